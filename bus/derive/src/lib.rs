@@ -1,0 +1,204 @@
+//! `#[derive(Message)]`: a fixed-layout message with its schema, checked when it is compiled.
+//!
+//! The derive refuses a struct that is not `repr(C)`, has implicit padding, has a field name that
+//! ROS 2 tools reject, or has a floating-point field that does not state its unit.
+
+use proc_macro::TokenStream;
+use proc_macro2::TokenStream as Tokens;
+use quote::quote;
+use syn::{Attribute, Data, DeriveInput, Error, Field, Fields, LitStr, Result, Type, parse_macro_input};
+
+/// Derives `bus::Message` for a `repr(C)` struct without padding.
+///
+/// On the struct: `#[message(type_name = "package/msg/Name")]`, and `definition = "…"` where the ROS 2
+/// definition is nested differently from the Rust struct. On fields: `#[field(unit = "m", frame =
+/// "world")]`; an empty unit means "that of the field that holds this message".
+#[proc_macro_derive(Message, attributes(message, field))]
+pub fn derive_message(input: TokenStream) -> TokenStream {
+    let input = parse_macro_input!(input as DeriveInput);
+    expand(&input).unwrap_or_else(Error::into_compile_error).into()
+}
+
+fn expand(input: &DeriveInput) -> Result<Tokens> {
+    require_repr_c(input)?;
+    if !input.generics.params.is_empty() {
+        return Err(Error::new_spanned(&input.generics, "a message has one layout: it cannot be generic"));
+    }
+    let options = MessageOptions::parse(input)?;
+    let fields = named_fields(input)?;
+    let name = &input.ident;
+    let types: Vec<&Type> = fields.iter().map(|field| &field.ty).collect();
+    let schemas = fields.iter().map(|field| field_schema(input, field)).collect::<Result<Vec<_>>>()?;
+    let (type_name, doc) = (&options.type_name, doc_text(&input.attrs));
+    let definition = match &options.definition {
+        Some(text) => quote!(::core::option::Option::Some(#text)),
+        None => quote!(::core::option::Option::None),
+    };
+    Ok(quote! {
+        const _: () = {
+            assert!(
+                ::core::mem::size_of::<#name>() == 0 #(+ ::core::mem::size_of::<#types>())*,
+                concat!("message ", stringify!(#name), " has implicit padding: reorder its fields or add `pad0`"),
+            );
+            assert!(::core::mem::align_of::<#name>() <= 8, "a message's alignment is at most 8 bytes");
+        };
+        // SAFETY: every field is `Pod` (required by `FieldType`), the struct is `repr(C)` and has no
+        // padding (asserted above), so every bit pattern is a value and every value is plain bytes.
+        unsafe impl ::bus::__private::bytemuck::Zeroable for #name {}
+        // SAFETY: as above.
+        unsafe impl ::bus::__private::bytemuck::Pod for #name {}
+        impl ::bus::schema::FieldType for #name {
+            const KIND: ::bus::schema::Kind = ::bus::schema::Kind::Message(<#name as ::bus::Message>::SCHEMA);
+        }
+        impl ::bus::Message for #name {
+            const SCHEMA: &'static ::bus::schema::Schema = &::bus::schema::Schema {
+                type_name: #type_name,
+                doc: #doc,
+                size: ::core::mem::size_of::<#name>(),
+                definition: #definition,
+                fields: &[#(#schemas),*],
+            };
+        }
+    })
+}
+
+/// The options of `#[message(…)]`.
+struct MessageOptions {
+    type_name: LitStr,
+    definition: Option<LitStr>,
+}
+
+impl MessageOptions {
+    fn parse(input: &DeriveInput) -> Result<Self> {
+        let (mut type_name, mut definition) = (None, None);
+        for attribute in input.attrs.iter().filter(|attribute| attribute.path().is_ident("message")) {
+            attribute.parse_nested_meta(|meta| {
+                let slot = if meta.path.is_ident("type_name") {
+                    &mut type_name
+                } else if meta.path.is_ident("definition") {
+                    &mut definition
+                } else {
+                    return Err(meta.error("expected `type_name` or `definition`"));
+                };
+                *slot = Some(meta.value()?.parse()?);
+                Ok(())
+            })?;
+        }
+        let type_name: LitStr = type_name.ok_or_else(|| {
+            Error::new_spanned(&input.ident, "add #[message(type_name = \"package/msg/Name\")]")
+        })?;
+        require_ros_type_name(&type_name)?;
+        Ok(Self { type_name, definition })
+    }
+}
+
+fn require_ros_type_name(type_name: &LitStr) -> Result<()> {
+    let text = type_name.value();
+    let parts: Vec<&str> = text.split('/').collect();
+    match parts.as_slice() {
+        [package, "msg", name]
+            if is_field_name(package) && name.starts_with(|c: char| c.is_ascii_uppercase()) =>
+        {
+            Ok(())
+        }
+        _ => Err(Error::new_spanned(type_name, "a type name has three parts: \"package/msg/Name\"")),
+    }
+}
+
+fn require_repr_c(input: &DeriveInput) -> Result<()> {
+    let mut is_c = false;
+    for attribute in input.attrs.iter().filter(|attribute| attribute.path().is_ident("repr")) {
+        attribute.parse_nested_meta(|meta| {
+            is_c |= meta.path.is_ident("C");
+            Ok(())
+        })?;
+    }
+    if is_c { Ok(()) } else { Err(Error::new_spanned(&input.ident, "a message needs #[repr(C)]")) }
+}
+
+fn named_fields(input: &DeriveInput) -> Result<&syn::punctuated::Punctuated<Field, syn::Token![,]>> {
+    match &input.data {
+        Data::Struct(data) => match &data.fields {
+            Fields::Named(fields) if !fields.named.is_empty() => Ok(&fields.named),
+            _ => Err(Error::new_spanned(&input.ident, "a message is a struct with named fields")),
+        },
+        _ => Err(Error::new_spanned(&input.ident, "a message is a struct with named fields")),
+    }
+}
+
+fn field_schema(input: &DeriveInput, field: &Field) -> Result<Tokens> {
+    let owner = &input.ident;
+    let ident = field.ident.as_ref().ok_or_else(|| Error::new_spanned(field, "unnamed field"))?;
+    let name = ident.to_string();
+    if !is_field_name(&name) {
+        return Err(Error::new_spanned(
+            ident,
+            "a field name matches ^[a-z](_?[a-z0-9]+)*$ (ROS 2 tools refuse others)",
+        ));
+    }
+    let (unit, frame) = unit_and_frame(field)?;
+    if unit.is_none() && is_float(&field.ty) {
+        return Err(Error::new_spanned(field, "state the unit: #[field(unit = \"m/s\")]"));
+    }
+    let (unit, frame) = (unit.unwrap_or_default(), frame.unwrap_or_default());
+    let (ty, doc) = (&field.ty, doc_text(&field.attrs));
+    Ok(quote! {
+        ::bus::schema::Field {
+            name: #name,
+            doc: #doc,
+            unit: #unit,
+            frame: #frame,
+            offset: ::core::mem::offset_of!(#owner, #ident),
+            kind: <#ty as ::bus::schema::FieldType>::KIND,
+        }
+    })
+}
+
+fn unit_and_frame(field: &Field) -> Result<(Option<String>, Option<String>)> {
+    let (mut unit, mut frame) = (None, None);
+    for attribute in field.attrs.iter().filter(|attribute| attribute.path().is_ident("field")) {
+        attribute.parse_nested_meta(|meta| {
+            let slot = if meta.path.is_ident("unit") {
+                &mut unit
+            } else if meta.path.is_ident("frame") {
+                &mut frame
+            } else {
+                return Err(meta.error("expected `unit` or `frame`"));
+            };
+            *slot = Some(meta.value()?.parse::<LitStr>()?.value());
+            Ok(())
+        })?;
+    }
+    Ok((unit, frame))
+}
+
+/// Whether `ty` is `f32`, `f64`, or an array of either.
+fn is_float(ty: &Type) -> bool {
+    match ty {
+        Type::Array(array) => is_float(&array.elem),
+        Type::Path(path) => path.path.is_ident("f64") || path.path.is_ident("f32"),
+        _ => false,
+    }
+}
+
+/// Whether `name` matches `^[a-z](_?[a-z0-9]+)*$`, the rule of ROS 2 field names.
+fn is_field_name(name: &str) -> bool {
+    name.starts_with(|c: char| c.is_ascii_lowercase())
+        && name.chars().all(|c| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '_')
+        && !name.contains("__")
+        && !name.ends_with('_')
+}
+
+/// The doc comment of an item as one line.
+fn doc_text(attributes: &[Attribute]) -> String {
+    let lines =
+        attributes.iter().filter(|attribute| attribute.path().is_ident("doc")).filter_map(|attribute| {
+            match &attribute.meta.require_name_value().ok()?.value {
+                syn::Expr::Lit(syn::ExprLit { lit: syn::Lit::Str(text), .. }) => {
+                    Some(text.value().trim().to_owned())
+                }
+                _ => None,
+            }
+        });
+    lines.take_while(|line| !line.is_empty()).collect::<Vec<_>>().join(" ")
+}

@@ -1,0 +1,75 @@
+//! What a publisher announces about its topic before the run starts, and the check of every reader.
+
+use crate::error::BusError;
+use crate::schema::Schema;
+use serde::{Deserialize, Serialize};
+use std::path::{Path, PathBuf};
+
+/// The message type of a topic, as its publisher was built with it.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct Announcement {
+    /// Three-part type name.
+    pub type_name: String,
+    /// Size of a message in bytes.
+    pub size: usize,
+    /// Hash of the layout.
+    pub layout_hash: u64,
+    /// The layout as a table, for error messages.
+    pub layout: String,
+    /// The ROS 2 definition, for recordings.
+    pub definition: String,
+}
+
+impl Announcement {
+    /// The announcement of a publisher that was built with `schema`.
+    #[must_use]
+    pub fn of(schema: &Schema) -> Self {
+        Self {
+            type_name: schema.type_name.to_owned(),
+            size: schema.size,
+            layout_hash: schema.layout_hash(),
+            layout: schema.layout(),
+            definition: schema.ros2_definition(),
+        }
+    }
+
+    /// Writes the announcement of topic number `topic` into the run directory.
+    pub(crate) fn store(&self, run_dir: &Path, topic: usize) -> Result<(), BusError> {
+        let path = path(run_dir, topic);
+        let text = serde_json::to_string(self).unwrap_or_else(|error| unreachable!("{error}"));
+        std::fs::write(&path, text).map_err(|source| BusError::File { action: "write", path, source })
+    }
+
+    /// Reads the announcement of topic number `topic`.
+    pub(crate) fn load(run_dir: &Path, topic: usize) -> Result<Self, BusError> {
+        let path = path(run_dir, topic);
+        let text = std::fs::read_to_string(&path).map_err(|source| BusError::File {
+            action: "read",
+            path: path.clone(),
+            source,
+        })?;
+        serde_json::from_str(&text).map_err(|error| BusError::Content {
+            path,
+            expected: "a topic's announcement",
+            found: error.to_string(),
+        })
+    }
+
+    /// Checks that a reader built with `schema` reads these bytes as they are meant.
+    pub(crate) fn check(&self, schema: &Schema, node: &str, port: &str, topic: &str) -> Result<(), BusError> {
+        if self.layout_hash == schema.layout_hash() {
+            return Ok(());
+        }
+        Err(BusError::LayoutMismatch {
+            topic: topic.to_owned(),
+            node: node.to_owned(),
+            port: port.to_owned(),
+            expected: schema.layout(),
+            found: self.layout.clone(),
+        })
+    }
+}
+
+fn path(run_dir: &Path, topic: usize) -> PathBuf {
+    run_dir.join(format!("topic-{topic}.json"))
+}

@@ -1,0 +1,154 @@
+//! The clock service: leads the processes of a run through the ready barrier and grants their ticks.
+
+use crate::control::{Control, Edge, Phase, Waited, Word, monotonic_ns, process_cpu_ns};
+use crate::error::BusError;
+use crate::plan::{Pace, Plan, Wait};
+use rustix::thread::clock_nanosleep_absolute;
+
+/// Runs the clock of this process's run until the run is over.
+///
+/// # Errors
+/// If the process was not started by a launcher; [`BusError::Aborted`] if the launcher ended the run early.
+pub fn run() -> Result<(), BusError> {
+    let plan = Plan::load(&crate::process::join()?)?;
+    crate::process::stay_on(plan.clock_cpu);
+    serve(&plan, &Control::open(&plan)?)
+}
+
+fn serve(plan: &Plan, control: &Control) -> Result<(), BusError> {
+    let clock = Clock::new(plan, control);
+    for phase in [Phase::Connecting, Phase::Running] {
+        clock.gather(phase)?;
+    }
+    let cpu_start_ns = process_cpu_ns();
+    control.set_host_start();
+    let end = match plan.pace {
+        Pace::Free => clock.run_free(),
+        Pace::Factor(factor) => clock.run_paced(factor),
+    }?;
+    clock.await_all(end)?;
+    control.set_host_end();
+    control.set_clock_cpu_ns(process_cpu_ns() - cpu_start_ns);
+    Ok(())
+}
+
+struct Clock<'a> {
+    plan: &'a Plan,
+    control: &'a Control,
+    grant_edges: Vec<Edge>,
+}
+
+impl<'a> Clock<'a> {
+    fn new(plan: &'a Plan, control: &'a Control) -> Self {
+        let grant_edges = (0..plan.nodes.len()).map(Edge::Grant).collect();
+        Self { plan, control, grant_edges }
+    }
+
+    /// Waits until every node is ready for `phase`, then starts it.
+    fn gather(&self, phase: Phase) -> Result<(), BusError> {
+        for node in 0..self.plan.nodes.len() {
+            reached(self.control.wait_ready(node, phase))?;
+        }
+        self.control.set_phase(phase);
+        Ok(())
+    }
+
+    /// Grants as far as the window reaches beyond the slowest node; returns the end tick.
+    fn run_free(&self) -> Result<u32, BusError> {
+        let window = self.plan.window_ticks.max(1);
+        // Granting half a window at a time lets fast nodes go on while the slowest catches up.
+        let stride = (window / 2).max(1);
+        let mut granted = 0;
+        loop {
+            let end = self.end_after(granted);
+            if granted >= end {
+                return Ok(end);
+            }
+            let target = end.min(self.slowest().saturating_add(window)).max(granted);
+            self.grant(target);
+            granted = target;
+            if granted < end {
+                self.await_all((granted + stride).saturating_sub(window))?;
+            }
+        }
+    }
+
+    /// Grants one tick per deadline; returns the end tick.
+    fn run_paced(&self, factor: f64) -> Result<u32, BusError> {
+        let start_ns = monotonic_ns();
+        for tick in 0..self.plan.duration_ticks {
+            sleep_until(start_ns + deadline_ns(tick, self.plan.tick_ns, factor));
+            let end = self.end_after(tick);
+            if tick >= end {
+                return Ok(end);
+            }
+            self.note_late_nodes(tick);
+            self.await_all((tick + 1).saturating_sub(self.plan.window_ticks.max(1)))?;
+            self.grant(tick + 1);
+        }
+        Ok(self.plan.duration_ticks)
+    }
+
+    /// The end tick, moved to `granted` if a stop was asked for.
+    fn end_after(&self, granted: u32) -> u32 {
+        if self.control.is_stop_requested() && granted < self.control.end_tick() {
+            self.control.set_end_tick(granted);
+        }
+        self.control.end_tick()
+    }
+
+    fn grant(&self, ticks: u32) {
+        self.control.advance(Word::Grant, ticks, &self.grant_edges);
+    }
+
+    fn slowest(&self) -> u32 {
+        let counts = (0..self.plan.nodes.len()).map(|node| self.control.count(Word::Done(node)));
+        counts.min().unwrap_or(u32::MAX)
+    }
+
+    /// Waits until every node has completed `ticks` ticks.
+    fn await_all(&self, ticks: u32) -> Result<(), BusError> {
+        for node in 0..self.plan.nodes.len() {
+            reached(self.control.wait(Word::Done(node), ticks, Edge::Done(node), Wait::Block, |_| false))?;
+        }
+        Ok(())
+    }
+
+    fn note_late_nodes(&self, tick: u32) {
+        let late = |node: &usize| self.control.count(Word::Done(*node)) < tick;
+        if (0..self.plan.nodes.len()).any(|node| late(&node)) {
+            self.control.count_missed_deadline((0..self.plan.nodes.len()).filter(late));
+        }
+    }
+}
+
+fn reached(waited: Waited) -> Result<(), BusError> {
+    if waited == Waited::Reached { Ok(()) } else { Err(BusError::Aborted) }
+}
+
+/// Host time of tick `tick` after the start: computed from the tick, so that it does not drift.
+#[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a run lasts less than 584 years")]
+fn deadline_ns(tick: u32, tick_ns: u64, factor: f64) -> u64 {
+    ((u64::from(tick) * tick_ns) as f64 / factor) as u64
+}
+
+#[allow(clippy::cast_possible_wrap, reason = "monotonic time fits 63 bits")]
+fn sleep_until(deadline_ns: u64) {
+    let deadline = rustix::time::Timespec {
+        tv_sec: (deadline_ns / 1_000_000_000) as i64,
+        tv_nsec: (deadline_ns % 1_000_000_000) as i64,
+    };
+    while clock_nanosleep_absolute(rustix::thread::ClockId::Monotonic, &deadline).is_err() {}
+}
+
+#[cfg(test)]
+mod tests {
+    use super::deadline_ns;
+
+    #[test]
+    fn deadlines_follow_the_pace() {
+        assert_eq!(deadline_ns(1000, 1_000_000, 1.0), 1_000_000_000);
+        assert_eq!(deadline_ns(1000, 1_000_000, 4.0), 250_000_000);
+        assert_eq!(deadline_ns(1000, 1_000_000, 0.5), 2_000_000_000);
+    }
+}

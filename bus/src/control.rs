@@ -1,0 +1,453 @@
+//! The control segment: the words in shared memory by which the processes of a run pace each other.
+//!
+//! One cache line a slot: the run, the grant, every topic, every node, every edge. A *word* counts
+//! ticks that are complete; an *edge* belongs to one reader of one word and holds the count that
+//! this reader sleeps for. A writer stores its word, then looks at the edges that read it, and wakes
+//! only those whose count is reached: nobody is woken for nothing, and nobody pays a system call
+//! for a reader that is awake.
+
+use crate::error::BusError;
+use crate::plan::{Plan, Wait};
+use memmap2::MmapRaw;
+use rustix::thread::futex;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicU32, AtomicU64, Ordering::SeqCst};
+
+const SLOT_BYTES: usize = 64;
+const MAGIC: u32 = 0x4855_4d35;
+/// The value of an edge on which nobody sleeps.
+const AWAKE: u32 = u32::MAX;
+/// How long a reader with `wait = "adaptive"` polls before it sleeps: about five context switches.
+const ADAPTIVE_SPIN_NS: u64 = 10_000;
+/// Polls between two looks at the clock or two yields.
+const POLLS: u32 = 64;
+
+/// How far the processes of a run have come together.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd)]
+#[repr(u32)]
+pub enum Phase {
+    /// Publishers are being created.
+    Announcing = 0,
+    /// Subscribers are being created.
+    Connecting = 1,
+    /// Ticks are granted.
+    Running = 2,
+}
+
+/// A tick word of the control segment.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Word {
+    /// Ticks that may be computed.
+    Grant,
+    /// Ticks of a topic whose sample has been sent.
+    Topic(usize),
+    /// Ticks that a node has completed.
+    Done(usize),
+}
+
+/// An edge of the control segment: one reader of one word.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Edge {
+    /// A node waits for the grant.
+    Grant(usize),
+    /// The clock waits for a node.
+    Done(usize),
+    /// A node waits for an input; counted over all inputs of the run.
+    Input(usize),
+}
+
+/// Why a wait ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Waited {
+    /// The word has reached the count.
+    Reached,
+    /// The run is over (or aborted) and will not reach it.
+    Over,
+}
+
+/// The mapped control segment of a run.
+#[derive(Debug)]
+pub struct Control {
+    map: MmapRaw,
+    topics: usize,
+    nodes: usize,
+    edges: usize,
+}
+
+/// Where the control segment of run `run_id` lies.
+#[must_use]
+pub fn control_path(run_id: &str) -> PathBuf {
+    Path::new("/dev/shm").join(format!("{}control", shm_prefix(run_id)))
+}
+
+/// What the name of every shared-memory file of run `run_id` starts with.
+#[must_use]
+pub fn shm_prefix(run_id: &str) -> String {
+    format!("hb_{run_id}_")
+}
+
+impl Control {
+    /// Creates the control segment of `plan`, readable and writable by this user alone.
+    ///
+    /// # Errors
+    /// If the segment exists already or shared memory cannot be had.
+    pub fn create(plan: &Plan) -> Result<Self, BusError> {
+        use std::os::unix::fs::OpenOptionsExt;
+        let path = control_path(&plan.run_id);
+        let fail = |source| BusError::File { action: "create", path: path.clone(), source };
+        let file = std::fs::OpenOptions::new()
+            .read(true)
+            .write(true)
+            .create_new(true)
+            .mode(0o600)
+            .open(&path)
+            .map_err(fail)?;
+        file.set_len(segment_bytes(plan) as u64).map_err(fail)?;
+        let control = Self::map(plan, &file).map_err(fail)?;
+        control.word(0, 0).store(MAGIC, SeqCst);
+        control.word(0, 2).store(plan.duration_ticks, SeqCst);
+        (0..control.edge_slots()).for_each(|edge| control.edge_at(edge).store(AWAKE, SeqCst));
+        Ok(control)
+    }
+
+    /// Opens the control segment of `plan`.
+    ///
+    /// # Errors
+    /// If it does not exist or belongs to another plan.
+    pub fn open(plan: &Plan) -> Result<Self, BusError> {
+        let path = control_path(&plan.run_id);
+        let fail = |source| BusError::File { action: "open", path: path.clone(), source };
+        let file = std::fs::OpenOptions::new().read(true).write(true).open(&path).map_err(fail)?;
+        let length = file.metadata().map_err(fail)?.len();
+        if length != segment_bytes(plan) as u64 {
+            return Err(BusError::Content {
+                path,
+                expected: "the control segment of this run",
+                found: format!("{length} bytes instead of {}", segment_bytes(plan)),
+            });
+        }
+        let control = Self::map(plan, &file).map_err(fail)?;
+        if control.word(0, 0).load(SeqCst) == MAGIC {
+            Ok(control)
+        } else {
+            Err(BusError::Content { path, expected: "a control segment", found: "other data".to_owned() })
+        }
+    }
+
+    fn map(plan: &Plan, file: &std::fs::File) -> std::io::Result<Self> {
+        let map = MmapRaw::map_raw(file)?;
+        let (topics, nodes, edges) = (plan.topics.len(), plan.nodes.len(), plan.edge_count());
+        Ok(Self { map, topics, nodes, edges })
+    }
+
+    /// Word `index` (0…15) of slot `slot`.
+    fn word(&self, slot: usize, index: usize) -> &AtomicU32 {
+        let offset = slot * SLOT_BYTES + index * 4;
+        assert!(index < 16 && offset + 4 <= self.map.len(), "slot {slot} is outside the control segment");
+        // SAFETY: the mapping lives as long as `self`, the offset is inside it (asserted) and a
+        // multiple of 4 from a page-aligned start; every process accesses these bytes as atomics only.
+        unsafe { AtomicU32::from_ptr(self.map.as_mut_ptr().add(offset).cast()) }
+    }
+
+    /// Double word `index` (0…7) of slot `slot`.
+    fn double_word(&self, slot: usize, index: usize) -> &AtomicU64 {
+        let offset = slot * SLOT_BYTES + index * 8;
+        assert!(index < 8 && offset + 8 <= self.map.len(), "slot {slot} is outside the control segment");
+        // SAFETY: as in `word`; the offset is a multiple of 8, and no slot uses the same bytes both
+        // as a word and as a double word.
+        unsafe { AtomicU64::from_ptr(self.map.as_mut_ptr().add(offset).cast()) }
+    }
+
+    fn tick_word(&self, word: Word) -> &AtomicU32 {
+        match word {
+            Word::Grant => self.word(1, 0),
+            Word::Topic(topic) => self.word(2 + topic, 0),
+            Word::Done(node) => self.word(self.node_slot(node), 1),
+        }
+    }
+
+    fn node_slot(&self, node: usize) -> usize {
+        2 + self.topics + node
+    }
+
+    fn edge_slots(&self) -> usize {
+        2 * self.nodes + self.edges
+    }
+
+    fn edge_at(&self, index: usize) -> &AtomicU32 {
+        self.word(2 + self.topics + self.nodes + index, 0)
+    }
+
+    fn edge_word(&self, edge: Edge) -> &AtomicU32 {
+        self.edge_at(match edge {
+            Edge::Grant(node) => node,
+            Edge::Done(node) => self.nodes + node,
+            Edge::Input(edge) => 2 * self.nodes + edge,
+        })
+    }
+
+    /// The count of `word`.
+    pub(crate) fn count(&self, word: Word) -> u32 {
+        self.tick_word(word).load(SeqCst)
+    }
+
+    /// Stores `count` in `word` and wakes those of its readers whose count is reached.
+    pub(crate) fn advance(&self, word: Word, count: u32, readers: &[Edge]) {
+        self.tick_word(word).store(count, SeqCst);
+        for &reader in readers {
+            let edge = self.edge_word(reader);
+            // Both sides are sequentially consistent: either the reader sees the new count before it
+            // sleeps, or this load sees what it sleeps for.
+            if edge.load(SeqCst) <= count {
+                wake_edge(edge);
+            }
+        }
+    }
+
+    /// Waits until `word` reaches `count`, or `is_over` says that it never will.
+    pub(crate) fn wait(
+        &self,
+        word: Word,
+        count: u32,
+        edge: Edge,
+        wait: Wait,
+        is_over: impl Fn(&Self) -> bool,
+    ) -> Waited {
+        let word = self.tick_word(word);
+        let spin = wait != Wait::Block;
+        let asleep_after_ns =
+            if wait == Wait::Adaptive { monotonic_ns() + ADAPTIVE_SPIN_NS } else { u64::MAX };
+        loop {
+            if word.load(SeqCst) >= count {
+                return Waited::Reached;
+            }
+            if self.is_aborted() || is_over(self) {
+                return Waited::Over;
+            }
+            if spin && (wait == Wait::Spin || monotonic_ns() < asleep_after_ns) {
+                poll(word, count);
+            } else {
+                self.sleep(word, count, self.edge_word(edge), &is_over);
+            }
+        }
+    }
+
+    fn sleep(&self, word: &AtomicU32, count: u32, edge: &AtomicU32, is_over: impl Fn(&Self) -> bool) {
+        edge.store(count, SeqCst);
+        if word.load(SeqCst) < count && !self.is_aborted() && !is_over(self) {
+            // An interrupted or spurious return is caught by the caller's loop.
+            let _ = futex::wait(edge, futex::Flags::empty(), count, None);
+        }
+        edge.store(AWAKE, SeqCst);
+    }
+
+    /// Wakes every sleeper, so that it looks whether the run is over.
+    fn wake_everybody(&self) {
+        (0..self.edge_slots()).for_each(|edge| wake_edge(self.edge_at(edge)));
+        for slot in 0..2 + self.topics + self.nodes {
+            (0..2).for_each(|index| wake_all(self.word(slot, index)));
+        }
+    }
+
+    /// The phase of the run.
+    #[must_use]
+    pub fn phase(&self) -> Phase {
+        match self.word(0, 1).load(SeqCst) {
+            0 => Phase::Announcing,
+            1 => Phase::Connecting,
+            _ => Phase::Running,
+        }
+    }
+
+    /// Moves the run to `phase` and wakes those who wait for it.
+    pub(crate) fn set_phase(&self, phase: Phase) {
+        self.word(0, 1).store(phase as u32, SeqCst);
+        wake_all(self.word(0, 1));
+    }
+
+    /// Waits until the run has reached `phase`.
+    pub(crate) fn wait_phase(&self, phase: Phase) -> Waited {
+        self.wait_plain(self.word(0, 1), phase as u32)
+    }
+
+    /// Notes that `node` is ready for `phase`.
+    pub(crate) fn set_ready(&self, node: usize, phase: Phase) {
+        let word = self.word(self.node_slot(node), 0);
+        word.store(phase as u32, SeqCst);
+        wake_all(word);
+    }
+
+    /// Waits until `node` is ready for `phase`; only for joining, where nobody counts microseconds.
+    pub(crate) fn wait_ready(&self, node: usize, phase: Phase) -> Waited {
+        self.wait_plain(self.word(self.node_slot(node), 0), phase as u32)
+    }
+
+    /// Whether `node` has reached `phase`.
+    #[must_use]
+    pub fn is_ready(&self, node: usize, phase: Phase) -> bool {
+        self.word(self.node_slot(node), 0).load(SeqCst) >= phase as u32
+    }
+
+    fn wait_plain(&self, word: &AtomicU32, value: u32) -> Waited {
+        loop {
+            let found = word.load(SeqCst);
+            if found >= value {
+                return Waited::Reached;
+            }
+            if self.is_aborted() {
+                return Waited::Over;
+            }
+            // The timeout covers an abort that falls between the look at the flag and the sleep.
+            let timeout = rustix::time::Timespec { tv_sec: 0, tv_nsec: 50_000_000 };
+            let _ = futex::wait(word, futex::Flags::empty(), found, Some(&timeout));
+        }
+    }
+
+    /// The tick at which the run ends; it shrinks when the run is stopped.
+    #[must_use]
+    pub fn end_tick(&self) -> u32 {
+        self.word(0, 2).load(SeqCst)
+    }
+
+    /// Ends the run at `tick`, which nobody may have passed.
+    pub(crate) fn set_end_tick(&self, tick: u32) {
+        self.word(0, 2).store(tick, SeqCst);
+        self.wake_everybody();
+    }
+
+    /// Ends the run at once: every wait returns.
+    pub fn abort(&self) {
+        self.word(0, 3).store(1, SeqCst);
+        // A sleeper stores its edge before it looks at the flag, so this wakes it or it sees the flag.
+        self.wake_everybody();
+    }
+
+    /// Whether the run was aborted.
+    #[must_use]
+    pub fn is_aborted(&self) -> bool {
+        self.word(0, 3).load(SeqCst) != 0
+    }
+
+    /// Asks the clock to end the run at the next tick boundary.
+    pub fn request_stop(&self) {
+        self.word(0, 4).store(1, SeqCst);
+    }
+
+    /// Whether a stop was asked for.
+    #[must_use]
+    pub fn is_stop_requested(&self) -> bool {
+        self.word(0, 4).load(SeqCst) != 0
+    }
+
+    /// Deadlines that the clock found missed: a node had not finished the tick before.
+    #[must_use]
+    pub fn missed_deadlines(&self) -> u32 {
+        self.word(0, 5).load(SeqCst)
+    }
+
+    /// Counts a missed deadline, and the nodes that were late.
+    pub(crate) fn count_missed_deadline(&self, late: impl Iterator<Item = usize>) {
+        self.word(0, 5).fetch_add(1, SeqCst);
+        late.for_each(|node| {
+            self.word(self.node_slot(node), 3).fetch_add(1, SeqCst);
+        });
+    }
+
+    /// Deadlines at which `node` was late.
+    #[must_use]
+    pub fn late_count(&self, node: usize) -> u32 {
+        self.word(self.node_slot(node), 3).load(SeqCst)
+    }
+
+    /// Ticks that every node has completed.
+    #[must_use]
+    pub fn completed_ticks(&self) -> u32 {
+        let end = self.end_tick();
+        (0..self.nodes).map(|node| self.count(Word::Done(node))).min().unwrap_or(0).min(end)
+    }
+
+    /// The nodes that have completed the fewest ticks.
+    #[must_use]
+    pub fn slowest_nodes(&self) -> Vec<usize> {
+        let count = |node: &usize| self.count(Word::Done(*node));
+        let fewest = (0..self.nodes).map(|node| count(&node)).min();
+        (0..self.nodes).filter(|node| Some(count(node)) == fewest).collect()
+    }
+
+    /// Host time at which the first and the last tick was granted and completed, in nanoseconds of the
+    /// monotonic clock; zero until then.
+    #[must_use]
+    pub fn host_span_ns(&self) -> (u64, u64) {
+        (self.double_word(0, 4).load(SeqCst), self.double_word(0, 5).load(SeqCst))
+    }
+
+    pub(crate) fn set_host_start(&self) {
+        self.double_word(0, 4).store(monotonic_ns(), SeqCst);
+    }
+
+    pub(crate) fn set_host_end(&self) {
+        self.double_word(0, 5).store(monotonic_ns(), SeqCst);
+    }
+
+    /// Processor time that `node` used between tick 0 and its last tick, in nanoseconds.
+    #[must_use]
+    pub fn cpu_ns(&self, node: usize) -> u64 {
+        self.double_word(self.node_slot(node), 2).load(SeqCst)
+    }
+
+    pub(crate) fn set_cpu_ns(&self, node: usize, ns: u64) {
+        self.double_word(self.node_slot(node), 2).store(ns, SeqCst);
+    }
+
+    /// Processor time of the clock service, in nanoseconds.
+    #[must_use]
+    pub fn clock_cpu_ns(&self) -> u64 {
+        self.double_word(0, 6).load(SeqCst)
+    }
+
+    pub(crate) fn set_clock_cpu_ns(&self, ns: u64) {
+        self.double_word(0, 6).store(ns, SeqCst);
+    }
+}
+
+fn segment_bytes(plan: &Plan) -> usize {
+    SLOT_BYTES * (2 + plan.topics.len() + plan.nodes.len() + 2 * plan.nodes.len() + plan.edge_count())
+}
+
+fn wake_edge(edge: &AtomicU32) {
+    if edge.swap(AWAKE, SeqCst) != AWAKE {
+        wake_all(edge);
+    }
+}
+
+fn wake_all(word: &AtomicU32) {
+    let _ = futex::wake(word, futex::Flags::empty(), i32::MAX as u32);
+}
+
+/// Polls `word` a few times, then lets another process have the core.
+fn poll(word: &AtomicU32, count: u32) {
+    for _ in 0..POLLS {
+        if word.load(SeqCst) >= count {
+            return;
+        }
+        std::hint::spin_loop();
+    }
+    rustix::thread::sched_yield();
+}
+
+/// The host's monotonic clock in nanoseconds.
+#[must_use]
+pub fn monotonic_ns() -> u64 {
+    clock_ns(rustix::time::ClockId::Monotonic)
+}
+
+/// Processor time of this process in nanoseconds.
+pub(crate) fn process_cpu_ns() -> u64 {
+    clock_ns(rustix::time::ClockId::ProcessCPUTime)
+}
+
+#[allow(clippy::cast_sign_loss, reason = "these clocks start at zero and only grow")]
+fn clock_ns(clock: rustix::time::ClockId) -> u64 {
+    let time = rustix::time::clock_gettime(clock);
+    time.tv_sec as u64 * 1_000_000_000 + time.tv_nsec as u64
+}

@@ -1,0 +1,177 @@
+//! What can go wrong on the bus, in words for the person who launched the run.
+
+use std::path::PathBuf;
+use thiserror::Error;
+
+/// An error of the bus; its text names the node, the topic and what to do.
+#[derive(Debug, Error)]
+pub enum BusError {
+    /// The process was not started by a launcher.
+    #[error(
+        "this process is a node of a run and was started without one: {variable} is not set. \
+         Name it as a `command` in a manifest and start it with `hummingbus run MANIFEST`"
+    )]
+    NotInARun {
+        /// The environment variable that is missing.
+        variable: &'static str,
+    },
+    /// A file of the run could not be read or written.
+    #[error("cannot {action} {path}: {source}")]
+    File {
+        /// What was tried.
+        action: &'static str,
+        /// Which file.
+        path: PathBuf,
+        /// Why it failed.
+        source: std::io::Error,
+    },
+    /// A file of the run does not hold what it should.
+    #[error(
+        "{path} is not readable as {expected}: {found}. Was it written by another version of hummingbus?"
+    )]
+    Content {
+        /// Which file.
+        path: PathBuf,
+        /// What it should hold.
+        expected: &'static str,
+        /// What is wrong with it.
+        found: String,
+    },
+    /// The plan has no node of this name.
+    #[error("the run has no node named `{node}`; it has {known}")]
+    UnknownNode {
+        /// The name asked for.
+        node: String,
+        /// The names there are.
+        known: String,
+    },
+    /// A node declares a port that the manifest does not wire.
+    #[error(
+        "node `{node}` declares the {direction} `{port}`, which the manifest does not {verb}; it has {known}"
+    )]
+    UnwiredPort {
+        /// The node.
+        node: String,
+        /// `input` or `output`.
+        direction: &'static str,
+        /// The port.
+        port: String,
+        /// `wire` or `name`.
+        verb: &'static str,
+        /// The ports the manifest has for this node.
+        known: String,
+    },
+    /// The manifest wires a port that the node never declared.
+    #[error("the manifest gives node `{node}` the {direction} `{port}`, which the node does not declare")]
+    UndeclaredPort {
+        /// The node.
+        node: String,
+        /// `input` or `output`.
+        direction: &'static str,
+        /// The port.
+        port: String,
+    },
+    /// Publisher and subscriber disagree on the bytes.
+    #[error(
+        "layout mismatch on topic {topic}: node `{node}` reads its port `{port}` as\n{expected}\n\
+         but the publisher sends\n{found}\nBuild both against the same message definition"
+    )]
+    LayoutMismatch {
+        /// The topic.
+        topic: String,
+        /// The node that joined.
+        node: String,
+        /// Its port.
+        port: String,
+        /// The layout the node was built with.
+        expected: String,
+        /// The layout the publisher announced.
+        found: String,
+    },
+    /// The type the manifest states for an output is not the type the node publishes.
+    #[error("node `{node}` publishes {found} on its output `{port}`, the manifest states {expected}")]
+    TypeMismatch {
+        /// The node.
+        node: String,
+        /// Its port.
+        port: String,
+        /// What the manifest states.
+        expected: String,
+        /// What the node publishes.
+        found: String,
+    },
+    /// The initial value of a delayed input does not fit its message.
+    #[error("node `{node}`, input `{port}`: the initial value does not fit {type_name}: {reason}")]
+    InitialValue {
+        /// The node.
+        node: String,
+        /// The input.
+        port: String,
+        /// The message type.
+        type_name: &'static str,
+        /// What does not fit.
+        reason: String,
+    },
+    /// The node's parameters are not what it reads.
+    #[error("node `{node}`: {reason}")]
+    Parameters {
+        /// The node.
+        node: String,
+        /// Which key, what was expected and found.
+        reason: String,
+    },
+    /// The transport refused something.
+    #[error("node `{node}`: {action} failed: {reason}")]
+    Transport {
+        /// The node.
+        node: String,
+        /// What was tried.
+        action: String,
+        /// iceoryx2's answer.
+        reason: String,
+    },
+    /// A sample is missing: a bug of the bus or a rogue publisher.
+    #[error(
+        "node `{node}`, topic {topic}, tick {tick}: sample {found} arrived where {expected} was due; \
+         a sample was lost or another process publishes on the topic"
+    )]
+    Gap {
+        /// The reader.
+        node: String,
+        /// The topic.
+        topic: String,
+        /// The reader's tick.
+        tick: u32,
+        /// The sequence number that was due.
+        expected: u64,
+        /// The sequence number that came.
+        found: String,
+    },
+    /// A node computed a tick and left a due output unwritten.
+    #[error(
+        "node `{node}` computed tick {tick} without writing its output `{port}`, which is due at this tick"
+    )]
+    UnwrittenOutput {
+        /// The node.
+        node: String,
+        /// The output.
+        port: String,
+        /// The tick.
+        tick: u32,
+    },
+    /// The node's own computation failed.
+    #[error("node `{node}` failed at tick {tick} (t = {time_s:.3} s): {reason}")]
+    Step {
+        /// The node.
+        node: String,
+        /// The tick.
+        tick: u32,
+        /// Simulation time in seconds.
+        time_s: f64,
+        /// The node's own words.
+        reason: String,
+    },
+    /// The launcher ended the run early.
+    #[error("the run was aborted")]
+    Aborted,
+}

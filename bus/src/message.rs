@@ -1,0 +1,47 @@
+//! The `Message` trait and how a message stands in a shared-memory sample.
+//!
+//! A sample is a slice of 64-bit words: one word whose last four bytes are the CDR encapsulation
+//! header `00 01 00 00` (little-endian XCDR1), then the message. A recorder therefore writes the
+//! sample's bytes from [`CDR_START`] on, untouched, as a ROS 2 message.
+
+use crate::schema::Schema;
+
+/// A fixed-layout message; implement it with `#[derive(bus::Message)]`.
+pub trait Message: bytemuck::Pod {
+    /// Type name, fields, units and frames.
+    const SCHEMA: &'static Schema;
+}
+
+/// Where the CDR encapsulation header starts in a sample's bytes.
+pub const CDR_START: usize = 4;
+/// Where the message starts in a sample's bytes.
+pub const BODY_START: usize = 8;
+
+/// The first word of every sample: four reserved bytes, then `00 01 00 00`.
+pub(crate) const ENCAPSULATION_WORD: u64 = u64::from_le_bytes([0, 0, 0, 0, 0, 1, 0, 0]);
+
+/// Words in a sample whose message has `size` bytes.
+#[must_use]
+pub(crate) const fn sample_words(size: usize) -> usize {
+    1 + size.div_ceil(8)
+}
+
+/// The message in a sample.
+///
+/// # Panics
+/// If the sample is shorter than the message; joining a run checks both sides' layouts.
+#[must_use]
+pub(crate) fn view<T: Message>(words: &[u64]) -> &T {
+    bytemuck::from_bytes(&bytemuck::cast_slice(&words[1..])[..T::SCHEMA.size])
+}
+
+/// As [`view`], for writing.
+pub(crate) fn view_mut<T: Message>(words: &mut [u64]) -> &mut T {
+    bytemuck::from_bytes_mut(&mut bytemuck::cast_slice_mut(&mut words[1..])[..T::SCHEMA.size])
+}
+
+/// The bytes that a recording holds: the encapsulation header and a message of `size` bytes.
+#[must_use]
+pub(crate) fn cdr_bytes(words: &[u64], size: usize) -> &[u8] {
+    &bytemuck::cast_slice(words)[CDR_START..BODY_START + size]
+}

@@ -1,0 +1,169 @@
+//! The resolved plan of a run: what the launcher writes and every process of the run reads.
+
+use crate::error::BusError;
+use serde::{Deserialize, Serialize};
+use std::path::Path;
+
+/// How time passes for the clock service.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Pace {
+    /// As fast as the nodes can.
+    Free,
+    /// This many simulated seconds per second of a monotonic clock.
+    Factor(f64),
+}
+
+/// How a process waits for what it needs.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Wait {
+    /// Sleep in the kernel (futex) until woken.
+    #[default]
+    Block,
+    /// Poll, yielding the core between polls.
+    Spin,
+    /// Poll for a short while, then sleep.
+    Adaptive,
+}
+
+/// A topic: samples of one message from one publisher.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct TopicPlan {
+    /// Name, such as `/plant/state`.
+    pub name: String,
+    /// Three-part type name.
+    pub type_name: String,
+    /// Ticks between two samples.
+    pub period_ticks: u32,
+}
+
+/// A node's input.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct InputPlan {
+    /// The port's name in the node.
+    pub port: String,
+    /// Index of the topic.
+    pub topic: usize,
+    /// 0: the sample of this tick; 1: that of the tick before.
+    pub delay_ticks: u32,
+    /// Field values of the sample that is read before the first one arrives.
+    pub initial: Option<serde_json::Value>,
+}
+
+/// A node's output.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct OutputPlan {
+    /// The port's name in the node.
+    pub port: String,
+    /// Index of the topic.
+    pub topic: usize,
+}
+
+/// A node: one process's part in the run.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct NodePlan {
+    /// Name, unique in the run.
+    pub name: String,
+    /// Ticks between two computations.
+    pub period_ticks: u32,
+    /// How it waits.
+    pub wait: Wait,
+    /// Cores it may run on; all where `None`.
+    pub cpu: Option<usize>,
+    /// Inputs, the one that arrives last first: waiting in this order wakes the process once a tick.
+    pub inputs: Vec<InputPlan>,
+    /// Outputs.
+    pub outputs: Vec<OutputPlan>,
+    /// The node's own parameters.
+    pub parameters: serde_json::Value,
+}
+
+/// Everything that the processes of a run must agree on.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct Plan {
+    /// Unique on this machine; part of every shared-memory name.
+    pub run_id: String,
+    /// Seed of every node's random stream.
+    pub seed: u64,
+    /// Simulated time of one tick in nanoseconds.
+    pub tick_ns: u64,
+    /// Ticks until the run ends.
+    pub duration_ticks: u32,
+    /// Ticks that a fast node may be ahead of the slowest.
+    pub window_ticks: u32,
+    /// Pacing.
+    pub pace: Pace,
+    /// Core of the clock service.
+    pub clock_cpu: Option<usize>,
+    /// Topics.
+    pub topics: Vec<TopicPlan>,
+    /// Nodes.
+    pub nodes: Vec<NodePlan>,
+}
+
+impl Plan {
+    /// The name of the plan's file in the run directory.
+    pub const FILE: &'static str = "plan.json";
+
+    /// Reads the plan of the run in `run_dir`.
+    ///
+    /// # Errors
+    /// If the file is missing or is not a plan.
+    pub fn load(run_dir: &Path) -> Result<Self, BusError> {
+        let path = run_dir.join(Self::FILE);
+        let text = std::fs::read_to_string(&path).map_err(|source| BusError::File {
+            action: "read",
+            path: path.clone(),
+            source,
+        })?;
+        serde_json::from_str(&text).map_err(|error| BusError::Content {
+            path,
+            expected: "the plan of a run",
+            found: error.to_string(),
+        })
+    }
+
+    /// Writes the plan into `run_dir`.
+    ///
+    /// # Errors
+    /// If the file cannot be written.
+    pub fn store(&self, run_dir: &Path) -> Result<(), BusError> {
+        let path = run_dir.join(Self::FILE);
+        let text = serde_json::to_string_pretty(self).unwrap_or_else(|error| unreachable!("{error}"));
+        std::fs::write(&path, text).map_err(|source| BusError::File { action: "write", path, source })
+    }
+
+    /// Simulated time of one tick in seconds.
+    #[must_use]
+    pub fn tick_s(&self) -> f64 {
+        self.tick_ns as f64 * 1e-9
+    }
+
+    /// The index of the node named `name`.
+    ///
+    /// # Errors
+    /// If there is none; the error lists those there are.
+    pub fn node_index(&self, name: &str) -> Result<usize, BusError> {
+        self.nodes.iter().position(|node| node.name == name).ok_or_else(|| BusError::UnknownNode {
+            node: name.to_owned(),
+            known: self.nodes.iter().map(|node| node.name.as_str()).collect::<Vec<_>>().join(", "),
+        })
+    }
+
+    /// Number of input edges of all nodes before node `node`.
+    pub(crate) fn edges_before(&self, node: usize) -> usize {
+        self.nodes[..node].iter().map(|node| node.inputs.len()).sum()
+    }
+
+    /// Number of input edges in the whole run.
+    pub(crate) fn edge_count(&self) -> usize {
+        self.edges_before(self.nodes.len())
+    }
+
+    /// The edges that carry topic `topic`, as indices into all input edges.
+    pub(crate) fn edges_of_topic(&self, topic: usize) -> Vec<usize> {
+        let inputs = self.nodes.iter().flat_map(|node| &node.inputs);
+        inputs.enumerate().filter(|(_, input)| input.topic == topic).map(|(edge, _)| edge).collect()
+    }
+}

@@ -1,0 +1,56 @@
+//! What a process of a run does to itself: die with its launcher, stay on its core.
+
+use crate::error::BusError;
+use rustix::process::{Signal, getppid, set_parent_process_death_signal};
+use rustix::thread::{CpuSet, sched_getaffinity, sched_setaffinity};
+use std::path::PathBuf;
+
+/// The environment variable that tells a process who its launcher is.
+pub const LAUNCHER_VARIABLE: &str = "HUMMINGBUS_LAUNCHER_PID";
+
+/// The environment variable that names the run directory.
+pub const RUN_VARIABLE: &str = "HUMMINGBUS_RUN";
+
+/// The directory of the run that started this process, with which the process from now on dies.
+///
+/// # Errors
+/// If it was not started by a launcher.
+pub(crate) fn join() -> Result<PathBuf, BusError> {
+    let run_dir = std::env::var(RUN_VARIABLE).map_err(|_| BusError::NotInARun { variable: RUN_VARIABLE })?;
+    die_with_parent();
+    Ok(PathBuf::from(run_dir))
+}
+
+/// Has the kernel kill this process when its launcher dies, even by `kill -9`.
+fn die_with_parent() {
+    let _ = set_parent_process_death_signal(Some(Signal::KILL));
+    // The launcher may have died before the line above; then nobody would ever send that signal.
+    let launcher = std::env::var(LAUNCHER_VARIABLE).ok().and_then(|pid| pid.parse::<i32>().ok());
+    let parent = getppid().map(|pid| pid.as_raw_nonzero().get());
+    if launcher.is_some() && launcher != parent {
+        std::process::exit(1);
+    }
+}
+
+/// Keeps this process on one core. Where the machine has no such core, it stays where it is: placement
+/// is a matter of speed, never of results.
+pub fn stay_on(cpu: Option<usize>) {
+    if let Some(cpu) = cpu {
+        let mut set = CpuSet::new();
+        set.set(cpu);
+        let _ = sched_setaffinity(None, &set);
+    }
+}
+
+/// The cores this process may run on, in ascending order; empty where the system does not tell.
+#[must_use]
+pub fn allowed_cores() -> Vec<usize> {
+    let set = sched_getaffinity(None).unwrap_or_else(|_| CpuSet::new());
+    (0..CpuSet::MAX_CPU).filter(|&cpu| set.is_set(cpu)).collect()
+}
+
+/// The number of the user this process runs as.
+#[must_use]
+pub fn user_id() -> u32 {
+    rustix::process::getuid().as_raw()
+}

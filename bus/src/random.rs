@@ -1,0 +1,47 @@
+//! One counter-based random stream per node, derived from the run's seed and the node's name.
+//!
+//! Adding or removing a node changes no other node's stream, and a stream does not depend on the
+//! order in which processes start.
+
+use rand_chacha::ChaCha8Rng;
+use rand_core::SeedableRng;
+
+/// The generator behind every node's noise.
+pub type Stream = ChaCha8Rng;
+
+/// The random stream of the node named `node` in a run whose seed is `run_seed`.
+///
+/// The 32-byte ChaCha key is the run seed followed by three FNV-1a hashes of the name, each started
+/// from another offset, so that two names share a stream only if all three collide.
+#[must_use]
+pub fn stream(run_seed: u64, node: &str) -> Stream {
+    let mut key = [0; 32];
+    key[..8].copy_from_slice(&run_seed.to_le_bytes());
+    for (lane, chunk) in key[8..].chunks_exact_mut(8).enumerate() {
+        let hash = fnv1a(node.as_bytes(), FNV_OFFSET.wrapping_add(lane as u64));
+        chunk.copy_from_slice(&hash.to_le_bytes());
+    }
+    Stream::from_seed(key)
+}
+
+pub(crate) const FNV_OFFSET: u64 = 0xcbf2_9ce4_8422_2325;
+const FNV_PRIME: u64 = 0x0000_0100_0000_01b3;
+
+/// FNV-1a over `bytes`, started from `offset` (Fowler, Noll, Vo; draft-eastlake-fnv).
+pub(crate) fn fnv1a(bytes: &[u8], offset: u64) -> u64 {
+    bytes.iter().fold(offset, |hash, &byte| (hash ^ u64::from(byte)).wrapping_mul(FNV_PRIME))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::stream;
+    use rand_core::Rng;
+
+    #[test]
+    fn a_stream_is_a_function_of_seed_and_name() {
+        let first = |seed, name| stream(seed, name).next_u64();
+        assert_eq!(first(7, "imu"), first(7, "imu"));
+        assert_ne!(first(7, "imu"), first(8, "imu"));
+        assert_ne!(first(7, "imu"), first(7, "gps"));
+    }
+}

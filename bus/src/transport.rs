@@ -1,0 +1,211 @@
+//! The only room that knows iceoryx2: one service per topic, its publisher and its subscribers.
+//!
+//! Each run has its own root path and its own prefix for shared-memory files, so runs never meet, and
+//! whatever a killed process leaves behind is found by name.
+
+use crate::control::shm_prefix;
+use crate::error::BusError;
+use crate::message::{ENCAPSULATION_WORD, sample_words};
+use iceoryx2::port::publisher::Publisher;
+use iceoryx2::port::subscriber::Subscriber;
+use iceoryx2::prelude::{
+    BackpressureStrategy, Config, FileName, LogLevel, NodeBuilder, Path as IoxPath, SemanticString,
+    ServiceName, SignalHandlingMode, ZeroCopySend, ipc, set_log_level,
+};
+use iceoryx2::sample::Sample;
+use iceoryx2::sample_mut::SampleMut;
+use iceoryx2::service::port_factory::publish_subscribe::PortFactory;
+use std::path::Path;
+
+type Service = ipc::Service;
+type Factory = PortFactory<Service, [u64], SampleHeader>;
+type Iceoryx2Node = iceoryx2::node::Node<Service>;
+
+/// Samples a subscriber holds at a time: the the current one and the one that replaces it.
+const BORROWED_SAMPLES: usize = 2;
+
+/// What travels beside a sample: its place in the run, and host times that no recording holds.
+#[derive(Clone, Copy, Debug, Default, ZeroCopySend)]
+#[repr(C)]
+pub struct SampleHeader {
+    /// The tick whose computation sent it.
+    pub tick: u64,
+    /// Samples sent before it on its topic.
+    pub sequence: u64,
+    /// Monotonic host time at which the sender had all its inputs.
+    pub received_ns: u64,
+    /// Monotonic host time at which the sender's computation was done.
+    pub done_ns: u64,
+    /// Monotonic host time at which it was sent.
+    pub sent_ns: u64,
+}
+
+/// This process's connection to the shared memory of a run.
+#[derive(Debug)]
+pub(crate) struct Transport {
+    node: Iceoryx2Node,
+    node_name: String,
+}
+
+/// How a topic's queues are sized.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Capacity {
+    /// Samples that wait in a subscriber's queue at most.
+    pub(crate) queued_samples: usize,
+    /// Subscribers of the topic.
+    pub(crate) subscribers: usize,
+    /// Processes of the run.
+    pub(crate) nodes: usize,
+}
+
+impl Transport {
+    /// Connects node `node_name` to the run `run_id`, whose directory is `run_dir`.
+    pub(crate) fn new(run_dir: &Path, run_id: &str, node_name: &str) -> Result<Self, BusError> {
+        set_log_level(LogLevel::Error);
+        let fail =
+            |reason: String| transport_error(node_name, "joining the shared memory of the run", reason);
+        let root = run_dir.join("iceoryx2");
+        let mut config = Config::default();
+        config.global.set_root_path(
+            &IoxPath::new(root.as_os_str().as_encoded_bytes())
+                .map_err(|error| fail(format!("{root:?}: {error:?}")))?,
+        );
+        config.global.prefix =
+            FileName::new(shm_prefix(run_id).as_bytes()).map_err(|e| fail(format!("{e:?}")))?;
+        // Dead processes are the launcher's business; looking for them here would only slow the start.
+        config.global.node.cleanup_dead_nodes_on_creation = false;
+        config.global.node.cleanup_dead_nodes_on_destruction = false;
+        config.global.service.cleanup_dead_nodes_on_open = false;
+        let node = NodeBuilder::new()
+            .config(&config)
+            .signal_handling_mode(SignalHandlingMode::Disabled)
+            .create::<Service>()
+            .map_err(|error| fail(format!("{error:?}")))?;
+        Ok(Self { node, node_name: node_name.to_owned() })
+    }
+
+    fn service(&self, topic: &str, capacity: Capacity) -> Result<Factory, BusError> {
+        let fail =
+            |reason: String| transport_error(&self.node_name, &format!("opening topic {topic}"), reason);
+        let name = ServiceName::new(topic).map_err(|error| fail(format!("{error:?}")))?;
+        self.node
+            .service_builder(&name)
+            .publish_subscribe::<[u64]>()
+            .user_header::<SampleHeader>()
+            // Nothing may be lost: a full queue must hold its sender up, not overwrite.
+            .enable_safe_overflow(false)
+            .subscriber_max_buffer_size(capacity.queued_samples)
+            .subscriber_max_borrowed_samples(BORROWED_SAMPLES)
+            .history_size(0)
+            .max_publishers(1)
+            .max_subscribers(capacity.subscribers.max(1))
+            .max_nodes(capacity.nodes)
+            .open_or_create()
+            .map_err(|error| fail(format!("{error:?}")))
+    }
+
+    /// Creates the publisher of `topic`, whose messages have `size` bytes.
+    pub(crate) fn publisher(&self, topic: &str, size: usize, capacity: Capacity) -> Result<Sender, BusError> {
+        let publisher = self
+            .service(topic, capacity)?
+            .publisher_builder()
+            .initial_max_slice_len(sample_words(size))
+            .max_loaned_samples(1)
+            .backpressure_strategy(BackpressureStrategy::RetryUntilDelivered)
+            .create()
+            .map_err(|error| {
+                transport_error(
+                    &self.node_name,
+                    &format!("publishing on topic {topic}"),
+                    format!("{error:?}"),
+                )
+            })?;
+        Ok(Sender { publisher, words: sample_words(size) })
+    }
+
+    /// Creates a subscriber of `topic`.
+    pub(crate) fn subscriber(&self, topic: &str, capacity: Capacity) -> Result<Receiver, BusError> {
+        let subscriber = self
+            .service(topic, capacity)?
+            .subscriber_builder()
+            .buffer_size(capacity.queued_samples)
+            .create()
+            .map_err(|error| {
+                transport_error(
+                    &self.node_name,
+                    &format!("subscribing to topic {topic}"),
+                    format!("{error:?}"),
+                )
+            })?;
+        Ok(Receiver { subscriber })
+    }
+}
+
+fn transport_error(node: &str, action: &str, reason: String) -> BusError {
+    BusError::Transport { node: node.to_owned(), action: action.to_owned(), reason }
+}
+
+/// The sending end of a topic.
+#[derive(Debug)]
+pub(crate) struct Sender {
+    publisher: Publisher<Service, [u64], SampleHeader>,
+    words: usize,
+}
+
+impl Sender {
+    /// Takes a sample to write into; it may hold the bytes of an earlier sample.
+    pub(crate) fn loan(&self) -> Result<Loan, String> {
+        let sample = self.publisher.loan_slice_uninit(self.words).map_err(|error| format!("{error:?}"))?;
+        // SAFETY: shared memory starts zeroed and holds nothing but words, and every bit pattern is a u64.
+        let mut sample = unsafe { sample.assume_init() };
+        sample.payload_mut()[0] = ENCAPSULATION_WORD;
+        Ok(Loan { sample })
+    }
+}
+
+/// A sample in the making.
+#[derive(Debug)]
+pub(crate) struct Loan {
+    sample: SampleMut<Service, [u64], SampleHeader>,
+}
+
+impl Loan {
+    pub(crate) fn words(&mut self) -> &mut [u64] {
+        self.sample.payload_mut()
+    }
+
+    pub(crate) fn send(mut self, header: SampleHeader) -> Result<(), String> {
+        *self.sample.user_header_mut() = header;
+        self.sample.send().map(|_| ()).map_err(|error| format!("{error:?}"))
+    }
+}
+
+/// The receiving end of a topic.
+#[derive(Debug)]
+pub(crate) struct Receiver {
+    subscriber: Subscriber<Service, [u64], SampleHeader>,
+}
+
+impl Receiver {
+    /// The oldest sample that was not received yet.
+    pub(crate) fn receive(&self) -> Result<Option<Received>, String> {
+        let sample = self.subscriber.receive().map_err(|error| format!("{error:?}"))?;
+        Ok(sample.map(|sample| Received { sample }))
+    }
+}
+
+/// A received sample; dropping it gives its memory back to the publisher.
+#[derive(Debug)]
+pub(crate) struct Received {
+    sample: Sample<Service, [u64], SampleHeader>,
+}
+
+impl Received {
+    pub(crate) fn words(&self) -> &[u64] {
+        self.sample.payload()
+    }
+
+    pub(crate) fn header(&self) -> &SampleHeader {
+        self.sample.user_header()
+    }
+}

@@ -1,0 +1,295 @@
+//! The altitude and attitude PID of the thesis (§3.2): set point and measurement to a wrench.
+//!
+//! Frames: world z up; body x forward, y left, z up; roll, pitch and yaw in the aerospace ZYX sequence.
+#![allow(
+    non_snake_case,
+    reason = "a trailing _W or _B names the frame a vector is written in, _N the newton"
+)]
+
+use crate::allocation::{Allocation, THRUST_RESERVE, Wrench};
+use crate::angle::wrap_rad;
+use crate::pid_gains::{LoopGains, PidGains};
+use crate::set_points::SetPoint;
+use nalgebra::Vector3;
+use vehicles::Vehicle;
+
+/// The least cosine of the tilt that is compensated: beyond 60° more thrust would push sideways rather
+/// than up. Tuned, no source.
+const TILT_COSINE_MIN: f64 = 0.5;
+
+/// What the law is told of the vehicle's motion.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Measurement {
+    /// Height in the world, m.
+    pub altitude_m: f64,
+    /// Rate of climb in the world, m/s.
+    pub climb_rate_m_s: f64,
+    /// Roll, rad.
+    pub roll_rad: f64,
+    /// Pitch, positive for nose down, rad.
+    pub pitch_rad: f64,
+    /// Yaw, counter-clockwise from above, rad.
+    pub yaw_rad: f64,
+    /// Angular rate of the body against the world, body axes, rad/s.
+    pub angular_velocity_B_rad_s: Vector3<f64>,
+}
+
+/// The part of the vehicle that the law has to know.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PidVehicle {
+    /// Mass, kg.
+    pub mass_kg: f64,
+    /// Moments of inertia about body x, y and z, kg·m².
+    pub inertia_B_kg_m2: Vector3<f64>,
+    /// Gravity, m/s².
+    pub gravity_m_s2: f64,
+    /// The least thrust to demand, N; see [`crate::allocation::Allocation::thrust_range_N`].
+    pub thrust_min_N: f64,
+    /// The greatest thrust to demand, N.
+    pub thrust_max_N: f64,
+}
+
+impl PidVehicle {
+    /// What the law has to know of `vehicle`, whose rotors are reached through `allocation`. Products of
+    /// inertia are left to the loops.
+    #[must_use]
+    pub fn new(vehicle: &Vehicle, allocation: &Allocation) -> Self {
+        let (thrust_min_N, thrust_max_N) = allocation.thrust_range_N(THRUST_RESERVE);
+        Self {
+            mass_kg: vehicle.mass_kg,
+            inertia_B_kg_m2: vehicle.inertia_kg_m2.diagonal(),
+            gravity_m_s2: vehicle.gravity_m_s2,
+            thrust_min_N,
+            thrust_max_N,
+        }
+    }
+}
+
+/// The law at one period: all that does not change during a run.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PidLaw {
+    /// Gains and limits.
+    pub gains: PidGains,
+    /// The vehicle that is flown.
+    pub vehicle: PidVehicle,
+    /// Time between two steps, s.
+    pub period_s: f64,
+}
+
+/// All that the law remembers: what its integrators ask for.
+///
+/// They are kept as accelerations, not as integrals of the error, so that a successor with other gains
+/// takes over without a jump.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct PidState {
+    /// Vertical acceleration that the altitude's integrator asks for, m/s².
+    pub altitude_m_s2: f64,
+    /// Angular acceleration about body x that the roll's integrator asks for, rad/s².
+    pub roll_rad_s2: f64,
+    /// The same about body y for pitch, rad/s².
+    pub pitch_rad_s2: f64,
+    /// The same about body z for yaw, rad/s².
+    pub yaw_rad_s2: f64,
+}
+
+impl PidLaw {
+    /// The wrench to demand now; advances the integrators by one period.
+    pub fn step(&self, state: &mut PidState, set_point: &SetPoint, measured: &Measurement) -> Wrench {
+        Wrench {
+            thrust_N: self.thrust_N(state, set_point.altitude_m, measured),
+            torque_B_N_m: self.torque_B_N_m(state, set_point, measured),
+        }
+    }
+
+    /// Thrust = m·(g + a) / (cos φ·cos θ): eq. 3.19 with its denominator corrected, where a is the
+    /// acceleration that the altitude loop asks for.
+    fn thrust_N(&self, state: &mut PidState, altitude_set_m: f64, measured: &Measurement) -> f64 {
+        let error_m = altitude_set_m - measured.altitude_m;
+        let gains = &self.gains.altitude;
+        let integral_m_s2 =
+            self.altitude_integral_m_s2(state.altitude_m_s2, error_m, measured.climb_rate_m_s);
+        let acceleration_m_s2 = demand(gains, error_m, integral_m_s2, measured.climb_rate_m_s);
+        let wanted_N =
+            self.vehicle.mass_kg * (self.vehicle.gravity_m_s2 + acceleration_m_s2) / tilt_cosine(measured);
+        let thrust_N = wanted_N.clamp(self.vehicle.thrust_min_N, self.vehicle.thrust_max_N);
+        // Against wind-up: at a limit the integrator may only come back from it.
+        if (wanted_N - thrust_N) * error_m <= 0.0 {
+            state.altitude_m_s2 = integral_m_s2;
+        }
+        thrust_N
+    }
+
+    fn altitude_integral_m_s2(&self, before_m_s2: f64, error_m: f64, climb_rate_m_s: f64) -> f64 {
+        if climb_rate_m_s.abs() > self.gains.altitude_integral_climb_max_m_s {
+            return before_m_s2;
+        }
+        let max_m_s2 = self.gains.altitude_integral_max_m_s2;
+        integrate(before_m_s2, &self.gains.altitude, error_m, self.period_s, max_m_s2)
+    }
+
+    /// Torque = inertia · (Kp·error + integral − Kd·body rate), axis by axis. The cross product of rate
+    /// and angular momentum is left to the loops: at 1 rad/s it is below 0.003 N·m on the Hummingbird.
+    fn torque_B_N_m(
+        &self,
+        state: &mut PidState,
+        set_point: &SetPoint,
+        measured: &Measurement,
+    ) -> Vector3<f64> {
+        let tilt_max_rad = self.gains.tilt_command_max_rad;
+        let roll_set_rad = set_point.roll_rad.clamp(-tilt_max_rad, tilt_max_rad);
+        let pitch_set_rad = set_point.pitch_rad.clamp(-tilt_max_rad, tilt_max_rad);
+        let [p, q, r]: [f64; 3] = measured.angular_velocity_B_rad_s.into();
+        let roll_error_rad = wrap_rad(roll_set_rad - measured.roll_rad);
+        let pitch_error_rad = pitch_set_rad - measured.pitch_rad;
+        let yaw_error_rad = wrap_rad(set_point.yaw_rad - measured.yaw_rad);
+        let acceleration_B_rad_s2 = Vector3::new(
+            self.angle_loop_rad_s2(&self.gains.roll, &mut state.roll_rad_s2, roll_error_rad, p),
+            self.angle_loop_rad_s2(&self.gains.pitch, &mut state.pitch_rad_s2, pitch_error_rad, q),
+            self.angle_loop_rad_s2(&self.gains.yaw, &mut state.yaw_rad_s2, yaw_error_rad, r),
+        );
+        self.vehicle.inertia_B_kg_m2.component_mul(&acceleration_B_rad_s2)
+    }
+
+    fn angle_loop_rad_s2(
+        &self,
+        gains: &LoopGains,
+        integral_rad_s2: &mut f64,
+        error_rad: f64,
+        rate_rad_s: f64,
+    ) -> f64 {
+        let max_rad_s2 = self.gains.attitude_integral_max_rad_s2;
+        *integral_rad_s2 = integrate(*integral_rad_s2, gains, error_rad, self.period_s, max_rad_s2);
+        demand(gains, error_rad, *integral_rad_s2, rate_rad_s)
+    }
+}
+
+/// The acceleration that a loop asks for.
+fn demand(gains: &LoopGains, error: f64, integral: f64, rate: f64) -> f64 {
+    gains.proportional_1_s2 * error + integral - gains.derivative_1_s * rate
+}
+
+/// The integrator's acceleration one period on, kept within ±`max`.
+fn integrate(before: f64, gains: &LoopGains, error: f64, period_s: f64, max: f64) -> f64 {
+    (before + gains.integral_1_s3 * error * period_s).clamp(-max, max)
+}
+
+/// The cosine of the angle between body z and world z, not below [`TILT_COSINE_MIN`].
+fn tilt_cosine(measured: &Measurement) -> f64 {
+    (measured.roll_rad.cos() * measured.pitch_rad.cos()).max(TILT_COSINE_MIN)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn law() -> PidLaw {
+        let vehicle = PidVehicle {
+            mass_kg: 0.5,
+            inertia_B_kg_m2: Vector3::new(5.0e-3, 6.0e-3, 8.0e-3),
+            gravity_m_s2: 9.81,
+            thrust_min_N: 1.0,
+            thrust_max_N: 10.0,
+        };
+        PidLaw { gains: PidGains::default(), vehicle, period_s: 1e-3 }
+    }
+
+    fn level() -> Measurement {
+        Measurement {
+            altitude_m: 1.0,
+            climb_rate_m_s: 0.0,
+            roll_rad: 0.0,
+            pitch_rad: 0.0,
+            yaw_rad: 0.0,
+            angular_velocity_B_rad_s: Vector3::zeros(),
+        }
+    }
+
+    fn hold() -> SetPoint {
+        SetPoint { altitude_m: 1.0, ..SetPoint::default() }
+    }
+
+    fn step(set_point: &SetPoint, measured: &Measurement) -> Wrench {
+        law().step(&mut PidState::default(), set_point, measured)
+    }
+
+    /// One second of holding 1 m at a measurement that stays as it is.
+    fn settle(law: &PidLaw, state: &mut PidState, measured: &Measurement) {
+        for _ in 0..1000 {
+            law.step(state, &hold(), measured);
+        }
+    }
+
+    #[test]
+    fn at_the_set_point_the_wrench_is_the_weight() {
+        let wrench = step(&hold(), &level());
+        assert!((wrench.thrust_N - 0.5 * 9.81).abs() < 1e-12);
+        assert_eq!(wrench.torque_B_N_m, Vector3::zeros());
+    }
+
+    /// Eq. 3.19 as printed would divide by cos φ·sin θ, which is zero here.
+    #[test]
+    fn a_tilt_is_made_up_for_up_to_sixty_degrees() {
+        let tilted = |roll_deg: f64| {
+            let measured = Measurement { roll_rad: roll_deg.to_radians(), pitch_rad: 0.1, ..level() };
+            step(&hold(), &measured).thrust_N
+        };
+        let expected_N = 0.5 * 9.81 / (20.0_f64.to_radians().cos() * 0.1_f64.cos());
+        assert!((tilted(20.0) - expected_N).abs() < 1e-12);
+        assert!((tilted(80.0) - 2.0 * 0.5 * 9.81).abs() < 1e-12);
+    }
+
+    #[test]
+    fn every_error_and_rate_acts_with_its_sign_and_inertia() {
+        let law = law();
+        let set = SetPoint { roll_rad: 0.1, pitch_rad: -0.1, yaw_rad: 0.2, ..hold() };
+        let torque = step(&set, &level()).torque_B_N_m;
+        let (roll, pitch, yaw) = (law.gains.roll, law.gains.pitch, law.gains.yaw);
+        assert!((torque.x - 5.0e-3 * roll.proportional_1_s2 * 0.1).abs() < 1e-12);
+        assert!((torque.y + 6.0e-3 * pitch.proportional_1_s2 * 0.1).abs() < 1e-12);
+        assert!((torque.z - 8.0e-3 * yaw.proportional_1_s2 * 0.2).abs() < 1e-12);
+        let turning = Measurement { angular_velocity_B_rad_s: Vector3::new(1.0, 0.0, 0.0), ..level() };
+        assert!((step(&hold(), &turning).torque_B_N_m.x + 5.0e-3 * roll.derivative_1_s).abs() < 1e-12);
+        let climbing = Measurement { climb_rate_m_s: 0.1, ..level() };
+        assert!(step(&hold(), &climbing).thrust_N < 0.5 * 9.81);
+    }
+
+    #[test]
+    fn yaw_turns_the_short_way() {
+        let set = SetPoint { yaw_rad: 3.1, ..hold() };
+        let measured = Measurement { yaw_rad: -3.1, ..level() };
+        assert!(step(&set, &measured).torque_B_N_m.z < 0.0);
+    }
+
+    #[test]
+    fn tilt_commands_are_cut_to_the_range_of_the_sticks() {
+        let at = |roll_deg: f64| {
+            step(&SetPoint { roll_rad: roll_deg.to_radians(), ..hold() }, &level()).torque_B_N_m.x
+        };
+        assert_eq!(at(70.0), at(30.0));
+    }
+
+    #[test]
+    fn the_altitude_integrator_takes_up_a_lasting_error_but_rests_in_a_climb() {
+        let mut state = PidState::default();
+        let low = Measurement { altitude_m: 0.95, ..level() };
+        settle(&law(), &mut state, &low);
+        let asked_m_s2 = law().gains.altitude.integral_1_s3 * 0.05;
+        assert!((state.altitude_m_s2 - asked_m_s2).abs() < 1e-9);
+        let before = state;
+        settle(&law(), &mut state, &Measurement { climb_rate_m_s: 0.3, ..low });
+        assert_eq!(state, before);
+    }
+
+    #[test]
+    fn the_integrator_rests_at_the_thrust_limit_and_comes_back_from_it() {
+        let mut weak = law();
+        weak.vehicle.thrust_max_N = 4.0;
+        let mut state = PidState { altitude_m_s2: 1.0, ..PidState::default() };
+        let sunk = Measurement { altitude_m: 0.95, ..level() };
+        settle(&weak, &mut state, &sunk);
+        assert_eq!(state.altitude_m_s2, 1.0);
+        let above = Measurement { altitude_m: 1.05, ..level() };
+        settle(&weak, &mut state, &above);
+        assert!(state.altitude_m_s2 < 1.0);
+    }
+}

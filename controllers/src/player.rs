@@ -1,0 +1,76 @@
+//! The player node: publishes the motor commands and the measured states of a real flight.
+
+use crate::flight_log::{ColumnMap, FlightLog, Row};
+use bus::kind::{Inputs, NodeKind, PortSpec, read_parameters};
+use bus::messages::{MeasuredState, MotorCommand};
+use bus::{BusError, Message, Node};
+use serde::Deserialize;
+use std::path::PathBuf;
+
+/// The player, for manifests.
+pub const KIND: NodeKind = NodeKind {
+    name: "player",
+    summary: "commands and measured states of a recorded flight (CSV with a column map)",
+    inputs: Inputs::Ports(&[]),
+    outputs: &[
+        PortSpec::required("command", MotorCommand::SCHEMA),
+        PortSpec::required("measured", MeasuredState::SCHEMA),
+    ],
+    check: |parameters| load(&read_parameters(parameters)?).map(|_| ()),
+    run,
+};
+
+/// Parameters of the player.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Parameters {
+    /// The flight.
+    data: PathBuf,
+    /// Time in the flight, from its first row, at which tick 0 lies.
+    #[serde(default)]
+    from_s: f64,
+    /// Which columns hold what.
+    columns: ColumnMap,
+}
+
+fn load(parameters: &Parameters) -> Result<FlightLog, String> {
+    let log = FlightLog::load(&parameters.data, &parameters.columns).map_err(|error| error.to_string())?;
+    if (0.0..log.duration_s()).contains(&parameters.from_s) {
+        Ok(log)
+    } else {
+        let (from_s, length_s) = (parameters.from_s, log.duration_s());
+        Err(format!("`from_s` is {from_s} s, the flight lasts {length_s:.3} s"))
+    }
+}
+
+fn run() -> Result<(), BusError> {
+    let mut node = Node::join()?;
+    let command = node.output::<MotorCommand>("command")?;
+    let measured = node.output::<MeasuredState>("measured")?;
+    let parameters: Parameters = node.parameters()?;
+    let log = load(&parameters).map_err(|error| node.error(error))?;
+    let mut hint = 0;
+    node.run(|tick| {
+        let time_s = parameters.from_s + tick.time_s();
+        if time_s > log.duration_s() {
+            return Err(format!(
+                "the flight ends {:.3} s after `from_s`; shorten run.duration_s",
+                log.duration_s() - parameters.from_s
+            ));
+        }
+        let row = log.at(time_s, &mut hint);
+        tick.write(command, MotorCommand { command: row.command, ..Default::default() })
+            .and_then(|()| tick.write(measured, message(&row)))
+            .map_err(|error| error.to_string())
+    })
+}
+
+fn message(row: &Row) -> MeasuredState {
+    MeasuredState {
+        position: row.position_m.into(),
+        velocity: row.velocity_m_s.into(),
+        attitude: row.quaternion(),
+        angular_velocity: row.angular_velocity_rad_s.into(),
+        ..Default::default()
+    }
+}

@@ -1,0 +1,359 @@
+//! The pilot's set points: steps, ramps and doublets on four channels, over integer ticks.
+//!
+//! A step or a ramp leads a channel to a new value, which it keeps; a doublet is added on top and leaves
+//! nothing behind. The thesis's "10 degree roll doublet in 1 sec" (§5.1) does not say what the second
+//! covers; here a doublet is `+amplitude` for `duration_s`, then `−amplitude` for `duration_s`, then
+//! nothing, so that one of 1 s lasts 2 s as a whole. Pulses of half a second would bring the
+//! Hummingbird to 8° only: behind its motors' lag 9° take about 0.57 s (gains 16 and 6, linearised).
+
+use serde::Deserialize;
+
+/// What the controllers are asked to hold.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct SetPoint {
+    /// Height in the world, m.
+    pub altitude_m: f64,
+    /// Roll, rad.
+    pub roll_rad: f64,
+    /// Pitch, positive for nose down, rad.
+    pub pitch_rad: f64,
+    /// Yaw, counter-clockwise from above, rad.
+    pub yaw_rad: f64,
+}
+
+/// One entry of a schedule as it stands in the manifest.
+///
+/// `{ kind = "step", channel = "altitude", at_s = 2.0, to = 1.5, unit = "m" }`,
+/// `{ kind = "ramp", channel = "yaw", at_s = 4.0, over_s = 2.0, to = 90.0, unit = "deg" }` or
+/// `{ kind = "doublet", channel = "roll", at_s = 6.0, amplitude = 10.0, unit = "deg", duration_s = 1.0 }`.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SetPointEntry {
+    /// "step", "ramp" or "doublet".
+    pub kind: String,
+    /// "altitude", "roll", "pitch" or "yaw".
+    pub channel: String,
+    /// When it begins, s; it acts from the first tick that is not earlier.
+    pub at_s: f64,
+    /// The unit of `to` and `amplitude`: "m" for altitude, "rad" or "deg" for the angles.
+    pub unit: String,
+    /// The value that a step or ramp leads to.
+    pub to: Option<f64>,
+    /// How long a ramp takes, s.
+    pub over_s: Option<f64>,
+    /// The size of a doublet's pulses; a negative one starts downwards.
+    pub amplitude: Option<f64>,
+    /// How long each of a doublet's two pulses takes, s.
+    pub duration_s: Option<f64>,
+}
+
+/// An entry that cannot be flown.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[error("set point {index} (the first is 0): `{key}` must be {expected}, found {found}")]
+pub struct SetPointError {
+    /// The entry's place in the list, from 0.
+    pub index: usize,
+    /// The key at fault.
+    pub key: &'static str,
+    /// What it may hold.
+    pub expected: String,
+    /// What it holds.
+    pub found: String,
+}
+
+/// A schedule compiled for one tick rate.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Schedule {
+    channels: [ChannelPlan; 4],
+}
+
+/// One channel's course, in SI units.
+#[derive(Debug, Clone, PartialEq, Default)]
+struct ChannelPlan {
+    initial: f64,
+    /// Steps and ramps in the order in which they begin; of two at one tick the later entry wins.
+    legs: Vec<Leg>,
+    /// In the order of the entries, in which they are summed.
+    doublets: Vec<Doublet>,
+}
+
+/// From one value to another over `length_ticks`, zero for a step.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Leg {
+    start_tick: u64,
+    length_ticks: u64,
+    from: f64,
+    to: f64,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Doublet {
+    start_tick: u64,
+    pulse_ticks: u64,
+    amplitude: f64,
+}
+
+/// The channels in the order of [`Schedule::channels`].
+const CHANNELS: [&str; 4] = ["altitude", "roll", "pitch", "yaw"];
+
+impl Schedule {
+    /// The course that `entries` describe from `initial` on, at `tick_rate_hz` ticks a second.
+    ///
+    /// # Errors
+    /// An entry has an unknown kind, channel or unit, a key that its kind lacks or does not know, or a
+    /// time that is negative or not finite.
+    pub fn new(
+        entries: &[SetPointEntry],
+        initial: &SetPoint,
+        tick_rate_hz: u32,
+    ) -> Result<Self, SetPointError> {
+        let mut schedule = Self::holding(initial);
+        for (index, entry) in entries.iter().enumerate() {
+            Reader { index, entry, tick_rate_hz }.add_to(&mut schedule.channels)?;
+        }
+        schedule.channels.iter_mut().for_each(ChannelPlan::link);
+        Ok(schedule)
+    }
+
+    /// The set point at `tick`, a function of the tick alone.
+    #[must_use]
+    pub fn at(&self, tick: u64) -> SetPoint {
+        let [altitude_m, roll_rad, pitch_rad, yaw_rad] =
+            std::array::from_fn(|channel| self.channels[channel].value(tick));
+        SetPoint { altitude_m, roll_rad, pitch_rad, yaw_rad }
+    }
+
+    fn holding(initial: &SetPoint) -> Self {
+        let values = [initial.altitude_m, initial.roll_rad, initial.pitch_rad, initial.yaw_rad];
+        Self { channels: values.map(|initial| ChannelPlan { initial, ..ChannelPlan::default() }) }
+    }
+}
+
+impl ChannelPlan {
+    /// Orders the legs and lets each begin where the one before has come to.
+    fn link(&mut self) {
+        // Stable, so that entries of one tick keep their order.
+        self.legs.sort_by_key(|leg| leg.start_tick);
+        let mut before = Leg { start_tick: 0, length_ticks: 0, from: self.initial, to: self.initial };
+        for leg in &mut self.legs {
+            leg.from = before.value(leg.start_tick);
+            before = *leg;
+        }
+    }
+
+    fn value(&self, tick: u64) -> f64 {
+        let begun = self.legs.partition_point(|leg| leg.start_tick <= tick);
+        let held = if begun == 0 { self.initial } else { self.legs[begun - 1].value(tick) };
+        held + self.doublets.iter().map(|doublet| doublet.value(tick)).sum::<f64>()
+    }
+}
+
+impl Leg {
+    /// The value at `tick`, which is not before the start.
+    fn value(&self, tick: u64) -> f64 {
+        let elapsed_ticks = tick - self.start_tick;
+        if elapsed_ticks >= self.length_ticks {
+            return self.to;
+        }
+        self.from + (self.to - self.from) * (elapsed_ticks as f64 / self.length_ticks as f64)
+    }
+}
+
+impl Doublet {
+    fn value(&self, tick: u64) -> f64 {
+        match tick.checked_sub(self.start_tick).map(|elapsed| elapsed / self.pulse_ticks) {
+            Some(0) => self.amplitude,
+            Some(1) => -self.amplitude,
+            _ => 0.0,
+        }
+    }
+}
+
+/// Reads one entry, and knows its place for the errors.
+struct Reader<'a> {
+    index: usize,
+    entry: &'a SetPointEntry,
+    tick_rate_hz: u32,
+}
+
+impl Reader<'_> {
+    fn add_to(&self, channels: &mut [ChannelPlan; 4]) -> Result<(), SetPointError> {
+        let channel = self.channel()?;
+        let plan = &mut channels[channel];
+        let si_per_unit = self.si_per_unit(channel)?;
+        match self.entry.kind.as_str() {
+            "step" => plan.legs.push(self.step(si_per_unit)?),
+            "ramp" => plan.legs.push(self.ramp(si_per_unit)?),
+            "doublet" => plan.doublets.push(self.doublet(si_per_unit)?),
+            other => return Err(self.error("kind", "\"step\", \"ramp\" or \"doublet\"", quoted(other))),
+        }
+        Ok(())
+    }
+
+    fn step(&self, si_per_unit: f64) -> Result<Leg, SetPointError> {
+        self.refuse("over_s", self.entry.over_s)?;
+        self.refuse("amplitude", self.entry.amplitude)?;
+        self.refuse("duration_s", self.entry.duration_s)?;
+        let to = si_per_unit * self.number("to", self.entry.to)?;
+        Ok(Leg { start_tick: self.start_tick()?, length_ticks: 0, from: to, to })
+    }
+
+    fn ramp(&self, si_per_unit: f64) -> Result<Leg, SetPointError> {
+        self.refuse("amplitude", self.entry.amplitude)?;
+        self.refuse("duration_s", self.entry.duration_s)?;
+        let to = si_per_unit * self.number("to", self.entry.to)?;
+        let length_ticks = self.length_ticks("over_s", self.entry.over_s)?;
+        Ok(Leg { start_tick: self.start_tick()?, length_ticks, from: to, to })
+    }
+
+    fn doublet(&self, si_per_unit: f64) -> Result<Doublet, SetPointError> {
+        self.refuse("to", self.entry.to)?;
+        self.refuse("over_s", self.entry.over_s)?;
+        let amplitude = si_per_unit * self.number("amplitude", self.entry.amplitude)?;
+        let pulse_ticks = self.length_ticks("duration_s", self.entry.duration_s)?;
+        Ok(Doublet { start_tick: self.start_tick()?, pulse_ticks, amplitude })
+    }
+
+    fn channel(&self) -> Result<usize, SetPointError> {
+        let given = self.entry.channel.as_str();
+        CHANNELS.iter().position(|name| *name == given).ok_or_else(|| {
+            self.error("channel", "\"altitude\", \"roll\", \"pitch\" or \"yaw\"", quoted(given))
+        })
+    }
+
+    fn si_per_unit(&self, channel: usize) -> Result<f64, SetPointError> {
+        match (CHANNELS[channel], self.entry.unit.as_str()) {
+            ("altitude", "m") => Ok(1.0),
+            ("altitude", other) => Err(self.error("unit", "\"m\" on channel altitude", quoted(other))),
+            (_, "rad") => Ok(1.0),
+            (_, "deg") => Ok(1.0_f64.to_radians()),
+            (name, other) => {
+                Err(self.error("unit", &format!("\"rad\" or \"deg\" on channel {name}"), quoted(other)))
+            }
+        }
+    }
+
+    /// The first tick that is not before `at_s`.
+    fn start_tick(&self) -> Result<u64, SetPointError> {
+        let at_s = self.entry.at_s;
+        if !(at_s.is_finite() && at_s >= 0.0) {
+            return Err(self.error("at_s", "a finite time, zero or more", at_s.to_string()));
+        }
+        // A time that is a tick's in decimal may come out just above it in binary.
+        Ok((at_s * f64::from(self.tick_rate_hz) - 1e-6).ceil().max(0.0) as u64)
+    }
+
+    /// A length of time as a whole number of ticks, at least one.
+    fn length_ticks(&self, key: &'static str, value: Option<f64>) -> Result<u64, SetPointError> {
+        let length_s = self.number(key, value)?;
+        if length_s <= 0.0 {
+            return Err(self.error(key, "a time greater than zero", length_s.to_string()));
+        }
+        Ok((length_s * f64::from(self.tick_rate_hz)).round().max(1.0) as u64)
+    }
+
+    fn number(&self, key: &'static str, value: Option<f64>) -> Result<f64, SetPointError> {
+        let expected = format!("a finite number in a {}", self.entry.kind);
+        match value {
+            Some(number) if number.is_finite() => Ok(number),
+            Some(number) => Err(self.error(key, &expected, number.to_string())),
+            None => Err(self.error(key, &expected, "nothing".to_owned())),
+        }
+    }
+
+    fn refuse(&self, key: &'static str, value: Option<f64>) -> Result<(), SetPointError> {
+        match value {
+            None => Ok(()),
+            Some(number) => {
+                Err(self.error(key, &format!("left out of a {}", self.entry.kind), number.to_string()))
+            }
+        }
+    }
+
+    fn error(&self, key: &'static str, expected: &str, found: String) -> SetPointError {
+        SetPointError { index: self.index, key, expected: expected.to_owned(), found }
+    }
+}
+
+fn quoted(text: &str) -> String {
+    format!("\"{text}\"")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[derive(Deserialize)]
+    struct Manifest {
+        set_points: Vec<SetPointEntry>,
+    }
+
+    fn schedule(entries: &str) -> Result<Schedule, SetPointError> {
+        let manifest: Manifest = toml::from_str(&format!("set_points = [{entries}]")).unwrap();
+        Schedule::new(&manifest.set_points, &SetPoint { altitude_m: 1.0, ..SetPoint::default() }, 1000)
+    }
+
+    #[test]
+    fn the_scenario_of_the_thesis_steps_and_rolls_on_its_ticks() {
+        let schedule = schedule(
+            r#"{kind="doublet", channel="roll", at_s=6.0, amplitude=10.0, unit="deg", duration_s=1.0},
+               {kind="step", channel="altitude", at_s=2.0, to=1.5, unit="m"}"#,
+        )
+        .unwrap();
+        let altitude_m = |tick| schedule.at(tick).altitude_m;
+        assert_eq!((altitude_m(0), altitude_m(1999), altitude_m(2000)), (1.0, 1.0, 1.5));
+        let roll_deg = |tick| schedule.at(tick).roll_rad.to_degrees().round();
+        let ticks = [5999, 6000, 6999, 7000, 7999, 8000, 1_000_000];
+        assert_eq!(ticks.map(roll_deg), [0.0, 10.0, 10.0, -10.0, -10.0, 0.0, 0.0]);
+    }
+
+    #[test]
+    fn a_ramp_starts_from_where_the_channel_is_even_within_another() {
+        let schedule = schedule(
+            r#"{kind="ramp", channel="altitude", at_s=1.0, over_s=2.0, to=3.0, unit="m"},
+               {kind="ramp", channel="altitude", at_s=2.0, over_s=1.0, to=0.0, unit="m"},
+               {kind="step", channel="yaw", at_s=0.0, to=0.5, unit="rad"}"#,
+        )
+        .unwrap();
+        let altitude_m = |tick| schedule.at(tick).altitude_m;
+        let ticks = [1000, 1500, 2000, 2500, 3000, 9000];
+        assert_eq!(ticks.map(altitude_m), [1.0, 1.5, 2.0, 1.0, 0.0, 0.0]);
+        assert_eq!(schedule.at(0).yaw_rad, 0.5);
+    }
+
+    #[test]
+    fn a_doublet_rides_on_a_step_and_a_decimal_time_meets_its_tick() {
+        let schedule = schedule(
+            r#"{kind="step", channel="pitch", at_s=0.007, to=0.1, unit="rad"},
+               {kind="doublet", channel="pitch", at_s=0.057, amplitude=-0.2, unit="rad", duration_s=0.001}"#,
+        )
+        .unwrap();
+        let pitch_rad = |tick| schedule.at(tick).pitch_rad;
+        assert_eq!((pitch_rad(6), pitch_rad(7), pitch_rad(56)), (0.0, 0.1, 0.1));
+        assert_eq!((pitch_rad(57), pitch_rad(58), pitch_rad(59)), (0.1 - 0.2, 0.1 + 0.2, 0.1));
+    }
+
+    #[test]
+    fn errors_name_the_entry_the_key_what_may_stand_there_and_what_does() {
+        let good = r#"{kind="step", channel="roll", at_s=0.0, to=1.0, unit="deg"}"#;
+        let cases = [
+            (r#"{kind="jump", channel="roll", at_s=0.0, to=1.0, unit="deg"}"#, "`kind` must be \"step\""),
+            (r#"{kind="step", channel="rol", at_s=0.0, to=1.0, unit="deg"}"#, "found \"rol\""),
+            (r#"{kind="step", channel="roll", at_s=0.0, to=1.0, unit="m"}"#, "`unit` must be \"rad\" or"),
+            (r#"{kind="step", channel="roll", at_s=0.0, unit="deg"}"#, "`to` must be a finite number"),
+            (r#"{kind="step", channel="roll", at_s=-1.0, to=1.0, unit="deg"}"#, "`at_s` must be"),
+            (
+                r#"{kind="doublet", channel="roll", at_s=0.0, to=1.0, unit="deg"}"#,
+                "`to` must be left out of a doublet, found 1",
+            ),
+            (
+                r#"{kind="ramp", channel="roll", at_s=0.0, over_s=0.0, to=1.0, unit="deg"}"#,
+                "`over_s` must be a time greater than zero, found 0",
+            ),
+        ];
+        for (entry, expected) in cases {
+            let error = schedule(&format!("{good}, {entry}")).unwrap_err().to_string();
+            assert!(error.contains("set point 1") && error.contains(expected), "{error}");
+        }
+    }
+}

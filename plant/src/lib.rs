@@ -1,0 +1,33 @@
+//! Vehicle physics: what moves, and by which equations; and the node that puts it on the bus.
+//!
+//! | room | what it holds |
+//! |---|---|
+//! | [`state`] | the rigid body and the rotors, as carried from tick to tick |
+//! | `motor` | the lag between commanded and actual rotor speed |
+//! | [`rotor`] | thrust and torques of the rotors on the body |
+//! | [`newton_euler`] | the free-flight backend: equations of motion and their integration |
+//! | [`node`] | the plant as a process of a run
+//!
+//! ```
+//! use nalgebra::Vector3;
+//! use plant::{NewtonEuler, RigidBody};
+//!
+//! let text = include_str!("../../vehicles/hummingbird.toml");
+//! let model = NewtonEuler::new(vehicles::Vehicle::parse(text, "hummingbird.toml")?, 1);
+//! let hover = model.vehicle().hover_command();
+//! let mut state = model.start(RigidBody::level_at(Vector3::new(0.0, 0.0, 1.0)), hover);
+//! model.step(&mut state, &[hover; 4], 0.001);
+//! assert!((state.body.position_W_m.z - 1.0).abs() < 1e-9);
+//! # Ok::<(), vehicles::VehicleError>(())
+//! ```
+#![forbid(unsafe_code)]
+
+mod motor;
+pub mod newton_euler;
+pub mod node;
+pub mod rotor;
+pub mod state;
+
+pub use newton_euler::{Motion, NewtonEuler};
+pub use rotor::Wrench;
+pub use state::{RigidBody, RotorState, State};

@@ -1,0 +1,25 @@
+//! The lag between the commanded and the actual rotor speed, with unit gain at rest (thesis section 4.2).
+
+use vehicles::MotorModel;
+
+use crate::state::{RotorRates, RotorState};
+
+/// Rates of change of a rotor whose motor is asked for `target_rad_s`.
+pub(crate) fn rates(model: &MotorModel, rotor: &RotorState, target_rad_s: f64) -> RotorRates {
+    let missing_rad_s = target_rad_s - rotor.speed_rad_s;
+    match *model {
+        MotorModel::SecondOrder { natural_frequency_rad_s: wn, damping_ratio: zeta } => RotorRates {
+            acceleration_rad_s2: rotor.acceleration_rad_s2,
+            jerk_rad_s3: wn * wn * missing_rad_s - 2.0 * zeta * wn * rotor.acceleration_rad_s2,
+        },
+        MotorModel::FirstOrder { time_constant_s } => {
+            RotorRates { acceleration_rad_s2: missing_rad_s / time_constant_s, jerk_rad_s3: 0.0 }
+        }
+    }
+}
+
+/// The rotor with an acceleration that fits its speed and target. A second-order motor carries its
+/// acceleration as a state; a first-order one has none, and only shows it.
+pub(crate) fn settled(model: &MotorModel, rotor: &RotorState, target_rad_s: f64) -> RotorState {
+    RotorState { acceleration_rad_s2: rates(model, rotor, target_rad_s).acceleration_rad_s2, ..*rotor }
+}

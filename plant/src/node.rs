@@ -1,0 +1,178 @@
+//! The plant node: steps the vehicle from tick to tick under the motor command of the tick before.
+//!
+//! At tick k it moves the state from k − 1 to k under the command stamped k − 1, then publishes it. With a
+//! `measured` input it is set to the measured state at the start of each window, after publishing: what it
+//! publishes at that tick is the end of the window before.
+#![allow(non_snake_case, reason = "a trailing _W or _B names the frame a vector is written in")]
+
+use crate::newton_euler::NewtonEuler;
+use crate::state::{RigidBody, State};
+use bus::kind::{Inputs, NodeKind, PortSpec, read_parameters};
+use bus::messages::{
+    BodyTransform, MeasuredState, MotorCommand, Orientation, PlantState, Point, Pose, PoseStamped, Quaternion,
+};
+use bus::{BusError, Message, Node, Output, Tick};
+use nalgebra::{UnitQuaternion, Vector3};
+use serde::Deserialize;
+use std::path::PathBuf;
+use vehicles::Vehicle;
+
+/// The plant, for manifests.
+pub const KIND: NodeKind = NodeKind {
+    name: "plant",
+    summary: "flies the vehicle of a vehicle file (Newton-Euler, free flight)",
+    inputs: Inputs::Ports(&[
+        PortSpec::required("command", MotorCommand::SCHEMA),
+        PortSpec::optional("measured", MeasuredState::SCHEMA),
+    ]),
+    outputs: &[
+        PortSpec::required("state", PlantState::SCHEMA),
+        PortSpec::optional("pose", PoseStamped::SCHEMA),
+        PortSpec::optional("tf", BodyTransform::SCHEMA),
+    ],
+    check,
+    run,
+};
+
+/// Parameters of the plant.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Parameters {
+    /// Vehicle file.
+    vehicle: PathBuf,
+    /// Position of the centre of mass at tick 0, in the world.
+    #[serde(default)]
+    initial_position_m: [f64; 3],
+    /// Motor command at which the rotors turn steadily at tick 0; that of hover where absent.
+    initial_command: Option<f64>,
+    /// Integration steps per tick.
+    #[serde(default = "one")]
+    substeps: u32,
+    /// With a `measured` input: time between two settings to the measured state.
+    window_s: Option<f64>,
+}
+
+fn one() -> u32 {
+    1
+}
+
+fn check(parameters: &serde_json::Value) -> Result<(), String> {
+    let parameters: Parameters = read_parameters(parameters)?;
+    if parameters.substeps == 0 {
+        return Err("`substeps` is 0, expected at least 1".to_owned());
+    }
+    if parameters.window_s.is_some_and(|window_s| !(window_s > 0.0 && window_s.is_finite())) {
+        return Err("`window_s` must be a positive number of seconds".to_owned());
+    }
+    Vehicle::load(&parameters.vehicle).map(|_| ()).map_err(|error| error.to_string())
+}
+
+fn run() -> Result<(), BusError> {
+    let mut node = Node::join()?;
+    let parameters: Parameters = node.parameters()?;
+    let vehicle = Vehicle::load(&parameters.vehicle).map_err(|error| node.error(error))?;
+    let command = node.input::<MotorCommand>("command")?;
+    let measured = node.optional_input::<MeasuredState>("measured");
+    let outputs = Outputs {
+        state: node.output("state")?,
+        pose: node.optional_output("pose")?,
+        tf: node.optional_output("tf")?,
+    };
+    let window_ticks = window_ticks(&node, measured.is_some(), parameters.window_s)?;
+    let dt_s = node.period_s();
+    let model = NewtonEuler::new(vehicle, parameters.substeps);
+    let initial_command = parameters.initial_command.unwrap_or_else(|| model.vehicle().hover_command());
+    let mut state =
+        model.start(RigidBody::level_at(Vector3::from(parameters.initial_position_m)), initial_command);
+    node.run(|tick| {
+        let window = measured.filter(|_| tick.number().is_multiple_of(window_ticks));
+        let is_first = tick.number() == 0;
+        if !is_first {
+            model.step(&mut state, &tick.get(command).command, dt_s);
+        } else if let Some(measured) = window {
+            state.body = body(tick.get(measured));
+        }
+        outputs.publish(tick, &model, &state)?;
+        if let Some(measured) = window {
+            state.body = body(tick.get(measured));
+        }
+        Ok::<_, BusError>(())
+    })
+}
+
+#[allow(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "checked to be positive and short"
+)]
+fn window_ticks(node: &Node, has_measured: bool, window_s: Option<f64>) -> Result<u32, BusError> {
+    match (has_measured, window_s) {
+        (true, Some(window_s)) => {
+            let ticks = window_s / node.tick_s();
+            if (ticks - ticks.round()).abs() < 1e-6 && ticks.round() >= 1.0 {
+                Ok(ticks.round() as u32)
+            } else {
+                Err(node.error(format!("`window_s` is {window_s}, which is not a whole number of ticks")))
+            }
+        }
+        (false, None) => Ok(u32::MAX),
+        (true, None) => Err(node.error("the input `measured` needs the parameter `window_s`")),
+        (false, Some(_)) => Err(node.error("the parameter `window_s` needs the input `measured`")),
+    }
+}
+
+struct Outputs {
+    state: Output<PlantState>,
+    pose: Option<Output<PoseStamped>>,
+    tf: Option<Output<BodyTransform>>,
+}
+
+impl Outputs {
+    fn publish(&self, tick: &mut Tick<'_>, model: &NewtonEuler, state: &State) -> Result<(), BusError> {
+        tick.write(self.state, message(model, state))?;
+        let position = point(&state.body.position_W_m);
+        let orientation = orientation(&state.body.attitude_WB);
+        if let Some(pose) = self.pose {
+            let message = PoseStamped { pose: Pose { position, orientation }, ..Default::default() };
+            tick.write(pose, message)?;
+        }
+        if let Some(tf) = self.tf {
+            tick.write(tf, BodyTransform::new(position, orientation))?;
+        }
+        Ok(())
+    }
+}
+
+fn message(model: &NewtonEuler, state: &State) -> PlantState {
+    let vector = |v: Vector3<f64>| <[f64; 3]>::from(v).into();
+    let [x, y, z, w] = state.body.attitude_WB.coords.into();
+    PlantState {
+        position: vector(state.body.position_W_m),
+        velocity: vector(state.body.velocity_W_m_s),
+        attitude: Quaternion { x, y, z, w },
+        angular_velocity: vector(state.body.angular_velocity_B_rad_s),
+        specific_force: vector(model.motion(state).specific_force_B_m_s2),
+        rotor_speed: state.rotors.map(|rotor| rotor.speed_rad_s),
+        ..Default::default()
+    }
+}
+
+fn point(v: &Vector3<f64>) -> Point {
+    Point { x: v.x, y: v.y, z: v.z }
+}
+
+fn orientation(attitude_WB: &UnitQuaternion<f64>) -> Orientation {
+    let [x, y, z, w] = attitude_WB.coords.into();
+    Orientation { x, y, z, w }
+}
+
+fn body(measured: &MeasuredState) -> RigidBody {
+    let vector = |v| Vector3::from(<[f64; 3]>::from(v));
+    let q = measured.attitude;
+    RigidBody {
+        position_W_m: vector(measured.position),
+        velocity_W_m_s: vector(measured.velocity),
+        attitude_WB: UnitQuaternion::new_normalize(nalgebra::Quaternion::new(q.w, q.x, q.y, q.z)),
+        angular_velocity_B_rad_s: vector(measured.angular_velocity),
+    }
+}

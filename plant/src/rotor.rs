@@ -1,0 +1,68 @@
+//! What the spinning rotors do to the body: thrust, drag torque, spin-up reaction, gyroscopic torque.
+//!
+//! Signs. A rotor of spin s (+1 counter-clockwise from above) and speed w turns at s w about z of the body. The
+//! air's drag on it, c_Q w^2 against the rotation, reaches the body as -s c_Q w^2 about z (the yaw row of thesis
+//! eq. 3.10 has the opposite sign for the rotation of section 2.1). With h = sum s J_r w the rotors' angular
+//! momentum relative to the body, Euler's equation for body and rotors together gives the body two more torques:
+//! -h' about z (spin-up reaction, which the thesis leaves out) and -w_B x (h z) = h (-q, p, 0), which is thesis
+//! eq. 3.11.
+#![allow(non_snake_case, reason = "a trailing _B names the frame a vector is written in, N the newton")]
+
+use nalgebra::Vector3;
+use vehicles::Vehicle;
+
+use crate::state::{RotorRates, RotorState};
+
+/// A force and a torque about the centre of mass, both written in the body frame.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Wrench {
+    /// Force.
+    pub force_B_N: Vector3<f64>,
+    /// Torque about the centre of mass.
+    pub torque_B_N_m: Vector3<f64>,
+}
+
+/// Thrust c_T w |w| along z of the body, in N (thesis eq. 3.1). A rotor that runs backwards, as an underdamped
+/// motor may for a moment after being switched off, pulls down.
+pub fn thrust_N(vehicle: &Vehicle, speed_rad_s: f64) -> f64 {
+    vehicle.thrust_coefficient * speed_rad_s * speed_rad_s.abs()
+}
+
+/// Drag torque c_Q w |w| that the air puts on a rotor against its own sense, in N*m (thesis eq. 3.2).
+pub fn drag_torque_N_m(vehicle: &Vehicle, speed_rad_s: f64) -> f64 {
+    vehicle.torque_coefficient * speed_rad_s * speed_rad_s.abs()
+}
+
+/// The wrench of all four rotors on a body that turns with `angular_velocity_B_rad_s`. Rotors are summed in the
+/// order of the motor commands; the order is part of the result, as float addition is not associative.
+pub(crate) fn wrench(
+    vehicle: &Vehicle,
+    rotors: &[RotorState; 4],
+    rates: &[RotorRates; 4],
+    angular_velocity_B_rad_s: &Vector3<f64>,
+) -> Wrench {
+    let (mut lift_N, mut torque_B_N_m) = (0.0, Vector3::zeros());
+    let mut momentum_N_m_s = 0.0;
+    for ((place, rotor), rate) in vehicle.rotors.iter().zip(rotors).zip(rates) {
+        let thrust_N = thrust_N(vehicle, rotor.speed_rad_s);
+        lift_N += thrust_N;
+        // r x (0, 0, T): thrust on the left (+y) rolls positive, thrust in front pitches nose up (negative).
+        torque_B_N_m.x += place.position_m.y * thrust_N;
+        torque_B_N_m.y -= place.position_m.x * thrust_N;
+        torque_B_N_m.z -= place.spin * reaction_N_m(vehicle, rotor, rate);
+        momentum_N_m_s += place.spin * vehicle.rotor_inertia_kg_m2 * rotor.speed_rad_s;
+    }
+    torque_B_N_m += gyroscopic_torque_N_m(momentum_N_m_s, angular_velocity_B_rad_s);
+    Wrench { force_B_N: Vector3::new(0.0, 0.0, lift_N), torque_B_N_m }
+}
+
+/// What the motor has to push against: the air's drag and the rotor's own inertia.
+fn reaction_N_m(vehicle: &Vehicle, rotor: &RotorState, rate: &RotorRates) -> f64 {
+    drag_torque_N_m(vehicle, rotor.speed_rad_s) + vehicle.rotor_inertia_kg_m2 * rate.acceleration_rad_s2
+}
+
+/// -w x (h z), thesis eq. 3.11.
+fn gyroscopic_torque_N_m(momentum_N_m_s: f64, angular_velocity_B_rad_s: &Vector3<f64>) -> Vector3<f64> {
+    let w = angular_velocity_B_rad_s;
+    Vector3::new(-momentum_N_m_s * w.y, momentum_N_m_s * w.x, 0.0)
+}

@@ -1,0 +1,122 @@
+//! The state that the integrator moves: one rigid body and four rotors, in SI units.
+#![allow(non_snake_case, reason = "a trailing _W or _B names the frame a vector is written in")]
+
+use nalgebra::{Quaternion, UnitQuaternion, Vector3};
+
+/// Pose and motion of the body frame B (x forward, y left, z up) in the world frame W (z up).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct RigidBody {
+    /// The centre of mass, in W.
+    pub position_W_m: Vector3<f64>,
+    /// Velocity of the centre of mass, in W.
+    pub velocity_W_m_s: Vector3<f64>,
+    /// Takes vectors written in B to W (Hamilton convention).
+    pub attitude_WB: UnitQuaternion<f64>,
+    /// Angular velocity of B relative to W, written in B.
+    pub angular_velocity_B_rad_s: Vector3<f64>,
+}
+
+/// One rotor's speed relative to the body, positive in the rotor's own sense of rotation.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct RotorState {
+    /// Rotation speed.
+    pub speed_rad_s: f64,
+    /// Its rate of change.
+    pub acceleration_rad_s2: f64,
+}
+
+/// Everything the physics carries from one tick to the next.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct State {
+    /// The rigid body.
+    pub body: RigidBody,
+    /// The rotors, in the order of the motor commands.
+    pub rotors: [RotorState; 4],
+}
+
+impl RigidBody {
+    /// At rest at `position_W_m`, level, facing along +x of the world.
+    pub fn level_at(position_W_m: Vector3<f64>) -> Self {
+        RigidBody {
+            position_W_m,
+            velocity_W_m_s: Vector3::zeros(),
+            attitude_WB: UnitQuaternion::identity(),
+            angular_velocity_B_rad_s: Vector3::zeros(),
+        }
+    }
+}
+
+impl RotorState {
+    /// Turning steadily at `speed_rad_s`.
+    pub fn steady(speed_rad_s: f64) -> Self {
+        RotorState { speed_rad_s, acceleration_rad_s2: 0.0 }
+    }
+}
+
+/// Rates of change of every component of a [`State`].
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Rates {
+    pub velocity_W_m_s: Vector3<f64>,
+    pub acceleration_W_m_s2: Vector3<f64>,
+    pub attitude_WB_per_s: Quaternion<f64>,
+    pub angular_acceleration_B_rad_s2: Vector3<f64>,
+    pub rotors: [RotorRates; 4],
+}
+
+/// Rates of change of a [`RotorState`].
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct RotorRates {
+    pub acceleration_rad_s2: f64,
+    pub jerk_rad_s3: f64,
+}
+
+impl Rates {
+    /// `self + factor * other`, the only arithmetic a Runge-Kutta step needs.
+    pub fn plus(&self, other: &Rates, factor: f64) -> Rates {
+        Rates {
+            velocity_W_m_s: self.velocity_W_m_s + other.velocity_W_m_s * factor,
+            acceleration_W_m_s2: self.acceleration_W_m_s2 + other.acceleration_W_m_s2 * factor,
+            attitude_WB_per_s: self.attitude_WB_per_s + other.attitude_WB_per_s * factor,
+            angular_acceleration_B_rad_s2: self.angular_acceleration_B_rad_s2
+                + other.angular_acceleration_B_rad_s2 * factor,
+            rotors: std::array::from_fn(|i| self.rotors[i].plus(&other.rotors[i], factor)),
+        }
+    }
+}
+
+impl RotorRates {
+    fn plus(&self, other: &RotorRates, factor: f64) -> RotorRates {
+        RotorRates {
+            acceleration_rad_s2: self.acceleration_rad_s2 + other.acceleration_rad_s2 * factor,
+            jerk_rad_s3: self.jerk_rad_s3 + other.jerk_rad_s3 * factor,
+        }
+    }
+}
+
+impl State {
+    /// This state moved along `rates` for `span_s`. The quaternion is left as long as it comes out: only a
+    /// finished step normalises it, so that the stages inside a step stay a smooth function of time.
+    pub(crate) fn moved(&self, rates: &Rates, span_s: f64) -> State {
+        let body = &self.body;
+        let attitude = body.attitude_WB.into_inner() + rates.attitude_WB_per_s * span_s;
+        State {
+            body: RigidBody {
+                position_W_m: body.position_W_m + rates.velocity_W_m_s * span_s,
+                velocity_W_m_s: body.velocity_W_m_s + rates.acceleration_W_m_s2 * span_s,
+                attitude_WB: UnitQuaternion::new_unchecked(attitude),
+                angular_velocity_B_rad_s: body.angular_velocity_B_rad_s
+                    + rates.angular_acceleration_B_rad_s2 * span_s,
+            },
+            rotors: std::array::from_fn(|i| self.rotors[i].moved(&rates.rotors[i], span_s)),
+        }
+    }
+}
+
+impl RotorState {
+    fn moved(&self, rates: &RotorRates, span_s: f64) -> RotorState {
+        RotorState {
+            speed_rad_s: self.speed_rad_s + rates.acceleration_rad_s2 * span_s,
+            acceleration_rad_s2: self.acceleration_rad_s2 + rates.jerk_rad_s3 * span_s,
+        }
+    }
+}

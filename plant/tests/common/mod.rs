@@ -1,0 +1,78 @@
+//! Vehicles for the tests: the real files, and the Hummingbird with single numbers replaced.
+#![allow(dead_code, reason = "every test file uses its own part of these helpers")]
+#![allow(non_snake_case, reason = "a trailing _W or _B names the frame a vector is written in")]
+
+use nalgebra::Vector3;
+use plant::{NewtonEuler, RigidBody, State};
+use vehicles::Vehicle;
+
+/// The tick of the whole project, 1 kHz.
+pub const TICK_S: f64 = 1e-3;
+
+pub const HUMMINGBIRD: &str = include_str!("../../../vehicles/hummingbird.toml");
+pub const CRAZYFLIE: &str = include_str!("../../../vehicles/crazyflie-2.1.toml");
+
+const C_T: &str = "value = 7.6184e-8";
+const C_Q: &str = "value = 2.6839e-9";
+const I_M: &str = "value = 3.1e-5";
+
+/// The Hummingbird with texts replaced; a text that is not in the file is a fault of the test.
+pub fn hummingbird_with(changes: &[(&str, &str)]) -> Vehicle {
+    let mut text = HUMMINGBIRD.to_owned();
+    for (from, to) in changes {
+        assert!(text.contains(from), "the vehicle file no longer holds {from:?}");
+        text = text.replace(from, to);
+    }
+    Vehicle::parse(&text, "hummingbird.toml").unwrap()
+}
+
+pub fn hummingbird() -> Vehicle {
+    hummingbird_with(&[])
+}
+
+pub fn crazyflie() -> Vehicle {
+    Vehicle::parse(CRAZYFLIE, "crazyflie-2.1.toml").unwrap()
+}
+
+/// A Hummingbird whose air does nothing; its rotors keep their inertia.
+pub fn airless() -> Vehicle {
+    hummingbird_with(&[(C_T, "value = 0"), (C_Q, "value = 0")])
+}
+
+/// A Hummingbird without thrust, drag torque or rotor inertia, and with three different moments of inertia.
+pub fn free_body() -> Vehicle {
+    hummingbird_with(&[
+        (C_T, "value = 0"),
+        (C_Q, "value = 0"),
+        (I_M, "value = 0"),
+        ("inertia_yy = { value = 5.6e-3", "inertia_yy = { value = 7.0e-3"),
+    ])
+}
+
+/// A Hummingbird on which left and right differ in nothing: no torque depends on a sense of rotation.
+pub fn spinless() -> Vehicle {
+    hummingbird_with(&[(C_Q, "value = 0"), (I_M, "value = 0")])
+}
+
+/// The model at 1 m with all rotors settled at hover.
+pub fn hovering(vehicle: Vehicle) -> (NewtonEuler, State, f64) {
+    let command = vehicle.hover_command();
+    let model = NewtonEuler::new(vehicle, 1);
+    let state = model.start(RigidBody::level_at(Vector3::z()), command);
+    (model, state, command)
+}
+
+/// Flies `ticks` ticks under constant commands.
+pub fn fly(model: &NewtonEuler, state: &mut State, commands: &[f64; 4], ticks: usize) {
+    for _ in 0..ticks {
+        model.step(state, commands, TICK_S);
+    }
+}
+
+/// Angular momentum of body and rotors together, in the world frame, in N m s.
+pub fn momentum_W(vehicle: &Vehicle, state: &State) -> Vector3<f64> {
+    let rotors = vehicle.rotors.iter().zip(&state.rotors);
+    let spin: f64 = rotors.map(|(place, rotor)| place.spin * rotor.speed_rad_s).sum();
+    let body_B = vehicle.inertia_kg_m2 * state.body.angular_velocity_B_rad_s;
+    state.body.attitude_WB * (body_B + Vector3::z() * (vehicle.rotor_inertia_kg_m2 * spin))
+}

@@ -1,0 +1,247 @@
+//! What a ROS 2 message definition (`ros2msg`) says about the bytes of a CDR message.
+
+use std::collections::BTreeMap;
+
+/// A value of a leaf field.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Value {
+    /// A floating-point number.
+    Float(f64),
+    /// An integer.
+    Integer(i128),
+    /// A string.
+    Text(String),
+}
+
+impl Value {
+    /// The value as a number, if it is one.
+    #[must_use]
+    #[allow(clippy::cast_precision_loss, reason = "plots and statistics need no more than a double")]
+    pub fn as_f64(&self) -> Option<f64> {
+        match self {
+            Self::Float(number) => Some(*number),
+            Self::Integer(number) => Some(*number as f64),
+            Self::Text(_) => None,
+        }
+    }
+}
+
+impl std::fmt::Display for Value {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Float(number) => write!(f, "{number:?}"),
+            Self::Integer(number) => write!(f, "{number}"),
+            Self::Text(text) => write!(f, "{text:?}"),
+        }
+    }
+}
+
+/// A leaf field of a message.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Leaf {
+    /// Path from the root, such as `position.z` or `command[2]`.
+    pub path: String,
+    /// Unit from the definition's comment (that of an enclosing field where the leaf has none).
+    pub unit: String,
+    /// Value.
+    pub value: Value,
+}
+
+#[derive(Clone, Debug)]
+struct Field {
+    base: String,
+    repeat: Repeat,
+    name: String,
+    unit: String,
+}
+
+#[derive(Clone, Copy, Debug)]
+enum Repeat {
+    One,
+    Fixed(usize),
+    Sequence,
+}
+
+/// A parsed definition.
+#[derive(Clone, Debug)]
+pub struct Definition {
+    root: Vec<Field>,
+    types: BTreeMap<String, Vec<Field>>,
+}
+
+impl Definition {
+    /// Parses the text of a `ros2msg` schema.
+    ///
+    /// # Errors
+    /// The line that is not understood.
+    pub fn parse(text: &str) -> Result<Self, String> {
+        let rule = "=".repeat(80);
+        let mut sections = text.split(rule.as_str());
+        let root = parse_fields(sections.next().unwrap_or_default())?;
+        let types = sections
+            .map(|section| {
+                let section = section.trim_start();
+                let (head, body) = section.split_once('\n').unwrap_or((section, ""));
+                let name =
+                    head.strip_prefix("MSG: ").ok_or_else(|| format!("expected `MSG: …`, found {head:?}"))?;
+                Ok((name.trim().to_owned(), parse_fields(body)?))
+            })
+            .collect::<Result<_, String>>()?;
+        Ok(Self { root, types })
+    }
+
+    /// Decodes a message: its encapsulation header and body.
+    ///
+    /// # Errors
+    /// If the bytes do not fit the definition.
+    pub fn decode(&self, cdr: &[u8]) -> Result<Vec<Leaf>, String> {
+        let Some((&[0, 1, 0, 0], body)) = cdr.split_first_chunk::<4>() else {
+            return Err("it does not start with the header of little-endian CDR, 00 01 00 00".to_owned());
+        };
+        let mut walk = Walk { definition: self, cdr: Cursor { body, at: 0 }, leaves: Vec::new() };
+        walk.message(&self.root, "", "")?;
+        Ok(walk.leaves)
+    }
+}
+
+fn parse_fields(text: &str) -> Result<Vec<Field>, String> {
+    let lines = text.lines().map(|line| line.split_once('#').unwrap_or((line, "")));
+    lines
+        .filter(|(code, _)| !code.trim().is_empty())
+        .map(|(code, comment)| parse_field(code, comment))
+        .collect()
+}
+
+fn parse_field(code: &str, comment: &str) -> Result<Field, String> {
+    let (kind, name) = code.trim().split_once(' ').ok_or_else(|| format!("not a field: {code:?}"))?;
+    let (base, repeat) = match kind.strip_suffix(']').and_then(|kind| kind.split_once('[')) {
+        None => (kind, Repeat::One),
+        Some((base, "")) => (base, Repeat::Sequence),
+        Some((base, length)) => {
+            let length = length.parse().map_err(|_| format!("not an array length: {length:?}"))?;
+            (base, Repeat::Fixed(length))
+        }
+    };
+    let unit =
+        comment.trim().strip_prefix('[').and_then(|rest| rest.split_once(']')).map_or("", |(unit, _)| unit);
+    Ok(Field { base: base.to_owned(), repeat, name: name.trim().to_owned(), unit: unit.to_owned() })
+}
+
+struct Walk<'a> {
+    definition: &'a Definition,
+    cdr: Cursor<'a>,
+    leaves: Vec<Leaf>,
+}
+
+impl Walk<'_> {
+    fn message(&mut self, fields: &[Field], prefix: &str, unit: &str) -> Result<(), String> {
+        for field in fields {
+            let unit = if field.unit.is_empty() { unit } else { &field.unit };
+            let path =
+                if prefix.is_empty() { field.name.clone() } else { format!("{prefix}.{}", field.name) };
+            let length = match field.repeat {
+                Repeat::One => {
+                    self.value(&field.base, path, unit)?;
+                    continue;
+                }
+                Repeat::Fixed(length) => length,
+                Repeat::Sequence => u32::from_le_bytes(self.cdr.take()?) as usize,
+            };
+            (0..length).try_for_each(|index| self.value(&field.base, format!("{path}[{index}]"), unit))?;
+        }
+        Ok(())
+    }
+
+    fn value(&mut self, base: &str, path: String, unit: &str) -> Result<(), String> {
+        let cdr = &mut self.cdr;
+        let value = match base {
+            "float64" => Value::Float(f64::from_le_bytes(cdr.take()?)),
+            "float32" => Value::Float(f32::from_le_bytes(cdr.take()?).into()),
+            "int64" => Value::Integer(i64::from_le_bytes(cdr.take()?).into()),
+            "uint64" => Value::Integer(u64::from_le_bytes(cdr.take()?).into()),
+            "int32" => Value::Integer(i32::from_le_bytes(cdr.take()?).into()),
+            "uint32" => Value::Integer(u32::from_le_bytes(cdr.take()?).into()),
+            "int16" => Value::Integer(i16::from_le_bytes(cdr.take()?).into()),
+            "uint16" => Value::Integer(u16::from_le_bytes(cdr.take()?).into()),
+            "int8" => Value::Integer(i8::from_le_bytes(cdr.take()?).into()),
+            "uint8" | "byte" | "bool" => Value::Integer(u8::from_le_bytes(cdr.take()?).into()),
+            "string" => Value::Text(cdr.text()?),
+            _ => {
+                let definition = self.definition;
+                let fields =
+                    definition.types.get(base).ok_or_else(|| format!("type {base} is not defined"))?;
+                return self.message(fields, &path, unit);
+            }
+        };
+        self.leaves.push(Leaf { path, unit: unit.to_owned(), value });
+        Ok(())
+    }
+}
+
+/// A place in the body of a CDR message.
+struct Cursor<'a> {
+    body: &'a [u8],
+    at: usize,
+}
+
+impl Cursor<'_> {
+    /// The next `N` bytes; XCDR1 aligns every primitive to its size, counted from the start of the body.
+    fn take<const N: usize>(&mut self) -> Result<[u8; N], String> {
+        let start = self.at.next_multiple_of(N);
+        let bytes = self.body.get(start..start + N).and_then(|bytes| bytes.try_into().ok());
+        self.at = start + N;
+        bytes.ok_or_else(|| {
+            format!("it ends at byte {}, a value of {N} bytes is due at {start}", self.body.len())
+        })
+    }
+
+    fn text(&mut self) -> Result<String, String> {
+        let length = u32::from_le_bytes(self.take()?) as usize;
+        let bytes = self.body.get(self.at..self.at + length);
+        self.at += length;
+        let bytes = bytes.ok_or_else(|| format!("a string of {length} bytes does not fit"))?;
+        Ok(String::from_utf8_lossy(bytes.strip_suffix(&[0]).unwrap_or(bytes)).into_owned())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Definition, Value};
+    use bus::Message;
+    use bus::messages::{BodyTransform, MotorCommand, Orientation, Point, PoseStamped, Time};
+
+    fn cdr<T: Message>(message: &T) -> Vec<u8> {
+        [&[0, 1, 0, 0], bytemuck::bytes_of(message)].concat()
+    }
+
+    #[test]
+    fn a_message_decodes_to_its_fields() {
+        let definition = Definition::parse(&MotorCommand::SCHEMA.ros2_definition()).unwrap();
+        let message = MotorCommand { stamp: Time { sec: 3, nanosec: 4 }, command: [1.0, 2.0, 3.0, 4.5] };
+        let leaves = definition.decode(&cdr(&message)).unwrap();
+        let paths: Vec<_> = leaves.iter().map(|leaf| leaf.path.as_str()).collect();
+        assert_eq!(paths[..3], ["stamp.sec", "stamp.nanosec", "command[0]"]);
+        assert_eq!(leaves[5].value, Value::Float(4.5));
+        assert_eq!(leaves[5].unit, "count");
+    }
+
+    #[test]
+    fn strings_and_sequences_of_standard_messages_decode() {
+        let definition = Definition::parse(&PoseStamped::SCHEMA.ros2_definition()).unwrap();
+        let leaves = definition.decode(&cdr(&PoseStamped::default())).unwrap();
+        assert_eq!(leaves[2].value, Value::Text("map".to_owned()));
+        assert_eq!(leaves.last().unwrap().path, "pose.orientation.w");
+        let definition = Definition::parse(&BodyTransform::SCHEMA.ros2_definition()).unwrap();
+        let leaves =
+            definition.decode(&cdr(&BodyTransform::new(Point::default(), Orientation::default()))).unwrap();
+        assert_eq!(leaves[3].value, Value::Text("hb_body".to_owned()));
+        assert_eq!(leaves.len(), 11);
+    }
+
+    #[test]
+    fn a_short_message_is_an_error() {
+        let definition = Definition::parse(&MotorCommand::SCHEMA.ros2_definition()).unwrap();
+        let error = definition.decode(&cdr(&MotorCommand::default())[..20]).unwrap_err();
+        assert!(error.contains("a value of 8 bytes is due at 16"), "{error}");
+    }
+}

@@ -1,0 +1,135 @@
+//! Where two recordings first differ.
+
+use crate::error::RecordingError;
+use crate::reader::{Record, Recording};
+use std::fmt;
+
+/// The first difference of two recordings.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Difference {
+    /// A field of a message.
+    Field {
+        /// Tick.
+        tick: u32,
+        /// Topic.
+        topic: String,
+        /// Field path.
+        field: String,
+        /// Value in the first recording.
+        a: String,
+        /// Value in the second recording.
+        b: String,
+    },
+    /// A message is in one recording only.
+    Message {
+        /// Tick.
+        tick: u32,
+        /// Topic.
+        topic: String,
+        /// What is in its place in the first recording.
+        a: String,
+        /// What is in its place in the second recording.
+        b: String,
+    },
+    /// The messages are the same; an attachment or the container differs.
+    Container(String),
+}
+
+impl fmt::Display for Difference {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Field { tick, topic, field, a, b } => {
+                write!(f, "tick {tick}, topic {topic}, field {field}: {a} against {b}")
+            }
+            Self::Message { tick, topic, a, b } => write!(f, "tick {tick}, topic {topic}: {a} against {b}"),
+            Self::Container(what) => write!(f, "all messages are the same; {what}"),
+        }
+    }
+}
+
+/// The first difference of `a` and `b`, or `None` if they are the same bytes.
+///
+/// # Errors
+/// If one of them is damaged.
+pub fn first_difference(a: &Recording, b: &Recording) -> Result<Option<Difference>, RecordingError> {
+    if a.bytes() == b.bytes() {
+        return Ok(None);
+    }
+    let (mut left, mut right) = (a.messages()?, b.messages()?);
+    loop {
+        match (left.next().transpose()?, right.next().transpose()?) {
+            (None, None) => return container_difference(a, b).map(Some),
+            (Some(x), Some(y)) if same_message(&x, &y) => {}
+            (Some(x), Some(y)) if (x.tick, &x.topic) == (y.tick, &y.topic) => {
+                return Ok(Some(field_difference(a, b, &x, &y)?));
+            }
+            (x, y) => return Ok(Some(message_difference(x.as_ref(), y.as_ref()))),
+        }
+    }
+}
+
+fn same_message(x: &Record<'_>, y: &Record<'_>) -> bool {
+    (x.tick, x.time_ns, &x.topic, &x.cdr) == (y.tick, y.time_ns, &y.topic, &y.cdr)
+}
+
+fn field_difference(
+    a: &Recording,
+    b: &Recording,
+    x: &Record<'_>,
+    y: &Record<'_>,
+) -> Result<Difference, RecordingError> {
+    let difference = |field: &str, a, b| Difference::Field {
+        tick: x.tick,
+        topic: x.topic.clone(),
+        field: field.to_owned(),
+        a,
+        b,
+    };
+    if x.time_ns != y.time_ns {
+        return Ok(difference("(log time in ns)", x.time_ns.to_string(), y.time_ns.to_string()));
+    }
+    let (type_a, type_b) = (&a.topic(&x.topic)?.type_name, &b.topic(&y.topic)?.type_name);
+    if type_a != type_b {
+        return Ok(difference("(message type)", type_a.clone(), type_b.clone()));
+    }
+    let decode = |recording: &Recording, record: &Record<'_>| {
+        let topic = recording.topic(&record.topic)?;
+        topic.definition.decode(&record.cdr).map_err(|reason| RecordingError::Decode {
+            topic: record.topic.clone(),
+            type_name: topic.type_name.clone(),
+            reason,
+        })
+    };
+    let (p, q) = (decode(a, x)?, decode(b, y)?);
+    // Compared as text: NaN equals NaN here, and -0.0 is not 0.0, as in the bytes.
+    let differing =
+        p.iter().zip(&q).find(|(l, r)| l.path != r.path || l.value.to_string() != r.value.to_string());
+    Ok(match differing {
+        Some((l, r)) => difference(&l.path, l.value.to_string(), r.value.to_string()),
+        None => difference("(length)", format!("{} bytes", x.cdr.len()), format!("{} bytes", y.cdr.len())),
+    })
+}
+
+fn message_difference(x: Option<&Record<'_>>, y: Option<&Record<'_>>) -> Difference {
+    let describe = |record: Option<&Record<'_>>| match record {
+        Some(record) => format!("a message of {} at tick {}", record.topic, record.tick),
+        None => "the end of the recording".to_owned(),
+    };
+    let earlier = [x, y].into_iter().flatten().min_by_key(|record| (record.tick, record.topic.clone()));
+    Difference::Message {
+        tick: earlier.map_or(0, |record| record.tick),
+        topic: earlier.map_or_else(String::new, |record| record.topic.clone()),
+        a: describe(x),
+        b: describe(y),
+    }
+}
+
+fn container_difference(a: &Recording, b: &Recording) -> Result<Difference, RecordingError> {
+    let (left, right) = (a.attachments()?, b.attachments()?);
+    let differing = left.iter().find(|attachment| !right.contains(attachment));
+    let differing = differing.or_else(|| right.iter().find(|attachment| !left.contains(attachment)));
+    Ok(Difference::Container(match differing {
+        Some((name, _)) => format!("the attachment `{name}` differs"),
+        None => "the bytes of the container differ (compression, library or chunks)".to_owned(),
+    }))
+}

@@ -1,0 +1,76 @@
+//! One field of one topic over time.
+//!
+//! A quaternion has three fields more than the message: `roll`, `pitch` and `yaw` (z-y-x sequence, in
+//! radians), since that is how people judge an attitude.
+
+use crate::definition::Leaf;
+use crate::error::RecordingError;
+use crate::reader::Recording;
+
+/// Samples of a field.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Series {
+    /// Simulation times in nanoseconds.
+    pub time_ns: Vec<u64>,
+    /// Values.
+    pub value: Vec<f64>,
+    /// Unit.
+    pub unit: String,
+}
+
+impl Recording {
+    /// The values of `fields` of `topic`, a series each.
+    ///
+    /// # Errors
+    /// If there is no such topic or field, or the file is damaged.
+    pub fn series(&self, topic: &str, fields: &[&str]) -> Result<Vec<Series>, RecordingError> {
+        let definition = &self.topic(topic)?.definition;
+        let type_name = &self.topic(topic)?.type_name;
+        let mut series = vec![Series::default(); fields.len()];
+        for record in self.messages()? {
+            let record = record?;
+            if record.topic != topic {
+                continue;
+            }
+            let leaves = definition.decode(&record.cdr).map_err(|reason| RecordingError::Decode {
+                topic: topic.to_owned(),
+                type_name: type_name.clone(),
+                reason,
+            })?;
+            for (series, field) in series.iter_mut().zip(fields) {
+                let (value, unit) = value(&leaves, field).ok_or_else(|| unknown(topic, field, &leaves))?;
+                series.time_ns.push(record.time_ns);
+                series.value.push(value);
+                unit.clone_into(&mut series.unit);
+            }
+        }
+        Ok(series)
+    }
+}
+
+fn unknown(topic: &str, field: &str, leaves: &[Leaf]) -> RecordingError {
+    RecordingError::UnknownField {
+        topic: topic.to_owned(),
+        field: field.to_owned(),
+        known: leaves.iter().map(|leaf| leaf.path.as_str()).collect::<Vec<_>>().join(", "),
+    }
+}
+
+fn value<'a>(leaves: &'a [Leaf], field: &str) -> Option<(f64, &'a str)> {
+    if let Some(leaf) = leaves.iter().find(|leaf| leaf.path == field) {
+        return Some((leaf.value.as_f64()?, &leaf.unit));
+    }
+    let (quaternion, angle) = field.rsplit_once('.')?;
+    let part = |name: &str| {
+        let path = format!("{quaternion}.{name}");
+        leaves.iter().find(|leaf| leaf.path == path)?.value.as_f64()
+    };
+    let (x, y, z, w) = (part("x")?, part("y")?, part("z")?, part("w")?);
+    let angle = match angle {
+        "roll" => (2.0 * (w * x + y * z)).atan2(1.0 - 2.0 * (x * x + y * y)),
+        "pitch" => (2.0 * (w * y - z * x)).clamp(-1.0, 1.0).asin(),
+        "yaw" => (2.0 * (w * z + x * y)).atan2(1.0 - 2.0 * (y * y + z * z)),
+        _ => return None,
+    };
+    Some((angle, "rad"))
+}

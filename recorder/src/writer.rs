@@ -1,0 +1,128 @@
+//! The MCAP file of a run, as ROS 2 tools expect it and as a function of the run alone.
+//!
+//! Times are simulation times, the sequence is the tick, chunks end by content and tick: two recordings
+//! of one run are the same bytes.
+
+use crate::error::RecordingError;
+use bus::announcement::Announcement;
+use mcap::records::MessageHeader;
+use mcap::{Attachment, Compression, WriteOptions};
+use std::borrow::Cow;
+use std::collections::BTreeMap;
+use std::fs::File;
+use std::io::BufWriter;
+use std::path::{Path, PathBuf};
+
+/// Uncompressed bytes after which a chunk is closed.
+const CHUNK_BYTES: u64 = 1024 * 1024;
+/// zstd level 1: on a run's numbers, higher levels cost more time than they save space.
+const ZSTD_LEVEL: u32 = 1;
+const FILE_BUFFER_BYTES: usize = 1024 * 1024;
+
+/// A recording being written.
+pub struct RecordingWriter {
+    mcap: mcap::Writer<BufWriter<File>>,
+    path: PathBuf,
+}
+
+/// A channel of a recording.
+#[derive(Clone, Copy, Debug)]
+pub struct ChannelId(u16);
+
+impl RecordingWriter {
+    /// Creates the file at `path`, replacing one that is there.
+    ///
+    /// # Errors
+    /// If the file cannot be created or written.
+    pub fn create(path: &Path) -> Result<Self, RecordingError> {
+        let file = File::create(path).map_err(|source| RecordingError::File {
+            action: "create",
+            path: path.to_owned(),
+            source,
+        })?;
+        let mcap = WriteOptions::new()
+            .profile("ros2")
+            .library("hummingbus")
+            .compression(Some(Compression::Zstd))
+            .compression_level(ZSTD_LEVEL)
+            // Worker threads would cost determinism nothing, but a core that the nodes need.
+            .compression_threads(0)
+            .chunk_size(Some(CHUNK_BYTES))
+            .create(BufWriter::with_capacity(FILE_BUFFER_BYTES, file))
+            .map_err(|error| write_error(path, &error))?;
+        Ok(Self { mcap, path: path.to_owned() })
+    }
+
+    /// Attaches a text file under `name`.
+    ///
+    /// # Errors
+    /// If the file cannot be written.
+    pub fn attach(&mut self, name: &str, text: &[u8]) -> Result<(), RecordingError> {
+        let attachment = Attachment {
+            log_time: 0,
+            create_time: 0,
+            name: name.to_owned(),
+            media_type: "application/toml".to_owned(),
+            data: Cow::Borrowed(text),
+        };
+        self.mcap.attach(&attachment).map_err(|error| write_error(&self.path, &error))
+    }
+
+    /// Adds a channel for `topic`.
+    ///
+    /// # Errors
+    /// If the file cannot be written.
+    pub fn add_channel(&mut self, topic: &str, message: &Announcement) -> Result<ChannelId, RecordingError> {
+        let metadata = BTreeMap::from([
+            ("offered_qos_profiles".to_owned(), String::new()),
+            ("layout_hash".to_owned(), format!("{:016x}", message.layout_hash)),
+        ]);
+        self.mcap
+            .add_schema(&message.type_name, "ros2msg", message.definition.as_bytes())
+            .and_then(|schema| self.mcap.add_channel(schema, topic, "cdr", &metadata))
+            .map(ChannelId)
+            .map_err(|error| write_error(&self.path, &error))
+    }
+
+    /// Writes one message: `cdr` is its encapsulation header and body.
+    ///
+    /// # Errors
+    /// If the file cannot be written.
+    pub fn write(
+        &mut self,
+        channel: ChannelId,
+        tick: u32,
+        time_ns: u64,
+        cdr: &[u8],
+    ) -> Result<(), RecordingError> {
+        let header =
+            MessageHeader { channel_id: channel.0, sequence: tick, log_time: time_ns, publish_time: time_ns };
+        self.mcap.write_to_known_channel(&header, cdr).map_err(|error| write_error(&self.path, &error))
+    }
+
+    /// Closes the chunk, so that what was written so far survives a killed process.
+    ///
+    /// # Errors
+    /// If the file cannot be written.
+    pub fn flush(&mut self) -> Result<(), RecordingError> {
+        self.mcap.flush().map_err(|error| write_error(&self.path, &error))
+    }
+
+    /// Writes the summary section and closes the file.
+    ///
+    /// # Errors
+    /// If the file cannot be written.
+    pub fn finish(mut self) -> Result<(), RecordingError> {
+        self.mcap.finish().map(|_| ()).map_err(|error| write_error(&self.path, &error))?;
+        let mut file = self.mcap.into_inner();
+        std::io::Write::flush(&mut file).map_err(|source| RecordingError::File {
+            action: "write",
+            path: self.path,
+            source,
+        })
+    }
+}
+
+fn write_error(path: &Path, error: &mcap::McapError) -> RecordingError {
+    RecordingError::Write { path: path.to_owned(), reason: error.to_string() }
+}

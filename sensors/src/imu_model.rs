@@ -1,0 +1,277 @@
+//! The inertial measurement unit: specific force and angular rate in, a noisy reading out.
+//!
+//! Reading = truth + bias + white noise, cut off at the range of the part; see [`crate::noise`]. The
+//! axes are those of the body (x forward, y left, z up) and the part sits at the centre of mass.
+#![allow(
+    non_snake_case,
+    reason = "a trailing _W or _B names the frame a vector is written in, _N the newton"
+)]
+
+use crate::noise::{BiasWalk, WhiteNoise};
+use crate::parameter::{ParameterError, finite, not_negative, positive};
+use bus::random::{Stream, stream};
+use nalgebra::Vector3;
+use serde::Deserialize;
+
+/// What an IMU does to the truth; the defaults are an Analog Devices ADIS16448.
+///
+/// The noise densities and bias walks are those that the EuRoC micro aerial vehicle data set gives for
+/// its ADIS16448 (Burri et al., "The EuRoC micro aerial vehicle datasets", IJRR 2016, file
+/// `imu0/sensor.yaml`); no data sheet of a part of this class gives a bias walk. The ranges are the
+/// data sheet's (±18 g, ±1000 °/s). The thesis does not name the part on the Hummingbird, so none of
+/// these is its own. The initial biases are zero: an autopilot nulls them at rest before take-off.
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct ImuParams {
+    /// White noise of the accelerometer, m/s²/√Hz.
+    pub accelerometer_noise_density_m_s2_sqrt_hz: f64,
+    /// Random walk of the accelerometer's bias, m/s³/√Hz.
+    pub accelerometer_bias_walk_m_s3_sqrt_hz: f64,
+    /// The accelerometer's bias at the first reading, body axes, m/s².
+    pub accelerometer_initial_bias_m_s2: [f64; 3],
+    /// The accelerometer reads no more than this on any axis, m/s².
+    pub accelerometer_range_m_s2: f64,
+    /// White noise of the gyroscope, rad/s/√Hz.
+    pub gyroscope_noise_density_rad_s_sqrt_hz: f64,
+    /// Random walk of the gyroscope's bias, rad/s²/√Hz.
+    pub gyroscope_bias_walk_rad_s2_sqrt_hz: f64,
+    /// The gyroscope's bias at the first reading, body axes, rad/s.
+    pub gyroscope_initial_bias_rad_s: [f64; 3],
+    /// The gyroscope reads no more than this on any axis, rad/s.
+    pub gyroscope_range_rad_s: f64,
+}
+
+impl Default for ImuParams {
+    fn default() -> Self {
+        Self {
+            accelerometer_noise_density_m_s2_sqrt_hz: 2.0e-3,
+            accelerometer_bias_walk_m_s3_sqrt_hz: 3.0e-3,
+            accelerometer_initial_bias_m_s2: [0.0; 3],
+            accelerometer_range_m_s2: 18.0 * crate::units::STANDARD_GRAVITY_M_S2,
+            gyroscope_noise_density_rad_s_sqrt_hz: 1.6968e-4,
+            gyroscope_bias_walk_rad_s2_sqrt_hz: 1.9393e-5,
+            gyroscope_initial_bias_rad_s: [0.0; 3],
+            gyroscope_range_rad_s: 1000.0_f64.to_radians(),
+        }
+    }
+}
+
+impl ImuParams {
+    /// The default part without noise, bias walk or initial bias: within its range it reads the truth.
+    #[must_use]
+    pub fn perfect() -> Self {
+        Self {
+            accelerometer_noise_density_m_s2_sqrt_hz: 0.0,
+            accelerometer_bias_walk_m_s3_sqrt_hz: 0.0,
+            gyroscope_noise_density_rad_s_sqrt_hz: 0.0,
+            gyroscope_bias_walk_rad_s2_sqrt_hz: 0.0,
+            ..Self::default()
+        }
+    }
+
+    fn validate(&self) -> Result<(), ParameterError> {
+        not_negative(
+            "accelerometer_noise_density_m_s2_sqrt_hz",
+            self.accelerometer_noise_density_m_s2_sqrt_hz,
+        )?;
+        not_negative("accelerometer_bias_walk_m_s3_sqrt_hz", self.accelerometer_bias_walk_m_s3_sqrt_hz)?;
+        not_negative("gyroscope_noise_density_rad_s_sqrt_hz", self.gyroscope_noise_density_rad_s_sqrt_hz)?;
+        not_negative("gyroscope_bias_walk_rad_s2_sqrt_hz", self.gyroscope_bias_walk_rad_s2_sqrt_hz)?;
+        positive("accelerometer_range_m_s2", self.accelerometer_range_m_s2)?;
+        positive("gyroscope_range_rad_s", self.gyroscope_range_rad_s)?;
+        for axis in 0..3 {
+            finite("accelerometer_initial_bias_m_s2", self.accelerometer_initial_bias_m_s2[axis])?;
+            finite("gyroscope_initial_bias_rad_s", self.gyroscope_initial_bias_rad_s[axis])?;
+        }
+        Ok(())
+    }
+}
+
+/// One sample of an IMU, or the truth that it measures; vectors in body axes.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ImuReading {
+    /// Acceleration less gravity, m/s²; at rest and level it is +g along z.
+    pub specific_force_B_m_s2: Vector3<f64>,
+    /// Angular rate of the body against the world, rad/s.
+    pub angular_velocity_B_rad_s: Vector3<f64>,
+}
+
+/// The IMU at one sample rate: all that does not change during a run.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ImuModel {
+    params: ImuParams,
+    accelerometer_noise: WhiteNoise,
+    accelerometer_walk: BiasWalk,
+    gyroscope_noise: WhiteNoise,
+    gyroscope_walk: BiasWalk,
+}
+
+/// All that does change: where the biases have walked to, and the node's random stream.
+#[derive(Debug, Clone)]
+pub struct ImuState {
+    /// The accelerometer's bias at the next reading, body axes, m/s².
+    pub accelerometer_bias_B_m_s2: Vector3<f64>,
+    /// The gyroscope's bias at the next reading, body axes, rad/s.
+    pub gyroscope_bias_B_rad_s: Vector3<f64>,
+    random: Stream,
+}
+
+impl ImuModel {
+    /// An IMU with `params` that is sampled `rate_hz` times a second (the node's own rate, that is the
+    /// tick rate divided by its period).
+    ///
+    /// # Errors
+    /// A parameter or the rate is outside its range.
+    pub fn new(params: ImuParams, rate_hz: f64) -> Result<Self, ParameterError> {
+        params.validate()?;
+        positive("rate_hz", rate_hz)?;
+        Ok(Self {
+            params,
+            accelerometer_noise: WhiteNoise::new(params.accelerometer_noise_density_m_s2_sqrt_hz, rate_hz),
+            accelerometer_walk: BiasWalk::new(params.accelerometer_bias_walk_m_s3_sqrt_hz, rate_hz),
+            gyroscope_noise: WhiteNoise::new(params.gyroscope_noise_density_rad_s_sqrt_hz, rate_hz),
+            gyroscope_walk: BiasWalk::new(params.gyroscope_bias_walk_rad_s2_sqrt_hz, rate_hz),
+        })
+    }
+
+    /// The state before the first reading of the IMU node `node` in a run seeded with `run_seed`.
+    #[must_use]
+    pub fn initial_state(&self, run_seed: u64, node: &str) -> ImuState {
+        ImuState {
+            accelerometer_bias_B_m_s2: self.params.accelerometer_initial_bias_m_s2.into(),
+            gyroscope_bias_B_rad_s: self.params.gyroscope_initial_bias_rad_s.into(),
+            random: stream(run_seed, node),
+        }
+    }
+
+    /// The reading of `truth`; the biases then walk one step on.
+    ///
+    /// The stream is drawn in a fixed order whatever the parameters, so that changing one of them does
+    /// not reshuffle the noise of the others.
+    pub fn read(&self, state: &mut ImuState, truth: &ImuReading) -> ImuReading {
+        let random = &mut state.random;
+        let force_noise = self.accelerometer_noise.sample(random);
+        let rate_noise = self.gyroscope_noise.sample(random);
+        let force = truth.specific_force_B_m_s2 + state.accelerometer_bias_B_m_s2 + force_noise;
+        let rate = truth.angular_velocity_B_rad_s + state.gyroscope_bias_B_rad_s + rate_noise;
+        state.accelerometer_bias_B_m_s2 =
+            self.accelerometer_walk.step(state.accelerometer_bias_B_m_s2, random);
+        state.gyroscope_bias_B_rad_s = self.gyroscope_walk.step(state.gyroscope_bias_B_rad_s, random);
+        ImuReading {
+            specific_force_B_m_s2: saturate(force, self.params.accelerometer_range_m_s2),
+            angular_velocity_B_rad_s: saturate(rate, self.params.gyroscope_range_rad_s),
+        }
+    }
+}
+
+fn saturate(value: Vector3<f64>, range: f64) -> Vector3<f64> {
+    value.map(|axis| axis.clamp(-range, range))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const RATE_HZ: f64 = 1000.0;
+
+    fn truth() -> ImuReading {
+        ImuReading {
+            specific_force_B_m_s2: Vector3::new(0.3, -0.2, 9.81),
+            angular_velocity_B_rad_s: Vector3::new(0.1, -0.7, 0.02),
+        }
+    }
+
+    fn readings(params: ImuParams, node: &str, count: usize) -> Vec<ImuReading> {
+        let model = ImuModel::new(params, RATE_HZ).unwrap();
+        let mut state = model.initial_state(7, node);
+        (0..count).map(|_| model.read(&mut state, &truth())).collect()
+    }
+
+    #[test]
+    fn without_noise_the_truth_passes_bit_for_bit() {
+        assert!(readings(ImuParams::perfect(), "imu", 100).iter().all(|reading| *reading == truth()));
+    }
+
+    #[test]
+    fn the_noise_on_either_part_has_its_own_density() {
+        let walk_free = ImuParams {
+            accelerometer_bias_walk_m_s3_sqrt_hz: 0.0,
+            gyroscope_bias_walk_rad_s2_sqrt_hz: 0.0,
+            ..ImuParams::default()
+        };
+        let readings = readings(walk_free, "imu", 20_000);
+        let mean_square = |error: fn(&ImuReading) -> Vector3<f64>| {
+            readings.iter().map(|reading| error(reading).norm_squared()).sum::<f64>()
+                / (3 * readings.len()) as f64
+        };
+        let force = mean_square(|r| r.specific_force_B_m_s2 - truth().specific_force_B_m_s2);
+        let rate = mean_square(|r| r.angular_velocity_B_rad_s - truth().angular_velocity_B_rad_s);
+        let bound = 6.0 * (2.0 / (3.0 * 20_000.0_f64)).sqrt();
+        assert!((force / (2.0e-3_f64.powi(2) * RATE_HZ) - 1.0).abs() < bound);
+        assert!((rate / (1.6968e-4_f64.powi(2) * RATE_HZ) - 1.0).abs() < bound);
+    }
+
+    /// With the walk alone, the Allan variance at averaging time τ is walk²·τ/3 (IEEE Std 952, annex C):
+    /// a line that white noise, whose Allan variance falls with τ, cannot give.
+    #[test]
+    fn the_bias_walk_has_the_allan_variance_of_a_random_walk() {
+        let walk = 0.02;
+        let params = ImuParams { gyroscope_bias_walk_rad_s2_sqrt_hz: walk, ..ImuParams::perfect() };
+        let readings = readings(params, "imu", 400_000);
+        for tau_ticks in [50, 200] {
+            let means: Vec<Vector3<f64>> = readings
+                .chunks_exact(tau_ticks)
+                .map(|c| {
+                    c.iter().map(|r| r.angular_velocity_B_rad_s).sum::<Vector3<f64>>() / tau_ticks as f64
+                })
+                .collect();
+            let pairs = (means.len() - 1) as f64;
+            let sum: f64 = means.windows(2).map(|pair| (pair[1] - pair[0]).norm_squared()).sum();
+            let ratio = sum / 3.0 / pairs / 2.0 / (walk * walk * tau_ticks as f64 / RATE_HZ / 3.0);
+            assert!(
+                (ratio - 1.0).abs() < 0.12,
+                "{ratio} of the expected Allan variance at {tau_ticks} ticks"
+            );
+        }
+    }
+
+    #[test]
+    fn initial_biases_are_added_and_the_range_cuts() {
+        let params = ImuParams {
+            accelerometer_initial_bias_m_s2: [0.1, 0.0, 0.0],
+            accelerometer_range_m_s2: 5.0,
+            gyroscope_initial_bias_rad_s: [0.0, 0.0, 0.03],
+            gyroscope_range_rad_s: 0.5,
+            ..ImuParams::perfect()
+        };
+        let reading = readings(params, "imu", 1)[0];
+        assert_eq!(reading.specific_force_B_m_s2, Vector3::new(0.3 + 0.1, -0.2, 5.0));
+        assert_eq!(reading.angular_velocity_B_rad_s, Vector3::new(0.1, -0.5, 0.02 + 0.03));
+    }
+
+    #[test]
+    fn a_reading_is_a_function_of_seed_and_name() {
+        let first = readings(ImuParams::default(), "imu", 10);
+        assert_eq!(first, readings(ImuParams::default(), "imu", 10));
+        let other = readings(ImuParams::default(), "imu_spare", 10);
+        assert!(
+            first.iter().zip(&other).all(|(a, b)| a.angular_velocity_B_rad_s != b.angular_velocity_B_rad_s)
+        );
+    }
+
+    #[test]
+    fn parameters_default_by_key_and_unknown_keys_are_refused() {
+        let given: ImuParams = toml::from_str("gyroscope_noise_density_rad_s_sqrt_hz = 0.001").unwrap();
+        let expected = ImuParams { gyroscope_noise_density_rad_s_sqrt_hz: 0.001, ..ImuParams::default() };
+        assert_eq!(given, expected);
+        let error = toml::from_str::<ImuParams>("gyro_noise = 0.1").unwrap_err().to_string();
+        assert!(error.contains("gyro_noise"), "{error}");
+    }
+
+    #[test]
+    fn impossible_parameters_are_named() {
+        let params = ImuParams { gyroscope_range_rad_s: 0.0, ..ImuParams::default() };
+        let error = ImuModel::new(params, RATE_HZ).unwrap_err().to_string();
+        assert!(error.contains("gyroscope_range_rad_s") && error.contains("found 0"), "{error}");
+    }
+}

@@ -1,0 +1,71 @@
+//! What `check` and `schema` print.
+
+use crate::graph::{Graph, Program};
+use bus::plan::{Pace, Plan, Wait};
+use std::fmt::Write as _;
+
+/// The graph of a run: nodes with their rates, edges with their delays.
+pub fn graph(graph: &Graph) -> String {
+    let plan = &graph.plan;
+    let rate_hz = 1e9 / plan.tick_ns as f64;
+    let pace = match plan.pace {
+        Pace::Free => "free".to_owned(),
+        Pace::Factor(factor) => format!("{factor} × real time"),
+    };
+    let mut text = format!(
+        "{} ticks at {rate_hz} Hz ({} s), pace {pace}, window {} ticks, seed {}\n",
+        plan.duration_ticks,
+        f64::from(plan.duration_ticks) * plan.tick_s(),
+        plan.window_ticks,
+        plan.seed
+    );
+    for (node, program) in plan.nodes.iter().zip(&graph.programs) {
+        let what = match program {
+            Program::Kind(kind) => kind.name.to_owned(),
+            Program::Command(words) => words.join(" "),
+        };
+        let cpu = node.cpu.map_or(String::new(), |cpu| format!(", cpu {cpu}"));
+        let wait = match node.wait {
+            Wait::Block => "block",
+            Wait::Spin => "spin",
+            Wait::Adaptive => "adaptive",
+        };
+        let _ = writeln!(
+            text,
+            "\n{} ({what}), {} Hz{cpu}, {wait}",
+            node.name,
+            rate_hz / f64::from(node.period_ticks)
+        );
+        for input in &node.inputs {
+            let topic = &plan.topics[input.topic];
+            let delay = if input.delay_ticks == 0 { "" } else { ", delayed by 1 tick" };
+            let _ = writeln!(text, "  <- {:<12} {} [{}]{delay}", input.port, topic.name, topic.type_name);
+        }
+        for output in &node.outputs {
+            let topic = &plan.topics[output.topic];
+            let hz = rate_hz / f64::from(topic.period_ticks);
+            let _ = writeln!(text, "  -> {:<12} {} [{}] {hz} Hz", output.port, topic.name, topic.type_name);
+        }
+    }
+    text
+}
+
+/// The graph as JSON.
+pub fn graph_json(plan: &Plan) -> String {
+    serde_json::to_string_pretty(plan).unwrap_or_default()
+}
+
+/// Every message with its fields, units, frames and layout hash.
+pub fn schemas() -> String {
+    bus::messages::all().into_iter().fold(String::new(), |mut text, schema| {
+        let _ = write!(text, "{}  layout {:016x}\n  {}\n", schema.layout(), schema.layout_hash(), schema.doc);
+        text.push('\n');
+        text
+    })
+}
+
+/// The same as JSON, with the ROS 2 definitions.
+pub fn schemas_json() -> String {
+    let schemas: Vec<_> = bus::messages::all().into_iter().map(bus::announcement::Announcement::of).collect();
+    serde_json::to_string_pretty(&schemas).unwrap_or_default()
+}

@@ -1,0 +1,305 @@
+//! Launching a run: starts its processes, watches them, and takes everything down again.
+
+use crate::graph::{Graph, Program};
+use crate::manifest::Manifest;
+use crate::progress::Progress;
+use crate::run_dir::RunDir;
+use anyhow::{Context, Result, bail};
+use bus::NODE_VARIABLE;
+use bus::control::{Control, Phase};
+use bus::plan::Plan;
+use bus::process::{LAUNCHER_VARIABLE, RUN_VARIABLE};
+use std::fs::File;
+use std::os::unix::process::{CommandExt, ExitStatusExt};
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, ExitStatus, Stdio};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::time::{Duration, Instant};
+
+const POLL: Duration = Duration::from_millis(5);
+/// How long a run may stand still before it is given up. A tick takes microseconds.
+const STALL: Duration = Duration::from_secs(20);
+/// How long processes have to leave by themselves after an abort.
+const GRACE: Duration = Duration::from_secs(2);
+/// Lines of a failed process's own words that are shown.
+const LOG_LINES: usize = 20;
+
+/// What is known about a run when it is over.
+#[derive(Debug)]
+pub struct Outcome {
+    /// Ticks that every node completed.
+    pub ticks: u32,
+    /// Whether the run was stopped before its end.
+    pub was_stopped: bool,
+    /// Host time from the first grant to the last completed tick.
+    pub host_s: f64,
+    /// Deadlines missed (paced runs).
+    pub missed_deadlines: u32,
+    /// Per process: name, processor share of one core, deadlines at which it was late.
+    pub processes: Vec<(String, f64, u32)>,
+}
+
+/// Flies `graph` and records to `recording`; returns when every process is gone.
+///
+/// # Errors
+/// If a process fails, stalls, or cannot be started; the error holds its last words.
+pub fn fly(manifest: &Manifest, graph: &mut Graph, recording: &Path, quiet: bool) -> Result<Outcome> {
+    let interrupts = count_interrupts()?;
+    let run_dir = RunDir::create()?;
+    prepare(manifest, graph, recording, &run_dir)?;
+    graph.plan.run_id = run_dir.run_id().to_owned();
+    graph.plan.store(run_dir.path())?;
+    let control = Control::create(&graph.plan)?;
+    let mut processes = Processes::start(manifest, graph, run_dir.path())?;
+    let progress = Progress::new(&graph.plan, quiet);
+    let was_stopped = watch(&mut processes, &control, &graph.plan, &interrupts, &progress)?;
+    progress.finish(&control);
+    Ok(outcome(&graph.plan, &control, was_stopped))
+}
+
+/// Counts Ctrl-C and SIGTERM from now on instead of dying of them.
+fn count_interrupts() -> Result<Arc<AtomicUsize>> {
+    let count = Arc::new(AtomicUsize::new(0));
+    let seen = count.clone();
+    ctrlc::set_handler(move || {
+        seen.fetch_add(1, Ordering::SeqCst);
+    })
+    .context("cannot handle Ctrl-C")?;
+    Ok(count)
+}
+
+/// Puts the files that recorders attach into the run directory and tells the recorders.
+fn prepare(manifest: &Manifest, graph: &mut Graph, recording: &Path, run_dir: &RunDir) -> Result<()> {
+    let manifest_copy = run_dir.path().join("manifest.toml");
+    std::fs::write(&manifest_copy, &manifest.recorded_text).context("cannot write the manifest's copy")?;
+    let name = |path: &Path| path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+    let mut attachments = vec![(name(&manifest.path), manifest_copy)];
+    attachments.extend(graph.vehicles.iter().map(|path| (name(path), path.clone())));
+    let attachments: Vec<_> =
+        attachments.iter().map(|(name, path)| serde_json::json!({ "name": name, "path": path })).collect();
+    for (program, node) in graph.programs.iter().zip(&mut graph.plan.nodes) {
+        if matches!(program, Program::Kind(kind) if kind.name == recorder::node::KIND.name) {
+            node.parameters = serde_json::json!({ "path": recording, "attachments": attachments });
+        }
+    }
+    Ok(())
+}
+
+/// The processes of a run; dropping them kills those that still live.
+struct Processes {
+    running: Vec<Process>,
+}
+
+struct Process {
+    name: String,
+    log: PathBuf,
+    child: Child,
+    end: Option<ExitStatus>,
+}
+
+impl Processes {
+    fn start(manifest: &Manifest, graph: &Graph, run_dir: &Path) -> Result<Self> {
+        let this_binary = std::env::current_exe().context("cannot find this binary")?;
+        let mut processes = Self { running: Vec::new() };
+        let mut clock = Command::new(&this_binary);
+        clock.args(["node", "clock"]);
+        let mut commands = vec![("clock".to_owned(), clock)];
+        for (program, node) in graph.programs.iter().zip(&graph.plan.nodes) {
+            let mut command = match program {
+                Program::Kind(kind) => {
+                    let mut command = Command::new(&this_binary);
+                    command.args(["node", kind.name]);
+                    command
+                }
+                Program::Command(words) => {
+                    let mut command = Command::new(executable(manifest, &words[0]));
+                    command.args(&words[1..]);
+                    command
+                }
+            };
+            command.env(NODE_VARIABLE, &node.name);
+            commands.push((node.name.clone(), command));
+        }
+        shuffle(&mut commands, manifest.content.run.start_order_seed);
+        for (name, command) in commands {
+            processes.running.push(Process::start(name, command, run_dir)?);
+        }
+        Ok(processes)
+    }
+
+    /// The first process that ended badly since the last look.
+    fn find_failure(&mut self) -> Result<Option<&Process>> {
+        for process in &mut self.running {
+            if process.end.is_none() {
+                process.end = process.child.try_wait().context("cannot watch a process")?;
+            }
+        }
+        Ok(self.running.iter().find(|process| process.end.is_some_and(|end| !end.success())))
+    }
+
+    fn all_ended(&self) -> bool {
+        self.running.iter().all(|process| process.end.is_some())
+    }
+}
+
+impl Drop for Processes {
+    fn drop(&mut self) {
+        for process in self.running.iter_mut().filter(|process| process.end.is_none()) {
+            let _ = process.child.kill();
+            let _ = process.child.wait();
+        }
+    }
+}
+
+impl Process {
+    fn start(name: String, mut command: Command, run_dir: &Path) -> Result<Self> {
+        let log = run_dir.join(format!("{name}.log"));
+        let file = File::create(&log).with_context(|| format!("cannot create {}", log.display()))?;
+        let output = file.try_clone().context("cannot share a log file")?;
+        command
+            .env(RUN_VARIABLE, run_dir)
+            .env(LAUNCHER_VARIABLE, std::process::id().to_string())
+            .stdin(Stdio::null())
+            .stdout(output)
+            .stderr(file)
+            // A group of its own: Ctrl-C in the terminal reaches the launcher alone, which stops the run
+            // at a tick boundary.
+            .process_group(0);
+        let child = command.spawn().with_context(|| {
+            format!("process `{name}`: cannot start {}", command.get_program().to_string_lossy())
+        })?;
+        Ok(Self { name, log, child, end: None })
+    }
+
+    /// How the process ended, with the last lines it wrote.
+    fn post_mortem(&self) -> String {
+        let end = match self.end {
+            Some(end) => match (end.code(), end.signal()) {
+                (Some(code), _) => format!("ended with exit code {code}"),
+                (None, Some(signal)) => format!("was killed by signal {signal}"),
+                (None, None) => "ended".to_owned(),
+            },
+            None => "is still running".to_owned(),
+        };
+        let words = std::fs::read_to_string(&self.log).unwrap_or_default();
+        let lines: Vec<&str> = words.lines().collect();
+        let last = &lines[lines.len().saturating_sub(LOG_LINES)..];
+        let words = last.iter().map(|line| format!("\n  {line}")).collect::<String>();
+        format!("process `{}` {end}{words}", self.name)
+    }
+}
+
+/// A command with a path is relative to the manifest; a bare name is looked up in PATH.
+fn executable(manifest: &Manifest, program: &str) -> PathBuf {
+    let path = Path::new(program);
+    if path.is_absolute() || !program.contains('/') {
+        return path.to_owned();
+    }
+    let folder = manifest.path.parent().unwrap_or(Path::new(""));
+    std::path::absolute(folder.join(path)).unwrap_or_else(|_| path.to_owned())
+}
+
+/// Fisher-Yates with the bus's own generator: the same seed gives the same order.
+fn shuffle<T>(items: &mut [T], seed: Option<u64>) {
+    use rand_core::Rng;
+    let Some(seed) = seed else { return };
+    let mut random = bus::random::stream(seed, "start-order");
+    for last in (1..items.len()).rev() {
+        let pick = random.next_u64() % (last as u64 + 1);
+        items.swap(last, usize::try_from(pick).unwrap_or(last));
+    }
+}
+
+/// Watches until all processes have ended; true if the run was stopped on the way.
+fn watch(
+    processes: &mut Processes,
+    control: &Control,
+    plan: &Plan,
+    interrupts: &AtomicUsize,
+    progress: &Progress,
+) -> Result<bool> {
+    let mut last_change = (0, Instant::now());
+    loop {
+        if let Some(failed) = processes.find_failure()? {
+            let tick = control.completed_ticks();
+            let words = format!("{}\nThe run was aborted at tick {tick}", failed.post_mortem());
+            take_down(processes, control)?;
+            bail!(words);
+        }
+        if processes.all_ended() {
+            return Ok(control.is_stop_requested());
+        }
+        match interrupts.load(Ordering::SeqCst) {
+            0 => {}
+            1 => control.request_stop(),
+            _ => {
+                take_down(processes, control)?;
+                bail!("interrupted twice: the run was aborted at tick {}", control.completed_ticks());
+            }
+        }
+        let ticks = control.completed_ticks();
+        if ticks != last_change.0 {
+            last_change = (ticks, Instant::now());
+        } else if last_change.1.elapsed() > STALL.max(2 * deadline(plan)) {
+            let words = describe_stall(control, plan);
+            take_down(processes, control)?;
+            bail!(words);
+        }
+        progress.show(control);
+        std::thread::sleep(POLL);
+    }
+}
+
+/// Host time between two deadlines of a paced run.
+fn deadline(plan: &Plan) -> Duration {
+    match plan.pace {
+        bus::plan::Pace::Free => Duration::ZERO,
+        bus::plan::Pace::Factor(factor) => Duration::from_secs_f64((plan.tick_s() / factor).min(1e6)),
+    }
+}
+
+/// Who has not come as far as the others, and what it waits for.
+fn describe_stall(control: &Control, plan: &Plan) -> String {
+    let names = |phase| {
+        let late = plan.nodes.iter().enumerate().filter(|(index, _)| !control.is_ready(*index, phase));
+        late.map(|(_, node)| format!("`{}`", node.name)).collect::<Vec<_>>().join(", ")
+    };
+    let waiting = match control.phase() {
+        Phase::Announcing => format!("waiting for {} to join", names(Phase::Connecting)),
+        Phase::Connecting => format!("waiting for {} to connect", names(Phase::Running)),
+        Phase::Running => {
+            let slowest = control.slowest_nodes();
+            let who = slowest.iter().map(|&node| format!("`{}`", plan.nodes[node].name)).collect::<Vec<_>>();
+            format!("tick {} is not completed by {}", control.completed_ticks(), who.join(", "))
+        }
+    };
+    format!("the run stood still for {} s: {waiting}; it was aborted", STALL.as_secs())
+}
+
+fn take_down(processes: &mut Processes, control: &Control) -> Result<()> {
+    control.abort();
+    let start = Instant::now();
+    while !processes.all_ended() && start.elapsed() < GRACE {
+        processes.find_failure()?;
+        std::thread::sleep(POLL);
+    }
+    Ok(())
+}
+
+fn outcome(plan: &Plan, control: &Control, was_stopped: bool) -> Outcome {
+    let (start_ns, end_ns) = control.host_span_ns();
+    let host_s = end_ns.saturating_sub(start_ns) as f64 * 1e-9;
+    let share = |cpu_ns: u64| if host_s > 0.0 { cpu_ns as f64 * 1e-9 / host_s } else { 0.0 };
+    let clock = ("clock".to_owned(), share(control.clock_cpu_ns()), 0);
+    let nodes = plan.nodes.iter().enumerate();
+    let nodes = nodes
+        .map(|(index, node)| (node.name.clone(), share(control.cpu_ns(index)), control.late_count(index)));
+    Outcome {
+        ticks: control.completed_ticks(),
+        was_stopped,
+        host_s,
+        missed_deadlines: control.missed_deadlines(),
+        processes: std::iter::once(clock).chain(nodes).collect(),
+    }
+}

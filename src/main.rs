@@ -1,0 +1,196 @@
+//! hummingbus: launches process sets that simulate a vehicle in lockstep, and judges their recordings.
+#![forbid(unsafe_code)]
+
+mod describe;
+mod graph;
+mod judge;
+mod kinds;
+mod launch;
+mod manifest;
+mod placement;
+mod problem;
+mod progress;
+mod run_dir;
+mod summary;
+
+use crate::graph::{Graph, Program};
+use crate::manifest::{Manifest, PaceSetting};
+use crate::summary::Summary;
+use anyhow::{Context, Result, bail};
+use bus::BusError;
+use clap::{Args, Parser, Subcommand};
+use recorder::reader::Recording;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+/// A vehicle simulation as independent processes in deterministic lockstep.
+#[derive(Parser)]
+#[command(version, about, after_help = "Example: hummingbus run manifests/hover.toml")]
+struct Cli {
+    #[command(subcommand)]
+    command: Verb,
+}
+
+#[derive(Subcommand)]
+enum Verb {
+    /// Fly a manifest, record it, and judge the recording.
+    #[command(after_help = "Example: hummingbus run manifests/hover.toml --pace realtime --set run.seed=7")]
+    Run(RunArguments),
+    /// Check a manifest without running it, and print its graph.
+    #[command(after_help = "Example: hummingbus check manifests/hover.toml")]
+    Check(CheckArguments),
+    /// Compare two recordings; exit code 1 if they differ.
+    #[command(after_help = "Example: hummingbus diff a.mcap b.mcap")]
+    Diff {
+        /// The first recording.
+        a: PathBuf,
+        /// The second recording.
+        b: PathBuf,
+    },
+    /// Print every message's fields, units, frames and layout hash.
+    #[command(after_help = "Example: hummingbus schema --json")]
+    Schema {
+        /// Print JSON, with the ROS 2 definitions.
+        #[arg(long)]
+        json: bool,
+    },
+    /// Be a process of a run; started by `run`.
+    #[command(hide = true)]
+    Node {
+        /// The kind of node.
+        kind: String,
+    },
+}
+
+#[derive(Args)]
+struct RunArguments {
+    /// The manifest.
+    manifest: PathBuf,
+    /// Where to record; beside the manifest, named like it, where absent.
+    #[arg(long, value_name = "PATH")]
+    record: Option<PathBuf>,
+    /// free, realtime, or simulated seconds per second.
+    #[arg(long, value_name = "PACE")]
+    pace: Option<PaceSetting>,
+    /// Ticks that a fast process may be ahead of the slowest.
+    #[arg(long, value_name = "TICKS")]
+    window: Option<u32>,
+    /// Override a key of the manifest, such as run.seed=3.
+    #[arg(long, value_name = "KEY=VALUE")]
+    set: Vec<String>,
+    /// Print the summary as JSON, and no progress.
+    #[arg(long)]
+    json: bool,
+}
+
+#[derive(Args)]
+struct CheckArguments {
+    /// The manifest.
+    manifest: PathBuf,
+    /// Override a key of the manifest.
+    #[arg(long, value_name = "KEY=VALUE")]
+    set: Vec<String>,
+    /// Print the graph as JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+fn main() -> ExitCode {
+    let result = match Cli::parse().command {
+        Verb::Run(arguments) => run(&arguments),
+        Verb::Check(arguments) => check(&arguments),
+        Verb::Diff { a, b } => diff(&a, &b),
+        Verb::Schema { json } => {
+            print_text(&if json { describe::schemas_json() } else { describe::schemas() });
+            Ok(true)
+        }
+        Verb::Node { kind } => node(&kind),
+    };
+    match result {
+        Ok(true) => ExitCode::SUCCESS,
+        Ok(false) => ExitCode::FAILURE,
+        Err(error) => {
+            eprintln!("error: {error:#}");
+            ExitCode::from(2)
+        }
+    }
+}
+
+/// Flies a manifest; false if a condition did not hold.
+fn run(arguments: &RunArguments) -> Result<bool> {
+    let mut manifest = Manifest::load(&arguments.manifest, &arguments.set)?;
+    if let Some(pace) = arguments.pace {
+        manifest.content.run.pace = pace;
+    }
+    if let Some(window) = arguments.window {
+        manifest.content.run.window_ticks = Some(toml::Spanned::new(0..0, window));
+    }
+    let mut graph = Graph::build(&manifest)?;
+    let path = recording_path(&manifest, arguments.record.as_deref())?;
+    let has_recorder = graph
+        .programs
+        .iter()
+        .any(|program| matches!(program, Program::Kind(kind) if kind.name == "recorder"));
+    let outcome = launch::fly(&manifest, &mut graph, &path, arguments.json)?;
+    let (mut pass, mut compare) = (Vec::new(), Vec::new());
+    // A run that was stopped has not flown what the conditions speak of.
+    if has_recorder && !outcome.was_stopped {
+        let recording = Recording::open(&path)?;
+        pass = judge::verdicts(&manifest.content, &recording)?;
+        compare = judge::window_errors(&manifest.content, &recording)?;
+    }
+    let tick_s = graph.plan.tick_s();
+    let summary = Summary::new(manifest.name(), outcome, tick_s, has_recorder.then_some(path), pass, compare);
+    print_text(&if arguments.json { serde_json::to_string_pretty(&summary)? } else { summary.to_string() });
+    Ok(summary.passed)
+}
+
+/// Where the run is recorded: `--record`, the manifest's `record`, or beside the manifest.
+fn recording_path(manifest: &Manifest, argument: Option<&Path>) -> Result<PathBuf> {
+    let folder = manifest.path.parent().unwrap_or(Path::new(""));
+    let path = match (argument, &manifest.content.run.record) {
+        (Some(path), _) => path.to_owned(),
+        (None, Some(path)) => folder.join(path),
+        (None, None) => manifest.path.with_extension("mcap"),
+    };
+    std::path::absolute(&path).with_context(|| format!("{} is not a path", path.display()))
+}
+
+fn check(arguments: &CheckArguments) -> Result<bool> {
+    let manifest = Manifest::load(&arguments.manifest, &arguments.set)?;
+    let graph = Graph::build(&manifest)?;
+    print_text(&if arguments.json { describe::graph_json(&graph.plan) } else { describe::graph(&graph) });
+    Ok(true)
+}
+
+/// Compares two recordings; false if they differ.
+fn diff(a: &Path, b: &Path) -> Result<bool> {
+    let difference = recorder::diff::first_difference(&Recording::open(a)?, &Recording::open(b)?)?;
+    match &difference {
+        None => print_text("identical"),
+        Some(difference) => print_text(&difference.to_string()),
+    }
+    Ok(difference.is_none())
+}
+
+/// Runs a process of a run; what it says goes to the launcher's log.
+fn node(kind: &str) -> Result<bool> {
+    let result = if kind == "clock" {
+        bus::clock::run()
+    } else {
+        let kind =
+            kinds::find(kind).with_context(|| format!("no kind `{kind}`; there are {}", kinds::names()))?;
+        (kind.run)()
+    };
+    match result {
+        // The launcher ended the run and knows why.
+        Ok(()) | Err(BusError::Aborted) => Ok(true),
+        Err(error) => bail!(error),
+    }
+}
+
+/// Prints to standard output; a reader that has gone away (`| head`) is no error.
+fn print_text(text: &str) {
+    use std::io::Write as _;
+    let _ = writeln!(std::io::stdout(), "{}", text.trim_end());
+}

@@ -1,0 +1,106 @@
+//! Graph questions about a run: cycles, depths, and which nodes share a core.
+
+use bus::plan::{NodePlan, Plan};
+
+/// A cycle of edges without delay, as node indices in the direction of the data.
+pub fn zero_delay_cycle(nodes: &[NodePlan], publisher: impl Fn(usize) -> usize) -> Option<Vec<usize>> {
+    let mut state = vec![Visit::New; nodes.len()];
+    (0..nodes.len()).find_map(|node| visit(nodes, &publisher, node, &mut state, &mut Vec::new()))
+}
+
+#[derive(Clone, Copy, PartialEq)]
+enum Visit {
+    New,
+    OnPath,
+    Done,
+}
+
+/// Walks from consumer to publisher; a node met twice on one path closes a cycle.
+fn visit(
+    nodes: &[NodePlan],
+    publisher: &impl Fn(usize) -> usize,
+    node: usize,
+    state: &mut [Visit],
+    path: &mut Vec<usize>,
+) -> Option<Vec<usize>> {
+    match state[node] {
+        Visit::Done => return None,
+        Visit::OnPath => {
+            let start = path.iter().position(|&other| other == node)?;
+            return Some(path[start..].iter().rev().copied().collect());
+        }
+        Visit::New => {}
+    }
+    state[node] = Visit::OnPath;
+    path.push(node);
+    let sources = nodes[node].inputs.iter().filter(|input| input.delay_ticks == 0).map(|input| input.topic);
+    let cycle = sources.map(publisher).find_map(|source| visit(nodes, publisher, source, state, path));
+    path.pop();
+    state[node] = Visit::Done;
+    cycle
+}
+
+/// The length of the longest chain of edges without delay that ends in each node.
+pub fn depths(nodes: &[NodePlan], publisher: impl Fn(usize) -> usize) -> Vec<usize> {
+    let mut depths = vec![0; nodes.len()];
+    // As many rounds as a chain can have nodes; the graph has no cycle.
+    for _ in 0..nodes.len() {
+        for (index, node) in nodes.iter().enumerate() {
+            let sources = node.inputs.iter().filter(|input| input.delay_ticks == 0);
+            let deepest = sources.map(|input| depths[publisher(input.topic)] + 1).max();
+            depths[index] = deepest.unwrap_or(0);
+        }
+    }
+    depths
+}
+
+/// Gives every node that has none a core: each feedback loop has one of its own while they last, and what
+/// is in no loop (pilots, players, recorders, the clock) shares the last.
+///
+/// A loop is a serial chain: on one core a hop costs a context switch, across cores it costs an
+/// interrupt and a wake-up, ten times as much (docs/decisions/002-waiting-and-placement.md).
+pub fn place(plan: &mut Plan, clock_cpu: Option<usize>) {
+    let cores = bus::process::allowed_cores();
+    let (Some(&last), true) = (cores.last(), cores.len() > 1) else {
+        plan.clock_cpu = clock_cpu;
+        return;
+    };
+    let loop_cores = &cores[..cores.len() - 1];
+    let loops = feedback_loops(plan);
+    plan.clock_cpu = clock_cpu.or(Some(last));
+    for (node, in_loop) in plan.nodes.iter_mut().zip(loops) {
+        let default = in_loop.map_or(last, |number| loop_cores[number % loop_cores.len()]);
+        node.cpu = node.cpu.or(Some(default));
+    }
+}
+
+/// For each node the number of the feedback loop it is in: nodes that reach each other, delays included.
+fn feedback_loops(plan: &Plan) -> Vec<Option<usize>> {
+    let count = plan.nodes.len();
+    let mut publisher = vec![0; plan.topics.len()];
+    for (index, node) in plan.nodes.iter().enumerate() {
+        node.outputs.iter().for_each(|output| publisher[output.topic] = index);
+    }
+    let mut reaches = vec![vec![false; count]; count];
+    for (index, node) in plan.nodes.iter().enumerate() {
+        node.inputs.iter().for_each(|input| reaches[publisher[input.topic]][index] = true);
+    }
+    for via in 0..count {
+        for from in 0..count {
+            if reaches[from][via] {
+                let onward = reaches[via].clone();
+                reaches[from].iter_mut().zip(onward).for_each(|(reach, next)| *reach |= next);
+            }
+        }
+    }
+    let mut loops: Vec<Option<usize>> = vec![None; count];
+    let mut number = 0;
+    for node in 0..count {
+        if reaches[node][node] && loops[node].is_none() {
+            let members = (0..count).filter(|&other| reaches[node][other] && reaches[other][node]);
+            members.for_each(|member| loops[member] = Some(number));
+            number += 1;
+        }
+    }
+    loops
+}

@@ -1,0 +1,147 @@
+//! The summary of a run: for people, and as JSON for programs.
+
+use crate::judge::{Verdict, WindowErrors};
+use crate::launch::Outcome;
+use serde::Serialize;
+use std::fmt;
+use std::path::PathBuf;
+
+/// What there is to say about a run.
+#[derive(Debug, Serialize)]
+pub struct Summary {
+    /// Name of the manifest.
+    pub manifest: String,
+    /// Whether the run completed and every condition held.
+    pub passed: bool,
+    /// Ticks completed.
+    pub ticks: u32,
+    /// Simulated time.
+    pub simulated_s: f64,
+    /// Host time from first grant to last completed tick.
+    pub host_s: f64,
+    /// Ticks per second of host time.
+    pub ticks_per_s: f64,
+    /// Simulated time per host time.
+    pub real_time_factor: f64,
+    /// Whether the run was stopped before its end.
+    pub stopped_early: bool,
+    /// Deadlines missed.
+    pub missed_deadlines: u32,
+    /// The processes.
+    pub processes: Vec<ProcessSummary>,
+    /// The recording.
+    pub recording: Option<PathBuf>,
+    /// Pass conditions.
+    pub pass: Vec<Verdict>,
+    /// Comparisons with measured states.
+    pub compare: Vec<WindowErrors>,
+}
+
+/// What there is to say about a process.
+#[derive(Debug, Serialize)]
+pub struct ProcessSummary {
+    /// Name.
+    pub name: String,
+    /// Processor time per host time.
+    pub cpu_share: f64,
+    /// Deadlines at which it had not finished the tick before.
+    pub late: u32,
+}
+
+impl Summary {
+    /// The summary of `outcome`.
+    pub fn new(
+        manifest: String,
+        outcome: Outcome,
+        tick_s: f64,
+        recording: Option<PathBuf>,
+        pass: Vec<Verdict>,
+        compare: Vec<WindowErrors>,
+    ) -> Self {
+        let ticks_per_s = f64::from(outcome.ticks) / outcome.host_s.max(1e-9);
+        let held = pass.iter().all(|verdict| verdict.passed) && compare.iter().all(|errors| errors.passed);
+        let processes = outcome.processes.into_iter();
+        Self {
+            manifest,
+            passed: held && !outcome.was_stopped,
+            ticks: outcome.ticks,
+            simulated_s: f64::from(outcome.ticks) * tick_s,
+            host_s: outcome.host_s,
+            ticks_per_s,
+            real_time_factor: ticks_per_s * tick_s,
+            stopped_early: outcome.was_stopped,
+            missed_deadlines: outcome.missed_deadlines,
+            processes: processes
+                .map(|(name, cpu_share, late)| ProcessSummary { name, cpu_share, late })
+                .collect(),
+            recording,
+            pass,
+            compare,
+        }
+    }
+}
+
+impl fmt::Display for Summary {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        writeln!(
+            f,
+            "{}: {} ticks ({:.3} s) in {:.3} s: {:.0} ticks/s, {:.2} × real time",
+            self.manifest, self.ticks, self.simulated_s, self.host_s, self.ticks_per_s, self.real_time_factor
+        )?;
+        if self.stopped_early {
+            writeln!(f, "  stopped before its end")?;
+        }
+        if self.missed_deadlines > 0 {
+            writeln!(f, "  {} deadlines missed", self.missed_deadlines)?;
+        }
+        let shares: Vec<String> = self
+            .processes
+            .iter()
+            .map(|process| format!("{} {:.0} %", process.name, process.cpu_share * 100.0))
+            .collect();
+        writeln!(f, "  cpu: {}", shares.join(", "))?;
+        self.compare.iter().try_for_each(|errors| writeln!(f, "{}", DisplayErrors(errors)))?;
+        self.pass.iter().try_for_each(|verdict| writeln!(f, "{}", DisplayVerdict(verdict)))?;
+        if let Some(recording) = &self.recording {
+            writeln!(f, "  recording: {}", recording.display())?;
+        }
+        write!(f, "{}", if self.passed { "passed" } else { "FAILED" })
+    }
+}
+
+struct DisplayErrors<'a>(&'a WindowErrors);
+
+impl fmt::Display for DisplayErrors<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let errors = self.0;
+        write!(
+            f,
+            "  {} after {} s (RMS over {} windows): position {:.4} m, velocity {:.4} m/s, attitude {:.3} deg{}",
+            errors.simulated,
+            errors.window_s,
+            errors.windows,
+            errors.position_rms_m,
+            errors.velocity_rms_m_s,
+            errors.attitude_rms_deg,
+            if errors.passed { "" } else { "  FAILED" }
+        )
+    }
+}
+
+struct DisplayVerdict<'a>(&'a Verdict);
+
+impl fmt::Display for DisplayVerdict<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let verdict = self.0;
+        let values: Vec<String> = verdict.values.iter().map(|value| format!("{value:.4}")).collect();
+        let values = if values.is_empty() { "no samples".to_owned() } else { values.join(" … ") };
+        let limit = match (verdict.min, verdict.max) {
+            (Some(min), Some(max)) => format!("{min} … {max}"),
+            (Some(min), None) => format!("at least {min}"),
+            (None, Some(max)) => format!("at most {max}"),
+            (None, None) => "no limit".to_owned(),
+        };
+        let mark = if verdict.passed { "ok    " } else { "FAILED" };
+        write!(f, "  {mark} {}: {values} {} ({limit})", verdict.name, verdict.unit)
+    }
+}

@@ -1,0 +1,83 @@
+//! The map between a raw motor command (counts, PWM) and the rotor speed it asks for.
+
+/// Linear map with saturation at both ends. The fields satisfy `min < max` and
+/// `0 <= speed_at_min_rad_s < speed_at_max_rad_s` when they come from a vehicle file.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct CommandMap {
+    /// Smallest command, in raw counts.
+    pub min: f64,
+    /// Largest command, in raw counts.
+    pub max: f64,
+    /// Steady rotor speed at `min`, in rad/s.
+    pub speed_at_min_rad_s: f64,
+    /// Steady rotor speed at `max`, in rad/s.
+    pub speed_at_max_rad_s: f64,
+    /// Whether a command of zero or less switches the motor off (speed 0) instead of saturating at `min`.
+    pub zero_is_off: bool,
+}
+
+impl CommandMap {
+    /// The steady speed in rad/s that a raw `command` asks for. A command that is not a number counts
+    /// as `min`, so that no NaN enters the state.
+    pub fn speed(&self, command: f64) -> f64 {
+        if self.zero_is_off && command <= 0.0 {
+            return 0.0;
+        }
+        // `max` first: it answers a NaN with `min`.
+        let held = command.max(self.min).min(self.max);
+        let share = (held - self.min) / (self.max - self.min);
+        between(self.speed_at_min_rad_s, self.speed_at_max_rad_s, share)
+    }
+
+    /// The raw command that asks for `speed_rad_s`, saturated to what the motor can do.
+    pub fn command(&self, speed_rad_s: f64) -> f64 {
+        if self.zero_is_off && speed_rad_s <= 0.0 {
+            return 0.0;
+        }
+        let held = speed_rad_s.max(self.speed_at_min_rad_s).min(self.speed_at_max_rad_s);
+        let share = (held - self.speed_at_min_rad_s) / (self.speed_at_max_rad_s - self.speed_at_min_rad_s);
+        between(self.min, self.max, share)
+    }
+}
+
+/// The point at `share` (0...1) of the way from `low` to `high`; exact at both ends.
+fn between(low: f64, high: f64, share: f64) -> f64 {
+    low * (1.0 - share) + high * share
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const MAP: CommandMap = CommandMap {
+        min: 1.0,
+        max: 200.0,
+        speed_at_min_rad_s: 100.0,
+        speed_at_max_rad_s: 900.0,
+        zero_is_off: false,
+    };
+
+    #[test]
+    fn both_directions_agree_inside_the_range() {
+        for command in [1.0, 17.25, 100.0, 200.0] {
+            assert!((MAP.command(MAP.speed(command)) - command).abs() < 1e-12);
+        }
+    }
+
+    #[test]
+    fn it_saturates_at_both_ends() {
+        assert_eq!(MAP.speed(-5.0), 100.0);
+        assert_eq!(MAP.speed(1e9), 900.0);
+        assert_eq!(MAP.speed(f64::NAN), 100.0);
+        assert_eq!(MAP.command(0.0), 1.0);
+        assert_eq!(MAP.command(1e9), 200.0);
+        assert_eq!(MAP.command(f64::NAN), 1.0);
+    }
+
+    #[test]
+    fn zero_switches_off_only_where_the_vehicle_says_so() {
+        let map = CommandMap { zero_is_off: true, ..MAP };
+        assert_eq!((map.speed(0.0), map.command(0.0)), (0.0, 0.0));
+        assert_eq!(map.speed(0.5), 100.0);
+    }
+}

@@ -1,0 +1,179 @@
+//! Which keys a vehicle file has, in which dimension, and what is physical.
+
+use nalgebra::{Matrix3, Vector3};
+
+use crate::command::CommandMap;
+use crate::error::VehicleError;
+use crate::provenance::Uncertainty;
+use crate::reader::{Document, Section};
+use crate::units::{
+    ACCELERATION, INERTIA, LENGTH, MASS, PURE_NUMBER, SPEED, THRUST_COEFFICIENT, TIME, TORQUE_COEFFICIENT,
+};
+use crate::vehicle::{MotorModel, Rotor, Spin, Vehicle};
+
+/// How far a published tensor may miss the triangle inequality through rounding, relative to its size.
+const TRIANGLE_SLACK: f64 = 1e-9;
+
+/// Reads the whole file; see `vehicles/hummingbird.toml` for the layout.
+pub(crate) fn parse(text: &str, file_name: &str) -> Result<Vehicle, VehicleError> {
+    let doc = Document::new(file_name, text);
+    let tree = doc.tree()?;
+    let root = Section::new(&doc, String::new(), 0..0, tree.get_ref());
+    let vehicle = read(&root)?;
+    Ok(Vehicle { provenance: doc.provenance.take(), ..vehicle })
+}
+
+fn read(root: &Section) -> Result<Vehicle, VehicleError> {
+    let name = root.text("name")?.to_owned();
+    if root.has("notes") {
+        root.text("notes")?;
+    }
+    let (mass_kg, inertia_kg_m2, gravity_m_s2) = body(&root.section("body")?)?;
+    let [thrust_coefficient, torque_coefficient, rotor_inertia_kg_m2] = rotor(&root.section("rotor")?)?;
+    let vehicle = Vehicle {
+        name,
+        mass_kg,
+        inertia_kg_m2,
+        gravity_m_s2,
+        rotors: layout(root)?,
+        thrust_coefficient,
+        torque_coefficient,
+        rotor_inertia_kg_m2,
+        motor: motor(&root.section("motor")?)?,
+        command: command(&root.section("command")?)?,
+        provenance: Vec::new(),
+    };
+    root.finish()?;
+    Ok(vehicle)
+}
+
+fn body(section: &Section) -> Result<(f64, Matrix3<f64>, f64), VehicleError> {
+    let mass = section.quantity("mass", MASS)?.positive(section.doc)?;
+    let gravity = section.quantity("gravity", ACCELERATION)?.not_negative(section.doc)?;
+    let inertia = inertia(section)?;
+    section.finish()?;
+    Ok((mass.si, inertia, gravity.si))
+}
+
+/// The symmetric tensor J; `inertia_xy` and so on are the entries J_xy themselves, not their negatives.
+fn inertia(section: &Section) -> Result<Matrix3<f64>, VehicleError> {
+    let xx = section.quantity("inertia_xx", INERTIA)?.positive(section.doc)?;
+    let yy = section.quantity("inertia_yy", INERTIA)?.positive(section.doc)?;
+    let zz = section.quantity("inertia_zz", INERTIA)?.positive(section.doc)?;
+    let xy = product(section, "inertia_xy")?;
+    let xz = product(section, "inertia_xz")?;
+    let yz = product(section, "inertia_yz")?;
+    let tensor = Matrix3::new(xx.si, xy, xz, xy, yy.si, yz, xz, yz, zz.si);
+    let moments = principal_moments(&tensor);
+    if is_physical(&moments) {
+        return Ok(tensor);
+    }
+    let found = format!("{:.4e}, {:.4e}, {:.4e} kg*m^2", moments[0], moments[1], moments[2]);
+    let expected = "a tensor whose principal moments are above 0, none larger than the sum of the other two";
+    Err(section.doc.bad(&xx.at, &section.key("inertia_xx, inertia_yy, inertia_zz"), expected, found))
+}
+
+fn product(section: &Section, name: &'static str) -> Result<f64, VehicleError> {
+    if section.has(name) { Ok(section.quantity(name, INERTIA)?.si) } else { Ok(0.0) }
+}
+
+/// A rigid body's principal moments are positive and satisfy the triangle inequality.
+fn is_physical(moments: &Vector3<f64>) -> bool {
+    let largest = moments.max();
+    moments.min() > 0.0 && 2.0 * largest <= moments.sum() + TRIANGLE_SLACK * largest
+}
+
+/// Eigenvalues, computed on the tensor scaled to 1 so that no exponent in a file can overflow on the way.
+fn principal_moments(tensor: &Matrix3<f64>) -> Vector3<f64> {
+    let scale = tensor.amax();
+    (tensor / scale).symmetric_eigenvalues() * scale
+}
+
+fn rotor(section: &Section) -> Result<[f64; 3], VehicleError> {
+    let doc = section.doc;
+    let thrust = section.quantity("thrust_coefficient", THRUST_COEFFICIENT)?.not_negative(doc)?;
+    let torque = section.quantity("torque_coefficient", TORQUE_COEFFICIENT)?.not_negative(doc)?;
+    let inertia = section.quantity("inertia", INERTIA)?.not_negative(doc)?;
+    section.finish()?;
+    Ok([thrust.si, torque.si, inertia.si])
+}
+
+fn layout(root: &Section) -> Result<[Rotor; 4], VehicleError> {
+    let sections = root.sections("rotors")?;
+    let rotors = sections.iter().map(one_rotor).collect::<Result<Vec<_>, _>>()?;
+    let count = rotors.len();
+    // The first table tells where; with none at all, the file's start does.
+    let at = sections.first().map_or(0..0, |section| section.at.clone());
+    rotors.try_into().map_err(|_| root.doc.bad(&at, "rotors", "four rotors", format!("{count}")))
+}
+
+fn one_rotor(section: &Section) -> Result<Rotor, VehicleError> {
+    let name = section.text("name")?.to_owned();
+    let position_m = Vector3::from(section.vector("position", LENGTH)?);
+    let spin = spin(&section.section("spin")?)?;
+    section.finish()?;
+    Ok(Rotor { name, position_m, spin: spin.sign() })
+}
+
+/// A sense of rotation has a value and a source, but neither unit nor uncertainty.
+fn spin(section: &Section) -> Result<Spin, VehicleError> {
+    let words = [("counter-clockwise", Spin::CounterClockwise), ("clockwise", Spin::Clockwise)];
+    let spin = section.choice("value", &words)?;
+    section.note("seen from above", section.text("source")?, Uncertainty::OneSigma(0.0));
+    section.finish()?;
+    Ok(spin)
+}
+
+#[derive(Clone, Copy)]
+enum Order {
+    First,
+    Second,
+}
+
+fn motor(section: &Section) -> Result<MotorModel, VehicleError> {
+    let orders = [("first-order", Order::First), ("second-order", Order::Second)];
+    let model = match section.choice("model", &orders)? {
+        Order::First => first_order(section)?,
+        Order::Second => second_order(section)?,
+    };
+    section.finish()?;
+    Ok(model)
+}
+
+fn first_order(section: &Section) -> Result<MotorModel, VehicleError> {
+    let time_constant = section.quantity("time_constant", TIME)?.positive(section.doc)?;
+    Ok(MotorModel::FirstOrder { time_constant_s: time_constant.si })
+}
+
+fn second_order(section: &Section) -> Result<MotorModel, VehicleError> {
+    let frequency = section.quantity("natural_frequency", SPEED)?.positive(section.doc)?;
+    let damping = section.quantity("damping_ratio", PURE_NUMBER)?.positive(section.doc)?;
+    Ok(MotorModel::SecondOrder { natural_frequency_rad_s: frequency.si, damping_ratio: damping.si })
+}
+
+fn command(section: &Section) -> Result<CommandMap, VehicleError> {
+    let doc = section.doc;
+    let min = section.quantity("min", PURE_NUMBER)?;
+    let max = section.quantity("max", PURE_NUMBER)?;
+    let low = section.quantity("speed_at_min", SPEED)?.not_negative(doc)?;
+    let high = section.quantity("speed_at_max", SPEED)?;
+    let (above_min, above_low) = (max.si > min.si, high.si > low.si);
+    let max = max.require(doc, above_min, "a command above `command.min`")?;
+    let high = high.require(doc, above_low, "a speed above `command.speed_at_min`")?;
+    let zero_is_off = section.has("zero_is_off") && off(&section.section("zero_is_off")?)?;
+    section.finish()?;
+    Ok(CommandMap {
+        min: min.si,
+        max: max.si,
+        speed_at_min_rad_s: low.si,
+        speed_at_max_rad_s: high.si,
+        zero_is_off,
+    })
+}
+
+fn off(section: &Section) -> Result<bool, VehicleError> {
+    let value = section.flag("value")?;
+    section.note("true or false", section.text("source")?, Uncertainty::OneSigma(0.0));
+    section.finish()?;
+    Ok(value)
+}

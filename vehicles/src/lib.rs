@@ -1,0 +1,32 @@
+//! Vehicle files: every physical number with its unit, source and uncertainty, read once into SI.
+//!
+//! | room | what it holds |
+//! |---|---|
+//! | [`vehicle`] | the immutable [`Vehicle`] that the physics uses |
+//! | [`command`] | the map between a raw motor command and a rotor speed |
+//! | [`provenance`] | where each number came from, kept for reports |
+//! | `file` | which keys a vehicle file has, and what is physical |
+//! | `reader` | walks the TOML tree with positions, refuses what it does not know |
+//! | `units` | the table of accepted units |
+//! | [`error`] | what can be wrong with a file, said for people |
+//!
+//! ```
+//! let text = include_str!("../hummingbird.toml");
+//! let vehicle = vehicles::Vehicle::parse(text, "hummingbird.toml")?;
+//! assert_eq!(vehicle.mass_kg, 0.480);
+//! # Ok::<(), vehicles::VehicleError>(())
+//! ```
+#![forbid(unsafe_code)]
+
+pub mod command;
+pub mod error;
+mod file;
+pub mod provenance;
+mod reader;
+mod units;
+pub mod vehicle;
+
+pub use command::CommandMap;
+pub use error::{Place, VehicleError};
+pub use provenance::{Provenance, Uncertainty};
+pub use vehicle::{MotorModel, Rotor, Spin, Vehicle};

@@ -1,0 +1,287 @@
+//! Walks the TOML tree of a vehicle file, keeps positions, and refuses every key nobody asked for.
+
+use std::cell::RefCell;
+use std::collections::BTreeSet;
+use std::ops::Range;
+
+use toml::Spanned;
+use toml::de::{DeTable, DeValue};
+
+use crate::error::{Place, VehicleError};
+use crate::provenance::{Provenance, Uncertainty};
+use crate::units::Dimension;
+
+/// The file being read: for positions, and to gather provenance on the way.
+pub(crate) struct Document<'t> {
+    file: &'t str,
+    text: &'t str,
+    pub provenance: RefCell<Vec<Provenance>>,
+}
+
+impl<'t> Document<'t> {
+    pub fn new(file: &'t str, text: &'t str) -> Self {
+        Document { file, text, provenance: RefCell::default() }
+    }
+
+    /// Parses the text into its tree.
+    pub fn tree(&self) -> Result<Spanned<DeTable<'t>>, VehicleError> {
+        DeTable::parse(self.text).map_err(|error| VehicleError::Syntax {
+            place: self.place(error.span().map_or(0, |span| span.start)),
+            message: error.message().to_owned(),
+        })
+    }
+
+    fn place(&self, offset: usize) -> Place {
+        Place::of(self.file, self.text, offset)
+    }
+
+    /// A value that cannot be meant.
+    pub fn bad(
+        &self,
+        at: &Range<usize>,
+        key: &str,
+        expected: impl Into<String>,
+        found: impl Into<String>,
+    ) -> VehicleError {
+        VehicleError::BadValue {
+            place: self.place(at.start),
+            key: key.to_owned(),
+            expected: expected.into(),
+            found: found.into(),
+        }
+    }
+}
+
+/// A number in SI, and where it stands in the file.
+#[derive(Debug, Clone)]
+pub(crate) struct Quantity {
+    pub si: f64,
+    pub key: String,
+    pub at: Range<usize>,
+}
+
+impl Quantity {
+    /// Refuses the number unless `holds`.
+    pub fn require(self, doc: &Document, holds: bool, expected: &str) -> Result<Self, VehicleError> {
+        if holds {
+            Ok(self)
+        } else {
+            Err(doc.bad(&self.at, &self.key, expected, format!("{} (in SI)", self.si)))
+        }
+    }
+
+    /// Refuses zero and less.
+    pub fn positive(self, doc: &Document) -> Result<Self, VehicleError> {
+        let holds = self.si > 0.0;
+        self.require(doc, holds, "a number above 0")
+    }
+
+    /// Refuses less than zero.
+    pub fn not_negative(self, doc: &Document) -> Result<Self, VehicleError> {
+        let holds = self.si >= 0.0;
+        self.require(doc, holds, "a number of 0 or above")
+    }
+}
+
+/// One table of the file; remembers which keys were asked for.
+pub(crate) struct Section<'d, 't> {
+    pub doc: &'d Document<'t>,
+    pub path: String,
+    pub at: Range<usize>,
+    table: &'d DeTable<'t>,
+    asked: RefCell<BTreeSet<&'static str>>,
+}
+
+impl<'d, 't> Section<'d, 't> {
+    pub fn new(doc: &'d Document<'t>, path: String, at: Range<usize>, table: &'d DeTable<'t>) -> Self {
+        Section { doc, path, at, table, asked: RefCell::default() }
+    }
+
+    /// The whole dotted key of `name` in this table.
+    pub fn key(&self, name: &str) -> String {
+        if self.path.is_empty() { name.to_owned() } else { format!("{}.{name}", self.path) }
+    }
+
+    /// The value of `name`, if the file has it.
+    fn find(&self, name: &'static str) -> Option<&'d Spanned<DeValue<'t>>> {
+        self.asked.borrow_mut().insert(name);
+        self.table.get(name)
+    }
+
+    fn need(&self, name: &'static str, expected: &str) -> Result<&'d Spanned<DeValue<'t>>, VehicleError> {
+        self.find(name).ok_or_else(|| VehicleError::MissingKey {
+            place: self.doc.place(self.at.start),
+            key: self.key(name),
+            expected: expected.to_owned(),
+        })
+    }
+
+    /// Whether the file has `name`.
+    pub fn has(&self, name: &'static str) -> bool {
+        self.find(name).is_some()
+    }
+
+    /// A sub-table.
+    pub fn section(&self, name: &'static str) -> Result<Section<'d, 't>, VehicleError> {
+        self.as_section(self.key(name), self.need(name, "a table")?)
+    }
+
+    fn as_section(
+        &self,
+        key: String,
+        value: &'d Spanned<DeValue<'t>>,
+    ) -> Result<Section<'d, 't>, VehicleError> {
+        match value.get_ref().as_table() {
+            Some(table) => Ok(Section::new(self.doc, key, value.span(), table)),
+            None => Err(self.wrong_type(&key, value, "a table")),
+        }
+    }
+
+    /// An array of tables.
+    pub fn sections(&self, name: &'static str) -> Result<Vec<Section<'d, 't>>, VehicleError> {
+        let value = self.need(name, "an array of tables")?;
+        let Some(array) = value.get_ref().as_array() else {
+            return Err(self.wrong_type(&self.key(name), value, "an array of tables"));
+        };
+        let key = |index| format!("{}[{index}]", self.key(name));
+        array.iter().enumerate().map(|(index, item)| self.as_section(key(index), item)).collect()
+    }
+
+    /// A text, not empty.
+    pub fn text(&self, name: &'static str) -> Result<&'d str, VehicleError> {
+        let value = self.need(name, "a text")?;
+        match value.get_ref().as_str() {
+            Some(text) if !text.trim().is_empty() => Ok(text),
+            Some(_) => Err(self.doc.bad(&value.span(), &self.key(name), "a text", "an empty text")),
+            None => Err(self.wrong_type(&self.key(name), value, "a text")),
+        }
+    }
+
+    /// A text that has to be one of `choices`; returns what stands beside it.
+    pub fn choice<T: Copy>(&self, name: &'static str, choices: &[(&str, T)]) -> Result<T, VehicleError> {
+        let text = self.text(name)?;
+        if let Some((_, chosen)) = choices.iter().find(|(word, _)| *word == text) {
+            return Ok(*chosen);
+        }
+        let words: Vec<_> = choices.iter().map(|(word, _)| format!("\"{word}\"")).collect();
+        Err(self.doc.bad(
+            &self.at_of(name),
+            &self.key(name),
+            format!("one of {}", words.join(", ")),
+            format!("\"{text}\""),
+        ))
+    }
+
+    /// True or false.
+    pub fn flag(&self, name: &'static str) -> Result<bool, VehicleError> {
+        let value = self.need(name, "true or false")?;
+        value.get_ref().as_bool().ok_or_else(|| self.wrong_type(&self.key(name), value, "true or false"))
+    }
+
+    /// A parameter: a table with `value`, `unit`, `source` and `uncertainty`; the value in SI.
+    pub fn quantity(&self, name: &'static str, dimension: Dimension) -> Result<Quantity, VehicleError> {
+        let parameter = self.parameter(name)?;
+        let value = parameter.need("value", "a number")?;
+        let si = parameter.number("value", value)? * parameter.meta(dimension)?;
+        let quantity = Quantity { si, key: parameter.path, at: value.span() };
+        quantity.require(self.doc, si.is_finite(), "a number that is finite in SI")
+    }
+
+    /// A parameter whose value is an array of three numbers.
+    pub fn vector(&self, name: &'static str, dimension: Dimension) -> Result<[f64; 3], VehicleError> {
+        let parameter = self.parameter(name)?;
+        let value = parameter.need("value", "an array of three numbers")?;
+        let [x, y, z] = parameter.three(value)?;
+        let factor = parameter.meta(dimension)?;
+        Ok([x * factor, y * factor, z * factor])
+    }
+
+    fn parameter(&self, name: &'static str) -> Result<Section<'d, 't>, VehicleError> {
+        let expected = "a table with value, unit, source and uncertainty";
+        let value = self.need(name, expected)?;
+        if !value.get_ref().is_table() {
+            return Err(self.wrong_type(&self.key(name), value, expected));
+        }
+        self.as_section(self.key(name), value)
+    }
+
+    /// Checks unit, source and uncertainty of a parameter's table; notes them; gives the factor to SI.
+    fn meta(&self, dimension: Dimension) -> Result<f64, VehicleError> {
+        let unit = self.text("unit")?;
+        let factor = dimension.factor(unit).ok_or_else(|| {
+            self.doc.bad(&self.at_of("unit"), &self.key("unit"), dimension.describe(), format!("\"{unit}\""))
+        })?;
+        self.note(unit, self.text("source")?, self.uncertainty(factor)?);
+        self.finish()?;
+        Ok(factor)
+    }
+
+    /// Remembers where a parameter came from.
+    pub fn note(&self, unit: &str, source: &str, uncertainty: Uncertainty) {
+        self.doc.provenance.borrow_mut().push(Provenance {
+            key: self.path.clone(),
+            line: self.doc.place(self.at.start).line,
+            unit: unit.to_owned(),
+            source: source.to_owned(),
+            uncertainty,
+        });
+    }
+
+    fn uncertainty(&self, factor: f64) -> Result<Uncertainty, VehicleError> {
+        let expected = "a number (one standard deviation, in the same unit) or a text such as \"not stated\"";
+        let value = self.need("uncertainty", expected)?;
+        if value.get_ref().is_str() {
+            return Ok(Uncertainty::Said(self.text("uncertainty")?.to_owned()));
+        }
+        let sigma = self.number("uncertainty", value)?;
+        if sigma < 0.0 {
+            return Err(self.doc.bad(&value.span(), &self.key("uncertainty"), expected, sigma.to_string()));
+        }
+        Ok(Uncertainty::OneSigma(sigma * factor))
+    }
+
+    fn three(&self, value: &Spanned<DeValue<'t>>) -> Result<[f64; 3], VehicleError> {
+        let found: Vec<_> = value.get_ref().as_array().into_iter().flat_map(|array| array.iter()).collect();
+        let [x, y, z] = found[..] else {
+            return Err(self.wrong_type(&self.key("value"), value, "an array of three numbers"));
+        };
+        Ok([self.number("value", x)?, self.number("value", y)?, self.number("value", z)?])
+    }
+
+    /// A finite number, integer or not.
+    fn number(&self, name: &str, value: &Spanned<DeValue<'t>>) -> Result<f64, VehicleError> {
+        let expected = "a finite number";
+        let number = match value.get_ref() {
+            DeValue::Float(float) => float.as_str().parse().ok(),
+            DeValue::Integer(int) => {
+                i64::from_str_radix(int.as_str(), int.radix()).ok().map(|int| int as f64)
+            }
+            _ => return Err(self.wrong_type(&self.key(name), value, expected)),
+        };
+        number.filter(|number: &f64| number.is_finite()).ok_or_else(|| {
+            self.doc.bad(&value.span(), &self.key(name), expected, self.doc.text[value.span()].to_owned())
+        })
+    }
+
+    fn wrong_type(&self, key: &str, value: &Spanned<DeValue<'t>>, expected: &str) -> VehicleError {
+        self.doc.bad(&value.span(), key, expected, format!("a TOML {}", value.get_ref().type_str()))
+    }
+
+    fn at_of(&self, name: &str) -> Range<usize> {
+        self.table.get(name).map_or(self.at.clone(), Spanned::span)
+    }
+
+    /// Refuses the first key in the file's order that nobody asked for.
+    pub fn finish(&self) -> Result<(), VehicleError> {
+        let asked = self.asked.borrow();
+        let unknown = self.table.keys().filter(|key| !asked.contains(key.get_ref().as_ref()));
+        match unknown.min_by_key(|key| key.span().start) {
+            None => Ok(()),
+            Some(key) => Err(VehicleError::UnknownKey {
+                place: self.doc.place(key.span().start),
+                key: self.key(key.get_ref()),
+                expected: asked.iter().copied().collect::<Vec<_>>().join(", "),
+            }),
+        }
+    }
+}

@@ -1,0 +1,78 @@
+//! The units a vehicle file may use, per dimension, with the factor that takes each to SI.
+
+#![cfg_attr(test, allow(non_snake_case, reason = "units stand last in names: thrust_N"))]
+
+use std::f64::consts::PI;
+
+/// One radian per second in revolutions per minute, inverted: rpm times this is rad/s.
+const RPM: f64 = PI / 30.0;
+
+/// A physical dimension and the units accepted for it.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Dimension {
+    /// Name for messages.
+    pub name: &'static str,
+    /// Unit as written in files, and the factor to SI. The first is the SI unit itself.
+    pub units: &'static [(&'static str, f64)],
+}
+
+impl Dimension {
+    /// The factor that takes `unit` to SI, if this dimension has it.
+    pub fn factor(&self, unit: &str) -> Option<f64> {
+        self.units.iter().find(|(name, _)| *name == unit).map(|(_, factor)| *factor)
+    }
+
+    /// "a unit of mass: kg, g", for messages.
+    pub fn describe(&self) -> String {
+        let names: Vec<_> = self.units.iter().map(|(name, _)| format!("\"{name}\"")).collect();
+        format!("a unit of {}: {}", self.name, names.join(", "))
+    }
+}
+
+pub(crate) const MASS: Dimension = Dimension { name: "mass", units: &[("kg", 1.0), ("g", 1e-3)] };
+
+pub(crate) const LENGTH: Dimension =
+    Dimension { name: "length", units: &[("m", 1.0), ("cm", 1e-2), ("mm", 1e-3)] };
+
+pub(crate) const TIME: Dimension = Dimension { name: "time", units: &[("s", 1.0), ("ms", 1e-3)] };
+
+pub(crate) const ACCELERATION: Dimension = Dimension { name: "acceleration", units: &[("m/s^2", 1.0)] };
+
+pub(crate) const INERTIA: Dimension =
+    Dimension { name: "moment of inertia", units: &[("kg*m^2", 1.0), ("g*m^2", 1e-3), ("g*mm^2", 1e-9)] };
+
+pub(crate) const SPEED: Dimension =
+    Dimension { name: "rotation speed", units: &[("rad/s", 1.0), ("rpm", RPM)] };
+
+pub(crate) const THRUST_COEFFICIENT: Dimension = Dimension {
+    name: "thrust per rotation speed squared",
+    units: &[("N/(rad/s)^2", 1.0), ("N/rpm^2", 1.0 / (RPM * RPM))],
+};
+
+pub(crate) const TORQUE_COEFFICIENT: Dimension = Dimension {
+    name: "torque per rotation speed squared",
+    units: &[("N*m/(rad/s)^2", 1.0), ("N*m/rpm^2", 1.0 / (RPM * RPM))],
+};
+
+pub(crate) const PURE_NUMBER: Dimension = Dimension { name: "a pure number", units: &[("1", 1.0)] };
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_coefficient_in_rpm_gives_the_same_thrust_in_rad_s() {
+        let factor = THRUST_COEFFICIENT.factor("N/rpm^2").unwrap();
+        let speed_rpm = 3930.0;
+        let thrust_N = 7.6184e-8 * speed_rpm * speed_rpm;
+        let speed_rad_s = speed_rpm * SPEED.factor("rpm").unwrap();
+        let same_N = 7.6184e-8 * factor * speed_rad_s * speed_rad_s;
+        assert!((thrust_N - same_N).abs() < 1e-14);
+    }
+
+    #[test]
+    fn a_unit_of_another_dimension_is_not_accepted() {
+        assert_eq!(MASS.factor("m"), None);
+        assert!(MASS.describe().contains("\"kg\", \"g\""));
+    }
+}

@@ -1,0 +1,115 @@
+//! The vehicle as the physics sees it: SI numbers only, immutable once read.
+//!
+//! Body frame B: x forward, y left, z up, origin at the centre of mass. World frame W: z up.
+
+use std::path::Path;
+
+use nalgebra::{Matrix3, Vector3};
+
+use crate::command::CommandMap;
+use crate::error::VehicleError;
+use crate::provenance::Provenance;
+
+/// A quadrotor, in SI units.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Vehicle {
+    /// What the vehicle is called.
+    pub name: String,
+    /// Take-off mass.
+    pub mass_kg: f64,
+    /// Inertia tensor about the centre of mass, body frame, rotors at rest included.
+    pub inertia_kg_m2: Matrix3<f64>,
+    /// Magnitude of gravity; it points along -z of the world.
+    pub gravity_m_s2: f64,
+    /// The four rotors, in the order of the motor commands.
+    pub rotors: [Rotor; 4],
+    /// c_T of T = c_T w^2, in N/(rad/s)^2 (thesis eq. 3.1).
+    pub thrust_coefficient: f64,
+    /// c_Q of Q = c_Q w^2, in N*m/(rad/s)^2 (thesis eq. 3.2).
+    pub torque_coefficient: f64,
+    /// Moment of inertia of one rotor about its axis (I_m of thesis eq. 3.11).
+    pub rotor_inertia_kg_m2: f64,
+    /// How the rotor speed follows the commanded speed.
+    pub motor: MotorModel,
+    /// How a raw motor command becomes a commanded speed.
+    pub command: CommandMap,
+    /// Where every number came from, in the file's order of reading.
+    pub provenance: Vec<Provenance>,
+}
+
+/// One rotor's place and sense of rotation.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Rotor {
+    /// What the file calls it, such as `front`.
+    pub name: String,
+    /// The hub, seen from the centre of mass, body frame.
+    pub position_m: Vector3<f64>,
+    /// Sense of rotation seen from above: +1 counter-clockwise, -1 clockwise.
+    pub spin: f64,
+}
+
+/// A sense of rotation seen from above, as files write it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Spin {
+    /// Angular velocity along +z of the body.
+    CounterClockwise,
+    /// Angular velocity along -z of the body.
+    Clockwise,
+}
+
+impl Spin {
+    /// +1 counter-clockwise, -1 clockwise.
+    pub fn sign(self) -> f64 {
+        match self {
+            Spin::CounterClockwise => 1.0,
+            Spin::Clockwise => -1.0,
+        }
+    }
+}
+
+/// How the rotor speed follows the commanded speed. Both have unit gain at rest: the thesis's gain of
+/// 3.5 (section 4.2) has no unit and does not map a speed onto the same speed.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum MotorModel {
+    /// w'' = wn^2 (wc - w) - 2 zeta wn w'.
+    SecondOrder {
+        /// wn.
+        natural_frequency_rad_s: f64,
+        /// zeta.
+        damping_ratio: f64,
+    },
+    /// w' = (wc - w) / tau.
+    FirstOrder {
+        /// tau.
+        time_constant_s: f64,
+    },
+}
+
+impl Vehicle {
+    /// Reads and checks a vehicle file.
+    pub fn load(path: &Path) -> Result<Self, VehicleError> {
+        let file = path.display().to_string();
+        match std::fs::read_to_string(path) {
+            Ok(text) => Self::parse(&text, &file),
+            Err(cause) => Err(VehicleError::Unreadable { file, cause }),
+        }
+    }
+
+    /// Reads and checks the text of a vehicle file; `file_name` is for messages only.
+    pub fn parse(text: &str, file_name: &str) -> Result<Self, VehicleError> {
+        crate::file::parse(text, file_name)
+    }
+
+    /// The rotor speed at which four equal thrusts carry the weight: sqrt(m g / (4 c_T)), in rad/s.
+    /// Infinite for a vehicle whose rotors make no thrust.
+    pub fn hover_speed_rad_s(&self) -> f64 {
+        #[allow(non_snake_case, reason = "units stand last in names, and the newton is N")]
+        let weight_N = self.mass_kg * self.gravity_m_s2;
+        if weight_N == 0.0 { 0.0 } else { (weight_N / (4.0 * self.thrust_coefficient)).sqrt() }
+    }
+
+    /// The raw motor command for hover, saturated to the motors' range.
+    pub fn hover_command(&self) -> f64 {
+        self.command.command(self.hover_speed_rad_s())
+    }
+}

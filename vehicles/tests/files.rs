@@ -1,0 +1,242 @@
+//! The two vehicle files, and what every fault in a file is answered with.
+#![allow(non_snake_case, reason = "units stand last in names, and the newton is N")]
+
+use std::f64::consts::PI;
+use std::path::Path;
+
+use vehicles::{MotorModel, Uncertainty, Vehicle, VehicleError};
+
+const HUMMINGBIRD: &str = include_str!("../hummingbird.toml");
+const CRAZYFLIE: &str = include_str!("../crazyflie-2.1.toml");
+
+const MASS_LINE: &str = r#"mass = { value = 0.480, unit = "kg", source = "thesis Table 2.1: take-off weight with the 2100 mAh battery", uncertainty = "not stated" }"#;
+
+fn rpm(speed_rad_s: f64) -> f64 {
+    speed_rad_s * 30.0 / PI
+}
+
+/// The line of the Hummingbird's file on which `needle` first stands, from 1.
+fn line_of(needle: &str) -> usize {
+    HUMMINGBIRD.lines().position(|line| line.contains(needle)).unwrap() + 1
+}
+
+fn refused(from: &str, to: &str) -> VehicleError {
+    assert!(HUMMINGBIRD.contains(from), "the test looks for {from:?}, which the file does not hold");
+    Vehicle::parse(&HUMMINGBIRD.replacen(from, to, 1), "bird.toml").expect_err("this file must be refused")
+}
+
+/// The fault `from` -> `to` is reported on `line` and its message holds every one of `words`.
+fn assert_refused(from: &str, to: &str, line: usize, words: &[&str]) {
+    let error = refused(from, to);
+    let message = error.to_string();
+    let start = format!("bird.toml:{line}:");
+    assert!(message.starts_with(&start), "expected {start} in: {message}");
+    for word in words {
+        assert!(message.contains(word), "expected {word:?} in: {message}");
+    }
+}
+
+#[test]
+fn the_hummingbird_is_the_thesiss() {
+    let bird = Vehicle::parse(HUMMINGBIRD, "hummingbird.toml").unwrap();
+    assert_eq!(bird.mass_kg, 0.480);
+    assert_eq!(bird.inertia_kg_m2.diagonal().as_slice(), [5.6e-3, 5.6e-3, 8.1e-3]);
+    assert!((rpm(bird.hover_speed_rad_s()) - 3930.0).abs() < 1.0);
+    assert!((rpm(bird.command.speed(1.0)) - 1075.0).abs() < 1e-9);
+    assert!((rpm(bird.command.speed(200.0)) - 8600.0).abs() < 1e-9);
+    let names: Vec<_> = bird.rotors.iter().map(|rotor| rotor.name.as_str()).collect();
+    assert_eq!(names, ["front", "right", "rear", "left"]);
+    assert_eq!(bird.rotors.each_ref().map(|rotor| rotor.spin), [-1.0, 1.0, -1.0, 1.0]);
+}
+
+#[test]
+fn the_hummingbirds_motor_is_the_thesiss_transfer_function() {
+    let MotorModel::SecondOrder { natural_frequency_rad_s: wn, damping_ratio: zeta } =
+        Vehicle::parse(HUMMINGBIRD, "").unwrap().motor
+    else {
+        panic!("expected a second-order motor")
+    };
+    assert!((1.0 / (wn * wn) - 0.0044).abs() < 1e-15);
+    assert!((2.0 * zeta / wn - 0.08).abs() < 1e-15);
+}
+
+#[test]
+fn the_crazyflie_follows_its_sources_where_it_hovers() {
+    let fly = Vehicle::parse(CRAZYFLIE, "crazyflie-2.1.toml").unwrap();
+    let pwm = fly.hover_command();
+    // Foerster's own thrust polynomial at this PWM: the quadratic law and his fit agree within 6 %.
+    let thrust_N = 2.130295e-11 * pwm * pwm + 1.032633e-6 * pwm + 5.48456e-4;
+    assert!((4.0 * thrust_N / (fly.mass_kg * fly.gravity_m_s2) - 1.0).abs() < 0.06);
+    assert!((37_000.0..39_000.0).contains(&pwm), "hover PWM {pwm}");
+    assert_eq!(fly.command.speed(0.0), 0.0);
+    assert!((fly.command.speed(30_000.0) - (0.04076521 * 30_000.0 + 380.8359)).abs() < 1e-3);
+}
+
+#[test]
+fn every_file_in_the_folder_loads_from_disk() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR"));
+    for name in ["hummingbird.toml", "crazyflie-2.1.toml"] {
+        let vehicle = Vehicle::load(&folder.join(name)).unwrap();
+        assert!(vehicle.provenance.len() >= 16 && vehicle.provenance.iter().all(|p| !p.source.is_empty()));
+        // Opposite rotors turn alike and the spins cancel: hover needs no yaw torque.
+        assert_eq!(vehicle.rotors.iter().map(|rotor| rotor.spin).sum::<f64>(), 0.0);
+    }
+}
+
+#[test]
+fn an_uncertainty_is_kept_in_si_or_in_words() {
+    let fly = Vehicle::parse(CRAZYFLIE, "").unwrap();
+    let of = |key: &str| fly.provenance.iter().find(|p| p.key == key).unwrap().uncertainty.clone();
+    assert_eq!(of("rotors[0].position"), Uncertainty::OneSigma(0.0025));
+    assert_eq!(of("body.mass"), Uncertainty::Said("not stated".into()));
+}
+
+#[test]
+fn products_of_inertia_are_tensor_entries() {
+    let line = r#"inertia_xy = { value = -2, unit = "g*m^2", source = "test", uncertainty = 0 }"#;
+    let text = HUMMINGBIRD.replacen("[rotor]", &format!("{line}\n[rotor]"), 1);
+    let tensor = Vehicle::parse(&text, "").unwrap().inertia_kg_m2;
+    assert_eq!((tensor[(0, 1)], tensor[(1, 0)]), (-2e-3, -2e-3));
+}
+
+#[test]
+fn the_unit_is_converted_and_the_files_own_unit_kept() {
+    let text = HUMMINGBIRD.replacen("value = 0.480, unit = \"kg\"", "value = 480, unit = \"g\"", 1);
+    let bird = Vehicle::parse(&text, "").unwrap();
+    assert!((bird.mass_kg - 0.480).abs() < 1e-15);
+    let mass = bird.provenance.iter().find(|p| p.key == "body.mass").unwrap();
+    assert_eq!((mass.unit.as_str(), mass.line), ("g", line_of("mass = ")));
+}
+
+#[test]
+fn a_missing_file_is_named() {
+    let message = Vehicle::load(Path::new("no/such.toml")).unwrap_err().to_string();
+    assert!(message.starts_with("no/such.toml: cannot read"), "{message}");
+}
+
+#[test]
+fn an_unknown_key_is_named_with_its_place_and_the_known_ones() {
+    let line = line_of("mass = ");
+    assert_refused("mass = {", "mess = {", line - 1, &["missing key `body.mass`"]);
+    assert_refused(
+        "[rotor]",
+        "colour = 1\n[rotor]",
+        line_of("[rotor]"),
+        &["unknown key `body.colour`", "inertia_xx"],
+    );
+    assert_refused(
+        MASS_LINE,
+        &MASS_LINE.replace(" }", ", sigma = 1 }"),
+        line,
+        &["unknown key `body.mass.sigma`", "source, uncertainty, unit, value"],
+    );
+    assert_refused("name = \"Asc", "nmae = 3\nname = \"Asc", line_of("name = "), &["`nmae`"]);
+}
+
+#[test]
+fn a_column_points_at_the_value() {
+    let error = refused("unit = \"kg\"", "unit = \"lb\"");
+    let place = error.place().unwrap();
+    assert_eq!(place.column, MASS_LINE.find("\"kg\"").unwrap() + 1);
+}
+
+#[test]
+fn a_wrong_unit_is_named_with_the_accepted_ones() {
+    let line = line_of("mass = ");
+    assert_refused("unit = \"kg\"", "unit = \"lb\"", line, &["`body.mass.unit`", "\"kg\", \"g\"", "\"lb\""]);
+    assert_refused("N/rpm^2", "N", line_of("thrust_coefficient"), &["N/(rad/s)^2", "N/rpm^2"]);
+}
+
+#[test]
+fn a_parameter_lacking_a_field_is_refused() {
+    let line = line_of("mass = ");
+    for (field, key) in [
+        ("value = 0.480, ", "body.mass.value"),
+        (" unit = \"kg\",", "body.mass.unit"),
+        ("source = \"thesis Table 2.1: take-off weight with the 2100 mAh battery\", ", "body.mass.source"),
+        (", uncertainty = \"not stated\"", "body.mass.uncertainty"),
+    ] {
+        let without = MASS_LINE.replacen(field, "", 1);
+        assert_refused(MASS_LINE, &without, line, &[&format!("missing key `{key}`")]);
+    }
+}
+
+#[test]
+fn a_number_that_is_not_physical_is_refused() {
+    let mass = line_of("mass = ");
+    assert_refused("value = 0.480", "value = -0.48", mass, &["body.mass", "above 0", "-0.48"]);
+    assert_refused("value = 0.480", "value = 0", mass, &["above 0"]);
+    assert_refused("value = 0.480", "value = nan", mass, &["finite"]);
+    assert_refused("value = 0.480", "value = inf", mass, &["finite"]);
+    assert_refused("value = 8.1e-3", "value = 11.3e-3", line_of("inertia_xx"), &["sum of the other two"]);
+    assert_refused("value = 200", "value = 1", line_of("max = "), &["command.max", "above `command.min`"]);
+    assert_refused("value = 7.6184e-8", "value = 1e308", line_of("thrust_coefficient"), &["finite in SI"]);
+    assert_refused("\"not stated\"", "-1", mass, &["body.mass.uncertainty"]);
+}
+
+#[test]
+fn a_wrong_type_is_named() {
+    let mass = line_of("mass = ");
+    assert_refused("value = 0.480", "value = \"0.480\"", mass, &["finite number", "a TOML string"]);
+    assert_refused(MASS_LINE, "mass = 0.48", mass, &["a table with value, unit, source and uncertainty"]);
+    assert_refused("[0.17, 0, 0]", "[0.17, 0]", line_of("[0.17, 0, 0]"), &["an array of three numbers"]);
+    assert_refused("\"second-order\"", "\"third-order\"", line_of("second-order"), &["\"first-order\""]);
+    assert_refused("\"clockwise\"", "\"left\"", line_of("\"clockwise\""), &["counter-clockwise"]);
+}
+
+#[test]
+fn three_rotors_are_not_enough() {
+    let cut = HUMMINGBIRD.rfind("[[rotors]]").unwrap();
+    let message = Vehicle::parse(&HUMMINGBIRD[..cut], "bird.toml").unwrap_err().to_string();
+    assert!(message.contains("expected four rotors, found 3"), "{message}");
+}
+
+#[test]
+fn broken_toml_is_named_with_its_place() {
+    assert_refused("[body]", "[body", line_of("[body]"), &["not valid TOML"]);
+}
+
+/// A small fixed generator, so that the test is the same on every machine.
+struct Lcg(u64);
+
+impl Lcg {
+    fn below(&mut self, bound: usize) -> usize {
+        self.0 = self.0.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+        ((self.0 >> 33) as usize) % bound
+    }
+}
+
+/// One to four random edits of the bytes: replaced, dropped, doubled, or cut off.
+fn mutated(text: &str, random: &mut Lcg) -> String {
+    let mut bytes = text.as_bytes().to_vec();
+    for _ in 0..=random.below(4) {
+        let (at, span) = (random.below(bytes.len()), random.below(30));
+        let end = (at + span).min(bytes.len());
+        match random.below(4) {
+            0 => bytes[at] = b"{}[]=\"'#\n.,-0e9x_\xff"[random.below(18)],
+            1 => drop(bytes.drain(at..end)),
+            2 => bytes.splice(at..at, bytes[at..end].to_vec()).for_each(drop),
+            _ => bytes.truncate(at.max(1)),
+        }
+        if bytes.is_empty() {
+            bytes.push(b'x');
+        }
+    }
+    String::from_utf8_lossy(&bytes).into_owned()
+}
+
+#[test]
+fn no_text_makes_the_reader_panic_and_what_it_accepts_is_physical() {
+    let mut random = Lcg(7);
+    for round in 0..6000 {
+        let source = if round % 2 == 0 { HUMMINGBIRD } else { CRAZYFLIE };
+        match Vehicle::parse(&mutated(source, &mut random), "mutant.toml") {
+            Ok(vehicle) => {
+                assert!(vehicle.mass_kg > 0.0 && vehicle.mass_kg.is_finite());
+                assert!(vehicle.inertia_kg_m2.try_inverse().is_some());
+                assert!(vehicle.command.max > vehicle.command.min);
+            }
+            Err(error) => assert!(error.place().is_some_and(|place| place.line > 0)),
+        }
+    }
+}
