@@ -406,7 +406,7 @@ impl ConnectedNode {
             reason: error.to_string(),
         })?;
         let done_ns = monotonic_ns();
-        for output in &mut self.outputs {
+        for output in self.outputs.iter_mut().filter(|output| output.is_due(tick)) {
             output.send(tick, time_ns, received_ns, done_ns, node)?;
             self.control.advance(Word::Topic(output.topic), tick + output.period_ticks, &output.readers);
         }

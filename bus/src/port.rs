@@ -153,7 +153,7 @@ impl OutPort {
         }
     }
 
-    /// Sends the sample of `tick`, if one is due.
+    /// Sends the sample that is due at `tick`.
     pub(crate) fn send(
         &mut self,
         tick: u32,
@@ -162,9 +162,6 @@ impl OutPort {
         done_ns: u64,
         node: &str,
     ) -> Result<(), BusError> {
-        if !self.is_due(tick) {
-            return Ok(());
-        }
         let Some(mut loan) = self.loan.take() else {
             return Err(BusError::UnwrittenOutput { node: node.to_owned(), port: self.port.clone(), tick });
         };
