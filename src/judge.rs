@@ -87,16 +87,21 @@ pub fn conversion(from: &str, to: &str) -> Result<f64, String> {
 /// # Errors
 /// If a topic or field is not in the recording, or a unit does not fit.
 pub fn verdicts(content: &Content, recording: &Recording) -> Result<Vec<Verdict>> {
-    content.pass.iter().map(|pass| verdict(pass.get_ref(), recording)).collect()
+    let conditions: Vec<&PassCondition> = content.pass.iter().map(toml::Spanned::get_ref).collect();
+    let fields: Vec<_> = conditions.iter().map(|pass| (pass.topic.as_str(), pass.field.as_str())).collect();
+    if fields.is_empty() {
+        return Ok(Vec::new());
+    }
+    let series = recording.series(&fields)?;
+    conditions.iter().zip(&series).map(|(pass, series)| verdict(pass, series)).collect()
 }
 
-fn verdict(pass: &PassCondition, recording: &Recording) -> Result<Verdict> {
-    let series = recording.series(&pass.topic, &[&pass.field])?.remove(0);
+fn verdict(pass: &PassCondition, series: &Series) -> Result<Verdict> {
     let factor = match conversion(&series.unit, &pass.unit) {
         Ok(factor) => factor,
         Err(error) => bail!("pass condition `{}`: {error}", pass.name),
     };
-    let samples = span(&series, pass.from_s, pass.to_s).map(|value| value * factor);
+    let samples = span(series, pass.from_s, pass.to_s).map(|value| value * factor);
     let values = statistic(pass.statistic, samples);
     let is_above = |value: &f64| pass.min.is_none_or(|min| *value >= min);
     let is_below = |value: &f64| pass.max.is_none_or(|max| *value <= max);
@@ -166,8 +171,9 @@ pub fn window_errors(content: &Content, recording: &Recording) -> Result<Vec<Win
 }
 
 fn compare_states(compare: &Comparison, recording: &Recording) -> Result<WindowErrors> {
-    let simulated = recording.series(&compare.simulated, &STATE_FIELDS)?;
-    let measured = recording.series(&compare.measured, &STATE_FIELDS)?;
+    let fields = |topic| STATE_FIELDS.map(|field| (topic, field));
+    let simulated = recording.series(&fields(compare.simulated.as_str()))?;
+    let measured = recording.series(&fields(compare.measured.as_str()))?;
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a positive time of a run")]
     let window_ns = (compare.window_s * 1e9).round() as u64;
     let is_end = |time_ns: u64| time_ns > 0 && window_ns > 0 && time_ns.is_multiple_of(window_ns);

@@ -47,6 +47,15 @@ enum Verb {
         /// The second recording.
         b: PathBuf,
     },
+    /// Print a recording's messages, one JSON object a line.
+    #[command(after_help = "Example: hummingbus cat hover.mcap --topic /plant/state | head")]
+    Cat {
+        /// The recording.
+        recording: PathBuf,
+        /// Only this topic.
+        #[arg(long)]
+        topic: Option<String>,
+    },
     /// Print every message's fields, units, frames and layout hash.
     #[command(after_help = "Example: hummingbus schema --json")]
     Schema {
@@ -100,6 +109,7 @@ fn main() -> ExitCode {
         Verb::Run(arguments) => run(&arguments),
         Verb::Check(arguments) => check(&arguments),
         Verb::Diff { a, b } => diff(&a, &b),
+        Verb::Cat { recording, topic } => cat(&recording, topic.as_deref()),
         Verb::Schema { json } => {
             print_text(&if json { describe::schemas_json() } else { describe::schemas() });
             Ok(true)
@@ -171,6 +181,33 @@ fn diff(a: &Path, b: &Path) -> Result<bool> {
         Some(difference) => print_text(&difference.to_string()),
     }
     Ok(difference.is_none())
+}
+
+/// Prints the messages of a recording: topic, tick, time and fields in the order of the definition.
+fn cat(path: &Path, topic: Option<&str>) -> Result<bool> {
+    use std::io::Write as _;
+    let recording = Recording::open(path)?;
+    if let Some(topic) = topic {
+        recording.topic(topic)?;
+    }
+    let mut out = std::io::BufWriter::new(std::io::stdout().lock());
+    for record in recording.messages()? {
+        let record = record?;
+        if topic.is_some_and(|topic| topic != record.topic) {
+            continue;
+        }
+        let leaves = recording.decode(&record)?;
+        let fields: serde_json::Map<_, _> =
+            leaves.into_iter().map(|leaf| (leaf.path, describe::json_value(&leaf.value))).collect();
+        let line = serde_json::json!({
+            "topic": record.topic, "tick": record.tick, "time_ns": record.time_ns, "fields": fields
+        });
+        if writeln!(out, "{line}").is_err() {
+            // The reader has gone away (`| head`).
+            return Ok(true);
+        }
+    }
+    Ok(out.flush().is_ok())
 }
 
 /// Runs a process of a run; what it says goes to the launcher's log.

@@ -11,7 +11,7 @@ use crate::plan::{Plan, Wait};
 use memmap2::MmapRaw;
 use rustix::thread::futex;
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicU32, AtomicU64, Ordering::SeqCst};
+use std::sync::atomic::{AtomicU32, AtomicU64, Ordering::Relaxed, Ordering::SeqCst};
 
 const SLOT_BYTES: usize = 64;
 const MAGIC: u32 = 0x4855_4d35;
@@ -238,7 +238,8 @@ impl Control {
             // An interrupted or spurious return is caught by the caller's loop.
             let _ = futex::wait(edge, futex::Flags::empty(), count, None);
         }
-        edge.store(AWAKE, SeqCst);
+        // Nothing is ordered by this store: a writer that misses it wakes somebody who is awake.
+        edge.store(AWAKE, Relaxed);
     }
 
     /// Wakes every sleeper, so that it looks whether the run is over.

@@ -5,7 +5,7 @@ use crate::control::{Control, Edge, Phase, Waited, Word, monotonic_ns, process_c
 use crate::error::BusError;
 use crate::initial;
 use crate::message::Message;
-use crate::plan::{InputPlan, NodePlan, Plan};
+use crate::plan::{InputPlan, NodePlan, Pace, Plan};
 use crate::port::{InPort, OutPort};
 use crate::random::{Stream, stream};
 use crate::schema::Schema;
@@ -217,6 +217,9 @@ impl Node {
         self.require_all_declared()?;
         let control = Control::open(&self.plan)?;
         crate::process::stay_on(self.node().cpu);
+        if self.plan.pace == Pace::Free {
+            crate::process::wait_for_turn();
+        }
         let transport = Transport::new(&self.run_dir, &self.plan.run_id, self.name())?;
         let outputs = self.connect_outputs(&transport)?;
         control.set_ready(self.index, Phase::Connecting);
@@ -406,10 +409,16 @@ impl ConnectedNode {
             reason: error.to_string(),
         })?;
         let done_ns = monotonic_ns();
+        let mut sent_before = false;
         for output in self.outputs.iter_mut().filter(|output| output.is_due(tick)) {
-            output.send(tick, time_ns, received_ns, done_ns, node)?;
+            // The first output is sent at once: one look at the clock serves for both times.
+            let sent_ns = if sent_before { monotonic_ns() } else { done_ns };
+            output.send(tick, time_ns, [received_ns, done_ns, sent_ns], node)?;
             self.control.advance(Word::Topic(output.topic), tick + output.period_ticks, &output.readers);
+            sent_before = true;
         }
+        // Readers are awake by now: what the next tick needs is fetched while they compute.
+        self.outputs.iter_mut().try_for_each(|output| output.prepare(node))?;
         Ok(())
     }
 }

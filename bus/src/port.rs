@@ -1,6 +1,6 @@
 //! The two ends of an edge inside a node: what may be read at a tick, and what must be sent.
 
-use crate::control::{Edge, monotonic_ns};
+use crate::control::Edge;
 use crate::error::BusError;
 use crate::message::cdr_bytes;
 use crate::messages::Time;
@@ -108,6 +108,7 @@ impl InPort {
 pub(crate) struct OutPort {
     // The loan before the sender, for the same reason as above.
     loan: Option<Loan>,
+    is_written: bool,
     sender: Sender,
     sequence: u64,
     port: String,
@@ -127,6 +128,7 @@ impl OutPort {
     ) -> Self {
         Self {
             loan: None,
+            is_written: false,
             sender,
             sequence: 0,
             port: output.port.clone(),
@@ -143,38 +145,41 @@ impl OutPort {
 
     /// The words of this tick's sample.
     pub(crate) fn words(&mut self, node: &str) -> Result<&mut [u64], BusError> {
-        if self.loan.is_none() {
-            let loan = self.sender.loan().map_err(|reason| self.error("taking a sample", node, reason))?;
-            self.loan = Some(loan);
-        }
+        self.prepare(node)?;
+        self.is_written = true;
         match &mut self.loan {
             Some(loan) => Ok(loan.words()),
             None => unreachable!("the loan was taken above"),
         }
     }
 
-    /// Sends the sample that is due at `tick`.
+    /// Takes the memory of the next sample.
+    pub(crate) fn prepare(&mut self, node: &str) -> Result<(), BusError> {
+        if self.loan.is_none() {
+            let loan = self.sender.loan().map_err(|reason| self.error("taking a sample", node, reason))?;
+            self.loan = Some(loan);
+        }
+        Ok(())
+    }
+
+    /// Sends the sample that is due at `tick`; the host times are when the node had its inputs, was done,
+    /// and sent.
     pub(crate) fn send(
         &mut self,
         tick: u32,
         time_ns: u64,
-        received_ns: u64,
-        done_ns: u64,
+        [received_ns, done_ns, sent_ns]: [u64; 3],
         node: &str,
     ) -> Result<(), BusError> {
-        let Some(mut loan) = self.loan.take() else {
+        let Some(mut loan) = self.loan.take().filter(|_| self.is_written) else {
             return Err(BusError::UnwrittenOutput { node: node.to_owned(), port: self.port.clone(), tick });
         };
+        self.is_written = false;
         if let Some(offset) = self.stamp_offset {
             stamp(loan.words(), offset, time_ns);
         }
-        let header = SampleHeader {
-            tick: u64::from(tick),
-            sequence: self.sequence,
-            received_ns,
-            done_ns,
-            sent_ns: monotonic_ns(),
-        };
+        let header =
+            SampleHeader { tick: u64::from(tick), sequence: self.sequence, received_ns, done_ns, sent_ns };
         self.sequence += 1;
         loan.send(header).map_err(|reason| self.error("sending", node, reason))
     }

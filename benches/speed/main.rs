@@ -1,0 +1,48 @@
+//! The benchmark of the bus: every figure is a ratio against a reference measured in the same run.
+//!
+//! `cargo bench --bench speed` runs all parts; `cargo bench --bench speed -- hop hover` runs some.
+
+mod floor;
+mod hop;
+mod hover;
+mod idle;
+mod payload;
+mod relay;
+mod report;
+
+use report::Result;
+
+/// The hummingbus binary that was built with this benchmark.
+const HUMMINGBUS: &str = env!("CARGO_BIN_EXE_hummingbus");
+
+fn main() -> Result<()> {
+    let words: Vec<String> = std::env::args().skip(1).filter(|word| word != "--bench").collect();
+    match words.first().map(String::as_str) {
+        // This binary is also the processes it measures.
+        Some("floor-process") => floor::process(&words[1..]),
+        Some("relay-process") => relay::process(&words[1..]),
+        _ => parts(&words),
+    }
+}
+
+/// A part of the benchmark: measures and prints.
+type Part = fn() -> Result<()>;
+
+fn parts(names: &[String]) -> Result<()> {
+    let all: [(&str, fn() -> Result<()>); 4] = [
+        ("hop", hop::report),
+        ("hover", hover::report),
+        ("payload", payload::report),
+        ("idle", idle::report),
+    ];
+    if let Some(unknown) = names.iter().find(|name| all.iter().all(|(part, _)| part != name)) {
+        return Err(format!("no part `{unknown}`; there are hop, hover, payload, idle").into());
+    }
+    report::print_machine();
+    for (name, report) in all {
+        if names.is_empty() || names.iter().any(|wanted| wanted == name) {
+            report()?;
+        }
+    }
+    Ok(())
+}

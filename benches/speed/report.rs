@@ -1,0 +1,52 @@
+//! What the parts share: medians with spread, a table, a run of a manifest as JSON.
+
+use std::path::Path;
+use std::process::Command;
+
+pub type Result<T> = std::result::Result<T, Box<dyn std::error::Error>>;
+
+/// Median, smallest and largest of some repetitions.
+#[derive(Clone, Copy, Debug)]
+pub struct Spread {
+    pub median: f64,
+    pub min: f64,
+    pub max: f64,
+}
+
+impl Spread {
+    pub fn of(mut values: Vec<f64>) -> Self {
+        values.sort_by(f64::total_cmp);
+        Self { median: values[values.len() / 2], min: values[0], max: values[values.len() - 1] }
+    }
+}
+
+impl std::fmt::Display for Spread {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{:8.2}  ({:.2} … {:.2})", self.median, self.min, self.max)
+    }
+}
+
+/// Prints what machine this is.
+pub fn print_machine() {
+    let info = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
+    let model = info.lines().find(|line| line.starts_with("model name")).unwrap_or("unknown processor");
+    let kernel = std::fs::read_to_string("/proc/sys/kernel/osrelease").unwrap_or_default();
+    let cores = std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
+    println!("{cores} cores, {}, Linux {}", model.rsplit(": ").next().unwrap_or(model), kernel.trim());
+}
+
+/// Runs the manifest at `path` and returns its summary.
+pub fn run_manifest(path: &Path, arguments: &[&str]) -> Result<serde_json::Value> {
+    let output =
+        Command::new(crate::HUMMINGBUS).arg("run").arg(path).args(arguments).arg("--json").output()?;
+    if output.status.success() {
+        Ok(serde_json::from_slice(&output.stdout)?)
+    } else {
+        Err(String::from_utf8_lossy(&output.stderr).into_owned().into())
+    }
+}
+
+/// A number of a summary.
+pub fn number(summary: &serde_json::Value, key: &str) -> Result<f64> {
+    summary[key].as_f64().ok_or_else(|| format!("the summary has no number `{key}`").into())
+}
