@@ -15,7 +15,8 @@ pub fn run() -> Result<(), BusError> {
     serve(&plan, &Control::open(&plan)?)
 }
 
-fn serve(plan: &Plan, control: &Control) -> Result<(), BusError> {
+/// Runs the clock of `plan` until the run is over.
+pub(crate) fn serve(plan: &Plan, control: &Control) -> Result<(), BusError> {
     let clock = Clock::new(plan, control);
     for phase in [Phase::Connecting, Phase::Running] {
         clock.gather(phase)?;

@@ -452,3 +452,95 @@ fn clock_ns(clock: rustix::time::ClockId) -> u64 {
     let time = rustix::time::clock_gettime(clock);
     time.tv_sec as u64 * 1_000_000_000 + time.tv_nsec as u64
 }
+
+#[cfg(test)]
+mod tests {
+    use super::{Control, Edge, Waited, Word, control_path};
+    use crate::plan::{InputPlan, NodePlan, Pace, Plan, TopicPlan, Wait};
+
+    fn plan() -> Plan {
+        let input = InputPlan { port: "in".to_owned(), topic: 0, delay_ticks: 0, initial: None };
+        let node = NodePlan {
+            name: "node".to_owned(),
+            period_ticks: 1,
+            wait: Wait::Block,
+            cpu: None,
+            inputs: vec![input],
+            outputs: vec![],
+            parameters: serde_json::Value::Null,
+        };
+        let topic = TopicPlan { name: "/t".to_owned(), type_name: "a/msg/B".to_owned(), period_ticks: 1 };
+        Plan {
+            run_id: format!("control-{:x}-{:x}", std::process::id(), super::monotonic_ns()),
+            seed: 0,
+            tick_ns: 1,
+            duration_ticks: 100,
+            window_ticks: 1,
+            pace: Pace::Free,
+            clock_cpu: None,
+            topics: vec![topic],
+            nodes: vec![node],
+        }
+    }
+
+    fn with_control(test: impl FnOnce(&Control)) {
+        let plan = plan();
+        let control = Control::create(&plan).unwrap();
+        assert!(Control::create(&plan).is_err(), "two runs never share a segment");
+        test(&control);
+        std::fs::remove_file(control_path(&plan.run_id)).unwrap();
+    }
+
+    #[test]
+    fn a_sleeper_is_woken_when_its_count_is_reached_however_it_waits() {
+        with_control(|control| {
+            for (round, wait) in [Wait::Block, Wait::Spin, Wait::Adaptive].into_iter().enumerate() {
+                let target = 1000 * (round as u32 + 1);
+                std::thread::scope(|scope| {
+                    let sleeper =
+                        scope.spawn(|| control.wait(Word::Topic(0), target, Edge::Input(0), wait, |_| false));
+                    let start = control.count(Word::Topic(0));
+                    (start + 1..=target).for_each(|n| control.advance(Word::Topic(0), n, &[Edge::Input(0)]));
+                    assert_eq!(sleeper.join().unwrap(), Waited::Reached);
+                });
+            }
+        });
+    }
+
+    #[test]
+    fn two_sides_hand_over_a_hundred_thousand_times_without_losing_a_wake_up() {
+        with_control(|control| {
+            let rounds = 100_000;
+            std::thread::scope(|scope| {
+                scope.spawn(|| {
+                    for round in 1..=rounds {
+                        control.wait(Word::Topic(0), round, Edge::Input(0), Wait::Block, |_| false);
+                        control.advance(Word::Done(0), round, &[Edge::Done(0)]);
+                    }
+                });
+                for round in 1..=rounds {
+                    control.advance(Word::Topic(0), round, &[Edge::Input(0)]);
+                    control.wait(Word::Done(0), round, Edge::Done(0), Wait::Block, |_| false);
+                }
+            });
+            assert_eq!(control.count(Word::Done(0)), rounds);
+        });
+    }
+
+    #[test]
+    fn an_abort_and_an_earlier_end_wake_everybody() {
+        with_control(|control| {
+            std::thread::scope(|scope| {
+                let over = |control: &Control| control.end_tick() <= 50;
+                let sleeper =
+                    scope.spawn(move || control.wait(Word::Grant, 60, Edge::Grant(0), Wait::Block, over));
+                control.set_end_tick(50);
+                assert_eq!(sleeper.join().unwrap(), Waited::Over);
+                let sleeper =
+                    scope.spawn(|| control.wait(Word::Topic(0), 1, Edge::Input(0), Wait::Block, |_| false));
+                control.abort();
+                assert_eq!(sleeper.join().unwrap(), Waited::Over);
+            });
+        });
+    }
+}

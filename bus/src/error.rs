@@ -4,7 +4,7 @@ use std::path::PathBuf;
 use thiserror::Error;
 
 /// An error of the bus; its text names the node, the topic and what to do.
-#[derive(Debug, Error)]
+#[derive(Error)]
 pub enum BusError {
     /// The process was not started by a launcher.
     #[error(
@@ -174,4 +174,11 @@ pub enum BusError {
     /// The launcher ended the run early.
     #[error("the run was aborted")]
     Aborted,
+}
+
+/// As `Display`: a node's `fn main() -> Result<(), BusError>` prints this, and people read it.
+impl std::fmt::Debug for BusError {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{self}")
+    }
 }

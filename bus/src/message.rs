@@ -7,6 +7,44 @@
 use crate::schema::Schema;
 
 /// A fixed-layout message; implement it with `#[derive(bus::Message)]`.
+///
+/// ```
+/// use bus::messages::Time;
+///
+/// /// Voltage of a battery.
+/// #[derive(Clone, Copy, bus::Message)]
+/// #[repr(C)]
+/// #[message(type_name = "my_msgs/msg/Battery")]
+/// struct Battery {
+///     stamp: Time,
+///     /// Voltage at the terminals.
+///     #[field(unit = "V")]
+///     voltage: f64,
+/// }
+/// assert!(<Battery as bus::Message>::SCHEMA.ros2_definition().contains("float64 voltage  # [V]"));
+/// ```
+///
+/// Implicit padding does not compile:
+/// ```compile_fail,E0080
+/// # use bus::messages::Time;
+/// #[derive(Clone, Copy, bus::Message)]
+/// #[repr(C)]
+/// #[message(type_name = "my_msgs/msg/Padded")]
+/// struct Padded {
+///     flag: u32,
+///     count: u64,
+/// }
+/// ```
+///
+/// Nor does a number without a unit:
+/// ```compile_fail
+/// #[derive(Clone, Copy, bus::Message)]
+/// #[repr(C)]
+/// #[message(type_name = "my_msgs/msg/Unitless")]
+/// struct Unitless {
+///     voltage: f64,
+/// }
+/// ```
 pub trait Message: bytemuck::Pod {
     /// Type name, fields, units and frames.
     const SCHEMA: &'static Schema;

@@ -78,8 +78,13 @@ impl Node {
         let run_dir = crate::process::join()?;
         let name =
             std::env::var(NODE_VARIABLE).map_err(|_| BusError::NotInARun { variable: NODE_VARIABLE })?;
+        Self::open(run_dir, &name)
+    }
+
+    /// Opens the part of `name` in the run whose directory is `run_dir`.
+    fn open(run_dir: PathBuf, name: &str) -> Result<Self, BusError> {
         let plan = Plan::load(&run_dir)?;
-        let index = plan.node_index(&name)?;
+        let index = plan.node_index(name)?;
         let (inputs, outputs) = (plan.nodes[index].inputs.len(), plan.nodes[index].outputs.len());
         Ok(Self { run_dir, plan, index, inputs: vec![None; inputs], outputs: vec![None; outputs] })
     }
@@ -498,5 +503,120 @@ impl Tick<'_> {
     pub fn in_place<T: Message>(&mut self, output: Output<T>) -> Result<&mut T, BusError> {
         let words = self.outputs[output.index].words(self.node)?;
         Ok(crate::message::view_mut(words))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Node;
+    use crate::control::Control;
+    use crate::messages::MotorCommand;
+    use crate::plan::{InputPlan, NodePlan, OutputPlan, Pace, Plan, TopicPlan, Wait};
+    use crate::{BusError, Message};
+    use std::alloc::{GlobalAlloc, Layout, System};
+    use std::cell::Cell;
+    use std::path::Path;
+
+    /// Counts the allocations of each thread.
+    struct Counting;
+
+    thread_local! {
+        static ALLOCATIONS: Cell<u64> = const { Cell::new(0) };
+    }
+
+    // SAFETY: every call goes to the system's allocator unchanged.
+    unsafe impl GlobalAlloc for Counting {
+        unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
+            ALLOCATIONS.set(ALLOCATIONS.get() + 1);
+            // SAFETY: the caller's promise is passed on.
+            unsafe { System.alloc(layout) }
+        }
+        unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
+            // SAFETY: the caller's promise is passed on.
+            unsafe { System.dealloc(pointer, layout) }
+        }
+    }
+
+    #[global_allocator]
+    static ALLOCATOR: Counting = Counting;
+
+    const TICKS: u32 = 2000;
+    const WARM_UP_TICKS: u32 = 500;
+    const LAST_TICK: u32 = TICKS - 1;
+
+    fn node(name: &str, inputs: Vec<InputPlan>, outputs: Vec<OutputPlan>) -> NodePlan {
+        let (wait, parameters) = (Wait::Block, serde_json::Value::Null);
+        NodePlan { name: name.to_owned(), period_ticks: 1, wait, cpu: None, inputs, outputs, parameters }
+    }
+
+    fn source_and_sink() -> Plan {
+        let topic = TopicPlan {
+            name: "/source/command".to_owned(),
+            type_name: MotorCommand::SCHEMA.type_name.to_owned(),
+            period_ticks: 1,
+        };
+        let input = InputPlan { port: "command".to_owned(), topic: 0, delay_ticks: 0, initial: None };
+        let output = OutputPlan { port: "command".to_owned(), topic: 0 };
+        Plan {
+            run_id: format!("test-{:x}-{:x}", std::process::id(), crate::control::monotonic_ns()),
+            seed: 1,
+            tick_ns: 1_000_000,
+            duration_ticks: TICKS,
+            window_ticks: 64,
+            pace: Pace::Free,
+            clock_cpu: None,
+            topics: vec![topic],
+            nodes: vec![node("source", vec![], vec![output]), node("sink", vec![input], vec![])],
+        }
+    }
+
+    /// Allocations of the calling thread's node between the warm-up and the last tick.
+    fn allocations(
+        mut step: impl FnMut(&mut super::Tick<'_>) -> Result<(), BusError>,
+        node: Node,
+    ) -> Result<u64, BusError> {
+        let (mut at_warm, mut at_last) = (0, 0);
+        node.run(|tick| {
+            match tick.number() {
+                WARM_UP_TICKS => at_warm = ALLOCATIONS.get(),
+                LAST_TICK => at_last = ALLOCATIONS.get(),
+                _ => {}
+            }
+            step(tick)
+        })?;
+        Ok(at_last - at_warm)
+    }
+
+    fn fly_source(run_dir: &Path) -> Result<u64, BusError> {
+        let mut node = Node::open(run_dir.to_owned(), "source")?;
+        let output = node.output::<MotorCommand>("command")?;
+        allocations(|tick| tick.write(output, MotorCommand::default()), node)
+    }
+
+    fn fly_sink(run_dir: &Path) -> Result<u64, BusError> {
+        let mut node = Node::open(run_dir.to_owned(), "sink")?;
+        let input = node.input::<MotorCommand>("command")?;
+        let check = |tick: &mut super::Tick<'_>| {
+            assert_eq!(u64::from(tick.get(input).stamp.nanosec), tick.time_ns() % 1_000_000_000);
+            Ok(())
+        };
+        allocations(check, node)
+    }
+
+    #[test]
+    fn a_tick_allocates_nothing_but_what_iceoryx2_allocates_for_a_loan() {
+        let folder = tempfile::tempdir().unwrap();
+        let plan = source_and_sink();
+        plan.store(folder.path()).unwrap();
+        let control = Control::create(&plan).unwrap();
+        let (source, sink) = std::thread::scope(|scope| {
+            let source = scope.spawn(|| fly_source(folder.path()));
+            let sink = scope.spawn(|| fly_sink(folder.path()));
+            crate::clock::serve(&plan, &control).unwrap();
+            (source.join().unwrap().unwrap(), sink.join().unwrap().unwrap())
+        });
+        std::fs::remove_file(crate::control::control_path(&plan.run_id)).unwrap();
+        assert_eq!(sink, 0, "allocations of a sink in its ticks");
+        assert_eq!(source, u64::from(LAST_TICK - WARM_UP_TICKS), "iceoryx2 0.10 allocates once a loan");
     }
 }

@@ -1,0 +1,163 @@
+//! Readers that others wrote find in a recording exactly what hummingbus's own reader finds.
+//!
+//! Each of `tests/readers/read_*` decodes every topic and ends at the first difference. `scripts/test`
+//! installs what they need and says where in `HUMMINGBUS_READERS`.
+
+use std::ffi::OsStr;
+use std::fs;
+use std::io::Write as _;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+use std::sync::{Arc, Mutex, Once, Weak};
+use tempfile::TempDir;
+
+const HUMMINGBUS: &str = env!("CARGO_BIN_EXE_hummingbus");
+const ROOT: &str = env!("CARGO_MANIFEST_DIR");
+const VEHICLE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/vehicles/hummingbird.toml");
+
+#[test]
+fn mcap_finds_a_sound_container() {
+    check("read_container.py");
+}
+
+#[test]
+fn mcap_ros2_support_decodes_the_same_values() {
+    check("read_mcap_ros2.py");
+}
+
+#[test]
+fn rosbags_decodes_the_same_values() {
+    check("read_rosbags.py");
+}
+
+#[test]
+fn foxglove_decodes_the_same_values() {
+    check("read_foxglove.mjs");
+}
+
+#[test]
+fn rerun_converts_the_same_values() {
+    check("read_rerun.py");
+}
+
+/// Runs a reader on the recording, and on falsified output of hummingbus's own reader, which it must notice.
+fn check(script: &str) {
+    let Some(readers) = readers() else { return };
+    let flight = Flight::shared();
+    let output = flight.read(&readers, script, &flight.lines);
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    // Not `print!`, which the test runner hides.
+    std::io::stderr().write_all(&output.stdout).unwrap();
+
+    let (topic, falsified) = if script == "read_container.py" {
+        ("/plant/pose", flight.falsified("/plant/pose", "tick", |tick| *tick = 1.into()))
+    } else {
+        ("/plant/state", flight.falsified("/plant/state", "position.z", one_bit_more))
+    };
+    expect_failure(&flight.read(&readers, script, &falsified), topic);
+    expect_failure(&flight.read(&readers, script, &flight.dir.path().join("empty.jsonl")), "");
+}
+
+fn expect_failure(output: &Output, reason: &str) {
+    let message = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(1), "{message}");
+    assert!(message.starts_with("read_") && message.contains(reason), "{message}");
+}
+
+fn one_bit_more(number: &mut serde_json::Value) {
+    *number = number.as_f64().unwrap().next_up().into();
+}
+
+/// The folder of the readers; absent only where a person runs `cargo test` by itself.
+fn readers() -> Option<PathBuf> {
+    static NOTICE: Once = Once::new();
+    let readers = std::env::var_os("HUMMINGBUS_READERS").map(PathBuf::from);
+    if readers.is_none() {
+        assert!(std::env::var_os("CI").is_none(), "HUMMINGBUS_READERS is not set, scripts/test sets it up");
+        NOTICE.call_once(|| {
+            let notice = "skipped: HUMMINGBUS_READERS is not set, scripts/test sets it up";
+            // Not `eprintln!`, which the test runner hides.
+            let _ = writeln!(std::io::stderr(), "{notice}");
+        });
+    }
+    readers
+}
+
+/// A recording and what hummingbus's own reader finds in it.
+struct Flight {
+    dir: TempDir,
+    manifest: PathBuf,
+    recording: PathBuf,
+    lines: PathBuf,
+}
+
+impl Flight {
+    /// The one flight of all tests that run at the same time; its files go with the last of them.
+    fn shared() -> Arc<Self> {
+        static FLIGHT: Mutex<Weak<Flight>> = Mutex::new(Weak::new());
+        let mut shared = FLIGHT.lock().expect("another test could not fly");
+        shared.upgrade().unwrap_or_else(|| {
+            let flight = Arc::new(Self::fly());
+            *shared = Arc::downgrade(&flight);
+            flight
+        })
+    }
+
+    fn fly() -> Self {
+        let dir = tempfile::tempdir().unwrap();
+        let file = |name: &str| dir.path().join(name);
+        let (manifest, recording, lines) = (file("hover.toml"), file("hover.mcap"), file("hover.jsonl"));
+        fs::write(&manifest, manifest_text()).unwrap();
+        fs::write(file("empty.jsonl"), "").unwrap();
+        hummingbus(&["run".as_ref(), manifest.as_ref(), "--record".as_ref(), recording.as_ref()]);
+        let output = hummingbus(&["cat".as_ref(), recording.as_ref()]);
+        fs::write(&lines, output.stdout).unwrap();
+        Self { dir, manifest, recording, lines }
+    }
+
+    fn read(&self, readers: &Path, script: &str, lines: &Path) -> Output {
+        let program = if script.ends_with(".py") { readers.join("venv/bin/python") } else { "node".into() };
+        let mut command = Command::new(&program);
+        command.env("HUMMINGBUS_READERS", readers).env("PYTHONDONTWRITEBYTECODE", "1");
+        command.arg(Path::new(ROOT).join("tests/readers").join(script)).arg(&self.recording).arg(lines);
+        if script == "read_container.py" {
+            command.arg(&self.manifest).arg(VEHICLE);
+        }
+        command.output().unwrap_or_else(|error| panic!("{}: {error}", program.display()))
+    }
+
+    /// A copy of the lines in which `change` was applied to one message of `topic`.
+    fn falsified(&self, topic: &str, key: &str, change: impl Fn(&mut serde_json::Value)) -> PathBuf {
+        let text = fs::read_to_string(&self.lines).unwrap();
+        let mut lines: Vec<_> = text.lines().map(str::to_owned).collect();
+        let start = format!("{{\"topic\":\"{topic}\"");
+        let line = lines.iter_mut().rfind(|line| line.starts_with(&start)).unwrap();
+        let mut message: serde_json::Value = serde_json::from_str(line).unwrap();
+        let object = if key == "tick" { &mut message } else { &mut message["fields"] };
+        change(&mut object[key]);
+        *line = message.to_string();
+        let path = self.dir.path().join(format!("{key}.jsonl"));
+        fs::write(&path, lines.join("\n")).unwrap();
+        path
+    }
+}
+
+/// The hover manifest, shortened, without conditions, and with absolute paths.
+fn manifest_text() -> String {
+    let text = fs::read_to_string(Path::new(ROOT).join("manifests/hover.toml")).unwrap();
+    let mut manifest: toml_edit::DocumentMut = text.parse().unwrap();
+    manifest["run"]["duration_s"] = toml_edit::value(2.0);
+    manifest.remove("pass");
+    for (_, process) in manifest["process"].as_table_mut().unwrap().iter_mut() {
+        if let Some(vehicle) = process.get_mut("vehicle") {
+            *vehicle = toml_edit::value(VEHICLE);
+        }
+    }
+    manifest.to_string()
+}
+
+fn hummingbus(arguments: &[&OsStr]) -> Output {
+    let output = Command::new(HUMMINGBUS).args(arguments).output().unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    output
+}

@@ -1,0 +1,143 @@
+//! The processes that the tests put into runs: this executable itself, started by a launcher.
+
+use bus::control::Control;
+use bus::messages::Time;
+use bus::plan::Plan;
+use bus::process::RUN_VARIABLE;
+use bus::{BusError, Input, Message, NODE_VARIABLE, Node, Tick};
+use serde::Deserialize;
+use std::path::Path;
+use std::process::ExitCode;
+
+/// What a test node sends: when it computed, and what it saw.
+#[derive(Clone, Copy, Default, Message)]
+#[repr(C)]
+#[message(type_name = "test_msgs/msg/Note")]
+struct Note {
+    stamp: Time,
+    /// The sender's tick.
+    tick: u64,
+    /// The sender's tick of the note that was seen.
+    seen_tick: u64,
+    /// The stamp of the note that was seen, in nanoseconds.
+    seen_ns: u64,
+    /// Ticks that the sender was ahead of the slowest node.
+    lead_ticks: u64,
+}
+
+/// Another message under the same name, as after a change on one side only.
+#[derive(Clone, Copy, Default, Message)]
+#[repr(C)]
+#[message(type_name = "test_msgs/msg/Note")]
+struct OtherNote {
+    stamp: Time,
+    /// Was the sender's tick.
+    #[field(unit = "m", frame = "world")]
+    place: [f64; 3],
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Parameters {
+    #[serde(default)]
+    has_other_layout: bool,
+    fault: Option<Fault>,
+    #[serde(default)]
+    at_tick: u32,
+}
+
+#[derive(Clone, Copy, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+enum Fault {
+    Error,
+    Panic,
+    ExitWith3,
+    ExitWith0,
+    Unwritten,
+    Hang,
+}
+
+impl Fault {
+    fn strike(self) -> Result<(), String> {
+        match self {
+            Self::Error => Err("the battery is empty".to_owned()),
+            Self::Panic => panic!("the propeller came off"),
+            Self::ExitWith3 => std::process::exit(3),
+            Self::ExitWith0 => std::process::exit(0),
+            Self::Unwritten => Ok(()),
+            Self::Hang => loop {
+                std::thread::park();
+            },
+        }
+    }
+}
+
+/// A test like any other, but for a launcher's processes: what they do is this.
+#[test]
+fn a_process_started_by_a_launcher_is_a_node() {
+    if std::env::var_os(NODE_VARIABLE).is_none() {
+        return;
+    }
+    let code = match run() {
+        Ok(()) | Err(BusError::Aborted) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("error: {error}");
+            ExitCode::FAILURE
+        }
+    };
+    code.exit_process();
+}
+
+fn run() -> Result<(), BusError> {
+    let mut node = Node::join()?;
+    let parameters: Parameters = node.parameters()?;
+    if parameters.has_other_layout {
+        let output = node.output::<OtherNote>("note")?;
+        return node.run(|tick| tick.write(output, OtherNote::default()));
+    }
+    let input = node.optional_input::<Note>("input");
+    let output = node.optional_output::<Note>("note")?;
+    let control = control()?;
+    node.run(|tick| {
+        if let Some(fault) = parameters.fault.filter(|_| tick.number() == parameters.at_tick) {
+            return fault.strike();
+        }
+        let Some(output) = output else { return Ok(()) };
+        tick.write(output, note(tick, input, &control)).map_err(|error| error.to_string())
+    })
+}
+
+fn control() -> Result<Control, BusError> {
+    let run_dir = std::env::var(RUN_VARIABLE).unwrap();
+    Control::open(&Plan::load(Path::new(&run_dir))?)
+}
+
+fn note(tick: &Tick<'_>, input: Option<Input<Note>>, control: &Control) -> Note {
+    let seen = input.map(|input| *tick.get(input)).unwrap_or_default();
+    Note {
+        tick: tick.number().into(),
+        seen_tick: seen.tick,
+        seen_ns: u64::from(seen.stamp.sec.unsigned_abs()) * 1_000_000_000 + u64::from(seen.stamp.nanosec),
+        lead_ticks: tick.number().saturating_sub(control.completed_ticks()).into(),
+        ..Note::default()
+    }
+}
+
+/// The table of a manifest that makes process `name` a node of this executable.
+pub fn table(name: &str, rest: &str) -> String {
+    let executable = std::env::current_exe().unwrap();
+    let test = "nodes::a_process_started_by_a_launcher_is_a_node";
+    format!("[process.{name}]\ncommand = [{executable:?}, {test:?}, \"--exact\", \"--nocapture\"]\n{rest}\n\n")
+}
+
+/// As [`table`], with the output `note`, sent every `every_ticks` ticks.
+pub fn sender(name: &str, every_ticks: u32, rest: &str) -> String {
+    let output = format!("outputs.note = {{ type = \"test_msgs/msg/Note\", every_ticks = {every_ticks} }}");
+    table(name, &format!("{rest}\n{output}"))
+}
+
+/// A manifest of a run of `ticks` milliseconds with these processes and a recorder.
+pub fn manifest(ticks: u32, processes: &[String]) -> String {
+    let run = format!("[run]\nduration_s = {}\n\n", f64::from(ticks) * 1e-3);
+    run + &processes.concat() + "[process.recorder]\nkind = \"recorder\"\n"
+}

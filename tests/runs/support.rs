@@ -1,0 +1,305 @@
+//! A folder of its own for each test, launches under a watchdog, and what a run left behind.
+
+use bus::control::Control;
+use bus::plan::Plan;
+use rustix::process::{Pid, Signal, kill_process};
+use std::fs::{self, File};
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, ExitStatus, Stdio};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread::{self, JoinHandle};
+use std::time::{Duration, Instant};
+
+const HUMMINGBUS: &str = env!("CARGO_BIN_EXE_hummingbus");
+/// A deadlock's end: no launch here needs a tenth of it on an idle machine.
+const WATCHDOG: Duration = Duration::from_secs(120);
+const POLL: Duration = Duration::from_millis(2);
+
+/// A path in this repository.
+pub fn repository(path: &str) -> String {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join(path).to_string_lossy().into_owned()
+}
+
+/// A test's own folder, with a folder for temporary files that marks every process launched from it.
+pub struct Place {
+    folder: tempfile::TempDir,
+}
+
+impl Place {
+    pub fn new() -> Self {
+        let place = Self { folder: tempfile::tempdir().unwrap() };
+        fs::create_dir(place.temporary()).unwrap();
+        place
+    }
+
+    /// The path of a file of this test.
+    pub fn path(&self, name: &str) -> String {
+        self.folder.path().join(name).to_string_lossy().into_owned()
+    }
+
+    /// Writes a file of this test and returns its path.
+    pub fn write(&self, name: &str, content: impl AsRef<[u8]>) -> String {
+        let path = self.path(name);
+        fs::write(&path, content).unwrap();
+        path
+    }
+
+    fn temporary(&self) -> PathBuf {
+        self.folder.path().join("tmp")
+    }
+
+    /// Starts `hummingbus` with `words`.
+    pub fn start(&self, words: &[&str]) -> Launch<'_> {
+        self.start_with(words, &[])
+    }
+
+    /// Starts `hummingbus` with `words` and more environment variables.
+    pub fn start_with(&self, words: &[&str], variables: &[(&str, &str)]) -> Launch<'_> {
+        let output = tempfile::NamedTempFile::new_in(self.folder.path()).unwrap().into_temp_path();
+        let error = tempfile::NamedTempFile::new_in(self.folder.path()).unwrap().into_temp_path();
+        let child = Command::new(HUMMINGBUS)
+            .args(words)
+            .env("TMPDIR", self.temporary())
+            .env("RUST_BACKTRACE", "0")
+            .env_remove("HUMMINGBUS_DATA")
+            .envs(variables.iter().copied())
+            .stdin(Stdio::null())
+            .stdout(File::create(&output).unwrap())
+            .stderr(File::create(&error).unwrap())
+            .spawn()
+            .unwrap();
+        Launch { place: self, child, words: words.join(" "), output, error, status: None }
+    }
+
+    /// Runs `hummingbus` with `words` to its end; it must leave nothing behind.
+    pub fn call(&self, words: &[&str]) -> Ended {
+        self.start(words).end()
+    }
+
+    /// The processes launched from this folder that live: their ids, with the names of their nodes.
+    pub fn processes(&self) -> Vec<(Pid, String)> {
+        let mark = format!("TMPDIR={}", self.temporary().display());
+        let entries = fs::read_dir("/proc").unwrap().flatten();
+        entries.filter_map(|entry| marked_process(&entry.path(), &mark)).collect()
+    }
+
+    /// The process of node `node`, once it has come up.
+    pub fn process_of(&self, node: &str) -> Pid {
+        poll(&format!("no process of node {node}"), || {
+            self.processes().into_iter().find(|(_, name)| name == node).map(|(pid, _)| pid)
+        })
+    }
+
+    /// Waits until no process launched from this folder lives.
+    pub fn await_no_process(&self) {
+        poll("processes that outlive their run", || self.processes().is_empty().then_some(()));
+    }
+
+    /// The directories of the runs that are up.
+    fn run_dirs(&self) -> Vec<PathBuf> {
+        entries(&self.temporary()).iter().flat_map(|user| entries(user)).collect()
+    }
+
+    /// Everything that the runs of this folder left outside of their recordings.
+    fn left_behind(&self, launcher: u32) -> Vec<String> {
+        let processes = self.processes().into_iter().map(|(pid, node)| format!("process {pid:?} ({node})"));
+        let files = entries(&self.temporary()).into_iter().chain(shared_memory(launcher));
+        processes.chain(files.map(|path| path.display().to_string())).collect()
+    }
+}
+
+fn marked_process(process: &Path, mark: &str) -> Option<(Pid, String)> {
+    let pid = process.file_name()?.to_str()?.parse().ok().and_then(Pid::from_raw)?;
+    let environment = fs::read(process.join("environ")).ok()?;
+    let variables: Vec<_> = environment.split(|&byte| byte == 0).map(String::from_utf8_lossy).collect();
+    variables.iter().any(|variable| variable == mark).then(|| {
+        let node = variables.iter().find_map(|variable| variable.strip_prefix("HUMMINGBUS_NODE="));
+        (pid, node.unwrap_or_default().to_owned())
+    })
+}
+
+/// The shared-memory files of the runs of a launcher; a run's name starts with its launcher's id.
+fn shared_memory(launcher: u32) -> Vec<PathBuf> {
+    let prefix = format!("/dev/shm/hb_{launcher:x}-");
+    let files = entries(Path::new("/dev/shm"));
+    files.into_iter().filter(|path| path.to_string_lossy().starts_with(&prefix)).collect()
+}
+
+fn entries(folder: &Path) -> Vec<PathBuf> {
+    fs::read_dir(folder).into_iter().flatten().flatten().map(|entry| entry.path()).collect()
+}
+
+/// Looks until there is an answer, or the watchdog bites.
+fn poll<T>(what: &str, mut look: impl FnMut() -> Option<T>) -> T {
+    let start = Instant::now();
+    loop {
+        if let Some(answer) = look() {
+            return answer;
+        }
+        assert!(start.elapsed() < WATCHDOG, "watchdog: {what}");
+        thread::sleep(POLL);
+    }
+}
+
+/// A launched `hummingbus`; dropping it kills it.
+pub struct Launch<'a> {
+    place: &'a Place,
+    child: Child,
+    words: String,
+    output: tempfile::TempPath,
+    error: tempfile::TempPath,
+    status: Option<ExitStatus>,
+}
+
+impl Launch<'_> {
+    /// Sends a signal to the launcher.
+    pub fn signal(&self, signal: Signal) {
+        kill_process(Pid::from_child(&self.child), signal).unwrap();
+    }
+
+    /// Waits until every node of the run has completed `ticks` ticks.
+    pub fn await_ticks(&mut self, ticks: u32) {
+        let start = Instant::now();
+        while self.completed_ticks() < Some(ticks) {
+            self.status = self.child.try_wait().unwrap();
+            assert!(self.status.is_none(), "ended before tick {ticks}: {}", self.said());
+            assert!(start.elapsed() < WATCHDOG, "watchdog: tick {ticks} was not reached: {}", self.said());
+            thread::sleep(POLL);
+        }
+    }
+
+    /// What the run's own control segment says; `None` while it is not there yet.
+    fn completed_ticks(&self) -> Option<u32> {
+        let plan = Plan::load(self.place.run_dirs().first()?).ok()?;
+        Control::open(&plan).ok().map(|control| control.completed_ticks())
+    }
+
+    /// Waits for the end; the launch must have left nothing behind.
+    pub fn end(mut self) -> Ended {
+        let status = self.wait();
+        let (launcher, ended) = (self.child.id(), self.ended(status));
+        let left = self.place.left_behind(launcher);
+        assert!(left.is_empty(), "left behind: {left:#?}\n{}", self.said());
+        ended
+    }
+
+    /// Kills the launcher as `kill -9` does; what is left behind is looked at by the test.
+    pub fn kill(mut self) {
+        self.child.kill().unwrap();
+        self.status = Some(self.child.wait().unwrap());
+    }
+
+    fn wait(&mut self) -> ExitStatus {
+        let start = Instant::now();
+        loop {
+            if let Some(status) = self.child.try_wait().unwrap() {
+                self.status = Some(status);
+                return status;
+            }
+            assert!(start.elapsed() < WATCHDOG, "watchdog: still running after {WATCHDOG:?}: {}", self.said());
+            thread::sleep(POLL);
+        }
+    }
+
+    fn ended(&self, status: ExitStatus) -> Ended {
+        Ended {
+            code: status.code(),
+            output: fs::read_to_string(&self.output).unwrap(),
+            error: fs::read_to_string(&self.error).unwrap(),
+            words: self.words.clone(),
+        }
+    }
+
+    fn said(&self) -> String {
+        let read = |path: &Path| fs::read_to_string(path).unwrap_or_default();
+        format!("hummingbus {}\n{}{}", self.words, read(&self.output), read(&self.error))
+    }
+}
+
+impl Drop for Launch<'_> {
+    fn drop(&mut self) {
+        if self.status.is_none() {
+            let _ = self.child.kill();
+            let _ = self.child.wait();
+        }
+        // After a kill nobody else removes these.
+        shared_memory(self.child.id()).iter().for_each(|path| drop(fs::remove_file(path)));
+    }
+}
+
+/// A launch that has ended.
+#[derive(Debug)]
+pub struct Ended {
+    pub code: Option<i32>,
+    pub output: String,
+    pub error: String,
+    words: String,
+}
+
+impl Ended {
+    /// Requires an exit code.
+    #[track_caller]
+    pub fn with_code(self, code: i32) -> Self {
+        assert_eq!(self.code, Some(code), "{self}");
+        self
+    }
+
+    /// Requires that the run went to its end, whatever its conditions came to.
+    #[track_caller]
+    pub fn flown(self) -> Self {
+        assert!(matches!(self.code, Some(0 | 1)) && self.error.is_empty(), "{self}");
+        self
+    }
+
+    /// Requires that standard error contains each of `parts`.
+    #[track_caller]
+    pub fn says(&self, parts: &[&str]) {
+        parts.iter().for_each(|part| assert!(self.error.contains(part), "no {part:?} in\n{self}"));
+    }
+
+    /// Requires that standard output contains each of `parts`.
+    #[track_caller]
+    pub fn prints(&self, parts: &[&str]) {
+        parts.iter().for_each(|part| assert!(self.output.contains(part), "no {part:?} in\n{self}"));
+    }
+
+    /// Standard output as JSON.
+    #[track_caller]
+    pub fn json(&self) -> serde_json::Value {
+        serde_json::from_str(&self.output).unwrap_or_else(|error| panic!("{error} in\n{self}"))
+    }
+}
+
+impl std::fmt::Display for Ended {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "hummingbus {}\nexit code {:?}\n{}{}", self.words, self.code, self.output, self.error)
+    }
+}
+
+/// Threads that keep the cores busy while this lives.
+pub struct Load {
+    is_over: Arc<AtomicBool>,
+    threads: Vec<JoinHandle<()>>,
+}
+
+impl Load {
+    pub fn of_threads(count: usize) -> Self {
+        let is_over = Arc::new(AtomicBool::new(false));
+        let spin = |is_over: Arc<AtomicBool>| {
+            thread::spawn(move || {
+                while !is_over.load(Ordering::Relaxed) {
+                    std::hint::spin_loop();
+                }
+            })
+        };
+        Self { threads: (0..count).map(|_| spin(is_over.clone())).collect(), is_over }
+    }
+}
+
+impl Drop for Load {
+    fn drop(&mut self) {
+        self.is_over.store(true, Ordering::Relaxed);
+        self.threads.drain(..).for_each(|thread| drop(thread.join()));
+    }
+}
