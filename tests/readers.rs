@@ -94,6 +94,7 @@ struct Flight {
 impl Flight {
     /// The one flight of all tests that run at the same time; its files go with the last of them.
     fn shared() -> Arc<Self> {
+        // Not a `OnceLock<Flight>`: statics are never dropped, and the files would stay.
         static FLIGHT: Mutex<Weak<Flight>> = Mutex::new(Weak::new());
         let mut shared = FLIGHT.lock().expect("another test could not fly");
         shared.upgrade().unwrap_or_else(|| {
@@ -149,7 +150,7 @@ fn manifest_text() -> String {
     manifest["run"]["duration_s"] = toml_edit::value(2.0);
     manifest.remove("pass");
     for (_, process) in manifest["process"].as_table_mut().unwrap().iter_mut() {
-        if let Some(vehicle) = process.get_mut("vehicle") {
+        if let Some(vehicle) = process.as_table_mut().unwrap().get_mut("vehicle") {
             *vehicle = toml_edit::value(VEHICLE);
         }
     }

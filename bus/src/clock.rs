@@ -92,6 +92,9 @@ impl<'a> Clock<'a> {
 
     /// The end tick, moved to `granted` if a stop was asked for.
     fn end_after(&self, granted: u32) -> u32 {
+        if crate::process::is_terminated() {
+            self.control.request_stop();
+        }
         if self.control.is_stop_requested() && granted < self.control.end_tick() {
             self.control.set_end_tick(granted);
         }

@@ -224,6 +224,9 @@ impl Control {
             if self.is_aborted() || is_over(self) {
                 return Waited::Over;
             }
+            if crate::process::is_terminated() {
+                self.request_stop();
+            }
             if spin && (wait == Wait::Spin || monotonic_ns() < asleep_after_ns) {
                 poll(word, count);
             } else {

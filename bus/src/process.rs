@@ -4,6 +4,8 @@ use crate::error::BusError;
 use rustix::process::{Signal, getppid, set_parent_process_death_signal};
 use rustix::thread::{CpuSet, sched_getaffinity, sched_setaffinity};
 use std::path::PathBuf;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, OnceLock};
 
 /// The environment variable that tells a process who its launcher is.
 pub const LAUNCHER_VARIABLE: &str = "HUMMINGBUS_LAUNCHER_PID";
@@ -18,7 +20,24 @@ pub const RUN_VARIABLE: &str = "HUMMINGBUS_RUN";
 pub(crate) fn join() -> Result<PathBuf, BusError> {
     let run_dir = std::env::var(RUN_VARIABLE).map_err(|_| BusError::NotInARun { variable: RUN_VARIABLE })?;
     die_with_parent();
+    note_signals();
     Ok(PathBuf::from(run_dir))
+}
+
+static IS_TERMINATED: OnceLock<Arc<AtomicBool>> = OnceLock::new();
+
+/// From now on SIGTERM and SIGINT are noted and end the run at a tick boundary: a process that died at
+/// once would take the recording's end with it.
+fn note_signals() {
+    let flag = IS_TERMINATED.get_or_init(Arc::default);
+    for signal in [signal_hook::consts::SIGTERM, signal_hook::consts::SIGINT] {
+        let _ = signal_hook::flag::register(signal, flag.clone());
+    }
+}
+
+/// Whether this process was asked to end.
+pub(crate) fn is_terminated() -> bool {
+    IS_TERMINATED.get().is_some_and(|flag| flag.load(Ordering::Relaxed))
 }
 
 /// Has the kernel kill this process when its launcher dies, even by `kill -9`.
