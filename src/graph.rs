@@ -1,7 +1,8 @@
 //! From a manifest to the plan of a run: nodes, topics and edges, checked before anything starts.
 
+use crate::judge;
 use crate::kinds;
-use crate::manifest::{InputSetting, Manifest, OutputSetting, Process};
+use crate::manifest::{InputSetting, Manifest, OutputSetting, PassCondition, Process};
 use crate::placement;
 use crate::problem::{Problem, nearest};
 use bus::kind::{Inputs, NodeKind, PortSpec};
@@ -521,8 +522,38 @@ fn parameter_problem(
     manifest.problem(&span, format!("process `{}`: {reason}", name.get_ref()), help)
 }
 
-/// Checks that what is evaluated after the run will be recorded.
+/// Checks that what is evaluated after the run will be recorded, and that its fields and units exist.
 fn check_evaluations(manifest: &Manifest, plan: &Plan) -> Result<(), Problem> {
+    check_recorded(manifest, plan)?;
+    manifest.content.pass.iter().try_for_each(|pass| check_field(manifest, plan, pass))
+}
+
+fn check_field(manifest: &Manifest, plan: &Plan, pass: &Spanned<PassCondition>) -> Result<(), Problem> {
+    let condition = pass.get_ref();
+    let at = |message: String, help: &str| {
+        manifest.problem(&pass.span(), format!("pass condition `{}`: {message}", condition.name), help)
+    };
+    if condition.min.is_none() && condition.max.is_none() {
+        return Err(at("it has no limit, so it cannot fail".into(), "add `min`, `max`, or both"));
+    }
+    let type_name =
+        plan.topics.iter().find(|topic| topic.name == condition.topic).map(|topic| &topic.type_name);
+    // A user's own type is known only to its publisher: it is checked when the run is judged.
+    let Some(schema) = bus::messages::all()
+        .into_iter()
+        .find(|schema| Some(schema.type_name) == type_name.map(String::as_str))
+    else {
+        return Ok(());
+    };
+    let unit = recorder::series::unit_of(schema, &condition.topic, &condition.field)
+        .map_err(|error| at(error.to_string(), "name one of these fields"))?;
+    match unit.map(|unit| judge::conversion(&unit, &condition.unit)) {
+        Some(Err(reason)) => Err(at(reason, "state the limits in a unit of the field's quantity")),
+        _ => Ok(()),
+    }
+}
+
+fn check_recorded(manifest: &Manifest, plan: &Plan) -> Result<(), Problem> {
     let content = &manifest.content;
     let passes = content.pass.iter().map(|pass| (pass.span(), vec![&pass.get_ref().topic]));
     let compares = content

@@ -129,6 +129,16 @@ impl Schema {
         })
     }
 
+    /// Whether the message, or one nested in it, has a string or a definition of its own.
+    #[must_use]
+    pub fn has_text(&self) -> bool {
+        let is_text = |field: &Field| match field.kind {
+            Kind::Text => true,
+            kind => nested(&kind).is_some_and(Schema::has_text),
+        };
+        self.definition.is_some() || self.fields.iter().any(is_text)
+    }
+
     /// The layout as a table: a line per number, with offset, type, name, unit and frame.
     #[must_use]
     pub fn layout(&self) -> String {

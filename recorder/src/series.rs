@@ -3,9 +3,10 @@
 //! A quaternion has three fields more than the message: `roll`, `pitch` and `yaw` (z-y-x sequence, in
 //! radians), since that is how people judge an attitude.
 
-use crate::definition::Leaf;
+use crate::definition::{Definition, Leaf};
 use crate::error::RecordingError;
 use crate::reader::Recording;
+use bus::schema::Schema;
 
 /// Samples of a field.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -42,6 +43,28 @@ impl Recording {
             }
         }
         Ok(series)
+    }
+}
+
+/// The unit of `field` in messages of `schema`, known before anything is recorded; `None` where the message
+/// has strings or sequences, whose fields are known only from data.
+///
+/// # Errors
+/// If there is no such field; the error lists those there are.
+pub fn unit_of(schema: &Schema, topic: &str, field: &str) -> Result<Option<String>, RecordingError> {
+    if schema.has_text() {
+        return Ok(None);
+    }
+    let zeros = [&[0, 1, 0, 0][..], &vec![0; schema.size]].concat();
+    let decoded = Definition::parse(&schema.ros2_definition()).and_then(|parsed| parsed.decode(&zeros));
+    let leaves = decoded.map_err(|reason| RecordingError::Decode {
+        topic: topic.to_owned(),
+        type_name: schema.type_name.to_owned(),
+        reason,
+    })?;
+    match value(&leaves, field) {
+        Some((_, unit)) => Ok(Some(unit.to_owned())),
+        None => Err(unknown(topic, field, &leaves)),
     }
 }
 
