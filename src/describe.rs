@@ -39,7 +39,9 @@ pub fn graph(graph: &Graph) -> String {
         for input in &node.inputs {
             let topic = &plan.topics[input.topic];
             let delay = if input.delay_ticks == 0 { "" } else { ", delayed by 1 tick" };
-            let _ = writeln!(text, "  <- {:<12} {} [{}]{delay}", input.port, topic.name, topic.type_name);
+            // A recorder's ports are called like their topics.
+            let port = if input.port == topic.name { "" } else { &input.port };
+            let _ = writeln!(text, "  <- {port:<12} {} [{}]{delay}", topic.name, topic.type_name);
         }
         for output in &node.outputs {
             let topic = &plan.topics[output.topic];

@@ -2,7 +2,7 @@
 
 use crate::judge;
 use crate::kinds;
-use crate::manifest::{InputSetting, Manifest, OutputSetting, PassCondition, Process};
+use crate::manifest::{Comparison, InputSetting, Manifest, OutputSetting, PassCondition, Process};
 use crate::placement;
 use crate::problem::{Problem, nearest};
 use bus::kind::{Inputs, NodeKind, PortSpec};
@@ -16,7 +16,7 @@ use toml::Spanned;
 /// Ticks that a fast node may be ahead of the slowest where the manifest does not say.
 const DEFAULT_WINDOW_TICKS: u32 = 64;
 /// More would only grow the queues: a window's samples are what shared memory must hold.
-const WINDOW_TICKS_MAX: u32 = 4096;
+pub const WINDOW_TICKS_MAX: u32 = 4096;
 const RATE_HZ_MAX: u32 = 1_000_000;
 
 /// A process to start.
@@ -26,6 +26,13 @@ pub enum Program {
     Kind(&'static NodeKind),
     /// Another executable and its arguments.
     Command(Vec<String>),
+}
+
+impl Program {
+    /// Whether this is the built-in recorder.
+    pub fn is_recorder(&self) -> bool {
+        matches!(self, Self::Kind(kind) if kind.name == recorder::node::KIND.name)
+    }
 }
 
 /// A checked manifest.
@@ -88,7 +95,8 @@ impl Graph {
         order_inputs(&mut plan, &published);
         placement::place(&mut plan, manifest.content.run.clock_cpu);
         let vehicles = set_parameters(manifest, &names, &processes, &programs, &mut plan)?;
-        check_evaluations(manifest, &plan)?;
+        require_one_recorder(manifest, &names, &programs)?;
+        check_evaluations(manifest, &plan, &programs)?;
         Ok(Self { plan, programs, vehicles })
     }
 }
@@ -488,15 +496,28 @@ fn set_parameters(
             }
         }
         let parameters = serde_json::to_value(parameters).unwrap_or_default();
-        if let Program::Kind(kind) = &programs[index]
-            && kind.name != recorder::node::KIND.name
-        {
-            (kind.check)(&parameters)
+        if programs[index].is_recorder() {
+            require_no_parameters(manifest, process)?;
+        } else if let Program::Kind(kind) = &programs[index] {
+            let inputs: Vec<&str> = process.inputs.keys().map(|port| port.get_ref().as_str()).collect();
+            (kind.check)(&parameters, &inputs)
                 .map_err(|reason| parameter_problem(manifest, names[index], process, &reason))?;
         }
         plan.nodes[index].parameters = parameters;
     }
     Ok(vehicles)
+}
+
+/// A recorder's file and attachments come from the launcher.
+fn require_no_parameters(manifest: &Manifest, process: &Process) -> Result<(), Problem> {
+    match process.parameters.keys().next() {
+        None => Ok(()),
+        Some(key) => Err(manifest.problem(
+            &key.span(),
+            format!("a recorder has no parameter `{}`", key.get_ref()),
+            "name the file with run.record or --record, and the topics with inputs",
+        )),
+    }
 }
 
 /// The place of a refused parameter: that of the first key the reason names, or of the process.
@@ -523,9 +544,24 @@ fn parameter_problem(
 }
 
 /// Checks that what is evaluated after the run will be recorded, and that its fields and units exist.
-fn check_evaluations(manifest: &Manifest, plan: &Plan) -> Result<(), Problem> {
-    check_recorded(manifest, plan)?;
+fn check_evaluations(manifest: &Manifest, plan: &Plan, programs: &[Program]) -> Result<(), Problem> {
+    check_recorded(manifest, plan, programs)?;
+    manifest.content.compare.iter().try_for_each(|compare| check_window(manifest, plan, compare))?;
     manifest.content.pass.iter().try_for_each(|pass| check_field(manifest, plan, pass))
+}
+
+fn check_window(manifest: &Manifest, plan: &Plan, compare: &Spanned<Comparison>) -> Result<(), Problem> {
+    let window_s = compare.get_ref().window_s;
+    let duration_s = f64::from(plan.duration_ticks) * plan.tick_s();
+    // The last tick lies one tick before the end.
+    if window_s > 0.0 && window_s <= duration_s - plan.tick_s() + 1e-9 {
+        return Ok(());
+    }
+    Err(manifest.problem(
+        &compare.span(),
+        format!("`window_s` is {window_s} s: no window of that length ends within the run of {duration_s} s"),
+        "choose a window shorter than run.duration_s",
+    ))
 }
 
 fn check_field(manifest: &Manifest, plan: &Plan, pass: &Spanned<PassCondition>) -> Result<(), Problem> {
@@ -553,7 +589,24 @@ fn check_field(manifest: &Manifest, plan: &Plan, pass: &Spanned<PassCondition>) 
     }
 }
 
-fn check_recorded(manifest: &Manifest, plan: &Plan) -> Result<(), Problem> {
+/// A second recorder would write to the same file.
+fn require_one_recorder(
+    manifest: &Manifest,
+    names: &[&Spanned<String>],
+    programs: &[Program],
+) -> Result<(), Problem> {
+    let mut recorders = names.iter().zip(programs).filter(|(_, program)| program.is_recorder());
+    match (recorders.next(), recorders.next()) {
+        (Some((first, _)), Some((second, _))) => Err(manifest.problem(
+            &second.span(),
+            format!("`{}` is a second recorder beside `{}`", second.get_ref(), first.get_ref()),
+            "a run has one recording: give all topics to one recorder",
+        )),
+        _ => Ok(()),
+    }
+}
+
+fn check_recorded(manifest: &Manifest, plan: &Plan, programs: &[Program]) -> Result<(), Problem> {
     let content = &manifest.content;
     let passes = content.pass.iter().map(|pass| (pass.span(), vec![&pass.get_ref().topic]));
     let compares = content
@@ -568,12 +621,9 @@ fn check_recorded(manifest: &Manifest, plan: &Plan) -> Result<(), Problem> {
                 let help = nearest(topic, known).map_or(list, |near| format!("did you mean {near}?"));
                 return Err(manifest.problem(&span, format!("nobody publishes {topic}"), help));
             }
-            let is_recorder = |node: &&NodePlan| node.outputs.is_empty();
-            let is_recorded = plan
-                .nodes
-                .iter()
-                .filter(is_recorder)
-                .flat_map(|node| &node.inputs)
+            let recorders = plan.nodes.iter().zip(programs).filter(|(_, program)| program.is_recorder());
+            let is_recorded = recorders
+                .flat_map(|(node, _)| &node.inputs)
                 .any(|input| plan.topics[input.topic].name == *topic);
             if !is_recorded {
                 let help = "add a process with kind = \"recorder\" that takes it";

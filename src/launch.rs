@@ -79,7 +79,7 @@ fn prepare(manifest: &Manifest, graph: &mut Graph, recording: &Path, run_dir: &R
     let attachments: Vec<_> =
         attachments.iter().map(|(name, path)| serde_json::json!({ "name": name, "path": path })).collect();
     for (program, node) in graph.programs.iter().zip(&mut graph.plan.nodes) {
-        if matches!(program, Program::Kind(kind) if kind.name == recorder::node::KIND.name) {
+        if program.is_recorder() {
             node.parameters = serde_json::json!({ "path": recording, "attachments": attachments });
         }
     }
@@ -138,6 +138,13 @@ impl Processes {
         Ok(self.running.iter().find(|process| process.end.is_some_and(|end| !end.success())))
     }
 
+    /// A node whose process ended well before the run did: one that never joined, or left on its way.
+    fn find_deserter(&self, control: &Control, plan: &Plan) -> Option<usize> {
+        let has_ended =
+            |name: &str| self.running.iter().any(|process| process.name == name && process.end.is_some());
+        (0..plan.nodes.len()).find(|&node| !control.has_completed(node) && has_ended(&plan.nodes[node].name))
+    }
+
     fn all_ended(&self) -> bool {
         self.running.iter().all(|process| process.end.is_some())
     }
@@ -184,8 +191,11 @@ impl Process {
         };
         let words = std::fs::read_to_string(&self.log).unwrap_or_default();
         let lines: Vec<&str> = words.lines().collect();
-        let last = &lines[lines.len().saturating_sub(LOG_LINES)..];
-        let words = last.iter().map(|line| format!("\n  {line}")).collect::<String>();
+        // What a panic says stands in front of its backtrace.
+        let last = lines.len().saturating_sub(LOG_LINES);
+        let start = lines.iter().position(|line| line.contains("panicked at")).unwrap_or(last);
+        let words =
+            lines[start..].iter().take(LOG_LINES).map(|line| format!("\n  {line}")).collect::<String>();
         format!("process `{}` {end}{words}", self.name)
     }
 }
@@ -226,6 +236,14 @@ fn watch(
             let words = format!("{}\nThe run was aborted at tick {tick}", failed.post_mortem());
             take_down(processes, control)?;
             bail!(words);
+        }
+        if let Some(node) = processes.find_deserter(control, plan) {
+            let name = &plan.nodes[node].name;
+            let tick = control.completed_ticks();
+            take_down(processes, control)?;
+            bail!(
+                "process `{name}` ended with exit code 0 before the run did; it was aborted at tick {tick}"
+            );
         }
         if processes.all_ended() {
             return Ok(control.is_stop_requested());

@@ -82,7 +82,7 @@ struct RunArguments {
     #[arg(long, value_name = "PACE")]
     pace: Option<PaceSetting>,
     /// Ticks that a fast process may be ahead of the slowest.
-    #[arg(long, value_name = "TICKS")]
+    #[arg(long, value_name = "TICKS", value_parser = clap::value_parser!(u32).range(1..=i64::from(graph::WINDOW_TICKS_MAX)))]
     window: Option<u32>,
     /// Override a key of the manifest, such as run.seed=3.
     #[arg(long, value_name = "KEY=VALUE")]

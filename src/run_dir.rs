@@ -4,6 +4,8 @@ use anyhow::{Context, Result};
 use bus::control::shm_prefix;
 use std::path::{Path, PathBuf};
 
+const CREATE_ATTEMPTS: u32 = 100;
+
 /// Where a run keeps its files; dropping it removes them and the run's shared memory.
 #[derive(Debug)]
 pub struct RunDir {
@@ -18,10 +20,11 @@ impl RunDir {
         let run_id = format!("{:x}-{:x}", std::process::id(), bus::control::monotonic_ns());
         let user = bus::process::user_id();
         let path = std::env::temp_dir().join(format!("hummingbus-{user}")).join(&run_id);
-        std::fs::DirBuilder::new()
-            .recursive(true)
-            .mode(0o700)
-            .create(&path)
+        // Another run that ends may remove the user's folder between its making and that of this run's.
+        let create = || std::fs::DirBuilder::new().recursive(true).mode(0o700).create(&path);
+        (1..CREATE_ATTEMPTS)
+            .find_map(|_| create().ok())
+            .map_or_else(create, Ok)
             .with_context(|| format!("cannot create the run directory {}", path.display()))?;
         Ok(Self { path, run_id })
     }

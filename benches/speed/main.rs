@@ -29,7 +29,7 @@ fn main() -> Result<()> {
 type Part = fn() -> Result<()>;
 
 fn parts(names: &[String]) -> Result<()> {
-    let all: [(&str, fn() -> Result<()>); 4] = [
+    let all: [(&str, Part); 4] = [
         ("hop", hop::report),
         ("hover", hover::report),
         ("payload", payload::report),

@@ -54,6 +54,9 @@ struct Parameters {
     latency_file: Option<PathBuf>,
 }
 
+/// Longer latencies count as this.
+const LATENCY_NS_MAX: u64 = 10_000_000_000;
+
 /// Runs a relay whose payload has the size given as the only argument.
 pub fn process(words: &[String]) -> Result<()> {
     let [bytes] = words else { return Err("one argument: the payload's size".into()) };
@@ -65,7 +68,7 @@ fn relay<T: Counted>() -> Result<()> {
     let input = node.input::<T>("input")?;
     let output = node.output::<T>("output")?;
     let parameters: Parameters = node.parameters()?;
-    let mut latency = Histogram::<u64>::new(3)?;
+    let mut latency = Histogram::<u64>::new_with_bounds(1, LATENCY_NS_MAX, 3)?;
     node.run(|tick| {
         let [.., sent_ns] = tick.host_times_ns(input);
         if sent_ns > 0 {

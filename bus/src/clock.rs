@@ -5,6 +5,9 @@ use crate::error::BusError;
 use crate::plan::{Pace, Plan, Wait};
 use rustix::thread::clock_nanosleep_absolute;
 
+/// How long the clock sleeps at most before it looks whether a stop was asked for.
+const NAP_NS_MAX: u64 = 100_000_000;
+
 /// Runs the clock of this process's run until the run is over.
 ///
 /// # Errors
@@ -78,7 +81,7 @@ impl<'a> Clock<'a> {
     fn run_paced(&self, factor: f64) -> Result<u32, BusError> {
         let start_ns = monotonic_ns();
         for tick in 0..self.plan.duration_ticks {
-            sleep_until(start_ns + deadline_ns(tick, self.plan.tick_ns, factor));
+            self.sleep_until(start_ns + deadline_ns(tick, self.plan.tick_ns, factor));
             let end = self.end_after(tick);
             if tick >= end {
                 return Ok(end);
@@ -92,13 +95,28 @@ impl<'a> Clock<'a> {
 
     /// The end tick, moved to `granted` if a stop was asked for.
     fn end_after(&self, granted: u32) -> u32 {
-        if crate::process::is_terminated() {
-            self.control.request_stop();
-        }
-        if self.control.is_stop_requested() && granted < self.control.end_tick() {
+        if self.is_stop_asked_for() && granted < self.control.end_tick() {
             self.control.set_end_tick(granted);
         }
         self.control.end_tick()
+    }
+
+    /// Sleeps until `deadline_ns`, or until a stop is asked for, which at a slow pace comes long before.
+    fn sleep_until(&self, deadline_ns: u64) {
+        while !self.is_stop_asked_for() {
+            let now_ns = monotonic_ns();
+            if now_ns >= deadline_ns {
+                return;
+            }
+            sleep_to(deadline_ns.min(now_ns + NAP_NS_MAX));
+        }
+    }
+
+    fn is_stop_asked_for(&self) -> bool {
+        if crate::process::is_terminated() {
+            self.control.request_stop();
+        }
+        self.control.is_stop_requested() || self.control.is_aborted()
     }
 
     fn grant(&self, ticks: u32) {
@@ -137,12 +155,13 @@ fn deadline_ns(tick: u32, tick_ns: u64, factor: f64) -> u64 {
 }
 
 #[allow(clippy::cast_possible_wrap, reason = "monotonic time fits 63 bits")]
-fn sleep_until(deadline_ns: u64) {
+fn sleep_to(deadline_ns: u64) {
     let deadline = rustix::time::Timespec {
         tv_sec: (deadline_ns / 1_000_000_000) as i64,
         tv_nsec: (deadline_ns % 1_000_000_000) as i64,
     };
-    while clock_nanosleep_absolute(rustix::thread::ClockId::Monotonic, &deadline).is_err() {}
+    // A signal may end it early; the caller looks at the clock again.
+    let _ = clock_nanosleep_absolute(rustix::thread::ClockId::Monotonic, &deadline);
 }
 
 #[cfg(test)]

@@ -363,6 +363,12 @@ impl Control {
         self.word(self.node_slot(node), 3).load(SeqCst)
     }
 
+    /// Whether `node` has completed the run.
+    #[must_use]
+    pub fn has_completed(&self, node: usize) -> bool {
+        self.count(Word::Done(node)) >= self.end_tick()
+    }
+
     /// Ticks that every node has completed.
     #[must_use]
     pub fn completed_ticks(&self) -> u32 {

@@ -49,8 +49,8 @@ pub struct NodeKind {
     pub inputs: Inputs,
     /// Outputs.
     pub outputs: &'static [PortSpec],
-    /// Checks the parameters and the files they name, without running.
-    pub check: fn(&serde_json::Value) -> Result<(), String>,
+    /// Checks the parameters and the files they name, without running; the words are the wired inputs.
+    pub check: fn(&serde_json::Value, &[&str]) -> Result<(), String>,
     /// Runs the node in this process.
     pub run: fn() -> Result<(), BusError>,
 }
@@ -60,5 +60,9 @@ pub struct NodeKind {
 /// # Errors
 /// What does not fit `P`.
 pub fn read_parameters<P: DeserializeOwned>(parameters: &serde_json::Value) -> Result<P, String> {
-    serde_json::from_value(parameters.clone()).map_err(|error| error.to_string())
+    serde_path_to_error::deserialize(parameters).map_err(|error| {
+        let (path, words) = (error.path().to_string(), error.inner().to_string());
+        // An unknown or missing key is named by the words already.
+        if path == "." || words.contains("field `") { words } else { format!("`{path}`: {words}") }
+    })
 }

@@ -603,6 +603,16 @@ mod tests {
         allocations(check, node)
     }
 
+    /// As the launcher does: iceoryx2 leaves a file of its own until the last process is gone.
+    fn remove_shared_memory(run_id: &str) {
+        let prefix = crate::control::shm_prefix(run_id);
+        for entry in std::fs::read_dir("/dev/shm").unwrap().flatten() {
+            if entry.file_name().to_string_lossy().starts_with(&prefix) {
+                std::fs::remove_file(entry.path()).unwrap();
+            }
+        }
+    }
+
     #[test]
     fn a_tick_allocates_nothing_but_what_iceoryx2_allocates_for_a_loan() {
         let folder = tempfile::tempdir().unwrap();
@@ -615,7 +625,7 @@ mod tests {
             crate::clock::serve(&plan, &control).unwrap();
             (source.join().unwrap().unwrap(), sink.join().unwrap().unwrap())
         });
-        std::fs::remove_file(crate::control::control_path(&plan.run_id)).unwrap();
+        remove_shared_memory(&plan.run_id);
         assert_eq!(sink, 0, "allocations of a sink in its ticks");
         assert_eq!(source, u64::from(LAST_TICK - WARM_UP_TICKS), "iceoryx2 0.10 allocates once a loan");
     }

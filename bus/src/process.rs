@@ -54,7 +54,7 @@ fn die_with_parent() {
 /// Keeps this process on one core. Where the machine has no such core, it stays where it is: placement
 /// is a matter of speed, never of results.
 pub fn stay_on(cpu: Option<usize>) {
-    if let Some(cpu) = cpu {
+    if let Some(cpu) = cpu.filter(|&cpu| cpu < CpuSet::MAX_CPU) {
         let mut set = CpuSet::new();
         set.set(cpu);
         let _ = sched_setaffinity(None, &set);

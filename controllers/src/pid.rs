@@ -26,7 +26,7 @@ pub const KIND: NodeKind = NodeKind {
         PortSpec::required("altitude", PlantState::SCHEMA),
     ]),
     outputs: &[PortSpec::required("command", MotorCommand::SCHEMA)],
-    check: |parameters| build(&read_parameters(parameters)?, 1.0).map(|_| ()),
+    check: |parameters, _| build(&read_parameters(parameters)?, 1.0).map(|_| ()),
     run,
 };
 

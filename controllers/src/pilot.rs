@@ -12,7 +12,7 @@ pub const KIND: NodeKind = NodeKind {
     summary: "set points from the manifest: steps, ramps and doublets",
     inputs: Inputs::Ports(&[]),
     outputs: &[PortSpec::required("set_point", SetPoint::SCHEMA)],
-    check: |parameters| schedule(&read_parameters(parameters)?, 1000).map(|_| ()),
+    check: |parameters, _| schedule(&read_parameters(parameters)?, 1000).map(|_| ()),
     run,
 };
 

@@ -16,7 +16,7 @@ pub const KIND: NodeKind = NodeKind {
         PortSpec::required("command", MotorCommand::SCHEMA),
         PortSpec::required("measured", MeasuredState::SCHEMA),
     ],
-    check: |parameters| load(&read_parameters(parameters)?).map(|_| ()),
+    check: |parameters, _| load(&read_parameters(parameters)?).map(|_| ()),
     run,
 };
 

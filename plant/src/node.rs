@@ -56,13 +56,18 @@ fn one() -> u32 {
     1
 }
 
-fn check(parameters: &serde_json::Value) -> Result<(), String> {
+fn check(parameters: &serde_json::Value, inputs: &[&str]) -> Result<(), String> {
     let parameters: Parameters = read_parameters(parameters)?;
     if parameters.substeps == 0 {
         return Err("`substeps` is 0, expected at least 1".to_owned());
     }
     if parameters.window_s.is_some_and(|window_s| !(window_s > 0.0 && window_s.is_finite())) {
         return Err("`window_s` must be a positive number of seconds".to_owned());
+    }
+    match (inputs.contains(&"measured"), parameters.window_s) {
+        (true, None) => return Err("the input `measured` needs the parameter `window_s`".to_owned()),
+        (false, Some(_)) => return Err("the parameter `window_s` needs the input `measured`".to_owned()),
+        _ => {}
     }
     Vehicle::load(&parameters.vehicle).map(|_| ()).map_err(|error| error.to_string())
 }
@@ -78,7 +83,7 @@ fn run() -> Result<(), BusError> {
         pose: node.optional_output("pose")?,
         tf: node.optional_output("tf")?,
     };
-    let window_ticks = window_ticks(&node, measured.is_some(), parameters.window_s)?;
+    let window_ticks = window_ticks(&node, parameters.window_s)?;
     let dt_s = node.period_s();
     let model = NewtonEuler::new(vehicle, parameters.substeps);
     let initial_command = parameters.initial_command.unwrap_or_else(|| model.vehicle().hover_command());
@@ -105,19 +110,13 @@ fn run() -> Result<(), BusError> {
     clippy::cast_sign_loss,
     reason = "checked to be positive and short"
 )]
-fn window_ticks(node: &Node, has_measured: bool, window_s: Option<f64>) -> Result<u32, BusError> {
-    match (has_measured, window_s) {
-        (true, Some(window_s)) => {
-            let ticks = window_s / node.tick_s();
-            if (ticks - ticks.round()).abs() < 1e-6 && ticks.round() >= 1.0 {
-                Ok(ticks.round() as u32)
-            } else {
-                Err(node.error(format!("`window_s` is {window_s}, which is not a whole number of ticks")))
-            }
-        }
-        (false, None) => Ok(u32::MAX),
-        (true, None) => Err(node.error("the input `measured` needs the parameter `window_s`")),
-        (false, Some(_)) => Err(node.error("the parameter `window_s` needs the input `measured`")),
+fn window_ticks(node: &Node, window_s: Option<f64>) -> Result<u32, BusError> {
+    let Some(window_s) = window_s else { return Ok(u32::MAX) };
+    let ticks = window_s / node.tick_s();
+    if (ticks - ticks.round()).abs() < 1e-6 && ticks.round() >= 1.0 {
+        Ok(ticks.round() as u32)
+    } else {
+        Err(node.error(format!("`window_s` is {window_s}, which is not a whole number of ticks")))
     }
 }
 

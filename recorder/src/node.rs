@@ -37,7 +37,7 @@ pub const KIND: NodeKind = NodeKind {
     summary: "writes every sample of its inputs (all topics where none is named) to an MCAP file",
     inputs: Inputs::Any,
     outputs: &[],
-    check: |parameters| read_parameters::<Parameters>(parameters).map(|_| ()),
+    check: |parameters, _| read_parameters::<Parameters>(parameters).map(|_| ()),
     run,
 };
 

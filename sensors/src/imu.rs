@@ -12,7 +12,7 @@ pub const KIND: NodeKind = NodeKind {
     summary: "accelerometer and gyroscope with noise and walking bias",
     inputs: Inputs::Ports(&[PortSpec::required("state", PlantState::SCHEMA)]),
     outputs: &[PortSpec::required("imu", Imu::SCHEMA)],
-    check: |parameters| {
+    check: |parameters, _| {
         let params: ImuParams = read_parameters(parameters)?;
         // Any rate serves here: only the parameters are checked.
         ImuModel::new(params, 1.0).map(|_| ()).map_err(|error| error.to_string())

@@ -132,7 +132,9 @@ def check_attachments(attachments, paths):
 def check_seeking(file, summary, expected):
     """Reads each topic through the indexes alone: as many messages, in the order of time."""
     for channel in summary.channels.values():
-        times = [message.log_time for _, _, message in make_reader(file).iter_messages(topics=[channel.topic])]
+        file.seek(0)
+        messages = make_reader(file).iter_messages(topics=[channel.topic])
+        times = [message.log_time for _, _, message in messages]
         wanted = sorted(time_ns for topic, time_ns in expected.messages if topic == channel.topic)
         check(times == wanted, f"{channel.topic}: the indexes lead to {len(times)} messages of {len(wanted)}")
 

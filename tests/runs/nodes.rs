@@ -7,7 +7,6 @@ use bus::process::RUN_VARIABLE;
 use bus::{BusError, Input, Message, NODE_VARIABLE, Node, Tick};
 use serde::Deserialize;
 use std::path::Path;
-use std::process::ExitCode;
 
 /// What a test node sends: when it computed, and what it saw.
 #[derive(Clone, Copy, Default, Message)]
@@ -78,14 +77,13 @@ fn a_process_started_by_a_launcher_is_a_node() {
     if std::env::var_os(NODE_VARIABLE).is_none() {
         return;
     }
-    let code = match run() {
-        Ok(()) | Err(BusError::Aborted) => ExitCode::SUCCESS,
+    match run() {
+        Ok(()) | Err(BusError::Aborted) => std::process::exit(0),
         Err(error) => {
             eprintln!("error: {error}");
-            ExitCode::FAILURE
+            std::process::exit(1);
         }
-    };
-    code.exit_process();
+    }
 }
 
 fn run() -> Result<(), BusError> {
@@ -127,7 +125,9 @@ fn note(tick: &Tick<'_>, input: Option<Input<Note>>, control: &Control) -> Note 
 pub fn table(name: &str, rest: &str) -> String {
     let executable = std::env::current_exe().unwrap();
     let test = "nodes::a_process_started_by_a_launcher_is_a_node";
-    format!("[process.{name}]\ncommand = [{executable:?}, {test:?}, \"--exact\", \"--nocapture\"]\n{rest}\n\n")
+    format!(
+        "[process.{name}]\ncommand = [{executable:?}, {test:?}, \"--exact\", \"--nocapture\"]\n{rest}\n\n"
+    )
 }
 
 /// As [`table`], with the output `note`, sent every `every_ticks` ticks.

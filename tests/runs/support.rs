@@ -3,6 +3,7 @@
 use bus::control::Control;
 use bus::plan::Plan;
 use rustix::process::{Pid, Signal, kill_process};
+use std::cell::RefCell;
 use std::fs::{self, File};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, ExitStatus, Stdio};
@@ -24,11 +25,12 @@ pub fn repository(path: &str) -> String {
 /// A test's own folder, with a folder for temporary files that marks every process launched from it.
 pub struct Place {
     folder: tempfile::TempDir,
+    launchers: RefCell<Vec<u32>>,
 }
 
 impl Place {
     pub fn new() -> Self {
-        let place = Self { folder: tempfile::tempdir().unwrap() };
+        let place = Self { folder: tempfile::tempdir().unwrap(), launchers: RefCell::default() };
         fs::create_dir(place.temporary()).unwrap();
         place
     }
@@ -69,6 +71,7 @@ impl Place {
             .stderr(File::create(&error).unwrap())
             .spawn()
             .unwrap();
+        self.launchers.borrow_mut().push(child.id());
         Launch { place: self, child, words: words.join(" "), output, error, status: None }
     }
 
@@ -91,9 +94,24 @@ impl Place {
         })
     }
 
+    /// The process of the clock service, once it has come up.
+    pub fn clock(&self) -> Pid {
+        let is_clock = |pid: &Pid| {
+            let words = fs::read(format!("/proc/{}/cmdline", pid.as_raw_nonzero())).unwrap_or_default();
+            words.ends_with(b"\0node\0clock\0")
+        };
+        poll("no clock service", || self.processes().into_iter().map(|(pid, _)| pid).find(is_clock))
+    }
+
     /// Waits until no process launched from this folder lives.
     pub fn await_no_process(&self) {
         poll("processes that outlive their run", || self.processes().is_empty().then_some(()));
+    }
+
+    /// Removes the folder of this user's runs where it is empty, as the end of a run does.
+    pub fn remove_runs_folder(&self) -> impl Fn() + Clone + Send + 'static {
+        let folder = self.temporary().join(format!("hummingbus-{}", bus::process::user_id()));
+        move || drop(fs::remove_dir(&folder))
     }
 
     /// The directories of the runs that are up.
@@ -106,6 +124,14 @@ impl Place {
         let processes = self.processes().into_iter().map(|(pid, node)| format!("process {pid:?} ({node})"));
         let files = entries(&self.temporary()).into_iter().chain(shared_memory(launcher));
         processes.chain(files.map(|path| path.display().to_string())).collect()
+    }
+}
+
+impl Drop for Place {
+    fn drop(&mut self) {
+        // After a kill nobody else removes these.
+        let files = self.launchers.get_mut().iter().flat_map(|&launcher| shared_memory(launcher));
+        files.for_each(|path| drop(fs::remove_file(path)));
     }
 }
 
@@ -184,6 +210,12 @@ impl Launch<'_> {
         ended
     }
 
+    /// Waits for the end while other runs of the same folder may go on.
+    pub fn end_among_others(mut self) -> Ended {
+        let status = self.wait();
+        self.ended(status)
+    }
+
     /// Kills the launcher as `kill -9` does; what is left behind is looked at by the test.
     pub fn kill(mut self) {
         self.child.kill().unwrap();
@@ -197,7 +229,11 @@ impl Launch<'_> {
                 self.status = Some(status);
                 return status;
             }
-            assert!(start.elapsed() < WATCHDOG, "watchdog: still running after {WATCHDOG:?}: {}", self.said());
+            assert!(
+                start.elapsed() < WATCHDOG,
+                "watchdog: still running after {WATCHDOG:?}: {}",
+                self.said()
+            );
             thread::sleep(POLL);
         }
     }
@@ -223,8 +259,6 @@ impl Drop for Launch<'_> {
             let _ = self.child.kill();
             let _ = self.child.wait();
         }
-        // After a kill nobody else removes these.
-        shared_memory(self.child.id()).iter().for_each(|path| drop(fs::remove_file(path)));
     }
 }
 
@@ -277,27 +311,38 @@ impl std::fmt::Display for Ended {
     }
 }
 
-/// Threads that keep the cores busy while this lives.
-pub struct Load {
+/// Threads that do something over and over while this lives.
+pub struct Repeating {
     is_over: Arc<AtomicBool>,
     threads: Vec<JoinHandle<()>>,
 }
 
-impl Load {
-    pub fn of_threads(count: usize) -> Self {
+impl Repeating {
+    /// A thread that does `action` over and over.
+    pub fn of(action: impl Fn() + Clone + Send + 'static) -> Self {
+        Self::of_threads(1, action)
+    }
+
+    /// Threads that keep the cores busy.
+    pub fn load(threads: usize) -> Self {
+        Self::of_threads(threads, std::hint::spin_loop)
+    }
+
+    fn of_threads(count: usize, action: impl Fn() + Clone + Send + 'static) -> Self {
         let is_over = Arc::new(AtomicBool::new(false));
-        let spin = |is_over: Arc<AtomicBool>| {
+        let start = |_| {
+            let (is_over, action) = (is_over.clone(), action.clone());
             thread::spawn(move || {
                 while !is_over.load(Ordering::Relaxed) {
-                    std::hint::spin_loop();
+                    action();
                 }
             })
         };
-        Self { threads: (0..count).map(|_| spin(is_over.clone())).collect(), is_over }
+        Self { threads: (0..count).map(start).collect(), is_over }
     }
 }
 
-impl Drop for Load {
+impl Drop for Repeating {
     fn drop(&mut self) {
         self.is_over.store(true, Ordering::Relaxed);
         self.threads.drain(..).for_each(|thread| drop(thread.join()));

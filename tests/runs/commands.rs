@@ -1,0 +1,232 @@
+//! The other subcommands, exit codes and JSON.
+
+use crate::support::{Place, repository};
+use serde_json::Value;
+use std::fs;
+
+fn hover() -> String {
+    repository("manifests/hover.toml")
+}
+
+/// A short recording of the hover.
+fn recording(place: &Place) -> String {
+    let path = place.path("hover.mcap");
+    place.call(&["run", &hover(), "--record", &path, "--set", "run.duration_s=0.5"]).with_code(1);
+    path
+}
+
+#[test]
+fn a_run_whose_conditions_hold_passes() {
+    let place = Place::new();
+    let ended = place.call(&["run", &hover(), "--record", &place.path("a.mcap")]).with_code(0);
+    ended.prints(&["12000 ticks", "ticks/s", "ok     altitude within 2 %", "recording: ", "\npassed\n"]);
+}
+
+#[test]
+fn a_condition_that_does_not_hold_fails_the_run() {
+    let place = Place::new();
+    // Without the step the vehicle stays at 1 m.
+    let words = ["--set", "process.pilot.parameters.set_points=[]", "--set", "run.duration_s=6"];
+    let ended = place.call(&[&["run", &hover(), "--record", &place.path("a.mcap")][..], &words].concat());
+    ended.with_code(1).prints(&["FAILED altitude within 2 % of 1.5 m", "(1.47 … 1.53)", "\nFAILED\n"]);
+}
+
+#[test]
+fn a_condition_on_a_span_that_was_not_flown_fails() {
+    let place = Place::new();
+    let words = ["run", &hover(), "--record", &place.path("a.mcap"), "--set", "run.duration_s=3"];
+    place.call(&words).with_code(1).prints(&["no samples"]);
+}
+
+/// The keys of an object.
+fn keys(value: &Value) -> Vec<&str> {
+    value.as_object().unwrap().keys().map(String::as_str).collect()
+}
+
+#[test]
+fn the_json_summary_holds_what_the_text_says() {
+    let place = Place::new();
+    let path = place.path("a.mcap");
+    let summary = place.call(&["run", &hover(), "--record", &path, "--json"]).with_code(0).json();
+    for key in
+        ["passed", "ticks", "ticks_per_s", "real_time_factor", "processes", "pass", "compare", "recording"]
+    {
+        assert!(keys(&summary).contains(&key), "no {key} in {summary}");
+    }
+    assert_eq!((&summary["passed"], &summary["ticks"]), (&true.into(), &12_000.into()));
+    assert_eq!(summary["recording"], path);
+    let number = |key: &str| summary[key].as_f64().unwrap();
+    assert!((number("ticks_per_s") * number("host_s") - 12_000.0).abs() < 1e-3);
+    assert!((number("real_time_factor") * number("host_s") - 12.0).abs() < 1e-6);
+    let names: Vec<_> =
+        summary["processes"].as_array().unwrap().iter().map(|process| &process["name"]).collect();
+    assert_eq!(names, ["clock", "attitude", "controller", "imu", "pilot", "plant", "recorder"]);
+    assert!(summary["pass"].as_array().unwrap().iter().all(|pass| pass["passed"] == true));
+}
+
+#[test]
+fn a_failed_run_in_json_says_which_condition() {
+    let place = Place::new();
+    let words = ["run", &hover(), "--record", &place.path("a.mcap"), "--json", "--set", "run.duration_s=3"];
+    let summary = place.call(&words).with_code(1).json();
+    assert_eq!(summary["passed"], false);
+    assert_eq!(summary["pass"][0]["passed"], false);
+    assert!(summary["pass"][0]["name"].as_str().unwrap().starts_with("altitude"));
+}
+
+#[test]
+fn a_paced_run_takes_at_least_its_simulated_time() {
+    let place = Place::new();
+    let words = ["run", &hover(), "--record", &place.path("a.mcap"), "--json", "--pace", "2"];
+    let summary = place.call(&[&words[..], &["--set", "run.duration_s=1"]].concat()).with_code(1).json();
+    // The last tick's deadline lies one tick before the end.
+    assert!(summary["host_s"].as_f64().unwrap() >= 0.999 / 2.0, "{summary}");
+}
+
+#[test]
+fn check_prints_nodes_edges_delays_and_rates() {
+    let ended = Place::new().call(&["check", &hover()]).with_code(0);
+    ended.prints(&["12000 ticks at 1000 Hz (12 s)", "pace free", "window 64 ticks", "seed 1"]);
+    ended.prints(&["attitude (attitude), 1000 Hz", "controller (pid)", "imu (imu)", "recorder (recorder)"]);
+    ended.prints(&["/controller/command [hummingbus_msgs/msg/MotorCommand], delayed by 1 tick"]);
+    ended.prints(&["<- imu          /imu/imu [hummingbus_msgs/msg/Imu]\n"]);
+    ended.prints(&["-> state        /plant/state [hummingbus_msgs/msg/PlantState] 1000 Hz"]);
+    ended.prints(&["-> pose         /plant/pose [geometry_msgs/msg/PoseStamped] 100 Hz"]);
+}
+
+#[test]
+fn check_prints_slow_nodes_at_their_rate_and_takes_overrides() {
+    let set = ["--set", "process.imu.period_ticks=4", "--set", "run.seed=9"];
+    let ended = Place::new().call(&[&["check", &hover()][..], &set].concat()).with_code(0);
+    ended.prints(&["imu (imu), 250 Hz", "/imu/imu [hummingbus_msgs/msg/Imu] 250 Hz", "seed 9"]);
+}
+
+#[test]
+fn check_prints_the_graph_as_json() {
+    let graph = Place::new().call(&["check", &hover(), "--json"]).with_code(0).json();
+    assert_eq!(
+        (graph["duration_ticks"].as_u64(), graph["tick_ns"].as_u64()),
+        (Some(12_000), Some(1_000_000))
+    );
+    let nodes: Vec<_> = graph["nodes"].as_array().unwrap().iter().map(|node| &node["name"]).collect();
+    assert_eq!(nodes, ["attitude", "controller", "imu", "pilot", "plant", "recorder"]);
+}
+
+/// The part of the schema listing about one message.
+fn section<'a>(text: &'a str, name: &str) -> &'a str {
+    let start = text.find(name).unwrap_or_else(|| panic!("no {name} in\n{text}"));
+    text[start..].split("\n\n").next().unwrap()
+}
+
+#[test]
+fn schema_prints_every_message_with_units_frames_and_hash() {
+    let ended = Place::new().call(&["schema"]).with_code(0);
+    for name in ["AttitudeEstimate", "Imu", "MeasuredState", "MotorCommand", "PlantState", "SetPoint"] {
+        let section = section(&ended.output, &format!("hummingbus_msgs/msg/{name} ("));
+        let hash = section.split("layout ").nth(1).unwrap_or_else(|| panic!("no hash in {section}"));
+        assert!(hash.len() >= 16 && hash[..16].bytes().all(|byte| byte.is_ascii_hexdigit()), "{section}");
+    }
+    let state = section(&ended.output, "hummingbus_msgs/msg/PlantState (");
+    for (field, unit, frame) in [("position.x", "m", "world"), ("angular_velocity.z", "rad/s", "body")] {
+        let row = state.lines().find(|line| line.contains(field)).unwrap();
+        let words: Vec<_> = row.split_whitespace().collect();
+        assert_eq!(words[1..], ["float64", field, unit, frame]);
+    }
+    ended.prints(&["geometry_msgs/msg/PoseStamped", "tf2_msgs/msg/TFMessage"]);
+}
+
+#[test]
+fn schema_prints_the_same_as_json() {
+    let place = Place::new();
+    let (text, schemas) =
+        (place.call(&["schema"]).output, place.call(&["schema", "--json"]).with_code(0).json());
+    let schemas = schemas.as_array().unwrap();
+    assert!(schemas.len() >= 8);
+    for schema in schemas {
+        let section = section(&text, schema["type_name"].as_str().unwrap());
+        assert!(section.contains(&format!("{:016x}", schema["layout_hash"].as_u64().unwrap())), "{section}");
+        assert!(schema["definition"].as_str().unwrap().ends_with('\n'));
+    }
+}
+
+#[test]
+fn cat_prints_one_json_object_a_line() {
+    let place = Place::new();
+    let recording = recording(&place);
+    let ended = place.call(&["cat", &recording, "--topic", "/plant/pose"]).with_code(0);
+    let lines: Vec<Value> = ended.output.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
+    assert_eq!(lines.len(), 50);
+    for (index, line) in lines.iter().enumerate() {
+        assert_eq!(keys(line), ["topic", "tick", "time_ns", "fields"]);
+        assert_eq!(line["tick"].as_u64(), Some(10 * index as u64));
+        assert_eq!(line["time_ns"].as_u64(), Some(10_000_000 * index as u64));
+    }
+    assert_eq!(lines[0]["fields"]["header.frame_id"], "map");
+    assert_eq!(lines[0]["fields"]["pose.position.z"], 1.0);
+    let all = place.call(&["cat", &recording]).with_code(0).output;
+    assert_eq!(all.lines().count(), 5 * 500 + 2 * 50);
+}
+
+#[test]
+fn cat_names_the_topics_there_are() {
+    let place = Place::new();
+    let ended = place.call(&["cat", &recording(&place), "--topic", "/plant/stat"]).with_code(2);
+    ended.says(&["no topic /plant/stat", "/plant/state"]);
+}
+
+#[test]
+fn a_truncated_recording_is_refused() {
+    let place = Place::new();
+    let whole = recording(&place);
+    let bytes = fs::read(&whole).unwrap();
+    for part in 0..16 {
+        let cut = place.write("cut.mcap", &bytes[..bytes.len() * part / 16]);
+        let ended = place.call(&["diff", &whole, &cut]).with_code(2);
+        ended.says(&[&cut, "not a complete MCAP file"]);
+        place.call(&["cat", &cut]).with_code(2).says(&["not a complete MCAP file"]);
+    }
+}
+
+#[test]
+fn a_recording_with_a_wrong_byte_is_never_identical_and_never_a_crash() {
+    let place = Place::new();
+    let whole = recording(&place);
+    let bytes = fs::read(&whole).unwrap();
+    for part in 0..64 {
+        let mut changed = bytes.clone();
+        changed[bytes.len() * part / 64] ^= 0x55;
+        let changed = place.write("changed.mcap", changed);
+        let ended = place.call(&["diff", &whole, &changed]);
+        assert!(matches!(ended.code, Some(1 | 2)), "byte {part}/64: {ended}");
+        let ended = place.call(&["cat", &changed]);
+        assert!(matches!(ended.code, Some(0 | 2)), "byte {part}/64: {:?} {}", ended.code, ended.error);
+    }
+}
+
+#[test]
+fn what_is_no_recording_is_refused() {
+    let place = Place::new();
+    let (empty, text) = (place.write("empty.mcap", ""), place.write("text.mcap", "hello\n".repeat(100)));
+    for file in [empty, text] {
+        place.call(&["diff", &file, &file]).with_code(2).says(&[&file, "not a complete MCAP file"]);
+    }
+    let none = place.path("none.mcap");
+    place.call(&["diff", &none, &none]).with_code(2).says(&["cannot open the recording", &none]);
+}
+
+#[test]
+fn every_subcommand_shows_an_example() {
+    let place = Place::new();
+    for command in ["run", "check", "diff", "cat", "schema"] {
+        let ended = place.call(&[command, "--help"]).with_code(0);
+        ended.prints(&[&format!("Example: hummingbus {command}")]);
+    }
+    place.call(&["--help"]).with_code(0).prints(&["Example: hummingbus run manifests/hover.toml"]);
+}
+
+#[test]
+fn a_node_without_a_launcher_says_how_to_start_it() {
+    let place = Place::new();
+    let ended = place.call(&["node", "plant"]).with_code(2);
+    ended.says(&["started without one", "hummingbus run MANIFEST"]);
+}
