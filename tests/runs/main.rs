@@ -16,6 +16,7 @@ mod cleanup;
 mod commands;
 mod contract;
 mod determinism;
+mod documentation;
 mod failures;
 mod loss;
 mod nodes;

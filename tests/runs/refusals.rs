@@ -451,7 +451,7 @@ fn a_window_of_no_tick_or_of_too_many() {
 fn a_window_argument_is_not_blamed_on_the_manifest() {
     let manifest = repository("manifests/hover.toml");
     let ended = Place::new().call(&["run", &manifest, "--window", "0"]).with_code(2);
-    ended.says(&["window", "is 0", "1 to 4096 ticks"]);
+    ended.says(&["--window", "0 is not in 1..=4096"]);
     assert!(!ended.error.contains("hover.toml:1:1"), "a place that has nothing to do with it: {ended}");
 }
 
