@@ -96,6 +96,7 @@ impl Graph {
         placement::place(&mut plan, manifest.content.run.clock_cpu);
         let vehicles = set_parameters(manifest, &names, &processes, &programs, &mut plan)?;
         require_one_recorder(manifest, &names, &programs)?;
+        require_whole_recording(manifest, &names, &plan, &programs)?;
         check_evaluations(manifest, &plan, &programs)?;
         Ok(Self { plan, programs, vehicles })
     }
@@ -550,9 +551,34 @@ fn check_evaluations(manifest: &Manifest, plan: &Plan, programs: &[Program]) -> 
     manifest.content.pass.iter().try_for_each(|pass| check_field(manifest, plan, pass))
 }
 
+/// How often the publisher of `topic` is set to a measured state, if it is a plant that is.
+fn reset_window_s(plan: &Plan, topic: &str) -> Option<f64> {
+    let publishes =
+        |node: &&NodePlan| node.outputs.iter().any(|output| plan.topics[output.topic].name == topic);
+    plan.nodes.iter().find(publishes)?.parameters.get("window_s")?.as_f64()
+}
+
 fn check_window(manifest: &Manifest, plan: &Plan, compare: &Spanned<Comparison>) -> Result<(), Problem> {
     let window_s = compare.get_ref().window_s;
     let duration_s = f64::from(plan.duration_ticks) * plan.tick_s();
+    let limits = compare.get_ref();
+    if [limits.max_position_m, limits.max_velocity_m_s, limits.max_attitude_deg] == [None; 3] {
+        return Err(manifest.problem(
+            &compare.span(),
+            "the comparison has no limit, so it cannot fail",
+            "add max_position_m, max_velocity_m_s or max_attitude_deg",
+        ));
+    }
+    if let Some(set_s) = reset_window_s(plan, &limits.simulated).filter(|set_s| *set_s != window_s) {
+        return Err(manifest.problem(
+            &compare.span(),
+            format!(
+                "`window_s` is {window_s} s, but the plant behind {} is set every {set_s} s",
+                limits.simulated
+            ),
+            "give both the same length",
+        ));
+    }
     // The last tick lies one tick before the end.
     if window_s > 0.0 && window_s <= duration_s - plan.tick_s() + 1e-9 {
         return Ok(());
@@ -604,6 +630,26 @@ fn require_one_recorder(
         )),
         _ => Ok(()),
     }
+}
+
+/// A recorder that ran less often, or looked back, would leave samples out.
+fn require_whole_recording(
+    manifest: &Manifest,
+    names: &[&Spanned<String>],
+    plan: &Plan,
+    programs: &[Program],
+) -> Result<(), Problem> {
+    let recorders = plan.nodes.iter().zip(names).zip(programs).filter(|(_, program)| program.is_recorder());
+    for ((node, name), _) in recorders {
+        if node.period_ticks != 1 || node.inputs.iter().any(|input| input.delay_ticks != 0) {
+            return Err(manifest.problem(
+                &name.span(),
+                format!("the recorder `{}` would leave samples out", name.get_ref()),
+                "leave `period_ticks` and `delay_ticks` out: a recorder takes every sample",
+            ));
+        }
+    }
+    Ok(())
 }
 
 fn check_recorded(manifest: &Manifest, plan: &Plan, programs: &[Program]) -> Result<(), Problem> {

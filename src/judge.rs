@@ -185,7 +185,8 @@ fn compare_states(compare: &Comparison, recording: &Recording) -> Result<WindowE
         sums[0] += (0..3).map(|field| error(field).powi(2)).sum::<f64>();
         sums[1] += (3..6).map(|field| error(field).powi(2)).sum::<f64>();
         let dot: f64 = (6..10).map(|f| simulated[f].value[index] * measured[f].value[other]).sum();
-        sums[2] += (2.0 * dot.abs().min(1.0).acos()).to_degrees().powi(2);
+        // `clamp` keeps NaN, where `min` would make it a perfect match.
+        sums[2] += (2.0 * dot.abs().clamp(0.0, 1.0).acos()).to_degrees().powi(2);
         windows += 1;
     }
     if windows == 0 {

@@ -1,4 +1,5 @@
 //! Launching a run: starts its processes, watches them, and takes everything down again.
+#![allow(clippy::disallowed_methods, reason = "the launcher watches host time; it simulates nothing")]
 
 use crate::graph::{Graph, Program};
 use crate::manifest::Manifest;
@@ -153,6 +154,8 @@ impl Processes {
 impl Drop for Processes {
     fn drop(&mut self) {
         for process in self.running.iter_mut().filter(|process| process.end.is_none()) {
+            // The whole group, since a command may have started processes of its own.
+            bus::process::kill_group(process.child.id());
             let _ = process.child.kill();
             let _ = process.child.wait();
         }
@@ -246,7 +249,8 @@ fn watch(
             );
         }
         if processes.all_ended() {
-            return Ok(control.is_stop_requested());
+            // A stop that was asked for after the last grant changed nothing.
+            return Ok(control.end_tick() < plan.duration_ticks);
         }
         match interrupts.load(Ordering::SeqCst) {
             0 => {}
@@ -260,7 +264,7 @@ fn watch(
         if ticks != last_change.0 {
             last_change = (ticks, Instant::now());
         } else if last_change.1.elapsed() > STALL.max(2 * deadline(plan)) {
-            let words = describe_stall(control, plan);
+            let words = describe_stall(control, plan, last_change.1.elapsed());
             take_down(processes, control)?;
             bail!(words);
         }
@@ -269,16 +273,19 @@ fn watch(
     }
 }
 
-/// Host time between two deadlines of a paced run.
+/// Host time in which a paced run must come forward: that of the slowest node's period.
 fn deadline(plan: &Plan) -> Duration {
+    let period_ticks = plan.nodes.iter().map(|node| node.period_ticks).max().unwrap_or(1);
     match plan.pace {
         bus::plan::Pace::Free => Duration::ZERO,
-        bus::plan::Pace::Factor(factor) => Duration::from_secs_f64((plan.tick_s() / factor).min(1e6)),
+        bus::plan::Pace::Factor(factor) => {
+            Duration::from_secs_f64((f64::from(period_ticks) * plan.tick_s() / factor).min(1e6))
+        }
     }
 }
 
 /// Who has not come as far as the others, and what it waits for.
-fn describe_stall(control: &Control, plan: &Plan) -> String {
+fn describe_stall(control: &Control, plan: &Plan, stood: Duration) -> String {
     let names = |phase| {
         let late = plan.nodes.iter().enumerate().filter(|(index, _)| !control.is_ready(*index, phase));
         late.map(|(_, node)| format!("`{}`", node.name)).collect::<Vec<_>>().join(", ")
@@ -292,7 +299,7 @@ fn describe_stall(control: &Control, plan: &Plan) -> String {
             format!("tick {} is not completed by {}", control.completed_ticks(), who.join(", "))
         }
     };
-    format!("the run stood still for {} s: {waiting}; it was aborted", STALL.as_secs())
+    format!("the run stood still for {} s: {waiting}; it was aborted", stood.as_secs())
 }
 
 fn take_down(processes: &mut Processes, control: &Control) -> Result<()> {

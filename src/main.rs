@@ -111,8 +111,7 @@ fn main() -> ExitCode {
         Verb::Diff { a, b } => diff(&a, &b),
         Verb::Cat { recording, topic } => cat(&recording, topic.as_deref()),
         Verb::Schema { json } => {
-            print_text(&if json { describe::schemas_json() } else { describe::schemas() });
-            Ok(true)
+            print_text(&if json { describe::schemas_json() } else { describe::schemas() }).map(|()| true)
         }
         Verb::Node { kind } => node(&kind),
     };
@@ -151,7 +150,7 @@ fn run(arguments: &RunArguments) -> Result<bool> {
     }
     let tick_s = graph.plan.tick_s();
     let summary = Summary::new(manifest.name(), outcome, tick_s, has_recorder.then_some(path), pass, compare);
-    print_text(&if arguments.json { serde_json::to_string_pretty(&summary)? } else { summary.to_string() });
+    print_text(&if arguments.json { serde_json::to_string_pretty(&summary)? } else { summary.to_string() })?;
     Ok(summary.passed)
 }
 
@@ -169,7 +168,7 @@ fn recording_path(manifest: &Manifest, argument: Option<&Path>) -> Result<PathBu
 fn check(arguments: &CheckArguments) -> Result<bool> {
     let manifest = Manifest::load(&arguments.manifest, &arguments.set)?;
     let graph = Graph::build(&manifest)?;
-    print_text(&if arguments.json { describe::graph_json(&graph.plan) } else { describe::graph(&graph) });
+    print_text(&if arguments.json { describe::graph_json(&graph.plan) } else { describe::graph(&graph) })?;
     Ok(true)
 }
 
@@ -177,8 +176,8 @@ fn check(arguments: &CheckArguments) -> Result<bool> {
 fn diff(a: &Path, b: &Path) -> Result<bool> {
     let difference = recorder::diff::first_difference(&Recording::open(a)?, &Recording::open(b)?)?;
     match &difference {
-        None => print_text("identical"),
-        Some(difference) => print_text(&difference.to_string()),
+        None => print_text("identical")?,
+        Some(difference) => print_text(&difference.to_string())?,
     }
     Ok(difference.is_none())
 }
@@ -202,12 +201,11 @@ fn cat(path: &Path, topic: Option<&str>) -> Result<bool> {
         let line = serde_json::json!({
             "topic": record.topic, "tick": record.tick, "time_ns": record.time_ns, "fields": fields
         });
-        if writeln!(out, "{line}").is_err() {
-            // The reader has gone away (`| head`).
-            return Ok(true);
+        if let Err(error) = writeln!(out, "{line}") {
+            return gone_or_failed(error);
         }
     }
-    Ok(out.flush().is_ok())
+    out.flush().map_or_else(gone_or_failed, |()| Ok(true))
 }
 
 /// Runs a process of a run; what it says goes to the launcher's log.
@@ -226,8 +224,17 @@ fn node(kind: &str) -> Result<bool> {
     }
 }
 
-/// Prints to standard output; a reader that has gone away (`| head`) is no error.
-fn print_text(text: &str) {
+/// Prints to standard output.
+fn print_text(text: &str) -> Result<()> {
     use std::io::Write as _;
-    let _ = writeln!(std::io::stdout(), "{}", text.trim_end());
+    writeln!(std::io::stdout(), "{}", text.trim_end()).or_else(|error| gone_or_failed(error).map(|_| ()))
+}
+
+/// A reader that has gone away (`| head`) is no error; a full disk is one.
+fn gone_or_failed(error: std::io::Error) -> Result<bool> {
+    if error.kind() == std::io::ErrorKind::BrokenPipe {
+        Ok(true)
+    } else {
+        Err(error).context("cannot write to standard output")
+    }
 }

@@ -67,9 +67,12 @@ pub fn place(plan: &mut Plan, clock_cpu: Option<usize>) {
     };
     let loop_cores = &cores[..cores.len() - 1];
     let loops = feedback_loops(plan);
+    let has_loop = loops.iter().any(Option::is_some);
     plan.clock_cpu = clock_cpu.or(Some(last));
-    for (node, in_loop) in plan.nodes.iter_mut().zip(loops) {
-        let default = in_loop.map_or(last, |number| loop_cores[number % loop_cores.len()]);
+    for (index, (node, in_loop)) in plan.nodes.iter_mut().zip(loops).enumerate() {
+        // Without a loop there is no serial chain to keep together: what computes is spread instead.
+        let spread = (!has_loop && !node.outputs.is_empty()).then_some(index);
+        let default = in_loop.or(spread).map_or(last, |number| loop_cores[number % loop_cores.len()]);
         node.cpu = node.cpu.or(Some(default));
     }
 }

@@ -28,7 +28,7 @@ pub fn hop_ns(cores: &[Option<usize>], laps: u32, spin: bool) -> Result<f64> {
         std::thread::yield_now();
     }
     let started = Instant::now();
-    ring.pass_on(0, 1);
+    ring.pass_on(0, 1, spin);
     for child in &mut children {
         if !child.wait()?.success() {
             return Err("a process of the floor's ring failed".into());
@@ -49,9 +49,10 @@ pub fn process(words: &[String]) -> Result<()> {
     let ring = Ring::open(path, count)?;
     ring.word(count).fetch_add(1, SeqCst);
     for lap in 1..=laps {
-        ring.await_lap(index, lap, wait == "spin");
+        let spin = wait == "spin";
+        ring.await_lap(index, lap, spin);
         let (next, lap) = if index + 1 == count { (0, lap + 1) } else { (index + 1, lap) };
-        ring.pass_on(next, lap);
+        ring.pass_on(next, lap, spin);
     }
     Ok(())
 }
@@ -89,8 +90,11 @@ impl Ring {
         }
     }
 
-    fn pass_on(&self, index: usize, lap: u32) {
+    fn pass_on(&self, index: usize, lap: u32, spin: bool) {
         self.word(index).store(lap, SeqCst);
+        if spin {
+            return;
+        }
         let _ = futex::wake(self.word(index), futex::Flags::empty(), 1);
     }
 }

@@ -1,6 +1,7 @@
 //! The benchmark of the bus: every figure is a ratio against a reference measured in the same run.
 //!
 //! `cargo bench --bench speed` runs all parts; `cargo bench --bench speed -- hop hover` runs some.
+#![allow(clippy::disallowed_methods, reason = "a benchmark measures host time")]
 
 mod floor;
 mod hop;

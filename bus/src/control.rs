@@ -343,13 +343,14 @@ impl Control {
         self.word(0, 4).load(SeqCst) != 0
     }
 
-    /// Deadlines that the clock found missed: a node had not finished the tick before.
+    /// Deadlines that were missed: a node had not finished the tick before, or the clock itself was more than
+    /// a tick late.
     #[must_use]
     pub fn missed_deadlines(&self) -> u32 {
         self.word(0, 5).load(SeqCst)
     }
 
-    /// Counts a missed deadline, and the nodes that were late.
+    /// Counts a missed deadline, and the nodes that were late; none where the clock itself was.
     pub(crate) fn count_missed_deadline(&self, late: impl Iterator<Item = usize>) {
         self.word(0, 5).fetch_add(1, SeqCst);
         late.for_each(|node| {

@@ -7,7 +7,6 @@ use crate::initial;
 use crate::message::Message;
 use crate::plan::{InputPlan, NodePlan, Pace, Plan};
 use crate::port::{InPort, OutPort};
-use crate::random::{Stream, stream};
 use crate::schema::Schema;
 use crate::transport::{Capacity, Transport};
 use serde::de::DeserializeOwned;
@@ -118,13 +117,7 @@ impl Node {
         (1_000_000_000 / self.plan.tick_ns) as u32
     }
 
-    /// The node's own random stream.
-    #[must_use]
-    pub fn random(&self) -> Stream {
-        stream(self.plan.seed, self.name())
-    }
-
-    /// The seed of the run.
+    /// The seed of the run: with the node's name it makes the node's random stream (`bus::random`).
     #[must_use]
     pub fn seed(&self) -> u64 {
         self.plan.seed
@@ -293,9 +286,13 @@ impl Node {
 
     /// A queue holds what a publisher can send before the slowest reader holds the grant back.
     fn capacity(&self, topic: usize) -> Capacity {
-        let longest_period = self.plan.nodes.iter().map(|node| node.period_ticks).max().unwrap_or(1);
+        let readers =
+            self.plan.nodes.iter().filter(|node| node.inputs.iter().any(|input| input.topic == topic));
+        let longest_period = readers.map(|node| node.period_ticks).max().unwrap_or(1);
+        let ticks = u64::from(self.plan.window_ticks) + u64::from(longest_period);
+        let samples = ticks.div_ceil(u64::from(self.plan.topics[topic].period_ticks)) + 2;
         Capacity {
-            queued_samples: (self.plan.window_ticks + longest_period + 2) as usize,
+            queued_samples: usize::try_from(samples).unwrap_or(usize::MAX),
             subscribers: self.plan.edges_of_topic(topic).len(),
             nodes: self.plan.nodes.len(),
         }
@@ -422,6 +419,7 @@ impl ConnectedNode {
             self.control.advance(Word::Topic(output.topic), tick + output.period_ticks, &output.readers);
             sent_before = true;
         }
+        self.outputs.iter_mut().for_each(OutPort::forget);
         // Readers are awake by now: what the next tick needs is fetched while they compute.
         self.outputs.iter_mut().try_for_each(|output| output.prepare(node))?;
         Ok(())

@@ -153,6 +153,11 @@ impl OutPort {
         }
     }
 
+    /// Forgets what was written at a tick at which nothing was due.
+    pub(crate) fn forget(&mut self) {
+        self.is_written = false;
+    }
+
     /// Takes the memory of the next sample.
     pub(crate) fn prepare(&mut self, node: &str) -> Result<(), BusError> {
         if self.loan.is_none() {

@@ -47,6 +47,10 @@ fn die_with_parent() {
     let launcher = std::env::var(LAUNCHER_VARIABLE).ok().and_then(|pid| pid.parse::<i32>().ok());
     let parent = getppid().map(|pid| pid.as_raw_nonzero().get());
     if launcher.is_some() && launcher != parent {
+        eprintln!(
+            "this node is not a child of its launcher: either the launcher has died, or a shell stands between \
+             them; start the node with `exec`"
+        );
         std::process::exit(1);
     }
 }
@@ -70,6 +74,14 @@ pub(crate) fn wait_for_turn() {
     // SAFETY: the call reads one `sched_param` that lives across it. A refusal leaves the policy as it
     // was, which costs speed only.
     let _ = unsafe { libc::sched_setscheduler(0, libc::SCHED_BATCH, &raw const parameters) };
+}
+
+/// Kills every process of the group that process `leader` leads.
+pub fn kill_group(leader: u32) {
+    let group = i32::try_from(leader).ok().and_then(rustix::process::Pid::from_raw);
+    if let Some(group) = group {
+        let _ = rustix::process::kill_process_group(group, Signal::KILL);
+    }
 }
 
 /// The cores this process may run on, in ascending order; empty where the system does not tell.

@@ -156,6 +156,10 @@ impl Schema {
                 Kind::Message(inner) => {
                     inner.write_rows(text, &format!("{name}."), base + field.offset, unit, frame);
                 }
+                // One row per field of the element: a change inside it must show.
+                Kind::Array(Kind::Message(inner), length) => {
+                    inner.write_rows(text, &format!("{name}[{length}]."), base + field.offset, unit, frame);
+                }
                 kind => {
                     let row = format!(
                         "  {:>5}  {:<12} {name:<28} {unit:<8} {frame}",
@@ -249,6 +253,20 @@ mod tests {
         assert_eq!(text.matches("MSG: builtin_interfaces/Time\n").count(), 1);
         assert!(text.ends_with('\n'));
         assert!(!text.contains("/msg/"));
+    }
+
+    #[test]
+    fn the_layout_shows_the_fields_of_an_array_of_messages() {
+        use crate::messages::Vector3;
+        #[derive(Clone, Copy, crate::Message)]
+        #[repr(C)]
+        #[message(type_name = "test_msgs/msg/Path")]
+        struct Path {
+            #[field(unit = "m", frame = "world")]
+            points: [Vector3; 3],
+        }
+        let layout = Path::SCHEMA.layout();
+        assert!(layout.contains("points[3].y") && layout.contains("m        world"), "{layout}");
     }
 
     #[test]

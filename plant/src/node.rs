@@ -43,8 +43,6 @@ struct Parameters {
     /// Position of the centre of mass at tick 0, in the world.
     #[serde(default)]
     initial_position_m: [f64; 3],
-    /// Motor command at which the rotors turn steadily at tick 0; that of hover where absent.
-    initial_command: Option<f64>,
     /// Integration steps per tick.
     #[serde(default = "one")]
     substeps: u32,
@@ -84,18 +82,23 @@ fn run() -> Result<(), BusError> {
         tf: node.optional_output("tf")?,
     };
     let window_ticks = window_ticks(&node, parameters.window_s)?;
-    let dt_s = node.period_s();
+    let dt_s = node.tick_s();
+    if node.period_s() != dt_s {
+        // It would apply a command before it was computed.
+        return Err(node.error("a plant runs at every tick; leave `period_ticks` out"));
+    }
     let model = NewtonEuler::new(vehicle, parameters.substeps);
-    let initial_command = parameters.initial_command.unwrap_or_else(|| model.vehicle().hover_command());
-    let mut state =
-        model.start(RigidBody::level_at(Vector3::from(parameters.initial_position_m)), initial_command);
+    let body_at_start = RigidBody::level_at(Vector3::from(parameters.initial_position_m));
+    let mut state = model.start(body_at_start, 0.0);
     node.run(|tick| {
         let window = measured.filter(|_| tick.number().is_multiple_of(window_ticks));
-        let is_first = tick.number() == 0;
-        if !is_first {
-            model.step(&mut state, &tick.get(command).command, dt_s);
-        } else if let Some(measured) = window {
-            state.body = body(tick.get(measured));
+        let commands = tick.get(command).command;
+        if tick.number() > 0 {
+            model.step(&mut state, &commands, dt_s);
+        } else {
+            // The input's initial value: the rotors turn steadily at it when the run starts.
+            state.rotors = commands.map(|command| model.steady(command));
+            state.body = window.map_or(state.body, |measured| body(tick.get(measured)));
         }
         outputs.publish(tick, &model, &state)?;
         if let Some(measured) = window {

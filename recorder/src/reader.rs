@@ -48,8 +48,8 @@ impl Recording {
     pub fn open(path: &Path) -> Result<Self, RecordingError> {
         let fail = |source| RecordingError::File { action: "open", path: path.to_owned(), source };
         let file = File::open(path).map_err(fail)?;
-        // SAFETY: the file is read only here; that nobody truncates it meanwhile is the caller's promise,
-        // as with every tool that maps a file.
+        // SAFETY: the mapping is read only, and our own writer never truncates a recording: it replaces the
+        // file. Another program that truncates it meanwhile ends this one with SIGBUS.
         let bytes = unsafe { Mmap::map(&file) }.map_err(fail)?;
         let summary = Summary::read(&bytes).map_err(|error| content(path, &error))?.ok_or_else(|| {
             RecordingError::Content { path: path.to_owned(), reason: "it has no summary section".to_owned() }

@@ -35,7 +35,9 @@ impl RecordingWriter {
     /// # Errors
     /// If the file cannot be created or written.
     pub fn create(path: &Path) -> Result<Self, RecordingError> {
-        let file = File::create(path).map_err(|source| RecordingError::File {
+        // A file of its own: who reads the old one, mapped, keeps it whole.
+        let _ = std::fs::remove_file(path);
+        let file = File::create_new(path).map_err(|source| RecordingError::File {
             action: "create",
             path: path.to_owned(),
             source,

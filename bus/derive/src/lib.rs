@@ -109,8 +109,9 @@ fn require_repr_c(input: &DeriveInput) -> Result<()> {
     let mut is_c = false;
     for attribute in input.attrs.iter().filter(|attribute| attribute.path().is_ident("repr")) {
         attribute.parse_nested_meta(|meta| {
-            is_c |= meta.path.is_ident("C");
-            Ok(())
+            is_c = meta.path.is_ident("C");
+            // `packed` would hide padding that CDR has, `align` would add some that it has not.
+            if is_c { Ok(()) } else { Err(meta.error("a message is #[repr(C)] and nothing else")) }
         })?;
     }
     if is_c { Ok(()) } else { Err(Error::new_spanned(&input.ident, "a message needs #[repr(C)]")) }
