@@ -235,14 +235,14 @@ fn watch(
     let mut last_change = (0, Instant::now());
     loop {
         if let Some(failed) = processes.find_failure()? {
-            let tick = control.completed_ticks();
+            let tick = ticks_of(&failed.name, control, plan);
             let words = format!("{}\nThe run was aborted at tick {tick}", failed.post_mortem());
             take_down(processes, control)?;
             bail!(words);
         }
         if let Some(node) = processes.find_deserter(control, plan) {
             let name = &plan.nodes[node].name;
-            let tick = control.completed_ticks();
+            let tick = ticks_of(&plan.nodes[node].name, control, plan);
             take_down(processes, control)?;
             bail!(
                 "process `{name}` ended with exit code 0 before the run did; it was aborted at tick {tick}"
@@ -271,6 +271,12 @@ fn watch(
         progress.show(control);
         std::thread::sleep(POLL);
     }
+}
+
+/// Ticks that the process `name` completed; those of the whole run if it is the clock.
+fn ticks_of(name: &str, control: &Control, plan: &Plan) -> u32 {
+    let node = plan.nodes.iter().position(|node| node.name == name);
+    node.map_or_else(|| control.completed_ticks(), |node| control.completed_by(node))
 }
 
 /// Host time in which a paced run must come forward: that of the slowest node's period.

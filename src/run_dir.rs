@@ -4,8 +4,6 @@ use anyhow::{Context, Result};
 use bus::control::shm_prefix;
 use std::path::{Path, PathBuf};
 
-const CREATE_ATTEMPTS: u32 = 100;
-
 /// Where a run keeps its files; dropping it removes them and the run's shared memory.
 #[derive(Debug)]
 pub struct RunDir {
@@ -19,12 +17,11 @@ impl RunDir {
         use std::os::unix::fs::DirBuilderExt;
         let run_id = format!("{:x}-{:x}", std::process::id(), bus::control::monotonic_ns());
         let user = bus::process::user_id();
-        let path = std::env::temp_dir().join(format!("hummingbus-{user}")).join(&run_id);
-        // Another run that ends may remove the user's folder between its making and that of this run's.
-        let create = || std::fs::DirBuilder::new().recursive(true).mode(0o700).create(&path);
-        (1..CREATE_ATTEMPTS)
-            .find_map(|_| create().ok())
-            .map_or_else(create, Ok)
+        // One level only: a folder shared by runs could vanish with another run that ends.
+        let path = std::env::temp_dir().join(format!("hummingbus-{user}-{run_id}"));
+        std::fs::DirBuilder::new()
+            .mode(0o700)
+            .create(&path)
             .with_context(|| format!("cannot create the run directory {}", path.display()))?;
         Ok(Self { path, run_id })
     }
@@ -44,8 +41,6 @@ impl Drop for RunDir {
     fn drop(&mut self) {
         remove_shared_memory(&self.run_id);
         let _ = std::fs::remove_dir_all(&self.path);
-        // The user's folder goes with the last run in it; while another is there, this fails, as it should.
-        let _ = self.path.parent().map(std::fs::remove_dir);
     }
 }
 

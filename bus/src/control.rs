@@ -364,6 +364,12 @@ impl Control {
         self.word(self.node_slot(node), 3).load(SeqCst)
     }
 
+    /// Ticks that `node` has completed.
+    #[must_use]
+    pub fn completed_by(&self, node: usize) -> u32 {
+        self.count(Word::Done(node)).min(self.end_tick())
+    }
+
     /// Whether `node` has completed the run.
     #[must_use]
     pub fn has_completed(&self, node: usize) -> bool {

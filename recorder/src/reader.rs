@@ -51,6 +51,8 @@ impl Recording {
         // SAFETY: the mapping is read only, and our own writer never truncates a recording: it replaces the
         // file. Another program that truncates it meanwhile ends this one with SIGBUS.
         let bytes = unsafe { Mmap::map(&file) }.map_err(fail)?;
+        require_sane_sizes(&bytes)
+            .map_err(|reason| RecordingError::Content { path: path.to_owned(), reason })?;
         let summary = Summary::read(&bytes).map_err(|error| content(path, &error))?.ok_or_else(|| {
             RecordingError::Content { path: path.to_owned(), reason: "it has no summary section".to_owned() }
         })?;
@@ -136,6 +138,39 @@ impl Recording {
             })
             .collect()
     }
+}
+
+/// No chunk of a recording is larger when it is unpacked.
+const CHUNK_BYTES_MAX: u64 = 1 << 30;
+const MAGIC_BYTES: usize = 8;
+const RECORD_HEAD_BYTES: usize = 9;
+const OP_FOOTER: u8 = 0x02;
+const OP_CHUNK: u8 = 0x06;
+
+/// Refuses records that claim an absurd size: reading them would ask for that much memory at once.
+fn require_sane_sizes(bytes: &[u8]) -> Result<(), String> {
+    let mut at = MAGIC_BYTES;
+    loop {
+        let (operation, content) =
+            record(bytes, at).ok_or_else(|| format!("no whole record at byte {at}"))?;
+        // A chunk begins with its start time, its end time and its unpacked size.
+        let unpacked = content.get(16..).and_then(|content| content.first_chunk::<8>());
+        match (operation, unpacked.map(|unpacked| u64::from_le_bytes(*unpacked))) {
+            (OP_FOOTER, _) => return Ok(()),
+            (OP_CHUNK, Some(unpacked)) if unpacked > CHUNK_BYTES_MAX => {
+                return Err(format!("the chunk at byte {at} claims to unpack to {unpacked} bytes"));
+            }
+            _ => at += RECORD_HEAD_BYTES + content.len(),
+        }
+    }
+}
+
+/// The record at byte `at`: its operation code and its content.
+fn record(bytes: &[u8], at: usize) -> Option<(u8, &[u8])> {
+    let (&operation, rest) = bytes.get(at..)?.split_first()?;
+    let (length, rest) = rest.split_first_chunk::<8>()?;
+    let length = usize::try_from(u64::from_le_bytes(*length)).ok()?;
+    Some((operation, rest.get(..length)?))
 }
 
 fn topics(summary: &Summary, path: &Path) -> Result<BTreeMap<String, Topic>, RecordingError> {

@@ -1,7 +1,7 @@
 //! Runs that are stopped or killed: they end at a tick boundary, and nothing outlives them.
 
 use crate::recordings::{open, require_same_messages, topics};
-use crate::support::{Ended, Place, Repeating, repository};
+use crate::support::{Ended, Place, repository};
 use rustix::process::{Signal, kill_process};
 use std::thread::sleep;
 use std::time::Duration;
@@ -184,16 +184,4 @@ fn a_refused_manifest_leaves_nothing_and_touches_no_recording() {
     let recording = place.write("kept.mcap", "kept");
     place.call(&["run", &manifest, "--record", &recording, "--set", "run.seeed=1"]).with_code(2);
     assert_eq!(std::fs::read_to_string(recording).unwrap(), "kept");
-}
-
-/// The last run to end removes the user's folder of runs; another may start at that moment.
-#[test]
-fn a_run_starts_also_while_another_that_ends_removes_the_runs_folder() {
-    let place = Place::new();
-    let _remover = Repeating::of(place.remove_runs_folder());
-    let manifest = repository("manifests/hover.toml");
-    let words = ["run", &manifest, "--record", &place.path("a.mcap"), "--set", "run.duration_s=0.001"];
-    for _ in 0..60 {
-        place.start(&words).end_among_others().flown();
-    }
 }

@@ -1,7 +1,7 @@
 //! A run is a function of its manifest: the same file, byte for byte, however it is flown.
 
 use crate::recordings::{open, require_same, rows, topics};
-use crate::support::{Place, Repeating, repository};
+use crate::support::{Load, Place, repository};
 use std::fs;
 use std::sync::OnceLock;
 
@@ -99,7 +99,7 @@ fn a_core_that_the_machine_does_not_have_changes_nothing() {
 
 #[test]
 fn the_recording_is_the_same_on_a_loaded_machine() {
-    let _load = Repeating::load(4);
+    let _load = Load::of_threads(4);
     require_reference(3, &[]);
     require_reference(3, &["--pace", "4"]);
 }

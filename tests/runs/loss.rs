@@ -1,7 +1,7 @@
 //! Every sample is recorded: complete, in order, at its topic's rate.
 
 use crate::recordings::topics;
-use crate::support::{Place, Repeating, repository};
+use crate::support::{Load, Place, repository};
 
 const TICK_NS: u64 = 1_000_000;
 /// The topics of hover.toml with the ticks between their samples.
@@ -41,7 +41,7 @@ fn sixty_thousand_ticks_are_recorded_whole() {
 
 #[test]
 fn nothing_is_lost_on_a_loaded_machine() {
-    let _load = Repeating::load(4);
+    let _load = Load::of_threads(4);
     require_complete(5_003, &["--window", "4096"]);
     require_complete(1_009, &["--window", "1"]);
 }

@@ -90,8 +90,14 @@ pub fn flight() -> String {
 fn replay_made_up(place: &Place, limit_m: f64) -> Ended {
     let text = fs::read_to_string(repository(MANIFEST)).unwrap();
     let text = text.replace("../vehicles", &repository("vehicles")).replace("from_s = 6.0", "from_s = 0.0");
-    let text = text.replace("window_s = 1.0\n", &format!("window_s = 1.0\nmax_position_m = {limit_m:?}\n"));
-    // Only the last is the comparison's: the plant's stands in braces.
+    // The made-up flight is none of the vehicle's: the limits of the real one do not hold for it.
+    let text: Vec<&str> = text.lines().filter(|line| !line.starts_with("max_")).collect();
+    let text = format!("{}\n", text.join("\n"));
+    let limits = format!("max_position_m = {limit_m:?}\n");
+    let text = text.split_inclusive('\n').fold(String::new(), |text, line| {
+        let limit = if line.starts_with("window_s") { limits.as_str() } else { "" };
+        text + line + limit
+    });
     let manifest = place.write("made-up.toml", text);
     let data = format!("process.player.data={}", place.write("flight.csv", flight()));
     place.call(&["run", &manifest, "--set", &data, "--set", "run.duration_s=1.001"])

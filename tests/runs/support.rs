@@ -109,15 +109,9 @@ impl Place {
         poll("processes that outlive their run", || self.processes().is_empty().then_some(()));
     }
 
-    /// Removes the folder of this user's runs where it is empty, as the end of a run does.
-    pub fn remove_runs_folder(&self) -> impl Fn() + Clone + Send + 'static {
-        let folder = self.temporary().join(format!("hummingbus-{}", bus::process::user_id()));
-        move || drop(fs::remove_dir(&folder))
-    }
-
     /// The directories of the runs that are up.
     fn run_dirs(&self) -> Vec<PathBuf> {
-        entries(&self.temporary()).iter().flat_map(|user| entries(user)).collect()
+        entries(&self.temporary())
     }
 
     /// Everything that the runs of this folder left outside of their recordings.
@@ -312,30 +306,21 @@ impl std::fmt::Display for Ended {
     }
 }
 
-/// Threads that do something over and over while this lives.
-pub struct Repeating {
+/// Threads that keep the cores busy while this lives.
+pub struct Load {
     is_over: Arc<AtomicBool>,
     threads: Vec<JoinHandle<()>>,
 }
 
-impl Repeating {
-    /// A thread that does `action` over and over.
-    pub fn of(action: impl Fn() + Clone + Send + 'static) -> Self {
-        Self::of_threads(1, action)
-    }
-
-    /// Threads that keep the cores busy.
-    pub fn load(threads: usize) -> Self {
-        Self::of_threads(threads, std::hint::spin_loop)
-    }
-
-    fn of_threads(count: usize, action: impl Fn() + Clone + Send + 'static) -> Self {
+impl Load {
+    /// Starts this many threads.
+    pub fn of_threads(count: usize) -> Self {
         let is_over = Arc::new(AtomicBool::new(false));
         let start = |_| {
-            let (is_over, action) = (is_over.clone(), action.clone());
+            let is_over = is_over.clone();
             thread::spawn(move || {
                 while !is_over.load(Ordering::Relaxed) {
-                    action();
+                    std::hint::spin_loop();
                 }
             })
         };
@@ -343,7 +328,7 @@ impl Repeating {
     }
 }
 
-impl Drop for Repeating {
+impl Drop for Load {
     fn drop(&mut self) {
         self.is_over.store(true, Ordering::Relaxed);
         self.threads.drain(..).for_each(|thread| drop(thread.join()));
