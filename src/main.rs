@@ -190,7 +190,7 @@ fn cat(path: &Path, topic: Option<&str>) -> Result<bool> {
         recording.topic(topic)?;
     }
     let mut out = std::io::BufWriter::new(std::io::stdout().lock());
-    for record in recording.messages()? {
+    for record in recording.messages() {
         let record = record?;
         if topic.is_some_and(|topic| topic != record.topic) {
             continue;

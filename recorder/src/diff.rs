@@ -55,7 +55,7 @@ pub fn first_difference(a: &Recording, b: &Recording) -> Result<Option<Differenc
     if a.bytes() == b.bytes() {
         return Ok(None);
     }
-    let (mut left, mut right) = (a.messages()?, b.messages()?);
+    let (mut left, mut right) = (a.messages(), b.messages());
     loop {
         match (left.next().transpose()?, right.next().transpose()?) {
             (None, None) => return container_difference(a, b).map(Some),
@@ -68,15 +68,15 @@ pub fn first_difference(a: &Recording, b: &Recording) -> Result<Option<Differenc
     }
 }
 
-fn same_message(x: &Record<'_>, y: &Record<'_>) -> bool {
+fn same_message(x: &Record, y: &Record) -> bool {
     (x.tick, x.time_ns, &x.topic, &x.cdr) == (y.tick, y.time_ns, &y.topic, &y.cdr)
 }
 
 fn field_difference(
     a: &Recording,
     b: &Recording,
-    x: &Record<'_>,
-    y: &Record<'_>,
+    x: &Record,
+    y: &Record,
 ) -> Result<Difference, RecordingError> {
     let difference = |field: &str, a, b| Difference::Field {
         tick: x.tick,
@@ -102,8 +102,8 @@ fn field_difference(
     })
 }
 
-fn message_difference(x: Option<&Record<'_>>, y: Option<&Record<'_>>) -> Difference {
-    let describe = |record: Option<&Record<'_>>| match record {
+fn message_difference(x: Option<&Record>, y: Option<&Record>) -> Difference {
+    let describe = |record: Option<&Record>| match record {
         Some(record) => format!("a message of {} at tick {}", record.topic, record.tick),
         None => "the end of the recording".to_owned(),
     };

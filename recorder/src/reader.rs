@@ -3,6 +3,8 @@
 use crate::definition::{Definition, Leaf};
 use crate::error::RecordingError;
 use mcap::Summary;
+use mcap::sans_io::linear_reader::LinearReaderOptions;
+use mcap::sans_io::{MessageReadEvent, MessageReader};
 use memmap2::Mmap;
 use std::collections::BTreeMap;
 use std::fs::File;
@@ -10,7 +12,7 @@ use std::path::{Path, PathBuf};
 
 /// A message of a recording.
 #[derive(Debug)]
-pub struct Record<'a> {
+pub struct Record {
     /// Tick at which it was sent.
     pub tick: u32,
     /// Simulation time in nanoseconds.
@@ -18,7 +20,7 @@ pub struct Record<'a> {
     /// Topic.
     pub topic: String,
     /// Encapsulation header and body.
-    pub cdr: std::borrow::Cow<'a, [u8]>,
+    pub cdr: Vec<u8>,
 }
 
 /// A topic of a recording.
@@ -51,8 +53,6 @@ impl Recording {
         // SAFETY: the mapping is read only, and our own writer never truncates a recording: it replaces the
         // file. Another program that truncates it meanwhile ends this one with SIGBUS.
         let bytes = unsafe { Mmap::map(&file) }.map_err(fail)?;
-        require_sane_sizes(&bytes)
-            .map_err(|reason| RecordingError::Content { path: path.to_owned(), reason })?;
         let summary = Summary::read(&bytes).map_err(|error| content(path, &error))?.ok_or_else(|| {
             RecordingError::Content { path: path.to_owned(), reason: "it has no summary section".to_owned() }
         })?;
@@ -89,30 +89,25 @@ impl Recording {
         })
     }
 
-    /// All messages in the order of the file: by tick, then by topic.
-    ///
-    /// # Errors
-    /// If the file is damaged.
-    pub fn messages(
-        &self,
-    ) -> Result<impl Iterator<Item = Result<Record<'_>, RecordingError>>, RecordingError> {
-        let stream = mcap::MessageStream::new(&self.bytes).map_err(|error| content(&self.path, &error))?;
-        Ok(stream.map(|message| {
+    /// All messages in the order of the file: by tick, then by topic. A damaged chunk is an error in front of any
+    /// of its messages.
+    pub fn messages(&self) -> impl Iterator<Item = Result<Record, RecordingError>> {
+        Messages::new(&self.bytes).map(|message| {
             let message = message.map_err(|error| content(&self.path, &error))?;
             Ok(Record {
                 tick: message.sequence,
                 time_ns: message.log_time,
                 topic: message.channel.topic.clone(),
-                cdr: message.data,
+                cdr: message.data.into_owned(),
             })
-        }))
+        })
     }
 
     /// The fields of a message.
     ///
     /// # Errors
     /// If it does not fit its definition.
-    pub fn decode(&self, record: &Record<'_>) -> Result<Vec<Leaf>, RecordingError> {
+    pub fn decode(&self, record: &Record) -> Result<Vec<Leaf>, RecordingError> {
         let topic = self.topic(&record.topic)?;
         topic.definition.decode(&record.cdr).map_err(|reason| RecordingError::Decode {
             topic: record.topic.clone(),
@@ -140,37 +135,41 @@ impl Recording {
     }
 }
 
-/// No chunk of a recording is larger when it is unpacked.
-const CHUNK_BYTES_MAX: u64 = 1 << 30;
-const MAGIC_BYTES: usize = 8;
-const RECORD_HEAD_BYTES: usize = 9;
-const OP_FOOTER: u8 = 0x02;
-const OP_CHUNK: u8 = 0x06;
+/// Longer records are refused before memory is taken for them: a damaged length must not ask for terabytes.
+const RECORD_BYTES_MAX: usize = 1 << 28;
 
-/// Refuses records that claim an absurd size: reading them would ask for that much memory at once.
-fn require_sane_sizes(bytes: &[u8]) -> Result<(), String> {
-    let mut at = MAGIC_BYTES;
-    loop {
-        let (operation, content) =
-            record(bytes, at).ok_or_else(|| format!("no whole record at byte {at}"))?;
-        // A chunk begins with its start time, its end time and its unpacked size.
-        let unpacked = content.get(16..).and_then(|content| content.first_chunk::<8>());
-        match (operation, unpacked.map(|unpacked| u64::from_le_bytes(*unpacked))) {
-            (OP_FOOTER, _) => return Ok(()),
-            (OP_CHUNK, Some(unpacked)) if unpacked > CHUNK_BYTES_MAX => {
-                return Err(format!("the chunk at byte {at} claims to unpack to {unpacked} bytes"));
-            }
-            _ => at += RECORD_HEAD_BYTES + content.len(),
-        }
+/// Feeds the bytes of a file to the reader of its messages.
+struct Messages<'a> {
+    reader: MessageReader,
+    rest: &'a [u8],
+}
+
+impl<'a> Messages<'a> {
+    fn new(bytes: &'a [u8]) -> Self {
+        let options = LinearReaderOptions::default()
+            .with_prevalidate_chunk_crcs(true)
+            .with_record_length_limit(RECORD_BYTES_MAX);
+        Self { reader: MessageReader::new_with_options(options), rest: bytes }
     }
 }
 
-/// The record at byte `at`: its operation code and its content.
-fn record(bytes: &[u8], at: usize) -> Option<(u8, &[u8])> {
-    let (&operation, rest) = bytes.get(at..)?.split_first()?;
-    let (length, rest) = rest.split_first_chunk::<8>()?;
-    let length = usize::try_from(u64::from_le_bytes(*length)).ok()?;
-    Some((operation, rest.get(..length)?))
+impl Iterator for Messages<'_> {
+    type Item = mcap::McapResult<mcap::Message<'static>>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        loop {
+            match self.reader.next_event()? {
+                Err(error) => return Some(Err(error)),
+                Ok(MessageReadEvent::Message(message)) => return Some(Ok(message)),
+                Ok(MessageReadEvent::ReadRequest(wanted)) => {
+                    let (next, rest) = self.rest.split_at(wanted.min(self.rest.len()));
+                    self.reader.insert(next.len()).copy_from_slice(next);
+                    self.reader.notify_read(next.len());
+                    self.rest = rest;
+                }
+            }
+        }
+    }
 }
 
 fn topics(summary: &Summary, path: &Path) -> Result<BTreeMap<String, Topic>, RecordingError> {

@@ -27,7 +27,7 @@ impl Recording {
     pub fn series(&self, fields: &[(&str, &str)]) -> Result<Vec<Series>, RecordingError> {
         fields.iter().try_for_each(|(topic, _)| self.topic(topic).map(|_| ()))?;
         let mut series = vec![Series::default(); fields.len()];
-        for record in self.messages()? {
+        for record in self.messages() {
             let record = record?;
             let wanted = |(topic, _): &(&str, &str)| record.topic == *topic;
             if !fields.iter().any(wanted) {

@@ -154,7 +154,7 @@ fn first_difference(a: &str, b: &str) -> (u32, String, String, [f64; 2]) {
     let of_tick = |path| rows(path, &topic).into_iter().find(|row| row.tick == tick).unwrap();
     let (left, right) = (of_tick(a), of_tick(b));
     let recording = open(a);
-    let record = recording.messages().unwrap().map(Result::unwrap).find(|record| record.topic == topic);
+    let record = recording.messages().map(Result::unwrap).find(|record| record.topic == topic);
     let leaves = recording.decode(&record.unwrap()).unwrap();
     let field = leaves.into_iter().map(|leaf| leaf.path).find(|path| left.get(path) != right.get(path));
     let field = field.unwrap();

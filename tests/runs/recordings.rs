@@ -26,8 +26,8 @@ pub fn open(path: &str) -> Recording {
 pub fn topics(path: &str) -> Topics {
     let recording = open(path);
     let mut topics: Topics = recording.topics().keys().map(|topic| (topic.clone(), Vec::new())).collect();
-    for record in recording.messages().unwrap().map(Result::unwrap) {
-        let message = Message { tick: record.tick, time_ns: record.time_ns, cdr: record.cdr.into_owned() };
+    for record in recording.messages().map(Result::unwrap) {
+        let message = Message { tick: record.tick, time_ns: record.time_ns, cdr: record.cdr };
         topics.get_mut(&record.topic).unwrap().push(message);
     }
     topics
@@ -64,7 +64,7 @@ impl Row {
 #[track_caller]
 pub fn rows(path: &str, topic: &str) -> Vec<Row> {
     let recording = open(path);
-    let records = recording.messages().unwrap().map(Result::unwrap);
+    let records = recording.messages().map(Result::unwrap);
     let number = |leaf: Leaf| leaf.value.as_f64().map(|number| (leaf.path, number));
     records
         .filter(|record| record.topic == topic)
