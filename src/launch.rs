@@ -299,13 +299,31 @@ fn describe_stall(control: &Control, plan: &Plan, stood: Duration) -> String {
     let waiting = match control.phase() {
         Phase::Announcing => format!("waiting for {} to join", names(Phase::Connecting)),
         Phase::Connecting => format!("waiting for {} to connect", names(Phase::Running)),
-        Phase::Running => {
-            let slowest = control.slowest_nodes();
-            let who = slowest.iter().map(|&node| format!("`{}`", plan.nodes[node].name)).collect::<Vec<_>>();
-            format!("tick {} is not completed by {}", control.completed_ticks(), who.join(", "))
-        }
+        Phase::Running => describe_stuck(control, plan),
     };
     format!("the run stood still for {} s: {waiting}; it was aborted", stood.as_secs())
+}
+
+/// Who is awake and does not come on, and which topics the others sleep for.
+fn describe_stuck(control: &Control, plan: &Plan) -> String {
+    let nodes = 0..plan.nodes.len();
+    let name = |node: usize| format!("`{}`", plan.nodes[node].name);
+    let is_awake = |node: &usize| {
+        control.awaited_topic(plan, *node).is_none()
+            && !control.awaits_grant(*node)
+            && !control.has_completed(*node)
+    };
+    let mut stuck: Vec<usize> = nodes.clone().filter(is_awake).collect();
+    if stuck.is_empty() {
+        stuck = control.slowest_nodes();
+    }
+    let tick = stuck.iter().map(|&node| control.completed_by(node)).min().unwrap_or(0);
+    let waiting = nodes.filter_map(|node| {
+        let topic = control.awaited_topic(plan, node)?;
+        Some(format!("; {} waits for {}", name(node), plan.topics[topic].name))
+    });
+    let stuck: Vec<String> = stuck.into_iter().map(name).collect();
+    format!("tick {tick} is not completed by {}{}", stuck.join(", "), waiting.collect::<String>())
 }
 
 fn take_down(processes: &mut Processes, control: &Control) -> Result<()> {

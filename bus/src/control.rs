@@ -391,6 +391,21 @@ impl Control {
         (0..self.nodes).filter(|node| Some(count(node)) == fewest).collect()
     }
 
+    /// The topic for which `node` sleeps; `None` for a node that computes, spins, or waits for its grant.
+    #[must_use]
+    pub fn awaited_topic(&self, plan: &Plan, node: usize) -> Option<usize> {
+        let first = plan.edges_before(node);
+        let sleeps = |index: usize| self.edge_word(Edge::Input(first + index)).load(SeqCst) != AWAKE;
+        let mut inputs = plan.nodes[node].inputs.iter().enumerate();
+        inputs.find(|(index, _)| sleeps(*index)).map(|(_, input)| input.topic)
+    }
+
+    /// Whether `node` sleeps until the clock grants its next tick.
+    #[must_use]
+    pub fn awaits_grant(&self, node: usize) -> bool {
+        self.edge_word(Edge::Grant(node)).load(SeqCst) != AWAKE
+    }
+
     /// Host time at which the first and the last tick was granted and completed, in nanoseconds of the
     /// monotonic clock; zero until then.
     #[must_use]

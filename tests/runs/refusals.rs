@@ -476,3 +476,34 @@ fn an_override_that_is_none() {
     set("process.plnat.cpu=1").says(&["process `plnat` needs either `kind` or `command`"]);
     set("=1");
 }
+
+#[test]
+fn a_recorder_that_would_leave_samples_out() {
+    let manifest = repository("manifests/hover.toml");
+    let delayed = "process.recorder.inputs.state={topic=\"/plant/state\",delay_ticks=1,initial={}}";
+    for setting in ["process.recorder.period_ticks=10", delayed] {
+        let ended = Place::new().call(&["check", &manifest, "--set", setting]).with_code(2);
+        ended.says(&["the recorder `recorder` would leave samples out"]);
+    }
+}
+
+#[test]
+fn a_comparison_without_a_limit_or_with_another_window_than_the_plant_has() {
+    let place = Place::new();
+    let flight = format!("process.player.data={}", place.write("flight.csv", crate::replay::flight()));
+    let manifest = repository("manifests/replay-nanobench.toml");
+    let set =
+        |words: &[&str]| place.call(&[&["check", &manifest, "--set", &flight], words].concat()).with_code(2);
+    let window = [
+        "--set",
+        "process.player.parameters.from_s=0.0",
+        "--set",
+        "process.plant-1s.parameters.window_s=0.2",
+    ];
+    set(&window).says(&["`window_s` is 1 s, but the plant behind /plant-1s/state is set every 0.2 s"]);
+    let text = std::fs::read_to_string(&manifest).unwrap().replace("../vehicles", &repository("vehicles"));
+    let lines: Vec<&str> = text.lines().filter(|line| !line.starts_with("max_")).collect();
+    let limitless = place.write("limitless.toml", lines.join("\n"));
+    let words = ["check", &limitless, "--set", &flight, "--set", "process.player.parameters.from_s=0.0"];
+    place.call(&words).with_code(2).says(&["the comparison has no limit, so it cannot fail"]);
+}
