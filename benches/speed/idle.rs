@@ -5,7 +5,7 @@ use std::path::Path;
 
 /// Prints the processor share of each process of a hover run at real time.
 pub fn report() -> Result<()> {
-    println!("\nhover.toml at real time for 10 s: processor share of one core");
+    println!("\nhover.toml at real time for 12 s: processor share of one core");
     let manifest = Path::new(env!("CARGO_MANIFEST_DIR")).join("manifests/hover.toml");
     let folder = tempfile::tempdir()?;
     let recording = folder.path().join("hover.mcap");
