@@ -230,3 +230,16 @@ fn a_node_without_a_launcher_says_how_to_start_it() {
     let ended = place.call(&["node", "plant"]).with_code(2);
     ended.says(&["started without one", "hummingbus run MANIFEST"]);
 }
+
+/// The example is built with the tests (`cargo test`, or `cargo build --examples` for this one alone).
+#[test]
+fn the_example_controller_flies_its_manifest_from_its_own_binary() {
+    let place = Place::new();
+    let folder = std::path::Path::new(env!("CARGO_BIN_EXE_hummingbus")).parent().unwrap();
+    let controller = folder.join("examples/custom_controller");
+    assert!(controller.exists(), "{} is not built: cargo build --examples", controller.display());
+    let manifest = repository("manifests/custom-controller.toml");
+    let command = format!("process.controller.command=[{:?}]", controller.display().to_string());
+    let words = ["run", &manifest, "--record", &place.path("custom.mcap"), "--set", &command];
+    place.call(&words).with_code(0).prints(&["ok     altitude within 2 %", "passed"]);
+}
