@@ -1,6 +1,7 @@
 //! What `check` and `schema` print.
 
-use crate::graph::{Graph, Program};
+use crate::graph::Graph;
+use crate::program::Executable;
 use bus::plan::{Pace, Plan, Wait};
 use std::fmt::Write as _;
 
@@ -20,9 +21,9 @@ pub fn graph(graph: &Graph) -> String {
         plan.seed
     );
     for (node, program) in plan.nodes.iter().zip(&graph.programs) {
-        let what = match program {
-            Program::Kind(kind) => kind.name.to_owned(),
-            Program::Command(words) => words.join(" "),
+        let what = match &program.executable {
+            Executable::Kind(kind) => kind.name.to_owned(),
+            Executable::Command(words) => words.join(" "),
         };
         let cpu = node.cpu.map_or(String::new(), |cpu| format!(", cpu {cpu}"));
         let wait = match node.wait {

@@ -5,6 +5,7 @@ use crate::kinds;
 use crate::manifest::{Comparison, InputSetting, Manifest, OutputSetting, PassCondition, Process};
 use crate::placement;
 use crate::problem::{Problem, nearest};
+use crate::program::{Executable, Program, Successor};
 use bus::kind::{Inputs, NodeKind, PortSpec};
 use bus::plan::{InputPlan, NodePlan, OutputPlan, Plan, TopicPlan};
 use bus::schema::Schema;
@@ -19,22 +20,6 @@ const DEFAULT_WINDOW_TICKS: u32 = 64;
 pub const WINDOW_TICKS_MAX: u32 = 4096;
 const RATE_HZ_MAX: u32 = 1_000_000;
 
-/// A process to start.
-#[derive(Debug)]
-pub enum Program {
-    /// A node of this binary.
-    Kind(&'static NodeKind),
-    /// Another executable and its arguments.
-    Command(Vec<String>),
-}
-
-impl Program {
-    /// Whether this is the built-in recorder.
-    pub fn is_recorder(&self) -> bool {
-        matches!(self, Self::Kind(kind) if kind.name == recorder::node::KIND.name)
-    }
-}
-
 /// A checked manifest.
 #[derive(Debug)]
 pub struct Graph {
@@ -42,6 +27,8 @@ pub struct Graph {
     pub plan: Plan,
     /// What to start, in the order of the plan's nodes.
     pub programs: Vec<Program>,
+    /// Who stands by or takes over, in the order in which they join.
+    pub successors: Vec<Successor>,
     /// The vehicle files the processes name, each once.
     pub vehicles: Vec<PathBuf>,
 }
@@ -98,7 +85,7 @@ impl Graph {
         require_one_recorder(manifest, &names, &programs)?;
         require_whole_recording(manifest, &names, &plan, &programs)?;
         check_evaluations(manifest, &plan, &programs)?;
-        Ok(Self { plan, programs, vehicles })
+        Ok(Self { plan, programs, successors: Vec::new(), vehicles })
     }
 }
 
@@ -114,10 +101,10 @@ fn program(manifest: &Manifest, name: &Spanned<String>, process: &Process) -> Re
             let message = format!("there is no kind `{}`", kind.get_ref());
             let kind =
                 kinds::find(kind.get_ref()).ok_or_else(|| manifest.problem(&kind.span(), message, help))?;
-            Ok(Program::Kind(kind))
+            Ok(Program::of(Executable::Kind(kind)))
         }
         (None, Some(command)) if !command.get_ref().is_empty() => {
-            Ok(Program::Command(command.get_ref().clone()))
+            Ok(Program::of(Executable::Command(command.get_ref().clone())))
         }
         (None, Some(command)) => Err(manifest.problem(
             &command.span(),
@@ -193,14 +180,16 @@ fn published_by(
     program: &Program,
 ) -> Result<Vec<Published>, Problem> {
     let period = period_ticks(manifest, process)?;
-    let declared: Vec<(&str, Option<&'static Schema>)> = match program {
-        Program::Kind(kind) => {
+    let declared: Vec<(&str, Option<&'static Schema>)> = match &program.executable {
+        Executable::Kind(kind) => {
             let names = process.outputs.keys().map(|port| (port.get_ref().as_str(), port.span()));
             require_known_ports(manifest, "output", name, kind.outputs, names)?;
             let is_on = |port: &&PortSpec| port.required || setting(process, port.name).is_some();
             kind.outputs.iter().filter(is_on).map(|port| (port.name, Some(port.schema))).collect()
         }
-        Program::Command(_) => process.outputs.keys().map(|port| (port.get_ref().as_str(), None)).collect(),
+        Executable::Command(_) => {
+            process.outputs.keys().map(|port| (port.get_ref().as_str(), None)).collect()
+        }
     };
     declared
         .into_iter()
@@ -308,7 +297,7 @@ fn inputs(
     program: &Program,
     topics: &[TopicPlan],
 ) -> Result<Vec<InputPlan>, Problem> {
-    if let Program::Kind(NodeKind { inputs: Inputs::Any, .. }) = program
+    if let Executable::Kind(NodeKind { inputs: Inputs::Any, .. }) = &program.executable
         && process.inputs.is_empty()
     {
         let all = topics.iter().enumerate();
@@ -320,7 +309,7 @@ fn inputs(
         };
         return Ok(all.map(port).collect());
     }
-    if let Program::Kind(NodeKind { inputs: Inputs::Ports(ports), .. }) = program {
+    if let Executable::Kind(NodeKind { inputs: Inputs::Ports(ports), .. }) = &program.executable {
         let used = process.inputs.keys().map(|port| (port.get_ref(), port.span()));
         require_known_ports(manifest, "input", name, ports, used)?;
         let is_wired = |port: &PortSpec| process.inputs.keys().any(|wired| wired.get_ref() == port.name);
@@ -360,7 +349,7 @@ fn input(
         let help = nearest(&setting.topic, known).map_or(list, |near| format!("did you mean {near}?"));
         return Err(at(format!("{who}: nobody publishes {}", setting.topic), help));
     };
-    if let Program::Kind(NodeKind { inputs: Inputs::Ports(ports), .. }) = program {
+    if let Executable::Kind(NodeKind { inputs: Inputs::Ports(ports), .. }) = &program.executable {
         let spec = ports.iter().find(|spec| spec.name == port.get_ref().as_str());
         let expected = spec.map_or("", |spec| spec.schema.type_name);
         let found = &topics[topic].type_name;
@@ -459,6 +448,8 @@ fn plan(manifest: &Manifest, topics: Vec<TopicPlan>, nodes: Vec<NodePlan>) -> Re
         window_ticks,
         pace: run.pace.0,
         clock_cpu: None,
+        profile: false,
+        lock_memory: false,
         topics,
         nodes,
     })
@@ -499,7 +490,7 @@ fn set_parameters(
         let parameters = serde_json::to_value(parameters).unwrap_or_default();
         if programs[index].is_recorder() {
             require_no_parameters(manifest, process)?;
-        } else if let Program::Kind(kind) = &programs[index] {
+        } else if let Executable::Kind(kind) = &programs[index].executable {
             let inputs: Vec<&str> = process.inputs.keys().map(|port| port.get_ref().as_str()).collect();
             (kind.check)(&parameters, &inputs)
                 .map_err(|reason| parameter_problem(manifest, names[index], process, &reason))?;

@@ -1,8 +1,9 @@
 //! Launching a run: starts its processes, watches them, and takes everything down again.
 #![allow(clippy::disallowed_methods, reason = "the launcher watches host time; it simulates nothing")]
 
-use crate::graph::{Graph, Program};
+use crate::graph::Graph;
 use crate::manifest::Manifest;
+use crate::program::Executable;
 use crate::progress::Progress;
 use crate::run_dir::RunDir;
 use anyhow::{Context, Result, bail};
@@ -107,13 +108,13 @@ impl Processes {
         clock.args(["node", "clock"]);
         let mut commands = vec![("clock".to_owned(), clock)];
         for (program, node) in graph.programs.iter().zip(&graph.plan.nodes) {
-            let mut command = match program {
-                Program::Kind(kind) => {
+            let mut command = match &program.executable {
+                Executable::Kind(kind) => {
                     let mut command = Command::new(&this_binary);
                     command.args(["node", kind.name]);
                     command
                 }
-                Program::Command(words) => {
+                Executable::Command(words) => {
                     let mut command = Command::new(executable(manifest, &words[0]));
                     command.args(&words[1..]);
                     command

@@ -9,12 +9,14 @@ mod launch;
 mod manifest;
 mod placement;
 mod problem;
+mod program;
 mod progress;
 mod run_dir;
 mod summary;
 
-use crate::graph::{Graph, Program};
+use crate::graph::Graph;
 use crate::manifest::{Manifest, PaceSetting};
+use crate::program::Program;
 use crate::summary::Summary;
 use anyhow::{Context, Result, bail};
 use bus::BusError;
@@ -143,10 +145,7 @@ fn run(arguments: &RunArguments) -> Result<bool> {
     }
     let mut graph = Graph::build(&manifest)?;
     let path = recording_path(&manifest, arguments.record.as_deref())?;
-    let has_recorder = graph
-        .programs
-        .iter()
-        .any(|program| matches!(program, Program::Kind(kind) if kind.name == "recorder"));
+    let has_recorder = graph.programs.iter().any(Program::is_recorder);
     let outcome = launch::fly(&manifest, &mut graph, &path, arguments.json)?;
     let (mut pass, mut compare) = (Vec::new(), Vec::new());
     // A run that was stopped has not flown what the conditions speak of.

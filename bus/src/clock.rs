@@ -26,14 +26,32 @@ pub(crate) fn serve(plan: &Plan, control: &Control) -> Result<(), BusError> {
     }
     let cpu_start_ns = process_cpu_ns();
     control.set_host_start();
-    let end = match plan.pace {
-        Pace::Free => clock.run_free(),
-        Pace::Factor(factor) => clock.run_paced(factor),
-    }?;
+    // By default the kernel may be 50 µs late to save power, a twentieth of a tick at 1 kHz.
+    let _ = rustix::thread::set_current_timer_slack(std::num::NonZeroU64::new(1));
+    let end = clock.run()?;
     clock.await_all(end)?;
     control.set_host_end();
     control.set_clock_cpu_ns(process_cpu_ns() - cpu_start_ns);
     Ok(())
+}
+
+/// The deadlines of a paced stretch of the run: from its start, or from the last hold or change of pace.
+struct Deadlines {
+    factor: f64,
+    first_tick: u32,
+    start_ns: u64,
+    granted_late: bool,
+}
+
+impl Deadlines {
+    fn new(first_tick: u32, factor: f64) -> Self {
+        Self { factor, first_tick, start_ns: monotonic_ns(), granted_late: false }
+    }
+
+    /// Host time at which `tick` is due: computed from the tick, so that it does not drift.
+    fn of(&self, tick: u32, tick_ns: u64) -> u64 {
+        self.start_ns.saturating_add(deadline_ns(tick - self.first_tick, tick_ns, self.factor))
+    }
 }
 
 struct Clock<'a> {
@@ -57,52 +75,66 @@ impl<'a> Clock<'a> {
         Ok(())
     }
 
-    /// Grants as far as the window reaches beyond the slowest node; returns the end tick.
-    fn run_free(&self) -> Result<u32, BusError> {
-        let window = self.plan.window_ticks.max(1);
-        // Granting half a window at a time lets fast nodes go on while the slowest catches up.
-        let stride = (window / 2).max(1);
+    /// Grants ticks until the run ends; returns the end tick.
+    fn run(&self) -> Result<u32, BusError> {
         let mut granted = 0;
+        let mut deadlines: Option<Deadlines> = None;
         loop {
             let end = self.end_after(granted);
             if granted >= end {
                 return Ok(end);
             }
-            let target = end.min(self.slowest().saturating_add(window)).max(granted);
-            self.grant(target);
-            granted = target;
-            if granted < end {
-                self.await_all((granted + stride).saturating_sub(window))?;
+            if self.control.hold_tick() <= granted {
+                self.await_all(granted)?;
+                self.control.hold(granted, || self.is_stop_asked_for());
+                deadlines = None;
+                continue;
             }
+            granted = match self.control.pace() {
+                Pace::Free => {
+                    deadlines = None;
+                    self.grant_window(granted, end)?
+                }
+                Pace::Factor(factor) => {
+                    let kept = deadlines.take().filter(|kept| kept.factor == factor);
+                    let deadlines = deadlines.insert(kept.unwrap_or_else(|| Deadlines::new(granted, factor)));
+                    self.grant_at_deadline(granted, deadlines)?
+                }
+            };
         }
     }
 
-    /// Grants one tick per deadline; returns the end tick.
-    fn run_paced(&self, factor: f64) -> Result<u32, BusError> {
-        // By default the kernel may be 50 µs late to save power, a twentieth of a tick at 1 kHz.
-        let _ = rustix::thread::set_current_timer_slack(std::num::NonZeroU64::new(1));
-        let start_ns = monotonic_ns();
-        let tick_host_ns = deadline_ns(1, self.plan.tick_ns, factor);
-        let mut granted_late = false;
-        for tick in 0..self.plan.duration_ticks {
-            let deadline_ns = start_ns.saturating_add(deadline_ns(tick, self.plan.tick_ns, factor));
-            self.sleep_until(deadline_ns);
-            let end = self.end_after(tick);
-            if tick >= end {
-                return Ok(end);
-            }
-            // A tick that was itself granted late says nothing about the nodes.
-            if !granted_late {
-                self.note_late_nodes(tick);
-            }
-            self.await_all((tick + 1).saturating_sub(self.plan.window_ticks.max(1)))?;
-            granted_late = monotonic_ns() > deadline_ns.saturating_add(tick_host_ns);
-            if granted_late {
-                self.control.count_missed_deadline(std::iter::empty());
-            }
-            self.grant(tick + 1);
+    /// Grants as far as the window reaches beyond the slowest node; returns what is granted then.
+    fn grant_window(&self, granted: u32, end: u32) -> Result<u32, BusError> {
+        let window = self.plan.window_ticks.max(1);
+        // Granting half a window at a time lets fast nodes go on while the slowest catches up.
+        let stride = (window / 2).max(1);
+        let limit = end.min(self.control.hold_tick());
+        let target = limit.min(self.slowest().saturating_add(window)).max(granted);
+        self.grant(target);
+        if target < limit {
+            self.await_all((target + stride).saturating_sub(window))?;
         }
-        Ok(self.plan.duration_ticks)
+        Ok(target)
+    }
+
+    /// Grants tick `tick` at its deadline; returns what is granted then: `tick` itself if a stop came first.
+    fn grant_at_deadline(&self, tick: u32, deadlines: &mut Deadlines) -> Result<u32, BusError> {
+        let deadline_ns = deadlines.of(tick, self.plan.tick_ns);
+        if !self.sleep_until(tick, deadline_ns, deadlines.factor) {
+            return Ok(tick);
+        }
+        // A tick that was itself granted late says nothing about the nodes.
+        if !deadlines.granted_late {
+            self.note_late_nodes(tick);
+        }
+        self.await_all((tick + 1).saturating_sub(self.plan.window_ticks.max(1)))?;
+        deadlines.granted_late = monotonic_ns() > deadlines.of(tick + 1, self.plan.tick_ns);
+        if deadlines.granted_late {
+            self.control.count_missed_deadline(std::iter::empty());
+        }
+        self.grant(tick + 1);
+        Ok(tick + 1)
     }
 
     /// The end tick, moved to `granted` if a stop was asked for.
@@ -113,12 +145,19 @@ impl<'a> Clock<'a> {
         self.control.end_tick()
     }
 
-    /// Sleeps until `deadline_ns`, or until a stop is asked for, which at a slow pace comes long before.
-    fn sleep_until(&self, deadline_ns: u64) {
-        while !self.is_stop_asked_for() {
+    /// Sleeps until `deadline_ns`; false if a stop, a hold or another pace was asked for, which at a slow pace
+    /// comes long before.
+    fn sleep_until(&self, tick: u32, deadline_ns: u64, factor: f64) -> bool {
+        loop {
+            if self.is_stop_asked_for()
+                || self.control.hold_tick() <= tick
+                || self.control.pace() != Pace::Factor(factor)
+            {
+                return false;
+            }
             let now_ns = monotonic_ns();
             if now_ns >= deadline_ns {
-                return;
+                return true;
             }
             sleep_to(deadline_ns.min(now_ns + NAP_NS_MAX));
         }
@@ -160,10 +199,10 @@ fn reached(waited: Waited) -> Result<(), BusError> {
     if waited == Waited::Reached { Ok(()) } else { Err(BusError::Aborted) }
 }
 
-/// Host time of tick `tick` after the start: computed from the tick, so that it does not drift.
+/// Host time that `ticks` ticks take at `factor` simulated seconds per second.
 #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a run lasts less than 584 years")]
-fn deadline_ns(tick: u32, tick_ns: u64, factor: f64) -> u64 {
-    ((u64::from(tick) * tick_ns) as f64 / factor) as u64
+fn deadline_ns(ticks: u32, tick_ns: u64, factor: f64) -> u64 {
+    ((u64::from(ticks) * tick_ns) as f64 / factor) as u64
 }
 
 #[allow(clippy::cast_possible_wrap, reason = "monotonic time fits 63 bits")]

@@ -7,7 +7,7 @@
 //! for a reader that is awake.
 
 use crate::error::BusError;
-use crate::plan::{Plan, Wait};
+use crate::plan::{Pace, Plan, Wait};
 use memmap2::MmapRaw;
 use rustix::thread::futex;
 use std::path::{Path, PathBuf};
@@ -17,6 +17,10 @@ const SLOT_BYTES: usize = 64;
 const MAGIC: u32 = 0x4855_4d35;
 /// The value of an edge on which nobody sleeps.
 const AWAKE: u32 = u32::MAX;
+/// What stands in the place of the tick of a hold while the clock runs.
+const NOT_HELD: u32 = u32::MAX;
+/// How long the clock sleeps in a hold before it looks whether the run was stopped.
+const HOLD_NAP: rustix::time::Timespec = rustix::time::Timespec { tv_sec: 0, tv_nsec: 100_000_000 };
 /// How long a reader with `wait = "adaptive"` polls before it sleeps: about five context switches.
 const ADAPTIVE_SPIN_NS: u64 = 10_000;
 /// Polls between two looks at the clock or two yields.
@@ -106,6 +110,9 @@ impl Control {
         let control = Self::map(plan, &file).map_err(fail)?;
         control.word(0, 0).store(MAGIC, SeqCst);
         control.word(0, 2).store(plan.duration_ticks, SeqCst);
+        control.set_pace(plan.pace);
+        control.set_hold_tick(u32::MAX);
+        control.word(1, 3).store(NOT_HELD, SeqCst);
         (0..control.edge_slots()).for_each(|edge| control.edge_at(edge).store(AWAKE, SeqCst));
         Ok(control)
     }
@@ -343,6 +350,74 @@ impl Control {
         self.word(0, 4).load(SeqCst) != 0
     }
 
+    /// The tick boundary at which the clock waits: no tick from it on is granted.
+    #[must_use]
+    pub fn hold_tick(&self) -> u32 {
+        self.word(1, 2).load(SeqCst)
+    }
+
+    /// Has the clock wait at the boundary before `tick`, or where it is if it has come further; `u32::MAX`
+    /// lets it run.
+    pub fn set_hold_tick(&self, tick: u32) {
+        self.word(1, 2).store(tick, SeqCst);
+        wake_all(self.word(1, 2));
+    }
+
+    /// The boundary at which the clock waits now: every node has completed the ticks before it, and none
+    /// has begun the next.
+    #[must_use]
+    pub fn held_at(&self) -> Option<u32> {
+        Some(self.word(1, 3).load(SeqCst)).filter(|&tick| tick != NOT_HELD)
+    }
+
+    /// Waits in the hold at `tick` until it is lifted or the run is stopped.
+    pub(crate) fn hold(&self, tick: u32, is_over: impl Fn() -> bool) {
+        self.word(1, 3).store(tick, SeqCst);
+        self.tell_supervisor();
+        loop {
+            let hold_tick = self.hold_tick();
+            if hold_tick > tick || self.is_aborted() || is_over() {
+                break;
+            }
+            let _ = futex::wait(self.word(1, 2), futex::Flags::empty(), hold_tick, Some(&HOLD_NAP));
+        }
+        self.word(1, 3).store(NOT_HELD, SeqCst);
+    }
+
+    /// The pace at which the clock grants ticks.
+    #[must_use]
+    pub fn pace(&self) -> Pace {
+        let factor = f64::from_bits(self.double_word(1, 2).load(SeqCst));
+        if factor > 0.0 { Pace::Factor(factor) } else { Pace::Free }
+    }
+
+    /// Changes the pace; the clock follows at its next grant.
+    pub fn set_pace(&self, pace: Pace) {
+        let factor = if let Pace::Factor(factor) = pace { factor } else { 0.0 };
+        self.double_word(1, 2).store(factor.to_bits(), SeqCst);
+    }
+
+    /// Wakes the supervisor, which looks at the run.
+    pub(crate) fn tell_supervisor(&self) {
+        self.word(1, 7).fetch_add(1, SeqCst);
+        wake_all(self.word(1, 7));
+    }
+
+    /// The count of what the supervisor was told: to be read before a look at the run, and waited on after it.
+    #[must_use]
+    pub fn news(&self) -> u32 {
+        self.word(1, 7).load(SeqCst)
+    }
+
+    /// Sleeps until there is something to look at since `news`, at most `timeout`.
+    pub fn await_news(&self, news: u32, timeout: std::time::Duration) {
+        let timeout = rustix::time::Timespec {
+            tv_sec: i64::try_from(timeout.as_secs()).unwrap_or(i64::MAX),
+            tv_nsec: timeout.subsec_nanos().into(),
+        };
+        let _ = futex::wait(self.word(1, 7), futex::Flags::empty(), news, Some(&timeout));
+    }
+
     /// Deadlines that were missed: a node had not finished the tick before, or the clock itself was more than
     /// a tick late.
     #[must_use]
@@ -509,6 +584,8 @@ mod tests {
             window_ticks: 1,
             pace: Pace::Free,
             clock_cpu: None,
+            profile: false,
+            lock_memory: false,
             topics: vec![topic],
             nodes: vec![node],
         }

@@ -563,6 +563,8 @@ mod tests {
             window_ticks: 64,
             pace: Pace::Free,
             clock_cpu: None,
+            profile: false,
+            lock_memory: false,
             topics: vec![topic],
             nodes: vec![node("source", vec![], vec![output]), node("sink", vec![input], vec![])],
         }

@@ -96,6 +96,12 @@ pub struct Plan {
     pub pace: Pace,
     /// Core of the clock service.
     pub clock_cpu: Option<usize>,
+    /// Whether every process notes the host times of its ticks.
+    #[serde(default)]
+    pub profile: bool,
+    /// Whether every process keeps its memory from being paged out.
+    #[serde(default)]
+    pub lock_memory: bool,
     /// Topics.
     pub topics: Vec<TopicPlan>,
     /// Nodes.

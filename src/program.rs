@@ -1,0 +1,91 @@
+//! What the supervisor starts: the executable behind a node, how it runs on the host, and what follows its end.
+
+use bus::kind::NodeKind;
+use bus::plan::NodePlan;
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+use std::time::Duration;
+
+/// How long a run may stand still because of one process where the manifest does not say. A tick takes
+/// microseconds.
+pub const WATCHDOG: Duration = Duration::from_secs(20);
+
+/// An executable behind a node.
+#[derive(Clone, Debug)]
+pub enum Executable {
+    /// A node of this binary.
+    Kind(&'static NodeKind),
+    /// Another executable and its arguments.
+    Command(Vec<String>),
+}
+
+/// What follows when a process ends before the run does.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum OnExit {
+    /// The run is aborted.
+    #[default]
+    Stop,
+    /// Another process is started in its place, and the clock holds the tick until it has joined.
+    Restart,
+    /// A process that shadows it from the start is promoted.
+    Standby,
+}
+
+/// A process to start.
+#[derive(Clone, Debug)]
+pub struct Program {
+    /// What is executed.
+    pub executable: Executable,
+    /// Environment variables beside the launcher's own.
+    pub environment: BTreeMap<String, String>,
+    /// Working directory; the launcher's where absent.
+    pub working_directory: Option<PathBuf>,
+    /// Niceness, -20 to 19.
+    pub nice: Option<i32>,
+    /// Priority under SCHED_FIFO, 1 to 99.
+    pub realtime_priority: Option<i32>,
+    /// What follows its end.
+    pub on_exit: OnExit,
+    /// How long the run may stand still because of it.
+    pub watchdog: Duration,
+    /// Where its standard output and error go; into the run directory where absent.
+    pub log: Option<PathBuf>,
+}
+
+impl Program {
+    /// A process with nothing set but what it executes.
+    pub fn of(executable: Executable) -> Self {
+        Self {
+            executable,
+            environment: BTreeMap::new(),
+            working_directory: None,
+            nice: None,
+            realtime_priority: None,
+            on_exit: OnExit::Stop,
+            watchdog: WATCHDOG,
+            log: None,
+        }
+    }
+
+    /// Whether this is the built-in recorder.
+    pub fn is_recorder(&self) -> bool {
+        matches!(self.executable, Executable::Kind(kind) if kind.name == recorder::node::KIND.name)
+    }
+}
+
+/// A process that shadows a node, and takes over from it when its time comes.
+#[derive(Clone, Debug)]
+pub struct Successor {
+    /// Index of the node in the plan.
+    pub node: usize,
+    /// The tick from which on it computes.
+    pub join_tick: u32,
+    /// The tick from which on its outputs count; `None` for one that only shadows or stands by.
+    pub take_over_tick: Option<u32>,
+    /// Whether it is promoted when the active process dies.
+    pub is_standby: bool,
+    /// What to start.
+    pub program: Program,
+    /// What it reads about itself: the node's own plan with the successor's parameters and inputs.
+    pub plan: NodePlan,
+}
