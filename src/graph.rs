@@ -68,6 +68,7 @@ impl Graph {
             let inputs = inputs(manifest, name, process, &programs[index], &topics)?;
             let outputs = outputs(&published, index);
             nodes.push(NodePlan {
+                restarts: false,
                 name: name.get_ref().clone(),
                 period_ticks: period_ticks(manifest, process)?,
                 wait: process.wait.unwrap_or_default(),

@@ -9,10 +9,14 @@ mod launch;
 mod manifest;
 mod placement;
 mod problem;
+mod processes;
 mod program;
 mod progress;
 mod run_dir;
+mod stall;
+mod succession;
 mod summary;
+mod supervisor;
 
 use crate::graph::Graph;
 use crate::manifest::{Manifest, PaceSetting};

@@ -1,8 +1,8 @@
 //! The clock service: leads the processes of a run through the ready barrier and grants their ticks.
 
-use crate::control::{Control, Edge, Phase, Waited, Word, monotonic_ns, process_cpu_ns};
+use crate::control::{Control, Edge, Phase, Seat, Waited, Word, monotonic_ns, process_cpu_ns};
 use crate::error::BusError;
-use crate::plan::{Pace, Plan, Wait};
+use crate::plan::{Pace, Plan, SEATS, Wait};
 use rustix::thread::clock_nanosleep_absolute;
 
 /// How long the clock sleeps at most before it looks whether a stop was asked for.
@@ -62,7 +62,7 @@ struct Clock<'a> {
 
 impl<'a> Clock<'a> {
     fn new(plan: &'a Plan, control: &'a Control) -> Self {
-        let grant_edges = (0..plan.nodes.len()).map(Edge::Grant).collect();
+        let grant_edges = (0..SEATS * plan.nodes.len()).map(Edge::Grant).collect();
         Self { plan, control, grant_edges }
     }
 
@@ -175,22 +175,34 @@ impl<'a> Clock<'a> {
     }
 
     fn slowest(&self) -> u32 {
-        let counts = (0..self.plan.nodes.len()).map(|node| self.control.count(Word::Done(node)));
-        counts.min().unwrap_or(u32::MAX)
+        self.control
+            .computing()
+            .map(|member| self.control.count(Word::Done(member)))
+            .min()
+            .unwrap_or(u32::MAX)
     }
 
-    /// Waits until every node has completed `ticks` ticks.
+    /// Waits until every member has completed `ticks` ticks.
     fn await_all(&self, ticks: u32) -> Result<(), BusError> {
-        for node in 0..self.plan.nodes.len() {
-            reached(self.control.wait(Word::Done(node), ticks, Edge::Done(node), Wait::Block, |_| false))?;
+        let late = |member: &usize| self.control.count(Word::Done(*member)) < ticks;
+        while let Some(member) = self.control.computing().find(late) {
+            // A member that died is replaced, or leaves: then it is another's turn to be waited for.
+            let epoch = self.control.epoch();
+            let has_left =
+                |control: &Control| control.epoch() != epoch || control.seat(member) != Seat::Taken;
+            let waited =
+                self.control.wait(Word::Done(member), ticks, Edge::Done(member), Wait::Block, has_left);
+            if waited == Waited::Over && self.control.is_aborted() {
+                return Err(BusError::Aborted);
+            }
         }
         Ok(())
     }
 
     fn note_late_nodes(&self, tick: u32) {
-        let late = |node: &usize| self.control.count(Word::Done(*node)) < tick;
-        if (0..self.plan.nodes.len()).any(|node| late(&node)) {
-            self.control.count_missed_deadline((0..self.plan.nodes.len()).filter(late));
+        let late = |member: &usize| self.control.count(Word::Done(*member)) < tick;
+        if self.control.computing().any(|member| late(&member)) {
+            self.control.count_missed_deadline(self.control.computing().filter(late));
         }
     }
 }

@@ -5,8 +5,10 @@ extern crate self as bus;
 
 pub mod announcement;
 pub mod clock;
+mod connected;
 pub mod control;
 pub mod error;
+pub mod handover;
 pub mod initial;
 pub mod kind;
 pub mod message;
@@ -16,13 +18,18 @@ pub mod plan;
 mod port;
 pub mod process;
 pub mod random;
+pub mod roster;
 pub mod schema;
+mod tick;
 mod transport;
 
 pub use bus_derive::Message;
+pub use connected::ConnectedNode;
 pub use error::BusError;
 pub use message::Message;
-pub use node::{ConnectedNode, Input, NODE_VARIABLE, Node, Output, RawInput, Tick};
+pub use node::{GENERATION_VARIABLE, Input, NODE_VARIABLE, Node, Output, RawInput};
+pub use tick::Tick;
+pub use transport::reap_dead;
 
 #[doc(hidden)]
 pub mod __private {

@@ -96,3 +96,10 @@ pub fn allowed_cores() -> Vec<usize> {
 pub fn user_id() -> u32 {
     rustix::process::getuid().as_raw()
 }
+
+/// A signal as people know it, such as `signal 9 (SIGKILL)`.
+#[must_use]
+pub fn signal_name(signal: i32) -> String {
+    let name = signal_hook::low_level::signal_name(signal);
+    name.map_or_else(|| format!("signal {signal}"), |name| format!("signal {signal} ({name})"))
+}

@@ -6,11 +6,13 @@
 use crate::control::shm_prefix;
 use crate::error::BusError;
 use crate::message::{ENCAPSULATION_WORD, sample_words};
+use iceoryx2::node::NodeState;
 use iceoryx2::port::publisher::Publisher;
 use iceoryx2::port::subscriber::Subscriber;
+use iceoryx2::port::update_connections::UpdateConnections as _;
 use iceoryx2::prelude::{
-    BackpressureStrategy, Config, FileName, LogLevel, NodeBuilder, Path as IoxPath, SemanticString,
-    ServiceName, SignalHandlingMode, ZeroCopySend, ipc, set_log_level,
+    BackpressureStrategy, CallbackProgression, Config, FileName, LogLevel, NodeBuilder, Path as IoxPath,
+    SemanticString, ServiceName, SignalHandlingMode, ZeroCopySend, ipc, set_log_level,
 };
 use iceoryx2::sample::Sample;
 use iceoryx2::sample_mut::SampleMut;
@@ -21,7 +23,7 @@ type Service = ipc::Service;
 type Factory = PortFactory<Service, [u64], SampleHeader>;
 type Iceoryx2Node = iceoryx2::node::Node<Service>;
 
-/// Samples a subscriber holds at a time: the the current one and the one that replaces it.
+/// Samples a subscriber holds at a time: the current one and the one that replaces it.
 const BORROWED_SAMPLES: usize = 2;
 
 /// What travels beside a sample: its place in the run, and host times that no recording holds.
@@ -52,30 +54,56 @@ pub(crate) struct Transport {
 pub(crate) struct Capacity {
     /// Samples that wait in a subscriber's queue at most.
     pub(crate) queued_samples: usize,
+    /// Samples that a publisher keeps for a subscriber that joins later.
+    pub(crate) history_samples: usize,
     /// Subscribers of the topic.
     pub(crate) subscribers: usize,
     /// Processes of the run.
     pub(crate) nodes: usize,
 }
 
+/// The configuration of the run `run_id`, whose directory is `run_dir`; the error is iceoryx2's.
+fn config(run_dir: &Path, run_id: &str) -> Result<Config, String> {
+    set_log_level(LogLevel::Error);
+    let root = run_dir.join("iceoryx2");
+    let mut config = Config::default();
+    config.global.set_root_path(
+        &IoxPath::new(root.as_os_str().as_encoded_bytes()).map_err(|error| format!("{root:?}: {error:?}"))?,
+    );
+    config.global.prefix =
+        FileName::new(shm_prefix(run_id).as_bytes()).map_err(|error| format!("{error:?}"))?;
+    // Dead processes are the launcher's business; looking for them here would only slow the start.
+    config.global.node.cleanup_dead_nodes_on_creation = false;
+    config.global.node.cleanup_dead_nodes_on_destruction = false;
+    config.global.service.cleanup_dead_nodes_on_open = false;
+    Ok(config)
+}
+
+/// Gives back what dead processes of the run hold: their ports and their shared memory.
+///
+/// # Errors
+/// iceoryx2's words.
+pub fn reap_dead(run_dir: &Path, run_id: &str) -> Result<(), String> {
+    let config = config(run_dir, run_id)?;
+    let mut failure = None;
+    iceoryx2::node::Node::<Service>::list(&config, |state| {
+        if let NodeState::Dead(view) = state
+            && let Err(error) = view.try_remove_stale_resources()
+        {
+            failure = Some(format!("{error:?}"));
+        }
+        CallbackProgression::Continue
+    })
+    .map_err(|error| format!("{error:?}"))?;
+    failure.map_or(Ok(()), Err)
+}
+
 impl Transport {
     /// Connects node `node_name` to the run `run_id`, whose directory is `run_dir`.
     pub(crate) fn new(run_dir: &Path, run_id: &str, node_name: &str) -> Result<Self, BusError> {
-        set_log_level(LogLevel::Error);
         let fail =
             |reason: String| transport_error(node_name, "joining the shared memory of the run", reason);
-        let root = run_dir.join("iceoryx2");
-        let mut config = Config::default();
-        config.global.set_root_path(
-            &IoxPath::new(root.as_os_str().as_encoded_bytes())
-                .map_err(|error| fail(format!("{root:?}: {error:?}")))?,
-        );
-        config.global.prefix =
-            FileName::new(shm_prefix(run_id).as_bytes()).map_err(|e| fail(format!("{e:?}")))?;
-        // Dead processes are the launcher's business; looking for them here would only slow the start.
-        config.global.node.cleanup_dead_nodes_on_creation = false;
-        config.global.node.cleanup_dead_nodes_on_destruction = false;
-        config.global.service.cleanup_dead_nodes_on_open = false;
+        let config = config(run_dir, run_id).map_err(fail)?;
         let node = NodeBuilder::new()
             .config(&config)
             .signal_handling_mode(SignalHandlingMode::Disabled)
@@ -84,19 +112,22 @@ impl Transport {
         Ok(Self { node, node_name: node_name.to_owned() })
     }
 
-    fn service(&self, topic: &str, capacity: Capacity) -> Result<Factory, BusError> {
+    /// The service of a topic's samples from one generation of its publisher. Each generation has its own:
+    /// who reads the topic knows for each tick whose sample counts.
+    fn service(&self, topic: &str, generation: u32, capacity: Capacity) -> Result<Factory, BusError> {
         let fail =
             |reason: String| transport_error(&self.node_name, &format!("opening topic {topic}"), reason);
-        let name = ServiceName::new(topic).map_err(|error| fail(format!("{error:?}")))?;
+        let name =
+            ServiceName::new(&format!("{topic}@{generation}")).map_err(|error| fail(format!("{error:?}")))?;
         self.node
             .service_builder(&name)
             .publish_subscribe::<[u64]>()
             .user_header::<SampleHeader>()
-            // Nothing may be lost: a full queue must hold its sender up, not overwrite.
+            // Nothing may be overwritten. The window keeps queues of living readers from running full.
             .enable_safe_overflow(false)
             .subscriber_max_buffer_size(capacity.queued_samples)
             .subscriber_max_borrowed_samples(BORROWED_SAMPLES)
-            .history_size(0)
+            .history_size(capacity.history_samples)
             .max_publishers(1)
             .max_subscribers(capacity.subscribers.max(1))
             .max_nodes(capacity.nodes)
@@ -105,13 +136,21 @@ impl Transport {
     }
 
     /// Creates the publisher of `topic`, whose messages have `size` bytes.
-    pub(crate) fn publisher(&self, topic: &str, size: usize, capacity: Capacity) -> Result<Sender, BusError> {
+    pub(crate) fn publisher(
+        &self,
+        topic: &str,
+        generation: u32,
+        size: usize,
+        capacity: Capacity,
+    ) -> Result<Sender, BusError> {
         let publisher = self
-            .service(topic, capacity)?
+            .service(topic, generation, capacity)?
             .publisher_builder()
             .initial_max_slice_len(sample_words(size))
             .max_loaned_samples(1)
-            .backpressure_strategy(BackpressureStrategy::RetryUntilDelivered)
+            // Only the queue of a reader that died or hangs can be full: nobody may wait for it. A living
+            // reader that lost a sample would miss its sequence number and stop the run.
+            .backpressure_strategy(BackpressureStrategy::DiscardData)
             .create()
             .map_err(|error| {
                 transport_error(
@@ -124,9 +163,14 @@ impl Transport {
     }
 
     /// Creates a subscriber of `topic`.
-    pub(crate) fn subscriber(&self, topic: &str, capacity: Capacity) -> Result<Receiver, BusError> {
+    pub(crate) fn subscriber(
+        &self,
+        topic: &str,
+        generation: u32,
+        capacity: Capacity,
+    ) -> Result<Receiver, BusError> {
         let subscriber = self
-            .service(topic, capacity)?
+            .service(topic, generation, capacity)?
             .subscriber_builder()
             .buffer_size(capacity.queued_samples)
             .create()
@@ -153,6 +197,11 @@ pub(crate) struct Sender {
 }
 
 impl Sender {
+    /// Meets the subscribers that have come, and hands them the history.
+    pub(crate) fn meet_subscribers(&self) -> Result<(), String> {
+        self.publisher.update_connections().map_err(|error| format!("{error:?}"))
+    }
+
     /// Takes a sample to write into; it may hold the bytes of an earlier sample.
     pub(crate) fn loan(&self) -> Result<Loan, String> {
         let sample = self.publisher.loan_slice_uninit(self.words).map_err(|error| format!("{error:?}"))?;
