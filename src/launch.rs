@@ -277,12 +277,11 @@ impl Supervisor<'_> {
     }
 
     fn refuse(&mut self, node: usize, reason: String) -> Result<()> {
-        let name = &self.plan.nodes[node].name;
         let vacant = self.successions.is_vacant(node);
-        self.progress.say(&format!(
-            "the successor of `{name}` was refused: {reason}\n`{name}` {}",
-            if vacant { "has no process left" } else { "flies on" }
-        ));
+        if !vacant {
+            let name = &self.plan.nodes[node].name;
+            self.progress.say(&format!("the successor of `{name}` was refused: {reason}\n`{name}` flies on"));
+        }
         self.successions.refuse(node, reason.clone(), &mut self.processes)?;
         if vacant {
             let ticks = self.control.completed_ticks();

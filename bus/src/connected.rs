@@ -199,8 +199,10 @@ impl ConnectedNode {
         let cpu_start_ns = process_cpu_ns();
         let period = self.links.node.period_ticks;
         let mut tick = self.first_tick;
-        self.state_state(tick, state);
         while self.await_tick(tick, state)? {
+            if tick == self.first_tick {
+                self.state_state(tick, state);
+            }
             self.compute(tick, state, &mut step)?;
             tick += period;
             self.links.control.advance(Word::Done(member), tick, &self.links.done_edges());
@@ -216,7 +218,8 @@ impl ConnectedNode {
         if let Some(ring) = &self.stated {
             ring.store(tick, state);
             let links = &self.links;
-            links.control.advance(Word::State(links.member()), tick, &[Edge::Partner(links.partner())]);
+            // A count of zero is no state.
+            links.control.advance(Word::State(links.member()), tick + 1, &[Edge::Partner(links.partner())]);
         }
     }
 
@@ -233,6 +236,8 @@ impl ConnectedNode {
                 self.await_needs(tick, state)?
             };
             match awaited {
+                // Who counts a promoted process's samples as there sees the change that promoted it, too.
+                Await::Tick if self.links.control.epoch() != self.epoch => {}
                 Await::Tick => return Ok(true),
                 Await::End if self.links.control.is_aborted() => return Err(BusError::Aborted),
                 Await::End => return Ok(false),
@@ -284,7 +289,7 @@ impl ConnectedNode {
         }
         let (predecessor, edge) = (self.links.partner(), Edge::Partner(self.links.member()));
         if let Some(ring) = &self.handed {
-            let awaited = self.wait(Word::State(predecessor), tick, edge, tick);
+            let awaited = self.wait(Word::State(predecessor), tick + 1, edge, tick);
             if awaited != Await::Tick {
                 return Ok(awaited);
             }
@@ -477,8 +482,9 @@ impl Links {
             let receiver = self.subscriber(input.topic, successor.generation)?;
             let first_tick = if successor.shadows { successor.join_tick } else { take_over_tick };
             let period_ticks = self.plan.topics[input.topic].period_ticks;
-            // A reader that joined later than the shadow starts with its own first tick.
-            let source = Source::new(successor.generation, receiver, first_tick.max(tick), period_ticks);
+            // A reader that joined later than the shadow starts with what its own first tick reads.
+            let first_tick = first_tick.max(tick.saturating_sub(input.delay_ticks));
+            let source = Source::new(successor.generation, receiver, first_tick, period_ticks);
             input.set_successor(Some(source));
         }
         input.set_take_over_tick(take_over_tick);

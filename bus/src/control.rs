@@ -58,7 +58,7 @@ pub(crate) enum Word {
     Shadow(usize),
     /// Ticks that a member has completed.
     Done(usize),
-    /// The tick up to which a member has stated the state that it would hand over.
+    /// Ticks at whose start a member has stated the state that it would hand over.
     State(usize),
 }
 

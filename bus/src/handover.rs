@@ -13,7 +13,7 @@ use memmap2::MmapRaw;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 
-/// Bytes of the tick in front of each state.
+/// Bytes in front of each state: its tick plus one, so that memory that was never written holds none.
 const TICK_BYTES: usize = 8;
 
 /// The ring of one process.
@@ -80,7 +80,7 @@ impl StateRing {
     /// States `state` as that at the start of `tick`.
     pub(crate) fn store(&self, tick: u32, state: &[u8]) {
         let entry = self.entry(tick);
-        self.word(entry).store(u64::from(tick), Relaxed);
+        self.word(entry).store(u64::from(tick) + 1, Relaxed);
         for (index, bytes) in state.chunks(8).enumerate() {
             let mut word = [0; 8];
             word[..bytes.len()].copy_from_slice(bytes);
@@ -91,7 +91,7 @@ impl StateRing {
     /// Reads the state at the start of `tick`; false if the ring does not hold it.
     pub(crate) fn load(&self, tick: u32, state: &mut [u8]) -> bool {
         let entry = self.entry(tick);
-        if self.word(entry).load(Relaxed) != u64::from(tick) {
+        if self.word(entry).load(Relaxed) != u64::from(tick) + 1 {
             return false;
         }
         for (index, bytes) in state.chunks_mut(8).enumerate() {

@@ -233,6 +233,10 @@ impl Node {
         if self.plan.pace == Pace::Free {
             crate::process::wait_for_turn();
         }
+        if self.generation > 0 {
+            // Every topic is announced by then.
+            go_on(control.wait_phase(Phase::Connecting))?;
+        }
         let member = self.plan.member(self.index, self.generation);
         let transport = Transport::new(&self.run_dir, &self.plan.run_id, self.name())?;
         let outputs = self.connect_outputs(&transport)?;
