@@ -13,6 +13,7 @@ mod processes;
 mod program;
 mod progress;
 mod run_dir;
+mod shadow;
 mod stall;
 mod succession;
 mod summary;
@@ -21,7 +22,7 @@ mod supervisor;
 use crate::graph::Graph;
 use crate::manifest::{Manifest, PaceSetting};
 use crate::program::Program;
-use crate::summary::Summary;
+use crate::summary::{Judgement, Summary};
 use anyhow::{Context, Result, bail};
 use bus::BusError;
 use clap::{Args, Parser, Subcommand};
@@ -151,15 +152,19 @@ fn run(arguments: &RunArguments) -> Result<bool> {
     let path = recording_path(&manifest, arguments.record.as_deref())?;
     let has_recorder = graph.programs.iter().any(Program::is_recorder);
     let outcome = launch::fly(&manifest, &mut graph, &path, arguments.json)?;
-    let (mut pass, mut compare) = (Vec::new(), Vec::new());
-    // A run that was stopped has not flown what the conditions speak of.
-    if has_recorder && !outcome.was_stopped {
+    let mut judgement = Judgement::default();
+    if has_recorder {
         let recording = Recording::open(&path)?;
-        pass = judge::verdicts(&manifest.content, &recording)?;
-        compare = judge::window_errors(&manifest.content, &recording)?;
+        judgement.steps = shadow::steps(&recording, &graph.plan, &outcome.successions)?;
+        judgement.shadows = shadow::differences(&recording)?;
+        // A run that was stopped has not flown what the conditions speak of.
+        if !outcome.was_stopped {
+            judgement.pass = judge::verdicts(&manifest.content, &recording)?;
+            judgement.compare = judge::window_errors(&manifest.content, &recording)?;
+        }
     }
     let tick_s = graph.plan.tick_s();
-    let summary = Summary::new(manifest.name(), outcome, tick_s, has_recorder.then_some(path), pass, compare);
+    let summary = Summary::new(manifest.name(), outcome, tick_s, has_recorder.then_some(path), judgement);
     print_text(&if arguments.json { serde_json::to_string_pretty(&summary)? } else { summary.to_string() })?;
     Ok(summary.passed)
 }

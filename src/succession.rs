@@ -60,6 +60,7 @@ enum Join {
 struct Pending {
     successor: Successor,
     purpose: Purpose,
+    is_planned: bool,
     join: Join,
 }
 
@@ -96,6 +97,8 @@ pub struct Report {
     pub generation: u32,
     /// Why it joined.
     pub purpose: Purpose,
+    /// Whether the manifest or a request names it; a restart and the next standby come by themselves.
+    pub is_planned: bool,
     /// The first tick it computed.
     pub join_tick: Option<u32>,
     /// The first tick whose outputs were its own.
@@ -156,6 +159,7 @@ impl<'a> Successions<'a> {
                 (None, true) => Purpose::Standby,
                 (None, false) => Purpose::Shadow,
             },
+            is_planned: true,
             join: Join::At(successor.join_tick),
             successor: successor.clone(),
         });
@@ -168,7 +172,7 @@ impl<'a> Successions<'a> {
     /// `shadow_ticks`.
     pub fn request_swap(&mut self, successor: Successor, shadow_ticks: u32) {
         let join = Join::Next { shadow_ticks: Some(shadow_ticks) };
-        self.pending.push_back(Pending { successor, purpose: Purpose::Swap, join });
+        self.pending.push_back(Pending { successor, purpose: Purpose::Swap, is_planned: true, join });
     }
 
     /// Whether a successor of `node` waits or is on its way.
@@ -325,6 +329,7 @@ impl<'a> Successions<'a> {
             process: name.clone(),
             generation,
             purpose: pending.purpose,
+            is_planned: pending.is_planned,
             join_tick: None,
             take_over_tick: None,
             hand_over: None,
@@ -516,6 +521,7 @@ impl<'a> Successions<'a> {
             let pending = Pending {
                 successor: candidate.pending.successor,
                 purpose: Purpose::Standby,
+                is_planned: false,
                 join: Join::Next { shadow_ticks: None },
             };
             self.pending.push_back(pending);
@@ -577,7 +583,8 @@ impl<'a> Successions<'a> {
             plan: self.roster.nodes[node].active.plan.clone(),
         };
         self.seats[node].is_vacant = true;
-        self.start_candidate(Pending { successor, purpose: Purpose::Restart, join: Join::AtOnce }, processes)
+        let (purpose, join) = (Purpose::Restart, Join::AtOnce);
+        self.start_candidate(Pending { successor, purpose, is_planned: false, join }, processes)
     }
 
     /// Whether the active process of `node` is dead and somebody is on the way to its place.
