@@ -3,18 +3,15 @@
 
 use crate::graph::Graph;
 use crate::manifest::Manifest;
-use crate::program::Executable;
 use crate::progress::Progress;
 use crate::run_dir::RunDir;
+use crate::spawn::{self, Role};
 use anyhow::{Context, Result, bail};
-use bus::NODE_VARIABLE;
 use bus::control::{Control, Phase};
 use bus::plan::Plan;
-use bus::process::{LAUNCHER_VARIABLE, RUN_VARIABLE};
-use std::fs::File;
-use std::os::unix::process::{CommandExt, ExitStatusExt};
+use std::os::unix::process::ExitStatusExt;
 use std::path::{Path, PathBuf};
-use std::process::{Child, Command, ExitStatus, Stdio};
+use std::process::{Child, ExitStatus};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
@@ -77,6 +74,7 @@ fn prepare(manifest: &Manifest, graph: &mut Graph, recording: &Path, run_dir: &R
     std::fs::write(&manifest_copy, &manifest.recorded_text).context("cannot write the manifest's copy")?;
     let name = |path: &Path| path.file_name().unwrap_or_default().to_string_lossy().into_owned();
     let mut attachments = vec![(name(&manifest.path), manifest_copy)];
+    attachments.extend(manifest.included.iter().map(|path| (name(path), path.clone())));
     attachments.extend(graph.vehicles.iter().map(|path| (name(path), path.clone())));
     let attachments: Vec<_> =
         attachments.iter().map(|(name, path)| serde_json::json!({ "name": name, "path": path })).collect();
@@ -91,6 +89,8 @@ fn prepare(manifest: &Manifest, graph: &mut Graph, recording: &Path, run_dir: &R
 /// The processes of a run; dropping them kills those that still live.
 struct Processes {
     running: Vec<Process>,
+    /// Those that take no part in the ticks.
+    companions: Vec<Child>,
 }
 
 struct Process {
@@ -102,30 +102,20 @@ struct Process {
 
 impl Processes {
     fn start(manifest: &Manifest, graph: &Graph, run_dir: &Path) -> Result<Self> {
-        let this_binary = std::env::current_exe().context("cannot find this binary")?;
-        let mut processes = Self { running: Vec::new() };
-        let mut clock = Command::new(&this_binary);
-        clock.args(["node", "clock"]);
-        let mut commands = vec![("clock".to_owned(), clock)];
-        for (program, node) in graph.programs.iter().zip(&graph.plan.nodes) {
-            let mut command = match &program.executable {
-                Executable::Kind(kind) => {
-                    let mut command = Command::new(&this_binary);
-                    command.args(["node", kind.name]);
-                    command
-                }
-                Executable::Command(words) => {
-                    let mut command = Command::new(executable(manifest, &words[0]));
-                    command.args(&words[1..]);
-                    command
-                }
+        let mut processes = Self { running: Vec::new(), companions: Vec::new() };
+        let nodes = graph.plan.nodes.iter().zip(&graph.programs);
+        let nodes = nodes.map(|(node, program)| (node.name.as_str(), Some(program)));
+        let mut starts: Vec<_> = std::iter::once(("clock", None)).chain(nodes).collect();
+        shuffle(&mut starts, manifest.content.run.start_order_seed);
+        for (name, program) in starts {
+            let (child, log) = match program {
+                None => spawn::start_clock(run_dir)?,
+                Some(program) => spawn::start(run_dir, name, Role::Node { generation: 0 }, program)?,
             };
-            command.env(NODE_VARIABLE, &node.name);
-            commands.push((node.name.clone(), command));
+            processes.running.push(Process { name: name.to_owned(), log, child, end: None });
         }
-        shuffle(&mut commands, manifest.content.run.start_order_seed);
-        for (name, command) in commands {
-            processes.running.push(Process::start(name, command, run_dir)?);
+        for (name, program) in &graph.companions {
+            processes.companions.push(spawn::start(run_dir, name, Role::Companion, program)?.0);
         }
         Ok(processes)
     }
@@ -154,35 +144,17 @@ impl Processes {
 
 impl Drop for Processes {
     fn drop(&mut self) {
-        for process in self.running.iter_mut().filter(|process| process.end.is_none()) {
+        let alive = self.running.iter_mut().filter(|process| process.end.is_none());
+        for child in alive.map(|process| &mut process.child).chain(&mut self.companions) {
             // The whole group, since a command may have started processes of its own.
-            bus::process::kill_group(process.child.id());
-            let _ = process.child.kill();
-            let _ = process.child.wait();
+            bus::process::kill_group(child.id());
+            let _ = child.kill();
+            let _ = child.wait();
         }
     }
 }
 
 impl Process {
-    fn start(name: String, mut command: Command, run_dir: &Path) -> Result<Self> {
-        let log = run_dir.join(format!("{name}.log"));
-        let file = File::create(&log).with_context(|| format!("cannot create {}", log.display()))?;
-        let output = file.try_clone().context("cannot share a log file")?;
-        command
-            .env(RUN_VARIABLE, run_dir)
-            .env(LAUNCHER_VARIABLE, std::process::id().to_string())
-            .stdin(Stdio::null())
-            .stdout(output)
-            .stderr(file)
-            // A group of its own: Ctrl-C in the terminal reaches the launcher alone, which stops the run
-            // at a tick boundary.
-            .process_group(0);
-        let child = command.spawn().with_context(|| {
-            format!("process `{name}`: cannot start {}", command.get_program().to_string_lossy())
-        })?;
-        Ok(Self { name, log, child, end: None })
-    }
-
     /// How the process ended, with the last lines it wrote.
     fn post_mortem(&self) -> String {
         let end = match self.end {
@@ -202,16 +174,6 @@ impl Process {
             lines[start..].iter().take(LOG_LINES).map(|line| format!("\n  {line}")).collect::<String>();
         format!("process `{}` {end}{words}", self.name)
     }
-}
-
-/// A command with a path is relative to the manifest; a bare name is looked up in PATH.
-fn executable(manifest: &Manifest, program: &str) -> PathBuf {
-    let path = Path::new(program);
-    if path.is_absolute() || !program.contains('/') {
-        return path.to_owned();
-    }
-    let folder = manifest.path.parent().unwrap_or(Path::new(""));
-    std::path::absolute(folder.join(path)).unwrap_or_else(|_| path.to_owned())
 }
 
 /// Fisher-Yates with the bus's own generator: the same seed gives the same order.
