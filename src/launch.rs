@@ -50,7 +50,7 @@ pub fn fly(manifest: &Manifest, graph: &mut Graph, recording: &Path, quiet: bool
     graph.plan.store(run_dir.path())?;
     let control = Control::create(&graph.plan)?;
     let (plan, dir) = (&graph.plan, run_dir.path());
-    let successions = Successions::new(manifest, plan, &control, dir, &graph.programs, &graph.successors);
+    let successions = Successions::new(plan, &control, dir, &graph.programs, &graph.successors);
     let mut supervisor = Supervisor {
         plan,
         control: &control,
@@ -86,6 +86,7 @@ fn prepare(manifest: &Manifest, graph: &mut Graph, recording: &Path, run_dir: &R
     std::fs::write(&manifest_copy, &manifest.recorded_text).context("cannot write the manifest's copy")?;
     let name = |path: &Path| path.file_name().unwrap_or_default().to_string_lossy().into_owned();
     let mut attachments = vec![(name(&manifest.path), manifest_copy)];
+    attachments.extend(manifest.included.iter().map(|path| (name(path), path.clone())));
     attachments.extend(graph.vehicles.iter().map(|path| (name(path), path.clone())));
     let attachments: Vec<_> =
         attachments.iter().map(|(name, path)| serde_json::json!({ "name": name, "path": path })).collect();
@@ -139,7 +140,10 @@ impl Supervisor<'_> {
         let mut all: Vec<_> = std::iter::once(("clock", Role::Clock, None)).chain(nodes).collect();
         shuffle(&mut all, manifest.content.run.start_order_seed);
         for (name, role, program) in all {
-            self.processes.start(manifest, name, role, program, run_dir)?;
+            self.processes.start(name, role, program, run_dir)?;
+        }
+        for (name, program) in &graph.companions {
+            self.processes.start(name, Role::Companion, Some(program), run_dir)?;
         }
         self.tell(Event::Started).map(|_| ())
     }
@@ -246,6 +250,7 @@ impl Supervisor<'_> {
 
     fn has_done_its_part(&self, role: Role) -> bool {
         match role {
+            Role::Companion => true,
             Role::Clock => self.control.completed_ticks() >= self.control.end_tick(),
             Role::Node { node, generation } => {
                 self.successions.standing(node, generation) == Standing::Former

@@ -14,6 +14,7 @@ mod program;
 mod progress;
 mod run_dir;
 mod shadow;
+mod spawn;
 mod stall;
 mod succession;
 mod summary;
@@ -171,10 +172,9 @@ fn run(arguments: &RunArguments) -> Result<bool> {
 
 /// Where the run is recorded: `--record`, the manifest's `record`, or beside the manifest.
 fn recording_path(manifest: &Manifest, argument: Option<&Path>) -> Result<PathBuf> {
-    let folder = manifest.path.parent().unwrap_or(Path::new(""));
     let path = match (argument, &manifest.content.run.record) {
         (Some(path), _) => path.to_owned(),
-        (None, Some(path)) => folder.join(path),
+        (None, Some(path)) => manifest.resolve(path)?,
         (None, None) => manifest.path.with_extension("mcap"),
     };
     std::path::absolute(&path).with_context(|| format!("{} is not a path", path.display()))
@@ -183,7 +183,7 @@ fn recording_path(manifest: &Manifest, argument: Option<&Path>) -> Result<PathBu
 fn check(arguments: &CheckArguments) -> Result<bool> {
     let manifest = Manifest::load(&arguments.manifest, &arguments.set)?;
     let graph = Graph::build(&manifest)?;
-    print_text(&if arguments.json { describe::graph_json(&graph.plan) } else { describe::graph(&graph) })?;
+    print_text(&if arguments.json { describe::graph_json(&graph) } else { describe::graph(&graph) })?;
     Ok(true)
 }
 

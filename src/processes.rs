@@ -1,16 +1,13 @@
 //! The processes of a run on the host: started, watched, and taken down.
 #![allow(clippy::disallowed_methods, reason = "the launcher watches host time; it simulates nothing")]
 
-use crate::manifest::Manifest;
-use crate::program::{Executable, Program};
+use crate::program::Program;
+use crate::spawn;
 use anyhow::{Context, Result};
 use bus::control::Control;
-use bus::process::{LAUNCHER_VARIABLE, RUN_VARIABLE};
-use bus::{GENERATION_VARIABLE, NODE_VARIABLE};
-use std::fs::File;
-use std::os::unix::process::{CommandExt, ExitStatusExt};
+use std::os::unix::process::ExitStatusExt;
 use std::path::{Path, PathBuf};
-use std::process::{Child, Command, ExitStatus, Stdio};
+use std::process::{Child, ExitStatus};
 use std::time::{Duration, Instant};
 
 /// How long processes have to leave by themselves after an abort.
@@ -31,6 +28,8 @@ pub enum Role {
         /// Counts the processes of this node.
         generation: u32,
     },
+    /// A process that takes no part in the ticks.
+    Companion,
 }
 
 /// A process of a run.
@@ -55,22 +54,34 @@ pub struct Process {
 pub struct Processes {
     /// Those that were started and whose end is not settled.
     pub running: Vec<Process>,
+    companions: Vec<Child>,
 }
 
 impl Processes {
-    /// Starts a process and returns its id.
-    pub fn start(
-        &mut self,
-        manifest: &Manifest,
-        name: &str,
-        role: Role,
-        program: Option<&Program>,
-        run_dir: &Path,
-    ) -> Result<u32> {
-        let process = Process::start(manifest, name, role, program, run_dir)?;
-        let id = process.child.id();
-        self.running.push(process);
-        Ok(id)
+    /// Starts a process; the clock where there is no program.
+    pub fn start(&mut self, name: &str, role: Role, program: Option<&Program>, run_dir: &Path) -> Result<()> {
+        let (child, log) = match program {
+            None => spawn::start_clock(run_dir)?,
+            Some(program) => spawn::start(run_dir, name, role, program)?,
+        };
+        let name = match role {
+            Role::Node { generation: generation @ 1.., .. } => format!("{name}.{generation}"),
+            _ => name.to_owned(),
+        };
+        if role == Role::Companion {
+            self.companions.push(child);
+        } else {
+            self.running.push(Process {
+                name,
+                role,
+                log,
+                child,
+                end: None,
+                is_settled: false,
+                verdict: None,
+            });
+        }
+        Ok(())
     }
 
     /// Looks which processes have ended.
@@ -126,61 +137,16 @@ impl Processes {
 impl Drop for Processes {
     fn drop(&mut self) {
         self.running.iter_mut().for_each(Process::kill);
+        for child in &mut self.companions {
+            kill(child);
+        }
     }
 }
 
 impl Process {
-    fn start(
-        manifest: &Manifest,
-        name: &str,
-        role: Role,
-        program: Option<&Program>,
-        run_dir: &Path,
-    ) -> Result<Self> {
-        let this_binary = std::env::current_exe().context("cannot find this binary")?;
-        let (mut command, kind) = match program.map(|program| &program.executable) {
-            None => (Command::new(&this_binary), Some("clock")),
-            Some(Executable::Kind(kind)) => (Command::new(&this_binary), Some(kind.name)),
-            Some(Executable::Command(words)) => {
-                let mut command = Command::new(executable(manifest, &words[0]));
-                command.args(&words[1..]);
-                (command, None)
-            }
-        };
-        if let Some(kind) = kind {
-            command.args(["node", kind]);
-        }
-        let mut label = name.to_owned();
-        if let Role::Node { generation, .. } = role {
-            command.env(NODE_VARIABLE, name).env(GENERATION_VARIABLE, generation.to_string());
-            if generation > 0 {
-                label = format!("{name}.{generation}");
-            }
-        }
-        let log = run_dir.join(format!("{}.log", label.replace('/', ".")));
-        let file = File::create(&log).with_context(|| format!("cannot create {}", log.display()))?;
-        let output = file.try_clone().context("cannot share a log file")?;
-        command
-            .env(RUN_VARIABLE, run_dir)
-            .env(LAUNCHER_VARIABLE, std::process::id().to_string())
-            .stdin(Stdio::null())
-            .stdout(output)
-            .stderr(file)
-            // A group of its own: Ctrl-C in the terminal reaches the launcher alone, which stops the run
-            // at a tick boundary.
-            .process_group(0);
-        let child = command.spawn().with_context(|| {
-            format!("process `{label}`: cannot start {}", command.get_program().to_string_lossy())
-        })?;
-        Ok(Self { name: label, role, log, child, end: None, is_settled: false, verdict: None })
-    }
-
     fn kill(&mut self) {
         if self.end.is_none() {
-            // The whole group, since a command may have started processes of its own.
-            bus::process::kill_group(self.child.id());
-            let _ = self.child.kill();
-            self.end = self.child.wait().ok();
+            self.end = kill(&mut self.child);
         }
     }
 
@@ -206,12 +172,9 @@ impl Process {
     }
 }
 
-/// A command with a path is relative to the manifest; a bare name is looked up in PATH.
-fn executable(manifest: &Manifest, program: &str) -> PathBuf {
-    let path = Path::new(program);
-    if path.is_absolute() || !program.contains('/') {
-        return path.to_owned();
-    }
-    let folder = manifest.path.parent().unwrap_or(Path::new(""));
-    std::path::absolute(folder.join(path)).unwrap_or_else(|_| path.to_owned())
+/// Kills a process and its whole group, since a command may have started processes of its own.
+fn kill(child: &mut Child) -> Option<ExitStatus> {
+    bus::process::kill_group(child.id());
+    let _ = child.kill();
+    child.wait().ok()
 }

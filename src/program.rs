@@ -2,6 +2,7 @@
 
 use bus::kind::NodeKind;
 use bus::plan::NodePlan;
+use serde::Deserialize;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::time::Duration;
@@ -20,7 +21,8 @@ pub enum Executable {
 }
 
 /// What follows when a process ends before the run does.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "kebab-case")]
 pub enum OnExit {
     /// The run is aborted.
     #[default]

@@ -4,7 +4,6 @@
 //! is a new roster: it is written, every member agrees with it, and only then the next one is made.
 #![allow(clippy::disallowed_methods, reason = "the launcher watches host time; it simulates nothing")]
 
-use crate::manifest::Manifest;
 use crate::processes::{Processes, Role};
 use crate::program::{OnExit, Program, Successor};
 use anyhow::Result;
@@ -115,7 +114,6 @@ pub struct Report {
 
 /// All successions of a run.
 pub struct Successions<'a> {
-    manifest: &'a Manifest,
     plan: &'a Plan,
     control: &'a Control,
     run_dir: &'a Path,
@@ -140,7 +138,6 @@ pub enum Standing {
 impl<'a> Successions<'a> {
     /// The successions of a run that begins: its planned successors wait for their ticks.
     pub fn new(
-        manifest: &'a Manifest,
         plan: &'a Plan,
         control: &'a Control,
         run_dir: &'a Path,
@@ -165,7 +162,7 @@ impl<'a> Successions<'a> {
         });
         let (seats, pending) = (seats.collect(), pending.collect());
         let roster = Roster::first(plan);
-        Self { manifest, plan, control, run_dir, roster, seats, pending, reports: Vec::new() }
+        Self { plan, control, run_dir, roster, seats, pending, reports: Vec::new() }
     }
 
     /// Has `successor` join at the next tick boundary once its process is prepared, and take over after
@@ -339,7 +336,7 @@ impl<'a> Successions<'a> {
         };
         let now = Instant::now();
         let role = Role::Node { node, generation };
-        processes.start(self.manifest, &name, role, Some(&pending.successor.program), self.run_dir)?;
+        processes.start(&name, role, Some(&pending.successor.program), self.run_dir)?;
         self.seats[node].newest_generation = generation;
         self.seats[node].candidate = Some(Candidate {
             pending,
