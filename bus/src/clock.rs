@@ -20,6 +20,7 @@ pub fn run() -> Result<(), BusError> {
 
 /// Runs the clock of `plan` until the run is over.
 pub(crate) fn serve(plan: &Plan, control: &Control) -> Result<(), BusError> {
+    control.set_clock_process();
     let clock = Clock::new(plan, control);
     for phase in [Phase::Connecting, Phase::Running] {
         clock.gather(phase)?;

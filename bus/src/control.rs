@@ -4,9 +4,10 @@
 //! ticks that are complete; an *edge* belongs to one reader of one word and holds the count that
 //! this reader sleeps for. A writer stores its word, then looks at the edges that read it, and wakes
 //! only those whose count is reached: nobody is woken for nothing, and nobody pays a system call
-//! for a reader that is awake.
+//! for a reader that is awake. Behind the edges every node counts its step times (`live.rs`).
 
 use crate::error::BusError;
+use crate::live::STEP_SLOTS;
 use crate::plan::{Pace, Plan, Wait};
 use memmap2::MmapRaw;
 use rustix::thread::futex;
@@ -148,7 +149,7 @@ impl Control {
     }
 
     /// Word `index` (0…15) of slot `slot`.
-    fn word(&self, slot: usize, index: usize) -> &AtomicU32 {
+    pub(crate) fn word(&self, slot: usize, index: usize) -> &AtomicU32 {
         let offset = slot * SLOT_BYTES + index * 4;
         assert!(index < 16 && offset + 4 <= self.map.len(), "slot {slot} is outside the control segment");
         // SAFETY: the mapping lives as long as `self`, the offset is inside it (asserted) and a
@@ -168,13 +169,22 @@ impl Control {
     fn tick_word(&self, word: Word) -> &AtomicU32 {
         match word {
             Word::Grant => self.word(1, 0),
-            Word::Topic(topic) => self.word(2 + topic, 0),
+            Word::Topic(topic) => self.word(self.topic_slot(topic), 0),
             Word::Done(node) => self.word(self.node_slot(node), 1),
         }
     }
 
-    fn node_slot(&self, node: usize) -> usize {
+    pub(crate) fn topic_slot(&self, topic: usize) -> usize {
+        2 + topic
+    }
+
+    pub(crate) fn node_slot(&self, node: usize) -> usize {
         2 + self.topics + node
+    }
+
+    /// The first of the slots that count the step times of `node`: behind those of the edges.
+    pub(crate) fn step_slot(&self, node: usize) -> usize {
+        2 + self.topics + self.nodes + self.edge_slots() + node * STEP_SLOTS
     }
 
     fn edge_slots(&self) -> usize {
@@ -518,7 +528,8 @@ impl Control {
 }
 
 fn segment_bytes(plan: &Plan) -> usize {
-    SLOT_BYTES * (2 + plan.topics.len() + plan.nodes.len() + 2 * plan.nodes.len() + plan.edge_count())
+    let (topics, nodes) = (plan.topics.len(), plan.nodes.len());
+    SLOT_BYTES * (2 + topics + nodes + 2 * nodes + plan.edge_count() + STEP_SLOTS * nodes)
 }
 
 fn wake_edge(edge: &AtomicU32) {

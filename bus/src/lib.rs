@@ -9,6 +9,7 @@ pub mod control;
 pub mod error;
 pub mod initial;
 pub mod kind;
+mod live;
 pub mod message;
 pub mod messages;
 mod node;
@@ -17,6 +18,7 @@ mod port;
 pub mod process;
 pub mod random;
 pub mod schema;
+pub mod step_times;
 mod transport;
 
 pub use bus_derive::Message;

@@ -214,6 +214,7 @@ impl Node {
     pub fn connect(self) -> Result<ConnectedNode, BusError> {
         self.require_all_declared()?;
         let control = Control::open(&self.plan)?;
+        control.set_process(self.index);
         crate::process::stay_on(self.node().cpu);
         if self.plan.pace == Pace::Free {
             crate::process::wait_for_turn();
@@ -399,7 +400,7 @@ impl ConnectedNode {
     ) -> Result<(), BusError> {
         let node = &self.plan.nodes[self.index].name;
         for input in &mut self.inputs {
-            input.take(tick, node)?;
+            input.take(tick, node).inspect_err(|_| self.control.count_gap(input.topic))?;
         }
         let received_ns = monotonic_ns();
         let time_ns = u64::from(tick) * self.plan.tick_ns;
@@ -411,6 +412,7 @@ impl ConnectedNode {
             reason: error.to_string(),
         })?;
         let done_ns = monotonic_ns();
+        self.control.count_step(self.index, done_ns - received_ns);
         let mut sent_before = false;
         for output in self.outputs.iter_mut().filter(|output| output.is_due(tick)) {
             // The first output is sent at once: one look at the clock serves for both times.
