@@ -1,6 +1,8 @@
 //! Launching a run: starts its processes, watches them, and takes everything down again.
 #![allow(clippy::disallowed_methods, reason = "the launcher watches host time; it simulates nothing")]
 
+use crate::ctl::desk::Desk;
+use crate::ctl::protocol::Answer;
 use crate::graph::Graph;
 use crate::manifest::Manifest;
 use crate::program::Executable;
@@ -48,14 +50,15 @@ pub struct Outcome {
 /// If a process fails, stalls, or cannot be started; the error holds its last words.
 pub fn fly(manifest: &Manifest, graph: &mut Graph, recording: &Path, quiet: bool) -> Result<Outcome> {
     let interrupts = count_interrupts()?;
-    let run_dir = RunDir::create()?;
+    let run_dir = RunDir::create(&manifest.path)?;
     prepare(manifest, graph, recording, &run_dir)?;
     graph.plan.run_id = run_dir.run_id().to_owned();
     graph.plan.store(run_dir.path())?;
     let control = Control::create(&graph.plan)?;
+    let mut desk = Desk::open(run_dir.path(), &graph.plan, &control)?;
     let mut processes = Processes::start(manifest, graph, run_dir.path())?;
     let progress = Progress::new(&graph.plan, quiet);
-    let was_stopped = watch(&mut processes, &control, &graph.plan, &interrupts, &progress)?;
+    let was_stopped = watch(&mut processes, &mut desk, &control, &graph.plan, &interrupts, &progress)?;
     progress.finish(&control);
     Ok(outcome(&graph.plan, &control, was_stopped))
 }
@@ -228,6 +231,7 @@ fn shuffle<T>(items: &mut [T], seed: Option<u64>) {
 /// Watches until all processes have ended; true if the run was stopped on the way.
 fn watch(
     processes: &mut Processes,
+    desk: &mut Desk<'_>,
     control: &Control,
     plan: &Plan,
     interrupts: &AtomicUsize,
@@ -261,10 +265,14 @@ fn watch(
                 bail!("interrupted twice: the run was aborted at tick {}", control.completed_ticks());
             }
         }
+        while let Some((_, reply)) = desk.serve() {
+            reply.send(&Answer::refused("swap is not supported yet"));
+        }
         let ticks = control.completed_ticks();
-        if ticks != last_change.0 {
+        // A paused run stands still because it was told to.
+        if ticks != last_change.0 || control.held_at().is_some() {
             last_change = (ticks, Instant::now());
-        } else if last_change.1.elapsed() > STALL.max(2 * deadline(plan)) {
+        } else if last_change.1.elapsed() > STALL.max(2 * deadline(control, plan)) {
             let words = describe_stall(control, plan, last_change.1.elapsed());
             take_down(processes, control)?;
             bail!(words);
@@ -281,9 +289,9 @@ fn ticks_of(name: &str, control: &Control, plan: &Plan) -> u32 {
 }
 
 /// Host time in which a paced run must come forward: that of the slowest node's period.
-fn deadline(plan: &Plan) -> Duration {
+fn deadline(control: &Control, plan: &Plan) -> Duration {
     let period_ticks = plan.nodes.iter().map(|node| node.period_ticks).max().unwrap_or(1);
-    match plan.pace {
+    match control.pace() {
         bus::plan::Pace::Free => Duration::ZERO,
         bus::plan::Pace::Factor(factor) => {
             Duration::from_secs_f64((f64::from(period_ticks) * plan.tick_s() / factor).min(1e6))
