@@ -214,8 +214,13 @@ impl std::fmt::Display for Report {
         let verb = if self.dry_run { "would remove" } else { "removed" };
         for remains in &self.dead {
             let bytes = HumanBytes(remains.bytes);
-            writeln!(f, "{verb} run {}: {} of {bytes}", remains.run_id, count(remains.paths.len(), "file"))?;
-            remains.paths.iter().try_for_each(|path| writeln!(f, "  {}", path.display()))?;
+            writeln!(f, "{verb} run {}: {bytes}", remains.run_id)?;
+            let (shared, folders): (Vec<&PathBuf>, Vec<&PathBuf>) =
+                remains.paths.iter().partition(|path| path.starts_with(SHARED_MEMORY));
+            folders.iter().try_for_each(|path| writeln!(f, "  {}", path.display()))?;
+            if !shared.is_empty() {
+                writeln!(f, "  {} in {SHARED_MEMORY}", count(shared.len(), "file"))?;
+            }
             remains.processes.iter().try_for_each(|process| writeln!(f, "  process {process}"))?;
             remains.failures.iter().try_for_each(|failure| writeln!(f, "  LEFT {failure}"))?;
         }

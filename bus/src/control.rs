@@ -382,16 +382,22 @@ impl Control {
 
     /// Waits in the hold at `tick` until it is lifted or the run is stopped.
     pub(crate) fn hold(&self, tick: u32, is_over: impl Fn() -> bool) {
-        self.word(1, 3).store(tick, SeqCst);
-        self.tell_supervisor();
+        let is_lifted = || self.hold_tick() > tick || self.is_aborted() || is_over();
         loop {
-            let hold_tick = self.hold_tick();
-            if hold_tick > tick || self.is_aborted() || is_over() {
-                break;
+            self.word(1, 3).store(tick, SeqCst);
+            self.tell_supervisor();
+            while !is_lifted() {
+                let hold_tick = self.hold_tick();
+                if hold_tick <= tick {
+                    let _ = futex::wait(self.word(1, 2), futex::Flags::empty(), hold_tick, Some(&HOLD_NAP));
+                }
             }
-            let _ = futex::wait(self.word(1, 2), futex::Flags::empty(), hold_tick, Some(&HOLD_NAP));
+            self.word(1, 3).store(NOT_HELD, SeqCst);
+            // Who asked for another hold before this store may have taken the lifted one for it: so it is kept.
+            if is_lifted() {
+                return;
+            }
         }
-        self.word(1, 3).store(NOT_HELD, SeqCst);
     }
 
     /// The pace at which the clock grants ticks.

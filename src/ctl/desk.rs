@@ -17,8 +17,6 @@ pub struct Desk<'a> {
     server: Server,
     /// What was asked for and has not happened yet: one thing at a time, the newest.
     wish: Option<Wish>,
-    /// The hold that the clock was told to leave and may still show.
-    leaving: Option<u32>,
 }
 
 struct Wish {
@@ -33,8 +31,6 @@ enum Goal {
     PauseToStep(u32),
     /// To be held again at the boundary before `target`, `ticks` after it was let go.
     Step { ticks: u32, target: u32 },
-    /// To run on from the hold at this tick.
-    Resume(u32),
 }
 
 impl<'a> Desk<'a> {
@@ -43,13 +39,13 @@ impl<'a> Desk<'a> {
     /// # Errors
     /// If the socket cannot be made.
     pub fn open(run_dir: &Path, plan: &'a Plan, control: &'a Control) -> Result<Self> {
-        Ok(Self { plan, control, server: Server::start(run_dir)?, wish: None, leaving: None })
+        Ok(Self { plan, control, server: Server::start(run_dir)?, wish: None })
     }
 
     /// Serves what has been asked since the last look; returns a request that is not about the clock, a swap.
     pub fn serve(&mut self) -> Option<(Request, Reply)> {
         self.grant_wish();
-        while !self.is_leaving() {
+        loop {
             let (request, reply) = self.server.poll()?;
             match request {
                 Request::Status => reply.send(&Answer::Status(Status::of(self.plan, self.control))),
@@ -68,13 +64,6 @@ impl<'a> Desk<'a> {
             }
             self.grant_wish();
         }
-        None
-    }
-
-    /// Whether the clock still shows a hold that was lifted: until it does not, nobody can tell the next from it.
-    fn is_leaving(&mut self) -> bool {
-        self.leaving = self.leaving.filter(|&tick| self.control.held_at() == Some(tick) && !self.has_ended());
-        self.leaving.is_some()
     }
 
     fn has_ended(&self) -> bool {
@@ -85,11 +74,19 @@ impl<'a> Desk<'a> {
         reply.send(&Answer::Done { text, tick: self.control.completed_ticks() });
     }
 
-    /// Takes up a new goal; who waits for the one before is told so.
+    /// Tells who waits for something that a later request undoes; true if there was somebody.
+    fn overtake(&mut self) -> bool {
+        let overtaken = self.wish.take();
+        let is_overtaken = overtaken.is_some();
+        overtaken
+            .into_iter()
+            .for_each(|wish| wish.reply.send(&Answer::refused("a later request took its place")));
+        is_overtaken
+    }
+
     fn wish(&mut self, goal: Goal, reply: Reply) {
-        if let Some(overtaken) = self.wish.replace(Wish { goal, reply }) {
-            overtaken.reply.send(&Answer::refused("a later request took its place"));
-        }
+        self.overtake();
+        self.wish = Some(Wish { goal, reply });
     }
 
     fn pause(&mut self, reply: Reply) {
@@ -103,14 +100,15 @@ impl<'a> Desk<'a> {
     }
 
     fn resume(&mut self, reply: Reply) {
+        let held_at = self.control.held_at();
+        let was_overtaken = self.overtake();
         self.control.set_hold_tick(NEVER);
-        match self.control.held_at() {
-            Some(tick) => {
-                self.leaving = Some(tick);
-                self.wish(Goal::Resume(tick), reply);
-            }
-            None => self.answer(reply, "it was not paused".to_owned()),
-        }
+        let text = match held_at {
+            Some(tick) => format!("running on from tick {tick}"),
+            None if was_overtaken => "running on".to_owned(),
+            None => "it was not paused".to_owned(),
+        };
+        self.answer(reply, text);
     }
 
     /// Answers the wish if it has come true; goes on to its second half if the first is done.
@@ -121,13 +119,10 @@ impl<'a> Desk<'a> {
             (Goal::Pause, Some(tick)) => self.answer(wish.reply, format!("paused at tick {tick}")),
             (Goal::PauseToStep(ticks), Some(tick)) => self.step(tick, ticks, wish.reply),
             (Goal::Step { ticks, target }, _) if held_at == Some(target) => {
-                self.answer(wish.reply, format!("{ticks} ticks on, paused at tick {target}"));
+                self.answer(wish.reply, format!("paused at tick {target}, {} on", ticks_in_words(ticks)));
             }
             (Goal::Step { ticks, target }, _) if self.has_ended() && self.control.end_tick() == target => {
-                self.answer(wish.reply, format!("{ticks} ticks on, the run has ended at tick {target}"));
-            }
-            (Goal::Resume(tick), _) if held_at != Some(tick) => {
-                self.answer(wish.reply, format!("running on from tick {tick}"));
+                self.answer(wish.reply, format!("ended at tick {target}, {} on", ticks_in_words(ticks)));
             }
             (goal, _) => self.wish = Some(Wish { goal, reply: wish.reply }),
         }
@@ -138,15 +133,18 @@ impl<'a> Desk<'a> {
         let left = self.control.end_tick() - tick;
         if ticks > left {
             let end = self.control.end_tick();
-            let reason =
-                format!("paused at tick {tick}: only {left} ticks are left of a run that ends at tick {end}");
+            let left = ticks_in_words(left);
+            let reason = format!("paused at tick {tick}: only {left} left of a run that ends at tick {end}");
             return reply.send(&Answer::refused(reason));
         }
         let target = tick + ticks;
-        self.leaving = Some(tick);
         self.control.set_hold_tick(target);
         self.wish(Goal::Step { ticks, target }, reply);
     }
+}
+
+fn ticks_in_words(ticks: u32) -> String {
+    if ticks == 1 { "1 tick".to_owned() } else { format!("{ticks} ticks") }
 }
 
 impl Drop for Desk<'_> {

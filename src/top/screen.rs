@@ -11,13 +11,13 @@ use ratatui::widgets::{Cell, Row, Table, Widget};
 
 const KEYS: &str = "space pause  s step  S 100  + - speed  f free  r realtime  x stop  q leave";
 const PROCESS_WIDTHS: [Constraint; 7] = [
-    Constraint::Fill(1),
-    Constraint::Fill(2),
+    Constraint::Fill(3),
+    Constraint::Fill(7),
     Constraint::Length(9),
     Constraint::Length(5),
-    Constraint::Length(8),
-    Constraint::Length(8),
-    Constraint::Length(6),
+    Constraint::Length(7),
+    Constraint::Length(7),
+    Constraint::Length(5),
 ];
 const TOPIC_WIDTHS: [Constraint; 5] = [
     Constraint::Fill(2),
