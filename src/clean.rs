@@ -58,7 +58,7 @@ pub fn clean(dry_run: bool) -> Result<Report> {
     let mut report = Report { dry_run, live: Vec::new(), dead: Vec::new() };
     for (run_id, traces) in find_traces()? {
         // Held until everything is removed: a launcher that is just registering this run waits for it.
-        let Some(_claim) = try_claim(&run_id) else {
+        let Some(_claim) = try_claim(&run_id, &traces.run_dirs) else {
             report.live.push(run_id);
             continue;
         };
@@ -87,7 +87,8 @@ fn find_traces() -> Result<BTreeMap<String, Traces>> {
         let traces = found.entry(run_id.to_owned()).or_default();
         if path == entry_path(run_id) {
             let entry = File::open(&path).ok().and_then(|file| serde_json::from_reader(file).ok());
-            traces.run_dirs.extend(entry.map(|entry: Entry| entry.run_dir));
+            let run_dir = entry.map(|entry: Entry| entry.run_dir);
+            traces.run_dirs.extend(run_dir.filter(|run_dir| is_run_dir_of(run_dir, run_id)));
         }
     }
     for path in own_files(&std::env::temp_dir()) {
@@ -105,6 +106,10 @@ fn find_traces() -> Result<BTreeMap<String, Traces>> {
     Ok(found)
 }
 
+fn is_run_dir_of(path: &Path, run_id: &str) -> bool {
+    name_of(path).and_then(run_of_dir) == Some(run_id)
+}
+
 fn name_of(path: &Path) -> Option<&str> {
     path.file_name()?.to_str()
 }
@@ -116,17 +121,24 @@ fn own_files(folder: &Path) -> Vec<PathBuf> {
     entries.filter(is_own).map(|entry| entry.path()).collect()
 }
 
-/// This user's processes that carry a run directory, except this one.
+/// This user's processes that carry a run directory, except this one and those that see another /dev/shm.
 fn processes_of_runs() -> Result<Vec<(Pid, PathBuf)>> {
+    let own_mounts = mounts_of(Path::new("/proc/self"));
     let entries = std::fs::read_dir("/proc")?.flatten();
     let process = |entry: std::fs::DirEntry| {
         let id =
             entry.file_name().to_str()?.parse().ok().filter(|&id| id != std::process::id().cast_signed())?;
         let process = Pid::from_raw(id)?;
-        entry.metadata().is_ok_and(|file| file.uid() == user_id()).then_some(())?;
+        let is_own = entry.metadata().is_ok_and(|file| file.uid() == user_id());
+        (is_own && mounts_of(&entry.path()) == own_mounts).then_some(())?;
         run_dir_of(process).map(|run_dir| (process, run_dir))
     };
     Ok(entries.filter_map(process).collect())
+}
+
+/// What stands for the mounts that a process sees.
+fn mounts_of(process: &Path) -> Option<PathBuf> {
+    std::fs::read_link(process.join("ns/mnt")).ok()
 }
 
 /// The run directory that a process carries in its environment; `None` for one that has ended.
@@ -140,8 +152,7 @@ fn run_dir_of(process: Pid) -> Option<PathBuf> {
 }
 
 fn look_at(run_id: String, traces: &Traces) -> Remains {
-    let belongs = |path: &&PathBuf| name_of(path).and_then(run_of_dir) == Some(&run_id) && path.is_dir();
-    let run_dirs = traces.run_dirs.iter().filter(belongs).cloned();
+    let run_dirs = traces.run_dirs.iter().filter(|path| path.is_dir()).cloned();
     // The entry last, as it goes when a run ends by itself.
     let entry = Some(entry_path(&run_id)).filter(|path| path.exists());
     let paths: Vec<PathBuf> = run_dirs.chain(shared_memory_of(&run_id)).chain(entry).collect();

@@ -8,6 +8,7 @@ use anyhow::{Context, Result, bail};
 use bus::control::shm_prefix;
 use rustix::fs::{FlockOperation, flock};
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeSet;
 use std::fs::File;
 use std::io::Write as _;
 use std::os::unix::fs::{DirBuilderExt, MetadataExt, OpenOptionsExt};
@@ -33,8 +34,8 @@ pub struct Entry {
 #[derive(Debug)]
 pub struct RunDir {
     entry: Entry,
-    /// Locked until the process ends.
-    _lock: File,
+    /// The entry and the directory, locked until the process ends.
+    _locks: [File; 2],
 }
 
 impl RunDir {
@@ -48,13 +49,16 @@ impl RunDir {
         let run_dir = std::path::absolute(std::env::temp_dir())?.join(dir_name(&run_id));
         let manifest = std::path::absolute(manifest)?;
         let entry = Entry { run_id, run_dir, manifest, launcher: std::process::id() };
-        let lock = register(&entry).with_context(|| format!("cannot register the run in {SHARED_MEMORY}"))?;
-        let this = Self { entry, _lock: lock };
-        std::fs::DirBuilder::new()
-            .mode(0o700)
-            .create(this.path())
-            .with_context(|| format!("cannot create the run directory {}", this.path().display()))?;
-        Ok(this)
+        let registered =
+            register(&entry).with_context(|| format!("cannot register the run in {SHARED_MEMORY}"))?;
+        match create_locked(&entry.run_dir) {
+            Ok(directory) => Ok(Self { entry, _locks: [registered, directory] }),
+            Err(error) => {
+                let _ = std::fs::remove_file(entry_path(&entry.run_id));
+                let path = entry.run_dir.display().to_string();
+                Err(error).with_context(|| format!("cannot create the run directory {path}"))
+            }
+        }
     }
 
     /// The directory.
@@ -128,6 +132,15 @@ fn register(entry: &Entry) -> Result<File> {
     }
 }
 
+/// Creates the run directory and locks it as well: where two containers share the folder for temporary files but
+/// not /dev/shm, neither sees the other's entries.
+fn create_locked(run_dir: &Path) -> std::io::Result<File> {
+    std::fs::DirBuilder::new().mode(0o700).create(run_dir)?;
+    let directory = File::open(run_dir)?;
+    rustix::io::retry_on_intr(|| flock(&directory, FlockOperation::LockExclusive))?;
+    Ok(directory)
+}
+
 /// Whether the launcher that locked `entry` lives. Asking does not disturb others who ask.
 fn is_locked(entry: &File) -> bool {
     let is_free = rustix::io::retry_on_intr(|| flock(entry, FlockOperation::NonBlockingLockShared)).is_ok();
@@ -140,18 +153,26 @@ fn is_locked(entry: &File) -> bool {
 /// A claim on what a dead run left. While it is held, no launcher can take up the run's entry.
 #[derive(Debug)]
 pub struct Claim {
-    _entry: Option<File>,
+    _locks: Vec<File>,
 }
 
-/// Claims what run `run_id` left; `None` if it is alive.
-pub fn try_claim(run_id: &str) -> Option<Claim> {
-    match File::open(entry_path(run_id)) {
-        Ok(entry) => rustix::io::retry_on_intr(|| flock(&entry, FlockOperation::NonBlockingLockShared))
-            .is_ok()
-            .then_some(Claim { _entry: Some(entry) }),
-        // Without an entry nobody lives: it is made before everything else, and removed after.
-        Err(error) => (error.kind() == std::io::ErrorKind::NotFound).then_some(Claim { _entry: None }),
+/// Claims what run `run_id` left, with those of `run_dirs` that there are; `None` if it is alive.
+///
+/// Without an entry nobody lives on this side of /dev/shm: it is made before everything else, and removed after.
+pub fn try_claim(run_id: &str, run_dirs: &BTreeSet<PathBuf>) -> Option<Claim> {
+    let (mut locks, entry) = (Vec::new(), entry_path(run_id));
+    for path in std::iter::once(&entry).chain(run_dirs) {
+        match File::open(path) {
+            Ok(file) => {
+                let taken = rustix::io::retry_on_intr(|| flock(&file, FlockOperation::NonBlockingLockShared));
+                taken.ok()?;
+                locks.push(file);
+            }
+            Err(error) if error.kind() == std::io::ErrorKind::NotFound => {}
+            Err(_) => return None,
+        }
     }
+    Some(Claim { _locks: locks })
 }
 
 /// A run that was alive when it was found.
@@ -212,8 +233,10 @@ fn choose(mut runs: Vec<LiveRun>, run_id: Option<&str>) -> Result<LiveRun> {
 }
 
 fn listed(runs: &[LiveRun]) -> String {
-    let line = |run: &LiveRun| format!("\n  {}  {}", run.entry.run_id, run.entry.manifest.display());
-    runs.iter().map(line).collect()
+    let line = |Entry { run_id, manifest, launcher, .. }: &Entry| {
+        format!("\n  {run_id}  {}  (launcher {launcher})", manifest.display())
+    };
+    runs.iter().map(|run| line(&run.entry)).collect()
 }
 
 #[cfg(test)]
@@ -237,7 +260,7 @@ mod tests {
         let words = |names: &[&str], run_id| chosen(names, run_id).unwrap_err().to_string();
         assert!(words(&[], Some("1-a")).contains("no run of this user is alive"));
         for text in [words(&["1-a", "2-b"], None), words(&["1-a", "2-b"], Some("3-c"))] {
-            assert!(text.contains("\n  1-a  /m.toml\n  2-b  /m.toml"), "{text}");
+            assert!(text.contains("\n  1-a  /m.toml  (launcher 1)\n  2-b  /m.toml"), "{text}");
         }
     }
 

@@ -29,9 +29,11 @@ use std::time::{Duration, Instant};
 use view::View;
 
 /// What `top --help` ends with.
-pub const HELP: &str = "Keys: space pauses and resumes, s and S step 1 and 100 ticks, + and - double and halve the speed, f runs free,\n\
-     r in real time, arrows scroll, x stops the run, q leaves it flying.\n\
-     Example: hummingbus top --once --json";
+pub const HELP: &str =
+    "Keys: space pauses and resumes, s and S step 1 and 100 ticks, + and - double and halve the
+speed, f runs free, r in real time, arrows scroll, x stops the run, q leaves it flying.
+
+Example: hummingbus top --once --json";
 
 /// Host time between two looks.
 const REFRESH: Duration = Duration::from_millis(250);

@@ -161,3 +161,40 @@ impl std::fmt::Display for Status {
         if *missed_deadlines > 0 { write!(f, ", {missed_deadlines} deadlines missed") } else { Ok(()) }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::{Answer, Request};
+
+    /// Requires that `line` is what a request is written as and read from.
+    fn require_round_trip(line: &str) {
+        let request: Request = serde_json::from_str(line).unwrap_or_else(|error| panic!("{line}: {error}"));
+        assert_eq!(serde_json::to_string(&request).unwrap(), line);
+    }
+
+    #[test]
+    fn a_request_is_one_json_object() {
+        require_round_trip(r#"{"request":"status"}"#);
+        require_round_trip(r#"{"request":"step","ticks":7}"#);
+        require_round_trip(r#"{"request":"pace","pace":"free"}"#);
+        require_round_trip(r#"{"request":"pace","pace":"realtime"}"#);
+        require_round_trip(r#"{"request":"pace","pace":"0.25"}"#);
+        require_round_trip(
+            r#"{"request":"swap","process":"pid","with":"kind='pid'","shadow_ticks":5,"at_tick":null}"#,
+        );
+        for wrong in [r#"{"request":"fly"}"#, r#"{"request":"step"}"#, r#"{"request":"pace","pace":-1}"#] {
+            assert!(serde_json::from_str::<Request>(wrong).is_err(), "{wrong}");
+        }
+    }
+
+    #[test]
+    fn an_answer_is_one_json_object() {
+        let done = Answer::Done { text: "paused at tick 5".to_owned(), tick: 5 };
+        assert_eq!(
+            serde_json::to_string(&done).unwrap(),
+            r#"{"answer":"done","text":"paused at tick 5","tick":5}"#
+        );
+        let refused = serde_json::to_string(&Answer::refused("no")).unwrap();
+        assert_eq!(refused, r#"{"answer":"refused","reason":"no"}"#);
+    }
+}

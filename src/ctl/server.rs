@@ -10,6 +10,8 @@ use std::time::Duration;
 
 /// How long a client that does not read may hold the launcher up.
 const WRITE_TIMEOUT: Duration = Duration::from_millis(100);
+/// Between two attempts to let a client in.
+const PAUSE: Duration = Duration::from_millis(100);
 
 /// The open socket of a run.
 pub struct Server {
@@ -33,7 +35,12 @@ impl Server {
         let (sender, requests) = channel();
         // Both kinds of thread end with the process.
         std::thread::spawn(move || {
-            for stream in listener.incoming().flatten() {
+            for stream in listener.incoming() {
+                let Ok(stream) = stream else {
+                    // Out of file descriptors, most likely: clients wait until there are some again.
+                    std::thread::sleep(PAUSE);
+                    continue;
+                };
                 let sender = sender.clone();
                 std::thread::spawn(move || read_requests(&stream, &sender));
             }

@@ -1,6 +1,7 @@
 //! What dead runs left is removed, and nothing of live ones, wherever their temporary files lie.
 
 use crate::support::{Launch, Place, poll, repository};
+use rustix::fs::{FlockOperation, flock};
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
@@ -104,6 +105,22 @@ fn files_that_are_not_of_runs_are_kept() {
     assert_eq!(remains_of(&report, "fffffff-1").unwrap()["paths"][0], stray.0.to_str().unwrap());
     assert!(!stray.0.exists() && others.iter().all(|other| other.0.exists()));
     assert!(Path::new(&place.path("tmp/hummingbus-notes")).exists());
+}
+
+#[test]
+fn a_run_directory_that_its_launcher_has_locked_is_kept() {
+    let _alone = alone();
+    let place = Place::new();
+    // As in a container that has a shared memory of its own: there is no entry to be seen.
+    let run_dir = place.path(&format!("tmp/hummingbus-{}-fffffff-2", bus::process::user_id()));
+    std::fs::create_dir(&run_dir).unwrap();
+    let lock = std::fs::File::open(&run_dir).unwrap();
+    flock(&lock, FlockOperation::LockExclusive).unwrap();
+    assert!(is_live(&clean(&place, &[]), "fffffff-2"));
+    assert!(Path::new(&run_dir).exists());
+    drop(lock);
+    assert!(remains_of(&clean(&place, &[]), "fffffff-2").is_some());
+    assert!(!Path::new(&run_dir).exists());
 }
 
 #[test]

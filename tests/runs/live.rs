@@ -1,9 +1,12 @@
 //! Runs that are watched and steered while they fly: what is seen is true, and nothing of it changes a recording.
 
 use crate::recordings::require_same;
-use crate::support::{Ended, Launch, Place, repository};
+use crate::support::{Ended, Launch, Place, poll, repository};
 use crate::terminal::Terminal;
+use rustix::process::Signal;
 use serde_json::Value;
+use std::io::{BufRead, BufReader, Write};
+use std::os::unix::net::UnixStream;
 use std::thread::sleep;
 use std::time::Duration;
 
@@ -90,13 +93,38 @@ fn a_run_can_be_paused_for_longer_than_the_watchdog_waits() {
 }
 
 #[test]
-fn a_stop_ends_a_paused_run_at_its_tick() {
+fn a_stop_and_ctrl_c_end_a_paused_run_at_its_tick() {
+    for is_signal in [false, true] {
+        let place = Place::new();
+        let flight = take_off(&place, "stopped.mcap", "realtime", 1000);
+        let held = tick_after(&place, &["pause"]);
+        if is_signal {
+            flight.signal(Signal::INT);
+        } else {
+            ctl(&place, &["stop"]);
+        }
+        let summary = flight.end().with_code(1).json();
+        assert_eq!((&summary["stopped_early"], &summary["ticks"]), (&true.into(), &held.into()));
+    }
+}
+
+#[test]
+fn a_program_can_speak_to_the_socket_and_nonsense_is_refused() {
     let place = Place::new();
-    let flight = take_off(&place, "stopped.mcap", "realtime", 1000);
-    let held = tick_after(&place, &["pause"]);
-    ctl(&place, &["stop"]);
-    let summary = flight.end().with_code(1).json();
-    assert_eq!((&summary["stopped_early"], &summary["ticks"]), (&true.into(), &held.into()));
+    let flight = take_off(&place, "spoken.mcap", "realtime", 1000);
+    let run_dir = format!("tmp/hummingbus-{}-{}", bus::process::user_id(), place.run_id());
+    let socket = UnixStream::connect(place.path(&format!("{run_dir}/ctl.sock"))).unwrap();
+    let mut answers = BufReader::new(socket.try_clone().unwrap()).lines();
+    let mut ask = |line: &str| -> Value {
+        writeln!(&socket, "{line}").unwrap();
+        serde_json::from_str(&answers.next().unwrap().unwrap()).unwrap()
+    };
+    assert_eq!(ask("nonsense")["answer"], "refused");
+    assert_eq!(ask(r#"{"request":"fly"}"#)["answer"], "refused");
+    assert_eq!(ask(r#"{"request":"pace","pace":0}"#)["answer"], "refused");
+    assert_eq!(ask(r#"{"request":"status"}"#)["run_id"], place.run_id());
+    assert_eq!(ask(r#"{"request":"stop"}"#)["answer"], "done");
+    flight.end().with_code(1);
 }
 
 #[test]
@@ -232,19 +260,22 @@ fn the_keyboard_of_top_steers_a_run() {
     flight.end_among_others().with_code(1);
     terminal.press("q");
     assert!(terminal.end().success());
-    assert!(!terminal.is_taken());
+    poll("the screen is not given back", || (!terminal.is_taken()).then_some(()));
 }
 
 #[test]
 fn who_leaves_top_leaves_the_run_flying() {
     let place = Place::new();
     let flight = take_off(&place, "left.mcap", "realtime", 1000);
-    for leave in ["q", "\x1b", "\x03"] {
+    for leave in [Some("q"), Some("\x1b"), Some("\x03"), None] {
         let mut terminal = Terminal::start(&place, &["top", "--run", &place.run_id()]);
         terminal.await_texts(&["running"]);
-        terminal.press(leave);
+        match leave {
+            Some(key) => terminal.press(key),
+            None => terminal.signal(Signal::TERM),
+        }
         assert!(terminal.end().success());
-        assert!(!terminal.is_taken());
+        poll("the screen is not given back", || (!terminal.is_taken()).then_some(()));
         assert_eq!(state(&place).0, "running");
     }
     ctl(&place, &["stop"]);
