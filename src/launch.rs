@@ -1,7 +1,10 @@
 //! Launching a run: starts its processes, supervises them, and takes everything down again.
 #![allow(clippy::disallowed_methods, reason = "the launcher watches host time; it simulates nothing")]
 
-use crate::graph::Graph;
+use crate::ctl::desk::Desk;
+use crate::ctl::protocol::{Answer, Request};
+use crate::ctl::server::Reply;
+use crate::graph::{Graph, successor_of};
 use crate::manifest::Manifest;
 use crate::processes::{Processes, Role};
 use crate::program::{OnExit, WATCHDOG};
@@ -20,6 +23,9 @@ use std::time::{Duration, Instant};
 
 /// How long the supervisor sleeps at most between two looks at its processes.
 const POLL: Duration = Duration::from_millis(2);
+
+/// Ticks that a successor shadows where a request does not say.
+const SHADOW_TICKS: u32 = 100;
 
 /// What is known about a run when it is over.
 #[derive(Debug)]
@@ -44,10 +50,11 @@ pub struct Outcome {
 /// If a process fails, stalls, or cannot be started; the error holds its last words.
 pub fn fly(manifest: &Manifest, graph: &mut Graph, recording: &Path, quiet: bool) -> Result<Outcome> {
     let interrupts = count_interrupts()?;
-    let run_dir = RunDir::create()?;
+    let run_dir = RunDir::create(&manifest.path)?;
     prepare(manifest, graph, recording, &run_dir)?;
     graph.plan.run_id = run_dir.run_id().to_owned();
     graph.plan.store(run_dir.path())?;
+    let graph = &*graph;
     let control = Control::create(&graph.plan)?;
     let (plan, dir) = (&graph.plan, run_dir.path());
     let successions = Successions::new(plan, &control, dir, &graph.programs, &graph.successors);
@@ -57,16 +64,37 @@ pub fn fly(manifest: &Manifest, graph: &mut Graph, recording: &Path, quiet: bool
         processes: Processes::default(),
         successions,
         state: State::Starting,
+        desk: Desk::open(dir, plan, &control)?,
+        swaps: Vec::new(),
         interrupts,
         seen_interrupts: 0,
+        manifest,
+        graph,
         progress: Progress::new(plan, quiet),
         last_change: (0, Instant::now()),
     };
-    supervisor.start(manifest, graph, dir)?;
+    supervisor.start(dir)?;
     supervisor.watch()?;
     supervisor.progress.finish(&control);
     let was_stopped = control.end_tick() < plan.duration_ticks;
     Ok(Outcome { successions: supervisor.successions.into_reports(), ..outcome(plan, &control, was_stopped) })
+}
+
+/// What became of a swap, for who asked for it.
+fn answer(report: &Report) -> Answer {
+    match (&report.refused, report.take_over_tick) {
+        (Some(reason), _) => Answer::refused(reason.clone()),
+        (None, Some(tick)) => Answer::Done {
+            text: format!(
+                "`{}.{}` flies from tick {tick}; handed over: {}",
+                report.process,
+                report.generation,
+                report.hand_over.unwrap_or("nothing")
+            ),
+            tick,
+        },
+        (None, None) => Answer::refused("the run ended before the take-over"),
+    }
 }
 
 /// Counts Ctrl-C and SIGTERM from now on instead of dying of them.
@@ -111,11 +139,16 @@ fn shuffle<T>(items: &mut [T], seed: Option<u64>) {
 
 /// Watches over a run: what happens is told to the state machine, and what that answers is done.
 struct Supervisor<'a> {
+    manifest: &'a Manifest,
+    graph: &'a Graph,
     plan: &'a Plan,
     control: &'a Control,
     processes: Processes,
     successions: Successions<'a>,
     state: State,
+    desk: Desk<'a>,
+    /// Swaps that were asked for and have not come to their end: the node, and who asked.
+    swaps: Vec<(usize, Reply)>,
     interrupts: Arc<AtomicUsize>,
     seen_interrupts: usize,
     progress: Progress,
@@ -131,14 +164,15 @@ struct Death {
 }
 
 impl Supervisor<'_> {
-    fn start(&mut self, manifest: &Manifest, graph: &Graph, run_dir: &Path) -> Result<()> {
-        self.hold();
+    fn start(&mut self, run_dir: &Path) -> Result<()> {
+        self.control.set_join_tick(self.successions.hold_tick());
+        let graph = self.graph;
         let nodes = graph.programs.iter().zip(&graph.plan.nodes).enumerate();
         let nodes = nodes.map(|(node, (program, plan))| {
             (plan.name.as_str(), Role::Node { node, generation: 0 }, Some(program))
         });
         let mut all: Vec<_> = std::iter::once(("clock", Role::Clock, None)).chain(nodes).collect();
-        shuffle(&mut all, manifest.content.run.start_order_seed);
+        shuffle(&mut all, self.manifest.content.run.start_order_seed);
         for (name, role, program) in all {
             self.processes.start(name, role, program, run_dir)?;
         }
@@ -156,11 +190,15 @@ impl Supervisor<'_> {
             self.settle_ends()?;
             self.note_interrupts()?;
             self.note_progress()?;
+            self.serve_requests();
             if self.state == State::Draining {
                 self.successions.end(&mut self.processes);
             }
+            if let Some(node) = self.successions.too_late() {
+                self.refuse(node, "the run had passed the tick at which it was to join".to_owned())?;
+            }
             self.successions.advance(&mut self.processes)?;
-            self.hold();
+            self.control.set_join_tick(self.successions.hold_tick());
             self.note_stall()?;
             self.progress.show(self.control);
             self.control.await_news(news, POLL);
@@ -183,11 +221,60 @@ impl Supervisor<'_> {
         Err(anyhow!(words))
     }
 
-    fn hold(&self) {
-        let hold_tick = self.successions.hold_tick();
-        if self.control.hold_tick() != hold_tick {
-            self.control.set_hold_tick(hold_tick);
+    /// Serves what was asked of the run, and answers those whose swap has come to its end.
+    fn serve_requests(&mut self) {
+        while let Some((request, reply)) = self.desk.serve() {
+            let Request::Swap { process, with, shadow_ticks, at_tick } = request else { continue };
+            match self.request_swap(&process, &with, shadow_ticks, at_tick) {
+                Ok(node) => self.swaps.push((node, reply)),
+                Err(reason) => reply.send(&Answer::refused(reason)),
+            }
         }
+        for (node, reply) in std::mem::take(&mut self.swaps) {
+            if self.successions.is_busy(node) {
+                self.swaps.push((node, reply));
+                continue;
+            }
+            let name = &self.plan.nodes[node].name;
+            let report = self.successions.reports.iter().rev().find(|report| report.process == *name);
+            reply.send(&report.map_or_else(|| Answer::refused("the run ended"), answer));
+        }
+    }
+
+    /// Checks a swap that was asked for and has its successor started; the error is the reason to refuse it.
+    fn request_swap(
+        &mut self,
+        process: &str,
+        with: &str,
+        shadow_ticks: Option<u32>,
+        at_tick: Option<u32>,
+    ) -> Result<usize, String> {
+        let successor = successor_of(self.manifest, self.graph, process, with).map_err(|e| e.to_string())?;
+        let node = successor.node;
+        if self.state != State::Running {
+            return Err(format!("the run does not fly: `{process}` cannot be swapped now"));
+        }
+        if self.successions.is_busy(node) {
+            return Err(format!("`{process}` has a successor, a standby or a shadow already; one at a time"));
+        }
+        let shadow_ticks = shadow_ticks.unwrap_or(SHADOW_TICKS);
+        let period = successor.plan.period_ticks;
+        if let Some(tick) = at_tick {
+            let join = tick.saturating_sub(shadow_ticks);
+            if join <= self.control.granted_ticks() || tick >= self.control.end_tick() {
+                return Err(format!(
+                    "tick {tick} less {shadow_ticks} ticks of shadowing is not ahead of the run, which has \
+                     granted {} of {} ticks",
+                    self.control.granted_ticks(),
+                    self.control.end_tick()
+                ));
+            }
+            if !tick.is_multiple_of(period) || !join.is_multiple_of(period) {
+                return Err(format!("`{process}` computes every {period} ticks: choose multiples of that"));
+            }
+        }
+        self.successions.request_swap(successor, shadow_ticks, at_tick);
+        Ok(node)
     }
 
     fn note_interrupts(&mut self) -> Result<()> {
@@ -348,7 +435,9 @@ impl Supervisor<'_> {
     /// Looks whether the run stands still, and because of whom.
     fn note_stall(&mut self) -> Result<()> {
         let ticks = self.control.completed_ticks();
-        if ticks != self.last_change.0 || self.state.is_over() {
+        // A paused run stands still because it was told to.
+        let is_paused = self.control.held_at().is_some_and(|held| self.control.hold_tick() <= held);
+        if ticks != self.last_change.0 || self.state.is_over() || is_paused {
             self.last_change = (ticks, Instant::now());
             return Ok(());
         }

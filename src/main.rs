@@ -1,6 +1,8 @@
 //! hummingbus: launches process sets that simulate a vehicle in lockstep, and judges their recordings.
 #![forbid(unsafe_code)]
 
+mod clean;
+mod ctl;
 mod describe;
 mod graph;
 mod judge;
@@ -19,6 +21,7 @@ mod stall;
 mod succession;
 mod summary;
 mod supervisor;
+mod top;
 
 use crate::graph::Graph;
 use crate::manifest::{Manifest, PaceSetting};
@@ -68,6 +71,25 @@ enum Verb {
     #[command(after_help = "Example: hummingbus schema --json")]
     Schema {
         /// Print JSON, with the ROS 2 definitions.
+        #[arg(long)]
+        json: bool,
+    },
+    /// Watch a live run and steer it: ticks, processes, topics.
+    #[command(after_help = top::HELP)]
+    Top(top::TopArguments),
+    /// Pause, step, pace or stop a live run; exit code 2 if it refuses.
+    #[command(after_help = "Example: hummingbus ctl pause")]
+    Ctl(ctl::CtlArguments),
+    /// Replace a process of a live run.
+    #[command(after_help = "Example: hummingbus swap controller --with better.toml --shadow-ticks 500")]
+    Swap(ctl::SwapArguments),
+    /// Remove what dead runs left, and nothing of live ones; exit code 1 if something could not be removed.
+    #[command(after_help = "Example: hummingbus clean --dry-run")]
+    Clean {
+        /// Only tell what would be removed.
+        #[arg(long)]
+        dry_run: bool,
+        /// Print JSON.
         #[arg(long)]
         json: bool,
     },
@@ -121,6 +143,10 @@ fn main() -> ExitCode {
         Verb::Schema { json } => {
             print_text(&if json { describe::schemas_json() } else { describe::schemas() }).map(|()| true)
         }
+        Verb::Top(arguments) => top::top(&arguments).map(|()| true),
+        Verb::Ctl(arguments) => ctl::ctl(&arguments).map(|()| true),
+        Verb::Swap(arguments) => ctl::swap(&arguments).map(|()| true),
+        Verb::Clean { dry_run, json } => clean(dry_run, json),
         Verb::Node { kind } => node(&kind),
     };
     match result {
@@ -221,6 +247,13 @@ fn cat(path: &Path, topic: Option<&str>) -> Result<bool> {
         }
     }
     out.flush().map_or_else(gone_or_failed, |()| Ok(true))
+}
+
+/// Removes what dead runs left; false if something of it is still there.
+fn clean(dry_run: bool, json: bool) -> Result<bool> {
+    let report = clean::clean(dry_run)?;
+    print_text(&if json { serde_json::to_string_pretty(&report)? } else { report.to_string() })?;
+    Ok(report.is_done())
 }
 
 /// Runs a process of a run; what it says goes to the launcher's log.

@@ -165,10 +165,14 @@ impl<'a> Successions<'a> {
         Self { plan, control, run_dir, roster, seats, pending, reports: Vec::new() }
     }
 
-    /// Has `successor` join at the next tick boundary once its process is prepared, and take over after
-    /// `shadow_ticks`.
-    pub fn request_swap(&mut self, successor: Successor, shadow_ticks: u32) {
-        let join = Join::Next { shadow_ticks: Some(shadow_ticks) };
+    /// Has `successor` join and take over after `shadow_ticks`: at `at_tick`, or as soon as its process is
+    /// prepared.
+    pub fn request_swap(&mut self, mut successor: Successor, shadow_ticks: u32, at_tick: Option<u32>) {
+        let join = match at_tick {
+            Some(tick) => Join::At(tick.saturating_sub(shadow_ticks)),
+            None => Join::Next { shadow_ticks: Some(shadow_ticks) },
+        };
+        successor.take_over_tick = at_tick;
         self.pending.push_back(Pending { successor, purpose: Purpose::Swap, is_planned: true, join });
     }
 
@@ -280,6 +284,17 @@ impl<'a> Successions<'a> {
         self.control.held_at().map_or(0, |held| held.next_multiple_of(period))
     }
 
+    /// A node whose candidate was to join at a tick that the run has passed.
+    pub fn too_late(&self) -> Option<usize> {
+        let held = self.control.held_at()?;
+        self.seats.iter().position(|seats| {
+            seats.candidate.as_ref().is_some_and(|candidate| {
+                candidate.stage == Stage::Starting
+                    && matches!(candidate.pending.join, Join::At(tick) if tick < held)
+            })
+        })
+    }
+
     fn is_prepared(&self, candidate: &Candidate) -> bool {
         let member = self.member(candidate.pending.successor.node, candidate.generation);
         self.control.is_ready(member, Phase::Connecting)
@@ -370,7 +385,7 @@ impl<'a> Successions<'a> {
             Stage::Starting => self.let_join(node)?,
             Stage::Joining => self.announce(node),
             Stage::Announced => self.let_compute(node),
-            Stage::Shadowing => self.commit(node),
+            Stage::Shadowing => self.commit(node)?,
             Stage::Retiring => self.close(node, processes),
         }
         if let Some(candidate) = &mut self.seats[node].candidate {
@@ -405,7 +420,7 @@ impl<'a> Successions<'a> {
         let (plan, control) = (self.plan, self.control);
         let active = plan.member(node, self.roster.nodes[node].active.generation);
         let successor = &candidate.pending.successor;
-        let sent = |topic: usize| control.sent_ticks(topic);
+        let sent = |topic: usize| control.ticks_sent(topic);
         let outputs = &successor.plan.outputs;
         let (join_tick, take_over_tick) = match candidate.pending.join {
             Join::At(tick) => (tick, successor.take_over_tick.unwrap_or(u32::MAX)),
@@ -471,7 +486,7 @@ impl<'a> Successions<'a> {
     }
 
     /// Its first tick is done: from now on it is the active one.
-    fn commit(&mut self, node: usize) {
+    fn commit(&mut self, node: usize) -> Result<()> {
         let roster = &mut self.roster.nodes[node];
         let take_over_tick = roster.take_over_tick;
         let former = roster.active.generation;
@@ -486,6 +501,8 @@ impl<'a> Successions<'a> {
             candidate.former = Some(former);
             candidate.stage = Stage::Retiring;
         }
+        // Every node knows already: this is for those who look at the run from outside.
+        Ok(self.roster.store(self.run_dir)?)
     }
 
     fn set_stage(&mut self, node: usize, stage: Stage) {
@@ -560,7 +577,7 @@ impl<'a> Successions<'a> {
         let roster = &mut self.roster.nodes[node];
         roster.take_over_tick = control.done(active);
         let outputs = roster.active.plan.outputs.iter();
-        roster.take_over_ticks = outputs.map(|output| control.sent_ticks(output.topic)).collect();
+        roster.take_over_ticks = outputs.map(|output| control.ticks_sent(output.topic)).collect();
         self.roster.epoch += 1;
         self.roster.store(self.run_dir)?;
         control.set_seat(active, Seat::Empty);

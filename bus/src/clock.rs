@@ -20,6 +20,7 @@ pub fn run() -> Result<(), BusError> {
 
 /// Runs the clock of `plan` until the run is over.
 pub(crate) fn serve(plan: &Plan, control: &Control) -> Result<(), BusError> {
+    control.set_clock_process();
     let clock = Clock::new(plan, control);
     for phase in [Phase::Connecting, Phase::Running] {
         clock.gather(phase)?;
@@ -84,7 +85,7 @@ impl<'a> Clock<'a> {
             if granted >= end {
                 return Ok(end);
             }
-            if self.control.hold_tick() <= granted {
+            if self.control.boundary() <= granted {
                 self.await_all(granted)?;
                 self.control.hold(granted, || self.is_stop_asked_for());
                 deadlines = None;
@@ -109,7 +110,7 @@ impl<'a> Clock<'a> {
         let window = self.plan.window_ticks.max(1);
         // Granting half a window at a time lets fast nodes go on while the slowest catches up.
         let stride = (window / 2).max(1);
-        let limit = end.min(self.control.hold_tick());
+        let limit = end.min(self.control.boundary());
         let target = limit.min(self.slowest().saturating_add(window)).max(granted);
         self.grant(target);
         if target < limit {
@@ -150,7 +151,7 @@ impl<'a> Clock<'a> {
     fn sleep_until(&self, tick: u32, deadline_ns: u64, factor: f64) -> bool {
         loop {
             if self.is_stop_asked_for()
-                || self.control.hold_tick() <= tick
+                || self.control.boundary() <= tick
                 || self.control.pace() != Pace::Factor(factor)
             {
                 return false;

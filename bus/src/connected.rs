@@ -88,6 +88,7 @@ impl ConnectedNode {
         };
         node.connect_inputs(declared, roster)?;
         node.agree_with(roster, first_tick)?;
+        node.links.control.set_process(node.links.member());
         node.links.control.agree(node.links.member(), roster.epoch);
         Ok(node)
     }
@@ -378,7 +379,7 @@ impl ConnectedNode {
         let links = &self.links;
         let node = &links.node.name;
         for input in &mut self.inputs {
-            input.take(tick, node)?;
+            input.take(tick, node).inspect_err(|_| links.control.count_gap(input.topic))?;
         }
         for port in &mut self.predecessor {
             port.take_available(tick, node)?;
@@ -396,6 +397,7 @@ impl ConnectedNode {
             reason,
         })?;
         let done_ns = monotonic_ns();
+        links.control.count_step(links.member(), done_ns - received_ns);
         // Before anything is sent: whoever sees the sample can go on from the state after it.
         self.state_state(tick + self.links.node.period_ticks, state);
         self.send(tick, time_ns, received_ns, done_ns)?;

@@ -4,9 +4,10 @@
 //! ticks that are complete; an *edge* belongs to one reader of one word and holds the count that
 //! this reader sleeps for. A writer stores its word, then looks at the edges that read it, and wakes
 //! only those whose count is reached: nobody is woken for nothing, and nobody pays a system call
-//! for a reader that is awake.
+//! for a reader that is awake. Behind the edges every node counts its step times (`live.rs`).
 
 use crate::error::BusError;
+use crate::live::STEP_SLOTS;
 use crate::plan::{InputPlan, Pace, Plan, SEATS, Wait};
 use memmap2::MmapRaw;
 use rustix::thread::futex;
@@ -153,6 +154,7 @@ impl Control {
         control.word(0, 2).store(plan.duration_ticks, SeqCst);
         control.set_pace(plan.pace);
         control.set_hold_tick(u32::MAX);
+        control.set_join_tick(u32::MAX);
         control.word(1, 3).store(NOT_HELD, SeqCst);
         // Generation 0 of every node is there from the start.
         (0..plan.nodes.len()).for_each(|member| control.set_seat(member, Seat::Taken));
@@ -191,7 +193,7 @@ impl Control {
     }
 
     /// Word `index` (0…15) of slot `slot`.
-    fn word(&self, slot: usize, index: usize) -> &AtomicU32 {
+    pub(crate) fn word(&self, slot: usize, index: usize) -> &AtomicU32 {
         let offset = slot * SLOT_BYTES + index * 4;
         assert!(index < 16 && offset + 4 <= self.map.len(), "slot {slot} is outside the control segment");
         // SAFETY: the mapping lives as long as `self`, the offset is inside it (asserted) and a
@@ -211,15 +213,24 @@ impl Control {
     fn tick_word(&self, word: Word) -> &AtomicU32 {
         match word {
             Word::Grant => self.word(1, 0),
-            Word::Topic(topic) => self.word(2 + topic, 0),
+            Word::Topic(topic) => self.word(self.topic_slot(topic), 0),
             Word::Shadow(topic) => self.word(2 + self.topics + topic, 0),
             Word::Done(member) => self.word(self.member_slot(member), 1),
             Word::State(member) => self.word(self.member_slot(member), 2),
         }
     }
 
-    fn member_slot(&self, member: usize) -> usize {
+    pub(crate) fn topic_slot(&self, topic: usize) -> usize {
+        2 + topic
+    }
+
+    pub(crate) fn member_slot(&self, member: usize) -> usize {
         2 + 2 * self.topics + member
+    }
+
+    /// The first of the slots that count the step times of `member`: behind those of the edges.
+    pub(crate) fn step_slot(&self, member: usize) -> usize {
+        2 + 2 * self.topics + self.members + self.edge_slots() + member * STEP_SLOTS
     }
 
     fn edge_slots(&self) -> usize {
@@ -303,7 +314,7 @@ impl Control {
     fn wake_everybody(&self) {
         (0..self.edge_slots()).for_each(|edge| wake_edge(self.edge_at(edge)));
         wake_all(self.word(0, 1));
-        wake_all(self.word(1, 2));
+        wake_all(self.word(1, 9));
         for member in 0..self.members {
             [READY, SEAT].into_iter().for_each(|index| wake_all(self.word(self.member_slot(member), index)));
         }
@@ -458,6 +469,12 @@ impl Control {
         self.tell_supervisor();
     }
 
+    /// Ticks that may be computed.
+    #[must_use]
+    pub fn granted_ticks(&self) -> u32 {
+        self.count(Word::Grant)
+    }
+
     /// The newest roster with which `member` agrees.
     #[must_use]
     pub fn agreed_epoch(&self, member: usize) -> u32 {
@@ -499,13 +516,7 @@ impl Control {
         self.count(Word::Done(member))
     }
 
-    /// Ticks of `topic` whose sample has been sent.
-    #[must_use]
-    pub fn sent_ticks(&self, topic: usize) -> u32 {
-        self.count(Word::Topic(topic))
-    }
-
-    /// The tick boundary at which the clock waits: no tick from it on is granted.
+    /// The tick boundary at which a user wants the clock to wait; `u32::MAX` if nobody does.
     #[must_use]
     pub fn hold_tick(&self) -> u32 {
         self.word(1, 2).load(SeqCst)
@@ -515,7 +526,24 @@ impl Control {
     /// lets it run.
     pub fn set_hold_tick(&self, tick: u32) {
         self.word(1, 2).store(tick, SeqCst);
-        wake_all(self.word(1, 2));
+        self.tell_clock();
+    }
+
+    /// The same for the supervisor, who holds the clock where a process joins.
+    pub fn set_join_tick(&self, tick: u32) {
+        if self.word(1, 8).swap(tick, SeqCst) != tick {
+            self.tell_clock();
+        }
+    }
+
+    /// The boundary beyond which no tick is granted now.
+    pub(crate) fn boundary(&self) -> u32 {
+        self.hold_tick().min(self.word(1, 8).load(SeqCst))
+    }
+
+    fn tell_clock(&self) {
+        self.word(1, 9).fetch_add(1, SeqCst);
+        wake_all(self.word(1, 9));
     }
 
     /// The boundary at which the clock waits now: every node has completed the ticks before it, and none
@@ -527,16 +555,23 @@ impl Control {
 
     /// Waits in the hold at `tick` until it is lifted or the run is stopped.
     pub(crate) fn hold(&self, tick: u32, is_over: impl Fn() -> bool) {
-        self.word(1, 3).store(tick, SeqCst);
-        self.tell_supervisor();
+        let is_lifted = || self.boundary() > tick || self.is_aborted() || is_over();
         loop {
-            let hold_tick = self.hold_tick();
-            if hold_tick > tick || self.is_aborted() || is_over() {
-                break;
+            self.word(1, 3).store(tick, SeqCst);
+            self.tell_supervisor();
+            loop {
+                let changes = self.word(1, 9).load(SeqCst);
+                if is_lifted() {
+                    break;
+                }
+                let _ = futex::wait(self.word(1, 9), futex::Flags::empty(), changes, Some(&HOLD_NAP));
             }
-            let _ = futex::wait(self.word(1, 2), futex::Flags::empty(), hold_tick, Some(&HOLD_NAP));
+            self.word(1, 3).store(NOT_HELD, SeqCst);
+            // Who asked for another hold before this store may have taken the lifted one for it: so it is kept.
+            if is_lifted() {
+                return;
+            }
         }
-        self.word(1, 3).store(NOT_HELD, SeqCst);
     }
 
     /// The pace at which the clock grants ticks.
@@ -684,8 +719,8 @@ fn members(plan: &Plan) -> usize {
 }
 
 fn segment_bytes(plan: &Plan) -> usize {
-    let slots = 2 + 2 * plan.topics.len() + 4 * members(plan) + 2 * SEATS * plan.edge_count();
-    SLOT_BYTES * slots
+    let edges = 3 * members(plan) + 2 * SEATS * plan.edge_count();
+    SLOT_BYTES * (2 + 2 * plan.topics.len() + members(plan) + edges + STEP_SLOTS * members(plan))
 }
 
 fn wake_edge(edge: &AtomicU32) {

@@ -11,6 +11,7 @@ pub mod error;
 pub mod handover;
 pub mod initial;
 pub mod kind;
+mod live;
 pub mod message;
 pub mod messages;
 mod node;
@@ -20,6 +21,7 @@ pub mod process;
 pub mod random;
 pub mod roster;
 pub mod schema;
+pub mod step_times;
 mod tick;
 mod transport;
 

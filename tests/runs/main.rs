@@ -4,6 +4,9 @@
 //! - [`recordings`]: recordings read back and compared
 //! - [`nodes`]: the processes that the tests put into runs
 //! - [`determinism`]: a run is a function of its manifest
+//! - [`live`]: runs that are watched and steered
+//! - [`clean`]: what dead runs left is removed, and nothing of live ones
+//! - [`terminal`]: a terminal for a program under test
 //! - [`loss`]: every sample is recorded
 //! - [`contract`]: what a node sees and sends at a tick
 //! - [`failures`]: nodes that fail, in every way
@@ -12,15 +15,18 @@
 //! - [`commands`]: the other subcommands, exit codes and JSON
 //! - [`replay`]: the measured flight
 
+mod clean;
 mod cleanup;
 mod commands;
 mod contract;
 mod determinism;
 mod documentation;
 mod failures;
+mod live;
 mod loss;
 mod nodes;
 mod recordings;
 mod refusals;
 mod replay;
 mod support;
+mod terminal;

@@ -61,11 +61,9 @@ impl Place {
     pub fn start_with(&self, words: &[&str], variables: &[(&str, &str)]) -> Launch<'_> {
         let output = tempfile::NamedTempFile::new_in(self.folder.path()).unwrap().into_temp_path();
         let error = tempfile::NamedTempFile::new_in(self.folder.path()).unwrap().into_temp_path();
-        let child = Command::new(HUMMINGBUS)
+        let child = self
+            .mark(&mut Command::new(HUMMINGBUS))
             .args(words)
-            .env("TMPDIR", self.temporary())
-            .env("RUST_BACKTRACE", "0")
-            .env_remove("HUMMINGBUS_DATA")
             .envs(variables.iter().copied())
             .stdin(Stdio::null())
             .stdout(File::create(&output).unwrap())
@@ -74,6 +72,11 @@ impl Place {
             .unwrap();
         self.launchers.borrow_mut().push(child.id());
         Launch { place: self, child, words: words.join(" "), output, error, status: None }
+    }
+
+    /// Gives `command` the environment of this test, by which its processes are known.
+    pub fn mark<'a>(&self, command: &'a mut Command) -> &'a mut Command {
+        command.env("TMPDIR", self.temporary()).env("RUST_BACKTRACE", "0").env_remove("HUMMINGBUS_DATA")
     }
 
     /// Runs `hummingbus` with `words` to its end; it must leave nothing behind.
@@ -109,12 +112,24 @@ impl Place {
         poll("processes that outlive their run", || self.processes().is_empty().then_some(()));
     }
 
+    /// The name of the run that is up.
+    pub fn run_id(&self) -> String {
+        let run_dirs = self.run_dirs();
+        let [run_dir] = &run_dirs[..] else { panic!("not one run but {run_dirs:?}") };
+        run_dir.file_name().unwrap().to_string_lossy().splitn(3, '-').last().unwrap().to_owned()
+    }
+
+    /// Everything that the runs of this folder left outside of their recordings.
+    pub fn left(&self) -> Vec<String> {
+        self.launchers.borrow().iter().flat_map(|&launcher| self.left_behind(launcher)).collect()
+    }
+
     /// The directories of the runs that are up.
     fn run_dirs(&self) -> Vec<PathBuf> {
         entries(&self.temporary())
     }
 
-    /// Everything that the runs of this folder left outside of their recordings.
+    /// What the runs of `launcher` left, and everything in the folder for temporary files.
     fn left_behind(&self, launcher: u32) -> Vec<String> {
         let processes = self.processes().into_iter().map(|(pid, node)| format!("process {pid:?} ({node})"));
         let files = entries(&self.temporary()).into_iter().chain(shared_memory(launcher));
@@ -152,7 +167,7 @@ fn entries(folder: &Path) -> Vec<PathBuf> {
 }
 
 /// Looks until there is an answer, or the watchdog bites.
-fn poll<T>(what: &str, mut look: impl FnMut() -> Option<T>) -> T {
+pub fn poll<T>(what: &str, mut look: impl FnMut() -> Option<T>) -> T {
     let start = Instant::now();
     loop {
         if let Some(answer) = look() {
