@@ -15,6 +15,7 @@ mod node;
 pub mod plan;
 mod port;
 pub mod process;
+pub mod profile;
 pub mod random;
 pub mod schema;
 mod transport;

@@ -7,6 +7,7 @@ use crate::initial;
 use crate::message::Message;
 use crate::plan::{InputPlan, NodePlan, Pace, Plan};
 use crate::port::{InPort, OutPort};
+use crate::profile::TickWriter;
 use crate::schema::Schema;
 use crate::transport::{Capacity, Transport};
 use serde::de::DeserializeOwned;
@@ -215,6 +216,9 @@ impl Node {
         self.require_all_declared()?;
         let control = Control::open(&self.plan)?;
         crate::process::stay_on(self.node().cpu);
+        if self.plan.lock_memory {
+            crate::process::lock_memory()?;
+        }
         if self.plan.pace == Pace::Free {
             crate::process::wait_for_turn();
         }
@@ -223,7 +227,10 @@ impl Node {
         control.set_ready(self.index, Phase::Connecting);
         go_on(control.wait_phase(Phase::Connecting))?;
         let (inputs, announcements) = self.connect_inputs(&transport)?;
-        Ok(ConnectedNode { plan: self.plan, index: self.index, control, inputs, outputs, announcements })
+        let profile = self.plan.profile.then(|| TickWriter::create(&self.run_dir, &self.plan, self.index));
+        let profile = profile.transpose()?;
+        let (plan, index) = (self.plan, self.index);
+        Ok(ConnectedNode { plan, index, control, inputs, outputs, announcements, profile })
     }
 
     fn require_all_declared(&self) -> Result<(), BusError> {
@@ -325,6 +332,7 @@ pub struct ConnectedNode {
     inputs: Vec<InPort>,
     outputs: Vec<OutPort>,
     announcements: Vec<Announcement>,
+    profile: Option<TickWriter>,
 }
 
 impl ConnectedNode {
@@ -412,9 +420,13 @@ impl ConnectedNode {
         })?;
         let done_ns = monotonic_ns();
         let mut sent_before = false;
-        for output in self.outputs.iter_mut().filter(|output| output.is_due(tick)) {
+        let due = |(_, output): &(usize, &mut OutPort)| output.is_due(tick);
+        for (index, output) in self.outputs.iter_mut().enumerate().filter(due) {
             // The first output is sent at once: one look at the clock serves for both times.
             let sent_ns = if sent_before { monotonic_ns() } else { done_ns };
+            if let Some(profile) = &mut self.profile {
+                profile.sent(index, sent_ns);
+            }
             output.send(tick, time_ns, [received_ns, done_ns, sent_ns], node)?;
             self.control.advance(Word::Topic(output.topic), tick + output.period_ticks, &output.readers);
             sent_before = true;
@@ -422,6 +434,9 @@ impl ConnectedNode {
         self.outputs.iter_mut().for_each(OutPort::forget);
         // Readers are awake by now: what the next tick needs is fetched while they compute.
         self.outputs.iter_mut().try_for_each(|output| output.prepare(node))?;
+        if let Some(profile) = &mut self.profile {
+            profile.end(tick, received_ns, done_ns, monotonic_ns());
+        }
         Ok(())
     }
 }
@@ -622,7 +637,7 @@ mod tests {
         let (source, sink) = std::thread::scope(|scope| {
             let source = scope.spawn(|| fly_source(folder.path()));
             let sink = scope.spawn(|| fly_sink(folder.path()));
-            crate::clock::serve(&plan, &control).unwrap();
+            crate::clock::serve(&plan, &control, None).unwrap();
             (source.join().unwrap().unwrap(), sink.join().unwrap().unwrap())
         });
         remove_shared_memory(&plan.run_id);

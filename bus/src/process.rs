@@ -76,6 +76,20 @@ pub(crate) fn wait_for_turn() {
     let _ = unsafe { libc::sched_setscheduler(0, libc::SCHED_BATCH, &raw const parameters) };
 }
 
+/// Keeps all memory of this process, now and from now on, from being paged out.
+///
+/// # Errors
+/// If the system does not allow this much; the error names the right.
+pub(crate) fn lock_memory() -> Result<(), BusError> {
+    let all = rustix::mm::MlockAllFlags::CURRENT | rustix::mm::MlockAllFlags::FUTURE;
+    rustix::mm::mlockall(all).map_err(|error| BusError::Denied {
+        action: "lock the memory of this process (run.lock_memory)",
+        source: error.into(),
+        advice: "give it the capability CAP_IPC_LOCK or raise the limit on locked memory (`ulimit -l`, \
+                 `memlock` in limits.conf, `LimitMEMLOCK=` in systemd)",
+    })
+}
+
 /// Kills every process of the group that process `leader` leads.
 pub fn kill_group(leader: u32) {
     let group = i32::try_from(leader).ok().and_then(rustix::process::Pid::from_raw);
