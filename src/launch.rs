@@ -3,6 +3,7 @@
 
 use crate::graph::Graph;
 use crate::manifest::Manifest;
+use crate::profile::Flight;
 use crate::program::Executable;
 use crate::progress::Progress;
 use crate::run_dir::RunDir;
@@ -40,6 +41,8 @@ pub struct Outcome {
     pub missed_deadlines: u32,
     /// Per process: name, processor share of one core, deadlines at which it was late.
     pub processes: Vec<(String, f64, u32)>,
+    /// The host times that the processes noted, in a run that is profiled.
+    pub flight: Option<Flight>,
 }
 
 /// Flies `graph` and records to `recording`; returns when every process is gone.
@@ -57,7 +60,11 @@ pub fn fly(manifest: &Manifest, graph: &mut Graph, recording: &Path, quiet: bool
     let progress = Progress::new(&graph.plan, quiet);
     let was_stopped = watch(&mut processes, &control, &graph.plan, &interrupts, &progress)?;
     progress.finish(&control);
-    Ok(outcome(&graph.plan, &control, was_stopped))
+    let mut outcome = outcome(&graph.plan, &control, was_stopped);
+    if graph.plan.profile {
+        outcome.flight = Some(Flight::open(&graph.plan, run_dir.path(), outcome.ticks)?);
+    }
+    Ok(outcome)
 }
 
 /// Counts Ctrl-C and SIGTERM from now on instead of dying of them.
@@ -351,5 +358,6 @@ fn outcome(plan: &Plan, control: &Control, was_stopped: bool) -> Outcome {
         host_s,
         missed_deadlines: control.missed_deadlines(),
         processes: std::iter::once(clock).chain(nodes).collect(),
+        flight: None,
     }
 }

@@ -107,8 +107,7 @@ impl GrantWriter {
     /// Notes that the ticks before `end_tick` were granted at host time `granted_ns`.
     pub fn grant_at(&mut self, end_tick: u32, deadline_ns: Option<u64>, granted_ns: u64) {
         if end_tick > self.granted {
-            let words =
-                [u64::from(self.granted), u64::from(end_tick), deadline_ns.unwrap_or(0), granted_ns];
+            let words = [u64::from(self.granted), u64::from(end_tick), deadline_ns.unwrap_or(0), granted_ns];
             self.records.record().copy_from_slice(&words);
             self.records.commit();
             self.granted = end_tick;
