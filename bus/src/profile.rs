@@ -348,3 +348,115 @@ impl RecordReader {
         self.all_words().get(start..start + self.words)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::{GrantReader, GrantWriter, TickReader, TickWriter, path};
+    use crate::plan::{NodePlan, OutputPlan, Pace, Plan, Wait};
+
+    fn plan(period_ticks: u32) -> Plan {
+        let output = |port: &str| OutputPlan { port: port.to_owned(), topic: 0 };
+        let node = NodePlan {
+            name: "arm/left".to_owned(),
+            period_ticks,
+            wait: Wait::Block,
+            cpu: None,
+            inputs: vec![],
+            outputs: vec![output("a"), output("b")],
+            parameters: serde_json::Value::Null,
+        };
+        Plan {
+            run_id: "profile".to_owned(),
+            seed: 0,
+            tick_ns: 1000,
+            duration_ticks: 30,
+            window_ticks: 1,
+            pace: Pace::Free,
+            clock_cpu: None,
+            profile: true,
+            lock_memory: false,
+            topics: vec![],
+            nodes: vec![node],
+        }
+    }
+
+    #[test]
+    fn what_was_noted_is_read_by_tick() {
+        let (folder, plan) = (tempfile::tempdir().unwrap(), plan(10));
+        let mut writer = TickWriter::create(folder.path(), &plan, 0).unwrap();
+        for tick in [0, 10, 20] {
+            let at = 100 * u64::from(tick);
+            writer.sent(1, at + 3);
+            writer.end(tick, at + 1, at + 2, at + 4);
+        }
+        let reader = TickReader::open(folder.path(), &plan, 0).unwrap();
+        assert_eq!((reader.count(), reader.left_out()), (3, 0));
+        let times = reader.at(10).unwrap();
+        let found = [times.began_ns.unwrap(), times.received_ns, times.done_ns, times.ended_ns];
+        assert_eq!(found, [4, 1001, 1002, 1004]);
+        assert_eq!(times.sent_ns, [0, 1003]);
+        assert_eq!(reader.at(0).unwrap().began_ns, None);
+        assert_eq!([5, 11, 30, u32::MAX].map(|tick| reader.at(tick)), [None; 4]);
+    }
+
+    #[test]
+    fn a_full_file_counts_what_it_leaves_out() {
+        let (folder, plan) = (tempfile::tempdir().unwrap(), plan(10));
+        let mut writer = TickWriter::create(folder.path(), &plan, 0).unwrap();
+        (0..5).for_each(|index| writer.end(10 * index, 1, 2, 3));
+        let reader = TickReader::open(folder.path(), &plan, 0).unwrap();
+        assert_eq!((reader.count(), reader.left_out()), (3, 2));
+        assert!(reader.at(20).is_some() && reader.at(30).is_none());
+    }
+
+    #[test]
+    fn a_process_that_takes_a_node_over_adds_to_what_was_noted() {
+        let (folder, plan) = (tempfile::tempdir().unwrap(), plan(1));
+        let mut first = TickWriter::create(folder.path(), &plan, 0).unwrap();
+        let mut second = TickWriter::create(folder.path(), &plan, 0).unwrap();
+        for tick in 0..4 {
+            first.sent(0, 7);
+            first.end(tick, 10, 11, 12);
+        }
+        // From tick 2 on the second process computes too, from tick 4 on it sends.
+        for tick in 2..6 {
+            if tick >= 4 {
+                second.sent(0, 8);
+            }
+            second.end(tick, 20, 21, 22);
+        }
+        let reader = TickReader::open(folder.path(), &plan, 0).unwrap();
+        let received = (0..6).map(|tick| reader.at(tick).unwrap().received_ns);
+        assert_eq!(received.collect::<Vec<_>>(), [10, 10, 10, 10, 20, 20]);
+    }
+
+    #[test]
+    fn a_grant_covers_the_ticks_since_the_one_before() {
+        let (folder, plan) = (tempfile::tempdir().unwrap(), plan(1));
+        let mut writer = GrantWriter::create(folder.path(), &plan).unwrap();
+        for (end_tick, granted_ns) in [(3, 100), (3, 110), (5, 120), (30, 130)] {
+            writer.grant_at(end_tick, (end_tick == 5).then_some(115), granted_ns);
+        }
+        let reader = GrantReader::open(folder.path()).unwrap();
+        assert_eq!(reader.grants().count(), 3, "one that grants nothing is none");
+        let granted = [0, 2, 3, 4, 5, 29].map(|tick| reader.of(tick).unwrap().granted_ns);
+        assert_eq!(granted, [100, 100, 120, 120, 130, 130]);
+        assert_eq!(reader.of(4).unwrap().deadline_ns, Some(115));
+        assert_eq!(reader.of(30), None);
+    }
+
+    #[test]
+    fn a_damaged_file_is_refused_by_its_name() {
+        let (folder, plan) = (tempfile::tempdir().unwrap(), plan(1));
+        drop(TickWriter::create(folder.path(), &plan, 0).unwrap());
+        let file = path(folder.path(), "0", 0);
+        let whole = std::fs::read(&file).unwrap();
+        let mut claims_more = whole.clone();
+        claims_more[16..24].copy_from_slice(&u64::MAX.to_le_bytes());
+        for damaged in [&whole[..30], &whole[..7], b"", &[b'x'; 64], &claims_more] {
+            std::fs::write(&file, damaged).unwrap();
+            let error = TickReader::open(folder.path(), &plan, 0).unwrap_err().to_string();
+            assert!(error.contains("profile-0.0.bin"), "{error}");
+        }
+    }
+}

@@ -49,7 +49,10 @@ function steps(histogram, colour) {
     y.push(count, count);
     next = bin + 1;
   }
-  return { x, y, name: histogram.name, mode: "lines", line: { color: colour, width: 2 }, hovertemplate: "%{x:.3~s} µs: %{y}" };
+  return {
+    x, y, name: histogram.name, mode: "lines", line: { color: colour, width: 2 },
+    hovertemplate: "%{x:.3~s} µs: %{y}",
+  };
 }
 
 function logarithmic(title, x, y) {
@@ -63,13 +66,25 @@ function logarithmic(title, x, y) {
   };
 }
 
+// One legend for all histograms: in each it would take a fifth of the plot.
+function drawLegend() {
+  for (const part of data.parts) {
+    const mark = document.createElement("span");
+    mark.className = "mark";
+    mark.style.background = COLOURS[part];
+    element("legend").append(mark, `${part} `);
+  }
+}
+
 function drawHistograms() {
+  drawLegend();
   for (const node of data.nodes) {
     const plot = document.createElement("div");
     plot.className = "small";
     element("histograms").append(plot);
     const traces = node.parts.map((part) => steps(part, COLOURS[part.name]));
-    Plotly.newPlot(plot, traces, logarithmic(node.name, "µs", "ticks"), CONFIG);
+    const layout = { ...logarithmic(node.name, "µs", "ticks"), showlegend: false };
+    Plotly.newPlot(plot, traces, layout, { ...CONFIG, displayModeBar: false });
   }
 }
 
@@ -92,14 +107,14 @@ function drawPath() {
 
 function drawTimeline(slow) {
   const nodes = profile.nodes.map((node) => node.name);
-  const bars = Object.keys(COLOURS).map((part) => {
-    const own = slow.bars.filter((bar) => bar.part === part);
+  const bars = data.parts.map((part, index) => {
+    const own = slow.bars.filter((bar) => bar[1] === index);
+    const described = ([, , tick, , , whole, cause]) =>
+      `tick ${tick}, ${part}: ${microseconds(whole)} µs` + (cause ? `<br>for ${cause}` : "");
     return {
       type: "bar", orientation: "h", name: part, marker: { color: COLOURS[part] },
-      y: own.map((bar) => bar.node), base: own.map((bar) => bar.start), x: own.map((bar) => bar.length),
-      customdata: own.map((bar) => `tick ${bar.tick}, ${part}: ${microseconds(bar.whole)} µs` +
-        (bar.for && part !== "compute" && part !== "publish" ? `<br>for ${bar.for}` : "")),
-      hovertemplate: "%{y}<br>%{customdata}<extra></extra>",
+      y: own.map(([node]) => nodes[node]), base: own.map((bar) => bar[3]), x: own.map((bar) => bar[4]),
+      customdata: own.map(described), hovertemplate: "%{y}<br>%{customdata}<extra></extra>",
     };
   });
   // A hop belongs to the node that is reached by it.

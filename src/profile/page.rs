@@ -18,6 +18,10 @@ const PLOTLY: &str = include_str!("plotly-basic.min.js");
 
 /// Slowest ticks on the page.
 const SLOWEST_TICKS: usize = 20;
+/// Bars on a timeline at most: the longest.
+const BARS_MAX: usize = 1500;
+/// The parts of a tick, as `page.js` numbers them.
+const PARTS: [&str; 4] = ["wait", "wake-up", "compute", "publish"];
 /// Points of the course of the tick time over the run: of the ticks that fall on one, the slowest is shown.
 const COURSE_POINTS: usize = 2000;
 /// Bins per decade of the histograms.
@@ -44,20 +48,16 @@ fn escaped(json: &str) -> String {
 fn data(run: &str, flight: &Flight, profile: &Profile) -> Value {
     let histogram = |name: &str, times: &Times| json!({ "name": name, "bins": times.bins(BINS_PER_DECADE) });
     let nodes = profile.nodes.iter().map(|node| {
-        let parts = [
-            ("wait", &node.wait),
-            ("wake-up", &node.wake_up),
-            ("compute", &node.compute),
-            ("publish", &node.publish),
-        ];
-        let parts = parts.map(|(name, times)| histogram(name, times));
-        json!({ "name": node.name, "parts": parts })
+        let times = [&node.wait, &node.wake_up, &node.compute, &node.publish];
+        let parts = PARTS.iter().zip(times).map(|(name, times)| histogram(name, times));
+        json!({ "name": node.name, "parts": parts.collect::<Vec<_>>() })
     });
     let jitter = profile.pacing.as_ref().map(|pacing| histogram("deadline to grant", &pacing.jitter));
     json!({
         "run": run,
         "profile": profile,
         "bins_per_decade": BINS_PER_DECADE,
+        "parts": PARTS,
         "nodes": nodes.collect::<Vec<_>>(),
         "tick_time": histogram("tick", &profile.critical_path.tick_time),
         "jitter": jitter,
@@ -71,7 +71,7 @@ fn course(profile: &Profile, tick_s: f64) -> Vec<[f64; 2]> {
     let lengths = &profile.critical_path.lengths_ns;
     let slowest = |ticks: &[(u32, u64)]| ticks.iter().max_by_key(|(_, ns)| *ns).copied();
     let points = lengths.chunks(lengths.len().div_ceil(COURSE_POINTS).max(1)).filter_map(slowest);
-    points.map(|(tick, ns)| [f64::from(tick) * tick_s, ns as f64 * 1e-3]).collect()
+    points.map(|(tick, ns)| [f64::from(tick) * tick_s, ns as f64 / 1e3]).collect()
 }
 
 fn slowest(flight: &Flight, profile: &Profile) -> Vec<Value> {
@@ -92,6 +92,8 @@ fn timeline(flight: &Flight, closing: &[usize], tick: u32) -> Option<Value> {
             bars.extend(node_bars(flight, node, &times, &window));
         }
     }
+    bars.sort_by_key(|bar: &Bar| std::cmp::Reverse(bar.end_ns - bar.start_ns));
+    let bars: Vec<Value> = bars.iter().take(BARS_MAX).map(|bar| bar.json(flight, &window)).collect();
     let places = path.0.iter().map(|stretch| {
         json!({
             "place": name(flight, stretch.place),
@@ -102,7 +104,7 @@ fn timeline(flight: &Flight, closing: &[usize], tick: u32) -> Option<Value> {
     });
     Some(json!({
         "tick": tick,
-        "length_us": path.length_ns() as f64 * 1e-3,
+        "length_us": path.length_ns() as f64 / 1e3,
         "bars": bars,
         "path": places.collect::<Vec<_>>(),
     }))
@@ -131,38 +133,55 @@ impl Window {
 
     fn us(&self, ns: u64) -> f64 {
         if ns >= self.origin_ns {
-            (ns - self.origin_ns) as f64 * 1e-3
+            (ns - self.origin_ns) as f64 / 1e3
         } else {
-            -((self.origin_ns - ns) as f64) * 1e-3
+            -((self.origin_ns - ns) as f64) / 1e3
         }
     }
 }
 
-fn node_bars(flight: &Flight, node: usize, times: &TickTimes<'_>, window: &Window) -> Vec<Value> {
+/// A part of a node's tick.
+struct Bar {
+    node: usize,
+    tick: u32,
+    part: usize,
+    start_ns: u64,
+    end_ns: u64,
+    /// What the node waited for.
+    cause: Option<Cause>,
+}
+
+fn node_bars(flight: &Flight, node: usize, times: &TickTimes<'_>, window: &Window) -> Vec<Bar> {
     let began_ns = times.began_ns.unwrap_or(times.received_ns);
     let waited = flight.waited(node, times);
     let ready_ns = waited.map_or(began_ns, |waited| waited.ready_ns.clamp(began_ns, times.received_ns));
-    let bars = [
-        ("wait", began_ns, ready_ns),
-        ("wake-up", ready_ns, times.received_ns),
-        ("compute", times.received_ns, times.done_ns),
-        ("publish", times.done_ns, times.ended_ns),
-    ];
-    let is_seen = |(_, start_ns, end_ns): &(&str, u64, u64)| {
-        start_ns < end_ns && *end_ns > window.start_ns && *start_ns < window.end_ns
-    };
-    let why = waited.map(|waited| match waited.cause {
-        Cause::Sample { input, .. } => flight.topic_name(flight.plan.nodes[node].inputs[input].topic),
-        Cause::Grant => "grant",
-        Cause::Itself => "its own last tick",
+    let ends = [began_ns, ready_ns, times.received_ns, times.done_ns, times.ended_ns];
+    let is_seen =
+        |bar: &Bar| bar.start_ns < bar.end_ns && bar.end_ns > window.start_ns && bar.start_ns < window.end_ns;
+    let bars = ends.windows(2).enumerate().map(|(part, ends)| Bar {
+        node,
+        tick: times.tick,
+        part,
+        start_ns: ends[0],
+        end_ns: ends[1],
+        cause: waited.map(|waited| waited.cause).filter(|_| part < 2),
     });
-    let bar = |(part, start_ns, end_ns): (&str, u64, u64)| {
-        let (from_ns, to_ns) = (start_ns.max(window.start_ns), end_ns.min(window.end_ns));
-        json!({
-            "node": flight.node_name(node), "part": part, "tick": times.tick, "for": why,
-            "start": window.us(from_ns), "length": (to_ns - from_ns) as f64 * 1e-3,
-            "whole": (end_ns - start_ns) as f64 * 1e-3,
-        })
-    };
-    bars.into_iter().filter(is_seen).map(bar).collect()
+    bars.filter(is_seen).collect()
+}
+
+impl Bar {
+    /// Node, part, tick, start and length of what is seen and whole length in µs, what was waited for.
+    fn json(&self, flight: &Flight, window: &Window) -> Value {
+        let (from_ns, to_ns) = (self.start_ns.max(window.start_ns), self.end_ns.min(window.end_ns));
+        let why = self.cause.map(|cause| match cause {
+            Cause::Sample { input, .. } => {
+                flight.topic_name(flight.plan.nodes[self.node].inputs[input].topic)
+            }
+            Cause::Grant => "grant",
+            Cause::Itself => "its own tick before",
+        });
+        let us = |ns: u64| ns as f64 / 1e3;
+        let whole_ns = self.end_ns - self.start_ns;
+        json!([self.node, self.part, self.tick, window.us(from_ns), us(to_ns - from_ns), us(whole_ns), why])
+    }
 }

@@ -174,6 +174,6 @@ pub fn name(flight: &Flight, place: Place) -> String {
             format!("{} → {}", flight.topic_name(topic), flight.node_name(reader))
         }
         Place::Grant(node) => format!("grant → {}", flight.node_name(node)),
-        Place::Itself(node) => format!("{} after its own last tick", flight.node_name(node)),
+        Place::Itself(node) => format!("{} still busy", flight.node_name(node)),
     }
 }

@@ -1,10 +1,10 @@
 //! A profile on the terminal: within 100 columns unless names are long.
 
 use crate::profile::Profile;
-use crate::profile::times::Times;
+use crate::profile::times::{Quantiles, Times};
 use std::fmt::{self, Display, Formatter};
 
-const NAME_COLUMNS: usize = 42;
+const NAME_COLUMNS: usize = 52;
 
 impl Display for Profile {
     fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
@@ -24,11 +24,11 @@ impl Profile {
     fn write_nodes(&self, f: &mut Formatter<'_>) -> fmt::Result {
         head(f, "node, per tick [µs]")?;
         for node in &self.nodes {
-            row(f, &format!("{:<30} wait", node.name), &node.wait)?;
+            row(f, &format!("{:<40} wait", node.name), &node.wait)?;
             for (part, times) in
                 [("wake-up", &node.wake_up), ("compute", &node.compute), ("publish", &node.publish)]
             {
-                row(f, &format!("{:<30} {part}", ""), times)?;
+                row(f, &format!("{:<40} {part}", ""), times)?;
             }
         }
         Ok(())
@@ -45,8 +45,8 @@ impl Profile {
             if index == 0 || self.age[index - 1].command != age.command {
                 head(f, &format!("\nage in {} [µs]", age.command))?;
             }
-            row(f, &format!("{:<32} simulated", age.source), &age.simulated)?;
-            row(f, &format!("{:<32} host", ""), &age.host)?;
+            row(f, &format!("{:<40} simulated", age.source), &age.simulated)?;
+            row(f, &format!("{:<40} host", ""), &age.host)?;
         }
         Ok(())
     }
@@ -76,7 +76,7 @@ fn head(f: &mut Formatter<'_>, title: &str) -> fmt::Result {
     let (space, title) = title.strip_prefix('\n').map_or(("", title), |title| ("\n", title));
     let columns = ["count", "p50", "p90", "p99", "p99.9", "max"];
     write!(f, "{space}{title:<NAME_COLUMNS$}")?;
-    columns.iter().try_for_each(|column| write!(f, "{column:>9}"))?;
+    columns.iter().try_for_each(|column| write!(f, "{column:>8}"))?;
     writeln!(f)
 }
 
@@ -87,11 +87,12 @@ fn row(f: &mut Formatter<'_>, name: &str, times: &Times) -> fmt::Result {
         write!(f, "{name:<NAME_COLUMNS$}")?;
     }
     let quantiles = times.quantiles();
-    write!(f, "{:>9}", quantiles.count)?;
+    write!(f, "{:>8}", quantiles.count)?;
     if !times.is_empty() {
-        let values =
-            [quantiles.p50_us, quantiles.p90_us, quantiles.p99_us, quantiles.p99_9_us, quantiles.max_us];
-        values.iter().try_for_each(|us| write!(f, "{us:>9.1}"))?;
+        let Quantiles { p50_us, p90_us, p99_us, p99_9_us, max_us, .. } = quantiles;
+        let values = [p50_us, p90_us, p99_us, p99_9_us, max_us];
+        // Times of ten milliseconds and more keep their columns, and need no tenths.
+        values.iter().try_for_each(|&us| write!(f, "{us:>8.*}", usize::from(us < 1e4)))?;
     }
     writeln!(f)
 }

@@ -72,6 +72,16 @@ impl Times {
         }
         bins
     }
+
+    /// What was added, in ascending order; exact below 2 µs.
+    #[cfg(test)]
+    pub fn values(&self) -> Vec<u64> {
+        let times = |value: hdrhistogram::iterators::IterationValue<u64>| {
+            let count = usize::try_from(value.count_at_value()).unwrap_or(0);
+            std::iter::repeat_n(value.value_iterated_to(), count)
+        };
+        self.0.iter_recorded().flat_map(times).collect()
+    }
 }
 
 impl Serialize for Times {

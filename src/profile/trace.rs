@@ -156,7 +156,7 @@ impl<W: Write> Trace<'_, W> {
     }
 
     fn slice(&self, process: usize, name: &str, start_ns: u64, end_ns: u64, arguments: &Value) -> Value {
-        let duration_us = end_ns.saturating_sub(start_ns) as f64 * 1e-3;
+        let duration_us = end_ns.saturating_sub(start_ns) as f64 / 1e3;
         json!({
             "ph": "X", "cat": "tick", "name": name, "pid": process, "tid": 1, "ts": self.us(start_ns),
             "dur": duration_us, "args": arguments
@@ -164,7 +164,7 @@ impl<W: Write> Trace<'_, W> {
     }
 
     fn us(&self, ns: u64) -> f64 {
-        ns.saturating_sub(self.origin_ns) as f64 * 1e-3
+        ns.saturating_sub(self.origin_ns) as f64 / 1e3
     }
 
     fn event(&mut self, event: &Value, is_first: bool) -> io::Result<()> {

@@ -10,6 +10,7 @@
 //! - [`cleanup`]: runs that are stopped or killed
 //! - [`refusals`]: manifests that are wrong
 //! - [`commands`]: the other subcommands, exit codes and JSON
+//! - [`profile`]: where the host time of a run's ticks goes
 //! - [`replay`]: the measured flight
 
 mod cleanup;
@@ -20,6 +21,7 @@ mod documentation;
 mod failures;
 mod loss;
 mod nodes;
+mod profile;
 mod recordings;
 mod refusals;
 mod replay;
