@@ -45,7 +45,10 @@ impl<'a> Ages<'a> {
             order: flight.in_order(),
             in_node: vec![vec![None; topics]; nodes],
             in_sample: vec![vec![None; topics]; topics],
-            found: vec![vec![Default::default(); topics]; closing.len()],
+            found: vec![
+                vec![(Times::in_units(flight.plan.tick_ns), Times::default()); topics];
+                closing.len()
+            ],
             closing,
         }
     }

@@ -88,16 +88,23 @@ impl<W: Write> Trace<'_, W> {
     fn write_grants(&mut self) -> io::Result<()> {
         let is_in = |grant: &Grant| self.ticks.range(grant.first_tick..grant.end_tick).next().is_some();
         let grants: Vec<Grant> = self.flight.grants().filter(is_in).collect();
+        let mut free_from_ns = 0;
         for grant in grants {
             let name = format!("grant {}…{}", grant.first_tick, grant.end_tick - 1);
             let event = match grant.deadline_ns {
-                // From the deadline to the grant: its length is the jitter.
-                Some(deadline_ns) => self.slice(CLOCK, &name, deadline_ns, grant.granted_ns, &json!({})),
+                // From the deadline to the grant, without what it shares with a late grant before it.
+                Some(deadline_ns) => {
+                    let late_us = grant.granted_ns.saturating_sub(deadline_ns) as f64 / 1e3;
+                    let start_ns = deadline_ns.max(free_from_ns);
+                    let arguments = json!({ "late_us": late_us });
+                    self.slice(CLOCK, &name, start_ns, grant.granted_ns, &arguments)
+                }
                 None => json!({
                     "ph": "i", "s": "p", "name": name, "pid": CLOCK, "tid": 1, "ts": self.us(grant.granted_ns)
                 }),
             };
             self.event(&event, false)?;
+            free_from_ns = grant.granted_ns;
         }
         Ok(())
     }

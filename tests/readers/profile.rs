@@ -22,8 +22,8 @@ fn perfetto_finds_every_slice_and_every_hop() {
     // The same check must notice a slice that is missing, and a hop that leads nowhere.
     for (mark, what) in [("\"name\":\"compute\"", "slices"), ("\"ph\":\"f\"", "hops")] {
         let mut lines: Vec<_> = written.lines().collect();
-        let last = lines.iter().rposition(|line| line.contains(mark)).unwrap();
-        lines.remove(last);
+        let first = lines.iter().position(|line| line.contains(mark)).unwrap();
+        lines.remove(first);
         let difference = require_trace(&lines.join("\n"), &found).unwrap_err();
         assert!(difference.contains(what), "{difference}");
     }
