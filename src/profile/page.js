@@ -7,7 +7,10 @@ const profile = data.profile;
 // Distinguishable also without colour vision (Okabe and Ito).
 const COLOURS = { wait: "#c8ccd0", "wake-up": "#e69f00", compute: "#0072b2", publish: "#009e73" };
 const PATH_COLOUR = "#d55e00";
-const CONFIG = { responsive: true, displaylogo: false };
+// Named one by one, since plotly.js would add one that sends the data away.
+const BUTTONS = ["toImage", "zoom2d", "pan2d", "zoomIn2d", "zoomOut2d", "resetScale2d"];
+const CONFIG = { responsive: true, displaylogo: false, plotlyServerURL: "", modeBarButtons: [BUTTONS] };
+const NUMBERS = { exponentformat: "none", separatethousands: true, automargin: true };
 const QUANTILES = [["p50_us", "p50"], ["p90_us", "p90"], ["p99_us", "p99"], ["p99.9_us", "p99.9"], ["max_us", "max"]];
 
 const element = (id) => document.getElementById(id);
@@ -58,8 +61,8 @@ function steps(histogram, colour) {
 function logarithmic(title, x, y) {
   return {
     title: { text: title, x: 0, xanchor: "left", font: { size: 14 } },
-    xaxis: { type: "log", title: { text: x }, exponentformat: "none", dtick: 1, automargin: true },
-    yaxis: { type: "log", title: { text: y }, exponentformat: "none", dtick: 1, automargin: true, rangemode: "tozero" },
+    xaxis: { type: "log", title: { text: x }, dtick: 1, ...NUMBERS },
+    yaxis: { type: "log", title: { text: y }, dtick: 1, ...NUMBERS },
     margin: { l: 48, r: 12, t: 36, b: 44 },
     legend: { orientation: "h", y: 1.02, yanchor: "bottom", x: 1, xanchor: "right", font: { size: 11 } },
     hovermode: "closest",
@@ -99,9 +102,13 @@ function drawPath() {
   const rows = profile.critical_path.places.map((place) =>
     [[place.place, `${(100 * place.share).toFixed(1)} %`], place.time]);
   fillTable("path", ["place", "share"], [[["tick", ""], profile.critical_path.tick_time], ...rows]);
-  const course = { x: data.course.map(([time]) => time), y: data.course.map(([, us]) => us), mode: "markers", marker: { size: 4, color: COLOURS.compute }, hovertemplate: "%{x:.3f} s: %{y:.1f} µs<extra></extra>" };
+  const course = {
+    x: data.course.map(([time]) => time), y: data.course.map(([, us]) => us),
+    mode: "markers", marker: { size: 4, color: COLOURS.compute },
+    hovertemplate: "%{x:.3f} s: %{y:.1f} µs<extra></extra>",
+  };
   const layout = logarithmic("Tick time over the run", "simulated time in s", "µs");
-  Object.assign(layout.xaxis, { type: "linear", dtick: undefined });
+  Object.assign(layout.xaxis, { type: "linear", dtick: undefined, zeroline: false });
   Plotly.newPlot("course", [course], layout, CONFIG);
 }
 
@@ -127,7 +134,7 @@ function drawTimeline(slow) {
     barmode: "overlay", bargap: 0.35, hovermode: "closest",
     height: 130 + 44 * nodes.length,
     margin: { l: 60, r: 12, t: 40, b: 48 },
-    xaxis: { title: { text: `µs from the start of the critical path of tick ${slow.tick}` }, zeroline: true, automargin: true },
+    xaxis: { title: { text: `µs from the start of the critical path of tick ${slow.tick}` }, ...NUMBERS },
     yaxis: { categoryorder: "array", categoryarray: [...nodes].reverse(), automargin: true, fixedrange: true },
     legend: { orientation: "h", y: 1.02, yanchor: "bottom", x: 0 },
   };

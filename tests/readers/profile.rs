@@ -95,6 +95,9 @@ fn a_browser_draws_the_page_without_a_network() {
     assert_eq!((rows("nodes"), rows("age"), rows("jitter-table")), (1 + 4 * NODES as u64, 1 + 2 * 4, 2));
     assert!(rows("path") > 5 && rows("transport") > 4 && rows("stretches") > 2, "{first}");
     assert_ne!(first["timeline"], last["timeline"], "another tick was chosen");
+    // None that sends the data to a server.
+    let buttons = json!(["Download plot as a PNG", "Zoom", "Pan", "Zoom in", "Zoom out", "Reset axes"]);
+    assert_eq!(first["buttons"], buttons);
     assert_eq!(first["overflow"], 0, "the page is wider than the window");
 
     // The same check must notice a page that needs the network.

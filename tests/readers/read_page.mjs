@@ -18,6 +18,7 @@ function look() {
     plots: [...document.querySelectorAll(".js-plotly-plot")].map(marks),
     tables: Object.fromEntries(tables),
     timeline: document.querySelector("#timeline .xtitle").textContent,
+    buttons: [...document.querySelectorAll("#timeline .modebar-btn")].map((button) => button.dataset.title),
     ticks: document.getElementById("tick").options.length,
     overflow: document.documentElement.scrollWidth - document.documentElement.clientWidth,
   };
