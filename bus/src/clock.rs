@@ -18,11 +18,12 @@ pub fn run() -> Result<(), BusError> {
     let run_dir = crate::process::join()?;
     let plan = Plan::load(&run_dir)?;
     crate::process::stay_on(plan.clock_cpu);
+    let grants = plan.profile.then(|| GrantWriter::create(&run_dir, &plan)).transpose()?;
+    let control = Control::open(&plan)?;
     if plan.lock_memory {
         crate::process::lock_memory()?;
     }
-    let grants = plan.profile.then(|| GrantWriter::create(&run_dir, &plan)).transpose()?;
-    serve(&plan, &Control::open(&plan)?, grants)
+    serve(&plan, &control, grants)
 }
 
 /// Runs the clock of `plan` until the run is over; notes its grants in `grants`.

@@ -216,9 +216,6 @@ impl Node {
         self.require_all_declared()?;
         let control = Control::open(&self.plan)?;
         crate::process::stay_on(self.node().cpu);
-        if self.plan.lock_memory {
-            crate::process::lock_memory()?;
-        }
         if self.plan.pace == Pace::Free {
             crate::process::wait_for_turn();
         }
@@ -229,6 +226,10 @@ impl Node {
         let (inputs, announcements) = self.connect_inputs(&transport)?;
         let profile = self.plan.profile.then(|| TickWriter::create(&self.run_dir, &self.plan, self.index));
         let profile = profile.transpose()?;
+        // Last, when all that the ticks use is mapped: a mapping that exceeds the limit later fails without words.
+        if self.plan.lock_memory {
+            crate::process::lock_memory()?;
+        }
         let (plan, index) = (self.plan, self.index);
         Ok(ConnectedNode { plan, index, control, inputs, outputs, announcements, profile })
     }
@@ -578,7 +579,8 @@ mod tests {
             window_ticks: 64,
             pace: Pace::Free,
             clock_cpu: None,
-            profile: false,
+            // Noting host times must not allocate either.
+            profile: true,
             lock_memory: false,
             topics: vec![topic],
             nodes: vec![node("source", vec![], vec![output]), node("sink", vec![input], vec![])],
