@@ -317,7 +317,7 @@ impl RecordReader {
         });
         let map = map.map_err(|source| BusError::File { action: "read", path: path.clone(), source })?;
         let reader = Self { map, words };
-        let is_whole = reader.map.len() % WORD_BYTES == 0
+        let is_whole = reader.map.len().is_multiple_of(WORD_BYTES)
             && reader.map.len() / WORD_BYTES >= HEADER_WORDS
             && reader.all_words()[..2] == [MAGIC, words as u64]
             && reader.record(reader.count().saturating_sub(1)).is_some() == (reader.count() > 0);
