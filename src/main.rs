@@ -158,6 +158,7 @@ fn words(error: &anyhow::Error) -> String {
 
 /// Flies a manifest, profiled where `files` are given; false if a condition did not hold.
 fn run(arguments: &RunArguments, files: Option<Files>) -> Result<bool> {
+    files.as_ref().map_or(Ok(()), Files::check)?;
     let mut manifest = Manifest::load(&arguments.manifest, &arguments.set)?;
     if let Some(pace) = arguments.pace {
         manifest.content.run.pace = pace;
@@ -182,7 +183,8 @@ fn run(arguments: &RunArguments, files: Option<Files>) -> Result<bool> {
     }
     let tick_s = graph.plan.tick_s();
     let summary = Summary::new(manifest.name(), outcome, tick_s, has_recorder.then_some(path), pass, compare);
-    let mut text = if arguments.json { json_text(&summary, profile.as_ref())? } else { summary.to_string() };
+    let mut text =
+        if arguments.json { json_text(&summary, profile.as_ref(), &files)? } else { summary.to_string() };
     if let (Some(flight), Some(profile)) = (&flight, &profile) {
         let lines = files.write(&summary.manifest, flight, profile)?;
         if !arguments.json {
@@ -193,11 +195,12 @@ fn run(arguments: &RunArguments, files: Option<Files>) -> Result<bool> {
     Ok(summary.passed)
 }
 
-/// The summary as JSON, with the profile in it.
-fn json_text(summary: &Summary, profile: Option<&Profile>) -> Result<String> {
+/// The summary as JSON, with the profile and its files in it.
+fn json_text(summary: &Summary, profile: Option<&Profile>, files: &Files) -> Result<String> {
     let mut value = serde_json::to_value(summary)?;
     if let Some(profile) = profile {
         value["profile"] = serde_json::to_value(profile)?;
+        value["profile"]["files"] = serde_json::to_value(files)?;
     }
     Ok(serde_json::to_string_pretty(&value)?)
 }

@@ -25,7 +25,7 @@ mod trace;
 pub use flight::Flight;
 
 use age::Age;
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, bail};
 use latency::{NodeLatency, Transport};
 use pacing::Pacing;
 use path::CriticalPath;
@@ -69,7 +69,7 @@ impl Profile {
 }
 
 /// Files to write beside what is printed.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, Serialize)]
 pub struct Files {
     /// A timeline for Perfetto.
     pub trace: Option<PathBuf>,
@@ -82,6 +82,20 @@ impl Files {
     pub fn beside(recording: &Path) -> Self {
         let file = |extension| Some(recording.with_extension(extension));
         Self { trace: file("trace.json"), html: file("profile.html") }
+    }
+
+    /// Checks that the files can lie where they were asked for, before a run is flown for them.
+    ///
+    /// # Errors
+    /// If a folder is not there.
+    pub fn check(&self) -> Result<()> {
+        for path in self.trace.iter().chain(&self.html) {
+            let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
+            if let Some(folder) = folder.filter(|folder| !folder.is_dir()) {
+                bail!("cannot create {}: there is no folder {}", path.display(), folder.display());
+            }
+        }
+        Ok(())
     }
 
     /// Writes those that were asked for; returns a line for each that says what it holds.

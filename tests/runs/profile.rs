@@ -32,7 +32,9 @@ fn a_profiled_run_records_the_same_file() {
     let recording = plain.path("hover.mcap");
     let words = ["run", &repository("manifests/hover.toml"), "--record", &recording, "--set", DURATION];
     plain.call(&words).flown();
-    hover(&profiled, &["--trace", &profiled.path("trace.json"), "--html", &profiled.path("page.html")]);
+    let (trace, page) = (profiled.path("trace.json"), profiled.path("page.html"));
+    let summary = hover(&profiled, &["--trace", &trace, "--html", &page, "--json"]).json();
+    assert_eq!(summary["profile"]["files"], serde_json::json!({ "trace": trace, "html": page }));
     require_same(&std::fs::read(recording).unwrap(), &profiled.path("hover.mcap"));
 }
 
