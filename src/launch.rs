@@ -7,6 +7,7 @@ use crate::ctl::server::Reply;
 use crate::graph::{Graph, successor_of};
 use crate::manifest::Manifest;
 use crate::processes::{Processes, Role};
+use crate::profile::Flight;
 use crate::program::{OnExit, WATCHDOG};
 use crate::progress::Progress;
 use crate::run_dir::RunDir;
@@ -42,6 +43,8 @@ pub struct Outcome {
     pub processes: Vec<(String, f64, u32)>,
     /// What became of those who were to succeed.
     pub successions: Vec<Report>,
+    /// The host times that the processes noted, in a run that is profiled.
+    pub flight: Option<Flight>,
 }
 
 /// Flies `graph` and records to `recording`; returns when every process is gone.
@@ -77,7 +80,12 @@ pub fn fly(manifest: &Manifest, graph: &mut Graph, recording: &Path, quiet: bool
     supervisor.watch()?;
     supervisor.progress.finish(&control);
     let was_stopped = control.end_tick() < plan.duration_ticks;
-    Ok(Outcome { successions: supervisor.successions.into_reports(), ..outcome(plan, &control, was_stopped) })
+    let mut outcome = outcome(plan, &control, was_stopped);
+    outcome.successions = supervisor.successions.into_reports();
+    if plan.profile {
+        outcome.flight = Some(Flight::open(plan, dir, outcome.ticks)?);
+    }
+    Ok(outcome)
 }
 
 /// What became of a swap, for who asked for it.
@@ -492,5 +500,6 @@ fn outcome(plan: &Plan, control: &Control, was_stopped: bool) -> Outcome {
         missed_deadlines: control.missed_deadlines(),
         processes: std::iter::once(clock).chain(nodes).collect(),
         successions: Vec::new(),
+        flight: None,
     }
 }

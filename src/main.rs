@@ -12,6 +12,7 @@ mod manifest;
 mod placement;
 mod problem;
 mod processes;
+mod profile;
 mod program;
 mod progress;
 mod run_dir;
@@ -25,6 +26,7 @@ mod top;
 
 use crate::graph::Graph;
 use crate::manifest::{Manifest, PaceSetting};
+use crate::profile::{Files, Profile};
 use crate::program::Program;
 use crate::summary::{Judgement, Summary};
 use anyhow::{Context, Result, bail};
@@ -47,6 +49,11 @@ enum Verb {
     /// Fly a manifest, record it, and judge the recording.
     #[command(after_help = "Example: hummingbus run manifests/hover.toml --pace realtime --set run.seed=7")]
     Run(RunArguments),
+    /// Fly a manifest as `run` does, and tell where the host time of its ticks goes.
+    #[command(
+        after_help = "Example: hummingbus profile manifests/hover.toml --html profile.html --trace trace.json"
+    )]
+    Profile(ProfileArguments),
     /// Check a manifest without running it, and print its graph.
     #[command(after_help = "Example: hummingbus check manifests/hover.toml")]
     Check(CheckArguments),
@@ -123,6 +130,18 @@ struct RunArguments {
 }
 
 #[derive(Args)]
+struct ProfileArguments {
+    #[command(flatten)]
+    run: RunArguments,
+    /// Write a timeline that ui.perfetto.dev opens.
+    #[arg(long, value_name = "FILE")]
+    trace: Option<PathBuf>,
+    /// Write a page with histograms and the slowest ticks.
+    #[arg(long, value_name = "FILE")]
+    html: Option<PathBuf>,
+}
+
+#[derive(Args)]
 struct CheckArguments {
     /// The manifest.
     manifest: PathBuf,
@@ -136,7 +155,10 @@ struct CheckArguments {
 
 fn main() -> ExitCode {
     let result = match Cli::parse().command {
-        Verb::Run(arguments) => run(&arguments),
+        Verb::Run(arguments) => run(&arguments, None),
+        Verb::Profile(ProfileArguments { run: arguments, trace, html }) => {
+            run(&arguments, Some(Files { trace, html }))
+        }
         Verb::Check(arguments) => check(&arguments),
         Verb::Diff { a, b } => diff(&a, &b),
         Verb::Cat { recording, topic } => cat(&recording, topic.as_deref()),
@@ -166,8 +188,9 @@ fn words(error: &anyhow::Error) -> String {
     })
 }
 
-/// Flies a manifest; false if a condition did not hold.
-fn run(arguments: &RunArguments) -> Result<bool> {
+/// Flies a manifest, profiled where `files` are given; false if a condition did not hold.
+fn run(arguments: &RunArguments, files: Option<Files>) -> Result<bool> {
+    files.as_ref().map_or(Ok(()), Files::check)?;
     let mut manifest = Manifest::load(&arguments.manifest, &arguments.set)?;
     if let Some(pace) = arguments.pace {
         manifest.content.run.pace = pace;
@@ -176,9 +199,13 @@ fn run(arguments: &RunArguments) -> Result<bool> {
         manifest.content.run.window_ticks = Some(toml::Spanned::new(0..0, window));
     }
     let mut graph = Graph::build(&manifest)?;
+    graph.plan.profile |= files.is_some();
     let path = recording_path(&manifest, arguments.record.as_deref())?;
     let has_recorder = graph.programs.iter().any(Program::is_recorder);
-    let outcome = launch::fly(&manifest, &mut graph, &path, arguments.json)?;
+    let mut outcome = launch::fly(&manifest, &mut graph, &path, arguments.json)?;
+    let flight = outcome.flight.take();
+    let profile = flight.as_ref().map(|flight| Profile::of(flight, outcome.missed_deadlines));
+    let files = files.unwrap_or_else(|| Files::beside(&path));
     let mut judgement = Judgement::default();
     if has_recorder {
         let recording = Recording::open(&path)?;
@@ -192,8 +219,26 @@ fn run(arguments: &RunArguments) -> Result<bool> {
     }
     let tick_s = graph.plan.tick_s();
     let summary = Summary::new(manifest.name(), outcome, tick_s, has_recorder.then_some(path), judgement);
-    print_text(&if arguments.json { serde_json::to_string_pretty(&summary)? } else { summary.to_string() })?;
+    let mut text =
+        if arguments.json { json_text(&summary, profile.as_ref(), &files)? } else { summary.to_string() };
+    if let (Some(flight), Some(profile)) = (&flight, &profile) {
+        let lines = files.write(&summary.manifest, flight, profile)?;
+        if !arguments.json {
+            text += &format!("\n\n{profile}\n{}", lines.join("\n"));
+        }
+    }
+    print_text(&text)?;
     Ok(summary.passed)
+}
+
+/// The summary as JSON, with the profile and its files in it.
+fn json_text(summary: &Summary, profile: Option<&Profile>, files: &Files) -> Result<String> {
+    let mut value = serde_json::to_value(summary)?;
+    if let Some(profile) = profile {
+        value["profile"] = serde_json::to_value(profile)?;
+        value["profile"]["files"] = serde_json::to_value(files)?;
+    }
+    Ok(serde_json::to_string_pretty(&value)?)
 }
 
 /// Where the run is recorded: `--record`, the manifest's `record`, or beside the manifest.

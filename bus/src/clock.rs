@@ -3,7 +3,9 @@
 use crate::control::{Control, Edge, Phase, Seat, Waited, Word, monotonic_ns, process_cpu_ns};
 use crate::error::BusError;
 use crate::plan::{Pace, Plan, SEATS, Wait};
+use crate::profile::GrantWriter;
 use rustix::thread::clock_nanosleep_absolute;
+use std::cell::RefCell;
 
 /// How long the clock sleeps at most before it looks whether a stop was asked for.
 const NAP_NS_MAX: u64 = 100_000_000;
@@ -13,15 +15,21 @@ const NAP_NS_MAX: u64 = 100_000_000;
 /// # Errors
 /// If the process was not started by a launcher; [`BusError::Aborted`] if the launcher ended the run early.
 pub fn run() -> Result<(), BusError> {
-    let plan = Plan::load(&crate::process::join()?)?;
+    let run_dir = crate::process::join()?;
+    let plan = Plan::load(&run_dir)?;
     crate::process::stay_on(plan.clock_cpu);
-    serve(&plan, &Control::open(&plan)?)
+    let grants = plan.profile.then(|| GrantWriter::create(&run_dir, &plan)).transpose()?;
+    let control = Control::open(&plan)?;
+    if plan.lock_memory {
+        crate::process::lock_memory()?;
+    }
+    serve(&plan, &control, grants)
 }
 
-/// Runs the clock of `plan` until the run is over.
-pub(crate) fn serve(plan: &Plan, control: &Control) -> Result<(), BusError> {
+/// Runs the clock of `plan` until the run is over; notes its grants in `grants`.
+pub(crate) fn serve(plan: &Plan, control: &Control, grants: Option<GrantWriter>) -> Result<(), BusError> {
     control.set_clock_process();
-    let clock = Clock::new(plan, control);
+    let clock = Clock::new(plan, control, grants);
     for phase in [Phase::Connecting, Phase::Running] {
         clock.gather(phase)?;
     }
@@ -59,12 +67,13 @@ struct Clock<'a> {
     plan: &'a Plan,
     control: &'a Control,
     grant_edges: Vec<Edge>,
+    grants: Option<RefCell<GrantWriter>>,
 }
 
 impl<'a> Clock<'a> {
-    fn new(plan: &'a Plan, control: &'a Control) -> Self {
+    fn new(plan: &'a Plan, control: &'a Control, grants: Option<GrantWriter>) -> Self {
         let grant_edges = (0..SEATS * plan.nodes.len()).map(Edge::Grant).collect();
-        Self { plan, control, grant_edges }
+        Self { plan, control, grant_edges, grants: grants.map(RefCell::new) }
     }
 
     /// Waits until every node is ready for `phase`, then starts it.
@@ -112,7 +121,7 @@ impl<'a> Clock<'a> {
         let stride = (window / 2).max(1);
         let limit = end.min(self.control.boundary());
         let target = limit.min(self.slowest().saturating_add(window)).max(granted);
-        self.grant(target);
+        self.grant(target, None);
         if target < limit {
             self.await_all((target + stride).saturating_sub(window))?;
         }
@@ -134,7 +143,7 @@ impl<'a> Clock<'a> {
         if deadlines.granted_late {
             self.control.count_missed_deadline(std::iter::empty());
         }
-        self.grant(tick + 1);
+        self.grant(tick + 1, Some(deadline_ns));
         Ok(tick + 1)
     }
 
@@ -171,7 +180,10 @@ impl<'a> Clock<'a> {
         self.control.is_stop_requested() || self.control.is_aborted()
     }
 
-    fn grant(&self, ticks: u32) {
+    fn grant(&self, ticks: u32, deadline_ns: Option<u64>) {
+        if let Some(grants) = &self.grants {
+            grants.borrow_mut().grant(ticks, deadline_ns);
+        }
         self.control.advance(Word::Grant, ticks, &self.grant_edges);
     }
 

@@ -9,6 +9,7 @@ use crate::message::Message;
 use crate::node::{Declared, RawInput, go_on};
 use crate::plan::{InputPlan, NodePlan, Plan};
 use crate::port::{InPort, OutPort, Source};
+use crate::profile::TickWriter;
 use crate::roster::{NodeRoster, Roster};
 use crate::schema::Schema;
 use crate::tick::Tick;
@@ -49,6 +50,7 @@ pub struct ConnectedNode {
     retirement_tick: u32,
     first_tick: u32,
     epoch: u32,
+    profile: Option<TickWriter>,
     // The transport last: the ports give back what they hold while it stands.
     links: Links,
 }
@@ -84,10 +86,15 @@ impl ConnectedNode {
             retirement_tick: u32::MAX,
             first_tick,
             epoch: roster.epoch,
+            profile: None,
             links,
         };
         node.connect_inputs(declared, roster)?;
         node.agree_with(roster, first_tick)?;
+        if node.links.plan.profile {
+            let links = &node.links;
+            node.profile = Some(TickWriter::create(&links.run_dir, &links.plan, links.index)?);
+        }
         node.links.control.set_process(node.links.member());
         node.links.control.agree(node.links.member(), roster.epoch);
         Ok(node)
@@ -190,6 +197,10 @@ impl ConnectedNode {
         state: &mut [u8],
         mut step: impl FnMut(&mut Tick<'_>, &mut [u8]) -> Result<(), String>,
     ) -> Result<(), BusError> {
+        // Last, when all that the ticks use is mapped: a mapping that exceeds the limit later fails without words.
+        if self.links.plan.lock_memory {
+            crate::process::lock_memory()?;
+        }
         let member = self.links.member();
         self.links.control.set_ready(member, Phase::Running);
         if self.links.generation == 0 {
@@ -412,9 +423,13 @@ impl ConnectedNode {
     fn send(&mut self, tick: u32, time_ns: u64, received_ns: u64, done_ns: u64) -> Result<(), BusError> {
         let (control, node) = (&self.links.control, &self.links.node.name);
         let mut sent_before = false;
-        for output in self.outputs.iter_mut().filter(|output| output.is_sent(tick)) {
+        let is_sent = |(_, output): &(usize, &mut OutPort)| output.is_sent(tick);
+        for (index, output) in self.outputs.iter_mut().enumerate().filter(is_sent) {
             // The first output is sent at once: one look at the clock serves for both times.
             let sent_ns = if sent_before { monotonic_ns() } else { done_ns };
+            if let Some(profile) = &mut self.profile {
+                profile.sent(index, sent_ns);
+            }
             output.send(tick, time_ns, [received_ns, done_ns, sent_ns], node)?;
             let next = tick + output.period_ticks;
             if tick >= output.counts_from {
@@ -427,6 +442,9 @@ impl ConnectedNode {
         self.outputs.iter_mut().for_each(OutPort::forget);
         // Readers are awake by now: what the next tick needs is fetched while they compute.
         self.outputs.iter_mut().try_for_each(|output| output.prepare(node))?;
+        if let Some(profile) = &mut self.profile {
+            profile.end(tick, received_ns, done_ns, monotonic_ns());
+        }
         Ok(())
     }
 }

@@ -188,6 +188,16 @@ pub enum BusError {
         /// The node's own words.
         reason: String,
     },
+    /// The system does not allow what the manifest asks for.
+    #[error("cannot {action}: {source}; {advice}")]
+    Denied {
+        /// What was tried.
+        action: &'static str,
+        /// The system's answer.
+        source: std::io::Error,
+        /// Which right is missing and how to get it.
+        advice: &'static str,
+    },
     /// The launcher ended the run early.
     #[error("the run was aborted")]
     Aborted,

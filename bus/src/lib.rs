@@ -18,6 +18,7 @@ mod node;
 pub mod plan;
 mod port;
 pub mod process;
+pub mod profile;
 pub mod random;
 pub mod roster;
 pub mod schema;

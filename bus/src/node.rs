@@ -459,7 +459,7 @@ mod tests {
         let (source, sink) = std::thread::scope(|scope| {
             let source = scope.spawn(|| fly_source(folder.path()));
             let sink = scope.spawn(|| fly_sink(folder.path()));
-            crate::clock::serve(&plan, &control).unwrap();
+            crate::clock::serve(&plan, &control, None).unwrap();
             (source.join().unwrap().unwrap(), sink.join().unwrap().unwrap())
         });
         remove_shared_memory(&plan.run_id);

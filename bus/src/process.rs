@@ -78,6 +78,10 @@ pub(crate) fn wait_for_turn() {
         // The launcher has given it a policy of its own.
         return;
     }
+    // SAFETY: the call takes and returns numbers. A process that was given a real-time priority keeps it.
+    if unsafe { libc::sched_getscheduler(0) } != libc::SCHED_OTHER {
+        return;
+    }
     let parameters = libc::sched_param { sched_priority: 0 };
     // SAFETY: the call reads one `sched_param` that lives across it. A refusal leaves the policy as it
     // was, which costs speed only.
@@ -117,6 +121,20 @@ pub fn die_with_this_one(command: &mut Command) {
     };
     // SAFETY: between fork and exec the closure makes two system calls and touches no lock and no heap.
     unsafe { command.pre_exec(bind) };
+}
+
+/// Keeps all memory of this process, now and from now on, from being paged out.
+///
+/// # Errors
+/// If the system does not allow this much; the error names the right.
+pub(crate) fn lock_memory() -> Result<(), BusError> {
+    let all = rustix::mm::MlockAllFlags::CURRENT | rustix::mm::MlockAllFlags::FUTURE;
+    rustix::mm::mlockall(all).map_err(|error| BusError::Denied {
+        action: "lock the memory of this process (run.lock_memory)",
+        source: error.into(),
+        advice: "give it the capability CAP_IPC_LOCK or raise the limit on locked memory (`ulimit -l`, \
+                 `memlock` in limits.conf, `LimitMEMLOCK=` in systemd)",
+    })
 }
 
 /// Kills every process of the group that process `leader` leads.

@@ -13,6 +13,7 @@
 //! - [`cleanup`]: runs that are stopped or killed
 //! - [`refusals`]: manifests that are wrong
 //! - [`commands`]: the other subcommands, exit codes and JSON
+//! - [`profile`]: where the host time of a run's ticks goes
 //! - [`replay`]: the measured flight
 
 mod clean;
@@ -25,6 +26,7 @@ mod failures;
 mod live;
 mod loss;
 mod nodes;
+mod profile;
 mod recordings;
 mod refusals;
 mod replay;
