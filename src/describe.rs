@@ -74,7 +74,9 @@ fn succession(graph: &Graph, node: usize) -> String {
     let lines = successors.map(|successor| {
         let (what, join_tick) = (what(&successor.program), successor.join_tick);
         match successor.take_over_tick {
-            Some(tick) => format!("  succeeded by {what} at tick {tick}, shadowing from tick {join_tick} on\n"),
+            Some(tick) => {
+                format!("  succeeded by {what} at tick {tick}, shadowing from tick {join_tick} on\n")
+            }
             None if successor.is_standby => format!("  if it ends, {what} is promoted, which shadows it\n"),
             None => format!("  shadowed by {what}\n"),
         }

@@ -11,6 +11,8 @@ mod placement;
 mod problem;
 mod program;
 mod progress;
+#[cfg(test)]
+mod properties;
 mod run_dir;
 mod spawn;
 mod summary;

@@ -21,10 +21,7 @@ pub struct Published {
 }
 
 /// All outputs of `members`, each with its topic; two on one topic are refused.
-pub fn publish_all(
-    manifest: &Manifest,
-    members: &[Member<'_>],
-) -> Result<Vec<Published>, Problem> {
+pub fn publish_all(manifest: &Manifest, members: &[Member<'_>]) -> Result<Vec<Published>, Problem> {
     let mut all: Vec<Published> = Vec::new();
     for (node, member) in members.iter().enumerate() {
         for output in published_by(manifest, node, member)? {
@@ -48,11 +45,7 @@ pub fn publish_all(
     Ok(all)
 }
 
-fn published_by(
-    manifest: &Manifest,
-    node: usize,
-    member: &Member<'_>,
-) -> Result<Vec<Published>, Problem> {
+fn published_by(manifest: &Manifest, node: usize, member: &Member<'_>) -> Result<Vec<Published>, Problem> {
     let Member { name, process, program } = member;
     let period = period_ticks(manifest, process)?;
     let declared: Vec<(&str, Option<&'static Schema>)> = match &program.executable {

@@ -100,11 +100,7 @@ pub fn program(manifest: &Manifest, name: &Spanned<String>, process: &Process) -
     })
 }
 
-fn executable(
-    manifest: &Manifest,
-    name: &Spanned<String>,
-    process: &Process,
-) -> Result<Executable, Problem> {
+fn executable(manifest: &Manifest, name: &Spanned<String>, process: &Process) -> Result<Executable, Problem> {
     match (&process.kind, &process.command) {
         (Some(kind), None) => {
             let known = kinds::KINDS.map(|kind| kind.name);
@@ -167,7 +163,9 @@ fn command(
     if !is_executable(&path) {
         let (why, help) = match path.is_file() {
             true => ("it is not executable", "make it so with chmod +x"),
-            false => ("there is no such file", "build it, or correct the path, which is relative to the manifest"),
+            false => {
+                ("there is no such file", "build it, or correct the path, which is relative to the manifest")
+            }
         };
         return Err(refused(&format!("{who} {}: {why}", path.display()), help));
     }
@@ -301,11 +299,7 @@ fn log(manifest: &Manifest, process: &Process) -> Result<Option<PathBuf>, Proble
 ///
 /// # Errors
 /// With the reason.
-pub fn require_replaceable(
-    manifest: &Manifest,
-    member: &Member<'_>,
-    node: &NodePlan,
-) -> Result<(), Problem> {
+pub fn require_replaceable(manifest: &Manifest, member: &Member<'_>, node: &NodePlan) -> Result<(), Problem> {
     let Some(on_exit) = member.process.on_exit.as_ref().filter(|kept| *kept.get_ref() != OnExit::Stop) else {
         return Ok(());
     };
@@ -313,7 +307,11 @@ pub fn require_replaceable(
         None => Ok(()),
         Some(reason) => {
             let message = format!("`on_exit` of `{}`: {reason}", member.name.get_ref());
-            Err(manifest.problem(&on_exit.span(), message, "leave it out: the run stops when the process does"))
+            Err(manifest.problem(
+                &on_exit.span(),
+                message,
+                "leave it out: the run stops when the process does",
+            ))
         }
     }
 }

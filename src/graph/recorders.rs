@@ -7,7 +7,8 @@ use bus::plan::NodePlan;
 
 /// A second recorder would write to the same file.
 pub fn require_one_recorder(manifest: &Manifest, members: &[Member<'_>]) -> Result<(), Problem> {
-    let mut recorders = members.iter().filter(|member| member.program.is_recorder()).map(|member| member.name);
+    let mut recorders =
+        members.iter().filter(|member| member.program.is_recorder()).map(|member| member.name);
     match (recorders.next(), recorders.next()) {
         (Some(first), Some(second)) => Err(manifest.problem(
             &second.span(),

@@ -125,7 +125,7 @@ impl Run<'_> {
         let process = Process { outputs: self.outputs(node, span), ..whole.clone() };
         let mut members = self.members.to_vec();
         members[node] = Member { name: &name, process: &process, program };
-        let mut wiring = wire(self.manifest, &members)?;
+        let mut wiring = wire(self.manifest, &members, Some(node))?;
         let mut plan = wiring.nodes.swap_remove(node);
         parameters::set(self.manifest, &members[node], &mut plan, vehicles)?;
         self.require_room(node, &plan, span)?;
@@ -252,7 +252,8 @@ impl Run<'_> {
     }
 
     fn repeat(&self, swap: &Spanned<SwapSetting>) -> Result<u32, Problem> {
-        let at = |span: Range<usize>, message: String, help: &str| self.manifest.problem(&span, message, help);
+        let at =
+            |span: Range<usize>, message: String, help: &str| self.manifest.problem(&span, message, help);
         match (&swap.get_ref().repeat, &swap.get_ref().every_ticks) {
             (None, None) => Ok(1),
             (Some(repeat), Some(_)) if (1..=REPEAT_MAX).contains(repeat.get_ref()) => Ok(*repeat.get_ref()),
@@ -290,7 +291,9 @@ impl Run<'_> {
                      tick {take_over}"
                 );
                 let earliest = u64::from(take_over) + gap;
-                let help = format!("it can join at tick {earliest} or later; lower `shadow_ticks`, or take over later");
+                let help = format!(
+                    "it can join at tick {earliest} or later; lower `shadow_ticks`, or take over later"
+                );
                 return at(message, help);
             }
         }

@@ -45,7 +45,8 @@ impl<'s> Override<'s> {
 
     /// Puts the value into `root`; tables that are missing on the way are made.
     pub fn apply(self, root: &mut DeTable<'s>, sources: &Sources) -> Result<(), Problem> {
-        let at = |span: Range<usize>, (message, help): (String, String)| sources.problem(&span, message, help);
+        let at =
+            |span: Range<usize>, (message, help): (String, String)| sources.problem(&span, message, help);
         if self.is_of_an_expanded_process() {
             require_process(root, self.names()[1]).map_err(|words| at(self.keys[1].span(), words))?;
         }
@@ -73,6 +74,8 @@ fn keys(path: &str, base: usize) -> Vec<Spanned<&str>> {
 
 /// A value as TOML; what is none is a string: a path needs no quotes on the command line.
 fn value_of(text: &str, base: usize) -> Spanned<DeValue<'_>> {
+    let base = base + (text.len() - text.trim_start().len());
+    let text = text.trim();
     tree::parse_value(text, base)
         .unwrap_or_else(|| Spanned::new(base..base + text.len(), DeValue::String(Cow::Borrowed(text))))
 }
@@ -196,7 +199,10 @@ mod tests {
             ("process.h1/plant.cpu=1", "there is no process `h1/plant`"),
         ] {
             let error = changed("run.seed = 1", change).unwrap_err();
-            assert!(error.starts_with(&format!("a.toml: --set {change}: ")) && error.contains(words), "{error}");
+            assert!(
+                error.starts_with(&format!("a.toml: --set {change}: ")) && error.contains(words),
+                "{error}"
+            );
         }
     }
 }

@@ -124,7 +124,11 @@ fn add_vehicle<'s>(
     let Some(set) = sets.get(vehicle.set.get_ref()) else {
         let known: Vec<&str> = sets.keys().map(String::as_str).collect();
         let message = format!("there is no set `{}`", vehicle.set.get_ref());
-        return Err(sources.problem(&vehicle.set.span(), message, did_you_mean(vehicle.set.get_ref(), &known)));
+        return Err(sources.problem(
+            &vehicle.set.span(),
+            message,
+            did_you_mean(vehicle.set.get_ref(), &known),
+        ));
     };
     let processes = differing(set, differences, sources)?;
     let topics: Vec<String> = processes.iter().flat_map(|(name, value)| published(name, value)).collect();
@@ -182,7 +186,11 @@ fn instances(vehicle: &Vehicle, sources: &Sources) -> Result<Vec<String>, Proble
     let Some(count) = &vehicle.count else { return Ok(vec![name.clone()]) };
     if !(1..=COUNT_MAX).contains(count.get_ref()) {
         let message = format!("`count` is {}", count.get_ref());
-        return Err(sources.problem(&count.span(), message, format!("a run has 1 to {COUNT_MAX} of a vehicle")));
+        return Err(sources.problem(
+            &count.span(),
+            message,
+            format!("a run has 1 to {COUNT_MAX} of a vehicle"),
+        ));
     }
     Ok((1..=*count.get_ref()).map(|number| format!("{name}{number}")).collect())
 }
@@ -191,7 +199,8 @@ fn instances(vehicle: &Vehicle, sources: &Sources) -> Result<Vec<String>, Proble
 fn published(name: &Spanned<DeString<'_>>, process: &Spanned<DeValue<'_>>) -> Vec<String> {
     let Some(process) = process.get_ref().as_table() else { return Vec::new() };
     let outputs = tree::table(process, "outputs");
-    let stated = outputs.into_iter().flat_map(|outputs| outputs.keys().map(|port| port.get_ref().to_string()));
+    let stated =
+        outputs.into_iter().flat_map(|outputs| outputs.keys().map(|port| port.get_ref().to_string()));
     let kind = tree::string(process, "kind").and_then(kinds::find);
     let built_in = kind.into_iter().flat_map(|kind| kind.outputs);
     let required = built_in.filter(|port| port.required).map(|port| port.name.to_owned());

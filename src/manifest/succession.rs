@@ -16,7 +16,9 @@ const FIXED: [&str; 5] = ["lockstep", "on_exit", "outputs", "period_ticks", "sta
 /// A process that is not there, or a key in which a successor cannot differ.
 pub fn complete(root: &mut DeTable<'_>, sources: &Sources) -> Result<(), Problem> {
     for list in ["swap", "shadow"] {
-        let Some(DeValue::Array(mut array)) = root.get(list).map(|value| value.get_ref().clone()) else { continue };
+        let Some(DeValue::Array(mut array)) = root.get(list).map(|value| value.get_ref().clone()) else {
+            continue;
+        };
         for item in array.iter_mut() {
             let span = item.span();
             if let DeValue::Table(item) = item.get_mut() {
@@ -64,7 +66,8 @@ fn complete_standbys(root: &mut DeTable<'_>, sources: &Sources) -> Result<(), Pr
             return Err(sources.problem(&span, "`standby` is described, but nothing stands by", help));
         }
         let whole = differing(process, differences, sources)?;
-        process.insert(Spanned::new(span.clone(), "standby".into()), Spanned::new(span, DeValue::Table(whole)));
+        process
+            .insert(Spanned::new(span.clone(), "standby".into()), Spanned::new(span, DeValue::Table(whole)));
     }
     Ok(())
 }
@@ -88,7 +91,8 @@ pub fn whole<'s>(
     match processes.and_then(|processes| tree::table(processes, name.get_ref())) {
         Some(process) => differing(process, with, sources),
         None => {
-            let known = processes.into_iter().flat_map(|table| table.keys()).map(|key| key.get_ref().as_ref());
+            let known =
+                processes.into_iter().flat_map(|table| table.keys()).map(|key| key.get_ref().as_ref());
             let known: Vec<&str> = known.collect();
             let list = format!("the processes are {}", known.join(", "));
             let help = nearest(name.get_ref(), known).map_or(list, |near| format!("did you mean `{near}`?"));

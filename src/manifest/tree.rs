@@ -91,12 +91,7 @@ fn merge<'t>(base: &mut DeTable<'t>, over: DeTable<'t>) {
     over.into_iter().for_each(|(key, value)| put(base, key, value, merge));
 }
 
-fn put<'t>(
-    base: &mut DeTable<'t>,
-    key: Spanned<DeString<'t>>,
-    value: Spanned<DeValue<'t>>,
-    how: Merge<'t>,
-) {
+fn put<'t>(base: &mut DeTable<'t>, key: Spanned<DeString<'t>>, value: Spanned<DeValue<'t>>, how: Merge<'t>) {
     let span = value.span();
     match (table_mut(base, key.get_ref()), value.into_inner()) {
         (Some(below), DeValue::Table(above)) => how(below, above),

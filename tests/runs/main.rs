@@ -9,6 +9,7 @@
 //! - [`failures`]: nodes that fail, in every way
 //! - [`cleanup`]: runs that are stopped or killed
 //! - [`refusals`]: manifests that are wrong
+//! - [`manifests`]: includes, sets, settings, successors, companions
 //! - [`commands`]: the other subcommands, exit codes and JSON
 //! - [`replay`]: the measured flight
 
@@ -19,6 +20,7 @@ mod determinism;
 mod documentation;
 mod failures;
 mod loss;
+mod manifests;
 mod nodes;
 mod recordings;
 mod refusals;
