@@ -174,6 +174,27 @@ const GOOD_SETTINGS: [(&str, &[&str]); 8] = [
     ("process.h3/imu.parameters.gyroscope_initial_bias_rad_s", &["[0, 0.1, 0]"]),
 ];
 
+/// Parts of keys.
+const KEYS: [&str; 17] = [
+    "run",
+    "process",
+    "set",
+    "vehicle",
+    "swap",
+    "pass",
+    "0",
+    "1",
+    "plant",
+    "controller",
+    "with",
+    "inputs",
+    "command",
+    "parameters",
+    "hummingbird",
+    "h1/plant",
+    "kind",
+];
+
 fn good_setting() -> impl Strategy<Value = String> {
     select(&GOOD_SETTINGS[..])
         .prop_flat_map(|(key, values)| select(values).prop_map(move |value| format!("{key}={value}")))
@@ -217,26 +238,7 @@ fn any_change_of_a_shipped_manifest_is_accepted_or_refused() {
 
 #[test]
 fn any_setting_of_a_shipped_manifest_is_accepted_or_refused() {
-    let keys = [
-        "run",
-        "process",
-        "set",
-        "vehicle",
-        "swap",
-        "pass",
-        "0",
-        "1",
-        "plant",
-        "controller",
-        "with",
-        "inputs",
-        "command",
-        "parameters",
-        "hummingbird",
-        "h1/plant",
-        "kind",
-    ];
-    let key = prop_oneof![select(&keys[..]).prop_map(str::to_owned), "[a-z./ ]{0,4}"];
+    let key = prop_oneof![select(&KEYS[..]).prop_map(str::to_owned), "[a-z./ ]{0,4}"];
     let keys = prop::collection::vec(key, 1..5);
     for_any(300, (select(&SHIPPED[..]), keys, select(&WORDS[..])), |folder, (name, keys, word)| {
         let settings = [format!("{}={word}", keys.join("."))];
