@@ -79,8 +79,8 @@ struct Wiring {
     nodes: Vec<NodePlan>,
 }
 
-/// Wires `members`; their nodes have no parameters and no place yet. `changed` is the one that is to blame for a
-/// cycle it is in.
+/// Wires `members`; their nodes have no parameters and no place yet. `changed` is the one that is to blame
+/// for a cycle it is in.
 fn wire(manifest: &Manifest, members: &[Member<'_>], changed: Option<usize>) -> Result<Wiring, Problem> {
     let published = outputs::publish_all(manifest, members)?;
     let topics: Vec<TopicPlan> = published.iter().map(|output| output.topic.clone()).collect();

@@ -54,8 +54,8 @@ pub fn depths(nodes: &[NodePlan], publisher: impl Fn(usize) -> usize) -> Vec<usi
     depths
 }
 
-/// Gives every node that has none a core: each feedback loop has one of its own while they last, and what
-/// is in no loop (pilots, players, recorders, the clock) shares the last. More loops than that take turns on all
+/// Gives every node that has none a core: each feedback loop has one of its own while they last, and what is
+/// in no loop (pilots, players, recorders, the clock) shares the last. More loops than that take turns on all
 /// cores, the last included.
 ///
 /// A loop is a serial chain: on one core a hop costs a context switch, across cores it costs an

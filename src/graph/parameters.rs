@@ -9,8 +9,8 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 use toml::Spanned;
 
-/// Gives `node` the parameters of `member`, files resolved, checked where its kind is built in; notes its vehicle
-/// file in `vehicles`.
+/// Gives `node` the parameters of `member`, files resolved, checked where its kind is built in; notes its
+/// vehicle file in `vehicles`.
 ///
 /// # Errors
 /// A file or a parameter that is refused.

@@ -1,4 +1,5 @@
-//! The manifest's text as the recording holds it: the user's own, comments and all, with what `--set` changed.
+//! The manifest's text as the recording holds it: the user's own, comments and all, with what `--set`
+//! changed.
 
 use super::include;
 use super::sources::Sources;

@@ -604,17 +604,76 @@ fn is_flown(ended: &Ended) -> bool {
 }
 
 #[test]
-fn niceness_reaches_the_process() {
+fn niceness_and_generation_reach_the_process() {
     let place = Place::new();
     let text = good().replace("duration_s = 0.1", "duration_s = 60\npace = \"realtime\"");
     let path = place.write("nice.toml", text.replace("kind = \"imu\"", "kind = \"imu\"\nnice = 7"));
     let mut launch = place.start(&["run", &path]);
     launch.await_ticks(50);
-    let stat = format!("/proc/{}/stat", place.process_of("imu").as_raw_nonzero());
+    let process = format!("/proc/{}", place.process_of("imu").as_raw_nonzero());
+    let environment = fs::read_to_string(process.clone() + "/environ").unwrap();
+    assert!(environment.split('\0').any(|variable| variable == "HUMMINGBUS_GENERATION=0"), "{environment}");
+    let stat = process + "/stat";
     // Behind the name in brackets: state is field 3, niceness field 19 (proc_pid_stat(5)).
     let stat = fs::read_to_string(stat).unwrap();
     let nice = stat.rsplit(')').next().unwrap().split_whitespace().nth(19 - 3).unwrap();
     assert_eq!(nice, "7", "{stat}");
     launch.kill();
     place.await_no_process();
+}
+
+// Documentation
+
+/// The keys that the refusal of `unknown_key` in the good manifest, with `from` replaced by `to`, names as known.
+#[track_caller]
+fn known_keys(from: &str, to: &str) -> Vec<String> {
+    let place = Place::new();
+    assert_eq!(good().matches(from).count(), 1, "{from}");
+    let ended = place.call(&["check", &place.write("keys.toml", good().replace(from, to))]).with_code(2);
+    ended.says(&["unknown field `unknown_key`, expected "]);
+    let list = ended.error.split("unknown field `unknown_key`").nth(1).unwrap().lines().next().unwrap();
+    list.split('`').skip(1).step_by(2).map(str::to_owned).collect()
+}
+
+#[test]
+fn the_documentation_has_every_key() {
+    let text = fs::read_to_string(repository("docs/manifest.md")).unwrap();
+    let end = "[process.recorder]\nkind = \"recorder\"\n";
+    let list = |name: &str| format!("{end}\n[[{name}]]\nunknown_key = 1\n");
+    let within = |process: &str, key: &str| format!("kind = \"{process}\"\n{key}.unknown_key = 1");
+    let keys = [
+        known_keys("window_ticks = 64", "unknown_key = 64"),
+        known_keys("kind = \"imu\"", "kind = \"imu\"\nunknown_key = 1"),
+        known_keys("kind = \"imu\"", &within("imu", "outputs.imu")),
+        known_keys(end, &list("pass")),
+        known_keys(end, &list("compare")),
+        known_keys(end, &list("swap")),
+        known_keys(end, &list("shadow")),
+        known_keys(end, &list("vehicle")),
+        known_keys("kind = \"plant\"", &within("plant", "parameters")),
+        known_keys("kind = \"imu\"", &within("imu", "parameters")),
+        known_keys("kind = \"attitude\"", &within("attitude", "parameters")),
+        known_keys("kind = \"pid\"", &within("pid", "parameters.gains")),
+        known_keys("kind = \"pid\"", &within("pid", "parameters.gains.roll")),
+        known_keys("initial_altitude_m = 1.0", "initial_altitude_m = 1.0\nunknown_key = 1"),
+    ];
+    let keys = keys.concat();
+    assert!(keys.len() > 80, "{keys:?}");
+    for key in keys {
+        let is_named = [format!("`{key}`"), format!("`{key}."), format!(".{key}`")];
+        let is_shown = [format!("{key} = "), format!("{key}.")];
+        let is_there = is_named.iter().chain(&is_shown).any(|words| text.contains(words));
+        assert!(is_there, "docs/manifest.md has no `{key}`");
+    }
+}
+
+#[test]
+fn the_examples_of_the_documentation_are_toml() {
+    let text = fs::read_to_string(repository("docs/manifest.md")).unwrap();
+    let examples: Vec<&str> =
+        text.split("```toml\n").skip(1).map(|rest| rest.split("```").next().unwrap()).collect();
+    assert!(examples.len() >= 10, "{}", examples.len());
+    for example in examples {
+        toml::from_str::<toml::Table>(example).unwrap_or_else(|error| panic!("{error}\n{example}"));
+    }
 }
