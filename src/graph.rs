@@ -54,7 +54,7 @@ impl Graph {
     pub fn build(manifest: &Manifest) -> Result<Self, Problem> {
         let members = processes::members(manifest)?;
         let companions = processes::companions(manifest)?;
-        let wiring = wire(manifest, &members)?;
+        let wiring = wire(manifest, &members, None)?;
         let mut plan = plan(manifest, wiring)?;
         let clock_cpu = manifest.content.run.clock_cpu.as_ref();
         processes::require_core(manifest, clock_cpu, "clock_cpu")?;
@@ -79,8 +79,9 @@ struct Wiring {
     nodes: Vec<NodePlan>,
 }
 
-/// Wires `members`; their nodes have no parameters and no place yet.
-fn wire(manifest: &Manifest, members: &[Member<'_>]) -> Result<Wiring, Problem> {
+/// Wires `members`; their nodes have no parameters and no place yet. `changed` is the one that is to blame
+/// for a cycle it is in.
+fn wire(manifest: &Manifest, members: &[Member<'_>], changed: Option<usize>) -> Result<Wiring, Problem> {
     let published = outputs::publish_all(manifest, members)?;
     let topics: Vec<TopicPlan> = published.iter().map(|output| output.topic.clone()).collect();
     let mut nodes = Vec::new();
@@ -97,7 +98,7 @@ fn wire(manifest: &Manifest, members: &[Member<'_>]) -> Result<Wiring, Problem> 
             restarts: member.program.on_exit == OnExit::Restart,
         });
     }
-    inputs::require_no_cycle(manifest, members, &nodes, &published)?;
+    inputs::require_no_cycle(manifest, members, &nodes, &published, changed)?;
     inputs::order_inputs(&mut nodes, &published);
     Ok(Wiring { topics, nodes })
 }

@@ -15,6 +15,8 @@ mod processes;
 mod profile;
 mod program;
 mod progress;
+#[cfg(test)]
+mod properties;
 mod run_dir;
 mod shadow;
 mod spawn;

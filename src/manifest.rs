@@ -2,7 +2,7 @@
 //!
 //! - [`sources`]: the texts it is made of, laid end to end, so that one offset names a place in any of them
 //! - [`include`]: reads the file and the files it includes
-//! - [`overrides`]: `--set`
+//! - [`overrides`]: the values given with `--set`
 //! - [`tree`]: tables with the places of their values, merged
 //! - [`sets`]: vehicles of process sets become processes
 //! - [`succession`]: a successor's differences become a whole process

@@ -1,4 +1,5 @@
-//! What the supervisor starts: the executable behind a node, how it runs on the host, and what follows its end.
+//! What the supervisor starts: the executable behind a node, how it runs on the host, and what follows its
+//! end.
 
 use bus::kind::NodeKind;
 use bus::plan::NodePlan;

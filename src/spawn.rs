@@ -86,8 +86,8 @@ fn spawn(
     Ok((child, path))
 }
 
-/// Where a process's output goes: the file that the manifest names, to which a successor adds, or one in the run
-/// directory, of which a successor has its own.
+/// Where a process's output goes: the file that the manifest names, to which a successor adds, or one in the
+/// run directory, of which a successor has its own.
 fn open_log(name: &str, role: Role, run_dir: &Path, log: Option<&Path>) -> Result<(File, PathBuf)> {
     let generation = match role {
         Role::Node { generation, .. } => generation,
@@ -122,7 +122,7 @@ fn set_priority(child: &Child, name: &str, program: &Program) -> Result<()> {
 
 fn refused(name: &str, key: &str, value: i32, limit: &str, error: io::Error) -> anyhow::Error {
     anyhow::anyhow!(
-        "process `{name}`: `{key} = {value}` is refused: {error}. It needs the capability CAP_SYS_NICE, or a limit \
-         that allows it (`ulimit {limit}`); or leave the key out"
+        "process `{name}`: `{key} = {value}` is refused: {error}. It needs the capability CAP_SYS_NICE, or a \
+         limit that allows it (`ulimit {limit}`); or leave the key out"
     )
 }

@@ -111,7 +111,8 @@ pub fn set_fifo(pid: u32, priority: i32) -> io::Result<()> {
     }
 }
 
-/// Has the kernel kill what `command` starts when this process dies: for executables that know nothing of a launcher.
+/// Has the kernel kill what `command` starts when this process dies: for executables that know nothing of a
+/// launcher.
 pub fn die_with_this_one(command: &mut Command) {
     let launcher = rustix::process::getpid();
     let bind = move || {

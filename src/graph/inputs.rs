@@ -112,6 +112,7 @@ pub fn require_no_cycle(
     members: &[Member<'_>],
     nodes: &[NodePlan],
     published: &[Published],
+    changed: Option<usize>,
 ) -> Result<(), Problem> {
     let Some(cycle) = placement::zero_delay_cycle(nodes, |topic| published[topic].node) else {
         return Ok(());
@@ -119,7 +120,7 @@ pub fn require_no_cycle(
     let path: Vec<&str> =
         cycle.iter().chain(cycle.first()).map(|&node| members[node].name.get_ref().as_str()).collect();
     Err(manifest.problem(
-        &members[cycle[0]].name.span(),
+        &members[changed.filter(|node| cycle.contains(node)).unwrap_or(cycle[0])].name.span(),
         format!("a cycle without delay: {}", path.join(" → ")),
         "give one input of the cycle delay_ticks = 1 and an initial value, usually the plant's command",
     ))

@@ -9,8 +9,8 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 use toml::Spanned;
 
-/// Gives `node` the parameters of `member`, files resolved, checked where its kind is built in; notes its vehicle
-/// file in `vehicles`.
+/// Gives `node` the parameters of `member`, files resolved, checked where its kind is built in; notes its
+/// vehicle file in `vehicles`.
 ///
 /// # Errors
 /// A file or a parameter that is refused.
@@ -55,8 +55,13 @@ fn require_none(manifest: &Manifest, process: &Process) -> Result<(), Problem> {
     }
 }
 
-/// The place of a refused parameter: that of the first key the reason names, or of the process.
+/// The place of a refused parameter: that of the first key or file the reason names, or of the process.
 fn refused(manifest: &Manifest, name: &Spanned<String>, process: &Process, reason: &str) -> Problem {
+    let mut files = [&process.vehicle, &process.data].into_iter().flatten();
+    let is_named = |file: &&Spanned<String>| {
+        manifest.resolve(file).is_ok_and(|path| reason.contains(&*path.to_string_lossy()))
+    };
+    let named_file = files.find(is_named).map(Spanned::span);
     let mut quoted = reason.split('`').skip(1).step_by(2);
     let key = |word: &str| process.parameters.keys().find(|key| key.get_ref() == word).map(Spanned::span);
     let file = |word: &str| match word {
@@ -64,7 +69,10 @@ fn refused(manifest: &Manifest, name: &Spanned<String>, process: &Process, reaso
         "data" => process.data.as_ref().map(Spanned::span),
         _ => None,
     };
-    let span = quoted.find_map(|word| key(word).or_else(|| file(word))).unwrap_or_else(|| name.span());
+    let span = quoted
+        .find_map(|word| key(word).or_else(|| file(word)))
+        .or(named_file)
+        .unwrap_or_else(|| name.span());
     let help = match reason.split('`').nth(1).filter(|_| reason.starts_with("missing field")) {
         Some(file @ ("vehicle" | "data")) => format!("add {file} = \"PATH\" to [process.{}]", name.get_ref()),
         Some(key) => format!("add {key} = … to [process.{}.parameters]", name.get_ref()),

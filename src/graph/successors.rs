@@ -12,12 +12,13 @@ use std::ops::Range;
 use std::path::PathBuf;
 use toml::Spanned;
 
-/// Inputs that a successor may have where the process it succeeds has fewer: its edges are laid out before the run.
+/// Inputs that a successor may have where the process it succeeds has fewer: its edges are laid out before
+/// the run.
 const INPUTS_MAX: usize = 8;
 /// More swaps of one kind than any run has use for.
 const REPEAT_MAX: u32 = 100_000;
-/// Ticks between a take-over and the next joining, beside two of the longest periods: until then the process before
-/// has left.
+/// Ticks between a take-over and the next joining, beside two of the longest periods: until then the process
+/// before has left.
 const SETTLE_TICKS: u64 = 2;
 
 /// What is known about the run that the successors join.
@@ -71,8 +72,8 @@ pub fn all(
     Ok(placed.into_iter().map(|placed| placed.successor).collect())
 }
 
-/// The successor of `process` in a run of `manifest` that is under way; `with_text` is TOML that says in what it
-/// differs, as `with` does. When it joins and takes over is left open.
+/// The successor of `process` in a run of `manifest` that is under way; `with_text` is TOML that says in what
+/// it differs, as `with` does. When it joins and takes over is left open.
 ///
 /// # Errors
 /// If there is no such process, or it cannot be succeeded by that.
@@ -125,7 +126,7 @@ impl Run<'_> {
         let process = Process { outputs: self.outputs(node, span), ..whole.clone() };
         let mut members = self.members.to_vec();
         members[node] = Member { name: &name, process: &process, program };
-        let mut wiring = wire(self.manifest, &members)?;
+        let mut wiring = wire(self.manifest, &members, Some(node))?;
         let mut plan = wiring.nodes.swap_remove(node);
         parameters::set(self.manifest, &members[node], &mut plan, vehicles)?;
         self.require_room(node, &plan, span)?;
@@ -298,5 +299,53 @@ impl Run<'_> {
             }
         }
         Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::successor_of;
+    use crate::graph::Graph;
+    use crate::manifest::Manifest;
+    use std::path::Path;
+
+    fn hover() -> (Manifest, Graph) {
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("manifests/hover.toml");
+        let manifest = Manifest::load(&path, &["run.duration_s=1".to_owned()]).unwrap();
+        let graph = Graph::build(&manifest).unwrap();
+        (manifest, graph)
+    }
+
+    #[test]
+    fn a_successor_in_a_live_run_differs_in_what_is_asked_for() {
+        let (manifest, graph) = hover();
+        let with = "parameters.gains.altitude_integral_max_m_s2 = 1.5";
+        let successor = successor_of(&manifest, &graph, "controller", with).unwrap();
+        let node = &graph.plan.nodes[successor.node];
+        assert_eq!(
+            (node.name.as_str(), successor.take_over_tick, successor.is_standby),
+            ("controller", None, false)
+        );
+        assert_eq!(successor.plan.parameters["gains"]["altitude_integral_max_m_s2"], 1.5);
+        assert_eq!(successor.plan.parameters["vehicle"], node.parameters["vehicle"]);
+        let topics =
+            |plan: &bus::plan::NodePlan| plan.inputs.iter().map(|input| input.topic).collect::<Vec<_>>();
+        assert_eq!(topics(&successor.plan), topics(node));
+        assert_eq!(successor.plan.cpu, node.cpu);
+    }
+
+    #[test]
+    fn a_successor_in_a_live_run_that_cannot_be_is_refused_with_its_place() {
+        let (manifest, graph) = hover();
+        let refused = |process: &str, with: &str| {
+            successor_of(&manifest, &graph, process, with).map(|_| ()).unwrap_err().to_string()
+        };
+        let words = refused("contorller", "");
+        assert!(words.starts_with("--with:1:1: there is no process `contorller`"), "{words}");
+        let words = refused("controller", "wait = \"spin\"\nknid = 3");
+        assert!(words.starts_with("--with:2:1: unknown field `knid`"), "{words}");
+        assert!(refused("controller", "parameters.gain = 3").contains("--with:1:12: process `controller`"));
+        assert!(refused("controller", "x = ").starts_with("--with:1:"));
+        assert!(refused("recorder", "").contains("its file would be torn"));
     }
 }

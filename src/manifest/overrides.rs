@@ -74,6 +74,8 @@ fn keys(path: &str, base: usize) -> Vec<Spanned<&str>> {
 
 /// A value as TOML; what is none is a string: a path needs no quotes on the command line.
 fn value_of(text: &str, base: usize) -> Spanned<DeValue<'_>> {
+    let base = base + (text.len() - text.trim_start().len());
+    let text = text.trim();
     tree::parse_value(text, base)
         .unwrap_or_else(|| Spanned::new(base..base + text.len(), DeValue::String(Cow::Borrowed(text))))
 }

@@ -1,7 +1,9 @@
-//! The manifest's text as the recording holds it: the user's own, comments and all, with what `--set` changed.
+//! The manifest's text as the recording holds it: the user's own, comments and all, with what `--set`
+//! changed.
 
 use super::include;
 use super::sources::Sources;
+use super::tree;
 use crate::problem::Problem;
 
 /// Keys of `[run]` that change how fast or where a run computes, never what: they stay out of the recording.
@@ -58,7 +60,10 @@ fn is_host_only(text: &str) -> bool {
 /// Writes an override into the text; false if its place is not in it.
 fn set(document: &mut toml_edit::DocumentMut, text: &str, sources: &Sources) -> Result<bool, Problem> {
     let Some((path, value)) = text.split_once('=') else { return Ok(false) };
-    let value = value.parse::<toml_edit::Value>().unwrap_or_else(|_| value.into());
+    let value = value.trim();
+    // What counts as TOML is decided as when it is read.
+    let parsed = tree::parse_value(value, 0).and_then(|_| value.parse::<toml_edit::Value>().ok());
+    let value = parsed.unwrap_or_else(|| value.into());
     let mut keys: Vec<String> = path.split('.').map(|key| key.trim().to_owned()).collect();
     if let [list, index, ..] = keys.as_mut_slice()
         && let (true, Ok(number)) = (include::LISTS.contains(&list.as_str()), index.parse::<usize>())

@@ -1,7 +1,8 @@
 //! Process sets: a vehicle makes a set's processes its own.
 //!
-//! Inside a set, names of processes and topics are local. The vehicle `h1` makes `plant` to `h1/plant`, and the
-//! topic `/plant/state` to `/h1/plant/state` where its own processes publish that, and leaves it alone where not.
+//! Inside a set, names of processes and topics are local. The vehicle `h1` makes `plant` to `h1/plant`, and
+//! the topic `/plant/state` to `/h1/plant/state` where its own processes publish that, and leaves it alone
+//! where not.
 
 use super::sources::Sources;
 use super::{refused, tree};

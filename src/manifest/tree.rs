@@ -67,8 +67,8 @@ pub fn merge_processes<'t>(base: &mut DeTable<'t>, over: DeTable<'t>) {
     over.into_iter().for_each(|(name, process)| put(base, name, process, merge_process));
 }
 
-/// Puts the process `over` on top of `base`. Where it says what it is, with `kind` or `command`, nothing is left
-/// of the parameters of what it was.
+/// Puts the process `over` on top of `base`. Where it says what it is, with `kind` or `command`, nothing is
+/// left of the parameters of what it was.
 pub fn merge_process<'t>(base: &mut DeTable<'t>, over: DeTable<'t>) {
     forget_identity(base, &over);
     merge(base, over);
@@ -125,8 +125,8 @@ pub fn string<'v>(table: &'v DeTable<'_>, key: &str) -> Option<&'v str> {
 
 /// Removes from a process what it was, if `over` says that it is something else.
 fn forget_identity(process: &mut DeTable<'_>, over: &DeTable<'_>) {
-    let is_changed = |key: &&str| over.contains_key(*key) && !is_same(process.get(*key), over.get(*key));
-    if IDENTITY.iter().any(|key| is_changed(&key)) {
+    let is_changed = |key: &str| over.contains_key(key) && !is_same(process.get(key), over.get(key));
+    if IDENTITY.iter().any(|key| is_changed(key)) {
         IDENTITY.iter().chain(&PARAMETERS).for_each(|key| drop(process.remove(*key)));
     }
 }

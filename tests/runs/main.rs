@@ -12,6 +12,7 @@
 //! - [`failures`]: nodes that fail, in every way
 //! - [`cleanup`]: runs that are stopped or killed
 //! - [`refusals`]: manifests that are wrong
+//! - [`manifests`]: includes, sets, settings, successors, companions
 //! - [`commands`]: the other subcommands, exit codes and JSON
 //! - [`profile`]: where the host time of a run's ticks goes
 //! - [`replay`]: the measured flight
@@ -25,6 +26,7 @@ mod documentation;
 mod failures;
 mod live;
 mod loss;
+mod manifests;
 mod nodes;
 mod profile;
 mod recordings;
