@@ -102,5 +102,5 @@ fn record(
             writer.write(channel, tick.number(), tick.time_ns(), cdr)?;
         }
     }
-    if tick.number() % flush_ticks == flush_ticks - 1 { writer.flush() } else { Ok(()) }
+    if tick.number() % flush_ticks == flush_ticks - 1 { writer.flush() } else { writer.end_tick() }
 }
