@@ -13,7 +13,9 @@ const NAP_NS_MAX: u64 = 100_000_000;
 /// # Errors
 /// If the process was not started by a launcher; [`BusError::Aborted`] if the launcher ended the run early.
 pub fn run() -> Result<(), BusError> {
-    let plan = Plan::load(&crate::process::join()?)?;
+    let run_dir = crate::process::join()?;
+    let plan = Plan::load(&run_dir)?;
+    let _claim = crate::process::claim(&run_dir, "clock")?;
     crate::process::stay_on(plan.clock_cpu);
     serve(&plan, &Control::open(&plan)?)
 }

@@ -7,6 +7,7 @@ use crate::initial;
 use crate::message::Message;
 use crate::plan::{InputPlan, NodePlan, Pace, Plan};
 use crate::port::{InPort, OutPort};
+use crate::process::Claim;
 use crate::schema::Schema;
 use crate::transport::{Capacity, Transport};
 use serde::de::DeserializeOwned;
@@ -213,6 +214,7 @@ impl Node {
     /// If a port of the manifest was not declared, two sides disagree on a layout, or the run is aborted.
     pub fn connect(self) -> Result<ConnectedNode, BusError> {
         self.require_all_declared()?;
+        let claim = crate::process::claim(&self.run_dir, self.name())?;
         let control = Control::open(&self.plan)?;
         crate::process::stay_on(self.node().cpu);
         if self.plan.pace == Pace::Free {
@@ -223,7 +225,15 @@ impl Node {
         control.set_ready(self.index, Phase::Connecting);
         go_on(control.wait_phase(Phase::Connecting))?;
         let (inputs, announcements) = self.connect_inputs(&transport)?;
-        Ok(ConnectedNode { plan: self.plan, index: self.index, control, inputs, outputs, announcements })
+        Ok(ConnectedNode {
+            plan: self.plan,
+            index: self.index,
+            control,
+            inputs,
+            outputs,
+            announcements,
+            _claim: claim,
+        })
     }
 
     fn require_all_declared(&self) -> Result<(), BusError> {
@@ -325,6 +335,7 @@ pub struct ConnectedNode {
     inputs: Vec<InPort>,
     outputs: Vec<OutPort>,
     announcements: Vec<Announcement>,
+    _claim: Claim,
 }
 
 impl ConnectedNode {
