@@ -387,7 +387,10 @@ impl ConnectedNode {
             }
             let granted = self.control.count(Word::Grant);
             let sleep_for = needed.max((tick + batch).min(granted).saturating_sub(input.delay_ticks));
-            if self.control.wait(word, sleep_for, input.edge, node.wait, over) == Waited::Over {
+            // A node that lets samples gather may be sent home with some of them still to be taken: all that was
+            // sent before an abort is recorded.
+            let waited = self.control.wait(word, sleep_for, input.edge, node.wait, over);
+            if waited == Waited::Over && self.control.count(word) < needed {
                 return self.end();
             }
         }
