@@ -188,7 +188,7 @@ impl Process {
         let end = match self.end {
             Some(end) => match (end.code(), end.signal()) {
                 (Some(code), _) => format!("ended with exit code {code}"),
-                (None, Some(signal)) => format!("was killed by signal {signal}"),
+                (None, Some(signal)) => format!("was killed by {}", bus::process::signal_name(signal)),
                 (None, None) => "ended".to_owned(),
             },
             None => "is still running".to_owned(),
@@ -237,16 +237,18 @@ fn watch(
     loop {
         if let Some(failed) = processes.find_failure()? {
             let tick = ticks_of(&failed.name, control, plan);
-            let words = format!("{}\nThe run was aborted at tick {tick}", failed.post_mortem());
+            let silent = silent_topics(&failed.name, plan);
+            let words = format!("{}\nThe run was aborted at tick {tick}{silent}", failed.post_mortem());
             take_down(processes, control)?;
             bail!(words);
         }
         if let Some(node) = processes.find_deserter(control, plan) {
             let name = &plan.nodes[node].name;
             let tick = ticks_of(&plan.nodes[node].name, control, plan);
+            let silent = silent_topics(name, plan);
             take_down(processes, control)?;
             bail!(
-                "process `{name}` ended with exit code 0 before the run did; it was aborted at tick {tick}"
+                "process `{name}` ended with exit code 0 before the run did; it was aborted at tick {tick}{silent}"
             );
         }
         if processes.all_ended() {
@@ -278,6 +280,13 @@ fn watch(
 fn ticks_of(name: &str, control: &Control, plan: &Plan) -> u32 {
     let node = plan.nodes.iter().position(|node| node.name == name);
     node.map_or_else(|| control.completed_ticks(), |node| control.completed_by(node))
+}
+
+/// The topics on which nothing came any more once the process `name` had ended, in words.
+fn silent_topics(name: &str, plan: &Plan) -> String {
+    let outputs = plan.nodes.iter().filter(|node| node.name == name).flat_map(|node| &node.outputs);
+    let topics: Vec<_> = outputs.map(|output| plan.topics[output.topic].name.as_str()).collect();
+    if topics.is_empty() { String::new() } else { format!("; nothing more came on {}", topics.join(", ")) }
 }
 
 /// Host time in which a paced run must come forward: that of the slowest node's period.

@@ -100,6 +100,15 @@ pub(crate) fn wait_for_turn() {
     let _ = unsafe { libc::sched_setscheduler(0, libc::SCHED_BATCH, &raw const parameters) };
 }
 
+/// A signal as people know it: its name, and the number that other programs may print.
+#[must_use]
+pub fn signal_name(number: i32) -> String {
+    match signal_hook::low_level::signal_name(number) {
+        Some(name) => format!("signal {number} ({name})"),
+        None => format!("signal {number}"),
+    }
+}
+
 /// Kills every process of the group that process `leader` leads.
 pub fn kill_group(leader: u32) {
     let group = i32::try_from(leader).ok().and_then(rustix::process::Pid::from_raw);
