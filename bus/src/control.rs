@@ -108,12 +108,13 @@ impl Control {
             .map_err(fail)?;
         file.set_len(segment_bytes(plan) as u64).map_err(fail)?;
         let control = Self::map(plan, &file).map_err(fail)?;
-        control.word(0, 0).store(MAGIC, SeqCst);
         control.word(0, 2).store(plan.duration_ticks, SeqCst);
         control.set_pace(plan.pace);
         control.set_hold_tick(u32::MAX);
         control.word(1, 3).store(NOT_HELD, SeqCst);
         (0..control.edge_slots()).for_each(|edge| control.edge_at(edge).store(AWAKE, SeqCst));
+        // Last: who opens the segment earlier finds no segment rather than half of one.
+        control.word(0, 0).store(MAGIC, SeqCst);
         Ok(control)
     }
 
