@@ -15,6 +15,7 @@ use iceoryx2::prelude::{
 use iceoryx2::sample::Sample;
 use iceoryx2::sample_mut::SampleMut;
 use iceoryx2::service::port_factory::publish_subscribe::PortFactory;
+use std::os::unix::fs::PermissionsExt;
 use std::path::Path;
 
 type Service = ipc::Service;
@@ -81,6 +82,7 @@ impl Transport {
             .signal_handling_mode(SignalHandlingMode::Disabled)
             .create::<Service>()
             .map_err(|error| fail(format!("{error:?}")))?;
+        keep_to_this_user(run_id).map_err(|error| fail(error.to_string()))?;
         Ok(Self { node, node_name: node_name.to_owned() })
     }
 
@@ -139,6 +141,24 @@ impl Transport {
             })?;
         Ok(Receiver { subscriber })
     }
+}
+
+/// Closes the run's shared-memory files to other users: iceoryx2 0.10 leaves the counter of its nodes open to all.
+fn keep_to_this_user(run_id: &str) -> std::io::Result<()> {
+    let prefix = shm_prefix(run_id);
+    for entry in std::fs::read_dir("/dev/shm")?.flatten() {
+        if !entry.file_name().to_string_lossy().starts_with(&prefix) {
+            continue;
+        }
+        let is_open = |data: std::fs::Metadata| data.permissions().mode() & 0o077 != 0;
+        if entry.metadata().is_ok_and(is_open) {
+            match std::fs::set_permissions(entry.path(), std::fs::Permissions::from_mode(0o600)) {
+                Err(error) if error.kind() != std::io::ErrorKind::NotFound => return Err(error),
+                _ => {}
+            }
+        }
+    }
+    Ok(())
 }
 
 fn transport_error(node: &str, action: &str, reason: String) -> BusError {
