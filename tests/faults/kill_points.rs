@@ -68,7 +68,7 @@ impl Case {
         let moment = match below(8) {
             0 => Moment::Start(Duration::from_micros(below(30_000).into())),
             1..4 => Moment::Boundary { tick, is_lifted: below(2) == 0 },
-            _ => Moment::Flight(tick),
+            _ => Moment::Flight(tick.max(1)),
         };
         let blow = if matches!(moment, Moment::Start(_)) {
             // Others find no handler yet, or find it: the next test in line is `cleanup`.
@@ -84,7 +84,17 @@ impl Case {
                 Blow::Signal(signals[below(signals.len() as u32) as usize])
             }
         };
-        Self { seed, index, victim, blow, moment, policy: Policy::Stop }
+        Self { seed, index, victim, blow, moment, policy: Policy::Stop }.lifted()
+    }
+
+    /// A node that is asked to end while the clock waits hears of it when the clock goes on.
+    fn lifted(mut self) -> Self {
+        if let (Moment::Boundary { is_lifted, .. }, Process::Node(_), true) =
+            (&mut self.moment, self.victim, matches!(self.blow, Blow::Signal(Signal::TERM | Signal::INT)))
+        {
+            *is_lifted = true;
+        }
+        self
     }
 
     fn tick(&self) -> u32 {
