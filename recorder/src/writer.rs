@@ -37,13 +37,15 @@ impl RecordingWriter {
     /// # Errors
     /// If the file cannot be created or written.
     pub fn create(path: &Path) -> Result<Self, RecordingError> {
+        let fail = |source| RecordingError::File { action: "create", path: path.to_owned(), source };
         // A file of its own: who reads the old one, mapped, keeps it whole.
-        let _ = std::fs::remove_file(path);
-        let file = File::create_new(path).map_err(|source| RecordingError::File {
-            action: "create",
-            path: path.to_owned(),
-            source,
-        })?;
+        match std::fs::symlink_metadata(path) {
+            Ok(old) if old.is_file() || old.is_symlink() => std::fs::remove_file(path).map_err(fail)?,
+            // Removing a device, as root, would take it from the whole machine.
+            Ok(_) => return Err(fail(std::io::Error::other("it exists and is not a regular file"))),
+            Err(_) => {}
+        }
+        let file = File::create_new(path).map_err(fail)?;
         let mcap = WriteOptions::new()
             .profile("ros2")
             .library("hummingbus")
@@ -139,6 +141,11 @@ impl RecordingWriter {
     }
 }
 
+/// The error with its deepest cause, which says what the system refused.
 fn write_error(path: &Path, error: &mcap::McapError) -> RecordingError {
-    RecordingError::Write { path: path.to_owned(), reason: error.to_string() }
+    let mut cause: &dyn std::error::Error = error;
+    while let Some(deeper) = cause.source() {
+        cause = deeper;
+    }
+    RecordingError::Write { path: path.to_owned(), reason: cause.to_string() }
 }

@@ -10,7 +10,7 @@ use std::thread::sleep;
 use std::time::Duration;
 
 /// Length of the run in ticks of a millisecond.
-pub const TICKS: u32 = 4000;
+const TICKS: u32 = 4000;
 /// Ticks between two flushes of the recorder.
 pub const FLUSH_TICKS: u32 = 1000;
 const LOOK: Duration = Duration::from_micros(100);
@@ -20,7 +20,9 @@ pub fn manifest() -> String {
     let hover = std::fs::read_to_string(repository("manifests/hover.toml")).unwrap();
     let (flown, _) = hover.split_once("[[pass]]").unwrap();
     let vehicles = repository("vehicles");
-    let flown = flown.replace("../vehicles", &vehicles).replace("duration_s = 12.0", "duration_s = 4.0");
+    let flown = flown
+        .replace("../vehicles", &vehicles)
+        .replace("duration_s = 12.0", &format!("duration_s = {}", f64::from(TICKS) * 1e-3));
     format!("{flown}{}", saboteur::table())
 }
 
@@ -65,7 +67,8 @@ impl Watched {
     /// Has the clock wait at the boundary before `tick`; returns the boundary at which it waits.
     pub fn hold_at(&self, tick: u32) -> u32 {
         self.control.set_hold_tick(tick);
-        self.look("the run was not held", || self.control.held_at())
+        // It may still wait where it was held before.
+        self.look("the run was not held", || self.control.held_at().filter(|&held| held >= tick))
     }
 
     /// Waits until `node` (all nodes, if none is named) has completed `ticks` ticks.

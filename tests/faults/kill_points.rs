@@ -1,6 +1,6 @@
 //! Kill points: seeded strikes over processes, ticks and signals, and what is promised after each.
 //!
-//! `HUMMINGBUS_KILL_POINTS` says how many (240 by default), `HUMMINGBUS_SEED` which, and `HUMMINGBUS_KILL_POINT` picks
+//! `HUMMINGBUS_KILL_POINTS` says how many (300 by default), `HUMMINGBUS_SEED` which, and `HUMMINGBUS_KILL_POINT` picks
 //! one of them to repeat it.
 
 use crate::flight::{FLUSH_TICKS, Process, Reference, Watched, manifest};
@@ -14,7 +14,7 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::Duration;
 
-const KILL_POINTS: u64 = 240;
+const KILL_POINTS: u64 = 300;
 /// Strikes come before this tick, so that a flush or two lie behind the last ones.
 const LAST_TICK: u32 = 3000;
 /// Ticks after a strike in flight at which the clock waits, so that no run ends before it is struck.
