@@ -229,3 +229,100 @@ impl Received {
         self.sample.user_header()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::{Capacity, Receiver, SampleHeader, Sender, Transport};
+    use crate::control::{Edge, monotonic_ns, shm_prefix};
+    use crate::plan::{InputPlan, TopicPlan};
+    use crate::port::InPort;
+
+    const TOPIC: &str = "/plant/state";
+    const SIZE: usize = 8;
+    const CAPACITY: Capacity = Capacity { queued_samples: 8, subscribers: 2, nodes: 4 };
+
+    /// A run of this test's own; its files go with it.
+    struct Run {
+        folder: tempfile::TempDir,
+        id: String,
+    }
+
+    impl Run {
+        fn new() -> Self {
+            let id = format!("transport-{:x}-{:x}", std::process::id(), monotonic_ns());
+            Self { folder: tempfile::tempdir().unwrap(), id }
+        }
+
+        fn join(&self, node: &str) -> Transport {
+            Transport::new(self.folder.path(), &self.id, node).unwrap()
+        }
+    }
+
+    impl Drop for Run {
+        fn drop(&mut self) {
+            let prefix = shm_prefix(&self.id);
+            let files = std::fs::read_dir("/dev/shm").unwrap().flatten();
+            let own = files.filter(|file| file.file_name().to_string_lossy().starts_with(&prefix));
+            own.for_each(|file| drop(std::fs::remove_file(file.path())));
+        }
+    }
+
+    fn send(sender: &Sender, tick: u64) {
+        let header = SampleHeader { tick, sequence: tick, ..SampleHeader::default() };
+        sender.loan().unwrap().send(header).unwrap();
+    }
+
+    fn port(receiver: Receiver) -> InPort {
+        let input = InputPlan { port: "state".to_owned(), topic: 0, delay_ticks: 0, initial: None };
+        let topic = TopicPlan {
+            name: TOPIC.to_owned(),
+            type_name: "test_msgs/msg/State".to_owned(),
+            period_ticks: 1,
+        };
+        InPort::new(&input, &topic, SIZE, Edge::Input(0), None, receiver)
+    }
+
+    #[test]
+    fn a_second_publisher_of_a_topic_is_refused() {
+        let run = Run::new();
+        let (plant, rogue) = (run.join("plant"), run.join("rogue"));
+        let sender = plant.publisher(TOPIC, SIZE, CAPACITY).unwrap();
+        let mut port = port(run.join("imu").subscriber(TOPIC, CAPACITY).unwrap());
+        send(&sender, 0);
+        let error = rogue.publisher(TOPIC, SIZE, CAPACITY).unwrap_err().to_string();
+        assert!(error.contains("node `rogue`: publishing on topic /plant/state failed"), "{error}");
+        send(&sender, 1);
+        port.take(1, "imu").unwrap();
+    }
+
+    #[test]
+    fn samples_of_another_publisher_in_the_place_of_a_dead_one_are_named() {
+        let run = Run::new();
+        let (plant, rogue) = (run.join("plant"), run.join("rogue"));
+        let sender = plant.publisher(TOPIC, SIZE, CAPACITY).unwrap();
+        let mut port = port(run.join("imu").subscriber(TOPIC, CAPACITY).unwrap());
+        send(&sender, 0);
+        port.take(0, "imu").unwrap();
+        drop(sender);
+        send(&rogue.publisher(TOPIC, SIZE, CAPACITY).unwrap(), 0);
+        let error = port.take(1, "imu").unwrap_err().to_string();
+        assert!(error.contains("node `imu`, topic /plant/state, tick 1"), "{error}");
+        assert!(error.contains("another process publishes on the topic"), "{error}");
+    }
+
+    #[test]
+    fn no_file_of_a_run_is_open_to_other_users() {
+        use std::os::unix::fs::PermissionsExt;
+        let run = Run::new();
+        let _sender = run.join("plant").publisher(TOPIC, SIZE, CAPACITY).unwrap();
+        let prefix = shm_prefix(&run.id);
+        let files = std::fs::read_dir("/dev/shm").unwrap().flatten();
+        let own: Vec<_> =
+            files.filter(|file| file.file_name().to_string_lossy().starts_with(&prefix)).collect();
+        assert!(own.len() > 2);
+        for file in own {
+            let mode = file.metadata().unwrap().permissions().mode();
+            assert_eq!(mode & 0o077, 0, "{:?} has mode {mode:o}", file.file_name());
+        }
+    }
+}
