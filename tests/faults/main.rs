@@ -10,9 +10,11 @@
 //! - [`intruders`]: a second clock, a second process of a node
 //! - [`users`]: another user of the machine
 //! - [`bad_files`]: corrupted manifests, truncated recordings
+//! - [`documentation`]: the list names tests that there are
 
 mod bad_files;
 mod disk;
+mod documentation;
 mod flight;
 mod intruders;
 mod kill_points;
