@@ -187,7 +187,7 @@ fn what_was_flushed_survives_at_every_byte_behind_it() {
     for length in 0..=WHOLE.len() {
         let ticks = read(&WHOLE[..length]).unwrap().unwrap_or(0);
         assert!(
-            ticks >= last && ticks % 30 == 0,
+            ticks >= last && ticks.is_multiple_of(30),
             "{length} bytes hold {ticks} ticks, a byte less held {last}"
         );
         last = ticks;

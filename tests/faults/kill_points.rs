@@ -16,7 +16,7 @@ use std::time::Duration;
 
 const KILL_POINTS: u64 = 300;
 /// Strikes come before this tick, so that a flush or two lie behind the last ones.
-const LAST_TICK: u32 = 3000;
+const LAST_TICK: usize = 3000;
 /// Ticks after a strike in flight at which the clock waits, so that no run ends before it is struck.
 const GUARD_TICKS: u32 = 500;
 /// Ticks around which something else happens: the first, a full window, a flush, the next chunk.
@@ -59,42 +59,21 @@ struct Case {
 }
 
 impl Case {
-    /// Case `index` under `seed`: the same on every machine.
+    /// Case `index` under `seed`: the same on every machine. Every process has its turn.
     fn draw(seed: u64, index: u64) -> Self {
         let mut random = bus::random::stream(seed, &format!("kill point {index}"));
-        let mut below = |bound: u32| random.next_u32() % bound;
+        let mut below = |bound: usize| random.next_u32() as usize % bound;
         let victim = Process::ALL[usize::try_from(index).unwrap() % Process::ALL.len()];
-        let tick = if below(3) == 0 { EDGES[below(10) as usize] } else { below(LAST_TICK) };
-        let moment = match below(8) {
-            0 => Moment::Start(Duration::from_micros(below(30_000).into())),
-            1..4 => Moment::Boundary { tick, is_lifted: below(2) == 0 },
-            _ => Moment::Flight(tick.max(1)),
-        };
-        let blow = if matches!(moment, Moment::Start(_)) {
-            // Others find no handler yet, or find it: the next test in line is `cleanup`.
-            Blow::Signal(Signal::KILL)
-        } else if victim == Process::Node("saboteur") && below(3) > 0 {
-            Blow::Fault(Fault::ALL[below(5) as usize])
-        } else {
-            let others = [Signal::TERM, Signal::INT, Signal::USR1, Signal::ALARM];
-            let signals: &[Signal] = if victim == Process::Launcher { &others[..2] } else { &others };
-            if below(3) > 0 {
-                Blow::Signal(Signal::KILL)
-            } else {
-                Blow::Signal(signals[below(signals.len() as u32) as usize])
-            }
-        };
-        Self { seed, index, victim, blow, moment, policy: Policy::Stop }.lifted()
-    }
-
-    /// A node that is asked to end while the clock waits hears of it when the clock goes on.
-    fn lifted(mut self) -> Self {
-        if let (Moment::Boundary { is_lifted, .. }, Process::Node(_), true) =
-            (&mut self.moment, self.victim, matches!(self.blow, Blow::Signal(Signal::TERM | Signal::INT)))
+        let moment = draw_moment(&mut below);
+        let blow = draw_blow(victim, moment, &mut below);
+        let mut case = Self { seed, index, victim, blow, moment, policy: Policy::Stop };
+        // A node that is asked to end while the clock waits hears of it when the clock goes on.
+        if let Moment::Boundary { tick, .. } = moment
+            && case.is_request()
         {
-            *is_lifted = true;
+            case.moment = Moment::Boundary { tick, is_lifted: true };
         }
-        self
+        case
     }
 
     fn tick(&self) -> u32 {
@@ -112,6 +91,34 @@ impl Case {
     /// Whether the recorder has no time to finish its file.
     fn cuts_recording(&self) -> bool {
         !self.is_request() && matches!(self.victim, Process::Launcher | Process::Node("recorder"))
+    }
+}
+
+fn draw_moment(below: &mut impl FnMut(usize) -> usize) -> Moment {
+    let tick =
+        if below(3) == 0 { EDGES[below(EDGES.len())] } else { u32::try_from(below(LAST_TICK)).unwrap() };
+    match below(8) {
+        0 => Moment::Start(Duration::from_micros(below(30_000) as u64)),
+        1..4 => Moment::Boundary { tick, is_lifted: below(2) == 0 },
+        _ => Moment::Flight(tick.max(1)),
+    }
+}
+
+/// Mostly SIGKILL; during the start nothing else, since until a process has joined every signal is one.
+fn draw_blow(victim: Process, moment: Moment, below: &mut impl FnMut(usize) -> usize) -> Blow {
+    // The launcher stops at whatever else ends a process.
+    let others: &[Signal] = match victim {
+        Process::Launcher => &[Signal::TERM, Signal::INT],
+        _ => &[Signal::TERM, Signal::INT, Signal::USR1, Signal::ALARM],
+    };
+    if matches!(moment, Moment::Start(_)) {
+        Blow::Signal(Signal::KILL)
+    } else if victim == Process::Node("saboteur") && below(3) > 0 {
+        Blow::Fault(Fault::ENDING[below(Fault::ENDING.len())])
+    } else if below(3) > 0 {
+        Blow::Signal(Signal::KILL)
+    } else {
+        Blow::Signal(others[below(others.len())])
     }
 }
 
@@ -181,10 +188,12 @@ fn strike(case: &Case, reference: &str) -> u32 {
     let sent_before = deliver(case, &place, &launch, &watched);
     let ended = end(case, &place, launch);
     match case.policy {
-        Policy::Stop => require_stopped(case, &watched, &ended),
+        Policy::Stop => {
+            require_stopped(case, &watched, &ended);
+            let recorded = recorded_ticks(case, &place, &recording, reference);
+            require_bounded_loss(case, &watched, sent_before, recorded)
+        }
     }
-    let recorded = recorded_ticks(case, &place, &recording, reference);
-    require_bounded_loss(case, &watched, sent_before, recorded)
 }
 
 fn start<'a>(case: &Case, place: &'a Place, words: &[&str]) -> Launch<'a> {

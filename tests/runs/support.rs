@@ -210,7 +210,7 @@ impl Launch<'_> {
     /// Waits for the end; the launch must have left nothing behind.
     pub fn end(mut self) -> Ended {
         let status = self.wait();
-        let (launcher, ended) = (self.child.id(), self.ended(status));
+        let (launcher, ended) = (self.id(), self.ended(status));
         let left = self.place.left_behind(launcher);
         assert!(left.is_empty(), "left behind: {left:#?}\n{}", self.said());
         ended
