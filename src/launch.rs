@@ -16,7 +16,7 @@ use crate::succession::{Report, Stage, Standing, Successions};
 use crate::supervisor::{Action, Event, State};
 use anyhow::{Context, Result, anyhow};
 use bus::control::{Control, Phase};
-use bus::plan::Plan;
+use bus::plan::{NodePlan, Plan};
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -433,7 +433,8 @@ impl Supervisor<'_> {
                     }
                     OnExit::Standby => ": no standby was ready to take over",
                 };
-                self.abort(format!("{}\nThe run was aborted at tick {tick}{why}", death.words))?;
+                let silent = silent_topics(&self.plan.nodes[node], self.plan);
+                self.abort(format!("{}\nThe run was aborted at tick {tick}{silent}{why}", death.words))?;
             }
         }
         self.last_change.1 = Instant::now();
@@ -483,6 +484,12 @@ impl Supervisor<'_> {
         }
         Ok(())
     }
+}
+
+/// The topics on which nothing came any more once the process of `node` had ended, in words.
+fn silent_topics(node: &NodePlan, plan: &Plan) -> String {
+    let topics: Vec<_> = node.outputs.iter().map(|output| plan.topics[output.topic].name.as_str()).collect();
+    if topics.is_empty() { String::new() } else { format!("; nothing more came on {}", topics.join(", ")) }
 }
 
 fn outcome(plan: &Plan, control: &Control, was_stopped: bool) -> Outcome {

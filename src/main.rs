@@ -260,9 +260,21 @@ fn check(arguments: &CheckArguments) -> Result<bool> {
     Ok(true)
 }
 
+/// Opens a recording, or what is whole of one that was cut off, and then says so.
+fn open_recording(path: &Path) -> Result<Recording> {
+    let recording = Recording::salvage(path)?;
+    if let Some(cut) = recording.cut() {
+        let end = cut.last_tick.map_or("nothing of it is whole".to_owned(), |tick| {
+            format!("what is whole of it ends after tick {tick}")
+        });
+        eprintln!("warning: {} was cut off, its writer did not finish it: {end}", path.display());
+    }
+    Ok(recording)
+}
+
 /// Compares two recordings; false if they differ.
 fn diff(a: &Path, b: &Path) -> Result<bool> {
-    let difference = recorder::diff::first_difference(&Recording::open(a)?, &Recording::open(b)?)?;
+    let difference = recorder::diff::first_difference(&open_recording(a)?, &open_recording(b)?)?;
     match &difference {
         None => print_text("identical")?,
         Some(difference) => print_text(&difference.to_string())?,
@@ -270,10 +282,11 @@ fn diff(a: &Path, b: &Path) -> Result<bool> {
     Ok(difference.is_none())
 }
 
-/// Prints the messages of a recording: topic, tick, time and fields in the order of the definition.
+/// Prints the messages of a recording: topic, tick, time and fields in the order of the definition; false if it
+/// was cut off.
 fn cat(path: &Path, topic: Option<&str>) -> Result<bool> {
     use std::io::Write as _;
-    let recording = Recording::open(path)?;
+    let recording = open_recording(path)?;
     if let Some(topic) = topic {
         recording.topic(topic)?;
     }
@@ -293,7 +306,7 @@ fn cat(path: &Path, topic: Option<&str>) -> Result<bool> {
             return gone_or_failed(error);
         }
     }
-    out.flush().map_or_else(gone_or_failed, |()| Ok(true))
+    out.flush().map_or_else(gone_or_failed, |()| Ok(recording.cut().is_none()))
 }
 
 /// Removes what dead runs left; false if something of it is still there.

@@ -17,6 +17,7 @@ const NAP_NS_MAX: u64 = 100_000_000;
 pub fn run() -> Result<(), BusError> {
     let run_dir = crate::process::join()?;
     let plan = Plan::load(&run_dir)?;
+    let _claim = crate::process::claim(&run_dir, "clock")?;
     crate::process::stay_on(plan.clock_cpu);
     let grants = plan.profile.then(|| GrantWriter::create(&run_dir, &plan)).transpose()?;
     let control = Control::open(&plan)?;

@@ -9,6 +9,7 @@ use crate::message::Message;
 use crate::node::{Declared, RawInput, go_on};
 use crate::plan::{InputPlan, NodePlan, Plan};
 use crate::port::{InPort, OutPort, Source};
+use crate::process::Claim;
 use crate::profile::TickWriter;
 use crate::roster::{NodeRoster, Roster};
 use crate::schema::Schema;
@@ -31,6 +32,7 @@ pub(crate) struct Links {
     pub(crate) node: NodePlan,
     pub(crate) control: Control,
     pub(crate) transport: Transport,
+    pub(crate) _claim: Claim,
 }
 
 /// A node whose ports are connected.
@@ -278,7 +280,10 @@ impl ConnectedNode {
                 let granted = links.control.count(Word::Grant);
                 let sleep_for = needed.max((tick + batch).min(granted).saturating_sub(input.delay_ticks));
                 let awaited = self.wait(word, sleep_for, Edge::Input(input.edge), tick);
-                if awaited != Await::Tick {
+                // A node that lets samples gather may be sent home with some of them still to be taken: all
+                // that was sent before an abort is recorded.
+                let is_sent = awaited == Await::End && links.control.count(word) >= needed;
+                if awaited != Await::Tick && !is_sent {
                     return Ok(awaited);
                 }
             }

@@ -150,7 +150,6 @@ impl Control {
             .map_err(fail)?;
         file.set_len(segment_bytes(plan) as u64).map_err(fail)?;
         let control = Self::map(plan, &file).map_err(fail)?;
-        control.word(0, 0).store(MAGIC, SeqCst);
         control.word(0, 2).store(plan.duration_ticks, SeqCst);
         control.set_pace(plan.pace);
         control.set_hold_tick(u32::MAX);
@@ -159,6 +158,8 @@ impl Control {
         // Generation 0 of every node is there from the start.
         (0..plan.nodes.len()).for_each(|member| control.set_seat(member, Seat::Taken));
         (0..control.edge_slots()).for_each(|edge| control.edge_at(edge).store(AWAKE, SeqCst));
+        // Last: who opens the segment earlier finds no segment rather than half of one.
+        control.word(0, 0).store(MAGIC, SeqCst);
         Ok(control)
     }
 

@@ -15,6 +15,15 @@ pub enum BusError {
         /// The environment variable that is missing.
         variable: &'static str,
     },
+    /// Another process has this process's place in the run.
+    #[error(
+        "the run has a process `{name}` already, and a second one is refused: a process joins a run only when \
+         its launcher starts it"
+    )]
+    Claimed {
+        /// The node, or `clock`.
+        name: String,
+    },
     /// A file of the run could not be read or written.
     #[error("cannot {action} {path}: {source}")]
     File {

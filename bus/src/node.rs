@@ -228,6 +228,10 @@ impl Node {
     /// If a port of the manifest was not declared, two sides disagree on a layout, or the run is aborted.
     pub fn connect(self) -> Result<ConnectedNode, BusError> {
         self.require_all_declared()?;
+        let claim = match self.generation {
+            0 => crate::process::claim(&self.run_dir, self.name())?,
+            generation => crate::process::claim(&self.run_dir, &format!("{}.{generation}", self.name()))?,
+        };
         let control = Control::open(&self.plan)?;
         crate::process::stay_on(self.node().cpu);
         if self.plan.pace == Pace::Free {
@@ -257,6 +261,7 @@ impl Node {
             node: self.node,
             control,
             transport,
+            _claim: claim,
         };
         ConnectedNode::new(links, self.inputs.into_iter().flatten(), outputs, &roster)
     }

@@ -3,9 +3,11 @@
 use crate::error::BusError;
 use rustix::process::{Signal, getppid, set_parent_process_death_signal};
 use rustix::thread::{CpuSet, sched_getaffinity, sched_setaffinity};
+use std::fs::{File, TryLockError};
 use std::io;
+use std::os::unix::fs::OpenOptionsExt;
 use std::os::unix::process::CommandExt;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, OnceLock};
@@ -55,6 +57,28 @@ fn die_with_parent() {
              them; start the node with `exec`"
         );
         std::process::exit(1);
+    }
+}
+
+/// A process's place in a run, taken for as long as this value lives: the kernel frees it when the process dies.
+#[derive(Debug)]
+pub(crate) struct Claim {
+    _lock: File,
+}
+
+/// Takes the place of process `name` in the run whose directory is `run_dir`.
+///
+/// # Errors
+/// If another process has it: two clocks, or two processes of one node, would mix their ticks.
+pub(crate) fn claim(run_dir: &Path, name: &str) -> Result<Claim, BusError> {
+    let path = run_dir.join(format!("{}.claim", name.replace('/', ".")));
+    let fail = |source| BusError::File { action: "open", path: path.clone(), source };
+    let lock =
+        File::options().create(true).truncate(false).write(true).mode(0o600).open(&path).map_err(fail)?;
+    match lock.try_lock() {
+        Ok(()) => Ok(Claim { _lock: lock }),
+        Err(TryLockError::WouldBlock) => Err(BusError::Claimed { name: name.to_owned() }),
+        Err(TryLockError::Error(source)) => Err(BusError::File { action: "lock", path, source }),
     }
 }
 

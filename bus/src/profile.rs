@@ -364,6 +364,7 @@ mod tests {
             inputs: vec![],
             outputs: vec![output("a"), output("b")],
             parameters: serde_json::Value::Null,
+            restarts: false,
         };
         Plan {
             run_id: "profile".to_owned(),

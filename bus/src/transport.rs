@@ -17,6 +17,7 @@ use iceoryx2::prelude::{
 use iceoryx2::sample::Sample;
 use iceoryx2::sample_mut::SampleMut;
 use iceoryx2::service::port_factory::publish_subscribe::PortFactory;
+use std::os::unix::fs::PermissionsExt;
 use std::path::Path;
 
 type Service = ipc::Service;
@@ -109,6 +110,7 @@ impl Transport {
             .signal_handling_mode(SignalHandlingMode::Disabled)
             .create::<Service>()
             .map_err(|error| fail(format!("{error:?}")))?;
+        keep_to_this_user(run_id).map_err(|error| fail(error.to_string()))?;
         Ok(Self { node, node_name: node_name.to_owned() })
     }
 
@@ -185,6 +187,24 @@ impl Transport {
     }
 }
 
+/// Closes the run's shared-memory files to other users: iceoryx2 0.10 leaves the counter of its nodes open to all.
+fn keep_to_this_user(run_id: &str) -> std::io::Result<()> {
+    let prefix = shm_prefix(run_id);
+    for entry in std::fs::read_dir("/dev/shm")?.flatten() {
+        if !entry.file_name().to_string_lossy().starts_with(&prefix) {
+            continue;
+        }
+        let is_open = |data: std::fs::Metadata| data.permissions().mode() & 0o077 != 0;
+        if entry.metadata().is_ok_and(is_open) {
+            match std::fs::set_permissions(entry.path(), std::fs::Permissions::from_mode(0o600)) {
+                Err(error) if error.kind() != std::io::ErrorKind::NotFound => return Err(error),
+                _ => {}
+            }
+        }
+    }
+    Ok(())
+}
+
 fn transport_error(node: &str, action: &str, reason: String) -> BusError {
     BusError::Transport { node: node.to_owned(), action: action.to_owned(), reason }
 }
@@ -256,5 +276,102 @@ impl Received {
 
     pub(crate) fn header(&self) -> &SampleHeader {
         self.sample.user_header()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Capacity, Receiver, SampleHeader, Sender, Transport};
+    use crate::control::{monotonic_ns, shm_prefix};
+    use crate::plan::{InputPlan, TopicPlan};
+    use crate::port::{InPort, Source};
+
+    const TOPIC: &str = "/plant/state";
+    const SIZE: usize = 8;
+    const CAPACITY: Capacity = Capacity { queued_samples: 8, history_samples: 1, subscribers: 2, nodes: 4 };
+
+    /// A run of this test's own; its files go with it.
+    struct Run {
+        folder: tempfile::TempDir,
+        id: String,
+    }
+
+    impl Run {
+        fn new() -> Self {
+            let id = format!("transport-{:x}-{:x}", std::process::id(), monotonic_ns());
+            Self { folder: tempfile::tempdir().unwrap(), id }
+        }
+
+        fn join(&self, node: &str) -> Transport {
+            Transport::new(self.folder.path(), &self.id, node).unwrap()
+        }
+    }
+
+    impl Drop for Run {
+        fn drop(&mut self) {
+            let prefix = shm_prefix(&self.id);
+            let files = std::fs::read_dir("/dev/shm").unwrap().flatten();
+            let own = files.filter(|file| file.file_name().to_string_lossy().starts_with(&prefix));
+            own.for_each(|file| drop(std::fs::remove_file(file.path())));
+        }
+    }
+
+    fn send(sender: &Sender, tick: u64) {
+        let header = SampleHeader { tick, sequence: tick, ..SampleHeader::default() };
+        sender.loan().unwrap().send(header).unwrap();
+    }
+
+    fn port(receiver: Receiver) -> InPort {
+        let input = InputPlan { port: "state".to_owned(), topic: 0, delay_ticks: 0, initial: None };
+        let topic = TopicPlan {
+            name: TOPIC.to_owned(),
+            type_name: "test_msgs/msg/State".to_owned(),
+            period_ticks: 1,
+        };
+        InPort::new(&input, &topic, SIZE, 0, None, Source::joined(0, receiver, Some(0), 1))
+    }
+
+    #[test]
+    fn a_second_publisher_of_a_topic_is_refused() {
+        let run = Run::new();
+        let (plant, rogue) = (run.join("plant"), run.join("rogue"));
+        let sender = plant.publisher(TOPIC, 0, SIZE, CAPACITY).unwrap();
+        let mut port = port(run.join("imu").subscriber(TOPIC, 0, CAPACITY).unwrap());
+        send(&sender, 0);
+        let error = rogue.publisher(TOPIC, 0, SIZE, CAPACITY).unwrap_err().to_string();
+        assert!(error.contains("node `rogue`: publishing on topic /plant/state failed"), "{error}");
+        send(&sender, 1);
+        port.take(1, "imu").unwrap();
+    }
+
+    #[test]
+    fn samples_of_another_publisher_in_the_place_of_a_dead_one_are_named() {
+        let run = Run::new();
+        let (plant, rogue) = (run.join("plant"), run.join("rogue"));
+        let sender = plant.publisher(TOPIC, 0, SIZE, CAPACITY).unwrap();
+        let mut port = port(run.join("imu").subscriber(TOPIC, 0, CAPACITY).unwrap());
+        send(&sender, 0);
+        port.take(0, "imu").unwrap();
+        drop(sender);
+        send(&rogue.publisher(TOPIC, 0, SIZE, CAPACITY).unwrap(), 0);
+        let error = port.take(1, "imu").unwrap_err().to_string();
+        assert!(error.contains("node `imu`, topic /plant/state, tick 1"), "{error}");
+        assert!(error.contains("another process publishes on the topic"), "{error}");
+    }
+
+    #[test]
+    fn no_file_of_a_run_is_open_to_other_users() {
+        use std::os::unix::fs::PermissionsExt;
+        let run = Run::new();
+        let _sender = run.join("plant").publisher(TOPIC, 0, SIZE, CAPACITY).unwrap();
+        let prefix = shm_prefix(&run.id);
+        let files = std::fs::read_dir("/dev/shm").unwrap().flatten();
+        let own: Vec<_> =
+            files.filter(|file| file.file_name().to_string_lossy().starts_with(&prefix)).collect();
+        assert!(own.len() > 2);
+        for file in own {
+            let mode = file.metadata().unwrap().permissions().mode();
+            assert_eq!(mode & 0o077, 0, "{:?} has mode {mode:o}", file.file_name());
+        }
     }
 }

@@ -72,11 +72,15 @@ pub fn run() -> Result<(), BusError> {
     let end = node.run(|tick| {
         record(&mut writer, &inputs, &channels, tick)?;
         record_shadows(&mut writer, &inputs, &types, &mut shadows, tick)?;
-        if tick.number() % flush_ticks == flush_ticks - 1 { writer.flush() } else { Ok(()) }
+        if tick.number() % flush_ticks == flush_ticks - 1 { writer.flush() } else { writer.end_tick() }
     });
     // Also a run that failed leaves a whole file of what was recorded.
-    writer.finish().map_err(failed)?;
-    end
+    let finished = writer.finish().map_err(failed);
+    match end {
+        Ok(()) | Err(BusError::Aborted) => finished.and(end),
+        // A disk that was full for a message is full for the end of the file too: the first error counts.
+        Err(error) => Err(error),
+    }
 }
 
 #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a small positive number")]

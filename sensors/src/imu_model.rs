@@ -269,7 +269,9 @@ mod tests {
     fn a_state_that_is_restored_goes_on_as_the_one_it_was_taken_from() {
         let model = ImuModel::new(ImuParams::default(), RATE_HZ).unwrap();
         let mut first = model.initial_state(7, "imu");
-        (0..17).for_each(|_| drop(model.read(&mut first, &truth())));
+        for _ in 0..17 {
+            model.read(&mut first, &truth());
+        }
         let mut second = model.initial_state(7, "imu");
         second.accelerometer_bias_B_m_s2 = first.accelerometer_bias_B_m_s2;
         second.gyroscope_bias_B_rad_s = first.gyroscope_bias_B_rad_s;

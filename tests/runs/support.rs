@@ -13,7 +13,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
-const HUMMINGBUS: &str = env!("CARGO_BIN_EXE_hummingbus");
+pub const HUMMINGBUS: &str = env!("CARGO_BIN_EXE_hummingbus");
 /// A deadlock's end: no launch here needs a tenth of it on an idle machine.
 const WATCHDOG: Duration = Duration::from_secs(120);
 const POLL: Duration = Duration::from_millis(2);
@@ -59,18 +59,24 @@ impl Place {
 
     /// Starts `hummingbus` with `words` and more environment variables.
     pub fn start_with(&self, words: &[&str], variables: &[(&str, &str)]) -> Launch<'_> {
+        let mut command = Command::new(HUMMINGBUS);
+        command.args(words).envs(variables.iter().copied());
+        self.launch(command)
+    }
+
+    /// Starts `command`, which is or becomes a `hummingbus`, as one of this folder.
+    pub fn launch(&self, mut command: Command) -> Launch<'_> {
         let output = tempfile::NamedTempFile::new_in(self.folder.path()).unwrap().into_temp_path();
         let error = tempfile::NamedTempFile::new_in(self.folder.path()).unwrap().into_temp_path();
         let child = self
-            .mark(&mut Command::new(HUMMINGBUS))
-            .args(words)
-            .envs(variables.iter().copied())
+            .mark(&mut command)
             .stdin(Stdio::null())
             .stdout(File::create(&output).unwrap())
             .stderr(File::create(&error).unwrap())
             .spawn()
             .unwrap();
         self.launchers.borrow_mut().push(child.id());
+        let words: Vec<_> = command.get_args().map(|word| word.to_string_lossy()).collect();
         Launch { place: self, child, words: words.join(" "), output, error, status: None }
     }
 
@@ -125,12 +131,12 @@ impl Place {
     }
 
     /// The directories of the runs that are up.
-    fn run_dirs(&self) -> Vec<PathBuf> {
+    pub fn run_dirs(&self) -> Vec<PathBuf> {
         entries(&self.temporary())
     }
 
     /// What the runs of `launcher` left, and everything in the folder for temporary files.
-    fn left_behind(&self, launcher: u32) -> Vec<String> {
+    pub fn left_behind(&self, launcher: u32) -> Vec<String> {
         let processes = self.processes().into_iter().map(|(pid, node)| format!("process {pid:?} ({node})"));
         let files = entries(&self.temporary()).into_iter().chain(shared_memory(launcher));
         processes.chain(files.map(|path| path.display().to_string())).collect()
@@ -189,6 +195,11 @@ pub struct Launch<'a> {
 }
 
 impl Launch<'_> {
+    /// The launcher's process id.
+    pub fn id(&self) -> u32 {
+        self.child.id()
+    }
+
     /// Sends a signal to the launcher.
     pub fn signal(&self, signal: Signal) {
         kill_process(Pid::from_child(&self.child), signal).unwrap();
@@ -214,7 +225,7 @@ impl Launch<'_> {
     /// Waits for the end; the launch must have left nothing behind.
     pub fn end(mut self) -> Ended {
         let status = self.wait();
-        let (launcher, ended) = (self.child.id(), self.ended(status));
+        let (launcher, ended) = (self.id(), self.ended(status));
         let left = self.place.left_behind(launcher);
         assert!(left.is_empty(), "left behind: {left:#?}\n{}", self.said());
         ended
