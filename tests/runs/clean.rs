@@ -60,6 +60,15 @@ impl Drop for Stray {
     }
 }
 
+/// Sets a flag at the end of a scope, however it ends.
+struct SetOnDrop<'a>(&'a AtomicBool);
+
+impl Drop for SetOnDrop<'_> {
+    fn drop(&mut self) {
+        self.0.store(true, Ordering::Relaxed);
+    }
+}
+
 #[test]
 fn what_a_killed_launcher_left_is_removed_and_a_live_run_beside_it_is_kept() {
     let _alone = alone();
@@ -164,6 +173,7 @@ fn runs_that_start_and_end_while_others_clean_are_not_disturbed() {
     let temporary = cleaner.path("tmp");
     let is_over = AtomicBool::new(false);
     std::thread::scope(|scope| {
+        let _end = SetOnDrop(&is_over);
         for _ in 0..2 {
             scope.spawn(|| {
                 let words = ["clean", "--json"];
@@ -181,6 +191,5 @@ fn runs_that_start_and_end_while_others_clean_are_not_disturbed() {
             let (manifest, recording) = (repository("manifests/hover.toml"), place.path("short.mcap"));
             place.call(&["run", &manifest, "--record", &recording, "--set", "run.duration_s=0.2"]).flown();
         }
-        is_over.store(true, Ordering::Relaxed);
     });
 }
