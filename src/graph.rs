@@ -54,6 +54,7 @@ impl Graph {
     pub fn build(manifest: &Manifest) -> Result<Self, Problem> {
         let members = processes::members(manifest)?;
         let companions = processes::companions(manifest)?;
+        processes::require_own_logs(manifest)?;
         let wiring = wire(manifest, &members, None)?;
         let mut plan = plan(manifest, wiring)?;
         let clock_cpu = manifest.content.run.clock_cpu.as_ref();

@@ -8,6 +8,7 @@ use bus::GENERATION_VARIABLE;
 use bus::NODE_VARIABLE;
 use bus::plan::NodePlan;
 use bus::process::{LAUNCHER_VARIABLE, RUN_VARIABLE};
+use std::collections::BTreeMap;
 use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -294,6 +295,23 @@ fn log(manifest: &Manifest, process: &Process) -> Result<Option<PathBuf>, Proble
         Some(_) => Ok(Some(path)),
         None => at(format!("`log`: the folder of {} is not there", path.display()), "make it"),
     }
+}
+
+/// Refuses two processes that would write over each other's log.
+///
+/// # Errors
+/// With both names.
+pub fn require_own_logs(manifest: &Manifest) -> Result<(), Problem> {
+    let mut logs: BTreeMap<PathBuf, &str> = BTreeMap::new();
+    for (name, process) in &manifest.content.process {
+        let Some(written) = &process.log else { continue };
+        if let Some(other) = logs.insert(manifest.resolve(written)?, name.get_ref()) {
+            let message = format!("`log`: `{}` writes to the file of `{other}`", name.get_ref());
+            let help = "give each a file of its own, those of a set in the [[vehicle]] tables";
+            return Err(manifest.problem(&written.span(), message, help));
+        }
+    }
+    Ok(())
 }
 
 /// Refuses to keep a run going without a process where that cannot work.

@@ -43,15 +43,15 @@ impl Reader {
         self.read.push(identity.clone());
         self.open.push((identity, path.to_owned()));
         for include in includes {
-            self.include(path, &include)?;
+            self.include(&include)?;
         }
         self.open.pop();
         self.sources.order.push(index);
         Ok(())
     }
 
-    fn include(&mut self, from: &Path, written: &Spanned<String>) -> Result<(), Problem> {
-        let path = from.parent().unwrap_or(Path::new("")).join(written.get_ref());
+    fn include(&mut self, written: &Spanned<String>) -> Result<(), Problem> {
+        let path = self.sources.path(written)?;
         let at = |message: String, help: &str| self.sources.problem(&written.span(), message, help);
         let identity = path.canonicalize().unwrap_or_else(|_| path.clone());
         if let Some(start) = self.open.iter().position(|(open, _)| *open == identity) {

@@ -112,16 +112,21 @@ impl Sources {
 
     /// A path as written: `${NAME:-default}` is the environment's NAME, and a relative path starts at the
     /// folder of the file it is written in, or of the manifest where it was given as an argument.
-    pub fn resolve(&self, written: &Spanned<String>) -> Result<PathBuf, Problem> {
+    pub fn path(&self, written: &Spanned<String>) -> Result<PathBuf, Problem> {
         let expanded = expand(written.get_ref(), |name| std::env::var(name).ok()).map_err(|message| {
             self.problem(&written.span(), message, "set it, or give a default: ${NAME:-path}")
         })?;
-        let path = self.folder(written.span().start).join(expanded);
+        Ok(self.folder(written.span().start).join(expanded))
+    }
+
+    /// The same, from the root on.
+    pub fn resolve(&self, written: &Spanned<String>) -> Result<PathBuf, Problem> {
+        let path = self.path(written)?;
         Ok(std::path::absolute(&path).unwrap_or(path))
     }
 
     /// The folder at which a relative path written at `offset` starts.
-    pub fn folder(&self, offset: usize) -> &Path {
+    fn folder(&self, offset: usize) -> &Path {
         let file = match &self.at(offset).origin {
             Origin::File(path) => path,
             Origin::Override | Origin::Argument(_) => self.file(),

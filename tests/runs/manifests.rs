@@ -574,6 +574,10 @@ fn host_settings_that_no_system_has() {
     with("working_directory = §\"none\"").says(&["`working_directory`: ", "/none is no folder"]);
     with("log = §\"none/imu.log\"").says(&["`log`: the folder of ", "/none/imu.log is not there"]);
     with("log = §\".\"").says(&["is a folder"]);
+    let twice = "kind = \"attitude\"\nlog = \"a.log\"";
+    let marked = good().replace("kind = \"attitude\"", twice);
+    let ended = refused_text(&marked.replace("kind = \"imu\"", "kind = \"imu\"\nlog = §\"./a.log\""));
+    ended.says(&["`log`: `imu` writes to the file of `attitude`"]);
     with("environment.§HUMMINGBUS_RUN = \"x\"").says(&["HUMMINGBUS_RUN is set by the launcher"]);
     with("environment.§\"A=B\" = \"x\"").says(&["cannot be an environment variable"]);
     with("environment.A = §3").says(&["invalid type"]);
