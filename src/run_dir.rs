@@ -30,6 +30,16 @@ pub struct Entry {
     pub launcher: u32,
 }
 
+impl Entry {
+    /// What a new run of `manifest` has to say.
+    fn new(manifest: &Path) -> Result<Self> {
+        let run_id = format!("{:x}-{:x}", std::process::id(), bus::control::monotonic_ns());
+        // One level only: a folder shared by runs could vanish with another run that ends.
+        let run_dir = std::path::absolute(std::env::temp_dir())?.join(dir_name(&run_id));
+        Ok(Self { run_id, run_dir, manifest: manifest.to_owned(), launcher: std::process::id() })
+    }
+}
+
 /// Where a run keeps its files; dropping it removes them, the run's shared memory, and its entry.
 #[derive(Debug)]
 pub struct RunDir {
@@ -44,13 +54,15 @@ impl RunDir {
     /// # Errors
     /// If shared memory or the folder for temporary files cannot be written to.
     pub fn create(manifest: &Path) -> Result<Self> {
-        let run_id = format!("{:x}-{:x}", std::process::id(), bus::control::monotonic_ns());
-        // One level only: a folder shared by runs could vanish with another run that ends.
-        let run_dir = std::path::absolute(std::env::temp_dir())?.join(dir_name(&run_id));
         let manifest = std::path::absolute(manifest)?;
-        let entry = Entry { run_id, run_dir, manifest, launcher: std::process::id() };
-        let registered =
-            register(&entry).with_context(|| format!("cannot register the run in {SHARED_MEMORY}"))?;
+        let (entry, registered) = loop {
+            let entry = Entry::new(&manifest)?;
+            if let Some(file) =
+                register(&entry).with_context(|| format!("cannot register in {SHARED_MEMORY}"))?
+            {
+                break (entry, file);
+            }
+        };
         match create_locked(&entry.run_dir) {
             Ok(directory) => Ok(Self { entry, _locks: [registered, directory] }),
             Err(error) => {
@@ -116,20 +128,19 @@ pub fn shared_memory_of(run_id: &str) -> Vec<PathBuf> {
     files.filter(belongs).map(|file| file.path()).filter(|path| *path != entry).collect()
 }
 
-/// Writes `entry` and locks it.
-fn register(entry: &Entry) -> Result<File> {
-    let path = entry_path(&entry.run_id);
-    loop {
-        let mut options = std::fs::OpenOptions::new();
-        let mut file = options.read(true).write(true).create_new(true).mode(0o600).open(&path)?;
-        // `clean` may have the lock for a moment, having met an entry that nobody has locked yet. Then it has
-        // removed the file, and another must be made.
-        rustix::io::retry_on_intr(|| flock(&file, FlockOperation::LockExclusive))?;
-        if file.metadata()?.nlink() > 0 {
-            file.write_all(&serde_json::to_vec(entry)?)?;
-            return Ok(file);
-        }
+/// Writes `entry` and locks it. `None` if `clean` met the file before it was locked, and has removed it: then the
+/// run needs another name, so that a name that was once dead is so for ever.
+fn register(entry: &Entry) -> Result<Option<File>> {
+    let mut options = std::fs::OpenOptions::new();
+    options.read(true).write(true).create_new(true).mode(0o600);
+    let mut file = options.open(entry_path(&entry.run_id))?;
+    // Waits while `clean` has the lock.
+    rustix::io::retry_on_intr(|| flock(&file, FlockOperation::LockExclusive))?;
+    if file.metadata()?.nlink() == 0 {
+        return Ok(None);
     }
+    file.write_all(&serde_json::to_vec(entry)?)?;
+    Ok(Some(file))
 }
 
 /// Creates the run directory and locks it as well: where two containers share the folder for temporary files but
@@ -241,7 +252,14 @@ fn listed(runs: &[LiveRun]) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::{Entry, LiveRun, choose, dir_name, is_run_id, run_of_dir, run_of_shared_memory};
+    use super::{
+        Entry, LiveRun, choose, dir_name, entry_path, is_run_id, register, run_of_dir, run_of_shared_memory,
+        try_claim,
+    };
+    use std::collections::BTreeSet;
+    use std::path::Path;
+    use std::sync::Mutex;
+    use std::sync::atomic::{AtomicBool, Ordering};
 
     fn runs(names: &[&str]) -> Vec<LiveRun> {
         let run = |name: &&str| {
@@ -262,6 +280,44 @@ mod tests {
         for text in [words(&["1-a", "2-b"], None), words(&["1-a", "2-b"], Some("3-c"))] {
             assert!(text.contains("\n  1-a  /m.toml  (launcher 1)\n  2-b  /m.toml"), "{text}");
         }
+    }
+
+    #[test]
+    fn a_run_that_has_registered_is_never_cleaned_whenever_clean_looked() {
+        let name = Mutex::new(String::new());
+        let clean = || {
+            let run_id = name.lock().unwrap().clone();
+            let path = entry_path(&run_id);
+            // Of a run that was there when `clean` looked around.
+            if path.exists()
+                && let Some(_claim) = try_claim(&run_id, &BTreeSet::new())
+            {
+                let _ = std::fs::remove_file(&path);
+            }
+        };
+        let (is_over, mut kept, mut removed, mut lost) = (AtomicBool::new(false), 0, 0, 0);
+        std::thread::scope(|scope| {
+            (0..2).for_each(|_| {
+                drop(scope.spawn(|| {
+                    while !is_over.load(Ordering::Relaxed) {
+                        clean()
+                    }
+                }))
+            });
+            for _ in 0..20_000 {
+                let entry = Entry::new(Path::new("/m.toml")).unwrap();
+                name.lock().unwrap().clone_from(&entry.run_id);
+                match register(&entry) {
+                    Ok(Some(_lock)) => match std::fs::remove_file(entry_path(&entry.run_id)) {
+                        Ok(()) => kept += 1,
+                        Err(_) => lost += 1,
+                    },
+                    _ => removed += 1,
+                }
+            }
+            is_over.store(true, Ordering::Relaxed);
+        });
+        assert!(lost == 0 && kept > 0, "{lost} lost, {kept} kept, {removed} removed before they were locked");
     }
 
     #[test]
