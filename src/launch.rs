@@ -83,7 +83,7 @@ pub fn fly(manifest: &Manifest, graph: &mut Graph, recording: &Path, quiet: bool
     let mut outcome = outcome(plan, &control, was_stopped);
     outcome.successions = supervisor.successions.into_reports();
     if plan.profile {
-        outcome.flight = Some(Flight::open(plan, dir, outcome.ticks)?);
+        outcome.flight = Some(Flight::open(plan, dir, outcome.ticks, &outcome.successions)?);
     }
     Ok(outcome)
 }

@@ -8,7 +8,7 @@ use crate::processes::{Processes, Role};
 use crate::program::{OnExit, Program, Successor};
 use anyhow::Result;
 use bus::control::{Control, HandOver, Phase, Seat};
-use bus::plan::{Plan, SEATS};
+use bus::plan::{InputPlan, Plan, SEATS};
 use bus::roster::{Incumbent, Roster};
 use serde::Serialize;
 use std::collections::VecDeque;
@@ -71,6 +71,8 @@ struct Candidate {
     /// When its process was started, and when the present stage began.
     started: Instant,
     stage_began: Instant,
+    /// Since when the run waits for it.
+    held_since: Option<Instant>,
     /// The generation that it has succeeded.
     former: Option<u32>,
     report: Report,
@@ -104,12 +106,15 @@ pub struct Report {
     pub take_over_tick: Option<u32>,
     /// What it went on from: `state` or `last output`.
     pub hand_over: Option<&'static str>,
-    /// Host time from the start of its process until it could join, in milliseconds.
+    /// Host time from the start of its process until that was prepared to join, in milliseconds.
     pub start_ms: f64,
     /// Host time for which the clock held the tick, in milliseconds.
     pub hold_ms: f64,
     /// Why it did not fly, if it was to.
     pub refused: Option<String>,
+    /// What it reads, for a profile of the run.
+    #[serde(skip)]
+    pub inputs: Vec<InputPlan>,
 }
 
 /// All successions of a run.
@@ -348,6 +353,7 @@ impl<'a> Successions<'a> {
             start_ms: 0.0,
             hold_ms: 0.0,
             refused: None,
+            inputs: pending.successor.plan.inputs.clone(),
         };
         let now = Instant::now();
         let role = Role::Node { node, generation };
@@ -359,6 +365,7 @@ impl<'a> Successions<'a> {
             stage: Stage::Starting,
             started: now,
             stage_began: now,
+            held_since: None,
             former: None,
             report,
         });
@@ -367,6 +374,7 @@ impl<'a> Successions<'a> {
 
     /// Takes the candidate of `node` one stage further; false where it must wait.
     fn advance_candidate(&mut self, node: usize, processes: &mut Processes) -> Result<bool> {
+        self.note_start(node);
         let Some(candidate) = &self.seats[node].candidate else { return Ok(false) };
         let member = self.member(node, candidate.generation);
         let goes_on = match candidate.stage {
@@ -392,6 +400,22 @@ impl<'a> Successions<'a> {
             candidate.stage_began = Instant::now();
         }
         Ok(true)
+    }
+
+    /// Notes when the candidate of `node` was prepared, and since when the run waits for it.
+    fn note_start(&mut self, node: usize) {
+        let Some(candidate) = &self.seats[node].candidate else { return };
+        if candidate.stage != Stage::Starting {
+            return;
+        }
+        let (is_prepared, is_awaited) = (self.is_prepared(candidate), self.is_at_join(candidate));
+        let Some(candidate) = &mut self.seats[node].candidate else { return };
+        if is_prepared && candidate.report.start_ms == 0.0 {
+            candidate.report.start_ms = milliseconds(candidate.started);
+        }
+        if is_awaited {
+            candidate.held_since.get_or_insert_with(Instant::now);
+        }
     }
 
     /// One change at a time: the one before must be agreed with, and nobody else may be on the way in.
@@ -451,10 +475,8 @@ impl<'a> Successions<'a> {
         });
         self.roster.epoch += 1;
         self.roster.store(self.run_dir)?;
-        candidate.report.start_ms = milliseconds(candidate.started);
         candidate.report.join_tick = Some(join_tick);
         candidate.stage = Stage::Joining;
-        candidate.started = Instant::now();
         control.set_seat(member, Seat::Joining);
         Ok(())
     }
@@ -469,7 +491,7 @@ impl<'a> Successions<'a> {
     fn let_compute(&mut self, node: usize) {
         let Some(candidate) = &mut self.seats[node].candidate else { return };
         let member = self.plan.member(node, candidate.generation);
-        candidate.report.hold_ms = milliseconds(candidate.started);
+        candidate.report.hold_ms = candidate.held_since.map_or(0.0, milliseconds);
         candidate.report.hand_over = match self.control.hand_over(member) {
             HandOver::Unknown => None,
             HandOver::State => Some("state"),

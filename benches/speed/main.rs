@@ -4,6 +4,7 @@
 #![allow(clippy::disallowed_methods, reason = "a benchmark measures host time")]
 
 mod floor;
+mod flying;
 mod hop;
 mod hover;
 mod idle;
@@ -11,6 +12,9 @@ mod payload;
 mod profile;
 mod relay;
 mod report;
+mod start;
+mod swap;
+mod vehicles;
 
 use report::Result;
 
@@ -31,15 +35,19 @@ fn main() -> Result<()> {
 type Part = fn() -> Result<()>;
 
 fn parts(names: &[String]) -> Result<()> {
-    let all: [(&str, Part); 5] = [
+    let all: [(&str, Part); 8] = [
         ("hop", hop::report),
         ("hover", hover::report),
         ("payload", payload::report),
         ("idle", idle::report),
         ("profile", profile::report),
+        ("vehicles", vehicles::report),
+        ("start", start::report),
+        ("swap", swap::report),
     ];
     if let Some(unknown) = names.iter().find(|name| all.iter().all(|(part, _)| part != name)) {
-        return Err(format!("no part `{unknown}`; there are hop, hover, payload, idle, profile").into());
+        let known = all.map(|(part, _)| part).join(", ");
+        return Err(format!("no part `{unknown}`; there are {known}").into());
     }
     report::print_machine();
     for (name, report) in all {

@@ -55,3 +55,13 @@ pub fn fly_manifest(verb: &str, path: &Path, arguments: &[&str]) -> Result<serde
 pub fn number(summary: &serde_json::Value, key: &str) -> Result<f64> {
     summary[key].as_f64().ok_or_else(|| format!("the summary has no number `{key}`").into())
 }
+
+/// The slope of the straight line through `points` with the least squares of the ordinates' errors.
+pub fn slope(points: impl Iterator<Item = (f64, f64)>) -> f64 {
+    let points: Vec<_> = points.collect();
+    let count = points.len() as f64;
+    let (mean_x, mean_y) =
+        points.iter().fold((0.0, 0.0), |(x, y), point| (x + point.0 / count, y + point.1 / count));
+    let products = points.iter().map(|(x, y)| (x - mean_x) * (y - mean_y)).sum::<f64>();
+    products / points.iter().map(|(x, _)| (x - mean_x).powi(2)).sum::<f64>()
+}

@@ -95,7 +95,9 @@ impl ConnectedNode {
         node.agree_with(roster, first_tick)?;
         if node.links.plan.profile {
             let links = &node.links;
-            node.profile = Some(TickWriter::create(&links.run_dir, &links.plan, links.index)?);
+            let (index, generation) = (links.index, links.generation);
+            node.profile =
+                Some(TickWriter::create(&links.run_dir, &links.plan, index, generation, first_tick)?);
         }
         node.links.control.set_process(node.links.member());
         node.links.control.agree(node.links.member(), roster.epoch);

@@ -59,14 +59,21 @@ pub struct Grant {
 pub struct TickWriter(RecordWriter);
 
 impl TickWriter {
-    /// Creates the file of `node` in `run_dir`.
+    /// Creates the file of generation `generation` of `node`, whose first tick is `first_tick`, in `run_dir`.
     ///
     /// # Errors
     /// If the file cannot be created or its space not be reserved.
-    pub fn create(run_dir: &Path, plan: &Plan, node: usize) -> Result<Self, BusError> {
+    pub fn create(
+        run_dir: &Path,
+        plan: &Plan,
+        node: usize,
+        generation: u32,
+        first_tick: u32,
+    ) -> Result<Self, BusError> {
         let words = TICK_WORDS + plan.nodes[node].outputs.len();
-        let ticks = plan.duration_ticks.div_ceil(plan.nodes[node].period_ticks.max(1));
-        RecordWriter::create(run_dir, &node.to_string(), words, ticks).map(Self)
+        let ticks = plan.duration_ticks.saturating_sub(first_tick);
+        let ticks = ticks.div_ceil(plan.nodes[node].period_ticks.max(1));
+        RecordWriter::create(path(run_dir, &node.to_string(), generation), words, ticks).map(Self)
     }
 
     /// Notes that `output` was sent at host time `sent_ns` in the current tick.
@@ -95,7 +102,7 @@ impl GrantWriter {
     /// # Errors
     /// If the file cannot be created or its space not be reserved.
     pub fn create(run_dir: &Path, plan: &Plan) -> Result<Self, BusError> {
-        let records = RecordWriter::create(run_dir, "clock", GRANT_WORDS, plan.duration_ticks)?;
+        let records = RecordWriter::create(path(run_dir, "clock", 0), GRANT_WORDS, plan.duration_ticks)?;
         Ok(Self { records, granted: 0 })
     }
 
@@ -115,47 +122,35 @@ impl GrantWriter {
     }
 }
 
-/// What a node noted, over all processes that were this node one after the other.
+/// What one process of a node noted.
 #[derive(Debug)]
 pub struct TickReader {
-    files: Vec<RecordReader>,
+    /// `None` if it ended before it could note anything.
+    records: Option<RecordReader>,
     period_ticks: u32,
 }
 
 impl TickReader {
-    /// Opens what `node` noted in `run_dir`; its processes must have ended.
+    /// Opens what generation `generation` of `node` noted in `run_dir`; its process must have ended.
     ///
     /// # Errors
-    /// If a file cannot be read or is not one of this plan.
-    pub fn open(run_dir: &Path, plan: &Plan, node: usize) -> Result<Self, BusError> {
+    /// If the file cannot be read or is not one of this plan.
+    pub fn open(run_dir: &Path, plan: &Plan, node: usize, generation: u32) -> Result<Self, BusError> {
         let words = TICK_WORDS + plan.nodes[node].outputs.len();
-        let files = RecordReader::open_all(run_dir, &node.to_string(), words)?;
-        Ok(Self { files, period_ticks: plan.nodes[node].period_ticks.max(1) })
-    }
-
-    /// Computations that were noted.
-    #[must_use]
-    pub fn count(&self) -> usize {
-        self.files.iter().map(RecordReader::count).sum()
+        let records = RecordReader::open(path(run_dir, &node.to_string(), generation), words)?;
+        Ok(Self { records, period_ticks: plan.nodes[node].period_ticks.max(1) })
     }
 
     /// Computations that were not noted because the file was full.
     #[must_use]
     pub fn left_out(&self) -> u64 {
-        self.files.iter().map(RecordReader::left_out).sum()
+        self.records.as_ref().map_or(0, RecordReader::left_out)
     }
 
-    /// The computation of `tick`. Of two processes that were this node at a tick, the one that sent is taken.
+    /// The computation of `tick`.
     #[must_use]
     pub fn at(&self, tick: u32) -> Option<TickTimes<'_>> {
-        let times = |file| self.times(file, tick);
-        let mut found = self.files.iter().filter_map(times);
-        let first = found.next()?;
-        let has_sent = |times: &TickTimes<'_>| times.sent_ns.iter().any(|&ns| ns > 0);
-        if has_sent(&first) { Some(first) } else { found.find(has_sent).or(Some(first)) }
-    }
-
-    fn times<'a>(&self, file: &'a RecordReader, tick: u32) -> Option<TickTimes<'a>> {
+        let file = self.records.as_ref()?;
         let first_tick = *file.record(0)?.first()?;
         let index = u64::from(tick).checked_sub(first_tick)? / u64::from(self.period_ticks);
         let index = usize::try_from(index).ok()?;
@@ -174,7 +169,7 @@ impl TickReader {
 
 /// What the clock noted.
 #[derive(Debug)]
-pub struct GrantReader(Vec<RecordReader>);
+pub struct GrantReader(Option<RecordReader>);
 
 impl GrantReader {
     /// Opens what the clock noted in `run_dir`; its process must have ended.
@@ -182,7 +177,7 @@ impl GrantReader {
     /// # Errors
     /// If the file cannot be read or is not one of this program.
     pub fn open(run_dir: &Path) -> Result<Self, BusError> {
-        RecordReader::open_all(run_dir, "clock", GRANT_WORDS).map(Self)
+        RecordReader::open(path(run_dir, "clock", 0), GRANT_WORDS).map(Self)
     }
 
     /// The grants, in their order.
@@ -193,7 +188,7 @@ impl GrantReader {
     /// The grant of `tick`.
     #[must_use]
     pub fn of(&self, tick: u32) -> Option<Grant> {
-        let file = self.0.first()?;
+        let file = self.0.as_ref()?;
         let (mut low, mut high) = (0, file.count());
         while low < high {
             let middle = usize::midpoint(low, high);
@@ -230,8 +225,13 @@ struct RecordWriter {
 }
 
 impl RecordWriter {
-    fn create(run_dir: &Path, writer: &str, words: usize, records: u32) -> Result<Self, BusError> {
-        let (file, path) = create_next(run_dir, writer)?;
+    fn create(path: PathBuf, words: usize, records: u32) -> Result<Self, BusError> {
+        let file = File::options()
+            .read(true)
+            .write(true)
+            .create_new(true)
+            .open(&path)
+            .map_err(|source| BusError::File { action: "create", path: path.clone(), source })?;
         let fail = |source| BusError::File { action: "reserve space for host times in", path, source };
         let capacity = records.min(NOTED_TICKS_MAX) as usize;
         // One more than counts: when the file is full, that one takes what is not noted.
@@ -275,19 +275,6 @@ impl RecordWriter {
     }
 }
 
-/// The first file of `writer` that is not there yet: a process that takes a node over keeps what was noted.
-fn create_next(run_dir: &Path, writer: &str) -> Result<(File, PathBuf), BusError> {
-    let mut generation = 0;
-    loop {
-        let path = path(run_dir, writer, generation);
-        match File::options().read(true).write(true).create_new(true).open(&path) {
-            Ok(file) => return Ok((file, path)),
-            Err(error) if error.kind() == ErrorKind::AlreadyExists => generation += 1,
-            Err(source) => return Err(BusError::File { action: "create", path, source }),
-        }
-    }
-}
-
 /// Gives `file` its size and its space: a full disk is an error here, and would kill a process that writes.
 fn reserve(file: &File, bytes: u64) -> std::io::Result<()> {
     match rustix::fs::fallocate(file, rustix::fs::FallocateFlags::empty(), 0, bytes) {
@@ -304,25 +291,23 @@ struct RecordReader {
 }
 
 impl RecordReader {
-    /// The files of all processes of `writer`, in the order in which they came.
-    fn open_all(run_dir: &Path, writer: &str, words: usize) -> Result<Vec<Self>, BusError> {
-        let paths = (0..).map(|generation| path(run_dir, writer, generation));
-        paths.take_while(|path| path.exists()).map(|path| Self::open(path, words)).collect()
-    }
-
-    fn open(path: PathBuf, words: usize) -> Result<Self, BusError> {
+    /// Opens the file at `path`; `None` where there is none.
+    fn open(path: PathBuf, words: usize) -> Result<Option<Self>, BusError> {
         let map = File::open(&path).and_then(|file| {
             // SAFETY: the file lies in the run's own directory and its writer has ended.
             unsafe { Mmap::map(&file) }
         });
-        let map = map.map_err(|source| BusError::File { action: "read", path: path.clone(), source })?;
+        let map = match map {
+            Err(error) if error.kind() == ErrorKind::NotFound => return Ok(None),
+            other => other.map_err(|source| BusError::File { action: "read", path: path.clone(), source })?,
+        };
         let reader = Self { map, words };
         let is_whole = reader.map.len().is_multiple_of(WORD_BYTES)
             && reader.map.len() / WORD_BYTES >= HEADER_WORDS
             && reader.all_words()[..2] == [MAGIC, words as u64]
             && reader.record(reader.count().saturating_sub(1)).is_some() == (reader.count() > 0);
         if is_whole {
-            return Ok(reader);
+            return Ok(Some(reader));
         }
         let found = format!("{} bytes that do not start like one", reader.map.len());
         Err(BusError::Content { path, expected: "the host times of a process", found })
@@ -384,14 +369,14 @@ mod tests {
     #[test]
     fn what_was_noted_is_read_by_tick() {
         let (folder, plan) = (tempfile::tempdir().unwrap(), plan(10));
-        let mut writer = TickWriter::create(folder.path(), &plan, 0).unwrap();
+        let mut writer = TickWriter::create(folder.path(), &plan, 0, 0, 0).unwrap();
         for tick in [0, 10, 20] {
             let at = 100 * u64::from(tick);
             writer.sent(1, at + 3);
             writer.end(tick, at + 1, at + 2, at + 4);
         }
-        let reader = TickReader::open(folder.path(), &plan, 0).unwrap();
-        assert_eq!((reader.count(), reader.left_out()), (3, 0));
+        let reader = TickReader::open(folder.path(), &plan, 0, 0).unwrap();
+        assert_eq!(reader.left_out(), 0);
         let times = reader.at(10).unwrap();
         let found = [times.began_ns.unwrap(), times.received_ns, times.done_ns, times.ended_ns];
         assert_eq!(found, [4, 1001, 1002, 1004]);
@@ -403,32 +388,21 @@ mod tests {
     #[test]
     fn a_full_file_counts_what_it_leaves_out() {
         let (folder, plan) = (tempfile::tempdir().unwrap(), plan(10));
-        let mut writer = TickWriter::create(folder.path(), &plan, 0).unwrap();
+        let mut writer = TickWriter::create(folder.path(), &plan, 0, 0, 0).unwrap();
         (0..5).for_each(|index| writer.end(10 * index, 1, 2, 3));
-        let reader = TickReader::open(folder.path(), &plan, 0).unwrap();
-        assert_eq!((reader.count(), reader.left_out()), (3, 2));
+        let reader = TickReader::open(folder.path(), &plan, 0, 0).unwrap();
+        assert_eq!(reader.left_out(), 2);
         assert!(reader.at(20).is_some() && reader.at(30).is_none());
     }
 
     #[test]
-    fn a_process_that_takes_a_node_over_adds_to_what_was_noted() {
-        let (folder, plan) = (tempfile::tempdir().unwrap(), plan(1));
-        let mut first = TickWriter::create(folder.path(), &plan, 0).unwrap();
-        let mut second = TickWriter::create(folder.path(), &plan, 0).unwrap();
-        for tick in 0..4 {
-            first.sent(0, 7);
-            first.end(tick, 10, 11, 12);
-        }
-        // From tick 2 on the second process computes too, from tick 4 on it sends.
-        for tick in 2..6 {
-            if tick >= 4 {
-                second.sent(0, 8);
-            }
-            second.end(tick, 20, 21, 22);
-        }
-        let reader = TickReader::open(folder.path(), &plan, 0).unwrap();
-        let received = (0..6).map(|tick| reader.at(tick).unwrap().received_ns);
-        assert_eq!(received.collect::<Vec<_>>(), [10, 10, 10, 10, 20, 20]);
+    fn a_process_that_joins_late_notes_from_its_first_tick_on() {
+        let (folder, plan) = (tempfile::tempdir().unwrap(), plan(10));
+        let mut writer = TickWriter::create(folder.path(), &plan, 0, 1, 20).unwrap();
+        writer.end(20, 1, 2, 3);
+        let of = |generation| TickReader::open(folder.path(), &plan, 0, generation).unwrap();
+        assert_eq!([0, 10, 20].map(|tick| of(1).at(tick).is_some()), [false, false, true]);
+        assert!(of(0).at(20).is_none(), "another process noted nothing");
     }
 
     #[test]
@@ -449,14 +423,14 @@ mod tests {
     #[test]
     fn a_damaged_file_is_refused_by_its_name() {
         let (folder, plan) = (tempfile::tempdir().unwrap(), plan(1));
-        drop(TickWriter::create(folder.path(), &plan, 0).unwrap());
+        drop(TickWriter::create(folder.path(), &plan, 0, 0, 0).unwrap());
         let file = path(folder.path(), "0", 0);
         let whole = std::fs::read(&file).unwrap();
         let mut claims_more = whole.clone();
         claims_more[16..24].copy_from_slice(&u64::MAX.to_le_bytes());
         for damaged in [&whole[..30], &whole[..7], b"", &[b'x'; 64], &claims_more] {
             std::fs::write(&file, damaged).unwrap();
-            let error = TickReader::open(folder.path(), &plan, 0).unwrap_err().to_string();
+            let error = TickReader::open(folder.path(), &plan, 0, 0).unwrap_err().to_string();
             assert!(error.contains("profile-0.0.bin"), "{error}");
         }
     }

@@ -69,8 +69,8 @@ impl<'a> Ages<'a> {
     fn compute(&mut self, node: usize, tick: u32) {
         let oldest = &mut self.in_node[node];
         oldest.fill(None);
-        for (index, input) in self.flight.plan.nodes[node].inputs.iter().enumerate() {
-            let Some(stamp) = self.flight.stamp(node, index, tick).filter(|_| input.delay_ticks == 0) else {
+        for input in self.flight.inputs(node, tick) {
+            let Some(stamp) = self.flight.stamp(input, tick).filter(|_| input.delay_ticks == 0) else {
                 continue;
             };
             keep_older(&mut oldest[input.topic], Some(stamp));

@@ -1,7 +1,8 @@
 //! What the processes of a run noted, and what follows from it with the plan.
 
+use crate::succession::Report;
 use bus::BusError;
-use bus::plan::Plan;
+use bus::plan::{InputPlan, Plan};
 use bus::profile::{Grant, GrantReader, TickReader, TickTimes};
 use std::path::Path;
 
@@ -12,9 +13,18 @@ pub struct Flight {
     pub plan: Plan,
     /// Ticks that every node completed.
     pub ticks: u32,
-    nodes: Vec<TickReader>,
+    nodes: Vec<Vec<Era>>,
     grants: GrantReader,
     publishers: Vec<Publisher>,
+}
+
+/// The time in which one process was a node: its samples counted.
+#[derive(Debug)]
+struct Era {
+    /// The first tick that was its own. A successor noted ticks before, as a shadow: nobody read those.
+    first_tick: u32,
+    inputs: Vec<InputPlan>,
+    noted: TickReader,
 }
 
 /// Who sends a topic.
@@ -29,8 +39,8 @@ pub struct Publisher {
 /// What a computation had to wait for last.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Cause {
-    /// A sample: the node's input, and the tick that the sample is stamped with.
-    Sample { input: usize, tick: u32 },
+    /// A sample: its topic, and the tick that it is stamped with.
+    Sample { topic: usize, tick: u32 },
     /// The clock's grant.
     Grant,
     /// The node's own computation before.
@@ -47,12 +57,13 @@ pub struct Waited {
 }
 
 impl Flight {
-    /// Opens what the processes of `plan` noted in `run_dir`. The files may be removed while this lives.
+    /// Opens what the processes of `plan` noted in `run_dir`; `successions` says who took over from whom. The
+    /// files may be removed while this lives.
     ///
     /// # Errors
     /// If a file cannot be read or does not hold what it should.
-    pub fn open(plan: &Plan, run_dir: &Path, ticks: u32) -> Result<Self, BusError> {
-        let nodes = (0..plan.nodes.len()).map(|node| TickReader::open(run_dir, plan, node));
+    pub fn open(plan: &Plan, run_dir: &Path, ticks: u32, successions: &[Report]) -> Result<Self, BusError> {
+        let nodes = (0..plan.nodes.len()).map(|node| eras(plan, run_dir, node, successions));
         let mut publishers = vec![Publisher::default(); plan.topics.len()];
         for (node, plan) in plan.nodes.iter().enumerate() {
             for (output, plan) in plan.outputs.iter().enumerate() {
@@ -68,14 +79,14 @@ impl Flight {
         })
     }
 
-    /// Computations that were noted, over all nodes.
+    /// Computations that were noted, over all nodes, without those of shadows.
     pub fn noted(&self) -> usize {
-        self.nodes.iter().map(TickReader::count).sum()
+        (0..self.nodes.len()).map(|node| self.ticks_of(node).count()).sum()
     }
 
     /// Computations that were not noted because there were too many.
     pub fn left_out(&self) -> u64 {
-        self.nodes.iter().map(TickReader::left_out).sum()
+        self.nodes.iter().flatten().map(|era| era.noted.left_out()).sum()
     }
 
     /// The name of a node.
@@ -95,7 +106,21 @@ impl Flight {
 
     /// The times of `node` at `tick`, if it was due then and noted it.
     pub fn at(&self, node: usize, tick: u32) -> Option<TickTimes<'_>> {
-        self.nodes[node].at(tick)
+        let mut found = self.eras_at(node, tick).filter_map(|era| era.noted.at(tick));
+        let newest = found.next()?;
+        let has_sent = |times: &TickTimes<'_>| times.sent_ns.iter().any(|&ns| ns > 0);
+        // A process that died may have sent the tick that its successor did again.
+        if has_sent(&newest) { Some(newest) } else { found.find(has_sent).or(Some(newest)) }
+    }
+
+    /// The processes that have been `node` by `tick`, the newest first.
+    fn eras_at(&self, node: usize, tick: u32) -> impl Iterator<Item = &Era> {
+        self.nodes[node].iter().rev().filter(move |era| era.first_tick <= tick)
+    }
+
+    /// The inputs that `node` has at `tick`: a successor may read other topics.
+    pub fn inputs(&self, node: usize, tick: u32) -> &[InputPlan] {
+        self.eras_at(node, tick).next().map_or(&[], |era| &era.inputs)
     }
 
     /// All that `node` noted in the ticks of the run.
@@ -104,9 +129,8 @@ impl Flight {
         (0..self.ticks).step_by(period).filter_map(move |tick| self.at(node, tick))
     }
 
-    /// The stamp of the sample that `input` of `node` reads at `tick`; `None` for an initial value.
-    pub fn stamp(&self, node: usize, input: usize, tick: u32) -> Option<u32> {
-        let input = &self.plan.nodes[node].inputs[input];
+    /// The stamp of the sample that `input` reads at `tick`; `None` for an initial value.
+    pub fn stamp(&self, input: &InputPlan, tick: u32) -> Option<u32> {
         let newest = tick.checked_sub(input.delay_ticks)?;
         Some(newest - newest % self.plan.topics[input.topic].period_ticks.max(1))
     }
@@ -133,11 +157,11 @@ impl Flight {
         let own = times.began_ns.map(|ready_ns| Waited { cause: Cause::Itself, ready_ns });
         let granted = self.grant(times.tick)?.granted_ns;
         let mut last = Waited { cause: Cause::Grant, ready_ns: granted };
-        for input in 0..self.plan.nodes[node].inputs.len() {
-            let Some(tick) = self.stamp(node, input, times.tick) else { continue };
-            let ready_ns = self.sent_ns(self.plan.nodes[node].inputs[input].topic, tick)?;
+        for input in self.inputs(node, times.tick) {
+            let Some(tick) = self.stamp(input, times.tick) else { continue };
+            let ready_ns = self.sent_ns(input.topic, tick)?;
             if ready_ns > last.ready_ns {
-                last = Waited { cause: Cause::Sample { input, tick }, ready_ns };
+                last = Waited { cause: Cause::Sample { topic: input.topic, tick }, ready_ns };
             }
         }
         Some(own.filter(|own| own.ready_ns >= last.ready_ns).unwrap_or(last))
@@ -153,11 +177,11 @@ impl Flight {
     }
 
     fn readers_of(&self, topic: usize, with: impl Fn(u32) -> bool + Copy) -> impl Iterator<Item = usize> {
-        let nodes = self.plan.nodes.iter().enumerate();
-        let reads = move |node: &bus::plan::NodePlan| {
-            node.inputs.iter().any(|input| input.topic == topic && with(input.delay_ticks))
-        };
-        nodes.filter(move |(_, node)| reads(node)).map(|(index, _)| index)
+        let reads = move |input: &InputPlan| input.topic == topic && with(input.delay_ticks);
+        let nodes = self.nodes.iter().enumerate();
+        nodes
+            .filter(move |(_, eras)| eras.iter().flat_map(|era| &era.inputs).any(reads))
+            .map(|(node, _)| node)
     }
 
     /// Whether what `from` sends comes to `to`, over any number of nodes; a node reaches itself.
@@ -175,9 +199,25 @@ impl Flight {
 
     /// The nodes in an order in which each comes after those whose samples of the same tick it reads.
     pub fn in_order(&self) -> Vec<usize> {
-        let depths = crate::placement::depths(&self.plan.nodes, |topic| self.publishers[topic].node);
+        let mut nodes = self.plan.nodes.clone();
+        for (node, eras) in nodes.iter_mut().zip(&self.nodes) {
+            node.inputs = eras.iter().flat_map(|era| era.inputs.clone()).collect();
+        }
+        let depths = crate::placement::depths(&nodes, |topic| self.publishers[topic].node);
         let mut order: Vec<usize> = (0..self.plan.nodes.len()).collect();
         order.sort_by_key(|&node| depths[node]);
         order
     }
+}
+
+/// The processes that were `node` one after the other.
+fn eras(plan: &Plan, run_dir: &Path, node: usize, successions: &[Report]) -> Result<Vec<Era>, BusError> {
+    let first = (0, 0, &plan.nodes[node].inputs);
+    let next = successions.iter().filter(|report| report.process == plan.nodes[node].name);
+    let next = next.filter_map(|report| Some((report.generation, report.take_over_tick?, &report.inputs)));
+    let era = |(generation, first_tick, inputs): (u32, u32, &Vec<InputPlan>)| {
+        let noted = TickReader::open(run_dir, plan, node, generation)?;
+        Ok(Era { first_tick, inputs: inputs.clone(), noted })
+    };
+    std::iter::once(first).chain(next).map(era).collect()
 }

@@ -56,8 +56,7 @@ fn latency(flight: &Flight, node: usize, transport: &mut BTreeMap<(usize, usize)
         }
         let woken_ns = times.received_ns.saturating_sub(waited.ready_ns);
         wake_up.add(woken_ns);
-        if let Cause::Sample { input, .. } = waited.cause {
-            let topic = flight.plan.nodes[node].inputs[input].topic;
+        if let Cause::Sample { topic, .. } = waited.cause {
             transport.entry((topic, node)).or_default().add(woken_ns);
         }
     }

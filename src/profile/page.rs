@@ -174,9 +174,7 @@ impl Bar {
     fn json(&self, flight: &Flight, window: &Window) -> Value {
         let (from_ns, to_ns) = (self.start_ns.max(window.start_ns), self.end_ns.min(window.end_ns));
         let why = self.cause.map(|cause| match cause {
-            Cause::Sample { input, .. } => {
-                flight.topic_name(flight.plan.nodes[self.node].inputs[input].topic)
-            }
+            Cause::Sample { topic, .. } => flight.topic_name(topic),
             Cause::Grant => "grant",
             Cause::Itself => "its own tick before",
         });

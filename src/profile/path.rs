@@ -58,15 +58,13 @@ impl Path {
             stretches.push(Stretch { place: Place::Node(node), start_ns: times.received_ns, end_ns });
             let (start_ns, received_ns) = (waited.ready_ns, times.received_ns);
             let place = match waited.cause {
-                Cause::Sample { input, .. } => {
-                    Place::Hop { topic: flight.plan.nodes[node].inputs[input].topic, reader: node }
-                }
+                Cause::Sample { topic, .. } => Place::Hop { topic, reader: node },
                 Cause::Grant => Place::Grant(node),
                 Cause::Itself => Place::Itself(node),
             };
             stretches.push(Stretch { place, start_ns, end_ns: received_ns });
-            match (waited.cause, place) {
-                (Cause::Sample { tick: stamp, .. }, Place::Hop { topic, .. }) if stamp == tick => {
+            match waited.cause {
+                Cause::Sample { topic, tick: stamp } if stamp == tick => {
                     (node, end_ns) = (flight.publisher(topic).node, start_ns);
                 }
                 _ => break,

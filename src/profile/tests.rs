@@ -77,7 +77,7 @@ const TICKS: [Ticks<'_>; 3] = [
 fn flight(nodes: &[Ticks<'_>], grants: &[(u32, Option<u64>, u64)]) -> Flight {
     let (folder, plan) = (tempfile::tempdir().unwrap(), plan());
     for (index, ticks) in nodes.iter().enumerate() {
-        let mut writer = TickWriter::create(folder.path(), &plan, index).unwrap();
+        let mut writer = TickWriter::create(folder.path(), &plan, index, 0, 0).unwrap();
         for &[tick, received, done, ended] in *ticks {
             writer.sent(0, done.into());
             writer.end(tick, received.into(), done.into(), ended.into());
@@ -85,7 +85,7 @@ fn flight(nodes: &[Ticks<'_>], grants: &[(u32, Option<u64>, u64)]) -> Flight {
     }
     let mut writer = GrantWriter::create(folder.path(), &plan).unwrap();
     grants.iter().for_each(|&(end_tick, deadline, granted)| writer.grant_at(end_tick, deadline, granted));
-    Flight::open(&plan, folder.path(), plan.duration_ticks).unwrap()
+    Flight::open(&plan, folder.path(), plan.duration_ticks, &[]).unwrap()
 }
 
 fn free_flight() -> Flight {

@@ -114,7 +114,7 @@ impl<W: Write> Trace<'_, W> {
         let waited = self.flight.waited(node, times);
         if let (Some(waited), Some(began_ns)) = (waited, times.began_ns.filter(|ns| *ns >= self.origin_ns)) {
             let end_ns = waited.ready_ns.clamp(began_ns, times.received_ns);
-            let why = json!({ "for": self.cause(node, waited.cause) });
+            let why = json!({ "for": self.cause(waited.cause) });
             if end_ns > began_ns {
                 self.event(&self.slice(process, "wait", began_ns, end_ns, &why), false)?;
             }
@@ -127,15 +127,14 @@ impl<W: Write> Trace<'_, W> {
         self.event(&whole, false)?;
         self.event(&self.slice(process, "compute", times.received_ns, times.done_ns, &json!({})), false)?;
         self.event(&self.slice(process, "publish", times.done_ns, times.ended_ns, &json!({})), false)?;
-        if let Some(Cause::Sample { input, tick: stamp }) = waited.map(|waited| waited.cause) {
-            self.write_flow(node, input, stamp, times.received_ns)?;
+        if let Some(Cause::Sample { topic, tick: stamp }) = waited.map(|waited| waited.cause) {
+            self.write_flow(node, topic, stamp, times.received_ns)?;
         }
         Ok(())
     }
 
     /// The arrow from the sending of a sample to the reader that waited for it.
-    fn write_flow(&mut self, reader: usize, input: usize, stamp: u32, received_ns: u64) -> io::Result<()> {
-        let topic = self.flight.plan.nodes[reader].inputs[input].topic;
+    fn write_flow(&mut self, reader: usize, topic: usize, stamp: u32, received_ns: u64) -> io::Result<()> {
         let Some(sent_ns) = self.flight.sent_ns(topic, stamp).filter(|_| self.ticks.contains(&stamp)) else {
             return Ok(());
         };
@@ -152,11 +151,9 @@ impl<W: Write> Trace<'_, W> {
         self.event(&finish, false)
     }
 
-    fn cause(&self, node: usize, cause: Cause) -> String {
+    fn cause(&self, cause: Cause) -> String {
         match cause {
-            Cause::Sample { input, .. } => {
-                self.flight.topic_name(self.flight.plan.nodes[node].inputs[input].topic).to_owned()
-            }
+            Cause::Sample { topic, .. } => self.flight.topic_name(topic).to_owned(),
             Cause::Grant => "grant".to_owned(),
             Cause::Itself => "its own last tick".to_owned(),
         }
