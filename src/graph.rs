@@ -19,7 +19,7 @@ pub use successors::successor_of;
 use crate::manifest::Manifest;
 use crate::placement;
 use crate::problem::Problem;
-use crate::program::{Program, Successor};
+use crate::program::{OnExit, Program, Successor};
 use bus::plan::{NodePlan, Plan, TopicPlan};
 use processes::Member;
 use std::path::PathBuf;
@@ -96,6 +96,7 @@ fn wire(manifest: &Manifest, members: &[Member<'_>], changed: Option<usize>) -> 
             inputs: inputs::inputs(manifest, member, &topics)?,
             outputs: outputs::outputs(&published, index),
             parameters: serde_json::Value::Null,
+            restarts: member.program.on_exit == OnExit::Restart,
         });
     }
     inputs::require_no_cycle(manifest, members, &nodes, &published, changed)?;

@@ -1,28 +1,15 @@
 //! Starting one process of a run.
 
+use crate::processes::Role;
 use crate::program::{Executable, Program};
 use anyhow::{Context, Result};
-use bus::NODE_VARIABLE;
-use bus::process::{GENERATION_VARIABLE, LAUNCHER_VARIABLE, RUN_VARIABLE};
+use bus::process::{LAUNCHER_VARIABLE, RUN_VARIABLE};
+use bus::{GENERATION_VARIABLE, NODE_VARIABLE};
 use std::fs::{File, OpenOptions};
 use std::io;
 use std::os::unix::process::CommandExt;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
-
-/// A process's part in the run.
-#[derive(Clone, Copy, Debug)]
-pub enum Role {
-    /// The clock service.
-    Clock,
-    /// A node; its first process is of generation 0, successors count up.
-    Node {
-        /// Which of the node's processes this is.
-        generation: u32,
-    },
-    /// No part in the ticks.
-    Companion,
-}
 
 /// The clock service.
 ///
@@ -57,7 +44,7 @@ pub fn start(run_dir: &Path, name: &str, role: Role, program: &Program) -> Resul
     }
     match role {
         Role::Clock => {}
-        Role::Node { generation } => {
+        Role::Node { generation, .. } => {
             command.env(NODE_VARIABLE, name).env(GENERATION_VARIABLE, generation.to_string());
         }
         Role::Companion => bus::process::die_with_this_one(&mut command),
@@ -103,7 +90,7 @@ fn spawn(
 /// run directory, of which a successor has its own.
 fn open_log(name: &str, role: Role, run_dir: &Path, log: Option<&Path>) -> Result<(File, PathBuf)> {
     let generation = match role {
-        Role::Node { generation } => generation,
+        Role::Node { generation, .. } => generation,
         Role::Clock | Role::Companion => 0,
     };
     let number = if generation == 0 { String::new() } else { format!("#{generation}") };

@@ -15,6 +15,15 @@ pub enum BusError {
         /// The environment variable that is missing.
         variable: &'static str,
     },
+    /// Another process has this process's place in the run.
+    #[error(
+        "the run has a process `{name}` already, and a second one is refused: a process joins a run only when \
+         its launcher starts it"
+    )]
+    Claimed {
+        /// The node, or `clock`.
+        name: String,
+    },
     /// A file of the run could not be read or written.
     #[error("cannot {action} {path}: {source}")]
     File {
@@ -86,6 +95,23 @@ pub enum BusError {
         /// The layout the node was built with.
         expected: String,
         /// The layout the publisher announced.
+        found: String,
+    },
+    /// A successor sends other bytes than the process it would succeed.
+    #[error(
+        "layout mismatch on topic {topic}: the successor of node `{node}` sends its port `{port}` as\n{found}\n\
+         but the topic carries\n{expected}\nBuild both against the same message definition"
+    )]
+    SuccessorLayout {
+        /// The node.
+        node: String,
+        /// Its port.
+        port: String,
+        /// The topic.
+        topic: String,
+        /// The layout the topic carries.
+        expected: String,
+        /// The layout the successor was built with.
         found: String,
     },
     /// The type the manifest states for an output is not the type the node publishes.
@@ -170,6 +196,16 @@ pub enum BusError {
         time_s: f64,
         /// The node's own words.
         reason: String,
+    },
+    /// The system does not allow what the manifest asks for.
+    #[error("cannot {action}: {source}; {advice}")]
+    Denied {
+        /// What was tried.
+        action: &'static str,
+        /// The system's answer.
+        source: std::io::Error,
+        /// Which right is missing and how to get it.
+        advice: &'static str,
     },
     /// The launcher ended the run early.
     #[error("the run was aborted")]

@@ -3,9 +3,11 @@
 use crate::error::BusError;
 use rustix::process::{Signal, getppid, set_parent_process_death_signal};
 use rustix::thread::{CpuSet, sched_getaffinity, sched_setaffinity};
+use std::fs::{File, TryLockError};
 use std::io;
+use std::os::unix::fs::OpenOptionsExt;
 use std::os::unix::process::CommandExt;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, OnceLock};
@@ -15,9 +17,6 @@ pub const LAUNCHER_VARIABLE: &str = "HUMMINGBUS_LAUNCHER_PID";
 
 /// The environment variable that names the run directory.
 pub const RUN_VARIABLE: &str = "HUMMINGBUS_RUN";
-
-/// The environment variable that counts the processes of a node: 0 for the first, 1 for its first successor.
-pub const GENERATION_VARIABLE: &str = "HUMMINGBUS_GENERATION";
 
 /// The directory of the run that started this process, with which the process from now on dies.
 ///
@@ -61,6 +60,28 @@ fn die_with_parent() {
     }
 }
 
+/// A process's place in a run, taken for as long as this value lives: the kernel frees it when the process dies.
+#[derive(Debug)]
+pub(crate) struct Claim {
+    _lock: File,
+}
+
+/// Takes the place of process `name` in the run whose directory is `run_dir`.
+///
+/// # Errors
+/// If another process has it: two clocks, or two processes of one node, would mix their ticks.
+pub(crate) fn claim(run_dir: &Path, name: &str) -> Result<Claim, BusError> {
+    let path = run_dir.join(format!("{}.claim", name.replace('/', ".")));
+    let fail = |source| BusError::File { action: "open", path: path.clone(), source };
+    let lock =
+        File::options().create(true).truncate(false).write(true).mode(0o600).open(&path).map_err(fail)?;
+    match lock.try_lock() {
+        Ok(()) => Ok(Claim { _lock: lock }),
+        Err(TryLockError::WouldBlock) => Err(BusError::Claimed { name: name.to_owned() }),
+        Err(TryLockError::Error(source)) => Err(BusError::File { action: "lock", path, source }),
+    }
+}
+
 /// Keeps this process on one core. Where the machine has no such core, it stays where it is: placement
 /// is a matter of speed, never of results.
 pub fn stay_on(cpu: Option<usize>) {
@@ -79,6 +100,10 @@ pub(crate) fn wait_for_turn() {
     // SAFETY: the call takes a number and touches no memory.
     if unsafe { libc::sched_getscheduler(0) } != libc::SCHED_OTHER {
         // The launcher has given it a policy of its own.
+        return;
+    }
+    // SAFETY: the call takes and returns numbers. A process that was given a real-time priority keeps it.
+    if unsafe { libc::sched_getscheduler(0) } != libc::SCHED_OTHER {
         return;
     }
     let parameters = libc::sched_param { sched_priority: 0 };
@@ -123,6 +148,20 @@ pub fn die_with_this_one(command: &mut Command) {
     unsafe { command.pre_exec(bind) };
 }
 
+/// Keeps all memory of this process, now and from now on, from being paged out.
+///
+/// # Errors
+/// If the system does not allow this much; the error names the right.
+pub(crate) fn lock_memory() -> Result<(), BusError> {
+    let all = rustix::mm::MlockAllFlags::CURRENT | rustix::mm::MlockAllFlags::FUTURE;
+    rustix::mm::mlockall(all).map_err(|error| BusError::Denied {
+        action: "lock the memory of this process (run.lock_memory)",
+        source: error.into(),
+        advice: "give it the capability CAP_IPC_LOCK or raise the limit on locked memory (`ulimit -l`, \
+                 `memlock` in limits.conf, `LimitMEMLOCK=` in systemd)",
+    })
+}
+
 /// Kills every process of the group that process `leader` leads.
 pub fn kill_group(leader: u32) {
     let group = i32::try_from(leader).ok().and_then(rustix::process::Pid::from_raw);
@@ -142,4 +181,11 @@ pub fn allowed_cores() -> Vec<usize> {
 #[must_use]
 pub fn user_id() -> u32 {
     rustix::process::getuid().as_raw()
+}
+
+/// A signal as people know it, such as `signal 9 (SIGKILL)`.
+#[must_use]
+pub fn signal_name(signal: i32) -> String {
+    let name = signal_hook::low_level::signal_name(signal);
+    name.map_or_else(|| format!("signal {signal}"), |name| format!("signal {signal} ({name})"))
 }

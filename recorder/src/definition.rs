@@ -62,6 +62,9 @@ enum Repeat {
     Sequence,
 }
 
+/// How deep messages may stand in messages; ROS 2's own stay below ten.
+const DEPTH_MAX: usize = 64;
+
 /// A parsed definition.
 #[derive(Clone, Debug)]
 pub struct Definition {
@@ -98,7 +101,9 @@ impl Definition {
         let Some((&[0, 1, 0, 0], body)) = cdr.split_first_chunk::<4>() else {
             return Err("it does not start with the header of little-endian CDR, 00 01 00 00".to_owned());
         };
-        let mut walk = Walk { definition: self, cdr: Cursor { body, at: 0 }, leaves: Vec::new() };
+        let values_left = DEPTH_MAX.saturating_mul(body.len() + 1);
+        let mut walk =
+            Walk { definition: self, cdr: Cursor { body, at: 0 }, leaves: Vec::new(), depth: 0, values_left };
         walk.message(&self.root, "", "")?;
         Ok(walk.leaves)
     }
@@ -131,6 +136,10 @@ struct Walk<'a> {
     definition: &'a Definition,
     cdr: Cursor<'a>,
     leaves: Vec<Leaf>,
+    depth: usize,
+    /// Values that are still read. A value takes a byte at least or holds one that does, so that only messages
+    /// without fields use this up: repeated, they would be read for ever.
+    values_left: usize,
 }
 
 impl Walk<'_> {
@@ -153,6 +162,9 @@ impl Walk<'_> {
     }
 
     fn value(&mut self, base: &str, path: String, unit: &str) -> Result<(), String> {
+        self.values_left = self.values_left.checked_sub(1).ok_or_else(|| {
+            format!("`{path}`: the definition names more values than the message has bytes")
+        })?;
         let cdr = &mut self.cdr;
         let value = match base {
             "float64" => Value::Float(f64::from_le_bytes(cdr.take()?)),
@@ -170,7 +182,13 @@ impl Walk<'_> {
                 let definition = self.definition;
                 let fields =
                     definition.types.get(base).ok_or_else(|| format!("type {base} is not defined"))?;
-                return self.message(fields, &path, unit);
+                if self.depth == DEPTH_MAX {
+                    return Err(format!("type {base} stands more than {DEPTH_MAX} messages deep"));
+                }
+                self.depth += 1;
+                let read = self.message(fields, &path, unit);
+                self.depth -= 1;
+                return read;
             }
         };
         self.leaves.push(Leaf { path, unit: unit.to_owned(), value });

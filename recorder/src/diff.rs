@@ -3,6 +3,7 @@
 use crate::error::RecordingError;
 use crate::reader::{Record, Recording};
 use std::fmt;
+use std::path::PathBuf;
 
 /// The first difference of two recordings.
 #[derive(Clone, Debug, PartialEq)]
@@ -31,6 +32,15 @@ pub enum Difference {
         /// What is in its place in the second recording.
         b: String,
     },
+    /// All messages of one recording are the first ones of the other, which goes on.
+    Prefix {
+        /// The recording that ends first.
+        shorter: PathBuf,
+        /// Its last tick; `None` where it has no message.
+        last_tick: Option<u32>,
+        /// The recording that goes on.
+        longer: PathBuf,
+    },
     /// The messages are the same; an attachment or the container differs.
     Container(String),
 }
@@ -42,6 +52,15 @@ impl fmt::Display for Difference {
                 write!(f, "tick {tick}, topic {topic}, field {field}: {a} against {b}")
             }
             Self::Message { tick, topic, a, b } => write!(f, "tick {tick}, topic {topic}: {a} against {b}"),
+            Self::Prefix { shorter, last_tick, longer } => {
+                write!(f, "{} is a prefix of {}: ", shorter.display(), longer.display())?;
+                match last_tick {
+                    Some(tick) => {
+                        write!(f, "all of its messages are the same, and it ends after tick {tick}")
+                    }
+                    None => write!(f, "it ends before the first message"),
+                }
+            }
             Self::Container(what) => write!(f, "all messages are the same; {what}"),
         }
     }
@@ -56,16 +75,23 @@ pub fn first_difference(a: &Recording, b: &Recording) -> Result<Option<Differenc
         return Ok(None);
     }
     let (mut left, mut right) = (a.messages(), b.messages());
+    let mut last_tick = None;
     loop {
         match (left.next().transpose()?, right.next().transpose()?) {
             (None, None) => return container_difference(a, b).map(Some),
-            (Some(x), Some(y)) if same_message(&x, &y) => {}
+            (Some(x), Some(y)) if same_message(&x, &y) => last_tick = Some(x.tick),
+            (None, Some(_)) => return Ok(Some(prefix(a, last_tick, b))),
+            (Some(_), None) => return Ok(Some(prefix(b, last_tick, a))),
             (Some(x), Some(y)) if (x.tick, &x.topic) == (y.tick, &y.topic) => {
                 return Ok(Some(field_difference(a, b, &x, &y)?));
             }
-            (x, y) => return Ok(Some(message_difference(x.as_ref(), y.as_ref()))),
+            (Some(x), Some(y)) => return Ok(Some(message_difference(&x, &y))),
         }
     }
+}
+
+fn prefix(shorter: &Recording, last_tick: Option<u32>, longer: &Recording) -> Difference {
+    Difference::Prefix { shorter: shorter.path().to_owned(), last_tick, longer: longer.path().to_owned() }
 }
 
 fn same_message(x: &Record, y: &Record) -> bool {
@@ -102,21 +128,17 @@ fn field_difference(
     })
 }
 
-fn message_difference(x: Option<&Record>, y: Option<&Record>) -> Difference {
-    let describe = |record: Option<&Record>| match record {
-        Some(record) => format!("a message of {} at tick {}", record.topic, record.tick),
-        None => "the end of the recording".to_owned(),
-    };
-    let earlier = [x, y].into_iter().flatten().min_by_key(|record| (record.tick, record.topic.clone()));
-    Difference::Message {
-        tick: earlier.map_or(0, |record| record.tick),
-        topic: earlier.map_or_else(String::new, |record| record.topic.clone()),
-        a: describe(x),
-        b: describe(y),
-    }
+fn message_difference(x: &Record, y: &Record) -> Difference {
+    let describe = |record: &Record| format!("a message of {} at tick {}", record.topic, record.tick);
+    let earlier = if (x.tick, &x.topic) <= (y.tick, &y.topic) { x } else { y };
+    Difference::Message { tick: earlier.tick, topic: earlier.topic.clone(), a: describe(x), b: describe(y) }
 }
 
 fn container_difference(a: &Recording, b: &Recording) -> Result<Difference, RecordingError> {
+    if let Some(cut) = [a, b].into_iter().find(|recording| recording.cut().is_some()) {
+        let path = cut.path().display();
+        return Ok(Difference::Container(format!("{path} was cut off behind its last message")));
+    }
     let (left, right) = (a.attachments()?, b.attachments()?);
     let differing = left.iter().find(|attachment| !right.contains(attachment));
     let differing = differing.or_else(|| right.iter().find(|attachment| !left.contains(attachment)));

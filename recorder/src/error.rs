@@ -18,7 +18,8 @@ pub enum RecordingError {
     },
     /// The file is not a complete MCAP file.
     #[error(
-        "{path} is not a complete MCAP file: {reason}. If its writer was killed, `mcap recover` saves what is whole"
+        "{path} is not a complete MCAP file: {reason}. If its writer was killed, `hummingbus cat` and `diff` read what \
+         is whole of it, and `mcap recover` makes a complete file of that"
     )]
     Content {
         /// The file.

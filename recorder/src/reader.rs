@@ -2,13 +2,14 @@
 
 use crate::definition::{Definition, Leaf};
 use crate::error::RecordingError;
-use mcap::Summary;
 use mcap::sans_io::linear_reader::LinearReaderOptions;
 use mcap::sans_io::{MessageReadEvent, MessageReader};
+use mcap::{Channel, Summary};
 use memmap2::Mmap;
 use std::collections::BTreeMap;
 use std::fs::File;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 /// A message of a recording.
 #[derive(Debug)]
@@ -40,24 +41,58 @@ pub struct Recording {
     path: PathBuf,
     bytes: Mmap,
     topics: BTreeMap<String, Topic>,
+    cut: Option<Cut>,
+}
+
+/// How a recording ends whose writer did not finish it.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Cut {
+    /// Tick of the last message that is whole; `None` where none is.
+    pub last_tick: Option<u32>,
 }
 
 impl Recording {
-    /// Opens the recording at `path`.
+    /// Opens the complete recording at `path`.
     ///
     /// # Errors
     /// If the file cannot be read or is not a complete MCAP file.
     pub fn open(path: &Path) -> Result<Self, RecordingError> {
-        let fail = |source| RecordingError::File { action: "open", path: path.to_owned(), source };
-        let file = File::open(path).map_err(fail)?;
-        // SAFETY: the mapping is read only, and our own writer never truncates a recording: it replaces the
-        // file. Another program that truncates it meanwhile ends this one with SIGBUS.
-        let bytes = unsafe { Mmap::map(&file) }.map_err(fail)?;
+        let bytes = map(path)?;
         let summary = Summary::read(&bytes).map_err(|error| content(path, &error))?.ok_or_else(|| {
             RecordingError::Content { path: path.to_owned(), reason: "it has no summary section".to_owned() }
         })?;
-        let topics = topics(&summary, path)?;
-        Ok(Self { path: path.to_owned(), bytes, topics })
+        let counts = summary.stats.as_ref().map(|stats| &stats.channel_message_counts);
+        let count = |channel: &Channel<'_>| counts.and_then(|counts| counts.get(&channel.id)).copied();
+        let channels = summary.channels.values().map(|channel| (channel, count(channel).unwrap_or(0)));
+        let topics = topics(channels, path)?;
+        Ok(Self { path: path.to_owned(), bytes, topics, cut: None })
+    }
+
+    /// Opens the recording at `path`, or what is whole of it if its writer did not come to the end of the file:
+    /// then [`Recording::cut`] says so. A complete file that is damaged is refused as by [`Recording::open`].
+    ///
+    /// # Errors
+    /// If the file cannot be read or is no MCAP file.
+    pub fn salvage(path: &Path) -> Result<Self, RecordingError> {
+        let bytes = map(path)?;
+        if !bytes.starts_with(mcap::MAGIC) || bytes.ends_with(mcap::MAGIC) && bytes.len() > mcap::MAGIC.len()
+        {
+            return Self::open(path);
+        }
+        let mut channels = BTreeMap::new();
+        let mut last_tick = None;
+        for message in Messages::new(&bytes).map_while(Result::ok) {
+            last_tick = Some(message.sequence);
+            channels.entry(message.channel.id).or_insert((message.channel, 0)).1 += 1;
+        }
+        let topics = topics(channels.values().map(|(channel, count)| (channel, *count)), path)?;
+        Ok(Self { path: path.to_owned(), bytes, topics, cut: Some(Cut { last_tick }) })
+    }
+
+    /// How the file ends, where its writer did not finish it.
+    #[must_use]
+    pub fn cut(&self) -> Option<&Cut> {
+        self.cut.as_ref()
     }
 
     /// The file.
@@ -90,9 +125,10 @@ impl Recording {
     }
 
     /// All messages in the order of the file: by tick, then by topic. A damaged chunk is an error in front of any
-    /// of its messages.
+    /// of its messages; a recording that was cut ends in front of it.
     pub fn messages(&self) -> impl Iterator<Item = Result<Record, RecordingError>> {
-        Messages::new(&self.bytes).map(|message| {
+        let messages = Messages::new(&self.bytes);
+        messages.take_while(|message| message.is_ok() || self.cut.is_none()).map(|message| {
             let message = message.map_err(|error| content(&self.path, &error))?;
             Ok(Record {
                 tick: message.sequence,
@@ -116,11 +152,14 @@ impl Recording {
         })
     }
 
-    /// The attachments: name and content.
+    /// The attachments: name and content; none of a recording that was cut, which has no index of them.
     ///
     /// # Errors
     /// If the file is damaged.
     pub fn attachments(&self) -> Result<Vec<(String, Vec<u8>)>, RecordingError> {
+        if self.cut.is_some() {
+            return Ok(Vec::new());
+        }
         let summary =
             Summary::read(&self.bytes).map_err(|error| content(&self.path, &error))?.unwrap_or_default();
         summary
@@ -172,20 +211,28 @@ impl Iterator for Messages<'_> {
     }
 }
 
-fn topics(summary: &Summary, path: &Path) -> Result<BTreeMap<String, Topic>, RecordingError> {
-    let counts = summary.stats.as_ref().map(|stats| &stats.channel_message_counts);
-    summary
-        .channels
-        .values()
-        .filter_map(|channel| channel.schema.as_ref().map(|schema| (channel, schema)))
-        .map(|(channel, schema)| {
+fn map(path: &Path) -> Result<Mmap, RecordingError> {
+    let fail = |source| RecordingError::File { action: "open", path: path.to_owned(), source };
+    let file = File::open(path).map_err(fail)?;
+    // SAFETY: the mapping is read only, and our own writer never truncates a recording: it replaces the
+    // file. Another program that truncates it meanwhile ends this one with SIGBUS.
+    unsafe { Mmap::map(&file) }.map_err(fail)
+}
+
+/// The topics of `channels`, each given with the number of its messages.
+fn topics<'a>(
+    channels: impl Iterator<Item = (&'a Arc<Channel<'static>>, u64)>,
+    path: &Path,
+) -> Result<BTreeMap<String, Topic>, RecordingError> {
+    channels
+        .filter_map(|(channel, count)| channel.schema.as_ref().map(|schema| (channel, schema, count)))
+        .map(|(channel, schema, message_count)| {
             let definition = Definition::parse(&String::from_utf8_lossy(&schema.data)).map_err(|reason| {
                 RecordingError::Content {
                     path: path.to_owned(),
                     reason: format!("schema {}: {reason}", schema.name),
                 }
             })?;
-            let message_count = counts.and_then(|counts| counts.get(&channel.id)).copied().unwrap_or(0);
             Ok((channel.topic.clone(), Topic { type_name: schema.name.clone(), definition, message_count }))
         })
         .collect()

@@ -13,8 +13,8 @@ use std::fs::File;
 use std::io::BufWriter;
 use std::path::{Path, PathBuf};
 
-/// Uncompressed bytes after which a chunk is closed.
-const CHUNK_BYTES: u64 = 1024 * 1024;
+/// Bytes of messages after which a chunk is closed.
+const CHUNK_BYTES: usize = 1024 * 1024;
 /// zstd level 1: on a run's numbers, higher levels cost more time than they save space.
 const ZSTD_LEVEL: u32 = 1;
 const FILE_BUFFER_BYTES: usize = 1024 * 1024;
@@ -23,6 +23,8 @@ const FILE_BUFFER_BYTES: usize = 1024 * 1024;
 pub struct RecordingWriter {
     mcap: mcap::Writer<BufWriter<File>>,
     path: PathBuf,
+    /// Bytes of messages in the open chunk.
+    chunk_bytes: usize,
 }
 
 /// A channel of a recording.
@@ -35,13 +37,15 @@ impl RecordingWriter {
     /// # Errors
     /// If the file cannot be created or written.
     pub fn create(path: &Path) -> Result<Self, RecordingError> {
+        let fail = |source| RecordingError::File { action: "create", path: path.to_owned(), source };
         // A file of its own: who reads the old one, mapped, keeps it whole.
-        let _ = std::fs::remove_file(path);
-        let file = File::create_new(path).map_err(|source| RecordingError::File {
-            action: "create",
-            path: path.to_owned(),
-            source,
-        })?;
+        match std::fs::symlink_metadata(path) {
+            Ok(old) if old.is_file() || old.is_symlink() => std::fs::remove_file(path).map_err(fail)?,
+            // Removing a device, as root, would take it from the whole machine.
+            Ok(_) => return Err(fail(std::io::Error::other("it exists and is not a regular file"))),
+            Err(_) => {}
+        }
+        let file = File::create_new(path).map_err(fail)?;
         let mcap = WriteOptions::new()
             .profile("ros2")
             .library("hummingbus")
@@ -49,10 +53,12 @@ impl RecordingWriter {
             .compression_level(ZSTD_LEVEL)
             // Worker threads would cost determinism nothing, but a core that the nodes need.
             .compression_threads(0)
-            .chunk_size(Some(CHUNK_BYTES))
+            // Chunks are closed between ticks, by `end_tick` and `flush`: what a killed recorder leaves ends
+            // with a whole tick.
+            .chunk_size(None)
             .create(BufWriter::with_capacity(FILE_BUFFER_BYTES, file))
             .map_err(|error| write_error(path, &error))?;
-        Ok(Self { mcap, path: path.to_owned() })
+        Ok(Self { mcap, path: path.to_owned(), chunk_bytes: 0 })
     }
 
     /// Attaches a text file under `name`.
@@ -99,14 +105,24 @@ impl RecordingWriter {
     ) -> Result<(), RecordingError> {
         let header =
             MessageHeader { channel_id: channel.0, sequence: tick, log_time: time_ns, publish_time: time_ns };
+        self.chunk_bytes += cdr.len();
         self.mcap.write_to_known_channel(&header, cdr).map_err(|error| write_error(&self.path, &error))
     }
 
-    /// Closes the chunk, so that what was written so far survives a killed process.
+    /// Ends a tick: closes the chunk if it is full.
+    ///
+    /// # Errors
+    /// If the file cannot be written.
+    pub fn end_tick(&mut self) -> Result<(), RecordingError> {
+        if self.chunk_bytes < CHUNK_BYTES { Ok(()) } else { self.flush() }
+    }
+
+    /// Closes the chunk and hands it to the kernel: what was written so far survives a killed process.
     ///
     /// # Errors
     /// If the file cannot be written.
     pub fn flush(&mut self) -> Result<(), RecordingError> {
+        self.chunk_bytes = 0;
         self.mcap.flush().map_err(|error| write_error(&self.path, &error))
     }
 
@@ -125,6 +141,11 @@ impl RecordingWriter {
     }
 }
 
+/// The error with its deepest cause, which says what the system refused.
 fn write_error(path: &Path, error: &mcap::McapError) -> RecordingError {
-    RecordingError::Write { path: path.to_owned(), reason: error.to_string() }
+    let mut cause: &dyn std::error::Error = error;
+    while let Some(deeper) = cause.source() {
+        cause = deeper;
+    }
+    RecordingError::Write { path: path.to_owned(), reason: cause.to_string() }
 }

@@ -199,6 +199,22 @@ impl std::str::FromStr for PaceSetting {
     }
 }
 
+impl fmt::Display for PaceSetting {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.0 {
+            Pace::Free => write!(f, "free"),
+            Pace::Factor(1.0) => write!(f, "realtime"),
+            Pace::Factor(factor) => write!(f, "{factor}"),
+        }
+    }
+}
+
+impl Serialize for PaceSetting {
+    fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_str(self)
+    }
+}
+
 impl<'de> Deserialize<'de> for PaceSetting {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         let text = match serde_json::Value::deserialize(deserializer)? {

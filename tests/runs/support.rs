@@ -13,7 +13,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
-const HUMMINGBUS: &str = env!("CARGO_BIN_EXE_hummingbus");
+pub const HUMMINGBUS: &str = env!("CARGO_BIN_EXE_hummingbus");
 /// A deadlock's end: no launch here needs a tenth of it on an idle machine.
 const WATCHDOG: Duration = Duration::from_secs(120);
 const POLL: Duration = Duration::from_millis(2);
@@ -59,21 +59,30 @@ impl Place {
 
     /// Starts `hummingbus` with `words` and more environment variables.
     pub fn start_with(&self, words: &[&str], variables: &[(&str, &str)]) -> Launch<'_> {
+        let mut command = Command::new(HUMMINGBUS);
+        command.args(words).envs(variables.iter().copied());
+        self.launch(command)
+    }
+
+    /// Starts `command`, which is or becomes a `hummingbus`, as one of this folder.
+    pub fn launch(&self, mut command: Command) -> Launch<'_> {
         let output = tempfile::NamedTempFile::new_in(self.folder.path()).unwrap().into_temp_path();
         let error = tempfile::NamedTempFile::new_in(self.folder.path()).unwrap().into_temp_path();
-        let child = Command::new(HUMMINGBUS)
-            .args(words)
-            .env("TMPDIR", self.temporary())
-            .env("RUST_BACKTRACE", "0")
-            .env_remove("HUMMINGBUS_DATA")
-            .envs(variables.iter().copied())
+        let child = self
+            .mark(&mut command)
             .stdin(Stdio::null())
             .stdout(File::create(&output).unwrap())
             .stderr(File::create(&error).unwrap())
             .spawn()
             .unwrap();
         self.launchers.borrow_mut().push(child.id());
+        let words: Vec<_> = command.get_args().map(|word| word.to_string_lossy()).collect();
         Launch { place: self, child, words: words.join(" "), output, error, status: None }
+    }
+
+    /// Gives `command` the environment of this test, by which its processes are known.
+    pub fn mark<'a>(&self, command: &'a mut Command) -> &'a mut Command {
+        command.env("TMPDIR", self.temporary()).env("RUST_BACKTRACE", "0").env_remove("HUMMINGBUS_DATA")
     }
 
     /// Runs `hummingbus` with `words` to its end; it must leave nothing behind.
@@ -109,13 +118,25 @@ impl Place {
         poll("processes that outlive their run", || self.processes().is_empty().then_some(()));
     }
 
-    /// The directories of the runs that are up.
-    fn run_dirs(&self) -> Vec<PathBuf> {
-        entries(&self.temporary())
+    /// The name of the run that is up.
+    pub fn run_id(&self) -> String {
+        let run_dirs = self.run_dirs();
+        let [run_dir] = &run_dirs[..] else { panic!("not one run but {run_dirs:?}") };
+        run_dir.file_name().unwrap().to_string_lossy().splitn(3, '-').last().unwrap().to_owned()
     }
 
     /// Everything that the runs of this folder left outside of their recordings.
-    fn left_behind(&self, launcher: u32) -> Vec<String> {
+    pub fn left(&self) -> Vec<String> {
+        self.launchers.borrow().iter().flat_map(|&launcher| self.left_behind(launcher)).collect()
+    }
+
+    /// The directories of the runs that are up.
+    pub fn run_dirs(&self) -> Vec<PathBuf> {
+        entries(&self.temporary())
+    }
+
+    /// What the runs of `launcher` left, and everything in the folder for temporary files.
+    pub fn left_behind(&self, launcher: u32) -> Vec<String> {
         let processes = self.processes().into_iter().map(|(pid, node)| format!("process {pid:?} ({node})"));
         let files = entries(&self.temporary()).into_iter().chain(shared_memory(launcher));
         processes.chain(files.map(|path| path.display().to_string())).collect()
@@ -152,7 +173,7 @@ fn entries(folder: &Path) -> Vec<PathBuf> {
 }
 
 /// Looks until there is an answer, or the watchdog bites.
-fn poll<T>(what: &str, mut look: impl FnMut() -> Option<T>) -> T {
+pub fn poll<T>(what: &str, mut look: impl FnMut() -> Option<T>) -> T {
     let start = Instant::now();
     loop {
         if let Some(answer) = look() {
@@ -174,6 +195,11 @@ pub struct Launch<'a> {
 }
 
 impl Launch<'_> {
+    /// The launcher's process id.
+    pub fn id(&self) -> u32 {
+        self.child.id()
+    }
+
     /// Sends a signal to the launcher.
     pub fn signal(&self, signal: Signal) {
         kill_process(Pid::from_child(&self.child), signal).unwrap();
@@ -199,7 +225,7 @@ impl Launch<'_> {
     /// Waits for the end; the launch must have left nothing behind.
     pub fn end(mut self) -> Ended {
         let status = self.wait();
-        let (launcher, ended) = (self.child.id(), self.ended(status));
+        let (launcher, ended) = (self.id(), self.ended(status));
         let left = self.place.left_behind(launcher);
         assert!(left.is_empty(), "left behind: {left:#?}\n{}", self.said());
         ended

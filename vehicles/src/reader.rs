@@ -234,7 +234,7 @@ impl<'d, 't> Section<'d, 't> {
             return Ok(Uncertainty::Said(self.text("uncertainty")?.to_owned()));
         }
         let sigma = self.number("uncertainty", value)?;
-        if sigma < 0.0 {
+        if sigma < 0.0 || !(sigma * factor).is_finite() {
             return Err(self.doc.bad(&value.span(), &self.key("uncertainty"), expected, sigma.to_string()));
         }
         Ok(Uncertainty::OneSigma(sigma * factor))

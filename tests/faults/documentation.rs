@@ -1,0 +1,37 @@
+//! `docs/faults.md` names only tests that there are.
+
+use crate::support::repository;
+use std::path::Path;
+
+/// The sources that hold tests.
+const SOURCES: [&str; 7] = [
+    "tests/faults",
+    "tests/runs",
+    "bus/src",
+    "bus/tests",
+    "recorder/tests",
+    "vehicles/tests",
+    "vehicles/src",
+];
+
+fn sources() -> String {
+    let files = SOURCES
+        .iter()
+        .flat_map(|folder| std::fs::read_dir(Path::new(&repository(folder))).unwrap().flatten());
+    files.map(|file| std::fs::read_to_string(file.path()).unwrap_or_default()).collect()
+}
+
+#[test]
+fn every_test_that_the_faults_name_exists() {
+    let text = std::fs::read_to_string(repository("docs/faults.md")).unwrap();
+    let sources = sources();
+    let quoted = text.split('`').skip(1).step_by(2);
+    // A test's name is a sentence.
+    let is_test = |word: &&str| word.matches('_').count() >= 4 && !word.contains(['=', ' ', '/', '\n']);
+    let tests: Vec<&str> = quoted.filter(is_test).collect();
+    assert!(tests.len() > 25, "{tests:?}");
+    for test in tests {
+        let name = test.rsplit("::").next().unwrap();
+        assert!(sources.contains(&format!("fn {name}(")), "docs/faults.md names {test}");
+    }
+}
