@@ -194,11 +194,6 @@ impl<'a> Successions<'a> {
         }
     }
 
-    /// The generation of `node` whose samples count.
-    pub fn active_generation(&self, node: usize) -> u32 {
-        self.roster.nodes[node].active.generation
-    }
-
     /// What follows the end of the active process of `node` by the manifest.
     pub fn program(&self, node: usize) -> &Program {
         &self.seats[node].program
