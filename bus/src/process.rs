@@ -97,11 +97,6 @@ pub fn stay_on(cpu: Option<usize>) {
 /// On a core that the nodes of a loop share, an interrupted waker needs the core once more before it can
 /// sleep; measured, a tick of the hover run takes 4.0 context switches this way and 5.7 without.
 pub(crate) fn wait_for_turn() {
-    // SAFETY: the call takes a number and touches no memory.
-    if unsafe { libc::sched_getscheduler(0) } != libc::SCHED_OTHER {
-        // The launcher has given it a policy of its own.
-        return;
-    }
     // SAFETY: the call takes and returns numbers. A process that was given a real-time priority keeps it.
     if unsafe { libc::sched_getscheduler(0) } != libc::SCHED_OTHER {
         return;

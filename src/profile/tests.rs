@@ -9,6 +9,7 @@ use super::latency::latencies;
 use super::pacing::Pacing;
 use super::path::{CriticalPath, Path, Place, Stretch};
 use super::times::Times;
+use crate::succession::{Purpose, Report};
 use bus::plan::{InputPlan, NodePlan, OutputPlan, Pace, Plan, TopicPlan, Wait};
 use bus::profile::{GrantWriter, TickWriter};
 use serde_json::Value;
@@ -234,6 +235,68 @@ fn a_sample_that_was_there_before_the_grant_is_not_waited_for() {
     let times = flight.at(PLANT, 1).unwrap();
     let waited = flight.waited(PLANT, &times).unwrap();
     assert_eq!((waited.cause, waited.ready_ns), (Cause::Grant, 1500));
+}
+
+/// A succession of the controller that took over at `take_over_tick`, if it did.
+fn succession(generation: u32, take_over_tick: Option<u32>, inputs: &[InputPlan]) -> Report {
+    Report {
+        process: "controller".to_owned(),
+        generation,
+        purpose: Purpose::Swap,
+        is_planned: true,
+        join_tick: Some(0),
+        take_over_tick,
+        hand_over: None,
+        start_ms: 0.0,
+        hold_ms: 0.0,
+        refused: None,
+        inputs: inputs.to_vec(),
+    }
+}
+
+#[test]
+fn ticks_of_shadows_do_not_count_and_a_successor_waits_for_its_own_inputs() {
+    let (folder, plan) = (tempfile::tempdir().unwrap(), plan());
+    let write = |node: usize, generation: u32, ticks: Ticks<'_>| {
+        let mut writer = TickWriter::create(folder.path(), &plan, node, generation, 0).unwrap();
+        for &[tick, received, done, ended] in ticks {
+            writer.sent(0, done.into());
+            writer.end(tick, received.into(), done.into(), ended.into());
+        }
+    };
+    write(PLANT, 0, TICKS[PLANT]);
+    write(IMU, 0, TICKS[IMU]);
+    // The first died after tick 1, the second was refused, the third took over at tick 2; all of them sent.
+    write(CONTROLLER, 0, &TICKS[CONTROLLER][..2]);
+    write(CONTROLLER, 1, &[[0, 1, 2, 3], [1, 4, 5, 6], [2, 7, 8, 9], [3, 10, 11, 12]]);
+    write(CONTROLLER, 2, &[[1, 1801, 1901, 1951], TICKS[CONTROLLER][2], TICKS[CONTROLLER][3]]);
+    let mut writer = GrantWriter::create(folder.path(), &plan).unwrap();
+    writer.grant_at(4, None, 1000);
+    // It reads the state alone.
+    let inputs = &plan.nodes[CONTROLLER].inputs[1..];
+    let successions = [succession(1, None, &[]), succession(2, Some(2), inputs)];
+    let flight = Flight::open(&plan, folder.path(), plan.duration_ticks, &successions).unwrap();
+    let received = (0..4).map(|tick| flight.at(CONTROLLER, tick).unwrap().received_ns);
+    assert_eq!(received.collect::<Vec<_>>(), [1400, 1800, 2100, 2205]);
+    assert_eq!(flight.noted(), 4 + 2 + 4);
+    let cause = |tick| flight.waited(CONTROLLER, &flight.at(CONTROLLER, tick).unwrap()).unwrap().cause;
+    assert_eq!(cause(0), Cause::Sample { topic: READING, tick: 0 });
+    assert_eq!(cause(2), Cause::Sample { topic: STATE, tick: 2 });
+    assert_eq!(flight.in_order(), [PLANT, IMU, CONTROLLER]);
+}
+
+#[test]
+fn a_tick_that_was_sent_before_its_process_died_is_that_one_s() {
+    let (folder, plan) = (tempfile::tempdir().unwrap(), plan());
+    let inputs = &plan.nodes[CONTROLLER].inputs;
+    let mut dead = TickWriter::create(folder.path(), &plan, CONTROLLER, 0, 0).unwrap();
+    dead.sent(0, 1450);
+    dead.end(0, 1400, 1450, 1500);
+    let mut next = TickWriter::create(folder.path(), &plan, CONTROLLER, 1, 0).unwrap();
+    next.end(0, 1700, 1750, 1800);
+    let successions = [succession(1, Some(0), inputs)];
+    let flight = Flight::open(&plan, folder.path(), plan.duration_ticks, &successions).unwrap();
+    assert_eq!(flight.sent_ns(COMMAND, 0), Some(1450));
 }
 
 #[test]

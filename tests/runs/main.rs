@@ -15,6 +15,7 @@
 //! - [`manifests`]: includes, sets, settings, successors, companions
 //! - [`commands`]: the other subcommands, exit codes and JSON
 //! - [`profile`]: where the host time of a run's ticks goes
+//! - [`rights`]: rights that a run lacks are named
 //! - [`replay`]: the measured flight
 
 mod clean;
@@ -32,6 +33,7 @@ mod profile;
 mod recordings;
 mod refusals;
 mod replay;
+mod rights;
 mod support;
 mod swap;
 mod terminal;

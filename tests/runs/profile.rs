@@ -1,9 +1,9 @@
 //! Profiled runs: every tick is in the profile, and the recording knows nothing of it.
 
 use crate::nodes::{manifest, sender};
-use crate::recordings::require_same;
+use crate::recordings::{require_same, topics};
 use crate::support::{Ended, Place, repository};
-use rustix::process::Signal;
+use rustix::process::{Pid, Signal, kill_process};
 use serde_json::Value;
 
 /// Ticks of a run here.
@@ -154,4 +154,106 @@ fn a_run_that_is_stopped_is_profiled_up_to_there() {
     let (ticks, profile) = (&summary["ticks"], &summary["profile"]);
     assert!(ticks.as_u64().unwrap() >= 50);
     assert_eq!(&find(&profile["nodes"], "name", "plant")["compute"]["count"], ticks);
+}
+
+#[test]
+fn a_run_whose_manifest_asks_for_a_profile_writes_page_and_trace_beside_its_recording() {
+    let place = Place::new();
+    let plain = place.path("plain.mcap");
+    let hover = repository("manifests/hover.toml");
+    place.call(&["run", &hover, "--record", &plain, "--set", DURATION]).flown();
+    let text = format!("include = [{hover:?}]\n[run]\nduration_s = 2.0\nprofile = true\n");
+    let (manifest, recording) = (place.write("profiled.toml", text), place.path("profiled.mcap"));
+    let summary = place.call(&["run", &manifest, "--record", &recording, "--json"]).flown().json();
+    let (page, trace) = (place.path("profiled.profile.html"), place.path("profiled.trace.json"));
+    assert_eq!(summary["profile"]["files"], serde_json::json!({ "trace": trace, "html": page }));
+    assert!(std::fs::read_to_string(page).unwrap().contains("id=\"data\">"));
+    assert!(!slices(&trace, "plant").is_empty());
+    assert!(topics(&recording) == topics(&plain), "the messages differ");
+    // As a flag it is not even in the manifest that is attached.
+    let words = ["run", &hover, "--record", &recording, "--set", DURATION, "--set", "run.profile=true"];
+    place.call(&words).flown();
+    require_same(&std::fs::read(plain).unwrap(), &recording);
+}
+
+/// The ticks of `node` in a trace, in the order of their starts: number, start and length in µs.
+fn slices(trace: &str, node: &str) -> Vec<(u32, f64, f64)> {
+    let trace: Value = serde_json::from_str(&std::fs::read_to_string(trace).unwrap()).unwrap();
+    let events = trace["traceEvents"].as_array().unwrap();
+    let is_name = |event: &&Value| event["name"] == "process_name" && event["args"]["name"] == node;
+    let process = &events.iter().find(is_name).unwrap()["pid"];
+    let tick = |event: &Value| {
+        let tick = event["name"].as_str()?.strip_prefix("tick ")?.parse().ok()?;
+        Some((tick, event["ts"].as_f64()?, event["dur"].as_f64()?))
+    };
+    let mut ticks: Vec<_> = events.iter().filter(|event| event["pid"] == *process).filter_map(tick).collect();
+    ticks.sort_by(|a, b| a.1.total_cmp(&b.1));
+    ticks
+}
+
+#[test]
+fn whoever_was_a_node_at_a_tick_is_the_one_that_is_profiled() {
+    let place = Place::new();
+    let nap = |ms: u32, at_tick: u32| format!("parameters = {{ nap_ms = {ms}, at_tick = {at_tick} }}");
+    let nodes = [sender("slow", 1, &nap(60, 130)), sender("fast", 1, "inputs.input = \"/slow/note\"")];
+    // It shadows from tick 100 on; what its predecessor does at tick 130, it does at tick 180.
+    let swap =
+        format!("[[swap]]\nprocess = \"slow\"\nat_tick = 150\nshadow_ticks = 50\nwith.{}\n", nap(60, 180));
+    let path = place.write("swap.toml", manifest(200, &nodes) + &swap);
+    let trace = place.path("trace.json");
+    let ended = place.call(&["profile", &path, "--trace", &trace, "--json"]).with_code(0);
+    assert_eq!(ended.json()["profile"]["noted"], 3 * 200, "{ended}");
+    let ticks = slices(&trace, "slow");
+    assert_eq!(ticks.iter().map(|(tick, ..)| *tick).collect::<Vec<_>>(), (0..200).collect::<Vec<_>>());
+    for nap in [130, 180] {
+        // A sleep lasts at least as long as it is asked to; the shadow slept at neither tick.
+        assert!(ticks[nap].2 >= 60e3, "tick {nap}: {:?}", ticks[nap]);
+    }
+}
+
+/// The process with which `node` began: a standby has the same name.
+fn first_process_of(place: &Place, node: &str) -> Pid {
+    let is_first = |pid: &Pid| {
+        let environment = std::fs::read(format!("/proc/{}/environ", pid.as_raw_nonzero())).unwrap();
+        environment.split(|&byte| byte == 0).any(|variable| variable == b"HUMMINGBUS_GENERATION=0")
+    };
+    let mut of_node = place.processes().into_iter().filter(|(_, name)| name == node).map(|(pid, _)| pid);
+    of_node.find(is_first).unwrap()
+}
+
+#[test]
+fn a_profile_goes_on_over_a_swap_a_restart_and_a_promotion() {
+    let place = Place::new();
+    let tables = "[process.controller]\non_exit = \"restart\"\n[process.attitude]\non_exit = \"standby\"\n\
+                  [[swap]]\nprocess = \"imu\"\nat_tick = 700\n";
+    let hover = repository("manifests/hover.toml");
+    let text = format!("include = [{hover:?}]\n[run]\nduration_s = 1.5\n{tables}");
+    let (manifest, trace) = (place.write("changes.toml", text), place.path("trace.json"));
+    let record = place.path("changes.mcap");
+    let mut launch = place.start(&["profile", &manifest, "--record", &record, "--trace", &trace, "--json"]);
+    for (node, tick) in [("controller", 300), ("attitude", 1000)] {
+        launch.hold_at(tick);
+        kill_process(first_process_of(&place, node), Signal::KILL).unwrap();
+        launch.release();
+    }
+    let ended = launch.end();
+    let summary = ended.json();
+    for (process, purpose, tick) in
+        [("controller", "restart", 300), ("imu", "swap", 700), ("attitude", "standby", 1000)]
+    {
+        let mut successions = summary["successions"].as_array().unwrap().iter();
+        let found = successions.any(|succession| {
+            (&succession["process"], &succession["purpose"], &succession["take_over_tick"])
+                == (&process.into(), &purpose.into(), &tick.into())
+        });
+        assert!(found, "no {purpose} of {process} at {tick}: {ended}");
+    }
+    let profile = &summary["profile"];
+    assert_eq!(profile["noted"], 6 * 1500, "{}", summary["successions"]);
+    assert_eq!(profile["critical_path"]["tick_time"]["count"], 1500);
+    for node in ["attitude", "controller", "imu", "pilot", "plant", "recorder"] {
+        let ticks = slices(&trace, node);
+        // In the order of host time: one process after the other, none of their ticks twice.
+        assert_eq!(ticks.iter().map(|(tick, ..)| *tick).collect::<Vec<_>>(), (0..1500).collect::<Vec<_>>());
+    }
 }
