@@ -378,7 +378,11 @@ impl<'a> Successions<'a> {
             }
             Stage::Joining => self.control.is_ready(member, Phase::Running),
             Stage::Announced => self.all_agree(processes),
-            Stage::Shadowing => self.control.done(member) > self.roster.nodes[node].take_over_tick,
+            // A promoted shadow may have done the tick before it was told that this one counts.
+            Stage::Shadowing => {
+                self.control.done(member) > self.roster.nodes[node].take_over_tick
+                    && self.all_agree(processes)
+            }
             Stage::Retiring => self.has_retired(node, candidate, processes),
         };
         if !goes_on {

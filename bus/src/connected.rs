@@ -373,7 +373,7 @@ impl ConnectedNode {
         if is_successor {
             self.take_over_tick = own.take_over_tick;
             self.retirement_tick = u32::MAX;
-        } else {
+        } else if own.active.generation == self.links.generation {
             self.retirement_tick = own.successor.as_ref().map_or(u32::MAX, |_| own.take_over_tick);
         }
         for (index, output) in self.outputs.iter_mut().enumerate() {

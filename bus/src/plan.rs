@@ -241,9 +241,13 @@ impl Plan {
         // Who joins at a tick boundary needs the newest sample; who takes the place of a crashed process
         // needs all that was sent since.
         let restarts = self.nodes.iter().filter(reads).any(|node| node.restarts);
+        // Whoever joins is handed the history first: beside it there must be room for what is sent before that
+        // has been taken.
+        let (queued_samples, history_samples) =
+            if restarts { (2 * queued_samples, queued_samples) } else { (queued_samples, 1) };
         Capacity {
             queued_samples,
-            history_samples: if restarts { queued_samples } else { 1 },
+            history_samples,
             // Each reader and its successor, and a successor of the publisher.
             subscribers: SEATS * self.nodes.iter().filter(reads).count() + 1,
             nodes: SEATS * self.nodes.len() + 1,

@@ -83,7 +83,10 @@ impl Roster {
     pub fn store(&self, run_dir: &Path) -> Result<(), BusError> {
         let path = path(run_dir, self.epoch);
         let text = serde_json::to_string(self).unwrap_or_else(|error| unreachable!("{error}"));
-        std::fs::write(&path, text).map_err(|source| BusError::File { action: "write", path, source })?;
+        // In one step: a process that was told of it before may be reading it.
+        let draft = path.with_extension("draft");
+        let written = std::fs::write(&draft, text).and_then(|()| std::fs::rename(&draft, &path));
+        written.map_err(|source| BusError::File { action: "write", path, source })?;
         if let Some(old) = self.epoch.checked_sub(2) {
             let _ = std::fs::remove_file(self::path(run_dir, old));
         }
