@@ -1,9 +1,12 @@
 //! What `check` and `schema` print.
 
 use crate::graph::Graph;
-use crate::program::Executable;
-use bus::plan::{Pace, Plan, Wait};
+use crate::program::{Executable, OnExit, Program, Successor};
+use bus::plan::{Pace, Wait};
 use std::fmt::Write as _;
+
+/// Successions between the first and the last that are listed one by one.
+const SUCCESSIONS_SHOWN: usize = 4;
 
 /// The graph of a run: nodes with their rates, edges with their delays.
 pub fn graph(graph: &Graph) -> String {
@@ -20,11 +23,7 @@ pub fn graph(graph: &Graph) -> String {
         plan.window_ticks,
         plan.seed
     );
-    for (node, program) in plan.nodes.iter().zip(&graph.programs) {
-        let what = match &program.executable {
-            Executable::Kind(kind) => kind.name.to_owned(),
-            Executable::Command(words) => words.join(" "),
-        };
+    for (index, (node, program)) in plan.nodes.iter().zip(&graph.programs).enumerate() {
         let cpu = node.cpu.map_or(String::new(), |cpu| format!(", cpu {cpu}"));
         let wait = match node.wait {
             Wait::Block => "block",
@@ -33,8 +32,9 @@ pub fn graph(graph: &Graph) -> String {
         };
         let _ = writeln!(
             text,
-            "\n{} ({what}), {} Hz{cpu}, {wait}",
+            "\n{} ({}), {} Hz{cpu}, {wait}",
             node.name,
+            what(program),
             rate_hz / f64::from(node.period_ticks)
         );
         for input in &node.inputs {
@@ -49,13 +49,64 @@ pub fn graph(graph: &Graph) -> String {
             let hz = rate_hz / f64::from(topic.period_ticks);
             let _ = writeln!(text, "  -> {:<12} {} [{}] {hz} Hz", output.port, topic.name, topic.type_name);
         }
+        text += &succession(graph, index);
+    }
+    for (name, program) in &graph.companions {
+        let _ = writeln!(text, "\n{name} ({}), takes no part in the ticks", what(program));
     }
     text
 }
 
-/// The graph as JSON.
-pub fn graph_json(plan: &Plan) -> String {
-    serde_json::to_string_pretty(plan).unwrap_or_default()
+fn what(program: &Program) -> String {
+    match &program.executable {
+        Executable::Kind(kind) => kind.name.to_owned(),
+        Executable::Command(words) => words.join(" "),
+    }
+}
+
+/// Who shadows, succeeds or stands by for a node, and what follows its end.
+fn succession(graph: &Graph, node: usize) -> String {
+    let mut text = match graph.programs[node].on_exit {
+        OnExit::Restart => "  if it ends, it is started again\n".to_owned(),
+        OnExit::Stop | OnExit::Standby => String::new(),
+    };
+    let successors = graph.successors.iter().filter(|successor| successor.node == node);
+    let lines = successors.map(|successor| {
+        let (what, join_tick) = (what(&successor.program), successor.join_tick);
+        match successor.take_over_tick {
+            Some(tick) => {
+                format!("  succeeded by {what} at tick {tick}, shadowing from tick {join_tick} on\n")
+            }
+            None if successor.is_standby => format!("  if it ends, {what} is promoted, which shadows it\n"),
+            None => format!("  shadowed by {what}\n"),
+        }
+    });
+    let lines: Vec<String> = lines.collect();
+    match lines.as_slice() {
+        [first, between @ .., last] if between.len() > SUCCESSIONS_SHOWN => {
+            text += &format!("{first}  and {} more times\n{last}", between.len());
+        }
+        lines => text += &lines.concat(),
+    }
+    text
+}
+
+/// The graph as JSON: the plan, with who succeeds whom and who takes no part.
+pub fn graph_json(graph: &Graph) -> String {
+    let successor = |successor: &Successor| {
+        serde_json::json!({
+            "process": graph.plan.nodes[successor.node].name,
+            "what": what(&successor.program),
+            "join_tick": successor.join_tick,
+            "take_over_tick": successor.take_over_tick,
+            "is_standby": successor.is_standby,
+            "plan": successor.plan,
+        })
+    };
+    let mut value = serde_json::to_value(&graph.plan).unwrap_or_default();
+    value["successors"] = graph.successors.iter().map(successor).collect();
+    value["companions"] = graph.companions.iter().map(|(name, _)| name.clone()).collect();
+    serde_json::to_string_pretty(&value).unwrap_or_default()
 }
 
 /// Every message with its fields, units, frames and layout hash.

@@ -1,31 +1,32 @@
-//! Launching a run: starts its processes, watches them, and takes everything down again.
+//! Launching a run: starts its processes, supervises them, and takes everything down again.
 #![allow(clippy::disallowed_methods, reason = "the launcher watches host time; it simulates nothing")]
 
-use crate::graph::Graph;
+use crate::ctl::desk::Desk;
+use crate::ctl::protocol::{Answer, Request};
+use crate::ctl::server::Reply;
+use crate::graph::{Graph, successor_of};
 use crate::manifest::Manifest;
-use crate::program::Executable;
+use crate::processes::{Processes, Role};
+use crate::profile::Flight;
+use crate::program::{OnExit, WATCHDOG};
 use crate::progress::Progress;
 use crate::run_dir::RunDir;
-use anyhow::{Context, Result, bail};
-use bus::NODE_VARIABLE;
+use crate::stall;
+use crate::succession::{Report, Stage, Standing, Successions};
+use crate::supervisor::{Action, Event, State};
+use anyhow::{Context, Result, anyhow};
 use bus::control::{Control, Phase};
-use bus::plan::Plan;
-use bus::process::{LAUNCHER_VARIABLE, RUN_VARIABLE};
-use std::fs::File;
-use std::os::unix::process::{CommandExt, ExitStatusExt};
-use std::path::{Path, PathBuf};
-use std::process::{Child, Command, ExitStatus, Stdio};
+use bus::plan::{NodePlan, Plan};
+use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
 
-const POLL: Duration = Duration::from_millis(5);
-/// How long a run may stand still before it is given up. A tick takes microseconds.
-const STALL: Duration = Duration::from_secs(20);
-/// How long processes have to leave by themselves after an abort.
-const GRACE: Duration = Duration::from_secs(2);
-/// Lines of a failed process's own words that are shown.
-const LOG_LINES: usize = 20;
+/// How long the supervisor sleeps at most between two looks at its processes.
+const POLL: Duration = Duration::from_millis(2);
+
+/// Ticks that a successor shadows where a request does not say.
+const SHADOW_TICKS: u32 = 100;
 
 /// What is known about a run when it is over.
 #[derive(Debug)]
@@ -40,6 +41,10 @@ pub struct Outcome {
     pub missed_deadlines: u32,
     /// Per process: name, processor share of one core, deadlines at which it was late.
     pub processes: Vec<(String, f64, u32)>,
+    /// What became of those who were to succeed.
+    pub successions: Vec<Report>,
+    /// The host times that the processes noted, in a run that is profiled.
+    pub flight: Option<Flight>,
 }
 
 /// Flies `graph` and records to `recording`; returns when every process is gone.
@@ -48,16 +53,56 @@ pub struct Outcome {
 /// If a process fails, stalls, or cannot be started; the error holds its last words.
 pub fn fly(manifest: &Manifest, graph: &mut Graph, recording: &Path, quiet: bool) -> Result<Outcome> {
     let interrupts = count_interrupts()?;
-    let run_dir = RunDir::create()?;
+    let run_dir = RunDir::create(&manifest.path)?;
     prepare(manifest, graph, recording, &run_dir)?;
     graph.plan.run_id = run_dir.run_id().to_owned();
     graph.plan.store(run_dir.path())?;
+    let graph = &*graph;
     let control = Control::create(&graph.plan)?;
-    let mut processes = Processes::start(manifest, graph, run_dir.path())?;
-    let progress = Progress::new(&graph.plan, quiet);
-    let was_stopped = watch(&mut processes, &control, &graph.plan, &interrupts, &progress)?;
-    progress.finish(&control);
-    Ok(outcome(&graph.plan, &control, was_stopped))
+    let (plan, dir) = (&graph.plan, run_dir.path());
+    let successions = Successions::new(plan, &control, dir, &graph.programs, &graph.successors);
+    let mut supervisor = Supervisor {
+        plan,
+        control: &control,
+        processes: Processes::default(),
+        successions,
+        state: State::Starting,
+        desk: Desk::open(dir, plan, &control)?,
+        swaps: Vec::new(),
+        interrupts,
+        seen_interrupts: 0,
+        manifest,
+        graph,
+        progress: Progress::new(plan, quiet),
+        last_change: (0, Instant::now()),
+    };
+    supervisor.start(dir)?;
+    supervisor.watch()?;
+    supervisor.progress.finish(&control);
+    let was_stopped = control.end_tick() < plan.duration_ticks;
+    let mut outcome = outcome(plan, &control, was_stopped);
+    outcome.successions = supervisor.successions.into_reports();
+    if plan.profile {
+        outcome.flight = Some(Flight::open(plan, dir, outcome.ticks)?);
+    }
+    Ok(outcome)
+}
+
+/// What became of a swap, for who asked for it.
+fn answer(report: &Report) -> Answer {
+    match (&report.refused, report.take_over_tick) {
+        (Some(reason), _) => Answer::refused(reason.clone()),
+        (None, Some(tick)) => Answer::Done {
+            text: format!(
+                "`{}.{}` flies from tick {tick}; handed over: {}",
+                report.process,
+                report.generation,
+                report.hand_over.unwrap_or("nothing")
+            ),
+            tick,
+        },
+        (None, None) => Answer::refused("the run ended before the take-over"),
+    }
 }
 
 /// Counts Ctrl-C and SIGTERM from now on instead of dying of them.
@@ -77,6 +122,7 @@ fn prepare(manifest: &Manifest, graph: &mut Graph, recording: &Path, run_dir: &R
     std::fs::write(&manifest_copy, &manifest.recorded_text).context("cannot write the manifest's copy")?;
     let name = |path: &Path| path.file_name().unwrap_or_default().to_string_lossy().into_owned();
     let mut attachments = vec![(name(&manifest.path), manifest_copy)];
+    attachments.extend(manifest.included.iter().map(|path| (name(path), path.clone())));
     attachments.extend(graph.vehicles.iter().map(|path| (name(path), path.clone())));
     let attachments: Vec<_> =
         attachments.iter().map(|(name, path)| serde_json::json!({ "name": name, "path": path })).collect();
@@ -86,132 +132,6 @@ fn prepare(manifest: &Manifest, graph: &mut Graph, recording: &Path, run_dir: &R
         }
     }
     Ok(())
-}
-
-/// The processes of a run; dropping them kills those that still live.
-struct Processes {
-    running: Vec<Process>,
-}
-
-struct Process {
-    name: String,
-    log: PathBuf,
-    child: Child,
-    end: Option<ExitStatus>,
-}
-
-impl Processes {
-    fn start(manifest: &Manifest, graph: &Graph, run_dir: &Path) -> Result<Self> {
-        let this_binary = std::env::current_exe().context("cannot find this binary")?;
-        let mut processes = Self { running: Vec::new() };
-        let mut clock = Command::new(&this_binary);
-        clock.args(["node", "clock"]);
-        let mut commands = vec![("clock".to_owned(), clock)];
-        for (program, node) in graph.programs.iter().zip(&graph.plan.nodes) {
-            let mut command = match &program.executable {
-                Executable::Kind(kind) => {
-                    let mut command = Command::new(&this_binary);
-                    command.args(["node", kind.name]);
-                    command
-                }
-                Executable::Command(words) => {
-                    let mut command = Command::new(executable(manifest, &words[0]));
-                    command.args(&words[1..]);
-                    command
-                }
-            };
-            command.env(NODE_VARIABLE, &node.name);
-            commands.push((node.name.clone(), command));
-        }
-        shuffle(&mut commands, manifest.content.run.start_order_seed);
-        for (name, command) in commands {
-            processes.running.push(Process::start(name, command, run_dir)?);
-        }
-        Ok(processes)
-    }
-
-    /// The first process that ended badly since the last look.
-    fn find_failure(&mut self) -> Result<Option<&Process>> {
-        for process in &mut self.running {
-            if process.end.is_none() {
-                process.end = process.child.try_wait().context("cannot watch a process")?;
-            }
-        }
-        Ok(self.running.iter().find(|process| process.end.is_some_and(|end| !end.success())))
-    }
-
-    /// A node whose process ended well before the run did: one that never joined, or left on its way.
-    fn find_deserter(&self, control: &Control, plan: &Plan) -> Option<usize> {
-        let has_ended =
-            |name: &str| self.running.iter().any(|process| process.name == name && process.end.is_some());
-        (0..plan.nodes.len()).find(|&node| !control.has_completed(node) && has_ended(&plan.nodes[node].name))
-    }
-
-    fn all_ended(&self) -> bool {
-        self.running.iter().all(|process| process.end.is_some())
-    }
-}
-
-impl Drop for Processes {
-    fn drop(&mut self) {
-        for process in self.running.iter_mut().filter(|process| process.end.is_none()) {
-            // The whole group, since a command may have started processes of its own.
-            bus::process::kill_group(process.child.id());
-            let _ = process.child.kill();
-            let _ = process.child.wait();
-        }
-    }
-}
-
-impl Process {
-    fn start(name: String, mut command: Command, run_dir: &Path) -> Result<Self> {
-        let log = run_dir.join(format!("{name}.log"));
-        let file = File::create(&log).with_context(|| format!("cannot create {}", log.display()))?;
-        let output = file.try_clone().context("cannot share a log file")?;
-        command
-            .env(RUN_VARIABLE, run_dir)
-            .env(LAUNCHER_VARIABLE, std::process::id().to_string())
-            .stdin(Stdio::null())
-            .stdout(output)
-            .stderr(file)
-            // A group of its own: Ctrl-C in the terminal reaches the launcher alone, which stops the run
-            // at a tick boundary.
-            .process_group(0);
-        let child = command.spawn().with_context(|| {
-            format!("process `{name}`: cannot start {}", command.get_program().to_string_lossy())
-        })?;
-        Ok(Self { name, log, child, end: None })
-    }
-
-    /// How the process ended, with the last lines it wrote.
-    fn post_mortem(&self) -> String {
-        let end = match self.end {
-            Some(end) => match (end.code(), end.signal()) {
-                (Some(code), _) => format!("ended with exit code {code}"),
-                (None, Some(signal)) => format!("was killed by {}", bus::process::signal_name(signal)),
-                (None, None) => "ended".to_owned(),
-            },
-            None => "is still running".to_owned(),
-        };
-        let words = std::fs::read_to_string(&self.log).unwrap_or_default();
-        let lines: Vec<&str> = words.lines().collect();
-        // What a panic says stands in front of its backtrace.
-        let last = lines.len().saturating_sub(LOG_LINES);
-        let start = lines.iter().position(|line| line.contains("panicked at")).unwrap_or(last);
-        let words =
-            lines[start..].iter().take(LOG_LINES).map(|line| format!("\n  {line}")).collect::<String>();
-        format!("process `{}` {end}{words}", self.name)
-    }
-}
-
-/// A command with a path is relative to the manifest; a bare name is looked up in PATH.
-fn executable(manifest: &Manifest, program: &str) -> PathBuf {
-    let path = Path::new(program);
-    if path.is_absolute() || !program.contains('/') {
-        return path.to_owned();
-    }
-    let folder = manifest.path.parent().unwrap_or(Path::new(""));
-    std::path::absolute(folder.join(path)).unwrap_or_else(|_| path.to_owned())
 }
 
 /// Fisher-Yates with the bus's own generator: the same seed gives the same order.
@@ -225,125 +145,351 @@ fn shuffle<T>(items: &mut [T], seed: Option<u64>) {
     }
 }
 
-/// Watches until all processes have ended; true if the run was stopped on the way.
-fn watch(
-    processes: &mut Processes,
-    control: &Control,
-    plan: &Plan,
-    interrupts: &AtomicUsize,
-    progress: &Progress,
-) -> Result<bool> {
-    let mut last_change = (0, Instant::now());
-    loop {
-        if let Some(failed) = processes.find_failure()? {
-            let tick = ticks_of(&failed.name, control, plan);
-            let silent = silent_topics(&failed.name, plan);
-            let words = format!("{}\nThe run was aborted at tick {tick}{silent}", failed.post_mortem());
-            take_down(processes, control)?;
-            bail!(words);
+/// Watches over a run: what happens is told to the state machine, and what that answers is done.
+struct Supervisor<'a> {
+    manifest: &'a Manifest,
+    graph: &'a Graph,
+    plan: &'a Plan,
+    control: &'a Control,
+    processes: Processes,
+    successions: Successions<'a>,
+    state: State,
+    desk: Desk<'a>,
+    /// Swaps that were asked for and have not come to their end: the node, and who asked.
+    swaps: Vec<(usize, Reply)>,
+    interrupts: Arc<AtomicUsize>,
+    seen_interrupts: usize,
+    progress: Progress,
+    /// How far the run had come when it last came on, and when that was.
+    last_change: (u32, Instant),
+}
+
+/// A process that ended, or was found to hang.
+struct Death {
+    name: String,
+    role: Role,
+    words: String,
+}
+
+impl Supervisor<'_> {
+    fn start(&mut self, run_dir: &Path) -> Result<()> {
+        self.control.set_join_tick(self.successions.hold_tick());
+        let graph = self.graph;
+        let nodes = graph.programs.iter().zip(&graph.plan.nodes).enumerate();
+        let nodes = nodes.map(|(node, (program, plan))| {
+            (plan.name.as_str(), Role::Node { node, generation: 0 }, Some(program))
+        });
+        let mut all: Vec<_> = std::iter::once(("clock", Role::Clock, None)).chain(nodes).collect();
+        shuffle(&mut all, self.manifest.content.run.start_order_seed);
+        for (name, role, program) in all {
+            self.processes.start(name, role, program, run_dir)?;
         }
-        if let Some(node) = processes.find_deserter(control, plan) {
-            let name = &plan.nodes[node].name;
-            let tick = ticks_of(&plan.nodes[node].name, control, plan);
-            let silent = silent_topics(name, plan);
-            take_down(processes, control)?;
-            bail!(
-                "process `{name}` ended with exit code 0 before the run did; it was aborted at tick {tick}{silent}"
-            );
+        for (name, program) in &graph.companions {
+            self.processes.start(name, Role::Companion, Some(program), run_dir)?;
         }
-        if processes.all_ended() {
-            // A stop that was asked for after the last grant changed nothing.
-            return Ok(control.end_tick() < plan.duration_ticks);
+        self.tell(Event::Started).map(|_| ())
+    }
+
+    /// Watches until all processes have ended.
+    fn watch(&mut self) -> Result<()> {
+        while !self.state.is_over() {
+            let news = self.control.news();
+            self.processes.look()?;
+            self.settle_ends()?;
+            self.note_interrupts()?;
+            self.note_progress()?;
+            self.serve_requests();
+            if self.state == State::Draining {
+                self.successions.end(&mut self.processes);
+            }
+            if let Some(node) = self.successions.too_late() {
+                self.refuse(node, "the run had passed the tick at which it was to join".to_owned())?;
+            }
+            self.successions.advance(&mut self.processes)?;
+            self.control.set_join_tick(self.successions.hold_tick());
+            self.note_stall()?;
+            self.progress.show(self.control);
+            self.control.await_news(news, POLL);
         }
-        match interrupts.load(Ordering::SeqCst) {
-            0 => {}
-            1 => control.request_stop(),
-            _ => {
-                take_down(processes, control)?;
-                bail!("interrupted twice: the run was aborted at tick {}", control.completed_ticks());
+        Ok(())
+    }
+
+    /// Tells the state machine what happened; an abort is left to the caller, who knows the words.
+    fn tell(&mut self, event: Event) -> Result<Action> {
+        let (state, action) = self.state.after(event);
+        self.state = state;
+        if action == Action::RequestStop {
+            self.control.request_stop();
+        }
+        Ok(action)
+    }
+
+    fn abort(&mut self, words: String) -> Result<()> {
+        self.processes.take_down(self.control)?;
+        Err(anyhow!(words))
+    }
+
+    /// Serves what was asked of the run, and answers those whose swap has come to its end.
+    fn serve_requests(&mut self) {
+        while let Some((request, reply)) = self.desk.serve() {
+            let Request::Swap { process, with, shadow_ticks, at_tick } = request else { continue };
+            match self.request_swap(&process, &with, shadow_ticks, at_tick) {
+                Ok(node) => self.swaps.push((node, reply)),
+                Err(reason) => reply.send(&Answer::refused(reason)),
             }
         }
-        let ticks = control.completed_ticks();
-        if ticks != last_change.0 {
-            last_change = (ticks, Instant::now());
-        } else if last_change.1.elapsed() > STALL.max(2 * deadline(plan)) {
-            let words = describe_stall(control, plan, last_change.1.elapsed());
-            take_down(processes, control)?;
-            bail!(words);
+        for (node, reply) in std::mem::take(&mut self.swaps) {
+            if self.successions.is_busy(node) {
+                self.swaps.push((node, reply));
+                continue;
+            }
+            let name = &self.plan.nodes[node].name;
+            let report = self.successions.reports.iter().rev().find(|report| report.process == *name);
+            reply.send(&report.map_or_else(|| Answer::refused("the run ended"), answer));
         }
-        progress.show(control);
-        std::thread::sleep(POLL);
+    }
+
+    /// Checks a swap that was asked for and has its successor started; the error is the reason to refuse it.
+    fn request_swap(
+        &mut self,
+        process: &str,
+        with: &str,
+        shadow_ticks: Option<u32>,
+        at_tick: Option<u32>,
+    ) -> Result<usize, String> {
+        let successor = successor_of(self.manifest, self.graph, process, with).map_err(|e| e.to_string())?;
+        let node = successor.node;
+        if self.state != State::Running {
+            return Err(format!("the run does not fly: `{process}` cannot be swapped now"));
+        }
+        if self.successions.is_busy(node) {
+            return Err(format!("`{process}` has a successor, a standby or a shadow already; one at a time"));
+        }
+        let shadow_ticks = shadow_ticks.unwrap_or(SHADOW_TICKS);
+        let period = successor.plan.period_ticks;
+        if let Some(tick) = at_tick {
+            let join = tick.saturating_sub(shadow_ticks);
+            if join <= self.control.granted_ticks() || tick >= self.control.end_tick() {
+                return Err(format!(
+                    "tick {tick} less {shadow_ticks} ticks of shadowing is not ahead of the run, which has \
+                     granted {} of {} ticks",
+                    self.control.granted_ticks(),
+                    self.control.end_tick()
+                ));
+            }
+            if !tick.is_multiple_of(period) || !join.is_multiple_of(period) {
+                return Err(format!("`{process}` computes every {period} ticks: choose multiples of that"));
+            }
+        }
+        self.successions.request_swap(successor, shadow_ticks, at_tick);
+        Ok(node)
+    }
+
+    fn note_interrupts(&mut self) -> Result<()> {
+        let count = self.interrupts.load(Ordering::SeqCst);
+        let seen = std::mem::replace(&mut self.seen_interrupts, count);
+        for number in seen..count {
+            let event = if number == 0 { Event::StopRequested } else { Event::Interrupted };
+            if self.tell(event)? == Action::Abort {
+                let ticks = self.control.completed_ticks();
+                return self.abort(format!("interrupted twice: the run was aborted at tick {ticks}"));
+            }
+        }
+        Ok(())
+    }
+
+    fn note_progress(&mut self) -> Result<()> {
+        if self.state == State::Gathering && self.control.phase() == Phase::Running {
+            self.tell(Event::Gathered)?;
+            if self.control.is_stop_requested() {
+                self.tell(Event::StopRequested)?;
+            }
+        }
+        let has_completed = |&(node, generation): &(usize, u32)| {
+            self.control.has_completed(self.plan.member(node, generation))
+        };
+        let active = (0..self.plan.nodes.len()).map(|node| (node, self.successions.active_generation(node)));
+        if self.state == State::Running && active.into_iter().any(|member| has_completed(&member)) {
+            self.tell(Event::EndReached)?;
+        }
+        if self.processes.all_ended() && self.processes.running.iter().all(|process| process.is_settled) {
+            self.tell(Event::AllEnded)?;
+        }
+        Ok(())
+    }
+
+    /// Draws the consequences of every end that was seen.
+    fn settle_ends(&mut self) -> Result<()> {
+        for index in 0..self.processes.running.len() {
+            let Some(process) = self.processes.running.get_mut(index) else { break };
+            let (Some(end), false) = (process.end, process.is_settled) else { continue };
+            let (name, role) = (process.name.clone(), process.role);
+            let succeeded = end.success() && process.verdict.is_none();
+            if succeeded && self.has_done_its_part(role) {
+                self.processes.running[index].is_settled = true;
+                continue;
+            }
+            let mut words = self.processes.running[index].post_mortem();
+            if succeeded {
+                words += " before the run did";
+            }
+            if self.settle(Death { name, role, words })?
+                && let Some(process) = self.processes.running.get_mut(index)
+                && process.role == role
+            {
+                process.is_settled = true;
+            }
+        }
+        Ok(())
+    }
+
+    fn has_done_its_part(&self, role: Role) -> bool {
+        match role {
+            Role::Companion => true,
+            Role::Clock => self.control.completed_ticks() >= self.control.end_tick(),
+            Role::Node { node, generation } => {
+                self.successions.standing(node, generation) == Standing::Former
+                    || self.control.has_completed(self.plan.member(node, generation))
+            }
+        }
+    }
+
+    /// Draws the consequences of a death; false if that must wait.
+    fn settle(&mut self, death: Death) -> Result<bool> {
+        let Role::Node { node, generation } = death.role else {
+            let ticks = self.control.completed_ticks();
+            self.tell(Event::Died { policy: OnExit::Stop, is_possible: false })?;
+            self.abort(format!("{}\nThe run was aborted at tick {ticks}", death.words))?;
+            return Ok(true);
+        };
+        match self.successions.standing(node, generation) {
+            Standing::Former => Ok(true),
+            Standing::Candidate => {
+                if self.tell(Event::SuccessorFailed)? == Action::Refuse {
+                    let tick = self.control.done(self.plan.member(node, generation));
+                    let reason = format!("{} (it had come to tick {tick})", death.words);
+                    self.refuse(node, reason)?;
+                }
+                Ok(true)
+            }
+            Standing::Active => self.settle_active(node, generation, &death),
+        }
+    }
+
+    fn refuse(&mut self, node: usize, reason: String) -> Result<()> {
+        let vacant = self.successions.is_vacant(node);
+        if !vacant {
+            let name = &self.plan.nodes[node].name;
+            self.progress.say(&format!("the successor of `{name}` was refused: {reason}\n`{name}` flies on"));
+        }
+        self.successions.refuse(node, reason.clone(), &mut self.processes)?;
+        if vacant {
+            let ticks = self.control.completed_ticks();
+            self.tell(Event::Died { policy: OnExit::Stop, is_possible: false })?;
+            return self.abort(format!("{reason}\nThe run was aborted at tick {ticks}"));
+        }
+        Ok(())
+    }
+
+    fn settle_active(&mut self, node: usize, generation: u32, death: &Death) -> Result<bool> {
+        if self.successions.is_vacant(node) {
+            return Ok(true);
+        }
+        let flies = self.control.phase() == Phase::Running;
+        if flies && !self.successions.all_agree(&self.processes) {
+            return Ok(false);
+        }
+        let policy = match self.successions.program(node).on_exit {
+            OnExit::Restart if self.successions.can_promote(node) => OnExit::Standby,
+            policy => policy,
+        };
+        let is_possible = flies
+            && match policy {
+                OnExit::Stop => false,
+                OnExit::Restart => self.successions.has_come_on(node),
+                OnExit::Standby => self.successions.can_promote(node),
+            };
+        let tick = self.control.completed_by(self.plan.member(node, generation));
+        match self.tell(Event::Died { policy, is_possible })? {
+            Action::Restart => {
+                if self.successions.is_busy(node) {
+                    self.refuse(node, "the process it was to succeed died first".to_owned())?;
+                }
+                self.progress.say(&format!("{}\n`{}` is restarted at tick {tick}", death.words, death.name));
+                self.successions.restart(node, &mut self.processes)?;
+            }
+            Action::Promote => {
+                self.progress.say(&format!(
+                    "{}\nThe standby of `{}` takes over at tick {tick}",
+                    death.words, self.plan.nodes[node].name
+                ));
+                self.successions.promote(node)?;
+            }
+            _ => {
+                let why = match policy {
+                    OnExit::Stop => "",
+                    OnExit::Restart => {
+                        ": it was restarted and came to its end again without completing a tick"
+                    }
+                    OnExit::Standby => ": no standby was ready to take over",
+                };
+                let silent = silent_topics(&self.plan.nodes[node], self.plan);
+                self.abort(format!("{}\nThe run was aborted at tick {tick}{silent}{why}", death.words))?;
+            }
+        }
+        self.last_change.1 = Instant::now();
+        Ok(true)
+    }
+
+    /// Looks whether the run stands still, and because of whom.
+    fn note_stall(&mut self) -> Result<()> {
+        let ticks = self.control.completed_ticks();
+        // A paused run stands still because it was told to.
+        let is_paused = self.control.held_at().is_some_and(|held| self.control.hold_tick() <= held);
+        if ticks != self.last_change.0 || self.state.is_over() || is_paused {
+            self.last_change = (ticks, Instant::now());
+            return Ok(());
+        }
+        if let Some((node, generation, stage, since)) = self.successions.joining() {
+            return self.note_late_joiner(node, generation, stage, since);
+        }
+        let stood = self.last_change.1.elapsed();
+        let culprit = stall::culprit(self.plan, self.control, &self.successions, &self.processes);
+        let patience = culprit
+            .map_or(WATCHDOG, |(node, generation)| self.successions.program_of(node, generation).watchdog);
+        if stood <= patience.max(2 * stall::deadline(self.plan, self.control)) {
+            return Ok(());
+        }
+        let words = stall::describe(self.control, self.plan, &self.successions, stood);
+        let Some((node, generation)) = culprit else {
+            self.tell(Event::Died { policy: OnExit::Stop, is_possible: false })?;
+            return self.abort(format!("{words}; it was aborted"));
+        };
+        self.last_change.1 = Instant::now();
+        self.processes.kill(node, generation, Some(format!("was killed by the watchdog: {words}")));
+        Ok(())
+    }
+
+    /// A process that does not join, or a member that does not make room for it.
+    fn note_late_joiner(&mut self, node: usize, generation: u32, stage: Stage, since: Instant) -> Result<()> {
+        let late = match stage {
+            Stage::Announced => self.successions.disagreeing(&self.processes).unwrap_or((node, generation)),
+            _ => (node, generation),
+        };
+        let patience = self.successions.program_of(late.0, late.1).watchdog;
+        if since.elapsed() > patience {
+            let words =
+                format!("was killed by the watchdog: it did not join within {} ms", patience.as_millis());
+            self.processes.kill(late.0, late.1, Some(words));
+        }
+        Ok(())
     }
 }
 
-/// Ticks that the process `name` completed; those of the whole run if it is the clock.
-fn ticks_of(name: &str, control: &Control, plan: &Plan) -> u32 {
-    let node = plan.nodes.iter().position(|node| node.name == name);
-    node.map_or_else(|| control.completed_ticks(), |node| control.completed_by(node))
-}
-
-/// The topics on which nothing came any more once the process `name` had ended, in words.
-fn silent_topics(name: &str, plan: &Plan) -> String {
-    let outputs = plan.nodes.iter().filter(|node| node.name == name).flat_map(|node| &node.outputs);
-    let topics: Vec<_> = outputs.map(|output| plan.topics[output.topic].name.as_str()).collect();
+/// The topics on which nothing came any more once the process of `node` had ended, in words.
+fn silent_topics(node: &NodePlan, plan: &Plan) -> String {
+    let topics: Vec<_> = node.outputs.iter().map(|output| plan.topics[output.topic].name.as_str()).collect();
     if topics.is_empty() { String::new() } else { format!("; nothing more came on {}", topics.join(", ")) }
-}
-
-/// Host time in which a paced run must come forward: that of the slowest node's period.
-fn deadline(plan: &Plan) -> Duration {
-    let period_ticks = plan.nodes.iter().map(|node| node.period_ticks).max().unwrap_or(1);
-    match plan.pace {
-        bus::plan::Pace::Free => Duration::ZERO,
-        bus::plan::Pace::Factor(factor) => {
-            Duration::from_secs_f64((f64::from(period_ticks) * plan.tick_s() / factor).min(1e6))
-        }
-    }
-}
-
-/// Who has not come as far as the others, and what it waits for.
-fn describe_stall(control: &Control, plan: &Plan, stood: Duration) -> String {
-    let names = |phase| {
-        let late = plan.nodes.iter().enumerate().filter(|(index, _)| !control.is_ready(*index, phase));
-        late.map(|(_, node)| format!("`{}`", node.name)).collect::<Vec<_>>().join(", ")
-    };
-    let waiting = match control.phase() {
-        Phase::Announcing => format!("waiting for {} to join", names(Phase::Connecting)),
-        Phase::Connecting => format!("waiting for {} to connect", names(Phase::Running)),
-        Phase::Running => describe_stuck(control, plan),
-    };
-    format!("the run stood still for {} s: {waiting}; it was aborted", stood.as_secs())
-}
-
-/// Who is awake and does not come on, and which topics the others sleep for.
-fn describe_stuck(control: &Control, plan: &Plan) -> String {
-    let nodes = 0..plan.nodes.len();
-    let name = |node: usize| format!("`{}`", plan.nodes[node].name);
-    let is_awake = |node: &usize| {
-        control.awaited_topic(plan, *node).is_none()
-            && !control.awaits_grant(*node)
-            && !control.has_completed(*node)
-    };
-    let mut stuck: Vec<usize> = nodes.clone().filter(is_awake).collect();
-    if stuck.is_empty() {
-        stuck = control.slowest_nodes();
-    }
-    let tick = stuck.iter().map(|&node| control.completed_by(node)).min().unwrap_or(0);
-    let waiting = nodes.filter_map(|node| {
-        let topic = control.awaited_topic(plan, node)?;
-        Some(format!("; {} waits for {}", name(node), plan.topics[topic].name))
-    });
-    let stuck: Vec<String> = stuck.into_iter().map(name).collect();
-    format!("tick {tick} is not completed by {}{}", stuck.join(", "), waiting.collect::<String>())
-}
-
-fn take_down(processes: &mut Processes, control: &Control) -> Result<()> {
-    control.abort();
-    let start = Instant::now();
-    while !processes.all_ended() && start.elapsed() < GRACE {
-        processes.find_failure()?;
-        std::thread::sleep(POLL);
-    }
-    Ok(())
 }
 
 fn outcome(plan: &Plan, control: &Control, was_stopped: bool) -> Outcome {
@@ -360,5 +506,7 @@ fn outcome(plan: &Plan, control: &Control, was_stopped: bool) -> Outcome {
         host_s,
         missed_deadlines: control.missed_deadlines(),
         processes: std::iter::once(clock).chain(nodes).collect(),
+        successions: Vec::new(),
+        flight: None,
     }
 }

@@ -1,6 +1,8 @@
 //! hummingbus: launches process sets that simulate a vehicle in lockstep, and judges their recordings.
 #![forbid(unsafe_code)]
 
+mod clean;
+mod ctl;
 mod describe;
 mod graph;
 mod judge;
@@ -9,15 +11,26 @@ mod launch;
 mod manifest;
 mod placement;
 mod problem;
+mod processes;
+mod profile;
 mod program;
 mod progress;
+#[cfg(test)]
+mod properties;
 mod run_dir;
+mod shadow;
+mod spawn;
+mod stall;
+mod succession;
 mod summary;
+mod supervisor;
+mod top;
 
 use crate::graph::Graph;
 use crate::manifest::{Manifest, PaceSetting};
+use crate::profile::{Files, Profile};
 use crate::program::Program;
-use crate::summary::Summary;
+use crate::summary::{Judgement, Summary};
 use anyhow::{Context, Result, bail};
 use bus::BusError;
 use clap::{Args, Parser, Subcommand};
@@ -38,6 +51,11 @@ enum Verb {
     /// Fly a manifest, record it, and judge the recording.
     #[command(after_help = "Example: hummingbus run manifests/hover.toml --pace realtime --set run.seed=7")]
     Run(RunArguments),
+    /// Fly a manifest as `run` does, and tell where the host time of its ticks goes.
+    #[command(
+        after_help = "Example: hummingbus profile manifests/hover.toml --html profile.html --trace trace.json"
+    )]
+    Profile(ProfileArguments),
     /// Check a manifest without running it, and print its graph.
     #[command(after_help = "Example: hummingbus check manifests/hover.toml")]
     Check(CheckArguments),
@@ -62,6 +80,25 @@ enum Verb {
     #[command(after_help = "Example: hummingbus schema --json")]
     Schema {
         /// Print JSON, with the ROS 2 definitions.
+        #[arg(long)]
+        json: bool,
+    },
+    /// Watch a live run and steer it: ticks, processes, topics.
+    #[command(after_help = top::HELP)]
+    Top(top::TopArguments),
+    /// Pause, step, pace or stop a live run; exit code 2 if it refuses.
+    #[command(after_help = "Example: hummingbus ctl pause")]
+    Ctl(ctl::CtlArguments),
+    /// Replace a process of a live run.
+    #[command(after_help = "Example: hummingbus swap controller --with better.toml --shadow-ticks 500")]
+    Swap(ctl::SwapArguments),
+    /// Remove what dead runs left, and nothing of live ones; exit code 1 if something could not be removed.
+    #[command(after_help = "Example: hummingbus clean --dry-run")]
+    Clean {
+        /// Only tell what would be removed.
+        #[arg(long)]
+        dry_run: bool,
+        /// Print JSON.
         #[arg(long)]
         json: bool,
     },
@@ -95,6 +132,18 @@ struct RunArguments {
 }
 
 #[derive(Args)]
+struct ProfileArguments {
+    #[command(flatten)]
+    run: RunArguments,
+    /// Write a timeline that ui.perfetto.dev opens.
+    #[arg(long, value_name = "FILE")]
+    trace: Option<PathBuf>,
+    /// Write a page with histograms and the slowest ticks.
+    #[arg(long, value_name = "FILE")]
+    html: Option<PathBuf>,
+}
+
+#[derive(Args)]
 struct CheckArguments {
     /// The manifest.
     manifest: PathBuf,
@@ -108,13 +157,20 @@ struct CheckArguments {
 
 fn main() -> ExitCode {
     let result = match Cli::parse().command {
-        Verb::Run(arguments) => run(&arguments),
+        Verb::Run(arguments) => run(&arguments, None),
+        Verb::Profile(ProfileArguments { run: arguments, trace, html }) => {
+            run(&arguments, Some(Files { trace, html }))
+        }
         Verb::Check(arguments) => check(&arguments),
         Verb::Diff { a, b } => diff(&a, &b),
         Verb::Cat { recording, topic } => cat(&recording, topic.as_deref()),
         Verb::Schema { json } => {
             print_text(&if json { describe::schemas_json() } else { describe::schemas() }).map(|()| true)
         }
+        Verb::Top(arguments) => top::top(&arguments).map(|()| true),
+        Verb::Ctl(arguments) => ctl::ctl(&arguments).map(|()| true),
+        Verb::Swap(arguments) => ctl::swap(&arguments).map(|()| true),
+        Verb::Clean { dry_run, json } => clean(dry_run, json),
         Verb::Node { kind } => node(&kind),
     };
     match result {
@@ -134,8 +190,9 @@ fn words(error: &anyhow::Error) -> String {
     })
 }
 
-/// Flies a manifest; false if a condition did not hold.
-fn run(arguments: &RunArguments) -> Result<bool> {
+/// Flies a manifest, profiled where `files` are given; false if a condition did not hold.
+fn run(arguments: &RunArguments, files: Option<Files>) -> Result<bool> {
+    files.as_ref().map_or(Ok(()), Files::check)?;
     let mut manifest = Manifest::load(&arguments.manifest, &arguments.set)?;
     if let Some(pace) = arguments.pace {
         manifest.content.run.pace = pace;
@@ -144,28 +201,53 @@ fn run(arguments: &RunArguments) -> Result<bool> {
         manifest.content.run.window_ticks = Some(toml::Spanned::new(0..0, window));
     }
     let mut graph = Graph::build(&manifest)?;
+    graph.plan.profile |= files.is_some();
     let path = recording_path(&manifest, arguments.record.as_deref())?;
     let has_recorder = graph.programs.iter().any(Program::is_recorder);
-    let outcome = launch::fly(&manifest, &mut graph, &path, arguments.json)?;
-    let (mut pass, mut compare) = (Vec::new(), Vec::new());
-    // A run that was stopped has not flown what the conditions speak of.
-    if has_recorder && !outcome.was_stopped {
+    let mut outcome = launch::fly(&manifest, &mut graph, &path, arguments.json)?;
+    let flight = outcome.flight.take();
+    let profile = flight.as_ref().map(|flight| Profile::of(flight, outcome.missed_deadlines));
+    let files = files.unwrap_or_else(|| Files::beside(&path));
+    let mut judgement = Judgement::default();
+    if has_recorder {
         let recording = Recording::open(&path)?;
-        pass = judge::verdicts(&manifest.content, &recording)?;
-        compare = judge::window_errors(&manifest.content, &recording)?;
+        judgement.steps = shadow::steps(&recording, &graph.plan, &outcome.successions)?;
+        judgement.shadows = shadow::differences(&recording)?;
+        // A run that was stopped has not flown what the conditions speak of.
+        if !outcome.was_stopped {
+            judgement.pass = judge::verdicts(&manifest.content, &recording)?;
+            judgement.compare = judge::window_errors(&manifest.content, &recording)?;
+        }
     }
     let tick_s = graph.plan.tick_s();
-    let summary = Summary::new(manifest.name(), outcome, tick_s, has_recorder.then_some(path), pass, compare);
-    print_text(&if arguments.json { serde_json::to_string_pretty(&summary)? } else { summary.to_string() })?;
+    let summary = Summary::new(manifest.name(), outcome, tick_s, has_recorder.then_some(path), judgement);
+    let mut text =
+        if arguments.json { json_text(&summary, profile.as_ref(), &files)? } else { summary.to_string() };
+    if let (Some(flight), Some(profile)) = (&flight, &profile) {
+        let lines = files.write(&summary.manifest, flight, profile)?;
+        if !arguments.json {
+            text += &format!("\n\n{profile}\n{}", lines.join("\n"));
+        }
+    }
+    print_text(&text)?;
     Ok(summary.passed)
+}
+
+/// The summary as JSON, with the profile and its files in it.
+fn json_text(summary: &Summary, profile: Option<&Profile>, files: &Files) -> Result<String> {
+    let mut value = serde_json::to_value(summary)?;
+    if let Some(profile) = profile {
+        value["profile"] = serde_json::to_value(profile)?;
+        value["profile"]["files"] = serde_json::to_value(files)?;
+    }
+    Ok(serde_json::to_string_pretty(&value)?)
 }
 
 /// Where the run is recorded: `--record`, the manifest's `record`, or beside the manifest.
 fn recording_path(manifest: &Manifest, argument: Option<&Path>) -> Result<PathBuf> {
-    let folder = manifest.path.parent().unwrap_or(Path::new(""));
     let path = match (argument, &manifest.content.run.record) {
         (Some(path), _) => path.to_owned(),
-        (None, Some(path)) => folder.join(path),
+        (None, Some(path)) => manifest.resolve(path)?,
         (None, None) => manifest.path.with_extension("mcap"),
     };
     std::path::absolute(&path).with_context(|| format!("{} is not a path", path.display()))
@@ -174,7 +256,7 @@ fn recording_path(manifest: &Manifest, argument: Option<&Path>) -> Result<PathBu
 fn check(arguments: &CheckArguments) -> Result<bool> {
     let manifest = Manifest::load(&arguments.manifest, &arguments.set)?;
     let graph = Graph::build(&manifest)?;
-    print_text(&if arguments.json { describe::graph_json(&graph.plan) } else { describe::graph(&graph) })?;
+    print_text(&if arguments.json { describe::graph_json(&graph) } else { describe::graph(&graph) })?;
     Ok(true)
 }
 
@@ -225,6 +307,13 @@ fn cat(path: &Path, topic: Option<&str>) -> Result<bool> {
         }
     }
     out.flush().map_or_else(gone_or_failed, |()| Ok(recording.cut().is_none()))
+}
+
+/// Removes what dead runs left; false if something of it is still there.
+fn clean(dry_run: bool, json: bool) -> Result<bool> {
+    let report = clean::clean(dry_run)?;
+    print_text(&if json { serde_json::to_string_pretty(&report)? } else { report.to_string() })?;
+    Ok(report.is_done())
 }
 
 /// Runs a process of a run; what it says goes to the launcher's log.

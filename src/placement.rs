@@ -54,8 +54,9 @@ pub fn depths(nodes: &[NodePlan], publisher: impl Fn(usize) -> usize) -> Vec<usi
     depths
 }
 
-/// Gives every node that has none a core: each feedback loop has one of its own while they last, and what
-/// is in no loop (pilots, players, recorders, the clock) shares the last.
+/// Gives every node that has none a core: each feedback loop has one of its own while they last, and what is
+/// in no loop (pilots, players, recorders, the clock) shares the last. More loops than that take turns on all
+/// cores, the last included.
 ///
 /// A loop is a serial chain: on one core a hop costs a context switch, across cores it costs an
 /// interrupt and a wake-up, ten times as much (docs/decisions/002-waiting-and-placement.md).
@@ -65,9 +66,10 @@ pub fn place(plan: &mut Plan, clock_cpu: Option<usize>) {
         plan.clock_cpu = clock_cpu;
         return;
     };
-    let loop_cores = &cores[..cores.len() - 1];
     let loops = feedback_loops(plan);
-    let has_loop = loops.iter().any(Option::is_some);
+    let count = loops.iter().flatten().max().map_or(0, |number| number + 1);
+    let has_loop = count > 0;
+    let loop_cores = if count < cores.len() { &cores[..cores.len() - 1] } else { &cores[..] };
     plan.clock_cpu = clock_cpu.or(Some(last));
     for (index, (node, in_loop)) in plan.nodes.iter_mut().zip(loops).enumerate() {
         // Without a loop there is no serial chain to keep together: what computes is spread instead.

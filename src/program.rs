@@ -1,7 +1,9 @@
-//! What the supervisor starts: the executable behind a node, how it runs on the host, and what follows its end.
+//! What the supervisor starts: the executable behind a node, how it runs on the host, and what follows its
+//! end.
 
 use bus::kind::NodeKind;
 use bus::plan::NodePlan;
+use serde::Deserialize;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::time::Duration;
@@ -20,7 +22,8 @@ pub enum Executable {
 }
 
 /// What follows when a process ends before the run does.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "kebab-case")]
 pub enum OnExit {
     /// The run is aborted.
     #[default]

@@ -39,6 +39,11 @@ impl Progress {
         self.bar.set_position(u64::from(ticks));
     }
 
+    /// Says something that the user should know while the run goes on.
+    pub fn say(&self, words: &str) {
+        self.bar.suspend(|| eprintln!("{words}"));
+    }
+
     /// Draws the end and leaves the bar standing.
     pub fn finish(&self, control: &Control) {
         self.bar.set_position(u64::from(control.completed_ticks()));

@@ -1,55 +1,336 @@
-//! The run directory, and the promise that a run leaves nothing behind.
+//! The run directory and the registry of runs: who flies, and who left something behind.
+//!
+//! A run registers before it creates anything else and signs off after it has removed everything else. Its entry
+//! is a file in /dev/shm that the launcher holds locked for its life. The kernel gives the lock back when the
+//! launcher dies, however it dies: so who can have the lock knows that the run is dead.
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, bail};
 use bus::control::shm_prefix;
+use rustix::fs::{FlockOperation, flock};
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeSet;
+use std::fs::File;
+use std::io::Write as _;
+use std::os::unix::fs::{DirBuilderExt, MetadataExt, OpenOptionsExt};
 use std::path::{Path, PathBuf};
 
-/// Where a run keeps its files; dropping it removes them and the run's shared memory.
+/// Where shared memory lies.
+pub const SHARED_MEMORY: &str = "/dev/shm";
+
+/// What a run says of itself in its entry.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct Entry {
+    /// The run's name, unique on this machine.
+    pub run_id: String,
+    /// Its run directory.
+    pub run_dir: PathBuf,
+    /// The manifest that it flies.
+    pub manifest: PathBuf,
+    /// The process number of its launcher.
+    pub launcher: u32,
+}
+
+impl Entry {
+    /// What a new run of `manifest` has to say.
+    fn new(manifest: &Path) -> Result<Self> {
+        let run_id = format!("{:x}-{:x}", std::process::id(), bus::control::monotonic_ns());
+        // One level only: a folder shared by runs could vanish with another run that ends.
+        let run_dir = std::path::absolute(std::env::temp_dir())?.join(dir_name(&run_id));
+        Ok(Self { run_id, run_dir, manifest: manifest.to_owned(), launcher: std::process::id() })
+    }
+}
+
+/// Where a run keeps its files; dropping it removes them, the run's shared memory, and its entry.
 #[derive(Debug)]
 pub struct RunDir {
-    path: PathBuf,
-    run_id: String,
+    entry: Entry,
+    /// The entry and the directory, locked until the process ends.
+    _locks: [File; 2],
 }
 
 impl RunDir {
-    /// Creates a directory for a new run, open to this user alone.
-    pub fn create() -> Result<Self> {
-        use std::os::unix::fs::DirBuilderExt;
-        let run_id = format!("{:x}-{:x}", std::process::id(), bus::control::monotonic_ns());
-        let user = bus::process::user_id();
-        // One level only: a folder shared by runs could vanish with another run that ends.
-        let path = std::env::temp_dir().join(format!("hummingbus-{user}-{run_id}"));
-        std::fs::DirBuilder::new()
-            .mode(0o700)
-            .create(&path)
-            .with_context(|| format!("cannot create the run directory {}", path.display()))?;
-        Ok(Self { path, run_id })
+    /// Registers a new run of `manifest` and creates its directory, open to this user alone.
+    ///
+    /// # Errors
+    /// If shared memory or the folder for temporary files cannot be written to.
+    pub fn create(manifest: &Path) -> Result<Self> {
+        let manifest = std::path::absolute(manifest)?;
+        let (entry, registered) = loop {
+            let entry = Entry::new(&manifest)?;
+            if let Some(file) =
+                register(&entry).with_context(|| format!("cannot register in {SHARED_MEMORY}"))?
+            {
+                break (entry, file);
+            }
+        };
+        match create_locked(&entry.run_dir) {
+            Ok(directory) => Ok(Self { entry, _locks: [registered, directory] }),
+            Err(error) => {
+                let _ = std::fs::remove_file(entry_path(&entry.run_id));
+                let path = entry.run_dir.display().to_string();
+                Err(error).with_context(|| format!("cannot create the run directory {path}"))
+            }
+        }
     }
 
     /// The directory.
     pub fn path(&self) -> &Path {
-        &self.path
+        &self.entry.run_dir
     }
 
     /// The run's name, unique on this machine.
     pub fn run_id(&self) -> &str {
-        &self.run_id
+        &self.entry.run_id
     }
 }
 
 impl Drop for RunDir {
     fn drop(&mut self) {
-        remove_shared_memory(&self.run_id);
-        let _ = std::fs::remove_dir_all(&self.path);
+        let _ = std::fs::remove_dir_all(self.path());
+        // The entry last: what has no entry belongs to nobody.
+        for path in shared_memory_of(self.run_id()).into_iter().chain([entry_path(self.run_id())]) {
+            let _ = std::fs::remove_file(path);
+        }
     }
 }
 
-/// Removes every shared-memory file of a run whose processes are gone.
-fn remove_shared_memory(run_id: &str) {
-    let prefix = shm_prefix(run_id);
-    for entry in std::fs::read_dir("/dev/shm").into_iter().flatten().flatten() {
-        if entry.file_name().to_string_lossy().starts_with(&prefix) {
-            let _ = std::fs::remove_file(entry.path());
+/// The name of the directory of run `run_id`.
+fn dir_name(run_id: &str) -> String {
+    format!("hummingbus-{}-{run_id}", bus::process::user_id())
+}
+
+/// The run whose directory has this name; `None` for anything else, and for runs of other users.
+pub fn run_of_dir(name: &str) -> Option<&str> {
+    let run_id = name.strip_prefix("hummingbus-")?.strip_prefix(&bus::process::user_id().to_string())?;
+    run_id.strip_prefix('-').filter(|run_id| is_run_id(run_id))
+}
+
+/// The run to which a shared-memory file of this name belongs; `None` for anything else.
+pub fn run_of_shared_memory(name: &str) -> Option<&str> {
+    name.strip_prefix("hb_")?.split_once('_').map(|(run_id, _)| run_id).filter(|run_id| is_run_id(run_id))
+}
+
+fn is_run_id(text: &str) -> bool {
+    let is_hex = |text: &str| !text.is_empty() && text.bytes().all(|byte| byte.is_ascii_hexdigit());
+    text.split_once('-').is_some_and(|(launcher, time)| is_hex(launcher) && is_hex(time))
+}
+
+/// Where the entry of run `run_id` lies.
+pub fn entry_path(run_id: &str) -> PathBuf {
+    Path::new(SHARED_MEMORY).join(format!("{}run", shm_prefix(run_id)))
+}
+
+/// Every shared-memory file of run `run_id` but its entry.
+pub fn shared_memory_of(run_id: &str) -> Vec<PathBuf> {
+    let (prefix, entry) = (shm_prefix(run_id), entry_path(run_id));
+    let files = std::fs::read_dir(SHARED_MEMORY).into_iter().flatten().flatten();
+    let belongs = |file: &std::fs::DirEntry| file.file_name().to_string_lossy().starts_with(&prefix);
+    files.filter(belongs).map(|file| file.path()).filter(|path| *path != entry).collect()
+}
+
+/// Writes `entry` and locks it. `None` if `clean` met the file before it was locked, and has removed it: then the
+/// run needs another name, so that a name that was once dead is so for ever.
+fn register(entry: &Entry) -> Result<Option<File>> {
+    let mut options = std::fs::OpenOptions::new();
+    options.read(true).write(true).create_new(true).mode(0o600);
+    let mut file = options.open(entry_path(&entry.run_id))?;
+    // Waits while `clean` has the lock.
+    rustix::io::retry_on_intr(|| flock(&file, FlockOperation::LockExclusive))?;
+    if file.metadata()?.nlink() == 0 {
+        return Ok(None);
+    }
+    file.write_all(&serde_json::to_vec(entry)?)?;
+    Ok(Some(file))
+}
+
+/// Creates the run directory and locks it as well: where two containers share the folder for temporary files but
+/// not /dev/shm, neither sees the other's entries.
+fn create_locked(run_dir: &Path) -> std::io::Result<File> {
+    std::fs::DirBuilder::new().mode(0o700).create(run_dir)?;
+    let directory = File::open(run_dir)?;
+    rustix::io::retry_on_intr(|| flock(&directory, FlockOperation::LockExclusive))?;
+    Ok(directory)
+}
+
+/// Whether the launcher that locked `entry` lives. Asking does not disturb others who ask.
+fn is_locked(entry: &File) -> bool {
+    let is_free = rustix::io::retry_on_intr(|| flock(entry, FlockOperation::NonBlockingLockShared)).is_ok();
+    if is_free {
+        let _ = flock(entry, FlockOperation::Unlock);
+    }
+    !is_free
+}
+
+/// A claim on what a dead run left. While it is held, no launcher can take up the run's entry.
+#[derive(Debug)]
+pub struct Claim {
+    _locks: Vec<File>,
+}
+
+/// Claims what run `run_id` left, with those of `run_dirs` that there are; `None` if it is alive.
+///
+/// Without an entry nobody lives on this side of /dev/shm: it is made before everything else, and removed after.
+pub fn try_claim(run_id: &str, run_dirs: &BTreeSet<PathBuf>) -> Option<Claim> {
+    let (mut locks, entry) = (Vec::new(), entry_path(run_id));
+    for path in std::iter::once(&entry).chain(run_dirs) {
+        match File::open(path) {
+            Ok(file) => {
+                let taken = rustix::io::retry_on_intr(|| flock(&file, FlockOperation::NonBlockingLockShared));
+                taken.ok()?;
+                locks.push(file);
+            }
+            Err(error) if error.kind() == std::io::ErrorKind::NotFound => {}
+            Err(_) => return None,
         }
+    }
+    Some(Claim { _locks: locks })
+}
+
+/// A run that was alive when it was found.
+#[derive(Debug)]
+pub struct LiveRun {
+    /// What it says of itself.
+    pub entry: Entry,
+    file: File,
+}
+
+impl LiveRun {
+    /// Whether its launcher still lives.
+    pub fn is_live(&self) -> bool {
+        is_locked(&self.file)
+    }
+}
+
+/// The live runs of this user, oldest first where process numbers do not wrap.
+pub fn live_runs() -> Vec<LiveRun> {
+    let files = std::fs::read_dir(SHARED_MEMORY).into_iter().flatten().flatten();
+    let mut runs: Vec<LiveRun> = files.filter_map(|file| live_run(&file.path())).collect();
+    runs.sort_by(|a, b| a.entry.run_id.cmp(&b.entry.run_id));
+    runs
+}
+
+fn live_run(path: &Path) -> Option<LiveRun> {
+    let run_id = run_of_shared_memory(path.file_name()?.to_str()?)?;
+    if path != entry_path(run_id) {
+        return None;
+    }
+    let file = File::open(path).ok().filter(is_own)?;
+    // A run that is registering has an empty entry, and is not up yet.
+    let entry = serde_json::from_reader(&file).ok()?;
+    Some(LiveRun { entry, file }).filter(LiveRun::is_live)
+}
+
+fn is_own(file: &File) -> bool {
+    file.metadata().is_ok_and(|metadata| metadata.uid() == bus::process::user_id())
+}
+
+/// The live run named `run_id`, or the only one.
+///
+/// # Errors
+/// If there is no such run, or several to choose from; the error lists those that there are.
+pub fn find_live(run_id: Option<&str>) -> Result<LiveRun> {
+    choose(live_runs(), run_id)
+}
+
+fn choose(mut runs: Vec<LiveRun>, run_id: Option<&str>) -> Result<LiveRun> {
+    let is_chosen = |run: &LiveRun| run_id.is_none_or(|run_id| run.entry.run_id == run_id);
+    let index = runs.iter().position(is_chosen);
+    match (index, run_id, runs.len()) {
+        (_, _, 0) => bail!("no run of this user is alive; `hummingbus run MANIFEST` starts one"),
+        (Some(index), Some(_), _) | (Some(index), None, 1) => Ok(runs.swap_remove(index)),
+        (_, None, count) => bail!("{count} runs are alive; choose one with --run:{}", listed(&runs)),
+        (None, Some(run_id), _) => bail!("no run `{run_id}` is alive; there are:{}", listed(&runs)),
+    }
+}
+
+fn listed(runs: &[LiveRun]) -> String {
+    let line = |Entry { run_id, manifest, launcher, .. }: &Entry| {
+        format!("\n  {run_id}  {}  (launcher {launcher})", manifest.display())
+    };
+    runs.iter().map(|run| line(&run.entry)).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{
+        Entry, LiveRun, choose, dir_name, entry_path, is_run_id, register, run_of_dir, run_of_shared_memory,
+        try_claim,
+    };
+    use std::collections::BTreeSet;
+    use std::path::Path;
+    use std::sync::Mutex;
+    use std::sync::atomic::{AtomicBool, Ordering};
+
+    fn runs(names: &[&str]) -> Vec<LiveRun> {
+        let run = |name: &&str| {
+            let run_id = (*name).to_owned();
+            let entry = Entry { run_id, run_dir: "/t".into(), manifest: "/m.toml".into(), launcher: 1 };
+            LiveRun { entry, file: tempfile::tempfile().unwrap() }
+        };
+        names.iter().map(run).collect()
+    }
+
+    #[test]
+    fn the_only_run_is_the_default_and_several_are_listed() {
+        let chosen = |names: &[&str], run_id| choose(runs(names), run_id).map(|run| run.entry.run_id);
+        assert_eq!(chosen(&["1-a"], None).unwrap(), "1-a");
+        assert_eq!(chosen(&["1-a", "2-b"], Some("2-b")).unwrap(), "2-b");
+        let words = |names: &[&str], run_id| chosen(names, run_id).unwrap_err().to_string();
+        assert!(words(&[], Some("1-a")).contains("no run of this user is alive"));
+        for text in [words(&["1-a", "2-b"], None), words(&["1-a", "2-b"], Some("3-c"))] {
+            assert!(text.contains("\n  1-a  /m.toml  (launcher 1)\n  2-b  /m.toml"), "{text}");
+        }
+    }
+
+    #[test]
+    fn a_run_that_has_registered_is_never_cleaned_whenever_clean_looked() {
+        let name = Mutex::new(String::new());
+        let clean = || {
+            let run_id = name.lock().unwrap().clone();
+            let path = entry_path(&run_id);
+            // Of a run that was there when `clean` looked around.
+            if path.exists()
+                && let Some(_claim) = try_claim(&run_id, &BTreeSet::new())
+            {
+                let _ = std::fs::remove_file(&path);
+            }
+        };
+        let (is_over, mut kept, mut removed, mut lost) = (AtomicBool::new(false), 0, 0, 0);
+        std::thread::scope(|scope| {
+            (0..2).for_each(|_| {
+                drop(scope.spawn(|| {
+                    while !is_over.load(Ordering::Relaxed) {
+                        clean()
+                    }
+                }))
+            });
+            for _ in 0..20_000 {
+                let entry = Entry::new(Path::new("/m.toml")).unwrap();
+                name.lock().unwrap().clone_from(&entry.run_id);
+                match register(&entry) {
+                    Ok(Some(_lock)) => match std::fs::remove_file(entry_path(&entry.run_id)) {
+                        Ok(()) => kept += 1,
+                        Err(_) => lost += 1,
+                    },
+                    _ => removed += 1,
+                }
+            }
+            is_over.store(true, Ordering::Relaxed);
+        });
+        assert!(lost == 0 && kept > 0, "{lost} lost, {kept} kept, {removed} removed before they were locked");
+    }
+
+    #[test]
+    fn names_that_are_not_of_runs_are_left_alone() {
+        assert_eq!(run_of_dir(&dir_name("1f-2e")), Some("1f-2e"));
+        assert_eq!(run_of_shared_memory("hb_1f-2e_control"), Some("1f-2e"));
+        for name in ["hb_control-1f-2e_control", "hb_1f_control", "hb_1f-2e", "hb_-_x", "hb_..-1_x", "sem.hb"]
+        {
+            assert_eq!(run_of_shared_memory(name), None, "{name}");
+        }
+        for name in ["hummingbus-x-1f-2e", "hummingbus-", "hummingbus", "hummingbus-0-1f-2e/.."] {
+            assert_eq!(run_of_dir(name), None, "{name}");
+        }
+        assert!(!is_run_id("-") && !is_run_id("1f-") && is_run_id("1f-2e"));
     }
 }

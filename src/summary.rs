@@ -2,9 +2,14 @@
 
 use crate::judge::{Verdict, WindowErrors};
 use crate::launch::Outcome;
+use crate::shadow::{Difference, Step};
+use crate::succession::{Purpose, Report};
 use serde::Serialize;
 use std::fmt;
 use std::path::PathBuf;
+
+/// Successions that the text shows.
+const SUCCESSIONS_SHOWN: usize = 5;
 
 /// What there is to say about a run.
 #[derive(Debug, Serialize)]
@@ -35,6 +40,33 @@ pub struct Summary {
     pub pass: Vec<Verdict>,
     /// Comparisons with measured states.
     pub compare: Vec<WindowErrors>,
+    /// Who joined the run, took over, or was refused.
+    pub successions: Vec<Succession>,
+    /// What shadows asked for otherwise than those they shadowed.
+    pub shadows: Vec<Difference>,
+}
+
+/// What there is to say about a successor.
+#[derive(Debug, Serialize)]
+pub struct Succession {
+    /// What became of it.
+    #[serde(flatten)]
+    pub report: Report,
+    /// How the outputs went on at its take-over.
+    pub steps: Vec<Step>,
+}
+
+/// What was judged on the recording.
+#[derive(Debug, Default)]
+pub struct Judgement {
+    /// Pass conditions.
+    pub pass: Vec<Verdict>,
+    /// Comparisons with measured states.
+    pub compare: Vec<WindowErrors>,
+    /// The steps at the take-overs, by succession.
+    pub steps: Vec<Vec<Step>>,
+    /// Differences of shadows.
+    pub shadows: Vec<Difference>,
 }
 
 /// What there is to say about a process.
@@ -55,15 +87,20 @@ impl Summary {
         outcome: Outcome,
         tick_s: f64,
         recording: Option<PathBuf>,
-        pass: Vec<Verdict>,
-        compare: Vec<WindowErrors>,
+        judgement: Judgement,
     ) -> Self {
+        let Judgement { pass, compare, steps, shadows } = judgement;
         let ticks_per_s = f64::from(outcome.ticks) / outcome.host_s.max(1e-9);
         let held = pass.iter().all(|verdict| verdict.passed) && compare.iter().all(|errors| errors.passed);
+        let all_joined =
+            outcome.successions.iter().all(|report| !report.is_planned || report.refused.is_none());
+        let steps = steps.into_iter().chain(std::iter::repeat_with(Vec::new));
+        let successions = outcome.successions.into_iter().zip(steps);
+        let successions = successions.map(|(report, steps)| Succession { report, steps }).collect();
         let processes = outcome.processes.into_iter();
         Self {
             manifest,
-            passed: held && !outcome.was_stopped,
+            passed: held && all_joined && !outcome.was_stopped,
             ticks: outcome.ticks,
             simulated_s: f64::from(outcome.ticks) * tick_s,
             host_s: outcome.host_s,
@@ -77,6 +114,8 @@ impl Summary {
             recording,
             pass,
             compare,
+            successions,
+            shadows,
         }
     }
 }
@@ -100,12 +139,64 @@ impl fmt::Display for Summary {
             .map(|process| format!("{} {:.0} %", process.name, process.cpu_share * 100.0))
             .collect();
         writeln!(f, "  cpu: {}", shares.join(", "))?;
+        self.write_successions(f)?;
+        self.shadows.iter().try_for_each(|difference| writeln!(f, "{difference}"))?;
         self.compare.iter().try_for_each(|errors| writeln!(f, "{}", DisplayErrors(errors)))?;
         self.pass.iter().try_for_each(|verdict| writeln!(f, "{}", DisplayVerdict(verdict)))?;
         if let Some(recording) = &self.recording {
             writeln!(f, "  recording: {}", recording.display())?;
         }
         write!(f, "{}", if self.passed { "passed" } else { "FAILED" })
+    }
+}
+
+impl Summary {
+    fn write_successions(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        for succession in self.successions.iter().take(SUCCESSIONS_SHOWN) {
+            writeln!(f, "  {}", DisplayReport(&succession.report))?;
+            succession.steps.iter().try_for_each(|step| writeln!(f, "{step}"))?;
+        }
+        match self.successions.len().saturating_sub(SUCCESSIONS_SHOWN) {
+            0 => Ok(()),
+            more => writeln!(f, "  … and {more} more; --json has them all"),
+        }
+    }
+}
+
+struct DisplayReport<'a>(&'a Report);
+
+impl fmt::Display for DisplayReport<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let report = self.0;
+        let purpose = match report.purpose {
+            Purpose::Swap => "swap",
+            Purpose::Standby => "standby",
+            Purpose::Shadow => "shadow",
+            Purpose::Restart => "restart",
+        };
+        write!(f, "{purpose} of `{}`", report.process)?;
+        match (report.join_tick, report.take_over_tick, report.purpose) {
+            (_, Some(take_over), Purpose::Restart) => write!(f, " at tick {take_over}")?,
+            (Some(join), Some(take_over), _) => {
+                write!(f, ": shadowed from tick {join}, flew from {take_over}")?
+            }
+            (Some(join), None, _) => write!(f, ": shadowed from tick {join}")?,
+            (None, ..) => {}
+        }
+        if let (Some(_), Some(hand_over)) = (report.take_over_tick, report.hand_over) {
+            write!(f, ", handed over: {hand_over}")?;
+        }
+        if report.join_tick.is_some() {
+            write!(
+                f,
+                " (started in {:.1} ms, held the clock for {:.1} ms)",
+                report.start_ms, report.hold_ms
+            )?;
+        }
+        match &report.refused {
+            Some(reason) => write!(f, ": REFUSED: {}", reason.lines().next().unwrap_or_default()),
+            None => Ok(()),
+        }
     }
 }
 

@@ -3,6 +3,9 @@
 //! Each of `tests/readers/read_*` decodes every topic and ends at the first difference. `scripts/test`
 //! installs what they need and says where in `HUMMINGBUS_READERS`.
 
+#[path = "readers/profile.rs"]
+mod profile;
+
 use std::ffi::OsStr;
 use std::fs;
 use std::io::Write as _;

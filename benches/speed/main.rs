@@ -8,6 +8,7 @@ mod hop;
 mod hover;
 mod idle;
 mod payload;
+mod profile;
 mod relay;
 mod report;
 
@@ -30,14 +31,15 @@ fn main() -> Result<()> {
 type Part = fn() -> Result<()>;
 
 fn parts(names: &[String]) -> Result<()> {
-    let all: [(&str, Part); 4] = [
+    let all: [(&str, Part); 5] = [
         ("hop", hop::report),
         ("hover", hover::report),
         ("payload", payload::report),
         ("idle", idle::report),
+        ("profile", profile::report),
     ];
     if let Some(unknown) = names.iter().find(|name| all.iter().all(|(part, _)| part != name)) {
-        return Err(format!("no part `{unknown}`; there are hop, hover, payload, idle").into());
+        return Err(format!("no part `{unknown}`; there are hop, hover, payload, idle, profile").into());
     }
     report::print_machine();
     for (name, report) in all {

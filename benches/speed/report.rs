@@ -37,8 +37,13 @@ pub fn print_machine() {
 
 /// Runs the manifest at `path` and returns its summary.
 pub fn run_manifest(path: &Path, arguments: &[&str]) -> Result<serde_json::Value> {
+    fly_manifest("run", path, arguments)
+}
+
+/// Runs or profiles the manifest at `path` and returns its summary.
+pub fn fly_manifest(verb: &str, path: &Path, arguments: &[&str]) -> Result<serde_json::Value> {
     let output =
-        Command::new(crate::HUMMINGBUS).arg("run").arg(path).args(arguments).arg("--json").output()?;
+        Command::new(crate::HUMMINGBUS).arg(verb).arg(path).args(arguments).arg("--json").output()?;
     if output.status.success() {
         Ok(serde_json::from_slice(&output.stdout)?)
     } else {

@@ -33,24 +33,26 @@ impl Announcement {
         }
     }
 
-    /// Writes the announcement of topic number `topic` into the run directory.
-    pub(crate) fn store(&self, run_dir: &Path, topic: usize) -> Result<(), BusError> {
-        let path = path(run_dir, topic);
+    /// Writes the announcement to `path`.
+    pub(crate) fn store(&self, path: &Path) -> Result<(), BusError> {
         let text = serde_json::to_string(self).unwrap_or_else(|error| unreachable!("{error}"));
-        std::fs::write(&path, text).map_err(|source| BusError::File { action: "write", path, source })
+        std::fs::write(path, text).map_err(|source| BusError::File {
+            action: "write",
+            path: path.to_owned(),
+            source,
+        })
     }
 
-    /// Reads the announcement of topic number `topic`.
-    pub(crate) fn load(run_dir: &Path, topic: usize) -> Result<Self, BusError> {
-        let path = path(run_dir, topic);
-        let text = std::fs::read_to_string(&path).map_err(|source| BusError::File {
+    /// Reads the announcement at `path`.
+    pub(crate) fn load(path: &Path) -> Result<Self, BusError> {
+        let text = std::fs::read_to_string(path).map_err(|source| BusError::File {
             action: "read",
-            path: path.clone(),
+            path: path.to_owned(),
             source,
         })?;
         serde_json::from_str(&text).map_err(|error| BusError::Content {
-            path,
-            expected: "a topic's announcement",
+            path: path.to_owned(),
+            expected: "the announcement of a message type",
             found: error.to_string(),
         })
     }
@@ -70,6 +72,7 @@ impl Announcement {
     }
 }
 
-fn path(run_dir: &Path, topic: usize) -> PathBuf {
+/// Where the type of topic number `topic` is announced.
+pub(crate) fn topic_path(run_dir: &Path, topic: usize) -> PathBuf {
     run_dir.join(format!("topic-{topic}.json"))
 }

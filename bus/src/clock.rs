@@ -1,9 +1,11 @@
 //! The clock service: leads the processes of a run through the ready barrier and grants their ticks.
 
-use crate::control::{Control, Edge, Phase, Waited, Word, monotonic_ns, process_cpu_ns};
+use crate::control::{Control, Edge, Phase, Seat, Waited, Word, monotonic_ns, process_cpu_ns};
 use crate::error::BusError;
-use crate::plan::{Pace, Plan, Wait};
+use crate::plan::{Pace, Plan, SEATS, Wait};
+use crate::profile::GrantWriter;
 use rustix::thread::clock_nanosleep_absolute;
+use std::cell::RefCell;
 
 /// How long the clock sleeps at most before it looks whether a stop was asked for.
 const NAP_NS_MAX: u64 = 100_000_000;
@@ -17,12 +19,18 @@ pub fn run() -> Result<(), BusError> {
     let plan = Plan::load(&run_dir)?;
     let _claim = crate::process::claim(&run_dir, "clock")?;
     crate::process::stay_on(plan.clock_cpu);
-    serve(&plan, &Control::open(&plan)?)
+    let grants = plan.profile.then(|| GrantWriter::create(&run_dir, &plan)).transpose()?;
+    let control = Control::open(&plan)?;
+    if plan.lock_memory {
+        crate::process::lock_memory()?;
+    }
+    serve(&plan, &control, grants)
 }
 
-/// Runs the clock of `plan` until the run is over.
-pub(crate) fn serve(plan: &Plan, control: &Control) -> Result<(), BusError> {
-    let clock = Clock::new(plan, control);
+/// Runs the clock of `plan` until the run is over; notes its grants in `grants`.
+pub(crate) fn serve(plan: &Plan, control: &Control, grants: Option<GrantWriter>) -> Result<(), BusError> {
+    control.set_clock_process();
+    let clock = Clock::new(plan, control, grants);
     for phase in [Phase::Connecting, Phase::Running] {
         clock.gather(phase)?;
     }
@@ -60,12 +68,13 @@ struct Clock<'a> {
     plan: &'a Plan,
     control: &'a Control,
     grant_edges: Vec<Edge>,
+    grants: Option<RefCell<GrantWriter>>,
 }
 
 impl<'a> Clock<'a> {
-    fn new(plan: &'a Plan, control: &'a Control) -> Self {
-        let grant_edges = (0..plan.nodes.len()).map(Edge::Grant).collect();
-        Self { plan, control, grant_edges }
+    fn new(plan: &'a Plan, control: &'a Control, grants: Option<GrantWriter>) -> Self {
+        let grant_edges = (0..SEATS * plan.nodes.len()).map(Edge::Grant).collect();
+        Self { plan, control, grant_edges, grants: grants.map(RefCell::new) }
     }
 
     /// Waits until every node is ready for `phase`, then starts it.
@@ -86,7 +95,7 @@ impl<'a> Clock<'a> {
             if granted >= end {
                 return Ok(end);
             }
-            if self.control.hold_tick() <= granted {
+            if self.control.boundary() <= granted {
                 self.await_all(granted)?;
                 self.control.hold(granted, || self.is_stop_asked_for());
                 deadlines = None;
@@ -111,9 +120,9 @@ impl<'a> Clock<'a> {
         let window = self.plan.window_ticks.max(1);
         // Granting half a window at a time lets fast nodes go on while the slowest catches up.
         let stride = (window / 2).max(1);
-        let limit = end.min(self.control.hold_tick());
+        let limit = end.min(self.control.boundary());
         let target = limit.min(self.slowest().saturating_add(window)).max(granted);
-        self.grant(target);
+        self.grant(target, None);
         if target < limit {
             self.await_all((target + stride).saturating_sub(window))?;
         }
@@ -135,7 +144,7 @@ impl<'a> Clock<'a> {
         if deadlines.granted_late {
             self.control.count_missed_deadline(std::iter::empty());
         }
-        self.grant(tick + 1);
+        self.grant(tick + 1, Some(deadline_ns));
         Ok(tick + 1)
     }
 
@@ -152,7 +161,7 @@ impl<'a> Clock<'a> {
     fn sleep_until(&self, tick: u32, deadline_ns: u64, factor: f64) -> bool {
         loop {
             if self.is_stop_asked_for()
-                || self.control.hold_tick() <= tick
+                || self.control.boundary() <= tick
                 || self.control.pace() != Pace::Factor(factor)
             {
                 return false;
@@ -172,27 +181,42 @@ impl<'a> Clock<'a> {
         self.control.is_stop_requested() || self.control.is_aborted()
     }
 
-    fn grant(&self, ticks: u32) {
+    fn grant(&self, ticks: u32, deadline_ns: Option<u64>) {
+        if let Some(grants) = &self.grants {
+            grants.borrow_mut().grant(ticks, deadline_ns);
+        }
         self.control.advance(Word::Grant, ticks, &self.grant_edges);
     }
 
     fn slowest(&self) -> u32 {
-        let counts = (0..self.plan.nodes.len()).map(|node| self.control.count(Word::Done(node)));
-        counts.min().unwrap_or(u32::MAX)
+        self.control
+            .computing()
+            .map(|member| self.control.count(Word::Done(member)))
+            .min()
+            .unwrap_or(u32::MAX)
     }
 
-    /// Waits until every node has completed `ticks` ticks.
+    /// Waits until every member has completed `ticks` ticks.
     fn await_all(&self, ticks: u32) -> Result<(), BusError> {
-        for node in 0..self.plan.nodes.len() {
-            reached(self.control.wait(Word::Done(node), ticks, Edge::Done(node), Wait::Block, |_| false))?;
+        let late = |member: &usize| self.control.count(Word::Done(*member)) < ticks;
+        while let Some(member) = self.control.computing().find(late) {
+            // A member that died is replaced, or leaves: then it is another's turn to be waited for.
+            let epoch = self.control.epoch();
+            let has_left =
+                |control: &Control| control.epoch() != epoch || control.seat(member) != Seat::Taken;
+            let waited =
+                self.control.wait(Word::Done(member), ticks, Edge::Done(member), Wait::Block, has_left);
+            if waited == Waited::Over && self.control.is_aborted() {
+                return Err(BusError::Aborted);
+            }
         }
         Ok(())
     }
 
     fn note_late_nodes(&self, tick: u32) {
-        let late = |node: &usize| self.control.count(Word::Done(*node)) < tick;
-        if (0..self.plan.nodes.len()).any(|node| late(&node)) {
-            self.control.count_missed_deadline((0..self.plan.nodes.len()).filter(late));
+        let late = |member: &usize| self.control.count(Word::Done(*member)) < tick;
+        if self.control.computing().any(|member| late(&member)) {
+            self.control.count_missed_deadline(self.control.computing().filter(late));
         }
     }
 }

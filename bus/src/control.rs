@@ -4,10 +4,11 @@
 //! ticks that are complete; an *edge* belongs to one reader of one word and holds the count that
 //! this reader sleeps for. A writer stores its word, then looks at the edges that read it, and wakes
 //! only those whose count is reached: nobody is woken for nothing, and nobody pays a system call
-//! for a reader that is awake.
+//! for a reader that is awake. Behind the edges every node counts its step times (`live.rs`).
 
 use crate::error::BusError;
-use crate::plan::{Pace, Plan, Wait};
+use crate::live::STEP_SLOTS;
+use crate::plan::{InputPlan, Pace, Plan, SEATS, Wait};
 use memmap2::MmapRaw;
 use rustix::thread::futex;
 use std::path::{Path, PathBuf};
@@ -15,6 +16,15 @@ use std::sync::atomic::{AtomicU32, AtomicU64, Ordering::Relaxed, Ordering::SeqCs
 
 const SLOT_BYTES: usize = 64;
 const MAGIC: u32 = 0x4855_4d35;
+/// Words of a member's slot: how far it has joined, and what its seat holds.
+const READY: usize = 0;
+const SEAT: usize = 8;
+/// Its deadlines missed, the epoch it agrees with, what it goes on from, and (a double word) its processor
+/// time.
+const LATE: usize = 3;
+const EPOCH: usize = 9;
+const HAND_OVER: usize = 10;
+const CPU: usize = 2;
 /// The value of an edge on which nobody sleeps.
 const AWAKE: u32 = u32::MAX;
 /// What stands in the place of the tick of a hold while the clock runs.
@@ -45,19 +55,51 @@ pub(crate) enum Word {
     Grant,
     /// Ticks of a topic whose sample has been sent.
     Topic(usize),
-    /// Ticks that a node has completed.
+    /// Ticks of a topic for which its publisher's successor has sent a shadow sample.
+    Shadow(usize),
+    /// Ticks that a member has completed.
     Done(usize),
+    /// Ticks at whose start a member has stated the state that it would hand over.
+    State(usize),
 }
 
 /// An edge of the control segment: one reader of one word.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Edge {
-    /// A node waits for the grant.
+    /// A member waits for the grant.
     Grant(usize),
-    /// The clock waits for a node.
+    /// The clock waits for a member.
     Done(usize),
-    /// A node waits for an input; counted over all inputs of the run.
+    /// A member waits for its predecessor or for its successor.
+    Partner(usize),
+    /// A member waits for an input; counted over all inputs of the run.
     Input(usize),
+    /// A member waits for the shadow samples of an input; counted in the same way.
+    Shadow(usize),
+}
+
+/// What a seat of a node holds.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u32)]
+pub enum Seat {
+    /// Nobody.
+    Empty = 0,
+    /// A process that may make its connections.
+    Joining = 1,
+    /// A process that computes.
+    Taken = 2,
+}
+
+/// What a successor goes on from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u32)]
+pub enum HandOver {
+    /// Nothing is known yet.
+    Unknown = 0,
+    /// The state of its predecessor: both know the same type.
+    State = 1,
+    /// The last sample that its predecessor sent on each output.
+    LastOutput = 2,
 }
 
 /// Why a wait ended.
@@ -74,7 +116,7 @@ pub(crate) enum Waited {
 pub struct Control {
     map: MmapRaw,
     topics: usize,
-    nodes: usize,
+    members: usize,
     edges: usize,
 }
 
@@ -111,7 +153,10 @@ impl Control {
         control.word(0, 2).store(plan.duration_ticks, SeqCst);
         control.set_pace(plan.pace);
         control.set_hold_tick(u32::MAX);
+        control.set_join_tick(u32::MAX);
         control.word(1, 3).store(NOT_HELD, SeqCst);
+        // Generation 0 of every node is there from the start.
+        (0..plan.nodes.len()).for_each(|member| control.set_seat(member, Seat::Taken));
         (0..control.edge_slots()).for_each(|edge| control.edge_at(edge).store(AWAKE, SeqCst));
         // Last: who opens the segment earlier finds no segment rather than half of one.
         control.word(0, 0).store(MAGIC, SeqCst);
@@ -144,12 +189,12 @@ impl Control {
 
     fn map(plan: &Plan, file: &std::fs::File) -> std::io::Result<Self> {
         let map = MmapRaw::map_raw(file)?;
-        let (topics, nodes, edges) = (plan.topics.len(), plan.nodes.len(), plan.edge_count());
-        Ok(Self { map, topics, nodes, edges })
+        let (topics, members, edges) = (plan.topics.len(), members(plan), SEATS * plan.edge_count());
+        Ok(Self { map, topics, members, edges })
     }
 
     /// Word `index` (0…15) of slot `slot`.
-    fn word(&self, slot: usize, index: usize) -> &AtomicU32 {
+    pub(crate) fn word(&self, slot: usize, index: usize) -> &AtomicU32 {
         let offset = slot * SLOT_BYTES + index * 4;
         assert!(index < 16 && offset + 4 <= self.map.len(), "slot {slot} is outside the control segment");
         // SAFETY: the mapping lives as long as `self`, the offset is inside it (asserted) and a
@@ -169,28 +214,41 @@ impl Control {
     fn tick_word(&self, word: Word) -> &AtomicU32 {
         match word {
             Word::Grant => self.word(1, 0),
-            Word::Topic(topic) => self.word(2 + topic, 0),
-            Word::Done(node) => self.word(self.node_slot(node), 1),
+            Word::Topic(topic) => self.word(self.topic_slot(topic), 0),
+            Word::Shadow(topic) => self.word(2 + self.topics + topic, 0),
+            Word::Done(member) => self.word(self.member_slot(member), 1),
+            Word::State(member) => self.word(self.member_slot(member), 2),
         }
     }
 
-    fn node_slot(&self, node: usize) -> usize {
-        2 + self.topics + node
+    pub(crate) fn topic_slot(&self, topic: usize) -> usize {
+        2 + topic
+    }
+
+    pub(crate) fn member_slot(&self, member: usize) -> usize {
+        2 + 2 * self.topics + member
+    }
+
+    /// The first of the slots that count the step times of `member`: behind those of the edges.
+    pub(crate) fn step_slot(&self, member: usize) -> usize {
+        2 + 2 * self.topics + self.members + self.edge_slots() + member * STEP_SLOTS
     }
 
     fn edge_slots(&self) -> usize {
-        2 * self.nodes + self.edges
+        3 * self.members + 2 * self.edges
     }
 
     fn edge_at(&self, index: usize) -> &AtomicU32 {
-        self.word(2 + self.topics + self.nodes + index, 0)
+        self.word(2 + 2 * self.topics + self.members + index, 0)
     }
 
     fn edge_word(&self, edge: Edge) -> &AtomicU32 {
         self.edge_at(match edge {
-            Edge::Grant(node) => node,
-            Edge::Done(node) => self.nodes + node,
-            Edge::Input(edge) => 2 * self.nodes + edge,
+            Edge::Grant(member) => member,
+            Edge::Done(member) => self.members + member,
+            Edge::Partner(member) => 2 * self.members + member,
+            Edge::Input(edge) => 3 * self.members + edge,
+            Edge::Shadow(edge) => 3 * self.members + self.edges + edge,
         })
     }
 
@@ -256,8 +314,10 @@ impl Control {
     /// Wakes every sleeper, so that it looks whether the run is over.
     fn wake_everybody(&self) {
         (0..self.edge_slots()).for_each(|edge| wake_edge(self.edge_at(edge)));
-        for slot in 0..2 + self.topics + self.nodes {
-            (0..2).for_each(|index| wake_all(self.word(slot, index)));
+        wake_all(self.word(0, 1));
+        wake_all(self.word(1, 9));
+        for member in 0..self.members {
+            [READY, SEAT].into_iter().for_each(|index| wake_all(self.word(self.member_slot(member), index)));
         }
     }
 
@@ -282,22 +342,23 @@ impl Control {
         self.wait_plain(self.word(0, 1), phase as u32)
     }
 
-    /// Notes that `node` is ready for `phase`.
-    pub(crate) fn set_ready(&self, node: usize, phase: Phase) {
-        let word = self.word(self.node_slot(node), 0);
+    /// Notes that `member` is ready for `phase`.
+    pub(crate) fn set_ready(&self, member: usize, phase: Phase) {
+        let word = self.word(self.member_slot(member), READY);
         word.store(phase as u32, SeqCst);
         wake_all(word);
+        self.tell_supervisor();
     }
 
-    /// Waits until `node` is ready for `phase`; only for joining, where nobody counts microseconds.
-    pub(crate) fn wait_ready(&self, node: usize, phase: Phase) -> Waited {
-        self.wait_plain(self.word(self.node_slot(node), 0), phase as u32)
+    /// Waits until `member` is ready for `phase`; only for joining, where nobody counts microseconds.
+    pub(crate) fn wait_ready(&self, member: usize, phase: Phase) -> Waited {
+        self.wait_plain(self.word(self.member_slot(member), READY), phase as u32)
     }
 
-    /// Whether `node` has reached `phase`.
+    /// Whether `member` has reached `phase`.
     #[must_use]
-    pub fn is_ready(&self, node: usize, phase: Phase) -> bool {
-        self.word(self.node_slot(node), 0).load(SeqCst) >= phase as u32
+    pub fn is_ready(&self, member: usize, phase: Phase) -> bool {
+        self.word(self.member_slot(member), READY).load(SeqCst) >= phase as u32
     }
 
     fn wait_plain(&self, word: &AtomicU32, value: u32) -> Waited {
@@ -351,7 +412,112 @@ impl Control {
         self.word(0, 4).load(SeqCst) != 0
     }
 
-    /// The tick boundary at which the clock waits: no tick from it on is granted.
+    /// What a seat holds.
+    #[must_use]
+    pub fn seat(&self, member: usize) -> Seat {
+        match self.word(self.member_slot(member), SEAT).load(SeqCst) {
+            0 => Seat::Empty,
+            1 => Seat::Joining,
+            _ => Seat::Taken,
+        }
+    }
+
+    /// States what a seat holds, and wakes the process that waits for it.
+    pub fn set_seat(&self, member: usize, seat: Seat) {
+        let word = self.word(self.member_slot(member), SEAT);
+        word.store(seat as u32, SeqCst);
+        wake_all(word);
+    }
+
+    /// Prepares an empty seat for another process.
+    pub fn clear_seat(&self, member: usize) {
+        self.word(self.member_slot(member), READY).store(0, SeqCst);
+        self.word(self.member_slot(member), EPOCH).store(0, SeqCst);
+        self.word(self.member_slot(member), HAND_OVER).store(0, SeqCst);
+        self.tick_word(Word::State(member)).store(0, SeqCst);
+    }
+
+    /// Has the process in a seat begin at `tick`.
+    pub fn set_first_tick(&self, member: usize, tick: u32) {
+        self.tick_word(Word::Done(member)).store(tick, SeqCst);
+    }
+
+    /// Has the shadow samples of `topic` begin at `tick`.
+    pub fn start_shadow(&self, topic: usize, tick: u32) {
+        self.tick_word(Word::Shadow(topic)).store(tick, SeqCst);
+    }
+
+    /// Waits until the seat of `member` is as far as `seat`.
+    pub(crate) fn wait_seat(&self, member: usize, seat: Seat) -> Waited {
+        self.wait_plain(self.word(self.member_slot(member), SEAT), seat as u32)
+    }
+
+    /// The number of the newest roster.
+    #[must_use]
+    pub fn epoch(&self) -> u32 {
+        self.word(1, 6).load(SeqCst)
+    }
+
+    /// Makes the roster number `epoch` the newest one, and wakes everybody to look at it.
+    pub fn set_epoch(&self, epoch: u32) {
+        self.word(1, 6).store(epoch, SeqCst);
+        self.wake_everybody();
+    }
+
+    /// Notes that `member` agrees with the roster number `epoch`.
+    pub(crate) fn agree(&self, member: usize, epoch: u32) {
+        self.word(self.member_slot(member), EPOCH).store(epoch, SeqCst);
+        self.tell_supervisor();
+    }
+
+    /// Ticks that may be computed.
+    #[must_use]
+    pub fn granted_ticks(&self) -> u32 {
+        self.count(Word::Grant)
+    }
+
+    /// The newest roster with which `member` agrees.
+    #[must_use]
+    pub fn agreed_epoch(&self, member: usize) -> u32 {
+        self.word(self.member_slot(member), EPOCH).load(SeqCst)
+    }
+
+    /// Notes what `member` goes on from.
+    pub(crate) fn set_hand_over(&self, member: usize, hand_over: HandOver) {
+        self.word(self.member_slot(member), HAND_OVER).store(hand_over as u32, SeqCst);
+    }
+
+    /// What `member` goes on from.
+    #[must_use]
+    pub fn hand_over(&self, member: usize) -> HandOver {
+        match self.word(self.member_slot(member), HAND_OVER).load(SeqCst) {
+            0 => HandOver::Unknown,
+            1 => HandOver::State,
+            _ => HandOver::LastOutput,
+        }
+    }
+
+    /// Whether `member`, whose inputs are `inputs`, has all it needs for its next tick: if it does not come on
+    /// then, it is at fault itself. A member that waits for its partner or for shadow samples does not count.
+    #[must_use]
+    pub fn can_compute(&self, member: usize, inputs: &[InputPlan]) -> bool {
+        let tick = self.done(member);
+        let has = |input: &InputPlan| {
+            self.count(Word::Topic(input.topic)) >= (tick.saturating_add(1)).saturating_sub(input.delay_ticks)
+        };
+        tick < self.end_tick()
+            && self.count(Word::Grant) > tick
+            && inputs.iter().all(has)
+            && !self.awaits_partner(member)
+    }
+
+    /// Ticks that `member` has completed, also those after the end of the run.
+    #[must_use]
+    pub fn done(&self, member: usize) -> u32 {
+        self.count(Word::Done(member))
+    }
+
+    /// The tick boundary at which a user wants the clock to wait; `u32::MAX` if nobody does.
     #[must_use]
     pub fn hold_tick(&self) -> u32 {
         self.word(1, 2).load(SeqCst)
@@ -361,7 +527,24 @@ impl Control {
     /// lets it run.
     pub fn set_hold_tick(&self, tick: u32) {
         self.word(1, 2).store(tick, SeqCst);
-        wake_all(self.word(1, 2));
+        self.tell_clock();
+    }
+
+    /// The same for the supervisor, who holds the clock where a process joins.
+    pub fn set_join_tick(&self, tick: u32) {
+        if self.word(1, 8).swap(tick, SeqCst) != tick {
+            self.tell_clock();
+        }
+    }
+
+    /// The boundary beyond which no tick is granted now.
+    pub(crate) fn boundary(&self) -> u32 {
+        self.hold_tick().min(self.word(1, 8).load(SeqCst))
+    }
+
+    fn tell_clock(&self) {
+        self.word(1, 9).fetch_add(1, SeqCst);
+        wake_all(self.word(1, 9));
     }
 
     /// The boundary at which the clock waits now: every node has completed the ticks before it, and none
@@ -373,16 +556,23 @@ impl Control {
 
     /// Waits in the hold at `tick` until it is lifted or the run is stopped.
     pub(crate) fn hold(&self, tick: u32, is_over: impl Fn() -> bool) {
-        self.word(1, 3).store(tick, SeqCst);
-        self.tell_supervisor();
+        let is_lifted = || self.boundary() > tick || self.is_aborted() || is_over();
         loop {
-            let hold_tick = self.hold_tick();
-            if hold_tick > tick || self.is_aborted() || is_over() {
-                break;
+            self.word(1, 3).store(tick, SeqCst);
+            self.tell_supervisor();
+            loop {
+                let changes = self.word(1, 9).load(SeqCst);
+                if is_lifted() {
+                    break;
+                }
+                let _ = futex::wait(self.word(1, 9), futex::Flags::empty(), changes, Some(&HOLD_NAP));
             }
-            let _ = futex::wait(self.word(1, 2), futex::Flags::empty(), hold_tick, Some(&HOLD_NAP));
+            self.word(1, 3).store(NOT_HELD, SeqCst);
+            // Who asked for another hold before this store may have taken the lifted one for it: so it is kept.
+            if is_lifted() {
+                return;
+            }
         }
-        self.word(1, 3).store(NOT_HELD, SeqCst);
     }
 
     /// The pace at which the clock grants ticks.
@@ -426,60 +616,67 @@ impl Control {
         self.word(0, 5).load(SeqCst)
     }
 
-    /// Counts a missed deadline, and the nodes that were late; none where the clock itself was.
+    /// Counts a missed deadline, and the members that were late; none where the clock itself was.
     pub(crate) fn count_missed_deadline(&self, late: impl Iterator<Item = usize>) {
         self.word(0, 5).fetch_add(1, SeqCst);
-        late.for_each(|node| {
-            self.word(self.node_slot(node), 3).fetch_add(1, SeqCst);
+        late.for_each(|member| {
+            self.word(self.member_slot(member), LATE).fetch_add(1, SeqCst);
         });
     }
 
-    /// Deadlines at which `node` was late.
+    /// Deadlines at which `member` was late.
     #[must_use]
-    pub fn late_count(&self, node: usize) -> u32 {
-        self.word(self.node_slot(node), 3).load(SeqCst)
+    pub fn late_count(&self, member: usize) -> u32 {
+        self.word(self.member_slot(member), LATE).load(SeqCst)
     }
 
-    /// Ticks that `node` has completed.
+    /// Ticks that `member` has completed.
     #[must_use]
-    pub fn completed_by(&self, node: usize) -> u32 {
-        self.count(Word::Done(node)).min(self.end_tick())
+    pub fn completed_by(&self, member: usize) -> u32 {
+        self.count(Word::Done(member)).min(self.end_tick())
     }
 
-    /// Whether `node` has completed the run.
+    /// Whether `member` has completed the run.
     #[must_use]
-    pub fn has_completed(&self, node: usize) -> bool {
-        self.count(Word::Done(node)) >= self.end_tick()
+    pub fn has_completed(&self, member: usize) -> bool {
+        self.count(Word::Done(member)) >= self.end_tick()
+    }
+
+    /// The members that compute, in ascending order.
+    pub fn computing(&self) -> impl Iterator<Item = usize> + '_ {
+        (0..self.members).filter(|&member| self.seat(member) == Seat::Taken)
     }
 
     /// Ticks that every node has completed.
     #[must_use]
     pub fn completed_ticks(&self) -> u32 {
-        let end = self.end_tick();
-        (0..self.nodes).map(|node| self.count(Word::Done(node))).min().unwrap_or(0).min(end)
+        let fewest = self.computing().map(|member| self.count(Word::Done(member))).min();
+        fewest.unwrap_or(0).min(self.end_tick())
     }
 
-    /// The nodes that have completed the fewest ticks.
+    /// The topic for which `member`, whose inputs are `inputs`, sleeps; `None` for one that computes, spins, or
+    /// waits for something else.
     #[must_use]
-    pub fn slowest_nodes(&self) -> Vec<usize> {
-        let count = |node: &usize| self.count(Word::Done(*node));
-        let fewest = (0..self.nodes).map(|node| count(&node)).min();
-        (0..self.nodes).filter(|node| Some(count(node)) == fewest).collect()
+    pub fn awaited_topic(&self, plan: &Plan, member: usize, inputs: &[InputPlan]) -> Option<usize> {
+        let sleeps = |edge: Edge| self.edge_word(edge).load(SeqCst) != AWAKE;
+        let mut inputs = inputs.iter().enumerate();
+        let awaited = inputs.find(|(index, _)| {
+            let edge = plan.edge(member, *index);
+            sleeps(Edge::Input(edge)) || sleeps(Edge::Shadow(edge))
+        });
+        awaited.map(|(_, input)| input.topic)
     }
 
-    /// The topic for which `node` sleeps; `None` for a node that computes, spins, or waits for its grant.
+    /// Whether `member` sleeps until its predecessor or its successor has come as far as it must.
     #[must_use]
-    pub fn awaited_topic(&self, plan: &Plan, node: usize) -> Option<usize> {
-        let first = plan.edges_before(node);
-        let sleeps = |index: usize| self.edge_word(Edge::Input(first + index)).load(SeqCst) != AWAKE;
-        let mut inputs = plan.nodes[node].inputs.iter().enumerate();
-        inputs.find(|(index, _)| sleeps(*index)).map(|(_, input)| input.topic)
+    pub fn awaits_partner(&self, member: usize) -> bool {
+        self.edge_word(Edge::Partner(member)).load(SeqCst) != AWAKE
     }
 
-    /// Whether `node` sleeps until the clock grants its next tick.
+    /// Whether `member` sleeps until the clock grants its next tick.
     #[must_use]
-    pub fn awaits_grant(&self, node: usize) -> bool {
-        self.edge_word(Edge::Grant(node)).load(SeqCst) != AWAKE
+    pub fn awaits_grant(&self, member: usize) -> bool {
+        self.edge_word(Edge::Grant(member)).load(SeqCst) != AWAKE
     }
 
     /// Host time at which the first and the last tick was granted and completed, in nanoseconds of the
@@ -497,14 +694,14 @@ impl Control {
         self.double_word(0, 5).store(monotonic_ns(), SeqCst);
     }
 
-    /// Processor time that `node` used between tick 0 and its last tick, in nanoseconds.
+    /// Processor time that `member` used between tick 0 and its last tick, in nanoseconds.
     #[must_use]
-    pub fn cpu_ns(&self, node: usize) -> u64 {
-        self.double_word(self.node_slot(node), 2).load(SeqCst)
+    pub fn cpu_ns(&self, member: usize) -> u64 {
+        self.double_word(self.member_slot(member), CPU).load(SeqCst)
     }
 
-    pub(crate) fn set_cpu_ns(&self, node: usize, ns: u64) {
-        self.double_word(self.node_slot(node), 2).store(ns, SeqCst);
+    pub(crate) fn set_cpu_ns(&self, member: usize, ns: u64) {
+        self.double_word(self.member_slot(member), CPU).store(ns, SeqCst);
     }
 
     /// Processor time of the clock service, in nanoseconds.
@@ -518,8 +715,13 @@ impl Control {
     }
 }
 
+fn members(plan: &Plan) -> usize {
+    SEATS * plan.nodes.len()
+}
+
 fn segment_bytes(plan: &Plan) -> usize {
-    SLOT_BYTES * (2 + plan.topics.len() + plan.nodes.len() + 2 * plan.nodes.len() + plan.edge_count())
+    let edges = 3 * members(plan) + 2 * SEATS * plan.edge_count();
+    SLOT_BYTES * (2 + 2 * plan.topics.len() + members(plan) + edges + STEP_SLOTS * members(plan))
 }
 
 fn wake_edge(edge: &AtomicU32) {
@@ -575,6 +777,7 @@ mod tests {
             inputs: vec![input],
             outputs: vec![],
             parameters: serde_json::Value::Null,
+            restarts: false,
         };
         let topic = TopicPlan { name: "/t".to_owned(), type_name: "a/msg/B".to_owned(), period_ticks: 1 };
         Plan {

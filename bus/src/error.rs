@@ -97,6 +97,23 @@ pub enum BusError {
         /// The layout the publisher announced.
         found: String,
     },
+    /// A successor sends other bytes than the process it would succeed.
+    #[error(
+        "layout mismatch on topic {topic}: the successor of node `{node}` sends its port `{port}` as\n{found}\n\
+         but the topic carries\n{expected}\nBuild both against the same message definition"
+    )]
+    SuccessorLayout {
+        /// The node.
+        node: String,
+        /// Its port.
+        port: String,
+        /// The topic.
+        topic: String,
+        /// The layout the topic carries.
+        expected: String,
+        /// The layout the successor was built with.
+        found: String,
+    },
     /// The type the manifest states for an output is not the type the node publishes.
     #[error("node `{node}` publishes {found} on its output `{port}`, the manifest states {expected}")]
     TypeMismatch {
@@ -179,6 +196,16 @@ pub enum BusError {
         time_s: f64,
         /// The node's own words.
         reason: String,
+    },
+    /// The system does not allow what the manifest asks for.
+    #[error("cannot {action}: {source}; {advice}")]
+    Denied {
+        /// What was tried.
+        action: &'static str,
+        /// The system's answer.
+        source: std::io::Error,
+        /// Which right is missing and how to get it.
+        advice: &'static str,
     },
     /// The launcher ended the run early.
     #[error("the run was aborted")]

@@ -5,24 +5,34 @@ extern crate self as bus;
 
 pub mod announcement;
 pub mod clock;
+mod connected;
 pub mod control;
 pub mod error;
+pub mod handover;
 pub mod initial;
 pub mod kind;
+mod live;
 pub mod message;
 pub mod messages;
 mod node;
 pub mod plan;
 mod port;
 pub mod process;
+pub mod profile;
 pub mod random;
+pub mod roster;
 pub mod schema;
+pub mod step_times;
+mod tick;
 mod transport;
 
 pub use bus_derive::Message;
+pub use connected::ConnectedNode;
 pub use error::BusError;
 pub use message::Message;
-pub use node::{ConnectedNode, Input, NODE_VARIABLE, Node, Output, RawInput, Tick};
+pub use node::{GENERATION_VARIABLE, Input, NODE_VARIABLE, Node, Output, RawInput};
+pub use tick::Tick;
+pub use transport::reap_dead;
 
 #[doc(hidden)]
 pub mod __private {

@@ -1,15 +1,16 @@
-//! A node: declare ports by name, connect, then compute tick by tick.
+//! A node before its first tick: it declares its ports by name and connects them.
 
-use crate::announcement::Announcement;
-use crate::control::{Control, Edge, Phase, Waited, Word, monotonic_ns, process_cpu_ns};
+use crate::announcement::{self, Announcement};
+use crate::connected::{ConnectedNode, Links};
+use crate::control::{Control, Phase, Seat, Waited};
 use crate::error::BusError;
-use crate::initial;
 use crate::message::Message;
-use crate::plan::{InputPlan, NodePlan, Pace, Plan};
-use crate::port::{InPort, OutPort};
-use crate::process::Claim;
+use crate::plan::{NodePlan, Pace, Plan};
+use crate::port::OutPort;
+use crate::roster::Roster;
 use crate::schema::Schema;
-use crate::transport::{Capacity, Transport};
+use crate::tick::Tick;
+use crate::transport::Transport;
 use serde::de::DeserializeOwned;
 use std::fmt::Display;
 use std::marker::PhantomData;
@@ -18,10 +19,13 @@ use std::path::PathBuf;
 /// The environment variable that names the node to itself.
 pub const NODE_VARIABLE: &str = "HUMMINGBUS_NODE";
 
+/// The environment variable that counts the processes of a node: 0 for the first, successors count up.
+pub const GENERATION_VARIABLE: &str = "HUMMINGBUS_GENERATION";
+
 /// Handle of an input whose messages are `T`.
 #[derive(Debug)]
 pub struct Input<T> {
-    index: usize,
+    pub(crate) index: usize,
     message: PhantomData<T>,
 }
 
@@ -35,13 +39,13 @@ impl<T> Copy for Input<T> {}
 /// Handle of an input whose messages are read as bytes.
 #[derive(Clone, Copy, Debug)]
 pub struct RawInput {
-    index: usize,
+    pub(crate) index: usize,
 }
 
 /// Handle of an output whose messages are `T`.
 #[derive(Debug)]
 pub struct Output<T> {
-    index: usize,
+    pub(crate) index: usize,
     message: PhantomData<T>,
 }
 
@@ -58,13 +62,16 @@ pub struct Node {
     run_dir: PathBuf,
     plan: Plan,
     index: usize,
+    generation: u32,
+    node: NodePlan,
     /// The message type of each input, in the plan's order; `None` until declared.
     inputs: Vec<Option<Declared>>,
     outputs: Vec<Option<&'static Schema>>,
 }
 
+/// How a node reads an input.
 #[derive(Clone, Copy, Debug)]
-enum Declared {
+pub(crate) enum Declared {
     Typed(&'static Schema),
     Raw,
 }
@@ -78,19 +85,25 @@ impl Node {
         let run_dir = crate::process::join()?;
         let name =
             std::env::var(NODE_VARIABLE).map_err(|_| BusError::NotInARun { variable: NODE_VARIABLE })?;
-        Self::open(run_dir, &name)
+        let generation = std::env::var(GENERATION_VARIABLE).ok().and_then(|text| text.parse().ok());
+        Self::open(run_dir, &name, generation.unwrap_or(0))
     }
 
-    /// Opens the part of `name` in the run whose directory is `run_dir`.
-    fn open(run_dir: PathBuf, name: &str) -> Result<Self, BusError> {
+    /// Opens the part of generation `generation` of `name` in the run whose directory is `run_dir`.
+    fn open(run_dir: PathBuf, name: &str, generation: u32) -> Result<Self, BusError> {
         let plan = Plan::load(&run_dir)?;
         let index = plan.node_index(name)?;
-        let (inputs, outputs) = (plan.nodes[index].inputs.len(), plan.nodes[index].outputs.len());
-        Ok(Self { run_dir, plan, index, inputs: vec![None; inputs], outputs: vec![None; outputs] })
+        let node = match generation {
+            0 => plan.nodes[index].clone(),
+            _ => NodePlan::load_successor(&run_dir, index, generation)?,
+        };
+        let (inputs, outputs) = (node.inputs.len(), node.outputs.len());
+        let (inputs, outputs) = (vec![None; inputs], vec![None; outputs]);
+        Ok(Self { run_dir, plan, index, generation, node, inputs, outputs })
     }
 
     fn node(&self) -> &NodePlan {
-        &self.plan.nodes[self.index]
+        &self.node
     }
 
     /// The node's name in the run.
@@ -208,32 +221,49 @@ impl Node {
         Ok(Output { index, message: PhantomData })
     }
 
-    /// Connects the declared ports; returns when every node of the run has done so.
+    /// Connects the declared ports; returns when every node of the run has done so. A successor connects
+    /// while the clock holds the tick from which on it computes.
     ///
     /// # Errors
     /// If a port of the manifest was not declared, two sides disagree on a layout, or the run is aborted.
     pub fn connect(self) -> Result<ConnectedNode, BusError> {
         self.require_all_declared()?;
-        let claim = crate::process::claim(&self.run_dir, self.name())?;
+        let claim = match self.generation {
+            0 => crate::process::claim(&self.run_dir, self.name())?,
+            generation => crate::process::claim(&self.run_dir, &format!("{}.{generation}", self.name()))?,
+        };
         let control = Control::open(&self.plan)?;
         crate::process::stay_on(self.node().cpu);
         if self.plan.pace == Pace::Free {
             crate::process::wait_for_turn();
         }
+        if self.generation > 0 {
+            // Every topic is announced by then.
+            go_on(control.wait_phase(Phase::Connecting))?;
+        }
+        let member = self.plan.member(self.index, self.generation);
         let transport = Transport::new(&self.run_dir, &self.plan.run_id, self.name())?;
         let outputs = self.connect_outputs(&transport)?;
-        control.set_ready(self.index, Phase::Connecting);
-        go_on(control.wait_phase(Phase::Connecting))?;
-        let (inputs, announcements) = self.connect_inputs(&transport)?;
-        Ok(ConnectedNode {
+        control.set_ready(member, Phase::Connecting);
+        let roster = if self.generation == 0 {
+            go_on(control.wait_phase(Phase::Connecting))?;
+            Roster::first(&self.plan)
+        } else {
+            go_on(control.wait_seat(member, Seat::Joining))?;
+            // It names this process already; the others are told when this one has connected.
+            Roster::load(&self.run_dir, control.epoch() + 1)?
+        };
+        let links = Links {
+            run_dir: self.run_dir,
             plan: self.plan,
             index: self.index,
+            generation: self.generation,
+            node: self.node,
             control,
-            inputs,
-            outputs,
-            announcements,
+            transport,
             _claim: claim,
-        })
+        };
+        ConnectedNode::new(links, self.inputs.into_iter().flatten(), outputs, &roster)
     }
 
     fn require_all_declared(&self) -> Result<(), BusError> {
@@ -255,57 +285,32 @@ impl Node {
         let ports = self.node().outputs.iter().zip(self.outputs.iter().flatten());
         ports
             .map(|(output, schema)| {
-                Announcement::of(schema).store(&self.run_dir, output.topic)?;
                 let topic = &self.plan.topics[output.topic];
-                let sender = transport.publisher(&topic.name, schema.size, self.capacity(output.topic))?;
-                let readers = self.plan.edges_of_topic(output.topic).into_iter().map(Edge::Input).collect();
-                Ok(OutPort::new(output, topic, schema, sender, readers))
+                self.announce(output.topic, schema, &output.port)?;
+                let capacity = self.plan.capacity(output.topic);
+                let sender = transport.publisher(&topic.name, self.generation, schema.size, capacity)?;
+                Ok(OutPort::new(output, topic, schema, sender))
             })
             .collect()
     }
 
-    fn connect_inputs(&self, transport: &Transport) -> Result<(Vec<InPort>, Vec<Announcement>), BusError> {
-        let first_edge = self.plan.edges_before(self.index);
-        let (mut ports, mut announcements) = (Vec::new(), Vec::new());
-        for (index, (input, declared)) in
-            self.node().inputs.iter().zip(self.inputs.iter().flatten()).enumerate()
-        {
-            let topic = &self.plan.topics[input.topic];
-            let announcement = Announcement::load(&self.run_dir, input.topic)?;
-            if let Declared::Typed(schema) = declared {
-                announcement.check(schema, self.name(), &input.port, &topic.name)?;
-            }
-            let initial = self.initial_value(input, *declared)?;
-            let receiver = transport.subscriber(&topic.name, self.capacity(input.topic))?;
-            let edge = Edge::Input(first_edge + index);
-            ports.push(InPort::new(input, topic, announcement.size, edge, initial, receiver));
-            announcements.push(announcement);
+    /// Announces the type of a topic, or checks that a successor sends what was announced.
+    fn announce(&self, topic: usize, schema: &Schema, port: &str) -> Result<(), BusError> {
+        let path = announcement::topic_path(&self.run_dir, topic);
+        if self.generation == 0 {
+            return Announcement::of(schema).store(&path);
         }
-        Ok((ports, announcements))
-    }
-
-    fn initial_value(&self, input: &InputPlan, declared: Declared) -> Result<Option<Box<[u64]>>, BusError> {
-        let (Some(value), Declared::Typed(schema)) = (&input.initial, declared) else { return Ok(None) };
-        initial::sample(schema, value).map(Some).map_err(|reason| BusError::InitialValue {
+        let announced = Announcement::load(&path)?;
+        if announced.layout_hash == schema.layout_hash() {
+            return Ok(());
+        }
+        Err(BusError::SuccessorLayout {
             node: self.name().to_owned(),
-            port: input.port.clone(),
-            type_name: schema.type_name,
-            reason,
+            port: port.to_owned(),
+            topic: self.plan.topics[topic].name.clone(),
+            expected: announced.layout,
+            found: schema.layout(),
         })
-    }
-
-    /// A queue holds what a publisher can send before the slowest reader holds the grant back.
-    fn capacity(&self, topic: usize) -> Capacity {
-        let readers =
-            self.plan.nodes.iter().filter(|node| node.inputs.iter().any(|input| input.topic == topic));
-        let longest_period = readers.map(|node| node.period_ticks).max().unwrap_or(1);
-        let ticks = u64::from(self.plan.window_ticks) + u64::from(longest_period);
-        let samples = ticks.div_ceil(u64::from(self.plan.topics[topic].period_ticks)) + 2;
-        Capacity {
-            queued_samples: usize::try_from(samples).unwrap_or(usize::MAX),
-            subscribers: self.plan.edges_of_topic(topic).len(),
-            nodes: self.plan.nodes.len(),
-        }
     }
 
     /// Connects, then computes `step` at every due tick until the run ends.
@@ -315,6 +320,19 @@ impl Node {
     pub fn run<E: Display>(self, step: impl FnMut(&mut Tick<'_>) -> Result<(), E>) -> Result<(), BusError> {
         self.connect()?.run(step)
     }
+
+    /// As [`Node::run`], for a node that remembers something from tick to tick: `state` is handed over to a
+    /// successor that knows the same type.
+    ///
+    /// # Errors
+    /// As [`Node::connect`] and [`ConnectedNode::run`].
+    pub fn run_with_state<S: Message, E: Display>(
+        self,
+        state: S,
+        step: impl FnMut(&mut Tick<'_>, &mut S) -> Result<(), E>,
+    ) -> Result<(), BusError> {
+        self.connect()?.run_with_state(state, step)
+    }
 }
 
 fn known<'a>(names: impl Iterator<Item = &'a str>) -> String {
@@ -322,200 +340,8 @@ fn known<'a>(names: impl Iterator<Item = &'a str>) -> String {
     if names.is_empty() { "none".to_owned() } else { names.join(", ") }
 }
 
-fn go_on(waited: Waited) -> Result<(), BusError> {
+pub(crate) fn go_on(waited: Waited) -> Result<(), BusError> {
     if waited == Waited::Reached { Ok(()) } else { Err(BusError::Aborted) }
-}
-
-/// A node whose ports are connected.
-#[derive(Debug)]
-pub struct ConnectedNode {
-    plan: Plan,
-    index: usize,
-    control: Control,
-    inputs: Vec<InPort>,
-    outputs: Vec<OutPort>,
-    announcements: Vec<Announcement>,
-    _claim: Claim,
-}
-
-impl ConnectedNode {
-    /// Topic name and announced type of a raw input.
-    #[must_use]
-    pub fn announcement(&self, input: RawInput) -> (&str, &Announcement) {
-        let topic = self.plan.nodes[self.index].inputs[input.index].topic;
-        (&self.plan.topics[topic].name, &self.announcements[input.index])
-    }
-
-    /// Computes `step` at every due tick until the run ends.
-    ///
-    /// # Errors
-    /// If a step fails, a due output stays unwritten, a sample is lost, or the run is aborted.
-    pub fn run<E: Display>(
-        mut self,
-        mut step: impl FnMut(&mut Tick<'_>) -> Result<(), E>,
-    ) -> Result<(), BusError> {
-        self.control.set_ready(self.index, Phase::Running);
-        go_on(self.control.wait_phase(Phase::Running))?;
-        let cpu_start_ns = process_cpu_ns();
-        let period = self.plan.nodes[self.index].period_ticks;
-        let mut tick = 0;
-        while self.await_tick(tick)? {
-            self.compute(tick, &mut step)?;
-            tick += period;
-            self.control.advance(Word::Done(self.index), tick, &[Edge::Done(self.index)]);
-        }
-        // A node whose next due tick lies beyond the end has completed the run.
-        self.control.set_cpu_ns(self.index, process_cpu_ns() - cpu_start_ns);
-        self.control.advance(Word::Done(self.index), u32::MAX - 1, &[Edge::Done(self.index)]);
-        Ok(())
-    }
-
-    /// Waits until `tick` may be computed; false when the run ends before it.
-    fn await_tick(&self, tick: u32) -> Result<bool, BusError> {
-        let node = &self.plan.nodes[self.index];
-        let over = |control: &Control| control.end_tick() <= tick;
-        if over(&self.control) {
-            return self.end();
-        }
-        // A node without outputs holds nobody up, so it lets samples gather and is woken less often.
-        let batch = if node.outputs.is_empty() { (self.plan.window_ticks / 4).max(1) } else { 1 };
-        for input in &self.inputs {
-            let needed = (tick + 1).saturating_sub(input.delay_ticks);
-            let word = Word::Topic(input.topic);
-            if self.control.count(word) >= needed {
-                continue;
-            }
-            let granted = self.control.count(Word::Grant);
-            let sleep_for = needed.max((tick + batch).min(granted).saturating_sub(input.delay_ticks));
-            // A node that lets samples gather may be sent home with some of them still to be taken: all that was
-            // sent before an abort is recorded.
-            let waited = self.control.wait(word, sleep_for, input.edge, node.wait, over);
-            if waited == Waited::Over && self.control.count(word) < needed {
-                return self.end();
-            }
-        }
-        // The inputs of this tick imply its grant, except where a node has none that are due at it.
-        let edge = Edge::Grant(self.index);
-        match self.control.wait(Word::Grant, tick + 1, edge, node.wait, over) {
-            Waited::Reached => Ok(true),
-            Waited::Over => self.end(),
-        }
-    }
-
-    fn end(&self) -> Result<bool, BusError> {
-        if self.control.is_aborted() { Err(BusError::Aborted) } else { Ok(false) }
-    }
-
-    fn compute<E: Display>(
-        &mut self,
-        tick: u32,
-        step: &mut impl FnMut(&mut Tick<'_>) -> Result<(), E>,
-    ) -> Result<(), BusError> {
-        let node = &self.plan.nodes[self.index].name;
-        for input in &mut self.inputs {
-            input.take(tick, node)?;
-        }
-        let received_ns = monotonic_ns();
-        let time_ns = u64::from(tick) * self.plan.tick_ns;
-        let mut view = Tick { tick, time_ns, node, inputs: &self.inputs, outputs: &mut self.outputs };
-        step(&mut view).map_err(|error| BusError::Step {
-            node: node.clone(),
-            tick,
-            time_s: time_ns as f64 * 1e-9,
-            reason: error.to_string(),
-        })?;
-        let done_ns = monotonic_ns();
-        let mut sent_before = false;
-        for output in self.outputs.iter_mut().filter(|output| output.is_due(tick)) {
-            // The first output is sent at once: one look at the clock serves for both times.
-            let sent_ns = if sent_before { monotonic_ns() } else { done_ns };
-            output.send(tick, time_ns, [received_ns, done_ns, sent_ns], node)?;
-            self.control.advance(Word::Topic(output.topic), tick + output.period_ticks, &output.readers);
-            sent_before = true;
-        }
-        self.outputs.iter_mut().for_each(OutPort::forget);
-        // Readers are awake by now: what the next tick needs is fetched while they compute.
-        self.outputs.iter_mut().try_for_each(|output| output.prepare(node))?;
-        Ok(())
-    }
-}
-
-/// One computation of a node: its inputs and outputs at one tick.
-#[derive(Debug)]
-pub struct Tick<'a> {
-    tick: u32,
-    time_ns: u64,
-    node: &'a str,
-    inputs: &'a [InPort],
-    outputs: &'a mut [OutPort],
-}
-
-impl Tick<'_> {
-    /// The tick's number.
-    #[must_use]
-    pub fn number(&self) -> u32 {
-        self.tick
-    }
-
-    /// Simulation time in nanoseconds.
-    #[must_use]
-    pub fn time_ns(&self) -> u64 {
-        self.time_ns
-    }
-
-    /// Simulation time in seconds.
-    #[must_use]
-    pub fn time_s(&self) -> f64 {
-        self.time_ns as f64 * 1e-9
-    }
-
-    /// The newest sample of an input that this tick may see.
-    #[must_use]
-    pub fn get<T: Message>(&self, input: Input<T>) -> &T {
-        crate::message::view(self.inputs[input.index].words())
-    }
-
-    /// Host times of the newest sample: when its sender had its inputs, was done, and sent it. For
-    /// profiling only: what a node computes from them is not reproducible. Zero for an initial value.
-    #[must_use]
-    pub fn host_times_ns<T: Message>(&self, input: Input<T>) -> [u64; 3] {
-        self.inputs[input.index].host_times_ns()
-    }
-
-    /// The newest sample of a raw input as CDR bytes with its sequence number, if it was sent at this tick.
-    #[must_use]
-    pub fn fresh(&self, input: RawInput) -> Option<(&[u8], u64)> {
-        self.inputs[input.index].fresh(self.tick)
-    }
-
-    /// Whether `output` is due at this tick.
-    #[must_use]
-    pub fn is_due<T>(&self, output: Output<T>) -> bool {
-        self.outputs[output.index].is_due(self.tick)
-    }
-
-    /// Writes the sample of `output`; the bus fills in its stamp. A sample that is not due is dropped.
-    ///
-    /// # Errors
-    /// If shared memory cannot be had.
-    pub fn write<T: Message>(&mut self, output: Output<T>, message: T) -> Result<(), BusError> {
-        if self.is_due(output) {
-            *self.in_place(output)? = message;
-        }
-        Ok(())
-    }
-
-    /// The sample of `output` in shared memory, to be written in place: for messages too large to copy.
-    ///
-    /// It may hold an earlier sample's values. A node that leaves some of them standing is not
-    /// reproducible.
-    ///
-    /// # Errors
-    /// If shared memory cannot be had.
-    pub fn in_place<T: Message>(&mut self, output: Output<T>) -> Result<&mut T, BusError> {
-        let words = self.outputs[output.index].words(self.node)?;
-        Ok(crate::message::view_mut(words))
-    }
 }
 
 #[cfg(test)]
@@ -524,6 +350,7 @@ mod tests {
     use crate::control::Control;
     use crate::messages::MotorCommand;
     use crate::plan::{InputPlan, NodePlan, OutputPlan, Pace, Plan, TopicPlan, Wait};
+    use crate::tick::Tick;
     use crate::{BusError, Message};
     use std::alloc::{GlobalAlloc, Layout, System};
     use std::cell::Cell;
@@ -558,7 +385,8 @@ mod tests {
 
     fn node(name: &str, inputs: Vec<InputPlan>, outputs: Vec<OutputPlan>) -> NodePlan {
         let (wait, parameters) = (Wait::Block, serde_json::Value::Null);
-        NodePlan { name: name.to_owned(), period_ticks: 1, wait, cpu: None, inputs, outputs, parameters }
+        let (name, restarts) = (name.to_owned(), false);
+        NodePlan { name, period_ticks: 1, wait, cpu: None, inputs, outputs, parameters, restarts }
     }
 
     fn source_and_sink() -> Plan {
@@ -586,7 +414,7 @@ mod tests {
 
     /// Allocations of the calling thread's node between the warm-up and the last tick.
     fn allocations(
-        mut step: impl FnMut(&mut super::Tick<'_>) -> Result<(), BusError>,
+        mut step: impl FnMut(&mut Tick<'_>) -> Result<(), BusError>,
         node: Node,
     ) -> Result<u64, BusError> {
         let (mut at_warm, mut at_last) = (0, 0);
@@ -602,15 +430,15 @@ mod tests {
     }
 
     fn fly_source(run_dir: &Path) -> Result<u64, BusError> {
-        let mut node = Node::open(run_dir.to_owned(), "source")?;
+        let mut node = Node::open(run_dir.to_owned(), "source", 0)?;
         let output = node.output::<MotorCommand>("command")?;
         allocations(|tick| tick.write(output, MotorCommand::default()), node)
     }
 
     fn fly_sink(run_dir: &Path) -> Result<u64, BusError> {
-        let mut node = Node::open(run_dir.to_owned(), "sink")?;
+        let mut node = Node::open(run_dir.to_owned(), "sink", 0)?;
         let input = node.input::<MotorCommand>("command")?;
-        let check = |tick: &mut super::Tick<'_>| {
+        let check = |tick: &mut Tick<'_>| {
             assert_eq!(u64::from(tick.get(input).stamp.nanosec), tick.time_ns() % 1_000_000_000);
             Ok(())
         };
@@ -636,7 +464,7 @@ mod tests {
         let (source, sink) = std::thread::scope(|scope| {
             let source = scope.spawn(|| fly_source(folder.path()));
             let sink = scope.spawn(|| fly_sink(folder.path()));
-            crate::clock::serve(&plan, &control).unwrap();
+            crate::clock::serve(&plan, &control, None).unwrap();
             (source.join().unwrap().unwrap(), sink.join().unwrap().unwrap())
         });
         remove_shared_memory(&plan.run_id);

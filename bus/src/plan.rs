@@ -1,8 +1,14 @@
 //! The resolved plan of a run: what the launcher writes and every process of the run reads.
 
 use crate::error::BusError;
+use crate::transport::Capacity;
 use serde::{Deserialize, Serialize};
-use std::path::Path;
+use std::path::{Path, PathBuf};
+
+/// Processes that a node can have at a time: the one that flies, and one that shadows it.
+pub const SEATS: usize = 2;
+/// Input edges that a node has at least, for successors that read more than it does.
+pub const EDGES_MIN: usize = 8;
 
 /// How time passes for the clock service.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -77,6 +83,44 @@ pub struct NodePlan {
     pub outputs: Vec<OutputPlan>,
     /// The node's own parameters.
     pub parameters: serde_json::Value,
+    /// Whether another process is started in its place when it dies: its publishers then keep enough history.
+    #[serde(default)]
+    pub restarts: bool,
+}
+
+impl NodePlan {
+    /// Reads what the process of generation `generation` of node `node` reads about itself.
+    ///
+    /// # Errors
+    /// If the file is missing or holds something else.
+    pub(crate) fn load_successor(run_dir: &Path, node: usize, generation: u32) -> Result<Self, BusError> {
+        let path = successor_path(run_dir, node, generation);
+        let text = std::fs::read_to_string(&path).map_err(|source| BusError::File {
+            action: "read",
+            path: path.clone(),
+            source,
+        })?;
+        serde_json::from_str(&text).map_err(|error| BusError::Content {
+            path,
+            expected: "the plan of a successor",
+            found: error.to_string(),
+        })
+    }
+
+    /// Writes the same.
+    ///
+    /// # Errors
+    /// If the file cannot be written.
+    pub fn store_successor(&self, run_dir: &Path, node: usize, generation: u32) -> Result<(), BusError> {
+        let path = successor_path(run_dir, node, generation);
+        let text = serde_json::to_string(self).unwrap_or_else(|error| unreachable!("{error}"));
+        std::fs::write(&path, text).map_err(|source| BusError::File { action: "write", path, source })
+    }
+
+    /// Input edges set aside for each of its processes.
+    fn edges(&self) -> usize {
+        self.inputs.len().max(EDGES_MIN)
+    }
 }
 
 /// Everything that the processes of a run must agree on.
@@ -106,6 +150,12 @@ pub struct Plan {
     pub topics: Vec<TopicPlan>,
     /// Nodes.
     pub nodes: Vec<NodePlan>,
+}
+
+/// Where the plan of a successor lies.
+#[must_use]
+pub fn successor_path(run_dir: &Path, node: usize, generation: u32) -> PathBuf {
+    run_dir.join(format!("node-{node}.{generation}.json"))
 }
 
 impl Plan {
@@ -157,19 +207,52 @@ impl Plan {
         })
     }
 
-    /// Number of input edges of all nodes before node `node`.
-    pub(crate) fn edges_before(&self, node: usize) -> usize {
-        self.nodes[..node].iter().map(|node| node.inputs.len()).sum()
+    /// Number of input edges set aside for all nodes before node `node`.
+    fn edges_before(&self, node: usize) -> usize {
+        self.nodes[..node].iter().map(NodePlan::edges).sum()
     }
 
-    /// Number of input edges in the whole run.
+    /// Number of input edges set aside for the processes of one seat.
     pub(crate) fn edge_count(&self) -> usize {
         self.edges_before(self.nodes.len())
     }
 
-    /// The edges that carry topic `topic`, as indices into all input edges.
-    pub(crate) fn edges_of_topic(&self, topic: usize) -> Vec<usize> {
-        let inputs = self.nodes.iter().flat_map(|node| &node.inputs);
-        inputs.enumerate().filter(|(_, input)| input.topic == topic).map(|(edge, _)| edge).collect()
+    /// The number of the edge of input `input` of the process in seat `member`.
+    pub(crate) fn edge(&self, member: usize, input: usize) -> usize {
+        let (seat, node) = (member / self.nodes.len(), member % self.nodes.len());
+        seat * self.edge_count() + self.edges_before(node) + input
+    }
+
+    /// The place of generation `generation` of node `node` among the members of the run: each node has two
+    /// seats, so that a successor can join while its predecessor flies.
+    #[must_use]
+    pub fn member(&self, node: usize, generation: u32) -> usize {
+        (generation as usize % SEATS) * self.nodes.len() + node
+    }
+
+    /// How the queues of topic `topic` are sized: a queue holds what a publisher can send before the slowest
+    /// node holds the grant back.
+    pub(crate) fn capacity(&self, topic: usize) -> Capacity {
+        let reads = |node: &&NodePlan| node.inputs.iter().any(|input| input.topic == topic);
+        let longest_period = self.nodes.iter().map(|node| node.period_ticks).max().unwrap_or(1);
+        let ticks = u64::from(self.window_ticks) + u64::from(longest_period);
+        let samples = ticks.div_ceil(u64::from(self.topics[topic].period_ticks)) + 2;
+        let queued_samples = usize::try_from(samples).unwrap_or(usize::MAX);
+        // Who joins at a tick boundary needs the newest sample; who takes the place of a crashed process
+        // needs all that was sent since.
+        let restarts = self.nodes.iter().filter(reads).any(|node| node.restarts);
+        Capacity {
+            queued_samples,
+            history_samples: if restarts { queued_samples } else { 1 },
+            // Each reader and its successor, and a successor of the publisher.
+            subscribers: SEATS * self.nodes.iter().filter(reads).count() + 1,
+            nodes: SEATS * self.nodes.len() + 1,
+        }
+    }
+
+    /// The node that publishes topic `topic`.
+    #[must_use]
+    pub fn publisher(&self, topic: usize) -> Option<usize> {
+        self.nodes.iter().position(|node| node.outputs.iter().any(|output| output.topic == topic))
     }
 }

@@ -8,20 +8,71 @@ use crate::plan::{InputPlan, OutputPlan, TopicPlan};
 use crate::schema::Schema;
 use crate::transport::{Loan, Received, Receiver, SampleHeader, Sender};
 
+/// The samples of a topic from one generation of its publisher.
+#[derive(Debug)]
+pub(crate) struct Source {
+    pub(crate) generation: u32,
+    receiver: Receiver,
+    /// The sequence number of the next sample.
+    next_sequence: u64,
+    /// Whether what was received so far may be older than the next sample: the history that a subscriber gets
+    /// which joins later.
+    has_history: bool,
+}
+
+impl Source {
+    /// A source whose first sample is that of the first due tick from `first_tick` on.
+    pub(crate) fn new(generation: u32, receiver: Receiver, first_tick: u32, period_ticks: u32) -> Self {
+        let next_sequence = u64::from(first_tick.div_ceil(period_ticks));
+        Self { generation, receiver, next_sequence, has_history: true }
+    }
+
+    /// A source for a process that joins at `tick`: it gets the newest sample of that tick's limit first.
+    pub(crate) fn joined(generation: u32, receiver: Receiver, limit: Option<u32>, period_ticks: u32) -> Self {
+        let next_sequence = limit.map_or(0, |limit| u64::from(limit / period_ticks));
+        Self { generation, receiver, next_sequence, has_history: true }
+    }
+
+    /// The next sample, if it is there; the error is what was found instead.
+    fn next(&mut self, period_ticks: u32) -> Result<Option<Received>, String> {
+        loop {
+            let Some(sample) = self.receiver.receive()? else { return Ok(None) };
+            let header = sample.header();
+            if self.has_history && header.sequence < self.next_sequence {
+                continue;
+            }
+            self.has_history = false;
+            if header.sequence != self.next_sequence
+                || header.tick != header.sequence * u64::from(period_ticks)
+            {
+                return Err(format!("{} (of tick {})", header.sequence, header.tick));
+            }
+            self.next_sequence += 1;
+            return Ok(Some(sample));
+        }
+    }
+}
+
 /// A connected input.
 #[derive(Debug)]
 pub(crate) struct InPort {
-    // The sample before the receiver: it goes back to the publisher while the connection still stands.
+    // Samples before the receivers: they go back to the publisher while the connection still stands.
     current: Option<Received>,
-    receiver: Receiver,
+    shadow: Option<Received>,
+    active: Source,
+    /// The process that shadows the publisher, and whose samples count from `take_over_tick` on.
+    successor: Option<Source>,
+    take_over_tick: u32,
     initial: Option<Box<[u64]>>,
-    expected_sequence: u64,
     topic_name: String,
     size: usize,
     topic_period_ticks: u32,
+    /// Whether the node reads the shadow samples too, and so waits for them.
+    pub(crate) reads_shadow: bool,
     pub(crate) topic: usize,
     pub(crate) delay_ticks: u32,
-    pub(crate) edge: Edge,
+    /// The number of the edge.
+    pub(crate) edge: usize,
 }
 
 impl InPort {
@@ -29,54 +80,118 @@ impl InPort {
         input: &InputPlan,
         topic: &TopicPlan,
         size: usize,
-        edge: Edge,
+        edge: usize,
         initial: Option<Box<[u64]>>,
-        receiver: Receiver,
+        active: Source,
     ) -> Self {
         Self {
             current: None,
-            receiver,
+            shadow: None,
+            active,
+            successor: None,
+            take_over_tick: u32::MAX,
             initial,
-            expected_sequence: 0,
             topic_name: topic.name.clone(),
             size,
             topic_period_ticks: topic.period_ticks,
+            reads_shadow: false,
             topic: input.topic,
             delay_ticks: input.delay_ticks,
             edge,
         }
     }
 
+    /// The newest generation that this input is connected to.
+    pub(crate) fn newest_generation(&self) -> u32 {
+        self.successor.as_ref().unwrap_or(&self.active).generation
+    }
+
+    /// The tick whose sample `tick` reads, unless that lies before the run.
+    pub(crate) fn limit(&self, tick: u32) -> Option<u32> {
+        tick.checked_sub(self.delay_ticks)
+    }
+
+    /// Connects the publisher's successor, or another one, or none.
+    pub(crate) fn set_successor(&mut self, successor: Option<Source>) {
+        self.shadow = None;
+        self.successor = successor;
+        self.take_over_tick = u32::MAX;
+    }
+
+    /// Has the successor's samples count from `tick` on.
+    pub(crate) fn set_take_over_tick(&mut self, tick: u32) {
+        if self.successor.is_some() {
+            self.take_over_tick = tick;
+        }
+    }
+
+    /// Whether a shadow sample is due at `tick` that the node waits for.
+    pub(crate) fn awaits_shadow(&self, tick: u32) -> bool {
+        self.reads_shadow && self.successor.is_some() && tick < self.take_over_tick
+    }
+
     /// Makes the newest sample stamped at or before `tick` minus the delay the current one.
     pub(crate) fn take(&mut self, tick: u32, node: &str) -> Result<(), BusError> {
-        let Some(limit) = tick.checked_sub(self.delay_ticks) else { return Ok(()) };
+        let Some(limit) = self.limit(tick) else { return Ok(()) };
         // The samples between the current one and the newest are received too, so that gaps show.
         let newest_sequence = u64::from(limit / self.topic_period_ticks);
-        while self.expected_sequence <= newest_sequence {
-            let sample = self.receive(tick, node)?;
-            self.current = Some(sample);
+        self.pass_take_over(newest_sequence);
+        while self.active.next_sequence <= newest_sequence {
+            let expected = self.active.next_sequence;
+            let next = self.active.next(self.topic_period_ticks).transpose();
+            let next = next.unwrap_or_else(|| Err("nothing".to_owned()));
+            self.current = Some(next.map_err(|found| self.gap(node, tick, expected, found))?);
+            self.pass_take_over(newest_sequence);
+        }
+        self.take_shadow(newest_sequence).map_err(|(expected, found)| self.gap(node, tick, expected, found))
+    }
+
+    /// As [`InPort::take`], without insisting on the newest sample: it may not have been sent yet.
+    pub(crate) fn take_available(&mut self, tick: u32, node: &str) -> Result<(), BusError> {
+        let newest_sequence = self.limit(tick).map_or(0, |limit| u64::from(limit / self.topic_period_ticks));
+        while self.active.next_sequence <= newest_sequence {
+            let expected = self.active.next_sequence;
+            match self.active.next(self.topic_period_ticks) {
+                Ok(Some(sample)) => self.current = Some(sample),
+                Ok(None) => break,
+                Err(found) => return Err(self.gap(node, tick, expected, found)),
+            }
         }
         Ok(())
     }
 
-    fn receive(&mut self, tick: u32, node: &str) -> Result<Received, BusError> {
-        let gap = |expected, found| BusError::Gap {
-            node: node.to_owned(),
-            topic: self.topic_name.clone(),
-            tick,
-            expected,
-            found,
-        };
-        let received = self.receiver.receive().map_err(|error| gap(self.expected_sequence, error))?;
-        let sample = received.ok_or_else(|| gap(self.expected_sequence, "nothing".to_owned()))?;
-        let header = sample.header();
-        let expected_tick = self.expected_sequence * u64::from(self.topic_period_ticks);
-        if header.sequence != self.expected_sequence || header.tick != expected_tick {
-            let found = format!("{} (of tick {})", header.sequence, header.tick);
-            return Err(gap(self.expected_sequence, found));
+    /// Turns to the successor when the next sample is one of those that count.
+    fn pass_take_over(&mut self, newest_sequence: u64) {
+        let first = u64::from(self.take_over_tick.div_ceil(self.topic_period_ticks));
+        if self.take_over_tick == u32::MAX || newest_sequence < first || self.active.next_sequence < first {
+            return;
         }
-        self.expected_sequence += 1;
-        Ok(sample)
+        if let Some(mut successor) = self.successor.take() {
+            self.shadow = None;
+            self.take_over_tick = u32::MAX;
+            // A node that does not read the shadow may have left some of it in the queue.
+            successor.has_history |= successor.next_sequence < first;
+            successor.next_sequence = successor.next_sequence.max(first);
+            self.active = successor;
+        }
+    }
+
+    /// Receives what the successor has sent so far, so that its queue cannot run full; the error is the
+    /// sequence number that was due, and what was found.
+    fn take_shadow(&mut self, newest_sequence: u64) -> Result<(), (u64, String)> {
+        let Some(successor) = &mut self.successor else { return Ok(()) };
+        while successor.next_sequence <= newest_sequence {
+            let expected = successor.next_sequence;
+            match successor.next(self.topic_period_ticks).map_err(|found| (expected, found))? {
+                Some(sample) => self.shadow = Some(sample),
+                None => break,
+            }
+        }
+        Ok(())
+    }
+
+    fn gap(&self, node: &str, tick: u32, expected: u64, found: String) -> BusError {
+        BusError::Gap { node: node.to_owned(), topic: self.topic_name.clone(), tick, expected, found }
     }
 
     /// The current sample, or the initial value.
@@ -91,6 +206,11 @@ impl InPort {
         }
     }
 
+    /// The current sample, if there is one.
+    pub(crate) fn sample(&self) -> Option<&[u64]> {
+        self.current.as_ref().map(Received::words)
+    }
+
     pub(crate) fn host_times_ns(&self) -> [u64; 3] {
         let header = self.current.as_ref().map(|sample| *sample.header()).unwrap_or_default();
         [header.received_ns, header.done_ns, header.sent_ns]
@@ -98,7 +218,16 @@ impl InPort {
 
     /// The current sample as CDR bytes with its sequence number, if it was sent at `tick`.
     pub(crate) fn fresh(&self, tick: u32) -> Option<(&[u8], u64)> {
-        let sample = self.current.as_ref().filter(|sample| sample.header().tick == u64::from(tick))?;
+        self.cdr(self.current.as_ref(), tick)
+    }
+
+    /// The same of the process that shadows the publisher.
+    pub(crate) fn fresh_shadow(&self, tick: u32) -> Option<(&[u8], u64)> {
+        self.cdr(self.shadow.as_ref(), tick)
+    }
+
+    fn cdr<'a>(&self, sample: Option<&'a Received>, tick: u32) -> Option<(&'a [u8], u64)> {
+        let sample = sample.filter(|sample| sample.header().tick == u64::from(tick))?;
         Some((cdr_bytes(sample.words(), self.size), sample.header().sequence))
     }
 }
@@ -110,37 +239,43 @@ pub(crate) struct OutPort {
     loan: Option<Loan>,
     is_written: bool,
     sender: Sender,
-    sequence: u64,
     port: String,
     stamp_offset: Option<usize>,
     pub(crate) topic: usize,
     pub(crate) period_ticks: u32,
+    /// The tick from which on the samples count; before it they are a shadow's.
+    pub(crate) counts_from: u32,
+    /// The tick from which on samples are sent at all.
+    pub(crate) sends_from: u32,
+    /// Those who wait for the samples that count, and those who wait for the shadow's.
     pub(crate) readers: Vec<Edge>,
+    pub(crate) shadow_readers: Vec<Edge>,
 }
 
 impl OutPort {
-    pub(crate) fn new(
-        output: &OutputPlan,
-        topic: &TopicPlan,
-        schema: &Schema,
-        sender: Sender,
-        readers: Vec<Edge>,
-    ) -> Self {
+    pub(crate) fn new(output: &OutputPlan, topic: &TopicPlan, schema: &Schema, sender: Sender) -> Self {
         Self {
             loan: None,
             is_written: false,
             sender,
-            sequence: 0,
             port: output.port.clone(),
             stamp_offset: schema.stamp_offset(),
             topic: output.topic,
             period_ticks: topic.period_ticks,
-            readers,
+            counts_from: 0,
+            sends_from: 0,
+            readers: Vec::new(),
+            shadow_readers: Vec::new(),
         }
     }
 
     pub(crate) fn is_due(&self, tick: u32) -> bool {
         tick.is_multiple_of(self.period_ticks)
+    }
+
+    /// Whether a sample is sent at `tick`.
+    pub(crate) fn is_sent(&self, tick: u32) -> bool {
+        self.is_due(tick) && tick >= self.sends_from
     }
 
     /// The words of this tick's sample.
@@ -151,6 +286,11 @@ impl OutPort {
             Some(loan) => Ok(loan.words()),
             None => unreachable!("the loan was taken above"),
         }
+    }
+
+    /// Sees to it that a subscriber that joined gets the newest samples before the next one is sent.
+    pub(crate) fn meet_subscribers(&self, node: &str) -> Result<(), BusError> {
+        self.sender.meet_subscribers().map_err(|reason| self.error("meeting subscribers", node, reason))
     }
 
     /// Forgets what was written at a tick at which nothing was due.
@@ -183,9 +323,8 @@ impl OutPort {
         if let Some(offset) = self.stamp_offset {
             stamp(loan.words(), offset, time_ns);
         }
-        let header =
-            SampleHeader { tick: u64::from(tick), sequence: self.sequence, received_ns, done_ns, sent_ns };
-        self.sequence += 1;
+        let sequence = u64::from(tick / self.period_ticks);
+        let header = SampleHeader { tick: u64::from(tick), sequence, received_ns, done_ns, sent_ns };
         loan.send(header).map_err(|reason| self.error("sending", node, reason))
     }
 

@@ -4,8 +4,11 @@ use crate::error::BusError;
 use rustix::process::{Signal, getppid, set_parent_process_death_signal};
 use rustix::thread::{CpuSet, sched_getaffinity, sched_setaffinity};
 use std::fs::{File, TryLockError};
+use std::io;
 use std::os::unix::fs::OpenOptionsExt;
+use std::os::unix::process::CommandExt;
 use std::path::{Path, PathBuf};
+use std::process::Command;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, OnceLock};
 
@@ -94,19 +97,69 @@ pub fn stay_on(cpu: Option<usize>) {
 /// On a core that the nodes of a loop share, an interrupted waker needs the core once more before it can
 /// sleep; measured, a tick of the hover run takes 4.0 context switches this way and 5.7 without.
 pub(crate) fn wait_for_turn() {
+    // SAFETY: the call takes a number and touches no memory.
+    if unsafe { libc::sched_getscheduler(0) } != libc::SCHED_OTHER {
+        // The launcher has given it a policy of its own.
+        return;
+    }
+    // SAFETY: the call takes and returns numbers. A process that was given a real-time priority keeps it.
+    if unsafe { libc::sched_getscheduler(0) } != libc::SCHED_OTHER {
+        return;
+    }
     let parameters = libc::sched_param { sched_priority: 0 };
     // SAFETY: the call reads one `sched_param` that lives across it. A refusal leaves the policy as it
     // was, which costs speed only.
     let _ = unsafe { libc::sched_setscheduler(0, libc::SCHED_BATCH, &raw const parameters) };
 }
 
-/// A signal as people know it: its name, and the number that other programs may print.
-#[must_use]
-pub fn signal_name(number: i32) -> String {
-    match signal_hook::low_level::signal_name(number) {
-        Some(name) => format!("signal {number} ({name})"),
-        None => format!("signal {number}"),
+/// Gives process `pid` a niceness, -20 to 19.
+///
+/// # Errors
+/// What the system says, where it does not allow it.
+pub fn set_nice(pid: u32, nice: i32) -> io::Result<()> {
+    let pid = i32::try_from(pid).ok().and_then(rustix::process::Pid::from_raw);
+    Ok(rustix::process::setpriority_process(pid, nice)?)
+}
+
+/// Gives process `pid` a priority under `SCHED_FIFO`, 1 to 99.
+///
+/// # Errors
+/// What the system says, where it does not allow it.
+pub fn set_fifo(pid: u32, priority: i32) -> io::Result<()> {
+    let parameters = libc::sched_param { sched_priority: priority };
+    let pid = libc::pid_t::try_from(pid).map_err(io::Error::other)?;
+    // SAFETY: the call reads one `sched_param` that lives across it.
+    match unsafe { libc::sched_setscheduler(pid, libc::SCHED_FIFO, &raw const parameters) } {
+        0 => Ok(()),
+        _ => Err(io::Error::last_os_error()),
     }
+}
+
+/// Has the kernel kill what `command` starts when this process dies: for executables that know nothing of a
+/// launcher.
+pub fn die_with_this_one(command: &mut Command) {
+    let launcher = rustix::process::getpid();
+    let bind = move || {
+        set_parent_process_death_signal(Some(Signal::KILL))?;
+        // The launcher may have died before the line above; then nobody would ever send that signal.
+        if getppid() == Some(launcher) { Ok(()) } else { Err(io::ErrorKind::NotFound.into()) }
+    };
+    // SAFETY: between fork and exec the closure makes two system calls and touches no lock and no heap.
+    unsafe { command.pre_exec(bind) };
+}
+
+/// Keeps all memory of this process, now and from now on, from being paged out.
+///
+/// # Errors
+/// If the system does not allow this much; the error names the right.
+pub(crate) fn lock_memory() -> Result<(), BusError> {
+    let all = rustix::mm::MlockAllFlags::CURRENT | rustix::mm::MlockAllFlags::FUTURE;
+    rustix::mm::mlockall(all).map_err(|error| BusError::Denied {
+        action: "lock the memory of this process (run.lock_memory)",
+        source: error.into(),
+        advice: "give it the capability CAP_IPC_LOCK or raise the limit on locked memory (`ulimit -l`, \
+                 `memlock` in limits.conf, `LimitMEMLOCK=` in systemd)",
+    })
 }
 
 /// Kills every process of the group that process `leader` leads.
@@ -128,4 +181,11 @@ pub fn allowed_cores() -> Vec<usize> {
 #[must_use]
 pub fn user_id() -> u32 {
     rustix::process::getuid().as_raw()
+}
+
+/// A signal as people know it, such as `signal 9 (SIGKILL)`.
+#[must_use]
+pub fn signal_name(signal: i32) -> String {
+    let name = signal_hook::low_level::signal_name(signal);
+    name.map_or_else(|| format!("signal {signal}"), |name| format!("signal {signal} ({name})"))
 }

@@ -6,11 +6,13 @@
 use crate::control::shm_prefix;
 use crate::error::BusError;
 use crate::message::{ENCAPSULATION_WORD, sample_words};
+use iceoryx2::node::NodeState;
 use iceoryx2::port::publisher::Publisher;
 use iceoryx2::port::subscriber::Subscriber;
+use iceoryx2::port::update_connections::UpdateConnections as _;
 use iceoryx2::prelude::{
-    BackpressureStrategy, Config, FileName, LogLevel, NodeBuilder, Path as IoxPath, SemanticString,
-    ServiceName, SignalHandlingMode, ZeroCopySend, ipc, set_log_level,
+    BackpressureStrategy, CallbackProgression, Config, FileName, LogLevel, NodeBuilder, Path as IoxPath,
+    SemanticString, ServiceName, SignalHandlingMode, ZeroCopySend, ipc, set_log_level,
 };
 use iceoryx2::sample::Sample;
 use iceoryx2::sample_mut::SampleMut;
@@ -22,7 +24,7 @@ type Service = ipc::Service;
 type Factory = PortFactory<Service, [u64], SampleHeader>;
 type Iceoryx2Node = iceoryx2::node::Node<Service>;
 
-/// Samples a subscriber holds at a time: the the current one and the one that replaces it.
+/// Samples a subscriber holds at a time: the current one and the one that replaces it.
 const BORROWED_SAMPLES: usize = 2;
 
 /// What travels beside a sample: its place in the run, and host times that no recording holds.
@@ -53,30 +55,56 @@ pub(crate) struct Transport {
 pub(crate) struct Capacity {
     /// Samples that wait in a subscriber's queue at most.
     pub(crate) queued_samples: usize,
+    /// Samples that a publisher keeps for a subscriber that joins later.
+    pub(crate) history_samples: usize,
     /// Subscribers of the topic.
     pub(crate) subscribers: usize,
     /// Processes of the run.
     pub(crate) nodes: usize,
 }
 
+/// The configuration of the run `run_id`, whose directory is `run_dir`; the error is iceoryx2's.
+fn config(run_dir: &Path, run_id: &str) -> Result<Config, String> {
+    set_log_level(LogLevel::Error);
+    let root = run_dir.join("iceoryx2");
+    let mut config = Config::default();
+    config.global.set_root_path(
+        &IoxPath::new(root.as_os_str().as_encoded_bytes()).map_err(|error| format!("{root:?}: {error:?}"))?,
+    );
+    config.global.prefix =
+        FileName::new(shm_prefix(run_id).as_bytes()).map_err(|error| format!("{error:?}"))?;
+    // Dead processes are the launcher's business; looking for them here would only slow the start.
+    config.global.node.cleanup_dead_nodes_on_creation = false;
+    config.global.node.cleanup_dead_nodes_on_destruction = false;
+    config.global.service.cleanup_dead_nodes_on_open = false;
+    Ok(config)
+}
+
+/// Gives back what dead processes of the run hold: their ports and their shared memory.
+///
+/// # Errors
+/// iceoryx2's words.
+pub fn reap_dead(run_dir: &Path, run_id: &str) -> Result<(), String> {
+    let config = config(run_dir, run_id)?;
+    let mut failure = None;
+    iceoryx2::node::Node::<Service>::list(&config, |state| {
+        if let NodeState::Dead(view) = state
+            && let Err(error) = view.try_remove_stale_resources()
+        {
+            failure = Some(format!("{error:?}"));
+        }
+        CallbackProgression::Continue
+    })
+    .map_err(|error| format!("{error:?}"))?;
+    failure.map_or(Ok(()), Err)
+}
+
 impl Transport {
     /// Connects node `node_name` to the run `run_id`, whose directory is `run_dir`.
     pub(crate) fn new(run_dir: &Path, run_id: &str, node_name: &str) -> Result<Self, BusError> {
-        set_log_level(LogLevel::Error);
         let fail =
             |reason: String| transport_error(node_name, "joining the shared memory of the run", reason);
-        let root = run_dir.join("iceoryx2");
-        let mut config = Config::default();
-        config.global.set_root_path(
-            &IoxPath::new(root.as_os_str().as_encoded_bytes())
-                .map_err(|error| fail(format!("{root:?}: {error:?}")))?,
-        );
-        config.global.prefix =
-            FileName::new(shm_prefix(run_id).as_bytes()).map_err(|e| fail(format!("{e:?}")))?;
-        // Dead processes are the launcher's business; looking for them here would only slow the start.
-        config.global.node.cleanup_dead_nodes_on_creation = false;
-        config.global.node.cleanup_dead_nodes_on_destruction = false;
-        config.global.service.cleanup_dead_nodes_on_open = false;
+        let config = config(run_dir, run_id).map_err(fail)?;
         let node = NodeBuilder::new()
             .config(&config)
             .signal_handling_mode(SignalHandlingMode::Disabled)
@@ -86,19 +114,22 @@ impl Transport {
         Ok(Self { node, node_name: node_name.to_owned() })
     }
 
-    fn service(&self, topic: &str, capacity: Capacity) -> Result<Factory, BusError> {
+    /// The service of a topic's samples from one generation of its publisher. Each generation has its own:
+    /// who reads the topic knows for each tick whose sample counts.
+    fn service(&self, topic: &str, generation: u32, capacity: Capacity) -> Result<Factory, BusError> {
         let fail =
             |reason: String| transport_error(&self.node_name, &format!("opening topic {topic}"), reason);
-        let name = ServiceName::new(topic).map_err(|error| fail(format!("{error:?}")))?;
+        let name =
+            ServiceName::new(&format!("{topic}@{generation}")).map_err(|error| fail(format!("{error:?}")))?;
         self.node
             .service_builder(&name)
             .publish_subscribe::<[u64]>()
             .user_header::<SampleHeader>()
-            // Nothing may be lost: a full queue must hold its sender up, not overwrite.
+            // Nothing may be overwritten. The window keeps queues of living readers from running full.
             .enable_safe_overflow(false)
             .subscriber_max_buffer_size(capacity.queued_samples)
             .subscriber_max_borrowed_samples(BORROWED_SAMPLES)
-            .history_size(0)
+            .history_size(capacity.history_samples)
             .max_publishers(1)
             .max_subscribers(capacity.subscribers.max(1))
             .max_nodes(capacity.nodes)
@@ -107,13 +138,21 @@ impl Transport {
     }
 
     /// Creates the publisher of `topic`, whose messages have `size` bytes.
-    pub(crate) fn publisher(&self, topic: &str, size: usize, capacity: Capacity) -> Result<Sender, BusError> {
+    pub(crate) fn publisher(
+        &self,
+        topic: &str,
+        generation: u32,
+        size: usize,
+        capacity: Capacity,
+    ) -> Result<Sender, BusError> {
         let publisher = self
-            .service(topic, capacity)?
+            .service(topic, generation, capacity)?
             .publisher_builder()
             .initial_max_slice_len(sample_words(size))
             .max_loaned_samples(1)
-            .backpressure_strategy(BackpressureStrategy::RetryUntilDelivered)
+            // Only the queue of a reader that died or hangs can be full: nobody may wait for it. A living
+            // reader that lost a sample would miss its sequence number and stop the run.
+            .backpressure_strategy(BackpressureStrategy::DiscardData)
             .create()
             .map_err(|error| {
                 transport_error(
@@ -126,9 +165,14 @@ impl Transport {
     }
 
     /// Creates a subscriber of `topic`.
-    pub(crate) fn subscriber(&self, topic: &str, capacity: Capacity) -> Result<Receiver, BusError> {
+    pub(crate) fn subscriber(
+        &self,
+        topic: &str,
+        generation: u32,
+        capacity: Capacity,
+    ) -> Result<Receiver, BusError> {
         let subscriber = self
-            .service(topic, capacity)?
+            .service(topic, generation, capacity)?
             .subscriber_builder()
             .buffer_size(capacity.queued_samples)
             .create()
@@ -173,6 +217,11 @@ pub(crate) struct Sender {
 }
 
 impl Sender {
+    /// Meets the subscribers that have come, and hands them the history.
+    pub(crate) fn meet_subscribers(&self) -> Result<(), String> {
+        self.publisher.update_connections().map_err(|error| format!("{error:?}"))
+    }
+
     /// Takes a sample to write into; it may hold the bytes of an earlier sample.
     pub(crate) fn loan(&self) -> Result<Loan, String> {
         let sample = self.publisher.loan_slice_uninit(self.words).map_err(|error| format!("{error:?}"))?;
@@ -233,13 +282,13 @@ impl Received {
 #[cfg(test)]
 mod tests {
     use super::{Capacity, Receiver, SampleHeader, Sender, Transport};
-    use crate::control::{Edge, monotonic_ns, shm_prefix};
+    use crate::control::{monotonic_ns, shm_prefix};
     use crate::plan::{InputPlan, TopicPlan};
-    use crate::port::InPort;
+    use crate::port::{InPort, Source};
 
     const TOPIC: &str = "/plant/state";
     const SIZE: usize = 8;
-    const CAPACITY: Capacity = Capacity { queued_samples: 8, subscribers: 2, nodes: 4 };
+    const CAPACITY: Capacity = Capacity { queued_samples: 8, history_samples: 1, subscribers: 2, nodes: 4 };
 
     /// A run of this test's own; its files go with it.
     struct Run {
@@ -279,17 +328,17 @@ mod tests {
             type_name: "test_msgs/msg/State".to_owned(),
             period_ticks: 1,
         };
-        InPort::new(&input, &topic, SIZE, Edge::Input(0), None, receiver)
+        InPort::new(&input, &topic, SIZE, 0, None, Source::joined(0, receiver, Some(0), 1))
     }
 
     #[test]
     fn a_second_publisher_of_a_topic_is_refused() {
         let run = Run::new();
         let (plant, rogue) = (run.join("plant"), run.join("rogue"));
-        let sender = plant.publisher(TOPIC, SIZE, CAPACITY).unwrap();
-        let mut port = port(run.join("imu").subscriber(TOPIC, CAPACITY).unwrap());
+        let sender = plant.publisher(TOPIC, 0, SIZE, CAPACITY).unwrap();
+        let mut port = port(run.join("imu").subscriber(TOPIC, 0, CAPACITY).unwrap());
         send(&sender, 0);
-        let error = rogue.publisher(TOPIC, SIZE, CAPACITY).unwrap_err().to_string();
+        let error = rogue.publisher(TOPIC, 0, SIZE, CAPACITY).unwrap_err().to_string();
         assert!(error.contains("node `rogue`: publishing on topic /plant/state failed"), "{error}");
         send(&sender, 1);
         port.take(1, "imu").unwrap();
@@ -299,12 +348,12 @@ mod tests {
     fn samples_of_another_publisher_in_the_place_of_a_dead_one_are_named() {
         let run = Run::new();
         let (plant, rogue) = (run.join("plant"), run.join("rogue"));
-        let sender = plant.publisher(TOPIC, SIZE, CAPACITY).unwrap();
-        let mut port = port(run.join("imu").subscriber(TOPIC, CAPACITY).unwrap());
+        let sender = plant.publisher(TOPIC, 0, SIZE, CAPACITY).unwrap();
+        let mut port = port(run.join("imu").subscriber(TOPIC, 0, CAPACITY).unwrap());
         send(&sender, 0);
         port.take(0, "imu").unwrap();
         drop(sender);
-        send(&rogue.publisher(TOPIC, SIZE, CAPACITY).unwrap(), 0);
+        send(&rogue.publisher(TOPIC, 0, SIZE, CAPACITY).unwrap(), 0);
         let error = port.take(1, "imu").unwrap_err().to_string();
         assert!(error.contains("node `imu`, topic /plant/state, tick 1"), "{error}");
         assert!(error.contains("another process publishes on the topic"), "{error}");
@@ -314,7 +363,7 @@ mod tests {
     fn no_file_of_a_run_is_open_to_other_users() {
         use std::os::unix::fs::PermissionsExt;
         let run = Run::new();
-        let _sender = run.join("plant").publisher(TOPIC, SIZE, CAPACITY).unwrap();
+        let _sender = run.join("plant").publisher(TOPIC, 0, SIZE, CAPACITY).unwrap();
         let prefix = shm_prefix(&run.id);
         let files = std::fs::read_dir("/dev/shm").unwrap().flatten();
         let own: Vec<_> =

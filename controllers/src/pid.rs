@@ -56,10 +56,14 @@ fn run() -> Result<(), BusError> {
     let output = node.output::<MotorCommand>("command")?;
     let (law, allocation, vehicle) =
         build(&node.parameters()?, node.period_s()).map_err(|error| node.error(error))?;
-    let mut memory = PidState::default();
-    node.run(|tick| {
+    node.run_with_state(PidState::default(), |tick, memory| {
         let measured = measurement(tick.get(attitude), tick.get(altitude));
-        let wrench = law.step(&mut memory, &asked(tick.get(set_point)), &measured);
+        let set_point = asked(tick.get(set_point));
+        if let Some(last) = tick.predecessor(output) {
+            let speeds_rad_s = last.command.map(|command| vehicle.command.speed(command));
+            *memory = law.tracking(&allocation.wrench(&speeds_rad_s), &set_point, &measured);
+        }
+        let wrench = law.step(memory, &set_point, &measured);
         let allocated = allocation.allocate(&wrench);
         let command = allocated.speeds_rad_s.map(|speed| vehicle.command.command(speed));
         tick.write(output, MotorCommand { command, ..Default::default() })

@@ -80,15 +80,21 @@ pub struct PidLaw {
 ///
 /// They are kept as accelerations, not as integrals of the error, so that a successor with other gains
 /// takes over without a jump.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, bus::Message)]
+#[repr(C)]
+#[message(type_name = "hummingbus_msgs/msg/PidState")]
 pub struct PidState {
     /// Vertical acceleration that the altitude's integrator asks for, m/s².
+    #[field(unit = "m/s^2", frame = "world")]
     pub altitude_m_s2: f64,
     /// Angular acceleration about body x that the roll's integrator asks for, rad/s².
+    #[field(unit = "rad/s^2", frame = "body")]
     pub roll_rad_s2: f64,
     /// The same about body y for pitch, rad/s².
+    #[field(unit = "rad/s^2", frame = "body")]
     pub pitch_rad_s2: f64,
     /// The same about body z for yaw, rad/s².
+    #[field(unit = "rad/s^2", frame = "body")]
     pub yaw_rad_s2: f64,
 }
 
@@ -98,6 +104,25 @@ impl PidLaw {
         Wrench {
             thrust_N: self.thrust_N(state, set_point.altitude_m, measured),
             torque_B_N_m: self.torque_B_N_m(state, set_point, measured),
+        }
+    }
+
+    /// The memory with which the law asks for `wrench` at this measurement, as far as the limits of its
+    /// integrators allow: a successor that knows only its predecessor's last command goes on from that.
+    #[must_use]
+    pub fn tracking(&self, wrench: &Wrench, set_point: &SetPoint, measured: &Measurement) -> PidState {
+        let forgetful = Self { period_s: 0.0, ..*self };
+        let asked = forgetful.step(&mut PidState::default(), set_point, measured);
+        let missing_N = (wrench.thrust_N - asked.thrust_N) * tilt_cosine(measured);
+        let missing_B_rad_s2 =
+            (wrench.torque_B_N_m - asked.torque_B_N_m).component_div(&self.vehicle.inertia_B_kg_m2);
+        let within = |value: f64, max: f64| value.clamp(-max, max);
+        let attitude = |value: f64| within(value, self.gains.attitude_integral_max_rad_s2);
+        PidState {
+            altitude_m_s2: within(missing_N / self.vehicle.mass_kg, self.gains.altitude_integral_max_m_s2),
+            roll_rad_s2: attitude(missing_B_rad_s2.x),
+            pitch_rad_s2: attitude(missing_B_rad_s2.y),
+            yaw_rad_s2: attitude(missing_B_rad_s2.z),
         }
     }
 
@@ -217,6 +242,17 @@ mod tests {
         for _ in 0..1000 {
             law.step(state, &hold(), measured);
         }
+    }
+
+    #[test]
+    fn a_law_that_tracks_a_wrench_asks_for_it() {
+        let wrench = Wrench { thrust_N: 5.2, torque_B_N_m: Vector3::new(1e-3, -2e-3, 1e-3) };
+        let measured = Measurement { roll_rad: 0.05, altitude_m: 0.99, ..level() };
+        let memory = law().tracking(&wrench, &hold(), &measured);
+        let still = PidLaw { period_s: 0.0, ..law() };
+        let asked = still.step(&mut memory.clone(), &hold(), &measured);
+        assert!((asked.thrust_N - wrench.thrust_N).abs() < 1e-12);
+        assert!((asked.torque_B_N_m - wrench.torque_B_N_m).norm() < 1e-15);
     }
 
     #[test]

@@ -2,6 +2,7 @@
 
 use crate::error::RecordingError;
 use crate::writer::{ChannelId, RecordingWriter};
+use bus::announcement::Announcement;
 use bus::kind::{Inputs, NodeKind, read_parameters};
 use bus::{BusError, ConnectedNode, Node, RawInput, Tick};
 use serde::Deserialize;
@@ -31,6 +32,10 @@ pub struct AttachedFile {
     pub path: PathBuf,
 }
 
+/// What stands in front of a topic's name where the samples of a process are recorded that shadows its
+/// publisher.
+pub const SHADOW_PREFIX: &str = "/shadow";
+
 /// The recorder, for manifests.
 pub const KIND: NodeKind = NodeKind {
     name: "recorder",
@@ -55,7 +60,20 @@ pub fn run() -> Result<(), BusError> {
     let failed =
         |error: RecordingError| BusError::Parameters { node: name.clone(), reason: error.to_string() };
     let (mut writer, channels) = open(&parameters, &node, &inputs).map_err(failed)?;
-    let end = node.run(|tick| record(&mut writer, &inputs, &channels, tick, flush_ticks));
+    // A shadow's channel is added with its first sample, whose tick is a function of the run.
+    let types: Vec<(String, Announcement)> = inputs
+        .iter()
+        .map(|&input| {
+            let (topic, announcement) = node.announcement(input);
+            (format!("{SHADOW_PREFIX}{topic}"), announcement.clone())
+        })
+        .collect();
+    let mut shadows: Vec<Option<ChannelId>> = vec![None; inputs.len()];
+    let end = node.run(|tick| {
+        record(&mut writer, &inputs, &channels, tick)?;
+        record_shadows(&mut writer, &inputs, &types, &mut shadows, tick)?;
+        if tick.number() % flush_ticks == flush_ticks - 1 { writer.flush() } else { writer.end_tick() }
+    });
     // Also a run that failed leaves a whole file of what was recorded.
     let finished = writer.finish().map_err(failed);
     match end {
@@ -99,12 +117,30 @@ fn record(
     inputs: &[RawInput],
     channels: &[ChannelId],
     tick: &Tick<'_>,
-    flush_ticks: u32,
 ) -> Result<(), RecordingError> {
     for (&input, &channel) in inputs.iter().zip(channels) {
         if let Some((cdr, _)) = tick.fresh(input) {
             writer.write(channel, tick.number(), tick.time_ns(), cdr)?;
         }
     }
-    if tick.number() % flush_ticks == flush_ticks - 1 { writer.flush() } else { writer.end_tick() }
+    Ok(())
+}
+
+/// Writes what a process sends that shadows the publisher of an input.
+fn record_shadows(
+    writer: &mut RecordingWriter,
+    inputs: &[RawInput],
+    types: &[(String, Announcement)],
+    channels: &mut [Option<ChannelId>],
+    tick: &Tick<'_>,
+) -> Result<(), RecordingError> {
+    for ((&input, (topic, announcement)), channel) in inputs.iter().zip(types).zip(channels) {
+        let Some((cdr, _)) = tick.fresh_shadow(input) else { continue };
+        let id = match *channel {
+            Some(id) => id,
+            None => *channel.insert(writer.add_channel(topic, announcement)?),
+        };
+        writer.write(id, tick.number(), tick.time_ns(), cdr)?;
+    }
+    Ok(())
 }

@@ -20,20 +20,55 @@ pub const KIND: NodeKind = NodeKind {
     run,
 };
 
+/// What the filter remembers, as it is handed over.
+#[derive(Clone, Copy, Message)]
+#[repr(C)]
+#[message(type_name = "hummingbus_msgs/msg/ComplementaryState")]
+struct Memory {
+    /// The estimated attitude, body to world.
+    #[field(frame = "world")]
+    attitude: Quaternion,
+    /// The last sample's angular rate; not a number before the first.
+    #[field(unit = "rad/s", frame = "body")]
+    last_angular_velocity: Vector3,
+}
+
+impl From<&ComplementaryState> for Memory {
+    fn from(state: &ComplementaryState) -> Self {
+        let [x, y, z, w] = state.attitude_WB.coords.into();
+        let rate_B_rad_s = state.last_angular_velocity_B_rad_s;
+        let last = rate_B_rad_s.map_or([f64::NAN; 3], <[f64; 3]>::from);
+        Self { attitude: Quaternion { x, y, z, w }, last_angular_velocity: last.into() }
+    }
+}
+
+impl From<&Memory> for ComplementaryState {
+    fn from(memory: &Memory) -> Self {
+        let Quaternion { x, y, z, w } = memory.attitude;
+        let last = nalgebra::Vector3::from(<[f64; 3]>::from(memory.last_angular_velocity));
+        Self {
+            // It was a unit quaternion: normalising it again would change its last bits.
+            attitude_WB: nalgebra::UnitQuaternion::new_unchecked(nalgebra::Quaternion::new(w, x, y, z)),
+            last_angular_velocity_B_rad_s: (!last.x.is_nan()).then_some(last),
+        }
+    }
+}
+
 fn run() -> Result<(), BusError> {
     let mut node = Node::join()?;
     let imu = node.input::<Imu>("imu")?;
     let output = node.output::<AttitudeEstimate>("estimate")?;
     let filter =
         Complementary::new(node.parameters()?, node.period_s()).map_err(|error| node.error(error))?;
-    let mut memory = ComplementaryState::default();
-    node.run(|tick| {
+    node.run_with_state(Memory::from(&ComplementaryState::default()), |tick, memory| {
         let imu = tick.get(imu);
         let reading = ImuReading {
             specific_force_B_m_s2: <[f64; 3]>::from(imu.specific_force).into(),
             angular_velocity_B_rad_s: <[f64; 3]>::from(imu.angular_velocity).into(),
         };
-        let estimate = filter.step(&mut memory, &reading);
+        let mut state = ComplementaryState::from(&*memory);
+        let estimate = filter.step(&mut state, &reading);
+        *memory = Memory::from(&state);
         let [x, y, z, w] = estimate.attitude_WB.coords.into();
         tick.write(
             output,

@@ -116,6 +116,22 @@ pub struct ImuState {
     random: Stream,
 }
 
+impl ImuState {
+    /// How far the random stream has been drawn, in words of 32 bits.
+    #[must_use]
+    pub fn random_words(&self) -> u128 {
+        self.random.get_word_pos()
+    }
+
+    /// Goes on at `words` of the random stream.
+    pub fn set_random_words(&mut self, words: u128) {
+        // Where it is there already, its block need not be computed again.
+        if self.random.get_word_pos() != words {
+            self.random.set_word_pos(words);
+        }
+    }
+}
+
 impl ImuModel {
     /// An IMU with `params` that is sampled `rate_hz` times a second (the node's own rate, that is the
     /// tick rate divided by its period).
@@ -247,6 +263,22 @@ mod tests {
         let reading = readings(params, "imu", 1)[0];
         assert_eq!(reading.specific_force_B_m_s2, Vector3::new(0.3 + 0.1, -0.2, 5.0));
         assert_eq!(reading.angular_velocity_B_rad_s, Vector3::new(0.1, -0.5, 0.02 + 0.03));
+    }
+
+    #[test]
+    fn a_state_that_is_restored_goes_on_as_the_one_it_was_taken_from() {
+        let model = ImuModel::new(ImuParams::default(), RATE_HZ).unwrap();
+        let mut first = model.initial_state(7, "imu");
+        for _ in 0..17 {
+            model.read(&mut first, &truth());
+        }
+        let mut second = model.initial_state(7, "imu");
+        second.accelerometer_bias_B_m_s2 = first.accelerometer_bias_B_m_s2;
+        second.gyroscope_bias_B_rad_s = first.gyroscope_bias_B_rad_s;
+        second.set_random_words(first.random_words());
+        for _ in 0..100 {
+            assert_eq!(model.read(&mut first, &truth()), model.read(&mut second, &truth()));
+        }
     }
 
     #[test]

@@ -92,12 +92,6 @@ fn the_recording_is_the_same_on_any_core() {
 }
 
 #[test]
-fn a_core_that_the_machine_does_not_have_changes_nothing() {
-    require_reference(2, &["--set", "process.plant.cpu=1000"]);
-    require_reference(2, &["--set", "process.plant.cpu=5000"]);
-}
-
-#[test]
 fn the_recording_is_the_same_on_a_loaded_machine() {
     let _load = Load::of_threads(4);
     require_reference(3, &[]);

@@ -4,23 +4,33 @@
 //! - [`recordings`]: recordings read back and compared
 //! - [`nodes`]: the processes that the tests put into runs
 //! - [`determinism`]: a run is a function of its manifest
+//! - [`live`]: runs that are watched and steered
+//! - [`clean`]: what dead runs left is removed, and nothing of live ones
+//! - [`terminal`]: a terminal for a program under test
 //! - [`loss`]: every sample is recorded
 //! - [`contract`]: what a node sees and sends at a tick
 //! - [`failures`]: nodes that fail, in every way
 //! - [`cleanup`]: runs that are stopped or killed
 //! - [`refusals`]: manifests that are wrong
+//! - [`manifests`]: includes, sets, settings, successors, companions
 //! - [`commands`]: the other subcommands, exit codes and JSON
+//! - [`profile`]: where the host time of a run's ticks goes
 //! - [`replay`]: the measured flight
 
+mod clean;
 mod cleanup;
 mod commands;
 mod contract;
 mod determinism;
 mod documentation;
 mod failures;
+mod live;
 mod loss;
+mod manifests;
 mod nodes;
+mod profile;
 mod recordings;
 mod refusals;
 mod replay;
 mod support;
+mod terminal;

@@ -43,6 +43,9 @@ struct Parameters {
     fault: Option<Fault>,
     #[serde(default)]
     at_tick: u32,
+    /// How long the node sleeps at that tick.
+    #[serde(default)]
+    nap_ms: u64,
 }
 
 #[derive(Clone, Copy, Deserialize)]
@@ -99,6 +102,9 @@ fn run() -> Result<(), BusError> {
     node.run(|tick| {
         if let Some(fault) = parameters.fault.filter(|_| tick.number() == parameters.at_tick) {
             return fault.strike();
+        }
+        if parameters.nap_ms > 0 && tick.number() == parameters.at_tick {
+            std::thread::sleep(std::time::Duration::from_millis(parameters.nap_ms));
         }
         let Some(output) = output else { return Ok(()) };
         tick.write(output, note(tick, input, &control)).map_err(|error| error.to_string())

@@ -9,7 +9,7 @@ use std::fs;
 const HERE: char = '§';
 
 /// A small manifest that flies.
-fn good() -> String {
+pub fn good() -> String {
     let vehicle = repository("vehicles/hummingbird.toml");
     format!(
         r#"[run]
@@ -51,20 +51,20 @@ kind = "recorder"
 
 /// Refuses the good manifest with `from` replaced by `to`, at the place marked in `to`.
 #[track_caller]
-fn refused(from: &str, to: &str) -> Ended {
+pub fn refused(from: &str, to: &str) -> Ended {
     assert_eq!(good().matches(from).count(), 1, "{from} stands once in the good manifest");
     refused_text(&good().replace(from, to))
 }
 
 /// Refuses the good manifest with `more` at its end.
 #[track_caller]
-fn refused_with(more: &str) -> Ended {
+pub fn refused_with(more: &str) -> Ended {
     refused_text(&(good() + more))
 }
 
 /// Refuses `marked`, a manifest, at the place that it marks.
 #[track_caller]
-fn refused_text(marked: &str) -> Ended {
+pub fn refused_text(marked: &str) -> Ended {
     let place = Place::new();
     let path = place.write("wrong.toml", marked.replace(HERE, ""));
     let ended = place.call(&["run", &path]).with_code(2);
@@ -90,6 +90,17 @@ fn refused_words(words: &[&str], file: &str) -> Ended {
     let mut numbers = rest.unwrap_or_else(|| panic!("{file} is not named\n{ended}")).splitn(3, ':');
     let is_number = |part: Option<&str>| part.is_some_and(|part| part.parse::<usize>().is_ok());
     assert!(is_number(numbers.next()) && is_number(numbers.next()), "no line and column\n{ended}");
+    ended
+}
+
+/// Runs `manifest` with `settings`, the last of which it must refuse.
+#[track_caller]
+pub fn refused_setting(manifest: &str, settings: &[&str]) -> Ended {
+    let words = settings.iter().flat_map(|setting| ["--set", setting]);
+    let words: Vec<&str> = ["check", manifest].into_iter().chain(words).collect();
+    let ended = Place::new().call(&words).with_code(2);
+    let start = format!("error: {manifest}: --set {}: ", settings.last().unwrap());
+    assert!(ended.error.starts_with(&start), "expected {start}\n{ended}");
     ended
 }
 
@@ -288,8 +299,7 @@ fn a_vehicle_file_that_is_not_there() {
     let place = Place::new();
     let manifest = repository("manifests/hover.toml");
     let vehicle = place.path("none.toml");
-    let set = format!("process.plant.vehicle={vehicle}");
-    let ended = refused_words(&["run", &manifest, "--set", &set], &manifest);
+    let ended = refused_setting(&manifest, &[&format!("process.plant.vehicle={vehicle}")]);
     ended.says(&["process `plant`", &vehicle, "cannot read this vehicle file", "check the path"]);
 }
 
@@ -300,8 +310,7 @@ fn a_vehicle_file_with_a_unit_of_another_quantity() {
     let line = text.lines().position(|line| line.starts_with("mass =")).unwrap() + 1;
     let vehicle = place.write("stone.toml", text.replacen("unit = \"kg\"", "unit = \"stone\"", 1));
     let manifest = repository("manifests/hover.toml");
-    let set = format!("process.plant.vehicle={vehicle}");
-    let ended = refused_words(&["run", &manifest, "--set", &set], &manifest);
+    let ended = refused_setting(&manifest, &[&format!("process.plant.vehicle={vehicle}")]);
     ended.says(&["process `plant`", &format!("{vehicle}:{line}:"), "body.mass", "stone", "kg"]);
 }
 
@@ -314,13 +323,14 @@ fn replay<'a>(place: &'a Place, flight: &str, more: &[&str]) -> crate::support::
     place.start(&[&words, more].concat())
 }
 
-/// Requires that the replay of `flight` is refused at a place in its manifest.
+/// Requires that the replay of `flight` is refused at a place in its manifest, or at a setting.
 #[track_caller]
 fn refused_replay(flight: &str, more: &[&str]) -> Ended {
     let ended = replay(&Place::new(), flight, more).end().with_code(2);
     let start = format!("error: {}:", repository("manifests/replay-nanobench.toml"));
     let rest = ended.error.strip_prefix(&start).unwrap_or_else(|| panic!("no place in\n{ended}"));
-    assert!(rest.starts_with(|c: char| c.is_ascii_digit()), "no line in\n{ended}");
+    let is_place = |c: char| c.is_ascii_digit();
+    assert!(rest.starts_with(is_place) || rest.starts_with(" --set process.player."), "no place in\n{ended}");
     ended
 }
 
@@ -338,8 +348,7 @@ fn the_good_flight_is_replayed() {
 #[test]
 fn a_flight_that_is_not_there() {
     let manifest = repository("manifests/replay-nanobench.toml");
-    let words = ["run", &manifest, "--set", "process.player.data=/no/flight.csv"];
-    let ended = refused_words(&words, &manifest);
+    let ended = refused_setting(&manifest, &["process.player.data=/no/flight.csv"]);
     ended.says(&["process `player`", "/no/flight.csv cannot be read", "--set process.<player>.data=PATH"]);
 }
 
@@ -468,13 +477,16 @@ fn a_pace_that_is_none() {
 #[test]
 fn an_override_that_is_none() {
     let manifest = repository("manifests/hover.toml");
-    let set = |text: &str| Place::new().call(&["run", &manifest, "--set", text]).with_code(2);
+    let set = |text: &str| refused_setting(&manifest, &[text]);
     set("run.seed").says(&["--set run.seed: expected KEY=VALUE", "run.seed=3"]);
     set("run.seed.low=1").says(&["--set run.seed.low=1", "`seed` is not a table"]);
     set("run.seeed=1").says(&["unknown field `seeed`", "did you mean `seed`?"]);
     set("run.seed=one").says(&["\"one\""]);
-    set("process.plnat.cpu=1").says(&["process `plnat` needs either `kind` or `command`"]);
-    set("=1");
+    set("process.plnat.cpu=1").says(&["there is no process `plnat`", "did you mean `plant`?"]);
+    set("process.h1/plant.cpu=1").says(&["there is no process `h1/plant`"]);
+    set("=1").says(&["expected keys with dots between them"]);
+    set("pass.9.max=1").says(&["`pass` is a list of 4, and `9` is none of them", "numbered from 0"]);
+    set("include=[]").says(&["unknown field `include`"]);
 }
 
 #[test]

@@ -68,10 +68,8 @@ impl Place {
     pub fn launch(&self, mut command: Command) -> Launch<'_> {
         let output = tempfile::NamedTempFile::new_in(self.folder.path()).unwrap().into_temp_path();
         let error = tempfile::NamedTempFile::new_in(self.folder.path()).unwrap().into_temp_path();
-        let child = command
-            .env("TMPDIR", self.temporary())
-            .env("RUST_BACKTRACE", "0")
-            .env_remove("HUMMINGBUS_DATA")
+        let child = self
+            .mark(&mut command)
             .stdin(Stdio::null())
             .stdout(File::create(&output).unwrap())
             .stderr(File::create(&error).unwrap())
@@ -80,6 +78,11 @@ impl Place {
         self.launchers.borrow_mut().push(child.id());
         let words: Vec<_> = command.get_args().map(|word| word.to_string_lossy()).collect();
         Launch { place: self, child, words: words.join(" "), output, error, status: None }
+    }
+
+    /// Gives `command` the environment of this test, by which its processes are known.
+    pub fn mark<'a>(&self, command: &'a mut Command) -> &'a mut Command {
+        command.env("TMPDIR", self.temporary()).env("RUST_BACKTRACE", "0").env_remove("HUMMINGBUS_DATA")
     }
 
     /// Runs `hummingbus` with `words` to its end; it must leave nothing behind.
@@ -115,12 +118,24 @@ impl Place {
         poll("processes that outlive their run", || self.processes().is_empty().then_some(()));
     }
 
+    /// The name of the run that is up.
+    pub fn run_id(&self) -> String {
+        let run_dirs = self.run_dirs();
+        let [run_dir] = &run_dirs[..] else { panic!("not one run but {run_dirs:?}") };
+        run_dir.file_name().unwrap().to_string_lossy().splitn(3, '-').last().unwrap().to_owned()
+    }
+
+    /// Everything that the runs of this folder left outside of their recordings.
+    pub fn left(&self) -> Vec<String> {
+        self.launchers.borrow().iter().flat_map(|&launcher| self.left_behind(launcher)).collect()
+    }
+
     /// The directories of the runs that are up.
     pub fn run_dirs(&self) -> Vec<PathBuf> {
         entries(&self.temporary())
     }
 
-    /// Everything that the runs of this folder left outside of their recordings.
+    /// What the runs of `launcher` left, and everything in the folder for temporary files.
     pub fn left_behind(&self, launcher: u32) -> Vec<String> {
         let processes = self.processes().into_iter().map(|(pid, node)| format!("process {pid:?} ({node})"));
         let files = entries(&self.temporary()).into_iter().chain(shared_memory(launcher));

@@ -1,0 +1,141 @@
+//! The state that a node hands over: stated after every tick, in shared memory that outlives the process.
+//!
+//! A ring holds the state at the start of each of the last ticks, as many as a member can be ahead of its
+//! successor. It is stated before the tick's outputs are sent: whatever was sent, the state that follows it
+//! can be read, also when the process died right after.
+
+use crate::announcement::Announcement;
+use crate::control::shm_prefix;
+use crate::error::BusError;
+use crate::plan::Plan;
+use crate::schema::Schema;
+use memmap2::MmapRaw;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
+
+/// Bytes in front of each state: its tick plus one, so that memory that was never written holds none.
+const TICK_BYTES: usize = 8;
+
+/// The ring of one process.
+#[derive(Debug)]
+pub(crate) struct StateRing {
+    map: MmapRaw,
+    entries: usize,
+    state_words: usize,
+}
+
+impl StateRing {
+    /// Creates the ring of generation `generation` of node `node`, whose state is `schema`, and announces it.
+    pub(crate) fn create(
+        run_dir: &Path,
+        plan: &Plan,
+        node: usize,
+        generation: u32,
+        schema: &Schema,
+    ) -> Result<Self, BusError> {
+        use std::os::unix::fs::OpenOptionsExt;
+        let path = ring_path(plan, node, generation);
+        let fail = |source| BusError::File { action: "create", path: path.clone(), source };
+        let mut options = std::fs::OpenOptions::new();
+        let file = options.read(true).write(true).create_new(true).mode(0o600).open(&path).map_err(fail)?;
+        let ring = Self::map(plan, schema, &file, Some(ring_bytes(plan, schema))).map_err(fail)?;
+        Announcement::of(schema).store(&announcement_path(run_dir, node, generation))?;
+        Ok(ring)
+    }
+
+    /// Opens the ring of a process that flies; `None` where it states no state, or one of another type.
+    pub(crate) fn open(
+        run_dir: &Path,
+        plan: &Plan,
+        node: usize,
+        generation: u32,
+        schema: &Schema,
+    ) -> Result<Option<Self>, BusError> {
+        let announced = announcement_path(run_dir, node, generation);
+        if !announced.exists() || Announcement::load(&announced)?.layout_hash != schema.layout_hash() {
+            return Ok(None);
+        }
+        let path = ring_path(plan, node, generation);
+        let fail = |source| BusError::File { action: "open", path: path.clone(), source };
+        let file = std::fs::OpenOptions::new().read(true).write(true).open(&path).map_err(fail)?;
+        Self::map(plan, schema, &file, None).map_err(fail).map(Some)
+    }
+
+    fn map(
+        plan: &Plan,
+        schema: &Schema,
+        file: &std::fs::File,
+        new_length: Option<usize>,
+    ) -> std::io::Result<Self> {
+        if let Some(length) = new_length {
+            file.set_len(length as u64)?;
+        }
+        let map = MmapRaw::map_raw(file)?;
+        if map.len() < ring_bytes(plan, schema) {
+            return Err(std::io::Error::other("the file is shorter than the state it should hold"));
+        }
+        Ok(Self { map, entries: entries(plan), state_words: schema.size.div_ceil(8) })
+    }
+
+    /// States `state` as that at the start of `tick`.
+    pub(crate) fn store(&self, tick: u32, state: &[u8]) {
+        let entry = self.entry(tick);
+        self.word(entry).store(u64::from(tick) + 1, Relaxed);
+        for (index, bytes) in state.chunks(8).enumerate() {
+            let mut word = [0; 8];
+            word[..bytes.len()].copy_from_slice(bytes);
+            self.word(entry + 1 + index).store(u64::from_le_bytes(word), Relaxed);
+        }
+    }
+
+    /// Reads the state at the start of `tick`; false if the ring does not hold it.
+    pub(crate) fn load(&self, tick: u32, state: &mut [u8]) -> bool {
+        let entry = self.entry(tick);
+        if self.word(entry).load(Relaxed) != u64::from(tick) + 1 {
+            return false;
+        }
+        for (index, bytes) in state.chunks_mut(8).enumerate() {
+            let word = self.word(entry + 1 + index).load(Relaxed).to_le_bytes();
+            bytes.copy_from_slice(&word[..bytes.len()]);
+        }
+        true
+    }
+
+    /// The number of the first word of the entry of `tick`.
+    fn entry(&self, tick: u32) -> usize {
+        (tick as usize % self.entries) * (1 + self.state_words)
+    }
+
+    fn word(&self, index: usize) -> &AtomicU64 {
+        assert!((index + 1) * 8 <= self.map.len(), "word {index} is outside the state ring");
+        // SAFETY: the mapping lives as long as `self`, the offset is inside it (asserted) and a multiple of 8
+        // from a page-aligned start; every process accesses these bytes as atomics only. The order against
+        // the other process comes from the member's state word.
+        unsafe { AtomicU64::from_ptr(self.map.as_mut_ptr().add(index * 8).cast()) }
+    }
+}
+
+/// A member is at most a window ahead of its successor; one state more belongs to the tick that it computes.
+fn entries(plan: &Plan) -> usize {
+    let longest = plan.nodes.iter().map(|node| node.period_ticks).max().unwrap_or(1);
+    (plan.window_ticks + longest + 2) as usize
+}
+
+fn ring_bytes(plan: &Plan, schema: &Schema) -> usize {
+    entries(plan) * (TICK_BYTES + schema.size.div_ceil(8) * 8)
+}
+
+fn ring_path(plan: &Plan, node: usize, generation: u32) -> PathBuf {
+    Path::new("/dev/shm").join(format!("{}state_{node}.{generation}", shm_prefix(&plan.run_id)))
+}
+
+fn announcement_path(run_dir: &Path, node: usize, generation: u32) -> PathBuf {
+    run_dir.join(format!("state-{node}.{generation}.json"))
+}
+
+/// Removes what generation `generation` of node `node` stated, once nobody reads it any more.
+pub fn remove(run_dir: &Path, plan: &Plan, node: usize, generation: u32) {
+    // A process without a state has neither.
+    let _ = std::fs::remove_file(ring_path(plan, node, generation));
+    let _ = std::fs::remove_file(announcement_path(run_dir, node, generation));
+}

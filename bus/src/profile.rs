@@ -1,0 +1,463 @@
+//! Host times of the ticks of a run: every process notes its own in a file of the run directory.
+//!
+//! A file is a header and records of a fixed number of words, mapped, reserved and touched before the first
+//! tick: noting a tick is a look at the clock and a few stores. What a node waited for is not noted: it follows
+//! from the plan and from what the other processes noted.
+
+use crate::control::monotonic_ns;
+use crate::error::BusError;
+use crate::plan::Plan;
+use memmap2::{Advice, Mmap, MmapMut};
+use std::fs::File;
+use std::io::ErrorKind;
+use std::path::{Path, PathBuf};
+
+/// Ticks that a process notes at most; those beyond are counted only.
+pub const NOTED_TICKS_MAX: u32 = 2_000_000;
+
+const MAGIC: u64 = 0x4855_4d50_524f_4631;
+const WORD_BYTES: usize = size_of::<u64>();
+/// Magic, words of a record, records, records left out.
+const HEADER_WORDS: usize = 4;
+/// Tick, received, done, ended; the host time at which each output was sent follows.
+const TICK_WORDS: usize = 4;
+/// First tick, tick after the last, deadline, granted.
+const GRANT_WORDS: usize = 4;
+
+/// Host times of one computation of a node, in nanoseconds of the monotonic clock.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct TickTimes<'a> {
+    /// The tick.
+    pub tick: u32,
+    /// When the node ended the computation before and began to wait; `None` for the first it noted.
+    pub began_ns: Option<u64>,
+    /// When it had its inputs.
+    pub received_ns: u64,
+    /// When it had computed.
+    pub done_ns: u64,
+    /// When its outputs were sent and the memory of the next ones was taken.
+    pub ended_ns: u64,
+    /// When each output was sent; 0 for one that was not due.
+    pub sent_ns: &'a [u64],
+}
+
+/// A grant of the clock.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Grant {
+    /// The first tick granted by it.
+    pub first_tick: u32,
+    /// The tick after the last granted by it.
+    pub end_tick: u32,
+    /// Host time at which it was due in a paced run.
+    pub deadline_ns: Option<u64>,
+    /// Host time at which it was given.
+    pub granted_ns: u64,
+}
+
+/// Notes the ticks of a node.
+#[derive(Debug)]
+pub struct TickWriter(RecordWriter);
+
+impl TickWriter {
+    /// Creates the file of `node` in `run_dir`.
+    ///
+    /// # Errors
+    /// If the file cannot be created or its space not be reserved.
+    pub fn create(run_dir: &Path, plan: &Plan, node: usize) -> Result<Self, BusError> {
+        let words = TICK_WORDS + plan.nodes[node].outputs.len();
+        let ticks = plan.duration_ticks.div_ceil(plan.nodes[node].period_ticks.max(1));
+        RecordWriter::create(run_dir, &node.to_string(), words, ticks).map(Self)
+    }
+
+    /// Notes that `output` was sent at host time `sent_ns` in the current tick.
+    pub fn sent(&mut self, output: usize, sent_ns: u64) {
+        self.0.record()[TICK_WORDS + output] = sent_ns;
+    }
+
+    /// Notes the current tick.
+    pub fn end(&mut self, tick: u32, received_ns: u64, done_ns: u64, ended_ns: u64) {
+        let words = [u64::from(tick), received_ns, done_ns, ended_ns];
+        self.0.record()[..TICK_WORDS].copy_from_slice(&words);
+        self.0.commit();
+    }
+}
+
+/// Notes the grants of the clock.
+#[derive(Debug)]
+pub struct GrantWriter {
+    records: RecordWriter,
+    granted: u32,
+}
+
+impl GrantWriter {
+    /// Creates the clock's file in `run_dir`.
+    ///
+    /// # Errors
+    /// If the file cannot be created or its space not be reserved.
+    pub fn create(run_dir: &Path, plan: &Plan) -> Result<Self, BusError> {
+        let records = RecordWriter::create(run_dir, "clock", GRANT_WORDS, plan.duration_ticks)?;
+        Ok(Self { records, granted: 0 })
+    }
+
+    /// Notes that the ticks before `end_tick` are granted now; `deadline_ns` is when they were due.
+    pub fn grant(&mut self, end_tick: u32, deadline_ns: Option<u64>) {
+        self.grant_at(end_tick, deadline_ns, monotonic_ns());
+    }
+
+    /// Notes that the ticks before `end_tick` were granted at host time `granted_ns`.
+    pub fn grant_at(&mut self, end_tick: u32, deadline_ns: Option<u64>, granted_ns: u64) {
+        if end_tick > self.granted {
+            let words = [u64::from(self.granted), u64::from(end_tick), deadline_ns.unwrap_or(0), granted_ns];
+            self.records.record().copy_from_slice(&words);
+            self.records.commit();
+            self.granted = end_tick;
+        }
+    }
+}
+
+/// What a node noted, over all processes that were this node one after the other.
+#[derive(Debug)]
+pub struct TickReader {
+    files: Vec<RecordReader>,
+    period_ticks: u32,
+}
+
+impl TickReader {
+    /// Opens what `node` noted in `run_dir`; its processes must have ended.
+    ///
+    /// # Errors
+    /// If a file cannot be read or is not one of this plan.
+    pub fn open(run_dir: &Path, plan: &Plan, node: usize) -> Result<Self, BusError> {
+        let words = TICK_WORDS + plan.nodes[node].outputs.len();
+        let files = RecordReader::open_all(run_dir, &node.to_string(), words)?;
+        Ok(Self { files, period_ticks: plan.nodes[node].period_ticks.max(1) })
+    }
+
+    /// Computations that were noted.
+    #[must_use]
+    pub fn count(&self) -> usize {
+        self.files.iter().map(RecordReader::count).sum()
+    }
+
+    /// Computations that were not noted because the file was full.
+    #[must_use]
+    pub fn left_out(&self) -> u64 {
+        self.files.iter().map(RecordReader::left_out).sum()
+    }
+
+    /// The computation of `tick`. Of two processes that were this node at a tick, the one that sent is taken.
+    #[must_use]
+    pub fn at(&self, tick: u32) -> Option<TickTimes<'_>> {
+        let times = |file| self.times(file, tick);
+        let mut found = self.files.iter().filter_map(times);
+        let first = found.next()?;
+        let has_sent = |times: &TickTimes<'_>| times.sent_ns.iter().any(|&ns| ns > 0);
+        if has_sent(&first) { Some(first) } else { found.find(has_sent).or(Some(first)) }
+    }
+
+    fn times<'a>(&self, file: &'a RecordReader, tick: u32) -> Option<TickTimes<'a>> {
+        let first_tick = *file.record(0)?.first()?;
+        let index = u64::from(tick).checked_sub(first_tick)? / u64::from(self.period_ticks);
+        let index = usize::try_from(index).ok()?;
+        let record = file.record(index).filter(|record| record[0] == u64::from(tick))?;
+        let before = index.checked_sub(1).and_then(|before| file.record(before));
+        Some(TickTimes {
+            tick,
+            began_ns: before.map(|record| record[3]),
+            received_ns: record[1],
+            done_ns: record[2],
+            ended_ns: record[3],
+            sent_ns: &record[TICK_WORDS..],
+        })
+    }
+}
+
+/// What the clock noted.
+#[derive(Debug)]
+pub struct GrantReader(Vec<RecordReader>);
+
+impl GrantReader {
+    /// Opens what the clock noted in `run_dir`; its process must have ended.
+    ///
+    /// # Errors
+    /// If the file cannot be read or is not one of this program.
+    pub fn open(run_dir: &Path) -> Result<Self, BusError> {
+        RecordReader::open_all(run_dir, "clock", GRANT_WORDS).map(Self)
+    }
+
+    /// The grants, in their order.
+    pub fn grants(&self) -> impl Iterator<Item = Grant> {
+        self.0.iter().flat_map(|file| (0..file.count()).filter_map(|index| file.record(index))).map(grant)
+    }
+
+    /// The grant of `tick`.
+    #[must_use]
+    pub fn of(&self, tick: u32) -> Option<Grant> {
+        let file = self.0.first()?;
+        let (mut low, mut high) = (0, file.count());
+        while low < high {
+            let middle = usize::midpoint(low, high);
+            if file.record(middle)?[1] <= u64::from(tick) { low = middle + 1 } else { high = middle }
+        }
+        file.record(low).map(grant)
+    }
+}
+
+#[allow(clippy::cast_possible_truncation, reason = "ticks were written from 32-bit numbers")]
+fn grant(record: &[u64]) -> Grant {
+    Grant {
+        first_tick: record[0] as u32,
+        end_tick: record[1] as u32,
+        deadline_ns: Some(record[2]).filter(|&ns| ns > 0),
+        granted_ns: record[3],
+    }
+}
+
+/// Where process number `generation` of `writer` (a node's index, or the clock) notes its ticks. An index and
+/// no name, since names may hold what a file's name may not.
+fn path(run_dir: &Path, writer: &str, generation: u32) -> PathBuf {
+    run_dir.join(format!("profile-{writer}.{generation}.bin"))
+}
+
+/// Appends records to a file that has its full size from the start.
+#[derive(Debug)]
+struct RecordWriter {
+    map: MmapMut,
+    words: usize,
+    capacity: usize,
+    count: usize,
+    left_out: u64,
+}
+
+impl RecordWriter {
+    fn create(run_dir: &Path, writer: &str, words: usize, records: u32) -> Result<Self, BusError> {
+        let (file, path) = create_next(run_dir, writer)?;
+        let fail = |source| BusError::File { action: "reserve space for host times in", path, source };
+        let capacity = records.min(NOTED_TICKS_MAX) as usize;
+        // One more than counts: when the file is full, that one takes what is not noted.
+        let bytes = WORD_BYTES * (HEADER_WORDS + words * (capacity + 1));
+        let map = reserve(&file, bytes as u64).and_then(|()| {
+            // SAFETY: the file was created by this call in the run's own directory; others read it only after
+            // this process has ended.
+            unsafe { MmapMut::map_mut(&file) }
+        });
+        let map = map.map_err(fail)?;
+        // A page that is touched here costs the tick that writes to it no fault; older kernels cannot.
+        let _ = map.advise(Advice::PopulateWrite);
+        let mut writer = Self { map, words, capacity, count: 0, left_out: 0 };
+        writer.set_header();
+        Ok(writer)
+    }
+
+    fn set_header(&mut self) {
+        let header = [MAGIC, self.words as u64, self.count as u64, self.left_out];
+        self.all_words()[..HEADER_WORDS].copy_from_slice(&header);
+    }
+
+    fn all_words(&mut self) -> &mut [u64] {
+        bytemuck::cast_slice_mut(&mut self.map)
+    }
+
+    /// The words of the current record.
+    fn record(&mut self) -> &mut [u64] {
+        let (start, words) = (HEADER_WORDS + self.words * self.count, self.words);
+        &mut self.all_words()[start..start + words]
+    }
+
+    /// Ends the current record.
+    fn commit(&mut self) {
+        if self.count < self.capacity {
+            self.count += 1;
+        } else {
+            self.left_out += 1;
+        }
+        self.set_header();
+    }
+}
+
+/// The first file of `writer` that is not there yet: a process that takes a node over keeps what was noted.
+fn create_next(run_dir: &Path, writer: &str) -> Result<(File, PathBuf), BusError> {
+    let mut generation = 0;
+    loop {
+        let path = path(run_dir, writer, generation);
+        match File::options().read(true).write(true).create_new(true).open(&path) {
+            Ok(file) => return Ok((file, path)),
+            Err(error) if error.kind() == ErrorKind::AlreadyExists => generation += 1,
+            Err(source) => return Err(BusError::File { action: "create", path, source }),
+        }
+    }
+}
+
+/// Gives `file` its size and its space: a full disk is an error here, and would kill a process that writes.
+fn reserve(file: &File, bytes: u64) -> std::io::Result<()> {
+    match rustix::fs::fallocate(file, rustix::fs::FallocateFlags::empty(), 0, bytes) {
+        Err(rustix::io::Errno::OPNOTSUPP) => file.set_len(bytes),
+        other => other.map_err(Into::into),
+    }
+}
+
+/// The records of a file whose writer has ended.
+#[derive(Debug)]
+struct RecordReader {
+    map: Mmap,
+    words: usize,
+}
+
+impl RecordReader {
+    /// The files of all processes of `writer`, in the order in which they came.
+    fn open_all(run_dir: &Path, writer: &str, words: usize) -> Result<Vec<Self>, BusError> {
+        let paths = (0..).map(|generation| path(run_dir, writer, generation));
+        paths.take_while(|path| path.exists()).map(|path| Self::open(path, words)).collect()
+    }
+
+    fn open(path: PathBuf, words: usize) -> Result<Self, BusError> {
+        let map = File::open(&path).and_then(|file| {
+            // SAFETY: the file lies in the run's own directory and its writer has ended.
+            unsafe { Mmap::map(&file) }
+        });
+        let map = map.map_err(|source| BusError::File { action: "read", path: path.clone(), source })?;
+        let reader = Self { map, words };
+        let is_whole = reader.map.len().is_multiple_of(WORD_BYTES)
+            && reader.map.len() / WORD_BYTES >= HEADER_WORDS
+            && reader.all_words()[..2] == [MAGIC, words as u64]
+            && reader.record(reader.count().saturating_sub(1)).is_some() == (reader.count() > 0);
+        if is_whole {
+            return Ok(reader);
+        }
+        let found = format!("{} bytes that do not start like one", reader.map.len());
+        Err(BusError::Content { path, expected: "the host times of a process", found })
+    }
+
+    fn all_words(&self) -> &[u64] {
+        bytemuck::cast_slice(&self.map)
+    }
+
+    fn count(&self) -> usize {
+        usize::try_from(self.all_words()[2]).unwrap_or(0)
+    }
+
+    fn left_out(&self) -> u64 {
+        self.all_words()[3]
+    }
+
+    fn record(&self, index: usize) -> Option<&[u64]> {
+        if index >= self.count() {
+            return None;
+        }
+        let start = HEADER_WORDS + self.words.checked_mul(index)?;
+        self.all_words().get(start..start + self.words)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{GrantReader, GrantWriter, TickReader, TickWriter, path};
+    use crate::plan::{NodePlan, OutputPlan, Pace, Plan, Wait};
+
+    fn plan(period_ticks: u32) -> Plan {
+        let output = |port: &str| OutputPlan { port: port.to_owned(), topic: 0 };
+        let node = NodePlan {
+            name: "arm/left".to_owned(),
+            period_ticks,
+            wait: Wait::Block,
+            cpu: None,
+            inputs: vec![],
+            outputs: vec![output("a"), output("b")],
+            parameters: serde_json::Value::Null,
+            restarts: false,
+        };
+        Plan {
+            run_id: "profile".to_owned(),
+            seed: 0,
+            tick_ns: 1000,
+            duration_ticks: 30,
+            window_ticks: 1,
+            pace: Pace::Free,
+            clock_cpu: None,
+            profile: true,
+            lock_memory: false,
+            topics: vec![],
+            nodes: vec![node],
+        }
+    }
+
+    #[test]
+    fn what_was_noted_is_read_by_tick() {
+        let (folder, plan) = (tempfile::tempdir().unwrap(), plan(10));
+        let mut writer = TickWriter::create(folder.path(), &plan, 0).unwrap();
+        for tick in [0, 10, 20] {
+            let at = 100 * u64::from(tick);
+            writer.sent(1, at + 3);
+            writer.end(tick, at + 1, at + 2, at + 4);
+        }
+        let reader = TickReader::open(folder.path(), &plan, 0).unwrap();
+        assert_eq!((reader.count(), reader.left_out()), (3, 0));
+        let times = reader.at(10).unwrap();
+        let found = [times.began_ns.unwrap(), times.received_ns, times.done_ns, times.ended_ns];
+        assert_eq!(found, [4, 1001, 1002, 1004]);
+        assert_eq!(times.sent_ns, [0, 1003]);
+        assert_eq!(reader.at(0).unwrap().began_ns, None);
+        assert_eq!([5, 11, 30, u32::MAX].map(|tick| reader.at(tick)), [None; 4]);
+    }
+
+    #[test]
+    fn a_full_file_counts_what_it_leaves_out() {
+        let (folder, plan) = (tempfile::tempdir().unwrap(), plan(10));
+        let mut writer = TickWriter::create(folder.path(), &plan, 0).unwrap();
+        (0..5).for_each(|index| writer.end(10 * index, 1, 2, 3));
+        let reader = TickReader::open(folder.path(), &plan, 0).unwrap();
+        assert_eq!((reader.count(), reader.left_out()), (3, 2));
+        assert!(reader.at(20).is_some() && reader.at(30).is_none());
+    }
+
+    #[test]
+    fn a_process_that_takes_a_node_over_adds_to_what_was_noted() {
+        let (folder, plan) = (tempfile::tempdir().unwrap(), plan(1));
+        let mut first = TickWriter::create(folder.path(), &plan, 0).unwrap();
+        let mut second = TickWriter::create(folder.path(), &plan, 0).unwrap();
+        for tick in 0..4 {
+            first.sent(0, 7);
+            first.end(tick, 10, 11, 12);
+        }
+        // From tick 2 on the second process computes too, from tick 4 on it sends.
+        for tick in 2..6 {
+            if tick >= 4 {
+                second.sent(0, 8);
+            }
+            second.end(tick, 20, 21, 22);
+        }
+        let reader = TickReader::open(folder.path(), &plan, 0).unwrap();
+        let received = (0..6).map(|tick| reader.at(tick).unwrap().received_ns);
+        assert_eq!(received.collect::<Vec<_>>(), [10, 10, 10, 10, 20, 20]);
+    }
+
+    #[test]
+    fn a_grant_covers_the_ticks_since_the_one_before() {
+        let (folder, plan) = (tempfile::tempdir().unwrap(), plan(1));
+        let mut writer = GrantWriter::create(folder.path(), &plan).unwrap();
+        for (end_tick, granted_ns) in [(3, 100), (3, 110), (5, 120), (30, 130)] {
+            writer.grant_at(end_tick, (end_tick == 5).then_some(115), granted_ns);
+        }
+        let reader = GrantReader::open(folder.path()).unwrap();
+        assert_eq!(reader.grants().count(), 3, "one that grants nothing is none");
+        let granted = [0, 2, 3, 4, 5, 29].map(|tick| reader.of(tick).unwrap().granted_ns);
+        assert_eq!(granted, [100, 100, 120, 120, 130, 130]);
+        assert_eq!(reader.of(4).unwrap().deadline_ns, Some(115));
+        assert_eq!(reader.of(30), None);
+    }
+
+    #[test]
+    fn a_damaged_file_is_refused_by_its_name() {
+        let (folder, plan) = (tempfile::tempdir().unwrap(), plan(1));
+        drop(TickWriter::create(folder.path(), &plan, 0).unwrap());
+        let file = path(folder.path(), "0", 0);
+        let whole = std::fs::read(&file).unwrap();
+        let mut claims_more = whole.clone();
+        claims_more[16..24].copy_from_slice(&u64::MAX.to_le_bytes());
+        for damaged in [&whole[..30], &whole[..7], b"", &[b'x'; 64], &claims_more] {
+            std::fs::write(&file, damaged).unwrap();
+            let error = TickReader::open(folder.path(), &plan, 0).unwrap_err().to_string();
+            assert!(error.contains("profile-0.0.bin"), "{error}");
+        }
+    }
+}

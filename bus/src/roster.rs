@@ -1,0 +1,125 @@
+//! Who flies and who shadows: the processes of a run from one change to the next.
+//!
+//! The supervisor writes the roster and raises the epoch; every node then makes its connections agree with
+//! it. A roster holds the whole state, not a change, so it does not matter which of them a node saw last.
+
+use crate::error::BusError;
+use crate::plan::{NodePlan, Plan};
+use serde::{Deserialize, Serialize};
+use std::path::{Path, PathBuf};
+
+/// The processes of a run.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct Roster {
+    /// Counts the changes of this run.
+    pub epoch: u32,
+    /// The processes of each node, in the plan's order.
+    pub nodes: Vec<NodeRoster>,
+}
+
+/// The processes of a node.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct NodeRoster {
+    /// The process whose samples count, up to the take-over.
+    pub active: Incumbent,
+    /// The process that shadows it.
+    pub successor: Option<Incumbent>,
+    /// The tick from which on the successor goes on by itself; `u32::MAX` where it only shadows.
+    pub take_over_tick: u32,
+    /// Per output: the tick from which on the successor's samples count. After a crash some outputs of the
+    /// take-over tick may have been sent already.
+    pub take_over_ticks: Vec<u32>,
+}
+
+/// A process of a node.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct Incumbent {
+    /// Counts the processes of this node, from 0.
+    pub generation: u32,
+    /// The first tick it computes.
+    pub join_tick: u32,
+    /// Whether it sends samples before the take-over; one that is started after a crash does not.
+    pub shadows: bool,
+    /// Its inputs and parameters.
+    pub plan: NodePlan,
+}
+
+impl Roster {
+    /// The roster at the start of a run: generation 0 of every node.
+    #[must_use]
+    pub fn first(plan: &Plan) -> Self {
+        let first = |node: &NodePlan| NodeRoster {
+            active: Incumbent { generation: 0, join_tick: 0, shadows: false, plan: node.clone() },
+            successor: None,
+            take_over_tick: u32::MAX,
+            take_over_ticks: vec![u32::MAX; node.outputs.len()],
+        };
+        Self { epoch: 0, nodes: plan.nodes.iter().map(first).collect() }
+    }
+
+    /// Reads roster number `epoch` of the run in `run_dir`.
+    ///
+    /// # Errors
+    /// If the file is missing or is no roster.
+    pub fn load(run_dir: &Path, epoch: u32) -> Result<Self, BusError> {
+        let path = path(run_dir, epoch);
+        let text = std::fs::read_to_string(&path).map_err(|source| BusError::File {
+            action: "read",
+            path: path.clone(),
+            source,
+        })?;
+        serde_json::from_str(&text).map_err(|error| BusError::Content {
+            path,
+            expected: "the roster of a run",
+            found: error.to_string(),
+        })
+    }
+
+    /// Writes the roster into `run_dir`, and removes the one before the one before it, which nobody reads
+    /// any more: every node agrees with a roster before the next is made.
+    ///
+    /// # Errors
+    /// If the file cannot be written.
+    pub fn store(&self, run_dir: &Path) -> Result<(), BusError> {
+        let path = path(run_dir, self.epoch);
+        let text = serde_json::to_string(self).unwrap_or_else(|error| unreachable!("{error}"));
+        std::fs::write(&path, text).map_err(|source| BusError::File { action: "write", path, source })?;
+        if let Some(old) = self.epoch.checked_sub(2) {
+            let _ = std::fs::remove_file(self::path(run_dir, old));
+        }
+        Ok(())
+    }
+
+    /// The processes that read topic `topic`: node, generation and number of the input.
+    pub(crate) fn readers(&self, topic: usize) -> impl Iterator<Item = (usize, u32, usize)> + '_ {
+        self.nodes.iter().enumerate().flat_map(move |(node, roster)| {
+            roster.incumbents().flat_map(move |incumbent| {
+                let inputs = incumbent.plan.inputs.iter().enumerate();
+                inputs
+                    .filter(move |(_, input)| input.topic == topic)
+                    .map(move |(index, _)| (node, incumbent.generation, index))
+            })
+        })
+    }
+}
+
+impl NodeRoster {
+    /// The process of this generation.
+    pub(crate) fn of(&self, generation: u32) -> Option<&Incumbent> {
+        self.incumbents().find(|incumbent| incumbent.generation == generation)
+    }
+
+    fn incumbents(&self) -> impl Iterator<Item = &Incumbent> {
+        std::iter::once(&self.active).chain(&self.successor)
+    }
+
+    /// The tick from which on the successor's samples of topic `topic` count.
+    pub(crate) fn topic_take_over_tick(&self, topic: usize) -> u32 {
+        let outputs = self.active.plan.outputs.iter().zip(&self.take_over_ticks);
+        outputs.filter(|(output, _)| output.topic == topic).map(|(_, &tick)| tick).next().unwrap_or(u32::MAX)
+    }
+}
+
+fn path(run_dir: &Path, epoch: u32) -> PathBuf {
+    run_dir.join(format!("roster-{epoch}.json"))
+}

@@ -1,0 +1,100 @@
+//! One computation of a node: what it reads and writes at a tick.
+
+use crate::error::BusError;
+use crate::message::{Message, view, view_mut};
+use crate::node::{Input, Output, RawInput};
+use crate::port::{InPort, OutPort};
+
+/// One computation of a node: its inputs and outputs at one tick.
+#[derive(Debug)]
+pub struct Tick<'a> {
+    pub(crate) tick: u32,
+    pub(crate) time_ns: u64,
+    pub(crate) node: &'a str,
+    pub(crate) inputs: &'a [InPort],
+    pub(crate) outputs: &'a mut [OutPort],
+    /// At the first tick whose outputs count, unless a state was handed over: what the predecessor sent, by
+    /// output.
+    pub(crate) predecessor: &'a [InPort],
+}
+
+impl Tick<'_> {
+    /// The tick's number.
+    #[must_use]
+    pub fn number(&self) -> u32 {
+        self.tick
+    }
+
+    /// Simulation time in nanoseconds.
+    #[must_use]
+    pub fn time_ns(&self) -> u64 {
+        self.time_ns
+    }
+
+    /// Simulation time in seconds.
+    #[must_use]
+    pub fn time_s(&self) -> f64 {
+        self.time_ns as f64 * 1e-9
+    }
+
+    /// The newest sample of an input that this tick may see.
+    #[must_use]
+    pub fn get<T: Message>(&self, input: Input<T>) -> &T {
+        view(self.inputs[input.index].words())
+    }
+
+    /// Host times of the newest sample: when its sender had its inputs, was done, and sent it. For
+    /// profiling only: what a node computes from them is not reproducible. Zero for an initial value.
+    #[must_use]
+    pub fn host_times_ns<T: Message>(&self, input: Input<T>) -> [u64; 3] {
+        self.inputs[input.index].host_times_ns()
+    }
+
+    /// The newest sample of a raw input as CDR bytes with its sequence number, if it was sent at this tick.
+    #[must_use]
+    pub fn fresh(&self, input: RawInput) -> Option<(&[u8], u64)> {
+        self.inputs[input.index].fresh(self.tick)
+    }
+
+    /// The same of the process that shadows the publisher of this input.
+    #[must_use]
+    pub fn fresh_shadow(&self, input: RawInput) -> Option<(&[u8], u64)> {
+        self.inputs[input.index].fresh_shadow(self.tick)
+    }
+
+    /// The last message that the predecessor of this process sent on `output`, at the tick of the take-over
+    /// and only where no state was handed over: the command to go on from without a jump.
+    #[must_use]
+    pub fn predecessor<T: Message>(&self, output: Output<T>) -> Option<&T> {
+        self.predecessor.get(output.index)?.sample().map(view)
+    }
+
+    /// Whether `output` is due at this tick.
+    #[must_use]
+    pub fn is_due<T>(&self, output: Output<T>) -> bool {
+        self.outputs[output.index].is_due(self.tick)
+    }
+
+    /// Writes the sample of `output`; the bus fills in its stamp. A sample that is not due is dropped.
+    ///
+    /// # Errors
+    /// If shared memory cannot be had.
+    pub fn write<T: Message>(&mut self, output: Output<T>, message: T) -> Result<(), BusError> {
+        if self.is_due(output) {
+            *self.in_place(output)? = message;
+        }
+        Ok(())
+    }
+
+    /// The sample of `output` in shared memory, to be written in place: for messages too large to copy.
+    ///
+    /// It may hold an earlier sample's values. A node that leaves some of them standing is not
+    /// reproducible.
+    ///
+    /// # Errors
+    /// If shared memory cannot be had.
+    pub fn in_place<T: Message>(&mut self, output: Output<T>) -> Result<&mut T, BusError> {
+        let words = self.outputs[output.index].words(self.node)?;
+        Ok(view_mut(words))
+    }
+}

@@ -1,0 +1,249 @@
+//! `hummingbus clean`: removes what dead runs left, and nothing of live ones.
+//!
+//! Whatever is removed is claimed first: the claim is the lock of the run's entry, which a live launcher holds.
+//! A run registers before it creates anything else, so files without an entry belong to a dead run.
+#![allow(clippy::disallowed_methods, reason = "waiting for a killed process takes host time")]
+
+use crate::run_dir::{
+    Entry, SHARED_MEMORY, entry_path, run_of_dir, run_of_shared_memory, shared_memory_of, try_claim,
+};
+use anyhow::Result;
+use bus::process::{RUN_VARIABLE, user_id};
+use indicatif::HumanBytes;
+use rustix::process::{Pid, PidfdFlags, Signal, pidfd_open, pidfd_send_signal};
+use serde::Serialize;
+use std::collections::{BTreeMap, BTreeSet};
+use std::ffi::OsStr;
+use std::fs::File;
+use std::os::unix::ffi::OsStrExt;
+use std::os::unix::fs::MetadataExt;
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
+
+/// How long a killed process may take to be gone.
+const GRACE: Duration = Duration::from_secs(5);
+const POLL: Duration = Duration::from_millis(2);
+
+/// What there was to clean.
+#[derive(Debug, Serialize)]
+pub struct Report {
+    /// Whether everything was left as it was.
+    pub dry_run: bool,
+    /// Names of the runs that live.
+    pub live: Vec<String>,
+    /// The dead runs of which something was left.
+    pub dead: Vec<Remains>,
+}
+
+/// What a dead run left.
+#[derive(Debug, Default, Serialize)]
+pub struct Remains {
+    /// The run.
+    pub run_id: String,
+    /// Processes that outlived it.
+    pub processes: Vec<i32>,
+    /// Files and directories.
+    pub paths: Vec<PathBuf>,
+    /// Memory and disk space that these take.
+    pub bytes: u64,
+    /// What could not be removed, and why.
+    pub failures: Vec<String>,
+}
+
+/// Removes what dead runs of this user left; with `dry_run`, only tells.
+///
+/// # Errors
+/// If the machine's processes cannot be listed.
+pub fn clean(dry_run: bool) -> Result<Report> {
+    let mut report = Report { dry_run, live: Vec::new(), dead: Vec::new() };
+    for (run_id, traces) in find_traces()? {
+        // Held until everything is removed: a launcher that is just registering this run waits for it.
+        let Some(_claim) = try_claim(&run_id, &traces.run_dirs) else {
+            report.live.push(run_id);
+            continue;
+        };
+        let mut remains = look_at(run_id, &traces);
+        if !dry_run {
+            remains.remove();
+        }
+        if !remains.is_empty() {
+            report.dead.push(remains);
+        }
+    }
+    Ok(report)
+}
+
+/// Where a run was met: its directory, wherever its folder for temporary files was, and its processes.
+#[derive(Default)]
+struct Traces {
+    run_dirs: BTreeSet<PathBuf>,
+    processes: Vec<Pid>,
+}
+
+fn find_traces() -> Result<BTreeMap<String, Traces>> {
+    let mut found: BTreeMap<String, Traces> = BTreeMap::new();
+    for path in own_files(Path::new(SHARED_MEMORY)) {
+        let Some(run_id) = name_of(&path).and_then(run_of_shared_memory) else { continue };
+        let traces = found.entry(run_id.to_owned()).or_default();
+        if path == entry_path(run_id) {
+            let entry = File::open(&path).ok().and_then(|file| serde_json::from_reader(file).ok());
+            let run_dir = entry.map(|entry: Entry| entry.run_dir);
+            traces.run_dirs.extend(run_dir.filter(|run_dir| is_run_dir_of(run_dir, run_id)));
+        }
+    }
+    for path in own_files(&std::env::temp_dir()) {
+        if let Some(run_id) = name_of(&path).and_then(run_of_dir) {
+            found.entry(run_id.to_owned()).or_default().run_dirs.insert(path);
+        }
+    }
+    for (process, run_dir) in processes_of_runs()? {
+        if let Some(run_id) = name_of(&run_dir).and_then(run_of_dir).map(str::to_owned) {
+            let traces = found.entry(run_id).or_default();
+            traces.run_dirs.insert(run_dir);
+            traces.processes.push(process);
+        }
+    }
+    Ok(found)
+}
+
+fn is_run_dir_of(path: &Path, run_id: &str) -> bool {
+    name_of(path).and_then(run_of_dir) == Some(run_id)
+}
+
+fn name_of(path: &Path) -> Option<&str> {
+    path.file_name()?.to_str()
+}
+
+/// What lies in `folder` and belongs to this user; nothing where there is no such folder.
+fn own_files(folder: &Path) -> Vec<PathBuf> {
+    let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
+    let is_own = |entry: &std::fs::DirEntry| entry.metadata().is_ok_and(|file| file.uid() == user_id());
+    entries.filter(is_own).map(|entry| entry.path()).collect()
+}
+
+/// This user's processes that carry a run directory, except this one and those that see another /dev/shm.
+fn processes_of_runs() -> Result<Vec<(Pid, PathBuf)>> {
+    let own_mounts = mounts_of(Path::new("/proc/self"));
+    let entries = std::fs::read_dir("/proc")?.flatten();
+    let process = |entry: std::fs::DirEntry| {
+        let id =
+            entry.file_name().to_str()?.parse().ok().filter(|&id| id != std::process::id().cast_signed())?;
+        let process = Pid::from_raw(id)?;
+        let is_own = entry.metadata().is_ok_and(|file| file.uid() == user_id());
+        (is_own && mounts_of(&entry.path()) == own_mounts).then_some(())?;
+        run_dir_of(process).map(|run_dir| (process, run_dir))
+    };
+    Ok(entries.filter_map(process).collect())
+}
+
+/// What stands for the mounts that a process sees.
+fn mounts_of(process: &Path) -> Option<PathBuf> {
+    std::fs::read_link(process.join("ns/mnt")).ok()
+}
+
+/// The run directory that a process carries in its environment; `None` for one that has ended.
+fn run_dir_of(process: Pid) -> Option<PathBuf> {
+    let environment = std::fs::read(format!("/proc/{process}/environ")).ok()?;
+    let mut variables = environment.split(|&byte| byte == 0);
+    let value = variables.find_map(|variable| {
+        variable.strip_prefix(RUN_VARIABLE.as_bytes()).and_then(|rest| rest.strip_prefix(b"="))
+    })?;
+    Some(PathBuf::from(OsStr::from_bytes(value)))
+}
+
+fn look_at(run_id: String, traces: &Traces) -> Remains {
+    let run_dirs = traces.run_dirs.iter().filter(|path| path.is_dir()).cloned();
+    // The entry last, as it goes when a run ends by itself.
+    let entry = Some(entry_path(&run_id)).filter(|path| path.exists());
+    let paths: Vec<PathBuf> = run_dirs.chain(shared_memory_of(&run_id)).chain(entry).collect();
+    let bytes = paths.iter().map(|path| bytes_below(path)).sum();
+    let processes = traces.processes.iter().map(|process| process.as_raw_nonzero().get()).collect();
+    Remains { run_id, processes, paths, bytes, failures: Vec::new() }
+}
+
+/// The space that a file, or a folder with everything in it, takes up; it may be far less than its length.
+fn bytes_below(path: &Path) -> u64 {
+    let Ok(metadata) = path.symlink_metadata() else { return 0 };
+    let entries = std::fs::read_dir(path).into_iter().flatten().flatten().filter(|_| metadata.is_dir());
+    metadata.blocks() * 512 + entries.map(|entry| bytes_below(&entry.path())).sum::<u64>()
+}
+
+impl Remains {
+    fn is_empty(&self) -> bool {
+        self.processes.is_empty() && self.paths.is_empty()
+    }
+
+    /// Ends the processes, then removes the files, which they may still be writing.
+    fn remove(&mut self) {
+        for &process in &self.processes {
+            if let Err(reason) = end_process(process) {
+                self.failures.push(format!("process {process}: {reason}"));
+            }
+        }
+        for path in &self.paths {
+            let removed =
+                if path.is_dir() { std::fs::remove_dir_all(path) } else { std::fs::remove_file(path) };
+            match removed {
+                // Another `clean` was faster.
+                Err(error) if error.kind() == std::io::ErrorKind::NotFound => {}
+                Err(error) => self.failures.push(format!("{}: {error}", path.display())),
+                Ok(()) => {}
+            }
+        }
+    }
+}
+
+/// Kills a process that carries a run directory, and waits until it is gone.
+fn end_process(process: i32) -> Result<(), String> {
+    let Some(process) = Pid::from_raw(process) else { return Ok(()) };
+    // The handle stays with the process, whoever gets its number next; so what carries the run directory now
+    // is what the signal goes to.
+    let Ok(handle) = pidfd_open(process, PidfdFlags::empty()) else { return Ok(()) };
+    if run_dir_of(process).is_none() {
+        return Ok(());
+    }
+    pidfd_send_signal(&handle, Signal::KILL).map_err(|error| format!("cannot be killed: {error}"))?;
+    let start = Instant::now();
+    while run_dir_of(process).is_some() {
+        if start.elapsed() > GRACE {
+            return Err(format!("still there {} s after it was killed", GRACE.as_secs()));
+        }
+        std::thread::sleep(POLL);
+    }
+    Ok(())
+}
+
+impl Report {
+    /// Whether nothing of a dead run is left, or nothing was to be removed.
+    pub fn is_done(&self) -> bool {
+        self.dead.iter().all(|remains| remains.failures.is_empty())
+    }
+}
+
+impl std::fmt::Display for Report {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let verb = if self.dry_run { "would remove" } else { "removed" };
+        for remains in &self.dead {
+            let bytes = HumanBytes(remains.bytes);
+            writeln!(f, "{verb} run {}: {bytes}", remains.run_id)?;
+            let (shared, folders): (Vec<&PathBuf>, Vec<&PathBuf>) =
+                remains.paths.iter().partition(|path| path.starts_with(SHARED_MEMORY));
+            folders.iter().try_for_each(|path| writeln!(f, "  {}", path.display()))?;
+            if !shared.is_empty() {
+                writeln!(f, "  {} in {SHARED_MEMORY}", count(shared.len(), "file"))?;
+            }
+            remains.processes.iter().try_for_each(|process| writeln!(f, "  process {process}"))?;
+            remains.failures.iter().try_for_each(|failure| writeln!(f, "  LEFT {failure}"))?;
+        }
+        let bytes = HumanBytes(self.dead.iter().map(|remains| remains.bytes).sum());
+        let live = count(self.live.len(), "live run");
+        match self.dead.len() {
+            0 => write!(f, "nothing to remove; {live} kept"),
+            dead => write!(f, "{verb} {} ({bytes}); {live} kept", count(dead, "dead run")),
+        }
+    }
+}
+
+fn count(number: usize, noun: &str) -> String {
+    format!("{number} {noun}{}", if number == 1 { "" } else { "s" })
+}

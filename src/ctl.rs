@@ -1,0 +1,157 @@
+//! `hummingbus ctl` and `hummingbus swap`: a live run is paused, stepped, paced and stopped from outside.
+//!
+//! - [`protocol`]: what can be asked of a run, and what it answers
+//! - [`server`]: the launcher's socket in the run directory
+//! - [`desk`]: what the launcher does with a request
+//! - [`client`]: the other end of the socket
+
+pub mod client;
+pub mod desk;
+pub mod protocol;
+pub mod server;
+
+use crate::manifest::PaceSetting;
+use crate::run_dir::find_live;
+use anyhow::{Context, Result, bail};
+use clap::{Args, Subcommand};
+use protocol::{Answer, Request};
+use std::path::Path;
+
+/// The arguments of `hummingbus ctl`.
+#[derive(Args)]
+pub struct CtlArguments {
+    /// The run, as `hummingbus top` names it; needed only if several are alive.
+    #[arg(long, global = true, value_name = "ID")]
+    run: Option<String>,
+    /// Print the run's answer as JSON.
+    #[arg(long, global = true)]
+    json: bool,
+    #[command(subcommand)]
+    verb: CtlVerb,
+}
+
+#[derive(Clone, Copy, Subcommand)]
+enum CtlVerb {
+    /// Say how far the run has come.
+    Status,
+    /// Hold the run at the next tick boundary, and wait until it is held.
+    Pause,
+    /// Run exactly this many ticks from the hold, and wait until it is held again; pauses a running run first.
+    #[command(after_help = "Example: hummingbus ctl step 100")]
+    Step {
+        /// How many.
+        #[arg(value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..))]
+        ticks: u32,
+    },
+    /// Let a held run go on.
+    Resume,
+    /// Change the pace of the run.
+    #[command(after_help = "Example: hummingbus ctl pace 0.5")]
+    Pace {
+        /// free, realtime, or simulated seconds per second.
+        pace: PaceSetting,
+    },
+    /// End the run at the next tick boundary, as Ctrl-C does.
+    Stop,
+}
+
+impl CtlVerb {
+    fn request(self) -> Request {
+        match self {
+            Self::Status => Request::Status,
+            Self::Pause => Request::Pause,
+            Self::Step { ticks } => Request::Step { ticks },
+            Self::Resume => Request::Resume,
+            Self::Pace { pace } => Request::Pace { pace },
+            Self::Stop => Request::Stop,
+        }
+    }
+}
+
+/// Asks a live run what `arguments` say, and prints its answer.
+///
+/// # Errors
+/// If there is no such run, or it refuses.
+pub fn ctl(arguments: &CtlArguments) -> Result<()> {
+    ask(arguments.run.as_deref(), &arguments.verb.request(), arguments.json)
+}
+
+/// The arguments of `hummingbus swap`.
+#[derive(Args)]
+pub struct SwapArguments {
+    /// The process to replace.
+    process: String,
+    /// What replaces it: a TOML file, or TOML text, with the keys of a process in a manifest.
+    #[arg(long, value_name = "FILE_OR_TOML")]
+    with: String,
+    /// Ticks that the successor computes beside the process before it takes over.
+    #[arg(long, value_name = "TICKS")]
+    shadow_ticks: Option<u32>,
+    /// The tick from which on the successor's outputs count; as soon as possible where absent.
+    #[arg(long, value_name = "TICK")]
+    at_tick: Option<u32>,
+    /// The run, as `hummingbus top` names it; needed only if several are alive.
+    #[arg(long, value_name = "ID")]
+    run: Option<String>,
+    /// Print the run's answer as JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+/// Has a live run replace one of its processes, and prints what came of it.
+///
+/// # Errors
+/// If there is no such run, the successor's description is no TOML, or the run refuses.
+pub fn swap(arguments: &SwapArguments) -> Result<()> {
+    let request = Request::Swap {
+        process: arguments.process.clone(),
+        with: description(&arguments.with)?,
+        shadow_ticks: arguments.shadow_ticks,
+        at_tick: arguments.at_tick,
+    };
+    ask(arguments.run.as_deref(), &request, arguments.json)
+}
+
+/// The TOML text that `words` are, or that the file of this name holds.
+fn description(words: &str) -> Result<String> {
+    let is_file = Path::new(words).is_file() || !words.contains('=');
+    let text = if is_file {
+        std::fs::read_to_string(words).with_context(|| {
+            format!("--with: cannot read {words}, and it is no TOML text such as kind=\"pid\"")
+        })?
+    } else {
+        words.to_owned()
+    };
+    let place = if is_file { words } else { "its text" };
+    text.parse::<toml::Table>().with_context(|| format!("--with: {place} is no TOML"))?;
+    Ok(text)
+}
+
+fn ask(run_id: Option<&str>, request: &Request, json: bool) -> Result<()> {
+    let answer = client::ask(&find_live(run_id)?, request)?;
+    if json {
+        crate::print_text(&serde_json::to_string(&answer)?)?;
+    }
+    match answer {
+        Answer::Refused { reason } => bail!("{reason}"),
+        _ if json => Ok(()),
+        Answer::Done { text, .. } => crate::print_text(&text),
+        Answer::Status(status) => crate::print_text(&status.to_string()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::description;
+
+    #[test]
+    fn a_successor_is_described_by_a_file_or_by_text() {
+        let file = tempfile::NamedTempFile::new().unwrap();
+        std::fs::write(file.path(), "kind = 'pid'\n").unwrap();
+        assert_eq!(description(file.path().to_str().unwrap()).unwrap(), "kind = 'pid'\n");
+        assert_eq!(description("kind='pid'").unwrap(), "kind='pid'");
+        let words = |text| format!("{:#}", description(text).unwrap_err());
+        assert!(words("kind='").contains("its text is no TOML"), "{}", words("kind='"));
+        assert!(words("nowhere.toml").contains("cannot read nowhere.toml"));
+    }
+}

@@ -1,0 +1,46 @@
+//! The client's end of the control socket.
+#![allow(clippy::disallowed_methods, reason = "waiting for a run to come up takes host time")]
+
+use crate::ctl::protocol::{Answer, Request};
+use crate::ctl::server::socket_path;
+use crate::run_dir::LiveRun;
+use anyhow::{Context, Result, bail};
+use std::io::{BufRead, BufReader, Write};
+use std::os::unix::net::UnixStream;
+use std::time::{Duration, Instant};
+
+/// How long a run may take from its registration to its socket.
+const START: Duration = Duration::from_secs(5);
+const POLL: Duration = Duration::from_millis(5);
+
+/// Asks `run`, and waits for its answer, which may take as long as what is asked.
+///
+/// # Errors
+/// If the run has ended.
+pub fn ask(run: &LiveRun, request: &Request) -> Result<Answer> {
+    let run_id = &run.entry.run_id;
+    let mut stream = connect(run).with_context(|| format!("run {run_id} has ended, or takes no requests"))?;
+    let mut line = serde_json::to_string(request)?;
+    line.push('\n');
+    stream.write_all(line.as_bytes()).with_context(|| format!("run {run_id} has ended"))?;
+    let mut answer = String::new();
+    BufReader::new(stream).read_line(&mut answer).with_context(|| format!("run {run_id} has ended"))?;
+    if answer.is_empty() {
+        bail!("run {run_id} ended before it answered");
+    }
+    serde_json::from_str(&answer)
+        .with_context(|| format!("run {run_id} gave an answer of another version of hummingbus: {answer}"))
+}
+
+/// Connects to `run`, which may just be starting.
+fn connect(run: &LiveRun) -> std::io::Result<UnixStream> {
+    let start = Instant::now();
+    loop {
+        let folder = std::fs::File::open(&run.entry.run_dir);
+        let stream = folder.and_then(|folder| UnixStream::connect(socket_path(&folder)));
+        if stream.is_ok() || !run.is_live() || start.elapsed() > START {
+            return stream;
+        }
+        std::thread::sleep(POLL);
+    }
+}

@@ -1,0 +1,155 @@
+//! What the launcher does with requests: holds, steps, paces and stops the run through its control segment.
+
+use crate::ctl::protocol::{Answer, Request, Status};
+use crate::ctl::server::{Reply, Server};
+use anyhow::Result;
+use bus::control::Control;
+use bus::plan::Plan;
+use std::path::Path;
+
+/// The hold tick of a run that is not to be held.
+const NEVER: u32 = u32::MAX;
+
+/// Serves requests about a run, a look at a time.
+pub struct Desk<'a> {
+    plan: &'a Plan,
+    control: &'a Control,
+    server: Server,
+    /// What was asked for and has not happened yet: one thing at a time, the newest.
+    wish: Option<Wish>,
+}
+
+struct Wish {
+    goal: Goal,
+    reply: Reply,
+}
+
+enum Goal {
+    /// To be held.
+    Pause,
+    /// To be held, then to be let go for this many ticks.
+    PauseToStep(u32),
+    /// To be held again at the boundary before `target`, `ticks` after it was let go.
+    Step { ticks: u32, target: u32 },
+}
+
+impl<'a> Desk<'a> {
+    /// Opens the control socket in `run_dir`.
+    ///
+    /// # Errors
+    /// If the socket cannot be made.
+    pub fn open(run_dir: &Path, plan: &'a Plan, control: &'a Control) -> Result<Self> {
+        Ok(Self { plan, control, server: Server::start(run_dir)?, wish: None })
+    }
+
+    /// Serves what has been asked since the last look; returns a request that is not about the clock, a swap.
+    pub fn serve(&mut self) -> Option<(Request, Reply)> {
+        self.grant_wish();
+        loop {
+            let (request, reply) = self.server.poll()?;
+            match request {
+                Request::Status => reply.send(&Answer::Status(Status::of(self.plan, self.control))),
+                Request::Pause => self.pause(reply),
+                Request::Step { ticks } => self.begin_step(ticks.max(1), reply),
+                Request::Resume => self.resume(reply),
+                Request::Pace { pace } => {
+                    self.control.set_pace(pace.0);
+                    self.answer(reply, format!("pace {pace}"));
+                }
+                Request::Stop => {
+                    self.control.request_stop();
+                    self.answer(reply, "stopping at the next tick boundary".to_owned());
+                }
+                Request::Swap { .. } => return Some((request, reply)),
+            }
+            self.grant_wish();
+        }
+    }
+
+    fn has_ended(&self) -> bool {
+        self.control.completed_ticks() >= self.control.end_tick()
+    }
+
+    fn answer(&self, reply: Reply, text: String) {
+        reply.send(&Answer::Done { text, tick: self.control.completed_ticks() });
+    }
+
+    /// Tells who waits for something that a later request undoes; true if there was somebody.
+    fn overtake(&mut self) -> bool {
+        let overtaken = self.wish.take();
+        let is_overtaken = overtaken.is_some();
+        overtaken
+            .into_iter()
+            .for_each(|wish| wish.reply.send(&Answer::refused("a later request took its place")));
+        is_overtaken
+    }
+
+    fn wish(&mut self, goal: Goal, reply: Reply) {
+        self.overtake();
+        self.wish = Some(Wish { goal, reply });
+    }
+
+    fn pause(&mut self, reply: Reply) {
+        self.control.set_hold_tick(0);
+        self.wish(Goal::Pause, reply);
+    }
+
+    fn begin_step(&mut self, ticks: u32, reply: Reply) {
+        self.control.set_hold_tick(0);
+        self.wish(Goal::PauseToStep(ticks), reply);
+    }
+
+    fn resume(&mut self, reply: Reply) {
+        let held_at = self.control.held_at();
+        let was_overtaken = self.overtake();
+        self.control.set_hold_tick(NEVER);
+        let text = match held_at {
+            Some(tick) => format!("running on from tick {tick}"),
+            None if was_overtaken => "running on".to_owned(),
+            None => "it was not paused".to_owned(),
+        };
+        self.answer(reply, text);
+    }
+
+    /// Answers the wish if it has come true; goes on to its second half if the first is done.
+    fn grant_wish(&mut self) {
+        let Some(wish) = self.wish.take() else { return };
+        let held_at = self.control.held_at();
+        match (wish.goal, held_at) {
+            (Goal::Pause, Some(tick)) => self.answer(wish.reply, format!("paused at tick {tick}")),
+            (Goal::PauseToStep(ticks), Some(tick)) => self.step(tick, ticks, wish.reply),
+            (Goal::Step { ticks, target }, _) if held_at == Some(target) => {
+                self.answer(wish.reply, format!("paused at tick {target}, {} on", ticks_in_words(ticks)));
+            }
+            (Goal::Step { ticks, target }, _) if self.has_ended() && self.control.end_tick() == target => {
+                self.answer(wish.reply, format!("ended at tick {target}, {} on", ticks_in_words(ticks)));
+            }
+            (goal, _) => self.wish = Some(Wish { goal, reply: wish.reply }),
+        }
+    }
+
+    /// Lets the run, held at `tick`, go for `ticks` ticks.
+    fn step(&mut self, tick: u32, ticks: u32, reply: Reply) {
+        let left = self.control.end_tick() - tick;
+        if ticks > left {
+            let end = self.control.end_tick();
+            let left = ticks_in_words(left);
+            let reason = format!("paused at tick {tick}: only {left} left of a run that ends at tick {end}");
+            return reply.send(&Answer::refused(reason));
+        }
+        let target = tick + ticks;
+        self.control.set_hold_tick(target);
+        self.wish(Goal::Step { ticks, target }, reply);
+    }
+}
+
+fn ticks_in_words(ticks: u32) -> String {
+    if ticks == 1 { "1 tick".to_owned() } else { format!("{ticks} ticks") }
+}
+
+impl Drop for Desk<'_> {
+    fn drop(&mut self) {
+        // A step may have come to the run's end since the last look.
+        self.grant_wish();
+    }
+}

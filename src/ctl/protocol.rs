@@ -1,0 +1,200 @@
+//! What can be asked of a live run: one JSON object a line, answered by one JSON object a line.
+
+use crate::manifest::PaceSetting;
+use bus::control::{Control, Phase};
+use bus::plan::Plan;
+use serde::{Deserialize, Serialize};
+
+/// The name of the socket in the run directory.
+pub const SOCKET: &str = "ctl.sock";
+
+/// What can be asked of a run.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[serde(tag = "request", rename_all = "kebab-case", deny_unknown_fields)]
+pub enum Request {
+    /// How far it has come.
+    Status,
+    /// Hold at the next tick boundary; answered when the run is held.
+    Pause,
+    /// Run this many ticks from the hold; answered when the run is held again.
+    Step {
+        /// How many, at least 1.
+        ticks: u32,
+    },
+    /// Go on from the hold.
+    Resume,
+    /// Change the pace.
+    Pace {
+        /// To this.
+        pace: PaceSetting,
+    },
+    /// End at the next tick boundary.
+    Stop,
+    /// Replace a process; answered when the successor has taken over.
+    Swap {
+        /// The process to replace.
+        process: String,
+        /// The successor: TOML with the keys of a process in a manifest.
+        with: String,
+        /// Ticks that it computes beside the process first.
+        shadow_ticks: Option<u32>,
+        /// The tick from which on its outputs count.
+        at_tick: Option<u32>,
+    },
+}
+
+/// What a run answers.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[serde(tag = "answer", rename_all = "kebab-case")]
+pub enum Answer {
+    /// What was asked has happened.
+    Done {
+        /// What happened, in words.
+        text: String,
+        /// Ticks that every process has completed.
+        tick: u32,
+    },
+    /// How far the run has come.
+    Status(Status),
+    /// What was asked did not happen.
+    Refused {
+        /// Why.
+        reason: String,
+    },
+}
+
+impl Answer {
+    /// A refusal.
+    pub fn refused(reason: impl Into<String>) -> Self {
+        Self::Refused { reason: reason.into() }
+    }
+}
+
+/// What a run is doing.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum State {
+    /// Its processes are connecting.
+    Starting,
+    /// Ticks are granted.
+    Running,
+    /// Ticks are granted up to the next hold.
+    Stepping,
+    /// It is about to be held.
+    Pausing,
+    /// It is held at a tick boundary.
+    Paused,
+    /// It is ending before its time.
+    Stopping,
+    /// It has completed its last tick, or its launcher has gone.
+    Ended,
+}
+
+impl State {
+    /// What the run of `control` is doing.
+    pub fn of(control: &Control) -> Self {
+        let ticks = control.completed_ticks();
+        match control.hold_tick() {
+            _ if control.phase() != Phase::Running => Self::Starting,
+            _ if ticks >= control.end_tick() => Self::Ended,
+            _ if control.is_stop_requested() || control.is_aborted() => Self::Stopping,
+            _ if control.held_at().is_some() => Self::Paused,
+            u32::MAX => Self::Running,
+            hold_tick if hold_tick > ticks => Self::Stepping,
+            _ => Self::Pausing,
+        }
+    }
+
+    /// The state as a word.
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Starting => "starting",
+            Self::Running => "running",
+            Self::Stepping => "stepping",
+            Self::Pausing => "pausing",
+            Self::Paused => "paused",
+            Self::Stopping => "stopping",
+            Self::Ended => "ended",
+        }
+    }
+}
+
+/// How far a run has come.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct Status {
+    /// The run's name.
+    pub run_id: String,
+    /// What it is doing.
+    pub state: State,
+    /// Ticks that every process has completed.
+    pub tick: u32,
+    /// The tick at which the run ends.
+    pub end_tick: u32,
+    /// Simulated time, in seconds.
+    pub time_s: f64,
+    /// The pace that is asked for.
+    pub pace: PaceSetting,
+    /// Deadlines missed (paced runs).
+    pub missed_deadlines: u32,
+}
+
+impl Status {
+    /// How far the run of `plan` has come.
+    pub fn of(plan: &Plan, control: &Control) -> Self {
+        let tick = control.completed_ticks();
+        Self {
+            run_id: plan.run_id.clone(),
+            state: State::of(control),
+            tick,
+            end_tick: control.end_tick(),
+            time_s: f64::from(tick) * plan.tick_s(),
+            pace: PaceSetting(control.pace()),
+            missed_deadlines: control.missed_deadlines(),
+        }
+    }
+}
+
+impl std::fmt::Display for Status {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let Self { run_id, state, tick, end_tick, time_s, pace, missed_deadlines } = self;
+        write!(f, "{run_id}: {} at tick {tick} of {end_tick} ({time_s:.3} s), pace {pace}", state.word())?;
+        if *missed_deadlines > 0 { write!(f, ", {missed_deadlines} deadlines missed") } else { Ok(()) }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Answer, Request};
+
+    /// Requires that `line` is what a request is written as and read from.
+    fn require_round_trip(line: &str) {
+        let request: Request = serde_json::from_str(line).unwrap_or_else(|error| panic!("{line}: {error}"));
+        assert_eq!(serde_json::to_string(&request).unwrap(), line);
+    }
+
+    #[test]
+    fn a_request_is_one_json_object() {
+        require_round_trip(r#"{"request":"status"}"#);
+        require_round_trip(r#"{"request":"step","ticks":7}"#);
+        require_round_trip(r#"{"request":"pace","pace":"free"}"#);
+        require_round_trip(r#"{"request":"pace","pace":"realtime"}"#);
+        require_round_trip(r#"{"request":"pace","pace":"0.25"}"#);
+        require_round_trip(
+            r#"{"request":"swap","process":"pid","with":"kind='pid'","shadow_ticks":5,"at_tick":null}"#,
+        );
+        for wrong in [r#"{"request":"fly"}"#, r#"{"request":"step"}"#, r#"{"request":"pace","pace":-1}"#] {
+            assert!(serde_json::from_str::<Request>(wrong).is_err(), "{wrong}");
+        }
+    }
+
+    #[test]
+    fn an_answer_is_one_json_object() {
+        let done = Answer::Done { text: "paused at tick 5".to_owned(), tick: 5 };
+        assert_eq!(
+            serde_json::to_string(&done).unwrap(),
+            r#"{"answer":"done","text":"paused at tick 5","tick":5}"#
+        );
+        let refused = serde_json::to_string(&Answer::refused("no")).unwrap();
+        assert_eq!(refused, r#"{"answer":"refused","reason":"no"}"#);
+    }
+}

@@ -1,0 +1,138 @@
+//! Inputs: who reads which topic, how late, and in which order a node waits for them.
+
+use super::outputs::{Published, require_known_ports};
+use super::processes::Member;
+use crate::manifest::{InputSetting, Manifest};
+use crate::placement;
+use crate::problem::{Problem, nearest};
+use crate::program::Executable;
+use bus::kind::{Inputs, NodeKind, PortSpec};
+use bus::plan::{InputPlan, NodePlan, TopicPlan};
+use toml::Spanned;
+
+/// The inputs of `member`, wired to `topics`.
+///
+/// # Errors
+/// A port or topic that is not there, or does not fit.
+pub fn inputs(
+    manifest: &Manifest,
+    member: &Member<'_>,
+    topics: &[TopicPlan],
+) -> Result<Vec<InputPlan>, Problem> {
+    let Member { name, process, program } = member;
+    if let Executable::Kind(NodeKind { inputs: Inputs::Any, .. }) = &program.executable
+        && process.inputs.is_empty()
+    {
+        let all = topics.iter().enumerate();
+        let port = |(topic, plan): (usize, &TopicPlan)| InputPlan {
+            port: plan.name.clone(),
+            topic,
+            delay_ticks: 0,
+            initial: None,
+        };
+        return Ok(all.map(port).collect());
+    }
+    if let Executable::Kind(NodeKind { inputs: Inputs::Ports(ports), .. }) = &program.executable {
+        let used = process.inputs.keys().map(|port| (port.get_ref(), port.span()));
+        require_known_ports(manifest, "input", name, ports, used)?;
+        let is_wired = |port: &PortSpec| process.inputs.keys().any(|wired| wired.get_ref() == port.name);
+        if let Some(missing) = ports.iter().find(|port| port.required && !is_wired(port)) {
+            return Err(manifest.problem(
+                &name.span(),
+                format!("process `{}` has no publisher for its input `{}`", name.get_ref(), missing.name),
+                format!(
+                    "add [process.{}.inputs] {} = \"/…\", a topic of {}",
+                    name.get_ref(),
+                    missing.name,
+                    missing.schema.type_name
+                ),
+            ));
+        }
+    }
+    process.inputs.iter().map(|(port, setting)| input(manifest, member, port, setting, topics)).collect()
+}
+
+fn input(
+    manifest: &Manifest,
+    member: &Member<'_>,
+    port: &Spanned<String>,
+    setting: &InputSetting,
+    topics: &[TopicPlan],
+) -> Result<InputPlan, Problem> {
+    let Member { name, program, .. } = member;
+    let at = |message: String, help: String| manifest.problem(&port.span(), message, help);
+    let who = format!("input `{}` of `{}`", port.get_ref(), name.get_ref());
+    let Some(topic) = topics.iter().position(|topic| topic.name == setting.topic) else {
+        let known: Vec<&str> = topics.iter().map(|topic| topic.name.as_str()).collect();
+        let list = format!("the topics are {}", known.join(", "));
+        let help = nearest(&setting.topic, known).map_or(list, |near| format!("did you mean {near}?"));
+        return Err(at(format!("{who}: nobody publishes {}", setting.topic), help));
+    };
+    if let Executable::Kind(NodeKind { inputs: Inputs::Ports(ports), .. }) = &program.executable {
+        let spec = ports.iter().find(|spec| spec.name == port.get_ref().as_str());
+        let expected = spec.map_or("", |spec| spec.schema.type_name);
+        let found = &topics[topic].type_name;
+        if expected != found {
+            let help = format!("wire a topic of {expected}");
+            return Err(at(format!("{who} reads {expected}, {} carries {found}", setting.topic), help));
+        }
+    }
+    match (setting.delay_ticks, &setting.initial) {
+        (0, None) | (1, Some(_)) => {}
+        (0, Some(_)) => {
+            return Err(at(format!("{who} has an initial value but no delay"), "add delay_ticks = 1".into()));
+        }
+        (1, None) => {
+            return Err(at(
+                format!("{who} is delayed and has no initial value"),
+                "state what it reads at tick 0, such as initial = { command = [1, 1, 1, 1] }".into(),
+            ));
+        }
+        (delay, _) => {
+            return Err(at(format!("{who} has delay_ticks = {delay}"), "a delay is 0 or 1 tick".into()));
+        }
+    }
+    let schema = bus::messages::all().into_iter().find(|schema| schema.type_name == topics[topic].type_name);
+    if let (Some(schema), Some(initial)) = (schema, &setting.initial) {
+        bus::initial::sample(schema, initial).map_err(|reason| {
+            at(format!("{who}: initial value: {reason}"), format!("give fields of {}", schema.type_name))
+        })?;
+    }
+    Ok(InputPlan {
+        port: port.get_ref().clone(),
+        topic,
+        delay_ticks: setting.delay_ticks,
+        initial: setting.initial.clone(),
+    })
+}
+
+/// Refuses a cycle of edges without delay: at its first tick every node of it would wait for another.
+pub fn require_no_cycle(
+    manifest: &Manifest,
+    members: &[Member<'_>],
+    nodes: &[NodePlan],
+    published: &[Published],
+    changed: Option<usize>,
+) -> Result<(), Problem> {
+    let Some(cycle) = placement::zero_delay_cycle(nodes, |topic| published[topic].node) else {
+        return Ok(());
+    };
+    let path: Vec<&str> =
+        cycle.iter().chain(cycle.first()).map(|&node| members[node].name.get_ref().as_str()).collect();
+    Err(manifest.problem(
+        &members[changed.filter(|node| cycle.contains(node)).unwrap_or(cycle[0])].name.span(),
+        format!("a cycle without delay: {}", path.join(" → ")),
+        "give one input of the cycle delay_ticks = 1 and an initial value, usually the plant's command",
+    ))
+}
+
+/// Puts each node's inputs in the order in which they are waited for: the one that arrives last first.
+pub fn order_inputs(nodes: &mut [NodePlan], published: &[Published]) {
+    let depths = placement::depths(nodes, |topic| published[topic].node);
+    for node in nodes {
+        node.inputs.sort_by_key(|input| {
+            let producer_depth = if input.delay_ticks == 0 { depths[published[input.topic].node] } else { 0 };
+            std::cmp::Reverse(producer_depth)
+        });
+    }
+}

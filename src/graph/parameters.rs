@@ -1,0 +1,82 @@
+//! Parameters: what each node reads about itself, checked by its kind.
+
+use super::processes::Member;
+use crate::manifest::{Manifest, Process};
+use crate::problem::Problem;
+use crate::program::Executable;
+use bus::plan::NodePlan;
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+use toml::Spanned;
+
+/// Gives `node` the parameters of `member`, files resolved, checked where its kind is built in; notes its
+/// vehicle file in `vehicles`.
+///
+/// # Errors
+/// A file or a parameter that is refused.
+pub fn set(
+    manifest: &Manifest,
+    member: &Member<'_>,
+    node: &mut NodePlan,
+    vehicles: &mut Vec<PathBuf>,
+) -> Result<(), Problem> {
+    let Member { name, process, program } = member;
+    let mut parameters: BTreeMap<&str, serde_json::Value> =
+        process.parameters.iter().map(|(key, value)| (key.get_ref().as_str(), value.clone())).collect();
+    for (key, file) in [("vehicle", &process.vehicle), ("data", &process.data)] {
+        if let Some(file) = file {
+            let path = manifest.resolve(file)?;
+            parameters.insert(key, path.to_string_lossy().into());
+            if key == "vehicle" && !vehicles.contains(&path) {
+                vehicles.push(path);
+            }
+        }
+    }
+    let parameters = serde_json::to_value(parameters).unwrap_or_default();
+    if program.is_recorder() {
+        require_none(manifest, process)?;
+    } else if let Executable::Kind(kind) = &program.executable {
+        let inputs: Vec<&str> = process.inputs.keys().map(|port| port.get_ref().as_str()).collect();
+        (kind.check)(&parameters, &inputs).map_err(|reason| refused(manifest, name, process, &reason))?;
+    }
+    node.parameters = parameters;
+    Ok(())
+}
+
+/// A recorder's file and attachments come from the launcher.
+fn require_none(manifest: &Manifest, process: &Process) -> Result<(), Problem> {
+    match process.parameters.keys().next() {
+        None => Ok(()),
+        Some(key) => Err(manifest.problem(
+            &key.span(),
+            format!("a recorder has no parameter `{}`", key.get_ref()),
+            "name the file with run.record or --record, and the topics with inputs",
+        )),
+    }
+}
+
+/// The place of a refused parameter: that of the first key or file the reason names, or of the process.
+fn refused(manifest: &Manifest, name: &Spanned<String>, process: &Process, reason: &str) -> Problem {
+    let mut files = [&process.vehicle, &process.data].into_iter().flatten();
+    let is_named = |file: &&Spanned<String>| {
+        manifest.resolve(file).is_ok_and(|path| reason.contains(&*path.to_string_lossy()))
+    };
+    let named_file = files.find(is_named).map(Spanned::span);
+    let mut quoted = reason.split('`').skip(1).step_by(2);
+    let key = |word: &str| process.parameters.keys().find(|key| key.get_ref() == word).map(Spanned::span);
+    let file = |word: &str| match word {
+        "vehicle" => process.vehicle.as_ref().map(Spanned::span),
+        "data" => process.data.as_ref().map(Spanned::span),
+        _ => None,
+    };
+    let span = quoted
+        .find_map(|word| key(word).or_else(|| file(word)))
+        .or(named_file)
+        .unwrap_or_else(|| name.span());
+    let help = match reason.split('`').nth(1).filter(|_| reason.starts_with("missing field")) {
+        Some(file @ ("vehicle" | "data")) => format!("add {file} = \"PATH\" to [process.{}]", name.get_ref()),
+        Some(key) => format!("add {key} = … to [process.{}.parameters]", name.get_ref()),
+        None => String::new(),
+    };
+    manifest.problem(&span, format!("process `{}`: {reason}", name.get_ref()), help)
+}

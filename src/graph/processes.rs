@@ -1,0 +1,347 @@
+//! Processes: what each executes, and how it runs on the host.
+
+use crate::kinds;
+use crate::manifest::{Manifest, Process};
+use crate::problem::{Problem, nearest};
+use crate::program::{Executable, OnExit, Program};
+use bus::GENERATION_VARIABLE;
+use bus::NODE_VARIABLE;
+use bus::plan::NodePlan;
+use bus::process::{LAUNCHER_VARIABLE, RUN_VARIABLE};
+use std::collections::BTreeMap;
+use std::os::unix::fs::PermissionsExt;
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+use toml::Spanned;
+
+/// A process that takes part in the ticks, on its way into the plan.
+#[derive(Clone)]
+pub struct Member<'m> {
+    /// Its name.
+    pub name: &'m Spanned<String>,
+    /// What the manifest says of it.
+    pub process: &'m Process,
+    /// What is started.
+    pub program: Program,
+}
+
+/// The processes that take part in the ticks, by name.
+///
+/// # Errors
+/// If there is none, or one cannot be started.
+pub fn members(manifest: &Manifest) -> Result<Vec<Member<'_>>, Problem> {
+    let members = manifest.content.process.iter().filter(|(_, process)| takes_part(process));
+    let member = |(name, process)| Ok(Member { name, process, program: program(manifest, name, process)? });
+    let members = members.map(member).collect::<Result<Vec<_>, _>>()?;
+    if members.is_empty() {
+        return Err(Problem::in_file(&manifest.path, "there is no process", "add [process.<name>] tables"));
+    }
+    Ok(members)
+}
+
+/// The processes that do not, by name.
+///
+/// # Errors
+/// If one says what only a node can, or cannot be started.
+pub fn companions(manifest: &Manifest) -> Result<Vec<(String, Program)>, Problem> {
+    let companions = manifest.content.process.iter().filter(|(_, process)| !takes_part(process));
+    let companion = |(name, process): (&Spanned<String>, &Process)| {
+        require_no_node(manifest, name, process)?;
+        Ok((name.get_ref().clone(), program(manifest, name, process)?))
+    };
+    companions.map(companion).collect()
+}
+
+fn takes_part(process: &Process) -> bool {
+    process.lockstep.as_ref().is_none_or(|lockstep| *lockstep.get_ref())
+}
+
+/// A companion has no ports and no place in the ticks.
+fn require_no_node(manifest: &Manifest, name: &Spanned<String>, process: &Process) -> Result<(), Problem> {
+    let first_key = |key: Option<&Spanned<String>>| key.map(Spanned::span);
+    let stated = [
+        ("kind", process.kind.as_ref().map(Spanned::span)),
+        ("vehicle", process.vehicle.as_ref().map(Spanned::span)),
+        ("data", process.data.as_ref().map(Spanned::span)),
+        ("period_ticks", process.period_ticks.as_ref().map(Spanned::span)),
+        ("cpu", process.cpu.as_ref().map(Spanned::span)),
+        ("wait", process.wait.map(|_| name.span())),
+        ("on_exit", process.on_exit.as_ref().map(Spanned::span)),
+        ("watchdog_ms_host", process.watchdog_ms_host.as_ref().map(Spanned::span)),
+        ("parameters", first_key(process.parameters.keys().next())),
+        ("inputs", first_key(process.inputs.keys().next())),
+        ("outputs", first_key(process.outputs.keys().next())),
+    ];
+    match stated.into_iter().find_map(|(key, span)| span.map(|span| (key, span))) {
+        None => Ok(()),
+        Some((key, span)) => Err(manifest.problem(
+            &span,
+            format!("`{key}` of `{}`, which has lockstep = false", name.get_ref()),
+            "a companion is a `command` that takes no part in the ticks; leave the key or `lockstep` out",
+        )),
+    }
+}
+
+/// What `process` executes and how.
+///
+/// # Errors
+/// If it cannot be started here.
+pub fn program(manifest: &Manifest, name: &Spanned<String>, process: &Process) -> Result<Program, Problem> {
+    require_name(manifest, name)?;
+    require_environment(manifest, process)?;
+    require_core(manifest, process.cpu.as_ref(), "cpu")?;
+    Ok(Program {
+        environment: process.environment.iter().map(|(k, v)| (k.get_ref().clone(), v.clone())).collect(),
+        working_directory: working_directory(manifest, process)?,
+        nice: within(manifest, "nice", process.nice.as_ref(), -20, 19)?,
+        realtime_priority: within(manifest, "realtime_priority", process.realtime_priority.as_ref(), 1, 99)?,
+        on_exit: process.on_exit.as_ref().map_or(OnExit::Stop, |on_exit| *on_exit.get_ref()),
+        watchdog: watchdog(manifest, process)?,
+        log: log(manifest, process)?,
+        ..Program::of(executable(manifest, name, process)?)
+    })
+}
+
+fn executable(manifest: &Manifest, name: &Spanned<String>, process: &Process) -> Result<Executable, Problem> {
+    match (&process.kind, &process.command) {
+        (Some(kind), None) => {
+            let known = kinds::KINDS.map(|kind| kind.name);
+            let help = match nearest(kind.get_ref(), known) {
+                Some(near) => format!("did you mean `{near}`? The kinds are {}", kinds::names()),
+                None => format!("the kinds are {}", kinds::names()),
+            };
+            let message = format!("there is no kind `{}`", kind.get_ref());
+            let kind =
+                kinds::find(kind.get_ref()).ok_or_else(|| manifest.problem(&kind.span(), message, help))?;
+            Ok(Executable::Kind(kind))
+        }
+        (None, Some(command)) => self::command(manifest, name, process, command).map(Executable::Command),
+        (Some(_), Some(command)) => Err(manifest.problem(
+            &command.span(),
+            format!("process `{}` has both `kind` and `command`", name.get_ref()),
+            "leave one of them out",
+        )),
+        (None, None) => Err(nameless(manifest, name)),
+    }
+}
+
+/// A process that nothing says what it is: most likely a name in a `--set` that is no process's.
+fn nameless(manifest: &Manifest, name: &Spanned<String>) -> Problem {
+    let found = name.get_ref();
+    if !manifest.is_override(&name.span()) {
+        let message = format!("process `{found}` needs either `kind` or `command`");
+        return manifest.problem(&name.span(), message, format!("the kinds are {}", kinds::names()));
+    }
+    let others = manifest.content.process.keys().map(|name| name.get_ref().as_str());
+    let known: Vec<&str> = others.filter(|name| name != found).collect();
+    let list = format!("the processes are {}", known.join(", "));
+    let help = nearest(found, known).map_or(list, |near| format!("did you mean `{near}`?"));
+    manifest.problem(&name.span(), format!("there is no process `{found}`"), help)
+}
+
+/// The words of a command; the first becomes the path of a file that can be executed.
+fn command(
+    manifest: &Manifest,
+    name: &Spanned<String>,
+    process: &Process,
+    command: &Spanned<Vec<String>>,
+) -> Result<Vec<String>, Problem> {
+    let refused = |message: &str, help: &str| manifest.problem(&command.span(), message, help);
+    let Some((word, arguments)) = command.get_ref().split_first() else {
+        return Err(refused("`command` is empty", "name an executable and its arguments"));
+    };
+    if command.get_ref().iter().any(|word| word.contains('\0')) {
+        return Err(refused("a word of `command` holds a NUL", "no program can be given one"));
+    }
+    let who = format!("process `{}`: cannot start", name.get_ref());
+    if !word.contains('/') {
+        let found = in_path(process, word).ok_or_else(|| {
+            let message = format!("{who} `{word}`: no folder of PATH holds such an executable");
+            refused(&message, "install it, or give a path with a `/`, relative to the manifest")
+        })?;
+        return Ok(std::iter::once(&found).chain(arguments).cloned().collect());
+    }
+    let path = manifest.resolve(&Spanned::new(command.span(), word.clone()))?;
+    if !is_executable(&path) {
+        let (why, help) = match path.is_file() {
+            true => ("it is not executable", "make it so with chmod +x"),
+            false => {
+                ("there is no such file", "build it, or correct the path, which is relative to the manifest")
+            }
+        };
+        return Err(refused(&format!("{who} {}: {why}", path.display()), help));
+    }
+    let path = path.to_string_lossy().into_owned();
+    Ok(std::iter::once(&path).chain(arguments).cloned().collect())
+}
+
+/// The file behind a bare name, in the folders of the PATH that the process will have.
+fn in_path(process: &Process, word: &str) -> Option<String> {
+    let own = process.environment.iter().find(|(name, _)| name.get_ref() == "PATH");
+    let path = own.map(|(_, path)| path.into()).or_else(|| std::env::var_os("PATH"))?;
+    let mut files = std::env::split_paths(&path).map(|folder| folder.join(word));
+    let found = files.find(|file| !word.is_empty() && is_executable(file))?;
+    Some(std::path::absolute(&found).unwrap_or(found).to_string_lossy().into_owned())
+}
+
+fn is_executable(path: &Path) -> bool {
+    path.metadata().is_ok_and(|file| file.is_file() && file.permissions().mode() & 0o111 != 0)
+}
+
+/// Each part of a name: the process's own, or a vehicle's and the process's in its set.
+fn require_name(manifest: &Manifest, name: &Spanned<String>) -> Result<(), Problem> {
+    let text = name.get_ref();
+    let fits = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '-' || c == '_';
+    if text != "clock" && text.split('/').all(|part| !part.is_empty() && part.chars().all(fits)) {
+        return Ok(());
+    }
+    Err(manifest.problem(
+        &name.span(),
+        format!("`{text}` cannot name a process"),
+        "use lower-case letters, digits, `-` and `_`; `clock` is taken by the clock service",
+    ))
+}
+
+/// Ticks between two computations of `process`.
+///
+/// # Errors
+/// If it is 0.
+pub fn period_ticks(manifest: &Manifest, process: &Process) -> Result<u32, Problem> {
+    match &process.period_ticks {
+        None => Ok(1),
+        Some(period) if *period.get_ref() >= 1 => Ok(*period.get_ref()),
+        Some(period) => {
+            Err(manifest.problem(&period.span(), "`period_ticks` is 0", "a node runs every 1 or more ticks"))
+        }
+    }
+}
+
+fn require_environment(manifest: &Manifest, process: &Process) -> Result<(), Problem> {
+    for (name, value) in &process.environment {
+        let text = name.get_ref();
+        if [GENERATION_VARIABLE, LAUNCHER_VARIABLE, NODE_VARIABLE, RUN_VARIABLE].contains(&text.as_str()) {
+            let help = "leave it out: by it a process finds its run";
+            return Err(manifest.problem(&name.span(), format!("{text} is set by the launcher"), help));
+        }
+        if text.is_empty() || text.contains(['=', '\0']) || value.contains('\0') {
+            let message = format!("{text:?} = {value:?} cannot be an environment variable");
+            return Err(manifest.problem(&name.span(), message, "a name has no `=`, and neither has a NUL"));
+        }
+    }
+    Ok(())
+}
+
+/// Refuses a core that this machine does not have, or does not allow.
+///
+/// # Errors
+/// With the cores there are.
+pub fn require_core(manifest: &Manifest, cpu: Option<&Spanned<usize>>, key: &str) -> Result<(), Problem> {
+    let (Some(cpu), allowed) = (cpu, bus::process::allowed_cores()) else { return Ok(()) };
+    if allowed.is_empty() || allowed.contains(cpu.get_ref()) {
+        return Ok(());
+    }
+    let list: Vec<String> = allowed.iter().map(ToString::to_string).collect();
+    let message = format!("`{key}` is {}, a core that is not allowed here", cpu.get_ref());
+    Err(manifest.problem(&cpu.span(), message, format!("the allowed cores are {}", list.join(", "))))
+}
+
+fn within(
+    manifest: &Manifest,
+    key: &str,
+    value: Option<&Spanned<i32>>,
+    min: i32,
+    max: i32,
+) -> Result<Option<i32>, Problem> {
+    match value {
+        Some(value) if !(min..=max).contains(value.get_ref()) => Err(manifest.problem(
+            &value.span(),
+            format!("`{key}` is {}", value.get_ref()),
+            format!("it goes from {min} to {max}"),
+        )),
+        value => Ok(value.map(|value| *value.get_ref())),
+    }
+}
+
+fn watchdog(manifest: &Manifest, process: &Process) -> Result<Duration, Problem> {
+    match &process.watchdog_ms_host {
+        None => Ok(crate::program::WATCHDOG),
+        Some(limit) if *limit.get_ref() >= 1 => Ok(Duration::from_millis(*limit.get_ref())),
+        Some(limit) => Err(manifest.problem(
+            &limit.span(),
+            "`watchdog_ms_host` is 0: no process computes in no time",
+            "give milliseconds of host time, such as 20000",
+        )),
+    }
+}
+
+fn working_directory(manifest: &Manifest, process: &Process) -> Result<Option<PathBuf>, Problem> {
+    let Some(written) = &process.working_directory else { return Ok(None) };
+    let path = manifest.resolve(written)?;
+    if path.is_dir() {
+        return Ok(Some(path));
+    }
+    let message = format!("`working_directory`: {} is no folder", path.display());
+    Err(manifest.problem(&written.span(), message, "make it, or correct the path"))
+}
+
+fn log(manifest: &Manifest, process: &Process) -> Result<Option<PathBuf>, Problem> {
+    let Some(written) = &process.log else { return Ok(None) };
+    let path = manifest.resolve(written)?;
+    let at = |message: String, help: &str| Err(manifest.problem(&written.span(), message, help));
+    if path.is_dir() {
+        return at(format!("`log`: {} is a folder", path.display()), "name a file in it");
+    }
+    match path.parent().filter(|folder| folder.is_dir()) {
+        Some(_) => Ok(Some(path)),
+        None => at(format!("`log`: the folder of {} is not there", path.display()), "make it"),
+    }
+}
+
+/// Refuses two processes that would write over each other's log.
+///
+/// # Errors
+/// With both names.
+pub fn require_own_logs(manifest: &Manifest) -> Result<(), Problem> {
+    let mut logs: BTreeMap<PathBuf, &str> = BTreeMap::new();
+    for (name, process) in &manifest.content.process {
+        let Some(written) = &process.log else { continue };
+        if let Some(other) = logs.insert(manifest.resolve(written)?, name.get_ref()) {
+            let message = format!("`log`: `{}` writes to the file of `{other}`", name.get_ref());
+            let help = "give each a file of its own, those of a set in the [[vehicle]] tables";
+            return Err(manifest.problem(&written.span(), message, help));
+        }
+    }
+    Ok(())
+}
+
+/// Refuses to keep a run going without a process where that cannot work.
+///
+/// # Errors
+/// With the reason.
+pub fn require_replaceable(manifest: &Manifest, member: &Member<'_>, node: &NodePlan) -> Result<(), Problem> {
+    let Some(on_exit) = member.process.on_exit.as_ref().filter(|kept| *kept.get_ref() != OnExit::Stop) else {
+        return Ok(());
+    };
+    match irreplaceable(member, node) {
+        None => Ok(()),
+        Some(reason) => {
+            let message = format!("`on_exit` of `{}`: {reason}", member.name.get_ref());
+            Err(manifest.problem(
+                &on_exit.span(),
+                message,
+                "leave it out: the run stops when the process does",
+            ))
+        }
+    }
+}
+
+/// Why another process cannot go on in the place of this one.
+pub fn irreplaceable(member: &Member<'_>, node: &NodePlan) -> Option<&'static str> {
+    if member.program.is_recorder() {
+        Some("it is the recorder, and its file would be torn")
+    } else if node.outputs.is_empty() {
+        Some("it has no outputs, so nothing could be handed over")
+    } else {
+        None
+    }
+}

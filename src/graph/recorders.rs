@@ -1,0 +1,39 @@
+//! Recorders: one, and it takes every sample.
+
+use super::processes::Member;
+use crate::manifest::Manifest;
+use crate::problem::Problem;
+use bus::plan::NodePlan;
+
+/// A second recorder would write to the same file.
+pub fn require_one_recorder(manifest: &Manifest, members: &[Member<'_>]) -> Result<(), Problem> {
+    let mut recorders =
+        members.iter().filter(|member| member.program.is_recorder()).map(|member| member.name);
+    match (recorders.next(), recorders.next()) {
+        (Some(first), Some(second)) => Err(manifest.problem(
+            &second.span(),
+            format!("`{}` is a second recorder beside `{}`", second.get_ref(), first.get_ref()),
+            "a run has one recording: give all topics to one recorder",
+        )),
+        _ => Ok(()),
+    }
+}
+
+/// A recorder that ran less often, or looked back, would leave samples out.
+pub fn require_whole_recording(
+    manifest: &Manifest,
+    members: &[Member<'_>],
+    nodes: &[NodePlan],
+) -> Result<(), Problem> {
+    let recorders = members.iter().zip(nodes).filter(|(member, _)| member.program.is_recorder());
+    for (Member { name, .. }, node) in recorders {
+        if node.period_ticks != 1 || node.inputs.iter().any(|input| input.delay_ticks != 0) {
+            return Err(manifest.problem(
+                &name.span(),
+                format!("the recorder `{}` would leave samples out", name.get_ref()),
+                "leave `period_ticks` and `delay_ticks` out: a recorder takes every sample",
+            ));
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,351 @@
+//! Successors: processes that shadow a node, take over from it, or stand by for it.
+
+use super::processes::{Member, irreplaceable, members, program};
+use super::{Graph, parameters, wire};
+use crate::manifest::{Manifest, OutputSetting, Process, SwapSetting};
+use crate::problem::Problem;
+use crate::program::{Executable, Program, Successor};
+use bus::kind::NodeKind;
+use bus::plan::{NodePlan, Plan};
+use std::collections::BTreeMap;
+use std::ops::Range;
+use std::path::PathBuf;
+use toml::Spanned;
+
+/// Inputs that a successor may have where the process it succeeds has fewer: its edges are laid out before
+/// the run.
+const INPUTS_MAX: usize = 8;
+/// More swaps of one kind than any run has use for.
+const REPEAT_MAX: u32 = 100_000;
+/// Ticks between a take-over and the next joining, beside two of the longest periods: until then the process
+/// before has left.
+const SETTLE_TICKS: u64 = 2;
+
+/// What is known about the run that the successors join.
+struct Run<'m> {
+    manifest: &'m Manifest,
+    plan: &'m Plan,
+    members: &'m [Member<'m>],
+}
+
+/// A successor and the place that asks for it.
+struct Placed {
+    successor: Successor,
+    span: Range<usize>,
+}
+
+/// Every successor that the manifest asks for, in the order in which they join.
+///
+/// # Errors
+/// One that cannot join, or cannot be what it is asked to be.
+pub fn all(
+    manifest: &Manifest,
+    plan: &Plan,
+    members: &[Member<'_>],
+    vehicles: &mut Vec<PathBuf>,
+) -> Result<Vec<Successor>, Problem> {
+    let run = Run { manifest, plan, members };
+    let mut placed = Vec::new();
+    for (node, member) in members.iter().enumerate() {
+        if let Some(standby) = &member.process.standby {
+            let (plan, program) = run.resolve(node, standby.get_ref(), &standby.span(), vehicles)?;
+            placed.push(Placed { successor: lasting(node, true, plan, program), span: standby.span() });
+        }
+    }
+    for shadow in &manifest.content.shadow {
+        let node = run.node(&shadow.get_ref().process)?;
+        let (plan, program) = run.resolve(node, &shadow.get_ref().with, &shadow.span(), vehicles)?;
+        placed.push(Placed { successor: lasting(node, false, plan, program), span: shadow.span() });
+    }
+    for swap in &manifest.content.swap {
+        let node = run.node(&swap.get_ref().process)?;
+        let (plan, program) = run.resolve(node, &swap.get_ref().with, &swap.span(), vehicles)?;
+        for (join_tick, at_tick) in run.times(node, swap)? {
+            let (plan, program) = (plan.clone(), program.clone());
+            let take_over_tick = Some(at_tick);
+            let successor = Successor { node, join_tick, take_over_tick, is_standby: false, program, plan };
+            placed.push(Placed { successor, span: swap.span() });
+        }
+    }
+    placed.sort_by_key(|placed| (placed.successor.join_tick, placed.successor.node));
+    run.require_one_at_a_time(&placed)?;
+    Ok(placed.into_iter().map(|placed| placed.successor).collect())
+}
+
+/// The successor of `process` in a run of `manifest` that is under way; `with_text` is TOML that says in what
+/// it differs, as `with` does. When it joins and takes over is left open.
+///
+/// # Errors
+/// If there is no such process, or it cannot be succeeded by that.
+pub fn successor_of(
+    manifest: &Manifest,
+    graph: &Graph,
+    process: &str,
+    with_text: &str,
+) -> Result<Successor, Problem> {
+    let (manifest, whole) = manifest.succeed(process, with_text)?;
+    let members = members(&manifest)?;
+    let run = Run { manifest: &manifest, plan: &graph.plan, members: &members };
+    let node = run.node(&Spanned::new(whole.span(), process.to_owned()))?;
+    let (plan, program) = run.resolve(node, whole.get_ref(), &whole.span(), &mut Vec::new())?;
+    Ok(lasting(node, false, plan, program))
+}
+
+/// A successor that computes from the first tick on and does not take over by the clock.
+fn lasting(node: usize, is_standby: bool, plan: NodePlan, program: Program) -> Successor {
+    Successor { node, join_tick: 0, take_over_tick: None, is_standby, program, plan }
+}
+
+impl Run<'_> {
+    /// The node named `process`, if another process can go on in its place.
+    fn node(&self, process: &Spanned<String>) -> Result<usize, Problem> {
+        let name = process.get_ref();
+        let at = |message: String, help: &str| Err(self.manifest.problem(&process.span(), message, help));
+        let Some(node) = self.members.iter().position(|member| member.name.get_ref() == name) else {
+            return at(format!("`{name}` takes no part in the ticks"), "only a node can be succeeded");
+        };
+        match irreplaceable(&self.members[node], &self.plan.nodes[node]) {
+            Some(reason) => at(format!("`{name}` cannot be succeeded: {reason}"), "name another process"),
+            None => Ok(node),
+        }
+    }
+
+    /// What the successor `whole` of `node` reads about itself, and what to start.
+    fn resolve(
+        &self,
+        node: usize,
+        whole: &Process,
+        span: &Range<usize>,
+        vehicles: &mut Vec<PathBuf>,
+    ) -> Result<(NodePlan, Program), Problem> {
+        let name = Spanned::new(span.clone(), self.plan.nodes[node].name.clone());
+        let program = program(self.manifest, &name, whole)?;
+        if let Executable::Kind(kind) = &program.executable {
+            self.require_same_outputs(node, kind, span)?;
+        }
+        let process = Process { outputs: self.outputs(node, span), ..whole.clone() };
+        let mut members = self.members.to_vec();
+        members[node] = Member { name: &name, process: &process, program };
+        let mut wiring = wire(self.manifest, &members, Some(node))?;
+        let mut plan = wiring.nodes.swap_remove(node);
+        parameters::set(self.manifest, &members[node], &mut plan, vehicles)?;
+        self.require_room(node, &plan, span)?;
+        for input in &mut plan.inputs {
+            // The same topics, but perhaps in another order.
+            let topic = &wiring.topics[input.topic].name;
+            input.topic = self.plan.topics.iter().position(|known| known.name == *topic).unwrap_or_default();
+        }
+        let present = &self.plan.nodes[node];
+        plan.outputs.clone_from(&present.outputs);
+        plan.cpu = plan.cpu.or(present.cpu);
+        Ok((plan, members.swap_remove(node).program))
+    }
+
+    /// The outputs of `node` as they are, written out.
+    fn outputs(&self, node: usize, span: &Range<usize>) -> BTreeMap<Spanned<String>, OutputSetting> {
+        let output = |output: &bus::plan::OutputPlan| {
+            let topic = &self.plan.topics[output.topic];
+            let setting = OutputSetting {
+                topic: Some(topic.name.clone()),
+                every_ticks: Some(topic.period_ticks),
+                type_name: Some(topic.type_name.clone()),
+            };
+            (Spanned::new(span.clone(), output.port.clone()), setting)
+        };
+        self.plan.nodes[node].outputs.iter().map(output).collect()
+    }
+
+    /// Refuses a kind that does not publish what `node` publishes.
+    fn require_same_outputs(&self, node: usize, kind: &NodeKind, span: &Range<usize>) -> Result<(), Problem> {
+        let present: Vec<(&str, &str)> = self.plan.nodes[node]
+            .outputs
+            .iter()
+            .map(|output| (output.port.as_str(), self.plan.topics[output.topic].type_name.as_str()))
+            .collect();
+        let ports = kind.outputs.iter().map(|port| (port.name, port.schema.type_name, port.required));
+        let knows_all = present.iter().all(|output| ports.clone().any(|(port, of, _)| (port, of) == *output));
+        let adds_none = ports.clone().all(|(port, of, required)| !required || present.contains(&(port, of)));
+        if knows_all && adds_none {
+            return Ok(());
+        }
+        let list = |outputs: Vec<(&str, &str)>| {
+            let words: Vec<String> = outputs.iter().map(|(port, of)| format!("`{port}` [{of}]")).collect();
+            if words.is_empty() { "nothing".to_owned() } else { words.join(", ") }
+        };
+        let message = format!(
+            "the kind `{}` publishes {}, but `{}`, which it would succeed, publishes {}",
+            kind.name,
+            list(ports.map(|(port, of, _)| (port, of)).collect()),
+            self.plan.nodes[node].name,
+            list(present),
+        );
+        Err(self.manifest.problem(span, message, "a successor publishes the same messages on the same ports"))
+    }
+
+    fn require_room(&self, node: usize, plan: &NodePlan, span: &Range<usize>) -> Result<(), Problem> {
+        let (found, present) = (plan.inputs.len(), self.plan.nodes[node].inputs.len());
+        let most = INPUTS_MAX.max(present);
+        if found <= most {
+            return Ok(());
+        }
+        let message = format!("the successor of `{}` has {found} inputs", plan.name);
+        let help = format!("it may have {most}: as many as the process it succeeds, or {INPUTS_MAX}");
+        Err(self.manifest.problem(span, message, help))
+    }
+
+    /// When a swap's successors join and take over.
+    fn times(&self, node: usize, swap: &Spanned<SwapSetting>) -> Result<Vec<(u32, u32)>, Problem> {
+        let setting = swap.get_ref();
+        let (at_tick, span) = self.at_tick(swap)?;
+        let repeat = self.repeat(swap)?;
+        let every_ticks = setting.every_ticks.as_ref().map_or(0, |every| *every.get_ref());
+        let at = |message: String, help: String| self.manifest.problem(&span, message, help);
+        let last = u64::from(at_tick) + u64::from(repeat - 1) * u64::from(every_ticks);
+        let end = self.plan.duration_ticks;
+        if last >= u64::from(end) {
+            let message = format!("the take-over at tick {last} lies beyond the run, which has {end} ticks");
+            return Err(at(message, format!("the last tick is {}", end - 1)));
+        }
+        let Some(join_tick) = at_tick.checked_sub(setting.shadow_ticks).filter(|join| *join >= 1) else {
+            let message = format!(
+                "it takes over at tick {at_tick} and would join {} ticks before, ahead of tick 1",
+                setting.shadow_ticks
+            );
+            return Err(at(message, "take over later, or lower `shadow_ticks`".to_owned()));
+        };
+        let period = self.plan.nodes[node].period_ticks;
+        for (what, tick) in
+            [("takes over at", at_tick), ("joins at", join_tick), ("repeats after", every_ticks)]
+        {
+            if !tick.is_multiple_of(period) {
+                let name = &self.plan.nodes[node].name;
+                let message = format!("it {what} tick {tick}, but `{name}` computes every {period} ticks");
+                return Err(at(message, format!("choose multiples of {period}")));
+            }
+        }
+        Ok((0..repeat).map(|n| (join_tick + n * every_ticks, at_tick + n * every_ticks)).collect())
+    }
+
+    /// The first tick at which a swap takes over, and its place.
+    fn at_tick(&self, swap: &Spanned<SwapSetting>) -> Result<(u32, Range<usize>), Problem> {
+        let at = |span: Range<usize>, message: &str, help: &str| self.manifest.problem(&span, message, help);
+        if swap.get_ref().shadow_ticks == 0 {
+            let help = "a successor computes at least one tick beside the process it succeeds";
+            return Err(at(swap.span(), "`shadow_ticks` is 0", help));
+        }
+        match (&swap.get_ref().at_tick, &swap.get_ref().at_s) {
+            (Some(tick), None) => Ok((*tick.get_ref(), tick.span())),
+            (None, Some(time)) => {
+                let ticks = time.get_ref() / self.plan.tick_s();
+                let is_whole = (ticks - ticks.round()).abs() < 1e-6;
+                if is_whole && (0.0..=f64::from(u32::MAX)).contains(&ticks) {
+                    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "checked")]
+                    return Ok((ticks.round() as u32, time.span()));
+                }
+                let message = format!("`at_s` is {} s, which is {ticks} ticks", time.get_ref());
+                Err(at(time.span(), &message, "give the time of a tick"))
+            }
+            (None, None) => Err(at(swap.span(), "the swap has no time", "add at_tick = … or at_s = …")),
+            (Some(_), Some(time)) => {
+                Err(at(time.span(), "the swap has both `at_tick` and `at_s`", "leave one of them out"))
+            }
+        }
+    }
+
+    fn repeat(&self, swap: &Spanned<SwapSetting>) -> Result<u32, Problem> {
+        let at =
+            |span: Range<usize>, message: String, help: &str| self.manifest.problem(&span, message, help);
+        match (&swap.get_ref().repeat, &swap.get_ref().every_ticks) {
+            (None, None) => Ok(1),
+            (Some(repeat), Some(_)) if (1..=REPEAT_MAX).contains(repeat.get_ref()) => Ok(*repeat.get_ref()),
+            (Some(repeat), Some(_)) => {
+                let message = format!("`repeat` is {}", repeat.get_ref());
+                Err(at(repeat.span(), message, "a swap happens 1 to 100 000 times"))
+            }
+            (Some(repeat), None) => {
+                Err(at(repeat.span(), "`repeat` without `every_ticks`".into(), "add every_ticks = …"))
+            }
+            (None, Some(every)) => {
+                Err(at(every.span(), "`every_ticks` without `repeat`".into(), "add repeat = …"))
+            }
+        }
+    }
+
+    /// Refuses a successor that joins while another one of the same node is there; `placed` is in order.
+    fn require_one_at_a_time(&self, placed: &[Placed]) -> Result<(), Problem> {
+        let longest = self.plan.nodes.iter().map(|node| node.period_ticks).max().unwrap_or(1);
+        let gap = SETTLE_TICKS + 2 * u64::from(longest);
+        let mut before: BTreeMap<usize, &Placed> = BTreeMap::new();
+        for next in placed {
+            let (node, join_tick) = (next.successor.node, next.successor.join_tick);
+            let Some(earlier) = before.insert(node, next) else { continue };
+            let name = &self.plan.nodes[node].name;
+            let at = |message: String, help: String| Err(self.manifest.problem(&next.span, message, help));
+            let Some(take_over) = earlier.successor.take_over_tick else {
+                let what = if earlier.successor.is_standby { "standby" } else { "shadow" };
+                let message = format!("`{name}` has a {what} already, which is there until the end");
+                return at(message, "a process has one shadow at a time: leave one of them out".to_owned());
+            };
+            if u64::from(join_tick) < u64::from(take_over) + gap {
+                let message = format!(
+                    "a successor of `{name}` would join at tick {join_tick}, too soon after the take-over at \
+                     tick {take_over}"
+                );
+                let earliest = u64::from(take_over) + gap;
+                let help = format!(
+                    "it can join at tick {earliest} or later; lower `shadow_ticks`, or take over later"
+                );
+                return at(message, help);
+            }
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::successor_of;
+    use crate::graph::Graph;
+    use crate::manifest::Manifest;
+    use std::path::Path;
+
+    fn hover() -> (Manifest, Graph) {
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("manifests/hover.toml");
+        let manifest = Manifest::load(&path, &["run.duration_s=1".to_owned()]).unwrap();
+        let graph = Graph::build(&manifest).unwrap();
+        (manifest, graph)
+    }
+
+    #[test]
+    fn a_successor_in_a_live_run_differs_in_what_is_asked_for() {
+        let (manifest, graph) = hover();
+        let with = "parameters.gains.altitude_integral_max_m_s2 = 1.5";
+        let successor = successor_of(&manifest, &graph, "controller", with).unwrap();
+        let node = &graph.plan.nodes[successor.node];
+        assert_eq!(
+            (node.name.as_str(), successor.take_over_tick, successor.is_standby),
+            ("controller", None, false)
+        );
+        assert_eq!(successor.plan.parameters["gains"]["altitude_integral_max_m_s2"], 1.5);
+        assert_eq!(successor.plan.parameters["vehicle"], node.parameters["vehicle"]);
+        let topics =
+            |plan: &bus::plan::NodePlan| plan.inputs.iter().map(|input| input.topic).collect::<Vec<_>>();
+        assert_eq!(topics(&successor.plan), topics(node));
+        assert_eq!(successor.plan.cpu, node.cpu);
+    }
+
+    #[test]
+    fn a_successor_in_a_live_run_that_cannot_be_is_refused_with_its_place() {
+        let (manifest, graph) = hover();
+        let refused = |process: &str, with: &str| {
+            successor_of(&manifest, &graph, process, with).map(|_| ()).unwrap_err().to_string()
+        };
+        let words = refused("contorller", "");
+        assert!(words.starts_with("--with:1:1: there is no process `contorller`"), "{words}");
+        let words = refused("controller", "wait = \"spin\"\nknid = 3");
+        assert!(words.starts_with("--with:2:1: unknown field `knid`"), "{words}");
+        assert!(refused("controller", "parameters.gain = 3").contains("--with:1:12: process `controller`"));
+        assert!(refused("controller", "x = ").starts_with("--with:1:"));
+        assert!(refused("recorder", "").contains("its file would be torn"));
+    }
+}

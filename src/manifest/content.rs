@@ -1,0 +1,335 @@
+//! What a manifest says, as types; places stay with the values that an error may name.
+
+use crate::program::OnExit;
+use bus::plan::{Pace, Wait};
+use serde::de::value::MapAccessDeserializer;
+use serde::de::{self, Deserializer, MapAccess, Visitor};
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+use std::fmt;
+use toml::Spanned;
+
+/// What a manifest says.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Content {
+    /// Settings of the whole run.
+    pub run: Run,
+    /// The processes by name.
+    pub process: BTreeMap<Spanned<String>, Process>,
+    /// Conditions on the recording, evaluated after the run.
+    #[serde(default)]
+    pub pass: Vec<Spanned<PassCondition>>,
+    /// Simulated states compared with measured ones, evaluated after the run.
+    #[serde(default)]
+    pub compare: Vec<Spanned<Comparison>>,
+    /// Processes that take over from others in flight.
+    #[serde(default)]
+    pub swap: Vec<Spanned<SwapSetting>>,
+    /// Processes that run beside others and are not listened to.
+    #[serde(default)]
+    pub shadow: Vec<Spanned<ShadowSetting>>,
+}
+
+/// Settings of the whole run.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Run {
+    /// Ticks per simulated second.
+    #[serde(default = "default_rate_hz")]
+    pub rate_hz: Spanned<u32>,
+    /// Simulated length of the run.
+    pub duration_s: Spanned<f64>,
+    /// Seed of every node's random stream.
+    #[serde(default)]
+    pub seed: u64,
+    /// Pacing: `free`, `realtime`, or simulated seconds per host second.
+    #[serde(default)]
+    pub pace: PaceSetting,
+    /// Ticks that a fast node may be ahead of the slowest.
+    pub window_ticks: Option<Spanned<u32>>,
+    /// Core of the clock service.
+    pub clock_cpu: Option<Spanned<usize>>,
+    /// Starts the processes in an order shuffled by this seed.
+    pub start_order_seed: Option<u64>,
+    /// The recording; beside the manifest and named like it where absent.
+    pub record: Option<Spanned<String>>,
+    /// Whether every process notes the host times of its ticks.
+    #[serde(default)]
+    pub profile: bool,
+    /// Whether every process keeps its memory from being paged out.
+    #[serde(default)]
+    pub lock_memory: bool,
+}
+
+fn default_rate_hz() -> Spanned<u32> {
+    Spanned::new(0..0, 1000)
+}
+
+/// A process.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Process {
+    /// A built-in node.
+    pub kind: Option<Spanned<String>>,
+    /// Any executable that links `bus`, with its arguments.
+    pub command: Option<Spanned<Vec<String>>>,
+    /// Whether it takes part in the ticks; a companion, such as a viewer, does not.
+    pub lockstep: Option<Spanned<bool>>,
+    /// Vehicle file, relative to the manifest.
+    pub vehicle: Option<Spanned<String>>,
+    /// Data file, relative to the manifest.
+    pub data: Option<Spanned<String>>,
+    /// Ticks between two computations.
+    pub period_ticks: Option<Spanned<u32>>,
+    /// Core it runs on.
+    pub cpu: Option<Spanned<usize>>,
+    /// How it waits.
+    pub wait: Option<Wait>,
+    /// Environment variables beside the launcher's own.
+    #[serde(default)]
+    pub environment: BTreeMap<Spanned<String>, String>,
+    /// Working directory, relative to the manifest.
+    pub working_directory: Option<Spanned<String>>,
+    /// Niceness.
+    pub nice: Option<Spanned<i32>>,
+    /// Priority under SCHED_FIFO.
+    pub realtime_priority: Option<Spanned<i32>>,
+    /// What follows when it ends before the run does.
+    pub on_exit: Option<Spanned<OnExit>>,
+    /// The process that stands by for it, whole.
+    pub standby: Option<Spanned<Box<Process>>>,
+    /// How long the run may stand still because of it, in milliseconds of host time.
+    pub watchdog_ms_host: Option<Spanned<u64>>,
+    /// Where its standard output and error go, relative to the manifest.
+    pub log: Option<Spanned<String>>,
+    /// The node's own parameters.
+    #[serde(default)]
+    pub parameters: BTreeMap<Spanned<String>, serde_json::Value>,
+    /// What it reads, by input port.
+    #[serde(default)]
+    pub inputs: BTreeMap<Spanned<String>, InputSetting>,
+    /// What it sends, by output port; built-in nodes need it only to change something.
+    #[serde(default)]
+    pub outputs: BTreeMap<Spanned<String>, OutputSetting>,
+}
+
+/// An input: a topic, or a table with delay and initial value.
+#[derive(Clone, Debug)]
+pub struct InputSetting {
+    /// The topic.
+    pub topic: String,
+    /// 0 or 1.
+    pub delay_ticks: u32,
+    /// Field values before the first sample.
+    pub initial: Option<serde_json::Value>,
+}
+
+impl<'de> Deserialize<'de> for InputSetting {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        deserializer.deserialize_any(InputVisitor)
+    }
+}
+
+/// Reads `"/topic"` or `{ topic = "/topic", delay_ticks = 1, initial = { … } }`.
+struct InputVisitor;
+
+impl<'de> Visitor<'de> for InputVisitor {
+    type Value = InputSetting;
+
+    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("a topic such as \"/plant/state\", or { topic = …, delay_ticks = …, initial = … }")
+    }
+
+    fn visit_str<E: de::Error>(self, topic: &str) -> Result<InputSetting, E> {
+        Ok(InputSetting { topic: topic.to_owned(), delay_ticks: 0, initial: None })
+    }
+
+    fn visit_map<A: MapAccess<'de>>(self, map: A) -> Result<InputSetting, A::Error> {
+        #[derive(Deserialize)]
+        #[serde(deny_unknown_fields)]
+        struct Table {
+            topic: String,
+            #[serde(default)]
+            delay_ticks: u32,
+            initial: Option<serde_json::Value>,
+        }
+        let Table { topic, delay_ticks, initial } = Table::deserialize(MapAccessDeserializer::new(map))?;
+        Ok(InputSetting { topic, delay_ticks, initial })
+    }
+}
+
+/// An output, where its topic or rate is not the default, or the process is not built in.
+#[derive(Clone, Debug, Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct OutputSetting {
+    /// Topic instead of `/<process>/<output>`.
+    pub topic: Option<String>,
+    /// Ticks between two samples, a multiple of the process's period.
+    pub every_ticks: Option<u32>,
+    /// Message type, needed for a `command`.
+    #[serde(rename = "type")]
+    pub type_name: Option<String>,
+}
+
+/// Pacing as written: `free`, `realtime`, or a factor.
+#[derive(Clone, Copy, Debug)]
+pub struct PaceSetting(pub Pace);
+
+impl Default for PaceSetting {
+    fn default() -> Self {
+        Self(Pace::Free)
+    }
+}
+
+impl std::str::FromStr for PaceSetting {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        match text {
+            "free" => Ok(Self(Pace::Free)),
+            "realtime" => Ok(Self(Pace::Factor(1.0))),
+            _ => match text.parse::<f64>() {
+                Ok(factor) if factor.is_finite() && factor > 0.0 => Ok(Self(Pace::Factor(factor))),
+                _ => Err(format!(
+                    "`{text}` is not a pace: expected free, realtime, or a factor above 0 such as 0.5"
+                )),
+            },
+        }
+    }
+}
+
+impl fmt::Display for PaceSetting {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.0 {
+            Pace::Free => write!(f, "free"),
+            Pace::Factor(1.0) => write!(f, "realtime"),
+            Pace::Factor(factor) => write!(f, "{factor}"),
+        }
+    }
+}
+
+impl Serialize for PaceSetting {
+    fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_str(self)
+    }
+}
+
+impl<'de> Deserialize<'de> for PaceSetting {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let text = match serde_json::Value::deserialize(deserializer)? {
+            serde_json::Value::String(text) => text,
+            other => other.to_string(),
+        };
+        text.parse().map_err(de::Error::custom)
+    }
+}
+
+/// What is computed from the samples of a pass condition.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Statistic {
+    /// Every sample must lie within the limits.
+    Every,
+    /// The smallest sample.
+    Min,
+    /// The largest sample.
+    Max,
+    /// The mean.
+    Mean,
+    /// The root of the mean square.
+    Rms,
+    /// The last sample.
+    Last,
+}
+
+/// A condition on a field of a topic over a span of simulated time.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct PassCondition {
+    /// What it means, for the summary.
+    pub name: String,
+    /// Topic.
+    pub topic: String,
+    /// Field, such as `position.z`, or `attitude.roll` of a quaternion.
+    pub field: String,
+    /// Unit of the limits.
+    pub unit: String,
+    /// Start of the span; the start of the run where absent.
+    #[serde(default)]
+    pub from_s: f64,
+    /// End of the span, itself included; the end of the run where absent.
+    pub to_s: Option<f64>,
+    /// What is compared with the limits.
+    pub statistic: Statistic,
+    /// Lower limit.
+    pub min: Option<f64>,
+    /// Upper limit.
+    pub max: Option<f64>,
+}
+
+/// A comparison of a simulated state with a measured one at the end of windows of equal length.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Comparison {
+    /// Topic of the simulated state.
+    pub simulated: String,
+    /// Topic of the measured state.
+    pub measured: String,
+    /// Length of the windows at whose start the plant is set to the measured state.
+    pub window_s: f64,
+    /// Upper limit of the RMS position error; no limit where absent.
+    pub max_position_m: Option<f64>,
+    /// The same for velocity.
+    pub max_velocity_m_s: Option<f64>,
+    /// The same for attitude.
+    pub max_attitude_deg: Option<f64>,
+}
+
+/// A process that takes over from another in flight.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SwapSetting {
+    /// The process it succeeds.
+    pub process: Spanned<String>,
+    /// The tick at which it takes over.
+    pub at_tick: Option<Spanned<u32>>,
+    /// The same as simulated time.
+    pub at_s: Option<Spanned<f64>>,
+    /// How many ticks it computes beside the process before.
+    #[serde(default = "default_shadow_ticks")]
+    pub shadow_ticks: u32,
+    /// How many times this happens.
+    pub repeat: Option<Spanned<u32>>,
+    /// Ticks between two times.
+    pub every_ticks: Option<Spanned<u32>>,
+    /// The successor, whole.
+    pub with: Process,
+}
+
+fn default_shadow_ticks() -> u32 {
+    100
+}
+
+/// A process that computes beside another from the first tick to the last, and never takes over.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ShadowSetting {
+    /// The process it shadows.
+    pub process: Spanned<String>,
+    /// The shadow, whole.
+    pub with: Process,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::PaceSetting;
+    use bus::plan::Pace;
+
+    #[test]
+    fn a_pace_is_free_realtime_or_a_factor() {
+        assert_eq!("realtime".parse::<PaceSetting>().unwrap().0, Pace::Factor(1.0));
+        assert_eq!("0.5".parse::<PaceSetting>().unwrap().0, Pace::Factor(0.5));
+        assert!("-1".parse::<PaceSetting>().is_err());
+    }
+}

@@ -1,0 +1,208 @@
+//! `--set key.path=value`.
+
+use super::sources::{Source, Sources};
+use super::tree;
+use crate::problem::{Problem, nearest};
+use std::borrow::Cow;
+use std::ops::Range;
+use toml::Spanned;
+use toml::de::{DeTable, DeValue};
+
+/// No key of a manifest lies as deep.
+const DEPTH_MAX: usize = 32;
+
+/// A value and the path of keys at which it belongs.
+#[derive(Debug)]
+pub struct Override<'s> {
+    keys: Vec<Spanned<&'s str>>,
+    value: Spanned<DeValue<'s>>,
+}
+
+impl<'s> Override<'s> {
+    /// Reads a `--set`.
+    pub fn parse(source: &'s Source, sources: &Sources) -> Result<Self, Problem> {
+        let refused = |message: &str| {
+            let help = "write --set run.seed=3, for example";
+            sources.problem(&(source.base..source.base), message, help)
+        };
+        let (path, value) = source.text.split_once('=').ok_or_else(|| refused("expected KEY=VALUE"))?;
+        let keys = keys(path, source.base);
+        if keys.iter().any(|key| key.get_ref().is_empty()) || keys.len() > DEPTH_MAX {
+            return Err(refused("expected keys with dots between them before the `=`"));
+        }
+        Ok(Self { keys, value: value_of(value, source.base + path.len() + 1) })
+    }
+
+    /// Whether it changes a process that a vehicle's set becomes: such names hold a `/`.
+    pub fn is_of_an_expanded_process(&self) -> bool {
+        matches!(self.names().as_slice(), ["process", name, ..] if name.contains('/'))
+    }
+
+    /// The path as words.
+    fn names(&self) -> Vec<&'s str> {
+        self.keys.iter().map(|key| *key.get_ref()).collect()
+    }
+
+    /// Puts the value into `root`; tables that are missing on the way are made.
+    pub fn apply(self, root: &mut DeTable<'s>, sources: &Sources) -> Result<(), Problem> {
+        let at =
+            |span: Range<usize>, (message, help): (String, String)| sources.problem(&span, message, help);
+        if self.is_of_an_expanded_process() {
+            require_process(root, self.names()[1]).map_err(|words| at(self.keys[1].span(), words))?;
+        }
+        let Some((last, parents)) = self.keys.split_last() else { return Ok(()) };
+        let mut whole = DeValue::Table(std::mem::take(root));
+        let put = descend(&mut whole, parents).and_then(|inside| put(inside, last, self.value));
+        if let DeValue::Table(table) = whole {
+            *root = table;
+        }
+        put.map_err(|words| at(last.span(), words))
+    }
+}
+
+/// The words between the dots, with their places.
+fn keys(path: &str, base: usize) -> Vec<Spanned<&str>> {
+    let mut start = base;
+    let key = |word: &str| {
+        let begin = start + (word.len() - word.trim_start().len());
+        start += word.len() + 1;
+        begin..begin + word.trim().len()
+    };
+    let spans: Vec<Range<usize>> = path.split('.').map(key).collect();
+    spans.into_iter().zip(path.split('.')).map(|(span, word)| Spanned::new(span, word.trim())).collect()
+}
+
+/// A value as TOML; what is none is a string: a path needs no quotes on the command line.
+fn value_of(text: &str, base: usize) -> Spanned<DeValue<'_>> {
+    let base = base + (text.len() - text.trim_start().len());
+    let text = text.trim();
+    tree::parse_value(text, base)
+        .unwrap_or_else(|| Spanned::new(base..base + text.len(), DeValue::String(Cow::Borrowed(text))))
+}
+
+fn require_process(root: &DeTable<'_>, name: &str) -> Result<(), (String, String)> {
+    let processes = tree::table(root, "process");
+    let known: Vec<&str> =
+        processes.into_iter().flat_map(|table| table.keys().map(|key| key.get_ref().as_ref())).collect();
+    if known.contains(&name) {
+        return Ok(());
+    }
+    let list = format!("the processes are {}", known.join(", "));
+    let help = nearest(name, known).map_or(list, |near| format!("did you mean `{near}`?"));
+    Err((format!("there is no process `{name}`"), help))
+}
+
+/// The value at `path` below `value`.
+fn descend<'v, 's>(
+    mut value: &'v mut DeValue<'s>,
+    path: &[Spanned<&'s str>],
+) -> Result<&'v mut DeValue<'s>, (String, String)> {
+    for (depth, key) in path.iter().enumerate() {
+        let parent = depth.checked_sub(1).map_or("the manifest", |parent| path[parent].get_ref());
+        value = match value {
+            DeValue::Table(table) => {
+                if !table.contains_key(*key.get_ref()) {
+                    let empty = Spanned::new(key.span(), DeValue::Table(DeTable::new()));
+                    table.insert(Spanned::new(key.span(), Cow::Borrowed(*key.get_ref())), empty);
+                }
+                table.get_mut(*key.get_ref()).map(Spanned::get_mut).ok_or_else(|| no_table(parent))?
+            }
+            DeValue::Array(array) => {
+                let index = index(key.get_ref(), parent, array.len())?;
+                array.as_mut()[index].get_mut()
+            }
+            _ => return Err(no_table(parent)),
+        };
+    }
+    match (&*value, path.last()) {
+        (DeValue::Table(_) | DeValue::Array(_), _) => Ok(value),
+        (_, last) => Err(no_table(last.map_or("the manifest", |key| key.get_ref()))),
+    }
+}
+
+fn put<'s>(
+    inside: &mut DeValue<'s>,
+    key: &Spanned<&'s str>,
+    value: Spanned<DeValue<'s>>,
+) -> Result<(), (String, String)> {
+    match inside {
+        DeValue::Table(table) => {
+            let key = Spanned::new(key.span(), Cow::Borrowed(*key.get_ref()));
+            tree::replace(table, key, value);
+        }
+        DeValue::Array(array) => {
+            let index = index(key.get_ref(), "the list", array.len())?;
+            array.as_mut()[index] = value;
+        }
+        _ => return Err(no_table(key.get_ref())),
+    }
+    Ok(())
+}
+
+fn no_table(name: &str) -> (String, String) {
+    (format!("`{name}` is not a table"), "docs/manifest.md lists every key".to_owned())
+}
+
+fn index(key: &str, list: &str, len: usize) -> Result<usize, (String, String)> {
+    match key.parse() {
+        Ok(index) if index < len => Ok(index),
+        _ => Err((
+            format!("`{list}` is a list of {len}, and `{key}` is none of them"),
+            "its elements are numbered from 0".to_owned(),
+        )),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::sources::{Origin, Sources};
+    use serde::Deserialize as _;
+    use toml::Spanned;
+
+    /// What `text` says with `change` applied, or why not.
+    fn changed(text: &str, change: &str) -> Result<serde_json::Value, String> {
+        let mut sources = Sources::default();
+        sources.add(Origin::File("a.toml".into()), text.to_owned());
+        sources.add(Origin::Override, change.to_owned());
+        let mut table = sources.table(&sources.all()[0]).unwrap();
+        let changes = sources.overrides().map_err(|problem| problem.to_string())?;
+        for change in changes {
+            change.apply(&mut table, &sources).map_err(|problem| problem.to_string())?;
+        }
+        Ok(serde_json::Value::deserialize(toml::Deserializer::from(Spanned::new(0..0, table))).unwrap())
+    }
+
+    #[test]
+    fn a_key_is_replaced_or_added() {
+        assert_eq!(changed("[run]\nseed = 1", "run.seed = 2").unwrap()["run"]["seed"], 2);
+        let data = changed("", "process.player.data=/a/b.csv").unwrap();
+        assert_eq!(data["process"]["player"]["data"], "/a/b.csv");
+        assert_eq!(changed("a = 1", "a=[1, 2]").unwrap()["a"], serde_json::json!([1, 2]));
+    }
+
+    #[test]
+    fn an_element_of_a_list_is_replaced() {
+        let text = "[[swap]]\nat_tick = 1\n[[swap]]\nat_tick = 2";
+        let found = changed(text, "swap.1.at_tick=5").unwrap();
+        assert_eq!(found["swap"], serde_json::json!([{ "at_tick": 1 }, { "at_tick": 5 }]));
+        let error = changed(text, "swap.2.at_tick=5").unwrap_err();
+        assert!(error.contains("`swap` is a list of 2, and `2` is none of them"), "{error}");
+        assert_eq!(changed("a = [1, 2]", "a.0=7").unwrap()["a"], serde_json::json!([7, 2]));
+    }
+
+    #[test]
+    fn what_is_no_path_of_tables_is_refused() {
+        for (change, words) in [
+            ("run", "expected KEY=VALUE"),
+            ("run.seed.low=1", "`seed` is not a table"),
+            ("run..seed=1", "expected keys with dots"),
+            ("process.h1/plant.cpu=1", "there is no process `h1/plant`"),
+        ] {
+            let error = changed("run.seed = 1", change).unwrap_err();
+            assert!(
+                error.starts_with(&format!("a.toml: --set {change}: ")) && error.contains(words),
+                "{error}"
+            );
+        }
+    }
+}

@@ -1,0 +1,183 @@
+//! The manifest's text as the recording holds it: the user's own, comments and all, with what `--set`
+//! changed.
+
+use super::include;
+use super::sources::Sources;
+use super::tree;
+use crate::problem::Problem;
+
+/// Keys of `[run]` that change how fast or where a run computes, never what: they stay out of the recording.
+const HOST_ONLY_KEYS: [&str; 7] =
+    ["clock_cpu", "lock_memory", "pace", "profile", "record", "start_order_seed", "window_ticks"];
+/// The same for keys of a process.
+const HOST_ONLY_PROCESS_KEYS: [&str; 8] = [
+    "cpu",
+    "environment",
+    "log",
+    "nice",
+    "realtime_priority",
+    "wait",
+    "watchdog_ms_host",
+    "working_directory",
+];
+
+/// The manifest's own text with those of `overrides` that may change what is simulated.
+///
+/// # Errors
+/// If an included file is not TOML.
+pub fn text(sources: &Sources, overrides: &[String]) -> Result<String, Problem> {
+    let original = &sources.all()[0].text;
+    let simulated: Vec<&String> = overrides.iter().filter(|text| !is_host_only(text)).collect();
+    let Ok(mut document) = original.parse::<toml_edit::DocumentMut>() else { return Ok(original.clone()) };
+    if simulated.is_empty() {
+        return Ok(original.clone());
+    }
+    let mut elsewhere = String::new();
+    for text in simulated {
+        if !set(&mut document, text, sources)? {
+            // It changes what an included file or a set holds, which has no line of its own here.
+            elsewhere += &format!("# --set {}\n", text.replace('\n', "\\n"));
+        }
+    }
+    let text = document.to_string();
+    let gap = if text.ends_with('\n') || elsewhere.is_empty() { "" } else { "\n" };
+    Ok(text + gap + &elsewhere)
+}
+
+/// Whether an override touches only where and how fast a run computes.
+fn is_host_only(text: &str) -> bool {
+    let path = text.split('=').next().unwrap_or_default();
+    let keys: Vec<&str> = path.split('.').map(str::trim).collect();
+    match keys.as_slice() {
+        ["run", key] => HOST_ONLY_KEYS.contains(key),
+        ["process", _, key, ..]
+        | ["set", _, "process", _, key, ..]
+        | ["vehicle", _, "process", _, key, ..] => HOST_ONLY_PROCESS_KEYS.contains(key),
+        _ => false,
+    }
+}
+
+/// Writes an override into the text; false if its place is not in it.
+fn set(document: &mut toml_edit::DocumentMut, text: &str, sources: &Sources) -> Result<bool, Problem> {
+    let Some((path, value)) = text.split_once('=') else { return Ok(false) };
+    let value = value.trim();
+    // What counts as TOML is decided as when it is read.
+    let parsed = tree::parse_value(value, 0).and_then(|_| value.parse::<toml_edit::Value>().ok());
+    let value = parsed.unwrap_or_else(|| value.into());
+    let mut keys: Vec<String> = path.split('.').map(|key| key.trim().to_owned()).collect();
+    if let [list, index, ..] = keys.as_mut_slice()
+        && let (true, Ok(number)) = (include::LISTS.contains(&list.as_str()), index.parse::<usize>())
+    {
+        // The elements of included files come first.
+        let Some(own) = number.checked_sub(include::inherited(sources, list)?) else { return Ok(false) };
+        *index = own.to_string();
+    }
+    // On a copy: a path that breaks off halfway must leave nothing behind.
+    let mut changed = document.clone();
+    let is_put = put(changed.as_item_mut(), &keys, value).is_some();
+    if is_put {
+        *document = changed;
+    }
+    Ok(is_put)
+}
+
+fn put(item: &mut toml_edit::Item, keys: &[String], value: toml_edit::Value) -> Option<()> {
+    let (key, rest) = keys.split_first()?;
+    match item {
+        toml_edit::Item::ArrayOfTables(tables) => {
+            let table = tables.get_mut(key.parse().ok()?)?;
+            put_in_table(table, rest, value)
+        }
+        toml_edit::Item::Value(toml_edit::Value::Array(array)) => put_in_array(array, key, rest, value),
+        _ => put_in_table(item.as_table_like_mut()?, keys, value),
+    }
+}
+
+fn put_in_table(
+    table: &mut dyn toml_edit::TableLike,
+    keys: &[String],
+    value: toml_edit::Value,
+) -> Option<()> {
+    match keys {
+        [] => None,
+        [last] => {
+            let mut value = value;
+            if let Some(old) = table.get(last).and_then(toml_edit::Item::as_value) {
+                // With it stays the comment behind it.
+                *value.decor_mut() = old.decor().clone();
+            }
+            table.insert(last, toml_edit::Item::Value(value));
+            Some(())
+        }
+        [first, rest @ ..] => {
+            let is_list = rest[0].parse::<usize>().is_ok();
+            if is_list && table.get(first).is_none() {
+                return None;
+            }
+            let empty = || toml_edit::Item::Table(toml_edit::Table::new());
+            put(table.entry(first).or_insert_with(empty), rest, value)
+        }
+    }
+}
+
+fn put_in_array(
+    array: &mut toml_edit::Array,
+    key: &str,
+    rest: &[String],
+    value: toml_edit::Value,
+) -> Option<()> {
+    let index = key.parse().ok()?;
+    if rest.is_empty() {
+        array.get(index)?;
+        array.replace(index, value);
+        return Some(());
+    }
+    match array.get_mut(index)? {
+        toml_edit::Value::InlineTable(table) => put_in_table(table, rest, value),
+        toml_edit::Value::Array(inner) => put_in_array(inner, rest.first()?, &rest[1..], value),
+        _ => None,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::sources::{Origin, Sources};
+    use super::{is_host_only, text};
+
+    fn recorded(manifest: &str, overrides: &[&str]) -> String {
+        let mut sources = Sources::default();
+        sources.add(Origin::File("a.toml".into()), manifest.to_owned());
+        sources.order.push(0);
+        let overrides: Vec<String> = overrides.iter().map(|text| (*text).to_owned()).collect();
+        text(&sources, &overrides).unwrap()
+    }
+
+    #[test]
+    fn host_only_overrides_are_known() {
+        for text in ["run.pace=free", "run.profile=true", "process.imu.wait=spin", "process.h1/imu.cpu=1"] {
+            assert!(is_host_only(text), "{text}");
+        }
+        assert!(is_host_only("process.imu.environment.RUST_LOG=debug") && is_host_only("process.imu.nice=3"));
+        assert!(!is_host_only("run.seed=1") && !is_host_only("process.imu.parameters.wait=1"));
+    }
+
+    #[test]
+    fn an_override_keeps_comments_and_stays_out_if_it_is_host_only() {
+        let found = recorded("[run]\nseed = 1 # why\n", &["run.seed=2", "run.pace=3"]);
+        assert_eq!(found, "[run]\nseed = 2 # why\n");
+        assert_eq!(recorded("[run]\nseed = 1 # why\n", &["run.pace=3"]), "[run]\nseed = 1 # why\n");
+    }
+
+    #[test]
+    fn elements_of_lists_are_reached() {
+        let found = recorded("[[swap]]\nat_tick = 1\n[[swap]]\nat_tick = 2\n", &["swap.1.at_tick=5"]);
+        assert_eq!(found, "[[swap]]\nat_tick = 1\n[[swap]]\nat_tick = 5\n");
+        assert_eq!(recorded("a = [{ b = 1 }]\n", &["a.0.b=2"]), "a = [{ b = 2 }]\n");
+    }
+
+    #[test]
+    fn what_has_no_place_in_the_text_is_noted_below_it() {
+        let found = recorded("a = 1\n", &["process.h1/pilot.parameters.set_points.0.to=2"]);
+        assert_eq!(found, "a = 1\n# --set process.h1/pilot.parameters.set_points.0.to=2\n");
+    }
+}

@@ -1,0 +1,193 @@
+//! The texts a manifest is made of, laid end to end: one offset names a place in any of them.
+
+use super::overrides::Override;
+use super::tree;
+use crate::problem::Problem;
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+use toml::Spanned;
+use toml::de::DeTable;
+
+/// Where a text comes from.
+#[derive(Clone, Debug)]
+pub enum Origin {
+    /// A file.
+    File(PathBuf),
+    /// A `--set`.
+    Override,
+    /// The value of another argument.
+    Argument(&'static str),
+}
+
+/// A text and where it begins among all.
+#[derive(Clone, Debug)]
+pub struct Source {
+    pub origin: Origin,
+    pub text: String,
+    pub base: usize,
+}
+
+/// All texts; the first is the manifest's own file.
+#[derive(Clone, Debug, Default)]
+pub struct Sources {
+    all: Vec<Source>,
+    /// The files in the order in which they are merged: what is included goes before what includes it.
+    pub order: Vec<usize>,
+}
+
+impl Sources {
+    /// Adds a text behind the others.
+    pub fn add(&mut self, origin: Origin, text: String) {
+        // One more than the text is long: its very end is a place of its own.
+        let base = self.all.last().map_or(0, |last| last.base + last.text.len() + 1);
+        self.all.push(Source { origin, text, base });
+    }
+
+    /// The texts.
+    pub fn all(&self) -> &[Source] {
+        &self.all
+    }
+
+    /// The text that was added last.
+    pub fn last(&self) -> &Source {
+        &self.all[self.all.len() - 1]
+    }
+
+    /// Where the text that was added last stands.
+    pub fn last_span(&self) -> Range<usize> {
+        let last = self.last();
+        last.base..last.base + last.text.len()
+    }
+
+    /// What the text that was added last says.
+    pub fn last_table(&self) -> Result<DeTable<'_>, Problem> {
+        self.table(self.last())
+    }
+
+    /// What one of the texts says, with places among all.
+    pub fn table<'s>(&self, source: &'s Source) -> Result<DeTable<'s>, Problem> {
+        tree::parse(&source.text, source.base).map_err(|(span, message)| {
+            self.problem(&span, message, "docs/manifest.md shows how a manifest is written")
+        })
+    }
+
+    /// The files beside the manifest's own.
+    pub fn included(&self) -> Vec<PathBuf> {
+        let file = |source: &Source| match &source.origin {
+            Origin::File(path) => Some(path.clone()),
+            Origin::Override | Origin::Argument(_) => None,
+        };
+        self.all.iter().skip(1).filter_map(file).collect()
+    }
+
+    /// Every `--set`, in the order in which they were given.
+    pub fn overrides(&self) -> Result<Vec<Override<'_>>, Problem> {
+        let overrides = self.all.iter().filter(|source| matches!(source.origin, Origin::Override));
+        overrides.map(|source| Override::parse(source, self)).collect()
+    }
+
+    /// Whether the place `offset` lies in a `--set`.
+    pub fn is_override(&self, offset: usize) -> bool {
+        matches!(self.at(offset).origin, Origin::Override)
+    }
+
+    /// A problem at `span`.
+    pub fn problem(
+        &self,
+        span: &Range<usize>,
+        message: impl Into<String>,
+        help: impl Into<String>,
+    ) -> Problem {
+        let source = self.at(span.start);
+        let span = span.start - source.base..span.end.max(span.start) - source.base;
+        match &source.origin {
+            Origin::File(path) => Problem::at(path, &source.text, &span, message, help),
+            Origin::Argument(name) => Problem::at(Path::new(name), &source.text, &span, message, help),
+            Origin::Override => {
+                let message = format!("--set {}: {}", source.text, message.into());
+                Problem::in_file(self.file(), message, help)
+            }
+        }
+    }
+
+    /// A path as written: `${NAME:-default}` is the environment's NAME, and a relative path starts at the
+    /// folder of the file it is written in, or of the manifest where it was given as an argument.
+    pub fn path(&self, written: &Spanned<String>) -> Result<PathBuf, Problem> {
+        let expanded = expand(written.get_ref(), |name| std::env::var(name).ok()).map_err(|message| {
+            self.problem(&written.span(), message, "set it, or give a default: ${NAME:-path}")
+        })?;
+        Ok(self.folder(written.span().start).join(expanded))
+    }
+
+    /// The same, from the root on.
+    pub fn resolve(&self, written: &Spanned<String>) -> Result<PathBuf, Problem> {
+        let path = self.path(written)?;
+        Ok(std::path::absolute(&path).unwrap_or(path))
+    }
+
+    /// The folder at which a relative path written at `offset` starts.
+    fn folder(&self, offset: usize) -> &Path {
+        let file = match &self.at(offset).origin {
+            Origin::File(path) => path,
+            Origin::Override | Origin::Argument(_) => self.file(),
+        };
+        file.parent().unwrap_or(Path::new(""))
+    }
+
+    /// The manifest's own file.
+    fn file(&self) -> &Path {
+        match &self.all[0].origin {
+            Origin::File(path) => path,
+            Origin::Override | Origin::Argument(_) => Path::new(""),
+        }
+    }
+
+    fn at(&self, offset: usize) -> &Source {
+        &self.all[self.all.partition_point(|source| source.base <= offset).saturating_sub(1)]
+    }
+}
+
+/// Replaces `${NAME}` and `${NAME:-default}` by what `variable` says.
+fn expand(text: &str, variable: impl Fn(&str) -> Option<String>) -> Result<String, String> {
+    let mut expanded = String::new();
+    let mut rest = text;
+    while let Some((before, after)) = rest.split_once("${") {
+        let (inside, after) =
+            after.split_once('}').ok_or_else(|| format!("`{text}` has `${{` without `}}`"))?;
+        let (name, default) = inside.split_once(":-").map_or((inside, None), |(name, d)| (name, Some(d)));
+        let value = variable(name).or(default.map(str::to_owned));
+        expanded += before;
+        expanded += &value.ok_or_else(|| format!("the environment variable {name} is not set"))?;
+        rest = after;
+    }
+    Ok(expanded + rest)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Origin, Sources, expand};
+
+    #[test]
+    fn variables_are_expanded_with_defaults() {
+        let variable = |name: &str| (name == "DATA").then(|| "/data".to_owned());
+        assert_eq!(expand("${DATA:-../x}/a.csv", variable).unwrap(), "/data/a.csv");
+        assert_eq!(expand("${NONE:-../x}/a.csv", variable).unwrap(), "../x/a.csv");
+        assert!(expand("${NONE}/a.csv", variable).unwrap_err().contains("NONE is not set"));
+    }
+
+    #[test]
+    fn an_offset_names_a_place_in_any_text() {
+        let mut sources = Sources::default();
+        sources.add(Origin::File("a.toml".into()), "x = 1\n".into());
+        sources.add(Origin::File("b.toml".into()), "y = 2\nz = 3".into());
+        sources.add(Origin::Override, "x=4".into());
+        let base = sources.all()[1].base;
+        let words = |offset: usize| sources.problem(&(offset..offset), "no", "").to_string();
+        assert_eq!(words(4), "a.toml:1:5: no");
+        // Behind the last byte of the first text is not yet the second.
+        assert_eq!(words(6), "a.toml:2:1: no");
+        assert_eq!(words(base), "b.toml:1:1: no");
+        assert_eq!(words(base + 10), "b.toml:2:5: no");
+        assert_eq!(words(sources.last().base + 2), "a.toml: --set x=4: no");
+    }
+}

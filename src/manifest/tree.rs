@@ -1,0 +1,199 @@
+//! Tables whose keys and values know their places, and how two of them become one.
+
+use std::ops::Range;
+use toml::Spanned;
+use toml::de::{DeString, DeTable, DeValue};
+
+/// Keys that say what a process is: naming one anew leaves nothing of the other.
+const IDENTITY: [&str; 2] = ["kind", "command"];
+/// Keys that mean something only to what the process is.
+const PARAMETERS: [&str; 3] = ["data", "parameters", "vehicle"];
+
+/// What `text` says; its places start at `base`.
+///
+/// # Errors
+/// The place and the message, where it is not TOML.
+pub fn parse(text: &str, base: usize) -> Result<DeTable<'_>, (Range<usize>, String)> {
+    let table = DeTable::parse(text).map_err(|error| {
+        let span = error.span().unwrap_or(0..0);
+        (base + span.start..base + span.end, error.message().trim().to_owned())
+    })?;
+    Ok(shifted_table(table.into_inner(), base))
+}
+
+/// A single value; its places start at `base`.
+pub fn parse_value(text: &str, base: usize) -> Option<Spanned<DeValue<'_>>> {
+    DeValue::parse(text).ok().map(|value| shifted(value, base))
+}
+
+fn shifted(value: Spanned<DeValue<'_>>, base: usize) -> Spanned<DeValue<'_>> {
+    let span = value.span().start + base..value.span().end + base;
+    let value = match value.into_inner() {
+        DeValue::Array(array) => DeValue::Array(array.into_iter().map(|item| shifted(item, base)).collect()),
+        DeValue::Table(table) => DeValue::Table(shifted_table(table, base)),
+        scalar => scalar,
+    };
+    Spanned::new(span, value)
+}
+
+fn shifted_table<'t>(table: DeTable<'t>, base: usize) -> DeTable<'t> {
+    let shift = |(key, value): (Spanned<DeString<'t>>, _)| {
+        let span = key.span().start + base..key.span().end + base;
+        (Spanned::new(span, key.into_inner()), shifted(value, base))
+    };
+    table.into_iter().map(shift).collect()
+}
+
+/// How a table is put on top of another.
+type Merge<'t> = fn(&mut DeTable<'t>, DeTable<'t>);
+
+/// Puts the manifest `over`, or a set of it, on top of `base`.
+pub fn merge_manifests<'t>(base: &mut DeTable<'t>, over: DeTable<'t>) {
+    for (key, value) in over {
+        match key.get_ref().as_ref() {
+            "process" => put(base, key, value, merge_processes),
+            "set" => put(base, key, value, merge_sets),
+            _ => put(base, key, value, merge),
+        }
+    }
+}
+
+fn merge_sets<'t>(base: &mut DeTable<'t>, over: DeTable<'t>) {
+    over.into_iter().for_each(|(name, set)| put(base, name, set, merge_manifests));
+}
+
+/// Puts processes on top of those of the same names.
+pub fn merge_processes<'t>(base: &mut DeTable<'t>, over: DeTable<'t>) {
+    over.into_iter().for_each(|(name, process)| put(base, name, process, merge_process));
+}
+
+/// Puts the process `over` on top of `base`. Where it says what it is, with `kind` or `command`, nothing is
+/// left of the parameters of what it was.
+pub fn merge_process<'t>(base: &mut DeTable<'t>, over: DeTable<'t>) {
+    forget_identity(base, &over);
+    merge(base, over);
+}
+
+/// Puts the keys of the process `over` in place of those of `base`; only `parameters` merge.
+pub fn replace_keys<'t>(base: &mut DeTable<'t>, over: DeTable<'t>) {
+    forget_identity(base, &over);
+    for (key, value) in over {
+        if key.get_ref() == "parameters" {
+            put(base, key, value, merge);
+        } else {
+            replace(base, key, value);
+        }
+    }
+}
+
+/// Puts `over` on top of `base`: tables merge, any other value of `over` replaces that of `base`.
+fn merge<'t>(base: &mut DeTable<'t>, over: DeTable<'t>) {
+    over.into_iter().for_each(|(key, value)| put(base, key, value, merge));
+}
+
+fn put<'t>(base: &mut DeTable<'t>, key: Spanned<DeString<'t>>, value: Spanned<DeValue<'t>>, how: Merge<'t>) {
+    let span = value.span();
+    match (table_mut(base, key.get_ref()), value.into_inner()) {
+        (Some(below), DeValue::Table(above)) => how(below, above),
+        (_, value) => replace(base, key, Spanned::new(span, value)),
+    }
+}
+
+/// Puts `key` and `value`, with their own places, into `table`.
+pub fn replace<'t>(table: &mut DeTable<'t>, key: Spanned<DeString<'t>>, value: Spanned<DeValue<'t>>) {
+    table.remove(key.get_ref().as_ref());
+    table.insert(key, value);
+}
+
+/// The table at `key`, if there is one.
+pub fn table_mut<'v, 't>(table: &'v mut DeTable<'t>, key: &str) -> Option<&'v mut DeTable<'t>> {
+    match table.get_mut(key)?.get_mut() {
+        DeValue::Table(table) => Some(table),
+        _ => None,
+    }
+}
+
+/// The table at `key`, if there is one.
+pub fn table<'v, 't>(table: &'v DeTable<'t>, key: &str) -> Option<&'v DeTable<'t>> {
+    table.get(key)?.get_ref().as_table()
+}
+
+/// The string at `key`, if there is one.
+pub fn string<'v>(table: &'v DeTable<'_>, key: &str) -> Option<&'v str> {
+    table.get(key)?.get_ref().as_str()
+}
+
+/// Removes from a process what it was, if `over` says that it is something else.
+fn forget_identity(process: &mut DeTable<'_>, over: &DeTable<'_>) {
+    let is_changed = |key: &str| over.contains_key(key) && !is_same(process.get(key), over.get(key));
+    if IDENTITY.iter().any(|key| is_changed(key)) {
+        IDENTITY.iter().chain(&PARAMETERS).for_each(|key| drop(process.remove(*key)));
+    }
+}
+
+fn is_same(a: Option<&Spanned<DeValue<'_>>>, b: Option<&Spanned<DeValue<'_>>>) -> bool {
+    let (Some(a), Some(b)) = (a.map(Spanned::get_ref), b.map(Spanned::get_ref)) else { return false };
+    match (a.as_array(), b.as_array()) {
+        (Some(a), Some(b)) => {
+            a.len() == b.len() && a.iter().zip(b.iter()).all(|(a, b)| is_same(Some(a), Some(b)))
+        }
+        _ => a.is_str() && a.as_str() == b.as_str(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{merge, merge_manifests, merge_process, parse, replace_keys};
+    use serde::Deserialize as _;
+    use toml::Spanned;
+    use toml::de::DeTable;
+
+    fn merged(
+        base: &'static str,
+        over: &'static str,
+        how: impl Fn(&mut DeTable<'static>, DeTable<'static>),
+    ) -> serde_json::Value {
+        let mut base = parse(base, 0).unwrap();
+        how(&mut base, parse(over, 100).unwrap());
+        serde_json::Value::deserialize(toml::Deserializer::from(Spanned::new(0..0, base))).unwrap()
+    }
+
+    #[test]
+    fn tables_merge_and_other_values_are_replaced() {
+        let found = merged("a = 1\nb.c = [1]\nb.d = 2", "b.c = [3, 4]\ne = 5", merge);
+        assert_eq!(found, serde_json::json!({ "a": 1, "b": { "c": [3, 4], "d": 2 }, "e": 5 }));
+    }
+
+    #[test]
+    fn a_process_that_becomes_something_else_keeps_no_parameters() {
+        let base = "kind = \"pid\"\nvehicle = \"x\"\nparameters.a = 1\ninputs.i = \"/t\"";
+        let found = merged(base, "command = [\"y\"]", merge_process);
+        assert_eq!(found, serde_json::json!({ "command": ["y"], "inputs": { "i": "/t" } }));
+        let found = merged(base, "kind = \"pid\"\nparameters.b = 2", merge_process);
+        assert_eq!(found["parameters"], serde_json::json!({ "a": 1, "b": 2 }));
+    }
+
+    #[test]
+    fn a_port_is_no_process() {
+        let base = "process.a.inputs = { command = \"/x\", kind = \"/y\" }";
+        let found = merged(base, "process.a.inputs.command = \"/z\"", merge_manifests);
+        assert_eq!(found["process"]["a"]["inputs"], serde_json::json!({ "command": "/z", "kind": "/y" }));
+    }
+
+    #[test]
+    fn a_successor_replaces_keys_and_merges_parameters() {
+        let base = "kind = \"pid\"\nparameters.a = 1\ninputs.i = \"/t\"";
+        let found = merged(base, "parameters.b = 2\ninputs.j = \"/u\"", replace_keys);
+        let expected =
+            serde_json::json!({ "kind": "pid", "parameters": { "a": 1, "b": 2 }, "inputs": { "j": "/u" } });
+        assert_eq!(found, expected);
+    }
+
+    #[test]
+    fn places_are_those_of_the_text_that_won() {
+        let mut base = parse("a = 1\nb = 2", 0).unwrap();
+        merge(&mut base, parse("b = 3", 100).unwrap());
+        let (key, value) = base.get_key_value("b").unwrap();
+        assert_eq!((key.span(), value.span()), (100..101, 104..105));
+    }
+}

@@ -1,0 +1,65 @@
+//! What a tick costs a node, and a sample on its way.
+
+use crate::profile::flight::{Cause, Flight};
+use crate::profile::times::Times;
+use serde::Serialize;
+use std::collections::BTreeMap;
+
+/// The parts of a node's ticks.
+#[derive(Debug, Serialize)]
+pub struct NodeLatency {
+    /// The node.
+    pub name: String,
+    /// From the end of the computation before until the last thing it needs was there; 0 where it was already.
+    pub wait: Times,
+    /// From then until it had its inputs; only ticks at which it waited.
+    pub wake_up: Times,
+    /// From having its inputs to having computed.
+    pub compute: Times,
+    /// From then until its outputs were sent and the memory of the next ones was taken.
+    pub publish: Times,
+}
+
+/// A topic on its way to one reader.
+#[derive(Debug, Serialize)]
+pub struct Transport {
+    /// The topic.
+    pub topic: String,
+    /// The node that reads it.
+    pub reader: String,
+    /// From being sent to being taken, where the reader waited for this sample last.
+    pub transport: Times,
+}
+
+/// The latencies of every node, and of every topic that somebody waited for.
+pub fn latencies(flight: &Flight) -> (Vec<NodeLatency>, Vec<Transport>) {
+    let mut transport = BTreeMap::new();
+    let nodes = (0..flight.plan.nodes.len()).map(|node| latency(flight, node, &mut transport)).collect();
+    let named = |((topic, reader), transport): ((usize, usize), Times)| Transport {
+        topic: flight.topic_name(topic).to_owned(),
+        reader: flight.node_name(reader).to_owned(),
+        transport,
+    };
+    (nodes, transport.into_iter().map(named).collect())
+}
+
+fn latency(flight: &Flight, node: usize, transport: &mut BTreeMap<(usize, usize), Times>) -> NodeLatency {
+    let name = flight.node_name(node).to_owned();
+    let [mut wait, mut wake_up, mut compute, mut publish] = std::array::from_fn(|_| Times::default());
+    for times in flight.ticks_of(node) {
+        compute.add(times.done_ns.saturating_sub(times.received_ns));
+        publish.add(times.ended_ns.saturating_sub(times.done_ns));
+        let (Some(waited), Some(began_ns)) = (flight.waited(node, &times), times.began_ns) else { continue };
+        wait.add(waited.ready_ns.saturating_sub(began_ns));
+        if waited.cause == Cause::Itself {
+            continue;
+        }
+        let woken_ns = times.received_ns.saturating_sub(waited.ready_ns);
+        wake_up.add(woken_ns);
+        if let Cause::Sample { input, .. } = waited.cause {
+            let topic = flight.plan.nodes[node].inputs[input].topic;
+            transport.entry((topic, node)).or_default().add(woken_ns);
+        }
+    }
+    NodeLatency { name, wait, wake_up, compute, publish }
+}

@@ -1,0 +1,128 @@
+//! Starting one process of a run.
+
+use crate::processes::Role;
+use crate::program::{Executable, Program};
+use anyhow::{Context, Result};
+use bus::process::{LAUNCHER_VARIABLE, RUN_VARIABLE};
+use bus::{GENERATION_VARIABLE, NODE_VARIABLE};
+use std::fs::{File, OpenOptions};
+use std::io;
+use std::os::unix::process::CommandExt;
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Stdio};
+
+/// The clock service.
+///
+/// # Errors
+/// If it cannot be started.
+pub fn start_clock(run_dir: &Path) -> Result<(Child, PathBuf)> {
+    let mut command = this_binary()?;
+    command.args(["node", "clock"]);
+    spawn(command, "clock", Role::Clock, run_dir, None)
+}
+
+/// The process `name` of the run in `run_dir`, and the file that its output goes to.
+///
+/// # Errors
+/// If it cannot be started, or the niceness or priority that it asks for is not allowed.
+pub fn start(run_dir: &Path, name: &str, role: Role, program: &Program) -> Result<(Child, PathBuf)> {
+    let mut command = match &program.executable {
+        Executable::Kind(kind) => {
+            let mut command = this_binary()?;
+            command.args(["node", kind.name]);
+            command
+        }
+        Executable::Command(words) => {
+            let mut command = Command::new(&words[0]);
+            command.args(&words[1..]);
+            command
+        }
+    };
+    command.envs(&program.environment);
+    if let Some(folder) = &program.working_directory {
+        command.current_dir(folder);
+    }
+    match role {
+        Role::Clock => {}
+        Role::Node { generation, .. } => {
+            command.env(NODE_VARIABLE, name).env(GENERATION_VARIABLE, generation.to_string());
+        }
+        Role::Companion => bus::process::die_with_this_one(&mut command),
+    }
+    let (mut child, log) = spawn(command, name, role, run_dir, program.log.as_deref())?;
+    if let Err(error) = set_priority(&child, name, program) {
+        bus::process::kill_group(child.id());
+        let _ = child.wait();
+        return Err(error);
+    }
+    Ok((child, log))
+}
+
+fn this_binary() -> Result<Command> {
+    Ok(Command::new(std::env::current_exe().context("cannot find this binary")?))
+}
+
+fn spawn(
+    mut command: Command,
+    name: &str,
+    role: Role,
+    run_dir: &Path,
+    log: Option<&Path>,
+) -> Result<(Child, PathBuf)> {
+    let (file, path) = open_log(name, role, run_dir, log)?;
+    let output = file.try_clone().context("cannot share a log file")?;
+    command
+        .env(RUN_VARIABLE, run_dir)
+        .env(LAUNCHER_VARIABLE, std::process::id().to_string())
+        .stdin(Stdio::null())
+        .stdout(output)
+        .stderr(file)
+        // A group of its own: Ctrl-C in the terminal reaches the launcher alone, which stops the run
+        // at a tick boundary.
+        .process_group(0);
+    let child = command.spawn().with_context(|| {
+        format!("process `{name}`: cannot start {}", command.get_program().to_string_lossy())
+    })?;
+    Ok((child, path))
+}
+
+/// Where a process's output goes: the file that the manifest names, to which a successor adds, or one in the
+/// run directory, of which a successor has its own.
+fn open_log(name: &str, role: Role, run_dir: &Path, log: Option<&Path>) -> Result<(File, PathBuf)> {
+    let generation = match role {
+        Role::Node { generation, .. } => generation,
+        Role::Clock | Role::Companion => 0,
+    };
+    let number = if generation == 0 { String::new() } else { format!("#{generation}") };
+    let path = match log {
+        Some(path) => path.to_owned(),
+        None => run_dir.join(format!("{}{number}.log", name.replace('/', "."))),
+    };
+    let mut options = OpenOptions::new();
+    options.create(true).append(true);
+    if generation == 0 {
+        // What an earlier run left there.
+        File::create(&path).with_context(|| format!("process `{name}`: cannot create {}", path.display()))?;
+    }
+    let file = options.open(&path);
+    Ok((file.with_context(|| format!("process `{name}`: cannot open {}", path.display()))?, path))
+}
+
+/// Gives a started process its niceness and its priority.
+fn set_priority(child: &Child, name: &str, program: &Program) -> Result<()> {
+    if let Some(nice) = program.nice {
+        bus::process::set_nice(child.id(), nice).map_err(|error| refused(name, "nice", nice, "-e", error))?;
+    }
+    if let Some(priority) = program.realtime_priority {
+        bus::process::set_fifo(child.id(), priority)
+            .map_err(|error| refused(name, "realtime_priority", priority, "-r", error))?;
+    }
+    Ok(())
+}
+
+fn refused(name: &str, key: &str, value: i32, limit: &str, error: io::Error) -> anyhow::Error {
+    anyhow::anyhow!(
+        "process `{name}`: `{key} = {value}` is refused: {error}. It needs the capability CAP_SYS_NICE, or a \
+         limit that allows it (`ulimit {limit}`); or leave the key out"
+    )
+}

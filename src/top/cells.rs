@@ -1,0 +1,80 @@
+//! A view as words: the same on the screen and on paper.
+
+use crate::top::view::{ProcessRow, TopicRow, View};
+
+/// A table: what its columns are called, and its rows.
+pub struct Cells<const N: usize> {
+    pub headings: [&'static str; N],
+    /// Whether a column holds numbers, which stand right.
+    pub is_number: [bool; N],
+    pub rows: Vec<[String; N]>,
+}
+
+/// The table of the processes.
+pub fn processes(view: &View) -> Cells<7> {
+    Cells {
+        headings: ["process", "state", "tick", "CPU %", "p50 µs", "p99 µs", "late"],
+        is_number: [false, false, true, true, true, true, true],
+        rows: view.processes.iter().map(process).collect(),
+    }
+}
+
+fn process(row: &ProcessRow) -> [String; 7] {
+    let or_dash =
+        |value: Option<f64>, digits| value.map_or("-".to_owned(), |value| format!("{value:.digits$}"));
+    [
+        row.name.clone(),
+        row.state.clone(),
+        row.tick.to_string(),
+        or_dash(row.cpu_share.map(|share| share * 100.0), 0),
+        or_dash(row.step_p50_us, 1),
+        or_dash(row.step_p99_us, 1),
+        row.late.to_string(),
+    ]
+}
+
+/// The table of the topics.
+pub fn topics(view: &View) -> Cells<5> {
+    Cells {
+        headings: ["topic", "publisher", "rate Hz", "samples", "lost"],
+        is_number: [false, false, true, true, true],
+        rows: view.topics.iter().map(topic).collect(),
+    }
+}
+
+fn topic(row: &TopicRow) -> [String; 5] {
+    let rate = format!("{:.0}", row.rate_hz);
+    [row.name.clone(), row.publisher.clone(), rate, row.samples.to_string(), row.lost.to_string()]
+}
+
+/// What stands above the tables: the run, and how far it has come.
+pub fn title(view: &View) -> [String; 2] {
+    let status = &view.status;
+    let missed = format!("{} deadlines missed", status.missed_deadlines);
+    let manifest = std::path::Path::new(&view.manifest).file_name().unwrap_or_default().to_string_lossy();
+    [
+        format!("{manifest}  run {}  {}", status.run_id, status.state.word()),
+        format!(
+            "tick {} / {}  {:.3} s  {:.2} × real time  pace {}  {missed}",
+            status.tick, status.end_tick, status.time_s, view.real_time_factor, status.pace
+        ),
+    ]
+}
+
+/// The whole view as text.
+pub fn page(view: &View) -> String {
+    let [run, progress] = title(view);
+    format!("{run}\n{progress}\n\n{}\n{}", lines(&processes(view)), lines(&topics(view)))
+}
+
+fn lines<const N: usize>(cells: &Cells<N>) -> String {
+    let headings = cells.headings.map(str::to_owned);
+    let rows = || std::iter::once(&headings).chain(&cells.rows);
+    let width = |column: usize| rows().map(|row| row[column].chars().count()).max().unwrap_or(0);
+    let widths: [usize; N] = std::array::from_fn(width);
+    let cell = |row: &[String; N], column: usize| {
+        let (text, width) = (&row[column], widths[column]);
+        if cells.is_number[column] { format!("{text:>width$}") } else { format!("{text:<width$}") }
+    };
+    rows().map(|row| (0..N).map(|column| cell(row, column)).collect::<Vec<_>>().join("  ") + "\n").collect()
+}

@@ -1,0 +1,157 @@
+//! Profiled runs: every tick is in the profile, and the recording knows nothing of it.
+
+use crate::nodes::{manifest, sender};
+use crate::recordings::require_same;
+use crate::support::{Ended, Place, repository};
+use rustix::process::Signal;
+use serde_json::Value;
+
+/// Ticks of a run here.
+const TICKS: u32 = 2000;
+const DURATION: &str = "run.duration_s=2";
+/// Terminals have this many columns.
+const COLUMNS: usize = 100;
+
+/// Profiles hover.toml; the recording is `hover.mcap`.
+fn hover(place: &Place, more: &[&str]) -> Ended {
+    let (manifest, recording) = (repository("manifests/hover.toml"), place.path("hover.mcap"));
+    let words = ["profile", &manifest, "--record", &recording, "--set", DURATION];
+    place.call(&[&words, more].concat()).flown()
+}
+
+/// The entry of `list` whose `key` is `value`.
+#[track_caller]
+fn find<'a>(list: &'a Value, key: &str, value: &str) -> &'a Value {
+    let mut entries = list.as_array().unwrap().iter();
+    entries.find(|entry| entry[key] == value).unwrap_or_else(|| panic!("no {key} {value} in {list}"))
+}
+
+#[test]
+fn a_profiled_run_records_the_same_file() {
+    let (plain, profiled) = (Place::new(), Place::new());
+    let recording = plain.path("hover.mcap");
+    let words = ["run", &repository("manifests/hover.toml"), "--record", &recording, "--set", DURATION];
+    plain.call(&words).flown();
+    let (trace, page) = (profiled.path("trace.json"), profiled.path("page.html"));
+    let summary = hover(&profiled, &["--trace", &trace, "--html", &page, "--json"]).json();
+    assert_eq!(summary["profile"]["files"], serde_json::json!({ "trace": trace, "html": page }));
+    require_same(&std::fs::read(recording).unwrap(), &profiled.path("hover.mcap"));
+}
+
+#[test]
+fn every_tick_of_every_node_is_in_the_profile() {
+    let profile = &hover(&Place::new(), &["--json"]).json()["profile"];
+    assert_eq!(
+        (&profile["ticks"], &profile["noted"], &profile["left_out"]),
+        (&TICKS.into(), &(6 * TICKS).into(), &0.into())
+    );
+    for name in ["attitude", "controller", "imu", "pilot", "plant", "recorder"] {
+        let node = find(&profile["nodes"], "name", name);
+        // What a node waited for before its first tick is the start of the run.
+        for (part, count) in [("compute", TICKS), ("publish", TICKS), ("wait", TICKS - 1)] {
+            assert_eq!(node[part]["count"], count, "{part} of {name}");
+        }
+        assert!(node["wake_up"]["count"].as_u64().unwrap() < TICKS.into());
+        let at = |key: &str| node["compute"][key].as_f64().unwrap();
+        let quantiles = ["p50_us", "p90_us", "p99_us", "p99.9_us", "max_us"].map(at);
+        assert!(quantiles.is_sorted() && quantiles[0] > 0.0, "{name}: {quantiles:?}");
+    }
+    assert_eq!(profile["pacing"], Value::Null);
+}
+
+#[test]
+fn the_critical_path_and_the_ages_are_those_of_the_loop() {
+    let profile = &hover(&Place::new(), &["--json"]).json()["profile"];
+    let path = &profile["critical_path"];
+    assert_eq!(path["tick_time"]["count"], TICKS);
+    let shares = path["places"].as_array().unwrap().iter().map(|place| place["share"].as_f64().unwrap());
+    assert!((shares.sum::<f64>() - 1.0).abs() < 1e-9);
+    // The command is what closes the loop, so its sender is on every path; the recorder is in no loop.
+    assert_eq!(find(&path["places"], "place", "controller")["ticks"], TICKS);
+    assert!(!path.to_string().contains("recorder"), "{path}");
+    let sources: Vec<_> = profile["age"].as_array().unwrap().iter().map(|age| &age["source"]).collect();
+    assert_eq!(sources, ["/attitude/estimate", "/imu/imu", "/pilot/set_point", "/plant/state"]);
+    for age in profile["age"].as_array().unwrap() {
+        assert_eq!((&age["command"], &age["host"]["count"]), (&"/controller/command".into(), &TICKS.into()));
+        assert_eq!(age["simulated"]["max_us"], 0.0, "every edge of the loop but one is of the same tick");
+    }
+}
+
+#[test]
+fn ages_follow_from_the_periods_of_the_nodes() {
+    let more = ["--json", "--set=process.imu.period_ticks=5"];
+    let profile = &hover(&Place::new(), &more).json()["profile"];
+    let age = |source| find(&profile["age"], "source", source)["simulated"].clone();
+    // A tick is 1 ms; a reading is used at its own tick and the four after it.
+    for source in ["/imu/imu", "/plant/state"] {
+        assert_eq!((&age(source)["max_us"], &age(source)["count"]), (&4000.0.into(), &TICKS.into()));
+    }
+    assert_eq!(age("/pilot/set_point")["max_us"], 0.0);
+    assert_eq!(find(&profile["nodes"], "name", "imu")["compute"]["count"], TICKS / 5);
+}
+
+#[test]
+fn the_node_that_a_tick_waits_for_is_named() {
+    let place = Place::new();
+    let nap = "parameters = { at_tick = 100, nap_ms = 60 }";
+    let (to_slow, to_fast) = (
+        "inputs.input = { topic = \"/fast/note\", delay_ticks = 1, initial = {} }",
+        "inputs.input = \"/slow/note\"",
+    );
+    let nodes = [sender("slow", 1, &format!("{to_slow}\n{nap}")), sender("fast", 1, to_fast)];
+    let path = place.write("nap.toml", manifest(200, &nodes));
+    let profile = &place.call(&["profile", &path, "--json"]).with_code(0).json()["profile"];
+    // A sleep lasts at least as long as it is asked to.
+    let slow = find(&profile["critical_path"]["places"], "place", "slow");
+    assert!(slow["time"]["max_us"].as_f64().unwrap() >= 60e3, "{slow}");
+    let tick_time = &profile["critical_path"]["tick_time"]["max_us"];
+    assert!(tick_time.as_f64() >= slow["time"]["max_us"].as_f64(), "{tick_time}, {slow}");
+}
+
+#[test]
+fn a_paced_run_tells_how_its_deadlines_were_kept() {
+    let place = Place::new();
+    let summary = hover(&place, &["--pace", "4", "--json"]).json();
+    let pacing = &summary["profile"]["pacing"];
+    assert_eq!(pacing["jitter"]["count"], TICKS);
+    assert_eq!(pacing["missed_deadlines"], summary["missed_deadlines"]);
+    assert_eq!(pacing["overruns"].as_array().unwrap().len(), 6);
+    hover(&place, &["--pace", "4"]).prints(&["deadlines [µs]", "jitter: deadline to grant", "overruns: "]);
+}
+
+#[test]
+fn the_tables_fit_a_terminal_and_follow_the_summary() {
+    let ended = hover(&Place::new(), &[]);
+    ended.prints(&["hover: 2000 ticks", "node, per tick [µs]", "transport, ", "age in /controller/command"]);
+    ended.prints(&["critical path [µs]", "p99.9", " % /plant/state → imu "]);
+    let (_, tables) = ended.output.split_once("node, per tick").unwrap();
+    let longest = tables.lines().max_by_key(|line| line.chars().count()).unwrap();
+    assert!(longest.chars().count() <= COLUMNS, "{longest}");
+}
+
+#[test]
+fn the_exit_code_is_that_of_a_run() {
+    let place = Place::new();
+    let hover = repository("manifests/hover.toml");
+    let words = ["profile", &hover, "--record", &place.path("a.mcap")];
+    place.call(&words).with_code(0).prints(&["\npassed\n"]);
+    place.call(&[&words[..], &["--set", DURATION]].concat()).with_code(1).prints(&["\nFAILED\n"]);
+    let nowhere = place.path("nowhere/page.html");
+    let ended = place.call(&[&words[..], &["--html", &nowhere]].concat()).with_code(2);
+    ended.says(&["cannot create", &nowhere]);
+}
+
+#[test]
+fn a_run_that_is_stopped_is_profiled_up_to_there() {
+    let place = Place::new();
+    let hover = repository("manifests/hover.toml");
+    let words = ["profile", &hover, "--record", &place.path("a.mcap"), "--json"];
+    let mut launch =
+        place.start(&[&words[..], &["--pace", "realtime", "--set", "run.duration_s=60"]].concat());
+    launch.await_ticks(50);
+    launch.signal(Signal::INT);
+    let summary = launch.end().with_code(1).json();
+    let (ticks, profile) = (&summary["ticks"], &summary["profile"]);
+    assert!(ticks.as_u64().unwrap() >= 50);
+    assert_eq!(&find(&profile["nodes"], "name", "plant")["compute"]["count"], ticks);
+}
