@@ -81,8 +81,9 @@ pub fn ctl(arguments: &CtlArguments) -> Result<()> {
 pub struct SwapArguments {
     /// The process to replace.
     process: String,
-    /// What replaces it: a TOML file, or TOML text, with the keys of a process in a manifest.
-    #[arg(long, value_name = "FILE_OR_TOML")]
+    /// What its successor has otherwise: a TOML file, or TOML text, with the keys of a process in a manifest;
+    /// nothing where absent.
+    #[arg(long, value_name = "FILE|TOML", default_value = "")]
     with: String,
     /// Ticks that the successor computes beside the process before it takes over.
     #[arg(long, value_name = "TICKS")]
@@ -113,8 +114,8 @@ pub fn swap(arguments: &SwapArguments) -> Result<()> {
 }
 
 /// The TOML text that `words` are, or that the file of this name holds.
-fn description(words: &str) -> Result<String> {
-    let is_file = Path::new(words).is_file() || !words.contains('=');
+pub fn description(words: &str) -> Result<String> {
+    let is_file = !words.is_empty() && (Path::new(words).is_file() || !words.contains('='));
     let text = if is_file {
         std::fs::read_to_string(words).with_context(|| {
             format!("--with: cannot read {words}, and it is no TOML text such as kind=\"pid\"")

@@ -305,11 +305,7 @@ impl Supervisor<'_> {
                 self.tell(Event::StopRequested)?;
             }
         }
-        let has_completed = |&(node, generation): &(usize, u32)| {
-            self.control.has_completed(self.plan.member(node, generation))
-        };
-        let active = (0..self.plan.nodes.len()).map(|node| (node, self.successions.active_generation(node)));
-        if self.state == State::Running && active.into_iter().any(|member| has_completed(&member)) {
+        if self.state == State::Running && self.control.granted_ticks() >= self.control.end_tick() {
             self.tell(Event::EndReached)?;
         }
         if self.processes.all_ended() && self.processes.running.iter().all(|process| process.is_settled) {

@@ -17,6 +17,7 @@ mod program;
 mod progress;
 #[cfg(test)]
 mod properties;
+mod run;
 mod run_dir;
 mod shadow;
 mod spawn;
@@ -27,10 +28,9 @@ mod supervisor;
 mod top;
 
 use crate::graph::Graph;
-use crate::manifest::{Manifest, PaceSetting};
-use crate::profile::{Files, Profile};
-use crate::program::Program;
-use crate::summary::{Judgement, Summary};
+use crate::manifest::Manifest;
+use crate::profile::Files;
+use crate::run::RunArguments;
 use anyhow::{Context, Result, bail};
 use bus::BusError;
 use clap::{Args, Parser, Subcommand};
@@ -56,6 +56,12 @@ enum Verb {
         after_help = "Example: hummingbus profile manifests/hover.toml --html profile.html --trace trace.json"
     )]
     Profile(ProfileArguments),
+    /// Fly a manifest with a shadow of one of its processes, or read a recording that has one: what the shadow
+    /// would have done otherwise.
+    #[command(
+        after_help = "Examples: hummingbus shadow manifests/hover.toml --process controller --with better.toml\n          hummingbus shadow hover.mcap"
+    )]
+    Shadow(ShadowArguments),
     /// Check a manifest without running it, and print its graph.
     #[command(after_help = "Example: hummingbus check manifests/hover.toml")]
     Check(CheckArguments),
@@ -111,27 +117,6 @@ enum Verb {
 }
 
 #[derive(Args)]
-struct RunArguments {
-    /// The manifest.
-    manifest: PathBuf,
-    /// Where to record; beside the manifest, named like it, where absent.
-    #[arg(long, value_name = "PATH")]
-    record: Option<PathBuf>,
-    /// free, realtime, or simulated seconds per second.
-    #[arg(long, value_name = "PACE")]
-    pace: Option<PaceSetting>,
-    /// Ticks that a fast process may be ahead of the slowest.
-    #[arg(long, value_name = "TICKS", value_parser = clap::value_parser!(u32).range(1..=i64::from(graph::WINDOW_TICKS_MAX)))]
-    window: Option<u32>,
-    /// Override a key of the manifest, such as run.seed=3.
-    #[arg(long, value_name = "KEY=VALUE")]
-    set: Vec<String>,
-    /// Print the summary as JSON, and no progress.
-    #[arg(long)]
-    json: bool,
-}
-
-#[derive(Args)]
 struct ProfileArguments {
     #[command(flatten)]
     run: RunArguments,
@@ -141,6 +126,18 @@ struct ProfileArguments {
     /// Write a page with histograms and the slowest ticks.
     #[arg(long, value_name = "FILE")]
     html: Option<PathBuf>,
+}
+
+#[derive(Args)]
+struct ShadowArguments {
+    #[command(flatten)]
+    run: RunArguments,
+    /// The process to shadow; left out where a recording is read.
+    #[arg(long)]
+    process: Option<String>,
+    /// What the shadow has otherwise: a TOML file, or TOML text, with the keys of a process in a manifest.
+    #[arg(long, value_name = "FILE|TOML", default_value = "")]
+    with: String,
 }
 
 #[derive(Args)]
@@ -157,10 +154,11 @@ struct CheckArguments {
 
 fn main() -> ExitCode {
     let result = match Cli::parse().command {
-        Verb::Run(arguments) => run(&arguments, None),
+        Verb::Run(arguments) => run::run(&arguments, None, None),
         Verb::Profile(ProfileArguments { run: arguments, trace, html }) => {
-            run(&arguments, Some(Files { trace, html }))
+            run::run(&arguments, Some(Files { trace, html }), None)
         }
+        Verb::Shadow(arguments) => shadow(&arguments),
         Verb::Check(arguments) => check(&arguments),
         Verb::Diff { a, b } => diff(&a, &b),
         Verb::Cat { recording, topic } => cat(&recording, topic.as_deref()),
@@ -190,67 +188,20 @@ fn words(error: &anyhow::Error) -> String {
     })
 }
 
-/// Flies a manifest, profiled where `files` are given; false if a condition did not hold.
-fn run(arguments: &RunArguments, files: Option<Files>) -> Result<bool> {
-    files.as_ref().map_or(Ok(()), Files::check)?;
-    let mut manifest = Manifest::load(&arguments.manifest, &arguments.set)?;
-    if let Some(pace) = arguments.pace {
-        manifest.content.run.pace = pace;
-    }
-    if let Some(window) = arguments.window {
-        manifest.content.run.window_ticks = Some(toml::Spanned::new(0..0, window));
-    }
-    let mut graph = Graph::build(&manifest)?;
-    graph.plan.profile |= files.is_some();
-    let path = recording_path(&manifest, arguments.record.as_deref())?;
-    let has_recorder = graph.programs.iter().any(Program::is_recorder);
-    let mut outcome = launch::fly(&manifest, &mut graph, &path, arguments.json)?;
-    let flight = outcome.flight.take();
-    let profile = flight.as_ref().map(|flight| Profile::of(flight, outcome.missed_deadlines));
-    let files = files.unwrap_or_else(|| Files::beside(&path));
-    let mut judgement = Judgement::default();
-    if has_recorder {
-        let recording = Recording::open(&path)?;
-        judgement.steps = shadow::steps(&recording, &graph.plan, &outcome.successions)?;
-        judgement.shadows = shadow::differences(&recording)?;
-        // A run that was stopped has not flown what the conditions speak of.
-        if !outcome.was_stopped {
-            judgement.pass = judge::verdicts(&manifest.content, &recording)?;
-            judgement.compare = judge::window_errors(&manifest.content, &recording)?;
+/// Flies a manifest with a shadow more, or tells what the shadows of a recording did otherwise.
+fn shadow(arguments: &ShadowArguments) -> Result<bool> {
+    let path = &arguments.run.manifest;
+    match (&arguments.process, path.extension().is_some_and(|extension| extension == "mcap")) {
+        (Some(process), false) => {
+            let with = ctl::description(&arguments.with)?;
+            run::run(&arguments.run, None, Some((process, &with)))
+        }
+        (None, true) => print_text(&shadow::report(&Recording::open(path)?)?).map(|()| true),
+        (None, false) => bail!("name the process to shadow: --process NAME; or give a recording (.mcap)"),
+        (Some(_), true) => {
+            bail!("{} is a recording: leave --process out, or give a manifest", path.display())
         }
     }
-    let tick_s = graph.plan.tick_s();
-    let summary = Summary::new(manifest.name(), outcome, tick_s, has_recorder.then_some(path), judgement);
-    let mut text =
-        if arguments.json { json_text(&summary, profile.as_ref(), &files)? } else { summary.to_string() };
-    if let (Some(flight), Some(profile)) = (&flight, &profile) {
-        let lines = files.write(&summary.manifest, flight, profile)?;
-        if !arguments.json {
-            text += &format!("\n\n{profile}\n{}", lines.join("\n"));
-        }
-    }
-    print_text(&text)?;
-    Ok(summary.passed)
-}
-
-/// The summary as JSON, with the profile and its files in it.
-fn json_text(summary: &Summary, profile: Option<&Profile>, files: &Files) -> Result<String> {
-    let mut value = serde_json::to_value(summary)?;
-    if let Some(profile) = profile {
-        value["profile"] = serde_json::to_value(profile)?;
-        value["profile"]["files"] = serde_json::to_value(files)?;
-    }
-    Ok(serde_json::to_string_pretty(&value)?)
-}
-
-/// Where the run is recorded: `--record`, the manifest's `record`, or beside the manifest.
-fn recording_path(manifest: &Manifest, argument: Option<&Path>) -> Result<PathBuf> {
-    let path = match (argument, &manifest.content.run.record) {
-        (Some(path), _) => path.to_owned(),
-        (None, Some(path)) => manifest.resolve(path)?,
-        (None, None) => manifest.path.with_extension("mcap"),
-    };
-    std::path::absolute(&path).with_context(|| format!("{} is not a path", path.display()))
 }
 
 fn check(arguments: &CheckArguments) -> Result<bool> {

@@ -1,7 +1,7 @@
 //! The manifest: what a user writes to describe a run, read with the place of every value.
 //!
 //! - [`sources`]: the texts it is made of, laid end to end, so that one offset names a place in any of them
-//! - [`include`]: reads the file and the files it includes
+//! - [`mod@include`]: reads the file and the files it includes
 //! - [`overrides`]: the values given with `--set`
 //! - [`tree`]: tables with the places of their values, merged
 //! - [`sets`]: vehicles of process sets become processes

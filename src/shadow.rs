@@ -1,6 +1,6 @@
 //! What a shadow would have done otherwise: its samples against those of the process it shadows.
 
-use anyhow::Result;
+use anyhow::{Result, bail};
 use bus::plan::Plan;
 use recorder::node::SHADOW_PREFIX;
 use recorder::reader::Recording;
@@ -77,6 +77,21 @@ pub fn differences(recording: &Recording) -> Result<Vec<Difference>> {
         difference(topic, field, unit, shadow, active)
     });
     Ok(shadows.collect())
+}
+
+/// The differences of all shadow topics of `recording`, in words.
+///
+/// # Errors
+/// If the recording is damaged, or has no shadow.
+pub fn report(recording: &Recording) -> Result<String> {
+    let differences = differences(recording)?;
+    if differences.is_empty() {
+        let path = recording.path().display();
+        bail!(
+            "{path} has no shadow: its run had no [[shadow]], [[swap]] or standby, or did not record their topics"
+        );
+    }
+    Ok(differences.iter().map(|difference| format!("{difference}\n")).collect())
 }
 
 fn difference(

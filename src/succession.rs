@@ -8,7 +8,7 @@ use crate::processes::{Processes, Role};
 use crate::program::{OnExit, Program, Successor};
 use anyhow::Result;
 use bus::control::{Control, HandOver, Phase, Seat};
-use bus::plan::{Plan, SEATS};
+use bus::plan::Plan;
 use bus::roster::{Incumbent, Roster};
 use serde::Serialize;
 use std::collections::VecDeque;
@@ -194,11 +194,6 @@ impl<'a> Successions<'a> {
         }
     }
 
-    /// The generation of `node` whose samples count.
-    pub fn active_generation(&self, node: usize) -> u32 {
-        self.roster.nodes[node].active.generation
-    }
-
     /// What follows the end of the active process of `node` by the manifest.
     pub fn program(&self, node: usize) -> &Program {
         &self.seats[node].program
@@ -329,9 +324,9 @@ impl<'a> Successions<'a> {
         let node = pending.successor.node;
         // A candidate that failed leaves its generation unused, and its seat is the active one's other.
         let active = self.roster.nodes[node].active.generation;
-        let newest = self.seats[node].newest_generation;
-        let generation = (newest + 1..).find(|generation| (generation - active) as usize % SEATS != 0);
-        let generation = generation.unwrap_or(newest + 1);
+        let next = self.seats[node].newest_generation + 1;
+        let is_other_seat = self.member(node, next) != self.member(node, active);
+        let generation = if is_other_seat { next } else { next + 1 };
         let name = self.plan.nodes[node].name.clone();
         let member = self.member(node, generation);
         self.control.set_seat(member, Seat::Empty);

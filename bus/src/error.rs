@@ -99,14 +99,12 @@ pub enum BusError {
     },
     /// A successor sends other bytes than the process it would succeed.
     #[error(
-        "layout mismatch on topic {topic}: the successor of node `{node}` sends its port `{port}` as\n{found}\n\
-         but the topic carries\n{expected}\nBuild both against the same message definition"
+        "layout mismatch on topic {topic}: the successor of node `{node}` sends\n{found}\nbut the topic carries\n\
+         {expected}\nBuild both against the same message definition"
     )]
     SuccessorLayout {
         /// The node.
         node: String,
-        /// Its port.
-        port: String,
         /// The topic.
         topic: String,
         /// The layout the topic carries.

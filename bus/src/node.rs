@@ -286,7 +286,7 @@ impl Node {
         ports
             .map(|(output, schema)| {
                 let topic = &self.plan.topics[output.topic];
-                self.announce(output.topic, schema, &output.port)?;
+                self.announce(output.topic, schema)?;
                 let capacity = self.plan.capacity(output.topic);
                 let sender = transport.publisher(&topic.name, self.generation, schema.size, capacity)?;
                 Ok(OutPort::new(output, topic, schema, sender))
@@ -295,7 +295,7 @@ impl Node {
     }
 
     /// Announces the type of a topic, or checks that a successor sends what was announced.
-    fn announce(&self, topic: usize, schema: &Schema, port: &str) -> Result<(), BusError> {
+    fn announce(&self, topic: usize, schema: &Schema) -> Result<(), BusError> {
         let path = announcement::topic_path(&self.run_dir, topic);
         if self.generation == 0 {
             return Announcement::of(schema).store(&path);
@@ -306,7 +306,6 @@ impl Node {
         }
         Err(BusError::SuccessorLayout {
             node: self.name().to_owned(),
-            port: port.to_owned(),
             topic: self.plan.topics[topic].name.clone(),
             expected: announced.layout,
             found: schema.layout(),

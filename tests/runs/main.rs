@@ -33,4 +33,5 @@ mod recordings;
 mod refusals;
 mod replay;
 mod support;
+mod swap;
 mod terminal;

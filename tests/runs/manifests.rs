@@ -4,7 +4,7 @@
 use crate::nodes::{manifest, sender, table};
 use crate::recordings::{open, require_same};
 use crate::refusals::{good, refused, refused_setting, refused_text, refused_with};
-use crate::support::{Ended, Place, repository};
+use crate::support::{Launch, Place, repository};
 use serde_json::Value;
 use std::fs;
 use std::path::Path;
@@ -511,24 +511,35 @@ fn a_companion_runs_beside_the_ticks_and_ends_with_the_run() {
         "\n[process.viewer]\nlockstep = false\ncommand = [\"sh\", \"-c\", {script:?}]\n\
          environment = {{ COLOUR = \"blue\", OUT = {out:?} }}\nworking_directory = {folder:?}\n"
     );
-    // Paced, so that the script has the time to write.
-    let text = good().replace("duration_s = 0.1", "duration_s = 2.0\npace = \"realtime\"") + &companion;
+    let text = good().replace("duration_s = 0.1", "duration_s = 100\npace = \"realtime\"") + &companion;
     let path = place.write("beside.toml", text);
     place.call(&["check", &path]).with_code(0).prints(&["viewer (", "takes no part in the ticks"]);
-    // It leaves nothing behind, although the script would sleep on.
-    place.call(&["run", &path]).with_code(0);
-    let written = fs::read_to_string(out).unwrap();
+    let mut launch = place.start(&["run", &path]);
+    let written =
+        await_it(&mut launch, || fs::read_to_string(&out).ok().filter(|written| written.ends_with('\n')));
     assert!(written.starts_with(&format!("blue {folder} none hummingbus-")), "{written}");
+    // It leaves nothing behind, although the script would sleep on.
+    launch.signal(rustix::process::Signal::INT);
+    launch.end().with_code(1);
+}
+
+/// Looks again and again, while a long run goes on.
+fn await_it<T>(launch: &mut Launch<'_>, look: impl Fn() -> Option<T>) -> T {
+    let looks = (1..1000).find_map(|step| {
+        launch.await_ticks(50 * step);
+        look()
+    });
+    looks.expect("it does not come")
 }
 
 #[test]
 fn a_companion_dies_with_a_launcher_that_is_killed() {
     let place = Place::new();
     let companion = "\n[process.viewer]\nlockstep = false\ncommand = [\"sleep\", \"600\"]\n";
-    let text = good().replace("duration_s = 0.1", "duration_s = 60\npace = \"realtime\"") + companion;
+    let text = good().replace("duration_s = 0.1", "duration_s = 100\npace = \"realtime\"") + companion;
     let mut launch = place.start(&["run", &place.write("beside.toml", text)]);
-    launch.await_ticks(50);
-    assert!(place.processes().len() >= 8, "{:?}", place.processes());
+    // The launcher, the clock, six nodes and the companion.
+    await_it(&mut launch, || (place.processes().len() >= 9).then_some(()));
     launch.kill();
     place.await_no_process();
 }
@@ -587,43 +598,46 @@ fn host_settings_that_no_system_has() {
 
 #[test]
 fn a_priority_is_given_or_refused_with_the_right_that_it_takes() {
-    let place = Place::new();
-    for (key, limit) in [("nice = -20", "ulimit -e"), ("realtime_priority = 99", "ulimit -r")] {
+    // Numbers of fields in proc_pid_stat(5): niceness, and priority under SCHED_FIFO.
+    let keys = [("nice = -20", "ulimit -e", 19, "-20"), ("realtime_priority = 2", "ulimit -r", 40, "2")];
+    for (key, limit, field, value) in keys {
+        let place = Place::new();
         let text = good().replace("kind = \"imu\"", &format!("kind = \"imu\"\n{key}"));
-        let ended = place.call(&["run", &place.write("priority.toml", text)]);
-        if !is_flown(&ended) {
+        let ended = place.call(&["run", &place.write("priority.toml", &text)]);
+        if ended.code == Some(0) {
+            assert_eq!(running(&place, &text, |process| stat(process, field)), value, "{key}");
+        } else {
             let ended = ended.with_code(2);
-            ended.says(&[
-                &format!("process `imu`: `{key}` is refused: "),
-                "CAP_SYS_NICE",
-                limit,
-                "leave the key",
-            ]);
+            ended.says(&[&format!("process `imu`: `{key}` is refused: "), "CAP_SYS_NICE", limit]);
         }
     }
 }
 
-fn is_flown(ended: &Ended) -> bool {
-    ended.code == Some(0) && ended.error.is_empty()
-}
-
 #[test]
 fn niceness_and_generation_reach_the_process() {
-    let place = Place::new();
-    let text = good().replace("duration_s = 0.1", "duration_s = 60\npace = \"realtime\"");
-    let path = place.write("nice.toml", text.replace("kind = \"imu\"", "kind = \"imu\"\nnice = 7"));
-    let mut launch = place.start(&["run", &path]);
-    launch.await_ticks(50);
-    let process = format!("/proc/{}", place.process_of("imu").as_raw_nonzero());
-    let environment = fs::read_to_string(process.clone() + "/environ").unwrap();
+    let text = good().replace("kind = \"imu\"", "kind = \"imu\"\nnice = 7");
+    let look = |process: &str| (stat(process, 19), fs::read_to_string(format!("{process}/environ")).unwrap());
+    let (nice, environment) = running(&Place::new(), &text, look);
+    assert_eq!(nice, "7");
     assert!(environment.split('\0').any(|variable| variable == "HUMMINGBUS_GENERATION=0"), "{environment}");
-    let stat = process + "/stat";
-    // Behind the name in brackets: state is field 3, niceness field 19 (proc_pid_stat(5)).
-    let stat = fs::read_to_string(stat).unwrap();
-    let nice = stat.rsplit(')').next().unwrap().split_whitespace().nth(19 - 3).unwrap();
-    assert_eq!(nice, "7", "{stat}");
+}
+
+/// What `look` finds in the folder of /proc of the IMU, amid a long run of `text`.
+fn running<T>(place: &Place, text: &str, look: impl Fn(&str) -> T) -> T {
+    let text = text.replace("duration_s = 0.1", "duration_s = 60\npace = \"realtime\"");
+    let mut launch = place.start(&["run", &place.write("running.toml", text)]);
+    launch.await_ticks(50);
+    let found = look(&format!("/proc/{}", place.process_of("imu").as_raw_nonzero()));
     launch.kill();
     place.await_no_process();
+    found
+}
+
+/// Field `number` of a process's proc_pid_stat(5); the third, behind the name in brackets, is its state.
+fn stat(process: &str, number: usize) -> String {
+    let text = fs::read_to_string(format!("{process}/stat")).unwrap();
+    let fields = text.rsplit(')').next().unwrap();
+    fields.split_whitespace().nth(number - 3).unwrap().to_owned()
 }
 
 // Documentation

@@ -216,10 +216,25 @@ impl Launch<'_> {
         }
     }
 
+    /// Holds the run at the boundary before `ticks` and waits until it is held there.
+    pub fn hold_at(&mut self, ticks: u32) {
+        let what = format!("the run was not held at tick {ticks}");
+        poll(&what, || self.control().map(|control| control.set_hold_tick(ticks)));
+        poll(&what, || self.control()?.held_at().filter(|&held| held == ticks));
+    }
+
+    /// Lets a held run go on.
+    pub fn release(&mut self) {
+        self.control().expect("the run is up").set_hold_tick(u32::MAX);
+    }
+
+    fn control(&self) -> Option<Control> {
+        Control::open(&Plan::load(self.place.run_dirs().first()?).ok()?).ok()
+    }
+
     /// What the run's own control segment says; `None` while it is not there yet.
     fn completed_ticks(&self) -> Option<u32> {
-        let plan = Plan::load(self.place.run_dirs().first()?).ok()?;
-        Control::open(&plan).ok().map(|control| control.completed_ticks())
+        self.control().map(|control| control.completed_ticks())
     }
 
     /// Waits for the end; the launch must have left nothing behind.

@@ -1,0 +1,111 @@
+//! The command `run` and its kin: check a manifest, fly it, judge its recording, say what came of it.
+
+use crate::graph::{self, Graph, successor_of};
+use crate::manifest::{Manifest, PaceSetting};
+use crate::profile::{Files, Profile};
+use crate::program::Program;
+use crate::summary::{Judgement, Summary};
+use crate::{judge, launch, shadow};
+use anyhow::{Context, Result, bail};
+use clap::Args;
+use recorder::reader::Recording;
+use std::path::{Path, PathBuf};
+
+/// What `run` and its kin take.
+#[derive(Args)]
+pub struct RunArguments {
+    /// The manifest.
+    pub manifest: PathBuf,
+    /// Where to record; beside the manifest, named like it, where absent.
+    #[arg(long, value_name = "PATH")]
+    pub record: Option<PathBuf>,
+    /// free, realtime, or simulated seconds per second.
+    #[arg(long, value_name = "PACE")]
+    pub pace: Option<PaceSetting>,
+    /// Ticks that a fast process may be ahead of the slowest.
+    #[arg(long, value_name = "TICKS", value_parser = clap::value_parser!(u32).range(1..=i64::from(graph::WINDOW_TICKS_MAX)))]
+    pub window: Option<u32>,
+    /// Override a key of the manifest, such as run.seed=3.
+    #[arg(long, value_name = "KEY=VALUE")]
+    pub set: Vec<String>,
+    /// Print the summary as JSON, and no progress.
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// Flies a manifest, profiled where `files` are given, with an `extra_shadow` (a process, and TOML with what the shadow
+/// has otherwise) where one is asked for; false if a condition did not hold.
+pub fn run(
+    arguments: &RunArguments,
+    files: Option<Files>,
+    extra_shadow: Option<(&str, &str)>,
+) -> Result<bool> {
+    files.as_ref().map_or(Ok(()), Files::check)?;
+    let mut manifest = Manifest::load(&arguments.manifest, &arguments.set)?;
+    if let Some(pace) = arguments.pace {
+        manifest.content.run.pace = pace;
+    }
+    if let Some(window) = arguments.window {
+        manifest.content.run.window_ticks = Some(toml::Spanned::new(0..0, window));
+    }
+    let mut graph = Graph::build(&manifest)?;
+    graph.plan.profile |= files.is_some();
+    if let Some((process, with)) = extra_shadow {
+        let shadow = successor_of(&manifest, &graph, process, with)?;
+        if graph.successors.iter().any(|other| other.node == shadow.node) {
+            bail!(
+                "`{process}` has a successor, a standby or a shadow in this manifest already; one at a time"
+            );
+        }
+        graph.successors.push(shadow);
+    }
+    let path = recording_path(&manifest, arguments.record.as_deref())?;
+    let has_recorder = graph.programs.iter().any(Program::is_recorder);
+    let mut outcome = launch::fly(&manifest, &mut graph, &path, arguments.json)?;
+    let flight = outcome.flight.take();
+    let profile = flight.as_ref().map(|flight| Profile::of(flight, outcome.missed_deadlines));
+    let files = files.unwrap_or_else(|| Files::beside(&path));
+    let mut judgement = Judgement::default();
+    if has_recorder {
+        let recording = Recording::open(&path)?;
+        judgement.steps = shadow::steps(&recording, &graph.plan, &outcome.successions)?;
+        judgement.shadows = shadow::differences(&recording)?;
+        // A run that was stopped has not flown what the conditions speak of.
+        if !outcome.was_stopped {
+            judgement.pass = judge::verdicts(&manifest.content, &recording)?;
+            judgement.compare = judge::window_errors(&manifest.content, &recording)?;
+        }
+    }
+    let tick_s = graph.plan.tick_s();
+    let summary = Summary::new(manifest.name(), outcome, tick_s, has_recorder.then_some(path), judgement);
+    let mut text =
+        if arguments.json { json_text(&summary, profile.as_ref(), &files)? } else { summary.to_string() };
+    if let (Some(flight), Some(profile)) = (&flight, &profile) {
+        let lines = files.write(&summary.manifest, flight, profile)?;
+        if !arguments.json {
+            text += &format!("\n\n{profile}\n{}", lines.join("\n"));
+        }
+    }
+    crate::print_text(&text)?;
+    Ok(summary.passed)
+}
+
+/// The summary as JSON, with the profile and its files in it.
+fn json_text(summary: &Summary, profile: Option<&Profile>, files: &Files) -> Result<String> {
+    let mut value = serde_json::to_value(summary)?;
+    if let Some(profile) = profile {
+        value["profile"] = serde_json::to_value(profile)?;
+        value["profile"]["files"] = serde_json::to_value(files)?;
+    }
+    Ok(serde_json::to_string_pretty(&value)?)
+}
+
+/// Where the run is recorded: `--record`, the manifest's `record`, or beside the manifest.
+fn recording_path(manifest: &Manifest, argument: Option<&Path>) -> Result<PathBuf> {
+    let path = match (argument, &manifest.content.run.record) {
+        (Some(path), _) => path.to_owned(),
+        (None, Some(path)) => manifest.resolve(path)?,
+        (None, None) => manifest.path.with_extension("mcap"),
+    };
+    std::path::absolute(&path).with_context(|| format!("{} is not a path", path.display()))
+}
