@@ -370,7 +370,12 @@ impl<'a> Successions<'a> {
             }
             Stage::Joining => self.control.is_ready(member, Phase::Running),
             Stage::Announced => self.all_agree(processes),
-            Stage::Shadowing => self.control.done(member) > self.roster.nodes[node].take_over_tick,
+            // It may have completed the tick as a shadow before it was promoted there: the roster that says so is
+            // replaced only when everybody has read it.
+            Stage::Shadowing => {
+                self.control.done(member) > self.roster.nodes[node].take_over_tick
+                    && self.all_agree(processes)
+            }
             Stage::Retiring => self.has_retired(node, candidate, processes),
         };
         if !goes_on {
