@@ -378,7 +378,8 @@ impl<'a> Successions<'a> {
             }
             Stage::Joining => self.control.is_ready(member, Phase::Running),
             Stage::Announced => self.all_agree(processes),
-            // A promoted shadow may have done the tick before it was told that this one counts.
+            // It may have completed the tick as a shadow before it was promoted there: the roster that says so is
+            // replaced only when everybody has read it.
             Stage::Shadowing => {
                 self.control.done(member) > self.roster.nodes[node].take_over_tick
                     && self.all_agree(processes)

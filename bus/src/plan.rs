@@ -231,23 +231,25 @@ impl Plan {
     }
 
     /// How the queues of topic `topic` are sized: a queue holds what a publisher can send before the slowest
-    /// node holds the grant back.
+    /// node holds the grant back. That is two windows where one shadows and nobody waits for its samples: it may
+    /// be a window behind a reader when that takes what there is, and a window ahead before it takes the next.
     pub(crate) fn capacity(&self, topic: usize) -> Capacity {
         let reads = |node: &&NodePlan| node.inputs.iter().any(|input| input.topic == topic);
         let longest_period = self.nodes.iter().map(|node| node.period_ticks).max().unwrap_or(1);
         let ticks = u64::from(self.window_ticks) + u64::from(longest_period);
-        let samples = ticks.div_ceil(u64::from(self.topics[topic].period_ticks)) + 2;
-        let queued_samples = usize::try_from(samples).unwrap_or(usize::MAX);
+        let samples = |ticks: u64| {
+            let samples = ticks.div_ceil(u64::from(self.topics[topic].period_ticks)) + 2;
+            usize::try_from(samples).unwrap_or(usize::MAX)
+        };
+        // Whoever joins is handed the history first: beside it there must be room for what is sent before that
+        // has been taken.
+        let queued_samples = 2 * samples(ticks);
         // Who joins at a tick boundary needs the newest sample; who takes the place of a crashed process
         // needs all that was sent since.
         let restarts = self.nodes.iter().filter(reads).any(|node| node.restarts);
-        // Whoever joins is handed the history first: beside it there must be room for what is sent before that
-        // has been taken.
-        let (queued_samples, history_samples) =
-            if restarts { (2 * queued_samples, queued_samples) } else { (queued_samples, 1) };
         Capacity {
             queued_samples,
-            history_samples,
+            history_samples: if restarts { samples(ticks) } else { 1 },
             // Each reader and its successor, and a successor of the publisher.
             subscribers: SEATS * self.nodes.iter().filter(reads).count() + 1,
             nodes: SEATS * self.nodes.len() + 1,
