@@ -325,10 +325,7 @@ impl Supervisor<'_> {
                 self.processes.running[index].is_settled = true;
                 continue;
             }
-            let mut words = self.processes.running[index].post_mortem();
-            if succeeded {
-                words += " before the run did";
-            }
+            let words = self.processes.running[index].post_mortem();
             if self.settle(Death { name, role, words })?
                 && let Some(process) = self.processes.running.get_mut(index)
                 && process.role == role
