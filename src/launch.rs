@@ -444,7 +444,7 @@ impl Supervisor<'_> {
             return Ok(());
         }
         if let Some((node, generation, stage, since)) = self.successions.joining() {
-            return self.note_late_joiner(node, generation, stage, since);
+            return self.note_late_joiner(node, generation, stage, since.max(self.last_change.1));
         }
         let stood = self.last_change.1.elapsed();
         let culprit = stall::culprit(self.plan, self.control, &self.successions, &self.processes);
@@ -465,14 +465,16 @@ impl Supervisor<'_> {
 
     /// A process that does not join, or a member that does not make room for it.
     fn note_late_joiner(&mut self, node: usize, generation: u32, stage: Stage, since: Instant) -> Result<()> {
-        let late = match stage {
-            Stage::Announced => self.successions.disagreeing(&self.processes).unwrap_or((node, generation)),
-            _ => (node, generation),
-        };
+        let disagreeing = self.successions.disagreeing(&self.processes);
+        let late = disagreeing.filter(|_| stage != Stage::Joining).unwrap_or((node, generation));
         let patience = self.successions.program_of(late.0, late.1).watchdog;
         if since.elapsed() > patience {
-            let words =
-                format!("was killed by the watchdog: it did not join within {} ms", patience.as_millis());
+            let what = if late == (node, generation) {
+                "did not join".to_owned()
+            } else {
+                format!("did not connect to `{}.{generation}`", self.plan.nodes[node].name)
+            };
+            let words = format!("was killed by the watchdog: it {what} within {} ms", patience.as_millis());
             self.processes.kill(late.0, late.1, Some(words));
         }
         Ok(())

@@ -247,13 +247,22 @@ impl<'a> Successions<'a> {
         })
     }
 
-    /// The candidate that has not joined yet and holds the clock, or would: node, generation and when its
-    /// stage began.
+    /// The candidate on which the run waits, because it has not joined yet: node, generation, stage and when that
+    /// began. One that is early for its tick, or prepares while the run flies, keeps nobody waiting.
     pub fn joining(&self) -> Option<(usize, u32, Stage, Instant)> {
-        self.seats.iter().enumerate().find_map(|(node, seats)| {
-            let candidate = seats.candidate.as_ref().filter(|c| c.stage < Stage::Shadowing)?;
-            Some((node, candidate.generation, candidate.stage, candidate.stage_began))
-        })
+        let candidates = self.seats.iter().enumerate();
+        let awaited = candidates.filter_map(|(node, seats)| {
+            let candidate = seats.candidate.as_ref()?;
+            let is_awaited = match (candidate.stage, candidate.pending.join) {
+                (Stage::Starting, Join::At(tick)) => self.control.held_at() == Some(tick),
+                (Stage::Starting, Join::Next { .. }) => false,
+                (Stage::Starting, Join::AtOnce) | (Stage::Joining | Stage::Announced, _) => true,
+                (Stage::Shadowing | Stage::Retiring, _) => false,
+            };
+            is_awaited.then_some((node, candidate.generation, candidate.stage, candidate.stage_began))
+        });
+        // Those that only start wait for the one that is on the way in.
+        awaited.max_by_key(|&(.., stage, _)| stage > Stage::Starting)
     }
 
     /// The tick at which the clock must wait for somebody to join; `u32::MAX` if nobody is awaited.
