@@ -389,10 +389,11 @@ impl Supervisor<'_> {
             return Ok(true);
         }
         let flies = self.control.phase() == Phase::Running;
-        if flies && !self.successions.all_agree(&self.processes) {
+        let on_exit = self.successions.program(node).on_exit;
+        if flies && on_exit != OnExit::Stop && !self.successions.may_replace(node, &self.processes) {
             return Ok(false);
         }
-        let policy = match self.successions.program(node).on_exit {
+        let policy = match on_exit {
             OnExit::Restart if self.successions.can_promote(node) => OnExit::Standby,
             policy => policy,
         };
@@ -405,6 +406,7 @@ impl Supervisor<'_> {
         let tick = self.control.completed_by(self.plan.member(node, generation));
         match self.tell(Event::Died { policy, is_possible })? {
             Action::Restart => {
+                self.successions.close_early(node, &mut self.processes);
                 if self.successions.is_busy(node) {
                     self.refuse(node, "the process it was to succeed died first".to_owned())?;
                 }

@@ -412,6 +412,15 @@ impl<'a> Successions<'a> {
             && self.all_agree(processes)
     }
 
+    /// Whether the dead active process of `node` can be replaced now: whoever is on the way in, its own successor
+    /// included, comes to the end of that or is refused first.
+    pub fn may_replace(&self, node: usize, processes: &Processes) -> bool {
+        let candidate = self.seats[node].candidate.as_ref();
+        let is_joining =
+            candidate.is_some_and(|candidate| matches!(candidate.stage, Stage::Joining | Stage::Announced));
+        !is_joining && self.may_change(node, processes)
+    }
+
     fn is_at_join(&self, candidate: &Candidate) -> bool {
         match (candidate.pending.join, self.control.held_at()) {
             (Join::At(tick), Some(held)) => held == tick,
@@ -552,6 +561,19 @@ impl<'a> Successions<'a> {
         self.reports.push(candidate.report);
     }
 
+    /// The active process of `node` has died while its predecessor retired: that is over now. Nothing more comes
+    /// from the predecessor, and who has not read its last samples yet holds them.
+    pub fn close_early(&mut self, node: usize, processes: &mut Processes) {
+        let Some(candidate) = self.seats[node].candidate.as_ref().filter(|c| c.stage == Stage::Retiring)
+        else {
+            return;
+        };
+        if let Some(former) = candidate.former {
+            processes.kill(node, former, None);
+        }
+        self.close(node, processes);
+    }
+
     /// Removes what a process that has ended left behind, and frees its seat.
     fn free(&mut self, node: usize, generation: u32, processes: &mut Processes) {
         let member = self.member(node, generation);
@@ -568,9 +590,12 @@ impl<'a> Successions<'a> {
         processes.forget(node, generation);
     }
 
-    /// Whether the candidate of `node` can take the place of the active process at once.
+    /// Whether the candidate of `node` can take the place of the active process at once. One that was never to be
+    /// listened to cannot.
     pub fn can_promote(&self, node: usize) -> bool {
-        self.seats[node].candidate.as_ref().is_some_and(|candidate| candidate.stage == Stage::Shadowing)
+        self.seats[node].candidate.as_ref().is_some_and(|candidate| {
+            candidate.stage == Stage::Shadowing && candidate.pending.purpose != Purpose::Shadow
+        })
     }
 
     /// Whether the active process of `node` has completed a tick since it joined: a restart leads somewhere.
