@@ -325,10 +325,7 @@ impl Supervisor<'_> {
                 self.processes.running[index].is_settled = true;
                 continue;
             }
-            let mut words = self.processes.running[index].post_mortem();
-            if succeeded {
-                words += " before the run did";
-            }
+            let words = self.processes.running[index].post_mortem();
             if self.settle(Death { name, role, words })?
                 && let Some(process) = self.processes.running.get_mut(index)
                 && process.role == role
@@ -392,10 +389,11 @@ impl Supervisor<'_> {
             return Ok(true);
         }
         let flies = self.control.phase() == Phase::Running;
-        if flies && !self.successions.all_agree(&self.processes) {
+        let on_exit = self.successions.program(node).on_exit;
+        if flies && on_exit != OnExit::Stop && !self.successions.may_replace(node, &self.processes) {
             return Ok(false);
         }
-        let policy = match self.successions.program(node).on_exit {
+        let policy = match on_exit {
             OnExit::Restart if self.successions.can_promote(node) => OnExit::Standby,
             policy => policy,
         };
@@ -408,6 +406,7 @@ impl Supervisor<'_> {
         let tick = self.control.completed_by(self.plan.member(node, generation));
         match self.tell(Event::Died { policy, is_possible })? {
             Action::Restart => {
+                self.successions.close_early(node, &mut self.processes);
                 if self.successions.is_busy(node) {
                     self.refuse(node, "the process it was to succeed died first".to_owned())?;
                 }
@@ -447,7 +446,7 @@ impl Supervisor<'_> {
             return Ok(());
         }
         if let Some((node, generation, stage, since)) = self.successions.joining() {
-            return self.note_late_joiner(node, generation, stage, since);
+            return self.note_late_joiner(node, generation, stage, since.max(self.last_change.1));
         }
         let stood = self.last_change.1.elapsed();
         let culprit = stall::culprit(self.plan, self.control, &self.successions, &self.processes);
@@ -468,14 +467,16 @@ impl Supervisor<'_> {
 
     /// A process that does not join, or a member that does not make room for it.
     fn note_late_joiner(&mut self, node: usize, generation: u32, stage: Stage, since: Instant) -> Result<()> {
-        let late = match stage {
-            Stage::Announced => self.successions.disagreeing(&self.processes).unwrap_or((node, generation)),
-            _ => (node, generation),
-        };
+        let disagreeing = self.successions.disagreeing(&self.processes);
+        let late = disagreeing.filter(|_| stage != Stage::Joining).unwrap_or((node, generation));
         let patience = self.successions.program_of(late.0, late.1).watchdog;
         if since.elapsed() > patience {
-            let words =
-                format!("was killed by the watchdog: it did not join within {} ms", patience.as_millis());
+            let what = if late == (node, generation) {
+                "did not join".to_owned()
+            } else {
+                format!("did not connect to `{}.{generation}`", self.plan.nodes[node].name)
+            };
+            let words = format!("was killed by the watchdog: it {what} within {} ms", patience.as_millis());
             self.processes.kill(late.0, late.1, Some(words));
         }
         Ok(())

@@ -150,11 +150,12 @@ impl Process {
         }
     }
 
-    /// How the process ended, with the last lines it wrote.
+    /// How the process ended before the run did, with the last lines it wrote.
     pub fn post_mortem(&self) -> String {
         let end = match (&self.verdict, self.end) {
             (Some(verdict), _) => verdict.clone(),
             (None, Some(end)) => match (end.code(), end.signal()) {
+                (Some(0), _) => "ended with exit code 0 before the run did".to_owned(),
                 (Some(code), _) => format!("ended with exit code {code}"),
                 (None, Some(signal)) => format!("was killed by {}", bus::process::signal_name(signal)),
                 (None, None) => "ended".to_owned(),

@@ -20,7 +20,7 @@ pub fn culprit(
         let member = plan.member(node, generation);
         control.seat(member) == Seat::Taken
             && processes.lives(node, generation)
-            && control.can_compute(member, successions.inputs(node, generation))
+            && control.can_compute(plan, member, successions.inputs(node, generation))
     };
     let members = successions.members().filter(stuck);
     members.min_by_key(|&(node, generation)| control.done(plan.member(node, generation)))
@@ -63,7 +63,7 @@ fn describe_stuck(control: &Control, plan: &Plan, successions: &Successions<'_>)
         _ => format!("`{}.{generation}`", plan.nodes[node].name),
     };
     let can_compute = |&&(node, generation, member): &&(usize, u32, usize)| {
-        control.can_compute(member, successions.inputs(node, generation))
+        control.can_compute(plan, member, successions.inputs(node, generation))
     };
     let mut stuck: Vec<&(usize, u32, usize)> = members.iter().filter(can_compute).collect();
     if stuck.is_empty() {

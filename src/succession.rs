@@ -252,13 +252,22 @@ impl<'a> Successions<'a> {
         })
     }
 
-    /// The candidate that has not joined yet and holds the clock, or would: node, generation and when its
-    /// stage began.
+    /// The candidate on which the run waits, because it has not joined yet: node, generation, stage and when that
+    /// began. One that is early for its tick, or prepares while the run flies, keeps nobody waiting.
     pub fn joining(&self) -> Option<(usize, u32, Stage, Instant)> {
-        self.seats.iter().enumerate().find_map(|(node, seats)| {
-            let candidate = seats.candidate.as_ref().filter(|c| c.stage < Stage::Shadowing)?;
-            Some((node, candidate.generation, candidate.stage, candidate.stage_began))
-        })
+        let candidates = self.seats.iter().enumerate();
+        let awaited = candidates.filter_map(|(node, seats)| {
+            let candidate = seats.candidate.as_ref()?;
+            let is_awaited = match (candidate.stage, candidate.pending.join) {
+                (Stage::Starting, Join::At(tick)) => self.control.held_at() == Some(tick),
+                (Stage::Starting, Join::Next { .. }) => false,
+                (Stage::Starting, Join::AtOnce) | (Stage::Joining | Stage::Announced, _) => true,
+                (Stage::Shadowing | Stage::Retiring, _) => false,
+            };
+            is_awaited.then_some((node, candidate.generation, candidate.stage, candidate.stage_began))
+        });
+        // Those that only start wait for the one that is on the way in.
+        awaited.max_by_key(|&(.., stage, _)| stage > Stage::Starting)
     }
 
     /// The tick at which the clock must wait for somebody to join; `u32::MAX` if nobody is awaited.
@@ -427,6 +436,15 @@ impl<'a> Successions<'a> {
             && self.all_agree(processes)
     }
 
+    /// Whether the dead active process of `node` can be replaced now: whoever is on the way in, its own successor
+    /// included, comes to the end of that or is refused first.
+    pub fn may_replace(&self, node: usize, processes: &Processes) -> bool {
+        let candidate = self.seats[node].candidate.as_ref();
+        let is_joining =
+            candidate.is_some_and(|candidate| matches!(candidate.stage, Stage::Joining | Stage::Announced));
+        !is_joining && self.may_change(node, processes)
+    }
+
     fn is_at_join(&self, candidate: &Candidate) -> bool {
         match (candidate.pending.join, self.control.held_at()) {
             (Join::At(tick), Some(held)) => held == tick,
@@ -565,6 +583,19 @@ impl<'a> Successions<'a> {
         self.reports.push(candidate.report);
     }
 
+    /// The active process of `node` has died while its predecessor retired: that is over now. Nothing more comes
+    /// from the predecessor, and who has not read its last samples yet holds them.
+    pub fn close_early(&mut self, node: usize, processes: &mut Processes) {
+        let Some(candidate) = self.seats[node].candidate.as_ref().filter(|c| c.stage == Stage::Retiring)
+        else {
+            return;
+        };
+        if let Some(former) = candidate.former {
+            processes.kill(node, former, None);
+        }
+        self.close(node, processes);
+    }
+
     /// Removes what a process that has ended left behind, and frees its seat.
     fn free(&mut self, node: usize, generation: u32, processes: &mut Processes) {
         let member = self.member(node, generation);
@@ -581,9 +612,12 @@ impl<'a> Successions<'a> {
         processes.forget(node, generation);
     }
 
-    /// Whether the candidate of `node` can take the place of the active process at once.
+    /// Whether the candidate of `node` can take the place of the active process at once. One that was never to be
+    /// listened to cannot.
     pub fn can_promote(&self, node: usize) -> bool {
-        self.seats[node].candidate.as_ref().is_some_and(|candidate| candidate.stage == Stage::Shadowing)
+        self.seats[node].candidate.as_ref().is_some_and(|candidate| {
+            candidate.stage == Stage::Shadowing && candidate.pending.purpose != Purpose::Shadow
+        })
     }
 
     /// Whether the active process of `node` has completed a tick since it joined: a restart leads somewhere.

@@ -499,9 +499,7 @@ impl Links {
     fn connect_successor(&self, input: &mut InPort, roster: &Roster, tick: u32) -> Result<(), BusError> {
         let publisher = self.publisher(roster, input.topic);
         let Some(successor) = &publisher.successor else {
-            if input.newest_generation() != publisher.active.generation {
-                input.set_successor(None);
-            }
+            input.drop_successors_of(publisher.active.generation);
             return Ok(());
         };
         let take_over_tick = publisher.topic_take_over_tick(input.topic);
@@ -512,7 +510,8 @@ impl Links {
             // A reader that joined later than the shadow starts with what its own first tick reads.
             let first_tick = first_tick.max(tick.saturating_sub(input.delay_ticks));
             let source = Source::new(successor.generation, receiver, first_tick, period_ticks);
-            input.set_successor(Some(source));
+            input.drop_successors_of(publisher.active.generation);
+            input.add_successor(source);
         }
         input.set_take_over_tick(take_over_tick);
         Ok(())

@@ -498,9 +498,10 @@ impl Control {
     }
 
     /// Whether `member`, whose inputs are `inputs`, has all it needs for its next tick: if it does not come on
-    /// then, it is at fault itself. A member that waits for its partner or for shadow samples does not count.
+    /// then, it is at fault itself. A member that sleeps does not count: nobody has come as far as it waits for, or it
+    /// would have been woken. A recorder sleeps until samples have gathered that the tick alone does not need.
     #[must_use]
-    pub fn can_compute(&self, member: usize, inputs: &[InputPlan]) -> bool {
+    pub fn can_compute(&self, plan: &Plan, member: usize, inputs: &[InputPlan]) -> bool {
         let tick = self.done(member);
         let has = |input: &InputPlan| {
             self.count(Word::Topic(input.topic)) >= (tick.saturating_add(1)).saturating_sub(input.delay_ticks)
@@ -508,6 +509,7 @@ impl Control {
         tick < self.end_tick()
             && self.count(Word::Grant) > tick
             && inputs.iter().all(has)
+            && self.awaited_topic(plan, member, inputs).is_none()
             && !self.awaits_partner(member)
     }
 

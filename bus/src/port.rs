@@ -7,6 +7,7 @@ use crate::messages::Time;
 use crate::plan::{InputPlan, OutputPlan, TopicPlan};
 use crate::schema::Schema;
 use crate::transport::{Loan, Received, Receiver, SampleHeader, Sender};
+use std::collections::VecDeque;
 
 /// The samples of a topic from one generation of its publisher.
 #[derive(Debug)]
@@ -53,6 +54,13 @@ impl Source {
     }
 }
 
+/// A process that shadows the publisher of an input, and whose samples count from `take_over_tick` on.
+#[derive(Debug)]
+struct Successor {
+    source: Source,
+    take_over_tick: u32,
+}
+
 /// A connected input.
 #[derive(Debug)]
 pub(crate) struct InPort {
@@ -60,9 +68,8 @@ pub(crate) struct InPort {
     current: Option<Received>,
     shadow: Option<Received>,
     active: Source,
-    /// The process that shadows the publisher, and whose samples count from `take_over_tick` on.
-    successor: Option<Source>,
-    take_over_tick: u32,
+    /// Those that succeed it, in order: more than one where a successor died before this node turned to it.
+    successors: VecDeque<Successor>,
     initial: Option<Box<[u64]>>,
     topic_name: String,
     size: usize,
@@ -88,8 +95,7 @@ impl InPort {
             current: None,
             shadow: None,
             active,
-            successor: None,
-            take_over_tick: u32::MAX,
+            successors: VecDeque::new(),
             initial,
             topic_name: topic.name.clone(),
             size,
@@ -103,7 +109,7 @@ impl InPort {
 
     /// The newest generation that this input is connected to.
     pub(crate) fn newest_generation(&self) -> u32 {
-        self.successor.as_ref().unwrap_or(&self.active).generation
+        self.successors.back().map_or(&self.active, |successor| &successor.source).generation
     }
 
     /// The tick whose sample `tick` reads, unless that lies before the run.
@@ -111,23 +117,28 @@ impl InPort {
         tick.checked_sub(self.delay_ticks)
     }
 
-    /// Connects the publisher's successor, or another one, or none.
-    pub(crate) fn set_successor(&mut self, successor: Option<Source>) {
+    /// Connects the publisher's successor; its samples do not count yet.
+    pub(crate) fn add_successor(&mut self, source: Source) {
         self.shadow = None;
-        self.successor = successor;
-        self.take_over_tick = u32::MAX;
+        self.successors.push_back(Successor { source, take_over_tick: u32::MAX });
+    }
+
+    /// Lets go of successors that were refused: those behind `generation`, which flies.
+    pub(crate) fn drop_successors_of(&mut self, generation: u32) {
+        self.shadow = None;
+        self.successors.retain(|successor| successor.source.generation <= generation);
     }
 
     /// Has the successor's samples count from `tick` on.
     pub(crate) fn set_take_over_tick(&mut self, tick: u32) {
-        if self.successor.is_some() {
-            self.take_over_tick = tick;
+        if let Some(successor) = self.successors.back_mut() {
+            successor.take_over_tick = tick;
         }
     }
 
     /// Whether a shadow sample is due at `tick` that the node waits for.
     pub(crate) fn awaits_shadow(&self, tick: u32) -> bool {
-        self.reads_shadow && self.successor.is_some() && tick < self.take_over_tick
+        self.reads_shadow && self.successors.back().is_some_and(|successor| tick < successor.take_over_tick)
     }
 
     /// Makes the newest sample stamped at or before `tick` minus the delay the current one.
@@ -162,29 +173,31 @@ impl InPort {
 
     /// Turns to the successor when the next sample is one of those that count.
     fn pass_take_over(&mut self, newest_sequence: u64) {
-        let first = u64::from(self.take_over_tick.div_ceil(self.topic_period_ticks));
-        if self.take_over_tick == u32::MAX || newest_sequence < first || self.active.next_sequence < first {
-            return;
-        }
-        if let Some(mut successor) = self.successor.take() {
+        while let Some(next) = self.successors.front() {
+            let first = u64::from(next.take_over_tick.div_ceil(self.topic_period_ticks));
+            if next.take_over_tick == u32::MAX || newest_sequence < first || self.active.next_sequence < first
+            {
+                return;
+            }
+            let Some(Successor { mut source, .. }) = self.successors.pop_front() else { return };
             self.shadow = None;
-            self.take_over_tick = u32::MAX;
             // A node that does not read the shadow may have left some of it in the queue.
-            successor.has_history |= successor.next_sequence < first;
-            successor.next_sequence = successor.next_sequence.max(first);
-            self.active = successor;
+            source.has_history |= source.next_sequence < first;
+            source.next_sequence = source.next_sequence.max(first);
+            self.active = source;
         }
     }
 
-    /// Receives what the successor has sent so far, so that its queue cannot run full; the error is the
+    /// Receives what successors have sent so far, so that their queues cannot run full; the error is the
     /// sequence number that was due, and what was found.
     fn take_shadow(&mut self, newest_sequence: u64) -> Result<(), (u64, String)> {
-        let Some(successor) = &mut self.successor else { return Ok(()) };
-        while successor.next_sequence <= newest_sequence {
-            let expected = successor.next_sequence;
-            match successor.next(self.topic_period_ticks).map_err(|found| (expected, found))? {
-                Some(sample) => self.shadow = Some(sample),
-                None => break,
+        for Successor { source, .. } in &mut self.successors {
+            while source.next_sequence <= newest_sequence {
+                let expected = source.next_sequence;
+                match source.next(self.topic_period_ticks).map_err(|found| (expected, found))? {
+                    Some(sample) => self.shadow = Some(sample),
+                    None => break,
+                }
             }
         }
         Ok(())
