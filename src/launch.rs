@@ -298,13 +298,18 @@ impl Supervisor<'_> {
         Ok(())
     }
 
-    fn note_progress(&mut self) -> Result<()> {
+    fn note_gathered(&mut self) -> Result<()> {
         if self.state == State::Gathering && self.control.phase() == Phase::Running {
             self.tell(Event::Gathered)?;
             if self.control.is_stop_requested() {
                 self.tell(Event::StopRequested)?;
             }
         }
+        Ok(())
+    }
+
+    fn note_progress(&mut self) -> Result<()> {
+        self.note_gathered()?;
         if self.state == State::Running && self.control.granted_ticks() >= self.control.end_tick() {
             self.tell(Event::EndReached)?;
         }
@@ -388,6 +393,8 @@ impl Supervisor<'_> {
         if self.successions.is_vacant(node) {
             return Ok(true);
         }
+        // It may have flown for a while before anybody looked.
+        self.note_gathered()?;
         let flies = self.control.phase() == Phase::Running;
         let on_exit = self.successions.program(node).on_exit;
         if flies && on_exit != OnExit::Stop && !self.successions.may_replace(node, &self.processes) {
@@ -423,6 +430,7 @@ impl Supervisor<'_> {
             _ => {
                 let why = match policy {
                     OnExit::Stop => "",
+                    _ if !flies => ": the run did not fly yet",
                     OnExit::Restart => {
                         ": it was restarted and came to its end again without completing a tick"
                     }

@@ -511,7 +511,7 @@ impl Links {
             let first_tick = first_tick.max(tick.saturating_sub(input.delay_ticks));
             let source = Source::new(successor.generation, receiver, first_tick, period_ticks);
             input.drop_successors_of(publisher.active.generation);
-            input.add_successor(source);
+            input.add_successor(source, successor.shadows);
         }
         input.set_take_over_tick(take_over_tick);
         Ok(())

@@ -311,9 +311,13 @@ impl Control {
         edge.store(AWAKE, Relaxed);
     }
 
-    /// Wakes every sleeper, so that it looks whether the run is over.
+    /// Wakes every sleeper, so that it looks whether the run is over. A process that died may have noted that it
+    /// wakes somebody and not have done it any more: so what the edges say does not count.
     fn wake_everybody(&self) {
-        (0..self.edge_slots()).for_each(|edge| wake_edge(self.edge_at(edge)));
+        for edge in 0..self.edge_slots() {
+            self.edge_at(edge).store(AWAKE, SeqCst);
+            wake_all(self.edge_at(edge));
+        }
         wake_all(self.word(0, 1));
         wake_all(self.word(1, 9));
         for member in 0..self.members {

@@ -58,6 +58,8 @@ impl Source {
 #[derive(Debug)]
 struct Successor {
     source: Source,
+    /// Whether it sends samples before they count; one that is started after a crash does not.
+    shadows: bool,
     take_over_tick: u32,
 }
 
@@ -118,9 +120,9 @@ impl InPort {
     }
 
     /// Connects the publisher's successor; its samples do not count yet.
-    pub(crate) fn add_successor(&mut self, source: Source) {
+    pub(crate) fn add_successor(&mut self, source: Source, shadows: bool) {
         self.shadow = None;
-        self.successors.push_back(Successor { source, take_over_tick: u32::MAX });
+        self.successors.push_back(Successor { source, shadows, take_over_tick: u32::MAX });
     }
 
     /// Lets go of successors that were refused: those behind `generation`, which flies.
@@ -138,7 +140,8 @@ impl InPort {
 
     /// Whether a shadow sample is due at `tick` that the node waits for.
     pub(crate) fn awaits_shadow(&self, tick: u32) -> bool {
-        self.reads_shadow && self.successors.back().is_some_and(|successor| tick < successor.take_over_tick)
+        let is_due = |successor: &Successor| successor.shadows && tick < successor.take_over_tick;
+        self.reads_shadow && self.successors.back().is_some_and(is_due)
     }
 
     /// Makes the newest sample stamped at or before `tick` minus the delay the current one.
