@@ -12,7 +12,7 @@ use crate::program::{OnExit, WATCHDOG};
 use crate::progress::Progress;
 use crate::run_dir::RunDir;
 use crate::stall;
-use crate::succession::{Report, Stage, Standing, Successions};
+use crate::succession::{Report, Stage, Standing, Successions, take_over_stride};
 use crate::supervisor::{Action, Event, State};
 use anyhow::{Context, Result, anyhow};
 use bus::control::{Control, Phase};
@@ -69,6 +69,7 @@ pub fn fly(manifest: &Manifest, graph: &mut Graph, recording: &Path, quiet: bool
         state: State::Starting,
         desk: Desk::open(dir, plan, &control)?,
         swaps: Vec::new(),
+        requests: 0,
         interrupts,
         seen_interrupts: 0,
         manifest,
@@ -79,8 +80,7 @@ pub fn fly(manifest: &Manifest, graph: &mut Graph, recording: &Path, quiet: bool
     supervisor.start(dir)?;
     supervisor.watch()?;
     supervisor.progress.finish(&control);
-    let was_stopped = control.end_tick() < plan.duration_ticks;
-    let mut outcome = outcome(plan, &control, was_stopped);
+    let mut outcome = outcome(plan, &control, &supervisor.successions);
     outcome.successions = supervisor.successions.into_reports();
     if plan.profile {
         outcome.flight = Some(Flight::open(plan, dir, outcome.ticks, &outcome.successions)?);
@@ -155,8 +155,10 @@ struct Supervisor<'a> {
     successions: Successions<'a>,
     state: State,
     desk: Desk<'a>,
-    /// Swaps that were asked for and have not come to their end: the node, and who asked.
-    swaps: Vec<(usize, Reply)>,
+    /// Swaps that were asked for and have not come to their end: the request, and who asked.
+    swaps: Vec<(u32, Reply)>,
+    /// Requests so far.
+    requests: u32,
     interrupts: Arc<AtomicUsize>,
     seen_interrupts: usize,
     progress: Progress,
@@ -205,8 +207,11 @@ impl Supervisor<'_> {
             if let Some(node) = self.successions.too_late() {
                 self.refuse(node, "the run had passed the tick at which it was to join".to_owned())?;
             }
+            // Before it too: what is held now must stay held while somebody joins.
+            self.control.set_join_tick(self.successions.hold_tick());
             self.successions.advance(&mut self.processes)?;
             self.control.set_join_tick(self.successions.hold_tick());
+            self.note_laggards();
             self.note_stall()?;
             self.progress.show(self.control);
             self.control.await_news(news, POLL);
@@ -234,18 +239,15 @@ impl Supervisor<'_> {
         while let Some((request, reply)) = self.desk.serve() {
             let Request::Swap { process, with, shadow_ticks, at_tick } = request else { continue };
             match self.request_swap(&process, &with, shadow_ticks, at_tick) {
-                Ok(node) => self.swaps.push((node, reply)),
+                Ok(request) => self.swaps.push((request, reply)),
                 Err(reason) => reply.send(&Answer::refused(reason)),
             }
         }
-        for (node, reply) in std::mem::take(&mut self.swaps) {
-            if self.successions.is_busy(node) {
-                self.swaps.push((node, reply));
-                continue;
+        for (request, reply) in std::mem::take(&mut self.swaps) {
+            match self.successions.reports.iter().find(|report| report.request == Some(request)) {
+                Some(report) => reply.send(&answer(report)),
+                None => self.swaps.push((request, reply)),
             }
-            let name = &self.plan.nodes[node].name;
-            let report = self.successions.reports.iter().rev().find(|report| report.process == *name);
-            reply.send(&report.map_or_else(|| Answer::refused("the run ended"), answer));
         }
     }
 
@@ -256,7 +258,7 @@ impl Supervisor<'_> {
         with: &str,
         shadow_ticks: Option<u32>,
         at_tick: Option<u32>,
-    ) -> Result<usize, String> {
+    ) -> Result<u32, String> {
         let successor = successor_of(self.manifest, self.graph, process, with).map_err(|e| e.to_string())?;
         let node = successor.node;
         if self.state != State::Running {
@@ -266,7 +268,11 @@ impl Supervisor<'_> {
             return Err(format!("`{process}` has a successor, a standby or a shadow already; one at a time"));
         }
         let shadow_ticks = shadow_ticks.unwrap_or(SHADOW_TICKS);
-        let period = successor.plan.period_ticks;
+        if shadow_ticks == 0 || shadow_ticks >= self.control.end_tick() {
+            let end = self.control.end_tick();
+            return Err(format!("shadowing for {shadow_ticks} ticks is not within the run's {end} ticks"));
+        }
+        let (period, stride) = (successor.plan.period_ticks, take_over_stride(self.plan, node));
         if let Some(tick) = at_tick {
             let join = tick.saturating_sub(shadow_ticks);
             if join <= self.control.granted_ticks() || tick >= self.control.end_tick() {
@@ -277,12 +283,16 @@ impl Supervisor<'_> {
                     self.control.end_tick()
                 ));
             }
-            if !tick.is_multiple_of(period) || !join.is_multiple_of(period) {
-                return Err(format!("`{process}` computes every {period} ticks: choose multiples of that"));
+            if !tick.is_multiple_of(stride) || !join.is_multiple_of(period) {
+                return Err(format!(
+                    "`{process}` sends every {stride} and computes every {period} ticks: let it take over at a \
+                     multiple of the first and join at one of the second"
+                ));
             }
         }
-        self.successions.request_swap(successor, shadow_ticks, at_tick);
-        Ok(node)
+        self.requests += 1;
+        self.successions.request_swap(successor, shadow_ticks, at_tick, self.requests);
+        Ok(self.requests)
     }
 
     fn note_interrupts(&mut self) -> Result<()> {
@@ -346,8 +356,14 @@ impl Supervisor<'_> {
             Role::Companion => true,
             Role::Clock => self.control.completed_ticks() >= self.control.end_tick(),
             Role::Node { node, generation } => {
-                self.successions.standing(node, generation) == Standing::Former
-                    || self.control.has_completed(self.plan.member(node, generation))
+                let has_completed = self.control.has_completed(self.plan.member(node, generation));
+                match self.successions.standing(node, generation) {
+                    Standing::Former => true,
+                    Standing::Active => has_completed,
+                    Standing::Candidate => {
+                        has_completed && self.successions.stage(node) >= Some(Stage::Shadowing)
+                    }
+                }
             }
         }
     }
@@ -363,6 +379,14 @@ impl Supervisor<'_> {
         match self.successions.standing(node, generation) {
             Standing::Former => Ok(true),
             Standing::Candidate => {
+                if self.successions.stage(node) > Some(Stage::Starting)
+                    && !self.successions.may_change(node, &self.processes)
+                {
+                    return Ok(false);
+                }
+                if self.successions.commit_if_flown(node)? {
+                    return self.settle_active(node, generation, &death);
+                }
                 if self.tell(Event::SuccessorFailed)? == Action::Refuse {
                     let tick = self.control.done(self.plan.member(node, generation));
                     let reason = format!("{} (it had come to tick {tick})", death.words);
@@ -414,7 +438,8 @@ impl Supervisor<'_> {
         match self.tell(Event::Died { policy, is_possible })? {
             Action::Restart => {
                 self.successions.close_early(node, &mut self.processes);
-                if self.successions.is_busy(node) {
+                self.successions.postpone(node, &mut self.processes);
+                if self.successions.stage(node).is_some() {
                     self.refuse(node, "the process it was to succeed died first".to_owned())?;
                 }
                 self.progress.say(&format!("{}\n`{}` is restarted at tick {tick}", death.words, death.name));
@@ -442,6 +467,22 @@ impl Supervisor<'_> {
         }
         self.last_change.1 = Instant::now();
         Ok(true)
+    }
+
+    /// Ends those that do not come up or do not leave in their time; their ends are settled like any other.
+    fn note_laggards(&mut self) {
+        if let Some((node, generation)) = self.successions.unprepared() {
+            let patience = self.successions.program_of(node, generation).watchdog.as_millis();
+            let words = format!("was killed by the watchdog: it did not come up within {patience} ms");
+            self.processes.kill(node, generation, Some(words));
+        }
+        if let Some((node, generation)) = self.successions.lingering(&self.processes) {
+            self.processes.kill(
+                node,
+                generation,
+                Some("was killed by the watchdog: it did not leave".to_owned()),
+            );
+        }
     }
 
     /// Looks whether the run stands still, and because of whom.
@@ -497,17 +538,19 @@ fn silent_topics(node: &NodePlan, plan: &Plan) -> String {
     if topics.is_empty() { String::new() } else { format!("; nothing more came on {}", topics.join(", ")) }
 }
 
-fn outcome(plan: &Plan, control: &Control, was_stopped: bool) -> Outcome {
+fn outcome(plan: &Plan, control: &Control, successions: &Successions<'_>) -> Outcome {
     let (start_ns, end_ns) = control.host_span_ns();
     let host_s = end_ns.saturating_sub(start_ns) as f64 * 1e-9;
     let share = |cpu_ns: u64| if host_s > 0.0 { cpu_ns as f64 * 1e-9 / host_s } else { 0.0 };
     let clock = ("clock".to_owned(), share(control.clock_cpu_ns()), 0);
     let nodes = plan.nodes.iter().enumerate();
-    let nodes = nodes
-        .map(|(index, node)| (node.name.clone(), share(control.cpu_ns(index)), control.late_count(index)));
+    let nodes = nodes.map(|(index, node)| {
+        let (cpu_ns, late) = successions.spent(index);
+        (node.name.clone(), share(cpu_ns), late)
+    });
     Outcome {
         ticks: control.completed_ticks(),
-        was_stopped,
+        was_stopped: control.end_tick() < plan.duration_ticks,
         host_s,
         missed_deadlines: control.missed_deadlines(),
         processes: std::iter::once(clock).chain(nodes).collect(),

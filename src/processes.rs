@@ -65,8 +65,8 @@ impl Processes {
             Some(program) => spawn::start(run_dir, name, role, program)?,
         };
         let name = match role {
-            Role::Node { generation: generation @ 1.., .. } => format!("{name}.{generation}"),
-            _ => name.to_owned(),
+            Role::Node { generation, .. } => bus::process::process_name(name, generation),
+            Role::Clock | Role::Companion => name.to_owned(),
         };
         if role == Role::Companion {
             self.companions.push(child);
@@ -116,8 +116,11 @@ impl Processes {
         }
     }
 
-    /// Forgets the process of a node's generation, whose end is settled.
-    pub fn forget(&mut self, node: usize, generation: u32) {
+    /// Forgets the process of a node's generation, whose end is settled, and what it wrote into the run directory.
+    pub fn forget(&mut self, node: usize, generation: u32, run_dir: &Path) {
+        if let Some(process) = self.of(node, generation).filter(|process| process.log.starts_with(run_dir)) {
+            let _ = std::fs::remove_file(&process.log);
+        }
         let role = Role::Node { node, generation };
         self.running.retain(|process| process.role != role || process.end.is_none());
     }

@@ -8,7 +8,7 @@ use crate::processes::{Processes, Role};
 use crate::program::{OnExit, Program, Successor};
 use anyhow::Result;
 use bus::control::{Control, HandOver, Phase, Seat};
-use bus::plan::{InputPlan, Plan};
+use bus::plan::{InputPlan, OutputPlan, Plan, SEATS};
 use bus::roster::{Incumbent, Roster};
 use serde::Serialize;
 use std::collections::VecDeque;
@@ -61,6 +61,8 @@ struct Pending {
     purpose: Purpose,
     is_planned: bool,
     join: Join,
+    /// The request that asked for it.
+    request: Option<u32>,
 }
 
 #[derive(Debug)]
@@ -87,6 +89,8 @@ struct Seats {
     newest_generation: u32,
     /// Whether the active process is dead and its place not taken yet.
     is_vacant: bool,
+    /// Processor time in nanoseconds, and deadlines missed, of those that have left.
+    spent: (u64, u32),
 }
 
 /// What became of a successor.
@@ -100,6 +104,9 @@ pub struct Report {
     pub purpose: Purpose,
     /// Whether the manifest or a request names it; a restart and the next standby come by themselves.
     pub is_planned: bool,
+    /// The request that asked for it.
+    #[serde(skip)]
+    pub request: Option<u32>,
     /// The first tick it computed.
     pub join_tick: Option<u32>,
     /// The first tick whose outputs were its own.
@@ -154,6 +161,7 @@ impl<'a> Successions<'a> {
             candidate: None,
             newest_generation: 0,
             is_vacant: false,
+            spent: (0, 0),
         });
         let pending = successors.iter().map(|successor| Pending {
             purpose: match (successor.take_over_tick, successor.is_standby) {
@@ -162,6 +170,7 @@ impl<'a> Successions<'a> {
                 (None, false) => Purpose::Shadow,
             },
             is_planned: true,
+            request: None,
             join: Join::At(successor.join_tick),
             successor: successor.clone(),
         });
@@ -172,13 +181,25 @@ impl<'a> Successions<'a> {
 
     /// Has `successor` join and take over after `shadow_ticks`: at `at_tick`, or as soon as its process is
     /// prepared.
-    pub fn request_swap(&mut self, mut successor: Successor, shadow_ticks: u32, at_tick: Option<u32>) {
+    pub fn request_swap(
+        &mut self,
+        mut successor: Successor,
+        shadow_ticks: u32,
+        at_tick: Option<u32>,
+        request: u32,
+    ) {
         let join = match at_tick {
             Some(tick) => Join::At(tick.saturating_sub(shadow_ticks)),
             None => Join::Next { shadow_ticks: Some(shadow_ticks) },
         };
         successor.take_over_tick = at_tick;
-        self.pending.push_back(Pending { successor, purpose: Purpose::Swap, is_planned: true, join });
+        self.pending.push_back(Pending {
+            successor,
+            purpose: Purpose::Swap,
+            is_planned: true,
+            request: Some(request),
+            join,
+        });
     }
 
     /// Whether a successor of `node` waits or is on its way.
@@ -245,7 +266,7 @@ impl<'a> Successions<'a> {
     }
 
     /// The inputs of a process.
-    pub fn inputs(&self, node: usize, generation: u32) -> &[bus::plan::InputPlan] {
+    pub fn inputs(&self, node: usize, generation: u32) -> &[InputPlan] {
         let candidate = self.seats[node].candidate.as_ref().filter(|c| c.generation == generation);
         candidate.map_or(&self.roster.nodes[node].active.plan.inputs, |candidate| {
             &candidate.pending.successor.plan.inputs
@@ -281,10 +302,20 @@ impl<'a> Successions<'a> {
             }
         });
         let pending = self.pending.iter().filter_map(|pending| match pending.join {
+            // Who took a dead process's place comes first, even if the run passes the tick.
+            Join::At(_) if self.is_recovering(pending.successor.node) => None,
             Join::At(tick) => Some(tick),
             Join::Next { .. } | Join::AtOnce => None,
         });
         candidates.chain(pending).min().unwrap_or(u32::MAX)
+    }
+
+    /// Whether the place of a dead process of `node` has just been taken.
+    fn is_recovering(&self, node: usize) -> bool {
+        self.seats[node].candidate.as_ref().is_some_and(|candidate| {
+            let is_recovery = matches!(candidate.pending.purpose, Purpose::Restart | Purpose::Standby);
+            is_recovery && (self.seats[node].is_vacant || candidate.stage == Stage::Retiring)
+        })
     }
 
     /// Where the clock must wait for a candidate: where it is, or at the node's next period.
@@ -342,15 +373,15 @@ impl<'a> Successions<'a> {
         let is_other_seat = self.member(node, next) != self.member(node, active);
         let generation = if is_other_seat { next } else { next + 1 };
         let name = self.plan.nodes[node].name.clone();
-        let member = self.member(node, generation);
-        self.control.set_seat(member, Seat::Empty);
-        self.control.clear_seat(member);
+        self.control.clear_seat(self.member(node, generation));
+        self.seats[node].newest_generation = generation;
         pending.successor.plan.store_successor(self.run_dir, node, generation)?;
         let report = Report {
             process: name.clone(),
             generation,
             purpose: pending.purpose,
             is_planned: pending.is_planned,
+            request: pending.request,
             join_tick: None,
             take_over_tick: None,
             hand_over: None,
@@ -361,8 +392,15 @@ impl<'a> Successions<'a> {
         };
         let now = Instant::now();
         let role = Role::Node { node, generation };
-        processes.start(&name, role, Some(&pending.successor.program), self.run_dir)?;
-        self.seats[node].newest_generation = generation;
+        let started = processes.start(&name, role, Some(&pending.successor.program), self.run_dir);
+        if let Err(error) = started {
+            if pending.purpose == Purpose::Restart {
+                return Err(error);
+            }
+            self.free(node, generation, processes);
+            self.reports.push(Report { refused: Some(format!("{error:#}")), ..report });
+            return Ok(());
+        }
         self.seats[node].candidate = Some(Candidate {
             pending,
             generation,
@@ -389,10 +427,7 @@ impl<'a> Successions<'a> {
             Stage::Announced => self.all_agree(processes),
             // It may have completed the tick as a shadow before it was promoted there: the roster that says so is
             // replaced only when everybody has read it.
-            Stage::Shadowing => {
-                self.control.done(member) > self.roster.nodes[node].take_over_tick
-                    && self.all_agree(processes)
-            }
+            Stage::Shadowing => self.has_flown(node) && self.all_agree(processes),
             Stage::Retiring => self.has_retired(node, candidate, processes),
         };
         if !goes_on {
@@ -409,6 +444,73 @@ impl<'a> Successions<'a> {
             candidate.stage_began = Instant::now();
         }
         Ok(true)
+    }
+
+    /// Whether the candidate of `node` has completed its first tick that counts.
+    fn has_flown(&self, node: usize) -> bool {
+        let take_over_tick = self.roster.nodes[node].take_over_tick;
+        self.seats[node].candidate.as_ref().is_some_and(|candidate| {
+            let done = self.control.done(self.member(node, candidate.generation));
+            candidate.stage == Stage::Shadowing
+                && done > take_over_tick
+                && take_over_tick < self.control.end_tick()
+        })
+    }
+
+    /// Makes the candidate of `node` the active process if any of its samples counts already: then it cannot be
+    /// refused any more. False if none does.
+    pub fn commit_if_flown(&mut self, node: usize) -> Result<bool> {
+        let roster = &self.roster.nodes[node];
+        let outputs = roster.active.plan.outputs.iter().zip(&roster.take_over_ticks);
+        let is_read = |(output, &tick): (&OutputPlan, &u32)| self.control.ticks_sent(output.topic) > tick;
+        let is_shadowing =
+            self.seats[node].candidate.as_ref().is_some_and(|candidate| candidate.stage == Stage::Shadowing);
+        // The candidate of a vacant place finds samples that the dead process sent.
+        let has_sent = is_shadowing && !self.seats[node].is_vacant && outputs.into_iter().any(is_read);
+        if has_sent || self.has_flown(node) {
+            self.commit(node)?;
+            return Ok(true);
+        }
+        Ok(false)
+    }
+
+    /// The stage of the candidate of `node`.
+    pub fn stage(&self, node: usize) -> Option<Stage> {
+        self.seats[node].candidate.as_ref().map(|candidate| candidate.stage)
+    }
+
+    /// A candidate whose process has not come up in its time: node and generation.
+    pub fn unprepared(&self) -> Option<(usize, u32)> {
+        self.seats.iter().enumerate().find_map(|(node, seats)| {
+            let candidate =
+                seats.candidate.as_ref().filter(|candidate| candidate.stage == Stage::Starting)?;
+            let is_late = candidate.started.elapsed() > candidate.pending.successor.program.watchdog;
+            let is_up = self.control.phase() != Phase::Running || self.is_prepared(candidate);
+            (is_late && !is_up).then_some((node, candidate.generation))
+        })
+    }
+
+    /// A process that everybody has read the last samples of and that does not leave: node and generation.
+    pub fn lingering(&self, processes: &Processes) -> Option<(usize, u32)> {
+        self.seats.iter().enumerate().find_map(|(node, seats)| {
+            let candidate =
+                seats.candidate.as_ref().filter(|candidate| candidate.stage == Stage::Retiring)?;
+            let former = candidate.former.filter(|&former| processes.lives(node, former))?;
+            let is_late = candidate.stage_began.elapsed() > seats.program.watchdog;
+            (is_late && self.is_read(candidate)).then_some((node, former))
+        })
+    }
+
+    /// Takes back a candidate that has not joined yet: its process is ended, and it waits for its turn again.
+    pub fn postpone(&mut self, node: usize, processes: &mut Processes) {
+        if self.stage(node) != Some(Stage::Starting) {
+            return;
+        }
+        if let Some(candidate) = self.seats[node].candidate.take() {
+            processes.kill(node, candidate.generation, None);
+            self.free(node, candidate.generation, processes);
+            self.pending.push_front(candidate.pending);
+        }
     }
 
     /// Notes when the candidate of `node` was prepared, and since when the run waits for it.
@@ -428,7 +530,7 @@ impl<'a> Successions<'a> {
     }
 
     /// One change at a time: the one before must be agreed with, and nobody else may be on the way in.
-    fn may_change(&self, node: usize, processes: &Processes) -> bool {
+    pub fn may_change(&self, node: usize, processes: &Processes) -> bool {
         let others = self.seats.iter().enumerate().filter(|&(other, _)| other != node);
         let mut joining = others.filter_map(|(_, seats)| seats.candidate.as_ref());
         !joining.any(|other| matches!(other.stage, Stage::Joining | Stage::Announced))
@@ -468,8 +570,9 @@ impl<'a> Successions<'a> {
             Join::At(tick) => (tick, successor.take_over_tick.unwrap_or(u32::MAX)),
             Join::Next { shadow_ticks } => {
                 let tick = control.held_at().unwrap_or_default();
-                let period = successor.plan.period_ticks;
-                let take_over = shadow_ticks.map(|ticks| (tick + ticks.max(1)).next_multiple_of(period));
+                let stride = take_over_stride(plan, node);
+                let take_over = shadow_ticks
+                    .and_then(|ticks| tick.checked_add(ticks.max(1))?.checked_next_multiple_of(stride));
                 (tick, take_over.unwrap_or(u32::MAX))
             }
             Join::AtOnce => (control.done(active), control.done(active)),
@@ -483,7 +586,11 @@ impl<'a> Successions<'a> {
             outputs.iter().map(|output| sent(output.topic)).collect()
         };
         let member = plan.member(node, candidate.generation);
-        outputs.iter().for_each(|output| control.start_shadow(output.topic, join_tick));
+        for (output, &take_over_tick) in outputs.iter().zip(&roster.take_over_ticks) {
+            // The next tick at which a shadow sample is due; one that does not shadow sends none.
+            let due = join_tick.next_multiple_of(plan.topics[output.topic].period_ticks);
+            control.start_shadow(output.topic, if shadows { due } else { take_over_tick });
+        }
         control.set_first_tick(member, join_tick);
         roster.successor = Some(Incumbent {
             generation: candidate.generation,
@@ -556,6 +663,11 @@ impl<'a> Successions<'a> {
         if candidate.former.is_some_and(|former| processes.lives(node, former)) {
             return false;
         }
+        self.is_read(candidate)
+    }
+
+    /// Whether everybody has read the last samples of the process that `candidate` has succeeded.
+    fn is_read(&self, candidate: &Candidate) -> bool {
         let longest = self.plan.nodes.iter().map(|node| node.period_ticks).max().unwrap_or(1);
         let taken = candidate.report.take_over_tick.unwrap_or_default().saturating_add(longest + 1);
         let taken = taken.min(self.control.end_tick());
@@ -576,6 +688,7 @@ impl<'a> Successions<'a> {
                 successor: candidate.pending.successor,
                 purpose: Purpose::Standby,
                 is_planned: false,
+                request: None,
                 join: Join::Next { shadow_ticks: None },
             };
             self.pending.push_back(pending);
@@ -599,7 +712,10 @@ impl<'a> Successions<'a> {
     /// Removes what a process that has ended left behind, and frees its seat.
     fn free(&mut self, node: usize, generation: u32, processes: &mut Processes) {
         let member = self.member(node, generation);
-        self.control.set_seat(member, Seat::Empty);
+        let spent = &mut self.seats[node].spent;
+        spent.0 += self.control.cpu_ns(member);
+        spent.1 += self.control.late_count(member);
+        self.control.clear_seat(member);
         let crashed = processes
             .of(node, generation)
             .is_some_and(|process| process.end.is_some_and(|end| !end.success()));
@@ -609,7 +725,8 @@ impl<'a> Successions<'a> {
         }
         bus::handover::remove(self.run_dir, self.plan, node, generation);
         let _ = std::fs::remove_file(bus::plan::successor_path(self.run_dir, node, generation));
-        processes.forget(node, generation);
+        bus::process::remove_claim(self.run_dir, &self.plan.nodes[node].name, generation);
+        processes.forget(node, generation, self.run_dir);
     }
 
     /// Whether the candidate of `node` can take the place of the active process at once. One that was never to be
@@ -654,7 +771,10 @@ impl<'a> Successions<'a> {
         };
         self.seats[node].is_vacant = true;
         let (purpose, join) = (Purpose::Restart, Join::AtOnce);
-        self.start_candidate(Pending { successor, purpose, is_planned: false, join }, processes)
+        self.start_candidate(
+            Pending { successor, purpose, is_planned: false, request: None, join },
+            processes,
+        )
     }
 
     /// Whether the active process of `node` is dead and somebody is on the way to its place.
@@ -705,13 +825,34 @@ impl<'a> Successions<'a> {
         }
     }
 
+    /// Processor time in nanoseconds, and deadlines missed, of all processes of `node`.
+    pub fn spent(&self, node: usize) -> (u64, u32) {
+        let members = (0..SEATS).map(|seat| self.control_use(seat * self.plan.nodes.len() + node));
+        members.fold(self.seats[node].spent, |sum, used| (sum.0 + used.0, sum.1 + used.1))
+    }
+
+    fn control_use(&self, member: usize) -> (u64, u32) {
+        (self.control.cpu_ns(member), self.control.late_count(member))
+    }
+
     /// What became of all successors, those included that still shadow.
     pub fn into_reports(mut self) -> Vec<Report> {
-        for candidate in self.seats.into_iter().filter_map(|seats| seats.candidate) {
+        for mut candidate in self.seats.into_iter().filter_map(|seats| seats.candidate) {
+            if candidate.report.purpose == Purpose::Swap && candidate.report.take_over_tick.is_none() {
+                candidate.report.refused = Some("the run ended before it could take over".to_owned());
+            }
             self.reports.push(candidate.report);
         }
         self.reports
     }
+}
+
+/// What the tick of a take-over must be a multiple of: so that the successor sends on every output at once, and who
+/// joins later finds its samples.
+pub fn take_over_stride(plan: &Plan, node: usize) -> u32 {
+    let periods = plan.nodes[node].outputs.iter().map(|output| plan.topics[output.topic].period_ticks);
+    let multiple = |a: u32, b: u32| (1..=b).map(|k| a.saturating_mul(k)).find(|m| m % b == 0).unwrap_or(a);
+    periods.fold(plan.nodes[node].period_ticks, multiple)
 }
 
 fn milliseconds(since: Instant) -> f64 {

@@ -206,6 +206,10 @@ impl ConnectedNode {
             crate::process::lock_memory()?;
         }
         let member = self.links.member();
+        if self.links.generation == 0 {
+            // Who takes its place may have to begin with the first tick.
+            self.state_state(self.first_tick, state);
+        }
         self.links.control.set_ready(member, Phase::Running);
         if self.links.generation == 0 {
             go_on(self.links.control.wait_phase(Phase::Running))?;
@@ -216,7 +220,8 @@ impl ConnectedNode {
         let period = self.links.node.period_ticks;
         let mut tick = self.first_tick;
         while self.await_tick(tick, state)? {
-            if tick == self.first_tick {
+            if self.links.generation > 0 && tick <= self.take_over_tick.max(self.first_tick) {
+                // What it begins with is its predecessor's, not what it came to itself.
                 self.state_state(tick, state);
             }
             self.compute(tick, state, &mut step)?;

@@ -433,11 +433,14 @@ impl Control {
         wake_all(word);
     }
 
-    /// Prepares an empty seat for another process.
+    /// Empties a seat, for another process.
     pub fn clear_seat(&self, member: usize) {
-        self.word(self.member_slot(member), READY).store(0, SeqCst);
-        self.word(self.member_slot(member), EPOCH).store(0, SeqCst);
-        self.word(self.member_slot(member), HAND_OVER).store(0, SeqCst);
+        self.set_seat(member, Seat::Empty);
+        for word in [READY, LATE, EPOCH, HAND_OVER] {
+            self.word(self.member_slot(member), word).store(0, SeqCst);
+        }
+        self.set_cpu_ns(member, 0);
+        self.tick_word(Word::Done(member)).store(0, SeqCst);
         self.tick_word(Word::State(member)).store(0, SeqCst);
     }
 

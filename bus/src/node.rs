@@ -228,10 +228,8 @@ impl Node {
     /// If a port of the manifest was not declared, two sides disagree on a layout, or the run is aborted.
     pub fn connect(self) -> Result<ConnectedNode, BusError> {
         self.require_all_declared()?;
-        let claim = match self.generation {
-            0 => crate::process::claim(&self.run_dir, self.name())?,
-            generation => crate::process::claim(&self.run_dir, &format!("{}.{generation}", self.name()))?,
-        };
+        let name = crate::process::process_name(self.name(), self.generation);
+        let claim = crate::process::claim(&self.run_dir, &name)?;
         let control = Control::open(&self.plan)?;
         crate::process::stay_on(self.node().cpu);
         if self.plan.pace == Pace::Free {

@@ -230,9 +230,9 @@ impl Plan {
         (generation as usize % SEATS) * self.nodes.len() + node
     }
 
-    /// How the queues of topic `topic` are sized: a queue holds what a publisher can send before the slowest
-    /// node holds the grant back. That is two windows where one shadows and nobody waits for its samples: it may
-    /// be a window behind a reader when that takes what there is, and a window ahead before it takes the next.
+    /// How the queues of topic `topic` are sized. A queue holds what a publisher can send before the slowest node
+    /// holds the grant back, and twice that for shadows, for whose samples nobody waits: one may be a window behind a
+    /// reader when that takes what there is, and a window ahead before it takes the next.
     pub(crate) fn capacity(&self, topic: usize) -> Capacity {
         let reads = |node: &&NodePlan| node.inputs.iter().any(|input| input.topic == topic);
         let longest_period = self.nodes.iter().map(|node| node.period_ticks).max().unwrap_or(1);
@@ -246,12 +246,13 @@ impl Plan {
         let queued_samples = 2 * samples(ticks);
         // Who joins at a tick boundary needs the newest sample; who takes the place of a crashed process
         // needs all that was sent since.
-        let restarts = self.nodes.iter().filter(reads).any(|node| node.restarts);
+        let restarts = self.nodes.iter().any(|node| node.restarts);
         Capacity {
             queued_samples,
             history_samples: if restarts { samples(ticks) } else { 1 },
-            // Each reader and its successor, and a successor of the publisher.
-            subscribers: SEATS * self.nodes.iter().filter(reads).count() + 1,
+            // Each reader and its successor, a successor of the publisher, and successors that read more than
+            // their predecessors.
+            subscribers: SEATS * self.nodes.iter().filter(reads).count() + 3,
             nodes: SEATS * self.nodes.len() + 1,
         }
     }

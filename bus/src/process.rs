@@ -71,7 +71,7 @@ pub(crate) struct Claim {
 /// # Errors
 /// If another process has it: two clocks, or two processes of one node, would mix their ticks.
 pub(crate) fn claim(run_dir: &Path, name: &str) -> Result<Claim, BusError> {
-    let path = run_dir.join(format!("{}.claim", name.replace('/', ".")));
+    let path = claim_path(run_dir, name);
     let fail = |source| BusError::File { action: "open", path: path.clone(), source };
     let lock =
         File::options().create(true).truncate(false).write(true).mode(0o600).open(&path).map_err(fail)?;
@@ -80,6 +80,22 @@ pub(crate) fn claim(run_dir: &Path, name: &str) -> Result<Claim, BusError> {
         Err(TryLockError::WouldBlock) => Err(BusError::Claimed { name: name.to_owned() }),
         Err(TryLockError::Error(source)) => Err(BusError::File { action: "lock", path, source }),
     }
+}
+
+fn claim_path(run_dir: &Path, name: &str) -> PathBuf {
+    run_dir.join(format!("{}.claim", name.replace('/', ".")))
+}
+
+/// Removes the claim of a process that has left: generation `generation` of node `node`.
+pub fn remove_claim(run_dir: &Path, node: &str, generation: u32) {
+    // A process that never joined has none.
+    let _ = std::fs::remove_file(claim_path(run_dir, &process_name(node, generation)));
+}
+
+/// What generation `generation` of node `node` is called.
+#[must_use]
+pub fn process_name(node: &str, generation: u32) -> String {
+    if generation == 0 { node.to_owned() } else { format!("{node}.{generation}") }
 }
 
 /// Keeps this process on one core. Where the machine has no such core, it stays where it is: placement

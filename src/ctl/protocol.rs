@@ -98,8 +98,9 @@ impl State {
             _ if control.phase() != Phase::Running => Self::Starting,
             _ if ticks >= control.end_tick() => Self::Ended,
             _ if control.is_stop_requested() || control.is_aborted() => Self::Stopping,
-            _ if control.held_at().is_some() => Self::Paused,
             u32::MAX => Self::Running,
+            // A hold for a process that joins is none of the user's.
+            hold_tick if control.held_at().is_some_and(|held| hold_tick <= held) => Self::Paused,
             hold_tick if hold_tick > ticks => Self::Stepping,
             _ => Self::Pausing,
         }

@@ -5,6 +5,7 @@ use super::{Graph, parameters, wire};
 use crate::manifest::{Manifest, OutputSetting, Process, SwapSetting};
 use crate::problem::Problem;
 use crate::program::{Executable, Program, Successor};
+use crate::succession::take_over_stride;
 use bus::kind::NodeKind;
 use bus::plan::{NodePlan, Plan};
 use std::collections::BTreeMap;
@@ -221,6 +222,15 @@ impl Run<'_> {
                 let name = &self.plan.nodes[node].name;
                 let message = format!("it {what} tick {tick}, but `{name}` computes every {period} ticks");
                 return Err(at(message, format!("choose multiples of {period}")));
+            }
+        }
+        let stride = take_over_stride(self.plan, node);
+        for (what, tick) in [("takes over at", at_tick), ("repeats after", every_ticks)] {
+            if !tick.is_multiple_of(stride) {
+                let name = &self.plan.nodes[node].name;
+                let message = format!("it {what} tick {tick}, but `{name}` sends every {stride} ticks");
+                let help = format!("choose multiples of {stride}: a successor sends on every output at once");
+                return Err(at(message, help));
             }
         }
         Ok((0..repeat).map(|n| (join_tick + n * every_ticks, at_tick + n * every_ticks)).collect())

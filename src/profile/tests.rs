@@ -244,6 +244,7 @@ fn succession(generation: u32, take_over_tick: Option<u32>, inputs: &[InputPlan]
         generation,
         purpose: Purpose::Swap,
         is_planned: true,
+        request: None,
         join_tick: Some(0),
         take_over_tick,
         hand_over: None,

@@ -223,6 +223,26 @@ impl Launch<'_> {
         poll(&what, || self.control()?.held_at().filter(|&held| held == ticks));
     }
 
+    /// Waits until generation `generation` of node `node` computes.
+    pub fn await_seat(&self, node: &str, generation: u32) {
+        poll(&format!("{node}.{generation} did not join"), || {
+            let plan = Plan::load(self.place.run_dirs().first()?).ok()?;
+            let member = plan.member(plan.node_index(node).ok()?, generation);
+            (Control::open(&plan).ok()?.seat(member) == bus::control::Seat::Taken).then_some(())
+        });
+    }
+
+    /// Waits until the run has this many processes beside its launcher.
+    pub fn await_process_count(&self, place: &Place, count: usize) {
+        poll(&format!("{count} processes"), || {
+            let nodes = place
+                .processes()
+                .into_iter()
+                .filter(|(pid, _)| Some(*pid) != Pid::from_raw(self.id() as i32));
+            (nodes.count() == count).then_some(())
+        });
+    }
+
     /// Lets a held run go on.
     pub fn release(&mut self) {
         self.control().expect("the run is up").set_hold_tick(u32::MAX);
