@@ -16,7 +16,7 @@ use std::process::{Child, Command, Stdio};
 /// # Errors
 /// If it cannot be started.
 pub fn start_clock(run_dir: &Path) -> Result<(Child, PathBuf)> {
-    let mut command = this_binary()?;
+    let mut command = this_binary();
     command.args(["node", "clock"]);
     spawn(command, "clock", Role::Clock, run_dir, None)
 }
@@ -28,7 +28,7 @@ pub fn start_clock(run_dir: &Path) -> Result<(Child, PathBuf)> {
 pub fn start(run_dir: &Path, name: &str, role: Role, program: &Program) -> Result<(Child, PathBuf)> {
     let mut command = match &program.executable {
         Executable::Kind(kind) => {
-            let mut command = this_binary()?;
+            let mut command = this_binary();
             command.args(["node", kind.name]);
             command
         }
@@ -58,8 +58,11 @@ pub fn start(run_dir: &Path, name: &str, role: Role, program: &Program) -> Resul
     Ok((child, log))
 }
 
-fn this_binary() -> Result<Command> {
-    Ok(Command::new(std::env::current_exe().context("cannot find this binary")?))
+/// This binary, also after the file that it was started from has been replaced by a newer one.
+fn this_binary() -> Command {
+    let mut command = Command::new("/proc/self/exe");
+    command.arg0("hummingbus");
+    command
 }
 
 fn spawn(

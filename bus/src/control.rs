@@ -15,7 +15,8 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU32, AtomicU64, Ordering::Relaxed, Ordering::SeqCst};
 
 const SLOT_BYTES: usize = 64;
-const MAGIC: u32 = 0x4855_4d35;
+/// Changes with the layout of the segment and the queues: processes of different versions do not fly together.
+const MAGIC: u32 = 0x4855_4d37;
 /// Words of a member's slot: how far it has joined, and what its seat holds.
 const READY: usize = 0;
 const SEAT: usize = 8;

@@ -15,7 +15,7 @@ use std::time::{Duration, Instant};
 
 pub const HUMMINGBUS: &str = env!("CARGO_BIN_EXE_hummingbus");
 /// A deadlock's end: no launch here needs a tenth of it on an idle machine.
-const WATCHDOG: Duration = Duration::from_secs(120);
+const WATCHDOG: Duration = Duration::from_secs(300);
 const POLL: Duration = Duration::from_millis(2);
 
 /// A path in this repository.
