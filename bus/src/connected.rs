@@ -204,6 +204,10 @@ impl ConnectedNode {
             crate::process::lock_memory()?;
         }
         let member = self.links.member();
+        if self.links.generation == 0 {
+            // Before anything can happen to it: who takes its place at the first tick starts from here.
+            self.state_state(self.first_tick, state);
+        }
         self.links.control.set_ready(member, Phase::Running);
         if self.links.generation == 0 {
             go_on(self.links.control.wait_phase(Phase::Running))?;
@@ -214,7 +218,7 @@ impl ConnectedNode {
         let period = self.links.node.period_ticks;
         let mut tick = self.first_tick;
         while self.await_tick(tick, state)? {
-            if tick == self.first_tick {
+            if tick == self.first_tick && self.links.generation > 0 {
                 self.state_state(tick, state);
             }
             self.compute(tick, state, &mut step)?;
