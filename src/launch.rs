@@ -360,6 +360,12 @@ impl Supervisor<'_> {
             self.abort(format!("{}\nThe run was aborted at tick {ticks}", death.words))?;
             return Ok(true);
         };
+        if self.successions.has_taken_over(node) {
+            if !self.successions.all_agree(&self.processes) {
+                return Ok(false);
+            }
+            self.successions.commit(node)?;
+        }
         match self.successions.standing(node, generation) {
             Standing::Former => Ok(true),
             Standing::Candidate => {

@@ -503,8 +503,22 @@ impl<'a> Successions<'a> {
         self.control.set_epoch(self.roster.epoch);
     }
 
-    /// Its first tick is done: from now on it is the active one.
-    fn commit(&mut self, node: usize) -> Result<()> {
+    /// Whether the candidate of `node` has sent a sample that counts. Readers may have turned to it: even if it dies
+    /// now, there is no way back to its predecessor.
+    pub fn has_taken_over(&self, node: usize) -> bool {
+        let roster = &self.roster.nodes[node];
+        let is_shadowing = self.seats[node].candidate.as_ref().is_some_and(|c| c.stage == Stage::Shadowing);
+        let outputs = roster.active.plan.outputs.iter().zip(&roster.take_over_ticks);
+        let has_sent = |(output, &tick): (&bus::plan::OutputPlan, &u32)| {
+            let period_ticks = u64::from(self.plan.topics[output.topic].period_ticks);
+            let first_due = u64::from(tick).next_multiple_of(period_ticks);
+            u64::from(self.control.ticks_sent(output.topic)) > first_due
+        };
+        is_shadowing && outputs.into_iter().any(has_sent)
+    }
+
+    /// Its first tick is done, or lost with it: from now on it is the active one.
+    pub fn commit(&mut self, node: usize) -> Result<()> {
         let roster = &mut self.roster.nodes[node];
         let take_over_tick = roster.take_over_tick;
         let former = roster.active.generation;
