@@ -367,7 +367,10 @@ impl Supervisor<'_> {
             self.successions.commit(node)?;
         }
         match self.successions.standing(node, generation) {
-            Standing::Former => Ok(true),
+            Standing::Former => {
+                self.successions.note_end_of_former(node, generation);
+                Ok(true)
+            }
             Standing::Candidate => {
                 if self.tell(Event::SuccessorFailed)? == Action::Refuse {
                     let tick = self.control.done(self.plan.member(node, generation));

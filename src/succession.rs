@@ -543,6 +543,15 @@ impl<'a> Successions<'a> {
         }
     }
 
+    /// The process has ended: if it is a predecessor that did not come to leave by itself, nobody waits for it.
+    pub fn note_end_of_former(&self, node: usize, generation: u32) {
+        let candidate = self.seats[node].candidate.as_ref();
+        if candidate.is_some_and(|candidate| candidate.former == Some(generation)) {
+            self.control.set_seat(self.member(node, generation), Seat::Empty);
+            self.control.set_epoch(self.control.epoch());
+        }
+    }
+
     /// Whether the predecessor has left and everybody has read its last samples.
     fn has_retired(&self, node: usize, candidate: &Candidate, processes: &Processes) -> bool {
         if candidate.former.is_some_and(|former| processes.lives(node, former)) {
