@@ -376,8 +376,17 @@ impl Supervisor<'_> {
             self.abort(format!("{}\nThe run was aborted at tick {ticks}", death.words))?;
             return Ok(true);
         };
+        if self.successions.has_taken_over(node) {
+            if !self.successions.all_agree(&self.processes) {
+                return Ok(false);
+            }
+            self.successions.commit(node)?;
+        }
         match self.successions.standing(node, generation) {
-            Standing::Former => Ok(true),
+            Standing::Former => {
+                self.successions.note_end_of_former(node, generation);
+                Ok(true)
+            }
             Standing::Candidate => {
                 if self.successions.stage(node) > Some(Stage::Starting)
                     && !self.successions.may_change(node, &self.processes)

@@ -632,8 +632,22 @@ impl<'a> Successions<'a> {
         self.control.set_epoch(self.roster.epoch);
     }
 
-    /// Its first tick is done: from now on it is the active one.
-    fn commit(&mut self, node: usize) -> Result<()> {
+    /// Whether the candidate of `node` has sent a sample that counts. Readers may have turned to it: even if it dies
+    /// now, there is no way back to its predecessor.
+    pub fn has_taken_over(&self, node: usize) -> bool {
+        let roster = &self.roster.nodes[node];
+        let is_shadowing = self.seats[node].candidate.as_ref().is_some_and(|c| c.stage == Stage::Shadowing);
+        let outputs = roster.active.plan.outputs.iter().zip(&roster.take_over_ticks);
+        let has_sent = |(output, &tick): (&bus::plan::OutputPlan, &u32)| {
+            let period_ticks = u64::from(self.plan.topics[output.topic].period_ticks);
+            let first_due = u64::from(tick).next_multiple_of(period_ticks);
+            u64::from(self.control.ticks_sent(output.topic)) > first_due
+        };
+        is_shadowing && outputs.into_iter().any(has_sent)
+    }
+
+    /// Its first tick is done, or lost with it: from now on it is the active one.
+    pub fn commit(&mut self, node: usize) -> Result<()> {
         let roster = &mut self.roster.nodes[node];
         let take_over_tick = roster.take_over_tick;
         let former = roster.active.generation;
@@ -655,6 +669,15 @@ impl<'a> Successions<'a> {
     fn set_stage(&mut self, node: usize, stage: Stage) {
         if let Some(candidate) = &mut self.seats[node].candidate {
             candidate.stage = stage;
+        }
+    }
+
+    /// The process has ended: if it is a predecessor that did not come to leave by itself, nobody waits for it.
+    pub fn note_end_of_former(&self, node: usize, generation: u32) {
+        let candidate = self.seats[node].candidate.as_ref();
+        if candidate.is_some_and(|candidate| candidate.former == Some(generation)) {
+            self.control.set_seat(self.member(node, generation), Seat::Empty);
+            self.control.set_epoch(self.control.epoch());
         }
     }
 

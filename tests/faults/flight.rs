@@ -2,8 +2,10 @@
 
 use crate::saboteur;
 use crate::support::{Launch, Place, poll, repository};
-use bus::control::Control;
+use bus::control::{Control, Seat};
 use bus::plan::Plan;
+use bus::roster::{NodeRoster, Roster};
+use recorder::reader::Recording;
 use rustix::process::Pid;
 use std::path::PathBuf;
 use std::thread::sleep;
@@ -26,7 +28,25 @@ pub fn manifest() -> String {
     format!("{flown}{}", saboteur::table())
 }
 
-/// The undisturbed recording of [`manifest`], flown once for all tests of this executable.
+/// Writes a manifest that adds `tables` to those of [`manifest`].
+pub fn write_manifest(place: &Place, tables: &str) -> String {
+    place.write("flight.toml", manifest());
+    place.write("more.toml", format!("include = [\"flight.toml\"]\n{tables}"))
+}
+
+/// Every message of the recording at `path` but those of shadows: topic, tick and bytes.
+pub fn messages(path: &str) -> Vec<(String, u32, Vec<u8>)> {
+    records(path).into_iter().filter(|(topic, ..)| !topic.starts_with("/shadow/")).collect()
+}
+
+/// Every message of the recording at `path`.
+pub fn records(path: &str) -> Vec<(String, u32, Vec<u8>)> {
+    let recording = Recording::open(path.as_ref()).unwrap();
+    let all = recording.messages().map(Result::unwrap);
+    all.map(|record| (record.topic, record.tick, record.cdr)).collect()
+}
+
+/// The undisturbed recording of a manifest.
 pub struct Reference {
     place: Place,
 }
@@ -35,7 +55,18 @@ impl Reference {
     pub fn fly() -> Self {
         let place = Place::new();
         let path = place.write("flight.toml", manifest());
-        place.call(&["run", &path, "--record", &place.path("reference.mcap")]).with_code(0);
+        Self::fly_manifest(place, &path)
+    }
+
+    /// That of [`write_manifest`].
+    pub fn fly_with(tables: &str) -> Self {
+        let place = Place::new();
+        let path = write_manifest(&place, tables);
+        Self::fly_manifest(place, &path)
+    }
+
+    fn fly_manifest(place: Place, path: &str) -> Self {
+        place.call(&["run", path, "--record", &place.path("reference.mcap")]).with_code(0);
         Self { place }
     }
 
@@ -80,6 +111,11 @@ impl Watched {
         });
     }
 
+    /// Waits until the run has come to its change number `epoch`.
+    pub fn await_epoch(&self, epoch: u32) {
+        self.look("nobody was replaced", || (self.control.epoch() >= epoch).then_some(()));
+    }
+
     fn look<T>(&self, what: &str, mut look: impl FnMut() -> Option<T>) -> T {
         poll(what, || {
             // Finer than the watchdog's own poll: a run computes dozens of ticks in a millisecond.
@@ -96,6 +132,26 @@ impl Watched {
 
     pub fn node(&self, name: &str) -> Option<usize> {
         self.plan.nodes.iter().position(|node| node.name == name)
+    }
+
+    /// Who is in the seats of `node` now, once everybody has been told of them.
+    pub fn roster(&self, place: &Place, node: usize) -> NodeRoster {
+        self.look("no roster", || {
+            let run_dir = place.run_dirs().into_iter().next()?;
+            let epoch = self.control.epoch();
+            let mut roster =
+                if epoch == 0 { Roster::first(&self.plan) } else { Roster::load(&run_dir, epoch).ok()? };
+            Some(roster.nodes.swap_remove(node))
+        })
+    }
+
+    /// Waits until the successor of `node` computes beside it; returns its generation.
+    pub fn await_shadow(&self, place: &Place, node: usize) -> u32 {
+        self.look("no successor has joined", || {
+            let generation = self.roster(place, node).successor?.generation;
+            let seat = self.control.seat(self.plan.member(node, generation));
+            (seat == Seat::Taken).then_some(generation)
+        })
     }
 
     /// Ticks of the node that is `ahead` of all others that send, or behind.

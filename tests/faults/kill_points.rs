@@ -1,8 +1,7 @@
-//! Kill points: seeded strikes over processes, ticks and signals, and what is promised after each.
-//!
-//! `HUMMINGBUS_KILL_POINTS` says how many (300 by default), `HUMMINGBUS_SEED` which, and `HUMMINGBUS_KILL_POINT` picks
-//! one of them to repeat it.
+//! Kill points: seeded strikes over processes, ticks and signals where nothing but a stop is to follow, and what is
+//! promised after each.
 
+use crate::campaign;
 use crate::flight::{FLUSH_TICKS, Process, Reference, Watched, manifest};
 use crate::saboteur::{FAULT_VARIABLE, Fault, TICK_VARIABLE};
 use crate::support::{Ended, Launch, Place};
@@ -11,27 +10,26 @@ use rustix::process::{Signal, kill_process};
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::Mutex;
-use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::Duration;
 
-const KILL_POINTS: u64 = 300;
+const KILL_POINTS: u64 = 180;
 /// Strikes come before this tick, so that a flush or two lie behind the last ones.
 const LAST_TICK: usize = 3000;
 /// Ticks after a strike in flight at which the clock waits, so that no run ends before it is struck.
-const GUARD_TICKS: u32 = 500;
+pub const GUARD_TICKS: u32 = 500;
 /// Ticks around which something else happens: the first, a full window, a flush, the next chunk.
-const EDGES: [u32; 10] = [0, 1, 63, 64, 65, 998, 999, 1000, 1001, 2000];
+pub const EDGES: [u32; 10] = [0, 1, 63, 64, 65, 998, 999, 1000, 1001, 2000];
 
 /// What is done to the victim.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Blow {
+pub enum Blow {
     Signal(Signal),
     Fault(Fault),
 }
 
 /// When it is done.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Moment {
+pub enum Moment {
     /// This long after its process has appeared.
     Start(Duration),
     /// While the clock waits at the boundary before this tick; then the clock goes on, or not.
@@ -40,22 +38,12 @@ enum Moment {
     Flight(u32),
 }
 
-/// What the manifest wants to follow.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Policy {
-    /// The run is aborted.
-    Stop,
-}
-
 /// One kill point.
 #[derive(Clone, Copy, Debug)]
 struct Case {
-    seed: u64,
-    index: u64,
     victim: Process,
     blow: Blow,
     moment: Moment,
-    policy: Policy,
 }
 
 impl Case {
@@ -66,7 +54,7 @@ impl Case {
         let victim = Process::ALL[usize::try_from(index).unwrap() % Process::ALL.len()];
         let moment = draw_moment(&mut below);
         let blow = draw_blow(victim, moment, &mut below);
-        let mut case = Self { seed, index, victim, blow, moment, policy: Policy::Stop };
+        let mut case = Self { victim, blow, moment };
         // A node that is asked to end while the clock waits hears of it when the clock goes on.
         if let Moment::Boundary { tick, .. } = moment
             && case.is_request()
@@ -122,26 +110,6 @@ fn draw_blow(victim: Process, moment: Moment, below: &mut impl FnMut(usize) -> u
     }
 }
 
-/// Says which case failed, so that exactly this one can be repeated, and has the others not go on.
-struct Witness<'a> {
-    case: &'a Case,
-    has_failed: &'a AtomicBool,
-}
-
-impl Drop for Witness<'_> {
-    fn drop(&mut self) {
-        if std::thread::panicking() {
-            self.has_failed.store(true, Ordering::SeqCst);
-            let Case { seed, index, .. } = self.case;
-            eprintln!(
-                "FAILED: {:#?}\nrepeat it: HUMMINGBUS_SEED={seed} HUMMINGBUS_KILL_POINT={index} \
-                 cargo test --test faults kill_points",
-                self.case
-            );
-        }
-    }
-}
-
 /// What a kill point cost.
 #[derive(Clone, Copy, Debug, Default)]
 struct Loss {
@@ -151,32 +119,16 @@ struct Loss {
 
 #[test]
 fn every_kill_point_ends_as_documented() {
-    let number = |name: &str| std::env::var(name).ok().map(|text| text.parse::<u64>().expect(name));
-    let seed = number("HUMMINGBUS_SEED").unwrap_or(1);
-    let first = number("HUMMINGBUS_KILL_POINT");
-    let count = first.map_or_else(|| number("HUMMINGBUS_KILL_POINTS").unwrap_or(KILL_POINTS), |_| 1);
     let reference = Reference::fly();
     let reference_path = reference.path();
-    let next = AtomicU64::new(first.unwrap_or(0));
-    let end = next.load(Ordering::SeqCst) + count;
-    let has_failed = AtomicBool::new(false);
     let losses = Mutex::new(BTreeMap::<&str, Loss>::new());
-    let work = || {
-        while !has_failed.load(Ordering::SeqCst) {
-            let index = next.fetch_add(1, Ordering::SeqCst);
-            if index >= end {
-                return;
-            }
-            let case = Case::draw(seed, index);
-            let _witness = Witness { case: &case, has_failed: &has_failed };
-            let lost = strike(&case, &reference_path);
-            let mut losses = losses.lock().unwrap();
-            let loss = losses.entry(case.victim.name()).or_default();
-            *loss = Loss { strikes: loss.strikes + 1, lost_ticks_max: loss.lost_ticks_max.max(lost) };
-        }
-    };
-    std::thread::scope(|scope| (0..2).for_each(|_| drop(scope.spawn(work))));
-    println!("seed {seed}, {count} kill points: {:#?}", losses.lock().unwrap());
+    campaign::run("kill_points", KILL_POINTS, Case::draw, |case| {
+        let lost = strike(case, &reference_path);
+        let mut losses = losses.lock().unwrap();
+        let loss = losses.entry(case.victim.name()).or_default();
+        *loss = Loss { strikes: loss.strikes + 1, lost_ticks_max: loss.lost_ticks_max.max(lost) };
+    });
+    println!("{:#?}", losses.lock().unwrap());
 }
 
 /// Flies, strikes and checks; returns how many ticks were sent and are not in the recording.
@@ -187,13 +139,9 @@ fn strike(case: &Case, reference: &str) -> u32 {
     let watched = Watched::attach(&place);
     let sent_before = deliver(case, &place, &launch, &watched);
     let ended = end(case, &place, launch);
-    match case.policy {
-        Policy::Stop => {
-            require_stopped(case, &watched, &ended);
-            let recorded = recorded_ticks(case, &place, &recording, reference);
-            require_bounded_loss(case, &watched, sent_before, recorded)
-        }
-    }
+    require_stopped(case, &watched, &ended);
+    let recorded = recorded_ticks(case, &place, &recording, reference);
+    require_bounded_loss(case, &watched, sent_before, recorded)
 }
 
 fn start<'a>(case: &Case, place: &'a Place, words: &[&str]) -> Launch<'a> {
@@ -243,7 +191,7 @@ fn end(case: &Case, place: &Place, launch: Launch<'_>) -> Ended {
     ended
 }
 
-/// The policy `stop`: exit code and message.
+/// Exit code and message.
 fn require_stopped(case: &Case, watched: &Watched, ended: &Ended) {
     let name = case.victim.name();
     if case.is_request() {
@@ -274,7 +222,7 @@ fn require_stopped(case: &Case, watched: &Watched, ended: &Ended) {
     }
 }
 
-fn signal_name(signal: Signal) -> &'static str {
+pub fn signal_name(signal: Signal) -> &'static str {
     match signal {
         Signal::KILL => "signal 9 (SIGKILL)",
         Signal::USR1 => "signal 10 (SIGUSR1)",
@@ -283,14 +231,16 @@ fn signal_name(signal: Signal) -> &'static str {
     }
 }
 
-fn words_of(fault: Fault) -> &'static [&'static str] {
+pub fn words_of(fault: Fault) -> &'static [&'static str] {
     match fault {
         Fault::Error => &["ended with exit code 1", "the battery is empty", "failed at tick"],
         Fault::Panic => &["ended with exit code 101", "the propeller came off"],
         Fault::ExitWith3 => &["ended with exit code 3"],
         Fault::ExitWith0 => &["ended with exit code 0 before the run did"],
         Fault::Unwritten => &["without writing its output `report`"],
-        Fault::SlowStep => unreachable!("a slow step ends no run"),
+        Fault::SlowStep | Fault::Hang | Fault::NeverJoins | Fault::OtherLayout => {
+            unreachable!("{fault:?} ends no run by itself")
+        }
     }
 }
 

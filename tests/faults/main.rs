@@ -3,7 +3,10 @@
 //! - [`support`]: a folder of its own for each test, launches under a watchdog, what a run left behind
 //! - [`flight`]: the run that the faults strike, and its undisturbed recording
 //! - [`saboteur`]: a node that fails from the inside when it is told to
-//! - [`kill_points`]: hundreds of seeded strikes over processes, ticks and signals
+//! - [`campaign`]: many seeded cases, each of which can be repeated
+//! - [`kill_points`]: seeded strikes over processes, ticks and signals, where the run is to stop
+//! - [`survival`]: the same where the process is restarted or has a standby
+//! - [`successors`]: successors that fail before they fly, and strikes at whoever else is there meanwhile
 //! - [`silence`]: processes that neither end nor go on
 //! - [`slow`]: steps that take too long
 //! - [`disk`]: a full disk under the recorder
@@ -13,6 +16,7 @@
 //! - [`documentation`]: the list names tests that there are
 
 mod bad_files;
+mod campaign;
 mod disk;
 mod documentation;
 mod flight;
@@ -21,7 +25,9 @@ mod kill_points;
 mod saboteur;
 mod silence;
 mod slow;
+mod successors;
 #[allow(dead_code, reason = "shared with the tests of undisturbed runs, which use the rest")]
 #[path = "../runs/support.rs"]
 mod support;
+mod survival;
 mod users;

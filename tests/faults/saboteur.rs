@@ -7,6 +7,8 @@ use std::time::Duration;
 /// The environment variables that tell the saboteur what to do, and when.
 pub const FAULT_VARIABLE: &str = "HUMMINGBUS_TEST_FAULT";
 pub const TICK_VARIABLE: &str = "HUMMINGBUS_TEST_FAULT_TICK";
+/// How many processes of the node fail, from the first on; all where it is not said.
+pub const GENERATIONS_VARIABLE: &str = "HUMMINGBUS_TEST_FAULT_GENERATIONS";
 
 /// What the saboteur sends while it behaves.
 #[derive(Clone, Copy, Default, Message)]
@@ -19,6 +21,17 @@ struct Report {
     altitude: f64,
 }
 
+/// Another message under the same name, as after a change on one side only.
+#[derive(Clone, Copy, Default, Message)]
+#[repr(C)]
+#[message(type_name = "test_msgs/msg/Report")]
+struct OtherReport {
+    stamp: Time,
+    /// The rate of climb that it saw.
+    #[field(unit = "m/s", frame = "world")]
+    climb: f64,
+}
+
 /// How a node fails from the inside.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Fault {
@@ -28,6 +41,9 @@ pub enum Fault {
     ExitWith0,
     Unwritten,
     SlowStep,
+    Hang,
+    NeverJoins,
+    OtherLayout,
 }
 
 impl Fault {
@@ -36,7 +52,8 @@ impl Fault {
         [Self::Error, Self::Panic, Self::ExitWith3, Self::ExitWith0, Self::Unwritten];
 
     fn find(name: &str) -> Option<Self> {
-        let mut all = Self::ENDING.into_iter().chain([Self::SlowStep]);
+        let others = [Self::SlowStep, Self::Hang, Self::NeverJoins, Self::OtherLayout];
+        let mut all = Self::ENDING.into_iter().chain(others);
         all.find(|fault| format!("{fault:?}") == name)
     }
 
@@ -46,8 +63,15 @@ impl Fault {
             Self::Panic => panic!("the propeller came off"),
             Self::ExitWith3 => std::process::exit(3),
             Self::ExitWith0 => std::process::exit(0),
-            Self::Unwritten | Self::SlowStep => Ok(()),
+            Self::Hang => hang(),
+            Self::Unwritten | Self::SlowStep | Self::NeverJoins | Self::OtherLayout => Ok(()),
         }
+    }
+}
+
+fn hang() -> ! {
+    loop {
+        std::thread::park();
     }
 }
 
@@ -79,11 +103,18 @@ fn a_process_started_by_a_launcher_is_the_saboteur() {
 }
 
 fn run() -> Result<(), BusError> {
+    let fault = fault();
+    if fault == Some(Fault::NeverJoins) {
+        hang();
+    }
     let mut node = Node::join()?;
+    if fault == Some(Fault::OtherLayout) {
+        node.input::<PlantState>("state")?;
+        let output = node.output::<OtherReport>("report")?;
+        return node.run(|tick| tick.write(output, OtherReport::default()));
+    }
     let (input, output) = (node.input::<PlantState>("state")?, node.output::<Report>("report")?);
-    let variable = |name| std::env::var(name).ok();
-    let fault = variable(FAULT_VARIABLE).and_then(|name| Fault::find(&name));
-    let at_tick = variable(TICK_VARIABLE).and_then(|tick| tick.parse().ok()).unwrap_or(0);
+    let at_tick = number(TICK_VARIABLE).unwrap_or(0);
     node.run(|tick| {
         if fault == Some(Fault::SlowStep) {
             std::thread::sleep(Duration::from_millis(3));
@@ -93,4 +124,15 @@ fn run() -> Result<(), BusError> {
         let report = Report { altitude: tick.get(input).position.z, ..Report::default() };
         tick.write(output, report).map_err(|error| error.to_string())
     })
+}
+
+/// The fault of this process, if it has one.
+fn fault() -> Option<Fault> {
+    let generation = number(bus::GENERATION_VARIABLE).unwrap_or(0);
+    let fails = generation < number(GENERATIONS_VARIABLE).unwrap_or(u32::MAX);
+    std::env::var(FAULT_VARIABLE).ok().filter(|_| fails).and_then(|name| Fault::find(&name))
+}
+
+fn number(variable: &str) -> Option<u32> {
+    std::env::var(variable).ok().and_then(|text| text.parse().ok())
 }

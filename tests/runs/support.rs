@@ -104,6 +104,15 @@ impl Place {
         })
     }
 
+    /// The process of a generation of node `node`, once it has come up; it may have been stopped or be on its way out.
+    pub fn process_of_generation(&self, node: &str, generation: u32) -> Pid {
+        let mark = format!("HUMMINGBUS_GENERATION={generation}");
+        poll(&format!("no process {generation} of node {node}"), || {
+            let of_node = self.processes().into_iter().filter(|(_, name)| name == node);
+            of_node.map(|(pid, _)| pid).find(|pid| environment(*pid).contains(&mark))
+        })
+    }
+
     /// The process of the clock service, once it has come up.
     pub fn clock(&self) -> Pid {
         let is_clock = |pid: &Pid| {
@@ -151,10 +160,14 @@ impl Drop for Place {
     }
 }
 
+fn environment(pid: Pid) -> Vec<String> {
+    let text = fs::read(format!("/proc/{}/environ", pid.as_raw_nonzero())).unwrap_or_default();
+    text.split(|&byte| byte == 0).map(|variable| String::from_utf8_lossy(variable).into_owned()).collect()
+}
+
 fn marked_process(process: &Path, mark: &str) -> Option<(Pid, String)> {
     let pid = process.file_name()?.to_str()?.parse().ok().and_then(Pid::from_raw)?;
-    let environment = fs::read(process.join("environ")).ok()?;
-    let variables: Vec<_> = environment.split(|&byte| byte == 0).map(String::from_utf8_lossy).collect();
+    let variables = environment(pid);
     variables.iter().any(|variable| variable == mark).then(|| {
         let node = variables.iter().find_map(|variable| variable.strip_prefix("HUMMINGBUS_NODE="));
         (pid, node.unwrap_or_default().to_owned())

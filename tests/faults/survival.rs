@@ -1,0 +1,214 @@
+//! Strikes that a run survives: the process is started again, or the one that stands by takes over. What is recorded is
+//! what would have been recorded without the strike.
+
+use crate::campaign;
+use crate::flight::{Reference, Watched, messages, records, write_manifest};
+use crate::kill_points::{Blow, EDGES, GUARD_TICKS, Moment, signal_name, words_of};
+use crate::saboteur::{FAULT_VARIABLE, Fault, GENERATIONS_VARIABLE, TICK_VARIABLE};
+use crate::support::{Ended, Launch, Place};
+use rand_core::Rng;
+use rustix::process::{Signal, kill_process};
+use serde_json::Value;
+use std::collections::BTreeSet;
+
+const KILL_POINTS: u64 = 90;
+const VICTIMS: [&str; 5] = ["controller", "attitude", "imu", "pilot", "saboteur"];
+/// Those that hand their state over.
+const STATEFUL: [&str; 3] = ["controller", "attitude", "imu"];
+/// The first strike comes before this tick, and the second so many ticks later: the first one's [`GUARD_TICKS`] are over.
+const LAST_TICK: usize = 2200;
+const TICKS_BETWEEN: u32 = GUARD_TICKS + 100;
+/// Of the victim of a SIGSTOP: long enough for a process to start in on a machine that is busy.
+const WATCHDOG_MS_HOST: &str = "1500";
+
+/// What is to follow the end of a process.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Policy {
+    Restart,
+    Standby,
+}
+
+impl Policy {
+    /// Tables that give it to every victim.
+    fn tables(self) -> String {
+        let on_exit = if self == Self::Restart { "restart" } else { "standby" };
+        VICTIMS.map(|victim| format!("[process.{victim}]\non_exit = \"{on_exit}\"\n")).concat()
+    }
+}
+
+/// A second strike at the same run.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Second {
+    /// Another process, at the same moment.
+    Together(&'static str),
+    /// Any process, the first one's successor included, once the first is replaced.
+    Later(&'static str),
+}
+
+/// One kill point.
+#[derive(Clone, Copy, Debug)]
+struct Case {
+    policy: Policy,
+    victim: &'static str,
+    blow: Blow,
+    moment: Moment,
+    second: Option<Second>,
+}
+
+impl Case {
+    fn draw(seed: u64, index: u64) -> Self {
+        let mut random = bus::random::stream(seed, &format!("survived kill point {index}"));
+        let mut below = |bound: usize| random.next_u32() as usize % bound;
+        let number = usize::try_from(index).unwrap();
+        let policy = [Policy::Restart, Policy::Standby][number % 2];
+        let victim = VICTIMS[number / 2 % VICTIMS.len()];
+        let tick =
+            if below(4) == 0 { EDGES[below(EDGES.len())] } else { u32::try_from(below(LAST_TICK)).unwrap() };
+        let moment = match below(2) {
+            0 => Moment::Boundary { tick, is_lifted: below(2) == 0 },
+            _ => Moment::Flight(tick.max(1)),
+        };
+        let blow = draw_blow(victim, &mut below);
+        let is_signal = matches!(blow, Blow::Signal(signal) if signal != Signal::STOP);
+        let another = VICTIMS[(number / 2 + 1 + below(VICTIMS.len() - 1)) % VICTIMS.len()];
+        let second = match (below(4), moment) {
+            (0, Moment::Boundary { .. }) if is_signal => Some(Second::Together(another)),
+            (1, _) if is_signal => Some(Second::Later(if below(2) == 0 { victim } else { another })),
+            _ => None,
+        };
+        Self { policy, victim, blow, moment, second }
+    }
+
+    fn tick(&self) -> u32 {
+        match self.moment {
+            Moment::Start(_) => 0,
+            Moment::Boundary { tick, .. } | Moment::Flight(tick) => tick,
+        }
+    }
+}
+
+fn draw_blow(victim: &str, below: &mut impl FnMut(usize) -> usize) -> Blow {
+    match below(8) {
+        0 => Blow::Signal(Signal::STOP),
+        1 => Blow::Signal(Signal::USR1),
+        _ if victim == "saboteur" => match below(Fault::ENDING.len() + 1) {
+            0 => Blow::Fault(Fault::Hang),
+            fault => Blow::Fault(Fault::ENDING[fault - 1]),
+        },
+        _ => Blow::Signal(Signal::KILL),
+    }
+}
+
+#[test]
+fn a_run_goes_on_after_every_kill_point_as_if_nothing_had_been() {
+    let references = [Policy::Restart, Policy::Standby].map(|policy| Reference::fly_with(&policy.tables()));
+    let paths = references.each_ref().map(Reference::path);
+    campaign::run("survival", KILL_POINTS, Case::draw, |case| strike(case, &paths[case.policy as usize]));
+}
+
+fn strike(case: &Case, reference: &str) {
+    let place = Place::new();
+    let (manifest, recording) =
+        (write_manifest(&place, &case.policy.tables()), place.path("flight.mcap"));
+    let launch = start(case, &place, &manifest, &recording);
+    let watched = Watched::attach(&place);
+    deliver(case, &place, &watched);
+    let ended = launch.end().with_code(0);
+    require_replaced(case, &ended);
+    if case.policy == Policy::Restart {
+        assert!(std::fs::read(&recording).unwrap() == std::fs::read(reference).unwrap(), "other bytes");
+    } else {
+        assert!(messages(&recording) == messages(reference), "other messages");
+        // Whoever shadows starts each tick from the same state: what it shows is never anything else.
+        let shown: BTreeSet<_> = records(reference).into_iter().collect();
+        assert!(records(&recording).iter().all(|record| shown.contains(record)), "other shadow messages");
+    }
+}
+
+fn start<'a>(case: &Case, place: &'a Place, manifest: &str, recording: &str) -> Launch<'a> {
+    let watchdog = format!("process.{}.watchdog_ms_host={WATCHDOG_MS_HOST}", case.victim);
+    let mut words = vec!["run", manifest, "--record", recording, "--json"];
+    if matches!(case.blow, Blow::Signal(Signal::STOP) | Blow::Fault(Fault::Hang)) {
+        words.extend(["--set", &watchdog]);
+    }
+    let Blow::Fault(fault) = case.blow else { return place.start(&words) };
+    let (fault, tick) = (format!("{fault:?}"), case.tick().to_string());
+    place.start_with(&words, &[(FAULT_VARIABLE, &fault), (TICK_VARIABLE, &tick), (GENERATIONS_VARIABLE, "1")])
+}
+
+fn deliver(case: &Case, place: &Place, watched: &Watched) {
+    let Blow::Signal(signal) = case.blow else { return };
+    let tick = case.tick();
+    match case.moment {
+        Moment::Boundary { .. } => assert_eq!(watched.hold_at(tick), tick),
+        _ => watched.control.set_hold_tick(tick + GUARD_TICKS),
+    }
+    let pid = ready(case, place, watched, case.victim);
+    let other = match case.second {
+        Some(Second::Together(other)) => Some(ready(case, place, watched, other)),
+        _ => None,
+    };
+    if let Moment::Flight(tick) = case.moment {
+        watched.await_ticks(watched.node(case.victim), tick);
+    }
+    let epoch = watched.control.epoch();
+    kill_process(pid, signal).unwrap();
+    if let Some(other) = other {
+        kill_process(other, signal).unwrap();
+    }
+    if let Moment::Boundary { is_lifted: false, .. } = case.moment
+        && signal != Signal::STOP
+    {
+        watched.await_epoch(epoch + 1);
+    }
+    if let Some(Second::Later(other)) = case.second {
+        let later = tick + TICKS_BETWEEN;
+        watched.control.set_hold_tick(later + GUARD_TICKS);
+        watched.await_ticks(None, later);
+        kill_process(ready(case, place, watched, other), signal).unwrap();
+    }
+    watched.control.set_hold_tick(u32::MAX);
+}
+
+/// The active process of node `name`, once it can be replaced.
+fn ready(case: &Case, place: &Place, watched: &Watched, name: &str) -> rustix::process::Pid {
+    let node = watched.node(name).unwrap();
+    if case.policy == Policy::Standby {
+        watched.await_shadow(place, node);
+    }
+    place.process_of_generation(name, watched.roster(place, node).active.generation)
+}
+
+/// Requires that the run says who ended how and who took the place, and when.
+fn require_replaced(case: &Case, ended: &Ended) {
+    let victims: Vec<&str> = match case.second {
+        None => vec![case.victim],
+        Some(Second::Together(other) | Second::Later(other)) => vec![case.victim, other],
+    };
+    let summary = ended.json();
+    let successions = summary["successions"].as_array().unwrap();
+    let flew: Vec<&Value> =
+        successions.iter().filter(|succession| !succession["take_over_tick"].is_null()).collect();
+    assert_eq!(flew.len(), victims.len(), "{ended}");
+    match case.blow {
+        Blow::Signal(Signal::STOP) | Blow::Fault(Fault::Hang) => ended.says(&["was killed by the watchdog"]),
+        Blow::Signal(signal) => ended.says(&[&format!("was killed by {}", signal_name(signal))]),
+        Blow::Fault(fault) => ended.says(words_of(fault)),
+    }
+    for victim in victims {
+        let of_victim = |succession: &&&Value| succession["process"] == victim;
+        let succession = flew.iter().find(of_victim).unwrap_or_else(|| panic!("none of {victim}: {ended}"));
+        let tick = &succession["take_over_tick"];
+        ended.says(&[&format!("process `{victim}")]);
+        ended.says(&[&match case.policy {
+            Policy::Restart => format!("` is restarted at tick {tick}"),
+            Policy::Standby => format!("The standby of `{victim}` takes over at tick {tick}"),
+        }]);
+        let handed_over = if STATEFUL.contains(&victim) { "state" } else { "last output" };
+        assert_eq!(succession["hand_over"], handed_over, "{ended}");
+        if matches!(case.moment, Moment::Boundary { .. }) && victim == case.victim {
+            let ticks = flew.iter().filter(|succession| of_victim(succession));
+            assert!(ticks.map(|succession| &succession["take_over_tick"]).any(|tick| *tick == case.tick()));
+        }
+    }
+}
