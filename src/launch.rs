@@ -393,9 +393,6 @@ impl Supervisor<'_> {
                 {
                     return Ok(false);
                 }
-                if self.successions.commit_if_flown(node)? {
-                    return self.settle_active(node, generation, &death);
-                }
                 if self.tell(Event::SuccessorFailed)? == Action::Refuse {
                     let tick = self.control.done(self.plan.member(node, generation));
                     let reason = format!("{} (it had come to tick {tick})", death.words);

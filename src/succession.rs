@@ -457,23 +457,6 @@ impl<'a> Successions<'a> {
         })
     }
 
-    /// Makes the candidate of `node` the active process if any of its samples counts already: then it cannot be
-    /// refused any more. False if none does.
-    pub fn commit_if_flown(&mut self, node: usize) -> Result<bool> {
-        let roster = &self.roster.nodes[node];
-        let outputs = roster.active.plan.outputs.iter().zip(&roster.take_over_ticks);
-        let is_read = |(output, &tick): (&OutputPlan, &u32)| self.control.ticks_sent(output.topic) > tick;
-        let is_shadowing =
-            self.seats[node].candidate.as_ref().is_some_and(|candidate| candidate.stage == Stage::Shadowing);
-        // The candidate of a vacant place finds samples that the dead process sent.
-        let has_sent = is_shadowing && !self.seats[node].is_vacant && outputs.into_iter().any(is_read);
-        if has_sent || self.has_flown(node) {
-            self.commit(node)?;
-            return Ok(true);
-        }
-        Ok(false)
-    }
-
     /// The stage of the candidate of `node`.
     pub fn stage(&self, node: usize) -> Option<Stage> {
         self.seats[node].candidate.as_ref().map(|candidate| candidate.stage)
@@ -638,7 +621,7 @@ impl<'a> Successions<'a> {
         let roster = &self.roster.nodes[node];
         let is_shadowing = self.seats[node].candidate.as_ref().is_some_and(|c| c.stage == Stage::Shadowing);
         let outputs = roster.active.plan.outputs.iter().zip(&roster.take_over_ticks);
-        let has_sent = |(output, &tick): (&bus::plan::OutputPlan, &u32)| {
+        let has_sent = |(output, &tick): (&OutputPlan, &u32)| {
             let period_ticks = u64::from(self.plan.topics[output.topic].period_ticks);
             let first_due = u64::from(tick).next_multiple_of(period_ticks);
             u64::from(self.control.ticks_sent(output.topic)) > first_due

@@ -108,8 +108,7 @@ fn a_run_goes_on_after_every_kill_point_as_if_nothing_had_been() {
 
 fn strike(case: &Case, reference: &str) {
     let place = Place::new();
-    let (manifest, recording) =
-        (write_manifest(&place, &case.policy.tables()), place.path("flight.mcap"));
+    let (manifest, recording) = (write_manifest(&place, &case.policy.tables()), place.path("flight.mcap"));
     let launch = start(case, &place, &manifest, &recording);
     let watched = Watched::attach(&place);
     deliver(case, &place, &watched);
