@@ -34,6 +34,7 @@ mod recordings;
 mod refusals;
 mod replay;
 mod rights;
+#[allow(dead_code, reason = "shared with tests/faults")]
 mod support;
 mod swap;
 mod terminal;
