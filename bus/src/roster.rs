@@ -83,7 +83,11 @@ impl Roster {
     pub fn store(&self, run_dir: &Path) -> Result<(), BusError> {
         let path = path(run_dir, self.epoch);
         let text = serde_json::to_string(self).unwrap_or_else(|error| unreachable!("{error}"));
-        std::fs::write(&path, text).map_err(|source| BusError::File { action: "write", path, source })?;
+        // It may replace one that a process is about to read.
+        let new = path.with_extension("new");
+        std::fs::write(&new, text)
+            .and_then(|()| std::fs::rename(&new, &path))
+            .map_err(|source| BusError::File { action: "write", path, source })?;
         if let Some(old) = self.epoch.checked_sub(2) {
             let _ = std::fs::remove_file(self::path(run_dir, old));
         }
