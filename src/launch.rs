@@ -414,7 +414,10 @@ impl Supervisor<'_> {
         if vacant {
             let ticks = self.control.completed_ticks();
             self.tell(Event::Died { policy: OnExit::Stop, is_possible: false })?;
-            return self.abort(format!("{reason}\nThe run was aborted at tick {ticks}"));
+            return self.abort(format!(
+                "{reason}\nThe run was aborted at tick {ticks}: it came in the place of a process that had died, \
+                 and completed no tick"
+            ));
         }
         Ok(())
     }

@@ -2,7 +2,7 @@
 
 use crate::saboteur;
 use crate::support::{Launch, Place, poll, repository};
-use bus::control::{Control, Seat};
+use bus::control::{Control, Phase, Seat};
 use bus::plan::Plan;
 use bus::roster::{NodeRoster, Roster};
 use recorder::reader::Recording;
@@ -152,6 +152,22 @@ impl Watched {
             let seat = self.control.seat(self.plan.member(node, generation));
             (seat == Seat::Taken).then_some(generation)
         })
+    }
+
+    /// Waits until the process `generation` of `node` flies.
+    pub fn await_active(&self, place: &Place, node: usize, generation: u32) {
+        let is_active = || (self.roster(place, node).active.generation == generation).then_some(());
+        self.look("the successor has not taken over", is_active);
+    }
+
+    /// Waits until `member` is ready for `phase`.
+    pub fn await_ready(&self, member: usize, phase: Phase) {
+        self.look("a process is not ready", || self.control.is_ready(member, phase).then_some(()));
+    }
+
+    /// Waits until the seat of `member` is as far as `seat`.
+    pub fn await_seat(&self, member: usize, seat: Seat) {
+        self.look("a seat was not taken", || (self.control.seat(member) == seat).then_some(()));
     }
 
     /// Ticks of the node that is `ahead` of all others that send, or behind.

@@ -138,7 +138,7 @@ fn strike(case: &Case, reference: &str) -> u32 {
     let launch = start(case, &place, &["run", &manifest, "--record", &recording]);
     let watched = Watched::attach(&place);
     let sent_before = deliver(case, &place, &launch, &watched);
-    let ended = end(case, &place, launch);
+    let ended = end(&place, launch, case.victim == Process::Launcher && !case.is_request());
     require_stopped(case, &watched, &ended);
     let recorded = recorded_ticks(case, &place, &recording, reference);
     require_bounded_loss(case, &watched, sent_before, recorded)
@@ -176,9 +176,9 @@ fn deliver(case: &Case, place: &Place, launch: &Launch<'_>, watched: &Watched) -
     sent_before
 }
 
-/// Waits for the end; nothing may be left behind.
-fn end(case: &Case, place: &Place, launch: Launch<'_>) -> Ended {
-    if case.victim != Process::Launcher || case.is_request() {
+/// Waits for the end; nothing may be left behind, but files where the launcher was killed.
+pub fn end(place: &Place, launch: Launch<'_>, launcher_was_killed: bool) -> Ended {
+    if !launcher_was_killed {
         return launch.end();
     }
     let launcher = launch.id();
