@@ -395,7 +395,10 @@ impl Supervisor<'_> {
                 }
                 if self.tell(Event::SuccessorFailed)? == Action::Refuse {
                     let tick = self.control.done(self.plan.member(node, generation));
-                    let reason = format!("{} (it had come to tick {tick})", death.words);
+                    let reason = match self.successions.stage(node) {
+                        Some(Stage::Starting) => format!("{} (it had not joined yet)", death.words),
+                        _ => format!("{} (it had come to tick {tick})", death.words),
+                    };
                     self.refuse(node, reason)?;
                 }
                 Ok(true)
@@ -482,7 +485,9 @@ impl Supervisor<'_> {
     fn note_laggards(&mut self) {
         if let Some((node, generation)) = self.successions.unprepared() {
             let patience = self.successions.program_of(node, generation).watchdog.as_millis();
-            let words = format!("was killed by the watchdog: it did not come up within {patience} ms");
+            let words = format!(
+                "was killed by the watchdog: it did not come up within {patience} ms; does it link `bus` and connect?"
+            );
             self.processes.kill(node, generation, Some(words));
         }
         if let Some((node, generation)) = self.successions.lingering(&self.processes) {

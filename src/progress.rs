@@ -48,5 +48,9 @@ impl Progress {
     pub fn finish(&self, control: &Control) {
         self.bar.set_position(u64::from(control.completed_ticks()));
         self.bar.abandon();
+        if !self.bar.is_hidden() {
+            // What is printed next starts on a line of its own.
+            eprintln!();
+        }
     }
 }

@@ -59,7 +59,11 @@ pub fn run(
         }
         graph.successors.push(shadow);
     }
-    let path = recording_path(&manifest, arguments.record.as_deref())?;
+    let mut path = recording_path(&manifest, arguments.record.as_deref())?;
+    if extra_shadow.is_some() && arguments.record.is_none() {
+        // That of the manifest itself stays as it is.
+        path.set_extension("shadow.mcap");
+    }
     let has_recorder = graph.programs.iter().any(Program::is_recorder);
     let mut outcome = launch::fly(&manifest, &mut graph, &path, arguments.json)?;
     let flight = outcome.flight.take();

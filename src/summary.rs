@@ -146,19 +146,37 @@ impl fmt::Display for Summary {
         if let Some(recording) = &self.recording {
             writeln!(f, "  recording: {}", recording.display())?;
         }
-        write!(f, "{}", if self.passed { "passed" } else { "FAILED" })
+        self.write_verdict(f)
     }
 }
 
 impl Summary {
+    /// Those that were refused are never left out.
     fn write_successions(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        for succession in self.successions.iter().take(SUCCESSIONS_SHOWN) {
+        let is_shown = |&(index, succession): &(usize, &Succession)| {
+            index < SUCCESSIONS_SHOWN || succession.report.refused.is_some()
+        };
+        let mut shown = 0;
+        for (_, succession) in self.successions.iter().enumerate().filter(is_shown) {
             writeln!(f, "  {}", DisplayReport(&succession.report))?;
             succession.steps.iter().try_for_each(|step| writeln!(f, "{step}"))?;
+            shown += 1;
         }
-        match self.successions.len().saturating_sub(SUCCESSIONS_SHOWN) {
+        match self.successions.len() - shown {
             0 => Ok(()),
             more => writeln!(f, "  … and {more} more; --json has them all"),
+        }
+    }
+
+    fn write_verdict(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let is_refused =
+            |succession: &&Succession| succession.report.is_planned && succession.report.refused.is_some();
+        let refused = self.successions.iter().filter(is_refused).count();
+        match (self.passed, refused) {
+            (true, _) => write!(f, "passed"),
+            (false, 0) => write!(f, "FAILED"),
+            (false, 1) => write!(f, "FAILED: a successor was refused"),
+            (false, _) => write!(f, "FAILED: {refused} successors were refused"),
         }
     }
 }
@@ -194,7 +212,11 @@ impl fmt::Display for DisplayReport<'_> {
             )?;
         }
         match &report.refused {
-            Some(reason) => write!(f, ": REFUSED: {}", reason.lines().next().unwrap_or_default()),
+            Some(reason) => {
+                // Its last words stand below how it ended.
+                let lines: Vec<&str> = reason.lines().map(str::trim).take(3).collect();
+                write!(f, ": REFUSED: {}", lines.join("; "))
+            }
             None => Ok(()),
         }
     }

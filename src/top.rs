@@ -42,6 +42,9 @@ const LOOKS: usize = 5;
 /// The same for `--once`.
 const ONCE: Duration = Duration::from_millis(500);
 
+/// How long the drawing has to end after a signal.
+const LEAVE: Duration = Duration::from_secs(2);
+
 /// The arguments of `hummingbus top`.
 #[derive(Args)]
 pub struct TopArguments {
@@ -79,8 +82,14 @@ pub fn top(arguments: &TopArguments) -> Result<()> {
 fn watch(run: &Arc<LiveRun>, source: &Source) -> Result<()> {
     let is_terminated = Arc::new(AtomicBool::new(false));
     let flag = is_terminated.clone();
-    // Without it a signal would leave the terminal as it is while we draw.
-    ctrlc::set_handler(move || flag.store(true, Ordering::SeqCst))?;
+    // Without it a signal would leave the terminal as it is while we draw. Where the terminal itself is gone, the
+    // reader of its keys does not come back: then it is left behind.
+    ctrlc::set_handler(move || {
+        flag.store(true, Ordering::SeqCst);
+        std::thread::sleep(LEAVE);
+        ratatui::restore();
+        std::process::exit(1);
+    })?;
     let mut terminal = ratatui::try_init()?;
     let result = draw_until_left(&mut terminal, Keys::new(run), source, &is_terminated);
     ratatui::try_restore()?;

@@ -17,6 +17,8 @@ use std::path::{Path, PathBuf};
 const CHUNK_BYTES: usize = 1024 * 1024;
 /// zstd level 1: on a run's numbers, higher levels cost more time than they save space.
 const ZSTD_LEVEL: u32 = 1;
+/// The bytes with which an MCAP file starts (its specification, "Magic").
+const MAGIC: &[u8] = b"\x89MCAP0\r\n";
 const FILE_BUFFER_BYTES: usize = 1024 * 1024;
 
 /// A recording being written.
@@ -40,6 +42,10 @@ impl RecordingWriter {
         let fail = |source| RecordingError::File { action: "create", path: path.to_owned(), source };
         // A file of its own: who reads the old one, mapped, keeps it whole.
         match std::fs::symlink_metadata(path) {
+            Ok(old) if old.is_file() && !is_replaceable(path) => {
+                let words = "it is a file that is no recording, and would be lost; name another file";
+                return Err(fail(std::io::Error::other(words)));
+            }
             Ok(old) if old.is_file() || old.is_symlink() => std::fs::remove_file(path).map_err(fail)?,
             // Removing a device, as root, would take it from the whole machine.
             Ok(_) => return Err(fail(std::io::Error::other("it exists and is not a regular file"))),
@@ -142,6 +148,14 @@ impl RecordingWriter {
 }
 
 /// The error with its deepest cause, which says what the system refused.
+/// Whether a recording may take the place of the file at `path`: one that is empty or starts as a recording does.
+fn is_replaceable(path: &Path) -> bool {
+    use std::io::Read as _;
+    let mut start = Vec::new();
+    let read = File::open(path).and_then(|file| file.take(MAGIC.len() as u64).read_to_end(&mut start));
+    read.is_ok() && MAGIC.starts_with(&start)
+}
+
 fn write_error(path: &Path, error: &mcap::McapError) -> RecordingError {
     let mut cause: &dyn std::error::Error = error;
     while let Some(deeper) = cause.source() {

@@ -339,6 +339,8 @@ pub fn require_replaceable(manifest: &Manifest, member: &Member<'_>, node: &Node
 pub fn irreplaceable(member: &Member<'_>, node: &NodePlan) -> Option<&'static str> {
     if member.program.is_recorder() {
         Some("it is the recorder, and its file would be torn")
+    } else if matches!(member.program.executable, Executable::Kind(kind) if kind.name == "plant") {
+        Some("it is the plant, whose motion is not handed over: the vehicle would start anew")
     } else if node.outputs.is_empty() {
         Some("it has no outputs, so nothing could be handed over")
     } else {
