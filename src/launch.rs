@@ -486,7 +486,7 @@ impl Supervisor<'_> {
         if let Some((node, generation)) = self.successions.unprepared() {
             let patience = self.successions.program_of(node, generation).watchdog.as_millis();
             let words = format!(
-                "was killed by the watchdog: it did not come up within {patience} ms; does it link `bus` and connect?"
+                "was killed by the watchdog: it did not join within {patience} ms; does it link `bus` and connect?"
             );
             self.processes.kill(node, generation, Some(words));
         }

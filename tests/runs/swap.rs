@@ -166,7 +166,10 @@ fn a_live_swap_that_cannot_be_is_refused_and_the_run_flies_on() {
     let cases: [(&[&str], &str); 4] = [
         (&["--with", "command = [\"/bin/true\"]"], "exit code 0"),
         (&["--with", &format!("command = [{not_a_program:?}]")], "cannot start"),
-        (&["--with", "command = [\"/bin/sleep\", \"600\"]\nwatchdog_ms_host = 300"], "did not come up"),
+        (
+            &["--with", "command = [\"/bin/sleep\", \"600\"]\nwatchdog_ms_host = 300"],
+            "did not join within 300 ms",
+        ),
         (&["--shadow-ticks", "4294967295"], "4294967295 ticks"),
     ];
     for (words, reason) in cases {
