@@ -292,7 +292,8 @@ fn deliver(case: &Case, place: &Place, launch: &Launch<'_>, watched: &Watched) -
             if is_between { Stage::Between } else { stage }
         }
         Moment::Flight(tick) => {
-            let stage = stage_at(tick);
+            // The clock waits there until it has joined.
+            let stage = if tick == JOIN_TICK { Stage::Joining } else { stage_at(tick) };
             watched.control.set_hold_tick(match stage {
                 Stage::Starting => JOIN_TICK - 1,
                 _ if tick < TAKE_OVER_TICK => TAKE_OVER_TICK - 1,
