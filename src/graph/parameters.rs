@@ -10,7 +10,7 @@ use std::path::PathBuf;
 use toml::Spanned;
 
 /// Gives `node` the parameters of `member`, files resolved, checked where its kind is built in; notes its
-/// vehicle and scene file in `models`.
+/// vehicle, scene and gains file in `models`.
 ///
 /// # Errors
 /// A file or a parameter that is refused.
@@ -44,8 +44,13 @@ pub fn set(
 }
 
 /// The keys of a process that name a file which becomes a parameter.
-fn files(process: &Process) -> [(&'static str, &Option<Spanned<String>>); 3] {
-    [("vehicle", &process.vehicle), ("scene", &process.scene), ("data", &process.data)]
+fn files(process: &Process) -> [(&'static str, &Option<Spanned<String>>); 4] {
+    [
+        ("vehicle", &process.vehicle),
+        ("scene", &process.scene),
+        ("gains", &process.gains),
+        ("data", &process.data),
+    ]
 }
 
 /// A recorder's file and attachments come from the launcher.
@@ -78,7 +83,7 @@ fn refused(manifest: &Manifest, name: &Spanned<String>, process: &Process, reaso
         .or(named_file)
         .unwrap_or_else(|| name.span());
     let help = match reason.split('`').nth(1).filter(|_| reason.starts_with("missing field")) {
-        Some(file @ ("vehicle" | "scene" | "data")) => {
+        Some(file @ ("vehicle" | "scene" | "gains" | "data")) => {
             format!("add {file} = \"PATH\" to [process.{}]", name.get_ref())
         }
         Some(key) => format!("add {key} = … to [process.{}.parameters]", name.get_ref()),
