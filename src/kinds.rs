@@ -3,8 +3,9 @@
 use bus::kind::NodeKind;
 
 /// Every built-in kind, in alphabetical order.
-pub const KINDS: [&NodeKind; 7] = [
+pub const KINDS: [&NodeKind; 8] = [
     &sensors::attitude::KIND,
+    &sensors::clearance::KIND,
     &sensors::imu::KIND,
     &controllers::pid::KIND,
     &controllers::pilot::KIND,

@@ -6,10 +6,12 @@
 //! - [`imu_model`]: accelerometer and gyroscope.
 //! - [`complementary`]: attitude from an IMU's readings.
 //! - [`imu`], [`attitude`]: the same as processes of a run.
+//! - [`clearance`]: true distances to the scene, for judging.
 //! - [`parameter`]: the error for a parameter outside its range.
 #![forbid(unsafe_code)]
 
 pub mod attitude;
+pub mod clearance;
 pub mod complementary;
 pub mod imu;
 pub mod imu_model;
