@@ -3,7 +3,7 @@
 use bus::kind::NodeKind;
 
 /// Every built-in kind, in alphabetical order.
-pub const KINDS: [&NodeKind; 8] = [
+pub const KINDS: &[&NodeKind] = &[
     &sensors::attitude::KIND,
     &sensors::clearance::KIND,
     &sensors::imu::KIND,
@@ -16,10 +16,10 @@ pub const KINDS: [&NodeKind; 8] = [
 
 /// The kind named `name`.
 pub fn find(name: &str) -> Option<&'static NodeKind> {
-    KINDS.into_iter().find(|kind| kind.name == name)
+    KINDS.iter().copied().find(|kind| kind.name == name)
 }
 
 /// The names of all kinds, for messages.
 pub fn names() -> String {
-    KINDS.map(|kind| kind.name).join(", ")
+    KINDS.iter().map(|kind| kind.name).collect::<Vec<_>>().join(", ")
 }
