@@ -7,10 +7,12 @@ pub const KINDS: &[&NodeKind] = &[
     &sensors::attitude::KIND,
     &sensors::clearance::KIND,
     &sensors::imu::KIND,
+    &sensors::mocap::KIND,
     &controllers::pid::KIND,
     &controllers::pilot::KIND,
     &plant::node::KIND,
     &controllers::player::KIND,
+    &sensors::range::KIND,
     &recorder::node::KIND,
 ];
 
