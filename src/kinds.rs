@@ -3,13 +3,14 @@
 use bus::kind::NodeKind;
 
 /// Every built-in kind, in alphabetical order.
-pub const KINDS: [&NodeKind; 7] = [
+pub const KINDS: [&NodeKind; 8] = [
     &sensors::attitude::KIND,
     &sensors::imu::KIND,
     &controllers::pid::KIND,
     &controllers::pilot::KIND,
     &plant::node::KIND,
     &controllers::player::KIND,
+    &sensors::range_inertial::KIND,
     &recorder::node::KIND,
 ];
 

@@ -6,6 +6,7 @@
 //! - [`imu_model`]: accelerometer and gyroscope.
 //! - [`complementary`]: attitude from an IMU's readings.
 //! - [`imu`], [`attitude`]: the same as processes of a run.
+//! - [`range_inertial`]: velocity, height and walls from range finders, an IMU and an attitude.
 //! - [`parameter`]: the error for a parameter outside its range.
 #![forbid(unsafe_code)]
 
@@ -15,4 +16,5 @@ pub mod imu;
 pub mod imu_model;
 pub mod noise;
 pub mod parameter;
+pub mod range_inertial;
 pub mod units;
