@@ -13,6 +13,7 @@ pub const KINDS: &[&NodeKind] = &[
     &plant::node::KIND,
     &controllers::player::KIND,
     &sensors::range::KIND,
+    &sensors::range_inertial::KIND,
     &recorder::node::KIND,
 ];
 

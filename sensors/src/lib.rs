@@ -12,6 +12,7 @@
 //! - `steps`: what is left of a value at a resolution.
 //! - `channel`: when sensors measure, and how measurements are delayed and lost.
 //! - `wire`: the vectors of messages as those of nalgebra.
+//! - [`range_inertial`]: velocity, height and walls from range finders, an IMU and an attitude.
 //! - [`parameter`]: the error for a parameter outside its range.
 #![forbid(unsafe_code)]
 
@@ -27,5 +28,6 @@ pub mod noise;
 pub mod parameter;
 pub mod range;
 mod steps;
+pub mod range_inertial;
 pub mod units;
 mod wire;
