@@ -17,8 +17,8 @@
 #![forbid(unsafe_code)]
 
 pub mod attitude;
-pub mod clearance;
 mod channel;
+pub mod clearance;
 pub mod complementary;
 pub mod cone;
 pub mod imu;
@@ -27,7 +27,7 @@ pub mod mocap;
 pub mod noise;
 pub mod parameter;
 pub mod range;
-mod steps;
 pub mod range_inertial;
+mod steps;
 pub mod units;
 mod wire;

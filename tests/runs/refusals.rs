@@ -27,6 +27,7 @@ inputs.state = "/plant/state"
 
 [process.mocap]
 kind = "mocap"
+period_ticks = 5
 inputs.state = "/plant/state"
 
 [process.ekf]
