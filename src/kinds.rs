@@ -3,9 +3,13 @@
 use bus::kind::NodeKind;
 
 /// Every built-in kind, in alphabetical order.
-pub const KINDS: [&NodeKind; 9] = [
+pub const KINDS: [&NodeKind; 13] = [
     &sensors::attitude::KIND,
+    &sensors::barometer::KIND,
+    &sensors::battery::KIND,
+    &sensors::gps::KIND,
     &sensors::imu::KIND,
+    &sensors::magnetometer::KIND,
     &sensors::mocap::KIND,
     &controllers::pid::KIND,
     &controllers::pilot::KIND,
