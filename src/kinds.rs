@@ -5,8 +5,12 @@ use bus::kind::NodeKind;
 /// Every built-in kind, in alphabetical order.
 pub const KINDS: &[&NodeKind] = &[
     &sensors::attitude::KIND,
+    &sensors::barometer::KIND,
+    &sensors::battery::KIND,
     &sensors::clearance::KIND,
+    &sensors::gps::KIND,
     &sensors::imu::KIND,
+    &sensors::magnetometer::KIND,
     &sensors::mocap::KIND,
     &controllers::pid::KIND,
     &controllers::pilot::KIND,
