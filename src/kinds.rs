@@ -3,13 +3,15 @@
 use bus::kind::NodeKind;
 
 /// Every built-in kind, in alphabetical order.
-pub const KINDS: [&NodeKind; 8] = [
+pub const KINDS: [&NodeKind; 10] = [
     &sensors::attitude::KIND,
     &sensors::imu::KIND,
+    &sensors::mocap::KIND,
     &controllers::pid::KIND,
     &controllers::pilot::KIND,
     &plant::node::KIND,
     &controllers::player::KIND,
+    &sensors::range::KIND,
     &sensors::range_inertial::KIND,
     &recorder::node::KIND,
 ];

@@ -6,15 +6,26 @@
 //! - [`imu_model`]: accelerometer and gyroscope.
 //! - [`complementary`]: attitude from an IMU's readings.
 //! - [`imu`], [`attitude`]: the same as processes of a run.
+//! - [`mocap`]: motion capture.
+//! - [`range`], [`cone`]: five range finders, and what their beams meet.
 //! - [`range_inertial`]: velocity, height and walls from range finders, an IMU and an attitude.
+//! - `steps`: what is left of a value at a resolution.
+//! - `channel`: when sensors measure, and how measurements are delayed and lost.
+//! - `wire`: the vectors of messages as those of nalgebra.
 //! - [`parameter`]: the error for a parameter outside its range.
 #![forbid(unsafe_code)]
 
 pub mod attitude;
+mod channel;
 pub mod complementary;
+pub mod cone;
 pub mod imu;
 pub mod imu_model;
+pub mod mocap;
 pub mod noise;
 pub mod parameter;
+pub mod range;
 pub mod range_inertial;
+mod steps;
 pub mod units;
+mod wire;
