@@ -3,8 +3,9 @@
 use bus::kind::NodeKind;
 
 /// Every built-in kind, in alphabetical order.
-pub const KINDS: [&NodeKind; 10] = [
+pub const KINDS: [&NodeKind; 11] = [
     &sensors::attitude::KIND,
+    &sensors::ekf::KIND,
     &sensors::imu::KIND,
     &sensors::mocap::KIND,
     &controllers::pid::KIND,

@@ -8,6 +8,7 @@
 //! - [`imu`], [`attitude`]: the same as processes of a run.
 //! - [`mocap`]: motion capture.
 //! - [`range`], [`cone`]: five range finders, and what their beams meet.
+//! - [`ekf`]: position, velocity and attitude from an IMU, GPS or motion capture, barometer, magnetometer.
 //! - [`range_inertial`]: velocity, height and walls from range finders, an IMU and an attitude.
 //! - `steps`: what is left of a value at a resolution.
 //! - `channel`: when sensors measure, and how measurements are delayed and lost.
@@ -19,6 +20,7 @@ pub mod attitude;
 mod channel;
 pub mod complementary;
 pub mod cone;
+pub mod ekf;
 pub mod imu;
 pub mod imu_model;
 pub mod mocap;
