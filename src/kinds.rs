@@ -8,6 +8,7 @@ pub const KINDS: &[&NodeKind] = &[
     &sensors::barometer::KIND,
     &sensors::battery::KIND,
     &sensors::clearance::KIND,
+    &sensors::ekf::KIND,
     &sensors::gps::KIND,
     &sensors::imu::KIND,
     &sensors::magnetometer::KIND,

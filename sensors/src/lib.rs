@@ -13,10 +13,11 @@
 //! - [`magnetometer`], [`earth_field`]: the earth's magnetic field, at the vehicle and in the world.
 //! - [`range`], [`cone`]: five range finders, and what their beams meet.
 //! - [`battery`]: voltage, current and charge.
+//! - [`ekf`]: position, velocity and attitude from an IMU, GPS or motion capture, barometer, magnetometer.
+//! - [`range_inertial`]: velocity, height and walls from range finders, an IMU and an attitude.
 //! - `steps`: what is left of a value at a resolution.
 //! - `channel`: when sensors measure, and how measurements are delayed and lost.
 //! - `wire`: the vectors of messages as those of nalgebra.
-//! - [`range_inertial`]: velocity, height and walls from range finders, an IMU and an attitude.
 //! - [`parameter`]: the error for a parameter outside its range.
 //! - `testing`: what the tests of sensors share.
 #![forbid(unsafe_code)]
@@ -31,6 +32,7 @@ pub mod complementary;
 pub mod cone;
 pub mod earth_field;
 pub mod gps;
+pub mod ekf;
 pub mod imu;
 pub mod imu_model;
 pub mod magnetometer;

@@ -6,11 +6,11 @@ pub mod filter;
 pub mod params;
 
 use crate::imu_model::ImuReading;
+use crate::wire::{attitude as rotation, vector, vector_message};
 use bus::kind::{Inputs, NodeKind, PortSpec, read_parameters};
-use bus::messages::{AttitudeEstimate, Imu, Ranges, StateEstimate, Vector3, WallEstimate};
+use bus::messages::{AttitudeEstimate, Imu, Ranges, StateEstimate, WallEstimate};
 use bus::{BusError, Message, Node};
 use filter::{RangeInertial, RangeInertialState};
-use nalgebra::UnitQuaternion;
 use params::RangeInertialParams;
 
 /// The range-inertial estimator, for manifests.
@@ -47,7 +47,7 @@ fn run() -> Result<(), BusError> {
         let inputs = filter::Inputs {
             now_ns: tick.time_ns(),
             imu: reading(tick.get(imu)),
-            attitude_WB: rotation(&attitude),
+            attitude_WB: rotation(attitude.attitude),
             ranges: tick.get(ranges),
         };
         filter.step(state, &inputs);
@@ -58,14 +58,9 @@ fn run() -> Result<(), BusError> {
 
 fn reading(imu: &Imu) -> ImuReading {
     ImuReading {
-        specific_force_B_m_s2: <[f64; 3]>::from(imu.specific_force).into(),
-        angular_velocity_B_rad_s: <[f64; 3]>::from(imu.angular_velocity).into(),
+        specific_force_B_m_s2: vector(imu.specific_force),
+        angular_velocity_B_rad_s: vector(imu.angular_velocity),
     }
-}
-
-fn rotation(estimate: &AttitudeEstimate) -> UnitQuaternion<f64> {
-    let q = estimate.attitude;
-    UnitQuaternion::new_unchecked(nalgebra::Quaternion::new(q.w, q.x, q.y, q.z))
 }
 
 fn wall_estimate(filter: &RangeInertial, state: &RangeInertialState, yaw_rad: f64) -> WallEstimate {
@@ -85,14 +80,13 @@ fn state_estimate(
     state: &RangeInertialState,
     attitude: &AttitudeEstimate,
 ) -> StateEstimate {
-    let vector = |v: nalgebra::Vector3<f64>| Vector3::from(<[f64; 3]>::from(v));
     StateEstimate {
-        position: vector(state.position_W_m()),
-        velocity: vector(state.velocity_W_m_s()),
+        position: vector_message(state.position_W_m()),
+        velocity: vector_message(state.velocity_W_m_s()),
         attitude: attitude.attitude,
         angular_velocity: attitude.angular_velocity,
-        position_sigma: vector(state.position_sigma_W_m()),
-        velocity_sigma: vector(state.velocity_sigma_W_m_s()),
+        position_sigma: vector_message(state.position_sigma_W_m()),
+        velocity_sigma: vector_message(state.velocity_sigma_W_m_s()),
         attitude_sigma: [filter.attitude_sigma_rad(); 3].into(),
         ..Default::default()
     }

@@ -18,7 +18,7 @@ use support::{Manoeuvre, PERIOD_NS, PERIOD_S, Truth, fly, pulse};
 
 const REACH_M: f64 = 7.65;
 const RANGE_PERIOD: usize = 100;
-const LATENCY: usize = 40;
+const LATENCY: usize = 50;
 const SEEDS: std::ops::Range<u64> = 0..20;
 
 /// Walls at right angles to the axes, where they are: ahead and behind along x, ahead and behind along y.
@@ -46,7 +46,7 @@ fn range_m(truth: &Truth, direction_B: Vector3<f64>, walls: [Option<f64>; 4], ra
     let met = walls.chain([plane(0.0, 2)]).filter(|distance| *distance > 0.0);
     let noise: f64 = StandardNormal.sample(random);
     let nearest_m = met.fold(f64::INFINITY, f64::min);
-    ((nearest_m + 0.005 * noise).min(REACH_M) * 100.0).round() / 100.0
+    ((nearest_m + 0.01 * noise).min(REACH_M) * 100.0).round() / 100.0
 }
 
 fn ranges(truth: &Truth, measured_ns: u64, walls: [Option<f64>; 4], random: &mut Stream) -> Ranges {
@@ -64,7 +64,7 @@ fn estimate(flight: &[Truth], room: Room, seed: u64, mut judge: impl FnMut(&Run)
     let complementary = Complementary::new(ComplementaryParams::default(), PERIOD_S).unwrap();
     let mut attitude_state = ComplementaryState::default();
     let initial_height_m = flight[0].position_W_m.z;
-    let params = RangeInertialParams { initial_height_m, ..Default::default() };
+    let params = RangeInertialParams { initial_height_m, half_angle_deg: 0.0, ..Default::default() };
     let filter = RangeInertial::new(params, PERIOD_S).unwrap();
     let mut state = filter.initial_state();
     let mut random = stream(seed, "range");

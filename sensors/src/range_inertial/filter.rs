@@ -19,6 +19,7 @@ use super::axis::{Axis, Echo, Side};
 use super::params::RangeInertialParams;
 use crate::imu_model::ImuReading;
 use crate::parameter::{ParameterError, positive};
+use crate::wire::{attitude, attitude_message, vector, vector_message};
 use bus::Message;
 use bus::messages::{Quaternion, Ranges, Vector3 as Vector3Message};
 use nalgebra::{UnitQuaternion, Vector3};
@@ -152,7 +153,7 @@ impl RangeInertial {
         let gravity_W = Vector3::new(0.0, 0.0, self.params.gravity_m_s2);
         let acceleration_W = inputs.attitude_WB * force_B - gravity_W;
         let last_W = if state.samples == 0 { acceleration_W } else { vector(state.acceleration) };
-        state.acceleration = <[f64; 3]>::from(acceleration_W).into();
+        state.acceleration = vector_message(acceleration_W);
         if state.samples == 0 {
             return;
         }
@@ -198,7 +199,7 @@ impl RangeInertial {
         beam: usize,
         reading_m: f64,
     ) -> Option<(usize, Side, f64, f64)> {
-        let beam_W = attitude(&past.attitude) * beam_B(beam);
+        let beam_W = attitude(past.attitude) * beam_B(beam);
         let (axis, side) = if beam == DOWN { (2, Side::Behind) } else { facing(&beam_W) };
         let cosine = if beam == DOWN { -beam_W.z } else { beam_W[axis].abs() };
         let angle_rad = cosine.clamp(-1.0, 1.0).acos();
@@ -208,25 +209,25 @@ impl RangeInertial {
         if beam != DOWN && reading_m > FLOOR_MARGIN * self.floor_m(state, &beam_W) {
             return None;
         }
-        let incidence_rad = (angle_rad - self.params.cone_half_angle_rad).max(0.0);
+        let incidence_rad = (angle_rad - self.params.half_angle_deg.to_radians()).max(0.0);
         let (reading_m, sigma_m) = self.reading(reading_m);
         let turn_sigma_m = reading_m * incidence_rad.sin() * self.params.attitude_sigma_rad;
         Some((axis, side, reading_m * incidence_rad.cos(), sigma_m.hypot(turn_sigma_m)))
     }
 
-    /// A reading and its standard deviation; one of the dead zone says only that something is in it.
+    /// A reading and its standard deviation; the nearest says only that something is within it.
     fn reading(&self, reading_m: f64) -> (f64, f64) {
-        let dead_zone_m = self.params.dead_zone_m;
-        if reading_m > dead_zone_m {
+        let nearest_m = self.params.nearest_m;
+        if reading_m > nearest_m {
             return (reading_m, self.params.range_sigma_m);
         }
-        // The mean and the standard deviation of what is anywhere from 0 to the dead zone's end.
-        (0.5 * dead_zone_m, self.params.range_sigma_m.hypot(dead_zone_m / 12.0_f64.sqrt()))
+        // The mean and the standard deviation of what is anywhere from 0 to the nearest reading.
+        (0.5 * nearest_m, self.params.range_sigma_m.hypot(nearest_m / 12.0_f64.sqrt()))
     }
 
     /// How far a beam's lower edge goes before it meets the floor, m.
     fn floor_m(&self, state: &RangeInertialState, beam_W: &Vector3<f64>) -> f64 {
-        let dive_rad = self.params.cone_half_angle_rad - beam_W.z.clamp(-1.0, 1.0).asin();
+        let dive_rad = self.params.half_angle_deg.to_radians() - beam_W.z.clamp(-1.0, 1.0).asin();
         if dive_rad > 0.0 { state.height_m() / dive_rad.sin() } else { f64::INFINITY }
     }
 
@@ -303,9 +304,9 @@ impl RangeInertialState {
     }
 
     fn remember(&mut self, attitude_WB: &UnitQuaternion<f64>) {
-        let [x, y, z, w] = attitude_WB.coords.into();
         let path = self.axes.map(|axis| axis.path).into();
-        self.past[self.samples as usize % PAST] = Past { path, attitude: Quaternion { x, y, z, w } };
+        let attitude = attitude_message(*attitude_WB);
+        self.past[self.samples as usize % PAST] = Past { path, attitude };
         self.samples += 1;
     }
 
@@ -335,13 +336,4 @@ fn facing(direction_W: &Vector3<f64>) -> (usize, Side) {
 
 fn turn(yaw_rad: f64) -> UnitQuaternion<f64> {
     UnitQuaternion::from_axis_angle(&Vector3::z_axis(), yaw_rad)
-}
-
-fn vector(message: Vector3Message) -> Vector3<f64> {
-    Vector3::from(<[f64; 3]>::from(message))
-}
-
-fn attitude(message: &Quaternion) -> UnitQuaternion<f64> {
-    let Quaternion { x, y, z, w } = *message;
-    UnitQuaternion::new_unchecked(nalgebra::Quaternion::new(w, x, y, z))
 }

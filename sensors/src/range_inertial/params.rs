@@ -8,16 +8,16 @@ use serde::Deserialize;
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct RangeInertialParams {
-    /// Standard deviation of a range, m. Default 0.01: the resolution of the MaxBotix MB1300 (thesis §5.5)
-    /// is 1 cm, of which rounding alone makes 0.0029 m; the rest is for what its data sheet leaves out.
+    /// Standard deviation of a range, m. Default 0.0104: the noise of the kind `range`, 0.01 m, and rounding
+    /// to its centimetre, 0.01 m / √12.
     pub range_sigma_m: f64,
     /// What a range finder reads where it meets nothing, m. Default 7.65, the MB1300 (thesis §5.5).
     pub reach_m: f64,
-    /// What a range finder reads of anything nearer than this, m. Default 0.20 (MB1300 data sheet).
-    pub dead_zone_m: f64,
-    /// Half the opening angle of a beam, rad: a wall that is turned by less is met at right angles.
-    /// Default 0.0, a thin beam.
-    pub cone_half_angle_rad: f64,
+    /// What a range finder reads of anything nearer, m. Default 0.20 (MB1300 data sheet).
+    pub nearest_m: f64,
+    /// Half angle of the beams' cones, degrees: a wall that is turned by less is met at right angles.
+    /// Default 5, as of the kind `range`.
+    pub half_angle_deg: f64,
     /// A range is left out if its beam meets the wall further than this from the right angle, rad.
     /// Default 0.6 (tuned, no source).
     pub incidence_max_rad: f64,
@@ -51,10 +51,10 @@ pub struct RangeInertialParams {
 impl Default for RangeInertialParams {
     fn default() -> Self {
         Self {
-            range_sigma_m: 0.01,
+            range_sigma_m: 0.0104,
             reach_m: 7.65,
-            dead_zone_m: 0.20,
-            cone_half_angle_rad: 0.0,
+            nearest_m: 0.20,
+            half_angle_deg: 5.0,
             incidence_max_rad: 0.6,
             gate_sigma: 5.0,
             sight_hold_s: 0.5,
@@ -91,8 +91,8 @@ impl RangeInertialParams {
 
     fn not_negative(&self) -> [(&'static str, f64); 8] {
         [
-            ("dead_zone_m", self.dead_zone_m),
-            ("cone_half_angle_rad", self.cone_half_angle_rad),
+            ("nearest_m", self.nearest_m),
+            ("half_angle_deg", self.half_angle_deg),
             ("attitude_sigma_rad", self.attitude_sigma_rad),
             ("accelerometer_noise_density_m_s2_sqrt_hz", self.accelerometer_noise_density_m_s2_sqrt_hz),
             ("acceleration_bias_walk_m_s3_sqrt_hz", self.acceleration_bias_walk_m_s3_sqrt_hz),
