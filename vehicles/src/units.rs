@@ -70,7 +70,8 @@ pub const PURE_NUMBER: Dimension = Dimension { name: "a pure number", units: &[(
 pub const RATIO: Dimension = Dimension { name: "a ratio", units: &[("1", 1.0), ("%", 1e-2)] };
 
 /// Velocities.
-pub const VELOCITY: Dimension = Dimension { name: "velocity", units: &[("m/s", 1.0), ("knot", 1852.0 / 3600.0)] };
+pub const VELOCITY: Dimension =
+    Dimension { name: "velocity", units: &[("m/s", 1.0), ("knot", 1852.0 / 3600.0)] };
 
 /// Torques.
 pub const TORQUE: Dimension = Dimension { name: "torque", units: &[("N*m", 1.0), ("N*mm", 1e-3)] };
@@ -83,7 +84,8 @@ pub const ROTARY_DAMPING: Dimension =
 pub const ROTARY_STIFFNESS: Dimension = Dimension { name: "torque per angle", units: &[("N*m/rad", 1.0)] };
 
 /// Masses times their distances from a point.
-pub const STATIC_MOMENT: Dimension = Dimension { name: "static moment", units: &[("kg*m", 1.0), ("g*m", 1e-3)] };
+pub const STATIC_MOMENT: Dimension =
+    Dimension { name: "static moment", units: &[("kg*m", 1.0), ("g*m", 1e-3)] };
 
 /// Forces linear in a rotor's speed and in that of the air.
 pub const ROTOR_DRAG: Dimension = Dimension {
