@@ -43,8 +43,13 @@ fn on_base(root: &Section, path: &Path) -> Result<Vehicle, VehicleError> {
     })?;
     let doc = Document::new(&file, &text);
     let tree = doc.tree()?;
-    // A base has no base itself, so that no chain of files can bite its tail.
-    let base = complete(&doc, &Section::new(&doc, String::new(), 0..0, tree.get_ref()))?;
+    let lower = Section::new(&doc, String::new(), 0..0, tree.get_ref());
+    if lower.has("base") {
+        // So no chain of files can bite its tail.
+        let expected = "a complete vehicle file as a base";
+        return Err(doc.bad(&lower.at_of("base"), "base", expected, "one that has a base itself"));
+    }
+    let base = complete(&doc, &lower)?;
     Ok(Vehicle { name, effects: [base.effects, more].concat(), ..base })
 }
 
@@ -105,6 +110,11 @@ fn inertia(section: &Section) -> Result<Matrix3<f64>, VehicleError> {
 
 fn product(section: &Section, name: &'static str) -> Result<f64, VehicleError> {
     if section.has(name) { Ok(section.quantity(name, INERTIA)?.si) } else { Ok(0.0) }
+}
+
+/// Whether a rigid body can have this tensor of inertia.
+pub fn is_rigid(inertia_kg_m2: &Matrix3<f64>) -> bool {
+    is_physical(&principal_moments(inertia_kg_m2))
 }
 
 /// A rigid body's principal moments are positive and satisfy the triangle inequality.

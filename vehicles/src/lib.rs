@@ -31,5 +31,6 @@ pub mod vehicle;
 pub use command::CommandMap;
 pub use effects::{EffectEntry, Stated};
 pub use error::{Place, VehicleError};
+pub use file::is_rigid;
 pub use provenance::{Provenance, Uncertainty};
 pub use vehicle::{MotorModel, Rotor, Spin, Vehicle};
