@@ -3,14 +3,18 @@
 use bus::kind::NodeKind;
 
 /// Every built-in kind, in alphabetical order.
-pub const KINDS: [&NodeKind; 7] = [
+pub const KINDS: [&NodeKind; 11] = [
     &sensors::attitude::KIND,
+    &controllers::cascade::KIND,
     &sensors::imu::KIND,
     &controllers::pid::KIND,
     &controllers::pilot::KIND,
     &plant::node::KIND,
     &controllers::player::KIND,
     &recorder::node::KIND,
+    &controllers::velocity::KIND,
+    &controllers::wall_follow::KIND,
+    &controllers::wall_stop::KIND,
 ];
 
 /// The kind named `name`.
