@@ -4,8 +4,8 @@
 //! - Command filter: roll and pitch are cut to ±30° and filtered, x'' = ω²(c − x) − 2ζω x'. The yaw command
 //!   turns towards the yaw that is asked for no faster than a yaw stick at full deflection would integrate
 //!   it, comes round at 360°, and is set to the measured yaw as long as no thrust is asked for.
-//! - Attitude loop: error of roll, pitch and yaw, times a gain, to their rates of change, and by the
-//!   kinematics of the z-y-x sequence to body rates (the inverse of thesis eq. 3.18).
+//! - Attitude loop: error of roll, pitch and yaw, times a gain, and a part of the filtered commands' own rates,
+//!   to their rates of change, and by the kinematics of the z-y-x sequence to body rates (the inverse of thesis eq. 3.18).
 //! - Rate loop: α = Kp·e + ∫Ki·e dt − Kd·dω/dt with e the error of a body rate; torque = inertia · α. The
 //!   cross product of rate and angular momentum is left to the loops.
 #![allow(non_snake_case, reason = "a trailing _B names the frame a vector is written in, _N the newton")]
@@ -60,7 +60,7 @@ impl CascadeLaw {
         }
         self.filter_commands(memory, set_point);
         let [roll_rad, pitch_rad, yaw_rad] = memory.attitude_command;
-        let rates_B_rad_s = self.rate_command_B_rad_s(&memory.attitude_command, measured);
+        let rates_B_rad_s = self.rate_command_B_rad_s(memory, measured);
         let torque_B_N_m = self.torque_B_N_m(memory, &rates_B_rad_s, measured);
         let thrust_N = self.altitude_loop().thrust_N(
             &mut memory.integrals.altitude_m_s2,
@@ -134,7 +134,8 @@ impl CascadeLaw {
     }
 
     /// Body rates that lead roll, pitch and yaw to `command`.
-    fn rate_command_B_rad_s(&self, command: &[f64; 3], measured: &Measurement) -> Vector3<f64> {
+    fn rate_command_B_rad_s(&self, memory: &ControllerState, measured: &Measurement) -> Vector3<f64> {
+        let command = &memory.attitude_command;
         let errors_rad = [
             wrap_rad(command[0] - measured.roll_rad),
             command[1] - measured.pitch_rad,
@@ -142,7 +143,9 @@ impl CascadeLaw {
         ];
         let [roll_rate, pitch_rate, yaw_rate]: [f64; 3] = std::array::from_fn(|axis| {
             let max_rad_s = self.gains.rate_max_rad_s[axis];
-            (self.gains.attitude_1_s[axis] * errors_rad[axis]).clamp(-max_rad_s, max_rad_s)
+            // The yaw command's own rate stays zero: yaw is slow.
+            let fed_rad_s = self.gains.rate_feed_forward * memory.attitude_command_rate[axis];
+            (self.gains.attitude_1_s[axis] * errors_rad[axis] + fed_rad_s).clamp(-max_rad_s, max_rad_s)
         });
         let (sin_roll, cos_roll) = measured.roll_rad.sin_cos();
         let (sin_pitch, cos_pitch) = measured.pitch_rad.sin_cos();
@@ -303,7 +306,8 @@ mod tests {
     #[test]
     fn a_yaw_rate_in_a_bank_needs_body_pitch_rate() {
         let banked = Measurement { roll_rad: 0.4, ..level() };
-        let rates = law().rate_command_B_rad_s(&[0.4, 0.0, 0.5], &banked);
+        let memory = ControllerState { attitude_command: [0.4, 0.0, 0.5], ..ControllerState::default() };
+        let rates = law().rate_command_B_rad_s(&memory, &banked);
         let yaw_rate = law().gains.attitude_1_s[2] * 0.5;
         assert!((rates.y - yaw_rate * 0.4_f64.sin()).abs() < 1e-12);
         assert!((rates.z - yaw_rate * 0.4_f64.cos()).abs() < 1e-12);

@@ -320,7 +320,7 @@ mod tests {
 
     #[test]
     fn a_negative_gain_is_refused_with_its_key() {
-        let text = OURS.replace("value = 1.8", "value = -1.8");
+        let text = OURS.replace("value = 2.2", "value = -2.2");
         let error = parse(&text, "my.toml", LoopsGains::read).unwrap_err().to_string();
         assert!(error.contains("velocity.proportional"), "{error}");
     }
