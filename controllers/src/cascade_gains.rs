@@ -156,8 +156,8 @@ mod tests {
     #[test]
     fn the_built_in_file_holds_the_numbers_that_the_head_of_this_room_compares() {
         let gains = CascadeGains::default();
-        assert_eq!(gains.attitude_1_s, [3.2, 3.2, 1.0]);
-        let tuned = RateGains { proportional_1_s: 8.0, integral_1_s2: 2.0, derivative: 0.5 };
+        assert_eq!(gains.attitude_1_s, [3.5, 3.5, 1.0]);
+        let tuned = RateGains { proportional_1_s: 8.0, integral_1_s2: 2.0, derivative: 0.3 };
         assert_eq!(gains.rate[..2], [tuned, tuned]);
         assert_eq!(gains.filter.tilt_max_rad, 30.0_f64.to_radians());
         assert_eq!(gains.altitude, crate::pid_gains::PidGains::default().altitude_gains());
