@@ -7,6 +7,7 @@ pub const KINDS: &[&NodeKind] = &[
     &sensors::attitude::KIND,
     &sensors::barometer::KIND,
     &sensors::battery::KIND,
+    &controllers::cascade::KIND,
     &sensors::clearance::KIND,
     &sensors::ekf::KIND,
     &sensors::gps::KIND,
@@ -20,6 +21,9 @@ pub const KINDS: &[&NodeKind] = &[
     &sensors::range::KIND,
     &sensors::range_inertial::KIND,
     &recorder::node::KIND,
+    &controllers::velocity::KIND,
+    &controllers::wall_follow::KIND,
+    &controllers::wall_stop::KIND,
 ];
 
 /// The kind named `name`.
