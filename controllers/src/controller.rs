@@ -115,6 +115,27 @@ pub struct ControllerState {
     /// Velocity that the guidance asks for, along the heading's level x and y.
     #[field(unit = "m/s")]
     pub velocity_command: [f64; 2],
+    /// Thrust that the rotors are foreseen to make; of `lqr` and `geometric` alone, as all that follows.
+    #[field(unit = "N", frame = "body")]
+    pub thrust_made: f64,
+    /// Its rate of change.
+    #[field(unit = "N/s", frame = "body")]
+    pub thrust_made_rate: f64,
+    /// Torque that they are foreseen to make.
+    #[field(unit = "N*m", frame = "body")]
+    pub torque_made: [f64; 3],
+    /// Its rate of change.
+    #[field(unit = "N*m/s", frame = "body")]
+    pub torque_made_rate: [f64; 3],
+    /// Velocity that was foreseen for now, against which disturbances show.
+    #[field(unit = "m/s", frame = "world")]
+    pub velocity_foreseen: [f64; 3],
+    /// Thrust that a law adds so that it takes over without a jump; fades.
+    #[field(unit = "N", frame = "body")]
+    pub thrust_offset: f64,
+    /// Torque that it adds likewise.
+    #[field(unit = "N*m", frame = "body")]
+    pub torque_offset: [f64; 3],
 }
 
 /// Runs `law` on the bus, its demand allocated to the rotors of `vehicle`.

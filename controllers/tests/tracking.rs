@@ -1,0 +1,125 @@
+//! The controllers that follow a trajectory, in closed loops.
+
+mod common;
+
+use common::{Flown, Loop, PERIOD_S, allocation, course, vehicle};
+use controllers::controller::Controller;
+use controllers::geometric_gains::GeometricGains;
+use controllers::geometric_law::GeometricLaw;
+use nalgebra::{UnitQuaternion, Vector3};
+use vehicles::{MotorModel, Vehicle};
+
+const FIGURE_EIGHT: &str = r#"{ kind = "hover", duration_s = 2.0 },
+    { kind = "figure-eight", half_length_m = 2.0, speed_m_s = 3.0, laps = 3, ramp_s = 3.0 }"#;
+const CIRCLE: &str = r#"{ kind = "hover", duration_s = 1.0 },
+    { kind = "circle", radius_m = 2.0, speed_m_s = 2.0, laps = 2, ramp_s = 2.0, yaw_deg = 180.0 }"#;
+const SLALOM: &str = r#"{ kind = "hover", duration_s = 1.0 },
+    { kind = "minimum-snap", mean_speed_m_s = 1.5, yaw_deg = -90.0,
+      waypoints_m = [[1.5, 1.0, 1.5], [3.0, -1.0, 2.0], [4.5, 1.0, 1.5], [6.0, 0.0, 1.0]] }"#;
+
+fn geometric() -> GeometricLaw {
+    GeometricLaw::new(GeometricGains::load(None).unwrap(), &vehicle(), &allocation(), PERIOD_S)
+}
+
+/// Root mean square and greatest distance from the course, in m, until 2 s behind its end.
+fn distances<C: Controller>(name: &str, law: &C, segments: &str, flown: Flown) -> (f64, f64) {
+    let course = course(segments);
+    let (rms_m, greatest_m) = Loop::new(flown).fly(law, &course, 0.0, course.duration_s() + 2.0);
+    println!("{name}: {rms_m:.4} m RMS, {greatest_m:.4} m at most");
+    (rms_m, greatest_m)
+}
+
+#[test]
+fn geometric_flies_a_figure_eight_at_3_m_s_within_a_tenth_of_a_metre_against_drag_it_does_not_know() {
+    for seed in 0..3 {
+        let (rms_m, _) = distances("figure eight", &geometric(), FIGURE_EIGHT, Flown::dragged(seed));
+        assert!(rms_m < 0.08, "seed {seed}: {rms_m}");
+    }
+}
+
+#[test]
+fn geometric_follows_without_drag_or_noise_as_its_feed_forward_says() {
+    for (name, segments) in [("eight", FIGURE_EIGHT), ("circle", CIRCLE), ("slalom", SLALOM)] {
+        let (rms_m, greatest_m) = distances(name, &geometric(), segments, Flown::ideal());
+        assert!(rms_m < 0.02 && greatest_m < 0.05, "{name}: {rms_m}, {greatest_m}");
+    }
+}
+
+#[test]
+fn geometric_with_the_drag_fed_forward_follows_closer() {
+    let gains = GeometricGains { drag_1_s: 0.28, ..GeometricGains::load(None).unwrap() };
+    let knowing = GeometricLaw::new(gains, &vehicle(), &allocation(), PERIOD_S);
+    let (without_m, _) = distances("unknown drag", &geometric(), FIGURE_EIGHT, Flown::dragged(0));
+    let (with_m, _) = distances("known drag", &knowing, FIGURE_EIGHT, Flown::dragged(0));
+    assert!(with_m < 0.5 * without_m);
+}
+
+#[test]
+fn geometric_flies_circles_and_minimum_snap_paths_against_drag_whatever_the_seed() {
+    for seed in 0..3 {
+        for (name, segments) in [("circle", CIRCLE), ("slalom", SLALOM)] {
+            let (rms_m, _) = distances(name, &geometric(), segments, Flown::dragged(seed));
+            assert!(rms_m < 0.08, "{name}, seed {seed}: {rms_m}");
+        }
+    }
+}
+
+/// Vehicles that differ from the file that the law believes in.
+fn variants() -> [(&'static str, Vehicle); 5] {
+    let motor = MotorModel::SecondOrder { natural_frequency_rad_s: 0.9 * 15.08, damping_ratio: 0.603 };
+    [
+        ("heavier", Vehicle { mass_kg: 1.05 * vehicle().mass_kg, ..vehicle() }),
+        ("larger", Vehicle { inertia_kg_m2: 1.15 * vehicle().inertia_kg_m2, ..vehicle() }),
+        ("smaller", Vehicle { inertia_kg_m2: 0.85 * vehicle().inertia_kg_m2, ..vehicle() }),
+        ("slower", Vehicle { motor, ..vehicle() }),
+        ("weaker", Vehicle { thrust_coefficient: 0.95 * vehicle().thrust_coefficient, ..vehicle() }),
+    ]
+}
+
+#[test]
+fn geometric_flies_vehicles_that_differ_from_their_file() {
+    for (name, flown) in variants() {
+        let flown = Flown { vehicle: flown, ..Flown::dragged(0) };
+        let (rms_m, _) = distances(name, &geometric(), FIGURE_EIGHT, flown);
+        assert!(rms_m < 0.1, "{name}: {rms_m}");
+    }
+}
+
+/// The greatest distance from 1 m above the origin in 10 s, in m.
+fn hover<C: Controller>(name: &str, law: &C, seed: u64) -> f64 {
+    distances(name, law, r#"{ kind = "hover", duration_s = 8.0 }"#, Flown::dragged(seed)).1
+}
+
+#[test]
+fn geometric_hovers_within_a_few_centimetres_in_noise() {
+    for seed in 0..3 {
+        assert!(hover("geometric hover", &geometric(), seed) < 0.03);
+    }
+}
+
+/// The distance from where it was thrown, after 4 s, and the greatest until then.
+fn recovery<C: Controller>(law: &C, axis: Vector3<f64>, angle_deg: f64) -> (f64, f64) {
+    let course = course("");
+    let mut flight = Loop::new(Flown::dragged(1));
+    flight.state.body.attitude_WB =
+        UnitQuaternion::from_scaled_axis(axis.normalize() * angle_deg.to_radians());
+    let (_, greatest_m) = flight.fly(law, &course, 0.0, 4.0);
+    let (_, left_m) = flight.fly(law, &course, 4.0, 6.0);
+    println!("thrown at {angle_deg} deg about {:?}: {greatest_m:.3} m, then {left_m:.4} m", axis.as_slice());
+    (left_m, greatest_m)
+}
+
+#[test]
+fn geometric_recovers_from_a_tilt_of_sixty_degrees_about_any_axis() {
+    for axis in [Vector3::x(), -Vector3::x(), Vector3::y(), -Vector3::y(), Vector3::new(1.0, 1.0, 0.5)] {
+        let (left_m, greatest_m) = recovery(&geometric(), axis, 60.0);
+        assert!(left_m < 0.1 && greatest_m < 2.0, "{axis}: {greatest_m}, {left_m}");
+    }
+}
+
+#[test]
+fn a_flight_is_a_function_of_its_seed() {
+    let flight = |seed| distances("again", &geometric(), CIRCLE, Flown::dragged(seed));
+    assert_eq!(flight(1), flight(1));
+    assert_ne!(flight(1), flight(2));
+}
