@@ -3,14 +3,20 @@
 use bus::kind::NodeKind;
 
 /// Every built-in kind, in alphabetical order.
-pub const KINDS: [&NodeKind; 7] = [
+pub const KINDS: [&NodeKind; 13] = [
     &sensors::attitude::KIND,
+    &controllers::cascade::KIND,
+    &controllers::geometric::KIND,
     &sensors::imu::KIND,
     &controllers::pid::KIND,
     &controllers::pilot::KIND,
     &plant::node::KIND,
     &controllers::player::KIND,
     &recorder::node::KIND,
+    &controllers::trajectory::KIND,
+    &controllers::velocity::KIND,
+    &controllers::wall_follow::KIND,
+    &controllers::wall_stop::KIND,
 ];
 
 /// The kind named `name`.

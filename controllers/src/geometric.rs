@@ -1,7 +1,6 @@
 //! The geometric controller node: a trajectory's reference to four motor commands.
 
-use crate::allocation::{Allocation, RotorSet};
-use crate::controller;
+use crate::controller::{self, Airframe};
 use crate::geometric_gains::GeometricGains;
 use crate::geometric_law::GeometricLaw;
 use bus::kind::{Inputs, NodeKind, PortSpec, read_parameters};
@@ -9,7 +8,6 @@ use bus::messages::{AttitudeEstimate, ControlStatus, MotorCommand, Reference, St
 use bus::{BusError, Message, Node};
 use serde::Deserialize;
 use std::path::PathBuf;
-use vehicles::Vehicle;
 
 /// The geometric controller, for manifests.
 pub const KIND: NodeKind = NodeKind {
@@ -38,16 +36,14 @@ struct Parameters {
     gains: Option<PathBuf>,
 }
 
-fn build(parameters: &Parameters, period_s: f64) -> Result<(GeometricLaw, Allocation, Vehicle), String> {
-    let vehicle = Vehicle::load(&parameters.vehicle).map_err(|error| error.to_string())?;
-    let allocation = Allocation::new(&RotorSet::from(&vehicle)).map_err(|error| error.to_string())?;
+fn build(parameters: &Parameters, period_s: f64) -> Result<(GeometricLaw, Airframe), String> {
+    let airframe = Airframe::load(&parameters.vehicle)?;
     let gains = GeometricGains::load(parameters.gains.as_deref()).map_err(|error| error.to_string())?;
-    Ok((GeometricLaw::new(gains, &vehicle, &allocation, period_s), allocation, vehicle))
+    Ok((GeometricLaw::new(gains, &airframe, period_s), airframe))
 }
 
 fn run() -> Result<(), BusError> {
     let node = Node::join()?;
-    let (law, allocation, vehicle) =
-        build(&node.parameters()?, node.period_s()).map_err(|error| node.error(error))?;
-    controller::run(node, &law, &allocation, &vehicle)
+    let (law, airframe) = build(&node.parameters()?, node.period_s()).map_err(|error| node.error(error))?;
+    controller::run(node, &law, &airframe.allocation, &airframe.vehicle)
 }

@@ -21,16 +21,15 @@
 )]
 
 use crate::allocation::{Allocation, THRUST_RESERVE, Wrench};
-use crate::controller::{Controller, ControllerState, Demand, Motion, Told};
-use crate::disturbance::{self, Disturbance};
+use crate::controller::{Airframe, Controller, ControllerState, Demand, Motion, Told};
+use crate::disturbance::Disturbance;
 use crate::flatness::{self, Moving, Target};
+use crate::foresight;
 use crate::geometric_gains::GeometricGains;
-use crate::hand_over;
 use crate::motor_lag::{Made, MotorLag};
 use crate::set_points::SetPoint;
 use bus::messages::Reference;
 use nalgebra::{Matrix3, Vector3};
-use vehicles::Vehicle;
 
 /// The thrust that sets the attitude points up by at least this: the attitude would be undefined in a free fall.
 /// Tuned, no source: a tenth of gravity.
@@ -56,33 +55,33 @@ struct Errors {
     jerk_W_m_s3: Vector3<f64>,
 }
 
-/// What the rotors do to the vehicle, in the world.
+/// How the model has the vehicle move, in the world.
 struct Push {
     acceleration_W_m_s2: Vector3<f64>,
     jerk_W_m_s3: Vector3<f64>,
 }
 
 impl GeometricLaw {
-    /// The law for `vehicle`, whose rotors are reached through `allocation`.
+    /// The law for `airframe`.
     #[must_use]
-    pub fn new(gains: GeometricGains, vehicle: &Vehicle, allocation: &Allocation, period_s: f64) -> Self {
+    pub fn new(gains: GeometricGains, airframe: &Airframe, period_s: f64) -> Self {
+        let vehicle = &airframe.vehicle;
         Self {
             gains,
             mass_kg: vehicle.mass_kg,
             inertia_B_kg_m2: vehicle.inertia_kg_m2,
             gravity_m_s2: vehicle.gravity_m_s2,
-            allocation: *allocation,
+            allocation: airframe.allocation,
             lag: MotorLag::new(vehicle.motor, period_s),
             period_s,
         }
     }
 
-    /// The demand without what a hand-over adds; advances the observer.
+    /// The demand, and the attitude behind it; advances the observer.
     fn asked(&self, memory: &mut ControllerState, made: &Made, told: &Told<'_>) -> (Wrench, Target) {
         let (reference, motion) = (told.reference, &told.motion);
         let push = self.push(made, motion);
-        let disturbance =
-            self.gains.observer.step(memory, motion, &push.acceleration_W_m_s2, self.period_s);
+        let disturbance = self.gains.observer.step(memory, motion, &push.acceleration_W_m_s2, self.period_s);
         let errors = errors(&push, &disturbance, reference, motion);
         let thrust_W_m_s2 = self.thrust_vector(&disturbance, &errors, reference);
         let target = flatness::target(&thrust_W_m_s2, reference.yaw, reference.yaw_rate);
@@ -101,16 +100,17 @@ impl GeometricLaw {
         Wrench { thrust_N: wrench.thrust_N.clamp(min_N, max_N), ..wrench }
     }
 
-    /// What the rotors are foreseen to do to the vehicle, gravity included.
+    /// What the model makes of the vehicle's motion: rotors as foreseen, gravity, and drag where it is stated.
     fn push(&self, made: &Made, motion: &Motion) -> Push {
         let z_W = motion.attitude_WB * Vector3::z();
         let turning_W = motion.attitude_WB * motion.angular_velocity_B_rad_s.cross(&Vector3::z());
         let (push_m_s2, push_rate_m_s3) =
             (made.wrench.thrust_N / self.mass_kg, made.rate.thrust_N / self.mass_kg);
-        Push {
-            acceleration_W_m_s2: z_W * push_m_s2 - Vector3::z() * self.gravity_m_s2,
-            jerk_W_m_s3: turning_W * push_m_s2 + z_W * push_rate_m_s3,
-        }
+        let drag_1_s = self.gains.drag_1_s;
+        let acceleration_W_m_s2 =
+            z_W * push_m_s2 - Vector3::z() * self.gravity_m_s2 - motion.velocity_W_m_s * drag_1_s;
+        let jerk_W_m_s3 = turning_W * push_m_s2 + z_W * push_rate_m_s3 - acceleration_W_m_s2 * drag_1_s;
+        Push { acceleration_W_m_s2, jerk_W_m_s3 }
     }
 
     /// Thrust for each unit of mass with two derivatives: t of the table above.
@@ -118,7 +118,8 @@ impl GeometricLaw {
         let gains = &self.gains;
         let (kp, kv) = (gains.position_proportional_1_s2, gains.position_derivative_1_s);
         let answer = -errors.position_W_m * kp - errors.velocity_W_m_s * kv - disturbance.acceleration_W_m_s2;
-        let answer_first = -errors.velocity_W_m_s * kp - errors.acceleration_W_m_s2 * kv - disturbance.jerk_W_m_s3;
+        let answer_first =
+            -errors.velocity_W_m_s * kp - errors.acceleration_W_m_s2 * kv - disturbance.jerk_W_m_s3;
         let answer_second = -errors.acceleration_W_m_s2 * kp - errors.jerk_W_m_s3 * kv;
         // What exceeds the limit is scaled down with its derivatives.
         let part = (gains.acceleration_max_m_s2 / answer.norm()).min(1.0);
@@ -159,21 +160,20 @@ impl Controller for GeometricLaw {
     const LAW: u32 = 7;
 
     fn step(&self, memory: &mut ControllerState, told: &Told<'_>) -> Demand {
-        let weight_N = self.mass_kg * self.gravity_m_s2;
-        let made = Made::foreseen(&self.lag, &self.allocation, memory, weight_N);
+        let made = Made::foreseen(&self.lag, &self.allocation, memory);
         made.store(memory);
-        if memory.law == 0 {
-            disturbance::begin(memory, &told.motion);
-        }
-        let (asked, target) = self.asked(memory, &made, told);
-        let wrench = hand_over::with_offset(memory, &asked, self.period_s);
+        let (wrench, target) = self.asked(memory, &made, told);
         let (roll_rad, pitch_rad, yaw_rad) = target.attitude_WB.euler_angles();
         let set_point = SetPoint { altitude_m: told.reference.position.z, roll_rad, pitch_rad, yaw_rad };
         Demand { wrench, set_point, ..Demand::default() }
     }
 
+    fn fresh(&self, told: &Told<'_>) -> ControllerState {
+        foresight::fresh(self.mass_kg * self.gravity_m_s2, told)
+    }
+
     fn tracking(&self, memory: &ControllerState, wrench: &Wrench, told: &Told<'_>) -> ControllerState {
-        hand_over::tracking(self, memory, wrench, told)
+        foresight::tracking::<Self>(memory, wrench, told)
     }
 }
 

@@ -141,17 +141,9 @@ impl Made {
     }
 
     /// What the rotors make now, one period after `memory` was left: they followed what was demanded then, as far as
-    /// `allocation` allows. Before the first demand they carry `weight_N`.
+    /// `allocation` allows.
     #[must_use]
-    pub fn foreseen(
-        lag: &MotorLag,
-        allocation: &Allocation,
-        memory: &ControllerState,
-        weight_N: f64,
-    ) -> Self {
-        if memory.law == 0 {
-            return Self::settled(Wrench { thrust_N: weight_N, ..Wrench::default() });
-        }
+    pub fn foreseen(lag: &MotorLag, allocation: &Allocation, memory: &ControllerState) -> Self {
         let asked = Wrench { thrust_N: memory.thrust, torque_B_N_m: memory.torque.into() };
         lag.advance(&Self::recall(memory), &allocation.allocate(&asked).wrench)
     }

@@ -1,15 +1,14 @@
 //! The PID controller node: altitude, roll, pitch and yaw to four motor commands.
 
-use crate::allocation::{Allocation, RotorSet, Wrench};
-use crate::controller::{self, Controller, ControllerState, Demand, Told};
-use crate::pid_gains::PidGains;
-use crate::pid_law::{Measurement, PidLaw, PidVehicle};
+use crate::allocation::Wrench;
+use crate::controller::{self, Airframe, Controller, ControllerState, Demand, Told};
+use crate::pid_gains::GivenGains;
+use crate::pid_law::{Measurement, PidLaw};
 use bus::kind::{Inputs, NodeKind, PortSpec, read_parameters};
 use bus::messages::{AttitudeEstimate, ControlStatus, MotorCommand, SetPoint, StateEstimate};
 use bus::{BusError, Message, Node};
 use serde::Deserialize;
 use std::path::PathBuf;
-use vehicles::Vehicle;
 
 /// The PID controller, for manifests.
 pub const KIND: NodeKind = NodeKind {
@@ -36,21 +35,19 @@ struct Parameters {
     vehicle: PathBuf,
     /// Gains and limits.
     #[serde(default)]
-    gains: PidGains,
+    gains: GivenGains,
 }
 
-fn build(parameters: &Parameters, period_s: f64) -> Result<(PidLaw, Allocation, Vehicle), String> {
-    let vehicle = Vehicle::load(&parameters.vehicle).map_err(|error| error.to_string())?;
-    let allocation = Allocation::new(&RotorSet::from(&vehicle)).map_err(|error| error.to_string())?;
-    let law = PidLaw { gains: parameters.gains, vehicle: PidVehicle::new(&vehicle, &allocation), period_s };
-    Ok((law, allocation, vehicle))
+fn build(parameters: &Parameters, period_s: f64) -> Result<(PidLaw, Airframe), String> {
+    let airframe = Airframe::load(&parameters.vehicle)?;
+    let gains = parameters.gains.gains()?;
+    Ok((PidLaw { gains, vehicle: airframe.known(), period_s }, airframe))
 }
 
 fn run() -> Result<(), BusError> {
     let node = Node::join()?;
-    let (law, allocation, vehicle) =
-        build(&node.parameters()?, node.period_s()).map_err(|error| node.error(error))?;
-    controller::run(node, &law, &allocation, &vehicle)
+    let (law, airframe) = build(&node.parameters()?, node.period_s()).map_err(|error| node.error(error))?;
+    controller::run(node, &law, &airframe.allocation, &airframe.vehicle)
 }
 
 impl Controller for PidLaw {

@@ -2,7 +2,7 @@
 
 mod common;
 
-use common::{Flown, Loop, PERIOD_S, allocation, course, vehicle};
+use common::{Craft, Loop, PERIOD_S, airframe, course, vehicle};
 use controllers::controller::Controller;
 use controllers::geometric_gains::GeometricGains;
 use controllers::geometric_law::GeometricLaw;
@@ -18,13 +18,13 @@ const SLALOM: &str = r#"{ kind = "hover", duration_s = 1.0 },
       waypoints_m = [[1.5, 1.0, 1.5], [3.0, -1.0, 2.0], [4.5, 1.0, 1.5], [6.0, 0.0, 1.0]] }"#;
 
 fn geometric() -> GeometricLaw {
-    GeometricLaw::new(GeometricGains::load(None).unwrap(), &vehicle(), &allocation(), PERIOD_S)
+    GeometricLaw::new(GeometricGains::load(None).unwrap(), &airframe(), PERIOD_S)
 }
 
 /// Root mean square and greatest distance from the course, in m, until 2 s behind its end.
-fn distances<C: Controller>(name: &str, law: &C, segments: &str, flown: Flown) -> (f64, f64) {
+fn distances<C: Controller>(name: &str, law: &C, segments: &str, craft: Craft) -> (f64, f64) {
     let course = course(segments);
-    let (rms_m, greatest_m) = Loop::new(flown).fly(law, &course, 0.0, course.duration_s() + 2.0);
+    let (rms_m, greatest_m) = Loop::new(craft).fly(law, &course, 0.0, course.duration_s() + 2.0);
     println!("{name}: {rms_m:.4} m RMS, {greatest_m:.4} m at most");
     (rms_m, greatest_m)
 }
@@ -32,7 +32,7 @@ fn distances<C: Controller>(name: &str, law: &C, segments: &str, flown: Flown) -
 #[test]
 fn geometric_flies_a_figure_eight_at_3_m_s_within_a_tenth_of_a_metre_against_drag_it_does_not_know() {
     for seed in 0..3 {
-        let (rms_m, _) = distances("figure eight", &geometric(), FIGURE_EIGHT, Flown::dragged(seed));
+        let (rms_m, _) = distances("figure eight", &geometric(), FIGURE_EIGHT, Craft::dragged(seed));
         assert!(rms_m < 0.08, "seed {seed}: {rms_m}");
     }
 }
@@ -40,7 +40,7 @@ fn geometric_flies_a_figure_eight_at_3_m_s_within_a_tenth_of_a_metre_against_dra
 #[test]
 fn geometric_follows_without_drag_or_noise_as_its_feed_forward_says() {
     for (name, segments) in [("eight", FIGURE_EIGHT), ("circle", CIRCLE), ("slalom", SLALOM)] {
-        let (rms_m, greatest_m) = distances(name, &geometric(), segments, Flown::ideal());
+        let (rms_m, greatest_m) = distances(name, &geometric(), segments, Craft::ideal());
         assert!(rms_m < 0.02 && greatest_m < 0.05, "{name}: {rms_m}, {greatest_m}");
     }
 }
@@ -48,9 +48,9 @@ fn geometric_follows_without_drag_or_noise_as_its_feed_forward_says() {
 #[test]
 fn geometric_with_the_drag_fed_forward_follows_closer() {
     let gains = GeometricGains { drag_1_s: 0.28, ..GeometricGains::load(None).unwrap() };
-    let knowing = GeometricLaw::new(gains, &vehicle(), &allocation(), PERIOD_S);
-    let (without_m, _) = distances("unknown drag", &geometric(), FIGURE_EIGHT, Flown::dragged(0));
-    let (with_m, _) = distances("known drag", &knowing, FIGURE_EIGHT, Flown::dragged(0));
+    let knowing = GeometricLaw::new(gains, &airframe(), PERIOD_S);
+    let (without_m, _) = distances("unknown drag", &geometric(), FIGURE_EIGHT, Craft::dragged(0));
+    let (with_m, _) = distances("known drag", &knowing, FIGURE_EIGHT, Craft::dragged(0));
     assert!(with_m < 0.5 * without_m);
 }
 
@@ -58,7 +58,7 @@ fn geometric_with_the_drag_fed_forward_follows_closer() {
 fn geometric_flies_circles_and_minimum_snap_paths_against_drag_whatever_the_seed() {
     for seed in 0..3 {
         for (name, segments) in [("circle", CIRCLE), ("slalom", SLALOM)] {
-            let (rms_m, _) = distances(name, &geometric(), segments, Flown::dragged(seed));
+            let (rms_m, _) = distances(name, &geometric(), segments, Craft::dragged(seed));
             assert!(rms_m < 0.08, "{name}, seed {seed}: {rms_m}");
         }
     }
@@ -78,16 +78,16 @@ fn variants() -> [(&'static str, Vehicle); 5] {
 
 #[test]
 fn geometric_flies_vehicles_that_differ_from_their_file() {
-    for (name, flown) in variants() {
-        let flown = Flown { vehicle: flown, ..Flown::dragged(0) };
-        let (rms_m, _) = distances(name, &geometric(), FIGURE_EIGHT, flown);
+    for (name, craft) in variants() {
+        let craft = Craft { vehicle: craft, ..Craft::dragged(0) };
+        let (rms_m, _) = distances(name, &geometric(), FIGURE_EIGHT, craft);
         assert!(rms_m < 0.1, "{name}: {rms_m}");
     }
 }
 
 /// The greatest distance from 1 m above the origin in 10 s, in m.
 fn hover<C: Controller>(name: &str, law: &C, seed: u64) -> f64 {
-    distances(name, law, r#"{ kind = "hover", duration_s = 8.0 }"#, Flown::dragged(seed)).1
+    distances(name, law, r#"{ kind = "hover", duration_s = 8.0 }"#, Craft::dragged(seed)).1
 }
 
 #[test]
@@ -100,7 +100,7 @@ fn geometric_hovers_within_a_few_centimetres_in_noise() {
 /// The distance from where it was thrown, after 4 s, and the greatest until then.
 fn recovery<C: Controller>(law: &C, axis: Vector3<f64>, angle_deg: f64) -> (f64, f64) {
     let course = course("");
-    let mut flight = Loop::new(Flown::dragged(1));
+    let mut flight = Loop::new(Craft::dragged(1));
     flight.state.body.attitude_WB =
         UnitQuaternion::from_scaled_axis(axis.normalize() * angle_deg.to_radians());
     let (_, greatest_m) = flight.fly(law, &course, 0.0, 4.0);
@@ -119,7 +119,7 @@ fn geometric_recovers_from_a_tilt_of_sixty_degrees_about_any_axis() {
 
 #[test]
 fn a_flight_is_a_function_of_its_seed() {
-    let flight = |seed| distances("again", &geometric(), CIRCLE, Flown::dragged(seed));
+    let flight = |seed| distances("again", &geometric(), CIRCLE, Craft::dragged(seed));
     assert_eq!(flight(1), flight(1));
     assert_ne!(flight(1), flight(2));
 }

@@ -300,7 +300,7 @@ fn a_vehicle_file_that_is_not_there() {
     let manifest = repository("manifests/hover.toml");
     let vehicle = place.path("none.toml");
     let ended = refused_setting(&manifest, &[&format!("process.plant.vehicle={vehicle}")]);
-    ended.says(&["process `plant`", &vehicle, "cannot read this vehicle file", "check the path"]);
+    ended.says(&["process `plant`", &vehicle, "cannot read this file", "check the path"]);
 }
 
 #[test]

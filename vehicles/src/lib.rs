@@ -6,7 +6,7 @@
 //! | [`command`] | the map between a raw motor command and a rotor speed |
 //! | [`provenance`] | where each number came from, kept for reports |
 //! | `file` | which keys a vehicle file has, and what is physical |
-//! | [`reader`] | walks the TOML tree with positions, refuses what it does not know; scene files use it too |
+//! | [`reader`] | walks the TOML tree with positions, refuses what it does not know; scene files and gains files use it too |
 //! | [`units`] | the table of accepted units |
 //! | [`error`] | what can be wrong with a file, said for people |
 //!

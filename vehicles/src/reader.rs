@@ -88,6 +88,13 @@ impl Quantity {
     }
 }
 
+/// Whether a number describes what is there or was chosen by somebody.
+#[derive(Debug, Clone, Copy)]
+enum Origin {
+    Known,
+    Chosen,
+}
+
 /// One table of the file; remembers which keys were asked for.
 pub struct Section<'d, 't> {
     /// The file.
@@ -189,9 +196,24 @@ impl<'d, 't> Section<'d, 't> {
 
     /// A parameter: a table with `value`, `unit`, `source` and `uncertainty`; the value in SI.
     pub fn quantity(&self, name: &'static str, dimension: Dimension) -> Result<Quantity, VehicleError> {
+        self.number_of(name, dimension, Origin::Known)
+    }
+
+    /// A number that somebody chose, such as a gain: as [`Self::quantity`], but it has an `uncertainty` only
+    /// where the file says so.
+    pub fn chosen(&self, name: &'static str, dimension: Dimension) -> Result<Quantity, VehicleError> {
+        self.number_of(name, dimension, Origin::Chosen)
+    }
+
+    fn number_of(
+        &self,
+        name: &'static str,
+        dimension: Dimension,
+        origin: Origin,
+    ) -> Result<Quantity, VehicleError> {
         let parameter = self.parameter(name)?;
         let value = parameter.need("value", "a number")?;
-        let si = parameter.number("value", value)? * parameter.meta(dimension)?;
+        let si = parameter.number("value", value)? * parameter.meta(dimension, origin)?;
         let quantity = Quantity { si, key: parameter.path, at: value.span() };
         quantity.require(self.doc, si.is_finite(), "a number that is finite in SI")
     }
@@ -201,7 +223,7 @@ impl<'d, 't> Section<'d, 't> {
         let parameter = self.parameter(name)?;
         let value = parameter.need("value", "an array of three numbers")?;
         let [x, y, z] = parameter.three(value)?;
-        let factor = parameter.meta(dimension)?;
+        let factor = parameter.meta(dimension, Origin::Known)?;
         Ok([x * factor, y * factor, z * factor])
     }
 
@@ -215,12 +237,16 @@ impl<'d, 't> Section<'d, 't> {
     }
 
     /// Checks unit, source and uncertainty of a parameter's table; notes them; gives the factor to SI.
-    fn meta(&self, dimension: Dimension) -> Result<f64, VehicleError> {
+    fn meta(&self, dimension: Dimension, origin: Origin) -> Result<f64, VehicleError> {
         let unit = self.text("unit")?;
         let factor = dimension.factor(unit).ok_or_else(|| {
             self.doc.bad(&self.at_of("unit"), &self.key("unit"), dimension.describe(), format!("\"{unit}\""))
         })?;
-        self.note(unit, self.text("source")?, self.uncertainty(factor)?);
+        let uncertainty = match origin {
+            Origin::Chosen if !self.has("uncertainty") => Uncertainty::Said("chosen".to_owned()),
+            _ => self.uncertainty(factor)?,
+        };
+        self.note(unit, self.text("source")?, uncertainty);
         self.finish()?;
         Ok(factor)
     }

@@ -49,7 +49,24 @@ pub const INERTIA: Dimension =
     Dimension { name: "moment of inertia", units: &[("kg*m^2", 1.0), ("g*m^2", 1e-3), ("g*mm^2", 1e-9)] };
 
 /// Rotation speeds.
-pub const SPEED: Dimension = Dimension { name: "rotation speed", units: &[("rad/s", 1.0), ("rpm", RPM)] };
+pub const SPEED: Dimension =
+    Dimension { name: "rotation speed", units: &[("rad/s", 1.0), ("rpm", RPM), ("deg/s", PI / 180.0)] };
+
+/// Speeds along a line.
+pub const VELOCITY: Dimension = Dimension { name: "velocity", units: &[("m/s", 1.0)] };
+
+/// Angular accelerations.
+pub const ANGULAR_ACCELERATION: Dimension =
+    Dimension { name: "angular acceleration", units: &[("rad/s^2", 1.0), ("deg/s^2", PI / 180.0)] };
+
+/// Gains from a quantity to its rate of change.
+pub const PER_SECOND: Dimension = Dimension { name: "gain per time", units: &[("1/s", 1.0)] };
+
+/// Gains from a quantity to its second rate of change.
+pub const PER_SECOND_2: Dimension = Dimension { name: "gain per time squared", units: &[("1/s^2", 1.0)] };
+
+/// Gains from a quantity to its third rate of change.
+pub const PER_SECOND_3: Dimension = Dimension { name: "gain per time cubed", units: &[("1/s^3", 1.0)] };
 
 /// Thrust coefficients.
 pub const THRUST_COEFFICIENT: Dimension = Dimension {

@@ -4,8 +4,8 @@
 #![allow(non_snake_case, reason = "a trailing _W or _B names the frame a vector is written in")]
 
 use bus::random::{Stream, stream};
-use controllers::allocation::{Allocation, RotorSet, Wrench};
-use controllers::controller::{Controller, ControllerState, Motion, Told};
+use controllers::allocation::Wrench;
+use controllers::controller::{Airframe, Controller, ControllerState, Flown, Motion, Told};
 use controllers::course::{Course, Start};
 use controllers::set_points::SetPoint;
 use controllers::trajectory::reference;
@@ -20,8 +20,9 @@ pub fn vehicle() -> Vehicle {
     Vehicle::parse(include_str!("../../../vehicles/hummingbird.toml"), "hummingbird.toml").unwrap()
 }
 
-pub fn allocation() -> Allocation {
-    Allocation::new(&RotorSet::from(&vehicle())).unwrap()
+/// The Hummingbird as the laws know it.
+pub fn airframe() -> Airframe {
+    Airframe::new(vehicle()).unwrap()
 }
 
 /// A course from 1 m above the origin; `segments` is a list in TOML.
@@ -37,7 +38,7 @@ pub fn try_course(segments: &str) -> Result<Course, String> {
 
 /// What the law flies and in what air.
 #[derive(Clone)]
-pub struct Flown {
+pub struct Craft {
     pub vehicle: Vehicle,
     /// Drag of the rotors along body x and y, for each unit of speed and mass.
     pub rotor_drag_1_s: f64,
@@ -47,7 +48,7 @@ pub struct Flown {
     pub seed: Option<u64>,
 }
 
-impl Flown {
+impl Craft {
     /// As the file says, in still air without drag, measured exactly.
     pub fn ideal() -> Self {
         Self { vehicle: vehicle(), rotor_drag_1_s: 0.0, parasitic_drag_1_m: 0.0, seed: None }
@@ -107,9 +108,9 @@ fn exact(body: &RigidBody) -> Motion {
 
 /// A vehicle in flight, and what a controller remembers.
 pub struct Loop {
-    flown: Flown,
+    craft: Craft,
     plant: NewtonEuler,
-    allocation: Allocation,
+    airframe: Airframe,
     noise: Option<Noise>,
     pub state: State,
     pub memory: ControllerState,
@@ -122,13 +123,13 @@ pub struct Loop {
 }
 
 impl Loop {
-    pub fn new(flown: Flown) -> Self {
-        let plant = NewtonEuler::new(flown.vehicle.clone(), 1);
+    pub fn new(craft: Craft) -> Self {
+        let plant = NewtonEuler::new(craft.vehicle.clone(), 1);
         let state = plant.start(RigidBody::level_at(Vector3::z()), plant.vehicle().hover_command());
-        let noise = flown.seed.map(Noise::new);
+        let noise = craft.seed.map(Noise::new);
         let set_point = SetPoint { altitude_m: 1.0, ..SetPoint::default() };
-        let (allocation, memory, demand) = (allocation(), ControllerState::default(), Wrench::default());
-        Self { flown, plant, allocation, noise, state, memory, tick: 0, set_point, demand, saturated: false }
+        let (airframe, memory, demand) = (airframe(), ControllerState::default(), Wrench::default());
+        Self { craft, plant, airframe, noise, state, memory, tick: 0, set_point, demand, saturated: false }
     }
 
     /// One tick under `law`: as the node runs it. Gives the true distance from the course.
@@ -147,27 +148,15 @@ impl Loop {
             walls: &walls,
             time_ns: self.tick * 1_000_000,
         };
-        self.demand = self.demanded(law, &told);
-        let allocated = self.allocation.allocate(&self.demand);
+        let known = Flown { law, vehicle: &self.airframe.vehicle, period_s: PERIOD_S };
+        self.demand = known.advance(&mut self.memory, &told, None).wrench;
+        let allocated = self.airframe.allocation.allocate(&self.demand);
         self.saturated = allocated.is_saturated();
-        let counts = allocated.speeds_rad_s.map(|speed| self.flown.vehicle.command.command(speed));
+        let counts = allocated.speeds_rad_s.map(|speed| self.airframe.vehicle.command.command(speed));
         self.plant.step(&mut self.state, &counts, PERIOD_S);
-        self.state.body.velocity_W_m_s += self.flown.drag_W_m_s2(&self.state.body) * PERIOD_S;
+        self.state.body.velocity_W_m_s += self.craft.drag_W_m_s2(&self.state.body) * PERIOD_S;
         self.tick += 1;
         off_m
-    }
-
-    fn demanded<C: Controller>(&mut self, law: &C, told: &Told<'_>) -> Wrench {
-        let memory = &mut self.memory;
-        if memory.law != 0 && memory.law != C::LAW {
-            let handed = Wrench { thrust_N: memory.thrust, torque_B_N_m: memory.torque.into() };
-            *memory = law.tracking(memory, &handed, told);
-        }
-        let wrench = law.step(memory, told).wrench;
-        memory.law = C::LAW;
-        memory.thrust = wrench.thrust_N;
-        memory.torque = wrench.torque_B_N_m.into();
-        wrench
     }
 
     /// Flies until `until_s`; gives the root mean square and the greatest distance from the course since `from_s`.
