@@ -3,11 +3,12 @@
 use bus::kind::NodeKind;
 
 /// Every built-in kind, in alphabetical order.
-pub const KINDS: [&NodeKind; 13] = [
+pub const KINDS: [&NodeKind; 14] = [
     &sensors::attitude::KIND,
     &controllers::cascade::KIND,
     &controllers::geometric::KIND,
     &sensors::imu::KIND,
+    &controllers::lqr::KIND,
     &controllers::pid::KIND,
     &controllers::pilot::KIND,
     &plant::node::KIND,

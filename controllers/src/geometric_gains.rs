@@ -96,14 +96,14 @@ mod tests {
     #[test]
     fn the_built_in_file_is_read_in_si() {
         let gains = GeometricGains::load(None).unwrap();
-        assert_eq!(gains.position_proportional_1_s2, 7.0);
+        assert_eq!(gains.position_proportional_1_s2, 9.0);
         assert_eq!(gains.motor.natural_frequency_rad_s, 50.0);
     }
 
     #[test]
     fn what_is_wrong_with_a_file_is_named_with_its_place() {
         let cases = [
-            ("value = 7.0", "value = -7.0", "`position.proportional`: expected a number of 0 or above"),
+            ("value = 9.0", "value = -9.0", "`position.proportional`: expected a number of 0 or above"),
             ("value = 50.0, unit = \"rad/s\"", "value = 0, unit = \"rad/s\"", "`motor.natural_frequency`"),
             ("linear = ", "quadratic = 1\nlinear = ", "unknown key `drag.quadratic`"),
         ];

@@ -16,8 +16,9 @@
 //! - [`motor_lag`]: what the rotors make of a demand, foreseen, and a demand that hurries them.
 //! - [`disturbance`]: the acceleration that the model does not explain, observed.
 //! - [`geometric_gains`], [`geometric_law`]: tracking on SE(3).
+//! - [`riccati`], [`lqr_model`], [`lqr_gains`], [`lqr_law`]: the linear-quadratic regulator.
 //! - [`foresight`]: what the laws that foresee remember of both.
-//! - [`pid`], [`cascade`], [`velocity`], [`wall_stop`], [`wall_follow`], [`geometric`], [`pilot`], [`trajectory`],
+//! - [`pid`], [`cascade`], [`velocity`], [`wall_stop`], [`wall_follow`], [`lqr`], [`geometric`], [`pilot`], [`trajectory`],
 //!   [`player`]: the nodes.
 //! - [`flight_log`]: a measured flight as CSV with a column map.
 //! - [`angle`]: the difference of two angles.
@@ -41,6 +42,10 @@ pub mod gains_file;
 pub mod geometric;
 pub mod geometric_gains;
 pub mod geometric_law;
+pub mod lqr;
+pub mod lqr_gains;
+pub mod lqr_law;
+pub mod lqr_model;
 pub mod minimum_snap;
 pub mod motor_lag;
 pub mod pid;
@@ -48,6 +53,7 @@ pub mod pid_gains;
 pub mod pid_law;
 pub mod pilot;
 pub mod player;
+pub mod riccati;
 pub mod room;
 pub mod set_points;
 pub mod trajectory;

@@ -86,6 +86,15 @@ impl MotorLag {
         }
     }
 
+    /// How far a demand that rises evenly is ahead of what is made, s: 2ζ/ω_n, or τ.
+    #[must_use]
+    pub fn delay_s(&self) -> f64 {
+        match self.model {
+            MotorModel::SecondOrder { natural_frequency_rad_s: wn, damping_ratio: zn } => 2.0 * zn / wn,
+            MotorModel::FirstOrder { time_constant_s } => time_constant_s,
+        }
+    }
+
     fn hurry(&self, target: &LagTarget, now: f64, rate: f64, wanted: f64) -> f64 {
         let (wf, zf) = (target.natural_frequency_rad_s, target.damping_ratio);
         match self.model {

@@ -36,6 +36,11 @@ pub fn try_course(segments: &str) -> Result<Course, String> {
     Course::read(entries.as_array().unwrap(), Start { position_W_m: Vector3::z(), yaw_rad: 0.0 })
 }
 
+/// Staying 1 m above the origin with this yaw.
+pub fn course_from(yaw_rad: f64) -> Course {
+    Course::read(&[], Start { position_W_m: Vector3::z(), yaw_rad }).unwrap()
+}
+
 /// What the law flies and in what air.
 #[derive(Clone)]
 pub struct Craft {
