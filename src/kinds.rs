@@ -3,10 +3,14 @@
 use bus::kind::NodeKind;
 
 /// Every built-in kind, in alphabetical order.
-pub const KINDS: [&NodeKind; 11] = [
+pub const KINDS: [&NodeKind; 15] = [
     &sensors::attitude::KIND,
+    &sensors::barometer::KIND,
+    &sensors::battery::KIND,
     &sensors::ekf::KIND,
+    &sensors::gps::KIND,
     &sensors::imu::KIND,
+    &sensors::magnetometer::KIND,
     &sensors::mocap::KIND,
     &controllers::pid::KIND,
     &controllers::pilot::KIND,

@@ -11,8 +11,8 @@
 //! average. They are drawn from a stream of their own: switching them on does not reshuffle the noise.
 
 use crate::parameter::{ParameterError, check, not_negative, positive};
-use bus::Message;
 use bus::random::{Stream, stream};
+use bus::{BusError, Message, Node};
 use rand_distr::{Distribution, StandardUniform};
 
 /// How many measurements a queue holds: those under way, and the one that arrived last.
@@ -40,16 +40,25 @@ impl Timing {
     /// A parameter is outside its range.
     pub fn validate(&self) -> Result<(), ParameterError> {
         positive("rate_hz", self.rate_hz)?;
+        self.validate_at_any_rate()?;
         let under_way = self.delay_ms * 1e-3 * self.rate_hz;
-        let delay_is_good = self.delay_ms >= 0.0 && under_way <= UNDER_WAY_MAX;
-        check("delay_ms", self.delay_ms, delay_is_good, "zero or more, and at most 30 measurements long")?;
-        let dropout_is_good = (0.0..1.0).contains(&self.dropout);
-        check("dropout", self.dropout, dropout_is_good, "a fraction from 0 to below 1")?;
-        not_negative("dropout_mean_s", self.dropout_mean_s)?;
+        let expected = "at most 30 measurements long";
+        check("delay_ms", self.delay_ms, under_way <= UNDER_WAY_MAX, expected)?;
         let losses = Losses::new(self);
         let mean_is_good = losses.begin <= 1.0 && losses.go_on >= 0.0;
         let expected = "zero, or long enough for one measurement and for the fraction `dropout` of them";
         check("dropout_mean_s", self.dropout_mean_s, mean_is_good, expected)
+    }
+
+    /// What can be said of the parameters where the rate is not known yet.
+    ///
+    /// # Errors
+    /// A parameter is outside its range.
+    pub fn validate_at_any_rate(&self) -> Result<(), ParameterError> {
+        not_negative("delay_ms", self.delay_ms)?;
+        let dropout_is_good = (0.0..1.0).contains(&self.dropout);
+        check("dropout", self.dropout, dropout_is_good, "a fraction from 0 to below 1")?;
+        not_negative("dropout_mean_s", self.dropout_mean_s)
     }
 }
 
@@ -138,6 +147,15 @@ impl Chance<'_> {
 }
 
 impl Channel {
+    /// The channel of `node`.
+    ///
+    /// # Errors
+    /// As [`Channel::new`].
+    pub fn of_node(timing: &Timing, node: &Node) -> Result<Self, BusError> {
+        let channel = Self::new(timing, node.period_s(), node.seed(), node.name());
+        channel.map_err(|error| node.error(error))
+    }
+
     /// The channel of node `node`, which computes every `period_s`, in a run seeded with `run_seed`.
     ///
     /// # Errors

@@ -98,10 +98,22 @@ impl MocapParams {
         let turn = UnitQuaternion::from_scaled_axis(turn_B_deg.map(f64::to_radians));
         (position_W_m + position_error_W_m, attitude_WB * turn)
     }
+
+    /// The sample to send at `now_ns`.
+    fn sample(&self, channel: &mut Channel, memory: &mut Memory, now_ns: u64, truth: &PlantState) -> Mocap {
+        channel.step(&mut memory.channel, &mut memory.queue, now_ns, |last, chance| {
+            let measured = self.measure(vector(truth.position), attitude(truth.attitude), chance.noise);
+            if chance.is_lost(0) {
+                return Mocap { valid: 0, ..*last };
+            }
+            let (position, attitude) = (vector_message(measured.0), attitude_message(measured.1));
+            Mocap { measured_ns: now_ns, position, attitude, valid: 1, ..Default::default() }
+        })
+    }
 }
 
 /// What the node remembers, as it is handed over.
-#[derive(Clone, Copy, Message)]
+#[derive(Clone, Copy, Default, Message)]
 #[repr(C)]
 #[message(type_name = "hummingbus_msgs/msg/MocapState")]
 struct Memory {
@@ -111,49 +123,23 @@ struct Memory {
     queue: [Mocap; QUEUE],
 }
 
-impl Default for Memory {
-    fn default() -> Self {
-        Self { channel: ChannelState::default(), queue: [Mocap::default(); QUEUE] }
-    }
-}
-
 fn run() -> Result<(), BusError> {
     let mut node = Node::join()?;
     let state = node.input::<PlantState>("state")?;
     let output = node.output::<Mocap>("mocap")?;
     let params: MocapParams = node.parameters()?;
     params.validate().map_err(|error| node.error(error))?;
-    let mut channel = Channel::new(&params.timing(), node.period_s(), node.seed(), node.name())
-        .map_err(|error| node.error(error))?;
+    let mut channel = Channel::of_node(&params.timing(), &node)?;
     node.run_with_state(Memory::default(), |tick, memory| {
-        let sent = sample(&params, &mut channel, memory, tick.time_ns(), tick.get(state));
+        let sent = params.sample(&mut channel, memory, tick.time_ns(), tick.get(state));
         tick.write(output, sent)
-    })
-}
-
-/// The sample to send at `now_ns`.
-fn sample(
-    params: &MocapParams,
-    channel: &mut Channel,
-    memory: &mut Memory,
-    now_ns: u64,
-    truth: &PlantState,
-) -> Mocap {
-    channel.step(&mut memory.channel, &mut memory.queue, now_ns, |last, chance| {
-        let measured = params.measure(vector(truth.position), attitude(truth.attitude), chance.noise);
-        if chance.is_lost(0) {
-            return Mocap { valid: 0, ..*last };
-        }
-        let (position, attitude) = (vector_message(measured.0), attitude_message(measured.1));
-        Mocap { measured_ns: now_ns, position, attitude, valid: 1, ..Default::default() }
     })
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    const TICK_NS: u64 = 1_000_000;
+    use crate::testing::{TICK_NS, require_hand_over, require_normal};
 
     fn truth() -> PlantState {
         PlantState {
@@ -168,8 +154,7 @@ mod tests {
         let params = MocapParams { delay_ms: 0.0, ..*params };
         let mut channel = Channel::new(&params.timing(), 0.01, 5, "mocap").unwrap();
         let mut memory = Memory::default();
-        let mut sample = |n| sample(&params, &mut channel, &mut memory, n * 10 * TICK_NS, &truth());
-        (0..count).map(&mut sample).collect()
+        (0..count).map(|n| params.sample(&mut channel, &mut memory, n * 10 * TICK_NS, &truth())).collect()
     }
 
     fn position_error_m(sample: &Mocap) -> Vector3<f64> {
@@ -189,20 +174,11 @@ mod tests {
             ..MocapParams::default()
         };
         let samples = samples(&params, 10_000);
-        require_normal(&samples, position_error_m, params.position_bias_m, params.position_noise_m);
-        require_normal(&samples, turn_B_deg, params.attitude_bias_deg, params.attitude_noise_deg);
-    }
-
-    /// Mean and variance of each axis are within six of their standard deviations.
-    #[track_caller]
-    fn require_normal(samples: &[Mocap], error: impl Fn(&Mocap) -> Vector3<f64>, mean: [f64; 3], sigma: f64) {
-        let count = samples.len() as f64;
-        for (axis, expected) in mean.into_iter().enumerate() {
-            let errors = samples.iter().map(|sample| error(sample)[axis] - expected);
-            let (sum, squares) = errors.fold((0.0, 0.0), |(sum, squares), e| (sum + e, squares + e * e));
-            assert!((sum / count).abs() < 6.0 * sigma / count.sqrt(), "axis {axis}: mean {}", sum / count);
-            let ratio = squares / count / sigma / sigma;
-            assert!((ratio - 1.0).abs() < 6.0 * (2.0 / count).sqrt(), "axis {axis}: variance ratio {ratio}");
+        for axis in 0..3 {
+            let errors_m = samples.iter().map(|sample| position_error_m(sample)[axis]);
+            require_normal(errors_m, params.position_bias_m[axis], params.position_noise_m);
+            let turns_deg = samples.iter().map(|sample| turn_B_deg(sample)[axis]);
+            require_normal(turns_deg, params.attitude_bias_deg[axis], params.attitude_noise_deg);
         }
     }
 
@@ -233,17 +209,9 @@ mod tests {
     fn a_memory_that_is_handed_over_goes_on_byte_for_byte() {
         let params = MocapParams { delay_ms: 45.0, dropout: 0.2, ..MocapParams::default() };
         let channel = || Channel::new(&params.timing(), 1e-3, 5, "mocap").unwrap();
-        let (mut first, mut memory) = (channel(), Memory::default());
-        for tick in 0..777 {
-            sample(&params, &mut first, &mut memory, tick * TICK_NS, &truth());
-        }
-        let (mut second, mut handed) = (channel(), memory);
-        for tick in 777..2000 {
-            let expected = sample(&params, &mut first, &mut memory, tick * TICK_NS, &truth());
-            let found = sample(&params, &mut second, &mut handed, tick * TICK_NS, &truth());
-            assert_eq!(bytemuck::bytes_of(&found), bytemuck::bytes_of(&expected), "at tick {tick}");
-        }
-        assert!(bytemuck::bytes_of(&handed) == bytemuck::bytes_of(&memory));
+        require_hand_over(channel, Memory::default(), |channel, memory: &mut Memory, now_ns| {
+            params.sample(channel, memory, now_ns, &truth())
+        });
     }
 
     #[test]

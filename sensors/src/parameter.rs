@@ -32,6 +32,11 @@ pub(crate) fn all_finite(key: &'static str, values: &[f64]) -> Result<(), Parame
     values.iter().try_for_each(|value| finite(key, *value))
 }
 
+/// Passes `values` if all are finite and none is negative.
+pub(crate) fn all_not_negative(key: &'static str, values: &[f64]) -> Result<(), ParameterError> {
+    values.iter().try_for_each(|value| not_negative(key, *value))
+}
+
 /// Passes `found` if it is `good`.
 pub(crate) fn check(
     key: &'static str,

@@ -208,9 +208,10 @@ impl RangeFinders {
         ranges
     }
 
-    /// What is sent until the first measurement arrives: nothing is met.
-    fn nothing(&self) -> Ranges {
-        Ranges { distance: [self.params.reach_m; BEAMS], ..Default::default() }
+    /// Until the first measurement arrives, nothing is met.
+    fn start(&self) -> Memory {
+        let nothing = Ranges { distance: [self.params.reach_m; BEAMS], ..Default::default() };
+        Memory { channel: ChannelState::default(), queue: [nothing; QUEUE] }
     }
 
     /// The sample to send at `now_ns`.
@@ -246,11 +247,8 @@ fn run() -> Result<(), BusError> {
     let traffic = node.optional_input::<Traffic>("traffic");
     let output = node.output::<Ranges>("ranges")?;
     let finders = RangeFinders::new(node.parameters()?).map_err(|error| node.error(error))?;
-    let timing = finders.params.timing();
-    let mut channel = Channel::new(&timing, node.period_s(), node.seed(), node.name())
-        .map_err(|error| node.error(error))?;
-    let memory = Memory { channel: ChannelState::default(), queue: [finders.nothing(); QUEUE] };
-    node.run_with_state(memory, |tick, memory| {
+    let mut channel = Channel::of_node(&finders.params.timing(), &node)?;
+    node.run_with_state(finders.start(), |tick, memory| {
         let traffic = traffic.map(|traffic| tick.get(traffic));
         let sent = finders.sample(&mut channel, memory, tick.time_ns(), tick.get(state), traffic);
         tick.write(output, sent)
@@ -260,9 +258,8 @@ fn run() -> Result<(), BusError> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::testing::{TICK_NS, require_hand_over, require_normal};
     use crate::wire::attitude_message;
-
-    const TICK_NS: u64 = 1_000_000;
 
     fn finders(params: RangeParams) -> RangeFinders {
         params.validate().unwrap();
@@ -294,7 +291,7 @@ mod tests {
         count: u64,
     ) -> Vec<Ranges> {
         let mut channel = Channel::new(&finders.params.timing(), 0.1, 5, "range").unwrap();
-        let mut memory = Memory { channel: ChannelState::default(), queue: [finders.nothing(); QUEUE] };
+        let mut memory = finders.start();
         let sample = |n| finders.sample(&mut channel, &mut memory, n * 100 * TICK_NS, truth, traffic);
         (0..count).map(sample).collect()
     }
@@ -363,16 +360,15 @@ mod tests {
         let bias_m = [0.1, -0.1, 0.0, 0.2, 0.05];
         let params = RangeParams { noise_m: 0.02, bias_m, ..perfect() };
         let samples = samples(&finders(params), &at([1.0, 2.0, 1.5], 0.0, 0.0, 0.0), None, 10_000);
+        let truth_m = [4.0, 6.0, 3.0, 7.0, 1.5];
         let errors = |beam: usize| {
-            let truth_m = [4.0, 6.0, 3.0, 7.0, 1.5][beam] + bias_m[beam];
-            samples.iter().map(move |ranges| (ranges.distance[beam] - truth_m) / 0.02).collect::<Vec<f64>>()
+            let expected_m = truth_m[beam] + bias_m[beam];
+            samples.iter().map(move |ranges| (ranges.distance[beam] - expected_m) / 0.02)
         };
         for beam in 0..BEAMS {
-            let mean = errors(beam).iter().sum::<f64>() / 1e4;
-            let variance = errors(beam).iter().map(|e| e * e).sum::<f64>() / 1e4;
-            assert!(mean.abs() < 0.06 && (variance - 1.0).abs() < 0.085, "{beam}: {mean} {variance}");
+            require_normal(errors(beam), 0.0, 1.0);
             let next = errors((beam + 1) % BEAMS);
-            let shared = errors(beam).iter().zip(next).map(|(a, b)| a * b).sum::<f64>() / 1e4;
+            let shared = errors(beam).zip(next).map(|(a, b)| a * b).sum::<f64>() / 1e4;
             assert!(shared.abs() < 0.06, "beams {beam} and the next share their noise: {shared}");
         }
     }
@@ -439,18 +435,9 @@ mod tests {
         let finders = finders(params);
         let channel = || Channel::new(&finders.params.timing(), 1e-3, 5, "range").unwrap();
         let truth = |tick: u64| at([1.0, tick as f64 * 1e-3, 1.5], 3.0, 4.0, tick as f64 * 0.1);
-        let mut first = channel();
-        let mut memory = Memory { channel: ChannelState::default(), queue: [finders.nothing(); QUEUE] };
-        for tick in 0..777 {
-            finders.sample(&mut first, &mut memory, tick * TICK_NS, &truth(tick), None);
-        }
-        let (mut second, mut handed) = (channel(), memory);
-        for tick in 777..2000 {
-            let expected = finders.sample(&mut first, &mut memory, tick * TICK_NS, &truth(tick), None);
-            let found = finders.sample(&mut second, &mut handed, tick * TICK_NS, &truth(tick), None);
-            assert_eq!(bytemuck::bytes_of(&found), bytemuck::bytes_of(&expected), "at tick {tick}");
-        }
-        assert!(bytemuck::bytes_of(&handed) == bytemuck::bytes_of(&memory));
+        require_hand_over(channel, finders.start(), |channel, memory: &mut Memory, now_ns| {
+            finders.sample(channel, memory, now_ns, &truth(now_ns / TICK_NS), None)
+        });
     }
 
     #[test]

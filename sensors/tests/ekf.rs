@@ -15,7 +15,6 @@ use nalgebra::{SVector, UnitQuaternion, Vector3};
 use rand_distr::{Distribution, StandardNormal};
 use sensors::ekf::filter::{Ekf, EkfState, deviation};
 use sensors::ekf::history::{Measurement, Newest, Reading, Sensor};
-use sensors::ekf::observation::magnetic_field_W_t;
 use sensors::ekf::params::EkfParams;
 use sensors::imu_model::{ImuModel, ImuParams, ImuReading, ImuState};
 use std::collections::VecDeque;
@@ -43,10 +42,10 @@ struct Timing {
     delay: usize,
 }
 
-const GPS: Timing = Timing { sensor: Sensor::Gps, period: 100, delay: 100 };
+const GPS: Timing = Timing { sensor: Sensor::Gps, period: 100, delay: 80 };
 const MOCAP: Timing = Timing { sensor: Sensor::Mocap, period: 10, delay: 10 };
-const BAROMETER: Timing = Timing { sensor: Sensor::Barometer, period: 20, delay: 5 };
-const MAGNETOMETER: Timing = Timing { sensor: Sensor::Magnetometer, period: 10, delay: 2 };
+const BAROMETER: Timing = Timing { sensor: Sensor::Barometer, period: 20, delay: 16 };
+const MAGNETOMETER: Timing = Timing { sensor: Sensor::Magnetometer, period: 10, delay: 6 };
 
 /// The sensors of a flight, which are worth what `params` says.
 struct World {
@@ -54,8 +53,8 @@ struct World {
     imu: ImuModel,
     imu_state: ImuState,
     random: Stream,
-    gps_offset_W_m: Vector3<f64>,
-    barometer_offset_m: f64,
+    gps_drift_W_m: Vector3<f64>,
+    barometer_bias_m: f64,
 }
 
 impl World {
@@ -70,18 +69,18 @@ impl World {
         };
         let imu = ImuModel::new(imu, 1.0 / PERIOD_S).unwrap();
         let imu_state = imu.initial_state(seed, "imu");
-        let gps_offset_W_m = offset_sigma_m(&params).component_mul(&normal3(&mut random));
-        let barometer_offset_m = params.barometer_initial_offset_sigma_m * normal(&mut random);
-        Self { params, imu, imu_state, random, gps_offset_W_m, barometer_offset_m }
+        let gps_drift_W_m = Vector3::from(params.gps_position_drift_m).component_mul(&normal3(&mut random));
+        let barometer_bias_m = params.barometer_initial_bias_sigma_m * normal(&mut random);
+        Self { params, imu, imu_state, random, gps_drift_W_m, barometer_bias_m }
     }
 
-    /// The offsets, one period on.
+    /// GPS drift and barometer bias, one period on.
     fn wander(&mut self) {
-        let fade = (-PERIOD_S / self.params.gps_offset_time_constant_s).exp();
-        let step = offset_sigma_m(&self.params) * (1.0 - fade * fade).sqrt();
-        self.gps_offset_W_m = fade * self.gps_offset_W_m + step.component_mul(&normal3(&mut self.random));
-        let walk = self.params.barometer_offset_walk_m_sqrt_s * PERIOD_S.sqrt();
-        self.barometer_offset_m += walk * normal(&mut self.random);
+        let fade = (-PERIOD_S / self.params.gps_position_drift_time_s).exp();
+        let step = Vector3::from(self.params.gps_position_drift_m) * (1.0 - fade * fade).sqrt();
+        self.gps_drift_W_m = fade * self.gps_drift_W_m + step.component_mul(&normal3(&mut self.random));
+        let walk = self.params.barometer_bias_walk_m_sqrt_s * PERIOD_S.sqrt();
+        self.barometer_bias_m += walk * normal(&mut self.random);
     }
 
     fn measure(&mut self, sensor: Sensor, truth: &Truth, now_ns: u64) -> Measurement {
@@ -95,42 +94,31 @@ impl World {
     }
 
     fn gps(&mut self, truth: &Truth) -> Vec<f64> {
-        let p = self.params;
-        let noise_m =
-            Vector3::new(p.gps_horizontal_sigma_m, p.gps_horizontal_sigma_m, p.gps_vertical_sigma_m);
-        let noise_m_s = Vector3::new(
-            p.gps_velocity_horizontal_sigma_m_s,
-            p.gps_velocity_horizontal_sigma_m_s,
-            p.gps_velocity_vertical_sigma_m_s,
-        );
-        let error_m = self.gps_offset_W_m + noise_m.component_mul(&normal3(&mut self.random));
-        let position = truth.position_W_m + error_m;
-        let velocity = truth.velocity_W_m_s + noise_m_s.component_mul(&normal3(&mut self.random));
+        let noise =
+            |sigma: [f64; 3], random: &mut Stream| Vector3::from(sigma).component_mul(&normal3(random));
+        let error_m = self.gps_drift_W_m + noise(self.params.gps_position_noise_m, &mut self.random);
+        let error_m_s = noise(self.params.gps_velocity_noise_m_s, &mut self.random);
+        let (position, velocity) = (truth.position_W_m + error_m, truth.velocity_W_m_s + error_m_s);
         position.iter().chain(velocity.iter()).copied().collect()
     }
 
     fn mocap(&mut self, truth: &Truth) -> Vec<f64> {
-        let position = truth.position_W_m + self.params.mocap_position_sigma_m * normal3(&mut self.random);
-        let turn_B = self.params.mocap_attitude_sigma_deg.to_radians() * normal3(&mut self.random);
+        let position = truth.position_W_m + self.params.mocap_position_noise_m * normal3(&mut self.random);
+        let turn_B = self.params.mocap_attitude_noise_deg.to_radians() * normal3(&mut self.random);
         let attitude = truth.attitude_WB * UnitQuaternion::from_scaled_axis(turn_B);
         position.iter().chain(attitude.coords.iter()).copied().collect()
     }
 
     fn barometer(&mut self, truth: &Truth) -> f64 {
-        let error_m = self.barometer_offset_m + self.params.barometer_sigma_m * normal(&mut self.random);
+        let error_m = self.barometer_bias_m + self.params.barometer_noise_m * normal(&mut self.random);
         truth.position_W_m.z + error_m
     }
 
     fn magnetometer(&mut self, truth: &Truth) -> Vec<f64> {
-        let field_B = truth.attitude_WB.inverse() * magnetic_field_W_t(&self.params);
-        let field_B = field_B + self.params.magnetometer_sigma_t * normal3(&mut self.random);
+        let field_B = truth.attitude_WB.inverse() * self.params.field_W_T();
+        let field_B = field_B + self.params.magnetometer_noise_T * normal3(&mut self.random);
         field_B.iter().copied().collect()
     }
-}
-
-fn offset_sigma_m(params: &EkfParams) -> Vector3<f64> {
-    let level_m = params.gps_offset_horizontal_sigma_m;
-    Vector3::new(level_m, level_m, params.gps_offset_vertical_sigma_m)
 }
 
 fn normal(random: &mut Stream) -> f64 {
@@ -345,9 +333,9 @@ fn a_filter_that_believes_a_wrong_noise_is_found_out() {
         change(&mut believed);
         consistency(&[MOCAP], EkfParams::default(), believed)
     };
-    let too_sure = wrong(|params| params.mocap_position_sigma_m *= 0.9);
+    let too_sure = wrong(|params| params.mocap_position_noise_m *= 0.9);
     assert!(!too_sure.holds(&[MOCAP]), "{too_sure}");
-    let too_humble = wrong(|params| params.mocap_attitude_sigma_deg *= 1.1);
+    let too_humble = wrong(|params| params.mocap_attitude_noise_deg *= 1.1);
     assert!(!too_humble.holds(&[MOCAP]), "{too_humble}");
     let steady = wrong(|params| params.accelerometer_bias_walk_m_s3_sqrt_hz *= 0.5);
     assert!(!steady.holds(&[MOCAP]), "{steady}");

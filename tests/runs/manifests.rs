@@ -659,6 +659,7 @@ fn the_documentation_has_every_key() {
     let end = "[process.recorder]\nkind = \"recorder\"\n";
     let list = |name: &str| format!("{end}\n[[{name}]]\nunknown_key = 1\n");
     let within = |process: &str, key: &str| format!("kind = \"{process}\"\n{key}.unknown_key = 1");
+    let sensor = |kind: &str| format!("{end}\n[process.sensor]\n{}\n", within(kind, "parameters"));
     let keys = [
         known_keys("window_ticks = 64", "unknown_key = 64"),
         known_keys("kind = \"imu\"", "kind = \"imu\"\nunknown_key = 1"),
@@ -675,8 +676,9 @@ fn the_documentation_has_every_key() {
         known_keys("kind = \"pid\"", &within("pid", "parameters.gains.roll")),
         known_keys("initial_altitude_m = 1.0", "initial_altitude_m = 1.0\nunknown_key = 1"),
     ];
-    let keys = keys.concat();
-    assert!(keys.len() > 80, "{keys:?}");
+    let sensors = ["gps", "barometer", "magnetometer", "mocap", "range", "battery"];
+    let keys = [keys.concat(), sensors.map(|kind| known_keys(end, &sensor(kind))).concat()].concat();
+    assert!(keys.len() > 150, "{keys:?}");
     for key in keys {
         let is_named = [format!("`{key}`"), format!("`{key}."), format!(".{key}`")];
         let is_shown = [format!("{key} = "), format!("{key}.")];
