@@ -52,9 +52,6 @@ pub const INERTIA: Dimension =
 pub const SPEED: Dimension =
     Dimension { name: "rotation speed", units: &[("rad/s", 1.0), ("rpm", RPM), ("deg/s", PI / 180.0)] };
 
-/// Speeds along a line.
-pub const VELOCITY: Dimension = Dimension { name: "velocity", units: &[("m/s", 1.0)] };
-
 /// Angular accelerations.
 pub const ANGULAR_ACCELERATION: Dimension =
     Dimension { name: "angular acceleration", units: &[("rad/s^2", 1.0), ("deg/s^2", PI / 180.0)] };
