@@ -4,8 +4,11 @@
 //! |---|---|
 //! | [`state`] | the rigid body and the rotors, as carried from tick to tick |
 //! | [`airframe`] | the forces that every backend moves the body by |
+//! | [`effects`] | the physics beyond the declared vehicle |
+//! | [`memory`] | what effects carry from tick to tick |
 //! | `motor` | the lag between commanded and actual rotor speed |
 //! | [`rotor`] | thrust and torques of the rotors on the body |
+//! | `rotation` | turning vectors inside of an integration step |
 //! | [`newton_euler`] | the free-flight backend: equations of motion and their integration |
 //! | [`node`] | the plant as a process of a run
 //!
@@ -24,13 +27,17 @@
 #![forbid(unsafe_code)]
 
 pub mod airframe;
+pub mod effects;
+pub mod memory;
 mod motor;
 pub mod newton_euler;
 pub mod node;
+mod rotation;
 pub mod rotor;
 pub mod state;
 
 pub use airframe::{Airframe, Drive};
+pub use memory::AirframeMemory;
 pub use newton_euler::{Motion, NewtonEuler};
 pub use rotor::Wrench;
 pub use state::{RigidBody, RotorState, State};

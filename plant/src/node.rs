@@ -5,6 +5,7 @@
 //! publishes at that tick is the end of the window before.
 #![allow(non_snake_case, reason = "a trailing _W or _B names the frame a vector is written in")]
 
+use crate::airframe::{Airframe, Drive};
 use crate::newton_euler::NewtonEuler;
 use crate::state::{RigidBody, State};
 use bus::kind::{Inputs, NodeKind, PortSpec, read_parameters};
@@ -15,7 +16,7 @@ use bus::{BusError, Message, Node, Output, Tick};
 use nalgebra::{UnitQuaternion, Vector3};
 use serde::Deserialize;
 use std::path::PathBuf;
-use vehicles::Vehicle;
+use vehicles::{Vehicle, VehicleError};
 
 /// The plant, for manifests.
 pub const KIND: NodeKind = NodeKind {
@@ -67,13 +68,17 @@ fn check(parameters: &serde_json::Value, inputs: &[&str]) -> Result<(), String> 
         (false, Some(_)) => return Err("the parameter `window_s` needs the input `measured`".to_owned()),
         _ => {}
     }
-    Vehicle::load(&parameters.vehicle).map(|_| ()).map_err(|error| error.to_string())
+    airframe(&parameters).map(|_| ()).map_err(|error| error.to_string())
+}
+
+fn airframe(parameters: &Parameters) -> Result<Airframe, VehicleError> {
+    Airframe::from_files(Vehicle::load(&parameters.vehicle)?, &[])
 }
 
 fn run() -> Result<(), BusError> {
     let mut node = Node::join()?;
     let parameters: Parameters = node.parameters()?;
-    let vehicle = Vehicle::load(&parameters.vehicle).map_err(|error| node.error(error))?;
+    let airframe = airframe(&parameters).map_err(|error| node.error(error))?;
     let command = node.input::<MotorCommand>("command")?;
     let measured = node.optional_input::<MeasuredState>("measured");
     let outputs = Outputs {
@@ -87,20 +92,22 @@ fn run() -> Result<(), BusError> {
         // It would apply a command before it was computed.
         return Err(node.error("a plant runs at every tick; leave `period_ticks` out"));
     }
-    let model = NewtonEuler::new(vehicle, parameters.substeps);
+    let model = NewtonEuler::flying(airframe, parameters.substeps);
+    let mut memory = model.airframe().memory(node.seed(), node.name(), dt_s);
     let body_at_start = RigidBody::level_at(Vector3::from(parameters.initial_position_m));
     let mut state = model.start(body_at_start, 0.0);
     node.run(|tick| {
         let window = measured.filter(|_| tick.number().is_multiple_of(window_ticks));
         let commands = tick.get(command).command;
         if tick.number() > 0 {
-            model.step(&mut state, &commands, dt_s);
+            let drive = model.airframe().begin_tick(&mut memory, &state, &commands, dt_s);
+            model.advance(&mut state, &drive, dt_s);
         } else {
             // The input's initial value: the rotors turn steadily at it when the run starts.
             state.rotors = commands.map(|command| model.steady(command));
             state.body = window.map_or(state.body, |measured| body(tick.get(measured)));
         }
-        outputs.publish(tick, &model, &state)?;
+        outputs.publish(tick, &model, &memory.drive, &state)?;
         if let Some(measured) = window {
             state.body = body(tick.get(measured));
         }
@@ -130,8 +137,14 @@ struct Outputs {
 }
 
 impl Outputs {
-    fn publish(&self, tick: &mut Tick<'_>, model: &NewtonEuler, state: &State) -> Result<(), BusError> {
-        tick.write(self.state, message(model, state))?;
+    fn publish(
+        &self,
+        tick: &mut Tick<'_>,
+        model: &NewtonEuler,
+        drive: &Drive,
+        state: &State,
+    ) -> Result<(), BusError> {
+        tick.write(self.state, message(model, drive, state))?;
         let position = point(&state.body.position_W_m);
         let orientation = orientation(&state.body.attitude_WB);
         if let Some(pose) = self.pose {
@@ -145,7 +158,7 @@ impl Outputs {
     }
 }
 
-fn message(model: &NewtonEuler, state: &State) -> PlantState {
+fn message(model: &NewtonEuler, drive: &Drive, state: &State) -> PlantState {
     let vector = |v: Vector3<f64>| <[f64; 3]>::from(v).into();
     let [x, y, z, w] = state.body.attitude_WB.coords.into();
     PlantState {
@@ -153,7 +166,7 @@ fn message(model: &NewtonEuler, state: &State) -> PlantState {
         velocity: vector(state.body.velocity_W_m_s),
         attitude: Quaternion { x, y, z, w },
         angular_velocity: vector(state.body.angular_velocity_B_rad_s),
-        specific_force: vector(model.motion(state).specific_force_B_m_s2),
+        specific_force: vector(model.motion_under(drive, state).specific_force_B_m_s2),
         rotor_speed: state.rotors.map(|rotor| rotor.speed_rad_s),
         ..Default::default()
     }

@@ -14,8 +14,9 @@ pub(crate) fn parse(text: &str, file_name: &str) -> Result<Scene, VehicleError> 
     let name = root.text("name")?.to_owned();
     let sections = if root.has("boxes") { root.sections("boxes")? } else { Vec::new() };
     let boxes = sections.iter().map(one_box).collect::<Result<_, _>>()?;
+    let effects = vehicles::effects::read(&root)?;
     root.finish()?;
-    Ok(Scene { name, boxes })
+    Ok(Scene { name, boxes, effects })
 }
 
 fn one_box(section: &Section) -> Result<Cuboid, VehicleError> {

@@ -3,7 +3,7 @@
 
 use nalgebra::Vector3;
 use std::path::Path;
-use vehicles::VehicleError;
+use vehicles::{EffectEntry, VehicleError};
 
 /// What stands around the vehicles, beside the ground at z = 0.
 #[derive(Debug, Clone, PartialEq)]
@@ -12,6 +12,8 @@ pub struct Scene {
     pub name: String,
     /// The boxes, in the file's order.
     pub boxes: Vec<Cuboid>,
+    /// Effects on every vehicle in the scene, such as wind; they act after those of its own file.
+    pub effects: Vec<EffectEntry>,
 }
 
 /// A solid box that stands still.
