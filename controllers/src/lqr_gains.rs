@@ -1,17 +1,17 @@
 //! The weights of the `lqr` controller: `controllers/gains/lqr.toml` and files like it.
+#![allow(non_snake_case, reason = "_N names the newton")]
 
 use crate::disturbance::Observer;
 use crate::gains_file::{self, limit};
 use std::path::Path;
 use vehicles::VehicleError;
 use vehicles::reader::Section;
-use vehicles::units::{ANGLE, Dimension, LENGTH, SPEED, VELOCITY};
+use vehicles::units::{ANGLE, Dimension, LENGTH, SPEED, TORQUE, VELOCITY};
 
 /// The weights that serve where the manifest names no file.
 const BUILT_IN: &str = include_str!("../gains/lqr.toml");
 
 const FORCE: Dimension = Dimension { name: "force", units: &[("N", 1.0)] };
-const TORQUE: Dimension = Dimension { name: "torque", units: &[("N*m", 1.0)] };
 
 /// Deviations that are worth one unit of cost each, and limits.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -29,13 +29,10 @@ pub struct LqrGains {
     /// Of the rate of yaw, rad/s.
     pub yaw_rate_rad_s: f64,
     /// Of the demanded thrust, N.
-    #[allow(non_snake_case, reason = "N is the newton")]
     pub thrust_N: f64,
     /// Of the demanded torque of roll and pitch, N·m.
-    #[allow(non_snake_case, reason = "N is the newton")]
     pub tilt_torque_N_m: f64,
     /// Of the demanded torque of yaw, N·m.
-    #[allow(non_snake_case, reason = "N is the newton")]
     pub yaw_torque_N_m: f64,
     /// The greatest error of position that is answered, m.
     pub position_max_m: f64,

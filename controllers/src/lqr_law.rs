@@ -108,7 +108,7 @@ impl LqrLaw {
         let to_heading = Rotation3::from_axis_angle(&Vector3::z_axis(), -heading_rad);
         let relative = needed.attitude.attitude_WB.inverse() * motion.attitude_WB;
         let rate = relative * motion.angular_velocity_B_rad_s - needed.attitude.angular_velocity_B_rad_s;
-        let mut deviation = SVector::zeros();
+        let mut deviation: SVector<f64, STATES> = SVector::zeros();
         let mut set = |at: usize, part: Vector3<f64>| deviation.fixed_rows_mut::<3>(at).copy_from(&part);
         set(0, to_heading * cut(off_W_m, self.gains.position_max_m));
         set(VELOCITY, to_heading * cut(off_W_m_s, self.gains.velocity_max_m_s));

@@ -1,13 +1,19 @@
 //! The controllers that follow a trajectory, in closed loops.
+#![allow(non_snake_case, reason = "_N names the newton")]
 
 mod common;
 
 use common::{Craft, Loop, PERIOD_S, airframe, course, vehicle};
+use controllers::allocation::Wrench;
+use controllers::cascade_gains::CascadeGains;
+use controllers::cascade_law::CascadeLaw;
 use controllers::controller::Controller;
 use controllers::geometric_gains::GeometricGains;
 use controllers::geometric_law::GeometricLaw;
 use controllers::lqr_gains::LqrGains;
 use controllers::lqr_law::LqrLaw;
+use controllers::pid_gains::PidGains;
+use controllers::pid_law::PidLaw;
 use nalgebra::{UnitQuaternion, Vector3};
 use vehicles::{MotorModel, Vehicle};
 
@@ -168,7 +174,7 @@ fn lqr_answers_alike_whatever_the_yaw() {
         flight.state.body.attitude_WB = turned;
         flight.state.body.position_W_m += turned * Vector3::new(0.3, 0.1, 0.0);
         let course = common::course_from(yaw_deg.to_radians());
-        (0..500).for_each(|_| drop(flight.step(&law, &course)));
+        flight.fly(&law, &course, 0.0, 0.5);
         turned.inverse() * flight.state.body.position_W_m
     });
     assert!(answers.iter().all(|answer| (answer - answers[0]).norm() < 1e-6), "{answers:?}");
@@ -218,4 +224,60 @@ fn an_lqr_without_a_solution_is_refused_with_a_reason() {
         controllers::controller::Airframe::new(Vehicle { gravity_m_s2: 0.0, ..vehicle() }).unwrap();
     let error = LqrLaw::new(LqrGains::load(None).unwrap(), &weightless, PERIOD_S).unwrap_err();
     assert!(error.contains("Riccati") && error.contains("`vehicle`"), "{error}");
+}
+
+/// The wrenches demanded at the last tick of `before`, which hovered 3 s, and over the half second of `after` behind it;
+/// and how far it was from the course in the 3 s after the swap.
+fn swap<A: Controller, B: Controller>(before: &A, after: &B) -> (Vec<Wrench>, f64) {
+    let course = common::course_from(0.0);
+    let mut flight = Loop::new(Craft::dragged(1));
+    flight.fly(before, &course, 0.0, 3.0);
+    let mut wrenches = vec![flight.demand];
+    for _ in 0..500 {
+        flight.step(after, &course);
+        wrenches.push(flight.demand);
+    }
+    let (_, greatest_m) = flight.fly(after, &course, 3.5, 6.5);
+    (wrenches, greatest_m)
+}
+
+/// The first demand of the successor against its predecessor's last, and the distance that is left.
+#[track_caller]
+fn assert_smooth<A: Controller, B: Controller>(name: &str, before: &A, after: &B, off_max_m: f64) {
+    let (wrenches, greatest_m) = swap(before, after);
+    let jump_N = (wrenches[1].thrust_N - wrenches[0].thrust_N).abs();
+    let jump_N_m = (wrenches[1].torque_B_N_m - wrenches[0].torque_B_N_m).norm();
+    println!("{name}: {jump_N:.1e} N, {jump_N_m:.1e} N m, then {greatest_m:.3} m off at most");
+    assert!(jump_N < 1e-9 && jump_N_m < 1e-9, "{name}: {jump_N} N, {jump_N_m} N m");
+    assert!(greatest_m < off_max_m, "{name}: {greatest_m}");
+}
+
+#[test]
+fn a_swap_to_or_from_the_tracking_laws_goes_on_from_the_wrench_that_was_asked_for() {
+    let (lqr, geometric) = (lqr(), geometric());
+    let pid = PidLaw { gains: PidGains::default(), vehicle: airframe().known(), period_s: PERIOD_S };
+    let cascade = CascadeLaw::new(CascadeGains::default(), airframe().known(), PERIOD_S);
+    assert_smooth("lqr to geometric", &lqr, &geometric, 0.05);
+    assert_smooth("geometric to lqr", &geometric, &lqr, 0.05);
+    assert_smooth("pid to lqr", &pid, &lqr, 0.5);
+    assert_smooth("pid to geometric", &pid, &geometric, 0.5);
+    assert_smooth("cascade to lqr", &cascade, &lqr, 0.5);
+    assert_smooth("cascade to geometric", &cascade, &geometric, 0.5);
+    // Neither holds a position, so in noise they drift.
+    assert_smooth("lqr to pid", &lqr, &pid, 2.0);
+    assert_smooth("geometric to pid", &geometric, &pid, 2.0);
+    assert_smooth("lqr to cascade", &lqr, &cascade, 2.0);
+    assert_smooth("geometric to cascade", &geometric, &cascade, 2.0);
+}
+
+#[test]
+fn between_the_tracking_laws_a_swap_in_the_middle_of_a_figure_eight_is_no_more_than_a_ripple() {
+    let course = course(FIGURE_EIGHT);
+    let mut flight = Loop::new(Craft::dragged(0));
+    flight.fly(&geometric(), &course, 0.0, 9.0);
+    let (rms_m, greatest_m) = flight.fly(&lqr(), &course, 9.0, 13.0);
+    println!("geometric to lqr in the eight: {rms_m:.3} m RMS, {greatest_m:.3} m at most");
+    let (back_rms_m, back_greatest_m) = flight.fly(&geometric(), &course, 13.0, 17.0);
+    println!("and back: {back_rms_m:.3} m RMS, {back_greatest_m:.3} m at most");
+    assert!(greatest_m < 0.2 && back_greatest_m < 0.2);
 }
