@@ -8,7 +8,7 @@
 //! |---|---|---|
 //! | 4.2, 6, 0, 0 | 23° | 2.0 |
 //! | 2.67, 6, 0, 0 (`pid`, ours) | 34° | 2.3 |
-//! | 3.2, 8, 2, 0.5 (here) | 48° | above 4 |
+//! | 3.5, 8, 2, 0.3 (here) | 37° | 2.6 |
 //!
 //! The derivative of the measured rate leads where the motors lag, and sees the gyroscope's noise through a
 //! filter of 20 ms. The filtered commands' own rates, fed forward, change no margin of this loop and shorten
