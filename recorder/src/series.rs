@@ -46,8 +46,39 @@ impl Recording {
     }
 }
 
-/// The unit of `field` in messages of `schema`, known before anything is recorded; `None` where the message
-/// has strings or sequences, whose fields are known only from data.
+impl Recording {
+    /// The unit of `field` on `topic`; `None` where it is a vector with the parts `x`, `y` and `z`.
+    ///
+    /// # Errors
+    /// If there is no such topic, or neither such a field nor such a vector.
+    pub fn unit_of(&self, topic: &str, field: &str) -> Result<Option<String>, RecordingError> {
+        self.topic(topic)?;
+        let Some(record) = self.messages().find(|record| record.as_ref().map_or(true, |r| r.topic == topic))
+        else {
+            return Ok(Some(String::new()));
+        };
+        let record = record?;
+        let leaves = self.decode(&record)?;
+        unit(&leaves, topic, field)
+    }
+}
+
+/// The unit of a field among `leaves`; `None` for a vector.
+fn unit(leaves: &[Leaf], topic: &str, field: &str) -> Result<Option<String>, RecordingError> {
+    let has = |name: String| leaves.iter().any(|leaf| leaf.path == name);
+    match value(leaves, field) {
+        Some((_, unit)) => Ok(Some(unit.to_owned())),
+        None if ["x", "y", "z"].iter().all(|axis| has(format!("{field}.{axis}")))
+            && !has(format!("{field}.w")) =>
+        {
+            Ok(None)
+        }
+        None => Err(unknown(topic, field, leaves)),
+    }
+}
+
+/// The unit of `field` in messages of `schema`, that of its parts for a vector, known before anything is recorded;
+/// `None` where the message has strings or sequences, whose fields are known only from data.
 ///
 /// # Errors
 /// If there is no such field; the error lists those there are.
@@ -62,9 +93,9 @@ pub fn unit_of(schema: &Schema, topic: &str, field: &str) -> Result<Option<Strin
         type_name: schema.type_name.to_owned(),
         reason,
     })?;
-    match value(&leaves, field) {
-        Some((_, unit)) => Ok(Some(unit.to_owned())),
-        None => Err(unknown(topic, field, &leaves)),
+    match unit(&leaves, topic, field)? {
+        Some(unit) => Ok(Some(unit)),
+        None => Ok(value(&leaves, &format!("{field}.x")).map(|(_, unit)| unit.to_owned())),
     }
 }
 

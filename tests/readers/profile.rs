@@ -9,7 +9,7 @@ use std::process::{Command, Output};
 use tempfile::TempDir;
 
 /// The nodes of the hover.
-const NODES: usize = 6;
+const NODES: usize = 7;
 
 #[test]
 fn perfetto_finds_every_slice_and_every_hop() {
