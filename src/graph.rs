@@ -42,8 +42,8 @@ pub struct Graph {
     pub successors: Vec<Successor>,
     /// Processes that take no part in the ticks: their names and what to start.
     pub companions: Vec<(String, Program)>,
-    /// The vehicle files the processes name, each once.
-    pub vehicles: Vec<PathBuf>,
+    /// The vehicle, scene and gains files the processes name, each once.
+    pub models: Vec<PathBuf>,
 }
 
 impl Graph {
@@ -60,17 +60,17 @@ impl Graph {
         let clock_cpu = manifest.content.run.clock_cpu.as_ref();
         processes::require_core(manifest, clock_cpu, "clock_cpu")?;
         placement::place(&mut plan, clock_cpu.map(|cpu| *cpu.get_ref()));
-        let mut vehicles = Vec::new();
+        let mut models = Vec::new();
         for (member, node) in members.iter().zip(&mut plan.nodes) {
-            parameters::set(manifest, member, node, &mut vehicles)?;
+            parameters::set(manifest, member, node, &mut models)?;
             processes::require_replaceable(manifest, member, node)?;
         }
         recorders::require_one_recorder(manifest, &members)?;
         recorders::require_whole_recording(manifest, &members, &plan.nodes)?;
-        let successors = successors::all(manifest, &plan, &members, &mut vehicles)?;
+        let successors = successors::all(manifest, &plan, &members, &mut models)?;
         let programs: Vec<Program> = members.into_iter().map(|member| member.program).collect();
         evaluations::check(manifest, &plan, &programs)?;
-        Ok(Self { plan, programs, successors, companions, vehicles })
+        Ok(Self { plan, programs, successors, companions, models })
     }
 }
 

@@ -123,7 +123,7 @@ fn prepare(manifest: &Manifest, graph: &mut Graph, recording: &Path, run_dir: &R
     let name = |path: &Path| path.file_name().unwrap_or_default().to_string_lossy().into_owned();
     let mut attachments = vec![(name(&manifest.path), manifest_copy)];
     attachments.extend(manifest.included.iter().map(|path| (name(path), path.clone())));
-    attachments.extend(graph.vehicles.iter().map(|path| (name(path), path.clone())));
+    attachments.extend(graph.models.iter().map(|path| (name(path), path.clone())));
     let attachments: Vec<_> =
         attachments.iter().map(|(name, path)| serde_json::json!({ "name": name, "path": path })).collect();
     for (program, node) in graph.programs.iter().zip(&mut graph.plan.nodes) {

@@ -34,6 +34,8 @@ impl PortSpec {
 pub enum Inputs {
     /// These.
     Ports(&'static [PortSpec]),
+    /// One or more of this message, under names that the manifest chooses.
+    Many(&'static Schema),
     /// Any topics; all of the run where the manifest names none.
     Any,
 }

@@ -5,6 +5,15 @@
 use crate::Message;
 use crate::schema::{FieldType, Kind, Schema};
 
+mod control;
+mod sensing;
+
+pub use control::{ControlStatus, Reference};
+pub use sensing::{
+    Barometer, Battery, Contact, Gps, Innovation, Magnetometer, Mocap, Ranges, StateEstimate, Traffic,
+    WallEstimate,
+};
+
 /// Simulation time as ROS 2 writes it. The bus fills it in when a sample is sent.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Message)]
 #[repr(C)]
@@ -362,16 +371,29 @@ pub struct MeasuredState {
 
 /// Every message that a topic of a built-in node can carry, in alphabetical order.
 #[must_use]
-pub fn all() -> [&'static Schema; 8] {
+pub fn all() -> [&'static Schema; 21] {
     [
         AttitudeEstimate::SCHEMA,
+        Barometer::SCHEMA,
+        Battery::SCHEMA,
         BodyTransform::SCHEMA,
+        Contact::SCHEMA,
+        ControlStatus::SCHEMA,
+        Gps::SCHEMA,
         Imu::SCHEMA,
+        Innovation::SCHEMA,
+        Magnetometer::SCHEMA,
         MeasuredState::SCHEMA,
+        Mocap::SCHEMA,
         MotorCommand::SCHEMA,
         PlantState::SCHEMA,
         PoseStamped::SCHEMA,
+        Ranges::SCHEMA,
+        Reference::SCHEMA,
         SetPoint::SCHEMA,
+        StateEstimate::SCHEMA,
+        Traffic::SCHEMA,
+        WallEstimate::SCHEMA,
     ]
 }
 

@@ -5,6 +5,7 @@
 //! - [`pid_gains`]: the gains of the `pid` controller, ours beside the thesis's.
 //! - [`pid_law`]: altitude and attitude PID, from set point and measurement to a wrench.
 //! - [`allocation`]: from a wrench to the speeds of four rotors.
+//! - [`controller`]: what all controllers share, and the node that runs any of them.
 //! - [`pid`], [`pilot`], [`player`]: the nodes.
 //! - [`flight_log`]: a measured flight as CSV with a column map.
 //! - [`angle`]: the difference of two angles.
@@ -12,6 +13,7 @@
 
 pub mod allocation;
 pub mod angle;
+pub mod controller;
 pub mod flight_log;
 pub mod pid;
 pub mod pid_gains;

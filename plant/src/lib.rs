@@ -3,6 +3,7 @@
 //! | room | what it holds |
 //! |---|---|
 //! | [`state`] | the rigid body and the rotors, as carried from tick to tick |
+//! | [`airframe`] | the forces that every backend moves the body by |
 //! | `motor` | the lag between commanded and actual rotor speed |
 //! | [`rotor`] | thrust and torques of the rotors on the body |
 //! | [`newton_euler`] | the free-flight backend: equations of motion and their integration |
@@ -22,12 +23,14 @@
 //! ```
 #![forbid(unsafe_code)]
 
+pub mod airframe;
 mod motor;
 pub mod newton_euler;
 pub mod node;
 pub mod rotor;
 pub mod state;
 
+pub use airframe::{Airframe, Drive};
 pub use newton_euler::{Motion, NewtonEuler};
 pub use rotor::Wrench;
 pub use state::{RigidBody, RotorState, State};

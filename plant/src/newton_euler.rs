@@ -9,14 +9,13 @@
 use nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};
 use vehicles::Vehicle;
 
-use crate::motor;
-use crate::rotor::{self, Wrench};
+use crate::airframe::{Airframe, Drive};
 use crate::state::{Rates, RigidBody, RotorRates, RotorState, State};
 
 /// The model: immutable, while the [`State`] it moves belongs to the caller.
 #[derive(Debug, Clone)]
 pub struct NewtonEuler {
-    vehicle: Vehicle,
+    airframe: Airframe,
     inverse_inertia: Matrix3<f64>,
     gravity_W_m_s2: Vector3<f64>,
     substeps: u32,
@@ -37,17 +36,22 @@ impl NewtonEuler {
         // A vehicle's tensor is positive definite, so the inverse exists; zero would only freeze the rotation.
         let inverse_inertia = vehicle.inertia_kg_m2.try_inverse().unwrap_or_else(Matrix3::zeros);
         let gravity_W_m_s2 = Vector3::new(0.0, 0.0, -vehicle.gravity_m_s2);
-        NewtonEuler { vehicle, inverse_inertia, gravity_W_m_s2, substeps: substeps.max(1) }
+        NewtonEuler {
+            airframe: Airframe::new(vehicle),
+            inverse_inertia,
+            gravity_W_m_s2,
+            substeps: substeps.max(1),
+        }
     }
 
     /// The vehicle this model flies.
     pub fn vehicle(&self) -> &Vehicle {
-        &self.vehicle
+        self.airframe.vehicle()
     }
 
     /// A rotor that has settled at a raw motor command.
     pub fn steady(&self, command: f64) -> RotorState {
-        RotorState::steady(self.vehicle.command.speed(command))
+        RotorState::steady(self.vehicle().command.speed(command))
     }
 
     /// A state with all four rotors settled at the same raw motor command.
@@ -57,60 +61,52 @@ impl NewtonEuler {
 
     /// Moves `state` by one tick of `dt_s` under raw motor `commands` held over the tick.
     pub fn step(&self, state: &mut State, commands: &[f64; 4], dt_s: f64) {
-        let targets_rad_s = commands.map(|command| self.vehicle.command.speed(command));
+        let drive = self.airframe.begin_tick(commands);
         let span_s = dt_s / f64::from(self.substeps);
         for _ in 0..self.substeps {
-            *state = self.runge_kutta(state, &targets_rad_s, span_s);
+            *state = self.runge_kutta(state, &drive, span_s);
         }
         state.body.attitude_WB = UnitQuaternion::new_normalize(state.body.attitude_WB.into_inner());
-        for (rotor, target_rad_s) in state.rotors.iter_mut().zip(targets_rad_s) {
-            *rotor = motor::settled(&self.vehicle.motor, rotor, target_rad_s);
-        }
+        state.rotors = self.airframe.settled(&drive, &state.rotors);
     }
 
     /// Specific force and angular acceleration at `state`.
     pub fn motion(&self, state: &State) -> Motion {
-        let wrench = self.wrench(state, &state.rotors.map(shown_rates));
+        let wrench = self.airframe.wrench(state, &state.rotors.map(shown_rates));
         Motion {
-            specific_force_B_m_s2: wrench.force_B_N / self.vehicle.mass_kg,
+            specific_force_B_m_s2: wrench.force_B_N / self.vehicle().mass_kg,
             angular_acceleration_B_rad_s2: self.angular_acceleration(state, &wrench.torque_B_N_m),
         }
     }
 
     /// One classic Runge-Kutta step of fourth order over the full state.
-    fn runge_kutta(&self, state: &State, targets_rad_s: &[f64; 4], span_s: f64) -> State {
-        let k1 = self.rates(state, targets_rad_s);
-        let k2 = self.rates(&state.moved(&k1, span_s / 2.0), targets_rad_s);
-        let k3 = self.rates(&state.moved(&k2, span_s / 2.0), targets_rad_s);
-        let k4 = self.rates(&state.moved(&k3, span_s), targets_rad_s);
+    fn runge_kutta(&self, state: &State, drive: &Drive, span_s: f64) -> State {
+        let k1 = self.rates(state, drive);
+        let k2 = self.rates(&state.moved(&k1, span_s / 2.0), drive);
+        let k3 = self.rates(&state.moved(&k2, span_s / 2.0), drive);
+        let k4 = self.rates(&state.moved(&k3, span_s), drive);
         let sum = k1.plus(&k2, 2.0).plus(&k3, 2.0).plus(&k4, 1.0);
         state.moved(&sum, span_s / 6.0)
     }
 
-    fn rates(&self, state: &State, targets_rad_s: &[f64; 4]) -> Rates {
-        let rotors: [RotorRates; 4] =
-            std::array::from_fn(|i| motor::rates(&self.vehicle.motor, &state.rotors[i], targets_rad_s[i]));
-        let wrench = self.wrench(state, &rotors);
+    fn rates(&self, state: &State, drive: &Drive) -> Rates {
+        let rotors = self.airframe.rotor_rates(drive, state);
+        let wrench = self.airframe.wrench(state, &rotors);
         let attitude_WB = state.body.attitude_WB.as_ref();
         let force_W_N = rotated(attitude_WB, &wrench.force_B_N);
         Rates {
             velocity_W_m_s: state.body.velocity_W_m_s,
-            acceleration_W_m_s2: self.gravity_W_m_s2 + force_W_N / self.vehicle.mass_kg,
+            acceleration_W_m_s2: self.gravity_W_m_s2 + force_W_N / self.vehicle().mass_kg,
             attitude_WB_per_s: quaternion_rate(attitude_WB, &state.body.angular_velocity_B_rad_s),
             angular_acceleration_B_rad_s2: self.angular_acceleration(state, &wrench.torque_B_N_m),
             rotors,
         }
     }
 
-    /// All forces but gravity, and their torques about the centre of mass.
-    fn wrench(&self, state: &State, rotors: &[RotorRates; 4]) -> Wrench {
-        rotor::wrench(&self.vehicle, &state.rotors, rotors, &state.body.angular_velocity_B_rad_s)
-    }
-
     /// J^-1 (tau - w x J w).
     fn angular_acceleration(&self, state: &State, torque_B_N_m: &Vector3<f64>) -> Vector3<f64> {
         let w = &state.body.angular_velocity_B_rad_s;
-        self.inverse_inertia * (torque_B_N_m - w.cross(&(self.vehicle.inertia_kg_m2 * w)))
+        self.inverse_inertia * (torque_B_N_m - w.cross(&(self.vehicle().inertia_kg_m2 * w)))
     }
 }
 

@@ -5,7 +5,7 @@ use super::processes::Member;
 use crate::manifest::{InputSetting, Manifest};
 use crate::placement;
 use crate::problem::{Problem, nearest};
-use crate::program::Executable;
+use crate::program::{Executable, Program};
 use bus::kind::{Inputs, NodeKind, PortSpec};
 use bus::plan::{InputPlan, NodePlan, TopicPlan};
 use toml::Spanned;
@@ -49,6 +49,13 @@ pub fn inputs(
             ));
         }
     }
+    if let Executable::Kind(NodeKind { inputs: Inputs::Many(schema), .. }) = &program.executable
+        && process.inputs.is_empty()
+    {
+        let message = format!("process `{}` has no input", name.get_ref());
+        let help = format!("name topics of {} under inputs, such as inputs.h1 = \"/…\"", schema.type_name);
+        return Err(manifest.problem(&name.span(), message, help));
+    }
     process.inputs.iter().map(|(port, setting)| input(manifest, member, port, setting, topics)).collect()
 }
 
@@ -68,9 +75,7 @@ fn input(
         let help = nearest(&setting.topic, known).map_or(list, |near| format!("did you mean {near}?"));
         return Err(at(format!("{who}: nobody publishes {}", setting.topic), help));
     };
-    if let Executable::Kind(NodeKind { inputs: Inputs::Ports(ports), .. }) = &program.executable {
-        let spec = ports.iter().find(|spec| spec.name == port.get_ref().as_str());
-        let expected = spec.map_or("", |spec| spec.schema.type_name);
+    if let Some(expected) = expected_type(program, port.get_ref()) {
         let found = &topics[topic].type_name;
         if expected != found {
             let help = format!("wire a topic of {expected}");
@@ -104,6 +109,17 @@ fn input(
         delay_ticks: setting.delay_ticks,
         initial: setting.initial.clone(),
     })
+}
+
+/// The type that a built-in node reads on `port`; none where it reads any.
+fn expected_type(program: &Program, port: &str) -> Option<&'static str> {
+    match &program.executable {
+        Executable::Kind(NodeKind { inputs: Inputs::Ports(ports), .. }) => {
+            Some(ports.iter().find(|spec| spec.name == port).map_or("", |spec| spec.schema.type_name))
+        }
+        Executable::Kind(NodeKind { inputs: Inputs::Many(schema), .. }) => Some(schema.type_name),
+        _ => None,
+    }
 }
 
 /// Refuses a cycle of edges without delay: at its first tick every node of it would wait for another.

@@ -10,7 +10,7 @@ use std::path::PathBuf;
 use toml::Spanned;
 
 /// Gives `node` the parameters of `member`, files resolved, checked where its kind is built in; notes its
-/// vehicle file in `vehicles`.
+/// vehicle, scene and gains file in `models`.
 ///
 /// # Errors
 /// A file or a parameter that is refused.
@@ -18,17 +18,17 @@ pub fn set(
     manifest: &Manifest,
     member: &Member<'_>,
     node: &mut NodePlan,
-    vehicles: &mut Vec<PathBuf>,
+    models: &mut Vec<PathBuf>,
 ) -> Result<(), Problem> {
     let Member { name, process, program } = member;
     let mut parameters: BTreeMap<&str, serde_json::Value> =
         process.parameters.iter().map(|(key, value)| (key.get_ref().as_str(), value.clone())).collect();
-    for (key, file) in [("vehicle", &process.vehicle), ("data", &process.data)] {
+    for (key, file) in files(process) {
         if let Some(file) = file {
             let path = manifest.resolve(file)?;
             parameters.insert(key, path.to_string_lossy().into());
-            if key == "vehicle" && !vehicles.contains(&path) {
-                vehicles.push(path);
+            if key != "data" && !models.contains(&path) {
+                models.push(path);
             }
         }
     }
@@ -41,6 +41,16 @@ pub fn set(
     }
     node.parameters = parameters;
     Ok(())
+}
+
+/// The keys of a process that name a file which becomes a parameter.
+fn files(process: &Process) -> [(&'static str, &Option<Spanned<String>>); 4] {
+    [
+        ("vehicle", &process.vehicle),
+        ("scene", &process.scene),
+        ("gains", &process.gains),
+        ("data", &process.data),
+    ]
 }
 
 /// A recorder's file and attachments come from the launcher.
@@ -57,24 +67,25 @@ fn require_none(manifest: &Manifest, process: &Process) -> Result<(), Problem> {
 
 /// The place of a refused parameter: that of the first key or file the reason names, or of the process.
 fn refused(manifest: &Manifest, name: &Spanned<String>, process: &Process, reason: &str) -> Problem {
-    let mut files = [&process.vehicle, &process.data].into_iter().flatten();
+    let mut named = files(process).into_iter().filter_map(|(_, file)| file.as_ref());
     let is_named = |file: &&Spanned<String>| {
         manifest.resolve(file).is_ok_and(|path| reason.contains(&*path.to_string_lossy()))
     };
-    let named_file = files.find(is_named).map(Spanned::span);
+    let named_file = named.find(is_named).map(Spanned::span);
     let mut quoted = reason.split('`').skip(1).step_by(2);
     let key = |word: &str| process.parameters.keys().find(|key| key.get_ref() == word).map(Spanned::span);
-    let file = |word: &str| match word {
-        "vehicle" => process.vehicle.as_ref().map(Spanned::span),
-        "data" => process.data.as_ref().map(Spanned::span),
-        _ => None,
+    let file = |word: &str| {
+        let stated = files(process).into_iter().find(|(key, _)| *key == word);
+        stated.and_then(|(_, file)| file.as_ref()).map(Spanned::span)
     };
     let span = quoted
         .find_map(|word| key(word).or_else(|| file(word)))
         .or(named_file)
         .unwrap_or_else(|| name.span());
     let help = match reason.split('`').nth(1).filter(|_| reason.starts_with("missing field")) {
-        Some(file @ ("vehicle" | "data")) => format!("add {file} = \"PATH\" to [process.{}]", name.get_ref()),
+        Some(file @ ("vehicle" | "scene" | "gains" | "data")) => {
+            format!("add {file} = \"PATH\" to [process.{}]", name.get_ref())
+        }
         Some(key) => format!("add {key} = … to [process.{}.parameters]", name.get_ref()),
         None => String::new(),
     };

@@ -62,6 +62,8 @@ fn require_no_node(manifest: &Manifest, name: &Spanned<String>, process: &Proces
     let stated = [
         ("kind", process.kind.as_ref().map(Spanned::span)),
         ("vehicle", process.vehicle.as_ref().map(Spanned::span)),
+        ("scene", process.scene.as_ref().map(Spanned::span)),
+        ("gains", process.gains.as_ref().map(Spanned::span)),
         ("data", process.data.as_ref().map(Spanned::span)),
         ("period_ticks", process.period_ticks.as_ref().map(Spanned::span)),
         ("cpu", process.cpu.as_ref().map(Spanned::span)),

@@ -43,24 +43,24 @@ pub fn all(
     manifest: &Manifest,
     plan: &Plan,
     members: &[Member<'_>],
-    vehicles: &mut Vec<PathBuf>,
+    models: &mut Vec<PathBuf>,
 ) -> Result<Vec<Successor>, Problem> {
     let run = Run { manifest, plan, members };
     let mut placed = Vec::new();
     for (node, member) in members.iter().enumerate() {
         if let Some(standby) = &member.process.standby {
-            let (plan, program) = run.resolve(node, standby.get_ref(), &standby.span(), vehicles)?;
+            let (plan, program) = run.resolve(node, standby.get_ref(), &standby.span(), models)?;
             placed.push(Placed { successor: lasting(node, true, plan, program), span: standby.span() });
         }
     }
     for shadow in &manifest.content.shadow {
         let node = run.node(&shadow.get_ref().process)?;
-        let (plan, program) = run.resolve(node, &shadow.get_ref().with, &shadow.span(), vehicles)?;
+        let (plan, program) = run.resolve(node, &shadow.get_ref().with, &shadow.span(), models)?;
         placed.push(Placed { successor: lasting(node, false, plan, program), span: shadow.span() });
     }
     for swap in &manifest.content.swap {
         let node = run.node(&swap.get_ref().process)?;
-        let (plan, program) = run.resolve(node, &swap.get_ref().with, &swap.span(), vehicles)?;
+        let (plan, program) = run.resolve(node, &swap.get_ref().with, &swap.span(), models)?;
         for (join_tick, at_tick) in run.times(node, swap)? {
             let (plan, program) = (plan.clone(), program.clone());
             let take_over_tick = Some(at_tick);
@@ -117,7 +117,7 @@ impl Run<'_> {
         node: usize,
         whole: &Process,
         span: &Range<usize>,
-        vehicles: &mut Vec<PathBuf>,
+        models: &mut Vec<PathBuf>,
     ) -> Result<(NodePlan, Program), Problem> {
         let name = Spanned::new(span.clone(), self.plan.nodes[node].name.clone());
         let program = program(self.manifest, &name, whole)?;
@@ -129,7 +129,7 @@ impl Run<'_> {
         members[node] = Member { name: &name, process: &process, program };
         let mut wiring = wire(self.manifest, &members, Some(node))?;
         let mut plan = wiring.nodes.swap_remove(node);
-        parameters::set(self.manifest, &members[node], &mut plan, vehicles)?;
+        parameters::set(self.manifest, &members[node], &mut plan, models)?;
         self.require_room(node, &plan, span)?;
         for input in &mut plan.inputs {
             // The same topics, but perhaps in another order.

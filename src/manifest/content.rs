@@ -78,6 +78,10 @@ pub struct Process {
     pub lockstep: Option<Spanned<bool>>,
     /// Vehicle file, relative to the manifest.
     pub vehicle: Option<Spanned<String>>,
+    /// Scene file, relative to the manifest.
+    pub scene: Option<Spanned<String>>,
+    /// File of a controller's gains, relative to the manifest.
+    pub gains: Option<Spanned<String>>,
     /// Data file, relative to the manifest.
     pub data: Option<Spanned<String>>,
     /// Ticks between two computations.

@@ -13,7 +13,7 @@ pub enum Role {
     Flown,
     /// What an estimator made of it: a thin line.
     Estimated,
-    /// What was measured in a real flight: a thin line.
+    /// What a sensor measured, or was measured in a real flight: a thin line.
     Measured,
     /// What was asked for: a dashed line.
     Asked,
@@ -23,10 +23,19 @@ impl Role {
     /// The role of what a topic of type `type_name` carries.
     fn of(type_name: &str) -> Self {
         match own_name(type_name) {
-            "SetPoint" | "Reference" => Self::Asked,
-            "MeasuredState" => Self::Measured,
+            "SetPoint" | "ControlStatus" | "Reference" => Self::Asked,
+            "MeasuredState" | "Imu" | "Gps" | "Mocap" | "Barometer" | "Magnetometer" => Self::Measured,
             name if name.ends_with("Estimate") => Self::Estimated,
             _ => Self::Flown,
+        }
+    }
+
+    /// Which line lies upon which: an estimator's noise must not hide what was flown, nor this what was asked for.
+    pub fn layer(self) -> u8 {
+        match self {
+            Self::Estimated | Self::Measured => 0,
+            Self::Flown => 1,
+            Self::Asked => 2,
         }
     }
 
@@ -46,12 +55,13 @@ struct Figure {
     title: &'static str,
     /// What its vertical axis shows.
     label: &'static str,
-    /// Message types and the fields of theirs that belong here.
+    /// Message types and the fields of theirs that belong here. Of the types that ask for something, only the first
+    /// that is there is drawn: mostly the others ask for the same.
     rows: &'static [(&'static str, &'static [&'static str])],
 }
 
-/// The figures in which the thesis shows a flight (its Figs 5.1–5.5).
-const FIGURES: [Figure; 6] = [
+/// The figures in which the thesis shows a flight (its Figs 5.1–5.5), and the distances that its wall following uses.
+const FIGURES: [Figure; 7] = [
     Figure {
         title: "Attitude",
         label: "angle",
@@ -60,13 +70,14 @@ const FIGURES: [Figure; 6] = [
             ("MeasuredState", &["attitude"]),
             ("AttitudeEstimate", &["attitude"]),
             ("StateEstimate", &["attitude"]),
+            ("ControlStatus", &["attitude_set_point"]),
             ("SetPoint", &["roll", "pitch", "yaw"]),
             ("Reference", &["yaw"]),
         ],
     },
     Figure {
         title: "Body rates",
-        label: "angular velocity",
+        label: "angular velocity in the body",
         rows: &[
             ("PlantState", &["angular_velocity"]),
             ("MeasuredState", &["angular_velocity"]),
@@ -91,9 +102,15 @@ const FIGURES: [Figure; 6] = [
             ("PlantState", &["position"]),
             ("MeasuredState", &["position"]),
             ("StateEstimate", &["position"]),
-            ("SetPoint", &["altitude"]),
             ("Reference", &["position"]),
+            ("ControlStatus", &["altitude_set_point"]),
+            ("SetPoint", &["altitude"]),
         ],
+    },
+    Figure {
+        title: "Distances",
+        label: "distance",
+        rows: &[("Ranges", &["distance"]), ("WallEstimate", &["distance"])],
     },
     Figure { title: "Motor command", label: "command", rows: &[("MotorCommand", &["command"])] },
     Figure { title: "Rotor speed", label: "rotor speed", rows: &[("PlantState", &["rotor_speed"])] },
@@ -240,16 +257,31 @@ fn belongs(topic: &str, vehicle: &str, vehicles: &[String]) -> bool {
 }
 
 fn default_panel(recording: &Recording, vehicle: &str, vehicles: &[String]) -> Panel {
-    let axes = FIGURES.iter().map(|figure| {
-        let asks = figure.rows.iter().flat_map(|(type_name, fields)| {
-            let of_type =
-                recording.topics().iter().filter(move |(_, topic)| own_name(&topic.type_name) == *type_name);
-            let own = of_type.filter(|(name, _)| belongs(name, vehicle, vehicles));
-            own.flat_map(|(name, topic)| fields.iter().map(move |field| ask(name, field, &topic.type_name)))
-        });
-        Wanted { title: figure.title, label: figure.label, asks: asks.collect() }
+    let own: Vec<(&str, &str)> = recording
+        .topics()
+        .iter()
+        .filter(|(name, _)| belongs(name, vehicle, vehicles))
+        .map(|(name, topic)| (name.as_str(), topic.type_name.as_str()))
+        .collect();
+    let axes = FIGURES.iter().map(|figure| Wanted {
+        title: figure.title,
+        label: figure.label,
+        asks: default_asks(figure, &own),
     });
     Panel { vehicle: vehicle.to_owned(), axes: axes.filter(|axes| !axes.asks.is_empty()).collect() }
+}
+
+/// What a figure draws of these topics, given with their types.
+fn default_asks(figure: &Figure, topics: &[(&str, &str)]) -> Vec<Ask> {
+    let mut asks: Vec<Ask> = Vec::new();
+    for (row, fields) in figure.rows {
+        let of_type = topics.iter().filter(|(_, type_name)| own_name(type_name) == *row);
+        let more =
+            of_type.flat_map(|(topic, type_name)| fields.iter().map(|field| ask(topic, field, type_name)));
+        let is_asked = asks.iter().any(|ask| ask.role == Role::Asked);
+        asks.extend(more.filter(|ask| !is_asked || ask.role != Role::Asked));
+    }
+    asks
 }
 
 fn ask(topic: &str, field: &str, type_name: &str) -> Ask {

@@ -98,7 +98,7 @@ fn axes(wanted: &Wanted, read: &[Curves]) -> Result<Axes> {
         wanted.asks.iter().zip(read).flat_map(|(ask, curves)| curves.iter().map(move |curve| (ask, curve)));
     let mut curves: Vec<Curve> = pairs
         .map(|(ask, (channel, curve))| Curve {
-            name: format!("{}{}", short(&channel.path), ask.role.suffix()),
+            name: String::new(),
             topic: ask.topic.clone(),
             field: channel.path.clone(),
             role: ask.role,
@@ -108,7 +108,7 @@ fn axes(wanted: &Wanted, read: &[Curves]) -> Result<Axes> {
         })
         .collect();
     curves.sort_by_key(|curve| curve.role);
-    tell_apart(&mut curves);
+    name(&mut curves);
     colour(&mut curves);
     let fields = || distinct(wanted.asks.iter().map(|ask| ask.field.as_str()));
     let label = if wanted.label.is_empty() { fields() } else { wanted.label.to_owned() };
@@ -148,13 +148,21 @@ fn short(path: &str) -> &str {
     path.rsplit_once('.').map_or(path, |(_, last)| last)
 }
 
-/// Adds the topic to names that two curves have, and what it is of to those of one topic.
-fn tell_apart(curves: &mut [Curve]) {
-    let names: Vec<String> = curves.iter().map(|curve| curve.name.clone()).collect();
-    for (index, curve) in curves.iter_mut().enumerate() {
-        if names.iter().filter(|name| **name == names[index]).count() > 1 {
-            curve.name = format!("{} {}", curve.topic, curve.field);
-        }
+/// Names what is flown by its component, and every other by that and its role; by topic and field where two would be
+/// called the same.
+fn name(curves: &mut [Curve]) {
+    let named = |curve: &Curve| {
+        let is_fellow = |other: &&Curve| {
+            other.role == Role::Flown
+                && component(&other.field).is_some_and(|it| component(&curve.field) == Some(it))
+        };
+        let fellow = curves.iter().find(is_fellow).filter(|_| curve.role != Role::Flown);
+        format!("{}{}", short(&fellow.unwrap_or(curve).field), curve.role.suffix())
+    };
+    let names: Vec<String> = curves.iter().map(named).collect();
+    for (curve, name) in curves.iter_mut().zip(&names) {
+        let is_only = names.iter().filter(|other| *other == name).count() == 1;
+        curve.name = if is_only { name.clone() } else { format!("{} {}", curve.topic, curve.field) };
     }
 }
 
@@ -197,11 +205,7 @@ pub fn trails(choice: &Choice, read: &Read) -> Vec<Trail> {
         .map(|(ask, trail)| {
             let index = vehicles.iter().position(|vehicle| *vehicle == ask.vehicle()).unwrap_or_default();
             Trail {
-                name: format!(
-                    "{}{}",
-                    if ask.vehicle().is_empty() { "path" } else { ask.vehicle() },
-                    ask.role.suffix()
-                ),
+                name: trail_name(ask.vehicle(), ask.role),
                 topic: ask.topic.clone(),
                 role: ask.role,
                 colour: COLOURS[index % COLOURS.len()],
@@ -212,4 +216,11 @@ pub fn trails(choice: &Choice, read: &Read) -> Vec<Trail> {
         .collect();
     trails.sort_by_key(|trail| trail.role);
     trails
+}
+
+fn trail_name(vehicle: &str, role: Role) -> String {
+    match (vehicle, role) {
+        ("", Role::Flown) => "flown".to_owned(),
+        (vehicle, role) => format!("{vehicle}{}", role.suffix()).trim_start().to_owned(),
+    }
 }

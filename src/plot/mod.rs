@@ -108,18 +108,15 @@ impl Drawing {
         "simulated time [s]"
     }
 
-    /// The title, with the vehicle where only one of several is shown over time.
-    fn heading(&self) -> String {
-        match self.panels.first() {
-            Some(panel) if !panel.vehicle.is_empty() => format!("{}: {}", self.title, panel.vehicle),
-            _ => self.title.clone(),
-        }
-    }
-
-    /// The views that were asked for, or else `usual`; those of paths only where there are paths.
+    /// The views that were asked for, or else those of `usual` that there is something for.
     fn views_or(&self, usual: &[View]) -> Vec<View> {
-        let views = if self.views.is_empty() { usual } else { &self.views };
-        views.iter().copied().filter(|view| *view == View::Time || !self.trails.is_empty()).collect()
+        let has_some =
+            |view: &View| if *view == View::Time { !self.panels.is_empty() } else { !self.trails.is_empty() };
+        if self.views.is_empty() {
+            usual.iter().copied().filter(has_some).collect()
+        } else {
+            self.views.clone()
+        }
     }
 }
 
@@ -149,8 +146,11 @@ pub fn plot(arguments: &PlotArguments) -> Result<bool> {
         views: arguments.figure.clone(),
         panels: figure::panels(&choice, &read)?,
         trails: figure::trails(&choice, &read),
-        solids: scene::scene_of(&recording),
+        solids: scene::scene_of(&recording)?,
     };
+    if drawing.trails.is_empty() && arguments.figure.iter().any(|view| *view != View::Time) {
+        bail!("the recording has no path to draw: no topic holds the position of a vehicle");
+    }
     for (format, path) in &files {
         write(&drawing, *format, path)?;
     }
@@ -226,7 +226,7 @@ fn as_text(drawing: &Drawing, files: &[(Format, PathBuf)]) -> String {
     let axes = drawing.panels.iter().flat_map(|panel| &panel.axes);
     let curves: usize = axes.clone().map(|axes| axes.curves.len()).sum();
     let summary = format!(
-        "{} axes with {curves} curves, {} paths, {} solids, {:.3} s to {:.3} s",
+        "axes: {} with {curves} curves; paths: {}; boxes: {}; from {:.3} s to {:.3} s",
         axes.count(),
         drawing.trails.len(),
         drawing.solids.len(),

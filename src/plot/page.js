@@ -7,7 +7,7 @@ const data = JSON.parse(document.getElementById("data").textContent);
 const CONFIG = { responsive: true, displaylogo: false, plotlyServerURL: "" };
 const FLAT = { ...CONFIG, modeBarButtons: [["toImage", "zoom2d", "pan2d", "zoomIn2d", "zoomOut2d", "resetScale2d"]] };
 const SPACE = { ...CONFIG, modeBarButtons: [["toImage", "zoom3d", "pan3d", "orbitRotation", "tableRotation", "resetCameraDefault3d"]] };
-const NUMBERS = { exponentformat: "none", automargin: true, zeroline: false, gridcolor: "#e6e6e6" };
+const NUMBERS = { exponentformat: "none", zeroline: false, gridcolor: "#e6e6e6" };
 const SOLID = "#787878";
 // The faces of a box as triangles of its corners.
 const FACES = [[0, 1, 5, 4], [1, 2, 6, 5], [2, 3, 7, 6], [3, 0, 4, 7], [4, 5, 6, 7], [0, 3, 2, 1]]
@@ -16,7 +16,7 @@ const FACES = [[0, 1, 5, 4], [1, 2, 6, 5], [2, 3, 7, 6], [3, 0, 4, 7], [4, 5, 6,
 const element = (id) => document.getElementById(id);
 const column = (rows, index) => rows.map((row) => row[index]);
 
-// What is beside the flown line is darker, to be seen upon it.
+// What is beside the flown line is darker, to be told from it.
 function darker(colour) {
   const parts = [1, 3, 5].map((at) => Math.floor(parseInt(colour.slice(at, at + 2), 16) / 2));
   return `rgb(${parts.join(",")})`;
@@ -27,9 +27,12 @@ function look({ role, colour }) {
   return { color: darker(colour), width: 1.2, dash: role === "asked" ? "dash" : "solid" };
 }
 
-function legend(rows) {
-  return { x: 1.01, y: 1, font: { size: 12 }, tracegroupgap: 2, itemwidth: 30, ...rows };
-}
+// Which line lies upon which: an estimator's noise must not hide what was flown, nor this what was asked for.
+const LAYERS = { estimated: 1, measured: 1, flown: 2, asked: 3 };
+const LEGEND = { x: 1.01, y: 1, font: { size: 12 }, itemwidth: 30 };
+// So wide that the longest name has room, and the same for all plots: their axes of time are then as long.
+const LEGEND_WIDTH = 7 * Math.max(12, ...data.panels.flatMap((panel) => panel.axes).flatMap((axes) => axes.curves)
+  .map((curve) => curve.name.length)) + 60;
 
 function head(text) {
   return { text, x: 0, xanchor: "left", font: { size: 15 } };
@@ -37,7 +40,8 @@ function head(text) {
 
 function timeTraces(axes) {
   return axes.curves.map((curve) => ({
-    type: "scatter", mode: "lines", name: curve.name, x: curve.x, y: curve.y, line: look(curve), connectgaps: false,
+    type: "scatter", mode: "lines", name: curve.name, x: curve.x, y: curve.y, line: look(curve),
+    zorder: LAYERS[curve.role], connectgaps: false,
     hovertemplate: `%{x:.3f} s: %{y:.5~g} ${axes.unit}<br>${curve.topic} ${curve.field}<extra>${curve.name}</extra>`,
   }));
 }
@@ -47,7 +51,7 @@ function timeLayout(axes) {
     title: head(axes.title),
     xaxis: { title: { text: data.time_label }, range: data.span_s, ...NUMBERS },
     yaxis: { title: { text: `${axes.label} [${axes.unit}]` }, ...NUMBERS },
-    margin: { l: 64, r: 12, t: 36, b: 44 }, legend: legend(), showlegend: true, hovermode: "closest",
+    margin: { l: 76, r: LEGEND_WIDTH, t: 36, b: 44, autoexpand: false }, legend: LEGEND, showlegend: true, hovermode: "closest",
   };
 }
 
@@ -134,8 +138,8 @@ function drawPath() {
   ];
   const axis = (name) => ({ title: { text: `${name} [m]` }, exponentformat: "none", backgroundcolor: "#fff", gridcolor: "#ddd" });
   const layout = {
-    scene: { xaxis: axis("x"), yaxis: axis("y"), zaxis: axis("z"), aspectmode: "data", camera: { eye: { x: 0.9, y: -1.5, z: 0.9 } } },
-    margin: { l: 0, r: 0, t: 8, b: 8 }, legend: legend(), showlegend: true,
+    scene: { xaxis: axis("x"), yaxis: axis("y"), zaxis: axis("z"), aspectmode: "data", camera: { eye: { x: 1.0, y: -1.8, z: 1.0 }, center: { x: 0, y: 0, z: -0.2 } } },
+    margin: { l: 0, r: 0, t: 40, b: 0 }, legend: LEGEND, showlegend: true,
   };
   return Plotly.newPlot("path", traces, layout, SPACE);
 }
@@ -151,7 +155,7 @@ function drawFlat(id, title, up) {
     title: head(title),
     xaxis: { title: { text: `${names[0]} [m]` }, ...NUMBERS },
     yaxis: { title: { text: `${names[1]} [m]` }, scaleanchor: "x", scaleratio: 1, ...NUMBERS },
-    margin: { l: 56, r: 12, t: 36, b: 44 }, showlegend: false, hovermode: "closest",
+    margin: { l: 64, r: 12, t: 36, b: 44 }, showlegend: false, hovermode: "closest",
   };
   return Plotly.newPlot(id, [...outlines, ...paths], layout, FLAT);
 }

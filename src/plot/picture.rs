@@ -6,7 +6,7 @@
 
 use crate::plot::choice::Role;
 use crate::plot::figure::{Axes, Curve};
-use crate::plot::{Drawing, View, space};
+use crate::plot::{Drawing, View, space, thin};
 use anyhow::{Context, Result, bail};
 use plotters::coord::{CoordTranslate, Shift};
 use plotters::prelude::*;
@@ -25,6 +25,8 @@ const UNITS_PER_PIXEL: u32 = 8;
 /// Dots of a PNG for each pixel of the picture, for sharp letters.
 const DOTS_PER_PIXEL: f32 = 1.5;
 const WIDTH: u32 = 1000;
+/// Bins of a curve: as many as its axes have pixels, or half of that.
+const BINS: usize = 700;
 const TITLE_HEIGHT: u32 = 40;
 const AXES_HEIGHT: u32 = 190;
 /// Room for the numbers and the name of the axis of time, below the last axes.
@@ -65,14 +67,14 @@ enum Section<'a> {
 }
 
 impl Section<'_> {
-    fn height(&self, drawing: &Drawing) -> u32 {
+    fn height(&self, drawing: &Drawing, legend: u32) -> u32 {
         match self {
             #[allow(clippy::cast_possible_truncation, reason = "a legend is short")]
             Self::Axes(axes, is_last) => {
-                let legend = (axes.curves.len() as u32 + 2) * LEGEND_ROW;
-                AXES_HEIGHT.max(legend) + if *is_last { TIME_AXIS_HEIGHT } else { 0 }
+                let rows = axes.curves.len() as u32 + 2;
+                AXES_HEIGHT.max(rows * LEGEND_ROW) + if *is_last { TIME_AXIS_HEIGHT } else { 0 }
             }
-            Self::View(view) => space::height(drawing, *view, WIDTH),
+            Self::View(view) => space::height(drawing, *view, WIDTH - legend),
         }
     }
 }
@@ -83,19 +85,20 @@ impl Section<'_> {
 /// If there is nothing to draw.
 pub fn svg(drawing: &Drawing) -> Result<String> {
     let sections = sections(drawing)?;
-    let height = TITLE_HEIGHT + sections.iter().map(|section| section.height(drawing)).sum::<u32>();
+    let legend = legend_width(drawing, &sections);
+    let height = TITLE_HEIGHT + sections.iter().map(|section| section.height(drawing, legend)).sum::<u32>();
     let mut text = String::new();
     {
         let sheet = SVGBackend::with_string(&mut text, (px(WIDTH), px(height))).into_drawing_area();
         sheet.fill(&WHITE)?;
         let (title, mut rest) = sheet.split_vertically(px(TITLE_HEIGHT));
-        title.draw_text(&drawing.heading(), &letters(TITLE_SIZE), (at(16), at(14)))?;
+        title.draw_text(&heading(drawing, &sections), &letters(TITLE_SIZE), (at(16), at(14)))?;
         for section in &sections {
-            let (area, below) = rest.split_vertically(px(section.height(drawing)));
+            let (area, below) = rest.split_vertically(px(section.height(drawing, legend)));
             rest = below;
             match section {
-                Section::Axes(axes, is_last) => draw_axes(&area, axes, drawing, *is_last)?,
-                Section::View(view) => space::draw(&area, drawing, *view)?,
+                Section::Axes(axes, is_last) => draw_axes(&area, axes, drawing, legend, *is_last)?,
+                Section::View(view) => space::draw(&area, drawing, legend, *view)?,
             }
         }
         sheet.present()?;
@@ -103,6 +106,15 @@ pub fn svg(drawing: &Drawing) -> Result<String> {
     // The units are for plotters only: whoever shows the picture is told its size in pixels.
     let units = format!(r#"width="{}" height="{}""#, px(WIDTH), px(height));
     Ok(text.replacen(&units, &format!(r#"width="{WIDTH}" height="{height}""#), 1))
+}
+
+/// The title, with the vehicle where its axes are drawn.
+fn heading(drawing: &Drawing, sections: &[Section<'_>]) -> String {
+    let shows_axes = sections.iter().any(|section| matches!(section, Section::Axes(..)));
+    match drawing.panels.first().filter(|panel| shows_axes && !panel.vehicle.is_empty()) {
+        Some(panel) => format!("{}: {}", drawing.title, panel.vehicle),
+        None => drawing.title.clone(),
+    }
 }
 
 fn sections(drawing: &Drawing) -> Result<Vec<Section<'_>>> {
@@ -138,9 +150,9 @@ pub fn png(svg: &str) -> Result<Vec<u8>> {
     Ok(dots.encode_png()?)
 }
 
-fn draw_axes(area: &Area<'_>, axes: &Axes, drawing: &Drawing, is_last: bool) -> Result<()> {
+fn draw_axes(area: &Area<'_>, axes: &Axes, drawing: &Drawing, legend: u32, is_last: bool) -> Result<()> {
     let names = axes.curves.iter().map(|curve| curve.name.as_str());
-    let plots = draw_legend(area, names.zip(axes.curves.iter().map(Look::of)))?;
+    let plots = draw_legend(area, legend, names.zip(axes.curves.iter().map(Look::of)))?;
     let [from_s, to_s] = drawing.span_s;
     let values = axes.curves.iter().flat_map(|curve| &curve.points).map(|(_, value)| *value);
     let mut chart = ChartBuilder::on(&plots)
@@ -164,9 +176,11 @@ fn draw_axes(area: &Area<'_>, axes: &Axes, drawing: &Drawing, is_last: bool) -> 
         mesh.x_labels(13).x_label_formatter(&|_| String::new());
     }
     mesh.draw()?;
-    for curve in &axes.curves {
-        let look = Look::of(curve);
-        for stretch in finite(&curve.points) {
+    let mut curves: Vec<&Curve> = axes.curves.iter().collect();
+    curves.sort_by_key(|curve| curve.role.layer());
+    for curve in curves {
+        let (look, points) = (Look::of(curve), thinned(&curve.points));
+        for stretch in finite(&points) {
             draw_line(&mut chart, stretch.iter().copied(), look)?;
         }
     }
@@ -183,7 +197,7 @@ pub struct Look {
 }
 
 impl Look {
-    /// That of a line with a role; what is beside the flown one is darker, to be seen upon it.
+    /// That of a line with a role; what is beside the flown one is darker, to be told from it.
     pub fn new(colour: &str, role: Role) -> Self {
         let colour = rgb(colour);
         let darker = RGBColor(colour.0 / 2, colour.1 / 2, colour.2 / 2);
@@ -226,14 +240,24 @@ where
     Ok(())
 }
 
-/// Draws a legend at the right side of an area; returns what is left of it. Beside the curves it hides none.
+/// The width of the legends, in pixels: one for all, so that the axes are as wide as each other.
+fn legend_width(drawing: &Drawing, sections: &[Section<'_>]) -> u32 {
+    let names = sections.iter().flat_map(|section| match section {
+        Section::Axes(axes, _) => axes.curves.iter().map(|curve| &curve.name).collect::<Vec<_>>(),
+        Section::View(_) => drawing.trails.iter().map(|trail| &trail.name).collect(),
+    });
+    #[allow(clippy::cast_possible_truncation, reason = "a name is short")]
+    let longest = names.map(|name| name.chars().count() as u32).max().unwrap_or(0);
+    (longest * LETTER_WIDTH + 52).clamp(130, WIDTH / 2)
+}
+
+/// Draws a legend, `width` pixels wide, at the right side of an area; returns what is left of it. Beside the curves it
+/// hides none.
 pub fn draw_legend<'a, 'n>(
     area: &Area<'a>,
-    entries: impl Iterator<Item = (&'n str, Look)> + Clone,
+    width: u32,
+    entries: impl Iterator<Item = (&'n str, Look)>,
 ) -> Result<Area<'a>> {
-    #[allow(clippy::cast_possible_truncation, reason = "a name is short")]
-    let longest = entries.clone().map(|(name, _)| name.chars().count() as u32).max().unwrap_or(0);
-    let width = (longest * LETTER_WIDTH + 52).clamp(130, WIDTH / 2);
     let (plots, legend) = area.split_horizontally(px(WIDTH - width));
     let anchor = Pos::new(HPos::Left, VPos::Center);
     for (row, (name, look)) in (0..).zip(entries) {
@@ -250,6 +274,13 @@ pub fn draw_legend<'a, 'n>(
         legend.draw(&Text::new(name.to_owned(), (at(44), y), letters(LABEL_SIZE).pos(anchor)))?;
     }
     Ok(plots)
+}
+
+/// As many points as a picture shows: a page has more, to zoom into.
+fn thinned(points: &[(f64, f64)]) -> Vec<(f64, f64)> {
+    let mut curve = thin::Curve::new(BINS);
+    points.iter().for_each(|(time_s, value)| curve.push(*time_s, *value));
+    curve.points()
 }
 
 /// The stretches of a curve without gaps.

@@ -1,6 +1,8 @@
 //! The scene of a recording, as what stands in it is drawn: boxes by their corners.
 
+use recorder::RecordingError;
 use recorder::reader::Recording;
+use scenes::{Cuboid, Scene};
 use serde::Serialize;
 
 /// A box that stands on or above the ground.
@@ -13,16 +15,15 @@ pub struct Solid {
 }
 
 impl Solid {
-    /// The box around `centre_m` with edges of `size_m`, turned by `yaw_rad` about the vertical.
-    pub fn new(name: &str, centre_m: [f64; 3], size_m: [f64; 3], yaw_rad: f64) -> Self {
-        let (sin, cos) = yaw_rad.sin_cos();
+    fn of(cuboid: &Cuboid) -> Self {
+        let ([x, y, z], [a, b, c]) = (cuboid.centre_W_m.into(), cuboid.half_extents_m.into());
+        let (sin, cos) = cuboid.yaw_rad.sin_cos();
         let corner = |index: usize| {
-            let [x, y] = [[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]][index % 4];
-            let (x, y) = (x * size_m[0], y * size_m[1]);
-            let z = if index < 4 { -0.5 } else { 0.5 } * size_m[2];
-            [centre_m[0] + cos * x - sin * y, centre_m[1] + sin * x + cos * y, centre_m[2] + z]
+            let (ahead, left) = [(-a, -b), (a, -b), (a, b), (-a, b)][index % 4];
+            let up = if index < 4 { -c } else { c };
+            [x + cos * ahead - sin * left, y + sin * ahead + cos * left, z + up]
         };
-        Self { name: name.to_owned(), corners: std::array::from_fn(corner) }
+        Self { name: cuboid.name.clone(), corners: std::array::from_fn(corner) }
     }
 
     /// Its outline seen along an axis, as a closed line; `across` and `up` are the axes of the view.
@@ -44,18 +45,39 @@ impl Solid {
 pub const EDGES: [[usize; 2]; 12] =
     [[0, 1], [1, 2], [2, 3], [3, 0], [4, 5], [5, 6], [6, 7], [7, 4], [0, 4], [1, 5], [2, 6], [3, 7]];
 
-/// What stands in the scene of a recording; nothing where it has none.
-pub fn scene_of(_recording: &Recording) -> Vec<Solid> {
-    Vec::new()
+/// What stands in the scene of a recording, whose file is attached; nothing where it has none.
+///
+/// # Errors
+/// If the recording is damaged.
+pub fn scene_of(recording: &Recording) -> Result<Vec<Solid>, RecordingError> {
+    let attachments = recording.attachments()?;
+    // An attachment does not say what it is, but no manifest and no vehicle file can be read as a scene.
+    let scene = |(name, bytes): &(String, Vec<u8>)| {
+        std::str::from_utf8(bytes).ok().and_then(|text| Scene::parse(text, name).ok())
+    };
+    Ok(attachments
+        .iter()
+        .find_map(scene)
+        .map_or(Vec::new(), |scene| scene.boxes.iter().map(Solid::of).collect()))
 }
 
 #[cfg(test)]
 mod tests {
     use super::Solid;
+    use scenes::Scene;
+
+    const SCENE: &str = r#"
+        name = "test"
+        [[boxes]]
+        name = "box"
+        centre = { value = [1, 2, 0.5], unit = "m", source = "test", uncertainty = "exact" }
+        size = { value = [4, 2, 1], unit = "m", source = "test", uncertainty = "exact" }
+        yaw = { value = 90, unit = "deg", source = "test", uncertainty = "exact" }
+    "#;
 
     #[test]
     fn a_turned_box_has_its_corners_where_they_are() {
-        let solid = Solid::new("box", [1.0, 2.0, 0.5], [4.0, 2.0, 1.0], std::f64::consts::FRAC_PI_2);
+        let solid = Solid::of(&Scene::parse(SCENE, "test.toml").unwrap().boxes[0]);
         let expected = [[2.0, 0.0, 0.0], [2.0, 4.0, 0.0], [0.0, 4.0, 0.0], [0.0, 0.0, 0.0]];
         for (index, [x, y, z]) in expected.into_iter().enumerate() {
             let (lower, upper) = (solid.corners[index], solid.corners[index + 4]);

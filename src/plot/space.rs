@@ -8,8 +8,8 @@ use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 use std::ops::Range;
 
-/// Room beside the axes of a flat view, in pixels: left, right with the legend, above, below.
-const MARGINS: [u32; 4] = [80, 190, 34, 50];
+/// Room beside the axes of a flat view, in pixels: left, right, above, below.
+const MARGINS: [u32; 4] = [80, 12, 34, 50];
 const FLAT_HEIGHT: Range<u32> = 260..760;
 const PATH_HEIGHT: u32 = 640;
 /// How the paths are looked at in three dimensions, in rad: from the right of -y, and from above.
@@ -52,7 +52,7 @@ fn flat_axes(view: View) -> [usize; 2] {
     if view == View::Side { [0, 2] } else { [0, 1] }
 }
 
-/// The height of a view on a sheet of `width`, in pixels: so much that both axes of a flat one have one scale.
+/// The height of a view `width` pixels wide: so much that both axes of a flat one have one scale.
 #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a height of some hundred pixels")]
 pub fn height(drawing: &Drawing, view: View, width: u32) -> u32 {
     if view == View::Path {
@@ -69,22 +69,25 @@ pub fn height(drawing: &Drawing, view: View, width: u32) -> u32 {
 ///
 /// # Errors
 /// If plotters cannot.
-pub fn draw(area: &Area<'_>, drawing: &Drawing, view: View) -> Result<()> {
-    if view == View::Path { draw_path(area, drawing) } else { draw_flat(area, drawing, view) }
+pub fn draw(area: &Area<'_>, drawing: &Drawing, legend: u32, view: View) -> Result<()> {
+    let names = drawing.trails.iter().map(|trail| trail.name.as_str());
+    let looks = drawing.trails.iter().map(|trail| Look::new(trail.colour, trail.role));
+    let plots = draw_legend(area, legend, names.zip(looks))?;
+    if view == View::Path { draw_path(&plots, drawing) } else { draw_flat(&plots, drawing, view) }
 }
 
-fn draw_flat(area: &Area<'_>, drawing: &Drawing, view: View) -> Result<()> {
-    let (plots, axes) = (legend(area, drawing)?, flat_axes(view));
+fn draw_flat(plots: &Area<'_>, drawing: &Drawing, view: View) -> Result<()> {
+    let axes = flat_axes(view);
     let extent = extent(drawing);
     let (width, height) = plots.dim_in_pixel();
-    let [left, _, above, below] = MARGINS;
-    let room = [width - px(left) - px(12), height - px(above) - px(below)];
+    let [left, right, above, below] = MARGINS;
+    let room = [width - px(left + right), height - px(above + below)];
     let [across, up] = equal(axes.map(|axis| extent[axis].clone()), room);
     let title = if view == View::Side { "Path from the side" } else { "Path from above" };
-    let mut chart = ChartBuilder::on(&plots)
+    let mut chart = ChartBuilder::on(plots)
         .caption(title, letters(15))
         .margin_left(px(12))
-        .margin_right(px(12))
+        .margin_right(px(right))
         .set_label_area_size(LabelAreaPosition::Left, px(left - 12))
         .set_label_area_size(LabelAreaPosition::Bottom, px(below))
         .build_cartesian_2d(across, up)?;
@@ -93,6 +96,7 @@ fn draw_flat(area: &Area<'_>, drawing: &Drawing, view: View) -> Result<()> {
         .light_line_style(TRANSPARENT)
         .bold_line_style(GRID.stroke_width(px(1)));
     mesh.x_desc(format!("{} [m]", AXES[axes[0]])).y_desc(format!("{} [m]", AXES[axes[1]]));
+    mesh.x_labels(labels(room[0])).y_labels(labels(room[1]));
     mesh.x_label_formatter(&number).y_label_formatter(&number).set_all_tick_mark_size(px(4)).draw()?;
     for solid in &drawing.solids {
         let outline = solid.outline(axes[0], axes[1]);
@@ -110,12 +114,12 @@ fn draw_flat(area: &Area<'_>, drawing: &Drawing, view: View) -> Result<()> {
     Ok(())
 }
 
-const AXES: [&str; 3] = ["x", "y", "z"];
-
-fn legend<'a>(area: &Area<'a>, drawing: &Drawing) -> Result<Area<'a>> {
-    let names = drawing.trails.iter().map(|trail| trail.name.as_str());
-    draw_legend(area, names.zip(drawing.trails.iter().map(|trail| Look::new(trail.colour, trail.role))))
+/// How many numbers stand along an axis of this length: as many in a metre of either axis.
+fn labels(units: u32) -> usize {
+    (units / px(70)) as usize
 }
+
+const AXES: [&str; 3] = ["x", "y", "z"];
 
 fn finite(trail: &Trail) -> impl Iterator<Item = &[f64; 3]> + Clone {
     trail.points.iter().filter(|point| point.iter().all(|value| value.is_finite()))
@@ -146,12 +150,11 @@ fn turned([x, y, z]: [f64; 3]) -> (f64, f64, f64) {
     (x, z, -y)
 }
 
-fn draw_path(area: &Area<'_>, drawing: &Drawing) -> Result<()> {
-    let plots = legend(area, drawing)?;
+fn draw_path(plots: &Area<'_>, drawing: &Drawing) -> Result<()> {
     let [x, y, z] = extent(drawing);
     let lengths = [length(&x), length(&z), length(&y)];
     let size = cube(lengths, plots.dim_in_pixel());
-    let mut chart = ChartBuilder::on(&plots).caption("Path", letters(15)).margin(px(8)).build_cartesian_3d(
+    let mut chart = ChartBuilder::on(plots).caption("Path", letters(15)).margin(px(8)).build_cartesian_3d(
         x.clone(),
         z.clone(),
         -y.end..-y.start,

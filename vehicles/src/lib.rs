@@ -6,8 +6,8 @@
 //! | [`command`] | the map between a raw motor command and a rotor speed |
 //! | [`provenance`] | where each number came from, kept for reports |
 //! | `file` | which keys a vehicle file has, and what is physical |
-//! | `reader` | walks the TOML tree with positions, refuses what it does not know |
-//! | `units` | the table of accepted units |
+//! | [`reader`] | walks the TOML tree with positions, refuses what it does not know; scene files use it too |
+//! | [`units`] | the table of accepted units |
 //! | [`error`] | what can be wrong with a file, said for people |
 //!
 //! ```
@@ -22,8 +22,8 @@ pub mod command;
 pub mod error;
 mod file;
 pub mod provenance;
-mod reader;
-mod units;
+pub mod reader;
+pub mod units;
 pub mod vehicle;
 
 pub use command::CommandMap;

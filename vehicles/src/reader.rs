@@ -12,13 +12,15 @@ use crate::provenance::{Provenance, Uncertainty};
 use crate::units::Dimension;
 
 /// The file being read: for positions, and to gather provenance on the way.
-pub(crate) struct Document<'t> {
+pub struct Document<'t> {
     file: &'t str,
     text: &'t str,
+    /// Where every number came from, in the order of reading.
     pub provenance: RefCell<Vec<Provenance>>,
 }
 
 impl<'t> Document<'t> {
+    /// The file named `file` with this text.
     pub fn new(file: &'t str, text: &'t str) -> Self {
         Document { file, text, provenance: RefCell::default() }
     }
@@ -54,9 +56,12 @@ impl<'t> Document<'t> {
 
 /// A number in SI, and where it stands in the file.
 #[derive(Debug, Clone)]
-pub(crate) struct Quantity {
+pub struct Quantity {
+    /// The number, in SI.
     pub si: f64,
+    /// The whole dotted key.
     pub key: String,
+    /// Where the number stands, in bytes.
     pub at: Range<usize>,
 }
 
@@ -84,15 +89,19 @@ impl Quantity {
 }
 
 /// One table of the file; remembers which keys were asked for.
-pub(crate) struct Section<'d, 't> {
+pub struct Section<'d, 't> {
+    /// The file.
     pub doc: &'d Document<'t>,
+    /// The whole dotted key of the table; empty for the root.
     pub path: String,
+    /// Where the table stands, in bytes.
     pub at: Range<usize>,
     table: &'d DeTable<'t>,
     asked: RefCell<BTreeSet<&'static str>>,
 }
 
 impl<'d, 't> Section<'d, 't> {
+    /// The `table` at `path`.
     pub fn new(doc: &'d Document<'t>, path: String, at: Range<usize>, table: &'d DeTable<'t>) -> Self {
         Section { doc, path, at, table, asked: RefCell::default() }
     }

@@ -9,7 +9,7 @@ const RPM: f64 = PI / 30.0;
 
 /// A physical dimension and the units accepted for it.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Dimension {
+pub struct Dimension {
     /// Name for messages.
     pub name: &'static str,
     /// Unit as written in files, and the factor to SI. The first is the SI unit itself.
@@ -29,32 +29,42 @@ impl Dimension {
     }
 }
 
-pub(crate) const MASS: Dimension = Dimension { name: "mass", units: &[("kg", 1.0), ("g", 1e-3)] };
+/// Masses.
+pub const MASS: Dimension = Dimension { name: "mass", units: &[("kg", 1.0), ("g", 1e-3)] };
 
-pub(crate) const LENGTH: Dimension =
-    Dimension { name: "length", units: &[("m", 1.0), ("cm", 1e-2), ("mm", 1e-3)] };
+/// Lengths.
+pub const LENGTH: Dimension = Dimension { name: "length", units: &[("m", 1.0), ("cm", 1e-2), ("mm", 1e-3)] };
 
-pub(crate) const TIME: Dimension = Dimension { name: "time", units: &[("s", 1.0), ("ms", 1e-3)] };
+/// Times.
+pub const TIME: Dimension = Dimension { name: "time", units: &[("s", 1.0), ("ms", 1e-3)] };
 
-pub(crate) const ACCELERATION: Dimension = Dimension { name: "acceleration", units: &[("m/s^2", 1.0)] };
+/// Accelerations.
+pub const ACCELERATION: Dimension = Dimension { name: "acceleration", units: &[("m/s^2", 1.0)] };
 
-pub(crate) const INERTIA: Dimension =
+/// Angles.
+pub const ANGLE: Dimension = Dimension { name: "angle", units: &[("rad", 1.0), ("deg", PI / 180.0)] };
+
+/// Moments of inertia.
+pub const INERTIA: Dimension =
     Dimension { name: "moment of inertia", units: &[("kg*m^2", 1.0), ("g*m^2", 1e-3), ("g*mm^2", 1e-9)] };
 
-pub(crate) const SPEED: Dimension =
-    Dimension { name: "rotation speed", units: &[("rad/s", 1.0), ("rpm", RPM)] };
+/// Rotation speeds.
+pub const SPEED: Dimension = Dimension { name: "rotation speed", units: &[("rad/s", 1.0), ("rpm", RPM)] };
 
-pub(crate) const THRUST_COEFFICIENT: Dimension = Dimension {
+/// Thrust coefficients.
+pub const THRUST_COEFFICIENT: Dimension = Dimension {
     name: "thrust per rotation speed squared",
     units: &[("N/(rad/s)^2", 1.0), ("N/rpm^2", 1.0 / (RPM * RPM))],
 };
 
-pub(crate) const TORQUE_COEFFICIENT: Dimension = Dimension {
+/// Torque coefficients.
+pub const TORQUE_COEFFICIENT: Dimension = Dimension {
     name: "torque per rotation speed squared",
     units: &[("N*m/(rad/s)^2", 1.0), ("N*m/rpm^2", 1.0 / (RPM * RPM))],
 };
 
-pub(crate) const PURE_NUMBER: Dimension = Dimension { name: "a pure number", units: &[("1", 1.0)] };
+/// Pure numbers.
+pub const PURE_NUMBER: Dimension = Dimension { name: "a pure number", units: &[("1", 1.0)] };
 
 #[cfg(test)]
 mod tests {

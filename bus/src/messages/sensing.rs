@@ -1,0 +1,271 @@
+//! What sensors beyond the IMU report, and what estimators make of it.
+//!
+//! A sensor sends a sample at each of its periods, as every publisher does. `valid` is 1 in a sample that holds
+//! a measurement and 0 where it was lost; the other fields then hold what was measured last.
+
+use super::{Quaternion, Time, Vector3};
+use crate::Message;
+
+/// What a satellite receiver reports, in the world's axes.
+#[derive(Clone, Copy, Debug, Default, Message)]
+#[repr(C)]
+#[message(type_name = "hummingbus_msgs/msg/Gps")]
+pub struct Gps {
+    /// Simulation time of sending.
+    pub stamp: Time,
+    /// Simulation time at which it was measured.
+    #[field(unit = "ns")]
+    pub measured_ns: u64,
+    /// Position of the centre of mass.
+    #[field(unit = "m", frame = "world")]
+    pub position: Vector3,
+    /// Velocity of the centre of mass.
+    #[field(unit = "m/s", frame = "world")]
+    pub velocity: Vector3,
+    /// 1 if this sample holds a measurement, 0 if it was lost.
+    #[field(unit = "1")]
+    pub valid: u32,
+    /// Zero.
+    #[field(unit = "")]
+    pub pad0: u32,
+}
+
+/// What a barometer reports.
+#[derive(Clone, Copy, Debug, Default, Message)]
+#[repr(C)]
+#[message(type_name = "hummingbus_msgs/msg/Barometer")]
+pub struct Barometer {
+    /// Simulation time of sending.
+    pub stamp: Time,
+    /// Simulation time at which it was measured.
+    #[field(unit = "ns")]
+    pub measured_ns: u64,
+    /// Static pressure.
+    #[field(unit = "Pa")]
+    pub pressure: f64,
+    /// Height above the world's origin that the pressure means in the standard atmosphere.
+    #[field(unit = "m", frame = "world")]
+    pub altitude: f64,
+    /// 1 if this sample holds a measurement, 0 if it was lost.
+    #[field(unit = "1")]
+    pub valid: u32,
+    /// Zero.
+    #[field(unit = "")]
+    pub pad0: u32,
+}
+
+/// What a magnetometer reports.
+#[derive(Clone, Copy, Debug, Default, Message)]
+#[repr(C)]
+#[message(type_name = "hummingbus_msgs/msg/Magnetometer")]
+pub struct Magnetometer {
+    /// Simulation time of sending.
+    pub stamp: Time,
+    /// Simulation time at which it was measured.
+    #[field(unit = "ns")]
+    pub measured_ns: u64,
+    /// Magnetic flux density.
+    #[field(unit = "T", frame = "body")]
+    pub field: Vector3,
+    /// 1 if this sample holds a measurement, 0 if it was lost.
+    #[field(unit = "1")]
+    pub valid: u32,
+    /// Zero.
+    #[field(unit = "")]
+    pub pad0: u32,
+}
+
+/// What a motion-capture system reports.
+#[derive(Clone, Copy, Debug, Default, Message)]
+#[repr(C)]
+#[message(type_name = "hummingbus_msgs/msg/Mocap")]
+pub struct Mocap {
+    /// Simulation time of sending.
+    pub stamp: Time,
+    /// Simulation time at which it was measured.
+    #[field(unit = "ns")]
+    pub measured_ns: u64,
+    /// Position of the centre of mass.
+    #[field(unit = "m", frame = "world")]
+    pub position: Vector3,
+    /// Attitude, body to world.
+    #[field(frame = "world")]
+    pub attitude: Quaternion,
+    /// 1 if this sample holds a measurement, 0 if it was lost.
+    #[field(unit = "1")]
+    pub valid: u32,
+    /// Zero.
+    #[field(unit = "")]
+    pub pad0: u32,
+}
+
+/// What five range finders report, in the order +x, -x, +y, -y of the body, and down.
+#[derive(Clone, Copy, Debug, Default, Message)]
+#[repr(C)]
+#[message(type_name = "hummingbus_msgs/msg/Ranges")]
+pub struct Ranges {
+    /// Simulation time of sending.
+    pub stamp: Time,
+    /// Simulation time at which it was measured.
+    #[field(unit = "ns")]
+    pub measured_ns: u64,
+    /// Distances; the sensor's reach where nothing is met.
+    #[field(unit = "m", frame = "body")]
+    pub distance: [f64; 5],
+    /// 1 for each beam that measured something, 0 where it met nothing within reach or was lost.
+    #[field(unit = "1")]
+    pub valid: [u32; 5],
+    /// Zero.
+    #[field(unit = "")]
+    pub pad0: u32,
+}
+
+/// Voltage and current of the battery, true or measured.
+#[derive(Clone, Copy, Debug, Default, Message)]
+#[repr(C)]
+#[message(type_name = "hummingbus_msgs/msg/Battery")]
+pub struct Battery {
+    /// Simulation time of sending.
+    pub stamp: Time,
+    /// Simulation time at which it was measured.
+    #[field(unit = "ns")]
+    pub measured_ns: u64,
+    /// Voltage at the terminals.
+    #[field(unit = "V")]
+    pub voltage: f64,
+    /// Current drawn.
+    #[field(unit = "A")]
+    pub current: f64,
+    /// What is left of the capacity, 0 to 1.
+    #[field(unit = "1")]
+    pub charge: f64,
+    /// 1 if this sample holds a measurement, 0 if it was lost.
+    #[field(unit = "1")]
+    pub valid: u32,
+    /// Zero.
+    #[field(unit = "")]
+    pub pad0: u32,
+}
+
+/// What the plant touches, whatever else is in the scene.
+#[derive(Clone, Copy, Debug, Default, Message)]
+#[repr(C)]
+#[message(type_name = "hummingbus_msgs/msg/Contact")]
+pub struct Contact {
+    /// Simulation time.
+    pub stamp: Time,
+    /// Sum of the contact forces over the last tick.
+    #[field(unit = "N", frame = "world")]
+    pub force: Vector3,
+    /// Speed against what is touched just before the contact began; 0 without a contact.
+    #[field(unit = "m/s")]
+    pub impact_speed: f64,
+    /// Number of things touched: the ground, boxes, other vehicles.
+    #[field(unit = "1")]
+    pub count: u32,
+    /// What is touched first: 0 nothing, 1 the ground, 2 + i the scene's box i, 1000 + i the other vehicle i.
+    #[field(unit = "1")]
+    pub object: u32,
+    /// Contacts that began since the run started, resting on the ground at the start left out.
+    #[field(unit = "1")]
+    pub began: u32,
+    /// 1 from the first impact on that was faster than the vehicle bears.
+    #[field(unit = "1")]
+    pub crashed: u32,
+}
+
+/// Where the vehicles of a run are, for those that share a room.
+#[derive(Clone, Copy, Debug, Default, Message)]
+#[repr(C)]
+#[message(type_name = "hummingbus_msgs/msg/Traffic")]
+pub struct Traffic {
+    /// Simulation time.
+    pub stamp: Time,
+    /// How many vehicles there are.
+    #[field(unit = "1")]
+    pub count: u32,
+    /// Zero.
+    #[field(unit = "")]
+    pub pad0: u32,
+    /// Positions of their centres of mass, in the order of the inputs' names.
+    #[field(unit = "m", frame = "world")]
+    pub position: [Vector3; 16],
+    /// Their velocities.
+    #[field(unit = "m/s", frame = "world")]
+    pub velocity: [Vector3; 16],
+}
+
+/// What an estimator believes of the vehicle's motion.
+#[derive(Clone, Copy, Debug, Default, Message)]
+#[repr(C)]
+#[message(type_name = "hummingbus_msgs/msg/StateEstimate")]
+pub struct StateEstimate {
+    /// Simulation time.
+    pub stamp: Time,
+    /// Position of the centre of mass.
+    #[field(unit = "m", frame = "world")]
+    pub position: Vector3,
+    /// Velocity of the centre of mass.
+    #[field(unit = "m/s", frame = "world")]
+    pub velocity: Vector3,
+    /// Attitude, body to world.
+    #[field(frame = "world")]
+    pub attitude: Quaternion,
+    /// Angular velocity, the gyroscope's estimated bias taken off.
+    #[field(unit = "rad/s", frame = "body")]
+    pub angular_velocity: Vector3,
+    /// Standard deviation of the position as the estimator believes it.
+    #[field(unit = "m", frame = "world")]
+    pub position_sigma: Vector3,
+    /// Standard deviation of the velocity.
+    #[field(unit = "m/s", frame = "world")]
+    pub velocity_sigma: Vector3,
+    /// Standard deviation of the attitude, as a rotation vector.
+    #[field(unit = "rad", frame = "body")]
+    pub attitude_sigma: Vector3,
+}
+
+/// How well an estimator's predictions met its measurements: the last update of each sensor.
+#[derive(Clone, Copy, Debug, Default, Message)]
+#[repr(C)]
+#[message(type_name = "hummingbus_msgs/msg/Innovation")]
+pub struct Innovation {
+    /// Simulation time.
+    pub stamp: Time,
+    /// Normalised innovation squared of the last update by GPS, motion capture, barometer, magnetometer.
+    #[field(unit = "1")]
+    pub normalised_squared: [f64; 4],
+    /// Its degrees of freedom, which it should equal on average.
+    #[field(unit = "1")]
+    pub degrees_of_freedom: [u32; 4],
+    /// Updates so far.
+    #[field(unit = "1")]
+    pub updates: [u32; 4],
+    /// Measurements refused as outliers so far.
+    #[field(unit = "1")]
+    pub refused: [u32; 4],
+}
+
+/// What an estimator makes of range finders: level distances to what stands around.
+#[derive(Clone, Copy, Debug, Default, Message)]
+#[repr(C)]
+#[message(type_name = "hummingbus_msgs/msg/WallEstimate")]
+pub struct WallEstimate {
+    /// Simulation time.
+    pub stamp: Time,
+    /// Level distances along the heading's +x, -x, +y, -y; the sensor's reach where nothing is in sight.
+    #[field(unit = "m")]
+    pub distance: [f64; 4],
+    /// 1 where a wall is in sight.
+    #[field(unit = "1")]
+    pub in_sight: [u32; 4],
+    /// Velocity along the heading's x and y: level axes that turn with the yaw.
+    #[field(unit = "m/s")]
+    pub velocity: [f64; 2],
+    /// Height above what is below.
+    #[field(unit = "m")]
+    pub height: f64,
+    /// Rate of climb.
+    #[field(unit = "m/s")]
+    pub climb_rate: f64,
+}

@@ -1,0 +1,23 @@
+//! Scene files: what stands around the vehicles; and what a ray meets there.
+//!
+//! The ground is the plane z = 0 of the world, solid below. Boxes stand still, turned about the vertical only.
+//!
+//! | room | what it holds |
+//! |---|---|
+//! | [`scene`] | the immutable [`Scene`] that plants and range finders use |
+//! | [`ray`] | the distance from a point along a direction to what is met first |
+//! | `file` | which keys a scene file has |
+//!
+//! ```
+//! let scene = scenes::Scene::parse(include_str!("../room.toml"), "room.toml")?;
+//! assert_eq!(scene.boxes.len(), 4);
+//! # Ok::<(), vehicles::VehicleError>(())
+//! ```
+#![forbid(unsafe_code)]
+
+mod file;
+pub mod ray;
+pub mod scene;
+
+pub use ray::RayCaster;
+pub use scene::{Cuboid, Scene};

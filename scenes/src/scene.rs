@@ -1,0 +1,50 @@
+//! The scene as physics and sensors see it: SI numbers only, immutable once read.
+#![allow(non_snake_case, reason = "a trailing _W names the frame a vector is written in")]
+
+use nalgebra::Vector3;
+use std::path::Path;
+use vehicles::VehicleError;
+
+/// What stands around the vehicles, beside the ground at z = 0.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Scene {
+    /// What the scene is called.
+    pub name: String,
+    /// The boxes, in the file's order.
+    pub boxes: Vec<Cuboid>,
+}
+
+/// A solid box that stands still.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Cuboid {
+    /// What the file calls it, such as `wall +x`.
+    pub name: String,
+    /// Its centre, in the world.
+    pub centre_W_m: Vector3<f64>,
+    /// Half of its lengths along its own axes.
+    pub half_extents_m: Vector3<f64>,
+    /// How far its x axis is turned from that of the world, counter-clockwise from above.
+    pub yaw_rad: f64,
+}
+
+impl Scene {
+    /// Reads and checks a scene file.
+    ///
+    /// # Errors
+    /// What is wrong with the file, and where.
+    pub fn load(path: &Path) -> Result<Self, VehicleError> {
+        let file = path.display().to_string();
+        match std::fs::read_to_string(path) {
+            Ok(text) => Self::parse(&text, &file),
+            Err(cause) => Err(VehicleError::Unreadable { file, cause }),
+        }
+    }
+
+    /// Reads and checks the text of a scene file; `file_name` is for messages only.
+    ///
+    /// # Errors
+    /// What is wrong with the text, and where.
+    pub fn parse(text: &str, file_name: &str) -> Result<Self, VehicleError> {
+        crate::file::parse(text, file_name)
+    }
+}
