@@ -160,7 +160,7 @@ pub fn plot(arguments: &PlotArguments) -> Result<bool> {
 
 fn span(arguments: &PlotArguments) -> Result<Span> {
     let (from_s, to_s) = (arguments.from, arguments.to);
-    if !from_s.is_finite() || to_s.is_some_and(|to_s| !(to_s > from_s)) {
+    if !from_s.is_finite() || to_s.is_some_and(|to_s| to_s.is_nan() || to_s <= from_s) {
         bail!("--from {from_s} --to {}: the end must be after the start", to_s.unwrap_or(f64::NAN));
     }
     Ok(Span { from_s, to_s })
