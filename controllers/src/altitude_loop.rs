@@ -1,6 +1,7 @@
 //! The altitude PID that `pid` and all laws with the cascade's inner loops share: height to thrust.
 #![allow(non_snake_case, reason = "a trailing _N is the newton")]
 
+use crate::controller::{ControllerState, within};
 use crate::gains_file;
 use crate::pid_gains::LoopGains;
 use crate::pid_law::{Measurement, PidVehicle};
@@ -67,13 +68,22 @@ impl AltitudeLoop<'_> {
         thrust_N
     }
 
-    /// What the integrator has to ask for so that the loop asks for `thrust_N`, within its limit.
+    /// What the integrator asks for after a take-over: what the predecessor's asked for, or, where only its last
+    /// thrust is known, what it takes to ask for that.
     #[must_use]
-    pub fn integral_for_m_s2(&self, thrust_N: f64, altitude_set_m: f64, measured: &Measurement) -> f64 {
-        let still = Self { period_s: 0.0, ..*self };
-        let missing_N = thrust_N - still.thrust_N(&mut 0.0, altitude_set_m, measured);
+    pub fn taken_over_m_s2(
+        &self,
+        memory: &ControllerState,
+        thrust_N: f64,
+        altitude_set_m: f64,
+        measured: &Measurement,
+    ) -> f64 {
         let max_m_s2 = self.gains.integral_max_m_s2;
-        (missing_N * tilt_cosine(measured) / self.vehicle.mass_kg).clamp(-max_m_s2, max_m_s2)
+        memory.handed_lift_m_s2(max_m_s2).unwrap_or_else(|| {
+            let still = Self { period_s: 0.0, ..*self };
+            let missing_N = thrust_N - still.thrust_N(&mut 0.0, altitude_set_m, measured);
+            within(missing_N * tilt_cosine(measured) / self.vehicle.mass_kg, max_m_s2)
+        })
     }
 
     fn advanced_m_s2(&self, before_m_s2: f64, error_m: f64, climb_rate_m_s: f64) -> f64 {

@@ -4,8 +4,8 @@
 //! - Command filter: roll and pitch are cut to ±30° and filtered, x'' = ω²(c − x) − 2ζω x'. The yaw command
 //!   turns towards the yaw that is asked for no faster than a yaw stick at full deflection would integrate
 //!   it, comes round at 360°, and is set to the measured yaw as long as no thrust is asked for.
-//! - Attitude loop: error of roll, pitch and yaw, times a gain, to their rates of change, and by the
-//!   kinematics of the z-y-x sequence to body rates (the inverse of thesis eq. 3.18).
+//! - Attitude loop: error of roll, pitch and yaw, times a gain, and a part of the filtered commands' own rates,
+//!   to their rates of change, and by the kinematics of the z-y-x sequence to body rates (the inverse of thesis eq. 3.18).
 //! - Rate loop: α = Kp·e + ∫Ki·e dt − Kd·dω/dt with e the error of a body rate; torque = inertia · α. The
 //!   cross product of rate and angular momentum is left to the loops.
 #![allow(non_snake_case, reason = "a trailing _B names the frame a vector is written in, _N the newton")]
@@ -14,7 +14,7 @@ use crate::allocation::Wrench;
 use crate::altitude_loop::AltitudeLoop;
 use crate::angle::wrap_rad;
 use crate::cascade_gains::{CascadeGains, CommandFilter};
-use crate::controller::{Controller, ControllerState, Demand, Told};
+use crate::controller::{Controller, ControllerState, Demand, Told, within};
 use crate::pid_law::{Measurement, PidState, PidVehicle};
 use crate::set_points::SetPoint;
 use nalgebra::Vector3;
@@ -42,7 +42,7 @@ impl Controller for CascadeLaw {
     }
 
     fn tracking(&self, memory: &ControllerState, wrench: &Wrench, told: &Told<'_>) -> ControllerState {
-        self.taken_over(memory, wrench, &told.set_point, &Measurement::from(told))
+        self.taken_over(memory, wrench, told.set_point.altitude_m, &Measurement::from(told))
     }
 }
 
@@ -60,7 +60,7 @@ impl CascadeLaw {
         }
         self.filter_commands(memory, set_point);
         let [roll_rad, pitch_rad, yaw_rad] = memory.attitude_command;
-        let rates_B_rad_s = self.rate_command_B_rad_s(&memory.attitude_command, measured);
+        let rates_B_rad_s = self.rate_command_B_rad_s(memory, measured);
         let torque_B_N_m = self.torque_B_N_m(memory, &rates_B_rad_s, measured);
         let thrust_N = self.altitude_loop().thrust_N(
             &mut memory.integrals.altitude_m_s2,
@@ -84,36 +84,26 @@ impl CascadeLaw {
         }
     }
 
-    /// The memory that goes on from another law's `wrench`: commands from where the vehicle is, and the rest
-    /// of the wrench in the integrators as far as they reach.
+    /// The memory that goes on from another law's: its integrators, and commands from where the vehicle is.
     #[must_use]
     pub fn taken_over(
         &self,
         memory: &ControllerState,
         wrench: &Wrench,
-        set_point: &SetPoint,
+        altitude_set_m: f64,
         measured: &Measurement,
     ) -> ControllerState {
-        let mut begun = ControllerState { thrust: wrench.thrust_N, ..self.begun(measured) };
-        let asked = self.demand(&mut begun.clone(), set_point, measured).wrench;
-        let missing_B_rad_s2 =
-            (wrench.torque_B_N_m - asked.torque_B_N_m).component_div(&self.vehicle.inertia_B_kg_m2);
-        let max_rad_s2 = self.gains.integral_max_rad_s2;
-        let integral = |axis: usize| match self.gains.rate[axis].integral_1_s2 {
-            0.0 => 0.0,
-            _ => missing_B_rad_s2[axis].clamp(-max_rad_s2, max_rad_s2),
-        };
-        begun.integrals = PidState {
-            altitude_m_s2: self.altitude_loop().integral_for_m_s2(
-                wrench.thrust_N,
-                set_point.altitude_m,
-                measured,
-            ),
-            roll_rad_s2: integral(0),
-            pitch_rad_s2: integral(1),
-            yaw_rad_s2: integral(2),
-        };
-        ControllerState { laps: memory.laps, ..begun }
+        let before = &memory.integrals;
+        let handed = [before.roll_rad_s2, before.pitch_rad_s2, before.yaw_rad_s2];
+        // An integrator without gain would keep for ever what it was given.
+        let [roll_rad_s2, pitch_rad_s2, yaw_rad_s2] = std::array::from_fn(|axis| {
+            let has_gain = self.gains.rate[axis].integral_1_s2 > 0.0;
+            if has_gain { within(handed[axis], self.gains.integral_max_rad_s2) } else { 0.0 }
+        });
+        let altitude_m_s2 =
+            self.altitude_loop().taken_over_m_s2(memory, wrench.thrust_N, altitude_set_m, measured);
+        let integrals = PidState { altitude_m_s2, roll_rad_s2, pitch_rad_s2, yaw_rad_s2 };
+        ControllerState { integrals, thrust: wrench.thrust_N, ..self.begun(measured) }
     }
 
     fn altitude_loop(&self) -> AltitudeLoop<'_> {
@@ -134,7 +124,8 @@ impl CascadeLaw {
     }
 
     /// Body rates that lead roll, pitch and yaw to `command`.
-    fn rate_command_B_rad_s(&self, command: &[f64; 3], measured: &Measurement) -> Vector3<f64> {
+    fn rate_command_B_rad_s(&self, memory: &ControllerState, measured: &Measurement) -> Vector3<f64> {
+        let command = &memory.attitude_command;
         let errors_rad = [
             wrap_rad(command[0] - measured.roll_rad),
             command[1] - measured.pitch_rad,
@@ -142,7 +133,9 @@ impl CascadeLaw {
         ];
         let [roll_rate, pitch_rate, yaw_rate]: [f64; 3] = std::array::from_fn(|axis| {
             let max_rad_s = self.gains.rate_max_rad_s[axis];
-            (self.gains.attitude_1_s[axis] * errors_rad[axis]).clamp(-max_rad_s, max_rad_s)
+            // The yaw command's own rate stays zero: yaw is slow.
+            let fed_rad_s = self.gains.rate_feed_forward * memory.attitude_command_rate[axis];
+            (self.gains.attitude_1_s[axis] * errors_rad[axis] + fed_rad_s).clamp(-max_rad_s, max_rad_s)
         });
         let (sin_roll, cos_roll) = measured.roll_rad.sin_cos();
         let (sin_pitch, cos_pitch) = measured.pitch_rad.sin_cos();
@@ -303,20 +296,31 @@ mod tests {
     #[test]
     fn a_yaw_rate_in_a_bank_needs_body_pitch_rate() {
         let banked = Measurement { roll_rad: 0.4, ..level() };
-        let rates = law().rate_command_B_rad_s(&[0.4, 0.0, 0.5], &banked);
+        let memory = ControllerState { attitude_command: [0.4, 0.0, 0.5], ..ControllerState::default() };
+        let rates = law().rate_command_B_rad_s(&memory, &banked);
         let yaw_rate = law().gains.attitude_1_s[2] * 0.5;
         assert!((rates.y - yaw_rate * 0.4_f64.sin()).abs() < 1e-12);
         assert!((rates.z - yaw_rate * 0.4_f64.cos()).abs() < 1e-12);
     }
 
     #[test]
-    fn a_law_that_takes_over_asks_for_the_wrench_that_was_asked_for() {
+    fn a_successor_goes_on_from_the_integrators_and_from_where_the_vehicle_is() {
         let wrench = Wrench { thrust_N: 5.2, torque_B_N_m: Vector3::new(1e-3, -2e-3, 1e-3) };
-        let measured = Measurement { roll_rad: 0.05, altitude_m: 0.99, yaw_rad: 1.0, ..level() };
-        let set_point = SetPoint { yaw_rad: 1.0, ..hold() };
-        let memory = law().taken_over(&ControllerState::default(), &wrench, &set_point, &measured);
-        let asked = law().demand(&mut memory.clone(), &set_point, &measured).wrench;
-        assert!((asked.thrust_N - wrench.thrust_N).abs() < 1e-3, "{asked:?}");
-        assert!((asked.torque_B_N_m - wrench.torque_B_N_m).norm() < 1e-5, "{asked:?}");
+        let measured = Measurement { roll_rad: 0.05, yaw_rad: 1.0, ..level() };
+        let integrals =
+            PidState { altitude_m_s2: 0.3, roll_rad_s2: 0.1, pitch_rad_s2: f64::NAN, yaw_rad_s2: 9.0 };
+        let before = ControllerState { law: 1, integrals, ..ControllerState::default() };
+        let memory = law().taken_over(&before, &wrench, 1.0, &measured);
+        let expected = PidState { altitude_m_s2: 0.3, roll_rad_s2: 0.1, pitch_rad_s2: 0.0, yaw_rad_s2: 2.0 };
+        assert_eq!(memory.integrals, expected);
+        assert_eq!(memory.attitude_command, [0.05, 0.0, 1.0]);
+    }
+
+    #[test]
+    fn a_successor_that_knows_only_the_last_command_asks_for_its_thrust() {
+        let wrench = Wrench { thrust_N: 5.2, torque_B_N_m: Vector3::zeros() };
+        let memory = law().taken_over(&ControllerState::default(), &wrench, 1.0, &level());
+        let asked = law().demand(&mut memory.clone(), &hold(), &level()).wrench;
+        assert!((asked.thrust_N - wrench.thrust_N).abs() < 1e-12, "{asked:?}");
     }
 }

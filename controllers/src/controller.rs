@@ -2,10 +2,10 @@
 //! any of them on the bus.
 //!
 //! All remember the same fixed-layout [`ControllerState`], so any of them can take over from any other in
-//! flight. A law finds its own memory there as it left it; another's memory it does not understand, and sets
-//! its own so that it goes on from the wrench that was asked for last, as nearly as its integrators can. What
-//! is then still missing is added to what it asks for and fades out ([`HANDOVER_TIME_CONSTANT_S`]), so that
-//! no take-over makes the demanded wrench jump.
+//! flight. A law finds its own memory there as it left it. Of another's it takes what means the same to all,
+//! the integrators, and sets the rest by what is measured. What was asked for last and the successor does not
+//! ask for is added to its demand and fades out ([`HANDOVER_TIME_CONSTANT_S`]), so that no take-over makes the
+//! demanded wrench jump.
 #![allow(
     non_snake_case,
     reason = "a trailing _W or _B names the frame a vector is written in, _N the newton"
@@ -129,9 +129,10 @@ pub trait Controller {
         ControllerState::default()
     }
 
-    /// The memory with which the law asks for `wrench` as nearly as its limits allow. `memory` is another
-    /// law's, or the default where only its last command is known. What an integrator can never give back
-    /// it should not take up: the rest of `wrench` is made up for by [`Flown::advance`].
+    /// The memory with which the law goes on after another that asked for `wrench`. `memory` is the other
+    /// law's, or the default where only its last command is known. It need not ask for `wrench`, whose rest
+    /// [`Flown::advance`] makes up for, and an integrator should not take that up: it would keep amid a
+    /// manoeuvre what is gone a moment later.
     fn tracking(&self, memory: &ControllerState, wrench: &Wrench, told: &Told<'_>) -> ControllerState;
 }
 
@@ -161,9 +162,10 @@ pub struct ControllerState {
     /// Torque that was demanded last.
     #[field(unit = "N*m", frame = "body")]
     pub torque: [f64; 3],
-    /// What the integrators of altitude and attitude ask for.
+    /// What the integrators of altitude and attitude ask for; every law goes on from another's.
     pub integrals: PidState,
-    /// Acceleration that the integrators of position or velocity ask for.
+    /// Acceleration that the integrators of position or velocity ask for; of laws by range finders, whose world
+    /// is the room, along the heading's axes.
     #[field(unit = "m/s^2", frame = "world")]
     pub position_integral: [f64; 3],
     /// The command filter's roll, pitch and yaw.
@@ -285,8 +287,17 @@ impl<C: Controller> Flown<'_, C> {
     }
 }
 
+impl ControllerState {
+    /// The vertical acceleration that another law's integrators ask for, within ±`max_m_s2`; `None` where no
+    /// state was handed over.
+    pub(crate) fn handed_lift_m_s2(&self, max_m_s2: f64) -> Option<f64> {
+        let lift_m_s2 = self.integrals.altitude_m_s2 + self.position_integral[2];
+        (self.law != 0).then_some(within(lift_m_s2, max_m_s2))
+    }
+}
+
 /// `value` cut to ±`max`; nothing of a value that is not a number.
-fn within(value: f64, max: f64) -> f64 {
+pub(crate) fn within(value: f64, max: f64) -> f64 {
     if value.is_nan() { 0.0 } else { value.clamp(-max, max) }
 }
 

@@ -1,7 +1,7 @@
 //! Controllers, their set points, and the allocation of their demands to the rotors.
 //!
 //! The rooms, pure cores first; no core knows the bus, the plant or the wall clock:
-//! - [`set_points`]: the pilot's schedule of steps, ramps and doublets.
+//! - [`set_points`]: the pilot's schedule of steps, ramps and doublets; [`sticks`]: a recording of sticks.
 //! - [`gains_file`]: gains with units and sources; [`pid_gains`], [`cascade_gains`] and, with their laws, those of
 //!   the others, ours beside the thesis's.
 //! - [`pid_law`]: altitude and attitude PID; [`altitude_loop`]: its part that all laws share.
@@ -57,6 +57,7 @@ pub mod riccati;
 pub mod room;
 pub mod set_points;
 pub mod trajectory;
+pub mod sticks;
 pub mod velocity;
 pub mod velocity_law;
 pub mod wall_follow;

@@ -59,8 +59,9 @@ impl Controller for PidLaw {
     }
 
     fn tracking(&self, memory: &ControllerState, wrench: &Wrench, told: &Told<'_>) -> ControllerState {
-        let integrals = PidLaw::tracking(self, wrench, &told.set_point, &Measurement::from(told));
-        ControllerState { integrals, ..*memory }
+        let altitude_m = told.set_point.altitude_m;
+        let integrals = self.taken_over(memory, wrench, altitude_m, &Measurement::from(told));
+        ControllerState { integrals, ..ControllerState::default() }
     }
 }
 

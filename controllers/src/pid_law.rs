@@ -9,6 +9,7 @@
 use crate::allocation::{Allocation, THRUST_RESERVE, Wrench};
 use crate::altitude_loop::AltitudeLoop;
 use crate::angle::wrap_rad;
+use crate::controller::{ControllerState, within};
 use crate::pid_gains::{LoopGains, PidGains};
 use crate::set_points::SetPoint;
 use nalgebra::Vector3;
@@ -105,28 +106,31 @@ impl PidLaw {
         }
     }
 
-    /// The memory with which the law asks for `wrench` at this measurement, as far as its integrators can: a
-    /// successor that knows only its predecessor's last command goes on from that. An integrator without gain
-    /// stays empty, since it would keep for ever what it was given.
+    /// The memory that goes on from another law's: its integrators.
     #[must_use]
-    pub fn tracking(&self, wrench: &Wrench, set_point: &SetPoint, measured: &Measurement) -> PidState {
-        let still = Self { period_s: 0.0, ..*self };
-        let asked_B_N_m = still.torque_B_N_m(&mut PidState::default(), set_point, measured);
-        let missing_B_rad_s2 =
-            (wrench.torque_B_N_m - asked_B_N_m).component_div(&self.vehicle.inertia_B_kg_m2);
-        let max_rad_s2 = self.gains.attitude_integral_max_rad_s2;
-        let taken_up = |gains: &LoopGains, value: f64| {
-            if gains.integral_1_s3 > 0.0 { value.clamp(-max_rad_s2, max_rad_s2) } else { 0.0 }
+    pub fn taken_over(
+        &self,
+        memory: &ControllerState,
+        wrench: &Wrench,
+        altitude_set_m: f64,
+        measured: &Measurement,
+    ) -> PidState {
+        // An integrator without gain would keep for ever what it was given.
+        let attitude = |gains: &LoopGains, handed_rad_s2: f64| {
+            let has_gain = gains.integral_1_s3 > 0.0;
+            if has_gain { within(handed_rad_s2, self.gains.attitude_integral_max_rad_s2) } else { 0.0 }
         };
+        let before = &memory.integrals;
         PidState {
-            altitude_m_s2: self.altitude_loop().integral_for_m_s2(
+            altitude_m_s2: self.altitude_loop().taken_over_m_s2(
+                memory,
                 wrench.thrust_N,
-                set_point.altitude_m,
+                altitude_set_m,
                 measured,
             ),
-            roll_rad_s2: taken_up(&self.gains.roll, missing_B_rad_s2.x),
-            pitch_rad_s2: taken_up(&self.gains.pitch, missing_B_rad_s2.y),
-            yaw_rad_s2: taken_up(&self.gains.yaw, missing_B_rad_s2.z),
+            roll_rad_s2: attitude(&self.gains.roll, before.roll_rad_s2),
+            pitch_rad_s2: attitude(&self.gains.pitch, before.pitch_rad_s2),
+            yaw_rad_s2: attitude(&self.gains.yaw, before.yaw_rad_s2),
         }
     }
 
@@ -212,26 +216,22 @@ mod tests {
     }
 
     #[test]
-    fn a_law_that_tracks_a_wrench_asks_for_it() {
+    fn a_successor_goes_on_from_the_integrators_that_it_has_a_gain_for() {
         let wrench = Wrench { thrust_N: 5.2, torque_B_N_m: Vector3::new(1e-3, -2e-3, 1e-3) };
-        let integral = |gains: LoopGains| LoopGains { integral_1_s3: 1.0, ..gains };
-        let (roll, pitch, yaw) = (law().gains.roll, law().gains.pitch, law().gains.yaw);
-        let (roll, pitch, yaw) = (integral(roll), integral(pitch), integral(yaw));
-        let law = || PidLaw { gains: PidGains { roll, pitch, yaw, ..law().gains }, ..law() };
-        let measured = Measurement { roll_rad: 0.05, altitude_m: 0.99, ..level() };
-        let memory = law().tracking(&wrench, &hold(), &measured);
-        let still = PidLaw { period_s: 0.0, ..law() };
-        let asked = still.step(&mut memory.clone(), &hold(), &measured);
-        assert!((asked.thrust_N - wrench.thrust_N).abs() < 1e-12);
-        assert!((asked.torque_B_N_m - wrench.torque_B_N_m).norm() < 1e-15);
+        let integrals = PidState { altitude_m_s2: 9.0, roll_rad_s2: 0.1, pitch_rad_s2: 0.1, yaw_rad_s2: 0.1 };
+        let before = ControllerState { law: 2, integrals, ..ControllerState::default() };
+        let memory = law().taken_over(&before, &wrench, 1.0, &level());
+        assert_eq!(memory, PidState { altitude_m_s2: 2.0, ..PidState::default() });
     }
 
     #[test]
-    fn an_integrator_without_gain_takes_nothing_up_that_it_could_never_give_back() {
-        let wrench = Wrench { thrust_N: 5.2, torque_B_N_m: Vector3::new(1e-3, -2e-3, 1e-3) };
-        let memory = law().tracking(&wrench, &hold(), &level());
-        assert_eq!((memory.roll_rad_s2, memory.pitch_rad_s2, memory.yaw_rad_s2), (0.0, 0.0, 0.0));
-        assert!(memory.altitude_m_s2 > 0.0);
+    fn a_successor_that_knows_only_the_last_command_asks_for_its_thrust() {
+        let wrench = Wrench { thrust_N: 5.2, torque_B_N_m: Vector3::zeros() };
+        let measured = Measurement { roll_rad: 0.05, altitude_m: 0.99, ..level() };
+        let memory = law().taken_over(&ControllerState::default(), &wrench, 1.0, &measured);
+        let still = PidLaw { period_s: 0.0, ..law() };
+        let asked = still.step(&mut memory.clone(), &hold(), &measured);
+        assert!((asked.thrust_N - wrench.thrust_N).abs() < 1e-12);
     }
 
     #[test]

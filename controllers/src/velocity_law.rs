@@ -159,16 +159,10 @@ impl VelocityLoop {
         velocity_m_s: &[f64; 2],
         measured: &Measurement,
     ) -> ControllerState {
-        let as_it_flies = SetPoint {
-            altitude_m: measured.altitude_m,
-            roll_rad: measured.roll_rad,
-            pitch_rad: measured.pitch_rad,
-            yaw_rad: measured.yaw_rad,
-        };
         ControllerState {
             velocity_filtered: *velocity_m_s,
             velocity_command: *velocity_m_s,
-            ..self.cascade.taken_over(memory, wrench, &as_it_flies, measured)
+            ..self.cascade.taken_over(memory, wrench, measured.altitude_m, measured)
         }
     }
 
@@ -320,7 +314,7 @@ mod tests {
 
     #[test]
     fn a_negative_gain_is_refused_with_its_key() {
-        let text = OURS.replace("value = 1.8", "value = -1.8");
+        let text = OURS.replace("value = 2.2", "value = -2.2");
         let error = parse(&text, "my.toml", LoopsGains::read).unwrap_err().to_string();
         assert!(error.contains("velocity.proportional"), "{error}");
     }

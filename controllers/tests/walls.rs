@@ -8,8 +8,9 @@ use controllers::room::Room;
 use controllers::velocity_law::VelocityLoop;
 use controllers::wall_follow_law::{Mode, Shared, WallFollowGains, WallFollowLaw};
 use controllers::wall_stop_law::{HOLDING, WallStopGains, WallStopLaw};
-use flight::{Loop, NOISY, PERIOD_S, ROOM, Senses, airframe};
+use flight::{Loop, NOISY, PERIOD_S, ROOM, Senses, airframe, vehicle};
 use nalgebra::Vector3;
+use vehicles::{MotorModel, Vehicle};
 
 const SEEDS: [u64; 3] = [1, 2, 3];
 
@@ -52,8 +53,12 @@ struct Stop {
 
 /// Flies towards a wall that is `away_m` away, for `seconds`.
 fn stop(law: &WallStopLaw, seed: u64, away_m: f64, seconds: u64) -> Stop {
+    stop_of(vehicle(), law, seed, away_m, seconds)
+}
+
+fn stop_of(flown: Vehicle, law: &WallStopLaw, seed: u64, away_m: f64, seconds: u64) -> Stop {
     let walls = [away_m, f64::INFINITY, f64::INFINITY, f64::INFINITY];
-    let mut flight = Loop::new(Vector3::new(0.0, 0.0, 1.5), Senses::new(seed, walls, NOISY));
+    let mut flight = Loop::of(flown, Vector3::new(0.0, 0.0, 1.5), Senses::new(seed, walls, NOISY));
     let (mut nearest_m, mut worst_error_m, mut fastest_m_s) = (f64::INFINITY, 0.0_f64, 0.0_f64);
     let mut altitude_error_m = 0.0_f64;
     for tick in 0..1000 * seconds {
@@ -80,9 +85,9 @@ fn it_stops_at_three_metres_and_never_nearer_than_2_8_whatever_the_speed_and_see
                  height within {:.3} m",
                 stop.nearest_m, stop.worst_error_m, stop.fastest_m_s, stop.altitude_error_m
             );
-            assert!(stop.nearest_m > 2.8, "nearest {}", stop.nearest_m);
+            assert!(stop.nearest_m > 2.85, "nearest {}", stop.nearest_m);
             assert!(stop.worst_error_m < 0.05, "at the end off by {}", stop.worst_error_m);
-            assert!((stop.fastest_m_s - cruise_m_s).abs() < 0.15 * cruise_m_s + 0.05, "{}", stop.fastest_m_s);
+            assert!((stop.fastest_m_s - cruise_m_s).abs() < 0.1 * cruise_m_s + 0.2, "{}", stop.fastest_m_s);
             assert_eq!(stop.state, HOLDING);
             assert!(stop.altitude_error_m < 0.1, "{}", stop.altitude_error_m);
         }
@@ -118,7 +123,11 @@ fn clearance_m(at: &Vector3<f64>) -> f64 {
 
 /// Follows the walls until two laps are done.
 fn two_laps(law: &WallFollowLaw, seed: u64) -> Laps {
-    let mut flight = Loop::new(Vector3::new(0.0, 0.0, 1.5), Senses::new(seed, ROOM, NOISY));
+    two_laps_of(vehicle(), law, seed)
+}
+
+fn two_laps_of(flown: Vehicle, law: &WallFollowLaw, seed: u64) -> Laps {
+    let mut flight = Loop::of(flown, Vector3::new(0.0, 0.0, 1.5), Senses::new(seed, ROOM, NOISY));
     let mut laps = Laps { nearest_m: f64::INFINITY, ..Laps::default() };
     while flight.memory.laps < 2 && flight.time_s() < 200.0 {
         flight.step(law);
@@ -191,7 +200,81 @@ fn two_laps_at_constant_speed_keep_three_metres_along_the_sides() {
             assert!(rms(&laps.side_errors_m) < 0.12, "sides {}", rms(&laps.side_errors_m));
             assert!(laps.nearest_m > 2.5, "nearest {}", laps.nearest_m);
             let mean_m_s = laps.speeds_m_s.iter().sum::<f64>() / laps.speeds_m_s.len() as f64;
-            assert!((mean_m_s / speed_m_s - 1.0).abs() < 0.1, "mean speed {mean_m_s}");
+            assert!((mean_m_s / speed_m_s - 1.0).abs() < 0.15, "mean speed {mean_m_s}");
         }
     }
+}
+
+/// Vehicles that differ from the file that the law believes in.
+fn others() -> [(&'static str, Vehicle); 3] {
+    let heavier = Vehicle { mass_kg: 1.05 * vehicle().mass_kg, ..vehicle() };
+    let larger = Vehicle { inertia_kg_m2: 1.15 * vehicle().inertia_kg_m2, ..vehicle() };
+    let motor = MotorModel::SecondOrder { natural_frequency_rad_s: 0.9 * 15.08, damping_ratio: 0.603 };
+    [("heavier", heavier), ("larger", larger), ("slower motors", Vehicle { motor, ..vehicle() })]
+}
+
+#[test]
+fn vehicles_that_differ_from_their_file_stop_and_follow_as_well() {
+    for (name, flown) in others() {
+        let stop = stop_of(flown.clone(), &wall_stop(2.0, 3.0), 1, 12.0, 25);
+        println!("{name}: nearest {:.3} m, at the end within {:.3} m", stop.nearest_m, stop.worst_error_m);
+        assert!(stop.nearest_m > 2.8 && stop.worst_error_m < 0.05, "{name}");
+        let laps = two_laps_of(flown, &wall_follow(Mode::Constant, 0.7), 1);
+        report(name, &laps);
+        assert!(laps.laps == 2 && rms(&laps.side_errors_m) < 0.12, "{name}");
+    }
+}
+
+/// Places along the loop at 3 m from the walls, in the order of the flight: the distance `along_m` behind the
+/// corner at (2, 2) and the state there.
+fn on_the_loop(along_m: f64) -> (Vector3<f64>, u32) {
+    let (side, rest_m) = ((along_m / 4.0) as u32 % 4, along_m % 4.0);
+    let (x, y) = match side {
+        0 => (2.0, 2.0 - rest_m),
+        1 => (2.0 - rest_m, -2.0),
+        2 => (-2.0, -2.0 + rest_m),
+        _ => (-2.0 + rest_m, 2.0),
+    };
+    (Vector3::new(x, y, 1.5), side + 2)
+}
+
+/// Ten vehicles on one loop of 16 m, each in the beams of its neighbours all the time.
+#[test]
+fn ten_vehicles_on_one_loop_keep_apart_and_do_their_laps() {
+    let count = 10;
+    let starts: Vec<_> =
+        (0..count).map(|number| on_the_loop(16.0 / f64::from(count) * f64::from(number))).collect();
+    let law = |(start, state): &(Vector3<f64>, u32)| WallFollowLaw {
+        start_state: *state,
+        shared: Some(Shared {
+            room: Room { size_m: [10.0, 10.0] },
+            start_m: Some([start.x + 5.0, start.y + 5.0]),
+            ahead_min_m: 0.6,
+        }),
+        ..wall_follow(Mode::Constant, 0.5)
+    };
+    let laws: Vec<_> = starts.iter().map(law).collect();
+    let senses = |number: usize| Senses::new(number as u64, ROOM, NOISY);
+    let mut flights: Vec<_> =
+        starts.iter().enumerate().map(|(number, (at, _))| Loop::new(*at, senses(number))).collect();
+    let (mut nearest_m, mut clearance) = (f64::INFINITY, f64::INFINITY);
+    for _ in 0..90_000 {
+        let places: Vec<_> = flights.iter().map(Loop::position).collect();
+        for (number, flight) in flights.iter_mut().enumerate() {
+            flight.senses.others_W_m.clear();
+            let others = places.iter().enumerate().filter(|(other, _)| *other != number);
+            flight.senses.others_W_m.extend(others.map(|(_, place)| *place));
+            flight.step(&laws[number]);
+            clearance = f64::min(clearance, clearance_m(&places[number]));
+        }
+        for (number, place) in places.iter().enumerate() {
+            let apart = places[..number].iter().map(|other| (place - other).norm());
+            nearest_m = apart.fold(nearest_m, f64::min);
+        }
+    }
+    let laps: Vec<_> = flights.iter().map(|flight| flight.memory.laps).collect();
+    println!("ten vehicles: nearest {nearest_m:.3} m apart, {clearance:.3} m from the walls, laps {laps:?}");
+    assert!(nearest_m > 0.7, "centres {nearest_m} m apart");
+    assert!(clearance > 2.5, "{clearance} m from the walls");
+    assert!(laps.iter().all(|laps| *laps >= 2), "{laps:?}");
 }

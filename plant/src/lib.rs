@@ -9,8 +9,15 @@
 //! | `motor` | the lag between commanded and actual rotor speed |
 //! | [`rotor`] | thrust and torques of the rotors on the body |
 //! | `rotation` | turning vectors inside of an integration step |
-//! | [`newton_euler`] | the free-flight backend: equations of motion and their integration |
-//! | [`node`] | the plant as a process of a run
+//! | [`newton_euler`] | equations of motion and their integration |
+//! | [`backend`] | what a plant can do, whichever physics moves it |
+//! | [`free_flight`] | the backend `newton-euler` |
+//! | [`rapier`] | the backend `rapier`: ground, walls, other vehicles, rigs |
+//! | [`snapshot`] | a backend's state as bytes |
+//! | [`node`] | the plant as a process of a run |
+//! | `parameters` | what manifests say of a plant, and the backend that follows |
+//! | `others` | which vehicles of the traffic are others |
+//! | `output` | what a plant publishes |
 //!
 //! ```
 //! use nalgebra::Vector3;
@@ -27,17 +34,27 @@
 #![forbid(unsafe_code)]
 
 pub mod airframe;
+pub mod backend;
 pub mod effects;
+pub mod free_flight;
 pub mod memory;
 mod motor;
 pub mod newton_euler;
 pub mod node;
+mod others;
+mod output;
+mod parameters;
+pub mod rapier;
 mod rotation;
 pub mod rotor;
+pub mod snapshot;
 pub mod state;
 
 pub use airframe::{Airframe, Drive};
+pub use backend::{Backend, ContactReport, Neighbour};
+pub use free_flight::FreeFlight;
 pub use memory::AirframeMemory;
 pub use newton_euler::{Motion, NewtonEuler};
+pub use rapier::Rapier;
 pub use rotor::Wrench;
 pub use state::{RigidBody, RotorState, State};

@@ -57,6 +57,11 @@ impl NewtonEuler {
         self.airframe.vehicle()
     }
 
+    /// How many integration steps a tick has.
+    pub(crate) fn substeps(&self) -> u32 {
+        self.substeps
+    }
+
     /// A rotor that has settled at a raw motor command.
     pub fn steady(&self, command: f64) -> RotorState {
         RotorState::steady(self.vehicle().command.speed(command))
@@ -101,8 +106,8 @@ impl NewtonEuler {
         }
     }
 
-    /// One classic Runge-Kutta step of fourth order over the full state.
-    fn runge_kutta(&self, state: &State, drive: &Drive, span_s: f64) -> State {
+    /// One classic Runge-Kutta step of fourth order over the full state, in free flight.
+    pub(crate) fn runge_kutta(&self, state: &State, drive: &Drive, span_s: f64) -> State {
         let k1 = self.rates(state, drive);
         let k2 = self.rates(&state.moved(&k1, span_s / 2.0), drive);
         let k3 = self.rates(&state.moved(&k2, span_s / 2.0), drive);

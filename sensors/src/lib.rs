@@ -12,9 +12,9 @@
 //! - [`barometer`], [`atmosphere`]: air pressure, and how it falls with height.
 //! - [`magnetometer`], [`earth_field`]: the earth's magnetic field, at the vehicle and in the world.
 //! - [`range`], [`cone`]: five range finders, and what their beams meet.
-//! - [`battery`]: voltage, current and charge.
 //! - [`ekf`]: position, velocity and attitude from an IMU, GPS or motion capture, barometer, magnetometer.
 //! - [`range_inertial`]: velocity, height and walls from range finders, an IMU and an attitude.
+//! - [`battery`]: voltage, current and charge.
 //! - `steps`: what is left of a value at a resolution.
 //! - `channel`: when sensors measure, and how measurements are delayed and lost.
 //! - `wire`: the vectors of messages as those of nalgebra.

@@ -14,7 +14,7 @@ use sensors::complementary::{Complementary, ComplementaryParams, ComplementarySt
 use sensors::imu_model::{ImuModel, ImuParams};
 use sensors::range_inertial::filter::{Inputs, RangeInertial, RangeInertialState, Wall};
 use sensors::range_inertial::params::RangeInertialParams;
-use support::{Manoeuvre, PERIOD_NS, PERIOD_S, Truth, fly, pulse};
+use support::{Manoeuvre, PERIOD_NS, PERIOD_S, Truth, fly};
 
 const REACH_M: f64 = 7.65;
 const RANGE_PERIOD: usize = 100;
@@ -84,6 +84,15 @@ fn estimate(flight: &[Truth], room: Room, seed: u64, mut judge: impl FnMut(&Run)
         let walls = filter.walls(&state, yaw_rad);
         judge(&Run { truth: *truth, time_s, state, walls, yaw_rad });
     }
+}
+
+/// A pulse of `height` from `from_s` on for `for_s` with soft edges of 0.15 s, as a vehicle can follow.
+fn pulse(time_s: f64, from_s: f64, for_s: f64, height: f64) -> f64 {
+    let edge = |since_s: f64| {
+        let part = (since_s / 0.15).clamp(0.0, 1.0);
+        part * part * (3.0 - 2.0 * part)
+    };
+    height * (edge(time_s - from_s) - edge(time_s - from_s - for_s))
 }
 
 /// A flight along x: 20° of pitch up to 2 m/s, a cruise of 2.7 s, and 20° against it to a stop.

@@ -16,6 +16,7 @@
 //! - [`commands`]: the other subcommands, exit codes and JSON
 //! - [`profile`]: where the host time of a run's ticks goes
 //! - [`rights`]: rights that a run lacks are named
+//! - [`sensors`]: sensors read what they should, and hand over what is under way
 //! - [`replay`]: the measured flight
 
 mod clean;
@@ -34,6 +35,7 @@ mod recordings;
 mod refusals;
 mod replay;
 mod rights;
+mod sensors;
 #[allow(dead_code, reason = "shared with tests/faults")]
 mod support;
 mod swap;

@@ -35,14 +35,17 @@ pub fn airframe() -> Airframe {
 pub struct RangeErrors {
     /// Standard deviation of a distance.
     pub distance_m: f64,
-    /// Standard deviation of the velocity's wandering error.
+    /// Standard deviation of the velocity's wandering error along an axis with a wall in sight.
     pub velocity_m_s: f64,
+    /// The same with none in sight.
+    pub blind_velocity_m_s: f64,
     /// Time constant of that wandering.
     pub wandering_s: f64,
 }
 
 /// Twice what the sensor's resolution makes, and what 10 Hz of it leave of the velocity.
-pub const NOISY: RangeErrors = RangeErrors { distance_m: 0.01, velocity_m_s: 0.03, wandering_s: 2.0 };
+pub const NOISY: RangeErrors =
+    RangeErrors { distance_m: 0.01, velocity_m_s: 0.02, blind_velocity_m_s: 0.05, wandering_s: 2.0 };
 
 /// Where walls stand: at +x, -x, +y, -y of the world's origin; none where infinite.
 pub type Walls = [f64; 4];
@@ -101,8 +104,9 @@ impl Senses {
             self.measure(body);
         }
         for axis in 0..3 {
-            let kick =
-                self.normal() * self.errors.velocity_m_s * (2.0 * PERIOD_S / self.errors.wandering_s).sqrt();
+            let is_seen = axis == 2 || self.seen.in_sight[2 * axis] + self.seen.in_sight[2 * axis + 1] > 0;
+            let sigma_m_s = if is_seen { self.errors.velocity_m_s } else { self.errors.blind_velocity_m_s };
+            let kick = self.normal() * sigma_m_s * (2.0 * PERIOD_S / self.errors.wandering_s).sqrt();
             let error_m_s = &mut self.velocity_error_m_s[axis];
             *error_m_s += kick - *error_m_s * PERIOD_S / self.errors.wandering_s;
         }

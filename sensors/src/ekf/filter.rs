@@ -238,7 +238,7 @@ impl Ekf {
                 from = *to;
             }
             state.settled.travel(&from, &end, self.params.gravity_m_s2, &mut span);
-            state.settled.fade_gps_offset(span.time_s(), self.params.gps_offset_time_constant_s);
+            state.settled.fade_gps_drift(span.time_s(), self.params.gps_position_drift_time_s);
             state.covariance = flat(&span.carry(&state.covariance(), &self.params));
             state.at = end;
         }

@@ -33,12 +33,12 @@ pub struct Motion {
     /// Bias of the accelerometer.
     #[field(unit = "m/s^2", frame = "body")]
     pub accelerometer_bias: Vector3Message,
-    /// The wandering part of the GPS positions' error.
+    /// How far GPS positions have drifted.
     #[field(unit = "m", frame = "world")]
-    pub gps_offset: Vector3Message,
-    /// The barometer's offset.
+    pub gps_drift: Vector3Message,
+    /// Bias of the barometer.
     #[field(unit = "m", frame = "world")]
-    pub barometer_offset: f64,
+    pub barometer_bias: f64,
 }
 
 impl Motion {
@@ -67,9 +67,9 @@ impl Motion {
         self.velocity = vector_message(velocity_W_m_s + acceleration_W_m_s2 * period_s);
     }
 
-    /// Lets the GPS offset fade over `time_s`, as what wanders does on average.
-    pub fn fade_gps_offset(&mut self, time_s: f64, time_constant_s: f64) {
-        self.gps_offset = vector_message(vector(self.gps_offset) * (-time_s / time_constant_s).exp());
+    /// Lets the GPS drift fade over `time_s`, as it does on average.
+    pub fn fade_gps_drift(&mut self, time_s: f64, time_constant_s: f64) {
+        self.gps_drift = vector_message(vector(self.gps_drift) * (-time_s / time_constant_s).exp());
     }
 
     /// Takes the estimated `errors` off.
@@ -82,7 +82,7 @@ impl Motion {
         self.attitude = attitude_message(UnitQuaternion::new_normalize(attitude_WB.into_inner()));
         self.gyroscope_bias = sum(self.gyroscope_bias, GYROSCOPE);
         self.accelerometer_bias = sum(self.accelerometer_bias, ACCELEROMETER);
-        self.gps_offset = sum(self.gps_offset, GPS);
-        self.barometer_offset += errors[BAROMETER];
+        self.gps_drift = sum(self.gps_drift, GPS);
+        self.barometer_bias += errors[BAROMETER];
     }
 }

@@ -1,7 +1,7 @@
 //! What each sensor should measure, and how that depends on the filter's errors.
 #![allow(
     non_snake_case,
-    reason = "a trailing _W or _B names the frame a vector is written in, _WB a rotation between the two"
+    reason = "a trailing _W or _B names the frame a vector is written in, _WB a rotation between the two, _T the tesla"
 )]
 
 use super::history::Measurement;
@@ -35,17 +35,13 @@ impl<const N: usize> Observation<N> {
     }
 }
 
-/// Position and velocity; the position with an offset that wanders.
+/// Position and velocity; the position drifts.
 #[must_use]
 pub fn gps(motion: &Motion, measured: &Measurement, params: &EkfParams) -> Observation<6> {
     let [x, y, z, u, v, w, _] = measured.values;
-    let offset_W_m = vector(motion.gps_offset);
-    let position_W_m = Vector3::new(x, y, z) - vector(motion.position) - offset_W_m;
+    let position_W_m = Vector3::new(x, y, z) - vector(motion.position) - vector(motion.gps_drift);
     let velocity_W_m_s = Vector3::new(u, v, w) - vector(motion.velocity);
-    let (level_m, up_m) = (params.gps_horizontal_sigma_m, params.gps_vertical_sigma_m);
-    let (level_m_s, up_m_s) =
-        (params.gps_velocity_horizontal_sigma_m_s, params.gps_velocity_vertical_sigma_m_s);
-    let sigma = SVector::from([level_m, level_m, up_m, level_m_s, level_m_s, up_m_s]);
+    let sigma = stack(&params.gps_position_noise_m.into(), &params.gps_velocity_noise_m_s.into());
     Observation::new(stack(&position_W_m, &velocity_W_m_s), sigma)
         .with(0, POSITION, &Matrix3::identity())
         .with(0, GPS, &Matrix3::identity())
@@ -58,8 +54,8 @@ pub fn mocap(motion: &Motion, measured: &Measurement, params: &EkfParams) -> Obs
     let [x, y, z, ..] = measured.values;
     let position_W_m = Vector3::new(x, y, z) - vector(motion.position);
     let turn_W = measured_attitude_WB(measured) * attitude(motion.attitude).inverse();
-    let turn_rad = params.mocap_attitude_sigma_deg.to_radians();
-    let sigma = stack(&Vector3::repeat(params.mocap_position_sigma_m), &Vector3::repeat(turn_rad));
+    let turn_rad = params.mocap_attitude_noise_deg.to_radians();
+    let sigma = stack(&Vector3::repeat(params.mocap_position_noise_m), &Vector3::repeat(turn_rad));
     Observation::new(stack(&position_W_m, &turn_W.scaled_axis()), sigma)
         .with(0, POSITION, &Matrix3::identity())
         .with(3, ATTITUDE, &Matrix3::identity())
@@ -72,12 +68,12 @@ pub fn measured_attitude_WB(measured: &Measurement) -> UnitQuaternion<f64> {
     UnitQuaternion::from_quaternion(nalgebra::Quaternion::new(w, x, y, z))
 }
 
-/// Altitude, with an offset that walks.
+/// Altitude, with a bias that walks.
 #[must_use]
 pub fn barometer(motion: &Motion, measured: &Measurement, params: &EkfParams) -> Observation<1> {
-    let innovation_m = measured.values[0] - motion.position.z - motion.barometer_offset;
+    let innovation_m = measured.values[0] - motion.position.z - motion.barometer_bias;
     let mut observation =
-        Observation::new(SVector::from([innovation_m]), SVector::from([params.barometer_sigma_m]));
+        Observation::new(SVector::from([innovation_m]), SVector::from([params.barometer_noise_m]));
     observation.jacobian[(0, POSITION + 2)] = 1.0;
     observation.jacobian[(0, BAROMETER)] = 1.0;
     observation
@@ -88,19 +84,11 @@ pub fn barometer(motion: &Motion, measured: &Measurement, params: &EkfParams) ->
 pub fn magnetometer(motion: &Motion, measured: &Measurement, params: &EkfParams) -> Observation<3> {
     let [x, y, z, ..] = measured.values;
     let to_body = attitude(motion.attitude).inverse();
-    let field_W_t = magnetic_field_W_t(params);
-    let field_B_t = Vector3::new(x, y, z) - Vector3::from(params.magnetometer_hard_iron_t);
-    let jacobian = to_body.to_rotation_matrix().into_inner() * field_W_t.cross_matrix();
-    Observation::new(field_B_t - to_body * field_W_t, Vector3::repeat(params.magnetometer_sigma_t))
+    let field_W_T = params.field_W_T();
+    let field_B_T = Vector3::new(x, y, z) - Vector3::from(params.magnetometer_hard_iron_T);
+    let jacobian = to_body.to_rotation_matrix().into_inner() * field_W_T.cross_matrix();
+    Observation::new(field_B_T - to_body * field_W_T, Vector3::repeat(params.magnetometer_noise_T))
         .with(0, ATTITUDE, &jacobian)
-}
-
-/// The world's magnetic field: x is east, y north, and a positive declination turns it from north to east.
-#[must_use]
-pub fn magnetic_field_W_t(params: &EkfParams) -> Vector3<f64> {
-    let (down, level) = params.magnetic_inclination_deg.to_radians().sin_cos();
-    let (east, north) = params.magnetic_declination_deg.to_radians().sin_cos();
-    params.magnetic_field_t * Vector3::new(level * east, level * north, -down)
 }
 
 fn stack(upper: &Vector3<f64>, lower: &Vector3<f64>) -> SVector<f64, 6> {

@@ -4,12 +4,12 @@
 //! any other, then gives it the confidence that it deserves.
 #![allow(
     non_snake_case,
-    reason = "a trailing _W or _B names the frame a vector is written in, _WB a rotation between the two"
+    reason = "a trailing _W or _B names the frame a vector is written in, _WB a rotation between the two, _T the tesla"
 )]
 
 use super::history::{Measurement, Newest, Reading, Readings, Sensor};
 use super::motion::Motion;
-use super::observation::{magnetic_field_W_t, measured_attitude_WB};
+use super::observation::measured_attitude_WB;
 use super::params::EkfParams;
 use super::transition::{ACCELEROMETER, ATTITUDE, BAROMETER, Covariance, GPS, GYROSCOPE, POSITION, VELOCITY};
 use crate::complementary::tilt_rad;
@@ -85,14 +85,13 @@ impl Start {
         let mut set = |from: usize, sigma: [f64; 3]| {
             (0..3).for_each(|axis| covariance[(from + axis, from + axis)] = sigma[axis].powi(2));
         };
-        let (level_m, up_m) = (params.gps_offset_horizontal_sigma_m, params.gps_offset_vertical_sigma_m);
         set(POSITION, [self.position_sigma_m; 3]);
         set(VELOCITY, [self.velocity_sigma_m_s; 3]);
         set(ATTITUDE, [self.tilt_sigma_rad, self.tilt_sigma_rad, self.yaw_sigma_rad]);
         set(GYROSCOPE, [params.initial_gyroscope_bias_sigma_rad_s; 3]);
         set(ACCELEROMETER, [params.initial_accelerometer_bias_sigma_m_s2; 3]);
-        set(GPS, [level_m, level_m, up_m]);
-        covariance[(BAROMETER, BAROMETER)] = params.barometer_initial_offset_sigma_m.powi(2);
+        set(GPS, params.gps_position_drift_m);
+        covariance[(BAROMETER, BAROMETER)] = params.barometer_initial_bias_sigma_m.powi(2);
         covariance
     }
 }
@@ -128,9 +127,9 @@ fn upright(reading: &Reading, yaw_rad: f64) -> Motion {
 /// The yaw at which the world's magnetic field lies as it is seen from the body, roll and pitch taken off.
 fn compass_yaw_rad(field: &Measurement, reading: &Reading, params: &EkfParams) -> f64 {
     let [x, y, z, ..] = field.values;
-    let field_B_t = Vector3::new(x, y, z) - Vector3::from(params.magnetometer_hard_iron_t);
+    let field_B_T = Vector3::new(x, y, z) - Vector3::from(params.magnetometer_hard_iron_T);
     let (roll_rad, pitch_rad) = tilt_rad(&vector(reading.specific_force));
-    let seen_t = UnitQuaternion::from_euler_angles(roll_rad, pitch_rad, 0.0) * field_B_t;
-    let true_t = magnetic_field_W_t(params);
-    true_t.y.atan2(true_t.x) - seen_t.y.atan2(seen_t.x)
+    let seen_T = UnitQuaternion::from_euler_angles(roll_rad, pitch_rad, 0.0) * field_B_T;
+    let true_T = params.field_W_T();
+    true_T.y.atan2(true_T.x) - seen_T.y.atan2(seen_T.x)
 }

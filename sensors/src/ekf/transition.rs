@@ -31,7 +31,7 @@ pub(super) const ACCELEROMETER: usize = 12;
 pub(super) const GPS: usize = 15;
 pub(super) const BAROMETER: usize = 18;
 
-/// The errors: position, velocity, attitude, gyroscope bias, accelerometer bias, GPS offset, barometer offset.
+/// The errors: position, velocity, attitude, gyroscope bias, accelerometer bias, GPS drift, barometer bias.
 pub type Errors = SVector<f64, STATES>;
 /// Their covariance.
 pub type Covariance = SMatrix<f64, STATES, STATES>;
@@ -89,7 +89,7 @@ impl Transition {
         if self.time == 0.0 {
             return *covariance;
         }
-        let fade = (-self.time / params.gps_offset_time_constant_s).exp();
+        let fade = (-self.time / params.gps_position_drift_time_s).exp();
         let half = self.apply(covariance, fade).transpose();
         let mut carried = self.apply(&half, fade);
         self.add_noise(&mut carried, params);
@@ -125,7 +125,7 @@ impl Transition {
             covariance[(position, velocity)] += force * time_s.powi(2) / 2.0;
             covariance[(velocity, position)] += force * time_s.powi(2) / 2.0;
         }
-        let fade = (-2.0 * time_s / params.gps_offset_time_constant_s).exp();
+        let fade = (-2.0 * time_s / params.gps_position_drift_time_s).exp();
         let mut add = |from: usize, count: usize, variance: f64| {
             (from..from + count).for_each(|state| covariance[(state, state)] += variance);
         };
@@ -133,9 +133,10 @@ impl Transition {
         add(ATTITUDE, 3, params.gyroscope_noise_density_rad_s_sqrt_hz.powi(2) * time_s);
         add(GYROSCOPE, 3, params.gyroscope_bias_walk_rad_s2_sqrt_hz.powi(2) * time_s);
         add(ACCELEROMETER, 3, params.accelerometer_bias_walk_m_s3_sqrt_hz.powi(2) * time_s);
-        add(GPS, 2, params.gps_offset_horizontal_sigma_m.powi(2) * (1.0 - fade));
-        add(GPS + 2, 1, params.gps_offset_vertical_sigma_m.powi(2) * (1.0 - fade));
-        add(BAROMETER, 1, params.barometer_offset_walk_m_sqrt_s.powi(2) * time_s);
+        add(BAROMETER, 1, params.barometer_bias_walk_m_sqrt_s.powi(2) * time_s);
+        for (axis, drift_m) in params.gps_position_drift_m.iter().enumerate() {
+            add(GPS + axis, 1, drift_m.powi(2) * (1.0 - fade));
+        }
     }
 }
 

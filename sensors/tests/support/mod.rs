@@ -67,12 +67,3 @@ fn angular_velocity_B(manoeuvre: Manoeuvre, time_s: f64) -> Vector3<f64> {
     let after = attitude(manoeuvre, time_s + half_s);
     (before.inverse() * after).scaled_axis() / (2.0 * half_s)
 }
-
-/// A pulse of `height` from `from_s` on for `for_s` with soft edges of 0.15 s, as a vehicle can follow.
-pub fn pulse(time_s: f64, from_s: f64, for_s: f64, height: f64) -> f64 {
-    let edge = |since_s: f64| {
-        let part = (since_s / 0.15).clamp(0.0, 1.0);
-        part * part * (3.0 - 2.0 * part)
-    };
-    height * (edge(time_s - from_s) - edge(time_s - from_s - for_s))
-}
