@@ -27,10 +27,10 @@ fn differences(course: &Course, span_s: f64, ends_s: &[f64]) -> [f64; 4] {
         }
         let (before, now, after) =
             (course.at(time_s - span_s), course.at(time_s), course.at(time_s + span_s));
-        for order in 0..4 {
+        for (order, worst) in worst.iter_mut().enumerate() {
             let difference_W = (after.path_W[order] - before.path_W[order]) / (2.0 * span_s);
             let off: f64 = (difference_W - now.path_W[order + 1]).norm();
-            worst[order] = off.max(worst[order]);
+            *worst = off.max(*worst);
         }
     }
     worst
@@ -186,4 +186,14 @@ fn what_is_wrong_with_a_segment_is_named_with_its_place() {
         assert!(error.starts_with("`segments`, entry 1 (the first is 0): "), "{error}");
         assert!(error.contains(expected), "{entry}: {error}");
     }
+}
+
+#[test]
+fn the_example_of_the_documentation_can_be_flown() {
+    let text = include_str!("../../docs/manifest.md");
+    let examples = text.split("```toml\n").skip(1).map(|rest| rest.split("```").next().unwrap());
+    let of_segments: Vec<_> = examples.filter(|example| example.contains("segments = [")).collect();
+    assert_eq!(of_segments.len(), 1);
+    let segments = of_segments[0].split_once("segments = [").unwrap().1.rsplit_once(']').unwrap().0;
+    assert!(course(segments).duration_s() > 10.0);
 }
