@@ -3,7 +3,7 @@
 use bus::kind::NodeKind;
 
 /// Every built-in kind, in alphabetical order.
-pub const KINDS: [&NodeKind; 7] = [
+pub const KINDS: [&NodeKind; 8] = [
     &sensors::attitude::KIND,
     &sensors::imu::KIND,
     &controllers::pid::KIND,
@@ -11,6 +11,7 @@ pub const KINDS: [&NodeKind; 7] = [
     &plant::node::KIND,
     &controllers::player::KIND,
     &recorder::node::KIND,
+    &plant::traffic::KIND,
 ];
 
 /// The kind named `name`.
