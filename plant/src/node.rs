@@ -58,7 +58,8 @@ fn run() -> Result<(), BusError> {
         if number > 0 {
             let before_ns = tick.time_ns() / u64::from(number) * u64::from(number - 1);
             let own_W_m = backend.state().body.position_W_m;
-            let seen = traffic.map(|traffic| others.seen(tick.get(traffic), &own_W_m, before_ns)).transpose()?;
+            let seen =
+                traffic.map(|traffic| others.seen(tick.get(traffic), &own_W_m, before_ns)).transpose()?;
             backend.step(&commands, dt_s, seen.unwrap_or_default());
         } else {
             // The input's initial value: the rotors turn steadily at it when the run starts.

@@ -36,8 +36,9 @@ impl Others {
         };
         let age_s = now_ns.saturating_sub(ns(traffic.stamp)) as f64 * 1e-9;
         self.neighbours.clear();
-        self.neighbours
-            .extend((0..count).filter(|number| *number != own).map(|number| neighbour(traffic, number, age_s)));
+        self.neighbours.extend(
+            (0..count).filter(|number| *number != own).map(|number| neighbour(traffic, number, age_s)),
+        );
         Ok(&self.neighbours)
     }
 }
@@ -98,9 +99,7 @@ mod tests {
 
     #[test]
     fn a_traffic_without_the_vehicle_or_with_two_at_its_place_is_refused() {
-        let seen = |positions| {
-            Others::new().seen(&traffic(positions), &Vector3::zeros(), 0).map(<[_]>::len)
-        };
+        let seen = |positions| Others::new().seen(&traffic(positions), &Vector3::zeros(), 0).map(<[_]>::len);
         assert!(seen(&[[1.0; 3]]).unwrap_err().contains("none of the 1 vehicles"));
         assert!(seen(&[[0.0; 3], [0.0; 3]]).unwrap_err().contains("start at one place"));
     }

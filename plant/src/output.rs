@@ -54,7 +54,10 @@ impl Outputs {
             tick.write(output, contact(backend))?;
         }
         if let Some(battery) = self.battery {
-            tick.write(battery, Battery { voltage: NOMINAL_VOLTAGE_V, charge: 1.0, valid: 1, ..Default::default() })?;
+            tick.write(
+                battery,
+                Battery { voltage: NOMINAL_VOLTAGE_V, charge: 1.0, valid: 1, ..Default::default() },
+            )?;
         }
         Ok(())
     }

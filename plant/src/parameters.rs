@@ -98,7 +98,9 @@ impl Parameters {
 
     fn check_inputs(&self, inputs: &[&str]) -> Result<(), String> {
         if inputs.contains(&"traffic") && self.backend == BackendName::NewtonEuler {
-            return Err("the input `traffic` needs `backend` = \"rapier\": free flight meets nobody".to_owned());
+            return Err(
+                "the input `traffic` needs `backend` = \"rapier\": free flight meets nobody".to_owned()
+            );
         }
         match (inputs.contains(&"measured"), self.window_s) {
             (true, None) => Err("the input `measured` needs the parameter `window_s`".to_owned()),
@@ -129,7 +131,10 @@ impl Parameters {
     fn start(&self) -> RigidBody {
         RigidBody {
             velocity_W_m_s: self.initial_velocity_m_s.into(),
-            attitude_WB: UnitQuaternion::from_axis_angle(&Vector3::z_axis(), self.initial_yaw_deg.to_radians()),
+            attitude_WB: UnitQuaternion::from_axis_angle(
+                &Vector3::z_axis(),
+                self.initial_yaw_deg.to_radians(),
+            ),
             ..RigidBody::level_at(self.initial_position_m.into())
         }
     }

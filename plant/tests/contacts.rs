@@ -106,7 +106,8 @@ fn reach_m(plant: &Rapier, hull: &Hull, direction: &Vector3<f64>) -> f64 {
 fn walls_hold_a_vehicle_and_are_named() {
     let hull = Hull::of(&hummingbird());
     let hover = [hummingbird().hover_command(); 4];
-    for (direction, object) in [(Vector3::x(), 2), (-Vector3::x(), 3), (Vector3::y(), 4), (-Vector3::y(), 5)] {
+    for (direction, object) in [(Vector3::x(), 2), (-Vector3::x(), 3), (Vector3::y(), 4), (-Vector3::y(), 5)]
+    {
         let start = RigidBody {
             velocity_W_m_s: direction * 2.0,
             ..RigidBody::level_at(direction * 4.0 + Vector3::z())

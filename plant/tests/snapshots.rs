@@ -48,8 +48,20 @@ fn situations() -> [Situation; 4] {
     let fixed = include_str!("../../scenes/rig-fixed.toml");
     let falling = |_| [1.0; 4];
     [
-        Situation { name: "a crash into wall and floor", scene: room, start: tumbling, commands: falling, traffic: nobody },
-        Situation { name: "among traffic", scene: room, start: tumbling, commands: falling, traffic: somebody },
+        Situation {
+            name: "a crash into wall and floor",
+            scene: room,
+            start: tumbling,
+            commands: falling,
+            traffic: nobody,
+        },
+        Situation {
+            name: "among traffic",
+            scene: room,
+            start: tumbling,
+            commands: falling,
+            traffic: somebody,
+        },
         Situation { name: "rig A", scene: sliding, start: at_rest, commands: uneven, traffic: nobody },
         Situation { name: "rig B", scene: fixed, start: at_rest, commands: uneven, traffic: nobody },
     ]

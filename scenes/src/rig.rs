@@ -30,7 +30,8 @@ pub struct Rig {
 }
 
 const TORQUE: Dimension = Dimension { name: "torque", units: &[("N*m", 1.0)] };
-const TORQUE_PER_SPEED: Dimension = Dimension { name: "torque per angular velocity", units: &[("N*m*s", 1.0)] };
+const TORQUE_PER_SPEED: Dimension =
+    Dimension { name: "torque per angular velocity", units: &[("N*m*s", 1.0)] };
 const FORCE: Dimension = Dimension { name: "force", units: &[("N", 1.0)] };
 const FORCE_PER_SPEED: Dimension = Dimension { name: "force per speed", units: &[("N*s/m", 1.0)] };
 

@@ -17,6 +17,7 @@
 //! - [`profile`]: where the host time of a run's ticks goes
 //! - [`rights`]: rights that a run lacks are named
 //! - [`replay`]: the measured flight
+//! - [`scenes`]: ground, walls, rigs and other vehicles
 
 mod clean;
 mod cleanup;
@@ -34,6 +35,7 @@ mod recordings;
 mod refusals;
 mod replay;
 mod rights;
+mod scenes;
 #[allow(dead_code, reason = "shared with tests/faults")]
 mod support;
 mod swap;

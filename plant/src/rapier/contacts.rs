@@ -82,7 +82,9 @@ impl Contacts {
             let touching = self.touches.iter_mut().find(|touch| touch.object == sighting.object);
             match touching {
                 Some(touch) => touch.seen |= sighting.gap_m < LIFT_M || sighting.impulse_N_s > 0.0,
-                None if sighting.impulse_N_s > 0.0 => self.begin(approach_m_s(before, &sighting), &sighting, crash_speed_m_s),
+                None if sighting.impulse_N_s > 0.0 => {
+                    self.begin(approach_m_s(before, &sighting), &sighting, crash_speed_m_s)
+                }
                 None => {}
             }
         }

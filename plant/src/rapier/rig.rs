@@ -41,9 +41,8 @@ pub(super) fn build(
 }
 
 fn slider(physics: &mut PhysicsWorld, foot: RigidBodyHandle, rig: &Rig) -> RigidBodyHandle {
-    let only_up = LockedAxes::ROTATION_LOCKED
-        | LockedAxes::TRANSLATION_LOCKED_X
-        | LockedAxes::TRANSLATION_LOCKED_Y;
+    let only_up =
+        LockedAxes::ROTATION_LOCKED | LockedAxes::TRANSLATION_LOCKED_X | LockedAxes::TRANSLATION_LOCKED_Y;
     let mass = MassProperties::new(Vector::ZERO, rig.moving_mass_kg, Vector::ZERO);
     let slider = RigidBodyBuilder::dynamic()
         .translation(to_rapier(&rig.bearing_W_m))

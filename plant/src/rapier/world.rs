@@ -151,7 +151,8 @@ impl World {
 
     fn sighting(&self, pair: &ContactPair) -> Option<Sighting> {
         let (manifold, contact) = pair.find_deepest_contact()?;
-        let (first, second) = (&self.physics.colliders[pair.collider1], &self.physics.colliders[pair.collider2]);
+        let (first, second) =
+            (&self.physics.colliders[pair.collider1], &self.physics.colliders[pair.collider2]);
         let own_is_first = self.handles.hull.contains(&pair.collider1);
         let other = if own_is_first { second } else { first };
         let outwards_W = from_rapier(first.position().rotation * manifold.local_n1);
