@@ -19,6 +19,7 @@
 //! - [`rights`]: rights that a run lacks are named
 //! - [`sensors`]: sensors read what they should, and hand over what is under way
 //! - [`replay`]: the measured flight
+//! - [`scenes`]: ground, walls, rigs and other vehicles
 
 mod clean;
 mod cleanup;
@@ -38,6 +39,7 @@ mod recordings;
 mod refusals;
 mod replay;
 mod rights;
+mod scenes;
 mod sensors;
 #[allow(dead_code, reason = "shared with tests/faults")]
 mod support;
