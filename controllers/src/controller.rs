@@ -186,6 +186,21 @@ pub struct ControllerState {
     /// Velocity that the guidance asks for, along the heading's level x and y.
     #[field(unit = "m/s")]
     pub velocity_command: [f64; 2],
+    /// Thrust that the rotors are foreseen to make; of `lqr` and `geometric` alone, as the next four.
+    #[field(unit = "N", frame = "body")]
+    pub thrust_made: f64,
+    /// Its rate of change.
+    #[field(unit = "N/s", frame = "body")]
+    pub thrust_made_rate: f64,
+    /// Torque that they are foreseen to make.
+    #[field(unit = "N*m", frame = "body")]
+    pub torque_made: [f64; 3],
+    /// Its rate of change.
+    #[field(unit = "N*m/s", frame = "body")]
+    pub torque_made_rate: [f64; 3],
+    /// Velocity that was foreseen for now, against which disturbances show.
+    #[field(unit = "m/s", frame = "world")]
+    pub velocity_foreseen: [f64; 3],
     /// Distances from the walls at the heading's -x and -y, where the guidance knows its room.
     #[field(unit = "m")]
     pub room_position: [f64; 2],

@@ -11,7 +11,15 @@
 //!   the walls must be although other vehicles stand in the beams.
 //! - [`allocation`]: from a wrench to the speeds of four rotors.
 //! - [`controller`]: what all controllers share, and the node that runs any of them.
-//! - [`pid`], [`cascade`], [`velocity`], [`wall_stop`], [`wall_follow`], [`pilot`], [`player`]: the nodes.
+//! - [`curve`], [`minimum_snap`], [`course`]: trajectories, with their derivatives.
+//! - [`flatness`]: the attitude and rates that a trajectory needs.
+//! - [`motor_lag`]: what the rotors make of a demand, foreseen, and a demand that hurries them.
+//! - [`disturbance`]: the acceleration that the model does not explain, observed.
+//! - [`geometric_gains`], [`geometric_law`]: tracking on SE(3).
+//! - [`riccati`], [`lqr_model`], [`lqr_gains`], [`lqr_law`]: the linear-quadratic regulator.
+//! - [`foresight`]: what the laws that foresee remember of both.
+//! - [`pid`], [`cascade`], [`velocity`], [`wall_stop`], [`wall_follow`], [`lqr`], [`geometric`], [`pilot`], [`trajectory`],
+//!   [`player`]: the nodes.
 //! - [`flight_log`]: a measured flight as CSV with a column map.
 //! - [`angle`]: the difference of two angles.
 #![forbid(unsafe_code)]
@@ -24,15 +32,31 @@ pub mod cascade;
 pub mod cascade_gains;
 pub mod cascade_law;
 pub mod controller;
+pub mod course;
+pub mod curve;
+pub mod disturbance;
+pub mod flatness;
 pub mod flight_log;
+pub mod foresight;
 pub mod gains_file;
+pub mod geometric;
+pub mod geometric_gains;
+pub mod geometric_law;
+pub mod lqr;
+pub mod lqr_gains;
+pub mod lqr_law;
+pub mod lqr_model;
+pub mod minimum_snap;
+pub mod motor_lag;
 pub mod pid;
 pub mod pid_gains;
 pub mod pid_law;
 pub mod pilot;
 pub mod player;
+pub mod riccati;
 pub mod room;
 pub mod set_points;
+pub mod trajectory;
 pub mod sticks;
 pub mod velocity;
 pub mod velocity_law;

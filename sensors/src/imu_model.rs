@@ -7,6 +7,7 @@
     reason = "a trailing _W or _B names the frame a vector is written in, _N the newton"
 )]
 
+use crate::channel::Timing;
 use crate::noise::{BiasWalk, WhiteNoise};
 use crate::parameter::{ParameterError, finite, not_negative, positive};
 use bus::random::{Stream, stream};
@@ -19,7 +20,8 @@ use serde::Deserialize;
 /// its ADIS16448 (Burri et al., "The EuRoC micro aerial vehicle datasets", IJRR 2016, file
 /// `imu0/sensor.yaml`); no data sheet of a part of this class gives a bias walk. The ranges are the
 /// data sheet's (±18 g, ±1000 °/s). The thesis does not name the part on the Hummingbird, so none of
-/// these is its own. The initial biases are zero: an autopilot nulls them at rest before take-off.
+/// these is its own. The initial biases are zero: an autopilot nulls them at rest before take-off. Readings are neither
+/// delayed nor lost: the autopilot reads the part over a wire of a few centimetres.
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct ImuParams {
@@ -39,6 +41,12 @@ pub struct ImuParams {
     pub gyroscope_initial_bias_rad_s: [f64; 3],
     /// The gyroscope reads no more than this on any axis, rad/s.
     pub gyroscope_range_rad_s: f64,
+    /// How long after it is made a reading arrives, ms.
+    pub delay_ms: f64,
+    /// The fraction of readings that are lost.
+    pub dropout: f64,
+    /// How long losses last on average, s; 0 where each is independent of the one before.
+    pub dropout_mean_s: f64,
 }
 
 impl Default for ImuParams {
@@ -52,11 +60,20 @@ impl Default for ImuParams {
             gyroscope_bias_walk_rad_s2_sqrt_hz: 1.9393e-5,
             gyroscope_initial_bias_rad_s: [0.0; 3],
             gyroscope_range_rad_s: 1000.0_f64.to_radians(),
+            delay_ms: 0.0,
+            dropout: 0.0,
+            dropout_mean_s: 0.0,
         }
     }
 }
 
 impl ImuParams {
+    /// What becomes of readings, `rate_hz` of which are made in a second, on their way.
+    pub(crate) fn timing(&self, rate_hz: f64) -> Timing {
+        let Self { delay_ms, dropout, dropout_mean_s, .. } = *self;
+        Timing { rate_hz, delay_ms, dropout, dropout_mean_s }
+    }
+
     /// The default part without noise, bias walk or initial bias: within its range it reads the truth.
     #[must_use]
     pub fn perfect() -> Self {
@@ -70,6 +87,8 @@ impl ImuParams {
     }
 
     fn validate(&self) -> Result<(), ParameterError> {
+        // The rate follows from the node's period, which is known when it starts.
+        self.timing(1.0).validate_at_any_rate()?;
         not_negative(
             "accelerometer_noise_density_m_s2_sqrt_hz",
             self.accelerometer_noise_density_m_s2_sqrt_hz,

@@ -65,7 +65,7 @@ impl BiasWalk {
 }
 
 /// Three independent draws from the normal distribution of zero mean and unit variance.
-fn standard_normal(random: &mut Stream) -> Vector3<f64> {
+pub(crate) fn standard_normal(random: &mut Stream) -> Vector3<f64> {
     // Bound one by one so that the order of drawing is in the source, not left to the constructor.
     let x: f64 = StandardNormal.sample(random);
     let y: f64 = StandardNormal.sample(random);

@@ -27,6 +27,22 @@ pub(crate) fn finite(key: &'static str, value: f64) -> Result<(), ParameterError
     check(key, value, value.is_finite(), "a finite number")
 }
 
-fn check(key: &'static str, found: f64, good: bool, expected: &'static str) -> Result<(), ParameterError> {
+/// Passes `values` if all are finite.
+pub(crate) fn all_finite(key: &'static str, values: &[f64]) -> Result<(), ParameterError> {
+    values.iter().try_for_each(|value| finite(key, *value))
+}
+
+/// Passes `values` if all are finite and none is negative.
+pub(crate) fn all_not_negative(key: &'static str, values: &[f64]) -> Result<(), ParameterError> {
+    values.iter().try_for_each(|value| not_negative(key, *value))
+}
+
+/// Passes `found` if it is `good`.
+pub(crate) fn check(
+    key: &'static str,
+    found: f64,
+    good: bool,
+    expected: &'static str,
+) -> Result<(), ParameterError> {
     if good { Ok(()) } else { Err(ParameterError { key, expected, found }) }
 }

@@ -8,9 +8,10 @@ use bus::plan::NodePlan;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 use toml::Spanned;
+use vehicles::Vehicle;
 
 /// Gives `node` the parameters of `member`, files resolved, checked where its kind is built in; notes its
-/// vehicle, scene and gains file in `models`.
+/// vehicle file, what that is based on, its scene and its gains file in `models`.
 ///
 /// # Errors
 /// A file or a parameter that is refused.
@@ -27,8 +28,10 @@ pub fn set(
         if let Some(file) = file {
             let path = manifest.resolve(file)?;
             parameters.insert(key, path.to_string_lossy().into());
-            if key != "data" && !models.contains(&path) {
-                models.push(path);
+            match key {
+                "data" => {}
+                "vehicle" => note([Some(path.clone()), Vehicle::base(&path)], models),
+                _ => note([Some(path), None], models),
             }
         }
     }
@@ -41,6 +44,15 @@ pub fn set(
     }
     node.parameters = parameters;
     Ok(())
+}
+
+/// Notes files to be recorded, each once.
+fn note(paths: [Option<PathBuf>; 2], models: &mut Vec<PathBuf>) {
+    for path in paths.into_iter().flatten() {
+        if !models.contains(&path) {
+            models.push(path);
+        }
+    }
 }
 
 /// The keys of a process that name a file which becomes a parameter.

@@ -107,7 +107,7 @@ pub fn program(manifest: &Manifest, name: &Spanned<String>, process: &Process) -
 fn executable(manifest: &Manifest, name: &Spanned<String>, process: &Process) -> Result<Executable, Problem> {
     match (&process.kind, &process.command) {
         (Some(kind), None) => {
-            let known = kinds::KINDS.map(|kind| kind.name);
+            let known: Vec<_> = kinds::KINDS.iter().map(|kind| kind.name).collect();
             let help = match nearest(kind.get_ref(), known) {
                 Some(near) => format!("did you mean `{near}`? The kinds are {}", kinds::names()),
                 None => format!("the kinds are {}", kinds::names()),

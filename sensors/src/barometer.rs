@@ -1,0 +1,247 @@
+//! The barometer node: air pressure, and the height that it means.
+//!
+//! Reading = pressure at the centre of mass in the standard atmosphere ([`crate::atmosphere`]) + bias + white
+//! noise, in steps of the part's resolution and cut off at its range; the bias walks at random, as weather and
+//! temperature move it. The altitude follows from the reading and a reference pressure. [`crate::channel`] says
+//! when it measures, how measurements are delayed and lost.
+#![allow(non_snake_case, reason = "a trailing _Pa names the pascal")]
+
+use crate::atmosphere::{SEA_LEVEL_PRESSURE_PA, height_m, pressure_Pa};
+use crate::channel::{Chance, Channel, ChannelState, QUEUE, Timing};
+use crate::noise::BiasWalk;
+use crate::parameter::{ParameterError, finite, not_negative, positive};
+use crate::steps::in_steps;
+use bus::kind::{Inputs, NodeKind, PortSpec, read_parameters};
+use bus::messages::{Barometer, PlantState};
+use bus::{BusError, Message, Node};
+use rand_distr::{Distribution, StandardNormal};
+use serde::Deserialize;
+
+/// The barometer, for manifests.
+pub const KIND: NodeKind = NodeKind {
+    name: "barometer",
+    summary: "air pressure and altitude with noise, walking bias and delay",
+    inputs: Inputs::Ports(&[PortSpec::required("state", PlantState::SCHEMA)]),
+    outputs: &[PortSpec::required("barometer", Barometer::SCHEMA)],
+    check: |parameters, _| {
+        let params: BarometerParams = read_parameters(parameters)?;
+        params.validate().map_err(|error| error.to_string())
+    },
+    run,
+};
+
+/// The least pressure that the part reads, Pa (MS5611-01BA03 data sheet: 10 mbar).
+const PRESSURE_MIN_PA: f64 = 1.0e3;
+/// The most, Pa (the same: 1200 mbar).
+const PRESSURE_MAX_PA: f64 = 1.2e5;
+
+/// What a barometer makes of the truth; the defaults are a MEAS Switzerland (TE Connectivity) MS5611-01BA03.
+///
+/// Its data sheet (DA5611-01BA03): resolution 0.012 mbar RMS at an oversampling ratio of 4096, which is its noise;
+/// the compensated reading in steps of 0.01 mbar; conversions of pressure and temperature of 8.22 ms each, one
+/// after the other, so that a reading is 16 ms old and 50 a second are possible. Bias walk: the data sheet states
+/// ±1 mbar a year, which is nothing in a flight; 0.2 Pa/√s, 1.5 Pa (13 cm) in a minute, stands for weather and
+/// warming (tuned, no source). The bias starts at zero: an autopilot nulls its altitude before take-off.
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct BarometerParams {
+    /// Measurements a second.
+    pub rate_hz: f64,
+    /// How long after measuring a measurement arrives, ms.
+    pub delay_ms: f64,
+    /// The fraction of measurements that are lost.
+    pub dropout: f64,
+    /// How long losses last on average, s; 0 where each is independent of the one before.
+    pub dropout_mean_s: f64,
+    /// True pressure at the world's origin, Pa.
+    pub ground_pressure_Pa: f64,
+    /// Pressure at which the altitude is zero, Pa.
+    pub reference_pressure_Pa: f64,
+    /// Standard deviation of a reading, Pa.
+    pub noise_Pa: f64,
+    /// The bias at the first reading, Pa.
+    pub initial_bias_Pa: f64,
+    /// Random walk of the bias, Pa/√s.
+    pub bias_walk_Pa_sqrt_s: f64,
+    /// Readings are multiples of this, Pa; 0 for any reading.
+    pub resolution_Pa: f64,
+}
+
+impl Default for BarometerParams {
+    fn default() -> Self {
+        Self {
+            rate_hz: 50.0,
+            delay_ms: 16.0,
+            dropout: 0.0,
+            dropout_mean_s: 0.0,
+            ground_pressure_Pa: SEA_LEVEL_PRESSURE_PA,
+            reference_pressure_Pa: SEA_LEVEL_PRESSURE_PA,
+            noise_Pa: 1.2,
+            initial_bias_Pa: 0.0,
+            bias_walk_Pa_sqrt_s: 0.2,
+            resolution_Pa: 1.0,
+        }
+    }
+}
+
+impl BarometerParams {
+    fn timing(&self) -> Timing {
+        let Self { rate_hz, delay_ms, dropout, dropout_mean_s, .. } = *self;
+        Timing { rate_hz, delay_ms, dropout, dropout_mean_s }
+    }
+
+    fn validate(&self) -> Result<(), ParameterError> {
+        self.timing().validate()?;
+        positive("ground_pressure_Pa", self.ground_pressure_Pa)?;
+        positive("reference_pressure_Pa", self.reference_pressure_Pa)?;
+        not_negative("noise_Pa", self.noise_Pa)?;
+        finite("initial_bias_Pa", self.initial_bias_Pa)?;
+        not_negative("bias_walk_Pa_sqrt_s", self.bias_walk_Pa_sqrt_s)?;
+        not_negative("resolution_Pa", self.resolution_Pa)
+    }
+
+    fn start(&self) -> Memory {
+        let queue = [Barometer::default(); QUEUE];
+        Memory { channel: ChannelState::default(), queue, bias: self.initial_bias_Pa }
+    }
+
+    /// What is read at `altitude_m`, Pa; the bias then walks one step on.
+    fn measure(&self, altitude_m: f64, bias_Pa: &mut f64, chance: &mut Chance<'_>) -> f64 {
+        let noise: f64 = StandardNormal.sample(chance.noise);
+        let step: f64 = StandardNormal.sample(chance.noise);
+        let read_Pa = pressure_Pa(altitude_m, self.ground_pressure_Pa) + *bias_Pa + self.noise_Pa * noise;
+        *bias_Pa += BiasWalk::new(self.bias_walk_Pa_sqrt_s, self.rate_hz).step_sigma() * step;
+        in_steps(read_Pa, self.resolution_Pa).clamp(PRESSURE_MIN_PA, PRESSURE_MAX_PA)
+    }
+
+    /// The sample to send at `now_ns`.
+    fn sample(
+        &self,
+        channel: &mut Channel,
+        memory: &mut Memory,
+        now_ns: u64,
+        truth: &PlantState,
+    ) -> Barometer {
+        let Memory { channel: state, queue, bias } = memory;
+        channel.step(state, queue, now_ns, |last, chance| {
+            let pressure = self.measure(truth.position.z, bias, chance);
+            if chance.is_lost(0) {
+                return Barometer { valid: 0, ..*last };
+            }
+            let altitude = height_m(pressure, self.reference_pressure_Pa);
+            Barometer { measured_ns: now_ns, pressure, altitude, valid: 1, ..Default::default() }
+        })
+    }
+}
+
+/// What the node remembers, as it is handed over.
+#[derive(Clone, Copy, Message)]
+#[repr(C)]
+#[message(type_name = "hummingbus_msgs/msg/BarometerState")]
+struct Memory {
+    /// What is under way.
+    channel: ChannelState,
+    /// The last measurements.
+    queue: [Barometer; QUEUE],
+    /// The bias at the next measurement.
+    #[field(unit = "Pa")]
+    bias: f64,
+}
+
+fn run() -> Result<(), BusError> {
+    let mut node = Node::join()?;
+    let state = node.input::<PlantState>("state")?;
+    let output = node.output::<Barometer>("barometer")?;
+    let params: BarometerParams = node.parameters()?;
+    params.validate().map_err(|error| node.error(error))?;
+    let mut channel = Channel::of_node(&params.timing(), &node)?;
+    node.run_with_state(params.start(), |tick, memory| {
+        let sent = params.sample(&mut channel, memory, tick.time_ns(), tick.get(state));
+        tick.write(output, sent)
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::{TICK_NS, require_hand_over, require_normal};
+
+    fn perfect() -> BarometerParams {
+        let (noise_Pa, bias_walk_Pa_sqrt_s, resolution_Pa) = (0.0, 0.0, 0.0);
+        BarometerParams { delay_ms: 0.0, noise_Pa, bias_walk_Pa_sqrt_s, resolution_Pa, ..Default::default() }
+    }
+
+    fn at(altitude_m: f64) -> PlantState {
+        PlantState { position: [3.0, 4.0, altitude_m].into(), ..Default::default() }
+    }
+
+    fn samples(params: &BarometerParams, truth: &PlantState, count: u64) -> Vec<Barometer> {
+        let mut channel = Channel::new(&params.timing(), 0.02, 5, "barometer").unwrap();
+        let mut memory = params.start();
+        (0..count).map(|n| params.sample(&mut channel, &mut memory, n * 20 * TICK_NS, truth)).collect()
+    }
+
+    #[test]
+    fn a_perfect_one_reads_the_true_height_whatever_the_pressure_on_the_ground() {
+        for pressure_Pa in [95_000.0, 101_325.0] {
+            let (ground_pressure_Pa, reference_pressure_Pa) = (pressure_Pa, pressure_Pa);
+            let params = BarometerParams { ground_pressure_Pa, reference_pressure_Pa, ..perfect() };
+            for altitude_m in [-2.0, 0.0, 1.5, 400.0] {
+                let found_m = samples(&params, &at(altitude_m), 1)[0].altitude;
+                assert!((found_m - altitude_m).abs() < 1e-8, "{found_m}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_reference_that_is_too_high_reads_too_high() {
+        // Near the ground a hectopascal is 8.3 m.
+        let params = BarometerParams { reference_pressure_Pa: SEA_LEVEL_PRESSURE_PA + 100.0, ..perfect() };
+        let found_m = samples(&params, &at(0.0), 1)[0].altitude;
+        assert!((found_m - 8.32).abs() < 0.01, "{found_m}");
+    }
+
+    #[test]
+    fn noise_and_bias_are_those_of_the_parameters() {
+        let params = BarometerParams { noise_Pa: 1.2, initial_bias_Pa: 30.0, ..perfect() };
+        let pressures = samples(&params, &at(0.0), 20_000).into_iter().map(|sample| sample.pressure);
+        require_normal(pressures, SEA_LEVEL_PRESSURE_PA + 30.0, 1.2);
+    }
+
+    #[test]
+    fn the_bias_walks_by_its_density_each_second() {
+        let params = BarometerParams { bias_walk_Pa_sqrt_s: 0.5, ..perfect() };
+        // 50 measurements are a second.
+        let samples = samples(&params, &at(0.0), 50 * 2000);
+        let seconds: Vec<f64> = samples.iter().step_by(50).map(|sample| sample.pressure).collect();
+        require_normal(seconds.windows(2).map(|pair| pair[1] - pair[0]), 0.0, 0.5);
+    }
+
+    #[test]
+    fn readings_are_multiples_of_the_resolution_and_within_the_range() {
+        let params = BarometerParams { delay_ms: 0.0, ..Default::default() };
+        assert!(samples(&params, &at(1.5), 100).iter().all(|sample| sample.pressure.fract() == 0.0));
+        for (altitude_m, expected_Pa) in [(40_000.0, PRESSURE_MIN_PA), (-5000.0, PRESSURE_MAX_PA)] {
+            let sample = samples(&params, &at(altitude_m), 1)[0];
+            assert!(sample.pressure == expected_Pa && sample.altitude.is_finite(), "{sample:?}");
+        }
+    }
+
+    #[test]
+    fn a_memory_that_is_handed_over_goes_on_byte_for_byte() {
+        let params = BarometerParams { dropout: 0.2, delay_ms: 145.0, ..Default::default() };
+        let channel = || Channel::new(&params.timing(), 1e-3, 5, "barometer").unwrap();
+        require_hand_over(channel, params.start(), |channel, memory: &mut Memory, now_ns| {
+            params.sample(channel, memory, now_ns, &at(now_ns as f64 * 1e-9))
+        });
+    }
+
+    #[test]
+    fn impossible_parameters_are_named() {
+        let bad = [("ground_pressure_Pa", 0.0), ("reference_pressure_Pa", -1.0), ("noise_Pa", -1.0)];
+        for (key, value) in bad.into_iter().chain([("bias_walk_Pa_sqrt_s", -1.0), ("resolution_Pa", -1.0)]) {
+            let reason = (KIND.check)(&serde_json::json!({ key: value }), &["state"]).unwrap_err();
+            assert!(reason.contains(&format!("`{key}`")), "{reason}");
+        }
+    }
+}

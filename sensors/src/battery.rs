@@ -1,0 +1,256 @@
+//! The battery monitor node: voltage and current at the battery's terminals, and the charge that is left.
+//!
+//! Reading = truth + bias + white noise, in steps of the part's resolution. The charge is what a monitor can know
+//! of it: the measured current counted from `initial_charge` on. [`crate::channel`] says when it measures, how
+//! measurements are delayed and lost; the count goes on through losses.
+#![allow(non_snake_case, reason = "trailing _V, _A and _Ah name units")]
+
+use crate::channel::{Chance, Channel, ChannelState, QUEUE, Timing};
+use crate::parameter::{ParameterError, check, finite, not_negative, positive};
+use crate::steps::in_steps;
+use bus::kind::{Inputs, NodeKind, PortSpec, read_parameters};
+use bus::messages::Battery;
+use bus::{BusError, Message, Node};
+use rand_distr::{Distribution, StandardNormal};
+use serde::Deserialize;
+
+/// The battery monitor, for manifests.
+pub const KIND: NodeKind = NodeKind {
+    name: "battery",
+    summary: "battery monitor: voltage and current with noise, and the charge counted from it",
+    inputs: Inputs::Ports(&[PortSpec::required("battery", Battery::SCHEMA)]),
+    outputs: &[PortSpec::required("measured", Battery::SCHEMA)],
+    check: |parameters, _| {
+        let params: BatteryParams = read_parameters(parameters)?;
+        params.validate().map_err(|error| error.to_string())
+    },
+    run,
+};
+
+/// What a battery monitor makes of the truth; the defaults are a Texas Instruments INA226 with a shunt of 2 mΩ.
+///
+/// Its data sheet (SBOS547): 1.25 mV a count of voltage, 2.5 µV a count of shunt voltage, which is 1.25 mA; 1.1 ms
+/// for each of the two conversions. It states no noise: one count of each, no source. The rate is 10 Hz, tuned, no
+/// source. The capacity is the Hummingbird's (thesis, Table 2.1: 2100 mAh).
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct BatteryParams {
+    /// Measurements a second.
+    pub rate_hz: f64,
+    /// How long after measuring a measurement arrives, ms.
+    pub delay_ms: f64,
+    /// The fraction of measurements that are lost.
+    pub dropout: f64,
+    /// How long losses last on average, s; 0 where each is independent of the one before.
+    pub dropout_mean_s: f64,
+    /// Standard deviation of a voltage, V.
+    pub voltage_noise_V: f64,
+    /// Constant error of the voltage, V.
+    pub voltage_bias_V: f64,
+    /// Voltages are multiples of this, V; 0 for any.
+    pub voltage_resolution_V: f64,
+    /// Standard deviation of a current, A.
+    pub current_noise_A: f64,
+    /// Constant error of the current, A.
+    pub current_bias_A: f64,
+    /// Currents are multiples of this, A; 0 for any.
+    pub current_resolution_A: f64,
+    /// Capacity of the battery, A·h.
+    pub capacity_Ah: f64,
+    /// The charge that is taken for granted at the first measurement, 0 to 1.
+    pub initial_charge: f64,
+}
+
+impl Default for BatteryParams {
+    fn default() -> Self {
+        Self {
+            rate_hz: 10.0,
+            delay_ms: 2.2,
+            dropout: 0.0,
+            dropout_mean_s: 0.0,
+            voltage_noise_V: 1.25e-3,
+            voltage_bias_V: 0.0,
+            voltage_resolution_V: 1.25e-3,
+            current_noise_A: 1.25e-3,
+            current_bias_A: 0.0,
+            current_resolution_A: 1.25e-3,
+            capacity_Ah: 2.1,
+            initial_charge: 1.0,
+        }
+    }
+}
+
+/// One quantity as a converter reads it.
+fn read(truth: f64, bias: f64, sigma: f64, step: f64, chance: &mut Chance<'_>) -> f64 {
+    let noise: f64 = StandardNormal.sample(chance.noise);
+    in_steps(truth + bias + sigma * noise, step)
+}
+
+impl BatteryParams {
+    fn timing(&self) -> Timing {
+        let Self { rate_hz, delay_ms, dropout, dropout_mean_s, .. } = *self;
+        Timing { rate_hz, delay_ms, dropout, dropout_mean_s }
+    }
+
+    fn validate(&self) -> Result<(), ParameterError> {
+        self.timing().validate()?;
+        not_negative("voltage_noise_V", self.voltage_noise_V)?;
+        finite("voltage_bias_V", self.voltage_bias_V)?;
+        not_negative("voltage_resolution_V", self.voltage_resolution_V)?;
+        not_negative("current_noise_A", self.current_noise_A)?;
+        finite("current_bias_A", self.current_bias_A)?;
+        not_negative("current_resolution_A", self.current_resolution_A)?;
+        positive("capacity_Ah", self.capacity_Ah)?;
+        let charge_is_good = (0.0..=1.0).contains(&self.initial_charge);
+        check("initial_charge", self.initial_charge, charge_is_good, "from 0 to 1")
+    }
+
+    fn start(&self) -> Memory {
+        let (channel, queue) = (ChannelState::default(), [Battery::default(); QUEUE]);
+        Memory { channel, queue, charge: self.initial_charge, counted_ns: u64::MAX }
+    }
+
+    fn measure(&self, truth: &Battery, chance: &mut Chance<'_>) -> Battery {
+        let Self { voltage_bias_V, voltage_noise_V, voltage_resolution_V, .. } = *self;
+        let Self { current_bias_A, current_noise_A, current_resolution_A, .. } = *self;
+        let voltage = read(truth.voltage, voltage_bias_V, voltage_noise_V, voltage_resolution_V, chance);
+        let current = read(truth.current, current_bias_A, current_noise_A, current_resolution_A, chance);
+        Battery { voltage, current, ..Default::default() }
+    }
+
+    /// The fraction of the capacity that `current_A` draws in `elapsed_ns`.
+    fn drawn(&self, current_A: f64, elapsed_ns: u64) -> f64 {
+        current_A * elapsed_ns as f64 * 1e-9 / 3600.0 / self.capacity_Ah
+    }
+
+    /// The sample to send at `now_ns`.
+    fn sample(&self, channel: &mut Channel, memory: &mut Memory, now_ns: u64, truth: &Battery) -> Battery {
+        let Memory { channel: state, queue, charge, counted_ns } = memory;
+        channel.step(state, queue, now_ns, |last, chance| {
+            let measured = self.measure(truth, chance);
+            let elapsed_ns = now_ns.saturating_sub(*counted_ns);
+            *charge = (*charge - self.drawn(measured.current, elapsed_ns)).clamp(0.0, 1.0);
+            *counted_ns = now_ns;
+            if chance.is_lost(0) {
+                return Battery { valid: 0, ..*last };
+            }
+            Battery { measured_ns: now_ns, charge: *charge, valid: 1, ..measured }
+        })
+    }
+}
+
+/// What the node remembers, as it is handed over.
+#[derive(Clone, Copy, Message)]
+#[repr(C)]
+#[message(type_name = "hummingbus_msgs/msg/BatteryMonitorState")]
+struct Memory {
+    /// What is under way.
+    channel: ChannelState,
+    /// The last measurements.
+    queue: [Battery; QUEUE],
+    /// The charge that is left.
+    #[field(unit = "1")]
+    charge: f64,
+    /// Until when it is counted; the end of time before the first measurement.
+    #[field(unit = "ns")]
+    counted_ns: u64,
+}
+
+fn run() -> Result<(), BusError> {
+    let mut node = Node::join()?;
+    let battery = node.input::<Battery>("battery")?;
+    let output = node.output::<Battery>("measured")?;
+    let params: BatteryParams = node.parameters()?;
+    params.validate().map_err(|error| node.error(error))?;
+    let mut channel = Channel::of_node(&params.timing(), &node)?;
+    node.run_with_state(params.start(), |tick, memory| {
+        let sent = params.sample(&mut channel, memory, tick.time_ns(), tick.get(battery));
+        tick.write(output, sent)
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::{TICK_NS, require_hand_over, require_normal};
+
+    fn truth() -> Battery {
+        Battery { voltage: 11.3, current: 8.4, charge: 0.5, ..Default::default() }
+    }
+
+    fn samples(params: &BatteryParams, count: u64) -> Vec<Battery> {
+        let mut channel = Channel::new(&params.timing(), 0.1, 5, "battery").unwrap();
+        let mut memory = params.start();
+        (0..count).map(|n| params.sample(&mut channel, &mut memory, n * 100 * TICK_NS, &truth())).collect()
+    }
+
+    fn undelayed() -> BatteryParams {
+        BatteryParams { delay_ms: 0.0, ..BatteryParams::default() }
+    }
+
+    #[test]
+    fn voltage_and_current_have_their_noise_and_bias() {
+        let params = BatteryParams {
+            voltage_noise_V: 0.02,
+            voltage_bias_V: 0.1,
+            voltage_resolution_V: 0.0,
+            current_noise_A: 0.05,
+            current_bias_A: -0.2,
+            current_resolution_A: 0.0,
+            ..undelayed()
+        };
+        let samples = samples(&params, 10_000);
+        require_normal(samples.iter().map(|sample| sample.voltage), 11.4, 0.02);
+        require_normal(samples.iter().map(|sample| sample.current), 8.2, 0.05);
+    }
+
+    #[test]
+    fn readings_are_counts_of_the_part() {
+        for sample in samples(&undelayed(), 100) {
+            for counts in [sample.voltage / 1.25e-3, sample.current / 1.25e-3] {
+                assert!((counts - counts.round()).abs() < 1e-6, "{counts}");
+            }
+        }
+    }
+
+    #[test]
+    fn the_charge_is_counted_from_the_measured_current_and_not_the_true_one() {
+        let params = BatteryParams {
+            current_noise_A: 0.0,
+            current_bias_A: 2.1,
+            initial_charge: 0.8,
+            dropout: 0.5,
+            ..undelayed()
+        };
+        // 8.4 A and the bias are 10.5 A, drawn for a tenth of a second between two measurements.
+        let samples = samples(&params, 3000);
+        for (number, sample) in samples.iter().enumerate().filter(|(_, sample)| sample.valid == 1) {
+            let expected = (0.8 - number as f64 * 0.1 * 10.5 / 3600.0 / 2.1).max(0.0);
+            assert!((sample.charge - expected).abs() < 1e-9, "{} {expected}", sample.charge);
+        }
+    }
+
+    #[test]
+    fn an_empty_battery_stays_at_zero() {
+        let params = BatteryParams { initial_charge: 0.01, ..undelayed() };
+        assert_eq!(samples(&params, 2000).last().unwrap().charge, 0.0);
+    }
+
+    #[test]
+    fn a_memory_that_is_handed_over_goes_on_byte_for_byte() {
+        let params = BatteryParams { dropout: 0.2, delay_ms: 245.0, ..BatteryParams::default() };
+        let channel = || Channel::new(&params.timing(), 1e-3, 5, "battery").unwrap();
+        require_hand_over(channel, params.start(), |channel, memory: &mut Memory, now_ns| {
+            params.sample(channel, memory, now_ns, &truth())
+        });
+    }
+
+    #[test]
+    fn impossible_parameters_are_named() {
+        let bad = [("capacity_Ah", 0.0), ("initial_charge", 1.1), ("voltage_noise_V", -1.0)];
+        for (key, value) in bad.into_iter().chain([("current_resolution_A", -1.0), ("dropout", 1.0)]) {
+            let reason = (KIND.check)(&serde_json::json!({ key: value }), &["battery"]).unwrap_err();
+            assert!(reason.contains(&format!("`{key}`")), "{reason}");
+        }
+    }
+}

@@ -1,0 +1,393 @@
+//! From measuring to arriving: when a sensor measures, how long its measurements travel, and which are lost.
+//!
+//! A sensor's node computes at each of its periods. It *measures* at the first of them at or after each multiple
+//! of 1 / `rate_hz`; a measurement *arrives* at the first at or after `delay_ms` later. In between it waits in a
+//! queue that is part of the node's hand-over state, so that a successor goes on with what is under way. Rate
+//! and delay are therefore exact where they are multiples of the node's period, and rounded up to it elsewhere;
+//! a measurement always holds the truth of the time that it states.
+//!
+//! Losses follow a two-state Markov chain (Gilbert, "Capacity of a burst-noise channel", Bell System Technical
+//! Journal 39, 1960): with probability `dropout` a measurement is lost, and losses last `dropout_mean_s` on
+//! average. They are drawn from a stream of their own: switching them on does not reshuffle the noise.
+
+use crate::parameter::{ParameterError, check, not_negative, positive};
+use bus::random::{Stream, stream};
+use bus::{BusError, Message, Node};
+use rand_distr::{Distribution, StandardUniform};
+
+/// How many measurements a queue holds: those under way, and the one that arrived last.
+pub(crate) const QUEUE: usize = 32;
+
+/// How many measurements may be under way: one place of the queue is for the one that arrived last, and one for
+/// a delay that is rounded up to the node's period.
+const UNDER_WAY_MAX: f64 = (QUEUE - 2) as f64;
+
+/// When a sensor measures, and what becomes of it on the way.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Timing {
+    /// Measurements a second.
+    pub rate_hz: f64,
+    /// How long after measuring a measurement arrives.
+    pub delay_ms: f64,
+    /// The fraction of measurements that are lost.
+    pub dropout: f64,
+    /// How long losses last on average; 0 where each is independent of the one before.
+    pub dropout_mean_s: f64,
+}
+
+impl Timing {
+    /// # Errors
+    /// A parameter is outside its range.
+    pub fn validate(&self) -> Result<(), ParameterError> {
+        positive("rate_hz", self.rate_hz)?;
+        self.validate_at_any_rate()?;
+        let under_way = self.delay_ms * 1e-3 * self.rate_hz;
+        let expected = "at most 30 measurements long";
+        check("delay_ms", self.delay_ms, under_way <= UNDER_WAY_MAX, expected)?;
+        let losses = Losses::new(self);
+        let mean_is_good = losses.begin <= 1.0 && losses.go_on >= 0.0;
+        let expected = "zero, or long enough for one measurement and for the fraction `dropout` of them";
+        check("dropout_mean_s", self.dropout_mean_s, mean_is_good, expected)
+    }
+
+    /// What can be said of the parameters where the rate is not known yet.
+    ///
+    /// # Errors
+    /// A parameter is outside its range.
+    pub fn validate_at_any_rate(&self) -> Result<(), ParameterError> {
+        not_negative("delay_ms", self.delay_ms)?;
+        let dropout_is_good = (0.0..1.0).contains(&self.dropout);
+        check("dropout", self.dropout, dropout_is_good, "a fraction from 0 to below 1")?;
+        not_negative("dropout_mean_s", self.dropout_mean_s)
+    }
+}
+
+/// The chances with which losses begin and go on.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Losses {
+    /// Probability of losing a measurement after one that was not lost.
+    begin: f64,
+    /// Probability of losing a measurement after one that was lost.
+    go_on: f64,
+}
+
+impl Losses {
+    /// In the long run begin · (1 − dropout) = (1 − go_on) · dropout, and losses last 1 / (1 − go_on).
+    fn new(timing: &Timing) -> Self {
+        let dropout = timing.dropout;
+        if timing.dropout_mean_s == 0.0 {
+            return Self { begin: dropout, go_on: dropout };
+        }
+        let end = (timing.dropout_mean_s * timing.rate_hz).recip();
+        Self { begin: end * dropout / (1.0 - dropout), go_on: 1.0 - end }
+    }
+}
+
+/// What is remembered of a channel from tick to tick, beside the queue of measurements.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Message)]
+#[repr(C)]
+#[message(type_name = "hummingbus_msgs/msg/ChannelState")]
+pub(crate) struct ChannelState {
+    /// Simulation time from which on the next measurement is due.
+    #[field(unit = "ns")]
+    next_ns: u64,
+    /// Measurements so far; number n is at place n modulo the length of the queue.
+    #[field(unit = "1")]
+    measured: u64,
+    /// How many of them have arrived.
+    #[field(unit = "1")]
+    arrived: u64,
+    /// When those in the queue arrive.
+    #[field(unit = "ns")]
+    arrival_ns: [u64; QUEUE],
+    /// Words of 32 bits drawn from the noise stream: the low and the high half of the count.
+    #[field(unit = "1")]
+    noise_words: [u64; 2],
+    /// The same of the stream of losses.
+    #[field(unit = "1")]
+    loss_words: [u64; 2],
+    /// Which parts of the last measurement were lost, a bit for each.
+    #[field(unit = "1")]
+    lost: u32,
+    /// Zero.
+    #[field(unit = "")]
+    pad0: u32,
+}
+
+/// The channel of a node: all that does not change during a run, and its random streams.
+#[derive(Debug, Clone)]
+pub(crate) struct Channel {
+    interval_ns: u64,
+    delay_ns: u64,
+    losses: Losses,
+    noise: Stream,
+    loss: Stream,
+}
+
+/// The chance in one measurement.
+#[derive(Debug)]
+pub(crate) struct Chance<'a> {
+    /// The node's random stream.
+    pub noise: &'a mut Stream,
+    loss: &'a mut Stream,
+    losses: Losses,
+    lost: &'a mut u32,
+}
+
+impl Chance<'_> {
+    /// Whether part `part` of the measurement, numbered from 0, is lost; to be asked once for each.
+    pub fn is_lost(&mut self, part: u32) -> bool {
+        let was_lost = *self.lost >> part & 1 == 1;
+        let chance = if was_lost { self.losses.go_on } else { self.losses.begin };
+        let drawn: f64 = StandardUniform.sample(self.loss);
+        let is_lost = drawn < chance;
+        *self.lost = *self.lost & !(1 << part) | u32::from(is_lost) << part;
+        is_lost
+    }
+}
+
+impl Channel {
+    /// The channel of `node`.
+    ///
+    /// # Errors
+    /// As [`Channel::new`].
+    pub fn of_node(timing: &Timing, node: &Node) -> Result<Self, BusError> {
+        let channel = Self::new(timing, node.period_s(), node.seed(), node.name());
+        channel.map_err(|error| node.error(error))
+    }
+
+    /// The channel of node `node`, which computes every `period_s`, in a run seeded with `run_seed`.
+    ///
+    /// # Errors
+    /// A parameter is outside its range, or the sensor measures more often than the node computes.
+    pub fn new(timing: &Timing, period_s: f64, run_seed: u64, node: &str) -> Result<Self, ParameterError> {
+        timing.validate()?;
+        let is_in_time = timing.rate_hz * period_s <= 1.0 + 1e-9;
+        let expected = "at most the rate at which the node computes; lower its `period_ticks` or `rate_hz`";
+        check("rate_hz", timing.rate_hz, is_in_time, expected)?;
+        let (noise, mut loss) = (stream(run_seed, node), stream(run_seed, node));
+        loss.set_stream(1);
+        let (interval_ns, delay_ns) =
+            (nanoseconds(timing.rate_hz.recip()), nanoseconds(timing.delay_ms * 1e-3));
+        Ok(Self { interval_ns, delay_ns, losses: Losses::new(timing), noise, loss })
+    }
+
+    /// What has arrived last at `now_ns`: an element of `queue`, which starts filled with what is sent until the
+    /// first measurement arrives. Where a measurement is due, `measure` makes it from the one before.
+    pub fn step<M: Copy>(
+        &mut self,
+        state: &mut ChannelState,
+        queue: &mut [M; QUEUE],
+        now_ns: u64,
+        measure: impl FnOnce(&M, &mut Chance<'_>) -> M,
+    ) -> M {
+        if now_ns >= state.next_ns {
+            let last = queue[before(state.measured)];
+            queue[place(state.measured)] = self.measure(state, |chance| measure(&last, chance));
+            state.arrival_ns[place(state.measured)] = now_ns.saturating_add(self.delay_ns);
+            state.measured += 1;
+            state.next_ns = (now_ns / self.interval_ns + 1).saturating_mul(self.interval_ns);
+        }
+        while state.arrived < state.measured && state.arrival_ns[place(state.arrived)] <= now_ns {
+            state.arrived += 1;
+        }
+        queue[before(state.arrived)]
+    }
+
+    /// One measurement, the streams drawn from where `state` says and left there.
+    fn measure<M>(&mut self, state: &mut ChannelState, measure: impl FnOnce(&mut Chance<'_>) -> M) -> M {
+        go_to(&mut self.noise, state.noise_words);
+        go_to(&mut self.loss, state.loss_words);
+        let (noise, loss) = (&mut self.noise, &mut self.loss);
+        let measurement = measure(&mut Chance { noise, loss, losses: self.losses, lost: &mut state.lost });
+        state.noise_words = words(&self.noise);
+        state.loss_words = words(&self.loss);
+        measurement
+    }
+}
+
+/// The place of measurement `number` in the queue.
+#[allow(clippy::cast_possible_truncation, reason = "it is below the length of the queue")]
+fn place(number: u64) -> usize {
+    (number % QUEUE as u64) as usize
+}
+
+/// The place of the measurement before `number`; before the first it is the last place, not yet written.
+fn before(number: u64) -> usize {
+    place(number.wrapping_sub(1))
+}
+
+#[allow(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "checked to be positive and short"
+)]
+fn nanoseconds(seconds: f64) -> u64 {
+    (seconds * 1e9).round() as u64
+}
+
+fn go_to(random: &mut Stream, [low, high]: [u64; 2]) {
+    let words = u128::from(high) << 64 | u128::from(low);
+    // Where it is there already, its block need not be computed again.
+    if random.get_word_pos() != words {
+        random.set_word_pos(words);
+    }
+}
+
+#[allow(clippy::cast_possible_truncation, reason = "the halves of the count are taken apart")]
+fn words(random: &Stream) -> [u64; 2] {
+    let words = random.get_word_pos();
+    [words as u64, (words >> 64) as u64]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand_core::Rng;
+
+    const TICK_NS: u64 = 1_000_000;
+
+    fn timing() -> Timing {
+        Timing { rate_hz: 10.0, delay_ms: 0.0, dropout: 0.0, dropout_mean_s: 0.0 }
+    }
+
+    /// The times at which measurements were made, tick by tick as they arrive; 0 is sent until the first.
+    fn arrivals(timing: &Timing, period_ticks: u64, ticks: u64) -> Vec<(u64, u64)> {
+        let mut channel = Channel::new(timing, period_ticks as f64 * 1e-3, 1, "gps").unwrap();
+        let (mut state, mut queue) = (ChannelState::default(), [u64::MAX; QUEUE]);
+        (0..ticks)
+            .step_by(usize::try_from(period_ticks).unwrap())
+            .map(|tick| {
+                let now_ns = tick * TICK_NS;
+                (tick, channel.step(&mut state, &mut queue, now_ns, |_, _| now_ns) / TICK_NS)
+            })
+            .collect()
+    }
+
+    const NOTHING: u64 = u64::MAX / TICK_NS;
+
+    #[test]
+    fn without_delay_a_measurement_arrives_as_it_is_made_and_is_held_until_the_next() {
+        for (tick, measured) in arrivals(&timing(), 1, 1000) {
+            assert_eq!(measured, tick / 100 * 100);
+        }
+    }
+
+    #[test]
+    fn a_delay_shorter_than_the_interval_and_one_longer_are_exact() {
+        for delay_ticks in [1_u64, 80, 99, 100, 250, 3000] {
+            let timing = Timing { delay_ms: delay_ticks as f64, ..timing() };
+            for (tick, measured) in arrivals(&timing, 1, 4000) {
+                let expected = tick.checked_sub(delay_ticks).map_or(NOTHING, |tick| tick / 100 * 100);
+                assert_eq!(measured, expected, "at tick {tick} with a delay of {delay_ticks}");
+            }
+        }
+    }
+
+    #[test]
+    fn what_is_no_multiple_of_the_period_is_rounded_up_to_it() {
+        let timing = Timing { rate_hz: 160.0, delay_ms: 6.0, ..timing() };
+        let found = arrivals(&timing, 5, 35);
+        let expected = [(0, NOTHING), (5, NOTHING), (10, 0), (15, 0), (20, 10), (25, 15), (30, 20)];
+        assert_eq!(found, expected);
+        let found: Vec<u64> =
+            arrivals(&Timing { delay_ms: 0.0, ..timing }, 1, 26).iter().map(|f| f.1).collect();
+        assert_eq!((found[6], found[7], found[13], found[19], found[25]), (0, 7, 13, 19, 25));
+    }
+
+    #[test]
+    fn a_channel_that_starts_late_measures_once_and_then_at_its_rate() {
+        let mut channel = Channel::new(&timing(), 1e-3, 1, "gps").unwrap();
+        let (mut state, mut queue) = (ChannelState::default(), [(); QUEUE]);
+        let mut count = 0;
+        for tick in 5031..5331 {
+            channel.step(&mut state, &mut queue, tick * TICK_NS, |_, _| count += 1);
+        }
+        assert_eq!(count, 4);
+    }
+
+    fn lost(timing: &Timing, count: usize) -> Vec<bool> {
+        let mut channel = Channel::new(timing, 1e-3, 3, "mocap").unwrap();
+        let (mut state, mut queue) = (ChannelState::default(), [false; QUEUE]);
+        let interval_ns = channel.interval_ns;
+        (0..count as u64)
+            .map(|n| channel.step(&mut state, &mut queue, n * interval_ns, |_, chance| chance.is_lost(0)))
+            .collect()
+    }
+
+    #[test]
+    fn the_fraction_dropout_is_lost_and_losses_last_as_long_as_stated() {
+        let count = 200_000;
+        for (dropout, dropout_mean_s, measurements) in
+            [(0.1, 0.0, 1.0 / 0.9), (0.1, 0.05, 5.0), (0.4, 0.2, 20.0)]
+        {
+            let timing = Timing { rate_hz: 100.0, dropout, dropout_mean_s, ..timing() };
+            let lost = lost(&timing, count);
+            let losses = lost.iter().filter(|lost| **lost).count() as f64;
+            let bursts = lost.windows(2).filter(|pair| !pair[0] && pair[1]).count() as f64;
+            // The standard deviation of the fraction is below √(2·length·p/n); six of them.
+            let bound = 6.0 * (2.0 * measurements * dropout / count as f64).sqrt();
+            let (fraction, length) = (losses / count as f64, losses / bursts);
+            assert!((fraction - dropout).abs() < bound, "{fraction} of {dropout}, bound {bound}");
+            assert!((length / measurements - 1.0).abs() < 6.0 / bursts.sqrt(), "{length} of {measurements}");
+        }
+    }
+
+    #[test]
+    fn losses_do_not_reshuffle_the_noise() {
+        let noise = |dropout: f64| {
+            let mut channel = Channel::new(&Timing { dropout, ..timing() }, 1e-3, 3, "gps").unwrap();
+            let (mut state, mut queue) = (ChannelState::default(), [0; QUEUE]);
+            let measure = |_: &u64, chance: &mut Chance<'_>| {
+                chance.is_lost(0);
+                chance.noise.next_u64()
+            };
+            [0, 1, 2].map(|n| channel.step(&mut state, &mut queue, n * 100 * TICK_NS, measure))
+        };
+        assert_eq!(noise(0.0), noise(0.9));
+    }
+
+    #[test]
+    fn a_state_that_is_handed_over_goes_on_as_the_one_it_was_taken_from() {
+        let timing = Timing { rate_hz: 250.0, delay_ms: 50.0, dropout: 0.3, dropout_mean_s: 0.02 };
+        let measure = |_: &u64, chance: &mut Chance<'_>| {
+            if chance.is_lost(0) { 0 } else { chance.noise.next_u64() }
+        };
+        let mut first = Channel::new(&timing, 1e-3, 3, "gps").unwrap();
+        let (mut state, mut queue) = (ChannelState::default(), [1; QUEUE]);
+        for tick in 0..333 {
+            first.step(&mut state, &mut queue, tick * TICK_NS, measure);
+        }
+        let mut second = Channel::new(&timing, 1e-3, 3, "gps").unwrap();
+        let (mut handed_state, mut handed_queue) = (state, queue);
+        for tick in 333..1000 {
+            let expected = first.step(&mut state, &mut queue, tick * TICK_NS, measure);
+            let found = second.step(&mut handed_state, &mut handed_queue, tick * TICK_NS, measure);
+            assert_eq!(found, expected, "at tick {tick}");
+        }
+        assert_eq!(handed_state, state);
+    }
+
+    #[test]
+    fn impossible_timings_are_named() {
+        let refused = |timing: Timing| timing.validate().unwrap_err().to_string();
+        let cases = [
+            ("rate_hz", Timing { rate_hz: 0.0, ..timing() }),
+            ("rate_hz", Timing { rate_hz: f64::NAN, ..timing() }),
+            ("delay_ms", Timing { delay_ms: -1.0, ..timing() }),
+            ("delay_ms", Timing { delay_ms: 3001.0, ..timing() }),
+            ("delay_ms", Timing { delay_ms: f64::NAN, ..timing() }),
+            ("dropout", Timing { dropout: 1.0, ..timing() }),
+            ("dropout", Timing { dropout: -0.1, ..timing() }),
+            ("dropout_mean_s", Timing { dropout_mean_s: f64::INFINITY, ..timing() }),
+            ("dropout_mean_s", Timing { dropout: 0.1, dropout_mean_s: 0.05, ..timing() }),
+            ("dropout_mean_s", Timing { dropout: 0.9, dropout_mean_s: 0.5, ..timing() }),
+        ];
+        for (key, timing) in cases {
+            let error = refused(timing);
+            assert!(error.starts_with(&format!("parameter `{key}` must be ")), "{error}");
+        }
+        let error = Channel::new(&timing(), 0.2, 1, "gps").unwrap_err().to_string();
+        assert!(error.contains("`rate_hz`") && error.contains("`period_ticks`"), "{error}");
+    }
+}

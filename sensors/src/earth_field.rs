@@ -1,0 +1,53 @@
+//! The earth's magnetic field in the world, whose x axis points to geographic north where magnetometers are used.
+#![allow(non_snake_case, reason = "a trailing _W names the frame a vector is written in, _T the tesla")]
+
+use nalgebra::Vector3;
+
+/// The field at one place. The default is Krailling near Munich, where the Hummingbird was made: 48.09° N,
+/// 11.41° E, 550 m, at the beginning of 2025, from the World Magnetic Model 2025 (NOAA NCEI and BGS).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct EarthField {
+    /// Magnetic flux density, T.
+    pub field_T: f64,
+    /// How far the field points below the horizon, degrees.
+    pub inclination_deg: f64,
+    /// How far magnetic north lies east of geographic north, degrees.
+    pub declination_deg: f64,
+}
+
+impl Default for EarthField {
+    fn default() -> Self {
+        Self { field_T: 48.709e-6, inclination_deg: 64.33, declination_deg: 4.11 }
+    }
+}
+
+impl EarthField {
+    /// The field in the world: x north, y west, z up. An eastern declination turns it clockwise seen from above.
+    #[must_use]
+    pub fn vector_W_T(&self) -> Vector3<f64> {
+        let (down, level) = self.inclination_deg.to_radians().sin_cos();
+        let (east, north) = self.declination_deg.to_radians().sin_cos();
+        self.field_T * Vector3::new(level * north, -level * east, -down)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_default_has_the_components_of_the_model() {
+        // North, east and down as the World Magnetic Model states them beside the angles, in nT.
+        let expected = Vector3::new(21_044.6, -1_511.7, -43_902.2) * 1e-9;
+        assert!((EarthField::default().vector_W_T() - expected).norm() < 1e-8);
+    }
+
+    #[test]
+    fn declination_turns_the_level_part_clockwise_and_leaves_the_rest() {
+        let at = |declination_deg| EarthField { declination_deg, ..EarthField::default() }.vector_W_T();
+        let (north, east) = (at(0.0), at(90.0));
+        assert_eq!(north.y, 0.0);
+        assert!(north.x > 0.0 && (east.y + north.x).abs() < 1e-18 && east.x.abs() < 1e-18);
+        assert_eq!(north.z, east.z);
+    }
+}

@@ -1,0 +1,341 @@
+//! The extended Kalman filter: motion and sensor errors from an IMU and whatever else measures.
+//!
+//! *Two times.* Measurements arrive late, and not in the order in which they were measured. The filter proper
+//! therefore stays at the time up to which nothing can arrive any more, and uses every measurement at its own
+//! time, in order; what it publishes is its motion carried on to the present with the readings since, and its
+//! covariance carried on likewise. That is exact, where correcting the present by an old innovation is not, and
+//! cheap: readings are integrated twice, and a covariance is carried once for each measurement. The price is
+//! that a fast sensor waits for the slow ones' delay, in which the present drifts by what the IMU's noise makes
+//! of it: with the default IMU and 200 ms, 1 mm/s and 0.005°.
+//!
+//! *What waits.* A measurement is used as soon as every sensor has shown one at least as late, and at the latest
+//! when it is `delay_max_ms` old. One that arrives later than that is refused.
+//!
+//! *Outliers.* A measurement is refused if its normalised innovation squared is unlikely. Each refusal leaves the
+//! covariance growing, so a filter that is wrong comes to accept what it refused.
+#![allow(
+    non_snake_case,
+    reason = "a trailing _W or _B names the frame a vector is written in, _WB a rotation between the two"
+)]
+
+use super::history::{Newest, READINGS, Reading, Readings, Sensor, Waiting};
+use super::motion::Motion;
+use super::observation::{self, Observation};
+use super::params::EkfParams;
+use super::start::start;
+use super::transition::{Covariance, STATES, Transition, symmetric};
+use crate::parameter::{ParameterError, check, positive};
+use bus::Message;
+
+/// The covariance is carried over spans of at most this, since noise acts through the attitude in longer ones.
+const SPAN_MAX_NS: u64 = 20_000_000;
+
+/// No measurement was seen.
+const NEVER: u64 = u64::MAX;
+
+/// What the estimator remembers, as it is handed over.
+#[derive(Clone, Copy, Debug, PartialEq, Message)]
+#[repr(C)]
+#[message(type_name = "hummingbus_msgs/msg/EkfState")]
+pub struct EkfState {
+    /// The reading at the filter's time; its time is that of the filter.
+    at: Reading,
+    /// The motion at the filter's time.
+    settled: Motion,
+    /// The covariance of its errors.
+    #[field(unit = "")]
+    covariance: [f64; STATES * STATES],
+    /// The motion at the newest reading.
+    present: Motion,
+    /// What the errors do from the filter's time to the newest reading.
+    since: Transition,
+    /// The last readings.
+    readings: Readings,
+    /// Measurements that wait.
+    waiting: Waiting,
+    /// When the newest measurement of each sensor was taken; the largest number before the first.
+    #[field(unit = "ns")]
+    newest_ns: [u64; 4],
+    /// How the last update of each sensor went, and how often it did.
+    #[field(unit = "1")]
+    normalised_squared: [f64; 4],
+    #[field(unit = "1")]
+    updates: [u32; 4],
+    #[field(unit = "1")]
+    refused: [u32; 4],
+    /// 1 once the filter has begun.
+    #[field(unit = "1")]
+    has_begun: u32,
+    #[field(unit = "")]
+    pad0: u32,
+}
+
+impl Default for EkfState {
+    fn default() -> Self {
+        Self {
+            at: Reading::default(),
+            settled: Motion::default(),
+            covariance: [0.0; STATES * STATES],
+            present: Motion::default(),
+            since: Transition::default(),
+            readings: Readings::default(),
+            waiting: Waiting::default(),
+            newest_ns: [NEVER; 4],
+            normalised_squared: [0.0; 4],
+            updates: [0; 4],
+            refused: [0; 4],
+            has_begun: 0,
+            pad0: 0,
+        }
+    }
+}
+
+/// The filter at one sample period: all that does not change during a run.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Ekf {
+    params: EkfParams,
+    delay_max_ns: u64,
+}
+
+impl Ekf {
+    /// A filter that is given a reading every `period_s`.
+    ///
+    /// # Errors
+    /// A parameter or the period is outside its range, or the period is too short for the delay.
+    #[allow(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "a delay is small, not negative"
+    )]
+    pub fn new(params: EkfParams, period_s: f64) -> Result<Self, ParameterError> {
+        params.validate()?;
+        positive("period_s", period_s)?;
+        let span_s = params.delay_max_ms * 1e-3 + SPAN_MAX_NS as f64 * 1e-9;
+        let fits = span_s / period_s <= (READINGS - 2) as f64;
+        check("delay_max_ms", params.delay_max_ms, fits, "20 ms shorter than 254 of the node's periods")?;
+        Ok(Self { params, delay_max_ns: (params.delay_max_ms * 1e6) as u64 })
+    }
+
+    /// The parameters.
+    #[must_use]
+    pub fn params(&self) -> &EkfParams {
+        &self.params
+    }
+
+    /// Moves `state` on to `reading`, with what the sensors have measured last.
+    pub fn step(&self, state: &mut EkfState, reading: &Reading, newest: &Newest) {
+        let last = state.readings.newest().copied();
+        // Without a reading that can be used, the last one goes on.
+        let reading = match last {
+            Some(last) if !reading.is_finite() => Reading { time_ns: reading.time_ns, ..last },
+            _ => *reading,
+        };
+        state.readings.push(reading);
+        let begins = state.has_begun == 0;
+        if begins && !self.begin(state, newest) {
+            return;
+        }
+        self.collect(state, newest);
+        if self.settle(state, newest, reading.time_ns) || begins {
+            self.catch_up(state);
+        } else if let Some(last) = last {
+            state.present.travel(&last, &reading, self.params.gravity_m_s2, &mut state.since);
+        }
+    }
+
+    /// Begins if a position is known; whether it has.
+    fn begin(&self, state: &mut EkfState, newest: &Newest) -> bool {
+        let Some((reading, start)) = start(newest, &state.readings, &self.params) else { return false };
+        (state.at, state.settled) = (reading, start.motion);
+        state.covariance = flat(&start.covariance(&self.params));
+        for earlier in newest.iter().flatten().flatten().filter(|m| m.measured_ns < reading.time_ns) {
+            state.newest_ns[earlier.sensor().index()] = earlier.measured_ns;
+        }
+        state.has_begun = 1;
+        true
+    }
+
+    /// Puts what is new among the measurements that wait.
+    fn collect(&self, state: &mut EkfState, newest: &Newest) {
+        for measurement in newest.iter().flatten().flatten() {
+            let sensor = measurement.sensor().index();
+            if state.newest_ns[sensor] == measurement.measured_ns {
+                continue;
+            }
+            state.newest_ns[sensor] = measurement.measured_ns;
+            if state.waiting.is_full() {
+                self.use_first(state);
+            }
+            state.waiting.insert(*measurement);
+        }
+    }
+
+    /// Uses every measurement before which nothing can arrive any more, and keeps the filter's time within
+    /// reach of the readings; whether the filter's time or motion has changed.
+    fn settle(&self, state: &mut EkfState, newest: &Newest, now_ns: u64) -> bool {
+        let mut has_changed = false;
+        let until_ns = self.settled_ns(state, newest, now_ns);
+        while state.waiting.first().is_some_and(|first| first.measured_ns <= until_ns) {
+            self.use_first(state);
+            has_changed = true;
+        }
+        let horizon_ns = now_ns.saturating_sub(self.delay_max_ns);
+        if horizon_ns >= state.at.time_ns + SPAN_MAX_NS {
+            self.advance(state, horizon_ns);
+            has_changed = true;
+        }
+        has_changed
+    }
+
+    /// Up to when nothing can arrive any more: no sensor sends its measurements out of order.
+    fn settled_ns(&self, state: &EkfState, newest: &Newest, now_ns: u64) -> u64 {
+        let seen = |sensor: &Sensor| match state.newest_ns[sensor.index()] {
+            NEVER => 0,
+            newest_ns => newest_ns,
+        };
+        let wired = Sensor::ALL.iter().filter(|sensor| newest[sensor.index()].is_some());
+        let all_seen_ns = wired.map(seen).min().unwrap_or(0);
+        all_seen_ns.max(now_ns.saturating_sub(self.delay_max_ns))
+    }
+
+    /// Goes on to the time of the earliest measurement that waits, and uses it.
+    fn use_first(&self, state: &mut EkfState) {
+        let Some(measurement) = state.waiting.pop() else { return };
+        let is_known =
+            measurement.measured_ns >= state.at.time_ns && self.advance(state, measurement.measured_ns);
+        if !is_known || !measurement.values.iter().all(|value| value.is_finite()) {
+            state.refused[measurement.sensor().index()] += 1;
+            return;
+        }
+        let (motion, params) = (&state.settled, &self.params);
+        match measurement.sensor() {
+            Sensor::Gps => self.update(state, Sensor::Gps, &observation::gps(motion, &measurement, params)),
+            Sensor::Mocap => {
+                self.update(state, Sensor::Mocap, &observation::mocap(motion, &measurement, params))
+            }
+            Sensor::Barometer => {
+                self.update(state, Sensor::Barometer, &observation::barometer(motion, &measurement, params));
+            }
+            Sensor::Magnetometer => {
+                self.update(
+                    state,
+                    Sensor::Magnetometer,
+                    &observation::magnetometer(motion, &measurement, params),
+                );
+            }
+        }
+    }
+
+    /// Carries the filter on to `until_ns`; false if there are no readings up to then.
+    fn advance(&self, state: &mut EkfState, until_ns: u64) -> bool {
+        while state.at.time_ns < until_ns {
+            let next_ns = until_ns.min(state.at.time_ns + SPAN_MAX_NS);
+            let Some(end) = state.readings.at(next_ns) else { return false };
+            let mut span = Transition::default();
+            let mut from = state.at;
+            for to in state.readings.after(from.time_ns).take_while(|reading| reading.time_ns < next_ns) {
+                state.settled.travel(&from, to, self.params.gravity_m_s2, &mut span);
+                from = *to;
+            }
+            state.settled.travel(&from, &end, self.params.gravity_m_s2, &mut span);
+            state.settled.fade_gps_drift(span.time_s(), self.params.gps_position_drift_time_s);
+            state.covariance = flat(&span.carry(&state.covariance(), &self.params));
+            state.at = end;
+        }
+        true
+    }
+
+    /// The present anew, from the filter's time.
+    fn catch_up(&self, state: &mut EkfState) {
+        (state.present, state.since) = (state.settled, Transition::default());
+        let mut from = state.at;
+        for to in state.readings.after(from.time_ns) {
+            state.present.travel(&from, to, self.params.gravity_m_s2, &mut state.since);
+            from = *to;
+        }
+    }
+
+    /// The Kalman update, or the refusal of an outlier.
+    fn update<const N: usize>(&self, state: &mut EkfState, sensor: Sensor, observed: &Observation<N>) {
+        let index = sensor.index();
+        let covariance = state.covariance();
+        let cross = covariance * observed.jacobian.transpose();
+        let mut spread = observed.jacobian * cross;
+        (0..N).for_each(|row| spread[(row, row)] += observed.variance[row]);
+        let Some(spread) = spread.cholesky() else {
+            state.refused[index] += 1;
+            return;
+        };
+        let normalised_squared = observed.innovation.dot(&spread.solve(&observed.innovation));
+        state.normalised_squared[index] = normalised_squared;
+        if deviation(normalised_squared, N) > self.params.gate_sigma {
+            state.refused[index] += 1;
+            return;
+        }
+        let gain = cross * spread.inverse();
+        state.settled.correct(&(gain * observed.innovation));
+        state.covariance = flat(&symmetric(&(covariance - gain * cross.transpose())));
+        state.updates[index] += 1;
+    }
+
+    /// The covariance of the present motion's errors.
+    #[must_use]
+    pub fn covariance(&self, state: &EkfState) -> Covariance {
+        state.since.carry(&state.covariance(), &self.params)
+    }
+}
+
+impl EkfState {
+    /// The motion at the newest reading.
+    #[must_use]
+    pub fn motion(&self) -> &Motion {
+        &self.present
+    }
+
+    /// Whether the filter has begun: before, there is no estimate.
+    #[must_use]
+    pub fn has_begun(&self) -> bool {
+        self.has_begun == 1
+    }
+
+    /// Normalised innovation squared of the last update of each sensor, in the order of [`Sensor::ALL`].
+    #[must_use]
+    pub fn normalised_squared(&self) -> [f64; 4] {
+        self.normalised_squared
+    }
+
+    /// Updates of each sensor so far.
+    #[must_use]
+    pub fn updates(&self) -> [u32; 4] {
+        self.updates
+    }
+
+    /// Measurements of each sensor that were refused so far.
+    #[must_use]
+    pub fn refused(&self) -> [u32; 4] {
+        self.refused
+    }
+
+    /// The newest reading.
+    #[must_use]
+    pub fn newest_reading(&self) -> Reading {
+        self.readings.newest().copied().unwrap_or_default()
+    }
+
+    fn covariance(&self) -> Covariance {
+        Covariance::from_column_slice(&self.covariance)
+    }
+}
+
+/// How many standard deviations a chi-square of `degrees` of freedom is from what it is on average: its cube root
+/// is nearly normal (Wilson and Hilferty, "The distribution of chi-square", PNAS 17, 1931).
+#[must_use]
+pub fn deviation(chi_square: f64, degrees: usize) -> f64 {
+    let degrees = degrees as f64;
+    let variance = 2.0 / (9.0 * degrees);
+    ((chi_square / degrees).cbrt() - (1.0 - variance)) / variance.sqrt()
+}
+
+fn flat(covariance: &Covariance) -> [f64; STATES * STATES] {
+    std::array::from_fn(|index| covariance[index])
+}

@@ -1,0 +1,221 @@
+//! What the filter remembers of the recent past: the IMU's readings, and measurements that wait their turn.
+
+use bus::Message;
+use bus::messages::Vector3;
+
+/// How many readings are remembered.
+pub const READINGS: usize = 256;
+/// How many measurements can wait.
+pub const WAITING: usize = 64;
+
+/// A reading of the IMU.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Message)]
+#[repr(C)]
+#[message(type_name = "hummingbus_msgs/msg/EkfReading")]
+pub struct Reading {
+    /// When it was read.
+    #[field(unit = "ns")]
+    pub time_ns: u64,
+    /// Specific force.
+    #[field(unit = "m/s^2", frame = "body")]
+    pub specific_force: Vector3,
+    /// Angular rate.
+    #[field(unit = "rad/s", frame = "body")]
+    pub angular_velocity: Vector3,
+}
+
+impl Reading {
+    /// The reading at `time_ns` on the line from this one to `next`.
+    #[must_use]
+    pub fn toward(&self, next: &Self, time_ns: u64) -> Self {
+        let part = (time_ns - self.time_ns) as f64 / (next.time_ns - self.time_ns) as f64;
+        let mix = |a: Vector3, b: Vector3| Vector3 {
+            x: a.x + part * (b.x - a.x),
+            y: a.y + part * (b.y - a.y),
+            z: a.z + part * (b.z - a.z),
+        };
+        Self {
+            time_ns,
+            specific_force: mix(self.specific_force, next.specific_force),
+            angular_velocity: mix(self.angular_velocity, next.angular_velocity),
+        }
+    }
+
+    /// Whether it holds numbers only.
+    #[must_use]
+    pub fn is_finite(&self) -> bool {
+        let all = [self.specific_force, self.angular_velocity].map(<[f64; 3]>::from);
+        all.as_flattened().iter().all(|value| value.is_finite())
+    }
+}
+
+/// The last readings, in the order of their times.
+#[derive(Clone, Copy, Debug, PartialEq, Message)]
+#[repr(C)]
+#[message(type_name = "hummingbus_msgs/msg/EkfReadings")]
+pub struct Readings {
+    /// Readings so far; number n is at the place n modulo the number of places.
+    count: u64,
+    /// The last of them.
+    ring: [Reading; READINGS],
+}
+
+impl Default for Readings {
+    fn default() -> Self {
+        Self { count: 0, ring: [Reading::default(); READINGS] }
+    }
+}
+
+impl Readings {
+    /// Remembers the newest reading.
+    pub fn push(&mut self, reading: Reading) {
+        self.ring[self.count as usize % READINGS] = reading;
+        self.count += 1;
+    }
+
+    /// The newest reading, if there is one.
+    #[must_use]
+    pub fn newest(&self) -> Option<&Reading> {
+        self.count.checked_sub(1).map(|number| self.numbered(number))
+    }
+
+    /// The readings after `time_ns`, oldest first.
+    pub fn after(&self, time_ns: u64) -> impl Iterator<Item = &Reading> {
+        let next = self.last_until(time_ns).map_or(self.oldest(), |number| number + 1);
+        (next..self.count).map(|number| self.numbered(number))
+    }
+
+    /// The reading at `time_ns`, between those around it; `None` before the oldest and after the newest.
+    #[must_use]
+    pub fn at(&self, time_ns: u64) -> Option<Reading> {
+        let number = self.last_until(time_ns)?;
+        let before = self.numbered(number);
+        if before.time_ns == time_ns {
+            return Some(*before);
+        }
+        (number + 1 < self.count).then(|| before.toward(self.numbered(number + 1), time_ns))
+    }
+
+    /// The number of the last reading up to `time_ns`.
+    fn last_until(&self, time_ns: u64) -> Option<u64> {
+        (self.oldest()..self.count).rev().find(|&number| self.numbered(number).time_ns <= time_ns)
+    }
+
+    fn oldest(&self) -> u64 {
+        self.count.saturating_sub(READINGS as u64)
+    }
+
+    fn numbered(&self, number: u64) -> &Reading {
+        &self.ring[number as usize % READINGS]
+    }
+}
+
+/// A sensor that measures what the filter estimates, in the order of `bus::messages::Innovation`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Sensor {
+    /// A satellite receiver.
+    Gps,
+    /// Motion capture.
+    Mocap,
+    /// A barometer.
+    Barometer,
+    /// A magnetometer.
+    Magnetometer,
+}
+
+impl Sensor {
+    /// All, in order.
+    pub const ALL: [Self; 4] = [Self::Gps, Self::Mocap, Self::Barometer, Self::Magnetometer];
+
+    /// The place in arrays of all.
+    #[must_use]
+    pub fn index(self) -> usize {
+        self as usize
+    }
+}
+
+/// A measurement, of whatever sensor.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Message)]
+#[repr(C)]
+#[message(type_name = "hummingbus_msgs/msg/EkfMeasurement")]
+pub struct Measurement {
+    /// When it was measured.
+    #[field(unit = "ns")]
+    pub measured_ns: u64,
+    /// What was measured: position and velocity, position and quaternion, altitude, or field.
+    #[field(unit = "")]
+    pub values: [f64; 7],
+    /// The sensor's place in `Sensor::ALL`.
+    #[field(unit = "1")]
+    pub sensor: u32,
+    /// Zero.
+    #[field(unit = "")]
+    pub pad0: u32,
+}
+
+impl Measurement {
+    /// What `sensor` measured at `measured_ns`; `values` are at most seven.
+    #[must_use]
+    pub fn new(sensor: Sensor, measured_ns: u64, values: &[f64]) -> Self {
+        let mut measurement = Self { measured_ns, sensor: sensor as u32, ..Default::default() };
+        measurement.values[..values.len()].copy_from_slice(values);
+        measurement
+    }
+
+    /// The sensor that measured it.
+    #[must_use]
+    pub fn sensor(&self) -> Sensor {
+        Sensor::ALL[self.sensor as usize % Sensor::ALL.len()]
+    }
+}
+
+/// The newest measurement of each sensor that is wired: outside `None` where there is no such sensor, inside where
+/// it has not measured yet. In the order of [`Sensor::ALL`].
+pub type Newest = [Option<Option<Measurement>>; 4];
+
+/// Measurements that wait until no earlier one can arrive, in the order of their times.
+#[derive(Clone, Copy, Debug, PartialEq, Message)]
+#[repr(C)]
+#[message(type_name = "hummingbus_msgs/msg/EkfWaiting")]
+pub struct Waiting {
+    count: u64,
+    queue: [Measurement; WAITING],
+}
+
+impl Default for Waiting {
+    fn default() -> Self {
+        Self { count: 0, queue: [Measurement::default(); WAITING] }
+    }
+}
+
+impl Waiting {
+    /// Puts `measurement` behind those of its time and before; there must be room.
+    pub fn insert(&mut self, measurement: Measurement) {
+        let count = self.count as usize;
+        let waiting = &self.queue[..count];
+        let place = waiting.partition_point(|other| other.measured_ns <= measurement.measured_ns);
+        self.queue.copy_within(place..count, place + 1);
+        self.queue[place] = measurement;
+        self.count += 1;
+    }
+
+    /// Whether there is no room for another.
+    #[must_use]
+    pub fn is_full(&self) -> bool {
+        self.count as usize == WAITING
+    }
+
+    /// The earliest, if there is one.
+    #[must_use]
+    pub fn first(&self) -> Option<&Measurement> {
+        self.queue[..self.count as usize].first()
+    }
+
+    /// Takes the earliest.
+    pub fn pop(&mut self) -> Option<Measurement> {
+        let first = *self.first()?;
+        self.queue.copy_within(1..self.count as usize, 0);
+        self.count -= 1;
+        Some(first)
+    }
+}

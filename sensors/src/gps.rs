@@ -1,0 +1,275 @@
+//! The GPS node: position and velocity as a satellite receiver reports them, in the world's axes.
+//!
+//! Position = truth + bias + drift + white noise; velocity = truth + white noise. The drift stands for orbits,
+//! clocks and the ionosphere, which move the position slowly: a first-order Gauss–Markov process, stationary from
+//! the first measurement on, d' = e^(−Δt/τ) d + σ √(1 − e^(−2Δt/τ)) n (Gelb, "Applied Optimal Estimation", MIT
+//! Press 1974, §3.6). [`crate::channel`] says when it measures, how measurements are delayed and lost.
+#![allow(non_snake_case, reason = "a trailing _W names the frame a vector is written in")]
+
+use crate::channel::{Chance, Channel, ChannelState, QUEUE, Timing};
+use crate::noise::standard_normal;
+use crate::parameter::{ParameterError, all_finite, all_not_negative, positive};
+use crate::wire::{vector, vector_message};
+use bus::kind::{Inputs, NodeKind, PortSpec, read_parameters};
+use bus::messages::{Gps, PlantState};
+use bus::random::Stream;
+use bus::{BusError, Message, Node};
+use nalgebra::Vector3;
+use serde::Deserialize;
+
+/// The satellite receiver, for manifests.
+pub const KIND: NodeKind = NodeKind {
+    name: "gps",
+    summary: "satellite receiver: position and velocity with noise, drift and delay",
+    inputs: Inputs::Ports(&[PortSpec::required("state", PlantState::SCHEMA)]),
+    outputs: &[PortSpec::required("gps", Gps::SCHEMA)],
+    check: |parameters, _| {
+        let params: GpsParams = read_parameters(parameters)?;
+        params.validate().map_err(|error| error.to_string())
+    },
+    run,
+};
+
+/// What a satellite receiver makes of the truth; the defaults are a u-blox NEO-M8N.
+///
+/// Its data sheet (UBX-15031086): 10 Hz; horizontal position within 2.5 m half of the time, which for equal axes
+/// is σ = 2.5 m / 1.177 = 2.1 m each; velocity within 0.05 m/s half of the time, σ = 0.05 / 0.6745 = 0.074 m/s.
+/// It has no vertical figures: 1.5 times the horizontal ones, the usual ratio of the dilutions of precision. Nearly
+/// all of the position's error is drift. Its time constant (300 s), the white part (0.3 m) and the delay (80 ms)
+/// are tuned, no source.
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct GpsParams {
+    /// Measurements a second.
+    pub rate_hz: f64,
+    /// How long after measuring a measurement arrives, ms.
+    pub delay_ms: f64,
+    /// The fraction of measurements that are lost.
+    pub dropout: f64,
+    /// How long losses last on average, s; 0 where each is independent of the one before.
+    pub dropout_mean_s: f64,
+    /// Standard deviation of the position's white noise along each axis, m.
+    pub position_noise_m: [f64; 3],
+    /// Standard deviation of the position's drift along each axis, m.
+    pub position_drift_m: [f64; 3],
+    /// Time constant of the drift, s.
+    pub position_drift_time_s: f64,
+    /// Constant error of the position, m.
+    pub position_bias_m: [f64; 3],
+    /// Standard deviation of the velocity's white noise along each axis, m/s.
+    pub velocity_noise_m_s: [f64; 3],
+}
+
+impl Default for GpsParams {
+    fn default() -> Self {
+        Self {
+            rate_hz: 10.0,
+            delay_ms: 80.0,
+            dropout: 0.0,
+            dropout_mean_s: 0.0,
+            position_noise_m: [0.3, 0.3, 0.45],
+            position_drift_m: [2.1, 2.1, 3.15],
+            position_drift_time_s: 300.0,
+            position_bias_m: [0.0; 3],
+            velocity_noise_m_s: [0.074, 0.074, 0.111],
+        }
+    }
+}
+
+impl GpsParams {
+    fn timing(&self) -> Timing {
+        let Self { rate_hz, delay_ms, dropout, dropout_mean_s, .. } = *self;
+        Timing { rate_hz, delay_ms, dropout, dropout_mean_s }
+    }
+
+    fn validate(&self) -> Result<(), ParameterError> {
+        self.timing().validate()?;
+        all_not_negative("position_noise_m", &self.position_noise_m)?;
+        all_not_negative("position_drift_m", &self.position_drift_m)?;
+        positive("position_drift_time_s", self.position_drift_time_s)?;
+        all_finite("position_bias_m", &self.position_bias_m)?;
+        all_not_negative("velocity_noise_m_s", &self.velocity_noise_m_s)
+    }
+
+    /// The drift one measurement after `drift_W_m`; there is none before the first.
+    fn drift(&self, drift_W_m: Option<Vector3<f64>>, random: &mut Stream) -> Vector3<f64> {
+        let sigma_m = Vector3::from(self.position_drift_m);
+        let new_W_m = sigma_m.component_mul(&standard_normal(random));
+        let Some(drift_W_m) = drift_W_m else { return new_W_m };
+        let kept = (-(self.rate_hz * self.position_drift_time_s).recip()).exp();
+        kept * drift_W_m + (1.0 - kept * kept).sqrt() * new_W_m
+    }
+
+    /// Position and velocity as they are read, with the drift that `drift` is left at.
+    fn measure(
+        &self,
+        truth: &PlantState,
+        drift: &mut bus::messages::Vector3,
+        chance: &mut Chance<'_>,
+    ) -> Gps {
+        let last_W_m = vector(*drift);
+        let drift_W_m = self.drift((!last_W_m.x.is_nan()).then_some(last_W_m), chance.noise);
+        *drift = vector_message(drift_W_m);
+        let noise = |sigma: [f64; 3], random: &mut Stream| {
+            Vector3::from(sigma).component_mul(&standard_normal(random))
+        };
+        let position_error_W_m =
+            Vector3::from(self.position_bias_m) + drift_W_m + noise(self.position_noise_m, chance.noise);
+        let velocity_error_W_m_s = noise(self.velocity_noise_m_s, chance.noise);
+        Gps {
+            position: vector_message(vector(truth.position) + position_error_W_m),
+            velocity: vector_message(vector(truth.velocity) + velocity_error_W_m_s),
+            ..Default::default()
+        }
+    }
+
+    /// The sample to send at `now_ns`.
+    fn sample(&self, channel: &mut Channel, memory: &mut Memory, now_ns: u64, truth: &PlantState) -> Gps {
+        let Memory { channel: state, queue, drift } = memory;
+        channel.step(state, queue, now_ns, |last, chance| {
+            let measured = self.measure(truth, drift, chance);
+            if chance.is_lost(0) {
+                return Gps { valid: 0, ..*last };
+            }
+            Gps { measured_ns: now_ns, valid: 1, ..measured }
+        })
+    }
+}
+
+/// What the node remembers, as it is handed over.
+#[derive(Clone, Copy, Message)]
+#[repr(C)]
+#[message(type_name = "hummingbus_msgs/msg/GpsState")]
+struct Memory {
+    /// What is under way.
+    channel: ChannelState,
+    /// The last measurements.
+    queue: [Gps; QUEUE],
+    /// The drift at the last measurement; not a number before the first.
+    #[field(unit = "m", frame = "world")]
+    drift: bus::messages::Vector3,
+}
+
+impl Default for Memory {
+    fn default() -> Self {
+        let (channel, queue) = (ChannelState::default(), [Gps::default(); QUEUE]);
+        Self { channel, queue, drift: [f64::NAN; 3].into() }
+    }
+}
+
+fn run() -> Result<(), BusError> {
+    let mut node = Node::join()?;
+    let state = node.input::<PlantState>("state")?;
+    let output = node.output::<Gps>("gps")?;
+    let params: GpsParams = node.parameters()?;
+    params.validate().map_err(|error| node.error(error))?;
+    let mut channel = Channel::of_node(&params.timing(), &node)?;
+    node.run_with_state(Memory::default(), |tick, memory| {
+        let sent = params.sample(&mut channel, memory, tick.time_ns(), tick.get(state));
+        tick.write(output, sent)
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::{TICK_NS, require_hand_over, require_normal};
+
+    fn truth() -> PlantState {
+        PlantState {
+            position: [10.0, -20.0, 5.0].into(),
+            velocity: [1.0, 2.0, -0.5].into(),
+            ..Default::default()
+        }
+    }
+
+    fn undelayed() -> GpsParams {
+        GpsParams { delay_ms: 0.0, ..GpsParams::default() }
+    }
+
+    /// The samples of `count` measurements in the run seeded with `seed`.
+    fn samples(params: &GpsParams, seed: u64, count: u64) -> Vec<Gps> {
+        let mut channel = Channel::new(&params.timing(), 0.1, seed, "gps").unwrap();
+        let mut memory = Memory::default();
+        (0..count).map(|n| params.sample(&mut channel, &mut memory, n * 100 * TICK_NS, &truth())).collect()
+    }
+
+    #[test]
+    fn position_and_velocity_have_their_noise_and_bias() {
+        let position_bias_m = [1.0, -1.0, 0.5];
+        let params = GpsParams { position_drift_m: [0.0; 3], position_bias_m, ..undelayed() };
+        let samples = samples(&params, 5, 10_000);
+        for (axis, bias_m) in position_bias_m.into_iter().enumerate() {
+            let truth_m = vector(truth().position)[axis] + bias_m;
+            let positions = samples.iter().map(|sample| vector(sample.position)[axis]);
+            require_normal(positions, truth_m, params.position_noise_m[axis]);
+            let velocities = samples.iter().map(|sample| vector(sample.velocity)[axis]);
+            require_normal(velocities, vector(truth().velocity)[axis], params.velocity_noise_m_s[axis]);
+        }
+    }
+
+    #[test]
+    fn the_drift_is_stationary_from_the_first_measurement_on() {
+        let params = GpsParams { position_noise_m: [0.0; 3], ..undelayed() };
+        for number in [0, 40] {
+            let of_seed = |seed| samples(&params, seed, number + 1).last().unwrap().position.z;
+            require_normal((0..2000).map(of_seed), truth().position.z, params.position_drift_m[2]);
+        }
+    }
+
+    #[test]
+    fn the_drift_fades_with_its_time_constant() {
+        let params = GpsParams { position_noise_m: [0.0; 3], position_drift_time_s: 5.0, ..undelayed() };
+        let drift_m: Vec<f64> = samples(&params, 5, 400_000)
+            .iter()
+            .map(|sample| sample.position.x - truth().position.x)
+            .collect();
+        let mean_of = |lag: usize| {
+            drift_m.iter().zip(&drift_m[lag..]).map(|(a, b)| a * b).sum::<f64>()
+                / (drift_m.len() - lag) as f64
+        };
+        // 50 measurements are one time constant; 400 000 hold some 4000 independent ones.
+        let ratio = mean_of(50) / mean_of(0);
+        assert!((ratio - (-1.0_f64).exp()).abs() < 6.0 / 4000.0_f64.sqrt(), "{ratio}");
+    }
+
+    #[test]
+    fn a_measurement_arrives_80_ms_late_with_the_truth_of_its_time() {
+        let perfect = GpsParams {
+            position_noise_m: [0.0; 3],
+            position_drift_m: [0.0; 3],
+            velocity_noise_m_s: [0.0; 3],
+            ..GpsParams::default()
+        };
+        let mut channel = Channel::new(&perfect.timing(), 1e-3, 5, "gps").unwrap();
+        let mut memory = Memory::default();
+        for tick in 0..1000_u64 {
+            let truth = PlantState { position: [tick as f64, 0.0, 0.0].into(), ..Default::default() };
+            let sample = perfect.sample(&mut channel, &mut memory, tick * TICK_NS, &truth);
+            let expected = tick.checked_sub(80).map(|tick| tick / 100 * 100);
+            assert_eq!(sample.valid, u32::from(expected.is_some()), "at tick {tick}");
+            assert_eq!(sample.measured_ns, expected.unwrap_or(0) * TICK_NS);
+            assert_eq!(sample.position.x, expected.unwrap_or(0) as f64);
+        }
+    }
+
+    #[test]
+    fn a_memory_that_is_handed_over_goes_on_byte_for_byte() {
+        let params = GpsParams { dropout: 0.2, delay_ms: 245.0, ..GpsParams::default() };
+        let channel = || Channel::new(&params.timing(), 1e-3, 5, "gps").unwrap();
+        require_hand_over(channel, Memory::default(), |channel, memory: &mut Memory, now_ns| {
+            params.sample(channel, memory, now_ns, &truth())
+        });
+    }
+
+    #[test]
+    fn impossible_parameters_are_named() {
+        let refused = |parameters| (KIND.check)(&parameters, &["state"]).unwrap_err();
+        let reason = refused(serde_json::json!({ "position_drift_time_s": 0.0 }));
+        assert!(reason.contains("`position_drift_time_s`"), "{reason}");
+        for key in ["position_noise_m", "position_drift_m", "velocity_noise_m_s"] {
+            let reason = refused(serde_json::json!({ key: [0.1, -0.1, 0.1] }));
+            assert!(reason.contains(&format!("`{key}`")), "{reason}");
+        }
+    }
+}

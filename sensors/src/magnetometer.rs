@@ -1,0 +1,260 @@
+//! The magnetometer node: the earth's magnetic field in body axes, as the vehicle's own iron lets it through.
+//!
+//! Reading = soft-iron scale · field in body axes + hard iron + white noise, in steps of the part's resolution and
+//! cut off at its range. [`crate::channel`] says when it measures, how measurements are delayed and lost.
+#![allow(non_snake_case, reason = "a trailing _W or _B names the frame a vector is written in, _T the tesla")]
+
+use crate::channel::{Channel, ChannelState, QUEUE, Timing};
+use crate::earth_field::EarthField;
+use crate::noise::standard_normal;
+use crate::parameter::{ParameterError, all_finite, check, finite, not_negative, positive};
+use crate::steps::in_steps;
+use crate::wire::{attitude, vector_message};
+use bus::kind::{Inputs, NodeKind, PortSpec, read_parameters};
+use bus::messages::{Magnetometer, PlantState};
+use bus::random::Stream;
+use bus::{BusError, Message, Node};
+use nalgebra::{UnitQuaternion, Vector3};
+use serde::Deserialize;
+
+/// The magnetometer, for manifests.
+pub const KIND: NodeKind = NodeKind {
+    name: "magnetometer",
+    summary: "the earth's magnetic field with hard and soft iron, noise and delay",
+    inputs: Inputs::Ports(&[PortSpec::required("state", PlantState::SCHEMA)]),
+    outputs: &[PortSpec::required("magnetometer", Magnetometer::SCHEMA)],
+    check: |parameters, _| {
+        let params: MagnetometerParams = read_parameters(parameters)?;
+        params.validate().map_err(|error| error.to_string())
+    },
+    run,
+};
+
+/// What a magnetometer makes of the earth's field; the defaults are a Honeywell HMC5883L.
+///
+/// Its data sheet (900405): noise floor 2 mG, 1090 counts per gauss in its default range of ±1.3 gauss, up to
+/// 160 Hz in single measurements of 6 ms each. The default field is that of [`EarthField`].
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct MagnetometerParams {
+    /// Measurements a second.
+    pub rate_hz: f64,
+    /// How long after measuring a measurement arrives, ms.
+    pub delay_ms: f64,
+    /// The fraction of measurements that are lost.
+    pub dropout: f64,
+    /// How long losses last on average, s; 0 where each is independent of the one before.
+    pub dropout_mean_s: f64,
+    /// Magnetic flux density of the earth's field, T.
+    pub field_T: f64,
+    /// How far the earth's field points below the horizon, degrees.
+    pub inclination_deg: f64,
+    /// How far magnetic north lies east of the world's x axis, degrees.
+    pub declination_deg: f64,
+    /// Field of what is magnetised on the vehicle, body axes, T.
+    pub hard_iron_T: [f64; 3],
+    /// What is left of the field along each body axis.
+    pub soft_iron_scale: [f64; 3],
+    /// Standard deviation of each axis, T.
+    pub noise_T: f64,
+    /// Readings are multiples of this, T; 0 for any reading.
+    pub resolution_T: f64,
+    /// The most that an axis reads, T.
+    pub range_T: f64,
+}
+
+impl Default for MagnetometerParams {
+    fn default() -> Self {
+        let EarthField { field_T, inclination_deg, declination_deg } = EarthField::default();
+        Self {
+            rate_hz: 100.0,
+            delay_ms: 6.0,
+            dropout: 0.0,
+            dropout_mean_s: 0.0,
+            field_T,
+            inclination_deg,
+            declination_deg,
+            hard_iron_T: [0.0; 3],
+            soft_iron_scale: [1.0; 3],
+            noise_T: 2.0e-7,
+            resolution_T: 1e-4 / 1090.0,
+            range_T: 1.3e-4,
+        }
+    }
+}
+
+impl MagnetometerParams {
+    fn timing(&self) -> Timing {
+        let Self { rate_hz, delay_ms, dropout, dropout_mean_s, .. } = *self;
+        Timing { rate_hz, delay_ms, dropout, dropout_mean_s }
+    }
+
+    fn field_W_T(&self) -> Vector3<f64> {
+        let Self { field_T, inclination_deg, declination_deg, .. } = *self;
+        EarthField { field_T, inclination_deg, declination_deg }.vector_W_T()
+    }
+
+    fn validate(&self) -> Result<(), ParameterError> {
+        self.timing().validate()?;
+        not_negative("field_T", self.field_T)?;
+        let inclination_is_good = self.inclination_deg.abs() <= 90.0;
+        check("inclination_deg", self.inclination_deg, inclination_is_good, "from -90 to 90")?;
+        finite("declination_deg", self.declination_deg)?;
+        all_finite("hard_iron_T", &self.hard_iron_T)?;
+        all_finite("soft_iron_scale", &self.soft_iron_scale)?;
+        not_negative("noise_T", self.noise_T)?;
+        not_negative("resolution_T", self.resolution_T)?;
+        positive("range_T", self.range_T)
+    }
+
+    /// What is read on a body with `attitude_WB`, body axes, T.
+    fn measure(&self, attitude_WB: UnitQuaternion<f64>, random: &mut Stream) -> Vector3<f64> {
+        let field_B_T = attitude_WB.inverse_transform_vector(&self.field_W_T());
+        let through_B_T = field_B_T.component_mul(&Vector3::from(self.soft_iron_scale));
+        let read_B_T = through_B_T + Vector3::from(self.hard_iron_T) + self.noise_T * standard_normal(random);
+        read_B_T.map(|axis_T| in_steps(axis_T, self.resolution_T).clamp(-self.range_T, self.range_T))
+    }
+
+    /// The sample to send at `now_ns`.
+    fn sample(
+        &self,
+        channel: &mut Channel,
+        memory: &mut Memory,
+        now_ns: u64,
+        truth: &PlantState,
+    ) -> Magnetometer {
+        channel.step(&mut memory.channel, &mut memory.queue, now_ns, |last, chance| {
+            let field = vector_message(self.measure(attitude(truth.attitude), chance.noise));
+            if chance.is_lost(0) {
+                return Magnetometer { valid: 0, ..*last };
+            }
+            Magnetometer { measured_ns: now_ns, field, valid: 1, ..Default::default() }
+        })
+    }
+}
+
+/// What the node remembers, as it is handed over.
+#[derive(Clone, Copy, Default, Message)]
+#[repr(C)]
+#[message(type_name = "hummingbus_msgs/msg/MagnetometerState")]
+struct Memory {
+    /// What is under way.
+    channel: ChannelState,
+    /// The last measurements.
+    queue: [Magnetometer; QUEUE],
+}
+
+fn run() -> Result<(), BusError> {
+    let mut node = Node::join()?;
+    let state = node.input::<PlantState>("state")?;
+    let output = node.output::<Magnetometer>("magnetometer")?;
+    let params: MagnetometerParams = node.parameters()?;
+    params.validate().map_err(|error| node.error(error))?;
+    let mut channel = Channel::of_node(&params.timing(), &node)?;
+    node.run_with_state(Memory::default(), |tick, memory| {
+        let sent = params.sample(&mut channel, memory, tick.time_ns(), tick.get(state));
+        tick.write(output, sent)
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::{TICK_NS, require_hand_over, require_normal};
+    use crate::wire::{attitude_message, vector};
+
+    fn perfect() -> MagnetometerParams {
+        MagnetometerParams { delay_ms: 0.0, noise_T: 0.0, resolution_T: 0.0, ..Default::default() }
+    }
+
+    fn turned(roll_deg: f64, pitch_deg: f64, yaw_deg: f64) -> PlantState {
+        let [roll, pitch, yaw] = [roll_deg, pitch_deg, yaw_deg].map(f64::to_radians);
+        let attitude = attitude_message(UnitQuaternion::from_euler_angles(roll, pitch, yaw));
+        PlantState { attitude, ..Default::default() }
+    }
+
+    fn samples(params: &MagnetometerParams, truth: &PlantState, count: u64) -> Vec<Magnetometer> {
+        let mut channel = Channel::new(&params.timing(), 0.01, 5, "magnetometer").unwrap();
+        let mut memory = Memory::default();
+        (0..count).map(|n| params.sample(&mut channel, &mut memory, n * 10 * TICK_NS, truth)).collect()
+    }
+
+    fn read(params: &MagnetometerParams, truth: &PlantState) -> Vector3<f64> {
+        vector(samples(params, truth, 1)[0].field)
+    }
+
+    #[test]
+    fn the_heading_of_the_level_field_is_the_yaw_less_the_declination_backwards() {
+        for declination_deg in [-20.0, 0.0, 4.11] {
+            let params = MagnetometerParams { declination_deg, ..perfect() };
+            for yaw_deg in [-170.0, -30.0, 0.0, 45.0, 120.0] {
+                // The needle points to -declination in the world, from which the body has turned by its yaw.
+                let field_B_T = read(&params, &turned(0.0, 0.0, yaw_deg));
+                let needle_deg = field_B_T.y.atan2(field_B_T.x).to_degrees();
+                let error_deg = (needle_deg + declination_deg + yaw_deg).rem_euclid(360.0);
+                assert!(error_deg.min(360.0 - error_deg) < 1e-9, "{error_deg} at {yaw_deg}");
+            }
+        }
+    }
+
+    #[test]
+    fn the_field_keeps_its_size_at_any_attitude() {
+        for (roll_deg, pitch_deg) in [(0.0, 0.0), (30.0, -20.0), (180.0, 0.0), (0.0, 90.0)] {
+            let size_T = read(&perfect(), &turned(roll_deg, pitch_deg, 70.0)).norm();
+            assert!((size_T - perfect().field_T).abs() < 1e-15, "{size_T}");
+        }
+        // Nose down by 90°, body x points down, as most of the field does.
+        assert!(read(&perfect(), &turned(0.0, 90.0, 0.0)).x > 4.0e-5);
+    }
+
+    #[test]
+    fn hard_iron_is_added_in_body_axes_and_soft_iron_scales_them() {
+        let truth = turned(10.0, 20.0, 30.0);
+        let plain = read(&perfect(), &truth);
+        let (hard_iron_T, soft_iron_scale) = ([1e-5, -2e-5, 3e-6], [0.9, 1.1, 1.0]);
+        let found = read(&MagnetometerParams { hard_iron_T, soft_iron_scale, ..perfect() }, &truth);
+        let expected = plain.component_mul(&Vector3::from(soft_iron_scale)) + Vector3::from(hard_iron_T);
+        assert_eq!(found, expected);
+    }
+
+    #[test]
+    fn each_axis_has_the_noise_of_the_parameters() {
+        let (truth, params) = (turned(0.0, 0.0, 40.0), MagnetometerParams { noise_T: 2.0e-7, ..perfect() });
+        let (samples, expected) = (samples(&params, &truth, 10_000), read(&perfect(), &truth));
+        for axis in 0..3 {
+            let values = samples.iter().map(|sample| vector(sample.field)[axis]);
+            require_normal(values, expected[axis], 2.0e-7);
+        }
+    }
+
+    #[test]
+    fn readings_are_counts_of_the_part_within_its_range() {
+        let truth = turned(0.0, 0.0, 40.0);
+        let params =
+            MagnetometerParams { delay_ms: 0.0, hard_iron_T: [2e-4, 0.0, 0.0], ..Default::default() };
+        for sample in samples(&params, &truth, 100) {
+            let counts = sample.field.y / params.resolution_T;
+            assert!((counts - counts.round()).abs() < 1e-6, "{counts}");
+            assert_eq!(sample.field.x, params.range_T);
+        }
+    }
+
+    #[test]
+    fn a_memory_that_is_handed_over_goes_on_byte_for_byte() {
+        let params = MagnetometerParams { dropout: 0.2, delay_ms: 45.0, ..Default::default() };
+        let channel = || Channel::new(&params.timing(), 1e-3, 5, "magnetometer").unwrap();
+        let truth = |now_ns| turned(1.0, 2.0, now_ns as f64 * 1e-7);
+        require_hand_over(channel, Memory::default(), |channel, memory: &mut Memory, now_ns| {
+            params.sample(channel, memory, now_ns, &truth(now_ns))
+        });
+    }
+
+    #[test]
+    fn impossible_parameters_are_named() {
+        let bad = [("field_T", -1.0), ("inclination_deg", 91.0), ("noise_T", -1.0), ("range_T", 0.0)];
+        for (key, value) in bad {
+            let reason = (KIND.check)(&serde_json::json!({ key: value }), &["state"]).unwrap_err();
+            assert!(reason.contains(&format!("`{key}`")), "{reason}");
+        }
+    }
+}

@@ -1,0 +1,462 @@
+//! The range node: five ultrasonic range finders along the body's +x, −x, +y, −y and −z axes.
+//!
+//! The beams tilt with the body. Each reads the nearest of what stands in its cone ([`crate::cone`]): the ground,
+//! the boxes of the scene and, with the input `traffic`, the other vehicles. Reading = distance + bias + white
+//! noise, in steps of the part's resolution; each beam has its own noise and is lost on its own.
+//! [`crate::channel`] says when they measure, how measurements are delayed and lost.
+//!
+//! The beams fire together and do not hear each other. An echo comes back from every surface in the cone at any
+//! angle of incidence; a real beam that grazes a smooth floor or wall hears none.
+#![allow(non_snake_case, reason = "a trailing _W or _B names the frame a vector is written in")]
+
+use crate::channel::{Chance, Channel, ChannelState, QUEUE, Timing};
+use crate::cone::Cone;
+use crate::parameter::{ParameterError, all_finite, check, not_negative, positive};
+use crate::steps::in_steps;
+use crate::wire::{attitude, vector};
+use bus::kind::{Inputs, NodeKind, PortSpec, read_parameters};
+use bus::messages::{PlantState, Ranges, Traffic};
+use bus::{BusError, Message, Node};
+use nalgebra::{UnitQuaternion, Vector3};
+use rand_distr::{Distribution, StandardNormal};
+use scenes::{RayCaster, Scene};
+use serde::Deserialize;
+use std::path::PathBuf;
+
+/// The range finders, for manifests.
+pub const KIND: NodeKind = NodeKind {
+    name: "range",
+    summary: "five ultrasonic range finders in the scene of a scene file",
+    inputs: Inputs::Ports(&[
+        PortSpec::required("state", PlantState::SCHEMA),
+        PortSpec::optional("traffic", Traffic::SCHEMA),
+    ]),
+    outputs: &[PortSpec::required("ranges", Ranges::SCHEMA)],
+    check: |parameters, _| RangeFinders::new(read_parameters(parameters)?).map(|_| ()),
+    run,
+};
+
+const BEAMS: usize = 5;
+
+/// A vehicle of the traffic that is nearer than this is the sensors' own: positions of one tick differ by less.
+const SELF_MAX_M: f64 = 0.01;
+
+/// What the range finders make of the truth; the defaults are five MaxBotix XL-MaxSonar-AE0 (MB1300).
+///
+/// *Reach, resolution, nearest reading and rate* are the data sheet's (PD11840): 7.65 m, 1 cm, 20 cm, which it
+/// reads from anything nearer too, and 10 Hz. *Delay*: sound takes 45 ms to the end of the reach and back, and
+/// the serial output another 5 ms. *Noise*: the data sheet has no figure but the resolution; 1 cm is tuned, no
+/// source. *Half angle*: it draws the beam as a shape that changes with target and distance; 5° is tuned, no
+/// source. The vehicle's radius is that of the Hummingbird: half of the 0.34 m between rotor axes (thesis,
+/// Table 2.1) and the radius of its 8 inch propellers (thesis, §2.1).
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct RangeParams {
+    /// Scene file; there is no default.
+    pub scene: Option<PathBuf>,
+    /// Measurements a second.
+    pub rate_hz: f64,
+    /// How long after measuring a measurement arrives, ms.
+    pub delay_ms: f64,
+    /// The fraction of measurements that each beam loses.
+    pub dropout: f64,
+    /// How long losses last on average, s; 0 where each is independent of the one before.
+    pub dropout_mean_s: f64,
+    /// Standard deviation of a reading, m.
+    pub noise_m: f64,
+    /// Constant error of each beam, m.
+    pub bias_m: [f64; BEAMS],
+    /// Readings are multiples of this, m; 0 for any reading.
+    pub resolution_m: f64,
+    /// Nothing beyond this is met, m.
+    pub reach_m: f64,
+    /// Whatever is nearer reads as this, m.
+    pub nearest_m: f64,
+    /// Half angle of the beams' cones, degrees, below 90.
+    pub half_angle_deg: f64,
+    /// Radius of the spheres that other vehicles are, m.
+    pub vehicle_radius_m: f64,
+    /// Which of the vehicles in the traffic is this one, numbered from 0; where absent, it is one that is nearer
+    /// than 1 cm.
+    #[serde(rename = "self")]
+    pub own_index: Option<u32>,
+}
+
+impl Default for RangeParams {
+    fn default() -> Self {
+        Self {
+            scene: None,
+            rate_hz: 10.0,
+            delay_ms: 50.0,
+            dropout: 0.0,
+            dropout_mean_s: 0.0,
+            noise_m: 0.01,
+            bias_m: [0.0; BEAMS],
+            resolution_m: 0.01,
+            reach_m: 7.65,
+            nearest_m: 0.20,
+            half_angle_deg: 5.0,
+            vehicle_radius_m: 0.27,
+            own_index: None,
+        }
+    }
+}
+
+impl RangeParams {
+    fn timing(&self) -> Timing {
+        let Self { rate_hz, delay_ms, dropout, dropout_mean_s, .. } = *self;
+        Timing { rate_hz, delay_ms, dropout, dropout_mean_s }
+    }
+
+    fn validate(&self) -> Result<(), ParameterError> {
+        self.timing().validate()?;
+        not_negative("noise_m", self.noise_m)?;
+        all_finite("bias_m", &self.bias_m)?;
+        not_negative("resolution_m", self.resolution_m)?;
+        positive("reach_m", self.reach_m)?;
+        let nearest_is_good = (0.0..self.reach_m).contains(&self.nearest_m);
+        check("nearest_m", self.nearest_m, nearest_is_good, "zero or more and below `reach_m`")?;
+        let angle_is_good = (0.0..90.0).contains(&self.half_angle_deg);
+        check("half_angle_deg", self.half_angle_deg, angle_is_good, "zero or more and below 90")?;
+        positive("vehicle_radius_m", self.vehicle_radius_m)
+    }
+}
+
+/// The five range finders in their scene: all that does not change during a run.
+#[derive(Debug, Clone)]
+struct RangeFinders {
+    params: RangeParams,
+    cones: [Cone; BEAMS],
+    scene: RayCaster,
+}
+
+impl RangeFinders {
+    /// Checks the parameters and loads the scene; the error says what is wrong with either.
+    fn new(params: RangeParams) -> Result<Self, String> {
+        params.validate().map_err(|error| error.to_string())?;
+        let path = params.scene.as_ref().ok_or("missing field `scene`")?;
+        let scene = Scene::load(path).map_err(|error| error.to_string())?;
+        Ok(Self::in_scene(params, &scene))
+    }
+
+    fn in_scene(params: RangeParams, scene: &Scene) -> Self {
+        let (x, y, z) = (Vector3::x_axis(), Vector3::y_axis(), Vector3::z_axis());
+        let half_angle_rad = params.half_angle_deg.to_radians();
+        let cones = [x, -x, y, -y, -z].map(|axis_B| Cone::new(axis_B, half_angle_rad));
+        Self { params, cones, scene: RayCaster::new(scene) }
+    }
+
+    /// What each beam meets first, within its reach.
+    fn distances_m(&self, truth: &PlantState, traffic: Option<&Traffic>) -> [Option<f64>; BEAMS] {
+        let (position_W_m, attitude_WB) = (vector(truth.position), attitude(truth.attitude));
+        let reach_m = self.params.reach_m;
+        self.cones.each_ref().map(|cone| {
+            let scene_m = cone.scene_distance_m(&self.scene, &position_W_m, &attitude_WB, reach_m);
+            let vehicles_m = self.others(traffic, position_W_m, attitude_WB);
+            let vehicles_m = vehicles_m
+                .filter_map(|centre_B_m| cone.sphere_distance_m(&centre_B_m, self.params.vehicle_radius_m));
+            vehicles_m.filter(|distance_m| *distance_m <= reach_m).chain(scene_m).reduce(f64::min)
+        })
+    }
+
+    /// Where the other vehicles are, from this one, in its own axes.
+    fn others(
+        &self,
+        traffic: Option<&Traffic>,
+        position_W_m: Vector3<f64>,
+        attitude_WB: UnitQuaternion<f64>,
+    ) -> impl Iterator<Item = Vector3<f64>> {
+        let own_index = self.params.own_index;
+        let positions = traffic.into_iter().flat_map(|traffic| {
+            let count = (traffic.count as usize).min(traffic.position.len());
+            traffic.position[..count].iter().zip(0..)
+        });
+        let from_here = positions.map(move |(other, index)| (vector(*other) - position_W_m, index));
+        let others = from_here.filter(move |(away_W_m, index)| match own_index {
+            Some(own_index) => *index != own_index,
+            None => away_W_m.norm() >= SELF_MAX_M,
+        });
+        others.map(move |(away_W_m, _)| attitude_WB.inverse_transform_vector(&away_W_m))
+    }
+
+    /// The reading of a beam whose nearest thing is at `distance_m`, if it meets one.
+    fn reading_m(&self, beam: usize, distance_m: Option<f64>, noise: f64) -> Option<f64> {
+        let RangeParams { noise_m, bias_m, resolution_m, reach_m, nearest_m, .. } = self.params;
+        let read_m = distance_m? + bias_m[beam] + noise_m * noise;
+        Some(in_steps(read_m, resolution_m).clamp(nearest_m, reach_m))
+    }
+
+    /// One measurement of all beams after `last`. The noise is drawn whether or not a beam meets anything, so
+    /// that what one of them sees does not reshuffle the others' noise.
+    fn measure(
+        &self,
+        last: &Ranges,
+        chance: &mut Chance<'_>,
+        truth: &PlantState,
+        traffic: Option<&Traffic>,
+    ) -> Ranges {
+        let mut ranges = *last;
+        for (beam, distance_m) in self.distances_m(truth, traffic).into_iter().enumerate() {
+            let noise: f64 = StandardNormal.sample(chance.noise);
+            let read_m = self.reading_m(beam, distance_m, noise);
+            let is_lost = chance.is_lost(beam as u32);
+            ranges.valid[beam] = u32::from(read_m.is_some() && !is_lost);
+            if !is_lost {
+                ranges.distance[beam] = read_m.unwrap_or(self.params.reach_m);
+            }
+        }
+        ranges
+    }
+
+    /// Until the first measurement arrives, nothing is met.
+    fn start(&self) -> Memory {
+        let nothing = Ranges { distance: [self.params.reach_m; BEAMS], ..Default::default() };
+        Memory { channel: ChannelState::default(), queue: [nothing; QUEUE] }
+    }
+
+    /// The sample to send at `now_ns`.
+    fn sample(
+        &self,
+        channel: &mut Channel,
+        memory: &mut Memory,
+        now_ns: u64,
+        truth: &PlantState,
+        traffic: Option<&Traffic>,
+    ) -> Ranges {
+        channel.step(&mut memory.channel, &mut memory.queue, now_ns, |last, chance| {
+            let measured = self.measure(last, chance, truth, traffic);
+            Ranges { measured_ns: now_ns, ..measured }
+        })
+    }
+}
+
+/// What the node remembers, as it is handed over.
+#[derive(Clone, Copy, Message)]
+#[repr(C)]
+#[message(type_name = "hummingbus_msgs/msg/RangeState")]
+struct Memory {
+    /// What is under way.
+    channel: ChannelState,
+    /// The last measurements.
+    queue: [Ranges; QUEUE],
+}
+
+fn run() -> Result<(), BusError> {
+    let mut node = Node::join()?;
+    let state = node.input::<PlantState>("state")?;
+    let traffic = node.optional_input::<Traffic>("traffic");
+    let output = node.output::<Ranges>("ranges")?;
+    let finders = RangeFinders::new(node.parameters()?).map_err(|error| node.error(error))?;
+    let mut channel = Channel::of_node(&finders.params.timing(), &node)?;
+    node.run_with_state(finders.start(), |tick, memory| {
+        let traffic = traffic.map(|traffic| tick.get(traffic));
+        let sent = finders.sample(&mut channel, memory, tick.time_ns(), tick.get(state), traffic);
+        tick.write(output, sent)
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::{TICK_NS, require_hand_over, require_normal};
+    use crate::wire::attitude_message;
+
+    fn finders(params: RangeParams) -> RangeFinders {
+        params.validate().unwrap();
+        let room = include_str!("../../scenes/room.toml");
+        RangeFinders::in_scene(params, &Scene::parse(room, "room.toml").unwrap())
+    }
+
+    /// Thin beams that read what they meet, at once.
+    fn perfect() -> RangeParams {
+        let (noise_m, resolution_m, half_angle_deg, delay_ms) = (0.0, 0.0, 0.0, 0.0);
+        RangeParams { noise_m, resolution_m, half_angle_deg, delay_ms, ..RangeParams::default() }
+    }
+
+    fn at(position_W_m: [f64; 3], roll_deg: f64, pitch_deg: f64, yaw_deg: f64) -> PlantState {
+        let [roll, pitch, yaw] = [roll_deg, pitch_deg, yaw_deg].map(f64::to_radians);
+        let attitude = attitude_message(UnitQuaternion::from_euler_angles(roll, pitch, yaw));
+        PlantState { position: position_W_m.into(), attitude, ..Default::default() }
+    }
+
+    fn read(params: RangeParams, truth: &PlantState, traffic: Option<&Traffic>) -> Ranges {
+        samples(&finders(params), truth, traffic, 1)[0]
+    }
+
+    /// The samples of `count` measurements.
+    fn samples(
+        finders: &RangeFinders,
+        truth: &PlantState,
+        traffic: Option<&Traffic>,
+        count: u64,
+    ) -> Vec<Ranges> {
+        let mut channel = Channel::new(&finders.params.timing(), 0.1, 5, "range").unwrap();
+        let mut memory = finders.start();
+        let sample = |n| finders.sample(&mut channel, &mut memory, n * 100 * TICK_NS, truth, traffic);
+        (0..count).map(sample).collect()
+    }
+
+    #[track_caller]
+    fn assert_near(found: [f64; BEAMS], expected: [f64; BEAMS]) {
+        for (found_m, expected_m) in found.into_iter().zip(expected) {
+            assert!((found_m - expected_m).abs() < 1e-9, "found {found:?}, expected {expected:?}");
+        }
+    }
+
+    #[test]
+    fn level_beams_read_the_four_walls_and_the_floor() {
+        let ranges = read(perfect(), &at([1.0, 2.0, 1.5], 0.0, 0.0, 0.0), None);
+        assert_near(ranges.distance, [4.0, 6.0, 3.0, 7.0, 1.5]);
+        assert_eq!(ranges.valid, [1; BEAMS]);
+    }
+
+    #[test]
+    fn the_beams_turn_with_the_yaw() {
+        let ranges = read(perfect(), &at([1.0, 2.0, 1.5], 0.0, 0.0, 90.0), None);
+        // Forward is +y, left is −x.
+        assert_near(ranges.distance, [3.0, 7.0, 6.0, 4.0, 1.5]);
+    }
+
+    #[test]
+    fn the_beams_tilt_with_the_body() {
+        // Nose down by 30°: ahead is the floor, behind goes up to the wall below its 3 m, down tilts backward.
+        let ranges = read(perfect(), &at([-3.0, 0.0, 1.5], 0.0, 30.0, 0.0), None);
+        let cos = 30.0_f64.to_radians().cos();
+        assert_near(ranges.distance, [3.0, 2.0 / cos, 5.0, 5.0, 1.5 / cos]);
+        // Left side up by 20°: the right beam meets the floor.
+        let ranges = read(perfect(), &at([0.0, -4.0, 0.3], 20.0, 0.0, 0.0), None);
+        let (sin, cos) = 20.0_f64.to_radians().sin_cos();
+        assert!((ranges.distance[3] - 0.3 / sin).abs() < 1e-9, "{ranges:?}");
+        assert!((ranges.distance[4] - 0.3 / cos).abs() < 1e-9, "{ranges:?}");
+    }
+
+    #[test]
+    fn what_is_out_of_reach_is_not_met_and_reads_the_reach() {
+        let ranges = read(perfect(), &at([-4.0, 0.0, 2.9], 0.0, -20.0, 0.0), None);
+        assert_eq!((ranges.valid[0], ranges.distance[0]), (0, 7.65));
+        assert_eq!(ranges.valid[1], 1);
+    }
+
+    #[test]
+    fn what_is_too_near_reads_the_nearest() {
+        let ranges = read(perfect(), &at([4.9, 0.0, 1.5], 0.0, 0.0, 0.0), None);
+        assert_eq!((ranges.valid[0], ranges.distance[0]), (1, 0.20));
+    }
+
+    #[test]
+    fn readings_are_multiples_of_the_resolution() {
+        let params = RangeParams { delay_ms: 0.0, ..RangeParams::default() };
+        let finders = finders(params);
+        for ranges in samples(&finders, &at([1.003, 2.0, 1.5], 0.0, 0.0, 0.0), None, 200) {
+            for distance_m in ranges.distance {
+                let steps = distance_m / 0.01;
+                assert!((steps - steps.round()).abs() < 1e-6, "{distance_m}");
+            }
+        }
+    }
+
+    #[test]
+    fn each_beam_has_noise_of_its_own_and_its_bias() {
+        let bias_m = [0.1, -0.1, 0.0, 0.2, 0.05];
+        let params = RangeParams { noise_m: 0.02, bias_m, ..perfect() };
+        let samples = samples(&finders(params), &at([1.0, 2.0, 1.5], 0.0, 0.0, 0.0), None, 10_000);
+        let truth_m = [4.0, 6.0, 3.0, 7.0, 1.5];
+        let errors = |beam: usize| {
+            let expected_m = truth_m[beam] + bias_m[beam];
+            samples.iter().map(move |ranges| (ranges.distance[beam] - expected_m) / 0.02)
+        };
+        for beam in 0..BEAMS {
+            require_normal(errors(beam), 0.0, 1.0);
+            let next = errors((beam + 1) % BEAMS);
+            let shared = errors(beam).zip(next).map(|(a, b)| a * b).sum::<f64>() / 1e4;
+            assert!(shared.abs() < 0.06, "beams {beam} and the next share their noise: {shared}");
+        }
+    }
+
+    #[test]
+    fn a_beam_is_lost_on_its_own_and_keeps_what_it_read_last() {
+        let params = RangeParams { dropout: 0.25, ..perfect() };
+        let samples = samples(&finders(params), &at([1.0, 2.0, 1.5], 0.0, 0.0, 0.0), None, 4000);
+        for beam in 0..BEAMS {
+            let lost = samples.iter().filter(|ranges| ranges.valid[beam] == 0).count() as f64 / 4000.0;
+            assert!((lost - 0.25).abs() < 6.0 * (0.25 * 0.75 / 4000.0_f64).sqrt(), "{lost}");
+        }
+        let both = samples.iter().filter(|ranges| ranges.valid[..2] == [0, 0]).count() as f64 / 4000.0;
+        assert!((both - 0.0625).abs() < 0.023, "{both}");
+        assert!(samples.iter().skip(50).all(|ranges| ranges.distance[0] == 4.0));
+        assert!(samples.iter().enumerate().all(|(n, ranges)| ranges.measured_ns == n as u64 * 100 * TICK_NS));
+    }
+
+    fn traffic(positions: &[[f64; 3]]) -> Traffic {
+        let mut traffic = Traffic { count: positions.len() as u32, ..Default::default() };
+        for (place, position) in traffic.position.iter_mut().zip(positions) {
+            *place = (*position).into();
+        }
+        traffic
+    }
+
+    #[test]
+    fn other_vehicles_are_met_as_spheres_and_the_own_one_is_not() {
+        let truth = at([1.0, 2.0, 1.5], 0.0, 0.0, 0.0);
+        // This one, one ahead, and one on the left but beyond the wall.
+        let traffic = traffic(&[[1.0, 2.001, 1.5], [3.0, 2.0, 1.5], [1.0, 6.0, 1.5]]);
+        let ranges = read(perfect(), &truth, Some(&traffic));
+        assert_near(ranges.distance, [2.0 - 0.27, 6.0, 3.0, 7.0, 1.5]);
+    }
+
+    #[test]
+    fn the_own_one_can_be_named() {
+        let truth = at([1.0, 2.0, 1.5], 0.0, 0.0, 0.0);
+        let traffic = traffic(&[[3.0, 2.0, 1.5], [1.0, 2.4, 1.5]]);
+        let params = RangeParams { own_index: Some(0), ..perfect() };
+        let ranges = read(params, &truth, Some(&traffic));
+        // The vehicle ahead is this one as it was; the other is nearer than the sensors read.
+        assert_near(ranges.distance, [4.0, 6.0, 0.20, 7.0, 1.5]);
+    }
+
+    #[test]
+    fn a_vehicle_is_met_in_the_axes_of_a_turned_body() {
+        let truth = at([0.0, 0.0, 1.5], 0.0, 0.0, 45.0);
+        let ranges = read(perfect(), &truth, Some(&traffic(&[[1.5, 1.5, 1.5]])));
+        let ahead_m = 1.5 * 2.0_f64.sqrt() - 0.27;
+        assert!((ranges.distance[0] - ahead_m).abs() < 1e-9, "{ranges:?}");
+    }
+
+    #[test]
+    fn a_count_of_vehicles_that_no_message_holds_is_cut() {
+        let traffic = Traffic { count: u32::MAX, ..Default::default() };
+        let ranges = read(perfect(), &at([1.0, 2.0, 1.5], 0.0, 0.0, 0.0), Some(&traffic));
+        assert!(ranges.distance.iter().all(|distance_m| distance_m.is_finite()));
+    }
+
+    #[test]
+    fn a_memory_that_is_handed_over_goes_on_byte_for_byte() {
+        let params = RangeParams { dropout: 0.2, delay_ms: 130.0, ..RangeParams::default() };
+        let finders = finders(params);
+        let channel = || Channel::new(&finders.params.timing(), 1e-3, 5, "range").unwrap();
+        let truth = |tick: u64| at([1.0, tick as f64 * 1e-3, 1.5], 3.0, 4.0, tick as f64 * 0.1);
+        require_hand_over(channel, finders.start(), |channel, memory: &mut Memory, now_ns| {
+            finders.sample(channel, memory, now_ns, &truth(now_ns / TICK_NS), None)
+        });
+    }
+
+    #[test]
+    fn impossible_parameters_are_named() {
+        let room = concat!(env!("CARGO_MANIFEST_DIR"), "/../scenes/room.toml");
+        let refused = |key: &str, value: f64| {
+            let mut parameters = serde_json::json!({ "scene": room });
+            parameters[key] = value.into();
+            (KIND.check)(&parameters, &["state"]).unwrap_err()
+        };
+        let bad = [("nearest_m", 8.0), ("half_angle_deg", 90.0), ("reach_m", 0.0), ("noise_m", -1.0)];
+        for (key, value) in bad.into_iter().chain([("vehicle_radius_m", 0.0), ("dropout", 1.5)]) {
+            let reason = refused(key, value);
+            assert!(reason.contains(&format!("`{key}`")), "{reason}");
+        }
+        let reason = (KIND.check)(&serde_json::json!({}), &["state"]).unwrap_err();
+        assert!(reason.starts_with("missing field `scene`"), "{reason}");
+        let reason = (KIND.check)(&serde_json::json!({ "scene": "none.toml" }), &["state"]).unwrap_err();
+        assert!(reason.contains("none.toml"), "{reason}");
+        (KIND.check)(&serde_json::json!({ "scene": room }), &["state"]).unwrap();
+    }
+}

@@ -1,0 +1,113 @@
+//! The parameters of the range-inertial estimator.
+
+use super::axis::Inertia;
+use crate::parameter::{ParameterError, not_negative, positive};
+use serde::Deserialize;
+
+/// What the range finders, the IMU and the attitude are worth, and where the vehicle starts.
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct RangeInertialParams {
+    /// Standard deviation of a range, m. Default 0.0104: the noise of the kind `range`, 0.01 m, and rounding
+    /// to its centimetre, 0.01 m / √12.
+    pub range_sigma_m: f64,
+    /// What a range finder reads where it meets nothing, m. Default 7.65, the MB1300 (thesis §5.5).
+    pub reach_m: f64,
+    /// What a range finder reads of anything nearer, m. Default 0.20 (MB1300 data sheet).
+    pub nearest_m: f64,
+    /// Half angle of the beams' cones, degrees: a wall that is turned by less is met at right angles.
+    /// Default 5, as of the kind `range`.
+    pub half_angle_deg: f64,
+    /// A range is left out if its beam meets the wall further than this from the right angle, rad.
+    /// Default 0.6 (tuned, no source).
+    pub incidence_max_rad: f64,
+    /// A range further than this many standard deviations from what was expected comes from something
+    /// new. Default 5 (tuned, no source).
+    pub gate_sigma: f64,
+    /// How long a wall stays in sight without an echo, s. Default 0.5, five of the MB1300's readings.
+    pub sight_hold_s: f64,
+    /// Time constant with which the attitude estimate follows the accelerometer, s: what it does so to
+    /// the level acceleration is taken off. Default 30, as of the kind `attitude`.
+    pub attitude_time_constant_s: f64,
+    /// Standard deviation of the estimated attitude, rad, by which ranges at an angle are trusted less.
+    /// Default 0.01 (tuned, no source).
+    pub attitude_sigma_rad: f64,
+    /// White noise of the accelerometer, m/s²/√Hz. Default 2.0e-3, as of the kind `imu`.
+    pub accelerometer_noise_density_m_s2_sqrt_hz: f64,
+    /// Random walk of the acceleration's bias, m/s³/√Hz. Default 4.0e-3: the 3.0e-3 of the kind `imu`, and
+    /// gravity times its gyroscope's 1.7e-4 rad/s/√Hz, since a wrong tilt shows as acceleration.
+    pub acceleration_bias_walk_m_s3_sqrt_hz: f64,
+    /// Standard deviation of the level acceleration's bias at the start, m/s². Default 0.02, which is a
+    /// tilt of 0.1° (tuned, no source).
+    pub initial_acceleration_bias_sigma_m_s2: f64,
+    /// Standard deviation of the velocity at the start, which is taken for zero, m/s. Default 0.01.
+    pub initial_velocity_sigma_m_s: f64,
+    /// Height at the start, m. Default 0.0.
+    pub initial_height_m: f64,
+    /// Gravity, m/s². Default 9.81 (thesis §3.1).
+    pub gravity_m_s2: f64,
+}
+
+impl Default for RangeInertialParams {
+    fn default() -> Self {
+        Self {
+            range_sigma_m: 0.0104,
+            reach_m: 7.65,
+            nearest_m: 0.20,
+            half_angle_deg: 5.0,
+            incidence_max_rad: 0.6,
+            gate_sigma: 5.0,
+            sight_hold_s: 0.5,
+            attitude_time_constant_s: 30.0,
+            attitude_sigma_rad: 0.01,
+            accelerometer_noise_density_m_s2_sqrt_hz: 2.0e-3,
+            acceleration_bias_walk_m_s3_sqrt_hz: 4.0e-3,
+            initial_acceleration_bias_sigma_m_s2: 0.02,
+            initial_velocity_sigma_m_s: 0.01,
+            initial_height_m: 0.0,
+            gravity_m_s2: 9.81,
+        }
+    }
+}
+
+impl RangeInertialParams {
+    /// Refuses what no flight can have.
+    ///
+    /// # Errors
+    /// A parameter is outside its range.
+    pub fn validate(&self) -> Result<(), ParameterError> {
+        positive("range_sigma_m", self.range_sigma_m)?;
+        positive("reach_m", self.reach_m)?;
+        positive("incidence_max_rad", self.incidence_max_rad)?;
+        positive("gate_sigma", self.gate_sigma)?;
+        positive("sight_hold_s", self.sight_hold_s)?;
+        positive("attitude_time_constant_s", self.attitude_time_constant_s)?;
+        positive("gravity_m_s2", self.gravity_m_s2)?;
+        for (key, value) in self.not_negative() {
+            not_negative(key, value)?;
+        }
+        Ok(())
+    }
+
+    fn not_negative(&self) -> [(&'static str, f64); 8] {
+        [
+            ("nearest_m", self.nearest_m),
+            ("half_angle_deg", self.half_angle_deg),
+            ("attitude_sigma_rad", self.attitude_sigma_rad),
+            ("accelerometer_noise_density_m_s2_sqrt_hz", self.accelerometer_noise_density_m_s2_sqrt_hz),
+            ("acceleration_bias_walk_m_s3_sqrt_hz", self.acceleration_bias_walk_m_s3_sqrt_hz),
+            ("initial_acceleration_bias_sigma_m_s2", self.initial_acceleration_bias_sigma_m_s2),
+            ("initial_velocity_sigma_m_s", self.initial_velocity_sigma_m_s),
+            ("initial_height_m", self.initial_height_m),
+        ]
+    }
+
+    /// What the level acceleration is worth.
+    #[must_use]
+    pub fn inertia(&self) -> Inertia {
+        Inertia {
+            noise_density_m_s2_sqrt_hz: self.accelerometer_noise_density_m_s2_sqrt_hz,
+            bias_walk_m_s3_sqrt_hz: self.acceleration_bias_walk_m_s3_sqrt_hz,
+        }
+    }
+}
