@@ -49,7 +49,8 @@ function timeTraces(axes) {
 function timeLayout(axes) {
   return {
     title: head(axes.title),
-    xaxis: { title: { text: data.time_label }, range: data.span_s, ...NUMBERS },
+    // A copy: plotly.js changes the one that it is given.
+    xaxis: { title: { text: data.time_label }, range: [...data.span_s], ...NUMBERS },
     yaxis: { title: { text: `${axes.label} [${axes.unit}]` }, ...NUMBERS },
     margin: { l: 76, r: LEGEND_WIDTH, t: 36, b: 44, autoexpand: false }, legend: LEGEND, showlegend: true, hovermode: "closest",
   };
