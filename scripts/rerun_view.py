@@ -3,6 +3,7 @@
 Usage: python3 scripts/rerun_view.py hover.mcap hover.rrd [VEHICLE] && rerun hover.rrd   (rerun-sdk 0.41, mcap-ros2-support)
 """
 
+import math
 import sys
 import tomllib
 
@@ -21,13 +22,6 @@ PLOTS = {
         ("plant/state", "PlantState", ".position.y", RED),
         ("plant/state", "PlantState", ".position.z", GREEN),
         ("pilot/set_point", "SetPoint", ".altitude", GREY),
-    ],
-    "Attitude [rad]": [
-        ("attitude/estimate", "AttitudeEstimate", ".roll", BLUE),
-        ("attitude/estimate", "AttitudeEstimate", ".pitch", RED),
-        ("attitude/estimate", "AttitudeEstimate", ".yaw", GREEN),
-        ("pilot/set_point", "SetPoint", ".roll", GREY),
-        ("pilot/set_point", "SetPoint", ".pitch", GREY),
     ],
     "Velocity [m/s]": [
         ("plant/state", "PlantState", ".velocity.x", BLUE),
@@ -66,6 +60,30 @@ def plot(name, lines, prefix, topics):
     return rrb.TimeSeriesView(name=name, contents=list(overrides), overrides=overrides)
 
 
+def roll_pitch_yaw_deg(q):
+    """The angles of a quaternion in the sequence z-y-x."""
+    roll = math.atan2(2 * (q.w * q.x + q.y * q.z), 1 - 2 * (q.x**2 + q.y**2))
+    pitch = math.asin(max(-1, min(1, 2 * (q.w * q.y - q.z * q.x))))
+    yaw = math.atan2(2 * (q.w * q.z + q.x * q.y), 1 - 2 * (q.y**2 + q.z**2))
+    return [math.degrees(angle) for angle in (roll, pitch, yaw)]
+
+
+def log_angles(entity, colours, names, messages, angles):
+    """Logs three angles over time, which the viewer cannot make of a message by itself."""
+    times = [message.log_time_ns * 1e-9 for message in messages]
+    rr.log(entity, rr.SeriesLines(colors=colours, names=names), static=True)
+    index = rr.TimeColumn("message_log_time", timestamp=times)
+    rr.send_columns(entity, [index], rr.Scalars.columns(scalars=[angles(message.ros_msg) for message in messages]))
+
+
+def log_attitude(recording, states, set_point_topic):
+    log_angles("flown/attitude", [BLUE, RED, GREEN], ["roll", "pitch", "yaw"], states, lambda m: roll_pitch_yaw_deg(m.attitude))
+    asked = list(read_ros2_messages(recording, topics=[set_point_topic]))
+    if asked:
+        degrees = lambda m: [math.degrees(angle) for angle in (m.roll, m.pitch, m.yaw)]
+        log_angles("asked/attitude", [GREY] * 3, ["roll set point", "pitch set point", "yaw set point"], asked, degrees)
+
+
 def log_scene(boxes):
     centres = [box["centre"]["value"] for box in boxes]
     halves = [[length / 2 for length in box["size"]["value"]] for box in boxes]
@@ -75,10 +93,9 @@ def log_scene(boxes):
     rr.log("scene", rr.CoordinateFrame("map"), shape, static=True)
 
 
-def log_path(recording, topic):
-    states = (message.ros_msg.position for message in read_ros2_messages(recording, topics=[topic]))
-    points = [[position.x, position.y, position.z] for position in states]
-    # A point each 20 ms: more would only make the file larger.
+def log_path(states):
+    points = [[at.x, at.y, at.z] for at in (message.ros_msg.position for message in states)]
+    # A point each 20 samples: more would only make the file larger.
     rr.log("path", rr.CoordinateFrame("map"), rr.LineStrips3D([points[::20]], colors=BLUE), static=True)
 
 
@@ -86,6 +103,7 @@ def main(recording, out, vehicle=""):
     topics, boxes = read(recording)
     prefix = f"/{vehicle}/" if vehicle else "/"
     plots = [plot(name, lines, prefix, topics) for name, lines in PLOTS.items()]
+    plots.insert(1, rrb.TimeSeriesView(name="Attitude [deg]", contents=["/flown/attitude", "/asked/attitude"]))
     space = rrb.Spatial3DView(name="Space", spatial_information=rrb.SpatialInformation(target_frame="map"))
     view = rrb.Blueprint(rrb.Horizontal(space, rrb.Vertical(*plots)), rrb.TimePanel(timeline="message_log_time"))
     rr.init("hummingbus")
@@ -93,8 +111,10 @@ def main(recording, out, vehicle=""):
     rr.log_file_from_path(recording)
     # The axes of the body, x forward, y left, z up: a pose alone is not seen.
     rr.log("body", rr.CoordinateFrame("hb_body"), rr.TransformAxes3D(0.4), static=True)
-    if prefix + "plant/state" in topics:
-        log_path(recording, prefix + "plant/state")
+    states = list(read_ros2_messages(recording, topics=[prefix + "plant/state"]))
+    if states:
+        log_path(states)
+        log_attitude(recording, states, prefix + "pilot/set_point")
     if boxes:
         log_scene(boxes)
     rr.disconnect()
