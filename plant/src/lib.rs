@@ -18,6 +18,7 @@
 //! | `parameters` | what manifests say of a plant, and the backend that follows |
 //! | `others` | which vehicles of the traffic are others |
 //! | `output` | what a plant publishes |
+//! | [`traffic`] | the node that tells all plants of a run where the others are |
 //!
 //! ```
 //! use nalgebra::Vector3;
@@ -49,6 +50,7 @@ mod rotation;
 pub mod rotor;
 pub mod snapshot;
 pub mod state;
+pub mod traffic;
 
 pub use airframe::{Airframe, Drive};
 pub use backend::{Backend, ContactReport, Neighbour};

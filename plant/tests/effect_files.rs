@@ -38,6 +38,25 @@ fn assert_refused(effects: &str, line: usize, words: &[&str]) {
 }
 
 #[test]
+fn every_vehicle_and_scene_of_the_repository_lists_effects_that_there_are() {
+    let files = |folder: &str| {
+        let entries = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path());
+        let files: Vec<_> =
+            entries.filter(|path| path.extension().is_some_and(|end| end == "toml")).collect();
+        files.into_iter().filter(|path| !path.ends_with("Cargo.toml"))
+    };
+    for path in files("../vehicles") {
+        let airframe = Airframe::from_files(Vehicle::load(&path).unwrap(), &[]);
+        assert!(airframe.is_ok(), "{}", airframe.unwrap_err());
+    }
+    let bird = Vehicle::load(Path::new("../vehicles/hummingbird-drag.toml")).unwrap();
+    for path in files("../scenes") {
+        let airframe = Airframe::from_files(bird.clone(), &Scene::load(&path).unwrap().effects);
+        assert!(airframe.is_ok(), "{}", airframe.unwrap_err());
+    }
+}
+
+#[test]
 fn the_vehicles_effects_come_before_the_scenes() {
     let airframe = airframe(DRAG, WIND).unwrap();
     let found: Vec<_> =

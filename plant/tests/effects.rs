@@ -381,13 +381,13 @@ proptest! {
 }
 
 /// Draws of an effect's own numbers while the vehicle stands still at a height.
-fn lags(name: &str, values: Values, height_m: f64, ticks: usize) -> Vec<plant::Drive> {
+fn lags(name: &str, values: Values, height_m: f64, dt_s: f64, ticks: usize) -> Vec<plant::Drive> {
     let effect = Effect { kind: find(name).unwrap(), values };
     let airframe = Airframe::with_effects(hummingbird(), vec![effect]);
-    let mut memory = airframe.memory(3, "plant", TICK_S);
+    let mut memory = airframe.memory(3, "plant", dt_s);
     let body = RigidBody::level_at(Vector3::z() * height_m);
     let state = State { body, rotors: [RotorState::steady(400.0); 4] };
-    (0..ticks).map(|_| airframe.begin_tick(&mut memory, &state, &[76.5; 4], TICK_S)).collect()
+    (0..ticks).map(|_| airframe.begin_tick(&mut memory, &state, &[76.5; 4], dt_s)).collect()
 }
 
 /// Standard deviation, and the autocorrelation after `lag` samples.
@@ -400,7 +400,8 @@ fn spread(samples: &[f64], lag: usize) -> (f64, f64) {
 #[test]
 fn turbulence_has_the_strength_and_length_of_the_specification() {
     // At 30.48 m, 100 feet, in a wind of 10 m/s: the bounds are six standard deviations of the estimates.
-    let drives = lags("turbulence", [10.0, 0.0, 0.0, 0.0, 0.0, 0.0], 30.48, 4_000_000);
+    let (dt_s, ticks) = (0.1, 400_000);
+    let drives = lags("turbulence", [10.0, 0.0, 0.0, 0.0, 0.0, 0.0], 30.48, dt_s, ticks);
     let shape: f64 = 0.177 + 0.0823;
     for (axis, sigma_m_s, length_m) in [
         (0, 1.0 / shape.powf(0.4), 30.48 / shape.powf(1.2)),
@@ -409,8 +410,8 @@ fn turbulence_has_the_strength_and_length_of_the_specification() {
     ] {
         let samples: Vec<f64> = drives.iter().map(|drive| drive.air_velocity_W_m_s[axis]).collect();
         let time_s = length_m / 10.0;
-        let (sigma, correlation) = spread(&samples, (time_s / TICK_S) as usize);
-        let draws: f64 = 4000.0 / (2.0 * time_s);
+        let (sigma, correlation) = spread(&samples, (time_s / dt_s) as usize);
+        let draws = ticks as f64 * dt_s / (2.0 * time_s);
         assert!(
             (sigma / sigma_m_s - 1.0).abs() < 6.0 / (2.0 * draws).sqrt(),
             "axis {axis}: {sigma} {sigma_m_s}"
@@ -423,7 +424,7 @@ fn turbulence_has_the_strength_and_length_of_the_specification() {
 fn turbulence_near_the_ground_fades_with_height_and_differs_between_rotors() {
     let values = [0.1, 0.3, 0.05, 0.0, 0.0, 0.0];
     let sigma = |height_m: f64| {
-        let drives = lags("ground-turbulence", values, height_m, 200_000);
+        let drives = lags("ground-turbulence", values, height_m, TICK_S, 200_000);
         spread(&drives.iter().map(|drive| drive.thrust_deviation[0]).collect::<Vec<_>>(), 50)
     };
     let ((ground, correlation), (above, _)) = (sigma(0.0), sigma(0.6));
@@ -432,7 +433,7 @@ fn turbulence_near_the_ground_fades_with_height_and_differs_between_rotors() {
         "{ground} {correlation}"
     );
     assert!((above / ground - (-2.0_f64).exp()).abs() < 1e-9, "the same draws, weaker: {above} {ground}");
-    let drives = lags("ground-turbulence", values, 0.0, 200_000);
+    let drives = lags("ground-turbulence", values, 0.0, TICK_S, 200_000);
     let product = |a: usize, b: usize| {
         drives.iter().map(|drive| drive.thrust_deviation[a] * drive.thrust_deviation[b]).sum::<f64>()
             / 200_000.0

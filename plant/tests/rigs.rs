@@ -149,7 +149,7 @@ fn it_swings_about_the_bearing_as_a_pendulum_does() {
     let start_J = energy_J(&plant);
     // A physical pendulum at 0.5 rad: 2 pi sqrt((J + m l^2) / (m g l)), times 1 + 0.5^2 / 16 + ...
     let (inertia, turning) = (5.6e-3 + 0.48 * 0.05_f64.powi(2), 0.48 * 9.81 * 0.05);
-    let expected_s = std::f64::consts::TAU * (inertia / turning as f64).sqrt() * 1.0158;
+    let expected_s = std::f64::consts::TAU * f64::sqrt(inertia / turning) * 1.0158;
     let (mut crossings, mut before) = (Vec::new(), 1.0);
     for tick in 0..10_000 {
         plant.step(&[1.0; 4], TICK_S, &[]);
@@ -158,11 +158,8 @@ fn it_swings_about_the_bearing_as_a_pendulum_does() {
             crossings.push(f64::from(tick) * TICK_S);
         }
         before = lean;
-        assert!(
-            (energy_J(&plant) - start_J).abs() < 0.03 * start_J.abs().min(0.03),
-            "{tick}: {}",
-            energy_J(&plant) - start_J
-        );
+        let gained_J = energy_J(&plant) - start_J;
+        assert!(gained_J.abs() < 1e-3, "tick {tick}: {gained_J} J of the 29 mJ that it swings with");
     }
     let periods = crossings.len() - 1;
     let period_s = (crossings[periods] - crossings[0]) / periods as f64;
@@ -174,7 +171,7 @@ fn friction_takes_energy_and_brings_it_to_rest() {
     for text in [SLIDING, FIXED] {
         let mut plant = swinging(&scene(text));
         let mut last_J = energy_J(&plant);
-        for tick in 0..10_000 {
+        for tick in 0..20_000 {
             plant.step(&[1.0; 4], TICK_S, &[]);
             let energy_J = energy_J(&plant);
             assert!(energy_J < last_J + 1e-5, "tick {tick}: {energy_J} after {last_J}");

@@ -116,12 +116,22 @@ fn value<'a>(leaves: &'a [Leaf], field: &str) -> Option<(f64, &'a str)> {
         let path = format!("{quaternion}.{name}");
         leaves.iter().find(|leaf| leaf.path == path)?.value.as_f64()
     };
-    let (x, y, z, w) = (part("x")?, part("y")?, part("z")?, part("w")?);
+    let [roll, pitch, yaw] = roll_pitch_yaw([part("x")?, part("y")?, part("z")?, part("w")?]);
     let angle = match angle {
-        "roll" => (2.0 * (w * x + y * z)).atan2(1.0 - 2.0 * (x * x + y * y)),
-        "pitch" => (2.0 * (w * y - z * x)).clamp(-1.0, 1.0).asin(),
-        "yaw" => (2.0 * (w * z + x * y)).atan2(1.0 - 2.0 * (y * y + z * z)),
+        "roll" => roll,
+        "pitch" => pitch,
+        "yaw" => yaw,
         _ => return None,
     };
     Some((angle, "rad"))
+}
+
+/// The angles of a quaternion, stored x, y, z, w, in the sequence z-y-x, in radians; roll and yaw from -π to π.
+#[must_use]
+pub fn roll_pitch_yaw([x, y, z, w]: [f64; 4]) -> [f64; 3] {
+    [
+        (2.0 * (w * x + y * z)).atan2(1.0 - 2.0 * (x * x + y * y)),
+        (2.0 * (w * y - z * x)).clamp(-1.0, 1.0).asin(),
+        (2.0 * (w * z + x * y)).atan2(1.0 - 2.0 * (y * y + z * z)),
+    ]
 }

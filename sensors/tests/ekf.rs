@@ -351,7 +351,7 @@ fn run_spoilt(spoil: impl Fn(usize, Measurement) -> Option<Measurement>, mut jud
 #[test]
 fn outliers_are_refused_and_counted_and_leave_no_mark() {
     let spoil = |number: usize, mut measured: Measurement| {
-        if number > 2000 && number % 500 == 0 {
+        if number > 2000 && number.is_multiple_of(500) {
             measured.values[0] += 0.5;
         }
         Some(measured)

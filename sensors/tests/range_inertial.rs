@@ -81,7 +81,7 @@ fn estimate(flight: &[Truth], room: Room, seed: u64, mut judge: impl FnMut(&Run)
         let attitude_WB = complementary.step(&mut attitude_state, &imu).attitude_WB;
         filter.step(&mut state, &Inputs { now_ns, imu, attitude_WB, ranges: &sent });
         let yaw_rad = attitude_WB.euler_angles().2;
-        let walls = filter.walls(&state, yaw_rad);
+        let walls = filter.walls(&state, yaw_rad, now_ns);
         judge(&Run { truth: *truth, time_s, state, walls, yaw_rad });
     }
 }

@@ -23,7 +23,7 @@ pub static BATTERY_SAG: EffectKind = EffectKind {
     summary: "the battery's voltage falls as it empties and under load, and the speed that a command asks for with it",
     equation: "w_target U / U_0 with U = U_0 - D (1 - q) - R I, U I = sum c_Q |w_i|^3 / eta, \
                q = 1 - q_0 - (charge drawn) / C",
-    source: "Thevenin model of order 0, Plett, Battery Management Systems I, 2015, sections 2.1 to 2.3; a brushed or \
+    source: "equivalent circuit of a voltage and a resistance: Plett, Battery Management Systems I, 2015, chapter 2; a brushed or \
              open-loop motor's speed follows its voltage. The charge's line from full to empty is own",
     validity: "between a full and an empty battery, where the discharge curve is near a line; no recovery after load; \
                a controller of rotor speed, which holds the speed until its headroom is gone, needs no sag",

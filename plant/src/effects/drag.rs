@@ -12,8 +12,8 @@ pub static ROTOR_DRAG: EffectKind = EffectKind {
     name: "rotor-drag",
     summary: "the air that crosses a spinning rotor drags at its hub, linear in both speeds",
     equation: "F_i = -c |w_i| (v_i - (v_i . z) z) at the hub of rotor i, v_i its velocity through the air",
-    source: "Martin and Salaun, The true role of accelerometer feedback in quadrotor control, ICRA 2010, \
-             section III; Mahony, Kumar and Corke, Multirotor aerial vehicles, IEEE RAM 19(3), 2012",
+    source: "Martin and Salaun, The true role of accelerometer feedback in quadrotor control, ICRA 2010; \
+             Mahony, Kumar and Corke, Multirotor aerial vehicles, IEEE RAM 19(3), 2012",
     validity: "advance ratios below 0.1 (the Hummingbird: 4 m/s); along the rotor's axis nothing acts",
     parameters: &[ParameterSpec {
         name: "coefficient",
@@ -33,7 +33,7 @@ pub static PARASITIC_DRAG: EffectKind = EffectKind {
     name: "parasitic-drag",
     summary: "the air drags at fuselage and arms, quadratic in its speed",
     equation: "F = -|v| (c_xy v_x, c_xy v_y, c_z v_z) at the centre of mass, v the velocity through the air",
-    source: "Folk, Paulos and Kumar, RotorPy, arXiv 2306.04485, section on aerodynamic wrenches",
+    source: "Folk, Paulos and Kumar, RotorPy, arXiv 2306.04485: aerodynamic wrenches",
     validity: "a body alike in front and at its sides; no torque: pressure centre and centre of mass coincide",
     parameters: &[
         ParameterSpec {

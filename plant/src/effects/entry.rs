@@ -87,13 +87,15 @@ fn within_bounds(spec: &ParameterSpec, stated: &Stated, entry: &EffectEntry) -> 
         });
     };
     let si = stated.value * factor;
+    // A pure number's unit would read as another number.
+    let unit = if spec.unit() == "1" { String::new() } else { format!(" {}", spec.unit()) };
     if (spec.lower..=spec.upper).contains(&si) {
         return Ok(si);
     }
     Err(VehicleError::BadValue {
         place: stated.place.clone(),
         key,
-        expected: format!("{} to {} {}", spec.lower, spec.upper, spec.unit()),
+        expected: format!("{} to {}{unit}", spec.lower, spec.upper),
         found: format!("{} {}", stated.value, stated.unit),
     })
 }

@@ -13,8 +13,8 @@ pub static TRANSLATIONAL_LIFT: EffectKind = EffectKind {
     summary: "a rotor that climbs loses thrust, one that is flown sideways gains some",
     equation: "dT_i = -k_z |w_i| v_iz + k_h (v_ix^2 + v_iy^2), v_i the hub's velocity through the air",
     source: "Svacha, Mohta and Kumar, Improving quadrotor trajectory tracking by compensating for aerodynamic \
-             effects, ICUAS 2017, thrust model; blade element theory as in Leishman, Principles of Helicopter \
-             Aerodynamics, section 3.3",
+             effects, ICUAS 2017: thrust model; blade element theory as in Leishman, Principles of Helicopter \
+             Aerodynamics",
     validity: "first terms of an expansion about hover: climb and descent well below the induced velocity (the \
                Hummingbird: 5 m/s), no vortex ring; independent of the thrust itself",
     parameters: &[
@@ -48,7 +48,7 @@ pub static BLADE_FLAPPING: EffectKind = EffectKind {
     summary: "the advancing blade rises: the thrust tilts away from where the rotor is flown, and twists the hub",
     equation: "a_i = k (v_ix, v_iy), F_i = -T_i a_i at the hub, tau_i = K_b (a_iy, -a_ix, 0)",
     source: "Hoffmann, Huang, Waslander and Tomlin, Quadrotor helicopter flight dynamics and control, AIAA \
-             2007-6461, section on blade flapping; Mahony, Kumar and Corke, IEEE RAM 19(3), 2012",
+             2007-6461: blade flapping; Mahony, Kumar and Corke, IEEE RAM 19(3), 2012",
     validity: "small tilts (below 0.1 rad); the lateral tilt, which is opposite for opposite senses of rotation, is \
                left out. Its force can hardly be told from rotor-drag near hover, its torque can",
     parameters: &[

@@ -17,7 +17,7 @@ pub static RIG_PENDULUM: EffectKind = EffectKind {
     summary: "a vehicle on a bearing beside its centre of mass swings as a pendulum, and turns more slowly",
     equation: "tau = g S (z x up), J_xx + A and J_yy + A; S = sum m l, A = sum m l^2 over all masses at l below the \
                bearing",
-    source: "the physical pendulum, as in Goldstein, Classical Mechanics, chapter 5",
+    source: "the physical pendulum of any text on mechanics",
     validity: "for flights on a rig, seen without it: the position is held by the bearing, whose force is not part of \
                this. A scene with a rig has the pendulum by its joints already",
     parameters: &[
@@ -51,7 +51,8 @@ pub static BEARING_FRICTION: EffectKind = EffectKind {
     summary: "the bearing brakes every rotation, by a constant torque and by one that grows with the rate",
     equation: "tau = -(c / sqrt(|w|^2 + w_0^2) + b) w with w_0 = 0.05 rad/s",
     source: "Coulomb and viscous friction, smoothed about standstill: Armstrong-Helouvry, Dupont and Canudas de Wit, \
-             Automatica 30(7), 1994, section 2",
+             A survey of models, analysis tools and compensation methods for the control of machines \
+             with friction, Automatica 30(7), 1994",
     validity: "the same about every axis, as in a ball joint; no stiction: below w_0 the bearing creeps",
     parameters: &[
         ParameterSpec {
