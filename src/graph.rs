@@ -42,7 +42,7 @@ pub struct Graph {
     pub successors: Vec<Successor>,
     /// Processes that take no part in the ticks: their names and what to start.
     pub companions: Vec<(String, Program)>,
-    /// The vehicle and scene files the processes name, each once.
+    /// The vehicle, scene and gains files the processes name, each once.
     pub models: Vec<PathBuf>,
 }
 

@@ -43,7 +43,7 @@ pub struct WindowErrors {
 }
 
 /// Units that stand for the same quantity: name, quantity, factor to the quantity's SI unit.
-const UNITS: [(&str, &str, f64); 14] = [
+const UNITS: [(&str, &str, f64); 22] = [
     ("m", "length", 1.0),
     ("cm", "length", 0.01),
     ("mm", "length", 0.001),
@@ -54,6 +54,14 @@ const UNITS: [(&str, &str, f64); 14] = [
     ("rpm", "angular rate", std::f64::consts::PI / 30.0),
     ("m/s", "velocity", 1.0),
     ("m/s^2", "acceleration", 1.0),
+    ("m/s^3", "jerk", 1.0),
+    ("N", "force", 1.0),
+    ("N*m", "torque", 1.0),
+    ("V", "voltage", 1.0),
+    ("A", "current", 1.0),
+    ("T", "magnetic flux density", 1.0),
+    ("Pa", "pressure", 1.0),
+    ("hPa", "pressure", 100.0),
     ("s", "time", 1.0),
     ("ns", "time", 1e-9),
     ("1", "number", 1.0),
@@ -87,26 +95,73 @@ pub fn conversion(from: &str, to: &str) -> Result<f64, String> {
 /// # Errors
 /// If a topic or field is not in the recording, or a unit does not fit.
 pub fn verdicts(content: &Content, recording: &Recording) -> Result<Vec<Verdict>> {
-    let conditions: Vec<&PassCondition> = content.pass.iter().map(toml::Spanned::get_ref).collect();
-    let fields: Vec<_> = conditions.iter().map(|pass| (pass.topic.as_str(), pass.field.as_str())).collect();
+    let conditions = || content.pass.iter().map(toml::Spanned::get_ref);
+    let wanted: Vec<_> = conditions().map(|pass| wanted(pass, recording)).collect::<Result<_>>()?;
+    let fields: Vec<_> =
+        wanted.iter().flatten().map(|(topic, field)| (topic.as_str(), field.as_str())).collect();
     if fields.is_empty() {
         return Ok(Vec::new());
     }
-    let series = recording.series(&fields)?;
-    conditions.iter().zip(&series).map(|(pass, series)| verdict(pass, series)).collect()
+    let mut series = recording.series(&fields)?.into_iter();
+    conditions()
+        .zip(&wanted)
+        .map(|(pass, wanted)| {
+            let own: Vec<Series> = series.by_ref().take(wanted.len()).collect();
+            verdict(pass, &own)
+        })
+        .collect()
 }
 
-fn verdict(pass: &PassCondition, series: &Series) -> Result<Verdict> {
-    let factor = match conversion(&series.unit, &pass.unit) {
+/// The parts of a vector field; of any other, the field itself.
+fn parts(topic: &str, field: &str, recording: &Recording) -> Result<Vec<(String, String)>> {
+    let is_field = recording.unit_of(topic, field)?.is_some();
+    let name =
+        |axis: &str| (topic.to_owned(), if is_field { field.to_owned() } else { format!("{field}.{axis}") });
+    Ok(if is_field { vec![name("")] } else { ["x", "y", "z"].map(name).to_vec() })
+}
+
+/// All series that a condition needs: the judged field's parts, those that are taken off, the gate's.
+fn wanted(pass: &PassCondition, recording: &Recording) -> Result<Vec<(String, String)>> {
+    let mut wanted = parts(&pass.topic, &pass.field, recording)?;
+    if let Some(minus) = &pass.minus {
+        let other = parts(&minus.topic, &minus.field, recording)?;
+        if other.len() != wanted.len() {
+            bail!(
+                "pass condition `{}`: `minus` takes a vector off a number, or a number off a vector",
+                pass.name
+            );
+        }
+        wanted.extend(other);
+    }
+    if let Some(gate) = &pass.gate {
+        wanted.push((gate.topic.clone(), gate.field.clone()));
+    }
+    Ok(wanted)
+}
+
+fn verdict(pass: &PassCondition, series: &[Series]) -> Result<Verdict> {
+    let (gate, signals) = match &pass.gate {
+        Some(gate) => series.split_last().map_or((None, series), |(last, rest)| (Some((gate, last)), rest)),
+        None => (None, series),
+    };
+    let (judged, taken) =
+        signals.split_at(if pass.minus.is_some() { signals.len() / 2 } else { signals.len() });
+    let factor = match conversion(&judged[0].unit, &pass.unit) {
         Ok(factor) => factor,
         Err(error) => bail!("pass condition `{}`: {error}", pass.name),
     };
-    let samples = span(series, pass.from_s, pass.to_s).map(|value| value * factor);
+    let is_open = |time_ns: u64| {
+        gate.is_none_or(|(gate, series)| {
+            held(series, time_ns).is_some_and(|value| within(value, gate.min, gate.max))
+        })
+    };
+    let samples = span(&judged[0], pass.from_s, pass.to_s)
+        .filter(|(_, time_ns)| is_open(*time_ns))
+        .filter_map(|(index, time_ns)| difference(judged, taken, index, time_ns))
+        .map(|value| value * factor);
     let values = statistic(pass.statistic, samples);
-    let is_above = |value: &f64| pass.min.is_none_or(|min| *value >= min);
-    let is_below = |value: &f64| pass.max.is_none_or(|max| *value <= max);
     // A span without samples fails: what was never measured did not pass.
-    let passed = !values.is_empty() && values.iter().all(|value| is_above(value) && is_below(value));
+    let passed = !values.is_empty() && values.iter().all(|value| within(*value, pass.min, pass.max));
     Ok(Verdict {
         name: pass.name.clone(),
         values,
@@ -117,15 +172,38 @@ fn verdict(pass: &PassCondition, series: &Series) -> Result<Verdict> {
     })
 }
 
-fn span(series: &Series, from_s: f64, to_s: Option<f64>) -> impl Iterator<Item = f64> {
-    let samples = series.time_ns.iter().zip(&series.value);
-    samples
-        .filter(move |(time_ns, _)| {
-            // Half a nanosecond of slack: limits in seconds are not exact in binary.
-            let time_s = **time_ns as f64 * 1e-9;
-            time_s >= from_s - 5e-10 && to_s.is_none_or(|to_s| time_s <= to_s + 5e-10)
-        })
-        .map(|(_, value)| *value)
+/// Whether `value` is a number between the limits that there are.
+fn within(value: f64, min: Option<f64>, max: Option<f64>) -> bool {
+    !value.is_nan() && min.is_none_or(|min| value >= min) && max.is_none_or(|max| value <= max)
+}
+
+/// The judged value of sample `index`: a number less what is taken off, or the length of such a vector; none before
+/// the first sample of what is taken off.
+fn difference(judged: &[Series], taken: &[Series], index: usize, time_ns: u64) -> Option<f64> {
+    let part = |part: usize| {
+        let off = taken.get(part).map_or(Some(0.0), |series| held(series, time_ns))?;
+        Some(judged[part].value[index] - off)
+    };
+    if judged.len() == 1 {
+        return part(0);
+    }
+    let squares = (0..judged.len()).map(|index| part(index).map(|value| value * value));
+    squares.sum::<Option<f64>>().map(f64::sqrt)
+}
+
+/// The newest value at `time_ns`.
+fn held(series: &Series, time_ns: u64) -> Option<f64> {
+    let count = series.time_ns.partition_point(|time| *time <= time_ns);
+    series.value.get(count.checked_sub(1)?).copied()
+}
+
+/// Index and time of the samples within a span.
+fn span(series: &Series, from_s: f64, to_s: Option<f64>) -> impl Iterator<Item = (usize, u64)> {
+    series.time_ns.iter().copied().enumerate().filter(move |(_, time_ns)| {
+        // Half a nanosecond of slack: limits in seconds are not exact in binary.
+        let time_s = *time_ns as f64 * 1e-9;
+        time_s >= from_s - 5e-10 && to_s.is_none_or(|to_s| time_s <= to_s + 5e-10)
+    })
 }
 
 fn statistic(statistic: Statistic, samples: impl Iterator<Item = f64>) -> Vec<f64> {
@@ -215,8 +293,46 @@ fn compare_states(compare: &Comparison, recording: &Recording) -> Result<WindowE
 
 #[cfg(test)]
 mod tests {
-    use super::{conversion, statistic};
-    use crate::manifest::Statistic;
+    use super::{conversion, statistic, verdict};
+    use crate::manifest::{PassCondition, Statistic};
+    use recorder::series::Series;
+
+    /// A series with a sample each second.
+    fn series(unit: &str, value: &[f64]) -> Series {
+        let time_ns = (0..value.len() as u64).map(|second| second * 1_000_000_000).collect();
+        Series { time_ns, value: value.to_vec(), unit: unit.to_owned() }
+    }
+
+    fn condition(more: &str) -> PassCondition {
+        let text = format!(
+            "name = \"c\"\ntopic = \"/a\"\nfield = \"p\"\nunit = \"m\"\nstatistic = \"every\"\nmin = 0.0\n{more}"
+        );
+        toml::from_str(&text).unwrap()
+    }
+
+    #[test]
+    fn a_vector_less_another_is_judged_by_its_length() {
+        let minus = condition("minus = { topic = \"/b\", field = \"p\" }");
+        let axes = [[1.0, 4.0], [0.0, 1.0], [0.0, 0.0], [1.0, 1.0], [0.0, -3.0], [0.0, 0.0]];
+        let verdict = verdict(&minus, &axes.map(|values| series("m", &values))).unwrap();
+        assert_eq!(verdict.values, [0.0, 5.0]);
+    }
+
+    #[test]
+    fn only_samples_while_the_gate_is_open_count() {
+        let gated = condition("while = { topic = \"/g\", field = \"s\", min = 1, max = 2 }");
+        let judged = series("m", &[7.0, 8.0, 9.0, 10.0]);
+        // The gate's last sample holds for the judged ones after it.
+        let verdict = verdict(&gated, &[judged, series("1", &[0.0, 1.0, 2.0])]).unwrap();
+        assert_eq!(verdict.values, [8.0, 10.0]);
+        assert!(verdict.passed);
+    }
+
+    #[test]
+    fn a_gate_that_never_opens_fails() {
+        let gated = condition("while = { topic = \"/g\", field = \"s\", min = 1 }");
+        assert!(!verdict(&gated, &[series("m", &[1.0]), series("1", &[0.0])]).unwrap().passed);
+    }
 
     #[test]
     fn units_of_one_quantity_convert() {

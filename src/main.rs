@@ -4,12 +4,15 @@
 mod clean;
 mod ctl;
 mod describe;
+mod files;
 mod graph;
 mod judge;
 mod kinds;
 mod launch;
 mod manifest;
+mod page;
 mod placement;
+mod plot;
 mod problem;
 mod processes;
 mod profile;
@@ -82,6 +85,9 @@ enum Verb {
         #[arg(long)]
         topic: Option<String>,
     },
+    /// Draw a recording: a page with curves over time and the paths in space, or pictures of them.
+    #[command(after_help = plot::HELP)]
+    Plot(plot::PlotArguments),
     /// Print every message's fields, units, frames and layout hash.
     #[command(after_help = "Example: hummingbus schema --json")]
     Schema {
@@ -162,6 +168,7 @@ fn main() -> ExitCode {
         Verb::Check(arguments) => check(&arguments),
         Verb::Diff { a, b } => diff(&a, &b),
         Verb::Cat { recording, topic } => cat(&recording, topic.as_deref()),
+        Verb::Plot(arguments) => plot::plot(&arguments),
         Verb::Schema { json } => {
             print_text(&if json { describe::schemas_json() } else { describe::schemas() }).map(|()| true)
         }

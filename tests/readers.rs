@@ -3,6 +3,11 @@
 //! Each of `tests/readers/read_*` decodes every topic and ends at the first difference. `scripts/test`
 //! installs what they need and says where in `HUMMINGBUS_READERS`.
 
+#[path = "runs/laps.rs"]
+#[allow(dead_code, reason = "shared with tests/runs")]
+mod laps;
+#[path = "readers/plot.rs"]
+mod plot;
 #[path = "readers/profile.rs"]
 mod profile;
 
@@ -164,4 +169,13 @@ fn hummingbus(arguments: &[&OsStr]) -> Output {
     let output = Command::new(HUMMINGBUS).args(arguments).output().unwrap();
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     output
+}
+
+/// Runs a script that looks at a page with a browser; the JSON that it prints.
+fn look(readers: &Path, script: &str, arguments: &[&OsStr]) -> serde_json::Value {
+    let mut command = Command::new("node");
+    command.arg(Path::new(ROOT).join("tests/readers").join(script)).args(arguments);
+    let Output { status, stdout, stderr } = command.env("HUMMINGBUS_READERS", readers).output().unwrap();
+    assert!(status.success(), "{script}: {}", String::from_utf8_lossy(&stderr));
+    serde_json::from_slice(&stdout).unwrap()
 }

@@ -10,8 +10,8 @@ mod sensing;
 
 pub use control::{ControlStatus, Reference};
 pub use sensing::{
-    Barometer, Battery, Contact, Gps, Innovation, Magnetometer, Mocap, Ranges, StateEstimate, Traffic,
-    WallEstimate,
+    Barometer, Battery, Clearance, Contact, Gps, Innovation, Magnetometer, Mocap, Ranges, StateEstimate,
+    Traffic, WallEstimate,
 };
 
 /// Simulation time as ROS 2 writes it. The bus fills it in when a sample is sent.
@@ -371,12 +371,13 @@ pub struct MeasuredState {
 
 /// Every message that a topic of a built-in node can carry, in alphabetical order.
 #[must_use]
-pub fn all() -> [&'static Schema; 21] {
+pub fn all() -> [&'static Schema; 22] {
     [
         AttitudeEstimate::SCHEMA,
         Barometer::SCHEMA,
         Battery::SCHEMA,
         BodyTransform::SCHEMA,
+        Clearance::SCHEMA,
         Contact::SCHEMA,
         ControlStatus::SCHEMA,
         Gps::SCHEMA,

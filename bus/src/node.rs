@@ -161,6 +161,15 @@ impl Node {
         self.input(port).ok()
     }
 
+    /// Declares every input the manifest wires as one of `T`, in the order of their names.
+    pub fn every_input<T: Message>(&mut self) -> Vec<Input<T>> {
+        self.inputs.fill(Some(Declared::Typed(T::SCHEMA)));
+        let mut inputs: Vec<_> =
+            (0..self.inputs.len()).map(|index| Input { index, message: PhantomData }).collect();
+        inputs.sort_by_key(|input| &self.node().inputs[input.index].port);
+        inputs
+    }
+
     /// Declares every input the manifest wires, to be read as bytes, in the order of their topics' names.
     pub fn raw_inputs(&mut self) -> Vec<RawInput> {
         self.inputs.fill(Some(Declared::Raw));

@@ -1,20 +1,14 @@
 //! The PID controller node: altitude, roll, pitch and yaw to four motor commands.
-//!
-//! Roll, pitch, yaw and rates come from the attitude estimate. Altitude and climb rate come from the
-//! plant's true state, as the thesis takes them from its simulator (§4.4): a stand-in until a run has an
-//! altimeter.
-#![allow(non_snake_case, reason = "a trailing _B names the frame a vector is written in")]
 
-use crate::allocation::{Allocation, RotorSet};
-use crate::pid_gains::PidGains;
-use crate::pid_law::{Measurement, PidLaw, PidState, PidVehicle};
-use crate::set_points;
+use crate::allocation::Wrench;
+use crate::controller::{self, Airframe, Controller, ControllerState, Demand, Told};
+use crate::pid_gains::GivenGains;
+use crate::pid_law::{Measurement, PidLaw};
 use bus::kind::{Inputs, NodeKind, PortSpec, read_parameters};
-use bus::messages::{AttitudeEstimate, MotorCommand, PlantState, SetPoint};
+use bus::messages::{AttitudeEstimate, ControlStatus, MotorCommand, SetPoint, StateEstimate};
 use bus::{BusError, Message, Node};
 use serde::Deserialize;
 use std::path::PathBuf;
-use vehicles::Vehicle;
 
 /// The PID controller, for manifests.
 pub const KIND: NodeKind = NodeKind {
@@ -22,10 +16,13 @@ pub const KIND: NodeKind = NodeKind {
     summary: "altitude, roll, pitch and yaw PID of the thesis with control allocation",
     inputs: Inputs::Ports(&[
         PortSpec::required("set_point", SetPoint::SCHEMA),
-        PortSpec::required("attitude", AttitudeEstimate::SCHEMA),
-        PortSpec::required("altitude", PlantState::SCHEMA),
+        PortSpec::required("estimate", StateEstimate::SCHEMA),
+        PortSpec::optional("attitude", AttitudeEstimate::SCHEMA),
     ]),
-    outputs: &[PortSpec::required("command", MotorCommand::SCHEMA)],
+    outputs: &[
+        PortSpec::required("command", MotorCommand::SCHEMA),
+        PortSpec::optional("status", ControlStatus::SCHEMA),
+    ],
     check: |parameters, _| build(&read_parameters(parameters)?, 1.0).map(|_| ()),
     run,
 };
@@ -38,54 +35,47 @@ struct Parameters {
     vehicle: PathBuf,
     /// Gains and limits.
     #[serde(default)]
-    gains: PidGains,
+    gains: GivenGains,
 }
 
-fn build(parameters: &Parameters, period_s: f64) -> Result<(PidLaw, Allocation, Vehicle), String> {
-    let vehicle = Vehicle::load(&parameters.vehicle).map_err(|error| error.to_string())?;
-    let allocation = Allocation::new(&RotorSet::from(&vehicle)).map_err(|error| error.to_string())?;
-    let law = PidLaw { gains: parameters.gains, vehicle: PidVehicle::new(&vehicle, &allocation), period_s };
-    Ok((law, allocation, vehicle))
+fn build(parameters: &Parameters, period_s: f64) -> Result<(PidLaw, Airframe), String> {
+    let airframe = Airframe::load(&parameters.vehicle)?;
+    let gains = parameters.gains.gains()?;
+    Ok((PidLaw { gains, vehicle: airframe.known(), period_s }, airframe))
 }
 
 fn run() -> Result<(), BusError> {
-    let mut node = Node::join()?;
-    let set_point = node.input::<SetPoint>("set_point")?;
-    let attitude = node.input::<AttitudeEstimate>("attitude")?;
-    let altitude = node.input::<PlantState>("altitude")?;
-    let output = node.output::<MotorCommand>("command")?;
-    let (law, allocation, vehicle) =
-        build(&node.parameters()?, node.period_s()).map_err(|error| node.error(error))?;
-    node.run_with_state(PidState::default(), |tick, memory| {
-        let measured = measurement(tick.get(attitude), tick.get(altitude));
-        let set_point = asked(tick.get(set_point));
-        if let Some(last) = tick.predecessor(output) {
-            let speeds_rad_s = last.command.map(|command| vehicle.command.speed(command));
-            *memory = law.tracking(&allocation.wrench(&speeds_rad_s), &set_point, &measured);
-        }
-        let wrench = law.step(memory, &set_point, &measured);
-        let allocated = allocation.allocate(&wrench);
-        let command = allocated.speeds_rad_s.map(|speed| vehicle.command.command(speed));
-        tick.write(output, MotorCommand { command, ..Default::default() })
-    })
+    let node = Node::join()?;
+    let (law, airframe) = build(&node.parameters()?, node.period_s()).map_err(|error| node.error(error))?;
+    controller::run(node, &law, &airframe.allocation, &airframe.vehicle)
 }
 
-fn measurement(attitude: &AttitudeEstimate, truth: &PlantState) -> Measurement {
-    Measurement {
-        altitude_m: truth.position.z,
-        climb_rate_m_s: truth.velocity.z,
-        roll_rad: attitude.roll,
-        pitch_rad: attitude.pitch,
-        yaw_rad: attitude.yaw,
-        angular_velocity_B_rad_s: <[f64; 3]>::from(attitude.angular_velocity).into(),
+impl Controller for PidLaw {
+    const LAW: u32 = 1;
+
+    fn step(&self, memory: &mut ControllerState, told: &Told<'_>) -> Demand {
+        let wrench = PidLaw::step(self, &mut memory.integrals, &told.set_point, &Measurement::from(told));
+        Demand { wrench, set_point: told.set_point, ..Demand::default() }
+    }
+
+    fn tracking(&self, memory: &ControllerState, wrench: &Wrench, told: &Told<'_>) -> ControllerState {
+        let altitude_m = told.set_point.altitude_m;
+        let integrals = self.taken_over(memory, wrench, altitude_m, &Measurement::from(told));
+        ControllerState { integrals, ..ControllerState::default() }
     }
 }
 
-fn asked(message: &SetPoint) -> set_points::SetPoint {
-    set_points::SetPoint {
-        altitude_m: message.altitude,
-        roll_rad: message.roll,
-        pitch_rad: message.pitch,
-        yaw_rad: message.yaw,
+impl From<&Told<'_>> for Measurement {
+    fn from(told: &Told<'_>) -> Self {
+        let motion = &told.motion;
+        let (roll_rad, pitch_rad, yaw_rad) = motion.attitude_WB.euler_angles();
+        Self {
+            altitude_m: motion.position_W_m.z,
+            climb_rate_m_s: motion.velocity_W_m_s.z,
+            roll_rad,
+            pitch_rad,
+            yaw_rad,
+            angular_velocity_B_rad_s: motion.angular_velocity_B_rad_s,
+        }
     }
 }

@@ -23,9 +23,23 @@
 //! | roll 16, 0, 6 | 35° | 2.4 | swings to −10.1° |
 //!
 //! The altitude's integral gain is raised because 1 takes 12 s to make up for a mass that is 5 % off.
-//! All of ours are tuned on that model, no source.
+//! All of ours are tuned on that model, no source. The numbers are in `controllers/gains/pid.toml` and
+//! `pid-thesis.toml`; the former is built in.
 
+use crate::altitude_loop::AltitudeGains;
+use crate::gains_file::{gain, parse, tilt};
 use serde::Deserialize;
+use serde::de::{MapAccess, Visitor, value::MapAccessDeserializer};
+use std::path::{Path, PathBuf};
+use vehicles::VehicleError;
+use vehicles::reader::Section;
+use vehicles::units::{ANGULAR_ACCELERATION, PER_SECOND, PER_SECOND_2, PER_SECOND_3};
+
+/// The gains that the law is tuned with.
+const OURS: &str = include_str!("../gains/pid.toml");
+
+/// The gains of the thesis.
+const THESIS: &str = include_str!("../gains/pid-thesis.toml");
 
 /// The gains of one loop, from an error to an acceleration (linear: m/s², angular: rad/s²).
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
@@ -40,9 +54,23 @@ pub struct LoopGains {
 }
 
 impl LoopGains {
-    /// Proportional (1/s²), integral (1/s³) and derivative (1/s) gain, in the thesis's order.
-    const fn pid(proportional_1_s2: f64, integral_1_s3: f64, derivative_1_s: f64) -> Self {
-        Self { proportional_1_s2, integral_1_s3, derivative_1_s }
+    /// `proportional`, `integral` and `derivative` of a gains file's table.
+    pub(crate) fn read(section: &Section<'_, '_>) -> Result<Self, VehicleError> {
+        Ok(Self {
+            proportional_1_s2: gain(section, "proportional", PER_SECOND_2)?,
+            integral_1_s3: gain(section, "integral", PER_SECOND_3)?,
+            derivative_1_s: gain(section, "derivative", PER_SECOND)?,
+        })
+    }
+
+    /// The acceleration that the loop asks for.
+    pub(crate) fn demand(&self, error: f64, integral: f64, rate: f64) -> f64 {
+        self.proportional_1_s2 * error + integral - self.derivative_1_s * rate
+    }
+
+    /// The integrator's acceleration `period_s` on, kept within ±`max`.
+    pub(crate) fn integrate(&self, before: f64, error: f64, period_s: f64, max: f64) -> f64 {
+        (before + self.integral_1_s3 * error * period_s).clamp(-max, max)
     }
 }
 
@@ -58,31 +86,19 @@ pub struct PidGains {
     pub pitch: LoopGains,
     /// Yaw error (rad) and body rate r (rad/s) to angular acceleration about body z (rad/s²).
     pub yaw: LoopGains,
-    /// The altitude's integrator rests while the vehicle climbs or sinks faster than this, m/s. Default
-    /// 0.1 (tuned, no source). Without it a step of 0.5 m leaves the integrator a surplus that takes
-    /// Kp/Ki to decay; a limit on the error instead would lock it out when the weight is far off.
+    /// The altitude's integrator rests while the vehicle climbs or sinks faster than this, m/s.
     pub altitude_integral_climb_max_m_s: f64,
-    /// The most that the altitude's integrator may ask for, m/s². Default 2 (tuned, no source): a fifth
-    /// of gravity, for a mass or battery that much off.
+    /// The most that the altitude's integrator may ask for, m/s².
     pub altitude_integral_max_m_s2: f64,
-    /// The most that an angle's integrator may ask for, rad/s². Default 2 (tuned, no source).
+    /// The most that an angle's integrator may ask for, rad/s².
     pub attitude_integral_max_rad_s2: f64,
-    /// Roll and pitch commands are cut to this, rad. Default 30° (thesis §5.3, the sticks' range).
+    /// Roll and pitch commands are cut to this, rad.
     pub tilt_command_max_rad: f64,
 }
 
 impl Default for PidGains {
     fn default() -> Self {
-        Self {
-            altitude: LoopGains::pid(12.0, 3.0, 6.0),
-            roll: LoopGains::pid(16.0, 0.0, 6.0),
-            pitch: LoopGains::pid(16.0, 0.0, 6.0),
-            yaw: LoopGains::pid(2.25, 0.0, 3.0),
-            altitude_integral_climb_max_m_s: 0.1,
-            altitude_integral_max_m_s2: 2.0,
-            attitude_integral_max_rad_s2: 2.0,
-            tilt_command_max_rad: 30.0_f64.to_radians(),
-        }
+        parse(OURS, "gains/pid.toml", Self::read).expect("a test reads the built-in gains")
     }
 }
 
@@ -90,12 +106,130 @@ impl PidGains {
     /// The thesis's own numbers (Table 5.1), with our yaw loop and limits, which it does not give.
     #[must_use]
     pub fn thesis() -> Self {
-        Self {
-            altitude: LoopGains::pid(16.0, 1.0, 10.0),
-            roll: LoopGains::pid(25.0, 0.0, 6.0),
-            pitch: LoopGains::pid(25.0, 0.0, 6.0),
-            ..Self::default()
+        parse(THESIS, "gains/pid-thesis.toml", Self::read).expect("a test reads the built-in gains")
+    }
+
+    /// The gains in the file at `path`.
+    ///
+    /// # Errors
+    /// The file cannot be read, or holds what no gains can be.
+    pub fn load(path: &Path) -> Result<Self, VehicleError> {
+        crate::gains_file::load(path, Self::read)
+    }
+
+    fn read(root: &Section<'_, '_>) -> Result<Self, VehicleError> {
+        let altitude = AltitudeGains::read(&root.section("altitude")?)?;
+        let axis = |name| {
+            let section = root.section(name)?;
+            let gains = LoopGains::read(&section)?;
+            section.finish().map(|()| gains)
+        };
+        let (roll, pitch, yaw) = (axis("roll")?, axis("pitch")?, axis("yaw")?);
+        let attitude = root.section("attitude")?;
+        let gains = Self {
+            altitude: altitude.loop_gains,
+            roll,
+            pitch,
+            yaw,
+            altitude_integral_climb_max_m_s: altitude.integral_climb_max_m_s,
+            altitude_integral_max_m_s2: altitude.integral_max_m_s2,
+            attitude_integral_max_rad_s2: gain(&attitude, "integral_max", ANGULAR_ACCELERATION)?,
+            tilt_command_max_rad: tilt(&attitude, "command_max")?,
+        };
+        attitude.finish()?;
+        Ok(gains)
+    }
+
+    /// What the altitude loop needs of these.
+    #[must_use]
+    pub fn altitude_gains(&self) -> AltitudeGains {
+        AltitudeGains {
+            loop_gains: self.altitude,
+            integral_climb_max_m_s: self.altitude_integral_climb_max_m_s,
+            integral_max_m_s2: self.altitude_integral_max_m_s2,
         }
+    }
+
+    /// Refuses what a gains file could not say either.
+    fn check(&self) -> Result<(), String> {
+        let loops =
+            [("altitude", self.altitude), ("roll", self.roll), ("pitch", self.pitch), ("yaw", self.yaw)];
+        for (name, of) in loops {
+            not_negative(name, "proportional_1_s2", of.proportional_1_s2)?;
+            not_negative(name, "integral_1_s3", of.integral_1_s3)?;
+            not_negative(name, "derivative_1_s", of.derivative_1_s)?;
+        }
+        not_negative("", "altitude_integral_climb_max_m_s", self.altitude_integral_climb_max_m_s)?;
+        not_negative("", "altitude_integral_max_m_s2", self.altitude_integral_max_m_s2)?;
+        not_negative("", "attitude_integral_max_rad_s2", self.attitude_integral_max_rad_s2)?;
+        let tilt_rad = self.tilt_command_max_rad;
+        if tilt_rad > 0.0 && tilt_rad < std::f64::consts::FRAC_PI_3 {
+            return Ok(());
+        }
+        Err(format!(
+            "`gains`: `tilt_command_max_rad` must be above 0 and below 1.0472 (60 deg), found {tilt_rad}"
+        ))
+    }
+}
+
+fn not_negative(table: &str, key: &str, value: f64) -> Result<(), String> {
+    if value.is_finite() && value >= 0.0 {
+        return Ok(());
+    }
+    let dot = if table.is_empty() { "" } else { "." };
+    Err(format!("`gains`: `{table}{dot}{key}` must be a finite number of 0 or above, found {value}"))
+}
+
+/// The gains as a manifest gives them: a table of parameters, or a gains file.
+#[derive(Debug, Clone)]
+pub enum GivenGains {
+    /// `parameters.gains = { … }`.
+    Table(PidGains),
+    /// `gains = "PATH"`.
+    File(PathBuf),
+}
+
+impl GivenGains {
+    /// The gains, checked.
+    ///
+    /// # Errors
+    /// The file or a number is refused; the text names the key.
+    pub fn gains(&self) -> Result<PidGains, String> {
+        match self {
+            GivenGains::Table(gains) => gains.check().map(|()| *gains),
+            GivenGains::File(path) => PidGains::load(path).map_err(|error| error.to_string()),
+        }
+    }
+}
+
+impl Default for GivenGains {
+    fn default() -> Self {
+        GivenGains::Table(PidGains::default())
+    }
+}
+
+/// Not `#[serde(untagged)]`, whose errors do not name the key at fault.
+impl<'de> Deserialize<'de> for GivenGains {
+    fn deserialize<D: serde::Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        deserializer.deserialize_any(TableOrFile)
+    }
+}
+
+struct TableOrFile;
+
+impl<'de> Visitor<'de> for TableOrFile {
+    type Value = GivenGains;
+
+    fn expecting(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str("a table of gains or the path of a gains file")
+    }
+
+    fn visit_str<E>(self, path: &str) -> Result<GivenGains, E> {
+        Ok(GivenGains::File(path.into()))
+    }
+
+    fn visit_map<A: MapAccess<'de>>(self, map: A) -> Result<GivenGains, A::Error> {
+        PidGains::deserialize(MapAccessDeserializer::new(map)).map(GivenGains::Table)
     }
 }
 
@@ -104,10 +238,59 @@ mod tests {
     use super::*;
 
     #[test]
+    fn the_built_in_files_hold_the_numbers_that_the_head_of_this_room_compares() {
+        let pid = |p, i, d| LoopGains { proportional_1_s2: p, integral_1_s3: i, derivative_1_s: d };
+        let (ours, thesis) = (PidGains::default(), PidGains::thesis());
+        assert_eq!(
+            (ours.altitude, ours.roll, ours.pitch),
+            (pid(12.0, 3.0, 6.0), pid(16.0, 0.0, 6.0), ours.roll)
+        );
+        assert_eq!((thesis.altitude, thesis.roll), (pid(16.0, 1.0, 10.0), pid(25.0, 0.0, 6.0)));
+        let same = PidGains { altitude: ours.altitude, roll: ours.roll, pitch: ours.pitch, ..thesis };
+        assert_eq!(same, ours, "what the thesis does not give");
+        assert_eq!(ours.tilt_command_max_rad, 30.0_f64.to_radians());
+    }
+
+    #[test]
+    fn negative_gains_and_impossible_limits_are_refused_with_their_key() {
+        let refused = |from: &str, to: &str| {
+            assert_eq!(OURS.matches(from).count(), 1, "{from}");
+            parse(&OURS.replace(from, to), "my.toml", PidGains::read).unwrap_err().to_string()
+        };
+        let error = refused("value = 12", "value = -12");
+        assert!(error.contains("my.toml:") && error.contains("altitude.proportional"), "{error}");
+        let error = refused("value = 30", "value = 80");
+        assert!(error.contains("attitude.command_max") && error.contains("below 60"), "{error}");
+        let error = refused("unit = \"deg\"", "unit = \"m\"");
+        assert!(error.contains("\"rad\", \"deg\""), "{error}");
+        let table = |text| GivenGains::Table(toml::from_str(text).unwrap()).gains().unwrap_err();
+        let error = table("yaw = { proportional_1_s2 = 1, integral_1_s3 = -1, derivative_1_s = 1 }");
+        assert!(error.contains("`yaw.integral_1_s3`") && error.contains("found -1"), "{error}");
+        assert!(table("tilt_command_max_rad = 2").contains("`tilt_command_max_rad` must be"));
+    }
+
+    #[test]
+    fn a_table_or_a_path_is_taken_and_nothing_else() {
+        let given = |json| serde_json::from_str::<GivenGains>(json);
+        assert!(matches!(given("\"a/b.toml\"").unwrap(), GivenGains::File(path) if path.ends_with("b.toml")));
+        assert!(matches!(given("{}").unwrap(), GivenGains::Table(gains) if gains == PidGains::default()));
+        assert!(given("3").unwrap_err().to_string().contains("a table of gains or the path"));
+        assert!(given("{\"rol\": 1}").unwrap_err().to_string().contains("unknown field `rol`"));
+        let error = GivenGains::File("no-such.toml".into()).gains().unwrap_err();
+        assert!(error.contains("no-such.toml") && error.contains("cannot read"), "{error}");
+    }
+
+    #[test]
     fn a_loop_that_is_left_out_keeps_its_default() {
         let text = "[roll]\nproportional_1_s2 = 20\nintegral_1_s3 = 0\nderivative_1_s = 7";
         let gains: PidGains = toml::from_str(text).unwrap();
-        assert_eq!(gains, PidGains { roll: LoopGains::pid(20.0, 0.0, 7.0), ..PidGains::default() });
+        assert_eq!(
+            gains,
+            PidGains {
+                roll: LoopGains { proportional_1_s2: 20.0, integral_1_s3: 0.0, derivative_1_s: 7.0 },
+                ..PidGains::default()
+            }
+        );
     }
 
     #[test]

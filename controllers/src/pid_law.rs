@@ -7,15 +7,13 @@
 )]
 
 use crate::allocation::{Allocation, THRUST_RESERVE, Wrench};
+use crate::altitude_loop::AltitudeLoop;
 use crate::angle::wrap_rad;
+use crate::controller::{ControllerState, within};
 use crate::pid_gains::{LoopGains, PidGains};
 use crate::set_points::SetPoint;
 use nalgebra::Vector3;
 use vehicles::Vehicle;
-
-/// The least cosine of the tilt that is compensated: beyond 60° more thrust would push sideways rather
-/// than up. Tuned, no source.
-const TILT_COSINE_MIN: f64 = 0.5;
 
 /// What the law is told of the vehicle's motion.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -101,55 +99,43 @@ pub struct PidState {
 impl PidLaw {
     /// The wrench to demand now; advances the integrators by one period.
     pub fn step(&self, state: &mut PidState, set_point: &SetPoint, measured: &Measurement) -> Wrench {
+        let altitude_loop = self.altitude_loop();
         Wrench {
-            thrust_N: self.thrust_N(state, set_point.altitude_m, measured),
+            thrust_N: altitude_loop.thrust_N(&mut state.altitude_m_s2, set_point.altitude_m, measured),
             torque_B_N_m: self.torque_B_N_m(state, set_point, measured),
         }
     }
 
-    /// The memory with which the law asks for `wrench` at this measurement, as far as the limits of its
-    /// integrators allow: a successor that knows only its predecessor's last command goes on from that.
+    /// The memory that goes on from another law's: its integrators.
     #[must_use]
-    pub fn tracking(&self, wrench: &Wrench, set_point: &SetPoint, measured: &Measurement) -> PidState {
-        let forgetful = Self { period_s: 0.0, ..*self };
-        let asked = forgetful.step(&mut PidState::default(), set_point, measured);
-        let missing_N = (wrench.thrust_N - asked.thrust_N) * tilt_cosine(measured);
-        let missing_B_rad_s2 =
-            (wrench.torque_B_N_m - asked.torque_B_N_m).component_div(&self.vehicle.inertia_B_kg_m2);
-        let within = |value: f64, max: f64| value.clamp(-max, max);
-        let attitude = |value: f64| within(value, self.gains.attitude_integral_max_rad_s2);
+    pub fn taken_over(
+        &self,
+        memory: &ControllerState,
+        wrench: &Wrench,
+        altitude_set_m: f64,
+        measured: &Measurement,
+    ) -> PidState {
+        // An integrator without gain would keep for ever what it was given.
+        let attitude = |gains: &LoopGains, handed_rad_s2: f64| {
+            let has_gain = gains.integral_1_s3 > 0.0;
+            if has_gain { within(handed_rad_s2, self.gains.attitude_integral_max_rad_s2) } else { 0.0 }
+        };
+        let before = &memory.integrals;
         PidState {
-            altitude_m_s2: within(missing_N / self.vehicle.mass_kg, self.gains.altitude_integral_max_m_s2),
-            roll_rad_s2: attitude(missing_B_rad_s2.x),
-            pitch_rad_s2: attitude(missing_B_rad_s2.y),
-            yaw_rad_s2: attitude(missing_B_rad_s2.z),
+            altitude_m_s2: self.altitude_loop().taken_over_m_s2(
+                memory,
+                wrench.thrust_N,
+                altitude_set_m,
+                measured,
+            ),
+            roll_rad_s2: attitude(&self.gains.roll, before.roll_rad_s2),
+            pitch_rad_s2: attitude(&self.gains.pitch, before.pitch_rad_s2),
+            yaw_rad_s2: attitude(&self.gains.yaw, before.yaw_rad_s2),
         }
     }
 
-    /// Thrust = m·(g + a) / (cos φ·cos θ): eq. 3.19 with its denominator corrected, where a is the
-    /// acceleration that the altitude loop asks for.
-    fn thrust_N(&self, state: &mut PidState, altitude_set_m: f64, measured: &Measurement) -> f64 {
-        let error_m = altitude_set_m - measured.altitude_m;
-        let gains = &self.gains.altitude;
-        let integral_m_s2 =
-            self.altitude_integral_m_s2(state.altitude_m_s2, error_m, measured.climb_rate_m_s);
-        let acceleration_m_s2 = demand(gains, error_m, integral_m_s2, measured.climb_rate_m_s);
-        let wanted_N =
-            self.vehicle.mass_kg * (self.vehicle.gravity_m_s2 + acceleration_m_s2) / tilt_cosine(measured);
-        let thrust_N = wanted_N.clamp(self.vehicle.thrust_min_N, self.vehicle.thrust_max_N);
-        // Against wind-up: at a limit the integrator may only come back from it.
-        if (wanted_N - thrust_N) * error_m <= 0.0 {
-            state.altitude_m_s2 = integral_m_s2;
-        }
-        thrust_N
-    }
-
-    fn altitude_integral_m_s2(&self, before_m_s2: f64, error_m: f64, climb_rate_m_s: f64) -> f64 {
-        if climb_rate_m_s.abs() > self.gains.altitude_integral_climb_max_m_s {
-            return before_m_s2;
-        }
-        let max_m_s2 = self.gains.altitude_integral_max_m_s2;
-        integrate(before_m_s2, &self.gains.altitude, error_m, self.period_s, max_m_s2)
+    fn altitude_loop(&self) -> AltitudeLoop<'_> {
+        AltitudeLoop { gains: self.gains.altitude_gains(), vehicle: &self.vehicle, period_s: self.period_s }
     }
 
     /// Torque = inertia · (Kp·error + integral − Kd·body rate), axis by axis. The cross product of rate
@@ -183,24 +169,9 @@ impl PidLaw {
         rate_rad_s: f64,
     ) -> f64 {
         let max_rad_s2 = self.gains.attitude_integral_max_rad_s2;
-        *integral_rad_s2 = integrate(*integral_rad_s2, gains, error_rad, self.period_s, max_rad_s2);
-        demand(gains, error_rad, *integral_rad_s2, rate_rad_s)
+        *integral_rad_s2 = gains.integrate(*integral_rad_s2, error_rad, self.period_s, max_rad_s2);
+        gains.demand(error_rad, *integral_rad_s2, rate_rad_s)
     }
-}
-
-/// The acceleration that a loop asks for.
-fn demand(gains: &LoopGains, error: f64, integral: f64, rate: f64) -> f64 {
-    gains.proportional_1_s2 * error + integral - gains.derivative_1_s * rate
-}
-
-/// The integrator's acceleration one period on, kept within ±`max`.
-fn integrate(before: f64, gains: &LoopGains, error: f64, period_s: f64, max: f64) -> f64 {
-    (before + gains.integral_1_s3 * error * period_s).clamp(-max, max)
-}
-
-/// The cosine of the angle between body z and world z, not below [`TILT_COSINE_MIN`].
-fn tilt_cosine(measured: &Measurement) -> f64 {
-    (measured.roll_rad.cos() * measured.pitch_rad.cos()).max(TILT_COSINE_MIN)
 }
 
 #[cfg(test)]
@@ -245,14 +216,22 @@ mod tests {
     }
 
     #[test]
-    fn a_law_that_tracks_a_wrench_asks_for_it() {
+    fn a_successor_goes_on_from_the_integrators_that_it_has_a_gain_for() {
         let wrench = Wrench { thrust_N: 5.2, torque_B_N_m: Vector3::new(1e-3, -2e-3, 1e-3) };
+        let integrals = PidState { altitude_m_s2: 9.0, roll_rad_s2: 0.1, pitch_rad_s2: 0.1, yaw_rad_s2: 0.1 };
+        let before = ControllerState { law: 2, integrals, ..ControllerState::default() };
+        let memory = law().taken_over(&before, &wrench, 1.0, &level());
+        assert_eq!(memory, PidState { altitude_m_s2: 2.0, ..PidState::default() });
+    }
+
+    #[test]
+    fn a_successor_that_knows_only_the_last_command_asks_for_its_thrust() {
+        let wrench = Wrench { thrust_N: 5.2, torque_B_N_m: Vector3::zeros() };
         let measured = Measurement { roll_rad: 0.05, altitude_m: 0.99, ..level() };
-        let memory = law().tracking(&wrench, &hold(), &measured);
+        let memory = law().taken_over(&ControllerState::default(), &wrench, 1.0, &measured);
         let still = PidLaw { period_s: 0.0, ..law() };
         let asked = still.step(&mut memory.clone(), &hold(), &measured);
         assert!((asked.thrust_N - wrench.thrust_N).abs() < 1e-12);
-        assert!((asked.torque_B_N_m - wrench.torque_B_N_m).norm() < 1e-15);
     }
 
     #[test]

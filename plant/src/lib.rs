@@ -4,10 +4,21 @@
 //! |---|---|
 //! | [`state`] | the rigid body and the rotors, as carried from tick to tick |
 //! | [`airframe`] | the forces that every backend moves the body by |
+//! | [`effects`] | the physics beyond the declared vehicle |
+//! | [`memory`] | what effects carry from tick to tick |
 //! | `motor` | the lag between commanded and actual rotor speed |
 //! | [`rotor`] | thrust and torques of the rotors on the body |
-//! | [`newton_euler`] | the free-flight backend: equations of motion and their integration |
-//! | [`node`] | the plant as a process of a run
+//! | `rotation` | turning vectors inside of an integration step |
+//! | [`newton_euler`] | equations of motion and their integration |
+//! | [`backend`] | what a plant can do, whichever physics moves it |
+//! | [`free_flight`] | the backend `newton-euler` |
+//! | [`rapier`] | the backend `rapier`: ground, walls, other vehicles, rigs |
+//! | [`snapshot`] | a backend's state as bytes |
+//! | [`node`] | the plant as a process of a run |
+//! | `parameters` | what manifests say of a plant, and the backend that follows |
+//! | `others` | which vehicles of the traffic are others |
+//! | `output` | what a plant publishes |
+//! | [`traffic`] | the node that tells all plants of a run where the others are |
 //!
 //! ```
 //! use nalgebra::Vector3;
@@ -24,13 +35,28 @@
 #![forbid(unsafe_code)]
 
 pub mod airframe;
+pub mod backend;
+pub mod effects;
+pub mod free_flight;
+pub mod memory;
 mod motor;
 pub mod newton_euler;
 pub mod node;
+mod others;
+mod output;
+mod parameters;
+pub mod rapier;
+mod rotation;
 pub mod rotor;
+pub mod snapshot;
 pub mod state;
+pub mod traffic;
 
 pub use airframe::{Airframe, Drive};
+pub use backend::{Backend, ContactReport, Neighbour};
+pub use free_flight::FreeFlight;
+pub use memory::AirframeMemory;
 pub use newton_euler::{Motion, NewtonEuler};
+pub use rapier::Rapier;
 pub use rotor::Wrench;
 pub use state::{RigidBody, RotorState, State};

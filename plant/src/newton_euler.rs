@@ -10,6 +10,7 @@ use nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};
 use vehicles::Vehicle;
 
 use crate::airframe::{Airframe, Drive};
+use crate::rotation::rotated;
 use crate::state::{Rates, RigidBody, RotorRates, RotorState, State};
 
 /// The model: immutable, while the [`State`] it moves belongs to the caller.
@@ -31,22 +32,34 @@ pub struct Motion {
 }
 
 impl NewtonEuler {
-    /// A model of `vehicle` that divides every tick into `substeps` Runge-Kutta steps (0 counts as 1).
+    /// A model of `vehicle` as it is declared, without the effects that its file lists; for the rest see
+    /// [`NewtonEuler::flying`].
     pub fn new(vehicle: Vehicle, substeps: u32) -> Self {
+        Self::flying(Airframe::new(vehicle), substeps)
+    }
+
+    /// A model of `airframe` that divides every tick into `substeps` Runge-Kutta steps (0 counts as 1).
+    pub fn flying(airframe: Airframe, substeps: u32) -> Self {
+        let vehicle = airframe.vehicle();
         // A vehicle's tensor is positive definite, so the inverse exists; zero would only freeze the rotation.
         let inverse_inertia = vehicle.inertia_kg_m2.try_inverse().unwrap_or_else(Matrix3::zeros);
         let gravity_W_m_s2 = Vector3::new(0.0, 0.0, -vehicle.gravity_m_s2);
-        NewtonEuler {
-            airframe: Airframe::new(vehicle),
-            inverse_inertia,
-            gravity_W_m_s2,
-            substeps: substeps.max(1),
-        }
+        NewtonEuler { airframe, inverse_inertia, gravity_W_m_s2, substeps: substeps.max(1) }
     }
 
-    /// The vehicle this model flies.
+    /// The airframe this model flies.
+    pub fn airframe(&self) -> &Airframe {
+        &self.airframe
+    }
+
+    /// The vehicle this model flies, changed by its effects.
     pub fn vehicle(&self) -> &Vehicle {
         self.airframe.vehicle()
+    }
+
+    /// How many integration steps a tick has.
+    pub(crate) fn substeps(&self) -> u32 {
+        self.substeps
     }
 
     /// A rotor that has settled at a raw motor command.
@@ -59,28 +72,42 @@ impl NewtonEuler {
         State { body, rotors: [self.steady(command); 4] }
     }
 
-    /// Moves `state` by one tick of `dt_s` under raw motor `commands` held over the tick.
+    /// Moves `state` by one tick of `dt_s` under raw motor `commands` held over the tick, as the declared vehicle
+    /// does.
+    ///
+    /// # Panics
+    /// If the airframe has effects: some of them have a memory, which [`NewtonEuler::advance`] gets by the drive.
     pub fn step(&self, state: &mut State, commands: &[f64; 4], dt_s: f64) {
-        let drive = self.airframe.begin_tick(commands);
-        let span_s = dt_s / f64::from(self.substeps);
-        for _ in 0..self.substeps {
-            *state = self.runge_kutta(state, &drive, span_s);
-        }
-        state.body.attitude_WB = UnitQuaternion::new_normalize(state.body.attitude_WB.into_inner());
-        state.rotors = self.airframe.settled(&drive, &state.rotors);
+        assert!(self.airframe.effects().is_empty(), "effects need begin_tick and advance");
+        self.advance(state, &self.airframe.asked(commands), dt_s);
     }
 
-    /// Specific force and angular acceleration at `state`.
+    /// Moves `state` by one tick of `dt_s` under the `drive` with which [`Airframe::begin_tick`] began it.
+    pub fn advance(&self, state: &mut State, drive: &Drive, dt_s: f64) {
+        let span_s = dt_s / f64::from(self.substeps);
+        for _ in 0..self.substeps {
+            *state = self.runge_kutta(state, drive, span_s);
+        }
+        state.body.attitude_WB = UnitQuaternion::new_normalize(state.body.attitude_WB.into_inner());
+        state.rotors = self.airframe.settled(drive, &state.rotors);
+    }
+
+    /// Specific force and angular acceleration at `state`, in still air.
     pub fn motion(&self, state: &State) -> Motion {
-        let wrench = self.airframe.wrench(state, &state.rotors.map(shown_rates));
+        self.motion_under(&Drive::default(), state)
+    }
+
+    /// Specific force and angular acceleration at `state`, with what acts over the tick that ends there.
+    pub fn motion_under(&self, drive: &Drive, state: &State) -> Motion {
+        let wrench = self.airframe.wrench(drive, state, &state.rotors.map(shown_rates));
         Motion {
             specific_force_B_m_s2: wrench.force_B_N / self.vehicle().mass_kg,
             angular_acceleration_B_rad_s2: self.angular_acceleration(state, &wrench.torque_B_N_m),
         }
     }
 
-    /// One classic Runge-Kutta step of fourth order over the full state.
-    fn runge_kutta(&self, state: &State, drive: &Drive, span_s: f64) -> State {
+    /// One classic Runge-Kutta step of fourth order over the full state, in free flight.
+    pub(crate) fn runge_kutta(&self, state: &State, drive: &Drive, span_s: f64) -> State {
         let k1 = self.rates(state, drive);
         let k2 = self.rates(&state.moved(&k1, span_s / 2.0), drive);
         let k3 = self.rates(&state.moved(&k2, span_s / 2.0), drive);
@@ -91,7 +118,7 @@ impl NewtonEuler {
 
     fn rates(&self, state: &State, drive: &Drive) -> Rates {
         let rotors = self.airframe.rotor_rates(drive, state);
-        let wrench = self.airframe.wrench(state, &rotors);
+        let wrench = self.airframe.wrench(drive, state, &rotors);
         let attitude_WB = state.body.attitude_WB.as_ref();
         let force_W_N = rotated(attitude_WB, &wrench.force_B_N);
         Rates {
@@ -118,12 +145,4 @@ fn shown_rates(rotor: RotorState) -> RotorRates {
 /// 1/2 q (0, w), with w in the body frame.
 fn quaternion_rate(attitude_WB: &Quaternion<f64>, w_B_rad_s: &Vector3<f64>) -> Quaternion<f64> {
     attitude_WB * Quaternion::from_imag(w_B_rad_s * 0.5)
-}
-
-/// A body vector in the world frame, right also for the quaternion of a stage, which is not quite of length 1:
-/// v + 2 u x (u x v + a v) / |q|^2 with q = (a, u).
-fn rotated(attitude_WB: &Quaternion<f64>, vector_B: &Vector3<f64>) -> Vector3<f64> {
-    let imaginary = attitude_WB.imag();
-    let inner = imaginary.cross(vector_B) + vector_B * attitude_WB.scalar();
-    vector_B + imaginary.cross(&inner) * (2.0 / attitude_WB.norm_squared())
 }

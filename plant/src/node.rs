@@ -3,108 +3,77 @@
 //! At tick k it moves the state from k − 1 to k under the command stamped k − 1, then publishes it. With a
 //! `measured` input it is set to the measured state at the start of each window, after publishing: what it
 //! publishes at that tick is the end of the window before.
-#![allow(non_snake_case, reason = "a trailing _W or _B names the frame a vector is written in")]
+#![allow(non_snake_case, reason = "a trailing _W names the frame a vector is written in")]
 
-use crate::newton_euler::NewtonEuler;
-use crate::state::{RigidBody, State};
-use bus::kind::{Inputs, NodeKind, PortSpec, read_parameters};
+use crate::others::Others;
+use crate::output::Outputs;
+use crate::parameters::{self, Parameters};
+use crate::state::RigidBody;
+use bus::kind::{Inputs, NodeKind, PortSpec};
 use bus::messages::{
-    BodyTransform, MeasuredState, MotorCommand, Orientation, PlantState, Point, Pose, PoseStamped, Quaternion,
+    Battery, BodyTransform, Contact, MeasuredState, MotorCommand, PlantState, PoseStamped, Traffic,
 };
-use bus::{BusError, Message, Node, Output, Tick};
+use bus::{BusError, Message, Node};
 use nalgebra::{UnitQuaternion, Vector3};
-use serde::Deserialize;
-use std::path::PathBuf;
-use vehicles::Vehicle;
 
 /// The plant, for manifests.
 pub const KIND: NodeKind = NodeKind {
     name: "plant",
-    summary: "flies the vehicle of a vehicle file (Newton-Euler, free flight)",
+    summary: "flies the vehicle of a vehicle file, freely or in a scene",
     inputs: Inputs::Ports(&[
         PortSpec::required("command", MotorCommand::SCHEMA),
         PortSpec::optional("measured", MeasuredState::SCHEMA),
+        PortSpec::optional("traffic", Traffic::SCHEMA),
     ]),
     outputs: &[
         PortSpec::required("state", PlantState::SCHEMA),
         PortSpec::optional("pose", PoseStamped::SCHEMA),
         PortSpec::optional("tf", BodyTransform::SCHEMA),
+        PortSpec::optional("contact", Contact::SCHEMA),
+        PortSpec::optional("battery", Battery::SCHEMA),
     ],
-    check,
+    check: parameters::check,
     run,
 };
-
-/// Parameters of the plant.
-#[derive(Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct Parameters {
-    /// Vehicle file.
-    vehicle: PathBuf,
-    /// Position of the centre of mass at tick 0, in the world.
-    #[serde(default)]
-    initial_position_m: [f64; 3],
-    /// Integration steps per tick.
-    #[serde(default = "one")]
-    substeps: u32,
-    /// With a `measured` input: time between two settings to the measured state.
-    window_s: Option<f64>,
-}
-
-fn one() -> u32 {
-    1
-}
-
-fn check(parameters: &serde_json::Value, inputs: &[&str]) -> Result<(), String> {
-    let parameters: Parameters = read_parameters(parameters)?;
-    if parameters.substeps == 0 {
-        return Err("`substeps` is 0, expected at least 1".to_owned());
-    }
-    if parameters.window_s.is_some_and(|window_s| !(window_s > 0.0 && window_s.is_finite())) {
-        return Err("`window_s` must be a positive number of seconds".to_owned());
-    }
-    match (inputs.contains(&"measured"), parameters.window_s) {
-        (true, None) => return Err("the input `measured` needs the parameter `window_s`".to_owned()),
-        (false, Some(_)) => return Err("the parameter `window_s` needs the input `measured`".to_owned()),
-        _ => {}
-    }
-    Vehicle::load(&parameters.vehicle).map(|_| ()).map_err(|error| error.to_string())
-}
 
 fn run() -> Result<(), BusError> {
     let mut node = Node::join()?;
     let parameters: Parameters = node.parameters()?;
-    let vehicle = Vehicle::load(&parameters.vehicle).map_err(|error| node.error(error))?;
+    let backend = parameters.backend(node.seed(), node.name(), node.tick_s());
+    let mut backend = backend.map_err(|error| node.error(error))?;
     let command = node.input::<MotorCommand>("command")?;
     let measured = node.optional_input::<MeasuredState>("measured");
-    let outputs = Outputs {
-        state: node.output("state")?,
-        pose: node.optional_output("pose")?,
-        tf: node.optional_output("tf")?,
-    };
+    let traffic = node.optional_input::<Traffic>("traffic");
+    let outputs = Outputs::declare(&mut node, parameters.backend)?;
     let window_ticks = window_ticks(&node, parameters.window_s)?;
     let dt_s = node.tick_s();
     if node.period_s() != dt_s {
         // It would apply a command before it was computed.
         return Err(node.error("a plant runs at every tick; leave `period_ticks` out"));
     }
-    let model = NewtonEuler::new(vehicle, parameters.substeps);
-    let body_at_start = RigidBody::level_at(Vector3::from(parameters.initial_position_m));
-    let mut state = model.start(body_at_start, 0.0);
+    let mut others = Others::new();
     node.run(|tick| {
-        let window = measured.filter(|_| tick.number().is_multiple_of(window_ticks));
+        let number = tick.number();
+        let window = measured.filter(|_| number.is_multiple_of(window_ticks));
         let commands = tick.get(command).command;
-        if tick.number() > 0 {
-            model.step(&mut state, &commands, dt_s);
+        if number > 0 {
+            let before_ns = tick.time_ns() / u64::from(number) * u64::from(number - 1);
+            let own_W_m = backend.state().body.position_W_m;
+            let seen =
+                traffic.map(|traffic| others.seen(tick.get(traffic), &own_W_m, before_ns)).transpose()?;
+            backend.step(&commands, dt_s, seen.unwrap_or_default());
         } else {
             // The input's initial value: the rotors turn steadily at it when the run starts.
-            state.rotors = commands.map(|command| model.steady(command));
-            state.body = window.map_or(state.body, |measured| body(tick.get(measured)));
+            backend.settle_rotors(&commands);
+            if let Some(measured) = window {
+                backend.set_body(&body(tick.get(measured)));
+            }
         }
-        outputs.publish(tick, &model, &state)?;
+        outputs.publish(tick, &*backend).map_err(|error| error.to_string())?;
         if let Some(measured) = window {
-            state.body = body(tick.get(measured));
+            backend.set_body(&body(tick.get(measured)));
         }
-        Ok::<_, BusError>(())
+        Ok::<_, String>(())
     })
 }
 
@@ -121,51 +90,6 @@ fn window_ticks(node: &Node, window_s: Option<f64>) -> Result<u32, BusError> {
     } else {
         Err(node.error(format!("`window_s` is {window_s}, which is not a whole number of ticks")))
     }
-}
-
-struct Outputs {
-    state: Output<PlantState>,
-    pose: Option<Output<PoseStamped>>,
-    tf: Option<Output<BodyTransform>>,
-}
-
-impl Outputs {
-    fn publish(&self, tick: &mut Tick<'_>, model: &NewtonEuler, state: &State) -> Result<(), BusError> {
-        tick.write(self.state, message(model, state))?;
-        let position = point(&state.body.position_W_m);
-        let orientation = orientation(&state.body.attitude_WB);
-        if let Some(pose) = self.pose {
-            let message = PoseStamped { pose: Pose { position, orientation }, ..Default::default() };
-            tick.write(pose, message)?;
-        }
-        if let Some(tf) = self.tf {
-            tick.write(tf, BodyTransform::new(position, orientation))?;
-        }
-        Ok(())
-    }
-}
-
-fn message(model: &NewtonEuler, state: &State) -> PlantState {
-    let vector = |v: Vector3<f64>| <[f64; 3]>::from(v).into();
-    let [x, y, z, w] = state.body.attitude_WB.coords.into();
-    PlantState {
-        position: vector(state.body.position_W_m),
-        velocity: vector(state.body.velocity_W_m_s),
-        attitude: Quaternion { x, y, z, w },
-        angular_velocity: vector(state.body.angular_velocity_B_rad_s),
-        specific_force: vector(model.motion(state).specific_force_B_m_s2),
-        rotor_speed: state.rotors.map(|rotor| rotor.speed_rad_s),
-        ..Default::default()
-    }
-}
-
-fn point(v: &Vector3<f64>) -> Point {
-    Point { x: v.x, y: v.y, z: v.z }
-}
-
-fn orientation(attitude_WB: &UnitQuaternion<f64>) -> Orientation {
-    let [x, y, z, w] = attitude_WB.coords.into();
-    Orientation { x, y, z, w }
 }
 
 fn body(measured: &MeasuredState) -> RigidBody {

@@ -9,17 +9,33 @@
 #![allow(non_snake_case, reason = "a trailing _B names the frame a vector is written in, N the newton")]
 
 use nalgebra::Vector3;
+use std::ops::AddAssign;
 use vehicles::Vehicle;
 
 use crate::state::{RotorRates, RotorState};
 
 /// A force and a torque about the centre of mass, both written in the body frame.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Wrench {
     /// Force.
     pub force_B_N: Vector3<f64>,
     /// Torque about the centre of mass.
     pub torque_B_N_m: Vector3<f64>,
+}
+
+impl Wrench {
+    /// A force that acts at `position_m`, seen from the centre of mass.
+    #[must_use]
+    pub fn at(position_m: &Vector3<f64>, force_B_N: Vector3<f64>) -> Self {
+        Self { force_B_N, torque_B_N_m: position_m.cross(&force_B_N) }
+    }
+}
+
+impl AddAssign for Wrench {
+    fn add_assign(&mut self, other: Self) {
+        self.force_B_N += other.force_B_N;
+        self.torque_B_N_m += other.torque_B_N_m;
+    }
 }
 
 /// Thrust c_T w |w| along z of the body, in N (thesis eq. 3.1). A rotor that runs backwards, as an underdamped
@@ -33,18 +49,18 @@ pub fn drag_torque_N_m(vehicle: &Vehicle, speed_rad_s: f64) -> f64 {
     vehicle.torque_coefficient * speed_rad_s * speed_rad_s.abs()
 }
 
-/// The wrench of all four rotors on a body that turns with `angular_velocity_B_rad_s`. Rotors are summed in the
+/// The wrench of all four rotors with these thrusts on a body that turns with `angular_velocity_B_rad_s`. Rotors are summed in the
 /// order of the motor commands; the order is part of the result, as float addition is not associative.
 pub(crate) fn wrench(
     vehicle: &Vehicle,
+    thrusts_N: &[f64; 4],
     rotors: &[RotorState; 4],
     rates: &[RotorRates; 4],
     angular_velocity_B_rad_s: &Vector3<f64>,
 ) -> Wrench {
     let (mut lift_N, mut torque_B_N_m) = (0.0, Vector3::zeros());
     let mut momentum_N_m_s = 0.0;
-    for ((place, rotor), rate) in vehicle.rotors.iter().zip(rotors).zip(rates) {
-        let thrust_N = thrust_N(vehicle, rotor.speed_rad_s);
+    for (((place, thrust_N), rotor), rate) in vehicle.rotors.iter().zip(thrusts_N).zip(rotors).zip(rates) {
         lift_N += thrust_N;
         // r x (0, 0, T): thrust on the left (+y) rolls positive, thrust in front pitches nose up (negative).
         torque_B_N_m.x += place.position_m.y * thrust_N;

@@ -2,9 +2,10 @@
 #![allow(non_snake_case, reason = "a trailing _W or _B names the frame a vector is written in")]
 
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
+use serde::{Deserialize, Serialize};
 
 /// Pose and motion of the body frame B (x forward, y left, z up) in the world frame W (z up).
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct RigidBody {
     /// The centre of mass, in W.
     pub position_W_m: Vector3<f64>,
@@ -17,7 +18,7 @@ pub struct RigidBody {
 }
 
 /// One rotor's speed relative to the body, positive in the rotor's own sense of rotation.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct RotorState {
     /// Rotation speed.
     pub speed_rad_s: f64,
@@ -26,7 +27,7 @@ pub struct RotorState {
 }
 
 /// Everything the physics carries from one tick to the next.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct State {
     /// The rigid body.
     pub body: RigidBody,

@@ -46,8 +46,39 @@ impl Recording {
     }
 }
 
-/// The unit of `field` in messages of `schema`, known before anything is recorded; `None` where the message
-/// has strings or sequences, whose fields are known only from data.
+impl Recording {
+    /// The unit of `field` on `topic`; `None` where it is a vector with the parts `x`, `y` and `z`.
+    ///
+    /// # Errors
+    /// If there is no such topic, or neither such a field nor such a vector.
+    pub fn unit_of(&self, topic: &str, field: &str) -> Result<Option<String>, RecordingError> {
+        self.topic(topic)?;
+        let Some(record) = self.messages().find(|record| record.as_ref().map_or(true, |r| r.topic == topic))
+        else {
+            return Ok(Some(String::new()));
+        };
+        let record = record?;
+        let leaves = self.decode(&record)?;
+        unit(&leaves, topic, field)
+    }
+}
+
+/// The unit of a field among `leaves`; `None` for a vector.
+fn unit(leaves: &[Leaf], topic: &str, field: &str) -> Result<Option<String>, RecordingError> {
+    let has = |name: String| leaves.iter().any(|leaf| leaf.path == name);
+    match value(leaves, field) {
+        Some((_, unit)) => Ok(Some(unit.to_owned())),
+        None if ["x", "y", "z"].iter().all(|axis| has(format!("{field}.{axis}")))
+            && !has(format!("{field}.w")) =>
+        {
+            Ok(None)
+        }
+        None => Err(unknown(topic, field, leaves)),
+    }
+}
+
+/// The unit of `field` in messages of `schema`, that of its parts for a vector, known before anything is recorded;
+/// `None` where the message has strings or sequences, whose fields are known only from data.
 ///
 /// # Errors
 /// If there is no such field; the error lists those there are.
@@ -62,9 +93,9 @@ pub fn unit_of(schema: &Schema, topic: &str, field: &str) -> Result<Option<Strin
         type_name: schema.type_name.to_owned(),
         reason,
     })?;
-    match value(&leaves, field) {
-        Some((_, unit)) => Ok(Some(unit.to_owned())),
-        None => Err(unknown(topic, field, &leaves)),
+    match unit(&leaves, topic, field)? {
+        Some(unit) => Ok(Some(unit)),
+        None => Ok(value(&leaves, &format!("{field}.x")).map(|(_, unit)| unit.to_owned())),
     }
 }
 
@@ -85,12 +116,22 @@ fn value<'a>(leaves: &'a [Leaf], field: &str) -> Option<(f64, &'a str)> {
         let path = format!("{quaternion}.{name}");
         leaves.iter().find(|leaf| leaf.path == path)?.value.as_f64()
     };
-    let (x, y, z, w) = (part("x")?, part("y")?, part("z")?, part("w")?);
+    let [roll, pitch, yaw] = roll_pitch_yaw([part("x")?, part("y")?, part("z")?, part("w")?]);
     let angle = match angle {
-        "roll" => (2.0 * (w * x + y * z)).atan2(1.0 - 2.0 * (x * x + y * y)),
-        "pitch" => (2.0 * (w * y - z * x)).clamp(-1.0, 1.0).asin(),
-        "yaw" => (2.0 * (w * z + x * y)).atan2(1.0 - 2.0 * (y * y + z * z)),
+        "roll" => roll,
+        "pitch" => pitch,
+        "yaw" => yaw,
         _ => return None,
     };
     Some((angle, "rad"))
+}
+
+/// The angles of a quaternion, stored x, y, z, w, in the sequence z-y-x, in radians; roll and yaw from -π to π.
+#[must_use]
+pub fn roll_pitch_yaw([x, y, z, w]: [f64; 4]) -> [f64; 3] {
+    [
+        (2.0 * (w * x + y * z)).atan2(1.0 - 2.0 * (x * x + y * y)),
+        (2.0 * (w * y - z * x)).clamp(-1.0, 1.0).asin(),
+        (2.0 * (w * z + x * y)).atan2(1.0 - 2.0 * (y * y + z * z)),
+    ]
 }

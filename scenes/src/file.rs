@@ -1,5 +1,6 @@
 //! Which keys a scene file has, and in which dimension.
 
+use crate::rig;
 use crate::scene::{Cuboid, Scene};
 use nalgebra::Vector3;
 use vehicles::VehicleError;
@@ -14,8 +15,10 @@ pub(crate) fn parse(text: &str, file_name: &str) -> Result<Scene, VehicleError> 
     let name = root.text("name")?.to_owned();
     let sections = if root.has("boxes") { root.sections("boxes")? } else { Vec::new() };
     let boxes = sections.iter().map(one_box).collect::<Result<_, _>>()?;
+    let rig = if root.has("rig") { Some(rig::parse(&root.section("rig")?)?) } else { None };
+    let effects = vehicles::effects::read(&root)?;
     root.finish()?;
-    Ok(Scene { name, boxes })
+    Ok(Scene { name, boxes, rig, effects })
 }
 
 fn one_box(section: &Section) -> Result<Cuboid, VehicleError> {

@@ -6,6 +6,7 @@
 //! |---|---|
 //! | [`scene`] | the immutable [`Scene`] that plants and range finders use |
 //! | [`ray`] | the distance from a point along a direction to what is met first |
+//! | [`rig`] | the test rigs that a vehicle hangs from |
 //! | `file` | which keys a scene file has |
 //!
 //! ```
@@ -17,7 +18,9 @@
 
 mod file;
 pub mod ray;
+pub mod rig;
 pub mod scene;
 
 pub use ray::RayCaster;
+pub use rig::Rig;
 pub use scene::{Cuboid, Scene};

@@ -4,7 +4,7 @@
 use crate::scene::{Cuboid, Scene};
 use nalgebra::Vector3;
 use parry3d_f64::math::{Pose, Vector};
-use parry3d_f64::query::{Ray, RayCast};
+use parry3d_f64::query::{PointQuery, Ray, RayCast};
 use parry3d_f64::shape::Cuboid as Shape;
 
 /// A scene prepared for ray casts. A cast allocates nothing.
@@ -35,6 +35,14 @@ impl RayCaster {
         let ground_m = ground_m(from_W_m, along_W).filter(|distance_m| *distance_m <= max_m);
         let boxes = self.boxes.iter().filter_map(|(shape, pose)| shape.cast_ray(pose, &ray, max_m, true));
         boxes.chain(ground_m).reduce(f64::min)
+    }
+
+    /// How far `point_W_m` is from the nearest box, the ground left out; 0 within a box, infinite without boxes.
+    #[must_use]
+    pub fn clearance_m(&self, point_W_m: &Vector3<f64>) -> f64 {
+        let point = Vector::new(point_W_m.x, point_W_m.y, point_W_m.z);
+        let distances = self.boxes.iter().map(|(shape, pose)| shape.distance_to_point(pose, point, true));
+        distances.fold(f64::INFINITY, f64::min)
     }
 }
 
@@ -71,6 +79,15 @@ mod tests {
         for (found, expected) in found.into_iter().zip([4.0, 6.0, 3.0, 7.0, 1.5]) {
             assert!((found - expected).abs() < 1e-12, "{found} {expected}");
         }
+    }
+
+    #[test]
+    fn the_clearance_is_that_of_the_nearest_box_and_of_no_ground() {
+        let room = room();
+        assert!((room.clearance_m(&Vector3::new(1.0, -2.0, 0.1)) - 3.0).abs() < 1e-12);
+        // Above the walls, 3 m high, the nearest point is on the upper edge.
+        assert!((room.clearance_m(&Vector3::new(4.0, 0.0, 3.75)) - 1.25).abs() < 1e-12);
+        assert_eq!(room.clearance_m(&Vector3::new(5.05, 0.0, 1.0)), 0.0);
     }
 
     #[test]

@@ -1,17 +1,22 @@
 //! The scene as physics and sensors see it: SI numbers only, immutable once read.
 #![allow(non_snake_case, reason = "a trailing _W names the frame a vector is written in")]
 
+use crate::rig::Rig;
 use nalgebra::Vector3;
 use std::path::Path;
-use vehicles::VehicleError;
+use vehicles::{EffectEntry, VehicleError};
 
 /// What stands around the vehicles, beside the ground at z = 0.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Default)]
 pub struct Scene {
     /// What the scene is called.
     pub name: String,
     /// The boxes, in the file's order.
     pub boxes: Vec<Cuboid>,
+    /// Effects on every vehicle in the scene, such as wind; they act after those of its own file.
+    pub effects: Vec<EffectEntry>,
+    /// What the vehicle hangs from, if anything.
+    pub rig: Option<Rig>,
 }
 
 /// A solid box that stands still.

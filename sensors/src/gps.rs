@@ -199,8 +199,8 @@ mod tests {
         let position_bias_m = [1.0, -1.0, 0.5];
         let params = GpsParams { position_drift_m: [0.0; 3], position_bias_m, ..undelayed() };
         let samples = samples(&params, 5, 10_000);
-        for axis in 0..3 {
-            let truth_m = vector(truth().position)[axis] + position_bias_m[axis];
+        for (axis, bias_m) in position_bias_m.into_iter().enumerate() {
+            let truth_m = vector(truth().position)[axis] + bias_m;
             let positions = samples.iter().map(|sample| vector(sample.position)[axis]);
             require_normal(positions, truth_m, params.position_noise_m[axis]);
             let velocities = samples.iter().map(|sample| vector(sample.velocity)[axis]);

@@ -6,6 +6,8 @@
 //! - [`imu_model`]: accelerometer and gyroscope.
 //! - [`complementary`]: attitude from an IMU's readings.
 //! - [`imu`], [`attitude`]: the same as processes of a run.
+//! - [`clearance`]: true distances to the scene, for judging.
+//! - [`mocap`]: motion capture.
 //! - [`gps`], [`mocap`]: position from satellites, position and attitude from cameras.
 //! - [`barometer`], [`atmosphere`]: air pressure, and how it falls with height.
 //! - [`magnetometer`], [`earth_field`]: the earth's magnetic field, at the vehicle and in the world.
@@ -25,6 +27,7 @@ pub mod attitude;
 pub mod barometer;
 pub mod battery;
 mod channel;
+pub mod clearance;
 pub mod complementary;
 pub mod cone;
 pub mod earth_field;

@@ -51,7 +51,7 @@ fn run() -> Result<(), BusError> {
             ranges: tick.get(ranges),
         };
         filter.step(state, &inputs);
-        tick.write(walls, wall_estimate(&filter, state, attitude.yaw))?;
+        tick.write(walls, wall_estimate(&filter, state, attitude.yaw, tick.time_ns()))?;
         tick.write(estimate, state_estimate(&filter, state, &attitude))
     })
 }
@@ -63,8 +63,13 @@ fn reading(imu: &Imu) -> ImuReading {
     }
 }
 
-fn wall_estimate(filter: &RangeInertial, state: &RangeInertialState, yaw_rad: f64) -> WallEstimate {
-    let walls = filter.walls(state, yaw_rad);
+fn wall_estimate(
+    filter: &RangeInertial,
+    state: &RangeInertialState,
+    yaw_rad: f64,
+    now_ns: u64,
+) -> WallEstimate {
+    let walls = filter.walls(state, yaw_rad, now_ns);
     WallEstimate {
         distance: walls.map(|wall| wall.distance_m),
         in_sight: walls.map(|wall| u32::from(wall.is_in_sight)),

@@ -61,26 +61,46 @@ fn check_field(manifest: &Manifest, plan: &Plan, pass: &Spanned<PassCondition>) 
     if condition.min.is_none() && condition.max.is_none() {
         return Err(at("it has no limit, so it cannot fail".into(), "add `min`, `max`, or both"));
     }
-    let type_name =
-        plan.topics.iter().find(|topic| topic.name == condition.topic).map(|topic| &topic.type_name);
-    // A user's own type is known only to its publisher: it is checked when the run is judged.
-    let Some(schema) = bus::messages::all()
-        .into_iter()
-        .find(|schema| Some(schema.type_name) == type_name.map(String::as_str))
-    else {
-        return Ok(());
+    let unit = |topic: &str, field: &str| {
+        unit_of(plan, topic, field).map_err(|error| at(error, "name one of these fields"))
     };
-    let unit = recorder::series::unit_of(schema, &condition.topic, &condition.field)
-        .map_err(|error| at(error.to_string(), "name one of these fields"))?;
-    match unit.map(|unit| judge::conversion(&unit, &condition.unit)) {
-        Some(Err(reason)) => Err(at(reason, "state the limits in a unit of the field's quantity")),
-        _ => Ok(()),
+    let Some(own) = unit(&condition.topic, &condition.field)? else { return Ok(()) };
+    judge::conversion(&own, &condition.unit)
+        .map_err(|reason| at(reason, "state the limits in a unit of the field's quantity"))?;
+    if let Some(minus) = &condition.minus
+        && let Some(other) = unit(&minus.topic, &minus.field)?
+        && other != own
+    {
+        return Err(at(format!("`minus` takes `{other}` off `{own}`"), "compare fields of one unit"));
     }
+    if let Some(gate) = &condition.gate {
+        unit(&gate.topic, &gate.field)?;
+        if gate.min.is_none() && gate.max.is_none() {
+            return Err(at("`while` has no limit".into(), "add `min`, `max`, or both to it"));
+        }
+    }
+    Ok(())
+}
+
+/// The unit of a field; `None` for a user's own type, which only its publisher knows: it is checked when the run is
+/// judged.
+fn unit_of(plan: &Plan, topic: &str, field: &str) -> Result<Option<String>, String> {
+    let type_name = plan.topics.iter().find(|known| known.name == topic).map(|topic| &topic.type_name);
+    let known = bus::messages::all();
+    let schema = known.into_iter().find(|schema| Some(schema.type_name) == type_name.map(String::as_str));
+    let Some(schema) = schema else { return Ok(None) };
+    recorder::series::unit_of(schema, topic, field).map_err(|error| error.to_string())
+}
+
+/// The topics that a condition reads.
+fn judged_topics(pass: &PassCondition) -> Vec<&String> {
+    let others = [pass.minus.as_ref().map(|minus| &minus.topic), pass.gate.as_ref().map(|gate| &gate.topic)];
+    std::iter::once(&pass.topic).chain(others.into_iter().flatten()).collect()
 }
 
 fn check_recorded(manifest: &Manifest, plan: &Plan, programs: &[Program]) -> Result<(), Problem> {
     let content = &manifest.content;
-    let passes = content.pass.iter().map(|pass| (pass.span(), vec![&pass.get_ref().topic]));
+    let passes = content.pass.iter().map(|pass| (pass.span(), judged_topics(pass.get_ref())));
     let compares = content
         .compare
         .iter()

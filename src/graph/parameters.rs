@@ -8,9 +8,10 @@ use bus::plan::NodePlan;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 use toml::Spanned;
+use vehicles::Vehicle;
 
 /// Gives `node` the parameters of `member`, files resolved, checked where its kind is built in; notes its
-/// vehicle and scene file in `models`.
+/// vehicle file, what that is based on, its scene and its gains file in `models`.
 ///
 /// # Errors
 /// A file or a parameter that is refused.
@@ -27,8 +28,10 @@ pub fn set(
         if let Some(file) = file {
             let path = manifest.resolve(file)?;
             parameters.insert(key, path.to_string_lossy().into());
-            if key != "data" && !models.contains(&path) {
-                models.push(path);
+            match key {
+                "data" => {}
+                "vehicle" => note([Some(path.clone()), Vehicle::base(&path)], models),
+                _ => note([Some(path), None], models),
             }
         }
     }
@@ -43,9 +46,23 @@ pub fn set(
     Ok(())
 }
 
+/// Notes files to be recorded, each once.
+fn note(paths: [Option<PathBuf>; 2], models: &mut Vec<PathBuf>) {
+    for path in paths.into_iter().flatten() {
+        if !models.contains(&path) {
+            models.push(path);
+        }
+    }
+}
+
 /// The keys of a process that name a file which becomes a parameter.
-fn files(process: &Process) -> [(&'static str, &Option<Spanned<String>>); 3] {
-    [("vehicle", &process.vehicle), ("scene", &process.scene), ("data", &process.data)]
+fn files(process: &Process) -> [(&'static str, &Option<Spanned<String>>); 4] {
+    [
+        ("vehicle", &process.vehicle),
+        ("scene", &process.scene),
+        ("gains", &process.gains),
+        ("data", &process.data),
+    ]
 }
 
 /// A recorder's file and attachments come from the launcher.
@@ -78,7 +95,7 @@ fn refused(manifest: &Manifest, name: &Spanned<String>, process: &Process, reaso
         .or(named_file)
         .unwrap_or_else(|| name.span());
     let help = match reason.split('`').nth(1).filter(|_| reason.starts_with("missing field")) {
-        Some(file @ ("vehicle" | "scene" | "data")) => {
+        Some(file @ ("vehicle" | "scene" | "gains" | "data")) => {
             format!("add {file} = \"PATH\" to [process.{}]", name.get_ref())
         }
         Some(key) => format!("add {key} = … to [process.{}.parameters]", name.get_ref()),

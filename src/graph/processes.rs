@@ -63,6 +63,7 @@ fn require_no_node(manifest: &Manifest, name: &Spanned<String>, process: &Proces
         ("kind", process.kind.as_ref().map(Spanned::span)),
         ("vehicle", process.vehicle.as_ref().map(Spanned::span)),
         ("scene", process.scene.as_ref().map(Spanned::span)),
+        ("gains", process.gains.as_ref().map(Spanned::span)),
         ("data", process.data.as_ref().map(Spanned::span)),
         ("period_ticks", process.period_ticks.as_ref().map(Spanned::span)),
         ("cpu", process.cpu.as_ref().map(Spanned::span)),
@@ -106,7 +107,7 @@ pub fn program(manifest: &Manifest, name: &Spanned<String>, process: &Process) -
 fn executable(manifest: &Manifest, name: &Spanned<String>, process: &Process) -> Result<Executable, Problem> {
     match (&process.kind, &process.command) {
         (Some(kind), None) => {
-            let known = kinds::KINDS.map(|kind| kind.name);
+            let known: Vec<_> = kinds::KINDS.iter().map(|kind| kind.name).collect();
             let help = match nearest(kind.get_ref(), known) {
                 Some(near) => format!("did you mean `{near}`? The kinds are {}", kinds::names()),
                 None => format!("the kinds are {}", kinds::names()),

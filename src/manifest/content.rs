@@ -80,6 +80,8 @@ pub struct Process {
     pub vehicle: Option<Spanned<String>>,
     /// Scene file, relative to the manifest.
     pub scene: Option<Spanned<String>>,
+    /// File of a controller's gains, relative to the manifest.
+    pub gains: Option<Spanned<String>>,
     /// Data file, relative to the manifest.
     pub data: Option<Spanned<String>>,
     /// Ticks between two computations.
@@ -253,8 +255,10 @@ pub struct PassCondition {
     pub name: String,
     /// Topic.
     pub topic: String,
-    /// Field, such as `position.z`, or `attitude.roll` of a quaternion.
+    /// Field, such as `position.z`, or `attitude.roll` of a quaternion; `position`, a vector, is judged by its length.
     pub field: String,
+    /// What is taken off first, sample by sample.
+    pub minus: Option<Signal>,
     /// Unit of the limits.
     pub unit: String,
     /// Start of the span; the start of the run where absent.
@@ -262,8 +266,35 @@ pub struct PassCondition {
     pub from_s: f64,
     /// End of the span, itself included; the end of the run where absent.
     pub to_s: Option<f64>,
+    /// Only samples while another signal is within limits.
+    #[serde(rename = "while")]
+    pub gate: Option<Gate>,
     /// What is compared with the limits.
     pub statistic: Statistic,
+    /// Lower limit.
+    pub min: Option<f64>,
+    /// Upper limit.
+    pub max: Option<f64>,
+}
+
+/// A field of a topic.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Signal {
+    /// Topic.
+    pub topic: String,
+    /// Field.
+    pub field: String,
+}
+
+/// Limits of a signal, in its own unit, within which a condition judges.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Gate {
+    /// Topic.
+    pub topic: String,
+    /// Field.
+    pub field: String,
     /// Lower limit.
     pub min: Option<f64>,
     /// Upper limit.

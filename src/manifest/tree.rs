@@ -7,7 +7,7 @@ use toml::de::{DeString, DeTable, DeValue};
 /// Keys that say what a process is: naming one anew leaves nothing of the other.
 const IDENTITY: [&str; 2] = ["kind", "command"];
 /// Keys that mean something only to what the process is.
-const PARAMETERS: [&str; 4] = ["data", "parameters", "scene", "vehicle"];
+const PARAMETERS: [&str; 5] = ["data", "gains", "parameters", "scene", "vehicle"];
 
 /// What `text` says; its places start at `base`.
 ///

@@ -24,14 +24,13 @@ mod trace;
 
 pub use flight::Flight;
 
+use crate::files;
 use age::Age;
-use anyhow::{Context, Result, bail};
+use anyhow::Result;
 use latency::{NodeLatency, Transport};
 use pacing::Pacing;
 use path::CriticalPath;
 use serde::Serialize;
-use std::fs::File;
-use std::io::{BufWriter, Write as _};
 use std::path::{Path, PathBuf};
 
 /// Where the host time of a run went.
@@ -89,13 +88,7 @@ impl Files {
     /// # Errors
     /// If a folder is not there.
     pub fn check(&self) -> Result<()> {
-        for path in self.trace.iter().chain(&self.html) {
-            let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
-            if let Some(folder) = folder.filter(|folder| !folder.is_dir()) {
-                bail!("cannot create {}: there is no folder {}", path.display(), folder.display());
-            }
-        }
-        Ok(())
+        self.trace.iter().chain(&self.html).try_for_each(|path| files::check_folder(path))
     }
 
     /// Writes those that were asked for; returns a line for each that says what it holds.
@@ -105,20 +98,13 @@ impl Files {
     pub fn write(&self, name: &str, flight: &Flight, profile: &Profile) -> Result<Vec<String>> {
         let mut lines = Vec::new();
         if let Some(path) = &self.trace {
-            let written = write_file(path, |out| trace::write(flight, &profile.critical_path, out))?;
+            let written = files::write(path, |out| trace::write(flight, &profile.critical_path, out))?;
             lines.push(format!("trace: {} ({written}); open it in ui.perfetto.dev", path.display()));
         }
         if let Some(path) = &self.html {
-            write_file(path, |out| page::write(name, flight, profile, out))?;
+            files::write(path, |out| page::write(name, flight, profile, out))?;
             lines.push(format!("page: {}", path.display()));
         }
         Ok(lines)
     }
-}
-
-fn write_file<T>(path: &Path, write: impl FnOnce(&mut BufWriter<File>) -> std::io::Result<T>) -> Result<T> {
-    let file = File::create(path).with_context(|| format!("cannot create {}", path.display()))?;
-    let mut out = BufWriter::new(file);
-    let written = write(&mut out).and_then(|written| out.flush().map(|()| written));
-    written.with_context(|| format!("cannot write {}", path.display()))
 }

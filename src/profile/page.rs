@@ -1,9 +1,8 @@
 //! One HTML page that needs no network: tables, histograms, and the slowest ticks on a time axis.
 //!
-//! It is drawn by `page.js` with plotly.js, whose bundle of basic charts is kept here as it is published (npm
-//! package `plotly.js-basic-dist-min` 4.1.1, MIT): the crate `plotly` embeds the whole library and two MathJax
-//! bundles, which makes a page of 7.5 MB and brings fifty more packages.
+//! It is drawn by `page.js` with plotly.js ([`crate::page`]).
 
+use crate::page::{PLOTLY_BASIC, Page};
 use crate::profile::Profile;
 use crate::profile::flight::{Cause, Flight};
 use crate::profile::path::{Path, name};
@@ -12,9 +11,8 @@ use bus::profile::TickTimes;
 use serde_json::{Value, json};
 use std::io::{self, Write};
 
-const TEMPLATE: &str = include_str!("page.html");
-const SCRIPT: &str = include_str!("page.js");
-const PLOTLY: &str = include_str!("plotly-basic.min.js");
+const PAGE: Page =
+    Page { template: include_str!("page.html"), plotly: PLOTLY_BASIC, script: include_str!("page.js") };
 
 /// Slowest ticks on the page.
 const SLOWEST_TICKS: usize = 20;
@@ -29,20 +27,7 @@ const BINS_PER_DECADE: f64 = 20.0;
 
 /// Writes the page of run `run`.
 pub fn write(run: &str, flight: &Flight, profile: &Profile, out: &mut impl Write) -> io::Result<()> {
-    let data = data(run, flight, profile).to_string();
-    let mut rest = TEMPLATE;
-    for (mark, text) in [("{{plotly}}", PLOTLY), ("{{data}}", &escaped(&data)), ("{{script}}", SCRIPT)] {
-        let (before, after) = rest.split_once(mark).unwrap_or((rest, ""));
-        out.write_all(before.as_bytes())?;
-        out.write_all(text.as_bytes())?;
-        rest = after;
-    }
-    out.write_all(rest.as_bytes())
-}
-
-/// JSON as a script element takes it: no name can end the element.
-fn escaped(json: &str) -> String {
-    json.replace('<', "\\u003c")
+    PAGE.write(&data(run, flight, profile).to_string(), out)
 }
 
 fn data(run: &str, flight: &Flight, profile: &Profile) -> Value {

@@ -215,7 +215,7 @@ impl Process {
     pub const ALL: [Self; 9] = [
         Self::Node("plant"),
         Self::Node("imu"),
-        Self::Node("attitude"),
+        Self::Node("ekf"),
         Self::Node("controller"),
         Self::Node("pilot"),
         Self::Node("saboteur"),

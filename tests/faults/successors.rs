@@ -10,7 +10,7 @@ use rand_core::Rng;
 use rustix::process::{Pid, Signal, kill_process};
 
 const KILL_POINTS: u64 = 60;
-const VICTIMS: [&str; 5] = ["controller", "attitude", "imu", "pilot", "saboteur"];
+const VICTIMS: [&str; 5] = ["controller", "ekf", "imu", "pilot", "saboteur"];
 /// When the successor joins, and when it takes over.
 const JOIN_TICK: u32 = 1000;
 const TAKE_OVER_TICK: u32 = 1500;

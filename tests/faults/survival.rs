@@ -12,9 +12,9 @@ use serde_json::Value;
 use std::collections::BTreeSet;
 
 const KILL_POINTS: u64 = 90;
-const VICTIMS: [&str; 5] = ["controller", "attitude", "imu", "pilot", "saboteur"];
+const VICTIMS: [&str; 5] = ["controller", "ekf", "imu", "pilot", "saboteur"];
 /// Those that hand their state over.
-const STATEFUL: [&str; 3] = ["controller", "attitude", "imu"];
+const STATEFUL: [&str; 3] = ["controller", "ekf", "imu"];
 /// The first strike comes before this tick, and the second so many ticks later: the first one's [`GUARD_TICKS`] are over.
 const LAST_TICK: usize = 2200;
 const TICKS_BETWEEN: u32 = GUARD_TICKS + 100;

@@ -30,9 +30,9 @@ const isLocal = (url) => /^(file|data|blob):/.test(url) || new URL(url).hostname
 
 /**
  * Opens `url` and calls `use` with the page and a list of what went wrong in it: errors, and requests that would have
- * left this machine, which are refused.
+ * left this machine, which are refused. `before` runs in the page in front of its own scripts.
  */
-export async function withPage(url, use) {
+export async function withPage(url, use, before) {
   const args = ["--disable-gpu", ...(process.getuid() === 0 ? ["--no-sandbox"] : [])];
   const browser = await puppeteer.launch({ executablePath: findBrowser(), args, timeout: PATIENCE_MS });
   try {
@@ -47,6 +47,7 @@ export async function withPage(url, use) {
       return request.abort();
     });
     await page.setRequestInterception(true);
+    if (before) await page.evaluateOnNewDocument(before);
     await page.goto(url, { waitUntil: "load" });
     return await use(page, wrong);
   } finally {

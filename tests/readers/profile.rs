@@ -1,21 +1,20 @@
 //! Perfetto and a browser find in a profile's files what was written into them.
 
-use crate::{ROOT, hummingbus, manifest_text, readers};
+use crate::{hummingbus, look, manifest_text, readers};
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
 use std::fs;
-use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
+use std::path::PathBuf;
 use tempfile::TempDir;
 
 /// The nodes of the hover.
-const NODES: usize = 6;
+const NODES: usize = 7;
 
 #[test]
 fn perfetto_finds_every_slice_and_every_hop() {
     let Some(readers) = readers() else { return };
     let flight = Profiled::fly();
-    let found = look(&readers, "read_trace.mjs", &flight.trace);
+    let found = look(&readers, "read_trace.mjs", &[flight.trace.as_os_str()]);
     let written = fs::read_to_string(&flight.trace).unwrap();
     require_trace(&written, &found).unwrap_or_else(|difference| panic!("{difference}"));
 
@@ -83,7 +82,7 @@ fn found_slices(found: &Value) -> Slices {
 fn a_browser_draws_the_page_without_a_network() {
     let Some(readers) = readers() else { return };
     let flight = Profiled::fly();
-    let seen = look(&readers, "read_page.mjs", &flight.page);
+    let seen = look(&readers, "read_page.mjs", &[flight.page.as_os_str()]);
     assert_eq!(seen["wrong"], json!([]));
     let (first, last) = (&seen["first"], &seen["last"]);
     // The slowest ticks, the course of the run, each node's histogram, and the jitter.
@@ -104,17 +103,8 @@ fn a_browser_draws_the_page_without_a_network() {
     let text = fs::read_to_string(&flight.page).unwrap();
     let falsified = flight.folder.path().join("falsified.html");
     fs::write(&falsified, text.replace("<h1", "<img src=\"http://plots.invalid/a.png\"><h1")).unwrap();
-    let seen = look(&readers, "read_page.mjs", &falsified);
+    let seen = look(&readers, "read_page.mjs", &[falsified.as_os_str()]);
     assert!(seen["wrong"][0].as_str().unwrap().contains("plots.invalid"), "{seen}");
-}
-
-/// Runs a script on a file; what it prints.
-fn look(readers: &Path, script: &str, file: &Path) -> Value {
-    let mut command = Command::new("node");
-    command.arg(Path::new(ROOT).join("tests/readers").join(script)).arg(file);
-    let Output { status, stdout, stderr } = command.env("HUMMINGBUS_READERS", readers).output().unwrap();
-    assert!(status.success(), "{script}: {}", String::from_utf8_lossy(&stderr));
-    serde_json::from_slice(&stdout).unwrap()
 }
 
 /// The files of a profiled, paced hover.

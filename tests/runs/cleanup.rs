@@ -148,7 +148,7 @@ fn no_process_outlives_a_killed_launcher() {
     let (manifest, recording) = (repository("manifests/hover.toml"), place.path("killed.mcap"));
     let mut launch = place.start(&["run", &manifest, "--record", &recording, "--pace", "realtime"]);
     launch.await_ticks(200);
-    assert_eq!(place.processes().len(), 8, "launcher, clock and six nodes");
+    assert_eq!(place.processes().len(), 9, "launcher, clock and seven nodes");
     launch.kill();
     place.await_no_process();
 }

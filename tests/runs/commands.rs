@@ -60,7 +60,7 @@ fn the_json_summary_holds_what_the_text_says() {
     assert!((number("real_time_factor") * number("host_s") - 12.0).abs() < 1e-6);
     let names: Vec<_> =
         summary["processes"].as_array().unwrap().iter().map(|process| &process["name"]).collect();
-    assert_eq!(names, ["clock", "attitude", "controller", "imu", "pilot", "plant", "recorder"]);
+    assert_eq!(names, ["clock", "controller", "ekf", "imu", "mocap", "pilot", "plant", "recorder"]);
     assert!(summary["pass"].as_array().unwrap().iter().all(|pass| pass["passed"] == true));
 }
 
@@ -87,7 +87,7 @@ fn a_paced_run_takes_at_least_its_simulated_time() {
 fn check_prints_nodes_edges_delays_and_rates() {
     let ended = Place::new().call(&["check", &hover()]).with_code(0);
     ended.prints(&["12000 ticks at 1000 Hz (12 s)", "pace free", "window 64 ticks", "seed 1"]);
-    ended.prints(&["attitude (attitude), 1000 Hz", "controller (pid)", "imu (imu)", "recorder (recorder)"]);
+    ended.prints(&["ekf (ekf), 1000 Hz", "controller (pid)", "imu (imu)", "recorder (recorder)"]);
     ended.prints(&["/controller/command [hummingbus_msgs/msg/MotorCommand], delayed by 1 tick"]);
     ended.prints(&["<- imu          /imu/imu [hummingbus_msgs/msg/Imu]\n"]);
     ended.prints(&["-> state        /plant/state [hummingbus_msgs/msg/PlantState] 1000 Hz"]);
@@ -109,7 +109,7 @@ fn check_prints_the_graph_as_json() {
         (Some(12_000), Some(1_000_000))
     );
     let nodes: Vec<_> = graph["nodes"].as_array().unwrap().iter().map(|node| &node["name"]).collect();
-    assert_eq!(nodes, ["attitude", "controller", "imu", "pilot", "plant", "recorder"]);
+    assert_eq!(nodes, ["controller", "ekf", "imu", "mocap", "pilot", "plant", "recorder"]);
 }
 
 /// The part of the schema listing about one message.

@@ -5,7 +5,7 @@ use crate::support::{Load, Place, repository};
 use std::fs;
 use std::sync::OnceLock;
 
-const PROCESSES: [&str; 6] = ["attitude", "controller", "imu", "pilot", "plant", "recorder"];
+const PROCESSES: [&str; 7] = ["controller", "ekf", "imu", "mocap", "pilot", "plant", "recorder"];
 
 /// Flies hover.toml for `duration_s` with `more` arguments; returns the recording.
 fn hover(place: &Place, duration_s: u32, more: &[&str]) -> String {

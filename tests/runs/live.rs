@@ -193,7 +193,7 @@ fn top_once_shows_what_flies() {
     );
     let processes = view["processes"].as_array().unwrap();
     let names: Vec<&str> = processes.iter().map(|process| process["name"].as_str().unwrap()).collect();
-    assert_eq!(names, ["clock", "attitude", "controller", "imu", "pilot", "plant", "recorder"]);
+    assert_eq!(names, ["clock", "controller", "ekf", "imu", "mocap", "pilot", "plant", "recorder"]);
     for process in &processes[1..] {
         let us = |key| process[key].as_f64().unwrap();
         assert!(us("step_p50_us") > 0.0 && us("step_p99_us") >= us("step_p50_us"), "{process:#}");

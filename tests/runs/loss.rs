@@ -5,10 +5,11 @@ use crate::support::{Load, Place, repository};
 
 const TICK_NS: u64 = 1_000_000;
 /// The topics of hover.toml with the ticks between their samples.
-const RATES: [(&str, u32); 7] = [
-    ("/attitude/estimate", 1),
+const RATES: [(&str, u32); 8] = [
     ("/controller/command", 1),
+    ("/ekf/estimate", 1),
     ("/imu/imu", 1),
+    ("/mocap/mocap", 5),
     ("/pilot/set_point", 1),
     ("/plant/pose", 10),
     ("/plant/state", 1),

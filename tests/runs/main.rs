@@ -15,8 +15,11 @@
 //! - [`manifests`]: includes, sets, settings, successors, companions
 //! - [`commands`]: the other subcommands, exit codes and JSON
 //! - [`profile`]: where the host time of a run's ticks goes
+//! - [`laps`], [`plot`]: recordings that are written, and pictures of them
 //! - [`rights`]: rights that a run lacks are named
+//! - [`sensors`]: sensors read what they should, and hand over what is under way
 //! - [`replay`]: the measured flight
+//! - [`scenes`]: ground, walls, rigs and other vehicles
 
 mod clean;
 mod cleanup;
@@ -25,15 +28,19 @@ mod contract;
 mod determinism;
 mod documentation;
 mod failures;
+mod laps;
 mod live;
 mod loss;
 mod manifests;
 mod nodes;
+mod plot;
 mod profile;
 mod recordings;
 mod refusals;
 mod replay;
 mod rights;
+mod scenes;
+mod sensors;
 #[allow(dead_code, reason = "shared with tests/faults")]
 mod support;
 mod swap;

@@ -237,7 +237,7 @@ fn every_loop_of_a_swarm_stays_on_one_core_and_all_cores_are_used() {
     let core = |name: String| node(&graph, &name)["cpu"].as_u64();
     let mut used = std::collections::BTreeSet::new();
     for vehicle in 1..=4 {
-        let cores = ["plant", "imu", "attitude", "controller"].map(|node| core(format!("h{vehicle}/{node}")));
+        let cores = ["plant", "imu", "ekf", "controller"].map(|node| core(format!("h{vehicle}/{node}")));
         assert!(cores.iter().all(|core| *core == cores[0]), "h{vehicle}: {cores:?}");
         used.insert(cores[0]);
     }
@@ -465,7 +465,7 @@ fn a_successor_that_would_not_fit_the_graph() {
     swap("§outputs.command.topic = \"/x\"").says(&["a successor cannot have another `outputs`"]);
     swap("§knid = \"pid\"").says(&["unknown field `knid`"]);
     swap("kind = §\"pdi\"").says(&["there is no kind `pdi`"]);
-    let inputs = "inputs.set_point = \"/pilot/set_point\"\ninputs.attitude = \"/attitude/estimate\"\n";
+    let inputs = "inputs.set_point = \"/pilot/set_point\"\ninputs.estimate = \"/ekf/estimate\"\n";
     let ended = swap(&format!("{inputs}inputs.§altitude = \"/plant/stat\""));
     ended.says(&["input `altitude` of `controller`: nobody publishes /plant/stat"]);
     let ended = swap("parameters.§gain = 3");
@@ -538,8 +538,8 @@ fn a_companion_dies_with_a_launcher_that_is_killed() {
     let companion = "\n[process.viewer]\nlockstep = false\ncommand = [\"sleep\", \"600\"]\n";
     let text = good().replace("duration_s = 0.1", "duration_s = 100\npace = \"realtime\"") + companion;
     let mut launch = place.start(&["run", &place.write("beside.toml", text)]);
-    // The launcher, the clock, six nodes and the companion.
-    await_it(&mut launch, || (place.processes().len() >= 9).then_some(()));
+    // The launcher, the clock, seven nodes and the companion.
+    await_it(&mut launch, || (place.processes().len() >= 10).then_some(()));
     launch.kill();
     place.await_no_process();
 }
@@ -585,8 +585,8 @@ fn host_settings_that_no_system_has() {
     with("working_directory = §\"none\"").says(&["`working_directory`: ", "/none is no folder"]);
     with("log = §\"none/imu.log\"").says(&["`log`: the folder of ", "/none/imu.log is not there"]);
     with("log = §\".\"").says(&["is a folder"]);
-    let twice = "kind = \"attitude\"\nlog = \"a.log\"";
-    let marked = good().replace("kind = \"attitude\"", twice);
+    let twice = "kind = \"ekf\"\nlog = \"a.log\"";
+    let marked = good().replace("kind = \"ekf\"", twice);
     let ended = refused_text(&marked.replace("kind = \"imu\"", "kind = \"imu\"\nlog = §\"./a.log\""));
     ended.says(&["`log`: `imu` writes to the file of `attitude`"]);
     with("environment.§HUMMINGBUS_RUN = \"x\"").says(&["HUMMINGBUS_RUN is set by the launcher"]);
@@ -671,7 +671,6 @@ fn the_documentation_has_every_key() {
         known_keys(end, &list("vehicle")),
         known_keys("kind = \"plant\"", &within("plant", "parameters")),
         known_keys("kind = \"imu\"", &within("imu", "parameters")),
-        known_keys("kind = \"attitude\"", &within("attitude", "parameters")),
         known_keys("kind = \"pid\"", &within("pid", "parameters.gains")),
         known_keys("kind = \"pid\"", &within("pid", "parameters.gains.roll")),
         known_keys("initial_altitude_m = 1.0", "initial_altitude_m = 1.0\nunknown_key = 1"),

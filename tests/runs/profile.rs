@@ -45,7 +45,7 @@ fn every_tick_of_every_node_is_in_the_profile() {
         (&profile["ticks"], &profile["noted"], &profile["left_out"]),
         (&TICKS.into(), &(6 * TICKS).into(), &0.into())
     );
-    for name in ["attitude", "controller", "imu", "pilot", "plant", "recorder"] {
+    for name in ["controller", "ekf", "imu", "mocap", "pilot", "plant", "recorder"] {
         let node = find(&profile["nodes"], "name", name);
         // What a node waited for before its first tick is the start of the run.
         for (part, count) in [("compute", TICKS), ("publish", TICKS), ("wait", TICKS - 1)] {
@@ -70,7 +70,7 @@ fn the_critical_path_and_the_ages_are_those_of_the_loop() {
     assert_eq!(find(&path["places"], "place", "controller")["ticks"], TICKS);
     assert!(!path.to_string().contains("recorder"), "{path}");
     let sources: Vec<_> = profile["age"].as_array().unwrap().iter().map(|age| &age["source"]).collect();
-    assert_eq!(sources, ["/attitude/estimate", "/imu/imu", "/pilot/set_point", "/plant/state"]);
+    assert_eq!(sources, ["/ekf/estimate", "/imu/imu", "/mocap/mocap", "/pilot/set_point", "/plant/state"]);
     for age in profile["age"].as_array().unwrap() {
         assert_eq!((&age["command"], &age["host"]["count"]), (&"/controller/command".into(), &TICKS.into()));
         assert_eq!(age["simulated"]["max_us"], 0.0, "every edge of the loop but one is of the same tick");
@@ -224,14 +224,14 @@ fn first_process_of(place: &Place, node: &str) -> Pid {
 #[test]
 fn a_profile_goes_on_over_a_swap_a_restart_and_a_promotion() {
     let place = Place::new();
-    let tables = "[process.controller]\non_exit = \"restart\"\n[process.attitude]\non_exit = \"standby\"\n\
+    let tables = "[process.controller]\non_exit = \"restart\"\n[process.ekf]\non_exit = \"standby\"\n\
                   [[swap]]\nprocess = \"imu\"\nat_tick = 700\n";
     let hover = repository("manifests/hover.toml");
     let text = format!("include = [{hover:?}]\n[run]\nduration_s = 1.5\n{tables}");
     let (manifest, trace) = (place.write("changes.toml", text), place.path("trace.json"));
     let record = place.path("changes.mcap");
     let mut launch = place.start(&["profile", &manifest, "--record", &record, "--trace", &trace, "--json"]);
-    for (node, tick) in [("controller", 300), ("attitude", 1000)] {
+    for (node, tick) in [("controller", 300), ("ekf", 1000)] {
         launch.hold_at(tick);
         kill_process(first_process_of(&place, node), Signal::KILL).unwrap();
         launch.release();
@@ -239,7 +239,7 @@ fn a_profile_goes_on_over_a_swap_a_restart_and_a_promotion() {
     let ended = launch.end();
     let summary = ended.json();
     for (process, purpose, tick) in
-        [("controller", "restart", 300), ("imu", "swap", 700), ("attitude", "standby", 1000)]
+        [("controller", "restart", 300), ("imu", "swap", 700), ("ekf", "standby", 1000)]
     {
         let mut successions = summary["successions"].as_array().unwrap().iter();
         let found = successions.any(|succession| {
@@ -251,7 +251,7 @@ fn a_profile_goes_on_over_a_swap_a_restart_and_a_promotion() {
     let profile = &summary["profile"];
     assert_eq!(profile["noted"], 6 * 1500, "{}", summary["successions"]);
     assert_eq!(profile["critical_path"]["tick_time"]["count"], 1500);
-    for node in ["attitude", "controller", "imu", "pilot", "plant", "recorder"] {
+    for node in ["controller", "ekf", "imu", "mocap", "pilot", "plant", "recorder"] {
         let ticks = slices(&trace, node);
         // In the order of host time: one process after the other, none of their ticks twice.
         assert_eq!(ticks.iter().map(|(tick, ..)| *tick).collect::<Vec<_>>(), (0..1500).collect::<Vec<_>>());

@@ -25,16 +25,21 @@ inputs.command = {{ topic = "/controller/command", delay_ticks = 1, initial = {{
 kind = "imu"
 inputs.state = "/plant/state"
 
-[process.attitude]
-kind = "attitude"
+[process.mocap]
+kind = "mocap"
+period_ticks = 5
+inputs.state = "/plant/state"
+
+[process.ekf]
+kind = "ekf"
 inputs.imu = "/imu/imu"
+inputs.mocap = "/mocap/mocap"
 
 [process.controller]
 kind = "pid"
 vehicle = "{vehicle}"
 inputs.set_point = "/pilot/set_point"
-inputs.attitude = "/attitude/estimate"
-inputs.altitude = "/plant/state"
+inputs.estimate = "/ekf/estimate"
 
 [process.pilot]
 kind = "pilot"
@@ -133,7 +138,7 @@ fn an_unknown_key() {
 fn an_unknown_kind() {
     let ended = refused("kind = \"imu\"", "kind = §\"imus\"");
     ended.says(&["there is no kind `imus`", "did you mean `imu`?", "recorder"]);
-    refused("kind = \"imu\"", "kind = §\"magnetometer\"").says(&["the kinds are", "attitude, imu"]);
+    refused("kind = \"imu\"", "kind = §\"lidar\"").says(&["the kinds are", "attitude, barometer"]);
 }
 
 #[test]
@@ -165,16 +170,16 @@ fn an_unknown_port() {
 #[test]
 fn a_topic_that_nobody_publishes() {
     let ended = refused("inputs.imu = \"/imu/imu\"", "inputs.§imu = \"/imu/imi\"");
-    ended.says(&["input `imu` of `attitude`", "nobody publishes /imu/imi", "did you mean /imu/imu?"]);
+    ended.says(&["input `imu` of `ekf`", "nobody publishes /imu/imi", "did you mean /imu/imu?"]);
 }
 
 #[test]
 fn a_required_input_that_is_not_wired() {
     let ended = refused(
-        "[process.attitude]\nkind = \"attitude\"\ninputs.imu = \"/imu/imu\"",
-        "[process.§attitude]\nkind = \"attitude\"",
+        "[process.ekf]\nkind = \"ekf\"\ninputs.imu = \"/imu/imu\"\n",
+        "[process.§ekf]\nkind = \"ekf\"\n",
     );
-    ended.says(&["process `attitude` has no publisher for its input `imu`", "hummingbus_msgs/msg/Imu"]);
+    ended.says(&["process `ekf` has no publisher for its input `imu`", "hummingbus_msgs/msg/Imu"]);
 }
 
 #[test]
@@ -212,7 +217,7 @@ fn a_cycle_without_delay() {
     let ended = refused_words(&["run", &path], &path);
     ended.says(&["a cycle without delay: ", "delay_ticks = 1", "initial value"]);
     // The loop through the IMU is as good an answer.
-    let cycles = [&["plant", "controller"][..], &["plant", "imu", "attitude", "controller"]];
+    let cycles = [&["plant", "mocap", "ekf", "controller"][..], &["plant", "imu", "ekf", "controller"]];
     assert!(cycles.iter().any(|cycle| names_cycle(&ended, cycle)), "{ended}");
 }
 
@@ -240,7 +245,7 @@ fn a_cycle_of_three_is_named_in_the_direction_of_the_data() {
 fn a_delay_without_an_initial_value_or_the_other_way_round() {
     let edge = "inputs.imu = \"/imu/imu\"";
     let ended = refused(edge, "inputs.§imu = { topic = \"/imu/imu\", delay_ticks = 1 }");
-    ended.says(&["input `imu` of `attitude` is delayed and has no initial value", "initial ="]);
+    ended.says(&["input `imu` of `ekf` is delayed and has no initial value", "initial ="]);
     let ended = refused(edge, "inputs.§imu = { topic = \"/imu/imu\", initial = {} }");
     ended.says(&["has an initial value but no delay", "add delay_ticks = 1"]);
     let ended = refused(edge, "inputs.§imu = { topic = \"/imu/imu\", delay_ticks = 2, initial = {} }");
@@ -300,7 +305,7 @@ fn a_vehicle_file_that_is_not_there() {
     let manifest = repository("manifests/hover.toml");
     let vehicle = place.path("none.toml");
     let ended = refused_setting(&manifest, &[&format!("process.plant.vehicle={vehicle}")]);
-    ended.says(&["process `plant`", &vehicle, "cannot read this vehicle file", "check the path"]);
+    ended.says(&["process `plant`", &vehicle, "cannot read this file", "check the path"]);
 }
 
 #[test]

@@ -36,7 +36,7 @@ impl fmt::Display for Place {
 #[derive(Debug, thiserror::Error)]
 pub enum VehicleError {
     /// The file could not be read at all.
-    #[error("{file}: cannot read this vehicle file: {cause}; check the path and that it is UTF-8 text")]
+    #[error("{file}: cannot read this file: {cause}; check the path and that it is UTF-8 text")]
     Unreadable {
         /// The path as given.
         file: String,

@@ -1,8 +1,10 @@
 //! Which keys a vehicle file has, in which dimension, and what is physical.
 
 use nalgebra::{Matrix3, Vector3};
+use std::path::{Path, PathBuf};
 
 use crate::command::CommandMap;
+use crate::effects;
 use crate::error::VehicleError;
 use crate::provenance::Uncertainty;
 use crate::reader::{Document, Section};
@@ -14,20 +16,52 @@ use crate::vehicle::{MotorModel, Rotor, Spin, Vehicle};
 /// How far a published tensor may miss the triangle inequality through rounding, relative to its size.
 const TRIANGLE_SLACK: f64 = 1e-9;
 
-/// Reads the whole file; see `vehicles/hummingbird.toml` for the layout.
+/// Reads the whole file; see `vehicles/hummingbird.toml` for the layout. A file with a `base` has that file's
+/// vehicle, and its effects before its own.
 pub(crate) fn parse(text: &str, file_name: &str) -> Result<Vehicle, VehicleError> {
     let doc = Document::new(file_name, text);
     let tree = doc.tree()?;
     let root = Section::new(&doc, String::new(), 0..0, tree.get_ref());
-    let vehicle = read(&root)?;
-    Ok(Vehicle { provenance: doc.provenance.take(), ..vehicle })
+    if root.has("base") {
+        return on_base(&root, &beside(Path::new(file_name), root.text("base")?));
+    }
+    complete(&doc, &root)
 }
 
-fn read(root: &Section) -> Result<Vehicle, VehicleError> {
-    let name = root.text("name")?.to_owned();
+/// The path that a file at `path` calls `other`.
+pub(crate) fn beside(path: &Path, other: &str) -> PathBuf {
+    path.parent().unwrap_or(Path::new("")).join(other)
+}
+
+fn on_base(root: &Section, path: &Path) -> Result<Vehicle, VehicleError> {
+    let (name, file) = (title(root)?, path.display().to_string());
+    let more = effects::read(root)?;
+    root.finish()?;
+    let text = std::fs::read_to_string(path).map_err(|cause| {
+        let expected = "the path of a vehicle file, relative to this one";
+        root.doc.bad(&root.at_of("base"), "base", expected, format!("{file}: {cause}"))
+    })?;
+    let doc = Document::new(&file, &text);
+    let tree = doc.tree()?;
+    let lower = Section::new(&doc, String::new(), 0..0, tree.get_ref());
+    if lower.has("base") {
+        // So no chain of files can bite its tail.
+        let expected = "a complete vehicle file as a base";
+        return Err(doc.bad(&lower.at_of("base"), "base", expected, "one that has a base itself"));
+    }
+    let base = complete(&doc, &lower)?;
+    Ok(Vehicle { name, effects: [base.effects, more].concat(), ..base })
+}
+
+fn title(root: &Section) -> Result<String, VehicleError> {
     if root.has("notes") {
         root.text("notes")?;
     }
+    Ok(root.text("name")?.to_owned())
+}
+
+fn complete(doc: &Document, root: &Section) -> Result<Vehicle, VehicleError> {
+    let name = title(root)?;
     let (mass_kg, inertia_kg_m2, gravity_m_s2) = body(&root.section("body")?)?;
     let [thrust_coefficient, torque_coefficient, rotor_inertia_kg_m2] = rotor(&root.section("rotor")?)?;
     let vehicle = Vehicle {
@@ -41,7 +75,8 @@ fn read(root: &Section) -> Result<Vehicle, VehicleError> {
         rotor_inertia_kg_m2,
         motor: motor(&root.section("motor")?)?,
         command: command(&root.section("command")?)?,
-        provenance: Vec::new(),
+        effects: effects::read(root)?,
+        provenance: doc.provenance.take(),
     };
     root.finish()?;
     Ok(vehicle)
@@ -75,6 +110,11 @@ fn inertia(section: &Section) -> Result<Matrix3<f64>, VehicleError> {
 
 fn product(section: &Section, name: &'static str) -> Result<f64, VehicleError> {
     if section.has(name) { Ok(section.quantity(name, INERTIA)?.si) } else { Ok(0.0) }
+}
+
+/// Whether a rigid body can have this tensor of inertia.
+pub fn is_rigid(inertia_kg_m2: &Matrix3<f64>) -> bool {
+    is_physical(&principal_moments(inertia_kg_m2))
 }
 
 /// A rigid body's principal moments are positive and satisfy the triangle inequality.

@@ -5,8 +5,9 @@
 //! | [`vehicle`] | the immutable [`Vehicle`] that the physics uses |
 //! | [`command`] | the map between a raw motor command and a rotor speed |
 //! | [`provenance`] | where each number came from, kept for reports |
+//! | [`effects`] | the effects that a vehicle or scene file lists, as they are written |
 //! | `file` | which keys a vehicle file has, and what is physical |
-//! | [`reader`] | walks the TOML tree with positions, refuses what it does not know; scene files use it too |
+//! | [`reader`] | walks the TOML tree with positions, refuses what it does not know; scene files and gains files use it too |
 //! | [`units`] | the table of accepted units |
 //! | [`error`] | what can be wrong with a file, said for people |
 //!
@@ -19,6 +20,7 @@
 #![forbid(unsafe_code)]
 
 pub mod command;
+pub mod effects;
 pub mod error;
 mod file;
 pub mod provenance;
@@ -27,6 +29,8 @@ pub mod units;
 pub mod vehicle;
 
 pub use command::CommandMap;
+pub use effects::{EffectEntry, Stated};
 pub use error::{Place, VehicleError};
+pub use file::is_rigid;
 pub use provenance::{Provenance, Uncertainty};
 pub use vehicle::{MotorModel, Rotor, Spin, Vehicle};

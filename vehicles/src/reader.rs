@@ -7,6 +7,7 @@ use std::ops::Range;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
+use crate::effects::Stated;
 use crate::error::{Place, VehicleError};
 use crate::provenance::{Provenance, Uncertainty};
 use crate::units::Dimension;
@@ -33,7 +34,8 @@ impl<'t> Document<'t> {
         })
     }
 
-    fn place(&self, offset: usize) -> Place {
+    /// The place of byte `offset`, for messages.
+    pub fn place(&self, offset: usize) -> Place {
         Place::of(self.file, self.text, offset)
     }
 
@@ -88,6 +90,13 @@ impl Quantity {
     }
 }
 
+/// Whether a number describes what is there or was chosen by somebody.
+#[derive(Debug, Clone, Copy)]
+enum Origin {
+    Known,
+    Chosen,
+}
+
 /// One table of the file; remembers which keys were asked for.
 pub struct Section<'d, 't> {
     /// The file.
@@ -97,7 +106,7 @@ pub struct Section<'d, 't> {
     /// Where the table stands, in bytes.
     pub at: Range<usize>,
     table: &'d DeTable<'t>,
-    asked: RefCell<BTreeSet<&'static str>>,
+    asked: RefCell<BTreeSet<&'d str>>,
 }
 
 impl<'d, 't> Section<'d, 't> {
@@ -112,12 +121,12 @@ impl<'d, 't> Section<'d, 't> {
     }
 
     /// The value of `name`, if the file has it.
-    fn find(&self, name: &'static str) -> Option<&'d Spanned<DeValue<'t>>> {
+    fn find(&self, name: &'d str) -> Option<&'d Spanned<DeValue<'t>>> {
         self.asked.borrow_mut().insert(name);
         self.table.get(name)
     }
 
-    fn need(&self, name: &'static str, expected: &str) -> Result<&'d Spanned<DeValue<'t>>, VehicleError> {
+    fn need(&self, name: &'d str, expected: &str) -> Result<&'d Spanned<DeValue<'t>>, VehicleError> {
         self.find(name).ok_or_else(|| VehicleError::MissingKey {
             place: self.doc.place(self.at.start),
             key: self.key(name),
@@ -126,12 +135,12 @@ impl<'d, 't> Section<'d, 't> {
     }
 
     /// Whether the file has `name`.
-    pub fn has(&self, name: &'static str) -> bool {
+    pub fn has(&self, name: &'d str) -> bool {
         self.find(name).is_some()
     }
 
     /// A sub-table.
-    pub fn section(&self, name: &'static str) -> Result<Section<'d, 't>, VehicleError> {
+    pub fn section(&self, name: &'d str) -> Result<Section<'d, 't>, VehicleError> {
         self.as_section(self.key(name), self.need(name, "a table")?)
     }
 
@@ -147,7 +156,7 @@ impl<'d, 't> Section<'d, 't> {
     }
 
     /// An array of tables.
-    pub fn sections(&self, name: &'static str) -> Result<Vec<Section<'d, 't>>, VehicleError> {
+    pub fn sections(&self, name: &'d str) -> Result<Vec<Section<'d, 't>>, VehicleError> {
         let value = self.need(name, "an array of tables")?;
         let Some(array) = value.get_ref().as_array() else {
             return Err(self.wrong_type(&self.key(name), value, "an array of tables"));
@@ -156,8 +165,13 @@ impl<'d, 't> Section<'d, 't> {
         array.iter().enumerate().map(|(index, item)| self.as_section(key(index), item)).collect()
     }
 
+    /// The names of all keys, in alphabetical order.
+    pub fn keys(&self) -> impl Iterator<Item = &'d str> {
+        self.table.keys().map(|key| key.get_ref().as_ref())
+    }
+
     /// A text, not empty.
-    pub fn text(&self, name: &'static str) -> Result<&'d str, VehicleError> {
+    pub fn text(&self, name: &'d str) -> Result<&'d str, VehicleError> {
         let value = self.need(name, "a text")?;
         match value.get_ref().as_str() {
             Some(text) if !text.trim().is_empty() => Ok(text),
@@ -167,7 +181,7 @@ impl<'d, 't> Section<'d, 't> {
     }
 
     /// A text that has to be one of `choices`; returns what stands beside it.
-    pub fn choice<T: Copy>(&self, name: &'static str, choices: &[(&str, T)]) -> Result<T, VehicleError> {
+    pub fn choice<T: Copy>(&self, name: &'d str, choices: &[(&str, T)]) -> Result<T, VehicleError> {
         let text = self.text(name)?;
         if let Some((_, chosen)) = choices.iter().find(|(word, _)| *word == text) {
             return Ok(*chosen);
@@ -182,30 +196,62 @@ impl<'d, 't> Section<'d, 't> {
     }
 
     /// True or false.
-    pub fn flag(&self, name: &'static str) -> Result<bool, VehicleError> {
+    pub fn flag(&self, name: &'d str) -> Result<bool, VehicleError> {
         let value = self.need(name, "true or false")?;
         value.get_ref().as_bool().ok_or_else(|| self.wrong_type(&self.key(name), value, "true or false"))
     }
 
     /// A parameter: a table with `value`, `unit`, `source` and `uncertainty`; the value in SI.
-    pub fn quantity(&self, name: &'static str, dimension: Dimension) -> Result<Quantity, VehicleError> {
+    pub fn quantity(&self, name: &'d str, dimension: Dimension) -> Result<Quantity, VehicleError> {
+        self.number_of(name, dimension, Origin::Known)
+    }
+
+    /// A number that somebody chose, such as a gain: as [`Self::quantity`], but it has an `uncertainty` only
+    /// where the file says so.
+    pub fn chosen(&self, name: &'d str, dimension: Dimension) -> Result<Quantity, VehicleError> {
+        self.number_of(name, dimension, Origin::Chosen)
+    }
+
+    fn number_of(
+        &self,
+        name: &'d str,
+        dimension: Dimension,
+        origin: Origin,
+    ) -> Result<Quantity, VehicleError> {
         let parameter = self.parameter(name)?;
         let value = parameter.need("value", "a number")?;
-        let si = parameter.number("value", value)? * parameter.meta(dimension)?;
+        let si = parameter.number("value", value)? * parameter.meta(dimension, origin)?;
         let quantity = Quantity { si, key: parameter.path, at: value.span() };
         quantity.require(self.doc, si.is_finite(), "a number that is finite in SI")
     }
 
     /// A parameter whose value is an array of three numbers.
-    pub fn vector(&self, name: &'static str, dimension: Dimension) -> Result<[f64; 3], VehicleError> {
+    pub fn vector(&self, name: &'d str, dimension: Dimension) -> Result<[f64; 3], VehicleError> {
         let parameter = self.parameter(name)?;
         let value = parameter.need("value", "an array of three numbers")?;
         let [x, y, z] = parameter.three(value)?;
-        let factor = parameter.meta(dimension)?;
+        let factor = parameter.meta(dimension, Origin::Known)?;
         Ok([x * factor, y * factor, z * factor])
     }
 
-    fn parameter(&self, name: &'static str) -> Result<Section<'d, 't>, VehicleError> {
+    /// A parameter of which only the reader of the catalogue knows the dimension: as it is written.
+    pub fn stated(&self, name: &'d str) -> Result<Stated, VehicleError> {
+        let parameter = self.parameter(name)?;
+        let value = parameter.need("value", "a number")?;
+        let stated = Stated {
+            name: name.to_owned(),
+            value: parameter.number("value", value)?,
+            unit: parameter.text("unit")?.to_owned(),
+            source: parameter.text("source")?.to_owned(),
+            uncertainty: parameter.uncertainty(1.0)?,
+            place: self.doc.place(value.span().start),
+            unit_place: self.doc.place(parameter.at_of("unit").start),
+        };
+        parameter.finish()?;
+        Ok(stated)
+    }
+
+    fn parameter(&self, name: &'d str) -> Result<Section<'d, 't>, VehicleError> {
         let expected = "a table with value, unit, source and uncertainty";
         let value = self.need(name, expected)?;
         if !value.get_ref().is_table() {
@@ -215,12 +261,16 @@ impl<'d, 't> Section<'d, 't> {
     }
 
     /// Checks unit, source and uncertainty of a parameter's table; notes them; gives the factor to SI.
-    fn meta(&self, dimension: Dimension) -> Result<f64, VehicleError> {
+    fn meta(&self, dimension: Dimension, origin: Origin) -> Result<f64, VehicleError> {
         let unit = self.text("unit")?;
         let factor = dimension.factor(unit).ok_or_else(|| {
             self.doc.bad(&self.at_of("unit"), &self.key("unit"), dimension.describe(), format!("\"{unit}\""))
         })?;
-        self.note(unit, self.text("source")?, self.uncertainty(factor)?);
+        let uncertainty = match origin {
+            Origin::Chosen if !self.has("uncertainty") => Uncertainty::Said("chosen".to_owned()),
+            _ => self.uncertainty(factor)?,
+        };
+        self.note(unit, self.text("source")?, uncertainty);
         self.finish()?;
         Ok(factor)
     }
@@ -276,7 +326,8 @@ impl<'d, 't> Section<'d, 't> {
         self.doc.bad(&value.span(), key, expected, format!("a TOML {}", value.get_ref().type_str()))
     }
 
-    fn at_of(&self, name: &str) -> Range<usize> {
+    /// Where the value of `name` stands, in bytes; the table itself where it has none.
+    pub fn at_of(&self, name: &str) -> Range<usize> {
         self.table.get(name).map_or(self.at.clone(), Spanned::span)
     }
 

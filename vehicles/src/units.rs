@@ -49,7 +49,21 @@ pub const INERTIA: Dimension =
     Dimension { name: "moment of inertia", units: &[("kg*m^2", 1.0), ("g*m^2", 1e-3), ("g*mm^2", 1e-9)] };
 
 /// Rotation speeds.
-pub const SPEED: Dimension = Dimension { name: "rotation speed", units: &[("rad/s", 1.0), ("rpm", RPM)] };
+pub const SPEED: Dimension =
+    Dimension { name: "rotation speed", units: &[("rad/s", 1.0), ("rpm", RPM), ("deg/s", PI / 180.0)] };
+
+/// Angular accelerations.
+pub const ANGULAR_ACCELERATION: Dimension =
+    Dimension { name: "angular acceleration", units: &[("rad/s^2", 1.0), ("deg/s^2", PI / 180.0)] };
+
+/// Gains from a quantity to its rate of change.
+pub const PER_SECOND: Dimension = Dimension { name: "gain per time", units: &[("1/s", 1.0)] };
+
+/// Gains from a quantity to its second rate of change.
+pub const PER_SECOND_2: Dimension = Dimension { name: "gain per time squared", units: &[("1/s^2", 1.0)] };
+
+/// Gains from a quantity to its third rate of change.
+pub const PER_SECOND_3: Dimension = Dimension { name: "gain per time cubed", units: &[("1/s^3", 1.0)] };
 
 /// Thrust coefficients.
 pub const THRUST_COEFFICIENT: Dimension = Dimension {
@@ -65,6 +79,52 @@ pub const TORQUE_COEFFICIENT: Dimension = Dimension {
 
 /// Pure numbers.
 pub const PURE_NUMBER: Dimension = Dimension { name: "a pure number", units: &[("1", 1.0)] };
+
+/// Parts of a whole, and relative deviations.
+pub const RATIO: Dimension = Dimension { name: "a ratio", units: &[("1", 1.0), ("%", 1e-2)] };
+
+/// Velocities.
+pub const VELOCITY: Dimension =
+    Dimension { name: "velocity", units: &[("m/s", 1.0), ("knot", 1852.0 / 3600.0)] };
+
+/// Torques.
+pub const TORQUE: Dimension = Dimension { name: "torque", units: &[("N*m", 1.0), ("N*mm", 1e-3)] };
+
+/// Torques against a rotation.
+pub const ROTARY_DAMPING: Dimension =
+    Dimension { name: "torque per rotation speed", units: &[("N*m*s/rad", 1.0)] };
+
+/// Torques against a deflection.
+pub const ROTARY_STIFFNESS: Dimension = Dimension { name: "torque per angle", units: &[("N*m/rad", 1.0)] };
+
+/// Masses times their distances from a point.
+pub const STATIC_MOMENT: Dimension =
+    Dimension { name: "static moment", units: &[("kg*m", 1.0), ("g*m", 1e-3)] };
+
+/// Forces linear in a rotor's speed and in that of the air.
+pub const ROTOR_DRAG: Dimension = Dimension {
+    name: "force per rotation speed and velocity",
+    units: &[("N*s^2/(m*rad)", 1.0), ("kg/rad", 1.0)],
+};
+
+/// Forces quadratic in the speed of the air.
+pub const DYNAMIC_DRAG: Dimension =
+    Dimension { name: "force per velocity squared", units: &[("N*s^2/m^2", 1.0), ("kg/m", 1.0)] };
+
+/// Angles linear in the speed of the air.
+pub const TILT: Dimension =
+    Dimension { name: "angle per velocity", units: &[("rad*s/m", 1.0), ("deg*s/m", PI / 180.0)] };
+
+/// Voltages.
+pub const VOLTAGE: Dimension = Dimension { name: "voltage", units: &[("V", 1.0), ("mV", 1e-3)] };
+
+/// Electrical resistances.
+pub const RESISTANCE: Dimension =
+    Dimension { name: "electrical resistance", units: &[("ohm", 1.0), ("mohm", 1e-3)] };
+
+/// Electrical charges.
+pub const CHARGE: Dimension =
+    Dimension { name: "electrical charge", units: &[("C", 1.0), ("A*h", 3600.0), ("mA*h", 3.6)] };
 
 #[cfg(test)]
 mod tests {

@@ -2,11 +2,12 @@
 //!
 //! Body frame B: x forward, y left, z up, origin at the centre of mass. World frame W: z up.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use nalgebra::{Matrix3, Vector3};
 
 use crate::command::CommandMap;
+use crate::effects::EffectEntry;
 use crate::error::VehicleError;
 use crate::provenance::Provenance;
 
@@ -33,6 +34,9 @@ pub struct Vehicle {
     pub motor: MotorModel,
     /// How a raw motor command becomes a commanded speed.
     pub command: CommandMap,
+    /// The effects that act beyond all this, in the file's order. Only a plant that flies them reads their
+    /// meaning: what else is in this structure is the vehicle as it is declared, without them.
+    pub effects: Vec<EffectEntry>,
     /// Where every number came from, in the file's order of reading.
     pub provenance: Vec<Provenance>,
 }
@@ -95,9 +99,17 @@ impl Vehicle {
         }
     }
 
-    /// Reads and checks the text of a vehicle file; `file_name` is for messages only.
+    /// Reads and checks the text of a vehicle file; `file_name` is for messages, and the path of its `base` is
+    /// relative to it.
     pub fn parse(text: &str, file_name: &str) -> Result<Self, VehicleError> {
         crate::file::parse(text, file_name)
+    }
+
+    /// The file that the vehicle file at `path` adds effects to, if it names one.
+    pub fn base(path: &Path) -> Option<PathBuf> {
+        let text = std::fs::read_to_string(path).ok()?;
+        let table: toml::Table = text.parse().ok()?;
+        Some(crate::file::beside(path, table.get("base")?.as_str()?))
     }
 
     /// The rotor speed at which four equal thrusts carry the weight: sqrt(m g / (4 c_T)), in rad/s.

@@ -174,6 +174,33 @@ pub struct Contact {
     pub crashed: u32,
 }
 
+/// How far a vehicle truly is from what stands in the scene: for judging and plotting, not for controllers.
+#[derive(Clone, Copy, Debug, Default, Message)]
+#[repr(C)]
+#[message(type_name = "hummingbus_msgs/msg/Clearance")]
+pub struct Clearance {
+    /// Simulation time.
+    pub stamp: Time,
+    /// Distance from the centre of mass to the nearest box.
+    #[field(unit = "m", frame = "world")]
+    pub nearest: f64,
+    /// Distances to what stands along the world's +x, -x, +y, -y; 1000 where nothing does.
+    #[field(unit = "m", frame = "world")]
+    pub wall: [f64; 4],
+    /// The smallest of them less the distance that is to be kept.
+    #[field(unit = "m", frame = "world")]
+    pub side_error: f64,
+    /// Turns flown about the world's origin, clockwise from above as positive: laps of a room.
+    #[field(unit = "1")]
+    pub laps: f64,
+    /// 1 in the corner between two walls, where both are about as far as is to be kept; 0 along a side.
+    #[field(unit = "1")]
+    pub corner: u32,
+    /// Zero.
+    #[field(unit = "")]
+    pub pad0: u32,
+}
+
 /// Where the vehicles of a run are, for those that share a room.
 #[derive(Clone, Copy, Debug, Default, Message)]
 #[repr(C)]

@@ -3,7 +3,8 @@
 #![allow(non_snake_case, reason = "a trailing _W or _B names the frame a vector is written in")]
 
 use nalgebra::Vector3;
-use plant::{NewtonEuler, RigidBody, State};
+use plant::{FreeFlight, NewtonEuler, Rapier, RigidBody, State};
+use scenes::Scene;
 use vehicles::Vehicle;
 
 /// The tick of the whole project, 1 kHz.
@@ -75,4 +76,17 @@ pub fn momentum_W(vehicle: &Vehicle, state: &State) -> Vector3<f64> {
     let spin: f64 = rotors.map(|(place, rotor)| place.spin * rotor.speed_rad_s).sum();
     let body_B = vehicle.inertia_kg_m2 * state.body.angular_velocity_B_rad_s;
     state.body.attitude_WB * (body_B + Vector3::z() * (vehicle.rotor_inertia_kg_m2 * spin))
+}
+
+/// A vehicle without effects in a scene of the rapier backend.
+pub fn rapier(model: NewtonEuler, scene: &Scene, body: &RigidBody, crash_speed_m_s: f64) -> Rapier {
+    let memory = model.airframe().memory(0, "plant", TICK_S);
+    Rapier::new(model, memory, scene, body, crash_speed_m_s)
+}
+
+/// A vehicle without effects in free flight.
+pub fn free_flight(vehicle: Vehicle, body: RigidBody) -> FreeFlight {
+    let model = NewtonEuler::new(vehicle, 1);
+    let memory = model.airframe().memory(0, "plant", TICK_S);
+    FreeFlight::new(model, body, memory)
 }

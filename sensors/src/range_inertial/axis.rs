@@ -84,6 +84,14 @@ pub struct Inertia {
     pub bias_walk_m_s3_sqrt_hz: f64,
 }
 
+impl Echo {
+    /// The distance now, m.
+    #[must_use]
+    pub fn now_m(&self) -> f64 {
+        self.distance_m - self.side.sign() * self.moved_m
+    }
+}
+
 impl Axis {
     /// An axis at rest with nothing in sight.
     #[must_use]
@@ -130,7 +138,7 @@ impl Axis {
     /// something else than before: its distance is taken as it is, and says nothing about the velocity.
     pub fn correct(&mut self, echo: &Echo, gate_sigma: f64) {
         let side = echo.side.index();
-        let now_m = echo.distance_m - echo.side.sign() * echo.moved_m;
+        let now_m = echo.now_m();
         let innovation_m = now_m - self.distance[side];
         let observation = observation(echo);
         let cross = self.covariance() * observation;

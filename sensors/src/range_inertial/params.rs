@@ -44,6 +44,11 @@ pub struct RangeInertialParams {
     pub initial_velocity_sigma_m_s: f64,
     /// Height at the start, m. Default 0.0.
     pub initial_height_m: f64,
+    /// Size of the room along the world's x and y, m, where it is shared with other vehicles: an echo that is not
+    /// that of a wall then says nothing about the velocity. Without it whatever is in sight is taken to stand still.
+    pub room_m: Option<[f64; 2]>,
+    /// With it: where the vehicle starts, from the walls at -x and -y, m.
+    pub start_in_room_m: Option<[f64; 2]>,
     /// Gravity, m/s². Default 9.81 (thesis §3.1).
     pub gravity_m_s2: f64,
 }
@@ -65,6 +70,8 @@ impl Default for RangeInertialParams {
             initial_acceleration_bias_sigma_m_s2: 0.02,
             initial_velocity_sigma_m_s: 0.01,
             initial_height_m: 0.0,
+            room_m: None,
+            start_in_room_m: None,
             gravity_m_s2: 9.81,
         }
     }
@@ -87,7 +94,24 @@ impl RangeInertialParams {
             not_negative(key, value)?;
         }
         let angle_is_good = (0.0..90.0).contains(&self.half_angle_deg);
-        check("half_angle_deg", self.half_angle_deg, angle_is_good, "zero or more and below 90")
+        check("half_angle_deg", self.half_angle_deg, angle_is_good, "zero or more and below 90")?;
+        self.validate_room()
+    }
+
+    /// A room has a size and a place within it, or is not known.
+    fn validate_room(&self) -> Result<(), ParameterError> {
+        let missing = |key| Err(ParameterError { key, expected: "given with its fellow", found: f64::NAN });
+        match (self.room_m, self.start_in_room_m) {
+            (Some(_), None) => return missing("start_in_room_m"),
+            (None, Some(_)) => return missing("room_m"),
+            _ => {}
+        }
+        let (sizes, starts) = (self.room_m.into_iter().flatten(), self.start_in_room_m.into_iter().flatten());
+        for (size_m, start_m) in sizes.zip(starts) {
+            not_negative("start_in_room_m", start_m)?;
+            positive("room_m", size_m - start_m)?;
+        }
+        Ok(())
     }
 
     fn not_negative(&self) -> [(&'static str, f64); 7] {

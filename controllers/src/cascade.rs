@@ -1,0 +1,49 @@
+//! The cascade controller node: the onboard structure of the AscTec, from sticks to four motor commands.
+
+use crate::cascade_gains::CascadeGains;
+use crate::cascade_law::CascadeLaw;
+use crate::controller::{self, Airframe};
+use bus::kind::{Inputs, NodeKind, PortSpec, read_parameters};
+use bus::messages::{AttitudeEstimate, ControlStatus, MotorCommand, SetPoint, StateEstimate};
+use bus::{BusError, Message, Node};
+use serde::Deserialize;
+use std::path::PathBuf;
+
+/// The cascade controller, for manifests.
+pub const KIND: NodeKind = NodeKind {
+    name: "cascade",
+    summary: "command filter, attitude loop around rate loop, altitude PID, control allocation",
+    inputs: Inputs::Ports(&[
+        PortSpec::required("set_point", SetPoint::SCHEMA),
+        PortSpec::required("estimate", StateEstimate::SCHEMA),
+        PortSpec::optional("attitude", AttitudeEstimate::SCHEMA),
+    ]),
+    outputs: &[
+        PortSpec::required("command", MotorCommand::SCHEMA),
+        PortSpec::optional("status", ControlStatus::SCHEMA),
+    ],
+    check: |parameters, _| build(&read_parameters(parameters)?, 1.0).map(|_| ()),
+    run,
+};
+
+/// Parameters of the cascade controller.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Parameters {
+    /// Vehicle file.
+    vehicle: PathBuf,
+    /// Gains file; the built-in `controllers/gains/cascade.toml` where there is none.
+    gains: Option<PathBuf>,
+}
+
+fn build(parameters: &Parameters, period_s: f64) -> Result<(CascadeLaw, Airframe), String> {
+    let airframe = Airframe::load(&parameters.vehicle)?;
+    let gains = CascadeGains::load(parameters.gains.as_deref()).map_err(|error| error.to_string())?;
+    Ok((CascadeLaw { gains, vehicle: airframe.known(), period_s }, airframe))
+}
+
+fn run() -> Result<(), BusError> {
+    let node = Node::join()?;
+    let (law, airframe) = build(&node.parameters()?, node.period_s()).map_err(|error| node.error(error))?;
+    controller::run(node, &law, &airframe.allocation, &airframe.vehicle)
+}

@@ -1,0 +1,326 @@
+//! The cascade of the AscTec's onboard computer (thesis §5.3, Figs 5.16–5.19): command filter, attitude loop
+//! around rate loop, and the altitude loop beside them; from set point and measurement to a wrench.
+//!
+//! - Command filter: roll and pitch are cut to ±30° and filtered, x'' = ω²(c − x) − 2ζω x'. The yaw command
+//!   turns towards the yaw that is asked for no faster than a yaw stick at full deflection would integrate
+//!   it, comes round at 360°, and is set to the measured yaw as long as no thrust is asked for.
+//! - Attitude loop: error of roll, pitch and yaw, times a gain, and a part of the filtered commands' own rates,
+//!   to their rates of change, and by the kinematics of the z-y-x sequence to body rates (the inverse of thesis eq. 3.18).
+//! - Rate loop: α = Kp·e + ∫Ki·e dt − Kd·dω/dt with e the error of a body rate; torque = inertia · α. The
+//!   cross product of rate and angular momentum is left to the loops.
+#![allow(non_snake_case, reason = "a trailing _B names the frame a vector is written in, _N the newton")]
+
+use crate::allocation::Wrench;
+use crate::altitude_loop::AltitudeLoop;
+use crate::angle::wrap_rad;
+use crate::cascade_gains::{CascadeGains, CommandFilter};
+use crate::controller::{Controller, ControllerState, Demand, Told, within};
+use crate::pid_law::{Measurement, PidState, PidVehicle};
+use crate::set_points::SetPoint;
+use nalgebra::Vector3;
+
+/// The law at one period: all that does not change during a run.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct CascadeLaw {
+    /// Gains and limits.
+    pub gains: CascadeGains,
+    /// The vehicle that is flown.
+    pub vehicle: PidVehicle,
+    /// Time between two steps, s.
+    pub period_s: f64,
+}
+
+impl Controller for CascadeLaw {
+    const LAW: u32 = 2;
+
+    fn step(&self, memory: &mut ControllerState, told: &Told<'_>) -> Demand {
+        self.demand(memory, &told.set_point, &Measurement::from(told))
+    }
+
+    fn fresh(&self, told: &Told<'_>) -> ControllerState {
+        self.begun(&Measurement::from(told))
+    }
+
+    fn tracking(&self, memory: &ControllerState, wrench: &Wrench, told: &Told<'_>) -> ControllerState {
+        self.taken_over(memory, wrench, told.set_point.altitude_m, &Measurement::from(told))
+    }
+}
+
+impl CascadeLaw {
+    /// The demand for `set_point`; advances the memory of the inner loops by one period.
+    pub fn demand(
+        &self,
+        memory: &mut ControllerState,
+        set_point: &SetPoint,
+        measured: &Measurement,
+    ) -> Demand {
+        // Before thrust is asked for, the vehicle may be turned by hand.
+        if memory.thrust <= self.vehicle.thrust_min_N {
+            memory.attitude_command[2] = measured.yaw_rad;
+        }
+        self.filter_commands(memory, set_point);
+        let [roll_rad, pitch_rad, yaw_rad] = memory.attitude_command;
+        let rates_B_rad_s = self.rate_command_B_rad_s(memory, measured);
+        let torque_B_N_m = self.torque_B_N_m(memory, &rates_B_rad_s, measured);
+        let thrust_N = self.altitude_loop().thrust_N(
+            &mut memory.integrals.altitude_m_s2,
+            set_point.altitude_m,
+            measured,
+        );
+        let held = SetPoint { altitude_m: set_point.altitude_m, roll_rad, pitch_rad, yaw_rad };
+        Demand { wrench: Wrench { thrust_N, torque_B_N_m }, set_point: held, ..Demand::default() }
+    }
+
+    /// The memory of a vehicle that no law has flown yet: commands as it lies, filters as it turns.
+    #[must_use]
+    pub fn begun(&self, measured: &Measurement) -> ControllerState {
+        let limit =
+            |angle_rad: f64| angle_rad.clamp(-self.gains.filter.tilt_max_rad, self.gains.filter.tilt_max_rad);
+        ControllerState {
+            attitude_command: [limit(measured.roll_rad), limit(measured.pitch_rad), measured.yaw_rad],
+            rate_filtered: measured.angular_velocity_B_rad_s.into(),
+            altitude_hold: measured.altitude_m,
+            ..ControllerState::default()
+        }
+    }
+
+    /// The memory that goes on from another law's: its integrators, and commands from where the vehicle is.
+    #[must_use]
+    pub fn taken_over(
+        &self,
+        memory: &ControllerState,
+        wrench: &Wrench,
+        altitude_set_m: f64,
+        measured: &Measurement,
+    ) -> ControllerState {
+        let before = &memory.integrals;
+        let handed = [before.roll_rad_s2, before.pitch_rad_s2, before.yaw_rad_s2];
+        // An integrator without gain would keep for ever what it was given.
+        let [roll_rad_s2, pitch_rad_s2, yaw_rad_s2] = std::array::from_fn(|axis| {
+            let has_gain = self.gains.rate[axis].integral_1_s2 > 0.0;
+            if has_gain { within(handed[axis], self.gains.integral_max_rad_s2) } else { 0.0 }
+        });
+        let altitude_m_s2 =
+            self.altitude_loop().taken_over_m_s2(memory, wrench.thrust_N, altitude_set_m, measured);
+        let integrals = PidState { altitude_m_s2, roll_rad_s2, pitch_rad_s2, yaw_rad_s2 };
+        ControllerState { integrals, thrust: wrench.thrust_N, ..self.begun(measured) }
+    }
+
+    fn altitude_loop(&self) -> AltitudeLoop<'_> {
+        AltitudeLoop { gains: self.gains.altitude, vehicle: &self.vehicle, period_s: self.period_s }
+    }
+
+    fn filter_commands(&self, memory: &mut ControllerState, set_point: &SetPoint) {
+        let filter = &self.gains.filter;
+        for (axis, asked_rad) in [set_point.roll_rad, set_point.pitch_rad].into_iter().enumerate() {
+            let (angle, rate) = (memory.attitude_command[axis], memory.attitude_command_rate[axis]);
+            let (angle, rate) = filter.moved(angle, rate, asked_rad, self.period_s);
+            (memory.attitude_command[axis], memory.attitude_command_rate[axis]) = (angle, rate);
+        }
+        let turn_max_rad = filter.yaw_rate_max_rad_s * self.period_s;
+        let yaw_rad = memory.attitude_command[2];
+        let turn_rad = wrap_rad(set_point.yaw_rad - yaw_rad).clamp(-turn_max_rad, turn_max_rad);
+        memory.attitude_command[2] = wrap_rad(yaw_rad + turn_rad);
+    }
+
+    /// Body rates that lead roll, pitch and yaw to `command`.
+    fn rate_command_B_rad_s(&self, memory: &ControllerState, measured: &Measurement) -> Vector3<f64> {
+        let command = &memory.attitude_command;
+        let errors_rad = [
+            wrap_rad(command[0] - measured.roll_rad),
+            command[1] - measured.pitch_rad,
+            wrap_rad(command[2] - measured.yaw_rad),
+        ];
+        let [roll_rate, pitch_rate, yaw_rate]: [f64; 3] = std::array::from_fn(|axis| {
+            let max_rad_s = self.gains.rate_max_rad_s[axis];
+            // The yaw command's own rate stays zero: yaw is slow.
+            let fed_rad_s = self.gains.rate_feed_forward * memory.attitude_command_rate[axis];
+            (self.gains.attitude_1_s[axis] * errors_rad[axis] + fed_rad_s).clamp(-max_rad_s, max_rad_s)
+        });
+        let (sin_roll, cos_roll) = measured.roll_rad.sin_cos();
+        let (sin_pitch, cos_pitch) = measured.pitch_rad.sin_cos();
+        Vector3::new(
+            roll_rate - yaw_rate * sin_pitch,
+            pitch_rate * cos_roll + yaw_rate * sin_roll * cos_pitch,
+            yaw_rate * cos_roll * cos_pitch - pitch_rate * sin_roll,
+        )
+    }
+
+    fn torque_B_N_m(
+        &self,
+        memory: &mut ControllerState,
+        rates_B_rad_s: &Vector3<f64>,
+        measured: &Measurement,
+    ) -> Vector3<f64> {
+        let integrals = &mut memory.integrals;
+        let integrals = [&mut integrals.roll_rad_s2, &mut integrals.pitch_rad_s2, &mut integrals.yaw_rad_s2];
+        let mut acceleration_B_rad_s2 = Vector3::zeros();
+        for (axis, integral) in integrals.into_iter().enumerate() {
+            let rate_rad_s = measured.angular_velocity_B_rad_s[axis];
+            let error_rad_s = rates_B_rad_s[axis] - rate_rad_s;
+            let change_rad_s2 = self.rate_change_rad_s2(&mut memory.rate_filtered[axis], rate_rad_s);
+            let (gains, max) = (&self.gains.rate[axis], self.gains.integral_max_rad_s2);
+            *integral = (*integral + gains.integral_1_s2 * error_rad_s * self.period_s).clamp(-max, max);
+            acceleration_B_rad_s2[axis] =
+                gains.proportional_1_s * error_rad_s + *integral - gains.derivative * change_rad_s2;
+        }
+        self.vehicle.inertia_B_kg_m2.component_mul(&acceleration_B_rad_s2)
+    }
+
+    /// The measured rate's rate of change, behind a first-order filter whose state follows the rate.
+    fn rate_change_rad_s2(&self, filtered_rad_s: &mut f64, rate_rad_s: f64) -> f64 {
+        let time_s = self.gains.derivative_filter_s + self.period_s;
+        let change_rad_s2 = (rate_rad_s - *filtered_rad_s) / time_s;
+        *filtered_rad_s += change_rad_s2 * self.period_s;
+        change_rad_s2
+    }
+}
+
+impl CommandFilter {
+    /// Angle and rate `period_s` on. Implicit in the rate, so that it is stable at any period.
+    fn moved(&self, angle_rad: f64, rate_rad_s: f64, asked_rad: f64, period_s: f64) -> (f64, f64) {
+        let asked_rad = asked_rad.clamp(-self.tilt_max_rad, self.tilt_max_rad);
+        let step = self.natural_frequency_rad_s * period_s;
+        let pull_rad_s = self.natural_frequency_rad_s * step * (asked_rad - angle_rad);
+        let rate_rad_s = (rate_rad_s + pull_rad_s) / (1.0 + 2.0 * self.damping_ratio * step + step * step);
+        (angle_rad + rate_rad_s * period_s, rate_rad_s)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn law() -> CascadeLaw {
+        let vehicle = PidVehicle {
+            mass_kg: 0.5,
+            inertia_B_kg_m2: Vector3::new(5.0e-3, 6.0e-3, 8.0e-3),
+            gravity_m_s2: 9.81,
+            thrust_min_N: 1.0,
+            thrust_max_N: 10.0,
+        };
+        CascadeLaw { gains: CascadeGains::default(), vehicle, period_s: 1e-3 }
+    }
+
+    fn level() -> Measurement {
+        Measurement {
+            altitude_m: 1.0,
+            climb_rate_m_s: 0.0,
+            roll_rad: 0.0,
+            pitch_rad: 0.0,
+            yaw_rad: 0.0,
+            angular_velocity_B_rad_s: Vector3::zeros(),
+        }
+    }
+
+    fn hold() -> SetPoint {
+        SetPoint { altitude_m: 1.0, ..SetPoint::default() }
+    }
+
+    /// A memory in flight, so that the yaw command is not reset.
+    fn flying(measured: &Measurement) -> ControllerState {
+        ControllerState { thrust: 5.0, law: CascadeLaw::LAW, ..law().begun(measured) }
+    }
+
+    /// `seconds` of asking for `set_point` at a measurement that stays as it is.
+    fn held(set_point: &SetPoint, measured: &Measurement, seconds: usize) -> (ControllerState, Demand) {
+        let mut memory = flying(measured);
+        let mut demand = Demand::default();
+        for _ in 0..1000 * seconds {
+            demand = law().demand(&mut memory, set_point, measured);
+        }
+        (memory, demand)
+    }
+
+    #[test]
+    fn at_the_set_point_the_wrench_is_the_weight() {
+        let wrench = law().demand(&mut flying(&level()), &hold(), &level()).wrench;
+        assert!((wrench.thrust_N - 0.5 * 9.81).abs() < 1e-12);
+        assert_eq!(wrench.torque_B_N_m, Vector3::zeros());
+    }
+
+    #[test]
+    fn a_step_of_the_stick_is_filtered_without_overshoot_and_cut_to_thirty_degrees() {
+        let far = SetPoint { roll_rad: 1.2, pitch_rad: -1.2, ..hold() };
+        let mut memory = flying(&level());
+        let mut rolls = Vec::new();
+        for _ in 0..1000 {
+            rolls.push(law().demand(&mut memory, &far, &level()).set_point.roll_rad);
+        }
+        assert!(rolls[0] < 0.01 && rolls.windows(2).all(|pair| pair[0] <= pair[1]));
+        assert!((rolls[999] - 30.0_f64.to_radians()).abs() < 1e-6);
+        assert!((memory.attitude_command[1] + 30.0_f64.to_radians()).abs() < 1e-6);
+    }
+
+    #[test]
+    fn every_error_and_rate_acts_with_its_sign() {
+        let set = SetPoint { roll_rad: 0.1, pitch_rad: -0.1, yaw_rad: 0.2, ..hold() };
+        let torque = held(&set, &level(), 1).1.wrench.torque_B_N_m;
+        assert!(torque.x > 0.0 && torque.y < 0.0 && torque.z > 0.0, "{torque}");
+        let turning = Measurement { angular_velocity_B_rad_s: Vector3::new(1.0, 0.0, 0.0), ..level() };
+        let torque = law().demand(&mut flying(&turning), &hold(), &turning).wrench.torque_B_N_m;
+        let rate = law().gains.rate[0];
+        let expected_N_m = -5.0e-3 * (rate.proportional_1_s + rate.integral_1_s2 * 1e-3);
+        assert!((torque.x - expected_N_m).abs() < 1e-12, "{torque}");
+    }
+
+    #[test]
+    fn the_derivative_opposes_a_growing_rate() {
+        let turning = Measurement { angular_velocity_B_rad_s: Vector3::new(0.1, 0.0, 0.0), ..level() };
+        let mut at_rest = flying(&level());
+        let growing = law().demand(&mut at_rest, &hold(), &turning).wrench.torque_B_N_m.x;
+        let steady = law().demand(&mut flying(&turning), &hold(), &turning).wrench.torque_B_N_m.x;
+        assert!(growing < steady && steady < 0.0);
+    }
+
+    #[test]
+    fn the_yaw_command_turns_the_short_way_at_the_sticks_rate_and_comes_round() {
+        let at = |yaw_rad| Measurement { yaw_rad, ..level() };
+        let asked = SetPoint { yaw_rad: -3.0, ..hold() };
+        let mut memory = flying(&at(3.0));
+        law().demand(&mut memory, &asked, &at(3.0));
+        let turned_rad = memory.attitude_command[2] - 3.0;
+        assert!((turned_rad - 90.0_f64.to_radians() * 1e-3).abs() < 1e-9, "{turned_rad}");
+        let (memory, _) = held(&asked, &at(3.0), 1);
+        assert!((memory.attitude_command[2] + 3.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn without_thrust_the_yaw_command_is_the_measured_yaw() {
+        let turned = Measurement { yaw_rad: 2.0, ..level() };
+        let mut memory = ControllerState { thrust: 0.0, ..flying(&level()) };
+        let demand = law().demand(&mut memory, &SetPoint { yaw_rad: 2.0, ..hold() }, &turned);
+        assert_eq!(demand.set_point.yaw_rad, 2.0);
+    }
+
+    #[test]
+    fn a_yaw_rate_in_a_bank_needs_body_pitch_rate() {
+        let banked = Measurement { roll_rad: 0.4, ..level() };
+        let memory = ControllerState { attitude_command: [0.4, 0.0, 0.5], ..ControllerState::default() };
+        let rates = law().rate_command_B_rad_s(&memory, &banked);
+        let yaw_rate = law().gains.attitude_1_s[2] * 0.5;
+        assert!((rates.y - yaw_rate * 0.4_f64.sin()).abs() < 1e-12);
+        assert!((rates.z - yaw_rate * 0.4_f64.cos()).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_successor_goes_on_from_the_integrators_and_from_where_the_vehicle_is() {
+        let wrench = Wrench { thrust_N: 5.2, torque_B_N_m: Vector3::new(1e-3, -2e-3, 1e-3) };
+        let measured = Measurement { roll_rad: 0.05, yaw_rad: 1.0, ..level() };
+        let integrals =
+            PidState { altitude_m_s2: 0.3, roll_rad_s2: 0.1, pitch_rad_s2: f64::NAN, yaw_rad_s2: 9.0 };
+        let before = ControllerState { law: 1, integrals, ..ControllerState::default() };
+        let memory = law().taken_over(&before, &wrench, 1.0, &measured);
+        let expected = PidState { altitude_m_s2: 0.3, roll_rad_s2: 0.1, pitch_rad_s2: 0.0, yaw_rad_s2: 2.0 };
+        assert_eq!(memory.integrals, expected);
+        assert_eq!(memory.attitude_command, [0.05, 0.0, 1.0]);
+    }
+
+    #[test]
+    fn a_successor_that_knows_only_the_last_command_asks_for_its_thrust() {
+        let wrench = Wrench { thrust_N: 5.2, torque_B_N_m: Vector3::zeros() };
+        let memory = law().taken_over(&ControllerState::default(), &wrench, 1.0, &level());
+        let asked = law().demand(&mut memory.clone(), &hold(), &level()).wrench;
+        assert!((asked.thrust_N - wrench.thrust_N).abs() < 1e-12, "{asked:?}");
+    }
+}

@@ -1,0 +1,123 @@
+//! The acceleration that the model does not explain: drag, wind, a mass or a thrust that is off.
+//!
+//! An observer of Luenberger's kind (K. J. Åström and R. M. Murray, "Feedback Systems", section 8.2) runs the velocity
+//! along, v̂′ = a + d̂ + 2ω·(v − v̂) and d̂′ = ω²·(v − v̂), where a is what the thrust that the rotors are foreseen to make
+//! means at the estimated attitude. Both of its poles lie at ω. Where the model holds, d̂ stays zero however the vehicle
+//! is steered, so it takes nothing from the margins of the loop that it serves; held against the disturbance it does
+//! an integrator's work without one's overshoot.
+#![allow(non_snake_case, reason = "a trailing _W names the frame a vector is written in")]
+
+use crate::controller::{ControllerState, Motion};
+use crate::gains_file::limit;
+use nalgebra::Vector3;
+use vehicles::VehicleError;
+use vehicles::reader::Section;
+use vehicles::units::{ACCELERATION, SPEED};
+
+/// The observer's one number and its limit.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Observer {
+    /// ω, rad/s.
+    pub bandwidth_rad_s: f64,
+    /// The most that it believes along an axis of the world, m/s².
+    pub acceleration_max_m_s2: f64,
+}
+
+/// What it believes, in the world.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Disturbance {
+    /// d̂.
+    pub acceleration_W_m_s2: Vector3<f64>,
+    /// Its rate of change.
+    pub jerk_W_m_s3: Vector3<f64>,
+}
+
+impl Observer {
+    /// The observer as a gains file's section states it.
+    ///
+    /// # Errors
+    /// A number is missing or cannot be meant.
+    pub fn read(section: &Section<'_, '_>) -> Result<Self, VehicleError> {
+        let observer = Self {
+            bandwidth_rad_s: limit(section, "bandwidth", SPEED)?,
+            acceleration_max_m_s2: limit(section, "acceleration_max", ACCELERATION)?,
+        };
+        section.finish()?;
+        Ok(observer)
+    }
+
+    /// The disturbance now, where the model explains `model_W_m_s2`; advances the memory by one period.
+    pub fn step(
+        &self,
+        memory: &mut ControllerState,
+        motion: &Motion,
+        model_W_m_s2: &Vector3<f64>,
+        period_s: f64,
+    ) -> Disturbance {
+        let (omega, max_m_s2) = (self.bandwidth_rad_s, self.acceleration_max_m_s2);
+        let before_W_m_s = Vector3::from(memory.velocity_foreseen);
+        let missed_W_m_s = motion.velocity_W_m_s - before_W_m_s;
+        let free_W_m_s2 = missed_W_m_s * (omega * omega * period_s) - Vector3::from(memory.position_integral);
+        let acceleration_W_m_s2 = free_W_m_s2.map(|along| along.clamp(-max_m_s2, max_m_s2));
+        let slope_W_m_s2 = model_W_m_s2 + acceleration_W_m_s2 + missed_W_m_s * (2.0 * omega);
+        memory.position_integral = (-acceleration_W_m_s2).into();
+        memory.velocity_foreseen = (before_W_m_s + slope_W_m_s2 * period_s).into();
+        // At its limit it does not move.
+        let jerk_W_m_s3 = (missed_W_m_s * (omega * omega))
+            .zip_map(&acceleration_W_m_s2, |along, held| if held.abs() < max_m_s2 { along } else { 0.0 });
+        Disturbance { acceleration_W_m_s2, jerk_W_m_s3 }
+    }
+}
+
+/// Has the observer begin at this motion, without a disturbance.
+pub fn begin(memory: &mut ControllerState, motion: &Motion) {
+    memory.position_integral = [0.0; 3];
+    memory.velocity_foreseen = motion.velocity_W_m_s.into();
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::UnitQuaternion;
+
+    const OBSERVER: Observer = Observer { bandwidth_rad_s: 5.0, acceleration_max_m_s2: 3.0 };
+
+    fn moving(velocity_W_m_s: Vector3<f64>) -> Motion {
+        let zero = Vector3::zeros();
+        let attitude_WB = UnitQuaternion::identity();
+        Motion { position_W_m: zero, velocity_W_m_s, attitude_WB, angular_velocity_B_rad_s: zero }
+    }
+
+    /// What it believes after `time_s` of `true_W_m_s2` while the model says 1 m/s² along x.
+    fn believed(true_W_m_s2: Vector3<f64>, time_s: f64) -> Vector3<f64> {
+        let mut memory = ControllerState::default();
+        let mut velocity_W_m_s = Vector3::zeros();
+        begin(&mut memory, &moving(velocity_W_m_s));
+        let mut believed = Vector3::zeros();
+        for _ in 0..(time_s * 1e3) as usize {
+            believed =
+                OBSERVER.step(&mut memory, &moving(velocity_W_m_s), &Vector3::x(), 1e-3).acceleration_W_m_s2;
+            velocity_W_m_s += true_W_m_s2 * 1e-3;
+        }
+        believed
+    }
+
+    #[test]
+    fn what_the_model_explains_is_no_disturbance_and_what_it_does_not_is_found() {
+        assert!(believed(Vector3::x(), 1.0).norm() < 1e-12);
+        let found = believed(Vector3::new(1.0, 0.5, -0.2), 3.0);
+        assert!((found - Vector3::new(0.0, 0.5, -0.2)).norm() < 1e-3, "{found}");
+    }
+
+    /// The answer to a step of a system with both poles at ω: 1 − (1 + ω·t)·e^(−ω·t).
+    #[test]
+    fn a_step_is_found_with_the_stated_bandwidth() {
+        let part = believed(Vector3::new(1.0, 1.0, 0.0), 0.3).y;
+        assert!((part - (1.0 - 2.5 * (-1.5_f64).exp())).abs() < 5e-3, "{part}");
+    }
+
+    #[test]
+    fn it_believes_no_more_than_its_limit() {
+        assert_eq!(believed(Vector3::new(1.0, 50.0, 0.0), 2.0).y, 3.0);
+    }
+}

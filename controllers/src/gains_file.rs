@@ -1,0 +1,66 @@
+//! Gains files: TOML as vehicle files are, every number with its unit and source, positions in the errors.
+//!
+//! Each law has a room that says which tables its file has. The file that a law is tuned with is built in, and
+//! serves where the manifest names none.
+
+use std::path::Path;
+use vehicles::VehicleError;
+use vehicles::reader::{Document, Section};
+use vehicles::units::Dimension;
+
+/// What makes gains of a file's root table.
+pub type Reader<G> = fn(&Section<'_, '_>) -> Result<G, VehicleError>;
+
+/// The gains in the file at `path`.
+///
+/// # Errors
+/// The file cannot be read, or `read` refuses it.
+pub fn load<G>(path: &Path, read: Reader<G>) -> Result<G, VehicleError> {
+    let file = path.display().to_string();
+    match std::fs::read_to_string(path) {
+        Ok(text) => parse(&text, &file, read),
+        Err(cause) => Err(VehicleError::Unreadable { file, cause }),
+    }
+}
+
+/// The gains in `text`; `file_name` is for messages only.
+///
+/// # Errors
+/// `read` refuses the text, or it has a table that `read` does not know.
+pub fn parse<G>(text: &str, file_name: &str, read: Reader<G>) -> Result<G, VehicleError> {
+    let doc = Document::new(file_name, text);
+    let tree = doc.tree()?;
+    let root = Section::new(&doc, String::new(), 0..0, tree.get_ref());
+    let gains = read(&root)?;
+    root.finish()?;
+    Ok(gains)
+}
+
+/// A gain: zero or more, since a negative one turns a loop against itself.
+pub(crate) fn gain(section: &Section, name: &'static str, of: Dimension) -> Result<f64, VehicleError> {
+    Ok(section.chosen(name, of)?.not_negative(section.doc)?.si)
+}
+
+/// A limit or a time: more than zero.
+pub(crate) fn limit(section: &Section, name: &'static str, of: Dimension) -> Result<f64, VehicleError> {
+    Ok(section.chosen(name, of)?.positive(section.doc)?.si)
+}
+
+/// A limit that is more than zero and less than `bound`, which `expected` describes.
+pub(crate) fn limit_below(
+    section: &Section,
+    name: &'static str,
+    of: Dimension,
+    bound: f64,
+    expected: &str,
+) -> Result<f64, VehicleError> {
+    let chosen = section.chosen(name, of)?;
+    let holds = 0.0 < chosen.si && chosen.si < bound;
+    Ok(chosen.require(section.doc, holds, expected)?.si)
+}
+
+/// A tilt that the altitude loop can make up for.
+pub(crate) fn tilt(section: &Section, name: &'static str) -> Result<f64, VehicleError> {
+    let expected = "an angle above 0 and below 60 degrees, up to which the thrust makes up for a tilt";
+    limit_below(section, name, vehicles::units::ANGLE, std::f64::consts::FRAC_PI_3, expected)
+}

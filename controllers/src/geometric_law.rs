@@ -1,0 +1,182 @@
+//! Geometric tracking on SE(3): a reference with its derivatives and a motion to a wrench, at any attitude.
+//!
+//! T. Lee, M. Leok and N. H. McClamroch, "Geometric tracking control of a quadrotor UAV on SE(3)", CDC 2010, their
+//! z axis turned up and their gains divided by mass and inertia:
+//!
+//! | here | in the paper |
+//! |---|---|
+//! | e_x = x − x_d, e_v = v − v_d | tracking errors of position and velocity |
+//! | t = a_d + g·z − k_p·e_x − k_v·e_v − d̂ | the vector that its b_3c lies along; d̂ is the `disturbance` that is observed |
+//! | R_c: body z along t, the yaw of the reference | R_c, with the yaw of `flatness` |
+//! | thrust = m·t·(R z) | f |
+//! | e_R = ½(R_cᵀR − RᵀR_c)^∨, e_Ω = Ω − RᵀR_c·Ω_c | tracking errors of attitude and angular velocity |
+//! | torque = J·(−k_R·e_R − k_Ω·e_Ω) + Ω × JΩ − J·([Ω]×RᵀR_c·Ω_c − RᵀR_c·Ω_c′) | M |
+//!
+//! Ω_c and its rate follow from the first two derivatives of t, which hold the reference's jerk and snap and those of
+//! the errors: the paper leaves open where the errors of acceleration and jerk come from; here they are what the
+//! thrust that the rotors are foreseen to make (`motor_lag`) means at the estimated attitude and rates, and d̂.
+#![allow(
+    non_snake_case,
+    reason = "a trailing _W or _B names the frame a vector is written in, _N the newton"
+)]
+
+use crate::allocation::{Allocation, THRUST_RESERVE, Wrench};
+use crate::controller::{Airframe, Controller, ControllerState, Demand, Motion, Told};
+use crate::course::Point;
+use crate::disturbance::Disturbance;
+use crate::flatness::{self, Moving, Target};
+use crate::foresight;
+use crate::geometric_gains::GeometricGains;
+use crate::motor_lag::{Made, MotorLag};
+use crate::set_points::SetPoint;
+use crate::trajectory;
+use nalgebra::{Matrix3, Vector3};
+
+/// The law at one period: all that does not change during a run.
+#[derive(Debug, Clone, PartialEq)]
+pub struct GeometricLaw {
+    gains: GeometricGains,
+    mass_kg: f64,
+    inertia_B_kg_m2: Matrix3<f64>,
+    gravity_m_s2: f64,
+    allocation: Allocation,
+    lag: MotorLag,
+    period_s: f64,
+}
+
+/// How far the vehicle is off its reference, and what the reference does: in the world.
+struct Errors {
+    position_W_m: Vector3<f64>,
+    velocity_W_m_s: Vector3<f64>,
+    acceleration_W_m_s2: Vector3<f64>,
+    jerk_W_m_s3: Vector3<f64>,
+}
+
+/// How the model has the vehicle move, in the world.
+struct Push {
+    acceleration_W_m_s2: Vector3<f64>,
+    jerk_W_m_s3: Vector3<f64>,
+}
+
+impl GeometricLaw {
+    /// The law for `airframe`.
+    #[must_use]
+    pub fn new(gains: GeometricGains, airframe: &Airframe, period_s: f64) -> Self {
+        let vehicle = &airframe.vehicle;
+        Self {
+            gains,
+            mass_kg: vehicle.mass_kg,
+            inertia_B_kg_m2: vehicle.inertia_kg_m2,
+            gravity_m_s2: vehicle.gravity_m_s2,
+            allocation: airframe.allocation,
+            lag: MotorLag::new(vehicle.motor, period_s),
+            period_s,
+        }
+    }
+
+    /// The demand, and the attitude behind it; advances the observer.
+    fn asked(&self, memory: &mut ControllerState, made: &Made, told: &Told<'_>) -> (Wrench, Target) {
+        let (reference, motion) = (&trajectory::point(told.reference), &told.motion);
+        let push = self.push(made, motion);
+        let disturbance = self.gains.observer.step(memory, motion, &push.acceleration_W_m_s2, self.period_s);
+        let errors = errors(&push, &disturbance, reference, motion);
+        let thrust_W_m_s2 = self.thrust_vector(&disturbance, &errors, reference);
+        let target = flatness::target(&thrust_W_m_s2, reference.yaw_rad, reference.yaw_rate_rad_s);
+        let z_W = motion.attitude_WB * Vector3::z();
+        let wanted = Wrench {
+            thrust_N: self.mass_kg * thrust_W_m_s2.value.dot(&z_W),
+            torque_B_N_m: self.torque(&target, motion),
+        };
+        let hurried = self.lag.hurried(&self.gains.motor, made, &wanted);
+        (self.within_limits(hurried), target)
+    }
+
+    /// Leaves room for roll and pitch.
+    fn within_limits(&self, wrench: Wrench) -> Wrench {
+        let (min_N, max_N) = self.allocation.thrust_range_N(THRUST_RESERVE);
+        Wrench { thrust_N: wrench.thrust_N.clamp(min_N, max_N), ..wrench }
+    }
+
+    /// What the model makes of the vehicle's motion: rotors as foreseen, gravity, and drag where it is stated.
+    fn push(&self, made: &Made, motion: &Motion) -> Push {
+        let z_W = motion.attitude_WB * Vector3::z();
+        let turning_W = motion.attitude_WB * motion.angular_velocity_B_rad_s.cross(&Vector3::z());
+        let (push_m_s2, push_rate_m_s3) =
+            (made.wrench.thrust_N / self.mass_kg, made.rate.thrust_N / self.mass_kg);
+        let drag_1_s = self.gains.drag_1_s;
+        let acceleration_W_m_s2 =
+            z_W * push_m_s2 - Vector3::z() * self.gravity_m_s2 - motion.velocity_W_m_s * drag_1_s;
+        let jerk_W_m_s3 = turning_W * push_m_s2 + z_W * push_rate_m_s3 - acceleration_W_m_s2 * drag_1_s;
+        Push { acceleration_W_m_s2, jerk_W_m_s3 }
+    }
+
+    /// Thrust for each unit of mass with two derivatives: t of the table above.
+    fn thrust_vector(&self, disturbance: &Disturbance, errors: &Errors, reference: &Point) -> Moving {
+        let gains = &self.gains;
+        let (kp, kv) = (gains.position_proportional_1_s2, gains.position_derivative_1_s);
+        let answer = -errors.position_W_m * kp - errors.velocity_W_m_s * kv - disturbance.acceleration_W_m_s2;
+        let answer_first =
+            -errors.velocity_W_m_s * kp - errors.acceleration_W_m_s2 * kv - disturbance.jerk_W_m_s3;
+        let answer_second = -errors.acceleration_W_m_s2 * kp - errors.jerk_W_m_s3 * kv;
+        // What exceeds the limit is scaled down with its derivatives.
+        let part = (gains.acceleration_max_m_s2 / answer.norm()).min(1.0);
+        let ahead = |order: usize| reference.path_W[order] + reference.path_W[order - 1] * gains.drag_1_s;
+        let acceleration_W = Moving {
+            value: ahead(2) + answer * part,
+            first: ahead(3) + answer_first * part,
+            second: ahead(4) + answer_second * part,
+        };
+        acceleration_W.against(self.gravity_m_s2)
+    }
+
+    fn torque(&self, target: &Target, motion: &Motion) -> Vector3<f64> {
+        let rate_B = motion.angular_velocity_B_rad_s;
+        // Takes the target's axes to the body's: RᵀR_c.
+        let relative = motion.attitude_WB.inverse() * target.attitude_WB;
+        let matrix = relative.to_rotation_matrix().into_inner();
+        let skew = (matrix.transpose() - matrix) * 0.5;
+        let attitude_error = Vector3::new(skew.m32, skew.m13, skew.m21);
+        let target_rate_B = relative * target.angular_velocity_B_rad_s;
+        let rate_error_B = rate_B - target_rate_B;
+        let ahead_B = relative * target.angular_acceleration_B_rad_s2 - rate_B.cross(&target_rate_B);
+        let gains = &self.gains;
+        let (tilt, yaw) = (gains.attitude_proportional_1_s2, gains.yaw_proportional_1_s2);
+        let (tilt_rate, yaw_rate) = (gains.attitude_derivative_1_s, gains.yaw_derivative_1_s);
+        let acceleration_B = ahead_B
+            - Vector3::new(tilt, tilt, yaw).component_mul(&attitude_error)
+            - Vector3::new(tilt_rate, tilt_rate, yaw_rate).component_mul(&rate_error_B);
+        self.inertia_B_kg_m2 * acceleration_B + rate_B.cross(&(self.inertia_B_kg_m2 * rate_B))
+    }
+}
+
+impl Controller for GeometricLaw {
+    const LAW: u32 = 7;
+
+    fn step(&self, memory: &mut ControllerState, told: &Told<'_>) -> Demand {
+        let made = Made::foreseen(&self.lag, &self.allocation, memory);
+        made.store(memory);
+        let (wrench, target) = self.asked(memory, &made, told);
+        let (roll_rad, pitch_rad, yaw_rad) = target.attitude_WB.euler_angles();
+        let set_point = SetPoint { altitude_m: told.reference.position.z, roll_rad, pitch_rad, yaw_rad };
+        Demand { wrench, set_point, ..Demand::default() }
+    }
+
+    fn fresh(&self, told: &Told<'_>) -> ControllerState {
+        foresight::fresh(self.mass_kg * self.gravity_m_s2, told)
+    }
+
+    fn tracking(&self, memory: &ControllerState, wrench: &Wrench, told: &Told<'_>) -> ControllerState {
+        foresight::tracking::<Self>(memory, wrench, told)
+    }
+}
+
+fn errors(push: &Push, disturbance: &Disturbance, reference: &Point, motion: &Motion) -> Errors {
+    let acceleration_W_m_s2 = push.acceleration_W_m_s2 + disturbance.acceleration_W_m_s2;
+    let jerk_W_m_s3 = push.jerk_W_m_s3 + disturbance.jerk_W_m_s3;
+    Errors {
+        position_W_m: motion.position_W_m - reference.path_W[0],
+        velocity_W_m_s: motion.velocity_W_m_s - reference.path_W[1],
+        acceleration_W_m_s2: acceleration_W_m_s2 - reference.path_W[2],
+        jerk_W_m_s3: jerk_W_m_s3 - reference.path_W[3],
+    }
+}

@@ -1,0 +1,49 @@
+//! The LQR controller node: a trajectory's reference to four motor commands.
+
+use crate::controller::{self, Airframe};
+use crate::lqr_gains::LqrGains;
+use crate::lqr_law::LqrLaw;
+use bus::kind::{Inputs, NodeKind, PortSpec, read_parameters};
+use bus::messages::{AttitudeEstimate, ControlStatus, MotorCommand, Reference, StateEstimate};
+use bus::{BusError, Message, Node};
+use serde::Deserialize;
+use std::path::PathBuf;
+
+/// The LQR controller, for manifests.
+pub const KIND: NodeKind = NodeKind {
+    name: "lqr",
+    summary: "linear-quadratic regulator about hover, its gains computed at the start from the vehicle file",
+    inputs: Inputs::Ports(&[
+        PortSpec::required("reference", Reference::SCHEMA),
+        PortSpec::required("estimate", StateEstimate::SCHEMA),
+        PortSpec::optional("attitude", AttitudeEstimate::SCHEMA),
+    ]),
+    outputs: &[
+        PortSpec::required("command", MotorCommand::SCHEMA),
+        PortSpec::optional("status", ControlStatus::SCHEMA),
+    ],
+    check: |parameters, _| build(&read_parameters(parameters)?, 1e-3).map(|_| ()),
+    run,
+};
+
+/// Parameters of the LQR controller.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Parameters {
+    /// Vehicle file.
+    vehicle: PathBuf,
+    /// Weights file; the built-in weights where absent.
+    gains: Option<PathBuf>,
+}
+
+fn build(parameters: &Parameters, period_s: f64) -> Result<(LqrLaw, Airframe), String> {
+    let airframe = Airframe::load(&parameters.vehicle)?;
+    let gains = LqrGains::load(parameters.gains.as_deref()).map_err(|error| error.to_string())?;
+    Ok((LqrLaw::new(gains, &airframe, period_s)?, airframe))
+}
+
+fn run() -> Result<(), BusError> {
+    let node = Node::join()?;
+    let (law, airframe) = build(&node.parameters()?, node.period_s()).map_err(|error| node.error(error))?;
+    controller::run(node, &law, &airframe.allocation, &airframe.vehicle)
+}

@@ -1,0 +1,168 @@
+//! The linear-quadratic regulator about hover, made to follow a reference.
+//!
+//! The gain K of `riccati` for the model of `lqr_model` is computed at the start from the vehicle file and the weights.
+//! The demand is u = u_d − K·(x − x_d): x_d is what the reference's acceleration, jerk and snap and the observed
+//! disturbance need by `flatness` (attitude, rates, wrench), u_d the wrench that the motors, which lag by 2ζ/ω_n, have to be
+//! asked for to make it. Position and velocity are compared in axes that turn with the vehicle's heading, attitude and
+//! rates in the axes of x_d, so that any yaw and any tilt of the reference is a hover to the regulator.
+#![allow(
+    non_snake_case,
+    reason = "a trailing _W or _B names the frame a vector is written in, _N the newton"
+)]
+
+use crate::allocation::{Allocation, THRUST_RESERVE, Wrench};
+use crate::controller::{Airframe, Controller, ControllerState, Demand, Motion, Told};
+use crate::course::Point;
+use crate::disturbance::Disturbance;
+use crate::flatness::{self, Moving, Target};
+use crate::foresight;
+use crate::lqr_gains::LqrGains;
+use crate::lqr_model::{self, INPUTS, MADE, MADE_RATE, RATE, ROTATION, STATES, VELOCITY};
+use crate::motor_lag::{Made, MotorLag};
+use crate::riccati;
+use crate::set_points::SetPoint;
+use crate::trajectory;
+use nalgebra::{Matrix3, Rotation3, SMatrix, SVector, Vector3};
+
+/// The law at one period: all that does not change during a run.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LqrLaw {
+    gains: LqrGains,
+    gain: SMatrix<f64, INPUTS, STATES>,
+    mass_kg: f64,
+    inertia_B_kg_m2: Matrix3<f64>,
+    gravity_m_s2: f64,
+    allocation: Allocation,
+    lag: MotorLag,
+    period_s: f64,
+}
+
+/// What the reference needs.
+struct Needed {
+    attitude: Target,
+    wrench: Wrench,
+    thrust_rate_N_s: f64,
+}
+
+impl LqrLaw {
+    /// The law for `airframe`.
+    ///
+    /// # Errors
+    /// The Riccati equation has no solution that stabilises the vehicle, or none that can be computed.
+    pub fn new(gains: LqrGains, airframe: &Airframe, period_s: f64) -> Result<Self, String> {
+        let vehicle = &airframe.vehicle;
+        let (state_weights, input_weights) = lqr_model::weights(&gains);
+        let regulator = lqr_model::step(vehicle, period_s).and_then(|step| {
+            riccati::regulator(&step.transition, &step.input, &state_weights, &input_weights)
+        });
+        let regulator = regulator.ok_or(
+            "the Riccati equation for this `vehicle` and these `gains` has no stabilising solution that can be \
+             computed: look for a vehicle without gravity, or weights that are many orders of magnitude apart",
+        )?;
+        Ok(Self {
+            gains,
+            gain: regulator.gain.fixed_view::<INPUTS, STATES>(0, 0).into(),
+            mass_kg: vehicle.mass_kg,
+            inertia_B_kg_m2: vehicle.inertia_kg_m2,
+            gravity_m_s2: vehicle.gravity_m_s2,
+            allocation: airframe.allocation,
+            lag: MotorLag::new(vehicle.motor, period_s),
+            period_s,
+        })
+    }
+
+    /// K: what each state's deviation takes off the demanded thrust (N) and torque (N·m).
+    #[must_use]
+    pub fn gain(&self) -> &SMatrix<f64, INPUTS, STATES> {
+        &self.gain
+    }
+
+    fn needed(&self, disturbance: &Disturbance, reference: &Point) -> Needed {
+        let [_, _, acceleration_W, jerk_W, snap_W] = reference.path_W;
+        let wanted_W = Moving {
+            value: acceleration_W - disturbance.acceleration_W_m_s2,
+            first: jerk_W - disturbance.jerk_W_m_s3,
+            second: snap_W,
+        };
+        let thrust_W = wanted_W.against(self.gravity_m_s2);
+        let attitude = flatness::target(&thrust_W, reference.yaw_rad, reference.yaw_rate_rad_s);
+        let (rate_B, inertia) = (attitude.angular_velocity_B_rad_s, &self.inertia_B_kg_m2);
+        let torque_B_N_m =
+            inertia * attitude.angular_acceleration_B_rad_s2 + rate_B.cross(&(inertia * rate_B));
+        let z_W = thrust_W.value.normalize();
+        Needed {
+            attitude,
+            wrench: Wrench { thrust_N: self.mass_kg * thrust_W.value.norm(), torque_B_N_m },
+            thrust_rate_N_s: self.mass_kg * thrust_W.first.dot(&z_W),
+        }
+    }
+
+    /// x − x_d.
+    fn deviation(
+        &self,
+        needed: &Needed,
+        made: &Made,
+        motion: &Motion,
+        reference: &Point,
+    ) -> SVector<f64, STATES> {
+        let off_W_m = motion.position_W_m - reference.path_W[0];
+        let off_W_m_s = motion.velocity_W_m_s - reference.path_W[1];
+        let (_, _, heading_rad) = motion.attitude_WB.euler_angles();
+        let to_heading = Rotation3::from_axis_angle(&Vector3::z_axis(), -heading_rad);
+        let relative = needed.attitude.attitude_WB.inverse() * motion.attitude_WB;
+        let rate = relative * motion.angular_velocity_B_rad_s - needed.attitude.angular_velocity_B_rad_s;
+        let mut deviation: SVector<f64, STATES> = SVector::zeros();
+        let mut set = |at: usize, part: Vector3<f64>| deviation.fixed_rows_mut::<3>(at).copy_from(&part);
+        set(0, to_heading * off_W_m.cap_magnitude(self.gains.position_max_m));
+        set(VELOCITY, to_heading * off_W_m_s.cap_magnitude(self.gains.velocity_max_m_s));
+        set(ROTATION, relative.scaled_axis());
+        set(RATE, rate);
+        set(MADE + 1, made.wrench.torque_B_N_m - needed.wrench.torque_B_N_m);
+        set(MADE_RATE + 1, made.rate.torque_B_N_m);
+        deviation[MADE] = made.wrench.thrust_N - needed.wrench.thrust_N;
+        deviation[MADE_RATE] = made.rate.thrust_N - needed.thrust_rate_N_s;
+        deviation
+    }
+
+    fn demand(&self, needed: &Needed, deviation: &SVector<f64, STATES>) -> Wrench {
+        let answer = self.gain * deviation;
+        let ahead_N = self.lag.delay_s() * needed.thrust_rate_N_s;
+        let (min_N, max_N) = self.allocation.thrust_range_N(THRUST_RESERVE);
+        Wrench {
+            thrust_N: (needed.wrench.thrust_N + ahead_N - answer[0]).clamp(min_N, max_N),
+            torque_B_N_m: needed.wrench.torque_B_N_m - answer.fixed_rows::<3>(1),
+        }
+    }
+
+    /// The acceleration that the foreseen thrust means.
+    fn explained_W_m_s2(&self, made: &Made, motion: &Motion) -> Vector3<f64> {
+        let thrust_B_m_s2 = Vector3::z() * (made.wrench.thrust_N / self.mass_kg);
+        motion.attitude_WB * thrust_B_m_s2 - Vector3::z() * self.gravity_m_s2
+    }
+}
+
+impl Controller for LqrLaw {
+    const LAW: u32 = 6;
+
+    fn step(&self, memory: &mut ControllerState, told: &Told<'_>) -> Demand {
+        let made = Made::foreseen(&self.lag, &self.allocation, memory);
+        made.store(memory);
+        let explained_W_m_s2 = self.explained_W_m_s2(&made, &told.motion);
+        let disturbance = self.gains.observer.step(memory, &told.motion, &explained_W_m_s2, self.period_s);
+        let reference = trajectory::point(told.reference);
+        let needed = self.needed(&disturbance, &reference);
+        let deviation = self.deviation(&needed, &made, &told.motion, &reference);
+        let wrench = self.demand(&needed, &deviation);
+        let (roll_rad, pitch_rad, yaw_rad) = needed.attitude.attitude_WB.euler_angles();
+        let set_point = SetPoint { altitude_m: told.reference.position.z, roll_rad, pitch_rad, yaw_rad };
+        Demand { wrench, set_point, ..Demand::default() }
+    }
+
+    fn fresh(&self, told: &Told<'_>) -> ControllerState {
+        foresight::fresh(self.mass_kg * self.gravity_m_s2, told)
+    }
+
+    fn tracking(&self, memory: &ControllerState, wrench: &Wrench, told: &Told<'_>) -> ControllerState {
+        foresight::tracking::<Self>(memory, wrench, told)
+    }
+}

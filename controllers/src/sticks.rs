@@ -1,0 +1,276 @@
+//! A recording of a pilot's sticks: a CSV file of commands over time.
+//!
+//! | column | unit | |
+//! |---|---|---|
+//! | `time_s` | s | rising from row to row; tick 0 of the run is at 0 |
+//! | `roll_deg`, `pitch_deg` | deg | as the sticks ask for, positive for left side up and nose down |
+//! | `yaw_rate_deg_s` | deg/s | may be left out; integrated to a yaw that comes round at 360° |
+//! | `altitude_m` | m | may be left out |
+//!
+//! Between two rows a value is on the straight line between theirs. Before the first row and after the last it
+//! is theirs, but the yaw rests there.
+
+use crate::angle::wrap_rad;
+use crate::set_points::SetPoint;
+use std::path::Path;
+
+/// A recording of sticks, at least one row.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Sticks {
+    rows: Vec<Row>,
+    has_yaw_rate: bool,
+    has_altitude: bool,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+struct Row {
+    time_s: f64,
+    roll_rad: f64,
+    pitch_rad: f64,
+    yaw_rate_rad_s: f64,
+    /// The rate's integral up to here.
+    yaw_rad: f64,
+    altitude_m: f64,
+}
+
+/// A recording that cannot be read.
+#[derive(Debug, thiserror::Error)]
+pub enum SticksError {
+    /// Not there, or not CSV.
+    #[error(
+        "{file}: cannot read these sticks: {cause}; check the path, and that it is a CSV file with a header"
+    )]
+    Unreadable {
+        /// The path as given.
+        file: String,
+        /// Why.
+        #[source]
+        cause: csv::Error,
+    },
+    /// A header that lacks a column or has one too many.
+    #[error("{file}:1: expected the columns {expected}, found {found}")]
+    Columns {
+        /// The path as given.
+        file: String,
+        /// What may stand there.
+        expected: &'static str,
+        /// What does.
+        found: String,
+    },
+    /// A value that cannot be meant.
+    #[error("{file}:{line}: column `{column}`: expected {expected}, found {found}")]
+    Value {
+        /// The path as given.
+        file: String,
+        /// The line, from 1.
+        line: u64,
+        /// The column.
+        column: &'static str,
+        /// What may stand there.
+        expected: &'static str,
+        /// What does.
+        found: String,
+    },
+    /// No rows.
+    #[error("{file}: expected at least one row of sticks, found none")]
+    Empty {
+        /// The path as given.
+        file: String,
+    },
+}
+
+const COLUMNS: [&str; 5] = ["time_s", "roll_deg", "pitch_deg", "yaw_rate_deg_s", "altitude_m"];
+const EXPECTED: &str = "time_s, roll_deg, pitch_deg and, if recorded, yaw_rate_deg_s, altitude_m";
+
+impl Sticks {
+    /// The recording at `path`.
+    ///
+    /// # Errors
+    /// It cannot be read, or holds what no sticks can ask for.
+    pub fn load(path: &Path) -> Result<Self, SticksError> {
+        let file = path.display().to_string();
+        match csv::ReaderBuilder::new().trim(csv::Trim::All).from_path(path) {
+            Ok(reader) => Self::read(reader, &file),
+            Err(cause) => Err(SticksError::Unreadable { file, cause }),
+        }
+    }
+
+    fn read<R: std::io::Read>(mut reader: csv::Reader<R>, file: &str) -> Result<Self, SticksError> {
+        let unreadable = |cause| SticksError::Unreadable { file: file.to_owned(), cause };
+        let places = Places::of(reader.headers().map_err(unreadable)?, file)?;
+        let mut rows: Vec<Row> = Vec::new();
+        for record in reader.records() {
+            let row = places.row(&record.map_err(unreadable)?, rows.last(), file)?;
+            rows.push(row);
+        }
+        if rows.is_empty() {
+            return Err(SticksError::Empty { file: file.to_owned() });
+        }
+        Ok(Self { rows, has_yaw_rate: places.0[3].is_some(), has_altitude: places.0[4].is_some() })
+    }
+
+    /// Whether the recording has the set point's `channel`.
+    #[must_use]
+    pub fn has(&self, channel: &str) -> bool {
+        match channel {
+            "roll" | "pitch" => true,
+            "yaw" => self.has_yaw_rate,
+            "altitude" => self.has_altitude,
+            _ => false,
+        }
+    }
+
+    /// What the sticks ask for at `time_s`; `beside` on the channels that the recording does not have.
+    #[must_use]
+    pub fn at(&self, time_s: f64, beside: &SetPoint) -> SetPoint {
+        let row = self.row_at(time_s);
+        SetPoint {
+            altitude_m: if self.has_altitude { row.altitude_m } else { beside.altitude_m },
+            roll_rad: row.roll_rad,
+            pitch_rad: row.pitch_rad,
+            yaw_rad: if self.has_yaw_rate { wrap_rad(row.yaw_rad) } else { beside.yaw_rad },
+        }
+    }
+
+    fn row_at(&self, time_s: f64) -> Row {
+        let next = self.rows.partition_point(|row| row.time_s <= time_s);
+        match (next.checked_sub(1).map(|last| self.rows[last]), self.rows.get(next)) {
+            (Some(last), Some(next)) => last.towards(next, time_s),
+            (Some(last), None) => last,
+            (None, _) => self.rows[0],
+        }
+    }
+}
+
+impl Row {
+    fn towards(&self, next: &Row, time_s: f64) -> Row {
+        let part = (time_s - self.time_s) / (next.time_s - self.time_s);
+        let between = |from: f64, to: f64| from + (to - from) * part;
+        let yaw_rate_rad_s = between(self.yaw_rate_rad_s, next.yaw_rate_rad_s);
+        Row {
+            time_s,
+            roll_rad: between(self.roll_rad, next.roll_rad),
+            pitch_rad: between(self.pitch_rad, next.pitch_rad),
+            yaw_rate_rad_s,
+            yaw_rad: self.turned_rad(yaw_rate_rad_s, time_s),
+            altitude_m: between(self.altitude_m, next.altitude_m),
+        }
+    }
+
+    /// The yaw at `time_s`, to which the rate has changed evenly: the trapezium under it is exact.
+    fn turned_rad(&self, yaw_rate_rad_s: f64, time_s: f64) -> f64 {
+        self.yaw_rad + 0.5 * (self.yaw_rate_rad_s + yaw_rate_rad_s) * (time_s - self.time_s)
+    }
+}
+
+/// Where in a row each of [`COLUMNS`] stands.
+struct Places([Option<usize>; 5]);
+
+impl Places {
+    fn of(header: &csv::StringRecord, file: &str) -> Result<Self, SticksError> {
+        let places = COLUMNS.map(|column| header.iter().position(|name| name == column));
+        let known = places.iter().flatten().count();
+        if places[..3].iter().all(Option::is_some) && known == header.len() {
+            return Ok(Self(places));
+        }
+        let found = header.iter().collect::<Vec<_>>().join(", ");
+        Err(SticksError::Columns { file: file.to_owned(), expected: EXPECTED, found })
+    }
+
+    fn row(&self, record: &csv::StringRecord, before: Option<&Row>, file: &str) -> Result<Row, SticksError> {
+        let number = |column: usize| self.number(record, column, file);
+        let time_s = number(0)?;
+        if before.is_some_and(|before| before.time_s >= time_s) {
+            let expected = "a time after the row before";
+            return Err(value_error(record, file, 0, expected, time_s.to_string()));
+        }
+        let yaw_rate_rad_s = number(3)?.to_radians();
+        Ok(Row {
+            time_s,
+            roll_rad: number(1)?.to_radians(),
+            pitch_rad: number(2)?.to_radians(),
+            yaw_rate_rad_s,
+            yaw_rad: before.map_or(0.0, |before| before.turned_rad(yaw_rate_rad_s, time_s)),
+            altitude_m: number(4)?,
+        })
+    }
+
+    /// The number in a column, 0 where the recording does not have it.
+    fn number(&self, record: &csv::StringRecord, column: usize, file: &str) -> Result<f64, SticksError> {
+        let Some(place) = self.0[column] else { return Ok(0.0) };
+        let text = record.get(place).unwrap_or_default();
+        let number = text.parse().ok().filter(|number: &f64| number.is_finite());
+        number.ok_or_else(|| value_error(record, file, column, "a finite number", format!("\"{text}\"")))
+    }
+}
+
+fn value_error(
+    record: &csv::StringRecord,
+    file: &str,
+    column: usize,
+    expected: &'static str,
+    found: String,
+) -> SticksError {
+    let line = record.position().map_or(0, csv::Position::line);
+    SticksError::Value { file: file.to_owned(), line, column: COLUMNS[column], expected, found }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn sticks(text: &str) -> Result<Sticks, SticksError> {
+        Sticks::read(csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(text.as_bytes()), "s.csv")
+    }
+
+    fn beside() -> SetPoint {
+        SetPoint { altitude_m: 1.5, yaw_rad: 0.4, ..SetPoint::default() }
+    }
+
+    #[test]
+    fn values_lie_on_the_line_between_rows_and_stay_at_the_ends() {
+        let sticks = sticks("time_s, roll_deg, pitch_deg\n1, 0, 3\n2, 10, 3\n").unwrap();
+        let roll_deg = |time_s| sticks.at(time_s, &beside()).roll_rad.to_degrees();
+        for (time_s, expected_deg) in [(0.0, 0.0), (1.0, 0.0), (1.25, 2.5), (2.0, 10.0), (9.0, 10.0)] {
+            assert!((roll_deg(time_s) - expected_deg).abs() < 1e-12, "at {time_s}");
+        }
+        let held = sticks.at(1.5, &beside());
+        assert_eq!((held.altitude_m, held.yaw_rad), (1.5, 0.4));
+        assert!(sticks.has("pitch") && !sticks.has("yaw") && !sticks.has("altitude"));
+    }
+
+    #[test]
+    fn a_yaw_rate_is_integrated_and_comes_round() {
+        let text =
+            "time_s,roll_deg,pitch_deg,yaw_rate_deg_s,altitude_m\n0,0,0,0,1\n2,0,0,100,2\n4,0,0,100,2\n";
+        let sticks = sticks(text).unwrap();
+        let yaw_deg = |time_s| sticks.at(time_s, &beside()).yaw_rad.to_degrees();
+        for (time_s, expected_deg) in [(1.0, 25.0), (2.0, 100.0), (3.0, -160.0), (4.0, -60.0), (9.0, -60.0)] {
+            assert!((yaw_deg(time_s) - expected_deg).abs() < 1e-9, "{} at {time_s}", yaw_deg(time_s));
+        }
+        assert_eq!(sticks.at(1.0, &beside()).altitude_m, 1.5);
+    }
+
+    #[test]
+    fn errors_name_file_line_column_and_what_was_found() {
+        let header = "time_s,roll_deg,pitch_deg\n";
+        let cases = [
+            (format!("{header}0,1,2\n0,1,2\n"), "s.csv:3: column `time_s`: expected a time after"),
+            (format!("{header}0,x,2\n"), "s.csv:2: column `roll_deg`: expected a finite number, found \"x\""),
+            (format!("{header}0,1,nan\n"), "column `pitch_deg`"),
+            ("time_s,roll_deg\n".to_owned(), "expected the columns time_s, roll_deg, pitch_deg"),
+            (
+                "time_s,roll_deg,pitch_deg,throttle\n".to_owned(),
+                "found time_s, roll_deg, pitch_deg, throttle",
+            ),
+            (header.to_owned(), "expected at least one row"),
+            (format!("{header}0,1\n"), "cannot read these sticks"),
+        ];
+        for (text, expected) in cases {
+            let error = sticks(&text).unwrap_err().to_string();
+            assert!(error.contains(expected), "{error}");
+        }
+        let error = Sticks::load(Path::new("no-such.csv")).unwrap_err().to_string();
+        assert!(error.contains("no-such.csv") && error.contains("check the path"), "{error}");
+    }
+}

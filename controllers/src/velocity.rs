@@ -1,0 +1,93 @@
+//! The velocity controller node: a velocity command to four motor commands.
+
+use crate::controller::{self, Airframe};
+use crate::velocity_law::{Course, LoopsGains, VelocityLaw, VelocityLoop};
+use bus::kind::{Inputs, NodeKind, PortSpec, read_parameters};
+use bus::messages::{AttitudeEstimate, ControlStatus, MotorCommand, Reference, StateEstimate};
+use bus::{BusError, Message, Node};
+use serde::Deserialize;
+use std::path::PathBuf;
+
+/// The velocity controller, for manifests.
+pub const KIND: NodeKind = NodeKind {
+    name: "velocity",
+    summary: "velocity PD around the cascade's inner loops",
+    inputs: Inputs::Ports(&[
+        PortSpec::required("estimate", StateEstimate::SCHEMA),
+        PortSpec::optional("attitude", AttitudeEstimate::SCHEMA),
+        PortSpec::optional("reference", Reference::SCHEMA),
+    ]),
+    outputs: &[
+        PortSpec::required("command", MotorCommand::SCHEMA),
+        PortSpec::optional("status", ControlStatus::SCHEMA),
+    ],
+    check: |parameters, inputs| {
+        let parameters: Parameters = read_parameters(parameters)?;
+        parameters.check(inputs.contains(&"reference"))?;
+        build(&parameters, 1.0).map(|_| ())
+    },
+    run,
+};
+
+/// Parameters of the velocity controller.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Parameters {
+    /// Vehicle file.
+    vehicle: PathBuf,
+    /// Gains file; the built-in `controllers/gains/velocity.toml` where there is none.
+    gains: Option<PathBuf>,
+    /// Velocity along the heading's level axes, without a reference.
+    velocity_m_s: Option<[f64; 2]>,
+    /// Height, without a reference.
+    altitude_m: Option<f64>,
+    /// Yaw, without a reference.
+    yaw_rad: Option<f64>,
+}
+
+impl Parameters {
+    /// A course is given by a reference or by parameters, never by both.
+    fn check(&self, has_reference: bool) -> Result<(), String> {
+        let given = [
+            ("velocity_m_s", self.velocity_m_s.is_some()),
+            ("altitude_m", self.altitude_m.is_some()),
+            ("yaw_rad", self.yaw_rad.is_some()),
+        ];
+        match given.into_iter().find(|(_, is_given)| *is_given) {
+            Some((key, _)) if has_reference => {
+                Err(format!("`{key}` is given, and so is the input `reference`; leave one of them out"))
+            }
+            _ if !has_reference && self.altitude_m.is_none() => Err("missing field `altitude_m`: without \
+                the input `reference` a velocity controller needs `altitude_m` and `velocity_m_s`"
+                .to_owned()),
+            _ => Ok(()),
+        }
+    }
+
+    fn course(&self) -> Result<Option<Course>, String> {
+        let Some(altitude_m) = self.altitude_m else { return Ok(None) };
+        let course = Course {
+            velocity_m_s: self.velocity_m_s.unwrap_or_default(),
+            feed_forward_m_s2: [0.0; 2],
+            altitude_m,
+            yaw_rad: self.yaw_rad.unwrap_or_default(),
+        };
+        controller::finite("altitude_m", altitude_m)?;
+        controller::finite("yaw_rad", course.yaw_rad)?;
+        course.velocity_m_s.iter().try_for_each(|speed| controller::finite("velocity_m_s", *speed))?;
+        Ok(Some(course))
+    }
+}
+
+fn build(parameters: &Parameters, period_s: f64) -> Result<(VelocityLaw, Airframe), String> {
+    let airframe = Airframe::load(&parameters.vehicle)?;
+    let gains = LoopsGains::load(parameters.gains.as_deref()).map_err(|error| error.to_string())?;
+    let velocity = VelocityLoop::new(&gains, airframe.known(), period_s);
+    Ok((VelocityLaw { velocity, constant: parameters.course()? }, airframe))
+}
+
+fn run() -> Result<(), BusError> {
+    let node = Node::join()?;
+    let (law, airframe) = build(&node.parameters()?, node.period_s()).map_err(|error| node.error(error))?;
+    controller::run(node, &law, &airframe.allocation, &airframe.vehicle)
+}

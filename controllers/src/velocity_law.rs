@@ -1,0 +1,321 @@
+//! Velocity PD around the cascade (thesis Fig 5.47): a velocity along the heading's level axes to roll and
+//! pitch commands.
+//!
+//! a = a_ff + Kp·(v_c − v) − Kd·dv/dt + integral, cut to a limit. At constant height the thrust is
+//! m·g / (cos φ·cos θ), and its level part accelerates by g·tan θ along the heading's x and by −g·tan φ / cos θ
+//! along its y. So θ = atan(a_x / g), positive for nose down, and φ = −atan(a_y·cos θ / g).
+//! The integral and a_ff are the guidance's; a law without guidance has none, as the thesis's.
+
+#![allow(non_snake_case, reason = "a trailing _W or _B names the frame a vector is written in")]
+
+use crate::allocation::Wrench;
+use crate::cascade_gains::CascadeGains;
+use crate::cascade_law::CascadeLaw;
+use crate::controller::{Controller, ControllerState, Demand, Told};
+use crate::gains_file::{gain, limit, parse};
+use crate::pid_law::{Measurement, PidVehicle};
+use crate::set_points::SetPoint;
+use std::path::Path;
+use vehicles::VehicleError;
+use vehicles::reader::Section;
+use vehicles::units::{ACCELERATION, PER_SECOND, PURE_NUMBER, TIME, VELOCITY};
+
+/// The gains that the law is tuned with.
+const OURS: &str = include_str!("../gains/velocity.toml");
+
+/// Gains and limits of the velocity loops, the same along both axes.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct VelocityGains {
+    /// Error of velocity (m/s) to acceleration (m/s²), 1/s.
+    pub proportional_1_s: f64,
+    /// Measured acceleration (m/s²) to acceleration against it (m/s²), 1.
+    pub derivative: f64,
+    /// Time constant of the filter before the derivative, s.
+    pub derivative_filter_s: f64,
+    /// The demanded acceleration is cut to this, m/s².
+    pub acceleration_max_m_s2: f64,
+    /// A commanded velocity gathers speed no faster than this, m/s².
+    pub command_acceleration_max_m_s2: f64,
+    /// A commanded height moves no faster than this, m/s.
+    pub climb_max_m_s: f64,
+}
+
+impl Default for VelocityGains {
+    fn default() -> Self {
+        parse(OURS, "gains/velocity.toml", LoopsGains::read)
+            .expect("a test reads the built-in gains")
+            .velocity
+    }
+}
+
+impl VelocityGains {
+    fn read(section: &Section<'_, '_>) -> Result<Self, VehicleError> {
+        let gains = Self {
+            proportional_1_s: gain(section, "proportional", PER_SECOND)?,
+            derivative: gain(section, "derivative", PURE_NUMBER)?,
+            derivative_filter_s: limit(section, "derivative_filter", TIME)?,
+            acceleration_max_m_s2: limit(section, "acceleration_max", ACCELERATION)?,
+            command_acceleration_max_m_s2: limit(section, "command_acceleration_max", ACCELERATION)?,
+            climb_max_m_s: limit(section, "climb_max", VELOCITY)?,
+        };
+        section.finish()?;
+        Ok(gains)
+    }
+}
+
+/// The gains of the velocity loops and of the cascade inside: what a file leaves out is built in.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct LoopsGains {
+    /// Of the velocity loops.
+    pub velocity: VelocityGains,
+    /// Of the inner loops.
+    pub cascade: CascadeGains,
+}
+
+impl LoopsGains {
+    /// The gains in the file at `path`, or those built in.
+    ///
+    /// # Errors
+    /// The file cannot be read, or holds what no gains can be.
+    pub fn load(path: Option<&Path>) -> Result<Self, VehicleError> {
+        path.map_or_else(|| Ok(Self::default()), |path| crate::gains_file::load(path, Self::read))
+    }
+
+    pub(crate) fn read(root: &Section<'_, '_>) -> Result<Self, VehicleError> {
+        let velocity = if root.has("velocity") {
+            VelocityGains::read(&root.section("velocity")?)?
+        } else {
+            VelocityGains::default()
+        };
+        Ok(Self { velocity, cascade: CascadeGains::read_or_built_in(root)? })
+    }
+}
+
+/// What is asked of the velocity loops at a step.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Course {
+    /// Velocity along the heading's level x and y, m/s.
+    pub velocity_m_s: [f64; 2],
+    /// Acceleration that following it takes, m/s².
+    pub feed_forward_m_s2: [f64; 2],
+    /// Height, m.
+    pub altitude_m: f64,
+    /// Yaw, rad.
+    pub yaw_rad: f64,
+}
+
+/// The velocity loops around the cascade, at the cascade's period.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct VelocityLoop {
+    /// Gains and limits.
+    pub gains: VelocityGains,
+    /// The inner loops.
+    pub cascade: CascadeLaw,
+}
+
+impl VelocityLoop {
+    /// The loops with `gains` for `vehicle`.
+    #[must_use]
+    pub fn new(gains: &LoopsGains, vehicle: PidVehicle, period_s: f64) -> Self {
+        let cascade = CascadeLaw { gains: gains.cascade, vehicle, period_s };
+        Self { gains: gains.velocity, cascade }
+    }
+
+    /// The demand for `course` at the measured `velocity_m_s` along the heading's axes.
+    pub fn demand(
+        &self,
+        memory: &mut ControllerState,
+        course: &Course,
+        velocity_m_s: &[f64; 2],
+        measured: &Measurement,
+    ) -> Demand {
+        let acceleration_m_s2 =
+            std::array::from_fn(|axis| self.acceleration_m_s2(memory, course, axis, velocity_m_s[axis]));
+        let climb_max_m = self.gains.climb_max_m_s * self.cascade.period_s;
+        memory.altitude_hold += (course.altitude_m - memory.altitude_hold).clamp(-climb_max_m, climb_max_m);
+        let (roll_rad, pitch_rad) = self.tilt_rad(&acceleration_m_s2);
+        let set_point =
+            SetPoint { altitude_m: memory.altitude_hold, roll_rad, pitch_rad, yaw_rad: course.yaw_rad };
+        let demand = self.cascade.demand(memory, &set_point, measured);
+        Demand { velocity_m_s: course.velocity_m_s, ..demand }
+    }
+
+    /// The memory of a vehicle that no law has flown yet.
+    #[must_use]
+    pub fn begun(&self, velocity_m_s: &[f64; 2], measured: &Measurement) -> ControllerState {
+        ControllerState {
+            velocity_filtered: *velocity_m_s,
+            velocity_command: *velocity_m_s,
+            ..self.cascade.begun(measured)
+        }
+    }
+
+    /// The memory that goes on from another law's `wrench`, at the height and speed where the vehicle is.
+    #[must_use]
+    pub fn taken_over(
+        &self,
+        memory: &ControllerState,
+        wrench: &Wrench,
+        velocity_m_s: &[f64; 2],
+        measured: &Measurement,
+    ) -> ControllerState {
+        ControllerState {
+            velocity_filtered: *velocity_m_s,
+            velocity_command: *velocity_m_s,
+            ..self.cascade.taken_over(memory, wrench, measured.altitude_m, measured)
+        }
+    }
+
+    /// `before` moved towards `asked`: at once where that is slower, no faster than the limit where it gathers
+    /// speed.
+    #[must_use]
+    pub fn gathered_m_s(&self, before_m_s: f64, asked_m_s: f64) -> f64 {
+        let step_m_s = self.gains.command_acceleration_max_m_s2 * self.cascade.period_s;
+        // Gathering speed is measured from standstill where the direction turns round.
+        let same_way_m_s = if before_m_s * asked_m_s > 0.0 { before_m_s.abs() } else { 0.0 };
+        asked_m_s.abs().min(same_way_m_s + step_m_s).copysign(asked_m_s)
+    }
+
+    fn acceleration_m_s2(
+        &self,
+        memory: &mut ControllerState,
+        course: &Course,
+        axis: usize,
+        velocity_m_s: f64,
+    ) -> f64 {
+        let time_s = self.gains.derivative_filter_s + self.cascade.period_s;
+        let change_m_s2 = (velocity_m_s - memory.velocity_filtered[axis]) / time_s;
+        memory.velocity_filtered[axis] += change_m_s2 * self.cascade.period_s;
+        let asked_m_s2 = course.feed_forward_m_s2[axis]
+            + self.gains.proportional_1_s * (course.velocity_m_s[axis] - velocity_m_s)
+            - self.gains.derivative * change_m_s2
+            + memory.position_integral[axis];
+        let max_m_s2 = self.gains.acceleration_max_m_s2;
+        asked_m_s2.clamp(-max_m_s2, max_m_s2)
+    }
+
+    /// Roll and pitch that accelerate so at constant height.
+    fn tilt_rad(&self, acceleration_m_s2: &[f64; 2]) -> (f64, f64) {
+        let gravity_m_s2 = self.cascade.vehicle.gravity_m_s2;
+        let pitch_rad = (acceleration_m_s2[0] / gravity_m_s2).atan();
+        (-(acceleration_m_s2[1] * pitch_rad.cos() / gravity_m_s2).atan(), pitch_rad)
+    }
+}
+
+/// The controller `velocity`: a reference's velocity, or a constant one.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct VelocityLaw {
+    /// The loops.
+    pub velocity: VelocityLoop,
+    /// What is flown where no reference is wired.
+    pub constant: Option<Course>,
+}
+
+impl VelocityLaw {
+    fn course(&self, told: &Told<'_>, measured: &Measurement) -> Course {
+        self.constant.unwrap_or_else(|| Course {
+            velocity_m_s: along_heading(
+                [told.reference.velocity.x, told.reference.velocity.y],
+                measured.yaw_rad,
+            ),
+            feed_forward_m_s2: [0.0; 2],
+            altitude_m: told.reference.position.z,
+            yaw_rad: told.reference.yaw,
+        })
+    }
+}
+
+impl Controller for VelocityLaw {
+    const LAW: u32 = 3;
+
+    fn step(&self, memory: &mut ControllerState, told: &Told<'_>) -> Demand {
+        let measured = Measurement::from(told);
+        let mut course = self.course(told, &measured);
+        let gathered = |axis: usize| {
+            self.velocity.gathered_m_s(memory.velocity_command[axis], course.velocity_m_s[axis])
+        };
+        memory.velocity_command = [gathered(0), gathered(1)];
+        course.velocity_m_s = memory.velocity_command;
+        self.velocity.demand(memory, &course, &velocity_m_s(told, &measured), &measured)
+    }
+
+    fn fresh(&self, told: &Told<'_>) -> ControllerState {
+        let measured = Measurement::from(told);
+        self.velocity.begun(&velocity_m_s(told, &measured), &measured)
+    }
+
+    fn tracking(&self, memory: &ControllerState, wrench: &Wrench, told: &Told<'_>) -> ControllerState {
+        let measured = Measurement::from(told);
+        self.velocity.taken_over(memory, wrench, &velocity_m_s(told, &measured), &measured)
+    }
+}
+
+/// The estimated velocity along the heading's level axes.
+fn velocity_m_s(told: &Told<'_>, measured: &Measurement) -> [f64; 2] {
+    let velocity_W_m_s = told.motion.velocity_W_m_s;
+    along_heading([velocity_W_m_s.x, velocity_W_m_s.y], measured.yaw_rad)
+}
+
+/// A level vector of the world along the axes of a heading.
+fn along_heading([x, y]: [f64; 2], yaw_rad: f64) -> [f64; 2] {
+    let (sin, cos) = yaw_rad.sin_cos();
+    [cos * x + sin * y, cos * y - sin * x]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::Vector3;
+
+    fn velocity() -> VelocityLoop {
+        let vehicle = PidVehicle {
+            mass_kg: 0.5,
+            inertia_B_kg_m2: Vector3::new(5.0e-3, 6.0e-3, 8.0e-3),
+            gravity_m_s2: 9.81,
+            thrust_min_N: 1.0,
+            thrust_max_N: 10.0,
+        };
+        VelocityLoop::new(&LoopsGains::default(), vehicle, 1e-3)
+    }
+
+    #[test]
+    fn forward_is_nose_down_and_left_is_right_side_up() {
+        let (roll_rad, pitch_rad) = velocity().tilt_rad(&[1.0, 0.0]);
+        assert!(pitch_rad > 0.0 && roll_rad == 0.0);
+        let (roll_rad, pitch_rad) = velocity().tilt_rad(&[0.0, 1.0]);
+        assert!(roll_rad < 0.0 && pitch_rad == 0.0);
+    }
+
+    /// The thrust that holds the height is turned by the tilt into the level acceleration that was asked for.
+    #[test]
+    fn the_tilt_makes_the_acceleration_on_both_axes_at_once() {
+        let asked_m_s2 = [1.5, -2.0];
+        let (roll_rad, pitch_rad) = velocity().tilt_rad(&asked_m_s2);
+        let up_B = nalgebra::UnitQuaternion::from_euler_angles(roll_rad, pitch_rad, 0.0) * Vector3::z();
+        let made_m_s2 = up_B * (9.81 / up_B.z);
+        assert!((made_m_s2.x - asked_m_s2[0]).abs() < 1e-12 && (made_m_s2.y - asked_m_s2[1]).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_command_gathers_speed_slowly_and_loses_it_at_once() {
+        let velocity = velocity();
+        let step_m_s = velocity.gains.command_acceleration_max_m_s2 * 1e-3;
+        assert!((velocity.gathered_m_s(0.5, 1.0) - (0.5 + step_m_s)).abs() < 1e-12);
+        assert_eq!(velocity.gathered_m_s(0.5, 0.1), 0.1);
+        assert!((velocity.gathered_m_s(0.5, -1.0) + step_m_s).abs() < 1e-12);
+        assert_eq!(velocity.gathered_m_s(0.0, 0.0), 0.0);
+    }
+
+    #[test]
+    fn a_world_velocity_is_seen_along_the_heading() {
+        let [x, y] = along_heading([0.0, 1.0], std::f64::consts::FRAC_PI_2);
+        assert!((x - 1.0).abs() < 1e-12 && y.abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_negative_gain_is_refused_with_its_key() {
+        let text = OURS.replace("value = 2.2", "value = -2.2");
+        let error = parse(&text, "my.toml", LoopsGains::read).unwrap_err().to_string();
+        assert!(error.contains("velocity.proportional"), "{error}");
+    }
+}

@@ -1,0 +1,208 @@
+//! Guidance to a stop before a wall (thesis §5.5, Figs 5.30–5.34), around velocity PD and cascade.
+//!
+//! It flies along the heading's +x. The velocity command is the cruising speed, or the [`Approach`] curve over
+//! the distance still to go where that is slower, so that the pitch command shrinks with the distance as the
+//! thesis says; the curve's own acceleration is fed forward. The velocity along y is held at zero. Once it has
+//! arrived, an integrator over the distance takes up what a tilted attitude estimate leaves.
+//!
+//! It knows the wall by the range finders' estimate alone, and its height by the beam downwards.
+
+use crate::allocation::Wrench;
+use crate::approach::Approach;
+use crate::controller::{Controller, ControllerState, Demand, Told};
+use crate::gains_file::{gain, limit, parse};
+use crate::pid_law::Measurement;
+use crate::velocity_law::{Course, LoopsGains, VelocityLoop};
+use std::path::Path;
+use vehicles::VehicleError;
+use vehicles::reader::Section;
+use vehicles::units::{ACCELERATION, LENGTH, PER_SECOND, PER_SECOND_3, VELOCITY};
+
+/// The gains that the law is tuned with.
+const OURS: &str = include_str!("../gains/wall-stop.toml");
+
+/// Flying at the cruising speed.
+pub const CRUISING: u32 = 1;
+/// Slowing down before the wall.
+pub const BRAKING: u32 = 2;
+/// Holding the distance.
+pub const HOLDING: u32 = 3;
+
+/// How far a holding vehicle may be from the distance, in units of what makes it holding, before it counts as
+/// braking again. Tuned, no source: so far that no noise does it.
+const HOLDING_LEFT_FACTOR: f64 = 3.0;
+
+/// Gains of the guidance, and of the loops inside.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct WallStopGains {
+    /// From the distance still to go to a velocity.
+    pub approach: Approach,
+    /// Back from a wall that is too near no faster than this, m/s.
+    pub retreat_max_m_s: f64,
+    /// Error of distance (m) held for one second to acceleration (m/s²), 1/s³.
+    pub integral_1_s3: f64,
+    /// The most that the integrator asks for, m/s².
+    pub integral_max_m_s2: f64,
+    /// Holding begins within this of the distance, m,
+    pub holding_distance_m: f64,
+    /// below this speed, m/s.
+    pub holding_speed_m_s: f64,
+    /// The loops inside.
+    pub loops: LoopsGains,
+}
+
+impl Default for WallStopGains {
+    fn default() -> Self {
+        parse(OURS, "gains/wall-stop.toml", Self::read).expect("a test reads the built-in gains")
+    }
+}
+
+impl WallStopGains {
+    /// The gains in the file at `path`, or those built in.
+    ///
+    /// # Errors
+    /// The file cannot be read, or holds what no gains can be.
+    pub fn load(path: Option<&Path>) -> Result<Self, VehicleError> {
+        path.map_or_else(|| Ok(Self::default()), |path| crate::gains_file::load(path, Self::read))
+    }
+
+    fn read(root: &Section<'_, '_>) -> Result<Self, VehicleError> {
+        let (approach, hold) = (root.section("approach")?, root.section("hold")?);
+        let gains = Self {
+            approach: Approach {
+                slope_1_s: limit(&approach, "slope", PER_SECOND)?,
+                deceleration_m_s2: limit(&approach, "deceleration", ACCELERATION)?,
+            },
+            retreat_max_m_s: limit(&approach, "retreat_max", VELOCITY)?,
+            integral_1_s3: gain(&hold, "integral", PER_SECOND_3)?,
+            integral_max_m_s2: gain(&hold, "integral_max", ACCELERATION)?,
+            holding_distance_m: limit(&hold, "distance", LENGTH)?,
+            holding_speed_m_s: limit(&hold, "speed", VELOCITY)?,
+            loops: LoopsGains::read(root)?,
+        };
+        approach.finish()?;
+        hold.finish()?;
+        Ok(gains)
+    }
+}
+
+/// The law.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct WallStopLaw {
+    /// Gains of the guidance.
+    pub gains: WallStopGains,
+    /// The loops inside.
+    pub velocity: VelocityLoop,
+    /// Speed towards the wall, m/s.
+    pub cruise_speed_m_s: f64,
+    /// Level distance from the wall at which it stops, m.
+    pub distance_m: f64,
+    /// Height above what is below, m.
+    pub altitude_m: f64,
+    /// Yaw, rad.
+    pub heading_rad: f64,
+}
+
+impl Controller for WallStopLaw {
+    const LAW: u32 = 4;
+
+    fn step(&self, memory: &mut ControllerState, told: &Told<'_>) -> Demand {
+        let measured = by_ranges(told);
+        let to_go_m = told.walls.distance[0] - self.distance_m;
+        let speed_m_s = told.walls.velocity[0];
+        self.enter_state(memory, told.time_ns, to_go_m, speed_m_s);
+        self.integrate(memory, to_go_m);
+        let course = self.course(memory, to_go_m, speed_m_s);
+        memory.velocity_command = course.velocity_m_s;
+        self.velocity.demand(memory, &course, &told.walls.velocity, &measured)
+    }
+
+    fn fresh(&self, told: &Told<'_>) -> ControllerState {
+        self.velocity.begun(&told.walls.velocity, &by_ranges(told))
+    }
+
+    fn tracking(&self, memory: &ControllerState, wrench: &Wrench, told: &Told<'_>) -> ControllerState {
+        self.velocity.taken_over(memory, wrench, &told.walls.velocity, &by_ranges(told))
+    }
+}
+
+impl WallStopLaw {
+    fn enter_state(&self, memory: &mut ControllerState, time_ns: u64, to_go_m: f64, speed_m_s: f64) {
+        let (near_m, slow_m_s) = (self.gains.holding_distance_m, self.gains.holding_speed_m_s);
+        let has_left = to_go_m.abs() > HOLDING_LEFT_FACTOR * near_m;
+        let has_arrived = to_go_m.abs() < near_m && speed_m_s.abs() < slow_m_s;
+        let state = if has_arrived || (memory.state == HOLDING && !has_left) {
+            HOLDING
+        } else if self.gains.approach.speed_m_s(to_go_m) < self.cruise_speed_m_s {
+            BRAKING
+        } else {
+            CRUISING
+        };
+        if state != memory.state {
+            (memory.state, memory.since_ns) = (state, time_ns);
+        }
+    }
+
+    /// Only a vehicle that holds integrates: while it approaches, the distance still to go is no error.
+    fn integrate(&self, memory: &mut ControllerState, to_go_m: f64) {
+        if memory.state == HOLDING {
+            let step_m_s2 = self.gains.integral_1_s3 * to_go_m * self.velocity.cascade.period_s;
+            let max_m_s2 = self.gains.integral_max_m_s2;
+            memory.position_integral[0] =
+                (memory.position_integral[0] + step_m_s2).clamp(-max_m_s2, max_m_s2);
+        }
+    }
+
+    fn course(&self, memory: &ControllerState, to_go_m: f64, speed_m_s: f64) -> Course {
+        let near_m_s = self.gains.approach.speed_m_s(to_go_m);
+        let wanted_m_s = near_m_s.clamp(-self.gains.retreat_max_m_s, self.cruise_speed_m_s);
+        let command_m_s = self.velocity.gathered_m_s(memory.velocity_command[0], wanted_m_s);
+        // The curve's acceleration is that of a vehicle on the curve, not of one kept back by a limit. One that
+        // holds is better off without: it would be moved by the velocity's error once more.
+        let is_on_curve = command_m_s == near_m_s && memory.state != HOLDING;
+        let braking_m_s2 =
+            if is_on_curve { self.gains.approach.acceleration_m_s2(to_go_m, speed_m_s) } else { 0.0 };
+        Course {
+            velocity_m_s: [command_m_s, 0.0],
+            feed_forward_m_s2: [braking_m_s2, 0.0],
+            altitude_m: self.altitude_m,
+            yaw_rad: self.heading_rad,
+        }
+    }
+}
+
+/// What is measured, height and climb by the beam downwards.
+pub(crate) fn by_ranges(told: &Told<'_>) -> Measurement {
+    Measurement {
+        altitude_m: told.walls.height,
+        climb_rate_m_s: told.walls.climb_rate,
+        ..Measurement::from(told)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn impossible_gains_are_refused_with_their_key() {
+        let cases = [
+            ("value = 1.1, unit = \"1/s\"", "value = 0, unit = \"1/s\"", "approach.slope"),
+            ("value = 0.4, unit = \"1/s^3\"", "value = -0.4, unit = \"1/s^3\"", "hold.integral"),
+        ];
+        for (good, bad, key) in cases {
+            assert_eq!(OURS.matches(good).count(), 1, "{good}");
+            let error =
+                parse(&OURS.replace(good, bad), "my.toml", WallStopGains::read).unwrap_err().to_string();
+            assert!(error.contains(key), "{error}");
+        }
+    }
+
+    #[test]
+    fn a_file_may_hold_the_gains_of_the_loops_inside_too() {
+        let velocity = include_str!("../gains/velocity.toml").replace("value = 2.2", "value = 1.5");
+        let gains = parse(&format!("{OURS}\n{velocity}"), "my.toml", WallStopGains::read).unwrap();
+        assert_eq!(gains.loops.velocity.proportional_1_s, 1.5);
+        assert_eq!(gains.loops.cascade, LoopsGains::default().cascade);
+    }
+}

@@ -1,0 +1,178 @@
+//! A closed loop around a law that follows a reference: the Hummingbird with drag that the law does not know, and an
+//! estimate with the noise of motion capture at 100 Hz and of the IMU's gyroscope.
+#![allow(dead_code, reason = "each test file uses a part")]
+#![allow(non_snake_case, reason = "a trailing _W or _B names the frame a vector is written in")]
+
+use bus::random::{Stream, stream};
+use controllers::allocation::Wrench;
+use controllers::controller::{Airframe, Controller, ControllerState, Flown, Motion, Told};
+use controllers::course::{Course, Start};
+use controllers::set_points::SetPoint;
+use controllers::trajectory::reference;
+use nalgebra::{UnitQuaternion, Vector3};
+use plant::{NewtonEuler, RigidBody, State};
+use sensors::noise::WhiteNoise;
+use vehicles::Vehicle;
+
+pub const PERIOD_S: f64 = 1e-3;
+
+pub fn vehicle() -> Vehicle {
+    Vehicle::parse(include_str!("../../../vehicles/hummingbird.toml"), "hummingbird.toml").unwrap()
+}
+
+/// The Hummingbird as the laws know it.
+pub fn airframe() -> Airframe {
+    Airframe::new(vehicle()).unwrap()
+}
+
+/// A course from 1 m above the origin; `segments` is a list in TOML.
+pub fn course(segments: &str) -> Course {
+    try_course(segments).unwrap()
+}
+
+pub fn try_course(segments: &str) -> Result<Course, String> {
+    let table: toml::Table = toml::from_str(&format!("segments = [{segments}]")).unwrap();
+    let entries = serde_json::to_value(&table["segments"]).unwrap();
+    Course::read(entries.as_array().unwrap(), Start { position_W_m: Vector3::z(), yaw_rad: 0.0 })
+}
+
+/// Staying 1 m above the origin with this yaw.
+pub fn course_from(yaw_rad: f64) -> Course {
+    Course::read(&[], Start { position_W_m: Vector3::z(), yaw_rad }).unwrap()
+}
+
+/// What the law flies and in what air.
+#[derive(Clone)]
+pub struct Craft {
+    pub vehicle: Vehicle,
+    /// Drag of the rotors along body x and y, for each unit of speed and mass.
+    pub rotor_drag_1_s: f64,
+    /// Drag of the frame against the velocity, for each unit of speed squared and mass.
+    pub parasitic_drag_1_m: f64,
+    /// Seed of the noise; none without noise.
+    pub seed: Option<u64>,
+}
+
+impl Craft {
+    /// As the file says, in still air without drag, measured exactly.
+    pub fn ideal() -> Self {
+        Self { vehicle: vehicle(), rotor_drag_1_s: 0.0, parasitic_drag_1_m: 0.0, seed: None }
+    }
+
+    /// With drag and noise. Rotor drag: 8.06e-5 N for each m/s and rad/s of a rotor (RotorS, hummingbird.xacro), four
+    /// rotors at 411 rad/s, 0.48 kg: 0.28 1/s. Frame: c_d·A = 0.01 m² (a guess) at 1.2 kg/m³: 0.0125 1/m.
+    pub fn dragged(seed: u64) -> Self {
+        Self { rotor_drag_1_s: 0.28, parasitic_drag_1_m: 0.0125, seed: Some(seed), ..Self::ideal() }
+    }
+
+    fn drag_W_m_s2(&self, body: &RigidBody) -> Vector3<f64> {
+        let velocity_B = body.attitude_WB.inverse() * body.velocity_W_m_s;
+        let level_B = Vector3::new(velocity_B.x, velocity_B.y, 0.0);
+        let frame_W = body.velocity_W_m_s * (body.velocity_W_m_s.norm() * self.parasitic_drag_1_m);
+        -(body.attitude_WB * level_B) * self.rotor_drag_1_s - frame_W
+    }
+}
+
+/// Noise of an estimate: standard deviations 1 mm, 2 cm/s and 3 mrad, renewed at 100 Hz; the gyroscope's own at each tick.
+pub struct Noise {
+    random: Stream,
+    position_W_m: Vector3<f64>,
+    velocity_W_m_s: Vector3<f64>,
+    turn_B_rad: Vector3<f64>,
+}
+
+impl Noise {
+    fn new(seed: u64) -> Self {
+        let zero = Vector3::zeros();
+        Self { random: stream(seed, "estimate"), position_W_m: zero, velocity_W_m_s: zero, turn_B_rad: zero }
+    }
+
+    fn estimate(&mut self, tick: u64, body: &RigidBody) -> Motion {
+        let mut draw = |sigma: f64| WhiteNoise::new(sigma, 1.0).sample(&mut self.random);
+        let gyroscope = draw(5.4e-3);
+        if tick.is_multiple_of(10) {
+            (self.position_W_m, self.velocity_W_m_s, self.turn_B_rad) = (draw(1e-3), draw(2e-2), draw(3e-3));
+        }
+        Motion {
+            position_W_m: body.position_W_m + self.position_W_m,
+            velocity_W_m_s: body.velocity_W_m_s + self.velocity_W_m_s,
+            attitude_WB: body.attitude_WB * UnitQuaternion::from_scaled_axis(self.turn_B_rad),
+            angular_velocity_B_rad_s: body.angular_velocity_B_rad_s + gyroscope,
+        }
+    }
+}
+
+fn exact(body: &RigidBody) -> Motion {
+    Motion {
+        position_W_m: body.position_W_m,
+        velocity_W_m_s: body.velocity_W_m_s,
+        attitude_WB: body.attitude_WB,
+        angular_velocity_B_rad_s: body.angular_velocity_B_rad_s,
+    }
+}
+
+/// A vehicle in flight, and what a controller remembers.
+pub struct Loop {
+    craft: Craft,
+    plant: NewtonEuler,
+    airframe: Airframe,
+    noise: Option<Noise>,
+    pub state: State,
+    pub memory: ControllerState,
+    pub tick: u64,
+    pub set_point: SetPoint,
+    /// The last demand.
+    pub demand: Wrench,
+    /// Whether the last demand was beyond the rotors.
+    pub saturated: bool,
+}
+
+impl Loop {
+    pub fn new(craft: Craft) -> Self {
+        let plant = NewtonEuler::new(craft.vehicle.clone(), 1);
+        let state = plant.start(RigidBody::level_at(Vector3::z()), plant.vehicle().hover_command());
+        let noise = craft.seed.map(Noise::new);
+        let set_point = SetPoint { altitude_m: 1.0, ..SetPoint::default() };
+        let (airframe, memory, demand) = (airframe(), ControllerState::default(), Wrench::default());
+        Self { craft, plant, airframe, noise, state, memory, tick: 0, set_point, demand, saturated: false }
+    }
+
+    /// One tick under `law`: as the node runs it. Gives the true distance from the course.
+    pub fn step<C: Controller>(&mut self, law: &C, course: &Course) -> f64 {
+        let point = course.at(self.tick as f64 * PERIOD_S);
+        let off_m = (self.state.body.position_W_m - point.path_W[0]).norm();
+        let motion = match &mut self.noise {
+            Some(noise) => noise.estimate(self.tick, &self.state.body),
+            None => exact(&self.state.body),
+        };
+        let (reference, walls) = (reference(&point), Default::default());
+        let told = Told {
+            motion,
+            set_point: self.set_point,
+            reference: &reference,
+            walls: &walls,
+            time_ns: self.tick * 1_000_000,
+        };
+        let known = Flown { law, vehicle: &self.airframe.vehicle, period_s: PERIOD_S };
+        self.demand = known.advance(&mut self.memory, &told, None).wrench;
+        let allocated = self.airframe.allocation.allocate(&self.demand);
+        self.saturated = allocated.is_saturated();
+        let counts = allocated.speeds_rad_s.map(|speed| self.airframe.vehicle.command.command(speed));
+        self.plant.step(&mut self.state, &counts, PERIOD_S);
+        self.state.body.velocity_W_m_s += self.craft.drag_W_m_s2(&self.state.body) * PERIOD_S;
+        self.tick += 1;
+        off_m
+    }
+
+    /// Flies until `until_s`; gives the root mean square and the greatest distance from the course since `from_s`.
+    pub fn fly<C: Controller>(&mut self, law: &C, course: &Course, from_s: f64, until_s: f64) -> (f64, f64) {
+        let (mut squares, mut greatest_m, mut count) = (0.0, 0.0_f64, 0.0);
+        while (self.tick as f64) * PERIOD_S < until_s {
+            let off_m = self.step(law, course);
+            if self.tick as f64 * PERIOD_S > from_s {
+                (squares, greatest_m, count) = (squares + off_m * off_m, greatest_m.max(off_m), count + 1.0);
+            }
+        }
+        ((squares / count).sqrt(), greatest_m)
+    }
+}

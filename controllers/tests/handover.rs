@@ -1,0 +1,161 @@
+//! Every law takes over from every other in hover without a jump in the demanded wrench.
+#![allow(
+    non_snake_case,
+    reason = "a trailing _W or _B names the frame a vector is written in, _N the newton"
+)]
+
+mod flight;
+
+use controllers::allocation::Wrench;
+use controllers::cascade_gains::CascadeGains;
+use controllers::cascade_law::CascadeLaw;
+use controllers::controller::Demand;
+use controllers::pid_gains::PidGains;
+use controllers::pid_law::PidLaw;
+use controllers::velocity_law::{Course, LoopsGains, VelocityLaw, VelocityLoop};
+use controllers::wall_follow_law::{Mode, WallFollowGains, WallFollowLaw};
+use controllers::wall_stop_law::{WallStopGains, WallStopLaw};
+use flight::{Loop, NOISY, PERIOD_S, ROOM, Senses, airframe};
+use nalgebra::Vector3;
+
+/// The most that the demand changes from the last tick of a law to the first of its successor: about what the noise of
+/// the gyroscope and the steps of the range finders change from tick to tick under one law.
+const THRUST_STEP_MAX_N: f64 = 0.05;
+const TORQUE_STEP_MAX_N_M: f64 = 5e-3;
+
+enum Law {
+    Pid(PidLaw),
+    Cascade(CascadeLaw),
+    Velocity(VelocityLaw),
+    WallStop(WallStopLaw),
+    WallFollow(WallFollowLaw),
+}
+
+impl Law {
+    fn step(&self, flight: &mut Loop) -> Demand {
+        match self {
+            Law::Pid(law) => flight.step(law),
+            Law::Cascade(law) => flight.step(law),
+            Law::Velocity(law) => flight.step(law),
+            Law::WallStop(law) => flight.step(law),
+            Law::WallFollow(law) => flight.step(law),
+        }
+    }
+}
+
+fn laws() -> [(&'static str, Law); 5] {
+    let vehicle = airframe().known();
+    let velocity = VelocityLoop::new(&LoopsGains::default(), vehicle, PERIOD_S);
+    let course = Course { altitude_m: 1.5, ..Course::default() };
+    let stop = WallStopLaw {
+        gains: WallStopGains::default(),
+        velocity,
+        cruise_speed_m_s: 1.0,
+        distance_m: 3.0,
+        altitude_m: 1.5,
+        heading_rad: 0.0,
+    };
+    let follow = WallFollowLaw {
+        gains: WallFollowGains::default(),
+        velocity,
+        mode: Mode::Constant,
+        speed_m_s: 0.7,
+        distance_m: 3.0,
+        altitude_m: 1.5,
+        heading_rad: 0.0,
+        start_state: 1,
+        shared: None,
+    };
+    [
+        ("pid", Law::Pid(PidLaw { gains: PidGains::default(), vehicle, period_s: PERIOD_S })),
+        ("cascade", Law::Cascade(CascadeLaw { gains: CascadeGains::default(), vehicle, period_s: PERIOD_S })),
+        ("velocity", Law::Velocity(VelocityLaw { velocity, constant: Some(course) })),
+        ("wall-stop", Law::WallStop(stop)),
+        ("wall-follow", Law::WallFollow(follow)),
+    ]
+}
+
+/// Before the wall at +x, 3 m away, so that all laws but `wall-follow` hover.
+fn hovering(law: &Law) -> (Loop, Demand) {
+    let mut flight = Loop::new(Vector3::new(2.0, 0.0, 1.5), Senses::new(1, ROOM, NOISY));
+    let mut demand = Demand::default();
+    for _ in 0..4000 {
+        demand = law.step(&mut flight);
+    }
+    (flight, demand)
+}
+
+fn step_between(before: &Wrench, after: &Wrench) -> (f64, f64) {
+    let torque_B_N_m = after.torque_B_N_m - before.torque_B_N_m;
+    ((after.thrust_N - before.thrust_N).abs(), torque_B_N_m.amax())
+}
+
+#[test]
+fn every_law_takes_over_from_every_other_without_a_jump_in_the_demanded_wrench() {
+    for (from, first) in &laws() {
+        for (to, second) in &laws() {
+            let (mut flight, mut before) = hovering(first);
+            let (mut first_step, mut worst_step) = ((0.0, 0.0), (0.0_f64, 0.0_f64));
+            let (mut height_error_m, mut tilt_rad) = (0.0_f64, 0.0_f64);
+            for tick in 0..2000 {
+                let demand = second.step(&mut flight);
+                let step = step_between(&before.wrench, &demand.wrench);
+                if tick == 0 {
+                    first_step = step;
+                }
+                worst_step = (worst_step.0.max(step.0), worst_step.1.max(step.1));
+                height_error_m = height_error_m.max((flight.position().z - 1.5).abs());
+                let (roll_rad, pitch_rad, _) = flight.state.body.attitude_WB.euler_angles();
+                tilt_rad = tilt_rad.max(roll_rad.hypot(pitch_rad));
+                before = demand;
+            }
+            println!(
+                "{from} to {to}: {:.4} N, {:.2e} N m; within 2 s {:.4} N, {:.2e} N m, height {height_error_m:.3} m, \
+                 tilt {:.1} deg",
+                first_step.0,
+                first_step.1,
+                worst_step.0,
+                worst_step.1,
+                tilt_rad.to_degrees()
+            );
+            assert!(first_step.0 < THRUST_STEP_MAX_N, "{from} to {to}: thrust steps by {} N", first_step.0);
+            assert!(first_step.1 < TORQUE_STEP_MAX_N_M, "{from} to {to}: torque steps by {}", first_step.1);
+            assert!(height_error_m < 0.15 && tilt_rad < 0.2, "{from} to {to}");
+        }
+    }
+}
+
+/// What makes the test above hold: amid a manoeuvre two laws ask for different torques at the same state.
+#[test]
+fn a_take_over_amid_a_doublet_does_not_jump_either_and_fades_out() {
+    let [(_, pid), (_, cascade), ..] = laws();
+    let (mut flight, _) = hovering(&pid);
+    flight.set_point.roll_rad = 0.17;
+    let mut before = Demand::default();
+    for _ in 0..100 {
+        before = pid.step(&mut flight);
+    }
+    let after = cascade.step(&mut flight);
+    let (thrust_N, torque_N_m) = step_between(&before.wrench, &after.wrench);
+    assert!(thrust_N < THRUST_STEP_MAX_N && torque_N_m < TORQUE_STEP_MAX_N_M, "{thrust_N} {torque_N_m}");
+    for _ in 0..2000 {
+        cascade.step(&mut flight);
+    }
+    assert!(Vector3::from(flight.memory.handed_torque).norm() < 1e-9);
+    let (roll_rad, ..) = flight.state.body.attitude_WB.euler_angles();
+    assert!((roll_rad - 0.17).abs() < 0.02, "the command is followed: {roll_rad}");
+}
+
+#[test]
+fn a_predecessor_gone_mad_is_not_gone_on_from() {
+    let [(_, pid), (_, cascade), ..] = laws();
+    for torque_N_m in [f64::NAN, 1e9] {
+        let (mut flight, _) = hovering(&pid);
+        (flight.memory.thrust, flight.memory.torque) = (torque_N_m, [torque_N_m; 3]);
+        for _ in 0..3000 {
+            cascade.step(&mut flight);
+        }
+        let (roll_rad, pitch_rad, _) = flight.state.body.attitude_WB.euler_angles();
+        assert!(roll_rad.hypot(pitch_rad) < 0.05 && (flight.position().z - 1.5).abs() < 0.2);
+    }
+}

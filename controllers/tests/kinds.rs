@@ -1,0 +1,127 @@
+//! What the kinds of controller and the pilot accept and refuse before a start, and that the documentation says so.
+
+use bus::kind::NodeKind;
+use controllers::{cascade, pid, pilot, velocity, wall_follow, wall_stop};
+use serde_json::{Value, json};
+
+const VEHICLE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../vehicles/hummingbird.toml");
+
+fn gains(name: &str) -> String {
+    format!("{}/gains/{name}.toml", env!("CARGO_MANIFEST_DIR"))
+}
+
+/// Each kind with parameters that it accepts.
+fn accepted() -> [(NodeKind, Value); 6] {
+    [
+        (pid::KIND, json!({ "vehicle": VEHICLE })),
+        (cascade::KIND, json!({ "vehicle": VEHICLE })),
+        (velocity::KIND, json!({ "vehicle": VEHICLE, "altitude_m": 1.5 })),
+        (wall_stop::KIND, json!({ "vehicle": VEHICLE, "altitude_m": 1.5 })),
+        (wall_follow::KIND, json!({ "vehicle": VEHICLE, "altitude_m": 1.5, "mode": "constant" })),
+        (pilot::KIND, json!({ "initial_altitude_m": 1.0 })),
+    ]
+}
+
+/// `parameters` with `key` set.
+fn with(parameters: &Value, key: &str, value: Value) -> Value {
+    let mut parameters = parameters.clone();
+    parameters[key] = value;
+    parameters
+}
+
+#[test]
+fn every_kind_flies_with_its_own_gains_file() {
+    for (kind, parameters) in accepted() {
+        (kind.check)(&parameters, &[]).unwrap();
+        if kind.name != "pilot" {
+            (kind.check)(&with(&parameters, "gains", json!(gains(kind.name))), &[]).unwrap();
+        }
+    }
+    let [(pid, parameters), ..] = accepted();
+    (pid.check)(&with(&parameters, "gains", json!(gains("pid-thesis"))), &[]).unwrap();
+}
+
+#[test]
+fn the_gains_file_of_another_law_is_refused_by_name_and_place() {
+    for (kind, parameters) in accepted().into_iter().take(5) {
+        let other = if kind.name == "cascade" { "pid" } else { "cascade" };
+        let outcome = (kind.check)(&with(&parameters, "gains", json!(gains(other))), &[]);
+        // A velocity file may hold the cascade's tables alone.
+        if kind.name != "velocity" {
+            let error = outcome.unwrap_err();
+            assert!(
+                error.contains(&format!("{other}.toml:")) && error.contains('`'),
+                "{}: {error}",
+                kind.name
+            );
+        }
+    }
+}
+
+#[test]
+fn impossible_parameters_are_refused_by_their_key() {
+    let [_, _, (velocity, fly), (wall_stop, stop), (wall_follow, follow), (pilot, hold)] = accepted();
+    let room = with(&follow, "room_m", json!([10.0, 10.0]));
+    let cases = [
+        (velocity, with(&fly, "velocity_m_s", json!([1.0])), "velocity_m_s"),
+        (wall_stop, with(&stop, "cruise_speed_m_s", json!(0.0)), "cruise_speed_m_s"),
+        (wall_stop, with(&stop, "cruise_speed_m_s", json!(9.0)), "cruise_speed_m_s"),
+        (wall_stop, with(&stop, "distance_m", json!(-3.0)), "distance_m"),
+        (wall_stop, with(&stop, "altitude_m", Value::Null), "altitude_m"),
+        (wall_follow, with(&follow, "mode", json!("fast")), "mode"),
+        (wall_follow, with(&follow, "start_state", json!(6)), "start_state"),
+        (wall_follow, with(&follow, "speed_m_s", json!(-1.0)), "speed_m_s"),
+        (wall_follow, with(&follow, "ahead_min_m", json!(1.0)), "ahead_min_m"),
+        (wall_follow, with(&follow, "room_m", json!([10.0, 5.0])), "room_m"),
+        (wall_follow, with(&room, "mode", json!("varying")), "room_m"),
+        (wall_follow, with(&room, "start_in_room_m", json!([1.0, 11.0])), "start_in_room_m"),
+        (pilot, with(&hold, "data", json!("no-such.csv")), "no-such.csv"),
+    ];
+    for (kind, parameters, key) in cases {
+        let error = (kind.check)(&parameters, &[]).unwrap_err();
+        assert!(error.contains(key), "{} with {parameters}: {error}", kind.name);
+    }
+}
+
+#[test]
+fn a_velocity_comes_from_a_reference_or_from_parameters_and_never_from_both() {
+    let [_, _, (velocity, fly), ..] = accepted();
+    let vehicle_only = json!({ "vehicle": VEHICLE });
+    (velocity.check)(&vehicle_only, &["estimate", "reference"]).unwrap();
+    let error = (velocity.check)(&vehicle_only, &["estimate"]).unwrap_err();
+    assert!(error.starts_with("missing field `altitude_m`"), "{error}");
+    let error = (velocity.check)(&fly, &["estimate", "reference"]).unwrap_err();
+    assert!(error.contains("`altitude_m`") && error.contains("`reference`"), "{error}");
+}
+
+/// The parameters that a kind's refusal of an unknown one names as known.
+fn known(kind: &NodeKind, parameters: &Value) -> Vec<String> {
+    let error = (kind.check)(&with(parameters, "unknown_key", json!(1)), &[]).unwrap_err();
+    let list = error.split("unknown field `unknown_key`").nth(1).unwrap_or_else(|| panic!("{error}"));
+    list.split('`').skip(1).step_by(2).map(str::to_owned).collect()
+}
+
+#[test]
+fn the_documentation_has_every_parameter_in_its_kinds_section() {
+    let text = include_str!("../../docs/manifest.md");
+    // What stands for every controller in the section before, or is a key of the process.
+    let elsewhere = ["vehicle", "gains"];
+    for (kind, parameters) in accepted() {
+        let section =
+            text.split(&format!("### `{}`\n", kind.name)).nth(1).unwrap().split("\n### ").next().unwrap();
+        let known = known(&kind, &parameters);
+        assert!(!known.is_empty());
+        for key in known.iter().filter(|key| !elsewhere.contains(&key.as_str())) {
+            assert!(
+                section.contains(&format!("`{key}`")),
+                "docs/manifest.md, `{}` has no `{key}`",
+                kind.name
+            );
+        }
+        let documented = section.split("\n| `").skip(1).map(|row| row.split('`').next().unwrap());
+        let is_gain = |key: &str| kind.name == "pid" && key != "gains";
+        for key in documented.filter(|key| !is_gain(key)) {
+            assert!(known.iter().any(|known| known == key), "`{}` has no `{key}`", kind.name);
+        }
+    }
+}

@@ -1,0 +1,5 @@
+//! Prints docs/effects.md.
+
+fn main() {
+    print!("{}", plant::effects::page::markdown());
+}

@@ -1,0 +1,78 @@
+//! What a plant can do, whichever physics moves it.
+#![allow(non_snake_case, reason = "a trailing _W names the frame a vector is written in, N the newton")]
+
+use crate::effects::battery::Battery;
+use crate::newton_euler::Motion;
+use crate::snapshot::SnapshotError;
+use crate::state::{RigidBody, State};
+use nalgebra::Vector3;
+use serde::{Deserialize, Serialize};
+
+/// Physics that moves one vehicle from tick to tick.
+pub trait Backend {
+    /// Body and rotors at the end of the last tick.
+    fn state(&self) -> &State;
+
+    /// What sensors at the centre of mass measure at the end of the last tick.
+    fn motion(&self) -> Motion;
+
+    /// Moves the vehicle by one tick of `dt_s` under raw motor `commands` held over it. `traffic` are the other
+    /// vehicles as they were at the start of the tick, always the same ones in the same order.
+    fn step(&mut self, commands: &[f64; 4], dt_s: f64, traffic: &[Neighbour]);
+
+    /// Has the rotors turn steadily at raw motor `commands`.
+    fn settle_rotors(&mut self, commands: &[f64; 4]);
+
+    /// Puts the body where it is said to be; the rotors stay as they are.
+    fn set_body(&mut self, body: &RigidBody);
+
+    /// What was touched over the last tick.
+    fn contact(&self) -> ContactReport;
+
+    /// The battery, if an effect models it.
+    fn battery(&self) -> Option<Battery>;
+
+    /// Everything that the next ticks depend on.
+    ///
+    /// # Errors
+    /// If the state cannot be written down.
+    fn snapshot(&self) -> Result<Vec<u8>, SnapshotError>;
+
+    /// Continues from a snapshot that the same backend took of the same vehicle in the same scene. After an
+    /// error the backend is as it was.
+    ///
+    /// # Errors
+    /// If the bytes are no such snapshot.
+    fn restore(&mut self, snapshot: &[u8]) -> Result<(), SnapshotError>;
+}
+
+/// The most vehicles that share a room, this one included.
+pub const TRAFFIC_MAX: usize = 16;
+
+/// Another vehicle of the run.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Neighbour {
+    /// Its place in the traffic, from 0.
+    pub number: u32,
+    /// Its centre of mass.
+    pub position_W_m: Vector3<f64>,
+    /// The velocity of its centre of mass.
+    pub velocity_W_m_s: Vector3<f64>,
+}
+
+/// What the vehicle touches; `bus::messages::Contact` says what each field means.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+pub struct ContactReport {
+    /// Sum of the contact forces over the last tick.
+    pub force_W_N: Vector3<f64>,
+    /// Speed of approach just before the contact with `object` began.
+    pub impact_speed_m_s: f64,
+    /// Number of things touched.
+    pub count: u32,
+    /// What is touched first: 0 nothing, 1 the ground, 2 + i the scene's box i, 1000 + i the other vehicle i.
+    pub object: u32,
+    /// Contacts that began since the start.
+    pub began: u32,
+    /// Whether an impact was faster than the vehicle bears.
+    pub crashed: bool,
+}

@@ -1,0 +1,78 @@
+//! The catalogue as the page `docs/effects.md`; a test compares the two.
+
+use super::{CATALOGUE, EffectKind, ParameterSpec};
+use std::fmt::Write;
+
+const HEAD: &str = "# Effects
+<!-- Written by `cargo run -p plant --example effects_page >docs/effects.md` from plant/src/effects. -->
+
+An effect is a named piece of physics beyond the declared vehicle. A vehicle file lists those of the vehicle, a scene
+file those of the surroundings; the plant flies both, the vehicle's first, each in the order of its file, and each
+effect once. Forces, torques and changes of thrust add up.
+
+```toml
+[[effects]]
+name = \"rotor-drag\"
+coefficient = { value = 8.06428e-5, unit = \"N*s^2/(m*rad)\", source = \"RotorS\", uncertainty = \"not stated\" }
+```
+
+A parameter that is left out has its neutral value, with which it does nothing; one without a neutral value has to be
+given. Controllers read the same vehicle file and know nothing of its effects. A vehicle file that only adds effects to
+another names it with `base = \"hummingbird.toml\"`, a path relative to itself, and holds nothing else but `name`,
+`notes` and `[[effects]]`.
+
+Drag, inflow and whatever else depends on the motion are evaluated at every stage of the integration; how the air moves,
+delays and the battery are settled when a tick begins and hold over it. Random effects draw from a stream of their own,
+made from the run's seed, the plant's name and the effect's name: adding one changes no other's noise.
+
+Thrusts T_i, speeds w_i, hub velocities v_i and heights z_i are those of rotor i; z is the axis of the rotors and `up`
+the vertical, both in the body. T_i is c_T w_i |w_i|: effects do not act on each other's changes of thrust.
+
+Delay and bias of a sensor are no effects: they are parameters of the sensors ([manifest.md](manifest.md)).
+
+| effect | what it does |
+|---|---|
+";
+
+/// The whole page, in Markdown.
+#[must_use]
+pub fn markdown() -> String {
+    let mut page = HEAD.to_owned();
+    for kind in CATALOGUE {
+        let _ = writeln!(page, "| [`{0}`](#{0}) | {1} |", kind.name, kind.summary);
+    }
+    CATALOGUE.into_iter().for_each(|kind| section(&mut page, kind));
+    page
+}
+
+fn section(page: &mut String, kind: &EffectKind) {
+    let _ = writeln!(page, "\n## {}", kind.name);
+    let _ = writeln!(page, "{}.\n", capitalised(kind.summary));
+    let _ = writeln!(page, "- **Equation:** `{}`", kind.equation);
+    let _ = writeln!(page, "- **Source:** {}.", kind.source);
+    let _ = writeln!(page, "- **Holds for:** {}.\n", kind.validity);
+    page.push_str("| parameter | meaning | units | least | most | neutral | plausible | source of the plausible value |\n");
+    page.push_str("|---|---|---|---|---|---|---|---|\n");
+    kind.parameters.iter().for_each(|spec| row(page, spec));
+}
+
+fn row(page: &mut String, spec: &ParameterSpec) {
+    let units: Vec<_> = spec.dimension.units.iter().map(|(unit, _)| format!("`{unit}`")).collect();
+    let neutral = spec.neutral.map_or("–".to_owned(), |value| value.to_string());
+    let _ = writeln!(
+        page,
+        "| `{}` | {} | {} | {} | {} | {neutral} | {} | {} |",
+        spec.name,
+        spec.meaning,
+        units.join(", "),
+        spec.lower,
+        spec.upper,
+        spec.typical,
+        spec.typical_source,
+    );
+}
+
+fn capitalised(text: &str) -> String {
+    let mut letters = text.chars();
+    letters.next().map_or(String::new(), |first| first.to_uppercase().chain(letters).collect())
+}

@@ -1,0 +1,60 @@
+//! What the functions of effects are functions of: how the vehicle moves through which air, how high.
+#![allow(non_snake_case, reason = "a trailing _W or _B names the frame a vector is written in, N the newton")]
+
+use crate::rotation::rotated_back;
+use crate::rotor;
+use crate::state::State;
+use nalgebra::Vector3;
+use vehicles::Vehicle;
+
+/// A vehicle at an instant.
+#[derive(Debug, Clone)]
+pub struct Situation<'v> {
+    /// The vehicle as it flies.
+    pub vehicle: &'v Vehicle,
+    /// Velocity of the centre of mass relative to the air.
+    pub airspeed_B_m_s: Vector3<f64>,
+    /// Angular velocity relative to the world.
+    pub angular_velocity_B_rad_s: Vector3<f64>,
+    /// The unit vector that points up.
+    pub up_B: Vector3<f64>,
+    /// Height of the centre of mass over the ground, the plane z = 0 of the world.
+    pub height_m: f64,
+    /// Speeds of the rotors, in the order of the motor commands.
+    pub rotor_speeds_rad_s: [f64; 4],
+}
+
+impl<'v> Situation<'v> {
+    /// `vehicle` at `state`, in air that moves with `air_velocity_W_m_s`.
+    #[must_use]
+    pub fn new(vehicle: &'v Vehicle, state: &State, air_velocity_W_m_s: &Vector3<f64>) -> Self {
+        let body = &state.body;
+        let attitude_WB = body.attitude_WB.as_ref();
+        Self {
+            vehicle,
+            airspeed_B_m_s: rotated_back(attitude_WB, &(body.velocity_W_m_s - air_velocity_W_m_s)),
+            angular_velocity_B_rad_s: body.angular_velocity_B_rad_s,
+            up_B: rotated_back(attitude_WB, &Vector3::z()),
+            height_m: body.position_W_m.z,
+            rotor_speeds_rad_s: state.rotors.map(|rotor| rotor.speed_rad_s),
+        }
+    }
+
+    /// Velocity of the hub of a rotor relative to the air.
+    #[must_use]
+    pub fn hub_airspeed_B_m_s(&self, rotor: usize) -> Vector3<f64> {
+        self.airspeed_B_m_s + self.angular_velocity_B_rad_s.cross(&self.vehicle.rotors[rotor].position_m)
+    }
+
+    /// Height of the hub of a rotor over the ground.
+    #[must_use]
+    pub fn hub_height_m(&self, rotor: usize) -> f64 {
+        self.height_m + self.up_B.dot(&self.vehicle.rotors[rotor].position_m)
+    }
+
+    /// Thrust of a rotor before any effect on it.
+    #[must_use]
+    pub fn thrust_N(&self, rotor: usize) -> f64 {
+        rotor::thrust_N(self.vehicle, self.rotor_speeds_rad_s[rotor])
+    }
+}

@@ -1,0 +1,110 @@
+//! What effects carry from tick to tick: commands under way, charge drawn, gusts, random streams.
+//!
+//! It belongs to whoever moves the vehicle, beside its [`State`](crate::State). Written down and read back it goes
+//! on to the same bits, random numbers included: a stream is written as its key and its position.
+
+use crate::airframe::Drive;
+use bus::random::Stream;
+use rand_distr::{Distribution, StandardNormal};
+use serde::{Deserialize, Serialize};
+
+/// What the effects of one airframe carry from tick to tick; made by
+/// [`Airframe::memory`](crate::Airframe::memory). Only its making allocates.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct AirframeMemory {
+    /// What acts over the tick that began last.
+    pub drive: Drive,
+    pub(crate) commands: DelayLine,
+    /// One for each effect, in their order.
+    pub(crate) remembered: Vec<Remembered>,
+}
+
+/// What one effect carries from tick to tick.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Remembered {
+    /// The effect's own numbers, zeros at the start.
+    pub lag: [f64; 4],
+    random: Stream,
+}
+
+impl Remembered {
+    pub(crate) fn new(random: Stream) -> Self {
+        Self { lag: [0.0; 4], random }
+    }
+
+    /// The next four draws from the normal distribution of mean 0 and variance 1.
+    pub fn normals(&mut self) -> [f64; 4] {
+        std::array::from_fn(|_| StandardNormal.sample(&mut self.random))
+    }
+}
+
+/// The commands of the last ticks, in a ring.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub(crate) struct DelayLine {
+    ring: Vec<[f64; 4]>,
+    newest: usize,
+    is_empty: bool,
+}
+
+impl DelayLine {
+    /// A line that holds commands for up to `ticks`.
+    #[allow(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "a delay is bounded and not negative"
+    )]
+    pub(crate) fn new(ticks: f64) -> Self {
+        Self { ring: vec![[0.0; 4]; ticks.ceil() as usize + 2], newest: 0, is_empty: true }
+    }
+
+    /// Takes the commands of this tick and gives those of `ticks` before, linear between two ticks. The first
+    /// commands count as held since ever. More ticks than the line was made for count as as many as it holds.
+    #[allow(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "a delay is bounded and not negative"
+    )]
+    pub(crate) fn pass(&mut self, commands: &[f64; 4], ticks: f64) -> [f64; 4] {
+        if self.is_empty {
+            self.ring.fill(*commands);
+            self.is_empty = false;
+        }
+        self.newest = (self.newest + 1) % self.ring.len();
+        self.ring[self.newest] = *commands;
+        let held = ticks.min((self.ring.len() - 2) as f64);
+        let (whole, part) = (held.floor(), held.fract());
+        let (late, later) = (self.back(whole as usize), self.back(whole as usize + 1));
+        if part == 0.0 { late } else { std::array::from_fn(|i| late[i] * (1.0 - part) + later[i] * part) }
+    }
+
+    fn back(&self, ticks: usize) -> [f64; 4] {
+        self.ring[(self.newest + self.ring.len() - ticks) % self.ring.len()]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_delay_of_whole_ticks_gives_the_very_numbers_back() {
+        let mut line = DelayLine::new(3.0);
+        let given: Vec<_> = (0..10).map(|k| line.pass(&[f64::from(k) + 0.1; 4], 3.0)[0]).collect();
+        assert_eq!(given, [0.1, 0.1, 0.1, 0.1, 1.1, 2.1, 3.1, 4.1, 5.1, 6.1]);
+    }
+
+    #[test]
+    fn a_part_of_a_tick_lies_between_its_ends() {
+        let mut line = DelayLine::new(1.25);
+        let given: Vec<_> = (0..5).map(|k| line.pass(&[f64::from(k); 4], 1.25)[2]).collect();
+        assert_eq!(given, [0.0, 0.0, 0.75, 1.75, 2.75]);
+    }
+
+    #[test]
+    fn no_delay_passes_commands_through() {
+        let mut line = DelayLine::new(0.0);
+        for k in 0..5 {
+            assert_eq!(line.pass(&[f64::from(k); 4], 0.0), [f64::from(k); 4]);
+        }
+    }
+}

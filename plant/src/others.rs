@@ -1,0 +1,106 @@
+//! Which vehicles of the traffic are others: all but the one that is where this plant's own vehicle is.
+#![allow(non_snake_case, reason = "a trailing _W names the frame a vector is written in")]
+
+use crate::backend::{Neighbour, TRAFFIC_MAX};
+use bus::messages::{Time, Traffic};
+use nalgebra::Vector3;
+
+/// The other vehicles of the run.
+#[derive(Debug, Default)]
+pub(crate) struct Others {
+    /// This vehicle's place in the traffic, known from the first sample on.
+    own: Option<usize>,
+    neighbours: Vec<Neighbour>,
+}
+
+impl Others {
+    pub(crate) fn new() -> Self {
+        Self { own: None, neighbours: Vec::with_capacity(TRAFFIC_MAX) }
+    }
+
+    /// The other vehicles at `now_ns`, when this one is at `own_W_m`. A sample that is older is carried on at its
+    /// velocities.
+    ///
+    /// # Errors
+    /// If this vehicle is not among the first traffic, or two are at its place.
+    pub(crate) fn seen(
+        &mut self,
+        traffic: &Traffic,
+        own_W_m: &Vector3<f64>,
+        now_ns: u64,
+    ) -> Result<&[Neighbour], String> {
+        let count = (traffic.count as usize).min(TRAFFIC_MAX);
+        let own = match self.own {
+            Some(own) => own,
+            None => *self.own.insert(place(traffic, count, own_W_m)?),
+        };
+        let age_s = now_ns.saturating_sub(ns(traffic.stamp)) as f64 * 1e-9;
+        self.neighbours.clear();
+        self.neighbours.extend(
+            (0..count).filter(|number| *number != own).map(|number| neighbour(traffic, number, age_s)),
+        );
+        Ok(&self.neighbours)
+    }
+}
+
+/// The one that is exactly where this vehicle is: the traffic copies what the plants publish.
+fn place(traffic: &Traffic, count: usize, own_W_m: &Vector3<f64>) -> Result<usize, String> {
+    let is_own = |number: &usize| Vector3::from(<[f64; 3]>::from(traffic.position[*number])) == *own_W_m;
+    let mut own = (0..count).filter(is_own);
+    let number = own.next().ok_or_else(|| {
+        format!(
+            "none of the {count} vehicles of the first traffic is at {own_W_m:?}, where this one is; the \
+             traffic must read this plant's state, without a delay and at every tick"
+        )
+    })?;
+    match own.next() {
+        None => Ok(number),
+        Some(second) => Err(format!("the vehicles {number} and {second} of the traffic start at one place")),
+    }
+}
+
+#[allow(clippy::cast_possible_truncation, reason = "at most TRAFFIC_MAX")]
+fn neighbour(traffic: &Traffic, number: usize, age_s: f64) -> Neighbour {
+    let vector = |v| Vector3::from(<[f64; 3]>::from(v));
+    let velocity_W_m_s = vector(traffic.velocity[number]);
+    let position_W_m = vector(traffic.position[number]) + velocity_W_m_s * age_s;
+    Neighbour { number: number as u32, position_W_m, velocity_W_m_s }
+}
+
+#[allow(clippy::cast_sign_loss, reason = "simulation time begins at 0")]
+fn ns(time: Time) -> u64 {
+    time.sec as u64 * 1_000_000_000 + u64::from(time.nanosec)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn traffic(positions: &[[f64; 3]]) -> Traffic {
+        let mut traffic = Traffic { count: positions.len() as u32, ..Default::default() };
+        for (place, position) in traffic.position.iter_mut().zip(positions) {
+            *place = (*position).into();
+        }
+        traffic.velocity = [[1.0, 0.0, 0.0].into(); 16];
+        traffic
+    }
+
+    #[test]
+    fn the_vehicle_itself_is_left_out_and_the_others_keep_their_numbers() {
+        let mut others = Others::new();
+        let traffic = traffic(&[[0.0; 3], [1.0, 2.0, 3.0], [4.0; 3]]);
+        let own_W_m = Vector3::new(1.0, 2.0, 3.0);
+        let seen = others.seen(&traffic, &own_W_m, 0).unwrap();
+        assert_eq!(seen.iter().map(|neighbour| neighbour.number).collect::<Vec<_>>(), [0, 2]);
+        // Known by then: it need not be found again.
+        let seen = others.seen(&traffic, &Vector3::zeros(), 500_000_000).unwrap();
+        assert_eq!(seen[0].position_W_m, Vector3::new(0.5, 0.0, 0.0), "an older sample is carried on");
+    }
+
+    #[test]
+    fn a_traffic_without_the_vehicle_or_with_two_at_its_place_is_refused() {
+        let seen = |positions| Others::new().seen(&traffic(positions), &Vector3::zeros(), 0).map(<[_]>::len);
+        assert!(seen(&[[1.0; 3]]).unwrap_err().contains("none of the 1 vehicles"));
+        assert!(seen(&[[0.0; 3], [0.0; 3]]).unwrap_err().contains("start at one place"));
+    }
+}

@@ -1,0 +1,241 @@
+//! The backend `rapier`: the same forces as in free flight, in a world that can be touched.
+//!
+//! At every step the free flight over the step is computed first, by the integrator of [`NewtonEuler`]. Its
+//! change of velocity is then given to rapier as a force and a torque, and rapier moves the body and solves the
+//! contacts. So rapier's own integrator, which is of first order, adds an error to the position only, of the
+//! velocity's change times a fraction of the step (docs/decisions/008-two-backends.md).
+//!
+//! | room | what it holds |
+//! |---|---|
+//! | `body` | who owns pose and velocity; where glam meets nalgebra |
+//! | `world` | what stands and moves in rapier's world |
+//! | [`hull`] | how much room a vehicle takes |
+//! | `contacts` | when contacts begin and end |
+//! | `rig` | test rigs as joints |
+#![allow(non_snake_case, reason = "a trailing _W or _B names the frame a vector is written in")]
+
+mod body;
+mod contacts;
+pub mod hull;
+mod rig;
+mod world;
+
+use crate::airframe::Drive;
+use crate::backend::{Backend, ContactReport, Neighbour, TRAFFIC_MAX};
+use crate::effects::battery::Battery;
+use crate::memory::AirframeMemory;
+use crate::newton_euler::{Motion, NewtonEuler};
+use crate::snapshot::{Snapshot, SnapshotError};
+use crate::state::{RigidBody, State};
+use contacts::Contacts;
+use hull::Hull;
+use nalgebra::Vector3;
+use scenes::{Rig, Scene};
+use serde::{Deserialize, Serialize};
+use world::World;
+
+/// What its snapshots are called.
+const NAME: &str = "rapier";
+
+/// A vehicle lower than this above its stand starts on its feet, at rest.
+const ON_THE_GROUND_M: f64 = 1e-3;
+
+/// A vehicle in a scene.
+pub struct Rapier {
+    model: NewtonEuler,
+    hull: Hull,
+    rig: Option<Rig>,
+    crash_speed_m_s: f64,
+    /// The least moment of inertia about any axis.
+    inertia_min_kg_m2: f64,
+    world: World,
+    contacts: Contacts,
+    state: State,
+    memory: AirframeMemory,
+    reaction: Reaction,
+}
+
+/// What contacts and joints changed over the last tick, against free flight.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
+struct Reaction {
+    acceleration_W_m_s2: Vector3<f64>,
+    angular_acceleration_W_rad_s2: Vector3<f64>,
+    /// Force of the contacts along their normals.
+    normal_W_N: Vector3<f64>,
+}
+
+impl Rapier {
+    /// A vehicle that starts as `body` in `scene`, its rotors at the lowest command; it crashes where it meets
+    /// something faster than `crash_speed_m_s`. A body lower than the vehicle stands is raised onto its feet; in
+    /// a rig it is moved to hang from the bearing. `memory` is made by the vehicle's airframe.
+    #[must_use]
+    pub fn new(
+        model: NewtonEuler,
+        memory: AirframeMemory,
+        scene: &Scene,
+        body: &RigidBody,
+        crash_speed_m_s: f64,
+    ) -> Self {
+        let vehicle = model.vehicle();
+        let hull = Hull::of(vehicle);
+        let mut rapier = Self {
+            hull,
+            rig: scene.rig,
+            crash_speed_m_s,
+            inertia_min_kg_m2: vehicle.inertia_kg_m2.symmetric_eigenvalues().min(),
+            world: World::new(vehicle, &hull, scene, body),
+            contacts: Contacts::new(1 + scene.boxes.len() + TRAFFIC_MAX),
+            state: model.start(*body, 0.0),
+            memory,
+            reaction: Reaction::default(),
+            model,
+        };
+        rapier.set_body(body);
+        rapier
+    }
+
+    /// One step of `span_s`; returns by how much contacts and joints changed the velocities.
+    fn substep(&mut self, drive: &Drive, span_s: f64) -> (Vector3<f64>, Vector3<f64>) {
+        let before = self.state.body;
+        let free = self.model.runge_kutta(&self.state, drive, span_s);
+        let (force_W_N, torque_W_N_m) = self.push(&free.body, span_s);
+        let friction_W_N_m = self.rig_friction(span_s);
+        self.world.step(&force_W_N, &(torque_W_N_m + friction_W_N_m), span_s);
+        self.contacts.note(&before, self.world.sightings(), self.crash_speed_m_s);
+        self.state = State { body: self.world.body(), rotors: free.rotors };
+        let after = &self.state.body;
+        (after.velocity_W_m_s - free.body.velocity_W_m_s, spin_W_rad_s(after) - spin_W_rad_s(&free.body))
+    }
+
+    /// Pushes the rig's slider, and returns the torque of the bearing's friction on the vehicle.
+    fn rig_friction(&mut self, span_s: f64) -> Vector3<f64> {
+        let Some(rig) = &self.rig else { return Vector3::zeros() };
+        self.world.push_slider(rig, self.model.vehicle().gravity_m_s2, span_s);
+        rig::bearing_torque_W_N_m(rig, &spin_W_rad_s(&self.state.body), self.inertia_min_kg_m2, span_s)
+    }
+
+    /// The constant force and torque that take the body's velocities to those of `free` over `span_s`.
+    fn push(&self, free: &RigidBody, span_s: f64) -> (Vector3<f64>, Vector3<f64>) {
+        let (vehicle, body) = (self.model.vehicle(), &self.state.body);
+        let turned_W_rad_s = spin_W_rad_s(free) - spin_W_rad_s(body);
+        let turned_B_rad_s = body.attitude_WB.inverse_transform_vector(&turned_W_rad_s);
+        let impulse_W_N_s = (free.velocity_W_m_s - body.velocity_W_m_s) * vehicle.mass_kg;
+        let turn_W_N_m_s = body.attitude_WB * (vehicle.inertia_kg_m2 * turned_B_rad_s);
+        (impulse_W_N_s / span_s, turn_W_N_m_s / span_s)
+    }
+
+    /// Has the vehicle stand on its feet where it is too low to fly.
+    fn put_down(&mut self) {
+        let stands = self.stands();
+        let height_m = &mut self.state.body.position_W_m.z;
+        if stands {
+            *height_m = height_m.max(self.hull.stand_m());
+        }
+        self.contacts.place(stands.then_some(world::GROUND));
+    }
+
+    fn stands(&self) -> bool {
+        let upright = self.state.body.attitude_WB * Vector3::z();
+        self.state.body.position_W_m.z < self.hull.stand_m() + ON_THE_GROUND_M && upright.z > 0.999
+    }
+
+    /// Moves the vehicle to hang from the rig's bearing.
+    fn hang(&mut self, rig: &Rig) {
+        let (body, bearing_W_m) = rig::hung(rig, &self.state.body);
+        self.state.body = body;
+        self.contacts.place(None);
+        let arm_W_m = body.attitude_WB * rig.mount_B_m;
+        let speed_m_s = body.velocity_W_m_s.z + spin_W_rad_s(&body).cross(&arm_W_m).z;
+        self.world.set_slider(&bearing_W_m, speed_m_s);
+    }
+
+    /// All that free flight does not explain is the contacts' doing; in a rig, where the bearing pushes too, it is
+    /// what they push along their normals, friction left out.
+    fn contact_force_W_N(&self) -> Vector3<f64> {
+        match self.rig {
+            Some(_) => self.reaction.normal_W_N,
+            None => self.reaction.acceleration_W_m_s2 * self.model.vehicle().mass_kg,
+        }
+    }
+}
+
+impl Backend for Rapier {
+    fn state(&self) -> &State {
+        &self.state
+    }
+
+    fn motion(&self) -> Motion {
+        let free = self.model.motion_under(&self.memory.drive, &self.state);
+        let in_body = |v_W: &Vector3<f64>| self.state.body.attitude_WB.inverse_transform_vector(v_W);
+        let Reaction { acceleration_W_m_s2, angular_acceleration_W_rad_s2, .. } = &self.reaction;
+        Motion {
+            specific_force_B_m_s2: free.specific_force_B_m_s2 + in_body(acceleration_W_m_s2),
+            angular_acceleration_B_rad_s2: free.angular_acceleration_B_rad_s2
+                + in_body(angular_acceleration_W_rad_s2),
+        }
+    }
+
+    fn step(&mut self, commands: &[f64; 4], dt_s: f64, traffic: &[Neighbour]) {
+        let drive = self.model.airframe().begin_tick(&mut self.memory, &self.state, commands, dt_s);
+        let span_s = dt_s / f64::from(self.model.substeps());
+        self.contacts.begin_tick();
+        let (mut change_W_m_s, mut change_W_rad_s) = (Vector3::zeros(), Vector3::zeros());
+        for substep in 1..=self.model.substeps() {
+            self.world.move_neighbours(traffic, &self.hull, f64::from(substep) * span_s);
+            let (linear_W_m_s, angular_W_rad_s) = self.substep(&drive, span_s);
+            change_W_m_s += linear_W_m_s;
+            change_W_rad_s += angular_W_rad_s;
+        }
+        self.state.rotors = self.model.airframe().settled(&drive, &self.state.rotors);
+        self.reaction = Reaction {
+            acceleration_W_m_s2: change_W_m_s / dt_s,
+            angular_acceleration_W_rad_s2: change_W_rad_s / dt_s,
+            normal_W_N: self.contacts.normal_impulse_W_N_s() / dt_s,
+        };
+    }
+
+    fn settle_rotors(&mut self, commands: &[f64; 4]) {
+        self.state.rotors = commands.map(|command| self.model.steady(command));
+    }
+
+    fn set_body(&mut self, body: &RigidBody) {
+        self.state.body = *body;
+        self.reaction = Reaction::default();
+        match self.rig {
+            Some(rig) => self.hang(&rig),
+            None => self.put_down(),
+        }
+        self.world.set_body(&self.state.body);
+    }
+
+    fn contact(&self) -> ContactReport {
+        self.contacts.report(&self.contact_force_W_N())
+    }
+
+    fn battery(&self) -> Option<Battery> {
+        self.model.airframe().battery(&self.memory, &self.state)
+    }
+
+    fn snapshot(&self) -> Result<Vec<u8>, SnapshotError> {
+        let own = Snapshot::of(NAME)
+            .with("state", &self.state)?
+            .with("memory", &self.memory)?
+            .with("reaction", &self.reaction)?
+            .with("contacts", &self.contacts)?;
+        self.world.write(own)?.bytes()
+    }
+
+    fn restore(&mut self, snapshot: &[u8]) -> Result<(), SnapshotError> {
+        let snapshot = Snapshot::read(snapshot, NAME)?;
+        let (state, memory, reaction) =
+            (snapshot.get("state")?, snapshot.get("memory")?, snapshot.get("reaction")?);
+        let (contacts, world) = (snapshot.get("contacts")?, World::read(&snapshot)?);
+        (self.state, self.memory, self.reaction) = (state, memory, reaction);
+        (self.contacts, self.world) = (contacts, world);
+        Ok(())
+    }
+}
+
+fn spin_W_rad_s(body: &RigidBody) -> Vector3<f64> {
+    body.attitude_WB * body.angular_velocity_B_rad_s
+}

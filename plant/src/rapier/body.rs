@@ -1,0 +1,72 @@
+//! The vehicle's body in rapier's world, which owns its pose and velocity: this room alone writes and reads
+//! them. Here alone, too, rapier's vectors (glam) and ours (nalgebra) become each other.
+//!
+//! Rapier keeps the angular velocity in the world frame; [`RigidBody`] has it in the body frame.
+#![allow(non_snake_case, reason = "a trailing _W or _B names the frame a vector is written in")]
+
+use crate::state::RigidBody;
+use nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};
+use rapier3d_f64::dynamics::{MassProperties, RigidBody as Owner, RigidBodyBuilder};
+use rapier3d_f64::math::{Matrix, Pose, Rotation, Vector};
+use vehicles::Vehicle;
+
+/// The body of `vehicle`, at the origin. Its mass is the vehicle's, whatever its colliders' shapes. Rapier's own
+/// gyroscopic term is off, as the torque that is put on it holds that already; it never sleeps, as motors may
+/// start at any tick.
+pub(super) fn owner(vehicle: &Vehicle) -> RigidBodyBuilder {
+    let inertia = matrix(&vehicle.inertia_kg_m2);
+    let mass = MassProperties::with_inertia_matrix(Vector::ZERO, vehicle.mass_kg, inertia);
+    RigidBodyBuilder::dynamic()
+        .additional_mass_properties(mass)
+        .gyroscopic_forces_enabled(false)
+        .allow_fast_rotation(true)
+        .can_sleep(false)
+}
+
+/// Pose and velocity, as rapier has them.
+pub(super) fn read(owner: &Owner) -> RigidBody {
+    let attitude_WB = attitude(owner.rotation());
+    RigidBody {
+        position_W_m: from_rapier(owner.translation()),
+        velocity_W_m_s: from_rapier(owner.linvel()),
+        attitude_WB,
+        angular_velocity_B_rad_s: attitude_WB.inverse_transform_vector(&from_rapier(owner.angvel())),
+    }
+}
+
+/// Gives rapier another pose and velocity.
+pub(super) fn write(owner: &mut Owner, body: &RigidBody) {
+    let [x, y, z, w] = body.attitude_WB.coords.into();
+    let pose = Pose::from_parts(to_rapier(&body.position_W_m), Rotation::from_xyzw(x, y, z, w));
+    owner.set_position(pose, true);
+    owner.set_linvel(to_rapier(&body.velocity_W_m_s), true);
+    owner.set_angvel(to_rapier(&(body.attitude_WB * body.angular_velocity_B_rad_s)), true);
+}
+
+/// Puts a force and a torque on the body for the next step, instead of those of the last.
+pub(super) fn push(owner: &mut Owner, force_W_N: &Vector3<f64>, torque_W_N_m: &Vector3<f64>) {
+    owner.reset_forces(true);
+    owner.reset_torques(true);
+    owner.add_force(to_rapier(force_W_N), true);
+    owner.add_torque(to_rapier(torque_W_N_m), true);
+}
+
+/// A vector as rapier writes it.
+pub(super) fn to_rapier(v: &Vector3<f64>) -> Vector {
+    Vector::new(v.x, v.y, v.z)
+}
+
+/// A vector of rapier's.
+pub(super) fn from_rapier(v: Vector) -> Vector3<f64> {
+    Vector3::new(v.x, v.y, v.z)
+}
+
+fn attitude(rotation: &Rotation) -> UnitQuaternion<f64> {
+    // Rapier normalises at every step; once more would only move the last bits.
+    UnitQuaternion::new_unchecked(Quaternion::new(rotation.w, rotation.x, rotation.y, rotation.z))
+}
+
+fn matrix(m: &Matrix3<f64>) -> Matrix {
+    let column = |i: usize| to_rapier(&m.column(i).into());
+    Matrix::from_cols(column(0), column(1), column(2))
+}

@@ -1,0 +1,62 @@
+//! How much room a vehicle takes: a flat disc around its propellers, and four feet below.
+//!
+//! Vehicle files give the rotors' places, but neither propellers nor feet. Those of the Hummingbird are scaled
+//! with the length of the arms; for a Crazyflie 2.1 that gives propellers of 2.7 cm instead of 2.3 cm.
+#![allow(non_snake_case, reason = "a trailing _B names the frame a vector is written in")]
+
+use nalgebra::Vector3;
+use vehicles::Vehicle;
+
+/// Arm of the Hummingbird: half of the 0.34 m between motor axes (thesis Table 2.1).
+const HUMMINGBIRD_ARM_M: f64 = 0.17;
+/// Radius of its propellers: 8 inch in diameter (thesis Table 2.1).
+const HUMMINGBIRD_PROPELLER_M: f64 = 0.1016;
+/// Half of the disc's thickness: tuned, no source; about a motor with its propeller.
+const HUMMINGBIRD_DISC_HALF_M: f64 = 0.015;
+/// How far below the centre of mass the feet stand: half of `body_height`, 0.12 m (RotorS,
+/// rotors_description/urdf/hummingbird.xacro).
+const HUMMINGBIRD_STAND_M: f64 = 0.06;
+/// How far the feet are out along body x and y: half of `body_width`, 0.1 m (the same file).
+const HUMMINGBIRD_FOOT_OUT_M: f64 = 0.05;
+/// Radius of the balls that the feet end in: tuned, no source.
+const HUMMINGBIRD_FOOT_RADIUS_M: f64 = 0.01;
+
+/// The shape of a vehicle, from its centre of mass, in the body frame.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Hull {
+    /// Radius of the disc around all propellers; its axis is body z.
+    pub disc_radius_m: f64,
+    /// Half of the disc's thickness.
+    pub disc_half_m: f64,
+    /// Height of the disc's middle: the mean of the rotors'.
+    pub disc_z_m: f64,
+    /// Centres of the feet.
+    pub feet_B_m: [Vector3<f64>; 4],
+    /// Radius of the feet.
+    pub foot_radius_m: f64,
+}
+
+impl Hull {
+    /// The hull of `vehicle`.
+    #[must_use]
+    pub fn of(vehicle: &Vehicle) -> Self {
+        let arm_m = vehicle.rotors.iter().map(|rotor| rotor.position_m.xy().norm()).fold(0.0, f64::max);
+        let scale = arm_m / HUMMINGBIRD_ARM_M;
+        let (out_m, radius_m) = (HUMMINGBIRD_FOOT_OUT_M * scale, HUMMINGBIRD_FOOT_RADIUS_M * scale);
+        let foot_z_m = radius_m - HUMMINGBIRD_STAND_M * scale;
+        let corners = [(out_m, out_m), (out_m, -out_m), (-out_m, -out_m), (-out_m, out_m)];
+        Self {
+            disc_radius_m: arm_m + HUMMINGBIRD_PROPELLER_M * scale,
+            disc_half_m: HUMMINGBIRD_DISC_HALF_M * scale,
+            disc_z_m: vehicle.rotors.iter().map(|rotor| rotor.position_m.z).sum::<f64>() / 4.0,
+            feet_B_m: corners.map(|(x, y)| Vector3::new(x, y, foot_z_m)),
+            foot_radius_m: radius_m,
+        }
+    }
+
+    /// Height of the centre of mass above the ground when the vehicle stands on its feet.
+    #[must_use]
+    pub fn stand_m(&self) -> f64 {
+        self.foot_radius_m - self.feet_B_m[0].z
+    }
+}

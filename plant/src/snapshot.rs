@@ -1,0 +1,94 @@
+//! A backend's state as bytes: named components, so that two snapshots that differ tell where.
+
+use serde::de::DeserializeOwned;
+use serde::{Deserialize, Serialize};
+use thiserror::Error;
+
+/// Why a snapshot could not be taken or read.
+#[derive(Debug, Error)]
+pub enum SnapshotError {
+    /// The bytes are not a snapshot.
+    #[error("these bytes are no snapshot of a plant: {0}")]
+    Unreadable(postcard::Error),
+    /// It is one of another backend.
+    #[error("this is a snapshot of the backend {found:?}, expected one of {expected:?}")]
+    OtherBackend {
+        /// The backend that was to be restored.
+        expected: &'static str,
+        /// The backend that took it.
+        found: String,
+    },
+    /// A component is absent.
+    #[error("the snapshot has no component {0:?}; it was taken by another version or in another scene")]
+    Missing(&'static str),
+    /// A component cannot be written or read.
+    #[error("component {component:?} of the snapshot: {cause}")]
+    Component {
+        /// Its name.
+        component: &'static str,
+        /// Why not.
+        cause: postcard::Error,
+    },
+}
+
+/// The components of a backend's state.
+#[derive(Debug, Serialize, Deserialize)]
+pub(crate) struct Snapshot {
+    backend: String,
+    components: Vec<(String, Vec<u8>)>,
+}
+
+impl Snapshot {
+    /// An empty snapshot of `backend`.
+    pub(crate) fn of(backend: &str) -> Self {
+        Self { backend: backend.to_owned(), components: Vec::new() }
+    }
+
+    /// The same with one more component.
+    pub(crate) fn with(
+        mut self,
+        component: &'static str,
+        value: &impl Serialize,
+    ) -> Result<Self, SnapshotError> {
+        let bytes =
+            postcard::to_stdvec(value).map_err(|cause| SnapshotError::Component { component, cause })?;
+        self.components.push((component.to_owned(), bytes));
+        Ok(self)
+    }
+
+    /// As bytes.
+    pub(crate) fn bytes(&self) -> Result<Vec<u8>, SnapshotError> {
+        postcard::to_stdvec(self).map_err(SnapshotError::Unreadable)
+    }
+
+    /// Reads the bytes of a snapshot of `backend`.
+    pub(crate) fn read(bytes: &[u8], backend: &'static str) -> Result<Self, SnapshotError> {
+        let snapshot: Self = postcard::from_bytes(bytes).map_err(SnapshotError::Unreadable)?;
+        if snapshot.backend == backend {
+            Ok(snapshot)
+        } else {
+            Err(SnapshotError::OtherBackend { expected: backend, found: snapshot.backend })
+        }
+    }
+
+    /// One component.
+    pub(crate) fn get<T: DeserializeOwned>(&self, component: &'static str) -> Result<T, SnapshotError> {
+        let found = self.components.iter().find(|(name, _)| name == component);
+        let (_, bytes) = found.ok_or(SnapshotError::Missing(component))?;
+        postcard::from_bytes(bytes).map_err(|cause| SnapshotError::Component { component, cause })
+    }
+}
+
+/// The name of the first component in which two snapshots differ; `None` where they are the same.
+///
+/// # Errors
+/// If one of them is no snapshot.
+pub fn first_difference(a: &[u8], b: &[u8]) -> Result<Option<String>, SnapshotError> {
+    let read = |bytes| postcard::from_bytes::<Snapshot>(bytes).map_err(SnapshotError::Unreadable);
+    let (a, b) = (read(a)?, read(b)?);
+    if a.backend != b.backend || a.components.len() != b.components.len() {
+        return Ok(Some("backend".to_owned()));
+    }
+    let mut pairs = a.components.into_iter().zip(b.components);
+    Ok(pairs.find(|(a, b)| a != b).map(|((name, _), _)| name))
+}

@@ -1,0 +1,81 @@
+//! How often a tick takes memory: never in free flight, and a few times inside rapier.
+#![allow(non_snake_case, reason = "a trailing _W or _B names the frame a vector is written in")]
+
+mod common;
+
+use common::{TICK_S, hummingbird};
+use nalgebra::Vector3;
+use plant::{Backend, Neighbour, NewtonEuler, Rapier, RigidBody};
+use scenes::Scene;
+use std::alloc::{GlobalAlloc, Layout, System};
+use std::cell::Cell;
+
+/// Counts how often each thread takes memory.
+struct Counting;
+
+thread_local! {
+    static TAKEN: Cell<u64> = const { Cell::new(0) };
+}
+
+// SAFETY: every call goes to the system's allocator unchanged.
+unsafe impl GlobalAlloc for Counting {
+    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
+        TAKEN.set(TAKEN.get() + 1);
+        // SAFETY: the caller's promise is passed on.
+        unsafe { System.alloc(layout) }
+    }
+    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
+        // SAFETY: the caller's promise is passed on.
+        unsafe { System.dealloc(pointer, layout) }
+    }
+}
+
+#[global_allocator]
+static ALLOCATOR: Counting = Counting;
+
+fn model() -> NewtonEuler {
+    NewtonEuler::new(hummingbird(), 1)
+}
+
+fn rapier(scene: &str, start_W_m: Vector3<f64>) -> Rapier {
+    let scene = Scene::parse(scene, "scene.toml").unwrap();
+    common::rapier(model(), &scene, &RigidBody::level_at(start_W_m), 1.0)
+}
+
+/// How often 1000 ticks take memory, after 1000 that may fill buffers.
+fn taken(plant: &mut dyn Backend, command: f64, traffic: &[Neighbour]) -> u64 {
+    plant.settle_rotors(&[command; 4]);
+    (0..1_000).for_each(|_| plant.step(&[command; 4], TICK_S, traffic));
+    let before = TAKEN.get();
+    for _ in 0..1_000 {
+        plant.step(&[command; 4], TICK_S, traffic);
+        std::hint::black_box((plant.motion(), plant.contact()));
+    }
+    TAKEN.get() - before
+}
+
+#[test]
+fn free_flight_takes_no_memory() {
+    let mut plant = common::free_flight(hummingbird(), RigidBody::level_at(Vector3::z()));
+    assert_eq!(taken(&mut plant, hummingbird().hover_command(), &[]), 0);
+}
+
+/// Rapier notes which bodies were written to, and its contact search between curved shapes builds lists; with debug
+/// assertions it also checks itself. None of these places is ours, and the number does not grow with time.
+#[test]
+fn rapier_takes_memory_a_few_times_a_tick_whatever_is_touched() {
+    let room = include_str!("../../scenes/room.toml");
+    let hover = hummingbird().hover_command();
+    let other =
+        Neighbour { number: 1, position_W_m: Vector3::new(0.3, 0.0, 1.0), velocity_W_m_s: Vector3::zeros() };
+    let counts = [
+        ("flying", taken(&mut rapier(room, Vector3::z()), hover, &[])),
+        ("standing", taken(&mut rapier(room, Vector3::zeros()), 1.0, &[])),
+        ("among traffic", taken(&mut rapier(room, Vector3::z()), hover, &[other])),
+        ("rig A", taken(&mut rapier(include_str!("../../scenes/rig-sliding.toml"), Vector3::z()), 1.0, &[])),
+    ];
+    println!("in 1000 ticks: {counts:?}");
+    for (name, count) in counts {
+        assert!(count <= 10_000, "{name}: {count} times in 1000 ticks");
+    }
+}

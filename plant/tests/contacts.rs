@@ -1,0 +1,171 @@
+//! What the rapier backend touches, and what it reports of it.
+#![allow(non_snake_case, reason = "a trailing _W or _B names the frame a vector is written in")]
+
+mod common;
+
+use common::{TICK_S, hummingbird};
+use nalgebra::{UnitQuaternion, Vector3};
+use plant::rapier::hull::Hull;
+use plant::{Backend, ContactReport, Neighbour, NewtonEuler, Rapier, RigidBody};
+use scenes::Scene;
+
+const CRASH_SPEED_M_S: f64 = 1.0;
+/// The lowest command: 1075 rpm, which carries a thirteenth of the weight.
+const IDLE: [f64; 4] = [1.0; 4];
+
+fn plant(scene: &Scene, body: &RigidBody) -> Rapier {
+    common::rapier(NewtonEuler::new(hummingbird(), 1), scene, body, CRASH_SPEED_M_S)
+}
+
+fn room() -> Scene {
+    Scene::parse(include_str!("../../scenes/room.toml"), "room.toml").unwrap()
+}
+
+fn fly(plant: &mut Rapier, commands: &[f64; 4], ticks: usize) -> Vec<ContactReport> {
+    let mut step = || {
+        plant.step(commands, TICK_S, &[]);
+        plant.contact()
+    };
+    (0..ticks).map(|_| step()).collect()
+}
+
+fn stand_m() -> f64 {
+    Hull::of(&hummingbird()).stand_m()
+}
+
+#[test]
+fn a_vehicle_that_starts_on_the_ground_stands_on_its_feet_and_stays_there() {
+    let mut plant = plant(&Scene::default(), &RigidBody::level_at(Vector3::zeros()));
+    assert_eq!(plant.state().body.position_W_m.z, stand_m());
+    let reports = fly(&mut plant, &IDLE, 3_000);
+    let body = plant.state().body;
+    assert!((body.position_W_m - Vector3::z() * stand_m()).norm() < 2e-4, "{:?}", body.position_W_m);
+    assert!(body.attitude_WB.angle() < 1e-3, "{}", body.attitude_WB.angle());
+    assert!(body.velocity_W_m_s.norm() < 1e-3 && body.angular_velocity_B_rad_s.norm() < 1e-2, "{body:?}");
+    let last = reports.last().unwrap();
+    assert_eq!((last.object, last.count, last.began, last.crashed), (1, 1, 0, false));
+    assert!(reports.iter().all(|report| report.object == 1), "it never leaves the ground");
+}
+
+#[test]
+fn the_ground_carries_what_the_rotors_do_not_and_the_accelerometer_feels_g() {
+    let mut plant = plant(&Scene::default(), &RigidBody::level_at(Vector3::zeros()));
+    let reports = fly(&mut plant, &IDLE, 2_000);
+    let vehicle = hummingbird();
+    let lift_N: f64 =
+        plant.state().rotors.iter().map(|rotor| plant::rotor::thrust_N(&vehicle, rotor.speed_rad_s)).sum();
+    let mean_N = reports[1_000..].iter().map(|report| report.force_W_N).sum::<Vector3<f64>>() / 1_000.0;
+    let expected_N = Vector3::z() * (vehicle.mass_kg * vehicle.gravity_m_s2 - lift_N);
+    assert!((mean_N - expected_N).norm() < 0.02, "{mean_N:?} {expected_N:?}");
+    let felt = plant.motion().specific_force_B_m_s2;
+    assert!((felt - Vector3::z() * 9.81).norm() < 0.05, "{felt:?}");
+}
+
+#[test]
+fn a_fall_is_met_at_its_speed_counted_once_and_a_crash_above_the_limit() {
+    // 4 cm of fall is 0.9 m/s, 0.5 m is 3.1 m/s; the idling rotors take a thirteenth of the weight off.
+    for (height_m, crashed) in [(0.04, false), (0.5, true)] {
+        let start = RigidBody::level_at(Vector3::z() * (stand_m() + height_m));
+        let mut plant = plant(&Scene::default(), &start);
+        let mut speed_before_m_s = 0.0;
+        let mut met = None;
+        for _ in 0..3_000 {
+            if met.is_none() {
+                speed_before_m_s = -plant.state().body.velocity_W_m_s.z;
+            }
+            plant.step(&IDLE, TICK_S, &[]);
+            met = met.or(Some(plant.contact()).filter(|report| report.count > 0));
+        }
+        let met = met.expect("it falls onto the ground");
+        assert!((met.impact_speed_m_s - speed_before_m_s).abs() < 1e-9, "{met:?} {speed_before_m_s}");
+        assert_eq!((met.object, met.began, met.crashed), (1, 1, crashed), "{met:?}");
+        assert!(plant.contact().began >= 1 && plant.contact().crashed == crashed);
+        assert!((plant.state().body.position_W_m.z - stand_m()).abs() < 1e-3, "it comes to rest on its feet");
+    }
+}
+
+#[test]
+fn lift_off_ends_the_contact_and_leaves_none_counted() {
+    let mut plant = plant(&Scene::default(), &RigidBody::level_at(Vector3::zeros()));
+    let reports = fly(&mut plant, &[120.0; 4], 1_500);
+    assert!(plant.state().body.position_W_m.z > 0.5);
+    let last = reports.last().unwrap();
+    assert_eq!((last.count, last.object, last.began, last.crashed), (0, 0, 0, false));
+    assert_eq!(last.force_W_N, Vector3::zeros());
+}
+
+/// How far the vehicle's disc reaches along `direction`.
+fn reach_m(plant: &Rapier, hull: &Hull, direction: &Vector3<f64>) -> f64 {
+    let body = plant.state().body;
+    let lean = (body.attitude_WB * Vector3::z()).dot(direction).abs();
+    let rim_m = hull.disc_radius_m * (1.0 - lean * lean).sqrt() + hull.disc_half_m * lean;
+    body.position_W_m.dot(direction) + rim_m
+}
+
+#[test]
+fn walls_hold_a_vehicle_and_are_named() {
+    let hull = Hull::of(&hummingbird());
+    let hover = [hummingbird().hover_command(); 4];
+    for (direction, object) in [(Vector3::x(), 2), (-Vector3::x(), 3), (Vector3::y(), 4), (-Vector3::y(), 5)]
+    {
+        let start = RigidBody {
+            velocity_W_m_s: direction * 2.0,
+            ..RigidBody::level_at(direction * 4.0 + Vector3::z())
+        };
+        let mut plant = plant(&room(), &start);
+        plant.settle_rotors(&hover);
+        let mut met = None;
+        for _ in 0..1_000 {
+            plant.step(&hover, TICK_S, &[]);
+            met = met.or(Some(plant.contact()).filter(|report| report.count > 0));
+            let depth_m = reach_m(&plant, &hull, &direction) - 5.0;
+            assert!(depth_m < 2e-3, "it enters the wall by {depth_m} m");
+        }
+        let met = met.expect("it flies into the wall");
+        assert_eq!((met.object, met.began, met.crashed), (object, 1, true));
+        assert!((met.impact_speed_m_s - 2.0).abs() < 0.01, "{met:?}");
+        assert!(met.force_W_N.dot(&direction) < 0.0, "the wall pushes back");
+    }
+}
+
+#[test]
+fn another_vehicle_is_met_where_it_flies() {
+    let hover = [hummingbird().hover_command(); 4];
+    let hull = Hull::of(&hummingbird());
+    let mut plant = plant(&room(), &RigidBody::level_at(Vector3::new(0.0, 0.0, 1.0)));
+    plant.settle_rotors(&hover);
+    let (mut met, mut met_at_m) = (None, 0.0);
+    for tick in 0..2_000 {
+        let position_W_m = Vector3::new(2.0 - 1.5 * f64::from(tick) * TICK_S, 0.0, 1.0);
+        let velocity_W_m_s = -Vector3::x() * 1.5;
+        plant.step(&hover, TICK_S, &[Neighbour { number: 3, position_W_m, velocity_W_m_s }]);
+        if met.is_none() && plant.contact().count > 0 {
+            met = Some(plant.contact());
+            met_at_m = position_W_m.x;
+        }
+    }
+    let met = met.expect("they meet");
+    assert_eq!((met.object, met.crashed), (1003, true));
+    assert!((met_at_m - 2.0 * hull.disc_radius_m).abs() < 0.01, "{met_at_m}");
+    assert!((met.impact_speed_m_s - 1.5).abs() < 0.01, "{met:?}");
+    assert!(plant.state().body.position_W_m.x < -0.3, "it is pushed away");
+}
+
+#[test]
+fn a_tumbling_fall_ends_on_the_ground_and_not_in_it() {
+    let start = RigidBody {
+        attitude_WB: UnitQuaternion::from_euler_angles(2.5, 0.4, 1.0),
+        angular_velocity_B_rad_s: Vector3::new(5.0, -3.0, 2.0),
+        ..RigidBody::level_at(Vector3::z() * 2.0)
+    };
+    let mut plant = plant(&room(), &start);
+    let hull = Hull::of(&hummingbird());
+    for tick in 0..8_000 {
+        plant.step(&IDLE, TICK_S, &[]);
+        let depth_m = reach_m(&plant, &hull, &-Vector3::z());
+        assert!(depth_m < 2e-3, "at tick {tick} it enters the ground by {depth_m} m");
+    }
+    // It may still roll on its rim: nothing but the air would stop that.
+    assert!(plant.state().body.position_W_m.z < hull.disc_radius_m + 0.01, "it lies on the ground");
+    assert!(plant.state().body.velocity_W_m_s.norm() < 1.0);
+}

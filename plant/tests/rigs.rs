@@ -1,0 +1,193 @@
+//! The thesis's rigs: what they hold, what they leave free.
+#![allow(non_snake_case, reason = "a trailing _W or _B names the frame a vector is written in")]
+
+mod common;
+
+use common::{TICK_S, hummingbird};
+use nalgebra::{UnitQuaternion, Vector3};
+use plant::{Backend, NewtonEuler, Rapier, RigidBody};
+use scenes::{Rig, Scene};
+
+const SLIDING: &str = include_str!("../../scenes/rig-sliding.toml");
+const FIXED: &str = include_str!("../../scenes/rig-fixed.toml");
+
+fn scene(text: &str) -> Scene {
+    Scene::parse(text, "rig.toml").unwrap()
+}
+
+fn frictionless(text: &str) -> Scene {
+    let mut scene = scene(text);
+    let rig = scene.rig.as_mut().unwrap();
+    (rig.bearing_friction_N_m, rig.bearing_damping_N_m_s) = (0.0, 0.0);
+    (rig.slide_friction_N, rig.slide_damping_N_s_m) = (0.0, 0.0);
+    scene
+}
+
+/// A vehicle that hangs in the rig, its nose towards `yaw_deg`.
+fn hanging(scene: &Scene, yaw_deg: f64) -> Rapier {
+    let attitude_WB = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), yaw_deg.to_radians());
+    let body = RigidBody { attitude_WB, ..RigidBody::level_at(Vector3::zeros()) };
+    common::rapier(NewtonEuler::new(hummingbird(), 1), scene, &body, 1.0)
+}
+
+/// Where the bearing's centre is, seen from the lower end of its travel.
+fn bearing_W_m(plant: &Rapier, rig: &Rig) -> Vector3<f64> {
+    let body = plant.state().body;
+    body.position_W_m + body.attitude_WB * rig.mount_B_m - rig.bearing_W_m
+}
+
+fn tilt_deg(plant: &Rapier) -> f64 {
+    (plant.state().body.attitude_WB * Vector3::z()).angle(&Vector3::z()).to_degrees()
+}
+
+/// What the rig promises at every tick: the bearing on its line and within its travel, the tilt within its cone.
+#[track_caller]
+fn assert_held(plant: &Rapier, rig: &Rig, tick: usize) {
+    let bearing_W_m = bearing_W_m(plant, rig);
+    assert!(bearing_W_m.xy().norm() < 1e-3, "tick {tick}: off its line by {:?}", bearing_W_m.xy());
+    let outside_m = (-bearing_W_m.z).max(bearing_W_m.z - rig.heave_m);
+    // The end stops act where they are passed: by the way of a solver's step at most.
+    assert!(outside_m < 2e-3, "tick {tick}: outside of its travel by {outside_m} m");
+    let over_deg = tilt_deg(plant) - rig.tilt_max_rad.to_degrees();
+    assert!(over_deg < 1.0, "tick {tick}: {over_deg} deg beyond the limit");
+}
+
+/// Commands that turn with all the rotors have about body x (or y), one way and then the other.
+fn hard(tick: usize, axis: usize) -> [f64; 4] {
+    let push = if (tick / 600).is_multiple_of(2) { 200.0 } else { 1.0 };
+    let pull = 201.0 - push;
+    if axis == 0 { [76.5, push, 76.5, pull] } else { [push, 76.5, pull, 76.5] }
+}
+
+#[test]
+fn the_tilt_limit_holds_against_all_the_rotors_at_any_yaw_and_about_any_axis() {
+    for text in [SLIDING, FIXED] {
+        let scene = scene(text);
+        let rig = scene.rig.unwrap();
+        for yaw_deg in [0.0, 45.0, 90.0, 200.0] {
+            for axis in [0, 1] {
+                let mut plant = hanging(&scene, yaw_deg);
+                let mut most_deg = 0.0_f64;
+                for tick in 0..3_000 {
+                    plant.step(&hard(tick, axis), TICK_S, &[]);
+                    assert_held(&plant, &rig, tick);
+                    most_deg = most_deg.max(tilt_deg(&plant));
+                }
+                assert!(most_deg > 44.5, "it has to reach the limit, or this shows nothing: {most_deg}");
+            }
+        }
+    }
+}
+
+#[test]
+fn it_hangs_at_the_lower_end_and_rises_to_the_upper_one() {
+    let scene = scene(SLIDING);
+    let rig = scene.rig.unwrap();
+    let mut plant = hanging(&scene, 0.0);
+    let fly = |plant: &mut Rapier, command: f64, ticks: usize| {
+        for tick in 0..ticks {
+            plant.step(&[command; 4], TICK_S, &[]);
+            assert_held(plant, &rig, tick);
+        }
+        bearing_W_m(plant, &rig).z
+    };
+    assert!(fly(&mut plant, 1.0, 1_000).abs() < 1e-4, "the rope holds it");
+    // Enough for the vehicle alone, and not for what hangs on it.
+    assert!(fly(&mut plant, 78.0, 3_000).abs() < 1e-4, "the hanging mass is too heavy");
+    assert!((fly(&mut plant, 120.0, 2_000) - 0.3).abs() < 1e-3, "the tube ends");
+    assert!(fly(&mut plant, 1.0, 3_000).abs() < 1e-4, "and down again");
+}
+
+#[test]
+fn the_accelerometer_feels_g_where_the_rope_carries_the_vehicle() {
+    let mut plant = hanging(&scene(SLIDING), 30.0);
+    for _ in 0..1_000 {
+        plant.step(&[1.0; 4], TICK_S, &[]);
+    }
+    let felt = plant.motion().specific_force_B_m_s2;
+    assert!((felt - Vector3::z() * 9.81).norm() < 1e-3, "{felt:?}");
+    assert_eq!(plant.contact().count, 0, "a rig is no contact");
+}
+
+#[test]
+fn yaw_is_free() {
+    let mut plant = hanging(&frictionless(FIXED), 0.0);
+    let body = plant.state().body;
+    plant.set_body(&RigidBody { angular_velocity_B_rad_s: Vector3::z() * 2.0, ..body });
+    // Nothing but the drag of idling rotors, which cancels, and their spin-down.
+    let mut turned_rad = 0.0;
+    for _ in 0..5_000 {
+        plant.step(&[1.0; 4], TICK_S, &[]);
+        turned_rad += plant.state().body.angular_velocity_B_rad_s.z * TICK_S;
+    }
+    assert!((turned_rad - 10.0).abs() < 0.02, "it turns on by itself: {turned_rad}");
+    assert!(tilt_deg(&plant) < 0.1);
+}
+
+/// Energy of the vehicle's motion and height, without that of its rotors.
+fn energy_J(plant: &Rapier) -> f64 {
+    let (vehicle, body) = (hummingbird(), plant.state().body);
+    let w = body.angular_velocity_B_rad_s;
+    0.5 * vehicle.mass_kg * body.velocity_W_m_s.norm_squared()
+        + 0.5 * w.dot(&(vehicle.inertia_kg_m2 * w))
+        + vehicle.mass_kg * vehicle.gravity_m_s2 * body.position_W_m.z
+}
+
+fn swinging(scene: &Scene) -> Rapier {
+    let mut vehicle = hummingbird();
+    (vehicle.thrust_coefficient, vehicle.torque_coefficient) = (0.0, 0.0);
+    let body = RigidBody {
+        attitude_WB: UnitQuaternion::from_euler_angles(0.5, 0.0, 0.3),
+        ..RigidBody::level_at(Vector3::zeros())
+    };
+    common::rapier(NewtonEuler::new(vehicle, 1), scene, &body, 1.0)
+}
+
+#[test]
+fn it_swings_about_the_bearing_as_a_pendulum_does() {
+    let mut plant = swinging(&frictionless(FIXED));
+    let start_J = energy_J(&plant);
+    // A physical pendulum at 0.5 rad: 2 pi sqrt((J + m l^2) / (m g l)), times 1 + 0.5^2 / 16 + ...
+    let (inertia, turning) = (5.6e-3 + 0.48 * 0.05_f64.powi(2), 0.48 * 9.81 * 0.05);
+    let expected_s = std::f64::consts::TAU * f64::sqrt(inertia / turning) * 1.0158;
+    let (mut crossings, mut before) = (Vec::new(), 1.0);
+    for tick in 0..10_000 {
+        plant.step(&[1.0; 4], TICK_S, &[]);
+        let lean = (plant.state().body.attitude_WB.inverse_transform_vector(&Vector3::z())).y;
+        if lean < 0.0 && before >= 0.0 {
+            crossings.push(f64::from(tick) * TICK_S);
+        }
+        before = lean;
+        let gained_J = energy_J(&plant) - start_J;
+        assert!(gained_J.abs() < 1e-3, "tick {tick}: {gained_J} J of the 29 mJ that it swings with");
+    }
+    let periods = crossings.len() - 1;
+    let period_s = (crossings[periods] - crossings[0]) / periods as f64;
+    assert!((period_s / expected_s - 1.0).abs() < 0.005, "{period_s} s, expected {expected_s} s");
+}
+
+#[test]
+fn friction_takes_energy_and_brings_it_to_rest() {
+    for text in [SLIDING, FIXED] {
+        let mut plant = swinging(&scene(text));
+        let mut last_J = energy_J(&plant);
+        for tick in 0..20_000 {
+            plant.step(&[1.0; 4], TICK_S, &[]);
+            let energy_J = energy_J(&plant);
+            assert!(energy_J < last_J + 1e-5, "tick {tick}: {energy_J} after {last_J}");
+            last_J = last_J.min(energy_J);
+        }
+        assert!(plant.state().body.angular_velocity_B_rad_s.norm() < 0.01);
+    }
+}
+
+#[test]
+fn of_a_start_in_a_rig_only_the_height_counts_and_that_within_the_heave() {
+    let scene = scene(SLIDING);
+    for (height_m, expected_m) in [(0.0, 0.0), (1.6, 0.15), (9.0, 0.3)] {
+        let body = RigidBody::level_at(Vector3::new(3.0, -2.0, height_m));
+        let plant = common::rapier(NewtonEuler::new(hummingbird(), 1), &scene, &body, 1.0);
+        let bearing_W_m = bearing_W_m(&plant, &scene.rig.unwrap());
+        assert!((bearing_W_m - Vector3::z() * expected_m).norm() < 1e-12, "{bearing_W_m:?}");
+    }
+}

@@ -1,0 +1,175 @@
+//! A snapshot continues as if nothing had happened, bit for bit; two runs are the same bits.
+#![allow(non_snake_case, reason = "a trailing _W or _B names the frame a vector is written in")]
+
+mod common;
+
+use common::{TICK_S, hummingbird};
+use nalgebra::{UnitQuaternion, Vector3};
+use plant::snapshot::first_difference;
+use plant::{Backend, Neighbour, NewtonEuler, Rapier, RigidBody};
+use scenes::Scene;
+
+/// A situation that is caught in the middle.
+struct Situation {
+    name: &'static str,
+    scene: &'static str,
+    start: RigidBody,
+    commands: fn(u32) -> [f64; 4],
+    traffic: fn(u32) -> Vec<Neighbour>,
+}
+
+fn nobody(_: u32) -> Vec<Neighbour> {
+    Vec::new()
+}
+
+/// Somebody who flies through the room, to and fro.
+fn somebody(tick: u32) -> Vec<Neighbour> {
+    let angle = f64::from(tick) * 2e-3;
+    let position_W_m = Vector3::new(3.9 + 1.0 * angle.cos(), 0.2 * angle.sin(), 0.1);
+    let velocity_W_m_s = Vector3::new(-2.0 * angle.sin(), 0.4 * angle.cos(), 0.0);
+    vec![Neighbour { number: 1, position_W_m, velocity_W_m_s }]
+}
+
+fn uneven(tick: u32) -> [f64; 4] {
+    let swing = 60.0 * (f64::from(tick) * 0.01).sin();
+    [76.5 + swing, 80.0, 76.5 - swing, 70.0]
+}
+
+fn situations() -> [Situation; 4] {
+    let tumbling = RigidBody {
+        position_W_m: Vector3::new(4.2, 0.0, 0.6),
+        velocity_W_m_s: Vector3::new(1.0, 0.3, -1.0),
+        attitude_WB: UnitQuaternion::from_euler_angles(0.8, -0.4, 1.0),
+        angular_velocity_B_rad_s: Vector3::new(3.0, -4.0, 2.0),
+    };
+    let at_rest = RigidBody::level_at(Vector3::zeros());
+    let room = include_str!("../../scenes/room.toml");
+    let sliding = include_str!("../../scenes/rig-sliding.toml");
+    let fixed = include_str!("../../scenes/rig-fixed.toml");
+    let falling = |_| [1.0; 4];
+    [
+        Situation {
+            name: "a crash into wall and floor",
+            scene: room,
+            start: tumbling,
+            commands: falling,
+            traffic: nobody,
+        },
+        Situation {
+            name: "among traffic",
+            scene: room,
+            start: tumbling,
+            commands: falling,
+            traffic: somebody,
+        },
+        Situation { name: "rig A", scene: sliding, start: at_rest, commands: uneven, traffic: nobody },
+        Situation { name: "rig B", scene: fixed, start: at_rest, commands: uneven, traffic: nobody },
+    ]
+}
+
+impl Situation {
+    fn plant(&self) -> Rapier {
+        let scene = Scene::parse(self.scene, "scene.toml").unwrap();
+        let mut plant = common::rapier(NewtonEuler::new(hummingbird(), 1), &scene, &self.start, 1.0);
+        plant.settle_rotors(&(self.commands)(0));
+        plant
+    }
+
+    fn fly(&self, plant: &mut dyn Backend, ticks: std::ops::Range<u32>) {
+        for tick in ticks {
+            plant.step(&(self.commands)(tick), TICK_S, &(self.traffic)(tick));
+        }
+    }
+}
+
+#[track_caller]
+fn assert_same(name: &str, a: &dyn Backend, b: &dyn Backend) {
+    let difference = first_difference(&a.snapshot().unwrap(), &b.snapshot().unwrap()).unwrap();
+    assert_eq!(difference, None, "{name}: the first component that differs");
+    assert_eq!((a.state(), a.motion(), a.contact()), (b.state(), b.motion(), b.contact()), "{name}");
+}
+
+#[test]
+fn a_restored_plant_flies_on_bit_for_bit() {
+    for situation in situations() {
+        for taken_at in [1, 150, 700] {
+            let mut flown_through = situation.plant();
+            situation.fly(&mut flown_through, 0..taken_at);
+            let snapshot = flown_through.snapshot().unwrap();
+            situation.fly(&mut flown_through, taken_at..taken_at + 2_000);
+            let mut restored = situation.plant();
+            restored.restore(&snapshot).unwrap();
+            situation.fly(&mut restored, taken_at..taken_at + 2_000);
+            assert_same(situation.name, &flown_through, &restored);
+        }
+    }
+}
+
+#[test]
+fn a_plant_that_went_elsewhere_comes_back_with_its_snapshot() {
+    let situation = &situations()[0];
+    let (mut straight, mut detour) = (situation.plant(), situation.plant());
+    situation.fly(&mut straight, 0..300);
+    situation.fly(&mut detour, 0..300);
+    let snapshot = detour.snapshot().unwrap();
+    situation.fly(&mut detour, 300..900);
+    detour.restore(&snapshot).unwrap();
+    situation.fly(&mut straight, 300..1_300);
+    situation.fly(&mut detour, 300..1_300);
+    assert_same(situation.name, &straight, &detour);
+}
+
+#[test]
+fn the_situations_do_touch_something() {
+    for situation in situations() {
+        let mut plant = situation.plant();
+        situation.fly(&mut plant, 0..2_700);
+        let began = plant.contact().began;
+        assert_eq!(began > 0, situation.scene.contains("room"), "{}: {began} contacts", situation.name);
+    }
+}
+
+#[test]
+fn two_runs_are_the_same_bits() {
+    for situation in situations() {
+        let (mut first, mut second) = (situation.plant(), situation.plant());
+        situation.fly(&mut first, 0..2_000);
+        situation.fly(&mut second, 0..2_000);
+        assert_same(situation.name, &first, &second);
+    }
+}
+
+#[test]
+fn a_difference_is_named() {
+    let situation = &situations()[2];
+    let (mut a, mut b) = (situation.plant(), situation.plant());
+    situation.fly(&mut a, 0..10);
+    situation.fly(&mut b, 0..9);
+    let (a, b) = (a.snapshot().unwrap(), b.snapshot().unwrap());
+    assert_eq!(first_difference(&a, &b).unwrap().as_deref(), Some("state"));
+}
+
+#[test]
+fn free_flight_is_restored_too() {
+    let plant = || common::free_flight(hummingbird(), RigidBody::level_at(Vector3::z()));
+    let (mut a, mut b) = (plant(), plant());
+    (0..100).for_each(|tick| a.step(&uneven(tick), TICK_S, &[]));
+    b.restore(&a.snapshot().unwrap()).unwrap();
+    (100..200).for_each(|tick| a.step(&uneven(tick), TICK_S, &[]));
+    (100..200).for_each(|tick| b.step(&uneven(tick), TICK_S, &[]));
+    assert_same("free flight", &a, &b);
+}
+
+#[test]
+fn what_is_no_snapshot_of_the_backend_is_refused_and_changes_nothing() {
+    let situation = &situations()[0];
+    let (mut plant, before) = (situation.plant(), situation.plant());
+    let free = common::free_flight(hummingbird(), RigidBody::level_at(Vector3::z()));
+    let error = plant.restore(&free.snapshot().unwrap()).unwrap_err().to_string();
+    assert!(error.contains("\"newton-euler\"") && error.contains("\"rapier\""), "{error}");
+    let whole = before.snapshot().unwrap();
+    for cut in [0, 1, 10, whole.len() / 2, whole.len() - 1] {
+        assert!(plant.restore(&whole[..cut]).is_err(), "cut off at {cut}");
+    }
+    assert_same("refused", &plant, &before);
+}

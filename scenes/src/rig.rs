@@ -1,0 +1,61 @@
+//! A test rig: the vehicle hangs from a ball joint that limits its tilt, and that may slide up and down.
+#![allow(non_snake_case, reason = "a trailing _W or _B names the frame a vector is written in, N the newton")]
+
+use nalgebra::Vector3;
+use vehicles::VehicleError;
+use vehicles::reader::{Quantity, Section};
+use vehicles::units::{ANGLE, Dimension, LENGTH, MASS};
+
+/// The rod-end bearing of thesis section 5.2, and the tube that it hangs on.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Rig {
+    /// Centre of the bearing at the lower end of its travel.
+    pub bearing_W_m: Vector3<f64>,
+    /// Centre of the bearing seen from the vehicle's centre of mass.
+    pub mount_B_m: Vector3<f64>,
+    /// The most that body z leans away from world z, in whichever direction.
+    pub tilt_max_rad: f64,
+    /// How far the bearing travels up; 0 where it does not.
+    pub heave_m: f64,
+    /// Mass that travels with the bearing, beside the vehicle.
+    pub moving_mass_kg: f64,
+    /// Torque of the bearing's dry friction, against any rotation.
+    pub bearing_friction_N_m: f64,
+    /// Torque of its viscous friction per angular velocity.
+    pub bearing_damping_N_m_s: f64,
+    /// Force of the tube's dry friction.
+    pub slide_friction_N: f64,
+    /// Force of its viscous friction per speed.
+    pub slide_damping_N_s_m: f64,
+}
+
+const TORQUE: Dimension = Dimension { name: "torque", units: &[("N*m", 1.0)] };
+const TORQUE_PER_SPEED: Dimension =
+    Dimension { name: "torque per angular velocity", units: &[("N*m*s", 1.0)] };
+const FORCE: Dimension = Dimension { name: "force", units: &[("N", 1.0)] };
+const FORCE_PER_SPEED: Dimension = Dimension { name: "force per speed", units: &[("N*s/m", 1.0)] };
+
+/// Reads the table `[rig]`; see `scenes/rig-sliding.toml`.
+pub(crate) fn parse(section: &Section) -> Result<Rig, VehicleError> {
+    let doc = section.doc;
+    let not_negative = |name, dimension| section.quantity(name, dimension)?.not_negative(doc);
+    let rig = Rig {
+        bearing_W_m: section.vector("bearing", LENGTH)?.into(),
+        mount_B_m: section.vector("mount", LENGTH)?.into(),
+        tilt_max_rad: tilt(section)?.si,
+        heave_m: not_negative("heave", LENGTH)?.si,
+        moving_mass_kg: section.quantity("moving_mass", MASS)?.positive(doc)?.si,
+        bearing_friction_N_m: not_negative("bearing_friction", TORQUE)?.si,
+        bearing_damping_N_m_s: not_negative("bearing_damping", TORQUE_PER_SPEED)?.si,
+        slide_friction_N: not_negative("slide_friction", FORCE)?.si,
+        slide_damping_N_s_m: not_negative("slide_damping", FORCE_PER_SPEED)?.si,
+    };
+    section.finish()?;
+    Ok(rig)
+}
+
+fn tilt(section: &Section) -> Result<Quantity, VehicleError> {
+    let tilt = section.quantity("tilt_max", ANGLE)?;
+    let holds = tilt.si > 0.0 && tilt.si < std::f64::consts::PI;
+    tilt.require(section.doc, holds, "an angle above 0 and below 180 deg")
+}

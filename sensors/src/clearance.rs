@@ -1,0 +1,153 @@
+//! The clearance node: how far a vehicle truly is from what stands in the scene. It is no sensor: a judge reads it,
+//! and plots; controllers have no port for it.
+#![allow(non_snake_case, reason = "a trailing _W names the frame a vector is written in")]
+
+use bus::kind::{Inputs, NodeKind, PortSpec, read_parameters};
+use bus::messages::{Clearance, PlantState, Vector3 as VectorMessage};
+use bus::{BusError, Message, Node};
+use nalgebra::Vector3;
+use scenes::{RayCaster, Scene};
+use serde::Deserialize;
+use std::f64::consts::{PI, TAU};
+use std::path::PathBuf;
+
+/// How far a wall is looked for, m.
+const REACH_M: f64 = 1000.0;
+
+/// The clearance node, for manifests.
+pub const KIND: NodeKind = NodeKind {
+    name: "clearance",
+    summary: "true distances to the scene, for judging and plots",
+    inputs: Inputs::Ports(&[PortSpec::required("state", PlantState::SCHEMA)]),
+    outputs: &[PortSpec::required("clearance", Clearance::SCHEMA)],
+    check: |parameters, _| build(&read_parameters(parameters)?).map(|_| ()),
+    run,
+};
+
+/// Parameters of the clearance node.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Parameters {
+    /// Scene file.
+    scene: PathBuf,
+    /// The distance from the wall that is to be kept, m.
+    #[serde(default = "three_metres")]
+    keep_m: f64,
+    /// Along a side, the wall ahead and the wall behind are at least this much farther than `keep_m`, m.
+    #[serde(default = "three_quarters_of_a_metre")]
+    corner_m: f64,
+}
+
+fn three_metres() -> f64 {
+    3.0
+}
+
+fn three_quarters_of_a_metre() -> f64 {
+    0.75
+}
+
+fn build(parameters: &Parameters) -> Result<Judge, String> {
+    for (key, value) in [("keep_m", parameters.keep_m), ("corner_m", parameters.corner_m)] {
+        if !(value.is_finite() && value >= 0.0) {
+            return Err(format!("parameter `{key}` must be a finite number, zero or more, found {value}"));
+        }
+    }
+    let scene = Scene::load(&parameters.scene).map_err(|error| error.to_string())?;
+    Ok(Judge { caster: RayCaster::new(&scene), keep_m: parameters.keep_m, corner_m: parameters.corner_m })
+}
+
+/// What a successor is told.
+#[derive(Clone, Copy, Default, Message)]
+#[repr(C)]
+#[message(type_name = "hummingbus_msgs/msg/ClearanceState")]
+struct Memory {
+    /// Bearing of the vehicle from the world's origin at the last tick; not a number before the first.
+    #[field(unit = "rad", frame = "world")]
+    bearing: f64,
+    /// Turns flown clockwise.
+    #[field(unit = "1")]
+    laps: f64,
+}
+
+fn run() -> Result<(), BusError> {
+    let mut node = Node::join()?;
+    let state = node.input::<PlantState>("state")?;
+    let output = node.output::<Clearance>("clearance")?;
+    let judge = build(&node.parameters()?).map_err(|error| node.error(error))?;
+    let start = Memory { bearing: f64::NAN, laps: 0.0 };
+    node.run_with_state(start, |tick, memory| {
+        let position = tick.get(state).position;
+        let clearance = judge.clearance(memory, &position);
+        tick.write(output, clearance)
+    })
+}
+
+struct Judge {
+    caster: RayCaster,
+    keep_m: f64,
+    corner_m: f64,
+}
+
+impl Judge {
+    fn clearance(&self, memory: &mut Memory, position: &VectorMessage) -> Clearance {
+        let position_W_m = Vector3::new(position.x, position.y, position.z);
+        let along = [Vector3::x(), -Vector3::x(), Vector3::y(), -Vector3::y()];
+        let wall =
+            along.map(|along_W| self.caster.distance_m(&position_W_m, &along_W, REACH_M).unwrap_or(REACH_M));
+        let (x_m, y_m) = (wall[0].min(wall[1]), wall[2].min(wall[3]));
+        count_laps(memory, &position_W_m);
+        Clearance {
+            nearest: self.caster.clearance_m(&position_W_m).min(REACH_M),
+            wall,
+            side_error: x_m.min(y_m) - self.keep_m,
+            laps: memory.laps,
+            corner: u32::from(x_m.max(y_m) < self.keep_m + self.corner_m),
+            ..Default::default()
+        }
+    }
+}
+
+/// Adds the turn since the last tick, less than half of one.
+fn count_laps(memory: &mut Memory, position_W_m: &Vector3<f64>) {
+    let bearing_rad = position_W_m.y.atan2(position_W_m.x);
+    if !memory.bearing.is_nan() {
+        let turn_rad = (bearing_rad - memory.bearing + PI).rem_euclid(TAU) - PI;
+        memory.laps -= turn_rad / TAU;
+    }
+    memory.bearing = bearing_rad;
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn judge() -> Judge {
+        let scene = Scene::parse(include_str!("../../scenes/room.toml"), "room.toml").unwrap();
+        Judge { caster: RayCaster::new(&scene), keep_m: 3.0, corner_m: 0.75 }
+    }
+
+    fn at(x: f64, y: f64) -> Clearance {
+        let mut memory = Memory { bearing: f64::NAN, laps: 0.0 };
+        judge().clearance(&mut memory, &VectorMessage { x, y, z: 1.0 })
+    }
+
+    #[test]
+    fn a_side_and_a_corner_are_told_apart() {
+        let side = at(2.1, 0.5);
+        assert_eq!((side.corner, side.wall[0]), (0, 2.9));
+        assert!((side.side_error + 0.1).abs() < 1e-12 && (side.nearest - 2.9).abs() < 1e-12);
+        assert_eq!(at(2.0, 1.5).corner, 1);
+        assert_eq!(at(2.0, -1.2).corner, 0);
+    }
+
+    #[test]
+    fn two_rounds_clockwise_are_two_laps() {
+        let mut memory = Memory { bearing: f64::NAN, laps: 0.0 };
+        for step in 0..=2000 {
+            let angle_rad = -TAU * f64::from(step) / 1000.0;
+            let position = VectorMessage { x: 2.0 * angle_rad.cos(), y: 2.0 * angle_rad.sin(), z: 1.0 };
+            judge().clearance(&mut memory, &position);
+        }
+        assert!((memory.laps - 2.0).abs() < 1e-9, "{}", memory.laps);
+    }
+}

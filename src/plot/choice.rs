@@ -1,0 +1,318 @@
+//! What is plotted: chosen with `--plot`, or by the types of the recording's topics.
+
+use anyhow::{Context, Result, bail};
+use recorder::reader::Recording;
+use serde::Serialize;
+use std::collections::BTreeSet;
+
+/// What a curve stands for; it decides how its line looks.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Role {
+    /// What happened: a full line.
+    Flown,
+    /// What an estimator made of it: a thin line.
+    Estimated,
+    /// What a sensor measured, or was measured in a real flight: a thin line.
+    Measured,
+    /// What was asked for: a dashed line.
+    Asked,
+}
+
+impl Role {
+    /// The role of what a topic of type `type_name` carries.
+    fn of(type_name: &str) -> Self {
+        match own_name(type_name) {
+            "SetPoint" | "ControlStatus" | "Reference" => Self::Asked,
+            "MeasuredState" | "Imu" | "Gps" | "Mocap" | "Barometer" | "Magnetometer" => Self::Measured,
+            name if name.ends_with("Estimate") => Self::Estimated,
+            _ => Self::Flown,
+        }
+    }
+
+    /// Which line lies upon which: an estimator's noise must not hide what was flown, nor this what was asked for.
+    pub fn layer(self) -> u8 {
+        match self {
+            Self::Estimated | Self::Measured => 0,
+            Self::Flown => 1,
+            Self::Asked => 2,
+        }
+    }
+
+    /// What distinguishes the curve's name from that of what was flown.
+    pub fn suffix(self) -> &'static str {
+        match self {
+            Self::Flown => "",
+            Self::Estimated => " estimate",
+            Self::Measured => " measured",
+            Self::Asked => " set point",
+        }
+    }
+}
+
+/// A figure that is drawn where the recording has topics of these types.
+struct Figure {
+    title: &'static str,
+    /// What its vertical axis shows.
+    label: &'static str,
+    /// Message types and the fields of theirs that belong here. Of the types that ask for something, only the first
+    /// that is there is drawn: mostly the others ask for the same.
+    rows: &'static [(&'static str, &'static [&'static str])],
+}
+
+/// The figures in which the thesis shows a flight (its Figs 5.1–5.5), and the distances that its wall following uses.
+const FIGURES: [Figure; 7] = [
+    Figure {
+        title: "Attitude",
+        label: "angle",
+        rows: &[
+            ("PlantState", &["attitude"]),
+            ("MeasuredState", &["attitude"]),
+            ("AttitudeEstimate", &["attitude"]),
+            ("StateEstimate", &["attitude"]),
+            ("ControlStatus", &["attitude_set_point"]),
+            ("SetPoint", &["roll", "pitch", "yaw"]),
+            ("Reference", &["yaw"]),
+        ],
+    },
+    Figure {
+        title: "Body rates",
+        label: "angular velocity in the body",
+        rows: &[
+            ("PlantState", &["angular_velocity"]),
+            ("MeasuredState", &["angular_velocity"]),
+            ("AttitudeEstimate", &["angular_velocity"]),
+            ("StateEstimate", &["angular_velocity"]),
+        ],
+    },
+    Figure {
+        title: "Velocity",
+        label: "velocity in the world",
+        rows: &[
+            ("PlantState", &["velocity"]),
+            ("MeasuredState", &["velocity"]),
+            ("StateEstimate", &["velocity"]),
+            ("Reference", &["velocity"]),
+        ],
+    },
+    Figure {
+        title: "Position",
+        label: "position in the world",
+        rows: &[
+            ("PlantState", &["position"]),
+            ("MeasuredState", &["position"]),
+            ("StateEstimate", &["position"]),
+            ("Reference", &["position"]),
+            ("ControlStatus", &["altitude_set_point"]),
+            ("SetPoint", &["altitude"]),
+        ],
+    },
+    Figure {
+        title: "Distances",
+        label: "distance",
+        rows: &[("Ranges", &["distance"]), ("WallEstimate", &["distance"])],
+    },
+    Figure { title: "Motor command", label: "command", rows: &[("MotorCommand", &["command"])] },
+    Figure { title: "Rotor speed", label: "rotor speed", rows: &[("PlantState", &["rotor_speed"])] },
+];
+
+/// The types of what moves, which have a field `position`; the first two make a vehicle.
+const MOVING: [&str; 4] = ["PlantState", "MeasuredState", "StateEstimate", "Reference"];
+
+/// A field of a topic that is asked for: a number, or something that is made of numbers.
+#[derive(Clone, Debug)]
+pub struct Ask {
+    /// Topic.
+    pub topic: String,
+    /// Field path.
+    pub field: String,
+    /// What it stands for.
+    pub role: Role,
+}
+
+impl Ask {
+    /// The vehicle whose topic it is; empty where it has no name.
+    pub fn vehicle(&self) -> &str {
+        prefix(&self.topic)
+    }
+}
+
+/// One set of axes over time.
+#[derive(Clone, Debug)]
+pub struct Wanted {
+    /// Title; empty where the fields say it.
+    pub title: &'static str,
+    /// What the vertical axis shows; empty where the fields say it.
+    pub label: &'static str,
+    /// What is drawn.
+    pub asks: Vec<Ask>,
+}
+
+/// The axes of a vehicle.
+#[derive(Clone, Debug)]
+pub struct Panel {
+    /// Vehicle; empty where the recording has one without a name.
+    pub vehicle: String,
+    /// Its axes.
+    pub axes: Vec<Wanted>,
+}
+
+/// All that is drawn.
+#[derive(Clone, Debug)]
+pub struct Choice {
+    /// Axes over time.
+    pub panels: Vec<Panel>,
+    /// Paths in space.
+    pub trails: Vec<Ask>,
+    /// Whether people named the fields: then what is not there is an error.
+    pub is_named: bool,
+}
+
+impl Choice {
+    /// What `plots` name, or else what the types of the topics suggest, of one vehicle or of all.
+    ///
+    /// # Errors
+    /// If a topic or the vehicle is not there, or nothing is.
+    pub fn of(recording: &Recording, plots: &[String], vehicle: Option<&str>) -> Result<Self> {
+        let vehicles = vehicles(recording);
+        let shown: Vec<&str> = match vehicle {
+            None => vehicles.iter().map(String::as_str).collect(),
+            Some(name) if vehicles.iter().any(|known| known == name) => vec![name],
+            Some(name) => bail!("the recording has no vehicle `{name}`; it has {}", listed(&vehicles)),
+        };
+        let panels = if plots.is_empty() {
+            shown.iter().map(|vehicle| default_panel(recording, vehicle, &vehicles)).collect()
+        } else {
+            let axes = plots.iter().map(|plot| named(recording, plot)).collect::<Result<_>>()?;
+            vec![Panel { vehicle: String::new(), axes }]
+        };
+        let is_shown = |topic: &str| shown.iter().any(|vehicle| belongs(topic, vehicle, &vehicles));
+        let choice = Self { panels, trails: trails(recording, is_shown), is_named: !plots.is_empty() };
+        choice.require_something(recording)?;
+        Ok(choice)
+    }
+
+    fn require_something(&self, recording: &Recording) -> Result<()> {
+        if self.trails.is_empty() && self.panels.iter().all(|panel| panel.axes.is_empty()) {
+            let topics: Vec<_> = recording.topics().keys().cloned().collect();
+            bail!(
+                "no topic of the recording is of a type that is plotted by itself: name fields with --plot \
+                 TOPIC:FIELD; the topics are {}",
+                listed(&topics)
+            );
+        }
+        Ok(())
+    }
+
+    /// Everything that is read, the axes' first.
+    pub fn asks(&self) -> impl Iterator<Item = &Ask> {
+        self.panels.iter().flat_map(|panel| &panel.axes).flat_map(|axes| &axes.asks)
+    }
+}
+
+fn listed(names: &[String]) -> String {
+    match names {
+        [] => "none".to_owned(),
+        [only] if only.is_empty() => "one without a name".to_owned(),
+        names => names.join(", "),
+    }
+}
+
+/// The last part of the name of a message of ours; nothing of others', which may be called the same.
+fn own_name(type_name: &str) -> &str {
+    type_name.strip_prefix("hummingbus_msgs/msg/").unwrap_or_default()
+}
+
+/// What stands in front of the process in the name of a topic: the vehicle, or nothing.
+fn prefix(topic: &str) -> &str {
+    let mut parts = topic.trim_start_matches('/').rsplitn(3, '/');
+    parts.nth(2).unwrap_or_default()
+}
+
+/// What a shadow publishes was not flown.
+fn is_of_shadow(topic: &str) -> bool {
+    topic.starts_with("/shadow/")
+}
+
+/// The vehicles by name, `h2` before `h10`.
+fn vehicles(recording: &Recording) -> Vec<String> {
+    let topics = recording.topics().iter();
+    let makes_one = |type_name: &str| MOVING[..2].contains(&own_name(type_name));
+    let states = topics.filter(|(name, topic)| makes_one(&topic.type_name) && !is_of_shadow(name));
+    let names: BTreeSet<_> = states.map(|(name, _)| (prefix(name).len(), prefix(name))).collect();
+    let mut names: Vec<_> = names.into_iter().map(|(_, name)| name.to_owned()).collect();
+    if names.is_empty() {
+        names.push(String::new());
+    }
+    names
+}
+
+/// Whether a topic is one of `vehicle`'s, or of no vehicle and so of all.
+fn belongs(topic: &str, vehicle: &str, vehicles: &[String]) -> bool {
+    let is_under = |vehicle: &str| {
+        let rest = topic.strip_prefix('/').and_then(|topic| topic.strip_prefix(vehicle));
+        !vehicle.is_empty() && rest.is_some_and(|rest| rest.starts_with('/'))
+    };
+    !is_of_shadow(topic) && (is_under(vehicle) || !vehicles.iter().any(|other| is_under(other)))
+}
+
+fn default_panel(recording: &Recording, vehicle: &str, vehicles: &[String]) -> Panel {
+    let own: Vec<(&str, &str)> = recording
+        .topics()
+        .iter()
+        .filter(|(name, _)| belongs(name, vehicle, vehicles))
+        .map(|(name, topic)| (name.as_str(), topic.type_name.as_str()))
+        .collect();
+    let axes = FIGURES.iter().map(|figure| Wanted {
+        title: figure.title,
+        label: figure.label,
+        asks: default_asks(figure, &own),
+    });
+    Panel { vehicle: vehicle.to_owned(), axes: axes.filter(|axes| !axes.asks.is_empty()).collect() }
+}
+
+/// What a figure draws of these topics, given with their types.
+fn default_asks(figure: &Figure, topics: &[(&str, &str)]) -> Vec<Ask> {
+    let mut asks: Vec<Ask> = Vec::new();
+    for (row, fields) in figure.rows {
+        let of_type = topics.iter().filter(|(_, type_name)| own_name(type_name) == *row);
+        let more =
+            of_type.flat_map(|(topic, type_name)| fields.iter().map(|field| ask(topic, field, type_name)));
+        let is_asked = asks.iter().any(|ask| ask.role == Role::Asked);
+        asks.extend(more.filter(|ask| !is_asked || ask.role != Role::Asked));
+    }
+    asks
+}
+
+fn ask(topic: &str, field: &str, type_name: &str) -> Ask {
+    Ask { topic: topic.to_owned(), field: field.to_owned(), role: Role::of(type_name) }
+}
+
+fn trails(recording: &Recording, is_shown: impl Fn(&str) -> bool) -> Vec<Ask> {
+    let moving = recording.topics().iter().filter(|(name, topic)| {
+        MOVING.contains(&own_name(&topic.type_name)) && is_shown(name) && topic.message_count > 0
+    });
+    moving.map(|(name, topic)| ask(name, "position", &topic.type_name)).collect()
+}
+
+/// The axes that `TOPIC:FIELD,TOPIC:FIELD…` names; a field without a topic is of the topic before.
+fn named(recording: &Recording, plot: &str) -> Result<Wanted> {
+    let mut last_topic = None;
+    let mut asks = Vec::new();
+    for part in plot.split(',').map(str::trim) {
+        let (topic, field) = match (part.split_once(':'), last_topic) {
+            (Some((topic, field)), _) => (topic, field),
+            (None, Some(topic)) => (topic, part),
+            (None, None) => {
+                bail!("--plot {plot}: `{part}` is not TOPIC:FIELD, such as /plant/state:position.z")
+            }
+        };
+        if field.is_empty() {
+            bail!("--plot {plot}: `{part}` names no field");
+        }
+        let found = recording.topic(topic).with_context(|| format!("--plot {plot}"))?;
+        asks.push(ask(topic, field, &found.type_name));
+        last_topic = Some(topic);
+    }
+    Ok(Wanted { title: "", label: "", asks })
+}

@@ -1,0 +1,226 @@
+//! What is drawn, ready for any kind of file: axes with named, coloured curves of one unit, and paths in space.
+
+use crate::plot::choice::{Choice, Role, Wanted};
+use crate::plot::read::{Curves, Read};
+use anyhow::{Result, bail};
+use serde::{Serialize, Serializer};
+use std::collections::BTreeSet;
+
+/// Distinguishable also without colour vision (Okabe and Ito).
+const COLOURS: [&str; 7] = ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#000000"];
+
+/// A line over time.
+#[derive(Clone, Debug, Serialize)]
+pub struct Curve {
+    /// Name in the legend.
+    pub name: String,
+    /// Topic.
+    pub topic: String,
+    /// Field path.
+    pub field: String,
+    /// What it stands for.
+    pub role: Role,
+    /// Colour, as HTML writes it.
+    pub colour: &'static str,
+    /// Samples in the recording.
+    pub samples: u64,
+    /// Times in seconds and values; JSON has their number.
+    #[serde(serialize_with = "count")]
+    pub points: Vec<(f64, f64)>,
+}
+
+/// A set of axes over time.
+#[derive(Clone, Debug, Serialize)]
+pub struct Axes {
+    /// Title.
+    pub title: String,
+    /// What the vertical axis shows.
+    pub label: String,
+    /// Its unit.
+    pub unit: String,
+    /// The lines, those on top last.
+    pub curves: Vec<Curve>,
+}
+
+/// The axes of a vehicle.
+#[derive(Clone, Debug, Serialize)]
+pub struct Panel {
+    /// Vehicle; empty where it has no name.
+    pub vehicle: String,
+    /// Its axes.
+    pub axes: Vec<Axes>,
+}
+
+/// A path in space.
+#[derive(Clone, Debug, Serialize)]
+pub struct Trail {
+    /// Name in the legend.
+    pub name: String,
+    /// Topic.
+    pub topic: String,
+    /// What it stands for.
+    pub role: Role,
+    /// Colour, as HTML writes it.
+    pub colour: &'static str,
+    /// Samples in the recording.
+    pub samples: u64,
+    /// Positions in metres; JSON has their number.
+    #[serde(serialize_with = "count")]
+    pub points: Vec<[f64; 3]>,
+}
+
+fn count<T, S: Serializer>(points: &[T], serializer: S) -> std::result::Result<S::Ok, S::Error> {
+    serializer.serialize_u64(points.len() as u64)
+}
+
+/// The axes of all panels.
+///
+/// # Errors
+/// If the curves of one set of axes have different units.
+pub fn panels(choice: &Choice, read: &Read) -> Result<Vec<Panel>> {
+    let mut rest = &read.curves[..];
+    let panels = choice.panels.iter().map(|panel| {
+        let axes = panel.axes.iter().map(|wanted| {
+            let (own, others) = rest.split_at(wanted.asks.len());
+            rest = others;
+            axes(wanted, own)
+        });
+        let axes = axes.filter(|axes| !matches!(axes, Ok(axes) if axes.curves.is_empty()));
+        Ok(Panel { vehicle: panel.vehicle.clone(), axes: axes.collect::<Result<_>>()? })
+    });
+    let panels: Vec<Panel> = panels.collect::<Result<_>>()?;
+    Ok(panels.into_iter().filter(|panel| !panel.axes.is_empty()).collect())
+}
+
+fn axes(wanted: &Wanted, read: &[Curves]) -> Result<Axes> {
+    let unit = unit(wanted, read)?;
+    let pairs =
+        wanted.asks.iter().zip(read).flat_map(|(ask, curves)| curves.iter().map(move |curve| (ask, curve)));
+    let mut curves: Vec<Curve> = pairs
+        .map(|(ask, (channel, curve))| Curve {
+            name: String::new(),
+            topic: ask.topic.clone(),
+            field: channel.path.clone(),
+            role: ask.role,
+            colour: "",
+            samples: curve.samples(),
+            points: curve.points(),
+        })
+        .collect();
+    curves.sort_by_key(|curve| curve.role);
+    name(&mut curves);
+    colour(&mut curves);
+    let fields = || distinct(wanted.asks.iter().map(|ask| ask.field.as_str()));
+    let label = if wanted.label.is_empty() { fields() } else { wanted.label.to_owned() };
+    let title = if wanted.title.is_empty() { fields() } else { wanted.title.to_owned() };
+    Ok(Axes { title, label, unit, curves })
+}
+
+/// The one unit of all curves.
+fn unit(wanted: &Wanted, read: &[Curves]) -> Result<String> {
+    let channels = read.iter().flatten().map(|(channel, _)| channel);
+    let units: BTreeSet<&str> = channels.map(|channel| channel.unit.as_str()).collect();
+    if units.len() > 1 {
+        let ask_units = wanted.asks.iter().zip(read).map(|(ask, curves)| {
+            let units = distinct(curves.iter().map(|(channel, _)| channel.unit.as_str()));
+            format!("{}:{} in {units}", ask.topic, ask.field)
+        });
+        let curves = ask_units.collect::<Vec<_>>().join(", ");
+        bail!(
+            "one set of axes has one unit, but it was asked for {curves}: give each unit a --plot of its own"
+        );
+    }
+    Ok(units.first().copied().unwrap_or_default().to_owned())
+}
+
+fn distinct<'a>(words: impl Iterator<Item = &'a str>) -> String {
+    let mut seen = Vec::new();
+    words.for_each(|word| {
+        if !seen.contains(&word) {
+            seen.push(word);
+        }
+    });
+    seen.join(", ")
+}
+
+/// The last part of a field's path.
+fn short(path: &str) -> &str {
+    path.rsplit_once('.').map_or(path, |(_, last)| last)
+}
+
+/// Names what is flown by its component, and every other by that and its role; by topic and field where two would be
+/// called the same.
+fn name(curves: &mut [Curve]) {
+    let named = |curve: &Curve| {
+        let is_fellow = |other: &&Curve| {
+            other.role == Role::Flown
+                && component(&other.field).is_some_and(|it| component(&curve.field) == Some(it))
+        };
+        let fellow = curves.iter().find(is_fellow).filter(|_| curve.role != Role::Flown);
+        format!("{}{}", short(&fellow.unwrap_or(curve).field), curve.role.suffix())
+    };
+    let names: Vec<String> = curves.iter().map(named).collect();
+    for (curve, name) in curves.iter_mut().zip(&names) {
+        let is_only = names.iter().filter(|other| *other == name).count() == 1;
+        curve.name = if is_only { name.clone() } else { format!("{} {}", curve.topic, curve.field) };
+    }
+}
+
+/// The axis, angle or rotor that a field is of: what flies and what was asked for share the colour.
+fn component(field: &str) -> Option<usize> {
+    match short(field) {
+        "x" | "roll" => Some(0),
+        "y" | "pitch" => Some(1),
+        "z" | "yaw" | "altitude" => Some(2),
+        last => last.rsplit_once('[')?.1.strip_suffix(']')?.parse().ok(),
+    }
+}
+
+/// Gives the flown curves different colours, and every other that of the flown one of its component.
+fn colour(curves: &mut [Curve]) {
+    // Colour and component of the curves that were given one of their own.
+    let mut taken: Vec<(usize, Option<usize>)> = Vec::new();
+    for curve in curves {
+        let own = component(&curve.field);
+        let fellow = taken.iter().find(|(_, other)| own.is_some() && *other == own);
+        let index = match fellow.filter(|_| curve.role != Role::Flown) {
+            Some((index, _)) => *index,
+            None => {
+                let is_free = |index: &usize| taken.iter().all(|(other, _)| other != index);
+                let free = own.into_iter().chain(0..COLOURS.len()).find(is_free).unwrap_or(taken.len());
+                taken.push((free, own));
+                free
+            }
+        };
+        curve.colour = COLOURS[index % COLOURS.len()];
+    }
+}
+
+/// The paths in space: those of one vehicle have one colour.
+pub fn trails(choice: &Choice, read: &Read) -> Vec<Trail> {
+    let drawn = || choice.trails.iter().zip(&read.trails).filter(|(_, trail)| trail.samples() > 0);
+    let vehicles = distinct(drawn().map(|(ask, _)| ask.vehicle()));
+    let vehicles: Vec<&str> = vehicles.split(", ").collect();
+    let mut trails: Vec<Trail> = drawn()
+        .map(|(ask, trail)| {
+            let index = vehicles.iter().position(|vehicle| *vehicle == ask.vehicle()).unwrap_or_default();
+            Trail {
+                name: trail_name(ask.vehicle(), ask.role),
+                topic: ask.topic.clone(),
+                role: ask.role,
+                colour: COLOURS[index % COLOURS.len()],
+                samples: trail.samples(),
+                points: trail.points(),
+            }
+        })
+        .collect();
+    trails.sort_by_key(|trail| trail.role);
+    trails
+}
+
+fn trail_name(vehicle: &str, role: Role) -> String {
+    match (vehicle, role) {
+        ("", Role::Flown) => "flown".to_owned(),
+        (vehicle, role) => format!("{vehicle}{}", role.suffix()).trim_start().to_owned(),
+    }
+}

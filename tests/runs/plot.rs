@@ -1,0 +1,238 @@
+//! Pictures of recordings: what is in them, and what is refused.
+
+use crate::laps;
+use crate::support::{Ended, Place, repository};
+use serde_json::{Value, json};
+use std::fs;
+use std::path::Path;
+
+/// A recording of vehicles that fly laps in the room.
+fn laps(place: &Place, vehicles: &[&str]) -> String {
+    let recording = place.path("laps.mcap");
+    let room = fs::read_to_string(repository("scenes/room.toml")).unwrap();
+    laps::record(Path::new(&recording), vehicles, Some(&room));
+    recording
+}
+
+fn described(ended: Ended) -> Value {
+    ended.with_code(0).json()
+}
+
+/// Requires that a command was refused with these words.
+#[track_caller]
+fn refused(ended: Ended, words: &str) {
+    ended.with_code(2).says(&[words]);
+}
+
+/// What a page draws, as it holds it.
+fn page(path: &str) -> Value {
+    let text = fs::read_to_string(path).unwrap();
+    let (_, data) = text.split_once("<script type=\"application/json\" id=\"data\">").unwrap();
+    serde_json::from_str(data.split_once("</script>").unwrap().0).unwrap()
+}
+
+fn numbers(values: &Value) -> Vec<f64> {
+    values.as_array().unwrap().iter().map(|value| value.as_f64().unwrap()).collect()
+}
+
+/// Names, fields and roles of the curves of one set of axes.
+fn curves(axes: &Value) -> Vec<[&str; 3]> {
+    let all = axes["curves"].as_array().unwrap().iter();
+    all.map(|curve| ["name", "field", "role"].map(|key| curve[key].as_str().unwrap())).collect()
+}
+
+#[test]
+fn what_the_topics_are_of_decides_what_is_plotted_and_how() {
+    let place = Place::new();
+    let recording = laps(&place, &["h1", "h2"]);
+    let shown = described(place.call(&["plot", &recording, "--json"]));
+    assert_eq!(shown["files"], json!([{ "path": place.path("laps.html"), "format": "html" }]));
+    let vehicles: Vec<_> =
+        shown["panels"].as_array().unwrap().iter().map(|panel| &panel["vehicle"]).collect();
+    assert_eq!(vehicles, ["h1", "h2"]);
+    let axes = shown["panels"][1]["axes"].as_array().unwrap();
+    let titles: Vec<_> =
+        axes.iter().map(|axes| (axes["title"].as_str().unwrap(), axes["unit"].as_str().unwrap())).collect();
+    let expected = [
+        ("Attitude", "deg"),
+        ("Body rates", "deg/s"),
+        ("Velocity", "m/s"),
+        ("Position", "m"),
+        ("Rotor speed", "rpm"),
+    ];
+    assert_eq!(titles, expected);
+    // The planner asks for all three axes, so the pilot's altitude is left out.
+    let position = [
+        ["x", "position.x", "flown"],
+        ["y", "position.y", "flown"],
+        ["z", "position.z", "flown"],
+        ["x set point", "position.x", "asked"],
+        ["y set point", "position.y", "asked"],
+        ["z set point", "position.z", "asked"],
+    ];
+    assert_eq!(curves(&axes[3]), position);
+    assert_eq!(axes[3]["curves"][0]["topic"], "/h2/plant/state");
+    assert_eq!(axes[3]["curves"][0]["colour"], axes[3]["curves"][3]["colour"]);
+    assert_eq!(shown["solids"].as_array().unwrap().len(), 4);
+    let trails: Vec<_> =
+        shown["trails"].as_array().unwrap().iter().map(|trail| trail["name"].as_str().unwrap()).collect();
+    assert_eq!(trails, ["h1", "h2", "h1 set point", "h2 set point"]);
+}
+
+#[test]
+fn one_vehicle_of_several_is_chosen() {
+    let place = Place::new();
+    let recording = laps(&place, &["h1", "h2"]);
+    let shown = described(place.call(&["plot", &recording, "--vehicle", "h2", "--json"]));
+    assert_eq!(
+        (shown["panels"].as_array().unwrap().len(), &shown["panels"][0]["vehicle"]),
+        (1, &json!("h2"))
+    );
+    assert_eq!(shown["trails"].as_array().unwrap().len(), 2);
+    let words = "the recording has no vehicle `h3`; it has h1, h2";
+    refused(place.call(&["plot", &recording, "--vehicle", "h3"]), words);
+}
+
+#[test]
+fn a_long_curve_keeps_its_one_spike_and_its_ends() {
+    let place = Place::new();
+    let recording = laps(&place, &[""]);
+    place.call(&["plot", &recording, "--plot", "/plant/state:position.z"]).with_code(0);
+    let curve = &page(&place.path("laps.html"))["panels"][0]["axes"][0]["curves"][0];
+    let (x, y) = (numbers(&curve["x"]), numbers(&curve["y"]));
+    assert!(x.len() <= 4000 && x.len() > 1000, "{}", x.len());
+    let spike = y.iter().position(|value| *value == laps::SPIKE_M).expect("the spike is gone");
+    assert!((x[spike] - f64::from(laps::SPIKE_TICK) * 0.01).abs() < 1e-6);
+    assert_eq!((x[0], *x.last().unwrap()), (0.0, f64::from(laps::TICKS - 1) * 0.01));
+}
+
+#[test]
+fn a_yaw_that_goes_round_is_drawn_without_jumps_in_degrees() {
+    let place = Place::new();
+    let recording = laps(&place, &[""]);
+    place.call(&["plot", &recording, "--plot", "/plant/state:attitude.yaw"]).with_code(0);
+    let yaw = numbers(&page(&place.path("laps.html"))["panels"][0]["axes"][0]["curves"][0]["y"]);
+    // Three laps.
+    assert!((yaw.last().unwrap() - 1080.0).abs() < 0.2, "{:?}", yaw.last());
+    assert!(yaw.windows(2).all(|pair| (pair[1] - pair[0]).abs() < 2.0));
+}
+
+#[test]
+fn a_span_of_time_is_chosen_its_ends_included() {
+    let place = Place::new();
+    let recording = laps(&place, &[""]);
+    let shown = described(place.call(&["plot", &recording, "--from", "10", "--to", "10.5", "--json"]));
+    assert_eq!(shown["span_s"], json!([10.0, 10.5]));
+    let curve = &shown["panels"][0]["axes"][0]["curves"][0];
+    assert_eq!((&curve["samples"], &curve["points"]), (&json!(51), &json!(51)));
+    let words = "there is nothing to plot from 60 s: the recording spans 0.000 s to 59.990 s";
+    refused(place.call(&["plot", &recording, "--from", "60"]), words);
+    let words = "--from 5 --to 5: the end must be after the start";
+    refused(place.call(&["plot", &recording, "--from", "5", "--to", "5"]), words);
+}
+
+#[test]
+fn chosen_fields_share_axes_where_they_share_a_unit() {
+    let place = Place::new();
+    let recording = laps(&place, &[""]);
+    let plots = [
+        "--plot",
+        "/plant/state:position.z,/pilot/set_point:altitude",
+        "--plot",
+        "/plant/state:rotor_speed[0],rotor_speed[3]",
+    ];
+    let words = [&["plot", &recording, "--json"][..], &plots].concat();
+    let shown = described(place.call(&words));
+    let axes = shown["panels"][0]["axes"].as_array().unwrap();
+    assert_eq!(curves(&axes[0]), [["z", "position.z", "flown"], ["z set point", "altitude", "asked"]]);
+    assert_eq!((&axes[0]["label"], &axes[0]["unit"]), (&json!("position.z, altitude"), &json!("m")));
+    assert_eq!(curves(&axes[1]).len(), 2);
+    let words = "/plant/state:position.z in m, /plant/state:attitude.roll in deg";
+    refused(place.call(&["plot", &recording, "--plot", "/plant/state:position.z,attitude.roll"]), words);
+}
+
+#[test]
+fn what_is_not_there_is_refused_with_what_is() {
+    let place = Place::new();
+    let recording = laps(&place, &[""]);
+    let cases: [(&[&str], &str); 8] = [
+        (
+            &["--plot", "/plant/stat:position.z"],
+            "the recording has no topic /plant/stat; it has /pilot/set_point, /planner/reference, /plant/state",
+        ),
+        (
+            &["--plot", "/pilot/set_point:heigh"],
+            "topic /pilot/set_point has no field `heigh`; it has stamp.sec, stamp.nanosec, altitude, roll",
+        ),
+        (&["--plot", "position.z"], "`position.z` is not TOPIC:FIELD"),
+        (&["--plot", "/plant/state:"], "`/plant/state:` names no field"),
+        (&["--out", "laps.pdf"], "--out laps.pdf: its name must end in .html, .png or .svg"),
+        (&["--png", "/no/where.png"], "cannot create /no/where.png: there is no folder /no"),
+        (&["--svg", &recording], "laps.mcap is the recording itself: name another file"),
+        (&["--png", &place.path("tmp")], "cannot create"),
+    ];
+    for (words, reason) in cases {
+        refused(place.call(&[&["plot", &recording][..], words].concat()), reason);
+    }
+    assert!(!Path::new(&place.path("laps.html")).exists(), "a refused plot wrote its page");
+}
+
+#[test]
+fn a_recording_without_a_vehicle_is_plotted_by_its_fields_only() {
+    let place = Place::new();
+    let recording = laps(&place, &[]);
+    let words = "name fields with --plot TOPIC:FIELD; the topics are none";
+    refused(place.call(&["plot", &recording]), words);
+}
+
+#[test]
+fn pictures_have_their_size_their_letters_and_their_dashes_and_are_the_same_twice() {
+    let place = Place::new();
+    let recording = laps(&place, &[""]);
+    let [a, b, svg] = ["a.png", "b.png", "laps.svg"].map(|name| place.path(name));
+    let views = [
+        "--figure",
+        "time",
+        "--figure",
+        "top",
+        "--figure",
+        "side",
+        "--figure",
+        "path",
+        "--title",
+        "Laps & walls",
+    ];
+    let words = [&["plot", &recording, "--png", &a, "--out", &b, "--svg", &svg][..], &views].concat();
+    place.call(&words).with_code(0);
+    let (a, b) = (fs::read(a).unwrap(), fs::read(b).unwrap());
+    assert!(a.starts_with(b"\x89PNG\r\n\x1a\n") && a.len() > 100_000);
+    assert!(a == b, "two pictures of one recording differ");
+    // The width is that of the picture times 1.5.
+    assert_eq!(u32::from_be_bytes(a[16..20].try_into().unwrap()), 1500);
+    let svg = fs::read_to_string(svg).unwrap();
+    assert!(svg.starts_with("<svg width=\"1000\" height=\"") && svg.trim_end().ends_with("</svg>"));
+    for words in [
+        "Laps &amp; walls",
+        "Attitude",
+        "angle [deg]",
+        "simulated time [s]",
+        "z set point",
+        "Path from above",
+        "x [m]",
+    ] {
+        assert!(svg.contains(words), "{words} is missing");
+    }
+    // Three angles of one lap that was asked for are one dash after the other; each is a line of its own.
+    assert!(svg.matches("<polyline").count() > 200);
+    assert!(!Path::new(&place.path("laps.html")).exists());
+}
+
+#[test]
+fn a_recording_that_was_cut_off_is_plotted_as_far_as_it_goes() {
+    let place = Place::new();
+    let recording = laps(&place, &[""]);
+    let bytes = fs::read(&recording).unwrap();
+    let cut = place.write("cut.mcap", &bytes[..bytes.len() * 2 / 3]);
+    place.call(&["plot", &cut, "--json"]).with_code(1).says(&["was cut off"]);
+    assert!(Path::new(&place.path("cut.html")).exists());
+}

@@ -1,0 +1,125 @@
+//! Runs in a scene: ground, walls, rigs and other vehicles.
+
+use crate::refusals::{good, refused, refused_text};
+use crate::support::{Place, repository};
+
+/// The good manifest's plant on the backend `rapier`, with `more` of its keys.
+fn in_rapier(more: &str) -> String {
+    good().replace("kind = \"plant\"", &format!("kind = \"plant\"\nparameters.backend = \"rapier\"\n{more}"))
+}
+
+#[test]
+fn the_hover_is_flown_on_rapier_and_twice_it_is_the_same_file() {
+    let place = Place::new();
+    let (manifest, backend) = (repository("manifests/hover.toml"), "process.plant.parameters.backend=rapier");
+    let [first, second] = ["first.mcap", "second.mcap"].map(|name| {
+        let path = place.path(name);
+        place.call(&["run", &manifest, "--set", backend, "--record", &path]).with_code(0);
+        path
+    });
+    place.call(&["diff", &first, &second]).with_code(0);
+}
+
+#[test]
+fn two_vehicles_that_share_a_room_meet() {
+    let place = Place::new();
+    let vehicle = |name: &str, x_m: f64, speed_m_s: f64| {
+        format!(
+            r#"
+[[vehicle]]
+name = "{name}"
+set = "hummingbird"
+process.plant.parameters.initial_position_m = [{x_m:?}, 0.0, 1.0]
+process.plant.parameters.initial_velocity_m_s = [{speed_m_s:?}, 0.0, 0.0]
+
+[[pass]]
+name = "{name} is met at 2 m/s"
+topic = "/{name}/plant/contact"
+field = "impact_speed"
+unit = "m/s"
+statistic = "max"
+min = 1.9
+max = 2.1
+"#
+        )
+    };
+    let text = format!(
+        r#"include = ["{set}"]
+
+[run]
+duration_s = 1.0
+
+[process.traffic]
+kind = "traffic"
+inputs = {{ h1 = "/h1/plant/state", h2 = "/h2/plant/state" }}
+
+[process.recorder]
+kind = "recorder"
+
+[set.hummingbird.process.plant]
+scene = "{room}"
+parameters.backend = "rapier"
+inputs.traffic = {{ topic = "/traffic/traffic", delay_ticks = 1, initial = {{ count = 0 }} }}
+outputs.contact = {{}}
+{first}{second}"#,
+        set = repository("manifests/sets/hover-set.toml"),
+        room = repository("scenes/room.toml"),
+        first = vehicle("h1", -0.5, 1.0),
+        second = vehicle("h2", 0.5, -1.0),
+    );
+    let path = place.write("meet.toml", text);
+    place.call(&["run", &path]).with_code(0);
+}
+
+#[test]
+fn a_vehicle_that_stands_on_the_ground_touches_it_and_one_in_a_rig_hangs() {
+    let place = Place::new();
+    for (scene, object, height_m) in [("ground", 1.0, 0.06), ("rig-sliding", 0.0, 1.45)] {
+        let pass = |topic: &str, field: &str, unit: &str, value: f64| {
+            format!(
+                "[[pass]]\nname = \"{field}\"\ntopic = \"{topic}\"\nfield = \"{field}\"\nunit = \"{unit}\"\n\
+                 statistic = \"every\"\nmin = {:?}\nmax = {:?}\n",
+                value - 1e-3,
+                value + 1e-3,
+            )
+        };
+        let scene_key =
+            format!("scene = \"{}\"\noutputs.contact = {{}}", repository(&format!("scenes/{scene}.toml")));
+        let text = in_rapier(&scene_key)
+            .replace("[70, 70, 70, 70]", "[1, 1, 1, 1]")
+            .replace("initial_altitude_m = 1.0", "initial_altitude_m = 0.0");
+        let text = text.replace("to = 1.5", "to = 0.0")
+            + &pass("/plant/contact", "object", "1", object)
+            + &pass("/plant/state", "position.z", "m", height_m);
+        place.call(&["run", &place.write("stand.toml", text)]).with_code(0);
+    }
+}
+
+#[test]
+fn what_free_flight_does_not_know_is_refused() {
+    let rig = repository("scenes/rig-fixed.toml");
+    refused("kind = \"plant\"", &format!("kind = \"plant\"\nscene = §\"{rig}\""))
+        .says(&["holds a rig", "\"rapier\""]);
+    refused("kind = \"plant\"", "kind = \"plant\"\nparameters.§crash_speed_m_s = 2.0")
+        .says(&["touches nothing"]);
+    refused("kind = \"plant\"", "kind = \"plant\"\nparameters.backend = §\"bullet\"").says(&[
+        "unknown variant `bullet`",
+        "`newton-euler`",
+        "`rapier`",
+    ]);
+    let place = Place::new();
+    let text = good().replace("kind = \"plant\"", "kind = \"plant\"\noutputs.contact = {}");
+    place
+        .call(&["run", &place.write("contact.toml", text)])
+        .with_code(2)
+        .says(&["needs `backend` = \"rapier\""]);
+}
+
+#[test]
+fn a_start_that_is_no_number_and_a_traffic_of_seventeen_are_refused() {
+    refused("kind = \"plant\"", "kind = \"plant\"\nparameters.§initial_yaw_deg = nan")
+        .says(&["initial_yaw_deg"]);
+    let inputs: Vec<String> = (0..17).map(|number| format!("h{number} = \"/plant/state\"")).collect();
+    let traffic = format!("[process.§traffic]\nkind = \"traffic\"\ninputs = {{ {} }}\n", inputs.join(", "));
+    refused_text(&(good() + &traffic)).says(&["at most 16 vehicles"]);
+}

@@ -1,0 +1,52 @@
+//! Contracts of the sensors as processes: they read what they should, and hand over what is under way.
+
+use crate::recordings::{require_same_messages, topics};
+use crate::support::{Place, repository};
+
+/// Every sensor of manifests/sensors.toml that is not part of hover.toml.
+const SENSORS: [&str; 5] = ["gps", "barometer", "magnetometer", "mocap", "range"];
+
+/// manifests/sensors.toml cut to 1 s, with more tables.
+fn short(place: &Place, name: &str, tables: &str) -> String {
+    let manifest = repository("manifests/sensors.toml");
+    place.write(name, format!("include = [{manifest:?}]\n[run]\nduration_s = 1.0\n{tables}"))
+}
+
+#[test]
+fn every_sensor_reads_what_it_should_in_a_hover() {
+    let place = Place::new();
+    let (manifest, recording) = (repository("manifests/sensors.toml"), place.path("sensors.mcap"));
+    place.call(&["run", &manifest, "--record", &recording]).with_code(0);
+}
+
+#[test]
+fn sensors_that_are_swapped_in_flight_leave_no_trace() {
+    let place = Place::new();
+    // Each with measurements under way: the IMU's are delayed too.
+    let delayed = "[process.imu.parameters]\ndelay_ms = 7.0\ndropout = 0.1\n";
+    let swap = |(index, process): (usize, &&str)| {
+        let at_tick = 300 + 60 * index;
+        format!("[[swap]]\nprocess = \"{process}\"\nat_tick = {at_tick}\nshadow_ticks = 20\n")
+    };
+    let processes = [&SENSORS[..], &["imu"]].concat();
+    let swaps: String = processes.iter().enumerate().map(swap).collect();
+    let [plain, swapped] = ["plain", "swapped"].map(|name| place.path(&format!("{name}.mcap")));
+    let manifest = short(&place, "plain.toml", delayed);
+    place.call(&["run", &manifest, "--record", &plain, "--json"]).flown();
+    let manifest = short(&place, "swapped.toml", &format!("{delayed}{swaps}"));
+    let ended = place.call(&["run", &manifest, "--record", &swapped, "--json"]).flown();
+    let summary = ended.json();
+    let successions = summary["successions"].as_array().unwrap();
+    assert_eq!(successions.len(), processes.len(), "{ended}");
+    assert!(successions.iter().all(|succession| succession["hand_over"] == "state"), "{ended}");
+    let [plain, mut swapped] = [topics(&plain), topics(&swapped)];
+    swapped.retain(|topic, _| !topic.starts_with("/shadow/"));
+    require_same_messages(&plain, &swapped);
+}
+
+#[test]
+fn a_sensor_that_should_measure_more_often_than_it_computes_is_refused() {
+    let place = Place::new();
+    let manifest = short(&place, "slow.toml", "[process.mocap]\nperiod_ticks = 20\n");
+    place.call(&["run", &manifest]).with_code(2).says(&["`rate_hz`", "`period_ticks`", "mocap"]);
+}

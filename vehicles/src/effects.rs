@@ -1,0 +1,65 @@
+//! The effects that a vehicle or scene file lists, as they are written: names, numbers with their units, places.
+//!
+//! What an effect is, which parameters it has and in which units, is the business of the plant's catalogue
+//! (`plant::effects`): here any name will do.
+
+use crate::error::{Place, VehicleError};
+use crate::provenance::Uncertainty;
+use crate::reader::Section;
+
+/// One `[[effects]]` table.
+#[derive(Debug, Clone, PartialEq)]
+pub struct EffectEntry {
+    /// Which effect.
+    pub name: String,
+    /// The dotted key of the table, such as `effects[0]`.
+    pub key: String,
+    /// Where the table stands.
+    pub place: Place,
+    /// Where its name stands.
+    pub name_place: Place,
+    /// Its parameters, by name.
+    pub parameters: Vec<Stated>,
+}
+
+/// A number with everything that the file says of it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Stated {
+    /// What it is called.
+    pub name: String,
+    /// The number, in the file's unit.
+    pub value: f64,
+    /// The file's unit.
+    pub unit: String,
+    /// Where it comes from.
+    pub source: String,
+    /// How well it is known, in the file's unit.
+    pub uncertainty: Uncertainty,
+    /// Where the number stands.
+    pub place: Place,
+    /// Where the unit stands.
+    pub unit_place: Place,
+}
+
+/// The `[[effects]]` of a file, in its order; none where it has none.
+///
+/// # Errors
+/// A table without a name, or with a key that is not a number with unit, source and uncertainty.
+pub fn read(root: &Section) -> Result<Vec<EffectEntry>, VehicleError> {
+    if !root.has("effects") {
+        return Ok(Vec::new());
+    }
+    root.sections("effects")?.iter().map(one_effect).collect()
+}
+
+fn one_effect(section: &Section) -> Result<EffectEntry, VehicleError> {
+    let name = section.text("name")?.to_owned();
+    let parameters = section.keys().filter(|key| *key != "name");
+    Ok(EffectEntry {
+        name,
+        key: section.path.clone(),
+        place: section.doc.place(section.at.start),
+        name_place: section.doc.place(section.at_of("name").start),
+        parameters: parameters.map(|key| section.stated(key)).collect::<Result<_, _>>()?,
+    })
+}
