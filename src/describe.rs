@@ -104,6 +104,9 @@ pub fn graph_json(graph: &Graph) -> String {
         })
     };
     let mut value = serde_json::to_value(&graph.plan).unwrap_or_default();
+    for (index, program) in graph.programs.iter().enumerate() {
+        value["nodes"][index]["what"] = what(program).into();
+    }
     value["successors"] = graph.successors.iter().map(successor).collect();
     value["companions"] = graph.companions.iter().map(|(name, _)| name.clone()).collect();
     serde_json::to_string_pretty(&value).unwrap_or_default()

@@ -10,6 +10,10 @@
 
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
 
+/// The least rise of a thrust that sets an attitude, which would be undefined in a free fall. Tuned, no source: a tenth
+/// of gravity.
+pub const RISE_MIN_M_S2: f64 = 1.0;
+
 /// A vector in the world that changes with time, with its first two derivatives.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Moving {
@@ -64,6 +68,14 @@ fn left_of_heading(yaw_rad: f64, rate_rad_s: f64) -> Moving {
 }
 
 impl Moving {
+    /// The thrust for each unit of mass that makes this acceleration against gravity. It points up by at least
+    /// [`RISE_MIN_M_S2`].
+    #[must_use]
+    pub fn against(mut self, gravity_m_s2: f64) -> Self {
+        self.value.z = (self.value.z + gravity_m_s2).max(RISE_MIN_M_S2);
+        self
+    }
+
     /// The unit vector along it.
     fn direction(&self) -> Self {
         let length = self.value.norm();

@@ -3,14 +3,14 @@
 //! T. Lee, M. Leok and N. H. McClamroch, "Geometric tracking control of a quadrotor UAV on SE(3)", CDC 2010, their
 //! z axis turned up and their gains divided by mass and inertia:
 //!
-//! | here | paper |
+//! | here | in the paper |
 //! |---|---|
-//! | e_x = x − x_d, e_v = v − v_d | eq. 17, 18 |
-//! | t = a_d + g·z − k_p·e_x − k_v·e_v − d̂ | eq. 23; d̂ is the `disturbance` that is observed |
-//! | body z of the attitude R_c lies along t, its yaw is the reference's | eq. 23, with the yaw of `flatness` |
-//! | thrust = m·t·(R z) | eq. 19 |
-//! | e_R = ½(R_cᵀR − RᵀR_c)^∨, e_Ω = Ω − RᵀR_c·Ω_c | eq. 21, 22 |
-//! | torque = J·(−k_R·e_R − k_Ω·e_Ω) + Ω × JΩ − J·([Ω]×RᵀR_c·Ω_c − RᵀR_c·Ω_c′) | eq. 20 |
+//! | e_x = x − x_d, e_v = v − v_d | tracking errors of position and velocity |
+//! | t = a_d + g·z − k_p·e_x − k_v·e_v − d̂ | the vector that its b_3c lies along; d̂ is the `disturbance` that is observed |
+//! | R_c: body z along t, the yaw of the reference | R_c, with the yaw of `flatness` |
+//! | thrust = m·t·(R z) | f |
+//! | e_R = ½(R_cᵀR − RᵀR_c)^∨, e_Ω = Ω − RᵀR_c·Ω_c | tracking errors of attitude and angular velocity |
+//! | torque = J·(−k_R·e_R − k_Ω·e_Ω) + Ω × JΩ − J·([Ω]×RᵀR_c·Ω_c − RᵀR_c·Ω_c′) | M |
 //!
 //! Ω_c and its rate follow from the first two derivatives of t, which hold the reference's jerk and snap and those of
 //! the errors: the paper leaves open where the errors of acceleration and jerk come from; here they are what the
@@ -22,18 +22,15 @@
 
 use crate::allocation::{Allocation, THRUST_RESERVE, Wrench};
 use crate::controller::{Airframe, Controller, ControllerState, Demand, Motion, Told};
+use crate::course::Point;
 use crate::disturbance::Disturbance;
 use crate::flatness::{self, Moving, Target};
 use crate::foresight;
 use crate::geometric_gains::GeometricGains;
 use crate::motor_lag::{Made, MotorLag};
 use crate::set_points::SetPoint;
-use bus::messages::Reference;
+use crate::trajectory;
 use nalgebra::{Matrix3, Vector3};
-
-/// The thrust that sets the attitude points up by at least this: the attitude would be undefined in a free fall.
-/// Tuned, no source: a tenth of gravity.
-const RISE_MIN_M_S2: f64 = 1.0;
 
 /// The law at one period: all that does not change during a run.
 #[derive(Debug, Clone, PartialEq)]
@@ -79,12 +76,12 @@ impl GeometricLaw {
 
     /// The demand, and the attitude behind it; advances the observer.
     fn asked(&self, memory: &mut ControllerState, made: &Made, told: &Told<'_>) -> (Wrench, Target) {
-        let (reference, motion) = (told.reference, &told.motion);
+        let (reference, motion) = (&trajectory::point(told.reference), &told.motion);
         let push = self.push(made, motion);
         let disturbance = self.gains.observer.step(memory, motion, &push.acceleration_W_m_s2, self.period_s);
         let errors = errors(&push, &disturbance, reference, motion);
         let thrust_W_m_s2 = self.thrust_vector(&disturbance, &errors, reference);
-        let target = flatness::target(&thrust_W_m_s2, reference.yaw, reference.yaw_rate);
+        let target = flatness::target(&thrust_W_m_s2, reference.yaw_rad, reference.yaw_rate_rad_s);
         let z_W = motion.attitude_WB * Vector3::z();
         let wanted = Wrench {
             thrust_N: self.mass_kg * thrust_W_m_s2.value.dot(&z_W),
@@ -114,7 +111,7 @@ impl GeometricLaw {
     }
 
     /// Thrust for each unit of mass with two derivatives: t of the table above.
-    fn thrust_vector(&self, disturbance: &Disturbance, errors: &Errors, reference: &Reference) -> Moving {
+    fn thrust_vector(&self, disturbance: &Disturbance, errors: &Errors, reference: &Point) -> Moving {
         let gains = &self.gains;
         let (kp, kv) = (gains.position_proportional_1_s2, gains.position_derivative_1_s);
         let answer = -errors.position_W_m * kp - errors.velocity_W_m_s * kv - disturbance.acceleration_W_m_s2;
@@ -123,17 +120,13 @@ impl GeometricLaw {
         let answer_second = -errors.acceleration_W_m_s2 * kp - errors.jerk_W_m_s3 * kv;
         // What exceeds the limit is scaled down with its derivatives.
         let part = (gains.acceleration_max_m_s2 / answer.norm()).min(1.0);
-        let drag_1_s = gains.drag_1_s;
-        let ahead = |order: bus::messages::Vector3, below: bus::messages::Vector3| {
-            vector(order) + vector(below) * drag_1_s
+        let ahead = |order: usize| reference.path_W[order] + reference.path_W[order - 1] * gains.drag_1_s;
+        let acceleration_W = Moving {
+            value: ahead(2) + answer * part,
+            first: ahead(3) + answer_first * part,
+            second: ahead(4) + answer_second * part,
         };
-        let level = ahead(reference.acceleration, reference.velocity) + answer * part;
-        let rise_m_s2 = (level.z + self.gravity_m_s2).max(RISE_MIN_M_S2);
-        Moving {
-            value: Vector3::new(level.x, level.y, rise_m_s2),
-            first: ahead(reference.jerk, reference.acceleration) + answer_first * part,
-            second: ahead(reference.snap, reference.jerk) + answer_second * part,
-        }
+        acceleration_W.against(self.gravity_m_s2)
     }
 
     fn torque(&self, target: &Target, motion: &Motion) -> Vector3<f64> {
@@ -177,17 +170,13 @@ impl Controller for GeometricLaw {
     }
 }
 
-fn errors(push: &Push, disturbance: &Disturbance, reference: &Reference, motion: &Motion) -> Errors {
+fn errors(push: &Push, disturbance: &Disturbance, reference: &Point, motion: &Motion) -> Errors {
     let acceleration_W_m_s2 = push.acceleration_W_m_s2 + disturbance.acceleration_W_m_s2;
     let jerk_W_m_s3 = push.jerk_W_m_s3 + disturbance.jerk_W_m_s3;
     Errors {
-        position_W_m: motion.position_W_m - vector(reference.position),
-        velocity_W_m_s: motion.velocity_W_m_s - vector(reference.velocity),
-        acceleration_W_m_s2: acceleration_W_m_s2 - vector(reference.acceleration),
-        jerk_W_m_s3: jerk_W_m_s3 - vector(reference.jerk),
+        position_W_m: motion.position_W_m - reference.path_W[0],
+        velocity_W_m_s: motion.velocity_W_m_s - reference.path_W[1],
+        acceleration_W_m_s2: acceleration_W_m_s2 - reference.path_W[2],
+        jerk_W_m_s3: jerk_W_m_s3 - reference.path_W[3],
     }
-}
-
-fn vector(message: bus::messages::Vector3) -> Vector3<f64> {
-    <[f64; 3]>::from(message).into()
 }

@@ -12,6 +12,7 @@
 
 use crate::allocation::{Allocation, THRUST_RESERVE, Wrench};
 use crate::controller::{Airframe, Controller, ControllerState, Demand, Motion, Told};
+use crate::course::Point;
 use crate::disturbance::Disturbance;
 use crate::flatness::{self, Moving, Target};
 use crate::foresight;
@@ -20,12 +21,8 @@ use crate::lqr_model::{self, INPUTS, MADE, MADE_RATE, RATE, ROTATION, STATES, VE
 use crate::motor_lag::{Made, MotorLag};
 use crate::riccati;
 use crate::set_points::SetPoint;
-use bus::messages::Reference;
+use crate::trajectory;
 use nalgebra::{Matrix3, Rotation3, SMatrix, SVector, Vector3};
-
-/// The thrust that sets the attitude points up by at least this: the attitude would be undefined in a free fall.
-/// Tuned, no source: a tenth of gravity.
-const RISE_MIN_M_S2: f64 = 1.0;
 
 /// The law at one period: all that does not change during a run.
 #[derive(Debug, Clone, PartialEq)]
@@ -80,14 +77,15 @@ impl LqrLaw {
         &self.gain
     }
 
-    fn needed(&self, disturbance: &Disturbance, reference: &Reference) -> Needed {
-        let mut thrust_W = Moving {
-            value: vector(reference.acceleration) - disturbance.acceleration_W_m_s2,
-            first: vector(reference.jerk) - disturbance.jerk_W_m_s3,
-            second: vector(reference.snap),
+    fn needed(&self, disturbance: &Disturbance, reference: &Point) -> Needed {
+        let [_, _, acceleration_W, jerk_W, snap_W] = reference.path_W;
+        let wanted_W = Moving {
+            value: acceleration_W - disturbance.acceleration_W_m_s2,
+            first: jerk_W - disturbance.jerk_W_m_s3,
+            second: snap_W,
         };
-        thrust_W.value.z = (thrust_W.value.z + self.gravity_m_s2).max(RISE_MIN_M_S2);
-        let attitude = flatness::target(&thrust_W, reference.yaw, reference.yaw_rate);
+        let thrust_W = wanted_W.against(self.gravity_m_s2);
+        let attitude = flatness::target(&thrust_W, reference.yaw_rad, reference.yaw_rate_rad_s);
         let (rate_B, inertia) = (attitude.angular_velocity_B_rad_s, &self.inertia_B_kg_m2);
         let torque_B_N_m =
             inertia * attitude.angular_acceleration_B_rad_s2 + rate_B.cross(&(inertia * rate_B));
@@ -100,18 +98,23 @@ impl LqrLaw {
     }
 
     /// x − x_d.
-    fn deviation(&self, needed: &Needed, made: &Made, told: &Told<'_>) -> SVector<f64, STATES> {
-        let (motion, reference) = (&told.motion, told.reference);
-        let off_W_m = motion.position_W_m - vector(reference.position);
-        let off_W_m_s = motion.velocity_W_m_s - vector(reference.velocity);
+    fn deviation(
+        &self,
+        needed: &Needed,
+        made: &Made,
+        motion: &Motion,
+        reference: &Point,
+    ) -> SVector<f64, STATES> {
+        let off_W_m = motion.position_W_m - reference.path_W[0];
+        let off_W_m_s = motion.velocity_W_m_s - reference.path_W[1];
         let (_, _, heading_rad) = motion.attitude_WB.euler_angles();
         let to_heading = Rotation3::from_axis_angle(&Vector3::z_axis(), -heading_rad);
         let relative = needed.attitude.attitude_WB.inverse() * motion.attitude_WB;
         let rate = relative * motion.angular_velocity_B_rad_s - needed.attitude.angular_velocity_B_rad_s;
         let mut deviation: SVector<f64, STATES> = SVector::zeros();
         let mut set = |at: usize, part: Vector3<f64>| deviation.fixed_rows_mut::<3>(at).copy_from(&part);
-        set(0, to_heading * cut(off_W_m, self.gains.position_max_m));
-        set(VELOCITY, to_heading * cut(off_W_m_s, self.gains.velocity_max_m_s));
+        set(0, to_heading * off_W_m.cap_magnitude(self.gains.position_max_m));
+        set(VELOCITY, to_heading * off_W_m_s.cap_magnitude(self.gains.velocity_max_m_s));
         set(ROTATION, relative.scaled_axis());
         set(RATE, rate);
         set(MADE + 1, made.wrench.torque_B_N_m - needed.wrench.torque_B_N_m);
@@ -146,8 +149,10 @@ impl Controller for LqrLaw {
         made.store(memory);
         let explained_W_m_s2 = self.explained_W_m_s2(&made, &told.motion);
         let disturbance = self.gains.observer.step(memory, &told.motion, &explained_W_m_s2, self.period_s);
-        let needed = self.needed(&disturbance, told.reference);
-        let wrench = self.demand(&needed, &self.deviation(&needed, &made, told));
+        let reference = trajectory::point(told.reference);
+        let needed = self.needed(&disturbance, &reference);
+        let deviation = self.deviation(&needed, &made, &told.motion, &reference);
+        let wrench = self.demand(&needed, &deviation);
         let (roll_rad, pitch_rad, yaw_rad) = needed.attitude.attitude_WB.euler_angles();
         let set_point = SetPoint { altitude_m: told.reference.position.z, roll_rad, pitch_rad, yaw_rad };
         Demand { wrench, set_point, ..Demand::default() }
@@ -160,13 +165,4 @@ impl Controller for LqrLaw {
     fn tracking(&self, memory: &ControllerState, wrench: &Wrench, told: &Told<'_>) -> ControllerState {
         foresight::tracking::<Self>(memory, wrench, told)
     }
-}
-
-/// `vector` shortened to `length_max`.
-fn cut(vector: Vector3<f64>, length_max: f64) -> Vector3<f64> {
-    vector.cap_magnitude(length_max)
-}
-
-fn vector(message: bus::messages::Vector3) -> Vector3<f64> {
-    <[f64; 3]>::from(message).into()
 }

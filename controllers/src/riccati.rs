@@ -98,7 +98,7 @@ mod tests {
         DMatrix::from_row_slice(rows, numbers.len() / rows, numbers)
     }
 
-    /// scipy.linalg.solve_discrete_are([[1, .1], [0, 1]], [[.005], [.1]], diag([1, .5]), [[.2]]), SciPy 1.16.
+    /// scipy.linalg.solve_discrete_are([[1, .1], [0, 1]], [[.005], [.1]], diag([1, .5]), [[.2]]), SciPy 1.17.
     #[test]
     fn a_double_integrator_has_the_cost_that_scipy_finds() {
         let (A, B) = (matrix(2, &[1.0, 0.1, 0.0, 1.0]), matrix(2, &[0.005, 0.1]));

@@ -54,3 +54,11 @@ pub fn reference(point: &Point) -> Reference {
     let (yaw, yaw_rate) = (point.yaw_rad, point.yaw_rate_rad_s);
     Reference { position, velocity, acceleration, jerk, snap, yaw, yaw_rate, ..Default::default() }
 }
+
+/// The point in a message.
+#[must_use]
+pub fn point(message: &Reference) -> Point {
+    let Reference { position, velocity, acceleration, jerk, snap, .. } = *message;
+    let path_W = [position, velocity, acceleration, jerk, snap].map(|vector| <[f64; 3]>::from(vector).into());
+    Point { path_W, yaw_rad: message.yaw, yaw_rate_rad_s: message.yaw_rate }
+}

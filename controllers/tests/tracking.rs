@@ -180,7 +180,7 @@ fn lqr_answers_alike_whatever_the_yaw() {
     assert!(answers.iter().all(|answer| (answer - answers[0]).norm() < 1e-6), "{answers:?}");
 }
 
-/// The Hummingbird at 1 kHz, Q and R of the built-in weights, by SciPy 1.16:
+/// The Hummingbird at 1 kHz, Q and R of the built-in weights, by SciPy 1.17:
 ///
 /// A, B as in `controllers/src/lqr_model.rs`; E = scipy.linalg.expm(numpy.block([[A, B], [0, 0]]) * 1e-3);
 /// X = scipy.linalg.solve_discrete_are(Ad, Bd, Q, R); K = solve(R + Bd.T @ X @ Bd, Bd.T @ X @ Ad)

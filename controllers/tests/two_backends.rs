@@ -82,12 +82,15 @@ fn start(plant: &mut dyn Backend) {
 }
 
 fn free_flight(substeps: u32) -> Box<dyn Backend> {
-    Box::new(FreeFlight::new(NewtonEuler::new(vehicle(), substeps), RigidBody::level_at(Vector3::z())))
+    let model = NewtonEuler::new(vehicle(), substeps);
+    let memory = model.airframe().memory(0, "plant", TICK_S);
+    Box::new(FreeFlight::new(model, RigidBody::level_at(Vector3::z()), memory))
 }
 
 fn rapier(substeps: u32) -> Box<dyn Backend> {
     let model = NewtonEuler::new(vehicle(), substeps);
-    Box::new(Rapier::new(model, &Scene::default(), &RigidBody::level_at(Vector3::z()), 1.0))
+    let memory = model.airframe().memory(0, "plant", TICK_S);
+    Box::new(Rapier::new(model, memory, &Scene::default(), &RigidBody::level_at(Vector3::z()), 1.0))
 }
 
 /// The states of a flight in closed loop, and the commands.

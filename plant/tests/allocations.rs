@@ -5,7 +5,7 @@ mod common;
 
 use common::{TICK_S, hummingbird};
 use nalgebra::Vector3;
-use plant::{Backend, FreeFlight, Neighbour, NewtonEuler, Rapier, RigidBody};
+use plant::{Backend, Neighbour, NewtonEuler, Rapier, RigidBody};
 use scenes::Scene;
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
@@ -39,7 +39,7 @@ fn model() -> NewtonEuler {
 
 fn rapier(scene: &str, start_W_m: Vector3<f64>) -> Rapier {
     let scene = Scene::parse(scene, "scene.toml").unwrap();
-    Rapier::new(model(), &scene, &RigidBody::level_at(start_W_m), 1.0)
+    common::rapier(model(), &scene, &RigidBody::level_at(start_W_m), 1.0)
 }
 
 /// How often 1000 ticks take memory, after 1000 that may fill buffers.
@@ -56,7 +56,7 @@ fn taken(plant: &mut dyn Backend, command: f64, traffic: &[Neighbour]) -> u64 {
 
 #[test]
 fn free_flight_takes_no_memory() {
-    let mut plant = FreeFlight::new(model(), RigidBody::level_at(Vector3::z()));
+    let mut plant = common::free_flight(hummingbird(), RigidBody::level_at(Vector3::z()));
     assert_eq!(taken(&mut plant, hummingbird().hover_command(), &[]), 0);
 }
 

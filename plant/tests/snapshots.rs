@@ -6,7 +6,7 @@ mod common;
 use common::{TICK_S, hummingbird};
 use nalgebra::{UnitQuaternion, Vector3};
 use plant::snapshot::first_difference;
-use plant::{Backend, FreeFlight, Neighbour, NewtonEuler, Rapier, RigidBody};
+use plant::{Backend, Neighbour, NewtonEuler, Rapier, RigidBody};
 use scenes::Scene;
 
 /// A situation that is caught in the middle.
@@ -70,7 +70,7 @@ fn situations() -> [Situation; 4] {
 impl Situation {
     fn plant(&self) -> Rapier {
         let scene = Scene::parse(self.scene, "scene.toml").unwrap();
-        let mut plant = Rapier::new(NewtonEuler::new(hummingbird(), 1), &scene, &self.start, 1.0);
+        let mut plant = common::rapier(NewtonEuler::new(hummingbird(), 1), &scene, &self.start, 1.0);
         plant.settle_rotors(&(self.commands)(0));
         plant
     }
@@ -151,7 +151,7 @@ fn a_difference_is_named() {
 
 #[test]
 fn free_flight_is_restored_too() {
-    let plant = || FreeFlight::new(NewtonEuler::new(hummingbird(), 1), RigidBody::level_at(Vector3::z()));
+    let plant = || common::free_flight(hummingbird(), RigidBody::level_at(Vector3::z()));
     let (mut a, mut b) = (plant(), plant());
     (0..100).for_each(|tick| a.step(&uneven(tick), TICK_S, &[]));
     b.restore(&a.snapshot().unwrap()).unwrap();
@@ -164,7 +164,7 @@ fn free_flight_is_restored_too() {
 fn what_is_no_snapshot_of_the_backend_is_refused_and_changes_nothing() {
     let situation = &situations()[0];
     let (mut plant, before) = (situation.plant(), situation.plant());
-    let free = FreeFlight::new(NewtonEuler::new(hummingbird(), 1), RigidBody::level_at(Vector3::z()));
+    let free = common::free_flight(hummingbird(), RigidBody::level_at(Vector3::z()));
     let error = plant.restore(&free.snapshot().unwrap()).unwrap_err().to_string();
     assert!(error.contains("\"newton-euler\"") && error.contains("\"rapier\""), "{error}");
     let whole = before.snapshot().unwrap();

@@ -89,7 +89,7 @@ fn run() -> Result<(), BusError> {
     let innovation = node.optional_output::<Innovation>("innovation")?;
     let attitude = node.optional_output::<AttitudeEstimate>("attitude")?;
     let filter = Ekf::new(node.parameters()?, node.period_s()).map_err(|error| node.error(error))?;
-    node.run_with_state(EkfState::default(), |tick, state| {
+    node.run_with_state(filter.initial_state(), |tick, state| {
         let newest = sensors.newest(tick);
         filter.step(state, &reading(tick.get(imu), tick.time_ns()), &newest);
         if tick.is_due(estimate) {
@@ -176,5 +176,33 @@ fn innovations(state: &EkfState) -> Innovation {
         updates: state.updates(),
         refused: state.refused(),
         ..Default::default()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::KIND;
+    use serde_json::json;
+
+    #[test]
+    fn a_filter_that_nothing_tells_the_position_is_refused() {
+        let error = (KIND.check)(&json!({}), &["imu", "barometer"]).unwrap_err();
+        assert!(error.contains("`inputs.gps`") && error.contains("`inputs.mocap`"), "{error}");
+        assert_eq!((KIND.check)(&json!({}), &["imu", "gps"]), Ok(()));
+        assert_eq!((KIND.check)(&json!({}), &["imu", "mocap"]), Ok(()));
+    }
+
+    #[test]
+    fn impossible_parameters_are_named() {
+        for (parameters, key) in [
+            (json!({ "mocap_position_noise_m": 0.0 }), "`mocap_position_noise_m`"),
+            (json!({ "gps_position_noise_m": [0.3, -1.0, 0.3] }), "`gps_position_noise_m`"),
+            (json!({ "inclination_deg": 90.0 }), "`inclination_deg`"),
+            (json!({ "initial_position_m": [0.0, 0.0] }), "`initial_position_m`"),
+            (json!({ "mocap_sigma": 1.0 }), "`mocap_sigma`"),
+        ] {
+            let error = (KIND.check)(&parameters, &["imu", "mocap"]).unwrap_err();
+            assert!(error.contains(key), "{error}");
+        }
     }
 }

@@ -96,3 +96,23 @@ fn state_estimate(
         ..Default::default()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::KIND;
+    use serde_json::json;
+
+    #[test]
+    fn impossible_parameters_are_named() {
+        for (parameters, key) in [
+            (json!({ "range_sigma_m": 0.0 }), "`range_sigma_m`"),
+            (json!({ "half_angle_deg": 90.0 }), "`half_angle_deg`"),
+            (json!({ "initial_height_m": -1.0 }), "`initial_height_m`"),
+            (json!({ "dead_zone_m": 0.2 }), "`dead_zone_m`"),
+        ] {
+            let error = (KIND.check)(&parameters, &[]).unwrap_err();
+            assert!(error.contains(key), "{error}");
+        }
+        assert_eq!((KIND.check)(&json!({}), &[]), Ok(()));
+    }
+}

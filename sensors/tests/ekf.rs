@@ -160,7 +160,7 @@ fn run_with(
 ) {
     let mut world = World::new(true_params, seed);
     let filter = Ekf::new(believed, PERIOD_S).unwrap();
-    let mut state = EkfState::default();
+    let mut state = filter.initial_state();
     let mut newest: Newest = [None; 4];
     timings.iter().for_each(|timing| newest[timing.sensor.index()] = Some(None));
     let mut under_way: VecDeque<(usize, Measurement)> = VecDeque::new();
@@ -346,6 +346,25 @@ fn run_spoilt(spoil: impl Fn(usize, Measurement) -> Option<Measurement>, mut jud
     let flight = fly(excited, [0.0, 0.0, 5.0], 12_000);
     let params = EkfParams::default();
     run_with(&flight, &[MOCAP], (params, params), 3, spoil, &mut judge);
+}
+
+/// A barometer at 500 Hz would have to wait for a receiver 190 ms behind.
+#[test]
+fn more_measurements_than_can_wait_are_used_early_and_what_is_later_than_they_is_refused() {
+    let crowd = [Timing { delay: 190, ..GPS }, Timing { period: 2, ..BAROMETER }];
+    let flight = fly(excited, [0.0, 0.0, 5.0], 10_000);
+    let params = EkfParams::default();
+    let mut sums = Vec::new();
+    run(&flight, &crowd, (params, params), 5, |sample| {
+        if sample.number % 1000 == 999 {
+            sums.push(nees(sample) / JUDGED as f64);
+        }
+        if sample.number == flight.len() - 1 {
+            let ([gps, _, barometer, _], [late, ..]) = (sample.state.updates(), sample.state.refused());
+            assert!(barometer > 4000 && gps == 1 && late > 90, "{gps} {barometer} {late}");
+        }
+    });
+    assert!(sums.iter().all(|nees| (0.2..2.5).contains(nees)), "{sums:.2?}");
 }
 
 #[test]

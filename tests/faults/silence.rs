@@ -24,7 +24,7 @@ fn a_stopped_process_is_named_with_its_tick_and_the_topic_that_others_wait_for()
         "stood still for 20.0 s",
         "tick 1234 is not completed by `imu`",
     ]);
-    ended.says(&["`attitude` waits for /imu/imu"]);
+    ended.says(&["`ekf` waits for /imu/imu"]);
     // The others were alive, so the recording is whole: it ends where the silence began.
     let tail = place.call(&["cat", &place.path("flight.mcap"), "--topic", "/imu/imu"]).with_code(0);
     assert!(

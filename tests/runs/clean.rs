@@ -100,7 +100,7 @@ fn what_was_removed_is_said_in_words() {
     let run_id = crash(&place);
     let run_dir = format!("-{run_id}\n");
     let ended = place.start(&["clean"]).end_among_others().with_code(0);
-    ended.prints(&[&format!("removed run {run_id}: "), "KiB", &run_dir, "in /dev/shm", "live run"]);
+    ended.prints(&[&format!("removed run {run_id}: "), "iB", &run_dir, "in /dev/shm", "live run"]);
 }
 
 #[test]

@@ -19,6 +19,7 @@
 //! - [`rights`]: rights that a run lacks are named
 //! - [`sensors`]: sensors read what they should, and hand over what is under way
 //! - [`replay`]: the measured flight
+//! - [`scenarios`]: the thesis's scenarios and those beyond
 //! - [`scenes`]: ground, walls, rigs and other vehicles
 
 mod clean;
@@ -39,6 +40,7 @@ mod recordings;
 mod refusals;
 mod replay;
 mod rights;
+mod scenarios;
 mod scenes;
 mod sensors;
 #[allow(dead_code, reason = "shared with tests/faults")]

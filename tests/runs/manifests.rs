@@ -204,7 +204,7 @@ fn a_count_makes_numbered_vehicles_and_each_has_its_own_noise() {
     );
     let path = place.write("three.toml", text);
     let graph = graph(&path, &[]);
-    assert_eq!(graph["nodes"].as_array().unwrap().len(), 3 * 5 + 1);
+    assert_eq!(graph["nodes"].as_array().unwrap().len(), 3 * 6 + 1);
     assert_eq!(read_by(&graph, "h3/controller", "set_point"), "/h3/pilot/set_point");
     place.call(&["run", &path]).with_code(0);
     let topics = crate::recordings::topics(&place.path("three.mcap"));
@@ -336,14 +336,14 @@ fn swap(keys: &str) -> String {
 #[test]
 fn a_swap_joins_before_it_takes_over() {
     let place = Place::new();
-    let swap = "\n[[swap]]\nprocess = \"controller\"\nat_s = 0.05\nshadow_ticks = 9\nrepeat = 3\nevery_ticks = 20\n\
+    let swap = "\n[[swap]]\nprocess = \"controller\"\nat_s = 0.05\nshadow_ticks = 9\nrepeat = 3\nevery_ticks = 30\n\
                 with = { parameters.gains.altitude_integral_max_m_s2 = 1.0 }\n";
     let path = place.write("swap.toml", good().replace("0.1\nwindow", "0.2\nwindow") + swap);
     let graph = graph(&path, &[]);
     let ticks = |successor: &Value| (successor["join_tick"].as_u64(), successor["take_over_tick"].as_u64());
     let successors = graph["successors"].as_array().unwrap();
     let found: Vec<_> = successors.iter().map(ticks).collect();
-    assert_eq!(found, [(41, 50), (61, 70), (81, 90)].map(|(join, take)| (Some(join), Some(take))));
+    assert_eq!(found, [(41, 50), (71, 80), (101, 110)].map(|(join, take)| (Some(join), Some(take))));
     for successor in successors {
         let plan = &successor["plan"];
         assert_eq!(plan["parameters"]["gains"]["altitude_integral_max_m_s2"], 1.0);
@@ -426,7 +426,7 @@ fn a_swap_whose_times_say_too_little_or_too_much() {
 fn successors_of_one_process_that_are_there_at_the_same_time() {
     let first = swap("at_tick = 30\nshadow_ticks = 9").replace('§', "");
     let ended = refused_with(&(first.clone() + &swap("at_tick = 40\nshadow_ticks = 9")));
-    ended.says(&["would join at tick 31, too soon after the take-over at tick 30", "at tick 34 or later"]);
+    ended.says(&["would join at tick 31, too soon after the take-over at tick 30", "at tick 42 or later"]);
     let ended = refused_with(&swap("at_tick = 30\nshadow_ticks = 9\nrepeat = 2\nevery_ticks = 12"));
     ended.says(&["would join at tick 33, too soon after the take-over at tick 30"]);
     let shadow = "\n[[shadow]]\nprocess = \"controller\"\n";
@@ -465,9 +465,9 @@ fn a_successor_that_would_not_fit_the_graph() {
     swap("§outputs.command.topic = \"/x\"").says(&["a successor cannot have another `outputs`"]);
     swap("§knid = \"pid\"").says(&["unknown field `knid`"]);
     swap("kind = §\"pdi\"").says(&["there is no kind `pdi`"]);
-    let inputs = "inputs.set_point = \"/pilot/set_point\"\ninputs.estimate = \"/ekf/estimate\"\n";
-    let ended = swap(&format!("{inputs}inputs.§altitude = \"/plant/stat\""));
-    ended.says(&["input `altitude` of `controller`: nobody publishes /plant/stat"]);
+    let inputs = "inputs.set_point = \"/pilot/set_point\"\n";
+    let ended = swap(&format!("{inputs}inputs.§estimate = \"/plant/stat\""));
+    ended.says(&["input `estimate` of `controller`: nobody publishes /plant/stat"]);
     let ended = swap("parameters.§gain = 3");
     ended.says(&["process `controller`", "unknown field `gain`"]);
     swap("parameters = §3").says(&["invalid type"]);
@@ -588,7 +588,7 @@ fn host_settings_that_no_system_has() {
     let twice = "kind = \"ekf\"\nlog = \"a.log\"";
     let marked = good().replace("kind = \"ekf\"", twice);
     let ended = refused_text(&marked.replace("kind = \"imu\"", "kind = \"imu\"\nlog = §\"./a.log\""));
-    ended.says(&["`log`: `imu` writes to the file of `attitude`"]);
+    ended.says(&["`log`: `imu` writes to the file of `ekf`"]);
     with("environment.§HUMMINGBUS_RUN = \"x\"").says(&["HUMMINGBUS_RUN is set by the launcher"]);
     with("environment.§\"A=B\" = \"x\"").says(&["cannot be an environment variable"]);
     with("environment.A = §3").says(&["invalid type"]);
@@ -659,7 +659,11 @@ fn the_documentation_has_every_key() {
     let end = "[process.recorder]\nkind = \"recorder\"\n";
     let list = |name: &str| format!("{end}\n[[{name}]]\nunknown_key = 1\n");
     let within = |process: &str, key: &str| format!("kind = \"{process}\"\n{key}.unknown_key = 1");
-    let sensor = |kind: &str| format!("{end}\n[process.sensor]\n{}\n", within(kind, "parameters"));
+    let sensor = |kind: &str| {
+        let port = if kind == "battery" { "battery" } else { "state" };
+        let input = format!("inputs.{port} = \"/plant/{port}\"\n[process.plant.outputs.battery]\n");
+        format!("{end}\n[process.sensor]\n{}\n{input}", within(kind, "parameters"))
+    };
     let keys = [
         known_keys("window_ticks = 64", "unknown_key = 64"),
         known_keys("kind = \"imu\"", "kind = \"imu\"\nunknown_key = 1"),

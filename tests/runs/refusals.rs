@@ -162,7 +162,7 @@ fn a_name_that_is_taken_or_has_capitals() {
 #[test]
 fn an_unknown_port() {
     let ended = refused("inputs.imu =", "inputs.§imuu =");
-    ended.says(&["process `attitude` has no input `imuu`", "did you mean `imu`?"]);
+    ended.says(&["process `ekf` has no input `imuu`", "did you mean `imu`?"]);
     let ended = refused("kind = \"imu\"", "kind = \"imu\"\noutputs.§image = {}");
     ended.says(&["process `imu` has no output `image`", "imu"]);
 }
@@ -268,13 +268,13 @@ fn an_initial_value_that_does_not_fit() {
 
 #[test]
 fn set_points_that_cannot_be_flown() {
-    let marked = good().replace("[process.pilot]", "[process.§pilot]");
+    let marked = good().replace("\nset_points =", "\n§set_points =");
     let with = |from: &str, to: &str| {
         assert_eq!(marked.matches(from).count(), 1);
         refused_text(&marked.replace(from, to))
     };
     let ended = with("unit = \"m\"", "unit = \"ft\"");
-    ended.says(&["process `pilot`: set point 0", "`unit` must be \"m\"", "found \"ft\""]);
+    ended.says(&["process `pilot`: `set_points`: set point 0", "`unit` must be \"m\"", "found \"ft\""]);
     with("\"altitude\"", "\"height\"").says(&["`channel` must be", "found \"height\""]);
     with("to = 1.5, ", "").says(&["`to` must be a finite number in a step, found nothing"]);
 }

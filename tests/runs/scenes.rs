@@ -102,7 +102,7 @@ fn what_free_flight_does_not_know_is_refused() {
         .says(&["holds a rig", "\"rapier\""]);
     refused("kind = \"plant\"", "kind = \"plant\"\nparameters.§crash_speed_m_s = 2.0")
         .says(&["touches nothing"]);
-    refused("kind = \"plant\"", "kind = \"plant\"\nparameters.backend = §\"bullet\"").says(&[
+    refused("kind = \"plant\"", "kind = \"plant\"\nparameters.§backend = \"bullet\"").says(&[
         "unknown variant `bullet`",
         "`newton-euler`",
         "`rapier`",

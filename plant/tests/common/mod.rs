@@ -3,7 +3,7 @@
 #![allow(non_snake_case, reason = "a trailing _W or _B names the frame a vector is written in")]
 
 use nalgebra::Vector3;
-use plant::{NewtonEuler, Rapier, RigidBody, State};
+use plant::{FreeFlight, NewtonEuler, Rapier, RigidBody, State};
 use scenes::Scene;
 use vehicles::Vehicle;
 
@@ -82,4 +82,11 @@ pub fn momentum_W(vehicle: &Vehicle, state: &State) -> Vector3<f64> {
 pub fn rapier(model: NewtonEuler, scene: &Scene, body: &RigidBody, crash_speed_m_s: f64) -> Rapier {
     let memory = model.airframe().memory(0, "plant", TICK_S);
     Rapier::new(model, memory, scene, body, crash_speed_m_s)
+}
+
+/// A vehicle without effects in free flight.
+pub fn free_flight(vehicle: Vehicle, body: RigidBody) -> FreeFlight {
+    let model = NewtonEuler::new(vehicle, 1);
+    let memory = model.airframe().memory(0, "plant", TICK_S);
+    FreeFlight::new(model, body, memory)
 }

@@ -70,30 +70,11 @@ pub struct EkfState {
     pad0: u32,
 }
 
-impl Default for EkfState {
-    fn default() -> Self {
-        Self {
-            at: Reading::default(),
-            settled: Motion::default(),
-            covariance: [0.0; STATES * STATES],
-            present: Motion::default(),
-            since: Transition::default(),
-            readings: Readings::default(),
-            waiting: Waiting::default(),
-            newest_ns: [NEVER; 4],
-            normalised_squared: [0.0; 4],
-            updates: [0; 4],
-            refused: [0; 4],
-            has_begun: 0,
-            pad0: 0,
-        }
-    }
-}
-
 /// The filter at one sample period: all that does not change during a run.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Ekf {
     params: EkfParams,
+    period_ns: u64,
     delay_max_ns: u64,
 }
 
@@ -113,33 +94,46 @@ impl Ekf {
         let span_s = params.delay_max_ms * 1e-3 + SPAN_MAX_NS as f64 * 1e-9;
         let fits = span_s / period_s <= (READINGS - 2) as f64;
         check("delay_max_ms", params.delay_max_ms, fits, "20 ms shorter than 254 of the node's periods")?;
-        Ok(Self { params, delay_max_ns: (params.delay_max_ms * 1e6) as u64 })
+        let (period_ns, delay_max_ns) = ((period_s * 1e9).round() as u64, (params.delay_max_ms * 1e6) as u64);
+        Ok(Self { params, period_ns, delay_max_ns })
     }
 
-    /// The parameters.
+    /// The state before the first reading.
     #[must_use]
-    pub fn params(&self) -> &EkfParams {
-        &self.params
+    pub fn initial_state(&self) -> EkfState {
+        EkfState {
+            at: Reading::default(),
+            settled: Motion::default(),
+            covariance: [0.0; STATES * STATES],
+            present: Motion::default(),
+            since: Transition::default(),
+            readings: Readings::every(self.period_ns),
+            waiting: Waiting::default(),
+            newest_ns: [NEVER; 4],
+            normalised_squared: [0.0; 4],
+            updates: [0; 4],
+            refused: [0; 4],
+            has_begun: 0,
+            pad0: 0,
+        }
     }
 
     /// Moves `state` on to `reading`, with what the sensors have measured last.
     pub fn step(&self, state: &mut EkfState, reading: &Reading, newest: &Newest) {
-        let last = state.readings.newest().copied();
+        let last = state.readings.newest();
         // Without a reading that can be used, the last one goes on.
-        let reading = match last {
-            Some(last) if !reading.is_finite() => Reading { time_ns: reading.time_ns, ..last },
-            _ => *reading,
-        };
-        state.readings.push(reading);
+        let usable = if reading.is_finite() { *reading } else { last.unwrap_or_default() };
+        let now_ns = reading.time_ns;
+        state.readings.push(&Reading { time_ns: now_ns, ..usable });
         let begins = state.has_begun == 0;
         if begins && !self.begin(state, newest) {
             return;
         }
-        self.collect(state, newest);
-        if self.settle(state, newest, reading.time_ns) || begins {
+        let was_full = self.collect(state, newest);
+        if self.settle(state, newest, now_ns) || was_full || begins {
             self.catch_up(state);
-        } else if let Some(last) = last {
-            state.present.travel(&last, &reading, self.params.gravity_m_s2, &mut state.since);
+        } else if let (Some(last), Some(now)) = (last, state.readings.newest()) {
+            state.present.travel(&last, &now, self.params.gravity_m_s2, &mut state.since);
         }
     }
 
@@ -155,8 +149,9 @@ impl Ekf {
         true
     }
 
-    /// Puts what is new among the measurements that wait.
-    fn collect(&self, state: &mut EkfState, newest: &Newest) {
+    /// Puts what is new among the measurements that wait; whether some had to be used early to make room.
+    fn collect(&self, state: &mut EkfState, newest: &Newest) -> bool {
+        let mut was_full = false;
         for measurement in newest.iter().flatten().flatten() {
             let sensor = measurement.sensor().index();
             if state.newest_ns[sensor] == measurement.measured_ns {
@@ -165,9 +160,11 @@ impl Ekf {
             state.newest_ns[sensor] = measurement.measured_ns;
             if state.waiting.is_full() {
                 self.use_first(state);
+                was_full = true;
             }
             state.waiting.insert(*measurement);
         }
+        was_full
     }
 
     /// Uses every measurement before which nothing can arrive any more, and keeps the filter's time within
@@ -234,8 +231,8 @@ impl Ekf {
             let mut span = Transition::default();
             let mut from = state.at;
             for to in state.readings.after(from.time_ns).take_while(|reading| reading.time_ns < next_ns) {
-                state.settled.travel(&from, to, self.params.gravity_m_s2, &mut span);
-                from = *to;
+                state.settled.travel(&from, &to, self.params.gravity_m_s2, &mut span);
+                from = to;
             }
             state.settled.travel(&from, &end, self.params.gravity_m_s2, &mut span);
             state.settled.fade_gps_drift(span.time_s(), self.params.gps_position_drift_time_s);
@@ -250,8 +247,8 @@ impl Ekf {
         (state.present, state.since) = (state.settled, Transition::default());
         let mut from = state.at;
         for to in state.readings.after(from.time_ns) {
-            state.present.travel(&from, to, self.params.gravity_m_s2, &mut state.since);
-            from = *to;
+            state.present.travel(&from, &to, self.params.gravity_m_s2, &mut state.since);
+            from = to;
         }
     }
 
@@ -319,7 +316,7 @@ impl EkfState {
     /// The newest reading.
     #[must_use]
     pub fn newest_reading(&self) -> Reading {
-        self.readings.newest().copied().unwrap_or_default()
+        self.readings.newest().unwrap_or_default()
     }
 
     fn covariance(&self) -> Covariance {

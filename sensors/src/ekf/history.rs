@@ -6,7 +6,7 @@ use bus::messages::Vector3;
 /// How many readings are remembered.
 pub const READINGS: usize = 256;
 /// How many measurements can wait.
-pub const WAITING: usize = 64;
+pub const WAITING: usize = 48;
 
 /// A reading of the IMU.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Message)]
@@ -49,38 +49,52 @@ impl Reading {
     }
 }
 
-/// The last readings, in the order of their times.
+/// The last readings, one a period.
+///
+/// They are kept in single precision, since what a node hands over is written at every tick: it rounds a reading by
+/// 10⁻⁷ of itself, four orders below its noise. The filter sees no other readings than these.
 #[derive(Clone, Copy, Debug, PartialEq, Message)]
 #[repr(C)]
 #[message(type_name = "hummingbus_msgs/msg/EkfReadings")]
 pub struct Readings {
     /// Readings so far; number n is at the place n modulo the number of places.
     count: u64,
-    /// The last of them.
-    ring: [Reading; READINGS],
-}
-
-impl Default for Readings {
-    fn default() -> Self {
-        Self { count: 0, ring: [Reading::default(); READINGS] }
-    }
+    /// When the newest was read.
+    #[field(unit = "ns")]
+    newest_ns: u64,
+    /// Time between two.
+    #[field(unit = "ns")]
+    period_ns: u64,
+    /// Specific force in m/s² and angular rate in rad/s, body axes.
+    #[field(unit = "")]
+    ring: [[f32; 6]; READINGS],
 }
 
 impl Readings {
-    /// Remembers the newest reading.
-    pub fn push(&mut self, reading: Reading) {
-        self.ring[self.count as usize % READINGS] = reading;
+    /// None yet, of those that will come every `period_ns`.
+    #[must_use]
+    pub fn every(period_ns: u64) -> Self {
+        Self { count: 0, newest_ns: 0, period_ns, ring: [[0.0; 6]; READINGS] }
+    }
+
+    /// Remembers the newest reading, one period after the last.
+    #[allow(clippy::cast_possible_truncation, reason = "single precision is meant")]
+    pub fn push(&mut self, reading: &Reading) {
+        let (force, rate) = (reading.specific_force, reading.angular_velocity);
+        let values = [force.x, force.y, force.z, rate.x, rate.y, rate.z];
+        self.ring[self.count as usize % READINGS] = values.map(|value| value as f32);
+        self.newest_ns = reading.time_ns;
         self.count += 1;
     }
 
     /// The newest reading, if there is one.
     #[must_use]
-    pub fn newest(&self) -> Option<&Reading> {
+    pub fn newest(&self) -> Option<Reading> {
         self.count.checked_sub(1).map(|number| self.numbered(number))
     }
 
     /// The readings after `time_ns`, oldest first.
-    pub fn after(&self, time_ns: u64) -> impl Iterator<Item = &Reading> {
+    pub fn after(&self, time_ns: u64) -> impl Iterator<Item = Reading> {
         let next = self.last_until(time_ns).map_or(self.oldest(), |number| number + 1);
         (next..self.count).map(|number| self.numbered(number))
     }
@@ -91,22 +105,26 @@ impl Readings {
         let number = self.last_until(time_ns)?;
         let before = self.numbered(number);
         if before.time_ns == time_ns {
-            return Some(*before);
+            return Some(before);
         }
-        (number + 1 < self.count).then(|| before.toward(self.numbered(number + 1), time_ns))
+        (number + 1 < self.count).then(|| before.toward(&self.numbered(number + 1), time_ns))
     }
 
     /// The number of the last reading up to `time_ns`.
     fn last_until(&self, time_ns: u64) -> Option<u64> {
-        (self.oldest()..self.count).rev().find(|&number| self.numbered(number).time_ns <= time_ns)
+        let back = self.newest_ns.saturating_sub(time_ns).div_ceil(self.period_ns);
+        let number = self.count.checked_sub(1 + back)?;
+        (number >= self.oldest()).then_some(number)
     }
 
     fn oldest(&self) -> u64 {
         self.count.saturating_sub(READINGS as u64)
     }
 
-    fn numbered(&self, number: u64) -> &Reading {
-        &self.ring[number as usize % READINGS]
+    fn numbered(&self, number: u64) -> Reading {
+        let [a, b, c, u, v, w] = self.ring[number as usize % READINGS].map(f64::from);
+        let time_ns = self.newest_ns - (self.count - 1 - number) * self.period_ns;
+        Reading { time_ns, specific_force: [a, b, c].into(), angular_velocity: [u, v, w].into() }
     }
 }
 

@@ -101,7 +101,7 @@ impl Start {
 pub fn start(newest: &Newest, readings: &Readings, params: &EkfParams) -> Option<(Reading, Start)> {
     let measured = |sensor: Sensor| newest[sensor.index()].flatten();
     if let Some(position_m) = params.initial_position_m {
-        let reading = *readings.newest()?;
+        let reading = readings.newest()?;
         return Some((reading, Start::given(position_m, &reading, params)));
     }
     if let Some(pose) = measured(Sensor::Mocap) {

@@ -1,7 +1,7 @@
 //! The parameters of the range-inertial estimator.
 
 use super::axis::Inertia;
-use crate::parameter::{ParameterError, not_negative, positive};
+use crate::parameter::{ParameterError, check, not_negative, positive};
 use serde::Deserialize;
 
 /// What the range finders, the IMU and the attitude are worth, and where the vehicle starts.
@@ -93,6 +93,8 @@ impl RangeInertialParams {
         for (key, value) in self.not_negative() {
             not_negative(key, value)?;
         }
+        let angle_is_good = (0.0..90.0).contains(&self.half_angle_deg);
+        check("half_angle_deg", self.half_angle_deg, angle_is_good, "zero or more and below 90")?;
         self.validate_room()
     }
 
@@ -112,10 +114,9 @@ impl RangeInertialParams {
         Ok(())
     }
 
-    fn not_negative(&self) -> [(&'static str, f64); 8] {
+    fn not_negative(&self) -> [(&'static str, f64); 7] {
         [
             ("nearest_m", self.nearest_m),
-            ("half_angle_deg", self.half_angle_deg),
             ("attitude_sigma_rad", self.attitude_sigma_rad),
             ("accelerometer_noise_density_m_s2_sqrt_hz", self.accelerometer_noise_density_m_s2_sqrt_hz),
             ("acceleration_bias_walk_m_s3_sqrt_hz", self.acceleration_bias_walk_m_s3_sqrt_hz),

@@ -1,0 +1,32 @@
+"""Lines of the table of docs/scenarios.md from the summaries that scripts/scenarios keeps."""
+
+import json
+import sys
+
+
+def number(value):
+    return f"{value:.4g}"
+
+
+def shown(verdict):
+    values = " … ".join(number(value) for value in verdict["values"])
+    return values if verdict["passed"] else f"**{values or 'nothing'}**"
+
+
+def limits(verdict):
+    low, high = verdict["min"], verdict["max"]
+    parts = [f"≥ {number(low)}"] * (low is not None) + [f"≤ {number(high)}"] * (high is not None)
+    return f"{', '.join(parts)} {verdict['unit']}"
+
+
+def main(name, folder, seeds):
+    flights = []
+    for seed in seeds.split():
+        with open(f"{folder}/{name}-{seed}.json", encoding="utf-8") as summary:
+            flights.append(json.load(summary)["pass"])
+    for verdicts in zip(*flights, strict=True):
+        columns = [name, verdicts[0]["name"], *map(shown, verdicts), limits(verdicts[0])]
+        print(f"| {' | '.join(columns)} |")
+
+
+main(*sys.argv[1:])

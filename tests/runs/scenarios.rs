@@ -1,0 +1,153 @@
+//! The thesis's scenarios and those beyond: every condition holds, whatever the seed, and no controller is told the
+//! truth.
+
+use crate::support::{Place, repository};
+use serde_json::Value;
+use std::collections::BTreeSet;
+
+const SEEDS: [u32; 3] = [1, 2, 3];
+
+/// The kinds of node that may read the plant's state: sensors, and those who judge or place.
+const MAY_KNOW: [&str; 11] = [
+    "barometer",
+    "clearance",
+    "gps",
+    "imu",
+    "magnetometer",
+    "mocap",
+    "plant",
+    "range",
+    "recorder",
+    "traffic",
+    "battery",
+];
+
+/// The messages that hold it.
+const TRUTHS: [&str; 7] =
+    ["Clearance", "Contact", "MeasuredState", "PlantState", "PoseStamped", "TFMessage", "Traffic"];
+
+/// Flies `name` with each seed; its own conditions decide.
+fn fly(name: &str) {
+    fly_with(&SEEDS, name);
+}
+
+fn fly_with(seeds: &[u32], name: &str) {
+    let manifest = repository(&format!("manifests/{name}.toml"));
+    for seed in seeds {
+        let place = Place::new();
+        let (recording, seed) = (place.path("flight.mcap"), format!("run.seed={seed}"));
+        let ended = place.call(&["run", &manifest, "--record", &recording, "--set", &seed]);
+        assert_eq!(ended.code, Some(0), "{ended}");
+    }
+}
+
+#[test]
+fn hover_and_doublet_on_both_backends() {
+    fly("hover");
+    fly("hover-rapier");
+}
+
+#[test]
+fn take_off_in_disturbed_air() {
+    fly("take-off");
+}
+
+#[test]
+fn sticks_in_both_rigs() {
+    fly("rig-a");
+    fly("rig-b");
+}
+
+#[test]
+fn stops_before_a_wall_from_three_speeds() {
+    for manifest in ["wall-stop-slow", "wall-stop", "wall-stop-fast"] {
+        fly(manifest);
+    }
+}
+
+#[test]
+fn follows_the_walls_at_varying_speed() {
+    fly("wall-follow-varying");
+}
+
+#[test]
+fn follows_the_walls_at_a_constant_distance() {
+    fly("wall-follow-constant");
+}
+
+#[test]
+fn ten_vehicles_share_a_room() {
+    fly_with(&SEEDS[..1], "ten-vehicles");
+}
+
+#[test]
+fn a_figure_eight_at_three_metres_a_second() {
+    fly("figure-eight");
+}
+
+#[test]
+fn four_laws_take_over_from_each_other() {
+    fly("swap-laws");
+}
+
+/// Every way from the plant's truth to a controller leads through a sensor.
+#[test]
+fn no_controller_is_told_the_truth() {
+    let manifests = [
+        "hover",
+        "hover-rapier",
+        "take-off",
+        "rig-a",
+        "rig-b",
+        "wall-stop-slow",
+        "wall-stop",
+        "wall-stop-fast",
+        "wall-follow-varying",
+        "wall-follow-constant",
+        "ten-vehicles",
+        "figure-eight",
+        "swap-laws",
+    ];
+    for manifest in manifests {
+        let path = repository(&format!("manifests/{manifest}.toml"));
+        let graph = Place::new().call(&["check", &path, "--json"]).with_code(0).json();
+        let told = readers_of(&graph, &TRUTHS);
+        assert!(told.contains("imu"), "{manifest}: {told:?}");
+        let others: Vec<_> = told.iter().filter(|kind| !MAY_KNOW.contains(&kind.as_str())).collect();
+        assert!(others.is_empty(), "{manifest}: {others:?} are told the truth");
+    }
+}
+
+/// Of the wall scenarios the controllers know range finders, IMU and attitude alone.
+#[test]
+fn the_wall_scenarios_know_range_finders_and_imu_alone() {
+    for manifest in ["wall-stop", "wall-follow-varying", "wall-follow-constant", "ten-vehicles"] {
+        let path = repository(&format!("manifests/{manifest}.toml"));
+        let graph = Place::new().call(&["check", &path, "--json"]).with_code(0).json();
+        let kinds: BTreeSet<_> = nodes(&graph).map(kind).collect();
+        assert!(["gps", "mocap", "ekf"].iter().all(|kind| !kinds.contains(kind)), "{manifest}: {kinds:?}");
+        let walls = readers_of(&graph, &["WallEstimate", "AttitudeEstimate"]);
+        assert!(walls.iter().any(|kind| kind.starts_with("wall-")), "{manifest}: {walls:?}");
+    }
+}
+
+/// The nodes of a graph and those that succeed them.
+fn nodes(graph: &Value) -> impl Iterator<Item = &Value> {
+    graph["nodes"].as_array().unwrap().iter().chain(graph["successors"].as_array().unwrap())
+}
+
+fn kind(node: &Value) -> &str {
+    node["what"].as_str().unwrap()
+}
+
+/// The kinds of the nodes that read messages of `types`.
+fn readers_of(graph: &Value, types: &[&str]) -> BTreeSet<String> {
+    let type_of = |input: &Value| {
+        let topic = &graph["topics"][usize::try_from(input["topic"].as_u64().unwrap()).unwrap()];
+        topic["type_name"].as_str().unwrap().to_owned()
+    };
+    let is_one = |input: &Value| types.iter().any(|name| type_of(input).ends_with(&format!("/{name}")));
+    let inputs = |node: &Value| node.get("plan").unwrap_or(node)["inputs"].as_array().unwrap().clone();
+    let reads = |node: &&Value| inputs(node).iter().any(is_one);
+    nodes(graph).filter(reads).map(|node| kind(node).to_owned()).collect()
+}
