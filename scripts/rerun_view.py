@@ -68,28 +68,32 @@ def roll_pitch_yaw_deg(q):
     return [math.degrees(angle) for angle in (roll, pitch, yaw)]
 
 
-def log_angles(entity, colours, names, messages, angles):
-    """Logs three angles over time, which the viewer cannot make of a message by itself."""
-    times = [message.log_time_ns * 1e-9 for message in messages]
+def log_angles(entity, colours, suffix, messages, angles_deg):
+    """Logs roll, pitch and yaw over time, which the viewer cannot make of a message by itself."""
+    names = [f"{angle}{suffix}" for angle in ("roll", "pitch", "yaw")]
     rr.log(entity, rr.SeriesLines(colors=colours, names=names), static=True)
-    index = rr.TimeColumn("message_log_time", timestamp=times)
-    rr.send_columns(entity, [index], rr.Scalars.columns(scalars=[angles(message.ros_msg) for message in messages]))
+    times = rr.TimeColumn("message_log_time", timestamp=[message.log_time_ns * 1e-9 for message in messages])
+    scalars = rr.Scalars.columns(scalars=[angles_deg(message.ros_msg) for message in messages])
+    rr.send_columns(entity, [times], scalars)
 
 
-def log_attitude(recording, states, set_point_topic):
-    log_angles("flown/attitude", [BLUE, RED, GREEN], ["roll", "pitch", "yaw"], states, lambda m: roll_pitch_yaw_deg(m.attitude))
-    asked = list(read_ros2_messages(recording, topics=[set_point_topic]))
-    if asked:
-        degrees = lambda m: [math.degrees(angle) for angle in (m.roll, m.pitch, m.yaw)]
-        log_angles("asked/attitude", [GREY] * 3, ["roll set point", "pitch set point", "yaw set point"], asked, degrees)
+def log_attitude(states, set_points):
+    def asked_deg(message):
+        return [math.degrees(angle) for angle in (message.roll, message.pitch, message.yaw)]
+
+    log_angles("flown/attitude", [BLUE, RED, GREEN], "", states, lambda state: roll_pitch_yaw_deg(state.attitude))
+    if set_points:
+        log_angles("asked/attitude", [GREY] * 3, " set point", set_points, asked_deg)
 
 
 def log_scene(boxes):
     centres = [box["centre"]["value"] for box in boxes]
     halves = [[length / 2 for length in box["size"]["value"]] for box in boxes]
     yaws = [box.get("yaw", {"value": 0, "unit": "rad"}) for box in boxes]
-    turns = [rr.RotationAxisAngle([0, 0, 1], **{"degrees" if yaw["unit"] == "deg" else "radians": yaw["value"]}) for yaw in yaws]
-    shape = rr.Boxes3D(centers=centres, half_sizes=halves, rotation_axis_angles=turns, labels=[box["name"] for box in boxes])
+    degrees = [yaw["value"] if yaw["unit"] == "deg" else math.degrees(yaw["value"]) for yaw in yaws]
+    turns = [rr.RotationAxisAngle([0, 0, 1], degrees=angle) for angle in degrees]
+    names = [box["name"] for box in boxes]
+    shape = rr.Boxes3D(centers=centres, half_sizes=halves, rotation_axis_angles=turns, labels=names)
     rr.log("scene", rr.CoordinateFrame("map"), shape, static=True)
 
 
@@ -114,7 +118,7 @@ def main(recording, out, vehicle=""):
     states = list(read_ros2_messages(recording, topics=[prefix + "plant/state"]))
     if states:
         log_path(states)
-        log_attitude(recording, states, prefix + "pilot/set_point")
+        log_attitude(states, list(read_ros2_messages(recording, topics=[prefix + "pilot/set_point"])))
     if boxes:
         log_scene(boxes)
     rr.disconnect()
