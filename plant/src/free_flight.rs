@@ -63,7 +63,8 @@ impl Backend for FreeFlight {
 
     fn restore(&mut self, snapshot: &[u8]) -> Result<(), SnapshotError> {
         let snapshot = Snapshot::read(snapshot, NAME)?;
-        (self.state, self.memory) = (snapshot.get("state")?, snapshot.get("memory")?);
+        let memory = snapshot.fitting("memory", |memory| self.memory.fits(memory))?;
+        (self.state, self.memory) = (snapshot.get("state")?, memory);
         Ok(())
     }
 }

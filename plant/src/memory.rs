@@ -19,6 +19,16 @@ pub struct AirframeMemory {
     pub(crate) remembered: Vec<Remembered>,
 }
 
+impl AirframeMemory {
+    /// Whether `other` can go on in place of this one: as many effects, as long a delay.
+    pub(crate) fn fits(&self, other: &Self) -> bool {
+        let (ring, newest) = (&other.commands.ring, other.commands.newest);
+        other.remembered.len() == self.remembered.len()
+            && ring.len() == self.commands.ring.len()
+            && newest < ring.len()
+    }
+}
+
 /// What one effect carries from tick to tick.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Remembered {

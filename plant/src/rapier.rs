@@ -227,9 +227,9 @@ impl Backend for Rapier {
 
     fn restore(&mut self, snapshot: &[u8]) -> Result<(), SnapshotError> {
         let snapshot = Snapshot::read(snapshot, NAME)?;
-        let (state, memory, reaction) =
-            (snapshot.get("state")?, snapshot.get("memory")?, snapshot.get("reaction")?);
-        let (contacts, world) = (snapshot.get("contacts")?, World::read(&snapshot)?);
+        let (state, reaction) = (snapshot.get("state")?, snapshot.get("reaction")?);
+        let memory = snapshot.fitting("memory", |memory| self.memory.fits(memory))?;
+        let (contacts, world) = (snapshot.get("contacts")?, self.world.read(&snapshot)?);
         (self.state, self.memory, self.reaction) = (state, memory, reaction);
         (self.contacts, self.world) = (contacts, world);
         Ok(())

@@ -21,6 +21,12 @@ pub enum SnapshotError {
     /// A component is absent.
     #[error("the snapshot has no component {0:?}; it was taken by another version or in another scene")]
     Missing(&'static str),
+    /// A component is that of another vehicle or scene.
+    #[error(
+        "component {0:?} of the snapshot does not fit this vehicle and scene; restore it with the vehicle, effects \
+         and scene that it was taken with"
+    )]
+    Misfit(&'static str),
     /// A component cannot be written or read.
     #[error("component {component:?} of the snapshot: {cause}")]
     Component {
@@ -69,6 +75,15 @@ impl Snapshot {
         } else {
             Err(SnapshotError::OtherBackend { expected: backend, found: snapshot.backend })
         }
+    }
+
+    /// One component, refused where it does not fit.
+    pub(crate) fn fitting<T: DeserializeOwned>(
+        &self,
+        component: &'static str,
+        fits: impl FnOnce(&T) -> bool,
+    ) -> Result<T, SnapshotError> {
+        Some(self.get(component)?).filter(fits).ok_or(SnapshotError::Misfit(component))
     }
 
     /// One component.

@@ -6,7 +6,7 @@ mod common;
 use common::{TICK_S, hummingbird};
 use nalgebra::{UnitQuaternion, Vector3};
 use plant::snapshot::first_difference;
-use plant::{Backend, Neighbour, NewtonEuler, Rapier, RigidBody};
+use plant::{Airframe, Backend, FreeFlight, Neighbour, NewtonEuler, Rapier, RigidBody};
 use scenes::Scene;
 
 /// A situation that is caught in the middle.
@@ -172,4 +172,59 @@ fn what_is_no_snapshot_of_the_backend_is_refused_and_changes_nothing() {
         assert!(plant.restore(&whole[..cut]).is_err(), "cut off at {cut}");
     }
     assert_same("refused", &plant, &before);
+}
+
+#[test]
+fn a_snapshot_of_another_scene_is_refused_and_changes_nothing() {
+    let [crash, _, sliding, fixed] = situations().map(|situation| situation.plant());
+    let ground = common::rapier(
+        NewtonEuler::new(hummingbird(), 1),
+        &Scene::default(),
+        &RigidBody::level_at(Vector3::zeros()),
+        1.0,
+    );
+    let moved = include_str!("../../scenes/room.toml").replacen("5.05", "5.06", 1);
+    let moved = common::rapier(
+        NewtonEuler::new(hummingbird(), 1),
+        &Scene::parse(&moved, "moved.toml").unwrap(),
+        &RigidBody::level_at(Vector3::zeros()),
+        1.0,
+    );
+    let mut plants = [crash, sliding, fixed, ground, moved];
+    let snapshots = plants.each_ref().map(|plant| plant.snapshot().unwrap());
+    for (own, plant) in plants.iter_mut().enumerate() {
+        for (other, snapshot) in snapshots.iter().enumerate() {
+            let restored = plant.restore(snapshot);
+            assert_eq!(restored.is_ok(), own == other, "{own} from {other}: {restored:?}");
+            assert_eq!(first_difference(&plant.snapshot().unwrap(), &snapshots[own]).unwrap(), None);
+        }
+        plant.step(&uneven(0), TICK_S, &[]);
+    }
+}
+
+#[test]
+fn a_snapshot_of_other_effects_or_another_delay_is_refused_by_both_backends() {
+    let effects = ["battery-sag", "command-delay", "wind"];
+    let with = |names: &[&str]| {
+        let effects = names.iter().map(|name| plant::effects::find(name).unwrap().typical()).collect();
+        Airframe::with_effects(hummingbird(), effects)
+    };
+    let start = RigidBody::level_at(Vector3::z());
+    let plants = |names: &[&str]| -> [Box<dyn Backend>; 2] {
+        let model = || NewtonEuler::flying(with(names), 1);
+        let memory = || with(names).memory(0, "plant", TICK_S);
+        let rapier = Rapier::new(model(), memory(), &Scene::default(), &start, 1.0);
+        [Box::new(FreeFlight::new(model(), start, memory())), Box::new(rapier)]
+    };
+    for (mut plant, all) in plants(&effects).into_iter().zip(plants(&effects)) {
+        plant.restore(&all.snapshot().unwrap()).unwrap();
+    }
+    for fewer in [&effects[..0], &effects[..1], &effects[1..], &["battery-sag", "turbulence", "wind"]] {
+        for (mut plant, other) in plants(&effects).into_iter().zip(plants(fewer)) {
+            let error = plant.restore(&other.snapshot().unwrap()).unwrap_err().to_string();
+            assert!(error.contains("\"memory\"") && error.contains("effects"), "{error}");
+            plant.step(&uneven(0), TICK_S, &[]);
+            assert!(plant.battery().is_some());
+        }
+    }
 }

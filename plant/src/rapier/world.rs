@@ -13,7 +13,7 @@ use crate::snapshot::{Snapshot, SnapshotError};
 use crate::state::RigidBody;
 use nalgebra::{Unit, Vector3};
 use rapier3d_f64::dynamics::{FrictionModel, IntegrationParameters, RigidBodyBuilder, RigidBodyHandle};
-use rapier3d_f64::geometry::{ColliderBuilder, ColliderHandle, ContactPair};
+use rapier3d_f64::geometry::{Collider, ColliderBuilder, ColliderHandle, ContactPair};
 use rapier3d_f64::math::Vector;
 use rapier3d_f64::pipeline::PhysicsWorld;
 use scenes::{Cuboid, Rig, Scene};
@@ -129,8 +129,8 @@ impl World {
             .with("narrow phase", &physics.narrow_phase)
     }
 
-    /// The world that `write` wrote.
-    pub(super) fn read(snapshot: &Snapshot) -> Result<Self, SnapshotError> {
+    /// The world that `write` wrote, of the same vehicle in the same scene as this one.
+    pub(super) fn read(&self, snapshot: &Snapshot) -> Result<Self, SnapshotError> {
         let physics = PhysicsWorld {
             bodies: snapshot.get("bodies")?,
             colliders: snapshot.get("colliders")?,
@@ -140,7 +140,33 @@ impl World {
             narrow_phase: snapshot.get("narrow phase")?,
             ..empty()
         };
-        Ok(Self { physics, handles: snapshot.get("handles")? })
+        let world = Self { physics, handles: snapshot.get("handles")? };
+        if !self.has_bodies_of(&world) {
+            return Err(SnapshotError::Misfit("bodies"));
+        }
+        if self.has_colliders_of(&world) { Ok(world) } else { Err(SnapshotError::Misfit("colliders")) }
+    }
+
+    /// Whether all that has a handle is there, and the joints are as many.
+    fn has_bodies_of(&self, other: &Self) -> bool {
+        let (own, handles, bodies) = (&self.handles, &other.handles, &other.physics.bodies);
+        let moving = [handles.vehicle].into_iter().chain(handles.slider).chain(handles.neighbours.clone());
+        (own.vehicle, own.slider, own.hull) == (handles.vehicle, handles.slider, handles.hull)
+            && moving.into_iter().all(|handle| bodies.get(handle).is_some())
+            && bodies.len() - handles.neighbours.len() == self.physics.bodies.len() - own.neighbours.len()
+            && other.physics.impulse_joints.len() == self.physics.impulse_joints.len()
+    }
+
+    /// Whether the vehicle is of the same shape and what stands is in the same places. Each neighbour has one
+    /// collider.
+    fn has_colliders_of(&self, other: &Self) -> bool {
+        let count = |world: &Self| world.physics.colliders.len() - world.handles.neighbours.len();
+        let mut lasting =
+            self.physics.colliders.iter().filter(|(_, own)| own.user_data < FIRST_NEIGHBOUR.into());
+        count(self) == count(other)
+            && lasting.all(|(handle, own)| {
+                other.physics.colliders.get(handle).is_some_and(|other| is_same(own, other))
+            })
     }
 
     /// Everything near the vehicle, as the last step found it.
@@ -167,6 +193,17 @@ impl World {
             velocity_W_m_s: other_body.map_or(Vector3::zeros(), |body| from_rapier(body.linvel())),
         })
     }
+}
+
+/// Whether two colliders are the same part of a vehicle, or the same box in the same place.
+fn is_same(a: &Collider, b: &Collider) -> bool {
+    a.user_data == b.user_data
+        && a.parent() == b.parent()
+        && a.position_wrt_parent() == b.position_wrt_parent()
+        && (a.parent().is_some() || a.position() == b.position())
+        && a.shape().as_cuboid() == b.shape().as_cuboid()
+        && a.shape().as_ball() == b.shape().as_ball()
+        && a.shape().as_cylinder() == b.shape().as_cylinder()
 }
 
 fn empty() -> PhysicsWorld {
