@@ -434,3 +434,26 @@ fn without_a_magnetometer_gps_tells_the_yaw_of_a_vehicle_that_is_pushed_about_an
     assert!(pushed_deg < 1.5, "{pushed_deg}");
     assert!(hovering_deg > 4.5, "{hovering_deg}");
 }
+
+/// What it is told to begin with is off by far more than it is told too: motion capture is refused at first.
+#[test]
+fn a_filter_that_is_told_a_wrong_start_finds_its_way() {
+    let flight = fly(excited, [0.0, 0.0, 5.0], 3_000);
+    let believed = EkfParams { initial_position_m: Some([2.0, -1.0, 5.0]), ..EkfParams::default() };
+    let mut refused = 0;
+    let mut judge = |sample: &Sample<'_>| {
+        refused = sample.state.refused()[Sensor::Mocap.index()];
+        if sample.number > 1000 {
+            assert!(errors(sample).fixed_rows::<3>(0).norm() < 5e-3, "at sample {}", sample.number);
+        }
+    };
+    run_with(
+        &flight,
+        &[MOCAP],
+        (EkfParams::default(), believed),
+        4,
+        |_, measured| Some(measured),
+        &mut judge,
+    );
+    assert_eq!(refused, 20);
+}

@@ -12,7 +12,8 @@
 //! when it is `delay_max_ms` old. One that arrives later than that is refused.
 //!
 //! *Outliers.* A measurement is refused if its normalised innovation squared is unlikely. Each refusal leaves the
-//! covariance growing, so a filter that is wrong comes to accept what it refused.
+//! covariance growing, so a filter that is wrong comes to accept what it refused; after twenty refusals of a position in
+//! a row the filter takes itself for lost: it keeps its motion with hardly any confidence.
 #![allow(
     non_snake_case,
     reason = "a trailing _W or _B names the frame a vector is written in, _WB a rotation between the two"
@@ -22,7 +23,7 @@ use super::history::{Newest, READINGS, Reading, Readings, Sensor, Waiting};
 use super::motion::Motion;
 use super::observation::{self, Observation};
 use super::params::EkfParams;
-use super::start::start;
+use super::start::{lost_covariance, start};
 use super::transition::{Covariance, STATES, Transition, symmetric};
 use crate::parameter::{ParameterError, check, positive};
 use bus::Message;
@@ -32,6 +33,10 @@ const SPAN_MAX_NS: u64 = 20_000_000;
 
 /// No measurement was seen.
 const NEVER: u64 = u64::MAX;
+
+/// So many refusals of a position in a row mean that the filter is wrong, not the sensor. Tuned, no source: 0.2 s of
+/// motion capture, 2 s of GPS.
+const REFUSED_IN_ROW_MAX: u32 = 20;
 
 /// What the estimator remembers, as it is handed over.
 #[derive(Clone, Copy, Debug, PartialEq, Message)]
@@ -63,6 +68,9 @@ pub struct EkfState {
     updates: [u32; 4],
     #[field(unit = "1")]
     refused: [u32; 4],
+    /// The same without one that was used in between.
+    #[field(unit = "1")]
+    refused_in_row: [u32; 4],
     /// 1 once the filter has begun.
     #[field(unit = "1")]
     has_begun: u32,
@@ -113,6 +121,7 @@ impl Ekf {
             normalised_squared: [0.0; 4],
             updates: [0; 4],
             refused: [0; 4],
+            refused_in_row: [0; 4],
             has_begun: 0,
             pad0: 0,
         }
@@ -267,8 +276,16 @@ impl Ekf {
         state.normalised_squared[index] = normalised_squared;
         if deviation(normalised_squared, N) > self.params.gate_sigma {
             state.refused[index] += 1;
-            return;
+            state.refused_in_row[index] += 1;
+            if state.refused_in_row[index] < REFUSED_IN_ROW_MAX || !sensor.tells_position() {
+                return;
+            }
+            // It is not the sensor that is wrong.
+            state.covariance = flat(&lost_covariance(&self.params));
+            state.refused_in_row[index] = 0;
+            return self.update(state, sensor, observed);
         }
+        state.refused_in_row[index] = 0;
         let gain = cross * spread.inverse();
         state.settled.correct(&(gain * observed.innovation));
         state.covariance = flat(&symmetric(&(covariance - gain * cross.transpose())));

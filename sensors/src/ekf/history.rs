@@ -150,6 +150,12 @@ impl Sensor {
     pub fn index(self) -> usize {
         self as usize
     }
+
+    /// Whether it tells the whole position.
+    #[must_use]
+    pub fn tells_position(self) -> bool {
+        matches!(self, Self::Gps | Self::Mocap)
+    }
 }
 
 /// A measurement, of whatever sensor.

@@ -13,6 +13,7 @@ use super::observation::measured_attitude_WB;
 use super::params::EkfParams;
 use super::transition::{ACCELEROMETER, ATTITUDE, BAROMETER, Covariance, GPS, GYROSCOPE, POSITION, VELOCITY};
 use crate::complementary::tilt_rad;
+use crate::units::STANDARD_GRAVITY_M_S2;
 use crate::wire::{attitude_message, vector};
 use nalgebra::{UnitQuaternion, Vector3};
 
@@ -20,6 +21,10 @@ use nalgebra::{UnitQuaternion, Vector3};
 const POSITION_UNKNOWN_SIGMA_M: f64 = 100.0;
 const VELOCITY_UNKNOWN_SIGMA_M_S: f64 = 10.0;
 const ATTITUDE_UNKNOWN_SIGMA_RAD: f64 = 0.5;
+
+/// A specific force that differs from gravity by more than this fraction does not show the tilt. As the complementary
+/// filter's.
+const GRAVITY_TOLERANCE: f64 = 0.2;
 
 /// A motion to begin with, and what it is worth.
 #[derive(Clone, Copy, Debug)]
@@ -96,6 +101,19 @@ impl Start {
     }
 }
 
+/// The covariance of a filter that has lost its way: hardly any confidence in its motion.
+#[must_use]
+pub fn lost_covariance(params: &EkfParams) -> Covariance {
+    let lost = Start {
+        motion: Motion::default(),
+        position_sigma_m: POSITION_UNKNOWN_SIGMA_M,
+        velocity_sigma_m_s: VELOCITY_UNKNOWN_SIGMA_M_S,
+        tilt_sigma_rad: ATTITUDE_UNKNOWN_SIGMA_RAD,
+        yaw_sigma_rad: ATTITUDE_UNKNOWN_SIGMA_RAD,
+    };
+    lost.covariance(params)
+}
+
 /// The reading and the motion to begin with, if a position is known.
 #[must_use]
 pub fn start(newest: &Newest, readings: &Readings, params: &EkfParams) -> Option<(Reading, Start)> {
@@ -117,9 +135,11 @@ pub fn start(newest: &Newest, readings: &Readings, params: &EkfParams) -> Option
     Some((reading, Start::at_fix(&fix, field.as_ref(), &reading, params)))
 }
 
-/// At rest, with roll and pitch as gravity shows them.
+/// At rest, with roll and pitch as gravity shows them; level, where what is felt is not gravity.
 fn upright(reading: &Reading, yaw_rad: f64) -> Motion {
-    let (roll_rad, pitch_rad) = tilt_rad(&vector(reading.specific_force));
+    let felt_m_s2 = vector(reading.specific_force);
+    let is_gravity = (felt_m_s2.norm() / STANDARD_GRAVITY_M_S2 - 1.0).abs() < GRAVITY_TOLERANCE;
+    let (roll_rad, pitch_rad) = if is_gravity { tilt_rad(&felt_m_s2) } else { (0.0, 0.0) };
     let attitude_WB = UnitQuaternion::from_euler_angles(roll_rad, pitch_rad, yaw_rad);
     Motion { attitude: attitude_message(attitude_WB), ..Motion::default() }
 }
