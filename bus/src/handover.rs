@@ -79,40 +79,49 @@ impl StateRing {
 
     /// States `state` as that at the start of `tick`.
     pub(crate) fn store(&self, tick: u32, state: &[u8]) {
-        let entry = self.entry(tick);
-        self.word(entry).store(u64::from(tick) + 1, Relaxed);
-        for (index, bytes) in state.chunks(8).enumerate() {
-            let mut word = [0; 8];
-            word[..bytes.len()].copy_from_slice(bytes);
-            self.word(entry + 1 + index).store(u64::from_le_bytes(word), Relaxed);
+        let (stamp, words) = self.entry(tick);
+        stamp.store(u64::from(tick) + 1, Relaxed);
+        for (word, bytes) in words.iter().zip(state.chunks(8)) {
+            word.store(word_of(bytes), Relaxed);
         }
     }
 
     /// Reads the state at the start of `tick`; false if the ring does not hold it.
     pub(crate) fn load(&self, tick: u32, state: &mut [u8]) -> bool {
-        let entry = self.entry(tick);
-        if self.word(entry).load(Relaxed) != u64::from(tick) + 1 {
+        let (stamp, words) = self.entry(tick);
+        if stamp.load(Relaxed) != u64::from(tick) + 1 {
             return false;
         }
-        for (index, bytes) in state.chunks_mut(8).enumerate() {
-            let word = self.word(entry + 1 + index).load(Relaxed).to_le_bytes();
-            bytes.copy_from_slice(&word[..bytes.len()]);
+        for (word, bytes) in words.iter().zip(state.chunks_mut(8)) {
+            bytes.copy_from_slice(&word.load(Relaxed).to_le_bytes()[..bytes.len()]);
         }
         true
     }
 
-    /// The number of the first word of the entry of `tick`.
-    fn entry(&self, tick: u32) -> usize {
-        (tick as usize % self.entries) * (1 + self.state_words)
+    /// The stamp and the state of the entry of `tick`.
+    fn entry(&self, tick: u32) -> (&AtomicU64, &[AtomicU64]) {
+        let length = 1 + self.state_words;
+        let first = (tick as usize % self.entries) * length;
+        assert!((first + length) * 8 <= self.map.len(), "the entry of tick {tick} is outside the state ring");
+        // SAFETY: the mapping lives as long as `self`, the words are inside it (asserted) and start at a multiple of
+        // 8 from a page-aligned start; every process accesses these bytes as atomics only. The order against the
+        // other process comes from the member's state word.
+        let words = unsafe {
+            std::slice::from_raw_parts(self.map.as_mut_ptr().add(first * 8).cast::<AtomicU64>(), length)
+        };
+        (&words[0], &words[1..])
     }
+}
 
-    fn word(&self, index: usize) -> &AtomicU64 {
-        assert!((index + 1) * 8 <= self.map.len(), "word {index} is outside the state ring");
-        // SAFETY: the mapping lives as long as `self`, the offset is inside it (asserted) and a multiple of 8
-        // from a page-aligned start; every process accesses these bytes as atomics only. The order against
-        // the other process comes from the member's state word.
-        unsafe { AtomicU64::from_ptr(self.map.as_mut_ptr().add(index * 8).cast()) }
+/// Up to eight bytes as a word, zeros behind them.
+fn word_of(bytes: &[u8]) -> u64 {
+    // The fast way for all words but the last.
+    if let Ok(whole) = bytes.try_into() {
+        return u64::from_le_bytes(whole);
     }
+    let mut word = [0; 8];
+    word[..bytes.len()].copy_from_slice(bytes);
+    u64::from_le_bytes(word)
 }
 
 /// A member is at most a window ahead of its successor; one state more belongs to the tick that it computes.

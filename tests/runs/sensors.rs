@@ -4,7 +4,7 @@ use crate::recordings::{require_same_messages, topics};
 use crate::support::{Place, repository};
 
 /// Every sensor of manifests/sensors.toml that is not part of hover.toml.
-const SENSORS: [&str; 5] = ["gps", "barometer", "magnetometer", "mocap", "range"];
+const SENSORS: [&str; 6] = ["gps", "barometer", "magnetometer", "mocap", "range", "battery"];
 
 /// manifests/sensors.toml cut to 1 s, with more tables.
 fn short(place: &Place, name: &str, tables: &str) -> String {
@@ -25,7 +25,7 @@ fn sensors_that_are_swapped_in_flight_leave_no_trace() {
     // Each with measurements under way: the IMU's are delayed too.
     let delayed = "[process.imu.parameters]\ndelay_ms = 7.0\ndropout = 0.1\n";
     let swap = |(index, process): (usize, &&str)| {
-        let at_tick = 300 + 60 * index;
+        let at_tick = 300 + 80 * index;
         format!("[[swap]]\nprocess = \"{process}\"\nat_tick = {at_tick}\nshadow_ticks = 20\n")
     };
     let processes = [&SENSORS[..], &["imu"]].concat();
