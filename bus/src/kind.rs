@@ -51,7 +51,8 @@ pub struct NodeKind {
     pub inputs: Inputs,
     /// Outputs.
     pub outputs: &'static [PortSpec],
-    /// Checks the parameters and the files they name, without running; the words are the wired inputs.
+    /// Checks the parameters and the files they name, without running; the words are the wired inputs
+    /// and the outputs that the manifest names.
     pub check: fn(&serde_json::Value, &[&str]) -> Result<(), String>,
     /// Runs the node in this process.
     pub run: fn() -> Result<(), BusError>,

@@ -38,6 +38,7 @@ use vehicles::{EffectEntry, Vehicle, VehicleError};
 pub struct Airframe {
     vehicle: Vehicle,
     effects: Vec<Effect>,
+    frame_shift_B_m: Vector3<f64>,
 }
 
 /// What acts on the airframe over one tick.
@@ -72,18 +73,26 @@ impl Airframe {
     /// The airframe of `vehicle` with these effects instead of those that its file lists.
     #[must_use]
     pub fn with_effects(mut vehicle: Vehicle, effects: Vec<Effect>) -> Self {
+        let declared_B_m = amid_rotors_B_m(&vehicle);
         for (effect, action) in actions(&effects) {
             if let Action::Vehicle(change) = action {
                 change(&effect.values, &mut vehicle);
             }
         }
-        Self { vehicle, effects }
+        let frame_shift_B_m = amid_rotors_B_m(&vehicle) - declared_B_m;
+        Self { vehicle, effects, frame_shift_B_m }
     }
 
     /// The vehicle as it flies, changed by its effects.
     #[must_use]
     pub fn vehicle(&self) -> &Vehicle {
         &self.vehicle
+    }
+
+    /// How far the effects have moved the frame, seen from the centre of mass, from where it is declared.
+    #[must_use]
+    pub fn frame_shift_B_m(&self) -> &Vector3<f64> {
+        &self.frame_shift_B_m
     }
 
     /// Its effects, in the order in which they are summed.
@@ -203,6 +212,11 @@ impl Airframe {
             }
         }
     }
+}
+
+/// The mean of the rotors' places, from the centre of mass.
+pub(crate) fn amid_rotors_B_m(vehicle: &Vehicle) -> Vector3<f64> {
+    vehicle.rotors.iter().map(|rotor| rotor.position_m).sum::<Vector3<f64>>() / 4.0
 }
 
 /// Each action of each effect, in order.

@@ -65,7 +65,7 @@ pub struct Neighbour {
 pub struct ContactReport {
     /// Sum of the contact forces over the last tick.
     pub force_W_N: Vector3<f64>,
-    /// Speed of approach just before the contact with `object` began.
+    /// Speed of approach of the newest impact of a part of the vehicle.
     pub impact_speed_m_s: f64,
     /// Number of things touched.
     pub count: u32,

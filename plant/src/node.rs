@@ -44,7 +44,7 @@ fn run() -> Result<(), BusError> {
     let command = node.input::<MotorCommand>("command")?;
     let measured = node.optional_input::<MeasuredState>("measured");
     let traffic = node.optional_input::<Traffic>("traffic");
-    let outputs = Outputs::declare(&mut node, parameters.backend)?;
+    let outputs = Outputs::declare(&mut node)?;
     let window_ticks = window_ticks(&node, parameters.window_s)?;
     let dt_s = node.tick_s();
     if node.period_s() != dt_s {

@@ -1,16 +1,11 @@
 //! What a plant publishes.
 
 use crate::backend::Backend;
-use crate::parameters::BackendName;
 use bus::messages::{
     Battery, BodyTransform, Contact, Orientation, PlantState, Point, Pose, PoseStamped, Quaternion,
 };
 use bus::{BusError, Node, Output, Tick};
 use nalgebra::{UnitQuaternion, Vector3};
-
-/// Nominal voltage of the Hummingbird's battery, three lithium-polymer cells of 3.7 V: what is published until
-/// a vehicle file describes its battery.
-const NOMINAL_VOLTAGE_V: f64 = 11.1;
 
 /// The outputs of a plant; those behind an option exist where the manifest names them.
 pub(crate) struct Outputs {
@@ -22,21 +17,14 @@ pub(crate) struct Outputs {
 }
 
 impl Outputs {
-    pub(crate) fn declare(node: &mut Node, backend: BackendName) -> Result<Self, BusError> {
-        let outputs = Self {
+    pub(crate) fn declare(node: &mut Node) -> Result<Self, BusError> {
+        Ok(Self {
             state: node.output("state")?,
             pose: node.optional_output("pose")?,
             tf: node.optional_output("tf")?,
             contact: node.optional_output("contact")?,
             battery: node.optional_output("battery")?,
-        };
-        if outputs.contact.is_some() && backend == BackendName::NewtonEuler {
-            return Err(node.error(
-                "the output `contact` needs `backend` = \"rapier\": free flight touches nothing, and would \
-                 report a flight through a wall as one without contact",
-            ));
-        }
-        Ok(outputs)
+        })
     }
 
     pub(crate) fn publish(&self, tick: &mut Tick<'_>, backend: &dyn Backend) -> Result<(), BusError> {
@@ -74,15 +62,16 @@ fn state(backend: &dyn Backend) -> PlantState {
     }
 }
 
+/// Without an effect that models the battery nothing is known of it: zeros that are not valid.
 fn battery_message(backend: &dyn Backend, measured_ns: u64) -> Battery {
-    let nominal = Battery { voltage: NOMINAL_VOLTAGE_V, charge: 1.0, ..Default::default() };
-    let truth = backend.battery().map_or(nominal, |battery| Battery {
+    let truth = backend.battery().map(|battery| Battery {
         voltage: battery.voltage_V,
         current: battery.current_A,
         charge: battery.charge,
+        valid: 1,
         ..Default::default()
     });
-    Battery { measured_ns, valid: 1, ..truth }
+    Battery { measured_ns, ..truth.unwrap_or_default() }
 }
 
 fn contact(backend: &dyn Backend) -> Contact {
@@ -109,4 +98,32 @@ fn point(v: &Vector3<f64>) -> Point {
 fn orientation(attitude: &UnitQuaternion<f64>) -> Orientation {
     let [x, y, z, w] = attitude.coords.into();
     Orientation { x, y, z, w }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{Airframe, FreeFlight, NewtonEuler, RigidBody};
+
+    fn published(effects: &[&str]) -> Battery {
+        let text = include_str!("../../vehicles/hummingbird.toml");
+        let vehicle = vehicles::Vehicle::parse(text, "hummingbird.toml").unwrap();
+        let effects = effects.iter().map(|name| crate::effects::find(name).unwrap().typical()).collect();
+        let airframe = Airframe::with_effects(vehicle, effects);
+        let memory = airframe.memory(0, "plant", 1e-3);
+        let body = RigidBody::level_at(Vector3::z());
+        let mut plant = FreeFlight::new(NewtonEuler::flying(airframe, 1), body, memory);
+        plant.settle_rotors(&[76.5; 4]);
+        battery_message(&plant, 7)
+    }
+
+    #[test]
+    fn a_battery_that_nothing_models_is_not_valid_and_holds_no_numbers() {
+        let battery = published(&["wind"]);
+        assert_eq!((battery.valid, battery.measured_ns), (0, 7));
+        assert_eq!((battery.voltage, battery.current, battery.charge), (0.0, 0.0, 0.0));
+        let battery = published(&["battery-sag"]);
+        assert_eq!((battery.valid, battery.charge), (1, 0.8));
+        assert!(battery.voltage > 10.0 && battery.current > 1.0, "{battery:?}");
+    }
 }

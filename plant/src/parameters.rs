@@ -12,7 +12,7 @@ use nalgebra::{UnitQuaternion, Vector3};
 use scenes::Scene;
 use serde::Deserialize;
 use std::path::PathBuf;
-use vehicles::Vehicle;
+use vehicles::{EffectEntry, Vehicle};
 
 /// Parameters of the plant.
 #[derive(Debug, Deserialize)]
@@ -24,7 +24,7 @@ pub(crate) struct Parameters {
     scene: Option<PathBuf>,
     /// What moves the vehicle.
     #[serde(default)]
-    pub(crate) backend: BackendName,
+    backend: BackendName,
     /// Position of the centre of mass at tick 0, in the world.
     #[serde(default)]
     initial_position_m: [f64; 3],
@@ -46,7 +46,7 @@ pub(crate) struct Parameters {
 /// The backends by name.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
 #[serde(rename_all = "kebab-case")]
-pub(crate) enum BackendName {
+enum BackendName {
     #[default]
     NewtonEuler,
     Rapier,
@@ -55,15 +55,18 @@ pub(crate) enum BackendName {
 /// What a Hummingbird bears, as far as anybody knows: tuned, no source.
 const CRASH_SPEED_M_S: f64 = 1.0;
 
+/// More steps than these gain nothing at 1 kHz, and would look like a run that hangs: tuned, no source.
+const SUBSTEPS_MAX: u32 = 1000;
+
 fn one() -> u32 {
     1
 }
 
-/// Refuses what cannot be meant; the words are the wired inputs.
-pub(crate) fn check(parameters: &serde_json::Value, inputs: &[&str]) -> Result<(), String> {
+/// Refuses what cannot be meant; the words are the wired inputs and the named outputs.
+pub(crate) fn check(parameters: &serde_json::Value, ports: &[&str]) -> Result<(), String> {
     let parameters: Parameters = read_parameters(parameters)?;
     parameters.check_numbers()?;
-    parameters.check_inputs(inputs)?;
+    parameters.check_ports(ports)?;
     // Any stream and tick serve here.
     parameters.backend(0, "", 1e-3).map(|_| ())
 }
@@ -71,8 +74,8 @@ pub(crate) fn check(parameters: &serde_json::Value, inputs: &[&str]) -> Result<(
 impl Parameters {
     fn check_numbers(&self) -> Result<(), String> {
         self.check_start()?;
-        if self.substeps == 0 {
-            return Err("`substeps` is 0, expected at least 1".to_owned());
+        if !(1..=SUBSTEPS_MAX).contains(&self.substeps) {
+            return Err(format!("`substeps` is {}, expected 1 to {SUBSTEPS_MAX}", self.substeps));
         }
         if self.window_s.is_some_and(|window_s| !is_positive(window_s)) {
             return Err("`window_s` must be a positive number of seconds".to_owned());
@@ -98,13 +101,21 @@ impl Parameters {
         finite("initial_yaw_deg", &[self.initial_yaw_deg])
     }
 
-    fn check_inputs(&self, inputs: &[&str]) -> Result<(), String> {
-        if inputs.contains(&"traffic") && self.backend == BackendName::NewtonEuler {
+    fn check_ports(&self, ports: &[&str]) -> Result<(), String> {
+        let needs_rapier = |port| ports.contains(&port) && self.backend == BackendName::NewtonEuler;
+        if needs_rapier("traffic") {
             return Err(
                 "the input `traffic` needs `backend` = \"rapier\": free flight meets nobody".to_owned()
             );
         }
-        match (inputs.contains(&"measured"), self.window_s) {
+        if needs_rapier("contact") {
+            return Err(
+                "the output `contact` needs `backend` = \"rapier\": free flight touches nothing, and \
+                        would report a flight through a wall as one without contact"
+                    .to_owned(),
+            );
+        }
+        match (ports.contains(&"measured"), self.window_s) {
             (true, None) => Err("the input `measured` needs the parameter `window_s`".to_owned()),
             (false, Some(_)) => Err("the parameter `window_s` needs the input `measured`".to_owned()),
             _ => Ok(()),
@@ -117,6 +128,7 @@ impl Parameters {
         let vehicle = Vehicle::load(&self.vehicle).map_err(|error| error.to_string())?;
         let scene = self.scene.as_deref().map(Scene::load).transpose().map_err(|error| error.to_string())?;
         let scene = scene.unwrap_or_default();
+        refuse_double_rig(&vehicle, &scene)?;
         let airframe = Airframe::from_files(vehicle, &scene.effects).map_err(|error| error.to_string())?;
         let memory = airframe.memory(seed, node, dt_s);
         let model = NewtonEuler::flying(airframe, self.substeps);
@@ -128,8 +140,22 @@ impl Parameters {
             BackendName::NewtonEuler => Ok(Box::new(FreeFlight::new(model, self.start(), memory))),
             BackendName::Rapier => {
                 let crash_speed_m_s = self.crash_speed_m_s.unwrap_or(CRASH_SPEED_M_S);
-                Ok(Box::new(Rapier::new(model, memory, &scene, &self.start(), crash_speed_m_s)))
+                let rapier = Rapier::new(model, memory, &scene, &self.start(), crash_speed_m_s);
+                self.refuse_inside(&rapier, &scene)?;
+                Ok(Box::new(rapier))
             }
+        }
+    }
+
+    /// Refuses a start inside of a box, unless a measured flight says where the vehicle starts.
+    fn refuse_inside(&self, rapier: &Rapier, scene: &Scene) -> Result<(), String> {
+        match rapier.box_around().and_then(|number| scene.boxes.get(number)) {
+            Some(cuboid) if self.window_s.is_none() => Err(format!(
+                "`initial_position_m` is {:?}, where the vehicle is partly inside of the box \"{}\" of the scene; \
+                 move it out",
+                self.initial_position_m, cuboid.name
+            )),
+            _ => Ok(()),
         }
     }
 
@@ -145,6 +171,93 @@ impl Parameters {
     }
 }
 
+/// Refuses effects that stand for what the joints of a rig do.
+fn refuse_double_rig(vehicle: &Vehicle, scene: &Scene) -> Result<(), String> {
+    let is_rig_effect =
+        |entry: &&EffectEntry| ["rig-pendulum", "bearing-friction"].contains(&entry.name.as_str());
+    match vehicle.effects.iter().chain(&scene.effects).find(is_rig_effect) {
+        Some(effect) if scene.rig.is_some() => Err(format!(
+            "`scene` \"{}\" holds a rig, whose joints have what the effect \"{}\" stands for: it would count twice; \
+             leave the effect out",
+            scene.name, effect.name
+        )),
+        _ => Ok(()),
+    }
+}
+
 fn is_positive(number: f64) -> bool {
     number > 0.0 && number.is_finite()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use serde_json::{Value, json};
+
+    fn repository(file: &str) -> String {
+        format!("{}/../{file}", env!("CARGO_MANIFEST_DIR"))
+    }
+
+    fn checked(scene: &str, more: Value, ports: &[&str]) -> Result<(), String> {
+        let mut parameters = json!({
+            "vehicle": repository("vehicles/hummingbird.toml"),
+            "scene": repository(scene),
+            "backend": "rapier",
+        });
+        parameters.as_object_mut().unwrap().extend(more.as_object().unwrap().clone());
+        check(&parameters, ports)
+    }
+
+    #[test]
+    fn a_start_inside_of_a_box_is_refused_and_names_both() {
+        let start = |x: f64| checked("scenes/room.toml", json!({ "initial_position_m": [x, 0.0, 1.0] }), &[]);
+        // The hull reaches 0.2716 m; the wall stands at 5 m.
+        assert_eq!(start(4.7), Ok(()));
+        for x in [4.8, 5.05, 5.3] {
+            let error = start(x).unwrap_err();
+            assert!(error.contains("`initial_position_m`") && error.contains("\"wall +x\""), "{error}");
+        }
+        let measured = json!({ "initial_position_m": [5.05, 0.0, 1.0], "window_s": 0.1 });
+        assert_eq!(checked("scenes/room.toml", measured, &["measured"]), Ok(()));
+    }
+
+    #[test]
+    fn effects_that_a_rig_has_by_its_joints_are_refused_with_it() {
+        let entry = |name| EffectEntry { name, ..effect_entry() };
+        for name in ["rig-pendulum", "bearing-friction"] {
+            let mut scene = Scene::load(repository("scenes/rig-fixed.toml").as_ref()).unwrap();
+            let mut vehicle = Vehicle::load(repository("vehicles/hummingbird.toml").as_ref()).unwrap();
+            assert_eq!(refuse_double_rig(&vehicle, &scene), Ok(()));
+            vehicle.effects.push(entry(name.to_owned()));
+            let error = refuse_double_rig(&vehicle, &scene).unwrap_err();
+            assert!(error.contains("`scene`") && error.contains(name), "{error}");
+            scene.effects.append(&mut vehicle.effects);
+            assert!(refuse_double_rig(&vehicle, &scene).is_err());
+            scene.rig = None;
+            assert_eq!(refuse_double_rig(&vehicle, &scene), Ok(()));
+        }
+    }
+
+    /// Any effect, from a file.
+    fn effect_entry() -> EffectEntry {
+        Scene::load(repository("scenes/ground-disturbed.toml").as_ref()).unwrap().effects.remove(0)
+    }
+
+    #[test]
+    fn substeps_have_a_least_and_a_most() {
+        let with = |substeps: u32| checked("scenes/ground.toml", json!({ "substeps": substeps }), &[]);
+        assert_eq!((with(1), with(1000)), (Ok(()), Ok(())));
+        for substeps in [0, 1001, u32::MAX] {
+            assert!(with(substeps).unwrap_err().contains("`substeps`"));
+        }
+    }
+
+    #[test]
+    fn contact_needs_a_backend_that_touches() {
+        let free = json!({ "backend": "newton-euler" });
+        let error = checked("scenes/ground.toml", free.clone(), &["command", "contact"]).unwrap_err();
+        assert!(error.contains("`contact`") && error.contains("`backend`"), "{error}");
+        assert_eq!(checked("scenes/ground.toml", free, &["command"]), Ok(()));
+        assert_eq!(checked("scenes/ground.toml", json!({}), &["command", "contact"]), Ok(()));
+    }
 }

@@ -40,6 +40,9 @@ const NAME: &str = "rapier";
 /// A vehicle lower than this above its stand starts on its feet, at rest.
 const ON_THE_GROUND_M: f64 = 1e-3;
 
+/// A vehicle that is slower than this when it is placed on the ground or in a rig is carried there: tuned, no source.
+const AT_REST_M_S: f64 = 0.01;
+
 /// A vehicle in a scene.
 pub struct Rapier {
     model: NewtonEuler,
@@ -77,13 +80,16 @@ impl Rapier {
         crash_speed_m_s: f64,
     ) -> Self {
         let vehicle = model.vehicle();
-        let hull = Hull::of(vehicle);
+        let hull = Hull::of(model.airframe());
+        // The mount is on the frame, and where it is seen from may have moved.
+        let mount_shift_B_m = model.airframe().frame_shift_B_m();
+        let rig = scene.rig.map(|rig| Rig { mount_B_m: rig.mount_B_m + mount_shift_B_m, ..rig });
         let mut rapier = Self {
             hull,
-            rig: scene.rig,
+            rig,
             crash_speed_m_s,
             inertia_min_kg_m2: vehicle.inertia_kg_m2.symmetric_eigenvalues().min(),
-            world: World::new(vehicle, &hull, scene, body),
+            world: World::new(vehicle, &hull, scene, rig.as_ref(), body),
             contacts: Contacts::new(1 + scene.boxes.len() + TRAFFIC_MAX),
             state: model.start(*body, 0.0),
             memory,
@@ -92,6 +98,12 @@ impl Rapier {
         };
         rapier.set_body(body);
         rapier
+    }
+
+    /// The number of the scene's box that the vehicle is inside of, if any.
+    #[must_use]
+    pub fn box_around(&self) -> Option<usize> {
+        self.world.box_around(&self.state.body)
     }
 
     /// One step of `span_s`; returns by how much contacts and joints changed the velocities.
@@ -131,7 +143,33 @@ impl Rapier {
         if stands {
             *height_m = height_m.max(self.hull.stand_m());
         }
-        self.contacts.place(stands.then_some(world::GROUND));
+        self.contacts.place(stands.then_some(world::GROUND), world::FEET);
+    }
+
+    /// Before anything has moved, what carries a vehicle at rest is what takes its free acceleration away: so its
+    /// accelerometer feels g from the first tick on.
+    fn lean_on_support(&mut self) {
+        let free = self.model.motion_under(&self.memory.drive, &self.state);
+        let body = &self.state.body;
+        let gravity_W_m_s2 = Vector3::z() * self.model.vehicle().gravity_m_s2;
+        let free_W_m_s2 = body.attitude_WB * free.specific_force_B_m_s2 - gravity_W_m_s2;
+        let is_at_rest = body.velocity_W_m_s.norm() < AT_REST_M_S;
+        self.reaction = Reaction::default();
+        if is_at_rest && self.is_carried(&free_W_m_s2) {
+            self.reaction.acceleration_W_m_s2 = -free_W_m_s2;
+        }
+    }
+
+    /// Whether ground or rig keep the vehicle from accelerating freely.
+    fn is_carried(&self, free_W_m_s2: &Vector3<f64>) -> bool {
+        let vehicle = self.model.vehicle();
+        match &self.rig {
+            Some(rig) => {
+                let lift_N = free_W_m_s2.z * vehicle.mass_kg;
+                rig::holds(rig, &self.state.body, lift_N, vehicle.gravity_m_s2)
+            }
+            None => self.stands() && free_W_m_s2.z < 0.0,
+        }
     }
 
     fn stands(&self) -> bool {
@@ -143,7 +181,7 @@ impl Rapier {
     fn hang(&mut self, rig: &Rig) {
         let (body, bearing_W_m) = rig::hung(rig, &self.state.body);
         self.state.body = body;
-        self.contacts.place(None);
+        self.contacts.place(None, 0);
         let arm_W_m = body.attitude_WB * rig.mount_B_m;
         let speed_m_s = body.velocity_W_m_s.z + spin_W_rad_s(&body).cross(&arm_W_m).z;
         self.world.set_slider(&bearing_W_m, speed_m_s);
@@ -196,16 +234,17 @@ impl Backend for Rapier {
 
     fn settle_rotors(&mut self, commands: &[f64; 4]) {
         self.state.rotors = commands.map(|command| self.model.steady(command));
+        self.lean_on_support();
     }
 
     fn set_body(&mut self, body: &RigidBody) {
         self.state.body = *body;
-        self.reaction = Reaction::default();
         match self.rig {
             Some(rig) => self.hang(&rig),
             None => self.put_down(),
         }
         self.world.set_body(&self.state.body);
+        self.lean_on_support();
     }
 
     fn contact(&self) -> ContactReport {

@@ -75,7 +75,8 @@ fn rapier_takes_memory_a_few_times_a_tick_whatever_is_touched() {
         ("rig A", taken(&mut rapier(include_str!("../../scenes/rig-sliding.toml"), Vector3::z()), 1.0, &[])),
     ];
     println!("in 1000 ticks: {counts:?}");
-    for (name, count) in counts {
-        assert!(count <= 10_000, "{name}: {count} times in 1000 ticks");
+    // What was counted with debug assertions, 3000, 5000, 5249 and 4000, and a tenth more.
+    for ((name, count), most) in counts.into_iter().zip([3_300, 5_500, 5_774, 4_400]) {
+        assert!(count <= most, "{name}: {count} times in 1000 ticks, expected {most} at most");
     }
 }

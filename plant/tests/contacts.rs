@@ -6,7 +6,7 @@ mod common;
 use common::{TICK_S, hummingbird};
 use nalgebra::{UnitQuaternion, Vector3};
 use plant::rapier::hull::Hull;
-use plant::{Backend, ContactReport, Neighbour, NewtonEuler, Rapier, RigidBody};
+use plant::{Airframe, Backend, ContactReport, Neighbour, NewtonEuler, Rapier, RigidBody};
 use scenes::Scene;
 
 const CRASH_SPEED_M_S: f64 = 1.0;
@@ -29,8 +29,67 @@ fn fly(plant: &mut Rapier, commands: &[f64; 4], ticks: usize) -> Vec<ContactRepo
     (0..ticks).map(|_| step()).collect()
 }
 
+fn hull() -> Hull {
+    Hull::of(&Airframe::new(hummingbird()))
+}
+
 fn stand_m() -> f64 {
-    Hull::of(&hummingbird()).stand_m()
+    hull().stand_m()
+}
+
+#[test]
+fn at_rest_on_the_ground_the_accelerometer_feels_g_before_anything_has_moved() {
+    let mut plant = plant(&Scene::default(), &RigidBody::level_at(Vector3::zeros()));
+    plant.settle_rotors(&IDLE);
+    let felt = plant.motion().specific_force_B_m_s2;
+    assert!((felt - Vector3::z() * 9.81).norm() < 1e-9, "{felt:?}");
+    assert!(plant.contact().force_W_N.z > 4.0, "the ground carries it: {:?}", plant.contact());
+    // More than its weight: the ground does not hold it back.
+    plant.settle_rotors(&[120.0; 4]);
+    assert!(plant.motion().specific_force_B_m_s2.z > 10.0);
+    // In the air nothing carries it.
+    plant.set_body(&RigidBody::level_at(Vector3::z()));
+    plant.settle_rotors(&IDLE);
+    assert!(plant.motion().specific_force_B_m_s2.z < 1.0);
+}
+
+/// Its front feet 0.2 mm above the ground, coming down slowly; its nose coming down fast.
+fn nose_down() -> RigidBody {
+    let attitude_WB = UnitQuaternion::from_axis_angle(&Vector3::y_axis(), 0.1);
+    let angular_velocity_B_rad_s = Vector3::y() * 14.0;
+    let foot_W_m = attitude_WB * hull().feet_B_m[0];
+    let turning_W_m_s = angular_velocity_B_rad_s.cross(&foot_W_m);
+    RigidBody {
+        position_W_m: Vector3::z() * (hull().foot_radius_m + 2e-4 - foot_W_m.z),
+        velocity_W_m_s: -Vector3::z() * 0.3 - turning_W_m_s,
+        attitude_WB,
+        angular_velocity_B_rad_s,
+    }
+}
+
+#[test]
+fn a_disc_that_is_slammed_down_while_a_foot_touches_already_is_a_crash() {
+    let mut plant = plant(&Scene::default(), &nose_down());
+    let reports = fly(&mut plant, &IDLE, 100);
+    let first = reports.iter().find(|report| report.count > 0).expect("the feet touch");
+    assert!(!first.crashed && first.impact_speed_m_s < 0.5, "{first:?}");
+    let slam = reports.iter().find(|report| report.crashed).expect("the disc follows");
+    assert_eq!((slam.began, slam.count, slam.object), (1, 1, 1), "it is the same contact: {slam:?}");
+    assert!((2.0..4.0).contains(&slam.impact_speed_m_s), "{slam:?}");
+}
+
+#[test]
+fn a_centre_of_mass_that_is_elsewhere_moves_the_whole_hull_and_leaves_its_shape() {
+    let offset_B_m = Vector3::new(0.02, -0.01, 0.005);
+    let kind = plant::effects::find("com-offset").unwrap();
+    let [x_m, y_m, z_m]: [f64; 3] = offset_B_m.into();
+    let effect = plant::effects::Effect { kind, values: [x_m, y_m, z_m, 0.0, 0.0, 0.0] };
+    let (moved, declared) = (Hull::of(&Airframe::with_effects(hummingbird(), vec![effect])), hull());
+    assert!((moved.disc_radius_m - declared.disc_radius_m).abs() < 1e-12);
+    assert!((moved.centre_B_m - (declared.centre_B_m - offset_B_m)).norm() < 1e-12);
+    for (foot_B_m, there_B_m) in moved.feet_B_m.iter().zip(declared.feet_B_m) {
+        assert!((foot_B_m - (there_B_m - offset_B_m)).norm() < 1e-12, "{foot_B_m:?}");
+    }
 }
 
 #[test]
@@ -104,7 +163,7 @@ fn reach_m(plant: &Rapier, hull: &Hull, direction: &Vector3<f64>) -> f64 {
 
 #[test]
 fn walls_hold_a_vehicle_and_are_named() {
-    let hull = Hull::of(&hummingbird());
+    let hull = hull();
     let hover = [hummingbird().hover_command(); 4];
     for (direction, object) in [(Vector3::x(), 2), (-Vector3::x(), 3), (Vector3::y(), 4), (-Vector3::y(), 5)]
     {
@@ -131,7 +190,7 @@ fn walls_hold_a_vehicle_and_are_named() {
 #[test]
 fn another_vehicle_is_met_where_it_flies() {
     let hover = [hummingbird().hover_command(); 4];
-    let hull = Hull::of(&hummingbird());
+    let hull = hull();
     let mut plant = plant(&room(), &RigidBody::level_at(Vector3::new(0.0, 0.0, 1.0)));
     plant.settle_rotors(&hover);
     let (mut met, mut met_at_m) = (None, 0.0);
@@ -159,7 +218,7 @@ fn a_tumbling_fall_ends_on_the_ground_and_not_in_it() {
         ..RigidBody::level_at(Vector3::z() * 2.0)
     };
     let mut plant = plant(&room(), &start);
-    let hull = Hull::of(&hummingbird());
+    let hull = hull();
     for tick in 0..8_000 {
         plant.step(&IDLE, TICK_S, &[]);
         let depth_m = reach_m(&plant, &hull, &-Vector3::z());

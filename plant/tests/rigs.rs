@@ -5,7 +5,7 @@ mod common;
 
 use common::{TICK_S, hummingbird};
 use nalgebra::{UnitQuaternion, Vector3};
-use plant::{Backend, NewtonEuler, Rapier, RigidBody};
+use plant::{Airframe, Backend, NewtonEuler, Rapier, RigidBody};
 use scenes::{Rig, Scene};
 
 const SLIDING: &str = include_str!("../../scenes/rig-sliding.toml");
@@ -107,6 +107,40 @@ fn the_accelerometer_feels_g_where_the_rope_carries_the_vehicle() {
     let felt = plant.motion().specific_force_B_m_s2;
     assert!((felt - Vector3::z() * 9.81).norm() < 1e-3, "{felt:?}");
     assert_eq!(plant.contact().count, 0, "a rig is no contact");
+}
+
+#[test]
+fn hung_at_rest_the_accelerometer_feels_g_before_anything_has_moved() {
+    for text in [SLIDING, FIXED] {
+        for command in [1.0, 78.0] {
+            let mut plant = hanging(&scene(text), 30.0);
+            plant.settle_rotors(&[command; 4]);
+            let felt = plant.motion().specific_force_B_m_s2;
+            assert!((felt - Vector3::z() * 9.81).norm() < 1e-9, "{felt:?}");
+        }
+    }
+    let mut plant = hanging(&scene(SLIDING), 0.0);
+    plant.settle_rotors(&[120.0; 4]);
+    assert!(plant.motion().specific_force_B_m_s2.z > 10.0, "it rises");
+}
+
+#[test]
+fn the_bearing_holds_the_frame_where_it_is_whatever_the_centre_of_mass() {
+    let kind = plant::effects::find("com-offset").unwrap();
+    let effect = plant::effects::Effect { kind, values: [0.02, -0.01, 0.005, 0.0, 0.0, 0.0] };
+    let model = NewtonEuler::flying(Airframe::with_effects(hummingbird(), vec![effect]), 1);
+    let memory = model.airframe().memory(0, "plant", TICK_S);
+    let scene = scene(FIXED);
+    let rig = scene.rig.unwrap();
+    let mut plant = Rapier::new(model, memory, &scene, &RigidBody::level_at(Vector3::zeros()), 1.0);
+    for tick in 0..500 {
+        let body = plant.state().body;
+        let mount_B_m = rig.mount_B_m - Vector3::new(0.02, -0.01, 0.005);
+        let off_m = (body.position_W_m + body.attitude_WB * mount_B_m - rig.bearing_W_m).norm();
+        assert!(off_m < 1e-3, "tick {tick}: {off_m}");
+        plant.step(&[1.0; 4], TICK_S, &[]);
+    }
+    assert!(tilt_deg(&plant) > 5.0, "it swings, or this shows nothing");
 }
 
 #[test]

@@ -2,7 +2,8 @@
 //!
 //! Reading = truth + bias + white noise, in steps of the part's resolution. The charge is what a monitor can know
 //! of it: the measured current counted from `initial_charge` on. [`crate::channel`] says when it measures, how
-//! measurements are delayed and lost; the count goes on through losses.
+//! measurements are delayed and lost; the count goes on through losses. Where the truth is not valid, since the plant
+//! has no model of its battery, nothing is measured and `valid` is 0.
 #![allow(non_snake_case, reason = "trailing _V, _A and _Ah name units")]
 
 use crate::channel::{Chance, Channel, ChannelState, QUEUE, Timing};
@@ -127,6 +128,9 @@ impl BatteryParams {
     fn sample(&self, channel: &mut Channel, memory: &mut Memory, now_ns: u64, truth: &Battery) -> Battery {
         let Memory { channel: state, queue, charge, counted_ns } = memory;
         channel.step(state, queue, now_ns, |last, chance| {
+            if truth.valid == 0 {
+                return Battery { valid: 0, ..*last };
+            }
             let measured = self.measure(truth, chance);
             let elapsed_ns = now_ns.saturating_sub(*counted_ns);
             *charge = (*charge - self.drawn(measured.current, elapsed_ns)).clamp(0.0, 1.0);
@@ -175,7 +179,7 @@ mod tests {
     use crate::testing::{TICK_NS, require_hand_over, require_normal};
 
     fn truth() -> Battery {
-        Battery { voltage: 11.3, current: 8.4, charge: 0.5, ..Default::default() }
+        Battery { voltage: 11.3, current: 8.4, charge: 0.5, valid: 1, ..Default::default() }
     }
 
     fn samples(params: &BatteryParams, count: u64) -> Vec<Battery> {
@@ -228,6 +232,18 @@ mod tests {
             let expected = (0.8 - number as f64 * 0.1 * 10.5 / 3600.0 / 2.1).max(0.0);
             assert!((sample.charge - expected).abs() < 1e-9, "{} {expected}", sample.charge);
         }
+    }
+
+    #[test]
+    fn nothing_is_measured_of_a_battery_that_the_plant_does_not_model() {
+        let params = undelayed();
+        let mut channel = Channel::new(&params.timing(), 0.1, 5, "battery").unwrap();
+        let mut memory = params.start();
+        for n in 0..100 {
+            let sent = params.sample(&mut channel, &mut memory, n * 100 * TICK_NS, &Battery::default());
+            assert_eq!((sent.valid, sent.voltage, sent.current), (0, 0.0, 0.0));
+        }
+        assert_eq!(memory.charge, params.initial_charge, "nothing is drawn from it");
     }
 
     #[test]

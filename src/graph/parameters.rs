@@ -39,8 +39,9 @@ pub fn set(
     if program.is_recorder() {
         require_none(manifest, process)?;
     } else if let Executable::Kind(kind) = &program.executable {
-        let inputs: Vec<&str> = process.inputs.keys().map(|port| port.get_ref().as_str()).collect();
-        (kind.check)(&parameters, &inputs).map_err(|reason| refused(manifest, name, process, &reason))?;
+        let ports = process.inputs.keys().chain(process.outputs.keys());
+        let ports: Vec<&str> = ports.map(|port| port.get_ref().as_str()).collect();
+        (kind.check)(&parameters, &ports).map_err(|reason| refused(manifest, name, process, &reason))?;
     }
     node.parameters = parameters;
     Ok(())

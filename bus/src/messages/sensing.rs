@@ -139,7 +139,7 @@ pub struct Battery {
     /// What is left of the capacity, 0 to 1.
     #[field(unit = "1")]
     pub charge: f64,
-    /// 1 if this sample holds a measurement, 0 if it was lost.
+    /// 1 if this sample holds a measurement, 0 if it was lost or the plant has no model of its battery.
     #[field(unit = "1")]
     pub valid: u32,
     /// Zero.
@@ -157,7 +157,8 @@ pub struct Contact {
     /// Sum of the contact forces over the last tick.
     #[field(unit = "N", frame = "world")]
     pub force: Vector3,
-    /// Speed against what is touched just before the contact began; 0 without a contact.
+    /// Speed of approach just before the newest impact: a part of the vehicle, a foot or the disc of propellers,
+    /// touched something that it had not touched. The fastest of those within a tick; 0 without a contact.
     #[field(unit = "m/s")]
     pub impact_speed: f64,
     /// Number of things touched: the ground, boxes, other vehicles.

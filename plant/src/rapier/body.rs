@@ -36,11 +36,15 @@ pub(super) fn read(owner: &Owner) -> RigidBody {
 
 /// Gives rapier another pose and velocity.
 pub(super) fn write(owner: &mut Owner, body: &RigidBody) {
-    let [x, y, z, w] = body.attitude_WB.coords.into();
-    let pose = Pose::from_parts(to_rapier(&body.position_W_m), Rotation::from_xyzw(x, y, z, w));
-    owner.set_position(pose, true);
+    owner.set_position(pose(body), true);
     owner.set_linvel(to_rapier(&body.velocity_W_m_s), true);
     owner.set_angvel(to_rapier(&(body.attitude_WB * body.angular_velocity_B_rad_s)), true);
+}
+
+/// The pose, as rapier writes it.
+pub(super) fn pose(body: &RigidBody) -> Pose {
+    let [x, y, z, w] = body.attitude_WB.coords.into();
+    Pose::from_parts(to_rapier(&body.position_W_m), Rotation::from_xyzw(x, y, z, w))
 }
 
 /// Puts a force and a torque on the body for the next step, instead of those of the last.

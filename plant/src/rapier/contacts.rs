@@ -15,6 +15,8 @@ const LIFT_M: f64 = 1e-3;
 pub(super) struct Sighting {
     /// What it is, as `bus::messages::Contact` numbers it.
     pub object: u32,
+    /// Which of the vehicle's colliders it is near: one bit of [`Touch::parts`].
+    pub part: u32,
     /// Where the two are nearest to each other.
     pub point_W_m: Vector3<f64>,
     /// The contact's normal, which points from the object to the vehicle.
@@ -27,13 +29,32 @@ pub(super) struct Sighting {
     pub velocity_W_m_s: Vector3<f64>,
 }
 
+impl Sighting {
+    fn pushes(&self) -> bool {
+        self.impulse_N_s > 0.0
+    }
+}
+
 /// A contact that lasts.
 #[derive(Debug, Clone, Copy, Serialize, Deserialize)]
 struct Touch {
     object: u32,
-    impact_speed_m_s: f64,
+    /// The vehicle's colliders that it touches, a bit for each.
+    parts: u32,
+    /// Those of them that the last step still saw.
+    parts_seen: u32,
     /// Whether the last step still saw it.
     seen: bool,
+}
+
+impl Touch {
+    fn see(&mut self, sighting: &Sighting) {
+        let is_near = sighting.gap_m < LIFT_M || sighting.pushes();
+        self.seen |= is_near;
+        if sighting.pushes() || (is_near && self.parts & sighting.part != 0) {
+            self.parts_seen |= sighting.part;
+        }
+    }
 }
 
 /// The contacts from tick to tick, the longest-lasting first.
@@ -42,6 +63,10 @@ pub(super) struct Contacts {
     touches: Vec<Touch>,
     began: u32,
     crashed: bool,
+    /// The speed of approach of the newest impact; 0 where nothing is touched.
+    impact_speed_m_s: f64,
+    /// Whether that was in this tick.
+    is_impact_new: bool,
     /// What the contacts pushed with along their normals since the tick began.
     normal_impulse_W_N_s: Vector3<f64>,
 }
@@ -49,13 +74,20 @@ pub(super) struct Contacts {
 impl Contacts {
     /// No contact so far, among at most `objects` things.
     pub(super) fn new(objects: usize) -> Self {
-        let normal_impulse_W_N_s = Vector3::zeros();
-        Self { touches: Vec::with_capacity(objects), began: 0, crashed: false, normal_impulse_W_N_s }
+        Self {
+            touches: Vec::with_capacity(objects),
+            began: 0,
+            crashed: false,
+            impact_speed_m_s: 0.0,
+            is_impact_new: false,
+            normal_impulse_W_N_s: Vector3::zeros(),
+        }
     }
 
     /// A tick begins.
     pub(super) fn begin_tick(&mut self) {
         self.normal_impulse_W_N_s = Vector3::zeros();
+        self.is_impact_new = false;
     }
 
     /// What the contacts pushed with along their normals since the tick began.
@@ -63,10 +95,12 @@ impl Contacts {
         self.normal_impulse_W_N_s
     }
 
-    /// Starts anew with the vehicle at rest on `object`, or free. What it stands on at first did not begin.
-    pub(super) fn place(&mut self, object: Option<u32>) {
+    /// Starts anew with `parts` of the vehicle at rest on `object`, or free. What it stands on at first did not
+    /// begin.
+    pub(super) fn place(&mut self, object: Option<u32>, parts: u32) {
         self.touches.clear();
-        self.touches.extend(object.map(|object| Touch { object, impact_speed_m_s: 0.0, seen: true }));
+        self.touches.extend(object.map(|object| Touch { object, parts, parts_seen: parts, seen: true }));
+        self.impact_speed_m_s = 0.0;
     }
 
     /// Takes in what a step found, with the vehicle's motion just before it.
@@ -76,25 +110,39 @@ impl Contacts {
         sightings: impl Iterator<Item = Sighting>,
         crash_speed_m_s: f64,
     ) {
-        self.touches.iter_mut().for_each(|touch| touch.seen = false);
+        self.touches.iter_mut().for_each(|touch| (touch.seen, touch.parts_seen) = (false, 0));
         for sighting in sightings {
             self.normal_impulse_W_N_s += sighting.towards_vehicle_W * sighting.impulse_N_s;
+            if sighting.pushes() {
+                let speed_m_s = approach_m_s(before, &sighting);
+                // A part that already touches may be slammed down as well.
+                self.crashed |= speed_m_s > crash_speed_m_s;
+                self.meet(&sighting, speed_m_s);
+            }
             let touching = self.touches.iter_mut().find(|touch| touch.object == sighting.object);
-            match touching {
-                Some(touch) => touch.seen |= sighting.gap_m < LIFT_M || sighting.impulse_N_s > 0.0,
-                None if sighting.impulse_N_s > 0.0 => {
-                    self.begin(approach_m_s(before, &sighting), &sighting, crash_speed_m_s)
-                }
-                None => {}
+            if let Some(touch) = touching {
+                touch.see(&sighting);
             }
         }
+        self.touches.iter_mut().for_each(|touch| touch.parts = touch.parts_seen);
         self.touches.retain(|touch| touch.seen);
+        if self.touches.is_empty() {
+            self.impact_speed_m_s = 0.0;
+        }
     }
 
-    fn begin(&mut self, impact_speed_m_s: f64, sighting: &Sighting, crash_speed_m_s: f64) {
-        self.began += 1;
-        self.crashed |= impact_speed_m_s > crash_speed_m_s;
-        self.touches.push(Touch { object: sighting.object, impact_speed_m_s, seen: true });
+    /// Notes what pushes a part of the vehicle, unless that part touched it before.
+    fn meet(&mut self, sighting: &Sighting, speed_m_s: f64) {
+        let touching = self.touches.iter().find(|touch| touch.object == sighting.object);
+        if touching.is_some_and(|touch| touch.parts & sighting.part != 0) {
+            return;
+        }
+        if touching.is_none() {
+            self.began += 1;
+            self.touches.push(Touch { object: sighting.object, parts: 0, parts_seen: 0, seen: true });
+        }
+        let fastest_m_s = if self.is_impact_new { self.impact_speed_m_s } else { 0.0 };
+        (self.impact_speed_m_s, self.is_impact_new) = (speed_m_s.max(fastest_m_s), true);
     }
 
     /// The report on a tick over which the contacts pushed with `force_W_N`.
@@ -102,7 +150,7 @@ impl Contacts {
         let first = self.touches.first();
         ContactReport {
             force_W_N: first.map_or(Vector3::zeros(), |_| *force_W_N),
-            impact_speed_m_s: first.map_or(0.0, |touch| touch.impact_speed_m_s),
+            impact_speed_m_s: self.impact_speed_m_s,
             #[allow(clippy::cast_possible_truncation, reason = "far fewer things than 2^32")]
             count: self.touches.len() as u32,
             object: first.map_or(0, |touch| touch.object),

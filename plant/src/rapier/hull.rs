@@ -1,11 +1,12 @@
 //! How much room a vehicle takes: a flat disc around its propellers, and four feet below.
 //!
 //! Vehicle files give the rotors' places, but neither propellers nor feet. Those of the Hummingbird are scaled
-//! with the length of the arms; for a Crazyflie 2.1 that gives propellers of 2.7 cm instead of 2.3 cm.
+//! with the length of the arms; for a Crazyflie 2.1 that gives propellers of 2.7 cm instead of 2.3 cm. Where an
+//! effect moves the centre of mass, the frame stays as it is: all of it moves the other way, seen from there.
 #![allow(non_snake_case, reason = "a trailing _B names the frame a vector is written in")]
 
+use crate::airframe::{Airframe, amid_rotors_B_m};
 use nalgebra::Vector3;
-use vehicles::Vehicle;
 
 /// Arm of the Hummingbird: half of the 0.34 m between motor axes (thesis Table 2.1).
 const HUMMINGBIRD_ARM_M: f64 = 0.17;
@@ -28,8 +29,8 @@ pub struct Hull {
     pub disc_radius_m: f64,
     /// Half of the disc's thickness.
     pub disc_half_m: f64,
-    /// Height of the disc's middle: the mean of the rotors'.
-    pub disc_z_m: f64,
+    /// The disc's middle: the mean of the rotors' places.
+    pub centre_B_m: Vector3<f64>,
     /// Centres of the feet.
     pub feet_B_m: [Vector3<f64>; 4],
     /// Radius of the feet.
@@ -37,19 +38,23 @@ pub struct Hull {
 }
 
 impl Hull {
-    /// The hull of `vehicle`.
+    /// The hull of the vehicle as it flies.
     #[must_use]
-    pub fn of(vehicle: &Vehicle) -> Self {
-        let arm_m = vehicle.rotors.iter().map(|rotor| rotor.position_m.xy().norm()).fold(0.0, f64::max);
+    pub fn of(airframe: &Airframe) -> Self {
+        let (rotors, shift_B_m) = (&airframe.vehicle().rotors, airframe.frame_shift_B_m());
+        let centre_B_m = amid_rotors_B_m(airframe.vehicle());
+        let arms_m = rotors.iter().map(|rotor| (rotor.position_m - centre_B_m).xy().norm());
+        let arm_m = arms_m.fold(0.0, f64::max);
         let scale = arm_m / HUMMINGBIRD_ARM_M;
         let (out_m, radius_m) = (HUMMINGBIRD_FOOT_OUT_M * scale, HUMMINGBIRD_FOOT_RADIUS_M * scale);
+        let middle_B_m = Vector3::new(centre_B_m.x, centre_B_m.y, shift_B_m.z);
         let foot_z_m = radius_m - HUMMINGBIRD_STAND_M * scale;
         let corners = [(out_m, out_m), (out_m, -out_m), (-out_m, -out_m), (-out_m, out_m)];
         Self {
             disc_radius_m: arm_m + HUMMINGBIRD_PROPELLER_M * scale,
             disc_half_m: HUMMINGBIRD_DISC_HALF_M * scale,
-            disc_z_m: vehicle.rotors.iter().map(|rotor| rotor.position_m.z).sum::<f64>() / 4.0,
-            feet_B_m: corners.map(|(x, y)| Vector3::new(x, y, foot_z_m)),
+            centre_B_m,
+            feet_B_m: corners.map(|(x, y)| middle_B_m + Vector3::new(x, y, foot_z_m)),
             foot_radius_m: radius_m,
         }
     }

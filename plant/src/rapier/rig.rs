@@ -24,6 +24,9 @@ use scenes::Rig;
 /// pull small. Tuned, no source.
 const LEVER_M: f64 = 0.1;
 
+/// A bearing that starts lower than this above the lower end of its travel is there: tuned, no source.
+const LOWER_END_M: f64 = 1e-6;
+
 /// Builds `rig` around `vehicle`; returns the slider where it heaves.
 pub(super) fn build(
     physics: &mut PhysicsWorld,
@@ -61,6 +64,14 @@ pub(super) fn hung(rig: &Rig, body: &RigidBody) -> (RigidBody, Vector3<f64>) {
     let wanted_m = body.position_W_m.z + arm_W_m.z - rig.bearing_W_m.z;
     let bearing_W_m = rig.bearing_W_m + Vector3::z() * wanted_m.clamp(0.0, rig.heave_m);
     (RigidBody { position_W_m: bearing_W_m - arm_W_m, ..*body }, bearing_W_m)
+}
+
+/// Whether the rig keeps a vehicle at rest where it is: always where it does not heave, and at the lower end of its
+/// travel unless `lift_N`, the force on the vehicle beyond its weight, raises what hangs there.
+pub(super) fn holds(rig: &Rig, body: &RigidBody, lift_N: f64, gravity_m_s2: f64) -> bool {
+    let raised_m = (hung(rig, body).1 - rig.bearing_W_m).z;
+    let needed_N = rig.moving_mass_kg * gravity_m_s2 + rig.slide_friction_N;
+    rig.heave_m == 0.0 || (raised_m < LOWER_END_M && lift_N < needed_N)
 }
 
 /// Puts the slider at `bearing_W_m`, moving with the vehicle's mount.

@@ -15,6 +15,7 @@ use nalgebra::{Unit, Vector3};
 use rapier3d_f64::dynamics::{FrictionModel, IntegrationParameters, RigidBodyBuilder, RigidBodyHandle};
 use rapier3d_f64::geometry::{Collider, ColliderBuilder, ColliderHandle, ContactPair};
 use rapier3d_f64::math::Vector;
+use rapier3d_f64::parry::query::intersection_test;
 use rapier3d_f64::pipeline::PhysicsWorld;
 use scenes::{Cuboid, Rig, Scene};
 use serde::{Deserialize, Serialize};
@@ -23,6 +24,8 @@ use vehicles::Vehicle;
 
 /// What a collider is, as `bus::messages::Contact` numbers it; the vehicle's own colliders are 0.
 pub(super) const GROUND: u32 = 1;
+/// The vehicle's feet, as [`Sighting::part`] numbers its colliders.
+pub(super) const FEET: u32 = 0b1111;
 const FIRST_BOX: u32 = 2;
 const FIRST_NEIGHBOUR: u32 = 1000;
 
@@ -47,7 +50,13 @@ struct Handles {
 
 impl World {
     /// The world of `scene` with `vehicle` in it.
-    pub(super) fn new(vehicle: &Vehicle, hull: &Hull, scene: &Scene, start: &RigidBody) -> Self {
+    pub(super) fn new(
+        vehicle: &Vehicle,
+        hull: &Hull,
+        scene: &Scene,
+        rig: Option<&Rig>,
+        start: &RigidBody,
+    ) -> Self {
         let mut physics = empty();
         let up = Unit::new_unchecked(Vector::Z);
         physics.insert_collider(solid(ColliderBuilder::halfspace(up), GROUND), None);
@@ -60,8 +69,8 @@ impl World {
             let ball = ColliderBuilder::ball(hull.foot_radius_m).translation(to_rapier(&foot_B_m));
             physics.insert_collider(solid(ball, 0), Some(owner))
         });
-        let disc = physics.insert_collider(disc(hull, 0), Some(owner));
-        let slider = scene.rig.as_ref().and_then(|rig| rig::build(&mut physics, owner, rig));
+        let disc = physics.insert_collider(disc(hull, &hull.centre_B_m, 0), Some(owner));
+        let slider = rig.and_then(|rig| rig::build(&mut physics, owner, rig));
         let hull = [first, second, third, fourth, disc];
         Self { physics, handles: Handles { vehicle: owner, hull, slider, neighbours: Vec::new() } }
     }
@@ -112,7 +121,8 @@ impl World {
     fn add_neighbour(&mut self, neighbour: &Neighbour, hull: &Hull) {
         let place = to_rapier(&neighbour.position_W_m);
         let moved = RigidBodyBuilder::kinematic_position_based().translation(place).can_sleep(false);
-        let shape = disc(hull, FIRST_NEIGHBOUR + neighbour.number);
+        // Their centres of mass are not this one's.
+        let shape = disc(hull, &Vector3::zeros(), FIRST_NEIGHBOUR + neighbour.number);
         self.handles.neighbours.push(self.physics.insert(moved, shape).0);
     }
 
@@ -169,13 +179,31 @@ impl World {
             })
     }
 
-    /// Everything near the vehicle, as the last step found it.
-    pub(super) fn sightings(&self) -> impl Iterator<Item = Sighting> + '_ {
-        let pairs = |own: &ColliderHandle| self.physics.narrow_phase.contact_pairs_with(*own);
-        self.handles.hull.iter().flat_map(pairs).filter_map(|pair| self.sighting(pair))
+    /// The number of the first of the scene's boxes that the vehicle, placed as `body`, is inside of.
+    pub(super) fn box_around(&self, body: &RigidBody) -> Option<usize> {
+        let pose = body::pose(body);
+        let colliders = &self.physics.colliders;
+        let parts = self.handles.hull.map(|handle| &colliders[handle]);
+        let meets = |shape: &Collider, part: &Collider| {
+            let place = part.position_wrt_parent().map_or(pose, |within| pose * *within);
+            let found = intersection_test(&place, part.shape(), shape.position(), shape.shape());
+            found.is_ok_and(|found| found.intersecting)
+        };
+        let boxes = colliders.iter().map(|(_, collider)| collider).filter(|it| it.parent().is_none());
+        let mut around = boxes.filter(|shape| parts.iter().any(|part| meets(shape, part)));
+        around.find_map(|shape| usize::try_from(shape.user_data.checked_sub(FIRST_BOX.into())?).ok())
     }
 
-    fn sighting(&self, pair: &ContactPair) -> Option<Sighting> {
+    /// Everything near the vehicle, as the last step found it.
+    pub(super) fn sightings(&self) -> impl Iterator<Item = Sighting> + '_ {
+        let own_parts = self.handles.hull.iter().enumerate();
+        own_parts.flat_map(move |(place, own)| {
+            let pairs = self.physics.narrow_phase.contact_pairs_with(*own);
+            pairs.filter_map(move |pair| self.sighting(pair, 1 << place))
+        })
+    }
+
+    fn sighting(&self, pair: &ContactPair, part: u32) -> Option<Sighting> {
         let (manifold, contact) = pair.find_deepest_contact()?;
         let (first, second) =
             (&self.physics.colliders[pair.collider1], &self.physics.colliders[pair.collider2]);
@@ -186,6 +214,7 @@ impl World {
         Some(Sighting {
             #[allow(clippy::cast_possible_truncation, reason = "written as u32 by `numbered`")]
             object: other.user_data as u32,
+            part,
             point_W_m: from_rapier(first.position().transform_point(contact.local_p1)),
             towards_vehicle_W: if own_is_first { -outwards_W } else { outwards_W },
             gap_m: contact.dist,
@@ -234,7 +263,7 @@ fn wall(cuboid: &Cuboid, object: u32) -> ColliderBuilder {
 }
 
 /// Rapier's cylinders lie along y.
-fn disc(hull: &Hull, object: u32) -> ColliderBuilder {
+fn disc(hull: &Hull, centre_m: &Vector3<f64>, object: u32) -> ColliderBuilder {
     let shape = ColliderBuilder::cylinder(hull.disc_half_m, hull.disc_radius_m);
-    solid(shape.translation(Vector::Z * hull.disc_z_m).rotation(Vector::X * FRAC_PI_2), object)
+    solid(shape.translation(to_rapier(centre_m)).rotation(Vector::X * FRAC_PI_2), object)
 }
