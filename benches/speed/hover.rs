@@ -23,13 +23,14 @@ pub fn report() -> Result<()> {
         floor.push(alone);
         ratio.push(alone / rate);
     }
-    println!("  seven processes, kticks/s   {}", Spread::of(bus));
+    println!("  eight processes, kticks/s   {}", Spread::of(bus));
     println!("  one process, kticks/s       {}", Spread::of(floor));
     println!("  one process / bus           {}", Spread::of(ratio));
     Ok(())
 }
 
-/// The same plant, IMU, estimator, controller and pilot called one after the other, nothing recorded.
+/// The same plant, IMU, filter, controller and pilot called one after the other, nothing recorded; the pose of motion
+/// capture is the true one.
 fn in_process_ticks_per_s() -> Result<f64> {
     let mut chain = chain::Chain::new()?;
     let ticks = (SECONDS * 1000.0) as u64;
@@ -49,9 +50,11 @@ mod chain {
     use controllers::pid_gains::PidGains;
     use controllers::pid_law::{Measurement, PidLaw, PidState, PidVehicle};
     use controllers::set_points::{Schedule, SetPoint, SetPointEntry};
-    use nalgebra::Vector3;
+    use nalgebra::{Quaternion, UnitQuaternion, Vector3};
     use plant::{NewtonEuler, RigidBody, State};
-    use sensors::complementary::{Complementary, ComplementaryParams, ComplementaryState};
+    use sensors::ekf::filter::{Ekf, EkfState};
+    use sensors::ekf::history::{Measurement as Fix, Newest, Reading, Sensor};
+    use sensors::ekf::params::EkfParams;
     use sensors::imu_model::{ImuModel, ImuParams, ImuReading, ImuState};
     use std::path::Path;
     use vehicles::Vehicle;
@@ -63,8 +66,9 @@ mod chain {
         state: State,
         imu: ImuModel,
         imu_state: ImuState,
-        filter: Complementary,
-        filter_state: ComplementaryState,
+        filter: Ekf,
+        filter_state: Box<EkfState>,
+        newest: Newest,
         law: PidLaw,
         law_state: PidState,
         allocation: Allocation,
@@ -97,13 +101,16 @@ mod chain {
             let hover = vehicle.hover_command();
             let plant = NewtonEuler::new(vehicle, 1);
             let state = plant.start(RigidBody::level_at(Vector3::new(0.0, 0.0, 1.0)), hover);
+            let params = EkfParams { initial_position_m: Some([0.0, 0.0, 1.0]), ..EkfParams::default() };
+            let filter = Ekf::new(params, DT_S)?;
             Ok(Self {
                 state,
+                filter_state: Box::new(filter.initial_state()),
+                filter,
+                newest: [None; 4],
                 plant,
                 imu_state: imu.initial_state(1, "imu"),
                 imu,
-                filter: Complementary::new(ComplementaryParams::default(), DT_S)?,
-                filter_state: ComplementaryState::default(),
                 law,
                 law_state: PidState::default(),
                 allocation,
@@ -121,18 +128,35 @@ mod chain {
                 angular_velocity_B_rad_s: self.state.body.angular_velocity_B_rad_s,
             };
             let reading = self.imu.read(&mut self.imu_state, &truth);
-            let estimate = self.filter.step(&mut self.filter_state, &reading);
-            let measured = Measurement {
-                altitude_m: self.altitude_m(),
-                climb_rate_m_s: self.state.body.velocity_W_m_s.z,
-                roll_rad: estimate.roll_rad,
-                pitch_rad: estimate.pitch_rad,
-                yaw_rad: estimate.yaw_rad,
-                angular_velocity_B_rad_s: estimate.angular_velocity_B_rad_s,
-            };
+            let measured = self.estimate(tick * 1_000_000, &reading);
             let wrench = self.law.step(&mut self.law_state, &self.schedule.at(tick), &measured);
             let speeds = self.allocation.allocate(&wrench).speeds_rad_s;
             self.command = speeds.map(|speed| self.plant.vehicle().command.command(speed));
+        }
+
+        fn estimate(&mut self, time_ns: u64, reading: &ImuReading) -> Measurement {
+            if time_ns.is_multiple_of(10_000_000) {
+                let body = &self.state.body;
+                let pose: Vec<f64> =
+                    body.position_W_m.iter().chain(body.attitude_WB.coords.iter()).copied().collect();
+                self.newest[Sensor::Mocap.index()] = Some(Some(Fix::new(Sensor::Mocap, time_ns, &pose)));
+            }
+            let specific_force = <[f64; 3]>::from(reading.specific_force_B_m_s2).into();
+            let angular_velocity = <[f64; 3]>::from(reading.angular_velocity_B_rad_s).into();
+            let reading = Reading { time_ns, specific_force, angular_velocity };
+            self.filter.step(&mut self.filter_state, &reading, &self.newest);
+            let motion = self.filter_state.motion();
+            let q = motion.attitude;
+            let attitude = UnitQuaternion::new_normalize(Quaternion::new(q.w, q.x, q.y, q.z));
+            let (roll_rad, pitch_rad, yaw_rad) = attitude.euler_angles();
+            Measurement {
+                altitude_m: motion.position.z,
+                climb_rate_m_s: motion.velocity.z,
+                roll_rad,
+                pitch_rad,
+                yaw_rad,
+                angular_velocity_B_rad_s: <[f64; 3]>::from(reading.angular_velocity).into(),
+            }
         }
 
         pub fn altitude_m(&self) -> f64 {

@@ -9,9 +9,11 @@ mod hop;
 mod hover;
 mod idle;
 mod payload;
+mod physics;
 mod profile;
 mod relay;
 mod report;
+mod scenarios;
 mod start;
 mod swap;
 mod vehicles;
@@ -35,7 +37,7 @@ fn main() -> Result<()> {
 type Part = fn() -> Result<()>;
 
 fn parts(names: &[String]) -> Result<()> {
-    let all: [(&str, Part); 8] = [
+    let all: [(&str, Part); 10] = [
         ("hop", hop::report),
         ("hover", hover::report),
         ("payload", payload::report),
@@ -44,6 +46,8 @@ fn parts(names: &[String]) -> Result<()> {
         ("vehicles", vehicles::report),
         ("start", start::report),
         ("swap", swap::report),
+        ("physics", physics::report),
+        ("scenarios", scenarios::report),
     ];
     if let Some(unknown) = names.iter().find(|name| all.iter().all(|(part, _)| part != name)) {
         let known = all.map(|(part, _)| part).join(", ");
