@@ -79,6 +79,17 @@ pub(crate) fn finite(key: &str, value: f64) -> Result<(), String> {
     if value.is_finite() { Ok(()) } else { Err(format!("`{key}` must be a finite number, found {value}")) }
 }
 
+/// Refuses a parameter that is not a finite number above zero.
+///
+/// # Errors
+/// It is not; the text names its key.
+pub(crate) fn positive(key: &str, value: f64, unit: &str) -> Result<(), String> {
+    if value.is_finite() && value > 0.0 {
+        return Ok(());
+    }
+    Err(format!("`{key}` must be a finite number above 0 {unit}, found {value}"))
+}
+
 /// Refuses a parameter that is not above zero and at most `max`.
 ///
 /// # Errors
@@ -162,7 +173,8 @@ pub struct ControllerState {
     /// Torque that was demanded last.
     #[field(unit = "N*m", frame = "body")]
     pub torque: [f64; 3],
-    /// What the integrators of altitude and attitude ask for; every law goes on from another's.
+    /// What the integrators of altitude and attitude ask for; every law goes on from another's. Zero under `lqr` and
+    /// `geometric`, whose observer holds the lift in `position_integral`.
     pub integrals: PidState,
     /// Acceleration that the integrators of position or velocity ask for; of laws by range finders, whose world
     /// is the room, along the heading's axes.

@@ -8,11 +8,11 @@
 #![allow(non_snake_case, reason = "a trailing _W names the frame a vector is written in")]
 
 use crate::controller::{ControllerState, Motion};
-use crate::gains_file::limit;
+use crate::gains_file::{bandwidth, limit};
 use nalgebra::Vector3;
 use vehicles::VehicleError;
 use vehicles::reader::Section;
-use vehicles::units::{ACCELERATION, SPEED};
+use vehicles::units::ACCELERATION;
 
 /// The observer's one number and its limit.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -39,7 +39,7 @@ impl Observer {
     /// A number is missing or cannot be meant.
     pub fn read(section: &Section<'_, '_>) -> Result<Self, VehicleError> {
         let observer = Self {
-            bandwidth_rad_s: limit(section, "bandwidth", SPEED)?,
+            bandwidth_rad_s: bandwidth(section, "bandwidth")?,
             acceleration_max_m_s2: limit(section, "acceleration_max", ACCELERATION)?,
         };
         section.finish()?;

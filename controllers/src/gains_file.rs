@@ -59,6 +59,16 @@ pub(crate) fn limit_below(
     Ok(chosen.require(section.doc, holds, expected)?.si)
 }
 
+/// Bandwidths stay below this, rad/s. Tuned, no source: a fifth of 1 kHz, at which an observer or a lag that is stepped
+/// once a tick still behaves as the continuous one; from some 1000 rad/s on it diverges.
+const BANDWIDTH_MAX_RAD_S: f64 = 200.0;
+
+/// A bandwidth that steps of 1 ms resolve.
+pub(crate) fn bandwidth(section: &Section, name: &'static str) -> Result<f64, VehicleError> {
+    let expected = "a bandwidth above 0 and below 200 rad/s, up to which steps of 1 ms resolve it";
+    limit_below(section, name, vehicles::units::SPEED, BANDWIDTH_MAX_RAD_S, expected)
+}
+
 /// A tilt that the altitude loop can make up for.
 pub(crate) fn tilt(section: &Section, name: &'static str) -> Result<f64, VehicleError> {
     let expected = "an angle above 0 and below 60 degrees, up to which the thrust makes up for a tilt";

@@ -10,12 +10,12 @@
 //! | 10 % slower | 27° | 3.7 | 2.22 |
 
 use crate::disturbance::Observer;
-use crate::gains_file::{self, gain, limit};
+use crate::gains_file::{self, bandwidth, gain, limit};
 use crate::motor_lag::LagTarget;
 use std::path::Path;
 use vehicles::VehicleError;
 use vehicles::reader::Section;
-use vehicles::units::{ACCELERATION, PER_SECOND, PER_SECOND_2, PURE_NUMBER, SPEED};
+use vehicles::units::{ACCELERATION, PER_SECOND, PER_SECOND_2, PURE_NUMBER};
 
 /// The gains that serve where the manifest names no file.
 const BUILT_IN: &str = include_str!("../gains/geometric.toml");
@@ -79,7 +79,7 @@ fn read(root: &Section<'_, '_>) -> Result<GeometricGains, VehicleError> {
         yaw_proportional_1_s2: gain(&yaw, "proportional", PER_SECOND_2)?,
         yaw_derivative_1_s: gain(&yaw, "derivative", PER_SECOND)?,
         motor: LagTarget {
-            natural_frequency_rad_s: limit(&motor, "natural_frequency", SPEED)?,
+            natural_frequency_rad_s: bandwidth(&motor, "natural_frequency")?,
             damping_ratio: limit(&motor, "damping_ratio", PURE_NUMBER)?,
         },
         observer: Observer::read(&root.section("disturbance")?)?,
@@ -105,6 +105,8 @@ mod tests {
         let cases = [
             ("value = 9.0", "value = -9.0", "`position.proportional`: expected a number of 0 or above"),
             ("value = 50.0, unit = \"rad/s\"", "value = 0, unit = \"rad/s\"", "`motor.natural_frequency`"),
+            ("value = 50.0, unit = \"rad/s\"", "value = 5000, unit = \"rad/s\"", "below 200 rad/s"),
+            ("value = 6.0, unit = \"rad/s\"", "value = 5000, unit = \"rad/s\"", "`disturbance.bandwidth`"),
             ("linear = ", "quadratic = 1\nlinear = ", "unknown key `drag.quadratic`"),
         ];
         for (from, to, expected) in cases {

@@ -25,7 +25,7 @@ use crate::controller::{Airframe, Controller, ControllerState, Demand, Motion, T
 use crate::course::Point;
 use crate::disturbance::Disturbance;
 use crate::flatness::{self, Moving, Target};
-use crate::foresight;
+use crate::foresight::Foresight;
 use crate::geometric_gains::GeometricGains;
 use crate::motor_lag::{Made, MotorLag};
 use crate::set_points::SetPoint;
@@ -71,6 +71,15 @@ impl GeometricLaw {
             allocation: airframe.allocation,
             lag: MotorLag::new(vehicle.motor, period_s),
             period_s,
+        }
+    }
+
+    fn foresight(&self) -> Foresight<'_> {
+        Foresight {
+            allocation: &self.allocation,
+            lag: &self.lag,
+            weight_N: self.mass_kg * self.gravity_m_s2,
+            disturbance_max_m_s2: self.gains.observer.acceleration_max_m_s2,
         }
     }
 
@@ -162,11 +171,11 @@ impl Controller for GeometricLaw {
     }
 
     fn fresh(&self, told: &Told<'_>) -> ControllerState {
-        foresight::fresh(self.mass_kg * self.gravity_m_s2, told)
+        self.foresight().fresh(told)
     }
 
     fn tracking(&self, memory: &ControllerState, wrench: &Wrench, told: &Told<'_>) -> ControllerState {
-        foresight::tracking::<Self>(memory, wrench, told)
+        self.foresight().tracking::<Self>(memory, wrench, told)
     }
 }
 

@@ -91,6 +91,7 @@ mod tests {
         let cases = [
             ("value = 0.15, unit = \"m\"", "value = 0.0, unit = \"m\"", "`states.position`"),
             ("unit = \"N*m\"", "unit = \"N\"", "a unit of torque: \"N*m\""),
+            ("bandwidth = { value = 4.0", "bandwidth = { value = 5000", "`disturbance.bandwidth`"),
             ("[limits]", "[limits]\ntilt = 1", "unknown key `limits.tilt`"),
         ];
         for (from, to, expected) in cases {

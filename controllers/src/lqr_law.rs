@@ -15,7 +15,7 @@ use crate::controller::{Airframe, Controller, ControllerState, Demand, Motion, T
 use crate::course::Point;
 use crate::disturbance::Disturbance;
 use crate::flatness::{self, Moving, Target};
-use crate::foresight;
+use crate::foresight::Foresight;
 use crate::lqr_gains::LqrGains;
 use crate::lqr_model::{self, INPUTS, MADE, MADE_RATE, RATE, ROTATION, STATES, VELOCITY};
 use crate::motor_lag::{Made, MotorLag};
@@ -75,6 +75,15 @@ impl LqrLaw {
     #[must_use]
     pub fn gain(&self) -> &SMatrix<f64, INPUTS, STATES> {
         &self.gain
+    }
+
+    fn foresight(&self) -> Foresight<'_> {
+        Foresight {
+            allocation: &self.allocation,
+            lag: &self.lag,
+            weight_N: self.mass_kg * self.gravity_m_s2,
+            disturbance_max_m_s2: self.gains.observer.acceleration_max_m_s2,
+        }
     }
 
     fn needed(&self, disturbance: &Disturbance, reference: &Point) -> Needed {
@@ -159,10 +168,10 @@ impl Controller for LqrLaw {
     }
 
     fn fresh(&self, told: &Told<'_>) -> ControllerState {
-        foresight::fresh(self.mass_kg * self.gravity_m_s2, told)
+        self.foresight().fresh(told)
     }
 
     fn tracking(&self, memory: &ControllerState, wrench: &Wrench, told: &Told<'_>) -> ControllerState {
-        foresight::tracking::<Self>(memory, wrench, told)
+        self.foresight().tracking::<Self>(memory, wrench, told)
     }
 }

@@ -1,6 +1,6 @@
 //! The wall-follow controller node: laps along the walls of a room.
 
-use crate::controller::{self, Airframe, finite, positive_up_to};
+use crate::controller::{self, Airframe, finite, positive, positive_up_to};
 use crate::room::Room;
 use crate::velocity_law::VelocityLoop;
 use crate::wall_follow_law::{Mode, Shared, WallFollowGains, WallFollowLaw};
@@ -88,7 +88,7 @@ impl Parameters {
     }
 
     fn check(&self) -> Result<(), String> {
-        finite("altitude_m", self.altitude_m)?;
+        positive("altitude_m", self.altitude_m, "m")?;
         finite("heading_rad", self.heading_rad)?;
         positive_up_to("distance_m", self.distance_m, DISTANCE_MAX_M, "m")?;
         let speed_m_s = self.speed_m_s.unwrap_or(CONSTANT_SPEED_M_S);

@@ -1,6 +1,6 @@
 //! The wall-stop controller node: flies along the heading and stops before the wall ahead.
 
-use crate::controller::{self, Airframe, finite, positive_up_to};
+use crate::controller::{self, Airframe, finite, positive, positive_up_to};
 use crate::velocity_law::VelocityLoop;
 use crate::wall_stop_law::{WallStopGains, WallStopLaw};
 use bus::kind::{Inputs, NodeKind, PortSpec, read_parameters};
@@ -63,7 +63,7 @@ const DISTANCE_MAX_M: f64 = 5.0;
 const SPEED_MAX_M_S: f64 = 3.0;
 
 fn build(parameters: &Parameters, period_s: f64) -> Result<(WallStopLaw, Airframe), String> {
-    finite("altitude_m", parameters.altitude_m)?;
+    positive("altitude_m", parameters.altitude_m, "m")?;
     finite("heading_rad", parameters.heading_rad)?;
     positive_up_to("cruise_speed_m_s", parameters.cruise_speed_m_s, SPEED_MAX_M_S, "m/s")?;
     positive_up_to("distance_m", parameters.distance_m, DISTANCE_MAX_M, "m")?;

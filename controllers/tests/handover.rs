@@ -6,10 +6,15 @@
 
 mod flight;
 
+use bus::messages::Vector3 as Point;
 use controllers::allocation::Wrench;
 use controllers::cascade_gains::CascadeGains;
 use controllers::cascade_law::CascadeLaw;
-use controllers::controller::Demand;
+use controllers::controller::{Controller, ControllerState, Demand};
+use controllers::geometric_gains::GeometricGains;
+use controllers::geometric_law::GeometricLaw;
+use controllers::lqr_gains::LqrGains;
+use controllers::lqr_law::LqrLaw;
 use controllers::pid_gains::PidGains;
 use controllers::pid_law::PidLaw;
 use controllers::velocity_law::{Course, LoopsGains, VelocityLaw, VelocityLoop};
@@ -146,16 +151,67 @@ fn a_take_over_amid_a_doublet_does_not_jump_either_and_fades_out() {
     assert!((roll_rad - 0.17).abs() < 0.02, "the command is followed: {roll_rad}");
 }
 
+fn lqr() -> LqrLaw {
+    LqrLaw::new(LqrGains::load(None).unwrap(), &airframe(), PERIOD_S).unwrap()
+}
+
+fn geometric() -> GeometricLaw {
+    GeometricLaw::new(GeometricGains::load(None).unwrap(), &airframe(), PERIOD_S)
+}
+
+/// `after` stays near and comes to hover again, although `before` left a memory in which `go_mad` was at work.
+fn assert_outlives<A: Controller, B: Controller>(
+    before: &A,
+    after: &B,
+    go_mad: impl Fn(&mut ControllerState),
+) {
+    let mut flight = Loop::new(Vector3::new(2.0, 0.0, 1.5), Senses::new(1, ROOM, NOISY));
+    flight.reference.position = Point { x: 2.0, y: 0.0, z: 1.5 };
+    for _ in 0..2000 {
+        flight.step(before);
+    }
+    go_mad(&mut flight.memory);
+    let (mut height_error_m, mut tilt_rad) = (0.0_f64, 0.0_f64);
+    for _ in 0..3000 {
+        flight.step(after);
+        let (roll_rad, pitch_rad, _) = flight.state.body.attitude_WB.euler_angles();
+        tilt_rad = tilt_rad.max(roll_rad.hypot(pitch_rad));
+        height_error_m = height_error_m.max((flight.position().z - 1.5).abs());
+    }
+    let name = format!("law {} after {}", B::LAW, A::LAW);
+    println!("{name}: {height_error_m:.3} m and {tilt_rad:.3} rad at most");
+    assert!(height_error_m < 0.3 && tilt_rad < 0.6, "{name}: {height_error_m} m, {tilt_rad} rad");
+    let (roll_rad, pitch_rad, _) = flight.state.body.attitude_WB.euler_angles();
+    let is_level = roll_rad.hypot(pitch_rad) < 0.05 && (flight.position().z - 1.5).abs() < 0.05;
+    assert!(is_level, "{name} does not hover again: {}", flight.position());
+}
+
 #[test]
 fn a_predecessor_gone_mad_is_not_gone_on_from() {
     let [(_, pid), (_, cascade), ..] = laws();
-    for torque_N_m in [f64::NAN, 1e9] {
-        let (mut flight, _) = hovering(&pid);
-        (flight.memory.thrust, flight.memory.torque) = (torque_N_m, [torque_N_m; 3]);
-        for _ in 0..3000 {
-            cascade.step(&mut flight);
-        }
-        let (roll_rad, pitch_rad, _) = flight.state.body.attitude_WB.euler_angles();
-        assert!(roll_rad.hypot(pitch_rad) < 0.05 && (flight.position().z - 1.5).abs() < 0.2);
+    let (Law::Pid(pid), Law::Cascade(cascade)) = (pid, cascade) else { unreachable!("as `laws` says") };
+    for mad in [f64::NAN, f64::INFINITY, 1e9, -1e9] {
+        let go_mad = |memory: &mut ControllerState| {
+            (memory.thrust, memory.torque) = (mad, [mad; 3]);
+        };
+        assert_outlives(&pid, &cascade, go_mad);
+        assert_outlives(&pid, &lqr(), go_mad);
+        assert_outlives(&pid, &geometric(), go_mad);
+    }
+    assert_outlives(&pid, &lqr(), |memory| memory.integrals.altitude_m_s2 = f64::NAN);
+}
+
+#[test]
+fn what_a_tracking_law_gone_mad_foresaw_is_not_gone_on_from() {
+    for mad in [f64::NAN, f64::INFINITY, 1e9, -1e9] {
+        let go_mad = |memory: &mut ControllerState| {
+            (memory.thrust_made, memory.thrust_made_rate) = (mad, mad);
+            (memory.torque_made, memory.torque_made_rate) = ([mad; 3], [mad; 3]);
+            memory.velocity_foreseen = [mad; 3];
+        };
+        assert_outlives(&lqr(), &geometric(), go_mad);
+        assert_outlives(&geometric(), &lqr(), go_mad);
+        assert_outlives(&geometric(), &lqr(), |memory| memory.position_integral = [mad; 3]);
+        assert_outlives(&lqr(), &geometric(), |memory| (memory.thrust, memory.torque) = (mad, [mad; 3]));
     }
 }

@@ -231,8 +231,9 @@ fn an_lqr_without_a_solution_is_refused_with_a_reason() {
 fn swap<A: Controller, B: Controller>(before: &A, after: &B) -> (Vec<Wrench>, f64) {
     let course = common::course_from(0.0);
     let mut flight = Loop::new(Craft { seed: None, ..Craft::dragged(0) });
-    // Off the reference, so that the laws do not all ask for the same.
-    flight.state.body.position_W_m += Vector3::new(0.02, -0.01, 0.02);
+    // Off the reference, so that the laws do not all ask for the same, and by less than what a successor may not go on
+    // from: `geometric` answers 2 cm with 10 rad/s².
+    flight.state.body.position_W_m += Vector3::new(0.015, -0.01, 0.02);
     flight.fly(before, &course, 0.0, 0.3);
     let mut wrenches = vec![flight.demand];
     for _ in 0..500 {
@@ -271,6 +272,33 @@ fn a_swap_to_or_from_the_tracking_laws_goes_on_from_the_wrench_that_was_asked_fo
     assert_smooth("geometric to pid", &geometric, &pid, 0.5);
     assert_smooth("lqr to cascade", &lqr, &cascade, 0.5);
     assert_smooth("geometric to cascade", &geometric, &cascade, 0.5);
+}
+
+/// The greatest error of height under `law` in 3 s.
+fn height_error_m<C: Controller>(flight: &mut Loop, law: &C) -> f64 {
+    let course = common::course_from(0.0);
+    let off_m = (0..3000).map(|_| {
+        flight.step(law, &course);
+        (flight.state.body.position_W_m.z - 1.0).abs()
+    });
+    off_m.fold(0.0, f64::max)
+}
+
+/// Counted twice, the lift of a vehicle 5 % heavier than its file would raise it by 4 cm.
+#[test]
+fn the_lift_that_a_heavier_vehicle_needs_is_handed_to_a_tracking_law_and_back_once() {
+    let pid = PidLaw { gains: PidGains::default(), vehicle: airframe().known(), period_s: PERIOD_S };
+    let heavier = Vehicle { mass_kg: 1.05 * vehicle().mass_kg, ..vehicle() };
+    let mut flight = Loop::new(Craft { vehicle: heavier, ..Craft::ideal() });
+    flight.fly(&pid, &common::course_from(0.0), 0.0, 20.0);
+    for _ in 0..2 {
+        let there_m = height_error_m(&mut flight, &geometric());
+        let back_m = height_error_m(&mut flight, &pid);
+        let lift_m_s2 = flight.memory.integrals.altitude_m_s2;
+        println!("to geometric {there_m:.4} m, back to pid {back_m:.4} m, lift {lift_m_s2:.3} m/s^2");
+        assert!(there_m < 0.005 && back_m < 0.005, "{there_m} m, {back_m} m");
+        assert!((lift_m_s2 - 0.05 * 9.81).abs() < 0.05, "{lift_m_s2} m/s^2");
+    }
 }
 
 #[test]

@@ -2,14 +2,14 @@
 
 /// A parameter whose value no sensor can have.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[error("parameter `{key}` must be {expected}, found {found}")]
+#[error("parameter `{key}` must be {expected}, found {}", .found.map_or("nothing".to_owned(), |value| value.to_string()))]
 pub struct ParameterError {
     /// The key as it is written in the manifest.
     pub key: &'static str,
     /// The values that are allowed.
     pub expected: &'static str,
-    /// The value that was given.
-    pub found: f64,
+    /// The value that was given; none where it is missing.
+    pub found: Option<f64>,
 }
 
 /// Passes `value` if it is finite and not negative.
@@ -44,5 +44,5 @@ pub(crate) fn check(
     good: bool,
     expected: &'static str,
 ) -> Result<(), ParameterError> {
-    if good { Ok(()) } else { Err(ParameterError { key, expected, found }) }
+    if good { Ok(()) } else { Err(ParameterError { key, expected, found: Some(found) }) }
 }

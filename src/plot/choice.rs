@@ -20,11 +20,15 @@ pub enum Role {
 }
 
 impl Role {
-    /// The role of what a topic of type `type_name` carries.
-    fn of(type_name: &str) -> Self {
+    /// The role of `field` in what a topic of type `type_name` carries.
+    fn of(type_name: &str, field: &str) -> Self {
+        let name = field.split('[').next().unwrap_or_default();
         match own_name(type_name) {
-            "SetPoint" | "ControlStatus" | "Reference" => Self::Asked,
-            "MeasuredState" | "Imu" | "Gps" | "Mocap" | "Barometer" | "Magnetometer" => Self::Measured,
+            "SetPoint" | "Reference" => Self::Asked,
+            // The rest of it is what the controller does.
+            "ControlStatus" if name.ends_with("set_point") => Self::Asked,
+            "MeasuredState" | "Imu" | "Gps" | "Mocap" | "Barometer" | "Magnetometer" | "Ranges"
+            | "Battery" => Self::Measured,
             name if name.ends_with("Estimate") => Self::Estimated,
             _ => Self::Flown,
         }
@@ -285,7 +289,7 @@ fn default_asks(figure: &Figure, topics: &[(&str, &str)]) -> Vec<Ask> {
 }
 
 fn ask(topic: &str, field: &str, type_name: &str) -> Ask {
-    Ask { topic: topic.to_owned(), field: field.to_owned(), role: Role::of(type_name) }
+    Ask { topic: topic.to_owned(), field: field.to_owned(), role: Role::of(type_name, field) }
 }
 
 fn trails(recording: &Recording, is_shown: impl Fn(&str) -> bool) -> Vec<Ask> {
@@ -315,4 +319,26 @@ fn named(recording: &Recording, plot: &str) -> Result<Wanted> {
         last_topic = Some(topic);
     }
     Ok(Wanted { title: "", label: "", asks })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Role;
+
+    #[test]
+    fn of_a_controllers_status_only_set_points_are_asked_for_and_every_sensor_measures() {
+        let cases = [
+            ("ControlStatus", "attitude_set_point[1]", Role::Asked),
+            ("ControlStatus", "altitude_set_point", Role::Asked),
+            ("ControlStatus", "thrust_error", Role::Flown),
+            ("SetPoint", "roll", Role::Asked),
+            ("Ranges", "distance[0]", Role::Measured),
+            ("Battery", "voltage", Role::Measured),
+            ("WallEstimate", "distance[0]", Role::Estimated),
+            ("PlantState", "position.z", Role::Flown),
+        ];
+        for (name, field, role) in cases {
+            assert_eq!(Role::of(&format!("hummingbus_msgs/msg/{name}"), field), role, "{name} {field}");
+        }
+    }
 }

@@ -168,7 +168,8 @@ fn name(curves: &mut [Curve]) {
 
 /// The axis, angle or rotor that a field is of: what flies and what was asked for share the colour.
 fn component(field: &str) -> Option<usize> {
-    match short(field) {
+    let short = short(field);
+    match short.strip_suffix("_set_point").unwrap_or(short) {
         "x" | "roll" => Some(0),
         "y" | "pitch" => Some(1),
         "z" | "yaw" | "altitude" => Some(2),
@@ -222,5 +223,29 @@ fn trail_name(vehicle: &str, role: Role) -> String {
     match (vehicle, role) {
         ("", Role::Flown) => "flown".to_owned(),
         (vehicle, role) => format!("{vehicle}{}", role.suffix()).trim_start().to_owned(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Curve, colour, name};
+    use crate::plot::choice::Role;
+
+    fn curve(topic: &str, field: &str, role: Role) -> Curve {
+        let (topic, field) = (topic.to_owned(), field.to_owned());
+        Curve { name: String::new(), topic, field, role, colour: "", samples: 0, points: Vec::new() }
+    }
+
+    #[test]
+    fn an_altitude_that_was_asked_for_is_named_and_coloured_as_the_z_that_was_flown() {
+        let mut curves = ["position.x", "position.y", "position.z"]
+            .map(|f| curve("/plant/state", f, Role::Flown))
+            .to_vec();
+        curves.push(curve("/controller/status", "altitude_set_point", Role::Asked));
+        name(&mut curves);
+        colour(&mut curves);
+        assert_eq!(curves[3].name, "z set point");
+        assert_eq!(curves[3].colour, curves[2].colour);
+        assert_ne!(curves[3].colour, curves[0].colour);
     }
 }

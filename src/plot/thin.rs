@@ -1,7 +1,8 @@
 //! Long curves as few points, made while a recording is read: memory does not grow with its length.
 
-/// A curve that keeps, of each of its bins, the first, the lowest, the highest and the last sample. Drawn over no
-/// more pixels than it has bins, it is the same line as the whole curve, extremes included.
+/// A curve that keeps, of each of its bins, the first, the lowest, the highest and the last sample, and one that is no
+/// number, where the line breaks off. Drawn over no more pixels than it has bins, it is the same line as the whole
+/// curve, extremes and gaps included.
 #[derive(Clone, Debug)]
 pub struct Curve {
     bins: Vec<Bin>,
@@ -18,11 +19,12 @@ struct Bin {
     first: Sample,
     lowest: Sample,
     highest: Sample,
+    gap: Option<Sample>,
     last: Sample,
 }
 
 impl Curve {
-    /// A curve of up to `bins_max` bins, and so four times as many points.
+    /// A curve of up to `bins_max` bins, and so five times as many points.
     pub fn new(bins_max: usize) -> Self {
         Self { bins: Vec::new(), bins_max: bins_max.max(2), bin_samples: 1, samples: 0 }
     }
@@ -58,24 +60,35 @@ impl Curve {
 
 impl Bin {
     fn of(sample: Sample) -> Self {
-        Self { first: sample, lowest: sample, highest: sample, last: sample }
+        let gap = sample.1.is_nan().then_some(sample);
+        Self { first: sample, lowest: sample, highest: sample, gap, last: sample }
     }
 
-    /// One bin for one or two that follow each other.
+    /// One bin for one or two that follow each other. A number is lower and higher than what is none.
     fn merged(bins: &[Self]) -> Self {
         let (first, last) = (bins[0], bins[bins.len() - 1]);
         Self {
             first: first.first,
-            lowest: if last.lowest.1 < first.lowest.1 { last.lowest } else { first.lowest },
-            highest: if last.highest.1 > first.highest.1 { last.highest } else { first.highest },
+            lowest: if first.lowest.1.min(last.lowest.1) == first.lowest.1 {
+                first.lowest
+            } else {
+                last.lowest
+            },
+            highest: if first.highest.1.max(last.highest.1) == first.highest.1 {
+                first.highest
+            } else {
+                last.highest
+            },
+            gap: first.gap.or(last.gap),
             last: last.last,
         }
     }
 
-    fn points(&self) -> [Sample; 4] {
-        let (a, b) = (self.lowest, self.highest);
-        let [a, b] = if a.0 <= b.0 { [a, b] } else { [b, a] };
-        [self.first, a, b, self.last]
+    fn points(&self) -> [Sample; 5] {
+        let gap = self.gap.unwrap_or(self.first);
+        let mut points = [self.first, self.lowest, self.highest, gap, self.last];
+        points.sort_by(|a, b| a.0.total_cmp(&b.0));
+        points
     }
 }
 
@@ -162,6 +175,25 @@ mod tests {
             let steps: Vec<f64> = x.windows(2).map(|pair| pair[1] - pair[0]).collect();
             prop_assert!(steps.iter().rev().skip(1).all(|step| *step == steps[0]));
         }
+    }
+
+    /// A bin of 8 samples, whatever else is in it.
+    fn bin_with_gap(index: usize) -> Vec<(f64, f64)> {
+        let mut values = [1.0, 5.0, 2.0, 0.0, 2.0, -4.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0];
+        values[index] = f64::NAN;
+        thinned(&values, 2)
+    }
+
+    #[test]
+    fn what_is_no_number_breaks_the_line_and_hides_no_peak_wherever_in_a_bin_it_is() {
+        for index in [0, 3, 7] {
+            let points = bin_with_gap(index);
+            let gaps: Vec<f64> = points.iter().filter(|(_, value)| value.is_nan()).map(|gap| gap.0).collect();
+            assert_eq!(gaps, [index as f64]);
+            assert!(points.contains(&(1.0, 5.0)) && points.contains(&(5.0, -4.0)), "{index}: {points:?}");
+            assert!(points.windows(2).all(|pair| pair[0].0 < pair[1].0));
+        }
+        assert!(thinned(&[f64::NAN; 40], 2).iter().all(|(_, value)| value.is_nan()));
     }
 
     #[test]

@@ -100,10 +100,10 @@ impl RangeInertialParams {
 
     /// A room has a size and a place within it, or is not known.
     fn validate_room(&self) -> Result<(), ParameterError> {
-        let missing = |key| Err(ParameterError { key, expected: "given with its fellow", found: f64::NAN });
+        let missing = |key, expected| Err(ParameterError { key, expected, found: None });
         match (self.room_m, self.start_in_room_m) {
-            (Some(_), None) => return missing("start_in_room_m"),
-            (None, Some(_)) => return missing("room_m"),
+            (Some(_), None) => return missing("start_in_room_m", "given where `room_m` is"),
+            (None, Some(_)) => return missing("room_m", "given where `start_in_room_m` is"),
             _ => {}
         }
         let (sizes, starts) = (self.room_m.into_iter().flatten(), self.start_in_room_m.into_iter().flatten());
@@ -133,5 +133,27 @@ impl RangeInertialParams {
             noise_density_m_s2_sqrt_hz: self.accelerometer_noise_density_m_s2_sqrt_hz,
             bias_walk_m_s3_sqrt_hz: self.acceleration_bias_walk_m_s3_sqrt_hz,
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn of_a_room_and_the_place_in_it_the_one_that_is_missing_is_named() {
+        let refused = |room_m, start_in_room_m| {
+            let params = RangeInertialParams { room_m, start_in_room_m, ..Default::default() };
+            params.validate().unwrap_err().to_string()
+        };
+        let given = Some([4.0, 4.0]);
+        assert_eq!(
+            refused(given, None),
+            "parameter `start_in_room_m` must be given where `room_m` is, found nothing"
+        );
+        assert_eq!(
+            refused(None, given),
+            "parameter `room_m` must be given where `start_in_room_m` is, found nothing"
+        );
     }
 }
