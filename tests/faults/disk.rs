@@ -55,7 +55,7 @@ fn a_limit_on_the_size_of_files_is_named_with_the_recorder_and_the_file() {
     let place = Place::new();
     let recording = place.path("flight.mcap");
     // Blocks of 512 bytes. The signal is ignored, as daemons do: the write fails instead.
-    let ended = fly_in(&place, "trap '' XFSZ; ulimit -f 1200; \"$@\"", &["env"], &recording).with_code(2);
+    let ended = fly_in(&place, "trap '' XFSZ; ulimit -f 2400; \"$@\"", &["env"], &recording).with_code(2);
     ended.says(&["process `recorder`", "node `recorder` failed at tick", &recording, "File too large"]);
     require_prefix(&place, &recording);
 }
@@ -64,7 +64,7 @@ fn a_limit_on_the_size_of_files_is_named_with_the_recorder_and_the_file() {
 fn a_recorder_killed_for_the_size_of_its_file_is_named_with_the_signal() {
     let place = Place::new();
     let recording = place.path("flight.mcap");
-    let ended = fly_in(&place, "ulimit -f 1200; \"$@\"", &["env"], &recording).with_code(2);
+    let ended = fly_in(&place, "ulimit -f 2400; \"$@\"", &["env"], &recording).with_code(2);
     ended.says(&["process `recorder` was killed by signal 25 (SIGXFSZ)", "aborted at tick"]);
     require_prefix(&place, &recording);
 }
