@@ -26,6 +26,11 @@ pub fn set(
         process.parameters.iter().map(|(key, value)| (key.get_ref().as_str(), value.clone())).collect();
     for (key, file) in files(process) {
         if let Some(file) = file {
+            if parameters.contains_key(key) {
+                let message =
+                    format!("`{}` has `{key}` twice: as a file, and in its parameters", name.get_ref());
+                return Err(manifest.problem(&file.span(), message, "leave one of them out"));
+            }
             let path = manifest.resolve(file)?;
             parameters.insert(key, path.to_string_lossy().into());
             match key {

@@ -280,6 +280,16 @@ fn set_points_that_cannot_be_flown() {
 }
 
 #[test]
+fn a_file_and_a_parameter_that_say_the_same() {
+    let gains = repository("controllers/gains/pid.toml");
+    let ended = refused(
+        "kind = \"pid\"",
+        &format!("kind = \"pid\"\ngains = §\"{gains}\"\nparameters.gains.roll = 1"),
+    );
+    ended.says(&["`controller` has `gains` twice", "leave one of them out"]);
+}
+
+#[test]
 fn a_parameter_that_is_unknown() {
     let ended = refused("initial_altitude_m", "§initial_altitude_ft");
     ended.says(&["process `pilot`", "unknown field `initial_altitude_ft`", "initial_altitude_m"]);
