@@ -30,6 +30,7 @@ function look({ role, colour }) {
 // Which line lies upon which: an estimator's noise must not hide what was flown, nor this what was asked for.
 const LAYERS = { estimated: 1, measured: 1, flown: 2, asked: 3 };
 const LEGEND = { x: 1.01, y: 1, font: { size: 12 }, itemwidth: 30 };
+const trails = [...data.trails].sort((a, b) => LAYERS[a.role] - LAYERS[b.role]);
 // So wide that the longest name has room, and the same for all plots: their axes of time are then as long.
 const LEGEND_WIDTH = 7 * Math.max(12, ...data.panels.flatMap((panel) => panel.axes).flatMap((axes) => axes.curves)
   .map((curve) => curve.name.length)) + 60;
@@ -108,7 +109,9 @@ function solidTraces(solid) {
 }
 
 function trailTraces(type, trail, points) {
-  const line = { ...look(trail), width: type === "scatter3d" ? 4 : look(trail).width };
+  const line = look(trail);
+  // Lines in space look half as wide.
+  if (type === "scatter3d") line.width *= 2;
   const first = Object.fromEntries(Object.entries(points).map(([axis, values]) => [axis, values.slice(0, 1)]));
   return [
     { type, mode: "lines", name: trail.name, ...points, line },
@@ -135,7 +138,7 @@ function drawPath() {
   const traces = [
     ground(),
     ...data.solids.flatMap(solidTraces),
-    ...data.trails.flatMap((trail) => trailTraces("scatter3d", trail, { x: trail.x, y: trail.y, z: trail.z })),
+    ...trails.flatMap((trail) => trailTraces("scatter3d", trail, { x: trail.x, y: trail.y, z: trail.z })),
   ];
   const axis = (name) => ({ title: { text: `${name} [m]` }, exponentformat: "none", backgroundcolor: "#fff", gridcolor: "#ddd" });
   const layout = {
@@ -151,7 +154,7 @@ function drawFlat(id, title, up) {
     type: "scatter", mode: "lines", fill: "toself", fillcolor: "rgba(120,120,120,0.3)", line: { color: SOLID, width: 1 },
     name: solid.name, showlegend: false, hoverinfo: "name", x: column(solid[id], 0), y: column(solid[id], 1),
   }));
-  const paths = data.trails.flatMap((trail) => trailTraces("scatter", trail, { x: trail.x, y: trail[up] }));
+  const paths = trails.flatMap((trail) => trailTraces("scatter", trail, { x: trail.x, y: trail[up] }));
   const layout = {
     title: head(title),
     xaxis: { title: { text: `${names[0]} [m]` }, ...NUMBERS },

@@ -103,7 +103,7 @@ fn draw_flat(plots: &Area<'_>, drawing: &Drawing, view: View) -> Result<()> {
         chart.draw_series([Polygon::new(outline.clone(), SOLID.mix(0.3))])?;
         chart.draw_series([PathElement::new(outline, SOLID.stroke_width(px(1)))])?;
     }
-    for trail in &drawing.trails {
+    for trail in layered(drawing) {
         let look = Look::new(trail.colour, trail.role);
         let points = finite(trail).map(|point| (point[axes[0]], point[axes[1]]));
         draw_line(&mut chart, points, look)?;
@@ -123,6 +123,13 @@ const AXES: [&str; 3] = ["x", "y", "z"];
 
 fn finite(trail: &Trail) -> impl Iterator<Item = &[f64; 3]> + Clone {
     trail.points.iter().filter(|point| point.iter().all(|value| value.is_finite()))
+}
+
+/// The paths, those on top last: an estimate must not hide what was flown.
+fn layered(drawing: &Drawing) -> Vec<&Trail> {
+    let mut trails: Vec<&Trail> = drawing.trails.iter().collect();
+    trails.sort_by_key(|trail| trail.role.layer());
+    trails
 }
 
 /// Where a path starts.
@@ -186,7 +193,7 @@ fn draw_path(plots: &Area<'_>, drawing: &Drawing) -> Result<()> {
             chart.draw_series([PathElement::new(edge.to_vec(), SOLID.mix(0.7).stroke_width(px(1)))])?;
         }
     }
-    for trail in &drawing.trails {
+    for trail in layered(drawing) {
         let look = Look::new(trail.colour, trail.role);
         let points = finite(trail).map(|point| turned(*point));
         draw_line(&mut chart, points, look)?;

@@ -20,8 +20,9 @@ function look() {
     x: plot.querySelector(".xtitle").textContent,
     y: plot.querySelector(".ytitle").textContent,
     lines: plot.data.map(line(plot)),
-    drawn: [...plot.querySelectorAll(".scatterlayer .trace .lines path, .scatterlayer .trace .points path")].filter(extent).length,
-    dashed: [...plot.querySelectorAll(".scatterlayer .trace .lines path")].filter((path) => path.style.strokeDasharray).length,
+    // plotly.js has a layer of its own for each level that lines lie on.
+    drawn: [...plot.querySelectorAll("g.trace.scatter")].filter((trace) => [...trace.querySelectorAll("path")].some(extent)).length,
+    dashed: [...plot.querySelectorAll("g.trace.scatter .lines path")].filter((path) => path.style.strokeDasharray).length,
     legend: [...plot.querySelectorAll(".legendtext")].map((text) => text.textContent),
     buttons: [...plot.querySelectorAll(".modebar-btn")].map((button) => button.dataset.title),
     range: plot._fullLayout.xaxis.range,
@@ -76,7 +77,8 @@ async function zoom(page) {
 
 async function change(page) {
   await page.select("#vehicle", "1");
-  await page.waitForFunction(() => document.querySelector("#time > .js-plotly-plot .scatterlayer .trace path"));
+  await page.waitForFunction(() =>
+    [...document.getElementById("time").children].every((plot) => plot.querySelector("g.trace.scatter path")));
 }
 
 const refuseWebGl = () => {
