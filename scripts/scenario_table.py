@@ -5,7 +5,8 @@ import sys
 
 
 def number(value):
-    return f"{value:.4g}"
+    # JSON has no NaN: what is not a number comes as null.
+    return "not a number" if value is None else f"{value:.4g}"
 
 
 def shown(verdict):
@@ -14,8 +15,8 @@ def shown(verdict):
 
 
 def limits(verdict):
-    low, high = verdict["min"], verdict["max"]
-    parts = [f"≥ {number(low)}"] * (low is not None) + [f"≤ {number(high)}"] * (high is not None)
+    sides = (("≥", verdict["min"]), ("≤", verdict["max"]))
+    parts = [f"{sign} {number(limit)}" for sign, limit in sides if limit is not None]
     return f"{', '.join(parts)} {verdict['unit']}"
 
 
