@@ -14,6 +14,9 @@ use std::path::PathBuf;
 /// How far a wall is looked for, m.
 const REACH_M: f64 = 1000.0;
 
+/// Nearer to the world's origin than this no laps are counted, m.
+const MIDDLE_M: f64 = 0.5;
+
 /// The clearance node, for manifests.
 pub const KIND: NodeKind = NodeKind {
     name: "clearance",
@@ -109,6 +112,11 @@ impl Judge {
 
 /// Adds the turn since the last tick, less than half of one.
 fn count_laps(memory: &mut Memory, position_W_m: &Vector3<f64>) {
+    if position_W_m.x.hypot(position_W_m.y) < MIDDLE_M {
+        // There a bearing jumps with every millimetre.
+        memory.bearing = f64::NAN;
+        return;
+    }
     let bearing_rad = position_W_m.y.atan2(position_W_m.x);
     if !memory.bearing.is_nan() {
         let turn_rad = (bearing_rad - memory.bearing + PI).rem_euclid(TAU) - PI;
