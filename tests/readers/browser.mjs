@@ -8,7 +8,7 @@ const require = createRequire(join(process.env.HUMMINGBUS_READERS, "package.json
 const puppeteer = require("puppeteer-core");
 
 const NAMES = ["chromium", "chromium-browser", "google-chrome"];
-const PATIENCE_MS = 60_000;
+const PATIENCE_MS = 180_000;
 
 function isExecutable(path) {
   try {
