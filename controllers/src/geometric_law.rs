@@ -10,7 +10,7 @@
 //! | R_c: body z along t, the yaw of the reference | R_c, with the yaw of `flatness` |
 //! | thrust = m·t·(R z) | f |
 //! | e_R = ½(R_cᵀR − RᵀR_c)^∨, e_Ω = Ω − RᵀR_c·Ω_c | tracking errors of attitude and angular velocity |
-//! | torque = J·(−k_R·e_R − k_Ω·e_Ω) + Ω × JΩ − J·([Ω]×RᵀR_c·Ω_c − RᵀR_c·Ω_c′) | M |
+//! | torque = J·(−k_R·e_R − k_Ω·e_Ω) + Ω × JΩ − J·(Ω × RᵀR_c·Ω_c − RᵀR_c·Ω_c′) | M |
 //!
 //! Ω_c and its rate follow from the first two derivatives of t, which hold the reference's jerk and snap and those of
 //! the errors: the paper leaves open where the errors of acceleration and jerk come from; here they are what the

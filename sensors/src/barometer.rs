@@ -2,7 +2,7 @@
 //!
 //! Reading = pressure at the centre of mass in the standard atmosphere ([`crate::atmosphere`]) + bias + white
 //! noise, in steps of the part's resolution and cut off at its range; the bias walks at random, as weather and
-//! temperature move it. The altitude follows from the reading and a reference pressure. [`crate::channel`] says
+//! temperature move it. The altitude follows from the reading and a reference pressure. `crate::channel` says
 //! when it measures, how measurements are delayed and lost.
 #![allow(non_snake_case, reason = "a trailing _Pa names the pascal")]
 

@@ -1,7 +1,7 @@
 //! The battery monitor node: voltage and current at the battery's terminals, and the charge that is left.
 //!
 //! Reading = truth + bias + white noise, in steps of the part's resolution. The charge is what a monitor can know
-//! of it: the measured current counted from `initial_charge` on. [`crate::channel`] says when it measures, how
+//! of it: the measured current counted from `initial_charge` on. `crate::channel` says when it measures, how
 //! measurements are delayed and lost; the count goes on through losses. Where the truth is not valid, since the plant
 //! has no model of its battery, nothing is measured and `valid` is 0.
 #![allow(non_snake_case, reason = "trailing _V, _A and _Ah name units")]

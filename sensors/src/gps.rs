@@ -3,7 +3,7 @@
 //! Position = truth + bias + drift + white noise; velocity = truth + white noise. The drift stands for orbits,
 //! clocks and the ionosphere, which move the position slowly: a first-order Gauss–Markov process, stationary from
 //! the first measurement on, d' = e^(−Δt/τ) d + σ √(1 − e^(−2Δt/τ)) n (Gelb, "Applied Optimal Estimation", MIT
-//! Press 1974, §3.6). [`crate::channel`] says when it measures, how measurements are delayed and lost.
+//! Press 1974, §3.6). `crate::channel` says when it measures, how measurements are delayed and lost.
 #![allow(non_snake_case, reason = "a trailing _W names the frame a vector is written in")]
 
 use crate::channel::{Chance, Channel, ChannelState, QUEUE, Timing};

@@ -1,6 +1,6 @@
 //! The IMU node: reads the plant's true motion, publishes what an inertial measurement unit makes of it.
 //!
-//! It reads at each of its periods. [`crate::channel`] says how readings are delayed and lost; a lost one repeats the
+//! It reads at each of its periods. `crate::channel` says how readings are delayed and lost; a lost one repeats the
 //! one before.
 #![allow(non_snake_case, reason = "a trailing _B names the frame a vector is written in")]
 

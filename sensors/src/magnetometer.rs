@@ -1,7 +1,7 @@
 //! The magnetometer node: the earth's magnetic field in body axes, as the vehicle's own iron lets it through.
 //!
 //! Reading = soft-iron scale · field in body axes + hard iron + white noise, in steps of the part's resolution and
-//! cut off at its range. [`crate::channel`] says when it measures, how measurements are delayed and lost.
+//! cut off at its range. `crate::channel` says when it measures, how measurements are delayed and lost.
 #![allow(non_snake_case, reason = "a trailing _W or _B names the frame a vector is written in, _T the tesla")]
 
 use crate::channel::{Channel, ChannelState, QUEUE, Timing};

@@ -1,6 +1,6 @@
 //! The motion capture node: position and attitude as cameras around the room see them.
 //!
-//! Reading = truth + bias + white noise, the attitude's as a rotation in body axes. [`crate::channel`] says when
+//! Reading = truth + bias + white noise, the attitude's as a rotation in body axes. `crate::channel` says when
 //! it measures, how measurements are delayed and lost.
 #![allow(non_snake_case, reason = "a trailing _W or _B names the frame a vector is written in")]
 

@@ -3,7 +3,7 @@
 //! The beams tilt with the body. Each reads the nearest of what stands in its cone ([`crate::cone`]): the ground,
 //! the boxes of the scene and, with the input `traffic`, the other vehicles. Reading = distance + bias + white
 //! noise, in steps of the part's resolution; each beam has its own noise and is lost on its own.
-//! [`crate::channel`] says when they measure, how measurements are delayed and lost.
+//! `crate::channel` says when they measure, how measurements are delayed and lost.
 //!
 //! The beams fire together and do not hear each other. An echo comes back from every surface in the cone at any
 //! angle of incidence; a real beam that grazes a smooth floor or wall hears none.

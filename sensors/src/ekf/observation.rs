@@ -79,7 +79,7 @@ pub fn barometer(motion: &Motion, measured: &Measurement, params: &EkfParams) ->
     observation
 }
 
-/// The magnetic field in body axes: R_trueᵀ·m = Rᵀ·exp(−[θ]×)·m, nearly Rᵀ·(m + [m]×·θ).
+/// The magnetic field in body axes: R_trueᵀ·m = Rᵀ·exp(−θ×)·m, nearly Rᵀ·(m + m × θ).
 #[must_use]
 pub fn magnetometer(motion: &Motion, measured: &Measurement, params: &EkfParams) -> Observation<3> {
     let [x, y, z, ..] = measured.values;

@@ -1,9 +1,9 @@
 //! How the filter's errors grow from one time to a later one.
 //!
-//! With the attitude's error as a rotation about the *world's* axes, R_true = exp([θ]×)·R, the errors of
+//! With the attitude's error as a rotation about the *world's* axes, R_true = exp(θ×)·R, the errors of
 //! position, velocity and attitude and of the biases of gyroscope and accelerometer follow
 //!
-//! dp/dt = v,  dv/dt = −[f_W]×·θ − R·(b_a + n_a),  dθ/dt = −R·(b_g + n_g)
+//! dp/dt = v,  dv/dt = −f_W × θ − R·(b_a + n_a),  dθ/dt = −R·(b_g + n_g)
 //!
 //! (Solà, "Quaternion kinematics for the error-state Kalman filter", 2017, §7, global angular errors). The
 //! matrix of this system is nilpotent: its transition from one time to another is made of a few integrals over

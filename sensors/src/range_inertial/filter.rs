@@ -285,7 +285,7 @@ impl RangeInertial {
         self.params.attitude_sigma_rad
     }
 
-    /// What is around, in the order of [`LEVEL_BEAMS`] along the heading at `yaw_rad`.
+    /// What is around, in the order of `LEVEL_BEAMS` along the heading at `yaw_rad`.
     #[must_use]
     pub fn walls(&self, state: &RangeInertialState, yaw_rad: f64, now_ns: u64) -> [Wall; 4] {
         LEVEL_BEAMS.map(|direction| {
