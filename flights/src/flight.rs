@@ -1,0 +1,80 @@
+//! A measured flight: channels that were sampled each at its own times.
+//!
+//! World W: z up. Body B: x forward, y left, z up. Times are seconds from the flight's start, one clock for all
+//! channels; they grow strictly within a channel. A gap is a time without samples, never a filler.
+
+use std::path::PathBuf;
+
+/// What a flight is for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Deserialize, serde::Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Role {
+    /// Parameters are fitted on it.
+    Fit,
+    /// Errors are judged on it; nothing is fitted.
+    Test,
+}
+
+/// Samples of one quantity.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Channel<const N: usize> {
+    /// When each sample was taken, in seconds; strictly growing.
+    pub time_s: Vec<f64>,
+    /// The samples.
+    pub values: Vec<[f64; N]>,
+}
+
+/// A flight. A channel that was not logged has no samples.
+#[derive(Debug, Clone)]
+pub struct Flight {
+    /// What reports call it.
+    pub name: String,
+    /// The file it was read from.
+    pub file: PathBuf,
+    /// What it is for.
+    pub role: Role,
+    /// Raw motor commands, in the unit of the vehicle file's command map and in its order of rotors. A command
+    /// holds until the next.
+    pub command: Channel<4>,
+    /// Speeds of the rotors in rad/s, in the order of the commands.
+    pub rotor_speed: Channel<4>,
+    /// Position in W, in m.
+    pub position: Channel<3>,
+    /// Velocity in W, in m/s.
+    pub velocity: Channel<3>,
+    /// Attitude quaternion that takes vectors from B to W (Hamilton), in the order w, x, y, z, of length one and
+    /// without jumps of sign.
+    pub attitude: Channel<4>,
+    /// Angular velocity of B relative to W, in B, in rad/s: a gyroscope's reading.
+    pub angular_velocity: Channel<3>,
+    /// Specific force in B, in m/s^2: an accelerometer's reading, +g along z at rest.
+    pub specific_force: Channel<3>,
+    /// Voltage of the battery in V.
+    pub battery_voltage: Channel<1>,
+    /// What the flights file has assumed instead of a measurement, such as a level attitude.
+    pub assumed: Vec<String>,
+    /// What the reader noticed: repeated samples left out, gaps, values that look like another unit.
+    pub notes: Vec<String>,
+}
+
+impl<const N: usize> Channel<N> {
+    /// Whether the quantity was not logged.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.time_s.is_empty()
+    }
+
+    /// Times of the first and the last sample.
+    #[must_use]
+    pub fn span_s(&self) -> Option<(f64, f64)> {
+        Some((*self.time_s.first()?, *self.time_s.last()?))
+    }
+
+    /// The median time between two samples; `None` with fewer than two.
+    #[must_use]
+    pub fn period_s(&self) -> Option<f64> {
+        let mut steps: Vec<f64> = self.time_s.windows(2).map(|pair| pair[1] - pair[0]).collect();
+        steps.sort_by(f64::total_cmp);
+        steps.get(steps.len() / 2).copied()
+    }
+}

@@ -1,0 +1,1 @@
+//! Closing the loop: what a real flight shows that the declared model lacks.
