@@ -91,7 +91,7 @@ fn a_browser_draws_the_page_without_a_network() {
     assert_eq!(marks.len(), NODES + 3);
     assert!(marks.iter().all(|&marks| marks > 0), "a plot is empty: {marks:?}");
     let rows = |table: &str| first["tables"][table].as_u64().unwrap();
-    assert_eq!((rows("nodes"), rows("age"), rows("jitter-table")), (1 + 4 * NODES as u64, 1 + 2 * 4, 2));
+    assert_eq!((rows("nodes"), rows("age"), rows("jitter-table")), (1 + 4 * NODES as u64, 1 + 2 * 5, 2));
     assert!(rows("path") > 5 && rows("transport") > 4 && rows("stretches") > 2, "{first}");
     assert_ne!(first["timeline"], last["timeline"], "another tick was chosen");
     // None that sends the data to a server.
