@@ -1,5 +1,39 @@
 //! Measured flights: what was logged, in SI units and in the frames of this project, whatever file it came from.
+//!
+//! | room | what it holds |
+//! |---|---|
+//! | `flight` | a flight: channels, each at its own times |
+//! | `set` | a flights file and all its logs |
+//! | `declaration`, `document` | what a flights file says, and where |
+//! | `quantity`, `frame` | units and frames |
+//! | `log` | a log of any format: `csv_log`, `mcap_log` (with `ros_definition`), `ulog`, `crazyflie`, `bytes` |
+//! | `known_types` | messages whose fields and units need not be said |
+//! | `channels`, `clean`, `reading` | from a log's numbers to a flight |
+//! | `plausible` | values against physics |
+//! | `error` | what can be wrong |
 
+mod bytes;
+mod channels;
+mod clean;
+mod crazyflie;
+mod csv_log;
+mod declaration;
+mod document;
+pub mod error;
 pub mod flight;
+mod frame;
+mod known_types;
+mod log;
+mod mcap_log;
+pub mod plausible;
+pub mod quantity;
+mod reading;
+mod ros_definition;
+mod set;
+mod ulog;
 
+pub use error::FlightsError;
 pub use flight::{Channel, Flight, Role};
+pub use plausible::Finding;
+pub use quantity::Quantity;
+pub use set::FlightSet;

@@ -1,0 +1,123 @@
+//! From the numbers of a log to a channel in SI units and our frames.
+
+use vehicles::Vehicle;
+
+use crate::declaration::{Entry, Frame};
+use crate::flight::Channel;
+use crate::frame;
+use crate::log::{Log, Samples};
+use crate::quantity::{ANGLES, FRACTION, PERCENT, Quantity, names};
+
+/// A channel as read, and what to say about it. Times need not grow yet and numbers need not be finite.
+pub type Read<const N: usize> = (Channel<N>, Vec<String>);
+
+/// Reads `quantity` as `entry` says; an attitude in the order w, x, y, z.
+pub fn read<const N: usize>(
+    log: &dyn Log,
+    quantity: Quantity,
+    entry: &Entry,
+    vehicle: &Vehicle,
+) -> Result<Read<N>, String> {
+    let layout = Layout::of(quantity, entry, vehicle)?;
+    let samples = signed_samples(log, entry.topic.as_deref(), layout.names)?;
+    let values = samples.rows.iter().map(|row| layout.convert(row)).collect::<Result<_, _>>()?;
+    Ok((Channel { time_s: samples.time_s, values }, samples.notes))
+}
+
+/// Reads the yaw of an attitude that is level by assumption, in rad; `None` where the entry has none.
+pub fn read_yaw(log: &dyn Log, entry: &Entry) -> Result<Option<Read<1>>, String> {
+    let Some(yaw) = &entry.yaw else { return Ok(None) };
+    let factor = factor(ANGLES, entry.unit.as_deref())?;
+    let samples = signed_samples(log, entry.topic.as_deref(), std::slice::from_ref(yaw))?;
+    let sign = if entry.frame == Some(Frame::FrdNed) { -1.0 } else { 1.0 };
+    let north = if entry.frame == Some(Frame::FrdNed) { std::f64::consts::FRAC_PI_2 } else { 0.0 };
+    let values = samples.rows.iter().map(|row| [north + sign * factor * row[0]]).collect();
+    Ok(Some((Channel { time_s: samples.time_s, values }, samples.notes)))
+}
+
+/// The samples of `names`; a name with `-` in front is read negated.
+fn signed_samples(log: &dyn Log, topic: Option<&str>, names: &[String]) -> Result<Samples, String> {
+    let plain: Vec<String> = names.iter().map(|name| name.trim_start_matches('-').to_owned()).collect();
+    let mut samples = log.samples(topic, &plain)?;
+    let signs: Vec<f64> = names.iter().map(|name| if name.starts_with('-') { -1.0 } else { 1.0 }).collect();
+    for row in &mut samples.rows {
+        row.iter_mut().zip(&signs).for_each(|(number, sign)| *number *= sign);
+    }
+    Ok(samples)
+}
+
+/// Which numbers of the log make a sample, and how.
+struct Layout<'a> {
+    quantity: Quantity,
+    names: &'a [String],
+    euler: bool,
+    /// What a number is multiplied by, and what is added then.
+    factor: f64,
+    offset: f64,
+    frame: Frame,
+}
+
+impl<'a> Layout<'a> {
+    fn of(quantity: Quantity, entry: &'a Entry, vehicle: &Vehicle) -> Result<Self, String> {
+        let frame = entry.frame.unwrap_or_default();
+        let (names, euler) = named(quantity, entry)?;
+        let (factor, offset) = match (quantity, entry.unit.as_deref()) {
+            (Quantity::Attitude, unit) if euler => (factor(ANGLES, unit)?, 0.0),
+            (Quantity::Attitude, None) => (1.0, 0.0),
+            (Quantity::Command, Some(unit @ (FRACTION | PERCENT))) => {
+                let range = vehicle.command.max - vehicle.command.min;
+                (factor(quantity.units(), Some(unit))? * range, vehicle.command.min)
+            }
+            (_, unit) => (factor(quantity.units(), unit)?, 0.0),
+        };
+        Ok(Self { quantity, names, euler, factor, offset, frame })
+    }
+
+    /// A sample in SI units and our frames.
+    fn convert<const N: usize>(&self, row: &[f64]) -> Result<[f64; N], String> {
+        let scaled: Vec<f64> = row.iter().map(|number| number * self.factor + self.offset).collect();
+        let turned: Vec<f64> = match (self.quantity, &scaled[..]) {
+            (Quantity::Position | Quantity::Velocity, &[x, y, z]) => {
+                frame::world(self.frame, [x, y, z]).into()
+            }
+            (Quantity::AngularVelocity | Quantity::SpecificForce, &[x, y, z]) => {
+                frame::body(self.frame, [x, y, z]).into()
+            }
+            (Quantity::Attitude, &[roll, pitch, yaw]) if self.euler => {
+                frame::attitude(self.frame, frame::euler([roll, pitch, yaw])).into()
+            }
+            (Quantity::Attitude, &[x, y, z, w]) => frame::attitude(self.frame, [w, x, y, z]).into(),
+            _ => scaled,
+        };
+        turned.try_into().map_err(|row: Vec<f64>| format!("a sample has {} numbers, expected {N}", row.len()))
+    }
+}
+
+/// The names that `entry` gives for a sample of `quantity`, and whether they are Euler angles.
+fn named(quantity: Quantity, entry: &Entry) -> Result<(&[String], bool), String> {
+    if quantity != Quantity::Attitude && (entry.euler.is_some() || entry.yaw.is_some()) {
+        return Err("only `attitude` can have `euler` or `yaw`; remove it".to_owned());
+    }
+    let (key, names, size) = match (&entry.columns, &entry.euler) {
+        (Some(_), Some(_)) => return Err("it has both `columns` and `euler`; remove one".to_owned()),
+        (None, Some(euler)) => ("euler", euler, 3),
+        (Some(columns), None) => ("columns", columns, quantity.size()),
+        (None, None) if entry.yaw.is_some() => {
+            return Err("a `yaw` alone is no attitude; add `assume = \"hover\"` to the flight".to_owned());
+        }
+        (None, None) => return Err("no `columns` (or `fields`); add them".to_owned()),
+    };
+    if names.len() == size {
+        Ok((names, entry.euler.is_some()))
+    } else {
+        Err(format!("`{key}` has {} names, expected {size}; correct it", names.len()))
+    }
+}
+
+fn factor(units: &[(&'static str, f64)], unit: Option<&str>) -> Result<f64, String> {
+    let found = unit.and_then(|unit| units.iter().find(|(name, _)| *name == unit));
+    found.map(|(_, factor)| *factor).ok_or_else(|| match unit {
+        Some(unit) => format!("`unit` is \"{unit}\", expected {}; correct it", names(units)),
+        None => format!("no `unit`, expected {}; add it", names(units)),
+    })
+}

@@ -1,0 +1,223 @@
+//! Cleaning of a channel: what is left out, counted and said.
+
+use crate::flight::Channel;
+use crate::quantity::Quantity;
+
+/// A gap is a step longer than this many median periods.
+pub const GAP_PERIODS: f64 = 5.0;
+/// Repeats are systematic, a value held on a finer grid, if this share of the distinct values is repeated.
+const HELD_SHARE: f64 = 0.1;
+/// A quaternion whose length is further from one than this is no attitude.
+const NORM_TOLERANCE: f64 = 0.1;
+
+/// Leaves out samples that are no numbers, whose time does not grow, or that only repeat the one before.
+///
+/// # Errors
+/// If nothing is left.
+pub fn clean<const N: usize>(
+    quantity: Quantity,
+    channel: Channel<N>,
+    notes: &mut Vec<String>,
+) -> Result<Channel<N>, String> {
+    let total = channel.time_s.len();
+    let channel = finite(quantity, channel, notes);
+    let channel = growing(quantity, channel, notes);
+    let channel = if quantity == Quantity::Command { channel } else { unheld(quantity, channel, notes) };
+    if channel.is_empty() {
+        return Err(format!(
+            "none of its {total} samples can be used ({}); check the names in `channels`",
+            notes.last().map_or("the log has none", String::as_str)
+        ));
+    }
+    Ok(channel)
+}
+
+/// The samples for which `keep` holds, given their index.
+fn keep<const N: usize>(channel: &Channel<N>, keep: impl Fn(usize) -> bool) -> Channel<N> {
+    let kept = || (0..channel.time_s.len()).filter(|&index| keep(index));
+    Channel {
+        time_s: kept().map(|index| channel.time_s[index]).collect(),
+        values: kept().map(|index| channel.values[index]).collect(),
+    }
+}
+
+fn finite<const N: usize>(quantity: Quantity, channel: Channel<N>, notes: &mut Vec<String>) -> Channel<N> {
+    let is_finite = |index: usize| {
+        channel.time_s[index].is_finite() && channel.values[index].iter().all(|number| number.is_finite())
+    };
+    let kept = keep(&channel, is_finite);
+    say_dropped(quantity, &channel, &kept, "have no finite number", notes);
+    kept
+}
+
+fn say_dropped<const N: usize>(
+    quantity: Quantity,
+    before: &Channel<N>,
+    after: &Channel<N>,
+    why: &str,
+    notes: &mut Vec<String>,
+) {
+    let (total, dropped) = (before.time_s.len(), before.time_s.len() - after.time_s.len());
+    if dropped > 0 {
+        notes.push(format!("{quantity}: {dropped} of {total} samples {why}; left out"));
+    }
+}
+
+/// Leaves out the fewest samples such that time grows: a single stamp far ahead costs itself, not all after it.
+fn growing<const N: usize>(quantity: Quantity, channel: Channel<N>, notes: &mut Vec<String>) -> Channel<N> {
+    if channel.time_s.windows(2).all(|pair| pair[1] > pair[0]) {
+        return channel;
+    }
+    let is_kept = longest_growing(&channel.time_s);
+    let kept = keep(&channel, |index| is_kept[index]);
+    say_dropped(quantity, &channel, &kept, "have a time that does not grow", notes);
+    kept
+}
+
+/// Marks a longest strictly growing subsequence of finite numbers.
+fn longest_growing(times: &[f64]) -> Vec<bool> {
+    // `tails[n]` is the index of the smallest time that ends a growing sequence of n + 1 samples.
+    let mut tails: Vec<usize> = Vec::new();
+    let mut before: Vec<Option<usize>> = Vec::with_capacity(times.len());
+    for (index, time) in times.iter().enumerate() {
+        let length = tails.partition_point(|&tail| times[tail] < *time);
+        before.push(length.checked_sub(1).map(|last| tails[last]));
+        tails.truncate(tails.len().max(length));
+        match tails.get_mut(length) {
+            Some(tail) => *tail = index,
+            None => tails.push(index),
+        }
+    }
+    let mut is_kept = vec![false; times.len()];
+    let mut next = tails.last().copied();
+    while let Some(index) = next {
+        is_kept[index] = true;
+        next = before[index];
+    }
+    is_kept
+}
+
+/// Leaves out repeats where they are systematic. A vehicle at rest in a simulation repeats its values too, but
+/// that is one long run and not many short ones.
+fn unheld<const N: usize>(quantity: Quantity, channel: Channel<N>, notes: &mut Vec<String>) -> Channel<N> {
+    let is_new = |index: usize| index == 0 || channel.values[index] != channel.values[index - 1];
+    let starts: Vec<usize> = (0..channel.values.len()).filter(|&index| is_new(index)).collect();
+    let long = starts.windows(2).filter(|pair| pair[1] - pair[0] > 1).count();
+    #[allow(clippy::cast_precision_loss, reason = "counts of samples")]
+    let systematic = starts.len() > 2 && long as f64 >= HELD_SHARE * starts.len() as f64;
+    if !systematic {
+        return channel;
+    }
+    let kept = keep(&channel, is_new);
+    say_dropped(quantity, &channel, &kept, "repeat the one before (a held value)", notes);
+    kept
+}
+
+/// Says where a channel has no samples for long.
+pub fn say_gaps<const N: usize>(quantity: Quantity, channel: &Channel<N>, notes: &mut Vec<String>) {
+    let gaps = gaps(channel);
+    let Some(longest) = gaps.iter().map(|(from, to)| to - from).max_by(f64::total_cmp) else { return };
+    let first = gaps.first().map_or(0.0, |gap| gap.0);
+    notes.push(format!(
+        "{quantity}: {} gaps of more than {GAP_PERIODS} periods ({:.4} s), the longest of {longest:.3} s; the first \
+         begins at {first:.3} s",
+        gaps.len(),
+        channel.period_s().unwrap_or_default(),
+    ));
+}
+
+/// The gaps of a channel: the times of the samples before and after each.
+pub fn gaps<const N: usize>(channel: &Channel<N>) -> Vec<(f64, f64)> {
+    let limit_s = GAP_PERIODS * channel.period_s().unwrap_or(f64::INFINITY);
+    let steps = channel.time_s.windows(2).map(|pair| (pair[0], pair[1]));
+    steps.filter(|(from, to)| to - from > limit_s).collect()
+}
+
+/// Makes quaternions of length one and without jumps of sign; leaves out those of another length.
+///
+/// # Errors
+/// If most have another length.
+pub fn unit_quaternions(channel: Channel<4>, notes: &mut Vec<String>) -> Result<Channel<4>, String> {
+    let norm = |q: &[f64; 4]| q.iter().map(|part| part * part).sum::<f64>().sqrt();
+    let is_unit = |index: usize| (norm(&channel.values[index]) - 1.0).abs() <= NORM_TOLERANCE;
+    let mut kept = keep(&channel, is_unit);
+    if 2 * kept.time_s.len() < channel.time_s.len() {
+        let mut norms: Vec<f64> = channel.values.iter().map(norm).collect();
+        norms.sort_by(f64::total_cmp);
+        return Err(format!(
+            "the quaternions have a median length of {:.4}, expected 1; name the columns of x, y, z and w, or use \
+             `euler` for angles",
+            norms[norms.len() / 2]
+        ));
+    }
+    say_dropped(Quantity::Attitude, &channel, &kept, "are no quaternion of length one", notes);
+    let mut before = [1.0, 0.0, 0.0, 0.0];
+    for (index, q) in kept.values.iter_mut().enumerate() {
+        let along: f64 = q.iter().zip(before).map(|(a, b)| a * b).sum();
+        let sign = if index > 0 && along < 0.0 { -1.0 } else { 1.0 };
+        let scale = sign / norm(q);
+        *q = q.map(|part| part * scale);
+        before = *q;
+    }
+    Ok(kept)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn channel(samples: &[(f64, f64)]) -> Channel<1> {
+        Channel {
+            time_s: samples.iter().map(|sample| sample.0).collect(),
+            values: samples.iter().map(|sample| [sample.1]).collect(),
+        }
+    }
+
+    #[test]
+    fn a_stamp_far_ahead_costs_itself_only() {
+        let mut notes = Vec::new();
+        let read = channel(&[(0.0, 1.0), (1.0, 2.0), (1e9, 3.0), (2.0, 4.0), (2.0, 5.0), (3.0, 6.0)]);
+        let cleaned = clean(Quantity::BatteryVoltage, read, &mut notes).unwrap();
+        assert_eq!(cleaned.time_s, [0.0, 1.0, 2.0, 3.0]);
+        assert_eq!(notes, ["battery_voltage: 2 of 6 samples have a time that does not grow; left out"]);
+    }
+
+    #[test]
+    fn cells_without_numbers_are_counted() {
+        let mut notes = Vec::new();
+        let read = channel(&[(0.0, 1.0), (1.0, f64::NAN), (f64::INFINITY, 3.0), (2.0, 4.0)]);
+        assert_eq!(clean(Quantity::BatteryVoltage, read, &mut notes).unwrap().time_s, [0.0, 2.0]);
+        assert!(notes[0].contains("2 of 4"), "{notes:?}");
+        assert!(clean(Quantity::BatteryVoltage, channel(&[(0.0, f64::NAN)]), &mut notes).is_err());
+    }
+
+    #[test]
+    fn held_values_are_left_out_but_not_rest() {
+        let mut notes = Vec::new();
+        let held: Vec<_> = (0..100).map(|k| (f64::from(k), f64::from(k / 10))).collect();
+        let cleaned = clean(Quantity::BatteryVoltage, channel(&held), &mut notes).unwrap();
+        assert_eq!(cleaned.time_s.len(), 10);
+        assert!(notes[0].contains("90 of 100"), "{notes:?}");
+        let rest: Vec<_> = (0..100).map(|k| (f64::from(k), f64::from(k.max(50)))).collect();
+        assert_eq!(clean(Quantity::BatteryVoltage, channel(&rest), &mut notes).unwrap().time_s.len(), 100);
+        assert_eq!(clean(Quantity::Command, channel(&held), &mut notes).unwrap().time_s.len(), 100);
+    }
+
+    #[test]
+    fn gaps_are_said() {
+        let mut notes = Vec::new();
+        let times: Vec<_> = (0..20).map(|k| (f64::from(if k < 10 { k } else { k + 30 }), 0.0)).collect();
+        say_gaps(Quantity::Position, &channel(&times), &mut notes);
+        assert!(notes[0].contains("1 gaps") && notes[0].contains("31.000 s"), "{notes:?}");
+    }
+
+    #[test]
+    fn quaternions_keep_their_sign() {
+        let mut notes = Vec::new();
+        let q = [0.6, 0.8, 0.0, 0.0];
+        let read = Channel { time_s: vec![0.0, 1.0, 2.0], values: vec![q, q.map(|x| -x), [9.0; 4]] };
+        let unit = unit_quaternions(read, &mut notes).unwrap();
+        assert_eq!(unit.values, [q, q]);
+        assert_eq!(notes.len(), 1);
+    }
+}

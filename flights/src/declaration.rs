@@ -1,0 +1,109 @@
+//! What a flights file says, as it is written.
+
+use std::collections::BTreeMap;
+
+use serde::Deserialize;
+use toml::Spanned;
+
+use crate::flight::Role;
+use crate::quantity::Quantity;
+
+/// A flights file.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Declaration {
+    /// The vehicle file, relative to the flights file.
+    pub vehicle: Spanned<String>,
+    /// Format of the logs whose flight does not say it.
+    pub format: Option<Format>,
+    /// Channels of the logs; a flight's own come first.
+    #[serde(default)]
+    pub channels: ChannelMap,
+    /// The flights.
+    #[serde(default)]
+    pub flight: Vec<Spanned<FlightEntry>>,
+}
+
+/// A flight of a flights file.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct FlightEntry {
+    /// What reports call it.
+    pub name: Spanned<String>,
+    /// The log, relative to the flights file.
+    pub file: Spanned<String>,
+    /// What it is for.
+    pub role: Role,
+    /// Format of the log.
+    pub format: Option<Format>,
+    /// Start of the part that is used, in seconds from the log's first sample.
+    pub from_s: Option<Spanned<f64>>,
+    /// End of that part.
+    pub to_s: Option<Spanned<f64>>,
+    /// Channels that differ from those of the whole file.
+    #[serde(default)]
+    pub channels: ChannelMap,
+    /// By how much each channel is late, in seconds.
+    #[serde(default)]
+    pub delay_s: BTreeMap<Quantity, Spanned<f64>>,
+    /// What stands in for a measurement that the log does not have.
+    pub assume: Option<Spanned<Assumption>>,
+    /// Whether values that contradict their units are only noted.
+    #[serde(default)]
+    pub trust_units: bool,
+}
+
+/// The format of a log.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Format {
+    /// Comma-separated values with a header.
+    Csv,
+    /// MCAP with ROS 2 message definitions: recordings of this project and ROS 2 bags.
+    Mcap,
+    /// PX4's ULog.
+    Ulog,
+    /// The log that a Crazyflie writes to its card, version 2.
+    Crazyflie,
+}
+
+/// What stands in for an attitude and an angular velocity that were not logged.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Assumption {
+    /// The vehicle hovers: level and not turning.
+    Hover,
+}
+
+/// The channels by quantity.
+pub type ChannelMap = BTreeMap<Quantity, Spanned<Entry>>;
+
+/// Where a log holds a quantity, and how.
+#[derive(Debug, Clone, Default, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Entry {
+    /// Columns of a CSV file, variables of a Crazyflie log, or fields of a topic.
+    #[serde(alias = "fields")]
+    pub columns: Option<Vec<String>>,
+    /// Roll, pitch and yaw instead of a quaternion's columns.
+    pub euler: Option<Vec<String>>,
+    /// The yaw alone, for a level attitude that is assumed.
+    pub yaw: Option<String>,
+    /// Topic of an MCAP file, message of a ULog, event of a Crazyflie log.
+    pub topic: Option<String>,
+    /// Unit of the numbers in the log.
+    pub unit: Option<String>,
+    /// Frames of the numbers in the log.
+    pub frame: Option<Frame>,
+}
+
+/// The frames of a log's vectors and attitudes: those of the body, then those of the world.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Frame {
+    /// Body x forward, y left, z up; world z up: this project's own.
+    #[default]
+    FluEnu,
+    /// Body x forward, y right, z down; world x north, y east, z down.
+    FrdNed,
+}

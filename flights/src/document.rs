@@ -1,0 +1,99 @@
+//! The text of a flights file with its name: places for messages, and the paths written in it.
+
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+
+use toml::Spanned;
+use vehicles::Place;
+
+use crate::error::FlightsError;
+
+/// A flights file that was read.
+pub struct Document {
+    path: PathBuf,
+    text: String,
+}
+
+impl Document {
+    /// Reads the file at `path`.
+    pub fn read(path: &Path) -> Result<Self, FlightsError> {
+        match std::fs::read_to_string(path) {
+            Ok(text) => Ok(Self { path: path.to_owned(), text }),
+            Err(cause) => Err(FlightsError::Unreadable { file: path.display().to_string(), cause }),
+        }
+    }
+
+    /// The text as a `T`; refuses keys that `T` does not have.
+    pub fn parse<T: serde::de::DeserializeOwned>(&self) -> Result<T, FlightsError> {
+        toml::from_str(&self.text).map_err(|error| FlightsError::Syntax {
+            place: self.place(&error.span().unwrap_or_default()),
+            message: error.message().trim().replace('\n', ", "),
+        })
+    }
+
+    /// Where `span` begins.
+    pub fn place(&self, span: &Range<usize>) -> Place {
+        Place::of(&self.path.display().to_string(), &self.text, span.start)
+    }
+
+    /// A value that cannot be meant.
+    pub fn bad(&self, span: &Range<usize>, key: &str, texts: Bad<'_>) -> FlightsError {
+        FlightsError::BadValue {
+            place: self.place(span),
+            key: key.to_owned(),
+            expected: texts.expected.to_owned(),
+            found: texts.found.to_owned(),
+            advice: texts.advice.to_owned(),
+        }
+    }
+
+    /// A path as written: `${NAME:-default}` is the environment's NAME, and a relative path starts at the folder
+    /// of the flights file.
+    pub fn resolve(&self, key: &str, written: &Spanned<String>) -> Result<PathBuf, FlightsError> {
+        let expanded = expand(written.get_ref(), |name| std::env::var(name).ok()).map_err(|found| {
+            let advice = "set the variable, or give a default: ${NAME:-path}";
+            self.bad(&written.span(), key, Bad { expected: "a path", found: &found, advice })
+        })?;
+        Ok(self.path.parent().unwrap_or(Path::new("")).join(expanded))
+    }
+}
+
+/// What a value should have been, what it is, and what to do.
+pub struct Bad<'a> {
+    /// What would be accepted.
+    pub expected: &'a str,
+    /// What the file says.
+    pub found: &'a str,
+    /// What to do.
+    pub advice: &'a str,
+}
+
+/// Replaces `${NAME}` and `${NAME:-default}` by what `variable` says, as manifests do.
+fn expand(text: &str, variable: impl Fn(&str) -> Option<String>) -> Result<String, String> {
+    let mut expanded = String::new();
+    let mut rest = text;
+    while let Some((before, after)) = rest.split_once("${") {
+        let (inside, after) =
+            after.split_once('}').ok_or_else(|| format!("`{text}`, which has `${{` without `}}`"))?;
+        let (name, default) = inside.split_once(":-").map_or((inside, None), |(name, d)| (name, Some(d)));
+        let value = variable(name).or(default.map(str::to_owned));
+        expanded += before;
+        expanded += &value.ok_or_else(|| format!("`{text}`, whose variable {name} is not set"))?;
+        rest = after;
+    }
+    Ok(expanded + rest)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::expand;
+
+    #[test]
+    fn variables_are_expanded_with_defaults() {
+        let variable = |name: &str| (name == "DATA").then(|| "/data".to_owned());
+        assert_eq!(expand("${DATA:-../x}/a.csv", variable).unwrap(), "/data/a.csv");
+        assert_eq!(expand("${NONE:-../x}/a.csv", variable).unwrap(), "../x/a.csv");
+        assert!(expand("${NONE}/a.csv", variable).unwrap_err().contains("NONE is not set"));
+        assert!(expand("${NONE", variable).unwrap_err().contains("without"));
+    }
+}

@@ -1,0 +1,138 @@
+//! Messages whose fields, units and frames need not be said.
+
+use crate::declaration::{ChannelMap, Entry, Format, Frame};
+use crate::log::Log;
+use crate::quantity::Quantity;
+
+/// Where a type of message holds a quantity. In `fields`, `*` stands for x, y, z (and w) in turn, and `#` for the
+/// indices from 0 on.
+struct Known {
+    kind: &'static str,
+    quantity: Quantity,
+    fields: &'static str,
+    unit: &'static str,
+    frame: Frame,
+}
+
+const fn ours(kind: &'static str, quantity: Quantity, fields: &'static str, unit: &'static str) -> Known {
+    Known { kind, quantity, fields, unit, frame: Frame::FluEnu }
+}
+
+const fn px4(kind: &'static str, quantity: Quantity, fields: &'static str, unit: &'static str) -> Known {
+    Known { kind, quantity, fields, unit, frame: Frame::FrdNed }
+}
+
+/// In the order of preference where no channel is declared: sensors come before the truth of a simulation.
+const KNOWN: &[Known] = &[
+    ours("hummingbus_msgs/msg/MotorCommand", Quantity::Command, "command[#]", "count"),
+    ours("hummingbus_msgs/msg/RotorSpeeds", Quantity::RotorSpeed, "rotor_speed[#]", "rad/s"),
+    ours("hummingbus_msgs/msg/Imu", Quantity::SpecificForce, "specific_force.*", "m/s^2"),
+    ours("hummingbus_msgs/msg/Imu", Quantity::AngularVelocity, "angular_velocity.*", "rad/s"),
+    ours("hummingbus_msgs/msg/Mocap", Quantity::Position, "position.*", "m"),
+    ours("hummingbus_msgs/msg/Mocap", Quantity::Attitude, "attitude.*", "1"),
+    ours("hummingbus_msgs/msg/Battery", Quantity::BatteryVoltage, "voltage", "V"),
+    ours("hummingbus_msgs/msg/MeasuredState", Quantity::Position, "position.*", "m"),
+    ours("hummingbus_msgs/msg/MeasuredState", Quantity::Velocity, "velocity.*", "m/s"),
+    ours("hummingbus_msgs/msg/MeasuredState", Quantity::Attitude, "attitude.*", "1"),
+    ours("hummingbus_msgs/msg/MeasuredState", Quantity::AngularVelocity, "angular_velocity.*", "rad/s"),
+    ours("geometry_msgs/msg/PoseStamped", Quantity::Position, "pose.position.*", "m"),
+    ours("geometry_msgs/msg/PoseStamped", Quantity::Attitude, "pose.orientation.*", "1"),
+    ours("geometry_msgs/msg/PoseWithCovarianceStamped", Quantity::Position, "pose.pose.position.*", "m"),
+    ours("geometry_msgs/msg/PoseWithCovarianceStamped", Quantity::Attitude, "pose.pose.orientation.*", "1"),
+    ours("geometry_msgs/msg/TransformStamped", Quantity::Position, "transform.translation.*", "m"),
+    ours("geometry_msgs/msg/TransformStamped", Quantity::Attitude, "transform.rotation.*", "1"),
+    ours("geometry_msgs/msg/TwistStamped", Quantity::Velocity, "twist.linear.*", "m/s"),
+    // The linear part of an odometry's twist is in the body, so that it is no velocity in the world.
+    ours("nav_msgs/msg/Odometry", Quantity::Position, "pose.pose.position.*", "m"),
+    ours("nav_msgs/msg/Odometry", Quantity::Attitude, "pose.pose.orientation.*", "1"),
+    ours("sensor_msgs/msg/Imu", Quantity::SpecificForce, "linear_acceleration.*", "m/s^2"),
+    ours("sensor_msgs/msg/Imu", Quantity::AngularVelocity, "angular_velocity.*", "rad/s"),
+    ours("sensor_msgs/msg/Imu", Quantity::Attitude, "orientation.*", "1"),
+    ours("nav_msgs/msg/Odometry", Quantity::AngularVelocity, "twist.twist.angular.*", "rad/s"),
+    ours("geometry_msgs/msg/TwistStamped", Quantity::AngularVelocity, "twist.angular.*", "rad/s"),
+    ours("sensor_msgs/msg/BatteryState", Quantity::BatteryVoltage, "voltage", "V"),
+    ours("hummingbus_msgs/msg/PlantState", Quantity::RotorSpeed, "rotor_speed[#]", "rad/s"),
+    ours("hummingbus_msgs/msg/PlantState", Quantity::Position, "position.*", "m"),
+    ours("hummingbus_msgs/msg/PlantState", Quantity::Velocity, "velocity.*", "m/s"),
+    ours("hummingbus_msgs/msg/PlantState", Quantity::Attitude, "attitude.*", "1"),
+    ours("hummingbus_msgs/msg/PlantState", Quantity::AngularVelocity, "angular_velocity.*", "rad/s"),
+    ours("hummingbus_msgs/msg/PlantState", Quantity::SpecificForce, "specific_force.*", "m/s^2"),
+    px4("vehicle_attitude", Quantity::Attitude, "q[1] q[2] q[3] q[0]", "1"),
+    px4("vehicle_local_position", Quantity::Position, "x y z", "m"),
+    px4("vehicle_local_position", Quantity::Velocity, "vx vy vz", "m/s"),
+    px4("sensor_combined", Quantity::AngularVelocity, "gyro_rad[#]", "rad/s"),
+    px4("sensor_combined", Quantity::SpecificForce, "accelerometer_m_s2[#]", "m/s^2"),
+    px4("vehicle_angular_velocity", Quantity::AngularVelocity, "xyz[#]", "rad/s"),
+    px4("vehicle_acceleration", Quantity::SpecificForce, "xyz[#]", "m/s^2"),
+    px4("battery_status", Quantity::BatteryVoltage, "voltage_v", "V"),
+];
+
+impl Known {
+    /// The entry that reads it from `topic`.
+    fn entry(&self, topic: &str) -> Entry {
+        let parts = ["x", "y", "z", "w"].into_iter().enumerate().take(self.quantity.size());
+        let name =
+            |(index, part): (usize, &str)| self.fields.replace('*', part).replace('#', &index.to_string());
+        let columns = if self.fields.contains(['*', '#']) {
+            parts.map(name).collect()
+        } else {
+            self.fields.split(' ').map(str::to_owned).collect()
+        };
+        Entry {
+            columns: Some(columns),
+            topic: Some(topic.to_owned()),
+            unit: Some(self.unit.to_owned()),
+            frame: Some(self.frame),
+            ..Entry::default()
+        }
+    }
+}
+
+/// `entry` with what need not be said about a known type of message.
+///
+/// # Errors
+/// If the entry names a topic alone and its type is not known to hold the quantity.
+pub fn complete(log: &dyn Log, quantity: Quantity, entry: &Entry) -> Result<Entry, String> {
+    let named = entry.columns.is_some() || entry.euler.is_some() || entry.yaw.is_some();
+    let (false, Some(topic)) = (named, entry.topic.as_deref()) else { return Ok(entry.clone()) };
+    let topics = log.topics();
+    let Some((_, kind)) = topics.iter().find(|(name, _)| name == topic) else {
+        let known = crate::log::known(topics.iter().map(|(name, _)| name.as_str()));
+        return Err(format!("no topic `{topic}`; it has {known}; correct `topic`"));
+    };
+    let known = KNOWN.iter().find(|known| known.kind == kind && known.quantity == quantity);
+    let known = known.ok_or_else(|| {
+        format!("messages of the type {kind} are not known to hold it; add `fields` and `unit`")
+    })?;
+    let default = known.entry(topic);
+    Ok(Entry { unit: entry.unit.clone().or(default.unit), frame: entry.frame.or(default.frame), ..default })
+}
+
+/// The channels of a log for which the flights file declares none: for each quantity the preferred type that
+/// exactly one topic has. The notes say what was taken and what was not clear.
+pub fn defaults(log: &dyn Log, format: Format) -> (ChannelMap, Vec<String>) {
+    let (mut channels, mut notes) = (ChannelMap::new(), Vec::new());
+    if !matches!(format, Format::Mcap | Format::Ulog) {
+        return (channels, notes);
+    }
+    let topics = log.topics();
+    for quantity in Quantity::CHANNELS {
+        for known in KNOWN.iter().filter(|known| known.quantity == quantity) {
+            let of_kind: Vec<_> =
+                topics.iter().filter(|(_, kind)| kind == known.kind).map(|(name, _)| name.as_str()).collect();
+            match of_kind[..] {
+                [] => continue,
+                [topic] => {
+                    notes.push(format!("{quantity}: taken from {topic}, as no channel is declared"));
+                    channels.insert(quantity, toml::Spanned::new(0..0, known.entry(topic)));
+                }
+                _ => notes.push(format!(
+                    "{quantity}: not read, as more than one topic has it ({}); name one in `channels`",
+                    of_kind.join(", ")
+                )),
+            }
+            break;
+        }
+    }
+    (channels, notes)
+}
