@@ -23,6 +23,7 @@ pub const KINDS: &[&NodeKind] = &[
     &sensors::range::KIND,
     &sensors::range_inertial::KIND,
     &recorder::node::KIND,
+    &sensors::rpm::KIND,
     &plant::traffic::KIND,
     &controllers::trajectory::KIND,
     &controllers::velocity::KIND,

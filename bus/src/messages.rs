@@ -10,8 +10,8 @@ mod sensing;
 
 pub use control::{ControlStatus, Reference};
 pub use sensing::{
-    Barometer, Battery, Clearance, Contact, Gps, Innovation, Magnetometer, Mocap, Ranges, StateEstimate,
-    Traffic, WallEstimate,
+    Barometer, Battery, Clearance, Contact, Gps, Innovation, Magnetometer, Mocap, Ranges, RotorSpeeds,
+    StateEstimate, Traffic, WallEstimate,
 };
 
 /// Simulation time as ROS 2 writes it. The bus fills it in when a sample is sent.
@@ -371,7 +371,7 @@ pub struct MeasuredState {
 
 /// Every message that a topic of a built-in node can carry, in alphabetical order.
 #[must_use]
-pub fn all() -> [&'static Schema; 22] {
+pub fn all() -> [&'static Schema; 23] {
     [
         AttitudeEstimate::SCHEMA,
         Barometer::SCHEMA,
@@ -391,6 +391,7 @@ pub fn all() -> [&'static Schema; 22] {
         PoseStamped::SCHEMA,
         Ranges::SCHEMA,
         Reference::SCHEMA,
+        RotorSpeeds::SCHEMA,
         SetPoint::SCHEMA,
         StateEstimate::SCHEMA,
         Traffic::SCHEMA,

@@ -12,6 +12,7 @@
 //! - [`barometer`], [`atmosphere`]: air pressure, and how it falls with height.
 //! - [`magnetometer`], [`earth_field`]: the earth's magnetic field, at the vehicle and in the world.
 //! - [`range`], [`cone`]: five range finders, and what their beams meet.
+//! - [`rpm`]: rotor speeds, and faults of their sensors.
 //! - [`ekf`]: position, velocity and attitude from an IMU, GPS or motion capture, barometer, magnetometer.
 //! - [`range_inertial`]: velocity, height and walls from range finders, an IMU and an attitude.
 //! - [`battery`]: voltage, current and charge.
@@ -41,6 +42,7 @@ pub mod noise;
 pub mod parameter;
 pub mod range;
 pub mod range_inertial;
+pub mod rpm;
 mod steps;
 #[cfg(test)]
 mod testing;

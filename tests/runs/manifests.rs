@@ -679,7 +679,7 @@ fn the_documentation_has_every_key() {
         known_keys("kind = \"pid\"", &within("pid", "parameters.gains.roll")),
         known_keys("initial_altitude_m = 1.0", "initial_altitude_m = 1.0\nunknown_key = 1"),
     ];
-    let sensors = ["gps", "barometer", "magnetometer", "mocap", "range", "battery"];
+    let sensors = ["gps", "barometer", "magnetometer", "mocap", "range", "battery", "rpm"];
     let keys = [keys.concat(), sensors.map(|kind| known_keys(end, &sensor(kind))).concat()].concat();
     assert!(keys.len() > 150, "{keys:?}");
     for key in keys {

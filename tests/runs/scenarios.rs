@@ -8,7 +8,7 @@ use std::collections::BTreeSet;
 const SEEDS: [u32; 3] = [1, 2, 3];
 
 /// The kinds of node that may read the plant's state: sensors, and those who judge or place.
-const MAY_KNOW: [&str; 11] = [
+const MAY_KNOW: [&str; 12] = [
     "barometer",
     "clearance",
     "gps",
@@ -18,6 +18,7 @@ const MAY_KNOW: [&str; 11] = [
     "plant",
     "range",
     "recorder",
+    "rpm",
     "traffic",
     "battery",
 ];

@@ -4,7 +4,7 @@ use crate::recordings::{require_same_messages, topics};
 use crate::support::{Place, repository};
 
 /// Every sensor of manifests/sensors.toml that is not part of hover.toml.
-const SENSORS: [&str; 6] = ["gps", "barometer", "magnetometer", "mocap", "range", "battery"];
+const SENSORS: [&str; 7] = ["gps", "barometer", "magnetometer", "mocap", "range", "battery", "rpm"];
 
 /// manifests/sensors.toml cut to 1 s, with more tables.
 fn short(place: &Place, name: &str, tables: &str) -> String {

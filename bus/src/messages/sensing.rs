@@ -120,6 +120,27 @@ pub struct Ranges {
     pub pad0: u32,
 }
 
+/// What the controllers of the motors report.
+#[derive(Clone, Copy, Debug, Default, Message)]
+#[repr(C)]
+#[message(type_name = "hummingbus_msgs/msg/RotorSpeeds")]
+pub struct RotorSpeeds {
+    /// Simulation time of sending.
+    pub stamp: Time,
+    /// Simulation time at which it was measured.
+    #[field(unit = "ns")]
+    pub measured_ns: u64,
+    /// Speeds of the rotors, in the order of the vehicle file.
+    #[field(unit = "rad/s")]
+    pub rotor_speed: [f64; 4],
+    /// 1 if this sample holds a measurement, 0 if it was lost.
+    #[field(unit = "1")]
+    pub valid: u32,
+    /// Zero.
+    #[field(unit = "")]
+    pub pad0: u32,
+}
+
 /// Voltage and current of the battery, true or measured.
 #[derive(Clone, Copy, Debug, Default, Message)]
 #[repr(C)]

@@ -1,0 +1,228 @@
+//! The rotor speed node: the speed of each rotor as its motor's controller counts it.
+//!
+//! Reading = truth + white noise, in steps of the part's resolution, never below zero. `crate::channel` says when it
+//! measures, how measurements are delayed and lost. Two faults can be put in, to see whether they are taken for
+//! physics of the vehicle: a rotor whose reading is stuck, and one of which half is read.
+
+use crate::channel::{Chance, Channel, ChannelState, QUEUE, Timing};
+use crate::parameter::{ParameterError, check, not_negative};
+use crate::steps::in_steps;
+use bus::kind::{Inputs, NodeKind, PortSpec, read_parameters};
+use bus::messages::{PlantState, RotorSpeeds};
+use bus::{BusError, Message, Node};
+use rand_distr::{Distribution, StandardNormal};
+use serde::Deserialize;
+
+/// The rotor speed sensor, for manifests.
+pub const KIND: NodeKind = NodeKind {
+    name: "rpm",
+    summary: "rotor speeds with noise and resolution, and faults of single rotors",
+    inputs: Inputs::Ports(&[PortSpec::required("state", PlantState::SCHEMA)]),
+    outputs: &[PortSpec::required("speeds", RotorSpeeds::SCHEMA)],
+    check: |parameters, _| {
+        read_parameters::<RpmParams>(parameters)?.validate().map_err(|error| error.to_string())
+    },
+    run,
+};
+
+/// What the motors' controllers make of the truth.
+///
+/// *Resolution*: telemetry of electronic speed controllers (KISS, BLHeli_32) counts hundreds of electrical revolutions
+/// a minute; with 7 pole pairs, usual for motors of this size, these are 14.3 rpm, 1.5 rad/s. *Noise* and *rate* are
+/// tuned, no source: one count, 200 Hz. *Delay* is off: the count is timed where it is made.
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct RpmParams {
+    /// Measurements a second.
+    pub rate_hz: f64,
+    /// How long after measuring a measurement arrives, ms.
+    pub delay_ms: f64,
+    /// The fraction of measurements that are lost.
+    pub dropout: f64,
+    /// How long losses last on average, s; 0 where each is independent of the one before.
+    pub dropout_mean_s: f64,
+    /// Standard deviation of a speed, rad/s.
+    pub noise_rad_s: f64,
+    /// Speeds are multiples of this, rad/s; 0 for any.
+    pub resolution_rad_s: f64,
+    /// The rotor, from 1, that reads for ever what it read first; 0 for none.
+    pub stuck_rotor: usize,
+    /// The rotor, from 1, of whose speed half is read; 0 for none.
+    pub half_reading_rotor: usize,
+}
+
+impl Default for RpmParams {
+    fn default() -> Self {
+        Self {
+            rate_hz: 200.0,
+            delay_ms: 0.0,
+            dropout: 0.0,
+            dropout_mean_s: 0.0,
+            noise_rad_s: 1.5,
+            resolution_rad_s: 1.5,
+            stuck_rotor: 0,
+            half_reading_rotor: 0,
+        }
+    }
+}
+
+impl RpmParams {
+    fn timing(&self) -> Timing {
+        let Self { rate_hz, delay_ms, dropout, dropout_mean_s, .. } = *self;
+        Timing { rate_hz, delay_ms, dropout, dropout_mean_s }
+    }
+
+    fn validate(&self) -> Result<(), ParameterError> {
+        self.timing().validate()?;
+        not_negative("noise_rad_s", self.noise_rad_s)?;
+        not_negative("resolution_rad_s", self.resolution_rad_s)?;
+        let rotor = |key, number: usize| {
+            check(key, number as f64, number <= 4, "the number of a rotor, 1 to 4, or 0 for none")
+        };
+        rotor("stuck_rotor", self.stuck_rotor)?;
+        rotor("half_reading_rotor", self.half_reading_rotor)
+    }
+
+    /// What is read of `truth_rad_s`, after `before`, the reading before; none before the first.
+    fn read(&self, truth_rad_s: &[f64; 4], before: Option<[f64; 4]>, chance: &mut Chance<'_>) -> [f64; 4] {
+        std::array::from_fn(|rotor| {
+            // Drawn whatever the fault is: a fault reshuffles no noise.
+            let noise: f64 = StandardNormal.sample(chance.noise);
+            match before {
+                Some(before) if rotor + 1 == self.stuck_rotor => before[rotor],
+                _ => self.count(truth_rad_s[rotor] + self.noise_rad_s * noise, rotor),
+            }
+        })
+    }
+
+    /// The count that stands for a speed of rotor `rotor`.
+    fn count(&self, speed_rad_s: f64, rotor: usize) -> f64 {
+        let part = if rotor + 1 == self.half_reading_rotor { 0.5 } else { 1.0 };
+        in_steps(part * speed_rad_s.max(0.0), self.resolution_rad_s)
+    }
+
+    /// The sample to send at `now_ns`.
+    fn sample(
+        &self,
+        channel: &mut Channel,
+        memory: &mut Memory,
+        now_ns: u64,
+        truth: &PlantState,
+    ) -> RotorSpeeds {
+        let Memory { channel: state, queue, read, has_read } = memory;
+        channel.step(state, queue, now_ns, |last, chance| {
+            *read = self.read(&truth.rotor_speed, (*has_read == 1).then_some(*read), chance);
+            *has_read = 1;
+            if chance.is_lost(0) {
+                return RotorSpeeds { valid: 0, ..*last };
+            }
+            RotorSpeeds { measured_ns: now_ns, rotor_speed: *read, valid: 1, ..Default::default() }
+        })
+    }
+}
+
+/// What the node remembers, as it is handed over.
+#[derive(Clone, Copy, Default, Message)]
+#[repr(C)]
+#[message(type_name = "hummingbus_msgs/msg/RpmState")]
+struct Memory {
+    /// What is under way.
+    channel: ChannelState,
+    /// The last measurements.
+    queue: [RotorSpeeds; QUEUE],
+    /// What was read last, whether it was lost or not.
+    #[field(unit = "rad/s")]
+    read: [f64; 4],
+    /// 1 from the first reading on.
+    #[field(unit = "1")]
+    has_read: u64,
+}
+
+fn run() -> Result<(), BusError> {
+    let mut node = Node::join()?;
+    let state = node.input::<PlantState>("state")?;
+    let output = node.output::<RotorSpeeds>("speeds")?;
+    let params: RpmParams = node.parameters()?;
+    params.validate().map_err(|error| node.error(error))?;
+    let mut channel = Channel::of_node(&params.timing(), &node)?;
+    node.run_with_state(Memory::default(), |tick, memory| {
+        let sent = params.sample(&mut channel, memory, tick.time_ns(), tick.get(state));
+        tick.write(output, sent)
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::{TICK_NS, require_hand_over, require_normal};
+
+    fn truth_at(time_s: f64) -> PlantState {
+        let rotor_speed = [400.0, 410.0 + 50.0 * time_s, 420.0, 430.0];
+        PlantState { rotor_speed, ..Default::default() }
+    }
+
+    /// Readings every 5 ms while the second rotor speeds up.
+    fn readings(params: &RpmParams, count: u64) -> Vec<[f64; 4]> {
+        let mut channel = Channel::new(&params.timing(), 5e-3, 5, "rpm").unwrap();
+        let mut memory = Memory::default();
+        let sample = |n: u64| {
+            let truth = truth_at(n as f64 * 5e-3);
+            params.sample(&mut channel, &mut memory, n * 5 * TICK_NS, &truth).rotor_speed
+        };
+        (0..count).map(sample).collect()
+    }
+
+    #[test]
+    fn speeds_have_their_noise() {
+        let params = RpmParams { noise_rad_s: 4.0, resolution_rad_s: 0.0, ..RpmParams::default() };
+        let readings = readings(&params, 10_000);
+        for (rotor, mean) in [(0, 400.0), (2, 420.0), (3, 430.0)] {
+            require_normal(readings.iter().map(|reading| reading[rotor]), mean, 4.0);
+        }
+    }
+
+    #[test]
+    fn speeds_are_counts_and_a_perfect_sensor_reads_the_truth() {
+        for reading in readings(&RpmParams::default(), 100) {
+            assert!(reading.iter().all(|speed| (speed / 1.5 - (speed / 1.5).round()).abs() < 1e-9));
+        }
+        let perfect = RpmParams { noise_rad_s: 0.0, resolution_rad_s: 0.0, ..RpmParams::default() };
+        assert_eq!(readings(&perfect, 3)[2], truth_at(0.01).rotor_speed);
+    }
+
+    #[test]
+    fn a_fault_is_of_its_rotor_alone() {
+        let sound = readings(&RpmParams::default(), 100);
+        let stuck = readings(&RpmParams { stuck_rotor: 2, ..RpmParams::default() }, 100);
+        let half = readings(&RpmParams { half_reading_rotor: 2, ..RpmParams::default() }, 100);
+        for (n, sound_reading) in sound.iter().enumerate() {
+            for rotor in [0, 2, 3] {
+                assert_eq!((stuck[n][rotor], half[n][rotor]), (sound_reading[rotor], sound_reading[rotor]));
+            }
+            assert_eq!(stuck[n][1], sound[0][1]);
+            assert!((half[n][1] - sound_reading[1] / 2.0).abs() <= 1.5);
+        }
+    }
+
+    #[test]
+    fn a_memory_that_is_handed_over_goes_on_byte_for_byte() {
+        let params = RpmParams { dropout: 0.2, delay_ms: 45.0, stuck_rotor: 3, ..RpmParams::default() };
+        let channel = || Channel::new(&params.timing(), 1e-3, 5, "rpm").unwrap();
+        require_hand_over(channel, Memory::default(), |channel, memory: &mut Memory, now_ns| {
+            params.sample(channel, memory, now_ns, &truth_at(now_ns as f64 * 1e-9))
+        });
+    }
+
+    #[test]
+    fn impossible_parameters_are_named() {
+        let bad = [("noise_rad_s", -1.0), ("resolution_rad_s", -1.0), ("dropout", 1.0)];
+        for (key, value) in bad {
+            let reason = (KIND.check)(&serde_json::json!({ key: value }), &["state"]).unwrap_err();
+            assert!(reason.contains(&format!("`{key}`")), "{reason}");
+        }
+        for key in ["stuck_rotor", "half_reading_rotor"] {
+            let reason = (KIND.check)(&serde_json::json!({ key: 5 }), &["state"]).unwrap_err();
+            assert!(reason.contains(&format!("`{key}`")), "{reason}");
+        }
+    }
+}
