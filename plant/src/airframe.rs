@@ -173,6 +173,15 @@ impl Airframe {
         sum
     }
 
+    /// The rotors at the end of a tick of `dt_s` that began with `drive`, whatever the body does: one Runge-Kutta
+    /// step of fourth order.
+    #[must_use]
+    pub fn spun(&self, drive: &Drive, rotors: &[RotorState; 4], dt_s: f64) -> [RotorState; 4] {
+        let motor = &self.vehicle.motor;
+        let moved = std::array::from_fn(|i| motor::moved(motor, &rotors[i], drive.targets_rad_s[i], dt_s));
+        self.settled(drive, &moved)
+    }
+
     /// The rotors with accelerations that fit their speeds and targets, as shown at the end of a tick.
     pub(crate) fn settled(&self, drive: &Drive, rotors: &[RotorState; 4]) -> [RotorState; 4] {
         std::array::from_fn(|i| motor::settled(&self.vehicle.motor, &rotors[i], drive.targets_rad_s[i]))

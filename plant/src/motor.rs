@@ -18,6 +18,16 @@ pub(crate) fn rates(model: &MotorModel, rotor: &RotorState, target_rad_s: f64) -
     }
 }
 
+/// The rotor after `span_s` towards `target_rad_s`: one classic Runge-Kutta step of fourth order.
+pub(crate) fn moved(model: &MotorModel, rotor: &RotorState, target_rad_s: f64, span_s: f64) -> RotorState {
+    let k1 = rates(model, rotor, target_rad_s);
+    let k2 = rates(model, &rotor.moved(&k1, span_s / 2.0), target_rad_s);
+    let k3 = rates(model, &rotor.moved(&k2, span_s / 2.0), target_rad_s);
+    let k4 = rates(model, &rotor.moved(&k3, span_s), target_rad_s);
+    let sum = k1.plus(&k2, 2.0).plus(&k3, 2.0).plus(&k4, 1.0);
+    rotor.moved(&sum, span_s / 6.0)
+}
+
 /// The rotor with an acceleration that fits its speed and target. A second-order motor carries its
 /// acceleration as a state; a first-order one has none, and only shows it.
 pub(crate) fn settled(model: &MotorModel, rotor: &RotorState, target_rad_s: f64) -> RotorState {

@@ -86,7 +86,7 @@ impl Rates {
 }
 
 impl RotorRates {
-    fn plus(&self, other: &RotorRates, factor: f64) -> RotorRates {
+    pub fn plus(&self, other: &RotorRates, factor: f64) -> RotorRates {
         RotorRates {
             acceleration_rad_s2: self.acceleration_rad_s2 + other.acceleration_rad_s2 * factor,
             jerk_rad_s3: self.jerk_rad_s3 + other.jerk_rad_s3 * factor,
@@ -114,7 +114,7 @@ impl State {
 }
 
 impl RotorState {
-    fn moved(&self, rates: &RotorRates, span_s: f64) -> RotorState {
+    pub(crate) fn moved(&self, rates: &RotorRates, span_s: f64) -> RotorState {
         RotorState {
             speed_rad_s: self.speed_rad_s + rates.acceleration_rad_s2 * span_s,
             acceleration_rad_s2: self.acceleration_rad_s2 + rates.jerk_rad_s3 * span_s,

@@ -1,0 +1,28 @@
+//! The grid of instants on which measured and modelled quantities are compared.
+
+/// Instants at equal steps.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Clock {
+    /// The first instant, in the flight's time.
+    pub start_s: f64,
+    /// Time between two instants.
+    pub step_s: f64,
+    /// How many instants there are.
+    pub count: usize,
+}
+
+impl Clock {
+    /// The instants from `start_s` to `end_s`.
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a flight is short and forwards")]
+    #[must_use]
+    pub fn spanning(start_s: f64, end_s: f64, step_s: f64) -> Self {
+        let steps = ((end_s - start_s) / step_s + 1e-9).floor().max(0.0);
+        Self { start_s, step_s, count: steps as usize + 1 }
+    }
+
+    /// Instant `index`.
+    #[must_use]
+    pub fn at(&self, index: usize) -> f64 {
+        self.start_s + index as f64 * self.step_s
+    }
+}

@@ -1,0 +1,270 @@
+//! Fitting some of the parameters to flights, with the others held.
+
+use crate::candidate::Candidate;
+use crate::model::Model;
+use crate::normal::{self, Block};
+use crate::prepared::{Equation, Prepared};
+use nalgebra::{DMatrix, DVector};
+use std::collections::BTreeMap;
+
+/// Weight of each component of each equation: one over the variance of its residual.
+pub type Weights = BTreeMap<(&'static str, usize), f64>;
+
+/// Steps of a fit at most.
+const STEPS_MAX: usize = 12;
+/// A fit is done when a step changes every parameter by less than this part of its standard deviation.
+const SMALL_STEP: f64 = 0.02;
+
+/// Flights, the model that they are held against, and how.
+#[derive(Debug)]
+pub struct Bench<'f> {
+    /// The model.
+    pub model: Model,
+    /// Flights that parameters are fitted on.
+    pub fit: Vec<Prepared<'f>>,
+    /// Flights that errors are judged on.
+    pub test: Vec<Prepared<'f>>,
+    /// How much each component counts.
+    pub weights: Weights,
+    /// Length of the blocks that count as independent.
+    pub block_s: f64,
+}
+
+/// Parameters fitted.
+#[derive(Debug, Clone)]
+pub struct Fitted {
+    /// All values, those that were held included.
+    pub values: Vec<f64>,
+    /// The parameters that were fitted.
+    pub which: Vec<usize>,
+    /// Their covariance.
+    pub covariance: DMatrix<f64>,
+    /// Weighted sums of squares of the blocks of the test flights.
+    pub test_squares: Vec<f64>,
+    /// Weighted sums of squares of the blocks of the fit flights.
+    pub fit_squares: Vec<f64>,
+}
+
+impl Fitted {
+    /// Sum of the squares of the test flights.
+    #[must_use]
+    pub fn test_sum(&self) -> f64 {
+        self.test_squares.iter().sum()
+    }
+
+    /// Standard deviation of a parameter; `None` where it was held.
+    #[must_use]
+    pub fn deviation(&self, parameter: usize) -> Option<f64> {
+        let at = self.which.iter().position(|own| *own == parameter)?;
+        Some(self.covariance[(at, at)].max(0.0).sqrt())
+    }
+}
+
+impl Bench<'_> {
+    /// Fits the parameters `which`, starting from `start`.
+    #[must_use]
+    pub fn fitted(&self, start: &[f64], which: &[usize]) -> Fitted {
+        let mut values = start.to_vec();
+        let mut blocks = self.blocks(&self.fit, &values, which);
+        let mut squares = normal::sum(&blocks).squares;
+        for _ in 0..STEPS_MAX {
+            let step = self.step(&blocks, &values, which);
+            let deviations = normal::covariance(&blocks).diagonal().map(|variance| variance.max(0.0).sqrt());
+            let is_small = step.iter().zip(&deviations).all(|(step, deviation)| step.abs() <= SMALL_STEP * deviation);
+            if which.is_empty() || is_small {
+                break;
+            }
+            let Some((next, next_blocks, next_squares)) = self.descended(&values, which, &step, squares) else { break };
+            (values, blocks) = (next, next_blocks);
+            let gain = squares - next_squares;
+            squares = next_squares;
+            if gain < 1e-9 * squares {
+                break;
+            }
+        }
+        let covariance = normal::covariance(&blocks);
+        let test_squares = self.squares(&self.test, &values);
+        let fit_squares = blocks.iter().map(|block| block.squares).collect();
+        Fitted { values, which: which.to_vec(), covariance, test_squares, fit_squares }
+    }
+
+    /// The values after the step, or after a part of it, where the sum of squares is smaller.
+    fn descended(
+        &self,
+        values: &[f64],
+        which: &[usize],
+        step: &DVector<f64>,
+        squares: f64,
+    ) -> Option<(Vec<f64>, Vec<Block>, f64)> {
+        let mut share = 1.0;
+        for _ in 0..5 {
+            let next = self.moved(values, which, &(step * share));
+            let blocks = self.blocks(&self.fit, &next, which);
+            let sum = normal::sum(&blocks).squares;
+            if sum < squares {
+                return Some((next, blocks, sum));
+            }
+            share /= 4.0;
+        }
+        None
+    }
+
+    /// The Gauss-Newton step within the bounds: a parameter that would leave them stops there, and the others are
+    /// fitted to that.
+    fn step(&self, blocks: &[Block], values: &[f64], which: &[usize]) -> DVector<f64> {
+        let total = normal::sum(blocks);
+        let mut held: Vec<Option<f64>> = vec![None; which.len()];
+        let mut step = DVector::zeros(which.len());
+        for _ in 0..=which.len() {
+            step = held_step(&total, &held);
+            let mut is_within = true;
+            for (at, parameter) in which.iter().enumerate() {
+                let own = &self.model.parameters.all[*parameter];
+                let wanted = values[*parameter] + step[at];
+                let bound = wanted.clamp(own.lower, own.upper);
+                if held[at].is_none() && (bound - wanted).abs() > 1e-12 * (own.upper - own.lower) {
+                    held[at] = Some(bound - values[*parameter]);
+                    is_within = false;
+                }
+            }
+            if is_within {
+                break;
+            }
+        }
+        step
+    }
+
+    fn moved(&self, values: &[f64], which: &[usize], step: &DVector<f64>) -> Vec<f64> {
+        let mut next = values.to_vec();
+        for (parameter, step) in which.iter().zip(step.iter()) {
+            let own = &self.model.parameters.all[*parameter];
+            next[*parameter] = (next[*parameter] + step).clamp(own.lower, own.upper);
+        }
+        next
+    }
+
+    /// The normal equations of all blocks of `flights`.
+    #[must_use]
+    pub fn blocks(&self, flights: &[Prepared], values: &[f64], which: &[usize]) -> Vec<Block> {
+        let of_flight = |flight: &Prepared| {
+            let (residual, columns) = self.model.linearised(flight, values, which);
+            self.flight_blocks(flight, &residual, &columns)
+        };
+        flights.iter().flat_map(of_flight).collect()
+    }
+
+    /// The weighted sums of squares of all blocks of `flights`.
+    #[must_use]
+    pub fn squares(&self, flights: &[Prepared], values: &[f64]) -> Vec<f64> {
+        self.blocks(flights, values, &[]).iter().map(|block| block.squares).collect()
+    }
+
+    fn flight_blocks(&self, flight: &Prepared, residual: &[f64], columns: &[Vec<f64>]) -> Vec<Block> {
+        use rayon::prelude::*;
+        let (width, weights) = (flight.width(), self.row_weights(flight));
+        let of_knots = |knots: &(usize, usize)| {
+            let mut block = Block::zero(columns.len());
+            let mut row = vec![0.0; columns.len()];
+            for at in knots.0 * width..knots.1 * width {
+                let weight = weights[at % width];
+                if weight > 0.0 {
+                    row.iter_mut().zip(columns).for_each(|(row, column)| *row = column[at]);
+                    block.add(residual[at], &row, weight);
+                }
+            }
+            block.complete();
+            block
+        };
+        self.block_knots(flight).par_iter().map(of_knots).collect()
+    }
+
+    /// The weights of the rows of one knot.
+    #[must_use]
+    pub fn row_weights(&self, flight: &Prepared) -> Vec<f64> {
+        let component = |equation: &Equation, axis: usize| {
+            self.weights.get(&(equation.name(), axis)).copied().unwrap_or(0.0)
+        };
+        let equations = flight.layout.equations.iter();
+        equations.flat_map(|equation| (0..equation.size()).map(move |axis| component(equation, axis))).collect()
+    }
+
+    /// First and last knot of each block.
+    fn block_knots(&self, flight: &Prepared) -> Vec<(usize, usize)> {
+        let knots = &flight.layout.knots;
+        let block_of = |knot: usize| (flight.layout.clock.at(knot) / self.block_s).floor();
+        let mut blocks = Vec::new();
+        let mut first = 0;
+        for at in 1..=knots.len() {
+            #[allow(clippy::float_cmp, reason = "whole numbers")]
+            if at == knots.len() || block_of(knots[at]) != block_of(knots[first]) {
+                blocks.push((first, at));
+                first = at;
+            }
+        }
+        blocks
+    }
+}
+
+/// The step of the parameters that are not held, while the others go where they are held.
+fn held_step(total: &Block, held: &[Option<f64>]) -> DVector<f64> {
+    let free: Vec<usize> = (0..held.len()).filter(|at| held[*at].is_none()).collect();
+    let mut step = DVector::from_fn(held.len(), |at, _| held[at].unwrap_or(0.0));
+    let gradient = &total.gradient + &total.gram * &step;
+    let own = total.of(&free);
+    let wanted = DVector::from_fn(free.len(), |i, _| gradient[free[i]]);
+    let solved = -(normal::inverse(&own.gram) * wanted);
+    free.iter().zip(solved.iter()).for_each(|(at, solved)| step[*at] = *solved);
+    step
+}
+
+/// A component without any noise would count infinitely: no sensor is better than this part of its own signal.
+const LEAST_NOISE: f64 = 1e-4;
+
+impl Bench<'_> {
+    /// Sets the weights by the variance that is left on the fit flights when, from `base` on, all of `candidates` take
+    /// the step that fits best.
+    pub fn weigh(&mut self, base: &Fitted, candidates: &[Candidate]) {
+        let mut all = base.which.clone();
+        for candidate in candidates.iter().filter(|candidate| candidate.starts.is_empty()) {
+            all.extend(candidate.which.iter().filter(|at| !base.which.contains(at)));
+        }
+        for _ in 0..2 {
+            if self.weights.is_empty() {
+                self.weights = self.variances(&base.values, &[], &DVector::zeros(0));
+            }
+            let total = normal::sum(&self.blocks(&self.fit, &base.values, &all));
+            let step = -(normal::inverse(&total.gram) * &total.gradient);
+            self.weights = self.variances(&base.values, &all, &step);
+        }
+    }
+
+    /// One over the variance of each component after a step.
+    fn variances(&self, values: &[f64], which: &[usize], step: &DVector<f64>) -> Weights {
+        let mut sums: BTreeMap<(&'static str, usize), (f64, f64, f64)> = BTreeMap::new();
+        for flight in &self.fit {
+            let (residual, columns) = self.model.linearised(flight, values, which);
+            let measured = self.model.tracks(flight, values).rows;
+            let width = flight.width();
+            let equations = flight.layout.equations.iter();
+            let names: Vec<_> =
+                equations.flat_map(|own| (0..own.size()).map(move |axis| (own.name(), axis))).collect();
+            for (at, residual) in residual.iter().enumerate() {
+                let left = residual + columns.iter().zip(step.iter()).map(|(column, step)| column[at] * step).sum::<f64>();
+                let sum = sums.entry(names[at % width]).or_default();
+                *sum = (sum.0 + left * left, sum.1 + measured[at] * measured[at], sum.2 + 1.0);
+            }
+        }
+        let weight = |(squares, signal, count): (f64, f64, f64)| {
+            let variance = (squares + LEAST_NOISE * LEAST_NOISE * signal) / count;
+            if variance > 0.0 { 1.0 / variance } else { 0.0 }
+        };
+        sums.into_iter().map(|(name, sum)| (name, weight(sum))).collect()
+    }
+
+    /// The shortest delay that the grids can tell from none.
+    #[must_use]
+    pub fn least_delay_s(&self) -> f64 {
+        let flights = self.fit.iter().chain(&self.test);
+        0.5 * flights.map(|flight| flight.layout.clock.step_s).fold(0.0, f64::max)
+    }
+}

@@ -1,0 +1,217 @@
+//! What the model says of a flight: the rows of every equation under given parameters.
+#![allow(non_snake_case, reason = "a trailing _W or _B names the frame a vector is written in")]
+
+use crate::parameter::{Parameters, SensorParameter, Stage};
+use crate::prepared::{Equation, Held, Prepared, Tracks};
+use crate::track::Track;
+use nalgebra::{UnitQuaternion, Vector3};
+use plant::{Airframe, Drive, NewtonEuler, RigidBody, RotorState, State};
+use vehicles::Vehicle;
+
+/// The motors are simulated in steps of at most this length.
+const MOTOR_STEP_S: f64 = 0.001;
+
+/// The rotors over a flight, on its grid.
+#[derive(Debug, Clone)]
+pub struct Rotors {
+    /// What turns the vehicle: measured where it was, else what follows from the commands.
+    pub flown: Vec<[RotorState; 4]>,
+    /// What follows from the commands.
+    pub commanded: Vec<[f64; 4]>,
+}
+
+/// The declared vehicle with all that may be changed of it.
+#[derive(Debug)]
+pub struct Model {
+    /// The vehicle as it is declared.
+    pub vehicle: Vehicle,
+    /// What may be changed.
+    pub parameters: Parameters,
+}
+
+impl Model {
+    /// The vehicle under these values.
+    #[must_use]
+    pub fn airframe(&self, values: &[f64]) -> Airframe {
+        Airframe::with_effects(self.vehicle.clone(), self.parameters.effects_under(values))
+    }
+
+    /// The measured channels of `flight` under these values.
+    #[must_use]
+    pub fn tracks(&self, flight: &Prepared, values: &[f64]) -> Tracks {
+        let sensor = |wanted| self.parameters.sensor(values, wanted);
+        flight.tracks(sensor(SensorParameter::PoseDelay), sensor(SensorParameter::ImuDelay))
+    }
+
+    /// The rotors of `flight` under these values.
+    #[must_use]
+    pub fn rotors(&self, flight: &Prepared, values: &[f64]) -> Rotors {
+        let measured = measured_rotors(flight);
+        let has_commands = !flight.flight.command.is_empty();
+        let commanded = if has_commands { spun(&self.airframe(values), flight) } else { measured.clone() };
+        let has_speeds = !flight.flight.rotor_speed.is_empty();
+        let pick = |i: usize, rotor: usize| {
+            if has_speeds && !flight.distrusted[rotor] { measured[i][rotor] } else { commanded[i][rotor] }
+        };
+        Rotors {
+            flown: (0..commanded.len()).map(|i| std::array::from_fn(|rotor| pick(i, rotor))).collect(),
+            commanded: commanded.iter().map(|rotors| rotors.map(|rotor| rotor.speed_rad_s)).collect(),
+        }
+    }
+
+    /// Measurement less model, for each knot each equation's components.
+    #[must_use]
+    pub fn residual(&self, flight: &Prepared, tracks: &Tracks, rotors: &Rotors, values: &[f64]) -> Vec<f64> {
+        let sides = self.sides(flight, tracks, rotors, values);
+        let bias = |own: fn(usize) -> SensorParameter| -> [f64; 3] {
+            std::array::from_fn(|axis| self.parameters.sensor(values, own(axis)))
+        };
+        let (force_bias, rate_bias) = (bias(SensorParameter::Accelerometer), bias(SensorParameter::Gyroscope));
+        let mut residual = tracks.rows.clone();
+        let mut rows = residual.iter_mut();
+        let mut take = |model: &[f64]| model.iter().for_each(|model| rows.next().map_or((), |row| *row -= model));
+        for &knot in &flight.layout.knots {
+            for (equation, (_, window)) in flight.layout.equations.iter().zip(&flight.layout.windows) {
+                match equation {
+                    Equation::SpecificForce => {
+                        let force = window.over(&sides.force_B, knot);
+                        take(&std::array::from_fn::<_, 3, _>(|axis| force[axis] + force_bias[axis]));
+                    }
+                    Equation::Acceleration => take(&window.over(&sides.acceleration_W, knot)),
+                    Equation::AngularAcceleration => take(&window.over(&sides.angular_B, knot)),
+                    Equation::Gyroscope => take(&rate_bias),
+                    Equation::RotorSpeed => {
+                        let speeds = window.over(&rotors.commanded, knot);
+                        let measured_again = |i: usize| if flight.distrusted[i] { f64::NAN } else { speeds[i] };
+                        take(&std::array::from_fn::<_, 4, _>(measured_again));
+                    }
+                }
+            }
+        }
+        // A rotor's speed that is not believed is compared with nothing.
+        residual.iter_mut().filter(|row| row.is_nan()).for_each(|row| *row = 0.0);
+        residual
+    }
+
+    fn sides(&self, flight: &Prepared, tracks: &Tracks, rotors: &Rotors, values: &[f64]) -> Sides {
+        let airframe = self.airframe(values);
+        let drive = air(&airframe, flight.layout.clock.step_s);
+        let model = NewtonEuler::flying(airframe, 1);
+        let tilt = Vector3::new(
+            self.parameters.sensor(values, SensorParameter::Attitude(0)),
+            self.parameters.sensor(values, SensorParameter::Attitude(1)),
+            0.0,
+        );
+        let mounting = UnitQuaternion::from_scaled_axis(-tilt);
+        let gravity_m_s2 = model.vehicle().gravity_m_s2;
+        let has_world = flight.offset_of(Equation::Acceleration).is_some();
+        let mut sides = Sides::default();
+        for i in 0..flight.layout.clock.count {
+            let attitude_WB = tracks.attitude[i] * mounting;
+            let body = RigidBody {
+                position_W_m: tracks.position.values[i].into(),
+                velocity_W_m_s: tracks.velocity[i].into(),
+                attitude_WB,
+                angular_velocity_B_rad_s: tracks.rates[i].into(),
+            };
+            let motion = model.motion_under(&drive, &State { body, rotors: rotors.flown[i] });
+            sides.force_B.push(motion.specific_force_B_m_s2.into());
+            sides.angular_B.push(motion.angular_acceleration_B_rad_s2.into());
+            if has_world {
+                let mut acceleration_W = attitude_WB * motion.specific_force_B_m_s2;
+                acceleration_W.z -= gravity_m_s2;
+                sides.acceleration_W.push(acceleration_W.into());
+            }
+        }
+        sides
+    }
+
+    /// The residual under `values`, and its derivative by each parameter of `which`: one column each.
+    #[must_use]
+    pub fn linearised(&self, flight: &Prepared, values: &[f64], which: &[usize]) -> (Vec<f64>, Vec<Vec<f64>>) {
+        let tracks = self.tracks(flight, values);
+        let rotors = self.rotors(flight, values);
+        let residual = self.residual(flight, &tracks, &rotors, values);
+        let column = |&parameter: &usize| {
+            let own = &self.parameters.all[parameter];
+            let mut changed = values.to_vec();
+            let up = values[parameter] + own.step <= own.upper;
+            let step = if up { own.step } else { -own.step };
+            changed[parameter] += step;
+            let moved = match own.stage() {
+                Stage::Tracks => {
+                    self.residual(flight, &self.tracks(flight, &changed), &rotors, &changed)
+                }
+                Stage::Rotors => self.residual(flight, &tracks, &self.rotors(flight, &changed), &changed),
+                Stage::Body | Stage::Reading => self.residual(flight, &tracks, &rotors, &changed),
+            };
+            moved.iter().zip(&residual).map(|(moved, own)| (moved - own) / step).collect()
+        };
+        use rayon::prelude::*;
+        let columns = which.par_iter().map(column).collect();
+        (residual, columns)
+    }
+
+    /// The residual under `values`.
+    #[must_use]
+    pub fn residual_under(&self, flight: &Prepared, values: &[f64]) -> Vec<f64> {
+        self.residual(flight, &self.tracks(flight, values), &self.rotors(flight, values), values)
+    }
+}
+
+/// The model's sides on the grid.
+#[derive(Default)]
+struct Sides {
+    force_B: Vec<[f64; 3]>,
+    acceleration_W: Vec<[f64; 3]>,
+    angular_B: Vec<[f64; 3]>,
+}
+
+/// How the air moves: what the steady effects make of it, which is the same at every instant.
+fn air(airframe: &Airframe, step_s: f64) -> Drive {
+    let state = State {
+        body: RigidBody::level_at(Vector3::zeros()),
+        rotors: [RotorState::default(); 4],
+    };
+    airframe.begin_tick(&mut airframe.memory(0, "identify", step_s), &state, &[0.0; 4], step_s)
+}
+
+/// The rotors that follow from the commands: simulated in fine steps, averaged over one step about each instant.
+#[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a few steps")]
+fn spun(airframe: &Airframe, flight: &Prepared) -> Vec<[RotorState; 4]> {
+    let clock = &flight.layout.clock;
+    let parts = (clock.step_s / MOTOR_STEP_S - 1e-9).ceil().max(1.0) as usize;
+    let step_s = clock.step_s / parts as f64;
+    let mut commands = Held::new(&flight.flight.command);
+    let mut time_s = clock.at(0) - clock.step_s / 2.0;
+    let first = commands.at(time_s);
+    let mut memory = airframe.memory(0, "identify", step_s);
+    let rotors = first.map(|command| RotorState::steady(airframe.vehicle().command.speed(command)));
+    let mut state = State { body: RigidBody::level_at(Vector3::zeros()), rotors };
+    let mut out = Vec::with_capacity(clock.count);
+    for _ in 0..clock.count {
+        let mut sum = [RotorState::default(); 4];
+        for _ in 0..parts {
+            let drive = airframe.begin_tick(&mut memory, &state, &commands.at(time_s), step_s);
+            let after = airframe.spun(&drive, &state.rotors, step_s);
+            let half = 0.5 / parts as f64;
+            for (sum, (before, after)) in sum.iter_mut().zip(state.rotors.iter().zip(&after)) {
+                sum.speed_rad_s += half * (before.speed_rad_s + after.speed_rad_s);
+                sum.acceleration_rad_s2 += half * (before.acceleration_rad_s2 + after.acceleration_rad_s2);
+            }
+            state.rotors = after;
+            time_s += step_s;
+        }
+        out.push(sum);
+    }
+    out
+}
+
+fn measured_rotors(flight: &Prepared) -> Vec<[RotorState; 4]> {
+    let clock = &flight.layout.clock;
+    let track = Track::sampled(&flight.flight.rotor_speed, 0.0, clock);
+    let slopes = track.slope(2, clock.step_s);
+    let rotor = |speed_rad_s, acceleration_rad_s2| RotorState { speed_rad_s, acceleration_rad_s2 };
+    let rotors = track.values.iter().zip(&slopes);
+    rotors.map(|(speed, slope)| std::array::from_fn(|i| rotor(speed[i], slope[i]))).collect()
+}

@@ -1,0 +1,133 @@
+//! Least squares over blocks of time: normal equations that remember which stretch of which flight they are from.
+//!
+//! Residuals of neighbouring windows are correlated, so what is counted as independent are blocks of time. The
+//! covariance of a fit is the sandwich over blocks (Liang and Zeger, Biometrika 73(1), 1986): with the
+//! normal matrix H = sum X'WX and the score s_b = X_b'W r_b of each block, cov = H^-1 (sum s_b s_b') H^-1.
+
+use nalgebra::{DMatrix, DVector};
+
+/// The normal equations of one block, for residuals r(x + d) = r + J d.
+#[derive(Debug, Clone)]
+pub struct Block {
+    /// J'WJ.
+    pub gram: DMatrix<f64>,
+    /// J'Wr.
+    pub gradient: DVector<f64>,
+    /// r'Wr.
+    pub squares: f64,
+}
+
+impl Block {
+    /// An empty block for so many parameters.
+    #[must_use]
+    pub fn zero(parameters: usize) -> Self {
+        Self { gram: DMatrix::zeros(parameters, parameters), gradient: DVector::zeros(parameters), squares: 0.0 }
+    }
+
+    /// Adds a row: its residual, its derivatives, its weight.
+    pub fn add(&mut self, residual: f64, row: &[f64], weight: f64) {
+        self.squares += weight * residual * residual;
+        for (i, a) in row.iter().enumerate().filter(|(_, a)| **a != 0.0) {
+            self.gradient[i] += weight * a * residual;
+            for (j, b) in row[..=i].iter().enumerate() {
+                self.gram[(i, j)] += weight * a * b;
+            }
+        }
+    }
+
+    /// Fills the upper half of the matrix, which [`Block::add`] leaves out.
+    pub fn complete(&mut self) {
+        self.gram.fill_upper_triangle_with_lower_triangle();
+    }
+
+    /// The part of it for these parameters.
+    #[must_use]
+    pub fn of(&self, which: &[usize]) -> Self {
+        let size = which.len();
+        Self {
+            gram: DMatrix::from_fn(size, size, |i, j| self.gram[(which[i], which[j])]),
+            gradient: DVector::from_fn(size, |i, _| self.gradient[which[i]]),
+            squares: self.squares,
+        }
+    }
+
+    /// The sum of squares after a step.
+    #[must_use]
+    pub fn squares_after(&self, step: &DVector<f64>) -> f64 {
+        self.squares + 2.0 * self.gradient.dot(step) + step.dot(&(&self.gram * step))
+    }
+}
+
+/// The sum of blocks.
+#[must_use]
+pub fn sum(blocks: &[Block]) -> Block {
+    let size = blocks.first().map_or(0, |block| block.gradient.len());
+    blocks.iter().fold(Block::zero(size), |mut sum, block| {
+        sum.gram += &block.gram;
+        sum.gradient += &block.gradient;
+        sum.squares += block.squares;
+        sum
+    })
+}
+
+/// Directions of the parameters whose curvature, in units of the columns' own lengths, is below this part cannot be
+/// told from nothing.
+const RANK_TOLERANCE: f64 = 1e-9;
+
+/// The pseudo-inverse of a normal matrix, computed with columns scaled to length one.
+#[must_use]
+pub fn inverse(gram: &DMatrix<f64>) -> DMatrix<f64> {
+    let size = gram.nrows();
+    let lengths: Vec<f64> = (0..size).map(|i| gram[(i, i)].max(0.0).sqrt()).collect();
+    let scale = |i: usize| if lengths[i] > 0.0 { 1.0 / lengths[i] } else { 0.0 };
+    let scaled = DMatrix::from_fn(size, size, |i, j| gram[(i, j)] * scale(i) * scale(j));
+    let eigen = scaled.symmetric_eigen();
+    let largest = eigen.eigenvalues.iter().copied().fold(0.0, f64::max);
+    let inverse = eigen.eigenvalues.map(|value| if value > RANK_TOLERANCE * largest { 1.0 / value } else { 0.0 });
+    let scaled = &eigen.eigenvectors * DMatrix::from_diagonal(&inverse) * eigen.eigenvectors.transpose();
+    DMatrix::from_fn(size, size, |i, j| scaled[(i, j)] * scale(i) * scale(j))
+}
+
+/// The covariance of the parameters fitted on `blocks`, at whose solution the blocks are given.
+#[must_use]
+pub fn covariance(blocks: &[Block]) -> DMatrix<f64> {
+    let total = sum(blocks);
+    let inverse = inverse(&total.gram);
+    let size = total.gradient.len();
+    let meat = blocks.iter().fold(DMatrix::zeros(size, size), |sum, block| {
+        sum + &block.gradient * block.gradient.transpose()
+    });
+    // A few blocks scatter less than many, as the fit has adapted to them (the factor HC1 has for rows).
+    let count = blocks.len() as f64;
+    let factor = count / (count - size as f64).max(1.0);
+    &inverse * meat * &inverse * factor
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn line(points: &[(f64, f64)]) -> Block {
+        let mut block = Block::zero(2);
+        points.iter().for_each(|(x, y)| block.add(*y, &[-1.0, -x], 1.0));
+        block.complete();
+        block
+    }
+
+    #[test]
+    fn a_line_is_fitted() {
+        let block = line(&[(0.0, 1.0), (1.0, 3.0), (2.0, 5.0)]);
+        let step = -(inverse(&block.gram) * &block.gradient);
+        assert!((step[0] - 1.0).abs() < 1e-9 && (step[1] - 2.0).abs() < 1e-9, "{step}");
+        assert!(block.squares_after(&step).abs() < 1e-9);
+    }
+
+    #[test]
+    fn a_column_of_zeros_and_twins_are_no_trouble() {
+        let mut block = Block::zero(3);
+        [(1.0, 2.0), (2.0, 4.0)].iter().for_each(|(x, y)| block.add(*y, &[-x, -x, 0.0], 1.0));
+        block.complete();
+        let step = -(inverse(&block.gram) * &block.gradient);
+        assert!((step[0] - 1.0).abs() < 1e-9 && (step[1] - 1.0).abs() < 1e-9 && step[2] == 0.0, "{step}");
+    }
+}

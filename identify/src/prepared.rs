@@ -1,0 +1,350 @@
+//! A flight made ready for comparison: its grid, its knots, and which equations it can be held against.
+#![allow(non_snake_case, reason = "a trailing _W or _B names the frame a vector is written in")]
+
+use crate::clock::Clock;
+use crate::track::Track;
+use crate::window::{NUMEROV, SIMPSON, Window, central_difference, second_difference};
+use flights::Flight;
+use nalgebra::{Quaternion, UnitQuaternion, Vector3};
+
+/// An equation that measurement and model are both put into.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Equation {
+    /// What the accelerometer reads, in B: forces.
+    SpecificForce,
+    /// Acceleration in W, from position or else from velocity: forces and gravity.
+    Acceleration,
+    /// Angular acceleration in B, from the gyroscope or else from the attitude: torques.
+    AngularAcceleration,
+    /// What the gyroscope reads against the attitude's rate of change, in B: the sensors alone.
+    Gyroscope,
+    /// Measured speeds of the rotors against those that follow from the commands.
+    RotorSpeed,
+}
+
+impl Equation {
+    /// How many components it has.
+    #[must_use]
+    pub fn size(self) -> usize {
+        if self == Equation::RotorSpeed { 4 } else { 3 }
+    }
+
+    /// What reports call it.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Equation::SpecificForce => "specific_force",
+            Equation::Acceleration => "acceleration",
+            Equation::AngularAcceleration => "angular_acceleration",
+            Equation::Gyroscope => "gyroscope",
+            Equation::RotorSpeed => "rotor_speed",
+        }
+    }
+
+    /// The unit of its residual.
+    #[must_use]
+    pub fn unit(self) -> &'static str {
+        match self {
+            Equation::SpecificForce | Equation::Acceleration => "m/s^2",
+            Equation::AngularAcceleration => "rad/s^2",
+            Equation::Gyroscope | Equation::RotorSpeed => "rad/s",
+        }
+    }
+}
+
+/// How the channels of a flight are read.
+#[derive(Debug, Clone)]
+pub struct Layout {
+    /// The grid.
+    pub clock: Clock,
+    /// Grid steps in a box of the window, which is also the way from knot to knot.
+    pub box_steps: usize,
+    /// Middles of the windows that are compared.
+    pub knots: Vec<usize>,
+    /// The equations, in the order of their rows.
+    pub equations: Vec<Equation>,
+    /// Measured side and model side of each equation.
+    pub windows: Vec<(Window, Window)>,
+}
+
+/// What was measured, on the grid.
+#[derive(Debug, Clone)]
+pub struct Tracks {
+    /// Position in W.
+    pub position: Track<3>,
+    /// Velocity in W, measured or else from the position.
+    pub velocity: Vec<[f64; 3]>,
+    /// Attitude, B to W.
+    pub attitude: Vec<UnitQuaternion<f64>>,
+    /// Angular velocity in B.
+    pub rates: Vec<[f64; 3]>,
+    /// The measured side of every row: for each knot, each equation's components.
+    pub rows: Vec<f64>,
+}
+
+/// A flight with its layout.
+#[derive(Debug)]
+pub struct Prepared<'f> {
+    /// The flight.
+    pub flight: &'f Flight,
+    /// How it is read.
+    pub layout: Layout,
+    /// Lateness of the pose against the other channels that this flight alone has, beyond what all flights share.
+    pub pose_offset_s: f64,
+    /// Rotors whose measured speed is not believed.
+    pub distrusted: [bool; 4],
+}
+
+/// The grid for flights whose slowest compared channel has this period: at 100 Hz windows of 0.12 s.
+fn steps_s(period_s: f64) -> (f64, usize) {
+    let box_s = (3.0 * period_s).max(0.02);
+    let box_steps = 5;
+    (box_s / box_steps as f64, box_steps)
+}
+
+impl<'f> Prepared<'f> {
+    /// The flight on its grid; `None` where it has nothing to compare: no commands and no rotor speeds, no motion, or
+    /// less than three windows of it.
+    #[must_use]
+    pub fn new(flight: &'f Flight, box_s: Option<f64>, is_flying: impl Fn(&[f64; 4]) -> bool) -> Option<Self> {
+        let equations = equations(flight);
+        let (start_s, end_s) = common_span(flight, &equations)?;
+        let (step_s, box_steps) = match box_s {
+            Some(box_s) => (box_s / 5.0, 5),
+            None => steps_s(slowest_period_s(flight)?),
+        };
+        let clock = Clock::spanning(start_s, end_s, step_s);
+        let windows = equations.iter().map(|equation| windows(*equation, flight, box_steps, step_s)).collect();
+        let layout = Layout { clock, box_steps, knots: Vec::new(), equations, windows };
+        let mut prepared = Self { flight, layout, pose_offset_s: 0.0, distrusted: [false; 4] };
+        prepared.layout.knots = prepared.knots(&is_flying);
+        (prepared.layout.knots.len() >= 3).then_some(prepared)
+    }
+
+    /// Rows of one knot.
+    #[must_use]
+    pub fn width(&self) -> usize {
+        self.layout.equations.iter().map(|equation| equation.size()).sum()
+    }
+
+    /// Where the rows of `equation` start within a knot.
+    #[must_use]
+    pub fn offset_of(&self, equation: Equation) -> Option<usize> {
+        let at = self.layout.equations.iter().position(|own| *own == equation)?;
+        Some(self.layout.equations[..at].iter().map(|equation| equation.size()).sum())
+    }
+
+    /// What was measured, with the pose late by `pose_s` and the inertial unit by `imu_s`.
+    #[must_use]
+    pub fn tracks(&self, pose_s: f64, imu_s: f64) -> Tracks {
+        let (flight, clock) = (self.flight, &self.layout.clock);
+        let pose_s = pose_s + self.pose_offset_s;
+        let position = Track::sampled(&flight.position, pose_s, clock);
+        let velocity_track = Track::sampled(&flight.velocity, pose_s, clock);
+        let velocity = if flight.velocity.is_empty() {
+            position.slope(self.layout.box_steps, clock.step_s)
+        } else {
+            velocity_track.values.clone()
+        };
+        let attitude = attitudes(&Track::sampled(&flight.attitude, pose_s, clock));
+        let turning = turning(&attitude, clock.step_s);
+        let gyroscope = Track::sampled(&flight.angular_velocity, imu_s, clock);
+        let force = Track::sampled(&flight.specific_force, imu_s, clock);
+        let speeds = Track::sampled(&flight.rotor_speed, 0.0, clock);
+        let rates = if flight.angular_velocity.is_empty() {
+            Track { values: turning.clone(), valid: Vec::new() }.smoothed(self.layout.box_steps / 2)
+        } else {
+            gyroscope.values.clone()
+        };
+        let mut rows = Vec::with_capacity(self.layout.knots.len() * self.width());
+        for &knot in &self.layout.knots {
+            for (equation, (measured, model)) in self.layout.equations.iter().zip(&self.layout.windows) {
+                match equation {
+                    Equation::SpecificForce => rows.extend(measured.over(&force.values, knot)),
+                    Equation::Acceleration if flight.position.is_empty() => {
+                        rows.extend(measured.over(&velocity_track.values, knot));
+                    }
+                    Equation::Acceleration => rows.extend(measured.over(&position.values, knot)),
+                    Equation::AngularAcceleration if flight.angular_velocity.is_empty() => {
+                        rows.extend(measured.over(&turning, knot));
+                    }
+                    Equation::AngularAcceleration => rows.extend(measured.over(&gyroscope.values, knot)),
+                    Equation::Gyroscope => {
+                        let (gyro, turned) = (model.over(&gyroscope.values, knot), measured.over(&turning, knot));
+                        rows.extend((0..3).map(|axis| gyro[axis] - turned[axis]));
+                    }
+                    Equation::RotorSpeed => rows.extend(measured.over(&speeds.values, knot)),
+                }
+            }
+        }
+        Tracks { position, velocity, attitude, rates, rows }
+    }
+
+    /// Middles of windows in which every compared channel was sampled and the motors were running.
+    fn knots(&self, is_flying: &impl Fn(&[f64; 4]) -> bool) -> Vec<usize> {
+        let valid = self.valid(is_flying);
+        let reach = self.layout.windows.iter().map(|(a, b)| a.reach().max(b.reach())).max().unwrap_or(0);
+        let mut bad = vec![0_usize];
+        for is_valid in &valid {
+            bad.push(bad[bad.len() - 1] + usize::from(!is_valid));
+        }
+        let last = valid.len().saturating_sub(reach + 1);
+        let middles = (reach..last).step_by(self.layout.box_steps);
+        middles.filter(|knot| bad[knot + reach + 1] == bad[knot - reach]).collect()
+    }
+
+    fn valid(&self, is_flying: &impl Fn(&[f64; 4]) -> bool) -> Vec<bool> {
+        let (flight, clock) = (self.flight, &self.layout.clock);
+        let mut valid = vec![true; clock.count];
+        let mut require = |other: Vec<bool>| valid.iter_mut().zip(other).for_each(|(all, one)| *all &= one);
+        if uses_pose(flight) && !flight.position.is_empty() {
+            require(Track::sampled(&flight.position, 0.0, clock).valid);
+        }
+        if !flight.attitude.is_empty() {
+            require(Track::sampled(&flight.attitude, 0.0, clock).valid);
+        }
+        if !flight.angular_velocity.is_empty() {
+            require(Track::sampled(&flight.angular_velocity, 0.0, clock).valid);
+        }
+        if !flight.specific_force.is_empty() {
+            require(Track::sampled(&flight.specific_force, 0.0, clock).valid);
+        }
+        if !flight.rotor_speed.is_empty() {
+            require(Track::sampled(&flight.rotor_speed, 0.0, clock).valid);
+        }
+        if !flight.command.is_empty() {
+            let mut held = Held::new(&flight.command);
+            require((0..clock.count).map(|index| is_flying(&held.at(clock.at(index)))).collect());
+        }
+        valid
+    }
+}
+
+/// A channel whose samples hold until the next.
+#[derive(Debug)]
+pub struct Held<'c> {
+    channel: &'c flights::Channel<4>,
+    next: usize,
+}
+
+impl<'c> Held<'c> {
+    /// From its beginning.
+    #[must_use]
+    pub fn new(channel: &'c flights::Channel<4>) -> Self {
+        Self { channel, next: 0 }
+    }
+
+    /// What holds at `at_s`; times have to grow from call to call. Before the first sample, the first.
+    pub fn at(&mut self, at_s: f64) -> [f64; 4] {
+        // Times are sums of decimal fractions: a nanosecond of slack puts an instant on its own sample.
+        while self.next < self.channel.time_s.len() && self.channel.time_s[self.next] <= at_s + 1e-9 {
+            self.next += 1;
+        }
+        self.channel.values[self.next.saturating_sub(1)]
+    }
+}
+
+fn uses_pose(flight: &Flight) -> bool {
+    !flight.attitude.is_empty()
+}
+
+/// The equations that the channels of a flight allow.
+fn equations(flight: &Flight) -> Vec<Equation> {
+    let has_position = !flight.position.is_empty() || !flight.velocity.is_empty();
+    let (has_attitude, has_gyroscope) = (!flight.attitude.is_empty(), !flight.angular_velocity.is_empty());
+    // An assumed attitude says nothing that a gyroscope could be held against.
+    let is_assumed = !flight.assumed.is_empty();
+    let has_both_speeds = !flight.rotor_speed.is_empty() && !flight.command.is_empty();
+    let all = [
+        (Equation::SpecificForce, !flight.specific_force.is_empty()),
+        (Equation::Acceleration, has_position && has_attitude),
+        (Equation::AngularAcceleration, has_attitude || has_gyroscope),
+        (Equation::Gyroscope, has_attitude && has_gyroscope && !is_assumed),
+        (Equation::RotorSpeed, has_both_speeds),
+    ];
+    all.into_iter().filter(|(_, is_there)| *is_there).map(|(equation, _)| equation).collect()
+}
+
+fn windows(equation: Equation, flight: &Flight, box_steps: usize, step_s: f64) -> (Window, Window) {
+    let plain = Window::b_spline(box_steps);
+    let (second, central) = (second_difference(step_s), central_difference(step_s));
+    match equation {
+        Equation::SpecificForce | Equation::RotorSpeed => (plain.clone(), plain),
+        Equation::Acceleration if flight.position.is_empty() => (plain.behind(central), plain.behind(SIMPSON)),
+        Equation::Acceleration => (plain.behind(second), plain.behind(NUMEROV)),
+        Equation::AngularAcceleration if flight.angular_velocity.is_empty() => {
+            (plain.behind(central), plain.behind(SIMPSON).behind(SIMPSON))
+        }
+        Equation::AngularAcceleration => (plain.behind(central), plain.behind(SIMPSON)),
+        // The attitude's rate is a mean over two steps, so the gyroscope is averaged alike.
+        Equation::Gyroscope => (plain.clone(), plain.behind(SIMPSON)),
+    }
+}
+
+/// The time in which all compared channels were sampled.
+fn common_span(flight: &Flight, equations: &[Equation]) -> Option<(f64, f64)> {
+    let drive = if flight.command.is_empty() { flight.rotor_speed.span_s() } else { flight.command.span_s() };
+    let motion = [
+        flight.position.span_s().filter(|_| equations.contains(&Equation::Acceleration)),
+        flight.attitude.span_s(),
+        flight.angular_velocity.span_s(),
+        flight.specific_force.span_s(),
+    ];
+    if equations.iter().all(|equation| *equation == Equation::RotorSpeed) {
+        return None;
+    }
+    let spans = motion.into_iter().flatten().chain([drive?]);
+    Some(spans.fold((f64::MIN, f64::MAX), |(start, end), span| (start.max(span.0), end.min(span.1))))
+        .filter(|(start, end)| end > start)
+}
+
+/// The longest of the periods of what is compared.
+fn slowest_period_s(flight: &Flight) -> Option<f64> {
+    let periods = [
+        flight.position.period_s(),
+        flight.attitude.period_s(),
+        flight.angular_velocity.period_s(),
+        flight.specific_force.period_s(),
+    ];
+    periods.into_iter().flatten().reduce(f64::max)
+}
+
+fn attitudes(track: &Track<4>) -> Vec<UnitQuaternion<f64>> {
+    let unit = |[w, x, y, z]: &[f64; 4]| {
+        let raw = Quaternion::new(*w, *x, *y, *z);
+        if raw.norm() > 1e-6 { UnitQuaternion::new_normalize(raw) } else { UnitQuaternion::identity() }
+    };
+    track.values.iter().map(unit).collect()
+}
+
+/// The mean angular velocity in B from the instant before to the instant after.
+fn turning(attitude: &[UnitQuaternion<f64>], step_s: f64) -> Vec<[f64; 3]> {
+    let count = attitude.len();
+    let between = |i: usize| -> Vector3<f64> { (attitude[i].inverse() * attitude[i + 1]).scaled_axis() / step_s };
+    (0..count)
+        .map(|i| {
+            if count < 3 {
+                return [0.0; 3];
+            }
+            let i = i.clamp(1, count - 2);
+            ((between(i - 1) + between(i)) / 2.0).into()
+        })
+        .collect()
+}
+
+impl<const N: usize> Track<N> {
+    /// The mean over `reach` instants to both sides.
+    fn smoothed(&self, reach: usize) -> Vec<[f64; N]> {
+        let count = self.values.len();
+        (0..count)
+            .map(|i| {
+                let (first, last) = (i.saturating_sub(reach), (i + reach).min(count - 1));
+                let mut sum = [0.0; N];
+                for value in &self.values[first..=last] {
+                    sum.iter_mut().zip(value).for_each(|(sum, value)| *sum += value);
+                }
+                sum.map(|sum| sum / (last - first + 1) as f64)
+            })
+            .collect()
+    }
+}

@@ -1,0 +1,277 @@
+//! Attribution: which candidates the flights ask for, one after the other.
+//!
+//! In each round every candidate is fitted, together with what was accepted before, on the fit flights, and judged
+//! on the test flights. It is accepted only if three things hold:
+//!
+//! 1. The gain on the test flights is beyond chance: the mean of the blocks' gains is above zero by a one-sided test
+//!    at 5 % over all candidates of the round together (Bonferroni; Student's t over blocks).
+//! 2. One of its parameters differs from the declared value beyond chance on the fit flights, at the same level.
+//! 3. The gain matters: it is at least [`LEAST_GAIN`] of the squared error.
+//!
+//! Of the accepted the one with the greatest gain is taken, but one with fewer parameters where the difference is not
+//! beyond chance. Then those taken before have to pass the first test again, as a later effect may explain what an
+//! earlier one stood in for. The rounds end when nothing is accepted any more.
+
+use crate::candidate::Candidate;
+use crate::fit::{Bench, Fitted};
+use crate::normal;
+use crate::parameter::Stage;
+use nalgebra::DVector;
+use statrs::distribution::{ContinuousCDF, StudentsT};
+
+/// A smaller part of the squared error does not matter, however certain it is: what the comparison itself leaves at
+/// its joints is of the order of a tenth of it.
+pub const LEAST_GAIN: f64 = 0.002;
+/// Chance of a false acceptance in a round.
+pub const FALSE_RATE: f64 = 0.05;
+/// Two rivals whose difference is within this one-sided level cannot be told apart.
+const RIVAL_LEVEL: f64 = 0.05;
+/// More rounds than there are effects worth naming.
+const ROUNDS_MAX: usize = 10;
+
+/// A candidate that was fitted and judged.
+#[derive(Debug, Clone)]
+pub struct Judged {
+    /// The candidate.
+    pub candidate: Candidate,
+    /// The fit of it and of what was accepted before.
+    pub fitted: Fitted,
+    /// Gain on the test flights as a part of their squared error.
+    pub gain: f64,
+    /// The gain in units of its standard error.
+    pub gain_t: f64,
+    /// The largest deviation of a parameter from the declared value, in units of its standard error.
+    pub parameter_t: f64,
+    /// Whether it was accepted.
+    pub is_accepted: bool,
+}
+
+/// One round.
+#[derive(Debug, Clone)]
+pub struct Round {
+    /// Everything judged in it.
+    pub judged: Vec<Judged>,
+    /// Which of it was taken.
+    pub taken: Option<usize>,
+}
+
+/// What a selection came to.
+#[derive(Debug, Clone)]
+pub struct Selection {
+    /// What was accepted, in order.
+    pub accepted: Vec<Candidate>,
+    /// The declared model.
+    pub before: Fitted,
+    /// The model with all that was accepted.
+    pub after: Fitted,
+    /// The rounds.
+    pub rounds: Vec<Round>,
+}
+
+/// Selects among `candidates`, telling `progress` of each step.
+pub fn select(bench: &mut Bench, candidates: &[Candidate], progress: &mut dyn FnMut(&str)) -> Selection {
+    let declared = bench.model.parameters.declared();
+    let mut accepted: Vec<Candidate> = Vec::new();
+    let mut rounds = Vec::new();
+    let mut base = bench.fitted(&declared, &[]);
+    for number in 1..=ROUNDS_MAX {
+        bench.weigh(&base, candidates);
+        base = bench.fitted(&base.values, &which(&accepted));
+        let round = round(bench, &base, &accepted, candidates, &mut |effect| {
+            progress(&format!("round {number}: {effect}"));
+        });
+        let taken = round.taken.map(|at| round.judged[at].clone());
+        rounds.push(round);
+        let Some(taken) = taken else { break };
+        accepted.push(taken.candidate);
+        base = taken.fitted;
+        base = without_idle(bench, base, &mut accepted);
+    }
+    bench.weigh(&base, candidates);
+    let after = bench.fitted(&base.values, &which(&accepted));
+    let before = bench.fitted(&declared, &[]);
+    Selection { accepted, before, after, rounds }
+}
+
+/// The parameters of candidates.
+#[must_use]
+pub fn which(accepted: &[Candidate]) -> Vec<usize> {
+    accepted.iter().flat_map(|candidate| candidate.which.clone()).collect()
+}
+
+fn round(
+    bench: &Bench,
+    base: &Fitted,
+    accepted: &[Candidate],
+    candidates: &[Candidate],
+    progress: &mut dyn FnMut(&str),
+) -> Round {
+    let open: Vec<&Candidate> = candidates.iter().filter(|candidate| !accepted.contains(candidate)).collect();
+    let screen = Screen::of(bench, base, accepted, &open);
+    let mut judged = Vec::new();
+    for candidate in &open {
+        progress(candidate.effect);
+        // A linear candidate that promises nothing is not worth a fit of its own.
+        if candidate.starts.is_empty() && !screen.is_promising(candidate) {
+            continue;
+        }
+        judged.push(judge(bench, base, accepted, candidate, open.len()));
+    }
+    let taken = best(&judged);
+    Round { judged, taken }
+}
+
+fn judge(bench: &Bench, base: &Fitted, accepted: &[Candidate], candidate: &Candidate, rivals: usize) -> Judged {
+    let fitted = fitted(bench, base, accepted, candidate);
+    let gain = base.test_sum() - fitted.test_sum();
+    let gain_t = t_of_gain(&base.test_squares, &fitted.test_squares);
+    let parameter_t = parameter_t(bench, &fitted, candidate);
+    let level = FALSE_RATE / rivals as f64;
+    let is_beyond = |t: f64, blocks: usize| t > t_quantile(1.0 - level, blocks);
+    let is_accepted = is_beyond(gain_t, fitted.test_squares.len())
+        && is_beyond(parameter_t, fitted.fit_squares.len())
+        && gain > LEAST_GAIN * base.test_sum()
+        && is_seen(bench, candidate, &fitted);
+    Judged { candidate: candidate.clone(), gain: gain / base.test_sum(), gain_t, parameter_t, is_accepted, fitted }
+}
+
+/// Whether a delay is more than half a step of the grid, which is what the grid can tell of time.
+fn is_seen(bench: &Bench, candidate: &Candidate, fitted: &Fitted) -> bool {
+    candidate.which.iter().any(|at| {
+        let own = &bench.model.parameters.all[*at];
+        let is_delay = own.unit == "s" && (own.stage() == Stage::Tracks || own.effect == "command-delay");
+        !is_delay || (fitted.values[*at] - own.declared).abs() > bench.least_delay_s()
+    })
+}
+
+/// The candidate's parameters fitted together with the accepted ones, from the best of its starts.
+fn fitted(bench: &Bench, base: &Fitted, accepted: &[Candidate], candidate: &Candidate) -> Fitted {
+    let mut all = which(accepted);
+    all.extend(&candidate.which);
+    let mut start = base.values.clone();
+    let mut least = base.fit_squares.iter().sum::<f64>();
+    for values in &candidate.starts {
+        let mut tried = base.values.clone();
+        candidate.which.iter().zip(values).for_each(|(at, value)| tried[*at] = *value);
+        let squares = bench.squares(&bench.fit, &tried).iter().sum::<f64>();
+        // The parts of a product have no slope at zero, so some other start is taken in any case.
+        if squares < least || (start == base.values && candidate.which.len() > 1) {
+            (start, least) = (tried, squares.min(least));
+        }
+    }
+    bench.fitted(&start, &all)
+}
+
+fn parameter_t(bench: &Bench, fitted: &Fitted, candidate: &Candidate) -> f64 {
+    let t = |at: &usize| {
+        let away = (fitted.values[*at] - bench.model.parameters.all[*at].declared).abs();
+        let deviation = fitted.deviation(*at).unwrap_or(0.0);
+        if deviation > 0.0 { away / deviation } else { 0.0 }
+    };
+    candidate.which.iter().map(t).fold(0.0, f64::max)
+}
+
+/// The mean of the differences of blocks in units of its standard error.
+fn t_of_gain(before: &[f64], after: &[f64]) -> f64 {
+    let gains: Vec<f64> = before.iter().zip(after).map(|(before, after)| before - after).collect();
+    let count = gains.len() as f64;
+    let mean = gains.iter().sum::<f64>() / count;
+    let variance = gains.iter().map(|gain| (gain - mean).powi(2)).sum::<f64>() / (count - 1.0).max(1.0);
+    if variance > 0.0 { mean / (variance / count).sqrt() } else { 0.0 }
+}
+
+/// The quantile of Student's distribution for a mean over so many blocks.
+fn t_quantile(probability: f64, blocks: usize) -> f64 {
+    let freedom = (blocks as f64 - 1.0).max(1.0);
+    StudentsT::new(0.0, 1.0, freedom).map_or(f64::INFINITY, |student| student.inverse_cdf(probability))
+}
+
+/// The accepted one with the greatest gain, or the one with the fewest parameters that is not worse beyond chance.
+fn best(judged: &[Judged]) -> Option<usize> {
+    let accepted: Vec<usize> = (0..judged.len()).filter(|at| judged[*at].is_accepted).collect();
+    let by_gain = |a: &&usize, b: &&usize| judged[**a].gain.total_cmp(&judged[**b].gain);
+    let greatest = *accepted.iter().max_by(by_gain)?;
+    let is_rival = |at: &&usize| !is_worse(&judged[**at].fitted, &judged[greatest].fitted);
+    let size = |at: usize| judged[at].candidate.which.len();
+    accepted.iter().filter(is_rival).min_by(|a, b| size(**a).cmp(&size(**b)).then(by_gain(b, a))).copied()
+}
+
+/// Whether `fitted` is worse on the test flights than `other`, beyond chance.
+#[must_use]
+pub fn is_worse(fitted: &Fitted, other: &Fitted) -> bool {
+    let t = t_of_gain(&fitted.test_squares, &other.test_squares);
+    t > t_quantile(1.0 - RIVAL_LEVEL, fitted.test_squares.len())
+}
+
+/// Takes back what no longer gains anything.
+fn without_idle(bench: &Bench, mut base: Fitted, accepted: &mut Vec<Candidate>) -> Fitted {
+    let mut at = 0;
+    // The newest has just passed.
+    while accepted.len() > 1 && at + 1 < accepted.len() {
+        let mut others = accepted.clone();
+        let idle = others.remove(at);
+        let mut start = base.values.clone();
+        idle.which.iter().for_each(|at| start[*at] = bench.model.parameters.all[*at].declared);
+        let fitted = bench.fitted(&start, &which(&others));
+        if is_worse(&fitted, &base) {
+            at += 1;
+        } else {
+            *accepted = others;
+            base = fitted;
+        }
+    }
+    base
+}
+
+/// What the linearised equations promise of each candidate.
+struct Screen {
+    columns: Vec<usize>,
+    fit: Vec<normal::Block>,
+    test: Vec<normal::Block>,
+    accepted: Vec<usize>,
+}
+
+impl Screen {
+    fn of(bench: &Bench, base: &Fitted, accepted: &[Candidate], open: &[&Candidate]) -> Self {
+        let linear = open.iter().filter(|candidate| candidate.starts.is_empty());
+        let mut columns = which(accepted);
+        columns.extend(linear.flat_map(|candidate| candidate.which.clone()));
+        let blocks = |flights| bench.blocks(flights, &base.values, &columns);
+        let (fit, test) = (blocks(&bench.fit), blocks(&bench.test));
+        Self { columns, fit, test, accepted: which(accepted) }
+    }
+
+    /// Whether a step to the fit flights' minimum would gain anything on the test flights.
+    fn is_promising(&self, candidate: &Candidate) -> bool {
+        let wanted = self.accepted.iter().chain(&candidate.which);
+        let at: Vec<usize> = wanted.filter_map(|p| self.columns.iter().position(|own| own == p)).collect();
+        let total = normal::sum(&self.fit).of(&at);
+        let step: DVector<f64> = -(normal::inverse(&total.gram) * &total.gradient);
+        let gain: f64 = self.test.iter().map(|block| block.squares - block.of(&at).squares_after(&step)).sum();
+        gain > 0.0
+    }
+}
+
+/// For an accepted candidate: the effects that would do as well in its place.
+#[must_use]
+pub fn rivals(bench: &Bench, selection: &Selection, at: usize, candidates: &[Candidate]) -> Vec<&'static str> {
+    let own = &selection.accepted[at];
+    let mut others = selection.accepted.clone();
+    others.remove(at);
+    let mut start = selection.after.values.clone();
+    own.which.iter().for_each(|at| start[*at] = bench.model.parameters.all[*at].declared);
+    let base = bench.fitted(&start, &which(&others));
+    let is_other = |candidate: &&Candidate| {
+        candidate.effect != own.effect && !selection.accepted.contains(candidate)
+    };
+    let mut names = Vec::new();
+    for candidate in candidates.iter().filter(is_other) {
+        if !names.contains(&candidate.effect) {
+            let fitted = fitted(bench, &base, &others, candidate);
+            if !is_worse(&fitted, &selection.after) {
+                names.push(candidate.effect);
+            }
+        }
+    }
+    names
+}
