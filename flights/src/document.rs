@@ -41,9 +41,9 @@ impl Document {
         FlightsError::BadValue {
             place: self.place(span),
             key: key.to_owned(),
-            expected: texts.expected.to_owned(),
+            expected: texts.expected,
             found: texts.found.to_owned(),
-            advice: texts.advice.to_owned(),
+            advice: texts.advice,
         }
     }
 
@@ -61,11 +61,11 @@ impl Document {
 /// What a value should have been, what it is, and what to do.
 pub struct Bad<'a> {
     /// What would be accepted.
-    pub expected: &'a str,
+    pub expected: &'static str,
     /// What the file says.
     pub found: &'a str,
     /// What to do.
-    pub advice: &'a str,
+    pub advice: &'static str,
 }
 
 /// Replaces `${NAME}` and `${NAME:-default}` by what `variable` says, as manifests do.

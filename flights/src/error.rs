@@ -34,11 +34,11 @@ pub enum FlightsError {
         /// The whole dotted key.
         key: String,
         /// What would be accepted.
-        expected: String,
+        expected: &'static str,
         /// What the file says.
         found: String,
         /// What to do.
-        advice: String,
+        advice: &'static str,
     },
     /// The vehicle file is not usable.
     #[error("{place}: `vehicle`: {cause}")]
@@ -47,7 +47,7 @@ pub enum FlightsError {
         place: Place,
         /// What is wrong with it.
         #[source]
-        cause: VehicleError,
+        cause: Box<VehicleError>,
     },
     /// A log cannot be read, or does not have what the flights file asks of it.
     #[error("{place}: flight `{flight}`, log {file}: {reason}")]

@@ -9,10 +9,13 @@
 //! | `log` | a log of any format: `csv_log`, `mcap_log` (with `ros_definition`), `ulog`, `crazyflie`, `bytes` |
 //! | `known_types` | messages whose fields and units need not be said |
 //! | `channels`, `clean`, `reading` | from a log's numbers to a flight |
-//! | `plausible` | values against physics |
+//! | `plausible`, `agreement` | values against physics |
+//! | `canonical` | a flight as one CSV table |
 //! | `error` | what can be wrong |
 
+mod agreement;
 mod bytes;
+pub mod canonical;
 mod channels;
 mod clean;
 mod crazyflie;
@@ -32,6 +35,7 @@ mod ros_definition;
 mod set;
 mod ulog;
 
+pub use canonical::{Canonical, write_csv};
 pub use error::FlightsError;
 pub use flight::{Channel, Flight, Role};
 pub use plausible::Finding;

@@ -32,9 +32,8 @@ impl McapLog {
     pub fn parse(bytes: Vec<u8>) -> Result<Self, String> {
         let mut log = Self { bytes, topics: BTreeMap::new(), start_ns: 0, notes: Vec::new() };
         let mut topics = BTreeMap::new();
-        let mut count = 0_usize;
         let mut start_ns = None;
-        for message in Messages::new(&log.bytes) {
+        for (count, message) in Messages::new(&log.bytes).enumerate() {
             let message = match message {
                 Ok(message) => message,
                 Err(error) if count == 0 => {
@@ -47,7 +46,6 @@ impl McapLog {
                     break;
                 }
             };
-            count += 1;
             start_ns = start_ns.or(Some(message.log_time));
             topics.entry(message.channel.topic.clone()).or_insert_with(|| Topic::of(&message.channel));
         }

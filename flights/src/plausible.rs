@@ -1,17 +1,35 @@
 //! Compares measured values with physics: what looks like another unit, frame or order is said.
+//!
+//! A mismatch is clear where a known factor, frame or order explains it; otherwise it is only worth a note.
 
+use nalgebra::{UnitQuaternion, Vector3};
 use vehicles::Vehicle;
 
-use crate::declaration::ChannelMap;
-use crate::flight::Flight;
-use crate::quantity::Quantity;
+use crate::agreement::Pairs;
+use crate::declaration::{ChannelMap, Frame};
+use crate::flight::{Channel, Flight};
+use crate::frame;
+use crate::quantity::{FRACTION, PERCENT, Quantity};
+
+/// Above this correlation a logged and a derived vector are the same but for a factor.
+const SAME: f64 = 0.7;
+/// Windows over which rates are derived, in s: long against the jitter between channels.
+const RATE_WINDOW_S: f64 = 0.1;
+const VELOCITY_WINDOW_S: f64 = 0.2;
+/// Below these the vehicle hardly moves, and noise is compared with noise.
+const QUIET_RATE_RAD_S: f64 = 0.05;
+const QUIET_SPEED_M_S: f64 = 0.05;
+/// No vehicle with four rotors flies faster, in m/s.
+const SPEED_MAX_M_S: f64 = 100.0;
+/// Voltages that a battery of a vehicle can have, from one cell to fourteen.
+const VOLTAGE_RANGE_V: (f64, f64) = (2.0, 62.0);
 
 /// Values that contradict what the flights file declares.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Finding {
     /// The channel.
     pub channel: Quantity,
-    /// How many times too large its values are; -1 for a wrong sign.
+    /// How many times too large its values are; negative for a wrong sign.
     pub factor: f64,
     /// The unit, frame or order that would fit.
     pub fits: Option<String>,
@@ -22,6 +40,281 @@ pub struct Finding {
 }
 
 /// Compares the channels of a flight with each other, with gravity and with the vehicle.
-pub fn judge(_flight: &Flight, _vehicle: &Vehicle, _channels: &ChannelMap) -> Vec<Finding> {
-    Vec::new()
+#[must_use]
+pub fn judge(flight: &Flight, vehicle: &Vehicle, channels: &ChannelMap) -> Vec<Finding> {
+    let judge = Judge { flight, vehicle, channels };
+    let findings = [
+        judge.gravity(),
+        judge.upright(),
+        judge.rates(),
+        judge.velocity(),
+        judge.speed(),
+        judge.commands(),
+        judge.rotor_speed(),
+        judge.voltage(),
+    ];
+    findings.into_iter().flatten().collect()
+}
+
+struct Judge<'a> {
+    flight: &'a Flight,
+    vehicle: &'a Vehicle,
+    channels: &'a ChannelMap,
+}
+
+impl Judge<'_> {
+    /// The specific force is gravity's in the median, and up.
+    fn gravity(&self) -> Option<Finding> {
+        let quantity = Quantity::SpecificForce;
+        let forces = &self.flight.specific_force.values;
+        let norm = median(forces.iter().map(|f| Vector3::from(*f).norm()))?;
+        let up = median(forces.iter().map(|f| f[2]))?;
+        let factor = norm / self.vehicle.gravity_m_s2;
+        let what = format!("its median magnitude is {norm:.4} m/s^2, {factor:.4} times gravity");
+        if let Some(finding) = self.by_unit(quantity, factor, 1.25, &what) {
+            return Some(finding);
+        }
+        if up < -0.7 * norm {
+            let fits = self.other_frame(quantity);
+            let what = format!("its median along z is {up:.3} m/s^2, but up is positive in our body");
+            return Some(finding(quantity, -1.0, Some(fits), &what));
+        }
+        let hint = if factor < 0.5 { "; gravity may have been taken off" } else { "" };
+        (!(0.6..1.6).contains(&factor)).then(|| finding(quantity, factor, None, &format!("{what}{hint}")))
+    }
+
+    /// The vehicle flies upright.
+    fn upright(&self) -> Option<Finding> {
+        let up = z_up(&self.flight.attitude)?;
+        let reordered = self.w_first().and_then(|attitude| z_up(&attitude))?;
+        let what = format!("the vehicle is upside down: its z axis points {up:.2} up in the median");
+        let fits = (reordered > 0.8).then(|| {
+            format!("the order w, x, y, z ({reordered:.2}): name the columns in the order x, y, z, w")
+        });
+        (up < 0.3).then(|| finding(Quantity::Attitude, -1.0, fits, &what))
+    }
+
+    /// The attitude as it would be if the columns named x, y, z, w held w, x, y, z; `None` in other frames.
+    fn w_first(&self) -> Option<Channel<4>> {
+        let entry = self.channels.get(&Quantity::Attitude)?.get_ref();
+        let plain = entry.frame.unwrap_or_default() == Frame::FluEnu && entry.columns.is_some();
+        plain.then(|| Channel {
+            time_s: self.flight.attitude.time_s.clone(),
+            values: self.flight.attitude.values.iter().map(|[w, x, y, z]| [*x, *y, *z, *w]).collect(),
+        })
+    }
+
+    /// The angular velocity is the attitude's derivative.
+    fn rates(&self) -> Option<Finding> {
+        if !self.flight.assumed.is_empty() {
+            return None;
+        }
+        let (quantity, rates) = (Quantity::AngularVelocity, &self.flight.angular_velocity);
+        let pairs = Pairs::rates(&self.flight.attitude, rates, RATE_WINDOW_S);
+        let agreement = pairs.agreement(QUIET_RATE_RAD_S)?;
+        if agreement.correlation > SAME {
+            let what = format!("it is {:.4} times the derivative of the attitude", agreement.slope);
+            return self.by_unit(quantity, agreement.slope, 1.3, &what);
+        }
+        let reordered = self
+            .w_first()
+            .and_then(|attitude| Pairs::rates(&attitude, rates, RATE_WINDOW_S).agreement(QUIET_RATE_RAD_S));
+        if let Some(better) = reordered.filter(|better| better.correlation > SAME) {
+            let what = format!(
+                "its derivative has a correlation of {:.2} with the angular velocity, {:.2} with w first",
+                agreement.correlation, better.correlation
+            );
+            let fits = "the order w, x, y, z: name the columns in the order x, y, z, w".to_owned();
+            return Some(finding(Quantity::Attitude, agreement.slope, Some(fits), &what));
+        }
+        let signs = pairs.signs();
+        let signed =
+            pairs.turned(|rate| rate.component_mul(&Vector3::from(signs))).agreement(QUIET_RATE_RAD_S);
+        let explains = signed.is_some_and(|signed| signed.correlation > SAME);
+        let what = format!(
+            "it has a correlation of {:.2} with the derivative of the attitude (signs of the axes: {signs:?})",
+            agreement.correlation
+        );
+        let fits = explains.then(|| match signs {
+            [x, y, z] if x < 0.0 && y < 0.0 && z < 0.0 => {
+                "an attitude that takes the world to the body: negate x, y and z of its columns".to_owned()
+            }
+            [x, y, z] if x > 0.0 && y < 0.0 && z < 0.0 => self.other_frame(quantity),
+            _ => "the axes with a `-` before the name".to_owned(),
+        });
+        Some(finding(quantity, agreement.slope, fits, &what))
+    }
+
+    /// The velocity is the position's derivative.
+    fn velocity(&self) -> Option<Finding> {
+        let quantity = Quantity::Velocity;
+        let pairs = Pairs::velocities(&self.flight.position, &self.flight.velocity, VELOCITY_WINDOW_S);
+        // A position in too large a unit makes everything look quiet: the share of noise decides then.
+        let agreement = pairs.agreement(QUIET_SPEED_M_S * self.position_scale())?;
+        let what = format!("it is {:.5} times the derivative of the position", agreement.slope);
+        if agreement.correlation > SAME {
+            let position = self.unit_that_fits(Quantity::Position, 1.0 / agreement.slope, 1.3);
+            let finding = self.by_unit(quantity, agreement.slope, 1.3, &what)?;
+            return Some(match (position, &finding.fits) {
+                (Some(position), Some(velocity)) => {
+                    let both = format!("{velocity} here or {position} of `position`");
+                    Finding { message: finding.message.replacen(velocity, &both, 1), ..finding }
+                }
+                _ => finding,
+            });
+        }
+        let turned = pairs.turned(|v| Vector3::new(v.y, v.x, -v.z)).agreement(0.0);
+        let fits = turned
+            .filter(|turned| turned.correlation > SAME)
+            .map(|_| format!("{} (x and y change places, z its sign)", self.other_frame(quantity)));
+        let what = format!(
+            "it has a correlation of {:.2} with the derivative of the position{}",
+            agreement.correlation,
+            if fits.is_some() { "" } else { "; it may be in the body, or late" }
+        );
+        Some(finding(quantity, agreement.slope, fits, &what))
+    }
+
+    /// How much smaller a position can be than its true one, if its unit is declared too large.
+    fn position_scale(&self) -> f64 {
+        let declared = self.factor(Quantity::Position);
+        let largest = Quantity::Position.units().iter().map(|unit| unit.1).fold(declared, f64::max);
+        declared / largest
+    }
+
+    /// The position does not change faster than vehicles fly.
+    fn speed(&self) -> Option<Finding> {
+        let (quantity, position) = (Quantity::Position, &self.flight.position);
+        let pairs = Pairs::velocities(position, position, VELOCITY_WINDOW_S);
+        let speed = median(pairs.derived.iter().map(|velocity| velocity.norm()))?;
+        let what = format!("its median speed is {speed:.1} m/s");
+        let fits = self.units_within(quantity, speed, (0.0, SPEED_MAX_M_S));
+        (speed > SPEED_MAX_M_S).then(|| finding(quantity, speed, fits, &what))
+    }
+
+    /// The commands lie in the vehicle's range.
+    fn commands(&self) -> Option<Finding> {
+        let quantity = Quantity::Command;
+        let map = self.vehicle.command;
+        let (low, high) = range(self.flight.command.values.iter().flatten().copied())?;
+        let tolerance = 0.05 * (map.max - map.min);
+        let what = format!(
+            "its commands go from {low} to {high}, the vehicle's from {} to {} (hover {:.1})",
+            map.min,
+            map.max,
+            self.vehicle.hover_command()
+        );
+        let share = match (self.unit(quantity), high) {
+            ("count", high) if high <= 1.001 && map.max > 50.0 => Some((FRACTION, 1.0 / map.max)),
+            ("count", high) if high <= 100.1 && map.max > 1000.0 => Some((PERCENT, 100.0 / map.max)),
+            (FRACTION | PERCENT, high) if high > 20.0 * map.max => Some(("count", high / map.max)),
+            _ => None,
+        };
+        // A motor at rest is zero whatever the smallest command, and then no command says anything.
+        if let Some((unit, factor)) = share.filter(|_| high > 0.0) {
+            return Some(finding(quantity, factor, Some(format!("`unit = \"{unit}\"`")), &what));
+        }
+        let outside = high > map.max + tolerance || low < (map.min - tolerance).min(0.0);
+        let far = high > 1.5 * map.max + tolerance;
+        let fits = far.then(|| "a vehicle file with their range in its `[command]`".to_owned());
+        (outside || high < map.min).then(|| finding(quantity, high / map.max, fits, &what))
+    }
+
+    /// The rotors turn about as fast as hover needs.
+    fn rotor_speed(&self) -> Option<Finding> {
+        let speeds = self.flight.rotor_speed.values.iter().flatten().copied();
+        let (_, high) = range(speeds.clone())?;
+        let turning = median(speeds.filter(|speed| *speed > 0.3 * high))?;
+        let hover = self.vehicle.hover_speed_rad_s();
+        let factor = turning / hover;
+        let what = format!("its median is {turning:.1} rad/s, hover needs {hover:.1} rad/s");
+        if !(hover.is_finite() && hover > 0.0) {
+            return None;
+        }
+        let by_unit = self.by_unit(Quantity::RotorSpeed, factor, 1.6, &what);
+        by_unit.filter(|finding| finding.clear || !(0.5..2.0).contains(&factor))
+    }
+
+    /// The voltage is one that batteries have.
+    fn voltage(&self) -> Option<Finding> {
+        let quantity = Quantity::BatteryVoltage;
+        let volts = median(self.flight.battery_voltage.values.iter().map(|value| value[0]))?;
+        let (low, high) = VOLTAGE_RANGE_V;
+        let what = format!("its median is {volts} V, batteries have {low} to {high} V");
+        let fits = self.units_within(quantity, volts, VOLTAGE_RANGE_V);
+        (!(low..high).contains(&volts)).then(|| finding(quantity, volts / 4.0, fits, &what))
+    }
+
+    /// The unit in which the values would lie in `range`.
+    fn units_within(&self, quantity: Quantity, value: f64, range: (f64, f64)) -> Option<String> {
+        let raw = value / self.factor(quantity);
+        let others = quantity.units().iter().filter(|(name, _)| *name != self.unit(quantity));
+        let mut fitting = others.filter(|(_, factor)| (range.0..range.1).contains(&(raw * factor)));
+        fitting.next_back().map(|(name, _)| format!("`unit = \"{name}\"`"))
+    }
+
+    /// A finding for values `factor` times too large: clear if another unit explains it within `tolerance`.
+    fn by_unit(&self, quantity: Quantity, factor: f64, tolerance: f64, what: &str) -> Option<Finding> {
+        if factor > 0.0 && factor.ln().abs() < tolerance.ln() {
+            return None;
+        }
+        let fits = self.unit_that_fits(quantity, factor, tolerance);
+        // The caller of `gravity` has its own words where no unit fits.
+        if fits.is_none() && quantity == Quantity::SpecificForce {
+            return None;
+        }
+        Some(finding(quantity, factor, fits, &format!("declared in {}, {what}", self.unit(quantity))))
+    }
+
+    /// The unit in which values would be right that are now `factor` times too large.
+    fn unit_that_fits(&self, quantity: Quantity, factor: f64, tolerance: f64) -> Option<String> {
+        let declared = self.factor(quantity);
+        let off = |other: f64| (factor * other / declared).abs().ln().abs();
+        let others = quantity.units().iter().filter(|(name, _)| *name != self.unit(quantity));
+        let best = others.min_by(|a, b| off(a.1).total_cmp(&off(b.1)))?;
+        (off(best.1) < tolerance.ln()).then(|| format!("`unit = \"{}\"`", best.0))
+    }
+
+    /// The declared unit; SI where the flights file leaves it to the type of message.
+    fn unit(&self, quantity: Quantity) -> &str {
+        let declared = self.channels.get(&quantity).and_then(|entry| entry.get_ref().unit.as_deref());
+        declared.unwrap_or(quantity.units()[0].0)
+    }
+
+    fn factor(&self, quantity: Quantity) -> f64 {
+        quantity.factor(self.unit(quantity)).unwrap_or(1.0)
+    }
+
+    fn other_frame(&self, quantity: Quantity) -> String {
+        let frame = self.channels.get(&quantity).and_then(|entry| entry.get_ref().frame);
+        let other = if frame == Some(Frame::FrdNed) { "flu-enu" } else { "frd-ned" };
+        format!("`frame = \"{other}\"`")
+    }
+}
+
+/// A finding; clear if something would fit.
+fn finding(channel: Quantity, factor: f64, fits: Option<String>, what: &str) -> Finding {
+    let advice = fits.as_ref().map_or(String::new(), |fits| format!("; {fits} would fit"));
+    Finding { channel, factor, clear: fits.is_some(), message: format!("`{channel}`: {what}{advice}"), fits }
+}
+
+/// The median of how far the body's z axis points up, from -1 to 1.
+fn z_up(attitude: &Channel<4>) -> Option<f64> {
+    median(attitude.values.iter().map(|wxyz| {
+        let q = UnitQuaternion::from_quaternion(frame::from_wxyz(*wxyz));
+        (q * Vector3::z()).z
+    }))
+}
+
+fn median(numbers: impl Iterator<Item = f64>) -> Option<f64> {
+    let mut sorted: Vec<f64> = numbers.collect();
+    sorted.sort_by(f64::total_cmp);
+    sorted.get(sorted.len() / 2).copied()
+}
+
+fn range(numbers: impl Iterator<Item = f64>) -> Option<(f64, f64)> {
+    numbers.fold(None, |range, number| match range {
+        None => Some((number, number)),
+        Some((low, high)) => Some((number.min(low), number.max(high))),
+    })
 }

@@ -150,7 +150,7 @@ impl Reading<'_> {
         origin_s: f64,
     ) -> Channel<N> {
         let delay_s = self.entry.delay_s.get(&quantity).map_or(0.0, |delay_s| *delay_s.get_ref());
-        channel.time_s.iter_mut().for_each(|time_s| *time_s = *time_s - origin_s - self.from_s() - delay_s);
+        channel.time_s.iter_mut().for_each(|time_s| *time_s = *time_s - origin_s - self.start_s() - delay_s);
         channel
     }
 
@@ -175,12 +175,12 @@ impl Reading<'_> {
         self.window(command)
     }
 
-    fn from_s(&self) -> f64 {
+    fn start_s(&self) -> f64 {
         self.entry.from_s.as_ref().map_or(0.0, |from_s| *from_s.get_ref())
     }
 
     fn length_s(&self) -> f64 {
-        self.entry.to_s.as_ref().map_or(f64::INFINITY, |to_s| *to_s.get_ref() - self.from_s())
+        self.entry.to_s.as_ref().map_or(f64::INFINITY, |to_s| *to_s.get_ref() - self.start_s())
     }
 
     /// Fills in what the flights file assumes instead of a measurement.
@@ -231,7 +231,7 @@ impl Reading<'_> {
             if span.is_none() && self.declared(quantity).is_some() {
                 let reason = format!(
                     "no sample lies in the flight's part from {} s on; correct `from_s` and `to_s`",
-                    self.from_s()
+                    self.start_s()
                 );
                 return Err(self.channel_error(quantity, reason));
             }

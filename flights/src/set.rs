@@ -32,7 +32,7 @@ impl FlightSet {
         let vehicle_path = document.resolve("vehicle", &declaration.vehicle)?;
         let vehicle = Vehicle::load(&vehicle_path).map_err(|cause| FlightsError::Vehicle {
             place: document.place(&declaration.vehicle.span()),
-            cause,
+            cause: Box::new(cause),
         })?;
         check_names(&document, &declaration.flight)?;
         let context = Context { document: &document, declaration: &declaration, vehicle: &vehicle };

@@ -1,0 +1,104 @@
+//! How two measurements of the same vector agree, whatever their units: one logged, one derived from another channel.
+
+use nalgebra::{UnitQuaternion, Vector3};
+
+use crate::flight::Channel;
+use crate::frame::from_wxyz;
+
+/// Fewer pairs say nothing.
+const PAIRS_MIN: usize = 20;
+
+/// Pairs of a logged and a derived vector.
+#[derive(Debug, Clone, Default)]
+pub struct Pairs {
+    /// As logged.
+    pub logged: Vec<Vector3<f64>>,
+    /// As derived.
+    pub derived: Vec<Vector3<f64>>,
+}
+
+impl Pairs {
+    /// The angular velocity against the attitude's change over windows of `window_s`.
+    pub fn rates(attitude: &Channel<4>, angular_velocity: &Channel<3>, window_s: f64) -> Self {
+        let q = |index: usize| UnitQuaternion::from_quaternion(from_wxyz(attitude.values[index]));
+        let change = |from: usize, to: usize| (q(from).inverse() * q(to)).scaled_axis();
+        Self::over_windows(&attitude.time_s, angular_velocity, window_s, change)
+    }
+
+    /// The velocity against the position's change over windows of `window_s`.
+    pub fn velocities(position: &Channel<3>, velocity: &Channel<3>, window_s: f64) -> Self {
+        let p = |index: usize| Vector3::from(position.values[index]);
+        Self::over_windows(&position.time_s, velocity, window_s, |from, to| p(to) - p(from))
+    }
+
+    fn over_windows(
+        time_s: &[f64],
+        logged: &Channel<3>,
+        window_s: f64,
+        change: impl Fn(usize, usize) -> Vector3<f64>,
+    ) -> Self {
+        let mut pairs = Self::default();
+        let mut from = 0;
+        while from < time_s.len() {
+            let to = time_s.partition_point(|time| *time < time_s[from] + window_s);
+            let Some(length_s) = time_s.get(to).map(|end_s| end_s - time_s[from]) else { break };
+            // A longer window spans a gap.
+            if let Some(mean) = mean(logged, time_s[from], time_s[to]).filter(|_| length_s < 2.0 * window_s) {
+                pairs.logged.push(mean);
+                pairs.derived.push(change(from, to) / length_s);
+            }
+            from = to;
+        }
+        pairs
+    }
+
+    /// The same pairs, the logged vector turned by `turn`.
+    pub fn turned(&self, turn: impl Fn(&Vector3<f64>) -> Vector3<f64>) -> Self {
+        Self { logged: self.logged.iter().map(turn).collect(), derived: self.derived.clone() }
+    }
+
+    /// How the pairs agree; `None` where there are few, or the derived vector is mostly below `quiet`.
+    pub fn agreement(&self, quiet: f64) -> Option<Agreement> {
+        let dot =
+            |a: &[Vector3<f64>], b: &[Vector3<f64>]| a.iter().zip(b).map(|(a, b)| a.dot(b)).sum::<f64>();
+        let logged = dot(&self.logged, &self.logged);
+        let derived = dot(&self.derived, &self.derived);
+        let both = dot(&self.logged, &self.derived);
+        #[allow(clippy::cast_precision_loss, reason = "counts of samples")]
+        let count = self.derived.len() as f64;
+        let says_something =
+            self.derived.len() >= PAIRS_MIN && (derived / count).sqrt() > quiet && logged > 0.0;
+        says_something
+            .then(|| Agreement { slope: both / derived, correlation: both / (logged * derived).sqrt() })
+    }
+
+    /// The signs of the axes' correlations: 0 for an axis that shows none.
+    pub fn signs(&self) -> [f64; 3] {
+        std::array::from_fn(|axis| {
+            let sum = |f: &dyn Fn(f64, f64) -> f64| {
+                self.logged.iter().zip(&self.derived).map(|(a, b)| f(a[axis], b[axis])).sum::<f64>()
+            };
+            let (both, logged, derived) = (sum(&|a, b| a * b), sum(&|a, _| a * a), sum(&|_, b| b * b));
+            let correlation = both / (logged * derived).sqrt();
+            if correlation.abs() > 0.5 { correlation.signum() } else { 0.0 }
+        })
+    }
+}
+
+/// How a logged vector agrees with a derived one.
+#[derive(Debug, Clone, Copy)]
+pub struct Agreement {
+    /// Logged over derived, by least squares.
+    pub slope: f64,
+    /// From -1 to 1.
+    pub correlation: f64,
+}
+
+/// The mean of the samples after `from_s` up to `to_s`.
+fn mean(channel: &Channel<3>, from_s: f64, to_s: f64) -> Option<Vector3<f64>> {
+    let index = |time_s: f64| channel.time_s.partition_point(|sample_s| *sample_s <= time_s);
+    let samples = channel.values.get(index(from_s)..index(to_s)).filter(|samples| !samples.is_empty())?;
+    #[allow(clippy::cast_precision_loss, reason = "a count of samples")]
+    let count = samples.len() as f64;
+    Some(samples.iter().map(|sample| Vector3::from(*sample)).sum::<Vector3<f64>>() / count)
+}

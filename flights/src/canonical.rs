@@ -1,0 +1,248 @@
+//! A flight as one table on one time base, in SI: a CSV file that every tool reads, the `player` node among them.
+
+use std::fmt::Write as _;
+use std::path::Path;
+
+use nalgebra::{Matrix3, UnitQuaternion, Vector3};
+
+use crate::clean::{GAP_PERIODS, gaps};
+use crate::error::FlightsError;
+use crate::flight::{Channel, Flight};
+use crate::frame::{from_wxyz, to_wxyz};
+
+/// How the columns of the file are to be read, as the `columns` table of a player in a manifest.
+pub const COLUMNS: &str = r#"time = { columns = ["t"], unit = "s" }
+command = { columns = ["m1", "m2", "m3", "m4"], unit = "count" }
+position = { columns = ["px", "py", "pz"], unit = "m" }
+velocity = { columns = ["vx", "vy", "vz"], unit = "m/s" }
+attitude = { columns = ["qx", "qy", "qz", "qw"], unit = "1" }
+angular_velocity = { columns = ["wx", "wy", "wz"], unit = "rad/s" }
+"#;
+
+const HEADER: &str = "t,m1,m2,m3,m4,px,py,pz,vx,vy,vz,qx,qy,qz,qw,wx,wy,wz\n";
+/// Samples to either side of one at which a derivative is fitted.
+const HALF_WINDOW: usize = 3;
+
+/// What was written.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Canonical {
+    /// How many rows.
+    pub rows: usize,
+    /// [`COLUMNS`].
+    pub columns: String,
+    /// What was derived, filled in or left out.
+    pub notes: Vec<String>,
+}
+
+/// Writes `flight` to `path`, a row for each sample of the attitude, or of the angular velocity where no attitude
+/// was logged. A command holds until the next; the rest is interpolated, and derived where it was not logged.
+///
+/// # Errors
+/// If the flight has neither attitude nor angular velocity, or the file cannot be written.
+pub fn write_csv(flight: &Flight, path: &Path) -> Result<Canonical, FlightsError> {
+    let mut notes = Vec::new();
+    let table = Table::of(flight, &mut notes);
+    let base =
+        if flight.attitude.is_empty() { &flight.angular_velocity.time_s } else { &flight.attitude.time_s };
+    let times: Vec<f64> = base.iter().copied().filter(|time_s| !table.is_in_gap(*time_s)).collect();
+    if times.is_empty() {
+        return Err(FlightsError::TooLittle {
+            flight: flight.name.clone(),
+            reason:
+                "no attitude or angular velocity at a time at which its other channels have samples; map one \
+                     of them, or use `assume = \"hover\"`"
+                    .to_owned(),
+        });
+    }
+    if times.len() < base.len() {
+        notes.push(format!(
+            "{} of {} rows lie in gaps of more than {GAP_PERIODS} periods of some channel; left out",
+            base.len() - times.len(),
+            base.len()
+        ));
+    }
+    let text = times.iter().fold(HEADER.to_owned(), |text, time_s| text + &table.row(*time_s));
+    std::fs::write(path, text)
+        .map_err(|error| FlightsError::Write { path: path.to_owned(), reason: error.to_string() })?;
+    Ok(Canonical { rows: times.len(), columns: COLUMNS.to_owned(), notes })
+}
+
+/// The channels from which rows are made.
+struct Table<'a> {
+    flight: &'a Flight,
+    velocity: Channel<3>,
+    angular_velocity: Channel<3>,
+    /// Times, without their ends, at which a channel has no samples.
+    gaps: Vec<(f64, f64)>,
+}
+
+impl<'a> Table<'a> {
+    fn of(flight: &'a Flight, notes: &mut Vec<String>) -> Self {
+        let mut velocity = flight.velocity.clone();
+        if velocity.is_empty() && !flight.position.is_empty() {
+            velocity = derivative(&flight.position.time_s, |from, to| {
+                Vector3::from(flight.position.values[to]) - Vector3::from(flight.position.values[from])
+            });
+            notes.push("velocity: derived from the position by local quadratics over 7 samples".to_owned());
+        }
+        let mut angular_velocity = flight.angular_velocity.clone();
+        if angular_velocity.is_empty() {
+            let q = |index: usize| UnitQuaternion::from_quaternion(from_wxyz(flight.attitude.values[index]));
+            angular_velocity =
+                derivative(&flight.attitude.time_s, |from, to| (q(from).inverse() * q(to)).scaled_axis());
+            notes.push(
+                "angular velocity: derived from the attitude by local quadratics over 7 samples".to_owned(),
+            );
+        }
+        let missing = [
+            (flight.command.is_empty(), "command: not logged, filled with 0"),
+            (flight.position.is_empty(), "position: not logged, filled with 0"),
+            (velocity.is_empty(), "velocity: not logged, filled with 0"),
+            (flight.attitude.is_empty(), "attitude: not logged, filled with the identity"),
+        ];
+        notes
+            .extend(missing.iter().filter(|(is_missing, _)| *is_missing).map(|(_, text)| (*text).to_owned()));
+        let mut table = Self { flight, velocity, angular_velocity, gaps: Vec::new() };
+        table.find_gaps();
+        table
+    }
+
+    fn find_gaps(&mut self) {
+        let mut found = without(&self.flight.position);
+        found.extend(without(&self.velocity));
+        found.extend(without(&self.flight.attitude));
+        found.extend(without(&self.angular_velocity));
+        self.gaps = found;
+    }
+
+    fn is_in_gap(&self, time_s: f64) -> bool {
+        self.gaps.iter().any(|(from_s, to_s)| (*from_s < time_s) && (time_s < *to_s))
+    }
+
+    fn row(&self, time_s: f64) -> String {
+        let [w, x, y, z] = attitude(&self.flight.attitude, time_s);
+        let numbers = [
+            &[time_s][..],
+            &held(&self.flight.command, time_s),
+            &linear(&self.flight.position, time_s),
+            &linear(&self.velocity, time_s),
+            &[x, y, z, w],
+            &linear(&self.angular_velocity, time_s),
+        ]
+        .concat();
+        let mut row = String::new();
+        for (index, number) in numbers.iter().enumerate() {
+            let _ = write!(row, "{}{number}", if index == 0 { "" } else { "," });
+        }
+        row + "\n"
+    }
+}
+
+/// The times at which a channel has no samples: its gaps, and all before and after it but for five periods.
+fn without<const N: usize>(channel: &Channel<N>) -> Vec<(f64, f64)> {
+    let (Some((first_s, last_s)), Some(period_s)) = (channel.span_s(), channel.period_s()) else {
+        return Vec::new();
+    };
+    let slack_s = GAP_PERIODS * period_s;
+    let ends = [(f64::NEG_INFINITY, first_s - slack_s), (last_s + slack_s, f64::INFINITY)];
+    gaps(channel).into_iter().chain(ends).collect()
+}
+
+/// The samples around `time_s` and how far it lies between them; at the ends the nearest sample twice.
+fn around<const N: usize>(channel: &Channel<N>, time_s: f64) -> Option<([f64; N], [f64; N], f64)> {
+    let after = channel.time_s.partition_point(|sample_s| *sample_s <= time_s);
+    let before = after.saturating_sub(1);
+    let from = *channel.values.get(before)?;
+    match (channel.time_s.get(before), channel.time_s.get(after)) {
+        (Some(from_s), Some(to_s)) if after > before => {
+            Some((from, channel.values[after], (time_s - from_s) / (to_s - from_s)))
+        }
+        _ => Some((from, from, 0.0)),
+    }
+}
+
+fn linear(channel: &Channel<3>, time_s: f64) -> [f64; 3] {
+    around(channel, time_s).map_or([0.0; 3], |(from, to, part)| {
+        std::array::from_fn(|axis| from[axis] + (to[axis] - from[axis]) * part)
+    })
+}
+
+fn held(channel: &Channel<4>, time_s: f64) -> [f64; 4] {
+    around(channel, time_s).map_or([0.0; 4], |(from, _, _)| from)
+}
+
+/// In the order w, x, y, z.
+fn attitude(channel: &Channel<4>, time_s: f64) -> [f64; 4] {
+    around(channel, time_s).map_or([1.0, 0.0, 0.0, 0.0], |(from, to, part)| {
+        let [a, b] = [from, to].map(|wxyz| UnitQuaternion::from_quaternion(from_wxyz(wxyz)));
+        to_wxyz(a.try_slerp(&b, part, 1e-12).unwrap_or(a).into_inner())
+    })
+}
+
+/// The derivative at every sample: that of the quadratic nearest to the changes to its neighbours, none of them
+/// behind a gap. `change(from, to)` is the change from one sample to another.
+fn derivative(times: &[f64], change: impl Fn(usize, usize) -> Vector3<f64>) -> Channel<3> {
+    let channel = Channel { time_s: times.to_vec(), values: vec![[0.0; 0]; times.len()] };
+    let limit_s = GAP_PERIODS * channel.period_s().unwrap_or(f64::INFINITY);
+    let joined = |a: usize| times[a + 1] - times[a] <= limit_s;
+    let slope = |at: usize| {
+        let mut from = at;
+        while from > 0 && at - from < HALF_WINDOW && joined(from - 1) {
+            from -= 1;
+        }
+        let mut to = at;
+        while to + 1 < times.len() && to - at < HALF_WINDOW && joined(to) {
+            to += 1;
+        }
+        quadratic_slope((from..=to).map(|k| (times[k] - times[at], change(at, k))))
+    };
+    let values = (0..times.len()).map(|at| slope(at).into()).collect();
+    Channel { time_s: times.to_vec(), values }
+}
+
+/// The slope at 0 of the quadratic nearest to `points`; of the line through their ends where they are too few.
+fn quadratic_slope(points: impl Iterator<Item = (f64, Vector3<f64>)> + Clone) -> Vector3<f64> {
+    let (mut normal, mut right) = (Matrix3::zeros(), Matrix3::zeros());
+    // Times in units of the window, so that the matrix is well conditioned.
+    let scale = points.clone().map(|(time, _)| time.abs()).fold(0.0, f64::max).max(f64::MIN_POSITIVE);
+    for (time, value) in points.clone() {
+        let tau = time / scale;
+        let powers = Vector3::new(1.0, tau, tau * tau);
+        normal += powers * powers.transpose();
+        right += powers * value.transpose();
+    }
+    let enough = points.clone().count() > 2;
+    match normal.try_inverse().filter(|_| enough) {
+        Some(inverse) => (inverse * right).row(1).transpose() / scale,
+        None => {
+            let ends = points.clone().next().zip(points.last());
+            let rise = |((t0, v0), (t1, v1)): ((f64, Vector3<f64>), (f64, Vector3<f64>))| (t1 - t0, v1 - v0);
+            let (run, rise) = ends.map_or((0.0, Vector3::zeros()), rise);
+            if run > 0.0 { rise / run } else { Vector3::zeros() }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_derivative_of_a_quadratic_is_exact() {
+        let times: Vec<f64> = (0..20).map(|k| 0.01 * f64::from(k) + 0.001 * f64::from(k % 3)).collect();
+        let p = |t: f64| Vector3::new(1.0 + 2.0 * t - 3.0 * t * t, t, 5.0);
+        let derived = derivative(&times, |from, to| p(times[to]) - p(times[from]));
+        for (t, v) in times.iter().zip(&derived.values) {
+            assert!((Vector3::from(*v) - Vector3::new(2.0 - 6.0 * t, 1.0, 0.0)).norm() < 1e-9, "{t}: {v:?}");
+        }
+    }
+
+    #[test]
+    fn single_samples_have_no_slope() {
+        assert_eq!(derivative(&[1.0], |_, _| Vector3::zeros()).values, [[0.0; 3]]);
+        assert_eq!(
+            derivative(&[0.0, 0.5], |a, b| Vector3::x() * (b as f64 - a as f64)).values,
+            [[2.0, 0.0, 0.0]; 2]
+        );
+    }
+}

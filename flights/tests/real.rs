@@ -1,0 +1,166 @@
+//! Flights of the repository's flights files, read from real logs in the folder that `HUMMINGBUS_DATA` names.
+
+use std::io::Write as _;
+use std::path::{Path, PathBuf};
+
+use flights::{Flight, FlightSet, Role};
+
+/// The folder of measured flights; says so where it is not given.
+fn data() -> Option<PathBuf> {
+    let data = std::env::var_os("HUMMINGBUS_DATA").map(PathBuf::from);
+    if data.is_none() {
+        // Not `eprintln!`, which the test runner hides.
+        let notice = "skipped: HUMMINGBUS_DATA, the folder of measured flights, is not set";
+        let _ = writeln!(std::io::stderr(), "{notice}");
+    }
+    data
+}
+
+fn load(name: &str) -> FlightSet {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(name);
+    FlightSet::load(&path).unwrap_or_else(|error| panic!("{error}"))
+}
+
+fn length_s(flight: &Flight) -> f64 {
+    flight.command.span_s().unwrap().1
+}
+
+#[test]
+fn every_flights_file_is_read_without_a_doubt_about_units() {
+    if data().is_none() {
+        return;
+    }
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let mut count = 0;
+    for entry in std::fs::read_dir(folder).unwrap() {
+        let path = entry.unwrap().path();
+        let name = path.file_name().unwrap().to_str().unwrap().to_owned();
+        if path.extension().is_none_or(|extension| extension != "toml") || name == "Cargo.toml" {
+            continue;
+        }
+        count += 1;
+        let set = load(&name);
+        assert!(set.vehicle.exists(), "{name}");
+        for role in [Role::Fit, Role::Test] {
+            assert!(set.flights.iter().any(|flight| flight.role == role), "{name} has no flight to {role:?}");
+        }
+        for flight in &set.flights {
+            println!(
+                "{name}: {} {:.2} s {:?} {:?}",
+                flight.name,
+                length_s(flight),
+                flight.assumed,
+                flight.notes
+            );
+            assert!(!flight.notes.iter().any(|note| note.starts_with('`')), "{:?}", flight.notes);
+        }
+    }
+    assert_eq!(count, 9);
+}
+
+#[test]
+fn nanobench_has_all_its_channels() {
+    if data().is_none() {
+        return;
+    }
+    let set = load("nanobench.toml");
+    let flight = &set.flights[0];
+    assert!((length_s(flight) - 16.5).abs() < 0.011, "{}", length_s(flight));
+    assert_eq!(flight.position.time_s.len(), 1651);
+    // In the air, level on average, at about gravity and at the height that the source gives.
+    assert!(flight.position.values.iter().all(|p| (0.8..1.2).contains(&p[2])));
+    let mean_up = flight.specific_force.values.iter().map(|f| f[2]).sum::<f64>()
+        / flight.specific_force.values.len() as f64;
+    assert!((9.0..11.0).contains(&mean_up), "{mean_up}");
+    assert!(flight.attitude.values.iter().all(|q| q[0].abs() > 0.7));
+    assert!(flight.rotor_speed.is_empty());
+}
+
+#[test]
+fn a_crazyflies_card_has_a_kilohertz_of_gyro_and_commands() {
+    if data().is_none() {
+        return;
+    }
+    let set = load("arpl-crazyflie.toml");
+    let flight = &set.flights[0];
+    assert!((flight.angular_velocity.period_s().unwrap() - 0.001).abs() < 1e-4);
+    assert!(flight.attitude.is_empty() && flight.position.is_empty());
+    // 600 deg/s are reached, 600 rad/s are not.
+    let fastest = flight.angular_velocity.values.iter().flatten().fold(0.0_f64, |a, b| a.max(b.abs()));
+    assert!((2.0..30.0).contains(&fastest), "{fastest}");
+}
+
+#[test]
+fn a_hover_without_attitude_is_assumed_level_and_said() {
+    if data().is_none() {
+        return;
+    }
+    let set = load("crazypad-normal-e8.toml");
+    let flight = &set.flights[0];
+    assert_eq!(flight.assumed.len(), 2, "{:?}", flight.assumed);
+    assert_eq!(flight.attitude.time_s, flight.command.time_s);
+    assert!(flight.attitude.values.iter().all(|q| q[0] > 0.99 && q[1] == 0.0 && q[2] == 0.0));
+    assert!(flight.battery_voltage.values.iter().all(|v| (3.0..4.3).contains(&v[0])));
+}
+
+/// Reads a PX4 log with a made-up flights file.
+fn ulog(data: &Path, file: &str, channels: &str) -> Flight {
+    let folder = tempfile::tempdir().unwrap();
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
+    let text = format!(
+        "vehicle = \"{}\"\n[channels]\n{channels}\n[[flight]]\nname = \"px4\"\nrole = \"fit\"\nfile = \"{}\"\n",
+        root.join("vehicles/hummingbird.toml").display(),
+        data.join("px4-ulog").join(file).display()
+    );
+    let path = folder.path().join("flights.toml");
+    std::fs::write(&path, text).unwrap();
+    FlightSet::load(&path).unwrap_or_else(|error| panic!("{error}")).flights.remove(0)
+}
+
+#[test]
+fn a_ulog_is_read_by_the_types_of_its_messages() {
+    let Some(data) = data() else { return };
+    let flight = ulog(&data, "sample.ulg", "");
+    println!("{:?}", flight.notes);
+    assert!((6400..=6461).contains(&flight.attitude.time_s.len()), "{}", flight.attitude.time_s.len());
+    assert!(flight.specific_force.values.len() > 16_000);
+    // Level on the whole, so that gravity is +9.8 along our z, in an own frame.
+    let f = &flight.specific_force.values;
+    let mean_z = f.iter().map(|f| f[2]).sum::<f64>() / f.len() as f64;
+    assert!((9.3..10.3).contains(&mean_z), "{mean_z}");
+    assert!(!flight.position.is_empty() && !flight.velocity.is_empty());
+}
+
+#[test]
+fn commands_of_a_ulog_are_read_by_field_and_as_a_share_of_the_vehicles_range() {
+    let Some(data) = data() else { return };
+    let channels = "command = { topic = \"actuator_motors\", fields = [\"control[0]\", \"control[1]\", \
+                    \"control[2]\", \"control[3]\"], unit = \"fraction\" }\n\
+                    attitude = { topic = \"vehicle_attitude\" }\n\
+                    angular_velocity = { topic = \"vehicle_angular_velocity\" }\n\
+                    battery_voltage = { topic = \"battery_status\" }";
+    let flight = ulog(&data, "sample_px4_events.ulg", channels);
+    println!("{:?}", flight.notes);
+    let (low, high) = (1.0, 200.0);
+    assert!(flight.command.values.iter().flatten().all(|command| (low..=high).contains(command)));
+    assert!(flight.angular_velocity.time_s.len() > 1500);
+    assert!(
+        (10.0..17.0).contains(&flight.battery_voltage.values[0][0]),
+        "{:?}",
+        flight.battery_voltage.values[0]
+    );
+}
+
+#[test]
+fn the_canonical_file_of_a_real_flight_has_a_row_for_each_attitude() {
+    if data().is_none() {
+        return;
+    }
+    let set = load("nanobench.toml");
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("flight.csv");
+    let written = flights::write_csv(&set.flights[0], &path).unwrap();
+    assert_eq!(written.rows, set.flights[0].attitude.time_s.len());
+    let lines = std::fs::read_to_string(&path).unwrap().lines().count();
+    assert_eq!(lines, written.rows + 1);
+}
