@@ -78,6 +78,9 @@ const RANK_TOLERANCE: f64 = 1e-9;
 #[must_use]
 pub fn inverse(gram: &DMatrix<f64>) -> DMatrix<f64> {
     let size = gram.nrows();
+    if size == 0 {
+        return gram.clone();
+    }
     let lengths: Vec<f64> = (0..size).map(|i| gram[(i, i)].max(0.0).sqrt()).collect();
     let scale = |i: usize| if lengths[i] > 0.0 { 1.0 / lengths[i] } else { 0.0 };
     let scaled = DMatrix::from_fn(size, size, |i, j| gram[(i, j)] * scale(i) * scale(j));

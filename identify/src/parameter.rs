@@ -66,6 +66,8 @@ pub struct Parameter {
     pub upper: f64,
     /// The value of the declared model.
     pub declared: f64,
+    /// How far a plausible value is from none.
+    pub plausible: f64,
     /// A change that is small and yet well above rounding.
     pub step: f64,
     /// What it belongs to.
@@ -147,6 +149,12 @@ impl Parameters {
 }
 
 impl Parameter {
+    /// Whether it is a delay.
+    #[must_use]
+    pub fn is_delay(&self) -> bool {
+        self.effect == "command-delay" || self.effect == SENSOR_DELAY
+    }
+
     /// What changes with it.
     #[must_use]
     pub fn stage(&self) -> Stage {
@@ -199,19 +207,23 @@ fn of_effect(effect: &Effect) -> Vec<Parameter> {
             lower: spec.lower,
             upper: spec.upper,
             declared: effect.values[index],
-            step: step(effect.kind, spec.typical, spec.neutral),
+            plausible: plausible(spec.typical, spec.neutral),
+            step: if effect.kind.name == "command-delay" {
+                DELAY_STEP_S
+            } else {
+                plausible(spec.typical, spec.neutral) / 50.0
+            },
             owner: Owner::Plant(effect.kind, index),
         })
         .collect()
 }
 
-/// A fiftieth of what is plausible; of delays two milliseconds, since the grid cannot see less.
-fn step(kind: &EffectKind, typical: f64, neutral: Option<f64>) -> f64 {
-    if kind.name == "command-delay" {
-        return 0.002;
-    }
+/// The grid cannot see less.
+const DELAY_STEP_S: f64 = 0.002;
+
+fn plausible(typical: f64, neutral: Option<f64>) -> f64 {
     let reach = (typical - neutral.unwrap_or(0.0)).abs();
-    if reach == 0.0 { 0.02 } else { reach / 50.0 }
+    if reach == 0.0 { 1.0 } else { reach }
 }
 
 fn of_sensors() -> Vec<Parameter> {
@@ -223,13 +235,14 @@ fn of_sensors() -> Vec<Parameter> {
         lower: -bound,
         upper: bound,
         declared: 0.0,
+        plausible: 50.0 * step,
         step,
         owner: Owner::Sensor(own),
     };
     let bias = |name, unit, bound, step, own| sensor(SENSOR_BIAS, name, unit, bound, step, own);
     vec![
-        sensor(SENSOR_DELAY, "pose", "s", 0.5, 0.002, PoseDelay),
-        sensor(SENSOR_DELAY, "imu", "s", 0.5, 0.002, ImuDelay),
+        sensor(SENSOR_DELAY, "pose", "s", 0.5, DELAY_STEP_S, PoseDelay),
+        sensor(SENSOR_DELAY, "imu", "s", 0.5, DELAY_STEP_S, ImuDelay),
         bias("accelerometer_x", "m/s^2", 5.0, 0.01, Accelerometer(0)),
         bias("accelerometer_y", "m/s^2", 5.0, 0.01, Accelerometer(1)),
         bias("accelerometer_z", "m/s^2", 5.0, 0.01, Accelerometer(2)),

@@ -3,8 +3,8 @@
 //! In each round every candidate is fitted, together with what was accepted before, on the fit flights, and judged
 //! on the test flights. It is accepted only if three things hold:
 //!
-//! 1. The gain on the test flights is beyond chance: the mean of the blocks' gains is above zero by a one-sided test
-//!    at 5 % over all candidates of the round together (Bonferroni; Student's t over blocks).
+//! 1. The gain on the test flights is beyond chance: the mean of the blocks' gains is above zero at 5 % over all
+//!    candidates of the round together (Bonferroni; one-sided percentile bootstrap over blocks, Efron 1979).
 //! 2. One of its parameters differs from the declared value beyond chance on the fit flights, at the same level.
 //! 3. The gain matters: it is at least [`LEAST_GAIN`] of the squared error.
 //!
@@ -15,17 +15,21 @@
 use crate::candidate::Candidate;
 use crate::fit::{Bench, Fitted};
 use crate::normal;
-use crate::parameter::Stage;
 use nalgebra::DVector;
+use rand_core::{Rng, SeedableRng};
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
 /// A smaller part of the squared error does not matter, however certain it is: what the comparison itself leaves at
 /// its joints is of the order of a tenth of it.
 pub const LEAST_GAIN: f64 = 0.002;
+/// A smaller part of a plausible value is none worth naming.
+const LEAST_PART: f64 = 0.01;
 /// Chance of a false acceptance in a round.
 pub const FALSE_RATE: f64 = 0.05;
 /// Two rivals whose difference is within this one-sided level cannot be told apart.
 const RIVAL_LEVEL: f64 = 0.05;
+/// Resamples of a bootstrap: enough for the level of one among thirty candidates.
+const RESAMPLES: usize = 5000;
 /// More rounds than there are effects worth naming.
 const ROUNDS_MAX: usize = 10;
 
@@ -38,8 +42,8 @@ pub struct Judged {
     pub fitted: Fitted,
     /// Gain on the test flights as a part of their squared error.
     pub gain: f64,
-    /// The gain in units of its standard error.
-    pub gain_t: f64,
+    /// Chance of as much without the effect.
+    pub gain_chance: f64,
     /// The largest deviation of a parameter from the declared value, in units of its standard error.
     pub parameter_t: f64,
     /// Whether it was accepted.
@@ -124,23 +128,23 @@ fn round(
 fn judge(bench: &Bench, base: &Fitted, accepted: &[Candidate], candidate: &Candidate, rivals: usize) -> Judged {
     let fitted = fitted(bench, base, accepted, candidate);
     let gain = base.test_sum() - fitted.test_sum();
-    let gain_t = t_of_gain(&base.test_squares, &fitted.test_squares);
+    let gain_chance = chance(&base.test_squares, &fitted.test_squares);
     let parameter_t = parameter_t(bench, &fitted, candidate);
     let level = FALSE_RATE / rivals as f64;
-    let is_beyond = |t: f64, blocks: usize| t > t_quantile(1.0 - level, blocks);
-    let is_accepted = is_beyond(gain_t, fitted.test_squares.len())
-        && is_beyond(parameter_t, fitted.fit_squares.len())
+    let is_accepted = gain_chance < level
+        && parameter_t > t_quantile(1.0 - level / 2.0, fitted.fit_squares.len())
         && gain > LEAST_GAIN * base.test_sum()
         && is_seen(bench, candidate, &fitted);
-    Judged { candidate: candidate.clone(), gain: gain / base.test_sum(), gain_t, parameter_t, is_accepted, fitted }
+    Judged { candidate: candidate.clone(), gain: gain / base.test_sum(), gain_chance, parameter_t, is_accepted, fitted }
 }
 
-/// Whether a delay is more than half a step of the grid, which is what the grid can tell of time.
+/// Whether one of its parameters is large enough to be more than an artefact of the grid: a delay of more than half a
+/// step, anything else at least [`LEAST_PART`] of what is plausible.
 fn is_seen(bench: &Bench, candidate: &Candidate, fitted: &Fitted) -> bool {
     candidate.which.iter().any(|at| {
         let own = &bench.model.parameters.all[*at];
-        let is_delay = own.unit == "s" && (own.stage() == Stage::Tracks || own.effect == "command-delay");
-        !is_delay || (fitted.values[*at] - own.declared).abs() > bench.least_delay_s()
+        let least = if own.is_delay() { bench.least_delay_s() } else { LEAST_PART * own.plausible };
+        (fitted.values[*at] - own.declared).abs() > least
     })
 }
 
@@ -171,13 +175,15 @@ fn parameter_t(bench: &Bench, fitted: &Fitted, candidate: &Candidate) -> f64 {
     candidate.which.iter().map(t).fold(0.0, f64::max)
 }
 
-/// The mean of the differences of blocks in units of its standard error.
-fn t_of_gain(before: &[f64], after: &[f64]) -> f64 {
+/// Chance that the mean gain from `before` to `after` is not above zero, by resampling the blocks: of gains so
+/// unequal, since a few blocks of violent flight hold most of them, a mean is far from normal.
+fn chance(before: &[f64], after: &[f64]) -> f64 {
     let gains: Vec<f64> = before.iter().zip(after).map(|(before, after)| before - after).collect();
-    let count = gains.len() as f64;
-    let mean = gains.iter().sum::<f64>() / count;
-    let variance = gains.iter().map(|gain| (gain - mean).powi(2)).sum::<f64>() / (count - 1.0).max(1.0);
-    if variance > 0.0 { mean / (variance / count).sqrt() } else { 0.0 }
+    let mut random = rand_chacha::ChaCha8Rng::seed_from_u64(gains.len() as u64);
+    let count = gains.len() as u64;
+    let draw = |random: &mut rand_chacha::ChaCha8Rng| gains[((random.next_u64() >> 32) * count >> 32) as usize];
+    let is_loss = |_: &usize| (0..count).map(|_| draw(&mut random)).sum::<f64>() <= 0.0;
+    (0..RESAMPLES).filter(is_loss).count() as f64 / RESAMPLES as f64
 }
 
 /// The quantile of Student's distribution for a mean over so many blocks.
@@ -199,8 +205,7 @@ fn best(judged: &[Judged]) -> Option<usize> {
 /// Whether `fitted` is worse on the test flights than `other`, beyond chance.
 #[must_use]
 pub fn is_worse(fitted: &Fitted, other: &Fitted) -> bool {
-    let t = t_of_gain(&fitted.test_squares, &other.test_squares);
-    t > t_quantile(1.0 - RIVAL_LEVEL, fitted.test_squares.len())
+    chance(&fitted.test_squares, &other.test_squares) < RIVAL_LEVEL
 }
 
 /// Takes back what no longer gains anything.

@@ -70,7 +70,7 @@ fn explore() {
             let mut judged: Vec<_> = round.judged.iter().collect();
             judged.sort_by(|a, b| b.gain.total_cmp(&a.gain));
             for judged in judged.iter().take(4) {
-                println!("   [{number}] {} gain {:.4} t {:.1} p {:.1} {}", judged.candidate.effect, judged.gain, judged.gain_t,
+                println!("   [{number}] {} gain {:.4} c {:.4} p {:.1} {}", judged.candidate.effect, judged.gain, judged.gain_chance,
                     judged.parameter_t, judged.is_accepted);
             }
         }

@@ -14,6 +14,8 @@ use std::path::{Path, PathBuf};
 use vehicles::Vehicle;
 
 const TICK_S: f64 = 0.001;
+/// Over this time a course comes up to speed.
+const RUN_UP_S: f64 = 3.0;
 
 /// Standard deviations of white noise, as multiples of good sensors'.
 #[derive(Debug, Clone, Copy)]
@@ -103,18 +105,22 @@ impl Course {
 
     /// Position, velocity and acceleration, and the heading.
     fn at(&self, time_s: f64) -> ([Vector3<f64>; 3], f64) {
-        // The course begins at rest.
-        let ramp = (time_s / 3.0).min(1.0);
+        // The course begins at rest: its own time runs up to speed.
+        let (tau_s, rate, growth) = if time_s < RUN_UP_S {
+            (time_s * time_s / (2.0 * RUN_UP_S), time_s / RUN_UP_S, 1.0 / RUN_UP_S)
+        } else {
+            (time_s - RUN_UP_S / 2.0, 1.0, 0.0)
+        };
         let part = |axis: usize, order: i32| -> f64 {
             let one = |(size, w, phase): &(f64, f64, f64)| {
-                let angle = w * time_s + phase;
+                let angle = w * tau_s + phase;
                 size * match order {
                     0 => angle.sin() - phase.sin(),
-                    1 => w * angle.cos(),
-                    _ => -w * w * angle.sin(),
+                    1 => w * angle.cos() * rate,
+                    _ => w * angle.cos() * growth - w * w * angle.sin() * rate * rate,
                 }
             };
-            ramp * self.axes[axis].iter().map(one).sum::<f64>()
+            self.axes[axis].iter().map(one).sum::<f64>()
         };
         let vector = |order| Vector3::new(part(0, order), part(1, order), part(2, order));
         let mut position = vector(0);
