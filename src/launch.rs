@@ -18,8 +18,8 @@ use anyhow::{Context, Result, anyhow};
 use bus::control::{Control, Phase};
 use bus::plan::{NodePlan, Plan};
 use std::path::Path;
-use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Arc, OnceLock};
 use std::time::{Duration, Instant};
 
 /// How long the supervisor sleeps at most between two looks at its processes.
@@ -105,15 +105,23 @@ fn answer(report: &Report) -> Answer {
     }
 }
 
-/// Counts Ctrl-C and SIGTERM from now on instead of dying of them.
-fn count_interrupts() -> Result<Arc<AtomicUsize>> {
+/// Counts Ctrl-C and SIGTERM from now on instead of dying of them. All runs of a process share the count: one that
+/// is stopped lets no other begin.
+///
+/// # Errors
+/// If the signals cannot be handled.
+pub fn count_interrupts() -> Result<Arc<AtomicUsize>> {
+    static COUNT: OnceLock<Arc<AtomicUsize>> = OnceLock::new();
+    if let Some(count) = COUNT.get() {
+        return Ok(count.clone());
+    }
     let count = Arc::new(AtomicUsize::new(0));
     let seen = count.clone();
     ctrlc::set_handler(move || {
         seen.fetch_add(1, Ordering::SeqCst);
     })
     .context("cannot handle Ctrl-C")?;
-    Ok(count)
+    Ok(COUNT.get_or_init(|| count).clone())
 }
 
 /// Puts the files that recorders attach into the run directory and tells the recorders.

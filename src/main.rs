@@ -29,6 +29,7 @@ mod succession;
 mod summary;
 mod supervisor;
 mod top;
+mod validate;
 
 use crate::graph::Graph;
 use crate::manifest::Manifest;
@@ -95,6 +96,9 @@ enum Verb {
         #[arg(long)]
         json: bool,
     },
+    /// Fly the measured commands of flights with one or two vehicle files, and tell how far they go astray.
+    #[command(after_help = validate::HELP)]
+    Validate(validate::ValidateArguments),
     /// Watch a live run and steer it: ticks, processes, topics.
     #[command(after_help = top::HELP)]
     Top(top::TopArguments),
@@ -172,6 +176,7 @@ fn main() -> ExitCode {
         Verb::Schema { json } => {
             print_text(&if json { describe::schemas_json() } else { describe::schemas() }).map(|()| true)
         }
+        Verb::Validate(arguments) => validate::validate(&arguments),
         Verb::Top(arguments) => top::top(&arguments).map(|()| true),
         Verb::Ctl(arguments) => ctl::ctl(&arguments).map(|()| true),
         Verb::Swap(arguments) => ctl::swap(&arguments).map(|()| true),

@@ -94,6 +94,37 @@ impl Drop for RunDir {
     }
 }
 
+/// A folder for a command that flies several runs, one after another; dropping it removes it. It is named and locked as
+/// a run directory is, so that `clean` removes it once its process is dead, and not before.
+#[derive(Debug)]
+pub struct Scratch {
+    path: PathBuf,
+    _lock: File,
+}
+
+impl Scratch {
+    /// Creates the folder, open to this user alone.
+    ///
+    /// # Errors
+    /// If the folder for temporary files cannot be written to.
+    pub fn create() -> Result<Self> {
+        let path = Entry::new(Path::new(""))?.run_dir;
+        let lock = create_locked(&path).with_context(|| format!("cannot create {}", path.display()))?;
+        Ok(Self { path, _lock: lock })
+    }
+
+    /// The folder.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+}
+
+impl Drop for Scratch {
+    fn drop(&mut self) {
+        let _ = std::fs::remove_dir_all(&self.path);
+    }
+}
+
 /// The name of the directory of run `run_id`.
 fn dir_name(run_id: &str) -> String {
     format!("hummingbus-{}-{run_id}", bus::process::user_id())
