@@ -68,8 +68,11 @@ impl Pairs {
         let count = self.derived.len() as f64;
         let says_something =
             self.derived.len() >= PAIRS_MIN && (derived / count).sqrt() > quiet && logged > 0.0;
-        says_something
-            .then(|| Agreement { slope: both / derived, correlation: both / (logged * derived).sqrt() })
+        // The ratio of the sizes: a regression's slope would fall with every lateness between the channels.
+        says_something.then(|| Agreement {
+            slope: (logged / derived).sqrt().copysign(both),
+            correlation: both / (logged * derived).sqrt(),
+        })
     }
 
     /// The signs of the axes' correlations: 0 for an axis that shows none.
@@ -88,7 +91,7 @@ impl Pairs {
 /// How a logged vector agrees with a derived one.
 #[derive(Debug, Clone, Copy)]
 pub struct Agreement {
-    /// Logged over derived, by least squares.
+    /// Size of the logged over that of the derived vector, with the sign of their correlation.
     pub slope: f64,
     /// From -1 to 1.
     pub correlation: f64,

@@ -5,7 +5,7 @@
 use nalgebra::{UnitQuaternion, Vector3};
 use vehicles::Vehicle;
 
-use crate::agreement::Pairs;
+use crate::agreement::{Agreement, Pairs};
 use crate::declaration::{ChannelMap, Frame};
 use crate::flight::{Channel, Flight};
 use crate::frame;
@@ -13,6 +13,8 @@ use crate::quantity::{FRACTION, PERCENT, Quantity};
 
 /// Above this correlation a logged and a derived vector are the same but for a factor.
 const SAME: f64 = 0.7;
+/// Below this one of them is late or noisy.
+const IN_TIME: f64 = 0.9;
 /// Windows over which rates are derived, in s: long against the jitter between channels.
 const RATE_WINDOW_S: f64 = 0.1;
 const VELOCITY_WINDOW_S: f64 = 0.2;
@@ -114,7 +116,7 @@ impl Judge<'_> {
         let agreement = pairs.agreement(QUIET_RATE_RAD_S)?;
         if agreement.correlation > SAME {
             let what = format!("it is {:.4} times the derivative of the attitude", agreement.slope);
-            return self.by_unit(quantity, agreement.slope, 1.3, &what);
+            return self.by_unit(quantity, agreement.slope, 1.3, &what).or_else(|| late(quantity, agreement));
         }
         let reordered = self
             .w_first()
@@ -154,7 +156,9 @@ impl Judge<'_> {
         let what = format!("it is {:.5} times the derivative of the position", agreement.slope);
         if agreement.correlation > SAME {
             let position = self.unit_that_fits(Quantity::Position, 1.0 / agreement.slope, 1.3);
-            let finding = self.by_unit(quantity, agreement.slope, 1.3, &what)?;
+            let Some(finding) = self.by_unit(quantity, agreement.slope, 1.3, &what) else {
+                return late(quantity, agreement);
+            };
             return Some(match (position, &finding.fits) {
                 (Some(position), Some(velocity)) => {
                     let both = format!("{velocity} here or {position} of `position`");
@@ -296,6 +300,15 @@ impl Judge<'_> {
 fn finding(channel: Quantity, factor: f64, fits: Option<String>, what: &str) -> Finding {
     let advice = fits.as_ref().map_or(String::new(), |fits| format!("; {fits} would fit"));
     Finding { channel, factor, clear: fits.is_some(), message: format!("`{channel}`: {what}{advice}"), fits }
+}
+
+/// A note where a vector follows its derived twin but loosely.
+fn late(channel: Quantity, agreement: Agreement) -> Option<Finding> {
+    let what = format!(
+        "it follows the derivative with a correlation of {:.2} only: noisy, or one is late (`delay_s`)",
+        agreement.correlation
+    );
+    (agreement.correlation < IN_TIME).then(|| finding(channel, agreement.slope, None, &what))
 }
 
 /// The median of how far the body's z axis points up, from -1 to 1.

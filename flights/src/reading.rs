@@ -18,6 +18,9 @@ use crate::log::Log;
 use crate::plausible;
 use crate::quantity::Quantity;
 
+/// Times are differences of decimal fractions since 1970: a sample on the edge of the part belongs to it.
+const SLACK_S: f64 = 1e-6;
+
 /// What is needed to read a flight.
 pub struct Reading<'a> {
     /// The flights file.
@@ -160,10 +163,15 @@ impl Reading<'_> {
 
     /// The samples within the flight's part.
     fn window<const N: usize>(&self, channel: Channel<N>) -> Channel<N> {
-        let length_s = self.length_s();
+        let length_s = self.length_s() + SLACK_S;
         let samples = channel.time_s.into_iter().zip(channel.values);
-        let (time_s, values) = samples.filter(|(time_s, _)| (0.0..=length_s).contains(time_s)).unzip();
-        Channel { time_s, values }
+        let inside = samples.filter(|(time_s, _)| (-SLACK_S..=length_s).contains(time_s));
+        let (time_s, values): (Vec<f64>, Vec<[f64; N]>) = inside.unzip();
+        // Of the samples that the slack lets in before the start, the last stands at the start.
+        let early = time_s.partition_point(|time_s| *time_s <= 0.0).saturating_sub(1);
+        let mut kept = Channel { time_s: time_s[early..].to_vec(), values: values[early..].to_vec() };
+        kept.time_s.iter_mut().take(1).for_each(|first_s| *first_s = first_s.max(0.0));
+        kept
     }
 
     /// The commands within the flight's part; the one that holds at its start begins there.
@@ -222,7 +230,7 @@ impl Reading<'_> {
         clean::say_gaps(Quantity::Attitude, &flight.attitude, &mut notes);
         clean::say_gaps(Quantity::AngularVelocity, &flight.angular_velocity, &mut notes);
         clean::say_gaps(Quantity::SpecificForce, &flight.specific_force, &mut notes);
-        clean::say_gaps(Quantity::BatteryVoltage, &flight.battery_voltage, &mut notes);
+        // Not of the battery: its coarse and slow readings repeat, and left out they look like gaps.
         flight.notes = notes;
     }
 

@@ -1,0 +1,369 @@
+//! Made-up logs of every format: what is read from them, and what is said about wrong ones.
+
+mod support;
+
+use flights::{Flight, FlightSet, FlightsError, Quantity};
+use support::{Motion, Place, crc32};
+
+const CHANNELS: &str = r#"
+time = { columns = ["t"], unit = "s" }
+command = { columns = ["m1", "m2", "m3", "m4"], unit = "count" }
+position = { columns = ["px", "py", "pz"], unit = "m" }
+velocity = { columns = ["vx", "vy", "vz"], unit = "m/s" }
+attitude = { columns = ["qx", "qy", "qz", "qw"] }
+angular_velocity = { columns = ["wx", "wy", "wz"], unit = "rad/s" }
+specific_force = { columns = ["fx", "fy", "fz"], unit = "m/s^2" }
+battery_voltage = { columns = ["v"], unit = "V" }
+"#;
+
+/// Reads the made-up flight in CSV with `channels`, and `extra` in the flight's table.
+fn read(motion: &Motion, channels: &str, extra: &str) -> Result<Flight, FlightsError> {
+    let place = Place::new();
+    place.write("log.csv", motion.csv().as_bytes());
+    place.load("log.csv", channels, extra)
+}
+
+/// The text with which the flight is refused.
+fn refused(channels: &str, extra: &str) -> String {
+    read(&Motion::default(), channels, extra).unwrap_err().to_string()
+}
+
+/// What contradicts in the flight.
+fn findings(motion: &Motion, channels: &str) -> Vec<(Quantity, String)> {
+    match read(motion, channels, "") {
+        Err(FlightsError::Implausible { findings, .. }) => findings
+            .into_iter()
+            .map(|finding| (finding.channel, finding.fits.expect("a clear finding says what fits")))
+            .collect(),
+        other => panic!("{:?}", other.map(|flight| flight.notes).map_err(|error| error.to_string())),
+    }
+}
+
+#[test]
+fn a_plain_flight_is_read_without_notes() {
+    let flight = read(&Motion::default(), CHANNELS, "").unwrap();
+    assert_eq!(flight.notes, [""; 0]);
+    assert_eq!(flight.attitude.time_s.len(), 1001);
+    assert_eq!(flight.command.values[7], [100.0, 101.0, 102.0, 103.0]);
+    assert!(
+        (flight.attitude.values[0][0] - 1.0).abs() < 0.03,
+        "w comes first: {:?}",
+        flight.attitude.values[0]
+    );
+}
+
+#[test]
+fn the_part_and_the_delay_move_the_clock() {
+    let extra = "from_s = 2.0\nto_s = 3.0\ndelay_s = { position = 0.05 }";
+    let flight = read(&Motion::default(), CHANNELS, extra).unwrap();
+    let whole = read(&Motion::default(), CHANNELS, "").unwrap();
+    assert_eq!(flight.velocity.values.first(), whole.velocity.values.get(200));
+    assert!(flight.velocity.time_s[0].abs() < 1e-9 && flight.velocity.span_s().unwrap().1 < 1.0 + 1e-9);
+    // The sample stamped 2.05 s was true at 2 s.
+    assert_eq!(flight.position.values.first(), whole.position.values.get(205));
+    assert_eq!((flight.position.time_s[0], flight.position.time_s.len()), (0.0, 101));
+    assert_eq!(flight.command.time_s[0], 0.0);
+}
+
+#[test]
+fn wrong_units_are_found_with_those_that_fit() {
+    let is = |declared: &str, instead: &str, quantity: Quantity, fits: &str| {
+        let found = findings(&Motion::default(), &CHANNELS.replace(declared, instead));
+        assert!(found.iter().any(|(q, text)| *q == quantity && text.contains(fits)), "{instead}: {found:?}");
+    };
+    is("\"rad/s\"", "\"deg/s\"", Quantity::AngularVelocity, "rad/s");
+    is("\"m/s^2\"", "\"g\"", Quantity::SpecificForce, "m/s^2");
+    is("unit = \"m\" ", "unit = \"mm\" ", Quantity::Velocity, "");
+    is("\"m/s\"", "\"mm/s\"", Quantity::Velocity, "m/s");
+    is("\"V\"", "\"mV\"", Quantity::BatteryVoltage, "\"V\"");
+    is("\"count\"", "\"fraction\"", Quantity::Command, "count");
+}
+
+#[test]
+fn data_in_other_units_than_declared_are_found() {
+    let deg = Motion { rate_unit: 57.295_779_5, ..Motion::default() };
+    assert!(findings(&deg, CHANNELS).contains(&(Quantity::AngularVelocity, "`unit = \"deg/s\"`".to_owned())));
+    let g = Motion { force_unit: 1.0 / 9.81, ..Motion::default() };
+    assert!(findings(&g, CHANNELS).contains(&(Quantity::SpecificForce, "`unit = \"g\"`".to_owned())));
+    let mm = Motion { length_unit: 1000.0, ..Motion::default() };
+    assert!(findings(&mm, CHANNELS).iter().any(|(_, fits)| fits.contains("mm")));
+    let share = Motion { command_unit: 1.0 / 200.0, ..Motion::default() };
+    assert!(findings(&share, CHANNELS).contains(&(Quantity::Command, "`unit = \"fraction\"`".to_owned())));
+}
+
+#[test]
+fn a_quaternion_with_w_first_or_the_wrong_way_is_found() {
+    let w_first = CHANNELS.replace("\"qx\", \"qy\", \"qz\", \"qw\"", "\"qw\", \"qx\", \"qy\", \"qz\"");
+    let found = findings(&Motion::default(), &w_first);
+    assert!(
+        found.iter().any(|(q, fits)| *q == Quantity::Attitude && fits.contains("w, x, y, z")),
+        "{found:?}"
+    );
+    let inverse = CHANNELS.replace("\"qx\", \"qy\", \"qz\"", "\"-qx\", \"-qy\", \"-qz\"");
+    let found = findings(&Motion::default(), &inverse);
+    assert!(
+        found.iter().any(|(_, fits)| fits.contains("world to the body") || fits.contains("the axes")),
+        "{found:?}"
+    );
+}
+
+#[test]
+fn frames_are_converted_and_a_wrong_one_is_found() {
+    let frd = Motion { frd_ned: true, ..Motion::default() };
+    let framed = CHANNELS.replace(" }", ", frame = \"frd-ned\" }");
+    let (converted, plain) =
+        (read(&frd, &framed, "").unwrap(), read(&Motion::default(), CHANNELS, "").unwrap());
+    for (a, b) in converted.position.values.iter().zip(&plain.position.values) {
+        assert!(a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-9), "{a:?} {b:?}");
+    }
+    for (a, b) in converted.attitude.values.iter().zip(&plain.attitude.values) {
+        assert!(a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>().abs() > 1.0 - 1e-9, "{a:?} {b:?}");
+    }
+    for (a, b) in converted.specific_force.values.iter().zip(&plain.specific_force.values) {
+        assert!(a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-6), "{a:?} {b:?}");
+    }
+    let body = "specific_force = { columns = [\"fx\", \"fy\", \"fz\"], unit = \"m/s^2\" }";
+    let wrong = framed.replace(&body.replace(" }", ", frame = \"frd-ned\" }"), body);
+    assert!(findings(&frd, &wrong).iter().any(|(_, fits)| fits.contains("frd-ned")));
+}
+
+#[test]
+fn trusted_units_are_noted_only() {
+    let deg = Motion { rate_unit: 57.295_779_5, ..Motion::default() };
+    let flight = read(&deg, CHANNELS, "trust_units = true").unwrap();
+    assert!(flight.notes.iter().any(|note| note.contains("deg/s")), "{:?}", flight.notes);
+}
+
+#[test]
+fn wrong_files_are_refused_with_line_and_advice() {
+    let said = |text: String, parts: &[&str]| {
+        parts.iter().for_each(|part| assert!(text.contains(part), "`{part}` is not in: {text}"));
+    };
+    said(
+        refused(&CHANNELS.replace("\"px\"", "\"qq\""), ""),
+        &["flights.toml:5:", "no column `qq`", "it has t, m1"],
+    );
+    said(
+        refused(&CHANNELS.replace("\"m\" ", "\"ft\" "), ""),
+        &["flights.toml:5:", "\"ft\"", "\"mm\"", "correct"],
+    );
+    said(refused(&CHANNELS.replace("position", "positon"), ""), &["flights.toml:5:", "positon", "position"]);
+    said(refused(&CHANNELS.replace("time =", "# time ="), ""), &["no channel `time`", "add `time"]);
+    said(refused(&CHANNELS.replace("[\"px\", \"py\", ", "["), ""), &["has 1 names, expected 3"]);
+    said(refused(CHANNELS, "from_s = 3\nto_s = 2"), &["flights.toml:", "`flight[0].to_s`", "found 2"]);
+    said(refused(CHANNELS, "from_s = 300"), &["no sample lies", "300", "from_s"]);
+    said(refused(CHANNELS, "format = \"ulog\""), &["no ULog", "check `format`"]);
+    said(refused(CHANNELS, "format = \"crazyflie\""), &["no Crazyflie log", "check `format`"]);
+    said(refused(CHANNELS, "format = \"mcap\""), &["cannot be read as MCAP", "check `format`"]);
+    said(refused(CHANNELS, "assume = \"hover\""), &["flight.assume", "has both"]);
+    said(refused(CHANNELS, "extra = 1"), &["unknown field `extra`"]);
+}
+
+#[test]
+fn bad_cells_and_times_are_counted() {
+    let place = Place::new();
+    let mut lines: Vec<String> = Motion::default().csv().lines().map(str::to_owned).collect();
+    lines[5] = lines[5].replacen(',', ",nonsense", 1);
+    lines[9] = lines[8].clone();
+    lines[20] = "0.19".to_owned();
+    place.write("log.csv", lines.join("\n").as_bytes());
+    let flight = place.load("log.csv", CHANNELS, "").unwrap();
+    let has = |text: &str| {
+        assert!(flight.notes.iter().any(|note| note.contains(text)), "{text}: {:?}", flight.notes)
+    };
+    has("command: 2 of 1001 samples have no finite number");
+    has("position: 1 of 1001 samples have no finite number");
+    has("position: 1 of 1000 samples have a time that does not grow");
+}
+
+#[test]
+fn nothing_left_is_an_error() {
+    let place = Place::new();
+    for log in ["", "t", "t,m1,m2,m3,m4,px,py,pz,vx,vy,vz,qx,qy,qz,qw,wx,wy,wz,fx,fy,fz,v\nx,x,x"] {
+        place.write("log.csv", log.as_bytes());
+        let error = place.load("log.csv", CHANNELS, "").unwrap_err().to_string();
+        assert!(error.contains("flights.toml:"), "{error}");
+    }
+}
+
+#[test]
+fn the_canonical_file_derives_what_was_not_logged() {
+    let channels: String = CHANNELS
+        .lines()
+        .filter(|line| !line.starts_with("velocity") && !line.starts_with("angular"))
+        .map(|line| line.to_owned() + "\n")
+        .collect();
+    let motion = Motion::default();
+    let flight = read(&motion, &channels, "").unwrap();
+    let whole = read(&motion, CHANNELS, "").unwrap();
+    let place = Place::new();
+    let path = place.path("flight.csv");
+    let written = flights::write_csv(&flight, &path).unwrap();
+    assert_eq!((written.rows, written.notes.len()), (1001, 2), "{:?}", written.notes);
+    // Its own column map reads it again.
+    let again = place.load("flight.csv", &written.columns, "").unwrap();
+    for (a, b) in again.velocity.values.iter().zip(&whole.velocity.values) {
+        assert!(a.iter().zip(b).all(|(a, b)| (a - b).abs() < 2e-3), "{a:?} {b:?}");
+    }
+    for (a, b) in again.angular_velocity.values.iter().zip(&whole.angular_velocity.values) {
+        assert!(a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-2), "{a:?} {b:?}");
+    }
+    assert_eq!(again.position.values, whole.position.values);
+}
+
+#[test]
+fn rows_in_gaps_are_left_out_of_the_canonical_file() {
+    let place = Place::new();
+    let motion = Motion::default().csv();
+    let blanked = motion.lines().enumerate().map(|(row, line)| {
+        // From 3 s to 4 s the capture sees nothing.
+        let mut cells: Vec<&str> = line.split(',').collect();
+        if (301..=400).contains(&row) {
+            cells[5..11].fill("");
+        }
+        cells.join(",") + "\n"
+    });
+    place.write("log.csv", blanked.collect::<String>().as_bytes());
+    let flight = place.load("log.csv", CHANNELS, "").unwrap();
+    assert!(flight.notes.iter().any(|note| note.contains("position: 1 gaps")), "{:?}", flight.notes);
+    let written = flights::write_csv(&flight, &place.path("flight.csv")).unwrap();
+    assert_eq!(written.rows, 901);
+    assert!(written.notes.iter().any(|note| note.contains("100 of 1001 rows")), "{:?}", written.notes);
+}
+
+const CRAZYFLIE: &str = r#"
+command = { fields = ["motor.m1", "motor.m2", "motor.m3", "motor.m4"], unit = "count" }
+specific_force = { fields = ["acc.x", "acc.y", "acc.z"], unit = "g" }
+battery_voltage = { fields = ["pm.vbatMV"], unit = "mV" }
+"#;
+
+#[test]
+fn a_crazyflie_log_is_read_and_its_checksum_checked() {
+    let place = Place::new();
+    let log = support::crazyflie_log(200);
+    place.write("log00", &log);
+    let flight = place.load("log00", CRAZYFLIE, "").unwrap();
+    assert_eq!(flight.command.values[3], [10.0, 20.0, 30.0, 40.0]);
+    assert!((flight.specific_force.values[0][2] - 9.80665).abs() < 1e-6);
+    assert_eq!(flight.battery_voltage.values[0], [3.7]);
+    assert!((flight.command.time_s[3] - 0.03).abs() < 1e-9);
+    let mut broken = log.clone();
+    broken[100] ^= 1;
+    place.write("log00", &broken);
+    let error = place.load("log00", CRAZYFLIE, "").unwrap_err().to_string();
+    assert!(error.contains("checksum") && error.contains("copy the log"), "{error}");
+    let mut cut = log[..log.len() - 10].to_vec();
+    cut.extend(crc32(&cut).to_le_bytes());
+    place.write("log00", &cut);
+    let error = place.load("log00", CRAZYFLIE, "").unwrap_err().to_string();
+    assert!(error.contains("is cut"), "{error}");
+}
+
+const ULOG: &str = r#"
+specific_force = { topic = "sensor_combined" }
+battery_voltage = { topic = "battery", fields = ["cell[1].volts"], unit = "V" }
+"#;
+
+#[test]
+fn a_ulog_is_read_to_where_it_was_cut() {
+    let place = Place::new();
+    let log = support::ulog(100);
+    place.write("log.ulg", &log);
+    let flight = place.load("log.ulg", ULOG, "").unwrap();
+    assert_eq!(flight.specific_force.time_s.len(), 100);
+    assert!((flight.specific_force.values[0][2] - 9.8).abs() < 1e-6, "{:?}", flight.specific_force.values[0]);
+    assert_eq!(flight.battery_voltage.values[0], [4.0]);
+    place.write("log.ulg", &log[..log.len() - 50]);
+    let flight = place.load("log.ulg", ULOG, "").unwrap();
+    assert!(flight.specific_force.time_s.len() < 100);
+    assert!(flight.notes.iter().any(|note| note.contains("the log is cut")), "{:?}", flight.notes);
+    let error =
+        place.load("log.ulg", &ULOG.replace("sensor_combined", "sensors"), "").unwrap_err().to_string();
+    assert!(error.contains("no topic `sensors`") && error.contains("battery"), "{error}");
+}
+
+#[test]
+fn a_recording_of_ours_needs_no_channels() {
+    let place = Place::new();
+    support::recording(&place.path("log.mcap"), 200);
+    let flight = place.load("log.mcap", "", "").unwrap();
+    assert_eq!(flight.command.values[0], [100.0, 101.0, 102.0, 103.0]);
+    assert!((flight.specific_force.values[5][2] - 9.81).abs() < 0.1);
+    assert!(flight.notes.iter().any(|note| note.contains("command: taken from /control/command")));
+    assert_eq!(flight.angular_velocity.time_s.len(), 200);
+}
+
+#[test]
+fn standard_messages_of_a_bag_are_read_by_topic_and_header() {
+    let place = Place::new();
+    support::recording(&place.path("log.mcap"), 200);
+    let channels = "battery_voltage = { topic = \"/battery\" }\ncommand = { topic = \"/control/command\" }";
+    let flight = place.load("log.mcap", channels, "").unwrap();
+    // Behind constants, and with the header's stamp, which is 0.1 s after the log's time.
+    assert_eq!(
+        flight.battery_voltage.values,
+        vec![[15.5]; 200].into_iter().take(flight.battery_voltage.values.len()).collect::<Vec<_>>()
+    );
+    assert!(flight.notes.iter().any(|note| note.contains("stamp")), "{:?}", flight.notes);
+    let wrong = place.load("log.mcap", "position = { topic = \"/battery\" }", "").unwrap_err().to_string();
+    assert!(wrong.contains("BatteryState") && wrong.contains("add `fields`"), "{wrong}");
+}
+
+mod mutated {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn mutate(
+        mut bytes: Vec<u8>,
+        changes: &[(prop::sample::Index, u8)],
+        cut: prop::sample::Index,
+    ) -> Vec<u8> {
+        for (index, byte) in changes {
+            let index = index.index(bytes.len());
+            bytes[index] = *byte;
+        }
+        bytes.truncate(cut.index(bytes.len()) + bytes.len() / 2);
+        bytes
+    }
+
+    fn changes() -> impl Strategy<Value = Vec<(prop::sample::Index, u8)>> {
+        prop::collection::vec(any::<(prop::sample::Index, u8)>(), 0..8)
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig { cases: 200, failure_persistence: None, ..ProptestConfig::default() })]
+
+        #[test]
+        fn crazyflie_logs_never_panic(changes in changes(), cut: prop::sample::Index) {
+            let place = Place::new();
+            let mut log = mutate(support::crazyflie_log(20), &changes, cut);
+            log.extend(crc32(&log).to_le_bytes());
+            place.write("log00", &log);
+            let _ = place.load("log00", CRAZYFLIE, "format = \"crazyflie\"");
+        }
+
+        #[test]
+        fn ulogs_never_panic(changes in changes(), cut: prop::sample::Index) {
+            let place = Place::new();
+            place.write("log.ulg", &mutate(support::ulog(20), &changes, cut));
+            let _ = place.load("log.ulg", ULOG, "format = \"ulog\"");
+        }
+
+        #[test]
+        fn bags_never_panic(changes in changes(), cut: prop::sample::Index) {
+            let place = Place::new();
+            support::recording(&place.path("whole.mcap"), 5);
+            let log = std::fs::read(place.path("whole.mcap")).unwrap();
+            place.write("log.mcap", &mutate(log, &changes, cut));
+            let _ = place.load("log.mcap", "", "format = \"mcap\"");
+        }
+
+        #[test]
+        fn flights_files_never_panic(changes in changes(), cut: prop::sample::Index) {
+            let place = Place::new();
+            let text = format!("vehicle = \"v.toml\"\n[channels]\n{CHANNELS}\n[[flight]]\nname = \"a\"\nfile = \"b\"\n");
+            place.write("flights.toml", &mutate(text.into_bytes(), &changes, cut));
+            prop_assert!(FlightSet::load(&place.path("flights.toml")).is_err());
+        }
+    }
+}
