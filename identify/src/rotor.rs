@@ -1,0 +1,64 @@
+//! From a thrust stand to a vehicle file: thrust and torque of a rotor, and how its motor follows a command.
+//!
+//! | room | what it holds |
+//! |---|---|
+//! | `stand` | the stand file: which logs, which columns, what is held out |
+//! | `table` | one log: its columns in SI |
+//! | `plateau` | where a log stands still, and what it reads there |
+//! | `coefficient` | T = c_T w^2 and Q = c_Q w^2 from plateaus |
+//! | `step` | steps of the command, cut out of a log |
+//! | `response` | how a first- and a second-order motor answers a step |
+//! | `lag` | the motor that answers all steps best |
+//! | `command_map` | the line from the command to the steady speed |
+//! | `score` | how well a model does on what was not fitted |
+//! | `statics`, `dynamics` | all of the above for the logs of a stand, with scores and findings |
+//! | `report` | the result, and its summary on one screen |
+//! | `vehicle_file` | the result as tables of a vehicle file |
+//! | `error` | what can be wrong |
+
+mod coefficient;
+mod command_map;
+mod dynamics;
+mod error;
+mod lag;
+mod plateau;
+mod report;
+mod response;
+mod score;
+mod stand;
+mod statics;
+mod step;
+mod table;
+mod vehicle_file;
+
+use std::path::Path;
+
+pub use coefficient::Coefficient;
+pub use command_map::CommandLine;
+pub use dynamics::{Comparison, Dynamics, Fitted, OneStep, Order};
+pub use error::RotorError;
+pub use report::RotorReport;
+pub use score::Score;
+pub use statics::{Plausibility, Statics};
+
+/// How often an interval shall hold the truth.
+pub const LEVEL: f64 = 0.95;
+
+/// Fits the rotor and the motor of the stand file at `path`; writes `rotor.toml`, tables of a vehicle file, and
+/// `rotor.json`, all figures, to the folder `out`, which is made if it is not there.
+pub fn run(path: &Path, out: &Path) -> Result<RotorReport, RotorError> {
+    let stand = stand::Stand::read(path)?;
+    let vehicle = stand.vehicle_file()?;
+    let statics = statics::fitted(&stand)?;
+    let dynamics = dynamics::fitted(&stand)?;
+    let report = RotorReport::new(&stand, statics, dynamics);
+    let write = |name: &str, text: String| {
+        let file = out.join(name);
+        std::fs::create_dir_all(out)
+            .and_then(|()| std::fs::write(&file, text))
+            .map_err(|cause| RotorError::Unwritable { file: file.display().to_string(), cause })
+    };
+    write("rotor.toml", vehicle_file::text(&report, vehicle.as_ref()))?;
+    write("rotor.json", report.json()? + "\n")?;
+    Ok(report)
+}

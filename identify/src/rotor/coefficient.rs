@@ -1,0 +1,104 @@
+//! y = c w^2 from plateaus: T = c_T w^2 (thesis eq. 3.1) and Q = c_Q w^2 (eq. 3.2).
+
+use serde::Serialize;
+
+use super::LEVEL;
+use super::score::Score;
+use crate::statistics::{Estimate, jackknife};
+
+/// Plateaus that a fit needs.
+pub const PLATEAUS_MIN: usize = 4;
+
+/// A mean square speed in (rad/s)^2 and the mean thrust or torque there, tare taken off.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Point {
+    /// Mean of w^2.
+    pub squared: f64,
+    /// Mean thrust in N or torque in N*m.
+    pub force: f64,
+}
+
+/// A coefficient, and how well the law fits.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Coefficient {
+    /// c, in N/(rad/s)^2 or N*m/(rad/s)^2.
+    pub value: Estimate,
+    /// p of y ~ w^p: the law says 2. All plateaus share the tare, whose error is not in this interval.
+    pub exponent: Estimate,
+    /// y at w = 0 of the line y = b + c w^2, which after the tare should be 0; in N or N*m.
+    pub intercept: Estimate,
+    /// y / w^2 at the slowest plateau.
+    pub at_slowest: f64,
+    /// y / w^2 at the fastest plateau.
+    pub at_fastest: f64,
+    /// Plateaus fitted.
+    pub plateaus: usize,
+    /// Errors on the plateaus that were held out, in N or N*m.
+    pub held_out: Option<Score>,
+}
+
+impl Coefficient {
+    /// Least squares over plateaus, each one vote; `None` with too few. Intervals by leaving out one plateau after
+    /// the other, since readings of one plateau are correlated.
+    pub fn fitted(fit: &[Point], test: &[Point]) -> Option<Self> {
+        let speed = |point: &&Point| point.squared;
+        let ratio = |point: &Point| point.force / point.squared;
+        if fit.len() < PLATEAUS_MIN {
+            return None;
+        }
+        let slowest = fit.iter().min_by(|a, b| speed(a).total_cmp(&speed(b)))?;
+        let fastest = fit.iter().max_by(|a, b| speed(a).total_cmp(&speed(b)))?;
+        let c = slope_through_zero(fit);
+        let pairs: Vec<_> = test.iter().map(|point| (c * point.squared, point.force)).collect();
+        Some(Self {
+            value: jackknifed(fit, slope_through_zero),
+            exponent: jackknifed(fit, exponent),
+            intercept: jackknifed(fit, intercept),
+            at_slowest: ratio(slowest),
+            at_fastest: ratio(fastest),
+            plateaus: fit.len(),
+            held_out: Score::of(&pairs),
+        })
+    }
+}
+
+/// An estimate from `points` with the interval of leaving out one after the other.
+pub fn jackknifed<T: Copy>(points: &[T], estimate: impl Fn(&[T]) -> f64) -> Estimate {
+    let without = |left_out: usize| {
+        let others: Vec<T> = points
+            .iter()
+            .enumerate()
+            .filter(|(index, _)| *index != left_out)
+            .map(|(_, point)| *point)
+            .collect();
+        estimate(&others)
+    };
+    let without_one: Vec<f64> = (0..points.len()).map(without).collect();
+    jackknife(estimate(points), &without_one, LEVEL)
+}
+
+/// The line y = intercept + slope x of least squares.
+pub fn line(points: &[(f64, f64)]) -> (f64, f64) {
+    let n = points.len() as f64;
+    let mean_x = points.iter().map(|(x, _)| x).sum::<f64>() / n;
+    let mean_y = points.iter().map(|(_, y)| y).sum::<f64>() / n;
+    let xy: f64 = points.iter().map(|(x, y)| (x - mean_x) * (y - mean_y)).sum();
+    let xx: f64 = points.iter().map(|(x, _)| (x - mean_x).powi(2)).sum();
+    (mean_y - xy / xx * mean_x, xy / xx)
+}
+
+fn slope_through_zero(points: &[Point]) -> f64 {
+    let products: f64 = points.iter().map(|point| point.squared * point.force).sum();
+    let squares: f64 = points.iter().map(|point| point.squared.powi(2)).sum();
+    products / squares
+}
+
+fn intercept(points: &[Point]) -> f64 {
+    line(&points.iter().map(|point| (point.squared, point.force)).collect::<Vec<_>>()).0
+}
+
+/// The slope of ln y over ln w, as far as y has a logarithm.
+fn exponent(points: &[Point]) -> f64 {
+    let positive = points.iter().filter(|point| point.force > 0.0);
+    line(&positive.map(|point| (0.5 * point.squared.ln(), point.force.ln())).collect::<Vec<_>>()).1
+}

@@ -1,0 +1,72 @@
+//! What can be wrong with a stand file, its logs, or the folder of the results.
+
+use vehicles::{Place, VehicleError};
+
+/// Why a rotor could not be identified.
+#[derive(Debug, thiserror::Error)]
+pub enum RotorError {
+    /// A file could not be read at all.
+    #[error("{file}: cannot read this file: {cause}; check the path")]
+    Unreadable {
+        /// The path.
+        file: String,
+        /// What the operating system said.
+        #[source]
+        cause: std::io::Error,
+    },
+    /// A result could not be written.
+    #[error("{file}: cannot write this file: {cause}; check the folder and the space left")]
+    Unwritable {
+        /// The path.
+        file: String,
+        /// What the operating system said.
+        #[source]
+        cause: std::io::Error,
+    },
+    /// The stand file is not TOML, or has a key or a type that no stand file has.
+    #[error("{place}: {message}; correct this line (docs/rotor-stand.md has the format)")]
+    Syntax {
+        /// Where the parser stopped.
+        place: Place,
+        /// What the parser said.
+        message: String,
+    },
+    /// A key of the stand file holds something that cannot be meant.
+    #[error("{file}: `{key}`: expected {expected}, found {found}; correct this value")]
+    BadValue {
+        /// The stand file.
+        file: String,
+        /// The dotted key.
+        key: String,
+        /// What would be accepted.
+        expected: String,
+        /// What the file says.
+        found: String,
+    },
+    /// The vehicle file that the rest is taken from is not usable.
+    #[error(transparent)]
+    Vehicle(#[from] VehicleError),
+    /// A log does not hold what the stand file says.
+    #[error("{file}: {reason}")]
+    Log {
+        /// The log.
+        file: String,
+        /// What is wrong, and what to do.
+        reason: String,
+    },
+    /// There is too little to fit.
+    #[error("{what}: expected {expected}, found {found}; {advice}")]
+    TooLittle {
+        /// What was to be fitted.
+        what: String,
+        /// What is needed.
+        expected: String,
+        /// What there is.
+        found: String,
+        /// What to do.
+        advice: String,
+    },
+    /// The figures could not be written as JSON.
+    #[error("cannot write the figures as JSON: {0}")]
+    Json(#[from] serde_json::Error),
+}

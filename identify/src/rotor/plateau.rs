@@ -1,0 +1,118 @@
+//! Where a log stands still, and what it reads there.
+
+use std::ops::Range;
+
+/// A reading of a plateau is an outlier beyond this many robust standard deviations.
+const OUTLIER_SIGMAS: f64 = 6.0;
+/// The robust standard deviation of normal numbers over their median absolute deviation.
+const MAD_TO_SIGMA: f64 = 1.4826;
+/// Rows before and after a row that its running median looks at.
+const MEDIAN_REACH: usize = 2;
+/// Below this a rotor stands still.
+pub const REST_RAD_S: f64 = 1.0;
+
+/// The plateaus of a log.
+pub struct Plateaus {
+    /// Rows of each, in the log's order.
+    pub rows: Vec<Range<usize>>,
+    /// Rows whose speed is a spike: far from the running median of five.
+    pub is_spike: Vec<bool>,
+}
+
+/// Finds the rows before which the speed has been within `steady` of itself for `settle_s`.
+///
+/// Spikes of one or two rows do not break a plateau. A plateau ends where the speed leaves twice the band around its
+/// first value, so that a slow sweep becomes many.
+pub fn find(time_s: &[f64], speed: &[f64], settle_s: f64, steady: f64) -> Plateaus {
+    let smooth = running_median(speed);
+    let band = |row: usize| (steady * smooth[row]).max(REST_RAD_S);
+    let is_spike = (0..speed.len()).map(|row| (speed[row] - smooth[row]).abs() > band(row)).collect();
+    let mut plateaus: Vec<Range<usize>> = Vec::new();
+    let mut first = 0;
+    for row in 0..speed.len() {
+        while time_s[row] - time_s[first] > settle_s {
+            first += 1;
+        }
+        let is_long = first > 0;
+        let (low, high) = range(&smooth[first..=row]);
+        if !is_long || high - low > band(row) {
+            continue;
+        }
+        match plateaus.last_mut() {
+            Some(last) if last.end == row && (smooth[row] - smooth[last.start]).abs() <= 2.0 * band(row) => {
+                last.end = row + 1;
+            }
+            _ => plateaus.push(row..row + 1),
+        }
+    }
+    Plateaus { rows: plateaus, is_spike }
+}
+
+/// Splits `values` into those that belong together and the number of outliers among them.
+pub fn without_outliers(values: &[f64]) -> (Vec<f64>, usize) {
+    let middle = median(values);
+    let bound = OUTLIER_SIGMAS * spread(values);
+    let kept: Vec<f64> = values.iter().copied().filter(|value| (value - middle).abs() <= bound).collect();
+    let outliers = values.len() - kept.len();
+    (kept, outliers)
+}
+
+/// The standard deviation as the median absolute deviation tells it.
+pub fn spread(values: &[f64]) -> f64 {
+    let middle = median(values);
+    let deviations: Vec<f64> = values.iter().map(|value| (value - middle).abs()).collect();
+    MAD_TO_SIGMA * median(&deviations)
+}
+
+/// The median; NaN of nothing.
+pub fn median(values: &[f64]) -> f64 {
+    let mut sorted = values.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    match sorted.len() {
+        0 => f64::NAN,
+        n if n % 2 == 1 => sorted[n / 2],
+        n => 0.5 * (sorted[n / 2 - 1] + sorted[n / 2]),
+    }
+}
+
+/// How many readings stand in runs of at least `shortest` equal ones while the rotor turns, and how many of these
+/// are the largest reading of all.
+pub fn stuck(values: &[f64], shortest: usize) -> (usize, usize) {
+    let largest = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    let runs = values.chunk_by(|a, b| a == b).filter(|run| run.len() >= shortest && run[0] > REST_RAD_S);
+    runs.fold((0, 0), |(all, top), run| {
+        (all + run.len(), top + if run[0] == largest { run.len() } else { 0 })
+    })
+}
+
+fn running_median(values: &[f64]) -> Vec<f64> {
+    let window = |row: usize| row.saturating_sub(MEDIAN_REACH)..(row + MEDIAN_REACH + 1).min(values.len());
+    (0..values.len()).map(|row| median(&values[window(row)])).collect()
+}
+
+/// The smallest and the largest.
+pub fn range(values: &[f64]) -> (f64, f64) {
+    values
+        .iter()
+        .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| (low.min(*value), high.max(*value)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_plateau_begins_after_settling_and_outlives_a_spike() {
+        let time_s: Vec<f64> = (0..200).map(|row| f64::from(row) * 0.05).collect();
+        let mut speed: Vec<f64> = (0..200).map(|row| if row < 100 { 300.0 } else { 400.0 }).collect();
+        speed[150] = 900.0;
+        let found = find(&time_s, &speed, 1.0, 0.02);
+        assert_eq!(found.rows, [21..100, 121..200]);
+        assert_eq!(found.is_spike.iter().filter(|spike| **spike).count(), 1);
+    }
+
+    #[test]
+    fn equal_readings_in_a_row_are_counted() {
+        assert_eq!(stuck(&[0.0, 0.0, 5.0, 5.0, 5.0, 4.0, 9.0, 9.0, 9.0], 3), (6, 3));
+    }
+}

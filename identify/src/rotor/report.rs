@@ -1,0 +1,151 @@
+//! The result, and its summary on one screen.
+
+use std::fmt;
+
+use serde::Serialize;
+
+use super::RotorError;
+use super::coefficient::Coefficient;
+use super::dynamics::{Dynamics, Fitted, Order};
+use super::plateau;
+use super::stand::Stand;
+use super::statics::Statics;
+use crate::statistics::Estimate;
+
+/// Everything that a stand told.
+#[derive(Debug, Clone, Serialize)]
+pub struct RotorReport {
+    /// What was measured.
+    pub name: String,
+    /// Thrust and torque; absent without static logs.
+    pub statics: Option<Statics>,
+    /// The motor; absent without dynamic logs.
+    pub dynamics: Option<Dynamics>,
+}
+
+impl RotorReport {
+    pub(super) fn new(stand: &Stand, statics: Option<Statics>, dynamics: Option<Dynamics>) -> Self {
+        Self { name: stand.name.clone(), statics, dynamics }
+    }
+
+    /// All figures as JSON; an end of an interval that is not known is `null`.
+    pub fn json(&self) -> Result<String, RotorError> {
+        Ok(serde_json::to_string_pretty(self)?)
+    }
+}
+
+impl fmt::Display for RotorReport {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        writeln!(f, "{}", self.name)?;
+        if let Some(statics) = &self.statics {
+            write_statics(f, statics)?;
+        }
+        if let Some(dynamics) = &self.dynamics {
+            write_dynamics(f, dynamics)?;
+        }
+        let findings = |own: &[String]| own.to_vec();
+        let statics = self.statics.iter().flat_map(|statics| findings(&statics.findings));
+        let dynamics = self.dynamics.iter().flat_map(|dynamics| findings(&dynamics.findings));
+        writeln!(f, "about the data")?;
+        statics.chain(dynamics).try_for_each(|finding| writeln!(f, "  - {finding}"))
+    }
+}
+
+fn write_statics(f: &mut fmt::Formatter<'_>, statics: &Statics) -> fmt::Result {
+    let (slowest, fastest) = statics.speeds_rad_s;
+    writeln!(f, "static, {slowest:.0} to {fastest:.0} rad/s, intervals of 95 %")?;
+    for (name, unit, coefficient) in [("c_T", "N", &statics.thrust), ("c_Q", "N*m", &statics.torque)] {
+        if let Some(coefficient) = coefficient {
+            write_coefficient(f, name, unit, coefficient)?;
+        }
+    }
+    if let Some(check) = &statics.plausibility {
+        write!(f, "  thrust number {:.3}", check.thrust_number)?;
+        match check.figure_of_merit {
+            Some(merit) => writeln!(f, ", figure of merit {merit:.2}")?,
+            None => writeln!(f)?,
+        }
+    }
+    Ok(())
+}
+
+fn write_coefficient(
+    f: &mut fmt::Formatter<'_>,
+    name: &str,
+    unit: &str,
+    coefficient: &Coefficient,
+) -> fmt::Result {
+    let Estimate { value, low, high, .. } = coefficient.value;
+    write!(f, "  {name} = {value:.4e} {unit}/(rad/s)^2 ({low:.4e} to {high:.4e})")?;
+    write!(f, ", {} plateaus; ", coefficient.plateaus)?;
+    match &coefficient.held_out {
+        Some(score) => writeln!(
+            f,
+            "held out {}: RMS {:.2e} {unit}, R^2 {:.4}",
+            score.segments, score.rms, score.r_squared
+        ),
+        None => writeln!(f, "none held out"),
+    }
+}
+
+fn write_dynamics(f: &mut fmt::Formatter<'_>, dynamics: &Dynamics) -> fmt::Result {
+    writeln!(f, "motor")?;
+    write_motor(f, &dynamics.first)?;
+    write_motor(f, &dynamics.second)?;
+    let preferred = if dynamics.comparison.preferred == Order::First { "first" } else { "second" };
+    writeln!(f, "  preferred: {preferred} order; {}", dynamics.comparison.reason)?;
+    write_time(f, "rising steps", dynamics.rising_s, &own_times(dynamics, 1.0))?;
+    write_time(f, "falling steps", dynamics.falling_s, &own_times(dynamics, -1.0))?;
+    write_time(f, "first order on the other clock", dynamics.other_clock_s, "")?;
+    let Some(command) = &dynamics.command else { return Ok(()) };
+    writeln!(
+        f,
+        "  command {} to {}: {:.0} to {:.0} rad/s{}",
+        command.min,
+        command.max,
+        command.speed_at_min_rad_s.value,
+        command.speed_at_max_rad_s.value,
+        command.held_out.map(|score| format!("; held out: RMS {:.0} rad/s", score.rms)).unwrap_or_default()
+    )
+}
+
+/// The time constants of single steps of a direction, smallest and largest.
+fn own_times(dynamics: &Dynamics, sign: f64) -> String {
+    let own = dynamics.steps.iter().filter(|step| step.height_rad_s * sign > 0.0);
+    let times: Vec<f64> = own.map(|step| 1e3 * step.time_constant_s).collect();
+    if times.is_empty() {
+        return "no steps".to_owned();
+    }
+    let (low, high) = plateau::range(&times);
+    format!("{} steps, alone {low:.0} to {high:.0} ms", times.len())
+}
+
+fn write_time(f: &mut fmt::Formatter<'_>, name: &str, time: Option<Estimate>, more: &str) -> fmt::Result {
+    let time = time.map_or("too few for an interval".to_owned(), milliseconds);
+    writeln!(f, "  {name}: {time}{}{more}", if more.is_empty() { "" } else { "; " })
+}
+
+fn milliseconds(time: Estimate) -> String {
+    format!("{:.1} ms ({:.1} to {:.1})", 1e3 * time.value, 1e3 * time.low, 1e3 * time.high)
+}
+
+fn write_motor(f: &mut fmt::Formatter<'_>, motor: &Fitted) -> fmt::Result {
+    match (motor.time_constant_s, motor.natural_frequency_rad_s, motor.damping_ratio) {
+        (Some(time), ..) => write!(f, "  first order: {}", milliseconds(time))?,
+        (None, Some(wn), Some(zeta)) => write!(
+            f,
+            "  second order: w_n {:.1} rad/s ({:.1} to {:.1}), zeta {:.2} ({:.2} to {:.2})",
+            wn.value, wn.low, wn.high, zeta.value, zeta.low, zeta.high
+        )?,
+        _ => write!(f, "  second order: its parameters cannot be told")?,
+    }
+    write!(f, ", {} steps", motor.steps)?;
+    match &motor.held_out {
+        Some(score) => writeln!(
+            f,
+            "; held out {}: RMS {:.2} rad/s, R^2 {:.4}",
+            score.segments, score.rms, score.r_squared
+        ),
+        None => writeln!(f, "; none held out"),
+    }
+}

@@ -1,0 +1,92 @@
+//! How a motor 1 / (a2 s^2 + a1 s + 1) answers a unit step of its command.
+
+/// Damping this near to 1 counts as 1, where the formulas on both sides lose digits.
+const NEAR_CRITICAL: f64 = 1e-8;
+
+/// A motor as its transfer function; with a2 = 0 it is of first order with the time constant a1. The thesis gives
+/// its motor in this form (section 4.2).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Lag {
+    /// a1, in s.
+    pub a1_s: f64,
+    /// a2, in s^2.
+    pub a2_s2: f64,
+}
+
+impl Lag {
+    /// w_n = 1 / sqrt(a2).
+    pub fn natural_frequency_rad_s(self) -> f64 {
+        self.a2_s2.sqrt().recip()
+    }
+
+    /// zeta = a1 / (2 sqrt(a2)).
+    pub fn damping_ratio(self) -> f64 {
+        0.5 * self.a1_s / self.a2_s2.sqrt()
+    }
+
+    /// The speed `t_s` after a step from 0 to 1 that found the motor at rest.
+    pub fn step(self, t_s: f64) -> f64 {
+        let Self { a1_s: a1, a2_s2: a2 } = self;
+        if t_s <= 0.0 {
+            return 0.0;
+        }
+        if a2 <= 0.0 {
+            return -(-t_s / a1).exp_m1();
+        }
+        let discriminant = a1 * a1 - 4.0 * a2;
+        let decay = 0.5 * a1 / a2;
+        if discriminant.abs() < NEAR_CRITICAL * a1 * a1 {
+            return 1.0 - (-decay * t_s).exp() * (1.0 + decay * t_s);
+        }
+        if discriminant < 0.0 {
+            let omega = 0.5 * (-discriminant).sqrt() / a2;
+            let (sin, cos) = (omega * t_s).sin_cos();
+            return 1.0 - (-decay * t_s).exp() * (cos + decay / omega * sin);
+        }
+        // The slow root by its conjugate, which keeps its digits where a2 is small.
+        let root = discriminant.sqrt();
+        let (slow, fast) = (-2.0 / (a1 + root), -0.5 * (a1 + root) / a2);
+        1.0 + (fast * (slow * t_s).exp() - slow * (fast * t_s).exp()) / (slow - fast)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The same step by the fourth-order Runge-Kutta method.
+    fn integrated(lag: Lag, end_s: f64) -> f64 {
+        let rate = |[w, v]: [f64; 2]| [v, (1.0 - w - lag.a1_s * v) / lag.a2_s2];
+        let steps = 20_000;
+        let h = end_s / f64::from(steps);
+        let ahead = |x: [f64; 2], k: [f64; 2], part: f64| [x[0] + part * h * k[0], x[1] + part * h * k[1]];
+        let mut x = [0.0, 0.0];
+        for _ in 0..steps {
+            let k1 = rate(x);
+            let k2 = rate(ahead(x, k1, 0.5));
+            let k3 = rate(ahead(x, k2, 0.5));
+            let k4 = rate(ahead(x, k3, 1.0));
+            let sum = [0, 1].map(|i| (k1[i] + 2.0 * k2[i] + 2.0 * k3[i] + k4[i]) / 6.0);
+            x = ahead(x, sum, 1.0);
+        }
+        x[0]
+    }
+
+    #[test]
+    fn the_closed_form_is_the_differential_equation() {
+        for (wn, zeta) in [(15.1, 0.6), (40.0, 1.0), (40.0, 1.0 + 1e-10), (60.0, 1.8), (90.0, 0.2)] {
+            let lag = Lag { a1_s: 2.0 * zeta / wn, a2_s2: 1.0 / (wn * wn) };
+            for t in [0.01, 0.05, 0.3] {
+                assert!((lag.step(t) - integrated(lag, t)).abs() < 1e-8, "{wn} {zeta} {t}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_small_second_coefficient_comes_near_the_first_order() {
+        let first = Lag { a1_s: 0.04, a2_s2: 0.0 };
+        let second = Lag { a1_s: 0.04, a2_s2: 1e-12 };
+        assert!((first.step(0.03) - second.step(0.03)).abs() < 1e-8);
+        assert_eq!(first.step(-1.0), 0.0);
+    }
+}

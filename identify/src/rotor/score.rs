@@ -1,0 +1,29 @@
+//! How well a model does on what was not fitted.
+
+use serde::Serialize;
+
+/// Errors of predictions.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Score {
+    /// Root of the mean square error, in the unit of what is predicted.
+    pub rms: f64,
+    /// The share of the variance that is predicted; 1 is all of it.
+    pub r_squared: f64,
+    /// Plateaus, steps or holds that were predicted.
+    pub segments: usize,
+}
+
+impl Score {
+    /// The score of pairs of a prediction and what was measured; `None` without any.
+    pub fn of(pairs: &[(f64, f64)]) -> Option<Self> {
+        let n = pairs.len() as f64;
+        let mean = pairs.iter().map(|(_, measured)| measured).sum::<f64>() / n;
+        let error: f64 = pairs.iter().map(|(predicted, measured)| (measured - predicted).powi(2)).sum();
+        let variance: f64 = pairs.iter().map(|(_, measured)| (measured - mean).powi(2)).sum();
+        (!pairs.is_empty()).then(|| Self {
+            rms: (error / n).sqrt(),
+            r_squared: 1.0 - error / variance,
+            segments: pairs.len(),
+        })
+    }
+}

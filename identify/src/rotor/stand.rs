@@ -1,0 +1,334 @@
+//! The stand file: which logs, which columns, and what is held out.
+
+use std::path::{Path, PathBuf};
+
+use serde::Deserialize;
+use vehicles::units::{Dimension, RATIO, SPEED, TIME, TORQUE};
+use vehicles::{Place, Vehicle};
+
+use super::RotorError;
+
+/// Forces of thrust; the gram-force by the standard gravity of 9.80665 m/s^2.
+const FORCE: Dimension =
+    Dimension { name: "force", units: &[("N", 1.0), ("gf", 9.806_65e-3), ("kgf", 9.806_65)] };
+
+/// A stand file, read.
+pub struct Stand {
+    /// What was measured, in words.
+    pub name: String,
+    /// Diameter of the propeller in m, if the file says it.
+    pub diameter_m: Option<f64>,
+    /// Logs of thrust and torque at steady speeds.
+    pub statics: Vec<StaticLog>,
+    /// Logs of steps of the command.
+    pub dynamics: Vec<DynamicLog>,
+    vehicle: Option<PathBuf>,
+}
+
+/// The vehicle file that the rest is taken over from.
+pub struct VehicleFile {
+    /// What it is called in texts.
+    pub name: String,
+    /// The vehicle.
+    pub vehicle: Vehicle,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct File {
+    name: String,
+    propeller_diameter_m: Option<f64>,
+    vehicle: Option<String>,
+    #[serde(default, rename = "static")]
+    statics: Vec<StaticLog>,
+    #[serde(default, rename = "dynamic")]
+    dynamics: Vec<DynamicLog>,
+}
+
+/// What a log is for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, serde::Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Role {
+    /// Parameters are fitted on it.
+    Fit,
+    /// Errors are judged on it, and nothing is fitted.
+    Test,
+}
+
+/// A log of thrust and torque.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct StaticLog {
+    /// The log; made a path by [`Stand::read`].
+    pub file: PathBuf,
+    /// What it is for.
+    #[serde(default = "fit")]
+    pub role: Role,
+    /// Share of the plateaus of a log with the role `fit` that are held out.
+    #[serde(default)]
+    pub held_out: f64,
+    /// How long the speed has to have been steady before a reading of thrust or torque counts.
+    #[serde(default = "settle_s")]
+    pub settle_s: f64,
+    /// By which part of itself the speed may change within that time.
+    #[serde(default = "steady")]
+    pub steady: f64,
+    /// Where the time stands.
+    pub time: Column,
+    /// Where the speed stands.
+    pub speed: Column,
+    /// Where the thrust stands.
+    pub thrust: Option<Column>,
+    /// Where the torque stands.
+    pub torque: Option<Column>,
+}
+
+/// A log of steps of the command.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct DynamicLog {
+    /// The log; made a path by [`Stand::read`].
+    pub file: PathBuf,
+    /// What it is for.
+    #[serde(default = "fit")]
+    pub role: Role,
+    /// Share of the steps of a log with the role `fit` that are held out.
+    #[serde(default)]
+    pub held_out: f64,
+    /// Which clock the steps are judged on.
+    #[serde(default)]
+    pub clock: Clock,
+    /// How long the command has to have been constant before a step.
+    #[serde(default = "before_s")]
+    pub before_s: f64,
+    /// How long after a step the speed is looked at; the command has to stay constant.
+    #[serde(default = "after_s")]
+    pub after_s: f64,
+    /// Where the time stands.
+    pub time: Column,
+    /// Where the speed stands.
+    pub speed: Column,
+    /// Where the command stands.
+    pub command: Column,
+}
+
+/// Where the times of rows come from.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize, serde::Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Clock {
+    /// The log's own stamps.
+    #[default]
+    Stamps,
+    /// Rows lie at equal distances, and stamps tell only the mean distance: for logs whose stamps are the times at
+    /// which rows arrived in groups.
+    Rows,
+}
+
+/// A column of a log.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Column {
+    /// Its name in the header.
+    pub column: String,
+    /// Its unit.
+    pub unit: String,
+    /// Pole pairs of the motor, for an electrical speed: the rotor's is this many times smaller.
+    #[serde(default = "one")]
+    pub pole_pairs: f64,
+}
+
+/// How the cells of a column become SI.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Scale {
+    /// By a factor.
+    Factor(f64),
+    /// By reading `YYYY-MM-DD HH:MM:SS:mmm`.
+    WallClock,
+}
+
+fn fit() -> Role {
+    Role::Fit
+}
+fn settle_s() -> f64 {
+    1.0
+}
+fn steady() -> f64 {
+    0.02
+}
+fn before_s() -> f64 {
+    0.2
+}
+fn after_s() -> f64 {
+    0.5
+}
+fn one() -> f64 {
+    1.0
+}
+
+impl Stand {
+    /// Reads and checks the stand file at `path`.
+    pub fn read(path: &Path) -> Result<Self, RotorError> {
+        let name = path.display().to_string();
+        let text = std::fs::read_to_string(path)
+            .map_err(|cause| RotorError::Unreadable { file: name.clone(), cause })?;
+        let file: File = toml::from_str(&text).map_err(|error| RotorError::Syntax {
+            place: Place::of(&name, &text, error.span().map_or(0, |span| span.start)),
+            message: error.message().trim().replace('\n', ", "),
+        })?;
+        let check = Check { file: &name };
+        check.all(&file)?;
+        let folder = path.parent().unwrap_or(Path::new(""));
+        let resolve =
+            |key: &str, written: &Path| check.expanded(key, written).map(|expanded| folder.join(expanded));
+        let mut stand = Stand {
+            name: file.name,
+            diameter_m: file.propeller_diameter_m,
+            vehicle: file.vehicle.map(|written| resolve("vehicle", Path::new(&written))).transpose()?,
+            statics: file.statics,
+            dynamics: file.dynamics,
+        };
+        for log in &mut stand.statics {
+            log.file = resolve("static.file", &log.file)?;
+        }
+        for log in &mut stand.dynamics {
+            log.file = resolve("dynamic.file", &log.file)?;
+        }
+        Ok(stand)
+    }
+
+    /// The vehicle that the rest is taken over from, if the file names one.
+    pub fn vehicle_file(&self) -> Result<Option<VehicleFile>, RotorError> {
+        let Some(path) = &self.vehicle else { return Ok(None) };
+        let name = short_name(path);
+        Ok(Some(VehicleFile { name, vehicle: Vehicle::load(path)? }))
+    }
+}
+
+/// What a file is called in reports: its name without folders.
+pub fn short_name(path: &Path) -> String {
+    path.file_name().unwrap_or(path.as_os_str()).to_string_lossy().into_owned()
+}
+
+/// What the cells of a speed, thrust or torque mean; known to be right after [`Stand::read`].
+impl Column {
+    /// To seconds.
+    pub fn time(&self) -> Scale {
+        if self.unit == "wall clock" { Scale::WallClock } else { self.scale(TIME) }
+    }
+
+    /// To rad/s of the rotor.
+    pub fn speed(&self) -> Scale {
+        self.scale(SPEED)
+    }
+
+    /// To N.
+    pub fn thrust(&self) -> Scale {
+        self.scale(FORCE)
+    }
+
+    /// To N*m.
+    pub fn torque(&self) -> Scale {
+        self.scale(TORQUE)
+    }
+
+    /// Raw: a command keeps its unit.
+    pub fn raw(&self) -> Scale {
+        Scale::Factor(1.0)
+    }
+
+    fn scale(&self, dimension: Dimension) -> Scale {
+        Scale::Factor(dimension.factor(&self.unit).unwrap_or(f64::NAN) / self.pole_pairs)
+    }
+}
+
+/// Checks the values of a stand file.
+struct Check<'f> {
+    file: &'f str,
+}
+
+impl Check<'_> {
+    fn all(&self, file: &File) -> Result<(), RotorError> {
+        let logs = file.statics.len() + file.dynamics.len();
+        self.require(logs > 0, "static, dynamic", "at least one log", "none")?;
+        if let Some(diameter) = file.propeller_diameter_m {
+            self.positive("propeller_diameter_m", diameter)?;
+        }
+        file.statics.iter().try_for_each(|log| self.static_log(log))?;
+        file.dynamics.iter().try_for_each(|log| self.dynamic_log(log))
+    }
+
+    fn static_log(&self, log: &StaticLog) -> Result<(), RotorError> {
+        self.share("static.held_out", log.held_out)?;
+        self.positive("static.settle_s", log.settle_s)?;
+        self.positive("static.steady", log.steady)?;
+        self.time("static.time", &log.time)?;
+        self.unit("static.speed", &log.speed, SPEED)?;
+        let has_one = log.thrust.is_some() || log.torque.is_some();
+        self.require(has_one, "static", "a `thrust` or a `torque`", "neither")?;
+        log.thrust.iter().try_for_each(|column| self.unit("static.thrust", column, FORCE))?;
+        log.torque.iter().try_for_each(|column| self.unit("static.torque", column, TORQUE))
+    }
+
+    fn dynamic_log(&self, log: &DynamicLog) -> Result<(), RotorError> {
+        self.share("dynamic.held_out", log.held_out)?;
+        self.positive("dynamic.before_s", log.before_s)?;
+        self.positive("dynamic.after_s", log.after_s)?;
+        self.time("dynamic.time", &log.time)?;
+        self.unit("dynamic.speed", &log.speed, SPEED)?;
+        self.unit("dynamic.command", &log.command, RATIO)
+    }
+
+    fn time(&self, key: &str, column: &Column) -> Result<(), RotorError> {
+        let expected = format!("\"wall clock\" (YYYY-MM-DD HH:MM:SS:mmm) or {}", TIME.describe());
+        let holds = column.time() == Scale::WallClock || TIME.factor(&column.unit).is_some();
+        self.require(holds, &format!("{key}.unit"), &expected, &column.unit)
+    }
+
+    fn unit(&self, key: &str, column: &Column, dimension: Dimension) -> Result<(), RotorError> {
+        self.positive(&format!("{key}.pole_pairs"), column.pole_pairs)?;
+        let holds = dimension.factor(&column.unit).is_some();
+        self.require(holds, &format!("{key}.unit"), &dimension.describe(), &column.unit)
+    }
+
+    fn share(&self, key: &str, share: f64) -> Result<(), RotorError> {
+        self.require((0.0..1.0).contains(&share), key, "a share from 0 to below 1", &share.to_string())
+    }
+
+    fn positive(&self, key: &str, number: f64) -> Result<(), RotorError> {
+        let holds = number > 0.0 && number.is_finite();
+        self.require(holds, key, "a number above 0", &number.to_string())
+    }
+
+    fn require(&self, holds: bool, key: &str, expected: &str, found: &str) -> Result<(), RotorError> {
+        if holds {
+            return Ok(());
+        }
+        let (key, expected, found) = (key.to_owned(), expected.to_owned(), found.to_owned());
+        Err(RotorError::BadValue { file: self.file.to_owned(), key, expected, found })
+    }
+
+    /// The path with `${NAME}` and `${NAME:-default}` replaced by the environment's, as in manifests.
+    fn expanded(&self, key: &str, written: &Path) -> Result<String, RotorError> {
+        let text = written.to_string_lossy();
+        let mut expanded = String::new();
+        let mut rest: &str = &text;
+        while let Some((before, after)) = rest.split_once("${") {
+            let (inside, after) = after.split_once('}').unwrap_or((after, ""));
+            let (name, default) =
+                inside.split_once(":-").map_or((inside, None), |(name, other)| (name, Some(other)));
+            let value = std::env::var(name).ok().or(default.map(str::to_owned));
+            let expected = "a path whose variables are set or have a default, as in ${NAME:-path}";
+            self.require(value.is_some(), key, expected, &text)?;
+            expanded += before;
+            expanded += &value.unwrap_or_default();
+            rest = after;
+        }
+        Ok(expanded + rest)
+    }
+}
+
+/// Which of `count` segments are held out: spread evenly, so that a share of them is, and the first is not.
+pub fn held_out(count: usize, role: Role, share: f64) -> Vec<bool> {
+    let passed = |index: usize| (index as f64 * share + 1e-9).floor();
+    (0..count).map(|index| role == Role::Test || passed(index + 1) > passed(index)).collect()
+}
