@@ -92,6 +92,28 @@ fn data_in_other_units_than_declared_are_found() {
 }
 
 #[test]
+fn a_position_alone_that_is_too_fast_is_found() {
+    let channels = CHANNELS.lines().filter(|line| !line.starts_with("velocity"));
+    let channels: String = channels.map(|line| line.to_owned() + "\n").collect();
+    let mm = Motion { length_unit: 1000.0, ..Motion::default() };
+    assert_eq!(findings(&mm, &channels), [(Quantity::Position, "`unit = \"mm\"`".to_owned())]);
+    assert_eq!(read(&Motion::default(), &channels, "").unwrap().notes, [""; 0]);
+}
+
+#[test]
+fn rotor_speeds_are_compared_with_hover() {
+    let vehicle = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../vehicles/hummingbird.toml");
+    let hover = vehicles::Vehicle::load(&vehicle).unwrap().hover_speed_rad_s();
+    // The columns of the commands hold speeds here, about that of hover in rpm.
+    let rpm = Motion { command_unit: hover / 101.5 * 60.0 / std::f64::consts::TAU, ..Motion::default() };
+    let channels = CHANNELS.replace("command =", "rotor_speed =");
+    let declared = |unit: &str| channels.replace("\"count\"", &format!("\"{unit}\""));
+    assert_eq!(findings(&rpm, &declared("rad/s")), [(Quantity::RotorSpeed, "`unit = \"rpm\"`".to_owned())]);
+    let flight = read(&rpm, &declared("rpm"), "").unwrap();
+    assert!((flight.rotor_speed.values[0][0] / hover - 1.0).abs() < 0.02 && flight.notes.is_empty());
+}
+
+#[test]
 fn a_quaternion_with_w_first_or_the_wrong_way_is_found() {
     let w_first = CHANNELS.replace("\"qx\", \"qy\", \"qz\", \"qw\"", "\"qw\", \"qx\", \"qy\", \"qz\"");
     let found = findings(&Motion::default(), &w_first);
