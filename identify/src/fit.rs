@@ -146,11 +146,14 @@ impl Bench<'_> {
     /// The normal equations of all blocks of `flights`.
     #[must_use]
     pub fn blocks(&self, flights: &[Prepared], values: &[f64], which: &[usize]) -> Vec<Block> {
-        let of_flight = |flight: &Prepared| {
-            let (residual, columns) = self.model.linearised(flight, values, which);
-            self.flight_blocks(flight, &residual, &columns)
-        };
-        flights.iter().flat_map(of_flight).collect()
+        flights.iter().flat_map(|flight| self.blocks_of(flight, values, which)).collect()
+    }
+
+    /// The normal equations of the blocks of one flight.
+    #[must_use]
+    pub fn blocks_of(&self, flight: &Prepared, values: &[f64], which: &[usize]) -> Vec<Block> {
+        let (residual, columns) = self.model.linearised(flight, values, which);
+        self.flight_blocks(flight, &residual, &columns)
     }
 
     /// The weighted sums of squares of all blocks of `flights`.

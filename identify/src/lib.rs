@@ -1,14 +1,43 @@
-//! Closing the loop: what a real flight shows that the declared model lacks.
+//! Closing the loop: what real flights show that the declared model lacks.
+//!
+//! Measurement and model are put into the same equations of motion, seen through the same smooth window
+//! ([`window`], [`prepared`], [`model`]); what is left is regressed on the candidates' effects ([`fit`]), and judged on
+//! flights that nothing was fitted on ([`select`]).
+//!
+//! | room | what it holds |
+//! |---|---|
+//! | [`run`] | the whole way, from flights to a report |
+//! | [`clock`], [`track`] | measured channels on a grid of instants |
+//! | [`window`] | the window, and differences that lose nothing |
+//! | [`prepared`] | a flight and the equations that it allows |
+//! | [`model`] | the model's side of the equations |
+//! | [`parameter`], [`candidate`] | what may be changed of the model, and by which effect |
+//! | [`normal`], [`fit`] | least squares over blocks of time |
+//! | [`select`] | attribution: which effects the flights ask for |
+//! | [`align`], [`faults`] | clocks and sensors, before anything is fitted |
+//! | [`whiteness`], [`noise`], [`statistics`] | what is left, and what noise alone would leave |
+//! | [`predict`] | prediction over horizons |
+//! | [`report`], [`vehicle_file`], [`experiment`] | what is written down |
+//! | [`rotor`] | the rotor from a thrust stand |
 
+pub mod align;
 pub mod candidate;
 pub mod clock;
+pub mod experiment;
+pub mod faults;
 pub mod fit;
 pub mod model;
+pub mod noise;
 pub mod normal;
 pub mod parameter;
+pub mod predict;
 pub mod prepared;
+pub mod report;
 pub mod rotor;
+pub mod run;
 pub mod select;
 pub mod statistics;
 pub mod track;
+pub mod vehicle_file;
+pub mod whiteness;
 pub mod window;

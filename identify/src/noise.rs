@@ -1,0 +1,80 @@
+//! What sensors scatter, and what follows from it for a prediction that starts at a measured state.
+
+use crate::fit::Bench;
+use flights::{Channel, Flight};
+use std::collections::BTreeMap;
+
+/// Standard deviation of the white noise of a channel, mean over its axes: third differences leave little of a smooth
+/// course, and of white noise 20 times its variance (von Neumann 1941 has it for first differences). A channel that
+/// was interpolated looks quieter than its sensor is.
+#[must_use]
+pub fn deviation<const N: usize>(channel: &Channel<N>) -> Option<f64> {
+    let third = |w: &[[f64; N]], i: usize| w[3][i] - 3.0 * w[2][i] + 3.0 * w[1][i] - w[0][i];
+    let squares: f64 =
+        channel.values.windows(4).flat_map(|w| (0..N).map(move |i| third(w, i).powi(2))).sum();
+    let count = (channel.values.len().checked_sub(3)? * N) as f64;
+    (count > 0.0).then(|| (squares / count / 20.0).sqrt())
+}
+
+/// The noise of each channel that was measured, over the test flights, with its unit.
+#[must_use]
+pub fn floor(bench: &Bench) -> BTreeMap<&'static str, (f64, &'static str)> {
+    let mut floor = BTreeMap::new();
+    let mut add = |name: &'static str, unit: &'static str, own: &dyn Fn(&Flight) -> Option<f64>| {
+        let found: Vec<f64> = bench.test.iter().filter_map(|flight| own(flight.flight)).collect();
+        if !found.is_empty() {
+            let mean_square = found.iter().map(|own| own * own).sum::<f64>() / found.len() as f64;
+            floor.insert(name, (mean_square.sqrt(), unit));
+        }
+    };
+    add("position", "m", &|flight| deviation(&flight.position));
+    add("velocity", "m/s", &|flight| velocity(flight));
+    // A quaternion's component moves by half of the angle.
+    add("attitude", "rad", &|flight| deviation(&flight.attitude).map(|own| own * 4.0 / 3.0_f64.sqrt()));
+    add("rates", "rad/s", &|flight| rates(flight));
+    add("specific_force", "m/s^2", &|flight| deviation(&flight.specific_force));
+    floor
+}
+
+fn velocity(flight: &Flight) -> Option<f64> {
+    deviation(&flight.velocity).or_else(|| Some(deviation(&flight.position)? * of_slope(flight.position.period_s()?)))
+}
+
+fn rates(flight: &Flight) -> Option<f64> {
+    let of_attitude = || {
+        let angle = deviation(&flight.attitude)? * 4.0 / 3.0_f64.sqrt();
+        Some(angle * of_slope(flight.attitude.period_s()?))
+    };
+    deviation(&flight.angular_velocity).or_else(of_attitude)
+}
+
+/// Deviation of the slope of a line through three samples to both sides, of samples with deviation 1.
+fn of_slope(period_s: f64) -> f64 {
+    1.0 / (period_s * 28.0_f64.sqrt())
+}
+
+/// The error per channel that a perfect model has over `horizon_s` by noise alone: that of the start, carried on, and
+/// that of the end. Each is the length of a vector of three axes; attitude in deg as in predictions.
+#[must_use]
+pub fn prediction_floor(
+    floor: &BTreeMap<&'static str, (f64, &'static str)>,
+    horizon_s: f64,
+    gravity_m_s2: f64,
+) -> BTreeMap<&'static str, f64> {
+    let own = |name| floor.get(name).map_or(0.0, |(value, _)| *value);
+    let (position, velocity, rates) = (own("position"), own("velocity"), own("rates"));
+    let angle = own("attitude");
+    let h = horizon_s;
+    let root = |squares: &[f64]| (3.0 * squares.iter().map(|own| own * own).sum::<f64>()).sqrt();
+    // Only tilt, two of three axes, turns gravity into acceleration.
+    let tilt = (2.0_f64 / 3.0).sqrt() * gravity_m_s2;
+    let position_now =
+        root(&[position, position, h * velocity, tilt * h * h / 2.0 * angle, tilt * h * h * h / 6.0 * rates]);
+    let velocity_now = root(&[velocity, velocity, tilt * h * angle, tilt * h * h / 2.0 * rates]);
+    let attitude_now = root(&[angle, angle, h * rates]).to_degrees();
+    let rates_now = root(&[rates, rates]);
+    [("position", position_now), ("velocity", velocity_now), ("attitude", attitude_now), ("rates", rates_now)]
+        .into_iter()
+        .filter(|(name, _)| floor.contains_key(name))
+        .collect()
+}

@@ -1,0 +1,138 @@
+//! Prediction over horizons: the model, set to the measured state at the start of each window, flown on the measured
+//! commands to its end. The same windows as those of the plant node with an input `measured`.
+#![allow(non_snake_case, reason = "a trailing _W or _B names the frame a vector is written in")]
+
+use crate::clock::Clock;
+use crate::prepared::Held;
+use crate::track::Track;
+use flights::Flight;
+use nalgebra::{Quaternion, UnitQuaternion, Vector3};
+use plant::{Airframe, Backend, FreeFlight, NewtonEuler, RigidBody};
+use std::collections::BTreeMap;
+
+/// Length of a tick.
+const TICK_S: f64 = 0.001;
+
+/// The measured states of a flight, tick by tick.
+#[derive(Debug)]
+pub struct Measured {
+    clock: Clock,
+    bodies: Vec<RigidBody>,
+    is_valid: Vec<bool>,
+}
+
+/// Root mean squares at the ends of windows, by channel.
+pub type Errors = BTreeMap<&'static str, f64>;
+
+/// Measured and predicted states at some ticks, for pictures: time in s, then the states.
+pub type Trace = Vec<(f64, RigidBody, RigidBody)>;
+
+impl Measured {
+    /// The states of `flight`, its pose late by `pose_s` and its inertial unit by `imu_s`; `None` where it has no
+    /// commands, or no motion.
+    #[must_use]
+    pub fn of(flight: &Flight, pose_s: f64, imu_s: f64) -> Option<Self> {
+        let span = if flight.attitude.is_empty() { &flight.angular_velocity.time_s } else { &flight.attitude.time_s };
+        let (first, last) = (span.first()?, span.last()?);
+        let (start_s, end_s) = flight.command.span_s()?;
+        let clock = Clock::spanning(first.max(start_s), last.min(end_s) - 0.01, TICK_S);
+        let position = Track::sampled(&flight.position, pose_s, &clock);
+        let attitude = Track::sampled(&flight.attitude, pose_s, &clock);
+        let gyroscope = Track::sampled(&flight.angular_velocity, imu_s, &clock);
+        let velocity = if flight.velocity.is_empty() {
+            position.slope(reach(flight.position.period_s()), TICK_S)
+        } else {
+            Track::sampled(&flight.velocity, pose_s, &clock).values
+        };
+        let quaternions: Vec<UnitQuaternion<f64>> = attitude.values.iter().map(unit).collect();
+        let rates = if flight.angular_velocity.is_empty() {
+            turning(&quaternions, reach(flight.attitude.period_s()))
+        } else {
+            gyroscope.values
+        };
+        let body = |i: usize| RigidBody {
+            position_W_m: position.values[i].into(),
+            velocity_W_m_s: velocity[i].into(),
+            attitude_WB: quaternions[i],
+            angular_velocity_B_rad_s: rates[i].into(),
+        };
+        let has_pose = !flight.position.is_empty();
+        let is_valid = (0..clock.count)
+            .map(|i| (!has_pose || position.valid[i]) && (flight.attitude.is_empty() || attitude.valid[i]))
+            .collect();
+        Some(Self { bodies: (0..clock.count).map(body).collect(), clock, is_valid })
+    }
+
+    /// Errors of `airframe` at the ends of windows of `horizon_s`, and the flight itself at every `every` ticks.
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a horizon is short")]
+    #[must_use]
+    pub fn predicted(&self, flight: &Flight, airframe: Airframe, horizon_s: f64, every: usize) -> (Errors, Trace) {
+        let window = (horizon_s / TICK_S).round() as usize;
+        let memory = airframe.memory(0, "predict", TICK_S);
+        let mut commands = Held::new(&flight.command);
+        let first = commands.at(self.clock.start_s);
+        let mut plant = FreeFlight::new(NewtonEuler::flying(airframe, 1), self.bodies[0], memory);
+        plant.settle_rotors(&first);
+        let (mut sums, mut count, mut trace) = ([0.0; 4], 0_u32, Vec::new());
+        for tick in 1..self.clock.count {
+            plant.step(&commands.at(self.clock.at(tick - 1)), TICK_S, &[]);
+            let (own, measured) = (&plant.state().body, &self.bodies[tick]);
+            if every > 0 && tick % every == 0 {
+                trace.push((self.clock.at(tick), *measured, *own));
+            }
+            if tick % window == 0 {
+                if self.is_valid[tick - window..=tick].iter().all(|is_valid| *is_valid) {
+                    sums.iter_mut().zip(differences(own, measured)).for_each(|(sum, own)| *sum += own * own);
+                    count += 1;
+                }
+                plant.set_body(measured);
+            }
+        }
+        let rms = |channel: usize| (sums[channel] / f64::from(count.max(1))).sqrt();
+        let errors = CHANNELS.iter().enumerate().filter(|(_, (channel, _))| is_measured(flight, channel));
+        (errors.map(|(at, (name, _))| (*name, rms(at))).collect(), trace)
+    }
+}
+
+/// The channels of a prediction, with their units.
+pub const CHANNELS: [(&str, &str); 4] =
+    [("position", "m"), ("velocity", "m/s"), ("attitude", "deg"), ("rates", "rad/s")];
+
+fn is_measured(flight: &Flight, channel: &str) -> bool {
+    match channel {
+        "position" => !flight.position.is_empty(),
+        "velocity" => !flight.position.is_empty() || !flight.velocity.is_empty(),
+        "attitude" => !flight.attitude.is_empty(),
+        _ => !flight.attitude.is_empty() || !flight.angular_velocity.is_empty(),
+    }
+}
+
+fn differences(own: &RigidBody, measured: &RigidBody) -> [f64; 4] {
+    [
+        (own.position_W_m - measured.position_W_m).norm(),
+        (own.velocity_W_m_s - measured.velocity_W_m_s).norm(),
+        own.attitude_WB.angle_to(&measured.attitude_WB).to_degrees(),
+        (own.angular_velocity_B_rad_s - measured.angular_velocity_B_rad_s).norm(),
+    ]
+}
+
+/// Ticks to both sides of a derivative: three samples.
+#[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a period is short")]
+fn reach(period_s: Option<f64>) -> usize {
+    ((3.0 * period_s.unwrap_or(0.0) / TICK_S).round() as usize).max(1)
+}
+
+fn unit([w, x, y, z]: &[f64; 4]) -> UnitQuaternion<f64> {
+    let raw = Quaternion::new(*w, *x, *y, *z);
+    if raw.norm() > 1e-6 { UnitQuaternion::new_normalize(raw) } else { UnitQuaternion::identity() }
+}
+
+fn turning(attitude: &[UnitQuaternion<f64>], reach: usize) -> Vec<[f64; 3]> {
+    let last = attitude.len() - 1;
+    let rate = |i: usize| -> Vector3<f64> {
+        let (before, after) = (i.saturating_sub(reach), (i + reach).min(last));
+        let span_s = (after - before).max(1) as f64 * TICK_S;
+        (attitude[before].inverse() * attitude[after]).scaled_axis() / span_s
+    };
+    (0..attitude.len()).map(|i| rate(i).into()).collect()
+}

@@ -1,0 +1,227 @@
+//! What identification found, for programs (`report.json`) and for people.
+
+use crate::align::Offset;
+use crate::candidate::Unseen;
+use crate::faults::Fault;
+use crate::whiteness::Whiteness;
+use serde::Serialize;
+use std::collections::BTreeMap;
+use std::fmt;
+
+/// Everything that was found.
+#[derive(Debug, Clone, Serialize)]
+pub struct Report {
+    /// The declared vehicle file.
+    pub vehicle: String,
+    /// The flights.
+    pub flights: Vec<FlightReport>,
+    /// The effects accepted, in order; empty where the declared model holds.
+    pub verdict: Vec<&'static str>,
+    /// Every candidate that was judged, by name.
+    pub effects: BTreeMap<&'static str, EffectReport>,
+    /// The residuals on the test flights.
+    pub whiteness: BeforeAfter<BTreeMap<&'static str, Whiteness>>,
+    /// Clocks of each flight: the pose against the inertial unit; `null` where it has not both.
+    pub time_offsets_s: BTreeMap<String, BTreeMap<&'static str, Option<Offset>>>,
+    /// Sensors and actuators that seem broken.
+    pub faults: Vec<Fault>,
+    /// Prediction errors of the test flights: flight, horizon in s, channel.
+    pub held_out: BTreeMap<String, BTreeMap<String, BTreeMap<&'static str, Change>>>,
+    /// The same of the fit flights.
+    pub fitted: BTreeMap<String, BTreeMap<String, BTreeMap<&'static str, Change>>>,
+    /// White noise of each channel, and the prediction error that it alone makes at each horizon.
+    pub noise_floor: BTreeMap<&'static str, Noise>,
+    /// What no candidate explains: the size of the part of the residual that is not noise, by equation.
+    pub unexplained: BTreeMap<&'static str, Unexplained>,
+    /// Effects that these flights cannot show, and what they would need.
+    pub not_identifiable: Vec<Unseen>,
+    /// Length of the blocks that count as independent.
+    pub block_s: f64,
+}
+
+/// A value under the declared and under the new model.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct BeforeAfter<T> {
+    /// Declared.
+    pub before: T,
+    /// With the accepted effects.
+    pub after: T,
+}
+
+/// A prediction error before and after.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Change {
+    /// Root mean square of the declared model.
+    pub before: f64,
+    /// With the accepted effects.
+    pub after: f64,
+    /// Unit of both.
+    pub unit: &'static str,
+}
+
+/// A flight as it was used.
+#[derive(Debug, Clone, Serialize)]
+pub struct FlightReport {
+    /// Its name.
+    pub name: String,
+    /// `fit` or `test`.
+    pub role: flights::Role,
+    /// Length of what was compared, in s.
+    pub compared_s: f64,
+    /// Width of the windows in which measurement and model are compared, in s.
+    pub window_s: f64,
+    /// The equations that its channels allow.
+    pub equations: Vec<&'static str>,
+    /// What was assumed instead of measured.
+    pub assumed: Vec<String>,
+    /// What the reader noticed.
+    pub notes: Vec<String>,
+}
+
+/// An effect as it came out.
+#[derive(Debug, Clone, Serialize)]
+pub struct EffectReport {
+    /// Whether it was accepted.
+    pub accepted: bool,
+    /// Its fitted parameters.
+    pub parameters: BTreeMap<&'static str, Estimate>,
+    /// Weighted root mean square of the residual on the test flights, in units of what all candidates together leave:
+    /// without and with it.
+    pub held_out: BeforeAfter<f64>,
+    /// Chance of as much gain without it, by resampled blocks.
+    pub chance: f64,
+    /// Effects that would do as well in its place.
+    pub confused_with: Vec<&'static str>,
+    /// The experiment that would tell it from them.
+    pub experiment: Option<String>,
+}
+
+/// A parameter with its 95 % interval.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Estimate {
+    /// The estimate.
+    pub value: f64,
+    /// Its unit.
+    pub unit: &'static str,
+    /// Lower end.
+    pub low: f64,
+    /// Upper end.
+    pub high: f64,
+}
+
+/// The noise of a channel.
+#[derive(Debug, Clone, Serialize)]
+pub struct Noise {
+    /// Standard deviation of one axis.
+    pub value: f64,
+    /// Its unit.
+    pub unit: &'static str,
+    /// Prediction error that noise alone makes, by horizon in s, in the unit of `held_out`.
+    pub prediction: BTreeMap<String, f64>,
+}
+
+/// A residual without an explanation.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Unexplained {
+    /// Root mean square of the part of it that is not noise.
+    pub rms: f64,
+    /// Its unit.
+    pub unit: &'static str,
+    /// The same under the declared model.
+    pub before: f64,
+}
+
+impl fmt::Display for Report {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.write_flights(f)?;
+        self.write_verdict(f)?;
+        self.write_errors(f)?;
+        self.write_rest(f)
+    }
+}
+
+impl Report {
+    fn write_flights(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        writeln!(f, "declared: {}", self.vehicle)?;
+        for flight in &self.flights {
+            let role = if flight.role == flights::Role::Fit { "fit " } else { "test" };
+            let equations = flight.equations.join(", ");
+            writeln!(f, "  {role}  {:28} {:7.1} s  {equations}", flight.name, flight.compared_s)?;
+        }
+        Ok(())
+    }
+
+    fn write_verdict(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if self.verdict.is_empty() {
+            writeln!(f, "\nverdict: nothing. No candidate makes the held-out flights better beyond chance.")?;
+        } else {
+            writeln!(f, "\nverdict: {}", self.verdict.join(", "))?;
+        }
+        for name in &self.verdict {
+            let Some(effect) = self.effects.get(name) else { continue };
+            writeln!(
+                f,
+                "  {name}: held-out residual {} -> {}",
+                rounded(effect.held_out.before),
+                rounded(effect.held_out.after)
+            )?;
+            for (parameter, own) in &effect.parameters {
+                let (value, low, high) = (rounded(own.value), rounded(own.low), rounded(own.high));
+                writeln!(f, "    {parameter} = {value} {}  (95 %: {low} ... {high})", own.unit)?;
+            }
+            if !effect.confused_with.is_empty() {
+                writeln!(f, "    cannot be told from: {}", effect.confused_with.join(", "))?;
+            }
+            if let Some(experiment) = &effect.experiment {
+                writeln!(f, "    to tell them apart: {experiment}")?;
+            }
+        }
+        for fault in &self.faults {
+            writeln!(f, "fault: {} ({}): {}; {}", fault.channel, fault.kind, fault.finding, fault.consequence)?;
+        }
+        Ok(())
+    }
+
+    fn write_errors(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if self.held_out.is_empty() {
+            return Ok(());
+        }
+        writeln!(f, "\nprediction errors on flights that nothing was fitted on (RMS, declared -> new):")?;
+        for (flight, horizons) in &self.held_out {
+            writeln!(f, "  {flight}")?;
+            for (horizon, channels) in horizons {
+                let one = |(name, own): (&&str, &Change)| {
+                    format!("{name} {} -> {} {}", rounded(own.before), rounded(own.after), own.unit)
+                };
+                writeln!(f, "    {horizon:>4} s  {}", channels.iter().map(one).collect::<Vec<_>>().join("   "))?;
+            }
+        }
+        Ok(())
+    }
+
+    fn write_rest(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        for (name, own) in &self.unexplained {
+            let (rms, before) = (rounded(own.rms), rounded(own.before));
+            writeln!(f, "unexplained: {name}: {rms} {} are no noise and no candidate's (before: {before})", own.unit)?;
+        }
+        for unseen in &self.not_identifiable {
+            writeln!(f, "not identifiable here: {} needs {}", unseen.effect, unseen.needs)?;
+        }
+        Ok(())
+    }
+}
+
+/// Four digits.
+fn rounded(value: f64) -> String {
+    if value == 0.0 {
+        return "0".to_owned();
+    }
+    let digits = 3 - value.abs().log10().floor() as i32;
+    if (0..9).contains(&digits) {
+        format!("{value:.*}", digits as usize)
+    } else if (-3..0).contains(&digits) {
+        format!("{value:.0}")
+    } else {
+        format!("{value:.3e}")
+    }
+}

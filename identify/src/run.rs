@@ -1,0 +1,381 @@
+//! The whole way: from flights and the declared vehicle to a report.
+
+use crate::align::{self, align};
+use crate::candidate::{Candidate, candidates};
+use crate::experiment;
+use crate::faults;
+use crate::fit::{Bench, Fitted, Weights};
+use crate::model::Model;
+use crate::noise;
+use crate::parameter::{Parameters, SENSOR_BIAS, SENSOR_DELAY, SensorParameter};
+use crate::predict::{CHANNELS, Errors, Measured};
+use crate::prepared::{Equation, Prepared};
+use crate::report::{
+    BeforeAfter, Change, EffectReport, Estimate, FlightReport, Noise, Report, Unexplained,
+};
+use crate::select::{Selection, rivals, select, which};
+use crate::whiteness::whiteness;
+use flights::{Flight, FlightSet, Role};
+use plant::effects::{Effect, entry};
+use std::collections::BTreeMap;
+use vehicles::{Vehicle, VehicleError};
+
+/// Horizons of prediction.
+pub const HORIZONS_S: [f64; 3] = [0.1, 0.5, 1.0];
+/// A motor that turns below this part of the hover speed does not carry the vehicle.
+const FLYING: f64 = 0.5;
+/// Windows of flights without an inertial unit: twice a derivative of a position needs more of it.
+const POSE_BOX_S: f64 = 0.04;
+/// A residual is worth telling where its persistent part is beyond this part of its noise.
+const UNEXPLAINED: f64 = 0.3;
+
+/// Why flights cannot be identified on.
+#[derive(Debug, thiserror::Error)]
+pub enum IdentifyError {
+    /// The vehicle file.
+    #[error(transparent)]
+    Vehicle(#[from] VehicleError),
+    /// A role that no flight has.
+    #[error(
+        "no flight with role \"{role}\" can be used; {reason}. Add flights, or give one a part of another's time by \
+         `from_s` and `to_s`"
+    )]
+    NoFlight {
+        /// The role.
+        role: &'static str,
+        /// Why.
+        reason: String,
+    },
+}
+
+/// What was found, with what is needed to draw it.
+#[derive(Debug)]
+pub struct Outcome {
+    /// The report.
+    pub report: Report,
+    /// The plant's effects of the new model, those that were declared included.
+    pub effects: Vec<Effect>,
+    /// Residuals for pictures: by flight and equation.
+    pub pictures: Vec<Picture>,
+    /// Accepted lateness of the pose and of the inertial unit, to be taken off the flights before they are flown again.
+    pub delays_s: (f64, f64),
+}
+
+/// The residuals of one equation of one flight, before and after, and what was measured.
+#[derive(Debug)]
+pub struct Picture {
+    /// The flight.
+    pub flight: String,
+    /// Its role.
+    pub role: Role,
+    /// The equation.
+    pub equation: Equation,
+    /// Middles of the windows, in s.
+    pub time_s: Vec<f64>,
+    /// What was measured, by component.
+    pub measured: Vec<Vec<f64>>,
+    /// Residual of the declared model.
+    pub before: Vec<Vec<f64>>,
+    /// Residual of the new model.
+    pub after: Vec<Vec<f64>>,
+}
+
+/// Identifies what the flights of `set` show beyond their vehicle file; `progress` hears of each step.
+///
+/// # Errors
+/// If the vehicle file cannot be read, or no flight of a role can be used.
+pub fn identify(set: &FlightSet, progress: &mut dyn FnMut(&str)) -> Result<Outcome, IdentifyError> {
+    let vehicle = Vehicle::load(&set.vehicle)?;
+    let declared = entry::resolve(&vehicle.effects)?;
+    progress("preparing flights");
+    let (mut bench, flight_reports) = bench(&vehicle, &declared, set)?;
+    let offsets = align(&mut bench);
+    let faults = faults::find(&mut bench);
+    let all: Vec<&Prepared> = bench.fit.iter().chain(&bench.test).collect();
+    let (open, unseen) = candidates(&bench.model.parameters, &all);
+    let selection = select(&mut bench, &open, progress);
+    progress("rivals");
+    let mut effects = judged_effects(&bench, &selection);
+    accepted_effects(&bench, &selection, &open, &mut effects);
+    progress("predictions");
+    let values = &selection.after.values;
+    let delays_s = delays(&bench, values);
+    let predictions = predictions(&bench, set, values, delays_s);
+    let floor = noise::floor(&bench);
+    let whiteness =
+        BeforeAfter { before: whiteness(&bench, &selection.before.values), after: whiteness(&bench, values) };
+    let report = Report {
+        vehicle: set.vehicle.display().to_string(),
+        flights: flight_reports,
+        verdict: verdict(&selection),
+        effects,
+        unexplained: unexplained(&whiteness),
+        whiteness,
+        time_offsets_s: offsets
+            .into_iter()
+            .map(|(flight, offset)| (flight, BTreeMap::from([("pose", offset)])))
+            .collect(),
+        faults,
+        held_out: of_role(&predictions, Role::Test),
+        fitted: of_role(&predictions, Role::Fit),
+        noise_floor: noise_report(&floor, vehicle.gravity_m_s2),
+        not_identifiable: unseen,
+        block_s: bench.block_s,
+    };
+    let effects = bench.model.parameters.effects_under(values);
+    Ok(Outcome { pictures: pictures(&bench, &selection), effects, delays_s, report })
+}
+
+/// The flights on their grids, with the declared model.
+///
+/// # Errors
+/// If no flight of a role can be used.
+pub fn bench<'f>(
+    vehicle: &Vehicle,
+    declared: &[Effect],
+    set: &'f FlightSet,
+) -> Result<(Bench<'f>, Vec<FlightReport>), IdentifyError> {
+    let parameters = Parameters::of(vehicle, declared, &[]);
+    let least_rad_s = FLYING * vehicle.hover_speed_rad_s();
+    let is_flying = |commands: &[f64; 4]| {
+        commands.iter().map(|command| vehicle.command.speed(*command)).sum::<f64>() > 4.0 * least_rad_s
+    };
+    let (mut fit, mut test, mut reports) = (Vec::new(), Vec::new(), Vec::new());
+    for flight in &set.flights {
+        let prepared = Prepared::new(flight, box_s(flight), is_flying);
+        reports.push(flight_report(flight, prepared.as_ref()));
+        match (prepared, flight.role) {
+            (Some(prepared), Role::Fit) => fit.push(prepared),
+            (Some(prepared), Role::Test) => test.push(prepared),
+            (None, _) => {}
+        }
+    }
+    for (role, own) in [("fit", &fit), ("test", &test)] {
+        if own.is_empty() {
+            let there = set.flights.iter().filter(|flight| (flight.role == Role::Fit) == (role == "fit"));
+            let names: Vec<&str> = there.map(|flight| flight.name.as_str()).collect();
+            let reason = match names[..] {
+                [] => "there is none".to_owned(),
+                _ => format!("{} have no stretch in which commands and motion were logged together", names.join(", ")),
+            };
+            return Err(IdentifyError::NoFlight { role, reason });
+        }
+    }
+    let total_s: f64 = fit.iter().map(compared_s).sum();
+    let block_s = (total_s / 40.0).clamp(0.5, 2.0);
+    let model = Model { vehicle: vehicle.clone(), parameters };
+    Ok((Bench { model, fit, test, weights: Weights::new(), block_s }, reports))
+}
+
+fn box_s(flight: &Flight) -> Option<f64> {
+    let has_imu = !flight.angular_velocity.is_empty() || !flight.specific_force.is_empty();
+    let period_s = flight.attitude.period_s().unwrap_or(0.0).max(flight.position.period_s().unwrap_or(0.0));
+    (!has_imu).then_some((3.0 * period_s).max(POSE_BOX_S))
+}
+
+fn compared_s(flight: &Prepared) -> f64 {
+    let layout = &flight.layout;
+    layout.knots.len() as f64 * layout.box_steps as f64 * layout.clock.step_s
+}
+
+fn flight_report(flight: &Flight, prepared: Option<&Prepared>) -> FlightReport {
+    FlightReport {
+        name: flight.name.clone(),
+        role: flight.role,
+        compared_s: prepared.map_or(0.0, compared_s),
+        window_s: prepared.map_or(0.0, |own| 4.0 * own.layout.box_steps as f64 * own.layout.clock.step_s),
+        equations: prepared.map_or(Vec::new(), |own| own.layout.equations.iter().map(|own| own.name()).collect()),
+        assumed: flight.assumed.clone(),
+        notes: flight.notes.clone(),
+    }
+}
+
+fn verdict(selection: &Selection) -> Vec<&'static str> {
+    let mut names = Vec::new();
+    for candidate in &selection.accepted {
+        if !names.contains(&candidate.effect) {
+            names.push(candidate.effect);
+        }
+    }
+    names
+}
+
+/// The candidates as the last round that judged them left them.
+fn judged_effects(bench: &Bench, selection: &Selection) -> BTreeMap<&'static str, EffectReport> {
+    let mut effects: BTreeMap<&'static str, EffectReport> = BTreeMap::new();
+    for round in &selection.rounds {
+        let mut of_round: BTreeMap<&'static str, EffectReport> = BTreeMap::new();
+        for judged in &round.judged {
+            let after = judged.fitted.test_sum();
+            let before = after / (1.0 - judged.gain).max(1e-12);
+            let report = EffectReport {
+                accepted: false,
+                parameters: estimates(bench, &judged.fitted, &judged.candidate.which),
+                held_out: BeforeAfter { before: size(bench, before), after: size(bench, after) },
+                chance: judged.gain_chance,
+                confused_with: Vec::new(),
+                experiment: None,
+            };
+            // Of the parts of an effect the one that gains most.
+            let name = judged.candidate.effect;
+            if of_round.get(name).is_none_or(|other| report.held_out.after < other.held_out.after) {
+                of_round.insert(name, report);
+            }
+        }
+        effects.extend(of_round);
+    }
+    effects
+}
+
+fn accepted_effects(
+    bench: &Bench,
+    selection: &Selection,
+    open: &[Candidate],
+    effects: &mut BTreeMap<&'static str, EffectReport>,
+) {
+    for name in verdict(selection) {
+        let own: Vec<usize> =
+            (0..selection.accepted.len()).filter(|at| selection.accepted[*at].effect == name).collect();
+        let others: Vec<Candidate> =
+            selection.accepted.iter().filter(|candidate| candidate.effect != name).cloned().collect();
+        let mut start = selection.after.values.clone();
+        let mut parameters = BTreeMap::new();
+        for at in &own {
+            let candidate = &selection.accepted[*at];
+            parameters.extend(estimates(bench, &selection.after, &candidate.which));
+            candidate.which.iter().for_each(|at| start[*at] = bench.model.parameters.all[*at].declared);
+        }
+        let without = bench.fitted(&start, &which(&others));
+        let mut confused_with: Vec<&'static str> = Vec::new();
+        if let [at] = own[..] {
+            confused_with = rivals(bench, selection, at, open);
+        }
+        let experiment = confused_with.first().map(|rival| experiment::between(name, rival).to_owned());
+        let held_out = BeforeAfter {
+            before: size(bench, without.test_sum()),
+            after: size(bench, selection.after.test_sum()),
+        };
+        let chance = effects.get(name).map_or(0.0, |own| own.chance);
+        effects.insert(name, EffectReport { accepted: true, parameters, held_out, chance, confused_with, experiment });
+    }
+}
+
+/// The weighted root mean square of a sum of squares of the test flights.
+fn size(bench: &Bench, squares: f64) -> f64 {
+    let rows = |flight: &Prepared| {
+        flight.layout.knots.len() * bench.row_weights(flight).iter().filter(|weight| **weight > 0.0).count()
+    };
+    (squares / bench.test.iter().map(rows).sum::<usize>().max(1) as f64).sqrt()
+}
+
+/// The estimates of these parameters, with 95 % intervals.
+#[must_use]
+pub fn estimates(bench: &Bench, fitted: &Fitted, which: &[usize]) -> BTreeMap<&'static str, Estimate> {
+    let quantile = crate::statistics::student_quantile(0.975, (fitted.fit_squares.len() as f64 - 1.0).max(1.0));
+    let one = |at: &usize| {
+        let own = &bench.model.parameters.all[*at];
+        let (value, half) = (fitted.values[*at], quantile * fitted.deviation(*at).unwrap_or(0.0));
+        let (low, high) = ((value - half).max(own.lower), (value + half).min(own.upper));
+        (own.name, Estimate { value, unit: own.unit, low, high })
+    };
+    which.iter().map(one).collect()
+}
+
+fn delays(bench: &Bench, values: &[f64]) -> (f64, f64) {
+    let sensor = |own| bench.model.parameters.sensor(values, own);
+    (sensor(SensorParameter::PoseDelay), sensor(SensorParameter::ImuDelay))
+}
+
+type Prediction = (String, Role, f64, Errors, Errors);
+
+/// Errors of every flight at every horizon, declared and new.
+fn predictions(bench: &Bench, set: &FlightSet, values: &[f64], delays_s: (f64, f64)) -> Vec<Prediction> {
+    let declared = bench.model.parameters.declared();
+    let mut predictions = Vec::new();
+    for flight in &set.flights {
+        let all = bench.fit.iter().chain(&bench.test);
+        let own_s = all.clone().find(|own| own.flight.name == flight.name).map_or(0.0, |own| own.pose_offset_s);
+        let before = Measured::of(flight, own_s, 0.0);
+        let after = Measured::of(flight, own_s + delays_s.0, delays_s.1);
+        let (Some(before), Some(after)) = (before, after) else { continue };
+        for horizon_s in HORIZONS_S {
+            let (old, _) = before.predicted(flight, bench.model.airframe(&declared), horizon_s, 0);
+            let (new, _) = after.predicted(flight, bench.model.airframe(values), horizon_s, 0);
+            predictions.push((flight.name.clone(), flight.role, horizon_s, old, new));
+        }
+    }
+    predictions
+}
+
+fn of_role(
+    predictions: &[Prediction],
+    role: Role,
+) -> BTreeMap<String, BTreeMap<String, BTreeMap<&'static str, Change>>> {
+    let mut flights: BTreeMap<String, BTreeMap<String, BTreeMap<&'static str, Change>>> = BTreeMap::new();
+    for (name, _, horizon_s, old, new) in predictions.iter().filter(|own| own.1 == role) {
+        let channels = CHANNELS.iter().filter_map(|(channel, unit)| {
+            Some((*channel, Change { before: *old.get(channel)?, after: *new.get(channel)?, unit }))
+        });
+        flights.entry(name.clone()).or_default().insert(format!("{horizon_s}"), channels.collect());
+    }
+    flights
+}
+
+fn noise_report(
+    floor: &BTreeMap<&'static str, (f64, &'static str)>,
+    gravity_m_s2: f64,
+) -> BTreeMap<&'static str, Noise> {
+    let at = |name: &str, horizon_s: f64| {
+        noise::prediction_floor(floor, horizon_s, gravity_m_s2).get(name).copied()
+    };
+    let one = |(name, (value, unit)): (&&'static str, &(f64, &'static str))| {
+        let prediction = HORIZONS_S.iter().filter_map(|h| Some((format!("{h}"), at(name, *h)?))).collect();
+        (*name, Noise { value: *value, unit, prediction })
+    };
+    floor.iter().map(one).collect()
+}
+
+fn unexplained(
+    whiteness: &BeforeAfter<BTreeMap<&'static str, crate::whiteness::Whiteness>>,
+) -> BTreeMap<&'static str, Unexplained> {
+    let one = |(name, own): (&&'static str, &crate::whiteness::Whiteness)| {
+        let noise = (own.rms * own.rms - own.persistent * own.persistent).max(0.0).sqrt();
+        let before = whiteness.before.get(name).map_or(0.0, |own| own.persistent);
+        let is_large = own.persistent > UNEXPLAINED * noise && own.p_value < 0.01;
+        is_large.then_some((*name, Unexplained { rms: own.persistent, unit: own.unit, before }))
+    };
+    whiteness.after.iter().filter_map(one).collect()
+}
+
+fn pictures(bench: &Bench, selection: &Selection) -> Vec<Picture> {
+    let mut pictures = Vec::new();
+    for flight in bench.fit.iter().chain(&bench.test) {
+        let before = bench.model.residual_under(flight, &selection.before.values);
+        let after = bench.model.residual_under(flight, &selection.after.values);
+        let measured = bench.model.tracks(flight, &selection.after.values).rows;
+        for equation in &flight.layout.equations {
+            let columns = |rows: &[f64]| {
+                (0..equation.size()).map(|axis| crate::whiteness::column(flight, rows, *equation, axis)).collect()
+            };
+            pictures.push(Picture {
+                flight: flight.flight.name.clone(),
+                role: flight.flight.role,
+                equation: *equation,
+                time_s: flight.layout.knots.iter().map(|knot| flight.layout.clock.at(*knot)).collect(),
+                measured: columns(&measured),
+                before: columns(&before),
+                after: columns(&after),
+            });
+        }
+    }
+    pictures
+}
+
+/// Whether an effect belongs to the sensors and not to the vehicle.
+#[must_use]
+pub fn is_of_sensors(effect: &str) -> bool {
+    effect == SENSOR_DELAY || effect == SENSOR_BIAS
+}
+
+/// The gyroscope's and the attitude's clocks, for whoever wants them alone.
+pub use align::offset;

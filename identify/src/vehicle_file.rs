@@ -1,0 +1,83 @@
+//! The new vehicle file: the declared one with the effects that were accepted.
+
+use crate::report::{Estimate, Report};
+use plant::effects::{Effect, find};
+use std::fmt::Write;
+use std::path::Path;
+use vehicles::{Uncertainty, Vehicle, VehicleError};
+
+/// The text of the new vehicle file: the declared file at `declared`, complete, with `effects` in place of its own.
+/// Parameters that were fitted carry their estimate, its interval and the flights that it comes from.
+///
+/// # Errors
+/// If the declared file cannot be read again.
+pub fn text(declared: &Path, effects: &[Effect], report: &Report) -> Result<String, VehicleError> {
+    let vehicle = Vehicle::load(declared)?;
+    let complete = Vehicle::base(declared).map_or_else(|| declared.to_owned(), |base| declared.with_file_name(base));
+    let file = complete.display().to_string();
+    let text = std::fs::read_to_string(&complete).map_err(|cause| VehicleError::Unreadable { file, cause })?;
+    let mut document: toml_edit::DocumentMut = text.parse().unwrap_or_default();
+    document.remove("effects");
+    document["name"] = toml_edit::value(format!("{}, identified", vehicle.name));
+    let mut text = document.to_string();
+    for effect in effects {
+        text += &entry(effect, &vehicle, report);
+    }
+    Ok(text)
+}
+
+fn entry(effect: &Effect, vehicle: &Vehicle, report: &Report) -> String {
+    let name = effect.kind.name;
+    let mut text = format!("\n[[effects]]\nname = {name:?}\n");
+    let fitted = report.effects.get(name).filter(|own| own.accepted);
+    let stated = vehicle.effects.iter().find(|own| own.name == name);
+    for (index, spec) in effect.kind.parameters.iter().enumerate() {
+        let value = effect.values[index];
+        let estimate = fitted.and_then(|own| own.parameters.get(spec.name));
+        let declared = stated.and_then(|own| own.parameters.iter().find(|own| own.name == spec.name));
+        let line = match (estimate, declared) {
+            (Some(estimate), _) => of_estimate(estimate, &source(report)),
+            (None, Some(own)) => number(own.value, &own.unit, &own.source, &said(&own.uncertainty)),
+            (None, None) if spec.neutral == Some(value) => continue,
+            (None, None) => number(value, spec.unit(), spec.typical_source, "\"not identified: held while the others were fitted\""),
+        };
+        // Writing to a string cannot fail.
+        let _ = writeln!(text, "{} = {line}", spec.name);
+    }
+    text
+}
+
+fn source(report: &Report) -> String {
+    let of_role = |role| {
+        let own = report.flights.iter().filter(move |flight| flight.role == role);
+        own.map(|flight| flight.name.as_str()).collect::<Vec<_>>().join(", ")
+    };
+    format!(
+        "hummingbus identify: fitted on {}; accepted for its gain on {}",
+        of_role(flights::Role::Fit),
+        of_role(flights::Role::Test)
+    )
+}
+
+fn of_estimate(own: &Estimate, source: &str) -> String {
+    let interval = format!("\"95 % interval {:e} to {:e} {}\"", own.low, own.high, own.unit);
+    number(own.value, own.unit, source, &interval)
+}
+
+fn number(value: f64, unit: &str, source: &str, uncertainty: &str) -> String {
+    let source = toml_edit::value(source).to_string();
+    format!("{{ value = {value:?}, unit = {unit:?}, source = {}, uncertainty = {uncertainty} }}", source.trim())
+}
+
+fn said(uncertainty: &Uncertainty) -> String {
+    match uncertainty {
+        Uncertainty::OneSigma(value) => format!("{value:?}"),
+        Uncertainty::Said(words) => format!("{words:?}"),
+    }
+}
+
+/// Whether `name` is an effect that a vehicle file can hold.
+#[must_use]
+pub fn can_hold(name: &str) -> bool {
+    find(name).is_some()
+}

@@ -1,0 +1,78 @@
+//! What is left of a residual: whether it is noise, and how large the part of it is that is not.
+
+use crate::fit::Bench;
+use crate::prepared::{Equation, Prepared};
+use crate::statistics::{autocorrelation, ljung_box, white_noise_bound};
+use serde::Serialize;
+use std::collections::BTreeMap;
+
+/// Windows of neighbouring knots overlap; those of every fourth do not.
+const APART: usize = 4;
+/// Lags looked at, in windows that do not overlap.
+const LAGS: usize = 25;
+
+/// The residual of one equation on the test flights.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Whiteness {
+    /// Root mean square over all components.
+    pub rms: f64,
+    /// Its unit.
+    pub unit: &'static str,
+    /// Part of the autocorrelations up to lag 25 (of windows that do not overlap) beyond their 99 % bound: 0.01 if
+    /// the residual is white.
+    pub beyond_bound: f64,
+    /// Probability of as much autocorrelation in white noise (Ljung and Box), the least over components, times their
+    /// number.
+    pub p_value: f64,
+    /// Root mean square of what neighbouring windows have in common: the residual that is not noise.
+    pub persistent: f64,
+}
+
+/// The whiteness of every equation under `values`, over the test flights.
+#[must_use]
+pub fn whiteness(bench: &Bench, values: &[f64]) -> BTreeMap<&'static str, Whiteness> {
+    let mut columns: BTreeMap<&'static str, Vec<(Equation, Vec<f64>)>> = BTreeMap::new();
+    for flight in &bench.test {
+        let residual = bench.model.residual_under(flight, values);
+        for equation in &flight.layout.equations {
+            for axis in 0..equation.size() {
+                let column = column(flight, &residual, *equation, axis);
+                columns.entry(equation.name()).or_default().push((*equation, column));
+            }
+        }
+    }
+    columns.into_iter().map(|(name, columns)| (name, of_equation(&columns))).collect()
+}
+
+/// One component of an equation over the knots.
+#[must_use]
+pub fn column(flight: &Prepared, rows: &[f64], equation: Equation, axis: usize) -> Vec<f64> {
+    let Some(offset) = flight.offset_of(equation) else { return Vec::new() };
+    rows[offset + axis..].iter().step_by(flight.width()).copied().collect()
+}
+
+fn of_equation(columns: &[(Equation, Vec<f64>)]) -> Whiteness {
+    let (mut squares, mut count, mut common, mut beyond, mut lags, mut p_value) = (0.0, 0, 0.0, 0, 0, 1.0_f64);
+    for (_, column) in columns {
+        squares += column.iter().map(|own| own * own).sum::<f64>();
+        count += column.len();
+        let pairs = column.iter().zip(column.iter().skip(APART));
+        common += pairs.map(|(a, b)| a * b).sum::<f64>();
+        let apart: Vec<f64> = column.iter().step_by(APART).copied().collect();
+        if apart.len() > 2 * LAGS {
+            let bound = white_noise_bound(apart.len(), 0.99);
+            let correlations = autocorrelation(&apart, LAGS);
+            beyond += correlations[1..].iter().filter(|own| own.abs() > bound).count();
+            lags += LAGS;
+            p_value = p_value.min(ljung_box(&apart, LAGS).p_value);
+        }
+    }
+    let unit = columns.first().map_or("", |(equation, _)| equation.unit());
+    Whiteness {
+        rms: (squares / count.max(1) as f64).sqrt(),
+        unit,
+        beyond_bound: f64::from(beyond as u32) / (lags.max(1) as f64),
+        p_value: (p_value * columns.len() as f64).min(1.0),
+        persistent: (common.max(0.0) / count.max(1) as f64).sqrt(),
+    }
+}
