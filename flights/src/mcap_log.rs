@@ -93,7 +93,8 @@ impl Log for McapLog {
             let decoded = definition.decode(&little_endian(&message.data));
             let leaves =
                 decoded.map_err(|reason| format!("a message of `{name}` ({}): {reason}", topic.kind))?;
-            let stamp_ns = stamp_ns(&leaves);
+            // A stamp of zero was not set, unless the log begins at zero too: the first tick of a simulation.
+            let stamp_ns = stamp_ns(&leaves).filter(|ns| *ns > 0 || message.log_time == 0);
             stamped += usize::from(stamp_ns.is_some());
             let time_ns = stamp_ns.unwrap_or_else(|| message.log_time.into()) - self.start_ns;
             #[allow(clippy::cast_precision_loss, reason = "nanoseconds since the log's start")]
@@ -128,8 +129,7 @@ fn number(leaves: &[Leaf], path: &str) -> Option<f64> {
     leaves.iter().find(|leaf| leaf.path == path)?.value.as_f64()
 }
 
-/// When the message was measured: by our own sensors' `measured_ns`, else by its header's or its own stamp. A stamp
-/// of zero was not set.
+/// When the message was measured: by our own sensors' `measured_ns`, else by its header's or its own stamp.
 fn stamp_ns(leaves: &[Leaf]) -> Option<i128> {
     let integer = |path: &str| match leaves.iter().find(|leaf| leaf.path == path)?.value {
         recorder::definition::Value::Integer(number) => Some(number),
@@ -139,7 +139,7 @@ fn stamp_ns(leaves: &[Leaf]) -> Option<i128> {
         let (sec, nanosec) = (integer(&format!("{prefix}.sec"))?, integer(&format!("{prefix}.nanosec"))?);
         sec.checked_mul(1_000_000_000)?.checked_add(nanosec)
     };
-    integer("measured_ns").or_else(|| stamp("header.stamp")).or_else(|| stamp("stamp")).filter(|ns| *ns > 0)
+    integer("measured_ns").or_else(|| stamp("header.stamp")).or_else(|| stamp("stamp"))
 }
 
 /// The numbers of a message; NaN where a sensor of ours says that the sample was lost.
