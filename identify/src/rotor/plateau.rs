@@ -107,7 +107,7 @@ mod tests {
         let mut speed: Vec<f64> = (0..200).map(|row| if row < 100 { 300.0 } else { 400.0 }).collect();
         speed[150] = 900.0;
         let found = find(&time_s, &speed, 1.0, 0.02);
-        assert_eq!(found.rows, [21..100, 121..200]);
+        assert_eq!(found.rows, [21..100, 120..200]);
         assert_eq!(found.is_spike.iter().filter(|spike| **spike).count(), 1);
     }
 
