@@ -32,7 +32,7 @@ pub struct HorizonErrors {
     pub horizon_ms: u32,
     /// How many windows count.
     pub windows: usize,
-    /// How many do not, since a measured channel has a gap there.
+    /// How many do not, since a measured channel has a gap there or the rotors' speeds are not known yet.
     pub left_out: usize,
     /// The errors by channel; only channels that the flight tells of.
     pub channels: Vec<ChannelErrors>,
@@ -152,7 +152,12 @@ fn write_left_out(f: &mut fmt::Formatter<'_>, flight: &FlightErrors) -> fmt::Res
     if counts.is_empty() {
         return Ok(());
     }
-    writeln!(f, "{}: not counted, as something was not measured: {}", flight.name, counts.join(", "))
+    writeln!(
+        f,
+        "{}: not counted, at the start or at gaps in what was measured: {}",
+        flight.name,
+        counts.join(", ")
+    )
 }
 
 /// A number with three digits that count.

@@ -14,6 +14,10 @@ use recorder::series::Series;
 /// A time without samples that is longer than this many periods of a channel is a gap.
 const GAP_PERIODS: f64 = 5.0;
 
+/// Windows that begin earlier do not count: the rotors' speeds at the start of a flight are not known, and take so
+/// long to follow the commands.
+const SETTLE_NS: u64 = 500_000_000;
+
 /// Fields of a state, simulated or measured: what [`Quantity::error`] reads.
 const FIELDS: [&str; 13] = [
     "position.x",
@@ -155,14 +159,15 @@ fn horizon_errors(
     measured: &Track,
     simulated: &[Track],
 ) -> HorizonErrors {
-    let horizon_s = f64::from(horizon_ms) * 1e-3;
     let gaps = gaps(flight);
     let window_ns = u64::from(horizon_ms) * 1_000_000;
     let last_ns = measured.time_ns.last().copied().unwrap_or(0);
     let ends: Vec<u64> = (1..=last_ns / window_ns).map(|number| number * window_ns).collect();
     let is_whole = |end_ns: u64| {
-        let end_s = replay.start_s() + end_ns as f64 * 1e-9;
-        !gaps.iter().any(|(from_s, to_s)| *from_s < end_s && end_s - horizon_s < *to_s)
+        let begin_ns = end_ns - window_ns;
+        let (from_s, to_s) =
+            (replay.start_s() + begin_ns as f64 * 1e-9, replay.start_s() + end_ns as f64 * 1e-9);
+        begin_ns >= SETTLE_NS && !gaps.iter().any(|gap| gap.0 < to_s && from_s < gap.1)
     };
     let counted: Vec<u64> = ends.iter().copied().filter(|end_ns| is_whole(*end_ns)).collect();
     let rms = |quantity: Quantity, track: &Track| {

@@ -19,6 +19,7 @@
 //! - [`rights`]: rights that a run lacks are named
 //! - [`sensors`]: sensors read what they should, and hand over what is under way
 //! - [`replay`]: the measured flight
+//! - [`validate`]: measured commands flown by vehicles side by side
 //! - [`scenarios`]: the thesis's scenarios and those beyond
 //! - [`scenes`]: ground, walls, rigs and other vehicles
 
@@ -47,3 +48,4 @@ mod sensors;
 mod support;
 mod swap;
 mod terminal;
+mod validate;

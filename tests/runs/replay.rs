@@ -16,7 +16,7 @@ const FROM_S: f64 = 6.0;
 const PLANTS: [(&str, u32); 3] = [("plant-100ms", 100), ("plant-500ms", 500), ("plant-1s", 1000)];
 
 /// The folder of measured flights; says so where it is not given.
-fn data() -> Option<String> {
+pub fn data() -> Option<String> {
     let data = std::env::var("HUMMINGBUS_DATA").ok();
     if data.is_none() {
         // Not `eprintln!`, which the test runner hides.
