@@ -56,6 +56,8 @@ const TWO_CLOCKS: Need = ("gyroscope and attitude, or else commands, to be late 
     flight.offset_of(Equation::Gyroscope).is_some() || !flight.flight.command.is_empty()
 });
 
+const HELD: Need = ("a rig: these flights move freely", |flight| !flight.moves_freely());
+
 /// What has to be measured for an effect to show.
 fn needs(effect: &str) -> &'static [Need] {
     match effect {
@@ -63,8 +65,9 @@ fn needs(effect: &str) -> &'static [Need] {
         "ground-effect" => &[HEIGHT, FORCES],
         "command-delay" | "motor-lag" | "battery-sag" => &[COMMANDS],
         "mass-error" => &[FORCES],
-        "com-offset" | "inertia-error" | "gyroscopic-torque" | "bearing-friction" => &[TORQUES],
-        "rig-pendulum" => &[TORQUES, ATTITUDE],
+        "com-offset" | "inertia-error" | "gyroscopic-torque" => &[TORQUES],
+        "bearing-friction" => &[TORQUES, HELD],
+        "rig-pendulum" => &[TORQUES, ATTITUDE, HELD],
         SENSOR_DELAY => &[TWO_CLOCKS],
         _ => &[],
     }

@@ -4,6 +4,7 @@ use crate::candidate::Candidate;
 use crate::model::Model;
 use crate::normal::{self, Block};
 use crate::prepared::{Equation, Prepared};
+use crate::trim;
 use nalgebra::{DMatrix, DVector};
 use std::collections::BTreeMap;
 
@@ -28,6 +29,8 @@ pub struct Bench<'f> {
     pub weights: Weights,
     /// Length of the blocks that count as independent.
     pub block_s: f64,
+    /// Whether each flight has a trim of its own: then the means of the angular accelerations do not count.
+    pub has_own_trims: bool,
 }
 
 /// Parameters fitted.
@@ -152,7 +155,10 @@ impl Bench<'_> {
     /// The normal equations of the blocks of one flight.
     #[must_use]
     pub fn blocks_of(&self, flight: &Prepared, values: &[f64], which: &[usize]) -> Vec<Block> {
-        let (residual, columns) = self.model.linearised(flight, values, which);
+        let (mut residual, mut columns) = self.model.linearised(flight, values, which);
+        if self.has_own_trims {
+            std::iter::once(&mut residual).chain(&mut columns).for_each(|rows| trim::take_off(flight, rows));
+        }
         self.flight_blocks(flight, &residual, &columns)
     }
 
@@ -245,7 +251,10 @@ impl Bench<'_> {
     fn variances(&self, values: &[f64], which: &[usize], step: &DVector<f64>) -> Weights {
         let mut sums: BTreeMap<(&'static str, usize), (f64, f64, f64)> = BTreeMap::new();
         for flight in &self.fit {
-            let (residual, columns) = self.model.linearised(flight, values, which);
+            let (mut residual, mut columns) = self.model.linearised(flight, values, which);
+            if self.has_own_trims {
+                std::iter::once(&mut residual).chain(&mut columns).for_each(|rows| trim::take_off(flight, rows));
+            }
             let measured = self.model.tracks(flight, values).rows;
             let width = flight.width();
             let equations = flight.layout.equations.iter();

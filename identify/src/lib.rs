@@ -14,7 +14,7 @@
 //! | [`parameter`], [`candidate`] | what may be changed of the model, and by which effect |
 //! | [`normal`], [`fit`] | least squares over blocks of time |
 //! | [`select`] | attribution: which effects the flights ask for |
-//! | [`align`], [`faults`] | clocks and sensors, before anything is fitted |
+//! | [`align`], [`faults`], [`trim`] | clocks, sensors and trims, before anything is fitted |
 //! | [`whiteness`], [`noise`], [`statistics`] | what is left, and what noise alone would leave |
 //! | [`predict`] | prediction over horizons |
 //! | [`report`], [`vehicle_file`], [`experiment`] | what is written down |
@@ -38,6 +38,7 @@ pub mod run;
 pub mod select;
 pub mod statistics;
 pub mod track;
+pub mod trim;
 pub mod vehicle_file;
 pub mod whiteness;
 pub mod window;

@@ -82,6 +82,9 @@ pub struct Tracks {
     pub rows: Vec<f64>,
 }
 
+/// No rig lets a vehicle go further to the side.
+const RIG_M: f64 = 0.3;
+
 /// A flight with its layout.
 #[derive(Debug)]
 pub struct Prepared<'f> {
@@ -119,6 +122,16 @@ impl<'f> Prepared<'f> {
         let mut prepared = Self { flight, layout, pose_offset_s: 0.0, distrusted: [false; 4] };
         prepared.layout.knots = prepared.knots(&is_flying);
         (prepared.layout.knots.len() >= 3).then_some(prepared)
+    }
+
+    /// Whether the vehicle moves further than any rig lets it.
+    #[must_use]
+    pub fn moves_freely(&self) -> bool {
+        let positions = &self.flight.position.values;
+        (0..2).any(|axis| {
+            let of_axis = || positions.iter().map(|position| position[axis]);
+            of_axis().fold(f64::MIN, f64::max) - of_axis().fold(f64::MAX, f64::min) > RIG_M
+        })
     }
 
     /// Rows of one knot.

@@ -3,6 +3,7 @@
 use crate::align::Offset;
 use crate::candidate::Unseen;
 use crate::faults::Fault;
+use crate::trim::Trim;
 use crate::whiteness::Whiteness;
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -25,6 +26,8 @@ pub struct Report {
     pub time_offsets_s: BTreeMap<String, BTreeMap<&'static str, Option<Offset>>>,
     /// Sensors and actuators that seem broken.
     pub faults: Vec<Fault>,
+    /// The trims of the flights where they differ between flights: constant torques that no one vehicle explains.
+    pub trims: Vec<Trim>,
     /// Prediction errors of the test flights: flight, horizon in s, channel.
     pub held_out: BTreeMap<String, BTreeMap<String, BTreeMap<&'static str, Change>>>,
     /// The same of the fit flights.
@@ -135,6 +138,7 @@ impl fmt::Display for Report {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         self.write_flights(f)?;
         self.write_verdict(f)?;
+        self.write_trims(f)?;
         self.write_errors(f)?;
         self.write_rest(f)
     }
@@ -178,6 +182,18 @@ impl Report {
         }
         for fault in &self.faults {
             writeln!(f, "fault: {} ({}): {}; {}", fault.channel, fault.kind, fault.finding, fault.consequence)?;
+        }
+        Ok(())
+    }
+
+    fn write_trims(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if self.trims.is_empty() {
+            return Ok(());
+        }
+        writeln!(f, "\nthe flights differ in trim, so their mean torques were left out (rad/s^2 beyond the model):")?;
+        for trim in &self.trims {
+            let [x, y, z] = trim.angular_acceleration_rad_s2.map(rounded);
+            writeln!(f, "  {:28} roll {x}  pitch {y}  yaw {z}", trim.flight)?;
         }
         Ok(())
     }

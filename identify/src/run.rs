@@ -14,6 +14,7 @@ use crate::report::{
     BeforeAfter, Change, EffectReport, Estimate, FlightReport, Noise, Report, Unexplained,
 };
 use crate::select::{Selection, rivals, select, which};
+use crate::trim;
 use crate::whiteness::whiteness;
 use flights::{Flight, FlightSet, Role};
 use plant::effects::{Effect, entry};
@@ -93,6 +94,8 @@ pub fn identify(set: &FlightSet, progress: &mut dyn FnMut(&str)) -> Result<Outco
     let faults = faults::find(&mut bench);
     let all: Vec<&Prepared> = bench.fit.iter().chain(&bench.test).collect();
     let (open, unseen) = candidates(&bench.model.parameters, &all);
+    progress("trims");
+    let trims = trim::compare(&mut bench, &open);
     let selection = select(&mut bench, &open, progress);
     progress("rivals");
     let mut effects = judged_effects(&bench, &selection);
@@ -116,6 +119,7 @@ pub fn identify(set: &FlightSet, progress: &mut dyn FnMut(&str)) -> Result<Outco
             .map(|(flight, offset)| (flight, BTreeMap::from([("pose", offset)])))
             .collect(),
         faults,
+        trims,
         held_out: of_role(&predictions, Role::Test),
         fitted: of_role(&predictions, Role::Fit),
         noise_floor: noise_report(&floor, vehicle.gravity_m_s2),
@@ -164,7 +168,7 @@ pub fn bench<'f>(
     let total_s: f64 = fit.iter().map(compared_s).sum();
     let block_s = (total_s / 40.0).clamp(0.5, 2.0);
     let model = Model { vehicle: vehicle.clone(), parameters };
-    Ok((Bench { model, fit, test, weights: Weights::new(), block_s }, reports))
+    Ok((Bench { model, fit, test, weights: Weights::new(), block_s, has_own_trims: false }, reports))
 }
 
 fn box_s(flight: &Flight) -> Option<f64> {

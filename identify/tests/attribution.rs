@@ -21,7 +21,7 @@ fn selected(vehicle: &Vehicle, declared: &[Effect], flights: &[Flight]) -> (Sele
         of_role.map(|flight| Prepared::new(flight, None, is_flying).expect("enough data")).collect()
     };
     let mut bench =
-        Bench { model, fit: prepared(Role::Fit), test: prepared(Role::Test), weights: Default::default(), block_s: 1.0 };
+        Bench { model, fit: prepared(Role::Fit), test: prepared(Role::Test), weights: Default::default(), block_s: 1.0, has_own_trims: false };
     let all: Vec<&Prepared> = bench.fit.iter().chain(&bench.test).collect();
     let (open, _) = candidates(&bench.model.parameters, &all);
     (select(&mut bench, &open, &mut |_| ()), parameters)
