@@ -6,6 +6,7 @@ mod ctl;
 mod describe;
 mod files;
 mod graph;
+mod identify;
 mod judge;
 mod kinds;
 mod launch;
@@ -96,6 +97,9 @@ enum Verb {
         #[arg(long)]
         json: bool,
     },
+    /// Find what measured flights show that the declared vehicle lacks; or fit a rotor to a thrust stand.
+    #[command(after_help = identify::HELP)]
+    Identify(identify::IdentifyArguments),
     /// Fly the measured commands of flights with one or two vehicle files, and tell how far they go astray.
     #[command(after_help = validate::HELP)]
     Validate(validate::ValidateArguments),
@@ -176,6 +180,7 @@ fn main() -> ExitCode {
         Verb::Schema { json } => {
             print_text(&if json { describe::schemas_json() } else { describe::schemas() }).map(|()| true)
         }
+        Verb::Identify(arguments) => identify::run(&arguments),
         Verb::Validate(arguments) => validate::validate(&arguments),
         Verb::Top(arguments) => top::top(&arguments).map(|()| true),
         Verb::Ctl(arguments) => ctl::ctl(&arguments).map(|()| true),

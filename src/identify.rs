@@ -1,0 +1,191 @@
+//! The command `identify`: what flights show that the declared model lacks, and the model with it.
+//!
+//! The crate `identify` does the work; here its results are written down, and the new vehicle file is flown against
+//! the declared one on the bus.
+
+mod page;
+
+use crate::{files, validate};
+use anyhow::{Context, Result, bail};
+use clap::{Args, Subcommand};
+use flights::{Channel, Flight, FlightSet};
+use identify::report::Report;
+use identify::run::Outcome;
+use identify::vehicle_file;
+use indicatif::{ProgressBar, ProgressStyle};
+use serde_json::{Value, json};
+use std::io::Write as _;
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+/// What `--help` shows behind the options.
+pub const HELP: &str = "Examples: hummingbus identify flights/nanobench.toml --out identified\n          \
+    hummingbus identify rotor flights/stands/esc-test-f40.toml --out rotor\n\n\
+    Writes report.html, report.json and vehicle.toml into the folder. See docs/identify.md.";
+
+/// What `identify` takes.
+#[derive(Args)]
+#[command(args_conflicts_with_subcommands = true, subcommand_negates_reqs = true)]
+pub struct IdentifyArguments {
+    #[command(subcommand)]
+    part: Option<Part>,
+    /// The flights file: the declared vehicle, and flights to fit and to test on.
+    #[arg(required = true)]
+    flights: Option<PathBuf>,
+    /// Where the report and the new vehicle file go; made if it is not there.
+    #[arg(long, value_name = "DIR", required = true)]
+    out: Option<PathBuf>,
+    /// Print the report as JSON, and no progress.
+    #[arg(long)]
+    json: bool,
+    /// Do not fly the declared and the new vehicle on the bus.
+    #[arg(long)]
+    no_bus: bool,
+}
+
+#[derive(Subcommand)]
+enum Part {
+    /// Fit thrust, torque and motor to the logs of a thrust stand.
+    Rotor {
+        /// The stand file.
+        stand: PathBuf,
+        /// Where rotor.toml and rotor.json go; made if it is not there.
+        #[arg(long, value_name = "DIR")]
+        out: PathBuf,
+        /// Print the report as JSON.
+        #[arg(long)]
+        json: bool,
+    },
+}
+
+/// Runs the command; what it could not do is an error, so that `true` says that the files are written.
+///
+/// # Errors
+/// A file that cannot be read or written, flights that cannot be used, a run on the bus that fails.
+pub fn run(arguments: &IdentifyArguments) -> Result<bool> {
+    match (&arguments.part, &arguments.flights, &arguments.out) {
+        (Some(Part::Rotor { stand, out, json }), ..) => rotor(stand, out, *json),
+        (None, Some(flights), Some(out)) => flights_of(arguments, flights, out),
+        _ => bail!("give a flights file, and a folder with --out"),
+    }
+}
+
+fn rotor(stand: &Path, out: &Path, is_json: bool) -> Result<bool> {
+    let report = identify::rotor::run(stand, out)?;
+    let text = if is_json { serde_json::to_string_pretty(&report)? } else { report.to_string() };
+    crate::print_text(&text)?;
+    Ok(true)
+}
+
+fn flights_of(arguments: &IdentifyArguments, file: &Path, out: &Path) -> Result<bool> {
+    let progress = Progress::new(arguments.json);
+    progress.say("reading flights");
+    let set = FlightSet::load(file)?;
+    std::fs::create_dir_all(out).with_context(|| format!("cannot make the folder {}", out.display()))?;
+    let outcome = identify::run::identify(&set, &mut |step| progress.say(step))?;
+    let vehicle = out.join("vehicle.toml");
+    let text = vehicle_file::text(&set.vehicle, &outcome.effects, &outcome.report)?;
+    files::write(&vehicle, |out| out.write_all(text.as_bytes()))?;
+    let flown = if arguments.no_bus { None } else { Some(fly(&set, &vehicle, &outcome, &progress)?) };
+    progress.finish();
+    let mut report = serde_json::to_value(&outcome.report)?;
+    report["bus"] = flown.clone().unwrap_or(Value::Null);
+    let report = serde_json::to_string_pretty(&report)?;
+    files::write(&out.join("report.json"), |out| out.write_all(report.as_bytes()))?;
+    files::write(&out.join("report.html"), |out| page::write(&outcome, out))?;
+    crate::print_text(&if arguments.json { report } else { summary(&outcome.report, flown.as_ref(), out) })?;
+    Ok(true)
+}
+
+/// Flies the measured commands with the declared and the new vehicle on the bus, and compares what comes of it with the
+/// predictions of the report.
+fn fly(set: &FlightSet, vehicle: &Path, outcome: &Outcome, progress: &Progress) -> Result<Value> {
+    let (aligned, corrected) = (retimed(set, outcome, (0.0, 0.0)), retimed(set, outcome, outcome.delays_s));
+    let mut tell = |line: &str| progress.say(&format!("on the bus: {line}"));
+    let mut errors = |vehicle: &Path, set: &FlightSet| validate::errors(&[vehicle], set, None, &mut tell);
+    let before = errors(&set.vehicle, &aligned)?;
+    let after = errors(vehicle, &corrected)?;
+    let mut flights = json!({});
+    let mut furthest = 0.0_f64;
+    for (before, after) in before.flights.iter().zip(&after.flights) {
+        for (before_at, after_at) in before.horizons.iter().zip(&after.horizons) {
+            for (old, new) in before_at.channels.iter().zip(&after_at.channels) {
+                let (old_rms, new_rms) = (old.rms[0], new.rms[0]);
+                let (horizon, channel) = (before_at.horizon(), old.quantity.name());
+                flights[&before.name][&horizon][channel] =
+                    json!({ "before": old_rms, "after": new_rms, "unit": old.quantity.unit() });
+                let own = predicted(&outcome.report, &before.name, &horizon, channel);
+                let away = own.map_or(0.0, |(before, after)| {
+                    (old_rms / before - 1.0).abs().max((new_rms / after - 1.0).abs())
+                });
+                furthest = furthest.max(away);
+            }
+        }
+    }
+    Ok(json!({ "flights": flights, "furthest_from_prediction": furthest }))
+}
+
+/// The report's own errors before and after.
+fn predicted(report: &Report, flight: &str, horizon: &str, channel: &str) -> Option<(f64, f64)> {
+    let own = report.held_out.get(flight).or_else(|| report.fitted.get(flight))?;
+    let change = own.get(horizon)?.get(channel)?;
+    Some((change.before, change.after))
+}
+
+/// The flights with their pose set right in time by what the alignment took off and by `delays_s` of pose and inertial
+/// unit.
+fn retimed(set: &FlightSet, outcome: &Outcome, delays_s: (f64, f64)) -> FlightSet {
+    let flight = |flight: &Flight| {
+        let offsets = outcome.report.time_offsets_s.get(&flight.name);
+        let own_s = offsets.and_then(|own| own.get("pose").copied().flatten()).map_or(0.0, |own| own.taken_off);
+        let mut flight = flight.clone();
+        let pose_s = own_s + delays_s.0;
+        earlier(&mut flight.position, pose_s);
+        earlier(&mut flight.velocity, pose_s);
+        earlier(&mut flight.attitude, pose_s);
+        earlier(&mut flight.angular_velocity, delays_s.1);
+        earlier(&mut flight.specific_force, delays_s.1);
+        flight
+    };
+    FlightSet { vehicle: set.vehicle.clone(), flights: set.flights.iter().map(flight).collect() }
+}
+
+fn earlier<const N: usize>(channel: &mut Channel<N>, by_s: f64) {
+    channel.time_s.iter_mut().for_each(|time_s| *time_s -= by_s);
+}
+
+fn summary(report: &Report, flown: Option<&Value>, out: &Path) -> String {
+    let mut text = report.to_string();
+    if let Some(furthest) = flown.and_then(|flown| flown["furthest_from_prediction"].as_f64()) {
+        text += &format!(
+            "flown again on the bus with both vehicle files: errors within {:.1} % of these\n",
+            furthest * 100.0
+        );
+    }
+    let files = ["report.html", "report.json", "vehicle.toml"].map(|name| out.join(name).display().to_string());
+    text + &format!("\nwritten: {}", files.join(", "))
+}
+
+/// A line on the terminal that says what is being done.
+struct Progress(ProgressBar);
+
+impl Progress {
+    fn new(is_quiet: bool) -> Self {
+        if is_quiet {
+            return Self(ProgressBar::hidden());
+        }
+        let bar = ProgressBar::new_spinner();
+        let style = ProgressStyle::with_template("{spinner} {elapsed:>4}  {msg}");
+        bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_spinner()));
+        bar.enable_steady_tick(Duration::from_millis(100));
+        Self(bar)
+    }
+
+    fn say(&self, words: &str) {
+        self.0.set_message(words.to_owned());
+    }
+
+    fn finish(&self) {
+        self.0.finish_and_clear();
+    }
+}
