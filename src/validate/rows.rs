@@ -31,7 +31,7 @@ fn merged(attitude: &Channel<4>, times: &[f64]) -> Channel<4> {
             merged.values.push(between(from, to, (time_s - from_s) / (to_s - from_s)));
         }
     }
-    if let Some((last_s, last)) = samples.last() {
+    if let Some((last_s, last)) = samples.clone().next_back() {
         merged.time_s.push(*last_s);
         merged.values.push(*last);
     }
