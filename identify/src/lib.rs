@@ -17,6 +17,7 @@
 //! | [`align`], [`faults`], [`trim`] | clocks, sensors and trims, before anything is fitted |
 //! | [`whiteness`], [`noise`], [`statistics`] | what is left, and what noise alone would leave |
 //! | [`predict`] | prediction over horizons |
+//! | [`regressor`] | what residuals are looked at against |
 //! | [`report`], [`vehicle_file`], [`experiment`] | what is written down |
 //! | [`rotor`] | the rotor from a thrust stand |
 
@@ -32,6 +33,7 @@ pub mod normal;
 pub mod parameter;
 pub mod predict;
 pub mod prepared;
+pub mod regressor;
 pub mod report;
 pub mod rotor;
 pub mod run;

@@ -10,6 +10,7 @@ use crate::noise;
 use crate::parameter::{Parameters, SENSOR_BIAS, SENSOR_DELAY, SensorParameter};
 use crate::predict::{CHANNELS, Errors, Measured};
 use crate::prepared::{Equation, Prepared};
+use crate::regressor::{Regressor, regressors};
 use crate::report::{
     BeforeAfter, Change, EffectReport, Estimate, FlightReport, Noise, Report, Unexplained,
 };
@@ -58,6 +59,8 @@ pub struct Outcome {
     pub effects: Vec<Effect>,
     /// Residuals for pictures: by flight and equation.
     pub pictures: Vec<Picture>,
+    /// What each flight did meanwhile, by name: at the same instants as its pictures.
+    pub regressors: BTreeMap<String, Vec<Regressor>>,
     /// Accepted lateness of the pose and of the inertial unit, to be taken off the flights before they are flown again.
     pub delays_s: (f64, f64),
 }
@@ -127,7 +130,10 @@ pub fn identify(set: &FlightSet, progress: &mut dyn FnMut(&str)) -> Result<Outco
         block_s: bench.block_s,
     };
     let effects = bench.model.parameters.effects_under(values);
-    Ok(Outcome { pictures: pictures(&bench, &selection), effects, delays_s, report })
+    let flown = bench.fit.iter().chain(&bench.test);
+    let regressors =
+        flown.map(|own| (own.flight.name.clone(), regressors(&bench.model, own, values))).collect();
+    Ok(Outcome { pictures: pictures(&bench, &selection), regressors, effects, delays_s, report })
 }
 
 /// The flights on their grids, with the declared model.

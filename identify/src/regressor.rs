@@ -1,0 +1,49 @@
+//! What a vehicle was doing at the knots of its flight, to look at residuals against.
+
+use crate::model::Model;
+use crate::prepared::Prepared;
+use crate::track::Track;
+use nalgebra::Vector3;
+
+/// A quantity at the knots of a flight.
+#[derive(Debug, Clone)]
+pub struct Regressor {
+    /// Its name.
+    pub name: &'static str,
+    /// Its unit.
+    pub unit: &'static str,
+    /// Its values, by knot.
+    pub values: Vec<f64>,
+}
+
+/// The quantities that residuals are looked at against, as far as `flight` has them: those that never change are left
+/// out.
+#[must_use]
+pub fn regressors(model: &Model, flight: &Prepared, values: &[f64]) -> Vec<Regressor> {
+    let tracks = model.tracks(flight, values);
+    let rotors = model.rotors(flight, values).flown;
+    let voltage = Track::sampled(&flight.flight.battery_voltage, 0.0, &flight.layout.clock).values;
+    let body = |at: usize, axis: usize| {
+        tracks.attitude[at].inverse_transform_vector(&Vector3::from(tracks.velocity[at]))[axis]
+    };
+    let mean_speed = |at: usize| rotors[at].iter().map(|rotor| rotor.speed_rad_s).sum::<f64>() / 4.0;
+    let all: [(&'static str, &'static str, &dyn Fn(usize) -> f64); 10] = [
+        ("speed", "m/s", &|at| Vector3::from(tracks.velocity[at]).norm()),
+        ("velocity x (body)", "m/s", &|at| body(at, 0)),
+        ("velocity y (body)", "m/s", &|at| body(at, 1)),
+        ("velocity z (body)", "m/s", &|at| body(at, 2)),
+        ("angular velocity x (body)", "rad/s", &|at| tracks.rates[at][0]),
+        ("angular velocity y (body)", "rad/s", &|at| tracks.rates[at][1]),
+        ("angular velocity z (body)", "rad/s", &|at| tracks.rates[at][2]),
+        ("height", "m", &|at| tracks.position.values[at][2]),
+        ("mean rotor speed", "rad/s", &mean_speed),
+        ("battery voltage", "V", &|at| voltage[at][0]),
+    ];
+    let knots = &flight.layout.knots;
+    let sampled = all.into_iter().map(|(name, unit, of)| Regressor {
+        name,
+        unit,
+        values: knots.iter().map(|at| of(*at)).collect(),
+    });
+    sampled.filter(|own| own.values.iter().any(|value| *value != own.values[0])).collect()
+}
