@@ -3,6 +3,8 @@
 //! Each of `tests/readers/read_*` decodes every topic and ends at the first difference. `scripts/test`
 //! installs what they need and says where in `HUMMINGBUS_READERS`.
 
+#[path = "readers/identify.rs"]
+mod identify;
 #[path = "runs/laps.rs"]
 #[allow(dead_code, reason = "shared with tests/runs")]
 mod laps;

@@ -15,7 +15,8 @@ const SUPERSCRIPTS = { "-": "⁻", 0: "⁰", 1: "¹", 2: "²", 3: "³", 4: "⁴"
 
 const element = (id) => document.getElementById(id);
 const raised = (text) => [...String(text)].map((sign) => SUPERSCRIPTS[sign]).join("");
-const withUnit = (text) => text.replace(/\^(-?\d+)/g, (_, exponent) => raised(exponent));
+// A pure number has none.
+const withUnit = (text) => (text === "1" ? "" : text.replace(/\^(-?\d+)/g, (_, exponent) => raised(exponent)).replaceAll("*", "·"));
 const words = (name) => name.replaceAll("_", " ");
 const list = (items) => items.join(", ") || "–";
 
@@ -33,7 +34,9 @@ function number(value) {
 function change(before, after) {
   const percent = 100 * (after / before - 1);
   if (!Number.isFinite(percent)) return "–";
-  return `${percent > 0 ? "+" : percent < 0 ? "−" : ""}${Math.abs(percent).toFixed(Math.abs(percent) < 10 ? 1 : 0)} %`;
+  const size = Math.abs(percent).toFixed(Math.abs(percent) < 10 ? 1 : 0);
+  const sign = Number(size) === 0 ? "" : percent > 0 ? "+" : "−";
+  return `${sign}${size} %`;
 }
 
 // An effect whose gain no resampling undid: 5000 of them are drawn.
@@ -65,7 +68,7 @@ function addItem(id, text) {
 const accepted = report.verdict.map((name) => [name, report.effects[name]]).filter(([, effect]) => effect);
 
 function estimateText(name, { value, unit, low, high }) {
-  return `${words(name)} = ${number(value)} ${withUnit(unit)} (95 %: ${number(low)} to ${number(high)})`;
+  return `${words(name)} = ${`${number(value)} ${withUnit(unit)}`.trim()} (95 %: ${number(low)} to ${number(high)})`;
 }
 
 function drawSummary() {
@@ -96,9 +99,9 @@ function drawFlights() {
   for (const flight of report.flights) {
     const offset = report.time_offsets_s[flight.name]?.pose;
     const times = offset ? [ms(offset.value), `${ms(offset.low)} to ${ms(offset.high)}`, ms(offset.taken_off)] : ["–", "–", "–"];
-    const equations = left(list(flight.equations.map(words)));
+    const equations = long(list(flight.equations.map(words)));
     addRow(table, "td", [left(flight.name), left(flight.role), flight.compared_s.toFixed(1), flight.window_s.toFixed(3), ...times, equations]);
-    for (const note of [...flight.assumed.map((own) => `assumed: ${own}`), ...flight.notes]) addItem("notes", `${flight.name}: ${note}`);
+    for (const note of [...flight.assumed.map((own) => `assumed: ${own}`), ...flight.notes]) addItem("notes", `${flight.name}: ${note.replaceAll("`", "")}`);
   }
 }
 
@@ -119,7 +122,7 @@ function drawFaults() {
 function drawEffect(table, name, effect) {
   const kind = effect.accepted ? "" : "left-out";
   const { before, after } = effect.held_out;
-  const own = [number(before), number(after), change(before, after), chance(effect.chance), left(list(effect.confused_with))];
+  const own = [number(before), number(after), change(before, after), chance(effect.chance), long(list(effect.confused_with))];
   const parameters = Object.entries(effect.parameters);
   parameters.forEach(([parameter, { value, unit, low, high }], index) => {
     const cells = [left(words(parameter)), number(value), `${number(low)} to ${number(high)}`, left(withUnit(unit))];
@@ -127,7 +130,7 @@ function drawEffect(table, name, effect) {
     const heads = index ? [left(""), left("")] : [left(name), left(effect.accepted ? "yes" : "no")];
     addRow(table, "td", [...heads, ...cells, ...judged], index ? kind : `first ${kind}`);
   });
-  if (effect.experiment) addRow(table, "td", [left(""), left(""), long(`To tell it from ${list(effect.confused_with)}: ${effect.experiment}.`, 9)], kind);
+  if (effect.experiment) addRow(table, "td", [left(""), left(""), long(`To tell it from ${effect.confused_with[0]}: ${effect.experiment}.`, 9)], kind);
 }
 
 function drawEffects() {
@@ -221,10 +224,10 @@ function drawWhiteness() {
 
 function addMarks(id, marks) {
   for (const [key, name] of marks) {
-    const mark = document.createElement("span");
-    mark.className = "mark";
+    const [mark, label] = ["mark", "label"].map((kind) => Object.assign(document.createElement("span"), { className: kind }));
     mark.style.background = COLOURS[key];
-    element(id).append(mark, `${name} `);
+    label.append(mark, name);
+    element(id).append(label, " ");
   }
 }
 

@@ -54,7 +54,8 @@ fn flight(outcome: &Outcome, name: &str, budget: Budget) -> Option<Value> {
     let first = pictures.first()?;
     let cloud = evenly(first.time_s.len(), budget.cloud);
     let regressors = outcome.regressors.get(name).map_or(&[][..], Vec::as_slice);
-    let input = |own: &Regressor| json!({ "name": own.name, "unit": own.unit, "cloud": at(&own.values, &cloud) });
+    let input =
+        |own: &Regressor| json!({ "name": own.name, "unit": own.unit, "cloud": at(&own.values, &cloud) });
     let equations: Vec<Value> =
         pictures.iter().map(|picture| equation(picture, regressors, budget.curve, &cloud)).collect();
     Some(json!({
@@ -66,7 +67,8 @@ fn flight(outcome: &Outcome, name: &str, budget: Budget) -> Option<Value> {
 }
 
 fn equation(picture: &Picture, regressors: &[Regressor], points: usize, cloud: &[usize]) -> Value {
-    let components = (0..picture.measured.len()).map(|axis| component(picture, axis, regressors, points, cloud));
+    let components =
+        (0..picture.measured.len()).map(|axis| component(picture, axis, regressors, points, cloud));
     json!({
         "name": title(picture.equation),
         "unit": picture.equation.unit(),
@@ -79,7 +81,7 @@ fn title(equation: Equation) -> &'static str {
         Equation::SpecificForce => "specific force (body)",
         Equation::Acceleration => "acceleration (world)",
         Equation::AngularAcceleration => "angular acceleration (body)",
-        Equation::Gyroscope => "gyroscope less turning of attitude (body)",
+        Equation::Gyroscope => "gyroscope less attitude (body)",
         Equation::RotorSpeed => "rotor speed",
     }
 }
@@ -95,8 +97,11 @@ fn component(
     let (measured, before, after) = (&picture.measured[axis], &picture.before[axis], &picture.after[axis]);
     let chosen = extremes(&[measured, before, after], points);
     let breaks = breaks(&picture.time_s, &chosen);
-    let name =
-        if picture.equation == Equation::RotorSpeed { format!("rotor {}", axis + 1) } else { ["x", "y", "z"][axis].into() };
+    let name = if picture.equation == Equation::RotorSpeed {
+        format!("rotor {}", axis + 1)
+    } else {
+        ["x", "y", "z"][axis].into()
+    };
     let inputs = std::iter::once(measured).chain(regressors.iter().map(|own| &own.values));
     let cross = |input: &Vec<f64>| json!({ "before": lagged(before, input), "after": lagged(after, input) });
     let windows = apart(before).len();
@@ -171,7 +176,8 @@ fn extremes(series: &[&Vec<f64>], points: usize) -> Vec<usize> {
 fn breaks(time_s: &[f64], chosen: &[usize]) -> Vec<usize> {
     let ways = || time_s.windows(2).map(|pair| pair[1] - pair[0]);
     let limit_s = 1.5 * ways().fold(f64::INFINITY, f64::min);
-    let gaps: Vec<usize> = ways().enumerate().filter(|(_, way)| *way > limit_s).map(|(at, _)| at + 1).collect();
+    let gaps: Vec<usize> =
+        ways().enumerate().filter(|(_, way)| *way > limit_s).map(|(at, _)| at + 1).collect();
     let after = gaps.iter().map(|gap| chosen.partition_point(|at| at < gap));
     after.filter(|at| *at < chosen.len()).collect::<BTreeSet<_>>().into_iter().collect()
 }
@@ -186,12 +192,22 @@ fn short(values: &[f64]) -> Vec<Value> {
 
 /// Five digits: finer than any plot. What is no number is none.
 fn digits(value: f64) -> Value {
-    if value.is_finite() { json!(format!("{value:.4e}").parse::<f64>().unwrap_or(value)) } else { Value::Null }
+    if value.is_finite() {
+        json!(format!("{value:.4e}").parse::<f64>().unwrap_or(value))
+    } else {
+        Value::Null
+    }
 }
 
 #[cfg(test)]
 mod tests {
-    use super::{breaks, evenly, extremes, lagged};
+    use super::{breaks, evenly, extremes, lagged, write};
+    use flights::Role;
+    use identify::prepared::Equation;
+    use identify::regressor::Regressor;
+    use identify::report::{BeforeAfter, FlightReport, Report};
+    use identify::run::{Outcome, Picture};
+    use std::collections::BTreeMap;
 
     #[test]
     fn a_long_flight_keeps_its_ends_and_extremes_within_its_points() {
@@ -220,5 +236,70 @@ mod tests {
         let value = |at: usize| correlations[at].as_f64().unwrap();
         let highest = (0..correlations.len()).max_by(|a, b| value(*a).total_cmp(&value(*b))).unwrap();
         assert_eq!((correlations.len(), highest), (51, 25 + 2));
+    }
+    const FLIGHTS: [&str; 2] = ["first hour", "second hour"];
+
+    fn noise(seed: usize, count: usize) -> Vec<f64> {
+        (0..count).map(|at| ((at * 7919 + seed * 104_729) % 10_007) as f64 * 1.234_567e-3).collect()
+    }
+
+    fn picture(flight: &str, equation: Equation, count: usize) -> Picture {
+        let columns = |seed| (0..equation.size()).map(|axis| noise(seed + axis, count)).collect();
+        let time_s = (0..count).map(|at| at as f64 * 0.03).collect();
+        let (measured, before, after) = (columns(1), columns(5), columns(9));
+        Picture { flight: flight.to_owned(), role: Role::Test, equation, time_s, measured, before, after }
+    }
+
+    fn report() -> Report {
+        let flight = |name: &str| FlightReport {
+            name: name.to_owned(),
+            role: Role::Test,
+            compared_s: 3600.0,
+            window_s: 0.12,
+            equations: Vec::new(),
+            assumed: Vec::new(),
+            notes: Vec::new(),
+        };
+        Report {
+            vehicle: "one.toml".to_owned(),
+            flights: FLIGHTS.map(flight).to_vec(),
+            verdict: Vec::new(),
+            effects: BTreeMap::new(),
+            whiteness: BeforeAfter { before: BTreeMap::new(), after: BTreeMap::new() },
+            time_offsets_s: BTreeMap::new(),
+            faults: Vec::new(),
+            trims: Vec::new(),
+            held_out: BTreeMap::new(),
+            fitted: BTreeMap::new(),
+            noise_floor: BTreeMap::new(),
+            unexplained: BTreeMap::new(),
+            not_identifiable: Vec::new(),
+            block_s: 1.0,
+        }
+    }
+
+    #[test]
+    fn hours_of_flight_make_a_page_that_a_browser_opens_at_once() {
+        let count = 120_000;
+        let equations = [
+            Equation::SpecificForce,
+            Equation::Acceleration,
+            Equation::AngularAcceleration,
+            Equation::Gyroscope,
+            Equation::RotorSpeed,
+        ];
+        let of_flight = |name: &'static str| equations.map(|equation| picture(name, equation, count));
+        let inputs = |_| Regressor { name: "speed", unit: "m/s", values: noise(3, count) };
+        let regressors = FLIGHTS.map(|name| (name.to_owned(), (0..10).map(inputs).collect()));
+        let outcome = Outcome {
+            report: report(),
+            effects: Vec::new(),
+            pictures: FLIGHTS.into_iter().flat_map(of_flight).collect(),
+            regressors: BTreeMap::from(regressors),
+            delays_s: (0.0, 0.0),
+        };
+        let mut page = Vec::new();
+        write(&outcome, &mut page).unwrap();
+        assert!((4_000_000..8_000_000).contains(&page.len()), "{} bytes", page.len());
     }
 }

@@ -1,0 +1,50 @@
+// Prints as JSON what a browser draws of an identification's page. Usage: read_identify.mjs PAGE [SCREENSHOT.png]
+
+import { pathToFileURL } from "node:url";
+import { withPage } from "./browser.mjs";
+
+const [file, screenshot] = process.argv.slice(2);
+const PLOTS = ["residual", "sides", "against", "agreement", "auto", "cross"];
+const CHOICES = ["flight", "equation", "component", "input"];
+
+/** What is drawn: for each plot its title, its axes and the number of marks that have an extent; each table's rows. */
+function look([plots, choices]) {
+  const extent = (mark) => {
+    const box = mark.getBBox();
+    return box.width > 0 || box.height > 0;
+  };
+  const text = (plot, name) => plot.querySelector(name)?.textContent ?? "";
+  const seen = (plot) => ({
+    title: text(plot, ".gtitle"), x: text(plot, ".xtitle"), y: text(plot, ".ytitle"),
+    marks: [...plot.querySelectorAll(".cartesianlayer .trace path")].filter(extent).length,
+  });
+  const chosen = (id) => document.getElementById(id).selectedOptions[0].textContent;
+  return {
+    title: document.querySelector("h1").textContent,
+    verdict: document.getElementById("verdict").textContent,
+    errors: [...document.querySelectorAll("#errors .js-plotly-plot")].map(seen),
+    plots: Object.fromEntries(plots.map((id) => [id, seen(document.getElementById(id))])),
+    tables: Object.fromEntries([...document.querySelectorAll("table")].map((table) => [table.id, table.rows.length])),
+    chosen: Object.fromEntries(choices.map((id) => [id, chosen(id)])),
+    buttons: [...document.querySelectorAll("#residual .modebar-btn")].map((button) => button.dataset.title),
+    overflow: document.documentElement.scrollWidth - document.documentElement.clientWidth,
+  };
+}
+
+/** Chooses the last of each selector, from the first selector on, since each offers what the one before leaves. */
+async function chooseLast(page) {
+  for (const id of CHOICES) {
+    const count = await page.$eval(`#${id}`, (select) => select.options.length);
+    await page.select(`#${id}`, String(count - 1));
+  }
+}
+
+const seen = await withPage(pathToFileURL(file).href, async (page, wrong) => {
+  await page.waitForSelector("#cross .cartesianlayer path");
+  const first = await page.evaluate(look, [PLOTS, CHOICES]);
+  if (screenshot) await page.screenshot({ path: screenshot, fullPage: true });
+  await chooseLast(page);
+  const last = await page.evaluate(look, [PLOTS, CHOICES]);
+  return { first, last, wrong };
+});
+console.log(JSON.stringify(seen));
