@@ -114,7 +114,8 @@ impl Bench<'_> {
 
     /// The Gauss-Newton step within the bounds: a parameter that would leave them stops there, and the others are
     /// fitted to that.
-    fn step(&self, blocks: &[Block], values: &[f64], which: &[usize]) -> DVector<f64> {
+    #[must_use]
+    pub fn step(&self, blocks: &[Block], values: &[f64], which: &[usize]) -> DVector<f64> {
         let total = normal::sum(blocks);
         let mut held: Vec<Option<f64>> = vec![None; which.len()];
         let mut step = DVector::zeros(which.len());
@@ -137,7 +138,9 @@ impl Bench<'_> {
         step
     }
 
-    fn moved(&self, values: &[f64], which: &[usize], step: &DVector<f64>) -> Vec<f64> {
+    /// The values after a step, within their bounds.
+    #[must_use]
+    pub fn moved(&self, values: &[f64], which: &[usize], step: &DVector<f64>) -> Vec<f64> {
         let mut next = values.to_vec();
         for (parameter, step) in which.iter().zip(step.iter()) {
             let own = &self.model.parameters.all[*parameter];

@@ -51,6 +51,13 @@ impl Block {
         }
     }
 
+    /// The equations about the point that a step leads to.
+    #[must_use]
+    pub fn after(&self, step: &DVector<f64>) -> Self {
+        let gradient = &self.gradient + &self.gram * step;
+        Self { gram: self.gram.clone(), gradient, squares: self.squares_after(step) }
+    }
+
     /// The sum of squares after a step.
     #[must_use]
     pub fn squares_after(&self, step: &DVector<f64>) -> f64 {

@@ -13,6 +13,9 @@ use std::collections::BTreeMap;
 /// Length of a tick.
 const TICK_S: f64 = 0.001;
 
+/// Windows that begin earlier do not count: how fast the rotors turn at the start of a flight is not known.
+const SETTLE_TICKS: usize = 500;
+
 /// The measured states of a flight, tick by tick.
 #[derive(Debug)]
 pub struct Measured {
@@ -81,7 +84,7 @@ impl Measured {
                 trace.push((self.clock.at(tick), *measured, *own));
             }
             if tick % window == 0 {
-                if self.is_valid[tick - window..=tick].iter().all(|is_valid| *is_valid) {
+                if tick - window >= SETTLE_TICKS && self.is_valid[tick - window..=tick].iter().all(|is_valid| *is_valid) {
                     sums.iter_mut().zip(differences(own, measured)).for_each(|(sum, own)| *sum += own * own);
                     count += 1;
                 }

@@ -102,7 +102,7 @@ pub fn identify(set: &FlightSet, progress: &mut dyn FnMut(&str)) -> Result<Outco
     let selection = select(&mut bench, &open, progress);
     progress("rivals");
     let mut effects = judged_effects(&bench, &selection);
-    accepted_effects(&bench, &selection, &open, &mut effects);
+    accepted_effects(&bench, &selection, &mut effects);
     progress("predictions");
     let values = &selection.after.values;
     let delays_s = delays(&bench, values);
@@ -240,7 +240,6 @@ fn judged_effects(bench: &Bench, selection: &Selection) -> BTreeMap<&'static str
 fn accepted_effects(
     bench: &Bench,
     selection: &Selection,
-    open: &[Candidate],
     effects: &mut BTreeMap<&'static str, EffectReport>,
 ) {
     for name in verdict(selection) {
@@ -258,7 +257,7 @@ fn accepted_effects(
         let without = bench.fitted(&start, &which(&others));
         let mut confused_with: Vec<&'static str> = Vec::new();
         if let [at] = own[..] {
-            confused_with = rivals(bench, selection, at, open);
+            confused_with = rivals(bench, selection, at);
         }
         let experiment = confused_with.first().map(|rival| experiment::between(name, rival).to_owned());
         let held_out = BeforeAfter {

@@ -14,9 +14,9 @@
 
 use crate::candidate::Candidate;
 use crate::fit::{Bench, Fitted};
-use crate::normal;
-use nalgebra::DVector;
+use crate::normal::{self, Block};
 use rand_core::{Rng, SeedableRng};
+use rayon::prelude::*;
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
 /// A smaller part of the squared error does not matter, however certain it is: what the comparison itself leaves at
@@ -30,6 +30,10 @@ pub const FALSE_RATE: f64 = 0.05;
 const RIVAL_LEVEL: f64 = 0.05;
 /// Resamples of a bootstrap: enough for the level of one among thirty candidates.
 const RESAMPLES: usize = 5000;
+/// So many candidates of a round are fitted in earnest.
+const CONFIRMED: usize = 4;
+/// A rival has at least this part of the gain.
+const NEAR: f64 = 0.5;
 /// More rounds than there are effects worth naming.
 const ROUNDS_MAX: usize = 10;
 
@@ -73,28 +77,52 @@ pub struct Selection {
 }
 
 /// Selects among `candidates`, telling `progress` of each step.
+///
+/// Where flights have trims of their own, these are left out at first; in the end a shift of the centre of mass, which
+/// is what most trims are, is tried with them.
 pub fn select(bench: &mut Bench, candidates: &[Candidate], progress: &mut dyn FnMut(&str)) -> Selection {
     let declared = bench.model.parameters.declared();
-    let mut accepted: Vec<Candidate> = Vec::new();
-    let mut rounds = Vec::new();
-    let mut base = bench.fitted(&declared, &[]);
-    for number in 1..=ROUNDS_MAX {
-        bench.weigh(&base, candidates);
-        base = bench.fitted(&base.values, &which(&accepted));
-        let round = round(bench, &base, &accepted, candidates, &mut |effect| {
-            progress(&format!("round {number}: {effect}"));
-        });
-        let taken = round.taken.map(|at| round.judged[at].clone());
-        rounds.push(round);
-        let Some(taken) = taken else { break };
-        accepted.push(taken.candidate);
-        base = taken.fitted;
-        base = without_idle(bench, base, &mut accepted);
+    let base = bench.fitted(&declared, &[]);
+    let mut course = Course { accepted: Vec::new(), rounds: Vec::new(), base };
+    course.run(bench, candidates, progress);
+    if bench.has_own_trims {
+        bench.has_own_trims = false;
+        let of_trim: Vec<Candidate> = candidates.iter().filter(|own| own.effect == "com-offset").cloned().collect();
+        course.run(bench, &of_trim, progress);
     }
+    let Course { accepted, rounds, base } = course;
     bench.weigh(&base, candidates);
     let after = bench.fitted(&base.values, &which(&accepted));
     let before = bench.fitted(&declared, &[]);
     Selection { accepted, before, after, rounds }
+}
+
+/// How far a selection has come.
+struct Course {
+    accepted: Vec<Candidate>,
+    rounds: Vec<Round>,
+    base: Fitted,
+}
+
+impl Course {
+    /// Rounds among `candidates` until none is accepted.
+    fn run(&mut self, bench: &mut Bench, candidates: &[Candidate], progress: &mut dyn FnMut(&str)) {
+        for _ in 0..ROUNDS_MAX {
+            let open = candidates.iter().filter(|candidate| !self.accepted.contains(candidate)).count();
+            if open == 0 {
+                break;
+            }
+            progress(&format!("round {}: {open} candidates", self.rounds.len() + 1));
+            bench.weigh(&self.base, candidates);
+            self.base = bench.fitted(&self.base.values, &which(&self.accepted));
+            let round = round(bench, &self.base, &self.accepted, candidates);
+            let taken = round.taken.map(|at| round.judged[at].clone());
+            self.rounds.push(round);
+            let Some(taken) = taken else { break };
+            self.accepted.push(taken.candidate);
+            self.base = without_idle(bench, taken.fitted, &mut self.accepted);
+        }
+    }
 }
 
 /// The parameters of candidates.
@@ -103,34 +131,43 @@ pub fn which(accepted: &[Candidate]) -> Vec<usize> {
     accepted.iter().flat_map(|candidate| candidate.which.clone()).collect()
 }
 
-fn round(
-    bench: &Bench,
-    base: &Fitted,
-    accepted: &[Candidate],
-    candidates: &[Candidate],
-    progress: &mut dyn FnMut(&str),
-) -> Round {
+fn round(bench: &Bench, base: &Fitted, accepted: &[Candidate], candidates: &[Candidate]) -> Round {
     let open: Vec<&Candidate> = candidates.iter().filter(|candidate| !accepted.contains(candidate)).collect();
+    let level = FALSE_RATE / open.len().max(1) as f64;
     let screen = Screen::of(bench, base, accepted, &open);
-    let mut judged = Vec::new();
-    for candidate in &open {
-        progress(candidate.effect);
-        // A linear candidate that promises nothing is not worth a fit of its own.
-        if candidate.starts.is_empty() && !screen.is_promising(candidate) {
-            continue;
-        }
-        judged.push(judge(bench, base, accepted, candidate, open.len()));
-    }
-    let taken = best(&judged);
-    Round { judged, taken }
+    let judge = |candidate: &&Candidate| {
+        let fitted = if candidate.starts.is_empty() {
+            screen.promised(bench, base, candidate)
+        } else {
+            fitted(bench, base, accepted, candidate)
+        };
+        judged(bench, base, candidate, fitted, level)
+    };
+    let mut all: Vec<Judged> = open.par_iter().map(judge).collect();
+    confirm(bench, base, accepted, &mut all, level);
+    let taken = best(&all);
+    Round { judged: all, taken }
 }
 
-fn judge(bench: &Bench, base: &Fitted, accepted: &[Candidate], candidate: &Candidate, rivals: usize) -> Judged {
-    let fitted = fitted(bench, base, accepted, candidate);
+/// Has those of whom the linearised equations promise most fitted in earnest; a promise alone is not accepted.
+fn confirm(bench: &Bench, base: &Fitted, accepted: &[Candidate], all: &mut [Judged], level: f64) {
+    let mut promises: Vec<&mut Judged> =
+        all.iter_mut().filter(|own| own.is_accepted && own.candidate.starts.is_empty()).collect();
+    promises.sort_by(|a, b| b.gain.total_cmp(&a.gain));
+    promises.into_par_iter().enumerate().for_each(|(place, own)| {
+        if place < CONFIRMED {
+            let fitted = fitted(bench, base, accepted, &own.candidate);
+            *own = judged(bench, base, &own.candidate, fitted, level);
+        } else {
+            own.is_accepted = false;
+        }
+    });
+}
+
+fn judged(bench: &Bench, base: &Fitted, candidate: &Candidate, fitted: Fitted, level: f64) -> Judged {
     let gain = base.test_sum() - fitted.test_sum();
     let gain_chance = chance(&base.test_squares, &fitted.test_squares);
     let parameter_t = parameter_t(bench, &fitted, candidate);
-    let level = FALSE_RATE / rivals as f64;
     let is_accepted = gain_chance < level
         && parameter_t > t_quantile(1.0 - level / 2.0, fitted.fit_squares.len())
         && gain > LEAST_GAIN * base.test_sum()
@@ -246,37 +283,55 @@ impl Screen {
         Self { columns, fit, test, accepted: which(accepted) }
     }
 
-    /// Whether a step to the fit flights' minimum would gain anything on the test flights.
-    fn is_promising(&self, candidate: &Candidate) -> bool {
-        let wanted = self.accepted.iter().chain(&candidate.which);
-        let at: Vec<usize> = wanted.filter_map(|p| self.columns.iter().position(|own| own == p)).collect();
-        let total = normal::sum(&self.fit).of(&at);
-        let step: DVector<f64> = -(normal::inverse(&total.gram) * &total.gradient);
-        let gain: f64 = self.test.iter().map(|block| block.squares - block.of(&at).squares_after(&step)).sum();
-        gain > 0.0
+    /// The fit that the linearised equations promise.
+    fn promised(&self, bench: &Bench, base: &Fitted, candidate: &Candidate) -> Fitted {
+        let wanted: Vec<usize> = self.accepted.iter().chain(&candidate.which).copied().collect();
+        let at: Vec<usize> =
+            wanted.iter().filter_map(|p| self.columns.iter().position(|own| own == p)).collect();
+        let of = |blocks: &[Block]| -> Vec<Block> { blocks.iter().map(|block| block.of(&at)).collect() };
+        let (fit, test) = (of(&self.fit), of(&self.test));
+        let step = bench.step(&fit, &base.values, &wanted);
+        let after = |blocks: &[Block]| -> Vec<f64> { blocks.iter().map(|own| own.squares_after(&step)).collect() };
+        let moved: Vec<Block> = fit.iter().map(|own| own.after(&step)).collect();
+        Fitted {
+            values: bench.moved(&base.values, &wanted, &step),
+            covariance: normal::covariance(&moved),
+            test_squares: after(&test),
+            fit_squares: after(&fit),
+            which: wanted,
+        }
     }
 }
 
-/// For an accepted candidate: the effects that would do as well in its place.
+/// For an accepted candidate: the effects that would do as well in its place, of those that were anywhere near it when
+/// it was taken.
 #[must_use]
-pub fn rivals(bench: &Bench, selection: &Selection, at: usize, candidates: &[Candidate]) -> Vec<&'static str> {
+pub fn rivals(bench: &Bench, selection: &Selection, at: usize) -> Vec<&'static str> {
     let own = &selection.accepted[at];
     let mut others = selection.accepted.clone();
     others.remove(at);
     let mut start = selection.after.values.clone();
     own.which.iter().for_each(|at| start[*at] = bench.model.parameters.all[*at].declared);
     let base = bench.fitted(&start, &which(&others));
-    let is_other = |candidate: &&Candidate| {
-        candidate.effect != own.effect && !selection.accepted.contains(candidate)
+    let is_rival = |candidate: &&Candidate| {
+        !is_worse(&fitted(bench, &base, &others, candidate), &selection.after)
     };
-    let mut names = Vec::new();
-    for candidate in candidates.iter().filter(is_other) {
-        if !names.contains(&candidate.effect) {
-            let fitted = fitted(bench, &base, &others, candidate);
-            if !is_worse(&fitted, &selection.after) {
-                names.push(candidate.effect);
-            }
-        }
-    }
+    let near = near(selection, own);
+    let mut names: Vec<&'static str> =
+        near.par_iter().filter(|candidate| is_rival(candidate)).map(|candidate| candidate.effect).collect();
+    names.dedup();
     names
+}
+
+/// The candidates of other effects that gained at least [`NEAR`] of what `own` did in the round that took it.
+fn near<'s>(selection: &'s Selection, own: &Candidate) -> Vec<&'s Candidate> {
+    let took = |round: &&Round| round.taken.is_some_and(|at| round.judged[at].candidate == *own);
+    let Some(round) = selection.rounds.iter().find(took) else { return Vec::new() };
+    let gain = round.taken.map_or(0.0, |at| round.judged[at].gain);
+    let is_near = |judged: &&Judged| {
+        judged.gain > NEAR * gain
+            && judged.candidate.effect != own.effect
+            && !selection.accepted.contains(&judged.candidate)
+    };
+    round.judged.iter().filter(is_near).map(|judged| &judged.candidate).collect()
 }

@@ -44,8 +44,8 @@ pub fn take_off(flight: &Prepared, rows: &mut [f64]) {
 /// the bench compares without them. Empty where the flights agree.
 pub fn compare(bench: &mut Bench, open: &[Candidate]) -> Vec<Trim> {
     let declared = bench.model.parameters.declared();
-    let base = bench.fitted(&declared, &[]);
-    let mut shared = base.clone();
+    bench.weigh(&bench.fitted(&declared, &[]), open);
+    let mut shared = bench.fitted(&declared, &[]);
     for effect in ["com-offset", "weak-rotor"] {
         let own = open.iter().filter(|candidate| candidate.effect == effect);
         let which: Vec<usize> = own.flat_map(|candidate| candidate.which.clone()).collect();
