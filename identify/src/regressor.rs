@@ -16,6 +16,9 @@ pub struct Regressor {
     pub values: Vec<f64>,
 }
 
+/// A quantity's name, its unit, and its value at an instant of the grid.
+type Named<'a> = (&'static str, &'static str, &'a dyn Fn(usize) -> f64);
+
 /// The quantities that residuals are looked at against, as far as `flight` has them: those that never change are left
 /// out.
 #[must_use]
@@ -27,7 +30,7 @@ pub fn regressors(model: &Model, flight: &Prepared, values: &[f64]) -> Vec<Regre
         tracks.attitude[at].inverse_transform_vector(&Vector3::from(tracks.velocity[at]))[axis]
     };
     let mean_speed = |at: usize| rotors[at].iter().map(|rotor| rotor.speed_rad_s).sum::<f64>() / 4.0;
-    let all: [(&'static str, &'static str, &dyn Fn(usize) -> f64); 10] = [
+    let all: [Named<'_>; 10] = [
         ("speed", "m/s", &|at| Vector3::from(tracks.velocity[at]).norm()),
         ("velocity x (body)", "m/s", &|at| body(at, 0)),
         ("velocity y (body)", "m/s", &|at| body(at, 1)),
