@@ -28,7 +28,12 @@ pub struct Unseen {
 #[must_use]
 pub fn candidates(parameters: &Parameters, flights: &[&Prepared]) -> (Vec<Candidate>, Vec<Unseen>) {
     let (mut seen, mut unseen) = (Vec::new(), Vec::new());
+    let is_assumed = flights.iter().any(|flight| flight.is_assumed());
     for effect in parameters.effects() {
+        if is_assumed && !OF_MEANS.contains(&effect) {
+            unseen.push(Unseen { effect, needs: "attitude and angular velocity that were measured, not assumed" });
+            continue;
+        }
         match needs(effect).iter().find(|(_, is_met)| !flights.iter().any(|flight| is_met(flight))) {
             Some((needs, _)) => unseen.push(Unseen { effect, needs }),
             None => seen.extend(parts(parameters, effect)),
@@ -36,6 +41,9 @@ pub fn candidates(parameters: &Parameters, flights: &[&Prepared]) -> (Vec<Candid
     }
     (seen, unseen)
 }
+
+/// What the means of a flight show, where its attitude was assumed and only the means of forces and torques are true.
+const OF_MEANS: [&str; 3] = ["thrust-scale", "mass-error", "com-offset"];
 
 type Need = (&'static str, fn(&Prepared) -> bool);
 

@@ -155,13 +155,24 @@ impl Bench<'_> {
         flights.iter().flat_map(|flight| self.blocks_of(flight, values, which)).collect()
     }
 
+    /// The model's residual and its derivatives, without what this bench does not compare: the means of angular
+    /// accelerations where flights have trims of their own, all but their means where the attitude was assumed.
+    fn linearised(&self, flight: &Prepared, values: &[f64], which: &[usize]) -> (Vec<f64>, Vec<Vec<f64>>) {
+        let (mut residual, mut columns) = self.model.linearised(flight, values, which);
+        for rows in std::iter::once(&mut residual).chain(&mut columns) {
+            if flight.is_assumed() {
+                trim::keep_means(flight, rows, &self.block_knots(flight));
+            } else if self.has_own_trims {
+                trim::take_off(flight, rows);
+            }
+        }
+        (residual, columns)
+    }
+
     /// The normal equations of the blocks of one flight.
     #[must_use]
     pub fn blocks_of(&self, flight: &Prepared, values: &[f64], which: &[usize]) -> Vec<Block> {
-        let (mut residual, mut columns) = self.model.linearised(flight, values, which);
-        if self.has_own_trims {
-            std::iter::once(&mut residual).chain(&mut columns).for_each(|rows| trim::take_off(flight, rows));
-        }
+        let (residual, columns) = self.linearised(flight, values, which);
         self.flight_blocks(flight, &residual, &columns)
     }
 
@@ -237,7 +248,10 @@ impl Bench<'_> {
     /// the step that fits best.
     pub fn weigh(&mut self, base: &Fitted, candidates: &[Candidate]) {
         let mut all = base.which.clone();
-        for candidate in candidates.iter().filter(|candidate| candidate.starts.is_empty()) {
+        // Torques of an assumed attitude are zero, to which any scale of thrust or inertia could shrink the model's.
+        let is_assumed = self.fit.iter().any(Prepared::is_assumed);
+        let counts = |own: &&Candidate| own.starts.is_empty() && (!is_assumed || own.effect == "com-offset");
+        for candidate in candidates.iter().filter(counts) {
             all.extend(candidate.which.iter().filter(|at| !base.which.contains(at)));
         }
         for _ in 0..2 {
@@ -254,10 +268,7 @@ impl Bench<'_> {
     fn variances(&self, values: &[f64], which: &[usize], step: &DVector<f64>) -> Weights {
         let mut sums: BTreeMap<(&'static str, usize), (f64, f64, f64)> = BTreeMap::new();
         for flight in &self.fit {
-            let (mut residual, mut columns) = self.model.linearised(flight, values, which);
-            if self.has_own_trims {
-                std::iter::once(&mut residual).chain(&mut columns).for_each(|rows| trim::take_off(flight, rows));
-            }
+            let (residual, columns) = self.linearised(flight, values, which);
             let measured = self.model.tracks(flight, values).rows;
             let width = flight.width();
             let equations = flight.layout.equations.iter();

@@ -124,6 +124,12 @@ impl<'f> Prepared<'f> {
         (prepared.layout.knots.len() >= 3).then_some(prepared)
     }
 
+    /// Whether its attitude or its rates were assumed instead of measured.
+    #[must_use]
+    pub fn is_assumed(&self) -> bool {
+        !self.flight.assumed.is_empty()
+    }
+
     /// Whether the vehicle moves further than any rig lets it.
     #[must_use]
     pub fn moves_freely(&self) -> bool {

@@ -40,9 +40,26 @@ pub fn take_off(flight: &Prepared, rows: &mut [f64]) {
     }
 }
 
+/// Puts the mean of each block, given by its first and last knot, in place of the angular acceleration's rows.
+pub fn keep_means(flight: &Prepared, rows: &mut [f64], blocks: &[(usize, usize)]) {
+    let Some(offset) = flight.offset_of(Equation::AngularAcceleration) else { return };
+    let width = flight.width();
+    for (first, last) in blocks {
+        for axis in 0..3 {
+            let own = || (first * width + offset + axis..last * width).step_by(width);
+            let mean = own().map(|at| rows[at]).sum::<f64>() / own().count().max(1) as f64;
+            own().for_each(|at| rows[at] = mean);
+        }
+    }
+}
+
 /// The trims of all flights where they differ, after what a shift of the centre of mass that all share explains; then
 /// the bench compares without them. Empty where the flights agree.
 pub fn compare(bench: &mut Bench, open: &[Candidate]) -> Vec<Trim> {
+    if bench.fit.iter().chain(&bench.test).any(Prepared::is_assumed) {
+        // Their means are all there is.
+        return Vec::new();
+    }
     let declared = bench.model.parameters.declared();
     bench.weigh(&bench.fitted(&declared, &[]), open);
     let mut shared = bench.fitted(&declared, &[]);
