@@ -187,14 +187,20 @@ fn reference(
     })
 }
 
-/// A rotor is at most half as wide as the way to the next one; the typical one is a Hummingbird's.
+/// The typical values are a Hummingbird's. A rotor is at most half as wide as the way to the next one; what weighs less
+/// than [`SMALL_KG`] flies on one lithium-polymer cell, as a Crazyflie 2.1 does (Bitcraze: 250 mAh).
 fn fitting(name: &str, typical: f64, vehicle: &Vehicle) -> f64 {
-    if name != "rotor_radius" {
-        return typical;
-    }
     let apart_m = (vehicle.rotors[0].position_m - vehicle.rotors[1].position_m).norm();
-    if (0.3..0.5).contains(&(typical / apart_m)) { typical } else { 0.35 * apart_m }
+    let is_small = vehicle.mass_kg < SMALL_KG;
+    match name {
+        "rotor_radius" if !(0.3..0.5).contains(&(typical / apart_m)) => 0.35 * apart_m,
+        "nominal_voltage" if is_small => 4.2,
+        "capacity" if is_small => 900.0,
+        _ => typical,
+    }
 }
+
+const SMALL_KG: f64 = 0.1;
 
 fn of_effect(effect: &Effect) -> Vec<Parameter> {
     let specs = effect.kind.parameters.iter().enumerate();
