@@ -110,6 +110,8 @@ pub struct Estimate {
     pub low: f64,
     /// Upper end.
     pub high: f64,
+    /// Whether the estimate stopped at the greatest or least value that the effect may have.
+    pub at_bound: bool,
 }
 
 /// The noise of a channel.
@@ -171,7 +173,8 @@ impl Report {
             )?;
             for (parameter, own) in &effect.parameters {
                 let (value, low, high) = (rounded(own.value), rounded(own.low), rounded(own.high));
-                writeln!(f, "    {parameter} = {value} {}  (95 %: {low} ... {high})", own.unit)?;
+                let bound = if own.at_bound { "; at its bound: more is asked for than this effect can be" } else { "" };
+                writeln!(f, "    {parameter} = {value} {}  (95 %: {low} ... {high}){bound}", own.unit)?;
             }
             if !effect.confused_with.is_empty() {
                 writeln!(f, "    cannot be told from: {}", effect.confused_with.join(", "))?;

@@ -264,7 +264,7 @@ fn accepted_effects(
             before: size(bench, without.test_sum()),
             after: size(bench, selection.after.test_sum()),
         };
-        let chance = effects.get(name).map_or(0.0, |own| own.chance);
+        let chance = selection.chance(name);
         effects.insert(name, EffectReport { accepted: true, parameters, held_out, chance, confused_with, experiment });
     }
 }
@@ -285,7 +285,9 @@ pub fn estimates(bench: &Bench, fitted: &Fitted, which: &[usize]) -> BTreeMap<&'
         let own = &bench.model.parameters.all[*at];
         let (value, half) = (fitted.values[*at], quantile * fitted.deviation(*at).unwrap_or(0.0));
         let (low, high) = ((value - half).max(own.lower), (value + half).min(own.upper));
-        (own.name, Estimate { value, unit: own.unit, low, high })
+        // Zero is where many effects begin, and no bound that data pushed against.
+        let at_bound = value != own.declared && (value <= own.lower || value >= own.upper);
+        (own.name, Estimate { value, unit: own.unit, low, high, at_bound })
     };
     which.iter().map(one).collect()
 }

@@ -76,6 +76,15 @@ pub struct Selection {
     pub rounds: Vec<Round>,
 }
 
+impl Selection {
+    /// Chance of as much gain without the accepted `effect`, in the round that took the best part of it.
+    #[must_use]
+    pub fn chance(&self, effect: &str) -> f64 {
+        let taken = self.rounds.iter().filter_map(|round| Some(&round.judged[round.taken?]));
+        taken.filter(|own| own.candidate.effect == effect).map(|own| own.gain_chance).fold(1.0, f64::min)
+    }
+}
+
 /// Selects among `candidates`, telling `progress` of each step.
 ///
 /// Where flights have trims of their own, these are left out at first; in the end a shift of the centre of mass, which
@@ -218,7 +227,7 @@ fn chance(before: &[f64], after: &[f64]) -> f64 {
     let gains: Vec<f64> = before.iter().zip(after).map(|(before, after)| before - after).collect();
     let mut random = rand_chacha::ChaCha8Rng::seed_from_u64(gains.len() as u64);
     let count = gains.len() as u64;
-    let draw = |random: &mut rand_chacha::ChaCha8Rng| gains[((random.next_u64() >> 32) * count >> 32) as usize];
+    let draw = |random: &mut rand_chacha::ChaCha8Rng| gains[(((random.next_u64() >> 32) * count) >> 32) as usize];
     let is_loss = |_: &usize| (0..count).map(|_| draw(&mut random)).sum::<f64>() <= 0.0;
     (0..RESAMPLES).filter(is_loss).count() as f64 / RESAMPLES as f64
 }
