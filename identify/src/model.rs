@@ -43,20 +43,20 @@ impl Model {
         flight.tracks(sensor(SensorParameter::PoseDelay), sensor(SensorParameter::ImuDelay))
     }
 
-    /// The rotors of `flight` under these values.
+    /// The rotors of `flight` under these values. Where speeds were measured, the difference to what follows from the
+    /// commands is smoothed before it is believed: the noise of a sensor, differentiated, would pass for spin-up.
     #[must_use]
     pub fn rotors(&self, flight: &Prepared, values: &[f64]) -> Rotors {
-        let measured = measured_rotors(flight);
-        let has_commands = !flight.flight.command.is_empty();
-        let commanded = if has_commands { spun(&self.airframe(values), flight) } else { measured.clone() };
-        let has_speeds = !flight.flight.rotor_speed.is_empty();
-        let pick = |i: usize, rotor: usize| {
-            if has_speeds && !flight.distrusted[rotor] { measured[i][rotor] } else { commanded[i][rotor] }
-        };
-        Rotors {
-            flown: (0..commanded.len()).map(|i| std::array::from_fn(|rotor| pick(i, rotor))).collect(),
-            commanded: commanded.iter().map(|rotors| rotors.map(|rotor| rotor.speed_rad_s)).collect(),
+        if flight.flight.command.is_empty() {
+            let flown = measured_rotors(flight);
+            return Rotors { commanded: flown.iter().map(|rotors| rotors.map(speed)).collect(), flown };
         }
+        let mut flown = spun(&self.airframe(values), flight);
+        let commanded: Vec<[f64; 4]> = flown.iter().map(|rotors| rotors.map(speed)).collect();
+        if !flight.flight.rotor_speed.is_empty() {
+            correct(flight, &commanded, &mut flown);
+        }
+        Rotors { flown, commanded }
     }
 
     /// Measurement less model, for each knot each equation's components.
@@ -207,10 +207,29 @@ fn spun(airframe: &Airframe, flight: &Prepared) -> Vec<[RotorState; 4]> {
     out
 }
 
+fn speed(rotor: RotorState) -> f64 {
+    rotor.speed_rad_s
+}
+
+/// Adds to rotors that follow from the commands by how much the measured ones turn faster. Their acceleration stays that
+/// of the commands: even of a smoothed measurement it would be noise for the most part.
+fn correct(flight: &Prepared, commanded: &[[f64; 4]], rotors: &mut [[RotorState; 4]]) {
+    let mut difference = Track::sampled(&flight.flight.rotor_speed, 0.0, &flight.layout.clock);
+    for (difference, commanded) in difference.values.iter_mut().zip(commanded) {
+        *difference = std::array::from_fn(|i| difference[i] - commanded[i]);
+    }
+    let smooth = difference.smoothed(flight.layout.box_steps);
+    for (rotors, more) in rotors.iter_mut().zip(&smooth) {
+        for i in (0..4).filter(|i| !flight.distrusted[*i]) {
+            rotors[i].speed_rad_s += more[i];
+        }
+    }
+}
+
 fn measured_rotors(flight: &Prepared) -> Vec<[RotorState; 4]> {
     let clock = &flight.layout.clock;
     let track = Track::sampled(&flight.flight.rotor_speed, 0.0, clock);
-    let slopes = track.slope(2, clock.step_s);
+    let slopes = track.slope(flight.layout.box_steps, clock.step_s);
     let rotor = |speed_rad_s, acceleration_rad_s2| RotorState { speed_rad_s, acceleration_rad_s2 };
     let rotors = track.values.iter().zip(&slopes);
     rotors.map(|(speed, slope)| std::array::from_fn(|i| rotor(speed[i], slope[i]))).collect()

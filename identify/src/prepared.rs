@@ -350,20 +350,3 @@ fn turning(attitude: &[UnitQuaternion<f64>], step_s: f64) -> Vec<[f64; 3]> {
         })
         .collect()
 }
-
-impl<const N: usize> Track<N> {
-    /// The mean over `reach` instants to both sides.
-    fn smoothed(&self, reach: usize) -> Vec<[f64; N]> {
-        let count = self.values.len();
-        (0..count)
-            .map(|i| {
-                let (first, last) = (i.saturating_sub(reach), (i + reach).min(count - 1));
-                let mut sum = [0.0; N];
-                for value in &self.values[first..=last] {
-                    sum.iter_mut().zip(value).for_each(|(sum, value)| *sum += value);
-                }
-                sum.map(|sum| sum / (last - first + 1) as f64)
-            })
-            .collect()
-    }
-}

@@ -32,6 +32,22 @@ impl<const N: usize> Track<N> {
         }
     }
 
+    /// The mean over `reach` instants to both sides.
+    #[must_use]
+    pub fn smoothed(&self, reach: usize) -> Vec<[f64; N]> {
+        let count = self.values.len();
+        (0..count)
+            .map(|i| {
+                let (first, last) = (i.saturating_sub(reach), (i + reach).min(count - 1));
+                let mut sum = [0.0; N];
+                for value in &self.values[first..=last] {
+                    sum.iter_mut().zip(value).for_each(|(sum, value)| *sum += value);
+                }
+                sum.map(|sum| sum / (last - first + 1) as f64)
+            })
+            .collect()
+    }
+
     /// The rate of change, by a straight line through `reach` instants to both sides; at the ends, that of the
     /// nearest instant that has as many.
     #[must_use]
