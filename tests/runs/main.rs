@@ -30,6 +30,7 @@ mod contract;
 mod determinism;
 mod documentation;
 mod failures;
+mod identify;
 mod laps;
 mod live;
 mod loss;
