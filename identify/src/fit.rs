@@ -72,9 +72,7 @@ impl Bench<'_> {
         let mut squares = normal::sum(&blocks).squares;
         for _ in 0..STEPS_MAX {
             let step = self.step(&blocks, &values, which);
-            let deviations = normal::covariance(&blocks).diagonal().map(|variance| variance.max(0.0).sqrt());
-            let is_small = step.iter().zip(&deviations).all(|(step, deviation)| step.abs() <= SMALL_STEP * deviation);
-            if which.is_empty() || is_small {
+            if which.is_empty() || self.is_small(&step, &blocks) {
                 break;
             }
             let Some((next, next_blocks, next_squares)) = self.descended(&values, which, &step, squares) else { break };
@@ -89,6 +87,12 @@ impl Bench<'_> {
         let test_squares = self.squares(&self.test, &values);
         let fit_squares = blocks.iter().map(|block| block.squares).collect();
         Fitted { values, which: which.to_vec(), covariance, test_squares, fit_squares }
+    }
+
+    /// Whether a step is a small part of every parameter's standard deviation, if all rows were independent.
+    fn is_small(&self, step: &DVector<f64>, blocks: &[Block]) -> bool {
+        let variances = normal::inverse(&normal::sum(blocks).gram).diagonal();
+        step.iter().zip(&variances).all(|(step, variance)| step.abs() <= SMALL_STEP * variance.max(0.0).sqrt())
     }
 
     /// The values after the step, or after a part of it, where the sum of squares is smaller.
