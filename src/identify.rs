@@ -9,7 +9,7 @@ use crate::{files, validate};
 use anyhow::{Context, Result, bail};
 use clap::{Args, Subcommand};
 use flights::{Channel, Flight, FlightSet};
-use identify::report::Report;
+use identify::report::{FlightReport, Report};
 use identify::run::Outcome;
 use identify::vehicle_file;
 use indicatif::{ProgressBar, ProgressStyle};
@@ -22,6 +22,9 @@ use std::time::Duration;
 pub const HELP: &str = "Examples: hummingbus identify flights/nanobench.toml --out identified\n          \
     hummingbus identify rotor flights/stands/esc-test-f40.toml --out rotor\n\n\
     Writes report.html, report.json and vehicle.toml into the folder. See docs/identify.md.";
+
+/// A shorter flight holds none of the windows of a replay.
+const LEAST_REPLAY_S: f64 = 2.0;
 
 /// What `identify` takes.
 #[derive(Args)]
@@ -86,27 +89,37 @@ fn flights_of(arguments: &IdentifyArguments, file: &Path, out: &Path) -> Result<
     let vehicle = out.join("vehicle.toml");
     let text = vehicle_file::text(&set.vehicle, &outcome.effects, &outcome.report)?;
     files::write(&vehicle, |out| out.write_all(text.as_bytes()))?;
-    let flown = if arguments.no_bus { None } else { Some(fly(&set, &vehicle, &outcome, &progress)?) };
-    progress.finish();
-    let mut report = serde_json::to_value(&outcome.report)?;
-    report["bus"] = flown.clone().unwrap_or(Value::Null);
-    let report = serde_json::to_string_pretty(&report)?;
-    files::write(&out.join("report.json"), |out| out.write_all(report.as_bytes()))?;
     files::write(&out.join("report.html"), |out| page::write(&outcome, out))?;
+    let mut report = serde_json::to_value(&outcome.report)?;
+    // Written before anything is flown, so that a run that fails loses nothing.
+    write_json(out, &report)?;
+    let flown = if arguments.no_bus { None } else { fly(&set, &vehicle, &outcome, &progress)? };
+    progress.finish();
+    report["bus"] = flown.clone().unwrap_or(Value::Null);
+    write_json(out, &report)?;
+    let report = serde_json::to_string_pretty(&report)?;
     crate::print_text(&if arguments.json { report } else { summary(&outcome.report, flown.as_ref(), out) })?;
     Ok(true)
 }
 
+fn write_json(out: &Path, report: &Value) -> Result<()> {
+    let text = serde_json::to_string_pretty(report)?;
+    files::write(&out.join("report.json"), |out| out.write_all(text.as_bytes()))
+}
+
 /// Flies the measured commands with the declared and the new vehicle on the bus, and compares what comes of it with the
-/// predictions of the report.
-fn fly(set: &FlightSet, vehicle: &Path, outcome: &Outcome, progress: &Progress) -> Result<Value> {
+/// predictions of the report; `None` where no flight has what a replay needs.
+fn fly(set: &FlightSet, vehicle: &Path, outcome: &Outcome, progress: &Progress) -> Result<Option<Value>> {
     let (aligned, corrected) = (retimed(set, outcome, (0.0, 0.0)), retimed(set, outcome, outcome.delays_s));
+    if aligned.flights.is_empty() {
+        return Ok(None);
+    }
     let mut tell = |line: &str| progress.say(&format!("on the bus: {line}"));
     let mut errors = |vehicle: &Path, set: &FlightSet| validate::errors(&[vehicle], set, None, &mut tell);
     let before = errors(&set.vehicle, &aligned)?;
     let after = errors(vehicle, &corrected)?;
     let mut flights = json!({});
-    let mut furthest = 0.0_f64;
+    let mut furthest: Option<f64> = None;
     for (before, after) in before.flights.iter().zip(&after.flights) {
         for (before_at, after_at) in before.horizons.iter().zip(&after.horizons) {
             for (old, new) in before_at.channels.iter().zip(&after_at.channels) {
@@ -115,14 +128,14 @@ fn fly(set: &FlightSet, vehicle: &Path, outcome: &Outcome, progress: &Progress) 
                 flights[&before.name][&horizon][channel] =
                     json!({ "before": old_rms, "after": new_rms, "unit": old.quantity.unit() });
                 let own = predicted(&outcome.report, &before.name, &horizon, channel);
-                let away = own.map_or(0.0, |(before, after)| {
+                let away = own.map(|(before, after)| {
                     (old_rms / before - 1.0).abs().max((new_rms / after - 1.0).abs())
                 });
-                furthest = furthest.max(away);
+                furthest = furthest.into_iter().chain(away).filter(|own| own.is_finite()).reduce(f64::max);
             }
         }
     }
-    Ok(json!({ "flights": flights, "furthest_from_prediction": furthest }))
+    Ok(Some(json!({ "flights": flights, "furthest_from_prediction": furthest })))
 }
 
 /// The report's own errors before and after.
@@ -132,8 +145,8 @@ fn predicted(report: &Report, flight: &str, horizon: &str, channel: &str) -> Opt
     Some((change.before, change.after))
 }
 
-/// The flights with their pose set right in time by what the alignment took off and by `delays_s` of pose and inertial
-/// unit.
+/// The flights that can be replayed, with their pose set right in time by what the alignment took off and by `delays_s`
+/// of pose and inertial unit.
 fn retimed(set: &FlightSet, outcome: &Outcome, delays_s: (f64, f64)) -> FlightSet {
     let flight = |flight: &Flight| {
         let offsets = outcome.report.time_offsets_s.get(&flight.name);
@@ -147,7 +160,12 @@ fn retimed(set: &FlightSet, outcome: &Outcome, delays_s: (f64, f64)) -> FlightSe
         earlier(&mut flight.specific_force, delays_s.1);
         flight
     };
-    FlightSet { vehicle: set.vehicle.clone(), flights: set.flights.iter().map(flight).collect() }
+    let can_fly = |flight: &&Flight| {
+        let was_used = |own: &FlightReport| own.name == flight.name && own.compared_s > LEAST_REPLAY_S;
+        !flight.command.is_empty() && !flight.attitude.is_empty() && outcome.report.flights.iter().any(was_used)
+    };
+    let flights = set.flights.iter().filter(can_fly).map(flight).collect();
+    FlightSet { vehicle: set.vehicle.clone(), flights }
 }
 
 fn earlier<const N: usize>(channel: &mut Channel<N>, by_s: f64) {

@@ -11,7 +11,9 @@ use crate::prepared::{Equation, Prepared};
 use serde::Serialize;
 
 /// Gauss-Newton steps.
-const STEPS: usize = 8;
+const STEPS: usize = 40;
+/// From fewer blocks no deviation can be told.
+const LEAST_BLOCKS: usize = 5;
 /// An offset is real beyond so many standard deviations.
 const SURE: f64 = 4.0;
 
@@ -35,22 +37,21 @@ pub fn offset(bench: &Bench, flight: &Prepared) -> Option<(f64, f64)> {
     let is_pose = |owner: &Owner| matches!(owner, Owner::Sensor(SensorParameter::PoseDelay));
     let parameter = bench.model.parameters.all.iter().position(|own| is_pose(&own.owner))?;
     let mut values = bench.model.parameters.declared();
-    let mut deviation = 0.0;
     for _ in 0..STEPS {
         let blocks = bench.blocks_of(flight, &values, &[parameter]);
         let total = normal::sum(&blocks);
-        if total.gram[(0, 0)] <= 0.0 {
+        if total.gram[(0, 0)] <= 0.0 || blocks.len() < LEAST_BLOCKS {
             return None;
         }
         let step = -total.gradient[0] / total.gram[(0, 0)];
-        deviation = normal::covariance(&blocks)[(0, 0)].max(0.0).sqrt();
+        let deviation = normal::covariance(&blocks)[(0, 0)].max(0.0).sqrt();
         // A line through a course is good for a fraction of its quickest turn.
         values[parameter] += step.clamp(-0.02, 0.02);
-        if step.abs() < 1e-5 {
-            break;
+        if step.abs() < 1e-5_f64.max(0.02 * deviation) {
+            return Some((values[parameter], deviation));
         }
     }
-    Some((values[parameter], deviation))
+    None
 }
 
 /// Weights under which only gyroscope and attitude count.

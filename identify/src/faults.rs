@@ -81,11 +81,11 @@ fn suspicion(bench: &Bench, rotor: usize) -> Option<Suspicion> {
     })
 }
 
-/// Measured and expected speeds of all rotors at all knots of the fit flights; `None` where no flight has both.
+/// Measured and expected speeds of all rotors at all knots of all flights; `None` where no flight has both.
 fn speeds(bench: &Bench) -> Option<Vec<([f64; 4], [f64; 4])>> {
     let declared = bench.model.parameters.declared();
     let mut pairs = Vec::new();
-    for flight in &bench.fit {
+    for flight in bench.fit.iter().chain(&bench.test) {
         let Some(offset) = flight.offset_of(Equation::RotorSpeed) else { continue };
         let rows = bench.model.tracks(flight, &declared).rows;
         let rotors = bench.model.rotors(flight, &declared);

@@ -82,15 +82,21 @@ impl Model {
                     Equation::Gyroscope => take(&rate_bias),
                     Equation::RotorSpeed => {
                         let speeds = window.over(&rotors.commanded, knot);
-                        let measured_again = |i: usize| if flight.distrusted[i] { f64::NAN } else { speeds[i] };
-                        take(&std::array::from_fn::<_, 4, _>(measured_again));
+                        take(&speeds);
                     }
                 }
             }
         }
-        // A rotor's speed that is not believed is compared with nothing.
-        residual.iter_mut().filter(|row| row.is_nan()).for_each(|row| *row = 0.0);
+        self.leave_out_distrusted(flight, &mut residual);
         residual
+    }
+
+    /// A rotor's speed that is not believed is compared with nothing.
+    fn leave_out_distrusted(&self, flight: &Prepared, residual: &mut [f64]) {
+        let Some(offset) = flight.offset_of(Equation::RotorSpeed) else { return };
+        for rotor in (0..4).filter(|rotor| flight.distrusted[*rotor]) {
+            residual.iter_mut().skip(offset + rotor).step_by(flight.width()).for_each(|row| *row = 0.0);
+        }
     }
 
     fn sides(&self, flight: &Prepared, tracks: &Tracks, rotors: &Rotors, values: &[f64]) -> Sides {

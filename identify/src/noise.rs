@@ -30,8 +30,11 @@ pub fn floor(bench: &Bench) -> BTreeMap<&'static str, (f64, &'static str)> {
     add("position", "m", &|flight| deviation(&flight.position));
     add("velocity", "m/s", &|flight| velocity(flight));
     // A quaternion's component moves by half of the angle.
-    add("attitude", "rad", &|flight| deviation(&flight.attitude).map(|own| own * 4.0 / 3.0_f64.sqrt()));
-    add("rates", "rad/s", &|flight| rates(flight));
+    let measured = |flight: &Flight, own: Option<f64>| own.filter(|_| flight.assumed.is_empty());
+    add("attitude", "rad", &|flight| {
+        measured(flight, deviation(&flight.attitude).map(|own| own * 4.0 / 3.0_f64.sqrt()))
+    });
+    add("rates", "rad/s", &|flight| measured(flight, rates(flight)));
     add("specific_force", "m/s^2", &|flight| deviation(&flight.specific_force));
     floor
 }

@@ -87,6 +87,10 @@ pub fn inverse(gram: &DMatrix<f64>) -> DMatrix<f64> {
     if size == 0 {
         return gram.clone();
     }
+    // Nothing can be told from equations with infinities in them.
+    if gram.iter().any(|own| !own.is_finite()) {
+        return DMatrix::zeros(size, size);
+    }
     let lengths: Vec<f64> = (0..size).map(|i| gram[(i, i)].max(0.0).sqrt()).collect();
     let scale = |i: usize| if lengths[i] > 0.0 { 1.0 / lengths[i] } else { 0.0 };
     let scaled = DMatrix::from_fn(size, size, |i, j| gram[(i, j)] * scale(i) * scale(j));
@@ -143,5 +147,14 @@ mod tests {
         block.complete();
         let step = -(inverse(&block.gram) * &block.gradient);
         assert!((step[0] - 1.0).abs() < 1e-9 && (step[1] - 1.0).abs() < 1e-9 && step[2] == 0.0, "{step}");
+    }
+
+    #[test]
+    fn what_no_row_depends_on_is_not_known_at_all() {
+        let mut blocks = [Block::zero(2), Block::zero(2), Block::zero(2)];
+        blocks.iter_mut().zip([0.1, -0.2, 0.1]).for_each(|(block, residual)| block.add(residual, &[-1.0, 0.0], 1.0));
+        let found = covariance(&blocks);
+        assert!(found[(0, 0)].is_finite() && found[(0, 0)] > 0.0, "{found}");
+        assert!(found[(1, 1)].is_infinite(), "{found}");
     }
 }

@@ -91,7 +91,10 @@ impl Measured {
                 plant.set_body(measured);
             }
         }
-        let rms = |channel: usize| (sums[channel] / f64::from(count.max(1))).sqrt();
+        if count == 0 {
+            return (Errors::new(), trace);
+        }
+        let rms = |channel: usize| (sums[channel] / f64::from(count)).sqrt();
         let errors = CHANNELS.iter().enumerate().filter(|(_, (channel, _))| is_measured(flight, channel));
         (errors.map(|(at, (name, _))| (*name, rms(at))).collect(), trace)
     }
@@ -102,11 +105,13 @@ pub const CHANNELS: [(&str, &str); 4] =
     [("position", "m"), ("velocity", "m/s"), ("attitude", "deg"), ("rates", "rad/s")];
 
 fn is_measured(flight: &Flight, channel: &str) -> bool {
+    // Without an attitude nobody knows where thrust points; one that was assumed is no measurement.
+    let (has_attitude, is_measured) = (!flight.attitude.is_empty(), flight.assumed.is_empty());
     match channel {
-        "position" => !flight.position.is_empty(),
-        "velocity" => !flight.position.is_empty() || !flight.velocity.is_empty(),
-        "attitude" => !flight.attitude.is_empty(),
-        _ => !flight.attitude.is_empty() || !flight.angular_velocity.is_empty(),
+        "position" => has_attitude && !flight.position.is_empty(),
+        "velocity" => has_attitude && (!flight.position.is_empty() || !flight.velocity.is_empty()),
+        "attitude" => has_attitude && is_measured,
+        _ => is_measured && (has_attitude || !flight.angular_velocity.is_empty()),
     }
 }
 

@@ -106,10 +106,11 @@ fn steps_s(period_s: f64) -> (f64, usize) {
 }
 
 impl<'f> Prepared<'f> {
-    /// The flight on its grid; `None` where it has nothing to compare: no commands and no rotor speeds, no motion, or
+    /// The flight on its grid; `is_flying` tells from motor commands (`true`) or rotor speeds (`false`) whether the
+    /// vehicle is in the air; `None` where it has nothing to compare: no commands and no rotor speeds, no motion, or
     /// less than three windows of it.
     #[must_use]
-    pub fn new(flight: &'f Flight, box_s: Option<f64>, is_flying: impl Fn(&[f64; 4]) -> bool) -> Option<Self> {
+    pub fn new(flight: &'f Flight, box_s: Option<f64>, is_flying: impl Fn(&[f64; 4], bool) -> bool) -> Option<Self> {
         let equations = equations(flight);
         let (start_s, end_s) = common_span(flight, &equations)?;
         let (step_s, box_steps) = match box_s {
@@ -200,7 +201,7 @@ impl<'f> Prepared<'f> {
     }
 
     /// Middles of windows in which every compared channel was sampled and the motors were running.
-    fn knots(&self, is_flying: &impl Fn(&[f64; 4]) -> bool) -> Vec<usize> {
+    fn knots(&self, is_flying: &impl Fn(&[f64; 4], bool) -> bool) -> Vec<usize> {
         let valid = self.valid(is_flying);
         let reach = self.layout.windows.iter().map(|(a, b)| a.reach().max(b.reach())).max().unwrap_or(0);
         let mut bad = vec![0_usize];
@@ -212,12 +213,15 @@ impl<'f> Prepared<'f> {
         middles.filter(|knot| bad[knot + reach + 1] == bad[knot - reach]).collect()
     }
 
-    fn valid(&self, is_flying: &impl Fn(&[f64; 4]) -> bool) -> Vec<bool> {
+    fn valid(&self, is_flying: &impl Fn(&[f64; 4], bool) -> bool) -> Vec<bool> {
         let (flight, clock) = (self.flight, &self.layout.clock);
         let mut valid = vec![true; clock.count];
         let mut require = |other: Vec<bool>| valid.iter_mut().zip(other).for_each(|(all, one)| *all &= one);
         if uses_pose(flight) && !flight.position.is_empty() {
             require(Track::sampled(&flight.position, 0.0, clock).valid);
+        }
+        if uses_pose(flight) && flight.position.is_empty() && !flight.velocity.is_empty() {
+            require(Track::sampled(&flight.velocity, 0.0, clock).valid);
         }
         if !flight.attitude.is_empty() {
             require(Track::sampled(&flight.attitude, 0.0, clock).valid);
@@ -233,7 +237,10 @@ impl<'f> Prepared<'f> {
         }
         if !flight.command.is_empty() {
             let mut held = Held::new(&flight.command);
-            require((0..clock.count).map(|index| is_flying(&held.at(clock.at(index)))).collect());
+            require((0..clock.count).map(|index| is_flying(&held.at(clock.at(index)), true)).collect());
+        } else if !flight.rotor_speed.is_empty() {
+            let speeds = Track::sampled(&flight.rotor_speed, 0.0, clock).values;
+            require(speeds.iter().map(|own| is_flying(own, false)).collect());
         }
         valid
     }
@@ -261,6 +268,11 @@ impl<'c> Held<'c> {
         }
         self.channel.values[self.next.saturating_sub(1)]
     }
+}
+
+/// Whether accelerations come from the velocity.
+fn of_velocity(flight: &Flight) -> bool {
+    uses_pose(flight) && flight.position.is_empty()
 }
 
 fn uses_pose(flight: &Flight) -> bool {
@@ -305,6 +317,7 @@ fn common_span(flight: &Flight, equations: &[Equation]) -> Option<(f64, f64)> {
     let drive = if flight.command.is_empty() { flight.rotor_speed.span_s() } else { flight.command.span_s() };
     let motion = [
         flight.position.span_s().filter(|_| equations.contains(&Equation::Acceleration)),
+        flight.velocity.span_s().filter(|_| of_velocity(flight)),
         flight.attitude.span_s(),
         flight.angular_velocity.span_s(),
         flight.specific_force.span_s(),
@@ -321,6 +334,7 @@ fn common_span(flight: &Flight, equations: &[Equation]) -> Option<(f64, f64)> {
 fn slowest_period_s(flight: &Flight) -> Option<f64> {
     let periods = [
         flight.position.period_s(),
+        flight.velocity.period_s().filter(|_| of_velocity(flight)),
         flight.attitude.period_s(),
         flight.angular_velocity.period_s(),
         flight.specific_force.period_s(),

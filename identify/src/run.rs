@@ -147,8 +147,9 @@ pub fn bench<'f>(
 ) -> Result<(Bench<'f>, Vec<FlightReport>), IdentifyError> {
     let parameters = Parameters::of(vehicle, declared, &[]);
     let least_rad_s = FLYING * vehicle.hover_speed_rad_s();
-    let is_flying = |commands: &[f64; 4]| {
-        commands.iter().map(|command| vehicle.command.speed(*command)).sum::<f64>() > 4.0 * least_rad_s
+    let is_flying = |drive: &[f64; 4], is_command: bool| {
+        let speed = |own: &f64| if is_command { vehicle.command.speed(*own) } else { *own };
+        drive.iter().map(speed).sum::<f64>() > 4.0 * least_rad_s
     };
     let (mut fit, mut test, mut reports) = (Vec::new(), Vec::new(), Vec::new());
     for flight in &set.flights {
@@ -256,9 +257,11 @@ fn accepted_effects(
         }
         let without = bench.fitted(&start, &which(&others));
         let mut confused_with: Vec<&'static str> = Vec::new();
-        if let [at] = own[..] {
-            confused_with = rivals(bench, selection, at);
+        for at in &own {
+            confused_with.extend(rivals(bench, selection, *at));
         }
+        confused_with.sort_unstable();
+        confused_with.dedup();
         let experiment = confused_with.first().map(|rival| experiment::between(name, rival).to_owned());
         let held_out = BeforeAfter {
             before: size(bench, without.test_sum()),
@@ -280,7 +283,7 @@ fn size(bench: &Bench, squares: f64) -> f64 {
 /// The estimates of these parameters, with 95 % intervals.
 #[must_use]
 pub fn estimates(bench: &Bench, fitted: &Fitted, which: &[usize]) -> BTreeMap<&'static str, Estimate> {
-    let quantile = crate::statistics::student_quantile(0.975, (fitted.fit_squares.len() as f64 - 1.0).max(1.0));
+    let quantile = crate::statistics::student_quantile(0.975, (fitted.fit_squares.len() as f64 - fitted.which.len() as f64).max(1.0));
     let one = |at: &usize| {
         let own = &bench.model.parameters.all[*at];
         let (value, half) = (fitted.values[*at], quantile * fitted.deviation(*at).unwrap_or(0.0));

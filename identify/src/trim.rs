@@ -94,6 +94,10 @@ fn of_flight(bench: &Bench, flight: &Prepared, values: &[f64]) -> Option<(Trim, 
     let (mut means, mut deviations, mut spread) = ([0.0; 3], [0.0; 3], 0.0_f64);
     for axis in 0..3 {
         let rows = column(flight, &residual, Equation::AngularAcceleration, axis);
+        // From fewer blocks no deviation can be told.
+        if rows.len() < 5 * per_block {
+            return None;
+        }
         let mean = rows.iter().sum::<f64>() / rows.len() as f64;
         let blocks: Vec<f64> =
             rows.chunks(per_block).map(|own| own.iter().sum::<f64>() / own.len() as f64 - mean).collect();

@@ -13,7 +13,7 @@ use vehicles::{Uncertainty, Vehicle, VehicleError};
 /// If the declared file cannot be read again.
 pub fn text(declared: &Path, effects: &[Effect], report: &Report) -> Result<String, VehicleError> {
     let vehicle = Vehicle::load(declared)?;
-    let complete = Vehicle::base(declared).map_or_else(|| declared.to_owned(), |base| declared.with_file_name(base));
+    let complete = Vehicle::base(declared).unwrap_or_else(|| declared.to_owned());
     let file = complete.display().to_string();
     let text = std::fs::read_to_string(&complete).map_err(|cause| VehicleError::Unreadable { file, cause })?;
     let mut document: toml_edit::DocumentMut = text.parse().unwrap_or_default();
@@ -49,7 +49,7 @@ fn entry(effect: &Effect, vehicle: &Vehicle, report: &Report) -> String {
 
 fn source(report: &Report) -> String {
     let of_role = |role| {
-        let own = report.flights.iter().filter(move |flight| flight.role == role);
+        let own = report.flights.iter().filter(move |flight| flight.role == role && flight.compared_s > 0.0);
         own.map(|flight| flight.name.as_str()).collect::<Vec<_>>().join(", ")
     };
     format!(
