@@ -118,7 +118,10 @@ pub fn covariance(blocks: &[Block]) -> DMatrix<f64> {
         sum + &away * away.transpose()
     });
     let count = blocks.len() as f64;
-    scatter * ((count - 1.0) / count)
+    let mut covariance = scatter * ((count - 1.0) / count);
+    // What no row depends on is not known at all.
+    (0..size).filter(|i| total.gram[(*i, *i)] == 0.0).for_each(|i| covariance[(i, i)] = f64::INFINITY);
+    covariance
 }
 
 #[cfg(test)]

@@ -287,8 +287,6 @@ pub fn estimates(bench: &Bench, fitted: &Fitted, which: &[usize]) -> BTreeMap<&'
     let one = |at: &usize| {
         let own = &bench.model.parameters.all[*at];
         let (value, half) = (fitted.values[*at], quantile * fitted.deviation(*at).unwrap_or(0.0));
-        // What no row depends on can be anything.
-        let half = if half > 0.0 { half } else { own.upper - own.lower };
         let (low, high) = ((value - half).max(own.lower), (value + half).min(own.upper));
         // Zero is where many effects begin, and no bound that data pushed against.
         let at_bound = value != own.declared && (value <= own.lower || value >= own.upper);
