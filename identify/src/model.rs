@@ -146,7 +146,13 @@ impl Model {
             changed[parameter] += step;
             let moved = match own.stage() {
                 Stage::Tracks => {
-                    self.residual(flight, &self.tracks(flight, &changed), &rotors, &changed)
+                    // The derivative holds the sensor's noise as well: of a difference to one side it would be
+                    // correlated with the residual's, and every delay would come out too long.
+                    let mut back = values.to_vec();
+                    back[parameter] -= step;
+                    let ahead = self.residual(flight, &self.tracks(flight, &changed), &rotors, &changed);
+                    let behind = self.residual(flight, &self.tracks(flight, &back), &rotors, &back);
+                    return ahead.iter().zip(&behind).map(|(a, b)| (a - b) / (2.0 * step)).collect();
                 }
                 Stage::Rotors => self.residual(flight, &tracks, &self.rotors(flight, &changed), &changed),
                 Stage::Body | Stage::Reading => self.residual(flight, &tracks, &rotors, &changed),
