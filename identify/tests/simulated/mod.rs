@@ -13,7 +13,11 @@ use rand_distr::{Distribution, StandardNormal};
 use std::path::{Path, PathBuf};
 use vehicles::Vehicle;
 
+pub mod cases;
+
 const TICK_S: f64 = 0.001;
+/// A vehicle further away than this has got out of control: its flight says nothing of any other.
+const FAR_M: f64 = 12.0;
 /// Over this time a course comes up to speed.
 const RUN_UP_S: f64 = 3.0;
 
@@ -32,6 +36,8 @@ pub struct Sensors {
     pub pose_delay_s: f64,
     /// Bias of the accelerometer.
     pub accelerometer_bias_m_s2: [f64; 3],
+    /// Bias of the gyroscope.
+    pub gyroscope_bias_rad_s: [f64; 3],
 }
 
 impl Default for Sensors {
@@ -43,6 +49,7 @@ impl Default for Sensors {
             has_rotor_speeds: false,
             pose_delay_s: 0.0,
             accelerometer_bias_m_s2: [0.0; 3],
+            gyroscope_bias_rad_s: [0.0; 3],
         }
     }
 }
@@ -60,11 +67,27 @@ pub struct Plan {
     pub duration_s: f64,
     /// Height about which it flies.
     pub height_m: f64,
+    /// Whether a bearing holds its position: then neither position nor specific force is logged.
+    pub is_on_rig: bool,
+    /// Whether it does no more than drift about a hover.
+    pub is_calm: bool,
+    /// Ticks from one command to the next.
+    pub control_ticks: usize,
 }
 
 impl Plan {
     pub fn of(truth: Vec<Effect>, seed: u64) -> Self {
-        Self { truth, sensors: Sensors::default(), seed, duration_s: 30.0, height_m: 3.0 }
+        let (sensors, duration_s, height_m) = (Sensors::default(), 30.0, 3.0);
+        Self {
+            truth,
+            sensors,
+            seed,
+            duration_s,
+            height_m,
+            is_on_rig: false,
+            is_calm: false,
+            control_ticks: 2,
+        }
     }
 }
 
@@ -86,18 +109,23 @@ struct Course {
 }
 
 impl Course {
-    fn of(seed: u64, height_m: f64) -> Self {
-        let mut random = bus::random::stream(seed, "course");
+    fn of(plan: &Plan) -> Self {
+        let height_m = plan.height_m;
+        let mut random = bus::random::stream(plan.seed, "course");
         let mut uniform = move || {
             let normal: f64 = StandardNormal.sample(&mut random);
             0.5 + normal.clamp(-2.0, 2.0) / 4.0
         };
-        let vertical_m = [0.7_f64.min(0.25 * height_m), 0.4_f64.min(0.12 * height_m), 0.15_f64.min(0.05 * height_m)];
+        // Near the ground it stays clear of it.
+        let room_m = if height_m < 1.0 { 0.7 * height_m } else { height_m };
+        let vertical_m =
+            [0.7_f64.min(0.25 * room_m), 0.4_f64.min(0.12 * room_m), 0.15_f64.min(0.05 * room_m)];
         let amplitudes = [[1.6, 0.8, 0.3], [1.6, 0.8, 0.3], vertical_m, [0.8, 0.4, 0.1]];
+        let share = if plan.is_calm { 0.02 } else { 1.0 };
         let axes = amplitudes.map(|amplitudes| {
-            let frequencies = [0.8, 1.7, 3.1];
+            let frequencies = [0.7, 1.5, 2.4];
             std::array::from_fn(|i| {
-                (amplitudes[i], frequencies[i] * (0.8 + 0.4 * uniform()), 6.3 * uniform())
+                (share * amplitudes[i], frequencies[i] * (0.8 + 0.4 * uniform()), 6.3 * uniform())
             })
         });
         Self { axes, height_m }
@@ -133,59 +161,145 @@ impl Course {
 pub fn fly(declared: &Vehicle, plan: &Plan, role: Role) -> Flight {
     let airframe = Airframe::with_effects(declared.clone(), plan.truth.clone());
     let memory = airframe.memory(plan.seed, "plant", TICK_S);
-    let course = Course::of(plan.seed, plan.height_m);
+    let course = Course::of(plan);
+    let sticks = Sticks::of(plan);
     let start = RigidBody::level_at(course.at(0.0).0[0]);
     let mut plant = FreeFlight::new(NewtonEuler::flying(airframe, 1), start, memory);
     let allocation = Allocation::new(&RotorSet::from(declared)).expect("a quadrotor");
     let mut commands = [declared.hover_command(); 4];
     plant.settle_rotors(&commands);
+    let slow_rad_s = [declared.hover_speed_rad_s(); 4];
+    let period_s = plan.control_ticks as f64 * TICK_S;
+    let mut pilot = Pilot { allocation, slow_rad_s, leaned: Vector3::zeros(), sunk: 0.0, period_s };
     let mut log = Log::new(plan);
     for tick in 0..(plan.duration_s / TICK_S) as usize {
         let time_s = tick as f64 * TICK_S;
         log.sample(tick, &plant, &commands);
         plant.step(&commands, TICK_S, &[]);
-        if tick % 2 == 0 {
-            commands = controlled(declared, &allocation, &course, plant.state(), time_s);
+        if plan.is_on_rig {
+            hold(&mut plant, start.position_W_m);
+        }
+        let position_W_m = plant.state().body.position_W_m;
+        let is_near = position_W_m.xy().norm() < FAR_M && (0.0..FAR_M).contains(&position_W_m.z);
+        assert!(is_near, "seed {} got away at {time_s} s", plan.seed);
+        if tick % plan.control_ticks == 0 {
+            commands = if plan.is_on_rig {
+                stirred(declared, &pilot.allocation, &sticks, plant.state(), time_s)
+            } else {
+                pilot.commands(declared, &course, plant.state(), time_s)
+            };
         }
     }
     log.flight(plan, role)
 }
 
-fn controlled(
+/// What the bearing of a rig does: the vehicle turns, and goes nowhere.
+fn hold(plant: &mut FreeFlight, position_W_m: Vector3<f64>) {
+    let body = RigidBody { position_W_m, velocity_W_m_s: Vector3::zeros(), ..plant.state().body };
+    plant.set_body(&body);
+}
+
+/// How long a pilot on a rig holds the sticks before moving them.
+const STICK_S: f64 = 0.3;
+
+/// Kicks of a pilot's sticks: torques and a part of the weight as thrust, held for [`STICK_S`] each.
+struct Sticks(Vec<([f64; 3], f64)>);
+
+impl Sticks {
+    fn of(plan: &Plan) -> Self {
+        let mut random = bus::random::stream(plan.seed, "sticks");
+        let mut normal = move || -> f64 { StandardNormal.sample(&mut random) };
+        let count = (plan.duration_s / STICK_S) as usize + 1;
+        let one = |_| ([0.03 * normal(), 0.03 * normal(), 0.015 * normal()], 0.1 * normal());
+        Self((0..count).map(one).collect())
+    }
+}
+
+/// Commands of a pilot who kicks the vehicle on its rig about, and of a slow controller that levels it.
+fn stirred(
     vehicle: &Vehicle,
     allocation: &Allocation,
-    course: &Course,
+    sticks: &Sticks,
     state: &plant::State,
     time_s: f64,
 ) -> [f64; 4] {
-    let ([position, velocity, acceleration], heading) = course.at(time_s);
+    let (kick_N_m, lift) = sticks.0[(time_s / STICK_S) as usize];
     let body = &state.body;
-    let wanted = acceleration
-        + 6.0 * (position - body.position_W_m)
-        + 4.0 * (velocity - body.velocity_W_m_s)
-        + Vector3::z() * vehicle.gravity_m_s2;
-    let up = body.attitude_WB * Vector3::z();
-    let thrust_N = vehicle.mass_kg * wanted.dot(&up);
-    let z = wanted.normalize();
-    let y = z.cross(&Vector3::new(heading.cos(), heading.sin(), 0.0)).normalize();
-    let rotation = nalgebra::Rotation3::from_basis_unchecked(&[y.cross(&z), y, z]);
-    let error = body.attitude_WB.inverse() * UnitQuaternion::from_rotation_matrix(&rotation);
-    let torque = vehicle.inertia_kg_m2
-        * (100.0 * error.scaled_axis() - 18.0 * body.angular_velocity_B_rad_s);
-    let wrench = Wrench { thrust_N, torque_B_N_m: torque };
+    let levelling =
+        vehicle.inertia_kg_m2 * (-2.0 * body.attitude_WB.scaled_axis() - 2.2 * body.angular_velocity_B_rad_s);
+    let thrust_N = vehicle.mass_kg * vehicle.gravity_m_s2 * (1.0 + lift.clamp(-0.3, 0.3));
+    let wrench = Wrench { thrust_N, torque_B_N_m: levelling + Vector3::from(kick_N_m) };
     allocation.allocate(&wrench).speeds_rad_s.map(|speed| vehicle.command.command(speed))
+}
+
+/// A tracking controller with the gains of somebody careful: bounded for all truths of the cases.
+struct Pilot {
+    allocation: Allocation,
+    /// Wanted speeds of the rotors, a moment ago.
+    slow_rad_s: [f64; 4],
+    /// Integrals of the errors of attitude and height.
+    leaned: Vector3<f64>,
+    sunk: f64,
+    period_s: f64,
+}
+
+/// What takes the motors' lag back: a lead over the slower part of it.
+const LEAD_S: f64 = 0.08;
+const LEAD_FILTER_S: f64 = 0.01;
+/// Most that errors of the course ask for sideways.
+const ANSWER_MAX_M_S2: f64 = 4.0;
+
+impl Pilot {
+    fn commands(
+        &mut self,
+        vehicle: &Vehicle,
+        course: &Course,
+        state: &plant::State,
+        time_s: f64,
+    ) -> [f64; 4] {
+        let ([position, velocity, acceleration], heading) = course.at(time_s);
+        let body = &state.body;
+        let (away, slip) = (position - body.position_W_m, velocity - body.velocity_W_m_s);
+        self.sunk += self.period_s * away.z;
+        let sideways = (1.2 * away.xy() + 2.0 * slip.xy()).cap_magnitude(ANSWER_MAX_M_S2);
+        let upwards = vehicle.gravity_m_s2 + 5.0 * away.z + 4.0 * slip.z + 4.0 * self.sunk;
+        let wanted = acceleration + sideways.push(upwards);
+        let thrust_N = vehicle.mass_kg * wanted.dot(&(body.attitude_WB * Vector3::z()));
+        let z = wanted.normalize();
+        let y = z.cross(&Vector3::new(heading.cos(), heading.sin(), 0.0)).normalize();
+        let rotation = nalgebra::Rotation3::from_basis_unchecked(&[y.cross(&z), y, z]);
+        let error = body.attitude_WB.inverse() * UnitQuaternion::from_rotation_matrix(&rotation);
+        self.leaned += self.period_s * error.scaled_axis();
+        let gains = (Vector3::new(18.0, 18.0, 6.0), Vector3::new(6.0, 6.0, 4.0));
+        let turn = gains.0.component_mul(&error.scaled_axis())
+            - gains.1.component_mul(&body.angular_velocity_B_rad_s)
+            + 8.0 * self.leaned;
+        let wrench = Wrench { thrust_N, torque_B_N_m: vehicle.inertia_kg_m2 * turn };
+        self.hurried(self.allocation.allocate(&wrench).speeds_rad_s)
+            .map(|speed| vehicle.command.command(speed))
+    }
+
+    fn hurried(&mut self, wanted_rad_s: [f64; 4]) -> [f64; 4] {
+        let part = self.period_s / (self.period_s + LEAD_FILTER_S);
+        std::array::from_fn(|i| {
+            let rise = wanted_rad_s[i] - self.slow_rad_s[i];
+            self.slow_rad_s[i] += part * rise;
+            wanted_rad_s[i] + LEAD_S * part * rise / self.period_s
+        })
+    }
 }
 
 struct Log {
     random: Stream,
     sensors: Sensors,
+    is_on_rig: bool,
     flight: Flight,
 }
 
 impl Log {
     fn new(plan: &Plan) -> Self {
         let random = bus::random::stream(plan.seed, "sensors");
-        Self { random, sensors: plan.sensors, flight: empty() }
+        Self { random, sensors: plan.sensors, is_on_rig: plan.is_on_rig, flight: empty() }
     }
 
     fn noisy(&mut self, value: [f64; 3], deviation: f64) -> [f64; 3] {
@@ -199,20 +313,25 @@ impl Log {
         let time_s = tick as f64 * TICK_S;
         let body = plant.state().body;
         push(&mut self.flight.command, time_s, *commands);
-        if tick % self.sensors.imu_ticks == 0 && tick > 0 {
+        if tick.is_multiple_of(self.sensors.imu_ticks) && tick > 0 {
             let motion = plant.motion();
             let bias = Vector3::from(self.sensors.accelerometer_bias_m_s2);
             let force = self.noisy((motion.specific_force_B_m_s2 + bias).into(), 0.05);
-            let rates = self.noisy(body.angular_velocity_B_rad_s.into(), 0.005);
-            push(&mut self.flight.specific_force, time_s, force);
+            let drift = Vector3::from(self.sensors.gyroscope_bias_rad_s);
+            let rates = self.noisy((body.angular_velocity_B_rad_s + drift).into(), 0.005);
+            if !self.is_on_rig {
+                push(&mut self.flight.specific_force, time_s, force);
+            }
             push(&mut self.flight.angular_velocity, time_s, rates);
         }
-        if tick % self.sensors.pose_ticks == 0 {
+        if tick.is_multiple_of(self.sensors.pose_ticks) {
             let stamp_s = time_s + self.sensors.pose_delay_s;
             let position = self.noisy(body.position_W_m.into(), 0.0005);
             let turn = self.noisy([0.0; 3], 0.001);
             let q = body.attitude_WB * UnitQuaternion::from_scaled_axis(Vector3::from(turn));
-            push(&mut self.flight.position, stamp_s, position);
+            if !self.is_on_rig {
+                push(&mut self.flight.position, stamp_s, position);
+            }
             let q = [q.w, q.i, q.j, q.k];
             let last = self.flight.attitude.values.last().copied().unwrap_or(q);
             let is_turned = q.iter().zip(&last).map(|(a, b)| a * b).sum::<f64>() < 0.0;

@@ -1,0 +1,44 @@
+//! 95 % intervals hold the truth as often as they say, of the effects that are true, without a selection.
+mod simulated;
+
+use identify::run::{bench, estimates};
+use rayon::prelude::*;
+use simulated::cases::Case;
+
+const CASES: u64 = 200;
+const DURATION_S: f64 = 8.0;
+
+/// Whether the intervals of the true effects' parameters hold the truth in the case of one seed.
+fn holds(seed: u64) -> Vec<(&'static str, bool)> {
+    let mut case = Case::of(&["rotor-drag", "mass-error"], 1.0, seed, DURATION_S);
+    case.plan.sensors.pose_ticks = 10;
+    let set = case.flights();
+    let (vehicle, declared) = case.declared();
+    let (mut bench, _) = bench(&vehicle, &declared, &set).expect("flights to identify on");
+    let parameters = &bench.model.parameters;
+    let values = case.true_values(parameters);
+    let which: Vec<usize> = case.effects().iter().flat_map(|name| parameters.of_name(name)).collect();
+    let start = parameters.declared();
+    // The weights as they are at the end of a selection: from what is left when all has been said.
+    let truth = bench.fitted(&values, &[]);
+    bench.weigh(&truth, &[]);
+    let fitted = bench.fitted(&start, &which);
+    let found = estimates(&bench, &fitted, &which);
+    let one = |at: &usize| {
+        let name = bench.model.parameters.all[*at].name;
+        (name, found[name].low <= values[*at] && values[*at] <= found[name].high)
+    };
+    which.iter().map(one).collect()
+}
+
+#[test]
+fn intervals_hold_the_truth_at_their_rate() {
+    let all: Vec<(&str, bool)> =
+        (0..CASES).into_par_iter().flat_map_iter(|seed| holds(3000 + seed)).collect();
+    for name in ["coefficient", "error"] {
+        let own: Vec<bool> = all.iter().filter(|(own, _)| *own == name).map(|(_, holds)| *holds).collect();
+        let rate = own.iter().filter(|holds| **holds).count() as f64 / own.len() as f64;
+        println!("{name}: {rate} of {}", own.len());
+        assert!((0.90..=0.99).contains(&rate), "{name}: {rate} of {}", own.len());
+    }
+}

@@ -1,0 +1,206 @@
+//! What can be logged differently: channels left out, slow, held, late, broken.
+mod simulated;
+
+use flights::{Channel, Flight, FlightSet};
+use identify::report::Report;
+use identify::run::identify;
+use simulated::cases::{Case, scaled};
+
+const DURATION_S: f64 = 12.0;
+
+/// Identifies on the flights of `case` after `change` was made to each.
+fn changed(case: &Case, change: impl Fn(&mut Flight)) -> Report {
+    let mut set = case.flights();
+    set.flights.iter_mut().for_each(change);
+    report(&set)
+}
+
+fn report(set: &FlightSet) -> Report {
+    identify(set, &mut |_| ()).expect("flights to identify on").report
+}
+
+/// A heavier vehicle with drag: what every set of channels with a pose can show.
+fn heavy_with_drag(seed: u64) -> Case {
+    Case::of(&["mass-error", "rotor-drag"], 1.0, seed, DURATION_S)
+}
+
+fn require_named(report: &Report, wanted: &[&str]) {
+    let (mut named, mut wanted) = (report.verdict.clone(), wanted.to_vec());
+    named.sort_unstable();
+    wanted.sort_unstable();
+    assert_eq!(named, wanted, "{report}");
+}
+
+fn without_imu(flight: &mut Flight) {
+    flight.angular_velocity = Channel::default();
+    flight.specific_force = Channel::default();
+}
+
+fn thinned<const N: usize>(channel: &mut Channel<N>, every: usize) {
+    let kept = |at: &usize| at % every == 0;
+    channel.time_s = (0..channel.time_s.len()).filter(kept).map(|at| channel.time_s[at]).collect();
+    channel.values = (0..channel.values.len()).filter(kept).map(|at| channel.values[at]).collect();
+}
+
+fn without_span<const N: usize>(channel: &mut Channel<N>, from_s: f64, to_s: f64) {
+    let kept: Vec<usize> =
+        (0..channel.time_s.len()).filter(|at| !(from_s..to_s).contains(&channel.time_s[*at])).collect();
+    channel.time_s = kept.iter().map(|at| channel.time_s[*at]).collect();
+    channel.values = kept.iter().map(|at| channel.values[*at]).collect();
+}
+
+#[test]
+fn a_pose_at_100_hz_is_enough() {
+    let mut case = heavy_with_drag(11);
+    case.plan.sensors.pose_ticks = 10;
+    require_named(&changed(&case, without_imu), &["mass-error", "rotor-drag"]);
+}
+
+#[test]
+fn so_is_one_at_50_hz_with_commands_as_slow() {
+    let mut case = heavy_with_drag(12);
+    (case.plan.sensors.pose_ticks, case.plan.control_ticks) = (20, 20);
+    require_named(&changed(&case, without_imu), &["mass-error", "rotor-drag"]);
+}
+
+#[test]
+fn everything_at_50_hz_and_everything_at_1_khz() {
+    for (seed, ticks) in [(13, 20), (14, 1)] {
+        let mut case = heavy_with_drag(seed);
+        (case.plan.sensors.pose_ticks, case.plan.sensors.imu_ticks) = (ticks, ticks);
+        case.plan.control_ticks = ticks.max(2);
+        require_named(&report(&case.flights()), &["mass-error", "rotor-drag"]);
+    }
+}
+
+#[test]
+fn rotor_speeds_alone_do_in_place_of_commands() {
+    let mut case = heavy_with_drag(15);
+    case.plan.sensors.has_rotor_speeds = true;
+    let found = changed(&case, |flight| flight.command = Channel::default());
+    require_named(&found, &["mass-error", "rotor-drag"]);
+    assert!(found.not_identifiable.iter().any(|own| own.effect == "command-delay"));
+}
+
+#[test]
+fn an_inertial_unit_alone_shows_mass_and_says_what_it_cannot_show() {
+    let found = changed(&Case::of(&["mass-error"], 1.0, 16, DURATION_S), |flight| {
+        flight.position = Channel::default();
+        flight.attitude = Channel::default();
+    });
+    require_named(&found, &["mass-error"]);
+    let unseen: Vec<&str> = found.not_identifiable.iter().map(|own| own.effect).collect();
+    for effect in ["rotor-drag", "wind", "ground-effect"] {
+        assert!(unseen.contains(&effect), "{unseen:?}");
+    }
+}
+
+#[test]
+fn gaps_cost_time_and_nothing_else() {
+    let found = changed(&heavy_with_drag(17), |flight| {
+        without_span(&mut flight.position, 4.0, 4.6);
+        without_span(&mut flight.attitude, 4.0, 4.6);
+        without_span(&mut flight.angular_velocity, 7.0, 7.3);
+    });
+    require_named(&found, &["mass-error", "rotor-drag"]);
+    assert!(found.flights.iter().all(|own| own.compared_s < DURATION_S - 0.9), "{found}");
+}
+
+/// What a reader leaves of a channel that was logged more often than it was sampled: samples at uneven times.
+#[test]
+fn repeated_samples_left_out_do_not_matter() {
+    let found = changed(&heavy_with_drag(18), |flight| {
+        thinned(&mut flight.position, 2);
+        thinned(&mut flight.attitude, 2);
+        let uneven = |at: &usize| at % 5 != 3;
+        let (times, values) =
+            (flight.angular_velocity.time_s.clone(), flight.angular_velocity.values.clone());
+        flight.angular_velocity.time_s = (0..times.len()).filter(uneven).map(|at| times[at]).collect();
+        flight.angular_velocity.values = (0..times.len()).filter(uneven).map(|at| values[at]).collect();
+    });
+    require_named(&found, &["mass-error", "rotor-drag"]);
+}
+
+/// Late in one flight only: the flight's clock, and no effect.
+#[test]
+fn a_pose_that_is_late_in_one_flight_is_an_offset() {
+    let case = heavy_with_drag(19);
+    let mut set = case.flights();
+    let late = &mut set.flights[1];
+    late.position.time_s.iter_mut().chain(&mut late.attitude.time_s).for_each(|time_s| *time_s += 0.012);
+    let found = report(&set);
+    require_named(&found, &["mass-error", "rotor-drag"]);
+    let of = |at: usize| found.time_offsets_s[&set.flights[at].name]["pose"].expect("both clocks");
+    assert!((of(1).value - 0.012).abs() < 0.0005 && (of(1).taken_off - 0.012).abs() < 0.0005, "{:?}", of(1));
+    assert!(of(0).value.abs() < 0.0005, "{:?}", of(0));
+}
+
+/// A sensor that is broken in both flights lands among the faults, and the vehicle is found as it is.
+fn require_fault(seed: u64, kind: &str, breaks: impl Fn(&mut f64)) {
+    let mut case = heavy_with_drag(seed);
+    case.plan.sensors.has_rotor_speeds = true;
+    let found = changed(&case, |flight| {
+        flight.rotor_speed.values.iter_mut().for_each(|speeds| breaks(&mut speeds[2]));
+    });
+    let faults: Vec<(&str, &str)> = found.faults.iter().map(|own| (own.channel.as_str(), own.kind)).collect();
+    assert_eq!(faults, [("rotor_speed.3", kind)], "{found}");
+    require_named(&found, &["mass-error", "rotor-drag"]);
+}
+
+#[test]
+fn a_stuck_rotor_speed_sensor_is_a_fault() {
+    require_fault(20, "stuck-sensor", |speed| *speed = 431.0);
+}
+
+#[test]
+fn a_rotor_speed_sensor_that_reads_half_is_a_fault() {
+    require_fault(21, "scaled-sensor", |speed| *speed *= 0.5);
+}
+
+/// Gusts have no course that a fit could follow.
+#[test]
+fn gusts_stay_unexplained() {
+    let mut case = Case::null(22, DURATION_S);
+    case.vehicle = "hummingbird-drag.toml";
+    case.plan.truth = vec![scaled("turbulence", 2.0)];
+    let found = report(&case.flights());
+    assert!(!found.unexplained.is_empty(), "{found}");
+    let random = ["rotor-drag", "parasitic-drag", "wind", "translational-lift", "blade-flapping"];
+    assert!(found.verdict.iter().all(|name| random.contains(name)), "only air may stand in for air: {found}");
+}
+
+/// Above a hover that hardly moves, where thrust and weight only have to be equal, a heavier vehicle and weaker rotors
+/// leave the same trace, and the report says so.
+#[test]
+fn in_a_calm_hover_mass_and_thrust_are_told_to_be_alike() {
+    let mut case = Case::of(&["mass-error"], 1.0, 23, DURATION_S);
+    case.plan.is_calm = true;
+    let found = changed(&case, |flight| flight.angular_velocity = Channel::default());
+    let [name] = found.verdict[..] else { panic!("{found}") };
+    let both = ["mass-error", "thrust-scale"];
+    let other = both.into_iter().find(|own| *own != name).expect("two");
+    assert!(both.contains(&name), "{found}");
+    assert!(found.effects[name].confused_with.contains(&other), "{found}");
+    let experiment = found.effects[name].experiment.clone().unwrap_or_default();
+    println!("{name}, confused with {:?}: {experiment}", found.effects[name].confused_with);
+}
+
+/// The riddle: an old log from a rig, of which nobody knows that it is one, with commands that act 150 ms late.
+#[test]
+fn the_riddle_of_the_late_rig_is_solved() {
+    let mut case = Case::of(&["rig-pendulum", "bearing-friction"], 1.0, 24, 20.0);
+    case.plan.truth = vec![
+        simulated::effect("rig-pendulum", &[("static_moment", 0.01), ("added_inertia", 0.0004)]),
+        simulated::effect("bearing-friction", &[("coulomb", 0.004), ("viscous", 0.003)]),
+        simulated::effect("command-delay", &[("delay", 0.15)]),
+    ];
+    case.plan.sensors.pose_ticks = 10;
+    let own = case.judged();
+    require_named(&own.report, &["bearing-friction", "command-delay", "rig-pendulum"]);
+    let delay = own.report.effects["command-delay"].parameters["delay"];
+    assert!((delay.value - 0.15).abs() < 0.01, "{delay:?}");
+    assert!(own.of_floor < 1.2, "{}", own.report);
+    for flight in own.report.held_out.values() {
+        assert!(flight["0.5"].values().all(|own| own.after < 0.3 * own.before), "{flight:?}");
+    }
+}
