@@ -128,9 +128,8 @@ fn fly(set: &FlightSet, vehicle: &Path, outcome: &Outcome, progress: &Progress) 
                 flights[&before.name][&horizon][channel] =
                     json!({ "before": old_rms, "after": new_rms, "unit": old.quantity.unit() });
                 let own = predicted(&outcome.report, &before.name, &horizon, channel);
-                let away = own.map(|(before, after)| {
-                    (old_rms / before - 1.0).abs().max((new_rms / after - 1.0).abs())
-                });
+                let away = own
+                    .map(|(before, after)| (old_rms / before - 1.0).abs().max((new_rms / after - 1.0).abs()));
                 furthest = furthest.into_iter().chain(away).filter(|own| own.is_finite()).reduce(f64::max);
             }
         }
@@ -150,7 +149,8 @@ fn predicted(report: &Report, flight: &str, horizon: &str, channel: &str) -> Opt
 fn retimed(set: &FlightSet, outcome: &Outcome, delays_s: (f64, f64)) -> FlightSet {
     let flight = |flight: &Flight| {
         let offsets = outcome.report.time_offsets_s.get(&flight.name);
-        let own_s = offsets.and_then(|own| own.get("pose").copied().flatten()).map_or(0.0, |own| own.taken_off);
+        let own_s =
+            offsets.and_then(|own| own.get("pose").copied().flatten()).map_or(0.0, |own| own.taken_off);
         let mut flight = flight.clone();
         let pose_s = own_s + delays_s.0;
         earlier(&mut flight.position, pose_s);
@@ -162,7 +162,9 @@ fn retimed(set: &FlightSet, outcome: &Outcome, delays_s: (f64, f64)) -> FlightSe
     };
     let can_fly = |flight: &&Flight| {
         let was_used = |own: &FlightReport| own.name == flight.name && own.compared_s > LEAST_REPLAY_S;
-        !flight.command.is_empty() && !flight.attitude.is_empty() && outcome.report.flights.iter().any(was_used)
+        !flight.command.is_empty()
+            && !flight.attitude.is_empty()
+            && outcome.report.flights.iter().any(was_used)
     };
     let flights = set.flights.iter().filter(can_fly).map(flight).collect();
     FlightSet { vehicle: set.vehicle.clone(), flights }
@@ -180,7 +182,8 @@ fn summary(report: &Report, flown: Option<&Value>, out: &Path) -> String {
             furthest * 100.0
         );
     }
-    let files = ["report.html", "report.json", "vehicle.toml"].map(|name| out.join(name).display().to_string());
+    let files =
+        ["report.html", "report.json", "vehicle.toml"].map(|name| out.join(name).display().to_string());
     text + &format!("\nwritten: {}", files.join(", "))
 }
 

@@ -31,7 +31,10 @@ pub fn candidates(parameters: &Parameters, flights: &[&Prepared]) -> (Vec<Candid
     let is_assumed = flights.iter().any(|flight| flight.is_assumed());
     for effect in parameters.effects() {
         if is_assumed && !OF_MEANS.contains(&effect) {
-            unseen.push(Unseen { effect, needs: "attitude and angular velocity that were measured, not assumed" });
+            unseen.push(Unseen {
+                effect,
+                needs: "attitude and angular velocity that were measured, not assumed",
+            });
             continue;
         }
         match needs(effect).iter().find(|(_, is_met)| !flights.iter().any(|flight| is_met(flight))) {
@@ -53,10 +56,11 @@ const FORCES: Need = ("position, velocity or specific force: something that show
 const TORQUES: Need = ("attitude or angular velocity: something that shows torques", |flight| {
     flight.offset_of(Equation::AngularAcceleration).is_some()
 });
-const AIRSPEED: Need = ("position or velocity, together with attitude: the velocity through the air", |flight| {
-    let has_velocity = !flight.flight.position.is_empty() || !flight.flight.velocity.is_empty();
-    has_velocity && !flight.flight.attitude.is_empty()
-});
+const AIRSPEED: Need =
+    ("position or velocity, together with attitude: the velocity through the air", |flight| {
+        let has_velocity = !flight.flight.position.is_empty() || !flight.flight.velocity.is_empty();
+        has_velocity && !flight.flight.attitude.is_empty()
+    });
 const HEIGHT: Need = ("position: the height above the ground", |flight| !flight.flight.position.is_empty());
 const ATTITUDE: Need = ("attitude", |flight| !flight.flight.attitude.is_empty());
 const COMMANDS: Need = ("motor commands", |flight| !flight.flight.command.is_empty());
@@ -69,7 +73,9 @@ const HELD: Need = ("a rig: these flights move freely", |flight| !flight.moves_f
 /// What has to be measured for an effect to show.
 fn needs(effect: &str) -> &'static [Need] {
     match effect {
-        "rotor-drag" | "parasitic-drag" | "translational-lift" | "blade-flapping" | "wind" => &[AIRSPEED, FORCES],
+        "rotor-drag" | "parasitic-drag" | "translational-lift" | "blade-flapping" | "wind" => {
+            &[AIRSPEED, FORCES]
+        }
         "ground-effect" => &[HEIGHT, FORCES],
         "command-delay" | "motor-lag" | "battery-sag" => &[COMMANDS],
         "mass-error" => &[FORCES],

@@ -13,7 +13,11 @@ pub struct Clock {
 
 impl Clock {
     /// The instants from `start_s` to `end_s`.
-    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a flight is short and forwards")]
+    #[allow(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "a flight is short and forwards"
+    )]
     #[must_use]
     pub fn spanning(start_s: f64, end_s: f64, step_s: f64) -> Self {
         let steps = ((end_s - start_s) / step_s + 1e-9).floor().max(0.0);

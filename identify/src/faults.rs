@@ -61,7 +61,9 @@ struct Suspicion {
 
 fn suspicion(bench: &Bench, rotor: usize) -> Option<Suspicion> {
     let pairs = speeds(bench)?;
-    let of = |rotor: usize| -> (Vec<f64>, Vec<f64>) { pairs.iter().map(|pair| (pair.0[rotor], pair.1[rotor])).unzip() };
+    let of = |rotor: usize| -> (Vec<f64>, Vec<f64>) {
+        pairs.iter().map(|pair| (pair.0[rotor], pair.1[rotor])).unzip()
+    };
     let (measured, expected) = of(rotor);
     let (spread, wanted) = (spread(&measured), spread(&expected));
     if spread < STUCK * wanted {

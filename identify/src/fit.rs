@@ -75,7 +75,10 @@ impl Bench<'_> {
             if which.is_empty() || self.is_small(&step, &blocks) {
                 break;
             }
-            let Some((next, next_blocks, next_squares)) = self.descended(&values, which, &step, squares) else { break };
+            let Some((next, next_blocks, next_squares)) = self.descended(&values, which, &step, squares)
+            else {
+                break;
+            };
             (values, blocks) = (next, next_blocks);
             let gain = squares - next_squares;
             squares = next_squares;
@@ -92,7 +95,9 @@ impl Bench<'_> {
     /// Whether a step is a small part of every parameter's standard deviation, if all rows were independent.
     fn is_small(&self, step: &DVector<f64>, blocks: &[Block]) -> bool {
         let variances = normal::inverse(&normal::sum(blocks).gram).diagonal();
-        step.iter().zip(&variances).all(|(step, variance)| step.abs() <= SMALL_STEP * variance.max(0.0).sqrt())
+        step.iter()
+            .zip(&variances)
+            .all(|(step, variance)| step.abs() <= SMALL_STEP * variance.max(0.0).sqrt())
     }
 
     /// The values after the step, or after a part of it, where the sum of squares is smaller.
@@ -212,7 +217,9 @@ impl Bench<'_> {
             self.weights.get(&(equation.name(), axis)).copied().unwrap_or(0.0)
         };
         let equations = flight.layout.equations.iter();
-        equations.flat_map(|equation| (0..equation.size()).map(move |axis| component(equation, axis))).collect()
+        equations
+            .flat_map(|equation| (0..equation.size()).map(move |axis| component(equation, axis)))
+            .collect()
     }
 
     /// First and last knot of each block.
@@ -279,7 +286,8 @@ impl Bench<'_> {
             let names: Vec<_> =
                 equations.flat_map(|own| (0..own.size()).map(move |axis| (own.name(), axis))).collect();
             for (at, residual) in residual.iter().enumerate() {
-                let left = residual + columns.iter().zip(step.iter()).map(|(column, step)| column[at] * step).sum::<f64>();
+                let left = residual
+                    + columns.iter().zip(step.iter()).map(|(column, step)| column[at] * step).sum::<f64>();
                 let sum = sums.entry(names[at % width]).or_default();
                 *sum = (sum.0 + left * left, sum.1 + measured[at] * measured[at], sum.2 + 1.0);
             }

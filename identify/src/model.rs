@@ -66,10 +66,12 @@ impl Model {
         let bias = |own: fn(usize) -> SensorParameter| -> [f64; 3] {
             std::array::from_fn(|axis| self.parameters.sensor(values, own(axis)))
         };
-        let (force_bias, rate_bias) = (bias(SensorParameter::Accelerometer), bias(SensorParameter::Gyroscope));
+        let (force_bias, rate_bias) =
+            (bias(SensorParameter::Accelerometer), bias(SensorParameter::Gyroscope));
         let mut residual = tracks.rows.clone();
         let mut rows = residual.iter_mut();
-        let mut take = |model: &[f64]| model.iter().for_each(|model| rows.next().map_or((), |row| *row -= model));
+        let mut take =
+            |model: &[f64]| model.iter().for_each(|model| rows.next().map_or((), |row| *row -= model));
         for &knot in &flight.layout.knots {
             for (equation, (_, window)) in flight.layout.equations.iter().zip(&flight.layout.windows) {
                 match equation {
@@ -134,7 +136,12 @@ impl Model {
 
     /// The residual under `values`, and its derivative by each parameter of `which`: one column each.
     #[must_use]
-    pub fn linearised(&self, flight: &Prepared, values: &[f64], which: &[usize]) -> (Vec<f64>, Vec<Vec<f64>>) {
+    pub fn linearised(
+        &self,
+        flight: &Prepared,
+        values: &[f64],
+        which: &[usize],
+    ) -> (Vec<f64>, Vec<Vec<f64>>) {
         let tracks = self.tracks(flight, values);
         let rotors = self.rotors(flight, values);
         let residual = self.residual(flight, &tracks, &rotors, values);
@@ -181,10 +188,7 @@ struct Sides {
 
 /// How the air moves: what the steady effects make of it, which is the same at every instant.
 fn air(airframe: &Airframe, step_s: f64) -> Drive {
-    let state = State {
-        body: RigidBody::level_at(Vector3::zeros()),
-        rotors: [RotorState::default(); 4],
-    };
+    let state = State { body: RigidBody::level_at(Vector3::zeros()), rotors: [RotorState::default(); 4] };
     airframe.begin_tick(&mut airframe.memory(0, "identify", step_s), &state, &[0.0; 4], step_s)
 }
 

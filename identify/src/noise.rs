@@ -10,8 +10,7 @@ use std::collections::BTreeMap;
 #[must_use]
 pub fn deviation<const N: usize>(channel: &Channel<N>) -> Option<f64> {
     let third = |w: &[[f64; N]], i: usize| w[3][i] - 3.0 * w[2][i] + 3.0 * w[1][i] - w[0][i];
-    let squares: f64 =
-        channel.values.windows(4).flat_map(|w| (0..N).map(move |i| third(w, i).powi(2))).sum();
+    let squares: f64 = channel.values.windows(4).flat_map(|w| (0..N).map(move |i| third(w, i).powi(2))).sum();
     let count = (channel.values.len().checked_sub(3)? * N) as f64;
     (count > 0.0).then(|| (squares / count / 20.0).sqrt())
 }
@@ -40,7 +39,8 @@ pub fn floor(bench: &Bench) -> BTreeMap<&'static str, (f64, &'static str)> {
 }
 
 fn velocity(flight: &Flight) -> Option<f64> {
-    deviation(&flight.velocity).or_else(|| Some(deviation(&flight.position)? * of_slope(flight.position.period_s()?)))
+    deviation(&flight.velocity)
+        .or_else(|| Some(deviation(&flight.position)? * of_slope(flight.position.period_s()?)))
 }
 
 fn rates(flight: &Flight) -> Option<f64> {

@@ -20,7 +20,11 @@ impl Block {
     /// An empty block for so many parameters.
     #[must_use]
     pub fn zero(parameters: usize) -> Self {
-        Self { gram: DMatrix::zeros(parameters, parameters), gradient: DVector::zeros(parameters), squares: 0.0 }
+        Self {
+            gram: DMatrix::zeros(parameters, parameters),
+            gradient: DVector::zeros(parameters),
+            squares: 0.0,
+        }
     }
 
     /// Adds a row: its residual, its derivatives, its weight.
@@ -96,7 +100,8 @@ pub fn inverse(gram: &DMatrix<f64>) -> DMatrix<f64> {
     let scaled = DMatrix::from_fn(size, size, |i, j| gram[(i, j)] * scale(i) * scale(j));
     let eigen = scaled.symmetric_eigen();
     let largest = eigen.eigenvalues.iter().copied().fold(0.0, f64::max);
-    let inverse = eigen.eigenvalues.map(|value| if value > RANK_TOLERANCE * largest { 1.0 / value } else { 0.0 });
+    let inverse =
+        eigen.eigenvalues.map(|value| if value > RANK_TOLERANCE * largest { 1.0 / value } else { 0.0 });
     let scaled = &eigen.eigenvectors * DMatrix::from_diagonal(&inverse) * eigen.eigenvectors.transpose();
     DMatrix::from_fn(size, size, |i, j| scaled[(i, j)] * scale(i) * scale(j))
 }
@@ -109,9 +114,8 @@ pub fn inverse(gram: &DMatrix<f64>) -> DMatrix<f64> {
 pub fn covariance(blocks: &[Block]) -> DMatrix<f64> {
     let total = sum(blocks);
     let size = total.gradient.len();
-    let without = |block: &Block| {
-        -(inverse(&(&total.gram - &block.gram)) * (&total.gradient - &block.gradient))
-    };
+    let without =
+        |block: &Block| -(inverse(&(&total.gram - &block.gram)) * (&total.gradient - &block.gradient));
     let centre = -(inverse(&total.gram) * &total.gradient);
     let scatter = blocks.iter().fold(DMatrix::zeros(size, size), |sum, block| {
         let away = without(block) - &centre;
@@ -155,7 +159,10 @@ mod tests {
     #[test]
     fn what_no_row_depends_on_is_not_known_at_all() {
         let mut blocks = [Block::zero(2), Block::zero(2), Block::zero(2)];
-        blocks.iter_mut().zip([0.1, -0.2, 0.1]).for_each(|(block, residual)| block.add(residual, &[-1.0, 0.0], 1.0));
+        blocks
+            .iter_mut()
+            .zip([0.1, -0.2, 0.1])
+            .for_each(|(block, residual)| block.add(residual, &[-1.0, 0.0], 1.0));
         let found = covariance(&blocks);
         assert!(found[(0, 0)].is_finite() && found[(0, 0)] > 0.0, "{found}");
         assert!(found[(1, 1)].is_infinite(), "{found}");

@@ -35,7 +35,11 @@ impl Measured {
     /// commands, or no motion.
     #[must_use]
     pub fn of(flight: &Flight, pose_s: f64, imu_s: f64) -> Option<Self> {
-        let span = if flight.attitude.is_empty() { &flight.angular_velocity.time_s } else { &flight.attitude.time_s };
+        let span = if flight.attitude.is_empty() {
+            &flight.angular_velocity.time_s
+        } else {
+            &flight.attitude.time_s
+        };
         let (first, last) = (span.first()?, span.last()?);
         let (start_s, end_s) = flight.command.span_s()?;
         let clock = Clock::spanning(first.max(start_s), last.min(end_s) - 0.01, TICK_S);
@@ -69,7 +73,13 @@ impl Measured {
     /// Errors of `airframe` at the ends of windows of `horizon_s`, and the flight itself at every `every` ticks.
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a horizon is short")]
     #[must_use]
-    pub fn predicted(&self, flight: &Flight, airframe: Airframe, horizon_s: f64, every: usize) -> (Errors, Trace) {
+    pub fn predicted(
+        &self,
+        flight: &Flight,
+        airframe: Airframe,
+        horizon_s: f64,
+        every: usize,
+    ) -> (Errors, Trace) {
         let window = (horizon_s / TICK_S).round() as usize;
         let memory = airframe.memory(0, "predict", TICK_S);
         let mut commands = Held::new(&flight.command);
@@ -84,7 +94,9 @@ impl Measured {
                 trace.push((self.clock.at(tick), *measured, *own));
             }
             if tick % window == 0 {
-                if tick - window >= SETTLE_TICKS && self.is_valid[tick - window..=tick].iter().all(|is_valid| *is_valid) {
+                if tick - window >= SETTLE_TICKS
+                    && self.is_valid[tick - window..=tick].iter().all(|is_valid| *is_valid)
+                {
                     sums.iter_mut().zip(differences(own, measured)).for_each(|(sum, own)| *sum += own * own);
                     count += 1;
                 }

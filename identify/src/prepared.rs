@@ -110,7 +110,11 @@ impl<'f> Prepared<'f> {
     /// vehicle is in the air; `None` where it has nothing to compare: no commands and no rotor speeds, no motion, or
     /// less than three windows of it.
     #[must_use]
-    pub fn new(flight: &'f Flight, box_s: Option<f64>, is_flying: impl Fn(&[f64; 4], bool) -> bool) -> Option<Self> {
+    pub fn new(
+        flight: &'f Flight,
+        box_s: Option<f64>,
+        is_flying: impl Fn(&[f64; 4], bool) -> bool,
+    ) -> Option<Self> {
         let equations = equations(flight);
         let (start_s, end_s) = common_span(flight, &equations)?;
         let (step_s, box_steps) = match box_s {
@@ -118,7 +122,8 @@ impl<'f> Prepared<'f> {
             None => steps_s(slowest_period_s(flight)?),
         };
         let clock = Clock::spanning(start_s, end_s, step_s);
-        let windows = equations.iter().map(|equation| windows(*equation, flight, box_steps, step_s)).collect();
+        let windows =
+            equations.iter().map(|equation| windows(*equation, flight, box_steps, step_s)).collect();
         let layout = Layout { clock, box_steps, knots: Vec::new(), equations, windows };
         let mut prepared = Self { flight, layout, pose_offset_s: 0.0, distrusted: [false; 4] };
         prepared.layout.knots = prepared.knots(&is_flying);
@@ -190,7 +195,8 @@ impl<'f> Prepared<'f> {
                     }
                     Equation::AngularAcceleration => rows.extend(measured.over(&gyroscope.values, knot)),
                     Equation::Gyroscope => {
-                        let (gyro, turned) = (model.over(&gyroscope.values, knot), measured.over(&turning, knot));
+                        let (gyro, turned) =
+                            (model.over(&gyroscope.values, knot), measured.over(&turning, knot));
                         rows.extend((0..3).map(|axis| gyro[axis] - turned[axis]));
                     }
                     Equation::RotorSpeed => rows.extend(measured.over(&speeds.values, knot)),
@@ -301,7 +307,9 @@ fn windows(equation: Equation, flight: &Flight, box_steps: usize, step_s: f64) -
     let (second, central) = (second_difference(step_s), central_difference(step_s));
     match equation {
         Equation::SpecificForce | Equation::RotorSpeed => (plain.clone(), plain),
-        Equation::Acceleration if flight.position.is_empty() => (plain.behind(central), plain.behind(SIMPSON)),
+        Equation::Acceleration if flight.position.is_empty() => {
+            (plain.behind(central), plain.behind(SIMPSON))
+        }
         Equation::Acceleration => (plain.behind(second), plain.behind(NUMEROV)),
         Equation::AngularAcceleration if flight.angular_velocity.is_empty() => {
             (plain.behind(central), plain.behind(SIMPSON).behind(SIMPSON))
@@ -353,7 +361,8 @@ fn attitudes(track: &Track<4>) -> Vec<UnitQuaternion<f64>> {
 /// The mean angular velocity in B from the instant before to the instant after.
 fn turning(attitude: &[UnitQuaternion<f64>], step_s: f64) -> Vec<[f64; 3]> {
     let count = attitude.len();
-    let between = |i: usize| -> Vector3<f64> { (attitude[i].inverse() * attitude[i + 1]).scaled_axis() / step_s };
+    let between =
+        |i: usize| -> Vector3<f64> { (attitude[i].inverse() * attitude[i + 1]).scaled_axis() / step_s };
     (0..count)
         .map(|i| {
             if count < 3 {

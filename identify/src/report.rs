@@ -173,7 +173,11 @@ impl Report {
             )?;
             for (parameter, own) in &effect.parameters {
                 let (value, low, high) = (rounded(own.value), rounded(own.low), rounded(own.high));
-                let bound = if own.at_bound { "; at its bound: more is asked for than this effect can be" } else { "" };
+                let bound = if own.at_bound {
+                    "; at its bound: more is asked for than this effect can be"
+                } else {
+                    ""
+                };
                 writeln!(f, "    {parameter} = {value} {}  (95 %: {low} ... {high}){bound}", own.unit)?;
             }
             if !effect.confused_with.is_empty() {
@@ -184,7 +188,11 @@ impl Report {
             }
         }
         for fault in &self.faults {
-            writeln!(f, "fault: {} ({}): {}; {}", fault.channel, fault.kind, fault.finding, fault.consequence)?;
+            writeln!(
+                f,
+                "fault: {} ({}): {}; {}",
+                fault.channel, fault.kind, fault.finding, fault.consequence
+            )?;
         }
         Ok(())
     }
@@ -193,7 +201,10 @@ impl Report {
         if self.trims.is_empty() {
             return Ok(());
         }
-        writeln!(f, "\nthe flights differ in trim, so their mean torques were left out (rad/s^2 beyond the model):")?;
+        writeln!(
+            f,
+            "\nthe flights differ in trim, so their mean torques were left out (rad/s^2 beyond the model):"
+        )?;
         for trim in &self.trims {
             let [x, y, z] = trim.angular_acceleration_rad_s2.map(rounded);
             writeln!(f, "  {:28} roll {x}  pitch {y}  yaw {z}", trim.flight)?;
@@ -212,7 +223,11 @@ impl Report {
                 let one = |(name, own): (&&str, &Change)| {
                     format!("{name} {} -> {} {}", rounded(own.before), rounded(own.after), own.unit)
                 };
-                writeln!(f, "    {horizon:>4} s  {}", channels.iter().map(one).collect::<Vec<_>>().join("   "))?;
+                writeln!(
+                    f,
+                    "    {horizon:>4} s  {}",
+                    channels.iter().map(one).collect::<Vec<_>>().join("   ")
+                )?;
             }
         }
         Ok(())
@@ -221,7 +236,11 @@ impl Report {
     fn write_rest(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         for (name, own) in &self.unexplained {
             let (rms, before) = (rounded(own.rms), rounded(own.before));
-            writeln!(f, "unexplained: {name}: {rms} {} are no noise and no candidate's (before: {before})", own.unit)?;
+            writeln!(
+                f,
+                "unexplained: {name}: {rms} {} are no noise and no candidate's (before: {before})",
+                own.unit
+            )?;
         }
         for unseen in &self.not_identifiable {
             writeln!(f, "not identifiable here: {} needs {}", unseen.effect, unseen.needs)?;

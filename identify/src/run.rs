@@ -11,9 +11,7 @@ use crate::parameter::{Parameters, SENSOR_BIAS, SENSOR_DELAY, SensorParameter};
 use crate::predict::{CHANNELS, Errors, Measured};
 use crate::prepared::{Equation, Prepared};
 use crate::regressor::{Regressor, regressors};
-use crate::report::{
-    BeforeAfter, Change, EffectReport, Estimate, FlightReport, Noise, Report, Unexplained,
-};
+use crate::report::{BeforeAfter, Change, EffectReport, Estimate, FlightReport, Noise, Report, Unexplained};
 use crate::select::{Selection, rivals, select, which};
 use crate::trim;
 use crate::whiteness::whiteness;
@@ -167,7 +165,10 @@ pub fn bench<'f>(
             let names: Vec<&str> = there.map(|flight| flight.name.as_str()).collect();
             let reason = match names[..] {
                 [] => "there is none".to_owned(),
-                _ => format!("{} have no stretch in which commands and motion were logged together", names.join(", ")),
+                _ => format!(
+                    "{} have no stretch in which commands and motion were logged together",
+                    names.join(", ")
+                ),
             };
             return Err(IdentifyError::NoFlight { role, reason });
         }
@@ -195,7 +196,8 @@ fn flight_report(flight: &Flight, prepared: Option<&Prepared>) -> FlightReport {
         role: flight.role,
         compared_s: prepared.map_or(0.0, compared_s),
         window_s: prepared.map_or(0.0, |own| 4.0 * own.layout.box_steps as f64 * own.layout.clock.step_s),
-        equations: prepared.map_or(Vec::new(), |own| own.layout.equations.iter().map(|own| own.name()).collect()),
+        equations: prepared
+            .map_or(Vec::new(), |own| own.layout.equations.iter().map(|own| own.name()).collect()),
         assumed: flight.assumed.clone(),
         notes: flight.notes.clone(),
     }
@@ -268,7 +270,10 @@ fn accepted_effects(
             after: size(bench, selection.after.test_sum()),
         };
         let chance = selection.chance(name);
-        effects.insert(name, EffectReport { accepted: true, parameters, held_out, chance, confused_with, experiment });
+        effects.insert(
+            name,
+            EffectReport { accepted: true, parameters, held_out, chance, confused_with, experiment },
+        );
     }
 }
 
@@ -283,7 +288,10 @@ fn size(bench: &Bench, squares: f64) -> f64 {
 /// The estimates of these parameters, with 95 % intervals.
 #[must_use]
 pub fn estimates(bench: &Bench, fitted: &Fitted, which: &[usize]) -> BTreeMap<&'static str, Estimate> {
-    let quantile = crate::statistics::student_quantile(0.975, (fitted.fit_squares.len() as f64 - fitted.which.len() as f64).max(1.0));
+    let quantile = crate::statistics::student_quantile(
+        0.975,
+        (fitted.fit_squares.len() as f64 - fitted.which.len() as f64).max(1.0),
+    );
     let one = |at: &usize| {
         let own = &bench.model.parameters.all[*at];
         let (value, half) = (fitted.values[*at], quantile * fitted.deviation(*at).unwrap_or(0.0));
@@ -308,7 +316,8 @@ fn predictions(bench: &Bench, set: &FlightSet, values: &[f64], delays_s: (f64, f
     let mut predictions = Vec::new();
     for flight in &set.flights {
         let all = bench.fit.iter().chain(&bench.test);
-        let own_s = all.clone().find(|own| own.flight.name == flight.name).map_or(0.0, |own| own.pose_offset_s);
+        let own_s =
+            all.clone().find(|own| own.flight.name == flight.name).map_or(0.0, |own| own.pose_offset_s);
         let before = Measured::of(flight, own_s, 0.0);
         let after = Measured::of(flight, own_s + delays_s.0, delays_s.1);
         let (Some(before), Some(after)) = (before, after) else { continue };
@@ -369,7 +378,9 @@ fn pictures(bench: &Bench, selection: &Selection) -> Vec<Picture> {
         let measured = bench.model.tracks(flight, &selection.after.values).rows;
         for equation in &flight.layout.equations {
             let columns = |rows: &[f64]| {
-                (0..equation.size()).map(|axis| crate::whiteness::column(flight, rows, *equation, axis)).collect()
+                (0..equation.size())
+                    .map(|axis| crate::whiteness::column(flight, rows, *equation, axis))
+                    .collect()
             };
             pictures.push(Picture {
                 flight: flight.flight.name.clone(),

@@ -186,7 +186,14 @@ fn judged(bench: &Bench, base: &Fitted, candidate: &Candidate, fitted: Fitted, l
         && parameter_t > t_quantile(1.0 - level / 2.0, fitted.fit_squares.len())
         && gain > LEAST_GAIN * base.test_sum()
         && is_seen(bench, candidate, &fitted);
-    Judged { candidate: candidate.clone(), gain: gain / base.test_sum(), gain_chance, parameter_t, is_accepted, fitted }
+    Judged {
+        candidate: candidate.clone(),
+        gain: gain / base.test_sum(),
+        gain_chance,
+        parameter_t,
+        is_accepted,
+        fitted,
+    }
 }
 
 /// Whether one of its parameters is large enough to be more than an artefact of the grid: a delay of more than half a
@@ -232,7 +239,8 @@ fn chance(before: &[f64], after: &[f64]) -> f64 {
     let gains: Vec<f64> = before.iter().zip(after).map(|(before, after)| before - after).collect();
     let mut random = rand_chacha::ChaCha8Rng::seed_from_u64(gains.len() as u64);
     let count = gains.len() as u64;
-    let draw = |random: &mut rand_chacha::ChaCha8Rng| gains[(((random.next_u64() >> 32) * count) >> 32) as usize];
+    let draw =
+        |random: &mut rand_chacha::ChaCha8Rng| gains[(((random.next_u64() >> 32) * count) >> 32) as usize];
     let is_loss = |_: &usize| (0..count).map(|_| draw(&mut random)).sum::<f64>() <= 0.0;
     let losses = (0..RESAMPLES).filter(is_loss).count();
     // A few blocks that agree prove no more than a few coins that fall alike.
@@ -307,7 +315,8 @@ impl Screen {
         let of = |blocks: &[Block]| -> Vec<Block> { blocks.iter().map(|block| block.of(&at)).collect() };
         let (fit, test) = (of(&self.fit), of(&self.test));
         let step = bench.step(&fit, &base.values, &wanted);
-        let after = |blocks: &[Block]| -> Vec<f64> { blocks.iter().map(|own| own.squares_after(&step)).collect() };
+        let after =
+            |blocks: &[Block]| -> Vec<f64> { blocks.iter().map(|own| own.squares_after(&step)).collect() };
         let moved: Vec<Block> = fit.iter().map(|own| own.after(&step)).collect();
         Fitted {
             values: bench.moved(&base.values, &wanted, &step),
@@ -329,9 +338,8 @@ pub fn rivals(bench: &Bench, selection: &Selection, at: usize) -> Vec<&'static s
     let mut start = selection.after.values.clone();
     own.which.iter().for_each(|at| start[*at] = bench.model.parameters.all[*at].declared);
     let base = bench.fitted(&start, &which(&others));
-    let is_rival = |candidate: &&Candidate| {
-        !is_worse(&fitted(bench, &base, &others, candidate), &selection.after)
-    };
+    let is_rival =
+        |candidate: &&Candidate| !is_worse(&fitted(bench, &base, &others, candidate), &selection.after);
     let near = near(selection, own);
     let mut names: Vec<&'static str> =
         near.par_iter().filter(|candidate| is_rival(candidate)).map(|candidate| candidate.effect).collect();

@@ -133,7 +133,12 @@ impl<'a, const N: usize> Integral<'a, N> {
 }
 
 /// Cubic pieces whose slope at a sample is that of the parabola through it and its neighbours.
-fn interpolated<const N: usize>(channel: &Channel<N>, delay_s: f64, clock: &Clock, period_s: f64) -> Track<N> {
+fn interpolated<const N: usize>(
+    channel: &Channel<N>,
+    delay_s: f64,
+    clock: &Clock,
+    period_s: f64,
+) -> Track<N> {
     let times = &channel.time_s;
     let mut segment = 0;
     let mut track = Track::default();
@@ -156,7 +161,12 @@ fn cubic<const N: usize>(channel: &Channel<N>, segment: usize, at_s: f64) -> [f6
     let part = ((at_s - times[segment]) / span_s).clamp(0.0, 1.0);
     let slopes = [slope_at(channel, segment), slope_at(channel, segment + 1)];
     let (part2, part3) = (part * part, part * part * part);
-    let shares = [2.0 * part3 - 3.0 * part2 + 1.0, part3 - 2.0 * part2 + part, 3.0 * part2 - 2.0 * part3, part3 - part2];
+    let shares = [
+        2.0 * part3 - 3.0 * part2 + 1.0,
+        part3 - 2.0 * part2 + part,
+        3.0 * part2 - 2.0 * part3,
+        part3 - part2,
+    ];
     std::array::from_fn(|i| {
         shares[0] * values[segment][i]
             + shares[1] * span_s * slopes[0][i]
@@ -193,7 +203,9 @@ mod tests {
 
     #[test]
     fn a_fast_channel_is_averaged_about_each_instant() {
-        let channel = sampled_at(0.001, 1001, |t| 3.0 * t + (if (t * 1000.0).round() % 2.0 == 0.0 { 1.0 } else { -1.0 }));
+        let channel = sampled_at(0.001, 1001, |t| {
+            3.0 * t + (if (t * 1000.0).round() % 2.0 == 0.0 { 1.0 } else { -1.0 })
+        });
         let track = Track::sampled(&channel, 0.0, &Clock::spanning(0.1, 0.9, 0.004));
         for (index, value) in track.values.iter().enumerate() {
             assert!((value[0] - 3.0 * (0.1 + 0.004 * index as f64)).abs() < 1e-9, "{value:?}");

@@ -74,9 +74,11 @@ pub fn compare(bench: &mut Bench, open: &[Candidate]) -> Vec<Trim> {
         }
     }
     let flights = bench.fit.iter().chain(&bench.test);
-    let found: Vec<(Trim, f64)> = flights.filter_map(|flight| of_flight(bench, flight, &shared.values)).collect();
+    let found: Vec<(Trim, f64)> =
+        flights.filter_map(|flight| of_flight(bench, flight, &shared.values)).collect();
     let differ = (0..3).any(|axis| {
-        let mean = found.iter().map(|(own, _)| own.angular_acceleration_rad_s2[axis]).sum::<f64>() / found.len() as f64;
+        let mean = found.iter().map(|(own, _)| own.angular_acceleration_rad_s2[axis]).sum::<f64>()
+            / found.len() as f64;
         found.iter().any(|(own, spread)| {
             let away = (own.angular_acceleration_rad_s2[axis] - mean).abs();
             away > SURE * own.deviation_rad_s2[axis] && away > LARGE * spread
@@ -90,7 +92,9 @@ pub fn compare(bench: &mut Bench, open: &[Candidate]) -> Vec<Trim> {
 fn of_flight(bench: &Bench, flight: &Prepared, values: &[f64]) -> Option<(Trim, f64)> {
     flight.offset_of(Equation::AngularAcceleration)?;
     let residual = bench.model.residual_under(flight, values);
-    let per_block = ((bench.block_s / (flight.layout.box_steps as f64 * flight.layout.clock.step_s)).ceil() as usize).max(1);
+    let per_block = ((bench.block_s / (flight.layout.box_steps as f64 * flight.layout.clock.step_s)).ceil()
+        as usize)
+        .max(1);
     let (mut means, mut deviations, mut spread) = ([0.0; 3], [0.0; 3], 0.0_f64);
     for axis in 0..3 {
         let rows = column(flight, &residual, Equation::AngularAcceleration, axis);
@@ -103,8 +107,10 @@ fn of_flight(bench: &Bench, flight: &Prepared, values: &[f64]) -> Option<(Trim, 
             rows.chunks(per_block).map(|own| own.iter().sum::<f64>() / own.len() as f64 - mean).collect();
         let count = blocks.len() as f64;
         means[axis] = mean;
-        deviations[axis] = (blocks.iter().map(|own| own * own).sum::<f64>() / (count * (count - 1.0).max(1.0))).sqrt();
-        spread = spread.max((rows.iter().map(|own| (own - mean).powi(2)).sum::<f64>() / rows.len() as f64).sqrt());
+        deviations[axis] =
+            (blocks.iter().map(|own| own * own).sum::<f64>() / (count * (count - 1.0).max(1.0))).sqrt();
+        spread =
+            spread.max((rows.iter().map(|own| (own - mean).powi(2)).sum::<f64>() / rows.len() as f64).sqrt());
     }
     let trim = Trim {
         flight: flight.flight.name.clone(),

@@ -15,7 +15,8 @@ pub fn text(declared: &Path, effects: &[Effect], report: &Report) -> Result<Stri
     let vehicle = Vehicle::load(declared)?;
     let complete = Vehicle::base(declared).unwrap_or_else(|| declared.to_owned());
     let file = complete.display().to_string();
-    let text = std::fs::read_to_string(&complete).map_err(|cause| VehicleError::Unreadable { file, cause })?;
+    let text =
+        std::fs::read_to_string(&complete).map_err(|cause| VehicleError::Unreadable { file, cause })?;
     let mut document: toml_edit::DocumentMut = text.parse().unwrap_or_default();
     document.remove("effects");
     document["name"] = toml_edit::value(format!("{}, identified", vehicle.name));
@@ -39,7 +40,12 @@ fn entry(effect: &Effect, vehicle: &Vehicle, report: &Report) -> String {
             (Some(estimate), _) => of_estimate(estimate, &source(report)),
             (None, Some(own)) => number(own.value, &own.unit, &own.source, &said(&own.uncertainty)),
             (None, None) if spec.neutral == Some(value) => continue,
-            (None, None) => number(value, spec.unit(), spec.typical_source, "\"not identified: held while the others were fitted\""),
+            (None, None) => number(
+                value,
+                spec.unit(),
+                spec.typical_source,
+                "\"not identified: held while the others were fitted\"",
+            ),
         };
         // Writing to a string cannot fail.
         let _ = writeln!(text, "{} = {line}", spec.name);
@@ -66,7 +72,10 @@ fn of_estimate(own: &Estimate, source: &str) -> String {
 
 fn number(value: f64, unit: &str, source: &str, uncertainty: &str) -> String {
     let source = toml_edit::value(source).to_string();
-    format!("{{ value = {value:?}, unit = {unit:?}, source = {}, uncertainty = {uncertainty} }}", source.trim())
+    format!(
+        "{{ value = {value:?}, unit = {unit:?}, source = {}, uncertainty = {uncertainty} }}",
+        source.trim()
+    )
 }
 
 fn said(uncertainty: &Uncertainty) -> String {

@@ -52,7 +52,8 @@ pub fn column(flight: &Prepared, rows: &[f64], equation: Equation, axis: usize) 
 }
 
 fn of_equation(columns: &[(Equation, Vec<f64>)]) -> Whiteness {
-    let (mut squares, mut count, mut common, mut beyond, mut lags, mut p_value) = (0.0, 0, 0.0, 0, 0, 1.0_f64);
+    let (mut squares, mut count, mut common, mut beyond, mut lags, mut p_value) =
+        (0.0, 0, 0.0, 0, 0, 1.0_f64);
     for (_, column) in columns {
         squares += column.iter().map(|own| own * own).sum::<f64>();
         count += column.len();

@@ -6,7 +6,7 @@ use rayon::prelude::*;
 use simulated::cases::{Case, EFFECTS, Judgement};
 
 /// Long enough to tell effects apart, short enough for many of them.
-const DURATION_S: f64 = 10.0;
+const DURATION_S: f64 = 8.0;
 
 /// A case flown with slower pose samples than the default, which makes the grid coarser and the test faster.
 fn judged(mut case: Case) -> Judgement {

@@ -6,7 +6,7 @@ use identify::report::Report;
 use identify::run::identify;
 use simulated::cases::{Case, scaled};
 
-const DURATION_S: f64 = 12.0;
+const DURATION_S: f64 = 8.0;
 
 /// Identifies on the flights of `case` after `change` was made to each.
 fn changed(case: &Case, change: impl Fn(&mut Flight)) -> Report {
@@ -37,7 +37,7 @@ fn without_imu(flight: &mut Flight) {
 }
 
 fn thinned<const N: usize>(channel: &mut Channel<N>, every: usize) {
-    let kept = |at: &usize| at % every == 0;
+    let kept = |at: &usize| at.is_multiple_of(every);
     channel.time_s = (0..channel.time_s.len()).filter(kept).map(|at| channel.time_s[at]).collect();
     channel.values = (0..channel.values.len()).filter(kept).map(|at| channel.values[at]).collect();
 }
