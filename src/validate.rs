@@ -6,7 +6,7 @@
 //! | [`replay`] | one flight as a run: its files, its manifest, the flight itself |
 //! | [`rows`] | the rows that the player reads: at the times of the commands too |
 //! | [`windows`] | errors at the ends of the windows, read from the recording |
-//! | [`errors`] | what came of it, as a table and as JSON |
+//! | [`mod@errors`] | what came of it, as a table and as JSON |
 
 mod errors;
 mod replay;
@@ -48,7 +48,7 @@ pub struct ValidateArguments {
 /// Flies all flights and prints the errors; every error is one of flying, so that `true` says that all was flown.
 ///
 /// # Errors
-/// As [`errors`].
+/// As [`errors()`].
 pub fn validate(arguments: &ValidateArguments) -> Result<bool> {
     let Some((file, vehicles)) = arguments.files.split_last() else { bail!("give a flights file") };
     let vehicles: Vec<&Path> = vehicles.iter().map(PathBuf::as_path).collect();
