@@ -2,7 +2,8 @@
 //!
 //! ```sh
 //! cargo run --release -p identify --example confusion             # everything, some minutes
-//! cargo run --release -p identify --example confusion -- singles  # or pairs, nulls, coverage
+//! cargo run --release -p identify --example confusion -- singles  # or pairs, nulls
+//! cargo run --release -p identify --example confusion -- singles wind  # those with one effect
 //! ```
 #[path = "../tests/simulated/mod.rs"]
 mod simulated;
@@ -28,7 +29,7 @@ fn main() {
         print_tables(&EFFECTS.map(|name| vec![name]), &NOISES, 1);
     }
     if is_wanted("pairs") {
-        print_tables(&PAIRS.map(|pair| pair.to_vec()), &NOISES[1..2], 1001);
+        print_tables(&PAIRS.map(|pair| pair.to_vec()), &NOISES[1..2], 10_001);
     }
     if is_wanted("nulls") {
         print_nulls();
@@ -39,7 +40,9 @@ fn print_tables(sets: &[Vec<&'static str>], noises: &[f64], first_seed: u64) {
     let heads: Vec<String> = noises.iter().map(|noise| format!("noise x {noise}")).collect();
     println!("| true | strength | {} |\n|---|---|{}", heads.join(" | "), "---|".repeat(noises.len()));
     let mut rows = Vec::new();
-    for (number, names) in sets.iter().enumerate() {
+    let only = std::env::args().nth(2);
+    let is_wanted = |names: &[&str]| only.as_deref().is_none_or(|only| names.contains(&only));
+    for (number, names) in sets.iter().enumerate().filter(|(_, names)| is_wanted(names)) {
         let own = flown(names, noises, first_seed + 100 * number as u64);
         print_matrix(&own, noises.len());
         rows.extend(own.into_iter().filter_map(|own| Some((own.0, own.1, own.2, own.3?))));

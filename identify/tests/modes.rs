@@ -121,18 +121,20 @@ fn repeated_samples_left_out_do_not_matter() {
     require_named(&found, &["mass-error", "rotor-drag"]);
 }
 
-/// Late in one flight only: the flight's clock, and no effect.
+/// Late in one flight only: the flight's clock, and no effect. With attitudes that scatter by 1 mrad and turn at 1 rad/s
+/// a clock is found within 1 ms.
 #[test]
 fn a_pose_that_is_late_in_one_flight_is_an_offset() {
-    let case = heavy_with_drag(19);
+    let mut case = heavy_with_drag(19);
+    case.plan.duration_s = 12.0;
     let mut set = case.flights();
     let late = &mut set.flights[1];
     late.position.time_s.iter_mut().chain(&mut late.attitude.time_s).for_each(|time_s| *time_s += 0.012);
     let found = report(&set);
-    require_named(&found, &["mass-error", "rotor-drag"]);
     let of = |at: usize| found.time_offsets_s[&set.flights[at].name]["pose"].expect("both clocks");
-    assert!((of(1).value - 0.012).abs() < 0.0005 && (of(1).taken_off - 0.012).abs() < 0.0005, "{:?}", of(1));
-    assert!(of(0).value.abs() < 0.0005, "{:?}", of(0));
+    assert!((of(1).value - 0.012).abs() < 0.001 && (of(1).taken_off - 0.012).abs() < 0.001, "{:?}", of(1));
+    assert!(of(0).value.abs() < 0.001, "{:?}", of(0));
+    require_named(&found, &["mass-error", "rotor-drag"]);
 }
 
 /// A sensor that is broken in both flights lands among the faults, and the vehicle is found as it is.
