@@ -50,10 +50,11 @@ impl Document {
     /// A path as written: `${NAME:-default}` is the environment's NAME, and a relative path starts at the folder
     /// of the flights file.
     pub fn resolve(&self, key: &str, written: &Spanned<String>) -> Result<PathBuf, FlightsError> {
-        let expanded = expand(written.get_ref(), |name| std::env::var(name).ok()).map_err(|found| {
-            let advice = "set the variable, or give a default: ${NAME:-path}";
-            self.bad(&written.span(), key, Bad { expected: "a path", found: &found, advice })
-        })?;
+        let expanded = vehicles::variables::expand(written.get_ref(), |name| std::env::var(name).ok())
+            .map_err(|found| {
+                let advice = "set the variable, or give a default: ${NAME:-path}";
+                self.bad(&written.span(), key, Bad { expected: "a path", found: &found, advice })
+            })?;
         Ok(self.path.parent().unwrap_or(Path::new("")).join(expanded))
     }
 }
@@ -66,34 +67,4 @@ pub struct Bad<'a> {
     pub found: &'a str,
     /// What to do.
     pub advice: &'static str,
-}
-
-/// Replaces `${NAME}` and `${NAME:-default}` by what `variable` says, as manifests do.
-fn expand(text: &str, variable: impl Fn(&str) -> Option<String>) -> Result<String, String> {
-    let mut expanded = String::new();
-    let mut rest = text;
-    while let Some((before, after)) = rest.split_once("${") {
-        let (inside, after) =
-            after.split_once('}').ok_or_else(|| format!("`{text}`, which has `${{` without `}}`"))?;
-        let (name, default) = inside.split_once(":-").map_or((inside, None), |(name, d)| (name, Some(d)));
-        let value = variable(name).or(default.map(str::to_owned));
-        expanded += before;
-        expanded += &value.ok_or_else(|| format!("`{text}`, whose variable {name} is not set"))?;
-        rest = after;
-    }
-    Ok(expanded + rest)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::expand;
-
-    #[test]
-    fn variables_are_expanded_with_defaults() {
-        let variable = |name: &str| (name == "DATA").then(|| "/data".to_owned());
-        assert_eq!(expand("${DATA:-../x}/a.csv", variable).unwrap(), "/data/a.csv");
-        assert_eq!(expand("${NONE:-../x}/a.csv", variable).unwrap(), "../x/a.csv");
-        assert!(expand("${NONE}/a.csv", variable).unwrap_err().contains("NONE is not set"));
-        assert!(expand("${NONE", variable).unwrap_err().contains("without"));
-    }
 }

@@ -2,15 +2,11 @@
 
 use std::collections::BTreeMap;
 
-use mcap::sans_io::linear_reader::LinearReaderOptions;
-use mcap::sans_io::{MessageReadEvent, MessageReader};
 use recorder::definition::{Definition, Leaf};
+use recorder::reader::Messages;
 
 use crate::log::{Log, Samples, known};
 use crate::ros_definition;
-
-/// Longer records are refused before memory is taken for them.
-const RECORD_BYTES_MAX: usize = 1 << 28;
 
 /// A log, with what its topics are.
 pub struct McapLog {
@@ -153,38 +149,4 @@ fn row(leaves: &[Leaf], topic: &str, names: &[String]) -> Result<Vec<f64>, Strin
         Ok(if lost { f64::NAN } else { found })
     };
     names.iter().map(find).collect()
-}
-
-/// Feeds the bytes of a file to the reader of its messages.
-struct Messages<'a> {
-    reader: MessageReader,
-    rest: &'a [u8],
-}
-
-impl<'a> Messages<'a> {
-    fn new(bytes: &'a [u8]) -> Self {
-        let options = LinearReaderOptions::default()
-            .with_prevalidate_chunk_crcs(true)
-            .with_record_length_limit(RECORD_BYTES_MAX);
-        Self { reader: MessageReader::new_with_options(options), rest: bytes }
-    }
-}
-
-impl Iterator for Messages<'_> {
-    type Item = mcap::McapResult<mcap::Message<'static>>;
-
-    fn next(&mut self) -> Option<Self::Item> {
-        loop {
-            match self.reader.next_event()? {
-                Err(error) => return Some(Err(error)),
-                Ok(MessageReadEvent::Message(message)) => return Some(Ok(message)),
-                Ok(MessageReadEvent::ReadRequest(wanted)) => {
-                    let (next, rest) = self.rest.split_at(wanted.min(self.rest.len()));
-                    self.reader.insert(next.len()).copy_from_slice(next);
-                    self.reader.notify_read(next.len());
-                    self.rest = rest;
-                }
-            }
-        }
-    }
 }

@@ -4,7 +4,7 @@
 //! vehicle but of its sensors: `sensor-delay` and `sensor-bias`. Random effects are no candidates, for they have no
 //! course that a fit could follow: what they leave is reported as unexplained.
 
-use plant::effects::{CATALOGUE, Effect, EffectKind, Values};
+use plant::effects::{CATALOGUE, Effect, EffectKind};
 use vehicles::Vehicle;
 
 /// The delay of sensors, as an effect.
@@ -87,11 +87,11 @@ pub struct Parameters {
 
 impl Parameters {
     /// The parameters of all candidates for `vehicle`, which has the effects `declared`. Parameters without a neutral
-    /// value are not fitted: they are those of `declared`, of `known`, or fit the vehicle's size.
+    /// value are not fitted: they are those of `declared`, or fit the vehicle's size.
     #[must_use]
-    pub fn of(vehicle: &Vehicle, declared: &[Effect], known: &[(String, String, f64)]) -> Self {
+    pub fn of(vehicle: &Vehicle, declared: &[Effect]) -> Self {
         let fixed: Vec<Effect> =
-            CATALOGUE.into_iter().map(|kind| reference(kind, vehicle, declared, known)).collect();
+            CATALOGUE.into_iter().map(|kind| reference(kind, vehicle, declared)).collect();
         let mut all = Vec::new();
         for effect in fixed.iter().filter(|effect| !RANDOM.contains(&effect.kind.name)) {
             all.extend(of_effect(effect));
@@ -171,20 +171,11 @@ impl Parameter {
 }
 
 /// The effect as the declared model has it: declared, or neutral with fixed values that fit the vehicle.
-fn reference(
-    kind: &'static EffectKind,
-    vehicle: &Vehicle,
-    declared: &[Effect],
-    known: &[(String, String, f64)],
-) -> Effect {
+fn reference(kind: &'static EffectKind, vehicle: &Vehicle, declared: &[Effect]) -> Effect {
     if let Some(effect) = declared.iter().find(|effect| effect.kind.name == kind.name) {
         return *effect;
     }
-    kind.with(|spec| {
-        let is_known = |(effect, name, _): &&(String, String, f64)| effect == kind.name && name == spec.name;
-        let known = known.iter().find(is_known).map(|(.., value)| *value);
-        spec.neutral.or(known).unwrap_or_else(|| fitting(spec.name, spec.typical, vehicle))
-    })
+    kind.with(|spec| spec.neutral.unwrap_or_else(|| fitting(spec.name, spec.typical, vehicle)))
 }
 
 /// The typical values are a Hummingbird's. A rotor is at most half as wide as the way to the next one; what weighs less
@@ -258,10 +249,4 @@ fn of_sensors() -> Vec<Parameter> {
         bias("attitude_x", "rad", 0.3, 0.001, Attitude(0)),
         bias("attitude_y", "rad", 0.3, 0.001, Attitude(1)),
     ]
-}
-
-/// The values of an effect, for a report or a vehicle file.
-#[must_use]
-pub fn values_of(effects: &[Effect], name: &str) -> Option<Values> {
-    effects.iter().find(|effect| effect.kind.name == name).map(|effect| effect.values)
 }

@@ -1,13 +1,13 @@
 //! The whole way: from flights and the declared vehicle to a report.
 
-use crate::align::{self, align};
+use crate::align::align;
 use crate::candidate::{Candidate, candidates};
 use crate::experiment;
 use crate::faults;
 use crate::fit::{Bench, Fitted, Weights};
 use crate::model::Model;
 use crate::noise;
-use crate::parameter::{Parameters, SENSOR_BIAS, SENSOR_DELAY, SensorParameter};
+use crate::parameter::{Parameters, SensorParameter};
 use crate::predict::{CHANNELS, Errors, Measured};
 use crate::prepared::{Equation, Prepared};
 use crate::regressor::{Regressor, regressors};
@@ -143,7 +143,7 @@ pub fn bench<'f>(
     declared: &[Effect],
     set: &'f FlightSet,
 ) -> Result<(Bench<'f>, Vec<FlightReport>), IdentifyError> {
-    let parameters = Parameters::of(vehicle, declared, &[]);
+    let parameters = Parameters::of(vehicle, declared);
     let least_rad_s = FLYING * vehicle.hover_speed_rad_s();
     let is_flying = |drive: &[f64; 4], is_command: bool| {
         let speed = |own: &f64| if is_command { vehicle.command.speed(*own) } else { *own };
@@ -395,12 +395,3 @@ fn pictures(bench: &Bench, selection: &Selection) -> Vec<Picture> {
     }
     pictures
 }
-
-/// Whether an effect belongs to the sensors and not to the vehicle.
-#[must_use]
-pub fn is_of_sensors(effect: &str) -> bool {
-    effect == SENSOR_DELAY || effect == SENSOR_BIAS
-}
-
-/// The gyroscope's and the attitude's clocks, for whoever wants them alone.
-pub use align::offset;

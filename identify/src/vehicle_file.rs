@@ -1,7 +1,7 @@
 //! The new vehicle file: the declared one with the effects that were accepted.
 
 use crate::report::{Estimate, Report};
-use plant::effects::{Effect, find};
+use plant::effects::Effect;
 use std::fmt::Write;
 use std::path::Path;
 use vehicles::{Uncertainty, Vehicle, VehicleError};
@@ -15,9 +15,10 @@ pub fn text(declared: &Path, effects: &[Effect], report: &Report) -> Result<Stri
     let vehicle = Vehicle::load(declared)?;
     let complete = Vehicle::base(declared).unwrap_or_else(|| declared.to_owned());
     let file = complete.display().to_string();
-    let text =
-        std::fs::read_to_string(&complete).map_err(|cause| VehicleError::Unreadable { file, cause })?;
-    let mut document: toml_edit::DocumentMut = text.parse().unwrap_or_default();
+    let unreadable = |cause| VehicleError::Unreadable { file: file.clone(), cause };
+    let text = std::fs::read_to_string(&complete).map_err(unreadable)?;
+    let mut document: toml_edit::DocumentMut =
+        text.parse().map_err(|error| unreadable(std::io::Error::other(error)))?;
     document.remove("effects");
     document["name"] = toml_edit::value(format!("{}, identified", vehicle.name));
     let mut text = document.to_string();
@@ -83,10 +84,4 @@ fn said(uncertainty: &Uncertainty) -> String {
         Uncertainty::OneSigma(value) => format!("{value:?}"),
         Uncertainty::Said(words) => format!("{words:?}"),
     }
-}
-
-/// Whether `name` is an effect that a vehicle file can hold.
-#[must_use]
-pub fn can_hold(name: &str) -> bool {
-    find(name).is_some()
 }

@@ -206,3 +206,17 @@ fn the_riddle_of_the_late_rig_is_solved() {
         assert!(flight["0.5"].values().all(|own| own.after < 0.3 * own.before), "{flight:?}");
     }
 }
+
+/// The new vehicle file stands alone, also where the declared one only adds effects to another beside it.
+#[test]
+fn the_new_vehicle_file_is_complete_and_keeps_declared_effects() {
+    let report = report(&heavy_with_drag(20).flights());
+    let declared = std::path::Path::new("../vehicles/hummingbird-drag.toml");
+    let effects =
+        plant::effects::entry::resolve(&vehicles::Vehicle::load(declared).unwrap().effects).unwrap();
+    let text = identify::vehicle_file::text(declared, &effects, &report).unwrap();
+    let read = vehicles::Vehicle::parse(&text, "anywhere.toml").unwrap();
+    let names: Vec<&str> = read.effects.iter().map(|own| own.name.as_str()).collect();
+    assert_eq!(names, ["rotor-drag", "parasitic-drag"], "{text}");
+    assert!(!text.contains("base ="), "{text}");
+}

@@ -177,14 +177,17 @@ impl Recording {
 /// Longer records are refused before memory is taken for them: a damaged length must not ask for terabytes.
 const RECORD_BYTES_MAX: usize = 1 << 28;
 
-/// Feeds the bytes of a file to the reader of its messages.
-struct Messages<'a> {
+/// The messages of an MCAP file, whoever wrote it: its bytes, fed to the reader. A damaged chunk is an error in front
+/// of any of its messages.
+pub struct Messages<'a> {
     reader: MessageReader,
     rest: &'a [u8],
 }
 
 impl<'a> Messages<'a> {
-    fn new(bytes: &'a [u8]) -> Self {
+    /// The messages of a file with these bytes.
+    #[must_use]
+    pub fn new(bytes: &'a [u8]) -> Self {
         let options = LinearReaderOptions::default()
             .with_prevalidate_chunk_crcs(true)
             .with_record_length_limit(RECORD_BYTES_MAX);

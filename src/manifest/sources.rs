@@ -113,9 +113,10 @@ impl Sources {
     /// A path as written: `${NAME:-default}` is the environment's NAME, and a relative path starts at the
     /// folder of the file it is written in, or of the manifest where it was given as an argument.
     pub fn path(&self, written: &Spanned<String>) -> Result<PathBuf, Problem> {
-        let expanded = expand(written.get_ref(), |name| std::env::var(name).ok()).map_err(|message| {
-            self.problem(&written.span(), message, "set it, or give a default: ${NAME:-path}")
-        })?;
+        let expanded = vehicles::variables::expand(written.get_ref(), |name| std::env::var(name).ok())
+            .map_err(|message| {
+                self.problem(&written.span(), message, "set it, or give a default: ${NAME:-path}")
+            })?;
         Ok(self.folder(written.span().start).join(expanded))
     }
 
@@ -147,33 +148,9 @@ impl Sources {
     }
 }
 
-/// Replaces `${NAME}` and `${NAME:-default}` by what `variable` says.
-fn expand(text: &str, variable: impl Fn(&str) -> Option<String>) -> Result<String, String> {
-    let mut expanded = String::new();
-    let mut rest = text;
-    while let Some((before, after)) = rest.split_once("${") {
-        let (inside, after) =
-            after.split_once('}').ok_or_else(|| format!("`{text}` has `${{` without `}}`"))?;
-        let (name, default) = inside.split_once(":-").map_or((inside, None), |(name, d)| (name, Some(d)));
-        let value = variable(name).or(default.map(str::to_owned));
-        expanded += before;
-        expanded += &value.ok_or_else(|| format!("the environment variable {name} is not set"))?;
-        rest = after;
-    }
-    Ok(expanded + rest)
-}
-
 #[cfg(test)]
 mod tests {
-    use super::{Origin, Sources, expand};
-
-    #[test]
-    fn variables_are_expanded_with_defaults() {
-        let variable = |name: &str| (name == "DATA").then(|| "/data".to_owned());
-        assert_eq!(expand("${DATA:-../x}/a.csv", variable).unwrap(), "/data/a.csv");
-        assert_eq!(expand("${NONE:-../x}/a.csv", variable).unwrap(), "../x/a.csv");
-        assert!(expand("${NONE}/a.csv", variable).unwrap_err().contains("NONE is not set"));
-    }
+    use super::{Origin, Sources};
 
     #[test]
     fn an_offset_names_a_place_in_any_text() {

@@ -30,8 +30,7 @@ const TRUTHS: [&str; 7] =
 
 /// Flies `name` with one seed, or with each of several; its own conditions decide.
 fn fly(name: &str) {
-    let number = name.len() % SEEDS.len();
-    fly_with(name, &SEEDS[number..=number]);
+    fly_with(name, &SEEDS[..1]);
 }
 
 fn fly_with(name: &str, seeds: &[u32]) {

@@ -9,6 +9,7 @@
 //! | `file` | which keys a vehicle file has, and what is physical |
 //! | [`reader`] | walks the TOML tree with positions, refuses what it does not know; scene files and gains files use it too |
 //! | [`units`] | the table of accepted units |
+//! | [`variables`] | variables of the environment within paths |
 //! | [`error`] | what can be wrong with a file, said for people |
 //!
 //! ```
@@ -26,6 +27,7 @@ mod file;
 pub mod provenance;
 pub mod reader;
 pub mod units;
+pub mod variables;
 pub mod vehicle;
 
 pub use command::CommandMap;

@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use serde::Deserialize;
 use vehicles::units::{Dimension, RATIO, SPEED, TIME, TORQUE};
+use vehicles::variables::expand;
 use vehicles::{Place, Vehicle};
 
 use super::RotorError;
@@ -309,21 +310,14 @@ impl Check<'_> {
 
     /// The path with `${NAME}` and `${NAME:-default}` replaced by the environment's, as in manifests.
     fn expanded(&self, key: &str, written: &Path) -> Result<String, RotorError> {
-        let text = written.to_string_lossy();
-        let mut expanded = String::new();
-        let mut rest: &str = &text;
-        while let Some((before, after)) = rest.split_once("${") {
-            let (inside, after) = after.split_once('}').unwrap_or((after, ""));
-            let (name, default) =
-                inside.split_once(":-").map_or((inside, None), |(name, other)| (name, Some(other)));
-            let value = std::env::var(name).ok().or(default.map(str::to_owned));
-            let expected = "a path whose variables are set or have a default, as in ${NAME:-path}";
-            self.require(value.is_some(), key, expected, &text)?;
-            expanded += before;
-            expanded += &value.unwrap_or_default();
-            rest = after;
-        }
-        Ok(expanded + rest)
+        expand(&written.to_string_lossy(), |name| std::env::var(name).ok()).map_err(|found| {
+            RotorError::BadValue {
+                file: self.file.to_owned(),
+                key: key.to_owned(),
+                expected: "a path whose variables are set or have a default, as in ${NAME:-path}".to_owned(),
+                found,
+            }
+        })
     }
 }
 

@@ -1,0 +1,34 @@
+//! Variables of the environment within the paths of files.
+
+/// Replaces `${NAME}` and `${NAME:-default}` in `text` by what `variable` says.
+///
+/// # Errors
+/// A variable that is not set and has no default, or one without its closing bracket, in words.
+pub fn expand(text: &str, variable: impl Fn(&str) -> Option<String>) -> Result<String, String> {
+    let mut expanded = String::new();
+    let mut rest = text;
+    while let Some((before, after)) = rest.split_once("${") {
+        let (inside, after) =
+            after.split_once('}').ok_or_else(|| format!("`{text}` has `${{` without `}}`"))?;
+        let (name, default) = inside.split_once(":-").map_or((inside, None), |(name, d)| (name, Some(d)));
+        let value = variable(name).or(default.map(str::to_owned));
+        expanded += before;
+        expanded += &value.ok_or_else(|| format!("the environment variable {name} is not set"))?;
+        rest = after;
+    }
+    Ok(expanded + rest)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::expand;
+
+    #[test]
+    fn variables_are_expanded_with_defaults() {
+        let variable = |name: &str| (name == "DATA").then(|| "/data".to_owned());
+        assert_eq!(expand("${DATA:-../x}/a.csv", variable).unwrap(), "/data/a.csv");
+        assert_eq!(expand("${NONE:-../x}/a.csv", variable).unwrap(), "../x/a.csv");
+        assert!(expand("${NONE}/a.csv", variable).unwrap_err().contains("NONE is not set"));
+        assert!(expand("${NONE", variable).unwrap_err().contains("without"));
+    }
+}
