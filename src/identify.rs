@@ -8,9 +8,10 @@ mod page;
 use crate::{files, validate};
 use anyhow::{Context, Result, bail};
 use clap::{Args, Subcommand};
-use flights::{Channel, Flight, FlightSet};
+use flights::{Flight, FlightSet};
 use identify::report::{FlightReport, Report};
 use identify::run::Outcome;
+use identify::sensing::SensorErrors;
 use identify::vehicle_file;
 use indicatif::{ProgressBar, ProgressStyle};
 use serde_json::{Value, json};
@@ -89,11 +90,17 @@ fn flights_of(arguments: &IdentifyArguments, file: &Path, out: &Path) -> Result<
     let vehicle = out.join("vehicle.toml");
     let text = vehicle_file::text(&set.vehicle, &outcome.effects, &outcome.report)?;
     files::write(&vehicle, |out| out.write_all(text.as_bytes()))?;
-    files::write(&out.join("report.html"), |out| page::write(&outcome, out))?;
+    // All is written before anything is flown, so that a run that fails loses nothing.
+    let write_page = |flown: Option<&Value>| {
+        files::write(&out.join("report.html"), |out| page::write(&outcome, flown, out))
+    };
+    write_page(None)?;
     let mut report = serde_json::to_value(&outcome.report)?;
-    // Written before anything is flown, so that a run that fails loses nothing.
     write_json(out, &report)?;
     let flown = if arguments.no_bus { None } else { fly(&set, &vehicle, &outcome, &progress)? };
+    if flown.is_some() {
+        write_page(flown.as_ref())?;
+    }
     progress.finish();
     report["bus"] = flown.clone().unwrap_or(Value::Null);
     write_json(out, &report)?;
@@ -110,7 +117,8 @@ fn write_json(out: &Path, report: &Value) -> Result<()> {
 /// Flies the measured commands with the declared and the new vehicle on the bus, and compares what comes of it with the
 /// predictions of the report; `None` where no flight has what a replay needs.
 fn fly(set: &FlightSet, vehicle: &Path, outcome: &Outcome, progress: &Progress) -> Result<Option<Value>> {
-    let (aligned, corrected) = (retimed(set, outcome, (0.0, 0.0)), retimed(set, outcome, outcome.delays_s));
+    let aligned = corrected(set, outcome, &SensorErrors::default());
+    let corrected = corrected(set, outcome, &outcome.sensor_errors);
     if aligned.flights.is_empty() {
         return Ok(None);
     }
@@ -144,21 +152,13 @@ fn predicted(report: &Report, flight: &str, horizon: &str, channel: &str) -> Opt
     Some((change.before, change.after))
 }
 
-/// The flights that can be replayed, with their pose set right in time by what the alignment took off and by `delays_s`
-/// of pose and inertial unit.
-fn retimed(set: &FlightSet, outcome: &Outcome, delays_s: (f64, f64)) -> FlightSet {
+/// The flights that can be replayed, without `errors` of their sensors and without what the alignment took off.
+fn corrected(set: &FlightSet, outcome: &Outcome, errors: &SensorErrors) -> FlightSet {
     let flight = |flight: &Flight| {
         let offsets = outcome.report.time_offsets_s.get(&flight.name);
         let own_s =
             offsets.and_then(|own| own.get("pose").copied().flatten()).map_or(0.0, |own| own.taken_off);
-        let mut flight = flight.clone();
-        let pose_s = own_s + delays_s.0;
-        earlier(&mut flight.position, pose_s);
-        earlier(&mut flight.velocity, pose_s);
-        earlier(&mut flight.attitude, pose_s);
-        earlier(&mut flight.angular_velocity, delays_s.1);
-        earlier(&mut flight.specific_force, delays_s.1);
-        flight
+        errors.taken_off(flight, own_s)
     };
     let can_fly = |flight: &&Flight| {
         let was_used = |own: &FlightReport| own.name == flight.name && own.compared_s > LEAST_REPLAY_S;
@@ -168,10 +168,6 @@ fn retimed(set: &FlightSet, outcome: &Outcome, delays_s: (f64, f64)) -> FlightSe
     };
     let flights = set.flights.iter().filter(can_fly).map(flight).collect();
     FlightSet { vehicle: set.vehicle.clone(), flights }
-}
-
-fn earlier<const N: usize>(channel: &mut Channel<N>, by_s: f64) {
-    channel.time_s.iter_mut().for_each(|time_s| *time_s -= by_s);
 }
 
 fn summary(report: &Report, flown: Option<&Value>, out: &Path) -> String {

@@ -8,7 +8,7 @@
 //! | `quantity`, `frame` | units and frames |
 //! | `log` | a log of any format: `csv_log`, `mcap_log` (with `ros_definition`), `ulog`, `crazyflie`, `bytes` |
 //! | `known_types` | messages whose fields and units need not be said |
-//! | `channels`, `clean`, `reading` | from a log's numbers to a flight |
+//! | `channels`, `clean`, `jumps`, `reading` | from a log's numbers to a flight |
 //! | `plausible`, `agreement` | values against physics |
 //! | `canonical` | a flight as one CSV table |
 //! | `error` | what can be wrong |
@@ -25,6 +25,7 @@ mod document;
 pub mod error;
 pub mod flight;
 mod frame;
+mod jumps;
 mod known_types;
 mod log;
 mod mcap_log;

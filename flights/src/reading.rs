@@ -13,6 +13,7 @@ use crate::document::{Bad, Document};
 use crate::error::FlightsError;
 use crate::flight::{Channel, Flight};
 use crate::frame;
+use crate::jumps;
 use crate::known_types;
 use crate::log::Log;
 use crate::plausible;
@@ -53,6 +54,7 @@ impl Reading<'_> {
         let origin_s = self.origin_s(&flight, yaw.as_ref())?;
         self.to_flight_time(&mut flight, origin_s);
         self.assume(&mut flight, yaw.map(|yaw| self.shift(Quantity::Attitude, yaw, origin_s)))?;
+        jumps::leave_out(&mut flight);
         self.say_gaps(&mut flight);
         self.check_something_is_left(&flight)?;
         self.judge(&mut flight)?;

@@ -17,6 +17,10 @@ const LEAST_BLOCKS: usize = 5;
 /// An offset is real beyond so many standard deviations.
 const SURE: f64 = 4.0;
 
+/// How the samples lie on the grid decides how much noise their interpolation leaves, which pulls at the offset by up to
+/// this part of the pose's period (docs/validation.md), beyond what blocks of time can show.
+const BETWEEN_SAMPLES: f64 = 0.1;
+
 /// Lateness of the pose against the inertial unit.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Offset {
@@ -54,6 +58,10 @@ pub fn offset(bench: &Bench, flight: &Prepared) -> Option<(f64, f64)> {
     None
 }
 
+fn pose_period_s(flight: &Prepared) -> f64 {
+    flight.flight.attitude.period_s().unwrap_or(0.0)
+}
+
 /// Weights under which only gyroscope and attitude count.
 #[must_use]
 pub fn kinematic_weights() -> Weights {
@@ -76,7 +84,7 @@ pub fn align(bench: &mut Bench) -> Vec<(String, Option<Offset>)> {
             let own = value - shared;
             let is_sure = own.abs() > SURE * deviation && own.abs() > least_s;
             flight.pose_offset_s = if is_sure { own } else { 0.0 };
-            let half = 1.96 * deviation;
+            let half = (1.96 * deviation).hypot(BETWEEN_SAMPLES * pose_period_s(flight));
             Offset { value, low: value - half, high: value + half, taken_off: flight.pose_offset_s }
         });
         offsets.push((flight.flight.name.clone(), offset));

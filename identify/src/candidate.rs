@@ -1,6 +1,6 @@
 //! The candidates of a selection: which parameters an effect brings, and where their fit starts.
 
-use crate::parameter::{Parameters, SENSOR_BIAS, SENSOR_DELAY};
+use crate::parameter::{Owner, Parameter, Parameters, SENSOR_BIAS, SENSOR_DELAY, SensorParameter};
 use crate::prepared::{Equation, Prepared};
 
 /// An effect, or the part of one that makes sense alone: one weak rotor, the bias of one sensor.
@@ -37,9 +37,16 @@ pub fn candidates(parameters: &Parameters, flights: &[&Prepared]) -> (Vec<Candid
             });
             continue;
         }
-        match needs(effect).iter().find(|(_, is_met)| !flights.iter().any(|flight| is_met(flight))) {
-            Some((needs, _)) => unseen.push(Unseen { effect, needs }),
-            None => seen.extend(parts(parameters, effect)),
+        let is_unmet = |need: &&Need| !flights.iter().any(|flight| need.1(flight));
+        if let Some((needs, _)) = needs(effect).iter().find(is_unmet) {
+            unseen.push(Unseen { effect, needs });
+            continue;
+        }
+        for part in parts(parameters, effect) {
+            match need_of_part(&parameters.all[part.which[0]]).filter(|need| is_unmet(&need)) {
+                Some((needs, _)) => unseen.push(Unseen { effect, needs }),
+                None => seen.push(part),
+            }
         }
     }
     (seen, unseen)
@@ -68,6 +75,22 @@ const TWO_CLOCKS: Need = ("gyroscope and attitude, or else commands, to be late 
     flight.offset_of(Equation::Gyroscope).is_some() || !flight.flight.command.is_empty()
 });
 
+const BIASED_FORCE: Need =
+    ("specific force, for the accelerometer's", |flight| flight.offset_of(Equation::SpecificForce).is_some());
+const BIASED_RATES: Need = ("attitude and angular velocity, for the gyroscope's", |flight| {
+    flight.offset_of(Equation::Gyroscope).is_some()
+});
+const BIASED_ATTITUDE: Need =
+    ("attitude with position, velocity or specific force, for the attitude's", |flight| {
+        !flight.flight.attitude.is_empty() && FORCES.1(flight)
+    });
+const INERTIAL: Need = ("an inertial unit, for its own", |flight| {
+    !flight.flight.angular_velocity.is_empty() || !flight.flight.specific_force.is_empty()
+});
+const POSE: Need = ("attitude or position, for the pose's", |flight| {
+    !flight.flight.attitude.is_empty() || !flight.flight.position.is_empty()
+});
+
 const HELD: Need = ("a rig: these flights move freely", |flight| !flight.moves_freely());
 
 /// What has to be measured for an effect to show.
@@ -84,6 +107,18 @@ fn needs(effect: &str) -> &'static [Need] {
         "rig-pendulum" => &[TORQUES, ATTITUDE, HELD],
         SENSOR_DELAY => &[TWO_CLOCKS],
         _ => &[],
+    }
+}
+
+/// What else has to be measured for one sensor's part of an effect.
+fn need_of_part(parameter: &Parameter) -> Option<Need> {
+    match parameter.owner {
+        Owner::Sensor(SensorParameter::Accelerometer(_)) => Some(BIASED_FORCE),
+        Owner::Sensor(SensorParameter::Gyroscope(_)) => Some(BIASED_RATES),
+        Owner::Sensor(SensorParameter::Attitude(_)) => Some(BIASED_ATTITUDE),
+        Owner::Sensor(SensorParameter::ImuDelay) => Some(INERTIAL),
+        Owner::Sensor(SensorParameter::PoseDelay) => Some(POSE),
+        Owner::Plant(..) => None,
     }
 }
 
@@ -116,6 +151,10 @@ fn starts(parameters: &Parameters, which: &[usize]) -> Vec<Vec<f64>> {
         "command-delay" => grid(&[0.005, 0.015, 0.03, 0.06, 0.1, 0.15, 0.2, 0.3]),
         SENSOR_DELAY => grid(&[-0.1, -0.05, -0.02, 0.01, 0.03, 0.06, 0.1, 0.15, 0.2]),
         "motor-lag" => [-0.5, -0.2, 0.3, 1.0, 2.5].map(|slowness| vec![slowness, 0.0]).to_vec(),
+        // The hub is twisted by the product of the two.
+        "blade-flapping" => [0.3, 1.0]
+            .map(|part| which.iter().map(|at| part * parameters.all[*at].plausible).collect())
+            .to_vec(),
         "battery-sag" => vec![vec![0.03, 1.0, 0.1], vec![0.1, 1.0, 0.3], vec![0.01, 0.5, 0.5]],
         _ => Vec::new(),
     }

@@ -55,6 +55,12 @@ impl Fitted {
         self.test_squares.iter().sum()
     }
 
+    /// Sum of the squares of the fit flights.
+    #[must_use]
+    pub fn fit_sum(&self) -> f64 {
+        self.fit_squares.iter().sum()
+    }
+
     /// Standard deviation of a parameter; `None` where it was held.
     #[must_use]
     pub fn deviation(&self, parameter: usize) -> Option<f64> {
@@ -297,6 +303,17 @@ impl Bench<'_> {
             if variance > 0.0 { 1.0 / variance } else { 0.0 }
         };
         sums.into_iter().map(|(name, sum)| (name, weight(sum))).collect()
+    }
+
+    /// The squares that `fitted` leaves on the fit flights, in units of what all candidates together would leave by the
+    /// linearised equations: those by which the weights were set.
+    #[must_use]
+    pub fn left(&self, fitted: &Fitted) -> f64 {
+        let rows = |flight: &Prepared| {
+            flight.layout.knots.len()
+                * self.row_weights(flight).iter().filter(|weight| **weight > 0.0).count()
+        };
+        fitted.fit_sum() / self.fit.iter().map(rows).sum::<usize>().max(1) as f64
     }
 
     /// The shortest delay that the grids can tell from none.

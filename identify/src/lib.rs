@@ -15,6 +15,7 @@
 //! | [`normal`], [`fit`] | least squares over blocks of time |
 //! | [`select`] | attribution: which effects the flights ask for |
 //! | [`align`], [`faults`], [`trim`] | clocks, sensors and trims, before anything is fitted |
+//! | [`sensing`] | the sensors' delays and biases, and a flight without them |
 //! | [`whiteness`], [`noise`], [`statistics`] | what is left, and what noise alone would leave |
 //! | [`predict`] | prediction over horizons |
 //! | [`regressor`] | what residuals are looked at against |
@@ -38,6 +39,7 @@ pub mod report;
 pub mod rotor;
 pub mod run;
 pub mod select;
+pub mod sensing;
 pub mod statistics;
 pub mod track;
 pub mod trim;

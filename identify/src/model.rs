@@ -1,10 +1,11 @@
 //! What the model says of a flight: the rows of every equation under given parameters.
 #![allow(non_snake_case, reason = "a trailing _W or _B names the frame a vector is written in")]
 
-use crate::parameter::{Parameters, SensorParameter, Stage};
+use crate::parameter::{Parameters, Stage};
 use crate::prepared::{Equation, Held, Prepared, Tracks};
+use crate::sensing::SensorErrors;
 use crate::track::Track;
-use nalgebra::{UnitQuaternion, Vector3};
+use nalgebra::Vector3;
 use plant::{Airframe, Drive, NewtonEuler, RigidBody, RotorState, State};
 use vehicles::Vehicle;
 
@@ -39,8 +40,8 @@ impl Model {
     /// The measured channels of `flight` under these values.
     #[must_use]
     pub fn tracks(&self, flight: &Prepared, values: &[f64]) -> Tracks {
-        let sensor = |wanted| self.parameters.sensor(values, wanted);
-        flight.tracks(sensor(SensorParameter::PoseDelay), sensor(SensorParameter::ImuDelay))
+        let errors = SensorErrors::of(&self.parameters, values);
+        flight.tracks(errors.pose_delay_s, errors.inertial_delay_s)
     }
 
     /// The rotors of `flight` under these values. Where speeds were measured, the difference to what follows from the
@@ -63,11 +64,7 @@ impl Model {
     #[must_use]
     pub fn residual(&self, flight: &Prepared, tracks: &Tracks, rotors: &Rotors, values: &[f64]) -> Vec<f64> {
         let sides = self.sides(flight, tracks, rotors, values);
-        let bias = |own: fn(usize) -> SensorParameter| -> [f64; 3] {
-            std::array::from_fn(|axis| self.parameters.sensor(values, own(axis)))
-        };
-        let (force_bias, rate_bias) =
-            (bias(SensorParameter::Accelerometer), bias(SensorParameter::Gyroscope));
+        let errors = SensorErrors::of(&self.parameters, values);
         let mut residual = tracks.rows.clone();
         let mut rows = residual.iter_mut();
         let mut take =
@@ -77,11 +74,13 @@ impl Model {
                 match equation {
                     Equation::SpecificForce => {
                         let force = window.over(&sides.force_B, knot);
-                        take(&std::array::from_fn::<_, 3, _>(|axis| force[axis] + force_bias[axis]));
+                        take(&std::array::from_fn::<_, 3, _>(|axis| {
+                            force[axis] + errors.accelerometer_bias_m_s2[axis]
+                        }));
                     }
                     Equation::Acceleration => take(&window.over(&sides.acceleration_W, knot)),
                     Equation::AngularAcceleration => take(&window.over(&sides.angular_B, knot)),
-                    Equation::Gyroscope => take(&rate_bias),
+                    Equation::Gyroscope => take(&errors.gyroscope_bias_rad_s),
                     Equation::RotorSpeed => {
                         let speeds = window.over(&rotors.commanded, knot);
                         take(&speeds);
@@ -105,12 +104,7 @@ impl Model {
         let airframe = self.airframe(values);
         let drive = air(&airframe, flight.layout.clock.step_s);
         let model = NewtonEuler::flying(airframe, 1);
-        let tilt = Vector3::new(
-            self.parameters.sensor(values, SensorParameter::Attitude(0)),
-            self.parameters.sensor(values, SensorParameter::Attitude(1)),
-            0.0,
-        );
-        let mounting = UnitQuaternion::from_scaled_axis(-tilt);
+        let mounting = SensorErrors::of(&self.parameters, values).mounting();
         let gravity_m_s2 = model.vehicle().gravity_m_s2;
         let has_world = flight.offset_of(Equation::Acceleration).is_some();
         let mut sides = Sides::default();

@@ -3,7 +3,7 @@
 #![allow(non_snake_case, reason = "a trailing _W or _B names the frame a vector is written in")]
 
 use crate::clock::Clock;
-use crate::prepared::Held;
+use crate::prepared::{Held, SETTLE_S};
 use crate::track::Track;
 use flights::Flight;
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
@@ -13,8 +13,9 @@ use std::collections::BTreeMap;
 /// Length of a tick.
 const TICK_S: f64 = 0.001;
 
-/// Windows that begin earlier do not count: how fast the rotors turn at the start of a flight is not known.
-const SETTLE_TICKS: usize = 500;
+/// Windows that begin earlier do not count.
+#[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a few hundred")]
+const SETTLE_TICKS: usize = (SETTLE_S / TICK_S) as usize;
 
 /// The measured states of a flight, tick by tick.
 #[derive(Debug)]
@@ -31,10 +32,9 @@ pub type Errors = BTreeMap<&'static str, f64>;
 pub type Trace = Vec<(f64, RigidBody, RigidBody)>;
 
 impl Measured {
-    /// The states of `flight`, its pose late by `pose_s` and its inertial unit by `imu_s`; `None` where it has no
-    /// commands, or no motion.
+    /// The states of `flight`; `None` where it has no commands, or no motion.
     #[must_use]
-    pub fn of(flight: &Flight, pose_s: f64, imu_s: f64) -> Option<Self> {
+    pub fn of(flight: &Flight) -> Option<Self> {
         let span = if flight.attitude.is_empty() {
             &flight.angular_velocity.time_s
         } else {
@@ -43,13 +43,13 @@ impl Measured {
         let (first, last) = (span.first()?, span.last()?);
         let (start_s, end_s) = flight.command.span_s()?;
         let clock = Clock::spanning(first.max(start_s), last.min(end_s) - 0.01, TICK_S);
-        let position = Track::sampled(&flight.position, pose_s, &clock);
-        let attitude = Track::sampled(&flight.attitude, pose_s, &clock);
-        let gyroscope = Track::sampled(&flight.angular_velocity, imu_s, &clock);
+        let position = Track::sampled(&flight.position, 0.0, &clock);
+        let attitude = Track::sampled(&flight.attitude, 0.0, &clock);
+        let gyroscope = Track::sampled(&flight.angular_velocity, 0.0, &clock);
         let velocity = if flight.velocity.is_empty() {
             position.slope(reach(flight.position.period_s()), TICK_S)
         } else {
-            Track::sampled(&flight.velocity, pose_s, &clock).values
+            Track::sampled(&flight.velocity, 0.0, &clock).values
         };
         let quaternions: Vec<UnitQuaternion<f64>> = attitude.values.iter().map(unit).collect();
         let rates = if flight.angular_velocity.is_empty() {

@@ -82,6 +82,13 @@ pub struct Tracks {
     pub rows: Vec<f64>,
 }
 
+/// How fast the rotors turn where a log begins, and what was commanded before, is not known: they count from then on.
+pub const SETTLE_S: f64 = 0.5;
+
+/// Delays of sensors that are tried take samples from beside an instant: at the ends of a flight and about its gaps so
+/// much is left out.
+const DELAY_MARGIN_S: f64 = 0.1;
+
 /// No rig lets a vehicle go further to the side.
 const RIG_M: f64 = 0.3;
 
@@ -224,24 +231,25 @@ impl<'f> Prepared<'f> {
         let mut valid = vec![true; clock.count];
         let mut require = |other: Vec<bool>| valid.iter_mut().zip(other).for_each(|(all, one)| *all &= one);
         if uses_pose(flight) && !flight.position.is_empty() {
-            require(Track::sampled(&flight.position, 0.0, clock).valid);
+            require(sampled_about(&flight.position, clock));
         }
         if uses_pose(flight) && flight.position.is_empty() && !flight.velocity.is_empty() {
-            require(Track::sampled(&flight.velocity, 0.0, clock).valid);
+            require(sampled_about(&flight.velocity, clock));
         }
         if !flight.attitude.is_empty() {
-            require(Track::sampled(&flight.attitude, 0.0, clock).valid);
+            require(sampled_about(&flight.attitude, clock));
         }
         if !flight.angular_velocity.is_empty() {
-            require(Track::sampled(&flight.angular_velocity, 0.0, clock).valid);
+            require(sampled_about(&flight.angular_velocity, clock));
         }
         if !flight.specific_force.is_empty() {
-            require(Track::sampled(&flight.specific_force, 0.0, clock).valid);
+            require(sampled_about(&flight.specific_force, clock));
         }
         if !flight.rotor_speed.is_empty() {
             require(Track::sampled(&flight.rotor_speed, 0.0, clock).valid);
         }
         if !flight.command.is_empty() {
+            require((0..clock.count).map(|index| clock.at(index) - clock.at(0) >= SETTLE_S).collect());
             let mut held = Held::new(&flight.command);
             require((0..clock.count).map(|index| is_flying(&held.at(clock.at(index)), true)).collect());
         } else if !flight.rotor_speed.is_empty() {
@@ -250,6 +258,16 @@ impl<'f> Prepared<'f> {
         }
         valid
     }
+}
+
+/// Whether a channel was sampled at each instant, and would have been if it were late or early by [`DELAY_MARGIN_S`].
+fn sampled_about<const N: usize>(channel: &flights::Channel<N>, clock: &Clock) -> Vec<bool> {
+    let mut valid = Track::sampled(channel, 0.0, clock).valid;
+    for delay_s in [-DELAY_MARGIN_S, DELAY_MARGIN_S] {
+        let trial = Track::sampled(channel, delay_s, clock).valid;
+        valid.iter_mut().zip(trial).for_each(|(all, one)| *all &= one);
+    }
+    valid
 }
 
 /// A channel whose samples hold until the next.

@@ -86,6 +86,8 @@ pub struct FlightReport {
 pub struct EffectReport {
     /// Whether it was accepted.
     pub accepted: bool,
+    /// Whether its parameters and its gain are what the linearised equations promise, and not those of a fit.
+    pub linearised: bool,
     /// Its fitted parameters.
     pub parameters: BTreeMap<&'static str, Estimate>,
     /// Weighted root mean square of the residual on the test flights, in units of what all candidates together leave:

@@ -7,12 +7,13 @@ use crate::faults;
 use crate::fit::{Bench, Fitted, Weights};
 use crate::model::Model;
 use crate::noise;
-use crate::parameter::{Parameters, SensorParameter};
+use crate::parameter::Parameters;
 use crate::predict::{CHANNELS, Errors, Measured};
 use crate::prepared::{Equation, Prepared};
 use crate::regressor::{Regressor, regressors};
 use crate::report::{BeforeAfter, Change, EffectReport, Estimate, FlightReport, Noise, Report, Unexplained};
 use crate::select::{Selection, rivals, select, which};
+use crate::sensing::SensorErrors;
 use crate::trim;
 use crate::whiteness::whiteness;
 use flights::{Flight, FlightSet, Role};
@@ -59,8 +60,8 @@ pub struct Outcome {
     pub pictures: Vec<Picture>,
     /// What each flight did meanwhile, by name: at the same instants as its pictures.
     pub regressors: BTreeMap<String, Vec<Regressor>>,
-    /// Accepted lateness of the pose and of the inertial unit, to be taken off the flights before they are flown again.
-    pub delays_s: (f64, f64),
+    /// Accepted delays and biases of sensors, to be taken off the flights before they are flown again.
+    pub sensor_errors: SensorErrors,
 }
 
 /// The residuals of one equation of one flight, before and after, and what was measured.
@@ -103,8 +104,8 @@ pub fn identify(set: &FlightSet, progress: &mut dyn FnMut(&str)) -> Result<Outco
     accepted_effects(&bench, &selection, &mut effects);
     progress("predictions");
     let values = &selection.after.values;
-    let delays_s = delays(&bench, values);
-    let predictions = predictions(&bench, set, values, delays_s);
+    let sensor_errors = SensorErrors::of(&bench.model.parameters, values);
+    let predictions = predictions(&bench, set, values, &sensor_errors);
     let floor = noise::floor(&bench);
     let whiteness =
         BeforeAfter { before: whiteness(&bench, &selection.before.values), after: whiteness(&bench, values) };
@@ -131,7 +132,7 @@ pub fn identify(set: &FlightSet, progress: &mut dyn FnMut(&str)) -> Result<Outco
     let flown = bench.fit.iter().chain(&bench.test);
     let regressors =
         flown.map(|own| (own.flight.name.clone(), regressors(&bench.model, own, values))).collect();
-    Ok(Outcome { pictures: pictures(&bench, &selection), regressors, effects, delays_s, report })
+    Ok(Outcome { pictures: pictures(&bench, &selection), regressors, effects, sensor_errors, report })
 }
 
 /// The flights on their grids, with the declared model.
@@ -223,6 +224,7 @@ fn judged_effects(bench: &Bench, selection: &Selection) -> BTreeMap<&'static str
             let before = after / (1.0 - judged.gain).max(1e-12);
             let report = EffectReport {
                 accepted: false,
+                linearised: judged.is_promise,
                 parameters: estimates(bench, &judged.fitted, &judged.candidate.which),
                 held_out: BeforeAfter { before: size(bench, before), after: size(bench, after) },
                 chance: judged.gain_chance,
@@ -272,7 +274,15 @@ fn accepted_effects(
         let chance = selection.chance(name);
         effects.insert(
             name,
-            EffectReport { accepted: true, parameters, held_out, chance, confused_with, experiment },
+            EffectReport {
+                accepted: true,
+                linearised: false,
+                parameters,
+                held_out,
+                chance,
+                confused_with,
+                experiment,
+            },
         );
     }
 }
@@ -303,27 +313,29 @@ pub fn estimates(bench: &Bench, fitted: &Fitted, which: &[usize]) -> BTreeMap<&'
     which.iter().map(one).collect()
 }
 
-fn delays(bench: &Bench, values: &[f64]) -> (f64, f64) {
-    let sensor = |own| bench.model.parameters.sensor(values, own);
-    (sensor(SensorParameter::PoseDelay), sensor(SensorParameter::ImuDelay))
-}
-
 type Prediction = (String, Role, f64, Errors, Errors);
 
 /// Errors of every flight at every horizon, declared and new.
-fn predictions(bench: &Bench, set: &FlightSet, values: &[f64], delays_s: (f64, f64)) -> Vec<Prediction> {
+fn predictions(
+    bench: &Bench,
+    set: &FlightSet,
+    values: &[f64],
+    sensor_errors: &SensorErrors,
+) -> Vec<Prediction> {
     let declared = bench.model.parameters.declared();
     let mut predictions = Vec::new();
     for flight in &set.flights {
         let all = bench.fit.iter().chain(&bench.test);
         let own_s =
             all.clone().find(|own| own.flight.name == flight.name).map_or(0.0, |own| own.pose_offset_s);
-        let before = Measured::of(flight, own_s, 0.0);
-        let after = Measured::of(flight, own_s + delays_s.0, delays_s.1);
-        let (Some(before), Some(after)) = (before, after) else { continue };
+        let aligned = SensorErrors::default().taken_off(flight, own_s);
+        let corrected = sensor_errors.taken_off(flight, own_s);
+        let (Some(before), Some(after)) = (Measured::of(&aligned), Measured::of(&corrected)) else {
+            continue;
+        };
         for horizon_s in HORIZONS_S {
-            let (old, _) = before.predicted(flight, bench.model.airframe(&declared), horizon_s, 0);
-            let (new, _) = after.predicted(flight, bench.model.airframe(values), horizon_s, 0);
+            let (old, _) = before.predicted(&aligned, bench.model.airframe(&declared), horizon_s, 0);
+            let (new, _) = after.predicted(&corrected, bench.model.airframe(values), horizon_s, 0);
             predictions.push((flight.name.clone(), flight.role, horizon_s, old, new));
         }
     }

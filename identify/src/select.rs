@@ -10,7 +10,10 @@
 //!
 //! Of the accepted the one with the greatest gain is taken, but one with fewer parameters where the difference is not
 //! beyond chance. Then those taken before have to pass the first test again, as a later effect may explain what an
-//! earlier one stood in for. The rounds end when nothing is accepted any more.
+//! earlier one stood in for.
+//!
+//! Where a round accepts nothing although much is left that some candidates together would take away, two are looked for
+//! that only gain together, under the same tests. The rounds end when nothing changes any more.
 
 use crate::candidate::Candidate;
 use crate::fit::{Bench, Fitted};
@@ -35,7 +38,12 @@ const CONFIRMED: usize = 4;
 /// A rival has at least this part of the gain.
 const NEAR: f64 = 0.5;
 /// More rounds than there are effects worth naming.
-const ROUNDS_MAX: usize = 10;
+const ROUNDS_MAX: usize = 12;
+/// Two that mask each other are looked for where this many times the squares are left that all candidates together
+/// would leave on the fit flights.
+const MUCH_LEFT: f64 = 1.5;
+/// So many candidates are tried as the first of two.
+const FIRSTS: usize = 4;
 
 /// A candidate that was fitted and judged.
 #[derive(Debug, Clone)]
@@ -52,6 +60,8 @@ pub struct Judged {
     pub parameter_t: f64,
     /// Whether it was accepted.
     pub is_accepted: bool,
+    /// Whether `fitted` is no fit but what the linearised equations promise.
+    pub is_promise: bool,
 }
 
 /// One round.
@@ -61,6 +71,14 @@ pub struct Round {
     pub judged: Vec<Judged>,
     /// Which of it was taken.
     pub taken: Option<usize>,
+}
+
+impl Round {
+    /// What was taken.
+    #[must_use]
+    pub fn taken(&self) -> Option<&Judged> {
+        self.taken.map(|at| &self.judged[at])
+    }
 }
 
 /// What a selection came to.
@@ -80,7 +98,7 @@ impl Selection {
     /// Chance of as much gain without the accepted `effect`, in the round that took the best part of it.
     #[must_use]
     pub fn chance(&self, effect: &str) -> f64 {
-        let taken = self.rounds.iter().filter_map(|round| Some(&round.judged[round.taken?]));
+        let taken = self.rounds.iter().filter_map(Round::taken);
         taken.filter(|own| own.candidate.effect == effect).map(|own| own.gain_chance).fold(1.0, f64::min)
     }
 }
@@ -119,7 +137,7 @@ struct Course {
 }
 
 impl Course {
-    /// Rounds among `candidates` until none is accepted.
+    /// Rounds among `candidates` until none changes anything.
     fn run(&mut self, bench: &mut Bench, candidates: &[Candidate], progress: &mut dyn FnMut(&str)) {
         for _ in 0..ROUNDS_MAX {
             let open = candidates.iter().filter(|candidate| !self.accepted.contains(candidate)).count();
@@ -129,14 +147,64 @@ impl Course {
             progress(&format!("round {}: {open} candidates", self.rounds.len() + 1));
             bench.weigh(&self.base, candidates);
             self.base = bench.fitted(&self.base.values, &which(&self.accepted));
-            let round = round(bench, &self.base, &self.accepted, candidates);
-            let taken = round.taken.map(|at| round.judged[at].clone());
-            self.rounds.push(round);
-            let Some(taken) = taken else { break };
-            self.accepted.push(taken.candidate);
-            self.base = without_idle(bench, taken.fitted, &mut self.accepted);
+            self.rounds.push(round(bench, &self.base, &self.accepted, candidates, FALSE_RATE));
+            if !(self.take(bench) || self.take_two(bench, candidates)) {
+                break;
+            }
         }
     }
+
+    /// Accepts what the last round took.
+    fn take(&mut self, bench: &Bench) -> bool {
+        let Some(taken) = self.rounds.last().and_then(Round::taken).cloned() else { return false };
+        self.accepted.push(taken.candidate);
+        self.base = without_idle(bench, taken.fitted, &mut self.accepted);
+        true
+    }
+
+    /// Accepts two that only gain together: of two strong effects each can make the blocks worse in which the other
+    /// acts. Their first is chosen on the fit flights, so that no chance of the test flights is used up by the search.
+    fn take_two(&mut self, bench: &Bench, candidates: &[Candidate]) -> bool {
+        let Some(last) = self.rounds.last() else { return false };
+        if bench.left(&self.base) < MUCH_LEFT {
+            return false;
+        }
+        let mut firsts: Vec<usize> = (0..last.judged.len()).collect();
+        firsts.sort_by(|a, b| last.judged[*a].fitted.fit_sum().total_cmp(&last.judged[*b].fitted.fit_sum()));
+        let rate = FALSE_RATE / FIRSTS as f64;
+        for first in firsts.into_iter().take(FIRSTS) {
+            let candidate = last.judged[first].candidate.clone();
+            let alone = fitted(bench, &self.base, &self.accepted, &candidate);
+            let mut accepted = self.accepted.clone();
+            accepted.push(candidate);
+            let round = round(bench, &alone, &accepted, candidates, rate);
+            let Some(second) = round.taken() else { continue };
+            let both = second.fitted.clone();
+            accepted.push(second.candidate.clone());
+            let place = self.accepted.len();
+            let without_first = without(bench, &both, &accepted, place);
+            let is_gain = |before: &Fitted| chance(&before.test_squares, &both.test_squares) < rate;
+            if is_gain(&self.base) && is_gain(&without_first) {
+                let at = self.rounds.len() - 1;
+                self.rounds[at].taken = Some(first);
+                self.rounds[at].judged[first].is_accepted = true;
+                self.rounds.push(round);
+                self.base = without_idle(bench, both, &mut accepted);
+                self.accepted = accepted;
+                return true;
+            }
+        }
+        false
+    }
+}
+
+/// The fit of `accepted` but that at `at`, from `base` on.
+fn without(bench: &Bench, base: &Fitted, accepted: &[Candidate], at: usize) -> Fitted {
+    let mut others = accepted.to_vec();
+    let own = others.remove(at);
+    let mut start = base.values.clone();
+    own.which.iter().for_each(|at| start[*at] = bench.model.parameters.all[*at].declared);
+    bench.fitted(&start, &which(&others))
 }
 
 /// The parameters of candidates.
@@ -145,17 +213,19 @@ pub fn which(accepted: &[Candidate]) -> Vec<usize> {
     accepted.iter().flat_map(|candidate| candidate.which.clone()).collect()
 }
 
-fn round(bench: &Bench, base: &Fitted, accepted: &[Candidate], candidates: &[Candidate]) -> Round {
+/// Judges all of `candidates` that are not in `accepted`; `rate` is the chance of a false acceptance among them.
+fn round(bench: &Bench, base: &Fitted, accepted: &[Candidate], candidates: &[Candidate], rate: f64) -> Round {
     let open: Vec<&Candidate> = candidates.iter().filter(|candidate| !accepted.contains(candidate)).collect();
-    let level = FALSE_RATE / open.len().max(1) as f64;
+    let level = rate / open.len().max(1) as f64;
     let screen = Screen::of(bench, base, accepted, &open);
     let judge = |candidate: &&Candidate| {
-        let fitted = if candidate.starts.is_empty() {
+        let is_promise = candidate.starts.is_empty();
+        let fitted = if is_promise {
             screen.promised(bench, base, candidate)
         } else {
             fitted(bench, base, accepted, candidate)
         };
-        judged(bench, base, candidate, fitted, level)
+        Judged { is_promise, ..judged(bench, base, candidate, fitted, level) }
     };
     let mut all: Vec<Judged> = open.par_iter().map(judge).collect();
     confirm(bench, base, accepted, &mut all, level);
@@ -166,7 +236,7 @@ fn round(bench: &Bench, base: &Fitted, accepted: &[Candidate], candidates: &[Can
 /// Has those of whom the linearised equations promise most fitted in earnest; a promise alone is not accepted.
 fn confirm(bench: &Bench, base: &Fitted, accepted: &[Candidate], all: &mut [Judged], level: f64) {
     let mut promises: Vec<&mut Judged> =
-        all.iter_mut().filter(|own| own.is_accepted && own.candidate.starts.is_empty()).collect();
+        all.iter_mut().filter(|own| own.is_accepted && own.is_promise).collect();
     promises.sort_by(|a, b| b.gain.total_cmp(&a.gain));
     promises.into_par_iter().enumerate().for_each(|(place, own)| {
         if place < CONFIRMED {
@@ -192,6 +262,7 @@ fn judged(bench: &Bench, base: &Fitted, candidate: &Candidate, fitted: Fitted, l
         gain_chance,
         parameter_t,
         is_accepted,
+        is_promise: false,
         fitted,
     }
 }
@@ -273,16 +344,12 @@ pub fn is_worse(fitted: &Fitted, other: &Fitted) -> bool {
 fn without_idle(bench: &Bench, mut base: Fitted, accepted: &mut Vec<Candidate>) -> Fitted {
     let mut at = 0;
     // The newest has just passed.
-    while accepted.len() > 1 && at + 1 < accepted.len() {
-        let mut others = accepted.clone();
-        let idle = others.remove(at);
-        let mut start = base.values.clone();
-        idle.which.iter().for_each(|at| start[*at] = bench.model.parameters.all[*at].declared);
-        let fitted = bench.fitted(&start, &which(&others));
+    while at + 1 < accepted.len() {
+        let fitted = without(bench, &base, accepted, at);
         if is_worse(&fitted, &base) {
             at += 1;
         } else {
-            *accepted = others;
+            accepted.remove(at);
             base = fitted;
         }
     }
@@ -335,9 +402,7 @@ pub fn rivals(bench: &Bench, selection: &Selection, at: usize) -> Vec<&'static s
     let own = &selection.accepted[at];
     let mut others = selection.accepted.clone();
     others.remove(at);
-    let mut start = selection.after.values.clone();
-    own.which.iter().for_each(|at| start[*at] = bench.model.parameters.all[*at].declared);
-    let base = bench.fitted(&start, &which(&others));
+    let base = without(bench, &selection.after, &selection.accepted, at);
     let is_rival =
         |candidate: &&Candidate| !is_worse(&fitted(bench, &base, &others, candidate), &selection.after);
     let near = near(selection, own);
@@ -349,9 +414,9 @@ pub fn rivals(bench: &Bench, selection: &Selection, at: usize) -> Vec<&'static s
 
 /// The candidates of other effects that gained at least [`NEAR`] of what `own` did in the round that took it.
 fn near<'s>(selection: &'s Selection, own: &Candidate) -> Vec<&'s Candidate> {
-    let took = |round: &&Round| round.taken.is_some_and(|at| round.judged[at].candidate == *own);
+    let took = |round: &&Round| round.taken().is_some_and(|taken| taken.candidate == *own);
     let Some(round) = selection.rounds.iter().find(took) else { return Vec::new() };
-    let gain = round.taken.map_or(0.0, |at| round.judged[at].gain);
+    let gain = round.taken().map_or(0.0, |taken| taken.gain);
     let is_near = |judged: &&Judged| {
         judged.gain > NEAR * gain
             && judged.candidate.effect != own.effect

@@ -52,9 +52,22 @@ fn each_effect_is_named_and_no_other_last_third() {
 
 #[test]
 fn two_effects_at_once_are_both_named() {
-    for (seed, pair) in [(801, ["rotor-drag", "mass-error"]), (802, ["com-offset", "weak-rotor"])] {
+    let pairs = [
+        (801, ["rotor-drag", "mass-error"]),
+        (802, ["com-offset", "weak-rotor"]),
+        // A centre of mass above the hubs makes nearly the torque of the flapping.
+        (803, ["blade-flapping", "rotor-drag"]),
+    ];
+    for (seed, pair) in pairs {
         require_right(&pair.join(" + "), &judged(Case::of(&pair, 1.0, seed, DURATION_S)));
     }
+}
+
+/// Each alone takes half of the squares away, but makes those blocks worse in which the other acts.
+#[test]
+fn two_effects_that_hide_each_other_are_both_named() {
+    let pair = ["thrust-scale", "translational-lift"];
+    require_right(&pair.join(" + "), &judged(Case::of(&pair, 1.0, 10_603, 12.0)));
 }
 
 /// At a true rate of 5 % more than three of twenty would be seen once in sixty times; the seeds are fixed.

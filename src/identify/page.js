@@ -123,12 +123,13 @@ function drawEffect(table, name, effect) {
   const kind = effect.accepted ? "" : "left-out";
   const { before, after } = effect.held_out;
   const own = [number(before), number(after), change(before, after), chance(effect.chance), long(list(effect.confused_with))];
+  const judged = effect.accepted ? "yes" : effect.linearised ? "no, linearised" : "no";
   const parameters = Object.entries(effect.parameters);
   parameters.forEach(([parameter, { value, unit, low, high }], index) => {
     const cells = [left(words(parameter)), number(value), `${number(low)} to ${number(high)}`, left(withUnit(unit))];
-    const judged = index ? ["", "", "", "", ""] : own;
-    const heads = index ? [left(""), left("")] : [left(name), left(effect.accepted ? "yes" : "no")];
-    addRow(table, "td", [...heads, ...cells, ...judged], index ? kind : `first ${kind}`);
+    const figures = index ? ["", "", "", "", ""] : own;
+    const heads = index ? [left(""), left("")] : [left(name), left(judged)];
+    addRow(table, "td", [...heads, ...cells, ...figures], index ? kind : `first ${kind}`);
   });
   if (effect.experiment) addRow(table, "td", [left(""), left(""), long(`To tell it from ${effect.confused_with[0]}: ${effect.experiment}.`, 9)], kind);
 }
@@ -149,13 +150,16 @@ const floorOf = (channel, horizon) => report.noise_floor[channel]?.prediction[ho
 
 function fillErrors(id, flights) {
   const table = element(id);
-  addRow(table, "th", [left("flight"), "horizon [s]", left("channel"), "declared", "new", left("unit"), "change", "by noise alone"]);
+  const onBus = data.bus ? ["declared, on the bus", "new, on the bus"] : [];
+  addRow(table, "th", [left("flight"), "horizon [s]", left("channel"), "declared", "new", left("unit"), "change", "by noise alone", ...onBus]);
   for (const [flight, own] of Object.entries(flights)) {
     let isFirst = true;
     for (const horizon of horizons({ own })) {
       for (const channel of CHANNELS.filter((name) => own[horizon][name])) {
         const { before, after, unit } = own[horizon][channel];
         const cells = [horizon, left(channel), number(before), number(after), left(withUnit(unit)), change(before, after), number(floorOf(channel, horizon))];
+        const flown = data.bus?.flights[flight]?.[horizon]?.[channel];
+        if (data.bus) cells.push(number(flown?.before), number(flown?.after));
         addRow(table, "td", [left(isFirst ? flight : ""), ...cells], isFirst ? "first" : "");
         isFirst = false;
       }

@@ -25,16 +25,16 @@ const CLOUD_POINTS: (usize, usize) = (1500, 40_000);
 /// Fewest points of a curve or cloud, however many there are.
 const POINTS_MIN: usize = 300;
 
-/// Writes the page of `outcome`.
-pub fn write(outcome: &Outcome, out: &mut impl Write) -> io::Result<()> {
-    PAGE.write(&data(outcome).to_string(), out)
+/// Writes the page of `outcome`; `flown` is what came of it on the bus, as in the report's `bus`, where it was flown.
+pub fn write(outcome: &Outcome, flown: Option<&Value>, out: &mut impl Write) -> io::Result<()> {
+    PAGE.write(&data(outcome, flown).to_string(), out)
 }
 
-fn data(outcome: &Outcome) -> Value {
+fn data(outcome: &Outcome, flown: Option<&Value>) -> Value {
     let components = outcome.pictures.iter().map(|picture| picture.measured.len()).sum();
     let budget = Budget { curve: share(CURVE_POINTS, components), cloud: share(CLOUD_POINTS, components) };
     let flights = outcome.report.flights.iter().filter_map(|own| flight(outcome, &own.name, budget));
-    json!({ "report": outcome.report, "flights": flights.collect::<Vec<_>>() })
+    json!({ "report": outcome.report, "bus": flown, "flights": flights.collect::<Vec<_>>() })
 }
 
 /// How many points a component has.
@@ -207,6 +207,7 @@ mod tests {
     use identify::regressor::Regressor;
     use identify::report::{BeforeAfter, FlightReport, Report};
     use identify::run::{Outcome, Picture};
+    use identify::sensing::SensorErrors;
     use std::collections::BTreeMap;
 
     #[test]
@@ -296,10 +297,10 @@ mod tests {
             effects: Vec::new(),
             pictures: FLIGHTS.into_iter().flat_map(of_flight).collect(),
             regressors: BTreeMap::from(regressors),
-            delays_s: (0.0, 0.0),
+            sensor_errors: SensorErrors::default(),
         };
         let mut page = Vec::new();
-        write(&outcome, &mut page).unwrap();
+        write(&outcome, None, &mut page).unwrap();
         assert!((4_000_000..8_000_000).contains(&page.len()), "{} bytes", page.len());
     }
 }

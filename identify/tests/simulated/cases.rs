@@ -8,6 +8,7 @@ use identify::parameter::{Owner, Parameters, SENSOR_BIAS, SENSOR_DELAY, SensorPa
 use identify::predict::Measured;
 use identify::report::Report;
 use identify::run::{HORIZONS_S, bench, identify};
+use identify::sensing::SensorErrors;
 use plant::effects::{Effect, entry, find};
 use vehicles::Vehicle;
 
@@ -231,7 +232,8 @@ impl Case {
     fn of_floor(&self, bench: &Bench, values: &[f64], set: &FlightSet, report: &Report) -> f64 {
         let flight: &Flight =
             set.flights.iter().find(|flight| flight.role == Role::Test).expect("a test flight");
-        let measured = Measured::of(flight, self.plan.sensors.pose_delay_s, 0.0).expect("motion");
+        let flight = &SensorErrors::of(&bench.model.parameters, values).taken_off(flight, 0.0);
+        let measured = Measured::of(flight).expect("motion");
         let mut worst = 0.0_f64;
         for horizon_s in HORIZONS_S {
             let (truth, _) = measured.predicted(flight, bench.model.airframe(values), horizon_s, 0);

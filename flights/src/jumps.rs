@@ -1,0 +1,141 @@
+//! Jumps of a pose: swapped markers, an estimator that starts anew. No vehicle moves so. The samples about a jump are
+//! left out, so that whatever reads the channel meets a gap there.
+
+use crate::flight::{Channel, Flight};
+use crate::quantity::Quantity;
+
+/// So many samples to both sides of a jump are left out: together more than the [`crate::clean::GAP_PERIODS`] of a gap.
+const REACH: usize = 3;
+/// A step is a jump if it differs from its neighbours' by more than this many times what is usual: noise does not.
+const UNUSUAL: f64 = 12.0;
+
+/// The least jump, and the greatest acceleration of a vehicle that still flies: what one step can differ from the next.
+struct Limits {
+    least: f64,
+    acceleration: f64,
+}
+
+/// In m and m/s^2: five times the weight.
+const POSITION: Limits = Limits { least: 0.05, acceleration: 50.0 };
+/// A quaternion moves by half of the angle: 10 degrees and 500 rad/s^2, several times what the rotors of a quadrotor of
+/// 30 g can do.
+const ATTITUDE: Limits = Limits { least: 0.0873, acceleration: 250.0 };
+
+/// Leaves out the samples about jumps of position and attitude, and says so.
+pub fn leave_out(flight: &mut Flight) {
+    let notes = &mut flight.notes;
+    flight.position =
+        without_jumps(Quantity::Position, std::mem::take(&mut flight.position), &POSITION, notes);
+    if flight.assumed.is_empty() {
+        let attitude = std::mem::take(&mut flight.attitude);
+        flight.attitude = without_jumps(Quantity::Attitude, attitude, &ATTITUDE, notes);
+    }
+}
+
+fn without_jumps<const N: usize>(
+    quantity: Quantity,
+    channel: Channel<N>,
+    limits: &Limits,
+    notes: &mut Vec<String>,
+) -> Channel<N> {
+    let steps = excesses(&channel);
+    let usual = median(steps.iter().map(|step| step.excess).collect());
+    let is_jump = |step: &&Step| {
+        let possible = limits.least + limits.acceleration * step.span_s * step.span_s;
+        step.excess > possible.max(UNUSUAL * usual)
+    };
+    let jumps: Vec<&Step> = steps.iter().filter(is_jump).collect();
+    let (Some(first), Some(greatest)) =
+        (jumps.first(), jumps.iter().max_by(|a, b| a.excess.total_cmp(&b.excess)))
+    else {
+        return channel;
+    };
+    notes.push(format!(
+        "{quantity}: jumps as no vehicle moves, first at {:.3} s, most at {:.3} s; the samples about {} steps are left \
+         out",
+        channel.time_s[first.from],
+        channel.time_s[greatest.from],
+        jumps.len(),
+    ));
+    let mut is_kept = vec![true; channel.time_s.len()];
+    for jump in jumps {
+        let last = (jump.from + REACH).min(is_kept.len() - 1);
+        is_kept[(jump.from + 1).saturating_sub(REACH)..=last].fill(false);
+    }
+    let kept = || (0..is_kept.len()).filter(|index| is_kept[*index]);
+    Channel {
+        time_s: kept().map(|index| channel.time_s[index]).collect(),
+        values: kept().map(|index| channel.values[index]).collect(),
+    }
+}
+
+/// From one sample to the next.
+struct Step {
+    from: usize,
+    span_s: f64,
+    /// How much longer it is than the speed before and after would have it.
+    excess: f64,
+}
+
+/// The steps that have a neighbour to both sides.
+fn excesses<const N: usize>(channel: &Channel<N>) -> Vec<Step> {
+    let span_s = |at: usize| channel.time_s[at + 1] - channel.time_s[at];
+    let speed =
+        |at: usize, axis: usize| (channel.values[at + 1][axis] - channel.values[at][axis]) / span_s(at);
+    let step = |at: usize| {
+        let odd = |axis: usize| speed(at, axis) - 0.5 * (speed(at - 1, axis) + speed(at + 1, axis));
+        let excess = (0..N).map(|axis| odd(axis).powi(2)).sum::<f64>().sqrt() * span_s(at);
+        Step { from: at, span_s: span_s(at - 1).max(span_s(at)).max(span_s(at + 1)), excess }
+    };
+    (1..channel.time_s.len().saturating_sub(2)).map(step).collect()
+}
+
+fn median(mut values: Vec<f64>) -> f64 {
+    values.sort_by(f64::total_cmp);
+    values.get(values.len() / 2).copied().unwrap_or(0.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A flight at 100 Hz with 0.5 mm of noise that accelerates by up to 15 m/s^2, and steps aside by `jump_m` at 3 s.
+    fn course(jump_m: f64) -> Channel<3> {
+        let time_s: Vec<f64> = (0..600).map(|k| f64::from(k) * 0.01).collect();
+        let position = |(k, t): (usize, &f64)| {
+            let noise = 0.5e-3 * (((k * 7919) % 1009) as f64 / 504.5 - 1.0);
+            [0.6 * (5.0 * t).sin() + noise + if *t > 3.005 { jump_m } else { 0.0 }, 0.0, 1.0]
+        };
+        Channel { values: time_s.iter().enumerate().map(position).collect(), time_s }
+    }
+
+    #[test]
+    fn the_samples_about_a_jump_are_left_out_and_said() {
+        let mut notes = Vec::new();
+        let cleaned = without_jumps(Quantity::Position, course(0.2), &POSITION, &mut notes);
+        assert_eq!(cleaned.time_s.len(), 600 - 2 * REACH - 2, "the steps beside it are odd as well");
+        assert!(
+            cleaned.time_s.windows(2).any(|pair| pair[0] < 3.0 && pair[1] > 3.01 && pair[1] - pair[0] > 0.05)
+        );
+        assert!(notes[0].starts_with("position: jumps") && notes[0].contains("most at 3.000 s"), "{notes:?}");
+    }
+
+    #[test]
+    fn violent_flight_is_no_jump() {
+        let mut notes = Vec::new();
+        let course = course(0.0);
+        assert_eq!(without_jumps(Quantity::Position, course.clone(), &POSITION, &mut notes), course);
+        let few = Channel { time_s: vec![0.0, 0.1], values: vec![[0.0; 3], [9.0; 3]] };
+        assert_eq!(without_jumps(Quantity::Position, few.clone(), &POSITION, &mut notes), few);
+        assert!(notes.is_empty());
+    }
+
+    #[test]
+    fn a_channel_of_single_wild_samples_keeps_the_rest() {
+        let mut wild = course(0.0);
+        wild.values[100][1] = 5.0;
+        let cleaned = without_jumps(Quantity::Position, wild, &POSITION, &mut Vec::new());
+        assert!(cleaned.values.iter().all(|value| value[1] == 0.0));
+        assert!(cleaned.time_s.len() > 585, "{}", cleaned.time_s.len());
+    }
+}

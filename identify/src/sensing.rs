@@ -1,0 +1,73 @@
+//! What is wrong with a flight's sensors, and the flight as sensors without it would have logged it.
+
+use crate::parameter::{Parameters, SensorParameter};
+use flights::{Channel, Flight};
+use nalgebra::{Quaternion, UnitQuaternion, Vector3};
+
+/// Lateness and biases of sensors.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct SensorErrors {
+    /// Lateness of position, velocity and attitude in s.
+    pub pose_delay_s: f64,
+    /// Lateness of gyroscope and accelerometer in s.
+    pub inertial_delay_s: f64,
+    /// Bias of the accelerometer in B, in m/s^2.
+    pub accelerometer_bias_m_s2: [f64; 3],
+    /// Bias of the gyroscope in B, in rad/s.
+    pub gyroscope_bias_rad_s: [f64; 3],
+    /// By how much the attitude sensor is turned in its mount about x and y of B, in rad.
+    pub attitude_bias_rad: [f64; 2],
+}
+
+impl SensorErrors {
+    /// Those of `values`.
+    #[must_use]
+    pub fn of(parameters: &Parameters, values: &[f64]) -> Self {
+        let own = |which| parameters.sensor(values, which);
+        Self {
+            pose_delay_s: own(SensorParameter::PoseDelay),
+            inertial_delay_s: own(SensorParameter::ImuDelay),
+            accelerometer_bias_m_s2: std::array::from_fn(|axis| own(SensorParameter::Accelerometer(axis))),
+            gyroscope_bias_rad_s: std::array::from_fn(|axis| own(SensorParameter::Gyroscope(axis))),
+            attitude_bias_rad: std::array::from_fn(|axis| own(SensorParameter::Attitude(axis))),
+        }
+    }
+
+    /// What turns a vector of the vehicle's B into the frame that the attitude sensor takes for it.
+    #[must_use]
+    pub fn mounting(&self) -> UnitQuaternion<f64> {
+        let [x, y] = self.attitude_bias_rad;
+        UnitQuaternion::from_scaled_axis(-Vector3::new(x, y, 0.0))
+    }
+
+    /// `flight` without these errors, and with its pose earlier by `pose_offset_s` besides.
+    #[must_use]
+    pub fn taken_off(&self, flight: &Flight, pose_offset_s: f64) -> Flight {
+        let mut flight = flight.clone();
+        let pose_s = self.pose_delay_s + pose_offset_s;
+        earlier(&mut flight.position, pose_s);
+        earlier(&mut flight.velocity, pose_s);
+        earlier(&mut flight.attitude, pose_s);
+        earlier(&mut flight.angular_velocity, self.inertial_delay_s);
+        earlier(&mut flight.specific_force, self.inertial_delay_s);
+        less(&mut flight.angular_velocity, self.gyroscope_bias_rad_s);
+        less(&mut flight.specific_force, self.accelerometer_bias_m_s2);
+        let mounting = self.mounting();
+        for value in &mut flight.attitude.values {
+            let [w, x, y, z] = *value;
+            let turned = Quaternion::new(w, x, y, z) * mounting.into_inner();
+            *value = [turned.w, turned.i, turned.j, turned.k];
+        }
+        flight
+    }
+}
+
+fn earlier<const N: usize>(channel: &mut Channel<N>, by_s: f64) {
+    channel.time_s.iter_mut().for_each(|time_s| *time_s -= by_s);
+}
+
+fn less(channel: &mut Channel<3>, bias: [f64; 3]) {
+    for value in &mut channel.values {
+        value.iter_mut().zip(bias).for_each(|(value, bias)| *value -= bias);
+    }
+}
