@@ -26,7 +26,7 @@ pub fn leave_out(flight: &mut Flight) {
     let notes = &mut flight.notes;
     flight.position =
         without_jumps(Quantity::Position, std::mem::take(&mut flight.position), &POSITION, notes);
-    if flight.assumed.is_empty() {
+    if !flight.assumed.iter().any(|assumed| assumed.starts_with("attitude")) {
         let attitude = std::mem::take(&mut flight.attitude);
         flight.attitude = without_jumps(Quantity::Attitude, attitude, &ATTITUDE, notes);
     }
@@ -51,11 +51,9 @@ fn without_jumps<const N: usize>(
         return channel;
     };
     notes.push(format!(
-        "{quantity}: jumps as no vehicle moves, first at {:.3} s, most at {:.3} s; the samples about {} steps are left \
-         out",
+        "{quantity}: jumps as no vehicle moves, first at {:.3} s, most at {:.3} s; the samples about are left out",
         channel.time_s[first.from],
         channel.time_s[greatest.from],
-        jumps.len(),
     ));
     let mut is_kept = vec![true; channel.time_s.len()];
     for jump in jumps {
@@ -77,14 +75,18 @@ struct Step {
     excess: f64,
 }
 
-/// The steps that have a neighbour to both sides.
+/// The steps that have a neighbour to both sides. The smaller of two excesses counts, by speed and by way: stamps that
+/// jitter make odd speeds, samples that are missing odd ways.
 fn excesses<const N: usize>(channel: &Channel<N>) -> Vec<Step> {
     let span_s = |at: usize| channel.time_s[at + 1] - channel.time_s[at];
-    let speed =
-        |at: usize, axis: usize| (channel.values[at + 1][axis] - channel.values[at][axis]) / span_s(at);
+    let way = |at: usize, axis: usize| channel.values[at + 1][axis] - channel.values[at][axis];
+    let speed = |at: usize, axis: usize| way(at, axis) / span_s(at);
+    let length =
+        |of_axis: &dyn Fn(usize) -> f64| (0..N).map(|axis| of_axis(axis).powi(2)).sum::<f64>().sqrt();
     let step = |at: usize| {
-        let odd = |axis: usize| speed(at, axis) - 0.5 * (speed(at - 1, axis) + speed(at + 1, axis));
-        let excess = (0..N).map(|axis| odd(axis).powi(2)).sum::<f64>().sqrt() * span_s(at);
+        let odd_way = |axis: usize| way(at, axis) - 0.5 * (way(at - 1, axis) + way(at + 1, axis));
+        let odd_speed = |axis: usize| speed(at, axis) - 0.5 * (speed(at - 1, axis) + speed(at + 1, axis));
+        let excess = length(&odd_way).min(length(&odd_speed) * span_s(at));
         Step { from: at, span_s: span_s(at - 1).max(span_s(at)).max(span_s(at + 1)), excess }
     };
     (1..channel.time_s.len().saturating_sub(2)).map(step).collect()
@@ -128,6 +130,25 @@ mod tests {
         let few = Channel { time_s: vec![0.0, 0.1], values: vec![[0.0; 3], [9.0; 3]] };
         assert_eq!(without_jumps(Quantity::Position, few.clone(), &POSITION, &mut notes), few);
         assert!(notes.is_empty());
+    }
+
+    #[test]
+    fn stamps_that_jitter_and_samples_that_are_missing_are_no_jumps() {
+        let mut late = course(0.0);
+        (0..600).step_by(30).for_each(|at| late.time_s[at] += 0.0095);
+        let mut notes = Vec::new();
+        assert_eq!(without_jumps(Quantity::Position, late.clone(), &POSITION, &mut notes), late, "{notes:?}");
+        let kept = |at: &usize| at % 20 > 2;
+        let whole = course(0.0);
+        let holey = Channel {
+            time_s: (0..600).filter(kept).map(|at| whole.time_s[at]).collect(),
+            values: (0..600).filter(kept).map(|at| whole.values[at]).collect(),
+        };
+        assert_eq!(
+            without_jumps(Quantity::Position, holey.clone(), &POSITION, &mut notes),
+            holey,
+            "{notes:?}"
+        );
     }
 
     #[test]

@@ -15,7 +15,7 @@ pub struct Candidate {
     pub starts: Vec<Vec<f64>>,
 }
 
-/// An effect that these flights cannot show, and what they would need.
+/// An effect, or the part of one that belongs to one sensor, that these flights cannot show, and what they would need.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct Unseen {
     /// The effect.

@@ -267,7 +267,9 @@ impl Bench<'_> {
         let mut all = base.which.clone();
         // Torques of an assumed attitude are zero, to which any scale of thrust or inertia could shrink the model's.
         let is_assumed = self.fit.iter().any(Prepared::is_assumed);
-        let counts = |own: &&Candidate| own.starts.is_empty() && (!is_assumed || own.effect == "com-offset");
+        // Of flapping the tilt is linear, if not the torque.
+        let is_linear = |own: &Candidate| own.starts.is_empty() || own.effect == "blade-flapping";
+        let counts = |own: &&Candidate| is_linear(own) && (!is_assumed || own.effect == "com-offset");
         for candidate in candidates.iter().filter(counts) {
             all.extend(candidate.which.iter().filter(|at| !base.which.contains(at)));
         }
@@ -306,7 +308,8 @@ impl Bench<'_> {
     }
 
     /// The squares that `fitted` leaves on the fit flights, in units of what all candidates together would leave by the
-    /// linearised equations: those by which the weights were set.
+    /// linearised equations: those by which the weights were set. Delays, lags and the battery are far from linear and do
+    /// not count.
     #[must_use]
     pub fn left(&self, fitted: &Fitted) -> f64 {
         let rows = |flight: &Prepared| {

@@ -55,7 +55,7 @@ impl Measured {
         let rates = if flight.angular_velocity.is_empty() {
             turning(&quaternions, reach(flight.attitude.period_s()))
         } else {
-            gyroscope.values
+            gyroscope.values.clone()
         };
         let body = |i: usize| RigidBody {
             position_W_m: position.values[i].into(),
@@ -63,10 +63,18 @@ impl Measured {
             attitude_WB: quaternions[i],
             angular_velocity_B_rad_s: rates[i].into(),
         };
-        let has_pose = !flight.position.is_empty();
-        let is_valid = (0..clock.count)
-            .map(|i| (!has_pose || position.valid[i]) && (flight.attitude.is_empty() || attitude.valid[i]))
-            .collect();
+        let mut is_valid = vec![true; clock.count];
+        let mut require = |is_there: bool, valid: &[bool], reach: usize| {
+            if is_there {
+                is_valid.iter_mut().zip(valid_about(valid, reach)).for_each(|(all, own)| *all &= own);
+            }
+        };
+        let of_position = if flight.velocity.is_empty() { reach(flight.position.period_s()) } else { 0 };
+        let of_attitude =
+            if flight.angular_velocity.is_empty() { reach(flight.attitude.period_s()) } else { 0 };
+        require(!flight.position.is_empty(), &position.valid, of_position);
+        require(!flight.attitude.is_empty(), &attitude.valid, of_attitude);
+        require(!flight.angular_velocity.is_empty(), &gyroscope.valid, 0);
         Some(Self { bodies: (0..clock.count).map(body).collect(), clock, is_valid })
     }
 
@@ -140,6 +148,16 @@ fn differences(own: &RigidBody, measured: &RigidBody) -> [f64; 4] {
 #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a period is short")]
 fn reach(period_s: Option<f64>) -> usize {
     ((3.0 * period_s.unwrap_or(0.0) / TICK_S).round() as usize).max(1)
+}
+
+/// Whether all within `reach` ticks to both sides are valid: a derivative is taken over so many.
+fn valid_about(valid: &[bool], reach: usize) -> Vec<bool> {
+    let mut bad = vec![0_usize];
+    for is_valid in valid {
+        bad.push(bad[bad.len() - 1] + usize::from(!is_valid));
+    }
+    let span = |i: usize| (i.saturating_sub(reach), (i + reach + 1).min(valid.len()));
+    (0..valid.len()).map(span).map(|(first, end)| bad[end] == bad[first]).collect()
 }
 
 fn unit([w, x, y, z]: &[f64; 4]) -> UnitQuaternion<f64> {

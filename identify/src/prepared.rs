@@ -85,9 +85,11 @@ pub struct Tracks {
 /// How fast the rotors turn where a log begins, and what was commanded before, is not known: they count from then on.
 pub const SETTLE_S: f64 = 0.5;
 
-/// Delays of sensors that are tried take samples from beside an instant: at the ends of a flight and about its gaps so
-/// much is left out.
-const DELAY_MARGIN_S: f64 = 0.1;
+/// Delays of sensors that are tried take samples from beside an instant: so much is left out at the ends of a flight.
+const END_MARGIN_S: f64 = 0.2;
+/// And so much about its gaps, where that leaves at least [`WORTH`] of the windows.
+const GAP_MARGIN_S: f64 = 0.1;
+const WORTH: f64 = 0.9;
 
 /// No rig lets a vehicle go further to the side.
 const RIG_M: f64 = 0.3;
@@ -215,10 +217,15 @@ impl<'f> Prepared<'f> {
 
     /// Middles of windows in which every compared channel was sampled and the motors were running.
     fn knots(&self, is_flying: &impl Fn(&[f64; 4], bool) -> bool) -> Vec<usize> {
-        let valid = self.valid(is_flying);
+        let of = |gap_margin_s: f64| self.knots_within(&self.valid(is_flying, gap_margin_s));
+        let (wide, all) = (of(GAP_MARGIN_S), of(0.0));
+        if wide.len() as f64 >= WORTH * all.len() as f64 { wide } else { all }
+    }
+
+    fn knots_within(&self, valid: &[bool]) -> Vec<usize> {
         let reach = self.layout.windows.iter().map(|(a, b)| a.reach().max(b.reach())).max().unwrap_or(0);
         let mut bad = vec![0_usize];
-        for is_valid in &valid {
+        for is_valid in valid {
             bad.push(bad[bad.len() - 1] + usize::from(!is_valid));
         }
         let last = valid.len().saturating_sub(reach + 1);
@@ -226,24 +233,24 @@ impl<'f> Prepared<'f> {
         middles.filter(|knot| bad[knot + reach + 1] == bad[knot - reach]).collect()
     }
 
-    fn valid(&self, is_flying: &impl Fn(&[f64; 4], bool) -> bool) -> Vec<bool> {
+    fn valid(&self, is_flying: &impl Fn(&[f64; 4], bool) -> bool, gap_margin_s: f64) -> Vec<bool> {
         let (flight, clock) = (self.flight, &self.layout.clock);
         let mut valid = vec![true; clock.count];
         let mut require = |other: Vec<bool>| valid.iter_mut().zip(other).for_each(|(all, one)| *all &= one);
         if uses_pose(flight) && !flight.position.is_empty() {
-            require(sampled_about(&flight.position, clock));
+            require(sampled_about(&flight.position, clock, gap_margin_s));
         }
         if uses_pose(flight) && flight.position.is_empty() && !flight.velocity.is_empty() {
-            require(sampled_about(&flight.velocity, clock));
+            require(sampled_about(&flight.velocity, clock, gap_margin_s));
         }
         if !flight.attitude.is_empty() {
-            require(sampled_about(&flight.attitude, clock));
+            require(sampled_about(&flight.attitude, clock, gap_margin_s));
         }
         if !flight.angular_velocity.is_empty() {
-            require(sampled_about(&flight.angular_velocity, clock));
+            require(sampled_about(&flight.angular_velocity, clock, gap_margin_s));
         }
         if !flight.specific_force.is_empty() {
-            require(sampled_about(&flight.specific_force, clock));
+            require(sampled_about(&flight.specific_force, clock, gap_margin_s));
         }
         if !flight.rotor_speed.is_empty() {
             require(Track::sampled(&flight.rotor_speed, 0.0, clock).valid);
@@ -260,13 +267,20 @@ impl<'f> Prepared<'f> {
     }
 }
 
-/// Whether a channel was sampled at each instant, and would have been if it were late or early by [`DELAY_MARGIN_S`].
-fn sampled_about<const N: usize>(channel: &flights::Channel<N>, clock: &Clock) -> Vec<bool> {
+/// Whether a channel was sampled at each instant, and at `gap_margin_s` before and after it; not at its ends.
+fn sampled_about<const N: usize>(
+    channel: &flights::Channel<N>,
+    clock: &Clock,
+    gap_margin_s: f64,
+) -> Vec<bool> {
     let mut valid = Track::sampled(channel, 0.0, clock).valid;
-    for delay_s in [-DELAY_MARGIN_S, DELAY_MARGIN_S] {
+    for delay_s in [-gap_margin_s, gap_margin_s] {
         let trial = Track::sampled(channel, delay_s, clock).valid;
         valid.iter_mut().zip(trial).for_each(|(all, one)| *all &= one);
     }
+    let (first_s, last_s) = channel.span_s().unwrap_or_default();
+    let inside = first_s + END_MARGIN_S..=last_s - END_MARGIN_S;
+    valid.iter_mut().enumerate().for_each(|(index, own)| *own &= inside.contains(&clock.at(index)));
     valid
 }
 

@@ -36,7 +36,7 @@ pub struct Report {
     pub noise_floor: BTreeMap<&'static str, Noise>,
     /// What no candidate explains: the size of the part of the residual that is not noise, by equation.
     pub unexplained: BTreeMap<&'static str, Unexplained>,
-    /// Effects that these flights cannot show, and what they would need.
+    /// Effects that these flights cannot show, or sensors' parts of them, and what they would need.
     pub not_identifiable: Vec<Unseen>,
     /// Length of the blocks that count as independent.
     pub block_s: f64,

@@ -9,7 +9,7 @@ use crate::model::Model;
 use crate::noise;
 use crate::parameter::Parameters;
 use crate::predict::{CHANNELS, Errors, Measured};
-use crate::prepared::{Equation, Prepared};
+use crate::prepared::{Equation, Prepared, SETTLE_S};
 use crate::regressor::{Regressor, regressors};
 use crate::report::{BeforeAfter, Change, EffectReport, Estimate, FlightReport, Noise, Report, Unexplained};
 use crate::select::{Selection, rivals, select, which};
@@ -167,7 +167,8 @@ pub fn bench<'f>(
             let reason = match names[..] {
                 [] => "there is none".to_owned(),
                 _ => format!(
-                    "{} have no stretch in which commands and motion were logged together",
+                    "{} have no stretch in which commands and motion were logged together in flight, besides the \
+                     first {SETTLE_S} s and the last moments",
                     names.join(", ")
                 ),
             };

@@ -12,8 +12,9 @@
 //! beyond chance. Then those taken before have to pass the first test again, as a later effect may explain what an
 //! earlier one stood in for.
 //!
-//! Where a round accepts nothing although much is left that some candidates together would take away, two are looked for
-//! that only gain together, under the same tests. The rounds end when nothing changes any more.
+//! Where a round accepts nothing although much is left that candidates together would take away, two are looked for that
+//! only gain together, under the same tests; the chance of a false acceptance in that search is [`FALSE_RATE`] once more.
+//! The rounds end when nothing changes any more.
 
 use crate::candidate::Candidate;
 use crate::fit::{Bench, Fitted};
@@ -31,8 +32,10 @@ const LEAST_PART: f64 = 0.01;
 pub const FALSE_RATE: f64 = 0.05;
 /// Two rivals whose difference is within this one-sided level cannot be told apart.
 const RIVAL_LEVEL: f64 = 0.05;
-/// Resamples of a bootstrap: enough for the level of one among thirty candidates.
-const RESAMPLES: usize = 5000;
+/// Resamples of a bootstrap: enough for the level of one among thirty candidates, tried beside four others.
+const RESAMPLES: usize = 20_000;
+/// After so many that lose, a chance is known well enough.
+const LOSSES_ENOUGH: usize = 500;
 /// So many candidates of a round are fitted in earnest.
 const CONFIRMED: usize = 4;
 /// A rival has at least this part of the gain.
@@ -163,34 +166,33 @@ impl Course {
     }
 
     /// Accepts two that only gain together: of two strong effects each can make the blocks worse in which the other
-    /// acts. Their first is chosen on the fit flights, so that no chance of the test flights is used up by the search.
+    /// acts. The firsts that are tried are chosen on the fit flights, the second in a round with the first, and then
+    /// the first has to pass a round with the second.
     fn take_two(&mut self, bench: &Bench, candidates: &[Candidate]) -> bool {
         let Some(last) = self.rounds.last() else { return false };
         if bench.left(&self.base) < MUCH_LEFT {
             return false;
         }
-        let mut firsts: Vec<usize> = (0..last.judged.len()).collect();
-        firsts.sort_by(|a, b| last.judged[*a].fitted.fit_sum().total_cmp(&last.judged[*b].fitted.fit_sum()));
+        let mut firsts: Vec<&Judged> = last.judged.iter().collect();
+        firsts.sort_by(|a, b| a.fitted.fit_sum().total_cmp(&b.fitted.fit_sum()));
+        let firsts: Vec<Candidate> = firsts.iter().take(FIRSTS).map(|own| own.candidate.clone()).collect();
         let rate = FALSE_RATE / FIRSTS as f64;
-        for first in firsts.into_iter().take(FIRSTS) {
-            let candidate = last.judged[first].candidate.clone();
-            let alone = fitted(bench, &self.base, &self.accepted, &candidate);
-            let mut accepted = self.accepted.clone();
-            accepted.push(candidate);
-            let round = round(bench, &alone, &accepted, candidates, rate);
-            let Some(second) = round.taken() else { continue };
-            let both = second.fitted.clone();
-            accepted.push(second.candidate.clone());
-            let place = self.accepted.len();
-            let without_first = without(bench, &both, &accepted, place);
-            let is_gain = |before: &Fitted| chance(&before.test_squares, &both.test_squares) < rate;
-            if is_gain(&self.base) && is_gain(&without_first) {
-                let at = self.rounds.len() - 1;
-                self.rounds[at].taken = Some(first);
-                self.rounds[at].judged[first].is_accepted = true;
-                self.rounds.push(round);
-                self.base = without_idle(bench, both, &mut accepted);
-                self.accepted = accepted;
+        for first in firsts {
+            let alone = fitted(bench, &self.base, &self.accepted, &first);
+            let with_first = [&self.accepted[..], std::slice::from_ref(&first)].concat();
+            let second_round = round(bench, &alone, &with_first, candidates, rate);
+            let Some(second) = second_round.taken().cloned() else { continue };
+            let with_second = [&self.accepted[..], std::slice::from_ref(&second.candidate)].concat();
+            let both = [&with_first[..], std::slice::from_ref(&second.candidate)].concat();
+            let without_first = without(bench, &second.fitted, &both, self.accepted.len());
+            let mut first_round = round(bench, &without_first, &with_second, candidates, rate);
+            first_round.taken =
+                first_round.judged.iter().position(|own| own.candidate == first && own.is_accepted);
+            let is_gain = chance(&self.base.test_squares, &second.fitted.test_squares) < rate;
+            if is_gain && first_round.taken.is_some() {
+                self.rounds.extend([first_round, second_round]);
+                self.accepted = both;
+                self.base = without_idle(bench, second.fitted, &mut self.accepted);
                 return true;
             }
         }
@@ -312,10 +314,13 @@ fn chance(before: &[f64], after: &[f64]) -> f64 {
     let count = gains.len() as u64;
     let draw =
         |random: &mut rand_chacha::ChaCha8Rng| gains[(((random.next_u64() >> 32) * count) >> 32) as usize];
-    let is_loss = |_: &usize| (0..count).map(|_| draw(&mut random)).sum::<f64>() <= 0.0;
-    let losses = (0..RESAMPLES).filter(is_loss).count();
+    let (mut losses, mut drawn) = (0, 0);
+    while drawn < RESAMPLES && losses < LOSSES_ENOUGH {
+        losses += usize::from((0..count).map(|_| draw(&mut random)).sum::<f64>() <= 0.0);
+        drawn += 1;
+    }
     // A few blocks that agree prove no more than a few coins that fall alike.
-    ((losses + 1) as f64 / (RESAMPLES + 1) as f64).max(0.5_f64.powi(gains.len().min(1000) as i32))
+    ((losses + 1) as f64 / (drawn + 1) as f64).max(0.5_f64.powi(gains.len().min(1000) as i32))
 }
 
 /// The quantile of Student's distribution for a mean over so many blocks.

@@ -115,7 +115,8 @@ impl Sources {
     pub fn path(&self, written: &Spanned<String>) -> Result<PathBuf, Problem> {
         let expanded = vehicles::variables::expand(written.get_ref(), |name| std::env::var(name).ok())
             .map_err(|message| {
-                self.problem(&written.span(), message, "set it, or give a default: ${NAME:-path}")
+                let message = format!("the path is {message}");
+                self.problem(&written.span(), message, "set the variable, or give a default: ${NAME:-path}")
             })?;
         Ok(self.folder(written.span().start).join(expanded))
     }

@@ -120,10 +120,21 @@ fn panic_again_and_again(policy: Policy) -> Ended {
     let launch = place.start_with(&words, &[(FAULT_VARIABLE, &fault), (TICK_VARIABLE, "700")]);
     let ended = launch.end().with_code(2);
     let reference = Reference::fly_with(&policy.tables());
-    let diff = place.start(&["diff", &recording, &reference.path()]).end_among_others().with_code(1);
-    diff.prints(&["is a prefix of"]);
+    require_prefix(&place, policy, &recording, &reference.path());
     ended.says(&["the propeller came off", "The run was aborted at tick 700"]);
     ended
+}
+
+/// What was recorded is the beginning of what would have been. Of a standby that died the last messages may be missing,
+/// since nobody waits for those of a shadow.
+fn require_prefix(place: &Place, policy: Policy, recording: &str, reference: &str) {
+    if policy == Policy::Standby {
+        let (own, whole) = (messages(recording), messages(reference));
+        assert!(own.len() < whole.len() && whole.starts_with(&own), "other messages");
+    } else {
+        let diff = place.start(&["diff", recording, reference]).end_among_others().with_code(1);
+        diff.prints(&["is a prefix of"]);
+    }
 }
 
 #[test]
@@ -173,8 +184,7 @@ fn strike(case: &Case, reference: &str) {
     let ended = launch.end();
     if ended.code == Some(2) && case.may_be_too_much() {
         ended.says(&["it came in the place of a process that had died, and completed no tick"]);
-        let diff = place.start(&["diff", &recording, reference]).end_among_others().with_code(1);
-        return diff.prints(&["is a prefix of"]);
+        return require_prefix(&place, case.policy, &recording, reference);
     }
     assert_eq!(ended.code, Some(0), "{ended}");
     require_replaced(case, &ended);

@@ -239,7 +239,12 @@ fn a_thousand_swaps_in_one_run_leak_nothing() {
     let before = settled(&place);
     launch.release();
     launch.hold_at(20_373);
-    crate::support::poll("open files and shared memory that grow", || (held(&place) == before).then_some(()));
+    // What one swap left behind would by now be there almost a thousand times; the next successor may hold more or less
+    // than that of then, as it is further with its preparations or not.
+    let is_like_before =
+        |(files, segments): (usize, usize)| files < before.0 + 100 && segments < before.1 + 100;
+    let now = settled(&place);
+    assert!(is_like_before(now), "open files and shared memory: {before:?} after 9 swaps, {now:?} after 998");
     launch.release();
     let ended = launch.end().flown();
     let successions = ended.json()["successions"].as_array().unwrap().clone();

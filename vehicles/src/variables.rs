@@ -9,11 +9,12 @@ pub fn expand(text: &str, variable: impl Fn(&str) -> Option<String>) -> Result<S
     let mut rest = text;
     while let Some((before, after)) = rest.split_once("${") {
         let (inside, after) =
-            after.split_once('}').ok_or_else(|| format!("`{text}` has `${{` without `}}`"))?;
+            after.split_once('}').ok_or_else(|| format!("`{text}`, which has `${{` without `}}`"))?;
         let (name, default) = inside.split_once(":-").map_or((inside, None), |(name, d)| (name, Some(d)));
         let value = variable(name).or(default.map(str::to_owned));
         expanded += before;
-        expanded += &value.ok_or_else(|| format!("the environment variable {name} is not set"))?;
+        expanded +=
+            &value.ok_or_else(|| format!("`{text}`, whose environment variable {name} is not set"))?;
         rest = after;
     }
     Ok(expanded + rest)
