@@ -1,12 +1,13 @@
 //! Attribution: which candidates the flights ask for, one after the other.
 //!
 //! In each round every candidate is fitted, together with what was accepted before, on the fit flights, and judged
-//! on the test flights. It is accepted only if three things hold:
+//! on the test flights. It is accepted only if four things hold:
 //!
 //! 1. The gain on the test flights is beyond chance: the mean of the blocks' gains is above zero at 5 % over all
 //!    candidates of the round together (Bonferroni; one-sided percentile bootstrap over blocks, Efron 1979).
 //! 2. One of its parameters differs from the declared value beyond chance on the fit flights, at the same level.
 //! 3. The gain matters: it is at least [`LEAST_GAIN`] of the squared error.
+//! 4. It is not for an effect of which more is asked than it can be: not all parameters that moved stopped at a bound.
 //!
 //! Of the accepted the one with the greatest gain is taken, but one with fewer parameters where the difference is not
 //! beyond chance. Then those taken before have to pass the first test again, as a later effect may explain what an
@@ -257,7 +258,8 @@ fn judged(bench: &Bench, base: &Fitted, candidate: &Candidate, fitted: Fitted, l
     let is_accepted = gain_chance < level
         && parameter_t > t_quantile(1.0 - level / 2.0, fitted.fit_squares.len())
         && gain > LEAST_GAIN * base.test_sum()
-        && is_seen(bench, candidate, &fitted);
+        && is_seen(bench, candidate, &fitted)
+        && !is_beyond_bounds(bench, candidate, &fitted);
     Judged {
         candidate: candidate.clone(),
         gain: gain / base.test_sum(),
@@ -276,6 +278,16 @@ fn is_seen(bench: &Bench, candidate: &Candidate, fitted: &Fitted) -> bool {
         let own = &bench.model.parameters.all[*at];
         let least = if own.is_delay() { bench.least_delay_s() } else { LEAST_PART * own.plausible };
         (fitted.values[*at] - own.declared).abs() > least
+    })
+}
+
+/// Whether every parameter that moved stopped at a bound: then more is asked for than the effect can be, and so another
+/// is at work.
+#[allow(clippy::float_cmp, reason = "values that stop at a bound are the bound")]
+fn is_beyond_bounds(bench: &Bench, candidate: &Candidate, fitted: &Fitted) -> bool {
+    candidate.which.iter().all(|at| {
+        let (own, value) = (&bench.model.parameters.all[*at], fitted.values[*at]);
+        value == own.declared || value == own.lower || value == own.upper
     })
 }
 
