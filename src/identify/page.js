@@ -39,8 +39,8 @@ function change(before, after) {
   return `${sign}${size} %`;
 }
 
-// An effect whose gain no resampling undid: 20 000 of them are drawn.
-const chance = (value) => (value === 0 ? "< 0.00005" : value.toFixed(4));
+// Of 20 000 resampled flights not one may undo a gain.
+const chance = (value) => (value < 1e-4 ? "< 0.0001" : value.toFixed(4));
 
 // A cell is text, or {text, words, long, span}: words are set to the left, long ones are broken.
 function addRow(table, tag, cells, className = "") {
