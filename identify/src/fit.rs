@@ -312,11 +312,17 @@ impl Bench<'_> {
     /// not count.
     #[must_use]
     pub fn left(&self, fitted: &Fitted) -> f64 {
-        let rows = |flight: &Prepared| {
+        fitted.fit_sum() / self.rows(&self.fit) as f64
+    }
+
+    /// How many rows of `flights` count, at least one.
+    #[must_use]
+    pub fn rows(&self, flights: &[Prepared]) -> usize {
+        let of = |flight: &Prepared| {
             flight.layout.knots.len()
                 * self.row_weights(flight).iter().filter(|weight| **weight > 0.0).count()
         };
-        fitted.fit_sum() / self.fit.iter().map(rows).sum::<usize>().max(1) as f64
+        flights.iter().map(of).sum::<usize>().max(1)
     }
 
     /// The shortest delay that the grids can tell from none.

@@ -4,7 +4,7 @@
 
 use crate::clock::Clock;
 use crate::prepared::{Held, SETTLE_S};
-use crate::track::Track;
+use crate::track::{Track, valid_about};
 use flights::Flight;
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use plant::{Airframe, Backend, FreeFlight, NewtonEuler, RigidBody};
@@ -148,16 +148,6 @@ fn differences(own: &RigidBody, measured: &RigidBody) -> [f64; 4] {
 #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a period is short")]
 fn reach(period_s: Option<f64>) -> usize {
     ((3.0 * period_s.unwrap_or(0.0) / TICK_S).round() as usize).max(1)
-}
-
-/// Whether all within `reach` ticks to both sides are valid: a derivative is taken over so many.
-fn valid_about(valid: &[bool], reach: usize) -> Vec<bool> {
-    let mut bad = vec![0_usize];
-    for is_valid in valid {
-        bad.push(bad[bad.len() - 1] + usize::from(!is_valid));
-    }
-    let span = |i: usize| (i.saturating_sub(reach), (i + reach + 1).min(valid.len()));
-    (0..valid.len()).map(span).map(|(first, end)| bad[end] == bad[first]).collect()
 }
 
 fn unit([w, x, y, z]: &[f64; 4]) -> UnitQuaternion<f64> {

@@ -2,7 +2,7 @@
 #![allow(non_snake_case, reason = "a trailing _W or _B names the frame a vector is written in")]
 
 use crate::clock::Clock;
-use crate::track::Track;
+use crate::track::{Track, valid_about};
 use crate::window::{NUMEROV, SIMPSON, Window, central_difference, second_difference};
 use flights::Flight;
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
@@ -224,13 +224,8 @@ impl<'f> Prepared<'f> {
 
     fn knots_within(&self, valid: &[bool]) -> Vec<usize> {
         let reach = self.layout.windows.iter().map(|(a, b)| a.reach().max(b.reach())).max().unwrap_or(0);
-        let mut bad = vec![0_usize];
-        for is_valid in valid {
-            bad.push(bad[bad.len() - 1] + usize::from(!is_valid));
-        }
-        let last = valid.len().saturating_sub(reach + 1);
-        let middles = (reach..last).step_by(self.layout.box_steps);
-        middles.filter(|knot| bad[knot + reach + 1] == bad[knot - reach]).collect()
+        let (about, last) = (valid_about(valid, reach), valid.len().saturating_sub(reach + 1));
+        (reach..last).step_by(self.layout.box_steps).filter(|knot| about[*knot]).collect()
     }
 
     fn valid(&self, is_flying: &impl Fn(&[f64; 4], bool) -> bool, gap_margin_s: f64) -> Vec<bool> {

@@ -290,10 +290,7 @@ fn accepted_effects(
 
 /// The weighted root mean square of a sum of squares of the test flights.
 fn size(bench: &Bench, squares: f64) -> f64 {
-    let rows = |flight: &Prepared| {
-        flight.layout.knots.len() * bench.row_weights(flight).iter().filter(|weight| **weight > 0.0).count()
-    };
-    (squares / bench.test.iter().map(rows).sum::<usize>().max(1) as f64).sqrt()
+    (squares / bench.rows(&bench.test) as f64).sqrt()
 }
 
 /// The estimates of these parameters, with 95 % intervals.

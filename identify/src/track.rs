@@ -66,6 +66,17 @@ impl<const N: usize> Track<N> {
     }
 }
 
+/// Whether all within `reach` instants to both sides are valid, so far as there are any.
+#[must_use]
+pub fn valid_about(valid: &[bool], reach: usize) -> Vec<bool> {
+    let mut bad = vec![0_usize];
+    for is_valid in valid {
+        bad.push(bad[bad.len() - 1] + usize::from(!is_valid));
+    }
+    let span = |i: usize| (i.saturating_sub(reach), (i + reach + 1).min(valid.len()));
+    (0..valid.len()).map(span).map(|(first, end)| bad[end] == bad[first]).collect()
+}
+
 /// Mean over one step about each instant of the line through the samples.
 fn averaged<const N: usize>(channel: &Channel<N>, delay_s: f64, clock: &Clock, period_s: f64) -> Track<N> {
     let integral = Integral::of(channel);
