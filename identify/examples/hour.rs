@@ -41,5 +41,13 @@ fn main() {
         let next = stages[at..].iter().find(|own| own.0 != *name).map_or(total_s, |own| own.1);
         println!("| {name} | {:.1} s |", next - from_s);
     }
-    println!("named {:?} in {total_s:.1} s", outcome.report.verdict);
+    println!("named in {total_s:.1} s:");
+    for name in &outcome.report.verdict {
+        let own = &outcome.report.effects[name];
+        let gain = 1.0 - (own.held_out.after / own.held_out.before).powi(2);
+        println!("| {name} | {:.2} % of the squares |", 100.0 * gain);
+        for (parameter, found) in &own.parameters {
+            println!("| {parameter} | {:.5} | {:.5} to {:.5} |", found.value, found.low, found.high);
+        }
+    }
 }

@@ -193,16 +193,19 @@ fn spun(airframe: &Airframe, flight: &Prepared) -> Vec<[RotorState; 4]> {
     let parts = (clock.step_s / MOTOR_STEP_S - 1e-9).ceil().max(1.0) as usize;
     let step_s = clock.step_s / parts as f64;
     let mut commands = Held::new(&flight.flight.command);
-    let mut time_s = clock.at(0) - clock.step_s / 2.0;
-    let first = commands.at(time_s);
+    // Counted, not summed up: over half an hour a sum drifts past a sample, and the command would be a tick late.
+    let start_s = clock.at(0) - clock.step_s / 2.0;
+    let at_s = |step: usize| start_s + step as f64 * step_s;
+    let first = commands.at(start_s);
     let mut memory = airframe.memory(0, "identify", step_s);
     let rotors = first.map(|command| RotorState::steady(airframe.vehicle().command.speed(command)));
     let mut state = State { body: RigidBody::level_at(Vector3::zeros()), rotors };
     let mut out = Vec::with_capacity(clock.count);
-    for _ in 0..clock.count {
+    for index in 0..clock.count {
         let mut sum = [RotorState::default(); 4];
-        for _ in 0..parts {
-            let drive = airframe.begin_tick(&mut memory, &state, &commands.at(time_s), step_s);
+        for part in 0..parts {
+            let command = commands.at(at_s(index * parts + part));
+            let drive = airframe.begin_tick(&mut memory, &state, &command, step_s);
             let after = airframe.spun(&drive, &state.rotors, step_s);
             let half = 0.5 / parts as f64;
             for (sum, (before, after)) in sum.iter_mut().zip(state.rotors.iter().zip(&after)) {
@@ -210,7 +213,6 @@ fn spun(airframe: &Airframe, flight: &Prepared) -> Vec<[RotorState; 4]> {
                 sum.acceleration_rad_s2 += half * (before.acceleration_rad_s2 + after.acceleration_rad_s2);
             }
             state.rotors = after;
-            time_s += step_s;
         }
         out.push(sum);
     }

@@ -49,6 +49,10 @@ fn without_span<const N: usize>(channel: &mut Channel<N>, from_s: f64, to_s: f64
     channel.values = kept.iter().map(|at| channel.values[*at]).collect();
 }
 
+fn shift<const N: usize>(channel: &mut Channel<N>, by_s: f64) {
+    channel.time_s.iter_mut().for_each(|time_s| *time_s += by_s);
+}
+
 #[test]
 fn a_pose_at_100_hz_is_enough() {
     let mut case = heavy_with_drag(11);
@@ -119,6 +123,26 @@ fn repeated_samples_left_out_do_not_matter() {
         flight.angular_velocity.values = (0..times.len()).filter(uneven).map(|at| values[at]).collect();
     });
     require_named(&found, &["mass-error", "rotor-drag"]);
+}
+
+/// Times since a recorder was switched on, two days ago: every command is found at its tick all the same.
+#[test]
+fn large_times_do_not_matter() {
+    const SWITCHED_ON_S: f64 = 200_000.0;
+    let mut case = heavy_with_drag(23);
+    case.plan.sensors.has_rotor_speeds = true;
+    let later = changed(&case, |flight| {
+        shift(&mut flight.position, SWITCHED_ON_S);
+        shift(&mut flight.attitude, SWITCHED_ON_S);
+        shift(&mut flight.angular_velocity, SWITCHED_ON_S);
+        shift(&mut flight.specific_force, SWITCHED_ON_S);
+        shift(&mut flight.command, SWITCHED_ON_S);
+        shift(&mut flight.rotor_speed, SWITCHED_ON_S);
+    });
+    require_named(&later, &["mass-error", "rotor-drag"]);
+    let slowness = |own: &Report| own.effects["motor-lag"].parameters["slowness"].value;
+    let (at_once, later) = (slowness(&report(&case.flights())), slowness(&later));
+    assert!((at_once - later).abs() < 1e-4, "{at_once} {later}");
 }
 
 /// Late in one flight only: the flight's clock, and no effect. With attitudes that scatter by 1 mrad and turn at 1 rad/s
