@@ -31,6 +31,30 @@ impl Pairs {
         Self::over_windows(&position.time_s, velocity, window_s, |from, to| p(to) - p(from))
     }
 
+    /// How the vehicle leans, as an acceleration in the horizontal plane under `gravity_m_s2`, against the position's
+    /// over windows of `window_s`.
+    pub fn leaning(attitude: &Channel<4>, position: &Channel<3>, gravity_m_s2: f64, window_s: f64) -> Self {
+        let lean = |wxyz: &[f64; 4]| {
+            let up = UnitQuaternion::from_quaternion(from_wxyz(*wxyz)) * Vector3::z();
+            // Beyond 60 degrees the vehicle does not hold its height by leaning.
+            let part = gravity_m_s2 / up.z.max(0.5);
+            [part * up.x, part * up.y, 0.0]
+        };
+        let values = attitude.values.iter().map(lean).collect();
+        let leaning = Channel { time_s: attitude.time_s.clone(), values };
+        let (time_s, p) = (&position.time_s, |index: usize| Vector3::from(position.values[index]));
+        let velocity = |from: usize, to: usize| (p(to) - p(from)) / (time_s[to] - time_s[from]);
+        Self::over_windows(time_s, &leaning, window_s, |from, to| {
+            let middle_s = (time_s[from] + time_s[to]) / 2.0;
+            let middle = time_s.partition_point(|time| *time < middle_s);
+            if middle == from || middle == to {
+                return Vector3::zeros();
+            }
+            let change = 2.0 * (velocity(middle, to) - velocity(from, middle));
+            Vector3::new(change.x, change.y, 0.0)
+        })
+    }
+
     fn over_windows(
         time_s: &[f64],
         logged: &Channel<3>,

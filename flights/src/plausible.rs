@@ -18,9 +18,15 @@ const IN_TIME: f64 = 0.9;
 /// Windows over which rates are derived, in s: long against the jitter between channels.
 const RATE_WINDOW_S: f64 = 0.1;
 const VELOCITY_WINDOW_S: f64 = 0.2;
+const LEANING_WINDOW_S: f64 = 0.4;
 /// Below these the vehicle hardly moves, and noise is compared with noise.
 const QUIET_RATE_RAD_S: f64 = 0.05;
 const QUIET_SPEED_M_S: f64 = 0.05;
+const QUIET_ACCELERATION_M_S2: f64 = 0.2;
+/// A vehicle accelerates as it leans, but for the drag, within this factor.
+const LEANING_TOLERANCE: f64 = 3.0;
+/// And a vector is its twin's derivative within this one.
+const DERIVATIVE_TOLERANCE: f64 = 1.3;
 /// No vehicle with four rotors flies faster, in m/s.
 const SPEED_MAX_M_S: f64 = 100.0;
 /// Voltages that a battery of a vehicle can have, from one cell to fourteen.
@@ -46,11 +52,12 @@ pub struct Finding {
 pub fn judge(flight: &Flight, vehicle: &Vehicle, channels: &ChannelMap) -> Vec<Finding> {
     let judge = Judge { flight, vehicle, channels };
     let findings = [
+        judge.time(),
         judge.gravity(),
         judge.upright(),
         judge.rates(),
         judge.velocity(),
-        judge.speed(),
+        judge.leaning().or_else(|| judge.speed()),
         judge.commands(),
         judge.rotor_speed(),
         judge.voltage(),
@@ -65,6 +72,49 @@ struct Judge<'a> {
 }
 
 impl Judge<'_> {
+    /// The derivatives of the pose are what was logged only if time is in its unit.
+    fn time(&self) -> Option<Finding> {
+        let quantity = Quantity::Time;
+        self.channels.get(&quantity)?;
+        let flight = self.flight;
+        let twins = |scale: f64| {
+            let attitude = slowed(&flight.attitude, scale);
+            let position = slowed(&flight.position, scale);
+            let gyroscope = slowed(&flight.angular_velocity, scale);
+            let velocity = slowed(&flight.velocity, scale);
+            let gravity_m_s2 = self.vehicle.gravity_m_s2;
+            let leaning = Pairs::leaning(&attitude, &position, gravity_m_s2, LEANING_WINDOW_S);
+            let is_twin = |pairs: Pairs, quiet: f64, tolerance: f64| {
+                let agreement = pairs.agreement(quiet);
+                agreement.is_some_and(|own| own.correlation > SAME && own.slope.ln().abs() < tolerance.ln())
+            };
+            [
+                is_twin(
+                    Pairs::rates(&attitude, &gyroscope, RATE_WINDOW_S),
+                    QUIET_RATE_RAD_S,
+                    DERIVATIVE_TOLERANCE,
+                ),
+                is_twin(
+                    Pairs::velocities(&position, &velocity, VELOCITY_WINDOW_S),
+                    QUIET_SPEED_M_S,
+                    DERIVATIVE_TOLERANCE,
+                ),
+                is_twin(leaning, QUIET_ACCELERATION_M_S2, LEANING_TOLERANCE),
+            ]
+        };
+        if !flight.assumed.is_empty() || twins(1.0).contains(&true) {
+            return None;
+        }
+        let others = quantity.units().iter().filter(|(name, _)| *name != self.unit(quantity));
+        let fitting = |(_, factor): &&(&str, f64)| twins(factor / self.factor(quantity)).contains(&true);
+        let (name, factor) = others.clone().find(fitting)?;
+        let what = format!(
+            "declared in {}, but the motion is that of a flight whose times are in {name}",
+            self.unit(quantity)
+        );
+        Some(finding(quantity, self.factor(quantity) / factor, Some(format!("`unit = \"{name}\"`")), &what))
+    }
+
     /// The specific force is gravity's in the median, and up.
     fn gravity(&self) -> Option<Finding> {
         let quantity = Quantity::SpecificForce;
@@ -116,7 +166,9 @@ impl Judge<'_> {
         let agreement = pairs.agreement(QUIET_RATE_RAD_S)?;
         if agreement.correlation > SAME {
             let what = format!("it is {:.4} times the derivative of the attitude", agreement.slope);
-            return self.by_unit(quantity, agreement.slope, 1.3, &what).or_else(|| late(quantity, agreement));
+            return self
+                .by_unit(quantity, agreement.slope, DERIVATIVE_TOLERANCE, &what)
+                .or_else(|| late(quantity, agreement));
         }
         let reordered = self
             .w_first()
@@ -155,8 +207,9 @@ impl Judge<'_> {
         let agreement = pairs.agreement(QUIET_SPEED_M_S * self.position_scale())?;
         let what = format!("it is {:.5} times the derivative of the position", agreement.slope);
         if agreement.correlation > SAME {
-            let position = self.unit_that_fits(Quantity::Position, 1.0 / agreement.slope, 1.3);
-            let Some(finding) = self.by_unit(quantity, agreement.slope, 1.3, &what) else {
+            let position =
+                self.unit_that_fits(Quantity::Position, 1.0 / agreement.slope, DERIVATIVE_TOLERANCE);
+            let Some(finding) = self.by_unit(quantity, agreement.slope, DERIVATIVE_TOLERANCE, &what) else {
                 return late(quantity, agreement);
             };
             return Some(match (position, &finding.fits) {
@@ -177,6 +230,21 @@ impl Judge<'_> {
             if fits.is_some() { "" } else { "; it may be in the body, or late" }
         );
         Some(finding(quantity, agreement.slope, fits, &what))
+    }
+
+    /// The position accelerates as the vehicle leans.
+    fn leaning(&self) -> Option<Finding> {
+        if !self.flight.assumed.is_empty() {
+            return None;
+        }
+        let (quantity, gravity_m_s2) = (Quantity::Position, self.vehicle.gravity_m_s2);
+        let (attitude, position) = (&self.flight.attitude, &self.flight.position);
+        let pairs = Pairs::leaning(attitude, position, gravity_m_s2, LEANING_WINDOW_S);
+        let agreement = pairs.agreement(QUIET_ACCELERATION_M_S2 * self.position_scale())?;
+        let factor = 1.0 / agreement.slope;
+        let what = format!("it accelerates {factor:.4} times as much as the vehicle leans");
+        let is_twin = agreement.correlation > SAME;
+        is_twin.then(|| self.by_unit(quantity, factor, LEANING_TOLERANCE, &what)).flatten()
     }
 
     /// How much smaller a position can be than its true one, if its unit is declared too large.
@@ -309,6 +377,12 @@ fn late(channel: Quantity, agreement: Agreement) -> Option<Finding> {
         agreement.correlation
     );
     (agreement.correlation < IN_TIME).then(|| finding(channel, agreement.slope, None, &what))
+}
+
+/// The channel with its times `scale` times as long.
+fn slowed<const N: usize>(channel: &Channel<N>, scale: f64) -> Channel<N> {
+    let time_s = channel.time_s.iter().map(|time_s| scale * time_s).collect();
+    Channel { time_s, values: channel.values.clone() }
 }
 
 /// The median of how far the body's z axis points up, from -1 to 1.

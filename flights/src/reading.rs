@@ -259,7 +259,7 @@ impl Reading<'_> {
             return Ok(());
         }
         Err(FlightsError::Implausible {
-            place: self.document.place(&self.at),
+            place: self.document.place(&self.declaration_of(clear[0].channel)),
             flight: flight.name.clone(),
             file: self.file.to_owned(),
             findings: clear,
@@ -279,10 +279,13 @@ impl Reading<'_> {
     }
 
     fn channel_error(&self, quantity: Quantity, reason: String) -> FlightsError {
-        // A channel that was taken by default stands nowhere in the file.
+        self.log_error(&self.declaration_of(quantity), format!("`{quantity}`: {reason}"))
+    }
+
+    /// Where a channel is declared; the flight, for one that was taken by default and stands nowhere in the file.
+    fn declaration_of(&self, quantity: Quantity) -> Range<usize> {
         let declared = self.channels.get(&quantity).map(Spanned::span).filter(|span| !span.is_empty());
-        let at = declared.unwrap_or(self.at.clone());
-        self.log_error(&at, format!("`{quantity}`: {reason}"))
+        declared.unwrap_or(self.at.clone())
     }
 
     fn log_error(&self, at: &Range<usize>, reason: String) -> FlightsError {

@@ -93,11 +93,36 @@ fn data_in_other_units_than_declared_are_found() {
 
 #[test]
 fn a_position_alone_that_is_too_fast_is_found() {
-    let channels = CHANNELS.lines().filter(|line| !line.starts_with("velocity"));
-    let channels: String = channels.map(|line| line.to_owned() + "\n").collect();
+    let channels = without("velocity").replace("attitude =", "# attitude =");
     let mm = Motion { length_unit: 1000.0, ..Motion::default() };
     assert_eq!(findings(&mm, &channels), [(Quantity::Position, "`unit = \"mm\"`".to_owned())]);
     assert_eq!(read(&Motion::default(), &channels, "").unwrap().notes, [""; 0]);
+}
+
+#[test]
+fn a_position_alone_is_held_against_how_the_vehicle_leans() {
+    let channels = without("velocity");
+    let cm = Motion { length_unit: 100.0, ..Motion::default() };
+    assert_eq!(findings(&cm, &channels), [(Quantity::Position, "`unit = \"cm\"`".to_owned())]);
+    let declared = channels.replace("unit = \"m\"", "unit = \"mm\"");
+    assert_eq!(findings(&Motion::default(), &declared), [(Quantity::Position, "`unit = \"m\"`".to_owned())]);
+}
+
+#[test]
+fn times_in_another_unit_are_found() {
+    let in_s = (Quantity::Time, "`unit = \"s\"`".to_owned());
+    for channels in [CHANNELS.to_owned(), without("velocity"), without("angular_velocity")] {
+        for declared in ["\"ms\"", "\"us\""] {
+            let found = findings(&Motion::default(), &channels.replace("\"s\"", declared));
+            assert!(found.contains(&in_s), "{declared}: {found:?}");
+        }
+    }
+}
+
+/// The channels without one of them.
+fn without(channel: &str) -> String {
+    let kept = CHANNELS.lines().filter(|line| !line.starts_with(channel));
+    kept.map(|line| line.to_owned() + "\n").collect()
 }
 
 #[test]

@@ -56,12 +56,23 @@ impl Default for Motion {
 }
 
 impl Motion {
+    fn position(time: f64) -> Vector3<f64> {
+        Vector3::new(1.4 * (1.4 * time).sin(), (2.0 * time).cos(), 1.0 + 0.2 * time.sin())
+    }
+
+    fn velocity(time: f64) -> Vector3<f64> {
+        Vector3::new(1.96 * (1.4 * time).cos(), -2.0 * (2.0 * time).sin(), 0.2 * time.cos())
+    }
+
+    /// What thrust has to make of it.
+    fn force(time: f64) -> Vector3<f64> {
+        Vector3::new(-2.744 * (1.4 * time).sin(), -4.0 * (2.0 * time).cos(), 9.81 - 0.2 * time.sin())
+    }
+
+    /// Leaning into the force, with some yaw.
     fn attitude(time: f64) -> UnitQuaternion<f64> {
-        UnitQuaternion::from_euler_angles(
-            0.3 * (2.0 * time).sin(),
-            0.2 * (1.4 * time).sin(),
-            0.2 * time.sin(),
-        )
+        let leaning = UnitQuaternion::rotation_between(&Vector3::z(), &Self::force(time)).unwrap();
+        leaning * UnitQuaternion::from_euler_angles(0.0, 0.0, 0.2 * time.sin())
     }
 
     fn rate(time: f64) -> Vector3<f64> {
@@ -81,10 +92,9 @@ impl Motion {
     }
 
     fn row(&self, time: f64) -> Vec<f64> {
-        let (s, c) = time.sin_cos();
-        let (mut p, mut v) = (Vector3::new(c, s, 1.0 + 0.2 * s), Vector3::new(-s, c, 0.2 * c));
+        let (mut p, mut v) = (Self::position(time), Self::velocity(time));
         let (mut q, mut w) = (Self::attitude(time), Self::rate(time));
-        let mut f = q.inverse() * Vector3::new(-c, -s, 9.81 - 0.2 * s);
+        let mut f = q.inverse() * Self::force(time);
         if self.frd_ned {
             let ned_enu = Matrix3::new(0.0, 1.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, -1.0);
             let frd_flu = Matrix3::from_diagonal(&Vector3::new(1.0, -1.0, -1.0));
