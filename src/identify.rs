@@ -9,6 +9,7 @@ use crate::{files, validate};
 use anyhow::{Context, Result, bail};
 use clap::{Args, Subcommand};
 use flights::{Flight, FlightSet};
+use identify::align;
 use identify::report::{FlightReport, Report};
 use identify::run::Outcome;
 use identify::sensing::SensorErrors;
@@ -127,7 +128,7 @@ fn fly(set: &FlightSet, vehicle: &Path, outcome: &Outcome, progress: &Progress) 
     let before = errors(&set.vehicle, &aligned)?;
     let after = errors(vehicle, &corrected)?;
     let mut flights = json!({});
-    let mut furthest: Option<f64> = None;
+    let mut furthest: Option<(f64, String)> = None;
     for (before, after) in before.flights.iter().zip(&after.flights) {
         for (before_at, after_at) in before.horizons.iter().zip(&after.horizons) {
             for (old, new) in before_at.channels.iter().zip(&after_at.channels) {
@@ -138,11 +139,14 @@ fn fly(set: &FlightSet, vehicle: &Path, outcome: &Outcome, progress: &Progress) 
                 let own = predicted(&outcome.report, &before.name, &horizon, channel);
                 let away = own
                     .map(|(before, after)| (old_rms / before - 1.0).abs().max((new_rms / after - 1.0).abs()));
-                furthest = furthest.into_iter().chain(away).filter(|own| own.is_finite()).reduce(f64::max);
+                let own = away.map(|away| (away, format!("{channel} after {horizon} s of {}", before.name)));
+                let all = furthest.into_iter().chain(own).filter(|own| own.0.is_finite());
+                furthest = all.max_by(|a, b| a.0.total_cmp(&b.0));
             }
         }
     }
-    Ok(Some(json!({ "flights": flights, "furthest_from_prediction": furthest })))
+    let (away, at) = furthest.unzip();
+    Ok(Some(json!({ "flights": flights, "furthest_from_prediction": away, "furthest_at": at })))
 }
 
 /// The report's own errors before and after.
@@ -156,9 +160,7 @@ fn predicted(report: &Report, flight: &str, horizon: &str, channel: &str) -> Opt
 fn corrected(set: &FlightSet, outcome: &Outcome, errors: &SensorErrors) -> FlightSet {
     let flight = |flight: &Flight| {
         let offsets = outcome.report.time_offsets_s.get(&flight.name);
-        let own_s =
-            offsets.and_then(|own| own.get("pose").copied().flatten()).map_or(0.0, |own| own.taken_off);
-        errors.taken_off(flight, own_s)
+        errors.taken_off(flight, &offsets.map(align::taken_off).unwrap_or_default())
     };
     let can_fly = |flight: &&Flight| {
         let was_used = |own: &FlightReport| own.name == flight.name && own.compared_s > LEAST_REPLAY_S;
@@ -172,10 +174,13 @@ fn corrected(set: &FlightSet, outcome: &Outcome, errors: &SensorErrors) -> Fligh
 
 fn summary(report: &Report, flown: Option<&Value>, out: &Path) -> String {
     let mut text = report.to_string();
-    if let Some(furthest) = flown.and_then(|flown| flown["furthest_from_prediction"].as_f64()) {
+    let furthest = flown.and_then(|flown| {
+        Some((flown["furthest_from_prediction"].as_f64()?, flown["furthest_at"].as_str()?))
+    });
+    if let Some((away, at)) = furthest {
         text += &format!(
-            "flown again on the bus with both vehicle files: errors within {:.1} % of these\n",
-            furthest * 100.0
+            "flown again on the bus with both vehicle files: every error within {:.1} % of these; furthest {at}\n",
+            away * 100.0
         );
     }
     let files =

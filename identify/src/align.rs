@@ -1,93 +1,193 @@
-//! Clocks of a flight against each other: how late the pose is against the gyroscope, by the sensors alone.
+//! Clocks of a flight against each other: how late attitude and position are against the inertial unit, by the sensors
+//! alone.
 //!
-//! The attitude's rate of change and the gyroscope's reading are the same quantity, so no model is needed to see by
-//! how much one lags. What all flights share is left to the candidate `sensor-delay`; what a single flight has beyond
-//! that is taken off its pose before anything else, and reported.
+//! The attitude's rate of change and the gyroscope's reading are the same quantity, and so are the position's second
+//! derivative and the accelerometer's reading turned by the attitude, less gravity: no model is needed to see by how much
+//! one lags. What the attitudes of all flights share is left to the candidate `sensor-delay`; what a single one has beyond
+//! that is taken off, and so is what a position has beyond its attitude.
 
 use crate::fit::{Bench, Weights};
-use crate::normal;
+use crate::normal::{self, Block};
 use crate::parameter::{Owner, SensorParameter};
 use crate::prepared::{Equation, Prepared};
 use serde::Serialize;
+use std::collections::BTreeMap;
 
 /// Gauss-Newton steps.
 const STEPS: usize = 40;
+/// None is longer: a line through a course is good for a fraction of its quickest turn.
+const STEP_MAX_S: f64 = 0.02;
 /// From fewer blocks no deviation can be told.
 const LEAST_BLOCKS: usize = 5;
 /// An offset is real beyond so many standard deviations.
 const SURE: f64 = 4.0;
 
 /// How the samples lie on the grid decides how much noise their interpolation leaves, which pulls at the offset by up to
-/// this part of the pose's period (docs/validation.md), beyond what blocks of time can show.
+/// this part of the channel's period (docs/validation.md), beyond what blocks of time can show.
 const BETWEEN_SAMPLES: f64 = 0.1;
 
-/// Lateness of the pose against the inertial unit.
+/// Lateness of a channel against the inertial unit.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Offset {
-    /// The offset in s; positive where the pose is late.
+    /// The offset in s; positive where the channel is late.
     pub value: f64,
     /// Lower end of the 95 % interval.
     pub low: f64,
     /// Upper end.
     pub high: f64,
-    /// The part of it that this flight has beyond what the fit flights share, taken off before the fit.
+    /// The part of it that was taken off before the fit.
     pub taken_off: f64,
 }
 
-/// The offset of one flight with its standard deviation; `None` without both gyroscope and attitude.
+impl Offset {
+    fn of(found: Found, period_s: Option<f64>, taken_off: f64) -> Self {
+        let half = (1.96 * found.deviation_s).hypot(BETWEEN_SAMPLES * period_s.unwrap_or(0.0));
+        Self { value: found.late_s, low: found.late_s - half, high: found.late_s + half, taken_off }
+    }
+}
+
+/// What is taken off the clocks of one flight.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Lateness {
+    /// Lateness of the attitude in s.
+    pub attitude_s: f64,
+    /// Lateness of position and velocity in s.
+    pub position_s: f64,
+}
+
+/// Offsets by channel; `None` where the flight has not what it takes.
+pub type Offsets = BTreeMap<&'static str, Option<Offset>>;
+
+/// What [`align`] took off, as it stands in the offsets of a report.
 #[must_use]
-pub fn offset(bench: &Bench, flight: &Prepared) -> Option<(f64, f64)> {
+pub fn taken_off(offsets: &Offsets) -> Lateness {
+    let of = |channel: &str| offsets.get(channel).copied().flatten().map(|own| own.taken_off);
+    let attitude_s = of("attitude").unwrap_or(0.0);
+    // A position without a clock of its own comes with the attitude.
+    let position_s = of("position").or_else(|| of("velocity")).unwrap_or(attitude_s);
+    Lateness { attitude_s, position_s }
+}
+
+/// An offset that was found.
+#[derive(Debug, Clone, Copy)]
+struct Found {
+    late_s: f64,
+    deviation_s: f64,
+}
+
+impl Found {
+    /// Whether what it has beyond `other_s` is more than chance and the grid make of none.
+    fn is_beyond(&self, other_s: f64, least_s: f64) -> bool {
+        let own_s = (self.late_s - other_s).abs();
+        own_s > SURE * self.deviation_s && own_s > least_s
+    }
+}
+
+/// The attitude's offset from the gyroscope.
+fn of_attitude(bench: &Bench, flight: &Prepared) -> Option<Found> {
     flight.offset_of(Equation::Gyroscope)?;
     let is_pose = |owner: &Owner| matches!(owner, Owner::Sensor(SensorParameter::PoseDelay));
     let parameter = bench.model.parameters.all.iter().position(|own| is_pose(&own.owner))?;
     let mut values = bench.model.parameters.declared();
+    descended(|late_s| {
+        values[parameter] = late_s;
+        bench.blocks_of(flight, &values, &[parameter])
+    })
+}
+
+/// The offset of the position, or else of the velocity, from what the accelerometer reads, turned by an attitude that is
+/// `attitude_s` late. What is moved is the inertial side: a position's second derivative is noise for the most part, and
+/// that of a moved one would depend on how its samples lie on the grid.
+fn of_position(bench: &Bench, flight: &Prepared, attitude_s: f64) -> Option<Found> {
+    const ASIDE_S: f64 = 1e-3;
+    let gravity_m_s2 = bench.model.vehicle.gravity_m_s2;
+    let translation = flight.translation_rows();
+    let is_measured = flight.offset_of(Equation::SpecificForce).is_some() && !flight.is_assumed();
+    if translation.is_empty() || !is_measured {
+        return None;
+    }
+    let blocks = bench.block_knots(flight);
+    descended(|late_s| {
+        let inertial = |aside_s: f64| {
+            flight.inertial_rows(attitude_s - late_s - aside_s, -late_s - aside_s, gravity_m_s2)
+        };
+        let [now, ahead, behind] = [0.0, ASIDE_S, -ASIDE_S].map(inertial);
+        let of_knots = |(first, end): &(usize, usize)| {
+            let mut block = Block::zero(4);
+            for at in 3 * first..3 * end {
+                // Beside the offset a constant on each axis, for what the accelerometer's bias makes of it.
+                let mut row = [(behind[at] - ahead[at]) / (2.0 * ASIDE_S), 0.0, 0.0, 0.0];
+                row[1 + at % 3] = 1.0;
+                block.add(translation[at] - now[at], &row, 1.0);
+            }
+            block.complete();
+            block
+        };
+        blocks.iter().map(of_knots).collect()
+    })
+}
+
+/// The offset at which the squares are least, by the normal equations at an offset, of which it is the first parameter.
+fn descended(mut blocks_at: impl FnMut(f64) -> Vec<Block>) -> Option<Found> {
+    let (mut late_s, mut last_s, mut reach_s) = (0.0_f64, 0.0_f64, STEP_MAX_S);
     for _ in 0..STEPS {
-        let blocks = bench.blocks_of(flight, &values, &[parameter]);
+        let blocks = blocks_at(late_s);
         let total = normal::sum(&blocks);
-        if total.gram[(0, 0)] <= 0.0 || blocks.len() < LEAST_BLOCKS {
+        if blocks.len() < LEAST_BLOCKS || total.gram[(0, 0)] <= 0.0 {
             return None;
         }
-        let step = -total.gradient[0] / total.gram[(0, 0)];
-        let deviation = normal::covariance(&blocks)[(0, 0)].max(0.0).sqrt();
-        // A line through a course is good for a fraction of its quickest turn.
-        values[parameter] += step.clamp(-0.02, 0.02);
-        if step.abs() < 1e-5_f64.max(0.02 * deviation) {
-            return Some((values[parameter], deviation));
+        let step_s = -(normal::inverse(&total.gram) * &total.gradient)[0];
+        let deviation_s = normal::covariance(&blocks)[(0, 0)].max(0.0).sqrt();
+        // How samples lie on the grid makes waves in the squares, over whose troughs a whole step can go to and fro.
+        if step_s * last_s < 0.0 {
+            reach_s = last_s.abs() / 2.0;
+        }
+        last_s = step_s.clamp(-reach_s, reach_s);
+        late_s += last_s;
+        if last_s.abs() < 1e-5_f64.max(0.02 * deviation_s) {
+            return Some(Found { late_s, deviation_s });
         }
     }
     None
 }
 
-fn pose_period_s(flight: &Prepared) -> f64 {
-    flight.flight.attitude.period_s().unwrap_or(0.0)
-}
-
 /// Weights under which only gyroscope and attitude count.
-#[must_use]
-pub fn kinematic_weights() -> Weights {
+fn kinematic_weights() -> Weights {
     (0..3).map(|axis| ((Equation::Gyroscope.name(), axis), 1.0)).collect()
 }
 
-/// Takes off each flight's pose what it is late beyond the mean of the fit flights, where that is sure, and says what
-/// was found for each flight of `fit` and then of `test`.
-pub fn align(bench: &mut Bench) -> Vec<(String, Option<Offset>)> {
+/// Takes off each flight's attitude what it is late beyond the mean of the fit flights, and its position what that is
+/// late beyond its attitude, where these are sure, and says what was found for each flight of `fit` and then of `test`.
+pub fn align(bench: &mut Bench) -> Vec<(String, Offsets)> {
     let weights = std::mem::replace(&mut bench.weights, kinematic_weights());
-    let found: Vec<Option<(f64, f64)>> =
-        bench.fit.iter().chain(&bench.test).map(|flight| offset(bench, flight)).collect();
+    let flights = || bench.fit.iter().chain(&bench.test);
+    let attitudes: Vec<Option<Found>> = flights().map(|flight| of_attitude(bench, flight)).collect();
+    let late_s = |found: &Option<Found>| found.map_or(0.0, |own| own.late_s);
+    let positions: Vec<Option<Found>> =
+        flights().zip(&attitudes).map(|(flight, own)| of_position(bench, flight, late_s(own))).collect();
     bench.weights = weights;
-    let of_fit: Vec<(f64, f64)> = found[..bench.fit.len()].iter().flatten().copied().collect();
-    let shared = of_fit.iter().map(|(value, _)| value).sum::<f64>() / (of_fit.len() as f64).max(1.0);
+    let of_fit: Vec<f64> = attitudes[..bench.fit.len()].iter().flatten().map(|own| own.late_s).collect();
+    let shared_s = of_fit.iter().sum::<f64>() / (of_fit.len() as f64).max(1.0);
     let least_s = bench.least_delay_s() / 2.0;
     let mut offsets = Vec::new();
-    for (flight, found) in bench.fit.iter_mut().chain(&mut bench.test).zip(found) {
-        let offset = found.map(|(value, deviation)| {
-            let own = value - shared;
-            let is_sure = own.abs() > SURE * deviation && own.abs() > least_s;
-            flight.pose_offset_s = if is_sure { own } else { 0.0 };
-            let half = (1.96 * deviation).hypot(BETWEEN_SAMPLES * pose_period_s(flight));
-            Offset { value, low: value - half, high: value + half, taken_off: flight.pose_offset_s }
-        });
-        offsets.push((flight.flight.name.clone(), offset));
+    let flights = bench.fit.iter_mut().chain(&mut bench.test);
+    for ((prepared, attitude), position) in flights.zip(attitudes).zip(positions) {
+        let flight = prepared.flight;
+        let attitude_s = late_s(&attitude);
+        let own = attitude.filter(|own| own.is_beyond(shared_s, least_s));
+        let of_attitude_s = own.map_or(0.0, |own| own.late_s - shared_s);
+        let (channel, period_s) = if flight.position.is_empty() {
+            ("velocity", flight.velocity.period_s())
+        } else {
+            ("position", flight.position.period_s())
+        };
+        let least_s = least_s.max(BETWEEN_SAMPLES * period_s.unwrap_or(0.0));
+        let beyond = position.filter(|own| own.is_beyond(attitude_s, least_s));
+        let of_position_s = of_attitude_s + beyond.map_or(0.0, |own| own.late_s - attitude_s);
+        prepared.late = Lateness { attitude_s: of_attitude_s, position_s: of_position_s };
+        let attitude = attitude.map(|own| Offset::of(own, flight.attitude.period_s(), of_attitude_s));
+        let position = position.map(|own| Offset::of(own, period_s, of_position_s));
+        offsets.push((flight.name.clone(), Offsets::from([("attitude", attitude), (channel, position)])));
     }
     offsets
 }

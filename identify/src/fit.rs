@@ -228,8 +228,9 @@ impl Bench<'_> {
             .collect()
     }
 
-    /// First and last knot of each block.
-    fn block_knots(&self, flight: &Prepared) -> Vec<(usize, usize)> {
+    /// First knot of each block, and the one behind its last.
+    #[must_use]
+    pub fn block_knots(&self, flight: &Prepared) -> Vec<(usize, usize)> {
         let knots = &flight.layout.knots;
         let block_of = |knot: usize| (flight.layout.clock.at(knot) / self.block_s).floor();
         let mut blocks = Vec::new();

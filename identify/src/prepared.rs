@@ -1,6 +1,7 @@
 //! A flight made ready for comparison: its grid, its knots, and which equations it can be held against.
 #![allow(non_snake_case, reason = "a trailing _W or _B names the frame a vector is written in")]
 
+use crate::align::Lateness;
 use crate::clock::Clock;
 use crate::track::{Track, valid_about};
 use crate::window::{NUMEROV, SIMPSON, Window, central_difference, second_difference};
@@ -101,8 +102,8 @@ pub struct Prepared<'f> {
     pub flight: &'f Flight,
     /// How it is read.
     pub layout: Layout,
-    /// Lateness of the pose against the other channels that this flight alone has, beyond what all flights share.
-    pub pose_offset_s: f64,
+    /// What its pose is late by that sensors of all flights are not.
+    pub late: Lateness,
     /// Rotors whose measured speed is not believed.
     pub distrusted: [bool; 4],
 }
@@ -134,7 +135,7 @@ impl<'f> Prepared<'f> {
         let windows =
             equations.iter().map(|equation| windows(*equation, flight, box_steps, step_s)).collect();
         let layout = Layout { clock, box_steps, knots: Vec::new(), equations, windows };
-        let mut prepared = Self { flight, layout, pose_offset_s: 0.0, distrusted: [false; 4] };
+        let mut prepared = Self { flight, layout, late: Lateness::default(), distrusted: [false; 4] };
         prepared.layout.knots = prepared.knots(&is_flying);
         (prepared.layout.knots.len() >= 3).then_some(prepared)
     }
@@ -172,15 +173,15 @@ impl<'f> Prepared<'f> {
     #[must_use]
     pub fn tracks(&self, pose_s: f64, imu_s: f64) -> Tracks {
         let (flight, clock) = (self.flight, &self.layout.clock);
-        let pose_s = pose_s + self.pose_offset_s;
-        let position = Track::sampled(&flight.position, pose_s, clock);
-        let velocity_track = Track::sampled(&flight.velocity, pose_s, clock);
+        let position_s = pose_s + self.late.position_s;
+        let position = Track::sampled(&flight.position, position_s, clock);
+        let velocity_track = Track::sampled(&flight.velocity, position_s, clock);
         let velocity = if flight.velocity.is_empty() {
             position.slope(self.layout.box_steps, clock.step_s)
         } else {
             velocity_track.values.clone()
         };
-        let attitude = attitudes(&Track::sampled(&flight.attitude, pose_s, clock));
+        let attitude = attitudes(&Track::sampled(&flight.attitude, pose_s + self.late.attitude_s, clock));
         let turning = turning(&attitude, clock.step_s);
         let gyroscope = Track::sampled(&flight.angular_velocity, imu_s, clock);
         let force = Track::sampled(&flight.specific_force, imu_s, clock);
@@ -213,6 +214,38 @@ impl<'f> Prepared<'f> {
             }
         }
         Tracks { position, velocity, attitude, rates, rows }
+    }
+
+    /// The measured side of [`Equation::Acceleration`] alone, three components for each knot; none where it is not
+    /// compared.
+    #[must_use]
+    pub fn translation_rows(&self) -> Vec<f64> {
+        let channel =
+            if self.flight.position.is_empty() { &self.flight.velocity } else { &self.flight.position };
+        let values = Track::sampled(channel, 0.0, &self.layout.clock).values;
+        self.acceleration_windows().map_or(Vec::new(), |(measured, _)| self.rows_over(measured, &values))
+    }
+
+    /// The same by attitude and accelerometer, late by `attitude_s` and `force_s`.
+    #[must_use]
+    pub fn inertial_rows(&self, attitude_s: f64, force_s: f64, gravity_m_s2: f64) -> Vec<f64> {
+        let clock = &self.layout.clock;
+        let attitude_WB = attitudes(&Track::sampled(&self.flight.attitude, attitude_s, clock));
+        let force_B = Track::sampled(&self.flight.specific_force, force_s, clock);
+        let turned = |(attitude_WB, force_B): (&UnitQuaternion<f64>, &[f64; 3])| {
+            (attitude_WB * Vector3::from(*force_B) - gravity_m_s2 * Vector3::z()).into()
+        };
+        let acceleration_W: Vec<[f64; 3]> = attitude_WB.iter().zip(&force_B.values).map(turned).collect();
+        self.acceleration_windows().map_or(Vec::new(), |(_, model)| self.rows_over(model, &acceleration_W))
+    }
+
+    fn acceleration_windows(&self) -> Option<&(Window, Window)> {
+        let at = self.layout.equations.iter().position(|own| *own == Equation::Acceleration)?;
+        Some(&self.layout.windows[at])
+    }
+
+    fn rows_over(&self, window: &Window, values: &[[f64; 3]]) -> Vec<f64> {
+        self.layout.knots.iter().flat_map(|knot| window.over(values, *knot)).collect()
     }
 
     /// Middles of windows in which every compared channel was sampled and the motors were running.

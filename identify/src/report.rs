@@ -1,6 +1,6 @@
 //! What identification found, for programs (`report.json`) and for people.
 
-use crate::align::Offset;
+use crate::align::Offsets;
 use crate::candidate::Unseen;
 use crate::faults::Fault;
 use crate::trim::Trim;
@@ -22,8 +22,9 @@ pub struct Report {
     pub effects: BTreeMap<&'static str, EffectReport>,
     /// The residuals on the test flights.
     pub whiteness: BeforeAfter<BTreeMap<&'static str, Whiteness>>,
-    /// Clocks of each flight: the pose against the inertial unit; `null` where it has not both.
-    pub time_offsets_s: BTreeMap<String, BTreeMap<&'static str, Option<Offset>>>,
+    /// Clocks of each flight: attitude and position, or else velocity, against the inertial unit; `null` where it has
+    /// not what that takes.
+    pub time_offsets_s: BTreeMap<String, Offsets>,
     /// Sensors and actuators that seem broken.
     pub faults: Vec<Fault>,
     /// The trims of the flights where they differ between flights: constant torques that no one vehicle explains.
@@ -114,6 +115,8 @@ pub struct Estimate {
     pub high: f64,
     /// Whether the estimate stopped at the greatest or least value that the effect may have.
     pub at_bound: bool,
+    /// Whether these flights say anything of it: its interval does not hold all that the effect may be.
+    pub determined: bool,
 }
 
 /// The noise of a channel.
@@ -156,6 +159,15 @@ impl Report {
             let equations = flight.equations.join(", ");
             writeln!(f, "  {role}  {:28} {:7.1} s  {equations}", flight.name, flight.compared_s)?;
         }
+        for (flight, offsets) in &self.time_offsets_s {
+            for (channel, offset) in offsets {
+                let taken_off_s = offset.map_or(0.0, |own| own.taken_off);
+                if taken_off_s != 0.0 {
+                    let late_ms = rounded(1e3 * taken_off_s);
+                    writeln!(f, "clock: {channel} of {flight} is {late_ms} ms late; taken off")?;
+                }
+            }
+        }
         Ok(())
     }
 
@@ -175,12 +187,14 @@ impl Report {
             )?;
             for (parameter, own) in &effect.parameters {
                 let (value, low, high) = (rounded(own.value), rounded(own.low), rounded(own.high));
-                let bound = if own.at_bound {
-                    "; at its bound: more is asked for than this effect can be"
-                } else {
-                    ""
+                let doubt = match own {
+                    Estimate { determined: false, .. } => "; not determined by these flights",
+                    Estimate { at_bound: true, .. } => {
+                        "; at its bound: more is asked for than this effect can be"
+                    }
+                    _ => "",
                 };
-                writeln!(f, "    {parameter} = {value} {}  (95 %: {low} ... {high}){bound}", own.unit)?;
+                writeln!(f, "    {parameter} = {value} {}  (95 %: {low} ... {high}){doubt}", own.unit)?;
             }
             if !effect.confused_with.is_empty() {
                 writeln!(f, "    cannot be told from: {}", effect.confused_with.join(", "))?;

@@ -1,6 +1,6 @@
 //! The whole way: from flights and the declared vehicle to a report.
 
-use crate::align::align;
+use crate::align::{Lateness, align};
 use crate::candidate::{Candidate, candidates};
 use crate::experiment;
 use crate::faults;
@@ -116,10 +116,7 @@ pub fn identify(set: &FlightSet, progress: &mut dyn FnMut(&str)) -> Result<Outco
         effects,
         unexplained: unexplained(&whiteness),
         whiteness,
-        time_offsets_s: offsets
-            .into_iter()
-            .map(|(flight, offset)| (flight, BTreeMap::from([("pose", offset)])))
-            .collect(),
+        time_offsets_s: offsets.into_iter().collect(),
         faults,
         trims,
         held_out: of_role(&predictions, Role::Test),
@@ -306,7 +303,8 @@ pub fn estimates(bench: &Bench, fitted: &Fitted, which: &[usize]) -> BTreeMap<&'
         let (low, high) = ((value - half).max(own.lower), (value + half).min(own.upper));
         // Zero is where many effects begin, and no bound that data pushed against.
         let at_bound = value != own.declared && (value <= own.lower || value >= own.upper);
-        (own.name, Estimate { value, unit: own.unit, low, high, at_bound })
+        let determined = low > own.lower || high < own.upper;
+        (own.name, Estimate { value, unit: own.unit, low, high, at_bound, determined })
     };
     which.iter().map(one).collect()
 }
@@ -324,10 +322,10 @@ fn predictions(
     let mut predictions = Vec::new();
     for flight in &set.flights {
         let all = bench.fit.iter().chain(&bench.test);
-        let own_s =
-            all.clone().find(|own| own.flight.name == flight.name).map_or(0.0, |own| own.pose_offset_s);
-        let aligned = SensorErrors::default().taken_off(flight, own_s);
-        let corrected = sensor_errors.taken_off(flight, own_s);
+        let own = all.clone().find(|own| own.flight.name == flight.name);
+        let late = own.map_or(Lateness::default(), |own| own.late);
+        let aligned = SensorErrors::default().taken_off(flight, &late);
+        let corrected = sensor_errors.taken_off(flight, &late);
         let (Some(before), Some(after)) = (Measured::of(&aligned), Measured::of(&corrected)) else {
             continue;
         };

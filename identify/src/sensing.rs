@@ -1,5 +1,6 @@
 //! What is wrong with a flight's sensors, and the flight as sensors without it would have logged it.
 
+use crate::align::Lateness;
 use crate::parameter::{Parameters, SensorParameter};
 use flights::{Channel, Flight};
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
@@ -40,14 +41,13 @@ impl SensorErrors {
         UnitQuaternion::from_scaled_axis(-Vector3::new(x, y, 0.0))
     }
 
-    /// `flight` without these errors, and with its pose earlier by `pose_offset_s` besides.
+    /// `flight` without these errors, and without what it is `late` by besides.
     #[must_use]
-    pub fn taken_off(&self, flight: &Flight, pose_offset_s: f64) -> Flight {
+    pub fn taken_off(&self, flight: &Flight, late: &Lateness) -> Flight {
         let mut flight = flight.clone();
-        let pose_s = self.pose_delay_s + pose_offset_s;
-        earlier(&mut flight.position, pose_s);
-        earlier(&mut flight.velocity, pose_s);
-        earlier(&mut flight.attitude, pose_s);
+        earlier(&mut flight.position, self.pose_delay_s + late.position_s);
+        earlier(&mut flight.velocity, self.pose_delay_s + late.position_s);
+        earlier(&mut flight.attitude, self.pose_delay_s + late.attitude_s);
         earlier(&mut flight.angular_velocity, self.inertial_delay_s);
         earlier(&mut flight.specific_force, self.inertial_delay_s);
         less(&mut flight.angular_velocity, self.gyroscope_bias_rad_s);

@@ -67,7 +67,8 @@ fn source(report: &Report) -> String {
 }
 
 fn of_estimate(own: &Estimate, source: &str) -> String {
-    let interval = format!("\"95 % interval {:e} to {:e} {}\"", own.low, own.high, own.unit);
+    let doubt = if own.determined { "" } else { "not determined by these flights: " };
+    let interval = format!("\"{doubt}95 % interval {:e} to {:e} {}\"", own.low, own.high, own.unit);
     number(own.value, own.unit, source, &interval)
 }
 

@@ -155,10 +155,32 @@ fn a_pose_that_is_late_in_one_flight_is_an_offset() {
     let late = &mut set.flights[1];
     late.position.time_s.iter_mut().chain(&mut late.attitude.time_s).for_each(|time_s| *time_s += 0.012);
     let found = report(&set);
-    let of = |at: usize| found.time_offsets_s[&set.flights[at].name]["pose"].expect("both clocks");
-    assert!((of(1).value - 0.012).abs() < 0.001 && (of(1).taken_off - 0.012).abs() < 0.001, "{:?}", of(1));
-    assert!(of(0).value.abs() < 0.001, "{:?}", of(0));
+    let of = |at: usize, channel| found.time_offsets_s[&set.flights[at].name][channel].expect("both clocks");
+    for channel in ["attitude", "position"] {
+        let (punctual, late) = (of(0, channel), of(1, channel));
+        assert!((late.value - 0.012).abs() < 0.001 && (late.taken_off - 0.012).abs() < 0.001, "{late:?}");
+        assert!(punctual.value.abs() < 0.001, "{punctual:?}");
+    }
     require_named(&found, &["mass-error", "rotor-drag"]);
+}
+
+/// A position from another source than the attitude, on a clock of its own in all flights.
+#[test]
+fn a_position_that_is_late_in_all_flights_is_an_offset() {
+    for has_gyroscope in [true, false] {
+        let found = changed(&heavy_with_drag(24), |flight| {
+            shift(&mut flight.position, 0.08);
+            if !has_gyroscope {
+                flight.angular_velocity = Channel::default();
+            }
+        });
+        for offsets in found.time_offsets_s.values() {
+            let position = offsets["position"].expect("an accelerometer and an attitude");
+            assert!((position.taken_off - 0.08).abs() < 0.003, "{position:?}");
+            assert_eq!(offsets["attitude"].map(|own| own.taken_off), has_gyroscope.then_some(0.0));
+        }
+        require_named(&found, &["mass-error", "rotor-drag"]);
+    }
 }
 
 /// A sensor that is broken in both flights lands among the faults, and the vehicle is found as it is.

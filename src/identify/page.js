@@ -20,13 +20,12 @@ const withUnit = (text) => (text === "1" ? "" : text.replace(/\^(-?\d+)/g, (_, e
 const words = (name) => name.replaceAll("_", " ");
 const list = (items) => items.join(", ") || "–";
 
-// Four digits.
-function number(value) {
+function number(value, digits = 4) {
   if (value === null || value === undefined) return "–";
   if (value === 0) return "0";
   const size = Math.abs(value);
-  if (size >= 1e-4 && size < 1e4) return value.toPrecision(4).replace("-", "−");
-  if (size >= 1e4 && size < 1e7) return value.toFixed(0).replace("-", "−");
+  if (size >= 1e-4 && size < 10 ** digits) return value.toPrecision(digits).replace("-", "−");
+  if (size >= 10 ** digits && size < 1e7) return value.toFixed(0).replace("-", "−");
   const [mantissa, exponent] = value.toExponential(3).split("e");
   return `${mantissa.replace("-", "−")}·10${raised(Number(exponent))}`;
 }
@@ -67,8 +66,11 @@ function addItem(id, text) {
 
 const accepted = report.verdict.map((name) => [name, report.effects[name]]).filter(([, effect]) => effect);
 
-function estimateText(name, { value, unit, low, high }) {
-  return `${words(name)} = ${`${number(value)} ${withUnit(unit)}`.trim()} (95 %: ${number(low)} to ${number(high)})`;
+const doubt = ({ determined, at_bound }) => (!determined ? ", not determined by these flights" : at_bound ? ", at its bound" : "");
+
+function estimateText(name, own) {
+  const { value, unit, low, high } = own;
+  return `${words(name)} = ${`${number(value)} ${withUnit(unit)}`.trim()} (95 %: ${number(low)} to ${number(high)}${doubt(own)})`;
 }
 
 function drawSummary() {
@@ -93,16 +95,39 @@ function drawSummary() {
 
 function drawFlights() {
   const table = element("flights");
-  const heads = ["compared [s]", "windows [s]", "pose late by [ms]", "95 % interval [ms]", "taken off [ms]"];
-  addRow(table, "th", [left("flight"), left("used to"), ...heads, left("equations")]);
-  const ms = (value) => number(1e3 * value);
+  addRow(table, "th", [left("flight"), left("used to"), "compared [s]", "windows [s]", left("equations")]);
   for (const flight of report.flights) {
-    const offset = report.time_offsets_s[flight.name]?.pose;
-    const times = offset ? [ms(offset.value), `${ms(offset.low)} to ${ms(offset.high)}`, ms(offset.taken_off)] : ["–", "–", "–"];
     const equations = long(list(flight.equations.map(words)));
-    addRow(table, "td", [left(flight.name), left(flight.role), flight.compared_s.toFixed(1), flight.window_s.toFixed(3), ...times, equations]);
-    for (const note of [...flight.assumed.map((own) => `assumed: ${own}`), ...flight.notes]) addItem("notes", `${flight.name}: ${note.replaceAll("`", "")}`);
+    addRow(table, "td", [left(flight.name), left(flight.role), flight.compared_s.toFixed(1), flight.window_s.toFixed(3), equations]);
   }
+  drawNotes();
+}
+
+// What the reader noticed; what holds for several flights is said once.
+function drawNotes() {
+  const flightsOf = new Map();
+  for (const flight of report.flights) {
+    for (const note of [...flight.assumed.map((own) => `assumed: ${own}`), ...flight.notes]) {
+      flightsOf.set(note, [...(flightsOf.get(note) ?? []), flight.name]);
+    }
+  }
+  for (const [note, names] of flightsOf) {
+    const of = names.length === report.flights.length && names.length > 1 ? "all flights" : names.join(", ");
+    addItem("notes", `${of}: ${note.replaceAll("`", "")}`);
+  }
+}
+
+function drawClocks() {
+  const offsets = Object.entries(report.time_offsets_s).flatMap(([flight, own]) =>
+    Object.entries(own).filter(([, offset]) => offset).map(([channel, offset]) => ({ flight, channel, ...offset })));
+  element("clocks-part").hidden = !offsets.length;
+  addRow(element("clocks"), "th", [left("flight"), left("channel"), "late by [ms]", "95 % interval [ms]", "taken off [ms]"]);
+  const ms = (value) => number(1e3 * value);
+  offsets.forEach(({ flight, channel, value, low, high, taken_off }, index) => {
+    const isFirst = flight !== offsets[index - 1]?.flight;
+    const cells = [ms(value), `${ms(low)} to ${ms(high)}`, ms(taken_off)];
+    addRow(element("clocks"), "td", [left(isFirst ? flight : ""), left(channel), ...cells], isFirst ? "first" : "");
+  });
 }
 
 function drawFaults() {
@@ -126,17 +151,18 @@ function drawEffect(table, name, effect) {
   const judged = effect.accepted ? "yes" : effect.linearised ? "no, linearised" : "no";
   const parameters = Object.entries(effect.parameters);
   parameters.forEach(([parameter, { value, unit, low, high }], index) => {
-    const cells = [left(words(parameter)), number(value), `${number(low)} to ${number(high)}`, left(withUnit(unit))];
+    const label = [words(parameter), withUnit(unit) && `[${withUnit(unit)}]`].join(" ");
+    const cells = [left(label), number(value), `${number(low)} to ${number(high)}`];
     const figures = index ? ["", "", "", "", ""] : own;
     const heads = index ? [left(""), left("")] : [left(name), left(judged)];
     addRow(table, "td", [...heads, ...cells, ...figures], index ? kind : `first ${kind}`);
   });
-  if (effect.experiment) addRow(table, "td", [left(""), left(""), long(`To tell it from ${effect.confused_with[0]}: ${effect.experiment}.`, 9)], kind);
+  if (effect.experiment) addRow(table, "td", [left(""), left(""), long(`To tell it from ${effect.confused_with[0]}: ${effect.experiment}.`, 8)], kind);
 }
 
 function drawEffects() {
   const table = element("effects");
-  addRow(table, "th", [left("effect"), left("accepted"), left("parameter"), "estimate", "95 % interval", left("unit"),
+  addRow(table, "th", [left("effect"), left("accepted"), left("parameter"), "estimate", "95 % interval",
     "without", "with", "change", "chance", left("cannot be told from")]);
   for (const [name, effect] of accepted) drawEffect(table, name, effect);
   const others = Object.entries(report.effects).filter(([, effect]) => !effect.accepted);
@@ -177,6 +203,8 @@ function drawBars(channel, horizon) {
   const bars = ["before", "after"].map((model) => ({
     type: "bar", name: NAMES[model], marker: { color: COLOURS[model] },
     x: rows.map(([flight]) => flight), y: rows.map(([, own]) => own[horizon][channel][model]),
+    // Beside a great error a small one is no bar to be seen.
+    text: rows.map(([, own]) => number(own[horizon][channel][model], 3)), textposition: "outside", cliponaxis: false,
     hovertemplate: `%{x}<br>${NAMES[model]}: %{y:.4~g} ${unit}<extra></extra>`,
   }));
   const floor = floorOf(channel, horizon);
@@ -404,6 +432,7 @@ function drawResiduals() {
 
 drawSummary();
 drawFlights();
+drawClocks();
 drawFaults();
 drawEffects();
 drawErrors();

@@ -3,6 +3,7 @@
 
 use super::{Plan, Sensors, fly, vehicle_file};
 use flights::{Flight, FlightSet, Role};
+use identify::align::Lateness;
 use identify::fit::Bench;
 use identify::parameter::{Owner, Parameters, SENSOR_BIAS, SENSOR_DELAY, SensorParameter};
 use identify::predict::Measured;
@@ -232,7 +233,8 @@ impl Case {
     fn of_floor(&self, bench: &Bench, values: &[f64], set: &FlightSet, report: &Report) -> f64 {
         let flight: &Flight =
             set.flights.iter().find(|flight| flight.role == Role::Test).expect("a test flight");
-        let flight = &SensorErrors::of(&bench.model.parameters, values).taken_off(flight, 0.0);
+        let flight =
+            &SensorErrors::of(&bench.model.parameters, values).taken_off(flight, &Lateness::default());
         let measured = Measured::of(flight).expect("motion");
         let mut worst = 0.0_f64;
         for horizon_s in HORIZONS_S {
