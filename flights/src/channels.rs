@@ -11,15 +11,20 @@ use crate::quantity::{ANGLES, FRACTION, PERCENT, Quantity, names};
 /// A channel as read, and what to say about it. Times need not grow yet and numbers need not be finite.
 pub type Read<const N: usize> = (Channel<N>, Vec<String>);
 
-/// Reads `quantity` as `entry` says; an attitude in the order w, x, y, z.
+/// Reads `quantity` as `entry` says; an attitude in the order w, x, y, z. Angles that no vehicle flies at are refused,
+/// unless they are trusted.
 pub fn read<const N: usize>(
     log: &dyn Log,
     quantity: Quantity,
     entry: &Entry,
     vehicle: &Vehicle,
+    is_trusted: bool,
 ) -> Result<Read<N>, String> {
     let layout = Layout::of(quantity, entry, vehicle)?;
     let samples = signed_samples(log, entry.topic.as_deref(), layout.names)?;
+    if !is_trusted {
+        layout.check_angles(&samples.rows)?;
+    }
     let values = samples.rows.iter().map(|row| layout.convert(row)).collect::<Result<_, _>>()?;
     Ok((Channel { time_s: samples.time_s, values }, samples.notes))
 }
@@ -71,6 +76,17 @@ impl<'a> Layout<'a> {
             (_, unit) => (factor(quantity.units(), unit)?, 0.0),
         };
         Ok(Self { quantity, names, euler, factor, offset, frame })
+    }
+
+    /// Roll and pitch come to more than a turn only if they are in degrees.
+    fn check_angles(&self, rows: &[Vec<f64>]) -> Result<(), String> {
+        let tilts = rows.iter().flat_map(|row| row.iter().take(2)).filter(|angle| angle.is_finite());
+        let largest = tilts.fold(0.0_f64, |largest, angle| largest.max(self.factor * angle.abs()));
+        let is_plausible = !self.euler || largest <= std::f64::consts::TAU;
+        is_plausible.then_some(()).ok_or_else(|| {
+            let fits = if self.factor < 1.0 { "" } else { "; `unit = \"deg\"` would fit" };
+            format!("its roll or pitch goes to {largest:.1} rad, more than a turn{fits}; correct it, or set `trust_units`")
+        })
     }
 
     /// A sample in SI units and our frames.

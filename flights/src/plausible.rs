@@ -9,7 +9,7 @@ use crate::agreement::{Agreement, Pairs};
 use crate::declaration::{ChannelMap, Frame};
 use crate::flight::{Channel, Flight};
 use crate::frame;
-use crate::quantity::{FRACTION, PERCENT, Quantity};
+use crate::quantity::{ANGLES, FRACTION, PERCENT, Quantity};
 
 /// Above this correlation a logged and a derived vector are the same but for a factor.
 const SAME: f64 = 0.7;
@@ -29,6 +29,8 @@ const LEANING_TOLERANCE: f64 = 3.0;
 const DERIVATIVE_TOLERANCE: f64 = 1.3;
 /// No vehicle with four rotors flies faster, in m/s.
 const SPEED_MAX_M_S: f64 = 100.0;
+/// Loggers sample at 5 Hz to 10 kHz; the units of time are a factor of 1000 apart.
+const PERIOD_RANGE_S: (f64, f64) = (1e-4, 0.2);
 /// Voltages that a battery of a vehicle can have, from one cell to fourteen.
 const VOLTAGE_RANGE_V: (f64, f64) = (2.0, 62.0);
 
@@ -52,7 +54,6 @@ pub struct Finding {
 pub fn judge(flight: &Flight, vehicle: &Vehicle, channels: &ChannelMap) -> Vec<Finding> {
     let judge = Judge { flight, vehicle, channels };
     let findings = [
-        judge.time(),
         judge.gravity(),
         judge.upright(),
         judge.rates(),
@@ -65,6 +66,27 @@ pub fn judge(flight: &Flight, vehicle: &Vehicle, channels: &ChannelMap) -> Vec<F
     findings.into_iter().flatten().collect()
 }
 
+/// Compares the times of a log, before anything is cut off, with the periods that loggers have.
+#[must_use]
+pub fn judge_time(flight: &Flight, vehicle: &Vehicle, channels: &ChannelMap) -> Option<Finding> {
+    channels.get(&Quantity::Time)?;
+    let periods_s = [
+        flight.command.period_s(),
+        flight.rotor_speed.period_s(),
+        flight.position.period_s(),
+        flight.velocity.period_s(),
+        flight.attitude.period_s(),
+        flight.angular_velocity.period_s(),
+        flight.specific_force.period_s(),
+    ];
+    let period_s = periods_s.into_iter().flatten().reduce(f64::min)?;
+    let judge = Judge { flight, vehicle, channels };
+    let fits = judge.units_within(Quantity::Time, period_s, PERIOD_RANGE_S);
+    let what = format!("declared in {}, its samples are {period_s} s apart", judge.unit(Quantity::Time));
+    let is_plausible = (PERIOD_RANGE_S.0..PERIOD_RANGE_S.1).contains(&period_s);
+    (!is_plausible).then(|| finding(Quantity::Time, period_s, fits, &what))
+}
+
 struct Judge<'a> {
     flight: &'a Flight,
     vehicle: &'a Vehicle,
@@ -72,49 +94,6 @@ struct Judge<'a> {
 }
 
 impl Judge<'_> {
-    /// The derivatives of the pose are what was logged only if time is in its unit.
-    fn time(&self) -> Option<Finding> {
-        let quantity = Quantity::Time;
-        self.channels.get(&quantity)?;
-        let flight = self.flight;
-        let twins = |scale: f64| {
-            let attitude = slowed(&flight.attitude, scale);
-            let position = slowed(&flight.position, scale);
-            let gyroscope = slowed(&flight.angular_velocity, scale);
-            let velocity = slowed(&flight.velocity, scale);
-            let gravity_m_s2 = self.vehicle.gravity_m_s2;
-            let leaning = Pairs::leaning(&attitude, &position, gravity_m_s2, LEANING_WINDOW_S);
-            let is_twin = |pairs: Pairs, quiet: f64, tolerance: f64| {
-                let agreement = pairs.agreement(quiet);
-                agreement.is_some_and(|own| own.correlation > SAME && own.slope.ln().abs() < tolerance.ln())
-            };
-            [
-                is_twin(
-                    Pairs::rates(&attitude, &gyroscope, RATE_WINDOW_S),
-                    QUIET_RATE_RAD_S,
-                    DERIVATIVE_TOLERANCE,
-                ),
-                is_twin(
-                    Pairs::velocities(&position, &velocity, VELOCITY_WINDOW_S),
-                    QUIET_SPEED_M_S,
-                    DERIVATIVE_TOLERANCE,
-                ),
-                is_twin(leaning, QUIET_ACCELERATION_M_S2, LEANING_TOLERANCE),
-            ]
-        };
-        if !flight.assumed.is_empty() || twins(1.0).contains(&true) {
-            return None;
-        }
-        let others = quantity.units().iter().filter(|(name, _)| *name != self.unit(quantity));
-        let fitting = |(_, factor): &&(&str, f64)| twins(factor / self.factor(quantity)).contains(&true);
-        let (name, factor) = others.clone().find(fitting)?;
-        let what = format!(
-            "declared in {}, but the motion is that of a flight whose times are in {name}",
-            self.unit(quantity)
-        );
-        Some(finding(quantity, self.factor(quantity) / factor, Some(format!("`unit = \"{name}\"`")), &what))
-    }
-
     /// The specific force is gravity's in the median, and up.
     fn gravity(&self) -> Option<Finding> {
         let quantity = Quantity::SpecificForce;
@@ -243,8 +222,30 @@ impl Judge<'_> {
         let agreement = pairs.agreement(QUIET_ACCELERATION_M_S2 * self.position_scale())?;
         let factor = 1.0 / agreement.slope;
         let what = format!("it accelerates {factor:.4} times as much as the vehicle leans");
-        let is_twin = agreement.correlation > SAME;
-        is_twin.then(|| self.by_unit(quantity, factor, LEANING_TOLERANCE, &what)).flatten()
+        if agreement.correlation <= SAME {
+            return None;
+        }
+        if let Some(unit) = self.angles_that_fit(factor) {
+            let what = format!("the position accelerates {factor:.4} times as much as the vehicle leans");
+            return Some(finding(Quantity::Attitude, 1.0 / factor, Some(unit), &what));
+        }
+        self.by_unit(quantity, factor, LEANING_TOLERANCE, &what)
+    }
+
+    /// The unit of Euler angles in which a vehicle that leans `factor` times too little would lean right, if that is
+    /// nearer than another unit of the position.
+    fn angles_that_fit(&self, factor: f64) -> Option<String> {
+        let entry = self.channels.get(&Quantity::Attitude)?.get_ref();
+        entry.euler.as_ref()?;
+        let declared = entry.unit.as_deref()?;
+        let of = |name: &str| ANGLES.iter().find(|own| own.0 == name).map(|own| own.1);
+        let (name, other) = ANGLES.iter().find(|own| own.0 != declared)?;
+        let off = (other / of(declared)? / factor).ln().abs();
+        let of_position = Quantity::Position.units().iter();
+        let is_nearer =
+            |(_, unit): &(&str, f64)| (factor * unit / self.factor(Quantity::Position)).ln().abs() < off;
+        (off < LEANING_TOLERANCE.ln() && !of_position.clone().any(is_nearer))
+            .then(|| format!("`unit = \"{name}\"`"))
     }
 
     /// How much smaller a position can be than its true one, if its unit is declared too large.
@@ -377,12 +378,6 @@ fn late(channel: Quantity, agreement: Agreement) -> Option<Finding> {
         agreement.correlation
     );
     (agreement.correlation < IN_TIME).then(|| finding(channel, agreement.slope, None, &what))
-}
-
-/// The channel with its times `scale` times as long.
-fn slowed<const N: usize>(channel: &Channel<N>, scale: f64) -> Channel<N> {
-    let time_s = channel.time_s.iter().map(|time_s| scale * time_s).collect();
-    Channel { time_s, values: channel.values.clone() }
 }
 
 /// The median of how far the body's z axis points up, from -1 to 1.

@@ -16,7 +16,7 @@ use crate::frame;
 use crate::jumps;
 use crate::known_types;
 use crate::log::Log;
-use crate::plausible;
+use crate::plausible::{self, Finding};
 use crate::quantity::Quantity;
 
 /// Times are differences of decimal fractions since 1970: a sample on the edge of the part belongs to it.
@@ -50,6 +50,8 @@ impl Reading<'_> {
         }
         let mut flight = self.read_channels(log)?;
         flight.notes.splice(0..0, taken);
+        let of_time = plausible::judge_time(&flight, self.vehicle, &self.channels);
+        self.settle(&mut flight, of_time.into_iter().collect())?;
         let yaw = self.yaw(log)?;
         let origin_s = self.origin_s(&flight, yaw.as_ref())?;
         self.to_flight_time(&mut flight, origin_s);
@@ -96,7 +98,8 @@ impl Reading<'_> {
             return Ok(Channel::default());
         }
         let complete = known_types::complete(log, quantity, entry);
-        let read = complete.and_then(|entry| channels::read(log, quantity, &entry, self.vehicle));
+        let read = complete
+            .and_then(|entry| channels::read(log, quantity, &entry, self.vehicle, self.entry.trust_units));
         let cleaned = read.and_then(|(channel, said)| {
             notes.extend(said.into_iter().map(|said| format!("{quantity}: {said}")));
             clean::clean(quantity, channel, notes)
@@ -249,9 +252,14 @@ impl Reading<'_> {
         Ok(())
     }
 
-    /// Compares the values with physics; what contradicts clearly is an error.
+    /// Compares the values with physics.
     fn judge(&self, flight: &mut Flight) -> Result<(), FlightsError> {
         let findings = plausible::judge(flight, self.vehicle, &self.channels);
+        self.settle(flight, findings)
+    }
+
+    /// Notes what is not clear, or is to be trusted; the rest is an error.
+    fn settle(&self, flight: &mut Flight, findings: Vec<Finding>) -> Result<(), FlightsError> {
         let (clear, vague): (Vec<_>, Vec<_>) = findings.into_iter().partition(|finding| finding.clear);
         flight.notes.extend(vague.into_iter().map(|finding| finding.message));
         if self.entry.trust_units || clear.is_empty() {

@@ -109,14 +109,33 @@ fn a_position_alone_is_held_against_how_the_vehicle_leans() {
 }
 
 #[test]
-fn times_in_another_unit_are_found() {
-    let in_s = (Quantity::Time, "`unit = \"s\"`".to_owned());
-    for channels in [CHANNELS.to_owned(), without("velocity"), without("angular_velocity")] {
-        for declared in ["\"ms\"", "\"us\""] {
-            let found = findings(&Motion::default(), &channels.replace("\"s\"", declared));
-            assert!(found.contains(&in_s), "{declared}: {found:?}");
+fn times_in_another_unit_are_found_before_a_part_is_cut_out() {
+    for declared in ["\"ms\"", "\"us\""] {
+        let channels = CHANNELS.replace("\"s\"", declared);
+        for extra in ["", "from_s = 2.0\nto_s = 3.0"] {
+            let text = read(&Motion::default(), &channels, extra).unwrap_err().to_string();
+            assert!(text.contains("flights.toml:3:") && text.contains("`unit = \"s\"` would fit"), "{text}");
         }
     }
+}
+
+#[test]
+fn angles_in_another_unit_are_found() {
+    let poses = |unit: &str| {
+        let attitude =
+            format!("attitude = {{ euler = [\"roll\", \"pitch\", \"yaw\"], unit = \"{unit}\" }}\n");
+        let kept = CHANNELS
+            .lines()
+            .filter(|line| ["time", "command", "position"].iter().any(|own| line.starts_with(own)));
+        kept.map(|line| line.to_owned() + "\n").collect::<String>() + &attitude
+    };
+    assert_eq!(read(&Motion::default(), &poses("rad"), "").unwrap().notes, [""; 0]);
+    let in_rad = (Quantity::Attitude, "`unit = \"rad\"`".to_owned());
+    assert_eq!(findings(&Motion::default(), &poses("deg")), [in_rad]);
+    let degrees = Motion { angle_unit: 57.295_779_5, ..Motion::default() };
+    let text = read(&degrees, &poses("rad"), "").unwrap_err().to_string();
+    assert!(text.contains("`unit = \"deg\"` would fit"), "{text}");
+    assert!(read(&degrees, &poses("rad"), "trust_units = true").is_ok());
 }
 
 /// The channels without one of them.

@@ -46,12 +46,20 @@ pub struct Motion {
     pub force_unit: f64,
     pub length_unit: f64,
     pub command_unit: f64,
+    pub angle_unit: f64,
     pub frd_ned: bool,
 }
 
 impl Default for Motion {
     fn default() -> Self {
-        Self { rate_unit: 1.0, force_unit: 1.0, length_unit: 1.0, command_unit: 1.0, frd_ned: false }
+        Self {
+            rate_unit: 1.0,
+            force_unit: 1.0,
+            length_unit: 1.0,
+            command_unit: 1.0,
+            angle_unit: 1.0,
+            frd_ned: false,
+        }
     }
 }
 
@@ -82,7 +90,8 @@ impl Motion {
 
     /// The flight as a CSV file.
     pub fn csv(&self) -> String {
-        let mut text = "t,m1,m2,m3,m4,px,py,pz,vx,vy,vz,qx,qy,qz,qw,wx,wy,wz,fx,fy,fz,v\n".to_owned();
+        let mut text =
+            "t,m1,m2,m3,m4,px,py,pz,vx,vy,vz,qx,qy,qz,qw,wx,wy,wz,fx,fy,fz,v,roll,pitch,yaw\n".to_owned();
         for k in 0..=1000 {
             let time = 0.01 * f64::from(k);
             let numbers: Vec<String> = self.row(time).iter().map(f64::to_string).collect();
@@ -102,6 +111,8 @@ impl Motion {
             let turned = ned_enu * q.to_rotation_matrix().matrix() * frd_flu.transpose();
             q = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(turned));
         }
+        let (roll, pitch, yaw) = q.euler_angles();
+        let [roll, pitch, yaw] = [roll, pitch, yaw].map(|angle| angle * self.angle_unit);
         let (p, v) = (p * self.length_unit, v);
         let (w, f) = (w * self.rate_unit, f * self.force_unit);
         let command = [100.0, 101.0, 102.0, 103.0].map(|command| command * self.command_unit);
@@ -112,7 +123,7 @@ impl Motion {
             q.coords.as_slice(),
             w.as_slice(),
             f.as_slice(),
-            &[11.1 - 0.01 * time],
+            &[11.1 - 0.01 * time, roll, pitch, yaw],
         ]
         .concat()
     }
