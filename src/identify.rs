@@ -9,7 +9,6 @@ use crate::{files, validate};
 use anyhow::{Context, Result, bail};
 use clap::{Args, Subcommand};
 use flights::{Flight, FlightSet};
-use identify::align;
 use identify::report::{FlightReport, Report};
 use identify::run::Outcome;
 use identify::sensing::SensorErrors;
@@ -159,8 +158,7 @@ fn predicted(report: &Report, flight: &str, horizon: &str, channel: &str) -> Opt
 /// The flights that can be replayed, without `errors` of their sensors and without what the alignment took off.
 fn corrected(set: &FlightSet, outcome: &Outcome, errors: &SensorErrors) -> FlightSet {
     let flight = |flight: &Flight| {
-        let offsets = outcome.report.time_offsets_s.get(&flight.name);
-        errors.taken_off(flight, &offsets.map(align::taken_off).unwrap_or_default())
+        errors.taken_off(flight, &outcome.late.get(&flight.name).copied().unwrap_or_default())
     };
     let can_fly = |flight: &&Flight| {
         let was_used = |own: &FlightReport| own.name == flight.name && own.compared_s > LEAST_REPLAY_S;

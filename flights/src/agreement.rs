@@ -21,14 +21,14 @@ impl Pairs {
     /// The angular velocity against the attitude's change over windows of `window_s`.
     pub fn rates(attitude: &Channel<4>, angular_velocity: &Channel<3>, window_s: f64) -> Self {
         let q = |index: usize| UnitQuaternion::from_quaternion(from_wxyz(attitude.values[index]));
-        let change = |from: usize, to: usize| (q(from).inverse() * q(to)).scaled_axis();
+        let change = |from: usize, to: usize| Some((q(from).inverse() * q(to)).scaled_axis());
         Self::over_windows(&attitude.time_s, angular_velocity, window_s, change)
     }
 
     /// The velocity against the position's change over windows of `window_s`.
     pub fn velocities(position: &Channel<3>, velocity: &Channel<3>, window_s: f64) -> Self {
         let p = |index: usize| Vector3::from(position.values[index]);
-        Self::over_windows(&position.time_s, velocity, window_s, |from, to| p(to) - p(from))
+        Self::over_windows(&position.time_s, velocity, window_s, |from, to| Some(p(to) - p(from)))
     }
 
     /// How the vehicle leans, as an acceleration in the horizontal plane under `gravity_m_s2`, against the position's
@@ -47,11 +47,8 @@ impl Pairs {
         Self::over_windows(time_s, &leaning, window_s, |from, to| {
             let middle_s = (time_s[from] + time_s[to]) / 2.0;
             let middle = time_s.partition_point(|time| *time < middle_s);
-            if middle == from || middle == to {
-                return Vector3::zeros();
-            }
-            let change = 2.0 * (velocity(middle, to) - velocity(from, middle));
-            Vector3::new(change.x, change.y, 0.0)
+            let change = || 2.0 * (velocity(middle, to) - velocity(from, middle));
+            (from < middle && middle < to).then(change).map(|change| Vector3::new(change.x, change.y, 0.0))
         })
     }
 
@@ -59,7 +56,7 @@ impl Pairs {
         time_s: &[f64],
         logged: &Channel<3>,
         window_s: f64,
-        change: impl Fn(usize, usize) -> Vector3<f64>,
+        change: impl Fn(usize, usize) -> Option<Vector3<f64>>,
     ) -> Self {
         let mut pairs = Self::default();
         let mut from = 0;
@@ -67,9 +64,10 @@ impl Pairs {
             let to = time_s.partition_point(|time| *time < time_s[from] + window_s);
             let Some(length_s) = time_s.get(to).map(|end_s| end_s - time_s[from]) else { break };
             // A longer window spans a gap.
-            if let Some(mean) = mean(logged, time_s[from], time_s[to]).filter(|_| length_s < 2.0 * window_s) {
+            let mean = mean(logged, time_s[from], time_s[to]).filter(|_| length_s < 2.0 * window_s);
+            if let Some((mean, change)) = mean.zip(change(from, to)) {
                 pairs.logged.push(mean);
-                pairs.derived.push(change(from, to) / length_s);
+                pairs.derived.push(change / length_s);
             }
             from = to;
         }

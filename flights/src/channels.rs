@@ -78,14 +78,26 @@ impl<'a> Layout<'a> {
         Ok(Self { quantity, names, euler, factor, offset, frame })
     }
 
-    /// Roll and pitch come to more than a turn only if they are in degrees.
+    /// Roll and pitch in rad come to more than a turn, and not in a bad sample or two, only if they are in degrees.
     fn check_angles(&self, rows: &[Vec<f64>]) -> Result<(), String> {
+        const BAD: f64 = 0.02;
         let tilts = rows.iter().flat_map(|row| row.iter().take(2)).filter(|angle| angle.is_finite());
-        let largest = tilts.fold(0.0_f64, |largest, angle| largest.max(self.factor * angle.abs()));
-        let is_plausible = !self.euler || largest <= std::f64::consts::TAU;
+        let mut sizes: Vec<f64> = tilts.map(|angle| angle.abs()).collect();
+        sizes.sort_by(f64::total_cmp);
+        #[allow(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            clippy::cast_precision_loss,
+            reason = "a part of a count"
+        )]
+        let largest = sizes.get(((1.0 - BAD) * sizes.len() as f64) as usize).copied().unwrap_or(0.0);
+        let is_in_rad = self.euler && self.factor > 0.5;
+        let is_plausible = !is_in_rad || largest <= std::f64::consts::TAU;
         is_plausible.then_some(()).ok_or_else(|| {
-            let fits = if self.factor < 1.0 { "" } else { "; `unit = \"deg\"` would fit" };
-            format!("its roll or pitch goes to {largest:.1} rad, more than a turn{fits}; correct it, or set `trust_units`")
+            format!(
+                "declared in rad, its roll or pitch goes to {largest:.1}, more than a turn; `unit = \"deg\"` would fit; \
+                 correct it, or set `trust_units = true`"
+            )
         })
     }
 

@@ -29,8 +29,9 @@ const LEANING_TOLERANCE: f64 = 3.0;
 const DERIVATIVE_TOLERANCE: f64 = 1.3;
 /// No vehicle with four rotors flies faster, in m/s.
 const SPEED_MAX_M_S: f64 = 100.0;
-/// Loggers sample at 5 Hz to 10 kHz; the units of time are a factor of 1000 apart.
-const PERIOD_RANGE_S: (f64, f64) = (1e-4, 0.2);
+/// Loggers sample at 4 Hz to 5 kHz, and vehicles fly for a second to an hour.
+const PERIOD_RANGE_S: (f64, f64) = (2e-4, 0.25);
+const SPAN_RANGE_S: (f64, f64) = (1.0, 3600.0);
 /// Voltages that a battery of a vehicle can have, from one cell to fourteen.
 const VOLTAGE_RANGE_V: (f64, f64) = (2.0, 62.0);
 
@@ -66,25 +67,26 @@ pub fn judge(flight: &Flight, vehicle: &Vehicle, channels: &ChannelMap) -> Vec<F
     findings.into_iter().flatten().collect()
 }
 
-/// Compares the times of a log, before anything is cut off, with the periods that loggers have.
+/// Compares the times of a CSV file, before anything is cut off, with those of logs of flights: wrong are samples that come
+/// as no logger's do over a time that no vehicle flies, where both are right in another unit.
 #[must_use]
 pub fn judge_time(flight: &Flight, vehicle: &Vehicle, channels: &ChannelMap) -> Option<Finding> {
-    channels.get(&Quantity::Time)?;
-    let periods_s = [
-        flight.command.period_s(),
-        flight.rotor_speed.period_s(),
-        flight.position.period_s(),
-        flight.velocity.period_s(),
-        flight.attitude.period_s(),
-        flight.angular_velocity.period_s(),
-        flight.specific_force.period_s(),
-    ];
-    let period_s = periods_s.into_iter().flatten().reduce(f64::min)?;
-    let judge = Judge { flight, vehicle, channels };
-    let fits = judge.units_within(Quantity::Time, period_s, PERIOD_RANGE_S);
-    let what = format!("declared in {}, its samples are {period_s} s apart", judge.unit(Quantity::Time));
-    let is_plausible = (PERIOD_RANGE_S.0..PERIOD_RANGE_S.1).contains(&period_s);
-    (!is_plausible).then(|| finding(Quantity::Time, period_s, fits, &what))
+    let (quantity, judge) = (Quantity::Time, Judge { flight, vehicle, channels });
+    channels.get(&quantity)?;
+    let period_s = flight.attitude.period_s().or(flight.command.period_s())?;
+    let (first_s, last_s) = flight.attitude.span_s().or(flight.command.span_s())?;
+    let span_s = last_s - first_s;
+    let is_wrong = |value: f64, (low, high): (f64, f64)| !(low..=high).contains(&value);
+    let factor = judge.factor(quantity);
+    let fits = |(_, other): &&(&str, f64)| {
+        let scale = other / factor;
+        !is_wrong(scale * period_s, PERIOD_RANGE_S) && !is_wrong(scale * span_s, SPAN_RANGE_S)
+    };
+    let (unit, other) = quantity.units().iter().find(fits)?;
+    let what =
+        format!("declared in {}, its samples are {period_s} s apart, over {span_s} s", judge.unit(quantity));
+    (is_wrong(period_s, PERIOD_RANGE_S) && is_wrong(span_s, SPAN_RANGE_S))
+        .then(|| finding(quantity, factor / other, Some(format!("`unit = \"{unit}\"`")), &what))
 }
 
 struct Judge<'a> {
@@ -145,6 +147,10 @@ impl Judge<'_> {
         let agreement = pairs.agreement(QUIET_RATE_RAD_S)?;
         if agreement.correlation > SAME {
             let what = format!("it is {:.4} times the derivative of the attitude", agreement.slope);
+            if let Some(angles) = self.angles_that_fit(agreement.slope) {
+                let unit = self.unit_that_fits(quantity, agreement.slope, DERIVATIVE_TOLERANCE);
+                return Some(finding(quantity, agreement.slope, either(unit, Some(angles)), &what));
+            }
             return self
                 .by_unit(quantity, agreement.slope, DERIVATIVE_TOLERANCE, &what)
                 .or_else(|| late(quantity, agreement));
@@ -221,31 +227,32 @@ impl Judge<'_> {
         let pairs = Pairs::leaning(attitude, position, gravity_m_s2, LEANING_WINDOW_S);
         let agreement = pairs.agreement(QUIET_ACCELERATION_M_S2 * self.position_scale())?;
         let factor = 1.0 / agreement.slope;
-        let what = format!("it accelerates {factor:.4} times as much as the vehicle leans");
-        if agreement.correlation <= SAME {
+        if agreement.correlation <= SAME || factor.ln().abs() < LEANING_TOLERANCE.ln() {
             return None;
         }
-        if let Some(unit) = self.angles_that_fit(factor) {
-            let what = format!("the position accelerates {factor:.4} times as much as the vehicle leans");
-            return Some(finding(Quantity::Attitude, 1.0 / factor, Some(unit), &what));
+        let what = format!(
+            "declared in {}, it accelerates {factor:.4} times as much as the vehicle leans",
+            self.unit(quantity)
+        );
+        let unit = self.unit_that_fits(quantity, factor, LEANING_TOLERANCE);
+        if pairs.agreement(QUIET_ACCELERATION_M_S2).is_none() {
+            // Also what hangs on a rig leans and hardly moves.
+            let hint = unit.map_or(String::new(), |unit| format!("; on a rig, or in another unit ({unit})"));
+            return Some(finding(quantity, factor, None, &(what + &hint)));
         }
-        self.by_unit(quantity, factor, LEANING_TOLERANCE, &what)
+        let fits = either(unit, self.angles_that_fit(factor));
+        Some(finding(quantity, factor, fits, &what))
     }
 
-    /// The unit of Euler angles in which a vehicle that leans `factor` times too little would lean right, if that is
-    /// nearer than another unit of the position.
+    /// The unit of Euler angles in which a vehicle that leans or turns `factor` times too little would not.
     fn angles_that_fit(&self, factor: f64) -> Option<String> {
         let entry = self.channels.get(&Quantity::Attitude)?.get_ref();
         entry.euler.as_ref()?;
-        let declared = entry.unit.as_deref()?;
         let of = |name: &str| ANGLES.iter().find(|own| own.0 == name).map(|own| own.1);
+        let declared = entry.unit.as_deref()?;
         let (name, other) = ANGLES.iter().find(|own| own.0 != declared)?;
         let off = (other / of(declared)? / factor).ln().abs();
-        let of_position = Quantity::Position.units().iter();
-        let is_nearer =
-            |(_, unit): &(&str, f64)| (factor * unit / self.factor(Quantity::Position)).ln().abs() < off;
-        (off < LEANING_TOLERANCE.ln() && !of_position.clone().any(is_nearer))
-            .then(|| format!("`unit = \"{name}\"`"))
+        (off < LEANING_TOLERANCE.ln()).then(|| format!("`unit = \"{name}\"` of `attitude`"))
     }
 
     /// How much smaller a position can be than its true one, if its unit is declared too large.
@@ -362,6 +369,14 @@ impl Judge<'_> {
         let frame = self.channels.get(&quantity).and_then(|entry| entry.get_ref().frame);
         let other = if frame == Some(Frame::FrdNed) { "flu-enu" } else { "frd-ned" };
         format!("`frame = \"{other}\"`")
+    }
+}
+
+/// What of two would fit, where not both are wrong.
+fn either(here: Option<String>, there: Option<String>) -> Option<String> {
+    match (here, there) {
+        (Some(here), Some(there)) => Some(format!("{here} here or {there}")),
+        (here, there) => here.or(there),
     }
 }
 

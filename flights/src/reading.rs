@@ -50,8 +50,10 @@ impl Reading<'_> {
         }
         let mut flight = self.read_channels(log)?;
         flight.notes.splice(0..0, taken);
-        let of_time = plausible::judge_time(&flight, self.vehicle, &self.channels);
-        self.settle(&mut flight, of_time.into_iter().collect())?;
+        if self.format == Format::Csv {
+            let of_time = plausible::judge_time(&flight, self.vehicle, &self.channels);
+            self.settle(&mut flight, of_time.into_iter().collect())?;
+        }
         let yaw = self.yaw(log)?;
         let origin_s = self.origin_s(&flight, yaw.as_ref())?;
         self.to_flight_time(&mut flight, origin_s);

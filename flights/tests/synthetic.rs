@@ -104,12 +104,27 @@ fn a_position_alone_is_held_against_how_the_vehicle_leans() {
     let channels = without("velocity");
     let cm = Motion { length_unit: 100.0, ..Motion::default() };
     assert_eq!(findings(&cm, &channels), [(Quantity::Position, "`unit = \"cm\"`".to_owned())]);
+    // As little as that also moves on a rig.
     let declared = channels.replace("unit = \"m\"", "unit = \"mm\"");
-    assert_eq!(findings(&Motion::default(), &declared), [(Quantity::Position, "`unit = \"m\"`".to_owned())]);
+    let notes = read(&Motion::default(), &declared, "").unwrap().notes;
+    assert!(
+        notes.len() == 1 && notes[0].contains("on a rig, or in another unit (`unit = \"m\"`)"),
+        "{notes:?}"
+    );
 }
 
 #[test]
 fn times_in_another_unit_are_found_before_a_part_is_cut_out() {
+    let in_ms = Motion { time_unit: 1000.0, ..Motion::default() };
+    assert!(read(&in_ms, &CHANNELS.replace("\"s\"", "\"ms\""), "").is_ok());
+    let text = read(&in_ms, CHANNELS, "").unwrap_err().to_string();
+    assert!(text.contains("flights.toml:3:") && text.contains("`unit = \"ms\"` would fit"), "{text}");
+    for slower in [10.0, 40.0, 100.0] {
+        let slow = Motion { time_unit: slower, ..Motion::default() };
+        let channels = "time = { columns = [\"t\"], unit = \"s\" }\ncommand = { columns = [\"m1\", \"m2\", \"m3\", \"m4\"], \
+                        unit = \"count\" }";
+        assert!(read(&slow, channels, "").is_ok(), "10 Hz to 1 Hz is slow, and no other unit");
+    }
     for declared in ["\"ms\"", "\"us\""] {
         let channels = CHANNELS.replace("\"s\"", declared);
         for extra in ["", "from_s = 2.0\nto_s = 3.0"] {
@@ -130,8 +145,9 @@ fn angles_in_another_unit_are_found() {
         kept.map(|line| line.to_owned() + "\n").collect::<String>() + &attitude
     };
     assert_eq!(read(&Motion::default(), &poses("rad"), "").unwrap().notes, [""; 0]);
-    let in_rad = (Quantity::Attitude, "`unit = \"rad\"`".to_owned());
-    assert_eq!(findings(&Motion::default(), &poses("deg")), [in_rad]);
+    let found = findings(&Motion::default(), &poses("deg"));
+    assert_eq!(found[0].0, Quantity::Position);
+    assert!(found.len() == 1 && found[0].1.ends_with("or `unit = \"rad\"` of `attitude`"), "{found:?}");
     let degrees = Motion { angle_unit: 57.295_779_5, ..Motion::default() };
     let text = read(&degrees, &poses("rad"), "").unwrap_err().to_string();
     assert!(text.contains("`unit = \"deg\"` would fit"), "{text}");

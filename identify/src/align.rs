@@ -4,12 +4,13 @@
 //! The attitude's rate of change and the gyroscope's reading are the same quantity, and so are the position's second
 //! derivative and the accelerometer's reading turned by the attitude, less gravity: no model is needed to see by how much
 //! one lags. What the attitudes of all flights share is left to the candidate `sensor-delay`; what a single one has beyond
-//! that is taken off, and so is what a position has beyond its attitude.
+//! that is taken off, and so is what position and velocity have beyond it.
 
 use crate::fit::{Bench, Weights};
 use crate::normal::{self, Block};
 use crate::parameter::{Owner, SensorParameter};
-use crate::prepared::{Equation, Prepared};
+use crate::prepared::{Equation, Prepared, Translation};
+use rayon::prelude::*;
 use serde::Serialize;
 use std::collections::BTreeMap;
 
@@ -22,9 +23,11 @@ const LEAST_BLOCKS: usize = 5;
 /// An offset is real beyond so many standard deviations.
 const SURE: f64 = 4.0;
 
-/// How the samples lie on the grid decides how much noise their interpolation leaves, which pulls at the offset by up to
-/// this part of the channel's period (docs/validation.md), beyond what blocks of time can show.
+/// How samples lie on the grid decides how much noise their interpolation leaves, which pulls at the offset by up to this
+/// part of the period of what is moved (docs/validation.md), beyond what blocks of time can show.
 const BETWEEN_SAMPLES: f64 = 0.1;
+/// A channel that is later than this is not on the same flight.
+const LATE_MAX_S: f64 = 0.4;
 
 /// Lateness of a channel against the inertial unit.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -40,8 +43,8 @@ pub struct Offset {
 }
 
 impl Offset {
-    fn of(found: Found, period_s: Option<f64>, taken_off: f64) -> Self {
-        let half = (1.96 * found.deviation_s).hypot(BETWEEN_SAMPLES * period_s.unwrap_or(0.0));
+    fn of(found: Found, taken_off: f64) -> Self {
+        let half = (1.96 * found.deviation_s).hypot(found.between_s);
         Self { value: found.late_s, low: found.late_s - half, high: found.late_s + half, taken_off }
     }
 }
@@ -51,35 +54,29 @@ impl Offset {
 pub struct Lateness {
     /// Lateness of the attitude in s.
     pub attitude_s: f64,
-    /// Lateness of position and velocity in s.
+    /// Lateness of the position in s.
     pub position_s: f64,
+    /// Lateness of the velocity in s.
+    pub velocity_s: f64,
 }
 
-/// Offsets by channel; `None` where the flight has not what it takes.
+/// Offsets by channel; `None` where the flight has not what it takes, or too little of it.
 pub type Offsets = BTreeMap<&'static str, Option<Offset>>;
-
-/// What [`align`] took off, as it stands in the offsets of a report.
-#[must_use]
-pub fn taken_off(offsets: &Offsets) -> Lateness {
-    let of = |channel: &str| offsets.get(channel).copied().flatten().map(|own| own.taken_off);
-    let attitude_s = of("attitude").unwrap_or(0.0);
-    // A position without a clock of its own comes with the attitude.
-    let position_s = of("position").or_else(|| of("velocity")).unwrap_or(attitude_s);
-    Lateness { attitude_s, position_s }
-}
 
 /// An offset that was found.
 #[derive(Debug, Clone, Copy)]
 struct Found {
     late_s: f64,
     deviation_s: f64,
+    /// What the places of samples on the grid make of it at most.
+    between_s: f64,
 }
 
 impl Found {
-    /// Whether what it has beyond `other_s` is more than chance and the grid make of none.
-    fn is_beyond(&self, other_s: f64, least_s: f64) -> bool {
+    /// Whether what it has beyond `other_s`, itself known to `deviation_s`, is more than chance and the grid make of none.
+    fn is_beyond(&self, other_s: f64, deviation_s: f64, least_s: f64) -> bool {
         let own_s = (self.late_s - other_s).abs();
-        own_s > SURE * self.deviation_s && own_s > least_s
+        own_s > SURE * self.deviation_s.hypot(deviation_s) && own_s > least_s.max(self.between_s)
     }
 }
 
@@ -89,27 +86,33 @@ fn of_attitude(bench: &Bench, flight: &Prepared) -> Option<Found> {
     let is_pose = |owner: &Owner| matches!(owner, Owner::Sensor(SensorParameter::PoseDelay));
     let parameter = bench.model.parameters.all.iter().position(|own| is_pose(&own.owner))?;
     let mut values = bench.model.parameters.declared();
-    descended(|late_s| {
+    let between_s = BETWEEN_SAMPLES * flight.flight.attitude.period_s().unwrap_or(0.0);
+    descended(between_s, |late_s| {
         values[parameter] = late_s;
         bench.blocks_of(flight, &values, &[parameter])
     })
 }
 
-/// The offset of the position, or else of the velocity, from what the accelerometer reads, turned by an attitude that is
-/// `attitude_s` late. What is moved is the inertial side: a position's second derivative is noise for the most part, and
-/// that of a moved one would depend on how its samples lie on the grid.
-fn of_position(bench: &Bench, flight: &Prepared, attitude_s: f64) -> Option<Found> {
+/// The offset of position or velocity from what the accelerometer reads, turned by an attitude that is `attitude_s` late.
+/// What is moved is the inertial side: a position's second derivative is noise for the most part, and that of a moved one
+/// would depend on how its samples lie on the grid.
+fn of_translation(
+    bench: &Bench,
+    flight: &Prepared,
+    translation: Translation,
+    attitude_s: f64,
+) -> Option<Found> {
     const ASIDE_S: f64 = 1e-3;
     let gravity_m_s2 = bench.model.vehicle.gravity_m_s2;
-    let translation = flight.translation_rows();
-    let is_measured = flight.offset_of(Equation::SpecificForce).is_some() && !flight.is_assumed();
-    if translation.is_empty() || !is_measured {
-        return None;
-    }
+    let rows = flight.translation_rows(translation)?;
+    flight.offset_of(Equation::SpecificForce)?;
+    let periods = [flight.flight.attitude.period_s(), flight.flight.specific_force.period_s()];
+    let between_s = BETWEEN_SAMPLES * periods.into_iter().flatten().fold(0.0, f64::max);
     let blocks = bench.block_knots(flight);
-    descended(|late_s| {
+    descended(between_s, |late_s| {
         let inertial = |aside_s: f64| {
-            flight.inertial_rows(attitude_s - late_s - aside_s, -late_s - aside_s, gravity_m_s2)
+            let moved_s = -late_s - aside_s;
+            flight.inertial_rows(translation, attitude_s + moved_s, moved_s, gravity_m_s2)
         };
         let [now, ahead, behind] = [0.0, ASIDE_S, -ASIDE_S].map(inertial);
         let of_knots = |(first, end): &(usize, usize)| {
@@ -118,7 +121,7 @@ fn of_position(bench: &Bench, flight: &Prepared, attitude_s: f64) -> Option<Foun
                 // Beside the offset a constant on each axis, for what the accelerometer's bias makes of it.
                 let mut row = [(behind[at] - ahead[at]) / (2.0 * ASIDE_S), 0.0, 0.0, 0.0];
                 row[1 + at % 3] = 1.0;
-                block.add(translation[at] - now[at], &row, 1.0);
+                block.add(rows[at] - now[at], &row, 1.0);
             }
             block.complete();
             block
@@ -128,7 +131,7 @@ fn of_position(bench: &Bench, flight: &Prepared, attitude_s: f64) -> Option<Foun
 }
 
 /// The offset at which the squares are least, by the normal equations at an offset, of which it is the first parameter.
-fn descended(mut blocks_at: impl FnMut(f64) -> Vec<Block>) -> Option<Found> {
+fn descended(between_s: f64, mut blocks_at: impl FnMut(f64) -> Vec<Block>) -> Option<Found> {
     let (mut late_s, mut last_s, mut reach_s) = (0.0_f64, 0.0_f64, STEP_MAX_S);
     for _ in 0..STEPS {
         let blocks = blocks_at(late_s);
@@ -144,8 +147,11 @@ fn descended(mut blocks_at: impl FnMut(f64) -> Vec<Block>) -> Option<Found> {
         }
         last_s = step_s.clamp(-reach_s, reach_s);
         late_s += last_s;
+        if late_s.abs() > LATE_MAX_S {
+            return None;
+        }
         if last_s.abs() < 1e-5_f64.max(0.02 * deviation_s) {
-            return Some(Found { late_s, deviation_s });
+            return Some(Found { late_s, deviation_s, between_s });
         }
     }
     None
@@ -156,38 +162,57 @@ fn kinematic_weights() -> Weights {
     (0..3).map(|axis| ((Equation::Gyroscope.name(), axis), 1.0)).collect()
 }
 
-/// Takes off each flight's attitude what it is late beyond the mean of the fit flights, and its position what that is
-/// late beyond its attitude, where these are sure, and says what was found for each flight of `fit` and then of `test`.
+/// What was found of one flight.
+struct Clocks {
+    attitude: Option<Found>,
+    position: Option<Found>,
+    velocity: Option<Found>,
+}
+
+impl Clocks {
+    fn of(bench: &Bench, flight: &Prepared) -> Self {
+        let attitude = of_attitude(bench, flight);
+        // Without a gyroscope nobody knows which of the two is late.
+        let of = |translation| of_translation(bench, flight, translation, attitude?.late_s);
+        Self { attitude, position: of(Translation::Position), velocity: of(Translation::Velocity) }
+    }
+
+    /// What is taken off where `shared_s` is the attitudes' lateness that all flights share.
+    fn taken_off(&self, shared_s: f64, least_s: f64) -> Lateness {
+        let own = self.attitude.filter(|own| own.is_beyond(shared_s, 0.0, least_s));
+        let attitude_s = own.map_or(0.0, |own| own.late_s - shared_s);
+        let of = |translation: Option<Found>| {
+            let (Some(attitude), Some(own)) = (self.attitude, translation) else { return attitude_s };
+            let is_apart = own.is_beyond(attitude.late_s, attitude.deviation_s, least_s);
+            if is_apart { own.late_s - shared_s } else { attitude_s }
+        };
+        Lateness { attitude_s, position_s: of(self.position), velocity_s: of(self.velocity) }
+    }
+}
+
+/// Takes off each flight's attitude what it is late beyond the mean of the fit flights, and its position and its velocity
+/// what they are late beyond that mean if they are apart from the attitude; they come with it if they are not. Only what
+/// is sure is taken off. Says what was found for each flight of `fit` and then of `test`.
 pub fn align(bench: &mut Bench) -> Vec<(String, Offsets)> {
     let weights = std::mem::replace(&mut bench.weights, kinematic_weights());
-    let flights = || bench.fit.iter().chain(&bench.test);
-    let attitudes: Vec<Option<Found>> = flights().map(|flight| of_attitude(bench, flight)).collect();
-    let late_s = |found: &Option<Found>| found.map_or(0.0, |own| own.late_s);
-    let positions: Vec<Option<Found>> =
-        flights().zip(&attitudes).map(|(flight, own)| of_position(bench, flight, late_s(own))).collect();
+    let flights: Vec<&Prepared> = bench.fit.iter().chain(&bench.test).collect();
+    let clocks: Vec<Clocks> = flights.par_iter().map(|flight| Clocks::of(bench, flight)).collect();
     bench.weights = weights;
-    let of_fit: Vec<f64> = attitudes[..bench.fit.len()].iter().flatten().map(|own| own.late_s).collect();
+    let of_fit: Vec<f64> =
+        clocks[..bench.fit.len()].iter().filter_map(|own| Some(own.attitude?.late_s)).collect();
     let shared_s = of_fit.iter().sum::<f64>() / (of_fit.len() as f64).max(1.0);
     let least_s = bench.least_delay_s() / 2.0;
     let mut offsets = Vec::new();
-    let flights = bench.fit.iter_mut().chain(&mut bench.test);
-    for ((prepared, attitude), position) in flights.zip(attitudes).zip(positions) {
-        let flight = prepared.flight;
-        let attitude_s = late_s(&attitude);
-        let own = attitude.filter(|own| own.is_beyond(shared_s, least_s));
-        let of_attitude_s = own.map_or(0.0, |own| own.late_s - shared_s);
-        let (channel, period_s) = if flight.position.is_empty() {
-            ("velocity", flight.velocity.period_s())
-        } else {
-            ("position", flight.position.period_s())
-        };
-        let least_s = least_s.max(BETWEEN_SAMPLES * period_s.unwrap_or(0.0));
-        let beyond = position.filter(|own| own.is_beyond(attitude_s, least_s));
-        let of_position_s = of_attitude_s + beyond.map_or(0.0, |own| own.late_s - attitude_s);
-        prepared.late = Lateness { attitude_s: of_attitude_s, position_s: of_position_s };
-        let attitude = attitude.map(|own| Offset::of(own, flight.attitude.period_s(), of_attitude_s));
-        let position = position.map(|own| Offset::of(own, period_s, of_position_s));
-        offsets.push((flight.name.clone(), Offsets::from([("attitude", attitude), (channel, position)])));
+    for (flight, own) in bench.fit.iter_mut().chain(&mut bench.test).zip(clocks) {
+        let late = own.taken_off(shared_s, least_s);
+        flight.set_late(late);
+        let offset = |found: Option<Found>, taken_off_s| found.map(|found| Offset::of(found, taken_off_s));
+        let of_flight = [
+            ("attitude", offset(own.attitude, late.attitude_s)),
+            ("position", offset(own.position, late.position_s)),
+            ("velocity", offset(own.velocity, late.velocity_s)),
+        ];
+        offsets.push((flight.flight.name.clone(), Offsets::from(of_flight)));
     }
     offsets
 }

@@ -5,7 +5,7 @@ use crate::align::Lateness;
 use crate::clock::Clock;
 use crate::track::{Track, valid_about};
 use crate::window::{NUMEROV, SIMPSON, Window, central_difference, second_difference};
-use flights::Flight;
+use flights::{Channel, Flight};
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 
 /// An equation that measurement and model are both put into.
@@ -53,6 +53,33 @@ impl Equation {
     }
 }
 
+/// A channel that an acceleration in W follows from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Translation {
+    /// By its second derivative.
+    Position,
+    /// By its first.
+    Velocity,
+}
+
+impl Translation {
+    fn channel(self, flight: &Flight) -> &Channel<3> {
+        match self {
+            Translation::Position => &flight.position,
+            Translation::Velocity => &flight.velocity,
+        }
+    }
+
+    /// Measured side and model side.
+    fn windows(self, box_steps: usize, step_s: f64) -> (Window, Window) {
+        let plain = Window::b_spline(box_steps);
+        match self {
+            Translation::Position => (plain.behind(second_difference(step_s)), plain.behind(NUMEROV)),
+            Translation::Velocity => (plain.behind(central_difference(step_s)), plain.behind(SIMPSON)),
+        }
+    }
+}
+
 /// How the channels of a flight are read.
 #[derive(Debug, Clone)]
 pub struct Layout {
@@ -92,6 +119,9 @@ const END_MARGIN_S: f64 = 0.2;
 const GAP_MARGIN_S: f64 = 0.1;
 const WORTH: f64 = 0.9;
 
+/// Far below any tick, and above what is left of a time of which seconds since 1970 were taken off.
+const SLACK_S: f64 = 1e-6;
+
 /// No rig lets a vehicle go further to the side.
 const RIG_M: f64 = 0.3;
 
@@ -102,7 +132,7 @@ pub struct Prepared<'f> {
     pub flight: &'f Flight,
     /// How it is read.
     pub layout: Layout,
-    /// What its pose is late by that sensors of all flights are not.
+    /// What its pose is late by, beyond what `sensor-delay` has.
     pub late: Lateness,
     /// Rotors whose measured speed is not believed.
     pub distrusted: [bool; 4],
@@ -175,7 +205,7 @@ impl<'f> Prepared<'f> {
         let (flight, clock) = (self.flight, &self.layout.clock);
         let position_s = pose_s + self.late.position_s;
         let position = Track::sampled(&flight.position, position_s, clock);
-        let velocity_track = Track::sampled(&flight.velocity, position_s, clock);
+        let velocity_track = Track::sampled(&flight.velocity, pose_s + self.late.velocity_s, clock);
         let velocity = if flight.velocity.is_empty() {
             position.slope(self.layout.box_steps, clock.step_s)
         } else {
@@ -216,19 +246,26 @@ impl<'f> Prepared<'f> {
         Tracks { position, velocity, attitude, rates, rows }
     }
 
-    /// The measured side of [`Equation::Acceleration`] alone, three components for each knot; none where it is not
-    /// compared.
+    /// The acceleration in W by position or velocity alone, seen through the windows: three components for each knot;
+    /// `None` where that is not logged, or not compared.
     #[must_use]
-    pub fn translation_rows(&self) -> Vec<f64> {
-        let channel =
-            if self.flight.position.is_empty() { &self.flight.velocity } else { &self.flight.position };
-        let values = Track::sampled(channel, 0.0, &self.layout.clock).values;
-        self.acceleration_windows().map_or(Vec::new(), |(measured, _)| self.rows_over(measured, &values))
+    pub fn translation_rows(&self, translation: Translation) -> Option<Vec<f64>> {
+        self.offset_of(Equation::Acceleration).filter(|_| !self.is_assumed())?;
+        let channel = translation.channel(self.flight);
+        let (measured, _) = self.translation_windows(translation);
+        let values = || Track::sampled(channel, 0.0, &self.layout.clock).values;
+        (!channel.is_empty()).then(|| self.rows_over(&measured, &values()))
     }
 
-    /// The same by attitude and accelerometer, late by `attitude_s` and `force_s`.
+    /// The same by accelerometer and attitude, late by `force_s` and `attitude_s`.
     #[must_use]
-    pub fn inertial_rows(&self, attitude_s: f64, force_s: f64, gravity_m_s2: f64) -> Vec<f64> {
+    pub fn inertial_rows(
+        &self,
+        translation: Translation,
+        attitude_s: f64,
+        force_s: f64,
+        gravity_m_s2: f64,
+    ) -> Vec<f64> {
         let clock = &self.layout.clock;
         let attitude_WB = attitudes(&Track::sampled(&self.flight.attitude, attitude_s, clock));
         let force_B = Track::sampled(&self.flight.specific_force, force_s, clock);
@@ -236,12 +273,35 @@ impl<'f> Prepared<'f> {
             (attitude_WB * Vector3::from(*force_B) - gravity_m_s2 * Vector3::z()).into()
         };
         let acceleration_W: Vec<[f64; 3]> = attitude_WB.iter().zip(&force_B.values).map(turned).collect();
-        self.acceleration_windows().map_or(Vec::new(), |(_, model)| self.rows_over(model, &acceleration_W))
+        self.rows_over(&self.translation_windows(translation).1, &acceleration_W)
     }
 
-    fn acceleration_windows(&self) -> Option<&(Window, Window)> {
-        let at = self.layout.equations.iter().position(|own| *own == Equation::Acceleration)?;
-        Some(&self.layout.windows[at])
+    fn translation_windows(&self, translation: Translation) -> (Window, Window) {
+        translation.windows(self.layout.box_steps, self.layout.clock.step_s)
+    }
+
+    /// Takes its pose as `late`, and leaves out the knots about which it was not sampled then.
+    pub fn set_late(&mut self, late: Lateness) {
+        self.late = late;
+        let (flight, clock) = (self.flight, &self.layout.clock);
+        let reach = self.reach();
+        let mut require = |is_valid: Vec<bool>| {
+            let about = valid_about(&is_valid, reach);
+            self.layout.knots.retain(|knot| about[*knot]);
+        };
+        if late.attitude_s != 0.0 {
+            require(Track::sampled(&flight.attitude, late.attitude_s, clock).valid);
+        }
+        if late.position_s != 0.0 && !flight.position.is_empty() {
+            require(Track::sampled(&flight.position, late.position_s, clock).valid);
+        }
+        if late.velocity_s != 0.0 && !flight.velocity.is_empty() {
+            require(Track::sampled(&flight.velocity, late.velocity_s, clock).valid);
+        }
+    }
+
+    fn reach(&self) -> usize {
+        self.layout.windows.iter().map(|(a, b)| a.reach().max(b.reach())).max().unwrap_or(0)
     }
 
     fn rows_over(&self, window: &Window, values: &[[f64; 3]]) -> Vec<f64> {
@@ -256,7 +316,7 @@ impl<'f> Prepared<'f> {
     }
 
     fn knots_within(&self, valid: &[bool]) -> Vec<usize> {
-        let reach = self.layout.windows.iter().map(|(a, b)| a.reach().max(b.reach())).max().unwrap_or(0);
+        let reach = self.reach();
         let (about, last) = (valid_about(valid, reach), valid.len().saturating_sub(reach + 1));
         (reach..last).step_by(self.layout.box_steps).filter(|knot| about[*knot]).collect()
     }
@@ -296,11 +356,7 @@ impl<'f> Prepared<'f> {
 }
 
 /// Whether a channel was sampled at each instant, and at `gap_margin_s` before and after it; not at its ends.
-fn sampled_about<const N: usize>(
-    channel: &flights::Channel<N>,
-    clock: &Clock,
-    gap_margin_s: f64,
-) -> Vec<bool> {
+fn sampled_about<const N: usize>(channel: &Channel<N>, clock: &Clock, gap_margin_s: f64) -> Vec<bool> {
     let mut valid = Track::sampled(channel, 0.0, clock).valid;
     for delay_s in [-gap_margin_s, gap_margin_s] {
         let trial = Track::sampled(channel, delay_s, clock).valid;
@@ -315,21 +371,21 @@ fn sampled_about<const N: usize>(
 /// A channel whose samples hold until the next.
 #[derive(Debug)]
 pub struct Held<'c> {
-    channel: &'c flights::Channel<4>,
+    channel: &'c Channel<4>,
     next: usize,
 }
 
 impl<'c> Held<'c> {
     /// From its beginning.
     #[must_use]
-    pub fn new(channel: &'c flights::Channel<4>) -> Self {
+    pub fn new(channel: &'c Channel<4>) -> Self {
         Self { channel, next: 0 }
     }
 
     /// What holds at `at_s`; times have to grow from call to call. Before the first sample, the first.
     pub fn at(&mut self, at_s: f64) -> [f64; 4] {
-        // Times are sums of decimal fractions: a nanosecond of slack puts an instant on its own sample.
-        while self.next < self.channel.time_s.len() && self.channel.time_s[self.next] <= at_s + 1e-9 {
+        // Times are differences of decimal fractions since 1970: the slack puts an instant on its own sample.
+        while self.next < self.channel.time_s.len() && self.channel.time_s[self.next] <= at_s + SLACK_S {
             self.next += 1;
         }
         self.channel.values[self.next.saturating_sub(1)]
@@ -364,13 +420,13 @@ fn equations(flight: &Flight) -> Vec<Equation> {
 
 fn windows(equation: Equation, flight: &Flight, box_steps: usize, step_s: f64) -> (Window, Window) {
     let plain = Window::b_spline(box_steps);
-    let (second, central) = (second_difference(step_s), central_difference(step_s));
+    let central = central_difference(step_s);
     match equation {
         Equation::SpecificForce | Equation::RotorSpeed => (plain.clone(), plain),
         Equation::Acceleration if flight.position.is_empty() => {
-            (plain.behind(central), plain.behind(SIMPSON))
+            Translation::Velocity.windows(box_steps, step_s)
         }
-        Equation::Acceleration => (plain.behind(second), plain.behind(NUMEROV)),
+        Equation::Acceleration => Translation::Position.windows(box_steps, step_s),
         Equation::AngularAcceleration if flight.angular_velocity.is_empty() => {
             (plain.behind(central), plain.behind(SIMPSON).behind(SIMPSON))
         }

@@ -22,8 +22,8 @@ pub struct Report {
     pub effects: BTreeMap<&'static str, EffectReport>,
     /// The residuals on the test flights.
     pub whiteness: BeforeAfter<BTreeMap<&'static str, Whiteness>>,
-    /// Clocks of each flight: attitude and position, or else velocity, against the inertial unit; `null` where it has
-    /// not what that takes.
+    /// Clocks of each flight: attitude, position and velocity against the inertial unit; `null` where it has not what
+    /// that takes, or too little of it.
     pub time_offsets_s: BTreeMap<String, Offsets>,
     /// Sensors and actuators that seem broken.
     pub faults: Vec<Fault>,
@@ -161,11 +161,9 @@ impl Report {
         }
         for (flight, offsets) in &self.time_offsets_s {
             for (channel, offset) in offsets {
-                let taken_off_s = offset.map_or(0.0, |own| own.taken_off);
-                if taken_off_s != 0.0 {
-                    let late_ms = rounded(1e3 * taken_off_s);
-                    writeln!(f, "clock: {channel} of {flight} is {late_ms} ms late; taken off")?;
-                }
+                let Some(own) = offset.filter(|own| own.taken_off != 0.0) else { continue };
+                let [late_ms, off_ms] = [own.value, own.taken_off].map(|seconds| rounded(1e3 * seconds));
+                writeln!(f, "clock: {channel} of {flight} is {late_ms} ms late; {off_ms} ms were taken off")?;
             }
         }
         Ok(())

@@ -60,7 +60,9 @@ pub struct Outcome {
     pub pictures: Vec<Picture>,
     /// What each flight did meanwhile, by name: at the same instants as its pictures.
     pub regressors: BTreeMap<String, Vec<Regressor>>,
-    /// Accepted delays and biases of sensors, to be taken off the flights before they are flown again.
+    /// What the alignment took off each flight, by name; for the flights before they are flown again.
+    pub late: BTreeMap<String, Lateness>,
+    /// Accepted delays and biases of sensors, for the same.
     pub sensor_errors: SensorErrors,
 }
 
@@ -129,7 +131,8 @@ pub fn identify(set: &FlightSet, progress: &mut dyn FnMut(&str)) -> Result<Outco
     let flown = bench.fit.iter().chain(&bench.test);
     let regressors =
         flown.map(|own| (own.flight.name.clone(), regressors(&bench.model, own, values))).collect();
-    Ok(Outcome { pictures: pictures(&bench, &selection), regressors, effects, sensor_errors, report })
+    let late = bench.fit.iter().chain(&bench.test).map(|own| (own.flight.name.clone(), own.late)).collect();
+    Ok(Outcome { pictures: pictures(&bench, &selection), regressors, effects, late, sensor_errors, report })
 }
 
 /// The flights on their grids, with the declared model.
@@ -299,7 +302,7 @@ pub fn estimates(bench: &Bench, fitted: &Fitted, which: &[usize]) -> BTreeMap<&'
     );
     let one = |at: &usize| {
         let own = &bench.model.parameters.all[*at];
-        let (value, half) = (fitted.values[*at], quantile * fitted.deviation(*at).unwrap_or(0.0));
+        let (value, half) = (fitted.values[*at], quantile * fitted.deviation(*at).unwrap_or(f64::INFINITY));
         let (low, high) = ((value - half).max(own.lower), (value + half).min(own.upper));
         // Zero is where many effects begin, and no bound that data pushed against.
         let at_bound = value != own.declared && (value <= own.lower || value >= own.upper);

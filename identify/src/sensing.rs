@@ -8,7 +8,7 @@ use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 /// Lateness and biases of sensors.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct SensorErrors {
-    /// Lateness of position, velocity and attitude in s.
+    /// Lateness of position, velocity and attitude in s that all flights share.
     pub pose_delay_s: f64,
     /// Lateness of gyroscope and accelerometer in s.
     pub inertial_delay_s: f64,
@@ -46,7 +46,7 @@ impl SensorErrors {
     pub fn taken_off(&self, flight: &Flight, late: &Lateness) -> Flight {
         let mut flight = flight.clone();
         earlier(&mut flight.position, self.pose_delay_s + late.position_s);
-        earlier(&mut flight.velocity, self.pose_delay_s + late.position_s);
+        earlier(&mut flight.velocity, self.pose_delay_s + late.velocity_s);
         earlier(&mut flight.attitude, self.pose_delay_s + late.attitude_s);
         earlier(&mut flight.angular_velocity, self.inertial_delay_s);
         earlier(&mut flight.specific_force, self.inertial_delay_s);

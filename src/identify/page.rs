@@ -293,6 +293,7 @@ mod tests {
         let inputs = |_| Regressor { name: "speed", unit: "m/s", values: noise(3, count) };
         let regressors = FLIGHTS.map(|name| (name.to_owned(), (0..10).map(inputs).collect()));
         let outcome = Outcome {
+            late: BTreeMap::new(),
             report: report(),
             effects: Vec::new(),
             pictures: FLIGHTS.into_iter().flat_map(of_flight).collect(),

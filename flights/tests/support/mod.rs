@@ -47,6 +47,7 @@ pub struct Motion {
     pub length_unit: f64,
     pub command_unit: f64,
     pub angle_unit: f64,
+    pub time_unit: f64,
     pub frd_ned: bool,
 }
 
@@ -58,6 +59,7 @@ impl Default for Motion {
             length_unit: 1.0,
             command_unit: 1.0,
             angle_unit: 1.0,
+            time_unit: 1.0,
             frd_ned: false,
         }
     }
@@ -95,7 +97,7 @@ impl Motion {
         for k in 0..=1000 {
             let time = 0.01 * f64::from(k);
             let numbers: Vec<String> = self.row(time).iter().map(f64::to_string).collect();
-            writeln!(text, "{:.2},{}", time, numbers.join(",")).unwrap();
+            writeln!(text, "{:.2},{}", self.time_unit * time, numbers.join(",")).unwrap();
         }
         text
     }
