@@ -308,3 +308,18 @@ fn the_new_vehicle_file_is_complete_and_keeps_declared_effects() {
     assert_eq!(names, ["rotor-drag", "parasitic-drag"], "{text}");
     assert!(!text.contains("base ="), "{text}");
 }
+
+/// How high the centre of mass lies shows only where something pushes the vehicle to the side.
+#[test]
+fn what_flights_do_not_determine_is_said() {
+    let mut case = Case::of(&["com-offset"], 0.3, 26, DURATION_S);
+    case.plan.is_calm = true;
+    let set = case.flights();
+    let outcome = identify(&set, &mut |_| ()).expect("flights to identify on");
+    require_named(&outcome.report, &["com-offset"]);
+    let found = &outcome.report.effects["com-offset"].parameters;
+    assert!(found["x"].determined && !found["z"].determined, "{found:?}");
+    let text = identify::vehicle_file::text(&set.vehicle, &outcome.effects, &outcome.report).unwrap();
+    let line = text.lines().rfind(|line| line.starts_with("z = ")).expect("the third component");
+    assert!(line.contains("not determined by these flights"), "{line}");
+}
