@@ -1,7 +1,7 @@
 //! The text of a flights file with its name: places for messages, and the paths written in it.
 
 use std::ops::Range;
-use std::path::{Path, PathBuf};
+use std::path::{Component, Path, PathBuf};
 
 use toml::Spanned;
 use vehicles::Place;
@@ -55,7 +55,25 @@ impl Document {
                 let advice = "set the variable, or give a default: ${NAME:-path}";
                 self.bad(&written.span(), key, Bad { expected: "a path", found: &found, advice })
             })?;
-        Ok(self.path.parent().unwrap_or(Path::new("")).join(expanded))
+        Ok(tidy(&self.path.parent().unwrap_or(Path::new("")).join(expanded)))
+    }
+}
+
+/// The path without ways down and up again, if it still leads to the same file.
+fn tidy(path: &Path) -> PathBuf {
+    let mut short = PathBuf::new();
+    for part in path.components() {
+        let is_way_down =
+            short.components().next_back().is_some_and(|last| matches!(last, Component::Normal(_)));
+        if part == Component::ParentDir && is_way_down {
+            short.pop();
+        } else {
+            short.push(part);
+        }
+    }
+    match (short.canonicalize(), path.canonicalize()) {
+        (Ok(a), Ok(b)) if a == b => short,
+        _ => path.to_owned(),
     }
 }
 

@@ -32,6 +32,29 @@ const SPEED_MAX_M_S: f64 = 100.0;
 /// Loggers sample at 4 Hz to 5 kHz, and vehicles fly for a second to an hour.
 const PERIOD_RANGE_S: (f64, f64) = (2e-4, 0.25);
 const SPAN_RANGE_S: (f64, f64) = (1.0, 3600.0);
+/// Below this correlation a vector does not follow its twin at all.
+const AGAINST: f64 = 0.3;
+/// It follows clearly better another way where that adds this much.
+const CLEARLY: f64 = 0.3;
+/// And two that are nearer than this cannot be told apart.
+const ALIKE: f64 = 0.1;
+/// What would make it good, in words and in numbers.
+type Mistake<T> = (&'static str, fn(T) -> T);
+/// What is mistaken about the Euler angles roll and pitch.
+const ANGLE_MISTAKES: [Mistake<(f64, f64)>; 5] = [
+    ("a `-` before the pitch", |(roll, pitch)| (roll, -pitch)),
+    ("a `-` before the roll", |(roll, pitch)| (-roll, pitch)),
+    ("a `-` before roll and pitch", |(roll, pitch)| (-roll, -pitch)),
+    ("roll and pitch in each other's place", |(roll, pitch)| (pitch, roll)),
+    ("roll and pitch in each other's place, a `-` before the new pitch", |(roll, pitch)| (pitch, -roll)),
+];
+/// And about a position.
+const POSITION_MISTAKES: [Mistake<[f64; 3]>; 4] = [
+    ("x and y of the position in each other's place", |[x, y, z]| [y, x, z]),
+    ("a `-` before x of the position", |[x, y, z]| [-x, y, z]),
+    ("a `-` before y of the position", |[x, y, z]| [x, -y, z]),
+    ("a `-` before x and y of the position", |[x, y, z]| [-x, -y, z]),
+];
 /// Voltages that a battery of a vehicle can have, from one cell to fourteen.
 const VOLTAGE_RANGE_V: (f64, f64) = (2.0, 62.0);
 
@@ -59,7 +82,7 @@ pub fn judge(flight: &Flight, vehicle: &Vehicle, channels: &ChannelMap) -> Vec<F
         judge.upright(),
         judge.rates(),
         judge.velocity(),
-        judge.leaning().or_else(|| judge.speed()),
+        judge.leaning().or_else(|| judge.axes()).or_else(|| judge.speed()),
         judge.commands(),
         judge.rotor_speed(),
         judge.voltage(),
@@ -179,7 +202,7 @@ impl Judge<'_> {
                 "an attitude that takes the world to the body: negate x, y and z of its columns".to_owned()
             }
             [x, y, z] if x > 0.0 && y < 0.0 && z < 0.0 => self.other_frame(quantity),
-            _ => "the axes with a `-` before the name".to_owned(),
+            _ => "the axes, or angles of the attitude, with a `-` before the name".to_owned(),
         });
         Some(finding(quantity, agreement.slope, fits, &what))
     }
@@ -242,6 +265,40 @@ impl Judge<'_> {
         }
         let fits = either(unit, self.angles_that_fit(factor));
         Some(finding(quantity, factor, fits, &what))
+    }
+
+    /// The position accelerates to where the vehicle leans.
+    fn axes(&self) -> Option<Finding> {
+        let (attitude, position) = (&self.flight.attitude, &self.flight.position);
+        let agreement = |attitude: &Channel<4>, position: &Channel<3>| {
+            let pairs = Pairs::leaning(attitude, position, self.vehicle.gravity_m_s2, LEANING_WINDOW_S);
+            let agreement = pairs.agreement(QUIET_ACCELERATION_M_S2);
+            agreement.filter(|_| self.flight.assumed.is_empty()).map(|own| own.correlation)
+        };
+        let declared = agreement(attitude, position).filter(|correlation| *correlation < SAME)?;
+        let is_euler = self.channels.get(&Quantity::Attitude)?.get_ref().euler.is_some();
+        let of_angles = ANGLE_MISTAKES.iter().filter(|_| is_euler);
+        let of_angles =
+            of_angles.map(|(words, change)| (*words, agreement(&with_angles(attitude, *change), position)));
+        let of_position = POSITION_MISTAKES.iter().map(|(words, change)| {
+            let values = position.values.iter().map(|own| change(*own)).collect();
+            let changed = Channel { time_s: position.time_s.clone(), values };
+            (*words, agreement(attitude, &changed))
+        });
+        let tried: Vec<(&str, f64)> =
+            of_angles.chain(of_position).filter_map(|(words, own)| Some((words, own?))).collect();
+        let best = tried.iter().map(|own| own.1).fold(-1.0, f64::max);
+        // With little yaw a pose tells not which of its halves is turned round.
+        let alike = tried.iter().filter(|own| own.1 > SAME && own.1 > best - ALIKE);
+        let words = alike.map(|own| own.0).collect::<Vec<_>>().join(", or ");
+        let what = format!(
+            "the position's acceleration has a correlation of {declared:.2} with how the vehicle leans; at best {best:.2}, \
+             with axes named otherwise"
+        );
+        let quantity = if is_euler { Quantity::Attitude } else { Quantity::Position };
+        let is_clear = best > SAME && best > declared + CLEARLY;
+        let finding = finding(quantity, best.signum(), is_clear.then_some(words), &what);
+        (is_clear || declared < AGAINST).then_some(finding)
     }
 
     /// The unit of Euler angles in which a vehicle that leans or turns `factor` times too little would not.
@@ -370,6 +427,16 @@ impl Judge<'_> {
         let other = if frame == Some(Frame::FrdNed) { "flu-enu" } else { "frd-ned" };
         format!("`frame = \"{other}\"`")
     }
+}
+
+/// The attitude with roll and pitch changed.
+fn with_angles(attitude: &Channel<4>, change: fn((f64, f64)) -> (f64, f64)) -> Channel<4> {
+    let changed = |wxyz: &[f64; 4]| {
+        let (roll, pitch, yaw) = UnitQuaternion::from_quaternion(frame::from_wxyz(*wxyz)).euler_angles();
+        let (roll, pitch) = change((roll, pitch));
+        frame::euler([roll, pitch, yaw])
+    };
+    Channel { time_s: attitude.time_s.clone(), values: attitude.values.iter().map(changed).collect() }
 }
 
 /// What of two would fit, where not both are wrong.

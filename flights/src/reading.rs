@@ -62,6 +62,7 @@ impl Reading<'_> {
         self.say_gaps(&mut flight);
         self.check_something_is_left(&flight)?;
         self.judge(&mut flight)?;
+        flight.notes = merged(&flight.notes);
         Ok(flight)
     }
 
@@ -320,6 +321,26 @@ fn spans(flight: &Flight) -> [Option<(f64, f64)>; 8] {
         flight.specific_force.span_s(),
         flight.battery_voltage.span_s(),
     ]
+}
+
+/// What several channels have in common is said once.
+fn merged(notes: &[String]) -> Vec<String> {
+    let mut said: Vec<(Vec<&str>, &str)> = Vec::new();
+    for note in notes {
+        let of_channel = note
+            .split_once(": ")
+            .filter(|(name, _)| Quantity::CHANNELS.iter().any(|own| own.name() == *name));
+        let (channel, words) = of_channel.map_or((None, note.as_str()), |(name, words)| (Some(name), words));
+        match said.iter_mut().find(|own| own.1 == words && !own.0.is_empty()) {
+            Some(own) => own.0.extend(channel),
+            None => said.push((channel.into_iter().collect(), words)),
+        }
+    }
+    let line = |(channels, words): &(Vec<&str>, &str)| match channels[..] {
+        [] => (*words).to_owned(),
+        _ => format!("{}: {words}", channels.join(", ")),
+    };
+    said.iter().map(line).collect()
 }
 
 /// Angles without jumps of a turn.

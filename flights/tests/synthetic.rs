@@ -154,6 +154,29 @@ fn angles_in_another_unit_are_found() {
     assert!(read(&degrees, &poses("rad"), "trust_units = true").is_ok());
 }
 
+#[test]
+fn a_pose_whose_axes_are_mistaken_is_found_without_a_gyroscope() {
+    let poses = |angles: &str, position: &str| {
+        format!(
+            "time = {{ columns = [\"t\"], unit = \"s\" }}\n\
+             command = {{ columns = [\"m1\", \"m2\", \"m3\", \"m4\"], unit = \"count\" }}\n\
+             attitude = {{ euler = [{angles}], unit = \"rad\" }}\n\
+             position = {{ columns = [{position}], unit = \"m\" }}\n"
+        )
+    };
+    let (angles, position) = (r#""roll", "pitch", "yaw""#, r#""px", "py", "pz""#);
+    assert_eq!(read(&Motion::default(), &poses(angles, position), "").unwrap().notes, [""; 0]);
+    let fits = |angles: &str, position: &str, words: &str| {
+        let found = findings(&Motion::default(), &poses(angles, position));
+        let [(Quantity::Attitude, advice)] = &found[..] else { panic!("{angles} {position}: {found:?}") };
+        assert!(advice.split(", or ").any(|own| own == words), "{angles} {position}: {advice}");
+    };
+    fits(r#""roll", "-pitch", "yaw""#, position, "a `-` before the pitch");
+    fits(r#""-roll", "-pitch", "yaw""#, position, "a `-` before roll and pitch");
+    fits(r#""pitch", "roll", "yaw""#, position, "roll and pitch in each other's place");
+    fits(angles, r#""py", "px", "pz""#, "x and y of the position in each other's place");
+}
+
 /// The channels without one of them.
 fn without(channel: &str) -> String {
     let kept = CHANNELS.lines().filter(|line| !line.starts_with(channel));
@@ -254,8 +277,9 @@ fn bad_cells_and_times_are_counted() {
         assert!(flight.notes.iter().any(|note| note.contains(text)), "{text}: {:?}", flight.notes)
     };
     has("command: 2 of 1001 samples have no finite number");
-    has("position: 1 of 1001 samples have no finite number");
-    has("position: 1 of 1000 samples have a time that does not grow");
+    let others = "attitude, position, velocity, angular_velocity, specific_force, battery_voltage";
+    has(&format!("{others}: 1 of 1001 samples have no finite number"));
+    has(&format!("{others}: 1 of 1000 samples have a time that does not grow"));
 }
 
 #[test]
@@ -307,7 +331,11 @@ fn rows_in_gaps_are_left_out_of_the_canonical_file() {
     });
     place.write("log.csv", blanked.collect::<String>().as_bytes());
     let flight = place.load("log.csv", CHANNELS, "").unwrap();
-    assert!(flight.notes.iter().any(|note| note.contains("position: 1 gaps")), "{:?}", flight.notes);
+    assert!(
+        flight.notes.iter().any(|note| note.contains("position, velocity: 1 gaps")),
+        "{:?}",
+        flight.notes
+    );
     let written = flights::write_csv(&flight, &place.path("flight.csv")).unwrap();
     assert_eq!(written.rows, 901);
     assert!(written.notes.iter().any(|note| note.contains("100 of 1001 rows")), "{:?}", written.notes);

@@ -73,10 +73,21 @@ struct Found {
 }
 
 impl Found {
-    /// Whether what it has beyond `other_s`, itself known to `deviation_s`, is more than chance and the grid make of none.
-    fn is_beyond(&self, other_s: f64, deviation_s: f64, least_s: f64) -> bool {
-        let own_s = (self.late_s - other_s).abs();
-        own_s > SURE * self.deviation_s.hypot(deviation_s) && own_s > least_s.max(self.between_s)
+    /// Whether what it has beyond `other` is more than chance and the grid make of none.
+    fn is_beyond(&self, other: &Found, least_s: f64) -> bool {
+        let own_s = (self.late_s - other.late_s).abs();
+        let deviation_s = self.deviation_s.hypot(other.deviation_s);
+        own_s > SURE * deviation_s && own_s > least_s.max(self.between_s).max(other.between_s)
+    }
+
+    /// Of several the mean; zero of none.
+    fn mean(all: &[Found]) -> Found {
+        let part = 1.0 / (all.len() as f64).max(1.0);
+        Found {
+            late_s: part * all.iter().map(|own| own.late_s).sum::<f64>(),
+            deviation_s: part * all.iter().map(|own| own.deviation_s.powi(2)).sum::<f64>().sqrt(),
+            between_s: all.iter().map(|own| own.between_s).fold(0.0, f64::max),
+        }
     }
 }
 
@@ -177,14 +188,14 @@ impl Clocks {
         Self { attitude, position: of(Translation::Position), velocity: of(Translation::Velocity) }
     }
 
-    /// What is taken off where `shared_s` is the attitudes' lateness that all flights share.
-    fn taken_off(&self, shared_s: f64, least_s: f64) -> Lateness {
-        let own = self.attitude.filter(|own| own.is_beyond(shared_s, 0.0, least_s));
-        let attitude_s = own.map_or(0.0, |own| own.late_s - shared_s);
+    /// What is taken off where `shared` is the attitudes' lateness that all flights share.
+    fn taken_off(&self, shared: &Found, least_s: f64) -> Lateness {
+        let own = self.attitude.filter(|own| own.is_beyond(shared, least_s));
+        let attitude_s = own.map_or(0.0, |own| own.late_s - shared.late_s);
         let of = |translation: Option<Found>| {
-            let (Some(attitude), Some(own)) = (self.attitude, translation) else { return attitude_s };
-            let is_apart = own.is_beyond(attitude.late_s, attitude.deviation_s, least_s);
-            if is_apart { own.late_s - shared_s } else { attitude_s }
+            let apart =
+                translation.filter(|own| self.attitude.is_some_and(|other| own.is_beyond(&other, least_s)));
+            apart.map_or(attitude_s, |own| own.late_s - shared.late_s)
         };
         Lateness { attitude_s, position_s: of(self.position), velocity_s: of(self.velocity) }
     }
@@ -198,13 +209,12 @@ pub fn align(bench: &mut Bench) -> Vec<(String, Offsets)> {
     let flights: Vec<&Prepared> = bench.fit.iter().chain(&bench.test).collect();
     let clocks: Vec<Clocks> = flights.par_iter().map(|flight| Clocks::of(bench, flight)).collect();
     bench.weights = weights;
-    let of_fit: Vec<f64> =
-        clocks[..bench.fit.len()].iter().filter_map(|own| Some(own.attitude?.late_s)).collect();
-    let shared_s = of_fit.iter().sum::<f64>() / (of_fit.len() as f64).max(1.0);
+    let of_fit: Vec<Found> = clocks[..bench.fit.len()].iter().filter_map(|own| own.attitude).collect();
+    let shared = Found::mean(&of_fit);
     let least_s = bench.least_delay_s() / 2.0;
     let mut offsets = Vec::new();
     for (flight, own) in bench.fit.iter_mut().chain(&mut bench.test).zip(clocks) {
-        let late = own.taken_off(shared_s, least_s);
+        let late = own.taken_off(&shared, least_s);
         flight.set_late(late);
         let offset = |found: Option<Found>, taken_off_s| found.map(|found| Offset::of(found, taken_off_s));
         let of_flight = [

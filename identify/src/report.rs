@@ -41,6 +41,8 @@ pub struct Report {
     pub not_identifiable: Vec<Unseen>,
     /// Length of the blocks that count as independent.
     pub block_s: f64,
+    /// So many of them have the flights that errors are judged on.
+    pub test_blocks: usize,
 }
 
 /// A value under the declared and under the new model.
@@ -151,7 +153,30 @@ impl fmt::Display for Report {
     }
 }
 
+/// With fewer blocks of test flights nothing is beyond chance.
+const ENOUGH_BLOCKS: usize = 12;
+
 impl Report {
+    /// Whether the verdict is empty only because the test flights are short.
+    #[must_use]
+    pub fn is_undecided(&self) -> bool {
+        self.verdict.is_empty() && self.test_blocks < ENOUGH_BLOCKS
+    }
+
+    /// What was assumed and noticed, each with its flights.
+    fn notes(&self) -> Vec<(&str, Vec<&str>)> {
+        let mut notes: Vec<(&str, Vec<&str>)> = Vec::new();
+        for flight in &self.flights {
+            for note in flight.assumed.iter().chain(&flight.notes) {
+                match notes.iter_mut().find(|own| own.0 == note) {
+                    Some(own) => own.1.push(&flight.name),
+                    None => notes.push((note, vec![&flight.name])),
+                }
+            }
+        }
+        notes
+    }
+
     fn write_flights(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         writeln!(f, "declared: {}", self.vehicle)?;
         for flight in &self.flights {
@@ -159,7 +184,18 @@ impl Report {
             let equations = flight.equations.join(", ");
             writeln!(f, "  {role}  {:28} {:7.1} s  {equations}", flight.name, flight.compared_s)?;
         }
+        for (note, flights) in self.notes() {
+            let all = flights.len() == self.flights.len() && flights.len() > 1;
+            let of = if all { "all flights".to_owned() } else { flights.join(", ") };
+            writeln!(f, "note: {of}: {note}")?;
+        }
         for (flight, offsets) in &self.time_offsets_s {
+            if offsets.values().all(Option::is_none) {
+                writeln!(
+                    f,
+                    "clock: {flight}: nothing to compare the pose with; log gyroscope and accelerometer"
+                )?;
+            }
             for (channel, offset) in offsets {
                 let Some(own) = offset.filter(|own| own.taken_off != 0.0) else { continue };
                 let [late_ms, off_ms] = [own.value, own.taken_off].map(|seconds| rounded(1e3 * seconds));
@@ -170,7 +206,14 @@ impl Report {
     }
 
     fn write_verdict(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        if self.verdict.is_empty() {
+        if self.is_undecided() {
+            let (blocks, block_s) = (self.test_blocks, self.block_s);
+            writeln!(
+                f,
+                "\nverdict: undecided. The test flights have {blocks} blocks of {block_s} s, of {ENOUGH_BLOCKS} that it takes to \
+                 show anything beyond chance: fly longer."
+            )?;
+        } else if self.verdict.is_empty() {
             writeln!(f, "\nverdict: nothing. No candidate makes the held-out flights better beyond chance.")?;
         } else {
             writeln!(f, "\nverdict: {}", self.verdict.join(", "))?;
@@ -179,7 +222,7 @@ impl Report {
             let Some(effect) = self.effects.get(name) else { continue };
             writeln!(
                 f,
-                "  {name}: held-out residual {} -> {}",
+                "  {name}: held-out residual {} without it, {} with all",
                 rounded(effect.held_out.before),
                 rounded(effect.held_out.after)
             )?;

@@ -126,6 +126,7 @@ pub fn identify(set: &FlightSet, progress: &mut dyn FnMut(&str)) -> Result<Outco
         noise_floor: noise_report(&floor, vehicle.gravity_m_s2),
         not_identifiable: unseen,
         block_s: bench.block_s,
+        test_blocks: selection.after.test_squares.len(),
     };
     let effects = bench.model.parameters.effects_under(values);
     let flown = bench.fit.iter().chain(&bench.test);

@@ -21,13 +21,19 @@ pub fn text(declared: &Path, effects: &[Effect], report: &Report) -> Result<Stri
         text.parse().map_err(|error| unreadable(std::io::Error::other(error)))?;
     document.remove("effects");
     document["name"] = toml_edit::value(format!("{}, identified", vehicle.name));
-    let mut text = document.to_string();
+    let mut text = format!(
+        "# Written by hummingbus identify. Up to the effects at its end this is the declared file {file}, with its comments.\n{document}"
+    );
     for effect in effects {
         text += &entry(effect, &vehicle, report);
     }
     Ok(text)
 }
 
+/// Where a value comes from that is typical of a vehicle of this size, and not of the Hummingbird.
+const SCALED: &str = "typical of a vehicle of this size (crate identify, `fitting`)";
+
+#[allow(clippy::float_cmp, reason = "a value that was not touched is the same")]
 fn entry(effect: &Effect, vehicle: &Vehicle, report: &Report) -> String {
     let name = effect.kind.name;
     let mut text = format!("\n[[effects]]\nname = {name:?}\n");
@@ -44,7 +50,7 @@ fn entry(effect: &Effect, vehicle: &Vehicle, report: &Report) -> String {
             (None, None) => number(
                 value,
                 spec.unit(),
-                spec.typical_source,
+                if value == spec.typical { spec.typical_source } else { SCALED },
                 "\"not identified: held while the others were fitted\"",
             ),
         };
@@ -67,7 +73,11 @@ fn source(report: &Report) -> String {
 }
 
 fn of_estimate(own: &Estimate, source: &str) -> String {
-    let doubt = if own.determined { "" } else { "not determined by these flights: " };
+    let doubt = match own {
+        Estimate { determined: false, .. } => "not determined by these flights: ",
+        Estimate { at_bound: true, .. } => "at its bound: ",
+        _ => "",
+    };
     let interval = format!("\"{doubt}95 % interval {:e} to {:e} {}\"", own.low, own.high, own.unit);
     number(own.value, own.unit, source, &interval)
 }

@@ -76,9 +76,10 @@ function estimateText(name, own) {
 function drawSummary() {
   const vehicle = report.vehicle.split(/[\\/]/).pop().replace(/\.toml$/, "");
   element("title").textContent = `${vehicle}: what flights show beyond the declared model`;
+  const undecided = `Undecided: the flights to test on have ${report.test_blocks} blocks of ${report.block_s} s, and with less than a dozen nothing is beyond chance.`;
   element("verdict").textContent = report.verdict.length
     ? `The flights ask for ${report.verdict.join(", ")}.`
-    : "The flights ask for nothing: no effect makes the prediction of flights that nothing was fitted on better beyond chance.";
+    : report.test_blocks < 12 ? undecided : "The flights ask for nothing: no effect makes the prediction of flights that nothing was fitted on better beyond chance.";
   for (const [name, effect] of accepted) {
     const estimates = Object.entries(effect.parameters).map(([parameter, own]) => estimateText(parameter, own));
     const rivals = effect.confused_with.length ? `; cannot be told from ${effect.confused_with.join(", ")} here` : "";

@@ -276,6 +276,7 @@ mod tests {
             unexplained: BTreeMap::new(),
             not_identifiable: Vec::new(),
             block_s: 1.0,
+            test_blocks: 20,
         }
     }
 
