@@ -47,7 +47,7 @@ fn main() {
         let gain = 1.0 - (own.held_out.after / own.held_out.before).powi(2);
         println!("| {name} | {:.2} % of the squares |", 100.0 * gain);
         for (parameter, found) in &own.parameters {
-            println!("| {parameter} | {:.5} | {:.5} to {:.5} |", found.value, found.low, found.high);
+            println!("| {parameter} | {:.4e} | {:.4e} to {:.4e} |", found.value, found.low, found.high);
         }
     }
 }
