@@ -190,7 +190,9 @@ impl Report {
             writeln!(f, "note: {of}: {note}")?;
         }
         for (flight, offsets) in &self.time_offsets_s {
-            if offsets.values().all(Option::is_none) {
+            let has_position =
+                |own: &FlightReport| own.name == *flight && own.equations.contains(&"acceleration");
+            if self.flights.iter().any(has_position) && offsets.values().all(Option::is_none) {
                 writeln!(
                     f,
                     "clock: {flight}: nothing to compare the pose with; log gyroscope and accelerometer"

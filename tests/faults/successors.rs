@@ -18,7 +18,7 @@ const TAKE_OVER_TICK: u32 = 1500;
 const EARLY_TICK: u32 = 900;
 const LAST_TICK: u32 = 1600;
 /// Long enough for a process to start in on a machine that is busy.
-const WATCHDOG_MS_HOST: u32 = 1500;
+const WATCHDOG_MS_HOST: u32 = 3000;
 
 /// A swap of `victim` for its like, with more keys.
 fn swap(victim: &str, more: &str) -> String {
@@ -50,7 +50,7 @@ fn a_successor_that_fails_from_the_inside_is_refused_with_its_last_words() {
     let ending = Fault::ENDING.map(|fault| (fault, words_of(fault)));
     let others: [(Fault, &[&str]); 3] = [
         (Fault::Hang, &watchdog),
-        (Fault::NeverJoins, &["was killed by the watchdog: it did not join within 1500 ms"]),
+        (Fault::NeverJoins, &["was killed by the watchdog: it did not join within 3000 ms"]),
         (Fault::OtherLayout, &["layout mismatch on topic /saboteur/report", "climb", "altitude"]),
     ];
     for (fault, words) in ending.into_iter().chain(others) {
