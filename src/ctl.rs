@@ -131,13 +131,13 @@ pub fn description(words: &str) -> Result<String> {
 fn ask(run_id: Option<&str>, request: &Request, json: bool) -> Result<()> {
     let answer = client::ask(&find_live(run_id)?, request)?;
     if json {
-        crate::print_text(&serde_json::to_string(&answer)?)?;
+        crate::output::print_text(&serde_json::to_string(&answer)?)?;
     }
     match answer {
         Answer::Refused { reason } => bail!("{reason}"),
         _ if json => Ok(()),
-        Answer::Done { text, .. } => crate::print_text(&text),
-        Answer::Status(status) => crate::print_text(&status.to_string()),
+        Answer::Done { text, .. } => crate::output::print_text(&text),
+        Answer::Status(status) => crate::output::print_text(&status.to_string()),
     }
 }
 

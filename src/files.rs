@@ -1,6 +1,7 @@
-//! Files that a command writes beside what it prints.
+//! Files that a command reads, and writes beside what it prints.
 
 use anyhow::{Context, Result, bail};
+use recorder::reader::Recording;
 use std::fs::File;
 use std::io::{self, BufWriter, Write as _};
 use std::path::Path;
@@ -26,4 +27,16 @@ pub fn write<T>(path: &Path, write: impl FnOnce(&mut BufWriter<File>) -> io::Res
     let mut out = BufWriter::new(file);
     let written = write(&mut out).and_then(|written| out.flush().map(|()| written));
     written.with_context(|| format!("cannot write {}", path.display()))
+}
+
+/// Opens a recording, or what is whole of one that was cut off, and then says so.
+pub fn open_recording(path: &Path) -> Result<Recording> {
+    let recording = Recording::salvage(path)?;
+    if let Some(cut) = recording.cut() {
+        let end = cut.last_tick.map_or("nothing of it is whole".to_owned(), |tick| {
+            format!("what is whole of it ends after tick {tick}")
+        });
+        eprintln!("warning: {} was cut off, its writer did not finish it: {end}", path.display());
+    }
+    Ok(recording)
 }

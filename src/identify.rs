@@ -77,7 +77,7 @@ pub fn run(arguments: &IdentifyArguments) -> Result<bool> {
 fn rotor(stand: &Path, out: &Path, is_json: bool) -> Result<bool> {
     let report = identify::rotor::run(stand, out)?;
     let text = if is_json { serde_json::to_string_pretty(&report)? } else { report.to_string() };
-    crate::print_text(&text)?;
+    crate::output::print_text(&text)?;
     Ok(true)
 }
 
@@ -105,7 +105,11 @@ fn flights_of(arguments: &IdentifyArguments, file: &Path, out: &Path) -> Result<
     report["bus"] = flown.clone().unwrap_or(Value::Null);
     write_json(out, &report)?;
     let report = serde_json::to_string_pretty(&report)?;
-    crate::print_text(&if arguments.json { report } else { summary(&outcome.report, flown.as_ref(), out) })?;
+    crate::output::print_text(&if arguments.json {
+        report
+    } else {
+        summary(&outcome.report, flown.as_ref(), out)
+    })?;
     Ok(true)
 }
 

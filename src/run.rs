@@ -90,7 +90,7 @@ pub fn run(
             text += &format!("\n\n{profile}\n{}", lines.join("\n"));
         }
     }
-    crate::print_text(&text)?;
+    crate::output::print_text(&text)?;
     Ok(summary.passed)
 }
 

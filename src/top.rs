@@ -75,7 +75,11 @@ pub fn top(arguments: &TopArguments) -> Result<()> {
     let before = source.sample();
     std::thread::sleep(ONCE);
     let view = View::new(&source, &before, &source.sample());
-    crate::print_text(&if arguments.json { serde_json::to_string_pretty(&view)? } else { cells::page(&view) })
+    crate::output::print_text(&if arguments.json {
+        serde_json::to_string_pretty(&view)?
+    } else {
+        cells::page(&view)
+    })
 }
 
 /// Shows the run until the user leaves.

@@ -61,7 +61,7 @@ pub fn validate(arguments: &ValidateArguments) -> Result<bool> {
     let errors = errors(&vehicles, &flights, arguments.keep.as_deref(), &mut tell)?;
     let text =
         if arguments.json { serde_json::to_string_pretty(&errors.json())? } else { errors.to_string() };
-    crate::print_text(&text)?;
+    crate::output::print_text(&text)?;
     Ok(true)
 }
 

@@ -19,7 +19,8 @@ mod scene;
 mod space;
 mod thin;
 
-use crate::{files, open_recording, print_text};
+use crate::files::{self, open_recording};
+use crate::output::print_text;
 use anyhow::{Context, Result, bail};
 use choice::Choice;
 use clap::{Args, ValueEnum};

@@ -1,0 +1,18 @@
+//! Standard output.
+
+use anyhow::{Context, Result};
+
+/// Prints to standard output.
+pub fn print_text(text: &str) -> Result<()> {
+    use std::io::Write as _;
+    writeln!(std::io::stdout(), "{}", text.trim_end()).or_else(|error| gone_or_failed(error).map(|_| ()))
+}
+
+/// A reader that has gone away (`| head`) is no error; a full disk is one.
+pub fn gone_or_failed(error: std::io::Error) -> Result<bool> {
+    if error.kind() == std::io::ErrorKind::BrokenPipe {
+        Ok(true)
+    } else {
+        Err(error).context("cannot write to standard output")
+    }
+}
