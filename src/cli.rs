@@ -3,7 +3,7 @@
 use crate::files::open_recording;
 use crate::graph::Graph;
 use crate::manifest::Manifest;
-use crate::output::{gone_or_failed, print_text};
+use crate::output::{gone_or_failed, print_text, say};
 use crate::profile::Files;
 use crate::run::RunArguments;
 use crate::{clean, ctl, describe, identify, kinds, plot, run, shadow, top, validate};
@@ -164,7 +164,7 @@ pub fn main() -> ExitCode {
         Ok(true) => ExitCode::SUCCESS,
         Ok(false) => ExitCode::FAILURE,
         Err(error) => {
-            eprintln!("error: {}", words(&error));
+            say(&format!("error: {}", words(&error)));
             ExitCode::from(2)
         }
     }

@@ -1,7 +1,7 @@
 //! What `check` and `schema` print.
 
 use crate::graph::Graph;
-use crate::program::{Executable, OnExit, Program, Successor};
+use crate::program::{Executable, OnExit, Program, Readiness, Successor};
 use bus::plan::{Pace, Wait};
 use std::fmt::Write as _;
 
@@ -52,7 +52,16 @@ pub fn graph(graph: &Graph) -> String {
         text += &succession(graph, index);
     }
     for (name, program) in &graph.companions {
-        let _ = writeln!(text, "\n{name} ({}), takes no part in the ticks", what(program));
+        let ready = match program.ready {
+            Readiness::Started => "",
+            Readiness::Notify => "; tick 0 waits until it says that it is ready",
+        };
+        let end = match program.on_exit {
+            OnExit::Restart => "; if it ends with an error, it is started again",
+            OnExit::Ignore => "; if it ends with an error, the run goes on",
+            OnExit::Stop | OnExit::Standby => "; if it ends with an error, so does the run",
+        };
+        let _ = writeln!(text, "\n{name} ({}), takes no part in the ticks{ready}{end}", what(program));
     }
     text
 }
@@ -68,7 +77,7 @@ fn what(program: &Program) -> String {
 fn succession(graph: &Graph, node: usize) -> String {
     let mut text = match graph.programs[node].on_exit {
         OnExit::Restart => "  if it ends, it is started again\n".to_owned(),
-        OnExit::Stop | OnExit::Standby => String::new(),
+        OnExit::Stop | OnExit::Standby | OnExit::Ignore => String::new(),
     };
     let successors = graph.successors.iter().filter(|successor| successor.node == node);
     let lines = successors.map(|successor| {

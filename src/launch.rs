@@ -1,29 +1,34 @@
 //! Launching a run: starts its processes, supervises them, and takes everything down again.
-#![allow(clippy::disallowed_methods, reason = "the launcher watches host time; it simulates nothing")]
 
+use crate::companions::Companions;
 use crate::ctl::desk::Desk;
 use crate::ctl::protocol::{Answer, Request};
 use crate::ctl::server::Reply;
+use crate::descendants::Descendants;
 use crate::graph::{Graph, successor_of};
 use crate::manifest::Manifest;
 use crate::processes::{Processes, Role};
 use crate::profile::Flight;
-use crate::program::{OnExit, WATCHDOG};
+use crate::program::OnExit;
 use crate::progress::Progress;
 use crate::run_dir::RunDir;
-use crate::stall;
+use crate::stall::{self, Culprit};
 use crate::succession::{Report, Stage, Standing, Successions, take_over_stride};
 use crate::supervisor::{Action, Event, State};
+use crate::watch_clock::WatchClock;
 use anyhow::{Context, Result, anyhow};
 use bus::control::{Control, Phase};
 use bus::plan::{NodePlan, Plan};
 use std::path::Path;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, OnceLock};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 /// How long the supervisor sleeps at most between two looks at its processes.
 const POLL: Duration = Duration::from_millis(2);
+
+/// How often the lengths of the processes' logs are looked at.
+const LOG_PERIOD: Duration = Duration::from_secs(1);
 
 /// Ticks that a successor shadows where a request does not say.
 const SHADOW_TICKS: u32 = 100;
@@ -60,11 +65,16 @@ pub fn fly(manifest: &Manifest, graph: &mut Graph, recording: &Path, quiet: bool
     let graph = &*graph;
     let control = Control::create(&graph.plan)?;
     let (plan, dir) = (&graph.plan, run_dir.path());
-    let successions = Successions::new(plan, &control, dir, &graph.programs, &graph.successors);
+    let clock = WatchClock::new();
+    // Dropped behind the supervisor, which ends the processes.
+    let _descendants = Descendants::of_run(dir);
+    let successions = Successions::new(plan, &control, dir, &clock, &graph.programs, &graph.successors);
     let mut supervisor = Supervisor {
         plan,
         control: &control,
         processes: Processes::default(),
+        companions: Companions::new(dir, &clock),
+        clock: &clock,
         successions,
         state: State::Starting,
         desk: Desk::open(dir, plan, &control)?,
@@ -75,9 +85,11 @@ pub fn fly(manifest: &Manifest, graph: &mut Graph, recording: &Path, quiet: bool
         manifest,
         graph,
         progress: Progress::new(plan, quiet),
-        last_change: (0, Instant::now()),
+        last_change: (0, clock.now()),
+        logs_bounded: clock.now(),
+        run_dir: dir,
     };
-    supervisor.start(dir)?;
+    supervisor.start()?;
     supervisor.watch()?;
     supervisor.progress.finish(&control);
     let mut outcome = outcome(plan, &control, &supervisor.successions);
@@ -160,6 +172,8 @@ struct Supervisor<'a> {
     plan: &'a Plan,
     control: &'a Control,
     processes: Processes,
+    companions: Companions<'a>,
+    clock: &'a WatchClock,
     successions: Successions<'a>,
     state: State,
     desk: Desk<'a>,
@@ -170,8 +184,10 @@ struct Supervisor<'a> {
     interrupts: Arc<AtomicUsize>,
     seen_interrupts: usize,
     progress: Progress,
-    /// How far the run had come when it last came on, and when that was.
-    last_change: (u32, Instant),
+    /// How far the run had come when it last came on, and when that was on the watchdogs' clock.
+    last_change: (u32, Duration),
+    logs_bounded: Duration,
+    run_dir: &'a Path,
 }
 
 /// A process that ended, or was found to hang.
@@ -182,8 +198,8 @@ struct Death {
 }
 
 impl Supervisor<'_> {
-    fn start(&mut self, run_dir: &Path) -> Result<()> {
-        self.control.set_join_tick(self.successions.hold_tick());
+    fn start(&mut self) -> Result<()> {
+        self.control.set_join_tick(self.hold_tick());
         let graph = self.graph;
         let nodes = graph.programs.iter().zip(&graph.plan.nodes).enumerate();
         let nodes = nodes.map(|(node, (program, plan))| {
@@ -192,20 +208,29 @@ impl Supervisor<'_> {
         let mut all: Vec<_> = std::iter::once(("clock", Role::Clock, None)).chain(nodes).collect();
         shuffle(&mut all, self.manifest.content.run.start_order_seed);
         for (name, role, program) in all {
-            self.processes.start(name, role, program, run_dir)?;
+            self.processes.start(name, role, program, self.run_dir)?;
         }
         for (name, program) in &graph.companions {
-            self.processes.start(name, Role::Companion, Some(program), run_dir)?;
+            self.companions.start(name, program)?;
         }
         self.tell(Event::Started).map(|_| ())
+    }
+
+    /// The tick at which the clock must wait: for who joins, and for companions that are not ready.
+    fn hold_tick(&self) -> u32 {
+        if self.companions.all_ready() { self.successions.hold_tick() } else { 0 }
     }
 
     /// Watches until all processes have ended.
     fn watch(&mut self) -> Result<()> {
         while !self.state.is_over() {
             let news = self.control.news();
+            self.clock.look();
             self.processes.look()?;
+            self.companions.look()?;
+            self.bound_logs();
             self.settle_ends()?;
+            self.settle_companions()?;
             self.note_interrupts()?;
             self.note_progress()?;
             self.serve_requests();
@@ -216,15 +241,23 @@ impl Supervisor<'_> {
                 self.refuse(node, "the run had passed the tick at which it was to join".to_owned())?;
             }
             // Before it too: what is held now must stay held while somebody joins.
-            self.control.set_join_tick(self.successions.hold_tick());
+            self.control.set_join_tick(self.hold_tick());
             self.successions.advance(&mut self.processes)?;
-            self.control.set_join_tick(self.successions.hold_tick());
+            self.control.set_join_tick(self.hold_tick());
             self.note_laggards();
             self.note_stall()?;
             self.progress.show(self.control);
             self.control.await_news(news, POLL);
         }
         Ok(())
+    }
+
+    fn bound_logs(&mut self) {
+        if self.clock.since(self.logs_bounded) >= LOG_PERIOD {
+            self.logs_bounded = self.clock.now();
+            self.processes.bound_logs(self.run_dir);
+            self.companions.bound_logs();
+        }
     }
 
     /// Tells the state machine what happened; an abort is left to the caller, who knows the words.
@@ -359,9 +392,36 @@ impl Supervisor<'_> {
         Ok(())
     }
 
+    /// Draws the consequences of every companion that has failed.
+    fn settle_companions(&mut self) -> Result<()> {
+        while let Some(failure) = self.companions.next_failure() {
+            let event = Event::CompanionFailed { policy: failure.policy, is_possible: failure.is_possible };
+            match self.tell(event)? {
+                Action::Abort => {
+                    let why = match failure.policy {
+                        OnExit::Restart => ": it was restarted and ended again within a second",
+                        _ => "; with `on_exit = \"ignore\"` the run would go on without it",
+                    };
+                    let ticks = self.control.completed_ticks();
+                    return self
+                        .abort(format!("{}\nThe run was aborted at tick {ticks}{why}", failure.words));
+                }
+                Action::Restart => {
+                    self.progress.say(&format!("{}\n`{}` is restarted", failure.words, failure.name));
+                    self.companions.restart(failure.index)?;
+                }
+                _ => {
+                    self.progress.say(&format!("{}\nThe run goes on without it", failure.words));
+                    self.companions.forget(failure.index);
+                }
+            }
+        }
+        Ok(())
+    }
+
     fn has_done_its_part(&self, role: Role) -> bool {
         match role {
-            Role::Companion => true,
+            Role::Companion { .. } => true,
             Role::Clock => self.control.completed_ticks() >= self.control.end_tick(),
             Role::Node { node, generation } => {
                 let has_completed = self.control.has_completed(self.plan.member(node, generation));
@@ -395,6 +455,10 @@ impl Supervisor<'_> {
                 self.successions.note_end_of_former(node, generation);
                 Ok(true)
             }
+            Standing::Candidate if self.has_died_behind_the_end(node, generation) => {
+                self.say_died_behind_the_end(&death);
+                Ok(true)
+            }
             Standing::Candidate => {
                 if self.successions.stage(node) > Some(Stage::Starting)
                     && !self.successions.may_change(node, &self.processes)
@@ -413,6 +477,19 @@ impl Supervisor<'_> {
             }
             Standing::Active => self.settle_active(node, generation, &death),
         }
+    }
+
+    /// Whether a process had completed its last tick when it died, and need not be missed by its node's policy: all that
+    /// it had to send is sent, and there is nothing left that another could do in its place.
+    fn has_died_behind_the_end(&self, node: usize, generation: u32) -> bool {
+        self.control.phase() == Phase::Running
+            && self.successions.program(node).on_exit != OnExit::Stop
+            && self.control.has_completed(self.plan.member(node, generation))
+    }
+
+    fn say_died_behind_the_end(&self, death: &Death) {
+        self.progress
+            .say(&format!("{}\nIt had completed its last tick: the run ends without it", death.words));
     }
 
     fn refuse(&mut self, node: usize, reason: String) -> Result<()> {
@@ -441,6 +518,10 @@ impl Supervisor<'_> {
         self.note_gathered()?;
         let flies = self.control.phase() == Phase::Running;
         let on_exit = self.successions.program(node).on_exit;
+        if self.has_died_behind_the_end(node, generation) {
+            self.say_died_behind_the_end(death);
+            return Ok(true);
+        }
         if flies && on_exit != OnExit::Stop && !self.successions.may_replace(node, &self.processes) {
             return Ok(false);
         }
@@ -450,7 +531,7 @@ impl Supervisor<'_> {
         };
         let is_possible = flies
             && match policy {
-                OnExit::Stop => false,
+                OnExit::Stop | OnExit::Ignore => false,
                 OnExit::Restart => self.successions.has_come_on(node),
                 OnExit::Standby => self.successions.can_promote(node),
             };
@@ -474,7 +555,7 @@ impl Supervisor<'_> {
             }
             _ => {
                 let why = match policy {
-                    OnExit::Stop => "",
+                    OnExit::Stop | OnExit::Ignore => "",
                     _ if !flies => ": the run did not fly yet",
                     OnExit::Restart => {
                         ": it was restarted and came to its end again without completing a tick"
@@ -485,7 +566,7 @@ impl Supervisor<'_> {
                 self.abort(format!("{}\nThe run was aborted at tick {tick}{silent}{why}", death.words))?;
             }
         }
-        self.last_change.1 = Instant::now();
+        self.last_change.1 = self.clock.now();
         Ok(true)
     }
 
@@ -512,36 +593,53 @@ impl Supervisor<'_> {
         let ticks = self.control.completed_ticks();
         // A paused run stands still because it was told to.
         let is_paused = self.control.held_at().is_some_and(|held| self.control.hold_tick() <= held);
-        if ticks != self.last_change.0 || self.state.is_over() || is_paused {
-            self.last_change = (ticks, Instant::now());
+        // A companion that does not get ready has a watchdog of its own.
+        let is_waiting = self.control.held_at().is_some() && !self.companions.all_ready();
+        if ticks != self.last_change.0 || self.state.is_over() || is_paused || is_waiting {
+            self.last_change = (ticks, self.clock.now());
             return Ok(());
         }
         if let Some((node, generation, stage, since)) = self.successions.joining() {
             return self.note_late_joiner(node, generation, stage, since.max(self.last_change.1));
         }
-        let stood = self.last_change.1.elapsed();
+        let stood = self.clock.since(self.last_change.1);
         let culprit = stall::culprit(self.plan, self.control, &self.successions, &self.processes);
-        let patience = culprit
-            .map_or(WATCHDOG, |(node, generation)| self.successions.program_of(node, generation).watchdog);
-        if stood <= patience.max(2 * stall::deadline(self.plan, self.control)) {
+        if stood <= self.patience(culprit).max(2 * stall::deadline(self.plan, self.control)) {
             return Ok(());
         }
-        let words = stall::describe(self.control, self.plan, &self.successions, stood);
-        let Some((node, generation)) = culprit else {
+        let words = stall::describe(self.control, self.plan, &self.successions, culprit, stood);
+        let Some(culprit) = culprit else {
             self.tell(Event::Died { policy: OnExit::Stop, is_possible: false })?;
             return self.abort(format!("{words}; it was aborted"));
         };
-        self.last_change.1 = Instant::now();
-        self.processes.kill(node, generation, Some(format!("was killed by the watchdog: {words}")));
+        self.last_change.1 = self.clock.now();
+        self.processes.kill_role(culprit.role(), Some(format!("was killed by the watchdog: {words}")));
         Ok(())
     }
 
+    /// How long the run may stand still because of `culprit`: for the clock, and where nobody is to blame, as long as
+    /// for the node that may take longest.
+    fn patience(&self, culprit: Option<Culprit>) -> Duration {
+        match culprit {
+            Some(Culprit::Node(node, generation)) => self.successions.program_of(node, generation).watchdog,
+            Some(Culprit::Clock) | None => {
+                self.graph.programs.iter().map(|program| program.watchdog).max().unwrap_or_default()
+            }
+        }
+    }
+
     /// A process that does not join, or a member that does not make room for it.
-    fn note_late_joiner(&mut self, node: usize, generation: u32, stage: Stage, since: Instant) -> Result<()> {
+    fn note_late_joiner(
+        &mut self,
+        node: usize,
+        generation: u32,
+        stage: Stage,
+        since: Duration,
+    ) -> Result<()> {
         let disagreeing = self.successions.disagreeing(&self.processes);
         let late = disagreeing.filter(|_| stage != Stage::Joining).unwrap_or((node, generation));
         let patience = self.successions.program_of(late.0, late.1).watchdog;
-        if since.elapsed() > patience {
+        if self.clock.since(since) > patience {
             let what = if late == (node, generation) {
                 "did not join".to_owned()
             } else {

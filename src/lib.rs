@@ -3,7 +3,9 @@
 
 mod clean;
 pub mod cli;
+mod companions;
 mod ctl;
+mod descendants;
 mod describe;
 mod files;
 mod graph;
@@ -17,6 +19,7 @@ mod page;
 mod placement;
 mod plot;
 mod problem;
+mod process_log;
 mod processes;
 mod profile;
 mod program;
@@ -33,3 +36,4 @@ mod summary;
 mod supervisor;
 mod top;
 mod validate;
+mod watch_clock;

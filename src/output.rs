@@ -1,4 +1,4 @@
-//! Standard output.
+//! Standard output and standard error.
 
 use anyhow::{Context, Result};
 
@@ -15,4 +15,10 @@ pub fn gone_or_failed(error: std::io::Error) -> Result<bool> {
     } else {
         Err(error).context("cannot write to standard output")
     }
+}
+
+/// Says something on standard error. Where that is closed or full there is nobody to tell.
+pub fn say(text: &str) {
+    use std::io::Write as _;
+    let _ = writeln!(std::io::stderr(), "{text}");
 }

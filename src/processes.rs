@@ -1,20 +1,19 @@
 //! The processes of a run on the host: started, watched, and taken down.
-#![allow(clippy::disallowed_methods, reason = "the launcher watches host time; it simulates nothing")]
 
+use crate::process_log::{self, last_words};
 use crate::program::Program;
 use crate::spawn;
+use crate::watch_clock::WatchClock;
 use anyhow::{Context, Result};
 use bus::control::Control;
 use std::os::unix::process::ExitStatusExt;
 use std::path::{Path, PathBuf};
 use std::process::{Child, ExitStatus};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 /// How long processes have to leave by themselves after an abort.
 const GRACE: Duration = Duration::from_secs(2);
 const POLL: Duration = Duration::from_millis(2);
-/// Lines of a failed process's own words that are shown.
-const LOG_LINES: usize = 20;
 
 /// What a process is for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -29,7 +28,10 @@ pub enum Role {
         generation: u32,
     },
     /// A process that takes no part in the ticks.
-    Companion,
+    Companion {
+        /// Counts the processes of this companion.
+        generation: u32,
+    },
 }
 
 /// A process of a run.
@@ -54,42 +56,23 @@ pub struct Process {
 pub struct Processes {
     /// Those that were started and whose end is not settled.
     pub running: Vec<Process>,
-    companions: Vec<Child>,
 }
 
 impl Processes {
     /// Starts a process; the clock where there is no program.
     pub fn start(&mut self, name: &str, role: Role, program: Option<&Program>, run_dir: &Path) -> Result<()> {
-        let (child, log) = match program {
-            None => spawn::start_clock(run_dir)?,
-            Some(program) => spawn::start(run_dir, name, role, program)?,
-        };
-        let name = match role {
-            Role::Node { generation, .. } => bus::process::process_name(name, generation),
-            Role::Clock | Role::Companion => name.to_owned(),
-        };
-        if role == Role::Companion {
-            self.companions.push(child);
-        } else {
-            self.running.push(Process {
-                name,
-                role,
-                log,
-                child,
-                end: None,
-                is_settled: false,
-                verdict: None,
-            });
-        }
+        self.running.push(Process::start(name, role, program, run_dir, None)?);
         Ok(())
     }
 
     /// Looks which processes have ended.
     pub fn look(&mut self) -> Result<()> {
-        for process in self.running.iter_mut().filter(|process| process.end.is_none()) {
-            process.end = process.child.try_wait().context("cannot watch a process")?;
-        }
-        Ok(())
+        self.running.iter_mut().try_for_each(Process::look)
+    }
+
+    /// Keeps logs in the run directory from filling its file system.
+    pub fn bound_logs(&self, run_dir: &Path) {
+        self.running.iter().for_each(|process| process.bound_log(run_dir));
     }
 
     /// Whether every process has ended.
@@ -110,7 +93,12 @@ impl Processes {
 
     /// Kills the process of a node's generation and waits for its end.
     pub fn kill(&mut self, node: usize, generation: u32, verdict: Option<String>) {
-        if let Some(process) = self.of(node, generation) {
+        self.kill_role(Role::Node { node, generation }, verdict);
+    }
+
+    /// Kills the process of this role and waits for its end.
+    pub fn kill_role(&mut self, role: Role, verdict: Option<String>) {
+        if let Some(process) = self.running.iter_mut().find(|process| process.role == role) {
             process.kill();
             process.verdict = verdict;
         }
@@ -128,10 +116,11 @@ impl Processes {
     /// Aborts the run and gives the processes time to leave.
     pub fn take_down(&mut self, control: &Control) -> Result<()> {
         control.abort();
-        let start = Instant::now();
-        while !self.all_ended() && start.elapsed() < GRACE {
+        let clock = WatchClock::new();
+        while !self.all_ended() && clock.now() < GRACE {
             self.look()?;
             std::thread::sleep(POLL);
+            clock.look();
         }
         Ok(())
     }
@@ -140,16 +129,49 @@ impl Processes {
 impl Drop for Processes {
     fn drop(&mut self) {
         self.running.iter_mut().for_each(Process::kill);
-        for child in &mut self.companions {
-            kill(child);
-        }
     }
 }
 
 impl Process {
-    fn kill(&mut self) {
+    /// Starts a process; the clock where there is no program. `notify` is the socket on which a companion says that
+    /// it is ready.
+    pub fn start(
+        name: &str,
+        role: Role,
+        program: Option<&Program>,
+        run_dir: &Path,
+        notify: Option<&Path>,
+    ) -> Result<Self> {
+        let (child, log) = match program {
+            None => spawn::start_clock(run_dir)?,
+            Some(program) => spawn::start(run_dir, name, role, program, notify)?,
+        };
+        let name = match role {
+            Role::Node { generation, .. } => bus::process::process_name(name, generation),
+            Role::Clock | Role::Companion { .. } => name.to_owned(),
+        };
+        Ok(Self { name, role, log, child, end: None, is_settled: false, verdict: None })
+    }
+
+    /// Looks whether the process has ended.
+    pub fn look(&mut self) -> Result<()> {
+        if self.end.is_none() {
+            self.end = self.child.try_wait().context("cannot watch a process")?;
+        }
+        Ok(())
+    }
+
+    /// Kills the process and its group, and waits for its end.
+    pub fn kill(&mut self) {
         if self.end.is_none() {
             self.end = kill(&mut self.child);
+        }
+    }
+
+    /// Keeps a log in the run directory from filling its file system. A log that the manifest names is its user's.
+    pub fn bound_log(&self, run_dir: &Path) {
+        if self.log.starts_with(run_dir) {
+            process_log::bound(&self.log);
         }
     }
 
@@ -165,13 +187,7 @@ impl Process {
             },
             (None, None) => "is still running".to_owned(),
         };
-        let words = std::fs::read_to_string(&self.log).unwrap_or_default();
-        let lines: Vec<&str> = words.lines().collect();
-        // What a panic says stands in front of its backtrace.
-        let last = lines.len().saturating_sub(LOG_LINES);
-        let start = lines.iter().position(|line| line.contains("panicked at")).unwrap_or(last);
-        let words =
-            lines[start..].iter().take(LOG_LINES).map(|line| format!("\n  {line}")).collect::<String>();
+        let words: String = last_words(&self.log).iter().map(|line| format!("\n  {line}")).collect();
         format!("process `{}` {end}{words}", self.name)
     }
 }

@@ -32,6 +32,19 @@ pub enum OnExit {
     Restart,
     /// A process that shadows it from the start is promoted.
     Standby,
+    /// The run goes on without it: for companions, which send nothing.
+    Ignore,
+}
+
+/// When a companion counts as ready: tick 0 waits for it.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Readiness {
+    /// Once it was started.
+    #[default]
+    Started,
+    /// When it says so: it sends `READY=1` to the socket named by `NOTIFY_SOCKET`, as sd_notify(3) does.
+    Notify,
 }
 
 /// A process to start.
@@ -51,6 +64,8 @@ pub struct Program {
     pub on_exit: OnExit,
     /// How long the run may stand still because of it.
     pub watchdog: Duration,
+    /// When a companion counts as ready.
+    pub ready: Readiness,
     /// Where its standard output and error go; into the run directory where absent.
     pub log: Option<PathBuf>,
 }
@@ -66,6 +81,7 @@ impl Program {
             realtime_priority: None,
             on_exit: OnExit::Stop,
             watchdog: WATCHDOG,
+            ready: Readiness::Started,
             log: None,
         }
     }

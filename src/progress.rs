@@ -1,5 +1,6 @@
 //! The progress of a run on the terminal.
 
+use crate::output::say;
 use bus::control::{Control, monotonic_ns};
 use bus::plan::Plan;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
@@ -41,7 +42,7 @@ impl Progress {
 
     /// Says something that the user should know while the run goes on.
     pub fn say(&self, words: &str) {
-        self.bar.suspend(|| eprintln!("{words}"));
+        self.bar.suspend(|| say(words));
     }
 
     /// Draws the end and leaves the bar standing.
@@ -50,7 +51,7 @@ impl Progress {
         self.bar.abandon();
         if !self.bar.is_hidden() {
             // What is printed next starts on a line of its own.
-            eprintln!();
+            say("");
         }
     }
 }

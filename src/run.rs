@@ -40,6 +40,8 @@ pub fn run(
     files: Option<Files>,
     extra_shadow: Option<(&str, &str)>,
 ) -> Result<bool> {
+    // First, so that who stops the run early hears that it was stopped.
+    launch::count_interrupts()?;
     files.as_ref().map_or(Ok(()), Files::check)?;
     let mut manifest = Manifest::load(&arguments.manifest, &arguments.set)?;
     if let Some(pace) = arguments.pace {

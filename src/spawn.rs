@@ -11,6 +11,9 @@ use std::os::unix::process::CommandExt;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 
+/// The environment variable with the socket on which a companion says that it is ready (sd_notify(3)).
+const NOTIFY_VARIABLE: &str = "NOTIFY_SOCKET";
+
 /// The clock service.
 ///
 /// # Errors
@@ -18,6 +21,7 @@ use std::process::{Child, Command, Stdio};
 pub fn start_clock(run_dir: &Path) -> Result<(Child, PathBuf)> {
     let mut command = this_binary();
     command.args(["node", "clock"]);
+    bus::process::hold_stop_signals(&mut command);
     spawn(command, "clock", Role::Clock, run_dir, None)
 }
 
@@ -25,7 +29,13 @@ pub fn start_clock(run_dir: &Path) -> Result<(Child, PathBuf)> {
 ///
 /// # Errors
 /// If it cannot be started, or the niceness or priority that it asks for is not allowed.
-pub fn start(run_dir: &Path, name: &str, role: Role, program: &Program) -> Result<(Child, PathBuf)> {
+pub fn start(
+    run_dir: &Path,
+    name: &str,
+    role: Role,
+    program: &Program,
+    notify: Option<&Path>,
+) -> Result<(Child, PathBuf)> {
     let mut command = match &program.executable {
         Executable::Kind(kind) => {
             let mut command = this_binary();
@@ -45,9 +55,15 @@ pub fn start(run_dir: &Path, name: &str, role: Role, program: &Program) -> Resul
     match role {
         Role::Clock => {}
         Role::Node { generation, .. } => {
+            bus::process::hold_stop_signals(&mut command);
             command.env(NODE_VARIABLE, name).env(GENERATION_VARIABLE, generation.to_string());
         }
-        Role::Companion => bus::process::die_with_this_one(&mut command),
+        Role::Companion { .. } => {
+            // One that this launcher's own service manager listens on is not the companion's.
+            command.env_remove(NOTIFY_VARIABLE);
+            command.envs(notify.map(|socket| (NOTIFY_VARIABLE, socket)));
+            bus::process::die_with_this_one(&mut command);
+        }
     }
     let (mut child, log) = spawn(command, name, role, run_dir, program.log.as_deref())?;
     if let Err(error) = set_priority(&child, name, program) {
@@ -93,8 +109,8 @@ fn spawn(
 /// run directory, of which a successor has its own.
 fn open_log(name: &str, role: Role, run_dir: &Path, log: Option<&Path>) -> Result<(File, PathBuf)> {
     let generation = match role {
-        Role::Node { generation, .. } => generation,
-        Role::Clock | Role::Companion => 0,
+        Role::Node { generation, .. } | Role::Companion { generation } => generation,
+        Role::Clock => 0,
     };
     let number = if generation == 0 { String::new() } else { format!("#{generation}") };
     let path = match log {

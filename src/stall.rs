@@ -1,21 +1,61 @@
 //! A run that stands still: because of whom, and what the others wait for.
 
-use crate::processes::Processes;
+use crate::processes::{Processes, Role};
 use crate::succession::Successions;
 use bus::control::{Control, Phase, Seat};
 use bus::plan::{Pace, Plan};
 use std::time::Duration;
 
-/// The living process that has all it needs for its next tick and does not come on: node and generation.
+/// A living process because of which the run stands still.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Culprit {
+    /// The clock service.
+    Clock,
+    /// A node's index, and the generation of its process.
+    Node(usize, u32),
+}
+
+impl Culprit {
+    /// The role of the process.
+    pub fn role(self) -> Role {
+        match self {
+            Self::Clock => Role::Clock,
+            Self::Node(node, generation) => Role::Node { node, generation },
+        }
+    }
+}
+
+/// The living process that has all it needs and does not come on.
 pub fn culprit(
     plan: &Plan,
     control: &Control,
     successions: &Successions<'_>,
     processes: &Processes,
-) -> Option<(usize, u32)> {
-    if control.phase() != Phase::Running || control.held_at().is_some() {
-        return None;
+) -> Option<Culprit> {
+    match control.phase() {
+        Phase::Announcing => Some(not_ready(plan, control, successions, Phase::Connecting)),
+        Phase::Connecting => Some(not_ready(plan, control, successions, Phase::Running)),
+        Phase::Running if control.awaits_clock() => Some(Culprit::Clock),
+        Phase::Running if control.held_at().is_some() => None,
+        Phase::Running if control.completed_ticks() >= control.end_tick() => not_left(processes),
+        Phase::Running => not_computing(plan, control, successions, processes),
     }
+}
+
+/// The first whose time is over of those that have not joined; the clock where all have.
+fn not_ready(plan: &Plan, control: &Control, successions: &Successions<'_>, phase: Phase) -> Culprit {
+    let late = (0..plan.nodes.len()).filter(|&node| !control.is_ready(node, phase));
+    late.min_by_key(|&node| successions.program_of(node, 0).watchdog)
+        .map_or(Culprit::Clock, |node| Culprit::Node(node, 0))
+}
+
+/// The node that is furthest behind of those that have all they need.
+fn not_computing(
+    plan: &Plan,
+    control: &Control,
+    successions: &Successions<'_>,
+    processes: &Processes,
+) -> Option<Culprit> {
     let stuck = |&(node, generation): &(usize, u32)| {
         let member = plan.member(node, generation);
         control.seat(member) == Seat::Taken
@@ -23,7 +63,19 @@ pub fn culprit(
             && control.can_compute(plan, member, successions.inputs(node, generation))
     };
     let members = successions.members().filter(stuck);
-    members.min_by_key(|&(node, generation)| control.done(plan.member(node, generation)))
+    let slowest = members.min_by_key(|&(node, generation)| control.done(plan.member(node, generation)));
+    slowest.map(|(node, generation)| Culprit::Node(node, generation))
+}
+
+/// A process that has completed the run and has not ended: a node, or else the clock.
+fn not_left(processes: &Processes) -> Option<Culprit> {
+    let left = processes.running.iter().filter(|process| process.end.is_none());
+    let culprits = left.filter_map(|process| match process.role {
+        Role::Node { node, generation } => Some(Culprit::Node(node, generation)),
+        Role::Clock => Some(Culprit::Clock),
+        Role::Companion { .. } => None,
+    });
+    culprits.max_by_key(|culprit| matches!(culprit, Culprit::Node(..)))
 }
 
 /// Host time in which a paced run must come forward: that of the slowest node's period.
@@ -38,15 +90,30 @@ pub fn deadline(plan: &Plan, control: &Control) -> Duration {
 }
 
 /// Who has not come as far as the others, and what it waits for.
-pub fn describe(control: &Control, plan: &Plan, successions: &Successions<'_>, stood: Duration) -> String {
+pub fn describe(
+    control: &Control,
+    plan: &Plan,
+    successions: &Successions<'_>,
+    culprit: Option<Culprit>,
+    stood: Duration,
+) -> String {
     let names = |phase| {
         let late = plan.nodes.iter().enumerate().filter(|(index, _)| !control.is_ready(*index, phase));
         late.map(|(_, node)| format!("`{}`", node.name)).collect::<Vec<_>>().join(", ")
     };
-    let waiting = match control.phase() {
-        Phase::Announcing => format!("waiting for {} to join", names(Phase::Connecting)),
-        Phase::Connecting => format!("waiting for {} to connect", names(Phase::Running)),
-        Phase::Running => describe_stuck(control, plan, successions),
+    let waiting = match (control.phase(), culprit) {
+        (Phase::Announcing | Phase::Connecting, Some(Culprit::Clock)) => {
+            "every node has joined, and `clock` does not let them begin".to_owned()
+        }
+        (Phase::Announcing, _) => format!("waiting for {} to join", names(Phase::Connecting)),
+        (Phase::Connecting, _) => format!("waiting for {} to connect", names(Phase::Running)),
+        (Phase::Running, _) if control.completed_ticks() >= control.end_tick() => {
+            "every tick is completed, and it does not end".to_owned()
+        }
+        (Phase::Running, Some(Culprit::Clock)) => {
+            format!("tick {} is not granted by `clock`", control.granted_ticks())
+        }
+        (Phase::Running, _) => describe_stuck(control, plan, successions),
     };
     format!("the run stood still for {:.1} s: {waiting}", stood.as_secs_f64())
 }

@@ -6,6 +6,7 @@
 
 use crate::processes::{Processes, Role};
 use crate::program::{OnExit, Program, Successor};
+use crate::watch_clock::WatchClock;
 use anyhow::Result;
 use bus::control::{Control, HandOver, Phase, Seat};
 use bus::plan::{InputPlan, OutputPlan, Plan, SEATS};
@@ -13,7 +14,7 @@ use bus::roster::{Incumbent, Roster};
 use serde::Serialize;
 use std::collections::VecDeque;
 use std::path::Path;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 /// Why a process joins a run that flies.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
@@ -70,10 +71,11 @@ struct Candidate {
     pending: Pending,
     generation: u32,
     stage: Stage,
-    /// When its process was started, and when the present stage began.
-    started: Instant,
-    stage_began: Instant,
-    /// Since when the run waits for it.
+    /// When its process was started, and when the present stage began, on the clock of the watchdogs.
+    started: Duration,
+    stage_began: Duration,
+    /// Host time at which its process was started, and since when the run waits for it: for the report.
+    spawned: Instant,
     held_since: Option<Instant>,
     /// The generation that it has succeeded.
     former: Option<u32>,
@@ -129,6 +131,7 @@ pub struct Successions<'a> {
     plan: &'a Plan,
     control: &'a Control,
     run_dir: &'a Path,
+    clock: &'a WatchClock,
     roster: Roster,
     seats: Vec<Seats>,
     pending: VecDeque<Pending>,
@@ -153,6 +156,7 @@ impl<'a> Successions<'a> {
         plan: &'a Plan,
         control: &'a Control,
         run_dir: &'a Path,
+        clock: &'a WatchClock,
         programs: &[Program],
         successors: &[Successor],
     ) -> Self {
@@ -176,7 +180,7 @@ impl<'a> Successions<'a> {
         });
         let (seats, pending) = (seats.collect(), pending.collect());
         let roster = Roster::first(plan);
-        Self { plan, control, run_dir, roster, seats, pending, reports: Vec::new() }
+        Self { plan, control, run_dir, clock, roster, seats, pending, reports: Vec::new() }
     }
 
     /// Has `successor` join and take over after `shadow_ticks`: at `at_tick`, or as soon as its process is
@@ -275,7 +279,7 @@ impl<'a> Successions<'a> {
 
     /// The candidate on which the run waits, because it has not joined yet: node, generation, stage and when that
     /// began. One that is early for its tick, or prepares while the run flies, keeps nobody waiting.
-    pub fn joining(&self) -> Option<(usize, u32, Stage, Instant)> {
+    pub fn joining(&self) -> Option<(usize, u32, Stage, Duration)> {
         let candidates = self.seats.iter().enumerate();
         let awaited = candidates.filter_map(|(node, seats)| {
             let candidate = seats.candidate.as_ref()?;
@@ -390,7 +394,7 @@ impl<'a> Successions<'a> {
             refused: None,
             inputs: pending.successor.plan.inputs.clone(),
         };
-        let now = Instant::now();
+        let spawned = Instant::now();
         let role = Role::Node { node, generation };
         let started = processes.start(&name, role, Some(&pending.successor.program), self.run_dir);
         if let Err(error) = started {
@@ -405,8 +409,9 @@ impl<'a> Successions<'a> {
             pending,
             generation,
             stage: Stage::Starting,
-            started: now,
-            stage_began: now,
+            started: self.clock.now(),
+            stage_began: self.clock.now(),
+            spawned,
             held_since: None,
             former: None,
             report,
@@ -441,7 +446,7 @@ impl<'a> Successions<'a> {
             Stage::Retiring => self.close(node, processes),
         }
         if let Some(candidate) = &mut self.seats[node].candidate {
-            candidate.stage_began = Instant::now();
+            candidate.stage_began = self.clock.now();
         }
         Ok(true)
     }
@@ -467,7 +472,7 @@ impl<'a> Successions<'a> {
         self.seats.iter().enumerate().find_map(|(node, seats)| {
             let candidate =
                 seats.candidate.as_ref().filter(|candidate| candidate.stage == Stage::Starting)?;
-            let is_late = candidate.started.elapsed() > candidate.pending.successor.program.watchdog;
+            let is_late = self.clock.since(candidate.started) > candidate.pending.successor.program.watchdog;
             let is_up = self.control.phase() != Phase::Running || self.is_prepared(candidate);
             (is_late && !is_up).then_some((node, candidate.generation))
         })
@@ -479,7 +484,7 @@ impl<'a> Successions<'a> {
             let candidate =
                 seats.candidate.as_ref().filter(|candidate| candidate.stage == Stage::Retiring)?;
             let former = candidate.former.filter(|&former| processes.lives(node, former))?;
-            let is_late = candidate.stage_began.elapsed() > seats.program.watchdog;
+            let is_late = self.clock.since(candidate.stage_began) > seats.program.watchdog;
             (is_late && self.is_read(candidate)).then_some((node, former))
         })
     }
@@ -505,7 +510,7 @@ impl<'a> Successions<'a> {
         let (is_prepared, is_awaited) = (self.is_prepared(candidate), self.is_at_join(candidate));
         let Some(candidate) = &mut self.seats[node].candidate else { return };
         if is_prepared && candidate.report.start_ms == 0.0 {
-            candidate.report.start_ms = milliseconds(candidate.started);
+            candidate.report.start_ms = milliseconds(candidate.spawned);
         }
         if is_awaited {
             candidate.held_since.get_or_insert_with(Instant::now);

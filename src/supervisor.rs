@@ -43,6 +43,13 @@ pub enum Event {
     },
     /// A successor failed before it took over.
     SuccessorFailed,
+    /// A companion ended with an error, was killed, or did not get ready.
+    CompanionFailed {
+        /// What its manifest says.
+        policy: OnExit,
+        /// Whether a restart leads somewhere.
+        is_possible: bool,
+    },
     /// Every process has ended.
     AllEnded,
 }
@@ -89,6 +96,9 @@ impl State {
             }
             (_, Event::Died { .. }) => (Failed, Abort),
             (_, Event::SuccessorFailed) => (self, Refuse),
+            (_, Event::CompanionFailed { policy: OnExit::Restart, is_possible: true }) => (self, Restart),
+            (_, Event::CompanionFailed { policy: OnExit::Ignore, .. }) => (self, Nothing),
+            (_, Event::CompanionFailed { .. }) => (Failed, Abort),
             (Starting | Gathering | Running | Draining, Event::AllEnded) => (Stopped, Nothing),
             (Gathering | Running | Draining, Event::Started)
             | (Starting | Running | Draining, Event::Gathered)
@@ -111,9 +121,11 @@ mod tests {
         [State::Starting, State::Gathering, State::Running, State::Draining, State::Stopped, State::Failed];
 
     fn events() -> Vec<Event> {
-        let died = [OnExit::Stop, OnExit::Restart, OnExit::Standby]
+        let ends = [OnExit::Stop, OnExit::Restart, OnExit::Standby, OnExit::Ignore]
             .into_iter()
-            .flat_map(|policy| [false, true].map(|is_possible| Event::Died { policy, is_possible }));
+            .flat_map(|policy| [false, true].map(|is_possible| (policy, is_possible)));
+        let died = ends.clone().map(|(policy, is_possible)| Event::Died { policy, is_possible });
+        let companions = ends.map(|(policy, is_possible)| Event::CompanionFailed { policy, is_possible });
         let others = [
             Event::Started,
             Event::Gathered,
@@ -123,7 +135,7 @@ mod tests {
             Event::SuccessorFailed,
             Event::AllEnded,
         ];
-        died.chain(others).collect()
+        died.chain(companions).chain(others).collect()
     }
 
     fn all() -> impl Iterator<Item = (State, Event, State, Action)> {
@@ -165,6 +177,21 @@ mod tests {
                 _ if state.is_over() => Action::Nothing,
                 OnExit::Restart if flies && is_possible => Action::Restart,
                 OnExit::Standby if flies && is_possible => Action::Promote,
+                _ => Action::Abort,
+            };
+            assert_eq!(action, expected, "{state:?} {event:?}");
+            assert_eq!(next == state, action != Action::Abort, "{state:?} {event:?}");
+        }
+    }
+
+    #[test]
+    fn a_companion_that_fails_ends_the_run_unless_its_manifest_says_otherwise() {
+        for (state, event, next, action) in all() {
+            let Event::CompanionFailed { policy, is_possible } = event else { continue };
+            let expected = match policy {
+                _ if state.is_over() => Action::Nothing,
+                OnExit::Ignore => Action::Nothing,
+                OnExit::Restart if is_possible => Action::Restart,
                 _ => Action::Abort,
             };
             assert_eq!(action, expected, "{state:?} {event:?}");

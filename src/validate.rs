@@ -55,7 +55,7 @@ pub fn validate(arguments: &ValidateArguments) -> Result<bool> {
     let flights = FlightSet::load(file)?;
     let mut tell = |line: &str| {
         if !arguments.json {
-            eprintln!("{line}");
+            crate::output::say(line);
         }
     };
     let errors = errors(&vehicles, &flights, arguments.keep.as_deref(), &mut tell)?;

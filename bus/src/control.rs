@@ -564,6 +564,17 @@ impl Control {
         Some(self.word(1, 3).load(SeqCst)).filter(|&tick| tick != NOT_HELD)
     }
 
+    /// Whether the clock has to act next: every tick that it granted is completed, and no hold keeps it from granting
+    /// more, or it is still in a hold that was lifted.
+    #[must_use]
+    pub fn awaits_clock(&self) -> bool {
+        let granted = self.granted_ticks();
+        match self.held_at() {
+            Some(tick) => self.boundary() > tick,
+            None => granted < self.end_tick() && self.computing().all(|member| self.done(member) >= granted),
+        }
+    }
+
     /// Waits in the hold at `tick` until it is lifted or the run is stopped.
     pub(crate) fn hold(&self, tick: u32, is_over: impl Fn() -> bool) {
         let is_lifted = || self.boundary() > tick || self.is_aborted() || is_over();

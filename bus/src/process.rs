@@ -35,8 +35,35 @@ static IS_TERMINATED: OnceLock<Arc<AtomicBool>> = OnceLock::new();
 /// once would take the recording's end with it.
 fn note_signals() {
     let flag = IS_TERMINATED.get_or_init(Arc::default);
-    for signal in [signal_hook::consts::SIGTERM, signal_hook::consts::SIGINT] {
+    for signal in STOP_SIGNALS {
         let _ = signal_hook::flag::register(signal, flag.clone());
+    }
+    mask_stop_signals(libc::SIG_UNBLOCK);
+}
+
+/// The signals that ask a process to end.
+const STOP_SIGNALS: [libc::c_int; 2] = [libc::SIGTERM, libc::SIGINT];
+
+/// Has SIGTERM and SIGINT wait until what `command` starts joins the run: before that it could not note them, and would
+/// die of a signal that is to stop the run in order.
+pub fn hold_stop_signals(command: &mut Command) {
+    let block = || {
+        mask_stop_signals(libc::SIG_BLOCK);
+        Ok(())
+    };
+    // SAFETY: between fork and exec the closure makes system calls only and touches no lock and no heap.
+    unsafe { command.pre_exec(block) };
+}
+
+fn mask_stop_signals(how: libc::c_int) {
+    // SAFETY: the set lives across the calls, is initialised by the first one, and the calls keep no reference to it.
+    unsafe {
+        let mut set: libc::sigset_t = std::mem::zeroed();
+        libc::sigemptyset(&raw mut set);
+        STOP_SIGNALS.iter().for_each(|&signal| {
+            libc::sigaddset(&raw mut set, signal);
+        });
+        libc::pthread_sigmask(how, &raw const set, std::ptr::null_mut());
     }
 }
 
@@ -52,7 +79,9 @@ fn die_with_parent() {
     let launcher = std::env::var(LAUNCHER_VARIABLE).ok().and_then(|pid| pid.parse::<i32>().ok());
     let parent = getppid().map(|pid| pid.as_raw_nonzero().get());
     if launcher.is_some() && launcher != parent {
-        eprintln!(
+        use std::io::Write as _;
+        let _ = writeln!(
+            io::stderr(),
             "this node is not a child of its launcher: either the launcher has died, or a shell stands between \
              them; start the node with `exec`"
         );

@@ -3,7 +3,7 @@
 use crate::kinds;
 use crate::manifest::{Manifest, Process};
 use crate::problem::{Problem, nearest};
-use crate::program::{Executable, OnExit, Program};
+use crate::program::{Executable, OnExit, Program, Readiness};
 use bus::GENERATION_VARIABLE;
 use bus::NODE_VARIABLE;
 use bus::plan::NodePlan;
@@ -31,7 +31,10 @@ pub struct Member<'m> {
 /// If there is none, or one cannot be started.
 pub fn members(manifest: &Manifest) -> Result<Vec<Member<'_>>, Problem> {
     let members = manifest.content.process.iter().filter(|(_, process)| takes_part(process));
-    let member = |(name, process)| Ok(Member { name, process, program: program(manifest, name, process)? });
+    let member = |(name, process)| {
+        require_no_companion(manifest, name, process)?;
+        Ok(Member { name, process, program: program(manifest, name, process)? })
+    };
     let members = members.map(member).collect::<Result<Vec<_>, _>>()?;
     if members.is_empty() {
         return Err(Problem::in_file(&manifest.path, "there is no process", "add [process.<name>] tables"));
@@ -47,6 +50,7 @@ pub fn companions(manifest: &Manifest) -> Result<Vec<(String, Program)>, Problem
     let companions = manifest.content.process.iter().filter(|(_, process)| !takes_part(process));
     let companion = |(name, process): (&Spanned<String>, &Process)| {
         require_no_node(manifest, name, process)?;
+        require_no_standby(manifest, name, process)?;
         Ok((name.get_ref().clone(), program(manifest, name, process)?))
     };
     companions.map(companion).collect()
@@ -68,8 +72,6 @@ fn require_no_node(manifest: &Manifest, name: &Spanned<String>, process: &Proces
         ("period_ticks", process.period_ticks.as_ref().map(Spanned::span)),
         ("cpu", process.cpu.as_ref().map(Spanned::span)),
         ("wait", process.wait.map(|_| name.span())),
-        ("on_exit", process.on_exit.as_ref().map(Spanned::span)),
-        ("watchdog_ms_host", process.watchdog_ms_host.as_ref().map(Spanned::span)),
         ("parameters", first_key(process.parameters.keys().next())),
         ("inputs", first_key(process.inputs.keys().next())),
         ("outputs", first_key(process.outputs.keys().next())),
@@ -80,6 +82,43 @@ fn require_no_node(manifest: &Manifest, name: &Spanned<String>, process: &Proces
             &span,
             format!("`{key}` of `{}`, which has lockstep = false", name.get_ref()),
             "a companion is a `command` that takes no part in the ticks; leave the key or `lockstep` out",
+        )),
+    }
+}
+
+/// A companion keeps no state of the run that a standby could go on from.
+fn require_no_standby(manifest: &Manifest, name: &Spanned<String>, process: &Process) -> Result<(), Problem> {
+    match process.on_exit.as_ref().filter(|on_exit| *on_exit.get_ref() == OnExit::Standby) {
+        None => Ok(()),
+        Some(on_exit) => Err(manifest.problem(
+            &on_exit.span(),
+            format!(
+                "`on_exit` of `{}`, which has lockstep = false: nothing can stand by for it",
+                name.get_ref()
+            ),
+            "stop (the default), restart or ignore",
+        )),
+    }
+}
+
+/// What only a companion may say.
+fn require_no_companion(
+    manifest: &Manifest,
+    name: &Spanned<String>,
+    process: &Process,
+) -> Result<(), Problem> {
+    if let Some(ready) = &process.ready {
+        let message = format!("`ready` of `{}`, which takes part in the ticks", name.get_ref());
+        let help =
+            "leave it out: a node is ready when it has joined; companions (lockstep = false) may say so";
+        return Err(manifest.problem(&ready.span(), message, help));
+    }
+    match process.on_exit.as_ref().filter(|on_exit| *on_exit.get_ref() == OnExit::Ignore) {
+        None => Ok(()),
+        Some(on_exit) => Err(manifest.problem(
+            &on_exit.span(),
+            format!("`on_exit` of `{}`: no tick can be computed without a node", name.get_ref()),
+            "stop (the default), restart or standby; only companions (lockstep = false) can be ignored",
         )),
     }
 }
@@ -99,6 +138,7 @@ pub fn program(manifest: &Manifest, name: &Spanned<String>, process: &Process) -
         realtime_priority: within(manifest, "realtime_priority", process.realtime_priority.as_ref(), 1, 99)?,
         on_exit: process.on_exit.as_ref().map_or(OnExit::Stop, |on_exit| *on_exit.get_ref()),
         watchdog: watchdog(manifest, process)?,
+        ready: process.ready.as_ref().map_or(Readiness::Started, |ready| *ready.get_ref()),
         log: log(manifest, process)?,
         ..Program::of(executable(manifest, name, process)?)
     })

@@ -1,6 +1,6 @@
 //! What a manifest says, as types; places stay with the values that an error may name.
 
-use crate::program::OnExit;
+use crate::program::{OnExit, Readiness};
 use bus::plan::{Pace, Wait};
 use serde::de::value::MapAccessDeserializer;
 use serde::de::{self, Deserializer, MapAccess, Visitor};
@@ -103,6 +103,8 @@ pub struct Process {
     pub on_exit: Option<Spanned<OnExit>>,
     /// The process that stands by for it, whole.
     pub standby: Option<Spanned<Box<Process>>>,
+    /// When a companion counts as ready.
+    pub ready: Option<Spanned<Readiness>>,
     /// How long the run may stand still because of it, in milliseconds of host time.
     pub watchdog_ms_host: Option<Spanned<u64>>,
     /// Where its standard output and error go, relative to the manifest.

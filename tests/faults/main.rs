@@ -7,8 +7,13 @@
 //! - [`kill_points`]: seeded strikes over processes, ticks and signals, where the run is to stop
 //! - [`survival`]: the same where the process is restarted or has a standby
 //! - [`successors`]: successors that fail before they fly, and strikes at whoever else is there meanwhile
+//! - [`last_tick`]: processes that die behind their last tick
 //! - [`silence`]: processes that neither end nor go on
+//! - [`companions`]: companions that fail or are not ready
+//! - [`strays`]: what the nodes of a run started themselves
+//! - [`floods`]: too much output, and nowhere to write
 //! - [`slow`]: steps that take too long
+//! - [`early`]: runs that are stopped while they start
 //! - [`disk`]: a full disk under the recorder
 //! - [`intruders`]: a second clock, a second process of a node
 //! - [`users`]: another user of the machine
@@ -17,14 +22,19 @@
 
 mod bad_files;
 mod campaign;
+mod companions;
 mod disk;
 mod documentation;
+mod early;
 mod flight;
+mod floods;
 mod intruders;
 mod kill_points;
+mod last_tick;
 mod saboteur;
 mod silence;
 mod slow;
+mod strays;
 mod successors;
 #[allow(dead_code, reason = "shared with the tests of undisturbed runs, which use the rest")]
 #[path = "../runs/support.rs"]

@@ -44,6 +44,8 @@ pub enum Fault {
     Hang,
     NeverJoins,
     OtherLayout,
+    /// It dies when it has completed its last tick.
+    BehindTheEnd,
 }
 
 impl Fault {
@@ -52,7 +54,7 @@ impl Fault {
         [Self::Error, Self::Panic, Self::ExitWith3, Self::ExitWith0, Self::Unwritten];
 
     fn find(name: &str) -> Option<Self> {
-        let others = [Self::SlowStep, Self::Hang, Self::NeverJoins, Self::OtherLayout];
+        let others = [Self::SlowStep, Self::Hang, Self::NeverJoins, Self::OtherLayout, Self::BehindTheEnd];
         let mut all = Self::ENDING.into_iter().chain(others);
         all.find(|fault| format!("{fault:?}") == name)
     }
@@ -64,7 +66,9 @@ impl Fault {
             Self::ExitWith3 => std::process::exit(3),
             Self::ExitWith0 => std::process::exit(0),
             Self::Hang => hang(),
-            Self::Unwritten | Self::SlowStep | Self::NeverJoins | Self::OtherLayout => Ok(()),
+            Self::Unwritten | Self::SlowStep | Self::NeverJoins | Self::OtherLayout | Self::BehindTheEnd => {
+                Ok(())
+            }
         }
     }
 }
@@ -75,15 +79,25 @@ fn hang() -> ! {
     }
 }
 
+/// The words that start the saboteur.
+pub fn command() -> [String; 4] {
+    let executable = std::env::current_exe().unwrap().to_string_lossy().into_owned();
+    [
+        executable,
+        "saboteur::a_process_started_by_a_launcher_is_the_saboteur".to_owned(),
+        "--exact".to_owned(),
+        "--nocapture".to_owned(),
+    ]
+}
+
 /// The saboteur's part in a manifest.
 pub fn table() -> String {
-    let executable = std::env::current_exe().unwrap();
     format!(
         "[process.saboteur]\n\
-         command = [{executable:?}, \"saboteur::a_process_started_by_a_launcher_is_the_saboteur\", \"--exact\", \
-         \"--nocapture\"]\n\
+         command = {:?}\n\
          inputs.state = \"/plant/state\"\n\
-         outputs.report = {{ type = \"test_msgs/msg/Report\" }}\n\n"
+         outputs.report = {{ type = \"test_msgs/msg/Report\" }}\n\n",
+        command()
     )
 }
 
@@ -94,6 +108,7 @@ fn a_process_started_by_a_launcher_is_the_saboteur() {
         return;
     }
     match run() {
+        Ok(()) if fault() == Some(Fault::BehindTheEnd) => std::process::exit(3),
         Ok(()) | Err(BusError::Aborted) => std::process::exit(0),
         Err(error) => {
             eprintln!("error: {error}");
@@ -118,7 +133,9 @@ fn run() -> Result<(), BusError> {
     node.run(|tick| {
         if fault == Some(Fault::SlowStep) {
             std::thread::sleep(Duration::from_millis(3));
-        } else if let Some(fault) = fault.filter(|_| tick.number() == at_tick) {
+        } else if let Some(fault) =
+            fault.filter(|&fault| fault != Fault::BehindTheEnd && tick.number() == at_tick)
+        {
             return fault.strike();
         }
         let report = Report { altitude: tick.get(input).position.z, ..Report::default() };

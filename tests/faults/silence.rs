@@ -1,8 +1,11 @@
 //! Processes that neither end nor go on: the watchdog names them.
+#![allow(clippy::disallowed_methods, reason = "the launcher's watchdog counts host time")]
 
-use crate::flight::{Watched, manifest};
-use crate::support::{Ended, Place};
-use rustix::process::{Signal, kill_process};
+use crate::flight::{Reference, Watched, manifest};
+use crate::saboteur::{FAULT_VARIABLE, Fault};
+use crate::support::{Ended, Launch, Place};
+use rustix::process::{Pid, Signal, kill_process};
+use std::time::Duration;
 
 /// Flies, and stops `node` as `kill -STOP` does while the clock waits at `tick`.
 fn stop_at(place: &Place, node: &str, tick: u32) -> Ended {
@@ -21,7 +24,7 @@ fn a_stopped_process_is_named_with_its_tick_and_the_topic_that_others_wait_for()
     let ended = stop_at(&place, "imu", 1234).with_code(2);
     ended.says(&[
         "was killed by the watchdog",
-        "stood still for 20.0 s",
+        "stood still for 20.",
         "tick 1234 is not completed by `imu`",
     ]);
     ended.says(&["`ekf` waits for /imu/imu"]);
@@ -32,4 +35,74 @@ fn a_stopped_process_is_named_with_its_tick_and_the_topic_that_others_wait_for()
         "{:?}",
         tail.output.lines().last()
     );
+}
+
+/// The nodes of the flight.
+const NODES: [&str; 8] = ["controller", "ekf", "imu", "mocap", "pilot", "plant", "recorder", "saboteur"];
+/// Long enough for a process to start in on a machine that is busy.
+const WATCHDOG_MS: u64 = 5000;
+
+/// Starts the flight with this watchdog for every node, and a fault of the saboteur.
+fn start_watched<'a>(place: &'a Place, fault: Option<Fault>) -> Launch<'a> {
+    let path = place.write("flight.toml", manifest());
+    let settings = NODES.map(|node| format!("process.{node}.watchdog_ms_host={WATCHDOG_MS}"));
+    let recording = place.path("flight.mcap");
+    let mut words = vec!["run", &path, "--record", &recording];
+    settings.iter().for_each(|setting| words.extend(["--set", setting]));
+    let fault = fault.map(|fault| format!("{fault:?}"));
+    let variables: Vec<_> = fault.iter().map(|fault| (FAULT_VARIABLE, fault.as_str())).collect();
+    place.start_with(&words, &variables)
+}
+
+#[test]
+fn a_stopped_clock_is_named_and_no_node_is() {
+    let place = Place::new();
+    let launch = start_watched(&place, None);
+    let watched = Watched::attach(&place);
+    assert_eq!(watched.hold_at(700), 700);
+    kill_process(place.clock(), Signal::STOP).unwrap();
+    watched.control.set_hold_tick(u32::MAX);
+    let ended = launch.end().with_code(2);
+    ended.says(&["process `clock` was killed by the watchdog", "stood still for 5."]);
+    ended.says(&["tick 700 is not granted by `clock`"]);
+    NODES.iter().for_each(|node| assert!(!ended.error.contains(&format!("`{node}`")), "{ended}"));
+}
+
+#[test]
+fn a_clock_that_is_stopped_before_the_first_tick_is_named() {
+    let place = Place::new();
+    let launch = start_watched(&place, None);
+    kill_process(place.clock(), Signal::STOP).unwrap();
+    let ended = launch.end().with_code(2);
+    ended.says(&["process `clock` was killed by the watchdog"]);
+}
+
+#[test]
+fn a_process_that_does_not_join_is_named_after_its_own_watchdog() {
+    let place = Place::new();
+    let ended = start_watched(&place, Some(Fault::NeverJoins)).end().with_code(2);
+    ended.says(&["process `saboteur` was killed by the watchdog", "stood still for 5."]);
+    ended.says(&["waiting for `saboteur` to join"]);
+}
+
+/// Everything stands still for longer than any watchdog, as in a paused container or behind a closed lid.
+#[test]
+fn a_run_that_is_frozen_and_thawed_goes_on_as_if_nothing_had_been() {
+    let place = Place::new();
+    let launch = start_watched(&place, None);
+    let watched = Watched::attach(&place);
+    // In the midst of the flight, where every node has something to do.
+    watched.await_ticks(None, 500);
+    let launcher = Pid::from_raw(i32::try_from(launch.id()).unwrap()).unwrap();
+    let mut all: Vec<Pid> = place.processes().into_iter().map(|(process, _)| process).collect();
+    all.sort_by_key(|&process| process != launcher);
+    all.iter().for_each(|&process| kill_process(process, Signal::STOP).unwrap());
+    assert!(watched.control.completed_ticks() < 4000, "it was over before it was frozen");
+    std::thread::sleep(Duration::from_millis(2 * WATCHDOG_MS));
+    // The launcher first: it has looked before the others can come on.
+    kill_process(launcher, Signal::CONT).unwrap();
+    std::thread::sleep(Duration::from_millis(WATCHDOG_MS / 10));
+    all.iter().skip(1).for_each(|&process| kill_process(process, Signal::CONT).unwrap());
+    launch.end().with_code(0);
+    assert!(std::fs::read(place.path("flight.mcap")).unwrap() == Reference::fly().bytes(), "other bytes");
 }

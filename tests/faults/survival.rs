@@ -19,7 +19,7 @@ const STATEFUL: [&str; 3] = ["controller", "ekf", "imu"];
 const LAST_TICK: usize = 2200;
 const TICKS_BETWEEN: u32 = GUARD_TICKS + 100;
 /// Of the victim of a SIGSTOP: long enough for a process to start in on a machine that is busy.
-const WATCHDOG_MS_HOST: &str = "3000";
+const WATCHDOG_MS_HOST: &str = "5000";
 
 /// What is to follow the end of a process.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -1,0 +1,177 @@
+//! Companions: processes beside the ticks, such as a viewer. They are started with the run, may say when they are ready,
+//! and end with it; an end with an error has the consequences that the manifest names.
+
+use crate::processes::{Process, Role};
+use crate::program::{OnExit, Program, Readiness};
+use crate::watch_clock::WatchClock;
+use anyhow::{Context, Result};
+use std::os::unix::net::UnixDatagram;
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+/// How long a companion must have lived for a restart to lead somewhere.
+const LIFE_MIN: Duration = Duration::from_secs(1);
+/// The longest message of sd_notify(3) that is looked at.
+const MESSAGE_BYTES: usize = 4096;
+
+/// The companions of a run; dropping them kills those that still live.
+pub struct Companions<'a> {
+    all: Vec<Companion<'a>>,
+    run_dir: &'a Path,
+    clock: &'a WatchClock,
+}
+
+struct Companion<'a> {
+    program: &'a Program,
+    process: Process,
+    generation: u32,
+    /// Where it says that it is ready; `None` for one that need not.
+    socket: Option<(UnixDatagram, PathBuf)>,
+    is_ready: bool,
+    started: Duration,
+}
+
+/// A companion that ended with an error, was killed, or ended before it was ready.
+#[derive(Debug)]
+pub struct Failure {
+    /// Which.
+    pub index: usize,
+    /// Its name.
+    pub name: String,
+    /// What its manifest says.
+    pub policy: OnExit,
+    /// Whether a restart leads somewhere.
+    pub is_possible: bool,
+    /// How it ended, with its last words.
+    pub words: String,
+}
+
+impl<'a> Companions<'a> {
+    /// No companions yet.
+    pub fn new(run_dir: &'a Path, clock: &'a WatchClock) -> Self {
+        Self { all: Vec::new(), run_dir, clock }
+    }
+
+    /// Starts a companion.
+    ///
+    /// # Errors
+    /// If it cannot be started.
+    pub fn start(&mut self, name: &str, program: &'a Program) -> Result<()> {
+        let socket = match program.ready {
+            Readiness::Started => None,
+            Readiness::Notify => Some(open_socket(name, self.run_dir)?),
+        };
+        let notify = socket.as_ref().map(|(_, path)| path.as_path());
+        let process =
+            Process::start(name, Role::Companion { generation: 0 }, Some(program), self.run_dir, notify)?;
+        let (is_ready, started) = (socket.is_none(), self.clock.now());
+        self.all.push(Companion { program, process, generation: 0, socket, is_ready, started });
+        Ok(())
+    }
+
+    /// Hears who is ready and looks who has ended; kills those that do not get ready in their time.
+    ///
+    /// # Errors
+    /// If a process cannot be watched.
+    pub fn look(&mut self) -> Result<()> {
+        for companion in &mut self.all {
+            companion.hear();
+            companion.process.look()?;
+            let patience = companion.program.watchdog;
+            if !companion.is_ready
+                && companion.process.end.is_none()
+                && self.clock.since(companion.started) > patience
+            {
+                let milliseconds = patience.as_millis();
+                companion.process.kill();
+                companion.process.verdict = Some(format!(
+                    "was killed by the watchdog: it did not say within {milliseconds} ms that it is ready; \
+                     `ready = \"notify\"` waits for READY=1 on the socket NOTIFY_SOCKET, as `systemd-notify \
+                     --ready` sends it"
+                ));
+            }
+        }
+        Ok(())
+    }
+
+    /// Keeps logs in the run directory from filling its file system.
+    pub fn bound_logs(&self) {
+        self.all.iter().for_each(|companion| companion.process.bound_log(self.run_dir));
+    }
+
+    /// Whether all that the first tick waits for are ready.
+    pub fn all_ready(&self) -> bool {
+        self.all.iter().all(|companion| companion.is_ready || companion.generation > 0)
+    }
+
+    /// The next one that has failed and of which nobody has drawn the consequences; it counts as settled then.
+    pub fn next_failure(&mut self) -> Option<Failure> {
+        let has_failed = |companion: &Companion<'_>| !companion.process.is_settled && companion.has_failed();
+        let index = self.all.iter().position(has_failed)?;
+        let companion = &mut self.all[index];
+        companion.process.is_settled = true;
+        let lived = self.clock.since(companion.started);
+        Some(Failure {
+            index,
+            name: companion.process.name.clone(),
+            policy: companion.program.on_exit,
+            is_possible: companion.generation == 0 || lived >= LIFE_MIN,
+            words: companion.process.post_mortem(),
+        })
+    }
+
+    /// The run goes on without companion `index`: nobody waits for it.
+    pub fn forget(&mut self, index: usize) {
+        self.all[index].is_ready = true;
+    }
+
+    /// Starts companion `index` once more.
+    ///
+    /// # Errors
+    /// If it cannot be started.
+    pub fn restart(&mut self, index: usize) -> Result<()> {
+        let companion = &mut self.all[index];
+        companion.generation += 1;
+        companion.started = self.clock.now();
+        companion.is_ready = companion.socket.is_none();
+        companion.process = Process::start(
+            &companion.process.name,
+            Role::Companion { generation: companion.generation },
+            Some(companion.program),
+            self.run_dir,
+            companion.socket.as_ref().map(|(_, path)| path.as_path()),
+        )?;
+        Ok(())
+    }
+}
+
+impl Drop for Companions<'_> {
+    fn drop(&mut self) {
+        self.all.iter_mut().for_each(|companion| companion.process.kill());
+    }
+}
+
+impl Companion<'_> {
+    /// Reads what it said: lines of `NAME=VALUE`, of which one is `READY=1`.
+    fn hear(&mut self) {
+        let Some((socket, _)) = &self.socket else { return };
+        let mut message = [0; MESSAGE_BYTES];
+        while let Ok(length) = socket.recv(&mut message) {
+            self.is_ready |= message[..length].split(|&byte| byte == b'\n').any(|line| line == b"READY=1");
+        }
+    }
+
+    /// Whether it has ended in another way than one that has done its part.
+    fn has_failed(&self) -> bool {
+        self.process.end.is_some_and(|end| !end.success() || !self.is_ready) || self.process.verdict.is_some()
+    }
+}
+
+/// The socket on which companion `name` says that it is ready, and where it lies.
+fn open_socket(name: &str, run_dir: &Path) -> Result<(UnixDatagram, PathBuf)> {
+    let path = run_dir.join(format!("{}.notify", name.replace('/', ".")));
+    let socket = UnixDatagram::bind(&path)
+        .with_context(|| format!("process `{name}`: cannot open the socket {}", path.display()))?;
+    socket.set_nonblocking(true).context("cannot read a socket without waiting")?;
+    Ok((socket, path))
+}

@@ -1,0 +1,162 @@
+//! What a process writes: its log in the run directory, bounded, and its last words, bounded and safe to print.
+
+use rustix::fs::{FallocateFlags, fallocate};
+use std::fs::{File, OpenOptions};
+use std::io::{self, Read as _, Seek as _, SeekFrom};
+use std::path::Path;
+
+/// Bytes of a log in the run directory that may take up room: that folder is often memory.
+const KEPT_BYTES: u64 = 16 * 1024 * 1024;
+/// Bytes at the end of a log that are looked at: a panic's message stands in front of its backtrace.
+const TAIL_BYTES: u64 = 64 * 1024;
+/// Lines that are shown.
+const LINES: usize = 20;
+/// Characters of a line that are shown: a line without end fills neither memory nor terminal.
+const LINE_CHARS: usize = 200;
+
+/// What the standard library writes when a thread panics.
+const PANIC: &[u8] = b"panicked at";
+
+/// The last lines of the log at `path`, or those from the last panic's message on; none where it cannot be read.
+/// Whatever a terminal would obey is escaped, and so is what is not UTF-8.
+pub fn last_words(path: &Path) -> Vec<String> {
+    let (bytes, is_cut) = tail(path).unwrap_or_default();
+    // A blank line at the end says nothing, and the first line of a part is a part.
+    let mut lines: Vec<&[u8]> = bytes.trim_ascii_end().split(|&byte| byte == b'\n').collect();
+    if is_cut && lines.len() > 1 {
+        lines.remove(0);
+    }
+    if bytes.trim_ascii_end().is_empty() {
+        return Vec::new();
+    }
+    let is_panic = |line: &&[u8]| line.windows(PANIC.len()).any(|part| part == PANIC);
+    let start = lines.iter().rposition(|line| is_panic(&line)).unwrap_or(lines.len().saturating_sub(LINES));
+    lines[start..].iter().take(LINES).map(|line| printable(line)).collect()
+}
+
+/// Gives back the room of all but the end of the log at `path`. Its length stays as it is, so that whoever writes to it
+/// goes on behind its end; what is gone reads as zeros. A file system that cannot do this keeps it all.
+pub fn bound(path: &Path) {
+    let Ok(length) = path.metadata().map(|log| log.len()) else { return };
+    let Some(gone) = length.checked_sub(KEPT_BYTES).filter(|&gone| gone > KEPT_BYTES) else { return };
+    if let Ok(file) = OpenOptions::new().write(true).open(path) {
+        let _ = fallocate(&file, FallocateFlags::PUNCH_HOLE | FallocateFlags::KEEP_SIZE, 0, gone);
+    }
+}
+
+/// The last bytes of a file, and whether there are more in front of them.
+fn tail(path: &Path) -> io::Result<(Vec<u8>, bool)> {
+    let mut file = File::open(path)?;
+    // A log may be a device, whose end cannot be looked at.
+    if !file.metadata()?.is_file() {
+        return Ok((Vec::new(), false));
+    }
+    let start = file.metadata()?.len().saturating_sub(TAIL_BYTES);
+    file.seek(SeekFrom::Start(start))?;
+    let mut bytes = Vec::new();
+    file.take(TAIL_BYTES).read_to_end(&mut bytes)?;
+    Ok((bytes, start > 0))
+}
+
+/// `line` as text that a terminal prints and does not obey: control characters and bytes that are not UTF-8 are
+/// escaped as in a Rust string; the middle of a long line is left out.
+fn printable(line: &[u8]) -> String {
+    let mut text = String::new();
+    for chunk in line.utf8_chunks() {
+        chunk.valid().chars().for_each(|c| push_printable(&mut text, c));
+        chunk.invalid().iter().for_each(|byte| text.push_str(&format!("\\x{byte:02x}")));
+    }
+    shortened(&text)
+}
+
+fn push_printable(text: &mut String, c: char) {
+    match c {
+        '\t' => text.push(' '),
+        // The end of a line as other systems write it.
+        '\r' => {}
+        c if c.is_control() || is_format_control(c) => text.extend(c.escape_default()),
+        c => text.push(c),
+    }
+}
+
+/// Characters that change the direction or the place of the text around them (Unicode's Bidi_Control, and the
+/// zero-width ones).
+fn is_format_control(c: char) -> bool {
+    matches!(c, '\u{200b}'..='\u{200f}' | '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}' | '\u{feff}')
+}
+
+fn shortened(text: &str) -> String {
+    let count = text.chars().count();
+    if count <= LINE_CHARS {
+        return text.to_owned();
+    }
+    let (head, tail) = (LINE_CHARS * 3 / 4, LINE_CHARS / 4);
+    let start: String = text.chars().take(head).collect();
+    let end: String = text.chars().skip(count - tail).collect();
+    format!("{start} … {} characters left out … {end}", count - head - tail)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{KEPT_BYTES, LINE_CHARS, LINES, bound, last_words, printable};
+    use std::io::Write as _;
+
+    fn words_of(log: &[u8]) -> Vec<String> {
+        let mut file = tempfile::NamedTempFile::new().unwrap();
+        file.write_all(log).unwrap();
+        last_words(file.path())
+    }
+
+    #[test]
+    fn the_last_lines_are_shown_and_a_panic_from_its_message_on() {
+        let numbered: String = (0..100).map(|n| format!("line {n}\n")).collect();
+        let words = words_of(numbered.as_bytes());
+        assert_eq!(
+            (words.len(), words[0].as_str(), words[LINES - 1].as_str()),
+            (LINES, "line 80", "line 99")
+        );
+        let panic = format!("thread 'main' panicked at src/x.rs:1:1:\nthe propeller came off\n{numbered}");
+        assert_eq!(words_of(panic.as_bytes())[1], "the propeller came off");
+        assert!(words_of(b"").is_empty() && words_of(b"\n\n").is_empty());
+        assert!(last_words("/nowhere/log".as_ref()).is_empty());
+        assert!(last_words("/dev/zero".as_ref()).is_empty(), "a device has no end");
+    }
+
+    #[test]
+    fn a_line_without_end_is_cut() {
+        let words = words_of(&vec![b'x'; 5_000_000]);
+        assert_eq!(words.len(), 1);
+        assert!(words[0].chars().count() < LINE_CHARS + 50, "{}", words[0]);
+        assert!(words[0].contains("characters left out"));
+    }
+
+    #[test]
+    fn a_flood_is_read_from_its_end() {
+        let mut flood = b"panicked at the very start\n".repeat(1);
+        flood.extend(b"noise noise noise noise\n".repeat(100_000));
+        flood.extend(b"the last line\n");
+        let words = words_of(&flood);
+        assert_eq!((words.len(), words[LINES - 1].as_str()), (LINES, "the last line"));
+    }
+
+    #[test]
+    fn a_log_that_has_grown_long_keeps_its_end_and_takes_up_little() {
+        use std::os::unix::fs::MetadataExt as _;
+        let mut file = tempfile::NamedTempFile::new().unwrap();
+        let line = [&[b'x'; 1023][..], b"\n"].concat();
+        (0..4 * KEPT_BYTES / 1024).for_each(|_| file.write_all(&line).unwrap());
+        file.write_all(b"the last line\n").unwrap();
+        bound(file.path());
+        let log = file.as_file().metadata().unwrap();
+        assert!(log.blocks() * 512 < 2 * KEPT_BYTES && log.len() > 4 * KEPT_BYTES, "{log:?}");
+        assert_eq!(last_words(file.path()).last().unwrap(), "the last line");
+    }
+
+    #[test]
+    fn nothing_reaches_a_terminal_raw() {
+        assert_eq!(printable(b"\x1b]0;owned\x07\x1b[2J"), "\\u{1b}]0;owned\\u{7}\\u{1b}[2J");
+        assert_eq!(printable(b"caf\xc3\xa9 \xff\xfe\tend\r"), "café \\xff\\xfe end");
+        // CSI as one character of the upper control set, and a change of direction.
+        assert_eq!(printable("\u{9b}2J \u{202e}".as_bytes()), "\\u{9b}2J \\u{202e}");
+    }
+}

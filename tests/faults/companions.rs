@@ -1,0 +1,101 @@
+//! Companions that fail, that are not ready, and what follows by their manifest.
+
+use crate::flight::write_manifest;
+use crate::support::{Ended, Launch, Place, poll};
+
+/// Starts a flight of 0.5 s with a companion that runs `script`.
+fn start<'a>(place: &'a Place, script: &str, more: &str, settings: &[&str]) -> Launch<'a> {
+    let companion = format!(
+        "[process.viewer]\nlockstep = false\ncommand = [\"sh\", \"-c\", {script:?}]\nworking_directory = {:?}\n{more}\n",
+        place.path("")
+    );
+    let manifest = write_manifest(place, &companion);
+    let recording = place.path("flight.mcap");
+    let mut words = vec!["run", &manifest, "--record", &recording, "--set", "run.duration_s=0.5"];
+    settings.iter().for_each(|setting| words.extend(["--set", setting]));
+    place.start(&words)
+}
+
+fn fly(script: &str, more: &str, settings: &[&str]) -> Ended {
+    start(&Place::new(), script, more, settings).end()
+}
+
+/// Long enough for the companion to end in.
+const PACED: &str = "run.pace=\"realtime\"";
+/// A second is its shortest life under `restart`.
+const LONGER: &str = "run.duration_s=4";
+
+/// Says to whoever started it that it is ready, as systemd-notify does.
+const NOTIFY: &str = "python3 -c \"import os, socket; \
+    socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM).sendto(b'STATUS=up\\nREADY=1', os.environ['NOTIFY_SOCKET'])\"";
+
+#[test]
+fn a_companion_that_ends_with_an_error_ends_the_run() {
+    let ended = fly("echo no display >&2; exit 4", "", &[PACED]).with_code(2);
+    ended.says(&["process `viewer` ended with exit code 4", "no display", "The run was aborted at tick"]);
+    fly("kill -9 $$", "", &[PACED]).with_code(2).says(&["process `viewer` was killed by signal 9 (SIGKILL)"]);
+}
+
+#[test]
+fn a_companion_that_has_done_its_part_is_not_missed() {
+    let ended = fly("exit 0", "", &[PACED]).with_code(0);
+    assert!(ended.error.is_empty(), "{ended}");
+}
+
+#[test]
+fn a_companion_that_may_be_missing_is_named_and_the_run_goes_on() {
+    let ended = fly("exit 4", "on_exit = \"ignore\"", &[PACED]).with_code(0);
+    ended.says(&["process `viewer` ended with exit code 4", "The run goes on without it"]);
+}
+
+#[test]
+fn a_companion_is_restarted_unless_it_ends_again_at_once() {
+    let place = Place::new();
+    let once = "if [ -e started ]; then sleep 600; else touch started; exit 4; fi";
+    let ended = start(&place, once, "on_exit = \"restart\"", &[PACED]).end().with_code(0);
+    ended.says(&["process `viewer` ended with exit code 4", "`viewer` is restarted"]);
+    let ended = fly("exit 4", "on_exit = \"restart\"", &[PACED, LONGER]).with_code(2);
+    ended.says(&["`viewer` is restarted", "it was restarted and ended again within a second"]);
+}
+
+#[test]
+fn the_first_tick_waits_for_a_companion_that_says_when_it_is_ready() {
+    let place = Place::new();
+    let script = format!("while ! [ -e go ]; do sleep 0.02; done; {NOTIFY}; sleep 600");
+    let mut launch = start(&place, &script, "ready = \"notify\"", &[]);
+    launch.hold_at(0);
+    launch.release();
+    // Everybody has joined, and nobody computes.
+    for _ in 0..20 {
+        std::thread::sleep(std::time::Duration::from_millis(10));
+        launch.hold_at(0);
+        launch.release();
+    }
+    place.write("go", "");
+    launch.end().with_code(0);
+}
+
+#[test]
+fn a_companion_that_does_not_get_ready_is_named() {
+    let more = "ready = \"notify\"\nwatchdog_ms_host = 1500";
+    let ended = fly("sleep 600", more, &[]).with_code(2);
+    ended.says(&[
+        "process `viewer` was killed by the watchdog",
+        "did not say within 1500 ms that it is ready",
+    ]);
+    let ended = fly("exit 0", more, &[]).with_code(2);
+    ended.says(&["process `viewer` ended with exit code 0 before the run did"]);
+    // Whoever can be missing need not be ready.
+    let ended = fly("sleep 600", &format!("{more}\non_exit = \"ignore\""), &[]).with_code(0);
+    ended.says(&["did not say within 1500 ms that it is ready", "The run goes on without it"]);
+}
+
+#[test]
+fn a_companion_dies_with_all_that_it_started() {
+    let place = Place::new();
+    let script = "setsid sleep 600 & sleep 600";
+    let launch = start(&place, script, "", &[PACED]);
+    poll("no child of the companion", || (place.processes().len() >= 12).then_some(()));
+    // `end` requires that no process of the run is left.
+    launch.end().with_code(0);
+}

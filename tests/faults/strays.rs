@@ -1,0 +1,74 @@
+//! What the nodes of a run started themselves: it dies with the run, however it was detached.
+
+use crate::flight::write_manifest;
+use crate::saboteur;
+use crate::support::{Place, poll};
+use rustix::process::{Pid, Signal, kill_process, test_kill_process};
+
+/// A saboteur whose shell starts `detached` first, which writes its process number to a file.
+fn start_with_stray(place: &Place, detached: &str) -> (String, Pid) {
+    let words = saboteur::command().map(|word| format!("'{word}'")).join(" ");
+    let script = format!("{detached} exec {words}");
+    let tables = format!(
+        "[process.saboteur]\ncommand = [\"sh\", \"-c\", {script:?}]\nworking_directory = {:?}\n",
+        place.path("")
+    );
+    (write_manifest(place, &tables), rustix::process::getpid())
+}
+
+/// Flies with a node that detaches a process in this way, ends the run with `end`, and requires that it is gone.
+fn require_gone(detached: &str, signal: Option<Signal>, code: i32) {
+    let place = Place::new();
+    let (manifest, _) = start_with_stray(&place, detached);
+    let recording = place.path("flight.mcap");
+    let pace = if signal.is_some() { "run.pace=\"realtime\"" } else { "run.pace=\"free\"" };
+    let launch = place.start(&["run", &manifest, "--record", &recording, "--set", pace]);
+    let stray = poll("nothing was detached", || {
+        let text = std::fs::read_to_string(place.path("stray")).ok()?;
+        text.trim().parse().ok().and_then(Pid::from_raw)
+    });
+    if let Some(signal) = signal {
+        kill_process(place.process_of("saboteur"), signal).unwrap();
+    }
+    launch.end_among_others().with_code(code);
+    assert!(test_kill_process(stray).is_err(), "{stray:?} outlives its run: {detached}");
+}
+
+const SESSION: &str = "setsid sh -c 'echo $$ > stray; exec sleep 600' &";
+/// Its parent is gone at once, and so is its environment.
+const DAEMON: &str =
+    "env -i PATH=\"$PATH\" sh -c 'setsid sh -c \"echo \\$\\$ > stray; exec sleep 600\" & exit' &";
+const DEAF: &str = "setsid sh -c 'trap \"\" TERM; echo $$ > stray; while :; do sleep 0.1; done' &";
+
+#[test]
+fn what_a_node_started_ends_with_the_run() {
+    require_gone(SESSION, None, 0);
+    require_gone(DAEMON, None, 0);
+}
+
+#[test]
+fn what_a_node_started_ends_although_it_does_not_hear() {
+    require_gone(DEAF, None, 0);
+}
+
+#[test]
+fn what_a_node_started_ends_with_an_aborted_run() {
+    require_gone(SESSION, Some(Signal::KILL), 2);
+}
+
+#[test]
+fn what_the_launchers_own_parent_started_is_left_alone() {
+    let place = Place::new();
+    // A shell that becomes the launcher hands its children over to it.
+    let manifest = crate::support::repository("manifests/hover.toml");
+    let script = format!(
+        "sleep 600 & echo $! > stray; exec '{}' run '{manifest}' --record flight.mcap",
+        crate::support::HUMMINGBUS
+    );
+    let mut command = std::process::Command::new("sh");
+    command.args(["-c", &script]).current_dir(place.path(""));
+    place.launch(command).end_among_others().with_code(0);
+    let text = std::fs::read_to_string(place.path("stray")).unwrap();
+    let other = Pid::from_raw(text.trim().parse().unwrap()).unwrap();
+    kill_process(other, Signal::KILL).expect("it lives");
+}
