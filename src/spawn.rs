@@ -2,11 +2,11 @@
 
 use crate::processes::Role;
 use crate::program::{Executable, Program};
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, bail};
 use bus::process::{LAUNCHER_VARIABLE, RUN_VARIABLE};
 use bus::{GENERATION_VARIABLE, NODE_VARIABLE};
 use std::fs::{File, OpenOptions};
-use std::io;
+use std::io::{self, Read as _};
 use std::os::unix::process::CommandExt;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
@@ -43,6 +43,7 @@ pub fn start(
             command
         }
         Executable::Command(words) => {
+            require_program(name, Path::new(&words[0]))?;
             let mut command = Command::new(&words[0]);
             command.args(&words[1..]);
             command
@@ -72,6 +73,22 @@ pub fn start(
         return Err(error);
     }
     Ok((child, log))
+}
+
+/// Refuses a file that the kernel cannot execute. The C library would have a shell read it, whatever it is.
+fn require_program(name: &str, path: &Path) -> Result<()> {
+    let mut magic = Vec::new();
+    let read = File::open(path).and_then(|file| file.take(4).read_to_end(&mut magic));
+    // One that can be executed and not be read is left to the kernel.
+    if read.is_err() || magic == b"\x7fELF" || magic.starts_with(b"#!") {
+        return Ok(());
+    }
+    bail!(
+        "process `{name}`: cannot start {}: it is neither a program (ELF) nor a script that begins with #!; name its \
+         interpreter first, such as [\"python3\", \"{}\"]",
+        path.display(),
+        path.display()
+    )
 }
 
 /// This binary, also after the file that it was started from has been replaced by a newer one.

@@ -22,11 +22,7 @@ fn stop_at(place: &Place, node: &str, tick: u32) -> Ended {
 fn a_stopped_process_is_named_with_its_tick_and_the_topic_that_others_wait_for() {
     let place = Place::new();
     let ended = stop_at(&place, "imu", 1234).with_code(2);
-    ended.says(&[
-        "was killed by the watchdog",
-        "stood still for 20.",
-        "tick 1234 is not completed by `imu`",
-    ]);
+    ended.says(&["was killed by the watchdog", "stood still for 20.", "tick 1234 is not completed by `imu`"]);
     ended.says(&["`ekf` waits for /imu/imu"]);
     // The others were alive, so the recording is whole: it ends where the silence began.
     let tail = place.call(&["cat", &place.path("flight.mcap"), "--topic", "/imu/imu"]).with_code(0);

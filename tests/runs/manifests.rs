@@ -550,7 +550,9 @@ fn a_companion_that_would_be_a_node() {
         refused_with(&format!("\n[process.viewer]\nlockstep = false\ncommand = [\"sleep\"]\n{more}\n"))
     };
     with("inputs.§state = \"/plant/state\"").says(&["`inputs` of `viewer`, which has lockstep = false"]);
-    with("on_exit = §\"restart\"").says(&["`on_exit` of `viewer`"]);
+    with("on_exit = §\"standby\"").says(&["`on_exit` of `viewer`", "nothing can stand by for it"]);
+    refused("kind = \"imu\"", "kind = \"imu\"\non_exit = §\"ignore\"").says(&["`on_exit` of `imu`"]);
+    refused("kind = \"imu\"", "kind = \"imu\"\nready = §\"notify\"").says(&["`ready` of `imu`"]);
     with("period_ticks = §2").says(&["`period_ticks` of `viewer`", "takes no part in the ticks"]);
     refused("kind = \"imu\"", "lockstep = false\nkind = §\"imu\"").says(&["`kind` of `imu`"]);
 }
