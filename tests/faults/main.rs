@@ -10,6 +10,8 @@
 //! - [`silence`]: processes that neither end nor go on
 //! - [`slow`]: steps that take too long
 //! - [`disk`]: a full disk under the recorder
+//! - [`memory`]: a full /dev/shm, limits on the size of files
+//! - [`folders`]: folders for temporary files of every kind
 //! - [`intruders`]: a second clock, a second process of a node
 //! - [`users`]: another user of the machine
 //! - [`bad_files`]: corrupted manifests, truncated recordings
@@ -20,8 +22,10 @@ mod campaign;
 mod disk;
 mod documentation;
 mod flight;
+mod folders;
 mod intruders;
 mod kill_points;
+mod memory;
 mod saboteur;
 mod silence;
 mod slow;
