@@ -56,9 +56,14 @@ fn no_room(what: String, needed: u64, folder: &Path) -> BusError {
     BusError::NoRoom { what, needed, folder: folder.to_owned(), free: free_bytes(folder) }
 }
 
-/// Reserves the pages of every shared-memory file of run `run_id` that iceoryx2 has made; `what` is what they are for.
-pub(crate) fn reserve_all(run_id: &str, what: &str) -> Result<(), BusError> {
-    let (files, folder) = (files_of(run_id), Path::new(SHARED_MEMORY));
+/// Reserves the pages of the shared-memory files of run `run_id` that iceoryx2 has made and whose names `are_meant`;
+/// `what` is what they are for.
+pub(crate) fn reserve_files(
+    run_id: &str,
+    are_meant: impl Fn(&str) -> bool,
+    what: &str,
+) -> Result<(), BusError> {
+    let (files, folder) = (files_of(run_id, are_meant), Path::new(SHARED_MEMORY));
     for path in &files {
         let file = match open_to_reserve(path) {
             Err(error) if error.kind() == std::io::ErrorKind::NotFound => continue,
@@ -92,12 +97,13 @@ fn missing_bytes(files: &[PathBuf]) -> u64 {
     found.map(|found| found.len().next_multiple_of(4096).saturating_sub(found.blocks() * 512)).sum()
 }
 
-/// Every shared-memory file of run `run_id`.
-fn files_of(run_id: &str) -> Vec<PathBuf> {
+/// The shared-memory files of run `run_id` whose names `are_meant`.
+fn files_of(run_id: &str, are_meant: impl Fn(&str) -> bool) -> Vec<PathBuf> {
     let prefix = shm_prefix(run_id);
     let entries = std::fs::read_dir(SHARED_MEMORY).into_iter().flatten().flatten();
-    let own = entries.filter(|entry| entry.file_name().to_string_lossy().starts_with(&prefix));
-    own.map(|entry| entry.path()).collect()
+    let names = entries.map(|entry| entry.file_name().to_string_lossy().into_owned());
+    let meant = names.filter(|name| name.strip_prefix(&prefix).is_some_and(&are_meant));
+    meant.map(|name| Path::new(SHARED_MEMORY).join(name)).collect()
 }
 
 /// Requires that iceoryx2 finds the room for a port of a topic whose messages have `size` bytes.

@@ -21,6 +21,7 @@ use iceoryx2::service::port_factory::publish_subscribe::PortFactory;
 use iceoryx2_bb_elementary::package_version::PackageVersion;
 use iceoryx2_cal::hash::Hash as _;
 use iceoryx2_cal::hash::sha1::Sha1;
+use std::cell::RefCell;
 use std::os::unix::fs::{OpenOptionsExt as _, PermissionsExt as _};
 use std::path::Path;
 
@@ -56,6 +57,8 @@ pub(crate) struct Transport {
     node: Iceoryx2Node,
     node_name: String,
     run_id: String,
+    /// The numbers of the ports whose pages are not reserved yet.
+    new_ports: RefCell<Vec<String>>,
 }
 
 /// How a topic's queues are sized.
@@ -122,8 +125,8 @@ impl Transport {
             .signal_handling_mode(SignalHandlingMode::Disabled)
             .create::<Service>()
             .map_err(|error| fail(format!("{error:?}")))?;
-        room::reserve_all(run_id, &what)?;
-        Ok(Self { node, node_name: node_name.to_owned(), run_id: run_id.to_owned() })
+        let (node_name, run_id) = (node_name.to_owned(), run_id.to_owned());
+        Ok(Self { node, node_name, run_id, new_ports: RefCell::default() })
     }
 
     /// The service of a topic's samples from one generation of its publisher. Each generation has its own:
@@ -175,7 +178,7 @@ impl Transport {
                     format!("{error:?}"),
                 )
             })?;
-        room::reserve_all(&self.run_id, &what)?;
+        self.new_ports.borrow_mut().push(publisher.id().value().to_string());
         Ok(Sender { publisher, words: sample_words(size) })
     }
 
@@ -200,8 +203,23 @@ impl Transport {
                     format!("{error:?}"),
                 )
             })?;
-        room::reserve_all(&self.run_id, &what)?;
+        self.new_ports.borrow_mut().push(subscriber.id().value().to_string());
         Ok(Receiver { subscriber })
+    }
+
+    /// Reserves the pages of what was made for the ports since the last call: from then on, no sample can find that a
+    /// page cannot be had.
+    pub(crate) fn reserve(&self) -> Result<(), BusError> {
+        let ports = std::mem::take(&mut *self.new_ports.borrow_mut());
+        if ports.is_empty() {
+            return Ok(());
+        }
+        // A file is named by its ports; those of services have none.
+        let is_new = |name: &str| {
+            name.ends_with(".dynamic")
+                || name.split(['_', '.']).any(|part| ports.iter().any(|port| port == part))
+        };
+        room::reserve_files(&self.run_id, is_new, &format!("the samples of node `{}`", self.node_name))
     }
 }
 
@@ -228,7 +246,10 @@ fn make_node_counter(config: &Config, run_id: &str) -> std::io::Result<()> {
     let linked = written.and_then(|()| std::fs::hard_link(&draft, &path));
     std::fs::remove_file(&draft)?;
     match linked {
-        Err(error) if error.kind() == std::io::ErrorKind::AlreadyExists => Ok(()),
+        // Of this user, or another one has put it there.
+        Err(error) if error.kind() == std::io::ErrorKind::AlreadyExists => {
+            crate::own_file::open(&path, true).map(|_| ())
+        }
         other => other,
     }
 }
@@ -443,6 +464,8 @@ mod tests {
         let capacity = Capacity { queued_samples: 500, ..CAPACITY };
         let _sender = plant.publisher(TOPIC, 0, 1000, capacity).unwrap();
         let _receiver = imu.subscriber(TOPIC, 0, capacity).unwrap();
+        plant.reserve().unwrap();
+        imu.reserve().unwrap();
         let files = files(&run);
         for (name, data) in &files {
             assert!(
@@ -481,13 +504,15 @@ mod tests {
     #[test]
     fn a_file_that_another_user_put_in_the_way_is_named() {
         let run = Run::new();
-        let path = format!("/dev/shm/{}intruder", shm_prefix(&run.id));
-        std::fs::write(&path, "x").unwrap();
+        let plant = run.join("plant");
+        let _sender = plant.publisher(TOPIC, 0, SIZE, CAPACITY).unwrap();
+        let (name, _) = files(&run).into_iter().find(|(name, _)| name.ends_with(".data")).unwrap();
+        let path = format!("/dev/shm/{name}");
         if std::os::unix::fs::chown(&path, Some(65534), None).is_err() {
             println!("NOT SHOWN: only root can give a file to another user");
             return;
         }
-        let error = Transport::new(run.folder.path(), &run.id, "plant").unwrap_err().to_string();
+        let error = plant.reserve().unwrap_err().to_string();
         assert!(error.contains(&path) && error.contains("belongs to user 65534"), "{error}");
     }
 }
