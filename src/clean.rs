@@ -2,19 +2,24 @@
 //!
 //! Whatever is removed is claimed first: the claim is the lock of the run's entry, which a live launcher holds.
 //! A run registers before it creates anything else, so files without an entry belong to a dead run.
+//!
+//! What a process inherited proves nothing: another run may have been started by a process of the dead one. A process
+//! belongs to a dead run if it says so and holds a file of its directory open, as everything does that writes where
+//! the run had it write, and if no live launcher is above or below it.
 #![allow(clippy::disallowed_methods, reason = "waiting for a killed process takes host time")]
 
 use crate::run_dir::{
-    Entry, SHARED_MEMORY, entry_path, run_of_dir, run_of_shared_memory, shared_memory_of, try_claim,
+    Entry, SHARED_MEMORY, entry_path, folders, is_own_name, is_own_run_dir, is_run_dir_of, live_runs,
+    run_of_dir, run_of_shared_memory, shared_memory_of, try_claim,
 };
 use anyhow::Result;
+use bus::own_file;
 use bus::process::{RUN_VARIABLE, user_id};
 use indicatif::HumanBytes;
 use rustix::process::{Pid, PidfdFlags, Signal, pidfd_open, pidfd_send_signal};
 use serde::Serialize;
 use std::collections::{BTreeMap, BTreeSet};
 use std::ffi::OsStr;
-use std::fs::File;
 use std::os::unix::ffi::OsStrExt;
 use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
@@ -86,12 +91,11 @@ fn find_traces() -> Result<BTreeMap<String, Traces>> {
         let Some(run_id) = name_of(&path).and_then(run_of_shared_memory) else { continue };
         let traces = found.entry(run_id.to_owned()).or_default();
         if path == entry_path(run_id) {
-            let entry = File::open(&path).ok().and_then(|file| serde_json::from_reader(file).ok());
-            let run_dir = entry.map(|entry: Entry| entry.run_dir);
-            traces.run_dirs.extend(run_dir.filter(|run_dir| is_run_dir_of(run_dir, run_id)));
+            let entry = own_file::open(&path, false).ok().and_then(|file| Entry::read(run_id, &file));
+            traces.run_dirs.extend(entry.map(|entry| entry.run_dir));
         }
     }
-    for path in own_files(&std::env::temp_dir()) {
+    for path in folders().iter().flat_map(|folder| own_files(folder)) {
         if let Some(run_id) = name_of(&path).and_then(run_of_dir) {
             found.entry(run_id.to_owned()).or_default().run_dirs.insert(path);
         }
@@ -99,15 +103,11 @@ fn find_traces() -> Result<BTreeMap<String, Traces>> {
     for (process, run_dir) in processes_of_runs()? {
         if let Some(run_id) = name_of(&run_dir).and_then(run_of_dir).map(str::to_owned) {
             let traces = found.entry(run_id).or_default();
-            traces.run_dirs.insert(run_dir);
+            traces.run_dirs.extend(Some(run_dir).filter(|run_dir| run_dir.is_absolute()));
             traces.processes.push(process);
         }
     }
     Ok(found)
-}
-
-fn is_run_dir_of(path: &Path, run_id: &str) -> bool {
-    name_of(path).and_then(run_of_dir) == Some(run_id)
 }
 
 fn name_of(path: &Path) -> Option<&str> {
@@ -123,7 +123,7 @@ fn own_files(folder: &Path) -> Vec<PathBuf> {
 
 /// This user's processes that carry a run directory, except this one and those that see another /dev/shm.
 fn processes_of_runs() -> Result<Vec<(Pid, PathBuf)>> {
-    let own_mounts = mounts_of(Path::new("/proc/self"));
+    let (own_mounts, kin) = (mounts_of(Path::new("/proc/self")), Kin::of_live_launchers());
     let entries = std::fs::read_dir("/proc")?.flatten();
     let process = |entry: std::fs::DirEntry| {
         let id =
@@ -131,7 +131,8 @@ fn processes_of_runs() -> Result<Vec<(Pid, PathBuf)>> {
         let process = Pid::from_raw(id)?;
         let is_own = entry.metadata().is_ok_and(|file| file.uid() == user_id());
         (is_own && mounts_of(&entry.path()) == own_mounts).then_some(())?;
-        run_dir_of(process).map(|run_dir| (process, run_dir))
+        let run_dir = run_dir_of(process).filter(|_| !kin.has(process))?;
+        holds_file_of(process, &run_dir).then_some((process, run_dir))
     };
     Ok(entries.filter_map(process).collect())
 }
@@ -139,6 +140,49 @@ fn processes_of_runs() -> Result<Vec<(Pid, PathBuf)>> {
 /// What stands for the mounts that a process sees.
 fn mounts_of(process: &Path) -> Option<PathBuf> {
     std::fs::read_link(process.join("ns/mnt")).ok()
+}
+
+/// The live launchers, and the processes above them.
+struct Kin {
+    launchers: BTreeSet<i32>,
+    above: BTreeSet<i32>,
+}
+
+impl Kin {
+    fn of_live_launchers() -> Self {
+        let launchers: BTreeSet<i32> =
+            live_runs().iter().map(|run| run.entry.launcher.cast_signed()).collect();
+        Self { above: launchers.iter().copied().flat_map(ancestors).collect(), launchers }
+    }
+
+    /// Whether a process is a live launcher, or above or below one.
+    fn has(&self, process: Pid) -> bool {
+        let process = process.as_raw_nonzero().get();
+        self.above.contains(&process)
+            || std::iter::once(process).chain(ancestors(process)).any(|id| self.launchers.contains(&id))
+    }
+}
+
+/// The processes above a process, its parent first.
+fn ancestors(process: i32) -> impl Iterator<Item = i32> {
+    std::iter::successors(Some(process), |&process| parent_of(process)).skip(1)
+}
+
+fn parent_of(process: i32) -> Option<i32> {
+    let line = std::fs::read_to_string(format!("/proc/{process}/stat")).ok()?;
+    // The name in brackets may hold anything, brackets and spaces too.
+    let parent = line.rsplit_once(')')?.1.split_whitespace().nth(1)?.parse().ok()?;
+    Some(parent).filter(|&parent| parent > 1)
+}
+
+/// Whether a process holds a file of `run_dir` open, also one that is removed by now.
+fn holds_file_of(process: Pid, run_dir: &Path) -> bool {
+    // The kernel tells where a file lies without the links on the way there.
+    let resolved = run_dir.parent().and_then(|folder| folder.canonicalize().ok());
+    let resolved = resolved.zip(run_dir.file_name()).map(|(folder, name)| folder.join(name));
+    let files = std::fs::read_dir(format!("/proc/{process}/fd")).into_iter().flatten().flatten();
+    let mut targets = files.filter_map(|file| std::fs::read_link(file.path()).ok());
+    targets.any(|target| resolved.as_ref().is_some_and(|run_dir| target.starts_with(run_dir)))
 }
 
 /// The run directory that a process carries in its environment; `None` for one that has ended.
@@ -152,9 +196,9 @@ fn run_dir_of(process: Pid) -> Option<PathBuf> {
 }
 
 fn look_at(run_id: String, traces: &Traces) -> Remains {
-    let run_dirs = traces.run_dirs.iter().filter(|path| path.is_dir()).cloned();
+    let run_dirs = traces.run_dirs.iter().filter(|path| is_own_run_dir(path)).cloned();
     // The entry last, as it goes when a run ends by itself.
-    let entry = Some(entry_path(&run_id)).filter(|path| path.exists());
+    let entry = Some(entry_path(&run_id)).filter(|path| is_own_name(path));
     let paths: Vec<PathBuf> = run_dirs.chain(shared_memory_of(&run_id)).chain(entry).collect();
     let bytes = paths.iter().map(|path| bytes_below(path)).sum();
     let processes = traces.processes.iter().map(|process| process.as_raw_nonzero().get()).collect();
@@ -176,13 +220,13 @@ impl Remains {
     /// Ends the processes, then removes the files, which they may still be writing.
     fn remove(&mut self) {
         for &process in &self.processes {
-            if let Err(reason) = end_process(process) {
+            if let Err(reason) = end_process(process, &self.run_id) {
                 self.failures.push(format!("process {process}: {reason}"));
             }
         }
         for path in &self.paths {
             let removed =
-                if path.is_dir() { std::fs::remove_dir_all(path) } else { std::fs::remove_file(path) };
+                if is_own_run_dir(path) { std::fs::remove_dir_all(path) } else { std::fs::remove_file(path) };
             match removed {
                 // Another `clean` was faster.
                 Err(error) if error.kind() == std::io::ErrorKind::NotFound => {}
@@ -194,12 +238,13 @@ impl Remains {
 }
 
 /// Kills a process that carries a run directory, and waits until it is gone.
-fn end_process(process: i32) -> Result<(), String> {
+fn end_process(process: i32, run_id: &str) -> Result<(), String> {
     let Some(process) = Pid::from_raw(process) else { return Ok(()) };
     // The handle stays with the process, whoever gets its number next; so what carries the run directory now
     // is what the signal goes to.
     let Ok(handle) = pidfd_open(process, PidfdFlags::empty()) else { return Ok(()) };
-    if run_dir_of(process).is_none() {
+    let is_of_run = |run_dir: &PathBuf| is_run_dir_of(run_dir, run_id) && holds_file_of(process, run_dir);
+    if run_dir_of(process).filter(is_of_run).is_none() {
         return Ok(());
     }
     pidfd_send_signal(&handle, Signal::KILL).map_err(|error| format!("cannot be killed: {error}"))?;

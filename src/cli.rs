@@ -139,7 +139,11 @@ struct CheckArguments {
 
 /// Parses the arguments of this process, does what they ask for, and says with which code the process ends.
 pub fn main() -> ExitCode {
-    let result = match Cli::parse().command {
+    let command = Cli::parse().command;
+    if !matches!(command, Verb::Node { .. }) {
+        crate::inherited::forget();
+    }
+    let result = match command {
         Verb::Run(arguments) => run::run(&arguments, None, None),
         Verb::Profile(ProfileArguments { run: arguments, trace, html }) => {
             run::run(&arguments, Some(Files { trace, html }), None)

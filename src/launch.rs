@@ -63,6 +63,7 @@ pub fn fly(manifest: &Manifest, graph: &mut Graph, recording: &Path, quiet: bool
     graph.plan.run_id = run_dir.run_id().to_owned();
     graph.plan.store(run_dir.path())?;
     let graph = &*graph;
+    bus::room::require(&graph.plan)?;
     let control = Control::create(&graph.plan)?;
     let (plan, dir) = (&graph.plan, run_dir.path());
     let clock = WatchClock::new();

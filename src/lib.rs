@@ -10,6 +10,7 @@ mod describe;
 mod files;
 mod graph;
 mod identify;
+mod inherited;
 mod judge;
 mod kinds;
 mod launch;

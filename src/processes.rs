@@ -182,7 +182,11 @@ impl Process {
             (None, Some(end)) => match (end.code(), end.signal()) {
                 (Some(0), _) => "ended with exit code 0 before the run did".to_owned(),
                 (Some(code), _) => format!("ended with exit code {code}"),
-                (None, Some(signal)) => format!("was killed by {}", bus::process::signal_name(signal)),
+                (None, Some(signal)) => format!(
+                    "was killed by {}{}",
+                    bus::process::signal_name(signal),
+                    bus::room::words_of_signal(signal)
+                ),
                 (None, None) => "ended".to_owned(),
             },
             (None, None) => "is still running".to_owned(),

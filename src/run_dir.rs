@@ -6,16 +6,20 @@
 
 use anyhow::{Context, Result, bail};
 use bus::control::shm_prefix;
+use bus::own_file;
+use bus::process::user_id;
+pub use bus::room::SHARED_MEMORY;
 use rustix::fs::{FlockOperation, flock};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
+use std::ffi::OsStr;
 use std::fs::File;
-use std::io::Write as _;
-use std::os::unix::fs::{DirBuilderExt, MetadataExt, OpenOptionsExt};
+use std::io::{Read as _, Write as _};
+use std::os::unix::fs::{DirBuilderExt, MetadataExt, OpenOptionsExt, PermissionsExt};
 use std::path::{Path, PathBuf};
 
-/// Where shared memory lies.
-pub const SHARED_MEMORY: &str = "/dev/shm";
+/// More than any entry has: two paths and a few numbers.
+const ENTRY_BYTES_MAX: u64 = 64 << 10;
 
 /// What a run says of itself in its entry.
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -34,10 +38,45 @@ impl Entry {
     /// What a new run of `manifest` has to say.
     fn new(manifest: &Path) -> Result<Self> {
         let run_id = format!("{:x}-{:x}", std::process::id(), bus::control::monotonic_ns());
-        // One level only: a folder shared by runs could vanish with another run that ends.
-        let run_dir = std::path::absolute(std::env::temp_dir())?.join(dir_name(&run_id));
+        let run_dir = new_run_dir(&run_id)?;
         Ok(Self { run_id, run_dir, manifest: manifest.to_owned(), launcher: std::process::id() })
     }
+
+    /// What stands in the file of the entry of run `run_id`; `None` for anything else.
+    pub fn read(run_id: &str, file: &File) -> Option<Self> {
+        let mut text = String::new();
+        file.take(ENTRY_BYTES_MAX).read_to_string(&mut text).ok()?;
+        let entry: Self = serde_json::from_str(&text).ok()?;
+        (entry.run_id == run_id && is_run_dir_of(&entry.run_dir, run_id)).then_some(entry)
+    }
+}
+
+/// The folders in which runs have their directories: that for temporary files, or else the first of the others that is
+/// there. `TMPDIR` may be a path that iceoryx2 does not take.
+pub fn folders() -> Vec<PathBuf> {
+    let own = std::env::var_os("TMPDIR").filter(|path| !path.is_empty()).map(PathBuf::from);
+    let session = std::env::var_os("XDG_RUNTIME_DIR").map(PathBuf::from).filter(|path| path.is_absolute());
+    let all = own.into_iter().chain(["/tmp".into()]).chain(session).chain([SHARED_MEMORY.into()]);
+    all.filter_map(|path: PathBuf| std::path::absolute(path).ok()).collect()
+}
+
+/// Where run `run_id` is to have its directory. One level below the folder: one shared by runs could vanish with
+/// another run that ends.
+fn new_run_dir(run_id: &str) -> Result<PathBuf> {
+    let folders = folders();
+    let wanted = folders.first().map(|folder| folder.join(dir_name(run_id)));
+    let mut paths = folders.iter().map(|folder| folder.join(dir_name(run_id)));
+    let is_usable = |path: &PathBuf| Some(path) == wanted.as_ref() || may_create(path);
+    paths.find(|path| bus::takes_run_dir(path, run_id) && is_usable(path)).with_context(|| {
+        format!(
+            "no folder for the run directory: none of {folders:?} is there, may be written to and is short"
+        )
+    })
+}
+
+fn may_create(path: &Path) -> bool {
+    use rustix::fs::{Access, access};
+    path.parent().is_some_and(|folder| access(folder, Access::WRITE_OK | Access::EXEC_OK).is_ok())
 }
 
 /// Where a run keeps its files; dropping it removes them, the run's shared memory, and its entry.
@@ -54,6 +93,7 @@ impl RunDir {
     /// # Errors
     /// If shared memory or the folder for temporary files cannot be written to.
     pub fn create(manifest: &Path) -> Result<Self> {
+        bus::process::survive_file_limit();
         let manifest = std::path::absolute(manifest)?;
         let (entry, registered) = loop {
             let entry = Entry::new(&manifest)?;
@@ -67,8 +107,11 @@ impl RunDir {
             Ok(directory) => Ok(Self { entry, _locks: [registered, directory] }),
             Err(error) => {
                 let _ = std::fs::remove_file(entry_path(&entry.run_id));
-                let path = entry.run_dir.display().to_string();
-                Err(error).with_context(|| format!("cannot create the run directory {path}"))
+                Err(error).with_context(|| format!(
+                    "cannot create the run directory {}; set TMPDIR to a folder that is there and that this user may \
+                     write to, or leave it out",
+                    entry.run_dir.display()
+                ))
             }
         }
     }
@@ -127,12 +170,12 @@ impl Drop for Scratch {
 
 /// The name of the directory of run `run_id`.
 fn dir_name(run_id: &str) -> String {
-    format!("hummingbus-{}-{run_id}", bus::process::user_id())
+    format!("hummingbus-{}-{run_id}", user_id())
 }
 
 /// The run whose directory has this name; `None` for anything else, and for runs of other users.
 pub fn run_of_dir(name: &str) -> Option<&str> {
-    let run_id = name.strip_prefix("hummingbus-")?.strip_prefix(&bus::process::user_id().to_string())?;
+    let run_id = name.strip_prefix("hummingbus-")?.strip_prefix(&user_id().to_string())?;
     run_id.strip_prefix('-').filter(|run_id| is_run_id(run_id))
 }
 
@@ -151,12 +194,29 @@ pub fn entry_path(run_id: &str) -> PathBuf {
     Path::new(SHARED_MEMORY).join(format!("{}run", shm_prefix(run_id)))
 }
 
+/// Whether this is a path to a directory of the name that run `run_id` gives its own.
+pub fn is_run_dir_of(path: &Path, run_id: &str) -> bool {
+    path.is_absolute() && path.file_name().and_then(OsStr::to_str).and_then(run_of_dir) == Some(run_id)
+}
+
+/// Whether there is a directory of this user, and no link to one.
+pub fn is_own_run_dir(path: &Path) -> bool {
+    let found = path.symlink_metadata();
+    found.is_ok_and(|found| found.is_dir() && found.uid() == user_id())
+}
+
+/// Whether there is something of this user that is no folder: runs have none in shared memory.
+pub fn is_own_name(path: &Path) -> bool {
+    path.symlink_metadata().is_ok_and(|found| !found.is_dir() && found.uid() == user_id())
+}
+
 /// Every shared-memory file of run `run_id` but its entry.
 pub fn shared_memory_of(run_id: &str) -> Vec<PathBuf> {
     let (prefix, entry) = (shm_prefix(run_id), entry_path(run_id));
     let files = std::fs::read_dir(SHARED_MEMORY).into_iter().flatten().flatten();
     let belongs = |file: &std::fs::DirEntry| file.file_name().to_string_lossy().starts_with(&prefix);
-    files.filter(belongs).map(|file| file.path()).filter(|path| *path != entry).collect()
+    let paths = files.filter(belongs).map(|file| file.path());
+    paths.filter(|path| *path != entry && is_own_name(path)).collect()
 }
 
 /// Writes `entry` and locks it. `None` if `clean` met the file before it was locked, and has removed it: then the
@@ -164,13 +224,25 @@ pub fn shared_memory_of(run_id: &str) -> Vec<PathBuf> {
 fn register(entry: &Entry) -> Result<Option<File>> {
     let mut options = std::fs::OpenOptions::new();
     options.read(true).write(true).create_new(true).mode(0o600);
-    let mut file = options.open(entry_path(&entry.run_id))?;
+    let path = entry_path(&entry.run_id);
+    let text = serde_json::to_vec(entry)?;
+    let file = options.open(&path)?;
+    let registered = lock_and_write(file, &text);
+    if registered.is_err() {
+        let _ = std::fs::remove_file(path);
+    }
+    Ok(registered?)
+}
+
+fn lock_and_write(mut file: File, text: &[u8]) -> std::io::Result<Option<File>> {
     // Waits while `clean` has the lock.
     rustix::io::retry_on_intr(|| flock(&file, FlockOperation::LockExclusive))?;
     if file.metadata()?.nlink() == 0 {
         return Ok(None);
     }
-    file.write_all(&serde_json::to_vec(entry)?)?;
+    // Whatever the umask takes away.
+    file.set_permissions(std::fs::Permissions::from_mode(0o600))?;
+    file.write_all(text)?;
     Ok(Some(file))
 }
 
@@ -178,9 +250,17 @@ fn register(entry: &Entry) -> Result<Option<File>> {
 /// not /dev/shm, neither sees the other's entries.
 fn create_locked(run_dir: &Path) -> std::io::Result<File> {
     std::fs::DirBuilder::new().mode(0o700).create(run_dir)?;
-    let directory = File::open(run_dir)?;
-    rustix::io::retry_on_intr(|| flock(&directory, FlockOperation::LockExclusive))?;
-    Ok(directory)
+    // Whatever the umask takes away.
+    let opened = std::fs::set_permissions(run_dir, std::fs::Permissions::from_mode(0o700))
+        .and_then(|()| own_file::open_folder(run_dir));
+    let locked = opened.and_then(|directory| {
+        rustix::io::retry_on_intr(|| flock(&directory, FlockOperation::LockExclusive))?;
+        Ok(directory)
+    });
+    if locked.is_err() {
+        let _ = std::fs::remove_dir(run_dir);
+    }
+    locked
 }
 
 /// Whether the launcher that locked `entry` lives. Asking does not disturb others who ask.
@@ -203,18 +283,30 @@ pub struct Claim {
 /// Without an entry nobody lives on this side of /dev/shm: it is made before everything else, and removed after.
 pub fn try_claim(run_id: &str, run_dirs: &BTreeSet<PathBuf>) -> Option<Claim> {
     let (mut locks, entry) = (Vec::new(), entry_path(run_id));
-    for path in std::iter::once(&entry).chain(run_dirs) {
-        match File::open(path) {
-            Ok(file) => {
-                let taken = rustix::io::retry_on_intr(|| flock(&file, FlockOperation::NonBlockingLockShared));
-                taken.ok()?;
-                locks.push(file);
-            }
-            Err(error) if error.kind() == std::io::ErrorKind::NotFound => {}
-            Err(_) => return None,
+    let opened = std::iter::once(open_own(&entry, own_file::open(&entry, false)));
+    let opened = opened.chain(run_dirs.iter().map(|path| open_own(path, own_file::open_folder(path))));
+    for file in opened {
+        if let Some(file) = file.ok()? {
+            let taken = rustix::io::retry_on_intr(|| flock(&file, FlockOperation::NonBlockingLockShared));
+            taken.ok()?;
+            locks.push(file);
         }
     }
     Some(Claim { _locks: locks })
+}
+
+/// What was opened at `path`; `None` for nothing, and for what no run of this user has made: no lock can be on it.
+fn open_own(path: &Path, opened: std::io::Result<File>) -> std::io::Result<Option<File>> {
+    match opened {
+        Ok(file) => Ok(Some(file)),
+        Err(error) if error.kind() == std::io::ErrorKind::NotFound => Ok(None),
+        Err(_) if !is_own_run_dir(path) && !is_own_file(path) => Ok(None),
+        Err(error) => Err(error),
+    }
+}
+
+fn is_own_file(path: &Path) -> bool {
+    path.symlink_metadata().is_ok_and(|found| found.is_file() && found.uid() == user_id())
 }
 
 /// A run that was alive when it was found.
@@ -245,14 +337,10 @@ fn live_run(path: &Path) -> Option<LiveRun> {
     if path != entry_path(run_id) {
         return None;
     }
-    let file = File::open(path).ok().filter(is_own)?;
+    let file = own_file::open(path, false).ok()?;
     // A run that is registering has an empty entry, and is not up yet.
-    let entry = serde_json::from_reader(&file).ok()?;
+    let entry = Entry::read(run_id, &file)?;
     Some(LiveRun { entry, file }).filter(LiveRun::is_live)
-}
-
-fn is_own(file: &File) -> bool {
-    file.metadata().is_ok_and(|metadata| metadata.uid() == bus::process::user_id())
 }
 
 /// The live run named `run_id`, or the only one.

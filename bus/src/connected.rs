@@ -93,6 +93,7 @@ impl ConnectedNode {
         };
         node.connect_inputs(declared, roster)?;
         node.agree_with(roster, first_tick)?;
+        node.links.transport.reserve()?;
         if node.links.plan.profile {
             let links = &node.links;
             let (index, generation) = (links.index, links.generation);
@@ -193,7 +194,7 @@ impl ConnectedNode {
             let size = Announcement::load(&announcement::topic_path(&links.run_dir, output.topic))?.size;
             self.predecessor.push(InPort::new(&input, topic, size, 0, None, source));
         }
-        Ok(())
+        links.transport.reserve()
     }
 
     fn fly(
@@ -265,6 +266,7 @@ impl ConnectedNode {
                 Await::Change => {
                     let epoch = self.links.control.epoch();
                     self.agree_with(&Roster::load(&self.links.run_dir, epoch)?, tick)?;
+                    self.links.transport.reserve()?;
                     self.links.control.agree(self.links.member(), epoch);
                 }
             }

@@ -149,7 +149,7 @@ impl Control {
             .mode(0o600)
             .open(&path)
             .map_err(fail)?;
-        file.set_len(segment_bytes(plan) as u64).map_err(fail)?;
+        crate::room::reserve(&file, &path, control_bytes(plan) as u64)?;
         let control = Self::map(plan, &file).map_err(fail)?;
         control.word(0, 2).store(plan.duration_ticks, SeqCst);
         control.set_pace(plan.pace);
@@ -171,13 +171,13 @@ impl Control {
     pub fn open(plan: &Plan) -> Result<Self, BusError> {
         let path = control_path(&plan.run_id);
         let fail = |source| BusError::File { action: "open", path: path.clone(), source };
-        let file = std::fs::OpenOptions::new().read(true).write(true).open(&path).map_err(fail)?;
+        let file = crate::own_file::open(&path, true).map_err(fail)?;
         let length = file.metadata().map_err(fail)?.len();
-        if length != segment_bytes(plan) as u64 {
+        if length != control_bytes(plan) as u64 {
             return Err(BusError::Content {
                 path,
                 expected: "the control segment of this run",
-                found: format!("{length} bytes instead of {}", segment_bytes(plan)),
+                found: format!("{length} bytes instead of {}", control_bytes(plan)),
             });
         }
         let control = Self::map(plan, &file).map_err(fail)?;
@@ -740,7 +740,8 @@ fn members(plan: &Plan) -> usize {
     SEATS * plan.nodes.len()
 }
 
-fn segment_bytes(plan: &Plan) -> usize {
+/// The size of the control segment of `plan`.
+pub(crate) fn control_bytes(plan: &Plan) -> usize {
     let edges = 3 * members(plan) + 2 * SEATS * plan.edge_count();
     SLOT_BYTES * (2 + 2 * plan.topics.len() + members(plan) + edges + STEP_SLOTS * members(plan))
 }

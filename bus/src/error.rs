@@ -34,6 +34,32 @@ pub enum BusError {
         /// Why it failed.
         source: std::io::Error,
     },
+    /// There is no room for what a run maps.
+    #[error(
+        "no room for {what}: it takes {needed} bytes, and {} has {free} bytes free; make room there, or give it more \
+         (`mount -o remount,size=SIZE {}`, `docker run --shm-size`)", folder.display(), folder.display()
+    )]
+    NoRoom {
+        /// What the room is for.
+        what: String,
+        /// How much it takes.
+        needed: u64,
+        /// Where.
+        folder: PathBuf,
+        /// How much there is.
+        free: u64,
+    },
+    /// Files may not become as large as the run needs them.
+    #[error(
+        "a shared-memory file of the run takes {needed} bytes, and the limit on the size of files is {limit} \
+         bytes; raise it (`ulimit -f`)"
+    )]
+    FileLimit {
+        /// The largest file.
+        needed: u64,
+        /// The limit.
+        limit: u64,
+    },
     /// A file of the run does not hold what it should.
     #[error(
         "{path} is not readable as {expected}: {found}. Was it written by another version of hummingbus?"

@@ -38,7 +38,8 @@ impl StateRing {
         let fail = |source| BusError::File { action: "create", path: path.clone(), source };
         let mut options = std::fs::OpenOptions::new();
         let file = options.read(true).write(true).create_new(true).mode(0o600).open(&path).map_err(fail)?;
-        let ring = Self::map(plan, schema, &file, Some(ring_bytes(plan, schema))).map_err(fail)?;
+        crate::room::reserve(&file, &path, ring_bytes(plan, schema) as u64)?;
+        let ring = Self::map(plan, schema, &file).map_err(fail)?;
         Announcement::of(schema).store(&announcement_path(run_dir, node, generation))?;
         Ok(ring)
     }
@@ -57,19 +58,11 @@ impl StateRing {
         }
         let path = ring_path(plan, node, generation);
         let fail = |source| BusError::File { action: "open", path: path.clone(), source };
-        let file = std::fs::OpenOptions::new().read(true).write(true).open(&path).map_err(fail)?;
-        Self::map(plan, schema, &file, None).map_err(fail).map(Some)
+        let file = crate::own_file::open(&path, true).map_err(fail)?;
+        Self::map(plan, schema, &file).map_err(fail).map(Some)
     }
 
-    fn map(
-        plan: &Plan,
-        schema: &Schema,
-        file: &std::fs::File,
-        new_length: Option<usize>,
-    ) -> std::io::Result<Self> {
-        if let Some(length) = new_length {
-            file.set_len(length as u64)?;
-        }
+    fn map(plan: &Plan, schema: &Schema, file: &std::fs::File) -> std::io::Result<Self> {
         let map = MmapRaw::map_raw(file)?;
         if map.len() < ring_bytes(plan, schema) {
             return Err(std::io::Error::other("the file is shorter than the state it should hold"));

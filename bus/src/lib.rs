@@ -15,11 +15,13 @@ mod live;
 pub mod message;
 pub mod messages;
 mod node;
+pub mod own_file;
 pub mod plan;
 mod port;
 pub mod process;
 pub mod profile;
 pub mod random;
+pub mod room;
 pub mod roster;
 pub mod schema;
 pub mod step_times;
@@ -32,7 +34,7 @@ pub use error::BusError;
 pub use message::Message;
 pub use node::{GENERATION_VARIABLE, Input, NODE_VARIABLE, Node, Output, RawInput};
 pub use tick::Tick;
-pub use transport::reap_dead;
+pub use transport::{reap_dead, takes_run_dir};
 
 #[doc(hidden)]
 pub mod __private {

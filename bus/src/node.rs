@@ -251,6 +251,7 @@ impl Node {
         let member = self.plan.member(self.index, self.generation);
         let transport = Transport::new(&self.run_dir, &self.plan.run_id, self.name())?;
         let outputs = self.connect_outputs(&transport)?;
+        transport.reserve()?;
         control.set_ready(member, Phase::Connecting);
         let roster = if self.generation == 0 {
             go_on(control.wait_phase(Phase::Connecting))?;

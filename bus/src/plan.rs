@@ -95,7 +95,7 @@ impl NodePlan {
     /// If the file is missing or holds something else.
     pub(crate) fn load_successor(run_dir: &Path, node: usize, generation: u32) -> Result<Self, BusError> {
         let path = successor_path(run_dir, node, generation);
-        let text = std::fs::read_to_string(&path).map_err(|source| BusError::File {
+        let text = crate::own_file::read_text(&path).map_err(|source| BusError::File {
             action: "read",
             path: path.clone(),
             source,
@@ -168,7 +168,7 @@ impl Plan {
     /// If the file is missing or is not a plan.
     pub fn load(run_dir: &Path) -> Result<Self, BusError> {
         let path = run_dir.join(Self::FILE);
-        let text = std::fs::read_to_string(&path).map_err(|source| BusError::File {
+        let text = crate::own_file::read_text(&path).map_err(|source| BusError::File {
             action: "read",
             path: path.clone(),
             source,

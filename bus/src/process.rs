@@ -23,7 +23,7 @@ pub const RUN_VARIABLE: &str = "HUMMINGBUS_RUN";
 /// # Errors
 /// If it was not started by a launcher.
 pub(crate) fn join() -> Result<PathBuf, BusError> {
-    let run_dir = std::env::var(RUN_VARIABLE).map_err(|_| BusError::NotInARun { variable: RUN_VARIABLE })?;
+    let run_dir = std::env::var_os(RUN_VARIABLE).ok_or(BusError::NotInARun { variable: RUN_VARIABLE })?;
     die_with_parent();
     note_signals();
     Ok(PathBuf::from(run_dir))
@@ -89,6 +89,14 @@ fn die_with_parent() {
     }
 }
 
+/// From now on a write beyond the limit on the size of files is an error with a reason, and no end without a word.
+/// What this process starts dies of it as before: the kernel forgets a handler where another program begins.
+pub fn survive_file_limit() {
+    static IS_REACHED: OnceLock<Arc<AtomicBool>> = OnceLock::new();
+    let flag = IS_REACHED.get_or_init(Arc::default);
+    let _ = signal_hook::flag::register(signal_hook::consts::SIGXFSZ, flag.clone());
+}
+
 /// A process's place in a run, taken for as long as this value lives: the kernel frees it when the process dies.
 #[derive(Debug)]
 pub(crate) struct Claim {
@@ -102,8 +110,9 @@ pub(crate) struct Claim {
 pub(crate) fn claim(run_dir: &Path, name: &str) -> Result<Claim, BusError> {
     let path = claim_path(run_dir, name);
     let fail = |source| BusError::File { action: "open", path: path.clone(), source };
-    let lock =
-        File::options().create(true).truncate(false).write(true).mode(0o600).open(&path).map_err(fail)?;
+    let mut options = File::options();
+    options.create(true).truncate(false).write(true).mode(0o600).custom_flags(crate::own_file::FLAGS);
+    let lock = options.open(&path).map_err(fail)?;
     match lock.try_lock() {
         Ok(()) => Ok(Claim { _lock: lock }),
         Err(TryLockError::WouldBlock) => Err(BusError::Claimed { name: name.to_owned() }),

@@ -232,16 +232,14 @@ impl RecordWriter {
             .create_new(true)
             .open(&path)
             .map_err(|source| BusError::File { action: "create", path: path.clone(), source })?;
-        let fail = |source| BusError::File { action: "reserve space for host times in", path, source };
         let capacity = records.min(NOTED_TICKS_MAX) as usize;
         // One more than counts: when the file is full, that one takes what is not noted.
         let bytes = WORD_BYTES * (HEADER_WORDS + words * (capacity + 1));
-        let map = reserve(&file, bytes as u64).and_then(|()| {
-            // SAFETY: the file was created by this call in the run's own directory; others read it only after
-            // this process has ended.
-            unsafe { MmapMut::map_mut(&file) }
-        });
-        let map = map.map_err(fail)?;
+        crate::room::reserve(&file, &path, bytes as u64)?;
+        // SAFETY: the file was created by this call in the run's own directory; others read it only after
+        // this process has ended.
+        let map = unsafe { MmapMut::map_mut(&file) };
+        let map = map.map_err(|source| BusError::File { action: "map", path, source })?;
         // A page that is touched here costs the tick that writes to it no fault; older kernels cannot.
         let _ = map.advise(Advice::PopulateWrite);
         let mut writer = Self { map, words, capacity, count: 0, left_out: 0 };
@@ -275,14 +273,6 @@ impl RecordWriter {
     }
 }
 
-/// Gives `file` its size and its space: a full disk is an error here, and would kill a process that writes.
-fn reserve(file: &File, bytes: u64) -> std::io::Result<()> {
-    match rustix::fs::fallocate(file, rustix::fs::FallocateFlags::empty(), 0, bytes) {
-        Err(rustix::io::Errno::OPNOTSUPP) => file.set_len(bytes),
-        other => other.map_err(Into::into),
-    }
-}
-
 /// The records of a file whose writer has ended.
 #[derive(Debug)]
 struct RecordReader {
@@ -293,7 +283,7 @@ struct RecordReader {
 impl RecordReader {
     /// Opens the file at `path`; `None` where there is none.
     fn open(path: PathBuf, words: usize) -> Result<Option<Self>, BusError> {
-        let map = File::open(&path).and_then(|file| {
+        let map = crate::own_file::open(&path, false).and_then(|file| {
             // SAFETY: the file lies in the run's own directory and its writer has ended.
             unsafe { Mmap::map(&file) }
         });

@@ -63,7 +63,7 @@ impl Roster {
     /// If the file is missing or is no roster.
     pub fn load(run_dir: &Path, epoch: u32) -> Result<Self, BusError> {
         let path = path(run_dir, epoch);
-        let text = std::fs::read_to_string(&path).map_err(|source| BusError::File {
+        let text = crate::own_file::read_text(&path).map_err(|source| BusError::File {
             action: "read",
             path: path.clone(),
             source,

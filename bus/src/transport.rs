@@ -3,9 +3,10 @@
 //! Each run has its own root path and its own prefix for shared-memory files, so runs never meet, and
 //! whatever a killed process leaves behind is found by name.
 
-use crate::control::shm_prefix;
+use crate::control::{monotonic_ns, shm_prefix};
 use crate::error::BusError;
 use crate::message::{ENCAPSULATION_WORD, sample_words};
+use crate::room;
 use iceoryx2::node::NodeState;
 use iceoryx2::port::publisher::Publisher;
 use iceoryx2::port::subscriber::Subscriber;
@@ -17,15 +18,22 @@ use iceoryx2::prelude::{
 use iceoryx2::sample::Sample;
 use iceoryx2::sample_mut::SampleMut;
 use iceoryx2::service::port_factory::publish_subscribe::PortFactory;
-use std::os::unix::fs::PermissionsExt;
+use iceoryx2_bb_elementary::package_version::PackageVersion;
+use iceoryx2_cal::hash::Hash as _;
+use iceoryx2_cal::hash::sha1::Sha1;
+use std::cell::RefCell;
+use std::os::unix::fs::{OpenOptionsExt as _, PermissionsExt as _};
 use std::path::Path;
 
 type Service = ipc::Service;
 type Factory = PortFactory<Service, [u64], SampleHeader>;
 type Iceoryx2Node = iceoryx2::node::Node<Service>;
 
+/// The longest path that iceoryx2 0.10 takes.
+const PATH_BYTES_MAX: usize = 255;
+
 /// Samples a subscriber holds at a time: the current one and the one that replaces it.
-const BORROWED_SAMPLES: usize = 2;
+pub(crate) const BORROWED_SAMPLES: usize = 2;
 
 /// What travels beside a sample: its place in the run, and host times that no recording holds.
 #[derive(Clone, Copy, Debug, Default, ZeroCopySend)]
@@ -48,6 +56,9 @@ pub struct SampleHeader {
 pub(crate) struct Transport {
     node: Iceoryx2Node,
     node_name: String,
+    run_id: String,
+    /// The numbers of the ports whose pages are not reserved yet.
+    new_ports: RefCell<Vec<String>>,
 }
 
 /// How a topic's queues are sized.
@@ -105,13 +116,17 @@ impl Transport {
         let fail =
             |reason: String| transport_error(node_name, "joining the shared memory of the run", reason);
         let config = config(run_dir, run_id).map_err(fail)?;
+        let what = format!("node `{node_name}` in shared memory");
+        room::require_for_process(&what)?;
+        make_node_counter(&config, run_id)
+            .map_err(|error| fail(format!("cannot make the counter of its nodes: {error}")))?;
         let node = NodeBuilder::new()
             .config(&config)
             .signal_handling_mode(SignalHandlingMode::Disabled)
             .create::<Service>()
             .map_err(|error| fail(format!("{error:?}")))?;
-        keep_to_this_user(run_id).map_err(|error| fail(error.to_string()))?;
-        Ok(Self { node, node_name: node_name.to_owned() })
+        let (node_name, run_id) = (node_name.to_owned(), run_id.to_owned());
+        Ok(Self { node, node_name, run_id, new_ports: RefCell::default() })
     }
 
     /// The service of a topic's samples from one generation of its publisher. Each generation has its own:
@@ -145,6 +160,8 @@ impl Transport {
         size: usize,
         capacity: Capacity,
     ) -> Result<Sender, BusError> {
+        let what = format!("node `{}` publishing on topic {topic}", self.node_name);
+        room::require_for_port(&what, size, capacity)?;
         let publisher = self
             .service(topic, generation, capacity)?
             .publisher_builder()
@@ -161,6 +178,7 @@ impl Transport {
                     format!("{error:?}"),
                 )
             })?;
+        self.new_ports.borrow_mut().push(publisher.id().value().to_string());
         Ok(Sender { publisher, words: sample_words(size) })
     }
 
@@ -171,6 +189,8 @@ impl Transport {
         generation: u32,
         capacity: Capacity,
     ) -> Result<Receiver, BusError> {
+        let what = format!("node `{}` subscribing to topic {topic}", self.node_name);
+        room::require_for_process(&what)?;
         let subscriber = self
             .service(topic, generation, capacity)?
             .subscriber_builder()
@@ -183,26 +203,71 @@ impl Transport {
                     format!("{error:?}"),
                 )
             })?;
+        self.new_ports.borrow_mut().push(subscriber.id().value().to_string());
         Ok(Receiver { subscriber })
+    }
+
+    /// Reserves the pages of what was made for the ports since the last call: from then on, no sample can find that a
+    /// page cannot be had.
+    pub(crate) fn reserve(&self) -> Result<(), BusError> {
+        let ports = std::mem::take(&mut *self.new_ports.borrow_mut());
+        if ports.is_empty() {
+            return Ok(());
+        }
+        // A file is named by its ports; those of services have none.
+        let is_new = |name: &str| {
+            name.ends_with(".dynamic")
+                || name.split(['_', '.']).any(|part| ports.iter().any(|port| port == part))
+        };
+        room::reserve_files(&self.run_id, is_new, &format!("the samples of node `{}`", self.node_name))
     }
 }
 
-/// Closes the run's shared-memory files to other users: iceoryx2 0.10 leaves the counter of its nodes open to all.
-fn keep_to_this_user(run_id: &str) -> std::io::Result<()> {
-    let prefix = shm_prefix(run_id);
-    for entry in std::fs::read_dir("/dev/shm")?.flatten() {
-        if !entry.file_name().to_string_lossy().starts_with(&prefix) {
-            continue;
+/// The type that iceoryx2 0.10 keeps in the counter of its nodes; its hash is part of the file's name.
+const COUNTER_TYPE: &str = "iceoryx2::node::global_management_segment::State";
+
+/// Makes the counter of the run's nodes, open to this user alone, where it is not there yet. iceoryx2 0.10 would make it
+/// itself otherwise, and open it to everybody, whatever the umask says.
+fn make_node_counter(config: &Config, run_id: &str) -> std::io::Result<()> {
+    use std::io::Write as _;
+    let version = PackageVersion::get();
+    let (major, minor, patch) = (version.major(), version.minor(), version.patch());
+    let hash = Sha1::new(COUNTER_TYPE.as_bytes()).value();
+    let (hash, suffix) = (hash.as_base64url(), config.global.node.global_mgmt_suffix);
+    let name = format!("{}{hash}_node.{major}_{minor}_{patch}{suffix}", shm_prefix(run_id));
+    let path = Path::new(room::SHARED_MEMORY).join(name);
+    // In one step, and never over another's: processes that come at the same time share one counter.
+    let draft = path.with_extension(format!("{:x}-{:x}", std::process::id(), monotonic_ns()));
+    let mut file = std::fs::OpenOptions::new().write(true).create_new(true).mode(0o600).open(&draft)?;
+    // Whatever the umask takes away.
+    file.set_permissions(std::fs::Permissions::from_mode(0o600))?;
+    // The version that wrote it, and the count, each in 8 bytes.
+    let written = file.write_all(&[version.to_u64().to_ne_bytes(), [0; 8]].concat());
+    let linked = written.and_then(|()| std::fs::hard_link(&draft, &path));
+    std::fs::remove_file(&draft)?;
+    match linked {
+        // Of this user, or another one has put it there.
+        Err(error) if error.kind() == std::io::ErrorKind::AlreadyExists => {
+            crate::own_file::open(&path, true).map(|_| ())
         }
-        let is_open = |data: std::fs::Metadata| data.permissions().mode() & 0o077 != 0;
-        if entry.metadata().is_ok_and(is_open) {
-            match std::fs::set_permissions(entry.path(), std::fs::Permissions::from_mode(0o600)) {
-                Err(error) if error.kind() != std::io::ErrorKind::NotFound => return Err(error),
-                _ => {}
-            }
-        }
+        other => other,
     }
-    Ok(())
+}
+
+/// Whether iceoryx2 can keep the files of run `run_id` below `run_dir`: it takes no path beyond 255 bytes, even where it
+/// opens none, and not every character; it panics over the first.
+#[must_use]
+pub fn takes_run_dir(run_dir: &Path, run_id: &str) -> bool {
+    let is_plain = |byte: u8| byte.is_ascii_alphanumeric() || b"/._-+,=@~ ".contains(&byte);
+    let bytes = run_dir.as_os_str().as_encoded_bytes();
+    bytes.iter().copied().all(is_plain) && bytes.len() <= run_dir_bytes_max(run_id)
+}
+
+/// Behind the run directory the longest path has `/iceoryx2/`, the prefix, the hash of a service (40 characters), a
+/// publisher and a subscriber (numbers of 128 bits, up to 39 digits) and `.connection`, with `_` between them.
+fn run_dir_bytes_max(run_id: &str) -> usize {
+    const LONGEST: usize = "/iceoryx2/".len() + 40 + "_".len() + 39 + "_".len() + 39 + ".connection".len();
+    PATH_BYTES_MAX.saturating_sub(LONGEST + shm_prefix(run_id).len())
 }
 
 fn transport_error(node: &str, action: &str, reason: String) -> BusError {
@@ -281,10 +346,11 @@ impl Received {
 
 #[cfg(test)]
 mod tests {
-    use super::{Capacity, Receiver, SampleHeader, Sender, Transport};
+    use super::{Capacity, Receiver, SampleHeader, Sender, Transport, run_dir_bytes_max, takes_run_dir};
     use crate::control::{monotonic_ns, shm_prefix};
     use crate::plan::{InputPlan, TopicPlan};
     use crate::port::{InPort, Source};
+    use std::os::unix::fs::{MetadataExt, PermissionsExt};
 
     const TOPIC: &str = "/plant/state";
     const SIZE: usize = 8;
@@ -359,19 +425,94 @@ mod tests {
         assert!(error.contains("another process publishes on the topic"), "{error}");
     }
 
+    /// What lies in shared memory for `run`: the name, and what the kernel says of it.
+    fn files(run: &Run) -> Vec<(String, std::fs::Metadata)> {
+        let entries = std::fs::read_dir("/dev/shm").unwrap().flatten();
+        let named = entries.map(|entry| (entry.file_name().to_string_lossy().into_owned(), entry));
+        let own = named.filter(|(name, _)| name.starts_with(&shm_prefix(&run.id)));
+        own.map(|(name, entry)| (name, entry.metadata().unwrap())).collect()
+    }
+
     #[test]
     fn no_file_of_a_run_is_open_to_other_users() {
-        use std::os::unix::fs::PermissionsExt;
         let run = Run::new();
-        let _sender = run.join("plant").publisher(TOPIC, 0, SIZE, CAPACITY).unwrap();
-        let prefix = shm_prefix(&run.id);
-        let files = std::fs::read_dir("/dev/shm").unwrap().flatten();
-        let own: Vec<_> =
-            files.filter(|file| file.file_name().to_string_lossy().starts_with(&prefix)).collect();
-        assert!(own.len() > 2);
-        for file in own {
-            let mode = file.metadata().unwrap().permissions().mode();
-            assert_eq!(mode & 0o077, 0, "{:?} has mode {mode:o}", file.file_name());
+        let processes: Vec<_> = std::thread::scope(|scope| {
+            (0..4)
+                .map(|_| scope.spawn(|| run.join("plant")))
+                .collect::<Vec<_>>()
+                .into_iter()
+                .map(|process| process.join().unwrap())
+                .collect()
+        });
+        let _sender = processes[0].publisher(TOPIC, 0, SIZE, CAPACITY).unwrap();
+        let files = files(&run);
+        assert!(files.len() > 2);
+        for (name, data) in &files {
+            assert_eq!(data.permissions().mode() & 0o077, 0, "{name}");
         }
+        // iceoryx2 has found the counter that was made for it: one of its own would be open to all at first.
+        let counters: Vec<_> = files.iter().filter(|(name, _)| name.contains("global_mgmt")).collect();
+        assert_eq!(counters.len(), 1, "{counters:?}");
+        let counter = std::fs::read(format!("/dev/shm/{}", counters[0].0)).unwrap();
+        assert_eq!(counter[8..12], 4_u32.to_ne_bytes(), "every process counts in it");
+    }
+
+    #[test]
+    fn every_page_of_shared_memory_is_there_before_the_first_sample() {
+        let run = Run::new();
+        let (plant, imu) = (run.join("plant"), run.join("imu"));
+        let capacity = Capacity { queued_samples: 500, ..CAPACITY };
+        let _sender = plant.publisher(TOPIC, 0, 1000, capacity).unwrap();
+        let _receiver = imu.subscriber(TOPIC, 0, capacity).unwrap();
+        plant.reserve().unwrap();
+        imu.reserve().unwrap();
+        let files = files(&run);
+        for (name, data) in &files {
+            assert!(
+                data.blocks() * 512 >= data.len(),
+                "{name}: {} blocks for {} bytes",
+                data.blocks(),
+                data.len()
+            );
+        }
+        // What is asked for before is neither more than is taken nor far from it.
+        let largest = files.iter().map(|(_, data)| data.len()).max().unwrap();
+        let asked = crate::room::samples_bytes(1000, capacity);
+        assert!(largest > asked && largest < asked + asked / 4, "asked for {asked} bytes, took {largest}");
+    }
+
+    #[test]
+    fn the_longest_run_directory_that_is_taken_is_one_that_iceoryx2_takes() {
+        let run = Run::new();
+        let folder = std::fs::canonicalize(run.folder.path()).unwrap();
+        let rest = run_dir_bytes_max(&run.id) - folder.as_os_str().len() - 1;
+        let longest = folder.join("x".repeat(rest));
+        std::fs::create_dir(&longest).unwrap();
+        assert!(
+            takes_run_dir(&longest, &run.id) && !takes_run_dir(&folder.join("x".repeat(rest + 1)), &run.id)
+        );
+        let [plant, imu] = ["plant", "imu"].map(|name| Transport::new(&longest, &run.id, name).unwrap());
+        let sender = plant.publisher(TOPIC, 0, SIZE, CAPACITY).unwrap();
+        let mut port = port(imu.subscriber(TOPIC, 0, CAPACITY).unwrap());
+        send(&sender, 0);
+        port.take(0, "imu").unwrap();
+        for name in ["a\"b", "a'b", "a\nb", "ä", "a*", "a|b", "a\\b"] {
+            assert!(!takes_run_dir(&folder.join(name), &run.id), "{name}");
+        }
+    }
+
+    #[test]
+    fn a_file_that_another_user_put_in_the_way_is_named() {
+        let run = Run::new();
+        let plant = run.join("plant");
+        let _sender = plant.publisher(TOPIC, 0, SIZE, CAPACITY).unwrap();
+        let (name, _) = files(&run).into_iter().find(|(name, _)| name.ends_with(".data")).unwrap();
+        let path = format!("/dev/shm/{name}");
+        if std::os::unix::fs::chown(&path, Some(65534), None).is_err() {
+            println!("NOT SHOWN: only root can give a file to another user");
+            return;
+        }
+        let error = plant.reserve().unwrap_err().to_string();
+        assert!(error.contains(&path) && error.contains("belongs to user 65534"), "{error}");
     }
 }

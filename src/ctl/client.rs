@@ -2,9 +2,10 @@
 #![allow(clippy::disallowed_methods, reason = "waiting for a run to come up takes host time")]
 
 use crate::ctl::protocol::{Answer, Request};
-use crate::ctl::server::socket_path;
+use crate::ctl::server::{is_own_user, socket_path};
 use crate::run_dir::LiveRun;
 use anyhow::{Context, Result, bail};
+use bus::own_file;
 use std::io::{BufRead, BufReader, Write};
 use std::os::unix::net::UnixStream;
 use std::time::{Duration, Instant};
@@ -36,11 +37,17 @@ pub fn ask(run: &LiveRun, request: &Request) -> Result<Answer> {
 fn connect(run: &LiveRun) -> std::io::Result<UnixStream> {
     let start = Instant::now();
     loop {
-        let folder = std::fs::File::open(&run.entry.run_dir);
-        let stream = folder.and_then(|folder| UnixStream::connect(socket_path(&folder)));
+        let folder = own_file::open_folder(&run.entry.run_dir);
+        let stream =
+            folder.and_then(|folder| UnixStream::connect(socket_path(&folder))).and_then(of_own_user);
         if stream.is_ok() || !run.is_live() || start.elapsed() > START {
             return stream;
         }
         std::thread::sleep(POLL);
     }
+}
+
+/// `stream`, if this user is at its other end.
+fn of_own_user(stream: UnixStream) -> std::io::Result<UnixStream> {
+    if is_own_user(&stream) { Ok(stream) } else { Err(std::io::Error::other("another user answers there")) }
 }

@@ -30,7 +30,7 @@ impl Server {
     /// # Errors
     /// If the socket cannot be made.
     pub fn start(run_dir: &Path) -> Result<Self> {
-        let folder = std::fs::File::open(run_dir).context("cannot open the run directory")?;
+        let folder = bus::own_file::open_folder(run_dir).context("cannot open the run directory")?;
         let listener = UnixListener::bind(socket_path(&folder)).context("cannot open the control socket")?;
         let (sender, requests) = channel();
         // Both kinds of thread end with the process.
@@ -41,6 +41,10 @@ impl Server {
                     std::thread::sleep(PAUSE);
                     continue;
                 };
+                // Nobody else gets through the run directory; root does everywhere.
+                if !is_own_user(&stream) {
+                    continue;
+                }
                 let sender = sender.clone();
                 std::thread::spawn(move || read_requests(&stream, &sender));
             }
@@ -52,6 +56,12 @@ impl Server {
     pub fn poll(&self) -> Option<(Request, Reply)> {
         self.requests.try_recv().ok()
     }
+}
+
+/// Whether this user, or root, is at the other end of `stream`.
+pub fn is_own_user(stream: &UnixStream) -> bool {
+    let peer = rustix::net::sockopt::socket_peercred(stream);
+    peer.is_ok_and(|peer| peer.uid.is_root() || peer.uid.as_raw() == bus::process::user_id())
 }
 
 /// The socket's path through the open run directory: a socket's own path may have 107 bytes only.

@@ -15,6 +15,8 @@
 //! - [`slow`]: steps that take too long
 //! - [`early`]: runs that are stopped while they start
 //! - [`disk`]: a full disk under the recorder
+//! - [`memory`]: a full /dev/shm, limits on the size of files
+//! - [`folders`]: folders for temporary files of every kind
 //! - [`intruders`]: a second clock, a second process of a node
 //! - [`users`]: another user of the machine
 //! - [`bad_files`]: corrupted manifests, truncated recordings
@@ -28,9 +30,11 @@ mod documentation;
 mod early;
 mod flight;
 mod floods;
+mod folders;
 mod intruders;
 mod kill_points;
 mod last_tick;
+mod memory;
 mod saboteur;
 mod silence;
 mod slow;

@@ -7,6 +7,8 @@ use std::os::unix::fs::PermissionsExt;
 use std::os::unix::process::CommandExt;
 use std::path::Path;
 use std::process::Command;
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 /// The user and group `nobody`.
 const NOBODY: u32 = 65534;
@@ -65,4 +67,81 @@ fn require_private(path: &Path) {
         path.ancestors().find(|folder| folder.parent().is_some_and(|parent| parent.ends_with("tmp")));
     let holder = run_dir.unwrap_or(path);
     assert!(is_closed(holder), "{} has mode {:o}", holder.display(), mode(holder));
+}
+
+/// Runs that start while another user tries to open whatever of them it sees.
+const RACED_RUNS: usize = 100;
+
+/// What another user tried.
+#[derive(Debug, Default)]
+struct Race {
+    opened: Vec<String>,
+    refused: u64,
+}
+
+/// Tries, as nobody, to open every file of the runs whose names begin with `prefix` says, until told to end.
+fn race(prefix: &Mutex<String>, folder: &Path, is_over: &AtomicBool) -> Race {
+    // Of this thread alone; it is nobody's to its end.
+    rustix::thread::set_thread_res_gid(gid(NOBODY), gid(NOBODY), gid(NOBODY)).unwrap();
+    rustix::thread::set_thread_res_uid(uid(NOBODY), uid(NOBODY), uid(NOBODY)).unwrap();
+    let mut race = Race::default();
+    while !is_over.load(Ordering::Relaxed) {
+        let prefix = prefix.lock().unwrap().clone();
+        let names = std::fs::read_dir("/dev/shm").unwrap().flatten().map(|entry| entry.path());
+        let own = names.filter(|path| path.to_string_lossy().starts_with(&prefix));
+        let run_dirs = std::fs::read_dir(folder).unwrap().flatten().map(|entry| entry.path());
+        let inside = |path: std::path::PathBuf| [path.clone(), path.join("plan.json"), path.join("iceoryx2")];
+        for path in own.chain(run_dirs.flat_map(inside)) {
+            for (reads, writes) in [(true, true), (true, false), (false, true)] {
+                match std::fs::OpenOptions::new().read(reads).write(writes).open(&path) {
+                    Ok(_) => race.opened.push(path.display().to_string()),
+                    Err(error) if error.kind() == std::io::ErrorKind::PermissionDenied => race.refused += 1,
+                    Err(_) => {}
+                }
+            }
+        }
+    }
+    race
+}
+
+fn uid(number: u32) -> rustix::fs::Uid {
+    rustix::fs::Uid::from_raw(number)
+}
+
+fn gid(number: u32) -> rustix::fs::Gid {
+    rustix::fs::Gid::from_raw(number)
+}
+
+#[test]
+fn another_user_who_tries_at_every_moment_opens_no_file_of_a_run() {
+    if !rustix::process::getuid().is_root() {
+        println!("NOT SHOWN: only root can be a second user");
+        return;
+    }
+    let place = Place::new();
+    open_folders(&place);
+    let manifest = crate::support::repository("manifests/hover.toml");
+    let (prefix, is_over, folder) =
+        (Mutex::new("/nowhere".to_owned()), AtomicBool::new(false), place.path("tmp"));
+    let race = std::thread::scope(|scope| {
+        let racer = scope.spawn(|| race(&prefix, Path::new(&folder), &is_over));
+        for _ in 0..RACED_RUNS {
+            let recording = place.path("raced.mcap");
+            let words = ["run", &manifest, "--record", &recording, "--set", "run.duration_s=0.01"];
+            // A umask that takes nothing away must not open anything.
+            let mut command = Command::new("sh");
+            command.args(["-c", "umask 0; exec \"$@\"", "sh", crate::support::HUMMINGBUS]).args(words);
+            let launch = place.launch(command);
+            *prefix.lock().unwrap() = format!("/dev/shm/hb_{:x}-", launch.id());
+            launch.end().flown();
+            // What the user is given is the umask's: no more is taken away than that.
+            let mode = std::fs::metadata(&recording).unwrap().permissions().mode();
+            assert_eq!(mode & 0o777, 0o666, "the recording has mode {mode:o}");
+            std::fs::remove_file(recording).unwrap();
+        }
+        is_over.store(true, Ordering::Relaxed);
+        racer.join().unwrap()
+    });
+    assert!(race.opened.is_empty(), "{:?}", race.opened);
+    assert!(race.refused > 10 * RACED_RUNS as u64, "it saw too little of the runs: {}", race.refused);
 }

@@ -139,12 +139,10 @@ fn a_process_that_outlived_its_run_is_killed() {
     let run_id = crash(&dead);
     let run_dir = dead.path(&format!("tmp/hummingbus-{}-{run_id}", bus::process::user_id()));
     assert!(Path::new(&run_dir).is_dir());
-    let mut sleeper = Command::new("sleep")
-        .arg("1000")
-        .env("HUMMINGBUS_RUN", &run_dir)
-        .stdout(Stdio::null())
-        .spawn()
-        .unwrap();
+    // Where a run has its processes write.
+    let log = std::fs::File::create(format!("{run_dir}/sleeper.log")).unwrap();
+    let mut sleeper =
+        Command::new("sleep").arg("1000").env("HUMMINGBUS_RUN", &run_dir).stdout(log).spawn().unwrap();
     let report = clean(&place, &[]);
     let ended = poll("the process lives", || sleeper.try_wait().unwrap());
     let id = sleeper.id();
@@ -192,4 +190,151 @@ fn runs_that_start_and_end_while_others_clean_are_not_disturbed() {
             place.call(&["run", &manifest, "--record", &recording, "--set", "run.duration_s=0.2"]).flown();
         }
     });
+}
+
+#[test]
+fn a_process_that_only_inherited_the_name_of_a_dead_run_is_left_alone() {
+    let _alone = alone();
+    let (place, dead) = (Place::new(), Place::new());
+    let run_id = crash(&dead);
+    let run_dir = dead.path(&format!("tmp/hummingbus-{}-{run_id}", bus::process::user_id()));
+    let mut sleeper = Command::new("sleep")
+        .arg("1000")
+        .env("HUMMINGBUS_RUN", &run_dir)
+        .stdout(Stdio::null())
+        .spawn()
+        .unwrap();
+    let report = clean(&place, &[]);
+    let ended = sleeper.try_wait().unwrap();
+    sleeper.kill().unwrap();
+    sleeper.wait().unwrap();
+    assert!(ended.is_none() && dead.left().is_empty(), "{report:#}");
+}
+
+#[test]
+fn a_run_that_a_process_of_a_dead_run_started_flies_on() {
+    let _alone = alone();
+    let (place, outer, inner) = (Place::new(), Place::new(), Place::new());
+    let hover = repository("manifests/hover.toml");
+    let words = [
+        "run",
+        &hover,
+        "--record",
+        &inner.path("inner.mcap"),
+        "--pace",
+        "realtime",
+        "--set",
+        "run.duration_s=8",
+    ];
+    let words: Vec<String> = [&[env!("CARGO_BIN_EXE_hummingbus")], &words[..]]
+        .concat()
+        .iter()
+        .map(|word| format!("'{word}'"))
+        .collect();
+    // Detached as a daemon is; what it says goes where the outer run has its companion write.
+    let command = format!("setsid --fork env TMPDIR='{}' {}; sleep 1000", inner.path("tmp"), words.join(" "));
+    let companion =
+        format!("\n[process.nested]\nlockstep = false\ncommand = [\"sh\", \"-c\", {command:?}]\n");
+    let manifest = outer.write("outer.toml", format!("include = [{hover:?}]\n{companion}"));
+    let launch =
+        outer.start(&["run", &manifest, "--record", &outer.path("outer.mcap"), "--pace", "realtime"]);
+    let inner_id = poll("the inner run does not fly", || {
+        let plan = bus::plan::Plan::load(inner.run_dirs().first()?).ok()?;
+        let control = bus::control::Control::open(&plan).ok()?;
+        (control.completed_ticks() > 500).then_some(plan.run_id)
+    });
+    let outer_id = outer.run_id();
+    let outer_variable = format!("HUMMINGBUS_RUN={}", outer.run_dirs()[0].display());
+    for (process, _) in inner.processes() {
+        let variables =
+            std::fs::read(format!("/proc/{}/environ", process.as_raw_nonzero())).unwrap_or_default();
+        let inherits =
+            variables.split(|&byte| byte == 0).any(|variable| variable == outer_variable.as_bytes());
+        assert!(!inherits, "process {process:?} of the inner run carries the outer one");
+    }
+    launch.kill();
+    let report = clean(&place, &[]);
+    assert!(remains_of(&report, &outer_id).is_some() && is_live(&report, &inner_id), "{report:#}");
+    outer.await_no_process();
+    assert_eq!(outer.left(), [""; 0]);
+    assert!(!inner.processes().is_empty(), "the inner run is dead");
+    inner.await_no_process();
+    assert_eq!(inner.run_dirs(), Vec::<PathBuf>::new(), "it took its files with it");
+    let alone = place.path("alone.mcap");
+    place.call(&["run", &hover, "--record", &alone, "--set", "run.duration_s=8"]).flown();
+    place.call(&["diff", &inner.path("inner.mcap"), &alone]).with_code(0).prints(&["identical"]);
+}
+
+/// Things of every kind under the names of runs in shared memory; removed at the end.
+struct Strange(Vec<PathBuf>);
+
+impl Strange {
+    fn new(target: &Path) -> Self {
+        use rustix::fs::{CWD, FileType, makedev, mknodat};
+        let name = |number: usize, rest: &str| {
+            Path::new("/dev/shm").join(format!("hb_{:x}-{number:x}_{rest}", std::process::id()))
+        };
+        let all: Vec<PathBuf> =
+            (0..9).map(|number| name(number, "run")).chain([name(9, "control")]).collect();
+        mknodat(CWD, &all[0], FileType::Fifo, 0o666.into(), 0).unwrap();
+        drop(std::os::unix::net::UnixListener::bind(&all[1]).unwrap());
+        std::os::unix::fs::symlink(target, &all[2]).unwrap();
+        std::fs::create_dir(&all[3]).unwrap();
+        std::fs::write(all[3].join("kept"), "").unwrap();
+        std::fs::File::create(&all[4]).unwrap().set_len(1 << 33).unwrap();
+        // The null device, where one can be made.
+        let _ = mknodat(CWD, &all[5], FileType::CharacterDevice, 0o666.into(), makedev(1, 3));
+        let entry = |number: usize, run_dir: &Path| {
+            let run_id = format!("{:x}-{number:x}", std::process::id());
+            serde_json::json!({ "run_id": run_id, "run_dir": run_dir, "manifest": "/m.toml", "launcher": 1 })
+                .to_string()
+        };
+        std::fs::write(&all[6], entry(6, target)).unwrap();
+        std::fs::write(&all[7], entry(7, Path::new("/"))).unwrap();
+        std::fs::write(&all[8], " ".repeat(1 << 20)).unwrap();
+        mknodat(CWD, &all[9], FileType::Fifo, 0o666.into(), 0).unwrap();
+        Self(all)
+    }
+}
+
+impl Drop for Strange {
+    fn drop(&mut self) {
+        for path in &self.0 {
+            let _ = std::fs::remove_file(path);
+            let _ = std::fs::remove_dir_all(path);
+        }
+    }
+}
+
+/// Requires that no command stops at what is strange, and that what it points to is kept.
+fn require_unmoved(place: &Place, target: &Path) {
+    for words in [
+        &["ctl", "status", "--run", "0-0"][..],
+        &["swap", "imu", "--run", "0-0"],
+        &["top", "--once", "--run", "0-0"],
+    ] {
+        place.start(words).end_among_others().with_code(2).says(&["is alive"]);
+    }
+    let report = clean(place, &[]);
+    assert!(target.join("kept").exists(), "{report:#}");
+}
+
+#[test]
+fn names_of_runs_that_are_no_files_of_runs_hinder_nobody_and_lead_nowhere() {
+    let _alone = alone();
+    let place = Place::new();
+    let target = PathBuf::from(place.path("target"));
+    std::fs::create_dir(&target).unwrap();
+    std::fs::write(target.join("kept"), "").unwrap();
+    let strange = Strange::new(&target);
+    require_unmoved(&place, &target);
+    assert!(strange.0[3].join("kept").exists(), "no folder in shared memory is a run's");
+    drop(strange);
+    let strange = Strange::new(&target);
+    if strange.0.iter().any(|path| std::os::unix::fs::lchown(path, Some(65534), None).is_err()) {
+        println!("NOT SHOWN for names of another user, which only root can give away");
+        return;
+    }
+    require_unmoved(&place, &target);
+    assert!(strange.0.iter().all(|path| path.symlink_metadata().is_ok()), "another user's are left alone");
 }

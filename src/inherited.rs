@@ -1,0 +1,25 @@
+//! What a command inherited from the run that it was started in, forgotten: it is no process of that run.
+
+use bus::process::{LAUNCHER_VARIABLE, RUN_VARIABLE};
+use bus::{GENERATION_VARIABLE, NODE_VARIABLE};
+use std::os::unix::process::CommandExt;
+use std::process::Command;
+
+/// What a launcher tells its processes by.
+const VARIABLES: [&str; 4] = [RUN_VARIABLE, LAUNCHER_VARIABLE, NODE_VARIABLE, GENERATION_VARIABLE];
+
+/// Begins this command anew without the variables of another run, if it has one: the kernel shows the variables with
+/// which a program began, whatever it does with them later, and `clean` goes by what the kernel shows.
+pub fn forget() {
+    if VARIABLES.iter().all(|variable| std::env::var_os(variable).is_none()) {
+        return;
+    }
+    let mut words = std::env::args_os();
+    let mut command = Command::new("/proc/self/exe");
+    command.arg0(words.next().unwrap_or_else(|| "hummingbus".into())).args(words);
+    for variable in VARIABLES {
+        command.env_remove(variable);
+    }
+    // It comes back only where it failed, without /proc for one: then there is nothing that `clean` could go by.
+    let _ = command.exec();
+}
