@@ -142,7 +142,7 @@ impl Course {
             let one = |(size, w, phase): &(f64, f64, f64)| {
                 let angle = w * tau_s + phase;
                 size * match order {
-                    0 => libm::sin(angle) - libm::sin(phase),
+                    0 => libm::sin(angle) - libm::sin(*phase),
                     1 => w * libm::cos(angle) * rate,
                     _ => w * libm::cos(angle) * growth - w * w * libm::sin(angle) * rate * rate,
                 }
