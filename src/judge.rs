@@ -264,7 +264,7 @@ fn compare_states(compare: &Comparison, recording: &Recording) -> Result<WindowE
         sums[1] += (3..6).map(|field| error(field).powi(2)).sum::<f64>();
         let dot: f64 = (6..10).map(|f| simulated[f].value[index] * measured[f].value[other]).sum();
         // `clamp` keeps NaN, where `min` would make it a perfect match.
-        sums[2] += (2.0 * dot.abs().clamp(0.0, 1.0).acos()).to_degrees().powi(2);
+        sums[2] += (2.0 * libm::acos(dot.abs().clamp(0.0, 1.0))).to_degrees().powi(2);
         windows += 1;
     }
     if windows == 0 {

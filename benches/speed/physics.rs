@@ -85,7 +85,7 @@ fn cast_ns(caster: &RayCaster) -> f64 {
     let start = Instant::now();
     for step in 0..STEPS {
         let angle_rad = f64::from(step);
-        let along = Vector3::new(angle_rad.cos(), angle_rad.sin(), 0.0);
+        let along = Vector3::new(libm::cos(angle_rad), libm::sin(angle_rad), 0.0);
         black_box(caster.distance_m(black_box(&Vector3::z()), &along, 7.65));
     }
     per_step_ns(start)

@@ -33,7 +33,7 @@ pub fn report() -> Result<()> {
     }
     let exponents = (0..REPETITIONS).map(|turn| {
         let points = VEHICLES.iter().zip(&tick_us);
-        slope(points.map(|(vehicles, found)| (f64::from(*vehicles).ln(), found[turn].ln())))
+        slope(points.map(|(vehicles, found)| (libm::log(f64::from(*vehicles)), libm::log(found[turn]))))
     });
     println!("  exponent of host time per tick against vehicles {}", Spread::of(exponents.collect()));
     print_memory(folder.path())

@@ -3,8 +3,12 @@
 //! Adding or removing a node changes no other node's stream, and a stream does not depend on the
 //! order in which processes start.
 
+mod normal;
+
+pub use normal::normal;
+
 use rand_chacha::ChaCha8Rng;
-use rand_core::SeedableRng;
+use rand_core::{Rng, SeedableRng};
 
 /// The generator behind every node's noise.
 pub type Stream = ChaCha8Rng;
@@ -24,6 +28,16 @@ pub fn stream(run_seed: u64, node: &str) -> Stream {
     Stream::from_seed(key)
 }
 
+/// The next draw, evenly from 0 up to 1: a multiple of 2^-53.
+pub fn uniform(random: &mut impl Rng) -> f64 {
+    (random.next_u64() >> 11) as f64 * (0.5 * f64::EPSILON)
+}
+
+/// The number of this exponent whose fraction are the highest bits of `bits`: from 2^exponent up to twice that.
+fn exponent_and_fraction(exponent: u64, bits: u64) -> f64 {
+    f64::from_bits((1023 + exponent) << 52 | bits >> 12)
+}
+
 pub(crate) const FNV_OFFSET: u64 = 0xcbf2_9ce4_8422_2325;
 const FNV_PRIME: u64 = 0x0000_0100_0000_01b3;
 
@@ -34,8 +48,7 @@ pub(crate) fn fnv1a(bytes: &[u8], offset: u64) -> u64 {
 
 #[cfg(test)]
 mod tests {
-    use super::stream;
-    use rand_core::Rng;
+    use super::*;
 
     #[test]
     fn a_stream_is_a_function_of_seed_and_name() {

@@ -97,5 +97,5 @@ impl AltitudeLoop<'_> {
 
 /// The cosine of the angle between body z and world z, not below [`TILT_COSINE_MIN`].
 fn tilt_cosine(measured: &Measurement) -> f64 {
-    (measured.roll_rad.cos() * measured.pitch_rad.cos()).max(TILT_COSINE_MIN)
+    (libm::cos(measured.roll_rad) * libm::cos(measured.pitch_rad)).max(TILT_COSINE_MIN)
 }

@@ -137,8 +137,8 @@ impl CascadeLaw {
             let fed_rad_s = self.gains.rate_feed_forward * memory.attitude_command_rate[axis];
             (self.gains.attitude_1_s[axis] * errors_rad[axis] + fed_rad_s).clamp(-max_rad_s, max_rad_s)
         });
-        let (sin_roll, cos_roll) = measured.roll_rad.sin_cos();
-        let (sin_pitch, cos_pitch) = measured.pitch_rad.sin_cos();
+        let (sin_roll, cos_roll) = libm::sincos(measured.roll_rad);
+        let (sin_pitch, cos_pitch) = libm::sincos(measured.pitch_rad);
         Vector3::new(
             roll_rate - yaw_rate * sin_pitch,
             pitch_rate * cos_roll + yaw_rate * sin_roll * cos_pitch,
@@ -299,8 +299,8 @@ mod tests {
         let memory = ControllerState { attitude_command: [0.4, 0.0, 0.5], ..ControllerState::default() };
         let rates = law().rate_command_B_rad_s(&memory, &banked);
         let yaw_rate = law().gains.attitude_1_s[2] * 0.5;
-        assert!((rates.y - yaw_rate * 0.4_f64.sin()).abs() < 1e-12);
-        assert!((rates.z - yaw_rate * 0.4_f64.cos()).abs() < 1e-12);
+        assert!((rates.y - yaw_rate * libm::sin(0.4)).abs() < 1e-12);
+        assert!((rates.z - yaw_rate * libm::cos(0.4)).abs() < 1e-12);
     }
 
     #[test]

@@ -292,7 +292,7 @@ impl<C: Controller> Flown<'_, C> {
             thrust_N: asked.thrust_N + memory.handed_thrust,
             torque_B_N_m: asked.torque_B_N_m + Vector3::from(memory.handed_torque),
         };
-        let left = (-self.period_s / HANDOVER_TIME_CONSTANT_S).exp();
+        let left = libm::exp(-self.period_s / HANDOVER_TIME_CONSTANT_S);
         memory.handed_thrust *= left;
         memory.handed_torque = memory.handed_torque.map(|torque_N_m| torque_N_m * left);
         wrench

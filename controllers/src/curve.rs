@@ -88,7 +88,7 @@ impl Shape {
 
 /// sin(mθ) and its first four derivatives by θ.
 fn sine_derivatives(multiple: f64, phase_rad: f64) -> Derivatives {
-    let (sin, cos) = (multiple * phase_rad).sin_cos();
+    let (sin, cos) = libm::sincos(multiple * phase_rad);
     let m = multiple;
     [sin, m * cos, -m * m * sin, -m.powi(3) * cos, m.powi(4) * sin]
 }
@@ -157,7 +157,7 @@ impl Curve {
         let by_phase = self.shape.by_phase(phase[0]);
         let x = by_time(&by_phase.map(|(x, _)| x), &phase);
         let y = by_time(&by_phase.map(|(_, y)| y), &phase);
-        let (sin, cos) = self.direction_rad.sin_cos();
+        let (sin, cos) = libm::sincos(self.direction_rad);
         let mut path: Path =
             std::array::from_fn(|n| Vector3::new(cos * x[n] - sin * y[n], sin * x[n] + cos * y[n], 0.0));
         path[0] += self.start_W_m;

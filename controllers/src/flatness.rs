@@ -61,7 +61,7 @@ pub fn target(thrust_W: &Moving, yaw_rad: f64, yaw_rate_rad_s: f64) -> Target {
 
 /// The level axis to the left of the heading.
 fn left_of_heading(yaw_rad: f64, rate_rad_s: f64) -> Moving {
-    let (sin, cos) = yaw_rad.sin_cos();
+    let (sin, cos) = libm::sincos(yaw_rad);
     let value = Vector3::new(-sin, cos, 0.0);
     let first = Vector3::new(-cos, -sin, 0.0) * rate_rad_s;
     Moving { value, first, second: -value * rate_rad_s * rate_rad_s }
@@ -104,8 +104,8 @@ mod tests {
 
     /// A thrust that swings about the vertical, with exact derivatives.
     fn swinging(time_s: f64) -> Moving {
-        let (sin, cos) = (1.3 * time_s).sin_cos();
-        let (sin_2, cos_2) = (2.6 * time_s).sin_cos();
+        let (sin, cos) = libm::sincos(1.3 * time_s);
+        let (sin_2, cos_2) = libm::sincos(2.6 * time_s);
         Moving {
             value: Vector3::new(3.0 * sin, -4.0 * sin_2, 9.81 + cos),
             first: Vector3::new(3.9 * cos, -10.4 * cos_2, -1.3 * sin),

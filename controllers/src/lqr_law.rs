@@ -61,7 +61,7 @@ impl LqrLaw {
         )?;
         Ok(Self {
             gains,
-            gain: regulator.gain.fixed_view::<INPUTS, STATES>(0, 0).into(),
+            gain: regulator.gain,
             mass_kg: vehicle.mass_kg,
             inertia_B_kg_m2: vehicle.inertia_kg_m2,
             gravity_m_s2: vehicle.gravity_m_s2,

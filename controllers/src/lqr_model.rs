@@ -10,13 +10,16 @@
 
 use crate::lqr_gains::LqrGains;
 use crate::motor_lag;
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{SMatrix, SVector};
 use vehicles::Vehicle;
 
 /// States of the model.
 pub const STATES: usize = 20;
 /// Its inputs: thrust, and torque about body x, y and z.
 pub const INPUTS: usize = 4;
+
+/// Both in one.
+const BOTH: usize = STATES + INPUTS;
 
 /// Where the parts of the state begin.
 pub const VELOCITY: usize = 3;
@@ -33,9 +36,9 @@ pub const MADE_RATE: usize = 16;
 #[derive(Debug, Clone, PartialEq)]
 pub struct Step {
     /// What becomes of the state.
-    pub transition: DMatrix<f64>,
+    pub transition: SMatrix<f64, STATES, STATES>,
     /// What a held demand adds.
-    pub input: DMatrix<f64>,
+    pub input: SMatrix<f64, STATES, INPUTS>,
 }
 
 /// The step of `vehicle` over `period_s`; `None` where its inertia has no inverse.
@@ -43,7 +46,7 @@ pub struct Step {
 pub fn step(vehicle: &Vehicle, period_s: f64) -> Option<Step> {
     let inverse_inertia = vehicle.inertia_kg_m2.try_inverse()?;
     let (lag, lag_input) = motor_lag::continuous(&vehicle.motor);
-    let mut both = DMatrix::zeros(STATES + INPUTS, STATES + INPUTS);
+    let mut both = SMatrix::<f64, BOTH, BOTH>::zeros();
     for axis in 0..3 {
         both[(axis, VELOCITY + axis)] = 1.0;
         both[(ROTATION + axis, RATE + axis)] = 1.0;
@@ -63,14 +66,14 @@ pub fn step(vehicle: &Vehicle, period_s: f64) -> Option<Step> {
     }
     let step = (both * period_s).exp();
     Some(Step {
-        transition: step.view((0, 0), (STATES, STATES)).into(),
-        input: step.view((0, STATES), (STATES, INPUTS)).into(),
+        transition: step.fixed_view::<STATES, STATES>(0, 0).into(),
+        input: step.fixed_view::<STATES, INPUTS>(0, STATES).into(),
     })
 }
 
 /// The weights of states and inputs: inverse squares of the stated deviations; the wrench made costs nothing.
 #[must_use]
-pub fn weights(gains: &LqrGains) -> (DMatrix<f64>, DMatrix<f64>) {
+pub fn weights(gains: &LqrGains) -> (SMatrix<f64, STATES, STATES>, SMatrix<f64, INPUTS, INPUTS>) {
     let (tilt, tilt_rate, torque) = (gains.tilt_rad, gains.tilt_rate_rad_s, gains.tilt_torque_N_m);
     let mut states = [f64::INFINITY; STATES];
     states[..VELOCITY].fill(gains.position_m);
@@ -78,10 +81,9 @@ pub fn weights(gains: &LqrGains) -> (DMatrix<f64>, DMatrix<f64>) {
     states[ROTATION..RATE].copy_from_slice(&[tilt, tilt, gains.yaw_rad]);
     states[RATE..MADE].copy_from_slice(&[tilt_rate, tilt_rate, gains.yaw_rate_rad_s]);
     let inputs = [gains.thrust_N, torque, torque, gains.yaw_torque_N_m];
-    (inverse_squares(&states), inverse_squares(&inputs))
+    (inverse_squares(states), inverse_squares(inputs))
 }
 
-fn inverse_squares(deviations: &[f64]) -> DMatrix<f64> {
-    let squares = deviations.iter().map(|deviation| (deviation * deviation).recip());
-    DMatrix::from_diagonal(&DVector::from_iterator(deviations.len(), squares))
+fn inverse_squares<const N: usize>(deviations: [f64; N]) -> SMatrix<f64, N, N> {
+    SMatrix::from_diagonal(&SVector::from(deviations.map(|deviation| (deviation * deviation).recip())))
 }

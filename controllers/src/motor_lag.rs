@@ -174,7 +174,7 @@ mod tests {
     /// The thrust after `time_s` from rest, by the closed form of a lag of second order.
     fn step_response(wn: f64, zeta: f64, time_s: f64) -> f64 {
         let (sigma, wd) = (zeta * wn, wn * (1.0 - zeta * zeta).sqrt());
-        1.0 - (-sigma * time_s).exp() * ((wd * time_s).cos() + sigma / wd * (wd * time_s).sin())
+        1.0 - libm::exp(-sigma * time_s) * (libm::cos(wd * time_s) + sigma / wd * libm::sin(wd * time_s))
     }
 
     #[test]
@@ -184,7 +184,7 @@ mod tests {
         assert!((made.wrench.thrust_N - step_response(15.0756, 0.603, 0.1)).abs() < 1e-12);
         let lag = MotorLag::new(FIRST, 1e-3);
         let made = (0..100).fold(Made::default(), |made, _| lag.advance(&made, &thrust(1.0)));
-        assert!((made.wrench.thrust_N - (1.0 - (-2.0_f64).exp())).abs() < 1e-12);
+        assert!((made.wrench.thrust_N - (1.0 - libm::exp(-2.0))).abs() < 1e-12);
     }
 
     #[test]
@@ -197,7 +197,7 @@ mod tests {
             }
             let expected = match model {
                 SECOND => step_response(50.0, 0.7, 0.03),
-                _ => 1.0 - (-0.03 / 0.028_f64).exp(),
+                _ => 1.0 - libm::exp(-0.03 / 0.028_f64),
             };
             assert!((made.wrench.thrust_N - expected).abs() < 1e-3, "{model:?}: {made:?}");
         }

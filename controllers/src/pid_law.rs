@@ -248,7 +248,7 @@ mod tests {
             let measured = Measurement { roll_rad: roll_deg.to_radians(), pitch_rad: 0.1, ..level() };
             step(&hold(), &measured).thrust_N
         };
-        let expected_N = 0.5 * 9.81 / (20.0_f64.to_radians().cos() * 0.1_f64.cos());
+        let expected_N = 0.5 * 9.81 / (libm::cos(20.0_f64.to_radians()) * libm::cos(0.1));
         assert!((tilted(20.0) - expected_N).abs() < 1e-12);
         assert!((tilted(80.0) - 2.0 * 0.5 * 9.81).abs() < 1e-12);
     }

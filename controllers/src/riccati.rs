@@ -5,9 +5,12 @@
 //! Linear Algebra and its Applications 396 (2005), section 2: with G = B·R⁻¹·Bᵀ, H = Q and W = I + G·H it repeats
 //! A ← A·W⁻¹·A, G ← G + A·W⁻¹·G·Aᵀ, H ← H + Aᵀ·H·W⁻¹·A (all right-hand sides of the step before), and H tends to X
 //! quadratically where the system can be stabilised and every state that does not fade is weighed.
+//!
+//! The sizes are in the types: products of matrices whose sizes are found at run time are computed with whatever
+//! instructions the processor has, and differ in the last digits from one to another.
 #![allow(non_snake_case, reason = "A, B, Q, R, X, G, H and W are the equation's letters")]
 
-use nalgebra::DMatrix;
+use nalgebra::{Const, DimMin, SMatrix, ToTypenum};
 
 /// Doublings: after n the algorithm has looked 2^n steps ahead.
 const DOUBLINGS_MAX: usize = 40;
@@ -16,46 +19,57 @@ const CHANGE_MAX: f64 = 1e-14;
 /// The equation must hold to this, relatively.
 const RESIDUAL_MAX: f64 = 1e-9;
 
-/// A regulator: what the equation's solution says.
+/// A regulator of N states and M inputs: what the equation's solution says.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Regulator {
+pub struct Regulator<const N: usize, const M: usize> {
     /// X: the cost that a state x has still to come is xᵀXx.
-    pub cost: DMatrix<f64>,
+    pub cost: SMatrix<f64, N, N>,
     /// K: the best input is −Kx.
-    pub gain: DMatrix<f64>,
+    pub gain: SMatrix<f64, M, N>,
 }
 
 /// The regulator of x ← A·x + B·u with the cost Σ xᵀQx + uᵀRu; `None` where the equation has no solution that
 /// stabilises the system, or none that can be computed.
 #[must_use]
-pub fn regulator(
-    A: &DMatrix<f64>,
-    B: &DMatrix<f64>,
-    Q: &DMatrix<f64>,
-    R: &DMatrix<f64>,
-) -> Option<Regulator> {
+pub fn regulator<const N: usize, const M: usize>(
+    A: &SMatrix<f64, N, N>,
+    B: &SMatrix<f64, N, M>,
+    Q: &SMatrix<f64, N, N>,
+    R: &SMatrix<f64, M, M>,
+) -> Option<Regulator<N, M>>
+where
+    Const<N>: DimMin<Const<N>, Output = Const<N>> + ToTypenum,
+    Const<M>: DimMin<Const<M>, Output = Const<M>> + ToTypenum,
+{
     let cost = doubled(A, B, Q, R)?;
-    let weighed = R + B.transpose() * &cost * B;
-    let gain = weighed.lu().solve(&(B.transpose() * &cost * A))?;
+    let weighed = R + B.transpose() * cost * B;
+    let gain = weighed.lu().solve(&(B.transpose() * cost * A))?;
     let off = relative_residual(A, B, Q, &cost, &gain);
-    let holds = off < RESIDUAL_MAX && is_stable(&(A - B * &gain));
+    let holds = off < RESIDUAL_MAX && is_stable(&(A - B * gain));
     holds.then_some(Regulator { cost, gain })
 }
 
-fn doubled(A: &DMatrix<f64>, B: &DMatrix<f64>, Q: &DMatrix<f64>, R: &DMatrix<f64>) -> Option<DMatrix<f64>> {
-    let size = A.nrows();
-    let mut G = B * R.clone().cholesky()?.solve(&B.transpose());
-    let (mut A, mut H) = (A.clone(), Q.clone());
+fn doubled<const N: usize, const M: usize>(
+    A: &SMatrix<f64, N, N>,
+    B: &SMatrix<f64, N, M>,
+    Q: &SMatrix<f64, N, N>,
+    R: &SMatrix<f64, M, M>,
+) -> Option<SMatrix<f64, N, N>>
+where
+    Const<N>: DimMin<Const<N>, Output = Const<N>> + ToTypenum,
+{
+    let mut G = B * R.cholesky()?.solve(&B.transpose());
+    let (mut A, mut H) = (*A, *Q);
     for _ in 0..DOUBLINGS_MAX {
-        let W = (DMatrix::identity(size, size) + &G * &H).lu();
+        let W = (SMatrix::identity() + G * H).lu();
         let ahead = W.solve(&A)?;
         let reach = W.solve(&G)?;
-        let added = A.transpose() * &H * &ahead;
-        G += &A * reach * A.transpose();
-        A = &A * ahead;
-        H += &added;
+        let added = A.transpose() * H * ahead;
+        G += A * reach * A.transpose();
+        A *= ahead;
+        H += added;
         // Rounding would let the symmetry go.
-        H = (&H + H.transpose()) * 0.5;
+        H = (H + H.transpose()) * 0.5;
         if !H.iter().all(|element| element.is_finite()) {
             return None;
         }
@@ -67,23 +81,23 @@ fn doubled(A: &DMatrix<f64>, B: &DMatrix<f64>, Q: &DMatrix<f64>, R: &DMatrix<f64
 }
 
 /// By how much the equation fails, against the size of its solution.
-fn relative_residual(
-    A: &DMatrix<f64>,
-    B: &DMatrix<f64>,
-    Q: &DMatrix<f64>,
-    cost: &DMatrix<f64>,
-    gain: &DMatrix<f64>,
+fn relative_residual<const N: usize, const M: usize>(
+    A: &SMatrix<f64, N, N>,
+    B: &SMatrix<f64, N, M>,
+    Q: &SMatrix<f64, N, N>,
+    cost: &SMatrix<f64, N, N>,
+    gain: &SMatrix<f64, M, N>,
 ) -> f64 {
     let next = A.transpose() * cost * (A - B * gain) + Q;
     (next - cost).norm() / cost.norm()
 }
 
 /// Whether x ← M·x fades: M^(2^n) vanishes.
-fn is_stable(step: &DMatrix<f64>) -> bool {
-    let mut power = step.clone();
+fn is_stable<const N: usize>(step: &SMatrix<f64, N, N>) -> bool {
+    let mut power = *step;
     for _ in 0..DOUBLINGS_MAX {
-        power = &power * &power;
-        if power.amax() < 0.5 / power.nrows() as f64 {
+        power *= power;
+        if power.amax() < 0.5 / N as f64 {
             return true;
         }
     }
@@ -93,26 +107,23 @@ fn is_stable(step: &DMatrix<f64>) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    fn matrix(rows: usize, numbers: &[f64]) -> DMatrix<f64> {
-        DMatrix::from_row_slice(rows, numbers.len() / rows, numbers)
-    }
+    use nalgebra::{Matrix1, Matrix2, Vector2};
 
     /// scipy.linalg.solve_discrete_are([[1, .1], [0, 1]], [[.005], [.1]], diag([1, .5]), [[.2]]), SciPy 1.17.
     #[test]
     fn a_double_integrator_has_the_cost_that_scipy_finds() {
-        let (A, B) = (matrix(2, &[1.0, 0.1, 0.0, 1.0]), matrix(2, &[0.005, 0.1]));
-        let (Q, R) = (matrix(2, &[1.0, 0.0, 0.0, 0.5]), matrix(1, &[0.2]));
+        let (A, B) = (Matrix2::new(1.0, 0.1, 0.0, 1.0), Vector2::new(0.005, 0.1));
+        let (Q, R) = (Matrix2::new(1.0, 0.0, 0.0, 0.5), Matrix1::new(0.2));
         let found = regulator(&A, &B, &Q, &R).unwrap().cost;
-        let expected = matrix(2, &[12.33096751, 4.48608961, 4.48608961, 5.55747804]);
+        let expected = Matrix2::new(12.33096751, 4.48608961, 4.48608961, 5.55747804);
         assert!((found - expected).amax() < 5e-9);
     }
 
     /// a·x with b = q = r = 1 has x² − a²·x − 1 = 0.
     #[test]
     fn a_single_state_has_the_closed_solution() {
-        for a in [0.0, 0.5, 1.0, 2.0] {
-            let (A, one) = (matrix(1, &[a]), matrix(1, &[1.0]));
+        for a in [0.0, 0.5, 1.0, 2.0_f64] {
+            let (A, one) = (Matrix1::new(a), Matrix1::new(1.0));
             let found = regulator(&A, &one, &one, &one).unwrap().cost[0];
             let expected = (a * a + (a.powi(4) + 4.0).sqrt()) / 2.0;
             assert!((found - expected).abs() < 1e-12, "{a}");
@@ -121,8 +132,7 @@ mod tests {
 
     #[test]
     fn a_system_that_cannot_be_stabilised_has_no_regulator() {
-        let (A, B) = (matrix(2, &[1.1, 0.0, 0.0, 0.9]), matrix(2, &[0.0, 1.0]));
-        let (Q, R) = (DMatrix::identity(2, 2), matrix(1, &[1.0]));
-        assert_eq!(regulator(&A, &B, &Q, &R), None);
+        let (A, B) = (Matrix2::new(1.1, 0.0, 0.0, 0.9), Vector2::new(0.0, 1.0));
+        assert_eq!(regulator(&A, &B, &Matrix2::identity(), &Matrix1::new(1.0)), None);
     }
 }

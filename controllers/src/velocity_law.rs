@@ -197,8 +197,8 @@ impl VelocityLoop {
     /// Roll and pitch that accelerate so at constant height.
     fn tilt_rad(&self, acceleration_m_s2: &[f64; 2]) -> (f64, f64) {
         let gravity_m_s2 = self.cascade.vehicle.gravity_m_s2;
-        let pitch_rad = (acceleration_m_s2[0] / gravity_m_s2).atan();
-        (-(acceleration_m_s2[1] * pitch_rad.cos() / gravity_m_s2).atan(), pitch_rad)
+        let pitch_rad = libm::atan(acceleration_m_s2[0] / gravity_m_s2);
+        (-libm::atan(acceleration_m_s2[1] * libm::cos(pitch_rad) / gravity_m_s2), pitch_rad)
     }
 }
 
@@ -258,7 +258,7 @@ fn velocity_m_s(told: &Told<'_>, measured: &Measurement) -> [f64; 2] {
 
 /// A level vector of the world along the axes of a heading.
 fn along_heading([x, y]: [f64; 2], yaw_rad: f64) -> [f64; 2] {
-    let (sin, cos) = yaw_rad.sin_cos();
+    let (sin, cos) = libm::sincos(yaw_rad);
     [cos * x + sin * y, cos * y - sin * x]
 }
 

@@ -111,7 +111,7 @@ fn every_law_takes_over_from_every_other_without_a_jump_in_the_demanded_wrench()
                 worst_step = (worst_step.0.max(step.0), worst_step.1.max(step.1));
                 height_error_m = height_error_m.max((flight.position().z - 1.5).abs());
                 let (roll_rad, pitch_rad, _) = flight.state.body.attitude_WB.euler_angles();
-                tilt_rad = tilt_rad.max(roll_rad.hypot(pitch_rad));
+                tilt_rad = tilt_rad.max(libm::hypot(roll_rad, pitch_rad));
                 before = demand;
             }
             println!(
@@ -175,14 +175,14 @@ fn assert_outlives<A: Controller, B: Controller>(
     for _ in 0..3000 {
         flight.step(after);
         let (roll_rad, pitch_rad, _) = flight.state.body.attitude_WB.euler_angles();
-        tilt_rad = tilt_rad.max(roll_rad.hypot(pitch_rad));
+        tilt_rad = tilt_rad.max(libm::hypot(roll_rad, pitch_rad));
         height_error_m = height_error_m.max((flight.position().z - 1.5).abs());
     }
     let name = format!("law {} after {}", B::LAW, A::LAW);
     println!("{name}: {height_error_m:.3} m and {tilt_rad:.3} rad at most");
     assert!(height_error_m < 0.3 && tilt_rad < 0.6, "{name}: {height_error_m} m, {tilt_rad} rad");
     let (roll_rad, pitch_rad, _) = flight.state.body.attitude_WB.euler_angles();
-    let is_level = roll_rad.hypot(pitch_rad) < 0.05 && (flight.position().z - 1.5).abs() < 0.05;
+    let is_level = libm::hypot(roll_rad, pitch_rad) < 0.05 && (flight.position().z - 1.5).abs() < 0.05;
     assert!(is_level, "{name} does not hover again: {}", flight.position());
 }
 

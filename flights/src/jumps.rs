@@ -106,7 +106,7 @@ mod tests {
         let time_s: Vec<f64> = (0..600).map(|k| f64::from(k) * 0.01).collect();
         let position = |(k, t): (usize, &f64)| {
             let noise = 0.5e-3 * (((k * 7919) % 1009) as f64 / 504.5 - 1.0);
-            [0.6 * (5.0 * t).sin() + noise + if *t > 3.005 { jump_m } else { 0.0 }, 0.0, 1.0]
+            [0.6 * libm::sin(5.0 * t) + noise + if *t > 3.005 { jump_m } else { 0.0 }, 0.0, 1.0]
         };
         Channel { values: time_s.iter().enumerate().map(position).collect(), time_s }
     }

@@ -250,7 +250,7 @@ impl Judge<'_> {
         let pairs = Pairs::leaning(attitude, position, gravity_m_s2, LEANING_WINDOW_S);
         let agreement = pairs.agreement(QUIET_ACCELERATION_M_S2 * self.position_scale())?;
         let factor = 1.0 / agreement.slope;
-        if agreement.correlation <= SAME || factor.ln().abs() < LEANING_TOLERANCE.ln() {
+        if agreement.correlation <= SAME || libm::log(factor).abs() < libm::log(LEANING_TOLERANCE) {
             return None;
         }
         let what = format!(
@@ -308,8 +308,8 @@ impl Judge<'_> {
         let of = |name: &str| ANGLES.iter().find(|own| own.0 == name).map(|own| own.1);
         let declared = entry.unit.as_deref()?;
         let (name, other) = ANGLES.iter().find(|own| own.0 != declared)?;
-        let off = (other / of(declared)? / factor).ln().abs();
-        (off < LEANING_TOLERANCE.ln()).then(|| format!("`unit = \"{name}\"` of `attitude`"))
+        let off = libm::log(other / of(declared)? / factor).abs();
+        (off < libm::log(LEANING_TOLERANCE)).then(|| format!("`unit = \"{name}\"` of `attitude`"))
     }
 
     /// How much smaller a position can be than its true one, if its unit is declared too large.
@@ -392,7 +392,7 @@ impl Judge<'_> {
 
     /// A finding for values `factor` times too large: clear if another unit explains it within `tolerance`.
     fn by_unit(&self, quantity: Quantity, factor: f64, tolerance: f64, what: &str) -> Option<Finding> {
-        if factor > 0.0 && factor.ln().abs() < tolerance.ln() {
+        if factor > 0.0 && libm::log(factor).abs() < libm::log(tolerance) {
             return None;
         }
         let fits = self.unit_that_fits(quantity, factor, tolerance);
@@ -406,10 +406,10 @@ impl Judge<'_> {
     /// The unit in which values would be right that are now `factor` times too large.
     fn unit_that_fits(&self, quantity: Quantity, factor: f64, tolerance: f64) -> Option<String> {
         let declared = self.factor(quantity);
-        let off = |other: f64| (factor * other / declared).abs().ln().abs();
+        let off = |other: f64| libm::log((factor * other / declared).abs()).abs();
         let others = quantity.units().iter().filter(|(name, _)| *name != self.unit(quantity));
         let best = others.min_by(|a, b| off(a.1).total_cmp(&off(b.1)))?;
-        (off(best.1) < tolerance.ln()).then(|| format!("`unit = \"{}\"`", best.0))
+        (off(best.1) < libm::log(tolerance)).then(|| format!("`unit = \"{}\"`", best.0))
     }
 
     /// The declared unit; SI where the flights file leaves it to the type of message.

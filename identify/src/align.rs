@@ -44,7 +44,7 @@ pub struct Offset {
 
 impl Offset {
     fn of(found: Found, taken_off: f64) -> Self {
-        let half = (1.96 * found.deviation_s).hypot(found.between_s);
+        let half = libm::hypot(1.96 * found.deviation_s, found.between_s);
         Self { value: found.late_s, low: found.late_s - half, high: found.late_s + half, taken_off }
     }
 }
@@ -76,7 +76,7 @@ impl Found {
     /// Whether what it has beyond `other` is more than chance and the grid make of none.
     fn is_beyond(&self, other: &Found, least_s: f64) -> bool {
         let own_s = (self.late_s - other.late_s).abs();
-        let deviation_s = self.deviation_s.hypot(other.deviation_s);
+        let deviation_s = libm::hypot(self.deviation_s, other.deviation_s);
         own_s > SURE * deviation_s && own_s > least_s.max(self.between_s).max(other.between_s)
     }
 

@@ -102,8 +102,11 @@ pub fn inverse(gram: &DMatrix<f64>) -> DMatrix<f64> {
     let largest = eigen.eigenvalues.iter().copied().fold(0.0, f64::max);
     let inverse =
         eigen.eigenvalues.map(|value| if value > RANK_TOLERANCE * largest { 1.0 / value } else { 0.0 });
-    let scaled = &eigen.eigenvectors * DMatrix::from_diagonal(&inverse) * eigen.eigenvectors.transpose();
-    DMatrix::from_fn(size, size, |i, j| scaled[(i, j)] * scale(i) * scale(j))
+    // Not as a product of matrices, whose last digits depend on the processor where sizes are found at run time.
+    let product = |i: usize, j: usize| -> f64 {
+        (0..size).map(|k| eigen.eigenvectors[(i, k)] * inverse[k] * eigen.eigenvectors[(j, k)]).sum()
+    };
+    DMatrix::from_fn(size, size, |i, j| product(i, j) * scale(i) * scale(j))
 }
 
 /// The covariance of the parameters fitted on `blocks`, at whose solution the blocks are given: the jackknife over

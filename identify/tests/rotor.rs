@@ -11,7 +11,6 @@ use identify::rotor::{self, Order, RotorReport};
 use identify::statistics::Estimate;
 use rand_chacha::ChaCha8Rng;
 use rand_core::SeedableRng;
-use rand_distr::{Distribution as _, StandardNormal, StandardUniform};
 use tempfile::TempDir;
 
 const C_T: f64 = 4.0e-6;
@@ -27,12 +26,12 @@ impl Draws {
     }
 
     fn normal(&mut self) -> f64 {
-        StandardNormal.sample(&mut self.0)
+        bus::random::normal(&mut self.0)
     }
 
     /// From 0 to 1.
     fn uniform(&mut self) -> f64 {
-        StandardUniform.sample(&mut self.0)
+        bus::random::uniform(&mut self.0)
     }
 }
 
@@ -77,7 +76,7 @@ impl Motor {
     /// Runs on by `h` seconds: exactly for a first order, by the fourth-order Runge-Kutta method for a second.
     fn run(&mut self, target: f64, h: f64) {
         if self.a2_s2 == 0.0 {
-            self.speed = target + (self.speed - target) * (-h / self.a1_s).exp();
+            self.speed = target + (self.speed - target) * libm::exp(-h / self.a1_s);
             return;
         }
         let rate = |[w, v]: [f64; 2]| [v, (target - w - self.a1_s * v) / self.a2_s2];

@@ -10,7 +10,6 @@ use identify::statistics::{
 };
 use rand_chacha::ChaCha8Rng;
 use rand_core::SeedableRng;
-use rand_distr::{Distribution as _, StandardNormal};
 use serde_json::{Value, json};
 
 const PROBABILITIES: [f64; 7] = [0.001, 0.025, 0.2, 0.5, 0.9, 0.975, 0.9995];
@@ -21,7 +20,7 @@ const LAGS: usize = 25;
 /// Noise that remembers: x_t = memory x_{t-1} + e_t.
 fn remembering(samples: usize, memory: f64, seed: u64) -> Vec<f64> {
     let mut draws = ChaCha8Rng::seed_from_u64(seed);
-    let mut normal = || -> f64 { StandardNormal.sample(&mut draws) };
+    let mut normal = || bus::random::normal(&mut draws);
     let mut state = normal() / (1.0 - memory * memory).sqrt();
     (0..samples)
         .map(|_| {

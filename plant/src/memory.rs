@@ -4,8 +4,7 @@
 //! on to the same bits, random numbers included: a stream is written as its key and its position.
 
 use crate::airframe::Drive;
-use bus::random::Stream;
-use rand_distr::{Distribution, StandardNormal};
+use bus::random::{Stream, normal};
 use serde::{Deserialize, Serialize};
 
 /// What the effects of one airframe carry from tick to tick; made by
@@ -44,7 +43,7 @@ impl Remembered {
 
     /// The next four draws from the normal distribution of mean 0 and variance 1.
     pub fn normals(&mut self) -> [f64; 4] {
-        std::array::from_fn(|_| StandardNormal.sample(&mut self.random))
+        std::array::from_fn(|_| normal(&mut self.random))
     }
 }
 

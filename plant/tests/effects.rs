@@ -404,8 +404,8 @@ fn turbulence_has_the_strength_and_length_of_the_specification() {
     let drives = lags("turbulence", [10.0, 0.0, 0.0, 0.0, 0.0, 0.0], 30.48, dt_s, ticks);
     let shape: f64 = 0.177 + 0.0823;
     for (axis, sigma_m_s, length_m) in [
-        (0, 1.0 / shape.powf(0.4), 30.48 / shape.powf(1.2)),
-        (1, 1.0 / shape.powf(0.4), 30.48 / shape.powf(1.2)),
+        (0, 1.0 / libm::pow(shape, 0.4), 30.48 / libm::pow(shape, 1.2)),
+        (1, 1.0 / libm::pow(shape, 0.4), 30.48 / libm::pow(shape, 1.2)),
         (2, 1.0, 30.48),
     ] {
         let samples: Vec<f64> = drives.iter().map(|drive| drive.air_velocity_W_m_s[axis]).collect();
@@ -416,7 +416,7 @@ fn turbulence_has_the_strength_and_length_of_the_specification() {
             (sigma / sigma_m_s - 1.0).abs() < 6.0 / (2.0 * draws).sqrt(),
             "axis {axis}: {sigma} {sigma_m_s}"
         );
-        assert!((correlation - (-1.0_f64).exp()).abs() < 6.0 / draws.sqrt(), "axis {axis}: {correlation}");
+        assert!((correlation - libm::exp(-1.0)).abs() < 6.0 / draws.sqrt(), "axis {axis}: {correlation}");
     }
 }
 
@@ -429,10 +429,10 @@ fn turbulence_near_the_ground_fades_with_height_and_differs_between_rotors() {
     };
     let ((ground, correlation), (above, _)) = (sigma(0.0), sigma(0.6));
     assert!(
-        (ground - 0.1).abs() < 0.01 && (correlation - (-1.0_f64).exp()).abs() < 0.1,
+        (ground - 0.1).abs() < 0.01 && (correlation - libm::exp(-1.0)).abs() < 0.1,
         "{ground} {correlation}"
     );
-    assert!((above / ground - (-2.0_f64).exp()).abs() < 1e-9, "the same draws, weaker: {above} {ground}");
+    assert!((above / ground - libm::exp(-2.0)).abs() < 1e-9, "the same draws, weaker: {above} {ground}");
     let drives = lags("ground-turbulence", values, 0.0, TICK_S, 200_000);
     let product = |a: usize, b: usize| {
         drives.iter().map(|drive| drive.thrust_deviation[a] * drive.thrust_deviation[b]).sum::<f64>()

@@ -30,8 +30,8 @@ fn the_hummingbirds_motor_steps_like_an_underdamped_second_order_system() {
     let root = (1.0 - zeta * zeta).sqrt();
     for (time, speed) in step_response(&vehicle, 50.0, 90.0) {
         let phase = wn * root * time;
-        let swing = phase.cos() + zeta / root * phase.sin();
-        let exact = target + (start - target) * (-zeta * wn * time).exp() * swing;
+        let swing = libm::cos(phase) + zeta / root * libm::sin(phase);
+        let exact = target + (start - target) * libm::exp(-zeta * wn * time) * swing;
         assert!((speed - exact).abs() < 1e-6, "{speed} instead of {exact} rad/s at {time} s");
     }
 }
@@ -44,7 +44,7 @@ fn the_crazyflies_motor_steps_like_a_first_order_system() {
     };
     let (start, target) = (vehicle.command.speed(20_000.0), vehicle.command.speed(50_000.0));
     for (time, speed) in step_response(&vehicle, 20_000.0, 50_000.0) {
-        let exact = target + (start - target) * (-time / time_constant_s).exp();
+        let exact = target + (start - target) * libm::exp(-time / time_constant_s);
         assert!((speed - exact).abs() < 1e-6, "{speed} instead of {exact} rad/s at {time} s");
     }
 }

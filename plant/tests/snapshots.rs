@@ -25,13 +25,13 @@ fn nobody(_: u32) -> Vec<Neighbour> {
 /// Somebody who flies through the room, to and fro.
 fn somebody(tick: u32) -> Vec<Neighbour> {
     let angle = f64::from(tick) * 2e-3;
-    let position_W_m = Vector3::new(3.9 + 1.0 * angle.cos(), 0.2 * angle.sin(), 0.1);
-    let velocity_W_m_s = Vector3::new(-2.0 * angle.sin(), 0.4 * angle.cos(), 0.0);
+    let position_W_m = Vector3::new(3.9 + 1.0 * libm::cos(angle), 0.2 * libm::sin(angle), 0.1);
+    let velocity_W_m_s = Vector3::new(-2.0 * libm::sin(angle), 0.4 * libm::cos(angle), 0.0);
     vec![Neighbour { number: 1, position_W_m, velocity_W_m_s }]
 }
 
 fn uneven(tick: u32) -> [f64; 4] {
-    let swing = 60.0 * (f64::from(tick) * 0.01).sin();
+    let swing = 60.0 * libm::sin(f64::from(tick) * 0.01);
     [76.5 + swing, 80.0, 76.5 - swing, 70.0]
 }
 

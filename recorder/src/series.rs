@@ -130,8 +130,8 @@ fn value<'a>(leaves: &'a [Leaf], field: &str) -> Option<(f64, &'a str)> {
 #[must_use]
 pub fn roll_pitch_yaw([x, y, z, w]: [f64; 4]) -> [f64; 3] {
     [
-        (2.0 * (w * x + y * z)).atan2(1.0 - 2.0 * (x * x + y * y)),
-        (2.0 * (w * y - z * x)).clamp(-1.0, 1.0).asin(),
-        (2.0 * (w * z + x * y)).atan2(1.0 - 2.0 * (y * y + z * z)),
+        libm::atan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y)),
+        libm::asin((2.0 * (w * y - z * x)).clamp(-1.0, 1.0)),
+        libm::atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z)),
     ]
 }

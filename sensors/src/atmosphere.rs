@@ -16,13 +16,13 @@ const EXPONENT: f64 = 9.806_65 * 0.028_964_4 / (8.314_32 * LAPSE_K_M);
 /// The pressure, Pa, `height_m` above where it is `ground_pressure_Pa`; zero above 44 km, where the formula ends.
 #[must_use]
 pub fn pressure_Pa(height_m: f64, ground_pressure_Pa: f64) -> f64 {
-    ground_pressure_Pa * (1.0 - LAPSE_K_M * height_m / TEMPERATURE_K).max(0.0).powf(EXPONENT)
+    ground_pressure_Pa * libm::pow((1.0 - LAPSE_K_M * height_m / TEMPERATURE_K).max(0.0), EXPONENT)
 }
 
 /// The height, m, above where the pressure is `reference_pressure_Pa`, at which it is `pressure_Pa`.
 #[must_use]
 pub fn height_m(pressure_Pa: f64, reference_pressure_Pa: f64) -> f64 {
-    TEMPERATURE_K / LAPSE_K_M * (1.0 - (pressure_Pa / reference_pressure_Pa).powf(EXPONENT.recip()))
+    TEMPERATURE_K / LAPSE_K_M * (1.0 - libm::pow(pressure_Pa / reference_pressure_Pa, EXPONENT.recip()))
 }
 
 #[cfg(test)]

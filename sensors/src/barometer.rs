@@ -13,8 +13,8 @@ use crate::parameter::{ParameterError, finite, not_negative, positive};
 use crate::steps::in_steps;
 use bus::kind::{Inputs, NodeKind, PortSpec, read_parameters};
 use bus::messages::{Barometer, PlantState};
+use bus::random::normal;
 use bus::{BusError, Message, Node};
-use rand_distr::{Distribution, StandardNormal};
 use serde::Deserialize;
 
 /// The barometer, for manifests.
@@ -107,8 +107,8 @@ impl BarometerParams {
 
     /// What is read at `altitude_m`, Pa; the bias then walks one step on.
     fn measure(&self, altitude_m: f64, bias_Pa: &mut f64, chance: &mut Chance<'_>) -> f64 {
-        let noise: f64 = StandardNormal.sample(chance.noise);
-        let step: f64 = StandardNormal.sample(chance.noise);
+        let noise = normal(chance.noise);
+        let step = normal(chance.noise);
         let read_Pa = pressure_Pa(altitude_m, self.ground_pressure_Pa) + *bias_Pa + self.noise_Pa * noise;
         *bias_Pa += BiasWalk::new(self.bias_walk_Pa_sqrt_s, self.rate_hz).step_sigma() * step;
         in_steps(read_Pa, self.resolution_Pa).clamp(PRESSURE_MIN_PA, PRESSURE_MAX_PA)

@@ -11,8 +11,8 @@ use crate::parameter::{ParameterError, check, finite, not_negative, positive};
 use crate::steps::in_steps;
 use bus::kind::{Inputs, NodeKind, PortSpec, read_parameters};
 use bus::messages::Battery;
+use bus::random::normal;
 use bus::{BusError, Message, Node};
-use rand_distr::{Distribution, StandardNormal};
 use serde::Deserialize;
 
 /// The battery monitor, for manifests.
@@ -83,7 +83,7 @@ impl Default for BatteryParams {
 
 /// One quantity as a converter reads it.
 fn read(truth: f64, bias: f64, sigma: f64, step: f64, chance: &mut Chance<'_>) -> f64 {
-    let noise: f64 = StandardNormal.sample(chance.noise);
+    let noise = normal(chance.noise);
     in_steps(truth + bias + sigma * noise, step)
 }
 

@@ -11,9 +11,8 @@
 //! average. They are drawn from a stream of their own: switching them on does not reshuffle the noise.
 
 use crate::parameter::{ParameterError, check, not_negative, positive};
-use bus::random::{Stream, stream};
+use bus::random::{Stream, stream, uniform};
 use bus::{BusError, Message, Node};
-use rand_distr::{Distribution, StandardUniform};
 
 /// How many measurements a queue holds: those under way, and the one that arrived last.
 pub(crate) const QUEUE: usize = 32;
@@ -139,8 +138,7 @@ impl Chance<'_> {
     pub fn is_lost(&mut self, part: u32) -> bool {
         let was_lost = *self.lost >> part & 1 == 1;
         let chance = if was_lost { self.losses.go_on } else { self.losses.begin };
-        let drawn: f64 = StandardUniform.sample(self.loss);
-        let is_lost = drawn < chance;
+        let is_lost = uniform(self.loss) < chance;
         *self.lost = *self.lost & !(1 << part) | u32::from(is_lost) << part;
         is_lost
     }

@@ -112,12 +112,12 @@ impl Judge {
 
 /// Adds the turn since the last tick, less than half of one.
 fn count_laps(memory: &mut Memory, position_W_m: &Vector3<f64>) {
-    if position_W_m.x.hypot(position_W_m.y) < MIDDLE_M {
+    if libm::hypot(position_W_m.x, position_W_m.y) < MIDDLE_M {
         // There a bearing jumps with every millimetre.
         memory.bearing = f64::NAN;
         return;
     }
-    let bearing_rad = position_W_m.y.atan2(position_W_m.x);
+    let bearing_rad = libm::atan2(position_W_m.y, position_W_m.x);
     if !memory.bearing.is_nan() {
         let turn_rad = (bearing_rad - memory.bearing + PI).rem_euclid(TAU) - PI;
         memory.laps -= turn_rad / TAU;
@@ -153,7 +153,8 @@ mod tests {
         let mut memory = Memory { bearing: f64::NAN, laps: 0.0 };
         for step in 0..=2000 {
             let angle_rad = -TAU * f64::from(step) / 1000.0;
-            let position = VectorMessage { x: 2.0 * angle_rad.cos(), y: 2.0 * angle_rad.sin(), z: 1.0 };
+            let position =
+                VectorMessage { x: 2.0 * libm::cos(angle_rad), y: 2.0 * libm::sin(angle_rad), z: 1.0 };
             judge().clearance(&mut memory, &position);
         }
         assert!((memory.laps - 2.0).abs() < 1e-9, "{}", memory.laps);

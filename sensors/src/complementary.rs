@@ -76,7 +76,7 @@ pub fn gyroscope_weight(time_constant_s: f64, period_s: f64) -> f64 {
 #[must_use]
 pub fn tilt_rad(specific_force_B: &Vector3<f64>) -> (f64, f64) {
     let [x, y, z]: [f64; 3] = (*specific_force_B).into();
-    (y.atan2(z), (-x).atan2(y.hypot(z)))
+    (libm::atan2(y, z), libm::atan2(-x, libm::hypot(y, z)))
 }
 
 /// The filter at one sample period: all that does not change during a run.
@@ -249,7 +249,7 @@ mod tests {
         let mut state = ComplementaryState::default();
         let mut estimate = filter.step(&mut state, &at_rest(0.2, -0.1));
         (0..500).for_each(|_| estimate = filter.step(&mut state, &at_rest(0.2, -0.1)));
-        let left = (-1.0_f64).exp();
+        let left = libm::exp(-1.0);
         assert!((estimate.roll_rad - 0.2 * (1.0 - left)).abs() < 1e-3);
         assert!((estimate.pitch_rad + 0.1 * (1.0 - left)).abs() < 1e-3);
         (0..5000).for_each(|_| estimate = filter.step(&mut state, &at_rest(0.2, -0.1)));
@@ -266,9 +266,9 @@ mod tests {
         state.last_angular_velocity_B_rad_s = Some(Vector3::new(p, q, r));
         let fall = reading(Vector3::zeros(), Vector3::new(p, q, r));
         let estimate = filter(30.0).step(&mut state, &fall);
-        let roll_rate = p + pitch.tan() * (q * roll.sin() + r * roll.cos());
-        let pitch_rate = q * roll.cos() - r * roll.sin();
-        let yaw_rate = (q * roll.sin() + r * roll.cos()) / pitch.cos();
+        let roll_rate = p + libm::tan(pitch) * (q * libm::sin(roll) + r * libm::cos(roll));
+        let pitch_rate = q * libm::cos(roll) - r * libm::sin(roll);
+        let yaw_rate = (q * libm::sin(roll) + r * libm::cos(roll)) / libm::cos(pitch);
         // The rates change within the step, by its square.
         assert!((estimate.roll_rad - roll - roll_rate * PERIOD_S).abs() < 2e-6);
         assert!((estimate.pitch_rad - pitch - pitch_rate * PERIOD_S).abs() < 2e-6);

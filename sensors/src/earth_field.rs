@@ -25,8 +25,8 @@ impl EarthField {
     /// The field in the world: x north, y west, z up. An eastern declination turns it clockwise seen from above.
     #[must_use]
     pub fn vector_W_T(&self) -> Vector3<f64> {
-        let (down, level) = self.inclination_deg.to_radians().sin_cos();
-        let (east, north) = self.declination_deg.to_radians().sin_cos();
+        let (down, level) = libm::sincos(self.inclination_deg.to_radians());
+        let (east, north) = libm::sincos(self.declination_deg.to_radians());
         self.field_T * Vector3::new(level * north, -level * east, -down)
     }
 }

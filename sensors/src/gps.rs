@@ -96,7 +96,7 @@ impl GpsParams {
         let sigma_m = Vector3::from(self.position_drift_m);
         let new_W_m = sigma_m.component_mul(&standard_normal(random));
         let Some(drift_W_m) = drift_W_m else { return new_W_m };
-        let kept = (-(self.rate_hz * self.position_drift_time_s).recip()).exp();
+        let kept = libm::exp(-(self.rate_hz * self.position_drift_time_s).recip());
         kept * drift_W_m + (1.0 - kept * kept).sqrt() * new_W_m
     }
 
@@ -230,7 +230,7 @@ mod tests {
         };
         // 50 measurements are one time constant; 400 000 hold some 4000 independent ones.
         let ratio = mean_of(50) / mean_of(0);
-        assert!((ratio - (-1.0_f64).exp()).abs() < 6.0 / 4000.0_f64.sqrt(), "{ratio}");
+        assert!((ratio - libm::exp(-1.0)).abs() < 6.0 / 4000.0_f64.sqrt(), "{ratio}");
     }
 
     #[test]

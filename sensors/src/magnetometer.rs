@@ -190,7 +190,7 @@ mod tests {
             for yaw_deg in [-170.0, -30.0, 0.0, 45.0, 120.0] {
                 // The needle points to -declination in the world, from which the body has turned by its yaw.
                 let field_B_T = read(&params, &turned(0.0, 0.0, yaw_deg));
-                let needle_deg = field_B_T.y.atan2(field_B_T.x).to_degrees();
+                let needle_deg = libm::atan2(field_B_T.y, field_B_T.x).to_degrees();
                 let error_deg = (needle_deg + declination_deg + yaw_deg).rem_euclid(360.0);
                 assert!(error_deg.min(360.0 - error_deg) < 1e-9, "{error_deg} at {yaw_deg}");
             }

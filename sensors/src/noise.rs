@@ -4,9 +4,8 @@
 //! truth + bias + white noise, and the bias is the integral of a second white noise. A density holds
 //! at any rate; the size of one sample follows from the density and the time between samples.
 
-use bus::random::Stream;
+use bus::random::{Stream, normal};
 use nalgebra::Vector3;
-use rand_distr::{Distribution, StandardNormal};
 
 /// White noise on each of three axes, independent between axes and between samples.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -67,9 +66,9 @@ impl BiasWalk {
 /// Three independent draws from the normal distribution of zero mean and unit variance.
 pub(crate) fn standard_normal(random: &mut Stream) -> Vector3<f64> {
     // Bound one by one so that the order of drawing is in the source, not left to the constructor.
-    let x: f64 = StandardNormal.sample(random);
-    let y: f64 = StandardNormal.sample(random);
-    let z: f64 = StandardNormal.sample(random);
+    let x = normal(random);
+    let y = normal(random);
+    let z = normal(random);
     Vector3::new(x, y, z)
 }
 

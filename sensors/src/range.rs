@@ -16,9 +16,9 @@ use crate::steps::in_steps;
 use crate::wire::{attitude, vector};
 use bus::kind::{Inputs, NodeKind, PortSpec, read_parameters};
 use bus::messages::{PlantState, Ranges, Traffic};
+use bus::random::normal;
 use bus::{BusError, Message, Node};
 use nalgebra::{UnitQuaternion, Vector3};
-use rand_distr::{Distribution, StandardNormal};
 use scenes::{RayCaster, Scene};
 use serde::Deserialize;
 use std::path::PathBuf;
@@ -197,7 +197,7 @@ impl RangeFinders {
     ) -> Ranges {
         let mut ranges = *last;
         for (beam, distance_m) in self.distances_m(truth, traffic).into_iter().enumerate() {
-            let noise: f64 = StandardNormal.sample(chance.noise);
+            let noise = normal(chance.noise);
             let read_m = self.reading_m(beam, distance_m, noise);
             let is_lost = chance.is_lost(beam as u32);
             ranges.valid[beam] = u32::from(read_m.is_some() && !is_lost);
@@ -321,11 +321,11 @@ mod tests {
     fn the_beams_tilt_with_the_body() {
         // Nose down by 30°: ahead is the floor, behind goes up to the wall below its 3 m, down tilts backward.
         let ranges = read(perfect(), &at([-3.0, 0.0, 1.5], 0.0, 30.0, 0.0), None);
-        let cos = 30.0_f64.to_radians().cos();
+        let cos = libm::cos(30.0_f64.to_radians());
         assert_near(ranges.distance, [3.0, 2.0 / cos, 5.0, 5.0, 1.5 / cos]);
         // Left side up by 20°: the right beam meets the floor.
         let ranges = read(perfect(), &at([0.0, -4.0, 0.3], 20.0, 0.0, 0.0), None);
-        let (sin, cos) = 20.0_f64.to_radians().sin_cos();
+        let (sin, cos) = libm::sincos(20.0_f64.to_radians());
         assert!((ranges.distance[3] - 0.3 / sin).abs() < 1e-9, "{ranges:?}");
         assert!((ranges.distance[4] - 0.3 / cos).abs() < 1e-9, "{ranges:?}");
     }

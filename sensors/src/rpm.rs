@@ -9,8 +9,8 @@ use crate::parameter::{ParameterError, check, not_negative};
 use crate::steps::in_steps;
 use bus::kind::{Inputs, NodeKind, PortSpec, read_parameters};
 use bus::messages::{PlantState, RotorSpeeds};
+use bus::random::normal;
 use bus::{BusError, Message, Node};
-use rand_distr::{Distribution, StandardNormal};
 use serde::Deserialize;
 
 /// The rotor speed sensor, for manifests.
@@ -87,7 +87,7 @@ impl RpmParams {
     fn read(&self, truth_rad_s: &[f64; 4], before: Option<[f64; 4]>, chance: &mut Chance<'_>) -> [f64; 4] {
         std::array::from_fn(|rotor| {
             // Drawn whatever the fault is: a fault reshuffles no noise.
-            let noise: f64 = StandardNormal.sample(chance.noise);
+            let noise = normal(chance.noise);
             match before {
                 Some(before) if rotor + 1 == self.stuck_rotor => before[rotor],
                 _ => self.count(truth_rad_s[rotor] + self.noise_rad_s * noise, rotor),

@@ -10,9 +10,8 @@
 
 mod support;
 
-use bus::random::{Stream, stream};
+use bus::random::{Stream, normal, stream};
 use nalgebra::{SVector, UnitQuaternion, Vector3};
-use rand_distr::{Distribution, StandardNormal};
 use sensors::ekf::filter::{Ekf, EkfState, deviation};
 use sensors::ekf::history::{Measurement, Newest, Reading, Sensor};
 use sensors::ekf::params::EkfParams;
@@ -30,7 +29,7 @@ const BOUND: f64 = 1.96;
 
 /// Every axis turned and pushed, at periods that share no multiple within the flight.
 fn excited(time_s: f64) -> [f64; 4] {
-    let swing = |amplitude: f64, period_s: f64| amplitude * (TAU * time_s / period_s).sin();
+    let swing = |amplitude: f64, period_s: f64| amplitude * libm::sin(TAU * time_s / period_s);
     [swing(0.3, 2.7), swing(0.25, 3.4), swing(1.2, 11.0), swing(1.0, 2.1)]
 }
 
@@ -76,7 +75,7 @@ impl World {
 
     /// GPS drift and barometer bias, one period on.
     fn wander(&mut self) {
-        let fade = (-PERIOD_S / self.params.gps_position_drift_time_s).exp();
+        let fade = libm::exp(-PERIOD_S / self.params.gps_position_drift_time_s);
         let step = Vector3::from(self.params.gps_position_drift_m) * (1.0 - fade * fade).sqrt();
         self.gps_drift_W_m = fade * self.gps_drift_W_m + step.component_mul(&normal3(&mut self.random));
         let walk = self.params.barometer_bias_walk_m_sqrt_s * PERIOD_S.sqrt();
@@ -119,10 +118,6 @@ impl World {
         let field_B = field_B + self.params.magnetometer_noise_T * normal3(&mut self.random);
         field_B.iter().copied().collect()
     }
-}
-
-fn normal(random: &mut Stream) -> f64 {
-    StandardNormal.sample(random)
 }
 
 fn normal3(random: &mut Stream) -> Vector3<f64> {

@@ -7,9 +7,8 @@
 mod support;
 
 use bus::messages::Ranges;
-use bus::random::{Stream, stream};
+use bus::random::{Stream, normal, stream};
 use nalgebra::Vector3;
-use rand_distr::{Distribution, StandardNormal};
 use sensors::complementary::{Complementary, ComplementaryParams, ComplementaryState};
 use sensors::imu_model::{ImuModel, ImuParams};
 use sensors::range_inertial::filter::{Inputs, RangeInertial, RangeInertialState, Wall};
@@ -44,7 +43,7 @@ fn range_m(truth: &Truth, direction_B: Vector3<f64>, walls: [Option<f64>; 4], ra
     let plane = |at: f64, axis: usize| (at - from[axis]) / along[axis];
     let walls = walls.into_iter().enumerate().filter_map(|(i, at)| Some(plane(at?, i / 2)));
     let met = walls.chain([plane(0.0, 2)]).filter(|distance| *distance > 0.0);
-    let noise: f64 = StandardNormal.sample(random);
+    let noise = normal(random);
     let nearest_m = met.fold(f64::INFINITY, f64::min);
     ((nearest_m + 0.01 * noise).min(REACH_M) * 100.0).round() / 100.0
 }
@@ -104,7 +103,8 @@ fn to_the_wall(time_s: f64) -> [f64; 4] {
 
 /// Both axes, yaw and height at once.
 fn weave(time_s: f64) -> [f64; 4] {
-    let swing = |amplitude: f64, period_s: f64| amplitude * (std::f64::consts::TAU * time_s / period_s).cos();
+    let swing =
+        |amplitude: f64, period_s: f64| amplitude * libm::cos(std::f64::consts::TAU * time_s / period_s);
     let soft = pulse(time_s, 0.0, 1e3, 1.0);
     [soft * swing(0.17, 3.1), soft * swing(0.2, 2.3), 0.2 - swing(0.2, 7.0), soft * swing(0.5, 2.0)]
 }
@@ -161,7 +161,7 @@ fn weaving_in_a_room_all_four_walls_and_the_height_are_known() {
     let wall = |run: &Run| {
         let p = run.truth.position_W_m;
         assert!(p.xy().amax() < 3.0, "the flight leaves the room: {p}");
-        let turn = run.yaw_rad.cos();
+        let turn = libm::cos(run.yaw_rad);
         let truth = [5.0 - p.x, 5.0 + p.x, 5.0 - p.y, 5.0 + p.y].map(|distance| distance / turn);
         let errors = run.walls.iter().zip(truth).filter(|(wall, _)| wall.is_in_sight);
         errors.map(|(wall, truth)| (wall.distance_m - truth).abs()).fold(0.0, f64::max)

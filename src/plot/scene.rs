@@ -17,7 +17,7 @@ pub struct Solid {
 impl Solid {
     fn of(cuboid: &Cuboid) -> Self {
         let ([x, y, z], [a, b, c]) = (cuboid.centre_W_m.into(), cuboid.half_extents_m.into());
-        let (sin, cos) = cuboid.yaw_rad.sin_cos();
+        let (sin, cos) = libm::sincos(cuboid.yaw_rad);
         let corner = |index: usize| {
             let (ahead, left) = [(-a, -b), (a, -b), (a, b), (-a, b)][index % 4];
             let up = if index < 4 { -c } else { c };

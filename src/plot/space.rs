@@ -207,8 +207,8 @@ fn draw_path(plots: &Area<'_>, drawing: &Drawing) -> Result<()> {
 /// The edges, in units, of a box with edges of these lengths that fills an area when it is looked at.
 #[allow(clippy::cast_possible_truncation, reason = "a picture is far smaller than 2^31 units")]
 fn cube([x, up, depth]: [f64; 3], (width, height): (u32, u32)) -> (i32, i32, i32) {
-    let across = x * YAW.cos() + depth * YAW.sin();
-    let upward = up * PITCH.cos() + (x * YAW.sin() + depth * YAW.cos()) * PITCH.sin();
+    let across = x * libm::cos(YAW) + depth * libm::sin(YAW);
+    let upward = up * libm::cos(PITCH) + (x * libm::sin(YAW) + depth * libm::cos(YAW)) * libm::sin(PITCH);
     let room = (f64::from(width) - f64::from(px(150)), f64::from(height) - f64::from(px(130)));
     let metre = (room.0 / across).min(room.1 / upward);
     ((x * metre) as i32, (up * metre) as i32, (depth * metre) as i32)

@@ -76,7 +76,7 @@ impl Times {
         let mut bins: Vec<(i32, u64)> = Vec::new();
         for value in self.histogram.iter_recorded() {
             #[allow(clippy::cast_possible_truncation, reason = "at most 12 decades")]
-            let bin = (((value.value_iterated_to() * self.unit_ns).max(1) as f64).log10() * per_decade)
+            let bin = (libm::log10((value.value_iterated_to() * self.unit_ns).max(1) as f64) * per_decade)
                 .floor() as i32;
             match bins.last_mut() {
                 Some(last) if last.0 == bin => last.1 += value.count_at_value(),

@@ -71,7 +71,7 @@ mod tests {
         assert_eq!(merged.time_s, [0.0, 0.004, 0.005, 0.01, 0.0199, 0.02]);
         let middle = merged.values[2];
         // Half way to a turn by 90 degrees.
-        assert!((middle[3] - (std::f64::consts::PI / 8.0).sin()).abs() < 1e-12, "{middle:?}");
+        assert!((middle[3] - libm::sin(std::f64::consts::PI / 8.0)).abs() < 1e-12, "{middle:?}");
     }
 
     #[test]

@@ -102,7 +102,7 @@ impl Quantity {
             Self::Attitude => {
                 let dot: f64 = (6..10).map(|field| simulated[field] * measured[field]).sum();
                 // `clamp` keeps NaN, where `min` would make it a perfect match.
-                (2.0 * dot.abs().clamp(0.0, 1.0).acos()).to_degrees()
+                (2.0 * libm::acos(dot.abs().clamp(0.0, 1.0))).to_degrees()
             }
             Self::Rates => distance(10),
         }

@@ -63,16 +63,16 @@ fn write<T: Message>(writer: &mut RecordingWriter, channel: ChannelId, tick: u32
 fn sample(tick: u32, vehicle: usize) -> (PlantState, Reference) {
     let time_s = f64::from(tick) * TICK_NS as f64 * 1e-9;
     let turn = TAU * (time_s / LAP_S + vehicle as f64 / 4.0);
-    let (sin, cos) = turn.sin_cos();
+    let (sin, cos) = libm::sincos(turn);
     let on_square = 2.0 / sin.abs().max(cos.abs());
     let altitude = if time_s < 2.0 { 1.0 } else { 1.5 };
     let asked = Vector3 { x: on_square * cos, y: on_square * sin, z: altitude };
-    let sways = 1.0 + 0.05 * (5.0 * turn).sin();
-    let z = if tick == SPIKE_TICK && vehicle == 0 { SPIKE_M } else { altitude - 0.5 * (-time_s).exp() };
+    let sways = 1.0 + 0.05 * libm::sin(5.0 * turn);
+    let z = if tick == SPIKE_TICK && vehicle == 0 { SPIKE_M } else { altitude - 0.5 * libm::exp(-time_s) };
     let half_yaw = turn / 2.0;
     let flown = PlantState {
         position: Vector3 { x: asked.x * sways, y: asked.y * sways, z },
-        attitude: Quaternion { x: 0.0, y: 0.0, z: half_yaw.sin(), w: half_yaw.cos() },
+        attitude: Quaternion { x: 0.0, y: 0.0, z: libm::sin(half_yaw), w: libm::cos(half_yaw) },
         angular_velocity: Vector3 { x: 0.0, y: 0.0, z: TAU / LAP_S },
         rotor_speed: [400.0, 401.0, 402.0, 403.0],
         ..PlantState::default()

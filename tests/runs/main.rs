@@ -4,6 +4,7 @@
 //! - [`recordings`]: recordings read back and compared
 //! - [`nodes`]: the processes that the tests put into runs
 //! - [`determinism`]: a run is a function of its manifest
+//! - [`processors`]: nor does it depend on the processor
 //! - [`live`]: runs that are watched and steered
 //! - [`clean`]: what dead runs left is removed, and nothing of live ones
 //! - [`terminal`]: a terminal for a program under test
@@ -37,6 +38,7 @@ mod loss;
 mod manifests;
 mod nodes;
 mod plot;
+mod processors;
 mod profile;
 mod recordings;
 mod refusals;

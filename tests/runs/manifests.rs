@@ -10,14 +10,14 @@ use std::fs;
 use std::path::Path;
 
 /// Every manifest that is shipped.
-fn shipped() -> Vec<String> {
+pub fn shipped() -> Vec<String> {
     let entries = fs::read_dir(repository("manifests")).unwrap();
     let paths = entries.map(|entry| entry.unwrap().path()).filter(|path| path.extension().is_some());
     paths.map(|path| path.to_string_lossy().into_owned()).filter(|path| path.ends_with(".toml")).collect()
 }
 
 /// Settings that make the shipped manifest at `path` find what is not part of the repository.
-fn settings(place: &Place, path: &str) -> Vec<String> {
+pub fn settings(place: &Place, path: &str) -> Vec<String> {
     let binary = Path::new(env!("CARGO_BIN_EXE_hummingbus")).parent().unwrap();
     match Path::new(path).file_stem().unwrap().to_str().unwrap() {
         "replay-nanobench" => {

@@ -11,7 +11,6 @@ use controllers::controller::{Airframe, Controller, ControllerState, Demand, Flo
 use controllers::set_points::SetPoint;
 use nalgebra::Vector3;
 use plant::{NewtonEuler, RigidBody, State};
-use rand_distr::{Distribution, StandardNormal};
 use sensors::complementary::{AttitudeEstimate, Complementary, ComplementaryParams, ComplementaryState};
 use sensors::imu_model::{ImuModel, ImuParams, ImuReading, ImuState};
 use vehicles::Vehicle;
@@ -86,7 +85,7 @@ impl Senses {
     }
 
     fn normal(&mut self) -> f64 {
-        StandardNormal.sample(&mut self.random)
+        bus::random::normal(&mut self.random)
     }
 
     pub fn attitude(&mut self, plant: &NewtonEuler, state: &State) -> AttitudeEstimate {
@@ -137,7 +136,8 @@ fn in_beam_m(beam: usize, to: &Vector3<f64>) -> Option<f64> {
     let axis = [Vector3::x(), -Vector3::x(), Vector3::y(), -Vector3::y()][beam];
     let along_m = to.dot(&axis);
     let aside_m = (to - axis * along_m).norm() - 0.27;
-    (along_m > 0.0 && aside_m < along_m * 15.0_f64.to_radians().tan()).then_some((along_m - 0.27).max(0.0))
+    (along_m > 0.0 && aside_m < along_m * libm::tan(15.0_f64.to_radians()))
+        .then_some((along_m - 0.27).max(0.0))
 }
 
 /// One vehicle in its loop, moved tick by tick.

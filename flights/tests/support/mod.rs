@@ -67,22 +67,26 @@ impl Default for Motion {
 
 impl Motion {
     fn position(time: f64) -> Vector3<f64> {
-        Vector3::new(1.4 * (1.4 * time).sin(), (2.0 * time).cos(), 1.0 + 0.2 * time.sin())
+        Vector3::new(1.4 * libm::sin(1.4 * time), libm::cos(2.0 * time), 1.0 + 0.2 * libm::sin(time))
     }
 
     fn velocity(time: f64) -> Vector3<f64> {
-        Vector3::new(1.96 * (1.4 * time).cos(), -2.0 * (2.0 * time).sin(), 0.2 * time.cos())
+        Vector3::new(1.96 * libm::cos(1.4 * time), -2.0 * libm::sin(2.0 * time), 0.2 * libm::cos(time))
     }
 
     /// What thrust has to make of it.
     fn force(time: f64) -> Vector3<f64> {
-        Vector3::new(-2.744 * (1.4 * time).sin(), -4.0 * (2.0 * time).cos(), 9.81 - 0.2 * time.sin())
+        Vector3::new(
+            -2.744 * libm::sin(1.4 * time),
+            -4.0 * libm::cos(2.0 * time),
+            9.81 - 0.2 * libm::sin(time),
+        )
     }
 
     /// Leaning into the force, with some yaw.
     fn attitude(time: f64) -> UnitQuaternion<f64> {
         let leaning = UnitQuaternion::rotation_between(&Vector3::z(), &Self::force(time)).unwrap();
-        leaning * UnitQuaternion::from_euler_angles(0.0, 0.0, 0.2 * time.sin())
+        leaning * UnitQuaternion::from_euler_angles(0.0, 0.0, 0.2 * libm::sin(time))
     }
 
     fn rate(time: f64) -> Vector3<f64> {

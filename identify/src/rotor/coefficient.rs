@@ -100,5 +100,6 @@ fn intercept(points: &[Point]) -> f64 {
 /// The slope of ln y over ln w, as far as y has a logarithm.
 fn exponent(points: &[Point]) -> f64 {
     let positive = points.iter().filter(|point| point.force > 0.0);
-    line(&positive.map(|point| (0.5 * point.squared.ln(), point.force.ln())).collect::<Vec<_>>()).1
+    line(&positive.map(|point| (0.5 * libm::log(point.squared), libm::log(point.force))).collect::<Vec<_>>())
+        .1
 }

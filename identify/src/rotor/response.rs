@@ -31,22 +31,22 @@ impl Lag {
             return 0.0;
         }
         if a2 <= 0.0 {
-            return -(-t_s / a1).exp_m1();
+            return -libm::expm1(-t_s / a1);
         }
         let discriminant = a1 * a1 - 4.0 * a2;
         let decay = 0.5 * a1 / a2;
         if discriminant.abs() < NEAR_CRITICAL * a1 * a1 {
-            return 1.0 - (-decay * t_s).exp() * (1.0 + decay * t_s);
+            return 1.0 - libm::exp(-decay * t_s) * (1.0 + decay * t_s);
         }
         if discriminant < 0.0 {
             let omega = 0.5 * (-discriminant).sqrt() / a2;
-            let (sin, cos) = (omega * t_s).sin_cos();
-            return 1.0 - (-decay * t_s).exp() * (cos + decay / omega * sin);
+            let (sin, cos) = libm::sincos(omega * t_s);
+            return 1.0 - libm::exp(-decay * t_s) * (cos + decay / omega * sin);
         }
         // The slow root by its conjugate, which keeps its digits where a2 is small.
         let root = discriminant.sqrt();
         let (slow, fast) = (-2.0 / (a1 + root), -0.5 * (a1 + root) / a2);
-        1.0 + (fast * (slow * t_s).exp() - slow * (fast * t_s).exp()) / (slow - fast)
+        1.0 + (fast * libm::exp(slow * t_s) - slow * libm::exp(fast * t_s)) / (slow - fast)
     }
 }
 

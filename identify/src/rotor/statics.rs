@@ -261,7 +261,7 @@ impl Plausibility {
     fn of(diameter_m: f64, thrust: Option<&Coefficient>, torque: Option<&Coefficient>) -> Option<Self> {
         let c_t = thrust?.value.value;
         let area_m2 = 0.25 * PI * diameter_m * diameter_m;
-        let merit = |c_q: f64| c_t.powf(1.5) / (c_q * (2.0 * AIR_KG_M3 * area_m2).sqrt());
+        let merit = |c_q: f64| libm::pow(c_t, 1.5) / (c_q * (2.0 * AIR_KG_M3 * area_m2).sqrt());
         Some(Self {
             thrust_number: c_t * 4.0 * PI * PI / (AIR_KG_M3 * diameter_m.powi(4)),
             figure_of_merit: torque.map(|torque| merit(torque.value.value)),

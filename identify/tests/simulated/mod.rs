@@ -9,7 +9,6 @@ use flights::{Channel, Flight, Role};
 use nalgebra::{UnitQuaternion, Vector3};
 use plant::effects::{Effect, find};
 use plant::{Airframe, Backend, FreeFlight, NewtonEuler, RigidBody};
-use rand_distr::{Distribution, StandardNormal};
 use std::path::{Path, PathBuf};
 use vehicles::Vehicle;
 
@@ -113,7 +112,7 @@ impl Course {
         let height_m = plan.height_m;
         let mut random = bus::random::stream(plan.seed, "course");
         let mut uniform = move || {
-            let normal: f64 = StandardNormal.sample(&mut random);
+            let normal = bus::random::normal(&mut random);
             0.5 + normal.clamp(-2.0, 2.0) / 4.0
         };
         // Near the ground it stays clear of it.
@@ -143,9 +142,9 @@ impl Course {
             let one = |(size, w, phase): &(f64, f64, f64)| {
                 let angle = w * tau_s + phase;
                 size * match order {
-                    0 => angle.sin() - phase.sin(),
-                    1 => w * angle.cos() * rate,
-                    _ => w * angle.cos() * growth - w * w * angle.sin() * rate * rate,
+                    0 => libm::sin(angle) - libm::sin(*phase),
+                    1 => w * libm::cos(angle) * rate,
+                    _ => w * libm::cos(angle) * growth - w * w * libm::sin(angle) * rate * rate,
                 }
             };
             self.axes[axis].iter().map(one).sum::<f64>()
@@ -208,7 +207,7 @@ struct Sticks(Vec<([f64; 3], f64)>);
 impl Sticks {
     fn of(plan: &Plan) -> Self {
         let mut random = bus::random::stream(plan.seed, "sticks");
-        let mut normal = move || -> f64 { StandardNormal.sample(&mut random) };
+        let mut normal = move || bus::random::normal(&mut random);
         let count = (plan.duration_s / STICK_S) as usize + 1;
         let one = |_| ([0.03 * normal(), 0.03 * normal(), 0.015 * normal()], 0.1 * normal());
         Self((0..count).map(one).collect())
@@ -266,7 +265,7 @@ impl Pilot {
         let wanted = acceleration + sideways.push(upwards);
         let thrust_N = vehicle.mass_kg * wanted.dot(&(body.attitude_WB * Vector3::z()));
         let z = wanted.normalize();
-        let y = z.cross(&Vector3::new(heading.cos(), heading.sin(), 0.0)).normalize();
+        let y = z.cross(&Vector3::new(libm::cos(heading), libm::sin(heading), 0.0)).normalize();
         let rotation = nalgebra::Rotation3::from_basis_unchecked(&[y.cross(&z), y, z]);
         let error = body.attitude_WB.inverse() * UnitQuaternion::from_rotation_matrix(&rotation);
         self.leaned += self.period_s * error.scaled_axis();
@@ -304,7 +303,7 @@ impl Log {
 
     fn noisy(&mut self, value: [f64; 3], deviation: f64) -> [f64; 3] {
         value.map(|value| {
-            let normal: f64 = StandardNormal.sample(&mut self.random);
+            let normal = bus::random::normal(&mut self.random);
             value + self.sensors.noise * deviation * normal
         })
     }
@@ -339,7 +338,7 @@ impl Log {
         }
         if self.sensors.has_rotor_speeds {
             let speeds = plant.state().rotors.map(|rotor| {
-                let normal: f64 = StandardNormal.sample(&mut self.random);
+                let normal = bus::random::normal(&mut self.random);
                 rotor.speed_rad_s + self.sensors.noise * normal
             });
             push(&mut self.flight.rotor_speed, time_s, speeds);

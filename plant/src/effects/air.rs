@@ -69,13 +69,13 @@ fn turbulence(&[wind_m_s, ..]: &Values, advance: &mut Advance) {
     let height_ft = (advance.situation.height_m / FOOT_M).clamp(10.0, 1000.0);
     let shape = 0.177 + 0.000823 * height_ft;
     let sigma_z_m_s = 0.1 * wind_m_s;
-    let sigma_xy_m_s = sigma_z_m_s / shape.powf(0.4);
-    let (length_z_m, length_xy_m) = (height_ft * FOOT_M, height_ft * FOOT_M / shape.powf(1.2));
+    let sigma_xy_m_s = sigma_z_m_s / libm::pow(shape, 0.4);
+    let (length_z_m, length_xy_m) = (height_ft * FOOT_M, height_ft * FOOT_M / libm::pow(shape, 1.2));
     let speed_m_s = advance.situation.airspeed_B_m_s.norm().max(wind_m_s);
     let sigma_m_s = [sigma_xy_m_s, sigma_xy_m_s, sigma_z_m_s];
     let length_m = [length_xy_m, length_xy_m, length_z_m];
     for axis in 0..3 {
-        let keep = (-advance.dt_s * speed_m_s / length_m[axis]).exp();
+        let keep = libm::exp(-advance.dt_s * speed_m_s / length_m[axis]);
         let lag = &mut advance.remembered.lag[axis];
         *lag = keep * *lag + sigma_m_s[axis] * (1.0 - keep * keep).sqrt() * noise[axis];
         advance.drive.air_velocity_W_m_s[axis] += *lag;

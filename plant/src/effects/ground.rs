@@ -90,11 +90,11 @@ fn ground_effect(&[strength, radius_m, ..]: &Values, situation: &Situation, roto
 }
 
 fn ground_turbulence(&[intensity, scale_m, correlation_s, ..]: &Values, advance: &mut Advance) {
-    let keep = (-advance.dt_s / correlation_s).exp();
+    let keep = libm::exp(-advance.dt_s / correlation_s);
     for (rotor, noise) in advance.remembered.normals().into_iter().enumerate() {
         let lag = &mut advance.remembered.lag[rotor];
         *lag = keep * *lag + (1.0 - keep * keep).sqrt() * noise;
         let height_m = advance.situation.hub_height_m(rotor).max(0.0);
-        advance.drive.thrust_deviation[rotor] += intensity * (-height_m / scale_m).exp() * *lag;
+        advance.drive.thrust_deviation[rotor] += intensity * libm::exp(-height_m / scale_m) * *lag;
     }
 }

@@ -5,22 +5,33 @@
 #![allow(non_snake_case, reason = "a trailing _W or _B names the frame a vector is written in")]
 
 use crate::state::RigidBody;
-use nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};
+use nalgebra::{Quaternion, Rotation3, UnitQuaternion, Vector3};
 use rapier3d_f64::dynamics::{MassProperties, RigidBody as Owner, RigidBodyBuilder};
-use rapier3d_f64::math::{Matrix, Pose, Rotation, Vector};
+use rapier3d_f64::math::{Pose, Rotation, Vector};
 use vehicles::Vehicle;
 
 /// The body of `vehicle`, at the origin. Its mass is the vehicle's, whatever its colliders' shapes. Rapier's own
 /// gyroscopic term is off, as the torque that is put on it holds that already; it never sleeps, as motors may
 /// start at any tick.
 pub(super) fn owner(vehicle: &Vehicle) -> RigidBodyBuilder {
-    let inertia = matrix(&vehicle.inertia_kg_m2);
-    let mass = MassProperties::with_inertia_matrix(Vector::ZERO, vehicle.mass_kg, inertia);
     RigidBodyBuilder::dynamic()
-        .additional_mass_properties(mass)
+        .additional_mass_properties(mass(vehicle))
         .gyroscopic_forces_enabled(false)
         .allow_fast_rotation(true)
         .can_sleep(false)
+}
+
+/// Mass and inertia, with principal axes of our own: rapier finds those of an inertia with products with the C
+/// library's cosine, whose last digit differs from processor to processor.
+fn mass(vehicle: &Vehicle) -> MassProperties {
+    let mut principal = vehicle.inertia_kg_m2.symmetric_eigen();
+    if principal.eigenvectors.determinant() < 0.0 {
+        principal.eigenvectors.column_mut(2).neg_mut();
+    }
+    let axes =
+        UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(principal.eigenvectors));
+    let moments = to_rapier(&principal.eigenvalues);
+    MassProperties::with_principal_inertia_frame(Vector::ZERO, vehicle.mass_kg, moments, rotation(&axes))
 }
 
 /// Pose and velocity, as rapier has them.
@@ -43,8 +54,7 @@ pub(super) fn write(owner: &mut Owner, body: &RigidBody) {
 
 /// The pose, as rapier writes it.
 pub(super) fn pose(body: &RigidBody) -> Pose {
-    let [x, y, z, w] = body.attitude_WB.coords.into();
-    Pose::from_parts(to_rapier(&body.position_W_m), Rotation::from_xyzw(x, y, z, w))
+    Pose::from_parts(to_rapier(&body.position_W_m), rotation(&body.attitude_WB))
 }
 
 /// Puts a force and a torque on the body for the next step, instead of those of the last.
@@ -70,7 +80,7 @@ fn attitude(rotation: &Rotation) -> UnitQuaternion<f64> {
     UnitQuaternion::new_unchecked(Quaternion::new(rotation.w, rotation.x, rotation.y, rotation.z))
 }
 
-fn matrix(m: &Matrix3<f64>) -> Matrix {
-    let column = |i: usize| to_rapier(&m.column(i).into());
-    Matrix::from_cols(column(0), column(1), column(2))
+fn rotation(attitude: &UnitQuaternion<f64>) -> Rotation {
+    let [x, y, z, w] = attitude.coords.into();
+    Rotation::from_xyzw(x, y, z, w)
 }

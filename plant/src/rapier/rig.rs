@@ -38,7 +38,7 @@ pub(super) fn build(
     let above = slider.unwrap_or(foot);
     let (mount, lever) = (to_rapier(&rig.mount_B_m), Vector::Z * LEVER_M);
     physics.insert_impulse_joint(above, vehicle, SphericalJointBuilder::new().local_anchor2(mount));
-    let rope = RopeJointBuilder::new(2.0 * LEVER_M * (rig.tilt_max_rad / 2.0).sin());
+    let rope = RopeJointBuilder::new(2.0 * LEVER_M * libm::sin(rig.tilt_max_rad / 2.0));
     physics.insert_impulse_joint(above, vehicle, rope.local_anchor1(lever).local_anchor2(mount + lever));
     slider
 }

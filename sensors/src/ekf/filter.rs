@@ -347,7 +347,7 @@ impl EkfState {
 pub fn deviation(chi_square: f64, degrees: usize) -> f64 {
     let degrees = degrees as f64;
     let variance = 2.0 / (9.0 * degrees);
-    ((chi_square / degrees).cbrt() - (1.0 - variance)) / variance.sqrt()
+    (libm::cbrt(chi_square / degrees) - (1.0 - variance)) / variance.sqrt()
 }
 
 fn flat(covariance: &Covariance) -> [f64; STATES * STATES] {

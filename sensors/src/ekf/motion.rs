@@ -69,7 +69,7 @@ impl Motion {
 
     /// Lets the GPS drift fade over `time_s`, as it does on average.
     pub fn fade_gps_drift(&mut self, time_s: f64, time_constant_s: f64) {
-        self.gps_drift = vector_message(vector(self.gps_drift) * (-time_s / time_constant_s).exp());
+        self.gps_drift = vector_message(vector(self.gps_drift) * libm::exp(-time_s / time_constant_s));
     }
 
     /// Takes the estimated `errors` off.

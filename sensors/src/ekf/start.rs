@@ -151,5 +151,5 @@ fn compass_yaw_rad(field: &Measurement, reading: &Reading, params: &EkfParams) -
     let (roll_rad, pitch_rad) = tilt_rad(&vector(reading.specific_force));
     let seen_T = UnitQuaternion::from_euler_angles(roll_rad, pitch_rad, 0.0) * field_B_T;
     let true_T = params.field_W_T();
-    true_T.y.atan2(true_T.x) - seen_T.y.atan2(seen_T.x)
+    libm::atan2(true_T.y, true_T.x) - libm::atan2(seen_T.y, seen_T.x)
 }

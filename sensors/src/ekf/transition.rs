@@ -89,7 +89,7 @@ impl Transition {
         if self.time == 0.0 {
             return *covariance;
         }
-        let fade = (-self.time / params.gps_position_drift_time_s).exp();
+        let fade = libm::exp(-self.time / params.gps_position_drift_time_s);
         let half = self.apply(covariance, fade).transpose();
         let mut carried = self.apply(&half, fade);
         self.add_noise(&mut carried, params);
@@ -125,7 +125,7 @@ impl Transition {
             covariance[(position, velocity)] += force * time_s.powi(2) / 2.0;
             covariance[(velocity, position)] += force * time_s.powi(2) / 2.0;
         }
-        let fade = (-2.0 * time_s / params.gps_position_drift_time_s).exp();
+        let fade = libm::exp(-2.0 * time_s / params.gps_position_drift_time_s);
         let mut add = |from: usize, count: usize, variance: f64| {
             (from..from + count).for_each(|state| covariance[(state, state)] += variance);
         };

@@ -233,7 +233,7 @@ impl RangeInertial {
         let beam_W = attitude(past.attitude) * beam_B(beam);
         let (axis, side) = if beam == DOWN { (2, Side::Behind) } else { facing(&beam_W) };
         let cosine = if beam == DOWN { -beam_W.z } else { beam_W[axis].abs() };
-        let angle_rad = cosine.clamp(-1.0, 1.0).acos();
+        let angle_rad = libm::acos(cosine.clamp(-1.0, 1.0));
         if angle_rad > self.params.incidence_max_rad {
             return None;
         }
@@ -242,8 +242,8 @@ impl RangeInertial {
         }
         let incidence_rad = (angle_rad - self.params.half_angle_deg.to_radians()).max(0.0);
         let (reading_m, sigma_m) = self.reading(reading_m);
-        let turn_sigma_m = reading_m * incidence_rad.sin() * self.params.attitude_sigma_rad;
-        Some((axis, side, reading_m * incidence_rad.cos(), sigma_m.hypot(turn_sigma_m)))
+        let turn_sigma_m = reading_m * libm::sin(incidence_rad) * self.params.attitude_sigma_rad;
+        Some((axis, side, reading_m * libm::cos(incidence_rad), libm::hypot(sigma_m, turn_sigma_m)))
     }
 
     /// A reading and its standard deviation; the nearest says only that something is within it.
@@ -253,13 +253,13 @@ impl RangeInertial {
             return (reading_m, self.params.range_sigma_m);
         }
         // The mean and the standard deviation of what is anywhere from 0 to the nearest reading.
-        (0.5 * nearest_m, self.params.range_sigma_m.hypot(nearest_m / 12.0_f64.sqrt()))
+        (0.5 * nearest_m, libm::hypot(self.params.range_sigma_m, nearest_m / 12.0_f64.sqrt()))
     }
 
     /// How far a beam's lower edge goes before it meets the floor, m.
     fn floor_m(&self, state: &RangeInertialState, beam_W: &Vector3<f64>) -> f64 {
-        let dive_rad = self.params.half_angle_deg.to_radians() - beam_W.z.clamp(-1.0, 1.0).asin();
-        if dive_rad > 0.0 { state.height_m() / dive_rad.sin() } else { f64::INFINITY }
+        let dive_rad = self.params.half_angle_deg.to_radians() - libm::asin(beam_W.z.clamp(-1.0, 1.0));
+        if dive_rad > 0.0 { state.height_m() / libm::sin(dive_rad) } else { f64::INFINITY }
     }
 
     /// Forgets the walls without an echo for too long, and those further than the reach.
