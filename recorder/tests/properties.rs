@@ -281,6 +281,10 @@ fn a_definition_that_holds_itself_or_repeats_nothing_is_refused() {
     assert!(definition.decode(&[0, 1, 0, 0, 1, 2, 3]).unwrap_err().contains("messages deep"));
     let definition = Definition::parse(&format!("A[18446744073709551615] a\n{rule}\nMSG: A\n")).unwrap();
     assert!(definition.decode(&[0, 1, 0, 0, 1, 2, 3]).unwrap_err().contains("more values than"));
+    let definition = Definition::parse(&format!("uint8[1000] {}\n", "a".repeat(5000))).unwrap();
+    assert!(
+        definition.decode(&[[0, 1, 0, 0].as_slice(), &[7; 1000]].concat()).unwrap_err().contains("paths")
+    );
 }
 
 #[test]

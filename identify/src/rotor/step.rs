@@ -127,8 +127,9 @@ impl<'s> Log<'s> {
         self.command[row] != self.command[row - 1]
     }
 
+    /// How many rows `seconds` are; at most one more than there are, whatever the stamps say.
     fn rows(&self, seconds: f64) -> usize {
-        (seconds / self.period_s).round() as usize
+        ((seconds / self.period_s).round() as usize).min(self.speed.len() + 1)
     }
 
     /// The step at `row` if the command is held long enough from `since` on and to `until`.
