@@ -120,6 +120,6 @@ mod tests {
             (found.channel, found.samples, found.gap_s),
             (Quantity::Position, 1000, (0.0, 1e16 + 2.0))
         );
-        assert_eq!(sparse(&flight(Channel::default(), SPACING_MAX_S)), None);
+        assert_eq!(sparse(&flight(Channel::default()), SPACING_MAX_S), None);
     }
 }

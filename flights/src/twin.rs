@@ -6,7 +6,8 @@
 
 use crate::flight::Channel;
 
-/// Values that differ by less than this part of the channel's spread are the same: a copy may have fewer digits.
+/// Values that differ by less than this part of the channel's spread are the same, and those that differ by less than the
+/// digits of one of the two: a copy may have fewer.
 const SAME: f64 = 1e-3;
 /// A vector that a channel has more often, as at rest, says nothing about when it was measured.
 const REPEATS_MAX: usize = 4;
@@ -35,26 +36,50 @@ pub struct Twin {
 #[must_use]
 #[allow(clippy::option_option, reason = "what is not known is no answer")]
 pub fn twin<const N: usize>(first: &Channel<N>, second: &Channel<N>) -> Option<Option<Twin>> {
-    let steps = steps(first);
-    let (of_first, of_second) = (Telling::of(first, &steps), Telling::of(second, &steps));
+    let steps = Steps::of(first, second);
+    let (of_first, of_second) = (Telling::of(first, &steps.key), Telling::of(second, &steps.key));
     if of_first.keys.len() < COMMON_MIN || of_second.keys.len() < COMMON_MIN {
         return None;
     }
     let period_s = first.period_s().unwrap_or(0.0).min(second.period_s().unwrap_or(0.0));
     let apart_s = (0.5 * period_s).max(1e-6);
     let Some(offset_s) = offset_s(&of_first, &of_second, (first, second), apart_s) else { return Some(None) };
-    Some(agreeing(first, second, &of_second, &steps, (offset_s, apart_s)))
+    Some(agreeing(first, second, &of_second, &steps.same, (offset_s, apart_s)))
 }
 
-/// What makes a difference on each axis; zero where the channel stands still.
-fn steps<const N: usize>(channel: &Channel<N>) -> [f64; N] {
+/// What makes a difference, on each axis; zero where the channel stands still.
+struct Steps<const N: usize> {
+    /// Values in one step are the same for a start.
+    key: [f64; N],
+    /// Values that differ by no more are the same. A rounded one is within half of its last digit.
+    same: [f64; N],
+}
+
+impl<const N: usize> Steps<N> {
+    fn of(first: &Channel<N>, second: &Channel<N>) -> Self {
+        let digit = |axis: usize| digit(first, axis).max(digit(second, axis));
+        let spread: [f64; N] = std::array::from_fn(|axis| SAME * spread(first, axis));
+        Self {
+            key: std::array::from_fn(|axis| spread[axis].max(digit(axis))),
+            same: std::array::from_fn(|axis| spread[axis].max(0.500_001 * digit(axis))),
+        }
+    }
+}
+
+fn spread<const N: usize>(channel: &Channel<N>, axis: usize) -> f64 {
     #[allow(clippy::cast_precision_loss, reason = "a count of samples")]
     let count = channel.values.len().max(1) as f64;
-    std::array::from_fn(|axis| {
-        let of_axis = || channel.values.iter().map(|value| value[axis]);
-        let mean = of_axis().sum::<f64>() / count;
-        SAME * (of_axis().map(|value| (value - mean).powi(2)).sum::<f64>() / count).sqrt()
-    })
+    let of_axis = || channel.values.iter().map(|value| value[axis]);
+    let mean = of_axis().sum::<f64>() / count;
+    (of_axis().map(|value| (value - mean).powi(2)).sum::<f64>() / count).sqrt()
+}
+
+/// The smallest difference of two values of an axis: the last digit of numbers that were rounded.
+fn digit<const N: usize>(channel: &Channel<N>, axis: usize) -> f64 {
+    let mut sorted: Vec<f64> = channel.values.iter().map(|value| value[axis]).collect();
+    sorted.sort_by(f64::total_cmp);
+    let gaps = sorted.windows(2).map(|pair| pair[1] - pair[0]).filter(|gap| *gap > 0.0);
+    gaps.min_by(f64::total_cmp).unwrap_or(0.0)
 }
 
 /// The samples of a channel that few others of it are the same as.
@@ -182,8 +207,10 @@ mod tests {
         );
         let end = found(&part(&whole, |index| index > 3800, 0.0));
         assert!(end.same > 190 && end.in_first_s.0 > 38.0, "{end:?}");
-        let rounded = found(&course(1, 4));
-        assert!(rounded.same > 3900, "{rounded:?}");
+        for digits in [2, 3, 5] {
+            let rounded = found(&course(1, digits));
+            assert!(rounded.same > 3000, "{digits} digits: {rounded:?}");
+        }
         // The other way round: the whole against a part of it.
         assert!(twin(&part(&whole, |index| index % 10 == 0, 0.0), &whole).unwrap().is_some());
     }

@@ -120,14 +120,36 @@ fn rows_that_were_saved_again_are_found_by_their_samples() {
     });
     save(&late.collect::<Vec<_>>());
     check();
-    // With four digits behind the point.
-    let rounded = |text: &&str| row(cells(text).iter().map(|number| (number * 1e4).round() / 1e4).collect());
-    save(&rows.iter().map(rounded).collect::<Vec<_>>());
-    check();
+    // With fewer digits behind the point.
+    for scale in [1e3, 1e4] {
+        let rounded =
+            |text: &&str| row(cells(text).iter().map(|number| (number * scale).round() / scale).collect());
+        save(&rows.iter().map(rounded).collect::<Vec<_>>());
+        check();
+    }
     // The other way round: fitted on the part, tested on the whole.
     save(&rows[200..500].iter().map(|row| (*row).to_owned()).collect::<Vec<_>>());
     check();
     refused(&place, ("again.csv", ""), ("log.csv", ""), &["samples of"]);
+}
+
+#[test]
+fn a_course_that_comes_round_may_be_cut_into_laps() {
+    let place = Place::new();
+    let header = "t,m1,m2,m3,m4,px,py,pz,qx,qy,qz,qw,wx,wy,wz\n";
+    let row = |k: u32| {
+        let (t, angle) = (0.01 * f64::from(k), std::f64::consts::TAU * 0.002 * f64::from(k));
+        format!(
+            "{t:.2},100,100,100,100,{},{},1,0,0,0,1,{},0,0\n",
+            angle.cos(),
+            angle.sin(),
+            0.01 * angle.sin()
+        )
+    };
+    place.write("log.csv", (0..=1000).map(row).fold(header.to_owned(), |text, row| text + &row).as_bytes());
+    let (first, second) =
+        (("log.csv", "to_s = 5.0\ntrust_units = true"), ("log.csv", "from_s = 5.0\ntrust_units = true"));
+    held_out(&place, first, second).unwrap();
 }
 
 #[test]

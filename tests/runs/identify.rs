@@ -45,8 +45,8 @@ fn the_riddle_of_the_thesis_delay_and_rig_are_told_apart_and_measured() {
     assert!(std::fs::metadata(place.path("out/report.html")).unwrap().len() > 100_000);
 }
 
-/// Rows of a hover with the noise of a gyroscope.
-fn hover(rows: u32) -> String {
+/// Rows of a hover, `step_s` apart, with the noise of a gyroscope.
+fn hover(rows: u32, step_s: f64) -> String {
     let mut state = 1_u32;
     let mut noise = || {
         state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
@@ -54,7 +54,7 @@ fn hover(rows: u32) -> String {
     };
     let row = |index: u32| {
         let [x, y, z] = [0.1 * noise(), 0.1 * noise(), 0.1 * noise()];
-        format!("{:.2},100,100,100,100,{x},{y},{z}\n", f64::from(index) * 0.01)
+        format!("{:.2},100,100,100,100,{x},{y},{z}\n", f64::from(index) * step_s)
     };
     (0..rows).map(row).fold("t,m1,m2,m3,m4,wx,wy,wz\n".to_owned(), |text, row| text + &row)
 }
@@ -63,7 +63,7 @@ fn hover(rows: u32) -> String {
 fn a_flight_that_is_fitted_on_is_no_test_flight_for_identify_and_validate() {
     let place = Place::new();
     let vehicle = repository("vehicles/hummingbird.toml");
-    let log = hover(400);
+    let log = hover(400, 0.01);
     place.write("log.csv", &log);
     place.write("copy.csv", &log);
     place.write("again.csv", log.replace(",wz\n", ",wz,comment\n"));
@@ -109,5 +109,11 @@ fn what_cannot_be_identified_on_is_refused_in_words() {
         ),
     );
     place.call(&["identify", &flights, "--out", &out]).with_code(2).says(&["short"]);
+    place.write("short.csv", hover(100, 1.0));
+    let slow = [
+        "flight `short` cannot be identified on",
+        "100 samples lie over 99 s, expected at least one in 0.5 s",
+    ];
+    place.call(&["identify", &flights, "--out", &out]).with_code(2).says(&slow);
     place.call(&["identify", "rotor", &missing, "--out", &out]).with_code(2).says(&["nowhere.toml"]);
 }
