@@ -3,6 +3,7 @@
 use bus::messages::Quaternion;
 use serde::Deserialize;
 use std::path::{Path, PathBuf};
+use vehicles::quotes::StrayQuote;
 
 /// Which columns of a file hold a quantity, and in which unit.
 #[derive(Clone, Debug, Deserialize)]
@@ -81,6 +82,14 @@ pub enum FlightLogError {
         /// Why.
         reason: String,
     },
+    /// A quotation mark makes one cell of what are many.
+    #[error("the flight {path}, {stray}")]
+    Quote {
+        /// The file.
+        path: PathBuf,
+        /// Where it stands, and what to do.
+        stray: StrayQuote,
+    },
     /// A column of the map is not in the file.
     #[error("the flight {path} has no column `{column}` (the map's `{quantity}`); it has {known}")]
     MissingColumn {
@@ -141,10 +150,12 @@ impl FlightLog {
     /// # Errors
     /// If the file, a column or a unit is missing, or a cell is not a number.
     pub fn load(path: &Path, map: &ColumnMap) -> Result<Self, FlightLogError> {
-        let file_error =
-            |error: csv::Error| FlightLogError::File { path: path.into(), reason: error.to_string() };
-        let mut reader =
-            csv::ReaderBuilder::new().trim(csv::Trim::All).from_path(path).map_err(file_error)?;
+        let refused = |reason: String| FlightLogError::File { path: path.into(), reason };
+        let bytes = std::fs::read(path).map_err(|error| refused(error.to_string()))?;
+        vehicles::quotes::check(&bytes, b',')
+            .map_err(|stray| FlightLogError::Quote { path: path.into(), stray })?;
+        let file_error = |error: csv::Error| refused(error.to_string());
+        let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(&bytes[..]);
         let headers = reader.headers().map_err(file_error)?.clone();
         let source = Source { path, headers };
         let picks = Picks::new(&source, map)?;

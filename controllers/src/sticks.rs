@@ -13,6 +13,7 @@
 use crate::angle::wrap_rad;
 use crate::set_points::SetPoint;
 use std::path::Path;
+use vehicles::quotes::StrayQuote;
 
 /// A recording of sticks, at least one row.
 #[derive(Debug, Clone, PartialEq)]
@@ -46,6 +47,14 @@ pub enum SticksError {
         /// Why.
         #[source]
         cause: csv::Error,
+    },
+    /// A quotation mark makes one cell of what are many.
+    #[error("{file}: {stray}")]
+    Quote {
+        /// The path as given.
+        file: String,
+        /// Where it stands, and what to do.
+        stray: StrayQuote,
     },
     /// A header that lacks a column or has one too many.
     #[error("{file}:1: expected the columns {expected}, found {found}")]
@@ -89,13 +98,16 @@ impl Sticks {
     /// It cannot be read, or holds what no sticks can ask for.
     pub fn load(path: &Path) -> Result<Self, SticksError> {
         let file = path.display().to_string();
-        match csv::ReaderBuilder::new().trim(csv::Trim::All).from_path(path) {
-            Ok(reader) => Self::read(reader, &file),
-            Err(cause) => Err(SticksError::Unreadable { file, cause }),
+        match std::fs::read(path) {
+            Ok(bytes) => Self::read(&bytes, &file),
+            Err(cause) => Err(SticksError::Unreadable { file, cause: cause.into() }),
         }
     }
 
-    fn read<R: std::io::Read>(mut reader: csv::Reader<R>, file: &str) -> Result<Self, SticksError> {
+    fn read(bytes: &[u8], file: &str) -> Result<Self, SticksError> {
+        let quote = |stray| SticksError::Quote { file: file.to_owned(), stray };
+        vehicles::quotes::check(bytes, b',').map_err(quote)?;
+        let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(bytes);
         let unreadable = |cause| SticksError::Unreadable { file: file.to_owned(), cause };
         let places = Places::of(reader.headers().map_err(unreadable)?, file)?;
         let mut rows: Vec<Row> = Vec::new();
@@ -220,7 +232,7 @@ mod tests {
     use super::*;
 
     fn sticks(text: &str) -> Result<Sticks, SticksError> {
-        Sticks::read(csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(text.as_bytes()), "s.csv")
+        Sticks::read(text.as_bytes(), "s.csv")
     }
 
     fn beside() -> SetPoint {
@@ -265,6 +277,10 @@ mod tests {
             ),
             (header.to_owned(), "expected at least one row"),
             (format!("{header}0,1\n"), "cannot read these sticks"),
+            (
+                format!("{header}0,1,2\n1,\"1,2\n2,1,2\n"),
+                "s.csv: line 3, cell 2: expected a cell on one line",
+            ),
         ];
         for (text, expected) in cases {
             let error = sticks(&text).unwrap_err().to_string();

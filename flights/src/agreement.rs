@@ -61,7 +61,8 @@ impl Pairs {
         let mut pairs = Self::default();
         let mut from = 0;
         while from < time_s.len() {
-            let to = time_s.partition_point(|time| *time < time_s[from] + window_s);
+            // Beside times beyond 1e15 s a window has no length: each is a sample further all the same.
+            let to = time_s.partition_point(|time| *time < time_s[from] + window_s).max(from + 1);
             let Some(length_s) = time_s.get(to).map(|end_s| end_s - time_s[from]) else { break };
             // A longer window spans a gap.
             let mean = mean(logged, time_s[from], time_s[to]).filter(|_| length_s < 2.0 * window_s);

@@ -112,11 +112,12 @@ impl<'a> Table<'a> {
         found.extend(without(&self.velocity));
         found.extend(without(&self.flight.attitude));
         found.extend(without(&self.angular_velocity));
-        self.gaps = found;
+        self.gaps = joined(found);
     }
 
     fn is_in_gap(&self, time_s: f64) -> bool {
-        self.gaps.iter().any(|(from_s, to_s)| (*from_s < time_s) && (time_s < *to_s))
+        let begun = self.gaps.partition_point(|(from_s, _)| *from_s < time_s);
+        begun.checked_sub(1).is_some_and(|last| time_s < self.gaps[last].1)
     }
 
     fn row(&self, time_s: f64) -> String {
@@ -136,6 +137,21 @@ impl<'a> Table<'a> {
         }
         row + "\n"
     }
+}
+
+/// The same open intervals, in order and none over another: a log can have as many gaps as rows.
+fn joined(mut gaps: Vec<(f64, f64)>) -> Vec<(f64, f64)> {
+    gaps.retain(|(from_s, to_s)| from_s < to_s);
+    gaps.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let mut apart: Vec<(f64, f64)> = Vec::new();
+    for (from_s, to_s) in gaps {
+        match apart.last_mut() {
+            // What begins where another ends leaves that instant.
+            Some(last) if from_s < last.1 => last.1 = last.1.max(to_s),
+            _ => apart.push((from_s, to_s)),
+        }
+    }
+    apart
 }
 
 /// The times at which a channel has no samples: its gaps, and all before and after it but for five periods.
@@ -235,6 +251,12 @@ mod tests {
         for (t, v) in times.iter().zip(&derived.values) {
             assert!((Vector3::from(*v) - Vector3::new(2.0 - 6.0 * t, 1.0, 0.0)).norm() < 1e-9, "{t}: {v:?}");
         }
+    }
+
+    #[test]
+    fn gaps_are_joined_where_they_overlap() {
+        let gaps = vec![(5.0, 6.0), (0.0, 2.0), (1.0, 1.5), (2.0, 3.0), (2.5, 4.0), (9.0, 8.0)];
+        assert_eq!(joined(gaps), [(0.0, 2.0), (2.0, 4.0), (5.0, 6.0)]);
     }
 
     #[test]

@@ -8,7 +8,10 @@ use crate::quantity::Quantity;
 pub struct CsvLog {
     headers: Vec<String>,
     time_s: Vec<f64>,
+    /// As many as the row has, but for those without a header: a wide header over short rows costs no more than the file.
     rows: Vec<Vec<f64>>,
+    /// The line of each row, from 1.
+    lines: Vec<u64>,
 }
 
 impl CsvLog {
@@ -16,20 +19,24 @@ impl CsvLog {
     pub fn parse(bytes: &[u8], time: Option<&Entry>) -> Result<Self, String> {
         let text = String::from_utf8_lossy(bytes);
         let text = text.trim_start_matches('\u{feff}');
+        let delimiter = delimiter(text);
+        vehicles::quotes::check(text.as_bytes(), delimiter).map_err(|stray| stray.to_string())?;
         let mut reader = csv::ReaderBuilder::new()
             .trim(csv::Trim::All)
             .flexible(true)
-            .delimiter(delimiter(text))
+            .delimiter(delimiter)
             .from_reader(text.as_bytes());
         let broken = |error: csv::Error| format!("it is not CSV: {error}; check `format`");
         let headers: Vec<String> = reader.headers().map_err(broken)?.iter().map(str::to_owned).collect();
         let (time_column, factor) = time_column(&headers, time)?;
-        let mut rows = Vec::new();
+        let (mut rows, mut lines) = (Vec::new(), Vec::new());
         for record in reader.records() {
-            rows.push(numbers(&record.map_err(broken)?, headers.len()));
+            let record = record.map_err(broken)?;
+            rows.push(numbers(&record, headers.len()));
+            lines.push(line(text, &record));
         }
-        let time_s = rows.iter().map(|row: &Vec<f64>| row[time_column] * factor).collect();
-        Ok(Self { headers, time_s, rows })
+        let time_s = rows.iter().map(|row| cell(row, time_column) * factor).collect();
+        Ok(Self { headers, time_s, rows, lines })
     }
 
     fn index(&self, name: &str) -> Result<usize, String> {
@@ -43,9 +50,15 @@ impl Log for CsvLog {
             return Err(format!("a CSV file has no topics, found `topic = \"{topic}\"`; remove it"));
         }
         let indices = names.iter().map(|name| self.index(name)).collect::<Result<Vec<_>, _>>()?;
-        let pick = |row: &Vec<f64>| indices.iter().map(|&index| row[index]).collect();
+        let pick = |row: &Vec<f64>| indices.iter().map(|&index| cell(row, index)).collect();
         let rows = self.rows.iter().map(pick).collect();
         Ok(Samples { time_s: self.time_s.clone(), rows, notes: Vec::new() })
+    }
+
+    fn line(&self, time_s: f64) -> Option<u64> {
+        let off = |row: &usize| (self.time_s[*row] - time_s).abs();
+        let rows = (0..self.rows.len()).filter(|row| self.time_s[*row].is_finite());
+        self.lines.get(rows.min_by(|a, b| off(a).total_cmp(&off(b)))?).copied()
     }
 }
 
@@ -71,11 +84,22 @@ fn find(headers: &[String], name: &str) -> Result<usize, String> {
     })
 }
 
-/// Short rows are filled with NaN.
 fn numbers(record: &csv::StringRecord, length: usize) -> Vec<f64> {
-    (0..length)
-        .map(|index| record.get(index).and_then(|cell| cell.parse().ok()).unwrap_or(f64::NAN))
-        .collect()
+    record.iter().take(length).map(|cell| cell.parse().unwrap_or(f64::NAN)).collect()
+}
+
+/// The line of a record, from 1: the reader's place is in front of the line ends and empty lines before it.
+fn line(text: &str, record: &csv::StringRecord) -> u64 {
+    let Some(place) = record.position() else { return 0 };
+    let from = usize::try_from(place.byte()).unwrap_or(usize::MAX);
+    let before = text.as_bytes().get(from..).unwrap_or_default();
+    let ends = before.iter().take_while(|byte| matches!(byte, b'\r' | b'\n'));
+    place.line() + ends.filter(|byte| **byte == b'\n').count() as u64
+}
+
+/// A short row has no numbers behind its end.
+fn cell(row: &[f64], index: usize) -> f64 {
+    row.get(index).copied().unwrap_or(f64::NAN)
 }
 
 /// The delimiter that the header has most of.

@@ -15,12 +15,9 @@ pub struct Document {
 }
 
 impl Document {
-    /// Reads the file at `path`.
-    pub fn read(path: &Path) -> Result<Self, FlightsError> {
-        match std::fs::read_to_string(path) {
-            Ok(text) => Ok(Self { path: path.to_owned(), text }),
-            Err(cause) => Err(FlightsError::Unreadable { file: path.display().to_string(), cause }),
-        }
+    /// The file at `path` with this text.
+    pub fn new(path: &Path, text: String) -> Self {
+        Self { path: path.to_owned(), text }
     }
 
     /// The text as a `T`; refuses keys that `T` does not have.

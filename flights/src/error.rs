@@ -77,6 +77,21 @@ pub enum FlightsError {
         /// What contradicts.
         findings: Vec<Finding>,
     },
+    /// A test flight holds samples of a flight that parameters are fitted on.
+    #[error(
+        "{place}: flight `{test}` with role \"test\" is not held out from flight `{fit}` with role \"fit\": {reason}; give \
+         them parts that do not overlap by `from_s` and `to_s`, name another log, or take one of them out"
+    )]
+    NotHeldOut {
+        /// The line that names the test flight's log.
+        place: Place,
+        /// The test flight's name.
+        test: String,
+        /// The fit flight's name.
+        fit: String,
+        /// What they have in common.
+        reason: String,
+    },
     /// A canonical file cannot be written.
     #[error("{path}: cannot write this file: {reason}; check the folder and the space left")]
     Write {

@@ -10,6 +10,8 @@
 //! | `known_types` | messages whose fields and units need not be said |
 //! | `channels`, `clean`, `jumps`, `reading` | from a log's numbers to a flight |
 //! | `plausible`, `agreement` | values against physics |
+//! | `span` | times against the number of samples |
+//! | `held_out`, `twin` | whether test flights hold what parameters are fitted on: by file and time, by samples |
 //! | `canonical` | a flight as one CSV table |
 //! | `error` | what can be wrong |
 
@@ -25,6 +27,7 @@ mod document;
 pub mod error;
 pub mod flight;
 mod frame;
+mod held_out;
 mod jumps;
 mod known_types;
 mod log;
@@ -34,11 +37,15 @@ pub mod quantity;
 mod reading;
 mod ros_definition;
 mod set;
+mod span;
+mod twin;
 mod ulog;
 
 pub use canonical::{Canonical, write_csv};
 pub use error::FlightsError;
 pub use flight::{Channel, Flight, Role};
+pub use held_out::same_file;
 pub use plausible::Finding;
 pub use quantity::Quantity;
 pub use set::FlightSet;
+pub use twin::{Twin, twin};

@@ -24,16 +24,19 @@ pub trait Log {
     /// The samples of `names` on `topic`. An error says what is missing, what there is, and what to do.
     fn samples(&self, topic: Option<&str>, names: &[String]) -> Result<Samples, String>;
 
+    /// The line of the row whose time is nearest to `time_s`, where the format has lines.
+    fn line(&self, _time_s: f64) -> Option<u64> {
+        None
+    }
+
     /// The topics that have data, with the type of each; none where the format has no types.
     fn topics(&self) -> Vec<(String, String)> {
         Vec::new()
     }
 }
 
-/// Opens the log at `path`.
-pub fn open(path: &Path, format: Format, time: Option<&Entry>) -> Result<Box<dyn Log>, String> {
-    let bytes = std::fs::read(path)
-        .map_err(|error| format!("cannot read it: {error}; check the path and its variables"))?;
+/// The log with these bytes.
+pub fn parse(bytes: Vec<u8>, format: Format, time: Option<&Entry>) -> Result<Box<dyn Log>, String> {
     match format {
         Format::Csv => Ok(Box::new(CsvLog::parse(&bytes, time)?)),
         Format::Crazyflie => Ok(Box::new(CrazyflieLog::parse(bytes)?)),
@@ -42,14 +45,12 @@ pub fn open(path: &Path, format: Format, time: Option<&Entry>) -> Result<Box<dyn
     }
 }
 
-/// The format of the log at `path`: by its first bytes, else by its name; CSV where neither says more.
-pub fn guess(path: &Path) -> Format {
-    let mut head = [0; 8];
-    let read = std::fs::File::open(path).and_then(|mut file| std::io::Read::read(&mut file, &mut head));
-    match (read, &head) {
-        (Ok(8), b"\x89MCAP0\r\n") => Format::Mcap,
-        (Ok(8), [b'U', b'L', b'o', b'g', 1, 0x12, 0x35, _]) => Format::Ulog,
-        (Ok(8), [0xBC, 2, 0, ..]) => Format::Crazyflie,
+/// The format of the log at `path` with these bytes: by the first of them, else by its name; CSV where neither says more.
+pub fn guess(path: &Path, bytes: &[u8]) -> Format {
+    match bytes {
+        [0x89, b'M', b'C', b'A', b'P', b'0', b'\r', b'\n', ..] => Format::Mcap,
+        [b'U', b'L', b'o', b'g', 1, 0x12, 0x35, _, ..] => Format::Ulog,
+        [0xBC, 2, 0, _, _, _, _, _, ..] => Format::Crazyflie,
         _ => match path.extension().and_then(|extension| extension.to_str()) {
             Some("mcap") => Format::Mcap,
             Some("ulg" | "ulog") => Format::Ulog,

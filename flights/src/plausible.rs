@@ -91,25 +91,15 @@ pub fn judge(flight: &Flight, vehicle: &Vehicle, channels: &ChannelMap) -> Vec<F
 }
 
 /// Compares the times of a CSV file, before anything is cut off, with those of logs of flights: wrong are samples that come
-/// as no logger's do over a time that no vehicle flies, where both are right in another unit.
+/// as no logger's do over a time that no vehicle flies, where both are right in another unit. A first row of zeros, which
+/// some loggers write before their clock runs, hides no wrong unit.
 #[must_use]
 pub fn judge_time(flight: &Flight, vehicle: &Vehicle, channels: &ChannelMap) -> Option<Finding> {
-    let (quantity, judge) = (Quantity::Time, Judge { flight, vehicle, channels });
-    channels.get(&quantity)?;
-    let period_s = flight.attitude.period_s().or(flight.command.period_s())?;
-    let (first_s, last_s) = flight.attitude.span_s().or(flight.command.span_s())?;
-    let span_s = last_s - first_s;
-    let is_wrong = |value: f64, (low, high): (f64, f64)| !(low..=high).contains(&value);
-    let factor = judge.factor(quantity);
-    let fits = |(_, other): &&(&str, f64)| {
-        let scale = other / factor;
-        !is_wrong(scale * period_s, PERIOD_RANGE_S) && !is_wrong(scale * span_s, SPAN_RANGE_S)
-    };
-    let (unit, other) = quantity.units().iter().find(fits)?;
-    let what =
-        format!("declared in {}, its samples are {period_s} s apart, over {span_s} s", judge.unit(quantity));
-    (is_wrong(period_s, PERIOD_RANGE_S) && is_wrong(span_s, SPAN_RANGE_S))
-        .then(|| finding(quantity, factor / other, Some(format!("`unit = \"{unit}\"`")), &what))
+    channels.get(&Quantity::Time)?;
+    let judge = Judge { flight, vehicle, channels };
+    let times =
+        [&flight.attitude.time_s, &flight.command.time_s].into_iter().find(|times| !times.is_empty())?;
+    judge.time(times).or_else(|| judge.time(&times[1..]))
 }
 
 struct Judge<'a> {
@@ -119,6 +109,26 @@ struct Judge<'a> {
 }
 
 impl Judge<'_> {
+    /// Samples come as a logger's do, and for as long as a vehicle flies.
+    fn time(&self, times: &[f64]) -> Option<Finding> {
+        let quantity = Quantity::Time;
+        let period_s = median(times.windows(2).map(|pair| pair[1] - pair[0]))?;
+        let span_s = times.last()? - times.first()?;
+        let is_wrong = |value: f64, (low, high): (f64, f64)| !(low..=high).contains(&value);
+        let factor = self.factor(quantity);
+        let fits = |(_, other): &&(&str, f64)| {
+            let scale = other / factor;
+            !is_wrong(scale * period_s, PERIOD_RANGE_S) && !is_wrong(scale * span_s, SPAN_RANGE_S)
+        };
+        let (unit, other) = quantity.units().iter().find(fits)?;
+        let what = format!(
+            "declared in {}, its samples are {period_s} s apart, over {span_s} s",
+            self.unit(quantity)
+        );
+        (is_wrong(period_s, PERIOD_RANGE_S) && is_wrong(span_s, SPAN_RANGE_S))
+            .then(|| finding(quantity, factor / other, Some(format!("`unit = \"{unit}\"`")), &what))
+    }
+
     /// The specific force is gravity's in the median, and up.
     fn gravity(&self) -> Option<Finding> {
         let quantity = Quantity::SpecificForce;

@@ -18,9 +18,23 @@ use crate::known_types;
 use crate::log::Log;
 use crate::plausible::{self, Finding};
 use crate::quantity::Quantity;
+use crate::span;
 
 /// Times are differences of decimal fractions since 1970: a sample on the edge of the part belongs to it.
 const SLACK_S: f64 = 1e-6;
+
+/// A part of a log, in s from the log's first sample.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Part {
+    /// When the first sample was, on the log's own clock.
+    pub origin_s: f64,
+    /// When the flight's own time begins.
+    pub start_s: f64,
+    /// The flight's first sample.
+    pub from_s: f64,
+    /// Its last.
+    pub to_s: f64,
+}
 
 /// What is needed to read a flight.
 pub struct Reading<'a> {
@@ -41,8 +55,8 @@ pub struct Reading<'a> {
 }
 
 impl Reading<'_> {
-    /// Reads the flight from `log`.
-    pub fn flight(mut self, log: &dyn Log) -> Result<Flight, FlightsError> {
+    /// Reads the flight from `log`; says which part of the log's own time it is, too.
+    pub fn flight(mut self, log: &dyn Log) -> Result<(Flight, Part), FlightsError> {
         self.check_delays()?;
         let mut taken = Vec::new();
         if self.channels.is_empty() {
@@ -57,13 +71,15 @@ impl Reading<'_> {
         let yaw = self.yaw(log)?;
         let origin_s = self.origin_s(&flight, yaw.as_ref())?;
         self.to_flight_time(&mut flight, origin_s);
+        self.check_span(&flight, log, origin_s)?;
+        let part = self.part(&flight, origin_s);
         self.assume(&mut flight, yaw.map(|yaw| self.shift(Quantity::Attitude, yaw, origin_s)))?;
         jumps::leave_out(&mut flight);
         self.say_gaps(&mut flight);
         self.check_something_is_left(&flight)?;
         self.judge(&mut flight)?;
         flight.notes = merged(&flight.notes);
-        Ok(flight)
+        Ok((flight, part))
     }
 
     fn read_channels(&self, log: &dyn Log) -> Result<Flight, FlightsError> {
@@ -189,6 +205,28 @@ impl Reading<'_> {
             command.time_s[holding] = 0.0;
         }
         self.window(command)
+    }
+
+    /// Refuses samples that are too far apart, before anything is computed over their time.
+    fn check_span(&self, flight: &Flight, log: &dyn Log, origin_s: f64) -> Result<(), FlightsError> {
+        let Some(sparse) = span::sparse(flight, span::SPACING_MAX_S) else { return Ok(()) };
+        let place = |time_s: f64| {
+            let of_log_s = time_s + self.start_s();
+            let line = log.line(of_log_s + origin_s).map_or(String::new(), |line| format!("line {line}, "));
+            format!("{line}{of_log_s} s from the log's first sample")
+        };
+        Err(self.log_error(&self.declaration_of(Quantity::Time), sparse.words(place)))
+    }
+
+    /// The part of the log that the flight's samples come from.
+    fn part(&self, flight: &Flight, origin_s: f64) -> Part {
+        let spans = || spans(flight).into_iter().flatten();
+        Part {
+            origin_s,
+            start_s: self.start_s(),
+            from_s: self.start_s() + spans().map(|span| span.0).fold(f64::INFINITY, f64::min),
+            to_s: self.start_s() + spans().map(|span| span.1).fold(f64::NEG_INFINITY, f64::max),
+        }
     }
 
     fn start_s(&self) -> f64 {

@@ -3,14 +3,15 @@
 use std::path::{Path, PathBuf};
 
 use toml::Spanned;
-use vehicles::Vehicle;
+use vehicles::{Vehicle, VehicleError};
 
 use crate::declaration::{ChannelMap, Declaration, FlightEntry};
 use crate::document::{Bad, Document};
 use crate::error::FlightsError;
 use crate::flight::Flight;
+use crate::held_out;
 use crate::log;
-use crate::reading::Reading;
+use crate::reading::{Part, Reading};
 
 /// The flights of a flights file, in its order.
 #[derive(Debug, Clone)]
@@ -25,20 +26,56 @@ impl FlightSet {
     /// Reads the flights file at `path` and its logs.
     ///
     /// # Errors
-    /// If a file cannot be read, a key or a name in a log is wrong, or values contradict their units.
+    /// As [`FlightSet::parse`], and if a file cannot be read.
     pub fn load(path: &Path) -> Result<Self, FlightsError> {
-        let document = Document::read(path)?;
+        let text = std::fs::read_to_string(path)
+            .map_err(|cause| FlightsError::Unreadable { file: path.display().to_string(), cause })?;
+        Self::parse(path, text, &|file| std::fs::read(file))
+    }
+
+    /// Reads the flights file at `path` with this text; `read` gives the bytes of the vehicle file and of the logs.
+    ///
+    /// # Errors
+    /// If a key or a name in a log is wrong, values contradict their units, a test flight holds what parameters are
+    /// fitted on, or `read` fails.
+    pub fn parse(path: &Path, text: String, read: &ReadFile<'_>) -> Result<Self, FlightsError> {
+        let document = Document::new(path, text);
         let declaration: Declaration = document.parse()?;
         let vehicle_path = document.resolve("vehicle", &declaration.vehicle)?;
-        let vehicle = Vehicle::load(&vehicle_path).map_err(|cause| FlightsError::Vehicle {
+        let vehicle = vehicle(&vehicle_path, read).map_err(|cause| FlightsError::Vehicle {
             place: document.place(&declaration.vehicle.span()),
             cause: Box::new(cause),
         })?;
         check_names(&document, &declaration.flight)?;
-        let context = Context { document: &document, declaration: &declaration, vehicle: &vehicle };
-        let entries = declaration.flight.iter().enumerate();
-        let flights = entries.map(|(index, entry)| context.flight(index, entry)).collect::<Result<_, _>>()?;
+        let context = Context { document: &document, declaration: &declaration, vehicle: &vehicle, read };
+        let mut parts = Vec::new();
+        let mut flights = Vec::new();
+        for (index, entry) in declaration.flight.iter().enumerate() {
+            let (flight, part) = context.flight(index, entry)?;
+            flights.push(flight);
+            parts.push(part);
+        }
+        held_out::check(&flights, &parts).map_err(|clash| FlightsError::NotHeldOut {
+            place: document.place(&declaration.flight[clash.test].get_ref().file.span()),
+            test: flights[clash.test].name.clone(),
+            fit: flights[clash.fit].name.clone(),
+            reason: clash.reason,
+        })?;
         Ok(Self { vehicle: vehicle_path, flights })
+    }
+}
+
+/// What gives the bytes of a file.
+pub type ReadFile<'a> = dyn Fn(&Path) -> std::io::Result<Vec<u8>> + 'a;
+
+fn vehicle(path: &Path, read: &ReadFile<'_>) -> Result<Vehicle, VehicleError> {
+    let file = path.display().to_string();
+    let as_text = |bytes| {
+        String::from_utf8(bytes).map_err(|error| std::io::Error::new(std::io::ErrorKind::InvalidData, error))
+    };
+    match read(path).and_then(as_text) {
+        Ok(text) => Vehicle::parse(&text, &file),
+        Err(cause) => Err(VehicleError::Unreadable { file, cause }),
     }
 }
 
@@ -67,11 +104,12 @@ struct Context<'a> {
     document: &'a Document,
     declaration: &'a Declaration,
     vehicle: &'a Vehicle,
+    read: &'a ReadFile<'a>,
 }
 
 impl Context<'_> {
     /// Reads the flight `index` of the file.
-    fn flight(&self, index: usize, spanned: &Spanned<FlightEntry>) -> Result<Flight, FlightsError> {
+    fn flight(&self, index: usize, spanned: &Spanned<FlightEntry>) -> Result<(Flight, Part), FlightsError> {
         let entry = spanned.get_ref();
         let key = |name: &str| format!("flight[{index}].{name}");
         self.check_window(entry, &key)?;
@@ -83,9 +121,11 @@ impl Context<'_> {
             reason,
         };
         let channels = self.channels(entry);
-        let format = entry.format.or(self.declaration.format).unwrap_or_else(|| log::guess(&file));
+        let bytes = (self.read)(&file)
+            .map_err(|error| broken(format!("cannot read it: {error}; check the path and its variables")))?;
+        let format = entry.format.or(self.declaration.format).unwrap_or_else(|| log::guess(&file, &bytes));
         let time = channels.get(&crate::Quantity::Time).map(Spanned::get_ref);
-        let log = log::open(&file, format, time).map_err(broken)?;
+        let log = log::parse(bytes, format, time).map_err(broken)?;
         Reading {
             document: self.document,
             vehicle: self.vehicle,

@@ -15,6 +15,8 @@ const HEADER_BYTES: usize = 16;
 const MESSAGE_BYTES_MAX: usize = 1 << 16;
 /// How deep formats may stand in formats; PX4's own stay below three.
 const DEPTH_MAX: usize = 8;
+/// How long the name of a field may be: it stands in the path of each of up to 65536 numbers. PX4's own stay below thirty.
+const NAME_BYTES_MAX: usize = 128;
 
 /// A log, with the places of its messages.
 pub struct Ulog {
@@ -155,6 +157,12 @@ impl Ulog {
         let fields = self.formats.get(format).filter(|_| depth > 0);
         let fields = fields.ok_or_else(|| format!("its format `{format}` is missing or stands in itself"))?;
         for field in fields {
+            if field.name.len() > NAME_BYTES_MAX {
+                let length = field.name.len();
+                return Err(format!(
+                    "its format `{format}` has a field name of {length} bytes, expected a few"
+                ));
+            }
             for index in 0..field.length.unwrap_or(1) {
                 let index = if field.length.is_some() { format!("[{index}]") } else { String::new() };
                 let path = format!("{prefix}{}{index}", field.name);

@@ -144,10 +144,13 @@ fn differences(own: &RigidBody, measured: &RigidBody) -> [f64; 4] {
     ]
 }
 
+/// A derivative reaches over no more, however far samples are apart: its cost grows with its reach.
+const SLOWEST_S: f64 = 0.5;
+
 /// Ticks to both sides of a derivative: three samples.
 #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a period is short")]
 fn reach(period_s: Option<f64>) -> usize {
-    ((3.0 * period_s.unwrap_or(0.0) / TICK_S).round() as usize).max(1)
+    ((3.0 * period_s.unwrap_or(0.0).min(SLOWEST_S) / TICK_S).round() as usize).max(1)
 }
 
 fn unit([w, x, y, z]: &[f64; 4]) -> UnitQuaternion<f64> {

@@ -4,6 +4,7 @@
 //! |---|---|
 //! | `stand` | the stand file: which logs, which columns, what is held out |
 //! | `table` | one log: its columns in SI |
+//! | `held_out` | whether logs to test on hold what is fitted on |
 //! | `plateau` | where a log stands still, and what it reads there |
 //! | `coefficient` | T = c_T w^2 and Q = c_Q w^2 from plateaus |
 //! | `step` | steps of the command, cut out of a log |
@@ -20,6 +21,7 @@ mod coefficient;
 mod command_map;
 mod dynamics;
 mod error;
+mod held_out;
 mod lag;
 mod plateau;
 mod report;
@@ -48,6 +50,7 @@ pub const LEVEL: f64 = 0.95;
 /// `rotor.json`, all figures, to the folder `out`, which is made if it is not there.
 pub fn run(path: &Path, out: &Path) -> Result<RotorReport, RotorError> {
     let stand = stand::Stand::read(path)?;
+    held_out::check(&stand)?;
     let vehicle = stand.vehicle_file()?;
     let statics = statics::fitted(&stand)?;
     let dynamics = dynamics::fitted(&stand)?;

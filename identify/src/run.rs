@@ -30,12 +30,24 @@ const POSE_BOX_S: f64 = 0.04;
 /// A residual is worth telling where its persistent part is beyond this part of its noise.
 const UNEXPLAINED: f64 = 0.3;
 
+/// Samples of motion that are further apart, on average, say nothing about it; what is computed tick by tick would cost
+/// time and memory beyond what there is to compare.
+const SPACING_MAX_S: f64 = 0.5;
+
 /// Why flights cannot be identified on.
 #[derive(Debug, thiserror::Error)]
 pub enum IdentifyError {
     /// The vehicle file.
     #[error(transparent)]
     Vehicle(#[from] VehicleError),
+    /// A flight whose samples are too far apart.
+    #[error("flight `{flight}` cannot be identified on: {reason}")]
+    Sparse {
+        /// Its name.
+        flight: String,
+        /// What is wrong, and what to do.
+        reason: String,
+    },
     /// A role that no flight has.
     #[error(
         "no flight with role \"{role}\" can be used; {reason}. Add flights, or give one a part of another's time by \
@@ -139,7 +151,7 @@ pub fn identify(set: &FlightSet, progress: &mut dyn FnMut(&str)) -> Result<Outco
 /// The flights on their grids, with the declared model.
 ///
 /// # Errors
-/// If no flight of a role can be used.
+/// If the samples of a flight are too far apart, or no flight of a role can be used.
 pub fn bench<'f>(
     vehicle: &Vehicle,
     declared: &[Effect],
@@ -153,6 +165,8 @@ pub fn bench<'f>(
     };
     let (mut fit, mut test, mut reports) = (Vec::new(), Vec::new(), Vec::new());
     for flight in &set.flights {
+        let sparse = |reason| IdentifyError::Sparse { flight: flight.name.clone(), reason };
+        flight.check_span(SPACING_MAX_S).map_err(sparse)?;
         let prepared = Prepared::new(flight, box_s(flight), is_flying);
         reports.push(flight_report(flight, prepared.as_ref()));
         match (prepared, flight.role) {

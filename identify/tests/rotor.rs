@@ -320,6 +320,82 @@ fn mistakes_are_said_with_what_to_do() {
     assert!(path.contains("`static.file`"), "{path}");
 }
 
+/// A stand whose log `first` is fitted on and `second` tested on; the words of the refusal, if it is one.
+fn held_out(table: &str, first: &str, second: &str) -> Result<(), String> {
+    let name = if table == STATIC { "static" } else { "dynamic" };
+    let test = table
+        .replace(&format!("{name}.csv"), "other.csv")
+        .replace("held_out = 0", "role = \"test\"\nheld_out = 0");
+    let stand = Stand::new(&format!("{table}{test}"));
+    stand.write(&format!("{name}.csv"), first);
+    stand.write("other.csv", second);
+    stand.run().map(|_| ()).map_err(|error| error.to_string())
+}
+
+#[test]
+fn a_log_to_test_on_that_is_fitted_on_is_refused() {
+    let logs = |seed: u64| {
+        let motor = || Motor::first(0.04);
+        [
+            (STATIC, static_log(&mut Draws::new(seed), 1.0)),
+            (DYNAMIC, dynamic_log(&mut Draws::new(seed), motor(), 4.0)),
+        ]
+    };
+    for ((table, first), (_, other)) in logs(1).into_iter().zip(logs(2)) {
+        held_out(table, &first, &other).unwrap();
+        let part: String = first
+            .lines()
+            .enumerate()
+            .filter(|(row, _)| *row == 0 || *row > 300)
+            .map(|(_, line)| line.to_owned() + "\n")
+            .collect();
+        for (second, how) in [(&first, "copies of the same bytes"), (&part, "rows are the same")] {
+            let words = held_out(table, &first, second).unwrap_err();
+            for part in [how, "other.csv", "role \"test\"", "is not held out", "by `held_out`"] {
+                assert!(words.contains(part), "`{part}` is not in: {words}");
+            }
+        }
+    }
+    let stand = Stand::new(&format!("{STATIC}{}", STATIC.replace("held_out = 0.3", "role = \"test\"")));
+    stand.write("static.csv", &static_log(&mut Draws::new(1), 1.0));
+    assert!(stand.run().unwrap_err().to_string().contains("the same file"));
+}
+
+#[test]
+fn stray_marks_and_stamps_of_any_size_in_stand_logs_end_in_words() {
+    let of_static = |log: &str| {
+        let stand = Stand::new(STATIC);
+        stand.write("static.csv", log);
+        stand.run().map(|_| ()).map_err(|error| error.to_string())
+    };
+    let log = static_log(&mut Draws::new(1), 1.0);
+    of_static(&log).unwrap();
+    let mut lines: Vec<String> = log.lines().map(str::to_owned).collect();
+    lines[101] = lines[101].replacen(',', ",\"", 1);
+    let words = of_static(&lines.join("\n")).unwrap_err();
+    assert!(words.contains("static.csv") && words.contains("line 102, cell 2"), "{words}");
+    let stamped = |stamp: &dyn Fn(f64) -> f64, log: &str| {
+        let mut rows = log.lines();
+        let mut text = rows.next().unwrap().to_owned() + "\n";
+        for (row, line) in rows.enumerate() {
+            text += &format!("{},{}\n", stamp(row as f64), line.split_once(',').unwrap().1);
+        }
+        text
+    };
+    let of_dynamic = |log: &str| {
+        let stand = Stand::new(DYNAMIC);
+        stand.write("dynamic.csv", log);
+        stand.run().map(|_| ()).map_err(|error| error.to_string())
+    };
+    let steps = dynamic_log(&mut Draws::new(1), Motor::first(0.04), 4.0);
+    let stamps: [&dyn Fn(f64) -> f64; 4] =
+        [&|row| 1e16 * row, &|row| 1e-300 * row, &|row| if row < 1.0 { 0.0 } else { 1e16 + row }, &|_| 0.0];
+    for stamp in stamps {
+        let (of_static, of_dynamic) = (of_static(&stamped(stamp, &log)), of_dynamic(&stamped(stamp, &steps)));
+        assert!(of_static.is_err() || of_dynamic.is_err(), "no log of a stand has such stamps");
+    }
+}
+
 /// The report of a stand of this project on esc-test; says so where the data is not given.
 fn esc_test(stand: &str) -> Option<RotorReport> {
     if std::env::var_os("HUMMINGBUS_DATA").is_none() {

@@ -64,6 +64,8 @@ enum Repeat {
 
 /// How deep messages may stand in messages; ROS 2's own stay below ten.
 const DEPTH_MAX: usize = 64;
+/// How long the path of a value may be for each byte of the message.
+const PATH_BYTES_MAX: usize = 1024;
 
 /// A parsed definition.
 #[derive(Clone, Debug)]
@@ -101,9 +103,14 @@ impl Definition {
         let Some((&[0, 1, 0, 0], body)) = cdr.split_first_chunk::<4>() else {
             return Err("it does not start with the header of little-endian CDR, 00 01 00 00".to_owned());
         };
-        let values_left = DEPTH_MAX.saturating_mul(body.len() + 1);
-        let mut walk =
-            Walk { definition: self, cdr: Cursor { body, at: 0 }, leaves: Vec::new(), depth: 0, values_left };
+        let mut walk = Walk {
+            definition: self,
+            cdr: Cursor { body, at: 0 },
+            leaves: Vec::new(),
+            depth: 0,
+            values_left: DEPTH_MAX.saturating_mul(body.len() + 1),
+            path_bytes_left: PATH_BYTES_MAX.saturating_mul(body.len() + 1),
+        };
         walk.message(&self.root, "", "")?;
         Ok(walk.leaves)
     }
@@ -140,6 +147,9 @@ struct Walk<'a> {
     /// Values that are still read. A value takes a byte at least or holds one that does, so that only messages
     /// without fields use this up: repeated, they would be read for ever.
     values_left: usize,
+    /// Bytes that the paths of further values may have: names of any length, once for each value, would take memory
+    /// without bound.
+    path_bytes_left: usize,
 }
 
 impl Walk<'_> {
@@ -164,6 +174,9 @@ impl Walk<'_> {
     fn value(&mut self, base: &str, path: String, unit: &str) -> Result<(), String> {
         self.values_left = self.values_left.checked_sub(1).ok_or_else(|| {
             format!("`{path}`: the definition names more values than the message has bytes")
+        })?;
+        self.path_bytes_left = self.path_bytes_left.checked_sub(path.len()).ok_or_else(|| {
+            format!("the paths of its values are longer than {PATH_BYTES_MAX} times the message")
         })?;
         let cdr = &mut self.cdr;
         let value = match base {

@@ -1,10 +1,11 @@
 //! A recording that was written: its topics, messages and attachments.
 
+pub use crate::container::{Damage, Messages};
+
+use crate::container::{attachment, summary};
 use crate::definition::{Definition, Leaf};
 use crate::error::RecordingError;
-use mcap::sans_io::linear_reader::LinearReaderOptions;
-use mcap::sans_io::{MessageReadEvent, MessageReader};
-use mcap::{Channel, Summary};
+use mcap::Channel;
 use memmap2::Mmap;
 use std::collections::BTreeMap;
 use std::fs::File;
@@ -58,12 +59,10 @@ impl Recording {
     /// If the file cannot be read or is not a complete MCAP file.
     pub fn open(path: &Path) -> Result<Self, RecordingError> {
         let bytes = map(path)?;
-        let summary = Summary::read(&bytes).map_err(|error| content(path, &error))?.ok_or_else(|| {
+        let summary = summary(&bytes).map_err(|error| content(path, &error))?.ok_or_else(|| {
             RecordingError::Content { path: path.to_owned(), reason: "it has no summary section".to_owned() }
         })?;
-        let counts = summary.stats.as_ref().map(|stats| &stats.channel_message_counts);
-        let count = |channel: &Channel<'_>| counts.and_then(|counts| counts.get(&channel.id)).copied();
-        let channels = summary.channels.values().map(|channel| (channel, count(channel).unwrap_or(0)));
+        let channels = summary.channels.values().map(|(channel, count)| (channel, *count));
         let topics = topics(channels, path)?;
         Ok(Self { path: path.to_owned(), bytes, topics, cut: None })
     }
@@ -160,57 +159,9 @@ impl Recording {
         if self.cut.is_some() {
             return Ok(Vec::new());
         }
-        let summary =
-            Summary::read(&self.bytes).map_err(|error| content(&self.path, &error))?.unwrap_or_default();
-        summary
-            .attachment_indexes
-            .iter()
-            .map(|index| {
-                let attachment =
-                    mcap::read::attachment(&self.bytes, index).map_err(|e| content(&self.path, &e))?;
-                Ok((attachment.name.clone(), attachment.data.into_owned()))
-            })
-            .collect()
-    }
-}
-
-/// Longer records are refused before memory is taken for them: a damaged length must not ask for terabytes.
-const RECORD_BYTES_MAX: usize = 1 << 28;
-
-/// The messages of an MCAP file, whoever wrote it: its bytes, fed to the reader. A damaged chunk is an error in front
-/// of any of its messages.
-pub struct Messages<'a> {
-    reader: MessageReader,
-    rest: &'a [u8],
-}
-
-impl<'a> Messages<'a> {
-    /// The messages of a file with these bytes.
-    #[must_use]
-    pub fn new(bytes: &'a [u8]) -> Self {
-        let options = LinearReaderOptions::default()
-            .with_prevalidate_chunk_crcs(true)
-            .with_record_length_limit(RECORD_BYTES_MAX);
-        Self { reader: MessageReader::new_with_options(options), rest: bytes }
-    }
-}
-
-impl Iterator for Messages<'_> {
-    type Item = mcap::McapResult<mcap::Message<'static>>;
-
-    fn next(&mut self) -> Option<Self::Item> {
-        loop {
-            match self.reader.next_event()? {
-                Err(error) => return Some(Err(error)),
-                Ok(MessageReadEvent::Message(message)) => return Some(Ok(message)),
-                Ok(MessageReadEvent::ReadRequest(wanted)) => {
-                    let (next, rest) = self.rest.split_at(wanted.min(self.rest.len()));
-                    self.reader.insert(next.len()).copy_from_slice(next);
-                    self.reader.notify_read(next.len());
-                    self.rest = rest;
-                }
-            }
-        }
+        let broken = |error| content(&self.path, &error);
+        let attachments = summary(&self.bytes).map_err(broken)?.map_or(Vec::new(), |own| own.attachments);
+        attachments.iter().map(|index| attachment(&self.bytes, index).map_err(broken)).collect()
     }
 }
 
@@ -241,6 +192,6 @@ fn topics<'a>(
         .collect()
 }
 
-fn content(path: &Path, error: &mcap::McapError) -> RecordingError {
+fn content(path: &Path, error: &Damage) -> RecordingError {
     RecordingError::Content { path: path.to_owned(), reason: error.to_string() }
 }

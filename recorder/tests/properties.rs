@@ -8,19 +8,19 @@ use bus::schema::Schema;
 use proptest::prelude::*;
 use recorder::definition::Definition;
 use recorder::diff::first_difference;
-use recorder::reader::Recording;
+use recorder::reader::{Messages, Recording};
 use recorder::writer::RecordingWriter;
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
+use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::LazyLock;
 
 const SCHEMAS: [&Schema; 5] =
     [BodyTransform::SCHEMA, Imu::SCHEMA, MotorCommand::SCHEMA, PlantState::SCHEMA, PoseStamped::SCHEMA];
-/// What may be taken while a damaged file of a few kilobytes is read: a record at its limit of 256 MiB, while its
-/// buffer grows, and 4 GiB of untouched address space, since mcap 0.26 reserves what a string says that it is long,
-/// in 32 bits, before it sees that the record is shorter.
-const HELD_BYTES_MAX: isize = (4 << 30) + (1 << 30);
+/// What may be taken while a file of a few kilobytes is read, whatever lengths it states: its chunks, its messages and
+/// the comparison with another. A claim of 4 GiB, or of a chunk of 256 MiB, is far beyond.
+const HELD_BYTES_MAX: isize = 2 << 20;
 
 /// Counts the bytes that each thread holds.
 struct Counting;
@@ -74,6 +74,32 @@ static WHOLE: LazyLock<Vec<u8>> = LazyLock::new(|| {
     }
     writer.finish().unwrap();
     std::fs::read(path).unwrap()
+});
+
+/// What other writers make: no compression, messages beside chunks, metadata, an attachment.
+static PLAIN: LazyLock<Vec<u8>> = LazyLock::new(|| {
+    let mut file = std::io::Cursor::new(Vec::new());
+    let mut writer =
+        mcap::WriteOptions::new().compression(None).chunk_size(Some(600)).create(&mut file).unwrap();
+    let definition = MotorCommand::SCHEMA.ros2_definition();
+    let schema = writer.add_schema(MotorCommand::SCHEMA.type_name, "ros2msg", definition.as_bytes()).unwrap();
+    let about = BTreeMap::from([("offered_qos_profiles".to_owned(), "none".to_owned())]);
+    let channel_id = writer.add_channel(schema, "/controller/command", "cdr", &about).unwrap();
+    for sequence in 0..20 {
+        let message = MotorCommand { command: [f64::from(sequence); 4], ..MotorCommand::default() };
+        let log_time = u64::from(sequence) * 1_000_000;
+        let header = mcap::records::MessageHeader { channel_id, sequence, log_time, publish_time: log_time };
+        writer
+            .write_to_known_channel(&header, &[&[0, 1, 0, 0], bytemuck::bytes_of(&message)].concat())
+            .unwrap();
+    }
+    let text = std::borrow::Cow::Borrowed(&b"[run]\n"[..]);
+    let (name, media_type) = ("run.toml".to_owned(), "application/toml".to_owned());
+    writer.attach(&mcap::Attachment { log_time: 0, create_time: 0, name, media_type, data: text }).unwrap();
+    writer.write_metadata(&mcap::records::Metadata { name: "about".to_owned(), metadata: about }).unwrap();
+    writer.finish().unwrap();
+    drop(writer);
+    file.into_inner()
 });
 
 /// Reads `bytes` as a recording in every way; returns the number of messages, where it reads.
@@ -157,13 +183,15 @@ proptest! {
     fn no_changed_byte_is_a_crash(
         changes in prop::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 1..6),
         cut in prop::option::of(any::<prop::sample::Index>()),
+        is_plain in any::<bool>(),
     ) {
-        let mut bytes = WHOLE.clone();
+        let mut bytes = if is_plain { PLAIN.clone() } else { WHOLE.clone() };
+        let whole = bytes.len();
         for (at, byte) in changes {
             let at = at.index(bytes.len());
             bytes[at] = byte;
         }
-        bytes.truncate(cut.map_or(usize::MAX, |cut| cut.index(WHOLE.len())));
+        bytes.truncate(cut.map_or(usize::MAX, |cut| cut.index(whole)));
         read(&bytes)?;
     }
 
@@ -172,13 +200,64 @@ proptest! {
         at in any::<prop::sample::Index>(),
         length in prop_oneof![Just(u64::MAX), Just(u64::MAX / 2), Just(1 << 40), Just(1 << 28), any::<u64>()],
         is_cut in any::<bool>(),
+        is_plain in any::<bool>(),
     ) {
-        let mut bytes = WHOLE.clone();
+        let mut bytes = if is_plain { PLAIN.clone() } else { WHOLE.clone() };
         let at = at.index(bytes.len() - 8);
         bytes[at..at + 8].copy_from_slice(&length.to_le_bytes());
-        bytes.truncate(WHOLE.len() - usize::from(is_cut));
+        bytes.truncate(bytes.len() - usize::from(is_cut));
         read(&bytes)?;
     }
+}
+
+/// Every place at which a length can stand, and the lengths that reach beyond the file: 4 GiB, a chunk's limit, twice.
+#[test]
+fn no_length_at_any_byte_of_a_recording_takes_more_memory_than_the_file_holds() {
+    for whole in [&*PLAIN, &*WHOLE] {
+        for length in [u64::from(u32::MAX), 1 << 28, 1 << 63] {
+            for at in 0..whole.len() - 8 {
+                let mut bytes = whole.clone();
+                bytes[at..at + 8].copy_from_slice(&length.to_le_bytes());
+                let before = HELD.get();
+                HELD_MAX.set(before);
+                let count = Messages::new(&bytes).map_while(Result::ok).count();
+                let held = HELD_MAX.get() - before;
+                assert!(held < HELD_BYTES_MAX, "{length} at byte {at}: {held} bytes were held");
+                assert!(count <= 90, "{length} at byte {at}");
+            }
+        }
+    }
+}
+
+#[test]
+fn a_length_beyond_the_file_is_refused_with_its_place() {
+    let refused = |bytes: &[u8]| Messages::new(bytes).find_map(Result::err).unwrap().to_string();
+    let head = [mcap::MAGIC, &[1], &100_u64.to_le_bytes()].concat();
+    assert_eq!(refused(&head), "byte 8: a record (header) says that it is 100 bytes long, 0 are left");
+    let body = [u32::MAX.to_le_bytes(), [0; 4]].concat();
+    let header = [mcap::MAGIC, &[1], &8_u64.to_le_bytes(), &body].concat();
+    assert_eq!(
+        refused(&header),
+        "byte 8: a record (header) says that 4294967295 bytes follow, 4 are left in it"
+    );
+    let at = WHOLE.windows(9).position(|bytes| bytes[0] == 6 && bytes[3..9] == [0; 6]).unwrap();
+    let mut claims = WHOLE.clone();
+    claims[at + 25..at + 33].copy_from_slice(&(1_u64 << 27).to_le_bytes());
+    let said = refused(&claims);
+    assert!(
+        said.starts_with(&format!("byte {at}: a chunk says that it unpacks to 134217728 bytes, and ")),
+        "{said}"
+    );
+    // A record of a chunk that goes on behind the chunk's end, in the same file.
+    let at = PLAIN.windows(9).position(|bytes| bytes[0] == 6 && bytes[3..9] == [0; 6]).unwrap();
+    let mut beyond = PLAIN.clone();
+    beyond[at + 33..at + 37].fill(0);
+    beyond[at + 49 + 1..at + 49 + 9].copy_from_slice(&2000_u64.to_le_bytes());
+    let said = refused(&beyond);
+    assert!(
+        said.contains(&format!("of the chunk at byte {at}: a record")) && said.contains("are left"),
+        "{said}"
+    );
 }
 
 #[test]
@@ -202,6 +281,10 @@ fn a_definition_that_holds_itself_or_repeats_nothing_is_refused() {
     assert!(definition.decode(&[0, 1, 0, 0, 1, 2, 3]).unwrap_err().contains("messages deep"));
     let definition = Definition::parse(&format!("A[18446744073709551615] a\n{rule}\nMSG: A\n")).unwrap();
     assert!(definition.decode(&[0, 1, 0, 0, 1, 2, 3]).unwrap_err().contains("more values than"));
+    let definition = Definition::parse(&format!("uint8[1000] {}\n", "a".repeat(5000))).unwrap();
+    assert!(
+        definition.decode(&[[0, 1, 0, 0].as_slice(), &[7; 1000]].concat()).unwrap_err().contains("paths")
+    );
 }
 
 #[test]

@@ -167,7 +167,9 @@ fn horizon_errors(
         let begin_ns = end_ns - window_ns;
         let (from_s, to_s) =
             (replay.start_s() + begin_ns as f64 * 1e-9, replay.start_s() + end_ns as f64 * 1e-9);
-        begin_ns >= SETTLE_NS && !gaps.iter().any(|gap| gap.0 < to_s && from_s < gap.1)
+        // Of the gaps that begin before the window's end, the one that ends last.
+        let begun = gaps.partition_point(|gap| gap.0 < to_s);
+        begin_ns >= SETTLE_NS && !begun.checked_sub(1).is_some_and(|last| from_s < gaps[last].1)
     };
     let counted: Vec<u64> = ends.iter().copied().filter(|end_ns| is_whole(*end_ns)).collect();
     let rms = |quantity: Quantity, track: &Track| {
@@ -196,16 +198,24 @@ fn root_mean_square(errors: impl Iterator<Item = f64>) -> f64 {
     (squares / count).sqrt()
 }
 
-/// The gaps of all measured channels of the state, in seconds of the flight.
+/// The gaps of all measured channels of the state, in seconds of the flight, by when they begin; each with the end of the
+/// longest so far, as there can be as many as rows.
 fn gaps(flight: &Flight) -> Vec<(f64, f64)> {
     let attitude = if flight.assumed.is_empty() { channel_gaps(&flight.attitude) } else { Vec::new() };
-    [
+    let mut gaps = [
         channel_gaps(&flight.position),
         channel_gaps(&flight.velocity),
         attitude,
         channel_gaps(&flight.angular_velocity),
     ]
-    .concat()
+    .concat();
+    gaps.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let mut last_s = f64::NEG_INFINITY;
+    for gap in &mut gaps {
+        last_s = last_s.max(gap.1);
+        gap.1 = last_s;
+    }
+    gaps
 }
 
 fn channel_gaps<const N: usize>(channel: &Channel<N>) -> Vec<(f64, f64)> {

@@ -4,12 +4,14 @@ use crate::support::repository;
 use std::path::Path;
 
 /// The sources that hold tests.
-const SOURCES: [&str; 7] = [
+const SOURCES: [&str; 9] = [
     "tests/faults",
     "tests/runs",
     "bus/src",
     "bus/tests",
     "recorder/tests",
+    "flights/tests",
+    "identify/tests",
     "vehicles/tests",
     "vehicles/src",
 ];

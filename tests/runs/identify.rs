@@ -45,6 +45,52 @@ fn the_riddle_of_the_thesis_delay_and_rig_are_told_apart_and_measured() {
     assert!(std::fs::metadata(place.path("out/report.html")).unwrap().len() > 100_000);
 }
 
+/// Rows of a hover, `step_s` apart, with the noise of a gyroscope.
+fn hover(rows: u32, step_s: f64) -> String {
+    let mut state = 1_u32;
+    let mut noise = || {
+        state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        f64::from(state >> 8) / f64::from(1 << 24) - 0.5
+    };
+    let row = |index: u32| {
+        let [x, y, z] = [0.1 * noise(), 0.1 * noise(), 0.1 * noise()];
+        format!("{:.2},100,100,100,100,{x},{y},{z}\n", f64::from(index) * step_s)
+    };
+    (0..rows).map(row).fold("t,m1,m2,m3,m4,wx,wy,wz\n".to_owned(), |text, row| text + &row)
+}
+
+#[test]
+fn a_flight_that_is_fitted_on_is_no_test_flight_for_identify_and_validate() {
+    let place = Place::new();
+    let vehicle = repository("vehicles/hummingbird.toml");
+    let log = hover(400, 0.01);
+    place.write("log.csv", &log);
+    place.write("copy.csv", &log);
+    place.write("again.csv", log.replace(",wz\n", ",wz,comment\n"));
+    let out = place.path("out");
+    for (other, how) in [
+        ("log.csv", "the same file"),
+        ("copy.csv", "copies of the same bytes"),
+        ("again.csv", "400 of 400 samples"),
+    ] {
+        let flights = place.write(
+            "flights.toml",
+            format!(
+                "vehicle = {vehicle:?}\n[channels]\ntime = {{ columns = [\"t\"], unit = \"s\" }}\n\
+                 command = {{ columns = [\"m1\", \"m2\", \"m3\", \"m4\"], unit = \"count\" }}\n\
+                 angular_velocity = {{ columns = [\"wx\", \"wy\", \"wz\"], unit = \"rad/s\" }}\n\
+                 [[flight]]\nname = \"first\"\nfile = \"log.csv\"\nrole = \"fit\"\n\
+                 [[flight]]\nname = \"second\"\nfile = {other:?}\nrole = \"test\"\n"
+            ),
+        );
+        let words =
+            ["flights.toml:12:8", "`second` with role \"test\"", "`first` with role \"fit\"", how, "from_s"];
+        place.call(&["identify", &flights, "--out", &out]).with_code(2).says(&words);
+        place.call(&["validate", &vehicle, &flights]).with_code(2).says(&words);
+    }
+    assert!(!std::path::Path::new(&out).exists(), "a refusal writes nothing");
+}
+
 #[test]
 fn what_cannot_be_identified_on_is_refused_in_words() {
     let place = Place::new();
@@ -63,5 +109,11 @@ fn what_cannot_be_identified_on_is_refused_in_words() {
         ),
     );
     place.call(&["identify", &flights, "--out", &out]).with_code(2).says(&["short"]);
+    place.write("short.csv", hover(100, 1.0));
+    let slow = [
+        "flight `short` cannot be identified on",
+        "100 samples lie over 99 s, expected at least one in 0.5 s",
+    ];
+    place.call(&["identify", &flights, "--out", &out]).with_code(2).says(&slow);
     place.call(&["identify", "rotor", &missing, "--out", &out]).with_code(2).says(&["nowhere.toml"]);
 }

@@ -386,6 +386,12 @@ fn a_flight_with_a_cell_that_is_no_number() {
 }
 
 #[test]
+fn a_flight_with_a_quotation_mark_that_swallows_rows() {
+    let flight = flight().replacen("0.010,0.001,", "0.010,\"0.001,", 1);
+    refused_replay(&flight, &FROM_THE_START).says(&["line 3, cell 2", "quotation mark", "remove the mark"]);
+}
+
+#[test]
 fn a_flight_whose_time_stands_still() {
     let flight = flight().replacen("0.020,", "0.010,", 1);
     refused_replay(&flight, &FROM_THE_START).says(&["time does not grow from line 3"]);

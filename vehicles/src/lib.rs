@@ -8,6 +8,7 @@
 //! | [`effects`] | the effects that a vehicle or scene file lists, as they are written |
 //! | `file` | which keys a vehicle file has, and what is physical |
 //! | [`reader`] | walks the TOML tree with positions, refuses what it does not know; scene files and gains files use it too |
+//! | [`quotes`] | quotation marks in CSV files of measurements, whose rows are lines |
 //! | [`units`] | the table of accepted units |
 //! | [`variables`] | variables of the environment within paths |
 //! | [`error`] | what can be wrong with a file, said for people |
@@ -25,6 +26,7 @@ pub mod effects;
 pub mod error;
 mod file;
 pub mod provenance;
+pub mod quotes;
 pub mod reader;
 pub mod units;
 pub mod variables;

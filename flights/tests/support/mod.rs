@@ -234,8 +234,13 @@ uint32 nanosec
 
 /// An MCAP file of `count` samples at 100 Hz: commands and inertial sensors of ours, a battery of ROS 2.
 pub fn recording(path: &Path, count: u32) {
-    let mut writer =
-        mcap::Writer::new(std::io::BufWriter::new(std::fs::File::create(path).unwrap())).unwrap();
+    std::fs::write(path, bag(count, Some(mcap::Compression::Zstd))).unwrap();
+}
+
+/// The same, its chunks compressed or not.
+pub fn bag(count: u32, compression: Option<mcap::Compression>) -> Vec<u8> {
+    let mut file = std::io::Cursor::new(Vec::new());
+    let mut writer = mcap::WriteOptions::new().compression(compression).create(&mut file).unwrap();
     let mut channel = |topic: &str, kind: &str, definition: &str| {
         let schema = writer.add_schema(kind, "ros2msg", definition.as_bytes()).unwrap();
         writer.add_channel(schema, topic, "cdr", &BTreeMap::new()).unwrap()
@@ -270,4 +275,6 @@ pub fn recording(path: &Path, count: u32) {
         send(battery, &body);
     }
     writer.finish().unwrap();
+    drop(writer);
+    file.into_inner()
 }

@@ -54,6 +54,19 @@ pub enum RotorError {
         /// What is wrong, and what to do.
         reason: String,
     },
+    /// A log to test on holds rows that are fitted on.
+    #[error(
+        "{test}: this log with role \"test\" is not held out from {fit} with role \"fit\": {reason}; give another log, or hold \
+         out a part of this one by `held_out`"
+    )]
+    NotHeldOut {
+        /// The log to test on.
+        test: String,
+        /// The log to fit on.
+        fit: String,
+        /// What they have in common.
+        reason: String,
+    },
     /// There is too little to fit.
     #[error("{what}: expected {expected}, found {found}; {advice}")]
     TooLittle {

@@ -1,5 +1,6 @@
 //! Where a log stands still, and what it reads there.
 
+use std::collections::VecDeque;
 use std::ops::Range;
 
 /// A reading of a plateau is an outlier beyond this many robust standard deviations.
@@ -29,12 +30,13 @@ pub fn find(time_s: &[f64], speed: &[f64], settle_s: f64, steady: f64) -> Platea
     let is_spike = (0..speed.len()).map(|row| (speed[row] - smooth[row]).abs() > band(row)).collect();
     let mut plateaus: Vec<Range<usize>> = Vec::new();
     let mut first = 0;
+    let mut extremes = Extremes::default();
     for row in 0..speed.len() {
         while time_s[row] - time_s[first] > settle_s {
             first += 1;
         }
+        let (low, high) = extremes.range(&smooth, first, row);
         let is_long = first > 0;
-        let (low, high) = range(&smooth[first..=row]);
         if !is_long || high - low > band(row) {
             continue;
         }
@@ -46,6 +48,29 @@ pub fn find(time_s: &[f64], speed: &[f64], settle_s: f64, steady: f64) -> Platea
         }
     }
     Plateaus { rows: plateaus, is_spike }
+}
+
+/// The smallest and the largest of a stretch of rows that moves on: each row is looked at once, however many rows the
+/// stamps put into a stretch.
+#[derive(Default)]
+struct Extremes {
+    /// Rows of the stretch whose values grow, the smallest first.
+    low: VecDeque<usize>,
+    /// The same, the largest first.
+    high: VecDeque<usize>,
+}
+
+impl Extremes {
+    /// Those of the rows from `first` to `row`; both grow from call to call, `row` by one.
+    fn range(&mut self, values: &[f64], first: usize, row: usize) -> (f64, f64) {
+        while self.low.pop_back_if(|last| values[*last] >= values[row]).is_some() {}
+        while self.high.pop_back_if(|last| values[*last] <= values[row]).is_some() {}
+        self.low.push_back(row);
+        self.high.push_back(row);
+        while self.low.pop_front_if(|own| *own < first).is_some() {}
+        while self.high.pop_front_if(|own| *own < first).is_some() {}
+        (values[self.low[0]], values[self.high[0]])
+    }
 }
 
 /// Splits `values` into those that belong together and the number of outliers among them.
@@ -109,6 +134,18 @@ mod tests {
         let found = find(&time_s, &speed, 1.0, 0.02);
         assert_eq!(found.rows, [21..100, 120..200]);
         assert_eq!(found.is_spike.iter().filter(|spike| **spike).count(), 1);
+    }
+
+    #[test]
+    fn the_extremes_are_those_of_each_stretch() {
+        let values: Vec<f64> = (0..300).map(|row| f64::from((row * 7919) % 101)).collect();
+        let (mut extremes, mut first) = (Extremes::default(), 0);
+        for row in 0..values.len() {
+            if row % 23 == 0 {
+                first = row.saturating_sub(5);
+            }
+            assert_eq!(extremes.range(&values, first, row), range(&values[first..=row]));
+        }
     }
 
     #[test]

@@ -13,6 +13,10 @@ const HEIGHT_SIGMAS_MIN: f64 = 3.0;
 const PERIOD_ROWS: usize = 500;
 /// Rows by which the stamps of a step may shift before rows count as lost.
 const LOST_ROWS: f64 = 1.5;
+/// Rows before a step whose median is the speed that it starts from.
+const ROWS_BEFORE_MIN: usize = 1;
+/// Rows after it: the last third of them is where it ends.
+const ROWS_AFTER_MIN: usize = 3;
 /// Equal readings in a row that are suspicious.
 const STUCK_READINGS: usize = 5;
 
@@ -118,7 +122,23 @@ impl<'s> Log<'s> {
             file: name.clone(),
             reason: "expected rows with time, speed and command, found too few; check the columns".to_owned(),
         })?;
-        Ok(Self { declared, name, time_s, speed, command, period_s })
+        let log = Self { declared, name, time_s, speed, command, period_s };
+        log.check_rate()?;
+        Ok(log)
+    }
+
+    /// Refuses rows that are too far apart to show a step.
+    fn check_rate(&self) -> Result<(), RotorError> {
+        let (before_s, after_s) = (self.declared.before_s, self.declared.after_s);
+        if self.rows(before_s) >= ROWS_BEFORE_MIN && self.rows(after_s) >= ROWS_AFTER_MIN {
+            return Ok(());
+        }
+        let reason = format!(
+            "its rows are {} s apart, expected at least {ROWS_BEFORE_MIN} in the {before_s} s before a step and \
+             {ROWS_AFTER_MIN} in the {after_s} s after; correct the unit of `time`, or raise `before_s` and `after_s`",
+            self.period_s
+        );
+        Err(RotorError::Log { file: self.name.clone(), reason })
     }
 
     /// Whether the command of `row` is another than before.
@@ -127,8 +147,9 @@ impl<'s> Log<'s> {
         self.command[row] != self.command[row - 1]
     }
 
+    /// How many rows `seconds` are; at most one more than there are, whatever the stamps say.
     fn rows(&self, seconds: f64) -> usize {
-        (seconds / self.period_s).round() as usize
+        ((seconds / self.period_s).round() as usize).min(self.speed.len() + 1)
     }
 
     /// The step at `row` if the command is held long enough from `since` on and to `until`.

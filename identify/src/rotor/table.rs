@@ -23,9 +23,11 @@ impl Table {
         let text = String::from_utf8_lossy(&bytes);
         // Programs for other systems put a byte order mark before the first name.
         let text = text.trim_start_matches('\u{feff}');
+        let file = short_name(path);
+        vehicles::quotes::check(text.as_bytes(), b',')
+            .map_err(|stray| RotorError::Log { file: file.clone(), reason: stray.to_string() })?;
         let mut reader =
             csv::ReaderBuilder::new().trim(csv::Trim::All).flexible(true).from_reader(text.as_bytes());
-        let file = short_name(path);
         let broken = |error: csv::Error| RotorError::Log {
             file: file.clone(),
             reason: format!("not a CSV file: {error}; check the path"),

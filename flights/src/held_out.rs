@@ -1,0 +1,118 @@
+//! Whether test flights are held out: none holds what parameters are fitted on, by its log and time or by its samples.
+
+use std::os::unix::fs::MetadataExt as _;
+use std::path::Path;
+
+use crate::flight::{Channel, Flight, Role};
+use crate::quantity::Quantity;
+use crate::reading::Part;
+use crate::twin::{Twin, twin};
+
+/// A sample on the edge of two parts belongs to both.
+const EDGE_S: f64 = 1e-5;
+
+/// Two flights that hold the same.
+#[derive(Debug)]
+pub struct Clash {
+    /// The index of the flight with role `fit`.
+    pub fit: usize,
+    /// That of the flight with role `test`.
+    pub test: usize,
+    /// What they have in common, in words.
+    pub reason: String,
+}
+
+/// Finds the first test flight that is not held out; `parts` are the parts of the logs that the flights are.
+pub fn check(flights: &[Flight], parts: &[Part]) -> Result<(), Clash> {
+    let of_role = |role| (0..flights.len()).filter(move |index| flights[*index].role == role);
+    for test in of_role(Role::Test) {
+        for fit in of_role(Role::Fit) {
+            let pair = [fit, test].map(|index| (&flights[index], &parts[index]));
+            let reason = match same_file(&pair[0].0.file, &pair[1].0.file) {
+                Some(how) => same_part(pair, how),
+                None => same_samples(pair),
+            };
+            if let Some(reason) = reason {
+                return Err(Clash { fit, test, reason });
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Whether both, of one log, have some of its time in common. Their samples need not be compared then: a course that comes
+/// round has the same ones again.
+fn same_part([(fit, fit_part), (test, test_part)]: [(&Flight, &Part); 2], how: &str) -> Option<String> {
+    // On the log's own clock: the first samples of two choices of channels can be others.
+    let span = |part: &Part| (part.origin_s + part.from_s, part.origin_s + part.to_s);
+    let (a, b) = (span(fit_part), span(test_part));
+    let (from_s, to_s) = (a.0.max(b.0), a.1.min(b.1));
+    (to_s - from_s > EDGE_S).then(|| {
+        format!(
+            "{} and {} are {how}, and of its time from {:.3} s to {:.3} s and from {:.3} s to {:.3} s both have {:.3} s to \
+             {:.3} s",
+            fit.file.display(),
+            test.file.display(),
+            fit_part.from_s,
+            fit_part.to_s,
+            test_part.from_s,
+            test_part.to_s,
+            from_s - fit_part.origin_s,
+            to_s - fit_part.origin_s,
+        )
+    })
+}
+
+/// Whether two paths lead to one file, or to files with the same bytes; how, in words.
+#[must_use]
+pub fn same_file(a: &Path, b: &Path) -> Option<&'static str> {
+    let (of_a, of_b) = (std::fs::metadata(a).ok(), std::fs::metadata(b).ok());
+    let (Some(of_a), Some(of_b)) = (of_a, of_b) else { return (a == b).then_some("the same file") };
+    if (of_a.dev(), of_a.ino()) == (of_b.dev(), of_b.ino()) {
+        return Some("the same file");
+    }
+    let are_same = of_a.len() == of_b.len() && std::fs::read(a).ok()? == std::fs::read(b).ok()?;
+    are_same.then_some("copies of the same bytes")
+}
+
+/// Whether the test flight holds measurements of the fit flight, whatever files they are in. Each channel of motion that
+/// both have and that tells has to agree: commands can be the same in two flights. Quaternions are made of length one, so
+/// that how they were rounded is not seen: where they do not agree, others that do may still.
+fn same_samples([(fit, fit_part), (test, test_part)]: [(&Flight, &Part); 2]) -> Option<String> {
+    let channels: [(Quantity, &dyn Fn() -> Option<Option<Twin>>); 5] = [
+        (Quantity::AngularVelocity, &|| twin(&fit.angular_velocity, &test.angular_velocity)),
+        (Quantity::SpecificForce, &|| twin(&fit.specific_force, &test.specific_force)),
+        (Quantity::Position, &|| twin(&fit.position, &test.position)),
+        (Quantity::Attitude, &|| twin(&one_sign(&fit.attitude), &one_sign(&test.attitude))),
+        (Quantity::Velocity, &|| twin(&fit.velocity, &test.velocity)),
+    ];
+    let mut found: Option<(Quantity, Twin)> = None;
+    for (quantity, compare) in channels {
+        match compare() {
+            Some(None) if quantity == Quantity::Attitude => {}
+            Some(None) => return None,
+            Some(Some(twin)) => found = found.or(Some((quantity, twin))),
+            None => {}
+        }
+    }
+    let (quantity, Twin { same, compared, in_first_s, in_second_s }) = found?;
+    Some(format!(
+        "{same} of {compared} samples of `{quantity}` in {} from {:.3} s to {:.3} s are those in {} from {:.3} s to {:.3} s, \
+         so that one is a copy or a part of the other",
+        test.file.display(),
+        test_part.start_s + in_second_s.0,
+        test_part.start_s + in_second_s.1,
+        fit.file.display(),
+        fit_part.start_s + in_first_s.0,
+        fit_part.start_s + in_first_s.1,
+    ))
+}
+
+/// Quaternions with their largest part positive: which of the two signs a flight has depends on where it begins.
+fn one_sign(attitude: &Channel<4>) -> Channel<4> {
+    let turned = |q: &[f64; 4]| {
+        let largest = q.iter().copied().max_by(|a, b| a.abs().total_cmp(&b.abs())).unwrap_or(1.0);
+        q.map(|part| part * largest.signum())
+    };
+    Channel { time_s: attitude.time_s.clone(), values: attitude.values.iter().map(turned).collect() }
+}

@@ -1,0 +1,392 @@
+//! The records of an MCAP file (its specification, "Records"), each held against the bytes that there are.
+//!
+//! mcap 0.26 takes memory for a length that a file states before it sees that the file is shorter, and computes with such
+//! lengths unchecked. So a record goes to it only where every length in it fits into it, and a chunk is unpacked as far
+//! as its bytes go, whatever its header says.
+
+use mcap::read::ChannelAccumulator;
+use mcap::records::{AttachmentIndex, ChunkHeader, Record, op};
+use mcap::{Channel, MAGIC, Message, parse_record};
+use std::borrow::Cow;
+use std::collections::BTreeMap;
+use std::io::Read as _;
+use std::sync::Arc;
+
+/// Larger chunks are refused: writers close theirs at some megabytes.
+const CHUNK_BYTES_MAX: u64 = 1 << 28;
+/// Opcode and length, in front of every record.
+const HEAD_BYTES: usize = 1 + 8;
+/// The footer with its head, at the end of every file in front of the magic bytes.
+const FOOTER_BYTES: usize = HEAD_BYTES + 8 + 8 + 4;
+
+/// What is wrong with the bytes of an MCAP file, and where.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{place}: {reason}")]
+pub struct Damage {
+    place: String,
+    reason: String,
+}
+
+impl Damage {
+    fn new(place: String, reason: impl ToString) -> Self {
+        Self { place, reason: reason.to_string() }
+    }
+}
+
+/// Some bytes of a file, with the word for their places.
+struct Bytes<'a> {
+    bytes: &'a [u8],
+    /// What the bytes belong to, such as ` of the chunk at byte 77`; nothing for the file itself.
+    of: &'a str,
+}
+
+/// A record whose lengths fit into it.
+struct Raw<'a> {
+    opcode: u8,
+    body: &'a [u8],
+    /// The byte behind it.
+    end: usize,
+}
+
+impl<'a> Bytes<'a> {
+    fn damage(&self, at: usize, reason: impl ToString) -> Damage {
+        Damage::new(format!("byte {at}{}", self.of), reason)
+    }
+
+    /// The record that begins at `at`.
+    fn record(&self, at: usize) -> Result<Raw<'a>, Damage> {
+        let rest = self.bytes.get(at..).unwrap_or_default();
+        let Some((&[opcode, ref length @ ..], rest)) = rest.split_first_chunk::<HEAD_BYTES>() else {
+            let reason = format!("a record begins, and {} bytes are left of its head of 9", rest.len());
+            return Err(self.damage(at, reason));
+        };
+        let length = u64::from_le_bytes(*length);
+        let body = usize::try_from(length).ok().and_then(|length| rest.get(..length)).ok_or_else(|| {
+            let (kind, left) = (name(opcode), rest.len());
+            self.damage(at, format!("a record ({kind}) says that it is {length} bytes long, {left} are left"))
+        })?;
+        check(opcode, body).map_err(|reason| self.damage(at, reason))?;
+        Ok(Raw { opcode, body, end: at + HEAD_BYTES + body.len() })
+    }
+
+    fn parsed<'b>(&self, at: usize, raw: &Raw<'b>) -> Result<Record<'b>, Damage> {
+        parse_record(raw.opcode, raw.body)
+            .map_err(|error| self.damage(at, format!("a record ({}): {error}", name(raw.opcode))))
+    }
+}
+
+/// A part of a record's body.
+enum Part {
+    /// So many bytes.
+    Fixed(usize),
+    /// A length in 32 bits and as many bytes: a text or a table of numbers.
+    Long32,
+    /// A length in 64 bits and as many bytes.
+    Long64,
+    /// A length in 32 bits and as many bytes of texts, each with its own.
+    Texts,
+}
+
+/// What the body of a record holds; behind that, and in records of other kinds, may stand anything.
+fn parts(opcode: u8) -> &'static [Part] {
+    use Part::{Fixed, Long32, Long64, Texts};
+    match opcode {
+        op::HEADER => &[Long32, Long32],
+        op::SCHEMA => &[Fixed(2), Long32, Long32, Long32],
+        op::CHANNEL => &[Fixed(4), Long32, Long32, Texts],
+        op::CHUNK => &[Fixed(28), Long32, Long64],
+        op::MESSAGE_INDEX => &[Fixed(2), Long32],
+        op::CHUNK_INDEX => &[Fixed(32), Long32, Fixed(8), Long32, Fixed(16)],
+        op::ATTACHMENT => &[Fixed(16), Long32, Long32, Long64, Fixed(4)],
+        op::ATTACHMENT_INDEX => &[Fixed(40), Long32, Long32],
+        op::STATISTICS => &[Fixed(42), Long32],
+        op::METADATA => &[Long32, Texts],
+        op::METADATA_INDEX => &[Fixed(16), Long32],
+        _ => &[],
+    }
+}
+
+fn name(opcode: u8) -> &'static str {
+    match opcode {
+        op::HEADER => "header",
+        op::FOOTER => "footer",
+        op::SCHEMA => "schema",
+        op::CHANNEL => "channel",
+        op::MESSAGE => "message",
+        op::CHUNK => "chunk",
+        op::MESSAGE_INDEX => "message index",
+        op::CHUNK_INDEX => "chunk index",
+        op::ATTACHMENT => "attachment",
+        op::ATTACHMENT_INDEX => "attachment index",
+        op::STATISTICS => "statistics",
+        op::METADATA => "metadata",
+        op::METADATA_INDEX => "metadata index",
+        op::SUMMARY_OFFSET => "summary offset",
+        op::DATA_END => "end of data",
+        _ => "of a kind that is not known",
+    }
+}
+
+/// Refuses a record with a length in it that goes beyond it.
+fn check(opcode: u8, body: &[u8]) -> Result<(), String> {
+    let refused = |reason: String| format!("a record ({}) {reason}", name(opcode));
+    let mut rest = body;
+    for part in parts(opcode) {
+        match part {
+            Part::Fixed(length) => take(&mut rest, *length as u64).map(|_| ()),
+            Part::Long32 => long32(&mut rest).map(|_| ()),
+            Part::Long64 => number(&mut rest, 8).and_then(|length| take(&mut rest, length)).map(|_| ()),
+            Part::Texts => long32(&mut rest).and_then(|mut texts| {
+                while !texts.is_empty() {
+                    long32(&mut texts)?;
+                }
+                Ok(())
+            }),
+        }
+        .map_err(refused)?;
+    }
+    Ok(())
+}
+
+fn take<'a>(rest: &mut &'a [u8], length: u64) -> Result<&'a [u8], String> {
+    let taken = usize::try_from(length).ok().and_then(|length| rest.split_at_checked(length));
+    let (taken, behind) =
+        taken.ok_or_else(|| format!("says that {length} bytes follow, {} are left in it", rest.len()))?;
+    *rest = behind;
+    Ok(taken)
+}
+
+/// The number in the next `size` bytes, at most eight.
+fn number(rest: &mut &[u8], size: u64) -> Result<u64, String> {
+    let bytes = take(rest, size)?;
+    Ok(bytes.iter().rev().fold(0, |number, byte| (number << 8) | u64::from(*byte)))
+}
+
+fn long32<'a>(rest: &mut &'a [u8]) -> Result<&'a [u8], String> {
+    let length = number(rest, 4)?;
+    take(rest, length)
+}
+
+/// The messages of an MCAP file, whoever wrote it. A damaged chunk is an error in front of any of its messages; nothing
+/// follows an error. The memory taken is that of one chunk, as far as it was written.
+pub struct Messages<'a> {
+    bytes: &'a [u8],
+    at: usize,
+    chunk: Option<Chunk<'a>>,
+    channels: ChannelAccumulator<'static>,
+    is_behind_data: bool,
+    is_done: bool,
+}
+
+/// A chunk that is being read.
+struct Chunk<'a> {
+    content: Cow<'a, [u8]>,
+    at: usize,
+    /// Its place, for errors.
+    of: String,
+}
+
+/// What comes next.
+enum Step {
+    Message(Message<'static>),
+    Other,
+    End,
+}
+
+impl<'a> Messages<'a> {
+    /// The messages of a file with these bytes.
+    #[must_use]
+    pub fn new(bytes: &'a [u8]) -> Self {
+        Self {
+            bytes,
+            at: 0,
+            chunk: None,
+            channels: ChannelAccumulator::default(),
+            is_behind_data: false,
+            is_done: false,
+        }
+    }
+
+    fn step(&mut self) -> Result<Step, Damage> {
+        if let Some(chunk) = &mut self.chunk {
+            if chunk.at < chunk.content.len() {
+                let bytes = Bytes { bytes: &chunk.content, of: &chunk.of };
+                let (at, raw) = (chunk.at, bytes.record(chunk.at)?);
+                chunk.at = raw.end;
+                return linked(&mut self.channels, &bytes, at, &raw);
+            }
+            self.chunk = None;
+        }
+        let (file, at) = (Bytes { bytes: self.bytes, of: "" }, self.at);
+        if at == 0 {
+            self.at = magic(&file, 0)?;
+            return Ok(Step::Other);
+        }
+        let raw = file.record(at)?;
+        self.at = raw.end;
+        match raw.opcode {
+            op::FOOTER => return magic(&file, raw.end).map(|_| Step::End),
+            op::DATA_END => self.is_behind_data = true,
+            op::CHUNK if !self.is_behind_data => {
+                if let Record::Chunk { header, data } = file.parsed(at, &raw)? {
+                    let Cow::Borrowed(data) = data else { return Ok(Step::Other) };
+                    let content = unpacked(&header, data)
+                        .map_err(|reason| file.damage(at, format!("a chunk {reason}")))?;
+                    self.chunk = Some(Chunk { content, at: 0, of: format!(" of the chunk at byte {at}") });
+                }
+            }
+            _ if !self.is_behind_data => return linked(&mut self.channels, &file, at, &raw),
+            // The summary repeats schemas and channels, and need not be held against them.
+            _ => file.parsed(at, &raw).map(|_| ())?,
+        }
+        Ok(Step::Other)
+    }
+}
+
+impl Iterator for Messages<'_> {
+    type Item = Result<Message<'static>, Damage>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        while !self.is_done {
+            match self.step() {
+                Ok(Step::Message(message)) => return Some(Ok(message)),
+                Ok(Step::Other) => {}
+                Ok(Step::End) => self.is_done = true,
+                Err(damage) => {
+                    self.is_done = true;
+                    return Some(Err(damage));
+                }
+            }
+        }
+        None
+    }
+}
+
+/// A message with its channel; schemas and channels are kept for those that follow.
+fn linked(
+    channels: &mut ChannelAccumulator<'static>,
+    bytes: &Bytes<'_>,
+    at: usize,
+    raw: &Raw<'_>,
+) -> Result<Step, Damage> {
+    match bytes.parsed(at, raw)? {
+        Record::Schema { header, data } => channels.add_schema(header, Cow::Owned(data.into_owned())),
+        Record::Channel(channel) => channels.add_channel(channel),
+        Record::Message { header, data } => {
+            let channel = channels.get(header.channel_id).ok_or_else(|| {
+                bytes.damage(
+                    at,
+                    format!("a message of the channel {}, which no record declares", header.channel_id),
+                )
+            })?;
+            let data = Cow::Owned(data.into_owned());
+            let (log_time, publish_time) = (header.log_time, header.publish_time);
+            let message = Message { channel, sequence: header.sequence, log_time, publish_time, data };
+            return Ok(Step::Message(message));
+        }
+        _ => Ok(()),
+    }
+    .map_err(|error| bytes.damage(at, error))?;
+    Ok(Step::Other)
+}
+
+/// The byte behind the magic bytes at `at`.
+fn magic(file: &Bytes<'_>, at: usize) -> Result<usize, Damage> {
+    let found = file.bytes.get(at..).unwrap_or_default();
+    if found.starts_with(MAGIC) {
+        return Ok(at + MAGIC.len());
+    }
+    let what = if MAGIC.starts_with(found) { "the file ends in front of" } else { "expected" };
+    Err(file.damage(at, format!("{what} the magic bytes of MCAP, 89 4d 43 41 50 30 0d 0a")))
+}
+
+/// The records of a chunk.
+fn unpacked<'a>(header: &ChunkHeader, data: &'a [u8]) -> Result<Cow<'a, [u8]>, String> {
+    let size = header.uncompressed_size;
+    let content = match header.compression.as_str() {
+        "" => Cow::Borrowed(data),
+        "zstd" if size <= CHUNK_BYTES_MAX => Cow::Owned(decompressed(data, size)?),
+        "zstd" => {
+            return Err(format!("says that it unpacks to {size} bytes, expected at most {CHUNK_BYTES_MAX}"));
+        }
+        other => {
+            return Err(format!("is compressed by `{other}`, expected zstd or nothing; convert the file"));
+        }
+    };
+    let (stored, found) = (header.uncompressed_crc, crc32fast::hash(&content));
+    if stored != 0 && stored != found {
+        return Err(format!("has the checksum {stored:08x}, its content {found:08x}"));
+    }
+    Ok(content)
+}
+
+/// What `data` decompresses to, which is `size` bytes; the memory grows with what there is.
+fn decompressed(data: &[u8], size: u64) -> Result<Vec<u8>, String> {
+    let broken = |error: std::io::Error| format!("cannot be decompressed: {error}");
+    let mut content = Vec::new();
+    let mut decoder = zstd::Decoder::with_buffer(data).map_err(broken)?.take(size);
+    let read = decoder.read_to_end(&mut content).map_err(broken)?;
+    if read as u64 == size {
+        return Ok(content);
+    }
+    Err(format!("says that it unpacks to {size} bytes, and unpacks to {read}"))
+}
+
+/// What the end of a complete file says about the rest.
+pub(crate) struct Summary {
+    /// The channels by their number, each with the number of its messages.
+    pub channels: BTreeMap<u16, (Arc<Channel<'static>>, u64)>,
+    /// Where the attachments are.
+    pub attachments: Vec<AttachmentIndex>,
+}
+
+/// The summary of the file with these bytes; `None` where it has none.
+pub(crate) fn summary(bytes: &[u8]) -> Result<Option<Summary>, Damage> {
+    let file = Bytes { bytes, of: "" };
+    magic(&file, 0)?;
+    let end = bytes.len().saturating_sub(MAGIC.len());
+    magic(&file, end)?;
+    let footer_at = end.saturating_sub(FOOTER_BYTES);
+    let Record::Footer(footer) = file.parsed(footer_at, &file.record(footer_at)?)? else {
+        return Err(file.damage(footer_at, "expected the footer"));
+    };
+    if footer.summary_start == 0 {
+        return Ok(None);
+    }
+    let (mut channels, mut known, mut counts) = (ChannelAccumulator::default(), Vec::new(), BTreeMap::new());
+    let mut attachments = Vec::new();
+    let section = Bytes { bytes: &bytes[..footer_at], of: "" };
+    let mut at = usize::try_from(footer.summary_start).unwrap_or(usize::MAX);
+    while at != footer_at {
+        let raw = section.record(at)?;
+        match section.parsed(at, &raw)? {
+            Record::Statistics(statistics) => counts = statistics.channel_message_counts,
+            Record::AttachmentIndex(index) => attachments.push(index),
+            Record::Channel(channel) => {
+                known.push(channel.id);
+                channels.add_channel(channel).map_err(|error| section.damage(at, error))?;
+            }
+            Record::Schema { header, data } => {
+                let data = Cow::Owned(data.into_owned());
+                channels.add_schema(header, data).map_err(|error| section.damage(at, error))?;
+            }
+            _ => {}
+        }
+        at = raw.end;
+    }
+    let counted = |id: u16| Some((id, (channels.get(id)?, counts.get(&id).copied().unwrap_or(0))));
+    Ok(Some(Summary { channels: known.into_iter().filter_map(counted).collect(), attachments }))
+}
+
+/// Name and content of the attachment at the place that `index` names.
+pub(crate) fn attachment(bytes: &[u8], index: &AttachmentIndex) -> Result<(String, Vec<u8>), Damage> {
+    let file = Bytes { bytes, of: "" };
+    let at = usize::try_from(index.offset).unwrap_or(usize::MAX);
+    let raw = file.record(at)?;
+    match file.parsed(at, &raw)? {
+        Record::Attachment { header, data, .. } if index.length == (raw.end - at) as u64 => {
+            Ok((header.name, data.into_owned()))
+        }
+        _ => Err(file.damage(at, "expected the attachment that the summary names there")),
+    }
+}

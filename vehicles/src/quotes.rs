@@ -1,0 +1,98 @@
+//! Quotation marks in CSV files of measurements, whose rows are lines.
+//!
+//! CSV lets a cell in quotation marks go on over line ends and delimiters. So a single stray mark makes one cell of all
+//! rows up to the next mark or the end of the file, and a reader finds nothing wrong. No logger writes a cell of several
+//! lines: a cell that begins with a mark has to end with one, on its line.
+
+/// A quotation mark that would swallow what follows it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct StrayQuote {
+    /// The line, from 1.
+    pub line: u64,
+    /// The cell of the line, from 1.
+    pub cell: u64,
+}
+
+impl std::fmt::Display for StrayQuote {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let Self { line, cell } = self;
+        write!(
+            f,
+            "line {line}, cell {cell}: expected a cell on one line, found a quotation mark (\") that opens one and has none \
+             before the next delimiter that closes it, so that what follows would be read as its text; remove the mark, \
+             or close it"
+        )
+    }
+}
+
+/// Refuses the first cell that begins with a quotation mark and does not end with one on its line.
+///
+/// # Errors
+/// Where it stands.
+pub fn check(text: &[u8], delimiter: u8) -> Result<(), StrayQuote> {
+    let mut line = 1;
+    for row in text.split_inclusive(|byte| matches!(byte, b'\n' | b'\r')) {
+        let cells = row.strip_suffix(b"\n").or(row.strip_suffix(b"\r")).unwrap_or(row);
+        if cells.contains(&b'"') {
+            check_row(cells, delimiter).map_err(|cell| StrayQuote { line, cell })?;
+        }
+        line += u64::from(row.ends_with(b"\n"));
+    }
+    Ok(())
+}
+
+/// The number of the cell that is wrong, from 1.
+fn check_row(mut rest: &[u8], delimiter: u8) -> Result<(), u64> {
+    let mut cell = 1_u64;
+    loop {
+        let end = match rest.strip_prefix(b"\"") {
+            Some(quoted) => 1 + closed(quoted, delimiter).ok_or(cell)?,
+            None => rest.iter().position(|byte| *byte == delimiter).unwrap_or(rest.len()),
+        };
+        let Some((_, behind)) = rest[end..].split_first() else { return Ok(()) };
+        (rest, cell) = (behind, cell + 1);
+    }
+}
+
+/// Where the cell ends whose text begins with `quoted`: its mark is followed by a delimiter or the line's end, but for
+/// blanks. Two marks are one of the text.
+fn closed(quoted: &[u8], delimiter: u8) -> Option<usize> {
+    let mut at = 0;
+    loop {
+        at += quoted.get(at..)?.iter().position(|byte| *byte == b'"')? + 1;
+        if quoted.get(at) == Some(&b'"') {
+            at += 1;
+            continue;
+        }
+        let is_blank = |byte: &&u8| **byte != delimiter && matches!(**byte, b' ' | b'\t');
+        let end = at + quoted[at..].iter().take_while(is_blank).count();
+        return quoted.get(end).is_none_or(|byte| *byte == delimiter).then_some(end);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{StrayQuote, check};
+
+    #[test]
+    fn cells_that_are_closed_on_their_line_pass() {
+        let text = "\"t\",\"a, b\" ,c\r\n1,\"say \"\"so\"\"\",3\n\"\",5\" prop,\"\"\"\"\n";
+        assert_eq!(check(text.as_bytes(), b','), Ok(()));
+        assert_eq!(check(b"", b','), Ok(()));
+        assert_eq!(check(b"\"a\"\t\"b\"\n", b'\t'), Ok(()));
+    }
+
+    #[test]
+    fn a_cell_that_is_not_closed_is_named_with_its_line() {
+        let stray = |text: &str| check(text.as_bytes(), b',').unwrap_err();
+        assert_eq!(stray("t,a\n1,2\n3,\"4\n5,6\n"), StrayQuote { line: 3, cell: 2 });
+        assert_eq!(stray("t,a\n1,\"2\n3,4\"\n"), StrayQuote { line: 2, cell: 2 });
+        assert_eq!(stray("t,a\n\"1\"2,3"), StrayQuote { line: 2, cell: 1 });
+        assert_eq!(stray("\"t,a\n"), StrayQuote { line: 1, cell: 1 });
+        assert_eq!(stray("t\r\n1\r\n\"\r\n"), StrayQuote { line: 3, cell: 1 });
+        assert_eq!(stray("t\n\"\"\"\n"), StrayQuote { line: 2, cell: 1 });
+        assert!(
+            stray("\"").to_string().contains("line 1, cell 1") && stray("\"").to_string().contains("remove")
+        );
+    }
+}
