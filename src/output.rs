@@ -1,4 +1,4 @@
-//! Standard output.
+//! What is printed.
 
 use anyhow::{Context, Result};
 
@@ -15,4 +15,11 @@ pub fn gone_or_failed(error: std::io::Error) -> Result<bool> {
     } else {
         Err(error).context("cannot write to standard output")
     }
+}
+
+/// What went wrong and why; a cause that the text holds already is not said twice.
+pub fn words(error: &anyhow::Error) -> String {
+    error.chain().skip(1).map(ToString::to_string).fold(error.to_string(), |text, cause| {
+        if text.contains(&cause) { text } else { format!("{text}: {cause}") }
+    })
 }

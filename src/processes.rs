@@ -1,6 +1,7 @@
 //! The processes of a run on the host: started, watched, and taken down.
 #![allow(clippy::disallowed_methods, reason = "the launcher watches host time; it simulates nothing")]
 
+use crate::output_file::LOG_START;
 use crate::program::Program;
 use crate::spawn;
 use anyhow::{Context, Result};
@@ -166,7 +167,7 @@ impl Process {
             (None, None) => "is still running".to_owned(),
         };
         let words = std::fs::read_to_string(&self.log).unwrap_or_default();
-        let lines: Vec<&str> = words.lines().collect();
+        let lines: Vec<&str> = words.strip_prefix(LOG_START).unwrap_or(&words).lines().collect();
         // What a panic says stands in front of its backtrace.
         let last = lines.len().saturating_sub(LOG_LINES);
         let start = lines.iter().position(|line| line.contains("panicked at")).unwrap_or(last);

@@ -36,7 +36,7 @@ mod ros_definition;
 mod set;
 mod ulog;
 
-pub use canonical::{Canonical, write_csv};
+pub use canonical::{Canonical, HEADER, csv, write_csv};
 pub use error::FlightsError;
 pub use flight::{Channel, Flight, Role};
 pub use plausible::Finding;
