@@ -90,7 +90,8 @@ pub fn run(arguments: &IdentifyArguments) -> Result<bool> {
 
 fn rotor(stand: &Path, out: &Path, is_json: bool) -> Result<bool> {
     let found = identify::rotor::run(stand)?;
-    let (report, _lock) = (found.report, claim(out, &[("rotor.toml", &TABLES), ("rotor.json", &REPORT)], &[stand])?);
+    let (report, _lock) =
+        (found.report, claim(out, &[("rotor.toml", &TABLES), ("rotor.json", &REPORT)], &[stand])?);
     for (name, kind, text) in
         [("rotor.toml", &TABLES, found.tables), ("rotor.json", &REPORT, found.figures + "\n")]
     {
@@ -106,7 +107,8 @@ fn flights_of(arguments: &IdentifyArguments, file: &Path, out: &Path) -> Result<
     progress.say("reading flights");
     let set = FlightSet::load(file)?;
     let base = Vehicle::base(&set.vehicle);
-    let inputs: Vec<&Path> = [Some(file), Some(&set.vehicle), base.as_deref()].into_iter().flatten().collect();
+    let inputs: Vec<&Path> =
+        [Some(file), Some(&set.vehicle), base.as_deref()].into_iter().flatten().collect();
     let files = [("vehicle.toml", &VEHICLE), ("report.html", &crate::page::KIND), ("report.json", &REPORT)];
     let _lock = claim(out, &files, &inputs)?;
     let outcome = identify::run::identify(&set, &mut |step| progress.say(step))?;
@@ -148,7 +150,10 @@ fn claim(out: &Path, files: &[(&str, &Kind)], inputs: &[&Path]) -> Result<File> 
         output_file::check(&path, kind)?;
         if let Some(input) = inputs.iter().find(|input| is_same(input, &path)) {
             let path = path.display();
-            bail!("{path} would be replaced, and is read as {}; name another folder with --out", input.display());
+            bail!(
+                "{path} would be replaced, and is read as {}; name another folder with --out",
+                input.display()
+            );
         }
     }
     output_file::lock_folder(out)

@@ -53,12 +53,7 @@ pub struct Outcome {
 /// # Errors
 /// If another run writes to one of its files, or a process fails, stalls, or cannot be started; the error holds its
 /// last words.
-pub fn fly(
-    manifest: &Manifest,
-    graph: &mut Graph,
-    outputs: &mut Outputs,
-    quiet: bool,
-) -> Result<Outcome> {
+pub fn fly(manifest: &Manifest, graph: &mut Graph, outputs: &mut Outputs, quiet: bool) -> Result<Outcome> {
     let interrupts = count_interrupts()?;
     let run_dir = RunDir::create(&manifest.path)?;
     outputs.claim(&run_dir)?;
@@ -133,12 +128,7 @@ pub fn count_interrupts() -> Result<Arc<AtomicUsize>> {
 }
 
 /// Puts the files that recorders attach into the run directory and tells the recorders.
-fn prepare(
-    manifest: &Manifest,
-    graph: &mut Graph,
-    recording: Option<&Path>,
-    run_dir: &RunDir,
-) -> Result<()> {
+fn prepare(manifest: &Manifest, graph: &mut Graph, recording: Option<&Path>, run_dir: &RunDir) -> Result<()> {
     let manifest_copy = run_dir.path().join("manifest.toml");
     std::fs::write(&manifest_copy, &manifest.recorded_text).context("cannot write the manifest's copy")?;
     let name = |path: &Path| path.file_name().unwrap_or_default().to_string_lossy().into_owned();

@@ -390,3 +390,77 @@ pub fn append_to_log(path: &Path) -> Result<File> {
     }
     Ok(file)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::{LOG, LOG_START, Partial, RECORDING, check, partial_path, real_path};
+    use std::io::Write as _;
+    use std::path::Path;
+    use std::sync::atomic::{AtomicU32, Ordering};
+
+    /// Locks of one process exclude each other as those of two do: they belong to open files.
+    #[test]
+    fn a_place_is_claimed_by_one_at_a_time_whatever_the_others_leave() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("flown.mcap");
+        let (holders, won) = (AtomicU32::new(0), AtomicU32::new(0));
+        std::thread::scope(|scope| {
+            for thread in 0..4_u32 {
+                let (path, holders, won) = (&path, &holders, &won);
+                drop(scope.spawn(move || {
+                    for round in 0..500 {
+                        let Some(partial) = Partial::claim(path).unwrap() else { continue };
+                        assert_eq!(holders.fetch_add(1, Ordering::SeqCst), 0, "two hold one place");
+                        won.fetch_add(1, Ordering::SeqCst);
+                        let mut file = partial.file();
+                        // It ends in order, breaks, or does not begin.
+                        if (thread + round) % 3 != 0 {
+                            file.write_all(recorder::writer::START).unwrap();
+                        }
+                        if (thread + round) % 3 == 1 {
+                            partial.finish().unwrap();
+                        }
+                        holders.fetch_sub(1, Ordering::SeqCst);
+                    }
+                }));
+            }
+        });
+        assert!(won.load(Ordering::SeqCst) > 500, "{won:?} of 2000");
+    }
+
+    #[test]
+    fn recordings_of_different_names_are_written_under_different_names() {
+        let partial = |name: &str| partial_path(Path::new(name)).map(|path| path.display().to_string());
+        assert_eq!(partial("/a/hover.mcap").unwrap(), "/a/hover.partial.mcap");
+        assert_eq!(partial("/a/hover").unwrap(), "/a/hover.partial");
+        assert_eq!(partial("/a/hover.2.mcap").unwrap(), "/a/hover.2.partial.mcap");
+        for taken in ["/a/hover.partial.mcap", "/a/hover.partial"] {
+            assert!(partial(taken).unwrap_err().to_string().contains("what a broken run leaves"));
+        }
+    }
+
+    #[test]
+    fn what_is_not_whole_is_known_by_its_beginning() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("file");
+        let checked = |content: &[u8], kind| {
+            std::fs::write(&path, content).unwrap();
+            check(&path, kind).is_ok()
+        };
+        for length in 0..recorder::writer::START.len() {
+            assert!(checked(&recorder::writer::START[..length], &RECORDING));
+        }
+        assert!(!checked(b"\x89MCAP0\r\n\x01\x16of another", &RECORDING));
+        assert!(checked(LOG_START.as_bytes(), &LOG) && !checked(b"[run]\n", &LOG));
+    }
+
+    #[test]
+    fn links_that_go_round_are_refused() {
+        let folder = tempfile::tempdir().unwrap();
+        let [a, b] = ["a", "b"].map(|name| folder.path().join(name));
+        std::os::unix::fs::symlink(&a, &b).unwrap();
+        std::os::unix::fs::symlink(&b, &a).unwrap();
+        assert!(real_path(&a).unwrap_err().to_string().contains("more than 40 symbolic links"));
+        assert!(real_path(Path::new("/")).unwrap_err().to_string().contains("it names a folder"));
+    }
+}

@@ -2,9 +2,9 @@
 
 use crate::graph::{self, Graph, successor_of};
 use crate::manifest::{Manifest, PaceSetting};
-use crate::profile::{Files, Profile};
 use crate::output::{print_text, words};
 use crate::outputs::Outputs;
+use crate::profile::{Files, Profile};
 use crate::summary::{Judgement, Summary};
 use crate::{judge, launch, shadow};
 use anyhow::{Context, Error, Result, anyhow, bail};

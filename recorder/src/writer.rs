@@ -19,8 +19,7 @@ const CHUNK_BYTES: usize = 1024 * 1024;
 const ZSTD_LEVEL: u32 = 1;
 /// The bytes with which every recording of ours starts, by MCAP's specification: "Magic", then the record "Header" with
 /// the profile and the library that are written here.
-pub const START: &[u8] =
-    b"\x89MCAP0\r\n\x01\x16\0\0\0\0\0\0\0\x04\0\0\0ros2\x0a\0\0\0hummingbus";
+pub const START: &[u8] = b"\x89MCAP0\r\n\x01\x16\0\0\0\0\0\0\0\x04\0\0\0ros2\x0a\0\0\0hummingbus";
 const FILE_BUFFER_BYTES: usize = 1024 * 1024;
 
 /// A recording being written.

@@ -20,8 +20,8 @@ mod space;
 mod thin;
 
 use crate::files::open_recording;
-use crate::output_file::{self, Kind, is_same};
 use crate::output::print_text;
+use crate::output_file::{self, Kind, is_same};
 use anyhow::{Context, Result, bail};
 use choice::Choice;
 use clap::{Args, ValueEnum};

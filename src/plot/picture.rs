@@ -320,3 +320,18 @@ pub fn number(value: &f64) -> String {
     // No minus before a zero.
     format!("{}", if rounded == 0.0 { 0.0 } else { rounded })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::PNG_MARK;
+
+    #[test]
+    fn the_chunk_that_says_who_wrote_a_picture_is_whole() {
+        let (length, rest) = PNG_MARK.split_first_chunk::<4>().unwrap();
+        let (content, sum) = rest.split_last_chunk::<4>().unwrap();
+        assert_eq!(u32::from_be_bytes(*length) as usize, content.len() - 4);
+        let bit = |sum: u32| if sum & 1 == 1 { 0xEDB8_8320 ^ (sum >> 1) } else { sum >> 1 };
+        let byte = |sum: u32, byte: &u8| (0..8).fold(sum ^ u32::from(*byte), |sum, _| bit(sum));
+        assert_eq!(u32::from_be_bytes(*sum), !content.iter().fold(u32::MAX, byte));
+    }
+}

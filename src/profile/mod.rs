@@ -101,7 +101,9 @@ impl Files {
     pub fn write(&self, name: &str, flight: &Flight, profile: &Profile) -> Result<Vec<String>> {
         let mut lines = Vec::new();
         if let Some(path) = &self.trace {
-            let written = output_file::write(path, &trace::KIND, |out| trace::write(flight, &profile.critical_path, out))?;
+            let written = output_file::write(path, &trace::KIND, |out| {
+                trace::write(flight, &profile.critical_path, out)
+            })?;
             lines.push(format!("trace: {} ({written}); open it in ui.perfetto.dev", path.display()));
         }
         if let Some(path) = &self.html {

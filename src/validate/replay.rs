@@ -30,8 +30,7 @@ const MANIFEST: &str = "manifest.toml";
 const RECORDING: &str = "flight.mcap";
 /// The first line of a manifest that is written here.
 const MANIFEST_START: &str = "# A measured flight, flown again in windows. Written by `hummingbus validate`.";
-const WRITTEN: Kind =
-    Kind { name: "manifest of a replay", mark: Mark::Start(MANIFEST_START.as_bytes()) };
+const WRITTEN: Kind = Kind { name: "manifest of a replay", mark: Mark::Start(MANIFEST_START.as_bytes()) };
 const CSV: Kind = Kind { name: "flight in SI", mark: Mark::Start(flights::HEADER.as_bytes()) };
 
 /// What plants of the vehicles are called.

@@ -1,7 +1,7 @@
 //! Processes that neither end nor go on: the watchdog names them.
 
 use crate::flight::{Watched, manifest};
-use crate::support::{Ended, Place};
+use crate::support::{Ended, Place, partial};
 use rustix::process::{Signal, kill_process};
 
 /// Flies, and stops `node` as `kill -STOP` does while the clock waits at `tick`.
@@ -26,7 +26,7 @@ fn a_stopped_process_is_named_with_its_tick_and_the_topic_that_others_wait_for()
     ]);
     ended.says(&["`ekf` waits for /imu/imu"]);
     // The others were alive, so the recording is whole: it ends where the silence began.
-    let tail = place.call(&["cat", &place.path("flight.mcap"), "--topic", "/imu/imu"]).with_code(0);
+    let tail = place.call(&["cat", &partial(&place.path("flight.mcap")), "--topic", "/imu/imu"]).with_code(0);
     assert!(
         tail.output.lines().last().unwrap().contains("\"tick\":1233,"),
         "{:?}",
