@@ -269,8 +269,11 @@ impl Drop for Partial {
     }
 }
 
-/// `hover.partial.mcap` for `hover.mcap`.
-fn partial_path(real: &Path) -> Result<PathBuf> {
+/// `hover.partial.mcap` for `hover.mcap`: where the recording is written that `real` is to be.
+///
+/// # Errors
+/// If `real` itself has such a name.
+pub fn partial_path(real: &Path) -> Result<PathBuf> {
     let (stem, extension) = (real.file_stem().unwrap_or_default(), real.extension());
     let is_partial = |name: &std::ffi::OsStr| name.as_encoded_bytes().ends_with(PARTIAL.as_bytes());
     if is_partial(stem) || real.file_name().is_some_and(is_partial) {
@@ -393,7 +396,7 @@ pub fn append_to_log(path: &Path) -> Result<File> {
 
 #[cfg(test)]
 mod tests {
-    use super::{LOG, LOG_START, Partial, RECORDING, check, partial_path, real_path};
+    use super::{LOG, LOG_START, Partial, RECORDING, check, partial_path, real_path, write};
     use std::io::Write as _;
     use std::path::Path;
     use std::sync::atomic::{AtomicU32, Ordering};
@@ -417,10 +420,10 @@ mod tests {
                         if (thread + round) % 3 != 0 {
                             file.write_all(recorder::writer::START).unwrap();
                         }
+                        holders.fetch_sub(1, Ordering::SeqCst);
                         if (thread + round) % 3 == 1 {
                             partial.finish().unwrap();
                         }
-                        holders.fetch_sub(1, Ordering::SeqCst);
                     }
                 }));
             }
@@ -452,6 +455,21 @@ mod tests {
         }
         assert!(!checked(b"\x89MCAP0\r\n\x01\x16of another", &RECORDING));
         assert!(checked(LOG_START.as_bytes(), &LOG) && !checked(b"[run]\n", &LOG));
+    }
+
+    #[test]
+    fn what_cannot_be_written_leaves_what_was_there_and_nothing_else() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.log");
+        std::fs::write(&path, LOG_START).unwrap();
+        let full = |out: &mut std::io::BufWriter<&mut std::fs::File>| {
+            out.write_all(&[b'x'; 100_000])?;
+            Err::<(), _>(std::io::Error::from(std::io::ErrorKind::StorageFull))
+        };
+        let error = format!("{:#}", write(&path, &LOG, full).unwrap_err());
+        assert!(error.contains("cannot write") && error.contains("a.log"), "{error}");
+        assert_eq!(std::fs::read_to_string(&path).unwrap(), LOG_START);
+        assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
     }
 
     #[test]

@@ -58,7 +58,8 @@ impl Outputs {
         let mut logs = logs(graph);
         logs.sort_by_key(|log| output_file::real_path(&log.path).ok());
         let inputs = inputs(manifest, graph);
-        let all: Vec<&Output> = recording.iter().chain(&logs).chain(&pages).collect();
+        let partial = recording.as_ref().map(Output::until_complete).transpose()?;
+        let all: Vec<&Output> = recording.iter().chain(&partial).chain(&logs).chain(&pages).collect();
         for (index, output) in all.iter().enumerate() {
             output_file::check(&output.path, output.kind)?;
             let path = output.path.display();
@@ -129,6 +130,13 @@ impl Outputs {
 }
 
 impl Output {
+    /// The file that this recording is while the run flies.
+    fn until_complete(&self) -> Result<Self> {
+        let path = output_file::partial_path(&output_file::real_path(&self.path)?)?;
+        let what = "the recording until it is complete".to_owned();
+        Ok(Self { what, path, kind: self.kind, advice: self.advice.clone() })
+    }
+
     /// What `claim` claims of it.
     fn claimed<T>(&self, claim: impl Fn(&Path) -> Result<Option<T>>) -> Result<T> {
         for _ in 0..ATTEMPTS {

@@ -368,6 +368,12 @@ fn no_file_that_a_run_reads_is_written_to() {
         let ended = place.call(&[&["run", &path][..], &words].concat()).with_code(2);
         ended.says(&["the run reads it, as", input, "name another file"]);
     }
+    let left = place.write("own.partial.mcap", "");
+    let reads = format!("process.source.data={left}");
+    for words in [["--set", &log(&left)], ["--set", &reads]] {
+        let ended = place.call(&[&["run", &path, "--record", &place.path("own.mcap")], &words[..]].concat());
+        ended.with_code(2).says(&[&left, "the recording until it is complete"]);
+    }
     for file in [&path, &vehicle] {
         let before = fs::read(file).unwrap();
         let ended = place.call(&["run", &path, "--set", &log(file)]).with_code(2);
