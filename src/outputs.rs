@@ -165,7 +165,7 @@ fn writer_of(real: &Path) -> Option<String> {
     let run = run_dir::live_runs().into_iter().find(|run| {
         let list = std::fs::read(run.entry.run_dir.join(LIST)).ok();
         let paths: Vec<String> = list.and_then(|text| serde_json::from_slice(&text).ok()).unwrap_or_default();
-        paths.iter().any(|path| *path == real.to_string_lossy())
+        paths.iter().any(|path| is_same(Path::new(path), real))
     })?;
     let entry = &run.entry;
     Some(format!("run {} of {} (launcher {})", entry.run_id, entry.manifest.display(), entry.launcher))

@@ -141,8 +141,13 @@ fn a_second_run_to_the_log_of_a_live_one_is_refused() {
     let mut first = fly("first.mcap");
     first.await_ticks(100);
     let run_id = place.run_id();
-    let second = fly("second.mcap").end_among_others();
-    require_named(&second, &first, &run_id, "--set process.imu.log=PATH");
+    fs::hard_link(place.path("imu.log"), place.path("same.log")).unwrap();
+    let same = format!("process.imu.log={}", place.path("same.log"));
+    for log in [&log, &same] {
+        let words = ["run", &hover, "--record", &place.path("second.mcap"), "--set", log];
+        let second = place.start(&words).end_among_others();
+        require_named(&second, &first, &run_id, "--set process.imu.log=PATH");
+    }
     first.signal(Signal::INT);
     first.end().with_code(1);
     assert!(!Path::new(&place.path("second.partial.mcap")).exists(), "litter of a refused run");
