@@ -3,7 +3,7 @@
 use crate::files::open_recording;
 use crate::graph::Graph;
 use crate::manifest::Manifest;
-use crate::output::{gone_or_failed, print_text, say};
+use crate::output::{gone_or_failed, print_text, say, words};
 use crate::profile::Files;
 use crate::run::RunArguments;
 use crate::{clean, ctl, describe, identify, kinds, plot, run, shadow, top, validate};
@@ -172,13 +172,6 @@ pub fn main() -> ExitCode {
             ExitCode::from(2)
         }
     }
-}
-
-/// What went wrong and why; a cause that the text holds already is not said twice.
-fn words(error: &anyhow::Error) -> String {
-    error.chain().skip(1).map(ToString::to_string).fold(error.to_string(), |text, cause| {
-        if text.contains(&cause) { text } else { format!("{text}: {cause}") }
-    })
 }
 
 /// Flies a manifest with a shadow more, or tells what the shadows of a recording did otherwise.

@@ -5,7 +5,8 @@
 
 mod page;
 
-use crate::{files, validate};
+use crate::output_file::{self, Kind, Mark, is_same};
+use crate::validate;
 use anyhow::{Context, Result, bail};
 use clap::{Args, Subcommand};
 use flights::{Flight, FlightSet};
@@ -15,9 +16,11 @@ use identify::sensing::SensorErrors;
 use identify::vehicle_file;
 use indicatif::{ProgressBar, ProgressStyle};
 use serde_json::{Value, json};
+use std::fs::File;
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
+use vehicles::Vehicle;
 
 /// What `--help` shows behind the options.
 pub const HELP: &str = "Examples: hummingbus identify flights/nanobench.toml --out identified\n          \
@@ -26,6 +29,17 @@ pub const HELP: &str = "Examples: hummingbus identify flights/nanobench.toml --o
 
 /// A shorter flight holds none of the windows of a replay.
 const LEAST_REPLAY_S: f64 = 2.0;
+
+/// A report as JSON: who wrote it comes first.
+const REPORT: Kind = Kind { name: "report", mark: Mark::Start(b"{\n  \"writer\": \"hummingbus\",") };
+/// The new vehicle file.
+const VEHICLE: Kind =
+    Kind { name: "identified vehicle", mark: Mark::Start(b"# Written by hummingbus identify.") };
+/// Tables for a vehicle file.
+const TABLES: Kind = Kind {
+    name: "table of a rotor",
+    mark: Mark::Start(b"# Tables of a vehicle file, identified from a thrust stand: "),
+};
 
 /// What `identify` takes.
 #[derive(Args)]
@@ -75,7 +89,14 @@ pub fn run(arguments: &IdentifyArguments) -> Result<bool> {
 }
 
 fn rotor(stand: &Path, out: &Path, is_json: bool) -> Result<bool> {
-    let report = identify::rotor::run(stand, out)?;
+    let found = identify::rotor::run(stand)?;
+    let (report, _lock) =
+        (found.report, claim(out, &[("rotor.toml", &TABLES), ("rotor.json", &REPORT)], &[stand])?);
+    for (name, kind, text) in
+        [("rotor.toml", &TABLES, found.tables), ("rotor.json", &REPORT, found.figures + "\n")]
+    {
+        output_file::write(&out.join(name), kind, |out| out.write_all(text.as_bytes()))?;
+    }
     let text = if is_json { serde_json::to_string_pretty(&report)? } else { report.to_string() };
     crate::output::print_text(&text)?;
     Ok(true)
@@ -85,14 +106,19 @@ fn flights_of(arguments: &IdentifyArguments, file: &Path, out: &Path) -> Result<
     let progress = Progress::new(arguments.json);
     progress.say("reading flights");
     let set = FlightSet::load(file)?;
-    std::fs::create_dir_all(out).with_context(|| format!("cannot make the folder {}", out.display()))?;
+    let base = Vehicle::base(&set.vehicle);
+    let inputs: Vec<&Path> =
+        [Some(file), Some(&set.vehicle), base.as_deref()].into_iter().flatten().collect();
+    let files = [("vehicle.toml", &VEHICLE), ("report.html", &crate::page::KIND), ("report.json", &REPORT)];
+    let _lock = claim(out, &files, &inputs)?;
     let outcome = identify::run::identify(&set, &mut |step| progress.say(step))?;
     let vehicle = out.join("vehicle.toml");
     let text = vehicle_file::text(&set.vehicle, &outcome.effects, &outcome.report)?;
-    files::write(&vehicle, |out| out.write_all(text.as_bytes()))?;
+    output_file::write(&vehicle, &VEHICLE, |out| out.write_all(text.as_bytes()))?;
     // All is written before anything is flown, so that a run that fails loses nothing.
     let write_page = |flown: Option<&Value>| {
-        files::write(&out.join("report.html"), |out| page::write(&outcome, flown, out))
+        let path = out.join("report.html");
+        output_file::write(&path, &crate::page::KIND, |out| page::write(&outcome, flown, out))
     };
     write_page(None)?;
     let mut report = serde_json::to_value(&outcome.report)?;
@@ -113,9 +139,31 @@ fn flights_of(arguments: &IdentifyArguments, file: &Path, out: &Path) -> Result<
     Ok(true)
 }
 
+/// Makes the folder `out`, claims it for this command, and checks that `files` can lie in it.
+///
+/// # Errors
+/// If another command writes to it, or one of the files would replace something of another kind or one of `inputs`.
+fn claim(out: &Path, files: &[(&str, &Kind)], inputs: &[&Path]) -> Result<File> {
+    std::fs::create_dir_all(out).with_context(|| format!("cannot make the folder {}", out.display()))?;
+    for (name, kind) in files {
+        let path = out.join(name);
+        output_file::check(&path, kind)?;
+        if let Some(input) = inputs.iter().find(|input| is_same(input, &path)) {
+            let path = path.display();
+            bail!(
+                "{path} would be replaced, and is read as {}; name another folder with --out",
+                input.display()
+            );
+        }
+    }
+    output_file::lock_folder(out)
+}
+
 fn write_json(out: &Path, report: &Value) -> Result<()> {
-    let text = serde_json::to_string_pretty(report)?;
-    files::write(&out.join("report.json"), |out| out.write_all(text.as_bytes()))
+    let mut all = serde_json::Map::from_iter([("writer".to_owned(), json!("hummingbus"))]);
+    all.extend(report.as_object().cloned().unwrap_or_default());
+    let text = serde_json::to_string_pretty(&all)?;
+    output_file::write(&out.join("report.json"), &REPORT, |out| out.write_all(text.as_bytes()))
 }
 
 /// Flies the measured commands with the declared and the new vehicle on the bus, and compares what comes of it with the

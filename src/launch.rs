@@ -7,6 +7,7 @@ use crate::ctl::server::Reply;
 use crate::descendants::Descendants;
 use crate::graph::{Graph, successor_of};
 use crate::manifest::Manifest;
+use crate::outputs::Outputs;
 use crate::processes::{Processes, Role};
 use crate::profile::Flight;
 use crate::program::OnExit;
@@ -52,14 +53,16 @@ pub struct Outcome {
     pub flight: Option<Flight>,
 }
 
-/// Flies `graph` and records to `recording`; returns when every process is gone.
+/// Flies `graph` and claims `outputs` for it; returns when every process is gone.
 ///
 /// # Errors
-/// If a process fails, stalls, or cannot be started; the error holds its last words.
-pub fn fly(manifest: &Manifest, graph: &mut Graph, recording: &Path, quiet: bool) -> Result<Outcome> {
+/// If another run writes to one of its files, or a process fails, stalls, or cannot be started; the error holds its
+/// last words.
+pub fn fly(manifest: &Manifest, graph: &mut Graph, outputs: &mut Outputs, quiet: bool) -> Result<Outcome> {
     let interrupts = count_interrupts()?;
     let run_dir = RunDir::create(&manifest.path)?;
-    prepare(manifest, graph, recording, &run_dir)?;
+    outputs.claim(&run_dir)?;
+    prepare(manifest, graph, outputs.partial(), &run_dir)?;
     graph.plan.run_id = run_dir.run_id().to_owned();
     graph.plan.store(run_dir.path())?;
     let graph = &*graph;
@@ -138,7 +141,7 @@ pub fn count_interrupts() -> Result<Arc<AtomicUsize>> {
 }
 
 /// Puts the files that recorders attach into the run directory and tells the recorders.
-fn prepare(manifest: &Manifest, graph: &mut Graph, recording: &Path, run_dir: &RunDir) -> Result<()> {
+fn prepare(manifest: &Manifest, graph: &mut Graph, recording: Option<&Path>, run_dir: &RunDir) -> Result<()> {
     let manifest_copy = run_dir.path().join("manifest.toml");
     std::fs::write(&manifest_copy, &manifest.recorded_text).context("cannot write the manifest's copy")?;
     let name = |path: &Path| path.file_name().unwrap_or_default().to_string_lossy().into_owned();

@@ -16,6 +16,8 @@ mod kinds;
 mod launch;
 mod manifest;
 mod output;
+mod output_file;
+mod outputs;
 mod page;
 mod placement;
 mod plot;

@@ -4,7 +4,12 @@
 //! `plotly.js-gl3d-dist-min` 4.1.1, MIT): the crate `plotly` embeds the whole library and two MathJax bundles, which
 //! makes a page of 7.5 MB and brings fifty more packages.
 
+use crate::output_file::{Kind, Mark};
 use std::io::{self, Write};
+
+/// A page; every template has the mark.
+pub const KIND: Kind =
+    Kind { name: "page", mark: Mark::Within(br#"<meta name="generator" content="hummingbus">"#) };
 
 /// plotly.js with lines, bars and pies.
 pub const PLOTLY_BASIC: &str = include_str!("page/plotly-basic.min.js");

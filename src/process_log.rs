@@ -1,5 +1,6 @@
 //! What a process writes: its log in the run directory, bounded, and its last words, bounded and safe to print.
 
+use crate::output_file::LOG_START;
 use rustix::fs::{FallocateFlags, fallocate};
 use std::fs::{File, OpenOptions};
 use std::io::{self, Read as _, Seek as _, SeekFrom};
@@ -21,6 +22,7 @@ const PANIC: &[u8] = b"panicked at";
 /// Whatever a terminal would obey is escaped, and so is what is not UTF-8.
 pub fn last_words(path: &Path) -> Vec<String> {
     let (bytes, is_cut) = tail(path).unwrap_or_default();
+    let bytes = bytes.strip_prefix(LOG_START.as_bytes()).unwrap_or(&bytes);
     // A blank line at the end says nothing, and the first line of a part is a part.
     let mut lines: Vec<&[u8]> = bytes.trim_ascii_end().split(|&byte| byte == b'\n').collect();
     if is_cut && lines.len() > 1 {

@@ -2,13 +2,14 @@
 
 use crate::graph::{self, Graph, successor_of};
 use crate::manifest::{Manifest, PaceSetting};
+use crate::output::{print_text, words};
+use crate::outputs::Outputs;
 use crate::profile::{Files, Profile};
-use crate::program::Program;
 use crate::summary::{Judgement, Summary};
 use crate::{judge, launch, shadow};
-use anyhow::{Context, Result, bail};
+use anyhow::{Context, Error, Result, anyhow, bail};
 use clap::Args;
-use recorder::reader::Recording;
+use serde_json::json;
 use std::path::{Path, PathBuf};
 
 /// What `run` and its kin take.
@@ -42,7 +43,6 @@ pub fn run(
 ) -> Result<bool> {
     // First, so that who stops the run early hears that it was stopped.
     launch::count_interrupts()?;
-    files.as_ref().map_or(Ok(()), Files::check)?;
     let mut manifest = Manifest::load(&arguments.manifest, &arguments.set)?;
     if let Some(pace) = arguments.pace {
         manifest.content.run.pace = pace;
@@ -66,24 +66,27 @@ pub fn run(
         // That of the manifest itself stays as it is.
         path.set_extension("shadow.mcap");
     }
-    let has_recorder = graph.programs.iter().any(Program::is_recorder);
-    let mut outcome = launch::fly(&manifest, &mut graph, &path, arguments.json)?;
+    let files = files.unwrap_or_else(|| Files::beside(&path));
+    let pages = if graph.plan.profile { files.outputs() } else { Vec::new() };
+    let mut outputs = Outputs::of(&manifest, &graph, &path, pages)?;
+    let flown = launch::fly(&manifest, &mut graph, &mut outputs, arguments.json)
+        .and_then(|outcome| Ok((outcome, outputs.finish()?)));
+    let (mut outcome, recording) =
+        flown.or_else(|error| Err(broken(&manifest, &error, outputs.left(), arguments.json)?))?;
     let flight = outcome.flight.take();
     let profile = flight.as_ref().map(|flight| Profile::of(flight, outcome.missed_deadlines));
-    let files = files.unwrap_or_else(|| Files::beside(&path));
     let mut judgement = Judgement::default();
-    if has_recorder {
-        let recording = Recording::open(&path)?;
-        judgement.steps = shadow::steps(&recording, &graph.plan, &outcome.successions)?;
-        judgement.shadows = shadow::differences(&recording)?;
+    if let Some(recording) = &recording {
+        judgement.steps = shadow::steps(recording, &graph.plan, &outcome.successions)?;
+        judgement.shadows = shadow::differences(recording)?;
         // A run that was stopped has not flown what the conditions speak of.
         if !outcome.was_stopped {
-            judgement.pass = judge::verdicts(&manifest.content, &recording)?;
-            judgement.compare = judge::window_errors(&manifest.content, &recording)?;
+            judgement.pass = judge::verdicts(&manifest.content, recording)?;
+            judgement.compare = judge::window_errors(&manifest.content, recording)?;
         }
     }
     let tick_s = graph.plan.tick_s();
-    let summary = Summary::new(manifest.name(), outcome, tick_s, has_recorder.then_some(path), judgement);
+    let summary = Summary::new(manifest.name(), outcome, tick_s, recording.map(|_| path), judgement);
     let mut text =
         if arguments.json { json_text(&summary, profile.as_ref(), &files)? } else { summary.to_string() };
     if let (Some(flight), Some(profile)) = (&flight, &profile) {
@@ -92,8 +95,28 @@ pub fn run(
             text += &format!("\n\n{profile}\n{}", lines.join("\n"));
         }
     }
-    crate::output::print_text(&text)?;
+    print_text(&text)?;
     Ok(summary.passed)
+}
+
+/// What there is to say about a run that was refused or broke, with what is `left` of its recording; printed as JSON too
+/// where that is asked for.
+fn broken(manifest: &Manifest, error: &Error, left: Option<&Path>, is_json: bool) -> Result<Error> {
+    let mut text = words(error);
+    if let Some(path) = left {
+        text += &format!("\nWhat was recorded until then is in {}", path.display());
+    }
+    if is_json {
+        let value = json!({
+            "manifest": manifest.name(),
+            "passed": false,
+            "error": text,
+            "recording": null,
+            "partial_recording": left,
+        });
+        print_text(&serde_json::to_string_pretty(&value)?)?;
+    }
+    Ok(anyhow!(text))
 }
 
 /// The summary as JSON, with the profile and its files in it.

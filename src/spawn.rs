@@ -1,5 +1,6 @@
 //! Starting one process of a run.
 
+use crate::output_file::append_to_log;
 use crate::processes::Role;
 use crate::program::{Executable, Program};
 use anyhow::{Context, Result, bail};
@@ -130,17 +131,12 @@ fn open_log(name: &str, role: Role, run_dir: &Path, log: Option<&Path>) -> Resul
         Role::Clock => 0,
     };
     let number = if generation == 0 { String::new() } else { format!("#{generation}") };
-    let path = match log {
-        Some(path) => path.to_owned(),
-        None => run_dir.join(format!("{}{number}.log", name.replace('/', "."))),
-    };
-    let mut options = OpenOptions::new();
-    options.create(true).append(true);
-    if generation == 0 {
-        // What an earlier run left there.
-        File::create(&path).with_context(|| format!("process `{name}`: cannot create {}", path.display()))?;
+    if let Some(path) = log {
+        let file = append_to_log(path).with_context(|| format!("process `{name}`"))?;
+        return Ok((file, path.to_owned()));
     }
-    let file = options.open(&path);
+    let path = run_dir.join(format!("{}{number}.log", name.replace('/', ".")));
+    let file = OpenOptions::new().create(true).append(true).open(&path);
     Ok((file.with_context(|| format!("process `{name}`: cannot open {}", path.display()))?, path))
 }
 

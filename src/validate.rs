@@ -18,8 +18,9 @@ pub use errors::Errors;
 use crate::run_dir::Scratch;
 use anyhow::{Context, Result, bail};
 use clap::Args;
-use flights::FlightSet;
+use flights::{Flight, FlightSet};
 use replay::Replay;
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use vehicles::Vehicle;
 
@@ -79,6 +80,7 @@ pub fn errors(
     for vehicle in vehicles {
         Vehicle::load(vehicle)?;
     }
+    require_own_folders(flights)?;
     // Before there is a folder to remove, so that an interrupt leaves none.
     crate::launch::count_interrupts()?;
     let scratch = if keep.is_none() { Some(Scratch::create()?) } else { None };
@@ -87,8 +89,9 @@ pub fn errors(
     for flight in &flights.flights {
         let replay = Replay::prepare(flight, vehicles, folder)
             .with_context(|| format!("the flight `{}` cannot be replayed", flight.name))?;
-        let host_s = replay.fly().with_context(|| format!("the flight `{}` was not flown", flight.name))?;
-        let flown = windows::flight_errors(flight, &replay, vehicles.len())?;
+        let (host_s, recording) =
+            replay.fly().with_context(|| not_flown(flight, keep.map(|_| replay.folder())))?;
+        let flown = windows::flight_errors(flight, &replay, &recording, vehicles.len())?;
         tell(&format!("{}: {:.1} s flown in {host_s:.1} s", flight.name, replay.duration_s()));
         errors.flights.push(flown);
         if keep.is_none() {
@@ -96,6 +99,23 @@ pub fn errors(
         }
     }
     Ok(errors)
+}
+
+fn not_flown(flight: &Flight, kept: Option<&Path>) -> String {
+    let kept = kept.map(|folder| format!(" (its files are in {})", folder.display())).unwrap_or_default();
+    format!("the flight `{}` was not flown{kept}", flight.name)
+}
+
+/// Refuses two flights whose files would lie in one folder.
+fn require_own_folders(set: &FlightSet) -> Result<()> {
+    let mut folders = BTreeMap::new();
+    for Flight { name, .. } in &set.flights {
+        if let Some(other) = folders.insert(replay::file_name(name), name) {
+            let folder = replay::file_name(name);
+            bail!("the flights `{other}` and `{name}` would both be kept in the folder {folder}: rename one");
+        }
+    }
+    Ok(())
 }
 
 /// What reports call the vehicles: the names of their files, or the whole paths where the names are the same.

@@ -19,7 +19,8 @@ attitude = { columns = ["qx", "qy", "qz", "qw"], unit = "1" }
 angular_velocity = { columns = ["wx", "wy", "wz"], unit = "rad/s" }
 "#;
 
-const HEADER: &str = "t,m1,m2,m3,m4,px,py,pz,vx,vy,vz,qx,qy,qz,qw,wx,wy,wz\n";
+/// The first line of every such file.
+pub const HEADER: &str = "t,m1,m2,m3,m4,px,py,pz,vx,vy,vz,qx,qy,qz,qw,wx,wy,wz\n";
 /// Samples to either side of one at which a derivative is fitted.
 const HALF_WINDOW: usize = 3;
 
@@ -40,6 +41,17 @@ pub struct Canonical {
 /// # Errors
 /// If the flight has neither attitude nor angular velocity, or the file cannot be written.
 pub fn write_csv(flight: &Flight, path: &Path) -> Result<Canonical, FlightsError> {
+    let (canonical, text) = csv(flight)?;
+    std::fs::write(path, text)
+        .map_err(|error| FlightsError::Write { path: path.to_owned(), reason: error.to_string() })?;
+    Ok(canonical)
+}
+
+/// The text that [`write_csv`] writes.
+///
+/// # Errors
+/// If the flight has neither attitude nor angular velocity.
+pub fn csv(flight: &Flight) -> Result<(Canonical, String), FlightsError> {
     let mut notes = Vec::new();
     let table = Table::of(flight, &mut notes);
     let base =
@@ -62,9 +74,7 @@ pub fn write_csv(flight: &Flight, path: &Path) -> Result<Canonical, FlightsError
         ));
     }
     let text = times.iter().fold(HEADER.to_owned(), |text, time_s| text + &table.row(*time_s));
-    std::fs::write(path, text)
-        .map_err(|error| FlightsError::Write { path: path.to_owned(), reason: error.to_string() })?;
-    Ok(Canonical { rows: times.len(), columns: COLUMNS.to_owned(), notes })
+    Ok((Canonical { rows: times.len(), columns: COLUMNS.to_owned(), notes }, text))
 }
 
 /// The channels from which rows are made.

@@ -41,7 +41,7 @@ mod span;
 mod twin;
 mod ulog;
 
-pub use canonical::{Canonical, write_csv};
+pub use canonical::{Canonical, HEADER, csv, write_csv};
 pub use error::FlightsError;
 pub use flight::{Channel, Flight, Role};
 pub use held_out::same_file;

@@ -46,22 +46,26 @@ pub use statics::{Plausibility, Statics};
 /// How often an interval shall hold the truth.
 pub const LEVEL: f64 = 0.95;
 
-/// Fits the rotor and the motor of the stand file at `path`; writes `rotor.toml`, tables of a vehicle file, and
-/// `rotor.json`, all figures, to the folder `out`, which is made if it is not there.
-pub fn run(path: &Path, out: &Path) -> Result<RotorReport, RotorError> {
+/// What came of a stand.
+#[derive(Debug, Clone)]
+pub struct Found {
+    /// Everything that was found.
+    pub report: RotorReport,
+    /// The text of `rotor.toml`: tables of a vehicle file.
+    pub tables: String,
+    /// The text of `rotor.json`: all figures.
+    pub figures: String,
+}
+
+/// Fits the rotor and the motor of the stand file at `path`.
+pub fn run(path: &Path) -> Result<Found, RotorError> {
     let stand = stand::Stand::read(path)?;
     held_out::check(&stand)?;
     let vehicle = stand.vehicle_file()?;
     let statics = statics::fitted(&stand)?;
     let dynamics = dynamics::fitted(&stand)?;
     let report = RotorReport::new(&stand, statics, dynamics);
-    let write = |name: &str, text: String| {
-        let file = out.join(name);
-        std::fs::create_dir_all(out)
-            .and_then(|()| std::fs::write(&file, text))
-            .map_err(|cause| RotorError::Unwritable { file: file.display().to_string(), cause })
-    };
-    write("rotor.toml", vehicle_file::text(&report, vehicle.as_ref()))?;
-    write("rotor.json", report.json()? + "\n")?;
-    Ok(report)
+    let tables = vehicle_file::text(&report, vehicle.as_ref());
+    let figures = report.json()?;
+    Ok(Found { report, tables, figures })
 }

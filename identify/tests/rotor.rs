@@ -154,7 +154,11 @@ impl Stand {
     }
 
     fn run(&self) -> Result<RotorReport, rotor::RotorError> {
-        rotor::run(&self.dir.path().join("stand.toml"), &self.dir.path().join("out"))
+        let found = rotor::run(&self.dir.path().join("stand.toml"))?;
+        fs::create_dir_all(self.dir.path().join("out")).unwrap();
+        self.write("out/rotor.toml", &found.tables);
+        self.write("out/rotor.json", &found.figures);
+        Ok(found.report)
     }
 
     fn text(&self, name: &str) -> String {
@@ -404,9 +408,8 @@ fn esc_test(stand: &str) -> Option<RotorReport> {
         let _ = writeln!(std::io::stderr(), "{notice}");
         return None;
     }
-    let out = tempfile::tempdir().unwrap();
     let path: PathBuf = Path::new(env!("CARGO_MANIFEST_DIR")).join("../flights/stands").join(stand);
-    Some(rotor::run(&path, out.path()).unwrap())
+    Some(rotor::run(&path).unwrap().report)
 }
 
 /// Whether some finding of the report has `words`.

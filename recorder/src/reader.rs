@@ -58,7 +58,18 @@ impl Recording {
     /// # Errors
     /// If the file cannot be read or is not a complete MCAP file.
     pub fn open(path: &Path) -> Result<Self, RecordingError> {
-        let bytes = map(path)?;
+        Self::of_bytes(map(path)?, path)
+    }
+
+    /// The complete recording in `file`, which is called `path` in messages.
+    ///
+    /// # Errors
+    /// As [`Recording::open`].
+    pub fn of_file(file: &File, path: &Path) -> Result<Self, RecordingError> {
+        Self::of_bytes(map_file(file, path)?, path)
+    }
+
+    fn of_bytes(bytes: Mmap, path: &Path) -> Result<Self, RecordingError> {
         let summary = summary(&bytes).map_err(|error| content(path, &error))?.ok_or_else(|| {
             RecordingError::Content { path: path.to_owned(), reason: "it has no summary section".to_owned() }
         })?;
@@ -167,10 +178,14 @@ impl Recording {
 
 fn map(path: &Path) -> Result<Mmap, RecordingError> {
     let fail = |source| RecordingError::File { action: "open", path: path.to_owned(), source };
-    let file = File::open(path).map_err(fail)?;
-    // SAFETY: the mapping is read only, and our own writer never truncates a recording: it replaces the
-    // file. Another program that truncates it meanwhile ends this one with SIGBUS.
-    unsafe { Mmap::map(&file) }.map_err(fail)
+    map_file(&File::open(path).map_err(fail)?, path)
+}
+
+fn map_file(file: &File, path: &Path) -> Result<Mmap, RecordingError> {
+    let fail = |source| RecordingError::File { action: "open", path: path.to_owned(), source };
+    // SAFETY: the mapping is read only, and no program of ours truncates a recording: it puts another file in
+    // its place. Another program that truncates it meanwhile ends this one with SIGBUS.
+    unsafe { Mmap::map(file) }.map_err(fail)
 }
 
 /// The topics of `channels`, each given with the number of its messages.

@@ -17,8 +17,9 @@ use std::path::{Path, PathBuf};
 const CHUNK_BYTES: usize = 1024 * 1024;
 /// zstd level 1: on a run's numbers, higher levels cost more time than they save space.
 const ZSTD_LEVEL: u32 = 1;
-/// The bytes with which an MCAP file starts (its specification, "Magic").
-const MAGIC: &[u8] = b"\x89MCAP0\r\n";
+/// The bytes with which every recording of ours starts, by MCAP's specification: "Magic", then the record "Header" with
+/// the profile and the library that are written here.
+pub const START: &[u8] = b"\x89MCAP0\r\n\x01\x16\0\0\0\0\0\0\0\x04\0\0\0ros2\x0a\0\0\0hummingbus";
 const FILE_BUFFER_BYTES: usize = 1024 * 1024;
 
 /// A recording being written.
@@ -34,24 +35,13 @@ pub struct RecordingWriter {
 pub struct ChannelId(u16);
 
 impl RecordingWriter {
-    /// Creates the file at `path`, replacing one that is there.
+    /// Creates the file at `path`, or opens one that is there and empty: nothing is replaced.
     ///
     /// # Errors
-    /// If the file cannot be created or written.
+    /// If the file cannot be created or written, or something else is there.
     pub fn create(path: &Path) -> Result<Self, RecordingError> {
         let fail = |source| RecordingError::File { action: "create", path: path.to_owned(), source };
-        // A file of its own: who reads the old one, mapped, keeps it whole.
-        match std::fs::symlink_metadata(path) {
-            Ok(old) if old.is_file() && !is_replaceable(path) => {
-                let words = "it is a file that is no recording, and would be lost; name another file";
-                return Err(fail(std::io::Error::other(words)));
-            }
-            Ok(old) if old.is_file() || old.is_symlink() => std::fs::remove_file(path).map_err(fail)?,
-            // Removing a device, as root, would take it from the whole machine.
-            Ok(_) => return Err(fail(std::io::Error::other("it exists and is not a regular file"))),
-            Err(_) => {}
-        }
-        let file = File::create_new(path).map_err(fail)?;
+        let file = open_empty(path).map_err(fail)?;
         let mcap = WriteOptions::new()
             .profile("ros2")
             .library("hummingbus")
@@ -147,15 +137,19 @@ impl RecordingWriter {
     }
 }
 
-/// The error with its deepest cause, which says what the system refused.
-/// Whether a recording may take the place of the file at `path`: one that is empty or starts as a recording does.
-fn is_replaceable(path: &Path) -> bool {
-    use std::io::Read as _;
-    let mut start = Vec::new();
-    let read = File::open(path).and_then(|file| file.take(MAGIC.len() as u64).read_to_end(&mut start));
-    read.is_ok() && MAGIC.starts_with(&start)
+/// Opens the empty file at `path`, which is created if nothing is there.
+fn open_empty(path: &Path) -> std::io::Result<File> {
+    let refused = |words: &str| Err(std::io::Error::other(words));
+    match std::fs::symlink_metadata(path) {
+        // To open a pipe or a device is to do something to it.
+        Ok(old) if !old.is_file() => refused("it exists and is not a regular file"),
+        Ok(old) if old.len() > 0 => refused("it exists and is not empty; name another file"),
+        Ok(_) => File::options().write(true).open(path),
+        Err(_) => File::create_new(path),
+    }
 }
 
+/// The error with its deepest cause, which says what the system refused.
 fn write_error(path: &Path, error: &mcap::McapError) -> RecordingError {
     let mut cause: &dyn std::error::Error = error;
     while let Some(deeper) = cause.source() {

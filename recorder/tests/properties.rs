@@ -9,7 +9,7 @@ use proptest::prelude::*;
 use recorder::definition::Definition;
 use recorder::diff::first_difference;
 use recorder::reader::{Messages, Recording};
-use recorder::writer::RecordingWriter;
+use recorder::writer::{RecordingWriter, START};
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
 use std::collections::BTreeMap;
@@ -291,4 +291,23 @@ fn a_definition_that_holds_itself_or_repeats_nothing_is_refused() {
 fn a_recording_that_is_not_there_is_named() {
     let error = Recording::salvage(Path::new("no/such.mcap")).unwrap_err().to_string();
     assert!(error.contains("no/such.mcap") && error.contains("No such file"), "{error}");
+}
+
+#[test]
+fn a_recording_starts_as_every_one_does_and_replaces_nothing() {
+    assert!(WHOLE.starts_with(START));
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("own.mcap");
+    std::fs::write(&path, "own").unwrap();
+    let refused = RecordingWriter::create(&path).err().unwrap().to_string();
+    assert!(refused.contains("own.mcap: it exists and is not empty; name another file"), "{refused}");
+    assert_eq!(std::fs::read_to_string(&path).unwrap(), "own");
+    let link = folder.path().join("link.mcap");
+    std::os::unix::fs::symlink("own.mcap", &link).unwrap();
+    let refused = RecordingWriter::create(&link).err().unwrap().to_string();
+    assert!(refused.contains("is not a regular file") && link.is_symlink(), "{refused}");
+    let empty = folder.path().join("empty.mcap");
+    std::fs::write(&empty, "").unwrap();
+    RecordingWriter::create(&empty).unwrap().finish().unwrap();
+    assert!(Recording::open(&empty).unwrap().topics().is_empty());
 }

@@ -2,6 +2,7 @@
 
 use crate::kinds;
 use crate::manifest::{Manifest, Process};
+use crate::output_file;
 use crate::problem::{Problem, nearest};
 use crate::program::{Executable, OnExit, Program, Readiness};
 use bus::GENERATION_VARIABLE;
@@ -333,9 +334,12 @@ fn log(manifest: &Manifest, process: &Process) -> Result<Option<PathBuf>, Proble
     if path.is_dir() {
         return at(format!("`log`: {} is a folder", path.display()), "name a file in it");
     }
-    match path.parent().filter(|folder| folder.is_dir()) {
-        Some(_) => Ok(Some(path)),
-        None => at(format!("`log`: the folder of {} is not there", path.display()), "make it"),
+    if !path.parent().is_some_and(Path::is_dir) {
+        return at(format!("`log`: the folder of {} is not there", path.display()), "make it");
+    }
+    match output_file::check(&path, &output_file::LOG) {
+        Ok(_) => Ok(Some(path)),
+        Err(error) => at(format!("`log`: {error:#}"), ""),
     }
 }
 

@@ -19,8 +19,9 @@ mod scene;
 mod space;
 mod thin;
 
-use crate::files::{self, open_recording};
+use crate::files::open_recording;
 use crate::output::print_text;
+use crate::output_file::{self, Kind, is_same};
 use anyhow::{Context, Result, bail};
 use choice::Choice;
 use clap::{Args, ValueEnum};
@@ -129,6 +130,16 @@ enum Format {
     Svg,
 }
 
+impl Format {
+    fn kind(self) -> &'static Kind {
+        match self {
+            Self::Html => &crate::page::KIND,
+            Self::Png => &picture::PNG,
+            Self::Svg => &picture::SVG,
+        }
+    }
+}
+
 /// Plots a recording; false if it was cut off.
 ///
 /// # Errors
@@ -178,11 +189,14 @@ fn outputs(arguments: &PlotArguments) -> Result<Vec<(Format, PathBuf)>> {
     if files.is_empty() {
         files.push((Format::Html, arguments.recording.with_extension("html")));
     }
-    for (_, path) in &files {
-        files::check_folder(path)?;
-        if is_same_file(path, &arguments.recording) {
+    for (index, (format, path)) in files.iter().enumerate() {
+        if is_same(path, &arguments.recording) {
             bail!("{} is the recording itself: name another file", path.display());
         }
+        if files[..index].iter().any(|(_, other)| is_same(path, other)) {
+            bail!("{} is named twice: name another file", path.display());
+        }
+        output_file::check(path, format.kind())?;
     }
     Ok(files)
 }
@@ -196,18 +210,14 @@ fn format_of(path: &Path) -> Result<Format> {
     }
 }
 
-fn is_same_file(a: &Path, b: &Path) -> bool {
-    matches!((a.canonicalize(), b.canonicalize()), (Ok(a), Ok(b)) if a == b)
-}
-
 fn write(drawing: &Drawing, format: Format, path: &Path) -> Result<()> {
     let bytes = match format {
-        Format::Html => return files::write(path, |out| html::write(drawing, out)),
+        Format::Html => return output_file::write(path, format.kind(), |out| html::write(drawing, out)),
         Format::Svg => picture::svg(drawing).map(String::into_bytes),
         Format::Png => picture::svg(drawing).and_then(|svg| picture::png(&svg)),
     };
     let bytes = bytes.with_context(|| format!("cannot draw {}", path.display()))?;
-    files::write(path, |out| out.write_all(&bytes))
+    output_file::write(path, format.kind(), |out| out.write_all(&bytes))
 }
 
 fn as_json(drawing: &Drawing, files: &[(Format, PathBuf)]) -> Result<String> {

@@ -4,6 +4,7 @@
 //! Regular 2.138 (Google, Apache License 2.0), changed by leaving out all but Latin, Greek and Cyrillic letters and
 //! signs, with `pyftsubset --layout-features=kern --no-hinting`.
 
+use crate::output_file::{Kind, Mark};
 use crate::plot::choice::Role;
 use crate::plot::figure::{Axes, Curve};
 use crate::plot::{Drawing, View, space, thin};
@@ -79,6 +80,16 @@ impl Section<'_> {
     }
 }
 
+/// What says in a picture who wrote it: a comment, or a chunk "tEXt" with its length and CRC-32 (PNG specification,
+/// 11.3.3.3) behind the signature and the chunk "IHDR".
+const SVG_MARK: &str = "<!-- Written by hummingbus plot -->";
+const PNG_MARK: &[u8; 31] = b"\0\0\0\x13tEXtSoftware\0hummingbus\x9d\xd2\xdf\x05";
+const PNG_HEAD_BYTES: usize = 8 + 25;
+/// A picture as SVG.
+pub const SVG: Kind = Kind { name: "SVG picture", mark: Mark::Within(SVG_MARK.as_bytes()) };
+/// A picture as PNG.
+pub const PNG: Kind = Kind { name: "PNG picture", mark: Mark::Within(PNG_MARK) };
+
 /// The picture as SVG.
 ///
 /// # Errors
@@ -105,7 +116,9 @@ pub fn svg(drawing: &Drawing) -> Result<String> {
     }
     // The units are for plotters only: whoever shows the picture is told its size in pixels.
     let units = format!(r#"width="{}" height="{}""#, px(WIDTH), px(height));
-    Ok(text.replacen(&units, &format!(r#"width="{WIDTH}" height="{height}""#), 1))
+    let text = text.replacen(&units, &format!(r#"width="{WIDTH}" height="{height}""#), 1);
+    // Behind the start of the root element.
+    Ok(text.replacen('>', &format!(">\n{SVG_MARK}"), 1))
 }
 
 /// The title, with the vehicle where its axes are drawn.
@@ -147,7 +160,9 @@ pub fn png(svg: &str) -> Result<Vec<u8>> {
     let size = tree.size().to_int_size().scale_by(DOTS_PER_PIXEL).context("the picture is too large")?;
     let mut dots = Pixmap::new(size.width(), size.height()).context("the picture is too large")?;
     resvg::render(&tree, Transform::from_scale(DOTS_PER_PIXEL, DOTS_PER_PIXEL), &mut dots.as_mut());
-    Ok(dots.encode_png()?)
+    let mut bytes = dots.encode_png()?;
+    bytes.splice(PNG_HEAD_BYTES..PNG_HEAD_BYTES, *PNG_MARK);
+    Ok(bytes)
 }
 
 fn draw_axes(area: &Area<'_>, axes: &Axes, drawing: &Drawing, legend: u32, is_last: bool) -> Result<()> {
@@ -304,4 +319,19 @@ pub fn number(value: &f64) -> String {
     let rounded = (value * 1e6).round() / 1e6;
     // No minus before a zero.
     format!("{}", if rounded == 0.0 { 0.0 } else { rounded })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::PNG_MARK;
+
+    #[test]
+    fn the_chunk_that_says_who_wrote_a_picture_is_whole() {
+        let (length, rest) = PNG_MARK.split_first_chunk::<4>().unwrap();
+        let (content, sum) = rest.split_last_chunk::<4>().unwrap();
+        assert_eq!(u32::from_be_bytes(*length) as usize, content.len() - 4);
+        let bit = |sum: u32| if sum & 1 == 1 { 0xEDB8_8320 ^ (sum >> 1) } else { sum >> 1 };
+        let byte = |sum: u32, byte: &u8| (0..8).fold(sum ^ u32::from(*byte), |sum, _| bit(sum));
+        assert_eq!(u32::from_be_bytes(*sum), !content.iter().fold(u32::MAX, byte));
+    }
 }

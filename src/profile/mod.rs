@@ -24,7 +24,8 @@ mod trace;
 
 pub use flight::Flight;
 
-use crate::files;
+use crate::output_file;
+use crate::outputs::Output;
 use age::Age;
 use anyhow::Result;
 use latency::{NodeLatency, Transport};
@@ -83,12 +84,14 @@ impl Files {
         Self { trace: file("trace.json"), html: file("profile.html") }
     }
 
-    /// Checks that the files can lie where they were asked for, before a run is flown for them.
-    ///
-    /// # Errors
-    /// If a folder is not there.
-    pub fn check(&self) -> Result<()> {
-        self.trace.iter().chain(&self.html).try_for_each(|path| files::check_folder(path))
+    /// Those that were asked for, to be checked before a run is flown for them.
+    pub fn outputs(&self) -> Vec<Output> {
+        let output = |what: &str, path: &Option<PathBuf>, kind, flag: &str| {
+            let advice = format!("name another with {flag} FILE");
+            path.as_ref().map(|path| Output { what: what.to_owned(), path: path.clone(), kind, advice })
+        };
+        let trace = output("the trace", &self.trace, &trace::KIND, "--trace");
+        trace.into_iter().chain(output("the page", &self.html, &crate::page::KIND, "--html")).collect()
     }
 
     /// Writes those that were asked for; returns a line for each that says what it holds.
@@ -98,11 +101,13 @@ impl Files {
     pub fn write(&self, name: &str, flight: &Flight, profile: &Profile) -> Result<Vec<String>> {
         let mut lines = Vec::new();
         if let Some(path) = &self.trace {
-            let written = files::write(path, |out| trace::write(flight, &profile.critical_path, out))?;
+            let written = output_file::write(path, &trace::KIND, |out| {
+                trace::write(flight, &profile.critical_path, out)
+            })?;
             lines.push(format!("trace: {} ({written}); open it in ui.perfetto.dev", path.display()));
         }
         if let Some(path) = &self.html {
-            files::write(path, |out| page::write(name, flight, profile, out))?;
+            output_file::write(path, &crate::page::KIND, |out| page::write(name, flight, profile, out))?;
             lines.push(format!("page: {}", path.display()));
         }
         Ok(lines)

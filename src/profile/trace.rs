@@ -1,5 +1,6 @@
 //! A timeline in the Trace Event Format (JSON), which ui.perfetto.dev and chrome://tracing open.
 
+use crate::output_file::{Kind, Mark};
 use crate::profile::flight::{Cause, Flight};
 use crate::profile::path::CriticalPath;
 use bus::profile::{Grant, TickTimes};
@@ -15,6 +16,11 @@ const SLOWEST_TICKS: usize = 100;
 const COMPUTATIONS_MAX: usize = 60_000;
 /// The clock's process in the trace; node n is process n + 2.
 const CLOCK: usize = 1;
+
+/// How every trace begins: `otherData` is where the format has room for who wrote it.
+const START: &str = r#"{"otherData":{"writer":"hummingbus"},"#;
+/// A trace.
+pub const KIND: Kind = Kind { name: "trace", mark: Mark::Start(START.as_bytes()) };
 
 /// Writes the trace; returns which ticks it holds, in words.
 pub fn write(flight: &Flight, path: &CriticalPath, out: &mut impl Write) -> io::Result<String> {
@@ -62,7 +68,7 @@ struct Trace<'a, W: Write> {
 
 impl<W: Write> Trace<'_, W> {
     fn write(&mut self) -> io::Result<()> {
-        write!(self.out, "{{\"displayTimeUnit\":\"ns\",\"traceEvents\":[")?;
+        write!(self.out, "{START}\"displayTimeUnit\":\"ns\",\"traceEvents\":[")?;
         self.name(CLOCK, "clock", true)?;
         for node in 0..self.flight.plan.nodes.len() {
             self.name(node + 2, self.flight.node_name(node), false)?;

@@ -7,9 +7,14 @@ use super::{HORIZONS_MS, rows};
 use crate::graph::Graph;
 use crate::launch;
 use crate::manifest::Manifest;
+use crate::output_file::{self, Kind, Mark, is_same};
+use crate::outputs::Outputs;
 use anyhow::{Context, Result, bail};
 use flights::Flight;
+use recorder::reader::Recording;
 use std::fmt::Write as _;
+use std::fs::File;
+use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
 /// The topic of the measured states.
@@ -20,6 +25,13 @@ const RATE_HZ: u32 = 1000;
 
 /// Ticks between two recorded states: 100 Hz, enough to plot; the ends of all windows are among them.
 const RECORDED_TICKS: u32 = 10;
+
+const MANIFEST: &str = "manifest.toml";
+const RECORDING: &str = "flight.mcap";
+/// The first line of a manifest that is written here.
+const MANIFEST_START: &str = "# A measured flight, flown again in windows. Written by `hummingbus validate`.";
+const WRITTEN: Kind = Kind { name: "manifest of a replay", mark: Mark::Start(MANIFEST_START.as_bytes()) };
+const CSV: Kind = Kind { name: "flight in SI", mark: Mark::Start(flights::HEADER.as_bytes()) };
 
 /// What plants of the vehicles are called.
 const VEHICLES: [&str; 2] = ["first", "second"];
@@ -33,6 +45,8 @@ pub struct Replay {
     start_s: f64,
     /// Ticks of the run.
     ticks: u32,
+    /// Held so that no other command writes to the folder.
+    _lock: File,
 }
 
 /// The name of the plant that flies vehicle number `vehicle` in windows of `horizon_ms`.
@@ -48,34 +62,40 @@ impl Replay {
     pub fn prepare(flight: &Flight, vehicles: &[&Path], folder: &Path) -> Result<Self> {
         let folder = std::path::absolute(folder)?.join(file_name(&flight.name));
         std::fs::create_dir_all(&folder).with_context(|| format!("cannot create {}", folder.display()))?;
+        let lock = output_file::lock_folder(&folder)?;
         let data = folder.join("flight.csv");
-        let canonical = flights::write_csv(&rows::with_rows_at_commands(flight), &data)?;
+        for output in [data.clone(), folder.join(MANIFEST), folder.join(RECORDING)] {
+            require_no_input(&output, flight, vehicles)?;
+        }
+        let (canonical, text) = flights::csv(&rows::with_rows_at_commands(flight))?;
+        output_file::write(&data, &CSV, |out| out.write_all(text.as_bytes()))?;
         let (start_s, end_s) = rows::span_s(&data)?;
-        let replay = Self { folder, start_s, ticks: ticks(end_s - start_s)? };
+        let replay = Self { folder, start_s, ticks: ticks(end_s - start_s)?, _lock: lock };
         let initial = command_at(flight, replay.start_s).context("it has no motor commands")?;
         let manifest = replay.manifest(&canonical.columns, initial, vehicles)?;
-        std::fs::write(replay.manifest_path(), manifest)
-            .with_context(|| format!("cannot write {}", replay.manifest_path().display()))?;
+        output_file::write(&replay.manifest_path(), &WRITTEN, |out| out.write_all(manifest.as_bytes()))?;
         Ok(replay)
     }
 
-    /// Flies; returns how long that took on the host, in seconds.
+    /// Flies; returns how long that took on the host, in seconds, and the recording.
     ///
     /// # Errors
     /// As `hummingbus run`; a run that was stopped too.
-    pub fn fly(&self) -> Result<f64> {
+    pub fn fly(&self) -> Result<(f64, Recording)> {
         let manifest = Manifest::load(&self.manifest_path(), &[])?;
         let mut graph = Graph::build(&manifest)?;
-        let outcome = launch::fly(&manifest, &mut graph, &self.recording(), true)?;
+        let mut outputs = Outputs::of(&manifest, &graph, &self.folder.join(RECORDING), Vec::new())?;
+        let outcome = launch::fly(&manifest, &mut graph, &mut outputs, true)?;
+        let recording = outputs.finish()?.context("it was not recorded")?;
         if outcome.was_stopped {
             bail!("it was stopped after {} of {} ticks", outcome.ticks, self.ticks);
         }
-        Ok(outcome.host_s)
+        Ok((outcome.host_s, recording))
     }
 
-    /// The recording.
-    pub fn recording(&self) -> PathBuf {
-        self.folder.join("flight.mcap")
+    /// Where its files are.
+    pub fn folder(&self) -> &Path {
+        &self.folder
     }
 
     /// The moment of the flight at which tick 0 lies, in seconds.
@@ -98,14 +118,14 @@ impl Replay {
     }
 
     fn manifest_path(&self) -> PathBuf {
-        self.folder.join("manifest.toml")
+        self.folder.join(MANIFEST)
     }
 
     /// The manifest's text, with the column map `columns` and the command `initial` before the first.
     fn manifest(&self, columns: &str, initial: [f64; 4], vehicles: &[&Path]) -> Result<String> {
         let duration_s = f64::from(self.ticks) / f64::from(RATE_HZ);
         let mut text = format!(
-            "# A measured flight, flown again in windows. Written by `hummingbus validate`.\n\n\
+            "{MANIFEST_START}\n\n\
              [run]\nrate_hz = {RATE_HZ}\nduration_s = {duration_s:.3}\nseed = 1\n\n\
              [process.player]\nkind = \"player\"\ndata = \"flight.csv\"\n\
              outputs.measured = {{ every_ticks = {RECORDED_TICKS} }}\n\n\
@@ -126,6 +146,14 @@ impl Replay {
             }
         }
         Ok(text)
+    }
+}
+
+/// Refuses to write where `flight` or one of `vehicles` was read from.
+fn require_no_input(output: &Path, flight: &Flight, vehicles: &[&Path]) -> Result<()> {
+    match vehicles.iter().copied().chain([flight.file.as_path()]).find(|input| is_same(input, output)) {
+        Some(input) => bail!("{} would be replaced, and is read; keep it in another folder", input.display()),
+        None => Ok(()),
     }
 }
 
@@ -151,7 +179,7 @@ fn command_at(flight: &Flight, time_s: f64) -> Option<[f64; 4]> {
 }
 
 /// A name for a file: letters and digits as they are, `-` for all else.
-fn file_name(name: &str) -> String {
+pub fn file_name(name: &str) -> String {
     name.chars().map(|letter| if letter.is_alphanumeric() || letter == '_' { letter } else { '-' }).collect()
 }
 

@@ -109,16 +109,20 @@ impl Quantity {
     }
 }
 
-/// The errors of the flown `replay` of `flight` with `vehicles` vehicles.
+/// The errors of the flown `replay` of `flight` with `vehicles` vehicles, in its `recording`.
 ///
 /// # Errors
 /// A recording that cannot be read.
-pub fn flight_errors(flight: &Flight, replay: &Replay, vehicles: usize) -> Result<FlightErrors> {
-    let recording = Recording::open(&replay.recording())?;
+pub fn flight_errors(
+    flight: &Flight,
+    replay: &Replay,
+    recording: &Recording,
+    vehicles: usize,
+) -> Result<FlightErrors> {
     let plants = HORIZONS_MS.map(|horizon_ms| (0..vehicles).map(move |vehicle| plant(vehicle, horizon_ms)));
     let simulated = plants.into_iter().flatten().map(|plant| format!("/{plant}/state"));
     let topics: Vec<String> = std::iter::once(MEASURED.to_owned()).chain(simulated).collect();
-    let tracks = tracks(&recording, &topics)?;
+    let tracks = tracks(recording, &topics)?;
     let Some((measured, simulated)) = tracks.split_first() else { anyhow::bail!("nothing was recorded") };
     let horizons = HORIZONS_MS
         .into_iter()

@@ -1,7 +1,7 @@
 //! A full disk under the recorder: the run ends, says which file and why, and what was written reads back.
 
 use crate::flight::{Reference, Watched, manifest};
-use crate::support::{Ended, HUMMINGBUS, Place, poll};
+use crate::support::{Ended, HUMMINGBUS, Place, partial, poll};
 use std::process::Command;
 
 /// Flies with `shell` around the launcher, which is its `"$@"`.
@@ -27,6 +27,13 @@ fn require_prefix(place: &Place, path: &str) {
     diff.says(&["was cut off"]);
 }
 
+/// The bytes of a recording of 50 ms.
+fn short_recording(place: &Place) -> Vec<u8> {
+    let (path, recording) = (place.write("short.toml", manifest()), place.path("short.mcap"));
+    place.call(&["run", &path, "--record", &recording, "--set", "run.duration_s=0.05"]).with_code(0);
+    std::fs::read(recording).unwrap()
+}
+
 #[test]
 fn a_full_disk_is_named_with_the_recorder_and_the_file() {
     if !rustix::process::getuid().is_root() {
@@ -36,18 +43,27 @@ fn a_full_disk_is_named_with_the_recorder_and_the_file() {
     let place = Place::new();
     let (disk, kept) = (place.path("disk"), place.path("kept.mcap"));
     std::fs::create_dir(&disk).unwrap();
-    let recording = format!("{disk}/flight.mcap");
+    let (recording, partial) = (format!("{disk}/flight.mcap"), format!("{disk}/flight.partial.mcap"));
+    // The good recording of an earlier run takes little of the room.
+    let (earlier, survived) =
+        (place.write("earlier.mcap", short_recording(&place)), place.path("survived.mcap"));
     let shell = format!(
-        "mount -t tmpfs -o size=600k none '{disk}' || exit 9; \"$@\"; code=$?; cp '{recording}' '{kept}'; exit $code"
+        "mount -t tmpfs -o size=650k none '{disk}' || exit 9; cp '{earlier}' '{recording}'; \"$@\"; code=$?; \
+         cp '{partial}' '{kept}'; cp '{recording}' '{survived}'; exit $code"
     );
     let ended = fly_in(&place, &shell, &["unshare", "--mount"], &recording).with_code(2);
     ended.says(&[
         "process `recorder`",
         "node `recorder` failed at tick",
-        &recording,
+        &partial,
         "No space left on device",
+        &format!("What was recorded until then is in {partial}"),
     ]);
     require_prefix(&place, &kept);
+    assert!(
+        std::fs::read(survived).unwrap() == std::fs::read(earlier).unwrap(),
+        "the earlier recording is gone"
+    );
 }
 
 #[test]
@@ -56,8 +72,9 @@ fn a_limit_on_the_size_of_files_is_named_with_the_recorder_and_the_file() {
     let recording = place.path("flight.mcap");
     // Blocks of 512 bytes. The signal is ignored, as daemons do: the write fails instead.
     let ended = fly_in(&place, "trap '' XFSZ; ulimit -f 2400; \"$@\"", &["env"], &recording).with_code(2);
-    ended.says(&["process `recorder`", "node `recorder` failed at tick", &recording, "File too large"]);
-    require_prefix(&place, &recording);
+    let partial = partial(&recording);
+    ended.says(&["process `recorder`", "node `recorder` failed at tick", &partial, "File too large"]);
+    require_prefix(&place, &partial);
 }
 
 #[test]
@@ -66,7 +83,7 @@ fn a_recorder_killed_for_the_size_of_its_file_is_named_with_the_signal() {
     let recording = place.path("flight.mcap");
     let ended = fly_in(&place, "ulimit -f 2400; \"$@\"", &["env"], &recording).with_code(2);
     ended.says(&["process `recorder` was killed by signal 25 (SIGXFSZ)", "aborted at tick"]);
-    require_prefix(&place, &recording);
+    require_prefix(&place, &partial(&recording));
 }
 
 #[test]

@@ -3,7 +3,7 @@
 
 use crate::flight::{Reference, Watched, manifest};
 use crate::saboteur::{FAULT_VARIABLE, Fault};
-use crate::support::{Ended, Launch, Place};
+use crate::support::{Ended, Launch, Place, partial};
 use rustix::process::{Pid, Signal, kill_process};
 use std::time::Duration;
 
@@ -25,7 +25,7 @@ fn a_stopped_process_is_named_with_its_tick_and_the_topic_that_others_wait_for()
     ended.says(&["was killed by the watchdog", "stood still for 20.", "tick 1234 is not completed by `imu`"]);
     ended.says(&["`ekf` waits for /imu/imu"]);
     // The others were alive, so the recording is whole: it ends where the silence began.
-    let tail = place.call(&["cat", &place.path("flight.mcap"), "--topic", "/imu/imu"]).with_code(0);
+    let tail = place.call(&["cat", &partial(&place.path("flight.mcap")), "--topic", "/imu/imu"]).with_code(0);
     assert!(
         tail.output.lines().last().unwrap().contains("\"tick\":1233,"),
         "{:?}",

@@ -4,7 +4,7 @@ use crate::campaign;
 use crate::flight::{Process, Reference, Watched, messages, write_manifest};
 use crate::kill_points::{GUARD_TICKS, end, signal_name, words_of};
 use crate::saboteur::{FAULT_VARIABLE, Fault, TICK_VARIABLE};
-use crate::support::{Ended, Launch, Place};
+use crate::support::{Ended, Launch, Place, partial};
 use bus::control::{Phase, Seat};
 use rand_core::Rng;
 use rustix::process::{Pid, Signal, kill_process};
@@ -231,7 +231,7 @@ fn strike(case: &Case, plain: &str, swapped: &str) {
         _ if case.restarts => return require_replaced(case, stage, &ended, &recording, plain),
         _ => require_stopped(case, case.victim, &ended),
     }
-    require_prefix(&place, &recording, swapped);
+    require_prefix(&place, &partial(&recording), swapped);
 }
 
 /// Requires that the run went on with another process.

@@ -5,7 +5,7 @@ use crate::campaign;
 use crate::flight::{Reference, Watched, messages, records, write_manifest};
 use crate::kill_points::{Blow, EDGES, GUARD_TICKS, Moment, signal_name, words_of};
 use crate::saboteur::{FAULT_VARIABLE, Fault, GENERATIONS_VARIABLE, TICK_VARIABLE};
-use crate::support::{Ended, Launch, Place};
+use crate::support::{Ended, Launch, Place, partial};
 use rand_core::Rng;
 use rustix::process::{Signal, kill_process};
 use serde_json::Value;
@@ -120,7 +120,8 @@ fn panic_again_and_again(policy: Policy) -> Ended {
     let launch = place.start_with(&words, &[(FAULT_VARIABLE, &fault), (TICK_VARIABLE, "700")]);
     let ended = launch.end().with_code(2);
     let reference = Reference::fly_with(&policy.tables());
-    require_prefix(&place, policy, &recording, &reference.path());
+    require_prefix(&place, policy, &partial(&recording), &reference.path());
+    assert_eq!(ended.json()["partial_recording"], partial(&recording), "{ended}");
     ended.says(&["the propeller came off", "The run was aborted at tick 700"]);
     ended
 }
@@ -184,7 +185,7 @@ fn strike(case: &Case, reference: &str) {
     let ended = launch.end();
     if ended.code == Some(2) && case.may_be_too_much() {
         ended.says(&["it came in the place of a process that had died, and completed no tick"]);
-        return require_prefix(&place, case.policy, &recording, reference);
+        return require_prefix(&place, case.policy, &partial(&recording), reference);
     }
     assert_eq!(ended.code, Some(0), "{ended}");
     require_replaced(case, &ended);

@@ -1,7 +1,7 @@
 //! Runs that are stopped or killed: they end at a tick boundary, and nothing outlives them.
 
 use crate::recordings::{open, require_same_messages, topics};
-use crate::support::{Ended, Place, repository};
+use crate::support::{Ended, Place, partial, repository};
 use rustix::process::{Signal, kill_process};
 use std::thread::sleep;
 use std::time::Duration;
@@ -122,7 +122,7 @@ fn a_second_ctrl_c_aborts_a_run_that_does_not_come_to_its_boundary() {
     sleep(Duration::from_millis(300));
     launch.signal(Signal::INT);
     launch.end().with_code(2).says(&["interrupted twice"]);
-    open(&recording);
+    open(&partial(&recording));
 }
 
 #[test]

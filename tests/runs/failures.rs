@@ -2,7 +2,7 @@
 
 use crate::nodes::{manifest, sender, table};
 use crate::recordings::{open, require_same_messages, topics};
-use crate::support::{Ended, Place, repository};
+use crate::support::{Ended, Place, partial, repository};
 use rustix::process::{Signal, kill_process};
 
 /// Runs a source that shows `fault` at tick 50, a relay behind it, and a recorder.
@@ -17,7 +17,9 @@ fn fly_with_variables(fault: &str, variables: &[(&str, &str)]) -> Ended {
     let path = place.write("failing.toml", manifest(5_000, &[faulty, relay]));
     let ended = place.start_with(&["run", &path], variables).end().with_code(2);
     // A failed run leaves a whole file of what was recorded.
-    open(&place.path("failing.mcap"));
+    let partial = partial(&place.path("failing.mcap"));
+    open(&partial);
+    ended.says(&[&format!("What was recorded until then is in {partial}")]);
     ended
 }
 
@@ -95,7 +97,7 @@ fn what_was_recorded_before_a_failure_is_that_of_an_undisturbed_run() {
     launch.await_ticks(300);
     kill_process(place.process_of("pilot"), Signal::KILL).unwrap();
     launch.end().with_code(2);
-    let (mut killed, whole) = (topics(&recording), place.path("whole.mcap"));
+    let (mut killed, whole) = (topics(&partial(&recording)), place.path("whole.mcap"));
     place.call(&["run", &manifest, "--record", &whole]).with_code(0);
     let mut whole = topics(&whole);
     let ticks = killed.values().flatten().map(|message| message.tick).max().unwrap() + 1;
@@ -154,5 +156,6 @@ fn a_recording_that_cannot_be_written_ends_the_run_and_names_the_file() {
     let manifest = repository("manifests/hover.toml");
     let recording = place.path("no-such-folder/a.mcap");
     let ended = place.call(&["run", &manifest, "--record", &recording]).with_code(2);
-    ended.says(&["cannot create the recording", &recording, "No such file or directory"]);
+    let folder = place.path("no-such-folder");
+    ended.says(&["cannot create ", &recording, &format!("there is no folder {folder}")]);
 }

@@ -15,6 +15,7 @@
 //! - [`refusals`]: manifests that are wrong
 //! - [`manifests`]: includes, sets, settings, successors, companions
 //! - [`commands`]: the other subcommands, exit codes and JSON
+//! - [`outputs`]: what runs and other commands write, where something is there already
 //! - [`profile`]: where the host time of a run's ticks goes
 //! - [`laps`], [`plot`]: recordings that are written, and pictures of them
 //! - [`rights`]: rights that a run lacks are named
@@ -37,6 +38,7 @@ mod live;
 mod loss;
 mod manifests;
 mod nodes;
+mod outputs;
 mod plot;
 mod processors;
 mod profile;

@@ -23,6 +23,13 @@ pub fn repository(path: &str) -> String {
     Path::new(env!("CARGO_MANIFEST_DIR")).join(path).to_string_lossy().into_owned()
 }
 
+/// Where a broken run leaves what it recorded to `recording`, whose own place it must not have taken.
+#[track_caller]
+pub fn partial(recording: &str) -> String {
+    assert!(!Path::new(recording).exists(), "a broken run has put its recording into its place");
+    format!("{}.partial.mcap", recording.strip_suffix(".mcap").unwrap())
+}
+
 /// A test's own folder, with a folder for temporary files that marks every process launched from it.
 pub struct Place {
     folder: tempfile::TempDir,
@@ -268,6 +275,12 @@ impl Launch<'_> {
     /// What the run's own control segment says; `None` while it is not there yet.
     fn completed_ticks(&self) -> Option<u32> {
         self.control().map(|control| control.completed_ticks())
+    }
+
+    /// Whether it has ended.
+    pub fn has_ended(&mut self) -> bool {
+        self.status = self.status.or_else(|| self.child.try_wait().unwrap());
+        self.status.is_some()
     }
 
     /// Waits for the end; the launch must have left nothing behind.

@@ -14,15 +14,6 @@ pub enum RotorError {
         #[source]
         cause: std::io::Error,
     },
-    /// A result could not be written.
-    #[error("{file}: cannot write this file: {cause}; check the folder and the space left")]
-    Unwritable {
-        /// The path.
-        file: String,
-        /// What the operating system said.
-        #[source]
-        cause: std::io::Error,
-    },
     /// The stand file is not TOML, or has a key or a type that no stand file has.
     #[error("{place}: {message}; correct this line (docs/rotor-stand.md has the format)")]
     Syntax {

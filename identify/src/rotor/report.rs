@@ -28,9 +28,11 @@ impl RotorReport {
         Self { name: stand.name.clone(), statics, dynamics }
     }
 
-    /// All figures as JSON; an end of an interval that is not known is `null`.
+    /// All figures as JSON, behind who wrote them; an end of an interval that is not known is `null`.
     pub fn json(&self) -> Result<String, RotorError> {
-        Ok(serde_json::to_string_pretty(self)?)
+        let mut all = serde_json::Map::from_iter([("writer".to_owned(), "hummingbus".into())]);
+        all.extend(serde_json::to_value(self)?.as_object().cloned().unwrap_or_default());
+        Ok(serde_json::to_string_pretty(&all)?)
     }
 }
 

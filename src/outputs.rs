@@ -1,0 +1,197 @@
+//! All files that a run writes where its user said: checked before anything starts, claimed while it flies.
+//!
+//! A second run that would write to one of them is refused at its start, and is told who does.
+
+use crate::graph::Graph;
+use crate::manifest::Manifest;
+use crate::output_file::{self, Kind, LOG, LogClaim, Partial, RECORDING, is_same};
+use crate::program::Program;
+use crate::run_dir::{self, RunDir};
+use anyhow::{Context, Result, bail};
+use recorder::reader::Recording;
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+/// How often a claimed file is tried again where no run says that it is its own, and how long in between: who has it
+/// may be about to say so, or about to leave.
+const ATTEMPTS: u32 = 100;
+const POLL: Duration = Duration::from_millis(20);
+/// The file in a run directory that lists what the run writes.
+const LIST: &str = "outputs.json";
+
+/// A file that a run writes.
+#[derive(Debug)]
+pub struct Output {
+    /// What it is, in messages.
+    pub what: String,
+    /// How the user spelled it.
+    pub path: PathBuf,
+    /// Its kind.
+    pub kind: &'static Kind,
+    /// How to name another.
+    pub advice: String,
+}
+
+/// The files that a run writes.
+#[derive(Debug)]
+pub struct Outputs {
+    recording: Option<Output>,
+    /// In the order of their real paths, so that no two runs wait for each other.
+    logs: Vec<Output>,
+    partial: Option<Partial>,
+    claimed_logs: Vec<LogClaim>,
+}
+
+impl Outputs {
+    /// The recording of `graph` at `recording`, if it has a recorder, and its logs; `pages` are written behind the run.
+    ///
+    /// # Errors
+    /// If one of them would replace what is not of its kind, an input of the run, or another of them.
+    pub fn of(manifest: &Manifest, graph: &Graph, recording: &Path, pages: Vec<Output>) -> Result<Self> {
+        let has_recorder = graph.programs.iter().any(Program::is_recorder);
+        let recording = has_recorder.then(|| Output {
+            what: "the recording".to_owned(),
+            path: recording.to_owned(),
+            kind: &RECORDING,
+            advice: "give this run a recording of its own with --record PATH".to_owned(),
+        });
+        let mut logs = logs(graph);
+        logs.sort_by_key(|log| output_file::real_path(&log.path).ok());
+        let inputs = inputs(manifest, graph);
+        let partial = recording.as_ref().map(Output::until_complete).transpose()?;
+        let all: Vec<&Output> = recording.iter().chain(&partial).chain(&logs).chain(&pages).collect();
+        for (index, output) in all.iter().enumerate() {
+            output_file::check(&output.path, output.kind)?;
+            let path = output.path.display();
+            if let Some(other) = all[..index].iter().find(|other| is_same(&other.path, &output.path)) {
+                bail!("{path} is to be {} and {}: give each a file of its own", other.what, output.what);
+            }
+            if let Some(input) = inputs.iter().find(|input| is_same(input, &output.path)) {
+                bail!(
+                    "{path} cannot be {}: the run reads it, as {}; name another file",
+                    output.what,
+                    input.display()
+                );
+            }
+        }
+        Ok(Self { recording, logs, partial: None, claimed_logs: Vec::new() })
+    }
+
+    /// Claims all for the run in `run_dir`, which must be registered already, and empties the logs.
+    ///
+    /// # Errors
+    /// If another run writes to one of them; the error names it.
+    pub fn claim(&mut self, run_dir: &RunDir) -> Result<()> {
+        if let Some(recording) = &self.recording {
+            let partial = recording.claimed(Partial::claim)?;
+            if partial.path().to_str().is_none() {
+                bail!("cannot record to {}: its name is not UTF-8", partial.path().display());
+            }
+            self.partial = Some(partial);
+        }
+        for log in &self.logs {
+            self.claimed_logs.push(log.claimed(LogClaim::claim)?);
+        }
+        self.publish(run_dir)?;
+        self.claimed_logs.iter_mut().try_for_each(LogClaim::begin)
+    }
+
+    /// Lists what the run has claimed, for those who come to find it claimed.
+    fn publish(&self, run_dir: &RunDir) -> Result<()> {
+        let all = self.recording.iter().chain(&self.logs);
+        let paths = all.map(|output| output_file::real_path(&output.path));
+        let paths = paths.map(|path| Ok(path?.to_string_lossy().into_owned()));
+        let text = serde_json::to_vec(&paths.collect::<Result<Vec<String>>>()?)?;
+        std::fs::write(run_dir.path().join(LIST), text).context("cannot write to the run directory")
+    }
+
+    /// Where the recorder writes.
+    pub fn partial(&self) -> Option<&Path> {
+        self.partial.as_ref().map(Partial::path)
+    }
+
+    /// Puts the recording of a run that has ended in order in its place; returns it, read from the file that this run
+    /// has written, whatever lies at its path by now.
+    ///
+    /// # Errors
+    /// If it is not complete, or something must not be replaced: then it stays where it was written.
+    pub fn finish(&mut self) -> Result<Option<Recording>> {
+        let (Some(partial), Some(recording)) = (&self.partial, &self.recording) else { return Ok(None) };
+        let flown = Recording::of_file(partial.file(), &recording.path)?;
+        partial.finish()?;
+        self.partial = None;
+        Ok(Some(flown))
+    }
+
+    /// What a broken run leaves of its recording, if anything.
+    pub fn left(&self) -> Option<&Path> {
+        self.partial.as_ref().filter(|partial| !partial.is_empty()).map(Partial::path)
+    }
+}
+
+impl Output {
+    /// The file that this recording is while the run flies.
+    fn until_complete(&self) -> Result<Self> {
+        let path = output_file::partial_path(&output_file::real_path(&self.path)?)?;
+        let what = "the recording until it is complete".to_owned();
+        Ok(Self { what, path, kind: self.kind, advice: self.advice.clone() })
+    }
+
+    /// What `claim` claims of it.
+    fn claimed<T>(&self, claim: impl Fn(&Path) -> Result<Option<T>>) -> Result<T> {
+        for _ in 0..ATTEMPTS {
+            if let Some(claimed) = claim(&self.path)? {
+                return Ok(claimed);
+            }
+            if let Some(run) = writer_of(&output_file::real_path(&self.path)?) {
+                bail!("{}: {run} writes to it now; {}", self.refused(), self.advice);
+            }
+            std::thread::sleep(POLL);
+        }
+        bail!(
+            "{}: another process writes to it now, which is no run of this user on this machine; {}",
+            self.refused(),
+            self.advice
+        )
+    }
+
+    fn refused(&self) -> String {
+        format!("{} cannot be {}", self.path.display(), self.what)
+    }
+}
+
+/// The live run that writes to the file at `real`, in words.
+fn writer_of(real: &Path) -> Option<String> {
+    let run = run_dir::live_runs().into_iter().find(|run| {
+        let list = std::fs::read(run.entry.run_dir.join(LIST)).ok();
+        let paths: Vec<String> = list.and_then(|text| serde_json::from_slice(&text).ok()).unwrap_or_default();
+        paths.iter().any(|path| is_same(Path::new(path), real))
+    })?;
+    let entry = &run.entry;
+    Some(format!("run {} of {} (launcher {})", entry.run_id, entry.manifest.display(), entry.launcher))
+}
+
+/// The logs that the processes of `graph` name, each once: a successor writes to that of its predecessor.
+fn logs(graph: &Graph) -> Vec<Output> {
+    let nodes = graph.programs.iter().zip(&graph.plan.nodes).map(|(program, node)| (&node.name, program));
+    let companions = graph.companions.iter().map(|(name, program)| (name, program));
+    let successors = graph.successors.iter().map(|other| (&other.plan.name, &other.program));
+    let mut logs: Vec<Output> = Vec::new();
+    for (name, program) in nodes.chain(companions).chain(successors) {
+        let Some(path) = &program.log else { continue };
+        let what = format!("the log of `{name}`");
+        if !logs.iter().any(|log| log.what == what && is_same(&log.path, path)) {
+            let advice = format!("give it another with --set process.{name}.log=PATH");
+            logs.push(Output { what, path: path.clone(), kind: &LOG, advice });
+        }
+    }
+    logs
+}
+
+/// The files that a run of `graph` reads.
+fn inputs(manifest: &Manifest, graph: &Graph) -> Vec<PathBuf> {
+    let nodes = graph.plan.nodes.iter().chain(graph.successors.iter().map(|successor| &successor.plan));
+    let data = nodes.filter_map(|node| node.parameters.get("data")?.as_str().map(PathBuf::from));
+    let files = manifest.included.iter().chain(&graph.models).cloned();
+    std::iter::once(manifest.path.clone()).chain(files).chain(data).collect()
+}
