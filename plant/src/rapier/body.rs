@@ -84,3 +84,28 @@ fn rotation(attitude: &UnitQuaternion<f64>) -> Rotation {
     let [x, y, z, w] = attitude.coords.into();
     Rotation::from_xyzw(x, y, z, w)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::Matrix3;
+
+    /// Principal moments that a body may have, about axes turned in many ways.
+    #[test]
+    fn rapier_has_the_inertia_of_the_vehicle() {
+        let text = include_str!("../../../vehicles/hummingbird.toml");
+        let mut vehicle = Vehicle::parse(text, "hummingbird.toml").unwrap();
+        let moments = Matrix3::from_diagonal(&Vector3::new(5.6e-3, 4.1e-3, 8.1e-3));
+        for turn in 0..100 {
+            let turn = f64::from(turn) * 0.3;
+            let axes = Rotation3::from_euler_angles(turn, 2.0 * turn, -0.7 * turn);
+            let inertia = axes * moments * axes.inverse();
+            // As a file gives it: products of inertia once.
+            vehicle.inertia_kg_m2 = 0.5 * (inertia + inertia.transpose());
+            let found = mass(&vehicle).reconstruct_inertia_matrix();
+            let columns = [found.x_axis, found.y_axis, found.z_axis].map(from_rapier);
+            let off = Matrix3::from_columns(&columns) - vehicle.inertia_kg_m2;
+            assert!(off.amax() < 1e-16, "turn {turn}: {off}");
+        }
+    }
+}
