@@ -6,7 +6,7 @@ use std::path::Path;
 use crate::flight::{Channel, Flight, Role};
 use crate::quantity::Quantity;
 use crate::reading::Part;
-use crate::twin::{Twin, twin};
+use crate::twin::{Comparison, Twin, twin};
 
 /// A sample on the edge of two parts belongs to both.
 const EDGE_S: f64 = 1e-5;
@@ -79,7 +79,7 @@ pub fn same_file(a: &Path, b: &Path) -> Option<&'static str> {
 /// both have and that tells has to agree: commands can be the same in two flights. Quaternions are made of length one, so
 /// that how they were rounded is not seen: where they do not agree, others that do may still.
 fn same_samples([(fit, fit_part), (test, test_part)]: [(&Flight, &Part); 2]) -> Option<String> {
-    let channels: [(Quantity, &dyn Fn() -> Option<Option<Twin>>); 5] = [
+    let channels: [(Quantity, &dyn Fn() -> Comparison); 5] = [
         (Quantity::AngularVelocity, &|| twin(&fit.angular_velocity, &test.angular_velocity)),
         (Quantity::SpecificForce, &|| twin(&fit.specific_force, &test.specific_force)),
         (Quantity::Position, &|| twin(&fit.position, &test.position)),
@@ -89,10 +89,9 @@ fn same_samples([(fit, fit_part), (test, test_part)]: [(&Flight, &Part); 2]) -> 
     let mut found: Option<(Quantity, Twin)> = None;
     for (quantity, compare) in channels {
         match compare() {
-            Some(None) if quantity == Quantity::Attitude => {}
-            Some(None) => return None,
-            Some(Some(twin)) => found = found.or(Some((quantity, twin))),
-            None => {}
+            Comparison::Other if quantity != Quantity::Attitude => return None,
+            Comparison::Same(twin) => found = found.or(Some((quantity, twin))),
+            Comparison::Other | Comparison::Unknown => {}
         }
     }
     let (quantity, Twin { same, compared, in_first_s, in_second_s }) = found?;

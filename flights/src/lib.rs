@@ -48,4 +48,4 @@ pub use held_out::same_file;
 pub use plausible::Finding;
 pub use quantity::Quantity;
 pub use set::FlightSet;
-pub use twin::{Twin, twin};
+pub use twin::{Comparison, Twin, twin};

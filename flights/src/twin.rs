@@ -31,20 +31,31 @@ pub struct Twin {
     pub in_second_s: (f64, f64),
 }
 
-/// What two channels have in common: `Some(Some(_))` where the second holds measurements of the first, `Some(None)` where it
-/// does not, `None` where too few of their samples tell.
+/// What two channels have in common.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Comparison {
+    /// The second holds measurements of the first.
+    Same(Twin),
+    /// It does not.
+    Other,
+    /// Too few of their samples tell, as of what stands still.
+    Unknown,
+}
+
+/// Compares two channels.
 #[must_use]
-#[allow(clippy::option_option, reason = "what is not known is no answer")]
-pub fn twin<const N: usize>(first: &Channel<N>, second: &Channel<N>) -> Option<Option<Twin>> {
+pub fn twin<const N: usize>(first: &Channel<N>, second: &Channel<N>) -> Comparison {
     let steps = Steps::of(first, second);
     let (of_first, of_second) = (Telling::of(first, &steps.key), Telling::of(second, &steps.key));
     if of_first.keys.len() < COMMON_MIN || of_second.keys.len() < COMMON_MIN {
-        return None;
+        return Comparison::Unknown;
     }
     let period_s = first.period_s().unwrap_or(0.0).min(second.period_s().unwrap_or(0.0));
     let apart_s = (0.5 * period_s).max(1e-6);
-    let Some(offset_s) = offset_s(&of_first, &of_second, (first, second), apart_s) else { return Some(None) };
-    Some(agreeing(first, second, &of_second, &steps.same, (offset_s, apart_s)))
+    let offset_s = offset_s(&of_first, &of_second, (first, second), apart_s);
+    let found =
+        offset_s.and_then(|offset_s| agreeing(first, second, &of_second, &steps.same, (offset_s, apart_s)));
+    found.map_or(Comparison::Other, Comparison::Same)
 }
 
 /// What makes a difference, on each axis; zero where the channel stands still.
@@ -157,7 +168,7 @@ fn agreeing<const N: usize>(
     let is_twin = same.len() >= COMMON_MIN && same.len() as f64 >= SHARE_MIN * compared as f64;
     let from_s = same.iter().copied().fold(f64::INFINITY, f64::min);
     let to_s = same.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-    is_twin.then(|| Twin {
+    is_twin.then_some(Twin {
         same: same.len(),
         compared,
         in_first_s: (from_s + offset_s, to_s + offset_s),
@@ -198,7 +209,10 @@ mod tests {
     #[test]
     fn copies_and_parts_of_them_are_found_at_any_offset() {
         let whole = course(1, 9);
-        let found = |other: &Channel<3>| twin(&whole, other).unwrap().unwrap();
+        let found = |other: &Channel<3>| match twin(&whole, other) {
+            Comparison::Same(twin) => twin,
+            other => panic!("{other:?}"),
+        };
         assert_eq!(found(&whole).same, found(&whole).compared);
         let late = found(&part(&whole, |index| index % 7 == 0, 1234.5));
         assert!(
@@ -212,16 +226,17 @@ mod tests {
             assert!(rounded.same > 3000, "{digits} digits: {rounded:?}");
         }
         // The other way round: the whole against a part of it.
-        assert!(twin(&part(&whole, |index| index % 10 == 0, 0.0), &whole).unwrap().is_some());
+        let tenth = part(&whole, |index| index % 10 == 0, 0.0);
+        assert!(matches!(twin(&tenth, &whole), Comparison::Same(_)));
     }
 
     #[test]
     fn the_same_course_flown_again_is_another_flight() {
-        assert_eq!(twin(&course(1, 9), &course(2, 9)), Some(None));
+        assert_eq!(twin(&course(1, 9), &course(2, 9)), Comparison::Other);
         // Coarse readings meet by chance, and at rest all are the same.
-        assert_eq!(twin(&course(1, 2), &course(2, 2)), Some(None));
+        assert_eq!(twin(&course(1, 2), &course(2, 2)), Comparison::Other);
         let rest = Channel { values: vec![[0.0, 0.0, 9.81]; 4000], ..course(1, 9) };
-        assert_eq!(twin(&rest, &rest), None);
+        assert_eq!(twin(&rest, &rest), Comparison::Unknown);
     }
 
     #[test]
@@ -229,6 +244,6 @@ mod tests {
         let whole = course(1, 9);
         let (first, second) =
             (part(&whole, |index| index < 2000, 0.0), part(&whole, |index| index >= 2000, 0.0));
-        assert_eq!(twin(&first, &second), Some(None));
+        assert_eq!(twin(&first, &second), Comparison::Other);
     }
 }

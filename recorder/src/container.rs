@@ -14,6 +14,8 @@ use std::sync::Arc;
 
 /// Larger chunks are refused: writers close theirs at some megabytes.
 const CHUNK_BYTES_MAX: u64 = 1 << 28;
+/// Compressors look back over 8 MiB up to their level 19, however short what they compress is.
+const WINDOW_LOG: u32 = 23;
 /// Opcode and length, in front of every record.
 const HEAD_BYTES: usize = 1 + 8;
 /// The footer with its head, at the end of every file in front of the magic bytes.
@@ -324,8 +326,12 @@ fn unpacked<'a>(header: &ChunkHeader, data: &'a [u8]) -> Result<Cow<'a, [u8]>, S
 fn decompressed(data: &[u8], size: u64) -> Result<Vec<u8>, String> {
     let broken = |error: std::io::Error| format!("cannot be decompressed: {error}");
     let mut content = Vec::new();
-    let mut decoder = zstd::Decoder::with_buffer(data).map_err(broken)?.take(size);
-    let read = decoder.read_to_end(&mut content).map_err(broken)?;
+    let mut decoder = zstd::Decoder::with_buffer(data).map_err(broken)?;
+    // A frame states how far it looks back, and the decoder takes as much: no further than the chunk is long.
+    decoder
+        .window_log_max(size.checked_ilog2().unwrap_or(0).saturating_add(1).max(WINDOW_LOG))
+        .map_err(broken)?;
+    let read = decoder.take(size).read_to_end(&mut content).map_err(broken)?;
     if read as u64 == size {
         return Ok(content);
     }

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use flights::{Channel, same_file, twin};
+use flights::{Channel, Comparison, same_file, twin};
 
 use super::RotorError;
 use super::stand::{Column, DynamicLog, Role, Stand, StaticLog};
@@ -31,7 +31,7 @@ fn pairs<L>(
             if let Some(how) = same_file(of(fit).1, of(test).1) {
                 return Err(refused(format!("they are {how}")));
             }
-            if let Some(Some(twin)) = twin(&samples(fit)?, &samples(test)?) {
+            if let Comparison::Same(twin) = twin(&samples(fit)?, &samples(test)?) {
                 return Err(refused(format!("{} of {} rows are the same", twin.same, twin.compared)));
             }
         }

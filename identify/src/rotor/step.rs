@@ -134,8 +134,8 @@ impl<'s> Log<'s> {
             return Ok(());
         }
         let reason = format!(
-            "its rows are {} s apart, expected at least {ROWS_BEFORE_MIN} in the {before_s} s before a step and \
-             {ROWS_AFTER_MIN} in the {after_s} s after; correct the unit of `time`, or raise `before_s` and `after_s`",
+            "expected at least {ROWS_BEFORE_MIN} row in the {before_s} s before a step and {ROWS_AFTER_MIN} in the {after_s} s \
+             after, found one in {} s; correct the unit of `time`, or raise `before_s` and `after_s`",
             self.period_s
         );
         Err(RotorError::Log { file: self.name.clone(), reason })
