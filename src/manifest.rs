@@ -6,9 +6,11 @@
 //! - [`tree`]: tables with the places of their values, merged
 //! - [`sets`]: vehicles of process sets become processes
 //! - [`succession`]: a successor's differences become a whole process
+//! - [`finite`]: no number is infinite or none
 //! - [`content`]: the types that the whole is read into
 
 mod content;
+mod finite;
 mod include;
 mod overrides;
 mod recorded;
@@ -90,6 +92,11 @@ impl Manifest {
         self.sources.is_override(span.start)
     }
 
+    /// Whether what stands at the two places was written in one file, or given in one `--set`.
+    pub fn is_one_text(&self, a: &Range<usize>, b: &Range<usize>) -> bool {
+        self.sources.is_one_text(a.start, b.start)
+    }
+
     /// This manifest with one more `[[swap]]`-like successor of `process`, whose differences are the TOML
     /// `with_text`: the manifest that its places refer to, and the whole process.
     ///
@@ -101,6 +108,7 @@ impl Manifest {
         let tree = whole_tree(&sources)?;
         let with = sources.last_table()?;
         let span = sources.last_span();
+        finite::require(&with, "", &sources)?;
         let whole = succession::whole(&sources, &tree, &Spanned::new(span.clone(), process.into()), with)?;
         let whole = Spanned::new(span.clone(), DeValue::Table(whole));
         let whole = Process::deserialize(toml::de::ValueDeserializer::from(whole))
@@ -137,5 +145,6 @@ fn whole_tree(sources: &Sources) -> Result<DeTable<'_>, Problem> {
     sets::expand(&mut tree, sources)?;
     late.into_iter().try_for_each(|change| change.apply(&mut tree, sources))?;
     succession::complete(&mut tree, sources)?;
+    finite::require(&tree, "", sources)?;
     Ok(tree)
 }

@@ -3,6 +3,7 @@
 use crate::controller::{self, Airframe, finite, positive, positive_up_to};
 use crate::velocity_law::VelocityLoop;
 use crate::wall_stop_law::{WallStopGains, WallStopLaw};
+use crate::rehearsal;
 use bus::kind::{Inputs, NodeKind, PortSpec, read_parameters};
 use bus::messages::{AttitudeEstimate, ControlStatus, MotorCommand, WallEstimate};
 use bus::{BusError, Message, Node};
@@ -21,7 +22,10 @@ pub const KIND: NodeKind = NodeKind {
         PortSpec::required("command", MotorCommand::SCHEMA),
         PortSpec::optional("status", ControlStatus::SCHEMA),
     ],
-    check: |parameters, _| build(&read_parameters(parameters)?, 1.0).map(|_| ()),
+    check: |parameters, run| {
+        let (law, airframe) = build(&read_parameters(parameters)?, run.period_s())?;
+        rehearsal::check(&law, &airframe, run)
+    },
     run,
 };
 

@@ -23,9 +23,10 @@ pub const KIND: NodeKind = NodeKind {
     summary: "the earth's magnetic field with hard and soft iron, noise and delay",
     inputs: Inputs::Ports(&[PortSpec::required("state", PlantState::SCHEMA)]),
     outputs: &[PortSpec::required("magnetometer", Magnetometer::SCHEMA)],
-    check: |parameters, _| {
+    check: |parameters, run| {
         let params: MagnetometerParams = read_parameters(parameters)?;
-        params.validate().map_err(|error| error.to_string())
+        params.validate().map_err(|error| error.to_string())?;
+        params.timing().check(run)
     },
     run,
 };
@@ -160,6 +161,7 @@ fn run() -> Result<(), BusError> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use bus::kind::RunContext;
     use crate::testing::{TICK_NS, require_hand_over, require_normal};
     use crate::wire::{attitude_message, vector};
 
@@ -253,7 +255,7 @@ mod tests {
     fn impossible_parameters_are_named() {
         let bad = [("field_T", -1.0), ("inclination_deg", 91.0), ("noise_T", -1.0), ("range_T", 0.0)];
         for (key, value) in bad {
-            let reason = (KIND.check)(&serde_json::json!({ key: value }), &["state"]).unwrap_err();
+            let reason = (KIND.check)(&serde_json::json!({ key: value }), &RunContext::of_ports(&["state"])).unwrap_err();
             assert!(reason.contains(&format!("`{key}`")), "{reason}");
         }
     }

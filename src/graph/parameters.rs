@@ -1,17 +1,42 @@
 //! Parameters: what each node reads about itself, checked by its kind.
 
 use super::processes::Member;
+use super::ranges;
 use crate::manifest::{Manifest, Process};
 use crate::problem::Problem;
 use crate::program::Executable;
-use bus::plan::NodePlan;
+use bus::kind::RunContext;
+use bus::plan::{NodePlan, Plan};
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 use toml::Spanned;
 use vehicles::Vehicle;
 
-/// Gives `node` the parameters of `member`, files resolved, checked where its kind is built in; notes its
-/// vehicle file, what that is based on, its scene and its gains file in `models`.
+/// What is noted on the way from a manifest to a plan.
+#[derive(Debug, Default)]
+pub struct Notes {
+    /// The vehicle, scene and gains files that the processes name, each once.
+    pub models: Vec<PathBuf>,
+    /// What is odd and flies all the same.
+    pub warnings: Vec<Problem>,
+}
+
+/// Ticks of a run: how long each is, and how many there are.
+#[derive(Clone, Copy, Debug)]
+pub struct RunLength {
+    tick_ns: u64,
+    duration_ticks: u32,
+}
+
+impl RunLength {
+    /// Those of `plan`.
+    pub fn of(plan: &Plan) -> Self {
+        Self { tick_ns: plan.tick_ns, duration_ticks: plan.duration_ticks }
+    }
+}
+
+/// Gives `node` the parameters of `member`, files resolved, checked for a run of that length where its kind is built
+/// in; notes its vehicle file, what that is based on, its scene and its gains file, and what is odd.
 ///
 /// # Errors
 /// A file or a parameter that is refused.
@@ -19,7 +44,8 @@ pub fn set(
     manifest: &Manifest,
     member: &Member<'_>,
     node: &mut NodePlan,
-    models: &mut Vec<PathBuf>,
+    run: RunLength,
+    notes: &mut Notes,
 ) -> Result<(), Problem> {
     let Member { name, process, program } = member;
     let mut parameters: BTreeMap<&str, serde_json::Value> =
@@ -35,8 +61,8 @@ pub fn set(
             parameters.insert(key, path.to_string_lossy().into());
             match key {
                 "data" => {}
-                "vehicle" => note([Some(path.clone()), Vehicle::base(&path)], models),
-                _ => note([Some(path), None], models),
+                "vehicle" => note([Some(path.clone()), Vehicle::base(&path)], &mut notes.models),
+                _ => note([Some(path), None], &mut notes.models),
             }
         }
     }
@@ -44,9 +70,13 @@ pub fn set(
     if program.is_recorder() {
         require_none(manifest, process)?;
     } else if let Executable::Kind(kind) = &program.executable {
+        ranges::check(manifest, name, process)?;
         let ports = process.inputs.keys().chain(process.outputs.keys());
         let ports: Vec<&str> = ports.map(|port| port.get_ref().as_str()).collect();
-        (kind.check)(&parameters, &ports).map_err(|reason| refused(manifest, name, process, &reason))?;
+        let context = RunContext::new(&ports, run.tick_ns, node.period_ticks, run.duration_ticks);
+        (kind.check)(&parameters, &context).map_err(|reason| refused(manifest, name, process, &reason))?;
+        let warnings = context.into_warnings().into_iter();
+        notes.warnings.extend(warnings.map(|words| refused(manifest, name, process, &words)));
     }
     node.parameters = parameters;
     Ok(())

@@ -91,6 +91,11 @@ impl Sources {
         matches!(self.at(offset).origin, Origin::Override)
     }
 
+    /// Whether two places lie in one text.
+    pub fn is_one_text(&self, a: usize, b: usize) -> bool {
+        self.at(a).base == self.at(b).base
+    }
+
     /// A problem at `span`.
     pub fn problem(
         &self,
