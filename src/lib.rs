@@ -5,6 +5,8 @@ mod clean;
 pub mod cli;
 mod ctl;
 mod describe;
+#[cfg(test)]
+mod extremes;
 mod files;
 mod graph;
 mod identify;

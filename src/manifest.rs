@@ -138,6 +138,8 @@ fn help_for(message: &str) -> String {
 
 /// Everything that the sources say, with sets expanded and successors made whole.
 fn whole_tree(sources: &Sources) -> Result<DeTable<'_>, Problem> {
+    // In every file, also where another one's number takes the place of what is none.
+    sources.files().try_for_each(|file| finite::require(&sources.table(file)?, "", sources))?;
     let mut tree = include::merged(sources)?;
     let (late, early): (Vec<_>, Vec<_>) =
         sources.overrides()?.into_iter().partition(overrides::Override::is_of_an_expanded_process);

@@ -83,8 +83,7 @@ pub fn run(
         }
     }
     let tick_s = graph.plan.tick_s();
-    let mut summary =
-        Summary::new(manifest.name(), outcome, tick_s, has_recorder.then_some(path), judgement);
+    let mut summary = Summary::new(manifest.name(), outcome, tick_s, has_recorder.then_some(path), judgement);
     summary.warnings = graph.warnings;
     let mut text =
         if arguments.json { json_text(&summary, profile.as_ref(), &files)? } else { summary.to_string() };

@@ -228,8 +228,10 @@ impl Point {
         if holds && rate_rad_s.abs() <= YAW_RATE_MAX_RAD_S {
             return Ok(());
         }
-        Err(format!("a yaw rate of {rate_rad_s:.4e} rad/s, or derivatives that are no numbers; expected at most \
-             {YAW_RATE_MAX_RAD_S} rad/s"))
+        Err(format!(
+            "a yaw rate of {rate_rad_s:.4e} rad/s, or derivatives that are no numbers; expected at most \
+             {YAW_RATE_MAX_RAD_S} rad/s"
+        ))
     }
 }
 

@@ -2,7 +2,10 @@
 //!
 //! The law is stepped at its own period on motions that any flight meets. What it asks for has to be a number; what
 //! the vehicle then does is not looked at: that is flying.
-#![allow(non_snake_case, reason = "a trailing _W or _B names the frame a vector is written in, _N the newton")]
+#![allow(
+    non_snake_case,
+    reason = "a trailing _W or _B names the frame a vector is written in, _N the newton"
+)]
 
 use crate::controller::{Airframe, Controller, ControllerState, Demand, Flown, Motion, Told};
 use crate::set_points::SetPoint;
@@ -113,10 +116,7 @@ impl Demand {
             .or_else(|| first_not_finite("a velocity set point in m/s", &self.velocity_m_s))
             .or_else(|| first_not_finite("an altitude set point in m", &[set.altitude_m]))
             .or_else(|| {
-                first_not_finite(
-                    "an attitude set point in rad",
-                    &[set.roll_rad, set.pitch_rad, set.yaw_rad],
-                )
+                first_not_finite("an attitude set point in rad", &[set.roll_rad, set.pitch_rad, set.yaw_rad])
             })
     }
 }

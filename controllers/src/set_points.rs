@@ -243,12 +243,7 @@ impl Reader<'_> {
     }
 
     /// A value of the channel in SI, within what a vehicle can be asked for.
-    fn value(
-        &self,
-        key: &'static str,
-        value: Option<f64>,
-        si_per_unit: f64,
-    ) -> Result<f64, SetPointError> {
+    fn value(&self, key: &'static str, value: Option<f64>, si_per_unit: f64) -> Result<f64, SetPointError> {
         let value = self.number(key, value)?;
         let (range, expected) = match self.entry.channel.as_str() {
             "altitude" => (ALTITUDES_M, ALTITUDES_IN_WORDS),

@@ -1,10 +1,10 @@
 //! The wall-follow controller node: laps along the walls of a room.
 
 use crate::controller::{self, Airframe, finite, positive, positive_up_to};
+use crate::rehearsal;
 use crate::room::Room;
 use crate::velocity_law::VelocityLoop;
 use crate::wall_follow_law::{Mode, Shared, WallFollowGains, WallFollowLaw};
-use crate::rehearsal;
 use bus::kind::{Inputs, NodeKind, PortSpec, read_parameters};
 use bus::messages::{AttitudeEstimate, ControlStatus, MotorCommand, WallEstimate};
 use bus::{BusError, Message, Node};

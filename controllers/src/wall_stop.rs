@@ -1,9 +1,9 @@
 //! The wall-stop controller node: flies along the heading and stops before the wall ahead.
 
 use crate::controller::{self, Airframe, finite, positive, positive_up_to};
+use crate::rehearsal;
 use crate::velocity_law::VelocityLoop;
 use crate::wall_stop_law::{WallStopGains, WallStopLaw};
-use crate::rehearsal;
 use bus::kind::{Inputs, NodeKind, PortSpec, read_parameters};
 use bus::messages::{AttitudeEstimate, ControlStatus, MotorCommand, WallEstimate};
 use bus::{BusError, Message, Node};

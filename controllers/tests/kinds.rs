@@ -34,7 +34,8 @@ fn every_kind_flies_with_its_own_gains_file() {
     for (kind, parameters) in accepted() {
         (kind.check)(&parameters, &RunContext::of_ports(&[])).unwrap();
         if kind.name != "pilot" {
-            (kind.check)(&with(&parameters, "gains", json!(gains(kind.name))), &RunContext::of_ports(&[])).unwrap();
+            (kind.check)(&with(&parameters, "gains", json!(gains(kind.name))), &RunContext::of_ports(&[]))
+                .unwrap();
         }
     }
     let [(pid, parameters), ..] = accepted();
@@ -45,7 +46,8 @@ fn every_kind_flies_with_its_own_gains_file() {
 fn the_gains_file_of_another_law_is_refused_by_name_and_place() {
     for (kind, parameters) in accepted().into_iter().take(5) {
         let other = if kind.name == "cascade" { "pid" } else { "cascade" };
-        let outcome = (kind.check)(&with(&parameters, "gains", json!(gains(other))), &RunContext::of_ports(&[]));
+        let outcome =
+            (kind.check)(&with(&parameters, "gains", json!(gains(other))), &RunContext::of_ports(&[]));
         // A velocity file may hold the cascade's tables alone.
         if kind.name != "velocity" {
             let error = outcome.unwrap_err();
@@ -102,7 +104,8 @@ fn a_velocity_comes_from_a_reference_or_from_parameters_and_never_from_both() {
 
 /// The parameters that a kind's refusal of an unknown one names as known.
 fn known(kind: &NodeKind, parameters: &Value) -> Vec<String> {
-    let error = (kind.check)(&with(parameters, "unknown_key", json!(1)), &RunContext::of_ports(&[])).unwrap_err();
+    let error =
+        (kind.check)(&with(parameters, "unknown_key", json!(1)), &RunContext::of_ports(&[])).unwrap_err();
     let list = error.split("unknown field `unknown_key`").nth(1).unwrap_or_else(|| panic!("{error}"));
     list.split('`').skip(1).step_by(2).map(str::to_owned).collect()
 }

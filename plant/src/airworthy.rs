@@ -83,7 +83,9 @@ pub(crate) fn check_lift(vehicle: &Vehicle, path: &Path, run: &RunContext<'_>) -
         return Err(words("cannot fly, expected a thrust to weight of 1 or more"));
     }
     if ratio > LIFT_MAX {
-        return Err(words(&format!("is no vehicle that flies, expected a thrust to weight below {LIFT_MAX}")));
+        return Err(words(&format!(
+            "is no vehicle that flies, expected a thrust to weight below {LIFT_MAX}"
+        )));
     }
     if least_N > weight_N {
         return Err(words("cannot come down, expected less lift than weight at `command.speed_at_min`"));
@@ -188,7 +190,10 @@ mod tests {
         assert_eq!(lift(|_| {}), (Ok(()), vec![]));
         assert_eq!(lift(|it| it.gravity_m_s2 = 0.0), (Ok(()), vec![]));
         let words = lift(|it| it.mass_kg = 480.0).0.unwrap_err();
-        assert!(words.contains("thrust to weight of 0.0048") && words.contains("weighs 4708.8000 N"), "{words}");
+        assert!(
+            words.contains("thrust to weight of 0.0048") && words.contains("weighs 4708.8000 N"),
+            "{words}"
+        );
         assert!(words.contains("hummingbird.toml:21: `body.mass`"), "{words}");
         // 4.785 as declared.
         let (outcome, warnings) = lift(|it| it.mass_kg *= 4.5);

@@ -46,7 +46,8 @@ fn run() -> Result<(), BusError> {
     let traffic = node.optional_input::<Traffic>("traffic");
     let outputs = Outputs::declare(&mut node)?;
     let dt_s = node.tick_s();
-    let window_ticks = parameters.window_s.map(|window_s| parameters::window_ticks(window_s, dt_s)).transpose();
+    let window_ticks =
+        parameters.window_s.map(|window_s| parameters::window_ticks(window_s, dt_s)).transpose();
     let window_ticks = window_ticks.map_err(|error| node.error(error))?.unwrap_or(u32::MAX);
     if node.period_s() != dt_s {
         // It would apply a command before it was computed.

@@ -104,7 +104,9 @@ pub(crate) fn window_ticks(window_s: f64, tick_s: f64) -> Result<u32, String> {
     if (window_s / tick_s - ticks).abs() < 1e-6 && (1.0..=f64::from(u32::MAX)).contains(&ticks) {
         return Ok(ticks as u32);
     }
-    Err(format!("`window_s` is {window_s} s, which is not a whole number of ticks of {tick_s} s, at least one"))
+    Err(format!(
+        "`window_s` is {window_s} s, which is not a whole number of ticks of {tick_s} s, at least one"
+    ))
 }
 
 impl Parameters {

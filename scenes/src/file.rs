@@ -24,7 +24,8 @@ const SIZE: Bounds = Bounds {
 };
 
 /// Ten turns.
-const YAW: Bounds = Bounds { least: -63.0, most: 63.0, unit: "rad", why: "ten turns, in case of a wrong unit" };
+const YAW: Bounds =
+    Bounds { least: -63.0, most: 63.0, unit: "rad", why: "ten turns, in case of a wrong unit" };
 
 /// Reads the whole file; see `scenes/room.toml` for the layout.
 pub(crate) fn parse(text: &str, file_name: &str) -> Result<Scene, VehicleError> {
@@ -44,7 +45,8 @@ fn one_box(section: &Section) -> Result<Cuboid, VehicleError> {
     let name = section.text("name")?.to_owned();
     let centre = section.vector("centre", LENGTH, &PLACE)?;
     let size = section.vector("size", LENGTH, &SIZE)?;
-    let yaw_rad = if section.has("yaw") { section.quantity("yaw", ANGLE)?.within(section.doc, &YAW)?.si } else { 0.0 };
+    let yaw_rad =
+        if section.has("yaw") { section.quantity("yaw", ANGLE)?.within(section.doc, &YAW)?.si } else { 0.0 };
     section.finish()?;
     Ok(Cuboid { name, centre_W_m: centre.into(), half_extents_m: Vector3::from(size) / 2.0, yaw_rad })
 }

@@ -37,8 +37,12 @@ const FORCE: Dimension = Dimension { name: "force", units: &[("N", 1.0)] };
 const FORCE_PER_SPEED: Dimension = Dimension { name: "force per speed", units: &[("N*s/m", 1.0)] };
 
 /// Where the vehicle is mounted, seen from its centre of mass.
-const MOUNT: Bounds =
-    Bounds { least: -100.0, most: 100.0, unit: "m", why: "the longest helicopter measures 40 m over its rotors" };
+const MOUNT: Bounds = Bounds {
+    least: -100.0,
+    most: 100.0,
+    unit: "m",
+    why: "the longest helicopter measures 40 m over its rotors",
+};
 
 /// A mass that hangs in a bearing.
 const MOVING_MASS: Bounds = Bounds {

@@ -177,8 +177,8 @@ fn run() -> Result<(), BusError> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use bus::kind::RunContext;
     use crate::testing::{TICK_NS, require_hand_over, require_normal};
+    use bus::kind::RunContext;
 
     fn truth() -> Battery {
         Battery { voltage: 11.3, current: 8.4, charge: 0.5, valid: 1, ..Default::default() }
@@ -267,7 +267,9 @@ mod tests {
     fn impossible_parameters_are_named() {
         let bad = [("capacity_Ah", 0.0), ("initial_charge", 1.1), ("voltage_noise_V", -1.0)];
         for (key, value) in bad.into_iter().chain([("current_resolution_A", -1.0), ("dropout", 1.0)]) {
-            let reason = (KIND.check)(&serde_json::json!({ key: value }), &RunContext::of_ports(&["battery"])).unwrap_err();
+            let reason =
+                (KIND.check)(&serde_json::json!({ key: value }), &RunContext::of_ports(&["battery"]))
+                    .unwrap_err();
             assert!(reason.contains(&format!("`{key}`")), "{reason}");
         }
     }

@@ -174,8 +174,8 @@ fn run() -> Result<(), BusError> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use bus::kind::RunContext;
     use crate::testing::{TICK_NS, require_hand_over, require_normal};
+    use bus::kind::RunContext;
 
     fn truth() -> PlantState {
         PlantState {

@@ -128,8 +128,8 @@ fn message(reading: &ImuReading) -> Imu {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use bus::kind::RunContext;
     use crate::testing::{TICK_NS, require_hand_over};
+    use bus::kind::RunContext;
 
     fn truth_at(tick: u64) -> ImuReading {
         ImuReading {
@@ -205,7 +205,8 @@ mod tests {
     #[test]
     fn impossible_losses_and_delays_are_named() {
         for (key, value) in [("delay_ms", -1.0), ("dropout", 1.0), ("dropout_mean_s", -1.0)] {
-            let reason = (KIND.check)(&serde_json::json!({ key: value }), &RunContext::of_ports(&["state"])).unwrap_err();
+            let reason = (KIND.check)(&serde_json::json!({ key: value }), &RunContext::of_ports(&["state"]))
+                .unwrap_err();
             assert!(reason.contains(&format!("`{key}`")), "{reason}");
         }
         // Whether this is long enough depends on the rate, which the check does not know.

@@ -32,9 +32,7 @@ pub const KIND: NodeKind = NodeKind {
         PortSpec::optional("traffic", Traffic::SCHEMA),
     ]),
     outputs: &[PortSpec::required("ranges", Ranges::SCHEMA)],
-    check: |parameters, run| {
-        RangeFinders::new(read_parameters(parameters)?)?.params.timing().check(run)
-    },
+    check: |parameters, run| RangeFinders::new(read_parameters(parameters)?)?.params.timing().check(run),
     run,
 };
 
@@ -260,9 +258,9 @@ fn run() -> Result<(), BusError> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use bus::kind::RunContext;
     use crate::testing::{TICK_NS, require_hand_over, require_normal};
     use crate::wire::attitude_message;
+    use bus::kind::RunContext;
 
     fn finders(params: RangeParams) -> RangeFinders {
         params.validate().unwrap();
@@ -458,7 +456,9 @@ mod tests {
         }
         let reason = (KIND.check)(&serde_json::json!({}), &RunContext::of_ports(&["state"])).unwrap_err();
         assert!(reason.starts_with("missing field `scene`"), "{reason}");
-        let reason = (KIND.check)(&serde_json::json!({ "scene": "none.toml" }), &RunContext::of_ports(&["state"])).unwrap_err();
+        let reason =
+            (KIND.check)(&serde_json::json!({ "scene": "none.toml" }), &RunContext::of_ports(&["state"]))
+                .unwrap_err();
         assert!(reason.contains("none.toml"), "{reason}");
         (KIND.check)(&serde_json::json!({ "scene": room }), &RunContext::of_ports(&["state"])).unwrap();
     }

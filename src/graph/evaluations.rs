@@ -55,7 +55,10 @@ fn check_span(
             format!("`from_s` is {from_s} s, and the run ends at {end_s} s: no sample of {topic} is judged");
         let duration = manifest.content.run.duration_s.span();
         return match manifest.is_one_text(&pass.span(), &duration) {
-            true => Err(at(message, "begin earlier, or raise run.duration_s: a span without samples does not pass")),
+            true => Err(at(
+                message,
+                "begin earlier, or raise run.duration_s: a span without samples does not pass",
+            )),
             // Somebody looks at the start of a run that is longer by itself.
             false => Ok(Some(at(message, "it does not pass: a span without samples does not"))),
         };
@@ -86,7 +89,10 @@ fn check_limits(
     if let (Some(min), Some(max)) = (min, max)
         && min > max
     {
-        return Err((format!("`min` is {min} and `max` is {max}"), "nothing lies between: exchange them".into()));
+        return Err((
+            format!("`min` is {min} and `max` is {max}"),
+            "nothing lies between: exchange them".into(),
+        ));
     }
     match (least, max) {
         (Some((least, what)), Some(max)) if max < least => {
@@ -162,12 +168,12 @@ fn check_field(manifest: &Manifest, plan: &Plan, pass: &Spanned<PassCondition>) 
     let unit = |topic: &str, field: &str| {
         unit_of(plan, topic, field).map_err(|error| at(error, "name one of these fields"))
     };
-    let limits = |min, max, least| {
-        check_limits(min, max, least).map_err(|(message, help)| at(message, &help))
-    };
+    let limits =
+        |min, max, least| check_limits(min, max, least).map_err(|(message, help)| at(message, &help));
     limits(condition.min, condition.max, least(condition))?;
     if let Some(gate) = &condition.gate {
-        check_limits(gate.min, gate.max, None).map_err(|(message, help)| at(format!("`while`: {message}"), &help))?;
+        check_limits(gate.min, gate.max, None)
+            .map_err(|(message, help)| at(format!("`while`: {message}"), &help))?;
     }
     let Some(own) = unit(&condition.topic, &condition.field)? else { return Ok(()) };
     judge::conversion(&own, &condition.unit)

@@ -45,7 +45,11 @@ fn checked(
 ) -> Result<Option<Problem>, Problem> {
     if end.checked_add(ticks).is_none_or(|behind| behind >= u32::MAX - 1) {
         let message = format!("{who} is {ticks}, and the run has {end} ticks");
-        return Err(manifest.problem(span, message, "both together stay below 4 294 967 294: ticks have 32 bits"));
+        return Err(manifest.problem(
+            span,
+            message,
+            "both together stay below 4 294 967 294: ticks have 32 bits",
+        ));
     }
     let message = format!("{who} is {ticks}, and the run has {end} ticks: it is due at tick 0 alone");
     Ok((ticks >= end && end > 1).then(|| manifest.problem(span, message, "lower it, or fly longer")))

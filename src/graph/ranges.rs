@@ -119,7 +119,10 @@ mod tests {
     fn a_number_deep_in_a_table_is_named_by_its_whole_key() {
         let gains = json!({ "roll": { "proportional_1_s2": 16.0, "integral_1_s3": [0.0, -1e300] } });
         let words = within("gains", "gains", &gains).unwrap_err();
-        assert!(words.starts_with("`gains.roll.integral_1_s3.1` is -1e300 1/s^3, expected at most 1e9"), "{words}");
+        assert!(
+            words.starts_with("`gains.roll.integral_1_s3.1` is -1e300 1/s^3, expected at most 1e9"),
+            "{words}"
+        );
         assert_eq!(within("gains", "gains", &json!({ "file": "1e300", "on": true })), Ok(()));
     }
 }

@@ -1,7 +1,7 @@
 //! Successors: processes that shadow a node, take over from it, or stand by for it.
 
-use super::processes::{Member, irreplaceable, members, program};
 use super::parameters::{Notes, RunLength};
+use super::processes::{Member, irreplaceable, members, program};
 use super::{Graph, parameters, wire};
 use crate::manifest::{Manifest, OutputSetting, Process, SwapSetting};
 use crate::problem::Problem;

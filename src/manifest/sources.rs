@@ -71,6 +71,11 @@ impl Sources {
         })
     }
 
+    /// The texts that are files.
+    pub fn files(&self) -> impl Iterator<Item = &Source> {
+        self.all.iter().filter(|source| matches!(source.origin, Origin::File(_)))
+    }
+
     /// The files beside the manifest's own.
     pub fn included(&self) -> Vec<PathBuf> {
         let file = |source: &Source| match &source.origin {

@@ -40,8 +40,12 @@ pub const TIME_CONSTANT: Bounds =
 pub const NATURAL_FREQUENCY: Bounds =
     bounds(1e-2, 1e6, "rad/s", "a rotor takes a millisecond to some seconds to follow");
 /// Damping ratio of a motor.
-pub const DAMPING_RATIO: Bounds =
-    bounds(1e-3, 1e3, "", "less swings for ever, more is of first order: say so with model = \"first-order\"");
+pub const DAMPING_RATIO: Bounds = bounds(
+    1e-3,
+    1e3,
+    "",
+    "less swings for ever, more is of first order: say so with model = \"first-order\"",
+);
 /// Raw commands.
 pub const COMMAND: Bounds = bounds(-1e10, 1e10, "counts", "a timer of 32 bits counts to 4.3e9");
 /// Rotor speeds.

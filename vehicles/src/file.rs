@@ -139,8 +139,12 @@ fn principal_moments(tensor: &Matrix3<f64>) -> Vector3<f64> {
 
 fn rotor(section: &Section) -> Result<[f64; 3], VehicleError> {
     let doc = section.doc;
-    let thrust = section.quantity("thrust_coefficient", THRUST_COEFFICIENT)?.within(doc, &bounds::THRUST_COEFFICIENT)?;
-    let torque = section.quantity("torque_coefficient", TORQUE_COEFFICIENT)?.within(doc, &bounds::TORQUE_COEFFICIENT)?;
+    let thrust = section
+        .quantity("thrust_coefficient", THRUST_COEFFICIENT)?
+        .within(doc, &bounds::THRUST_COEFFICIENT)?;
+    let torque = section
+        .quantity("torque_coefficient", TORQUE_COEFFICIENT)?
+        .within(doc, &bounds::TORQUE_COEFFICIENT)?;
     let inertia = section.quantity("inertia", INERTIA)?.within(doc, &bounds::ROTOR_INERTIA)?;
     section.finish()?;
     Ok([thrust.si, torque.si, inertia.si])
@@ -189,13 +193,16 @@ fn motor(section: &Section) -> Result<MotorModel, VehicleError> {
 }
 
 fn first_order(section: &Section) -> Result<MotorModel, VehicleError> {
-    let time_constant = section.quantity("time_constant", TIME)?.within(section.doc, &bounds::TIME_CONSTANT)?;
+    let time_constant =
+        section.quantity("time_constant", TIME)?.within(section.doc, &bounds::TIME_CONSTANT)?;
     Ok(MotorModel::FirstOrder { time_constant_s: time_constant.si })
 }
 
 fn second_order(section: &Section) -> Result<MotorModel, VehicleError> {
-    let frequency = section.quantity("natural_frequency", SPEED)?.within(section.doc, &bounds::NATURAL_FREQUENCY)?;
-    let damping = section.quantity("damping_ratio", PURE_NUMBER)?.within(section.doc, &bounds::DAMPING_RATIO)?;
+    let frequency =
+        section.quantity("natural_frequency", SPEED)?.within(section.doc, &bounds::NATURAL_FREQUENCY)?;
+    let damping =
+        section.quantity("damping_ratio", PURE_NUMBER)?.within(section.doc, &bounds::DAMPING_RATIO)?;
     Ok(MotorModel::SecondOrder { natural_frequency_rad_s: frequency.si, damping_ratio: damping.si })
 }
 
