@@ -68,7 +68,7 @@ impl Graph {
         processes::require_core(manifest, clock_cpu, "clock_cpu")?;
         placement::place(&mut plan, clock_cpu.map(|cpu| *cpu.get_ref()));
         let mut notes = Notes::default();
-        periods::check(manifest, &members, &plan, &mut notes.warnings)?;
+        periods::check(manifest, &members, &plan, &mut notes)?;
         let length = RunLength::of(&plan);
         for (member, node) in members.iter().zip(&mut plan.nodes) {
             parameters::set(manifest, member, node, length, &mut notes)?;
@@ -78,8 +78,8 @@ impl Graph {
         recorders::require_whole_recording(manifest, &members, &plan.nodes)?;
         let successors = successors::all(manifest, &plan, &members, &mut notes)?;
         let programs: Vec<Program> = members.into_iter().map(|member| member.program).collect();
-        evaluations::check(manifest, &plan, &programs, &mut notes.warnings)?;
-        let Notes { models, warnings } = notes;
+        evaluations::check(manifest, &plan, &programs, &mut notes)?;
+        let (models, warnings) = notes.into_parts(manifest);
         Ok(Self { plan, programs, successors, companions, models, warnings })
     }
 }

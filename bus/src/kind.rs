@@ -52,7 +52,16 @@ pub struct RunContext<'a> {
     pub period_ticks: u32,
     /// Length of the run.
     pub duration_ticks: u32,
-    warnings: RefCell<Vec<String>>,
+    warnings: RefCell<Vec<RunWarning>>,
+}
+
+/// What is odd about a node in its run.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RunWarning {
+    /// A parameter is named in backticks, as in an error.
+    pub words: String,
+    /// Whether it is odd only because the run ends so early.
+    pub is_behind_end: bool,
 }
 
 impl<'a> RunContext<'a> {
@@ -101,12 +110,17 @@ impl<'a> RunContext<'a> {
 
     /// Leaves a warning: what is odd and flies all the same. A parameter is named in backticks, as in an error.
     pub fn warn(&self, words: impl Into<String>) {
-        self.warnings.borrow_mut().push(words.into());
+        self.warnings.borrow_mut().push(RunWarning { words: words.into(), is_behind_end: false });
+    }
+
+    /// Leaves a warning of what a longer run would come to.
+    pub fn warn_behind_end(&self, words: impl Into<String>) {
+        self.warnings.borrow_mut().push(RunWarning { words: words.into(), is_behind_end: true });
     }
 
     /// The warnings left so far.
     #[must_use]
-    pub fn into_warnings(self) -> Vec<String> {
+    pub fn into_warnings(self) -> Vec<RunWarning> {
         self.warnings.into_inner()
     }
 }

@@ -40,7 +40,7 @@ struct Parameters {
 fn warn_of_late(entries: &[SetPointEntry], run: &RunContext<'_>) {
     let end_s = run.duration_s();
     for (index, entry) in entries.iter().enumerate().filter(|(_, entry)| entry.at_s >= end_s) {
-        run.warn(format!(
+        run.warn_behind_end(format!(
             "`set_points`: set point {index} (the first is 0): `at_s` is {} s, and the run ends at {end_s} s: it never \
              acts",
             entry.at_s
@@ -126,7 +126,7 @@ mod tests {
         let run = RunContext::new(&[], 1_000_000, 1, 1000);
         assert_eq!((KIND.check)(&parameters, &run), Ok(()));
         let warnings = run.into_warnings();
-        assert!(warnings.len() == 1 && warnings[0].contains("set point 1"), "{warnings:?}");
+        assert!(warnings.len() == 1 && warnings[0].words.contains("set point 1"), "{warnings:?}");
     }
 
     #[test]

@@ -131,6 +131,7 @@ mod tests {
     use super::*;
     use crate::pid_gains::PidGains;
     use crate::pid_law::PidLaw;
+    use bus::kind::RunWarning;
     use vehicles::Vehicle;
 
     fn hummingbird(change: impl Fn(&mut Vehicle)) -> Airframe {
@@ -140,7 +141,7 @@ mod tests {
         Airframe::new(vehicle).unwrap()
     }
 
-    fn checked(airframe: &Airframe, gains: PidGains, tick_ns: u64) -> (Result<(), String>, Vec<String>) {
+    fn checked(airframe: &Airframe, gains: PidGains, tick_ns: u64) -> (Result<(), String>, Vec<RunWarning>) {
         let run = RunContext::new(&[], tick_ns, 1, 1000);
         let law = PidLaw { gains, vehicle: airframe.known(), period_s: run.period_s() };
         let outcome = check(&law, airframe, &run);
@@ -152,7 +153,7 @@ mod tests {
         let airframe = hummingbird(|_| {});
         assert_eq!(checked(&airframe, PidGains::default(), 1_000_000), (Ok(()), vec![]));
         let (outcome, warnings) = checked(&airframe, PidGains::default(), 100_000_000);
-        assert!(outcome.is_ok() && warnings[0].contains("computes 10 times a second"), "{warnings:?}");
+        assert!(outcome.is_ok() && warnings[0].words.contains("computes 10 times a second"), "{warnings:?}");
         let words = checked(&airframe, PidGains::default(), 1_000_000_000).0.unwrap_err();
         assert!(words.contains("6 1/s") && words.contains("expected below 2"), "{words}");
     }
@@ -161,7 +162,7 @@ mod tests {
     fn a_vehicle_too_heavy_for_its_rotors_is_told_with_both_forces() {
         let (outcome, warnings) =
             checked(&hummingbird(|it| it.mass_kg = 480.0), PidGains::default(), 1_000_000);
-        assert!(outcome.is_ok() && warnings[0].contains("weighs 4708.8000 N"), "{warnings:?}");
+        assert!(outcome.is_ok() && warnings[0].words.contains("weighs 4708.8000 N"), "{warnings:?}");
     }
 
     #[test]

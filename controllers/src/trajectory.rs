@@ -48,7 +48,7 @@ fn course(parameters: &Parameters) -> Result<Course, String> {
 fn warn_of_late(course: &Course, run: &RunContext<'_>) {
     let end_s = run.duration_s();
     if let Some((index, start_s)) = course.starts_s().enumerate().find(|(_, start_s)| *start_s >= end_s) {
-        run.warn(format!(
+        run.warn_behind_end(format!(
             "`segments`: entry {index} (the first is 0) begins at {start_s:.3} s, and the run ends at {end_s} s: it and \
              what follows is never flown"
         ));

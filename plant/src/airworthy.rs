@@ -169,6 +169,7 @@ fn first_not_finite(backend: &dyn Backend) -> Option<&'static str> {
 mod tests {
     use super::*;
     use crate::{FreeFlight, NewtonEuler, RigidBody};
+    use bus::kind::RunWarning;
     use nalgebra::Vector3;
 
     const PATH: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../vehicles/hummingbird.toml");
@@ -179,7 +180,7 @@ mod tests {
         vehicle
     }
 
-    fn lift(change: impl Fn(&mut Vehicle)) -> (Result<(), String>, Vec<String>) {
+    fn lift(change: impl Fn(&mut Vehicle)) -> (Result<(), String>, Vec<RunWarning>) {
         let run = RunContext::of_ports(&[]);
         let outcome = check_lift(&hummingbird(change), PATH.as_ref(), &run);
         (outcome, run.into_warnings())
@@ -197,14 +198,14 @@ mod tests {
         assert!(words.contains("hummingbird.toml:21: `body.mass`"), "{words}");
         // 4.785 as declared.
         let (outcome, warnings) = lift(|it| it.mass_kg *= 4.5);
-        assert!(outcome.is_ok() && warnings[0].contains("can hardly climb"), "{warnings:?}");
+        assert!(outcome.is_ok() && warnings[0].words.contains("can hardly climb"), "{warnings:?}");
         let (outcome, warnings) = lift(|it| it.mass_kg /= 20.0);
         assert!(outcome.is_err() && warnings.is_empty(), "at 1075 rpm it still rises");
         let words = outcome.unwrap_err();
         assert!(words.contains("cannot come down"), "{words}");
         let slow = |it: &mut Vehicle| it.command.speed_at_min_rad_s = 0.0;
         let strong = |factor: f64| lift(|it| (slow(it), it.mass_kg /= factor).1);
-        assert!(strong(20.0).1[0].contains("stronger than any"));
+        assert!(strong(20.0).1[0].words.contains("stronger than any"));
         assert!(strong(1e4).0.unwrap_err().contains("no vehicle that flies"));
     }
 
@@ -216,7 +217,7 @@ mod tests {
             (outcome, run.into_warnings())
         };
         assert_eq!(steps(1e-3), (Ok(()), vec![]));
-        assert!(steps(0.1).1[0].contains("raise `substeps`"));
+        assert!(steps(0.1).1[0].words.contains("raise `substeps`"));
         let words = steps(0.2).0.unwrap_err();
         assert!(words.contains("15.0756 rad/s") && words.contains("expected below 2.5"), "{words}");
     }

@@ -74,7 +74,7 @@ impl Timing {
             ));
         }
         if self.delay_ms * 1e-3 >= run.duration_s() {
-            run.warn(format!(
+            run.warn_behind_end(format!(
                 "`delay_ms` is {} ms, as long as the run: no measurement arrives before its end",
                 self.delay_ms
             ));
@@ -315,7 +315,7 @@ mod tests {
         }
         assert_eq!(rate_of(1_000_000, 5), (Ok(()), vec![]));
         let (outcome, warnings) = rate_of(1_000_000, 3);
-        assert!(outcome.is_ok() && warnings[0].contains("not evenly spaced"), "{warnings:?}");
+        assert!(outcome.is_ok() && warnings[0].words.contains("not evenly spaced"), "{warnings:?}");
     }
 
     #[test]

@@ -1,5 +1,6 @@
 //! What is judged after the run: it will be recorded, and its fields and units exist.
 
+use super::parameters::Notes;
 use crate::judge;
 use crate::manifest::{Comparison, Manifest, PassCondition, Statistic};
 use crate::problem::{Problem, nearest};
@@ -12,24 +13,25 @@ pub fn check(
     manifest: &Manifest,
     plan: &Plan,
     programs: &[Program],
-    warnings: &mut Vec<Problem>,
+    notes: &mut Notes,
 ) -> Result<(), Problem> {
     check_recorded(manifest, plan, programs)?;
     manifest.content.compare.iter().try_for_each(|compare| check_window(manifest, plan, compare))?;
     for pass in &manifest.content.pass {
         check_field(manifest, plan, pass)?;
-        warnings.extend(check_span(manifest, plan, pass)?);
+        check_span(manifest, plan, pass, notes)?;
     }
     Ok(())
 }
 
-/// Refuses a span in which nothing can be judged; tells one that the run ends in, or before where it was cut short by
-/// other than the condition's own file.
+/// Refuses a span in which nothing can be judged; tells one that the run ends in. Where the run was cut short by other
+/// than the condition's own file, it is not refused.
 fn check_span(
     manifest: &Manifest,
     plan: &Plan,
     pass: &Spanned<PassCondition>,
-) -> Result<Option<Problem>, Problem> {
+    notes: &mut Notes,
+) -> Result<(), Problem> {
     let PassCondition { name, topic, from_s, to_s, .. } = pass.get_ref();
     let at = |message: String, help: &str| {
         manifest.problem(&pass.span(), format!("pass condition `{name}`: {message}"), help)
@@ -51,23 +53,22 @@ fn check_span(
         return Err(at(message, "widen the span: a span without samples does not pass"));
     }
     if first_s >= end_s - HALF_NS_S {
+        if notes.is_cut(manifest, &pass.span()) {
+            return Ok(());
+        }
         let message =
             format!("`from_s` is {from_s} s, and the run ends at {end_s} s: no sample of {topic} is judged");
-        let duration = manifest.content.run.duration_s.span();
-        return match manifest.is_one_text(&pass.span(), &duration) {
-            true => Err(at(
-                message,
-                "begin earlier, or raise run.duration_s: a span without samples does not pass",
-            )),
-            // Somebody looks at the start of a run that is longer by itself.
-            false => Ok(Some(at(message, "it does not pass: a span without samples does not"))),
-        };
+        let help = "begin earlier, or raise run.duration_s: a span without samples does not pass";
+        return Err(at(message, help));
     }
-    let beyond = to_s.filter(|to_s| *to_s > end_s + HALF_NS_S);
-    Ok(beyond.map(|to_s| {
+    if let Some(to_s) = to_s.filter(|to_s| *to_s > end_s + HALF_NS_S)
+        && !notes.is_cut(manifest, &pass.span())
+    {
         let message = format!("`to_s` is {to_s} s, and the run ends at {end_s} s");
-        at(message, "only what is flown is judged; leave `to_s` out for the whole rest of the run")
-    }))
+        let help = "only what is flown is judged; leave `to_s` out for the whole rest of the run";
+        notes.warnings.push(at(message, help));
+    }
+    Ok(())
 }
 
 /// Times in seconds are exact to half a nanosecond, as when the run is judged.

@@ -8,6 +8,7 @@ use crate::program::Executable;
 use bus::kind::RunContext;
 use bus::plan::{NodePlan, Plan};
 use std::collections::BTreeMap;
+use std::ops::Range;
 use std::path::PathBuf;
 use toml::Spanned;
 use vehicles::Vehicle;
@@ -19,6 +20,32 @@ pub struct Notes {
     pub models: Vec<PathBuf>,
     /// What is odd and flies all the same.
     pub warnings: Vec<Problem>,
+    /// Whether something was left out of the warnings because the run was cut short.
+    has_cut: bool,
+}
+
+impl Notes {
+    /// Whether what stands at `span` lies behind the end only because `--set`, or a file that includes that one, says
+    /// how long the run is: then somebody looks at the start of it, and is told so once.
+    pub fn is_cut(&mut self, manifest: &Manifest, span: &Range<usize>) -> bool {
+        let is_cut = !manifest.is_one_text(span, &manifest.content.run.duration_s.span());
+        self.has_cut |= is_cut;
+        is_cut
+    }
+
+    /// The warnings, with one about all that a run that was cut short leaves out.
+    pub fn into_parts(mut self, manifest: &Manifest) -> (Vec<PathBuf>, Vec<Problem>) {
+        if self.has_cut {
+            let duration = &manifest.content.run.duration_s;
+            let message = format!(
+                "`duration_s` is {} s, and set points, segments or conditions lie behind that",
+                duration.get_ref()
+            );
+            let help = "set points do not act; a condition without a sample does not pass";
+            self.warnings.push(manifest.problem(&duration.span(), message, help));
+        }
+        (self.models, self.warnings)
+    }
 }
 
 /// Ticks of a run: how long each is, and how many there are.
@@ -75,8 +102,13 @@ pub fn set(
         let ports: Vec<&str> = ports.map(|port| port.get_ref().as_str()).collect();
         let context = RunContext::new(&ports, run.tick_ns, node.period_ticks, run.duration_ticks);
         (kind.check)(&parameters, &context).map_err(|reason| refused(manifest, name, process, &reason))?;
-        let warnings = context.into_warnings().into_iter();
-        notes.warnings.extend(warnings.map(|words| refused(manifest, name, process, &words)));
+        for warning in context.into_warnings() {
+            let at = process.parameters.keys().next().map_or_else(|| name.span(), Spanned::span);
+            if warning.is_behind_end && notes.is_cut(manifest, &at) {
+                continue;
+            }
+            notes.warnings.push(refused(manifest, name, process, &warning.words));
+        }
     }
     node.parameters = parameters;
     Ok(())

@@ -1,9 +1,11 @@
 //! Periods against the length of the run: what would overflow the count of ticks, and what computes only once.
 
+use super::parameters::Notes;
 use super::processes::Member;
 use crate::manifest::Manifest;
 use crate::problem::Problem;
 use bus::plan::Plan;
+use std::ops::Range;
 
 /// Refuses periods with which the tick behind the last cannot be counted, and tells those as long as the run.
 ///
@@ -13,7 +15,7 @@ pub fn check(
     manifest: &Manifest,
     members: &[Member<'_>],
     plan: &Plan,
-    warnings: &mut Vec<Problem>,
+    notes: &mut Notes,
 ) -> Result<(), Problem> {
     let end = plan.duration_ticks;
     for (member, node) in members.iter().zip(&plan.nodes) {
@@ -21,7 +23,7 @@ pub fn check(
         let written = member.process.period_ticks.as_ref();
         let span = written.map_or_else(|| name.span(), toml::Spanned::span);
         let who = format!("`period_ticks` of `{}`", name.get_ref());
-        warnings.extend(checked(manifest, &span, &who, node.period_ticks, end)?);
+        note(manifest, &span, checked(manifest, &span, &who, node.period_ticks, end)?, notes);
         for output in &node.outputs {
             let every = plan.topics[output.topic].period_ticks;
             if every == node.period_ticks {
@@ -30,15 +32,23 @@ pub fn check(
             let port = member.process.outputs.keys().find(|port| *port.get_ref() == output.port);
             let span = port.unwrap_or(name).span();
             let who = format!("`every_ticks` of the output `{}` of `{}`", output.port, name.get_ref());
-            warnings.extend(checked(manifest, &span, &who, every, end)?);
+            note(manifest, &span, checked(manifest, &span, &who, every, end)?, notes);
         }
     }
     Ok(())
 }
 
+fn note(manifest: &Manifest, span: &Range<usize>, warning: Option<Problem>, notes: &mut Notes) {
+    if let Some(warning) = warning
+        && !notes.is_cut(manifest, span)
+    {
+        notes.warnings.push(warning);
+    }
+}
+
 fn checked(
     manifest: &Manifest,
-    span: &std::ops::Range<usize>,
+    span: &Range<usize>,
     who: &str,
     ticks: u32,
     end: u32,

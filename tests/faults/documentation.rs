@@ -4,7 +4,7 @@ use crate::support::repository;
 use std::path::Path;
 
 /// The sources that hold tests.
-const SOURCES: [&str; 7] = [
+const SOURCES: [&str; 8] = [
     "tests/faults",
     "tests/runs",
     "bus/src",
@@ -12,6 +12,7 @@ const SOURCES: [&str; 7] = [
     "recorder/tests",
     "vehicles/tests",
     "vehicles/src",
+    "src",
 ];
 
 fn sources() -> String {
