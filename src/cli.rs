@@ -4,6 +4,7 @@ use crate::files::open_recording;
 use crate::graph::Graph;
 use crate::manifest::Manifest;
 use crate::output::{gone_or_failed, print_text, say, words};
+use crate::problem::print_warnings;
 use crate::profile::Files;
 use crate::run::RunArguments;
 use crate::{clean, ctl, describe, identify, kinds, plot, run, shadow, top, validate};
@@ -193,6 +194,7 @@ fn shadow(arguments: &ShadowArguments) -> Result<bool> {
 fn check(arguments: &CheckArguments) -> Result<bool> {
     let manifest = Manifest::load(&arguments.manifest, &arguments.set)?;
     let graph = Graph::build(&manifest)?;
+    print_warnings(&graph.warnings);
     print_text(&if arguments.json { describe::graph_json(&graph) } else { describe::graph(&graph) })?;
     Ok(true)
 }

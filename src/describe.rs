@@ -117,6 +117,7 @@ pub fn graph_json(graph: &Graph) -> String {
         value["nodes"][index]["what"] = what(program).into();
     }
     value["successors"] = graph.successors.iter().map(successor).collect();
+    value["warnings"] = serde_json::to_value(&graph.warnings).unwrap_or_default();
     value["companions"] = graph.companions.iter().map(|(name, _)| name.clone()).collect();
     serde_json::to_string_pretty(&value).unwrap_or_default()
 }

@@ -3,6 +3,8 @@
 //! - [`processes`]: what each process executes, and how it runs on the host
 //! - [`outputs`], [`inputs`]: topics and edges
 //! - [`parameters`], [`recorders`]: what each node is given
+//! - [`periods`]: nodes and outputs that compute once or never count on
+//! - [`ranges`]: ranges of numbers by their units
 //! - [`evaluations`]: what is judged after the run
 //! - [`successors`]: who shadows, takes over or stands by
 
@@ -10,7 +12,9 @@ mod evaluations;
 mod inputs;
 mod outputs;
 mod parameters;
+mod periods;
 mod processes;
+mod ranges;
 mod recorders;
 mod successors;
 
@@ -21,6 +25,7 @@ use crate::placement;
 use crate::problem::Problem;
 use crate::program::{OnExit, Program, Successor};
 use bus::plan::{NodePlan, Plan, TopicPlan};
+use parameters::{Notes, RunLength};
 use processes::Member;
 use std::path::PathBuf;
 use toml::Spanned;
@@ -44,6 +49,8 @@ pub struct Graph {
     pub companions: Vec<(String, Program)>,
     /// The vehicle, scene and gains files the processes name, each once.
     pub models: Vec<PathBuf>,
+    /// What is odd and flies all the same; `check` and `run` tell it.
+    pub warnings: Vec<Problem>,
 }
 
 impl Graph {
@@ -60,17 +67,20 @@ impl Graph {
         let clock_cpu = manifest.content.run.clock_cpu.as_ref();
         processes::require_core(manifest, clock_cpu, "clock_cpu")?;
         placement::place(&mut plan, clock_cpu.map(|cpu| *cpu.get_ref()));
-        let mut models = Vec::new();
+        let mut notes = Notes::default();
+        periods::check(manifest, &members, &plan, &mut notes)?;
+        let length = RunLength::of(&plan);
         for (member, node) in members.iter().zip(&mut plan.nodes) {
-            parameters::set(manifest, member, node, &mut models)?;
+            parameters::set(manifest, member, node, length, &mut notes)?;
             processes::require_replaceable(manifest, member, node)?;
         }
         recorders::require_one_recorder(manifest, &members)?;
         recorders::require_whole_recording(manifest, &members, &plan.nodes)?;
-        let successors = successors::all(manifest, &plan, &members, &mut models)?;
+        let successors = successors::all(manifest, &plan, &members, &mut notes)?;
         let programs: Vec<Program> = members.into_iter().map(|member| member.program).collect();
-        evaluations::check(manifest, &plan, &programs)?;
-        Ok(Self { plan, programs, successors, companions, models })
+        evaluations::check(manifest, &plan, &programs, &mut notes)?;
+        let (models, warnings) = notes.into_parts(manifest);
+        Ok(Self { plan, programs, successors, companions, models, warnings })
     }
 }
 

@@ -7,6 +7,8 @@ mod companions;
 mod ctl;
 mod descendants;
 mod describe;
+#[cfg(test)]
+mod extremes;
 mod files;
 mod graph;
 mod identify;

@@ -6,9 +6,11 @@
 //! - [`tree`]: tables with the places of their values, merged
 //! - [`sets`]: vehicles of process sets become processes
 //! - [`succession`]: a successor's differences become a whole process
+//! - [`finite`]: no number is infinite or none
 //! - [`content`]: the types that the whole is read into
 
 mod content;
+mod finite;
 mod include;
 mod overrides;
 mod recorded;
@@ -90,6 +92,11 @@ impl Manifest {
         self.sources.is_override(span.start)
     }
 
+    /// Whether what stands at the two places was written in one file, or given in one `--set`.
+    pub fn is_one_text(&self, a: &Range<usize>, b: &Range<usize>) -> bool {
+        self.sources.is_one_text(a.start, b.start)
+    }
+
     /// This manifest with one more `[[swap]]`-like successor of `process`, whose differences are the TOML
     /// `with_text`: the manifest that its places refer to, and the whole process.
     ///
@@ -101,6 +108,7 @@ impl Manifest {
         let tree = whole_tree(&sources)?;
         let with = sources.last_table()?;
         let span = sources.last_span();
+        finite::require(&with, "", &sources)?;
         let whole = succession::whole(&sources, &tree, &Spanned::new(span.clone(), process.into()), with)?;
         let whole = Spanned::new(span.clone(), DeValue::Table(whole));
         let whole = Process::deserialize(toml::de::ValueDeserializer::from(whole))
@@ -130,6 +138,8 @@ fn help_for(message: &str) -> String {
 
 /// Everything that the sources say, with sets expanded and successors made whole.
 fn whole_tree(sources: &Sources) -> Result<DeTable<'_>, Problem> {
+    // In every file, also where another one's number takes the place of what is none.
+    sources.files().try_for_each(|file| finite::require(&sources.table(file)?, "", sources))?;
     let mut tree = include::merged(sources)?;
     let (late, early): (Vec<_>, Vec<_>) =
         sources.overrides()?.into_iter().partition(overrides::Override::is_of_an_expanded_process);
@@ -137,5 +147,6 @@ fn whole_tree(sources: &Sources) -> Result<DeTable<'_>, Problem> {
     sets::expand(&mut tree, sources)?;
     late.into_iter().try_for_each(|change| change.apply(&mut tree, sources))?;
     succession::complete(&mut tree, sources)?;
+    finite::require(&tree, "", sources)?;
     Ok(tree)
 }

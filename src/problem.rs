@@ -1,11 +1,12 @@
 //! A problem in a manifest, for the person who wrote it: where, what, and what to do.
 
+use serde::ser::{Serialize, SerializeStruct, Serializer};
 use std::fmt;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 /// A problem at a place in a file.
-#[derive(Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Problem {
     file: PathBuf,
     /// Line and column, counted from 1.
@@ -38,6 +39,24 @@ impl Problem {
             help: help.into(),
         }
     }
+}
+
+/// As an object: file, line, column, message, help.
+impl Serialize for Problem {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let mut object = serializer.serialize_struct("Problem", 5)?;
+        object.serialize_field("file", &self.file)?;
+        object.serialize_field("line", &self.place.map(|(line, _)| line))?;
+        object.serialize_field("column", &self.place.map(|(_, column)| column))?;
+        object.serialize_field("message", &self.message)?;
+        object.serialize_field("help", &self.help)?;
+        object.end()
+    }
+}
+
+/// Tells people of what is odd, on standard error.
+pub fn print_warnings(warnings: &[Problem]) {
+    warnings.iter().for_each(|warning| eprintln!("warning: {warning}"));
 }
 
 impl fmt::Display for Problem {

@@ -4,6 +4,7 @@ use crate::graph::{self, Graph, successor_of};
 use crate::manifest::{Manifest, PaceSetting};
 use crate::output::{print_text, words};
 use crate::outputs::Outputs;
+use crate::problem::print_warnings;
 use crate::profile::{Files, Profile};
 use crate::summary::{Judgement, Summary};
 use crate::{judge, launch, shadow};
@@ -51,6 +52,7 @@ pub fn run(
         manifest.content.run.window_ticks = Some(toml::Spanned::new(0..0, window));
     }
     let mut graph = Graph::build(&manifest)?;
+    print_warnings(&graph.warnings);
     graph.plan.profile |= files.is_some();
     if let Some((process, with)) = extra_shadow {
         let shadow = successor_of(&manifest, &graph, process, with)?;
@@ -86,7 +88,8 @@ pub fn run(
         }
     }
     let tick_s = graph.plan.tick_s();
-    let summary = Summary::new(manifest.name(), outcome, tick_s, recording.map(|_| path), judgement);
+    let mut summary = Summary::new(manifest.name(), outcome, tick_s, recording.map(|_| path), judgement);
+    summary.warnings = graph.warnings;
     let mut text =
         if arguments.json { json_text(&summary, profile.as_ref(), &files)? } else { summary.to_string() };
     if let (Some(flight), Some(profile)) = (&flight, &profile) {

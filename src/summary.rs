@@ -2,6 +2,7 @@
 
 use crate::judge::{Verdict, WindowErrors};
 use crate::launch::Outcome;
+use crate::problem::Problem;
 use crate::shadow::{Difference, Step};
 use crate::succession::{Purpose, Report};
 use serde::Serialize;
@@ -44,6 +45,8 @@ pub struct Summary {
     pub successions: Vec<Succession>,
     /// What shadows asked for otherwise than those they shadowed.
     pub shadows: Vec<Difference>,
+    /// What `check` found odd; told before the flight.
+    pub warnings: Vec<Problem>,
 }
 
 /// What there is to say about a successor.
@@ -116,6 +119,7 @@ impl Summary {
             compare,
             successions,
             shadows,
+            warnings: Vec::new(),
         }
     }
 }

@@ -106,6 +106,23 @@ pub enum BusError {
         /// The port.
         port: String,
     },
+    /// A node declares a port a second time.
+    #[error(
+        "node `{node}` declares its {direction} `{port}` twice, as {first} and as {second}; declare it once, and \
+         use that handle in both places"
+    )]
+    DeclaredTwice {
+        /// The node.
+        node: String,
+        /// `input` or `output`.
+        direction: &'static str,
+        /// The port.
+        port: String,
+        /// The message type of the first declaration.
+        first: &'static str,
+        /// That of the second.
+        second: &'static str,
+    },
     /// Publisher and subscriber disagree on the bytes.
     #[error(
         "layout mismatch on topic {topic}: node `{node}` reads its port `{port}` as\n{expected}\n\
@@ -208,6 +225,28 @@ pub enum BusError {
         port: String,
         /// The tick.
         tick: u32,
+    },
+    /// A node wrote a sample that holds a number that is none.
+    #[error(
+        "node `{node}` failed at tick {tick} (t = {time_s:.3} s): its output `{port}` on {topic} holds {field} = \
+         {value}, expected a finite number; the sample was not sent. What the node read last, and its own numbers \
+         (gains, vehicle, parameters), are where to look"
+    )]
+    NotFinite {
+        /// The node.
+        node: String,
+        /// Its output.
+        port: String,
+        /// The topic.
+        topic: String,
+        /// The field, with its place in an array.
+        field: String,
+        /// What it holds: NaN, inf or -inf.
+        value: f64,
+        /// The tick.
+        tick: u32,
+        /// Simulation time in seconds.
+        time_s: f64,
     },
     /// The node's own computation failed.
     #[error("node `{node}` failed at tick {tick} (t = {time_s:.3} s): {reason}")]

@@ -3,6 +3,7 @@
 use crate::error::BusError;
 use crate::schema::Schema;
 use serde::de::DeserializeOwned;
+use std::cell::RefCell;
 
 /// A port of a built-in node.
 #[derive(Clone, Copy, Debug)]
@@ -40,6 +41,90 @@ pub enum Inputs {
     Any,
 }
 
+/// What a kind has to know of a run to check its parameters for it, and where it leaves its warnings.
+#[derive(Clone, Debug)]
+pub struct RunContext<'a> {
+    /// The wired inputs and the outputs that the manifest names.
+    pub ports: &'a [&'a str],
+    /// Nanoseconds a tick.
+    pub tick_ns: u64,
+    /// Ticks between two computations of the node.
+    pub period_ticks: u32,
+    /// Length of the run.
+    pub duration_ticks: u32,
+    warnings: RefCell<Vec<RunWarning>>,
+}
+
+/// What is odd about a node in its run.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RunWarning {
+    /// A parameter is named in backticks, as in an error.
+    pub words: String,
+    /// Whether it is odd only because the run ends so early.
+    pub is_behind_end: bool,
+}
+
+impl<'a> RunContext<'a> {
+    /// A node with these `ports` that computes at 1 kHz, in a run that lasts an hour.
+    #[must_use]
+    pub fn of_ports(ports: &'a [&'a str]) -> Self {
+        Self::new(ports, 1_000_000, 1, 3_600_000)
+    }
+
+    /// A node that computes every `period_ticks` ticks of `tick_ns`, in a run of `duration_ticks`.
+    #[must_use]
+    pub fn new(ports: &'a [&'a str], tick_ns: u64, period_ticks: u32, duration_ticks: u32) -> Self {
+        Self { ports, tick_ns, period_ticks, duration_ticks, warnings: RefCell::default() }
+    }
+
+    /// Whether an input is wired, or an output named.
+    #[must_use]
+    pub fn has(&self, port: &str) -> bool {
+        self.ports.contains(&port)
+    }
+
+    /// Simulated time of a tick, in seconds.
+    #[must_use]
+    pub fn tick_s(&self) -> f64 {
+        self.tick_ns as f64 * 1e-9
+    }
+
+    /// Simulated time between two computations of the node, in seconds; as `Node::period_s`.
+    #[must_use]
+    pub fn period_s(&self) -> f64 {
+        f64::from(self.period_ticks) * self.tick_s()
+    }
+
+    /// Simulated length of the run, in seconds.
+    #[must_use]
+    pub fn duration_s(&self) -> f64 {
+        f64::from(self.duration_ticks) * self.tick_s()
+    }
+
+    /// Ticks per simulated second; as `Node::rate_hz`.
+    #[must_use]
+    #[allow(clippy::cast_possible_truncation, reason = "a tick is at least a nanosecond")]
+    pub fn rate_hz(&self) -> u32 {
+        (1_000_000_000 / self.tick_ns.max(1)) as u32
+    }
+
+    /// Leaves a warning: what is odd and flies all the same. A parameter is named in backticks, as in an error.
+    pub fn warn(&self, words: impl Into<String>) {
+        self.warnings.borrow_mut().push(RunWarning { words: words.into(), is_behind_end: false });
+    }
+
+    /// Leaves a warning of what a longer run would come to.
+    pub fn warn_behind_end(&self, words: impl Into<String>) {
+        self.warnings.borrow_mut().push(RunWarning { words: words.into(), is_behind_end: true });
+    }
+
+    /// The warnings left so far.
+    #[must_use]
+    pub fn into_warnings(self) -> Vec<RunWarning> {
+        self.warnings.into_inner()
+    }
+}
+
 /// A kind of built-in node.
 #[derive(Clone, Copy, Debug)]
 pub struct NodeKind {
@@ -51,9 +136,8 @@ pub struct NodeKind {
     pub inputs: Inputs,
     /// Outputs.
     pub outputs: &'static [PortSpec],
-    /// Checks the parameters and the files they name, without running; the words are the wired inputs
-    /// and the outputs that the manifest names.
-    pub check: fn(&serde_json::Value, &[&str]) -> Result<(), String>,
+    /// Checks the parameters and the files they name for the run, without running.
+    pub check: fn(&serde_json::Value, &RunContext<'_>) -> Result<(), String>,
     /// Runs the node in this process.
     pub run: fn() -> Result<(), BusError>,
 }

@@ -8,6 +8,7 @@ pub mod clock;
 mod connected;
 pub mod control;
 pub mod error;
+mod finite;
 pub mod handover;
 pub mod initial;
 pub mod kind;

@@ -83,3 +83,8 @@ pub(crate) fn view_mut<T: Message>(words: &mut [u64]) -> &mut T {
 pub(crate) fn cdr_bytes(words: &[u64], size: usize) -> &[u8] {
     &bytemuck::cast_slice(words)[CDR_START..BODY_START + size]
 }
+
+/// The bytes of a message of `size` bytes alone.
+pub(crate) fn message_bytes(words: &[u64], size: usize) -> &[u8] {
+    &bytemuck::cast_slice(words)[BODY_START..BODY_START + size]
+}

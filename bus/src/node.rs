@@ -67,6 +67,8 @@ pub struct Node {
     /// The message type of each input, in the plan's order; `None` until declared.
     inputs: Vec<Option<Declared>>,
     outputs: Vec<Option<&'static Schema>>,
+    /// What was wrong with a declaration that does not return errors; connecting does.
+    fault: Option<BusError>,
 }
 
 /// How a node reads an input.
@@ -74,6 +76,16 @@ pub struct Node {
 pub(crate) enum Declared {
     Typed(&'static Schema),
     Raw,
+}
+
+impl Declared {
+    /// The message type, in words where any is read.
+    fn type_name(self) -> &'static str {
+        match self {
+            Self::Typed(schema) => schema.type_name,
+            Self::Raw => "bytes of any type",
+        }
+    }
 }
 
 impl Node {
@@ -99,7 +111,7 @@ impl Node {
         };
         let (inputs, outputs) = (node.inputs.len(), node.outputs.len());
         let (inputs, outputs) = (vec![None; inputs], vec![None; outputs]);
-        Ok(Self { run_dir, plan, index, generation, node, inputs, outputs })
+        Ok(Self { run_dir, plan, index, generation, node, inputs, outputs, fault: None })
     }
 
     fn node(&self) -> &NodePlan {
@@ -149,33 +161,77 @@ impl Node {
     /// Declares the input `port`, whose messages are `T`.
     ///
     /// # Errors
-    /// If the manifest does not wire it.
+    /// If the manifest does not wire it, or the node declared it before.
     pub fn input<T: Message>(&mut self, port: &str) -> Result<Input<T>, BusError> {
         let index = self.input_index(port)?;
-        self.inputs[index] = Some(Declared::Typed(T::SCHEMA));
+        self.declare_input(index, Declared::Typed(T::SCHEMA))?;
         Ok(Input { index, message: PhantomData })
     }
 
-    /// Declares the input `port` if the manifest wires it.
+    /// Declares the input `port` if the manifest wires it. A port that was declared before is refused when the node
+    /// connects.
     pub fn optional_input<T: Message>(&mut self, port: &str) -> Option<Input<T>> {
-        self.input(port).ok()
+        let is_wired = self.node().inputs.iter().any(|input| input.port == port);
+        self.keep_fault(|node| is_wired.then(|| node.input(port)).transpose()).flatten()
     }
 
-    /// Declares every input the manifest wires as one of `T`, in the order of their names.
+    /// What `declare` gives; its error is kept for [`Node::connect`].
+    fn keep_fault<D>(&mut self, declare: impl FnOnce(&mut Self) -> Result<D, BusError>) -> Option<D> {
+        let declared = declare(self);
+        declared.map_err(|fault| self.fault = self.fault.take().or(Some(fault))).ok()
+    }
+
+    /// The error for a port that the node declares a second time: the first handle would read or write bytes of
+    /// the second one's type.
+    fn declared_twice(
+        &self,
+        direction: &'static str,
+        port: &str,
+        first: &'static str,
+        second: &'static str,
+    ) -> BusError {
+        BusError::DeclaredTwice {
+            node: self.name().to_owned(),
+            direction,
+            port: port.to_owned(),
+            first,
+            second,
+        }
+    }
+
+    /// Declares every input the manifest wires as one of `T`, in the order of their names. An input that was declared
+    /// before is refused when the node connects.
     pub fn every_input<T: Message>(&mut self) -> Vec<Input<T>> {
-        self.inputs.fill(Some(Declared::Typed(T::SCHEMA)));
+        self.declare_all(Declared::Typed(T::SCHEMA));
         let mut inputs: Vec<_> =
             (0..self.inputs.len()).map(|index| Input { index, message: PhantomData }).collect();
         inputs.sort_by_key(|input| &self.node().inputs[input.index].port);
         inputs
     }
 
-    /// Declares every input the manifest wires, to be read as bytes, in the order of their topics' names.
+    /// Declares every input the manifest wires, to be read as bytes, in the order of their topics' names. As
+    /// [`Node::every_input`].
     pub fn raw_inputs(&mut self) -> Vec<RawInput> {
-        self.inputs.fill(Some(Declared::Raw));
+        self.declare_all(Declared::Raw);
         let mut inputs: Vec<RawInput> = (0..self.inputs.len()).map(|index| RawInput { index }).collect();
         inputs.sort_by_key(|input| &self.plan.topics[self.node().inputs[input.index].topic].name);
         inputs
+    }
+
+    fn declare_all(&mut self, declared: Declared) {
+        for index in 0..self.inputs.len() {
+            self.keep_fault(|node| node.declare_input(index, declared));
+        }
+    }
+
+    fn declare_input(&mut self, index: usize, declared: Declared) -> Result<(), BusError> {
+        match self.inputs[index].replace(declared) {
+            None => Ok(()),
+            Some(before) => {
+                let port = &self.node().inputs[index].port;
+                Err(self.declared_twice("input", port, before.type_name(), declared.type_name()))
+            }
+        }
     }
 
     /// Declares the output `port` if the manifest names it.
@@ -206,7 +262,7 @@ impl Node {
     /// Declares the output `port`, whose messages are `T`.
     ///
     /// # Errors
-    /// If the manifest does not name it, or states another message type.
+    /// If the manifest does not name it, or states another message type, or the node declared it before.
     pub fn output<T: Message>(&mut self, port: &str) -> Result<Output<T>, BusError> {
         let outputs = &self.node().outputs;
         let index =
@@ -226,7 +282,9 @@ impl Node {
                 found: T::SCHEMA.type_name.to_owned(),
             });
         }
-        self.outputs[index] = Some(T::SCHEMA);
+        if let Some(before) = self.outputs[index].replace(T::SCHEMA) {
+            return Err(self.declared_twice("output", port, before.type_name, T::SCHEMA.type_name));
+        }
         Ok(Output { index, message: PhantomData })
     }
 
@@ -234,8 +292,9 @@ impl Node {
     /// while the clock holds the tick from which on it computes.
     ///
     /// # Errors
-    /// If a port of the manifest was not declared, two sides disagree on a layout, or the run is aborted.
-    pub fn connect(self) -> Result<ConnectedNode, BusError> {
+    /// If a port of the manifest was not declared or declared twice, two sides disagree on a layout, or the run is aborted.
+    pub fn connect(mut self) -> Result<ConnectedNode, BusError> {
+        self.fault.take().map_or(Ok(()), Err)?;
         self.require_all_declared()?;
         let name = crate::process::process_name(self.name(), self.generation);
         let claim = crate::process::claim(&self.run_dir, &name)?;
@@ -355,7 +414,7 @@ pub(crate) fn go_on(waited: Waited) -> Result<(), BusError> {
 mod tests {
     use super::Node;
     use crate::control::Control;
-    use crate::messages::MotorCommand;
+    use crate::messages::{MotorCommand, PlantState};
     use crate::plan::{InputPlan, NodePlan, OutputPlan, Pace, Plan, TopicPlan, Wait};
     use crate::tick::Tick;
     use crate::{BusError, Message};
@@ -459,6 +518,38 @@ mod tests {
             if entry.file_name().to_string_lossy().starts_with(&prefix) {
                 std::fs::remove_file(entry.path()).unwrap();
             }
+        }
+    }
+
+    #[test]
+    fn a_port_that_is_declared_twice_is_refused_with_both_types_and_never_takes_the_last() {
+        let folder = tempfile::tempdir().unwrap();
+        source_and_sink().store(folder.path()).unwrap();
+        let open = |name| Node::open(folder.path().to_owned(), name, 0).unwrap();
+
+        let mut source = open("source");
+        source.output::<MotorCommand>("command").unwrap();
+        let words = source.optional_output::<MotorCommand>("command").unwrap_err().to_string();
+        assert!(words.contains("node `source` declares its output `command` twice"), "{words}");
+
+        let mut sink = open("sink");
+        sink.input::<MotorCommand>("command").unwrap();
+        let words = sink.input::<PlantState>("command").unwrap_err().to_string();
+        let both = "as hummingbus_msgs/msg/MotorCommand and as hummingbus_msgs/msg/PlantState";
+        assert!(words.contains("declares its input `command` twice") && words.contains(both), "{words}");
+
+        // Where the declaration returns no error, connecting does.
+        let late: [fn(&mut Node); 3] = [
+            |node| assert!(node.optional_input::<PlantState>("command").is_none()),
+            |node| drop(node.every_input::<PlantState>()),
+            |node| drop(node.raw_inputs()),
+        ];
+        for declare in late {
+            let mut sink = open("sink");
+            sink.input::<MotorCommand>("command").unwrap();
+            declare(&mut sink);
+            let words = sink.connect().unwrap_err().to_string();
+            assert!(words.contains("declares its input `command` twice"), "{words}");
         }
     }
 

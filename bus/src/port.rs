@@ -2,7 +2,8 @@
 
 use crate::control::Edge;
 use crate::error::BusError;
-use crate::message::cdr_bytes;
+use crate::finite::{Floats, field_at};
+use crate::message::{cdr_bytes, message_bytes};
 use crate::messages::Time;
 use crate::plan::{InputPlan, OutputPlan, TopicPlan};
 use crate::schema::Schema;
@@ -256,6 +257,9 @@ pub(crate) struct OutPort {
     is_written: bool,
     sender: Sender,
     port: String,
+    topic_name: String,
+    schema: &'static Schema,
+    floats: Floats,
     stamp_offset: Option<usize>,
     pub(crate) topic: usize,
     pub(crate) period_ticks: u32,
@@ -269,12 +273,20 @@ pub(crate) struct OutPort {
 }
 
 impl OutPort {
-    pub(crate) fn new(output: &OutputPlan, topic: &TopicPlan, schema: &Schema, sender: Sender) -> Self {
+    pub(crate) fn new(
+        output: &OutputPlan,
+        topic: &TopicPlan,
+        schema: &'static Schema,
+        sender: Sender,
+    ) -> Self {
         Self {
             loan: None,
             is_written: false,
             sender,
             port: output.port.clone(),
+            topic_name: topic.name.clone(),
+            schema,
+            floats: Floats::of(schema),
             stamp_offset: schema.stamp_offset(),
             topic: output.topic,
             period_ticks: topic.period_ticks,
@@ -336,12 +348,27 @@ impl OutPort {
             return Err(BusError::UnwrittenOutput { node: node.to_owned(), port: self.port.clone(), tick });
         };
         self.is_written = false;
+        if let Some(found) = self.floats.first_not_finite(message_bytes(loan.words(), self.schema.size)) {
+            return Err(self.not_finite(found, tick, time_ns, node));
+        }
         if let Some(offset) = self.stamp_offset {
             stamp(loan.words(), offset, time_ns);
         }
         let sequence = u64::from(tick / self.period_ticks);
         let header = SampleHeader { tick: u64::from(tick), sequence, received_ns, done_ns, sent_ns };
         loan.send(header).map_err(|reason| self.error("sending", node, reason))
+    }
+
+    fn not_finite(&self, (offset, value): (usize, f64), tick: u32, time_ns: u64, node: &str) -> BusError {
+        BusError::NotFinite {
+            node: node.to_owned(),
+            port: self.port.clone(),
+            topic: self.topic_name.clone(),
+            field: field_at(self.schema, offset),
+            value,
+            tick,
+            time_s: time_ns as f64 * 1e-9,
+        }
     }
 
     fn error(&self, action: &str, node: &str, reason: String) -> BusError {

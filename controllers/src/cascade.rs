@@ -3,6 +3,7 @@
 use crate::cascade_gains::CascadeGains;
 use crate::cascade_law::CascadeLaw;
 use crate::controller::{self, Airframe};
+use crate::rehearsal;
 use bus::kind::{Inputs, NodeKind, PortSpec, read_parameters};
 use bus::messages::{AttitudeEstimate, ControlStatus, MotorCommand, SetPoint, StateEstimate};
 use bus::{BusError, Message, Node};
@@ -22,7 +23,10 @@ pub const KIND: NodeKind = NodeKind {
         PortSpec::required("command", MotorCommand::SCHEMA),
         PortSpec::optional("status", ControlStatus::SCHEMA),
     ],
-    check: |parameters, _| build(&read_parameters(parameters)?, 1.0).map(|_| ()),
+    check: |parameters, run| {
+        let (law, airframe) = build(&read_parameters(parameters)?, run.period_s())?;
+        rehearsal::check(&law, &airframe, run)
+    },
     run,
 };
 

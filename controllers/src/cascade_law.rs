@@ -33,6 +33,10 @@ pub struct CascadeLaw {
 impl Controller for CascadeLaw {
     const LAW: u32 = 2;
 
+    fn rate_gain_1_s(&self) -> f64 {
+        self.gains.rate.iter().fold(0.0, |most, axis| axis.proportional_1_s.max(most))
+    }
+
     fn step(&self, memory: &mut ControllerState, told: &Told<'_>) -> Demand {
         self.demand(memory, &told.set_point, &Measurement::from(told))
     }

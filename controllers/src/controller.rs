@@ -132,6 +132,12 @@ pub trait Controller {
     /// Number of the law in a [`ControllerState`], one for each law.
     const LAW: u32;
 
+    /// The greatest angular acceleration that it asks for against a body rate, 1/s: with the period it tells whether
+    /// the loop can be closed at all. 0 where the law is made for its period.
+    fn rate_gain_1_s(&self) -> f64 {
+        0.0
+    }
+
     /// The demand now; advances the memory by one period. Touches neither `law` nor what was demanded.
     fn step(&self, memory: &mut ControllerState, told: &Told<'_>) -> Demand;
 
@@ -330,11 +336,16 @@ pub fn run<C: Controller>(
     node.run_with_state(ControllerState::default(), |tick, memory| {
         let told = inputs.told(tick);
         let demand = flown.advance(memory, &told, last_wrench(tick, command, allocation, vehicle));
+        if let Some(what) = demand.not_finite() {
+            // The allocation and the command map would make a command of it all the same.
+            return Err(format!("the law asks for {what}: its output `command` is not sent"));
+        }
         let allocated = allocation.allocate(&demand.wrench);
         let counts = allocated.speeds_rad_s.map(|speed| vehicle.command.command(speed));
         let report = report(&demand, &allocated, memory);
-        tick.write(command, MotorCommand { command: counts, ..Default::default() })?;
-        status.map_or(Ok(()), |status| tick.write(status, report))
+        tick.write(command, MotorCommand { command: counts, ..Default::default() })
+            .and_then(|()| status.map_or(Ok(()), |status| tick.write(status, report)))
+            .map_err(|error| error.to_string())
     })
 }
 

@@ -163,6 +163,26 @@ impl Course {
         self.segments.last().map_or(0.0, |segment| segment.start_s + segment.duration_s)
     }
 
+    /// When each segment begins, s.
+    pub fn starts_s(&self) -> impl Iterator<Item = f64> {
+        self.segments.iter().map(|segment| segment.start_s)
+    }
+
+    /// Refuses a course that no vehicle flies: each segment is looked at in [`LOOKS`] places.
+    ///
+    /// # Errors
+    /// Which segment asks for how much, and where.
+    pub fn require_flyable(&self) -> Result<(), String> {
+        self.segments.iter().enumerate().try_for_each(|(index, segment)| {
+            let times = (0..=LOOKS).map(|look| segment.duration_s * f64::from(look) / f64::from(LOOKS));
+            times.map(|own_s| segment.at(segment.start_s + own_s)).try_for_each(|point| {
+                point.require_flyable().map_err(|reason| {
+                    format!("`segments`, entry {index} (the first is 0): it asks for {reason}")
+                })
+            })
+        })
+    }
+
     /// The point at `time_s`, a function of the time alone.
     #[must_use]
     pub fn at(&self, time_s: f64) -> Point {
@@ -183,6 +203,40 @@ fn at_rest(position_W_m: Vector3<f64>) -> Path {
     path[0] = position_W_m;
     path
 }
+
+/// In how many places of a segment a course is looked at before a run.
+const LOOKS: u32 = 200;
+
+/// What a reference may ask for at most, with its unit and why. Tuned, no source, a decade above what any vehicle does:
+/// a racing quadrotor reaches 100 m/s and 15 g; shock tests of electronics begin at 100 g.
+const ASKED_MAX: [(f64, &str); 3] = [
+    (1e6, "m from the world's origin; beyond 1000 km nanometres are lost in a double"),
+    (1e3, "m/s; no vehicle with rotors flies near the speed of sound"),
+    (1e3, "m/s^2; no vehicle that flies stands 100 g"),
+];
+
+impl Point {
+    fn require_flyable(&self) -> Result<(), String> {
+        for (asked, (most, unit)) in self.path_W.iter().zip(ASKED_MAX) {
+            let length = asked.norm();
+            if length.is_nan() || length > most {
+                return Err(format!("{length:.4e} where at most {most:e} {unit}"));
+            }
+        }
+        let rate_rad_s = self.yaw_rate_rad_s;
+        let holds = self.path_W.iter().all(|asked| asked.iter().all(|number| number.is_finite()));
+        if holds && rate_rad_s.abs() <= YAW_RATE_MAX_RAD_S {
+            return Ok(());
+        }
+        Err(format!(
+            "a yaw rate of {rate_rad_s:.4e} rad/s, or derivatives that are no numbers; expected at most \
+             {YAW_RATE_MAX_RAD_S} rad/s"
+        ))
+    }
+}
+
+/// Faster than any vehicle turns about its vertical axis: 16 turns a second. Tuned, no source.
+const YAW_RATE_MAX_RAD_S: f64 = 100.0;
 
 impl Segment {
     fn at(&self, time_s: f64) -> Point {

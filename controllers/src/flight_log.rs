@@ -113,7 +113,7 @@ pub enum FlightLogError {
         expected: String,
     },
     /// A cell is not a number.
-    #[error("the flight {path}, line {line}, column `{column}`: {found:?} is not a finite number")]
+    #[error("the flight {path}, line {line}, column `{column}`: {found:?} is not {expected}")]
     Cell {
         /// The file.
         path: PathBuf,
@@ -123,6 +123,8 @@ pub enum FlightLogError {
         column: String,
         /// What stands there.
         found: String,
+        /// What may stand there.
+        expected: &'static str,
     },
     /// Time does not grow, or there is too little of it.
     #[error("the flight {path}: {reason}")]
@@ -268,18 +270,35 @@ impl<const N: usize> Pick<N> {
         for (value, &index) in values.iter_mut().zip(&self.indices) {
             let text = record.get(index).unwrap_or_default();
             *value = match text.parse::<f64>() {
-                Ok(number) if number.is_finite() => number * self.factor,
-                _ => {
-                    return Err(FlightLogError::Cell {
-                        path: source.path.into(),
-                        line: record.position().map_or(0, csv::Position::line),
-                        column: source.headers.get(index).unwrap_or_default().to_owned(),
-                        found: text.to_owned(),
-                    });
+                Ok(number) if !number.is_finite() => {
+                    return Err(source.cell(record, index, "a finite number"));
                 }
+                Ok(number) if (number * self.factor).abs() <= CELL_MAX => number * self.factor,
+                Ok(_) => {
+                    return Err(source.cell(record, index, "at most 1e12 in SI, which no flight exceeds"));
+                }
+                Err(_) => return Err(source.cell(record, index, "a finite number")),
             };
         }
         Ok(values)
+    }
+}
+
+/// No flight has more of anything, in SI: seconds since 1970 are 2e9, counts go to 4.3e9.
+const CELL_MAX: f64 = 1e12;
+
+/// A quaternion this short has no direction left; logs write 1, or 0 where there is none.
+const NORM_MIN: f64 = 1e-3;
+
+impl Source<'_> {
+    fn cell(&self, record: &csv::StringRecord, index: usize, expected: &'static str) -> FlightLogError {
+        FlightLogError::Cell {
+            path: self.path.into(),
+            line: record.position().map_or(0, csv::Position::line),
+            column: self.headers.get(index).unwrap_or_default().to_owned(),
+            found: record.get(index).unwrap_or_default().to_owned(),
+            expected,
+        }
     }
 }
 
@@ -317,12 +336,17 @@ impl Picks {
 
     fn row(&self, source: &Source<'_>, record: &csv::StringRecord) -> Result<Row, FlightLogError> {
         let [time_s] = self.time.values(source, record)?;
+        let attitude = self.attitude.values(source, record)?;
+        if attitude.iter().map(|x| x * x).sum::<f64>() < NORM_MIN * NORM_MIN {
+            let expected = "part of an attitude: the quaternion is 0";
+            return Err(source.cell(record, self.attitude.indices[3], expected));
+        }
         Ok(Row {
             time_s,
             command: self.command.values(source, record)?,
             position_m: self.position.values(source, record)?,
             velocity_m_s: self.velocity.values(source, record)?,
-            attitude: self.attitude.values(source, record)?,
+            attitude,
             angular_velocity_rad_s: self.angular_velocity.values(source, record)?,
         })
     }

@@ -5,7 +5,7 @@
 
 use std::path::Path;
 use vehicles::VehicleError;
-use vehicles::reader::{Document, Section};
+use vehicles::reader::{Bounds, Document, Section};
 use vehicles::units::Dimension;
 
 /// What makes gains of a file's root table.
@@ -36,14 +36,32 @@ pub fn parse<G>(text: &str, file_name: &str, read: Reader<G>) -> Result<G, Vehic
     Ok(gains)
 }
 
+/// The most that a gain is, in its unit: a loop that is closed once a tick of 1 µs, the shortest, holds an angle with
+/// less than 4/T², a rate with less than 2/T, and is far from either with every motor.
+pub(crate) const GAIN: Bounds = Bounds {
+    least: 0.0,
+    most: 1e9,
+    unit: "in SI",
+    why: "a negative gain turns a loop against itself, and no run has ticks short enough for a larger one",
+};
+
+/// A limit, a weight's deviation or a time, in its unit: none that is of use to a vehicle is so small or so large.
+const LIMIT: Bounds = Bounds {
+    least: 1e-6,
+    most: 1e6,
+    unit: "in SI",
+    why: "a limit, a deviation or a time is above 0: less than a millionth of any unit lets nothing through, and a \
+          million is none",
+};
+
 /// A gain: zero or more, since a negative one turns a loop against itself.
 pub(crate) fn gain(section: &Section, name: &'static str, of: Dimension) -> Result<f64, VehicleError> {
-    Ok(section.chosen(name, of)?.not_negative(section.doc)?.si)
+    Ok(section.chosen(name, of)?.not_negative(section.doc)?.within(section.doc, &GAIN)?.si)
 }
 
 /// A limit or a time: more than zero.
 pub(crate) fn limit(section: &Section, name: &'static str, of: Dimension) -> Result<f64, VehicleError> {
-    Ok(section.chosen(name, of)?.positive(section.doc)?.si)
+    Ok(section.chosen(name, of)?.positive(section.doc)?.within(section.doc, &LIMIT)?.si)
 }
 
 /// A limit that is more than zero and less than `bound`, which `expected` describes.
@@ -55,7 +73,7 @@ pub(crate) fn limit_below(
     expected: &str,
 ) -> Result<f64, VehicleError> {
     let chosen = section.chosen(name, of)?;
-    let holds = 0.0 < chosen.si && chosen.si < bound;
+    let holds = LIMIT.least <= chosen.si && chosen.si < bound;
     Ok(chosen.require(section.doc, holds, expected)?.si)
 }
 

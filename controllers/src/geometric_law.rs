@@ -161,6 +161,10 @@ impl GeometricLaw {
 impl Controller for GeometricLaw {
     const LAW: u32 = 7;
 
+    fn rate_gain_1_s(&self) -> f64 {
+        self.gains.attitude_derivative_1_s.max(self.gains.yaw_derivative_1_s)
+    }
+
     fn step(&self, memory: &mut ControllerState, told: &Told<'_>) -> Demand {
         let made = Made::foreseen(&self.lag, &self.allocation, memory);
         made.store(memory);

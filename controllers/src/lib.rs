@@ -11,6 +11,7 @@
 //!   the walls must be although other vehicles stand in the beams.
 //! - [`allocation`]: from a wrench to the speeds of four rotors.
 //! - [`controller`]: what all controllers share, and the node that runs any of them.
+//! - [`rehearsal`]: a law tried before a run, so that `check` finds numbers that do not go together.
 //! - [`curve`], [`minimum_snap`], [`course`]: trajectories, with their derivatives.
 //! - [`flatness`]: the attitude and rates that a trajectory needs.
 //! - [`motor_lag`]: what the rotors make of a demand, foreseen, and a demand that hurries them.
@@ -53,6 +54,7 @@ pub mod pid_gains;
 pub mod pid_law;
 pub mod pilot;
 pub mod player;
+pub mod rehearsal;
 pub mod riccati;
 pub mod room;
 pub mod set_points;

@@ -4,6 +4,7 @@ use crate::allocation::Wrench;
 use crate::controller::{self, Airframe, Controller, ControllerState, Demand, Told};
 use crate::pid_gains::GivenGains;
 use crate::pid_law::{Measurement, PidLaw};
+use crate::rehearsal;
 use bus::kind::{Inputs, NodeKind, PortSpec, read_parameters};
 use bus::messages::{AttitudeEstimate, ControlStatus, MotorCommand, SetPoint, StateEstimate};
 use bus::{BusError, Message, Node};
@@ -23,7 +24,10 @@ pub const KIND: NodeKind = NodeKind {
         PortSpec::required("command", MotorCommand::SCHEMA),
         PortSpec::optional("status", ControlStatus::SCHEMA),
     ],
-    check: |parameters, _| build(&read_parameters(parameters)?, 1.0).map(|_| ()),
+    check: |parameters, run| {
+        let (law, airframe) = build(&read_parameters(parameters)?, run.period_s())?;
+        rehearsal::check(&law, &airframe, run)
+    },
     run,
 };
 
@@ -52,6 +56,11 @@ fn run() -> Result<(), BusError> {
 
 impl Controller for PidLaw {
     const LAW: u32 = 1;
+
+    fn rate_gain_1_s(&self) -> f64 {
+        let Self { gains, .. } = self;
+        [gains.roll, gains.pitch, gains.yaw].iter().fold(0.0, |most, axis| axis.derivative_1_s.max(most))
+    }
 
     fn step(&self, memory: &mut ControllerState, told: &Told<'_>) -> Demand {
         let wrench = PidLaw::step(self, &mut memory.integrals, &told.set_point, &Measurement::from(told));

@@ -173,11 +173,12 @@ impl PidGains {
 }
 
 fn not_negative(table: &str, key: &str, value: f64) -> Result<(), String> {
-    if value.is_finite() && value >= 0.0 {
+    if crate::gains_file::GAIN.contains(value) {
         return Ok(());
     }
     let dot = if table.is_empty() { "" } else { "." };
-    Err(format!("`gains`: `{table}{dot}{key}` must be a finite number of 0 or above, found {value}"))
+    let most = crate::gains_file::GAIN.most;
+    Err(format!("`gains`: `{table}{dot}{key}` must be a number from 0 to {most:e}, found {value}"))
 }
 
 /// The gains as a manifest gives them: a table of parameters, or a gains file.

@@ -1,8 +1,8 @@
 //! The pilot node: publishes the set points of a schedule, or of a recording of sticks.
 
-use crate::set_points::{Schedule, SetPoint as Values, SetPointEntry};
+use crate::set_points::{ALTITUDES_IN_WORDS, ALTITUDES_M, Schedule, SetPoint as Values, SetPointEntry};
 use crate::sticks::Sticks;
-use bus::kind::{Inputs, NodeKind, PortSpec, read_parameters};
+use bus::kind::{Inputs, NodeKind, PortSpec, RunContext, read_parameters};
 use bus::messages::SetPoint;
 use bus::{BusError, Message, Node};
 use serde::Deserialize;
@@ -14,7 +14,12 @@ pub const KIND: NodeKind = NodeKind {
     summary: "set points from the manifest: steps, ramps and doublets; or from a recording of sticks",
     inputs: Inputs::Ports(&[]),
     outputs: &[PortSpec::required("set_point", SetPoint::SCHEMA)],
-    check: |parameters, _| Pilot::new(&read_parameters(parameters)?, 1000).map(|_| ()),
+    check: |parameters, run| {
+        let parameters: Parameters = read_parameters(parameters)?;
+        Pilot::new(&parameters, run.rate_hz())?;
+        warn_of_late(&parameters.set_points, run);
+        Ok(())
+    },
     run,
 };
 
@@ -31,6 +36,18 @@ struct Parameters {
     data: Option<PathBuf>,
 }
 
+/// Warns of set points that the run ends before.
+fn warn_of_late(entries: &[SetPointEntry], run: &RunContext<'_>) {
+    let end_s = run.duration_s();
+    for (index, entry) in entries.iter().enumerate().filter(|(_, entry)| entry.at_s >= end_s) {
+        run.warn_behind_end(format!(
+            "`set_points`: set point {index} (the first is 0): `at_s` is {} s, and the run ends at {end_s} s: it never \
+             acts",
+            entry.at_s
+        ));
+    }
+}
+
 /// What the pilot asks for over time.
 #[derive(Debug)]
 struct Pilot {
@@ -40,6 +57,10 @@ struct Pilot {
 
 impl Pilot {
     fn new(parameters: &Parameters, rate_hz: u32) -> Result<Self, String> {
+        let altitude_m = parameters.initial_altitude_m;
+        if !ALTITUDES_M.contains(&altitude_m) {
+            return Err(format!("`initial_altitude_m` is {altitude_m} m, expected {ALTITUDES_IN_WORDS}"));
+        }
         let initial = Values { altitude_m: parameters.initial_altitude_m, ..Values::default() };
         let schedule = Schedule::new(&parameters.set_points, &initial, rate_hz)
             .map_err(|error| format!("`set_points`: {error}"))?;
@@ -96,6 +117,29 @@ mod tests {
         let pilot = pilot(&format!("set_points = [{climb}]")).unwrap();
         assert_eq!((pilot.at(0, 0.0).altitude_m, pilot.at(3000, 3.0).altitude_m), (1.5, 2.0));
         assert!((0..30).any(|at_s| pilot.at(0, f64::from(at_s)).roll_rad != 0.0));
+    }
+
+    #[test]
+    fn a_set_point_behind_the_end_of_the_run_is_told_and_one_before_is_not() {
+        let step = |at_s: f64| serde_json::json!({"kind": "step", "channel": "altitude", "at_s": at_s, "to": 2.0, "unit": "m"});
+        let parameters = serde_json::json!({"initial_altitude_m": 1.0, "set_points": [step(0.5), step(1.0)]});
+        let run = RunContext::new(&[], 1_000_000, 1, 1000);
+        assert_eq!((KIND.check)(&parameters, &run), Ok(()));
+        let warnings = run.into_warnings();
+        assert!(warnings.len() == 1 && warnings[0].words.contains("set point 1"), "{warnings:?}");
+    }
+
+    #[test]
+    fn an_altitude_that_no_rotorcraft_reaches_is_refused_with_the_range() {
+        let step =
+            serde_json::json!({"kind": "step", "channel": "altitude", "at_s": 0.5, "to": 1e5, "unit": "m"});
+        for parameters in [
+            serde_json::json!({"initial_altitude_m": -100_000.0}),
+            serde_json::json!({"initial_altitude_m": 1.0, "set_points": [step]}),
+        ] {
+            let words = (KIND.check)(&parameters, &RunContext::of_ports(&[])).unwrap_err();
+            assert!(words.contains("-20 000 m to 20 000 m") && words.contains("00000 m"), "{words}");
+        }
     }
 
     #[test]

@@ -1,7 +1,7 @@
 //! The player node: publishes the motor commands and the measured states of a real flight.
 
 use crate::flight_log::{ColumnMap, FlightLog, Row};
-use bus::kind::{Inputs, NodeKind, PortSpec, read_parameters};
+use bus::kind::{Inputs, NodeKind, PortSpec, RunContext, read_parameters};
 use bus::messages::{MeasuredState, MotorCommand};
 use bus::{BusError, Message, Node};
 use serde::Deserialize;
@@ -16,7 +16,10 @@ pub const KIND: NodeKind = NodeKind {
         PortSpec::required("command", MotorCommand::SCHEMA),
         PortSpec::required("measured", MeasuredState::SCHEMA),
     ],
-    check: |parameters, _| load(&read_parameters(parameters)?).map(|_| ()),
+    check: |parameters, run| {
+        let parameters = read_parameters(parameters)?;
+        require_length(&load(&parameters)?, parameters.from_s, run)
+    },
     run,
 };
 
@@ -43,6 +46,22 @@ fn load(parameters: &Parameters) -> Result<FlightLog, String> {
     }
 }
 
+/// Times are sums of decimal fractions: a nanosecond of slack, as for the rows.
+const SLACK_S: f64 = 1e-9;
+
+/// Refuses a run that goes on behind the end of the flight.
+fn require_length(log: &FlightLog, from_s: f64, run: &RunContext<'_>) -> Result<(), String> {
+    let last_tick = (run.duration_ticks.max(1) - 1) / run.period_ticks * run.period_ticks;
+    let (last_s, left_s) = (f64::from(last_tick) * run.tick_s(), log.duration_s() - from_s);
+    if last_s <= left_s + SLACK_S {
+        return Ok(());
+    }
+    Err(format!(
+        "the flight ends {left_s:.3} s after `from_s`, and the run's last tick lies at {last_s:.3} s; shorten \
+         run.duration_s"
+    ))
+}
+
 fn run() -> Result<(), BusError> {
     let mut node = Node::join()?;
     let command = node.output::<MotorCommand>("command")?;
@@ -52,8 +71,7 @@ fn run() -> Result<(), BusError> {
     let mut hint = 0;
     node.run(|tick| {
         let time_s = parameters.from_s + tick.time_s();
-        // Times are sums of decimal fractions: a nanosecond of slack, as for the rows.
-        if time_s > log.duration_s() + 1e-9 {
+        if time_s > log.duration_s() + SLACK_S {
             return Err(format!(
                 "the flight ends {:.3} s after `from_s`; shorten run.duration_s",
                 log.duration_s() - parameters.from_s

@@ -7,6 +7,7 @@
 //! Hummingbird to 8° only: behind its motors' lag 9° take about 0.57 s (gains 16 and 6, linearised).
 
 use serde::Deserialize;
+use std::ops::RangeInclusive;
 
 /// What the controllers are asked to hold.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -92,6 +93,14 @@ struct Doublet {
     pulse_ticks: u64,
     amplitude: f64,
 }
+
+/// Heights in the world that a set point may ask for, m: the record of all rotorcraft is 12 442 m (SA 315B Lama, FAI,
+/// 1972), and the world's origin may lie as far above.
+pub const ALTITUDES_M: RangeInclusive<f64> = -20_000.0..=20_000.0;
+/// The same for people.
+pub const ALTITUDES_IN_WORDS: &str = "-20 000 m to 20 000 m: no rotorcraft has flown above 12 442 m";
+/// Angles that a set point may ask for, rad: a hundred turns of yaw.
+const ANGLES_RAD: RangeInclusive<f64> = -628.4..=628.4;
 
 /// The channels in the order of [`Schedule::channels`].
 const CHANNELS: [&str; 4] = ["altitude", "roll", "pitch", "yaw"];
@@ -194,14 +203,14 @@ impl Reader<'_> {
         self.refuse("over_s", self.entry.over_s)?;
         self.refuse("amplitude", self.entry.amplitude)?;
         self.refuse("duration_s", self.entry.duration_s)?;
-        let to = si_per_unit * self.number("to", self.entry.to)?;
+        let to = self.value("to", self.entry.to, si_per_unit)?;
         Ok(Leg { start_tick: self.start_tick()?, length_ticks: 0, from: to, to })
     }
 
     fn ramp(&self, si_per_unit: f64) -> Result<Leg, SetPointError> {
         self.refuse("amplitude", self.entry.amplitude)?;
         self.refuse("duration_s", self.entry.duration_s)?;
-        let to = si_per_unit * self.number("to", self.entry.to)?;
+        let to = self.value("to", self.entry.to, si_per_unit)?;
         let length_ticks = self.length_ticks("over_s", self.entry.over_s)?;
         Ok(Leg { start_tick: self.start_tick()?, length_ticks, from: to, to })
     }
@@ -209,7 +218,7 @@ impl Reader<'_> {
     fn doublet(&self, si_per_unit: f64) -> Result<Doublet, SetPointError> {
         self.refuse("to", self.entry.to)?;
         self.refuse("over_s", self.entry.over_s)?;
-        let amplitude = si_per_unit * self.number("amplitude", self.entry.amplitude)?;
+        let amplitude = self.value("amplitude", self.entry.amplitude, si_per_unit)?;
         let pulse_ticks = self.length_ticks("duration_s", self.entry.duration_s)?;
         Ok(Doublet { start_tick: self.start_tick()?, pulse_ticks, amplitude })
     }
@@ -230,6 +239,19 @@ impl Reader<'_> {
             (name, other) => {
                 Err(self.error("unit", &format!("\"rad\" or \"deg\" on channel {name}"), quoted(other)))
             }
+        }
+    }
+
+    /// A value of the channel in SI, within what a vehicle can be asked for.
+    fn value(&self, key: &'static str, value: Option<f64>, si_per_unit: f64) -> Result<f64, SetPointError> {
+        let value = self.number(key, value)?;
+        let (range, expected) = match self.entry.channel.as_str() {
+            "altitude" => (ALTITUDES_M, ALTITUDES_IN_WORDS),
+            _ => (ANGLES_RAD, "an angle of at most a hundred turns"),
+        };
+        match si_per_unit * value {
+            si if range.contains(&si) => Ok(si),
+            _ => Err(self.error(key, expected, format!("{value} {}", self.entry.unit))),
         }
     }
 

@@ -89,6 +89,14 @@ pub enum SticksError {
 }
 
 const COLUMNS: [&str; 5] = ["time_s", "roll_deg", "pitch_deg", "yaw_rate_deg_s", "altitude_m"];
+/// The most that each may hold, in its unit, and why; as the set points of a manifest.
+const MOST: [(f64, &str); 5] = [
+    (1e10, "at most 1e10 s: seconds since 1970 are 2e9"),
+    (180.0, "an angle of at most 180 deg"),
+    (180.0, "an angle of at most 180 deg"),
+    (6000.0, "a rate of at most 6000 deg/s: no vehicle turns faster about its vertical"),
+    (20_000.0, "at most 20 000 m: no rotorcraft has flown above 12 442 m"),
+];
 const EXPECTED: &str = "time_s, roll_deg, pitch_deg and, if recorded, yaw_rate_deg_s, altitude_m";
 
 impl Sticks {
@@ -212,7 +220,12 @@ impl Places {
         let Some(place) = self.0[column] else { return Ok(0.0) };
         let text = record.get(place).unwrap_or_default();
         let number = text.parse().ok().filter(|number: &f64| number.is_finite());
-        number.ok_or_else(|| value_error(record, file, column, "a finite number", format!("\"{text}\"")))
+        let (most, expected) = MOST[column];
+        let refused = |expected| value_error(record, file, column, expected, format!("\"{text}\""));
+        match number.ok_or_else(|| refused("a finite number"))? {
+            number if number.abs() <= most => Ok(number),
+            _ => Err(refused(expected)),
+        }
     }
 }
 
@@ -270,6 +283,7 @@ mod tests {
             (format!("{header}0,1,2\n0,1,2\n"), "s.csv:3: column `time_s`: expected a time after"),
             (format!("{header}0,x,2\n"), "s.csv:2: column `roll_deg`: expected a finite number, found \"x\""),
             (format!("{header}0,1,nan\n"), "column `pitch_deg`"),
+            (format!("{header}0,1e308,2\n"), "s.csv:2: column `roll_deg`: expected an angle of at most 180"),
             ("time_s,roll_deg\n".to_owned(), "expected the columns time_s, roll_deg, pitch_deg"),
             (
                 "time_s,roll_deg,pitch_deg,throttle\n".to_owned(),

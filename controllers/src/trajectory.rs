@@ -2,7 +2,7 @@
 #![allow(non_snake_case, reason = "a trailing _W names the frame a vector is written in")]
 
 use crate::course::{Course, Point, Start};
-use bus::kind::{Inputs, NodeKind, PortSpec, read_parameters};
+use bus::kind::{Inputs, NodeKind, PortSpec, RunContext, read_parameters};
 use bus::messages::{Reference, Vector3};
 use bus::{BusError, Message, Node};
 use serde::Deserialize;
@@ -13,7 +13,12 @@ pub const KIND: NodeKind = NodeKind {
     summary: "references from the manifest: hover, circle, figure eight, minimum snap through waypoints",
     inputs: Inputs::Ports(&[]),
     outputs: &[PortSpec::required("reference", Reference::SCHEMA)],
-    check: |parameters, _| course(&read_parameters(parameters)?).map(|_| ()),
+    check: |parameters, run| {
+        let course = course(&read_parameters(parameters)?)?;
+        course.require_flyable()?;
+        warn_of_late(&course, run);
+        Ok(())
+    },
     run,
 };
 
@@ -37,6 +42,17 @@ fn course(parameters: &Parameters) -> Result<Course, String> {
         &parameters.segments,
         Start { position_W_m, yaw_rad: parameters.initial_yaw_deg.to_radians() },
     )
+}
+
+/// Warns of segments that the run ends before.
+fn warn_of_late(course: &Course, run: &RunContext<'_>) {
+    let end_s = run.duration_s();
+    if let Some((index, start_s)) = course.starts_s().enumerate().find(|(_, start_s)| *start_s >= end_s) {
+        run.warn_behind_end(format!(
+            "`segments`: entry {index} (the first is 0) begins at {start_s:.3} s, and the run ends at {end_s} s: it and \
+             what follows is never flown"
+        ));
+    }
 }
 
 fn run() -> Result<(), BusError> {

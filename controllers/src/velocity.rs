@@ -1,6 +1,7 @@
 //! The velocity controller node: a velocity command to four motor commands.
 
 use crate::controller::{self, Airframe};
+use crate::rehearsal;
 use crate::velocity_law::{Course, LoopsGains, VelocityLaw, VelocityLoop};
 use bus::kind::{Inputs, NodeKind, PortSpec, read_parameters};
 use bus::messages::{AttitudeEstimate, ControlStatus, MotorCommand, Reference, StateEstimate};
@@ -21,10 +22,11 @@ pub const KIND: NodeKind = NodeKind {
         PortSpec::required("command", MotorCommand::SCHEMA),
         PortSpec::optional("status", ControlStatus::SCHEMA),
     ],
-    check: |parameters, inputs| {
+    check: |parameters, run| {
         let parameters: Parameters = read_parameters(parameters)?;
-        parameters.check(inputs.contains(&"reference"))?;
-        build(&parameters, 1.0).map(|_| ())
+        parameters.check(run.has("reference"))?;
+        let (law, airframe) = build(&parameters, run.period_s())?;
+        rehearsal::check(&law, &airframe, run)
     },
     run,
 };

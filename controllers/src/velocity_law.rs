@@ -228,6 +228,10 @@ impl VelocityLaw {
 impl Controller for VelocityLaw {
     const LAW: u32 = 3;
 
+    fn rate_gain_1_s(&self) -> f64 {
+        self.velocity.cascade.rate_gain_1_s()
+    }
+
     fn step(&self, memory: &mut ControllerState, told: &Told<'_>) -> Demand {
         let measured = Measurement::from(told);
         let mut course = self.course(told, &measured);

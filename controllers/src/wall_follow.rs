@@ -1,6 +1,7 @@
 //! The wall-follow controller node: laps along the walls of a room.
 
 use crate::controller::{self, Airframe, finite, positive, positive_up_to};
+use crate::rehearsal;
 use crate::room::Room;
 use crate::velocity_law::VelocityLoop;
 use crate::wall_follow_law::{Mode, Shared, WallFollowGains, WallFollowLaw};
@@ -22,7 +23,10 @@ pub const KIND: NodeKind = NodeKind {
         PortSpec::required("command", MotorCommand::SCHEMA),
         PortSpec::optional("status", ControlStatus::SCHEMA),
     ],
-    check: |parameters, _| build(&read_parameters(parameters)?, 1.0).map(|_| ()),
+    check: |parameters, run| {
+        let (law, airframe) = build(&read_parameters(parameters)?, run.period_s())?;
+        rehearsal::check(&law, &airframe, run)
+    },
     run,
 };
 

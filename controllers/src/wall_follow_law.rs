@@ -172,6 +172,10 @@ impl Leg {
 impl Controller for WallFollowLaw {
     const LAW: u32 = 5;
 
+    fn rate_gain_1_s(&self) -> f64 {
+        self.velocity.cascade.rate_gain_1_s()
+    }
+
     fn step(&self, memory: &mut ControllerState, told: &Told<'_>) -> Demand {
         let distances_m = self.wall_distances_m(memory, told.walls);
         self.enter_state(memory, told.time_ns, &distances_m);

@@ -1,6 +1,7 @@
 //! The wall-stop controller node: flies along the heading and stops before the wall ahead.
 
 use crate::controller::{self, Airframe, finite, positive, positive_up_to};
+use crate::rehearsal;
 use crate::velocity_law::VelocityLoop;
 use crate::wall_stop_law::{WallStopGains, WallStopLaw};
 use bus::kind::{Inputs, NodeKind, PortSpec, read_parameters};
@@ -21,7 +22,10 @@ pub const KIND: NodeKind = NodeKind {
         PortSpec::required("command", MotorCommand::SCHEMA),
         PortSpec::optional("status", ControlStatus::SCHEMA),
     ],
-    check: |parameters, _| build(&read_parameters(parameters)?, 1.0).map(|_| ()),
+    check: |parameters, run| {
+        let (law, airframe) = build(&read_parameters(parameters)?, run.period_s())?;
+        rehearsal::check(&law, &airframe, run)
+    },
     run,
 };
 

@@ -106,6 +106,10 @@ pub struct WallStopLaw {
 impl Controller for WallStopLaw {
     const LAW: u32 = 4;
 
+    fn rate_gain_1_s(&self) -> f64 {
+        self.velocity.cascade.rate_gain_1_s()
+    }
+
     fn step(&self, memory: &mut ControllerState, told: &Told<'_>) -> Demand {
         let measured = by_ranges(told);
         let to_go_m = told.walls.distance[0] - self.distance_m;

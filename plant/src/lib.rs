@@ -15,6 +15,7 @@
 //! | [`rapier`] | the backend `rapier`: ground, walls, other vehicles, rigs |
 //! | [`snapshot`] | a backend's state as bytes |
 //! | [`node`] | the plant as a process of a run |
+//! | `airworthy` | what a vehicle must be to fly at all |
 //! | `parameters` | what manifests say of a plant, and the backend that follows |
 //! | `others` | which vehicles of the traffic are others |
 //! | `output` | what a plant publishes |
@@ -35,6 +36,7 @@
 #![forbid(unsafe_code)]
 
 pub mod airframe;
+mod airworthy;
 pub mod backend;
 pub mod effects;
 pub mod free_flight;

@@ -45,8 +45,10 @@ fn run() -> Result<(), BusError> {
     let measured = node.optional_input::<MeasuredState>("measured");
     let traffic = node.optional_input::<Traffic>("traffic");
     let outputs = Outputs::declare(&mut node)?;
-    let window_ticks = window_ticks(&node, parameters.window_s)?;
     let dt_s = node.tick_s();
+    let window_ticks =
+        parameters.window_s.map(|window_s| parameters::window_ticks(window_s, dt_s)).transpose();
+    let window_ticks = window_ticks.map_err(|error| node.error(error))?.unwrap_or(u32::MAX);
     if node.period_s() != dt_s {
         // It would apply a command before it was computed.
         return Err(node.error("a plant runs at every tick; leave `period_ticks` out"));
@@ -75,21 +77,6 @@ fn run() -> Result<(), BusError> {
         }
         Ok::<_, String>(())
     })
-}
-
-#[allow(
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    reason = "checked to be positive and short"
-)]
-fn window_ticks(node: &Node, window_s: Option<f64>) -> Result<u32, BusError> {
-    let Some(window_s) = window_s else { return Ok(u32::MAX) };
-    let ticks = window_s / node.tick_s();
-    if (ticks - ticks.round()).abs() < 1e-6 && ticks.round() >= 1.0 {
-        Ok(ticks.round() as u32)
-    } else {
-        Err(node.error(format!("`window_s` is {window_s}, which is not a whole number of ticks")))
-    }
 }
 
 fn body(measured: &MeasuredState) -> RigidBody {

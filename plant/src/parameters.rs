@@ -2,12 +2,13 @@
 #![allow(non_snake_case, reason = "a trailing _W names the frame a vector is written in")]
 
 use crate::airframe::Airframe;
+use crate::airworthy;
 use crate::backend::Backend;
 use crate::free_flight::FreeFlight;
 use crate::newton_euler::NewtonEuler;
 use crate::rapier::Rapier;
 use crate::state::RigidBody;
-use bus::kind::read_parameters;
+use bus::kind::{RunContext, read_parameters};
 use nalgebra::{UnitQuaternion, Vector3};
 use scenes::Scene;
 use serde::Deserialize;
@@ -62,13 +63,50 @@ fn one() -> u32 {
     1
 }
 
-/// Refuses what cannot be meant; the words are the wired inputs and the named outputs.
-pub(crate) fn check(parameters: &serde_json::Value, ports: &[&str]) -> Result<(), String> {
+/// Refuses what cannot be meant, or cannot fly.
+pub(crate) fn check(parameters: &serde_json::Value, run: &RunContext<'_>) -> Result<(), String> {
     let parameters: Parameters = read_parameters(parameters)?;
     parameters.check_numbers()?;
-    parameters.check_ports(ports)?;
-    // Any stream and tick serve here.
-    parameters.backend(0, "", 1e-3).map(|_| ())
+    parameters.check_ports(run.ports)?;
+    require_every_tick(run.period_ticks)?;
+    if let Some(window_s) = parameters.window_s {
+        window_ticks(window_s, run.tick_s())?;
+    }
+    // Before the backend, which a vehicle that is none might not survive.
+    let (airframe, scene) = parameters.airframe()?;
+    airworthy::check_steps(&airframe, run.tick_s() / f64::from(parameters.substeps), run)?;
+    if scene.rig.is_none() && parameters.window_s.is_none() {
+        airworthy::check_lift(airframe.vehicle(), &parameters.vehicle, run)?;
+    }
+    // Any stream serves here.
+    let mut backend = parameters.backend(0, "", run.tick_s())?;
+    airworthy::rehearse(&mut *backend, airframe.vehicle(), parameters.substeps, run.tick_s())
+}
+
+/// A plant that ran less often would apply a command before it was computed.
+pub(crate) fn require_every_tick(period_ticks: u32) -> Result<(), String> {
+    match period_ticks {
+        1 => Ok(()),
+        other => {
+            Err(format!("`period_ticks` is {other}, expected 1: a plant runs at every tick; leave it out"))
+        }
+    }
+}
+
+/// The ticks between two settings to what is measured.
+#[allow(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "checked to be positive and short"
+)]
+pub(crate) fn window_ticks(window_s: f64, tick_s: f64) -> Result<u32, String> {
+    let ticks = (window_s / tick_s).round();
+    if (window_s / tick_s - ticks).abs() < 1e-6 && (1.0..=f64::from(u32::MAX)).contains(&ticks) {
+        return Ok(ticks as u32);
+    }
+    Err(format!(
+        "`window_s` is {window_s} s, which is not a whole number of ticks of {tick_s} s, at least one"
+    ))
 }
 
 impl Parameters {
@@ -125,11 +163,7 @@ impl Parameters {
     /// The backend that flies the vehicle, as it is at tick 0, in ticks of `dt_s`; the effects of `node` draw their
     /// random numbers by the run's `seed`.
     pub(crate) fn backend(&self, seed: u64, node: &str, dt_s: f64) -> Result<Box<dyn Backend>, String> {
-        let vehicle = Vehicle::load(&self.vehicle).map_err(|error| error.to_string())?;
-        let scene = self.scene.as_deref().map(Scene::load).transpose().map_err(|error| error.to_string())?;
-        let scene = scene.unwrap_or_default();
-        refuse_double_rig(&vehicle, &scene)?;
-        let airframe = Airframe::from_files(vehicle, &scene.effects).map_err(|error| error.to_string())?;
+        let (airframe, scene) = self.airframe()?;
         let memory = airframe.memory(seed, node, dt_s);
         let model = NewtonEuler::flying(airframe, self.substeps);
         match self.backend {
@@ -145,6 +179,16 @@ impl Parameters {
                 Ok(Box::new(rapier))
             }
         }
+    }
+
+    /// The vehicle as it flies, and what stands around it.
+    fn airframe(&self) -> Result<(Airframe, Scene), String> {
+        let vehicle = Vehicle::load(&self.vehicle).map_err(|error| error.to_string())?;
+        let scene = self.scene.as_deref().map(Scene::load).transpose().map_err(|error| error.to_string())?;
+        let scene = scene.unwrap_or_default();
+        refuse_double_rig(&vehicle, &scene)?;
+        let airframe = Airframe::from_files(vehicle, &scene.effects).map_err(|error| error.to_string())?;
+        Ok((airframe, scene))
     }
 
     /// Refuses a start inside of a box, unless a measured flight says where the vehicle starts.
@@ -205,7 +249,7 @@ mod tests {
             "backend": "rapier",
         });
         parameters.as_object_mut().unwrap().extend(more.as_object().unwrap().clone());
-        check(&parameters, ports)
+        check(&parameters, &RunContext::of_ports(ports))
     }
 
     #[test]

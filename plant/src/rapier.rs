@@ -110,6 +110,11 @@ impl Rapier {
     fn substep(&mut self, drive: &Drive, span_s: f64) -> (Vector3<f64>, Vector3<f64>) {
         let before = self.state.body;
         let free = self.model.runge_kutta(&self.state, drive, span_s);
+        if !free.body.is_finite() {
+            // The world would panic on it; what is published ends the run with the field that is no number.
+            self.state = free;
+            return (Vector3::zeros(), Vector3::zeros());
+        }
         let (force_W_N, torque_W_N_m) = self.push(&free.body, span_s);
         let friction_W_N_m = self.rig_friction(span_s);
         self.world.step(&force_W_N, &(torque_W_N_m + friction_W_N_m), span_s);

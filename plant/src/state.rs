@@ -47,6 +47,15 @@ impl RigidBody {
     }
 }
 
+impl RigidBody {
+    /// Whether pose and motion are numbers.
+    pub fn is_finite(&self) -> bool {
+        let vectors = [&self.position_W_m, &self.velocity_W_m_s, &self.angular_velocity_B_rad_s];
+        let numbers = vectors.into_iter().flatten().chain(self.attitude_WB.coords.iter());
+        numbers.into_iter().all(|number| number.is_finite())
+    }
+}
+
 impl RotorState {
     /// Turning steadily at `speed_rad_s`.
     pub fn steady(speed_rad_s: f64) -> Self {

@@ -1,7 +1,7 @@
 //! The traffic node: gathers where the vehicles of a run are into one sample, for those that share a room.
 
 use crate::backend::TRAFFIC_MAX;
-use bus::kind::{Inputs, NodeKind, PortSpec, read_parameters};
+use bus::kind::{Inputs, NodeKind, PortSpec, RunContext, read_parameters};
 use bus::messages::{PlantState, Traffic};
 use bus::{BusError, Input, Message, Node, Tick};
 use serde::Deserialize;
@@ -21,8 +21,9 @@ pub const KIND: NodeKind = NodeKind {
 #[serde(deny_unknown_fields)]
 struct Parameters {}
 
-fn check(parameters: &serde_json::Value, inputs: &[&str]) -> Result<(), String> {
+fn check(parameters: &serde_json::Value, run: &RunContext<'_>) -> Result<(), String> {
     let Parameters {} = read_parameters(parameters)?;
+    let inputs = run.ports;
     if inputs.len() <= TRAFFIC_MAX {
         Ok(())
     } else {

@@ -4,8 +4,28 @@ use crate::rig;
 use crate::scene::{Cuboid, Scene};
 use nalgebra::Vector3;
 use vehicles::VehicleError;
-use vehicles::reader::{Document, Section};
+use vehicles::reader::{Bounds, Document, Section};
 use vehicles::units::{ANGLE, LENGTH};
+
+/// Where things of a scene stand.
+pub(crate) const PLACE: Bounds = Bounds {
+    least: -1e6,
+    most: 1e6,
+    unit: "m",
+    why: "beyond 1000 km the ground is not flat, and contacts of a double lose their micrometres",
+};
+
+/// Lengths of a box.
+const SIZE: Bounds = Bounds {
+    least: 1e-4,
+    most: 1e6,
+    unit: "m",
+    why: "three lengths above 0: contacts are resolved to 0.1 mm, and beyond 1000 km the ground is not flat",
+};
+
+/// Ten turns.
+const YAW: Bounds =
+    Bounds { least: -63.0, most: 63.0, unit: "rad", why: "ten turns, in case of a wrong unit" };
 
 /// Reads the whole file; see `scenes/room.toml` for the layout.
 pub(crate) fn parse(text: &str, file_name: &str) -> Result<Scene, VehicleError> {
@@ -23,13 +43,10 @@ pub(crate) fn parse(text: &str, file_name: &str) -> Result<Scene, VehicleError> 
 
 fn one_box(section: &Section) -> Result<Cuboid, VehicleError> {
     let name = section.text("name")?.to_owned();
-    let centre = section.vector("centre", LENGTH)?;
-    let size = section.vector("size", LENGTH)?;
-    let yaw_rad = if section.has("yaw") { section.quantity("yaw", ANGLE)?.si } else { 0.0 };
+    let centre = section.vector("centre", LENGTH, &PLACE)?;
+    let size = section.vector("size", LENGTH, &SIZE)?;
+    let yaw_rad =
+        if section.has("yaw") { section.quantity("yaw", ANGLE)?.within(section.doc, &YAW)?.si } else { 0.0 };
     section.finish()?;
-    if size.iter().any(|length_m| *length_m <= 0.0) {
-        let found = format!("{size:?} m");
-        return Err(section.doc.bad(&section.at, &section.key("size"), "three lengths above 0", found));
-    }
     Ok(Cuboid { name, centre_W_m: centre.into(), half_extents_m: Vector3::from(size) / 2.0, yaw_rad })
 }

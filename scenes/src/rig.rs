@@ -1,9 +1,10 @@
 //! A test rig: the vehicle hangs from a ball joint that limits its tilt, and that may slide up and down.
 #![allow(non_snake_case, reason = "a trailing _W or _B names the frame a vector is written in, N the newton")]
 
+use crate::file::PLACE;
 use nalgebra::Vector3;
 use vehicles::VehicleError;
-use vehicles::reader::{Quantity, Section};
+use vehicles::reader::{Bounds, Quantity, Section};
 use vehicles::units::{ANGLE, Dimension, LENGTH, MASS};
 
 /// The rod-end bearing of thesis section 5.2, and the tube that it hangs on.
@@ -35,16 +36,40 @@ const TORQUE_PER_SPEED: Dimension =
 const FORCE: Dimension = Dimension { name: "force", units: &[("N", 1.0)] };
 const FORCE_PER_SPEED: Dimension = Dimension { name: "force per speed", units: &[("N*s/m", 1.0)] };
 
+/// Where the vehicle is mounted, seen from its centre of mass.
+const MOUNT: Bounds = Bounds {
+    least: -100.0,
+    most: 100.0,
+    unit: "m",
+    why: "the longest helicopter measures 40 m over its rotors",
+};
+
+/// A mass that hangs in a bearing.
+const MOVING_MASS: Bounds = Bounds {
+    least: 1e-6,
+    most: 1e6,
+    unit: "kg",
+    why: "the lightest that flies weighs 80 mg, the heaviest with rotors 56 t",
+};
+
+/// Heave, friction and damping, each in its unit of the SI.
+const AMOUNT: Bounds = Bounds {
+    least: 0.0,
+    most: 1e6,
+    unit: "in SI",
+    why: "no test rig travels so far or rubs so hard: the weight of 56 t, the heaviest with rotors, is 5.5e5 N",
+};
+
 /// Reads the table `[rig]`; see `scenes/rig-sliding.toml`.
 pub(crate) fn parse(section: &Section) -> Result<Rig, VehicleError> {
     let doc = section.doc;
-    let not_negative = |name, dimension| section.quantity(name, dimension)?.not_negative(doc);
+    let not_negative = |name, dimension| section.quantity(name, dimension)?.within(doc, &AMOUNT);
     let rig = Rig {
-        bearing_W_m: section.vector("bearing", LENGTH)?.into(),
-        mount_B_m: section.vector("mount", LENGTH)?.into(),
+        bearing_W_m: section.vector("bearing", LENGTH, &PLACE)?.into(),
+        mount_B_m: section.vector("mount", LENGTH, &MOUNT)?.into(),
         tilt_max_rad: tilt(section)?.si,
         heave_m: not_negative("heave", LENGTH)?.si,
-        moving_mass_kg: section.quantity("moving_mass", MASS)?.positive(doc)?.si,
+        moving_mass_kg: section.quantity("moving_mass", MASS)?.within(doc, &MOVING_MASS)?.si,
         bearing_friction_N_m: not_negative("bearing_friction", TORQUE)?.si,
         bearing_damping_N_m_s: not_negative("bearing_damping", TORQUE_PER_SPEED)?.si,
         slide_friction_N: not_negative("slide_friction", FORCE)?.si,

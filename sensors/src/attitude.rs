@@ -13,9 +13,9 @@ pub const KIND: NodeKind = NodeKind {
     summary: "complementary filter: roll, pitch and yaw from an IMU",
     inputs: Inputs::Ports(&[PortSpec::required("imu", Imu::SCHEMA)]),
     outputs: &[PortSpec::required("estimate", AttitudeEstimate::SCHEMA)],
-    check: |parameters, _| {
+    check: |parameters, run| {
         let params: ComplementaryParams = read_parameters(parameters)?;
-        Complementary::new(params, 1.0).map(|_| ()).map_err(|error| error.to_string())
+        Complementary::new(params, run.period_s()).map(|_| ()).map_err(|error| error.to_string())
     },
     run,
 };

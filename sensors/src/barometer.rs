@@ -23,9 +23,10 @@ pub const KIND: NodeKind = NodeKind {
     summary: "air pressure and altitude with noise, walking bias and delay",
     inputs: Inputs::Ports(&[PortSpec::required("state", PlantState::SCHEMA)]),
     outputs: &[PortSpec::required("barometer", Barometer::SCHEMA)],
-    check: |parameters, _| {
+    check: |parameters, run| {
         let params: BarometerParams = read_parameters(parameters)?;
-        params.validate().map_err(|error| error.to_string())
+        params.validate().map_err(|error| error.to_string())?;
+        params.timing().check(run)
     },
     run,
 };
@@ -165,6 +166,7 @@ fn run() -> Result<(), BusError> {
 mod tests {
     use super::*;
     use crate::testing::{TICK_NS, require_hand_over, require_normal};
+    use bus::kind::RunContext;
 
     fn perfect() -> BarometerParams {
         let (noise_Pa, bias_walk_Pa_sqrt_s, resolution_Pa) = (0.0, 0.0, 0.0);
@@ -240,7 +242,8 @@ mod tests {
     fn impossible_parameters_are_named() {
         let bad = [("ground_pressure_Pa", 0.0), ("reference_pressure_Pa", -1.0), ("noise_Pa", -1.0)];
         for (key, value) in bad.into_iter().chain([("bias_walk_Pa_sqrt_s", -1.0), ("resolution_Pa", -1.0)]) {
-            let reason = (KIND.check)(&serde_json::json!({ key: value }), &["state"]).unwrap_err();
+            let reason = (KIND.check)(&serde_json::json!({ key: value }), &RunContext::of_ports(&["state"]))
+                .unwrap_err();
             assert!(reason.contains(&format!("`{key}`")), "{reason}");
         }
     }

@@ -21,9 +21,10 @@ pub const KIND: NodeKind = NodeKind {
     summary: "battery monitor: voltage and current with noise, and the charge counted from it",
     inputs: Inputs::Ports(&[PortSpec::required("battery", Battery::SCHEMA)]),
     outputs: &[PortSpec::required("measured", Battery::SCHEMA)],
-    check: |parameters, _| {
+    check: |parameters, run| {
         let params: BatteryParams = read_parameters(parameters)?;
-        params.validate().map_err(|error| error.to_string())
+        params.validate().map_err(|error| error.to_string())?;
+        params.timing().check(run)
     },
     run,
 };
@@ -177,6 +178,7 @@ fn run() -> Result<(), BusError> {
 mod tests {
     use super::*;
     use crate::testing::{TICK_NS, require_hand_over, require_normal};
+    use bus::kind::RunContext;
 
     fn truth() -> Battery {
         Battery { voltage: 11.3, current: 8.4, charge: 0.5, valid: 1, ..Default::default() }
@@ -265,7 +267,9 @@ mod tests {
     fn impossible_parameters_are_named() {
         let bad = [("capacity_Ah", 0.0), ("initial_charge", 1.1), ("voltage_noise_V", -1.0)];
         for (key, value) in bad.into_iter().chain([("current_resolution_A", -1.0), ("dropout", 1.0)]) {
-            let reason = (KIND.check)(&serde_json::json!({ key: value }), &["battery"]).unwrap_err();
+            let reason =
+                (KIND.check)(&serde_json::json!({ key: value }), &RunContext::of_ports(&["battery"]))
+                    .unwrap_err();
             assert!(reason.contains(&format!("`{key}`")), "{reason}");
         }
     }

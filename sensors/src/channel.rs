@@ -11,6 +11,7 @@
 //! average. They are drawn from a stream of their own: switching them on does not reshuffle the noise.
 
 use crate::parameter::{ParameterError, check, not_negative, positive};
+use bus::kind::RunContext;
 use bus::random::{Stream, stream, uniform};
 use bus::{BusError, Message, Node};
 
@@ -49,6 +50,37 @@ impl Timing {
         check("dropout_mean_s", self.dropout_mean_s, mean_is_good, expected)
     }
 
+    /// Whether a node of `run` can measure so often; warns where measurements would be uneven or never arrive.
+    ///
+    /// # Errors
+    /// The sensor measures more often than its node computes, or as [`Timing::validate`].
+    pub fn check(&self, run: &RunContext<'_>) -> Result<(), String> {
+        self.validate().map_err(|error| error.to_string())?;
+        let (rate_hz, node_hz) = (self.rate_hz, run.period_s().recip());
+        if !is_in_time(rate_hz, run.period_s()) {
+            return Err(format!(
+                "`rate_hz` is {rate_hz} Hz, expected at most {node_hz} Hz, at which its node computes (run.rate_hz = \
+                 {}, period_ticks = {}); raise run.rate_hz, or lower `period_ticks` or `rate_hz`",
+                run.rate_hz(),
+                run.period_ticks
+            ));
+        }
+        let share = node_hz / rate_hz;
+        if (share - share.round()).abs() > 1e-6 * share {
+            run.warn(format!(
+                "`rate_hz` is {rate_hz} Hz, which does not divide the {node_hz} Hz at which its node computes: the \
+                 measurements are not evenly spaced"
+            ));
+        }
+        if self.delay_ms * 1e-3 >= run.duration_s() {
+            run.warn_behind_end(format!(
+                "`delay_ms` is {} ms, as long as the run: no measurement arrives before its end",
+                self.delay_ms
+            ));
+        }
+        Ok(())
+    }
+
     /// What can be said of the parameters where the rate is not known yet.
     ///
     /// # Errors
@@ -59,6 +91,11 @@ impl Timing {
         check("dropout", self.dropout, dropout_is_good, "a fraction from 0 to below 1")?;
         not_negative("dropout_mean_s", self.dropout_mean_s)
     }
+}
+
+/// Whether a node that computes every `period_s` can measure `rate_hz` times a second.
+fn is_in_time(rate_hz: f64, period_s: f64) -> bool {
+    rate_hz * period_s <= 1.0 + 1e-9
 }
 
 /// The chances with which losses begin and go on.
@@ -160,9 +197,8 @@ impl Channel {
     /// A parameter is outside its range, or the sensor measures more often than the node computes.
     pub fn new(timing: &Timing, period_s: f64, run_seed: u64, node: &str) -> Result<Self, ParameterError> {
         timing.validate()?;
-        let is_in_time = timing.rate_hz * period_s <= 1.0 + 1e-9;
         let expected = "at most the rate at which the node computes; lower its `period_ticks` or `rate_hz`";
-        check("rate_hz", timing.rate_hz, is_in_time, expected)?;
+        check("rate_hz", timing.rate_hz, is_in_time(timing.rate_hz, period_s), expected)?;
         let (noise, mut loss) = (stream(run_seed, node), stream(run_seed, node));
         loss.set_stream(1);
         let (interval_ns, delay_ns) =
@@ -263,6 +299,22 @@ mod tests {
     }
 
     const NOTHING: u64 = u64::MAX / TICK_NS;
+
+    #[test]
+    fn a_sensor_that_measures_more_often_than_its_node_computes_is_refused_with_both_rates() {
+        let rate_of = |tick_ns, period_ticks| {
+            let run = RunContext::new(&[], tick_ns, period_ticks, 10_000);
+            let outcome = Timing { rate_hz: 200.0, ..timing() }.check(&run);
+            (outcome, run.into_warnings())
+        };
+        for (tick_ns, period_ticks) in [(100_000_000, 1), (1_000_000, 100)] {
+            let words = rate_of(tick_ns, period_ticks).0.unwrap_err();
+            assert!(words.contains("`rate_hz` is 200 Hz, expected at most 10 Hz"), "{words}");
+        }
+        assert_eq!(rate_of(1_000_000, 5), (Ok(()), vec![]));
+        let (outcome, warnings) = rate_of(1_000_000, 3);
+        assert!(outcome.is_ok() && warnings[0].words.contains("not evenly spaced"), "{warnings:?}");
+    }
 
     #[test]
     fn without_delay_a_measurement_arrives_as_it_is_made_and_is_held_until_the_next() {

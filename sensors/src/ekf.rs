@@ -35,11 +35,10 @@ pub const KIND: NodeKind = NodeKind {
         PortSpec::optional("innovation", Innovation::SCHEMA),
         PortSpec::optional("attitude", AttitudeEstimate::SCHEMA),
     ],
-    check: |parameters, wired| {
+    check: |parameters, run| {
         let params: EkfParams = read_parameters(parameters)?;
-        // A period at which any delay fits: only the parameters are checked.
-        Ekf::new(params, 1.0).map_err(|error| error.to_string())?;
-        let has_position = wired.iter().any(|input| ["gps", "mocap"].contains(input));
+        Ekf::new(params, run.period_s()).map_err(|error| error.to_string())?;
+        let has_position = run.has("gps") || run.has("mocap");
         let unwired = "nothing tells the position: wire `inputs.gps`, `inputs.mocap` or both";
         if has_position { Ok(()) } else { Err(unwired.to_owned()) }
     },
@@ -182,14 +181,15 @@ fn innovations(state: &EkfState) -> Innovation {
 #[cfg(test)]
 mod tests {
     use super::KIND;
+    use bus::kind::RunContext;
     use serde_json::json;
 
     #[test]
     fn a_filter_that_nothing_tells_the_position_is_refused() {
-        let error = (KIND.check)(&json!({}), &["imu", "barometer"]).unwrap_err();
+        let error = (KIND.check)(&json!({}), &RunContext::of_ports(&["imu", "barometer"])).unwrap_err();
         assert!(error.contains("`inputs.gps`") && error.contains("`inputs.mocap`"), "{error}");
-        assert_eq!((KIND.check)(&json!({}), &["imu", "gps"]), Ok(()));
-        assert_eq!((KIND.check)(&json!({}), &["imu", "mocap"]), Ok(()));
+        assert_eq!((KIND.check)(&json!({}), &RunContext::of_ports(&["imu", "gps"])), Ok(()));
+        assert_eq!((KIND.check)(&json!({}), &RunContext::of_ports(&["imu", "mocap"])), Ok(()));
     }
 
     #[test]
@@ -201,7 +201,7 @@ mod tests {
             (json!({ "initial_position_m": [0.0, 0.0] }), "`initial_position_m`"),
             (json!({ "mocap_sigma": 1.0 }), "`mocap_sigma`"),
         ] {
-            let error = (KIND.check)(&parameters, &["imu", "mocap"]).unwrap_err();
+            let error = (KIND.check)(&parameters, &RunContext::of_ports(&["imu", "mocap"])).unwrap_err();
             assert!(error.contains(key), "{error}");
         }
     }

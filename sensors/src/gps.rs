@@ -23,9 +23,10 @@ pub const KIND: NodeKind = NodeKind {
     summary: "satellite receiver: position and velocity with noise, drift and delay",
     inputs: Inputs::Ports(&[PortSpec::required("state", PlantState::SCHEMA)]),
     outputs: &[PortSpec::required("gps", Gps::SCHEMA)],
-    check: |parameters, _| {
+    check: |parameters, run| {
         let params: GpsParams = read_parameters(parameters)?;
-        params.validate().map_err(|error| error.to_string())
+        params.validate().map_err(|error| error.to_string())?;
+        params.timing().check(run)
     },
     run,
 };
@@ -174,6 +175,7 @@ fn run() -> Result<(), BusError> {
 mod tests {
     use super::*;
     use crate::testing::{TICK_NS, require_hand_over, require_normal};
+    use bus::kind::RunContext;
 
     fn truth() -> PlantState {
         PlantState {
@@ -264,7 +266,7 @@ mod tests {
 
     #[test]
     fn impossible_parameters_are_named() {
-        let refused = |parameters| (KIND.check)(&parameters, &["state"]).unwrap_err();
+        let refused = |parameters| (KIND.check)(&parameters, &RunContext::of_ports(&["state"])).unwrap_err();
         let reason = refused(serde_json::json!({ "position_drift_time_s": 0.0 }));
         assert!(reason.contains("`position_drift_time_s`"), "{reason}");
         for key in ["position_noise_m", "position_drift_m", "velocity_noise_m_s"] {

@@ -18,10 +18,11 @@ pub const KIND: NodeKind = NodeKind {
     summary: "accelerometer and gyroscope with noise and walking bias",
     inputs: Inputs::Ports(&[PortSpec::required("state", PlantState::SCHEMA)]),
     outputs: &[PortSpec::required("imu", Imu::SCHEMA)],
-    check: |parameters, _| {
+    check: |parameters, run| {
         let params: ImuParams = read_parameters(parameters)?;
-        // Any rate serves here: only the parameters are checked.
-        ImuModel::new(params, 1.0).map(|_| ()).map_err(|error| error.to_string())
+        let rate_hz = run.period_s().recip();
+        ImuModel::new(params, rate_hz).map_err(|error| error.to_string())?;
+        params.timing(rate_hz).check(run)
     },
     run,
 };
@@ -128,6 +129,7 @@ fn message(reading: &ImuReading) -> Imu {
 mod tests {
     use super::*;
     use crate::testing::{TICK_NS, require_hand_over};
+    use bus::kind::RunContext;
 
     fn truth_at(tick: u64) -> ImuReading {
         ImuReading {
@@ -203,11 +205,12 @@ mod tests {
     #[test]
     fn impossible_losses_and_delays_are_named() {
         for (key, value) in [("delay_ms", -1.0), ("dropout", 1.0), ("dropout_mean_s", -1.0)] {
-            let reason = (KIND.check)(&serde_json::json!({ key: value }), &["state"]).unwrap_err();
+            let reason = (KIND.check)(&serde_json::json!({ key: value }), &RunContext::of_ports(&["state"]))
+                .unwrap_err();
             assert!(reason.contains(&format!("`{key}`")), "{reason}");
         }
         // Whether this is long enough depends on the rate, which the check does not know.
         let bursts = serde_json::json!({ "dropout": 0.1, "dropout_mean_s": 0.05 });
-        (KIND.check)(&bursts, &["state"]).unwrap();
+        (KIND.check)(&bursts, &RunContext::of_ports(&["state"])).unwrap();
     }
 }

@@ -23,9 +23,10 @@ pub const KIND: NodeKind = NodeKind {
     summary: "the earth's magnetic field with hard and soft iron, noise and delay",
     inputs: Inputs::Ports(&[PortSpec::required("state", PlantState::SCHEMA)]),
     outputs: &[PortSpec::required("magnetometer", Magnetometer::SCHEMA)],
-    check: |parameters, _| {
+    check: |parameters, run| {
         let params: MagnetometerParams = read_parameters(parameters)?;
-        params.validate().map_err(|error| error.to_string())
+        params.validate().map_err(|error| error.to_string())?;
+        params.timing().check(run)
     },
     run,
 };
@@ -162,6 +163,7 @@ mod tests {
     use super::*;
     use crate::testing::{TICK_NS, require_hand_over, require_normal};
     use crate::wire::{attitude_message, vector};
+    use bus::kind::RunContext;
 
     fn perfect() -> MagnetometerParams {
         MagnetometerParams { delay_ms: 0.0, noise_T: 0.0, resolution_T: 0.0, ..Default::default() }
@@ -253,7 +255,8 @@ mod tests {
     fn impossible_parameters_are_named() {
         let bad = [("field_T", -1.0), ("inclination_deg", 91.0), ("noise_T", -1.0), ("range_T", 0.0)];
         for (key, value) in bad {
-            let reason = (KIND.check)(&serde_json::json!({ key: value }), &["state"]).unwrap_err();
+            let reason = (KIND.check)(&serde_json::json!({ key: value }), &RunContext::of_ports(&["state"]))
+                .unwrap_err();
             assert!(reason.contains(&format!("`{key}`")), "{reason}");
         }
     }

@@ -26,10 +26,9 @@ pub const KIND: NodeKind = NodeKind {
         PortSpec::required("walls", WallEstimate::SCHEMA),
         PortSpec::required("estimate", StateEstimate::SCHEMA),
     ],
-    check: |parameters, _| {
+    check: |parameters, run| {
         let params: RangeInertialParams = read_parameters(parameters)?;
-        // Any period serves here: only the parameters are checked.
-        RangeInertial::new(params, 1.0).map(|_| ()).map_err(|error| error.to_string())
+        RangeInertial::new(params, run.period_s()).map(|_| ()).map_err(|error| error.to_string())
     },
     run,
 };
@@ -100,6 +99,7 @@ fn state_estimate(
 #[cfg(test)]
 mod tests {
     use super::KIND;
+    use bus::kind::RunContext;
     use serde_json::json;
 
     #[test]
@@ -110,9 +110,9 @@ mod tests {
             (json!({ "initial_height_m": -1.0 }), "`initial_height_m`"),
             (json!({ "dead_zone_m": 0.2 }), "`dead_zone_m`"),
         ] {
-            let error = (KIND.check)(&parameters, &[]).unwrap_err();
+            let error = (KIND.check)(&parameters, &RunContext::of_ports(&[])).unwrap_err();
             assert!(error.contains(key), "{error}");
         }
-        assert_eq!((KIND.check)(&json!({}), &[]), Ok(()));
+        assert_eq!((KIND.check)(&json!({}), &RunContext::of_ports(&[])), Ok(()));
     }
 }

@@ -19,8 +19,10 @@ pub const KIND: NodeKind = NodeKind {
     summary: "rotor speeds with noise and resolution, and faults of single rotors",
     inputs: Inputs::Ports(&[PortSpec::required("state", PlantState::SCHEMA)]),
     outputs: &[PortSpec::required("speeds", RotorSpeeds::SCHEMA)],
-    check: |parameters, _| {
-        read_parameters::<RpmParams>(parameters)?.validate().map_err(|error| error.to_string())
+    check: |parameters, run| {
+        let params: RpmParams = read_parameters(parameters)?;
+        params.validate().map_err(|error| error.to_string())?;
+        params.timing().check(run)
     },
     run,
 };
@@ -155,6 +157,7 @@ fn run() -> Result<(), BusError> {
 mod tests {
     use super::*;
     use crate::testing::{TICK_NS, require_hand_over, require_normal};
+    use bus::kind::RunContext;
 
     fn truth_at(time_s: f64) -> PlantState {
         let rotor_speed = [400.0, 410.0 + 50.0 * time_s, 420.0, 430.0];
@@ -217,11 +220,13 @@ mod tests {
     fn impossible_parameters_are_named() {
         let bad = [("noise_rad_s", -1.0), ("resolution_rad_s", -1.0), ("dropout", 1.0)];
         for (key, value) in bad {
-            let reason = (KIND.check)(&serde_json::json!({ key: value }), &["state"]).unwrap_err();
+            let reason = (KIND.check)(&serde_json::json!({ key: value }), &RunContext::of_ports(&["state"]))
+                .unwrap_err();
             assert!(reason.contains(&format!("`{key}`")), "{reason}");
         }
         for key in ["stuck_rotor", "half_reading_rotor"] {
-            let reason = (KIND.check)(&serde_json::json!({ key: 5 }), &["state"]).unwrap_err();
+            let reason =
+                (KIND.check)(&serde_json::json!({ key: 5 }), &RunContext::of_ports(&["state"])).unwrap_err();
             assert!(reason.contains(&format!("`{key}`")), "{reason}");
         }
     }

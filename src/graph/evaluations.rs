@@ -1,17 +1,111 @@
 //! What is judged after the run: it will be recorded, and its fields and units exist.
 
+use super::parameters::Notes;
 use crate::judge;
-use crate::manifest::{Comparison, Manifest, PassCondition};
+use crate::manifest::{Comparison, Manifest, PassCondition, Statistic};
 use crate::problem::{Problem, nearest};
 use crate::program::Program;
 use bus::plan::{NodePlan, Plan};
 use toml::Spanned;
 
 /// Checks that what is evaluated after the run will be recorded, and that its fields and units exist.
-pub fn check(manifest: &Manifest, plan: &Plan, programs: &[Program]) -> Result<(), Problem> {
+pub fn check(
+    manifest: &Manifest,
+    plan: &Plan,
+    programs: &[Program],
+    notes: &mut Notes,
+) -> Result<(), Problem> {
     check_recorded(manifest, plan, programs)?;
     manifest.content.compare.iter().try_for_each(|compare| check_window(manifest, plan, compare))?;
-    manifest.content.pass.iter().try_for_each(|pass| check_field(manifest, plan, pass))
+    for pass in &manifest.content.pass {
+        check_field(manifest, plan, pass)?;
+        check_span(manifest, plan, pass, notes)?;
+    }
+    Ok(())
+}
+
+/// Refuses a span in which nothing can be judged; tells one that the run ends in. Where the run was cut short by other
+/// than the condition's own file, it is not refused.
+fn check_span(
+    manifest: &Manifest,
+    plan: &Plan,
+    pass: &Spanned<PassCondition>,
+    notes: &mut Notes,
+) -> Result<(), Problem> {
+    let PassCondition { name, topic, from_s, to_s, .. } = pass.get_ref();
+    let at = |message: String, help: &str| {
+        manifest.problem(&pass.span(), format!("pass condition `{name}`: {message}"), help)
+    };
+    if *from_s < 0.0 {
+        return Err(at(format!("`from_s` is {from_s} s"), "a run begins at 0 s"));
+    }
+    if let Some(to_s) = to_s.filter(|to_s| to_s < from_s) {
+        let message = format!("`from_s` is {from_s} s and `to_s` is {to_s} s");
+        return Err(at(message, "a span ends where it begins, or later"));
+    }
+    let period = plan.topics.iter().find(|known| known.name == *topic).map_or(1, |known| known.period_ticks);
+    let (first_s, period_s) = first_sample_s(*from_s, period, plan.tick_ns);
+    let end_s = f64::from(plan.duration_ticks) * plan.tick_s();
+    if let Some(to_s) = to_s.filter(|to_s| first_s > to_s + HALF_NS_S) {
+        let message = format!(
+            "no sample of {topic} lies from {from_s} s to {to_s} s: it comes every {period_s} s, the next at {first_s} s"
+        );
+        return Err(at(message, "widen the span: a span without samples does not pass"));
+    }
+    if first_s >= end_s - HALF_NS_S {
+        if notes.is_cut(manifest, &pass.span()) {
+            return Ok(());
+        }
+        let message =
+            format!("`from_s` is {from_s} s, and the run ends at {end_s} s: no sample of {topic} is judged");
+        let help = "begin earlier, or raise run.duration_s: a span without samples does not pass";
+        return Err(at(message, help));
+    }
+    if let Some(to_s) = to_s.filter(|to_s| *to_s > end_s + HALF_NS_S)
+        && !notes.is_cut(manifest, &pass.span())
+    {
+        let message = format!("`to_s` is {to_s} s, and the run ends at {end_s} s");
+        let help = "only what is flown is judged; leave `to_s` out for the whole rest of the run";
+        notes.warnings.push(at(message, help));
+    }
+    Ok(())
+}
+
+/// Times in seconds are exact to half a nanosecond, as when the run is judged.
+const HALF_NS_S: f64 = 5e-10;
+
+/// The first sample at `from_s` or later of a topic that comes every `period_ticks`, and its period, in seconds.
+fn first_sample_s(from_s: f64, period_ticks: u32, tick_ns: u64) -> (f64, f64) {
+    let period_s = f64::from(period_ticks) * tick_ns as f64 * 1e-9;
+    let number = ((from_s - HALF_NS_S) / period_s).ceil().max(0.0);
+    (number * period_s, period_s)
+}
+
+/// Refuses limits that nothing can hold.
+fn check_limits(
+    min: Option<f64>,
+    max: Option<f64>,
+    least: Option<(f64, &str)>,
+) -> Result<(), (String, String)> {
+    if let (Some(min), Some(max)) = (min, max)
+        && min > max
+    {
+        return Err((
+            format!("`min` is {min} and `max` is {max}"),
+            "nothing lies between: exchange them".into(),
+        ));
+    }
+    match (least, max) {
+        (Some((least, what)), Some(max)) if max < least => {
+            Err((format!("`max` is {max}"), format!("{what} is never below {least}")))
+        }
+        _ => Ok(()),
+    }
+}
+
+/// The least that a condition's value can be, and why.
+fn least(condition: &PassCondition) -> Option<(f64, &'static str)> {
+    (condition.statistic == Statistic::Rms).then_some((0.0, "the root of a mean square"))
 }
 
 /// How often the publisher of `topic` is set to a measured state, if it is a plant that is.
@@ -42,6 +136,17 @@ fn check_window(manifest: &Manifest, plan: &Plan, compare: &Spanned<Comparison>)
             "give both the same length",
         ));
     }
+    let limits_and_keys = [
+        ("max_position_m", limits.max_position_m),
+        ("max_velocity_m_s", limits.max_velocity_m_s),
+        ("max_attitude_deg", limits.max_attitude_deg),
+    ];
+    for (key, limit) in limits_and_keys {
+        if let Some(limit) = limit.filter(|limit| *limit < 0.0) {
+            let message = format!("`{key}` is {limit}");
+            return Err(manifest.problem(&compare.span(), message, "an RMS error is never below 0"));
+        }
+    }
     // The last tick lies one tick before the end.
     if window_s > 0.0 && window_s <= duration_s - plan.tick_s() + 1e-9 {
         return Ok(());
@@ -64,6 +169,13 @@ fn check_field(manifest: &Manifest, plan: &Plan, pass: &Spanned<PassCondition>) 
     let unit = |topic: &str, field: &str| {
         unit_of(plan, topic, field).map_err(|error| at(error, "name one of these fields"))
     };
+    let limits =
+        |min, max, least| check_limits(min, max, least).map_err(|(message, help)| at(message, &help));
+    limits(condition.min, condition.max, least(condition))?;
+    if let Some(gate) = &condition.gate {
+        check_limits(gate.min, gate.max, None)
+            .map_err(|(message, help)| at(format!("`while`: {message}"), &help))?;
+    }
     let Some(own) = unit(&condition.topic, &condition.field)? else { return Ok(()) };
     judge::conversion(&own, &condition.unit)
         .map_err(|reason| at(reason, "state the limits in a unit of the field's quantity"))?;

@@ -1,17 +1,69 @@
 //! Parameters: what each node reads about itself, checked by its kind.
 
 use super::processes::Member;
+use super::ranges;
 use crate::manifest::{Manifest, Process};
 use crate::problem::Problem;
 use crate::program::Executable;
-use bus::plan::NodePlan;
+use bus::kind::RunContext;
+use bus::plan::{NodePlan, Plan};
 use std::collections::BTreeMap;
+use std::ops::Range;
 use std::path::PathBuf;
 use toml::Spanned;
 use vehicles::Vehicle;
 
-/// Gives `node` the parameters of `member`, files resolved, checked where its kind is built in; notes its
-/// vehicle file, what that is based on, its scene and its gains file in `models`.
+/// What is noted on the way from a manifest to a plan.
+#[derive(Debug, Default)]
+pub struct Notes {
+    /// The vehicle, scene and gains files that the processes name, each once.
+    pub models: Vec<PathBuf>,
+    /// What is odd and flies all the same.
+    pub warnings: Vec<Problem>,
+    /// Whether something was left out of the warnings because the run was cut short.
+    has_cut: bool,
+}
+
+impl Notes {
+    /// Whether what stands at `span` lies behind the end only because `--set`, or a file that includes that one, says
+    /// how long the run is: then somebody looks at the start of it, and is told so once.
+    pub fn is_cut(&mut self, manifest: &Manifest, span: &Range<usize>) -> bool {
+        let is_cut = !manifest.is_one_text(span, &manifest.content.run.duration_s.span());
+        self.has_cut |= is_cut;
+        is_cut
+    }
+
+    /// The warnings, with one about all that a run that was cut short leaves out.
+    pub fn into_parts(mut self, manifest: &Manifest) -> (Vec<PathBuf>, Vec<Problem>) {
+        if self.has_cut {
+            let duration = &manifest.content.run.duration_s;
+            let message = format!(
+                "`duration_s` is {} s, and set points, segments or conditions lie behind that",
+                duration.get_ref()
+            );
+            let help = "set points do not act; a condition without a sample does not pass";
+            self.warnings.push(manifest.problem(&duration.span(), message, help));
+        }
+        (self.models, self.warnings)
+    }
+}
+
+/// Ticks of a run: how long each is, and how many there are.
+#[derive(Clone, Copy, Debug)]
+pub struct RunLength {
+    tick_ns: u64,
+    duration_ticks: u32,
+}
+
+impl RunLength {
+    /// Those of `plan`.
+    pub fn of(plan: &Plan) -> Self {
+        Self { tick_ns: plan.tick_ns, duration_ticks: plan.duration_ticks }
+    }
+}
+
+/// Gives `node` the parameters of `member`, files resolved, checked for a run of that length where its kind is built
+/// in; notes its vehicle file, what that is based on, its scene and its gains file, and what is odd.
 ///
 /// # Errors
 /// A file or a parameter that is refused.
@@ -19,7 +71,8 @@ pub fn set(
     manifest: &Manifest,
     member: &Member<'_>,
     node: &mut NodePlan,
-    models: &mut Vec<PathBuf>,
+    run: RunLength,
+    notes: &mut Notes,
 ) -> Result<(), Problem> {
     let Member { name, process, program } = member;
     let mut parameters: BTreeMap<&str, serde_json::Value> =
@@ -35,8 +88,8 @@ pub fn set(
             parameters.insert(key, path.to_string_lossy().into());
             match key {
                 "data" => {}
-                "vehicle" => note([Some(path.clone()), Vehicle::base(&path)], models),
-                _ => note([Some(path), None], models),
+                "vehicle" => note([Some(path.clone()), Vehicle::base(&path)], &mut notes.models),
+                _ => note([Some(path), None], &mut notes.models),
             }
         }
     }
@@ -44,9 +97,18 @@ pub fn set(
     if program.is_recorder() {
         require_none(manifest, process)?;
     } else if let Executable::Kind(kind) = &program.executable {
+        ranges::check(manifest, name, process)?;
         let ports = process.inputs.keys().chain(process.outputs.keys());
         let ports: Vec<&str> = ports.map(|port| port.get_ref().as_str()).collect();
-        (kind.check)(&parameters, &ports).map_err(|reason| refused(manifest, name, process, &reason))?;
+        let context = RunContext::new(&ports, run.tick_ns, node.period_ticks, run.duration_ticks);
+        (kind.check)(&parameters, &context).map_err(|reason| refused(manifest, name, process, &reason))?;
+        for warning in context.into_warnings() {
+            let at = process.parameters.keys().next().map_or_else(|| name.span(), Spanned::span);
+            if warning.is_behind_end && notes.is_cut(manifest, &at) {
+                continue;
+            }
+            notes.warnings.push(refused(manifest, name, process, &warning.words));
+        }
     }
     node.parameters = parameters;
     Ok(())

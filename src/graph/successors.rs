@@ -1,5 +1,6 @@
 //! Successors: processes that shadow a node, take over from it, or stand by for it.
 
+use super::parameters::{Notes, RunLength};
 use super::processes::{Member, irreplaceable, members, program};
 use super::{Graph, parameters, wire};
 use crate::manifest::{Manifest, OutputSetting, Process, SwapSetting};
@@ -10,7 +11,6 @@ use bus::kind::NodeKind;
 use bus::plan::{NodePlan, Plan};
 use std::collections::BTreeMap;
 use std::ops::Range;
-use std::path::PathBuf;
 use toml::Spanned;
 
 /// Inputs that a successor may have where the process it succeeds has fewer: its edges are laid out before
@@ -43,24 +43,24 @@ pub fn all(
     manifest: &Manifest,
     plan: &Plan,
     members: &[Member<'_>],
-    models: &mut Vec<PathBuf>,
+    notes: &mut Notes,
 ) -> Result<Vec<Successor>, Problem> {
     let run = Run { manifest, plan, members };
     let mut placed = Vec::new();
     for (node, member) in members.iter().enumerate() {
         if let Some(standby) = &member.process.standby {
-            let (plan, program) = run.resolve(node, standby.get_ref(), &standby.span(), models)?;
+            let (plan, program) = run.resolve(node, standby.get_ref(), &standby.span(), notes)?;
             placed.push(Placed { successor: lasting(node, true, plan, program), span: standby.span() });
         }
     }
     for shadow in &manifest.content.shadow {
         let node = run.node(&shadow.get_ref().process)?;
-        let (plan, program) = run.resolve(node, &shadow.get_ref().with, &shadow.span(), models)?;
+        let (plan, program) = run.resolve(node, &shadow.get_ref().with, &shadow.span(), notes)?;
         placed.push(Placed { successor: lasting(node, false, plan, program), span: shadow.span() });
     }
     for swap in &manifest.content.swap {
         let node = run.node(&swap.get_ref().process)?;
-        let (plan, program) = run.resolve(node, &swap.get_ref().with, &swap.span(), models)?;
+        let (plan, program) = run.resolve(node, &swap.get_ref().with, &swap.span(), notes)?;
         for (join_tick, at_tick) in run.times(node, swap)? {
             let (plan, program) = (plan.clone(), program.clone());
             let take_over_tick = Some(at_tick);
@@ -88,7 +88,7 @@ pub fn successor_of(
     let members = members(&manifest)?;
     let run = Run { manifest: &manifest, plan: &graph.plan, members: &members };
     let node = run.node(&Spanned::new(whole.span(), process.to_owned()))?;
-    let (plan, program) = run.resolve(node, whole.get_ref(), &whole.span(), &mut Vec::new())?;
+    let (plan, program) = run.resolve(node, whole.get_ref(), &whole.span(), &mut Notes::default())?;
     Ok(lasting(node, false, plan, program))
 }
 
@@ -117,7 +117,7 @@ impl Run<'_> {
         node: usize,
         whole: &Process,
         span: &Range<usize>,
-        models: &mut Vec<PathBuf>,
+        notes: &mut Notes,
     ) -> Result<(NodePlan, Program), Problem> {
         let name = Spanned::new(span.clone(), self.plan.nodes[node].name.clone());
         let program = program(self.manifest, &name, whole)?;
@@ -129,7 +129,7 @@ impl Run<'_> {
         members[node] = Member { name: &name, process: &process, program };
         let mut wiring = wire(self.manifest, &members, Some(node))?;
         let mut plan = wiring.nodes.swap_remove(node);
-        parameters::set(self.manifest, &members[node], &mut plan, models)?;
+        parameters::set(self.manifest, &members[node], &mut plan, RunLength::of(self.plan), notes)?;
         self.require_room(node, &plan, span)?;
         for input in &mut plan.inputs {
             // The same topics, but perhaps in another order.

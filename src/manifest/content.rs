@@ -182,6 +182,11 @@ pub struct OutputSetting {
 #[derive(Clone, Copy, Debug)]
 pub struct PaceSetting(pub Pace);
 
+/// Simulated seconds per second of a paced run: a tick of 1 ms then takes 10 s at most, half of what the watchdog
+/// allows, and 0.1 µs at least, less than any process needs for it.
+const FACTOR_MIN: f64 = 1e-4;
+const FACTOR_MAX: f64 = 1e4;
+
 impl Default for PaceSetting {
     fn default() -> Self {
         Self(Pace::Free)
@@ -196,9 +201,10 @@ impl std::str::FromStr for PaceSetting {
             "free" => Ok(Self(Pace::Free)),
             "realtime" => Ok(Self(Pace::Factor(1.0))),
             _ => match text.parse::<f64>() {
-                Ok(factor) if factor.is_finite() && factor > 0.0 => Ok(Self(Pace::Factor(factor))),
+                Ok(factor) if (FACTOR_MIN..=FACTOR_MAX).contains(&factor) => Ok(Self(Pace::Factor(factor))),
                 _ => Err(format!(
-                    "`{text}` is not a pace: expected free, realtime, or a factor above 0 such as 0.5"
+                    "`{text}` is not a pace: expected free, realtime, or a factor from {FACTOR_MIN} to {FACTOR_MAX}, \
+                     such as 0.5"
                 )),
             },
         }

@@ -71,6 +71,11 @@ impl Sources {
         })
     }
 
+    /// The texts that are files.
+    pub fn files(&self) -> impl Iterator<Item = &Source> {
+        self.all.iter().filter(|source| matches!(source.origin, Origin::File(_)))
+    }
+
     /// The files beside the manifest's own.
     pub fn included(&self) -> Vec<PathBuf> {
         let file = |source: &Source| match &source.origin {
@@ -89,6 +94,11 @@ impl Sources {
     /// Whether the place `offset` lies in a `--set`.
     pub fn is_override(&self, offset: usize) -> bool {
         matches!(self.at(offset).origin, Origin::Override)
+    }
+
+    /// Whether two places lie in one text.
+    pub fn is_one_text(&self, a: usize, b: usize) -> bool {
+        self.at(a).base == self.at(b).base
     }
 
     /// A problem at `span`.

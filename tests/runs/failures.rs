@@ -61,6 +61,18 @@ fn an_output_left_unwritten_is_named_with_node_and_tick() {
 }
 
 #[test]
+fn a_number_that_is_not_finite_ends_the_run_with_node_topic_tick_and_field() {
+    let place = Place::new();
+    let parameters = "parameters = { has_other_layout = true, is_nan = true, at_tick = 50 }";
+    let path = place.write("nan.toml", manifest(5_000, &[sender("source", 1, parameters)]));
+    let ended = place.call(&["run", &path]).with_code(2);
+    ended.says(&["process `source` ended with exit code 1", "node `source` failed at tick 50 (t = 0.050 s)"]);
+    ended.says(&["its output `note` on /source/note holds place[1] = NaN", "expected a finite number"]);
+    // The sample was not sent: what is recorded ends at the tick before.
+    assert_eq!(topics(&place.path("nan.mcap"))["/source/note"].last().unwrap().tick, 49);
+}
+
+#[test]
 fn a_node_that_hangs_is_named_with_its_tick() {
     fly_with("hang").says(&["stood still", "tick 50 is not completed by", "`faulty`"]);
 }
@@ -130,6 +142,18 @@ fn a_type_that_the_node_does_not_publish_is_refused() {
         "node `liar` publishes test_msgs/msg/Note",
         "output `note`",
         "states hummingbus_msgs/msg/Imu",
+    ]);
+}
+
+#[test]
+fn a_port_that_is_declared_twice_is_refused_with_both_types() {
+    let place = Place::new();
+    let twice = sender("twice", 1, "parameters = { declares_twice = true }");
+    let path = place.write("twice.toml", manifest(100, &[twice]));
+    place.call(&["run", &path]).with_code(2).says(&[
+        "node `twice` declares its output `note` twice",
+        "as test_msgs/msg/Note and as test_msgs/msg/Note",
+        "declare it once",
     ]);
 }
 

@@ -40,6 +40,12 @@ struct OtherNote {
 struct Parameters {
     #[serde(default)]
     has_other_layout: bool,
+    /// With the other layout: what it sends is no number at `at_tick`.
+    #[serde(default)]
+    is_nan: bool,
+    /// Declares its output a second time, as the other layout.
+    #[serde(default)]
+    declares_twice: bool,
     fault: Option<Fault>,
     #[serde(default)]
     at_tick: u32,
@@ -94,10 +100,17 @@ fn run() -> Result<(), BusError> {
     let parameters: Parameters = node.parameters()?;
     if parameters.has_other_layout {
         let output = node.output::<OtherNote>("note")?;
-        return node.run(|tick| tick.write(output, OtherNote::default()));
+        return node.run(|tick| {
+            let is_nan = parameters.is_nan && tick.number() == parameters.at_tick;
+            let place = [0.0, if is_nan { f64::NAN } else { 1.0 }, 2.0];
+            tick.write(output, OtherNote { place, ..Default::default() })
+        });
     }
     let input = node.optional_input::<Note>("input");
     let output = node.optional_output::<Note>("note")?;
+    if parameters.declares_twice {
+        node.output::<OtherNote>("note")?;
+    }
     let control = control()?;
     node.run(|tick| {
         if let Some(fault) = parameters.fault.filter(|_| tick.number() == parameters.at_tick) {

@@ -457,7 +457,7 @@ fn a_run_of_no_length() {
     let with = |duration: &str| refused("duration_s = 0.1", &format!("duration_s = §{duration}"));
     with("0").says(&["`duration_s` is 0 s, which is 0 ticks", "between 1 and"]);
     with("-1.0").says(&["`duration_s` is -1 s"]);
-    with("nan").says(&["`duration_s` is NaN s"]);
+    with("nan").says(&["`run.duration_s` is nan, expected a finite number"]);
     with("1e9").says(&["`duration_s` is 1000000000 s"]);
     with("\"long\"").says(&["expected f64"]);
 }
@@ -531,6 +531,8 @@ fn a_comparison_without_a_limit_or_with_another_window_than_the_plant_has() {
         "--set",
         "process.player.parameters.from_s=0.0",
         "--set",
+        "run.duration_s=1.001",
+        "--set",
         "process.plant-1s.parameters.window_s=0.2",
     ];
     set(&window).says(&["`window_s` is 1 s, but the plant behind /plant-1s/state is set every 0.2 s"]);
@@ -538,5 +540,152 @@ fn a_comparison_without_a_limit_or_with_another_window_than_the_plant_has() {
     let lines: Vec<&str> = text.lines().filter(|line| !line.starts_with("max_")).collect();
     let limitless = place.write("limitless.toml", lines.join("\n"));
     let words = ["check", &limitless, "--set", &flight, "--set", "process.player.parameters.from_s=0.0"];
+    let words = [&words[..], &["--set", "run.duration_s=1.001"]].concat();
     place.call(&words).with_code(2).says(&["the comparison has no limit, so it cannot fail"]);
+}
+
+/// Writes the good manifest with a vehicle of its own into `place`: the Hummingbird with `from` replaced by `to`.
+fn with_vehicle(place: &Place, from: &str, to: &str) -> (String, String) {
+    let text = fs::read_to_string(repository("vehicles/hummingbird.toml")).unwrap();
+    assert_eq!(text.matches(from).count(), 1, "{from} stands once in the vehicle file");
+    let vehicle = place.write("vehicle.toml", text.replace(from, to));
+    let manifest = good().replace(&repository("vehicles/hummingbird.toml"), &vehicle);
+    (place.write("own.toml", manifest), vehicle)
+}
+
+#[test]
+fn a_vehicle_with_a_number_that_none_has_is_refused_with_its_file_line_and_key() {
+    let cases = [
+        (
+            "{ value = 8600, unit = \"rpm\"",
+            "{ value = 1e308, unit = \"rpm\"",
+            "command.speed_at_max",
+            "1e308",
+        ),
+        ("{ value = 9.81,", "{ value = 9e300,", "body.gravity", "9e300"),
+        ("{ value = 9.81,", "{ value = -9.81,", "body.gravity", "-9.81"),
+        ("{ value = 0.480,", "{ value = 4.8e-300,", "body.mass", "4.8e-300"),
+        ("{ value = 7.6184e-8,", "{ value = inf,", "rotor.thrust_coefficient", "inf"),
+        ("{ value = [0.17, 0, 0]", "{ value = [0.17, 1e200, 0]", "rotors[0].position", "1e200"),
+    ];
+    for (from, to, key, found) in cases {
+        let place = Place::new();
+        let (manifest, vehicle) = with_vehicle(&place, from, to);
+        let number = if found == "1e308" { "1.047" } else { found };
+        refused_words(&["run", &manifest], &manifest).says(&[
+            &format!("{vehicle}:"),
+            &format!("`{key}`"),
+            number,
+        ]);
+    }
+}
+
+#[test]
+fn a_vehicle_that_its_rotors_do_not_carry_is_refused_and_one_they_hardly_carry_is_told() {
+    let place = Place::new();
+    let (manifest, vehicle) = with_vehicle(&place, "{ value = 0.480,", "{ value = 480,");
+    let ended = refused_words(&["run", &manifest], &manifest);
+    ended.says(&[
+        "process `plant`",
+        "cannot fly",
+        "thrust to weight of 0.0048",
+        &format!("{vehicle}:21: `body.mass`"),
+    ]);
+    let (manifest, _) = with_vehicle(&place, "{ value = 0.480,", "{ value = 2.0,");
+    let ended = place.call(&["run", &manifest, "--json"]).with_code(0);
+    ended.says(&["warning: ", "process `plant`", "can hardly climb or tilt"]);
+    let warnings = ended.json()["warnings"].clone();
+    let told = warnings.as_array().unwrap().iter().find(|warning| {
+        warning["message"].as_str().unwrap().contains("can hardly climb")
+            && warning["line"].as_u64().is_some()
+            && warning["file"].as_str() == Some(&manifest)
+    });
+    assert!(told.is_some(), "{warnings}");
+    let ended = place.call(&["check", &manifest, "--json"]).with_code(0);
+    ended.says(&["can hardly climb or tilt"]);
+    assert_eq!(ended.json()["warnings"], warnings);
+}
+
+#[test]
+fn a_rate_at_which_a_sensor_cannot_measure_or_a_plant_cannot_move() {
+    let sensor = "[process.rpm]\nkind = \"rpm\"\ninputs.state = \"/plant/state\"\n";
+    let text = good().replace("duration_s = 0.1", "duration_s = 10\nrate_hz = 10");
+    let text =
+        text.replace("[process.imu]", &format!("{sensor}[process.imu]")).replace("period_ticks = 5\n", "");
+    let place = Place::new();
+    let path = place.write("slow.toml", &text);
+    // Motion capture at 100 Hz comes first.
+    refused_words(&["check", &path], &path)
+        .says(&["process `mocap`", "`rate_hz` is 100 Hz, expected at most 10 Hz"]);
+    let path = place
+        .write("slow.toml", text.replace("kind = \"mocap\"", "kind = \"mocap\"\nparameters.rate_hz = 5"));
+    let ended = refused_words(&["check", &path], &path);
+    ended.says(&["process `rpm`", "`rate_hz` is 200 Hz, expected at most 10 Hz", "run.rate_hz = 10"]);
+    let text = text.replace("rate_hz = 10", "rate_hz = 4").replace(sensor, "");
+    let path = place
+        .write("slow.toml", text.replace("kind = \"mocap\"", "kind = \"mocap\"\nparameters.rate_hz = 2"));
+    refused_words(&["check", &path], &path).says(&["process `plant`", "the integration diverges"]);
+}
+
+#[test]
+fn a_condition_that_nothing_can_hold() {
+    let with = |limits: &str| refused_with(&format!("§{}", PASS.replace("max = 1\n", limits)));
+    with("min = 2\nmax = 1\n").says(&[
+        "pass condition `low`",
+        "`min` is 2 and `max` is 1",
+        "nothing lies between",
+    ]);
+    with("max = 1\nfrom_s = 0.1\n")
+        .says(&["`from_s` is 0.1 s, and the run ends at 0.1 s", "raise run.duration_s"]);
+    with("max = 1\nfrom_s = 5\nto_s = 4\n").says(&["`from_s` is 5 s and `to_s` is 4 s"]);
+    with("max = 1\nfrom_s = 0.0501\nto_s = 0.0504\n")
+        .says(&["no sample of /plant/state", "it comes every 0.001 s"]);
+    with("max = 1\nfrom_s = -1\n").says(&["`from_s` is -1 s"]);
+    let gate = "max = 1\nwhile = { topic = \"/plant/state\", field = \"position.z\", min = 1, max = 0 }\n";
+    with(gate).says(&["`while`: `min` is 1 and `max` is 0"]);
+    let rms = PASS.replace("statistic = \"max\"", "statistic = \"rms\"").replace("max = 1\n", "max = -1\n");
+    refused_with(&format!("§{rms}")).says(&["`max` is -1", "the root of a mean square is never below 0"]);
+    for number in ["nan", "inf", "-inf", "1e999"] {
+        let ended = refused_with(&PASS.replace("max = 1\n", &format!("max = §{number}\n")));
+        ended.says(&[&format!("`pass.0.max` is {number}, expected a finite number")]);
+    }
+}
+
+#[test]
+fn a_number_that_is_none_anywhere_is_refused_where_it_stands() {
+    let ended = refused("initial_altitude_m = 1.0", "initial_altitude_m = §nan");
+    ended.says(&["`process.pilot.parameters.initial_altitude_m` is nan, expected a finite number"]);
+    refused("70, 70, 70, 70", "70, §inf, 70, 70")
+        .says(&["`process.plant.inputs.command.initial.command.1` is inf"]);
+    let ended = refused("initial_altitude_m = 1.0", "§initial_altitude_m = 1e300");
+    ended.says(&["`initial_altitude_m` is 1e300 m, expected at most 1e7 m in size"]);
+    let manifest = repository("manifests/hover.toml");
+    refused_setting(&manifest, &["pass.0.max=nan"]).says(&["`pass.0.max` is nan"]);
+}
+
+#[test]
+fn a_period_that_overflows_the_count_of_ticks() {
+    let ended = refused("period_ticks = 5", "period_ticks = §4294967295");
+    ended.says(&["`period_ticks` of `mocap` is 4294967295, and the run has 100 ticks", "32 bits"]);
+}
+
+#[test]
+fn what_is_odd_is_told_by_check_and_run_and_flies() {
+    let place = Place::new();
+    let path = place.write("good.toml", good());
+    let line = good().lines().position(|line| line.starts_with("set_points")).unwrap() + 1;
+    let words = [
+        format!("warning: {path}:{line}:1: process `pilot`: `set_points`: set point 0"),
+        "`at_s` is 0.1 s, and the run ends at 0.1 s: it never acts".to_owned(),
+    ];
+    let words = words.each_ref().map(String::as_str);
+    place.call(&["check", &path]).with_code(0).says(&words);
+    place.call(&["run", &path]).with_code(0).says(&words);
+    let longer = place.call(&["check", &path, "--set", "run.duration_s=1"]).with_code(0);
+    assert_eq!(longer.error, "");
+    // A run that is cut short by hand flies: what cannot be judged then is told, and does not pass.
+    let pass = PASS.replace("max = 1\n", "max = 1\nfrom_s = 0.05\n");
+    let path = place.write("judged.toml", good() + &pass);
+    let ended = place.call(&["run", &path, "--set", "run.duration_s=0.04"]).with_code(1);
+    ended.says(&["warning: ", "--set run.duration_s=0.04", "a condition without a sample does not pass"]);
 }

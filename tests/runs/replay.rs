@@ -126,14 +126,16 @@ fn a_comparison_beyond_its_limit_fails_the_run() {
 }
 
 #[test]
-fn a_flight_that_ends_before_the_run_ends_it_and_says_so() {
+fn a_flight_that_ends_before_the_run_is_refused() {
     let place = Place::new();
     let (manifest, recording) = (repository(MANIFEST), place.path("a.mcap"));
     let data = format!("process.player.data={}", place.write("flight.csv", flight()));
     let words = ["run", &manifest, "--record", &recording, "--set", &data];
     let ended = place.call(&[&words[..], &["--set", "process.player.parameters.from_s=0.5"]].concat());
     let ended = ended.with_code(2);
-    ended.says(&["process `player`", "failed at tick 501", "ends 0.500 s after", "shorten run.duration_s"]);
+    // Before it starts, not at the tick at which it would have to stop.
+    ended.says(&["process `player`", "ends 0.500 s after `from_s`", "last tick lies at 16.000 s"]);
+    ended.says(&["shorten run.duration_s"]);
 }
 
 #[test]

@@ -3,11 +3,12 @@
 use nalgebra::{Matrix3, Vector3};
 use std::path::{Path, PathBuf};
 
+use crate::bounds;
 use crate::command::CommandMap;
 use crate::effects;
 use crate::error::VehicleError;
 use crate::provenance::Uncertainty;
-use crate::reader::{Document, Section};
+use crate::reader::{Document, Quantity, Section};
 use crate::units::{
     ACCELERATION, INERTIA, LENGTH, MASS, PURE_NUMBER, SPEED, THRUST_COEFFICIENT, TIME, TORQUE_COEFFICIENT,
 };
@@ -83,8 +84,8 @@ fn complete(doc: &Document, root: &Section) -> Result<Vehicle, VehicleError> {
 }
 
 fn body(section: &Section) -> Result<(f64, Matrix3<f64>, f64), VehicleError> {
-    let mass = section.quantity("mass", MASS)?.positive(section.doc)?;
-    let gravity = section.quantity("gravity", ACCELERATION)?.not_negative(section.doc)?;
+    let mass = section.quantity("mass", MASS)?.within(section.doc, &bounds::MASS)?;
+    let gravity = section.quantity("gravity", ACCELERATION)?.within(section.doc, &bounds::GRAVITY)?;
     let inertia = inertia(section)?;
     section.finish()?;
     Ok((mass.si, inertia, gravity.si))
@@ -92,9 +93,9 @@ fn body(section: &Section) -> Result<(f64, Matrix3<f64>, f64), VehicleError> {
 
 /// The symmetric tensor J; `inertia_xy` and so on are the entries J_xy themselves, not their negatives.
 fn inertia(section: &Section) -> Result<Matrix3<f64>, VehicleError> {
-    let xx = section.quantity("inertia_xx", INERTIA)?.positive(section.doc)?;
-    let yy = section.quantity("inertia_yy", INERTIA)?.positive(section.doc)?;
-    let zz = section.quantity("inertia_zz", INERTIA)?.positive(section.doc)?;
+    let xx = moment(section, "inertia_xx")?;
+    let yy = moment(section, "inertia_yy")?;
+    let zz = moment(section, "inertia_zz")?;
     let xy = product(section, "inertia_xy")?;
     let xz = product(section, "inertia_xz")?;
     let yz = product(section, "inertia_yz")?;
@@ -108,8 +109,15 @@ fn inertia(section: &Section) -> Result<Matrix3<f64>, VehicleError> {
     Err(section.doc.bad(&xx.at, &section.key("inertia_xx, inertia_yy, inertia_zz"), expected, found))
 }
 
+fn moment(section: &Section, name: &'static str) -> Result<Quantity, VehicleError> {
+    section.quantity(name, INERTIA)?.within(section.doc, &bounds::INERTIA)
+}
+
 fn product(section: &Section, name: &'static str) -> Result<f64, VehicleError> {
-    if section.has(name) { Ok(section.quantity(name, INERTIA)?.si) } else { Ok(0.0) }
+    if !section.has(name) {
+        return Ok(0.0);
+    }
+    Ok(section.quantity(name, INERTIA)?.within(section.doc, &bounds::INERTIA_PRODUCT)?.si)
 }
 
 /// Whether a rigid body can have this tensor of inertia.
@@ -131,9 +139,13 @@ fn principal_moments(tensor: &Matrix3<f64>) -> Vector3<f64> {
 
 fn rotor(section: &Section) -> Result<[f64; 3], VehicleError> {
     let doc = section.doc;
-    let thrust = section.quantity("thrust_coefficient", THRUST_COEFFICIENT)?.not_negative(doc)?;
-    let torque = section.quantity("torque_coefficient", TORQUE_COEFFICIENT)?.not_negative(doc)?;
-    let inertia = section.quantity("inertia", INERTIA)?.not_negative(doc)?;
+    let thrust = section
+        .quantity("thrust_coefficient", THRUST_COEFFICIENT)?
+        .within(doc, &bounds::THRUST_COEFFICIENT)?;
+    let torque = section
+        .quantity("torque_coefficient", TORQUE_COEFFICIENT)?
+        .within(doc, &bounds::TORQUE_COEFFICIENT)?;
+    let inertia = section.quantity("inertia", INERTIA)?.within(doc, &bounds::ROTOR_INERTIA)?;
     section.finish()?;
     Ok([thrust.si, torque.si, inertia.si])
 }
@@ -149,7 +161,7 @@ fn layout(root: &Section) -> Result<[Rotor; 4], VehicleError> {
 
 fn one_rotor(section: &Section) -> Result<Rotor, VehicleError> {
     let name = section.text("name")?.to_owned();
-    let position_m = Vector3::from(section.vector("position", LENGTH)?);
+    let position_m = Vector3::from(section.vector("position", LENGTH, &bounds::HUB)?);
     let spin = spin(&section.section("spin")?)?;
     section.finish()?;
     Ok(Rotor { name, position_m, spin: spin.sign() })
@@ -181,22 +193,25 @@ fn motor(section: &Section) -> Result<MotorModel, VehicleError> {
 }
 
 fn first_order(section: &Section) -> Result<MotorModel, VehicleError> {
-    let time_constant = section.quantity("time_constant", TIME)?.positive(section.doc)?;
+    let time_constant =
+        section.quantity("time_constant", TIME)?.within(section.doc, &bounds::TIME_CONSTANT)?;
     Ok(MotorModel::FirstOrder { time_constant_s: time_constant.si })
 }
 
 fn second_order(section: &Section) -> Result<MotorModel, VehicleError> {
-    let frequency = section.quantity("natural_frequency", SPEED)?.positive(section.doc)?;
-    let damping = section.quantity("damping_ratio", PURE_NUMBER)?.positive(section.doc)?;
+    let frequency =
+        section.quantity("natural_frequency", SPEED)?.within(section.doc, &bounds::NATURAL_FREQUENCY)?;
+    let damping =
+        section.quantity("damping_ratio", PURE_NUMBER)?.within(section.doc, &bounds::DAMPING_RATIO)?;
     Ok(MotorModel::SecondOrder { natural_frequency_rad_s: frequency.si, damping_ratio: damping.si })
 }
 
 fn command(section: &Section) -> Result<CommandMap, VehicleError> {
     let doc = section.doc;
-    let min = section.quantity("min", PURE_NUMBER)?;
-    let max = section.quantity("max", PURE_NUMBER)?;
-    let low = section.quantity("speed_at_min", SPEED)?.not_negative(doc)?;
-    let high = section.quantity("speed_at_max", SPEED)?;
+    let min = section.quantity("min", PURE_NUMBER)?.within(doc, &bounds::COMMAND)?;
+    let max = section.quantity("max", PURE_NUMBER)?.within(doc, &bounds::COMMAND)?;
+    let low = section.quantity("speed_at_min", SPEED)?.within(doc, &bounds::ROTOR_SPEED)?;
+    let high = section.quantity("speed_at_max", SPEED)?.within(doc, &bounds::ROTOR_SPEED)?;
     let (above_min, above_low) = (max.si > min.si, high.si > low.si);
     let max = max.require(doc, above_min, "a command above `command.min`")?;
     let high = high.require(doc, above_low, "a speed above `command.speed_at_min`")?;

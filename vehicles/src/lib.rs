@@ -6,6 +6,7 @@
 //! | [`command`] | the map between a raw motor command and a rotor speed |
 //! | [`provenance`] | where each number came from, kept for reports |
 //! | [`effects`] | the effects that a vehicle or scene file lists, as they are written |
+//! | `bounds` | what the numbers of a vehicle can be, and why |
 //! | `file` | which keys a vehicle file has, and what is physical |
 //! | [`reader`] | walks the TOML tree with positions, refuses what it does not know; scene files and gains files use it too |
 //! | [`quotes`] | quotation marks in CSV files of measurements, whose rows are lines |
@@ -21,6 +22,7 @@
 //! ```
 #![forbid(unsafe_code)]
 
+mod bounds;
 pub mod command;
 pub mod effects;
 pub mod error;

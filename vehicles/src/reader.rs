@@ -83,10 +83,40 @@ impl Quantity {
         self.require(doc, holds, "a number above 0")
     }
 
+    /// Refuses what lies outside of `bounds`.
+    pub fn within(self, doc: &Document, bounds: &Bounds) -> Result<Self, VehicleError> {
+        if bounds.contains(self.si) { Ok(self) } else { Err(bounds.refuse(doc, &self)) }
+    }
+
     /// Refuses less than zero.
     pub fn not_negative(self, doc: &Document) -> Result<Self, VehicleError> {
         let holds = self.si >= 0.0;
         self.require(doc, holds, "a number of 0 or above")
+    }
+}
+
+/// What a quantity can be, in SI, and why it is not more or less.
+#[derive(Debug, Clone, Copy)]
+pub struct Bounds {
+    /// The least.
+    pub least: f64,
+    /// The most.
+    pub most: f64,
+    /// Their unit.
+    pub unit: &'static str,
+    /// What has the most and the least, or why nothing that flies has more.
+    pub why: &'static str,
+}
+
+impl Bounds {
+    /// Whether `si` lies within, both ends included; no NaN does.
+    pub fn contains(&self, si: f64) -> bool {
+        (self.least..=self.most).contains(&si)
+    }
+
+    fn refuse(&self, doc: &Document, found: &Quantity) -> VehicleError {
+        let expected = format!("{:?} to {:?} {} ({})", self.least, self.most, self.unit, self.why);
+        doc.bad(&found.at, &found.key, expected, format!("{:?} {}", found.si, self.unit))
     }
 }
 
@@ -225,13 +255,24 @@ impl<'d, 't> Section<'d, 't> {
         quantity.require(self.doc, si.is_finite(), "a number that is finite in SI")
     }
 
-    /// A parameter whose value is an array of three numbers.
-    pub fn vector(&self, name: &'d str, dimension: Dimension) -> Result<[f64; 3], VehicleError> {
+    /// A parameter whose value is an array of three numbers, each within `bounds`.
+    pub fn vector(
+        &self,
+        name: &'d str,
+        dimension: Dimension,
+        bounds: &Bounds,
+    ) -> Result<[f64; 3], VehicleError> {
         let parameter = self.parameter(name)?;
         let value = parameter.need("value", "an array of three numbers")?;
-        let [x, y, z] = parameter.three(value)?;
+        let numbers = parameter.three(value)?;
         let factor = parameter.meta(dimension, Origin::Known)?;
-        Ok([x * factor, y * factor, z * factor])
+        let numbers = numbers.map(|number| number * factor);
+        match numbers.iter().find(|number| !bounds.contains(**number)) {
+            None => Ok(numbers),
+            Some(&si) => {
+                Err(bounds.refuse(self.doc, &Quantity { si, key: parameter.path.clone(), at: value.span() }))
+            }
+        }
     }
 
     /// A parameter of which only the reader of the catalogue knows the dimension: as it is written.

@@ -1,0 +1,161 @@
+//! Which numbers of a message have to be finite, and whether they are: found once, looked at before every sample.
+
+use crate::schema::{Kind, Primitive, Schema};
+
+/// Floating-point numbers that lie side by side in a message.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Span {
+    /// Bytes from the start of the message.
+    offset: usize,
+    count: usize,
+    is_double: bool,
+}
+
+/// Where a message has floating-point numbers.
+#[derive(Debug)]
+pub(crate) struct Floats {
+    spans: Vec<Span>,
+}
+
+impl Floats {
+    /// Those of `schema`.
+    pub(crate) fn of(schema: &Schema) -> Self {
+        let mut floats = Self { spans: Vec::new() };
+        floats.add_message(schema, 0);
+        floats
+    }
+
+    fn add_message(&mut self, schema: &Schema, base: usize) {
+        for field in schema.fields {
+            self.add(&field.kind, base + field.offset);
+        }
+    }
+
+    /// Adds what is at `offset`; returns nothing of text and integers.
+    fn add(&mut self, kind: &Kind, offset: usize) {
+        match kind {
+            Kind::Primitive(Primitive::F64) => self.add_span(Span { offset, count: 1, is_double: true }),
+            Kind::Primitive(Primitive::F32) => self.add_span(Span { offset, count: 1, is_double: false }),
+            Kind::Primitive(_) | Kind::Text => {}
+            Kind::Message(inner) => self.add_message(inner, offset),
+            Kind::Array(element, length) => {
+                for index in 0..*length {
+                    self.add(element, offset + index * size_of_kind(element));
+                }
+            }
+        }
+    }
+
+    /// Numbers that touch those before become one span with them: most messages are one or two spans.
+    fn add_span(&mut self, span: Span) {
+        if let Some(last) = self.spans.last_mut()
+            && last.is_double == span.is_double
+            && last.offset + last.count * width(last.is_double) == span.offset
+        {
+            last.count += span.count;
+        } else {
+            self.spans.push(span);
+        }
+    }
+
+    /// The first number in the message `bytes` that is not finite: its place in bytes, and what it is.
+    pub(crate) fn first_not_finite(&self, bytes: &[u8]) -> Option<(usize, f64)> {
+        self.spans.iter().find_map(|span| {
+            let numbers = &bytes[span.offset..][..span.count * width(span.is_double)];
+            let mut numbers = numbers.chunks_exact(width(span.is_double)).map(number);
+            let index = numbers.clone().position(|number| !number.is_finite())?;
+            Some((span.offset + index * width(span.is_double), numbers.nth(index)?))
+        })
+    }
+}
+
+fn width(is_double: bool) -> usize {
+    if is_double { size_of::<f64>() } else { size_of::<f32>() }
+}
+
+fn number(bytes: &[u8]) -> f64 {
+    match bytes.try_into() {
+        Ok(double) => f64::from_le_bytes(double),
+        Err(_) => bytes.try_into().map_or(f64::NAN, |single| f64::from(f32::from_le_bytes(single))),
+    }
+}
+
+fn size_of_kind(kind: &Kind) -> usize {
+    match kind {
+        Kind::Primitive(Primitive::F64 | Primitive::I64 | Primitive::U64) => 8,
+        Kind::Primitive(Primitive::F32 | Primitive::I32 | Primitive::U32) => 4,
+        Kind::Primitive(Primitive::I16 | Primitive::U16) => 2,
+        Kind::Primitive(Primitive::I8 | Primitive::U8) => 1,
+        Kind::Message(schema) => schema.size,
+        Kind::Array(element, length) => length * size_of_kind(element),
+        // Only ever behind the numbers of a message that an array does not hold.
+        Kind::Text => 0,
+    }
+}
+
+/// The field of `schema` at `offset` bytes, such as `position.z` or `command[2]`.
+pub(crate) fn field_at(schema: &Schema, offset: usize) -> String {
+    let field = schema.fields.iter().rev().find(|field| field.offset <= offset);
+    field.map_or_else(String::new, |field| {
+        format!("{}{}", field.name, within(&field.kind, offset - field.offset))
+    })
+}
+
+fn within(kind: &Kind, offset: usize) -> String {
+    match kind {
+        Kind::Message(inner) => format!(".{}", field_at(inner, offset)),
+        Kind::Array(element, _) => {
+            let size = size_of_kind(element).max(1);
+            format!("[{}]{}", offset / size, within(element, offset % size))
+        }
+        Kind::Primitive(_) | Kind::Text => String::new(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Floats, field_at};
+    use crate::Message;
+    use crate::messages::{MotorCommand, PlantState, Vector3};
+
+    /// Singles behind an odd count of bytes, and messages in an array.
+    #[derive(Clone, Copy, Default, crate::Message)]
+    #[repr(C)]
+    #[message(type_name = "test_msgs/msg/Mixed")]
+    struct Mixed {
+        #[field(unit = "1")]
+        count: u32,
+        #[field(unit = "V")]
+        voltage: [f32; 3],
+        #[field(unit = "m", frame = "world")]
+        points: [Vector3; 2],
+    }
+
+    fn found<T: Message>(message: &T) -> Option<(String, f64)> {
+        let found = Floats::of(T::SCHEMA).first_not_finite(bytemuck::bytes_of(message));
+        found.map(|(offset, value)| (field_at(T::SCHEMA, offset), value))
+    }
+
+    #[test]
+    fn a_number_that_is_not_finite_is_named_by_its_field() {
+        let mut state = PlantState::default();
+        assert_eq!(found(&state), None);
+        state.position.z = f64::INFINITY;
+        assert_eq!(found(&state), Some(("position.z".to_owned(), f64::INFINITY)));
+        let command = MotorCommand { command: [1.0, 2.0, f64::NAN, 4.0], ..Default::default() };
+        let (field, value) = found(&command).unwrap();
+        assert!(field == "command[2]" && value.is_nan(), "{field} = {value}");
+    }
+
+    #[test]
+    fn every_number_of_a_mixed_message_is_looked_at_and_no_integer() {
+        // All bits set: as a float this would be a NaN.
+        let clean = Mixed { count: u32::MAX, ..Default::default() };
+        assert_eq!(found(&clean), None);
+        let voltage = [0.0, 0.0, f32::NEG_INFINITY];
+        assert_eq!(found(&Mixed { voltage, ..clean }), Some(("voltage[2]".to_owned(), f64::NEG_INFINITY)));
+        let mut points = [Vector3::default(); 2];
+        points[1].y = f64::INFINITY;
+        assert_eq!(found(&Mixed { points, ..clean }), Some(("points[1].y".to_owned(), f64::INFINITY)));
+    }
+}

@@ -1,0 +1,178 @@
+//! A law tried before a run, in `check`: numbers with which no vehicle can be held are found before it flies.
+//!
+//! The law is stepped at its own period on motions that any flight meets. What it asks for has to be a number; what
+//! the vehicle then does is not looked at: that is flying.
+#![allow(
+    non_snake_case,
+    reason = "a trailing _W or _B names the frame a vector is written in, _N the newton"
+)]
+
+use crate::controller::{Airframe, Controller, ControllerState, Demand, Flown, Motion, Told};
+use crate::set_points::SetPoint;
+use bus::kind::RunContext;
+use bus::messages::{Reference, WallEstimate};
+use nalgebra::{UnitQuaternion, Vector3};
+
+/// Steps on each motion: a filter that a step multiplies by 2 overflows before 1100 of them, and they take a
+/// millisecond.
+const STEPS: u32 = 1100;
+
+/// A gain against a rate, times the period, at which the rate changes its sign and grows from step to step: of
+/// w ← (1 − kT)·w, whatever the vehicle.
+const DIVERGES: f64 = 2.0;
+
+/// The same product from which on little is left of the phase margin: kT of 0.5 and the half period that a command is
+/// held take 14° and more at the loop's own bandwidth.
+const COARSE: f64 = 0.5;
+
+/// Refuses numbers with which `law` diverges or asks for what is no number; warns of a vehicle that cannot hover, and of
+/// a coarse period.
+///
+/// # Errors
+/// What goes wrong, and which keys are to blame.
+pub(crate) fn check<C: Controller>(law: &C, airframe: &Airframe, run: &RunContext<'_>) -> Result<(), String> {
+    check_period(law.rate_gain_1_s(), run)?;
+    warn_of_weight(airframe, run);
+    let flown = Flown { law, vehicle: &airframe.vehicle, period_s: run.period_s() };
+    motions().iter().try_for_each(|motion| fly(&flown, airframe, motion, run))
+}
+
+fn check_period(gain_1_s: f64, run: &RunContext<'_>) -> Result<(), String> {
+    let (product, hz) = (gain_1_s * run.period_s(), run.period_s().recip());
+    let words = || {
+        format!(
+            "`gains` answer a body rate with {gain_1_s} 1/s, and the law computes {hz} times a second: their ratio is \
+             {product:.3}"
+        )
+    };
+    if product >= DIVERGES {
+        return Err(format!(
+            "{}, expected below {DIVERGES}, from where on the rate grows from step to step; raise run.rate_hz, or \
+             lower `period_ticks` or the gain",
+            words()
+        ));
+    }
+    if product > COARSE {
+        run.warn(format!("{}, above {COARSE} little is left of the phase margin", words()));
+    }
+    Ok(())
+}
+
+fn warn_of_weight(airframe: &Airframe, run: &RunContext<'_>) {
+    let (_, most_N) = airframe.allocation.thrust_range_N(0.0);
+    let weight_N = airframe.vehicle.mass_kg * airframe.vehicle.gravity_m_s2;
+    if weight_N > most_N {
+        run.warn(format!(
+            "`vehicle` \"{}\" weighs {weight_N:.4} N, and its rotors lift {most_N:.4} N at most: the law cannot hold it",
+            airframe.vehicle.name
+        ));
+    }
+}
+
+/// At rest; tilted, turning and moving; on its back in a fall.
+fn motions() -> [Motion; 3] {
+    let motion = |speed_m_s: f64, tilt_rad: f64, rate_rad_s: f64| Motion {
+        position_W_m: Vector3::new(0.1, -0.1, 1.0),
+        velocity_W_m_s: Vector3::new(speed_m_s, -speed_m_s, speed_m_s),
+        attitude_WB: UnitQuaternion::from_euler_angles(tilt_rad, -0.5 * tilt_rad, tilt_rad),
+        angular_velocity_B_rad_s: Vector3::new(rate_rad_s, -rate_rad_s, rate_rad_s),
+    };
+    [motion(0.0, 0.0, 0.0), motion(2.0, 0.4, 1.0), motion(-20.0, 3.0, 10.0)]
+}
+
+fn fly<C: Controller>(
+    flown: &Flown<'_, C>,
+    airframe: &Airframe,
+    motion: &Motion,
+    run: &RunContext<'_>,
+) -> Result<(), String> {
+    let (reference, walls) = (Reference::default(), WallEstimate::default());
+    let set_point = SetPoint { altitude_m: 1.5, roll_rad: 0.1, pitch_rad: -0.1, yaw_rad: 0.5 };
+    let mut memory = ControllerState::default();
+    for step in 0..STEPS {
+        let time_ns = u64::from(step) * u64::from(run.period_ticks) * run.tick_ns;
+        let told = Told { motion: *motion, set_point, reference: &reference, walls: &walls, time_ns };
+        let demand = flown.advance(&mut memory, &told, None);
+        let speeds_rad_s = airframe.allocation.allocate(&demand.wrench).speeds_rad_s;
+        if let Some(what) = demand.not_finite().or_else(|| first_not_finite("a rotor speed", &speeds_rad_s)) {
+            return Err(format!(
+                "its numbers lead to {what} after {} steps of {} s on a motion that any flight meets; `gains`, \
+                 `vehicle` or run.rate_hz do not go together",
+                step + 1,
+                run.period_s()
+            ));
+        }
+    }
+    Ok(())
+}
+
+impl Demand {
+    /// The first of the numbers asked for that is none, in words.
+    #[must_use]
+    pub fn not_finite(&self) -> Option<String> {
+        let set = &self.set_point;
+        first_not_finite("a thrust in N", &[self.wrench.thrust_N])
+            .or_else(|| first_not_finite("a torque in N*m", self.wrench.torque_B_N_m.as_slice()))
+            .or_else(|| first_not_finite("a velocity set point in m/s", &self.velocity_m_s))
+            .or_else(|| first_not_finite("an altitude set point in m", &[set.altitude_m]))
+            .or_else(|| {
+                first_not_finite("an attitude set point in rad", &[set.roll_rad, set.pitch_rad, set.yaw_rad])
+            })
+    }
+}
+
+fn first_not_finite(what: &str, numbers: &[f64]) -> Option<String> {
+    let found = numbers.iter().find(|number| !number.is_finite())?;
+    Some(format!("{what} that is {found}"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::pid_gains::PidGains;
+    use crate::pid_law::PidLaw;
+    use bus::kind::RunWarning;
+    use vehicles::Vehicle;
+
+    fn hummingbird(change: impl Fn(&mut Vehicle)) -> Airframe {
+        let text = include_str!("../../vehicles/hummingbird.toml");
+        let mut vehicle = Vehicle::parse(text, "hummingbird.toml").unwrap();
+        change(&mut vehicle);
+        Airframe::new(vehicle).unwrap()
+    }
+
+    fn checked(airframe: &Airframe, gains: PidGains, tick_ns: u64) -> (Result<(), String>, Vec<RunWarning>) {
+        let run = RunContext::new(&[], tick_ns, 1, 1000);
+        let law = PidLaw { gains, vehicle: airframe.known(), period_s: run.period_s() };
+        let outcome = check(&law, airframe, &run);
+        (outcome, run.into_warnings())
+    }
+
+    #[test]
+    fn a_law_that_a_rate_cannot_hold_is_refused_and_a_coarse_one_is_told() {
+        let airframe = hummingbird(|_| {});
+        assert_eq!(checked(&airframe, PidGains::default(), 1_000_000), (Ok(()), vec![]));
+        let (outcome, warnings) = checked(&airframe, PidGains::default(), 100_000_000);
+        assert!(outcome.is_ok() && warnings[0].words.contains("computes 10 times a second"), "{warnings:?}");
+        let words = checked(&airframe, PidGains::default(), 1_000_000_000).0.unwrap_err();
+        assert!(words.contains("6 1/s") && words.contains("expected below 2"), "{words}");
+    }
+
+    #[test]
+    fn a_vehicle_too_heavy_for_its_rotors_is_told_with_both_forces() {
+        let (outcome, warnings) =
+            checked(&hummingbird(|it| it.mass_kg = 480.0), PidGains::default(), 1_000_000);
+        assert!(outcome.is_ok() && warnings[0].words.contains("weighs 4708.8000 N"), "{warnings:?}");
+    }
+
+    #[test]
+    fn gains_whose_products_overflow_are_refused_with_what_they_lead_to() {
+        // No gains file says this: its bound lies far below.
+        let mut gains = PidGains::default();
+        gains.roll.proportional_1_s2 = f64::MAX;
+        gains.roll.derivative_1_s = 0.0;
+        let airframe = hummingbird(|it| it.inertia_kg_m2 *= 1e10);
+        let words = checked(&airframe, gains, 1_000_000).0.unwrap_err();
+        assert!(words.contains("lead to a torque in N*m that is"), "{words}");
+    }
+}

@@ -1,0 +1,252 @@
+//! What a vehicle must be to fly at all, looked at before a run: `check` refuses what cannot, and tells what is odd.
+#![allow(non_snake_case, reason = "units stand last in names, and the newton is N")]
+
+use crate::airframe::Airframe;
+use crate::backend::Backend;
+use crate::state::State;
+use bus::kind::RunContext;
+use std::path::Path;
+use vehicles::{MotorModel, Vehicle};
+
+/// Below this thrust to weight a vehicle hovers and has next to nothing left to climb, tilt or brake with: 1.2 is what
+/// is left to a tilt of 34°. Tuned, no source; multirotors are built with 2 and more.
+const LIFT_ODD: f64 = 1.2;
+
+/// From here on a thrust to weight is odd, and from there on none: racing quadrotors reach 15. Tuned, no source.
+const LIFT_HIGH: f64 = 50.0;
+const LIFT_MAX: f64 = 1000.0;
+
+/// The classic Runge-Kutta method of fourth order diverges where a pole times the step leaves a region that reaches to
+/// 2.785 on the real axis and 2.828 on the imaginary one (Hairer and Wanner, Solving Ordinary Differential Equations II,
+/// 1996, section IV.2); the circle of 2.5 about 0 lies within it on the left.
+const POLE_STEPS_MAX: f64 = 2.5;
+/// A step as long as half a time constant errs by 0.02 % of the motion. Tuned, no source.
+const POLE_STEPS_ODD: f64 = 0.5;
+
+/// Steps of a rehearsal, less where a tick has many.
+const REHEARSAL_STEPS: u32 = 300;
+
+/// Refuses steps of `span_s` in which the motors' lag cannot be integrated, and tells coarse ones.
+///
+/// # Errors
+/// The lag, the step, and what to do.
+pub(crate) fn check_steps(airframe: &Airframe, span_s: f64, run: &RunContext<'_>) -> Result<(), String> {
+    let product = fastest_pole_rad_s(&airframe.vehicle().motor) * span_s;
+    let words = |limit: f64| {
+        format!(
+            "`vehicle` \"{}\" has motors whose fastest pole, {:.4} rad/s, times a step of {span_s} s is {product:.4}, \
+             expected below {limit}; raise `substeps` or run.rate_hz, or correct `[motor]` of the file",
+            airframe.vehicle().name,
+            product / span_s
+        )
+    };
+    if product > POLE_STEPS_MAX {
+        return Err(format!("{}: beyond it the integration diverges", words(POLE_STEPS_MAX)));
+    }
+    if product > POLE_STEPS_ODD {
+        run.warn(format!("{}: beyond it the motion is coarse", words(POLE_STEPS_ODD)));
+    }
+    Ok(())
+}
+
+fn fastest_pole_rad_s(motor: &MotorModel) -> f64 {
+    match *motor {
+        MotorModel::FirstOrder { time_constant_s } => time_constant_s.recip(),
+        MotorModel::SecondOrder { natural_frequency_rad_s, damping_ratio } => {
+            let beyond = (damping_ratio * damping_ratio - 1.0).max(0.0).sqrt();
+            natural_frequency_rad_s * (damping_ratio.max(1.0) + beyond)
+        }
+    }
+}
+
+/// Refuses a vehicle, of the file at `path`, that its rotors cannot carry, or cannot let down.
+///
+/// # Errors
+/// Both forces, and the keys that they come from.
+pub(crate) fn check_lift(vehicle: &Vehicle, path: &Path, run: &RunContext<'_>) -> Result<(), String> {
+    let (least_N, most_N) =
+        (lift_N(vehicle, least_speed_rad_s(vehicle)), lift_N(vehicle, vehicle.command.speed_at_max_rad_s));
+    let weight_N = vehicle.mass_kg * vehicle.gravity_m_s2;
+    if weight_N == 0.0 {
+        return Ok(());
+    }
+    let ratio = most_N / weight_N;
+    let words = |what: &str| {
+        format!(
+            "`vehicle` \"{}\" {what}: its rotors lift {least_N:.4} N to {most_N:.4} N and it weighs {weight_N:.4} N, a \
+             thrust to weight of {ratio:.4}; look at {}",
+            vehicle.name,
+            places(vehicle, path)
+        )
+    };
+    if ratio < 1.0 {
+        return Err(words("cannot fly, expected a thrust to weight of 1 or more"));
+    }
+    if ratio > LIFT_MAX {
+        return Err(words(&format!(
+            "is no vehicle that flies, expected a thrust to weight below {LIFT_MAX}"
+        )));
+    }
+    if least_N > weight_N {
+        return Err(words("cannot come down, expected less lift than weight at `command.speed_at_min`"));
+    }
+    if ratio < LIFT_ODD {
+        run.warn(words(&format!("can hardly climb or tilt, below a thrust to weight of {LIFT_ODD}")));
+    } else if ratio > LIFT_HIGH {
+        run.warn(words(&format!("is stronger than any that flies, above a thrust to weight of {LIFT_HIGH}")));
+    }
+    Ok(())
+}
+
+fn lift_N(vehicle: &Vehicle, speed_rad_s: f64) -> f64 {
+    vehicle.rotors.len() as f64 * vehicle.thrust_coefficient * speed_rad_s * speed_rad_s
+}
+
+/// A motor that a command of 0 switches off turns as slowly as one likes.
+fn least_speed_rad_s(vehicle: &Vehicle) -> f64 {
+    if vehicle.command.zero_is_off { 0.0 } else { vehicle.command.speed_at_min_rad_s }
+}
+
+/// The keys that lift and weight come from, with their lines.
+fn places(vehicle: &Vehicle, path: &Path) -> String {
+    let file = Vehicle::base(path).unwrap_or_else(|| path.to_owned());
+    let keys = ["body.mass", "body.gravity", "rotor.thrust_coefficient", "command.speed_at_max"];
+    let stated = vehicle.provenance.iter().filter(|number| keys.contains(&number.key.as_str()));
+    let places: Vec<String> =
+        stated.map(|number| format!("{}:{}: `{}`", file.display(), number.line, number.key)).collect();
+    places.join(", ")
+}
+
+/// Flies `backend` for a moment with rotors at their fastest, at hover and at their slowest: what overflows on the
+/// way does so here, and not in flight. The backend is of no use afterwards.
+///
+/// # Errors
+/// Which number is none, and after how many ticks.
+pub(crate) fn rehearse(
+    backend: &mut dyn Backend,
+    vehicle: &Vehicle,
+    substeps: u32,
+    dt_s: f64,
+) -> Result<(), String> {
+    let ticks = (REHEARSAL_STEPS / substeps.max(1)).max(3);
+    let (map, mut flown) = (&vehicle.command, 0);
+    for command in [vehicle.hover_command(), map.max, map.min] {
+        backend.settle_rotors(&[command; 4]);
+        for _ in 0..ticks {
+            backend.step(&[command; 4], dt_s, &[]);
+            flown += 1;
+            if let Some(what) = first_not_finite(backend) {
+                return Err(format!(
+                    "`vehicle` \"{}\": its numbers lead to {what} that is no number after {flown} ticks; no vehicle \
+                     that flies has them together",
+                    vehicle.name
+                ));
+            }
+        }
+    }
+    Ok(())
+}
+
+fn first_not_finite(backend: &dyn Backend) -> Option<&'static str> {
+    let (State { body, rotors }, motion) = (backend.state(), backend.motion());
+    let vectors = [
+        ("a position", &body.position_W_m),
+        ("a velocity", &body.velocity_W_m_s),
+        ("an angular velocity", &body.angular_velocity_B_rad_s),
+        ("a specific force", &motion.specific_force_B_m_s2),
+        ("an angular acceleration", &motion.angular_acceleration_B_rad_s2),
+    ];
+    let vector = vectors.iter().find(|(_, vector)| vector.iter().any(|number| !number.is_finite()));
+    let turns = body.attitude_WB.coords.iter().all(|number| number.is_finite());
+    let spins = rotors.iter().all(|rotor| rotor.speed_rad_s.is_finite());
+    vector
+        .map(|(what, _)| *what)
+        .or((!turns).then_some("an attitude"))
+        .or((!spins).then_some("a rotor speed"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{FreeFlight, NewtonEuler, RigidBody};
+    use bus::kind::RunWarning;
+    use nalgebra::Vector3;
+
+    const PATH: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../vehicles/hummingbird.toml");
+
+    fn hummingbird(change: impl Fn(&mut Vehicle)) -> Vehicle {
+        let mut vehicle = Vehicle::load(PATH.as_ref()).unwrap();
+        change(&mut vehicle);
+        vehicle
+    }
+
+    fn lift(change: impl Fn(&mut Vehicle)) -> (Result<(), String>, Vec<RunWarning>) {
+        let run = RunContext::of_ports(&[]);
+        let outcome = check_lift(&hummingbird(change), PATH.as_ref(), &run);
+        (outcome, run.into_warnings())
+    }
+
+    #[test]
+    fn lift_and_weight_decide_what_flies() {
+        assert_eq!(lift(|_| {}), (Ok(()), vec![]));
+        assert_eq!(lift(|it| it.gravity_m_s2 = 0.0), (Ok(()), vec![]));
+        let words = lift(|it| it.mass_kg = 480.0).0.unwrap_err();
+        assert!(
+            words.contains("thrust to weight of 0.0048") && words.contains("weighs 4708.8000 N"),
+            "{words}"
+        );
+        assert!(words.contains("hummingbird.toml:21: `body.mass`"), "{words}");
+        // 4.785 as declared.
+        let (outcome, warnings) = lift(|it| it.mass_kg *= 4.5);
+        assert!(outcome.is_ok() && warnings[0].words.contains("can hardly climb"), "{warnings:?}");
+        let (outcome, warnings) = lift(|it| it.mass_kg /= 20.0);
+        assert!(outcome.is_err() && warnings.is_empty(), "at 1075 rpm it still rises");
+        let words = outcome.unwrap_err();
+        assert!(words.contains("cannot come down"), "{words}");
+        let slow = |it: &mut Vehicle| it.command.speed_at_min_rad_s = 0.0;
+        let strong = |factor: f64| lift(|it| (slow(it), it.mass_kg /= factor).1);
+        assert!(strong(20.0).1[0].words.contains("stronger than any"));
+        assert!(strong(1e4).0.unwrap_err().contains("no vehicle that flies"));
+    }
+
+    #[test]
+    fn motors_that_a_step_cannot_follow_are_refused_with_both() {
+        let steps = |span_s: f64| {
+            let run = RunContext::of_ports(&[]);
+            let outcome = check_steps(&Airframe::new(hummingbird(|_| {})), span_s, &run);
+            (outcome, run.into_warnings())
+        };
+        assert_eq!(steps(1e-3), (Ok(()), vec![]));
+        assert!(steps(0.1).1[0].words.contains("raise `substeps`"));
+        let words = steps(0.2).0.unwrap_err();
+        assert!(words.contains("15.0756 rad/s") && words.contains("expected below 2.5"), "{words}");
+    }
+
+    #[test]
+    fn the_bound_on_steps_is_where_the_integration_leaves_its_target() {
+        let swing = |span_s: f64| {
+            let model = NewtonEuler::new(hummingbird(|_| {}), 1);
+            let mut state = model.start(RigidBody::level_at(Vector3::z()), 76.0);
+            (0..2000).for_each(|_| model.step(&mut state, &[80.0; 4], span_s));
+            (state.rotors[0].speed_rad_s / model.steady(80.0).speed_rad_s - 1.0).abs()
+        };
+        let pole_rad_s = 15.075_567_228_888_18;
+        assert!(swing(POLE_STEPS_MAX / pole_rad_s) < 1e-3);
+        assert!(swing(3.5 / pole_rad_s).is_nan() || swing(3.5 / pole_rad_s) > 1e3);
+    }
+
+    #[test]
+    fn numbers_that_overflow_together_are_found_on_the_ground() {
+        let rehearsed = |change: fn(&mut Vehicle)| {
+            let vehicle = hummingbird(change);
+            let airframe = Airframe::new(vehicle.clone());
+            let memory = airframe.memory(0, "", 1e-3);
+            let model = NewtonEuler::flying(airframe, 1);
+            let mut backend = FreeFlight::new(model, RigidBody::level_at(Vector3::z()), memory);
+            rehearse(&mut backend, &vehicle, 1, 1e-3)
+        };
+        assert_eq!(rehearsed(|_| {}), Ok(()));
+        let words = rehearsed(|it| it.thrust_coefficient = 1e306).unwrap_err();
+        assert!(words.contains("that is no number after"), "{words}");
+    }
+}

@@ -1,0 +1,128 @@
+//! Ranges of numbers by the unit that their keys end in: what no vehicle, sensor or room has is refused before a
+//! kind reads it. Kinds and files have narrower bounds where they know more.
+
+use crate::manifest::{Manifest, Process};
+use crate::problem::Problem;
+use serde_json::Value;
+use toml::Spanned;
+
+/// The most that a number may be, by the unit at the end of its key; the longest end counts.
+struct Range {
+    end: &'static str,
+    unit: &'static str,
+    most: f64,
+    why: &'static str,
+}
+
+const fn range(end: &'static str, unit: &'static str, most: f64, why: &'static str) -> Range {
+    Range { end, unit, most, why }
+}
+
+/// All are wide by intent, decades beyond what a source states: they keep products of a few numbers within what a double
+/// holds, and catch a wrong unit or a slipped digit of the exponent.
+const RANGES: [Range; 21] = [
+    range("_sqrt_hz", "its unit/sqrt(Hz)", 1e3, "no inertial sensor is that noisy: a phone's has 1e-2"),
+    range("_sqrt_s", "its unit/sqrt(s)", 1e5, "a bias that walks like that leaves any range in a second"),
+    range("_m_s2", "m/s^2", 1e5, "no vehicle that flies stands 10 000 g"),
+    range("_m_s", "m/s", 1e4, "faster than anything that leaves the earth (11 200 m/s) or stays"),
+    range("_m", "m", 1e7, "a quarter of the earth's meridian"),
+    range("_rad_s2", "rad/s^2", 1e7, "no vehicle that flies turns up so fast"),
+    range("_rad_s", "rad/s", 1e5, "a rotor of 1 cm radius would be supersonic at 3.4e4 rad/s"),
+    range("_rad", "rad", 1e4, "more than a thousand turns"),
+    range("_deg", "deg", 1e6, "more than a thousand turns"),
+    range("_1_s3", "1/s^3", 1e9, "the poles of such a loop are beyond 1 kHz"),
+    range("_1_s2", "1/s^2", 1e8, "the poles of such a loop are beyond 1 kHz"),
+    range("_1_s", "1/s", 1e6, "the fastest run has a million ticks a second"),
+    range("_hz", "Hz", 1e6, "the fastest run has a million ticks a second"),
+    range("_ms", "ms", 5e12, "longer than the longest run, of four thousand million ticks"),
+    range("_s", "s", 5e9, "longer than the longest run, of four thousand million ticks"),
+    range("_Pa", "Pa", 1e7, "a hundred times the air pressure at sea level"),
+    range("_T", "T", 1e2, "the strongest continuous magnet makes 45 T"),
+    range("_V", "V", 1e4, "no battery that flies has it"),
+    range("_A", "A", 1e5, "no battery that flies gives it"),
+    range("_Ah", "A*h", 1e5, "no battery that flies has it"),
+    range("", "", 1e12, "no number without a unit is that large"),
+];
+
+/// Less than this, other than 0, is an accident: its inverse or its square leave what a double holds.
+const LEAST: f64 = 1e-30;
+
+/// Refuses the first number of the parameters and initial values of process `name` that is out of all range.
+///
+/// # Errors
+/// Its key, the bound and why.
+pub fn check(manifest: &Manifest, name: &Spanned<String>, process: &Process) -> Result<(), Problem> {
+    let refused = |at: &Spanned<String>, reason: String| {
+        let message = format!("process `{}`: {reason}", name.get_ref());
+        manifest.problem(&at.span(), message, "correct the number or its unit: the key ends in the unit")
+    };
+    for (key, value) in &process.parameters {
+        within(key.get_ref(), key.get_ref(), value).map_err(|reason| refused(key, reason))?;
+    }
+    for (port, input) in &process.inputs {
+        let Some(initial) = &input.initial else { continue };
+        let path = format!("inputs.{}.initial", port.get_ref());
+        within(&path, "", initial).map_err(|reason| refused(port, reason))?;
+    }
+    Ok(())
+}
+
+/// Checks `value` at the dotted `path`; `key` is the last key on it that is a name.
+fn within(path: &str, key: &str, value: &Value) -> Result<(), String> {
+    match value {
+        Value::Object(table) => {
+            table.iter().try_for_each(|(key, value)| within(&format!("{path}.{key}"), key, value))
+        }
+        Value::Array(array) => array
+            .iter()
+            .enumerate()
+            .try_for_each(|(index, value)| within(&format!("{path}.{index}"), key, value)),
+        Value::Number(number) => number.as_f64().map_or(Ok(()), |number| number_within(path, key, number)),
+        Value::Null | Value::Bool(_) | Value::String(_) => Ok(()),
+    }
+}
+
+fn number_within(path: &str, key: &str, number: f64) -> Result<(), String> {
+    // The last range fits any key.
+    let Some(range) = RANGES.iter().find(|range| key.ends_with(range.end)) else { return Ok(()) };
+    let Range { unit, most, why, .. } = range;
+    let unit = if unit.is_empty() { String::new() } else { format!(" {unit}") };
+    if number.abs() > *most {
+        return Err(format!("`{path}` is {number:e}{unit}, expected at most {most:e}{unit} in size: {why}"));
+    }
+    if number != 0.0 && number.abs() < LEAST {
+        return Err(format!("`{path}` is {number:e}{unit}, expected 0 or at least {LEAST:e}{unit} in size"));
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{RANGES, within};
+    use serde_json::json;
+
+    #[test]
+    fn the_longest_end_of_a_key_counts() {
+        let refused = |key: &str, number: f64| within(key, key, &json!(number)).unwrap_err();
+        assert!(refused("speed_m_s", 2e4).contains("expected at most 1e4 m/s in size"));
+        assert!(refused("width_m", 2e7).contains("1e7 m"));
+        assert!(refused("rate_rad_s", 1e6).contains("1e5 rad/s"));
+        assert!(refused("count", 1e13).contains("1e12 in size"));
+        assert!(refused("time_s", 5e-324).contains("expected 0 or at least 1e-30 s"));
+        for (index, range) in RANGES.iter().enumerate() {
+            let earlier = RANGES[..index].iter().find(|earlier| range.end.ends_with(earlier.end));
+            assert!(earlier.is_none(), "{} is never reached", range.end);
+        }
+    }
+
+    #[test]
+    fn a_number_deep_in_a_table_is_named_by_its_whole_key() {
+        let gains = json!({ "roll": { "proportional_1_s2": 16.0, "integral_1_s3": [0.0, -1e300] } });
+        let words = within("gains", "gains", &gains).unwrap_err();
+        assert!(
+            words.starts_with("`gains.roll.integral_1_s3.1` is -1e300 1/s^3, expected at most 1e9"),
+            "{words}"
+        );
+        assert_eq!(within("gains", "gains", &json!({ "file": "1e300", "on": true })), Ok(()));
+    }
+}

@@ -1,0 +1,37 @@
+//! No number of a manifest is infinite or none: found where it stands, before anything makes a `null` of it.
+
+use super::sources::Sources;
+use crate::problem::Problem;
+use toml::Spanned;
+use toml::de::{DeTable, DeValue};
+
+/// Refuses the first number in `table` that is not finite; `path` is the dotted key of the table.
+///
+/// # Errors
+/// Its place and key.
+pub fn require(table: &DeTable<'_>, path: &str, sources: &Sources) -> Result<(), Problem> {
+    table.iter().try_for_each(|(key, value)| require_value(value, &joined(path, key.get_ref()), sources))
+}
+
+fn require_value(value: &Spanned<DeValue<'_>>, path: &str, sources: &Sources) -> Result<(), Problem> {
+    match value.get_ref() {
+        DeValue::Table(table) => require(table, path, sources),
+        DeValue::Array(array) => array
+            .iter()
+            .enumerate()
+            .try_for_each(|(index, item)| require_value(item, &joined(path, &index.to_string()), sources)),
+        DeValue::Float(float) => match float.as_str().parse::<f64>() {
+            Ok(number) if !number.is_finite() => {
+                let message = format!("`{path}` is {}, expected a finite number", float.as_str());
+                let help = "no quantity is infinite or none; a number above 1.8e308 counts as infinite";
+                Err(sources.problem(&value.span(), message, help))
+            }
+            _ => Ok(()),
+        },
+        _ => Ok(()),
+    }
+}
+
+fn joined(path: &str, key: &str) -> String {
+    if path.is_empty() { key.to_owned() } else { format!("{path}.{key}") }
+}
