@@ -17,7 +17,7 @@ pub struct Document {
 impl Document {
     /// Reads the file at `path`.
     pub fn read(path: &Path) -> Result<Self, FlightsError> {
-        match std::fs::read_to_string(path) {
+        match vehicles::text::read(path) {
             Ok(text) => Ok(Self { path: path.to_owned(), text }),
             Err(cause) => Err(FlightsError::Unreadable { file: path.display().to_string(), cause }),
         }

@@ -8,6 +8,7 @@
 //! | [`effects`] | the effects that a vehicle or scene file lists, as they are written |
 //! | `file` | which keys a vehicle file has, and what is physical |
 //! | [`reader`] | walks the TOML tree with positions, refuses what it does not know; scene files and gains files use it too |
+//! | [`text`] | files that people write, read with an end to it |
 //! | [`units`] | the table of accepted units |
 //! | [`variables`] | variables of the environment within paths |
 //! | [`error`] | what can be wrong with a file, said for people |
@@ -26,6 +27,7 @@ pub mod error;
 mod file;
 pub mod provenance;
 pub mod reader;
+pub mod text;
 pub mod units;
 pub mod variables;
 pub mod vehicle;
