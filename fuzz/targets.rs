@@ -67,14 +67,14 @@ pub fn manifest(bytes: &[u8]) -> bool {
 pub fn vehicle(bytes: &[u8]) -> bool {
     let place = Place::with("under-test.toml", bytes);
     said(Vehicle::load(&place.path("under-test.toml")), "under-test.toml").is_some()
-        && place.is_flown_by("process.plant.vehicle")
+        && place.is_flown_by("hover.toml", "process.plant.vehicle")
 }
 
-/// A scene file; one that is accepted is put around the hover.
+/// A scene file; one that is accepted is put around the hover with contacts and rigs.
 pub fn scene(bytes: &[u8]) -> bool {
     let place = Place::with("under-test.toml", bytes);
     said(Scene::load(&place.path("under-test.toml")), "under-test.toml").is_some()
-        && place.is_flown_by("process.plant.scene")
+        && place.is_flown_by("hover-rapier.toml", "process.plant.scene")
 }
 
 /// A flights file beside a log in CSV.
@@ -169,12 +169,12 @@ impl Place {
         std::fs::write(self.path(name), bytes).expect("the temporary folder can be written");
     }
 
-    /// Whether the hover is accepted with the file under test at `key`.
-    fn is_flown_by(&self, key: &str) -> bool {
+    /// Whether the shipped `manifest` is accepted with the file under test at `key`.
+    fn is_flown_by(&self, manifest: &str, key: &str) -> bool {
+        let manifest = repository().join("manifests").join(manifest);
         let path = self.path("under-test.toml");
         let overrides = [format!("{key}={:?}", path.display().to_string())];
-        said(hummingbus::check(&repository().join("manifests/hover.toml"), &overrides), "hover.toml")
-            .is_some()
+        said(hummingbus::check(&manifest, &overrides), "hover").is_some()
     }
 
     /// Whether the log of `format` is read with `channels`, and can be written as one table.
