@@ -1,8 +1,6 @@
 //! The command line: arguments, what is printed, exit codes.
 
 use crate::files::open_recording;
-use crate::graph::Graph;
-use crate::manifest::Manifest;
 use crate::output::{gone_or_failed, print_text, say, words};
 use crate::problem::print_warnings;
 use crate::profile::Files;
@@ -192,10 +190,9 @@ fn shadow(arguments: &ShadowArguments) -> Result<bool> {
 }
 
 fn check(arguments: &CheckArguments) -> Result<bool> {
-    let manifest = Manifest::load(&arguments.manifest, &arguments.set)?;
-    let graph = Graph::build(&manifest)?;
-    print_warnings(&graph.warnings);
-    print_text(&if arguments.json { describe::graph_json(&graph) } else { describe::graph(&graph) })?;
+    let checked = crate::check(&arguments.manifest, &arguments.set)?;
+    print_warnings(checked.warnings());
+    print_text(&if arguments.json { checked.json() } else { checked.to_string() })?;
     Ok(true)
 }
 

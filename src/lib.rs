@@ -1,6 +1,10 @@
 //! hummingbus: launches process sets that simulate a vehicle in lockstep, and judges their recordings.
+//!
+//! What other programs can call: [`check()`] and [`check_text`], which check a manifest and all that it names without
+//! running it.
 #![forbid(unsafe_code)]
 
+pub mod check;
 mod clean;
 pub mod cli;
 mod companions;
@@ -42,3 +46,6 @@ mod supervisor;
 mod top;
 mod validate;
 mod watch_clock;
+
+pub use check::{Checked, check, check_text};
+pub use problem::Problem;

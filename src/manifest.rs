@@ -52,7 +52,15 @@ impl Manifest {
     /// # Errors
     /// A [`Problem`] that names the place.
     pub fn load(path: &Path, overrides: &[String]) -> Result<Self, Problem> {
-        let mut sources = include::read(path)?;
+        Self::parse(include::text(path)?, path, overrides)
+    }
+
+    /// The same for `text` that stands, or is to stand, at `path`.
+    ///
+    /// # Errors
+    /// A [`Problem`] that names the place.
+    pub fn parse(text: String, path: &Path, overrides: &[String]) -> Result<Self, Problem> {
+        let mut sources = include::read(path, text)?;
         overrides.iter().for_each(|text| sources.add(Origin::Override, text.clone()));
         let tree = whole_tree(&sources)?;
         let content = Content::deserialize(toml::Deserializer::from(Spanned::new(0..0, tree)))

@@ -56,7 +56,7 @@ impl Serialize for Problem {
 
 /// Tells people of what is odd, on standard error.
 pub fn print_warnings(warnings: &[Problem]) {
-    warnings.iter().for_each(|warning| eprintln!("warning: {warning}"));
+    warnings.iter().for_each(|warning| crate::output::say(&format!("warning: {warning}")));
 }
 
 impl fmt::Display for Problem {

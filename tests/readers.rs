@@ -175,9 +175,13 @@ fn hummingbus(arguments: &[&OsStr]) -> Output {
 
 /// Runs a script that looks at a page with a browser; the JSON that it prints.
 fn look(readers: &Path, script: &str, arguments: &[&OsStr]) -> serde_json::Value {
-    let mut command = Command::new("node");
-    command.arg(Path::new(ROOT).join("tests/readers").join(script)).args(arguments);
-    let Output { status, stdout, stderr } = command.env("HUMMINGBUS_READERS", readers).output().unwrap();
+    let Output { status, stdout, stderr } = reader_of_a_page(readers, script, arguments);
     assert!(status.success(), "{script}: {}", String::from_utf8_lossy(&stderr));
     serde_json::from_slice(&stdout).unwrap()
+}
+
+fn reader_of_a_page(readers: &Path, script: &str, arguments: &[&OsStr]) -> Output {
+    let mut command = Command::new("node");
+    command.arg(Path::new(ROOT).join("tests/readers").join(script)).args(arguments);
+    command.env("HUMMINGBUS_READERS", readers).output().unwrap_or_else(|error| panic!("node: {error}"))
 }

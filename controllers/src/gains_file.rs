@@ -17,7 +17,7 @@ pub type Reader<G> = fn(&Section<'_, '_>) -> Result<G, VehicleError>;
 /// The file cannot be read, or `read` refuses it.
 pub fn load<G>(path: &Path, read: Reader<G>) -> Result<G, VehicleError> {
     let file = path.display().to_string();
-    match std::fs::read_to_string(path) {
+    match vehicles::text::read(path) {
         Ok(text) => parse(&text, &file, read),
         Err(cause) => Err(VehicleError::Unreadable { file, cause }),
     }

@@ -22,15 +22,23 @@ pub struct FlightSet {
     pub flights: Vec<Flight>,
 }
 
+/// The bytes of the file at `path`. A device or a pipe has no end that a log could be read to.
+fn read_log(path: &Path) -> std::io::Result<Vec<u8>> {
+    if !path.metadata()?.is_file() {
+        return Err(std::io::Error::other("it is not a regular file"));
+    }
+    std::fs::read(path)
+}
+
 impl FlightSet {
     /// Reads the flights file at `path` and its logs.
     ///
     /// # Errors
     /// As [`FlightSet::parse`], and if a file cannot be read.
     pub fn load(path: &Path) -> Result<Self, FlightsError> {
-        let text = std::fs::read_to_string(path)
+        let text = vehicles::text::read(path)
             .map_err(|cause| FlightsError::Unreadable { file: path.display().to_string(), cause })?;
-        Self::parse(path, text, &|file| std::fs::read(file))
+        Self::parse(path, text, &read_log)
     }
 
     /// Reads the flights file at `path` with this text; `read` gives the bytes of the vehicle file and of the logs.

@@ -39,7 +39,7 @@ impl Scene {
     /// What is wrong with the file, and where.
     pub fn load(path: &Path) -> Result<Self, VehicleError> {
         let file = path.display().to_string();
-        match std::fs::read_to_string(path) {
+        match vehicles::text::read(path) {
             Ok(text) => Self::parse(&text, &file),
             Err(cause) => Err(VehicleError::Unreadable { file, cause }),
         }

@@ -13,15 +13,22 @@ const KEY: &str = "include";
 /// Lists at the top level, to which each file adds.
 pub const LISTS: [&str; 5] = ["compare", "pass", "shadow", "swap", "vehicle"];
 
-/// Reads `path` and, file by file, what it includes; a file that is included twice is read once.
+/// Reads the manifest's own file.
+///
+/// # Errors
+/// If it cannot be read.
+pub fn text(path: &Path) -> Result<String, Problem> {
+    vehicles::text::read(path).map_err(|error| {
+        Problem::in_file(path, format!("cannot be read: {error}"), "give the path of a manifest")
+    })
+}
+
+/// Reads, file by file, what `text`, the manifest at `path`, includes; a file that is included twice is read once.
 ///
 /// # Errors
 /// A file that cannot be read or includes itself, at the place of the include.
-pub fn read(path: &Path) -> Result<Sources, Problem> {
+pub fn read(path: &Path, text: String) -> Result<Sources, Problem> {
     let mut reader = Reader { sources: Sources::default(), read: Vec::new(), open: Vec::new() };
-    let text = std::fs::read_to_string(path).map_err(|error| {
-        Problem::in_file(path, format!("cannot be read: {error}"), "give the path of a manifest")
-    })?;
     reader.add(path, text)?;
     Ok(reader.sources)
 }
@@ -63,7 +70,7 @@ impl Reader {
         if self.read.contains(&identity) {
             return Ok(());
         }
-        let text = std::fs::read_to_string(&path).map_err(|error| {
+        let text = vehicles::text::read(&path).map_err(|error| {
             let message = format!("the included file {} cannot be read: {error}", path.display());
             at(message, "a path is relative to the file that includes it")
         })?;

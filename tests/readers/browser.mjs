@@ -9,6 +9,9 @@ const puppeteer = require("puppeteer-core");
 
 const NAMES = ["chromium", "chromium-browser", "google-chrome"];
 const PATIENCE_MS = 180_000;
+// WebGL by the processor on every machine: whether a build of Chromium falls back to it by itself depends on its version
+// and on whether it finds a graphics card.
+const ARGS = ["--use-angle=swiftshader", "--enable-unsafe-swiftshader"];
 
 function isExecutable(path) {
   try {
@@ -26,14 +29,25 @@ function findBrowser() {
   return path;
 }
 
+/** Ends with words where the page has no WebGL 2: what then comes of the page says nothing about the page. */
+async function requireWebGl(browser, page) {
+  if (await page.evaluate(() => document.createElement("canvas").getContext("webgl2") !== null)) return;
+  const started = [findBrowser(), ...ARGS].join(" ");
+  throw new Error(
+    `this reader needs WebGL 2, and the browser has none: ${await browser.version()}, started as ${started}; ` +
+      "the page chrome://gpu of this browser says why; install another version, or add the flag that it asks for in tests/readers/browser.mjs",
+  );
+}
+
 const isLocal = (url) => /^(file|data|blob):/.test(url) || new URL(url).hostname === "127.0.0.1";
 
 /**
  * Opens `url` and calls `use` with the page and a list of what went wrong in it: errors, and requests that would have
- * left this machine, which are refused. `before` runs in the page in front of its own scripts.
+ * left this machine, which are refused. `before` runs in the page in front of its own scripts; `needsWebGl` says that
+ * without WebGL there is nothing to look at.
  */
-export async function withPage(url, use, before) {
-  const args = ["--disable-gpu", ...(process.getuid() === 0 ? ["--no-sandbox"] : [])];
+export async function withPage(url, use, { before, needsWebGl = false } = {}) {
+  const args = [...ARGS, ...(process.getuid() === 0 ? ["--no-sandbox"] : [])];
   const browser = await puppeteer.launch({ executablePath: findBrowser(), args, timeout: PATIENCE_MS });
   try {
     const page = await browser.newPage();
@@ -49,6 +63,7 @@ export async function withPage(url, use, before) {
     await page.setRequestInterception(true);
     if (before) await page.evaluateOnNewDocument(before);
     await page.goto(url, { waitUntil: "load" });
+    if (needsWebGl) await requireWebGl(browser, page);
     return await use(page, wrong);
   } finally {
     await browser.close();

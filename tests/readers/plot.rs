@@ -1,6 +1,6 @@
 //! A browser draws the page of a recording: curves over time, and the paths in space with the scene.
 
-use crate::{Flight, ROOT, hummingbus, laps, look, readers};
+use crate::{Flight, ROOT, hummingbus, laps, look, reader_of_a_page, readers};
 use serde_json::{Value, json};
 use std::collections::BTreeSet;
 use std::ffi::OsStr;
@@ -106,12 +106,25 @@ fn require_zoom(seen: &Value) {
 fn a_browser_draws_the_room_and_the_paths_in_it_and_the_vehicle_that_is_chosen() {
     let Some(readers) = readers() else { return };
     let flight = Laps::of(&["h1", "h2"]);
-    let seen = look(&readers, "read_plot.mjs", &[flight.page.as_os_str()]);
+    let seen = look(&readers, "read_plot.mjs", &[flight.page.as_os_str(), "needs-webgl".as_ref()]);
     assert_eq!((&seen["wrong"], &seen["vehicles"]), (&json!([]), &json!(["h1", "h2"])));
     require_space(&seen);
     // The second starts a quarter of a lap ahead.
     let x = |seen: &Value| seen["axes"][3]["lines"][0]["y"][0].as_f64().unwrap().round();
     assert_eq!((x(&seen), x(&seen["second"])), (2.0, 0.0));
+}
+
+#[test]
+fn a_browser_that_lacks_what_a_reader_needs_is_named_with_it() {
+    let Some(readers) = readers() else { return };
+    let flight = Laps::of(&["h1"]);
+    let words = [flight.page.as_os_str(), "needs-webgl".as_ref(), "no-webgl".as_ref()];
+    let output = reader_of_a_page(&readers, "read_plot.mjs", &words);
+    let message = String::from_utf8_lossy(&output.stderr);
+    assert!(!output.status.success(), "{message}");
+    for word in ["needs WebGL 2", "Chrome", "started as /", "chrome://gpu"] {
+        assert!(message.contains(word), "`{word}` is missing: {message}");
+    }
 }
 
 #[test]

@@ -1,4 +1,5 @@
-// Prints as JSON what a browser draws of a recording's page. Usage: read_plot.mjs PAGE [no-webgl] [SCREENSHOT.png]
+// Prints as JSON what a browser draws of a recording's page. Usage: read_plot.mjs PAGE [needs-webgl] [no-webgl] [SCREENSHOT.png]
+// `needs-webgl` fails where the browser has no WebGL, `no-webgl` takes it away from the page.
 
 import { pathToFileURL } from "node:url";
 import { withPage } from "./browser.mjs";
@@ -96,5 +97,5 @@ const seen = await withPage(pathToFileURL(file).href, async (page, wrong) => {
   const zoomed = first.axes.length ? await zoom(page) : null;
   if (first.vehicles.length > 1) await change(page);
   return { ...first, colours: space, zoomed, second: first.vehicles.length > 1 ? await page.evaluate(look) : null, wrong };
-}, withoutWebGl ? refuseWebGl : undefined);
+}, { before: withoutWebGl ? refuseWebGl : undefined, needsWebGl: rest.includes("needs-webgl") });
 console.log(JSON.stringify(seen));

@@ -10,6 +10,7 @@
 //! - [`terminal`]: a terminal for a program under test
 //! - [`loss`]: every sample is recorded
 //! - [`contract`]: what a node sees and sends at a tick
+//! - [`corpus`]: what fuzzers found is read once more
 //! - [`failures`]: nodes that fail, in every way
 //! - [`cleanup`]: runs that are stopped or killed
 //! - [`refusals`]: manifests that are wrong
@@ -29,6 +30,7 @@ mod clean;
 mod cleanup;
 mod commands;
 mod contract;
+mod corpus;
 mod determinism;
 mod documentation;
 mod failures;

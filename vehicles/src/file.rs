@@ -38,7 +38,7 @@ fn on_base(root: &Section, path: &Path) -> Result<Vehicle, VehicleError> {
     let (name, file) = (title(root)?, path.display().to_string());
     let more = effects::read(root)?;
     root.finish()?;
-    let text = std::fs::read_to_string(path).map_err(|cause| {
+    let text = crate::text::read(path).map_err(|cause| {
         let expected = "the path of a vehicle file, relative to this one";
         root.doc.bad(&root.at_of("base"), "base", expected, format!("{file}: {cause}"))
     })?;

@@ -93,7 +93,7 @@ impl Vehicle {
     /// Reads and checks a vehicle file.
     pub fn load(path: &Path) -> Result<Self, VehicleError> {
         let file = path.display().to_string();
-        match std::fs::read_to_string(path) {
+        match crate::text::read(path) {
             Ok(text) => Self::parse(&text, &file),
             Err(cause) => Err(VehicleError::Unreadable { file, cause }),
         }
@@ -107,7 +107,7 @@ impl Vehicle {
 
     /// The file that the vehicle file at `path` adds effects to, if it names one.
     pub fn base(path: &Path) -> Option<PathBuf> {
-        let text = std::fs::read_to_string(path).ok()?;
+        let text = crate::text::read(path).ok()?;
         let table: toml::Table = text.parse().ok()?;
         Some(crate::file::beside(path, table.get("base")?.as_str()?))
     }
