@@ -8,19 +8,18 @@
 //! the run had it write, and if no live launcher is above or below it.
 #![allow(clippy::disallowed_methods, reason = "waiting for a killed process takes host time")]
 
+use crate::process_table::{ancestors, run_dir_of};
 use crate::run_dir::{
     Entry, SHARED_MEMORY, entry_path, folders, is_own_name, is_own_run_dir, is_run_dir_of, live_runs,
     run_of_dir, run_of_shared_memory, shared_memory_of, try_claim,
 };
 use anyhow::Result;
 use bus::own_file;
-use bus::process::{RUN_VARIABLE, user_id};
+use bus::process::user_id;
 use indicatif::HumanBytes;
 use rustix::process::{Pid, PidfdFlags, Signal, pidfd_open, pidfd_send_signal};
 use serde::Serialize;
 use std::collections::{BTreeMap, BTreeSet};
-use std::ffi::OsStr;
-use std::os::unix::ffi::OsStrExt;
 use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
@@ -152,27 +151,20 @@ impl Kin {
     fn of_live_launchers() -> Self {
         let launchers: BTreeSet<i32> =
             live_runs().iter().map(|run| run.entry.launcher.cast_signed()).collect();
-        Self { above: launchers.iter().copied().flat_map(ancestors).collect(), launchers }
+        let above =
+            launchers.iter().copied().filter_map(Pid::from_raw).flat_map(ancestors).map(number).collect();
+        Self { launchers, above }
     }
 
     /// Whether a process is a live launcher, or above or below one.
     fn has(&self, process: Pid) -> bool {
-        let process = process.as_raw_nonzero().get();
-        self.above.contains(&process)
-            || std::iter::once(process).chain(ancestors(process)).any(|id| self.launchers.contains(&id))
+        let mut line = std::iter::once(process).chain(ancestors(process)).map(number);
+        self.above.contains(&number(process)) || line.any(|id| self.launchers.contains(&id))
     }
 }
 
-/// The processes above a process, its parent first.
-fn ancestors(process: i32) -> impl Iterator<Item = i32> {
-    std::iter::successors(Some(process), |&process| parent_of(process)).skip(1)
-}
-
-fn parent_of(process: i32) -> Option<i32> {
-    let line = std::fs::read_to_string(format!("/proc/{process}/stat")).ok()?;
-    // The name in brackets may hold anything, brackets and spaces too.
-    let parent = line.rsplit_once(')')?.1.split_whitespace().nth(1)?.parse().ok()?;
-    Some(parent).filter(|&parent| parent > 1)
+fn number(process: Pid) -> i32 {
+    process.as_raw_nonzero().get()
 }
 
 /// Whether a process holds a file of `run_dir` open, also one that is removed by now.
@@ -185,23 +177,13 @@ fn holds_file_of(process: Pid, run_dir: &Path) -> bool {
     targets.any(|target| resolved.as_ref().is_some_and(|run_dir| target.starts_with(run_dir)))
 }
 
-/// The run directory that a process carries in its environment; `None` for one that has ended.
-fn run_dir_of(process: Pid) -> Option<PathBuf> {
-    let environment = std::fs::read(format!("/proc/{process}/environ")).ok()?;
-    let mut variables = environment.split(|&byte| byte == 0);
-    let value = variables.find_map(|variable| {
-        variable.strip_prefix(RUN_VARIABLE.as_bytes()).and_then(|rest| rest.strip_prefix(b"="))
-    })?;
-    Some(PathBuf::from(OsStr::from_bytes(value)))
-}
-
 fn look_at(run_id: String, traces: &Traces) -> Remains {
     let run_dirs = traces.run_dirs.iter().filter(|path| is_own_run_dir(path)).cloned();
     // The entry last, as it goes when a run ends by itself.
     let entry = Some(entry_path(&run_id)).filter(|path| is_own_name(path));
     let paths: Vec<PathBuf> = run_dirs.chain(shared_memory_of(&run_id)).chain(entry).collect();
     let bytes = paths.iter().map(|path| bytes_below(path)).sum();
-    let processes = traces.processes.iter().map(|process| process.as_raw_nonzero().get()).collect();
+    let processes = traces.processes.iter().copied().map(number).collect();
     Remains { run_id, processes, paths, bytes, failures: Vec::new() }
 }
 

@@ -3,13 +3,12 @@
 //! The launcher makes itself their reaper (PR_SET_CHILD_SUBREAPER): whatever loses its parent becomes the launcher's
 //! child, however it was detached. So the launcher has only to end its children until there are none left.
 
+use crate::process_table::{children, run_dir_of};
+use crate::run_dir::run_of_dir;
 use crate::watch_clock::WatchClock;
-use bus::process::RUN_VARIABLE;
 use rustix::process::{
     Pid, Signal, WaitOptions, child_subreaper, kill_process, set_child_subreaper, waitpid,
 };
-use std::ffi::OsStr;
-use std::os::unix::ffi::OsStrExt;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
@@ -36,10 +35,18 @@ impl Descendants {
         Self { run_dir: run_dir.to_owned(), before: children(), was_reaper }
     }
 
+    /// Whether `run_dir` is that of another run of this very process.
+    fn is_of_another_run(&self, run_dir: &Path) -> bool {
+        let run = run_dir.file_name().and_then(|name| name.to_str()).and_then(run_of_dir);
+        let launcher = run.and_then(|run| run.split_once('-')).map(|(launcher, _)| launcher);
+        run_dir != self.run_dir && launcher == Some(format!("{:x}", std::process::id()).as_str())
+    }
+
     /// The children of this process that came with the run, and are not of another run of this process.
     fn left(&self) -> Vec<Pid> {
         let came = children().into_iter().filter(|child| !self.before.contains(child));
-        came.filter(|&child| run_dir_of(child).is_none_or(|run_dir| run_dir == self.run_dir)).collect()
+        came.filter(|&child| run_dir_of(child).is_none_or(|run_dir| !self.is_of_another_run(&run_dir)))
+            .collect()
     }
 }
 
@@ -71,32 +78,4 @@ impl Drop for Descendants {
             let _ = set_child_subreaper(None);
         }
     }
-}
-
-/// The children of this process.
-fn children() -> Vec<Pid> {
-    let own = rustix::process::getpid();
-    let entries = std::fs::read_dir("/proc").into_iter().flatten().flatten();
-    let processes =
-        entries.filter_map(|entry| entry.file_name().to_str()?.parse().ok().and_then(Pid::from_raw));
-    processes.filter(|&process| parent_of(process) == Some(own)).collect()
-}
-
-/// The parent of a process; `None` for one that is gone.
-fn parent_of(process: Pid) -> Option<Pid> {
-    let stat = std::fs::read(format!("/proc/{process}/stat")).ok()?;
-    // The name stands in brackets and may hold anything; behind it come the state and the parent (proc_pid_stat(5)).
-    let behind = stat.iter().rposition(|&byte| byte == b')')? + 1;
-    let mut fields = stat[behind..].split(u8::is_ascii_whitespace).filter(|field| !field.is_empty());
-    std::str::from_utf8(fields.nth(1)?).ok()?.parse().ok().and_then(Pid::from_raw)
-}
-
-/// The run directory in the environment of a process; `None` for one that has ended or has none.
-fn run_dir_of(process: Pid) -> Option<PathBuf> {
-    let environment = std::fs::read(format!("/proc/{process}/environ")).ok()?;
-    let mut variables = environment.split(|&byte| byte == 0);
-    let value = variables.find_map(|variable| {
-        variable.strip_prefix(RUN_VARIABLE.as_bytes()).and_then(|rest| rest.strip_prefix(b"="))
-    })?;
-    Some(PathBuf::from(OsStr::from_bytes(value)))
 }

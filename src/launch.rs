@@ -137,6 +137,8 @@ pub fn count_interrupts() -> Result<Arc<AtomicUsize>> {
         seen.fetch_add(1, Ordering::SeqCst);
     })
     .context("cannot handle Ctrl-C")?;
+    // A run that a node of another run starts has them blocked.
+    bus::process::hear_stop_signals();
     Ok(COUNT.get_or_init(|| count).clone())
 }
 

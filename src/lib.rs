@@ -29,6 +29,7 @@ mod placement;
 mod plot;
 mod problem;
 mod process_log;
+mod process_table;
 mod processes;
 mod profile;
 mod program;

@@ -55,6 +55,11 @@ pub fn hold_stop_signals(command: &mut Command) {
     unsafe { command.pre_exec(block) };
 }
 
+/// Has this process hear SIGTERM and SIGINT although whoever started it had them wait.
+pub fn hear_stop_signals() {
+    mask_stop_signals(libc::SIG_UNBLOCK);
+}
+
 fn mask_stop_signals(how: libc::c_int) {
     // SAFETY: the set lives across the calls, is initialised by the first one, and the calls keep no reference to it.
     unsafe {
