@@ -64,7 +64,7 @@ enum Repeat {
 
 /// How deep messages may stand in messages; ROS 2's own stay below ten.
 const DEPTH_MAX: usize = 64;
-/// How long the path of a value may be for each byte of the message.
+/// How long the paths of values may be for each byte of the message, which counts as DEPTH_MAX bytes longer.
 const PATH_BYTES_MAX: usize = 1024;
 
 /// A parsed definition.
@@ -109,7 +109,7 @@ impl Definition {
             leaves: Vec::new(),
             depth: 0,
             values_left: DEPTH_MAX.saturating_mul(body.len() + 1),
-            path_bytes_left: PATH_BYTES_MAX.saturating_mul(body.len() + 1),
+            path_bytes_left: PATH_BYTES_MAX.saturating_mul(body.len() + DEPTH_MAX),
         };
         walk.message(&self.root, "", "")?;
         Ok(walk.leaves)
