@@ -10,7 +10,7 @@
 
 use crate::process_table::{ancestors, run_dir_of};
 use crate::run_dir::{
-    Entry, SHARED_MEMORY, entry_path, folders, is_own_name, is_own_run_dir, is_run_dir_of, live_runs,
+    Claim, Entry, SHARED_MEMORY, entry_path, folders, is_own_name, is_own_run_dir, is_run_dir_of, live_runs,
     run_of_dir, run_of_shared_memory, shared_memory_of, try_claim,
 };
 use anyhow::Result;
@@ -26,6 +26,8 @@ use std::time::{Duration, Instant};
 
 /// How long a killed process may take to be gone.
 const GRACE: Duration = Duration::from_secs(5);
+/// How long a process may take from its start to the beginning of its program.
+const BEGINNING: Duration = Duration::from_secs(1);
 const POLL: Duration = Duration::from_millis(2);
 
 /// What there was to clean.
@@ -62,7 +64,7 @@ pub fn clean(dry_run: bool) -> Result<Report> {
     let mut report = Report { dry_run, live: Vec::new(), dead: Vec::new() };
     for (run_id, traces) in find_traces()? {
         // Held until everything is removed: a launcher that is just registering this run waits for it.
-        let Some(_claim) = try_claim(&run_id, &traces.run_dirs) else {
+        let Some(_claim) = claim(&run_id, &traces.run_dirs) else {
             report.live.push(run_id);
             continue;
         };
@@ -75,6 +77,25 @@ pub fn clean(dry_run: bool) -> Result<Report> {
         }
     }
     Ok(report)
+}
+
+/// Claims what a run left; `None` if it is alive. What a launcher was just starting when it was killed holds its locks,
+/// too, until it has begun as another program: that is waited for.
+fn claim(run_id: &str, run_dirs: &BTreeSet<PathBuf>) -> Option<Claim> {
+    let start = Instant::now();
+    loop {
+        let claim = try_claim(run_id, run_dirs);
+        if claim.is_some() || launcher_is_there(run_id) || start.elapsed() > BEGINNING {
+            return claim;
+        }
+        std::thread::sleep(POLL);
+    }
+}
+
+/// Whether a process has the number of the run's launcher, with which the run's name begins.
+fn launcher_is_there(run_id: &str) -> bool {
+    let number = run_id.split_once('-').and_then(|(launcher, _)| u32::from_str_radix(launcher, 16).ok());
+    number.is_some_and(|number| Path::new("/proc").join(number.to_string()).exists())
 }
 
 /// Where a run was met: its directory, wherever its folder for temporary files was, and its processes.

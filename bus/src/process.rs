@@ -97,9 +97,22 @@ fn die_with_parent() {
 /// From now on a write beyond the limit on the size of files is an error with a reason, and no end without a word.
 /// What this process starts dies of it as before: the kernel forgets a handler where another program begins.
 pub fn survive_file_limit() {
+    // Who had it ignored gets such errors already, in everything that is started as well.
+    if is_ignored(libc::SIGXFSZ) {
+        return;
+    }
     static IS_REACHED: OnceLock<Arc<AtomicBool>> = OnceLock::new();
     let flag = IS_REACHED.get_or_init(Arc::default);
     let _ = signal_hook::flag::register(signal_hook::consts::SIGXFSZ, flag.clone());
+}
+
+fn is_ignored(signal: libc::c_int) -> bool {
+    let mut found = std::mem::MaybeUninit::<libc::sigaction>::uninit();
+    // SAFETY: the call changes nothing and writes one `sigaction`, which is read only if it succeeded.
+    let found = unsafe {
+        (libc::sigaction(signal, std::ptr::null(), found.as_mut_ptr()) == 0).then(|| found.assume_init())
+    };
+    found.is_some_and(|found| found.sa_sigaction == libc::SIG_IGN)
 }
 
 /// A process's place in a run, taken for as long as this value lives: the kernel frees it when the process dies.

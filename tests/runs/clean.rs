@@ -338,3 +338,32 @@ fn names_of_runs_that_are_no_files_of_runs_hinder_nobody_and_lead_nowhere() {
     require_unmoved(&place, &target);
     assert!(strange.0.iter().all(|path| path.symlink_metadata().is_ok()), "another user's are left alone");
 }
+
+#[test]
+fn what_a_killed_launcher_left_in_the_place_of_a_folder_that_does_not_serve_is_removed() {
+    let _alone = alone();
+    let (place, dead) = (Place::new(), Place::new());
+    let folder = dead.path("a\n\"b");
+    std::fs::create_dir(&folder).unwrap();
+    let (manifest, recording) = (repository("manifests/hover.toml"), dead.path("flown.mcap"));
+    let mut command = Command::new("env");
+    command.args([&format!("TMPDIR={folder}"), env!("CARGO_BIN_EXE_hummingbus"), "run", &manifest]);
+    command.args(["--record", &recording, "--pace", "realtime"]);
+    let launch = dead.launch(command);
+    let prefix = format!("/dev/shm/hb_{:x}-", launch.id());
+    let entry: Value = poll("no entry", || {
+        let mut names = std::fs::read_dir("/dev/shm").unwrap().flatten().map(|file| file.path());
+        let is_entry = |path: &PathBuf| {
+            path.to_string_lossy().starts_with(&prefix) && path.to_string_lossy().ends_with("_run")
+        };
+        serde_json::from_slice(&std::fs::read(names.find(is_entry)?).ok()?).ok()
+    });
+    let run_dir = Path::new(entry["run_dir"].as_str().unwrap());
+    poll("no plan", || run_dir.join("plan.json").metadata().ok());
+    assert!(!run_dir.starts_with(&folder), "{run_dir:?}");
+    launch.kill();
+    let report = clean(&place, &[]);
+    let remains = remains_of(&report, entry["run_id"].as_str().unwrap()).unwrap();
+    assert_eq!(remains["paths"][0], entry["run_dir"], "{report:#}");
+    assert!(!run_dir.exists() && dead.left().is_empty(), "{report:#}");
+}
