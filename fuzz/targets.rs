@@ -13,8 +13,11 @@ use std::path::{Path, PathBuf};
 use tempfile::TempDir;
 use vehicles::Vehicle;
 
+/// Reads an input; whether it was accepted.
+pub type Target = fn(&[u8]) -> bool;
+
 /// Every target by its name, which is that of its folder in `corpus/`.
-pub const TARGETS: [(&str, fn(&[u8]) -> bool); 8] = [
+pub const TARGETS: [(&str, Target); 8] = [
     ("manifest", manifest),
     ("vehicle", vehicle),
     ("scene", scene),
