@@ -32,7 +32,7 @@ pub fn last_words(path: &Path) -> Vec<String> {
         return Vec::new();
     }
     let is_panic = |line: &&[u8]| line.windows(PANIC.len()).any(|part| part == PANIC);
-    let start = lines.iter().rposition(|line| is_panic(&line)).unwrap_or(lines.len().saturating_sub(LINES));
+    let start = lines.iter().rposition(is_panic).unwrap_or(lines.len().saturating_sub(LINES));
     lines[start..].iter().take(LINES).map(|line| printable(line)).collect()
 }
 
@@ -134,7 +134,7 @@ mod tests {
 
     #[test]
     fn a_flood_is_read_from_its_end() {
-        let mut flood = b"panicked at the very start\n".repeat(1);
+        let mut flood = b"panicked at the very start\n".to_vec();
         flood.extend(b"noise noise noise noise\n".repeat(100_000));
         flood.extend(b"the last line\n");
         let words = words_of(&flood);

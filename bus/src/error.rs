@@ -228,17 +228,15 @@ pub enum BusError {
     },
     /// A node wrote a sample that holds a number that is none.
     #[error(
-        "node `{node}` failed at tick {tick} (t = {time_s:.3} s): its output `{port}` on {topic} holds {field} = \
-         {value}, expected a finite number; the sample was not sent. What the node read last, and its own numbers \
+        "node `{node}` failed at tick {tick} (t = {time_s:.3} s): its output {output} holds {field} = {value}, \
+         expected a finite number; the sample was not sent. What the node read last, and its own numbers \
          (gains, vehicle, parameters), are where to look"
     )]
     NotFinite {
         /// The node.
         node: String,
-        /// Its output.
-        port: String,
-        /// The topic.
-        topic: String,
+        /// Its output, and the topic.
+        output: String,
         /// The field, with its place in an array.
         field: String,
         /// What it holds: NaN, inf or -inf.

@@ -362,8 +362,7 @@ impl OutPort {
     fn not_finite(&self, (offset, value): (usize, f64), tick: u32, time_ns: u64, node: &str) -> BusError {
         BusError::NotFinite {
             node: node.to_owned(),
-            port: self.port.clone(),
-            topic: self.topic_name.clone(),
+            output: format!("`{}` on {}", self.port, self.topic_name),
             field: field_at(self.schema, offset),
             value,
             tick,

@@ -191,7 +191,7 @@ mod tests {
         };
         let scale = 10_f64.powi(digits);
         let mut value = |k: i32, axis: i32| {
-            let smooth = (0.011 * f64::from(k) + f64::from(axis)).sin();
+            let smooth = libm::sin(0.011 * f64::from(k) + f64::from(axis));
             ((smooth + 0.02 * noise()) * scale).round() / scale
         };
         let values = (0..4000).map(|k| [value(k, 0), value(k, 1), value(k, 2)]).collect();

@@ -141,9 +141,9 @@ fn a_course_that_comes_round_may_be_cut_into_laps() {
         let (t, angle) = (0.01 * f64::from(k), std::f64::consts::TAU * 0.002 * f64::from(k));
         format!(
             "{t:.2},100,100,100,100,{},{},1,0,0,0,1,{},0,0\n",
-            angle.cos(),
-            angle.sin(),
-            0.01 * angle.sin()
+            libm::cos(angle),
+            libm::sin(angle),
+            0.01 * libm::sin(angle)
         )
     };
     place.write("log.csv", (0..=1000).map(row).fold(header.to_owned(), |text, row| text + &row).as_bytes());

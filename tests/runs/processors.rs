@@ -21,7 +21,7 @@ const TICKS: u32 = 5000;
 const OTHERS: [(&str, u32); 3] = [("swap-laws", 10_000), ("ten-vehicles", 1000), ("replay-nanobench", 1001)];
 
 /// Functions of the C library that a node may call, with the end of its name, since they change nothing: the number of
-/// halvings in nalgebra's matrix exponential, and a count in parry's tree of boxes (docs/decisions/020-numbers.md).
+/// halvings in nalgebra's matrix exponential, and a count in parry's tree of boxes (docs/decisions/009-numbers.md).
 const ALLOWED: [(&str, &str); 2] = [("log2", "controller"), ("log2", "plant")];
 
 /// Where the witness, `c_library.c`, writes which functions are called.
