@@ -168,7 +168,7 @@ impl Course {
         self.segments.iter().map(|segment| segment.start_s)
     }
 
-    /// Refuses a course that no vehicle flies: each segment is looked at in [`LOOKS`] places.
+    /// Refuses a course that no vehicle flies: each segment is looked at in `LOOKS` places.
     ///
     /// # Errors
     /// Which segment asks for how much, and where.
