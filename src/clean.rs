@@ -48,6 +48,8 @@ pub struct Remains {
     pub run_id: String,
     /// Processes that outlived it.
     pub processes: Vec<i32>,
+    /// Processes that carry its name and hold none of its files: they may be anything that it started, and live on.
+    pub spared: Vec<i32>,
     /// Files and directories.
     pub paths: Vec<PathBuf>,
     /// Memory and disk space that these take.
@@ -103,6 +105,7 @@ fn launcher_is_there(run_id: &str) -> bool {
 struct Traces {
     run_dirs: BTreeSet<PathBuf>,
     processes: Vec<Pid>,
+    spared: Vec<Pid>,
 }
 
 fn find_traces() -> Result<BTreeMap<String, Traces>> {
@@ -120,11 +123,11 @@ fn find_traces() -> Result<BTreeMap<String, Traces>> {
             found.entry(run_id.to_owned()).or_default().run_dirs.insert(path);
         }
     }
-    for (process, run_dir) in processes_of_runs()? {
+    for (process, run_dir, holds_file) in processes_of_runs()? {
         if let Some(run_id) = name_of(&run_dir).and_then(run_of_dir).map(str::to_owned) {
             let traces = found.entry(run_id).or_default();
             traces.run_dirs.extend(Some(run_dir).filter(|run_dir| run_dir.is_absolute()));
-            traces.processes.push(process);
+            if holds_file { &mut traces.processes } else { &mut traces.spared }.push(process);
         }
     }
     Ok(found)
@@ -141,8 +144,9 @@ fn own_files(folder: &Path) -> Vec<PathBuf> {
     entries.filter(is_own).map(|entry| entry.path()).collect()
 }
 
-/// This user's processes that carry a run directory, except this one and those that see another /dev/shm.
-fn processes_of_runs() -> Result<Vec<(Pid, PathBuf)>> {
+/// This user's processes that carry a run directory, and whether they hold a file of it; except this one and those that
+/// see another /dev/shm.
+fn processes_of_runs() -> Result<Vec<(Pid, PathBuf, bool)>> {
     let (own_mounts, kin) = (mounts_of(Path::new("/proc/self")), Kin::of_live_launchers());
     let entries = std::fs::read_dir("/proc")?.flatten();
     let process = |entry: std::fs::DirEntry| {
@@ -152,7 +156,8 @@ fn processes_of_runs() -> Result<Vec<(Pid, PathBuf)>> {
         let is_own = entry.metadata().is_ok_and(|file| file.uid() == user_id());
         (is_own && mounts_of(&entry.path()) == own_mounts).then_some(())?;
         let run_dir = run_dir_of(process).filter(|_| !kin.has(process))?;
-        holds_file_of(process, &run_dir).then_some((process, run_dir))
+        let holds_file = holds_file_of(process, &run_dir);
+        Some((process, run_dir, holds_file))
     };
     Ok(entries.filter_map(process).collect())
 }
@@ -204,8 +209,9 @@ fn look_at(run_id: String, traces: &Traces) -> Remains {
     let entry = Some(entry_path(&run_id)).filter(|path| is_own_name(path));
     let paths: Vec<PathBuf> = run_dirs.chain(shared_memory_of(&run_id)).chain(entry).collect();
     let bytes = paths.iter().map(|path| bytes_below(path)).sum();
-    let processes = traces.processes.iter().copied().map(number).collect();
-    Remains { run_id, processes, paths, bytes, failures: Vec::new() }
+    let [processes, spared] =
+        [&traces.processes, &traces.spared].map(|all| all.iter().copied().map(number).collect());
+    Remains { run_id, processes, spared, paths, bytes, failures: Vec::new() }
 }
 
 /// The space that a file, or a folder with everything in it, takes up; it may be far less than its length.
@@ -217,7 +223,7 @@ fn bytes_below(path: &Path) -> u64 {
 
 impl Remains {
     fn is_empty(&self) -> bool {
-        self.processes.is_empty() && self.paths.is_empty()
+        self.processes.is_empty() && self.spared.is_empty() && self.paths.is_empty()
     }
 
     /// Ends the processes, then removes the files, which they may still be writing.
@@ -281,6 +287,12 @@ impl std::fmt::Display for Report {
                 writeln!(f, "  {} in {SHARED_MEMORY}", count(shared.len(), "file"))?;
             }
             remains.processes.iter().try_for_each(|process| writeln!(f, "  process {process}"))?;
+            remains.spared.iter().try_for_each(|process| {
+                writeln!(
+                    f,
+                    "  not killed: process {process}, which the run started and which holds none of its files"
+                )
+            })?;
             remains.failures.iter().try_for_each(|failure| writeln!(f, "  LEFT {failure}"))?;
         }
         let bytes = HumanBytes(self.dead.iter().map(|remains| remains.bytes).sum());

@@ -11,6 +11,8 @@ use std::time::Duration;
 
 /// How long a companion must have lived for a restart to lead somewhere.
 const LIFE_MIN: Duration = Duration::from_secs(1);
+/// Messages of a companion that are read in one look, so that one that never ends keeps nobody waiting.
+const MESSAGES_MAX: usize = 32;
 /// The longest message of sd_notify(3) that is looked at.
 const MESSAGE_BYTES: usize = 4096;
 
@@ -28,6 +30,8 @@ struct Companion<'a> {
     /// Where it says that it is ready; `None` for one that need not.
     socket: Option<(UnixDatagram, PathBuf)>,
     is_ready: bool,
+    /// Whether the first tick need not wait for it any more.
+    was_ready: bool,
     started: Duration,
 }
 
@@ -59,13 +63,14 @@ impl<'a> Companions<'a> {
     pub fn start(&mut self, name: &str, program: &'a Program) -> Result<()> {
         let socket = match program.ready {
             Readiness::Started => None,
-            Readiness::Notify => Some(open_socket(name, self.run_dir)?),
+            Readiness::Notify => Some(open_socket(name, self.all.len(), self.run_dir)?),
         };
         let notify = socket.as_ref().map(|(_, path)| path.as_path());
         let process =
             Process::start(name, Role::Companion { generation: 0 }, Some(program), self.run_dir, notify)?;
         let (is_ready, started) = (socket.is_none(), self.clock.now());
-        self.all.push(Companion { program, process, generation: 0, socket, is_ready, started });
+        let was_ready = is_ready;
+        self.all.push(Companion { program, process, generation: 0, socket, is_ready, was_ready, started });
         Ok(())
     }
 
@@ -94,6 +99,11 @@ impl<'a> Companions<'a> {
         Ok(())
     }
 
+    /// The process numbers of all.
+    pub fn ids(&self) -> impl Iterator<Item = u32> {
+        self.all.iter().map(|companion| companion.process.id())
+    }
+
     /// Keeps logs in the run directory from filling its file system.
     pub fn bound_logs(&self) {
         self.all.iter().for_each(|companion| companion.process.bound_log(self.run_dir));
@@ -101,7 +111,7 @@ impl<'a> Companions<'a> {
 
     /// Whether all that the first tick waits for are ready.
     pub fn all_ready(&self) -> bool {
-        self.all.iter().all(|companion| companion.is_ready || companion.generation > 0)
+        self.all.iter().all(|companion| companion.was_ready)
     }
 
     /// The next one that has failed and of which nobody has drawn the consequences; it counts as settled then.
@@ -122,7 +132,7 @@ impl<'a> Companions<'a> {
 
     /// The run goes on without companion `index`: nobody waits for it.
     pub fn forget(&mut self, index: usize) {
-        self.all[index].is_ready = true;
+        self.all[index].was_ready = true;
     }
 
     /// Starts companion `index` once more.
@@ -134,6 +144,7 @@ impl<'a> Companions<'a> {
         companion.generation += 1;
         companion.started = self.clock.now();
         companion.is_ready = companion.socket.is_none();
+        companion.process.remove_log(self.run_dir);
         companion.process = Process::start(
             &companion.process.name,
             Role::Companion { generation: companion.generation },
@@ -156,9 +167,11 @@ impl Companion<'_> {
     fn hear(&mut self) {
         let Some((socket, _)) = &self.socket else { return };
         let mut message = [0; MESSAGE_BYTES];
-        while let Ok(length) = socket.recv(&mut message) {
+        for _ in 0..MESSAGES_MAX {
+            let Ok(length) = socket.recv(&mut message) else { break };
             self.is_ready |= message[..length].split(|&byte| byte == b'\n').any(|line| line == b"READY=1");
         }
+        self.was_ready |= self.is_ready;
     }
 
     /// Whether it has ended in another way than one that has done its part.
@@ -167,9 +180,10 @@ impl Companion<'_> {
     }
 }
 
-/// The socket on which companion `name` says that it is ready, and where it lies.
-fn open_socket(name: &str, run_dir: &Path) -> Result<(UnixDatagram, PathBuf)> {
-    let path = run_dir.join(format!("{}.notify", name.replace('/', ".")));
+/// The socket on which companion `name`, the one of this number, says that it is ready, and where it lies. The path of
+/// a socket may have 107 bytes only, so that the name is not in it.
+fn open_socket(name: &str, number: usize, run_dir: &Path) -> Result<(UnixDatagram, PathBuf)> {
+    let path = run_dir.join(format!("{number}.notify"));
     let socket = UnixDatagram::bind(&path)
         .with_context(|| format!("process `{name}`: cannot open the socket {}", path.display()))?;
     socket.set_nonblocking(true).context("cannot read a socket without waiting")?;

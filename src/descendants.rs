@@ -35,6 +35,24 @@ impl Descendants {
         Self { run_dir: run_dir.to_owned(), before: children(), was_reaper }
     }
 
+    /// Whether a child was left by this run. Where the launcher had children before, those may leave some too: then only
+    /// who says that it is of this run is.
+    fn is_of_this_run(&self, child: Pid) -> bool {
+        match run_dir_of(child) {
+            Some(run_dir) => !self.is_of_another_run(&run_dir),
+            None => self.before.is_empty(),
+        }
+    }
+
+    /// Takes note of children that have ended, but for `own`, which somebody waits for.
+    pub fn reap(&self, own: &[u32]) {
+        let is_own = |child: &Pid| own.contains(&child.as_raw_nonzero().get().cast_unsigned());
+        let came = children().into_iter().filter(|child| !self.before.contains(child) && !is_own(child));
+        for child in came {
+            let _ = waitpid(Some(child), WaitOptions::NOHANG);
+        }
+    }
+
     /// Whether `run_dir` is that of another run of this very process.
     fn is_of_another_run(&self, run_dir: &Path) -> bool {
         let run = run_dir.file_name().and_then(|name| name.to_str()).and_then(run_of_dir);
@@ -45,8 +63,7 @@ impl Descendants {
     /// The children of this process that came with the run, and are not of another run of this process.
     fn left(&self) -> Vec<Pid> {
         let came = children().into_iter().filter(|child| !self.before.contains(child));
-        came.filter(|&child| run_dir_of(child).is_none_or(|run_dir| !self.is_of_another_run(&run_dir)))
-            .collect()
+        came.filter(|&child| self.is_of_this_run(child)).collect()
     }
 }
 

@@ -10,7 +10,7 @@ use crate::manifest::Manifest;
 use crate::outputs::Outputs;
 use crate::processes::{Processes, Role};
 use crate::profile::Flight;
-use crate::program::OnExit;
+use crate::program::{OnExit, Readiness, Successor};
 use crate::progress::Progress;
 use crate::run_dir::RunDir;
 use crate::stall::{self, Culprit};
@@ -29,7 +29,9 @@ use std::time::Duration;
 const POLL: Duration = Duration::from_millis(2);
 
 /// How often the lengths of the processes' logs are looked at.
-const LOG_PERIOD: Duration = Duration::from_secs(1);
+const LOG_PERIOD: Duration = Duration::from_millis(100);
+/// How often orphans that have ended are looked for.
+const REAP_PERIOD: Duration = Duration::from_secs(5);
 
 /// Ticks that a successor shadows where a request does not say.
 const SHADOW_TICKS: u32 = 100;
@@ -61,17 +63,18 @@ pub struct Outcome {
 pub fn fly(manifest: &Manifest, graph: &mut Graph, outputs: &mut Outputs, quiet: bool) -> Result<Outcome> {
     let interrupts = count_interrupts()?;
     let run_dir = RunDir::create(&manifest.path)?;
+    // Before anything is touched that an earlier run left.
+    bus::room::require(&graph.plan)?;
     outputs.claim(&run_dir)?;
     prepare(manifest, graph, outputs.partial(), &run_dir)?;
     graph.plan.run_id = run_dir.run_id().to_owned();
     graph.plan.store(run_dir.path())?;
     let graph = &*graph;
-    bus::room::require(&graph.plan)?;
     let control = Control::create(&graph.plan)?;
     let (plan, dir) = (&graph.plan, run_dir.path());
     let clock = WatchClock::new();
     // Dropped behind the supervisor, which ends the processes.
-    let _descendants = Descendants::of_run(dir);
+    let descendants = Descendants::of_run(dir);
     let successions = Successions::new(plan, &control, dir, &clock, &graph.programs, &graph.successors);
     let mut supervisor = Supervisor {
         plan,
@@ -92,9 +95,10 @@ pub fn fly(manifest: &Manifest, graph: &mut Graph, outputs: &mut Outputs, quiet:
         last_change: (0, clock.now()),
         logs_bounded: clock.now(),
         run_dir: dir,
+        descendants: &descendants,
+        reaped: clock.now(),
     };
-    supervisor.start()?;
-    supervisor.watch()?;
+    supervisor.fly()?;
     supervisor.progress.finish(&control);
     let mut outcome = outcome(plan, &control, &supervisor.successions);
     outcome.successions = supervisor.successions.into_reports();
@@ -194,6 +198,8 @@ struct Supervisor<'a> {
     last_change: (u32, Duration),
     logs_bounded: Duration,
     run_dir: &'a Path,
+    descendants: &'a Descendants,
+    reaped: Duration,
 }
 
 /// A process that ended, or was found to hang.
@@ -204,9 +210,20 @@ struct Death {
 }
 
 impl Supervisor<'_> {
+    /// Starts everybody and watches until all have ended. Whatever goes wrong, those that live may leave in order: the
+    /// recorder finishes its file.
+    fn fly(&mut self) -> Result<()> {
+        let flown = self.start().and_then(|()| self.watch());
+        if flown.is_err() && !self.control.is_aborted() {
+            self.processes.take_down(self.control)?;
+        }
+        flown
+    }
+
     fn start(&mut self) -> Result<()> {
-        self.control.set_join_tick(self.hold_tick());
         let graph = self.graph;
+        let waits = graph.companions.iter().any(|(_, program)| program.ready == Readiness::Notify);
+        self.control.set_join_tick(if waits { 0 } else { self.hold_tick() });
         let nodes = graph.programs.iter().zip(&graph.plan.nodes).enumerate();
         let nodes = nodes.map(|(node, (program, plan))| {
             (plan.name.as_str(), Role::Node { node, generation: 0 }, Some(program))
@@ -235,6 +252,7 @@ impl Supervisor<'_> {
             self.processes.look()?;
             self.companions.look()?;
             self.bound_logs();
+            self.reap();
             self.settle_ends()?;
             self.settle_companions()?;
             self.note_interrupts()?;
@@ -256,6 +274,15 @@ impl Supervisor<'_> {
             self.control.await_news(news, POLL);
         }
         Ok(())
+    }
+
+    /// Takes note of the end of orphans, which would otherwise stay in the table of processes for the whole run.
+    fn reap(&mut self) {
+        if self.clock.since(self.reaped) >= REAP_PERIOD {
+            self.reaped = self.clock.now();
+            let own: Vec<u32> = self.processes.ids().chain(self.companions.ids()).collect();
+            self.descendants.reap(&own);
+        }
     }
 
     fn bound_logs(&mut self) {
@@ -308,6 +335,7 @@ impl Supervisor<'_> {
     ) -> Result<u32, String> {
         let successor = successor_of(self.manifest, self.graph, process, with).map_err(|e| e.to_string())?;
         let node = successor.node;
+        self.require_claimed_log(&successor)?;
         if self.state != State::Running {
             return Err(format!("the run does not fly: `{process}` cannot be swapped now"));
         }
@@ -340,6 +368,20 @@ impl Supervisor<'_> {
         self.requests += 1;
         self.successions.request_swap(successor, shadow_ticks, at_tick, self.requests);
         Ok(self.requests)
+    }
+
+    /// Refuses a log of its own to a successor that was asked for in flight: this run has not claimed the file.
+    fn require_claimed_log(&self, successor: &Successor) -> Result<(), String> {
+        let planned = self.graph.successors.iter().filter(|other| other.node == successor.node);
+        let mut known = planned.map(|other| &other.program).chain([&self.graph.programs[successor.node]]);
+        match &successor.program.log {
+            Some(log) if !known.any(|program| program.log.as_ref() == Some(log)) => Err(format!(
+                "`log` = {}: a run claims its logs when it starts, and cannot claim another in flight; leave it out, or \
+                 write the swap into the manifest",
+                log.display()
+            )),
+            _ => Ok(()),
+        }
     }
 
     fn note_interrupts(&mut self) -> Result<()> {

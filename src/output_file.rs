@@ -6,6 +6,7 @@
 
 use anyhow::{Context, Result, bail};
 use rustix::fs::{FlockOperation, OFlags, flock};
+use rustix::io::Errno;
 use std::fs::{File, Metadata, OpenOptions, Permissions};
 use std::io::{self, BufWriter, ErrorKind, Write as _};
 use std::os::unix::fs::{FileExt as _, MetadataExt as _, OpenOptionsExt as _, PermissionsExt as _};
@@ -66,6 +67,9 @@ impl Kind {
     }
 }
 
+/// What to do where two runs could not be kept apart.
+const NO_LOCKS: &str = "the file system cannot lock files (flock), as some network file systems cannot; write to a local \
+                        folder and move the file afterwards";
 const NOT_REGULAR: &str = "it exists and is not a regular file; name another file";
 
 fn read_start(file: &File, start: &mut [u8]) -> io::Result<usize> {
@@ -172,7 +176,8 @@ pub fn lock_folder(folder: &Path) -> Result<File> {
     let file = File::open(folder).with_context(cannot)?;
     match flock(&file, FlockOperation::NonBlockingLockExclusive) {
         Ok(()) => Ok(file),
-        Err(rustix::io::Errno::WOULDBLOCK) => {
+        Err(Errno::NOSYS | Errno::NOLCK | Errno::OPNOTSUPP) => bail!("{}: {NO_LOCKS}", cannot()),
+        Err(Errno::WOULDBLOCK) => {
             bail!("{}: another hummingbus writes to it now; name another folder, or wait", cannot())
         }
         Err(error) => Err(error).with_context(cannot),
@@ -190,9 +195,10 @@ enum Attempt {
 
 fn try_lock(file: File, path: &Path) -> io::Result<Attempt> {
     match rustix::io::retry_on_intr(|| flock(&file, FlockOperation::NonBlockingLockExclusive)) {
+        Err(Errno::NOSYS | Errno::NOLCK | Errno::OPNOTSUPP) => Err(io::Error::other(NO_LOCKS)),
         Ok(()) if is_at(&file, path) => Ok(Attempt::Locked(file)),
         Ok(()) => Ok(Attempt::Gone),
-        Err(rustix::io::Errno::WOULDBLOCK) => Ok(Attempt::Held),
+        Err(Errno::WOULDBLOCK) => Ok(Attempt::Held),
         Err(error) => Err(error.into()),
     }
 }
@@ -219,12 +225,13 @@ pub struct Partial {
     real: PathBuf,
     path: PathBuf,
     file: File,
+    kept: Option<PathBuf>,
 }
 
 impl Partial {
     /// Claims the place `path` of a recording; `None` where somebody else writes there.
     ///
-    /// What a broken run left is removed, and not truncated: who reads it, mapped, keeps it whole.
+    /// What a broken run left there gets another name, and is never lost.
     ///
     /// # Errors
     /// If something is in the way that must not be replaced, or the folder cannot be written to.
@@ -233,13 +240,23 @@ impl Partial {
         let partial = partial_path(&real)?;
         check(&partial, &RECORDING)?;
         let cannot = || format!("cannot create the recording {}", partial.display());
-        let file = claim_new(&partial).with_context(cannot)?;
-        Ok(file.map(|file| Self { real, path: partial, file }))
+        let claimed = claim_new(&partial).with_context(cannot)?;
+        Ok(claimed.map(|(file, kept)| Self { real, path: partial, file, kept }))
     }
 
     /// Where it is written.
     pub fn path(&self) -> &Path {
         &self.path
+    }
+
+    /// Where what a broken run left lies now, if there was something.
+    pub fn kept(&self) -> Option<&Path> {
+        self.kept.as_deref()
+    }
+
+    /// Whether it still lies where it is written.
+    pub fn is_there(&self) -> bool {
+        is_at(&self.file, &self.path)
     }
 
     /// The file, whatever its name.
@@ -296,11 +313,12 @@ pub fn partial_path(real: &Path) -> Result<PathBuf> {
     Ok(real.with_file_name(name))
 }
 
-/// A new file at `path`, locked; `None` where somebody else has one there.
+/// A new file at `path`, locked, and where what lay there before is kept; `None` where somebody else has one there.
 ///
 /// Of any number of processes that try at once exactly one gets it: only who has locked what lies there removes it, and
 /// who has created it and then finds it locked or gone has lost it to another.
-fn claim_new(path: &Path) -> io::Result<Option<File>> {
+fn claim_new(path: &Path) -> io::Result<Option<(File, Option<PathBuf>)>> {
+    let mut kept = None;
     loop {
         let old = match open_options().open(path) {
             Ok(old) => try_lock(old, path)?,
@@ -315,12 +333,12 @@ fn claim_new(path: &Path) -> io::Result<Option<File>> {
                 if let Some(words) = RECORDING.objection(&old)? {
                     return Err(io::Error::other(words));
                 }
-                std::fs::remove_file(path)?;
+                kept = keep_aside(&old, path)?.or(kept);
             }
         }
         match open_options().create_new(true).open(path) {
             Ok(new) => match try_lock(new, path)? {
-                Attempt::Locked(new) => return Ok(Some(new)),
+                Attempt::Locked(new) => return Ok(Some((new, kept))),
                 Attempt::Held => return Ok(None),
                 Attempt::Gone => {}
             },
@@ -328,6 +346,32 @@ fn claim_new(path: &Path) -> io::Result<Option<File>> {
             Err(error) => return Err(error),
         }
     }
+}
+
+/// Gives the locked recording `old` at `path` the first free name of `NAME-2.mcap`, `NAME-3.mcap`, …; one that is empty
+/// is removed.
+fn keep_aside(old: &File, path: &Path) -> io::Result<Option<PathBuf>> {
+    if old.metadata()?.len() == 0 {
+        return std::fs::remove_file(path).map(|()| None);
+    }
+    for number in 2_u32.. {
+        let mut name = path.file_stem().unwrap_or_default().to_owned();
+        name.push(format!("-{number}"));
+        if let Some(extension) = path.extension() {
+            name.push(".");
+            name.push(extension);
+        }
+        let aside = path.with_file_name(name);
+        // A second name first, which is never given to two files: no moment has none.
+        match std::fs::hard_link(path, &aside) {
+            Ok(()) => return std::fs::remove_file(path).map(|()| Some(aside)),
+            Err(error) if error.kind() == ErrorKind::AlreadyExists => {}
+            // Not every file system has second names.
+            Err(_) if !aside.exists() => return std::fs::rename(path, &aside).map(|()| Some(aside)),
+            Err(_) => {}
+        }
+    }
+    Err(io::Error::other("no name is free"))
 }
 
 /// A log that this run alone writes to, while this lives.
@@ -377,7 +421,7 @@ impl LogClaim {
 
 impl Drop for LogClaim {
     fn drop(&mut self) {
-        if self.is_new {
+        if self.is_new && is_at(&self.file, &self.path) {
             let _ = std::fs::remove_file(&self.path);
         }
     }

@@ -4,6 +4,7 @@
 
 use crate::graph::Graph;
 use crate::manifest::Manifest;
+use crate::output::say;
 use crate::output_file::{self, Kind, LOG, LogClaim, Partial, RECORDING, is_same};
 use crate::program::Program;
 use crate::run_dir::{self, RunDir};
@@ -87,6 +88,9 @@ impl Outputs {
             if partial.path().to_str().is_none() {
                 bail!("cannot record to {}: its name is not UTF-8", partial.path().display());
             }
+            if let Some(kept) = partial.kept() {
+                say(&format!("what an earlier run left unfinished is kept as {}", kept.display()));
+            }
             self.partial = Some(partial);
         }
         for log in &self.logs {
@@ -125,7 +129,7 @@ impl Outputs {
 
     /// What a broken run leaves of its recording, if anything.
     pub fn left(&self) -> Option<&Path> {
-        self.partial.as_ref().filter(|partial| !partial.is_empty()).map(Partial::path)
+        self.partial.as_ref().filter(|partial| !partial.is_empty() && partial.is_there()).map(Partial::path)
     }
 }
 

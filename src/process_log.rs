@@ -13,7 +13,7 @@ const TAIL_BYTES: u64 = 64 * 1024;
 /// Lines that are shown.
 const LINES: usize = 20;
 /// Characters of a line that are shown: a line without end fills neither memory nor terminal.
-const LINE_CHARS: usize = 200;
+const LINE_CHARS: usize = 600;
 
 /// What the standard library writes when a thread panics.
 const PANIC: &[u8] = b"panicked at";

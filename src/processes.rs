@@ -65,6 +65,11 @@ impl Processes {
         Ok(())
     }
 
+    /// The process numbers of all.
+    pub fn ids(&self) -> impl Iterator<Item = u32> {
+        self.running.iter().map(Process::id)
+    }
+
     /// Looks which processes have ended.
     pub fn look(&mut self) -> Result<()> {
         self.running.iter_mut().try_for_each(Process::look)
@@ -106,8 +111,8 @@ impl Processes {
 
     /// Forgets the process of a node's generation, whose end is settled, and what it wrote into the run directory.
     pub fn forget(&mut self, node: usize, generation: u32, run_dir: &Path) {
-        if let Some(process) = self.of(node, generation).filter(|process| process.log.starts_with(run_dir)) {
-            let _ = std::fs::remove_file(&process.log);
+        if let Some(process) = self.of(node, generation) {
+            process.remove_log(run_dir);
         }
         let role = Role::Node { node, generation };
         self.running.retain(|process| process.role != role || process.end.is_none());
@@ -151,6 +156,18 @@ impl Process {
             Role::Clock | Role::Companion { .. } => name.to_owned(),
         };
         Ok(Self { name, role, log, child, end: None, is_settled: false, verdict: None })
+    }
+
+    /// Its process number.
+    pub fn id(&self) -> u32 {
+        self.child.id()
+    }
+
+    /// Removes its log, if that lies in the run directory.
+    pub fn remove_log(&self, run_dir: &Path) {
+        if self.log.starts_with(run_dir) {
+            let _ = std::fs::remove_file(&self.log);
+        }
     }
 
     /// Looks whether the process has ended.

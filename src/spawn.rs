@@ -3,11 +3,11 @@
 use crate::output_file::append_to_log;
 use crate::processes::Role;
 use crate::program::{Executable, Program};
-use anyhow::{Context, Result, bail};
+use anyhow::{Context, Result};
 use bus::process::{LAUNCHER_VARIABLE, RUN_VARIABLE};
 use bus::{GENERATION_VARIABLE, NODE_VARIABLE};
 use std::fs::{File, OpenOptions};
-use std::io::{self, Read as _};
+use std::io;
 use std::os::unix::process::CommandExt;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
@@ -44,7 +44,6 @@ pub fn start(
             command
         }
         Executable::Command(words) => {
-            require_program(name, Path::new(&words[0]))?;
             let mut command = Command::new(&words[0]);
             command.args(&words[1..]);
             command
@@ -57,7 +56,10 @@ pub fn start(
     match role {
         Role::Clock => {}
         Role::Node { generation, .. } => {
-            bus::process::hold_stop_signals(&mut command);
+            // A `command` may be a shell that starts others first, who would not hear these signals either.
+            if matches!(program.executable, Executable::Kind(_)) {
+                bus::process::hold_stop_signals(&mut command);
+            }
             command.env(NODE_VARIABLE, name).env(GENERATION_VARIABLE, generation.to_string());
         }
         Role::Companion { .. } => {
@@ -74,22 +76,6 @@ pub fn start(
         return Err(error);
     }
     Ok((child, log))
-}
-
-/// Refuses a file that the kernel cannot execute. The C library would have a shell read it, whatever it is.
-fn require_program(name: &str, path: &Path) -> Result<()> {
-    let mut magic = Vec::new();
-    let read = File::open(path).and_then(|file| file.take(4).read_to_end(&mut magic));
-    // One that can be executed and not be read is left to the kernel.
-    if read.is_err() || magic == b"\x7fELF" || magic.starts_with(b"#!") {
-        return Ok(());
-    }
-    bail!(
-        "process `{name}`: cannot start {}: it is neither a program (ELF) nor a script that begins with #!; name its \
-         interpreter first, such as [\"python3\", \"{}\"]",
-        path.display(),
-        path.display()
-    )
 }
 
 /// This binary, also after the file that it was started from has been replaced by a newer one.

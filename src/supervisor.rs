@@ -96,6 +96,8 @@ impl State {
             }
             (_, Event::Died { .. }) => (Failed, Abort),
             (_, Event::SuccessorFailed) => (self, Refuse),
+            // Nobody needs it any more; it may have ended because the nodes have.
+            (Draining, Event::CompanionFailed { .. }) => (self, Nothing),
             (_, Event::CompanionFailed { policy: OnExit::Restart, is_possible: true }) => (self, Restart),
             (_, Event::CompanionFailed { policy: OnExit::Ignore, .. }) => (self, Nothing),
             (_, Event::CompanionFailed { .. }) => (Failed, Abort),
@@ -189,7 +191,7 @@ mod tests {
         for (state, event, next, action) in all() {
             let Event::CompanionFailed { policy, is_possible } = event else { continue };
             let expected = match policy {
-                _ if state.is_over() => Action::Nothing,
+                _ if state.is_over() || state == State::Draining => Action::Nothing,
                 OnExit::Ignore => Action::Nothing,
                 OnExit::Restart if is_possible => Action::Restart,
                 _ => Action::Abort,

@@ -182,21 +182,24 @@ impl Node {
     }
 
     /// The error for a port that the node declares a second time: the first handle would read or write bytes of
-    /// the second one's type.
+    /// the second one's type. The node cannot connect any more, whatever it does with the error.
     fn declared_twice(
-        &self,
+        &mut self,
         direction: &'static str,
         port: &str,
         first: &'static str,
         second: &'static str,
     ) -> BusError {
-        BusError::DeclaredTwice {
-            node: self.name().to_owned(),
+        let node = self.name().to_owned();
+        let error = || BusError::DeclaredTwice {
+            node: node.clone(),
             direction,
             port: port.to_owned(),
             first,
             second,
-        }
+        };
+        self.fault.get_or_insert_with(error);
+        error()
     }
 
     /// Declares every input the manifest wires as one of `T`, in the order of their names. An input that was declared
@@ -225,13 +228,12 @@ impl Node {
     }
 
     fn declare_input(&mut self, index: usize, declared: Declared) -> Result<(), BusError> {
-        match self.inputs[index].replace(declared) {
-            None => Ok(()),
-            Some(before) => {
-                let port = &self.node().inputs[index].port;
-                Err(self.declared_twice("input", port, before.type_name(), declared.type_name()))
-            }
-        }
+        let Some(before) = self.inputs[index] else {
+            self.inputs[index] = Some(declared);
+            return Ok(());
+        };
+        let port = self.node().inputs[index].port.clone();
+        Err(self.declared_twice("input", &port, before.type_name(), declared.type_name()))
     }
 
     /// Declares the output `port` if the manifest names it.
@@ -282,9 +284,10 @@ impl Node {
                 found: T::SCHEMA.type_name.to_owned(),
             });
         }
-        if let Some(before) = self.outputs[index].replace(T::SCHEMA) {
+        if let Some(before) = self.outputs[index] {
             return Err(self.declared_twice("output", port, before.type_name, T::SCHEMA.type_name));
         }
+        self.outputs[index] = Some(T::SCHEMA);
         Ok(Output { index, message: PhantomData })
     }
 
@@ -538,8 +541,9 @@ mod tests {
         let both = "as hummingbus_msgs/msg/MotorCommand and as hummingbus_msgs/msg/PlantState";
         assert!(words.contains("declares its input `command` twice") && words.contains(both), "{words}");
 
-        // Where the declaration returns no error, connecting does.
-        let late: [fn(&mut Node); 3] = [
+        // Where the declaration returns no error, or nobody looks at it, connecting does.
+        let late: [fn(&mut Node); 4] = [
+            |node| drop(node.input::<PlantState>("command")),
             |node| assert!(node.optional_input::<PlantState>("command").is_none()),
             |node| drop(node.every_input::<PlantState>()),
             |node| drop(node.raw_inputs()),

@@ -10,6 +10,8 @@ use bus::NODE_VARIABLE;
 use bus::plan::NodePlan;
 use bus::process::{LAUNCHER_VARIABLE, RUN_VARIABLE};
 use std::collections::BTreeMap;
+use std::fs::File;
+use std::io::Read as _;
 use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -214,8 +216,25 @@ fn command(
         };
         return Err(refused(&format!("{who} {}: {why}", path.display()), help));
     }
+    if is_text_without_interpreter(&path) {
+        let help =
+            "begin it with #! and its interpreter, or name that first, such as [\"python3\", \"script.py\"]";
+        return Err(refused(
+            &format!("{who} {}: it is text that names no interpreter", path.display()),
+            help,
+        ));
+    }
     let path = path.to_string_lossy().into_owned();
     Ok(std::iter::once(&path).chain(arguments).cloned().collect())
+}
+
+/// Whether no kernel can execute a file: it is text, and does not begin with `#!`. The C library would have a shell read
+/// it, whatever it is.
+fn is_text_without_interpreter(path: &Path) -> bool {
+    let mut start = Vec::new();
+    let read = File::open(path).and_then(|file| file.take(256).read_to_end(&mut start));
+    // One that can be executed and not be read is left to the kernel, and so is what has its own kind of program.
+    read.is_ok() && !start.starts_with(b"#!") && !start.contains(&0)
 }
 
 /// The file behind a bare name, in the folders of the PATH that the process will have.

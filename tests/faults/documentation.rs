@@ -38,3 +38,15 @@ fn every_test_that_the_faults_name_exists() {
         assert!(sources.contains(&format!("fn {name}(")), "docs/faults.md names {test}");
     }
 }
+
+#[test]
+fn no_fault_of_a_table_stands_there_twice_with_two_rules() {
+    let text = std::fs::read_to_string(repository("docs/faults.md")).unwrap();
+    for table in text.split("\n\n") {
+        let faults = table.lines().filter_map(|line| line.strip_prefix("| ")?.split(" | ").next());
+        let faults: Vec<&str> = faults.filter(|fault| !fault.starts_with("the same")).collect();
+        for (index, fault) in faults.iter().enumerate() {
+            assert!(!faults[..index].contains(fault), "docs/faults.md has twice: {fault}");
+        }
+    }
+}

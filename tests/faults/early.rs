@@ -37,7 +37,7 @@ fn stop_by(process: &str) {
 
 #[test]
 fn a_process_that_is_asked_to_end_before_it_has_joined_stops_the_run() {
-    for process in ["plant", "recorder", "saboteur", "clock", "imu", "pilot"] {
+    for process in ["plant", "recorder", "clock", "imu", "pilot"] {
         stop_by(process);
     }
 }

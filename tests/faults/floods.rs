@@ -5,6 +5,8 @@ use crate::support::{Ended, HUMMINGBUS, Place, repository};
 use std::fs::File;
 use std::process::{Command, Stdio};
 
+/// Address space of the launcher, and of each process that it starts: less than a flood.
+const LAUNCHER_KIB: u32 = 280_000;
 /// What the launcher prints at most of a run that fails.
 const SAID_BYTES: usize = 16 * 1024;
 
@@ -14,7 +16,11 @@ fn fly(script: &str) -> Ended {
     let tables = format!("[process.viewer]\nlockstep = false\ncommand = [\"sh\", \"-c\", {script:?}]\n");
     let manifest = write_manifest(&place, &tables);
     let recording = place.path("flight.mcap");
-    place.call(&["run", &manifest, "--record", &recording, "--pace", "realtime"]).with_code(2)
+    // Who read a flood whole would need more memory than this.
+    let mut command = Command::new("sh");
+    command.args(["-c", &format!("ulimit -v {LAUNCHER_KIB}; exec \"$@\""), "sh", HUMMINGBUS]);
+    command.args(["run", &manifest, "--record", &recording, "--pace", "realtime"]);
+    place.launch(command).end().with_code(2)
 }
 
 #[test]

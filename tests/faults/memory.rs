@@ -1,7 +1,7 @@
 //! A full /dev/shm and limits on the size of files: a run flies, or is refused in words and leaves nothing.
 
 use crate::flight::{Reference, manifest};
-use crate::support::{Ended, HUMMINGBUS, Place, poll, repository};
+use crate::support::{Ended, HUMMINGBUS, Place, partial, poll, repository};
 use rustix::process::{Signal, kill_process};
 use std::process::Command;
 
@@ -75,9 +75,11 @@ fn fly_into_full_memory(place: &Place, strike: impl FnOnce(&Place)) -> Option<En
     let words = ["run", &path, "--record", &place.path("flight.mcap"), "--pace", "realtime"];
     let launch = place.launch(with_room(8192, &shell, &words)?);
     // Its control segment lies in a /dev/shm that is not ours: the recording tells that it flies.
-    poll("no recording", || std::fs::metadata(place.path("flight.mcap")).ok().filter(|file| file.len() > 0));
+    let partial = partial(&place.path("flight.mcap"));
+    poll("no recording", || std::fs::metadata(&partial).ok().filter(|file| file.len() > 0));
     place.write("go", "");
     poll("nobody fills shared memory", || std::fs::metadata(&full).ok());
+    assert!(!std::path::Path::new(&place.path("flight.mcap")).exists(), "it was over before memory was full");
     strike(place);
     let ended = launch.end();
     Some(ended)

@@ -6,20 +6,20 @@ use crate::support::{Place, poll};
 use rustix::process::{Pid, Signal, kill_process, test_kill_process};
 
 /// A saboteur whose shell starts `detached` first, which writes its process number to a file.
-fn start_with_stray(place: &Place, detached: &str) -> (String, Pid) {
+fn write_stray(place: &Place, detached: &str) -> String {
     let words = saboteur::command().map(|word| format!("'{word}'")).join(" ");
     let script = format!("{detached} exec {words}");
     let tables = format!(
         "[process.saboteur]\ncommand = [\"sh\", \"-c\", {script:?}]\nworking_directory = {:?}\n",
         place.path("")
     );
-    (write_manifest(place, &tables), rustix::process::getpid())
+    write_manifest(place, &tables)
 }
 
 /// Flies with a node that detaches a process in this way, ends the run with `end`, and requires that it is gone.
 fn require_gone(detached: &str, signal: Option<Signal>, code: i32) {
     let place = Place::new();
-    let (manifest, _) = start_with_stray(&place, detached);
+    let manifest = write_stray(&place, detached);
     let recording = place.path("flight.mcap");
     let pace = if signal.is_some() { "run.pace=\"realtime\"" } else { "run.pace=\"free\"" };
     let launch = place.start(&["run", &manifest, "--record", &recording, "--set", pace]);
@@ -56,19 +56,24 @@ fn what_a_node_started_ends_with_an_aborted_run() {
     require_gone(SESSION, Some(Signal::KILL), 2);
 }
 
-#[test]
-fn what_the_launchers_own_parent_started_is_left_alone() {
+/// Runs a shell that starts `others`, which write their process numbers to the file `stray`, and then becomes the
+/// launcher; requires that they live on.
+fn require_left_alone(others: &str) {
     let place = Place::new();
-    // A shell that becomes the launcher hands its children over to it.
     let manifest = crate::support::repository("manifests/hover.toml");
-    let script = format!(
-        "sleep 600 & echo $! > stray; exec '{}' run '{manifest}' --record flight.mcap",
-        crate::support::HUMMINGBUS
-    );
+    let script =
+        format!("{others} exec '{}' run '{manifest}' --record flight.mcap", crate::support::HUMMINGBUS);
     let mut command = std::process::Command::new("sh");
     command.args(["-c", &script]).current_dir(place.path(""));
     place.launch(command).end_among_others().with_code(0);
     let text = std::fs::read_to_string(place.path("stray")).unwrap();
     let other = Pid::from_raw(text.trim().parse().unwrap()).unwrap();
     kill_process(other, Signal::KILL).expect("it lives");
+}
+
+#[test]
+fn what_the_launchers_own_parent_started_is_left_alone() {
+    // A shell that becomes the launcher hands its children over to it, and what these leave in flight as well.
+    require_left_alone("sleep 600 & echo $! > stray;");
+    require_left_alone("(sleep 0.05; setsid sleep 600 & echo $! > stray) &");
 }

@@ -209,6 +209,9 @@ fn a_process_that_only_inherited_the_name_of_a_dead_run_is_left_alone() {
     sleeper.kill().unwrap();
     sleeper.wait().unwrap();
     assert!(ended.is_none() && dead.left().is_empty(), "{report:#}");
+    let dead_runs = report["dead"].as_array().unwrap();
+    let of_run = dead_runs.iter().find(|remains| remains["run_id"] == run_id.as_str()).unwrap();
+    assert_eq!(of_run["spared"], serde_json::json!([sleeper.id()]), "it is not said: {report:#}");
 }
 
 #[test]

@@ -1,8 +1,9 @@
 //! Runs that are stopped or killed: they end at a tick boundary, and nothing outlives them.
 
 use crate::recordings::{open, require_same_messages, topics};
-use crate::support::{Ended, Place, partial, repository};
+use crate::support::{Ended, HUMMINGBUS, Place, partial, repository};
 use rustix::process::{Signal, kill_process};
+use std::process::Command;
 use std::thread::sleep;
 use std::time::Duration;
 
@@ -130,7 +131,11 @@ fn ctrl_c_at_any_moment_of_the_start_leaves_nothing() {
     let place = Place::new();
     for wait_ms in [0, 1, 2, 4, 8, 12, 16, 24, 32, 48, 64] {
         let (manifest, recording) = (repository("manifests/hover.toml"), place.path("early.mcap"));
-        let launch = place.start(&["run", &manifest, "--record", &recording, "--pace", "realtime"]);
+        // Whoever started these tests in the background has SIGINT ignored from the start.
+        let mut command = Command::new("env");
+        command.args(["--default-signal=INT", HUMMINGBUS, "run", &manifest, "--record", &recording]);
+        command.args(["--pace", "realtime"]);
+        let launch = place.launch(command);
         sleep(Duration::from_millis(wait_ms));
         launch.signal(Signal::INT);
         let ended = launch.end();

@@ -167,8 +167,11 @@ fn a_lock_does_not_outlive_a_killed_launcher() {
     let left = place.path("flown.partial.mcap");
     let cut = place.start(&["cat", &left, "--topic", "/imu/imu"]).end_among_others().with_code(1);
     cut.says(&["was cut off", "ends after tick 999"]);
-    place.start(&["run", &hover, "--record", &recording]).end_among_others().with_code(0);
-    assert!(!Path::new(&left).exists(), "the next run has left it there");
+    let cut = fs::read(&left).unwrap();
+    let aside = place.path("flown.partial-2.mcap");
+    let ended = place.start(&["run", &hover, "--record", &recording]).end_among_others().with_code(0);
+    ended.says(&[&format!("what an earlier run left unfinished is kept as {aside}")]);
+    assert!(!Path::new(&left).exists() && fs::read(&aside).unwrap() == cut, "what a killed run left is lost");
     assert_eq!(rows(&recording, "/imu/imu").len(), 12_000);
 }
 
@@ -200,6 +203,10 @@ fn a_run_that_breaks_leaves_the_good_recording_and_says_where_its_own_is() {
     place.call(&["plot", &left, "--plot", "/source/note:tick"]).with_code(0);
     place.call(&["run", &good, "--record", &recording]).with_code(0);
     assert!(!Path::new(&left).exists(), "a later run has left it there");
+    for number in [2, 3] {
+        let aside = place.path(&format!("failing.partial-{number}.mcap"));
+        assert_eq!(rows(&aside, "/source/note").len(), 50, "what a broken run left is lost");
+    }
 }
 
 #[test]

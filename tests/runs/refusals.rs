@@ -574,7 +574,7 @@ fn a_vehicle_with_a_number_that_none_has_is_refused_with_its_file_line_and_key()
         let number = if found == "1e308" { "1.047" } else { found };
         refused_words(&["run", &manifest], &manifest).says(&[
             &format!("{vehicle}:"),
-            &format!("`{key}`"),
+            &format!("`{key}"),
             number,
         ]);
     }

@@ -235,7 +235,8 @@ fn a_thousand_swaps_in_one_run_leak_nothing() {
     let mut launch = place.start(&["run", &manifest, "--record", &recording, "--json"]);
     // Between two swaps, after the tenth and before the last: the successor before has left and the next is prepared.
     launch.hold_at(593);
-    launch.await_process_count(&place, 8);
+    // The clock, seven nodes, and the successor that is prepared.
+    launch.await_process_count(&place, 9);
     let before = settled(&place);
     launch.release();
     launch.hold_at(20_373);

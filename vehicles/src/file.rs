@@ -84,7 +84,7 @@ fn complete(doc: &Document, root: &Section) -> Result<Vehicle, VehicleError> {
 }
 
 fn body(section: &Section) -> Result<(f64, Matrix3<f64>, f64), VehicleError> {
-    let mass = section.quantity("mass", MASS)?.within(section.doc, &bounds::MASS)?;
+    let mass = section.quantity("mass", MASS)?.positive(section.doc)?.within(section.doc, &bounds::MASS)?;
     let gravity = section.quantity("gravity", ACCELERATION)?.within(section.doc, &bounds::GRAVITY)?;
     let inertia = inertia(section)?;
     section.finish()?;
@@ -110,7 +110,7 @@ fn inertia(section: &Section) -> Result<Matrix3<f64>, VehicleError> {
 }
 
 fn moment(section: &Section, name: &'static str) -> Result<Quantity, VehicleError> {
-    section.quantity(name, INERTIA)?.within(section.doc, &bounds::INERTIA)
+    section.quantity(name, INERTIA)?.positive(section.doc)?.within(section.doc, &bounds::INERTIA)
 }
 
 fn product(section: &Section, name: &'static str) -> Result<f64, VehicleError> {
