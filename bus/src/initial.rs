@@ -67,8 +67,7 @@ fn write_number(primitive: Primitive, value: &Value, bytes: &mut [u8], path: &st
     }
     match primitive {
         Primitive::F64 => put(bytes, &float()?.to_le_bytes()),
-        #[allow(clippy::cast_possible_truncation, reason = "the field is single precision")]
-        Primitive::F32 => put(bytes, &(float()? as f32).to_le_bytes()),
+        Primitive::F32 => put(bytes, &single(float()?, path)?.to_le_bytes()),
         Primitive::I64 => integer!(i64),
         Primitive::U64 => integer!(u64),
         Primitive::I32 => integer!(i32),
@@ -79,6 +78,16 @@ fn write_number(primitive: Primitive, value: &Value, bytes: &mut [u8], path: &st
         Primitive::U8 => integer!(u8),
     }
     Ok(())
+}
+
+/// `number` in single precision, where it is a number too.
+#[allow(clippy::cast_possible_truncation, reason = "the field is single precision")]
+fn single(number: f64, path: &str) -> Result<f32, String> {
+    let single = number as f32;
+    let words = || {
+        format!("`{path}` is {number}, expected a number within {:e} of 0: it is single precision", f32::MAX)
+    };
+    single.is_finite().then_some(single).ok_or_else(words)
 }
 
 fn put(bytes: &mut [u8], number: &[u8]) {
@@ -105,7 +114,7 @@ fn size_of_kind(kind: &Kind) -> usize {
 
 #[cfg(test)]
 mod tests {
-    use super::sample;
+    use super::{sample, single};
     use crate::message::{Message, view};
     use crate::messages::{MotorCommand, PlantState};
     use serde_json::json;
@@ -123,6 +132,11 @@ mod tests {
         let error = |value| sample(MotorCommand::SCHEMA, &value).unwrap_err();
         assert!(error(json!({"comand": 1})).contains("no field `comand`; the fields are stamp, command"));
         assert!(error(json!({"command": [1, 2]})).contains("expected an array of 4"));
+        assert_eq!(single(1.5, "range"), Ok(1.5));
+        assert!(
+            single(1e39, "range").unwrap_err().contains("`range` is 1"),
+            "an infinity in single precision"
+        );
         assert!(error(json!({"stamp": {"nanosec": -1}})).contains("range of uint32"));
     }
 }

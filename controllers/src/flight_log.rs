@@ -153,7 +153,7 @@ impl FlightLog {
     /// If the file, a column or a unit is missing, or a cell is not a number.
     pub fn load(path: &Path, map: &ColumnMap) -> Result<Self, FlightLogError> {
         let refused = |reason: String| FlightLogError::File { path: path.into(), reason };
-        let bytes = std::fs::read(path).map_err(|error| refused(error.to_string()))?;
+        let bytes = vehicles::text::read_log(path).map_err(|error| refused(error.to_string()))?;
         vehicles::quotes::check(&bytes, b',')
             .map_err(|stray| FlightLogError::Quote { path: path.into(), stray })?;
         let file_error = |error: csv::Error| refused(error.to_string());

@@ -47,11 +47,11 @@ pub(crate) const GAIN: Bounds = Bounds {
 
 /// A limit, a weight's deviation or a time, in its unit: none that is of use to a vehicle is so small or so large.
 const LIMIT: Bounds = Bounds {
-    least: 1e-6,
-    most: 1e6,
+    least: 1e-12,
+    most: 1e12,
     unit: "in SI",
-    why: "a limit, a deviation or a time is above 0: less than a millionth of any unit lets nothing through, and a \
-          million is none",
+    why: "a limit, a deviation or a time is above 0: less than 1e-12 of any unit lets nothing through, and from 1e12 \
+          on squares and products of it are no figures of a vehicle",
 };
 
 /// A gain: zero or more, since a negative one turns a loop against itself.
@@ -72,8 +72,8 @@ pub(crate) fn limit_below(
     bound: f64,
     expected: &str,
 ) -> Result<f64, VehicleError> {
-    let chosen = section.chosen(name, of)?;
-    let holds = LIMIT.least <= chosen.si && chosen.si < bound;
+    let chosen = section.chosen(name, of)?.positive(section.doc)?.within(section.doc, &LIMIT)?;
+    let holds = chosen.si < bound;
     Ok(chosen.require(section.doc, holds, expected)?.si)
 }
 

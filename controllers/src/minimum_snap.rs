@@ -6,6 +6,10 @@
 //! (D. Mellinger and V. Kumar, "Minimum snap trajectory generation and control for quadrotors", ICRA 2011, solve the
 //! same problem as a quadratic programme). Without inequalities it is a system of linear equations, solved once at the
 //! start. Each leg has a time of its own from 0 to 1, which keeps the system well conditioned.
+#![allow(
+    clippy::disallowed_types,
+    reason = "a system that is factorised, and no product: see the decision on numbers"
+)]
 #![allow(non_snake_case, reason = "a trailing _W names the frame a vector is written in")]
 
 use crate::curve::Path;

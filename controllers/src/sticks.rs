@@ -106,7 +106,7 @@ impl Sticks {
     /// It cannot be read, or holds what no sticks can ask for.
     pub fn load(path: &Path) -> Result<Self, SticksError> {
         let file = path.display().to_string();
-        match std::fs::read(path) {
+        match vehicles::text::read_log(path) {
             Ok(bytes) => Self::read(&bytes, &file),
             Err(cause) => Err(SticksError::Unreadable { file, cause: cause.into() }),
         }

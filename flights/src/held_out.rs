@@ -97,7 +97,7 @@ fn same_samples([(fit, fit_part), (test, test_part)]: [(&Flight, &Part); 2]) -> 
     let (quantity, Twin { same, compared, in_first_s, in_second_s }) = found?;
     Some(format!(
         "{same} of {compared} samples of `{quantity}` in {} from {:.3} s to {:.3} s are those in {} from {:.3} s to {:.3} s, \
-         so that one is a copy or a part of the other",
+         so that one is a copy or a part of the other, or both are simulated without noise on the same course",
         test.file.display(),
         test_part.start_s + in_second_s.0,
         test_part.start_s + in_second_s.1,

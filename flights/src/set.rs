@@ -22,14 +22,6 @@ pub struct FlightSet {
     pub flights: Vec<Flight>,
 }
 
-/// The bytes of the file at `path`. A device or a pipe has no end that a log could be read to.
-fn read_log(path: &Path) -> std::io::Result<Vec<u8>> {
-    if !path.metadata()?.is_file() {
-        return Err(std::io::Error::other("it is not a regular file"));
-    }
-    std::fs::read(path)
-}
-
 impl FlightSet {
     /// Reads the flights file at `path` and its logs.
     ///
@@ -38,7 +30,7 @@ impl FlightSet {
     pub fn load(path: &Path) -> Result<Self, FlightsError> {
         let text = vehicles::text::read(path)
             .map_err(|cause| FlightsError::Unreadable { file: path.display().to_string(), cause })?;
-        Self::parse(path, text, &read_log)
+        Self::parse(path, text, &vehicles::text::read_log)
     }
 
     /// Reads the flights file at `path` with this text; `read` gives the bytes of the vehicle file and of the logs.

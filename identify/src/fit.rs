@@ -1,4 +1,8 @@
 //! Fitting some of the parameters to flights, with the others held.
+#![allow(
+    clippy::disallowed_types,
+    reason = "not in a component: reports of flights, whose products are summed by hand"
+)]
 
 use crate::candidate::Candidate;
 use crate::model::Model;

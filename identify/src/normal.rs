@@ -2,6 +2,10 @@
 //!
 //! Residuals of neighbouring windows are correlated, so what is counted as independent are blocks of time: the
 //! covariance of a fit is the jackknife over them.
+#![allow(
+    clippy::disallowed_types,
+    reason = "not in a component: reports of flights, whose products are summed by hand"
+)]
 
 use nalgebra::{DMatrix, DVector};
 

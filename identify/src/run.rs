@@ -164,11 +164,20 @@ pub fn bench<'f>(
         drive.iter().map(speed).sum::<f64>() > 4.0 * least_rad_s
     };
     let (mut fit, mut test, mut reports) = (Vec::new(), Vec::new(), Vec::new());
+    let mut too_sparse: Vec<(Role, IdentifyError)> = Vec::new();
     for flight in &set.flights {
-        let sparse = |reason| IdentifyError::Sparse { flight: flight.name.clone(), reason };
-        flight.check_span(SPACING_MAX_S).map_err(sparse)?;
-        let prepared = Prepared::new(flight, box_s(flight), is_flying);
-        reports.push(flight_report(flight, prepared.as_ref()));
+        let (prepared, note) = match flight.check_span(SPACING_MAX_S) {
+            Ok(()) => (Prepared::new(flight, box_s(flight), is_flying), None),
+            // One flight that cannot be used leaves the others.
+            Err(reason) => {
+                let note = format!("not used: {reason}");
+                too_sparse.push((flight.role, IdentifyError::Sparse { flight: flight.name.clone(), reason }));
+                (None, Some(note))
+            }
+        };
+        let mut report = flight_report(flight, prepared.as_ref());
+        report.notes.extend(note);
+        reports.push(report);
         match (prepared, flight.role) {
             (Some(prepared), Role::Fit) => fit.push(prepared),
             (Some(prepared), Role::Test) => test.push(prepared),
@@ -177,6 +186,10 @@ pub fn bench<'f>(
     }
     for (role, own) in [("fit", &fit), ("test", &test)] {
         if own.is_empty() {
+            let is_role = |(own, _): &(Role, IdentifyError)| (*own == Role::Fit) == (role == "fit");
+            if let Some(index) = too_sparse.iter().position(is_role) {
+                return Err(too_sparse.swap_remove(index).1);
+            }
             let there = set.flights.iter().filter(|flight| (flight.role == Role::Fit) == (role == "fit"));
             let names: Vec<&str> = there.map(|flight| flight.name.as_str()).collect();
             let reason = match names[..] {

@@ -16,7 +16,7 @@ pub fn text(declared: &Path, effects: &[Effect], report: &Report) -> Result<Stri
     let complete = Vehicle::base(declared).unwrap_or_else(|| declared.to_owned());
     let file = complete.display().to_string();
     let unreadable = |cause| VehicleError::Unreadable { file: file.clone(), cause };
-    let text = std::fs::read_to_string(&complete).map_err(unreadable)?;
+    let text = vehicles::text::read(&complete).map_err(unreadable)?;
     let mut document: toml_edit::DocumentMut =
         text.parse().map_err(|error| unreadable(std::io::Error::other(error)))?;
     document.remove("effects");

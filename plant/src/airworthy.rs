@@ -12,9 +12,11 @@ use vehicles::{MotorModel, Vehicle};
 /// is left to a tilt of 34°. Tuned, no source; multirotors are built with 2 and more.
 const LIFT_ODD: f64 = 1.2;
 
-/// From here on a thrust to weight is odd, and from there on none: racing quadrotors reach 15. Tuned, no source.
+/// From here on a thrust to weight on Earth is odd, and from there on none: racing quadrotors reach 15. Tuned, no source.
 const LIFT_HIGH: f64 = 50.0;
 const LIFT_MAX: f64 = 1000.0;
+/// Standard gravity, m/s² (ISO 80000-3): rotors are as strong as they are wherever they fly.
+const GRAVITY_M_S2: f64 = 9.806_65;
 
 /// The classic Runge-Kutta method of fourth order diverges where a pole times the step leaves a region that reaches to
 /// 2.785 on the real axis and 2.828 on the imaginary one (Hairer and Wanner, Solving Ordinary Differential Equations II,
@@ -71,6 +73,7 @@ pub(crate) fn check_lift(vehicle: &Vehicle, path: &Path, run: &RunContext<'_>) -
         return Ok(());
     }
     let ratio = most_N / weight_N;
+    let on_earth = most_N / (vehicle.mass_kg * GRAVITY_M_S2);
     let words = |what: &str| {
         format!(
             "`vehicle` \"{}\" {what}: its rotors lift {least_N:.4} N to {most_N:.4} N and it weighs {weight_N:.4} N, a \
@@ -82,9 +85,9 @@ pub(crate) fn check_lift(vehicle: &Vehicle, path: &Path, run: &RunContext<'_>) -
     if ratio < 1.0 {
         return Err(words("cannot fly, expected a thrust to weight of 1 or more"));
     }
-    if ratio > LIFT_MAX {
+    if on_earth > LIFT_MAX {
         return Err(words(&format!(
-            "is no vehicle that flies, expected a thrust to weight below {LIFT_MAX}"
+            "is no vehicle that flies, expected a thrust to weight on Earth below {LIFT_MAX}"
         )));
     }
     if least_N > weight_N {
@@ -92,8 +95,10 @@ pub(crate) fn check_lift(vehicle: &Vehicle, path: &Path, run: &RunContext<'_>) -
     }
     if ratio < LIFT_ODD {
         run.warn(words(&format!("can hardly climb or tilt, below a thrust to weight of {LIFT_ODD}")));
-    } else if ratio > LIFT_HIGH {
-        run.warn(words(&format!("is stronger than any that flies, above a thrust to weight of {LIFT_HIGH}")));
+    } else if on_earth > LIFT_HIGH {
+        run.warn(words(&format!(
+            "is stronger than any that flies, above a thrust to weight on Earth of {LIFT_HIGH}"
+        )));
     }
     Ok(())
 }
@@ -190,6 +195,9 @@ mod tests {
     fn lift_and_weight_decide_what_flies() {
         assert_eq!(lift(|_| {}), (Ok(()), vec![]));
         assert_eq!(lift(|it| it.gravity_m_s2 = 0.0), (Ok(()), vec![]));
+        // On an asteroid the rotors are as strong as on Earth.
+        let off = |it: &mut Vehicle| it.command.speed_at_min_rad_s = 0.0;
+        assert_eq!(lift(|it| (off(it), it.gravity_m_s2 = 0.005).1), (Ok(()), vec![]));
         let words = lift(|it| it.mass_kg = 480.0).0.unwrap_err();
         assert!(
             words.contains("thrust to weight of 0.0048") && words.contains("weighs 4708.8000 N"),

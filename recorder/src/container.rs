@@ -8,7 +8,7 @@ use mcap::read::ChannelAccumulator;
 use mcap::records::{AttachmentIndex, ChunkHeader, Record, op};
 use mcap::{Channel, MAGIC, Message, parse_record};
 use std::borrow::Cow;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::io::Read as _;
 use std::sync::Arc;
 
@@ -360,14 +360,20 @@ pub(crate) fn summary(bytes: &[u8]) -> Result<Option<Summary>, Damage> {
         return Ok(None);
     }
     let (mut channels, mut known, mut counts) = (ChannelAccumulator::default(), Vec::new(), BTreeMap::new());
-    let mut attachments = Vec::new();
+    let (mut attachments, mut offsets) = (Vec::new(), BTreeSet::new());
     let section = Bytes { bytes: &bytes[..footer_at], of: "" };
     let mut at = usize::try_from(footer.summary_start).unwrap_or(usize::MAX);
     while at != footer_at {
         let raw = section.record(at)?;
         match section.parsed(at, &raw)? {
             Record::Statistics(statistics) => counts = statistics.channel_message_counts,
-            Record::AttachmentIndex(index) => attachments.push(index),
+            Record::AttachmentIndex(index) => {
+                // Each is read whole: one that is listed again and again would take any amount of memory.
+                if !offsets.insert(index.offset) {
+                    return Err(section.damage(at, "expected an attachment that is not listed yet"));
+                }
+                attachments.push(index);
+            }
             Record::Channel(channel) => {
                 known.push(channel.id);
                 channels.add_channel(channel).map_err(|error| section.damage(at, error))?;

@@ -102,6 +102,36 @@ static PLAIN: LazyLock<Vec<u8>> = LazyLock::new(|| {
     file.into_inner()
 });
 
+/// The summary's index of the attachment once more: a file of any size could list it any number of times.
+#[test]
+fn an_attachment_that_is_listed_twice_is_refused() {
+    const ATTACHMENT_INDEX: u8 = 0x0a;
+    let mut bytes = PLAIN.clone();
+    let number = |bytes: &[u8], at: usize| {
+        usize::try_from(u64::from_le_bytes(bytes[at..at + 8].try_into().unwrap())).unwrap()
+    };
+    let footer = bytes.len() - 8 - 29;
+    let mut at = number(&bytes, footer + 9);
+    while bytes[at] != ATTACHMENT_INDEX {
+        at += 9 + number(&bytes, at + 1);
+    }
+    let index = bytes[at..at + 9 + number(&bytes, at + 1)].to_vec();
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("twice.mcap");
+    let attachments = |bytes: &[u8]| {
+        std::fs::write(&path, bytes).unwrap();
+        Recording::open(&path)
+            .and_then(|recording| recording.attachments())
+            .map_err(|error| error.to_string())
+    };
+    assert_eq!(attachments(&bytes).unwrap().len(), 1);
+    // Without a checksum of the summary.
+    let crc = bytes.len() - 8 - 4;
+    bytes[crc..crc + 4].fill(0);
+    bytes.splice(at..at, index);
+    assert!(attachments(&bytes).unwrap_err().contains("expected an attachment that is not listed yet"));
+}
+
 /// Reads `bytes` as a recording in every way; returns the number of messages, where it reads.
 fn read(bytes: &[u8]) -> Result<Option<usize>, TestCaseError> {
     let folder = tempfile::tempdir().unwrap();

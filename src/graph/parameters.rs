@@ -103,7 +103,9 @@ pub fn set(
         let context = RunContext::new(&ports, run.tick_ns, node.period_ticks, run.duration_ticks);
         (kind.check)(&parameters, &context).map_err(|reason| refused(manifest, name, process, &reason))?;
         for warning in context.into_warnings() {
-            let at = process.parameters.keys().next().map_or_else(|| name.span(), Spanned::span);
+            let words = &warning.words;
+            let named = process.parameters.keys().find(|key| words.contains(&format!("`{}", key.get_ref())));
+            let at = named.map_or_else(|| name.span(), Spanned::span);
             if warning.is_behind_end && notes.is_cut(manifest, &at) {
                 continue;
             }

@@ -62,15 +62,19 @@ fn a_device_in_the_place_of_a_file_is_refused_in_words() {
     for key in ["process.plant.vehicle", "process.controller.vehicle"] {
         let overrides = [format!("{key}=\"/dev/zero\"")];
         let problem = hummingbus::check(Path::new(&hover), &overrides).unwrap_err().to_string();
-        assert!(problem.contains("/dev/zero: cannot read this file: it is longer than 16 MiB"), "{problem}");
+        assert!(problem.contains("/dev/zero: cannot read this file: it is not a regular file"), "{problem}");
     }
     let problem = hummingbus::check(Path::new("/dev/zero"), &[]).unwrap_err().to_string();
-    assert!(problem.starts_with("/dev/zero: cannot be read: it is longer than 16 MiB"), "{problem}");
+    assert!(problem.starts_with("/dev/zero: cannot be read: it is not a regular file"), "{problem}");
     let text = "include = [\"/dev/zero\"]";
     let problem = hummingbus::check_text(text, Path::new("new.toml"), &[]).unwrap_err().to_string();
     assert!(problem.starts_with("new.toml:1:12: the included file /dev/zero cannot be read"), "{problem}");
+    let replay = repository("manifests/replay-nanobench.toml");
+    let overrides = ["process.player.data=\"/dev/zero\"".to_owned()];
+    let problem = hummingbus::check(Path::new(&replay), &overrides).unwrap_err().to_string();
+    assert!(problem.contains("/dev/zero") && problem.contains("not a regular file"), "{problem}");
     let problem = flights::FlightSet::load(Path::new("/dev/zero")).unwrap_err().to_string();
-    assert!(problem.contains("/dev/zero") && problem.contains("16 MiB"), "{problem}");
+    assert!(problem.contains("/dev/zero") && problem.contains("not a regular file"), "{problem}");
 }
 
 #[test]

@@ -1,4 +1,4 @@
-//! Files that people write, read with an end to it.
+//! Files that people write, and logs, read with an end to it.
 
 use std::fs::File;
 use std::io::{Error, ErrorKind, Read as _, Result};
@@ -14,7 +14,7 @@ pub const BYTES_MAX: u64 = 16 << 20;
 /// If the file cannot be read, is not UTF-8, or is longer than [`BYTES_MAX`].
 pub fn read(path: &Path) -> Result<String> {
     let mut text = String::new();
-    File::open(path)?.take(BYTES_MAX + 1).read_to_string(&mut text)?;
+    open(path)?.take(BYTES_MAX + 1).read_to_string(&mut text)?;
     if text.len() as u64 > BYTES_MAX {
         let limit = BYTES_MAX >> 20;
         return Err(Error::new(
@@ -25,6 +25,21 @@ pub fn read(path: &Path) -> Result<String> {
     Ok(text)
 }
 
+/// The bytes of the log at `path`, of any length.
+///
+/// # Errors
+/// If the file cannot be read, or is a device or a pipe, which have no end that could be read to.
+pub fn read_log(path: &Path) -> Result<Vec<u8>> {
+    let mut bytes = Vec::new();
+    open(path)?.read_to_end(&mut bytes)?;
+    Ok(bytes)
+}
+
+/// Opens a regular file: to open a pipe waits for whoever writes to it.
+fn open(path: &Path) -> Result<File> {
+    if path.metadata()?.is_file() { File::open(path) } else { Err(Error::other("it is not a regular file")) }
+}
+
 #[cfg(test)]
 mod tests {
     use std::path::Path;
@@ -32,6 +47,12 @@ mod tests {
     #[test]
     fn a_file_that_does_not_end_is_refused_in_words() {
         let error = super::read(Path::new("/dev/zero")).unwrap_err();
+        assert_eq!(error.to_string(), "it is not a regular file");
+        let error = super::read_log(Path::new("/dev/zero")).unwrap_err();
+        assert_eq!(error.to_string(), "it is not a regular file");
+        let long = tempfile::NamedTempFile::new().unwrap();
+        long.as_file().set_len(super::BYTES_MAX + 1).unwrap();
+        let error = super::read(long.path()).unwrap_err();
         assert_eq!(error.to_string(), "it is longer than 16 MiB, and no such text");
     }
 

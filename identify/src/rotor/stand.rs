@@ -170,7 +170,7 @@ impl Stand {
     /// Reads and checks the stand file at `path`.
     pub fn read(path: &Path) -> Result<Self, RotorError> {
         let name = path.display().to_string();
-        let text = std::fs::read_to_string(path)
+        let text = vehicles::text::read(path)
             .map_err(|cause| RotorError::Unreadable { file: name.clone(), cause })?;
         let file: File = toml::from_str(&text).map_err(|error| RotorError::Syntax {
             place: Place::of(&name, &text, error.span().map_or(0, |span| span.start)),

@@ -18,7 +18,7 @@ pub struct Table {
 impl Table {
     /// Reads the log at `path`.
     pub fn read(path: &Path) -> Result<Self, RotorError> {
-        let bytes = std::fs::read(path)
+        let bytes = vehicles::text::read_log(path)
             .map_err(|cause| RotorError::Unreadable { file: path.display().to_string(), cause })?;
         let text = String::from_utf8_lossy(&bytes);
         // Programs for other systems put a byte order mark before the first name.
