@@ -31,12 +31,15 @@ impl std::fmt::Display for StrayQuote {
 /// Where it stands.
 pub fn check(text: &[u8], delimiter: u8) -> Result<(), StrayQuote> {
     let mut line = 1;
-    for row in text.split_inclusive(|byte| matches!(byte, b'\n' | b'\r')) {
+    let mut rows = text.split_inclusive(|byte| matches!(byte, b'\n' | b'\r')).peekable();
+    while let Some(row) = rows.next() {
         let cells = row.strip_suffix(b"\n").or(row.strip_suffix(b"\r")).unwrap_or(row);
         if cells.contains(&b'"') {
             check_row(cells, delimiter).map_err(|cell| StrayQuote { line, cell })?;
         }
-        line += u64::from(row.ends_with(b"\n"));
+        // Of the two bytes that end a line elsewhere the second counts; the first alone ends one too.
+        let is_half = row.ends_with(b"\r") && rows.peek() == Some(&&b"\n"[..]);
+        line += u64::from(!is_half);
     }
     Ok(())
 }
@@ -73,6 +76,14 @@ fn closed(quoted: &[u8], delimiter: u8) -> Option<usize> {
 #[cfg(test)]
 mod tests {
     use super::{StrayQuote, check};
+
+    #[test]
+    fn lines_of_every_system_are_counted() {
+        for end in ["\n", "\r", "\r\n"] {
+            let text = ["t,a", "1,2", "", "3,\"4", "5,6"].join(end);
+            assert_eq!(check(text.as_bytes(), b','), Err(StrayQuote { line: 4, cell: 2 }), "{end:?}");
+        }
+    }
 
     #[test]
     fn cells_that_are_closed_on_their_line_pass() {
