@@ -21,8 +21,11 @@ fn pairs<L>(
     samples: impl Fn(&L) -> Result<Channel<3>, RotorError>,
 ) -> Result<(), RotorError> {
     let of_role = |role| logs.iter().filter(move |log| of(log).0 == role);
+    // Each log is read once, however many it is held against.
+    let mut fits: Vec<Option<Channel<3>>> = of_role(Role::Fit).map(|_| None).collect();
     for test in of_role(Role::Test) {
-        for fit in of_role(Role::Fit) {
+        let mut own = None;
+        for (fit, other) in of_role(Role::Fit).zip(&mut fits) {
             let refused = |reason: String| RotorError::NotHeldOut {
                 test: of(test).1.display().to_string(),
                 fit: of(fit).1.display().to_string(),
@@ -31,12 +34,24 @@ fn pairs<L>(
             if let Some(how) = same_file(of(fit).1, of(test).1) {
                 return Err(refused(format!("they are {how}")));
             }
-            if let Comparison::Same(twin) = twin(&samples(fit)?, &samples(test)?) {
+            if let Comparison::Same(twin) = twin(once(other, || samples(fit))?, once(&mut own, || samples(test))?) {
                 return Err(refused(format!("{} of {} rows are the same", twin.same, twin.compared)));
             }
         }
     }
     Ok(())
+}
+
+/// What `slot` holds, read into it if nothing was.
+fn once(
+    slot: &mut Option<Channel<3>>,
+    read: impl FnOnce() -> Result<Channel<3>, RotorError>,
+) -> Result<&Channel<3>, RotorError> {
+    let channel = match slot.take() {
+        Some(channel) => channel,
+        None => read()?,
+    };
+    Ok(slot.insert(channel))
 }
 
 fn of_static(log: &StaticLog) -> Result<Channel<3>, RotorError> {
