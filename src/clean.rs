@@ -74,7 +74,7 @@ pub fn clean(dry_run: bool) -> Result<Report> {
         if !dry_run {
             remains.remove();
         }
-        if !remains.is_empty() {
+        if remains.has_something_to_remove() || !remains.spared.is_empty() {
             report.dead.push(remains);
         }
     }
@@ -222,8 +222,8 @@ fn bytes_below(path: &Path) -> u64 {
 }
 
 impl Remains {
-    fn is_empty(&self) -> bool {
-        self.processes.is_empty() && self.spared.is_empty() && self.paths.is_empty()
+    fn has_something_to_remove(&self) -> bool {
+        !(self.processes.is_empty() && self.paths.is_empty())
     }
 
     /// Ends the processes, then removes the files, which they may still be writing.
@@ -279,7 +279,9 @@ impl std::fmt::Display for Report {
         let verb = if self.dry_run { "would remove" } else { "removed" };
         for remains in &self.dead {
             let bytes = HumanBytes(remains.bytes);
-            writeln!(f, "{verb} run {}: {bytes}", remains.run_id)?;
+            if remains.has_something_to_remove() {
+                writeln!(f, "{verb} run {}: {bytes}", remains.run_id)?;
+            }
             let (shared, folders): (Vec<&PathBuf>, Vec<&PathBuf>) =
                 remains.paths.iter().partition(|path| path.starts_with(SHARED_MEMORY));
             folders.iter().try_for_each(|path| writeln!(f, "  {}", path.display()))?;
@@ -290,14 +292,16 @@ impl std::fmt::Display for Report {
             remains.spared.iter().try_for_each(|process| {
                 writeln!(
                     f,
-                    "  not killed: process {process}, which the run started and which holds none of its files"
+                    "  not killed: process {process}, which run {} started and which holds none of its files; if \
+                     nobody needs it: kill {process}",
+                    remains.run_id
                 )
             })?;
             remains.failures.iter().try_for_each(|failure| writeln!(f, "  LEFT {failure}"))?;
         }
         let bytes = HumanBytes(self.dead.iter().map(|remains| remains.bytes).sum());
         let live = count(self.live.len(), "live run");
-        match self.dead.len() {
+        match self.dead.iter().filter(|remains| remains.has_something_to_remove()).count() {
             0 => write!(f, "nothing to remove; {live} kept"),
             dead => write!(f, "{verb} {} ({bytes}); {live} kept", count(dead, "dead run")),
         }

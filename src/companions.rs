@@ -82,6 +82,7 @@ impl<'a> Companions<'a> {
         for companion in &mut self.all {
             companion.hear();
             companion.process.look()?;
+            companion.note_early_end();
             let patience = companion.program.watchdog;
             if !companion.is_ready
                 && companion.process.end.is_none()
@@ -172,6 +173,18 @@ impl Companion<'_> {
             self.is_ready |= message[..length].split(|&byte| byte == b'\n').any(|line| line == b"READY=1");
         }
         self.was_ready |= self.is_ready;
+    }
+
+    /// An end with code 0 is one of a companion that has done its part, but for one that was to say that it is ready.
+    fn note_early_end(&mut self) {
+        if !self.is_ready
+            && self.process.verdict.is_none()
+            && self.process.end.is_some_and(|end| end.success())
+        {
+            let words =
+                "ended with exit code 0 before it said that it is ready: READY=1 on the socket NOTIFY_SOCKET";
+            self.process.verdict = Some(words.to_owned());
+        }
     }
 
     /// Whether it has ended in another way than one that has done its part.

@@ -122,6 +122,9 @@ pub fn check(path: &Path, kind: &Kind) -> Result<PathBuf> {
     if !old.is_file() {
         bail!("{}: {NOT_REGULAR}", cannot());
     }
+    if is_standard_stream(&old) {
+        bail!("{}: it is where this command prints; name another file", cannot());
+    }
     if old.len() > 0 {
         match File::open(path).and_then(|file| kind.objection(&file)) {
             Ok(None) => {}
@@ -132,6 +135,12 @@ pub fn check(path: &Path, kind: &Kind) -> Result<PathBuf> {
         }
     }
     real_path(path)
+}
+
+/// Whether standard output or standard error goes to this file.
+fn is_standard_stream(file: &Metadata) -> bool {
+    let streams = ["/proc/self/fd/1", "/proc/self/fd/2"].map(std::fs::metadata);
+    streams.iter().flatten().any(|stream| (stream.dev(), stream.ino()) == (file.dev(), file.ino()))
 }
 
 /// Whether two paths name one file, by any spelling, link, or second name of it.

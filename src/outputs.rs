@@ -127,8 +127,17 @@ impl Outputs {
         Ok(Some(flown))
     }
 
-    /// What a broken run leaves of its recording, if anything.
-    pub fn left(&self) -> Option<&Path> {
+    /// What a broken run leaves of its recording, if anything. A file without a message, of a run that never flew, is
+    /// removed.
+    pub fn left(&mut self) -> Option<&Path> {
+        let is_blank = |partial: &&Partial| {
+            let whole = Recording::of_file(partial.file(), partial.path());
+            partial.is_there() && whole.is_ok_and(|recording| recording.messages().next().is_none())
+        };
+        if let Some(blank) = self.partial.as_ref().filter(is_blank) {
+            let _ = std::fs::remove_file(blank.path());
+            self.partial = None;
+        }
         self.partial.as_ref().filter(|partial| !partial.is_empty() && partial.is_there()).map(Partial::path)
     }
 }

@@ -107,7 +107,7 @@ fn a_companion_that_does_not_get_ready_is_named() {
         "did not say within 1500 ms that it is ready",
     ]);
     let ended = fly("exit 0", more, &[]).with_code(2);
-    ended.says(&["process `viewer` ended with exit code 0 before the run did"]);
+    ended.says(&["process `viewer` ended with exit code 0 before it said that it is ready"]);
     // Whoever can be missing need not be ready.
     let ended = fly("sleep 600", &format!("{more}\non_exit = \"ignore\""), &[]).with_code(0);
     ended.says(&["did not say within 1500 ms that it is ready", "The run goes on without it"]);

@@ -3,7 +3,7 @@
 use crate::laps;
 use crate::nodes::{manifest, sender, table};
 use crate::recordings::{open, rows};
-use crate::support::{Ended, Launch, Place, partial, poll, repository};
+use crate::support::{Ended, HUMMINGBUS, Launch, Place, partial, poll, repository};
 use rustix::fs::{FlockOperation, flock};
 use rustix::process::{Signal, kill_process};
 use std::fs::{self, File};
@@ -569,4 +569,23 @@ fn an_aborted_recording_in_flight_is_partial_until_its_end() {
     kill_process(place.process_of("imu"), Signal::KILL).unwrap();
     launch.end().with_code(2).says(&[&left]);
     assert_eq!(rows(&partial(&recording), "/imu/imu").len(), 1500);
+}
+
+#[test]
+fn a_recording_does_not_take_the_place_of_what_the_command_prints() {
+    let place = Place::new();
+    let path = short(&place);
+    let script = format!("exec '{HUMMINGBUS}' run '{path}' --record /dev/stdout >printed");
+    let mut command = std::process::Command::new("sh");
+    command.args(["-c", &script]).current_dir(place.path(""));
+    place.launch(command).end().with_code(2).says(&["/dev/stdout: it is where this command prints"]);
+}
+
+#[test]
+fn a_run_that_never_flew_leaves_no_recording() {
+    let place = Place::new();
+    let path = place.write("flown.toml", manifest(200, &[sender("source", 1, "")]));
+    let ended = place.call(&["run", &path, "--set", "process.source.command=[\"false\"]"]).with_code(2);
+    assert!(!ended.error.contains("What was recorded"), "{ended}");
+    assert!(!Path::new(&partial(&place.path("flown.mcap"))).exists(), "{ended}");
 }

@@ -34,7 +34,9 @@ fn pairs<L>(
             if let Some(how) = same_file(of(fit).1, of(test).1) {
                 return Err(refused(format!("they are {how}")));
             }
-            if let Comparison::Same(twin) = twin(once(other, || samples(fit))?, once(&mut own, || samples(test))?) {
+            if let Comparison::Same(twin) =
+                twin(once(other, || samples(fit))?, once(&mut own, || samples(test))?)
+            {
                 return Err(refused(format!("{} of {} rows are the same", twin.same, twin.compared)));
             }
         }
