@@ -1,7 +1,7 @@
 //! Runs that are stopped or killed: they end at a tick boundary, and nothing outlives them.
 
 use crate::recordings::{open, require_same_messages, topics};
-use crate::support::{Ended, HUMMINGBUS, Place, partial, repository};
+use crate::support::{Ended, HUMMINGBUS, Place, partial, poll, repository};
 use rustix::process::{Signal, kill_process};
 use std::process::Command;
 use std::thread::sleep;
@@ -126,6 +126,16 @@ fn a_second_ctrl_c_aborts_a_run_that_does_not_come_to_its_boundary() {
     open(&partial(&recording));
 }
 
+/// Waits until a process does not ignore SIGINT any more; until then the signal would be lost.
+fn await_no_ignored_sigint(process: u32) {
+    poll("SIGINT stays ignored", || {
+        let status = std::fs::read_to_string(format!("/proc/{process}/status")).ok()?;
+        let ignored = status.lines().find_map(|line| line.strip_prefix("SigIgn:"))?;
+        let mask = u64::from_str_radix(ignored.trim(), 16).ok()?;
+        (mask & (1 << (Signal::INT.as_raw() - 1)) == 0).then_some(())
+    });
+}
+
 #[test]
 fn ctrl_c_at_any_moment_of_the_start_leaves_nothing() {
     let place = Place::new();
@@ -136,6 +146,7 @@ fn ctrl_c_at_any_moment_of_the_start_leaves_nothing() {
         command.args(["--default-signal=INT", HUMMINGBUS, "run", &manifest, "--record", &recording]);
         command.args(["--pace", "realtime"]);
         let launch = place.launch(command);
+        await_no_ignored_sigint(launch.id());
         sleep(Duration::from_millis(wait_ms));
         launch.signal(Signal::INT);
         let ended = launch.end();
