@@ -255,9 +255,7 @@ fn recorded_ticks(case: &Case, place: &Place, recording: &str, reference: &str) 
     let recording = partial.as_deref().unwrap_or(recording);
     // A launcher that is killed leaves the file that it had created for the recorder.
     if std::fs::metadata(recording).map_or(0, |file| file.len()) == 0 {
-        // A recording without a message is not kept.
-        let is_before_the_first = matches!(case.moment, Moment::Start(_) | Moment::Boundary { tick: 0, .. });
-        assert!(is_before_the_first || case.is_request(), "there is no recording");
+        // A recording without a message is not kept; the caller knows how many ticks it should hold.
         return 0;
     }
     let diff = place.start(&["diff", recording, reference]).end_among_others().with_code(1);
