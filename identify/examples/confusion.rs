@@ -1,9 +1,9 @@
 //! The confusion matrix of `docs/validation.md`, as markdown: which effects are named where which are true.
 //!
 //! ```sh
-//! cargo run --release -p identify --example confusion             # everything, some minutes
-//! cargo run --release -p identify --example confusion -- singles  # or pairs, nulls
-//! cargo run --release -p identify --example confusion -- singles wind  # those with one effect
+//! cargo run --release -p hummingbus-identify --example confusion             # everything, some minutes
+//! cargo run --release -p hummingbus-identify --example confusion -- singles  # or pairs, nulls
+//! cargo run --release -p hummingbus-identify --example confusion -- singles wind  # those with one effect
 //! ```
 #[path = "../tests/simulated/mod.rs"]
 mod simulated;

@@ -1,7 +1,7 @@
 //! How long an hour of flight at 1 kHz takes: 3.6 million rows through all candidates, flown in this process.
 //!
 //! ```sh
-//! cargo run --release -p identify --example hour          # or with a number of minutes
+//! cargo run --release -p hummingbus-identify --example hour          # or with a number of minutes
 //! ```
 #![allow(clippy::disallowed_methods, reason = "it measures the time that the machine takes")]
 #[path = "../tests/simulated/mod.rs"]

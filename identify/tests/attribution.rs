@@ -1,5 +1,5 @@
 //! Flights with an effect that nobody declared: it is named, and nothing else is. The whole table is made by
-//! `cargo run --release -p identify --example confusion`, see docs/validation.md.
+//! `cargo run --release -p hummingbus-identify --example confusion`, see docs/validation.md.
 mod simulated;
 
 use rayon::prelude::*;

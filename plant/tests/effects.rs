@@ -54,7 +54,7 @@ fn the_catalogue_has_the_names_that_files_use() {
 #[test]
 fn the_page_of_effects_is_the_catalogues() {
     let page = include_str!("../../docs/effects.md");
-    let hint = "write it anew: cargo run -p plant --example effects_page >docs/effects.md";
+    let hint = "write it anew: cargo run -p hummingbus-plant --example effects_page >docs/effects.md";
     assert!(page == plant::effects::page::markdown(), "{hint}");
 }
 

@@ -4,7 +4,7 @@ use super::{CATALOGUE, EffectKind, ParameterSpec};
 use std::fmt::Write;
 
 const HEAD: &str = "# Effects
-<!-- Written by `cargo run -p plant --example effects_page >docs/effects.md` from plant/src/effects. -->
+<!-- Written by `cargo run -p hummingbus-plant --example effects_page >docs/effects.md` from plant/src/effects. -->
 
 An effect is a named piece of physics beyond the declared vehicle. A vehicle file lists those of the vehicle, a scene
 file those of the surroundings; the plant flies both, the vehicle's first, each in the order of its file, and each
