@@ -14,8 +14,8 @@ use crate::run_dir::{
     run_of_dir, run_of_shared_memory, shared_memory_of, try_claim,
 };
 use anyhow::Result;
-use bus::own_file;
 use bus::process::user_id;
+use bus::user_file;
 use indicatif::HumanBytes;
 use rustix::process::{Pid, PidfdFlags, Signal, pidfd_open, pidfd_send_signal};
 use serde::Serialize;
@@ -114,7 +114,7 @@ fn find_traces() -> Result<BTreeMap<String, Traces>> {
         let Some(run_id) = name_of(&path).and_then(run_of_shared_memory) else { continue };
         let traces = found.entry(run_id.to_owned()).or_default();
         if path == entry_path(run_id) {
-            let entry = own_file::open(&path, false).ok().and_then(|file| Entry::read(run_id, &file));
+            let entry = user_file::open(&path, false).ok().and_then(|file| Entry::read(run_id, &file));
             traces.run_dirs.extend(entry.map(|entry| entry.run_dir));
         }
     }

@@ -247,7 +247,7 @@ impl Supervisor<'_> {
     /// Watches until all processes have ended.
     fn watch(&mut self) -> Result<()> {
         while !self.state.is_over() {
-            let news = self.control.news();
+            let news = self.control.notifications();
             self.clock.look();
             self.processes.look()?;
             self.companions.look()?;
@@ -271,7 +271,7 @@ impl Supervisor<'_> {
             self.note_laggards();
             self.note_stall()?;
             self.progress.show(self.control);
-            self.control.await_news(news, POLL);
+            self.control.await_notification(news, POLL);
         }
         Ok(())
     }
@@ -472,7 +472,7 @@ impl Supervisor<'_> {
             Role::Companion { .. } => true,
             Role::Clock => self.control.completed_ticks() >= self.control.end_tick(),
             Role::Node { node, generation } => {
-                let has_completed = self.control.has_completed(self.plan.member(node, generation));
+                let has_completed = self.control.has_completed(self.plan.slot(node, generation));
                 match self.successions.standing(node, generation) {
                     Standing::Former => true,
                     Standing::Active => has_completed,
@@ -514,7 +514,7 @@ impl Supervisor<'_> {
                     return Ok(false);
                 }
                 if self.tell(Event::SuccessorFailed)? == Action::Refuse {
-                    let tick = self.control.done(self.plan.member(node, generation));
+                    let tick = self.control.done(self.plan.slot(node, generation));
                     let reason = match self.successions.stage(node) {
                         Some(Stage::Starting) => format!("{} (it had not joined yet)", death.words),
                         _ => format!("{} (it had come to tick {tick})", death.words),
@@ -532,7 +532,7 @@ impl Supervisor<'_> {
     fn has_died_behind_the_end(&self, node: usize, generation: u32) -> bool {
         self.control.phase() == Phase::Running
             && self.successions.program(node).on_exit != OnExit::Stop
-            && self.control.has_completed(self.plan.member(node, generation))
+            && self.control.has_completed(self.plan.slot(node, generation))
     }
 
     fn say_died_behind_the_end(&self, death: &Death) {
@@ -583,7 +583,7 @@ impl Supervisor<'_> {
                 OnExit::Restart => self.successions.has_come_on(node),
                 OnExit::Standby => self.successions.can_promote(node),
             };
-        let tick = self.control.completed_by(self.plan.member(node, generation));
+        let tick = self.control.completed_by(self.plan.slot(node, generation));
         match self.tell(Event::Died { policy, is_possible })? {
             Action::Restart => {
                 self.successions.close_early(node, &mut self.processes);

@@ -202,7 +202,7 @@ impl Process {
                 (None, Some(signal)) => format!(
                     "was killed by {}{}",
                     bus::process::signal_name(signal),
-                    bus::room::words_of_signal(signal)
+                    bus::room::signal_message(signal)
                 ),
                 (None, None) => "ended".to_owned(),
             },

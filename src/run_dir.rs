@@ -6,9 +6,9 @@
 
 use anyhow::{Context, Result, bail};
 use bus::control::shm_prefix;
-use bus::own_file;
 use bus::process::user_id;
 pub use bus::room::SHARED_MEMORY;
+use bus::user_file;
 use rustix::fs::{FlockOperation, flock};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
@@ -252,7 +252,7 @@ fn create_locked(run_dir: &Path) -> std::io::Result<File> {
     std::fs::DirBuilder::new().mode(0o700).create(run_dir)?;
     // Whatever the umask takes away.
     let opened = std::fs::set_permissions(run_dir, std::fs::Permissions::from_mode(0o700))
-        .and_then(|()| own_file::open_folder(run_dir));
+        .and_then(|()| user_file::open_folder(run_dir));
     let locked = opened.and_then(|directory| {
         rustix::io::retry_on_intr(|| flock(&directory, FlockOperation::LockExclusive))?;
         Ok(directory)
@@ -283,8 +283,8 @@ pub struct Claim {
 /// Without an entry nobody lives on this side of /dev/shm: it is made before everything else, and removed after.
 pub fn try_claim(run_id: &str, run_dirs: &BTreeSet<PathBuf>) -> Option<Claim> {
     let (mut locks, entry) = (Vec::new(), entry_path(run_id));
-    let opened = std::iter::once(open_own(&entry, own_file::open(&entry, false)));
-    let opened = opened.chain(run_dirs.iter().map(|path| open_own(path, own_file::open_folder(path))));
+    let opened = std::iter::once(open_own(&entry, user_file::open(&entry, false)));
+    let opened = opened.chain(run_dirs.iter().map(|path| open_own(path, user_file::open_folder(path))));
     for file in opened {
         if let Some(file) = file.ok()? {
             let taken = rustix::io::retry_on_intr(|| flock(&file, FlockOperation::NonBlockingLockShared));
@@ -337,7 +337,7 @@ fn live_run(path: &Path) -> Option<LiveRun> {
     if path != entry_path(run_id) {
         return None;
     }
-    let file = own_file::open(path, false).ok()?;
+    let file = user_file::open(path, false).ok()?;
     // A run that is registering has an empty entry, and is not up yet.
     let entry = Entry::read(run_id, &file)?;
     Some(LiveRun { entry, file }).filter(LiveRun::is_live)

@@ -2,7 +2,7 @@
 
 use crate::processes::{Processes, Role};
 use crate::succession::Successions;
-use bus::control::{Control, Phase, Seat};
+use bus::control::{Control, Phase, SlotState};
 use bus::plan::{Pace, Plan};
 use std::time::Duration;
 
@@ -57,13 +57,13 @@ fn not_computing(
     processes: &Processes,
 ) -> Option<Culprit> {
     let stuck = |&(node, generation): &(usize, u32)| {
-        let member = plan.member(node, generation);
-        control.seat(member) == Seat::Taken
+        let member = plan.slot(node, generation);
+        control.slot_state(member) == SlotState::Taken
             && processes.lives(node, generation)
             && control.can_compute(plan, member, successions.inputs(node, generation))
     };
     let members = successions.members().filter(stuck);
-    let slowest = members.min_by_key(|&(node, generation)| control.done(plan.member(node, generation)));
+    let slowest = members.min_by_key(|&(node, generation)| control.done(plan.slot(node, generation)));
     slowest.map(|(node, generation)| Culprit::Node(node, generation))
 }
 
@@ -122,8 +122,10 @@ pub fn describe(
 fn describe_stuck(control: &Control, plan: &Plan, successions: &Successions<'_>) -> String {
     let members: Vec<(usize, u32, usize)> = successions
         .members()
-        .map(|(node, generation)| (node, generation, plan.member(node, generation)))
-        .filter(|&(.., member)| control.seat(member) == Seat::Taken && !control.has_completed(member))
+        .map(|(node, generation)| (node, generation, plan.slot(node, generation)))
+        .filter(|&(.., member)| {
+            control.slot_state(member) == SlotState::Taken && !control.has_completed(member)
+        })
         .collect();
     let name = |node: usize, generation: u32| match generation {
         0 => format!("`{}`", plan.nodes[node].name),

@@ -8,9 +8,9 @@ use crate::processes::{Processes, Role};
 use crate::program::{OnExit, Program, Successor};
 use crate::watch_clock::WatchClock;
 use anyhow::Result;
-use bus::control::{Control, HandOver, Phase, Seat};
-use bus::plan::{InputPlan, OutputPlan, Plan, SEATS};
-use bus::roster::{Incumbent, Roster};
+use bus::control::{Control, Phase, SlotState, Transfer};
+use bus::membership::{Instance, Membership};
+use bus::plan::{InputPlan, OutputPlan, Plan, SLOTS_PER_NODE};
 use serde::Serialize;
 use std::collections::VecDeque;
 use std::path::Path;
@@ -132,7 +132,7 @@ pub struct Successions<'a> {
     control: &'a Control,
     run_dir: &'a Path,
     clock: &'a WatchClock,
-    roster: Roster,
+    roster: Membership,
     seats: Vec<Seats>,
     pending: VecDeque<Pending>,
     /// What became of those that are through.
@@ -179,7 +179,7 @@ impl<'a> Successions<'a> {
             successor: successor.clone(),
         });
         let (seats, pending) = (seats.collect(), pending.collect());
-        let roster = Roster::first(plan);
+        let roster = Membership::first(plan);
         Self { plan, control, run_dir, clock, roster, seats, pending, reports: Vec::new() }
     }
 
@@ -215,7 +215,7 @@ impl<'a> Successions<'a> {
     /// What the process of a node's generation is to it now.
     pub fn standing(&self, node: usize, generation: u32) -> Standing {
         let candidate = self.seats[node].candidate.as_ref();
-        if self.roster.nodes[node].active.generation == generation {
+        if self.roster.nodes[node].primary.generation == generation {
             Standing::Active
         } else if candidate.is_some_and(|candidate| candidate.generation == generation) {
             Standing::Candidate
@@ -236,7 +236,7 @@ impl<'a> Successions<'a> {
     }
 
     fn member(&self, node: usize, generation: u32) -> usize {
-        self.plan.member(node, generation)
+        self.plan.slot(node, generation)
     }
 
     /// Whether every living member agrees with the newest roster.
@@ -248,10 +248,10 @@ impl<'a> Successions<'a> {
     pub fn disagreeing(&self, processes: &Processes) -> Option<(usize, u32)> {
         self.members().find(|&(node, generation)| {
             let member = self.member(node, generation);
-            self.control.seat(member) == Seat::Taken
+            self.control.slot_state(member) == SlotState::Taken
                 && processes.lives(node, generation)
                 && !self.control.has_completed(member)
-                && self.control.agreed_epoch(member) < self.control.epoch()
+                && self.control.acknowledged_epoch(member) < self.control.epoch()
         })
     }
 
@@ -262,7 +262,7 @@ impl<'a> Successions<'a> {
             // While it retires, the predecessor still reads.
             let former = candidate.and_then(|candidate| candidate.former);
             let candidate = candidate.map(|candidate| candidate.generation);
-            let generations = [Some(roster.active.generation), candidate, former];
+            let generations = [Some(roster.primary.generation), candidate, former];
             let mut seen: Vec<u32> = generations.into_iter().flatten().collect();
             seen.dedup();
             seen.into_iter().map(move |generation| (node, generation))
@@ -272,7 +272,7 @@ impl<'a> Successions<'a> {
     /// The inputs of a process.
     pub fn inputs(&self, node: usize, generation: u32) -> &[InputPlan] {
         let candidate = self.seats[node].candidate.as_ref().filter(|c| c.generation == generation);
-        candidate.map_or(&self.roster.nodes[node].active.plan.inputs, |candidate| {
+        candidate.map_or(&self.roster.nodes[node].primary.plan.inputs, |candidate| {
             &candidate.pending.successor.plan.inputs
         })
     }
@@ -372,14 +372,14 @@ impl<'a> Successions<'a> {
     fn start_candidate(&mut self, pending: Pending, processes: &mut Processes) -> Result<()> {
         let node = pending.successor.node;
         // A candidate that failed leaves its generation unused, and its seat is the active one's other.
-        let active = self.roster.nodes[node].active.generation;
+        let active = self.roster.nodes[node].primary.generation;
         let next = self.seats[node].newest_generation + 1;
         let is_other_seat = self.member(node, next) != self.member(node, active);
         let generation = if is_other_seat { next } else { next + 1 };
         let name = self.plan.nodes[node].name.clone();
-        self.control.clear_seat(self.member(node, generation));
+        self.control.clear_slot(self.member(node, generation));
         self.seats[node].newest_generation = generation;
-        pending.successor.plan.store_successor(self.run_dir, node, generation)?;
+        pending.successor.plan.store_backup(self.run_dir, node, generation)?;
         let report = Report {
             process: name.clone(),
             generation,
@@ -550,7 +550,7 @@ impl<'a> Successions<'a> {
     fn let_join(&mut self, node: usize) -> Result<()> {
         let Some(candidate) = &mut self.seats[node].candidate else { return Ok(()) };
         let (plan, control) = (self.plan, self.control);
-        let active = plan.member(node, self.roster.nodes[node].active.generation);
+        let active = plan.slot(node, self.roster.nodes[node].primary.generation);
         let successor = &candidate.pending.successor;
         let sent = |topic: usize| control.ticks_sent(topic);
         let outputs = &successor.plan.outputs;
@@ -573,14 +573,14 @@ impl<'a> Successions<'a> {
         } else {
             outputs.iter().map(|output| sent(output.topic)).collect()
         };
-        let member = plan.member(node, candidate.generation);
+        let member = plan.slot(node, candidate.generation);
         for (output, &take_over_tick) in outputs.iter().zip(&roster.take_over_ticks) {
             // The next tick at which a shadow sample is due; one that does not shadow sends none.
             let due = join_tick.next_multiple_of(plan.topics[output.topic].period_ticks);
             control.start_shadow(output.topic, if shadows { due } else { take_over_tick });
         }
         control.set_first_tick(member, join_tick);
-        roster.successor = Some(Incumbent {
+        roster.backup = Some(Instance {
             generation: candidate.generation,
             join_tick,
             shadows,
@@ -590,7 +590,7 @@ impl<'a> Successions<'a> {
         self.roster.store(self.run_dir)?;
         candidate.report.join_tick = Some(join_tick);
         candidate.stage = Stage::Joining;
-        control.set_seat(member, Seat::Joining);
+        control.set_slot_state(member, SlotState::Joining);
         Ok(())
     }
 
@@ -603,19 +603,19 @@ impl<'a> Successions<'a> {
     /// Everybody is connected: it computes from its tick on.
     fn let_compute(&mut self, node: usize) {
         let Some(candidate) = &mut self.seats[node].candidate else { return };
-        let member = self.plan.member(node, candidate.generation);
+        let member = self.plan.slot(node, candidate.generation);
         candidate.report.hold_ms = candidate.held_since.map_or(0.0, milliseconds);
-        candidate.report.hand_over = match self.control.hand_over(member) {
-            HandOver::Unknown => None,
-            HandOver::State => Some("state"),
-            HandOver::LastOutput => Some("last output"),
+        candidate.report.hand_over = match self.control.transfer(member) {
+            Transfer::Unknown => None,
+            Transfer::State => Some("state"),
+            Transfer::LastOutput => Some("last output"),
         };
         candidate.stage = Stage::Shadowing;
-        self.control.set_seat(member, Seat::Taken);
+        self.control.set_slot_state(member, SlotState::Taken);
         if candidate.pending.join == Join::AtOnce {
             // The clock waited for the dead process until its place was taken.
-            let dead = self.plan.member(node, self.roster.nodes[node].active.generation);
-            self.control.set_seat(dead, Seat::Empty);
+            let dead = self.plan.slot(node, self.roster.nodes[node].primary.generation);
+            self.control.set_slot_state(dead, SlotState::Empty);
         }
         self.control.set_epoch(self.roster.epoch);
     }
@@ -625,7 +625,7 @@ impl<'a> Successions<'a> {
     pub fn has_taken_over(&self, node: usize) -> bool {
         let roster = &self.roster.nodes[node];
         let is_shadowing = self.seats[node].candidate.as_ref().is_some_and(|c| c.stage == Stage::Shadowing);
-        let outputs = roster.active.plan.outputs.iter().zip(&roster.take_over_ticks);
+        let outputs = roster.primary.plan.outputs.iter().zip(&roster.take_over_ticks);
         let has_sent = |(output, &tick): (&OutputPlan, &u32)| {
             let period_ticks = u64::from(self.plan.topics[output.topic].period_ticks);
             let first_due = u64::from(tick).next_multiple_of(period_ticks);
@@ -638,9 +638,9 @@ impl<'a> Successions<'a> {
     pub fn commit(&mut self, node: usize) -> Result<()> {
         let roster = &mut self.roster.nodes[node];
         let take_over_tick = roster.take_over_tick;
-        let former = roster.active.generation;
-        if let Some(successor) = roster.successor.take() {
-            roster.active = successor;
+        let former = roster.primary.generation;
+        if let Some(successor) = roster.backup.take() {
+            roster.primary = successor;
         }
         roster.take_over_tick = u32::MAX;
         roster.take_over_ticks.fill(u32::MAX);
@@ -664,7 +664,7 @@ impl<'a> Successions<'a> {
     pub fn note_end_of_former(&self, node: usize, generation: u32) {
         let candidate = self.seats[node].candidate.as_ref();
         if candidate.is_some_and(|candidate| candidate.former == Some(generation)) {
-            self.control.set_seat(self.member(node, generation), Seat::Empty);
+            self.control.set_slot_state(self.member(node, generation), SlotState::Empty);
             self.control.set_epoch(self.control.epoch());
         }
     }
@@ -726,7 +726,7 @@ impl<'a> Successions<'a> {
         let spent = &mut self.seats[node].spent;
         spent.0 += self.control.cpu_ns(member);
         spent.1 += self.control.late_count(member);
-        self.control.clear_seat(member);
+        self.control.clear_slot(member);
         let crashed = processes
             .of(node, generation)
             .is_some_and(|process| process.end.is_some_and(|end| !end.success()));
@@ -734,8 +734,8 @@ impl<'a> Successions<'a> {
             // Its ports would keep their places; what cannot be removed now goes with the run.
             let _ = bus::reap_dead(self.run_dir, &self.plan.run_id);
         }
-        bus::handover::remove(self.run_dir, self.plan, node, generation);
-        let _ = std::fs::remove_file(bus::plan::successor_path(self.run_dir, node, generation));
+        bus::state_transfer::remove(self.run_dir, self.plan, node, generation);
+        let _ = std::fs::remove_file(bus::plan::backup_path(self.run_dir, node, generation));
         bus::process::remove_claim(self.run_dir, &self.plan.nodes[node].name, generation);
         processes.forget(node, generation, self.run_dir);
     }
@@ -750,21 +750,21 @@ impl<'a> Successions<'a> {
 
     /// Whether the active process of `node` has completed a tick since it joined: a restart leads somewhere.
     pub fn has_come_on(&self, node: usize) -> bool {
-        let active = &self.roster.nodes[node].active;
+        let active = &self.roster.nodes[node].primary;
         active.generation == 0 || self.control.done(self.member(node, active.generation)) > active.join_tick
     }
 
     /// The active process of `node` is dead: the candidate takes its place at the tick it did not complete.
     pub fn promote(&mut self, node: usize) -> Result<()> {
-        let active = self.member(node, self.roster.nodes[node].active.generation);
+        let active = self.member(node, self.roster.nodes[node].primary.generation);
         let control = self.control;
         let roster = &mut self.roster.nodes[node];
         roster.take_over_tick = control.done(active);
-        let outputs = roster.active.plan.outputs.iter();
+        let outputs = roster.primary.plan.outputs.iter();
         roster.take_over_ticks = outputs.map(|output| control.ticks_sent(output.topic)).collect();
         self.roster.epoch += 1;
         self.roster.store(self.run_dir)?;
-        control.set_seat(active, Seat::Empty);
+        control.set_slot_state(active, SlotState::Empty);
         control.set_epoch(self.roster.epoch);
         self.seats[node].is_vacant = true;
         Ok(())
@@ -778,7 +778,7 @@ impl<'a> Successions<'a> {
             take_over_tick: None,
             is_standby: false,
             program: self.seats[node].program.clone(),
-            plan: self.roster.nodes[node].active.plan.clone(),
+            plan: self.roster.nodes[node].primary.plan.clone(),
         };
         self.seats[node].is_vacant = true;
         let (purpose, join) = (Purpose::Restart, Join::AtOnce);
@@ -798,9 +798,9 @@ impl<'a> Successions<'a> {
         let Some(mut candidate) = self.seats[node].candidate.take() else { return Ok(()) };
         processes.kill(node, candidate.generation, None);
         let member = self.member(node, candidate.generation);
-        self.control.set_seat(member, Seat::Empty);
+        self.control.set_slot_state(member, SlotState::Empty);
         let roster = &mut self.roster.nodes[node];
-        if roster.successor.take().is_some() {
+        if roster.backup.take().is_some() {
             roster.take_over_tick = u32::MAX;
             roster.take_over_ticks.fill(u32::MAX);
             // A roster that nobody was told of is replaced under its own number.
@@ -824,7 +824,7 @@ impl<'a> Successions<'a> {
             if candidate.stage < Stage::Shadowing && candidate.pending.join != Join::AtOnce {
                 let generation = candidate.generation;
                 processes.kill(node, generation, None);
-                self.control.set_seat(self.member(node, generation), Seat::Empty);
+                self.control.set_slot_state(self.member(node, generation), SlotState::Empty);
                 if let Some(process) = processes.of(node, generation) {
                     process.is_settled = true;
                 }
@@ -838,7 +838,7 @@ impl<'a> Successions<'a> {
 
     /// Processor time in nanoseconds, and deadlines missed, of all processes of `node`.
     pub fn spent(&self, node: usize) -> (u64, u32) {
-        let members = (0..SEATS).map(|seat| self.control_use(seat * self.plan.nodes.len() + node));
+        let members = (0..SLOTS_PER_NODE).map(|seat| self.control_use(seat * self.plan.nodes.len() + node));
         members.fold(self.seats[node].spent, |sum, used| (sum.0 + used.0, sum.1 + used.1))
     }
 

@@ -45,7 +45,7 @@ impl Announcement {
 
     /// Reads the announcement at `path`.
     pub(crate) fn load(path: &Path) -> Result<Self, BusError> {
-        let text = crate::own_file::read_text(path).map_err(|source| BusError::File {
+        let text = crate::user_file::read_text(path).map_err(|source| BusError::File {
             action: "read",
             path: path.to_owned(),
             source,

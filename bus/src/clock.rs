@@ -1,8 +1,8 @@
 //! The clock service: leads the processes of a run through the ready barrier and grants their ticks.
 
-use crate::control::{Control, Edge, Phase, Seat, Waited, Word, monotonic_ns, process_cpu_ns};
+use crate::control::{Control, Phase, Sequence, SlotState, Waited, Waiter, monotonic_ns, process_cpu_ns};
 use crate::error::BusError;
-use crate::plan::{Pace, Plan, SEATS, Wait};
+use crate::plan::{Pace, Plan, SLOTS_PER_NODE, Wait};
 use crate::profile::GrantWriter;
 use rustix::thread::clock_nanosleep_absolute;
 use std::cell::RefCell;
@@ -67,14 +67,14 @@ impl Deadlines {
 struct Clock<'a> {
     plan: &'a Plan,
     control: &'a Control,
-    grant_edges: Vec<Edge>,
+    grant_waiters: Vec<Waiter>,
     grants: Option<RefCell<GrantWriter>>,
 }
 
 impl<'a> Clock<'a> {
     fn new(plan: &'a Plan, control: &'a Control, grants: Option<GrantWriter>) -> Self {
-        let grant_edges = (0..SEATS * plan.nodes.len()).map(Edge::Grant).collect();
-        Self { plan, control, grant_edges, grants: grants.map(RefCell::new) }
+        let grant_waiters = (0..SLOTS_PER_NODE * plan.nodes.len()).map(Waiter::Grant).collect();
+        Self { plan, control, grant_waiters, grants: grants.map(RefCell::new) }
     }
 
     /// Waits until every node is ready for `phase`, then starts it.
@@ -185,27 +185,27 @@ impl<'a> Clock<'a> {
         if let Some(grants) = &self.grants {
             grants.borrow_mut().grant(ticks, deadline_ns);
         }
-        self.control.advance(Word::Grant, ticks, &self.grant_edges);
+        self.control.advance(Sequence::Grant, ticks, &self.grant_waiters);
     }
 
     fn slowest(&self) -> u32 {
         self.control
             .computing()
-            .map(|member| self.control.count(Word::Done(member)))
+            .map(|slot| self.control.count(Sequence::Done(slot)))
             .min()
             .unwrap_or(u32::MAX)
     }
 
-    /// Waits until every member has completed `ticks` ticks.
+    /// Waits until every slot has completed `ticks` ticks.
     fn await_all(&self, ticks: u32) -> Result<(), BusError> {
-        let late = |member: &usize| self.control.count(Word::Done(*member)) < ticks;
-        while let Some(member) = self.control.computing().find(late) {
-            // A member that died is replaced, or leaves: then it is another's turn to be waited for.
+        let late = |slot: &usize| self.control.count(Sequence::Done(*slot)) < ticks;
+        while let Some(slot) = self.control.computing().find(late) {
+            // A slot that died is replaced, or leaves: then it is another's turn to be waited for.
             let epoch = self.control.epoch();
             let has_left =
-                |control: &Control| control.epoch() != epoch || control.seat(member) != Seat::Taken;
+                |control: &Control| control.epoch() != epoch || control.slot_state(slot) != SlotState::Taken;
             let waited =
-                self.control.wait(Word::Done(member), ticks, Edge::Done(member), Wait::Block, has_left);
+                self.control.wait(Sequence::Done(slot), ticks, Waiter::Done(slot), Wait::Block, has_left);
             if waited == Waited::Over && self.control.is_aborted() {
                 return Err(BusError::Aborted);
             }
@@ -214,8 +214,8 @@ impl<'a> Clock<'a> {
     }
 
     fn note_late_nodes(&self, tick: u32) {
-        let late = |member: &usize| self.control.count(Word::Done(*member)) < tick;
-        if self.control.computing().any(|member| late(&member)) {
+        let late = |slot: &usize| self.control.count(Sequence::Done(*slot)) < tick;
+        if self.control.computing().any(|slot| late(&slot)) {
             self.control.count_missed_deadline(self.control.computing().filter(late));
         }
     }

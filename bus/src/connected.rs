@@ -1,18 +1,20 @@
 //! A connected node: waits for what a tick needs, computes it, sends, and follows the changes of the run.
 
 use crate::announcement::{self, Announcement};
-use crate::control::{Control, Edge, HandOver, Phase, Seat, Waited, Word, monotonic_ns, process_cpu_ns};
+use crate::control::{
+    Control, Phase, Sequence, SlotState, Transfer, Waited, Waiter, monotonic_ns, process_cpu_ns,
+};
 use crate::error::BusError;
-use crate::handover::StateRing;
 use crate::initial;
+use crate::membership::{Membership, NodeInstances};
 use crate::message::Message;
-use crate::node::{Declared, RawInput, go_on};
+use crate::node::{Declared, RawInput, require_reached};
 use crate::plan::{InputPlan, NodePlan, Plan};
 use crate::port::{InPort, OutPort, Source};
 use crate::process::Claim;
 use crate::profile::TickWriter;
-use crate::roster::{NodeRoster, Roster};
 use crate::schema::Schema;
+use crate::state_transfer::StateRing;
 use crate::tick::Tick;
 use crate::transport::Transport;
 use std::fmt::Display;
@@ -62,7 +64,7 @@ pub struct ConnectedNode {
 enum Await {
     /// The tick can be computed.
     Tick,
-    /// The roster has changed.
+    /// The membership has changed.
     Change,
     /// The run ends before the tick.
     End,
@@ -73,10 +75,10 @@ impl ConnectedNode {
         links: Links,
         declared: impl Iterator<Item = Declared>,
         outputs: Vec<OutPort>,
-        roster: &Roster,
+        membership: &Membership,
     ) -> Result<Self, BusError> {
-        let own = roster.nodes[links.index].of(links.generation);
-        let first_tick = own.map_or(0, |incumbent| incumbent.join_tick);
+        let own = membership.nodes[links.index].of(links.generation);
+        let first_tick = own.map_or(0, |instance| instance.join_tick);
         let mut node = Self {
             inputs: Vec::new(),
             outputs,
@@ -87,12 +89,12 @@ impl ConnectedNode {
             take_over_tick: 0,
             retirement_tick: u32::MAX,
             first_tick,
-            epoch: roster.epoch,
+            epoch: membership.epoch,
             profile: None,
             links,
         };
-        node.connect_inputs(declared, roster)?;
-        node.agree_with(roster, first_tick)?;
+        node.connect_inputs(declared, membership)?;
+        node.follow(membership, first_tick)?;
         node.links.transport.reserve()?;
         if node.links.plan.profile {
             let links = &node.links;
@@ -100,15 +102,15 @@ impl ConnectedNode {
             node.profile =
                 Some(TickWriter::create(&links.run_dir, &links.plan, index, generation, first_tick)?);
         }
-        node.links.control.set_process(node.links.member());
-        node.links.control.agree(node.links.member(), roster.epoch);
+        node.links.control.set_process(node.links.slot());
+        node.links.control.acknowledge(node.links.slot(), membership.epoch);
         Ok(node)
     }
 
     fn connect_inputs(
         &mut self,
         declared: impl Iterator<Item = Declared>,
-        roster: &Roster,
+        membership: &Membership,
     ) -> Result<(), BusError> {
         let links = &self.links;
         for (index, (input, declared)) in links.node.inputs.iter().zip(declared).enumerate() {
@@ -118,12 +120,12 @@ impl ConnectedNode {
                 announcement.check(schema, &links.node.name, &input.port, &topic.name)?;
             }
             let initial = links.initial_value(input, declared)?;
-            let generation = links.publisher(roster, input.topic).active.generation;
+            let generation = links.publisher(membership, input.topic).primary.generation;
             let receiver = links.subscriber(input.topic, generation)?;
             let limit = self.first_tick.checked_sub(input.delay_ticks);
             let source = Source::joined(generation, receiver, limit, topic.period_ticks);
-            let edge = links.plan.edge(links.member(), index);
-            let mut port = InPort::new(input, topic, announcement.size, edge, initial, source);
+            let waiter = links.plan.input_waiter(links.slot(), index);
+            let mut port = InPort::new(input, topic, announcement.size, waiter, initial, source);
             port.reads_shadow = matches!(declared, Declared::Raw);
             self.inputs.push(port);
             self.announcements.push(announcement);
@@ -146,7 +148,7 @@ impl ConnectedNode {
         mut self,
         mut step: impl FnMut(&mut Tick<'_>) -> Result<(), E>,
     ) -> Result<(), BusError> {
-        self.meet_predecessor(None)?;
+        self.open_predecessor(None)?;
         self.fly(&mut [], |tick, _| step(tick).map_err(|error| error.to_string()))
     }
 
@@ -160,7 +162,7 @@ impl ConnectedNode {
         mut state: S,
         mut step: impl FnMut(&mut Tick<'_>, &mut S) -> Result<(), E>,
     ) -> Result<(), BusError> {
-        self.meet_predecessor(Some(S::SCHEMA))?;
+        self.open_predecessor(Some(S::SCHEMA))?;
         let links = &self.links;
         let (dir, plan) = (&links.run_dir, &links.plan);
         self.stated = Some(StateRing::create(dir, plan, links.index, links.generation, S::SCHEMA)?);
@@ -170,20 +172,20 @@ impl ConnectedNode {
     }
 
     /// Opens the state of the process that this one succeeds, or else what it sends.
-    fn meet_predecessor(&mut self, state: Option<&Schema>) -> Result<(), BusError> {
+    fn open_predecessor(&mut self, state: Option<&Schema>) -> Result<(), BusError> {
         let links = &self.links;
         if links.generation == 0 {
             return Ok(());
         }
-        let generation = Roster::load(&links.run_dir, self.epoch)?.nodes[links.index].active.generation;
+        let generation = Membership::load(&links.run_dir, self.epoch)?.nodes[links.index].primary.generation;
         if let Some(schema) = state {
             self.handed = StateRing::open(&links.run_dir, &links.plan, links.index, generation, schema)?;
         }
         if self.handed.is_some() {
-            links.control.set_hand_over(links.member(), HandOver::State);
+            links.control.set_transfer(links.slot(), Transfer::State);
             return Ok(());
         }
-        links.control.set_hand_over(links.member(), HandOver::LastOutput);
+        links.control.set_transfer(links.slot(), Transfer::LastOutput);
         for output in &links.node.outputs {
             let topic = &links.plan.topics[output.topic];
             let receiver = links.subscriber(output.topic, generation)?;
@@ -206,16 +208,16 @@ impl ConnectedNode {
         if self.links.plan.lock_memory {
             crate::process::lock_memory()?;
         }
-        let member = self.links.member();
+        let slot = self.links.slot();
         if self.links.generation == 0 {
             // Who takes its place may have to begin with the first tick.
-            self.state_state(self.first_tick, state);
+            self.publish_state(self.first_tick, state);
         }
-        self.links.control.set_ready(member, Phase::Running);
+        self.links.control.set_ready(slot, Phase::Running);
         if self.links.generation == 0 {
-            go_on(self.links.control.wait_phase(Phase::Running))?;
+            require_reached(self.links.control.wait_phase(Phase::Running))?;
         } else {
-            go_on(self.links.control.wait_seat(member, Seat::Taken))?;
+            require_reached(self.links.control.wait_slot(slot, SlotState::Taken))?;
         }
         let cpu_start_ns = process_cpu_ns();
         let period = self.links.node.period_ticks;
@@ -223,25 +225,29 @@ impl ConnectedNode {
         while self.await_tick(tick, state)? {
             if self.links.generation > 0 && tick <= self.take_over_tick.max(self.first_tick) {
                 // What it begins with is its predecessor's, not what it came to itself.
-                self.state_state(tick, state);
+                self.publish_state(tick, state);
             }
             self.compute(tick, state, &mut step)?;
             tick += period;
-            self.links.control.advance(Word::Done(member), tick, &self.links.done_edges());
+            self.links.control.advance(Sequence::Done(slot), tick, &self.links.done_waiters());
         }
         // A node whose next due tick lies beyond the end has completed the run.
-        self.links.control.set_cpu_ns(member, process_cpu_ns() - cpu_start_ns);
-        self.links.control.advance(Word::Done(member), u32::MAX - 1, &self.links.done_edges());
+        self.links.control.set_cpu_ns(slot, process_cpu_ns() - cpu_start_ns);
+        self.links.control.advance(Sequence::Done(slot), u32::MAX - 1, &self.links.done_waiters());
         self.await_readers(tick)
     }
 
     /// States the state at the start of `tick`, for whoever takes over there.
-    fn state_state(&self, tick: u32, state: &[u8]) {
+    fn publish_state(&self, tick: u32, state: &[u8]) {
         if let Some(ring) = &self.stated {
             ring.store(tick, state);
             let links = &self.links;
             // A count of zero is no state.
-            links.control.advance(Word::State(links.member()), tick + 1, &[Edge::Partner(links.partner())]);
+            links.control.advance(
+                Sequence::State(links.slot()),
+                tick + 1,
+                &[Waiter::Replacement(links.other_slot())],
+            );
         }
     }
 
@@ -265,9 +271,9 @@ impl ConnectedNode {
                 Await::End => return Ok(false),
                 Await::Change => {
                     let epoch = self.links.control.epoch();
-                    self.agree_with(&Roster::load(&self.links.run_dir, epoch)?, tick)?;
+                    self.follow(&Membership::load(&self.links.run_dir, epoch)?, tick)?;
                     self.links.transport.reserve()?;
-                    self.links.control.agree(self.links.member(), epoch);
+                    self.links.control.acknowledge(self.links.slot(), epoch);
                 }
             }
         }
@@ -284,11 +290,11 @@ impl ConnectedNode {
         let batch = if links.node.outputs.is_empty() { (links.plan.window_ticks / 4).max(1) } else { 1 };
         for input in &self.inputs {
             let needed = (tick + 1).saturating_sub(input.delay_ticks);
-            let word = Word::Topic(input.topic);
+            let word = Sequence::Topic(input.topic);
             if links.control.count(word) < needed {
-                let granted = links.control.count(Word::Grant);
+                let granted = links.control.count(Sequence::Grant);
                 let sleep_for = needed.max((tick + batch).min(granted).saturating_sub(input.delay_ticks));
-                let awaited = self.wait(word, sleep_for, Edge::Input(input.edge), tick);
+                let awaited = self.wait(word, sleep_for, Waiter::Input(input.waiter), tick);
                 // A node that lets samples gather may be sent home with some of them still to be taken: all
                 // that was sent before an abort is recorded.
                 let is_sent = awaited == Await::End && links.control.count(word) >= needed;
@@ -297,14 +303,15 @@ impl ConnectedNode {
                 }
             }
             if input.awaits_shadow(tick) {
-                let awaited = self.wait(Word::Shadow(input.topic), tick + 1, Edge::Shadow(input.edge), tick);
+                let awaited =
+                    self.wait(Sequence::Shadow(input.topic), tick + 1, Waiter::Shadow(input.waiter), tick);
                 if awaited != Await::Tick {
                     return Ok(awaited);
                 }
             }
         }
         // The inputs of this tick imply its grant, except where a node has none that are due at it.
-        Ok(self.wait(Word::Grant, tick + 1, Edge::Grant(links.member()), tick))
+        Ok(self.wait(Sequence::Grant, tick + 1, Waiter::Grant(links.slot()), tick))
     }
 
     /// As a shadow, starts `tick` from the state of the predecessor, if that states one: what this process
@@ -313,9 +320,9 @@ impl ConnectedNode {
         if self.links.generation == 0 || tick > self.take_over_tick {
             return Ok(Await::Tick);
         }
-        let (predecessor, edge) = (self.links.partner(), Edge::Partner(self.links.member()));
+        let (predecessor, waiter) = (self.links.other_slot(), Waiter::Replacement(self.links.slot()));
         if let Some(ring) = &self.handed {
-            let awaited = self.wait(Word::State(predecessor), tick + 1, edge, tick);
+            let awaited = self.wait(Sequence::State(predecessor), tick + 1, waiter, tick);
             if awaited != Await::Tick {
                 return Ok(awaited);
             }
@@ -326,33 +333,33 @@ impl ConnectedNode {
                 });
             }
         }
-        if tick == self.take_over_tick && self.links.control.seat(predecessor) == Seat::Taken {
-            return Ok(self.wait(Word::Done(predecessor), tick, edge, tick));
+        if tick == self.take_over_tick && self.links.control.slot_state(predecessor) == SlotState::Taken {
+            return Ok(self.wait(Sequence::Done(predecessor), tick, waiter, tick));
         }
         Ok(Await::Tick)
     }
 
     /// Waits until the successor has completed its first tick, or is refused.
     fn await_successor(&self) -> Await {
-        let (member, successor) = (self.links.member(), self.links.partner());
+        let (slot, successor) = (self.links.slot(), self.links.other_slot());
         let tick = self.retirement_tick;
-        match self.wait(Word::Done(successor), tick + 1, Edge::Partner(member), tick) {
+        match self.wait(Sequence::Done(successor), tick + 1, Waiter::Replacement(slot), tick) {
             Await::Tick => Await::End,
             other => other,
         }
     }
 
-    fn wait(&self, word: Word, count: u32, edge: Edge, tick: u32) -> Await {
+    fn wait(&self, word: Sequence, count: u32, waiter: Waiter, tick: u32) -> Await {
         let over = |control: &Control| control.end_tick() <= tick || control.epoch() != self.epoch;
         let control = &self.links.control;
-        match control.wait(word, count, edge, self.links.node.wait, over) {
+        match control.wait(word, count, waiter, self.links.node.wait, over) {
             Waited::Reached => Await::Tick,
             Waited::Over if control.is_aborted() || control.end_tick() <= tick => Await::End,
             Waited::Over => Await::Change,
         }
     }
 
-    /// Stays until every member has taken the last samples of this process, where it leaves before the end.
+    /// Stays until every slot has taken the last samples of this process, where it leaves before the end.
     fn await_readers(&self, tick: u32) -> Result<(), BusError> {
         let (control, plan) = (&self.links.control, &self.links.plan);
         let longest = plan.nodes.iter().map(|node| node.period_ticks).max().unwrap_or(1);
@@ -362,36 +369,37 @@ impl ConnectedNode {
                 return Err(BusError::Aborted);
             }
             let needed = taken.min(control.end_tick());
-            if control.computing().all(|member| control.count(Word::Done(member)) >= needed) {
+            if control.computing().all(|slot| control.count(Sequence::Done(slot)) >= needed) {
                 return Ok(());
             }
             std::thread::sleep(RETIREMENT_NAP);
         }
     }
 
-    /// Makes the connections agree with `roster`; `tick` is the next that this node computes.
-    fn agree_with(&mut self, roster: &Roster, tick: u32) -> Result<(), BusError> {
+    /// Makes the connections agree with `membership`; `tick` is the next that this node computes.
+    fn follow(&mut self, membership: &Membership, tick: u32) -> Result<(), BusError> {
         for input in &mut self.inputs {
-            self.links.connect_successor(input, roster, tick)?;
+            self.links.connect_successor(input, membership, tick)?;
         }
-        let own = &roster.nodes[self.links.index];
+        let own = &membership.nodes[self.links.index];
         let is_successor =
-            own.successor.as_ref().is_some_and(|successor| successor.generation == self.links.generation);
+            own.backup.as_ref().is_some_and(|successor| successor.generation == self.links.generation);
         if is_successor {
             self.take_over_tick = own.take_over_tick;
             self.retirement_tick = u32::MAX;
-        } else if own.active.generation == self.links.generation {
-            self.retirement_tick = own.successor.as_ref().map_or(u32::MAX, |_| own.take_over_tick);
+        } else if own.primary.generation == self.links.generation {
+            self.retirement_tick = own.backup.as_ref().map_or(u32::MAX, |_| own.take_over_tick);
         }
         for (index, output) in self.outputs.iter_mut().enumerate() {
-            output.readers = self.links.reader_edges(roster, output.topic).map(Edge::Input).collect();
-            output.shadow_readers = self.links.reader_edges(roster, output.topic).map(Edge::Shadow).collect();
-            output.meet_subscribers(&self.links.node.name)?;
+            output.readers = self.links.reader_waiters(membership, output.topic).map(Waiter::Input).collect();
+            output.shadow_readers =
+                self.links.reader_waiters(membership, output.topic).map(Waiter::Shadow).collect();
+            output.update_subscribers(&self.links.node.name)?;
             if is_successor {
                 self.links.promote(output, own, index, tick);
             }
         }
-        self.epoch = roster.epoch;
+        self.epoch = membership.epoch;
         Ok(())
     }
 
@@ -422,9 +430,9 @@ impl ConnectedNode {
             reason,
         })?;
         let done_ns = monotonic_ns();
-        links.control.count_step(links.member(), done_ns - received_ns);
+        links.control.count_step(links.slot(), done_ns - received_ns);
         // Before anything is sent: whoever sees the sample can go on from the state after it.
-        self.state_state(tick + self.links.node.period_ticks, state);
+        self.publish_state(tick + self.links.node.period_ticks, state);
         self.send(tick, time_ns, received_ns, done_ns)?;
         if tick >= self.take_over_tick {
             // The predecessor leaves; nothing of it is read any more.
@@ -447,9 +455,9 @@ impl ConnectedNode {
             output.send(tick, time_ns, [received_ns, done_ns, sent_ns], node)?;
             let next = tick + output.period_ticks;
             if tick >= output.counts_from {
-                control.advance(Word::Topic(output.topic), next, &output.readers);
+                control.advance(Sequence::Topic(output.topic), next, &output.readers);
             } else {
-                control.advance(Word::Shadow(output.topic), next, &output.shadow_readers);
+                control.advance(Sequence::Shadow(output.topic), next, &output.shadow_readers);
             }
             sent_before = true;
         }
@@ -464,17 +472,17 @@ impl ConnectedNode {
 }
 
 impl Links {
-    fn member(&self) -> usize {
-        self.plan.member(self.index, self.generation)
+    fn slot(&self) -> usize {
+        self.plan.slot(self.index, self.generation)
     }
 
-    /// The other seat of this node: its predecessor's or its successor's.
-    fn partner(&self) -> usize {
-        self.plan.member(self.index, self.generation + 1)
+    /// The other slot of this node: its predecessor's or its successor's.
+    fn other_slot(&self) -> usize {
+        self.plan.slot(self.index, self.generation + 1)
     }
 
-    fn done_edges(&self) -> [Edge; 2] {
-        [Edge::Done(self.member()), Edge::Partner(self.partner())]
+    fn done_waiters(&self) -> [Waiter; 2] {
+        [Waiter::Done(self.slot()), Waiter::Replacement(self.other_slot())]
     }
 
     fn subscriber(&self, topic: usize, generation: u32) -> Result<crate::transport::Receiver, BusError> {
@@ -482,14 +490,14 @@ impl Links {
     }
 
     /// The processes of the node that publishes `topic`.
-    fn publisher<'a>(&self, roster: &'a Roster, topic: usize) -> &'a NodeRoster {
-        &roster.nodes[self.plan.publisher(topic).unwrap_or(self.index)]
+    fn publisher<'a>(&self, membership: &'a Membership, topic: usize) -> &'a NodeInstances {
+        &membership.nodes[self.plan.publisher(topic).unwrap_or(self.index)]
     }
 
-    fn reader_edges(&self, roster: &Roster, topic: usize) -> impl Iterator<Item = usize> {
-        roster
+    fn reader_waiters(&self, membership: &Membership, topic: usize) -> impl Iterator<Item = usize> {
+        membership
             .readers(topic)
-            .map(|(node, generation, input)| self.plan.edge(self.plan.member(node, generation), input))
+            .map(|(node, generation, input)| self.plan.input_waiter(self.plan.slot(node, generation), input))
     }
 
     fn initial_value(&self, input: &InputPlan, declared: Declared) -> Result<Option<Box<[u64]>>, BusError> {
@@ -503,10 +511,15 @@ impl Links {
     }
 
     /// Connects `input` to the process that shadows its publisher, and lets go of one that is gone.
-    fn connect_successor(&self, input: &mut InPort, roster: &Roster, tick: u32) -> Result<(), BusError> {
-        let publisher = self.publisher(roster, input.topic);
-        let Some(successor) = &publisher.successor else {
-            input.drop_successors_of(publisher.active.generation);
+    fn connect_successor(
+        &self,
+        input: &mut InPort,
+        membership: &Membership,
+        tick: u32,
+    ) -> Result<(), BusError> {
+        let publisher = self.publisher(membership, input.topic);
+        let Some(successor) = &publisher.backup else {
+            input.drop_successors_of(publisher.primary.generation);
             return Ok(());
         };
         let take_over_tick = publisher.topic_take_over_tick(input.topic);
@@ -517,7 +530,7 @@ impl Links {
             // A reader that joined later than the shadow starts with what its own first tick reads.
             let first_tick = first_tick.max(tick.saturating_sub(input.delay_ticks));
             let source = Source::new(successor.generation, receiver, first_tick, period_ticks);
-            input.drop_successors_of(publisher.active.generation);
+            input.drop_successors_of(publisher.primary.generation);
             input.add_successor(source, successor.shadows);
         }
         input.set_take_over_tick(take_over_tick);
@@ -525,13 +538,13 @@ impl Links {
     }
 
     /// Has the samples of `output` count from the take-over on, also those that were sent already.
-    fn promote(&self, output: &mut OutPort, own: &NodeRoster, index: usize, tick: u32) {
+    fn promote(&self, output: &mut OutPort, own: &NodeInstances, index: usize, tick: u32) {
         output.counts_from = own.take_over_ticks[index];
-        let shadows = own.successor.as_ref().is_some_and(|successor| successor.shadows);
+        let shadows = own.backup.as_ref().is_some_and(|successor| successor.shadows);
         output.sends_from = if shadows { 0 } else { output.counts_from };
         let next_due = tick.div_ceil(output.period_ticks) * output.period_ticks;
-        if next_due > output.counts_from && self.control.count(Word::Topic(output.topic)) < next_due {
-            self.control.advance(Word::Topic(output.topic), next_due, &output.readers);
+        if next_due > output.counts_from && self.control.count(Sequence::Topic(output.topic)) < next_due {
+            self.control.advance(Sequence::Topic(output.topic), next_due, &output.readers);
         }
     }
 }

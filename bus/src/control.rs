@@ -1,32 +1,32 @@
 //! The control segment: the words in shared memory by which the processes of a run pace each other.
 //!
-//! One cache line a slot: the run, the grant, every topic, every node, every edge. A *word* counts
-//! ticks that are complete; an *edge* belongs to one reader of one word and holds the count that
-//! this reader sleeps for. A writer stores its word, then looks at the edges that read it, and wakes
+//! One cache line a slot: the run, the grant, every topic, every node, every waiter. A *word* counts
+//! ticks that are complete; an *waiter* belongs to one reader of one word and holds the count that
+//! this reader sleeps for. A writer stores its word, then looks at the waiters that read it, and wakes
 //! only those whose count is reached: nobody is woken for nothing, and nobody pays a system call
-//! for a reader that is awake. Behind the edges every node counts its step times (`live.rs`).
+//! for a reader that is awake. Behind the waiters every node counts its step times (`live.rs`).
 
 use crate::error::BusError;
-use crate::live::STEP_SLOTS;
-use crate::plan::{InputPlan, Pace, Plan, SEATS, Wait};
+use crate::live::STEP_LINES;
+use crate::plan::{InputPlan, Pace, Plan, SLOTS_PER_NODE, Wait};
 use memmap2::MmapRaw;
 use rustix::thread::futex;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU32, AtomicU64, Ordering::Relaxed, Ordering::SeqCst};
 
-const SLOT_BYTES: usize = 64;
+const LINE_BYTES: usize = 64;
 /// Changes with the layout of the segment and the queues: processes of different versions do not fly together.
 const MAGIC: u32 = 0x4855_4d37;
-/// Words of a member's slot: how far it has joined, and what its seat holds.
+/// Words of a slot: how far its process has joined, and what it holds.
 const READY: usize = 0;
-const SEAT: usize = 8;
+const STATE: usize = 8;
 /// Its deadlines missed, the epoch it agrees with, what it goes on from, and (a double word) its processor
 /// time.
 const LATE: usize = 3;
 const EPOCH: usize = 9;
-const HAND_OVER: usize = 10;
+const TRANSFER: usize = 10;
 const CPU: usize = 2;
-/// The value of an edge on which nobody sleeps.
+/// The value of a waiter on which nobody sleeps.
 const AWAKE: u32 = u32::MAX;
 /// What stands in the place of the tick of a hold while the clock runs.
 const NOT_HELD: u32 = u32::MAX;
@@ -51,38 +51,38 @@ pub enum Phase {
 
 /// A tick word of the control segment.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Word {
+pub(crate) enum Sequence {
     /// Ticks that may be computed.
     Grant,
     /// Ticks of a topic whose sample has been sent.
     Topic(usize),
     /// Ticks of a topic for which its publisher's successor has sent a shadow sample.
     Shadow(usize),
-    /// Ticks that a member has completed.
+    /// Ticks that a slot has completed.
     Done(usize),
-    /// Ticks at whose start a member has stated the state that it would hand over.
+    /// Ticks at whose start a slot has stated the state that it would hand over.
     State(usize),
 }
 
-/// An edge of the control segment: one reader of one word.
+/// A waiter of the control segment: one reader of one word.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Edge {
-    /// A member waits for the grant.
+pub(crate) enum Waiter {
+    /// A slot waits for the grant.
     Grant(usize),
-    /// The clock waits for a member.
+    /// The clock waits for a slot.
     Done(usize),
-    /// A member waits for its predecessor or for its successor.
-    Partner(usize),
-    /// A member waits for an input; counted over all inputs of the run.
+    /// A slot waits for its predecessor or for its successor.
+    Replacement(usize),
+    /// A slot waits for an input; counted over all inputs of the run.
     Input(usize),
-    /// A member waits for the shadow samples of an input; counted in the same way.
+    /// A slot waits for the shadow samples of an input; counted in the same way.
     Shadow(usize),
 }
 
-/// What a seat of a node holds.
+/// What a slot of a node holds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u32)]
-pub enum Seat {
+pub enum SlotState {
     /// Nobody.
     Empty = 0,
     /// A process that may make its connections.
@@ -94,7 +94,7 @@ pub enum Seat {
 /// What a successor goes on from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u32)]
-pub enum HandOver {
+pub enum Transfer {
     /// Nothing is known yet.
     Unknown = 0,
     /// The state of its predecessor: both know the same type.
@@ -117,8 +117,8 @@ pub(crate) enum Waited {
 pub struct Control {
     map: MmapRaw,
     topics: usize,
-    members: usize,
-    edges: usize,
+    slots: usize,
+    waiters: usize,
 }
 
 /// Where the control segment of run `run_id` lies.
@@ -157,8 +157,8 @@ impl Control {
         control.set_join_tick(u32::MAX);
         control.word(1, 3).store(NOT_HELD, SeqCst);
         // Generation 0 of every node is there from the start.
-        (0..plan.nodes.len()).for_each(|member| control.set_seat(member, Seat::Taken));
-        (0..control.edge_slots()).for_each(|edge| control.edge_at(edge).store(AWAKE, SeqCst));
+        (0..plan.nodes.len()).for_each(|slot| control.set_slot_state(slot, SlotState::Taken));
+        (0..control.waiter_count()).for_each(|waiter| control.waiter_at(waiter).store(AWAKE, SeqCst));
         // Last: who opens the segment earlier finds no segment rather than half of one.
         control.word(0, 0).store(MAGIC, SeqCst);
         Ok(control)
@@ -171,7 +171,7 @@ impl Control {
     pub fn open(plan: &Plan) -> Result<Self, BusError> {
         let path = control_path(&plan.run_id);
         let fail = |source| BusError::File { action: "open", path: path.clone(), source };
-        let file = crate::own_file::open(&path, true).map_err(fail)?;
+        let file = crate::user_file::open(&path, true).map_err(fail)?;
         let length = file.metadata().map_err(fail)?.len();
         if length != control_bytes(plan) as u64 {
             return Err(BusError::Content {
@@ -190,13 +190,14 @@ impl Control {
 
     fn map(plan: &Plan, file: &std::fs::File) -> std::io::Result<Self> {
         let map = MmapRaw::map_raw(file)?;
-        let (topics, members, edges) = (plan.topics.len(), members(plan), SEATS * plan.edge_count());
-        Ok(Self { map, topics, members, edges })
+        let (topics, slots, waiters) =
+            (plan.topics.len(), slots(plan), SLOTS_PER_NODE * plan.input_waiters());
+        Ok(Self { map, topics, slots, waiters })
     }
 
     /// Word `index` (0…15) of slot `slot`.
     pub(crate) fn word(&self, slot: usize, index: usize) -> &AtomicU32 {
-        let offset = slot * SLOT_BYTES + index * 4;
+        let offset = slot * LINE_BYTES + index * 4;
         assert!(index < 16 && offset + 4 <= self.map.len(), "slot {slot} is outside the control segment");
         // SAFETY: the mapping lives as long as `self`, the offset is inside it (asserted) and a
         // multiple of 4 from a page-aligned start; every process accesses these bytes as atomics only.
@@ -205,68 +206,68 @@ impl Control {
 
     /// Double word `index` (0…7) of slot `slot`.
     fn double_word(&self, slot: usize, index: usize) -> &AtomicU64 {
-        let offset = slot * SLOT_BYTES + index * 8;
+        let offset = slot * LINE_BYTES + index * 8;
         assert!(index < 8 && offset + 8 <= self.map.len(), "slot {slot} is outside the control segment");
         // SAFETY: as in `word`; the offset is a multiple of 8, and no slot uses the same bytes both
         // as a word and as a double word.
         unsafe { AtomicU64::from_ptr(self.map.as_mut_ptr().add(offset).cast()) }
     }
 
-    fn tick_word(&self, word: Word) -> &AtomicU32 {
+    fn tick_word(&self, word: Sequence) -> &AtomicU32 {
         match word {
-            Word::Grant => self.word(1, 0),
-            Word::Topic(topic) => self.word(self.topic_slot(topic), 0),
-            Word::Shadow(topic) => self.word(2 + self.topics + topic, 0),
-            Word::Done(member) => self.word(self.member_slot(member), 1),
-            Word::State(member) => self.word(self.member_slot(member), 2),
+            Sequence::Grant => self.word(1, 0),
+            Sequence::Topic(topic) => self.word(self.topic_line(topic), 0),
+            Sequence::Shadow(topic) => self.word(2 + self.topics + topic, 0),
+            Sequence::Done(slot) => self.word(self.slot_line(slot), 1),
+            Sequence::State(slot) => self.word(self.slot_line(slot), 2),
         }
     }
 
-    pub(crate) fn topic_slot(&self, topic: usize) -> usize {
+    pub(crate) fn topic_line(&self, topic: usize) -> usize {
         2 + topic
     }
 
-    pub(crate) fn member_slot(&self, member: usize) -> usize {
-        2 + 2 * self.topics + member
+    pub(crate) fn slot_line(&self, slot: usize) -> usize {
+        2 + 2 * self.topics + slot
     }
 
-    /// The first of the slots that count the step times of `member`: behind those of the edges.
-    pub(crate) fn step_slot(&self, member: usize) -> usize {
-        2 + 2 * self.topics + self.members + self.edge_slots() + member * STEP_SLOTS
+    /// The first of the slots that count the step times of `slot`: behind those of the waiters.
+    pub(crate) fn step_line(&self, slot: usize) -> usize {
+        2 + 2 * self.topics + self.slots + self.waiter_count() + slot * STEP_LINES
     }
 
-    fn edge_slots(&self) -> usize {
-        3 * self.members + 2 * self.edges
+    fn waiter_count(&self) -> usize {
+        3 * self.slots + 2 * self.waiters
     }
 
-    fn edge_at(&self, index: usize) -> &AtomicU32 {
-        self.word(2 + 2 * self.topics + self.members + index, 0)
+    fn waiter_at(&self, index: usize) -> &AtomicU32 {
+        self.word(2 + 2 * self.topics + self.slots + index, 0)
     }
 
-    fn edge_word(&self, edge: Edge) -> &AtomicU32 {
-        self.edge_at(match edge {
-            Edge::Grant(member) => member,
-            Edge::Done(member) => self.members + member,
-            Edge::Partner(member) => 2 * self.members + member,
-            Edge::Input(edge) => 3 * self.members + edge,
-            Edge::Shadow(edge) => 3 * self.members + self.edges + edge,
+    fn waiter_word(&self, waiter: Waiter) -> &AtomicU32 {
+        self.waiter_at(match waiter {
+            Waiter::Grant(slot) => slot,
+            Waiter::Done(slot) => self.slots + slot,
+            Waiter::Replacement(slot) => 2 * self.slots + slot,
+            Waiter::Input(waiter) => 3 * self.slots + waiter,
+            Waiter::Shadow(waiter) => 3 * self.slots + self.waiters + waiter,
         })
     }
 
     /// The count of `word`.
-    pub(crate) fn count(&self, word: Word) -> u32 {
+    pub(crate) fn count(&self, word: Sequence) -> u32 {
         self.tick_word(word).load(SeqCst)
     }
 
     /// Stores `count` in `word` and wakes those of its readers whose count is reached.
-    pub(crate) fn advance(&self, word: Word, count: u32, readers: &[Edge]) {
+    pub(crate) fn advance(&self, word: Sequence, count: u32, readers: &[Waiter]) {
         self.tick_word(word).store(count, SeqCst);
         for &reader in readers {
-            let edge = self.edge_word(reader);
+            let waiter = self.waiter_word(reader);
             // Both sides are sequentially consistent: either the reader sees the new count before it
             // sleeps, or this load sees what it sleeps for.
-            if edge.load(SeqCst) <= count {
-                wake_edge(edge);
+            if waiter.load(SeqCst) <= count {
+                wake_waiter(waiter);
             }
         }
     }
@@ -274,9 +275,9 @@ impl Control {
     /// Waits until `word` reaches `count`, or `is_over` says that it never will.
     pub(crate) fn wait(
         &self,
-        word: Word,
+        word: Sequence,
         count: u32,
-        edge: Edge,
+        waiter: Waiter,
         wait: Wait,
         is_over: impl Fn(&Self) -> bool,
     ) -> Waited {
@@ -297,32 +298,32 @@ impl Control {
             if spin && (wait == Wait::Spin || monotonic_ns() < asleep_after_ns) {
                 poll(word, count);
             } else {
-                self.sleep(word, count, self.edge_word(edge), &is_over);
+                self.sleep(word, count, self.waiter_word(waiter), &is_over);
             }
         }
     }
 
-    fn sleep(&self, word: &AtomicU32, count: u32, edge: &AtomicU32, is_over: impl Fn(&Self) -> bool) {
-        edge.store(count, SeqCst);
+    fn sleep(&self, word: &AtomicU32, count: u32, waiter: &AtomicU32, is_over: impl Fn(&Self) -> bool) {
+        waiter.store(count, SeqCst);
         if word.load(SeqCst) < count && !self.is_aborted() && !is_over(self) {
             // An interrupted or spurious return is caught by the caller's loop.
-            let _ = futex::wait(edge, futex::Flags::empty(), count, None);
+            let _ = futex::wait(waiter, futex::Flags::empty(), count, None);
         }
         // Nothing is ordered by this store: a writer that misses it wakes somebody who is awake.
-        edge.store(AWAKE, Relaxed);
+        waiter.store(AWAKE, Relaxed);
     }
 
     /// Wakes every sleeper, so that it looks whether the run is over. A process that died may have noted that it
-    /// wakes somebody and not have done it any more: so what the edges say does not count.
+    /// wakes somebody and not have done it any more: so what the waiters say does not count.
     fn wake_everybody(&self) {
-        for edge in 0..self.edge_slots() {
-            self.edge_at(edge).store(AWAKE, SeqCst);
-            wake_all(self.edge_at(edge));
+        for waiter in 0..self.waiter_count() {
+            self.waiter_at(waiter).store(AWAKE, SeqCst);
+            wake_all(self.waiter_at(waiter));
         }
         wake_all(self.word(0, 1));
         wake_all(self.word(1, 9));
-        for member in 0..self.members {
-            [READY, SEAT].into_iter().for_each(|index| wake_all(self.word(self.member_slot(member), index)));
+        for slot in 0..self.slots {
+            [READY, STATE].into_iter().for_each(|index| wake_all(self.word(self.slot_line(slot), index)));
         }
     }
 
@@ -347,23 +348,23 @@ impl Control {
         self.wait_plain(self.word(0, 1), phase as u32)
     }
 
-    /// Notes that `member` is ready for `phase`.
-    pub(crate) fn set_ready(&self, member: usize, phase: Phase) {
-        let word = self.word(self.member_slot(member), READY);
+    /// Notes that `slot` is ready for `phase`.
+    pub(crate) fn set_ready(&self, slot: usize, phase: Phase) {
+        let word = self.word(self.slot_line(slot), READY);
         word.store(phase as u32, SeqCst);
         wake_all(word);
-        self.tell_supervisor();
+        self.notify_supervisor();
     }
 
-    /// Waits until `member` is ready for `phase`; only for joining, where nobody counts microseconds.
-    pub(crate) fn wait_ready(&self, member: usize, phase: Phase) -> Waited {
-        self.wait_plain(self.word(self.member_slot(member), READY), phase as u32)
+    /// Waits until `slot` is ready for `phase`; only for joining, where nobody counts microseconds.
+    pub(crate) fn wait_ready(&self, slot: usize, phase: Phase) -> Waited {
+        self.wait_plain(self.word(self.slot_line(slot), READY), phase as u32)
     }
 
-    /// Whether `member` has reached `phase`.
+    /// Whether `slot` has reached `phase`.
     #[must_use]
-    pub fn is_ready(&self, member: usize, phase: Phase) -> bool {
-        self.word(self.member_slot(member), READY).load(SeqCst) >= phase as u32
+    pub fn is_ready(&self, slot: usize, phase: Phase) -> bool {
+        self.word(self.slot_line(slot), READY).load(SeqCst) >= phase as u32
     }
 
     fn wait_plain(&self, word: &AtomicU32, value: u32) -> Waited {
@@ -396,7 +397,7 @@ impl Control {
     /// Ends the run at once: every wait returns.
     pub fn abort(&self) {
         self.word(0, 3).store(1, SeqCst);
-        // A sleeper stores its edge before it looks at the flag, so this wakes it or it sees the flag.
+        // A sleeper stores its waiter before it looks at the flag, so this wakes it or it sees the flag.
         self.wake_everybody();
     }
 
@@ -417,114 +418,115 @@ impl Control {
         self.word(0, 4).load(SeqCst) != 0
     }
 
-    /// What a seat holds.
+    /// What a slot holds.
     #[must_use]
-    pub fn seat(&self, member: usize) -> Seat {
-        match self.word(self.member_slot(member), SEAT).load(SeqCst) {
-            0 => Seat::Empty,
-            1 => Seat::Joining,
-            _ => Seat::Taken,
+    pub fn slot_state(&self, slot: usize) -> SlotState {
+        match self.word(self.slot_line(slot), STATE).load(SeqCst) {
+            0 => SlotState::Empty,
+            1 => SlotState::Joining,
+            _ => SlotState::Taken,
         }
     }
 
-    /// States what a seat holds, and wakes the process that waits for it.
-    pub fn set_seat(&self, member: usize, seat: Seat) {
-        let word = self.word(self.member_slot(member), SEAT);
-        word.store(seat as u32, SeqCst);
+    /// States what a slot holds, and wakes the process that waits for it.
+    pub fn set_slot_state(&self, slot: usize, state: SlotState) {
+        let word = self.word(self.slot_line(slot), STATE);
+        word.store(state as u32, SeqCst);
         wake_all(word);
     }
 
-    /// Empties a seat, for another process.
-    pub fn clear_seat(&self, member: usize) {
-        self.set_seat(member, Seat::Empty);
-        for word in [READY, LATE, EPOCH, HAND_OVER] {
-            self.word(self.member_slot(member), word).store(0, SeqCst);
+    /// Empties a slot, for another process.
+    pub fn clear_slot(&self, slot: usize) {
+        self.set_slot_state(slot, SlotState::Empty);
+        for word in [READY, LATE, EPOCH, TRANSFER] {
+            self.word(self.slot_line(slot), word).store(0, SeqCst);
         }
-        self.set_cpu_ns(member, 0);
-        self.tick_word(Word::Done(member)).store(0, SeqCst);
-        self.tick_word(Word::State(member)).store(0, SeqCst);
+        self.set_cpu_ns(slot, 0);
+        self.tick_word(Sequence::Done(slot)).store(0, SeqCst);
+        self.tick_word(Sequence::State(slot)).store(0, SeqCst);
     }
 
-    /// Has the process in a seat begin at `tick`.
-    pub fn set_first_tick(&self, member: usize, tick: u32) {
-        self.tick_word(Word::Done(member)).store(tick, SeqCst);
+    /// Has the process in a slot begin at `tick`.
+    pub fn set_first_tick(&self, slot: usize, tick: u32) {
+        self.tick_word(Sequence::Done(slot)).store(tick, SeqCst);
     }
 
     /// Has the shadow samples of `topic` begin at `tick`.
     pub fn start_shadow(&self, topic: usize, tick: u32) {
-        self.tick_word(Word::Shadow(topic)).store(tick, SeqCst);
+        self.tick_word(Sequence::Shadow(topic)).store(tick, SeqCst);
     }
 
-    /// Waits until the seat of `member` is as far as `seat`.
-    pub(crate) fn wait_seat(&self, member: usize, seat: Seat) -> Waited {
-        self.wait_plain(self.word(self.member_slot(member), SEAT), seat as u32)
+    /// Waits until `slot` is as far as `state`.
+    pub(crate) fn wait_slot(&self, slot: usize, state: SlotState) -> Waited {
+        self.wait_plain(self.word(self.slot_line(slot), STATE), state as u32)
     }
 
-    /// The number of the newest roster.
+    /// The number of the newest membership.
     #[must_use]
     pub fn epoch(&self) -> u32 {
         self.word(1, 6).load(SeqCst)
     }
 
-    /// Makes the roster number `epoch` the newest one, and wakes everybody to look at it.
+    /// Makes the membership number `epoch` the newest one, and wakes everybody to look at it.
     pub fn set_epoch(&self, epoch: u32) {
         self.word(1, 6).store(epoch, SeqCst);
         self.wake_everybody();
     }
 
-    /// Notes that `member` agrees with the roster number `epoch`.
-    pub(crate) fn agree(&self, member: usize, epoch: u32) {
-        self.word(self.member_slot(member), EPOCH).store(epoch, SeqCst);
-        self.tell_supervisor();
+    /// Notes that `slot` agrees with the membership number `epoch`.
+    pub(crate) fn acknowledge(&self, slot: usize, epoch: u32) {
+        self.word(self.slot_line(slot), EPOCH).store(epoch, SeqCst);
+        self.notify_supervisor();
     }
 
     /// Ticks that may be computed.
     #[must_use]
     pub fn granted_ticks(&self) -> u32 {
-        self.count(Word::Grant)
+        self.count(Sequence::Grant)
     }
 
-    /// The newest roster with which `member` agrees.
+    /// The newest membership with which `slot` agrees.
     #[must_use]
-    pub fn agreed_epoch(&self, member: usize) -> u32 {
-        self.word(self.member_slot(member), EPOCH).load(SeqCst)
+    pub fn acknowledged_epoch(&self, slot: usize) -> u32 {
+        self.word(self.slot_line(slot), EPOCH).load(SeqCst)
     }
 
-    /// Notes what `member` goes on from.
-    pub(crate) fn set_hand_over(&self, member: usize, hand_over: HandOver) {
-        self.word(self.member_slot(member), HAND_OVER).store(hand_over as u32, SeqCst);
+    /// Notes what `slot` goes on from.
+    pub(crate) fn set_transfer(&self, slot: usize, transfer: Transfer) {
+        self.word(self.slot_line(slot), TRANSFER).store(transfer as u32, SeqCst);
     }
 
-    /// What `member` goes on from.
+    /// What `slot` goes on from.
     #[must_use]
-    pub fn hand_over(&self, member: usize) -> HandOver {
-        match self.word(self.member_slot(member), HAND_OVER).load(SeqCst) {
-            0 => HandOver::Unknown,
-            1 => HandOver::State,
-            _ => HandOver::LastOutput,
+    pub fn transfer(&self, slot: usize) -> Transfer {
+        match self.word(self.slot_line(slot), TRANSFER).load(SeqCst) {
+            0 => Transfer::Unknown,
+            1 => Transfer::State,
+            _ => Transfer::LastOutput,
         }
     }
 
-    /// Whether `member`, whose inputs are `inputs`, has all it needs for its next tick: if it does not come on
-    /// then, it is at fault itself. A member that sleeps does not count: nobody has come as far as it waits for, or it
+    /// Whether `slot`, whose inputs are `inputs`, has all it needs for its next tick: if it does not come on
+    /// then, it is at fault itself. A slot that sleeps does not count: nobody has come as far as it waits for, or it
     /// would have been woken. A recorder sleeps until samples have gathered that the tick alone does not need.
     #[must_use]
-    pub fn can_compute(&self, plan: &Plan, member: usize, inputs: &[InputPlan]) -> bool {
-        let tick = self.done(member);
+    pub fn can_compute(&self, plan: &Plan, slot: usize, inputs: &[InputPlan]) -> bool {
+        let tick = self.done(slot);
         let has = |input: &InputPlan| {
-            self.count(Word::Topic(input.topic)) >= (tick.saturating_add(1)).saturating_sub(input.delay_ticks)
+            self.count(Sequence::Topic(input.topic))
+                >= (tick.saturating_add(1)).saturating_sub(input.delay_ticks)
         };
         tick < self.end_tick()
-            && self.count(Word::Grant) > tick
+            && self.count(Sequence::Grant) > tick
             && inputs.iter().all(has)
-            && self.awaited_topic(plan, member, inputs).is_none()
-            && !self.awaits_partner(member)
+            && self.awaited_topic(plan, slot, inputs).is_none()
+            && !self.awaits_replacement(slot)
     }
 
-    /// Ticks that `member` has completed, also those after the end of the run.
+    /// Ticks that `slot` has completed, also those after the end of the run.
     #[must_use]
-    pub fn done(&self, member: usize) -> u32 {
-        self.count(Word::Done(member))
+    pub fn done(&self, slot: usize) -> u32 {
+        self.count(Sequence::Done(slot))
     }
 
     /// The tick boundary at which a user wants the clock to wait; `u32::MAX` if nobody does.
@@ -537,13 +539,13 @@ impl Control {
     /// lets it run.
     pub fn set_hold_tick(&self, tick: u32) {
         self.word(1, 2).store(tick, SeqCst);
-        self.tell_clock();
+        self.notify_clock();
     }
 
     /// The same for the supervisor, who holds the clock where a process joins.
     pub fn set_join_tick(&self, tick: u32) {
         if self.word(1, 8).swap(tick, SeqCst) != tick {
-            self.tell_clock();
+            self.notify_clock();
         }
     }
 
@@ -552,7 +554,7 @@ impl Control {
         self.hold_tick().min(self.word(1, 8).load(SeqCst))
     }
 
-    fn tell_clock(&self) {
+    fn notify_clock(&self) {
         self.word(1, 9).fetch_add(1, SeqCst);
         wake_all(self.word(1, 9));
     }
@@ -571,7 +573,7 @@ impl Control {
         let granted = self.granted_ticks();
         match self.held_at() {
             Some(tick) => self.boundary() > tick,
-            None => granted < self.end_tick() && self.computing().all(|member| self.done(member) >= granted),
+            None => granted < self.end_tick() && self.computing().all(|slot| self.done(slot) >= granted),
         }
     }
 
@@ -580,7 +582,7 @@ impl Control {
         let is_lifted = || self.boundary() > tick || self.is_aborted() || is_over();
         loop {
             self.word(1, 3).store(tick, SeqCst);
-            self.tell_supervisor();
+            self.notify_supervisor();
             loop {
                 let changes = self.word(1, 9).load(SeqCst);
                 if is_lifted() {
@@ -610,24 +612,24 @@ impl Control {
     }
 
     /// Wakes the supervisor, which looks at the run.
-    pub(crate) fn tell_supervisor(&self) {
+    pub(crate) fn notify_supervisor(&self) {
         self.word(1, 7).fetch_add(1, SeqCst);
         wake_all(self.word(1, 7));
     }
 
     /// The count of what the supervisor was told: to be read before a look at the run, and waited on after it.
     #[must_use]
-    pub fn news(&self) -> u32 {
+    pub fn notifications(&self) -> u32 {
         self.word(1, 7).load(SeqCst)
     }
 
-    /// Sleeps until there is something to look at since `news`, at most `timeout`.
-    pub fn await_news(&self, news: u32, timeout: std::time::Duration) {
+    /// Sleeps until there is something to look at since `notifications`, at most `timeout`.
+    pub fn await_notification(&self, notifications: u32, timeout: std::time::Duration) {
         let timeout = rustix::time::Timespec {
             tv_sec: i64::try_from(timeout.as_secs()).unwrap_or(i64::MAX),
             tv_nsec: timeout.subsec_nanos().into(),
         };
-        let _ = futex::wait(self.word(1, 7), futex::Flags::empty(), news, Some(&timeout));
+        let _ = futex::wait(self.word(1, 7), futex::Flags::empty(), notifications, Some(&timeout));
     }
 
     /// Deadlines that were missed: a node had not finished the tick before, or the clock itself was more than
@@ -637,67 +639,67 @@ impl Control {
         self.word(0, 5).load(SeqCst)
     }
 
-    /// Counts a missed deadline, and the members that were late; none where the clock itself was.
+    /// Counts a missed deadline, and the slots that were late; none where the clock itself was.
     pub(crate) fn count_missed_deadline(&self, late: impl Iterator<Item = usize>) {
         self.word(0, 5).fetch_add(1, SeqCst);
-        late.for_each(|member| {
-            self.word(self.member_slot(member), LATE).fetch_add(1, SeqCst);
+        late.for_each(|slot| {
+            self.word(self.slot_line(slot), LATE).fetch_add(1, SeqCst);
         });
     }
 
-    /// Deadlines at which `member` was late.
+    /// Deadlines at which `slot` was late.
     #[must_use]
-    pub fn late_count(&self, member: usize) -> u32 {
-        self.word(self.member_slot(member), LATE).load(SeqCst)
+    pub fn late_count(&self, slot: usize) -> u32 {
+        self.word(self.slot_line(slot), LATE).load(SeqCst)
     }
 
-    /// Ticks that `member` has completed.
+    /// Ticks that `slot` has completed.
     #[must_use]
-    pub fn completed_by(&self, member: usize) -> u32 {
-        self.count(Word::Done(member)).min(self.end_tick())
+    pub fn completed_by(&self, slot: usize) -> u32 {
+        self.count(Sequence::Done(slot)).min(self.end_tick())
     }
 
-    /// Whether `member` has completed the run.
+    /// Whether `slot` has completed the run.
     #[must_use]
-    pub fn has_completed(&self, member: usize) -> bool {
-        self.count(Word::Done(member)) >= self.end_tick()
+    pub fn has_completed(&self, slot: usize) -> bool {
+        self.count(Sequence::Done(slot)) >= self.end_tick()
     }
 
-    /// The members that compute, in ascending order.
+    /// The slots that compute, in ascending order.
     pub fn computing(&self) -> impl Iterator<Item = usize> + '_ {
-        (0..self.members).filter(|&member| self.seat(member) == Seat::Taken)
+        (0..self.slots).filter(|&slot| self.slot_state(slot) == SlotState::Taken)
     }
 
     /// Ticks that every node has completed.
     #[must_use]
     pub fn completed_ticks(&self) -> u32 {
-        let fewest = self.computing().map(|member| self.count(Word::Done(member))).min();
+        let fewest = self.computing().map(|slot| self.count(Sequence::Done(slot))).min();
         fewest.unwrap_or(0).min(self.end_tick())
     }
 
-    /// The topic for which `member`, whose inputs are `inputs`, sleeps; `None` for one that computes, spins, or
+    /// The topic for which `slot`, whose inputs are `inputs`, sleeps; `None` for one that computes, spins, or
     /// waits for something else.
     #[must_use]
-    pub fn awaited_topic(&self, plan: &Plan, member: usize, inputs: &[InputPlan]) -> Option<usize> {
-        let sleeps = |edge: Edge| self.edge_word(edge).load(SeqCst) != AWAKE;
+    pub fn awaited_topic(&self, plan: &Plan, slot: usize, inputs: &[InputPlan]) -> Option<usize> {
+        let sleeps = |waiter: Waiter| self.waiter_word(waiter).load(SeqCst) != AWAKE;
         let mut inputs = inputs.iter().enumerate();
         let awaited = inputs.find(|(index, _)| {
-            let edge = plan.edge(member, *index);
-            sleeps(Edge::Input(edge)) || sleeps(Edge::Shadow(edge))
+            let waiter = plan.input_waiter(slot, *index);
+            sleeps(Waiter::Input(waiter)) || sleeps(Waiter::Shadow(waiter))
         });
         awaited.map(|(_, input)| input.topic)
     }
 
-    /// Whether `member` sleeps until its predecessor or its successor has come as far as it must.
+    /// Whether `slot` sleeps until its predecessor or its successor has come as far as it must.
     #[must_use]
-    pub fn awaits_partner(&self, member: usize) -> bool {
-        self.edge_word(Edge::Partner(member)).load(SeqCst) != AWAKE
+    pub fn awaits_replacement(&self, slot: usize) -> bool {
+        self.waiter_word(Waiter::Replacement(slot)).load(SeqCst) != AWAKE
     }
 
-    /// Whether `member` sleeps until the clock grants its next tick.
+    /// Whether `slot` sleeps until the clock grants its next tick.
     #[must_use]
-    pub fn awaits_grant(&self, member: usize) -> bool {
-        self.edge_word(Edge::Grant(member)).load(SeqCst) != AWAKE
+    pub fn awaits_grant(&self, slot: usize) -> bool {
+        self.waiter_word(Waiter::Grant(slot)).load(SeqCst) != AWAKE
     }
 
     /// Host time at which the first and the last tick was granted and completed, in nanoseconds of the
@@ -715,14 +717,14 @@ impl Control {
         self.double_word(0, 5).store(monotonic_ns(), SeqCst);
     }
 
-    /// Processor time that `member` used between tick 0 and its last tick, in nanoseconds.
+    /// Processor time that `slot` used between tick 0 and its last tick, in nanoseconds.
     #[must_use]
-    pub fn cpu_ns(&self, member: usize) -> u64 {
-        self.double_word(self.member_slot(member), CPU).load(SeqCst)
+    pub fn cpu_ns(&self, slot: usize) -> u64 {
+        self.double_word(self.slot_line(slot), CPU).load(SeqCst)
     }
 
-    pub(crate) fn set_cpu_ns(&self, member: usize, ns: u64) {
-        self.double_word(self.member_slot(member), CPU).store(ns, SeqCst);
+    pub(crate) fn set_cpu_ns(&self, slot: usize, ns: u64) {
+        self.double_word(self.slot_line(slot), CPU).store(ns, SeqCst);
     }
 
     /// Processor time of the clock service, in nanoseconds.
@@ -736,19 +738,19 @@ impl Control {
     }
 }
 
-fn members(plan: &Plan) -> usize {
-    SEATS * plan.nodes.len()
+fn slots(plan: &Plan) -> usize {
+    SLOTS_PER_NODE * plan.nodes.len()
 }
 
 /// The size of the control segment of `plan`.
 pub(crate) fn control_bytes(plan: &Plan) -> usize {
-    let edges = 3 * members(plan) + 2 * SEATS * plan.edge_count();
-    SLOT_BYTES * (2 + 2 * plan.topics.len() + members(plan) + edges + STEP_SLOTS * members(plan))
+    let waiters = 3 * slots(plan) + 2 * SLOTS_PER_NODE * plan.input_waiters();
+    LINE_BYTES * (2 + 2 * plan.topics.len() + slots(plan) + waiters + STEP_LINES * slots(plan))
 }
 
-fn wake_edge(edge: &AtomicU32) {
-    if edge.swap(AWAKE, SeqCst) != AWAKE {
-        wake_all(edge);
+fn wake_waiter(waiter: &AtomicU32) {
+    if waiter.swap(AWAKE, SeqCst) != AWAKE {
+        wake_all(waiter);
     }
 }
 
@@ -786,7 +788,7 @@ fn clock_ns(clock: rustix::time::ClockId) -> u64 {
 
 #[cfg(test)]
 mod tests {
-    use super::{Control, Edge, Waited, Word, control_path};
+    use super::{Control, Sequence, Waited, Waiter, control_path};
     use crate::plan::{InputPlan, NodePlan, Pace, Plan, TopicPlan, Wait};
 
     fn plan() -> Plan {
@@ -831,10 +833,12 @@ mod tests {
             for (round, wait) in [Wait::Block, Wait::Spin, Wait::Adaptive].into_iter().enumerate() {
                 let target = 1000 * (round as u32 + 1);
                 std::thread::scope(|scope| {
-                    let sleeper =
-                        scope.spawn(|| control.wait(Word::Topic(0), target, Edge::Input(0), wait, |_| false));
-                    let start = control.count(Word::Topic(0));
-                    (start + 1..=target).for_each(|n| control.advance(Word::Topic(0), n, &[Edge::Input(0)]));
+                    let sleeper = scope.spawn(|| {
+                        control.wait(Sequence::Topic(0), target, Waiter::Input(0), wait, |_| false)
+                    });
+                    let start = control.count(Sequence::Topic(0));
+                    (start + 1..=target)
+                        .for_each(|n| control.advance(Sequence::Topic(0), n, &[Waiter::Input(0)]));
                     assert_eq!(sleeper.join().unwrap(), Waited::Reached);
                 });
             }
@@ -848,16 +852,16 @@ mod tests {
             std::thread::scope(|scope| {
                 scope.spawn(|| {
                     for round in 1..=rounds {
-                        control.wait(Word::Topic(0), round, Edge::Input(0), Wait::Block, |_| false);
-                        control.advance(Word::Done(0), round, &[Edge::Done(0)]);
+                        control.wait(Sequence::Topic(0), round, Waiter::Input(0), Wait::Block, |_| false);
+                        control.advance(Sequence::Done(0), round, &[Waiter::Done(0)]);
                     }
                 });
                 for round in 1..=rounds {
-                    control.advance(Word::Topic(0), round, &[Edge::Input(0)]);
-                    control.wait(Word::Done(0), round, Edge::Done(0), Wait::Block, |_| false);
+                    control.advance(Sequence::Topic(0), round, &[Waiter::Input(0)]);
+                    control.wait(Sequence::Done(0), round, Waiter::Done(0), Wait::Block, |_| false);
                 }
             });
-            assert_eq!(control.count(Word::Done(0)), rounds);
+            assert_eq!(control.count(Sequence::Done(0)), rounds);
         });
     }
 
@@ -866,12 +870,12 @@ mod tests {
         with_control(|control| {
             std::thread::scope(|scope| {
                 let over = |control: &Control| control.end_tick() <= 50;
-                let sleeper =
-                    scope.spawn(move || control.wait(Word::Grant, 60, Edge::Grant(0), Wait::Block, over));
+                let sleeper = scope
+                    .spawn(move || control.wait(Sequence::Grant, 60, Waiter::Grant(0), Wait::Block, over));
                 control.set_end_tick(50);
                 assert_eq!(sleeper.join().unwrap(), Waited::Over);
-                let sleeper =
-                    scope.spawn(|| control.wait(Word::Topic(0), 1, Edge::Input(0), Wait::Block, |_| false));
+                let sleeper = scope
+                    .spawn(|| control.wait(Sequence::Topic(0), 1, Waiter::Input(0), Wait::Block, |_| false));
                 control.abort();
                 assert_eq!(sleeper.join().unwrap(), Waited::Over);
             });

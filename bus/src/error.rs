@@ -145,7 +145,7 @@ pub enum BusError {
         "layout mismatch on topic {topic}: the successor of node `{node}` sends\n{found}\nbut the topic carries\n\
          {expected}\nBuild both against the same message definition"
     )]
-    SuccessorLayout {
+    BackupLayout {
         /// The node.
         node: String,
         /// The topic.

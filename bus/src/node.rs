@@ -2,12 +2,12 @@
 
 use crate::announcement::{self, Announcement};
 use crate::connected::{ConnectedNode, Links};
-use crate::control::{Control, Phase, Seat, Waited};
+use crate::control::{Control, Phase, SlotState, Waited};
 use crate::error::BusError;
+use crate::membership::Membership;
 use crate::message::Message;
 use crate::plan::{NodePlan, Pace, Plan};
 use crate::port::OutPort;
-use crate::roster::Roster;
 use crate::schema::Schema;
 use crate::tick::Tick;
 use crate::transport::Transport;
@@ -107,7 +107,7 @@ impl Node {
         let index = plan.node_index(name)?;
         let node = match generation {
             0 => plan.nodes[index].clone(),
-            _ => NodePlan::load_successor(&run_dir, index, generation)?,
+            _ => NodePlan::load_backup(&run_dir, index, generation)?,
         };
         let (inputs, outputs) = (node.inputs.len(), node.outputs.len());
         let (inputs, outputs) = (vec![None; inputs], vec![None; outputs]);
@@ -308,20 +308,20 @@ impl Node {
         }
         if self.generation > 0 {
             // Every topic is announced by then.
-            go_on(control.wait_phase(Phase::Connecting))?;
+            require_reached(control.wait_phase(Phase::Connecting))?;
         }
-        let member = self.plan.member(self.index, self.generation);
+        let slot = self.plan.slot(self.index, self.generation);
         let transport = Transport::new(&self.run_dir, &self.plan.run_id, self.name())?;
         let outputs = self.connect_outputs(&transport)?;
         transport.reserve()?;
-        control.set_ready(member, Phase::Connecting);
-        let roster = if self.generation == 0 {
-            go_on(control.wait_phase(Phase::Connecting))?;
-            Roster::first(&self.plan)
+        control.set_ready(slot, Phase::Connecting);
+        let membership = if self.generation == 0 {
+            require_reached(control.wait_phase(Phase::Connecting))?;
+            Membership::first(&self.plan)
         } else {
-            go_on(control.wait_seat(member, Seat::Joining))?;
+            require_reached(control.wait_slot(slot, SlotState::Joining))?;
             // It names this process already; the others are told when this one has connected.
-            Roster::load(&self.run_dir, control.epoch() + 1)?
+            Membership::load(&self.run_dir, control.epoch() + 1)?
         };
         let links = Links {
             run_dir: self.run_dir,
@@ -333,7 +333,7 @@ impl Node {
             transport,
             _claim: claim,
         };
-        ConnectedNode::new(links, self.inputs.into_iter().flatten(), outputs, &roster)
+        ConnectedNode::new(links, self.inputs.into_iter().flatten(), outputs, &membership)
     }
 
     fn require_all_declared(&self) -> Result<(), BusError> {
@@ -374,7 +374,7 @@ impl Node {
         if announced.layout_hash == schema.layout_hash() {
             return Ok(());
         }
-        Err(BusError::SuccessorLayout {
+        Err(BusError::BackupLayout {
             node: self.name().to_owned(),
             topic: self.plan.topics[topic].name.clone(),
             expected: announced.layout,
@@ -409,7 +409,7 @@ fn known<'a>(names: impl Iterator<Item = &'a str>) -> String {
     if names.is_empty() { "none".to_owned() } else { names.join(", ") }
 }
 
-pub(crate) fn go_on(waited: Waited) -> Result<(), BusError> {
+pub(crate) fn require_reached(waited: Waited) -> Result<(), BusError> {
     if waited == Waited::Reached { Ok(()) } else { Err(BusError::Aborted) }
 }
 

@@ -6,9 +6,9 @@ use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
 /// Processes that a node can have at a time: the one that flies, and one that shadows it.
-pub const SEATS: usize = 2;
-/// Input edges that a node has at least, for successors that read more than it does.
-pub const EDGES_MIN: usize = 8;
+pub const SLOTS_PER_NODE: usize = 2;
+/// Input waiters that a node has at least, for successors that read more than it does.
+pub const SPARE_INPUTS: usize = 8;
 
 /// How time passes for the clock service.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -93,9 +93,9 @@ impl NodePlan {
     ///
     /// # Errors
     /// If the file is missing or holds something else.
-    pub(crate) fn load_successor(run_dir: &Path, node: usize, generation: u32) -> Result<Self, BusError> {
-        let path = successor_path(run_dir, node, generation);
-        let text = crate::own_file::read_text(&path).map_err(|source| BusError::File {
+    pub(crate) fn load_backup(run_dir: &Path, node: usize, generation: u32) -> Result<Self, BusError> {
+        let path = backup_path(run_dir, node, generation);
+        let text = crate::user_file::read_text(&path).map_err(|source| BusError::File {
             action: "read",
             path: path.clone(),
             source,
@@ -111,15 +111,15 @@ impl NodePlan {
     ///
     /// # Errors
     /// If the file cannot be written.
-    pub fn store_successor(&self, run_dir: &Path, node: usize, generation: u32) -> Result<(), BusError> {
-        let path = successor_path(run_dir, node, generation);
+    pub fn store_backup(&self, run_dir: &Path, node: usize, generation: u32) -> Result<(), BusError> {
+        let path = backup_path(run_dir, node, generation);
         let text = serde_json::to_string(self).unwrap_or_else(|error| unreachable!("{error}"));
         std::fs::write(&path, text).map_err(|source| BusError::File { action: "write", path, source })
     }
 
-    /// Input edges set aside for each of its processes.
-    fn edges(&self) -> usize {
-        self.inputs.len().max(EDGES_MIN)
+    /// Input waiters set aside for each of its processes.
+    fn waiters(&self) -> usize {
+        self.inputs.len().max(SPARE_INPUTS)
     }
 }
 
@@ -154,7 +154,7 @@ pub struct Plan {
 
 /// Where the plan of a successor lies.
 #[must_use]
-pub fn successor_path(run_dir: &Path, node: usize, generation: u32) -> PathBuf {
+pub fn backup_path(run_dir: &Path, node: usize, generation: u32) -> PathBuf {
     run_dir.join(format!("node-{node}.{generation}.json"))
 }
 
@@ -168,7 +168,7 @@ impl Plan {
     /// If the file is missing or is not a plan.
     pub fn load(run_dir: &Path) -> Result<Self, BusError> {
         let path = run_dir.join(Self::FILE);
-        let text = crate::own_file::read_text(&path).map_err(|source| BusError::File {
+        let text = crate::user_file::read_text(&path).map_err(|source| BusError::File {
             action: "read",
             path: path.clone(),
             source,
@@ -207,27 +207,27 @@ impl Plan {
         })
     }
 
-    /// Number of input edges set aside for all nodes before node `node`.
-    fn edges_before(&self, node: usize) -> usize {
-        self.nodes[..node].iter().map(NodePlan::edges).sum()
+    /// Number of input waiters set aside for all nodes before node `node`.
+    fn input_waiters_before(&self, node: usize) -> usize {
+        self.nodes[..node].iter().map(NodePlan::waiters).sum()
     }
 
-    /// Number of input edges set aside for the processes of one seat.
-    pub(crate) fn edge_count(&self) -> usize {
-        self.edges_before(self.nodes.len())
+    /// Number of input waiters set aside for the processes of one slot.
+    pub(crate) fn input_waiters(&self) -> usize {
+        self.input_waiters_before(self.nodes.len())
     }
 
-    /// The number of the edge of input `input` of the process in seat `member`.
-    pub(crate) fn edge(&self, member: usize, input: usize) -> usize {
-        let (seat, node) = (member / self.nodes.len(), member % self.nodes.len());
-        seat * self.edge_count() + self.edges_before(node) + input
+    /// The number of the waiter of input `input` of the process in slot `slot`.
+    pub(crate) fn input_waiter(&self, slot: usize, input: usize) -> usize {
+        let (half, node) = (slot / self.nodes.len(), slot % self.nodes.len());
+        half * self.input_waiters() + self.input_waiters_before(node) + input
     }
 
-    /// The place of generation `generation` of node `node` among the members of the run: each node has two
-    /// seats, so that a successor can join while its predecessor flies.
+    /// The place of generation `generation` of node `node` among the slots of the run: each node has two
+    /// slots, so that a successor can join while its predecessor flies.
     #[must_use]
-    pub fn member(&self, node: usize, generation: u32) -> usize {
-        (generation as usize % SEATS) * self.nodes.len() + node
+    pub fn slot(&self, node: usize, generation: u32) -> usize {
+        (generation as usize % SLOTS_PER_NODE) * self.nodes.len() + node
     }
 
     /// How the queues of topic `topic` are sized. A queue holds what a publisher can send before the slowest node
@@ -252,8 +252,8 @@ impl Plan {
             history_samples: if restarts { samples(ticks) } else { 1 },
             // Each reader and its successor, a successor of the publisher, and successors that read more than
             // their predecessors.
-            subscribers: SEATS * self.nodes.iter().filter(reads).count() + 3,
-            nodes: SEATS * self.nodes.len() + 1,
+            subscribers: SLOTS_PER_NODE * self.nodes.iter().filter(reads).count() + 3,
+            nodes: SLOTS_PER_NODE * self.nodes.len() + 1,
         }
     }
 

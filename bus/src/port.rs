@@ -1,6 +1,6 @@
-//! The two ends of an edge inside a node: what may be read at a tick, and what must be sent.
+//! The two ends of a connection inside a node: what may be read at a tick, and what must be sent.
 
-use crate::control::Edge;
+use crate::control::Waiter;
 use crate::error::BusError;
 use crate::finite::{Floats, field_at};
 use crate::message::{cdr_bytes, message_bytes};
@@ -81,8 +81,8 @@ pub(crate) struct InPort {
     pub(crate) reads_shadow: bool,
     pub(crate) topic: usize,
     pub(crate) delay_ticks: u32,
-    /// The number of the edge.
-    pub(crate) edge: usize,
+    /// The number of the waiter.
+    pub(crate) waiter: usize,
 }
 
 impl InPort {
@@ -90,7 +90,7 @@ impl InPort {
         input: &InputPlan,
         topic: &TopicPlan,
         size: usize,
-        edge: usize,
+        waiter: usize,
         initial: Option<Box<[u64]>>,
         active: Source,
     ) -> Self {
@@ -106,7 +106,7 @@ impl InPort {
             reads_shadow: false,
             topic: input.topic,
             delay_ticks: input.delay_ticks,
-            edge,
+            waiter,
         }
     }
 
@@ -268,8 +268,8 @@ pub(crate) struct OutPort {
     /// The tick from which on samples are sent at all.
     pub(crate) sends_from: u32,
     /// Those who wait for the samples that count, and those who wait for the shadow's.
-    pub(crate) readers: Vec<Edge>,
-    pub(crate) shadow_readers: Vec<Edge>,
+    pub(crate) readers: Vec<Waiter>,
+    pub(crate) shadow_readers: Vec<Waiter>,
 }
 
 impl OutPort {
@@ -317,8 +317,8 @@ impl OutPort {
     }
 
     /// Sees to it that a subscriber that joined gets the newest samples before the next one is sent.
-    pub(crate) fn meet_subscribers(&self, node: &str) -> Result<(), BusError> {
-        self.sender.meet_subscribers().map_err(|reason| self.error("meeting subscribers", node, reason))
+    pub(crate) fn update_subscribers(&self, node: &str) -> Result<(), BusError> {
+        self.sender.update_subscribers().map_err(|reason| self.error("meeting subscribers", node, reason))
     }
 
     /// Forgets what was written at a tick at which nothing was due.

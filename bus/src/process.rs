@@ -129,7 +129,7 @@ pub(crate) fn claim(run_dir: &Path, name: &str) -> Result<Claim, BusError> {
     let path = claim_path(run_dir, name);
     let fail = |source| BusError::File { action: "open", path: path.clone(), source };
     let mut options = File::options();
-    options.create(true).truncate(false).write(true).mode(0o600).custom_flags(crate::own_file::FLAGS);
+    options.create(true).truncate(false).write(true).mode(0o600).custom_flags(crate::user_file::FLAGS);
     let lock = options.open(&path).map_err(fail)?;
     match lock.try_lock() {
         Ok(()) => Ok(Claim { _lock: lock }),

@@ -283,7 +283,7 @@ struct RecordReader {
 impl RecordReader {
     /// Opens the file at `path`; `None` where there is none.
     fn open(path: PathBuf, words: usize) -> Result<Option<Self>, BusError> {
-        let map = crate::own_file::open(&path, false).and_then(|file| {
+        let map = crate::user_file::open(&path, false).and_then(|file| {
             // SAFETY: the file lies in the run's own directory and its writer has ended.
             unsafe { Mmap::map(&file) }
         });

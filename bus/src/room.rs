@@ -90,7 +90,7 @@ fn open_to_reserve(path: &Path) -> std::io::Result<File> {
             "it belongs to user {owner}, who has put it in this run's way"
         )));
     }
-    OpenOptions::new().write(true).custom_flags(crate::own_file::FLAGS).open(path)
+    OpenOptions::new().write(true).custom_flags(crate::user_file::FLAGS).open(path)
 }
 
 fn missing_bytes(files: &[PathBuf]) -> u64 {
@@ -162,7 +162,7 @@ pub fn require(plan: &Plan) -> Result<(), BusError> {
 
 /// What a signal says about room, for the words about a process that it killed; empty for most.
 #[must_use]
-pub fn words_of_signal(signal: i32) -> String {
+pub fn signal_message(signal: i32) -> String {
     let free = free_bytes(Path::new(SHARED_MEMORY));
     match signal {
         libc::SIGBUS if free < FULL_BYTES => format!(

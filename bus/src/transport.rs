@@ -248,7 +248,7 @@ fn make_node_counter(config: &Config, run_id: &str) -> std::io::Result<()> {
     match linked {
         // Of this user, or another one has put it there.
         Err(error) if error.kind() == std::io::ErrorKind::AlreadyExists => {
-            crate::own_file::open(&path, true).map(|_| ())
+            crate::user_file::open(&path, true).map(|_| ())
         }
         other => other,
     }
@@ -283,7 +283,7 @@ pub(crate) struct Sender {
 
 impl Sender {
     /// Meets the subscribers that have come, and hands them the history.
-    pub(crate) fn meet_subscribers(&self) -> Result<(), String> {
+    pub(crate) fn update_subscribers(&self) -> Result<(), String> {
         self.publisher.update_connections().map_err(|error| format!("{error:?}"))
     }
 

@@ -5,7 +5,7 @@ use crate::ctl::protocol::{Answer, Request};
 use crate::ctl::server::{is_own_user, socket_path};
 use crate::run_dir::LiveRun;
 use anyhow::{Context, Result, bail};
-use bus::own_file;
+use bus::user_file;
 use std::io::{BufRead, BufReader, Write};
 use std::os::unix::net::UnixStream;
 use std::time::{Duration, Instant};
@@ -37,7 +37,7 @@ pub fn ask(run: &LiveRun, request: &Request) -> Result<Answer> {
 fn connect(run: &LiveRun) -> std::io::Result<UnixStream> {
     let start = Instant::now();
     loop {
-        let folder = own_file::open_folder(&run.entry.run_dir);
+        let folder = user_file::open_folder(&run.entry.run_dir);
         let stream =
             folder.and_then(|folder| UnixStream::connect(socket_path(&folder))).and_then(of_own_user);
         if stream.is_ok() || !run.is_live() || start.elapsed() > START {

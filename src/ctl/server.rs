@@ -30,7 +30,7 @@ impl Server {
     /// # Errors
     /// If the socket cannot be made.
     pub fn start(run_dir: &Path) -> Result<Self> {
-        let folder = bus::own_file::open_folder(run_dir).context("cannot open the run directory")?;
+        let folder = bus::user_file::open_folder(run_dir).context("cannot open the run directory")?;
         let listener = UnixListener::bind(socket_path(&folder)).context("cannot open the control socket")?;
         let (sender, requests) = channel();
         // Both kinds of thread end with the process.

@@ -4,8 +4,8 @@ use crate::ctl::protocol::{State, Status};
 use crate::run_dir::LiveRun;
 use anyhow::{Context, Result};
 use bus::control::{Control, Phase, monotonic_ns};
+use bus::membership::{Membership, NodeInstances};
 use bus::plan::Plan;
-use bus::roster::{NodeRoster, Roster};
 use bus::step_times::StepTimes;
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -84,8 +84,8 @@ impl Source {
         }
         let clock = self.clock(status.state);
         // While it is being written, or gone with the run, that of the start serves.
-        let roster = Roster::load(&self.run.entry.run_dir, self.control.epoch());
-        let roster = roster.unwrap_or_else(|_| Roster::first(&self.plan));
+        let roster = Membership::load(&self.run.entry.run_dir, self.control.epoch());
+        let roster = roster.unwrap_or_else(|_| Membership::first(&self.plan));
         let nodes = roster.nodes.iter().enumerate().map(|(node, roster)| self.node(node, roster));
         let topics = self.plan.topics.iter().enumerate().map(|(index, topic)| TopicSample {
             samples: self.control.ticks_sent(index).div_ceil(topic.period_ticks),
@@ -114,8 +114,8 @@ impl Source {
         }
     }
 
-    fn node(&self, node: usize, roster: &NodeRoster) -> ProcessSample {
-        let member = self.plan.member(node, roster.active.generation);
+    fn node(&self, node: usize, roster: &NodeInstances) -> ProcessSample {
+        let member = self.plan.slot(node, roster.primary.generation);
         let id = self.control.process(member);
         let kernel = id.and_then(KernelView::of);
         let trouble = kernel.as_ref().and_then(KernelView::trouble);
@@ -129,8 +129,8 @@ impl Source {
         }
     }
 
-    fn node_state(&self, member: usize, roster: &NodeRoster) -> String {
-        let awaited = self.control.awaited_topic(&self.plan, member, &roster.active.plan.inputs);
+    fn node_state(&self, member: usize, roster: &NodeInstances) -> String {
+        let awaited = self.control.awaited_topic(&self.plan, member, &roster.primary.plan.inputs);
         let state = match awaited {
             _ if self.control.phase() != Phase::Running => "connects".to_owned(),
             _ if self.control.has_completed(member) => "done".to_owned(),
@@ -138,7 +138,7 @@ impl Source {
             None if self.control.awaits_grant(member) => "waits for grant".to_owned(),
             None => "computes".to_owned(),
         };
-        match &roster.successor {
+        match &roster.backup {
             Some(successor) => format!("{state}, shadowed by .{}", successor.generation),
             None => state,
         }

@@ -2,9 +2,9 @@
 
 use crate::saboteur;
 use crate::support::{Launch, Place, poll, repository};
-use bus::control::{Control, Phase, Seat};
+use bus::control::{Control, Phase, SlotState};
+use bus::membership::{Membership, NodeInstances};
 use bus::plan::Plan;
-use bus::roster::{NodeRoster, Roster};
 use recorder::reader::Recording;
 use rustix::process::Pid;
 use std::path::PathBuf;
@@ -134,13 +134,16 @@ impl Watched {
         self.plan.nodes.iter().position(|node| node.name == name)
     }
 
-    /// Who is in the seats of `node` now, once everybody has been told of them.
-    pub fn roster(&self, place: &Place, node: usize) -> NodeRoster {
+    /// Who is in the slots of `node` now, once everybody has been told of them.
+    pub fn roster(&self, place: &Place, node: usize) -> NodeInstances {
         self.look("no roster", || {
             let run_dir = place.run_dirs().into_iter().next()?;
             let epoch = self.control.epoch();
-            let mut roster =
-                if epoch == 0 { Roster::first(&self.plan) } else { Roster::load(&run_dir, epoch).ok()? };
+            let mut roster = if epoch == 0 {
+                Membership::first(&self.plan)
+            } else {
+                Membership::load(&run_dir, epoch).ok()?
+            };
             Some(roster.nodes.swap_remove(node))
         })
     }
@@ -148,26 +151,26 @@ impl Watched {
     /// Waits until the successor of `node` computes beside it; returns its generation.
     pub fn await_shadow(&self, place: &Place, node: usize) -> u32 {
         self.look("no successor has joined", || {
-            let generation = self.roster(place, node).successor?.generation;
-            let seat = self.control.seat(self.plan.member(node, generation));
-            (seat == Seat::Taken).then_some(generation)
+            let generation = self.roster(place, node).backup?.generation;
+            let state = self.control.slot_state(self.plan.slot(node, generation));
+            (state == SlotState::Taken).then_some(generation)
         })
     }
 
     /// Waits until the process `generation` of `node` flies.
     pub fn await_active(&self, place: &Place, node: usize, generation: u32) {
-        let is_active = || (self.roster(place, node).active.generation == generation).then_some(());
+        let is_active = || (self.roster(place, node).primary.generation == generation).then_some(());
         self.look("the successor has not taken over", is_active);
     }
 
-    /// Waits until `member` is ready for `phase`.
-    pub fn await_ready(&self, member: usize, phase: Phase) {
-        self.look("a process is not ready", || self.control.is_ready(member, phase).then_some(()));
+    /// Waits until `slot` is ready for `phase`.
+    pub fn await_ready(&self, slot: usize, phase: Phase) {
+        self.look("a process is not ready", || self.control.is_ready(slot, phase).then_some(()));
     }
 
-    /// Waits until the seat of `member` is as far as `seat`.
-    pub fn await_seat(&self, member: usize, seat: Seat) {
-        self.look("a seat was not taken", || (self.control.seat(member) == seat).then_some(()));
+    /// Waits until `slot` is as far as `state`.
+    pub fn await_slot(&self, slot: usize, state: SlotState) {
+        self.look("a slot was not taken", || (self.control.slot_state(slot) == state).then_some(()));
     }
 
     /// Ticks of the node that is `ahead` of all others that send, or behind.

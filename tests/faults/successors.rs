@@ -5,7 +5,7 @@ use crate::flight::{Process, Reference, Watched, messages, write_manifest};
 use crate::kill_points::{GUARD_TICKS, end, signal_name, words_of};
 use crate::saboteur::{FAULT_VARIABLE, Fault, TICK_VARIABLE};
 use crate::support::{Ended, Launch, Place, partial};
-use bus::control::{Phase, Seat};
+use bus::control::{Phase, SlotState};
 use rand_core::Rng;
 use rustix::process::{Pid, Signal, kill_process};
 
@@ -85,7 +85,7 @@ fn a_successor_that_dies_before_its_predecessor_has_left_is_replaced() {
     kill_process(place.process_of_generation("controller", 0), Signal::STOP).unwrap();
     kill_process(place.process_of("recorder"), Signal::STOP).unwrap();
     watched.control.set_hold_tick(TAKE_OVER_TICK + GUARD_TICKS);
-    watched.await_ticks(Some(watched.plan.member(node, 1)), TAKE_OVER_TICK + 20);
+    watched.await_ticks(Some(watched.plan.slot(node, 1)), TAKE_OVER_TICK + 20);
     kill_process(successor, Signal::KILL).unwrap();
     kill_process(place.process_of("recorder"), Signal::CONT).unwrap();
     watched.control.set_hold_tick(u32::MAX);
@@ -268,10 +268,10 @@ fn require_prefix(place: &Place, recording: &str, swapped: &str) {
 /// Strikes, and says where the successor stood.
 fn deliver(case: &Case, place: &Place, launch: &Launch<'_>, watched: &Watched) -> Stage {
     let node = watched.node(case.victim).unwrap();
-    let successor = watched.plan.member(node, 1);
+    let successor = watched.plan.slot(node, 1);
     let pid = |target| match target {
         Target::Active => {
-            place.process_of_generation(case.victim, watched.roster(place, node).active.generation)
+            place.process_of_generation(case.victim, watched.roster(place, node).primary.generation)
         }
         Target::Successor => place.process_of_generation(case.victim, 1),
         Target::Other(process) => process.pid(place, launch),
@@ -314,7 +314,7 @@ fn deliver(case: &Case, place: &Place, launch: &Launch<'_>, watched: &Watched) -
             let joining = pid(Target::Successor);
             kill_process(joining, Signal::STOP).unwrap();
             watched.control.set_hold_tick(u32::MAX);
-            watched.await_seat(successor, Seat::Joining);
+            watched.await_slot(successor, SlotState::Joining);
             hit(case, watched, pid(case.target));
             if case.target != Target::Successor {
                 // The launcher may have ended it by now.

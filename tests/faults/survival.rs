@@ -250,7 +250,7 @@ fn ready(case: &Case, place: &Place, watched: &Watched, name: &str) -> rustix::p
     if case.policy == Policy::Standby {
         watched.await_shadow(place, node);
     }
-    place.process_of_generation(name, watched.roster(place, node).active.generation)
+    place.process_of_generation(name, watched.roster(place, node).primary.generation)
 }
 
 /// Requires that the run says who ended how and who took the place, and when.

@@ -244,11 +244,11 @@ impl Launch<'_> {
     }
 
     /// Waits until generation `generation` of node `node` computes.
-    pub fn await_seat(&self, node: &str, generation: u32) {
+    pub fn await_slot(&self, node: &str, generation: u32) {
         poll(&format!("{node}.{generation} did not join"), || {
             let plan = Plan::load(self.place.run_dirs().first()?).ok()?;
-            let member = plan.member(plan.node_index(node).ok()?, generation);
-            (Control::open(&plan).ok()?.seat(member) == bus::control::Seat::Taken).then_some(())
+            let member = plan.slot(plan.node_index(node).ok()?, generation);
+            (Control::open(&plan).ok()?.slot_state(member) == bus::control::SlotState::Taken).then_some(())
         });
     }
 

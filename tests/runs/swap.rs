@@ -144,7 +144,7 @@ fn a_process_of_a_live_run_is_swapped() {
     let words = ["swap", "controller", "--with", "kind = \"pid\"", "--shadow-ticks", "20", "--run", &run];
     let swap = place.start(&words);
     // The run is held: the successor joins at the tick at which it stands.
-    launch.await_seat("controller", 1);
+    launch.await_slot("controller", 1);
     let refused = place.start(&["swap", "recorder", "--run", &run]).end_among_others().with_code(2);
     refused.says(&["recorder"]);
     launch.release();

@@ -1,6 +1,6 @@
 //! The state that a node hands over: stated after every tick, in shared memory that outlives the process.
 //!
-//! A ring holds the state at the start of each of the last ticks, as many as a member can be ahead of its
+//! A ring holds the state at the start of each of the last ticks, as many as a slot can be ahead of its
 //! successor. It is stated before the tick's outputs are sent: whatever was sent, the state that follows it
 //! can be read, also when the process died right after.
 
@@ -58,7 +58,7 @@ impl StateRing {
         }
         let path = ring_path(plan, node, generation);
         let fail = |source| BusError::File { action: "open", path: path.clone(), source };
-        let file = crate::own_file::open(&path, true).map_err(fail)?;
+        let file = crate::user_file::open(&path, true).map_err(fail)?;
         Self::map(plan, schema, &file).map_err(fail).map(Some)
     }
 
@@ -98,7 +98,7 @@ impl StateRing {
         assert!((first + length) * 8 <= self.map.len(), "the entry of tick {tick} is outside the state ring");
         // SAFETY: the mapping lives as long as `self`, the words are inside it (asserted) and start at a multiple of
         // 8 from a page-aligned start; every process accesses these bytes as atomics only. The order against the
-        // other process comes from the member's state word.
+        // other process comes from the slot's state word.
         let words = unsafe {
             std::slice::from_raw_parts(self.map.as_mut_ptr().add(first * 8).cast::<AtomicU64>(), length)
         };
@@ -117,7 +117,7 @@ fn word_of(bytes: &[u8]) -> u64 {
     u64::from_le_bytes(word)
 }
 
-/// A member is at most a window ahead of its successor; one state more belongs to the tick that it computes.
+/// A slot is at most a window ahead of its successor; one state more belongs to the tick that it computes.
 fn entries(plan: &Plan) -> usize {
     let longest = plan.nodes.iter().map(|node| node.period_ticks).max().unwrap_or(1);
     (plan.window_ticks + longest + 2) as usize

@@ -1,7 +1,7 @@
 //! Who flies and who shadows: the processes of a run from one change to the next.
 //!
-//! The supervisor writes the roster and raises the epoch; every node then makes its connections agree with
-//! it. A roster holds the whole state, not a change, so it does not matter which of them a node saw last.
+//! The supervisor writes the membership and raises the epoch; every node then makes its connections agree with
+//! it. A membership holds the whole state, not a change, so it does not matter which of them a node saw last.
 
 use crate::error::BusError;
 use crate::plan::{NodePlan, Plan};
@@ -10,20 +10,20 @@ use std::path::{Path, PathBuf};
 
 /// The processes of a run.
 #[derive(Clone, Debug, Serialize, Deserialize)]
-pub struct Roster {
+pub struct Membership {
     /// Counts the changes of this run.
     pub epoch: u32,
     /// The processes of each node, in the plan's order.
-    pub nodes: Vec<NodeRoster>,
+    pub nodes: Vec<NodeInstances>,
 }
 
 /// The processes of a node.
 #[derive(Clone, Debug, Serialize, Deserialize)]
-pub struct NodeRoster {
+pub struct NodeInstances {
     /// The process whose samples count, up to the take-over.
-    pub active: Incumbent,
+    pub primary: Instance,
     /// The process that shadows it.
-    pub successor: Option<Incumbent>,
+    pub backup: Option<Instance>,
     /// The tick from which on the successor goes on by itself; `u32::MAX` where it only shadows.
     pub take_over_tick: u32,
     /// Per output: the tick from which on the successor's samples count. After a crash some outputs of the
@@ -33,7 +33,7 @@ pub struct NodeRoster {
 
 /// A process of a node.
 #[derive(Clone, Debug, Serialize, Deserialize)]
-pub struct Incumbent {
+pub struct Instance {
     /// Counts the processes of this node, from 0.
     pub generation: u32,
     /// The first tick it computes.
@@ -44,39 +44,39 @@ pub struct Incumbent {
     pub plan: NodePlan,
 }
 
-impl Roster {
-    /// The roster at the start of a run: generation 0 of every node.
+impl Membership {
+    /// The membership at the start of a run: generation 0 of every node.
     #[must_use]
     pub fn first(plan: &Plan) -> Self {
-        let first = |node: &NodePlan| NodeRoster {
-            active: Incumbent { generation: 0, join_tick: 0, shadows: false, plan: node.clone() },
-            successor: None,
+        let first = |node: &NodePlan| NodeInstances {
+            primary: Instance { generation: 0, join_tick: 0, shadows: false, plan: node.clone() },
+            backup: None,
             take_over_tick: u32::MAX,
             take_over_ticks: vec![u32::MAX; node.outputs.len()],
         };
         Self { epoch: 0, nodes: plan.nodes.iter().map(first).collect() }
     }
 
-    /// Reads roster number `epoch` of the run in `run_dir`.
+    /// Reads membership number `epoch` of the run in `run_dir`.
     ///
     /// # Errors
-    /// If the file is missing or is no roster.
+    /// If the file is missing or is no membership.
     pub fn load(run_dir: &Path, epoch: u32) -> Result<Self, BusError> {
         let path = path(run_dir, epoch);
-        let text = crate::own_file::read_text(&path).map_err(|source| BusError::File {
+        let text = crate::user_file::read_text(&path).map_err(|source| BusError::File {
             action: "read",
             path: path.clone(),
             source,
         })?;
         serde_json::from_str(&text).map_err(|error| BusError::Content {
             path,
-            expected: "the roster of a run",
+            expected: "the membership of a run",
             found: error.to_string(),
         })
     }
 
-    /// Writes the roster into `run_dir`, and removes the one before the one before it, which nobody reads
-    /// any more: every node agrees with a roster before the next is made.
+    /// Writes the membership into `run_dir`, and removes the one before the one before it, which nobody reads
+    /// any more: every node agrees with a membership before the next is made.
     ///
     /// # Errors
     /// If the file cannot be written.
@@ -95,34 +95,34 @@ impl Roster {
 
     /// The processes that read topic `topic`: node, generation and number of the input.
     pub(crate) fn readers(&self, topic: usize) -> impl Iterator<Item = (usize, u32, usize)> + '_ {
-        self.nodes.iter().enumerate().flat_map(move |(node, roster)| {
-            roster.incumbents().flat_map(move |incumbent| {
-                let inputs = incumbent.plan.inputs.iter().enumerate();
+        self.nodes.iter().enumerate().flat_map(move |(node, membership)| {
+            membership.instances().flat_map(move |instance| {
+                let inputs = instance.plan.inputs.iter().enumerate();
                 inputs
                     .filter(move |(_, input)| input.topic == topic)
-                    .map(move |(index, _)| (node, incumbent.generation, index))
+                    .map(move |(index, _)| (node, instance.generation, index))
             })
         })
     }
 }
 
-impl NodeRoster {
+impl NodeInstances {
     /// The process of this generation.
-    pub(crate) fn of(&self, generation: u32) -> Option<&Incumbent> {
-        self.incumbents().find(|incumbent| incumbent.generation == generation)
+    pub(crate) fn of(&self, generation: u32) -> Option<&Instance> {
+        self.instances().find(|instance| instance.generation == generation)
     }
 
-    fn incumbents(&self) -> impl Iterator<Item = &Incumbent> {
-        std::iter::once(&self.active).chain(&self.successor)
+    fn instances(&self) -> impl Iterator<Item = &Instance> {
+        std::iter::once(&self.primary).chain(&self.backup)
     }
 
     /// The tick from which on the successor's samples of topic `topic` count.
     pub(crate) fn topic_take_over_tick(&self, topic: usize) -> u32 {
-        let outputs = self.active.plan.outputs.iter().zip(&self.take_over_ticks);
+        let outputs = self.primary.plan.outputs.iter().zip(&self.take_over_ticks);
         outputs.filter(|(output, _)| output.topic == topic).map(|(_, &tick)| tick).next().unwrap_or(u32::MAX)
     }
 }
 
 fn path(run_dir: &Path, epoch: u32) -> PathBuf {
-    run_dir.join(format!("roster-{epoch}.json"))
+    run_dir.join(format!("membership-{epoch}.json"))
 }
