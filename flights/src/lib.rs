@@ -12,6 +12,7 @@
 //! | `plausible`, `agreement` | values against physics |
 //! | `span` | times against the number of samples |
 //! | `held_out`, `twin` | whether test flights hold what parameters are fitted on: by file and time, by samples |
+//! | `state` | errors of a simulated state against the measured one |
 //! | `canonical` | a flight as one CSV table |
 //! | `error` | what can be wrong |
 
@@ -38,6 +39,7 @@ mod reading;
 mod ros_definition;
 mod set;
 mod span;
+pub mod state;
 mod twin;
 mod ulog;
 

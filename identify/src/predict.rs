@@ -6,6 +6,7 @@ use crate::clock::Clock;
 use crate::prepared::{Held, SETTLE_S};
 use crate::track::{Track, valid_about};
 use flights::Flight;
+use flights::state::{StateQuantity, VehicleState, WindowEndErrors};
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use plant::{Airframe, Backend, FreeFlight, NewtonEuler, RigidBody};
 use std::collections::BTreeMap;
@@ -94,7 +95,7 @@ impl Measured {
         let first = commands.at(self.clock.start_s);
         let mut plant = FreeFlight::new(NewtonEuler::flying(airframe, 1), self.bodies[0], memory);
         plant.settle_rotors(&first);
-        let (mut sums, mut count, mut trace) = ([0.0; 4], 0_u32, Vec::new());
+        let (mut errors, mut trace) = (WindowEndErrors::default(), Vec::new());
         for tick in 1..self.clock.count {
             plant.step(&commands.at(self.clock.at(tick - 1)), TICK_S, &[]);
             let (own, measured) = (&plant.state().body, &self.bodies[tick]);
@@ -105,43 +106,26 @@ impl Measured {
                 if tick - window >= SETTLE_TICKS
                     && self.is_valid[tick - window..=tick].iter().all(|is_valid| *is_valid)
                 {
-                    sums.iter_mut().zip(differences(own, measured)).for_each(|(sum, own)| *sum += own * own);
-                    count += 1;
+                    errors.add(&state(own), &state(measured));
                 }
                 plant.set_body(measured);
             }
         }
-        if count == 0 {
+        if errors.windows() == 0 {
             return (Errors::new(), trace);
         }
-        let rms = |channel: usize| (sums[channel] / f64::from(count)).sqrt();
-        let errors = CHANNELS.iter().enumerate().filter(|(_, (channel, _))| is_measured(flight, channel));
-        (errors.map(|(at, (name, _))| (*name, rms(at))).collect(), trace)
+        let measured = StateQuantity::ALL.into_iter().filter(|quantity| quantity.is_measured(flight));
+        (measured.map(|quantity| (quantity.name(), errors.rms(quantity))).collect(), trace)
     }
 }
 
-/// The channels of a prediction, with their units.
-pub const CHANNELS: [(&str, &str); 4] =
-    [("position", "m"), ("velocity", "m/s"), ("attitude", "deg"), ("rates", "rad/s")];
-
-fn is_measured(flight: &Flight, channel: &str) -> bool {
-    // Without an attitude nobody knows where thrust points; one that was assumed is no measurement.
-    let (has_attitude, is_measured) = (!flight.attitude.is_empty(), flight.assumed.is_empty());
-    match channel {
-        "position" => has_attitude && !flight.position.is_empty(),
-        "velocity" => has_attitude && (!flight.position.is_empty() || !flight.velocity.is_empty()),
-        "attitude" => has_attitude && is_measured,
-        _ => is_measured && (has_attitude || !flight.angular_velocity.is_empty()),
+fn state(body: &RigidBody) -> VehicleState {
+    VehicleState {
+        position_W_m: body.position_W_m.into(),
+        velocity_W_m_s: body.velocity_W_m_s.into(),
+        attitude_WB: body.attitude_WB.coords.into(),
+        angular_velocity_B_rad_s: body.angular_velocity_B_rad_s.into(),
     }
-}
-
-fn differences(own: &RigidBody, measured: &RigidBody) -> [f64; 4] {
-    [
-        (own.position_W_m - measured.position_W_m).norm(),
-        (own.velocity_W_m_s - measured.velocity_W_m_s).norm(),
-        own.attitude_WB.angle_to(&measured.attitude_WB).to_degrees(),
-        (own.angular_velocity_B_rad_s - measured.angular_velocity_B_rad_s).norm(),
-    ]
 }
 
 /// A derivative reaches over no more, however far samples are apart: its cost grows with its reach.

@@ -8,7 +8,7 @@ use crate::fit::{Bench, Fitted, Weights};
 use crate::model::Model;
 use crate::noise;
 use crate::parameter::Parameters;
-use crate::predict::{CHANNELS, Errors, Measured};
+use crate::predict::{Errors, Measured};
 use crate::prepared::{Equation, Prepared, SETTLE_S};
 use crate::regressor::{Regressor, regressors};
 use crate::report::{BeforeAfter, Change, EffectReport, Estimate, FlightReport, Noise, Report, Unexplained};
@@ -16,6 +16,7 @@ use crate::select::{Selection, rivals, select, which};
 use crate::sensing::SensorErrors;
 use crate::trim;
 use crate::whiteness::whiteness;
+use flights::state::StateQuantity;
 use flights::{Flight, FlightSet, Role};
 use plant::effects::{Effect, entry};
 use std::collections::BTreeMap;
@@ -375,8 +376,9 @@ fn of_role(
 ) -> BTreeMap<String, BTreeMap<String, BTreeMap<&'static str, Change>>> {
     let mut flights: BTreeMap<String, BTreeMap<String, BTreeMap<&'static str, Change>>> = BTreeMap::new();
     for (name, _, horizon_s, old, new) in predictions.iter().filter(|own| own.1 == role) {
-        let channels = CHANNELS.iter().filter_map(|(channel, unit)| {
-            Some((*channel, Change { before: *old.get(channel)?, after: *new.get(channel)?, unit }))
+        let channels = StateQuantity::ALL.iter().filter_map(|quantity| {
+            let (channel, unit) = (quantity.name(), quantity.unit());
+            Some((channel, Change { before: *old.get(channel)?, after: *new.get(channel)?, unit }))
         });
         flights.entry(name.clone()).or_default().insert(format!("{horizon_s}"), channels.collect());
     }
