@@ -1,9 +1,10 @@
 //! Checks manifests without running them, for the command line and for other programs: editors, tests, fuzzers.
 
-use crate::describe;
-use crate::graph::Graph;
-use crate::manifest::Manifest;
-use crate::problem::Problem;
+use crate::COMPONENTS;
+use runtime::describe;
+use runtime::graph::Graph;
+use runtime::manifest::Manifest;
+use runtime::problem::Problem;
 use std::fmt;
 use std::path::Path;
 
@@ -49,7 +50,7 @@ impl fmt::Display for Checked {
 /// # Ok::<(), hummingbus::Problem>(())
 /// ```
 pub fn check(path: &Path, overrides: &[String]) -> Result<Checked, Problem> {
-    checked(&Manifest::load(path, overrides)?)
+    checked(&Manifest::load(path, overrides, COMPONENTS)?)
 }
 
 /// Checks `text` as the manifest at `path`, which need not exist: paths written in it start at its folder.
@@ -64,7 +65,7 @@ pub fn check(path: &Path, overrides: &[String]) -> Result<Checked, Problem> {
 /// assert!(problem.to_string().contains("did you mean `duration_s`?"));
 /// ```
 pub fn check_text(text: &str, path: &Path, overrides: &[String]) -> Result<Checked, Problem> {
-    checked(&Manifest::parse(text.to_owned(), path, overrides)?)
+    checked(&Manifest::parse(text.to_owned(), path, overrides, COMPONENTS)?)
 }
 
 fn checked(manifest: &Manifest) -> Result<Checked, Problem> {

@@ -3,9 +3,10 @@
 //! What `check` accepts it has tried: it has stepped the plant and the law with it ("rehearsed"). So a panic, or a
 //! number that overflows on the way, shows here without a process.
 
-use crate::graph::Graph;
-use crate::manifest::Manifest;
+use crate::COMPONENTS;
 use bus::kind::{NodeKind, RunContext};
+use runtime::graph::Graph;
+use runtime::manifest::Manifest;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 use toml::{Table, Value};
@@ -44,7 +45,7 @@ impl Folder {
 
     /// Checks the manifest at `path` with `settings`: its words where it is refused.
     fn check(path: &Path, settings: &[String]) -> Result<Graph, String> {
-        let manifest = Manifest::load(path, settings).map_err(|problem| problem.to_string())?;
+        let manifest = Manifest::load(path, settings, COMPONENTS).map_err(|problem| problem.to_string())?;
         Graph::build(&manifest).map_err(|problem| problem.to_string())
     }
 }

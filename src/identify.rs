@@ -175,7 +175,9 @@ fn fly(set: &FlightSet, vehicle: &Path, outcome: &Outcome, progress: &Progress) 
         return Ok(None);
     }
     let mut tell = |line: &str| progress.say(&format!("on the bus: {line}"));
-    let mut errors = |vehicle: &Path, set: &FlightSet| validate::errors(&[vehicle], set, None, &mut tell);
+    let stop = crate::cli::interrupts::stop_token()?;
+    let mut errors =
+        |vehicle: &Path, set: &FlightSet| validate::errors(&[vehicle], set, None, &stop, &mut tell);
     let before = errors(&set.vehicle, &aligned)?;
     let after = errors(vehicle, &corrected)?;
     let mut flights = json!({});

@@ -1,9 +1,9 @@
-//! The built-in kinds of node.
+//! The components that this package brings.
 
-use bus::kind::NodeKind;
+use runtime::registry::Registry;
 
-/// Every built-in kind, in alphabetical order.
-pub const KINDS: &[&NodeKind] = &[
+/// Every component that this package brings, in alphabetical order.
+pub const COMPONENTS: Registry = Registry::new(&[
     &sensors::attitude::KIND,
     &sensors::barometer::KIND,
     &sensors::battery::KIND,
@@ -29,14 +29,4 @@ pub const KINDS: &[&NodeKind] = &[
     &controllers::velocity::KIND,
     &controllers::wall_follow::KIND,
     &controllers::wall_stop::KIND,
-];
-
-/// The kind named `name`.
-pub fn find(name: &str) -> Option<&'static NodeKind> {
-    KINDS.iter().copied().find(|kind| kind.name == name)
-}
-
-/// The names of all kinds, for messages.
-pub fn names() -> String {
-    KINDS.iter().map(|kind| kind.name).collect::<Vec<_>>().join(", ")
-}
+]);

@@ -5,48 +5,27 @@
 #![forbid(unsafe_code)]
 
 pub mod check;
-mod clean;
 pub mod cli;
-mod companions;
-mod ctl;
-mod descendants;
-mod describe;
 #[cfg(test)]
 mod extremes;
-mod files;
-mod graph;
 mod identify;
-mod inherited;
 mod judge;
 mod kinds;
-mod launch;
-mod manifest;
-mod output;
-mod output_file;
-mod outputs;
 mod page;
-mod placement;
 mod plot;
-mod problem;
-mod process_log;
-mod process_table;
-mod processes;
 mod profile;
-mod program;
-mod progress;
 #[cfg(test)]
 mod properties;
-mod run;
-mod run_dir;
 mod shadow;
-mod spawn;
-mod stall;
-mod succession;
+#[cfg(test)]
+mod successors;
 mod summary;
-mod supervisor;
 mod top;
 mod validate;
-mod watch_clock;
 
 pub use check::{Checked, check, check_text};
-pub use problem::Problem;
+pub use kinds::COMPONENTS;
+pub use runtime::problem::Problem;
+
+use cli::{files, output};
+use runtime::{ctl, manifest, output_file, outputs, problem, run_dir, succession};

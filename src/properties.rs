@@ -1,11 +1,12 @@
 //! What holds for any manifest: it is accepted or refused with words, and never brings the program down.
 
-use crate::graph::Graph;
-use crate::manifest::Manifest;
-use crate::problem::Problem;
+use crate::COMPONENTS;
 use proptest::prelude::*;
 use proptest::sample::select;
 use proptest::test_runner::{RngSeed, TestRunner};
+use runtime::graph::Graph;
+use runtime::manifest::Manifest;
+use runtime::problem::Problem;
 use std::path::{Path, PathBuf};
 
 const SHIPPED: [&str; 7] =
@@ -84,7 +85,7 @@ impl Folder {
     fn check(&self, text: &[u8], settings: &[String]) -> Result<(Manifest, Graph), Problem> {
         let path = self.0.path().join("manifests/under-test.toml");
         std::fs::write(&path, text).unwrap();
-        let manifest = Manifest::load(&path, settings)?;
+        let manifest = Manifest::load(&path, settings, COMPONENTS)?;
         let graph = Graph::build(&manifest)?;
         Ok((manifest, graph))
     }
@@ -92,7 +93,7 @@ impl Folder {
     /// Checks `text`, and has whatever is wrong with it said.
     fn survives(&self, text: &[u8], settings: &[String]) {
         match self.check(text, settings) {
-            Ok((_, graph)) => assert!(!crate::describe::graph(&graph).is_empty()),
+            Ok((_, graph)) => assert!(!runtime::describe::graph(&graph).is_empty()),
             Err(problem) => assert!(!problem.to_string().is_empty()),
         }
     }

@@ -1,10 +1,10 @@
 //! The summary of a run: for people, and as JSON for programs.
 
 use crate::judge::{Verdict, WindowErrors};
-use crate::launch::Outcome;
 use crate::problem::Problem;
 use crate::shadow::{Difference, Step};
 use crate::succession::{Purpose, Report};
+use runtime::launch::Outcome;
 use serde::Serialize;
 use std::fmt;
 use std::path::PathBuf;

@@ -20,6 +20,7 @@ use anyhow::{Context, Result, bail};
 use clap::Args;
 use flights::{Flight, FlightSet};
 use replay::Replay;
+use runtime::event::StopToken;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use vehicles::Vehicle;
@@ -59,7 +60,9 @@ pub fn validate(arguments: &ValidateArguments) -> Result<bool> {
             crate::output::say(line);
         }
     };
-    let errors = errors(&vehicles, &flights, arguments.keep.as_deref(), &mut tell)?;
+    // Before there is a folder to remove, so that an interrupt leaves none.
+    let stop = crate::cli::interrupts::stop_token()?;
+    let errors = errors(&vehicles, &flights, arguments.keep.as_deref(), &stop, &mut tell)?;
     let text =
         if arguments.json { serde_json::to_string_pretty(&errors.json())? } else { errors.to_string() };
     crate::output::print_text(&text)?;
@@ -75,14 +78,13 @@ pub fn errors(
     vehicles: &[&Path],
     flights: &FlightSet,
     keep: Option<&Path>,
+    stop: &StopToken,
     tell: &mut dyn FnMut(&str),
 ) -> Result<Errors> {
     for vehicle in vehicles {
         Vehicle::load(vehicle)?;
     }
     require_own_folders(flights)?;
-    // Before there is a folder to remove, so that an interrupt leaves none.
-    crate::launch::count_interrupts()?;
     let scratch = if keep.is_none() { Some(Scratch::create()?) } else { None };
     let folder = keep.or(scratch.as_ref().map(Scratch::path)).context("no folder to fly in")?;
     let mut errors = Errors { vehicles: labels(vehicles), flights: Vec::new() };
@@ -90,7 +92,7 @@ pub fn errors(
         let replay = Replay::prepare(flight, vehicles, folder)
             .with_context(|| format!("the flight `{}` cannot be replayed", flight.name))?;
         let (host_s, recording) =
-            replay.fly().with_context(|| not_flown(flight, keep.map(|_| replay.folder())))?;
+            replay.fly(stop).with_context(|| not_flown(flight, keep.map(|_| replay.folder())))?;
         let flown = windows::flight_errors(flight, &replay, &recording, vehicles.len())?;
         tell(&format!("{}: {:.1} s flown in {host_s:.1} s", flight.name, replay.duration_s()));
         errors.flights.push(flown);

@@ -1,8 +1,8 @@
 //! The numbers that a field of a message is drawn as, and the units that people read them in.
 
-use crate::judge::conversion;
 use recorder::definition::Leaf;
 use recorder::series::roll_pitch_yaw;
+use runtime::units::conversion;
 use std::f64::consts::{PI, TAU};
 
 /// The angles that a quaternion is drawn as.

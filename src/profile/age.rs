@@ -1,7 +1,7 @@
 //! How old the samples are that a command rests on when it is sent.
 
-use crate::profile::flight::Flight;
 use crate::profile::times::Times;
+use runtime::flight::Flight;
 use serde::Serialize;
 
 /// The age of one topic's samples in the commands of another.

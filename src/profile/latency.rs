@@ -1,7 +1,7 @@
 //! What a tick costs a node, and a sample on its way.
 
-use crate::profile::flight::{Cause, Flight};
 use crate::profile::times::Times;
+use runtime::flight::{Cause, Flight};
 use serde::Serialize;
 use std::collections::BTreeMap;
 

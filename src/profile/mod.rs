@@ -1,6 +1,5 @@
 //! Where the host time of a run's ticks goes.
 //!
-//! - [`flight`]: what the processes noted, and what each of them waited for
 //! - [`times`]: histograms of host times
 //! - [`latency`]: wait, wake-up, computation and sending per node; transport per topic
 //! - [`age`]: how old the measurements are that a command rests on
@@ -11,7 +10,6 @@
 //! - [`page`]: a page with histograms and the slowest ticks
 
 mod age;
-mod flight;
 mod latency;
 mod pacing;
 mod page;
@@ -22,8 +20,6 @@ mod tests;
 mod times;
 mod trace;
 
-pub use flight::Flight;
-
 use crate::output_file;
 use crate::outputs::Output;
 use age::Age;
@@ -31,6 +27,7 @@ use anyhow::Result;
 use latency::{NodeLatency, Transport};
 use pacing::Pacing;
 use path::CriticalPath;
+use runtime::flight::Flight;
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 

@@ -1,7 +1,7 @@
 //! The deadlines of a paced run.
 
-use crate::profile::flight::Flight;
 use crate::profile::times::Times;
+use runtime::flight::Flight;
 use serde::Serialize;
 
 /// How the clock and the nodes kept the deadlines.

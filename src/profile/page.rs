@@ -4,10 +4,10 @@
 
 use crate::page::{PLOTLY_BASIC, Page};
 use crate::profile::Profile;
-use crate::profile::flight::{Cause, Flight};
 use crate::profile::path::{Path, name};
 use crate::profile::times::Times;
 use bus::profile::TickTimes;
+use runtime::flight::{Cause, Flight};
 use serde_json::{Value, json};
 use std::io::{self, Write};
 

@@ -4,8 +4,8 @@
 //! there it goes back over what each node waited for last, until that lies before the tick: a sample of an
 //! earlier tick, the clock's grant, or the node's own computation before.
 
-use crate::profile::flight::{Cause, Flight};
 use crate::profile::times::Times;
+use runtime::flight::{Cause, Flight};
 use serde::Serialize;
 use std::cmp::Reverse;
 use std::collections::BTreeMap;

@@ -4,7 +4,6 @@
 //! each node has its inputs, has computed, has sent, and has ended.
 
 use super::age::{Age, ages};
-use super::flight::{Cause, Flight};
 use super::latency::latencies;
 use super::pacing::Pacing;
 use super::path::{CriticalPath, Path, Place, Stretch};
@@ -12,6 +11,7 @@ use super::times::Times;
 use crate::succession::{Purpose, Report};
 use bus::plan::{InputPlan, NodePlan, OutputPlan, Pace, Plan, TopicPlan, Wait};
 use bus::profile::{GrantWriter, TickWriter};
+use runtime::flight::{Cause, Flight};
 use serde_json::Value;
 
 const PLANT: usize = 0;

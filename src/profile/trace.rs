@@ -1,9 +1,9 @@
 //! A timeline in the Trace Event Format (JSON), which ui.perfetto.dev and chrome://tracing open.
 
 use crate::output_file::{Kind, Mark};
-use crate::profile::flight::{Cause, Flight};
 use crate::profile::path::CriticalPath;
 use bus::profile::{Grant, TickTimes};
+use runtime::flight::{Cause, Flight};
 use serde_json::{Value, json};
 use std::collections::BTreeSet;
 use std::io::{self, Write};

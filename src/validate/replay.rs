@@ -4,14 +4,16 @@
 //! commands, set to the measured state at the start of each window; all in one run, so that all fly the same.
 
 use super::{HORIZONS_MS, rows};
-use crate::graph::Graph;
-use crate::launch;
-use crate::manifest::Manifest;
+use crate::COMPONENTS;
 use crate::output_file::{self, Kind, Mark, is_same};
 use crate::outputs::Outputs;
 use anyhow::{Context, Result, bail};
 use flights::Flight;
 use recorder::reader::Recording;
+use runtime::event::{RunEvent, StopToken};
+use runtime::graph::Graph;
+use runtime::launch;
+use runtime::manifest::Manifest;
 use std::fmt::Write as _;
 use std::fs::File;
 use std::io::Write as _;
@@ -81,11 +83,15 @@ impl Replay {
     ///
     /// # Errors
     /// As `hummingbus run`; a run that was stopped too.
-    pub fn fly(&self) -> Result<(f64, Recording)> {
-        let manifest = Manifest::load(&self.manifest_path(), &[])?;
+    pub fn fly(&self, stop: &StopToken) -> Result<(f64, Recording)> {
+        let manifest = Manifest::load(&self.manifest_path(), &[], COMPONENTS)?;
         let mut graph = Graph::build(&manifest)?;
         let mut outputs = Outputs::of(&manifest, &graph, &self.folder.join(RECORDING), Vec::new())?;
-        let outcome = launch::fly(&manifest, &mut graph, &mut outputs, true)?;
+        let outcome = launch::fly(&manifest, &mut graph, &mut outputs, stop, &mut |event| {
+            if let RunEvent::Note(text) = event {
+                crate::output::say(text);
+            }
+        })?;
         let recording = outputs.finish()?.context("it was not recorded")?;
         if outcome.was_stopped {
             bail!("it was stopped after {} of {} ticks", outcome.ticks, self.ticks);

@@ -11,7 +11,7 @@ pub fn open_recording(path: &Path) -> Result<Recording> {
         let end = cut.last_tick.map_or("nothing of it is whole".to_owned(), |tick| {
             format!("what is whole of it ends after tick {tick}")
         });
-        crate::output::say(&format!(
+        super::output::say(&format!(
             "warning: {} was cut off, its writer did not finish it: {end}",
             path.display()
         ));

@@ -4,7 +4,6 @@
 
 use crate::graph::Graph;
 use crate::manifest::Manifest;
-use crate::output::say;
 use crate::output_file::{self, Kind, LOG, LogClaim, Partial, RECORDING, is_same};
 use crate::program::Program;
 use crate::run_dir::{self, RunDir};
@@ -88,9 +87,6 @@ impl Outputs {
             if partial.path().to_str().is_none() {
                 bail!("cannot record to {}: its name is not UTF-8", partial.path().display());
             }
-            if let Some(kept) = partial.kept() {
-                say(&format!("what an earlier run left unfinished is kept as {}", kept.display()));
-            }
             self.partial = Some(partial);
         }
         for log in &self.logs {
@@ -107,6 +103,11 @@ impl Outputs {
         let paths = paths.map(|path| Ok(path?.to_string_lossy().into_owned()));
         let text = serde_json::to_vec(&paths.collect::<Result<Vec<String>>>()?)?;
         std::fs::write(run_dir.path().join(LIST), text).context("cannot write to the run directory")
+    }
+
+    /// Where what an earlier run left unfinished lies now, if there was something.
+    pub fn kept(&self) -> Option<&Path> {
+        self.partial.as_ref().and_then(Partial::kept)
     }
 
     /// Where the recorder writes.

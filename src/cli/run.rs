@@ -1,15 +1,17 @@
 //! The command `run` and its kin: check a manifest, fly it, judge its recording, say what came of it.
 
-use crate::graph::{self, Graph, successor_of};
-use crate::manifest::{Manifest, PaceSetting};
-use crate::output::{print_text, words};
-use crate::outputs::Outputs;
-use crate::problem::print_warnings;
+use super::interrupts::stop_token;
+use super::output::{print_text, print_warnings, words};
+use super::progress::Bar;
 use crate::profile::{Files, Profile};
 use crate::summary::{Judgement, Summary};
-use crate::{judge, launch, shadow};
+use crate::{COMPONENTS, judge, shadow};
 use anyhow::{Context, Error, Result, anyhow, bail};
 use clap::Args;
+use runtime::graph::{self, Graph, successor_of};
+use runtime::launch;
+use runtime::manifest::{Manifest, PaceSetting};
+use runtime::outputs::Outputs;
 use serde_json::json;
 use std::path::{Path, PathBuf};
 
@@ -43,8 +45,8 @@ pub fn run(
     extra_shadow: Option<(&str, &str)>,
 ) -> Result<bool> {
     // First, so that who stops the run early hears that it was stopped.
-    launch::count_interrupts()?;
-    let mut manifest = Manifest::load(&arguments.manifest, &arguments.set)?;
+    let stop = stop_token()?;
+    let mut manifest = Manifest::load(&arguments.manifest, &arguments.set, COMPONENTS)?;
     if let Some(pace) = arguments.pace {
         manifest.content.run.pace = pace;
     }
@@ -71,8 +73,12 @@ pub fn run(
     let files = files.unwrap_or_else(|| Files::beside(&path));
     let pages = if graph.plan.profile { files.outputs() } else { Vec::new() };
     let mut outputs = Outputs::of(&manifest, &graph, &path, pages)?;
-    let flown = launch::fly(&manifest, &mut graph, &mut outputs, arguments.json)
-        .and_then(|outcome| Ok((outcome, outputs.finish()?)));
+    let bar = Bar::new(arguments.json);
+    let flown = launch::fly(&manifest, &mut graph, &mut outputs, &stop, &mut |event| bar.show(event))
+        .and_then(|outcome| {
+            bar.finish();
+            Ok((outcome, outputs.finish()?))
+        });
     let (mut outcome, recording) =
         flown.or_else(|error| Err(broken(&manifest, &error, outputs.left(), arguments.json)?))?;
     let flight = outcome.flight.take();

@@ -40,7 +40,12 @@ pub struct Publisher {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Cause {
     /// A sample: its topic, and the tick that it is stamped with.
-    Sample { topic: usize, tick: u32 },
+    Sample {
+        /// The topic.
+        topic: usize,
+        /// The tick.
+        tick: u32,
+    },
     /// The clock's grant.
     Grant,
     /// The node's own computation before.

@@ -3,6 +3,7 @@
 use super::sources::{Origin, Sources};
 use super::tree;
 use crate::problem::Problem;
+use crate::registry::Registry;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use toml::Spanned;
@@ -27,8 +28,8 @@ pub fn text(path: &Path) -> Result<String, Problem> {
 ///
 /// # Errors
 /// A file that cannot be read or includes itself, at the place of the include.
-pub fn read(path: &Path, text: String) -> Result<Sources, Problem> {
-    let mut reader = Reader { sources: Sources::default(), read: Vec::new(), open: Vec::new() };
+pub fn read(path: &Path, text: String, registry: Registry) -> Result<Sources, Problem> {
+    let mut reader = Reader { sources: Sources::of(registry), read: Vec::new(), open: Vec::new() };
     reader.add(path, text)?;
     Ok(reader.sources)
 }

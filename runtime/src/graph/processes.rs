@@ -1,6 +1,5 @@
 //! Processes: what each executes, and how it runs on the host.
 
-use crate::kinds;
 use crate::manifest::{Manifest, Process};
 use crate::output_file;
 use crate::problem::{Problem, nearest};
@@ -150,14 +149,16 @@ pub fn program(manifest: &Manifest, name: &Spanned<String>, process: &Process) -
 fn executable(manifest: &Manifest, name: &Spanned<String>, process: &Process) -> Result<Executable, Problem> {
     match (&process.kind, &process.command) {
         (Some(kind), None) => {
-            let known: Vec<_> = kinds::KINDS.iter().map(|kind| kind.name).collect();
+            let known: Vec<_> = manifest.registry().iter().map(|kind| kind.name).collect();
             let help = match nearest(kind.get_ref(), known) {
-                Some(near) => format!("did you mean `{near}`? The kinds are {}", kinds::names()),
-                None => format!("the kinds are {}", kinds::names()),
+                Some(near) => format!("did you mean `{near}`? The kinds are {}", manifest.registry().names()),
+                None => format!("the kinds are {}", manifest.registry().names()),
             };
             let message = format!("there is no kind `{}`", kind.get_ref());
-            let kind =
-                kinds::find(kind.get_ref()).ok_or_else(|| manifest.problem(&kind.span(), message, help))?;
+            let kind = manifest
+                .registry()
+                .find(kind.get_ref())
+                .ok_or_else(|| manifest.problem(&kind.span(), message, help))?;
             Ok(Executable::Kind(kind))
         }
         (None, Some(command)) => self::command(manifest, name, process, command).map(Executable::Command),
@@ -175,7 +176,11 @@ fn nameless(manifest: &Manifest, name: &Spanned<String>) -> Problem {
     let found = name.get_ref();
     if !manifest.is_override(&name.span()) {
         let message = format!("process `{found}` needs either `kind` or `command`");
-        return manifest.problem(&name.span(), message, format!("the kinds are {}", kinds::names()));
+        return manifest.problem(
+            &name.span(),
+            message,
+            format!("the kinds are {}", manifest.registry().names()),
+        );
     }
     let others = manifest.content.process.keys().map(|name| name.get_ref().as_str());
     let known: Vec<&str> = others.filter(|name| name != found).collect();

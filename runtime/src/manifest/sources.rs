@@ -3,6 +3,7 @@
 use super::overrides::Override;
 use super::tree;
 use crate::problem::Problem;
+use crate::registry::Registry;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use toml::Spanned;
@@ -33,9 +34,16 @@ pub struct Sources {
     all: Vec<Source>,
     /// The files in the order in which they are merged: what is included goes before what includes it.
     pub order: Vec<usize>,
+    /// The components that they may name.
+    pub registry: Registry,
 }
 
 impl Sources {
+    /// No texts yet, which may name the components of `registry`.
+    pub fn of(registry: Registry) -> Self {
+        Self { registry, ..Self::default() }
+    }
+
     /// Adds a text behind the others.
     pub fn add(&mut self, origin: Origin, text: String) {
         // One more than the text is long: its very end is a place of its own.

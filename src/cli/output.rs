@@ -1,6 +1,7 @@
 //! Standard output and standard error.
 
 use anyhow::{Context, Result};
+use runtime::problem::Problem;
 
 /// Prints to standard output.
 pub fn print_text(text: &str) -> Result<()> {
@@ -28,4 +29,9 @@ pub fn words(error: &anyhow::Error) -> String {
     error.chain().skip(1).map(ToString::to_string).fold(error.to_string(), |text, cause| {
         if text.contains(&cause) { text } else { format!("{text}: {cause}") }
     })
+}
+
+/// Tells people of what is odd, on standard error.
+pub fn print_warnings(warnings: &[Problem]) {
+    warnings.iter().for_each(|warning| say(&format!("warning: {warning}")));
 }

@@ -25,6 +25,7 @@ pub use content::{
 };
 
 use crate::problem::{Problem, nearest};
+use crate::registry::Registry;
 use serde::Deserialize;
 use sources::{Origin, Sources};
 use std::ops::Range;
@@ -51,16 +52,21 @@ impl Manifest {
     ///
     /// # Errors
     /// A [`Problem`] that names the place.
-    pub fn load(path: &Path, overrides: &[String]) -> Result<Self, Problem> {
-        Self::parse(include::text(path)?, path, overrides)
+    pub fn load(path: &Path, overrides: &[String], registry: Registry) -> Result<Self, Problem> {
+        Self::parse(include::text(path)?, path, overrides, registry)
     }
 
     /// The same for `text` that stands, or is to stand, at `path`.
     ///
     /// # Errors
     /// A [`Problem`] that names the place.
-    pub fn parse(text: String, path: &Path, overrides: &[String]) -> Result<Self, Problem> {
-        let mut sources = include::read(path, text)?;
+    pub fn parse(
+        text: String,
+        path: &Path,
+        overrides: &[String],
+        registry: Registry,
+    ) -> Result<Self, Problem> {
+        let mut sources = include::read(path, text, registry)?;
         overrides.iter().for_each(|text| sources.add(Origin::Override, text.clone()));
         let tree = whole_tree(&sources)?;
         let content = Content::deserialize(toml::Deserializer::from(Spanned::new(0..0, tree)))
@@ -77,6 +83,11 @@ impl Manifest {
     /// The manifest's name: its file name without `.toml`.
     pub fn name(&self) -> String {
         self.path.file_stem().unwrap_or_default().to_string_lossy().into_owned()
+    }
+
+    /// The components that it may name.
+    pub fn registry(&self) -> Registry {
+        self.sources.registry
     }
 
     /// A problem at `span` of this manifest.

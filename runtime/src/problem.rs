@@ -54,11 +54,6 @@ impl Serialize for Problem {
     }
 }
 
-/// Tells people of what is odd, on standard error.
-pub fn print_warnings(warnings: &[Problem]) {
-    warnings.iter().for_each(|warning| crate::output::say(&format!("warning: {warning}")));
-}
-
 impl fmt::Display for Problem {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{}", self.file.display())?;

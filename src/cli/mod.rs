@@ -1,15 +1,24 @@
 //! The command line: arguments, what is printed, exit codes.
 
-use crate::files::open_recording;
-use crate::output::{gone_or_failed, print_text, say, words};
-use crate::problem::print_warnings;
+pub(crate) mod describe;
+pub(crate) mod files;
+mod inherited;
+pub(crate) mod interrupts;
+pub(crate) mod output;
+mod progress;
+mod run;
+mod steer;
+
 use crate::profile::Files;
-use crate::run::RunArguments;
-use crate::{clean, ctl, describe, identify, kinds, plot, run, shadow, top, validate};
+use crate::{COMPONENTS, identify, plot, shadow, top, validate};
 use anyhow::{Context, Result, bail};
 use bus::BusError;
 use clap::{Args, Parser, Subcommand};
+use files::open_recording;
+use output::{gone_or_failed, print_text, print_warnings, say, words};
 use recorder::reader::Recording;
+use run::RunArguments;
+use runtime::clean;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
@@ -78,10 +87,10 @@ enum Verb {
     Top(top::TopArguments),
     /// Pause, step, pace or stop a live run; exit code 2 if it refuses.
     #[command(after_help = "Example: hummingbus ctl pause")]
-    Ctl(ctl::CtlArguments),
+    Ctl(steer::CtlArguments),
     /// Replace a process of a live run.
     #[command(after_help = "Example: hummingbus swap controller --with better.toml --shadow-ticks 500")]
-    Swap(ctl::SwapArguments),
+    Swap(steer::SwapArguments),
     /// Remove what dead runs left, and nothing of live ones; exit code 1 if something could not be removed.
     #[command(after_help = "Example: hummingbus clean --dry-run")]
     Clean {
@@ -140,7 +149,7 @@ struct CheckArguments {
 pub fn main() -> ExitCode {
     let command = Cli::parse().command;
     if !matches!(command, Verb::Node { .. }) {
-        crate::inherited::forget();
+        inherited::forget();
     }
     let result = match command {
         Verb::Run(arguments) => run::run(&arguments, None, None),
@@ -158,8 +167,8 @@ pub fn main() -> ExitCode {
         Verb::Identify(arguments) => identify::run(&arguments),
         Verb::Validate(arguments) => validate::validate(&arguments),
         Verb::Top(arguments) => top::top(&arguments).map(|()| true),
-        Verb::Ctl(arguments) => ctl::ctl(&arguments).map(|()| true),
-        Verb::Swap(arguments) => ctl::swap(&arguments).map(|()| true),
+        Verb::Ctl(arguments) => steer::ctl(&arguments).map(|()| true),
+        Verb::Swap(arguments) => steer::swap(&arguments).map(|()| true),
         Verb::Clean { dry_run, json } => clean(dry_run, json),
         Verb::Node { kind } => node(&kind),
     };
@@ -178,7 +187,7 @@ fn shadow(arguments: &ShadowArguments) -> Result<bool> {
     let path = &arguments.run.manifest;
     match (&arguments.process, path.extension().is_some_and(|extension| extension == "mcap")) {
         (Some(process), false) => {
-            let with = ctl::description(&arguments.with)?;
+            let with = steer::description(&arguments.with)?;
             run::run(&arguments.run, None, Some((process, &with)))
         }
         (None, true) => print_text(&shadow::report(&Recording::open(path)?)?).map(|()| true),
@@ -245,8 +254,9 @@ fn node(kind: &str) -> Result<bool> {
     let result = if kind == "clock" {
         bus::clock::run()
     } else {
-        let kind =
-            kinds::find(kind).with_context(|| format!("no kind `{kind}`; there are {}", kinds::names()))?;
+        let kind = COMPONENTS
+            .find(kind)
+            .with_context(|| format!("no kind `{kind}`; there are {}", COMPONENTS.names()))?;
         (kind.run)()
     };
     match result {

@@ -6,8 +6,8 @@
 
 use super::sources::Sources;
 use super::{refused, tree};
-use crate::kinds;
 use crate::problem::{Problem, nearest};
+use crate::registry::Registry;
 use serde::Deserialize;
 use serde::de::IgnoredAny;
 use std::borrow::Cow;
@@ -132,7 +132,8 @@ fn add_vehicle<'s>(
         ));
     };
     let processes = differing(set, differences, sources)?;
-    let topics: Vec<String> = processes.iter().flat_map(|(name, value)| published(name, value)).collect();
+    let topics: Vec<String> =
+        processes.iter().flat_map(|(name, value)| published(name, value, sources.registry)).collect();
     for name in instances(&vehicle, sources)? {
         for (process, value) in processes.clone() {
             let mut value = value;
@@ -197,12 +198,16 @@ fn instances(vehicle: &Vehicle, sources: &Sources) -> Result<Vec<String>, Proble
 }
 
 /// The local topics that a process of a set publishes.
-fn published(name: &Spanned<DeString<'_>>, process: &Spanned<DeValue<'_>>) -> Vec<String> {
+fn published(
+    name: &Spanned<DeString<'_>>,
+    process: &Spanned<DeValue<'_>>,
+    registry: Registry,
+) -> Vec<String> {
     let Some(process) = process.get_ref().as_table() else { return Vec::new() };
     let outputs = tree::table(process, "outputs");
     let stated =
         outputs.into_iter().flat_map(|outputs| outputs.keys().map(|port| port.get_ref().to_string()));
-    let kind = tree::string(process, "kind").and_then(kinds::find);
+    let kind = tree::string(process, "kind").and_then(|kind| registry.find(kind));
     let built_in = kind.into_iter().flat_map(|kind| kind.outputs);
     let required = built_in.filter(|port| port.required).map(|port| port.name.to_owned());
     let topic = |port: String| {

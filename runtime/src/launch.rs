@@ -5,24 +5,22 @@ use crate::ctl::desk::Desk;
 use crate::ctl::protocol::{Answer, Request};
 use crate::ctl::server::Reply;
 use crate::descendants::Descendants;
+use crate::event::{Progress, RunEvent, StopToken};
+use crate::flight::Flight;
 use crate::graph::{Graph, successor_of};
 use crate::manifest::Manifest;
 use crate::outputs::Outputs;
 use crate::processes::{Processes, Role};
-use crate::profile::Flight;
 use crate::program::{OnExit, Readiness, Successor};
-use crate::progress::Progress;
 use crate::run_dir::RunDir;
 use crate::stall::{self, Culprit};
 use crate::succession::{Report, Stage, Standing, Successions, take_over_stride};
 use crate::supervisor::{Action, Event, State};
 use crate::watch_clock::WatchClock;
 use anyhow::{Context, Result, anyhow};
-use bus::control::{Control, Phase};
+use bus::control::{Control, Phase, monotonic_ns};
 use bus::plan::{NodePlan, Plan};
 use std::path::Path;
-use std::sync::atomic::{AtomicUsize, Ordering};
-use std::sync::{Arc, OnceLock};
 use std::time::Duration;
 
 /// How long the supervisor sleeps at most between two looks at its processes.
@@ -60,12 +58,20 @@ pub struct Outcome {
 /// # Errors
 /// If another run writes to one of its files, or a process fails, stalls, or cannot be started; the error holds its
 /// last words.
-pub fn fly(manifest: &Manifest, graph: &mut Graph, outputs: &mut Outputs, quiet: bool) -> Result<Outcome> {
-    let interrupts = count_interrupts()?;
+pub fn fly(
+    manifest: &Manifest,
+    graph: &mut Graph,
+    outputs: &mut Outputs,
+    stop: &StopToken,
+    on: &mut dyn FnMut(RunEvent<'_>),
+) -> Result<Outcome> {
     let run_dir = RunDir::create(&manifest.path)?;
     // Before anything is touched that an earlier run left.
     bus::room::require(&graph.plan)?;
     outputs.claim(&run_dir)?;
+    if let Some(kept) = outputs.kept() {
+        on(RunEvent::Note(&format!("what an earlier run left unfinished is kept as {}", kept.display())));
+    }
     prepare(manifest, graph, outputs.partial(), &run_dir)?;
     graph.plan.run_id = run_dir.run_id().to_owned();
     graph.plan.store(run_dir.path())?;
@@ -87,11 +93,11 @@ pub fn fly(manifest: &Manifest, graph: &mut Graph, outputs: &mut Outputs, quiet:
         desk: Desk::open(dir, plan, &control)?,
         swaps: Vec::new(),
         requests: 0,
-        interrupts,
-        seen_interrupts: 0,
+        stop,
+        seen_stops: 0,
         manifest,
         graph,
-        progress: Progress::new(plan, quiet),
+        on,
         last_change: (0, clock.now()),
         logs_bounded: clock.now(),
         run_dir: dir,
@@ -99,7 +105,7 @@ pub fn fly(manifest: &Manifest, graph: &mut Graph, outputs: &mut Outputs, quiet:
         reaped: clock.now(),
     };
     supervisor.fly()?;
-    supervisor.progress.finish(&control);
+    supervisor.tell_progress();
     let mut outcome = outcome(plan, &control, &supervisor.successions);
     outcome.successions = supervisor.successions.into_reports();
     if plan.profile {
@@ -123,27 +129,6 @@ fn answer(report: &Report) -> Answer {
         },
         (None, None) => Answer::refused("the run ended before the take-over"),
     }
-}
-
-/// Counts Ctrl-C and SIGTERM from now on instead of dying of them. All runs of a process share the count: one that
-/// is stopped lets no other begin.
-///
-/// # Errors
-/// If the signals cannot be handled.
-pub fn count_interrupts() -> Result<Arc<AtomicUsize>> {
-    static COUNT: OnceLock<Arc<AtomicUsize>> = OnceLock::new();
-    if let Some(count) = COUNT.get() {
-        return Ok(count.clone());
-    }
-    let count = Arc::new(AtomicUsize::new(0));
-    let seen = count.clone();
-    ctrlc::set_handler(move || {
-        seen.fetch_add(1, Ordering::SeqCst);
-    })
-    .context("cannot handle Ctrl-C")?;
-    // A run that a node of another run starts has them blocked.
-    bus::process::hear_stop_signals();
-    Ok(COUNT.get_or_init(|| count).clone())
 }
 
 /// Puts the files that recorders attach into the run directory and tells the recorders.
@@ -191,9 +176,9 @@ struct Supervisor<'a> {
     swaps: Vec<(u32, Reply)>,
     /// Requests so far.
     requests: u32,
-    interrupts: Arc<AtomicUsize>,
-    seen_interrupts: usize,
-    progress: Progress,
+    stop: &'a StopToken,
+    seen_stops: usize,
+    on: &'a mut dyn FnMut(RunEvent<'_>),
     /// How far the run had come when it last came on, and when that was on the watchdogs' clock.
     last_change: (u32, Duration),
     logs_bounded: Duration,
@@ -270,10 +255,25 @@ impl Supervisor<'_> {
             self.control.set_join_tick(self.hold_tick());
             self.note_laggards();
             self.note_stall()?;
-            self.progress.show(self.control);
+            self.tell_progress();
             self.control.await_notification(news, POLL);
         }
         Ok(())
+    }
+
+    fn say(&mut self, text: &str) {
+        (self.on)(RunEvent::Note(text));
+    }
+
+    fn tell_progress(&mut self) {
+        let (start_ns, _) = self.control.host_span_ns();
+        let host_ns = if start_ns > 0 { monotonic_ns().saturating_sub(start_ns) } else { 0 };
+        (self.on)(RunEvent::Progress(Progress {
+            ticks: self.control.completed_ticks(),
+            duration_ticks: self.plan.duration_ticks,
+            tick_s: self.plan.tick_s(),
+            host_s: host_ns as f64 * 1e-9,
+        }));
     }
 
     /// Takes note of the end of orphans, which would otherwise stay in the table of processes for the whole run.
@@ -385,8 +385,8 @@ impl Supervisor<'_> {
     }
 
     fn note_interrupts(&mut self) -> Result<()> {
-        let count = self.interrupts.load(Ordering::SeqCst);
-        let seen = std::mem::replace(&mut self.seen_interrupts, count);
+        let count = self.stop.count();
+        let seen = std::mem::replace(&mut self.seen_stops, count);
         for number in seen..count {
             let event = if number == 0 { Event::StopRequested } else { Event::Interrupted };
             if self.tell(event)? == Action::Abort {
@@ -455,11 +455,11 @@ impl Supervisor<'_> {
                         .abort(format!("{}\nThe run was aborted at tick {ticks}{why}", failure.words));
                 }
                 Action::Restart => {
-                    self.progress.say(&format!("{}\n`{}` is restarted", failure.words, failure.name));
+                    self.say(&format!("{}\n`{}` is restarted", failure.words, failure.name));
                     self.companions.restart(failure.index)?;
                 }
                 _ => {
-                    self.progress.say(&format!("{}\nThe run goes on without it", failure.words));
+                    self.say(&format!("{}\nThe run goes on without it", failure.words));
                     self.companions.forget(failure.index);
                 }
             }
@@ -535,16 +535,15 @@ impl Supervisor<'_> {
             && self.control.has_completed(self.plan.slot(node, generation))
     }
 
-    fn say_died_behind_the_end(&self, death: &Death) {
-        self.progress
-            .say(&format!("{}\nIt had completed its last tick: the run ends without it", death.words));
+    fn say_died_behind_the_end(&mut self, death: &Death) {
+        self.say(&format!("{}\nIt had completed its last tick: the run ends without it", death.words));
     }
 
     fn refuse(&mut self, node: usize, reason: String) -> Result<()> {
         let vacant = self.successions.is_vacant(node);
         if !vacant {
             let name = &self.plan.nodes[node].name;
-            self.progress.say(&format!("the successor of `{name}` was refused: {reason}\n`{name}` flies on"));
+            self.say(&format!("the successor of `{name}` was refused: {reason}\n`{name}` flies on"));
         }
         self.successions.refuse(node, reason.clone(), &mut self.processes)?;
         if vacant {
@@ -591,11 +590,11 @@ impl Supervisor<'_> {
                 if self.successions.stage(node).is_some() {
                     self.refuse(node, "the process it was to succeed died first".to_owned())?;
                 }
-                self.progress.say(&format!("{}\n`{}` is restarted at tick {tick}", death.words, death.name));
+                self.say(&format!("{}\n`{}` is restarted at tick {tick}", death.words, death.name));
                 self.successions.restart(node, &mut self.processes)?;
             }
             Action::Promote => {
-                self.progress.say(&format!(
+                self.say(&format!(
                     "{}\nThe standby of `{}` takes over at tick {tick}",
                     death.words, self.plan.nodes[node].name
                 ));

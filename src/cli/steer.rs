@@ -1,20 +1,11 @@
-//! `hummingbus ctl` and `hummingbus swap`: a live run is paused, stepped, paced and stopped from outside.
-//!
-//! - [`protocol`]: what can be asked of a run, and what it answers
-//! - [`server`]: the launcher's socket in the run directory
-//! - [`desk`]: what the launcher does with a request
-//! - [`client`]: the other end of the socket
+//! `hummingbus ctl` and `hummingbus swap`: a live run is steered from outside.
 
-pub mod client;
-pub mod desk;
-pub mod protocol;
-pub mod server;
-
-use crate::manifest::PaceSetting;
-use crate::run_dir::find_live;
 use anyhow::{Context, Result, bail};
 use clap::{Args, Subcommand};
-use protocol::{Answer, Request};
+use runtime::ctl::client;
+use runtime::ctl::protocol::{Answer, Request};
+use runtime::manifest::PaceSetting;
+use runtime::run_dir::find_live;
 use std::path::Path;
 
 /// The arguments of `hummingbus ctl`.
@@ -131,13 +122,13 @@ pub fn description(words: &str) -> Result<String> {
 fn ask(run_id: Option<&str>, request: &Request, json: bool) -> Result<()> {
     let answer = client::ask(&find_live(run_id)?, request)?;
     if json {
-        crate::output::print_text(&serde_json::to_string(&answer)?)?;
+        super::output::print_text(&serde_json::to_string(&answer)?)?;
     }
     match answer {
         Answer::Refused { reason } => bail!("{reason}"),
         _ if json => Ok(()),
-        Answer::Done { text, .. } => crate::output::print_text(&text),
-        Answer::Status(status) => crate::output::print_text(&status.to_string()),
+        Answer::Done { text, .. } => super::output::print_text(&text),
+        Answer::Status(status) => super::output::print_text(&status.to_string()),
     }
 }
 

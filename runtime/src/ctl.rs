@@ -1,0 +1,11 @@
+//! A live run is paused, stepped, paced, swapped and stopped from outside.
+//!
+//! - [`protocol`]: what can be asked of a run, and what it answers
+//! - [`server`]: the launcher's socket in the run directory
+//! - [`desk`]: what the launcher does with a request
+//! - [`client`]: the other end of the socket
+
+pub mod client;
+pub(crate) mod desk;
+pub mod protocol;
+pub(crate) mod server;

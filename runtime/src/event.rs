@@ -1,0 +1,58 @@
+//! What a launcher tells of a run while it flies, and how it is told to end it.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+/// What happens in a run, for whoever follows it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum RunEvent<'a> {
+    /// Something that the user should know while the run goes on, in words.
+    Note(&'a str),
+    /// How far the run has come; every few milliseconds.
+    Progress(Progress),
+}
+
+/// How far a run has come.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Progress {
+    /// Ticks that every node has completed.
+    pub ticks: u32,
+    /// Ticks of the whole run.
+    pub duration_ticks: u32,
+    /// Simulated time of a tick, in seconds.
+    pub tick_s: f64,
+    /// Host time since the first grant, in seconds; 0 before that.
+    pub host_s: f64,
+}
+
+/// Asks a run to stop, from any thread: the first time at the next tick boundary, the second time at once.
+///
+/// A token may be given to several runs, which all end then; one that was used lets no other begin.
+///
+/// ```
+/// let token = runtime::event::StopToken::new();
+/// let elsewhere = token.clone();
+/// std::thread::spawn(move || elsewhere.stop()).join().unwrap();
+/// assert_eq!(token.count(), 1);
+/// ```
+#[derive(Clone, Debug, Default)]
+pub struct StopToken(Arc<AtomicUsize>);
+
+impl StopToken {
+    /// A token that asks for nothing yet.
+    #[must_use]
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    /// Asks for a stop at the next tick boundary; if that was done before, for an end at once.
+    pub fn stop(&self) {
+        self.0.fetch_add(1, Ordering::SeqCst);
+    }
+
+    /// How often a stop was asked for.
+    #[must_use]
+    pub fn count(&self) -> usize {
+        self.0.load(Ordering::SeqCst)
+    }
+}

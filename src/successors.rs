@@ -1,0 +1,45 @@
+//! Successors that are asked for in flight, checked against a manifest of this package.
+
+use crate::COMPONENTS;
+use runtime::graph::{Graph, successor_of};
+use runtime::manifest::Manifest;
+use std::path::Path;
+
+fn hover() -> (Manifest, Graph) {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("manifests/hover.toml");
+    let manifest = Manifest::load(&path, &["run.duration_s=1".to_owned()], COMPONENTS).unwrap();
+    let graph = Graph::build(&manifest).unwrap();
+    (manifest, graph)
+}
+
+#[test]
+fn a_successor_in_a_live_run_differs_in_what_is_asked_for() {
+    let (manifest, graph) = hover();
+    let with = "parameters.gains.altitude_integral_max_m_s2 = 1.5";
+    let successor = successor_of(&manifest, &graph, "controller", with).unwrap();
+    let node = &graph.plan.nodes[successor.node];
+    assert_eq!(
+        (node.name.as_str(), successor.take_over_tick, successor.is_standby),
+        ("controller", None, false)
+    );
+    assert_eq!(successor.plan.parameters["gains"]["altitude_integral_max_m_s2"], 1.5);
+    assert_eq!(successor.plan.parameters["vehicle"], node.parameters["vehicle"]);
+    let topics = |plan: &bus::plan::NodePlan| plan.inputs.iter().map(|input| input.topic).collect::<Vec<_>>();
+    assert_eq!(topics(&successor.plan), topics(node));
+    assert_eq!(successor.plan.cpu, node.cpu);
+}
+
+#[test]
+fn a_successor_in_a_live_run_that_cannot_be_is_refused_with_its_place() {
+    let (manifest, graph) = hover();
+    let refused = |process: &str, with: &str| {
+        successor_of(&manifest, &graph, process, with).map(|_| ()).unwrap_err().to_string()
+    };
+    let words = refused("contorller", "");
+    assert!(words.starts_with("--with:1:1: there is no process `contorller`"), "{words}");
+    let words = refused("controller", "wait = \"spin\"\nknid = 3");
+    assert!(words.starts_with("--with:2:1: unknown field `knid`"), "{words}");
+    assert!(refused("controller", "parameters.gain = 3").contains("--with:1:12: process `controller`"));
+    assert!(refused("controller", "x = ").starts_with("--with:1:"));
+    assert!(refused("recorder", "").contains("its file would be torn"));
+}
