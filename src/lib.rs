@@ -8,24 +8,12 @@ pub mod check;
 pub mod cli;
 #[cfg(test)]
 mod extremes;
-mod identify;
-mod judge;
 mod kinds;
-mod page;
-mod plot;
-mod profile;
 #[cfg(test)]
 mod properties;
-mod shadow;
 #[cfg(test)]
 mod successors;
-mod summary;
-mod top;
-mod validate;
 
 pub use check::{Checked, check, check_text};
 pub use kinds::COMPONENTS;
 pub use runtime::problem::Problem;
-
-use cli::{files, output};
-use runtime::{ctl, manifest, output_file, outputs, problem, run_dir, succession};

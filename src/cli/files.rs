@@ -1,8 +1,12 @@
-//! Recordings that a command reads.
+//! Files that commands read and write.
 
 use anyhow::Result;
 use recorder::reader::Recording;
+use runtime::output_file::{Kind, Mark};
 use std::path::Path;
+
+/// A page, whatever it shows.
+pub const PAGE: Kind = Kind { name: "page", mark: Mark::Within(report::page::MARK.as_bytes()) };
 
 /// Opens a recording, or what is whole of one that was cut off, and then says so.
 pub fn open_recording(path: &Path) -> Result<Recording> {

@@ -1,22 +1,28 @@
 //! The command line: arguments, what is printed, exit codes.
 
-pub(crate) mod describe;
-pub(crate) mod files;
+mod describe;
+mod files;
+mod identify;
 mod inherited;
-pub(crate) mod interrupts;
-pub(crate) mod output;
+mod interrupts;
+mod output;
+mod plot;
+mod profile;
 mod progress;
 mod run;
 mod steer;
+mod top;
+mod validate;
 
-use crate::profile::Files;
-use crate::{COMPONENTS, identify, plot, shadow, top, validate};
+use crate::COMPONENTS;
 use anyhow::{Context, Result, bail};
 use bus::BusError;
 use clap::{Args, Parser, Subcommand};
 use files::open_recording;
 use output::{gone_or_failed, print_text, print_warnings, say, words};
+use profile::Files;
 use recorder::reader::Recording;
+use report::shadow;
 use run::RunArguments;
 use runtime::clean;
 use std::path::{Path, PathBuf};
@@ -156,7 +162,7 @@ pub fn main() -> ExitCode {
         Verb::Profile(ProfileArguments { run: arguments, trace, html }) => {
             run::run(&arguments, Some(Files { trace, html }), None)
         }
-        Verb::Shadow(arguments) => shadow(&arguments),
+        Verb::Shadow(arguments) => run_shadow(&arguments),
         Verb::Check(arguments) => check(&arguments),
         Verb::Diff { a, b } => diff(&a, &b),
         Verb::Cat { recording, topic } => cat(&recording, topic.as_deref()),
@@ -183,7 +189,7 @@ pub fn main() -> ExitCode {
 }
 
 /// Flies a manifest with a shadow more, or tells what the shadows of a recording did otherwise.
-fn shadow(arguments: &ShadowArguments) -> Result<bool> {
+fn run_shadow(arguments: &ShadowArguments) -> Result<bool> {
     let path = &arguments.run.manifest;
     match (&arguments.process, path.extension().is_some_and(|extension| extension == "mcap")) {
         (Some(process), false) => {

@@ -2,12 +2,14 @@
 
 use super::interrupts::stop_token;
 use super::output::{print_text, print_warnings, words};
+use super::profile::Files;
 use super::progress::Bar;
-use crate::profile::{Files, Profile};
-use crate::summary::{Judgement, Summary};
-use crate::{COMPONENTS, judge, shadow};
+use crate::COMPONENTS;
 use anyhow::{Context, Error, Result, anyhow, bail};
 use clap::Args;
+use report::profile::Profile;
+use report::summary::{Judgement, Summary};
+use report::{judge, shadow};
 use runtime::graph::{self, Graph, successor_of};
 use runtime::launch;
 use runtime::manifest::{Manifest, PaceSetting};

@@ -1,0 +1,76 @@
+//! What an identification predicts, flown on the bus.
+
+use crate::validate::Validation;
+use anyhow::Result;
+use flights::{Flight, FlightSet};
+use identify::report::{FlightReport, Report};
+use identify::run::Outcome;
+use identify::sensing::SensorErrors;
+use serde_json::{Value, json};
+use std::path::Path;
+
+/// A shorter flight holds none of the windows of a replay.
+const LEAST_REPLAY_S: f64 = 2.0;
+
+/// Flies the measured commands with the declared and the new vehicle on the bus, and compares what comes of it with the
+/// predictions of the report; `None` where no flight has what a replay needs.
+///
+/// # Errors
+/// As [`Validation::errors`].
+pub fn fly_again(
+    set: &FlightSet,
+    vehicle: &Path,
+    outcome: &Outcome,
+    how: &Validation<'_>,
+    tell: &mut dyn FnMut(&str),
+) -> Result<Option<Value>> {
+    let aligned = corrected(set, outcome, &SensorErrors::default());
+    let corrected = corrected(set, outcome, &outcome.sensor_errors);
+    if aligned.flights.is_empty() {
+        return Ok(None);
+    }
+    let before = how.errors(&[&set.vehicle], &aligned, tell)?;
+    let after = how.errors(&[vehicle], &corrected, tell)?;
+    let mut flights = json!({});
+    let mut furthest: Option<(f64, String)> = None;
+    for (before, after) in before.flights.iter().zip(&after.flights) {
+        for (before_at, after_at) in before.horizons.iter().zip(&after.horizons) {
+            for (old, new) in before_at.channels.iter().zip(&after_at.channels) {
+                let (old_rms, new_rms) = (old.rms[0], new.rms[0]);
+                let (horizon, channel) = (before_at.horizon(), old.quantity.name());
+                flights[&before.name][&horizon][channel] =
+                    json!({ "before": old_rms, "after": new_rms, "unit": old.quantity.unit() });
+                let own = predicted(&outcome.report, &before.name, &horizon, channel);
+                let away = own
+                    .map(|(before, after)| (old_rms / before - 1.0).abs().max((new_rms / after - 1.0).abs()));
+                let own = away.map(|away| (away, format!("{channel} after {horizon} s of {}", before.name)));
+                let all = furthest.into_iter().chain(own).filter(|own| own.0.is_finite());
+                furthest = all.max_by(|a, b| a.0.total_cmp(&b.0));
+            }
+        }
+    }
+    let (away, at) = furthest.unzip();
+    Ok(Some(json!({ "flights": flights, "furthest_from_prediction": away, "furthest_at": at })))
+}
+
+/// The report's own errors before and after.
+fn predicted(report: &Report, flight: &str, horizon: &str, channel: &str) -> Option<(f64, f64)> {
+    let own = report.held_out.get(flight).or_else(|| report.fitted.get(flight))?;
+    let change = own.get(horizon)?.get(channel)?;
+    Some((change.before, change.after))
+}
+
+/// The flights that can be replayed, without `errors` of their sensors and without what the alignment took off.
+fn corrected(set: &FlightSet, outcome: &Outcome, errors: &SensorErrors) -> FlightSet {
+    let flight = |flight: &Flight| {
+        errors.taken_off(flight, &outcome.late.get(&flight.name).copied().unwrap_or_default())
+    };
+    let can_fly = |flight: &&Flight| {
+        let was_used = |own: &FlightReport| own.name == flight.name && own.compared_s > LEAST_REPLAY_S;
+        !flight.command.is_empty()
+            && !flight.attitude.is_empty()
+            && outcome.report.flights.iter().any(was_used)
+    };
+    let flights = set.flights.iter().filter(can_fly).map(flight).collect();
+    FlightSet { vehicle: set.vehicle.clone(), flights }
+}

@@ -1,0 +1,294 @@
+// What flights show that the declared model lacks, and the residuals behind it.
+
+const report = data.report;
+
+// Distinguishable also without colour vision (Okabe and Ito).
+const COLOURS = { measured: "#8a8f94", before: "#e69f00", after: "#0072b2", noise: "#1a1a1a" };
+const NAMES = { before: "declared", after: "new" };
+const MODELS = Object.keys(NAMES);
+const CHANNELS = ["position", "velocity", "attitude", "rates"];
+
+const withUnit = (value, unit) => `${number(value)} ${shownUnit(unit)}`.trim();
+// Of 20 000 resampled flights not one may undo a gain.
+const chance = (value) => (value < 1e-4 ? "< 0.0001" : value.toFixed(4));
+
+function change(before, after) {
+  const percent = 100 * (after / before - 1);
+  if (!Number.isFinite(percent)) return "–";
+  const size = Math.abs(percent).toFixed(Math.abs(percent) < 10 ? 1 : 0);
+  const sign = Number(size) === 0 ? "" : percent > 0 ? "+" : "−";
+  return `${sign}${size} %`;
+}
+
+const addItem = (id, textContent) => add(element(id), "li", { textContent });
+
+const accepted = report.verdict.map((name) => [name, report.effects[name]]).filter(([, effect]) => effect);
+
+const doubt = ({ determined, at_bound }) => (!determined ? ", not determined by these flights" : at_bound ? ", at its bound" : "");
+
+const estimateText = (name, own) =>
+  `${words(name)} = ${withUnit(own.value, own.unit)} (95 %: ${number(own.low)} to ${number(own.high)}${doubt(own)})`;
+
+function verdictText() {
+  if (report.verdict.length) return `The flights ask for ${report.verdict.join(", ")}.`;
+  if (report.test_blocks < 12) {
+    return `Undecided: the flights to test on have ${report.test_blocks} blocks of ${report.block_s} s, and with less than a dozen nothing is beyond chance.`;
+  }
+  return "The flights ask for nothing: no effect makes the prediction of flights that nothing was fitted on better beyond chance.";
+}
+
+function drawSummary() {
+  title(`${report.vehicle.split(/[\\/]/).pop().replace(/\.toml$/, "")}: what flights show beyond the declared model`);
+  element("verdict").textContent = verdictText();
+  for (const [name, effect] of accepted) {
+    const estimates = Object.entries(effect.parameters).map(([parameter, own]) => estimateText(parameter, own));
+    const rivals = effect.confused_with.length ? `; cannot be told from ${effect.confused_with.join(", ")} here` : "";
+    addItem("findings", `${name}: ${estimates.join("; ")}${rivals}.`);
+  }
+  for (const fault of report.faults) addItem("findings", `Fault, ${fault.channel} (${fault.kind}): ${fault.finding}; ${fault.consequence}.`);
+  if (report.trims.length) addItem("findings", "The flights differ in trim; their mean torques were left out.");
+  for (const [name, { rms, before, unit }] of Object.entries(report.unexplained)) {
+    addItem("findings", `Unexplained, ${words(name)}: ${withUnit(rms, unit)} are neither noise nor any ` +
+      `effect's (${withUnit(before, unit)} with the declared model).`);
+  }
+  for (const { effect, needs } of report.not_identifiable) addItem("findings", `Cannot be seen here: ${effect}. It needs ${needs}.`);
+}
+
+function drawFlights() {
+  fillTable("flights", [left("flight"), left("used to"), "compared [s]", "windows [s]", left("equations")], report.flights.map((flight) =>
+    [left(flight.name), left(flight.role), flight.compared_s.toFixed(1), flight.window_s.toFixed(3), long(list(flight.equations.map(words)))]));
+  // What the reader noticed; what holds for several flights is said once.
+  const flightsOf = new Map();
+  for (const { name, assumed, notes } of report.flights) {
+    for (const note of [...assumed.map((own) => `assumed: ${own}`), ...notes]) flightsOf.set(note, [...(flightsOf.get(note) ?? []), name]);
+  }
+  for (const [note, names] of flightsOf) {
+    const of = names.length === report.flights.length && names.length > 1 ? "all flights" : names.join(", ");
+    addItem("notes", `${of}: ${note.replaceAll("`", "")}`);
+  }
+}
+
+// A table within a part of the page that is there only where the table has rows.
+function fillPart(id, headings, rows) {
+  element(`${id}-part`).hidden = !rows.length;
+  fillTable(id, headings, rows);
+}
+
+function drawClocks() {
+  const ms = (value) => number(1e3 * value);
+  const rows = (channels) => Object.entries(channels).filter(([, offset]) => offset).map(([channel, { value, low, high, taken_off }]) =>
+    [left(channel), ms(value), `${ms(low)} to ${ms(high)}`, ms(taken_off)]);
+  fillPart("clocks", [left("flight"), left("channel"), "late by [ms]", "95 % interval [ms]", "taken off [ms]"],
+    Object.entries(report.time_offsets_s).flatMap(([flight, channels]) => grouped(flight, rows(channels))));
+}
+
+function drawFaults() {
+  fillPart("faults", ["channel", "kind", "finding", "consequence"].map(left), report.faults.map((fault) =>
+    [left(fault.channel), left(fault.kind), long(fault.finding), long(fault.consequence)]));
+  fillPart("trims", [left("flight"), "roll", "pitch", "yaw"], report.trims.map((trim) => [left(trim.flight),
+    ...trim.angular_acceleration_rad_s2.map((own, axis) => `${number(own)} ± ${trim.deviation_rad_s2[axis].toPrecision(2)}`)]));
+}
+
+// One row per parameter; the effect stands in the first.
+function effectRows([name, effect]) {
+  const { before, after } = effect.held_out;
+  const figures = [number(before), number(after), change(before, after), chance(effect.chance), long(list(effect.confused_with))];
+  const judged = effect.accepted ? "yes" : effect.linearised ? "no, linearised" : "no";
+  const rows = Object.entries(effect.parameters).map(([parameter, { value, unit, low, high }], index) => {
+    const label = left([words(parameter), shownUnit(unit) && `[${shownUnit(unit)}]`].join(" "));
+    return [left(index ? "" : judged), label, number(value), `${number(low)} to ${number(high)}`, ...(index ? [] : figures)];
+  });
+  if (effect.experiment) rows.push([left(""), long(`To tell it from ${effect.confused_with[0]}: ${effect.experiment}.`, 8)]);
+  return grouped(name, rows).map(({ cells, className }) => ({ cells, className: effect.accepted ? className : `${className} left-out` }));
+}
+
+function drawEffects() {
+  const others = Object.entries(report.effects).filter(([, effect]) => !effect.accepted);
+  others.sort(([, a], [, b]) => a.held_out.after / a.held_out.before - b.held_out.after / b.held_out.before);
+  fillTable("effects", [left("effect"), left("accepted"), left("parameter"), "estimate", "95 % interval",
+    "without", "with", "change", "chance", left("cannot be told from")], [...accepted, ...others].flatMap(effectRows));
+}
+
+const horizons = (flights) => [...new Set(Object.values(flights).flatMap(Object.keys))].sort((a, b) => a - b);
+const floorOf = (channel, horizon) => report.noise_floor[channel]?.prediction[horizon];
+
+function fillErrors(id, flights) {
+  const rows = (flight, own) => horizons({ own }).flatMap((horizon) => CHANNELS.filter((name) => own[horizon][name]).map((channel) => {
+    const { before, after, unit } = own[horizon][channel];
+    const flown = data.bus?.flights[flight]?.[horizon]?.[channel];
+    return [horizon, left(channel), number(before), number(after), left(shownUnit(unit)), change(before, after),
+      number(floorOf(channel, horizon)), ...(data.bus ? [number(flown?.before), number(flown?.after)] : [])];
+  }));
+  const onBus = data.bus ? ["declared, on the bus", "new, on the bus"] : [];
+  fillTable(id, [left("flight"), "horizon [s]", left("channel"), "declared", "new", left("unit"), "change", "by noise alone", ...onBus],
+    Object.entries(flights).flatMap(([flight, own]) => grouped(flight, rows(flight, own))));
+}
+
+// The errors of one channel at one horizon, flight by flight; a line where noise alone would put them.
+function drawBars(channel, horizon, rows) {
+  const unit = shownUnit(rows[0][1][horizon][channel].unit);
+  const bars = MODELS.map((model) => ({
+    type: "bar", name: NAMES[model], marker: { color: COLOURS[model] },
+    x: rows.map(([flight]) => flight), y: rows.map(([, own]) => own[horizon][channel][model]),
+    // Beside a great error a small one is no bar to be seen.
+    text: rows.map(([, own]) => number(own[horizon][channel][model], 3)), textposition: "outside", cliponaxis: false,
+    hovertemplate: `%{x}<br>${NAMES[model]}: %{y:.4~g} ${unit}<extra></extra>`,
+  }));
+  const floor = floorOf(channel, horizon);
+  addPlot("errors", "small", bars, layout(`${channel} after ${horizon} s`, "", unit, {
+    xaxis: { tickangle: 0, showticklabels: rows.length < 5 }, yaxis: { rangemode: "tozero", nticks: 5 }, bargap: 0.3,
+    shapes: floor === undefined ? [] : [level(floor, { color: COLOURS.noise, width: 1.5, dash: "dot" })],
+  }), SMALL);
+}
+
+function drawErrors() {
+  addLegend("errors-legend", [[COLOURS.before, "declared"], [COLOURS.after, "new"], [COLOURS.noise, "what noise alone makes (dotted)"]]);
+  for (const channel of CHANNELS) {
+    for (const horizon of horizons(report.held_out)) {
+      const rows = Object.entries(report.held_out).filter(([, own]) => own[horizon]?.[channel]);
+      if (rows.length) drawBars(channel, horizon, rows);
+    }
+  }
+  fillErrors("held-out", report.held_out);
+  fillErrors("fitted", report.fitted);
+}
+
+function drawNoise() {
+  const ahead = horizons(report.held_out);
+  const units = Object.fromEntries(Object.values(report.held_out).flatMap(Object.values).flatMap(Object.entries).map(([channel, own]) => [channel, own.unit]));
+  fillTable("noise", [left("channel"), "deviation", left("unit"), ...ahead.map((horizon) => `error after ${horizon} s`), left("unit")],
+    Object.entries(report.noise_floor).map(([channel, { value, unit, prediction }]) =>
+      [left(words(channel)), number(value), left(shownUnit(unit)), ...ahead.map((horizon) => number(prediction[horizon])), left(shownUnit(units[channel] ?? ""))]));
+}
+
+function drawWhiteness() {
+  const cells = (model, { rms, persistent, unit, beyond_bound, p_value }) =>
+    [left(NAMES[model]), number(rms), number(persistent), left(shownUnit(unit)), `${(100 * beyond_bound).toFixed(0)} %`, chance(p_value)];
+  fillTable("whiteness", [left("equation"), left("model"), "RMS", "common to neighbours", left("unit"), "beyond bound", "p"],
+    Object.keys(report.whiteness.before).flatMap((name) =>
+      grouped(words(name), MODELS.map((model) => cells(model, report.whiteness[model][name])))));
+}
+
+// What is chosen: a flight, an equation of it, a component of that, and what it is looked at against.
+function chosen() {
+  const flight = data.flights[element("flight").value];
+  const equation = flight.equations[element("equation").value];
+  const component = equation.components[element("component").value];
+  const measured = { name: `measured ${equation.name}`, unit: equation.unit, cloud: component.cloud.measured };
+  const inputs = [measured, ...flight.inputs];
+  const at = Math.min(element("input").value, inputs.length - 1);
+  const windowS = report.flights.find((own) => own.name === flight.name).window_s;
+  return { equation, component, unit: shownUnit(equation.unit), input: inputs[at], cross: component.cross[at], windowS };
+}
+
+const redraw = (id, traces, ...axes) => Plotly.react(id, traces, layout(...axes), CONFIG);
+
+// The curve with nothing between two points that have a gap between them.
+const broken = (values, breaks) => values.flatMap((value, at) => (breaks.includes(at) ? [null, value] : [value]));
+
+function line(curve, key, values, width) {
+  const [x, y] = [curve.time, values].map((own) => broken(own, curve.breaks));
+  return { mode: "lines", name: NAMES[key] ?? key, x, y, line: { color: COLOURS[key], width }, hovertemplate: "%{x:.3f} s: %{y:.4~g}" };
+}
+
+function cloud(x, y, key, hovertemplate) {
+  return { mode: "markers", name: NAMES[key], x, y, marker: { color: COLOURS[key], size: 4, opacity: 0.5 }, hovertemplate };
+}
+
+// What a model says: the measured less its residual.
+const predicted = (own, model) => own.measured.map((value, at) => value - own[model][at]);
+
+function drawOverTime({ equation, component: { name, curve }, unit }) {
+  const label = `${equation.name}, ${name}`;
+  const residuals = MODELS.map((model) => line(curve, model, curve[model], 1.2));
+  redraw("residual", residuals, `Residual: ${label}`, "time in s", unit);
+  const sides = [line(curve, "measured", curve.measured, 3), ...MODELS.map((model) => line(curve, model, predicted(curve, model), 1.2))];
+  redraw("sides", sides, `Measured and model: ${label}`, "time in s", unit);
+}
+
+function drawClouds({ component: { cloud: own }, unit, input }) {
+  const against = MODELS.map((model) => cloud(input.cloud, own[model], model, "%{x:.4~g}: %{y:.4~g}"));
+  redraw("against", against, "Residual against an input", `${input.name} in ${shownUnit(input.unit)}`, `residual in ${unit}`);
+  const agreement = MODELS.map((model) => cloud(predicted(own, model), own.measured, model, "model %{x:.4~g}, measured %{y:.4~g}"));
+  const same = { mode: "lines", x: ends(own.measured), y: ends(own.measured), line: { color: COLOURS.noise, width: 1 }, hoverinfo: "skip" };
+  redraw("agreement", [same, ...agreement], "Measured against model", `model in ${unit}`, `measured in ${unit}`);
+}
+
+function boundLines(bounds) {
+  const grey = "#555";
+  const shapes = Object.entries(bounds).flatMap(([share, bound]) =>
+    [bound, -bound].map((y) => level(y, { color: grey, width: 1, dash: share === "95" ? "dash" : "dot" })));
+  // Within and beyond, since the two bounds are close to each other.
+  const annotations = Object.entries(bounds).map(([share, y]) => ({
+    text: `${share} %`, xref: "paper", x: 1, xanchor: "right", y, yanchor: share === "95" ? "top" : "bottom", showarrow: false, font: { size: 10, color: grey },
+  }));
+  return { shapes, annotations };
+}
+
+function drawCorrelation(id, text, x, values, bounds) {
+  const traces = MODELS.map((model) => ({
+    mode: "lines+markers", name: NAMES[model], x, y: values[model], line: { color: COLOURS[model], width: 1.5 }, marker: { size: 4 },
+    hovertemplate: "%{x:.3~g} s: %{y:.3f}",
+  }));
+  redraw(id, traces, text, "lag in s", "correlation", boundLines(bounds));
+}
+
+// At lag zero every residual agrees with itself.
+const beyondZero = (auto) => Object.fromEntries(MODELS.map((model) => [model, auto[model].slice(1)]));
+
+function drawCorrelations({ component: { auto, bounds }, input, cross, windowS }) {
+  const beyond = beyondZero(auto);
+  const count = beyond.before.length;
+  drawCorrelation("auto", "Autocorrelation of the residual", beyond.before.map((_, at) => (at + 1) * windowS), beyond, bounds);
+  const lags = cross.before.map((_, at) => (at - count) * windowS);
+  drawCorrelation("cross", `Correlation of the residual with ${input.name}`, lags, cross, bounds);
+}
+
+function describe({ component: { rms, auto, bounds }, unit, windowS }) {
+  const [before, after] = MODELS.map((model) => beyondZero(auto)[model].filter((own) => Math.abs(own) > bounds["99"]).length);
+  element("size").textContent = `RMS ${number(rms[0])} ${unit} with the declared model, ${number(rms[1])} ${unit} with the new one ` +
+    `(${change(...rms)}). Autocorrelations beyond the 99 % bound: ${before} and ${after} of ${auto.before.length - 1}, ` +
+    `in windows of ${windowS.toFixed(3)} s.`;
+}
+
+function draw() {
+  const choice = chosen();
+  for (const part of [describe, drawOverTime, drawClouds, drawCorrelations]) part(choice);
+}
+
+const named = (things) => things.map(({ name }) => name);
+
+function offerEquations() {
+  offer("equation", named(data.flights[element("flight").value].equations));
+  offerComponents();
+}
+
+function offerComponents() {
+  const flight = data.flights[element("flight").value];
+  offer("component", named(flight.equations[element("equation").value].components));
+  offer("input", ["measured", ...named(flight.inputs)]);
+}
+
+// The component of a held-out flight that the new model makes smaller than any other: what the report is about.
+function chooseTelling() {
+  const all = data.flights.flatMap((flight, f) => flight.equations.flatMap((equation, e) =>
+    equation.components.map(({ rms: [before, after] }, c) => ({ at: [f, e, c], isTest: flight.role === "test", left: before > 0 ? after / before : 1 }))));
+  const [{ at: [flight, equation, component] }] = all.sort((a, b) => b.isTest - a.isTest || a.left - b.left);
+  element("flight").value = flight;
+  offerEquations();
+  element("equation").value = equation;
+  offerComponents();
+  element("component").value = component;
+}
+
+function drawResiduals() {
+  addLegend("legend", [[COLOURS.before, "declared"], [COLOURS.after, "new"], [COLOURS.measured, "measured"]]);
+  offer("flight", data.flights.map((flight) => `${flight.name} (${flight.role})`));
+  chooseTelling();
+  const changed = { flight: offerEquations, equation: offerComponents, component: () => {}, input: () => {} };
+  for (const [id, follow] of Object.entries(changed)) element(id).addEventListener("change", () => { follow(); draw(); });
+  draw();
+  zoomTogether(["residual", "sides"].map(element));
+}
+
+for (const part of [drawSummary, drawFlights, drawClocks, drawFaults, drawEffects, drawErrors, drawNoise, drawWhiteness, drawResiduals]) part();

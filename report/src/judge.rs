@@ -1,0 +1,287 @@
+//! The judgement of a run: its pass conditions and comparisons, evaluated on the recording.
+
+use crate::states::{FIELDS_OF_POSE, tracks};
+use anyhow::{Result, bail};
+use flights::state::{StateQuantity, WindowEndErrors};
+use recorder::reader::Recording;
+use recorder::series::Series;
+use runtime::manifest::{Comparison, Content, PassCondition, Statistic};
+use runtime::units::conversion;
+use serde::Serialize;
+
+/// A pass condition and how it came out.
+#[derive(Debug, Serialize)]
+pub struct Verdict {
+    /// What the condition means.
+    pub name: String,
+    /// The values compared with the limits: one, or the smallest and the largest.
+    pub values: Vec<f64>,
+    /// Their unit.
+    pub unit: String,
+    /// Lower limit.
+    pub min: Option<f64>,
+    /// Upper limit.
+    pub max: Option<f64>,
+    /// Whether it held.
+    pub passed: bool,
+}
+
+/// RMS errors of a simulated state at the ends of windows.
+#[derive(Debug, Serialize)]
+pub struct WindowErrors {
+    /// Topic of the simulated state.
+    pub simulated: String,
+    /// Length of the windows.
+    pub window_s: f64,
+    /// Windows compared.
+    pub windows: usize,
+    /// RMS length of the position error.
+    pub position_rms_m: f64,
+    /// RMS length of the velocity error.
+    pub velocity_rms_m_s: f64,
+    /// RMS angle of the attitude error.
+    pub attitude_rms_deg: f64,
+    /// Whether all limits held.
+    pub passed: bool,
+}
+
+/// Evaluates the pass conditions of `content` on `recording`.
+///
+/// # Errors
+/// If a topic or field is not in the recording, or a unit does not fit.
+pub fn verdicts(content: &Content, recording: &Recording) -> Result<Vec<Verdict>> {
+    let conditions = || content.pass.iter().map(toml::Spanned::get_ref);
+    let wanted: Vec<_> = conditions().map(|pass| wanted(pass, recording)).collect::<Result<_>>()?;
+    let fields: Vec<_> =
+        wanted.iter().flatten().map(|(topic, field)| (topic.as_str(), field.as_str())).collect();
+    if fields.is_empty() {
+        return Ok(Vec::new());
+    }
+    let mut series = recording.series(&fields)?.into_iter();
+    conditions()
+        .zip(&wanted)
+        .map(|(pass, wanted)| {
+            let own: Vec<Series> = series.by_ref().take(wanted.len()).collect();
+            verdict(pass, &own)
+        })
+        .collect()
+}
+
+/// The parts of a vector field; of any other, the field itself.
+fn parts(topic: &str, field: &str, recording: &Recording) -> Result<Vec<(String, String)>> {
+    let is_field = recording.unit_of(topic, field)?.is_some();
+    let name =
+        |axis: &str| (topic.to_owned(), if is_field { field.to_owned() } else { format!("{field}.{axis}") });
+    Ok(if is_field { vec![name("")] } else { ["x", "y", "z"].map(name).to_vec() })
+}
+
+/// All series that a condition needs: the judged field's parts, those that are taken off, the gate's.
+fn wanted(pass: &PassCondition, recording: &Recording) -> Result<Vec<(String, String)>> {
+    let mut wanted = parts(&pass.topic, &pass.field, recording)?;
+    if let Some(minus) = &pass.minus {
+        let other = parts(&minus.topic, &minus.field, recording)?;
+        if other.len() != wanted.len() {
+            bail!(
+                "pass condition `{}`: `minus` takes a vector off a number, or a number off a vector",
+                pass.name
+            );
+        }
+        wanted.extend(other);
+    }
+    if let Some(gate) = &pass.gate {
+        wanted.push((gate.topic.clone(), gate.field.clone()));
+    }
+    Ok(wanted)
+}
+
+fn verdict(pass: &PassCondition, series: &[Series]) -> Result<Verdict> {
+    let (gate, signals) = match &pass.gate {
+        Some(gate) => series.split_last().map_or((None, series), |(last, rest)| (Some((gate, last)), rest)),
+        None => (None, series),
+    };
+    let (judged, taken) =
+        signals.split_at(if pass.minus.is_some() { signals.len() / 2 } else { signals.len() });
+    let factor = match conversion(&judged[0].unit, &pass.unit) {
+        Ok(factor) => factor,
+        Err(error) => bail!("pass condition `{}`: {error}", pass.name),
+    };
+    let is_open = |time_ns: u64| {
+        gate.is_none_or(|(gate, series)| {
+            held(series, time_ns).is_some_and(|value| within(value, gate.min, gate.max))
+        })
+    };
+    let samples = span(&judged[0], pass.from_s, pass.to_s)
+        .filter(|(_, time_ns)| is_open(*time_ns))
+        .filter_map(|(index, time_ns)| difference(judged, taken, index, time_ns))
+        .map(|value| value * factor);
+    let values = statistic(pass.statistic, samples);
+    // A span without samples fails: what was never measured did not pass.
+    let passed = !values.is_empty() && values.iter().all(|value| within(*value, pass.min, pass.max));
+    Ok(Verdict {
+        name: pass.name.clone(),
+        values,
+        unit: pass.unit.clone(),
+        min: pass.min,
+        max: pass.max,
+        passed,
+    })
+}
+
+/// Whether `value` is a number between the limits that there are.
+fn within(value: f64, min: Option<f64>, max: Option<f64>) -> bool {
+    !value.is_nan() && min.is_none_or(|min| value >= min) && max.is_none_or(|max| value <= max)
+}
+
+/// The judged value of sample `index`: a number less what is taken off, or the length of such a vector; none before
+/// the first sample of what is taken off.
+fn difference(judged: &[Series], taken: &[Series], index: usize, time_ns: u64) -> Option<f64> {
+    let part = |part: usize| {
+        let off = taken.get(part).map_or(Some(0.0), |series| held(series, time_ns))?;
+        Some(judged[part].value[index] - off)
+    };
+    if judged.len() == 1 {
+        return part(0);
+    }
+    let squares = (0..judged.len()).map(|index| part(index).map(|value| value * value));
+    squares.sum::<Option<f64>>().map(f64::sqrt)
+}
+
+/// The newest value at `time_ns`.
+fn held(series: &Series, time_ns: u64) -> Option<f64> {
+    let count = series.time_ns.partition_point(|time| *time <= time_ns);
+    series.value.get(count.checked_sub(1)?).copied()
+}
+
+/// Index and time of the samples within a span.
+fn span(series: &Series, from_s: f64, to_s: Option<f64>) -> impl Iterator<Item = (usize, u64)> {
+    series.time_ns.iter().copied().enumerate().filter(move |(_, time_ns)| {
+        // Half a nanosecond of slack: limits in seconds are not exact in binary.
+        let time_s = *time_ns as f64 * 1e-9;
+        time_s >= from_s - 5e-10 && to_s.is_none_or(|to_s| time_s <= to_s + 5e-10)
+    })
+}
+
+fn statistic(statistic: Statistic, samples: impl Iterator<Item = f64>) -> Vec<f64> {
+    let samples: Vec<f64> = samples.collect();
+    if samples.is_empty() {
+        return Vec::new();
+    }
+    let count = samples.len() as f64;
+    // NaN must fail a condition, so it wins over every number here, unlike with f64::min.
+    let extreme = |pick: fn(f64, f64) -> f64| {
+        samples.iter().copied().reduce(|a, b| if a.is_nan() || b.is_nan() { f64::NAN } else { pick(a, b) })
+    };
+    let (smallest, largest) = (extreme(f64::min), extreme(f64::max));
+    match statistic {
+        Statistic::Every => smallest.into_iter().chain(largest).collect(),
+        Statistic::Min => smallest.into_iter().collect(),
+        Statistic::Max => largest.into_iter().collect(),
+        Statistic::Mean => vec![samples.iter().sum::<f64>() / count],
+        Statistic::Rms => vec![(samples.iter().map(|x| x * x).sum::<f64>() / count).sqrt()],
+        Statistic::Last => samples.last().copied().into_iter().collect(),
+    }
+}
+
+/// Evaluates the comparisons of `content` on `recording`.
+///
+/// # Errors
+/// If a topic is not in the recording or holds no state.
+pub fn window_errors(content: &Content, recording: &Recording) -> Result<Vec<WindowErrors>> {
+    content.compare.iter().map(|compare| compare_states(compare.get_ref(), recording)).collect()
+}
+
+fn compare_states(compare: &Comparison, recording: &Recording) -> Result<WindowErrors> {
+    let topics = [compare.simulated.as_str(), compare.measured.as_str()];
+    let tracks = tracks(recording, &topics, FIELDS_OF_POSE)?;
+    let [simulated, measured] = &tracks[..] else { unreachable!("a track for each topic") };
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a positive time of a run")]
+    let window_ns = (compare.window_s * 1e9).round() as u64;
+    let is_end = |time_ns: &&u64| **time_ns > 0 && window_ns > 0 && time_ns.is_multiple_of(window_ns);
+    let mut errors = WindowEndErrors::default();
+    for &time_ns in simulated.time_ns().iter().filter(is_end) {
+        if let (Some(simulated), Some(measured)) = (simulated.at(time_ns), measured.at(time_ns)) {
+            errors.add(&simulated, &measured);
+        }
+    }
+    if errors.windows() == 0 {
+        bail!(
+            "{} and {} have no common sample at the end of a window of {} s",
+            compare.simulated,
+            compare.measured,
+            compare.window_s
+        );
+    }
+    let [position_rms_m, velocity_rms_m_s, attitude_rms_deg, _] =
+        StateQuantity::ALL.map(|quantity| errors.rms(quantity));
+    let holds = |value: f64, max: Option<f64>| max.is_none_or(|max| value <= max);
+    let passed = holds(position_rms_m, compare.max_position_m)
+        && holds(velocity_rms_m_s, compare.max_velocity_m_s)
+        && holds(attitude_rms_deg, compare.max_attitude_deg);
+    Ok(WindowErrors {
+        simulated: compare.simulated.clone(),
+        window_s: compare.window_s,
+        windows: errors.windows() as usize,
+        position_rms_m,
+        velocity_rms_m_s,
+        attitude_rms_deg,
+        passed,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{conversion, statistic, verdict};
+    use recorder::series::Series;
+    use runtime::manifest::{PassCondition, Statistic};
+
+    /// A series with a sample each second.
+    fn series(unit: &str, value: &[f64]) -> Series {
+        let time_ns = (0..value.len() as u64).map(|second| second * 1_000_000_000).collect();
+        Series { time_ns, value: value.to_vec(), unit: unit.to_owned() }
+    }
+
+    fn condition(more: &str) -> PassCondition {
+        let text = format!(
+            "name = \"c\"\ntopic = \"/a\"\nfield = \"p\"\nunit = \"m\"\nstatistic = \"every\"\nmin = 0.0\n{more}"
+        );
+        toml::from_str(&text).unwrap()
+    }
+
+    #[test]
+    fn a_vector_less_another_is_judged_by_its_length() {
+        let minus = condition("minus = { topic = \"/b\", field = \"p\" }");
+        let axes = [[1.0, 4.0], [0.0, 1.0], [0.0, 0.0], [1.0, 1.0], [0.0, -3.0], [0.0, 0.0]];
+        let verdict = verdict(&minus, &axes.map(|values| series("m", &values))).unwrap();
+        assert_eq!(verdict.values, [0.0, 5.0]);
+    }
+
+    #[test]
+    fn only_samples_while_the_gate_is_open_count() {
+        let gated = condition("while = { topic = \"/g\", field = \"s\", min = 1, max = 2 }");
+        let judged = series("m", &[7.0, 8.0, 9.0, 10.0]);
+        // The gate's last sample holds for the judged ones after it.
+        let verdict = verdict(&gated, &[judged, series("1", &[0.0, 1.0, 2.0])]).unwrap();
+        assert_eq!(verdict.values, [8.0, 10.0]);
+        assert!(verdict.passed);
+    }
+
+    #[test]
+    fn a_gate_that_never_opens_fails() {
+        let gated = condition("while = { topic = \"/g\", field = \"s\", min = 1 }");
+        assert!(!verdict(&gated, &[series("m", &[1.0]), series("1", &[0.0])]).unwrap().passed);
+    }
+
+    #[test]
+    fn units_of_one_quantity_convert() {
+        assert!((conversion("rad", "deg").unwrap() - 180.0 / std::f64::consts::PI).abs() < 1e-12);
+        assert!(conversion("m", "deg").unwrap_err().contains("expected m or cm or mm"));
+        assert_eq!(conversion("foo", "foo"), Ok(1.0));
+    }
+
+    #[test]
+    fn a_nan_among_the_samples_is_not_hidden() {
+        assert!(statistic(Statistic::Max, [1.0, f64::NAN, 2.0].into_iter())[0].is_nan());
+        assert_eq!(statistic(Statistic::Every, [3.0, 1.0].into_iter()), [1.0, 3.0]);
+        assert!(statistic(Statistic::Every, std::iter::empty()).is_empty());
+    }
+}

@@ -1,0 +1,136 @@
+// Curves over time, and paths in space.
+
+const SPACE = config(["toImage", "zoom3d", "pan3d", "orbitRotation", "tableRotation", "resetCameraDefault3d"]);
+const SOLID = "#787878";
+// The faces of a box as triangles of its corners.
+const FACES = [[0, 1, 5, 4], [1, 2, 6, 5], [2, 3, 7, 6], [3, 0, 4, 7], [4, 5, 6, 7], [0, 3, 2, 1]]
+  .flatMap(([a, b, c, d]) => [[a, b, c], [a, c, d]]);
+// Which line lies upon which: an estimator's noise must not hide what was flown, nor this what was asked for.
+const LAYERS = { estimated: 1, measured: 1, flown: 2, asked: 3 };
+const LEGEND = { x: 1.01, y: 1, font: { size: 12 }, itemwidth: 30 };
+// So wide that the longest name has room, and the same for all plots: their axes of time are then as long.
+const LEGEND_WIDTH = 7 * Math.max(12, ...data.panels.flatMap((panel) => panel.axes).flatMap((axes) => axes.curves)
+  .map((curve) => curve.name.length)) + 60;
+
+const trails = [...data.trails].sort((a, b) => LAYERS[a.role] - LAYERS[b.role]);
+const column = (rows, index) => rows.map((row) => row[index]);
+
+// What is beside the flown line is darker, to be told from it.
+function darker(colour) {
+  const parts = [1, 3, 5].map((at) => Math.floor(parseInt(colour.slice(at, at + 2), 16) / 2));
+  return `rgb(${parts.join(",")})`;
+}
+
+function look({ role, colour }) {
+  if (role === "flown") return { color: colour, width: 2 };
+  return { color: darker(colour), width: 1.2, dash: role === "asked" ? "dash" : "solid" };
+}
+
+function drawAxes(axes) {
+  const traces = axes.curves.map((curve) => ({
+    mode: "lines", name: curve.name, x: curve.x, y: curve.y, line: look(curve), zorder: LAYERS[curve.role],
+    hovertemplate: `%{x:.3f} s: %{y:.5~g} ${axes.unit}<br>${curve.topic} ${curve.field}<extra>${curve.name}</extra>`,
+  }));
+  return addPlot("time", "wide", traces, layout(axes.title, data.time_label, `${axes.label} [${axes.unit}]`, {
+    // A copy: plotly.js changes the one that it is given.
+    xaxis: { range: [...data.span_s], zeroline: false }, yaxis: { zeroline: false, automargin: false },
+    margin: { l: 76, r: LEGEND_WIDTH, t: 36, b: 44, autoexpand: false }, legend: LEGEND, showlegend: true,
+  }), CONFIG);
+}
+
+async function drawPanel(panel) {
+  for (const plot of element("time").children) Plotly.purge(plot);
+  element("time").replaceChildren();
+  zoomTogether(await Promise.all(panel.axes.map(drawAxes)));
+}
+
+function offerVehicles() {
+  offer("vehicle", data.panels.map((panel) => panel.vehicle));
+  element("choice").hidden = data.panels.length < 2;
+  element("vehicle").addEventListener("change", () => drawPanel(data.panels[element("vehicle").value]));
+}
+
+function hasWebGl() {
+  const canvas = document.createElement("canvas");
+  return Boolean(canvas.getContext("webgl2") ?? canvas.getContext("webgl"));
+}
+
+function solidTraces(solid) {
+  const [x, y, z] = [0, 1, 2].map((axis) => column(solid.corners, axis));
+  const [i, j, k] = [0, 1, 2].map((corner) => column(FACES, corner));
+  const along = (axis) => data.edges.flatMap(([a, b]) => [solid.corners[a][axis], solid.corners[b][axis], null]);
+  return [
+    { type: "mesh3d", name: solid.name, x, y, z, i, j, k, color: SOLID, opacity: 0.15, flatshading: true, hoverinfo: "name" },
+    { type: "scatter3d", mode: "lines", name: `${solid.name} edges`, x: along(0), y: along(1), z: along(2), line: { color: SOLID, width: 2 }, showlegend: false, hoverinfo: "skip" },
+  ];
+}
+
+// A path and its start; lines in space look half as wide.
+function trailTraces(type, trail, points) {
+  const [line, size, widen] = [look(trail), ...(type === "scatter3d" ? [4, 2] : [8, 1])];
+  const first = Object.fromEntries(Object.entries(points).map(([axis, values]) => [axis, values.slice(0, 1)]));
+  return [
+    { type, mode: "lines", name: trail.name, ...points, line: { ...line, width: widen * line.width } },
+    { type, mode: "markers", name: `start of ${trail.name}`, showlegend: false, ...first, marker: { color: line.color, size } },
+  ];
+}
+
+function ground() {
+  const corners = data.solids.flatMap((solid) => solid.corners);
+  const [[left, right], [near, far]] = ["x", "y"].map((axis, index) => {
+    const [low, high] = ends([...data.trails.flatMap((trail) => trail[axis]), ...column(corners, index)]);
+    return [low - 0.5, high + 0.5];
+  });
+  return {
+    type: "mesh3d", name: "ground", x: [left, right, right, left], y: [near, near, far, far], z: [0, 0, 0, 0],
+    i: [0, 0], j: [1, 2], k: [2, 3], color: "#c8d8c0", opacity: 0.5, hoverinfo: "skip",
+  };
+}
+
+function drawPath() {
+  const paths = trails.flatMap(({ x, y, z, ...trail }) => trailTraces("scatter3d", trail, { x, y, z }));
+  const axis = (name) => ({ title: { text: `${name} [m]` }, exponentformat: "none", backgroundcolor: "#fff", gridcolor: "#ddd" });
+  const camera = { eye: { x: 1.0, y: -1.8, z: 1.0 }, center: { x: 0, y: 0, z: -0.2 } };
+  return Plotly.newPlot("path", [ground(), ...data.solids.flatMap(solidTraces), ...paths], {
+    scene: { xaxis: axis("x"), yaxis: axis("y"), zaxis: axis("z"), aspectmode: "data", camera },
+    margin: { l: 0, r: 0, t: 40, b: 0 }, legend: LEGEND, showlegend: true,
+  }, SPACE);
+}
+
+function drawFlat(id, text, up) {
+  const outlines = data.solids.map((solid) => ({
+    type: "scatter", mode: "lines", fill: "toself", fillcolor: "rgba(120,120,120,0.3)", line: { color: SOLID, width: 1 },
+    name: solid.name, hoverinfo: "name", x: column(solid[id], 0), y: column(solid[id], 1),
+  }));
+  const paths = trails.flatMap((trail) => trailTraces("scatter", trail, { x: trail.x, y: trail[up] }));
+  const axes = { xaxis: { zeroline: false }, yaxis: { zeroline: false, scaleanchor: "x", scaleratio: 1 } };
+  return Plotly.newPlot(id, [...outlines, ...paths], layout(text, "x [m]", `${up} [m]`, axes), CONFIG);
+}
+
+const VIEWS = { path: drawPath, top: () => drawFlat("top", "From above", "y"), side: () => drawFlat("side", "From the side", "z") };
+
+function drawSpace() {
+  let shown = Object.keys(VIEWS).filter((view) => data.views.includes(view));
+  if (shown.includes("path") && !hasWebGl()) {
+    shown = ["top", "side"];
+    element("space-note").textContent =
+      "This browser has no WebGL, which draws in three dimensions: here are the paths from above and from the side.";
+  }
+  for (const view of Object.keys(VIEWS)) element(view).hidden = !shown.includes(view);
+  element("space").hidden = !shown.length;
+  return Promise.all(shown.map((view) => VIEWS[view]()));
+}
+
+async function draw() {
+  title(data.title);
+  const [from, to] = data.span_s.map((time) => time.toFixed(3));
+  element("summary").textContent = `${data.recording}, ${from} s to ${to} s of simulated time. ` +
+    "Dashed: asked for. Thin: estimated or measured. Drag to zoom, double-click to see all; a click on a name hides its curve.";
+  offerVehicles();
+  if (data.panels.length) await drawPanel(data.panels[0]);
+  await drawSpace();
+  // For whoever waits until everything is there.
+  document.body.dataset.drawn = "true";
+}
+
+draw();

@@ -1,0 +1,63 @@
+//! States of vehicles over time, read from a recording.
+
+use anyhow::Result;
+use flights::state::VehicleState;
+use recorder::reader::Recording;
+use recorder::series::Series;
+
+/// The fields of a state, simulated or measured.
+const FIELDS: [&str; 13] = [
+    "position.x",
+    "position.y",
+    "position.z",
+    "velocity.x",
+    "velocity.y",
+    "velocity.z",
+    "attitude.x",
+    "attitude.y",
+    "attitude.z",
+    "attitude.w",
+    "angular_velocity.x",
+    "angular_velocity.y",
+    "angular_velocity.z",
+];
+
+/// Fields of a state without its rates.
+pub(crate) const FIELDS_OF_POSE: usize = 10;
+/// All fields of a state.
+pub(crate) const FIELDS_OF_STATE: usize = FIELDS.len();
+
+/// The states of one topic over time.
+pub(crate) struct Track {
+    fields: Vec<Series>,
+}
+
+impl Track {
+    /// The times of the states in ns, growing.
+    pub fn time_ns(&self) -> &[u64] {
+        &self.fields[0].time_ns
+    }
+
+    /// The state stamped `time_ns`; fields that were not read are 0.
+    pub fn at(&self, time_ns: u64) -> Option<VehicleState> {
+        let index = self.time_ns().binary_search(&time_ns).ok()?;
+        let field = |field: usize| self.fields.get(field).map_or(0.0, |series| series.value[index]);
+        Some(VehicleState {
+            position_W_m: std::array::from_fn(field),
+            velocity_W_m_s: std::array::from_fn(|axis| field(3 + axis)),
+            attitude_WB: std::array::from_fn(|part| field(6 + part)),
+            angular_velocity_B_rad_s: std::array::from_fn(|axis| field(10 + axis)),
+        })
+    }
+}
+
+/// The first `fields` fields of the states of all `topics`, read in one pass.
+///
+/// # Errors
+/// If a topic is not in the recording or holds no state.
+pub(crate) fn tracks(recording: &Recording, topics: &[&str], fields: usize) -> Result<Vec<Track>> {
+    let wanted: Vec<(&str, &str)> =
+        topics.iter().flat_map(|topic| FIELDS[..fields].iter().map(|field| (*topic, *field))).collect();
+    let mut series = recording.series(&wanted)?.into_iter();
+    Ok(topics.iter().map(|_| Track { fields: series.by_ref().take(fields).collect() }).collect())
+}

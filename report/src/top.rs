@@ -1,0 +1,88 @@
+//! A live run in the terminal, steered from the keyboard.
+//!
+//! - [`sample`]: what a run shows at a moment
+//! - [`view`]: what two moments say about the time between them
+//! - [`cells`]: the view as words, for screen and paper
+//! - [`screen`]: how it is drawn
+//! - [`keys`]: what the keys do
+#![allow(clippy::disallowed_methods, reason = "rates are per host time")]
+
+mod cells;
+mod keys;
+mod sample;
+mod screen;
+mod view;
+
+pub use view::View;
+
+use anyhow::Result;
+use keys::Keys;
+use ratatui::DefaultTerminal;
+use ratatui::crossterm::event;
+use runtime::run_dir::LiveRun;
+use sample::{Sample, Source};
+use screen::Screen;
+use std::collections::VecDeque;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
+/// Host time between two looks.
+const REFRESH: Duration = Duration::from_millis(250);
+/// What rates, shares and percentiles speak of: about the last second.
+const LOOKS: usize = 5;
+/// The same for `--once`.
+const ONCE: Duration = Duration::from_millis(500);
+
+/// Looks at `run` for half a second.
+///
+/// # Errors
+/// If it has ended.
+pub fn look(run: &Arc<LiveRun>) -> Result<View> {
+    let source = Source::open(run)?;
+    let before = source.sample();
+    std::thread::sleep(ONCE);
+    Ok(View::new(&source, &before, &source.sample()))
+}
+
+/// Shows `run` in the terminal and lets the keys steer it until the user leaves, or `is_terminated` becomes true.
+///
+/// # Errors
+/// If the run has ended, or the terminal cannot be drawn on.
+pub fn watch(run: &Arc<LiveRun>, is_terminated: &AtomicBool) -> Result<()> {
+    let source = Source::open(run)?;
+    let mut terminal = ratatui::try_init()?;
+    let result = draw_until_left(&mut terminal, Keys::new(run), &source, is_terminated);
+    ratatui::try_restore()?;
+    result
+}
+
+/// Leaves the terminal as it was before [`watch`], for whoever ends the process meanwhile.
+pub fn restore_terminal() {
+    ratatui::restore();
+}
+
+fn draw_until_left(
+    terminal: &mut DefaultTerminal,
+    mut keys: Keys,
+    source: &Source,
+    is_terminated: &AtomicBool,
+) -> Result<()> {
+    let mut looks: VecDeque<Sample> = VecDeque::from([source.sample()]);
+    let mut last_look = Instant::now();
+    while !keys.has_left() && !is_terminated.load(Ordering::SeqCst) {
+        if last_look.elapsed() >= REFRESH {
+            last_look = Instant::now();
+            looks.push_back(source.sample());
+            looks.drain(..looks.len().saturating_sub(LOOKS));
+        }
+        let view = View::new(source, &looks[0], &looks[looks.len() - 1]);
+        let scroll = keys.scroll();
+        let screen = Screen { view: &view, notice: keys.notice(), scroll };
+        terminal.draw(|frame| frame.render_widget(screen, frame.area()))?;
+        if event::poll(REFRESH.saturating_sub(last_look.elapsed()))? {
+            keys.press(&event::read()?, &view.status);
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,187 @@
+//! How a view is drawn: title, processes, topics, and what the keys do. 80 × 24 characters are enough for hover.toml.
+
+use crate::cells::Cells;
+use crate::top::cells::{processes, title, topics};
+use crate::top::view::View;
+use ratatui::buffer::Buffer;
+use ratatui::layout::{Constraint, Layout, Rect};
+use ratatui::style::{Color, Style, Stylize};
+use ratatui::text::{Line, Text};
+use ratatui::widgets::{Cell, Row, Table, Widget};
+use runtime::ctl::protocol::State;
+
+const KEYS: &str = "space pause  s step  S 100  + - speed  f free  r realtime  x stop  q leave";
+const PROCESS_WIDTHS: [Constraint; 7] = [
+    Constraint::Fill(3),
+    Constraint::Fill(7),
+    Constraint::Length(9),
+    Constraint::Length(5),
+    Constraint::Length(7),
+    Constraint::Length(7),
+    Constraint::Length(5),
+];
+const TOPIC_WIDTHS: [Constraint; 5] = [
+    Constraint::Fill(2),
+    Constraint::Fill(1),
+    Constraint::Length(9),
+    Constraint::Length(10),
+    Constraint::Length(5),
+];
+
+/// A view on its way to the screen.
+pub struct Screen<'a> {
+    /// What is shown.
+    pub view: &'a View,
+    /// What there is to tell or to ask the user.
+    pub notice: &'a str,
+    /// Rows of each table that are scrolled over.
+    pub scroll: usize,
+}
+
+impl Widget for Screen<'_> {
+    fn render(self, area: Rect, buffer: &mut Buffer) {
+        let (processes, topics) = (processes(self.view), topics(self.view));
+        let process_lines = share_of(area.height.saturating_sub(6), processes.rows.len(), topics.rows.len());
+        let [head, first, _, second, notice, keys] = Layout::vertical([
+            Constraint::Length(3),
+            Constraint::Length(process_lines),
+            Constraint::Length(1),
+            Constraint::Fill(1),
+            Constraint::Length(1),
+            Constraint::Length(1),
+        ])
+        .areas(area);
+        let [run, progress] = title(self.view);
+        let lines = [Line::styled(run, title_style(self.view.status.state)), Line::raw(progress)];
+        Text::from_iter(lines).render(head, buffer);
+        table(&processes, PROCESS_WIDTHS, self.scroll, first.height).render(first, buffer);
+        table(&topics, TOPIC_WIDTHS, self.scroll, second.height).render(second, buffer);
+        Line::raw(self.notice).bold().render(notice, buffer);
+        Line::raw(KEYS).dim().render(keys, buffer);
+    }
+}
+
+/// Lines for the processes of `height` lines for both tables, each with its heading: what both need if there is
+/// room, else at least half.
+fn share_of(height: u16, processes: usize, topics: usize) -> u16 {
+    let lines = |rows: usize| u16::try_from(rows + 1).unwrap_or(u16::MAX);
+    lines(processes).min((height / 2).max(height.saturating_sub(lines(topics))))
+}
+
+fn title_style(state: State) -> Style {
+    let color = match state {
+        State::Running => Color::Green,
+        State::Paused | State::Pausing | State::Stepping => Color::Yellow,
+        State::Stopping | State::Ended => Color::Red,
+        State::Starting => Color::Blue,
+    };
+    Style::new().fg(color).bold()
+}
+
+fn table<const N: usize>(
+    cells: &Cells<N>,
+    widths: [Constraint; N],
+    scroll: usize,
+    height: u16,
+) -> Table<'static> {
+    let row = |texts: [String; N]| {
+        let aligned = |(text, is_number)| {
+            let line = Line::raw(text);
+            Cell::new(if is_number { line.right_aligned() } else { line })
+        };
+        Row::new(texts.into_iter().zip(cells.is_number).map(aligned).collect::<Vec<_>>())
+    };
+    let hidden = cells.rows.len().saturating_sub(usize::from(height.saturating_sub(1)));
+    let rows = cells.rows.iter().skip(scroll.min(hidden)).cloned().map(row).collect::<Vec<_>>();
+    Table::new(rows, widths).header(row(cells.headings.map(str::to_owned)).dim()).column_spacing(1)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{KEYS, Screen};
+    use crate::top::view::{ProcessRow, TopicRow, View};
+    use bus::plan::Pace;
+    use ratatui::Terminal;
+    use ratatui::backend::TestBackend;
+    use runtime::ctl::protocol::{State, Status};
+    use runtime::manifest::PaceSetting;
+
+    fn view(rows: usize) -> View {
+        let process = |index| ProcessRow {
+            name: format!("process-{index}"),
+            process: Some(7),
+            state: "waits for /attitude/estimate".to_owned(),
+            tick: 12_345,
+            cpu_share: Some(0.256),
+            step_p50_us: Some(1.25),
+            step_p99_us: None,
+            late: 3,
+        };
+        let topic = |index| TopicRow {
+            name: format!("/process-{index}/estimate"),
+            publisher: format!("process-{index}"),
+            rate_hz: 999.7,
+            samples: 12_345,
+            lost: 0,
+        };
+        View {
+            manifest: "/somewhere/hover.toml".to_owned(),
+            status: Status {
+                run_id: "1f-2e".to_owned(),
+                state: State::Paused,
+                tick: 12_345,
+                end_tick: 60_000,
+                time_s: 12.345,
+                pace: PaceSetting(Pace::Factor(0.5)),
+                missed_deadlines: 2,
+            },
+            span_s: 1.0,
+            real_time_factor: 0.4999,
+            processes: (0..rows).map(process).collect(),
+            topics: (0..rows).map(topic).collect(),
+        }
+    }
+
+    fn drawn(view: &View, (width, height): (u16, u16), scroll: usize) -> Vec<String> {
+        let mut terminal = Terminal::new(TestBackend::new(width, height)).unwrap();
+        let screen = Screen { view, notice: "paused at tick 12345", scroll };
+        terminal.draw(|frame| frame.render_widget(screen, frame.area())).unwrap();
+        let buffer = terminal.backend().buffer();
+        let row = |y| (0..width).map(|x| buffer[(x, y)].symbol()).collect::<String>().trim_end().to_owned();
+        (0..height).map(row).collect()
+    }
+
+    #[test]
+    fn a_terminal_of_80_by_24_shows_everything_of_a_run_like_hover() {
+        let lines = drawn(&view(8), (80, 24), 0);
+        let expected = [
+            "hover.toml  run 1f-2e  paused",
+            "tick 12345 / 60000  12.345 s  0.50 × real time  pace 0.5  2 deadlines missed",
+            "",
+            "process      state                              tick CPU %  p50 µs  p99 µs  late",
+            "process-0    waits for /attitude/estimate      12345    26     1.2       -     3",
+        ];
+        assert_eq!(lines[..5], expected);
+        let words = |line: &str| line.split_whitespace().map(str::to_owned).collect::<Vec<_>>();
+        assert_eq!(words(&lines[13]), ["topic", "publisher", "rate", "Hz", "samples", "lost"]);
+        assert_eq!(words(&lines[21]), ["/process-7/estimate", "process-7", "1000", "12345", "0"]);
+        assert_eq!(lines[22..], ["paused at tick 12345", KEYS]);
+    }
+
+    #[test]
+    fn what_does_not_fit_is_scrolled_to() {
+        let shows = |lines: &[String], text: &str| lines.iter().any(|line| line.starts_with(text));
+        let (top, bottom) = (drawn(&view(40), (80, 24), 0), drawn(&view(40), (80, 24), 1000));
+        for (first, last) in [("process-0 ", "process-39 "), ("/process-0/", "/process-39/")] {
+            assert!(shows(&top, first) && !shows(&top, last), "{top:#?}");
+            assert!(!shows(&bottom, first) && shows(&bottom, last), "{bottom:#?}");
+        }
+    }
+
+    #[test]
+    fn a_terminal_of_any_size_is_drawn_into() {
+        for size in [(1, 1), (3, 2), (20, 5), (80, 6), (200, 60)] {
+            drawn(&view(8), size, 3);
+        }
+    }
+}

@@ -1,0 +1,118 @@
+//! Measured flights flown again: the commands of flights on the bus with one or two vehicle files, and how far the state
+//! at the ends of windows lies from the measured one.
+//!
+//! | room | what it holds |
+//! |---|---|
+//! | [`replay`] | one flight as a run: its files, its manifest, the flight itself |
+//! | [`rows`] | the rows that the player reads: at the times of the commands too |
+//! | [`windows`] | errors at the ends of the windows, read from the recording |
+//! | [`mod@errors`] | what came of it, as a table and as JSON |
+
+mod errors;
+mod replay;
+mod rows;
+mod windows;
+
+pub use errors::{ChannelErrors, Errors, FlightErrors, HorizonErrors};
+
+use anyhow::{Context, Result, bail};
+use flights::{Flight, FlightSet};
+use replay::Replay;
+use runtime::event::StopToken;
+use runtime::registry::Registry;
+use runtime::run_dir::Scratch;
+use std::collections::BTreeMap;
+use std::path::Path;
+use vehicles::Vehicle;
+
+/// Lengths of the windows, in milliseconds.
+pub const HORIZONS_MS: [u32; 3] = [100, 500, 1000];
+
+/// How flights are flown again.
+#[derive(Clone, Copy, Debug)]
+pub struct Validation<'a> {
+    /// The components that a run may have; a player, a plant and a recorder are needed.
+    pub components: Registry,
+    /// Ends it.
+    pub stop: &'a StopToken,
+    /// Where the runs' files are kept; they are gone afterwards where absent.
+    pub keep: Option<&'a Path>,
+}
+
+impl Validation<'_> {
+    /// Flies the measured commands of every flight with each of `vehicles`, all vehicles of a flight in one run, and
+    /// compares; `tell` hears a line for each flight.
+    ///
+    /// # Errors
+    /// A file that cannot be read, a flight without what a replay needs, a run that fails or is stopped.
+    pub fn errors(
+        &self,
+        vehicles: &[&Path],
+        flights: &FlightSet,
+        tell: &mut dyn FnMut(&str),
+    ) -> Result<Errors> {
+        for vehicle in vehicles {
+            Vehicle::load(vehicle)?;
+        }
+        require_own_folders(flights)?;
+        let scratch = if self.keep.is_none() { Some(Scratch::create()?) } else { None };
+        let folder = self.keep.or(scratch.as_ref().map(Scratch::path)).context("no folder to fly in")?;
+        let mut errors = Errors { vehicles: labels(vehicles), flights: Vec::new() };
+        for flight in &flights.flights {
+            let replay = Replay::prepare(flight, vehicles, folder)
+                .with_context(|| format!("the flight `{}` cannot be replayed", flight.name))?;
+            let (host_s, recording) = replay
+                .fly(self, tell)
+                .with_context(|| not_flown(flight, self.keep.map(|_| replay.folder())))?;
+            let flown = windows::flight_errors(flight, &replay, &recording, vehicles.len())?;
+            tell(&format!("{}: {:.1} s flown in {host_s:.1} s", flight.name, replay.duration_s()));
+            errors.flights.push(flown);
+            if self.keep.is_none() {
+                replay.remove()?;
+            }
+        }
+        Ok(errors)
+    }
+}
+
+fn not_flown(flight: &Flight, kept: Option<&Path>) -> String {
+    let kept = kept.map(|folder| format!(" (its files are in {})", folder.display())).unwrap_or_default();
+    format!("the flight `{}` was not flown{kept}", flight.name)
+}
+
+/// Refuses two flights whose files would lie in one folder.
+fn require_own_folders(set: &FlightSet) -> Result<()> {
+    let mut folders = BTreeMap::new();
+    for Flight { name, .. } in &set.flights {
+        if let Some(other) = folders.insert(replay::file_name(name), name) {
+            let folder = replay::file_name(name);
+            bail!("the flights `{other}` and `{name}` would both be kept in the folder {folder}: rename one");
+        }
+    }
+    Ok(())
+}
+
+/// What reports call the vehicles: the names of their files, or the whole paths where the names are the same.
+fn labels(vehicles: &[&Path]) -> Vec<String> {
+    let stems: Vec<String> = vehicles
+        .iter()
+        .map(|path| path.file_stem().unwrap_or_default().to_string_lossy().into_owned())
+        .collect();
+    match &stems[..] {
+        [one, other] if one == other => vehicles.iter().map(|path| path.display().to_string()).collect(),
+        _ => stems,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::labels;
+    use std::path::Path;
+
+    #[test]
+    fn vehicles_of_the_same_name_are_told_apart_by_their_paths() {
+        let label = |paths: [&str; 2]| labels(&paths.map(Path::new));
+        assert_eq!(label(["a/old.toml", "a/new.toml"]), ["old", "new"]);
+        assert_eq!(label(["a/h.toml", "b/h.toml"]), ["a/h.toml", "b/h.toml"]);
+    }
+}

@@ -1,0 +1,212 @@
+//! What came of a validation: errors by flight, horizon and channel, for people and for programs.
+
+use flights::Role;
+use flights::state::StateQuantity;
+use serde_json::{Map, Value, json};
+use std::fmt;
+
+/// The errors of one or two vehicles on all flights.
+#[derive(Debug)]
+pub struct Errors {
+    /// What the vehicles are called.
+    pub vehicles: Vec<String>,
+    /// The flights, in the order of the flights file.
+    pub flights: Vec<FlightErrors>,
+}
+
+/// The errors on one flight.
+#[derive(Debug)]
+pub struct FlightErrors {
+    /// The flight's name.
+    pub name: String,
+    /// What it is for.
+    pub role: Role,
+    /// The errors by the length of the windows, shortest first.
+    pub horizons: Vec<HorizonErrors>,
+}
+
+/// The errors at the ends of windows of one length.
+#[derive(Debug)]
+pub struct HorizonErrors {
+    /// Length of the windows, in ms.
+    pub horizon_ms: u32,
+    /// How many windows count.
+    pub windows: usize,
+    /// How many do not, since a measured channel has a gap there or the rotors' speeds are not known yet.
+    pub left_out: usize,
+    /// The errors by channel; only channels that the flight tells of.
+    pub channels: Vec<ChannelErrors>,
+}
+
+/// The errors of one channel.
+#[derive(Debug)]
+pub struct ChannelErrors {
+    /// Which channel.
+    pub quantity: StateQuantity,
+    /// Root mean square over the windows, of each vehicle, in the quantity's unit.
+    pub rms: Vec<f64>,
+}
+
+impl ChannelErrors {
+    /// The second vehicle's error by the first's; `None` for a single vehicle.
+    #[must_use]
+    pub fn ratio(&self) -> Option<f64> {
+        Some(self.rms.get(1)? / self.rms.first()?)
+    }
+}
+
+impl HorizonErrors {
+    /// The horizon as it is written: `0.5`.
+    #[must_use]
+    pub fn horizon(&self) -> String {
+        (f64::from(self.horizon_ms) * 1e-3).to_string()
+    }
+
+    fn json(&self, vehicles: &[String]) -> Value {
+        let mut value = json!({ "windows": self.windows, "left_out": self.left_out });
+        for channel in &self.channels {
+            let rms = vehicles.iter().cloned().zip(channel.rms.iter().map(|rms| json!(rms)));
+            let mut entry: Map<String, Value> =
+                [("unit".to_owned(), json!(channel.quantity.unit()))].into_iter().chain(rms).collect();
+            if let Some(ratio) = channel.ratio() {
+                entry.insert("ratio".to_owned(), json!(ratio));
+            }
+            value[channel.quantity.name()] = Value::Object(entry);
+        }
+        value
+    }
+}
+
+impl Errors {
+    /// All errors by the flights' names; numbers that are not finite are null.
+    #[must_use]
+    pub fn json(&self) -> Value {
+        let horizons = |flight: &FlightErrors| -> Map<String, Value> {
+            flight.horizons.iter().map(|errors| (errors.horizon(), errors.json(&self.vehicles))).collect()
+        };
+        let flight = |flight: &FlightErrors| {
+            (flight.name.clone(), json!({ "role": flight.role, "horizons": horizons(flight) }))
+        };
+        json!({ "flights": self.flights.iter().map(flight).collect::<Map<_, _>>() })
+    }
+
+    /// Width of the widest flight's name.
+    fn name_width(&self) -> usize {
+        self.flights.iter().map(|flight| flight.name.chars().count()).chain([6]).max().unwrap_or(6)
+    }
+}
+
+impl fmt::Display for Errors {
+    /// A line for each flight, horizon and channel.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let width = self.name_width();
+        let columns: Vec<usize> = self.vehicles.iter().map(|label| label.chars().count().max(9)).collect();
+        write!(f, "{:width$}  role  horizon  windows  channel         ", "flight")?;
+        for (label, width) in self.vehicles.iter().zip(&columns) {
+            write!(f, "  {label:>width$}")?;
+        }
+        writeln!(f, "{}", if self.vehicles.len() == 2 { "   ratio" } else { "" })?;
+        for flight in &self.flights {
+            for horizon in &flight.horizons {
+                for channel in &horizon.channels {
+                    write_line(f, width, &columns, flight, horizon, channel)?;
+                }
+            }
+        }
+        self.flights.iter().try_for_each(|flight| write_left_out(f, flight))
+    }
+}
+
+fn write_line(
+    f: &mut fmt::Formatter<'_>,
+    name_width: usize,
+    columns: &[usize],
+    flight: &FlightErrors,
+    horizon: &HorizonErrors,
+    channel: &ChannelErrors,
+) -> fmt::Result {
+    let role = match flight.role {
+        Role::Fit => "fit",
+        Role::Test => "test",
+    };
+    let what = format!("{}, {}", channel.quantity.name(), channel.quantity.unit());
+    let (seconds, windows) = (format!("{} s", horizon.horizon()), horizon.windows);
+    write!(f, "{:name_width$}  {role:4}  {seconds:>7}  {windows:>7}  {what:16}", flight.name)?;
+    for (rms, width) in channel.rms.iter().zip(columns) {
+        write!(f, "  {:>width$}", short(*rms))?;
+    }
+    match channel.ratio() {
+        Some(ratio) => writeln!(f, "  {ratio:>6.3}"),
+        None => writeln!(f),
+    }
+}
+
+/// Says how many windows of a flight do not count.
+fn write_left_out(f: &mut fmt::Formatter<'_>, flight: &FlightErrors) -> fmt::Result {
+    let counts: Vec<String> = flight
+        .horizons
+        .iter()
+        .filter(|horizon| horizon.left_out > 0)
+        .map(|horizon| format!("{} of {} s", horizon.left_out, horizon.horizon()))
+        .collect();
+    if counts.is_empty() {
+        return Ok(());
+    }
+    writeln!(
+        f,
+        "{}: not counted, at the start or at gaps in what was measured: {}",
+        flight.name,
+        counts.join(", ")
+    )
+}
+
+/// A number with three digits that count.
+fn short(number: f64) -> String {
+    match number.abs() {
+        size if !size.is_finite() => number.to_string(),
+        size if size >= 100.0 => format!("{number:.0}"),
+        size if size >= 10.0 => format!("{number:.1}"),
+        size if size >= 1.0 => format!("{number:.2}"),
+        size if size >= 0.1 => format!("{number:.3}"),
+        size if size >= 0.01 => format!("{number:.4}"),
+        _ => format!("{number:.2e}"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn two() -> Errors {
+        let channels = vec![ChannelErrors { quantity: StateQuantity::Position, rms: vec![0.5, 0.25] }];
+        let horizons = vec![HorizonErrors { horizon_ms: 100, windows: 7, left_out: 2, channels }];
+        let flights = vec![FlightErrors { name: "loop".into(), role: Role::Test, horizons }];
+        Errors { vehicles: vec!["old".into(), "new".into()], flights }
+    }
+
+    #[test]
+    fn json_has_the_errors_by_flight_horizon_and_vehicle() {
+        let expected = json!({ "flights": { "loop": { "role": "test", "horizons": { "0.1": {
+            "windows": 7, "left_out": 2,
+            "position": { "unit": "m", "old": 0.5, "new": 0.25, "ratio": 0.5 },
+        } } } } });
+        assert_eq!(two().json(), expected);
+    }
+
+    #[test]
+    fn the_table_has_both_vehicles_the_ratio_and_the_windows_left_out() {
+        let text = two().to_string();
+        let lines: Vec<&str> = text.lines().collect();
+        assert_eq!(lines.len(), 3, "{text}");
+        let words = |line: usize| lines[line].split_whitespace().collect::<Vec<_>>();
+        assert_eq!(words(0), ["flight", "role", "horizon", "windows", "channel", "old", "new", "ratio"]);
+        assert_eq!(words(1), ["loop", "test", "0.1", "s", "7", "position,", "m", "0.500", "0.250", "0.500"]);
+        assert!(lines[2].contains("2 of 0.1 s"), "{text}");
+    }
+
+    #[test]
+    fn three_digits_count() {
+        let cases = [(123.4, "123"), (12.34, "12.3"), (0.0432, "0.0432"), (1.2e-5, "1.20e-5")];
+        cases.iter().for_each(|(number, text)| assert_eq!(short(*number), *text));
+    }
+}

@@ -1,0 +1,208 @@
+//! One flight as a run: its data, its manifest, and the flight itself.
+//!
+//! The player plays the flight from its first moment on. For each vehicle and each length of window a plant flies the
+//! commands, set to the measured state at the start of each window; all in one run, so that all fly the same.
+
+use super::{HORIZONS_MS, Validation, rows};
+use anyhow::{Context, Result, bail};
+use flights::Flight;
+use recorder::reader::Recording;
+use runtime::event::RunEvent;
+use runtime::graph::Graph;
+use runtime::launch;
+use runtime::manifest::Manifest;
+use runtime::output_file::{self, Kind, Mark, is_same};
+use runtime::outputs::Outputs;
+use std::fmt::Write as _;
+use std::fs::File;
+use std::io::Write as _;
+use std::path::{Path, PathBuf};
+
+/// The topic of the measured states.
+pub const MEASURED: &str = "/player/measured";
+
+/// Ticks a second.
+const RATE_HZ: u32 = 1000;
+
+/// Ticks between two recorded states: 100 Hz, enough to plot; the ends of all windows are among them.
+const RECORDED_TICKS: u32 = 10;
+
+const MANIFEST: &str = "manifest.toml";
+const RECORDING: &str = "flight.mcap";
+/// The first line of a manifest that is written here.
+const MANIFEST_START: &str = "# A measured flight, flown again in windows. Written by `hummingbus validate`.";
+const WRITTEN: Kind = Kind { name: "manifest of a replay", mark: Mark::Start(MANIFEST_START.as_bytes()) };
+const CSV: Kind = Kind { name: "flight in SI", mark: Mark::Start(flights::HEADER.as_bytes()) };
+
+/// What plants of the vehicles are called.
+const VEHICLES: [&str; 2] = ["first", "second"];
+
+/// A flight that is ready to be flown.
+#[derive(Debug)]
+pub struct Replay {
+    /// Where its files are.
+    folder: PathBuf,
+    /// The moment of the flight at which tick 0 lies.
+    start_s: f64,
+    /// Ticks of the run.
+    ticks: u32,
+    /// Held so that no other command writes to the folder.
+    _lock: File,
+}
+
+/// The name of the plant that flies vehicle number `vehicle` in windows of `horizon_ms`.
+pub fn plant(vehicle: usize, horizon_ms: u32) -> String {
+    format!("{}-{horizon_ms}ms", VEHICLES.get(vehicle).unwrap_or(&"other"))
+}
+
+impl Replay {
+    /// Writes what a run of `flight` with `vehicles` needs into a folder of its own in `folder`.
+    ///
+    /// # Errors
+    /// A flight without commands or shorter than the shortest window, or a folder that cannot be written to.
+    pub fn prepare(flight: &Flight, vehicles: &[&Path], folder: &Path) -> Result<Self> {
+        let folder = std::path::absolute(folder)?.join(file_name(&flight.name));
+        std::fs::create_dir_all(&folder).with_context(|| format!("cannot create {}", folder.display()))?;
+        let lock = output_file::lock_folder(&folder)?;
+        let data = folder.join("flight.csv");
+        for output in [data.clone(), folder.join(MANIFEST), folder.join(RECORDING)] {
+            require_no_input(&output, flight, vehicles)?;
+        }
+        let (canonical, text) = flights::csv(&rows::with_rows_at_commands(flight))?;
+        output_file::write(&data, &CSV, |out| out.write_all(text.as_bytes()))?;
+        let (start_s, end_s) = rows::span_s(&data)?;
+        let replay = Self { folder, start_s, ticks: ticks(end_s - start_s)?, _lock: lock };
+        let initial = command_at(flight, replay.start_s).context("it has no motor commands")?;
+        let manifest = replay.manifest(&canonical.columns, initial, vehicles)?;
+        output_file::write(&replay.manifest_path(), &WRITTEN, |out| out.write_all(manifest.as_bytes()))?;
+        Ok(replay)
+    }
+
+    /// Flies; returns how long that took on the host, in seconds, and the recording.
+    ///
+    /// # Errors
+    /// As `hummingbus run`; a run that was stopped too.
+    pub fn fly(&self, how: &Validation<'_>, tell: &mut dyn FnMut(&str)) -> Result<(f64, Recording)> {
+        let manifest = Manifest::load(&self.manifest_path(), &[], how.components)?;
+        let mut graph = Graph::build(&manifest)?;
+        let mut outputs = Outputs::of(&manifest, &graph, &self.folder.join(RECORDING), Vec::new())?;
+        let outcome = launch::fly(&manifest, &mut graph, &mut outputs, how.stop, &mut |event| {
+            if let RunEvent::Note(text) = event {
+                tell(text);
+            }
+        })?;
+        let recording = outputs.finish()?.context("it was not recorded")?;
+        if outcome.was_stopped {
+            bail!("it was stopped after {} of {} ticks", outcome.ticks, self.ticks);
+        }
+        Ok((outcome.host_s, recording))
+    }
+
+    /// Where its files are.
+    pub fn folder(&self) -> &Path {
+        &self.folder
+    }
+
+    /// The moment of the flight at which tick 0 lies, in seconds.
+    pub fn start_s(&self) -> f64 {
+        self.start_s
+    }
+
+    /// How long the run is, in seconds.
+    pub fn duration_s(&self) -> f64 {
+        f64::from(self.ticks - 1) / f64::from(RATE_HZ)
+    }
+
+    /// Removes its files.
+    ///
+    /// # Errors
+    /// If that is not possible.
+    pub fn remove(self) -> Result<()> {
+        std::fs::remove_dir_all(&self.folder)
+            .with_context(|| format!("cannot remove {}", self.folder.display()))
+    }
+
+    fn manifest_path(&self) -> PathBuf {
+        self.folder.join(MANIFEST)
+    }
+
+    /// The manifest's text, with the column map `columns` and the command `initial` before the first.
+    fn manifest(&self, columns: &str, initial: [f64; 4], vehicles: &[&Path]) -> Result<String> {
+        let duration_s = f64::from(self.ticks) / f64::from(RATE_HZ);
+        let mut text = format!(
+            "{MANIFEST_START}\n\n\
+             [run]\nrate_hz = {RATE_HZ}\nduration_s = {duration_s:.3}\nseed = 1\n\n\
+             [process.player]\nkind = \"player\"\ndata = \"flight.csv\"\n\
+             outputs.measured = {{ every_ticks = {RECORDED_TICKS} }}\n\n\
+             [process.player.parameters.columns]\n{columns}\n\
+             [process.recorder]\nkind = \"recorder\"\n"
+        );
+        for (number, vehicle) in vehicles.iter().enumerate() {
+            let vehicle = std::path::absolute(vehicle)?.display().to_string();
+            for horizon_ms in HORIZONS_MS {
+                let (plant, window_s) = (plant(number, horizon_ms), f64::from(horizon_ms) * 1e-3);
+                write!(
+                    text,
+                    "\n[process.{plant}]\nkind = \"plant\"\nvehicle = {}\nparameters = {{ window_s = {window_s:?} }}\n\
+                     inputs.command = {{ topic = \"/player/command\", delay_ticks = 1, initial = {{ command = {initial:?} }} }}\n\
+                     inputs.measured = \"{MEASURED}\"\noutputs.state = {{ every_ticks = {RECORDED_TICKS} }}\n",
+                    toml::Value::from(vehicle.clone()),
+                )?;
+            }
+        }
+        Ok(text)
+    }
+}
+
+/// Refuses to write where `flight` or one of `vehicles` was read from.
+fn require_no_input(output: &Path, flight: &Flight, vehicles: &[&Path]) -> Result<()> {
+    match vehicles.iter().copied().chain([flight.file.as_path()]).find(|input| is_same(input, output)) {
+        Some(input) => bail!("{} would be replaced, and is read; keep it in another folder", input.display()),
+        None => Ok(()),
+    }
+}
+
+/// Ticks of a run that plays `duration_s` of a flight, both ends included.
+#[allow(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "checked to be positive and short"
+)]
+fn ticks(duration_s: f64) -> Result<u32> {
+    let (shortest_s, longest_s) = (f64::from(HORIZONS_MS[0]) * 1e-3, 86400.0);
+    if !(shortest_s..longest_s).contains(&duration_s) {
+        bail!("it lasts {duration_s:.3} s, expected {shortest_s} s to a day");
+    }
+    // Times are sums of decimal fractions: a nanosecond of slack keeps the last moment.
+    Ok(((duration_s + 1e-9) * f64::from(RATE_HZ)).floor() as u32 + 1)
+}
+
+/// The command that holds at `time_s`, or the first where none was given before.
+fn command_at(flight: &Flight, time_s: f64) -> Option<[f64; 4]> {
+    let given = flight.command.time_s.partition_point(|time| *time <= time_s + 1e-9);
+    flight.command.values.get(given.saturating_sub(1)).copied()
+}
+
+/// A name for a file: letters and digits as they are, `-` for all else.
+pub fn file_name(name: &str) -> String {
+    name.chars().map(|letter| if letter.is_alphanumeric() || letter == '_' { letter } else { '-' }).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_run_holds_both_ends_of_the_flight() {
+        assert_eq!(ticks(1.0).unwrap(), 1001);
+        assert_eq!(ticks(0.3).unwrap(), 301);
+        assert_eq!(ticks(1.000_9).unwrap(), 1001);
+        assert!(ticks(0.05).unwrap_err().to_string().contains("expected 0.1 s"));
+        assert!(ticks(f64::NAN).is_err());
+    }
+
+    #[test]
+    fn names_become_file_names() {
+        assert_eq!(file_name("B3 figure/8"), "B3-figure-8");
+    }
+}

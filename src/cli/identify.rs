@@ -1,0 +1,204 @@
+//! The command `identify`: what flights show that the declared model lacks, and the model with it.
+
+use super::files::PAGE;
+use super::interrupts::stop_token;
+use super::output::print_text;
+use crate::COMPONENTS;
+use anyhow::{Context, Result, bail};
+use clap::{Args, Subcommand};
+use flights::FlightSet;
+use identify::report::Report;
+use identify::vehicle_file;
+use indicatif::{ProgressBar, ProgressStyle};
+use report::identification;
+use report::validate::Validation;
+use runtime::output_file::{self, Kind, Mark, is_same};
+use serde_json::{Value, json};
+use std::fs::File;
+use std::io::Write as _;
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+use vehicles::Vehicle;
+
+/// What `--help` shows behind the options.
+pub const HELP: &str = "Examples: hummingbus identify flights/nanobench.toml --out identified\n          \
+    hummingbus identify rotor flights/stands/esc-test-f40.toml --out rotor\n\n\
+    Writes report.html, report.json and vehicle.toml into the folder. See docs/identify.md.";
+
+/// A report as JSON: who wrote it comes first.
+const REPORT: Kind = Kind { name: "report", mark: Mark::Start(b"{\n  \"writer\": \"hummingbus\",") };
+/// The new vehicle file.
+const VEHICLE: Kind =
+    Kind { name: "identified vehicle", mark: Mark::Start(b"# Written by hummingbus identify.") };
+/// Tables for a vehicle file.
+const TABLES: Kind = Kind {
+    name: "table of a rotor",
+    mark: Mark::Start(b"# Tables of a vehicle file, identified from a thrust stand: "),
+};
+
+/// What `identify` takes.
+#[derive(Args)]
+#[command(args_conflicts_with_subcommands = true, subcommand_negates_reqs = true)]
+pub struct IdentifyArguments {
+    #[command(subcommand)]
+    part: Option<Part>,
+    /// The flights file: the declared vehicle, and flights to fit and to test on.
+    #[arg(required = true)]
+    flights: Option<PathBuf>,
+    /// Where the report and the new vehicle file go; made if it is not there.
+    #[arg(long, value_name = "DIR", required = true)]
+    out: Option<PathBuf>,
+    /// Print the report as JSON, and no progress.
+    #[arg(long)]
+    json: bool,
+    /// Do not fly the declared and the new vehicle on the bus.
+    #[arg(long)]
+    no_bus: bool,
+}
+
+#[derive(Subcommand)]
+enum Part {
+    /// Fit thrust, torque and motor to the logs of a thrust stand.
+    Rotor {
+        /// The stand file.
+        stand: PathBuf,
+        /// Where rotor.toml and rotor.json go; made if it is not there.
+        #[arg(long, value_name = "DIR")]
+        out: PathBuf,
+        /// Print the report as JSON.
+        #[arg(long)]
+        json: bool,
+    },
+}
+
+/// Runs the command; what it could not do is an error, so that `true` says that the files are written.
+///
+/// # Errors
+/// A file that cannot be read or written, flights that cannot be used, a run on the bus that fails.
+pub fn run(arguments: &IdentifyArguments) -> Result<bool> {
+    match (&arguments.part, &arguments.flights, &arguments.out) {
+        (Some(Part::Rotor { stand, out, json }), ..) => rotor(stand, out, *json),
+        (None, Some(flights), Some(out)) => flights_of(arguments, flights, out),
+        _ => bail!("give a flights file, and a folder with --out"),
+    }
+}
+
+fn rotor(stand: &Path, out: &Path, is_json: bool) -> Result<bool> {
+    let found = identify::rotor::run(stand)?;
+    let (report, _lock) =
+        (found.report, claim(out, &[("rotor.toml", &TABLES), ("rotor.json", &REPORT)], &[stand])?);
+    for (name, kind, text) in
+        [("rotor.toml", &TABLES, found.tables), ("rotor.json", &REPORT, found.figures + "\n")]
+    {
+        output_file::write(&out.join(name), kind, |out| out.write_all(text.as_bytes()))?;
+    }
+    let text = if is_json { serde_json::to_string_pretty(&report)? } else { report.to_string() };
+    print_text(&text)?;
+    Ok(true)
+}
+
+fn flights_of(arguments: &IdentifyArguments, file: &Path, out: &Path) -> Result<bool> {
+    let progress = Progress::new(arguments.json);
+    progress.say("reading flights");
+    let set = FlightSet::load(file)?;
+    let base = Vehicle::base(&set.vehicle);
+    let inputs: Vec<&Path> =
+        [Some(file), Some(&set.vehicle), base.as_deref()].into_iter().flatten().collect();
+    let files = [("vehicle.toml", &VEHICLE), ("report.html", &PAGE), ("report.json", &REPORT)];
+    let _lock = claim(out, &files, &inputs)?;
+    let outcome = identify::run::identify(&set, &mut |step| progress.say(step))?;
+    let vehicle = out.join("vehicle.toml");
+    let text = vehicle_file::text(&set.vehicle, &outcome.effects, &outcome.report)?;
+    output_file::write(&vehicle, &VEHICLE, |out| out.write_all(text.as_bytes()))?;
+    // All is written before anything is flown, so that a run that fails loses nothing.
+    let write_page = |flown: Option<&Value>| {
+        let path = out.join("report.html");
+        output_file::write(&path, &PAGE, |out| out.write_all(&identification::page(&outcome, flown)))
+    };
+    write_page(None)?;
+    let mut report = serde_json::to_value(&outcome.report)?;
+    write_json(out, &report)?;
+    let flown = if arguments.no_bus {
+        None
+    } else {
+        let how = Validation { components: COMPONENTS, stop: &stop_token()?, keep: None };
+        let mut tell = |line: &str| progress.say(&format!("on the bus: {line}"));
+        identification::fly_again(&set, &vehicle, &outcome, &how, &mut tell)?
+    };
+    if flown.is_some() {
+        write_page(flown.as_ref())?;
+    }
+    progress.finish();
+    report["bus"] = flown.clone().unwrap_or(Value::Null);
+    write_json(out, &report)?;
+    let report = serde_json::to_string_pretty(&report)?;
+    print_text(&if arguments.json { report } else { summary(&outcome.report, flown.as_ref(), out) })?;
+    Ok(true)
+}
+
+/// Makes the folder `out`, claims it for this command, and checks that `files` can lie in it.
+///
+/// # Errors
+/// If another command writes to it, or one of the files would replace something of another kind or one of `inputs`.
+fn claim(out: &Path, files: &[(&str, &Kind)], inputs: &[&Path]) -> Result<File> {
+    std::fs::create_dir_all(out).with_context(|| format!("cannot make the folder {}", out.display()))?;
+    for (name, kind) in files {
+        let path = out.join(name);
+        output_file::check(&path, kind)?;
+        if let Some(input) = inputs.iter().find(|input| is_same(input, &path)) {
+            let path = path.display();
+            bail!(
+                "{path} would be replaced, and is read as {}; name another folder with --out",
+                input.display()
+            );
+        }
+    }
+    output_file::lock_folder(out)
+}
+
+fn write_json(out: &Path, report: &Value) -> Result<()> {
+    let mut all = serde_json::Map::from_iter([("writer".to_owned(), json!("hummingbus"))]);
+    all.extend(report.as_object().cloned().unwrap_or_default());
+    let text = serde_json::to_string_pretty(&all)?;
+    output_file::write(&out.join("report.json"), &REPORT, |out| out.write_all(text.as_bytes()))
+}
+
+fn summary(report: &Report, flown: Option<&Value>, out: &Path) -> String {
+    let mut text = report.to_string();
+    let furthest = flown.and_then(|flown| {
+        Some((flown["furthest_from_prediction"].as_f64()?, flown["furthest_at"].as_str()?))
+    });
+    if let Some((away, at)) = furthest {
+        text += &format!(
+            "flown again on the bus with both vehicle files: every error within {:.1} % of these; furthest {at}\n",
+            away * 100.0
+        );
+    }
+    let files =
+        ["report.html", "report.json", "vehicle.toml"].map(|name| out.join(name).display().to_string());
+    text + &format!("\nwritten: {}", files.join(", "))
+}
+
+/// A line on the terminal that says what is being done.
+struct Progress(ProgressBar);
+
+impl Progress {
+    fn new(is_quiet: bool) -> Self {
+        if is_quiet {
+            return Self(ProgressBar::hidden());
+        }
+        let bar = ProgressBar::new_spinner();
+        let style = ProgressStyle::with_template("{spinner} {elapsed:>4}  {msg}");
+        bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_spinner()));
+        bar.enable_steady_tick(Duration::from_millis(100));
+        Self(bar)
+    }
+
+    fn say(&self, words: &str) {
+        self.0.set_message(words.to_owned());
+    }
+
+    fn finish(&self) {
+        self.0.finish_and_clear();
+    }
+}

@@ -1,0 +1,54 @@
+//! The command `validate`.
+
+use super::interrupts::stop_token;
+use super::output::{print_text, say};
+use crate::COMPONENTS;
+use anyhow::{Result, bail};
+use clap::Args;
+use flights::FlightSet;
+use report::validate::Validation;
+use std::path::{Path, PathBuf};
+
+/// What `--help` shows behind the options.
+pub const HELP: &str = "Example: hummingbus validate vehicles/hummingbird.toml fitted.toml flights.toml\n\n\
+    At the start of each window of 0.1, 0.5 and 1 s the simulated vehicle is set to the measured state; the table shows \
+    the root mean square of its errors at the windows' ends. See docs/replay.md.";
+
+/// What `validate` takes.
+#[derive(Args)]
+pub struct ValidateArguments {
+    /// One or two vehicle files, then the flights file.
+    #[arg(value_name = "FILE", required = true, num_args = 2..=3)]
+    files: Vec<PathBuf>,
+    /// Print JSON, and no progress.
+    #[arg(long)]
+    json: bool,
+    /// Keep what was flown in this folder: of each flight its data, its manifest and its recording.
+    #[arg(long, value_name = "DIR")]
+    keep: Option<PathBuf>,
+}
+
+/// Flies all flights and prints the errors; every error is one of flying, so that `true` says that all was flown.
+///
+/// # Errors
+/// If a file cannot be read, or a flight cannot be flown.
+pub fn validate(arguments: &ValidateArguments) -> Result<bool> {
+    let Some((file, vehicles)) = arguments.files.split_last() else { bail!("give a flights file") };
+    let vehicles: Vec<&Path> = vehicles.iter().map(PathBuf::as_path).collect();
+    let flights = FlightSet::load(file)?;
+    let mut tell = |line: &str| {
+        if !arguments.json {
+            say(line);
+        }
+    };
+    // Before there is a folder to remove, so that an interrupt leaves none.
+    let validation =
+        Validation { components: COMPONENTS, stop: &stop_token()?, keep: arguments.keep.as_deref() };
+    let errors = validation.errors(&vehicles, &flights, &mut tell)?;
+    print_text(&if arguments.json {
+        serde_json::to_string_pretty(&errors.json())?
+    } else {
+        errors.to_string()
+    })?;
+    Ok(true)
+}
