@@ -4,7 +4,8 @@
 //! number that overflows on the way, shows here without a process.
 
 use crate::COMPONENTS;
-use bus::kind::{NodeKind, RunContext};
+use bus::context::NodeContext;
+use bus::kind::NodeKind;
 use runtime::graph::Graph;
 use runtime::manifest::Manifest;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -228,9 +229,9 @@ fn no_number_of_shipped_gains_brings_a_law_down() {
         if kind.name == "wall-follow" {
             parameters["mode"] = "constant".into();
         }
-        assert_eq!((kind.check)(&parameters, &RunContext::of_ports(&[])), Ok(()));
+        assert_eq!((kind.check)(&parameters, &NodeContext::new("node", &[])), Ok(()));
         let (_, refused) = try_all(&folder, &file, stride(2), || {
-            (kind.check)(&parameters, &RunContext::of_ports(&[]))
+            (kind.check)(&parameters, &NodeContext::new("node", &[]))
                 .map_err(|words| if words.contains(".toml:") { words } else { format!("{file}: {words}") })
         });
         assert!(refused > 10, "only {refused} refusals of {name}");

@@ -136,8 +136,13 @@ impl ConnectedNode {
     /// Topic name and announced type of a raw input.
     #[must_use]
     pub fn announcement(&self, input: RawInput) -> (&str, &Announcement) {
-        let topic = self.links.node.inputs[input.index].topic;
-        (&self.links.plan.topics[topic].name, &self.announcements[input.index])
+        self.announced(input.index)
+    }
+
+    /// Topic name and announced type of input `input`.
+    pub(crate) fn announced(&self, input: usize) -> (&str, &Announcement) {
+        let topic = self.links.node.inputs[input].topic;
+        (&self.links.plan.topics[topic].name, &self.announcements[input])
     }
 
     /// Computes `step` at every due tick until the run ends, or until a successor has taken over.
@@ -145,11 +150,10 @@ impl ConnectedNode {
     /// # Errors
     /// If a step fails, a due output stays unwritten, a sample is lost, or the run is aborted.
     pub fn run<E: Display>(
-        mut self,
+        self,
         mut step: impl FnMut(&mut Tick<'_>) -> Result<(), E>,
     ) -> Result<(), BusError> {
-        self.open_predecessor(None)?;
-        self.fly(&mut [], |tick, _| step(tick).map_err(|error| error.to_string()))
+        self.run_with_state_of(None, &mut [], |tick, _| step(tick))
     }
 
     /// As [`ConnectedNode::run`], for a node that remembers something from tick to tick: `state` is handed
@@ -158,17 +162,29 @@ impl ConnectedNode {
     /// # Errors
     /// As [`ConnectedNode::run`].
     pub fn run_with_state<S: Message, E: Display>(
-        mut self,
+        self,
         mut state: S,
         mut step: impl FnMut(&mut Tick<'_>, &mut S) -> Result<(), E>,
     ) -> Result<(), BusError> {
-        self.open_predecessor(Some(S::SCHEMA))?;
-        let links = &self.links;
-        let (dir, plan) = (&links.run_dir, &links.plan);
-        self.stated = Some(StateRing::create(dir, plan, links.index, links.generation, S::SCHEMA)?);
-        self.fly(bytemuck::bytes_of_mut(&mut state), |tick, state| {
-            step(tick, bytemuck::from_bytes_mut(state)).map_err(|error| error.to_string())
+        self.run_with_state_of(Some(S::SCHEMA), bytemuck::bytes_of_mut(&mut state), |tick, state| {
+            step(tick, bytemuck::from_bytes_mut(state))
         })
+    }
+
+    /// The same with a state that is a message of `schema`; none where that is `None`.
+    pub(crate) fn run_with_state_of<E: Display>(
+        mut self,
+        schema: Option<&'static Schema>,
+        state: &mut [u8],
+        mut step: impl FnMut(&mut Tick<'_>, &mut [u8]) -> Result<(), E>,
+    ) -> Result<(), BusError> {
+        self.open_predecessor(schema)?;
+        if let Some(schema) = schema {
+            let links = &self.links;
+            let (dir, plan) = (&links.run_dir, &links.plan);
+            self.stated = Some(StateRing::create(dir, plan, links.index, links.generation, schema)?);
+        }
+        self.fly(state, |tick, state| step(tick, state).map_err(|error| error.to_string()))
     }
 
     /// Opens the state of the process that this one succeeds, or else what it sends.

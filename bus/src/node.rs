@@ -8,6 +8,9 @@ use crate::membership::Membership;
 use crate::message::Message;
 use crate::plan::{NodePlan, Pace, Plan};
 use crate::port::OutPort;
+use crate::ports::{Inputs, PortSpec};
+use crate::registration::{Registration, read_parameters};
+use crate::run_process::Join;
 use crate::schema::Schema;
 use crate::tick::Tick;
 use crate::transport::Transport;
@@ -56,6 +59,13 @@ impl<T> Clone for Output<T> {
 }
 impl<T> Copy for Output<T> {}
 
+/// Where the ports of a component are among those of its node, in the order in which it declares them.
+#[derive(Debug)]
+pub(crate) struct Wiring {
+    pub(crate) inputs: Vec<Option<usize>>,
+    pub(crate) outputs: Vec<Option<usize>>,
+}
+
 /// A node that declares its ports.
 #[derive(Debug)]
 pub struct Node {
@@ -94,17 +104,14 @@ impl Node {
     /// # Errors
     /// If the process was not started by `hummingbus run`, or the run is gone.
     pub fn join() -> Result<Self, BusError> {
-        let run_dir = crate::process::join()?;
-        let name =
-            std::env::var(NODE_VARIABLE).map_err(|_| BusError::NotInARun { variable: NODE_VARIABLE })?;
-        let generation = std::env::var(GENERATION_VARIABLE).ok().and_then(|text| text.parse().ok());
-        Self::open(run_dir, &name, generation.unwrap_or(0))
+        Self::open(Join::from_environment()?)
     }
 
-    /// Opens the part of generation `generation` of `name` in the run whose directory is `run_dir`.
-    fn open(run_dir: PathBuf, name: &str, generation: u32) -> Result<Self, BusError> {
+    /// Opens the part of a run that `join` names.
+    pub(crate) fn open(join: Join) -> Result<Self, BusError> {
+        let Join { run_dir, node, generation } = join;
         let plan = Plan::load(&run_dir)?;
-        let index = plan.node_index(name)?;
+        let index = plan.node_index(&node)?;
         let node = match generation {
             0 => plan.nodes[index].clone(),
             _ => NodePlan::load_backup(&run_dir, index, generation)?,
@@ -154,8 +161,64 @@ impl Node {
     /// # Errors
     /// If they do not fit `P`; the error names the key.
     pub fn parameters<P: DeserializeOwned>(&self) -> Result<P, BusError> {
-        crate::kind::read_parameters(&self.node().parameters)
-            .map_err(|error| self.error(format!("parameters: {error}")))
+        read_parameters(&self.node().parameters).map_err(|error| self.error(format!("parameters: {error}")))
+    }
+
+    pub(crate) fn raw_parameters(&self) -> &serde_json::Value {
+        &self.node().parameters
+    }
+
+    pub(crate) fn tick_ns(&self) -> u64 {
+        self.plan.tick_ns
+    }
+
+    pub(crate) fn period_ticks(&self) -> u32 {
+        self.node().period_ticks
+    }
+
+    pub(crate) fn duration_ticks(&self) -> u32 {
+        self.plan.duration_ticks
+    }
+
+    /// The wired inputs, and the outputs.
+    pub(crate) fn port_names(&self) -> (Vec<&str>, Vec<&str>) {
+        let NodePlan { inputs, outputs, .. } = self.node();
+        let inputs = inputs.iter().map(|input| input.port.as_str()).collect();
+        (inputs, outputs.iter().map(|output| output.port.as_str()).collect())
+    }
+
+    /// Declares the ports of a component.
+    ///
+    /// # Errors
+    /// If the manifest does not wire a port that must be, or states another message type.
+    pub(crate) fn declare(&mut self, component: &Registration) -> Result<Wiring, BusError> {
+        let inputs = match component.inputs {
+            Inputs::Ports(ports) => {
+                ports.iter().map(|port| self.declare_port(port)).collect::<Result<_, _>>()?
+            }
+            Inputs::Many(schema) => self
+                .declare_all(Declared::Typed(schema), |node, index| node.node().inputs[index].port.clone()),
+            Inputs::Any => self.declare_all(Declared::Raw, |node, index| {
+                node.plan.topics[node.node().inputs[index].topic].name.clone()
+            }),
+        };
+        let mut outputs = Vec::new();
+        for port in component.outputs {
+            let is_named = self.node().outputs.iter().any(|output| output.port == port.name);
+            let is_there = port.required || is_named;
+            outputs.push(is_there.then(|| self.declare_output(port.name, port.schema)).transpose()?);
+        }
+        Ok(Wiring { inputs, outputs })
+    }
+
+    fn declare_port(&mut self, port: &PortSpec) -> Result<Option<usize>, BusError> {
+        let is_wired = self.node().inputs.iter().any(|input| input.port == port.name);
+        if !port.required && !is_wired {
+            return Ok(None);
+        }
+        let index = self.input_index(port.name)?;
+        self.declare_input(index, Declared::Typed(port.schema))?;
+        Ok(Some(index))
     }
 
     /// Declares the input `port`, whose messages are `T`.
@@ -205,26 +268,32 @@ impl Node {
     /// Declares every input the manifest wires as one of `T`, in the order of their names. An input that was declared
     /// before is refused when the node connects.
     pub fn every_input<T: Message>(&mut self) -> Vec<Input<T>> {
-        self.declare_all(Declared::Typed(T::SCHEMA));
-        let mut inputs: Vec<_> =
-            (0..self.inputs.len()).map(|index| Input { index, message: PhantomData }).collect();
-        inputs.sort_by_key(|input| &self.node().inputs[input.index].port);
-        inputs
+        let ports = self
+            .declare_all(Declared::Typed(T::SCHEMA), |node, index| node.node().inputs[index].port.clone());
+        ports.into_iter().flatten().map(|index| Input { index, message: PhantomData }).collect()
     }
 
     /// Declares every input the manifest wires, to be read as bytes, in the order of their topics' names. As
     /// [`Node::every_input`].
     pub fn raw_inputs(&mut self) -> Vec<RawInput> {
-        self.declare_all(Declared::Raw);
-        let mut inputs: Vec<RawInput> = (0..self.inputs.len()).map(|index| RawInput { index }).collect();
-        inputs.sort_by_key(|input| &self.plan.topics[self.node().inputs[input.index].topic].name);
-        inputs
+        let ports = self.declare_all(Declared::Raw, |node, index| {
+            node.plan.topics[node.node().inputs[index].topic].name.clone()
+        });
+        ports.into_iter().flatten().map(|index| RawInput { index }).collect()
     }
 
-    fn declare_all(&mut self, declared: Declared) {
-        for index in 0..self.inputs.len() {
+    /// Declares every input, in the order of what `key` gives of them.
+    fn declare_all(
+        &mut self,
+        declared: Declared,
+        key: impl Fn(&Self, usize) -> String,
+    ) -> Vec<Option<usize>> {
+        let mut indices: Vec<usize> = (0..self.inputs.len()).collect();
+        for &index in &indices {
             self.keep_fault(|node| node.declare_input(index, declared));
         }
+        indices.sort_by_key(|&index| key(self, index));
+        indices.into_iter().map(Some).collect()
     }
 
     fn declare_input(&mut self, index: usize, declared: Declared) -> Result<(), BusError> {
@@ -266,6 +335,11 @@ impl Node {
     /// # Errors
     /// If the manifest does not name it, or states another message type, or the node declared it before.
     pub fn output<T: Message>(&mut self, port: &str) -> Result<Output<T>, BusError> {
+        let index = self.declare_output(port, T::SCHEMA)?;
+        Ok(Output { index, message: PhantomData })
+    }
+
+    fn declare_output(&mut self, port: &str, schema: &'static Schema) -> Result<usize, BusError> {
         let outputs = &self.node().outputs;
         let index =
             outputs.iter().position(|output| output.port == port).ok_or_else(|| BusError::UnwiredPort {
@@ -276,19 +350,19 @@ impl Node {
                 known: known(outputs.iter().map(|output| output.port.as_str())),
             })?;
         let expected = &self.plan.topics[outputs[index].topic].type_name;
-        if expected != T::SCHEMA.type_name {
+        if expected != schema.type_name {
             return Err(BusError::TypeMismatch {
                 node: self.name().to_owned(),
                 port: port.to_owned(),
                 expected: expected.clone(),
-                found: T::SCHEMA.type_name.to_owned(),
+                found: schema.type_name.to_owned(),
             });
         }
         if let Some(before) = self.outputs[index] {
-            return Err(self.declared_twice("output", port, before.type_name, T::SCHEMA.type_name));
+            return Err(self.declared_twice("output", port, before.type_name, schema.type_name));
         }
-        self.outputs[index] = Some(T::SCHEMA);
-        Ok(Output { index, message: PhantomData })
+        self.outputs[index] = Some(schema);
+        Ok(index)
     }
 
     /// Connects the declared ports; returns when every node of the run has done so. A successor connects
@@ -419,6 +493,7 @@ mod tests {
     use crate::control::Control;
     use crate::messages::{MotorCommand, PlantState};
     use crate::plan::{InputPlan, NodePlan, OutputPlan, Pace, Plan, TopicPlan, Wait};
+    use crate::run_process::Join;
     use crate::tick::Tick;
     use crate::{BusError, Message};
     use std::alloc::{GlobalAlloc, Layout, System};
@@ -498,14 +573,18 @@ mod tests {
         Ok(at_last - at_warm)
     }
 
+    fn first(run_dir: &Path, node: &str) -> Join {
+        Join { run_dir: run_dir.to_owned(), node: node.to_owned(), generation: 0 }
+    }
+
     fn fly_source(run_dir: &Path) -> Result<u64, BusError> {
-        let mut node = Node::open(run_dir.to_owned(), "source", 0)?;
+        let mut node = Node::open(first(run_dir, "source"))?;
         let output = node.output::<MotorCommand>("command")?;
         allocations(|tick| tick.write(output, MotorCommand::default()), node)
     }
 
     fn fly_sink(run_dir: &Path) -> Result<u64, BusError> {
-        let mut node = Node::open(run_dir.to_owned(), "sink", 0)?;
+        let mut node = Node::open(first(run_dir, "sink"))?;
         let input = node.input::<MotorCommand>("command")?;
         let check = |tick: &mut Tick<'_>| {
             assert_eq!(u64::from(tick.get(input).stamp.nanosec), tick.time_ns() % 1_000_000_000);
@@ -528,7 +607,7 @@ mod tests {
     fn a_port_that_is_declared_twice_is_refused_with_both_types_and_never_takes_the_last() {
         let folder = tempfile::tempdir().unwrap();
         source_and_sink().store(folder.path()).unwrap();
-        let open = |name| Node::open(folder.path().to_owned(), name, 0).unwrap();
+        let open = |name| Node::open(first(folder.path(), name)).unwrap();
 
         let mut source = open("source");
         source.output::<MotorCommand>("command").unwrap();

@@ -211,16 +211,18 @@ impl InPort {
         BusError::Gap { node: node.to_owned(), topic: self.topic_name.clone(), tick, expected, found }
     }
 
+    /// The current sample, or the initial value, if there is one.
+    pub(crate) fn newest(&self) -> Option<&[u64]> {
+        self.sample().or(self.initial.as_deref())
+    }
+
     /// The current sample, or the initial value.
     ///
     /// # Panics
     /// If there is neither: the launcher refuses a delayed input without an initial value.
     pub(crate) fn words(&self) -> &[u64] {
-        match (&self.current, &self.initial) {
-            (Some(sample), _) => sample.words(),
-            (None, Some(initial)) => initial,
-            (None, None) => panic!("topic {} has no sample and no initial value", self.topic_name),
-        }
+        let words = self.newest();
+        words.unwrap_or_else(|| panic!("topic {} has no sample and no initial value", self.topic_name))
     }
 
     /// The current sample, if there is one.

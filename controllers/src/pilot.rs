@@ -1,32 +1,18 @@
-//! The pilot node: publishes the set points of a schedule, or of a recording of sticks.
+//! The pilot: publishes the set points of a schedule, or of a recording of sticks.
 
 use crate::set_points::{ALTITUDES_IN_WORDS, ALTITUDES_M, Schedule, SetPoint as Values, SetPointEntry};
 use crate::sticks::Sticks;
-use bus::kind::{Inputs, NodeKind, PortSpec, RunContext, read_parameters};
+use bus::OutputPorts;
+use bus::component::{Component, Info, StepError};
+use bus::context::{NodeContext, StepContext};
 use bus::messages::SetPoint;
-use bus::{BusError, Message, Node};
 use serde::Deserialize;
 use std::path::PathBuf;
-
-/// The pilot, for manifests.
-pub const KIND: NodeKind = NodeKind {
-    name: "pilot",
-    summary: "set points from the manifest: steps, ramps and doublets; or from a recording of sticks",
-    inputs: Inputs::Ports(&[]),
-    outputs: &[PortSpec::required("set_point", SetPoint::SCHEMA)],
-    check: |parameters, run| {
-        let parameters: Parameters = read_parameters(parameters)?;
-        Pilot::new(&parameters, run.rate_hz())?;
-        warn_of_late(&parameters.set_points, run);
-        Ok(())
-    },
-    run,
-};
 
 /// Parameters of the pilot.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-struct Parameters {
+pub struct Parameters {
     /// Altitude until the first entry changes it; the angles start at zero.
     initial_altitude_m: f64,
     /// The schedule.
@@ -37,7 +23,7 @@ struct Parameters {
 }
 
 /// Warns of set points that the run ends before.
-fn warn_of_late(entries: &[SetPointEntry], run: &RunContext<'_>) {
+fn warn_of_late(entries: &[SetPointEntry], run: &NodeContext<'_>) {
     let end_s = run.duration_s();
     for (index, entry) in entries.iter().enumerate().filter(|(_, entry)| entry.at_s >= end_s) {
         run.warn_behind_end(format!(
@@ -48,27 +34,46 @@ fn warn_of_late(entries: &[SetPointEntry], run: &RunContext<'_>) {
     }
 }
 
+/// What the pilot sends.
+#[derive(Debug, OutputPorts)]
+pub struct Outputs {
+    /// What it asks for.
+    pub set_point: SetPoint,
+}
+
 /// What the pilot asks for over time.
 #[derive(Debug)]
-struct Pilot {
+pub struct Pilot {
     schedule: Schedule,
     sticks: Option<Sticks>,
 }
 
-impl Pilot {
-    fn new(parameters: &Parameters, rate_hz: u32) -> Result<Self, String> {
+impl Component for Pilot {
+    const INFO: Info = Info::new(
+        "pilot",
+        "set points from the manifest: steps, ramps and doublets; or from a recording of sticks",
+    );
+    type Parameters = Parameters;
+    type Inputs<'a> = ();
+    type Outputs = Outputs;
+    type State = ();
+
+    fn new(parameters: Parameters, context: &NodeContext<'_>) -> Result<Self, String> {
         let altitude_m = parameters.initial_altitude_m;
         if !ALTITUDES_M.contains(&altitude_m) {
             return Err(format!("`initial_altitude_m` is {altitude_m} m, expected {ALTITUDES_IN_WORDS}"));
         }
         let initial = Values { altitude_m: parameters.initial_altitude_m, ..Values::default() };
-        let schedule = Schedule::new(&parameters.set_points, &initial, rate_hz)
+        let schedule = Schedule::new(&parameters.set_points, &initial, context.rate_hz())
             .map_err(|error| format!("`set_points`: {error}"))?;
         let sticks = parameters.data.as_deref().map(Sticks::load).transpose();
         let sticks = sticks.map_err(|error| error.to_string())?;
         let taken = |entry: &&SetPointEntry| sticks.as_ref().is_some_and(|it| it.has(&entry.channel));
         match parameters.set_points.iter().find(taken) {
-            None => Ok(Self { schedule, sticks }),
+            None => {
+                warn_of_late(&parameters.set_points, context);
+                Ok(Self { schedule, sticks })
+            }
             Some(entry) => Err(format!(
                 "`set_points` has an entry on channel {}, which the sticks in `data` hold; leave one of them out",
                 entry.channel
@@ -76,39 +81,37 @@ impl Pilot {
         }
     }
 
+    fn initial(&self) {}
+
+    fn step(&mut self, context: &StepContext<'_>, (): (), (): &mut ()) -> Result<Outputs, StepError> {
+        let asked = self.at(u64::from(context.tick()), context.time_s());
+        let set_point = SetPoint {
+            altitude: asked.altitude_m,
+            roll: asked.roll_rad,
+            pitch: asked.pitch_rad,
+            yaw: asked.yaw_rad,
+            ..Default::default()
+        };
+        Ok(Outputs { set_point })
+    }
+}
+
+impl Pilot {
     fn at(&self, tick: u64, time_s: f64) -> Values {
         let scheduled = self.schedule.at(tick);
         self.sticks.as_ref().map_or(scheduled, |sticks| sticks.at(time_s, &scheduled))
     }
 }
 
-fn run() -> Result<(), BusError> {
-    let mut node = Node::join()?;
-    let output = node.output::<SetPoint>("set_point")?;
-    let pilot = Pilot::new(&node.parameters()?, node.rate_hz()).map_err(|error| node.error(error))?;
-    node.run(|tick| {
-        let asked = pilot.at(u64::from(tick.number()), tick.time_s());
-        tick.write(
-            output,
-            SetPoint {
-                altitude: asked.altitude_m,
-                roll: asked.roll_rad,
-                pitch: asked.pitch_rad,
-                yaw: asked.yaw_rad,
-                ..Default::default()
-            },
-        )
-    })
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use bus::Registration;
 
     fn pilot(more: &str) -> Result<Pilot, String> {
         let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../manifests/sticks/roll.csv");
         let text = format!("initial_altitude_m = 1.5\ndata = {path:?}\n{more}");
-        Pilot::new(&toml::from_str(&text).unwrap(), 1000)
+        Pilot::new(toml::from_str(&text).unwrap(), &NodeContext::new("pilot", &[]))
     }
 
     #[test]
@@ -123,8 +126,8 @@ mod tests {
     fn a_set_point_behind_the_end_of_the_run_is_told_and_one_before_is_not() {
         let step = |at_s: f64| serde_json::json!({"kind": "step", "channel": "altitude", "at_s": at_s, "to": 2.0, "unit": "m"});
         let parameters = serde_json::json!({"initial_altitude_m": 1.0, "set_points": [step(0.5), step(1.0)]});
-        let run = RunContext::new(&[], 1_000_000, 1, 1000);
-        assert_eq!((KIND.check)(&parameters, &run), Ok(()));
+        let run = NodeContext::new("node", &[]).timed(1_000_000, 1, 1000);
+        assert_eq!(Registration::of::<Pilot>().check(&parameters, &run), Ok(()));
         let warnings = run.into_warnings();
         assert!(warnings.len() == 1 && warnings[0].words.contains("set point 1"), "{warnings:?}");
     }
@@ -137,7 +140,8 @@ mod tests {
             serde_json::json!({"initial_altitude_m": -100_000.0}),
             serde_json::json!({"initial_altitude_m": 1.0, "set_points": [step]}),
         ] {
-            let words = (KIND.check)(&parameters, &RunContext::of_ports(&[])).unwrap_err();
+            let words =
+                Registration::of::<Pilot>().check(&parameters, &NodeContext::new("node", &[])).unwrap_err();
             assert!(words.contains("-20 000 m to 20 000 m") && words.contains("00000 m"), "{words}");
         }
     }

@@ -1,7 +1,8 @@
 //! The player node: publishes the motor commands and the measured states of a real flight.
 
 use crate::flight_log::{ColumnMap, FlightLog, Row};
-use bus::kind::{Inputs, NodeKind, PortSpec, RunContext, read_parameters};
+use bus::context::NodeContext;
+use bus::kind::{Inputs, NodeKind, PortSpec, read_parameters};
 use bus::messages::{MeasuredState, MotorCommand};
 use bus::{BusError, Message, Node};
 use serde::Deserialize;
@@ -50,7 +51,7 @@ fn load(parameters: &Parameters) -> Result<FlightLog, String> {
 const SLACK_S: f64 = 1e-9;
 
 /// Refuses a run that goes on behind the end of the flight.
-fn require_length(log: &FlightLog, from_s: f64, run: &RunContext<'_>) -> Result<(), String> {
+fn require_length(log: &FlightLog, from_s: f64, run: &NodeContext<'_>) -> Result<(), String> {
     let last_tick = (run.duration_ticks.max(1) - 1) / run.period_ticks * run.period_ticks;
     let (last_s, left_s) = (f64::from(last_tick) * run.tick_s(), log.duration_s() - from_s);
     if last_s <= left_s + SLACK_S {

@@ -9,7 +9,7 @@
 
 use crate::controller::{Airframe, Controller, ControllerState, Demand, Flown, Motion, Told};
 use crate::set_points::SetPoint;
-use bus::kind::RunContext;
+use bus::context::NodeContext;
 use bus::messages::{Reference, WallEstimate};
 use nalgebra::{UnitQuaternion, Vector3};
 
@@ -30,14 +30,18 @@ const COARSE: f64 = 0.5;
 ///
 /// # Errors
 /// What goes wrong, and which keys are to blame.
-pub(crate) fn check<C: Controller>(law: &C, airframe: &Airframe, run: &RunContext<'_>) -> Result<(), String> {
+pub(crate) fn check<C: Controller>(
+    law: &C,
+    airframe: &Airframe,
+    run: &NodeContext<'_>,
+) -> Result<(), String> {
     check_period(law.rate_gain_1_s(), run)?;
     warn_of_weight(airframe, run);
     let flown = Flown { law, vehicle: &airframe.vehicle, period_s: run.period_s() };
     motions().iter().try_for_each(|motion| fly(&flown, airframe, motion, run))
 }
 
-fn check_period(gain_1_s: f64, run: &RunContext<'_>) -> Result<(), String> {
+fn check_period(gain_1_s: f64, run: &NodeContext<'_>) -> Result<(), String> {
     let (product, hz) = (gain_1_s * run.period_s(), run.period_s().recip());
     let words = || {
         format!(
@@ -58,7 +62,7 @@ fn check_period(gain_1_s: f64, run: &RunContext<'_>) -> Result<(), String> {
     Ok(())
 }
 
-fn warn_of_weight(airframe: &Airframe, run: &RunContext<'_>) {
+fn warn_of_weight(airframe: &Airframe, run: &NodeContext<'_>) {
     let (_, most_N) = airframe.allocation.thrust_range_N(0.0);
     let weight_N = airframe.vehicle.mass_kg * airframe.vehicle.gravity_m_s2;
     if weight_N > most_N {
@@ -84,7 +88,7 @@ fn fly<C: Controller>(
     flown: &Flown<'_, C>,
     airframe: &Airframe,
     motion: &Motion,
-    run: &RunContext<'_>,
+    run: &NodeContext<'_>,
 ) -> Result<(), String> {
     let (reference, walls) = (Reference::default(), WallEstimate::default());
     let set_point = SetPoint { altitude_m: 1.5, roll_rad: 0.1, pitch_rad: -0.1, yaw_rad: 0.5 };
@@ -131,7 +135,7 @@ mod tests {
     use super::*;
     use crate::pid_gains::PidGains;
     use crate::pid_law::PidLaw;
-    use bus::kind::RunWarning;
+    use bus::context::Warning;
     use vehicles::Vehicle;
 
     fn hummingbird(change: impl Fn(&mut Vehicle)) -> Airframe {
@@ -141,8 +145,8 @@ mod tests {
         Airframe::new(vehicle).unwrap()
     }
 
-    fn checked(airframe: &Airframe, gains: PidGains, tick_ns: u64) -> (Result<(), String>, Vec<RunWarning>) {
-        let run = RunContext::new(&[], tick_ns, 1, 1000);
+    fn checked(airframe: &Airframe, gains: PidGains, tick_ns: u64) -> (Result<(), String>, Vec<Warning>) {
+        let run = NodeContext::new("node", &[]).timed(tick_ns, 1, 1000);
         let law = PidLaw { gains, vehicle: airframe.known(), period_s: run.period_s() };
         let outcome = check(&law, airframe, &run);
         (outcome, run.into_warnings())

@@ -2,7 +2,8 @@
 #![allow(non_snake_case, reason = "a trailing _W names the frame a vector is written in")]
 
 use crate::course::{Course, Point, Start};
-use bus::kind::{Inputs, NodeKind, PortSpec, RunContext, read_parameters};
+use bus::context::NodeContext;
+use bus::kind::{Inputs, NodeKind, PortSpec, read_parameters};
 use bus::messages::{Reference, Vector3};
 use bus::{BusError, Message, Node};
 use serde::Deserialize;
@@ -45,7 +46,7 @@ fn course(parameters: &Parameters) -> Result<Course, String> {
 }
 
 /// Warns of segments that the run ends before.
-fn warn_of_late(course: &Course, run: &RunContext<'_>) {
+fn warn_of_late(course: &Course, run: &NodeContext<'_>) {
     let end_s = run.duration_s();
     if let Some((index, start_s)) = course.starts_s().enumerate().find(|(_, start_s)| *start_s >= end_s) {
         run.warn_behind_end(format!(

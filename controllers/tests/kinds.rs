@@ -1,6 +1,7 @@
 //! What the kinds of controller and the pilot accept and refuse before a start, and that the documentation says so.
 
-use bus::kind::{NodeKind, RunContext};
+use bus::context::NodeContext;
+use bus::kind::NodeKind;
 use controllers::{cascade, pid, pilot, velocity, wall_follow, wall_stop};
 use serde_json::{Value, json};
 
@@ -18,7 +19,7 @@ fn accepted() -> [(NodeKind, Value); 6] {
         (velocity::KIND, json!({ "vehicle": VEHICLE, "altitude_m": 1.5 })),
         (wall_stop::KIND, json!({ "vehicle": VEHICLE, "altitude_m": 1.5 })),
         (wall_follow::KIND, json!({ "vehicle": VEHICLE, "altitude_m": 1.5, "mode": "constant" })),
-        (pilot::KIND, json!({ "initial_altitude_m": 1.0 })),
+        (NodeKind::of::<pilot::Pilot>(), json!({ "initial_altitude_m": 1.0 })),
     ]
 }
 
@@ -32,14 +33,18 @@ fn with(parameters: &Value, key: &str, value: Value) -> Value {
 #[test]
 fn every_kind_flies_with_its_own_gains_file() {
     for (kind, parameters) in accepted() {
-        (kind.check)(&parameters, &RunContext::of_ports(&[])).unwrap();
+        (kind.check)(&parameters, &NodeContext::new("node", &[])).unwrap();
         if kind.name != "pilot" {
-            (kind.check)(&with(&parameters, "gains", json!(gains(kind.name))), &RunContext::of_ports(&[]))
-                .unwrap();
+            (kind.check)(
+                &with(&parameters, "gains", json!(gains(kind.name))),
+                &NodeContext::new("node", &[]),
+            )
+            .unwrap();
         }
     }
     let [(pid, parameters), ..] = accepted();
-    (pid.check)(&with(&parameters, "gains", json!(gains("pid-thesis"))), &RunContext::of_ports(&[])).unwrap();
+    (pid.check)(&with(&parameters, "gains", json!(gains("pid-thesis"))), &NodeContext::new("node", &[]))
+        .unwrap();
 }
 
 #[test]
@@ -47,7 +52,7 @@ fn the_gains_file_of_another_law_is_refused_by_name_and_place() {
     for (kind, parameters) in accepted().into_iter().take(5) {
         let other = if kind.name == "cascade" { "pid" } else { "cascade" };
         let outcome =
-            (kind.check)(&with(&parameters, "gains", json!(gains(other))), &RunContext::of_ports(&[]));
+            (kind.check)(&with(&parameters, "gains", json!(gains(other))), &NodeContext::new("node", &[]));
         // A velocity file may hold the cascade's tables alone.
         if kind.name != "velocity" {
             let error = outcome.unwrap_err();
@@ -86,7 +91,7 @@ fn impossible_parameters_are_refused_by_their_key() {
         (pilot, with(&hold, "data", json!("no-such.csv")), "no-such.csv"),
     ];
     for (kind, parameters, key) in cases {
-        let error = (kind.check)(&parameters, &RunContext::of_ports(&[])).unwrap_err();
+        let error = (kind.check)(&parameters, &NodeContext::new("node", &[])).unwrap_err();
         assert!(error.contains(key), "{} with {parameters}: {error}", kind.name);
     }
 }
@@ -95,17 +100,17 @@ fn impossible_parameters_are_refused_by_their_key() {
 fn a_velocity_comes_from_a_reference_or_from_parameters_and_never_from_both() {
     let [_, _, (velocity, fly), ..] = accepted();
     let vehicle_only = json!({ "vehicle": VEHICLE });
-    (velocity.check)(&vehicle_only, &RunContext::of_ports(&["estimate", "reference"])).unwrap();
-    let error = (velocity.check)(&vehicle_only, &RunContext::of_ports(&["estimate"])).unwrap_err();
+    (velocity.check)(&vehicle_only, &NodeContext::new("node", &["estimate", "reference"])).unwrap();
+    let error = (velocity.check)(&vehicle_only, &NodeContext::new("node", &["estimate"])).unwrap_err();
     assert!(error.starts_with("missing field `altitude_m`"), "{error}");
-    let error = (velocity.check)(&fly, &RunContext::of_ports(&["estimate", "reference"])).unwrap_err();
+    let error = (velocity.check)(&fly, &NodeContext::new("node", &["estimate", "reference"])).unwrap_err();
     assert!(error.contains("`altitude_m`") && error.contains("`reference`"), "{error}");
 }
 
 /// The parameters that a kind's refusal of an unknown one names as known.
 fn known(kind: &NodeKind, parameters: &Value) -> Vec<String> {
     let error =
-        (kind.check)(&with(parameters, "unknown_key", json!(1)), &RunContext::of_ports(&[])).unwrap_err();
+        (kind.check)(&with(parameters, "unknown_key", json!(1)), &NodeContext::new("node", &[])).unwrap_err();
     let list = error.split("unknown field `unknown_key`").nth(1).unwrap_or_else(|| panic!("{error}"));
     list.split('`').skip(1).step_by(2).map(str::to_owned).collect()
 }

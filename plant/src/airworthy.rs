@@ -4,7 +4,7 @@
 use crate::airframe::Airframe;
 use crate::backend::Backend;
 use crate::state::State;
-use bus::kind::RunContext;
+use bus::context::NodeContext;
 use std::path::Path;
 use vehicles::{MotorModel, Vehicle};
 
@@ -32,7 +32,7 @@ const REHEARSAL_STEPS: u32 = 300;
 ///
 /// # Errors
 /// The lag, the step, and what to do.
-pub(crate) fn check_steps(airframe: &Airframe, span_s: f64, run: &RunContext<'_>) -> Result<(), String> {
+pub(crate) fn check_steps(airframe: &Airframe, span_s: f64, run: &NodeContext<'_>) -> Result<(), String> {
     let product = fastest_pole_rad_s(&airframe.vehicle().motor) * span_s;
     let words = |limit: f64| {
         format!(
@@ -65,7 +65,7 @@ fn fastest_pole_rad_s(motor: &MotorModel) -> f64 {
 ///
 /// # Errors
 /// Both forces, and the keys that they come from.
-pub(crate) fn check_lift(vehicle: &Vehicle, path: &Path, run: &RunContext<'_>) -> Result<(), String> {
+pub(crate) fn check_lift(vehicle: &Vehicle, path: &Path, run: &NodeContext<'_>) -> Result<(), String> {
     let (least_N, most_N) =
         (lift_N(vehicle, least_speed_rad_s(vehicle)), lift_N(vehicle, vehicle.command.speed_at_max_rad_s));
     let weight_N = vehicle.mass_kg * vehicle.gravity_m_s2;
@@ -174,7 +174,7 @@ fn first_not_finite(backend: &dyn Backend) -> Option<&'static str> {
 mod tests {
     use super::*;
     use crate::{FreeFlight, NewtonEuler, RigidBody};
-    use bus::kind::RunWarning;
+    use bus::context::Warning;
     use nalgebra::Vector3;
 
     const PATH: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../vehicles/hummingbird.toml");
@@ -185,8 +185,8 @@ mod tests {
         vehicle
     }
 
-    fn lift(change: impl Fn(&mut Vehicle)) -> (Result<(), String>, Vec<RunWarning>) {
-        let run = RunContext::of_ports(&[]);
+    fn lift(change: impl Fn(&mut Vehicle)) -> (Result<(), String>, Vec<Warning>) {
+        let run = NodeContext::new("node", &[]);
         let outcome = check_lift(&hummingbird(change), PATH.as_ref(), &run);
         (outcome, run.into_warnings())
     }
@@ -220,7 +220,7 @@ mod tests {
     #[test]
     fn motors_that_a_step_cannot_follow_are_refused_with_both() {
         let steps = |span_s: f64| {
-            let run = RunContext::of_ports(&[]);
+            let run = NodeContext::new("node", &[]);
             let outcome = check_steps(&Airframe::new(hummingbird(|_| {})), span_s, &run);
             (outcome, run.into_warnings())
         };

@@ -1,82 +1,104 @@
-//! The plant node: steps the vehicle from tick to tick under the motor command of the tick before.
+//! The plant: steps the vehicle from tick to tick under the motor command of the tick before.
 //!
 //! At tick k it moves the state from k − 1 to k under the command stamped k − 1, then publishes it. With a
 //! `measured` input it is set to the measured state at the start of each window, after publishing: what it
 //! publishes at that tick is the end of the window before.
 #![allow(non_snake_case, reason = "a trailing _W names the frame a vector is written in")]
 
+use crate::airworthy;
+use crate::backend::Backend;
 use crate::others::Others;
 use crate::output::Outputs;
-use crate::parameters::{self, Parameters};
+use crate::parameters::Parameters;
 use crate::state::RigidBody;
-use bus::kind::{Inputs, NodeKind, PortSpec};
-use bus::messages::{
-    Battery, BodyTransform, Contact, MeasuredState, MotorCommand, PlantState, PoseStamped, Traffic,
-};
-use bus::{BusError, Message, Node};
+use bus::InputPorts;
+use bus::component::{Component, Info, Internal, StepError};
+use bus::context::{NodeContext, StepContext};
+use bus::messages::{MeasuredState, MotorCommand, Traffic};
 use nalgebra::{UnitQuaternion, Vector3};
+use vehicles::Vehicle;
 
-/// The plant, for manifests.
-pub const KIND: NodeKind = NodeKind {
-    name: "plant",
-    summary: "flies the vehicle of a vehicle file, freely or in a scene",
-    inputs: Inputs::Ports(&[
-        PortSpec::required("command", MotorCommand::SCHEMA),
-        PortSpec::optional("measured", MeasuredState::SCHEMA),
-        PortSpec::optional("traffic", Traffic::SCHEMA),
-    ]),
-    outputs: &[
-        PortSpec::required("state", PlantState::SCHEMA),
-        PortSpec::optional("pose", PoseStamped::SCHEMA),
-        PortSpec::optional("tf", BodyTransform::SCHEMA),
-        PortSpec::optional("contact", Contact::SCHEMA),
-        PortSpec::optional("battery", Battery::SCHEMA),
-    ],
-    check: parameters::check,
-    run,
-};
+/// What the plant reads.
+#[derive(Debug, InputPorts)]
+pub struct Inputs<'a> {
+    /// The motors' command.
+    pub command: &'a MotorCommand,
+    /// A measured flight, to whose state the vehicle is set at the start of each window.
+    pub measured: Option<&'a MeasuredState>,
+    /// The vehicles that share the room, this one among them.
+    pub traffic: Option<&'a Traffic>,
+}
 
-fn run() -> Result<(), BusError> {
-    let mut node = Node::join()?;
-    let parameters: Parameters = node.parameters()?;
-    let backend = parameters.backend(node.seed(), node.name(), node.tick_s());
-    let mut backend = backend.map_err(|error| node.error(error))?;
-    let command = node.input::<MotorCommand>("command")?;
-    let measured = node.optional_input::<MeasuredState>("measured");
-    let traffic = node.optional_input::<Traffic>("traffic");
-    let outputs = Outputs::declare(&mut node)?;
-    let dt_s = node.tick_s();
-    let window_ticks =
-        parameters.window_s.map(|window_s| parameters::window_ticks(window_s, dt_s)).transpose();
-    let window_ticks = window_ticks.map_err(|error| node.error(error))?.unwrap_or(u32::MAX);
-    if node.period_s() != dt_s {
-        // It would apply a command before it was computed.
-        return Err(node.error("a plant runs at every tick; leave `period_ticks` out"));
+/// The plant: its vehicle, and what moves it.
+pub struct Plant {
+    vehicle: Vehicle,
+    substeps: u32,
+    backend: Box<dyn Backend>,
+    /// Ticks between two settings to what is measured.
+    window_ticks: u32,
+    dt_s: f64,
+    others: Others,
+}
+
+impl Component for Plant {
+    const INFO: Info = Info::new("plant", "flies the vehicle of a vehicle file, freely or in a scene");
+    type Parameters = Parameters;
+    type Inputs<'a> = Inputs<'a>;
+    type Outputs = Outputs;
+    type State = Internal;
+
+    fn new(parameters: Parameters, context: &NodeContext<'_>) -> Result<Self, String> {
+        let (dt_s, substeps) = (context.tick_s(), parameters.substeps);
+        let (vehicle, backend) = parameters.backend(context)?;
+        let window_ticks = parameters.window_ticks(dt_s)?;
+        Ok(Self { vehicle, substeps, backend, window_ticks, dt_s, others: Others::new() })
     }
-    let mut others = Others::new();
-    node.run(|tick| {
-        let number = tick.number();
-        let window = measured.filter(|_| number.is_multiple_of(window_ticks));
-        let commands = tick.get(command).command;
-        if number > 0 {
-            let before_ns = tick.time_ns() / u64::from(number) * u64::from(number - 1);
-            let own_W_m = backend.state().body.position_W_m;
-            let seen =
-                traffic.map(|traffic| others.seen(tick.get(traffic), &own_W_m, before_ns)).transpose()?;
-            backend.step(&commands, dt_s, seen.unwrap_or_default());
+
+    fn rehearse(mut self, _: &NodeContext<'_>) -> Result<(), String> {
+        airworthy::rehearse(&mut *self.backend, &self.vehicle, self.substeps, self.dt_s)
+    }
+
+    fn initial(&self) -> Internal {
+        Internal
+    }
+
+    fn step(
+        &mut self,
+        context: &StepContext<'_>,
+        inputs: Inputs<'_>,
+        _: &mut Internal,
+    ) -> Result<Outputs, StepError> {
+        let measured = inputs.measured.filter(|_| context.tick().is_multiple_of(self.window_ticks));
+        if context.tick() > 0 {
+            self.fly(context, &inputs)?;
         } else {
             // The input's initial value: the rotors turn steadily at it when the run starts.
-            backend.settle_rotors(&commands);
-            if let Some(measured) = window {
-                backend.set_body(&body(tick.get(measured)));
-            }
+            self.backend.settle_rotors(&inputs.command.command);
+            self.set_body(measured);
         }
-        outputs.publish(tick, &*backend).map_err(|error| error.to_string())?;
-        if let Some(measured) = window {
-            backend.set_body(&body(tick.get(measured)));
+        let outputs = Outputs::of(&*self.backend, context.time_ns());
+        self.set_body(measured);
+        Ok(outputs)
+    }
+}
+
+impl Plant {
+    /// Moves the vehicle by the tick that ends now.
+    fn fly(&mut self, context: &StepContext<'_>, inputs: &Inputs<'_>) -> Result<(), StepError> {
+        let number = u64::from(context.tick());
+        let before_ns = context.time_ns() / number * (number - 1);
+        let own_W_m = self.backend.state().body.position_W_m;
+        let seen =
+            inputs.traffic.map(|traffic| self.others.seen(traffic, &own_W_m, before_ns)).transpose()?;
+        self.backend.step(&inputs.command.command, self.dt_s, seen.unwrap_or_default());
+        Ok(())
+    }
+
+    fn set_body(&mut self, measured: Option<&MeasuredState>) {
+        if let Some(measured) = measured {
+            self.backend.set_body(&body(measured));
         }
-        Ok::<_, String>(())
-    })
+    }
 }
 
 fn body(measured: &MeasuredState) -> RigidBody {
@@ -87,5 +109,57 @@ fn body(measured: &MeasuredState) -> RigidBody {
         velocity_W_m_s: vector(measured.velocity),
         attitude_WB: UnitQuaternion::new_normalize(nalgebra::Quaternion::new(q.w, q.x, q.y, q.z)),
         angular_velocity_B_rad_s: vector(measured.angular_velocity),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use bus::Registration;
+    use serde_json::{Value, json};
+
+    fn repository(file: &str) -> String {
+        format!("{}/../{file}", env!("CARGO_MANIFEST_DIR"))
+    }
+
+    fn checked(scene: &str, more: Value, ports: &[&str]) -> Result<(), String> {
+        let mut parameters = json!({
+            "vehicle": repository("vehicles/hummingbird.toml"),
+            "scene": repository(scene),
+            "backend": "rapier",
+        });
+        parameters.as_object_mut().unwrap().extend(more.as_object().unwrap().clone());
+        Registration::of::<Plant>().check(&parameters, &NodeContext::new("plant", ports))
+    }
+
+    #[test]
+    fn a_start_inside_of_a_box_is_refused_and_names_both() {
+        let start = |x: f64| checked("scenes/room.toml", json!({ "initial_position_m": [x, 0.0, 1.0] }), &[]);
+        // The hull reaches 0.2716 m; the wall stands at 5 m.
+        assert_eq!(start(4.7), Ok(()));
+        for x in [4.8, 5.05, 5.3] {
+            let error = start(x).unwrap_err();
+            assert!(error.contains("`initial_position_m`") && error.contains("\"wall +x\""), "{error}");
+        }
+        let measured = json!({ "initial_position_m": [5.05, 0.0, 1.0], "window_s": 0.1 });
+        assert_eq!(checked("scenes/room.toml", measured, &["measured"]), Ok(()));
+    }
+
+    #[test]
+    fn substeps_have_a_least_and_a_most() {
+        let with = |substeps: u32| checked("scenes/ground.toml", json!({ "substeps": substeps }), &[]);
+        assert_eq!((with(1), with(1000)), (Ok(()), Ok(())));
+        for substeps in [0, 1001, u32::MAX] {
+            assert!(with(substeps).unwrap_err().contains("`substeps`"));
+        }
+    }
+
+    #[test]
+    fn contact_needs_a_backend_that_touches() {
+        let free = json!({ "backend": "newton-euler" });
+        let error = checked("scenes/ground.toml", free.clone(), &["command", "contact"]).unwrap_err();
+        assert!(error.contains("`contact`") && error.contains("`backend`"), "{error}");
+        assert_eq!(checked("scenes/ground.toml", free, &["command"]), Ok(()));
+        assert_eq!(checked("scenes/ground.toml", json!({}), &["command", "contact"]), Ok(()));
     }
 }

@@ -1,50 +1,39 @@
 //! What a plant publishes.
 
 use crate::backend::Backend;
+use bus::OutputPorts;
 use bus::messages::{
     Battery, BodyTransform, Contact, Orientation, PlantState, Point, Pose, PoseStamped, Quaternion,
 };
-use bus::{BusError, Node, Output, Tick};
 use nalgebra::{UnitQuaternion, Vector3};
 
-/// The outputs of a plant; those behind an option exist where the manifest names them.
-pub(crate) struct Outputs {
-    state: Output<PlantState>,
-    pose: Option<Output<PoseStamped>>,
-    tf: Option<Output<BodyTransform>>,
-    contact: Option<Output<Contact>>,
-    battery: Option<Output<Battery>>,
+/// The outputs of a plant.
+#[derive(Debug, OutputPorts)]
+pub struct Outputs {
+    /// The truth.
+    pub state: PlantState,
+    /// The pose, for 3-D views.
+    pub pose: Option<PoseStamped>,
+    /// The transform of the body, for 3-D views.
+    pub tf: Option<BodyTransform>,
+    /// What is touched; with the backend `rapier`.
+    pub contact: Option<Contact>,
+    /// The battery, where an effect models it.
+    pub battery: Option<Battery>,
 }
 
 impl Outputs {
-    pub(crate) fn declare(node: &mut Node) -> Result<Self, BusError> {
-        Ok(Self {
-            state: node.output("state")?,
-            pose: node.optional_output("pose")?,
-            tf: node.optional_output("tf")?,
-            contact: node.optional_output("contact")?,
-            battery: node.optional_output("battery")?,
-        })
-    }
-
-    pub(crate) fn publish(&self, tick: &mut Tick<'_>, backend: &dyn Backend) -> Result<(), BusError> {
-        tick.write(self.state, state(backend))?;
+    /// The motion of `backend`, at `time_ns`.
+    pub(crate) fn of(backend: &dyn Backend, time_ns: u64) -> Self {
         let body = &backend.state().body;
         let (position, orientation) = (point(&body.position_W_m), orientation(&body.attitude_WB));
-        if let Some(pose) = self.pose {
-            let message = PoseStamped { pose: Pose { position, orientation }, ..Default::default() };
-            tick.write(pose, message)?;
+        Self {
+            state: state(backend),
+            pose: Some(PoseStamped { pose: Pose { position, orientation }, ..Default::default() }),
+            tf: Some(BodyTransform::new(position, orientation)),
+            contact: Some(contact(backend)),
+            battery: Some(battery_message(backend, time_ns)),
         }
-        if let Some(tf) = self.tf {
-            tick.write(tf, BodyTransform::new(position, orientation))?;
-        }
-        if let Some(output) = self.contact {
-            tick.write(output, contact(backend))?;
-        }
-        if let Some(battery) = self.battery {
-            tick.write(battery, battery_message(backend, tick.time_ns()))?;
-        }
-        Ok(())
     }
 }
 

@@ -5,10 +5,11 @@ use crate::airframe::Airframe;
 use crate::airworthy;
 use crate::backend::Backend;
 use crate::free_flight::FreeFlight;
+use crate::memory::AirframeMemory;
 use crate::newton_euler::NewtonEuler;
 use crate::rapier::Rapier;
 use crate::state::RigidBody;
-use bus::kind::{RunContext, read_parameters};
+use bus::context::NodeContext;
 use nalgebra::{UnitQuaternion, Vector3};
 use scenes::Scene;
 use serde::Deserialize;
@@ -18,7 +19,7 @@ use vehicles::{EffectEntry, Vehicle};
 /// Parameters of the plant.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(crate) struct Parameters {
+pub struct Parameters {
     /// Vehicle file.
     vehicle: PathBuf,
     /// Scene file; nothing but the ground where it is left out.
@@ -37,9 +38,9 @@ pub(crate) struct Parameters {
     initial_yaw_deg: f64,
     /// Integration steps per tick.
     #[serde(default = "one")]
-    substeps: u32,
+    pub(crate) substeps: u32,
     /// With a `measured` input: time between two settings to the measured state.
-    pub(crate) window_s: Option<f64>,
+    window_s: Option<f64>,
     /// With `rapier`: an impact that is faster is a crash.
     crash_speed_m_s: Option<f64>,
 }
@@ -63,28 +64,8 @@ fn one() -> u32 {
     1
 }
 
-/// Refuses what cannot be meant, or cannot fly.
-pub(crate) fn check(parameters: &serde_json::Value, run: &RunContext<'_>) -> Result<(), String> {
-    let parameters: Parameters = read_parameters(parameters)?;
-    parameters.check_numbers()?;
-    parameters.check_ports(run.ports)?;
-    require_every_tick(run.period_ticks)?;
-    if let Some(window_s) = parameters.window_s {
-        window_ticks(window_s, run.tick_s())?;
-    }
-    // Before the backend, which a vehicle that is none might not survive.
-    let (airframe, scene) = parameters.airframe()?;
-    airworthy::check_steps(&airframe, run.tick_s() / f64::from(parameters.substeps), run)?;
-    if scene.rig.is_none() && parameters.window_s.is_none() {
-        airworthy::check_lift(airframe.vehicle(), &parameters.vehicle, run)?;
-    }
-    // Any stream serves here.
-    let mut backend = parameters.backend(0, "", run.tick_s())?;
-    airworthy::rehearse(&mut *backend, airframe.vehicle(), parameters.substeps, run.tick_s())
-}
-
 /// A plant that ran less often would apply a command before it was computed.
-pub(crate) fn require_every_tick(period_ticks: u32) -> Result<(), String> {
+fn require_every_tick(period_ticks: u32) -> Result<(), String> {
     match period_ticks {
         1 => Ok(()),
         other => {
@@ -99,7 +80,7 @@ pub(crate) fn require_every_tick(period_ticks: u32) -> Result<(), String> {
     clippy::cast_sign_loss,
     reason = "checked to be positive and short"
 )]
-pub(crate) fn window_ticks(window_s: f64, tick_s: f64) -> Result<u32, String> {
+fn window_ticks(window_s: f64, tick_s: f64) -> Result<u32, String> {
     let ticks = (window_s / tick_s).round();
     if (window_s / tick_s - ticks).abs() < 1e-6 && (1.0..=f64::from(u32::MAX)).contains(&ticks) {
         return Ok(ticks as u32);
@@ -110,6 +91,27 @@ pub(crate) fn window_ticks(window_s: f64, tick_s: f64) -> Result<u32, String> {
 }
 
 impl Parameters {
+    /// Refuses what cannot be meant.
+    fn check(&self, run: &NodeContext<'_>) -> Result<(), String> {
+        self.check_numbers()?;
+        self.check_ports(run)?;
+        require_every_tick(run.period_ticks)
+    }
+
+    /// Refuses what cannot fly.
+    fn check_flight(&self, airframe: &Airframe, scene: &Scene, run: &NodeContext<'_>) -> Result<(), String> {
+        airworthy::check_steps(airframe, run.tick_s() / f64::from(self.substeps), run)?;
+        if scene.rig.is_none() && self.window_s.is_none() {
+            airworthy::check_lift(airframe.vehicle(), &self.vehicle, run)?;
+        }
+        Ok(())
+    }
+
+    /// Ticks of `tick_s` between two settings to what is measured; longer than any run without.
+    pub(crate) fn window_ticks(&self, tick_s: f64) -> Result<u32, String> {
+        self.window_s.map_or(Ok(u32::MAX), |window_s| window_ticks(window_s, tick_s))
+    }
+
     fn check_numbers(&self) -> Result<(), String> {
         self.check_start()?;
         if !(1..=SUBSTEPS_MAX).contains(&self.substeps) {
@@ -139,8 +141,8 @@ impl Parameters {
         finite("initial_yaw_deg", &[self.initial_yaw_deg])
     }
 
-    fn check_ports(&self, ports: &[&str]) -> Result<(), String> {
-        let needs_rapier = |port| ports.contains(&port) && self.backend == BackendName::NewtonEuler;
+    fn check_ports(&self, run: &NodeContext<'_>) -> Result<(), String> {
+        let needs_rapier = |port| run.has(port) && self.backend == BackendName::NewtonEuler;
         if needs_rapier("traffic") {
             return Err(
                 "the input `traffic` needs `backend` = \"rapier\": free flight meets nobody".to_owned()
@@ -153,19 +155,35 @@ impl Parameters {
                     .to_owned(),
             );
         }
-        match (ports.contains(&"measured"), self.window_s) {
+        match (run.has("measured"), self.window_s) {
             (true, None) => Err("the input `measured` needs the parameter `window_s`".to_owned()),
             (false, Some(_)) => Err("the parameter `window_s` needs the input `measured`".to_owned()),
             _ => Ok(()),
         }
     }
 
-    /// The backend that flies the vehicle, as it is at tick 0, in ticks of `dt_s`; the effects of `node` draw their
-    /// random numbers by the run's `seed`.
-    pub(crate) fn backend(&self, seed: u64, node: &str, dt_s: f64) -> Result<Box<dyn Backend>, String> {
+    /// The vehicle, and the backend that flies it, as it is at tick 0; the effects draw their random numbers by the
+    /// run's seed and the node's name.
+    ///
+    /// # Errors
+    /// What cannot be meant, or cannot fly.
+    pub(crate) fn backend(&self, run: &NodeContext<'_>) -> Result<(Vehicle, Box<dyn Backend>), String> {
+        self.check(run)?;
         let (airframe, scene) = self.airframe()?;
-        let memory = airframe.memory(seed, node, dt_s);
+        // Before the backend, which a vehicle that is none might not survive.
+        self.check_flight(&airframe, &scene, run)?;
+        let vehicle = airframe.vehicle().clone();
+        let memory = airframe.memory(run.seed, run.name, run.tick_s());
         let model = NewtonEuler::flying(airframe, self.substeps);
+        Ok((vehicle, self.fly(model, memory, &scene)?))
+    }
+
+    fn fly(
+        &self,
+        model: NewtonEuler,
+        memory: AirframeMemory,
+        scene: &Scene,
+    ) -> Result<Box<dyn Backend>, String> {
         match self.backend {
             BackendName::NewtonEuler if scene.rig.is_some() => Err(format!(
                 "`scene` \"{}\" holds a rig, which needs `backend` = \"rapier\": newton-euler flies freely",
@@ -174,8 +192,8 @@ impl Parameters {
             BackendName::NewtonEuler => Ok(Box::new(FreeFlight::new(model, self.start(), memory))),
             BackendName::Rapier => {
                 let crash_speed_m_s = self.crash_speed_m_s.unwrap_or(CRASH_SPEED_M_S);
-                let rapier = Rapier::new(model, memory, &scene, &self.start(), crash_speed_m_s);
-                self.refuse_inside(&rapier, &scene)?;
+                let rapier = Rapier::new(model, memory, scene, &self.start(), crash_speed_m_s);
+                self.refuse_inside(&rapier, scene)?;
                 Ok(Box::new(rapier))
             }
         }
@@ -236,33 +254,9 @@ fn is_positive(number: f64) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use serde_json::{Value, json};
 
     fn repository(file: &str) -> String {
         format!("{}/../{file}", env!("CARGO_MANIFEST_DIR"))
-    }
-
-    fn checked(scene: &str, more: Value, ports: &[&str]) -> Result<(), String> {
-        let mut parameters = json!({
-            "vehicle": repository("vehicles/hummingbird.toml"),
-            "scene": repository(scene),
-            "backend": "rapier",
-        });
-        parameters.as_object_mut().unwrap().extend(more.as_object().unwrap().clone());
-        check(&parameters, &RunContext::of_ports(ports))
-    }
-
-    #[test]
-    fn a_start_inside_of_a_box_is_refused_and_names_both() {
-        let start = |x: f64| checked("scenes/room.toml", json!({ "initial_position_m": [x, 0.0, 1.0] }), &[]);
-        // The hull reaches 0.2716 m; the wall stands at 5 m.
-        assert_eq!(start(4.7), Ok(()));
-        for x in [4.8, 5.05, 5.3] {
-            let error = start(x).unwrap_err();
-            assert!(error.contains("`initial_position_m`") && error.contains("\"wall +x\""), "{error}");
-        }
-        let measured = json!({ "initial_position_m": [5.05, 0.0, 1.0], "window_s": 0.1 });
-        assert_eq!(checked("scenes/room.toml", measured, &["measured"]), Ok(()));
     }
 
     #[test]
@@ -285,23 +279,5 @@ mod tests {
     /// Any effect, from a file.
     fn effect_entry() -> EffectEntry {
         Scene::load(repository("scenes/ground-disturbed.toml").as_ref()).unwrap().effects.remove(0)
-    }
-
-    #[test]
-    fn substeps_have_a_least_and_a_most() {
-        let with = |substeps: u32| checked("scenes/ground.toml", json!({ "substeps": substeps }), &[]);
-        assert_eq!((with(1), with(1000)), (Ok(()), Ok(())));
-        for substeps in [0, 1001, u32::MAX] {
-            assert!(with(substeps).unwrap_err().contains("`substeps`"));
-        }
-    }
-
-    #[test]
-    fn contact_needs_a_backend_that_touches() {
-        let free = json!({ "backend": "newton-euler" });
-        let error = checked("scenes/ground.toml", free.clone(), &["command", "contact"]).unwrap_err();
-        assert!(error.contains("`contact`") && error.contains("`backend`"), "{error}");
-        assert_eq!(checked("scenes/ground.toml", free, &["command"]), Ok(()));
-        assert_eq!(checked("scenes/ground.toml", json!({}), &["command", "contact"]), Ok(()));
     }
 }

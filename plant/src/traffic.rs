@@ -1,53 +1,57 @@
-//! The traffic node: gathers where the vehicles of a run are into one sample, for those that share a room.
+//! The traffic: gathers where the vehicles of a run are into one sample, for those that share a room.
 
 use crate::backend::TRAFFIC_MAX;
-use bus::kind::{Inputs, NodeKind, PortSpec, RunContext, read_parameters};
-use bus::messages::{PlantState, Traffic};
-use bus::{BusError, Input, Message, Node, Tick};
+use bus::OutputPorts;
+use bus::component::{Component, Info, StepError};
+use bus::context::{NodeContext, StepContext};
+use bus::messages::{PlantState, Traffic as Gathered};
+use bus::ports::Many;
 use serde::Deserialize;
 
-/// The traffic, for manifests.
-pub const KIND: NodeKind = NodeKind {
-    name: "traffic",
-    summary: "gathers the states of up to 16 plants",
-    inputs: Inputs::Many(PlantState::SCHEMA),
-    outputs: &[PortSpec::required("traffic", Traffic::SCHEMA)],
-    check,
-    run,
-};
+/// Gathers the states of the plants of a run.
+#[derive(Debug)]
+pub struct Traffic;
 
 /// It has no parameters.
-#[derive(Deserialize)]
+#[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-struct Parameters {}
+pub struct Parameters {}
 
-fn check(parameters: &serde_json::Value, run: &RunContext<'_>) -> Result<(), String> {
-    let Parameters {} = read_parameters(parameters)?;
-    let inputs = run.ports;
-    if inputs.len() <= TRAFFIC_MAX {
-        Ok(())
-    } else {
-        Err(format!("{} inputs, expected at most {TRAFFIC_MAX} vehicles", inputs.len()))
-    }
+/// What it sends.
+#[derive(Debug, OutputPorts)]
+pub struct Outputs {
+    /// The states, in the order of the inputs' names.
+    pub traffic: Gathered,
 }
 
-fn run() -> Result<(), BusError> {
-    let mut node = Node::join()?;
-    let states = node.every_input::<PlantState>();
-    let output = node.output::<Traffic>("traffic")?;
-    node.run(|tick| {
-        let traffic = gathered(tick, &states);
-        tick.write(output, traffic)
-    })
-}
+impl Component for Traffic {
+    const INFO: Info = Info::new("traffic", "gathers the states of up to 16 plants");
+    type Parameters = Parameters;
+    type Inputs<'a> = Many<'a, PlantState>;
+    type Outputs = Outputs;
+    type State = ();
 
-#[allow(clippy::cast_possible_truncation, reason = "at most TRAFFIC_MAX")]
-fn gathered(tick: &Tick<'_>, states: &[Input<PlantState>]) -> Traffic {
-    let mut traffic = Traffic { count: states.len() as u32, ..Default::default() };
-    for (number, state) in states.iter().enumerate() {
-        let state = tick.get(*state);
-        traffic.position[number] = state.position;
-        traffic.velocity[number] = state.velocity;
+    fn new(Parameters {}: Parameters, context: &NodeContext<'_>) -> Result<Self, String> {
+        match context.inputs.len() {
+            0..=TRAFFIC_MAX => Ok(Self),
+            count => Err(format!("{count} inputs, expected at most {TRAFFIC_MAX} vehicles")),
+        }
     }
-    traffic
+
+    fn initial(&self) {}
+
+    fn step(
+        &mut self,
+        _: &StepContext<'_>,
+        states: Many<'_, PlantState>,
+        (): &mut (),
+    ) -> Result<Outputs, StepError> {
+        let mut traffic = Gathered::default();
+        for (number, state) in states.iter().enumerate() {
+            traffic.position[number] = state.position;
+            traffic.velocity[number] = state.velocity;
+            traffic.count += 1;
+        }
+        Ok(Outputs { traffic })
+    }
 }

@@ -1,10 +1,11 @@
-//! The recorder node: takes every sample of its inputs and writes their bytes to the file.
+//! The recorder: takes every sample of its inputs and writes their bytes to the file.
 
 use crate::error::RecordingError;
 use crate::writer::{ChannelId, RecordingWriter};
 use bus::announcement::Announcement;
-use bus::kind::{Inputs, NodeKind, read_parameters};
-use bus::{BusError, ConnectedNode, Node, RawInput, Tick};
+use bus::component::{Component, Info, Internal, StepError};
+use bus::context::{NodeContext, StepContext};
+use bus::ports::AnyInputs;
 use serde::Deserialize;
 use std::path::PathBuf;
 
@@ -36,50 +37,69 @@ pub struct AttachedFile {
 /// publisher.
 pub const SHADOW_PREFIX: &str = "/shadow";
 
-/// The recorder, for manifests.
-pub const KIND: NodeKind = NodeKind {
-    name: "recorder",
-    summary: "writes every sample of its inputs (all topics where none is named) to an MCAP file",
-    inputs: Inputs::Any,
-    outputs: &[],
-    check: |parameters, _| read_parameters::<Parameters>(parameters).map(|_| ()),
-    run,
-};
+/// The recorder of a run.
+pub struct Recorder {
+    parameters: Parameters,
+    flush_ticks: u32,
+    recording: Option<Recording>,
+}
 
-/// Runs the recorder of this process's run.
-///
-/// # Errors
-/// If the run or the file fails.
-pub fn run() -> Result<(), BusError> {
-    let mut node = Node::join()?;
-    let name = node.name().to_owned();
-    let parameters: Parameters = node.parameters()?;
-    let inputs = node.raw_inputs();
-    let flush_ticks = flush_period_ticks(node.tick_s());
-    let node = node.connect()?;
-    let failed =
-        |error: RecordingError| BusError::Parameters { node: name.clone(), reason: error.to_string() };
-    let (mut writer, channels) = open(&parameters, &node, &inputs).map_err(failed)?;
-    // A shadow's channel is added with its first sample, whose tick is a function of the run.
-    let types: Vec<(String, Announcement)> = inputs
-        .iter()
-        .map(|&input| {
-            let (topic, announcement) = node.announcement(input);
-            (format!("{SHADOW_PREFIX}{topic}"), announcement.clone())
-        })
-        .collect();
-    let mut shadows: Vec<Option<ChannelId>> = vec![None; inputs.len()];
-    let end = node.run(|tick| {
-        record(&mut writer, &inputs, &channels, tick)?;
-        record_shadows(&mut writer, &inputs, &types, &mut shadows, tick)?;
-        if tick.number() % flush_ticks == flush_ticks - 1 { writer.flush() } else { writer.end_tick() }
-    });
-    // Also a run that failed leaves a whole file of what was recorded.
-    let finished = writer.finish().map_err(failed);
-    match end {
-        Ok(()) | Err(BusError::Aborted) => finished.and(end),
-        // A disk that was full for a message is full for the end of the file too: the first error counts.
-        Err(error) => Err(error),
+/// The file under way.
+struct Recording {
+    writer: RecordingWriter,
+    topics: Vec<Topic>,
+}
+
+/// A topic that is recorded.
+#[derive(Debug)]
+struct Topic {
+    channel: ChannelId,
+    /// That of the process that shadows the publisher: added with its first sample, whose tick is a function of the run.
+    shadow_channel: Option<ChannelId>,
+    shadow_name: String,
+    announcement: Announcement,
+}
+
+impl Component for Recorder {
+    const INFO: Info = Info::new(
+        "recorder",
+        "writes every sample of its inputs (all topics where none is named) to an MCAP file",
+    )
+    .recorder();
+    type Parameters = Parameters;
+    type Inputs<'a> = AnyInputs<'a>;
+    type Outputs = ();
+    type State = Internal;
+
+    fn new(parameters: Parameters, context: &NodeContext<'_>) -> Result<Self, String> {
+        Ok(Self { parameters, flush_ticks: flush_period_ticks(context.tick_s()), recording: None })
+    }
+
+    fn initial(&self) -> Internal {
+        Internal
+    }
+
+    fn connected(&mut self, topics: &[(&str, &Announcement)]) -> Result<(), StepError> {
+        self.recording = Some(Recording::begin(&self.parameters, topics)?);
+        Ok(())
+    }
+
+    fn step(
+        &mut self,
+        context: &StepContext<'_>,
+        inputs: AnyInputs<'_>,
+        _: &mut Internal,
+    ) -> Result<(), StepError> {
+        let Some(recording) = &mut self.recording else { return Ok(()) };
+        recording.record(context, inputs)?;
+        let is_last_of_chunk = context.tick() % self.flush_ticks == self.flush_ticks - 1;
+        let writer = &mut recording.writer;
+        Ok(if is_last_of_chunk { writer.flush() } else { writer.end_tick() }?)
+    }
+
+    /// Also a run that failed leaves a whole file of what was recorded.
+    fn finish(&mut self) -> Result<(), StepError> {
+        Ok(self.recording.take().map_or(Ok(()), |recording| recording.writer.finish())?)
     }
 }
 
@@ -88,59 +108,47 @@ fn flush_period_ticks(tick_s: f64) -> u32 {
     ((FLUSH_PERIOD_S / tick_s).round() as u32).max(1)
 }
 
-fn open(
-    parameters: &Parameters,
-    node: &ConnectedNode,
-    inputs: &[RawInput],
-) -> Result<(RecordingWriter, Vec<ChannelId>), RecordingError> {
-    let mut writer = RecordingWriter::create(&parameters.path)?;
-    for file in &parameters.attachments {
-        let text = std::fs::read(&file.path).map_err(|source| RecordingError::File {
-            action: "attach to",
-            path: file.path.clone(),
-            source,
-        })?;
-        writer.attach(&file.name, &text)?;
-    }
-    let channels = inputs
-        .iter()
-        .map(|&input| {
-            let (topic, announcement) = node.announcement(input);
-            writer.add_channel(topic, announcement)
-        })
-        .collect::<Result<_, _>>()?;
-    Ok((writer, channels))
-}
-
-fn record(
-    writer: &mut RecordingWriter,
-    inputs: &[RawInput],
-    channels: &[ChannelId],
-    tick: &Tick<'_>,
-) -> Result<(), RecordingError> {
-    for (&input, &channel) in inputs.iter().zip(channels) {
-        if let Some((cdr, _)) = tick.fresh(input) {
-            writer.write(channel, tick.number(), tick.time_ns(), cdr)?;
+impl Recording {
+    fn begin(parameters: &Parameters, topics: &[(&str, &Announcement)]) -> Result<Self, RecordingError> {
+        let mut writer = RecordingWriter::create(&parameters.path)?;
+        for file in &parameters.attachments {
+            let text = std::fs::read(&file.path).map_err(|source| RecordingError::File {
+                action: "attach to",
+                path: file.path.clone(),
+                source,
+            })?;
+            writer.attach(&file.name, &text)?;
         }
-    }
-    Ok(())
-}
-
-/// Writes what a process sends that shadows the publisher of an input.
-fn record_shadows(
-    writer: &mut RecordingWriter,
-    inputs: &[RawInput],
-    types: &[(String, Announcement)],
-    channels: &mut [Option<ChannelId>],
-    tick: &Tick<'_>,
-) -> Result<(), RecordingError> {
-    for ((&input, (topic, announcement)), channel) in inputs.iter().zip(types).zip(channels) {
-        let Some((cdr, _)) = tick.fresh_shadow(input) else { continue };
-        let id = match *channel {
-            Some(id) => id,
-            None => *channel.insert(writer.add_channel(topic, announcement)?),
+        let mut topic = |&(name, announcement): &(&str, &Announcement)| {
+            Ok(Topic {
+                channel: writer.add_channel(name, announcement)?,
+                shadow_channel: None,
+                shadow_name: format!("{SHADOW_PREFIX}{name}"),
+                announcement: announcement.clone(),
+            })
         };
-        writer.write(id, tick.number(), tick.time_ns(), cdr)?;
+        let topics = topics.iter().map(&mut topic).collect::<Result<_, RecordingError>>()?;
+        Ok(Self { writer, topics })
     }
-    Ok(())
+
+    /// Writes what was sent at this tick: what counts first, then what shadows send.
+    fn record(&mut self, context: &StepContext<'_>, inputs: AnyInputs<'_>) -> Result<(), RecordingError> {
+        let (tick, time_ns) = (context.tick(), context.time_ns());
+        for (input, topic) in self.topics.iter().enumerate() {
+            if let Some(cdr) = inputs.fresh(input) {
+                self.writer.write(topic.channel, tick, time_ns, cdr)?;
+            }
+        }
+        for (input, topic) in self.topics.iter_mut().enumerate() {
+            let Some(cdr) = inputs.fresh_shadow(input) else { continue };
+            let channel = match topic.shadow_channel {
+                Some(channel) => channel,
+                None => *topic
+                    .shadow_channel
+                    .insert(self.writer.add_channel(&topic.shadow_name, &topic.announcement)?),
+            };
+            self.writer.write(channel, tick, time_ns, cdr)?;
+        }
+        Ok(())
+    }
 }

@@ -88,7 +88,7 @@ impl Program {
 
     /// Whether this is the built-in recorder.
     pub fn is_recorder(&self) -> bool {
-        matches!(self.executable, Executable::Kind(kind) if kind.name == recorder::node::KIND.name)
+        matches!(self.executable, Executable::Kind(kind) if kind.name == <recorder::node::Recorder as bus::Component>::INFO.name)
     }
 }
 

@@ -166,7 +166,7 @@ fn run() -> Result<(), BusError> {
 mod tests {
     use super::*;
     use crate::testing::{TICK_NS, require_hand_over, require_normal};
-    use bus::kind::RunContext;
+    use bus::context::NodeContext;
 
     fn perfect() -> BarometerParams {
         let (noise_Pa, bias_walk_Pa_sqrt_s, resolution_Pa) = (0.0, 0.0, 0.0);
@@ -242,8 +242,9 @@ mod tests {
     fn impossible_parameters_are_named() {
         let bad = [("ground_pressure_Pa", 0.0), ("reference_pressure_Pa", -1.0), ("noise_Pa", -1.0)];
         for (key, value) in bad.into_iter().chain([("bias_walk_Pa_sqrt_s", -1.0), ("resolution_Pa", -1.0)]) {
-            let reason = (KIND.check)(&serde_json::json!({ key: value }), &RunContext::of_ports(&["state"]))
-                .unwrap_err();
+            let reason =
+                (KIND.check)(&serde_json::json!({ key: value }), &NodeContext::new("node", &["state"]))
+                    .unwrap_err();
             assert!(reason.contains(&format!("`{key}`")), "{reason}");
         }
     }

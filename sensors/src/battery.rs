@@ -178,7 +178,7 @@ fn run() -> Result<(), BusError> {
 mod tests {
     use super::*;
     use crate::testing::{TICK_NS, require_hand_over, require_normal};
-    use bus::kind::RunContext;
+    use bus::context::NodeContext;
 
     fn truth() -> Battery {
         Battery { voltage: 11.3, current: 8.4, charge: 0.5, valid: 1, ..Default::default() }
@@ -268,7 +268,7 @@ mod tests {
         let bad = [("capacity_Ah", 0.0), ("initial_charge", 1.1), ("voltage_noise_V", -1.0)];
         for (key, value) in bad.into_iter().chain([("current_resolution_A", -1.0), ("dropout", 1.0)]) {
             let reason =
-                (KIND.check)(&serde_json::json!({ key: value }), &RunContext::of_ports(&["battery"]))
+                (KIND.check)(&serde_json::json!({ key: value }), &NodeContext::new("node", &["battery"]))
                     .unwrap_err();
             assert!(reason.contains(&format!("`{key}`")), "{reason}");
         }

@@ -11,7 +11,7 @@
 //! average. They are drawn from a stream of their own: switching them on does not reshuffle the noise.
 
 use crate::parameter::{ParameterError, check, not_negative, positive};
-use bus::kind::RunContext;
+use bus::context::NodeContext;
 use bus::random::{Stream, stream, uniform};
 use bus::{BusError, Message, Node};
 
@@ -58,7 +58,7 @@ impl Timing {
     ///
     /// # Errors
     /// The sensor measures more often than its node computes, or as [`Timing::validate`].
-    pub fn check(&self, run: &RunContext<'_>) -> Result<(), String> {
+    pub fn check(&self, run: &NodeContext<'_>) -> Result<(), String> {
         self.validate().map_err(|error| error.to_string())?;
         let (rate_hz, node_hz) = (self.rate_hz, run.period_s().recip());
         if !is_in_time(rate_hz, run.period_s()) {
@@ -196,6 +196,16 @@ impl Channel {
         channel.map_err(|error| node.error(error))
     }
 
+    /// The channel of the node that `context` tells of; warns where measurements would be uneven or never arrive.
+    ///
+    /// # Errors
+    /// As [`Timing::check`].
+    pub fn in_context(timing: &Timing, context: &NodeContext<'_>) -> Result<Self, String> {
+        timing.check(context)?;
+        let channel = Self::new(timing, context.period_s(), context.seed, context.name);
+        channel.map_err(|error| error.to_string())
+    }
+
     /// The channel of node `node`, which computes every `period_s`, in a run seeded with `run_seed`.
     ///
     /// # Errors
@@ -308,7 +318,7 @@ mod tests {
     #[test]
     fn a_sensor_that_measures_more_often_than_its_node_computes_is_refused_with_both_rates() {
         let rate_of = |tick_ns, period_ticks| {
-            let run = RunContext::new(&[], tick_ns, period_ticks, 10_000);
+            let run = NodeContext::new("node", &[]).timed(tick_ns, period_ticks, 10_000);
             let outcome = Timing { rate_hz: 200.0, ..timing() }.check(&run);
             (outcome, run.into_warnings())
         };

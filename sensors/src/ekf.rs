@@ -181,15 +181,15 @@ fn innovations(state: &EkfState) -> Innovation {
 #[cfg(test)]
 mod tests {
     use super::KIND;
-    use bus::kind::RunContext;
+    use bus::context::NodeContext;
     use serde_json::json;
 
     #[test]
     fn a_filter_that_nothing_tells_the_position_is_refused() {
-        let error = (KIND.check)(&json!({}), &RunContext::of_ports(&["imu", "barometer"])).unwrap_err();
+        let error = (KIND.check)(&json!({}), &NodeContext::new("node", &["imu", "barometer"])).unwrap_err();
         assert!(error.contains("`inputs.gps`") && error.contains("`inputs.mocap`"), "{error}");
-        assert_eq!((KIND.check)(&json!({}), &RunContext::of_ports(&["imu", "gps"])), Ok(()));
-        assert_eq!((KIND.check)(&json!({}), &RunContext::of_ports(&["imu", "mocap"])), Ok(()));
+        assert_eq!((KIND.check)(&json!({}), &NodeContext::new("node", &["imu", "gps"])), Ok(()));
+        assert_eq!((KIND.check)(&json!({}), &NodeContext::new("node", &["imu", "mocap"])), Ok(()));
     }
 
     #[test]
@@ -201,7 +201,7 @@ mod tests {
             (json!({ "initial_position_m": [0.0, 0.0] }), "`initial_position_m`"),
             (json!({ "mocap_sigma": 1.0 }), "`mocap_sigma`"),
         ] {
-            let error = (KIND.check)(&parameters, &RunContext::of_ports(&["imu", "mocap"])).unwrap_err();
+            let error = (KIND.check)(&parameters, &NodeContext::new("node", &["imu", "mocap"])).unwrap_err();
             assert!(error.contains(key), "{error}");
         }
     }

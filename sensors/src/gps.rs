@@ -10,26 +10,13 @@ use crate::channel::{Chance, Channel, ChannelState, QUEUE, Timing};
 use crate::noise::standard_normal;
 use crate::parameter::{ParameterError, all_finite, all_not_negative, positive};
 use crate::wire::{vector, vector_message};
-use bus::kind::{Inputs, NodeKind, PortSpec, read_parameters};
+use bus::component::{Component, Info, StepError};
+use bus::context::{NodeContext, StepContext};
 use bus::messages::{Gps, PlantState};
 use bus::random::Stream;
-use bus::{BusError, Message, Node};
+use bus::{InputPorts, Message, OutputPorts};
 use nalgebra::Vector3;
 use serde::Deserialize;
-
-/// The satellite receiver, for manifests.
-pub const KIND: NodeKind = NodeKind {
-    name: "gps",
-    summary: "satellite receiver: position and velocity with noise, drift and delay",
-    inputs: Inputs::Ports(&[PortSpec::required("state", PlantState::SCHEMA)]),
-    outputs: &[PortSpec::required("gps", Gps::SCHEMA)],
-    check: |parameters, run| {
-        let params: GpsParams = read_parameters(parameters)?;
-        params.validate().map_err(|error| error.to_string())?;
-        params.timing().check(run)
-    },
-    run,
-};
 
 /// What a satellite receiver makes of the truth; the defaults are a u-blox NEO-M8N.
 ///
@@ -137,11 +124,11 @@ impl GpsParams {
     }
 }
 
-/// What the node remembers, as it is handed over.
-#[derive(Clone, Copy, Message)]
+/// What the receiver remembers.
+#[derive(Debug, Clone, Copy, Message)]
 #[repr(C)]
 #[message(type_name = "hummingbus_msgs/msg/GpsState")]
-struct Memory {
+pub struct Memory {
     /// What is under way.
     channel: ChannelState,
     /// The last measurements.
@@ -158,24 +145,60 @@ impl Default for Memory {
     }
 }
 
-fn run() -> Result<(), BusError> {
-    let mut node = Node::join()?;
-    let state = node.input::<PlantState>("state")?;
-    let output = node.output::<Gps>("gps")?;
-    let params: GpsParams = node.parameters()?;
-    params.validate().map_err(|error| node.error(error))?;
-    let mut channel = Channel::of_node(&params.timing(), &node)?;
-    node.run_with_state(Memory::default(), |tick, memory| {
-        let sent = params.sample(&mut channel, memory, tick.time_ns(), tick.get(state));
-        tick.write(output, sent)
-    })
+/// What the receiver reads.
+#[derive(Debug, InputPorts)]
+pub struct Inputs<'a> {
+    /// The truth.
+    pub state: &'a PlantState,
+}
+
+/// What the receiver sends.
+#[derive(Debug, OutputPorts)]
+pub struct Outputs {
+    /// The measurement that arrived last.
+    pub gps: Gps,
+}
+
+/// A satellite receiver.
+#[derive(Debug)]
+pub struct GpsReceiver {
+    params: GpsParams,
+    channel: Channel,
+}
+
+impl Component for GpsReceiver {
+    const INFO: Info =
+        Info::new("gps", "satellite receiver: position and velocity with noise, drift and delay");
+    type Parameters = GpsParams;
+    type Inputs<'a> = Inputs<'a>;
+    type Outputs = Outputs;
+    type State = Memory;
+
+    fn new(params: GpsParams, context: &NodeContext<'_>) -> Result<Self, String> {
+        params.validate().map_err(|error| error.to_string())?;
+        Ok(Self { params, channel: Channel::in_context(&params.timing(), context)? })
+    }
+
+    fn initial(&self) -> Memory {
+        Memory::default()
+    }
+
+    fn step(
+        &mut self,
+        context: &StepContext<'_>,
+        inputs: Inputs<'_>,
+        memory: &mut Memory,
+    ) -> Result<Outputs, StepError> {
+        let gps = self.params.sample(&mut self.channel, memory, context.time_ns(), inputs.state);
+        Ok(Outputs { gps })
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::testing::{TICK_NS, require_hand_over, require_normal};
-    use bus::kind::RunContext;
+    use crate::testing::{TICK_NS, require_normal};
+    use bus::Harness;
 
     fn truth() -> PlantState {
         PlantState {
@@ -191,9 +214,9 @@ mod tests {
 
     /// The samples of `count` measurements in the run seeded with `seed`.
     fn samples(params: &GpsParams, seed: u64, count: u64) -> Vec<Gps> {
-        let mut channel = Channel::new(&params.timing(), 0.1, seed, "gps").unwrap();
-        let mut memory = Memory::default();
-        (0..count).map(|n| params.sample(&mut channel, &mut memory, n * 100 * TICK_NS, &truth())).collect()
+        let context = NodeContext::new("gps", &["state"]).timed(100 * TICK_NS, 1, 1_000_000).seeded(seed);
+        let mut receiver = Harness::<GpsReceiver>::in_context(*params, &context).unwrap();
+        (0..count).map(|_| receiver.step(Inputs { state: &truth() }).unwrap().gps).collect()
     }
 
     #[test]
@@ -243,11 +266,10 @@ mod tests {
             velocity_noise_m_s: [0.0; 3],
             ..GpsParams::default()
         };
-        let mut channel = Channel::new(&perfect.timing(), 1e-3, 5, "gps").unwrap();
-        let mut memory = Memory::default();
+        let mut receiver = Harness::<GpsReceiver>::new(perfect).unwrap();
         for tick in 0..1000_u64 {
-            let truth = PlantState { position: [tick as f64, 0.0, 0.0].into(), ..Default::default() };
-            let sample = perfect.sample(&mut channel, &mut memory, tick * TICK_NS, &truth);
+            let state = &PlantState { position: [tick as f64, 0.0, 0.0].into(), ..Default::default() };
+            let sample = receiver.step(Inputs { state }).unwrap().gps;
             let expected = tick.checked_sub(80).map(|tick| tick / 100 * 100);
             assert_eq!(sample.valid, u32::from(expected.is_some()), "at tick {tick}");
             assert_eq!(sample.measured_ns, expected.unwrap_or(0) * TICK_NS);
@@ -256,17 +278,16 @@ mod tests {
     }
 
     #[test]
-    fn a_memory_that_is_handed_over_goes_on_byte_for_byte() {
+    fn a_state_that_is_transferred_goes_on_byte_for_byte() {
         let params = GpsParams { dropout: 0.2, delay_ms: 245.0, ..GpsParams::default() };
-        let channel = || Channel::new(&params.timing(), 1e-3, 5, "gps").unwrap();
-        require_hand_over(channel, Memory::default(), |channel, memory: &mut Memory, now_ns| {
-            params.sample(channel, memory, now_ns, &truth())
-        });
+        let state = truth();
+        let receiver = || Harness::<GpsReceiver>::new(params).unwrap();
+        Harness::require_transfer(receiver, |_| Inputs { state: &state });
     }
 
     #[test]
     fn impossible_parameters_are_named() {
-        let refused = |parameters| (KIND.check)(&parameters, &RunContext::of_ports(&["state"])).unwrap_err();
+        let refused = |parameters| Harness::<GpsReceiver>::from_json(&parameters).unwrap_err();
         let reason = refused(serde_json::json!({ "position_drift_time_s": 0.0 }));
         assert!(reason.contains("`position_drift_time_s`"), "{reason}");
         for key in ["position_noise_m", "position_drift_m", "velocity_noise_m_s"] {

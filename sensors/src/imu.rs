@@ -129,7 +129,7 @@ fn message(reading: &ImuReading) -> Imu {
 mod tests {
     use super::*;
     use crate::testing::{TICK_NS, require_hand_over};
-    use bus::kind::RunContext;
+    use bus::context::NodeContext;
 
     fn truth_at(tick: u64) -> ImuReading {
         ImuReading {
@@ -205,12 +205,13 @@ mod tests {
     #[test]
     fn impossible_losses_and_delays_are_named() {
         for (key, value) in [("delay_ms", -1.0), ("dropout", 1.0), ("dropout_mean_s", -1.0)] {
-            let reason = (KIND.check)(&serde_json::json!({ key: value }), &RunContext::of_ports(&["state"]))
-                .unwrap_err();
+            let reason =
+                (KIND.check)(&serde_json::json!({ key: value }), &NodeContext::new("node", &["state"]))
+                    .unwrap_err();
             assert!(reason.contains(&format!("`{key}`")), "{reason}");
         }
         // Whether this is long enough depends on the rate, which the check does not know.
         let bursts = serde_json::json!({ "dropout": 0.1, "dropout_mean_s": 0.05 });
-        (KIND.check)(&bursts, &RunContext::of_ports(&["state"])).unwrap();
+        (KIND.check)(&bursts, &NodeContext::new("node", &["state"])).unwrap();
     }
 }

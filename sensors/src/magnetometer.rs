@@ -163,7 +163,7 @@ mod tests {
     use super::*;
     use crate::testing::{TICK_NS, require_hand_over, require_normal};
     use crate::wire::{attitude_message, vector};
-    use bus::kind::RunContext;
+    use bus::context::NodeContext;
 
     fn perfect() -> MagnetometerParams {
         MagnetometerParams { delay_ms: 0.0, noise_T: 0.0, resolution_T: 0.0, ..Default::default() }
@@ -255,8 +255,9 @@ mod tests {
     fn impossible_parameters_are_named() {
         let bad = [("field_T", -1.0), ("inclination_deg", 91.0), ("noise_T", -1.0), ("range_T", 0.0)];
         for (key, value) in bad {
-            let reason = (KIND.check)(&serde_json::json!({ key: value }), &RunContext::of_ports(&["state"]))
-                .unwrap_err();
+            let reason =
+                (KIND.check)(&serde_json::json!({ key: value }), &NodeContext::new("node", &["state"]))
+                    .unwrap_err();
             assert!(reason.contains(&format!("`{key}`")), "{reason}");
         }
     }

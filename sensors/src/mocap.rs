@@ -142,7 +142,7 @@ fn run() -> Result<(), BusError> {
 mod tests {
     use super::*;
     use crate::testing::{TICK_NS, require_hand_over, require_normal};
-    use bus::kind::RunContext;
+    use bus::context::NodeContext;
 
     fn truth() -> PlantState {
         PlantState {
@@ -219,10 +219,10 @@ mod tests {
 
     #[test]
     fn impossible_parameters_are_named_and_unknown_ones_are_refused() {
-        let refused = |value| (KIND.check)(&value, &RunContext::of_ports(&["state"])).unwrap_err();
+        let refused = |value| (KIND.check)(&value, &NodeContext::new("node", &["state"])).unwrap_err();
         assert!(refused(serde_json::json!({ "position_noise_m": -1.0 })).contains("`position_noise_m`"));
         assert!(refused(serde_json::json!({ "rate_hz": 0.0 })).contains("`rate_hz`"));
         assert!(refused(serde_json::json!({ "nose": 0.0 })).contains("`nose`"));
-        (KIND.check)(&serde_json::json!({}), &RunContext::of_ports(&["state"])).unwrap();
+        (KIND.check)(&serde_json::json!({}), &NodeContext::new("node", &["state"])).unwrap();
     }
 }

@@ -260,7 +260,7 @@ mod tests {
     use super::*;
     use crate::testing::{TICK_NS, require_hand_over, require_normal};
     use crate::wire::attitude_message;
-    use bus::kind::RunContext;
+    use bus::context::NodeContext;
 
     fn finders(params: RangeParams) -> RangeFinders {
         params.validate().unwrap();
@@ -447,19 +447,19 @@ mod tests {
         let refused = |key: &str, value: f64| {
             let mut parameters = serde_json::json!({ "scene": room });
             parameters[key] = value.into();
-            (KIND.check)(&parameters, &RunContext::of_ports(&["state"])).unwrap_err()
+            (KIND.check)(&parameters, &NodeContext::new("node", &["state"])).unwrap_err()
         };
         let bad = [("nearest_m", 8.0), ("half_angle_deg", 90.0), ("reach_m", 0.0), ("noise_m", -1.0)];
         for (key, value) in bad.into_iter().chain([("vehicle_radius_m", 0.0), ("dropout", 1.5)]) {
             let reason = refused(key, value);
             assert!(reason.contains(&format!("`{key}`")), "{reason}");
         }
-        let reason = (KIND.check)(&serde_json::json!({}), &RunContext::of_ports(&["state"])).unwrap_err();
+        let reason = (KIND.check)(&serde_json::json!({}), &NodeContext::new("node", &["state"])).unwrap_err();
         assert!(reason.starts_with("missing field `scene`"), "{reason}");
         let reason =
-            (KIND.check)(&serde_json::json!({ "scene": "none.toml" }), &RunContext::of_ports(&["state"]))
+            (KIND.check)(&serde_json::json!({ "scene": "none.toml" }), &NodeContext::new("node", &["state"]))
                 .unwrap_err();
         assert!(reason.contains("none.toml"), "{reason}");
-        (KIND.check)(&serde_json::json!({ "scene": room }), &RunContext::of_ports(&["state"])).unwrap();
+        (KIND.check)(&serde_json::json!({ "scene": room }), &NodeContext::new("node", &["state"])).unwrap();
     }
 }

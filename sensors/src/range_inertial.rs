@@ -99,7 +99,7 @@ fn state_estimate(
 #[cfg(test)]
 mod tests {
     use super::KIND;
-    use bus::kind::RunContext;
+    use bus::context::NodeContext;
     use serde_json::json;
 
     #[test]
@@ -110,9 +110,9 @@ mod tests {
             (json!({ "initial_height_m": -1.0 }), "`initial_height_m`"),
             (json!({ "dead_zone_m": 0.2 }), "`dead_zone_m`"),
         ] {
-            let error = (KIND.check)(&parameters, &RunContext::of_ports(&[])).unwrap_err();
+            let error = (KIND.check)(&parameters, &NodeContext::new("node", &[])).unwrap_err();
             assert!(error.contains(key), "{error}");
         }
-        assert_eq!((KIND.check)(&json!({}), &RunContext::of_ports(&[])), Ok(()));
+        assert_eq!((KIND.check)(&json!({}), &NodeContext::new("node", &[])), Ok(()));
     }
 }

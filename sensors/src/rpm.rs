@@ -157,7 +157,7 @@ fn run() -> Result<(), BusError> {
 mod tests {
     use super::*;
     use crate::testing::{TICK_NS, require_hand_over, require_normal};
-    use bus::kind::RunContext;
+    use bus::context::NodeContext;
 
     fn truth_at(time_s: f64) -> PlantState {
         let rotor_speed = [400.0, 410.0 + 50.0 * time_s, 420.0, 430.0];
@@ -220,13 +220,14 @@ mod tests {
     fn impossible_parameters_are_named() {
         let bad = [("noise_rad_s", -1.0), ("resolution_rad_s", -1.0), ("dropout", 1.0)];
         for (key, value) in bad {
-            let reason = (KIND.check)(&serde_json::json!({ key: value }), &RunContext::of_ports(&["state"]))
-                .unwrap_err();
+            let reason =
+                (KIND.check)(&serde_json::json!({ key: value }), &NodeContext::new("node", &["state"]))
+                    .unwrap_err();
             assert!(reason.contains(&format!("`{key}`")), "{reason}");
         }
         for key in ["stuck_rotor", "half_reading_rotor"] {
-            let reason =
-                (KIND.check)(&serde_json::json!({ key: 5 }), &RunContext::of_ports(&["state"])).unwrap_err();
+            let reason = (KIND.check)(&serde_json::json!({ key: 5 }), &NodeContext::new("node", &["state"]))
+                .unwrap_err();
             assert!(reason.contains(&format!("`{key}`")), "{reason}");
         }
     }

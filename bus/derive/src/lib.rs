@@ -1,4 +1,5 @@
-//! `#[derive(Message)]`: a fixed-layout message with its schema, checked when it is compiled.
+//! `#[derive(Message)]`: a fixed-layout message with its schema, checked when it is compiled; `#[derive(InputPorts)]` and
+//! `#[derive(OutputPorts)]`, the ports of a component.
 //!
 //! The derive refuses a struct that is not `repr(C)`, has implicit padding, has a field name that
 //! ROS 2 tools reject, or has a floating-point field that does not state its unit.
@@ -62,6 +63,93 @@ fn expand(input: &DeriveInput) -> Result<Tokens> {
     })
 }
 
+/// Derives `bus::ports::InputPorts` for a struct `Name<'a>` whose fields are `&'a T` and `Option<&'a T>`.
+#[proc_macro_derive(InputPorts)]
+pub fn derive_input_ports(input: TokenStream) -> TokenStream {
+    let input = parse_macro_input!(input as DeriveInput);
+    expand_inputs(&input).unwrap_or_else(Error::into_compile_error).into()
+}
+
+/// Derives `bus::ports::OutputPorts` for a struct whose fields are `T` and `Option<T>`.
+#[proc_macro_derive(OutputPorts)]
+pub fn derive_output_ports(input: TokenStream) -> TokenStream {
+    let input = parse_macro_input!(input as DeriveInput);
+    expand_outputs(&input).unwrap_or_else(Error::into_compile_error).into()
+}
+
+fn expand_inputs(input: &DeriveInput) -> Result<Tokens> {
+    let Some(lifetime) = input.generics.lifetimes().next().filter(|_| input.generics.params.len() == 1)
+    else {
+        return Err(Error::new_spanned(
+            &input.ident,
+            "inputs are a struct with one lifetime, that of the samples",
+        ));
+    };
+    let (name, lifetime) = (&input.ident, &lifetime.lifetime);
+    let fields = named_fields(input)?;
+    let specs = fields.iter().map(|field| port_spec(field, &quote!(::bus::ports::InputPort<#lifetime>)));
+    let reads = fields
+        .iter()
+        .enumerate()
+        .map(|(port, Field { ident, .. })| quote!(#ident: ::bus::ports::InputPort::read(samples, #port)));
+    Ok(quote! {
+        impl<#lifetime> ::bus::ports::InputPorts<#lifetime> for #name<#lifetime> {
+            const DECLARED: ::bus::ports::Inputs = ::bus::ports::Inputs::Ports(&[#(#specs),*]);
+
+            fn read(samples: ::bus::ports::InputSamples<#lifetime>) -> Self {
+                Self { #(#reads),* }
+            }
+        }
+    })
+}
+
+fn expand_outputs(input: &DeriveInput) -> Result<Tokens> {
+    if !input.generics.params.is_empty() {
+        return Err(Error::new_spanned(&input.generics, "outputs are sent by value: they cannot be generic"));
+    }
+    let name = &input.ident;
+    let fields = named_fields(input)?;
+    let specs = fields.iter().map(|field| port_spec(field, &quote!(::bus::ports::OutputPort)));
+    let writes = fields.iter().enumerate().map(
+        |(port, Field { ident, .. })| quote!(::bus::ports::OutputPort::write(self.#ident, samples, #port)?;),
+    );
+    let reads = fields
+        .iter()
+        .enumerate()
+        .map(|(port, Field { ident, .. })| quote!(#ident: ::bus::ports::OutputPort::read(samples, #port)?));
+    Ok(quote! {
+        impl ::bus::ports::OutputPorts for #name {
+            const DECLARED: &'static [::bus::ports::PortSpec] = &[#(#specs),*];
+
+            fn write(
+                self,
+                samples: &mut ::bus::ports::OutputSamples<'_>,
+            ) -> ::core::result::Result<(), ::bus::BusError> {
+                #(#writes)*
+                ::core::result::Result::Ok(())
+            }
+
+            fn read(samples: ::bus::ports::InputSamples<'_>) -> ::core::option::Option<Self> {
+                ::core::option::Option::Some(Self { #(#reads),* })
+            }
+        }
+    })
+}
+
+/// What a field declares, whose type is a `port`.
+fn port_spec(field: &Field, port: &Tokens) -> Tokens {
+    let Field { ident, ty, attrs, .. } = field;
+    let (name, doc) = (ident.as_ref().map(ToString::to_string), doc_text(attrs));
+    quote! {
+        ::bus::ports::PortSpec {
+            name: #name,
+            doc: #doc,
+            schema: <#ty as #port>::SCHEMA,
+            required: <#ty as #port>::REQUIRED,
+        }
+    }
+}
+
 /// The options of `#[message(…)]`.
 struct MessageOptions {
     type_name: LitStr,
@@ -121,9 +209,9 @@ fn named_fields(input: &DeriveInput) -> Result<&syn::punctuated::Punctuated<Fiel
     match &input.data {
         Data::Struct(data) => match &data.fields {
             Fields::Named(fields) if !fields.named.is_empty() => Ok(&fields.named),
-            _ => Err(Error::new_spanned(&input.ident, "a message is a struct with named fields")),
+            _ => Err(Error::new_spanned(&input.ident, "expected a struct with named fields")),
         },
-        _ => Err(Error::new_spanned(&input.ident, "a message is a struct with named fields")),
+        _ => Err(Error::new_spanned(&input.ident, "expected a struct with named fields")),
     }
 }
 

@@ -5,7 +5,7 @@ use super::ranges;
 use crate::manifest::{Manifest, Process};
 use crate::problem::Problem;
 use crate::program::Executable;
-use bus::kind::RunContext;
+use bus::context::NodeContext;
 use bus::plan::{NodePlan, Plan};
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -48,9 +48,10 @@ impl Notes {
     }
 }
 
-/// Ticks of a run: how long each is, and how many there are.
+/// What all nodes are told of a run: its seed, how long a tick is, and how many there are.
 #[derive(Clone, Copy, Debug)]
 pub struct RunLength {
+    seed: u64,
     tick_ns: u64,
     duration_ticks: u32,
 }
@@ -58,7 +59,7 @@ pub struct RunLength {
 impl RunLength {
     /// Those of `plan`.
     pub fn of(plan: &Plan) -> Self {
-        Self { tick_ns: plan.tick_ns, duration_ticks: plan.duration_ticks }
+        Self { seed: plan.seed, tick_ns: plan.tick_ns, duration_ticks: plan.duration_ticks }
     }
 }
 
@@ -98,9 +99,12 @@ pub fn set(
         require_none(manifest, process)?;
     } else if let Executable::Kind(kind) = &program.executable {
         ranges::check(manifest, name, process)?;
-        let ports = process.inputs.keys().chain(process.outputs.keys());
-        let ports: Vec<&str> = ports.map(|port| port.get_ref().as_str()).collect();
-        let context = RunContext::new(&ports, run.tick_ns, node.period_ticks, run.duration_ticks);
+        let inputs: Vec<&str> = process.inputs.keys().map(|port| port.get_ref().as_str()).collect();
+        let outputs: Vec<&str> = process.outputs.keys().map(|port| port.get_ref().as_str()).collect();
+        let context = NodeContext::new(name.get_ref(), &inputs)
+            .naming(&outputs)
+            .timed(run.tick_ns, node.period_ticks, run.duration_ticks)
+            .seeded(run.seed);
         (kind.check)(&parameters, &context).map_err(|reason| refused(manifest, name, process, &reason))?;
         for warning in context.into_warnings() {
             let words = &warning.words;

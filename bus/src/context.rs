@@ -1,0 +1,153 @@
+//! What a component is told of its run when it is made, and of the tick when it steps.
+
+use crate::ports::{InputSamples, OutputPorts, SampleSource};
+use std::cell::RefCell;
+
+/// What a component may know of its node and the run, and where it leaves its warnings.
+#[derive(Clone, Debug)]
+pub struct NodeContext<'a> {
+    /// The node's name in the run.
+    pub name: &'a str,
+    /// The seed of the run: with the node's name it makes the node's random stream ([`crate::random`]).
+    pub seed: u64,
+    /// The wired inputs.
+    pub inputs: &'a [&'a str],
+    /// The outputs that the manifest names.
+    pub outputs: &'a [&'a str],
+    /// Nanoseconds a tick.
+    pub tick_ns: u64,
+    /// Ticks between two computations of the node.
+    pub period_ticks: u32,
+    /// Length of the run.
+    pub duration_ticks: u32,
+    warnings: RefCell<Vec<Warning>>,
+}
+
+/// What is odd about a node in its run.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Warning {
+    /// A parameter is named in backticks, as in an error.
+    pub words: String,
+    /// Whether it is odd only because the run ends so early.
+    pub is_behind_end: bool,
+}
+
+impl<'a> NodeContext<'a> {
+    /// The node `name` with these `inputs`, in a run with seed 1 that lasts an hour: it computes at 1 kHz, once a tick.
+    #[must_use]
+    pub fn new(name: &'a str, inputs: &'a [&'a str]) -> Self {
+        let (seed, tick_ns, period_ticks, duration_ticks) = (1, 1_000_000, 1, 3_600_000);
+        let (outputs, warnings) = (&[] as &[_], RefCell::default());
+        Self { name, seed, inputs, outputs, tick_ns, period_ticks, duration_ticks, warnings }
+    }
+
+    /// The same node where the manifest names these `outputs`.
+    #[must_use]
+    pub fn naming(self, outputs: &'a [&'a str]) -> Self {
+        Self { outputs, ..self }
+    }
+
+    /// The same node where it computes every `period_ticks` ticks of `tick_ns`, in a run of `duration_ticks`.
+    #[must_use]
+    pub fn timed(self, tick_ns: u64, period_ticks: u32, duration_ticks: u32) -> Self {
+        Self { tick_ns, period_ticks, duration_ticks, ..self }
+    }
+
+    /// The same node in a run with another seed.
+    #[must_use]
+    pub fn seeded(self, seed: u64) -> Self {
+        Self { seed, ..self }
+    }
+
+    /// Whether an input is wired, or an output named.
+    #[must_use]
+    pub fn has(&self, port: &str) -> bool {
+        self.inputs.contains(&port) || self.outputs.contains(&port)
+    }
+
+    /// Simulated time of a tick, in seconds.
+    #[must_use]
+    pub fn tick_s(&self) -> f64 {
+        self.tick_ns as f64 * 1e-9
+    }
+
+    /// Simulated time between two computations of the node, in seconds.
+    #[must_use]
+    pub fn period_s(&self) -> f64 {
+        f64::from(self.period_ticks) * self.tick_s()
+    }
+
+    /// Simulated length of the run, in seconds.
+    #[must_use]
+    pub fn duration_s(&self) -> f64 {
+        f64::from(self.duration_ticks) * self.tick_s()
+    }
+
+    /// Ticks per simulated second.
+    #[must_use]
+    #[allow(clippy::cast_possible_truncation, reason = "a tick is at least a nanosecond")]
+    pub fn rate_hz(&self) -> u32 {
+        (1_000_000_000 / self.tick_ns.max(1)) as u32
+    }
+
+    /// Leaves a warning: what is odd and flies all the same. A parameter is named in backticks, as in an error.
+    pub fn warn(&self, words: impl Into<String>) {
+        self.warnings.borrow_mut().push(Warning { words: words.into(), is_behind_end: false });
+    }
+
+    /// Leaves a warning of what a longer run would come to.
+    pub fn warn_behind_end(&self, words: impl Into<String>) {
+        self.warnings.borrow_mut().push(Warning { words: words.into(), is_behind_end: true });
+    }
+
+    /// The warnings left so far.
+    #[must_use]
+    pub fn into_warnings(self) -> Vec<Warning> {
+        self.warnings.into_inner()
+    }
+}
+
+/// What a step is told of its tick, beside the inputs.
+#[derive(Clone, Copy)]
+pub struct StepContext<'a> {
+    pub(crate) tick: u32,
+    pub(crate) time_ns: u64,
+    /// What the predecessor sent last, by output.
+    pub(crate) predecessor: Option<&'a dyn SampleSource>,
+}
+
+impl std::fmt::Debug for StepContext<'_> {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("StepContext")
+            .field("tick", &self.tick)
+            .field("time_ns", &self.time_ns)
+            .finish_non_exhaustive()
+    }
+}
+
+impl StepContext<'_> {
+    /// The tick's number.
+    #[must_use]
+    pub fn tick(&self) -> u32 {
+        self.tick
+    }
+
+    /// Simulation time in nanoseconds.
+    #[must_use]
+    pub fn time_ns(&self) -> u64 {
+        self.time_ns
+    }
+
+    /// Simulation time in seconds.
+    #[must_use]
+    pub fn time_s(&self) -> f64 {
+        self.time_ns as f64 * 1e-9
+    }
+
+    /// What the process whose place this one takes sent last, at the tick at which it takes it and only where no state
+    /// was transferred: the command to go on from without a jump. `O` are the component's outputs.
+    #[must_use]
+    pub fn predecessor<O: OutputPorts>(&self) -> Option<O> {
+        self.predecessor.and_then(|sent| O::read(InputSamples(sent)))
+    }
+}

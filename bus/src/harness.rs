@@ -1,0 +1,149 @@
+//! A component stepped without a run: for tests, and for whoever wants its numbers alone.
+
+use crate::component::{Component, StepError};
+use crate::context::{NodeContext, StepContext};
+use crate::message::sample_words;
+use crate::ports::{OutputPorts, OutputSamples, PortSpec, SampleSink, SampleSource};
+use crate::registration::read_parameters;
+
+/// A component with its state and its time, stepped by hand.
+///
+/// As [`Component`] shows, inputs and outputs are the component's own structs.
+#[derive(Debug)]
+pub struct Harness<C: Component> {
+    component: C,
+    /// What the component remembers.
+    pub state: C::State,
+    /// The tick of the next step.
+    pub tick: u32,
+    tick_ns: u64,
+    period_ticks: u32,
+    /// What a predecessor sent last, until the next step.
+    predecessor: Option<Sent>,
+}
+
+impl<C: Component> Harness<C> {
+    /// A component by itself, stepped once a millisecond in a run with seed 1; its node is called like it.
+    ///
+    /// # Errors
+    /// As [`Component::new`].
+    pub fn new(parameters: C::Parameters) -> Result<Self, String> {
+        Self::in_context(parameters, &NodeContext::new(C::INFO.name, &[]))
+    }
+
+    /// The same, with the parameters as a manifest says them.
+    ///
+    /// # Errors
+    /// They do not fit, or as [`Component::new`].
+    pub fn from_json(parameters: &serde_json::Value) -> Result<Self, String> {
+        Self::new(read_parameters(parameters)?)
+    }
+
+    /// A component as the node that `context` tells of.
+    ///
+    /// # Errors
+    /// As [`Component::new`].
+    pub fn in_context(parameters: C::Parameters, context: &NodeContext<'_>) -> Result<Self, String> {
+        let component = C::new(parameters, context)?;
+        let state = component.initial();
+        let (tick_ns, period_ticks) = (context.tick_ns, context.period_ticks);
+        Ok(Self { component, state, tick: 0, tick_ns, period_ticks, predecessor: None })
+    }
+
+    /// The component.
+    #[must_use]
+    pub fn component(&self) -> &C {
+        &self.component
+    }
+
+    /// Has the next step take the place of a process that sent `outputs` last and transferred no state.
+    pub fn replaces(&mut self, outputs: C::Outputs) {
+        self.predecessor = Some(Sent::of(outputs));
+    }
+
+    /// Computes the next tick.
+    ///
+    /// # Errors
+    /// As [`Component::step`].
+    pub fn step(&mut self, inputs: C::Inputs<'_>) -> Result<C::Outputs, StepError> {
+        let predecessor = self.predecessor.take();
+        let context = StepContext {
+            tick: self.tick,
+            time_ns: u64::from(self.tick) * self.tick_ns,
+            predecessor: predecessor.as_ref().map(|sent| sent as &dyn SampleSource),
+        };
+        self.tick += self.period_ticks;
+        self.component.step(&context, inputs, &mut self.state)
+    }
+}
+
+impl<C: Component> Harness<C> {
+    /// Steps a component, has a second one go on from its state amid the run, and requires the same outputs and the same
+    /// state of both from there on, byte for byte. `inputs` says what is read at a step.
+    ///
+    /// # Panics
+    /// If they differ, or a step fails.
+    #[track_caller]
+    pub fn require_transfer<'i>(make: impl Fn() -> Self, inputs: impl Fn(u32) -> C::Inputs<'i>) {
+        const ALONE: u32 = 777;
+        const TOGETHER: u32 = 1223;
+        let (mut first, mut second) = (make(), make());
+        let step = |harness: &mut Self| {
+            let outputs = harness.step(inputs(harness.tick)).unwrap_or_else(|error| panic!("{error}"));
+            Sent::of(outputs)
+        };
+        for _ in 0..ALONE {
+            step(&mut first);
+        }
+        (second.state, second.tick) = (first.state, first.tick);
+        for _ in 0..TOGETHER {
+            let tick = first.tick;
+            assert!(step(&mut second) == step(&mut first), "other outputs at tick {tick}");
+            let is_same = bytemuck::bytes_of(&second.state) == bytemuck::bytes_of(&first.state);
+            assert!(is_same, "another state after tick {tick}");
+        }
+    }
+}
+
+/// Samples that were sent, by port.
+#[derive(Debug, PartialEq)]
+struct Sent {
+    samples: Vec<Box<[u64]>>,
+    is_sent: Vec<bool>,
+}
+
+impl Sent {
+    fn of<O: OutputPorts>(outputs: O) -> Self {
+        let sample = |port: &PortSpec| vec![0; sample_words(port.schema.size)].into_boxed_slice();
+        let samples = O::DECLARED.iter().map(sample).collect();
+        let mut sent = Self { samples, is_sent: vec![false; O::DECLARED.len()] };
+        let written = outputs.write(&mut OutputSamples(&mut sent));
+        written.unwrap_or_else(|error| unreachable!("this memory is there: {error}"));
+        sent
+    }
+}
+
+impl SampleSink for Sent {
+    fn words(&mut self, port: usize) -> Result<Option<&mut [u64]>, crate::BusError> {
+        self.is_sent[port] = true;
+        Ok(Some(&mut self.samples[port]))
+    }
+}
+
+impl SampleSource for Sent {
+    fn count(&self) -> usize {
+        self.samples.len()
+    }
+
+    fn words(&self, port: usize) -> Option<&[u64]> {
+        self.is_sent[port].then(|| &*self.samples[port])
+    }
+
+    fn fresh(&self, _: usize) -> Option<&[u8]> {
+        None
+    }
+
+    fn fresh_shadow(&self, _: usize) -> Option<&[u8]> {
+        None
+    }
+}

@@ -1,0 +1,287 @@
+//! What a component declares about its ports, and how the inputs and outputs of a step reach them.
+
+use crate::error::BusError;
+use crate::message::{Message, view, view_mut};
+use crate::schema::Schema;
+use std::marker::PhantomData;
+
+/// A port of a component.
+#[derive(Clone, Copy, Debug)]
+pub struct PortSpec {
+    /// Name in the component.
+    pub name: &'static str,
+    /// What it is for, in one line.
+    pub doc: &'static str,
+    /// Message type.
+    pub schema: &'static Schema,
+    /// Whether the component needs it.
+    pub required: bool,
+}
+
+impl PortSpec {
+    /// A port that must be wired.
+    #[must_use]
+    pub const fn required(name: &'static str, schema: &'static Schema) -> Self {
+        Self { name, doc: "", schema, required: true }
+    }
+
+    /// A port that may be left out; an optional output exists only where the manifest names it.
+    #[must_use]
+    pub const fn optional(name: &'static str, schema: &'static Schema) -> Self {
+        Self { name, doc: "", schema, required: false }
+    }
+}
+
+/// Which inputs a component has.
+#[derive(Clone, Copy, Debug)]
+pub enum Inputs {
+    /// These.
+    Ports(&'static [PortSpec]),
+    /// One or more of this message, under names that the manifest chooses.
+    Many(&'static Schema),
+    /// Any topics; all of the run where the manifest names none.
+    Any,
+}
+
+/// The inputs of a component at one tick; implement it with `#[derive(bus::InputPorts)]`.
+///
+/// Each field is a port of the same name: `&'a T` one that must be wired, `Option<&'a T>` one that may be left out.
+/// A component whose inputs the manifest names takes [`Many`] or [`AnyInputs`], one without inputs `()`.
+///
+/// ```
+/// use bus::messages::{Gps, Imu};
+/// use bus::ports::{InputPorts, Inputs};
+///
+/// #[derive(bus::InputPorts)]
+/// struct Measurements<'a> {
+///     /// At every tick.
+///     imu: &'a Imu,
+///     /// Where a receiver is on board.
+///     gps: Option<&'a Gps>,
+/// }
+/// let Inputs::Ports([imu, gps]) = Measurements::DECLARED else { panic!() };
+/// assert_eq!((imu.name, imu.required, gps.name, gps.required), ("imu", true, "gps", false));
+/// ```
+pub trait InputPorts<'a>: Sized {
+    /// The ports.
+    const DECLARED: Inputs;
+
+    /// The inputs among `samples`.
+    fn read(samples: InputSamples<'a>) -> Self;
+}
+
+/// The outputs of a component at one tick; implement it with `#[derive(bus::OutputPorts)]`.
+///
+/// Each field is a port of the same name: `T` one that is always there, `Option<T>` one that is there where the
+/// manifest names it. What is not there or not due is dropped; a due output that is `None` ends the run.
+///
+/// ```
+/// use bus::messages::{ControlStatus, MotorCommand};
+/// use bus::ports::OutputPorts;
+///
+/// #[derive(bus::OutputPorts)]
+/// struct Answer {
+///     command: MotorCommand,
+///     status: Option<ControlStatus>,
+/// }
+/// assert_eq!(Answer::DECLARED.iter().map(|port| port.name).collect::<Vec<_>>(), ["command", "status"]);
+/// ```
+pub trait OutputPorts: Sized {
+    /// The ports.
+    const DECLARED: &'static [PortSpec];
+
+    /// Writes the outputs.
+    ///
+    /// # Errors
+    /// If shared memory cannot be had.
+    fn write(self, samples: &mut OutputSamples<'_>) -> Result<(), BusError>;
+
+    /// What was sent last; `None` where one that is always there was never sent.
+    fn read(samples: InputSamples<'_>) -> Option<Self>;
+}
+
+/// The samples that a step may read, by the numbers of its ports.
+#[derive(Clone, Copy)]
+pub struct InputSamples<'a>(pub(crate) &'a dyn SampleSource);
+
+/// Where samples come from: the bus, or whoever steps a component without it.
+pub(crate) trait SampleSource {
+    /// How many ports there are.
+    fn count(&self) -> usize;
+    /// The newest sample of a port; `None` where that is not wired.
+    fn words(&self, port: usize) -> Option<&[u64]>;
+    /// The CDR bytes of a port's sample, if it was sent at this tick.
+    fn fresh(&self, port: usize) -> Option<&[u8]>;
+    /// The same of the process that shadows the publisher.
+    fn fresh_shadow(&self, port: usize) -> Option<&[u8]>;
+}
+
+impl std::fmt::Debug for InputSamples<'_> {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("InputSamples").field("count", &self.0.count()).finish()
+    }
+}
+
+impl<'a> InputSamples<'a> {
+    /// The newest sample of port `port`; `None` where it is not wired.
+    #[must_use]
+    pub fn get<T: Message>(&self, port: usize) -> Option<&'a T> {
+        self.0.words(port).map(view)
+    }
+}
+
+/// Where the samples of a step are written, by the numbers of its ports.
+pub struct OutputSamples<'a>(pub(crate) &'a mut dyn SampleSink);
+
+/// Where samples go: the bus, or whoever steps a component without it.
+pub(crate) trait SampleSink {
+    /// The words of a port's sample; `None` where that is not wired or not due.
+    fn words(&mut self, port: usize) -> Result<Option<&mut [u64]>, BusError>;
+}
+
+impl std::fmt::Debug for OutputSamples<'_> {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("OutputSamples").finish_non_exhaustive()
+    }
+}
+
+/// A field of a struct of inputs.
+pub trait InputPort<'a>: Sized {
+    /// The message that it reads.
+    const SCHEMA: &'static Schema;
+    /// Whether it must be wired.
+    const REQUIRED: bool;
+    /// The input at port `port`.
+    fn read(samples: InputSamples<'a>, port: usize) -> Self;
+}
+
+impl<'a, T: Message> InputPort<'a> for &'a T {
+    const SCHEMA: &'static Schema = T::SCHEMA;
+    const REQUIRED: bool = true;
+
+    fn read(samples: InputSamples<'a>, port: usize) -> Self {
+        samples
+            .get(port)
+            .unwrap_or_else(|| panic!("no sample of {}, which must be wired", T::SCHEMA.type_name))
+    }
+}
+
+impl<'a, T: Message> InputPort<'a> for Option<&'a T> {
+    const SCHEMA: &'static Schema = T::SCHEMA;
+    const REQUIRED: bool = false;
+
+    fn read(samples: InputSamples<'a>, port: usize) -> Self {
+        samples.get(port)
+    }
+}
+
+/// A field of a struct of outputs.
+pub trait OutputPort: Sized {
+    /// The message that it sends.
+    const SCHEMA: &'static Schema;
+    /// Whether it is always there.
+    const REQUIRED: bool;
+    /// Writes the output to port `port`.
+    ///
+    /// # Errors
+    /// If shared memory cannot be had.
+    fn write(self, samples: &mut OutputSamples<'_>, port: usize) -> Result<(), BusError>;
+    /// What was sent last on port `port`; `None` where a required output was never sent.
+    fn read(samples: InputSamples<'_>, port: usize) -> Option<Self>;
+}
+
+impl<T: Message> OutputPort for T {
+    const SCHEMA: &'static Schema = T::SCHEMA;
+    const REQUIRED: bool = true;
+
+    fn write(self, samples: &mut OutputSamples<'_>, port: usize) -> Result<(), BusError> {
+        if let Some(words) = samples.0.words(port)? {
+            *view_mut(words) = self;
+        }
+        Ok(())
+    }
+
+    fn read(samples: InputSamples<'_>, port: usize) -> Option<Self> {
+        samples.get(port).copied()
+    }
+}
+
+impl<T: Message> OutputPort for Option<T> {
+    const SCHEMA: &'static Schema = T::SCHEMA;
+    const REQUIRED: bool = false;
+
+    fn write(self, samples: &mut OutputSamples<'_>, port: usize) -> Result<(), BusError> {
+        self.map_or(Ok(()), |message| message.write(samples, port))
+    }
+
+    fn read(samples: InputSamples<'_>, port: usize) -> Option<Self> {
+        Some(samples.get(port).copied())
+    }
+}
+
+impl<'a> InputPorts<'a> for () {
+    const DECLARED: Inputs = Inputs::Ports(&[]);
+
+    fn read(_: InputSamples<'a>) -> Self {}
+}
+
+impl OutputPorts for () {
+    const DECLARED: &'static [PortSpec] = &[];
+
+    fn write(self, _: &mut OutputSamples<'_>) -> Result<(), BusError> {
+        Ok(())
+    }
+
+    fn read(_: InputSamples<'_>) -> Option<Self> {
+        Some(())
+    }
+}
+
+/// One or more inputs of one message, in the order of the names that the manifest gives them.
+#[derive(Clone, Copy, Debug)]
+pub struct Many<'a, T> {
+    samples: InputSamples<'a>,
+    message: PhantomData<T>,
+}
+
+impl<'a, T: Message> Many<'a, T> {
+    /// The newest sample of each.
+    pub fn iter(&self) -> impl Iterator<Item = &'a T> + use<'a, T> {
+        let samples = self.samples;
+        (0..samples.0.count()).filter_map(move |port| samples.get(port))
+    }
+}
+
+impl<'a, T: Message> InputPorts<'a> for Many<'a, T> {
+    const DECLARED: Inputs = Inputs::Many(T::SCHEMA);
+
+    fn read(samples: InputSamples<'a>) -> Self {
+        Self { samples, message: PhantomData }
+    }
+}
+
+/// The inputs of a component that takes any messages as bytes, in the order of their topics' names.
+#[derive(Clone, Copy, Debug)]
+pub struct AnyInputs<'a>(InputSamples<'a>);
+
+impl<'a> AnyInputs<'a> {
+    /// The sample of input `input` as CDR bytes, if it was sent at this tick.
+    #[must_use]
+    pub fn fresh(&self, input: usize) -> Option<&'a [u8]> {
+        self.0.0.fresh(input)
+    }
+
+    /// The same of the process that shadows the publisher of the input.
+    #[must_use]
+    pub fn fresh_shadow(&self, input: usize) -> Option<&'a [u8]> {
+        self.0.0.fresh_shadow(input)
+    }
+}
+
+impl<'a> InputPorts<'a> for AnyInputs<'a> {
+    const DECLARED: Inputs = Inputs::Any;
+
+    fn read(samples: InputSamples<'a>) -> Self {
+        Self(samples)
+    }
+}

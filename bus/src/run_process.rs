@@ -1,0 +1,167 @@
+//! A component as a node of a run: this process, or a thread of it, takes the node's part.
+
+use crate::announcement::Announcement;
+use crate::component::{Component, StepError, Transfer};
+use crate::connected::ConnectedNode;
+use crate::context::{NodeContext, StepContext};
+use crate::error::BusError;
+use crate::node::{GENERATION_VARIABLE, NODE_VARIABLE, Node, Wiring};
+use crate::port::{InPort, OutPort};
+use crate::ports::{InputSamples, OutputSamples, SampleSink, SampleSource};
+use crate::registration::{Registration, Stepper};
+use crate::tick::Tick;
+use std::path::PathBuf;
+
+/// Which part of which run a process or thread takes.
+#[derive(Clone, Debug)]
+pub struct Join {
+    /// The run directory.
+    pub run_dir: PathBuf,
+    /// The node's name.
+    pub node: String,
+    /// Which instance of the node it is: 0 for the first, those that replace it count up.
+    pub generation: u32,
+}
+
+impl Join {
+    /// The part that the launcher gave this process, which from now on dies with its launcher.
+    ///
+    /// # Errors
+    /// If the process was not started by a launcher.
+    pub fn from_environment() -> Result<Self, BusError> {
+        let run_dir = crate::process::join()?;
+        let node =
+            std::env::var(NODE_VARIABLE).map_err(|_| BusError::NotInARun { variable: NODE_VARIABLE })?;
+        let generation = std::env::var(GENERATION_VARIABLE).ok().and_then(|text| text.parse().ok());
+        Ok(Self { run_dir, node, generation: generation.unwrap_or(0) })
+    }
+}
+
+/// Runs the component `C` as the node that the launcher started this process for: the whole `main` of an executable
+/// that a manifest names as a `command`.
+///
+/// # Errors
+/// If the process was not started by a launcher, the manifest and the component do not fit, or as the component says.
+pub fn run_process<C: Component + 'static>() -> Result<(), BusError> {
+    Registration::of::<C>().run(Join::from_environment()?)
+}
+
+impl Registration {
+    /// Runs the component as the node that `join` names, until the run ends or another process has taken its place.
+    ///
+    /// # Errors
+    /// If the manifest and the component do not fit, a step fails, or the run is aborted.
+    pub fn run(&self, join: Join) -> Result<(), BusError> {
+        let mut node = Node::open(join)?;
+        let wiring = node.declare(self)?;
+        let mut component = make(self, &node)?;
+        let name = node.name().to_owned();
+        let failed =
+            |error: StepError| BusError::Parameters { node: name.clone(), reason: error.to_string() };
+        let mut state = component.initial();
+        let connected = node.connect()?;
+        let topics: Vec<(&str, &Announcement)> =
+            wiring.inputs.iter().flatten().map(|&input| connected.announced(input)).collect();
+        component.connected(&topics).map_err(failed)?;
+        let end = self.step_to_the_end(connected, &wiring, &mut *component, &mut state);
+        let finished = component.finish().map_err(failed);
+        match end {
+            Ok(()) | Err(BusError::Aborted) => finished.and(end),
+            // What made a step fail makes the end fail too: the first error counts.
+            Err(error) => Err(error),
+        }
+    }
+
+    fn step_to_the_end(
+        &self,
+        connected: ConnectedNode,
+        wiring: &Wiring,
+        component: &mut dyn Stepper,
+        state: &mut [u64],
+    ) -> Result<(), BusError> {
+        let schema = match self.transfer {
+            Transfer::Message(schema) => Some(schema),
+            Transfer::Nothing | Transfer::Internal => None,
+        };
+        let size = schema.map_or(0, |schema| schema.size);
+        let state = &mut bytemuck::cast_slice_mut(state)[..size];
+        connected.run_with_state_of(schema, state, |tick, state| step(component, wiring, tick, state))
+    }
+}
+
+/// The component, made for the node.
+fn make(registration: &Registration, node: &Node) -> Result<Box<dyn Stepper>, BusError> {
+    let (inputs, outputs) = node.port_names();
+    let context = NodeContext::new(node.name(), &inputs)
+        .naming(&outputs)
+        .timed(node.tick_ns(), node.period_ticks(), node.duration_ticks())
+        .seeded(node.seed());
+    let made = (registration.make)(node.raw_parameters(), &context);
+    made.map_err(|reason| node.error(reason))
+}
+
+fn step(
+    component: &mut dyn Stepper,
+    wiring: &Wiring,
+    tick: &mut Tick<'_>,
+    state: &mut [u8],
+) -> Result<(), StepError> {
+    let number = tick.number();
+    let inputs = Received { tick: number, ports: tick.inputs, wiring: &wiring.inputs };
+    let predecessor = Received { tick: number, ports: tick.predecessor, wiring: &wiring.outputs };
+    let context = StepContext {
+        tick: number,
+        time_ns: tick.time_ns,
+        predecessor: (!tick.predecessor.is_empty()).then_some(&predecessor as &dyn SampleSource),
+    };
+    let mut sink = Loans { tick: number, node: tick.node, ports: tick.outputs, wiring: &wiring.outputs };
+    component.step(&context, InputSamples(&inputs), state, &mut OutputSamples(&mut sink))
+}
+
+/// The samples that a node has received.
+struct Received<'a> {
+    tick: u32,
+    ports: &'a [InPort],
+    wiring: &'a [Option<usize>],
+}
+
+impl Received<'_> {
+    fn port(&self, port: usize) -> Option<&InPort> {
+        self.ports.get(self.wiring[port]?)
+    }
+}
+
+impl SampleSource for Received<'_> {
+    fn count(&self) -> usize {
+        self.wiring.len()
+    }
+
+    fn words(&self, port: usize) -> Option<&[u64]> {
+        self.port(port)?.newest()
+    }
+
+    fn fresh(&self, port: usize) -> Option<&[u8]> {
+        Some(self.port(port)?.fresh(self.tick)?.0)
+    }
+
+    fn fresh_shadow(&self, port: usize) -> Option<&[u8]> {
+        Some(self.port(port)?.fresh_shadow(self.tick)?.0)
+    }
+}
+
+/// The memory that a node's samples are written to.
+struct Loans<'a> {
+    tick: u32,
+    node: &'a str,
+    ports: &'a mut [OutPort],
+    wiring: &'a [Option<usize>],
+}
+
+impl SampleSink for Loans<'_> {
+    fn words(&mut self, port: usize) -> Result<Option<&mut [u64]>, BusError> {
+        match self.wiring[port].and_then(|index| self.ports.get_mut(index)) {
+            Some(output) if output.is_due(self.tick) => output.words(self.node).map(Some),
+            Some(_) | None => Ok(None),
+        }
+    }
+}
