@@ -1,5 +1,6 @@
 //! The components that this package brings.
 
+use bus::kind::NodeKind;
 use runtime::registry::Registry;
 
 /// Every component that this package brings, in alphabetical order.
