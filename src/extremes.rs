@@ -4,8 +4,8 @@
 //! number that overflows on the way, shows here without a process.
 
 use crate::COMPONENTS;
+use bus::Registration;
 use bus::context::NodeContext;
-use bus::kind::NodeKind;
 use runtime::graph::Graph;
 use runtime::manifest::Manifest;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -207,15 +207,15 @@ fn no_number_of_a_shipped_scene_brings_the_plant_down() {
 fn no_number_of_shipped_gains_brings_a_law_down() {
     use controllers::{cascade, geometric, lqr, pid, velocity, wall_follow, wall_stop};
     let folder = Folder::new();
-    let kinds: [(&str, NodeKind); 8] = [
-        ("pid", pid::KIND),
-        ("pid-thesis", pid::KIND),
-        ("cascade", cascade::KIND),
-        ("velocity", velocity::KIND),
-        ("wall-stop", wall_stop::KIND),
-        ("wall-follow", wall_follow::KIND),
-        ("lqr", lqr::KIND),
-        ("geometric", geometric::KIND),
+    let kinds: [(&str, Registration); 8] = [
+        ("pid", Registration::of_kind(&pid::KIND)),
+        ("pid-thesis", Registration::of_kind(&pid::KIND)),
+        ("cascade", Registration::of_kind(&cascade::KIND)),
+        ("velocity", Registration::of_kind(&velocity::KIND)),
+        ("wall-stop", Registration::of_kind(&wall_stop::KIND)),
+        ("wall-follow", Registration::of_kind(&wall_follow::KIND)),
+        ("lqr", Registration::of_kind(&lqr::KIND)),
+        ("geometric", Registration::of_kind(&geometric::KIND)),
     ];
     for (name, kind) in kinds {
         let file = format!("controllers/gains/{name}.toml");

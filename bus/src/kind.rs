@@ -1,9 +1,7 @@
 //! What a built-in node declares about itself: known before it runs, so that a manifest can be checked.
 
-use crate::component::Component;
 use crate::context::NodeContext;
 use crate::error::BusError;
-use crate::registration::Registration;
 
 pub use crate::ports::{Inputs, PortSpec};
 pub use crate::registration::read_parameters;
@@ -23,20 +21,4 @@ pub struct NodeKind {
     pub check: fn(&serde_json::Value, &NodeContext<'_>) -> Result<(), String>,
     /// Runs the node in this process.
     pub run: fn() -> Result<(), BusError>,
-}
-
-impl NodeKind {
-    /// The kind of the component `C`.
-    #[must_use]
-    pub const fn of<C: Component + 'static>() -> Self {
-        let Registration { info, inputs, outputs, .. } = Registration::of::<C>();
-        Self {
-            name: info.name,
-            summary: info.summary,
-            inputs,
-            outputs,
-            check: |parameters, context| Registration::of::<C>().check(parameters, context),
-            run: crate::run_process::run_process::<C>,
-        }
-    }
 }

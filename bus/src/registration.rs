@@ -1,8 +1,10 @@
 //! A component in a table of components: its declaration, and how one is made, without its type.
 
 use crate::announcement::Announcement;
-use crate::component::{Component, Info, State, StepError, Transfer};
+use crate::component::{Component, Info, Role, State, StepError, Transfer};
 use crate::context::{NodeContext, StepContext};
+use crate::error::BusError;
+use crate::kind::NodeKind;
 use crate::ports::{InputPorts, InputSamples, Inputs, OutputPorts, OutputSamples, PortSpec};
 use serde::de::DeserializeOwned;
 use serde_json::Value;
@@ -10,44 +12,56 @@ use serde_json::Value;
 /// A component in a table of components: all that a launcher must know of it.
 #[derive(Clone, Copy, Debug)]
 pub struct Registration {
-    /// Name, summary and role.
-    pub info: Info,
+    /// Name in manifests.
+    pub name: &'static str,
+    /// What it does, in one line.
+    pub summary: &'static str,
+    /// What it does for a run.
+    pub role: Role,
     /// Inputs.
     pub inputs: Inputs,
     /// Outputs.
     pub outputs: &'static [PortSpec],
     /// What happens to its state when another process takes its place.
     pub transfer: Transfer,
-    pub(crate) make: fn(&Value, &NodeContext<'_>) -> Result<Box<dyn Stepper>, String>,
-    check: fn(&Value, &NodeContext<'_>) -> Result<(), String>,
+    /// Checks the parameters and the files that they name for a node, without running it.
+    pub check: fn(&Value, &NodeContext<'_>) -> Result<(), String>,
+    pub(crate) make: Make,
+}
+
+/// Makes a component.
+pub(crate) type MakeComponent = fn(&Value, &NodeContext<'_>) -> Result<Box<dyn Stepper>, String>;
+
+/// How a component is made.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Make {
+    Component(MakeComponent),
+    Kind(fn() -> Result<(), BusError>),
 }
 
 impl Registration {
     /// The component `C`.
     #[must_use]
     pub const fn of<C: Component + 'static>() -> Self {
+        let Info { name, summary, role } = C::INFO;
         Self {
-            info: C::INFO,
+            name,
+            summary,
+            role,
             inputs: <C::Inputs<'static> as InputPorts<'static>>::DECLARED,
             outputs: C::Outputs::DECLARED,
             transfer: C::State::TRANSFER,
-            make: |parameters, context| Ok(Box::new(make::<C>(parameters, context)?)),
             check: |parameters, context| make::<C>(parameters, context)?.rehearse(context),
+            make: Make::Component(|parameters, context| Ok(Box::new(make::<C>(parameters, context)?))),
         }
     }
 
-    /// Name in manifests.
+    /// A component that is not a type yet.
     #[must_use]
-    pub const fn name(&self) -> &'static str {
-        self.info.name
-    }
-
-    /// Checks `parameters` and the files that they name for a node, without running it.
-    ///
-    /// # Errors
-    /// What cannot be meant, the key in backticks.
-    pub fn check(&self, parameters: &Value, context: &NodeContext<'_>) -> Result<(), String> {
-        (self.check)(parameters, context)
+    pub const fn of_kind(kind: &NodeKind) -> Self {
+        let NodeKind { name, summary, inputs, outputs, check, run } = *kind;
+        let (role, transfer) = (Role::Compute, Transfer::Nothing);
+        Self { name, summary, role, inputs, outputs, transfer, check, make: Make::Kind(run) }
     }
 }
 

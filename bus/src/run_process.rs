@@ -8,7 +8,7 @@ use crate::error::BusError;
 use crate::node::{GENERATION_VARIABLE, NODE_VARIABLE, Node, Wiring};
 use crate::port::{InPort, OutPort};
 use crate::ports::{InputSamples, OutputSamples, SampleSink, SampleSource};
-use crate::registration::{Registration, Stepper};
+use crate::registration::{Make, MakeComponent, Registration, Stepper};
 use crate::tick::Tick;
 use std::path::PathBuf;
 
@@ -52,9 +52,13 @@ impl Registration {
     /// # Errors
     /// If the manifest and the component do not fit, a step fails, or the run is aborted.
     pub fn run(&self, join: Join) -> Result<(), BusError> {
+        let make = match self.make {
+            Make::Component(make) => make,
+            Make::Kind(run) => return run(),
+        };
         let mut node = Node::open(join)?;
         let wiring = node.declare(self)?;
-        let mut component = make(self, &node)?;
+        let mut component = made(make, &node)?;
         let name = node.name().to_owned();
         let failed =
             |error: StepError| BusError::Parameters { node: name.clone(), reason: error.to_string() };
@@ -90,14 +94,13 @@ impl Registration {
 }
 
 /// The component, made for the node.
-fn make(registration: &Registration, node: &Node) -> Result<Box<dyn Stepper>, BusError> {
+fn made(make: MakeComponent, node: &Node) -> Result<Box<dyn Stepper>, BusError> {
     let (inputs, outputs) = node.port_names();
     let context = NodeContext::new(node.name(), &inputs)
         .naming(&outputs)
         .timed(node.tick_ns(), node.period_ticks(), node.duration_ticks())
         .seeded(node.seed());
-    let made = (registration.make)(node.raw_parameters(), &context);
-    made.map_err(|reason| node.error(reason))
+    make(node.raw_parameters(), &context).map_err(|reason| node.error(reason))
 }
 
 fn step(

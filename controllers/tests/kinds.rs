@@ -1,7 +1,7 @@
 //! What the kinds of controller and the pilot accept and refuse before a start, and that the documentation says so.
 
+use bus::Registration;
 use bus::context::NodeContext;
-use bus::kind::NodeKind;
 use controllers::{cascade, pid, pilot, velocity, wall_follow, wall_stop};
 use serde_json::{Value, json};
 
@@ -12,14 +12,17 @@ fn gains(name: &str) -> String {
 }
 
 /// Each kind with parameters that it accepts.
-fn accepted() -> [(NodeKind, Value); 6] {
+fn accepted() -> [(Registration, Value); 6] {
     [
-        (pid::KIND, json!({ "vehicle": VEHICLE })),
-        (cascade::KIND, json!({ "vehicle": VEHICLE })),
-        (velocity::KIND, json!({ "vehicle": VEHICLE, "altitude_m": 1.5 })),
-        (wall_stop::KIND, json!({ "vehicle": VEHICLE, "altitude_m": 1.5 })),
-        (wall_follow::KIND, json!({ "vehicle": VEHICLE, "altitude_m": 1.5, "mode": "constant" })),
-        (NodeKind::of::<pilot::Pilot>(), json!({ "initial_altitude_m": 1.0 })),
+        (Registration::of_kind(&pid::KIND), json!({ "vehicle": VEHICLE })),
+        (Registration::of_kind(&cascade::KIND), json!({ "vehicle": VEHICLE })),
+        (Registration::of_kind(&velocity::KIND), json!({ "vehicle": VEHICLE, "altitude_m": 1.5 })),
+        (Registration::of_kind(&wall_stop::KIND), json!({ "vehicle": VEHICLE, "altitude_m": 1.5 })),
+        (
+            Registration::of_kind(&wall_follow::KIND),
+            json!({ "vehicle": VEHICLE, "altitude_m": 1.5, "mode": "constant" }),
+        ),
+        (Registration::of::<pilot::Pilot>(), json!({ "initial_altitude_m": 1.0 })),
     ]
 }
 
@@ -108,7 +111,7 @@ fn a_velocity_comes_from_a_reference_or_from_parameters_and_never_from_both() {
 }
 
 /// The parameters that a kind's refusal of an unknown one names as known.
-fn known(kind: &NodeKind, parameters: &Value) -> Vec<String> {
+fn known(kind: &Registration, parameters: &Value) -> Vec<String> {
     let error =
         (kind.check)(&with(parameters, "unknown_key", json!(1)), &NodeContext::new("node", &[])).unwrap_err();
     let list = error.split("unknown field `unknown_key`").nth(1).unwrap_or_else(|| panic!("{error}"));

@@ -68,7 +68,7 @@ pub fn graph(graph: &Graph) -> String {
 
 fn what(program: &Program) -> String {
     match &program.executable {
-        Executable::Kind(kind) => kind.name.to_owned(),
+        Executable::Component(kind) => kind.name.to_owned(),
         Executable::Command(words) => words.join(" "),
     }
 }

@@ -1,7 +1,8 @@
 //! What the supervisor starts: the executable behind a node, how it runs on the host, and what follows its
 //! end.
 
-use bus::kind::NodeKind;
+use bus::Registration;
+use bus::component::Role;
 use bus::plan::NodePlan;
 use serde::Deserialize;
 use std::collections::BTreeMap;
@@ -15,8 +16,8 @@ pub const WATCHDOG: Duration = Duration::from_secs(20);
 /// An executable behind a node.
 #[derive(Clone, Debug)]
 pub enum Executable {
-    /// A node of this binary.
-    Kind(&'static NodeKind),
+    /// A component that this binary brings.
+    Component(&'static Registration),
     /// Another executable and its arguments.
     Command(Vec<String>),
 }
@@ -86,9 +87,17 @@ impl Program {
         }
     }
 
-    /// Whether this is the built-in recorder.
+    /// The component that this is, where the binary brings it.
+    pub fn component(&self) -> Option<&'static Registration> {
+        match self.executable {
+            Executable::Component(component) => Some(component),
+            Executable::Command(_) => None,
+        }
+    }
+
+    /// Whether this writes the run's recording.
     pub fn is_recorder(&self) -> bool {
-        matches!(self.executable, Executable::Kind(kind) if kind.name == <recorder::node::Recorder as bus::Component>::INFO.name)
+        self.component().is_some_and(|component| component.role == Role::Record)
     }
 }
 

@@ -1,26 +1,26 @@
 //! The components that a manifest may name.
 
-use bus::kind::NodeKind;
+use bus::Registration;
 
 /// The components that a manifest may name: whoever checks or launches one says which there are.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Registry(&'static [&'static NodeKind]);
+pub struct Registry(&'static [Registration]);
 
 impl Registry {
     /// A registry of `components`, in the order in which messages list them.
     #[must_use]
-    pub const fn new(components: &'static [&'static NodeKind]) -> Self {
+    pub const fn new(components: &'static [Registration]) -> Self {
         Self(components)
     }
 
     /// All components.
-    pub fn iter(&self) -> impl Iterator<Item = &'static NodeKind> {
-        self.0.iter().copied()
+    pub fn iter(&self) -> impl Iterator<Item = &'static Registration> {
+        self.0.iter()
     }
 
     /// The component named `name`.
     #[must_use]
-    pub fn find(&self, name: &str) -> Option<&'static NodeKind> {
+    pub fn find(&self, name: &str) -> Option<&'static Registration> {
         self.iter().find(|component| component.name == name)
     }
 

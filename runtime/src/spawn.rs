@@ -38,7 +38,7 @@ pub fn start(
     notify: Option<&Path>,
 ) -> Result<(Child, PathBuf)> {
     let mut command = match &program.executable {
-        Executable::Kind(kind) => {
+        Executable::Component(kind) => {
             let mut command = this_binary();
             command.args(["node", kind.name]);
             command
@@ -57,7 +57,7 @@ pub fn start(
         Role::Clock => {}
         Role::Node { generation, .. } => {
             // A `command` may be a shell that starts others first, who would not hear these signals either.
-            if matches!(program.executable, Executable::Kind(_)) {
+            if matches!(program.executable, Executable::Component(_)) {
                 bus::process::hold_stop_signals(&mut command);
             }
             command.env(NODE_VARIABLE, name).env(GENERATION_VARIABLE, generation.to_string());

@@ -263,7 +263,7 @@ fn node(kind: &str) -> Result<bool> {
         let kind = COMPONENTS
             .find(kind)
             .with_context(|| format!("no kind `{kind}`; there are {}", COMPONENTS.names()))?;
-        (kind.run)()
+        bus::Join::from_environment().and_then(|join| kind.run(join))
     };
     match result {
         // The launcher ended the run and knows why.

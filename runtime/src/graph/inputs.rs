@@ -6,8 +6,9 @@ use crate::manifest::{InputSetting, Manifest};
 use crate::placement;
 use crate::problem::{Problem, nearest};
 use crate::program::{Executable, Program};
-use bus::kind::{Inputs, NodeKind, PortSpec};
+use bus::Registration;
 use bus::plan::{InputPlan, NodePlan, TopicPlan};
+use bus::ports::{Inputs, PortSpec};
 use toml::Spanned;
 
 /// The inputs of `member`, wired to `topics`.
@@ -20,7 +21,7 @@ pub fn inputs(
     topics: &[TopicPlan],
 ) -> Result<Vec<InputPlan>, Problem> {
     let Member { name, process, program } = member;
-    if let Executable::Kind(NodeKind { inputs: Inputs::Any, .. }) = &program.executable
+    if let Executable::Component(Registration { inputs: Inputs::Any, .. }) = &program.executable
         && process.inputs.is_empty()
     {
         let all = topics.iter().enumerate();
@@ -32,7 +33,7 @@ pub fn inputs(
         };
         return Ok(all.map(port).collect());
     }
-    if let Executable::Kind(NodeKind { inputs: Inputs::Ports(ports), .. }) = &program.executable {
+    if let Executable::Component(Registration { inputs: Inputs::Ports(ports), .. }) = &program.executable {
         let used = process.inputs.keys().map(|port| (port.get_ref(), port.span()));
         require_known_ports(manifest, "input", name, ports, used)?;
         let is_wired = |port: &PortSpec| process.inputs.keys().any(|wired| wired.get_ref() == port.name);
@@ -49,7 +50,7 @@ pub fn inputs(
             ));
         }
     }
-    if let Executable::Kind(NodeKind { inputs: Inputs::Many(schema), .. }) = &program.executable
+    if let Executable::Component(Registration { inputs: Inputs::Many(schema), .. }) = &program.executable
         && process.inputs.is_empty()
     {
         let message = format!("process `{}` has no input", name.get_ref());
@@ -114,10 +115,10 @@ fn input(
 /// The type that a built-in node reads on `port`; none where it reads any.
 fn expected_type(program: &Program, port: &str) -> Option<&'static str> {
     match &program.executable {
-        Executable::Kind(NodeKind { inputs: Inputs::Ports(ports), .. }) => {
+        Executable::Component(Registration { inputs: Inputs::Ports(ports), .. }) => {
             Some(ports.iter().find(|spec| spec.name == port).map_or("", |spec| spec.schema.type_name))
         }
-        Executable::Kind(NodeKind { inputs: Inputs::Many(schema), .. }) => Some(schema.type_name),
+        Executable::Component(Registration { inputs: Inputs::Many(schema), .. }) => Some(schema.type_name),
         _ => None,
     }
 }

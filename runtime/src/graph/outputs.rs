@@ -4,8 +4,8 @@ use super::processes::{Member, period_ticks};
 use crate::manifest::{Manifest, OutputSetting, Process};
 use crate::problem::{Problem, nearest};
 use crate::program::Executable;
-use bus::kind::PortSpec;
 use bus::plan::{OutputPlan, TopicPlan};
+use bus::ports::PortSpec;
 use bus::schema::Schema;
 use std::ops::Range;
 use toml::Spanned;
@@ -49,7 +49,7 @@ fn published_by(manifest: &Manifest, node: usize, member: &Member<'_>) -> Result
     let Member { name, process, program } = member;
     let period = period_ticks(manifest, process)?;
     let declared: Vec<(&str, Option<&'static Schema>)> = match &program.executable {
-        Executable::Kind(kind) => {
+        Executable::Component(kind) => {
             let names = process.outputs.keys().map(|port| (port.get_ref().as_str(), port.span()));
             require_known_ports(manifest, "output", name, kind.outputs, names)?;
             let is_on = |port: &&PortSpec| port.required || setting(process, port.name).is_some();

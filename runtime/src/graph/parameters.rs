@@ -97,7 +97,7 @@ pub fn set(
     let parameters = serde_json::to_value(parameters).unwrap_or_default();
     if program.is_recorder() {
         require_none(manifest, process)?;
-    } else if let Executable::Kind(kind) = &program.executable {
+    } else if let Executable::Component(kind) = &program.executable {
         ranges::check(manifest, name, process)?;
         let inputs: Vec<&str> = process.inputs.keys().map(|port| port.get_ref().as_str()).collect();
         let outputs: Vec<&str> = process.outputs.keys().map(|port| port.get_ref().as_str()).collect();

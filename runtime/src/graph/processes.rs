@@ -6,6 +6,8 @@ use crate::problem::{Problem, nearest};
 use crate::program::{Executable, OnExit, Program, Readiness};
 use bus::GENERATION_VARIABLE;
 use bus::NODE_VARIABLE;
+use bus::Registration;
+use bus::component::Transfer;
 use bus::plan::NodePlan;
 use bus::process::{LAUNCHER_VARIABLE, RUN_VARIABLE};
 use std::collections::BTreeMap;
@@ -159,7 +161,7 @@ fn executable(manifest: &Manifest, name: &Spanned<String>, process: &Process) ->
                 .registry()
                 .find(kind.get_ref())
                 .ok_or_else(|| manifest.problem(&kind.span(), message, help))?;
-            Ok(Executable::Kind(kind))
+            Ok(Executable::Component(kind))
         }
         (None, Some(command)) => self::command(manifest, name, process, command).map(Executable::Command),
         (Some(_), Some(command)) => Err(manifest.problem(
@@ -407,12 +409,13 @@ pub fn require_replaceable(manifest: &Manifest, member: &Member<'_>, node: &Node
 
 /// Why another process cannot go on in the place of this one.
 pub fn irreplaceable(member: &Member<'_>, node: &NodePlan) -> Option<&'static str> {
+    let has_internal_state = |component: &Registration| matches!(component.transfer, Transfer::Internal);
     if member.program.is_recorder() {
         Some("it is the recorder, and its file would be torn")
-    } else if matches!(member.program.executable, Executable::Kind(kind) if kind.name == "plant") {
-        Some("it is the plant, whose motion is not handed over: the vehicle would start anew")
+    } else if member.program.component().is_some_and(has_internal_state) {
+        Some("its state is not transferred: another process would start anew")
     } else if node.outputs.is_empty() {
-        Some("it has no outputs, so nothing could be handed over")
+        Some("it has no outputs, so nothing could be transferred")
     } else {
         None
     }

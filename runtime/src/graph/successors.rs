@@ -7,7 +7,7 @@ use crate::manifest::{Manifest, OutputSetting, Process, SwapSetting};
 use crate::problem::Problem;
 use crate::program::{Executable, Program, Successor};
 use crate::succession::take_over_stride;
-use bus::kind::NodeKind;
+use bus::Registration;
 use bus::plan::{NodePlan, Plan};
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -121,7 +121,7 @@ impl Run<'_> {
     ) -> Result<(NodePlan, Program), Problem> {
         let name = Spanned::new(span.clone(), self.plan.nodes[node].name.clone());
         let program = program(self.manifest, &name, whole)?;
-        if let Executable::Kind(kind) = &program.executable {
+        if let Executable::Component(kind) = &program.executable {
             self.require_same_outputs(node, kind, span)?;
         }
         let process = Process { outputs: self.outputs(node, span), ..whole.clone() };
@@ -157,7 +157,12 @@ impl Run<'_> {
     }
 
     /// Refuses a kind that does not publish what `node` publishes.
-    fn require_same_outputs(&self, node: usize, kind: &NodeKind, span: &Range<usize>) -> Result<(), Problem> {
+    fn require_same_outputs(
+        &self,
+        node: usize,
+        kind: &Registration,
+        span: &Range<usize>,
+    ) -> Result<(), Problem> {
         let present: Vec<(&str, &str)> = self.plan.nodes[node]
             .outputs
             .iter()
