@@ -1,15 +1,17 @@
-//! A controller in its own binary: joins a run, reads two topics, publishes motor commands.
+//! A controller in its own binary: reads two topics, publishes motor commands.
 //!
 //! `cargo build --release --examples`, then `hummingbus run manifests/custom-controller.toml`.
 
+use bus::component::{Component, Info, StepError};
+use bus::context::{NodeContext, StepContext};
 use bus::messages::{MotorCommand, Quaternion, SetPoint, StateEstimate};
-use bus::{BusError, Node};
+use bus::{BusError, InputPorts, OutputPorts};
 use serde::Deserialize;
 
 /// What the manifest's `parameters` table holds; gains from an error to motor counts.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
-struct Parameters {
+struct Gains {
     /// Command at which the vehicle hovers, in counts.
     hover_count: f64,
     /// Counts per metre of altitude error, and per metre a second of climb.
@@ -18,15 +20,35 @@ struct Parameters {
     tilt: [f64; 2],
 }
 
-fn main() -> Result<(), BusError> {
-    let mut node = Node::join()?;
-    let set_point = node.input::<SetPoint>("set_point")?;
-    let estimate = node.input::<StateEstimate>("estimate")?;
-    let command = node.output::<MotorCommand>("command")?;
-    let gains: Parameters = node.parameters()?;
+#[derive(InputPorts)]
+struct Inputs<'a> {
+    set_point: &'a SetPoint,
+    estimate: &'a StateEstimate,
+}
 
-    node.run(|tick| {
-        let (asked, found) = (tick.get(set_point), tick.get(estimate));
+#[derive(OutputPorts)]
+struct Outputs {
+    command: MotorCommand,
+}
+
+/// The controller, which remembers nothing from tick to tick.
+struct Controller(Gains);
+
+impl Component for Controller {
+    const INFO: Info = Info::new("custom", "proportional-derivative control of altitude, roll and pitch");
+    type Parameters = Gains;
+    type Inputs<'a> = Inputs<'a>;
+    type Outputs = Outputs;
+    type State = ();
+
+    fn new(gains: Gains, _: &NodeContext<'_>) -> Result<Self, String> {
+        Ok(Self(gains))
+    }
+
+    fn initial(&self) {}
+
+    fn step(&mut self, _: &StepContext<'_>, inputs: Inputs<'_>, (): &mut ()) -> Result<Outputs, StepError> {
+        let (Self(gains), asked, found) = (self, inputs.set_point, inputs.estimate);
         let law = |gains: [f64; 2], error: f64, rate: f64| gains[0] * error - gains[1] * rate;
         let lift = law(gains.altitude, asked.altitude - found.position.z, found.velocity.z);
         let (roll, pitch) = tilt_rad(&found.attitude);
@@ -35,9 +57,13 @@ fn main() -> Result<(), BusError> {
         // Rotors in the order of the vehicle file: front, right, rear, left. Roll lifts the left side,
         // pitch the rear.
         let mix = [-pitch, -roll, pitch, roll];
-        let command_counts = mix.map(|tilt| gains.hover_count + lift + tilt);
-        tick.write(command, MotorCommand { command: command_counts, ..Default::default() })
-    })
+        let command = mix.map(|tilt| gains.hover_count + lift + tilt);
+        Ok(Outputs { command: MotorCommand { command, ..Default::default() } })
+    }
+}
+
+fn main() -> Result<(), BusError> {
+    bus::run_process::<Controller>()
 }
 
 /// Roll and pitch (positive nose down) of an attitude near level.

@@ -3,7 +3,7 @@
 //! Frames: `world` is z up; `body` is x forward, y left, z up, its origin in the centre of mass.
 
 use crate::Message;
-use crate::schema::{FieldType, Kind, Schema};
+use crate::schema::{FieldType, Kind};
 
 mod control;
 mod sensing;
@@ -367,36 +367,6 @@ pub struct MeasuredState {
     /// Angular velocity.
     #[field(unit = "rad/s", frame = "body")]
     pub angular_velocity: Vector3,
-}
-
-/// Every message that a topic of a built-in node can carry, in alphabetical order.
-#[must_use]
-pub fn all() -> [&'static Schema; 23] {
-    [
-        AttitudeEstimate::SCHEMA,
-        Barometer::SCHEMA,
-        Battery::SCHEMA,
-        BodyTransform::SCHEMA,
-        Clearance::SCHEMA,
-        Contact::SCHEMA,
-        ControlStatus::SCHEMA,
-        Gps::SCHEMA,
-        Imu::SCHEMA,
-        Innovation::SCHEMA,
-        Magnetometer::SCHEMA,
-        MeasuredState::SCHEMA,
-        Mocap::SCHEMA,
-        MotorCommand::SCHEMA,
-        PlantState::SCHEMA,
-        PoseStamped::SCHEMA,
-        Ranges::SCHEMA,
-        Reference::SCHEMA,
-        RotorSpeeds::SCHEMA,
-        SetPoint::SCHEMA,
-        StateEstimate::SCHEMA,
-        Traffic::SCHEMA,
-        WallEstimate::SCHEMA,
-    ]
 }
 
 #[cfg(test)]

@@ -6,6 +6,7 @@ use crate::context::{NodeContext, StepContext};
 use crate::error::BusError;
 use crate::kind::NodeKind;
 use crate::ports::{InputPorts, InputSamples, Inputs, OutputPorts, OutputSamples, PortSpec};
+use crate::schema::Schema;
 use serde::de::DeserializeOwned;
 use serde_json::Value;
 
@@ -54,6 +55,16 @@ impl Registration {
             check: |parameters, context| make::<C>(parameters, context)?.rehearse(context),
             make: Make::Component(|parameters, context| Ok(Box::new(make::<C>(parameters, context)?))),
         }
+    }
+
+    /// The messages of its ports.
+    pub fn messages(&self) -> impl Iterator<Item = &'static Schema> {
+        let (inputs, one) = match self.inputs {
+            Inputs::Ports(ports) => (ports, None),
+            Inputs::Many(schema) => (&[] as &[_], Some(schema)),
+            Inputs::Any => (&[] as &[_], None),
+        };
+        inputs.iter().chain(self.outputs).map(|port| port.schema).chain(one)
     }
 
     /// A component that is not a type yet.

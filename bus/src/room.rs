@@ -8,6 +8,7 @@ use crate::error::BusError;
 use crate::message::sample_words;
 use crate::plan::Plan;
 use crate::process::user_id;
+use crate::schema::Schema;
 use crate::transport::{BORROWED_SAMPLES, Capacity, SampleHeader};
 use rustix::io::Errno;
 use std::fs::{File, OpenOptions};
@@ -132,23 +133,23 @@ pub(crate) fn samples_bytes(size: usize, capacity: Capacity) -> u64 {
 }
 
 /// The shared memory that the run of `plan` takes at least, and its largest file. Not in it: the states that nodes
-/// hand over, and messages that this program does not know; who makes those finds the room or says so.
-fn bytes_at_least(plan: &Plan) -> (u64, u64) {
-    let schemas = crate::messages::all();
+/// hand over, and messages that are not `known`; who makes those finds the room or says so.
+fn bytes_at_least(plan: &Plan, known: &[&Schema]) -> (u64, u64) {
     let topics = plan.topics.iter().enumerate().map(|(index, topic)| {
-        let known = schemas.iter().find(|schema| schema.type_name == topic.type_name);
-        known.map_or(0, |schema| samples_bytes(schema.size, plan.capacity(index)))
+        let schema = known.iter().find(|schema| schema.type_name == topic.type_name);
+        schema.map_or(0, |schema| samples_bytes(schema.size, plan.capacity(index)))
     });
     let files = || topics.clone().chain([control_bytes(plan) as u64]);
     (files().sum(), files().max().unwrap_or(0))
 }
 
-/// Requires that /dev/shm has the room that the run of `plan` takes, and that files may be as large as it needs them.
+/// Requires that /dev/shm has the room that the run of `plan` takes, and that files may be as large as it needs them;
+/// `known` are the messages that this program knows.
 ///
 /// # Errors
 /// How much was needed, and how much there is.
-pub fn require(plan: &Plan) -> Result<(), BusError> {
-    let (total, largest) = bytes_at_least(plan);
+pub fn require(plan: &Plan, known: &[&Schema]) -> Result<(), BusError> {
+    let (total, largest) = bytes_at_least(plan, known);
     let limit = rustix::process::getrlimit(rustix::process::Resource::Fsize).current.unwrap_or(u64::MAX);
     if largest > limit {
         return Err(BusError::FileLimit { needed: largest, limit });

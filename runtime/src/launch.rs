@@ -67,7 +67,7 @@ pub fn fly(
 ) -> Result<Outcome> {
     let run_dir = RunDir::create(&manifest.path)?;
     // Before anything is touched that an earlier run left.
-    bus::room::require(&graph.plan)?;
+    bus::room::require(&graph.plan, &manifest.registry().messages())?;
     outputs.claim(&run_dir)?;
     if let Some(kept) = outputs.kept() {
         on(RunEvent::Note(&format!("what an earlier run left unfinished is kept as {}", kept.display())));

@@ -1,6 +1,8 @@
 //! The components that a manifest may name.
 
 use bus::Registration;
+use bus::schema::Schema;
+use std::collections::BTreeMap;
 
 /// The components that a manifest may name: whoever checks or launches one says which there are.
 #[derive(Clone, Copy, Debug, Default)]
@@ -28,5 +30,19 @@ impl Registry {
     #[must_use]
     pub fn names(&self) -> String {
         self.iter().map(|component| component.name).collect::<Vec<_>>().join(", ")
+    }
+
+    /// Every message that a port of a component carries, in the order of their type names.
+    #[must_use]
+    pub fn messages(&self) -> Vec<&'static Schema> {
+        let by_name: BTreeMap<_, _> =
+            self.iter().flat_map(Registration::messages).map(|schema| (schema.type_name, schema)).collect();
+        by_name.into_values().collect()
+    }
+
+    /// The message whose type is called `type_name`.
+    #[must_use]
+    pub fn message(&self, type_name: &str) -> Option<&'static Schema> {
+        self.iter().flat_map(Registration::messages).find(|schema| schema.type_name == type_name)
     }
 }

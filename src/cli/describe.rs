@@ -1,10 +1,11 @@
 //! What `schema` and `cat` print.
 
+use crate::COMPONENTS;
 use std::fmt::Write as _;
 
 /// Every message with its fields, units, frames and layout hash.
 pub fn schemas() -> String {
-    bus::messages::all().into_iter().fold(String::new(), |mut text, schema| {
+    COMPONENTS.messages().into_iter().fold(String::new(), |mut text, schema| {
         let _ = write!(text, "{}  layout {:016x}\n  {}\n", schema.layout(), schema.layout_hash(), schema.doc);
         text.push('\n');
         text
@@ -13,7 +14,8 @@ pub fn schemas() -> String {
 
 /// The same as JSON, with the ROS 2 definitions.
 pub fn schemas_json() -> String {
-    let schemas: Vec<_> = bus::messages::all().into_iter().map(bus::announcement::Announcement::of).collect();
+    let schemas: Vec<_> =
+        COMPONENTS.messages().into_iter().map(bus::announcement::Announcement::of).collect();
     serde_json::to_string_pretty(&schemas).unwrap_or_default()
 }
 

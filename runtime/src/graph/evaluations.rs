@@ -167,7 +167,7 @@ fn check_field(manifest: &Manifest, plan: &Plan, pass: &Spanned<PassCondition>) 
         return Err(at("it has no limit, so it cannot fail".into(), "add `min`, `max`, or both"));
     }
     let unit = |topic: &str, field: &str| {
-        unit_of(plan, topic, field).map_err(|error| at(error, "name one of these fields"))
+        unit_of(manifest, plan, topic, field).map_err(|error| at(error, "name one of these fields"))
     };
     let limits =
         |min, max, least| check_limits(min, max, least).map_err(|(message, help)| at(message, &help));
@@ -196,10 +196,9 @@ fn check_field(manifest: &Manifest, plan: &Plan, pass: &Spanned<PassCondition>) 
 
 /// The unit of a field; `None` for a user's own type, which only its publisher knows: it is checked when the run is
 /// judged.
-fn unit_of(plan: &Plan, topic: &str, field: &str) -> Result<Option<String>, String> {
-    let type_name = plan.topics.iter().find(|known| known.name == topic).map(|topic| &topic.type_name);
-    let known = bus::messages::all();
-    let schema = known.into_iter().find(|schema| Some(schema.type_name) == type_name.map(String::as_str));
+fn unit_of(manifest: &Manifest, plan: &Plan, topic: &str, field: &str) -> Result<Option<String>, String> {
+    let topic_plan = plan.topics.iter().find(|known| known.name == topic);
+    let schema = topic_plan.and_then(|topic| manifest.registry().message(&topic.type_name));
     let Some(schema) = schema else { return Ok(None) };
     recorder::series::unit_of(schema, topic, field).map_err(|error| error.to_string())
 }

@@ -98,7 +98,7 @@ fn input(
             return Err(at(format!("{who} has delay_ticks = {delay}"), "a delay is 0 or 1 tick".into()));
         }
     }
-    let schema = bus::messages::all().into_iter().find(|schema| schema.type_name == topics[topic].type_name);
+    let schema = manifest.registry().message(&topics[topic].type_name);
     if let (Some(schema), Some(initial)) = (schema, &setting.initial) {
         bus::initial::sample(schema, initial).map_err(|reason| {
             at(format!("{who}: initial value: {reason}"), format!("give fields of {}", schema.type_name))
