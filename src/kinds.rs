@@ -26,7 +26,7 @@ pub const COMPONENTS: Registry = Registry::new(&[
     Registration::of::<recorder::node::Recorder>(),
     Registration::of_kind(&sensors::rpm::KIND),
     Registration::of::<plant::traffic::Traffic>(),
-    Registration::of_kind(&controllers::trajectory::KIND),
+    Registration::of_kind(&controllers::trajectory_node::KIND),
     Registration::of_kind(&controllers::velocity::KIND),
     Registration::of_kind(&controllers::wall_follow::KIND),
     Registration::of_kind(&controllers::wall_stop::KIND),

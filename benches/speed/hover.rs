@@ -46,14 +46,16 @@ fn in_process_ticks_per_s() -> Result<f64> {
 mod chain {
     //! The hover scenario as one loop.
     use crate::report::Result;
-    use controllers::allocation::{Allocation, RotorSet};
+    use controllers::airframe::ControlledVehicle;
+    use controllers::allocation::Allocation;
+    use controllers::control::{HoverMotion, Integrals};
     use controllers::pid_gains::PidGains;
-    use controllers::pid_law::{Measurement, PidLaw, PidState, PidVehicle};
+    use controllers::pid_law::PidLaw;
     use controllers::set_points::{Schedule, SetPoint, SetPointEntry};
     use nalgebra::{Quaternion, UnitQuaternion, Vector3};
     use plant::{NewtonEuler, RigidBody, State};
     use sensors::ekf::filter::{Ekf, EkfState};
-    use sensors::ekf::history::{Measurement as Fix, Newest, Reading, Sensor};
+    use sensors::ekf::history::{Measurement, Newest, Reading, Sensor};
     use sensors::ekf::params::EkfParams;
     use sensors::imu_model::{ImuModel, ImuParams, ImuReading, ImuState};
     use std::path::Path;
@@ -70,7 +72,7 @@ mod chain {
         filter_state: Box<EkfState>,
         newest: Newest,
         law: PidLaw,
-        law_state: PidState,
+        integrals: Integrals,
         allocation: Allocation,
         schedule: Schedule,
         command: [f64; 4],
@@ -80,12 +82,8 @@ mod chain {
         pub fn new() -> Result<Self> {
             let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("vehicles/hummingbird.toml");
             let vehicle = Vehicle::load(&path)?;
-            let allocation = Allocation::new(&RotorSet::from(&vehicle))?;
-            let law = PidLaw {
-                gains: PidGains::default(),
-                vehicle: PidVehicle::new(&vehicle, &allocation),
-                period_s: DT_S,
-            };
+            let craft = ControlledVehicle::new(vehicle.clone())?;
+            let law = PidLaw { gains: PidGains::default(), vehicle: craft.hover_model(), period_s: DT_S };
             let imu = ImuModel::new(ImuParams::default(), 1.0 / DT_S)?;
             let initial = SetPoint { altitude_m: 1.0, ..SetPoint::default() };
             let step = SetPointEntry {
@@ -112,8 +110,8 @@ mod chain {
                 imu_state: imu.initial_state(1, "imu"),
                 imu,
                 law,
-                law_state: PidState::default(),
-                allocation,
+                integrals: Integrals::default(),
+                allocation: craft.allocation,
                 schedule: Schedule::new(&[step], &initial, 1000)?,
                 command: [hover; 4],
             })
@@ -129,17 +127,18 @@ mod chain {
             };
             let reading = self.imu.read(&mut self.imu_state, &truth);
             let measured = self.estimate(tick * 1_000_000, &reading);
-            let wrench = self.law.step(&mut self.law_state, &self.schedule.at(tick), &measured);
+            let wrench = self.law.wrench(&mut self.integrals, &self.schedule.at(tick), &measured);
             let speeds = self.allocation.allocate(&wrench).speeds_rad_s;
             self.command = speeds.map(|speed| self.plant.vehicle().command.command(speed));
         }
 
-        fn estimate(&mut self, time_ns: u64, reading: &ImuReading) -> Measurement {
+        fn estimate(&mut self, time_ns: u64, reading: &ImuReading) -> HoverMotion {
             if time_ns.is_multiple_of(10_000_000) {
                 let body = &self.state.body;
                 let pose: Vec<f64> =
                     body.position_W_m.iter().chain(body.attitude_WB.coords.iter()).copied().collect();
-                self.newest[Sensor::Mocap.index()] = Some(Some(Fix::new(Sensor::Mocap, time_ns, &pose)));
+                self.newest[Sensor::Mocap.index()] =
+                    Some(Some(Measurement::new(Sensor::Mocap, time_ns, &pose)));
             }
             let specific_force = <[f64; 3]>::from(reading.specific_force_B_m_s2).into();
             let angular_velocity = <[f64; 3]>::from(reading.angular_velocity_B_rad_s).into();
@@ -149,7 +148,7 @@ mod chain {
             let q = motion.attitude;
             let attitude = UnitQuaternion::new_normalize(Quaternion::new(q.w, q.x, q.y, q.z));
             let (roll_rad, pitch_rad, yaw_rad) = attitude.euler_angles();
-            Measurement {
+            HoverMotion {
                 altitude_m: motion.position.z,
                 climb_rate_m_s: motion.velocity.z,
                 roll_rad,

@@ -18,7 +18,7 @@ pub const THRUST_RESERVE: f64 = 0.05;
 
 /// A thrust along body z and a torque about the centre of mass in body axes.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Wrench {
+pub struct RotorWrench {
     /// Total thrust along body z, N.
     pub thrust_N: f64,
     /// Torque in body axes, N·m.
@@ -91,7 +91,7 @@ pub struct Allocated {
     /// Rotor speeds within their limits, rad/s.
     pub speeds_rad_s: [f64; 4],
     /// The wrench that these speeds make once the motors have reached them.
-    pub wrench: Wrench,
+    pub wrench: RotorWrench,
     /// Thrust made less thrust demanded, N: zero unless the rotors cannot make that much or that little.
     pub thrust_error_N: f64,
     /// The part of the demanded roll and pitch torque that is made, 0 to 1.
@@ -141,17 +141,17 @@ impl Allocation {
 
     /// The wrench that the rotors make at `speeds_rad_s`.
     #[must_use]
-    pub fn wrench(&self, speeds_rad_s: &[f64; 4]) -> Wrench {
+    pub fn wrench(&self, speeds_rad_s: &[f64; 4]) -> RotorWrench {
         let squares = Vector4::from(*speeds_rad_s).map(|speed| speed * speed);
         let wrench = self.effectiveness * squares;
-        Wrench { thrust_N: wrench[0], torque_B_N_m: Vector3::new(wrench[1], wrench[2], wrench[3]) }
+        RotorWrench { thrust_N: wrench[0], torque_B_N_m: Vector3::new(wrench[1], wrench[2], wrench[3]) }
     }
 
     /// The speeds that make `demand`, or as much of it as the rotors can: yaw torque is given up first,
     /// then roll and pitch torque together, keeping their direction, and thrust only when thrust alone
     /// is beyond the rotors: then each rotor is cut to its limit.
     #[must_use]
-    pub fn allocate(&self, demand: &Wrench) -> Allocated {
+    pub fn allocate(&self, demand: &RotorWrench) -> Allocated {
         let torque = &demand.torque_B_N_m;
         let for_thrust = self.inverse.column(0) * demand.thrust_N;
         let for_roll_pitch = self.inverse.column(1) * torque.x + self.inverse.column(2) * torque.y;
@@ -223,12 +223,12 @@ mod tests {
         Allocation::new(&hummingbird()).unwrap()
     }
 
-    fn wrench(thrust_N: f64, x: f64, y: f64, z: f64) -> Wrench {
-        Wrench { thrust_N, torque_B_N_m: Vector3::new(x, y, z) }
+    fn wrench(thrust_N: f64, x: f64, y: f64, z: f64) -> RotorWrench {
+        RotorWrench { thrust_N, torque_B_N_m: Vector3::new(x, y, z) }
     }
 
     #[track_caller]
-    fn assert_made(found: &Wrench, expected: &Wrench) {
+    fn assert_made(found: &RotorWrench, expected: &RotorWrench) {
         assert!((found.thrust_N - expected.thrust_N).abs() < 1e-9, "{found:?}");
         assert!((found.torque_B_N_m - expected.torque_B_N_m).norm() < 1e-9, "{found:?}");
     }

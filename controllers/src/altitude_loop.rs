@@ -1,17 +1,51 @@
 //! The altitude PID that `pid` and all laws with the cascade's inner loops share: height to thrust.
 #![allow(non_snake_case, reason = "a trailing _N is the newton")]
 
-use crate::controller::{ControllerState, within};
-use crate::gains_file;
-use crate::pid_gains::LoopGains;
-use crate::pid_law::{Measurement, PidVehicle};
+use crate::airframe::HoverModel;
+use crate::control::{HoverMotion, Integrals, within};
+use crate::gains_file::{self, gain};
+use crate::law::Predecessor;
+use serde::Deserialize;
 use vehicles::VehicleError;
 use vehicles::reader::Section;
-use vehicles::units::{ACCELERATION, VELOCITY};
+use vehicles::units::{ACCELERATION, PER_SECOND, PER_SECOND_2, PER_SECOND_3, VELOCITY};
 
 /// The least cosine of the tilt that is compensated: beyond 60° more thrust would push sideways rather
 /// than up. Tuned, no source.
 const TILT_COSINE_MIN: f64 = 0.5;
+
+/// The gains of one loop, from an error to an acceleration (linear: m/s², angular: rad/s²).
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct LoopGains {
+    /// Acceleration for each unit of error, 1/s².
+    pub proportional_1_s2: f64,
+    /// Acceleration for each unit of error held for one second, 1/s³.
+    pub integral_1_s3: f64,
+    /// Acceleration against each unit of measured rate, 1/s.
+    pub derivative_1_s: f64,
+}
+
+impl LoopGains {
+    /// `proportional`, `integral` and `derivative` of a gains file's table.
+    pub(crate) fn read(section: &Section<'_, '_>) -> Result<Self, VehicleError> {
+        Ok(Self {
+            proportional_1_s2: gain(section, "proportional", PER_SECOND_2)?,
+            integral_1_s3: gain(section, "integral", PER_SECOND_3)?,
+            derivative_1_s: gain(section, "derivative", PER_SECOND)?,
+        })
+    }
+
+    /// The acceleration that the loop asks for.
+    pub(crate) fn demand(&self, error: f64, integral: f64, rate: f64) -> f64 {
+        self.proportional_1_s2 * error + integral - self.derivative_1_s * rate
+    }
+
+    /// The integrator's acceleration `period_s` on, kept within ±`max`.
+    pub(crate) fn integrate(&self, before: f64, error: f64, period_s: f64, max: f64) -> f64 {
+        (before + self.integral_1_s3 * error * period_s).clamp(-max, max)
+    }
+}
 
 /// Gains and limits of the altitude loop.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -32,7 +66,7 @@ impl AltitudeGains {
         let gains = Self {
             loop_gains: LoopGains::read(section)?,
             integral_climb_max_m_s: gains_file::limit(section, "integral_climb_max", VELOCITY)?,
-            integral_max_m_s2: gains_file::gain(section, "integral_max", ACCELERATION)?,
+            integral_max_m_s2: gain(section, "integral_max", ACCELERATION)?,
         };
         section.finish()?;
         Ok(gains)
@@ -45,7 +79,7 @@ pub struct AltitudeLoop<'a> {
     /// Gains and limits.
     pub gains: AltitudeGains,
     /// The vehicle that is flown.
-    pub vehicle: &'a PidVehicle,
+    pub vehicle: &'a HoverModel,
     /// Time between two steps, s.
     pub period_s: f64,
 }
@@ -54,7 +88,7 @@ impl AltitudeLoop<'_> {
     /// Thrust = m·(g + a) / (cos φ·cos θ): eq. 3.19 with its denominator corrected, where a is the
     /// acceleration that the loop asks for. `integral_m_s2` advances by one period.
     #[must_use]
-    pub fn thrust_N(&self, integral_m_s2: &mut f64, altitude_set_m: f64, measured: &Measurement) -> f64 {
+    pub fn thrust_N(&self, integral_m_s2: &mut f64, altitude_set_m: f64, measured: &HoverMotion) -> f64 {
         let error_m = altitude_set_m - measured.altitude_m;
         let advanced_m_s2 = self.advanced_m_s2(*integral_m_s2, error_m, measured.climb_rate_m_s);
         let acceleration_m_s2 = self.gains.loop_gains.demand(error_m, advanced_m_s2, measured.climb_rate_m_s);
@@ -68,22 +102,36 @@ impl AltitudeLoop<'_> {
         thrust_N
     }
 
-    /// What the integrator asks for after a take-over: what the predecessor's asked for, or, where only its last
-    /// thrust is known, what it takes to ask for that.
+    /// What the integrators ask for after another law: what the other's asked for, where this law has a gain for it.
+    /// Where only its last thrust is known, the lift is what it takes to ask for that. `turn_gains` and `turn_max_rad_s2`
+    /// are those of the law's own attitude loops.
     #[must_use]
-    pub fn taken_over_m_s2(
+    pub fn continued<S>(
         &self,
-        memory: &ControllerState,
-        thrust_N: f64,
+        from: &Predecessor<'_, S>,
+        turn_gains: [f64; 3],
+        turn_max_rad_s2: f64,
         altitude_set_m: f64,
-        measured: &Measurement,
-    ) -> f64 {
+        measured: &HoverMotion,
+    ) -> Integrals {
         let max_m_s2 = self.gains.integral_max_m_s2;
-        memory.handed_lift_m_s2(max_m_s2).unwrap_or_else(|| {
-            let still = Self { period_s: 0.0, ..*self };
-            let missing_N = thrust_N - still.thrust_N(&mut 0.0, altitude_set_m, measured);
-            within(missing_N * tilt_cosine(measured) / self.vehicle.mass_kg, max_m_s2)
-        })
+        let lift = from.integrals.map_or_else(
+            || within(self.missing_m_s2(from.wrench.thrust_N, altitude_set_m, measured), max_m_s2),
+            |before| within(before.lift, max_m_s2),
+        );
+        let before = from.integrals.unwrap_or_default();
+        // An integrator without gain would keep for ever what it was given.
+        let turn = std::array::from_fn(|axis| {
+            if turn_gains[axis] > 0.0 { within(before.turn[axis], turn_max_rad_s2) } else { 0.0 }
+        });
+        Integrals { lift, turn }
+    }
+
+    /// The acceleration that the loop lacks to ask for `thrust_N`.
+    fn missing_m_s2(&self, thrust_N: f64, altitude_set_m: f64, measured: &HoverMotion) -> f64 {
+        let still = Self { period_s: 0.0, ..*self };
+        let missing_N = thrust_N - still.thrust_N(&mut 0.0, altitude_set_m, measured);
+        missing_N * tilt_cosine(measured) / self.vehicle.mass_kg
     }
 
     fn advanced_m_s2(&self, before_m_s2: f64, error_m: f64, climb_rate_m_s: f64) -> f64 {
@@ -96,6 +144,6 @@ impl AltitudeLoop<'_> {
 }
 
 /// The cosine of the angle between body z and world z, not below [`TILT_COSINE_MIN`].
-fn tilt_cosine(measured: &Measurement) -> f64 {
+fn tilt_cosine(measured: &HoverMotion) -> f64 {
     (libm::cos(measured.roll_rad) * libm::cos(measured.pitch_rad)).max(TILT_COSINE_MIN)
 }

@@ -1,8 +1,9 @@
 //! The cascade controller node: the onboard structure of the AscTec, from sticks to four motor commands.
 
+use crate::airframe::ControlledVehicle;
 use crate::cascade_gains::CascadeGains;
 use crate::cascade_law::CascadeLaw;
-use crate::controller::{self, Airframe};
+use crate::controller;
 use crate::rehearsal;
 use bus::kind::{Inputs, NodeKind, PortSpec, read_parameters};
 use bus::messages::{AttitudeEstimate, ControlStatus, MotorCommand, SetPoint, StateEstimate};
@@ -24,8 +25,8 @@ pub const KIND: NodeKind = NodeKind {
         PortSpec::optional("status", ControlStatus::SCHEMA),
     ],
     check: |parameters, run| {
-        let (law, airframe) = build(&read_parameters(parameters)?, run.period_s())?;
-        rehearsal::check(&law, &airframe, run)
+        let (law, craft) = build(&read_parameters(parameters)?, run.period_s())?;
+        rehearsal::check(&law, &craft, run)
     },
     run,
 };
@@ -40,14 +41,14 @@ struct Parameters {
     gains: Option<PathBuf>,
 }
 
-fn build(parameters: &Parameters, period_s: f64) -> Result<(CascadeLaw, Airframe), String> {
-    let airframe = Airframe::load(&parameters.vehicle)?;
+fn build(parameters: &Parameters, period_s: f64) -> Result<(CascadeLaw, ControlledVehicle), String> {
+    let craft = ControlledVehicle::load(&parameters.vehicle)?;
     let gains = CascadeGains::load(parameters.gains.as_deref()).map_err(|error| error.to_string())?;
-    Ok((CascadeLaw { gains, vehicle: airframe.known(), period_s }, airframe))
+    Ok((CascadeLaw { gains, vehicle: craft.hover_model(), period_s }, craft))
 }
 
 fn run() -> Result<(), BusError> {
     let node = Node::join()?;
-    let (law, airframe) = build(&node.parameters()?, node.period_s()).map_err(|error| node.error(error))?;
-    controller::run(node, &law, &airframe.allocation, &airframe.vehicle)
+    let (law, craft) = build(&node.parameters()?, node.period_s()).map_err(|error| node.error(error))?;
+    controller::run(node, &law, &craft)
 }

@@ -10,12 +10,13 @@
 //!   cross product of rate and angular momentum is left to the loops.
 #![allow(non_snake_case, reason = "a trailing _B names the frame a vector is written in, _N the newton")]
 
-use crate::allocation::Wrench;
+use crate::airframe::HoverModel;
+use crate::allocation::RotorWrench;
 use crate::altitude_loop::AltitudeLoop;
 use crate::angle::wrap_rad;
 use crate::cascade_gains::{CascadeGains, CommandFilter};
-use crate::controller::{Controller, ControllerState, Demand, Told, within};
-use crate::pid_law::{Measurement, PidState, PidVehicle};
+use crate::control::{ControlInput, ControlOutput, HoverMotion, Integrals};
+use crate::law::{Law, Predecessor, Start};
 use crate::set_points::SetPoint;
 use nalgebra::Vector3;
 
@@ -25,111 +26,128 @@ pub struct CascadeLaw {
     /// Gains and limits.
     pub gains: CascadeGains,
     /// The vehicle that is flown.
-    pub vehicle: PidVehicle,
+    pub vehicle: HoverModel,
     /// Time between two steps, s.
     pub period_s: f64,
 }
 
-impl Controller for CascadeLaw {
-    const LAW: u32 = 2;
+/// All that the law remembers.
+#[derive(Debug, Clone, Copy, PartialEq, Default, bus::Message)]
+#[repr(C)]
+#[message(type_name = "hummingbus_msgs/msg/CascadeState")]
+pub struct CascadeState {
+    /// What the integrators of altitude and rates ask for.
+    pub integrals: Integrals,
+    /// The command filter's roll, pitch and yaw.
+    #[field(unit = "rad", frame = "world")]
+    pub attitude_command: [f64; 3],
+    /// Their rates of change.
+    #[field(unit = "rad/s", frame = "world")]
+    pub attitude_command_rate: [f64; 3],
+    /// Body rates behind the filter of the rate loop's derivative.
+    #[field(unit = "rad/s", frame = "body")]
+    pub rate_filtered: [f64; 3],
+}
+
+impl Law for CascadeLaw {
+    const NAME: &'static str = "cascade";
+    type State = CascadeState;
 
     fn rate_gain_1_s(&self) -> f64 {
         self.gains.rate.iter().fold(0.0, |most, axis| axis.proportional_1_s.max(most))
     }
 
-    fn step(&self, memory: &mut ControllerState, told: &Told<'_>) -> Demand {
-        self.demand(memory, &told.set_point, &Measurement::from(told))
+    fn start(&self, input: &ControlInput<'_>) -> Start<CascadeState> {
+        Start { state: self.initial(&HoverMotion::of(&input.motion)), wrench: RotorWrench::default() }
     }
 
-    fn fresh(&self, told: &Told<'_>) -> ControllerState {
-        self.begun(&Measurement::from(told))
+    fn take_over(
+        &self,
+        from: &Predecessor<'_, CascadeState>,
+        input: &ControlInput<'_>,
+    ) -> Start<CascadeState> {
+        let measured = HoverMotion::of(&input.motion);
+        Start { state: self.continued(from, input.set_point.altitude_m, &measured), wrench: from.wrench }
     }
 
-    fn tracking(&self, memory: &ControllerState, wrench: &Wrench, told: &Told<'_>) -> ControllerState {
-        self.taken_over(memory, wrench, told.set_point.altitude_m, &Measurement::from(told))
+    fn step(&self, state: &mut CascadeState, last: &RotorWrench, input: &ControlInput<'_>) -> ControlOutput {
+        self.demand(state, last, &input.set_point, &HoverMotion::of(&input.motion))
     }
 }
 
 impl CascadeLaw {
-    /// The demand for `set_point`; advances the memory of the inner loops by one period.
+    /// The demand for `set_point`; advances the state of the inner loops by one period.
     pub fn demand(
         &self,
-        memory: &mut ControllerState,
+        state: &mut CascadeState,
+        last: &RotorWrench,
         set_point: &SetPoint,
-        measured: &Measurement,
-    ) -> Demand {
+        measured: &HoverMotion,
+    ) -> ControlOutput {
         // Before thrust is asked for, the vehicle may be turned by hand.
-        if memory.thrust <= self.vehicle.thrust_min_N {
-            memory.attitude_command[2] = measured.yaw_rad;
+        if last.thrust_N <= self.vehicle.thrust_min_N {
+            state.attitude_command[2] = measured.yaw_rad;
         }
-        self.filter_commands(memory, set_point);
-        let [roll_rad, pitch_rad, yaw_rad] = memory.attitude_command;
-        let rates_B_rad_s = self.rate_command_B_rad_s(memory, measured);
-        let torque_B_N_m = self.torque_B_N_m(memory, &rates_B_rad_s, measured);
-        let thrust_N = self.altitude_loop().thrust_N(
-            &mut memory.integrals.altitude_m_s2,
-            set_point.altitude_m,
-            measured,
-        );
-        let held = SetPoint { altitude_m: set_point.altitude_m, roll_rad, pitch_rad, yaw_rad };
-        Demand { wrench: Wrench { thrust_N, torque_B_N_m }, set_point: held, ..Demand::default() }
+        self.filter_commands(state, set_point);
+        let [roll_rad, pitch_rad, yaw_rad] = state.attitude_command;
+        let rates_B_rad_s = self.rate_command_B_rad_s(state, measured);
+        let torque_B_N_m = self.torque_B_N_m(state, &rates_B_rad_s, measured);
+        let altitude_m = set_point.altitude_m;
+        let thrust_N = self.altitude_loop().thrust_N(&mut state.integrals.lift, altitude_m, measured);
+        ControlOutput {
+            wrench: RotorWrench { thrust_N, torque_B_N_m },
+            integrals: state.integrals,
+            set_point: SetPoint { altitude_m, roll_rad, pitch_rad, yaw_rad },
+            ..ControlOutput::default()
+        }
     }
 
-    /// The memory of a vehicle that no law has flown yet: commands as it lies, filters as it turns.
+    /// The state of a vehicle that no law has flown yet: commands as it lies, filters as it turns.
     #[must_use]
-    pub fn begun(&self, measured: &Measurement) -> ControllerState {
+    pub fn initial(&self, measured: &HoverMotion) -> CascadeState {
         let limit =
             |angle_rad: f64| angle_rad.clamp(-self.gains.filter.tilt_max_rad, self.gains.filter.tilt_max_rad);
-        ControllerState {
+        CascadeState {
             attitude_command: [limit(measured.roll_rad), limit(measured.pitch_rad), measured.yaw_rad],
             rate_filtered: measured.angular_velocity_B_rad_s.into(),
-            altitude_hold: measured.altitude_m,
-            ..ControllerState::default()
+            ..CascadeState::default()
         }
     }
 
-    /// The memory that goes on from another law's: its integrators, and commands from where the vehicle is.
+    /// The state that goes on from another law's: its integrators, and commands from where the vehicle is.
     #[must_use]
-    pub fn taken_over(
+    pub fn continued<S>(
         &self,
-        memory: &ControllerState,
-        wrench: &Wrench,
+        from: &Predecessor<'_, S>,
         altitude_set_m: f64,
-        measured: &Measurement,
-    ) -> ControllerState {
-        let before = &memory.integrals;
-        let handed = [before.roll_rad_s2, before.pitch_rad_s2, before.yaw_rad_s2];
-        // An integrator without gain would keep for ever what it was given.
-        let [roll_rad_s2, pitch_rad_s2, yaw_rad_s2] = std::array::from_fn(|axis| {
-            let has_gain = self.gains.rate[axis].integral_1_s2 > 0.0;
-            if has_gain { within(handed[axis], self.gains.integral_max_rad_s2) } else { 0.0 }
-        });
-        let altitude_m_s2 =
-            self.altitude_loop().taken_over_m_s2(memory, wrench.thrust_N, altitude_set_m, measured);
-        let integrals = PidState { altitude_m_s2, roll_rad_s2, pitch_rad_s2, yaw_rad_s2 };
-        ControllerState { integrals, thrust: wrench.thrust_N, ..self.begun(measured) }
+        measured: &HoverMotion,
+    ) -> CascadeState {
+        let gains = self.gains.rate.map(|axis| axis.integral_1_s2);
+        let max_rad_s2 = self.gains.integral_max_rad_s2;
+        let integrals = self.altitude_loop().continued(from, gains, max_rad_s2, altitude_set_m, measured);
+        CascadeState { integrals, ..self.initial(measured) }
     }
 
     fn altitude_loop(&self) -> AltitudeLoop<'_> {
         AltitudeLoop { gains: self.gains.altitude, vehicle: &self.vehicle, period_s: self.period_s }
     }
 
-    fn filter_commands(&self, memory: &mut ControllerState, set_point: &SetPoint) {
+    fn filter_commands(&self, state: &mut CascadeState, set_point: &SetPoint) {
         let filter = &self.gains.filter;
         for (axis, asked_rad) in [set_point.roll_rad, set_point.pitch_rad].into_iter().enumerate() {
-            let (angle, rate) = (memory.attitude_command[axis], memory.attitude_command_rate[axis]);
+            let (angle, rate) = (state.attitude_command[axis], state.attitude_command_rate[axis]);
             let (angle, rate) = filter.moved(angle, rate, asked_rad, self.period_s);
-            (memory.attitude_command[axis], memory.attitude_command_rate[axis]) = (angle, rate);
+            (state.attitude_command[axis], state.attitude_command_rate[axis]) = (angle, rate);
         }
         let turn_max_rad = filter.yaw_rate_max_rad_s * self.period_s;
-        let yaw_rad = memory.attitude_command[2];
+        let yaw_rad = state.attitude_command[2];
         let turn_rad = wrap_rad(set_point.yaw_rad - yaw_rad).clamp(-turn_max_rad, turn_max_rad);
-        memory.attitude_command[2] = wrap_rad(yaw_rad + turn_rad);
+        state.attitude_command[2] = wrap_rad(yaw_rad + turn_rad);
     }
 
     /// Body rates that lead roll, pitch and yaw to `command`.
-    fn rate_command_B_rad_s(&self, memory: &ControllerState, measured: &Measurement) -> Vector3<f64> {
-        let command = &memory.attitude_command;
+    fn rate_command_B_rad_s(&self, state: &CascadeState, measured: &HoverMotion) -> Vector3<f64> {
+        let command = &state.attitude_command;
         let errors_rad = [
             wrap_rad(command[0] - measured.roll_rad),
             command[1] - measured.pitch_rad,
@@ -138,7 +156,7 @@ impl CascadeLaw {
         let [roll_rate, pitch_rate, yaw_rate]: [f64; 3] = std::array::from_fn(|axis| {
             let max_rad_s = self.gains.rate_max_rad_s[axis];
             // The yaw command's own rate stays zero: yaw is slow.
-            let fed_rad_s = self.gains.rate_feed_forward * memory.attitude_command_rate[axis];
+            let fed_rad_s = self.gains.rate_feed_forward * state.attitude_command_rate[axis];
             (self.gains.attitude_1_s[axis] * errors_rad[axis] + fed_rad_s).clamp(-max_rad_s, max_rad_s)
         });
         let (sin_roll, cos_roll) = libm::sincos(measured.roll_rad);
@@ -152,17 +170,15 @@ impl CascadeLaw {
 
     fn torque_B_N_m(
         &self,
-        memory: &mut ControllerState,
+        state: &mut CascadeState,
         rates_B_rad_s: &Vector3<f64>,
-        measured: &Measurement,
+        measured: &HoverMotion,
     ) -> Vector3<f64> {
-        let integrals = &mut memory.integrals;
-        let integrals = [&mut integrals.roll_rad_s2, &mut integrals.pitch_rad_s2, &mut integrals.yaw_rad_s2];
         let mut acceleration_B_rad_s2 = Vector3::zeros();
-        for (axis, integral) in integrals.into_iter().enumerate() {
+        for (axis, integral) in state.integrals.turn.iter_mut().enumerate() {
             let rate_rad_s = measured.angular_velocity_B_rad_s[axis];
             let error_rad_s = rates_B_rad_s[axis] - rate_rad_s;
-            let change_rad_s2 = self.rate_change_rad_s2(&mut memory.rate_filtered[axis], rate_rad_s);
+            let change_rad_s2 = self.rate_change_rad_s2(&mut state.rate_filtered[axis], rate_rad_s);
             let (gains, max) = (&self.gains.rate[axis], self.gains.integral_max_rad_s2);
             *integral = (*integral + gains.integral_1_s2 * error_rad_s * self.period_s).clamp(-max, max);
             acceleration_B_rad_s2[axis] =
@@ -196,7 +212,7 @@ mod tests {
     use super::*;
 
     fn law() -> CascadeLaw {
-        let vehicle = PidVehicle {
+        let vehicle = HoverModel {
             mass_kg: 0.5,
             inertia_B_kg_m2: Vector3::new(5.0e-3, 6.0e-3, 8.0e-3),
             gravity_m_s2: 9.81,
@@ -206,8 +222,8 @@ mod tests {
         CascadeLaw { gains: CascadeGains::default(), vehicle, period_s: 1e-3 }
     }
 
-    fn level() -> Measurement {
-        Measurement {
+    fn level() -> HoverMotion {
+        HoverMotion {
             altitude_m: 1.0,
             climb_rate_m_s: 0.0,
             roll_rad: 0.0,
@@ -221,24 +237,26 @@ mod tests {
         SetPoint { altitude_m: 1.0, ..SetPoint::default() }
     }
 
-    /// A memory in flight, so that the yaw command is not reset.
-    fn flying(measured: &Measurement) -> ControllerState {
-        ControllerState { thrust: 5.0, law: CascadeLaw::LAW, ..law().begun(measured) }
+    /// What was asked for in flight, so that the yaw command is not reset.
+    const IN_FLIGHT: RotorWrench = RotorWrench { thrust_N: 5.0, torque_B_N_m: Vector3::new(0.0, 0.0, 0.0) };
+
+    fn flying(measured: &HoverMotion) -> CascadeState {
+        law().initial(measured)
     }
 
     /// `seconds` of asking for `set_point` at a measurement that stays as it is.
-    fn held(set_point: &SetPoint, measured: &Measurement, seconds: usize) -> (ControllerState, Demand) {
-        let mut memory = flying(measured);
-        let mut demand = Demand::default();
+    fn held(set_point: &SetPoint, measured: &HoverMotion, seconds: usize) -> (CascadeState, ControlOutput) {
+        let mut state = flying(measured);
+        let mut output = ControlOutput::default();
         for _ in 0..1000 * seconds {
-            demand = law().demand(&mut memory, set_point, measured);
+            output = law().demand(&mut state, &IN_FLIGHT, set_point, measured);
         }
-        (memory, demand)
+        (state, output)
     }
 
     #[test]
     fn at_the_set_point_the_wrench_is_the_weight() {
-        let wrench = law().demand(&mut flying(&level()), &hold(), &level()).wrench;
+        let wrench = law().demand(&mut flying(&level()), &IN_FLIGHT, &hold(), &level()).wrench;
         assert!((wrench.thrust_N - 0.5 * 9.81).abs() < 1e-12);
         assert_eq!(wrench.torque_B_N_m, Vector3::zeros());
     }
@@ -246,14 +264,14 @@ mod tests {
     #[test]
     fn a_step_of_the_stick_is_filtered_without_overshoot_and_cut_to_thirty_degrees() {
         let far = SetPoint { roll_rad: 1.2, pitch_rad: -1.2, ..hold() };
-        let mut memory = flying(&level());
+        let mut state = flying(&level());
         let mut rolls = Vec::new();
         for _ in 0..1000 {
-            rolls.push(law().demand(&mut memory, &far, &level()).set_point.roll_rad);
+            rolls.push(law().demand(&mut state, &IN_FLIGHT, &far, &level()).set_point.roll_rad);
         }
         assert!(rolls[0] < 0.01 && rolls.windows(2).all(|pair| pair[0] <= pair[1]));
         assert!((rolls[999] - 30.0_f64.to_radians()).abs() < 1e-6);
-        assert!((memory.attitude_command[1] + 30.0_f64.to_radians()).abs() < 1e-6);
+        assert!((state.attitude_command[1] + 30.0_f64.to_radians()).abs() < 1e-6);
     }
 
     #[test]
@@ -261,8 +279,8 @@ mod tests {
         let set = SetPoint { roll_rad: 0.1, pitch_rad: -0.1, yaw_rad: 0.2, ..hold() };
         let torque = held(&set, &level(), 1).1.wrench.torque_B_N_m;
         assert!(torque.x > 0.0 && torque.y < 0.0 && torque.z > 0.0, "{torque}");
-        let turning = Measurement { angular_velocity_B_rad_s: Vector3::new(1.0, 0.0, 0.0), ..level() };
-        let torque = law().demand(&mut flying(&turning), &hold(), &turning).wrench.torque_B_N_m;
+        let turning = HoverMotion { angular_velocity_B_rad_s: Vector3::new(1.0, 0.0, 0.0), ..level() };
+        let torque = law().demand(&mut flying(&turning), &IN_FLIGHT, &hold(), &turning).wrench.torque_B_N_m;
         let rate = law().gains.rate[0];
         let expected_N_m = -5.0e-3 * (rate.proportional_1_s + rate.integral_1_s2 * 1e-3);
         assert!((torque.x - expected_N_m).abs() < 1e-12, "{torque}");
@@ -270,61 +288,63 @@ mod tests {
 
     #[test]
     fn the_derivative_opposes_a_growing_rate() {
-        let turning = Measurement { angular_velocity_B_rad_s: Vector3::new(0.1, 0.0, 0.0), ..level() };
+        let turning = HoverMotion { angular_velocity_B_rad_s: Vector3::new(0.1, 0.0, 0.0), ..level() };
         let mut at_rest = flying(&level());
-        let growing = law().demand(&mut at_rest, &hold(), &turning).wrench.torque_B_N_m.x;
-        let steady = law().demand(&mut flying(&turning), &hold(), &turning).wrench.torque_B_N_m.x;
+        let growing = law().demand(&mut at_rest, &IN_FLIGHT, &hold(), &turning).wrench.torque_B_N_m.x;
+        let steady = law().demand(&mut flying(&turning), &IN_FLIGHT, &hold(), &turning).wrench.torque_B_N_m.x;
         assert!(growing < steady && steady < 0.0);
     }
 
     #[test]
     fn the_yaw_command_turns_the_short_way_at_the_sticks_rate_and_comes_round() {
-        let at = |yaw_rad| Measurement { yaw_rad, ..level() };
+        let at = |yaw_rad| HoverMotion { yaw_rad, ..level() };
         let asked = SetPoint { yaw_rad: -3.0, ..hold() };
-        let mut memory = flying(&at(3.0));
-        law().demand(&mut memory, &asked, &at(3.0));
-        let turned_rad = memory.attitude_command[2] - 3.0;
+        let mut state = flying(&at(3.0));
+        law().demand(&mut state, &IN_FLIGHT, &asked, &at(3.0));
+        let turned_rad = state.attitude_command[2] - 3.0;
         assert!((turned_rad - 90.0_f64.to_radians() * 1e-3).abs() < 1e-9, "{turned_rad}");
-        let (memory, _) = held(&asked, &at(3.0), 1);
-        assert!((memory.attitude_command[2] + 3.0).abs() < 1e-9);
+        let (state, _) = held(&asked, &at(3.0), 1);
+        assert!((state.attitude_command[2] + 3.0).abs() < 1e-9);
     }
 
     #[test]
     fn without_thrust_the_yaw_command_is_the_measured_yaw() {
-        let turned = Measurement { yaw_rad: 2.0, ..level() };
-        let mut memory = ControllerState { thrust: 0.0, ..flying(&level()) };
-        let demand = law().demand(&mut memory, &SetPoint { yaw_rad: 2.0, ..hold() }, &turned);
-        assert_eq!(demand.set_point.yaw_rad, 2.0);
+        let turned = HoverMotion { yaw_rad: 2.0, ..level() };
+        let none = RotorWrench::default();
+        let output =
+            law().demand(&mut flying(&level()), &none, &SetPoint { yaw_rad: 2.0, ..hold() }, &turned);
+        assert_eq!(output.set_point.yaw_rad, 2.0);
     }
 
     #[test]
     fn a_yaw_rate_in_a_bank_needs_body_pitch_rate() {
-        let banked = Measurement { roll_rad: 0.4, ..level() };
-        let memory = ControllerState { attitude_command: [0.4, 0.0, 0.5], ..ControllerState::default() };
-        let rates = law().rate_command_B_rad_s(&memory, &banked);
+        let banked = HoverMotion { roll_rad: 0.4, ..level() };
+        let state = CascadeState { attitude_command: [0.4, 0.0, 0.5], ..CascadeState::default() };
+        let rates = law().rate_command_B_rad_s(&state, &banked);
         let yaw_rate = law().gains.attitude_1_s[2] * 0.5;
         assert!((rates.y - yaw_rate * libm::sin(0.4)).abs() < 1e-12);
         assert!((rates.z - yaw_rate * libm::cos(0.4)).abs() < 1e-12);
     }
 
+    fn after(wrench: RotorWrench, integrals: Option<Integrals>) -> Predecessor<'static, CascadeState> {
+        Predecessor { wrench, integrals, state: None }
+    }
+
     #[test]
     fn a_successor_goes_on_from_the_integrators_and_from_where_the_vehicle_is() {
-        let wrench = Wrench { thrust_N: 5.2, torque_B_N_m: Vector3::new(1e-3, -2e-3, 1e-3) };
-        let measured = Measurement { roll_rad: 0.05, yaw_rad: 1.0, ..level() };
-        let integrals =
-            PidState { altitude_m_s2: 0.3, roll_rad_s2: 0.1, pitch_rad_s2: f64::NAN, yaw_rad_s2: 9.0 };
-        let before = ControllerState { law: 1, integrals, ..ControllerState::default() };
-        let memory = law().taken_over(&before, &wrench, 1.0, &measured);
-        let expected = PidState { altitude_m_s2: 0.3, roll_rad_s2: 0.1, pitch_rad_s2: 0.0, yaw_rad_s2: 2.0 };
-        assert_eq!(memory.integrals, expected);
-        assert_eq!(memory.attitude_command, [0.05, 0.0, 1.0]);
+        let wrench = RotorWrench { thrust_N: 5.2, torque_B_N_m: Vector3::new(1e-3, -2e-3, 1e-3) };
+        let measured = HoverMotion { roll_rad: 0.05, yaw_rad: 1.0, ..level() };
+        let before = Integrals { lift: 0.3, turn: [0.1, f64::NAN, 9.0] };
+        let state = law().continued(&after(wrench, Some(before)), 1.0, &measured);
+        assert_eq!(state.integrals, Integrals { lift: 0.3, turn: [0.1, 0.0, 2.0] });
+        assert_eq!(state.attitude_command, [0.05, 0.0, 1.0]);
     }
 
     #[test]
     fn a_successor_that_knows_only_the_last_command_asks_for_its_thrust() {
-        let wrench = Wrench { thrust_N: 5.2, torque_B_N_m: Vector3::zeros() };
-        let memory = law().taken_over(&ControllerState::default(), &wrench, 1.0, &level());
-        let asked = law().demand(&mut memory.clone(), &hold(), &level()).wrench;
+        let wrench = RotorWrench { thrust_N: 5.2, torque_B_N_m: Vector3::zeros() };
+        let mut state = law().continued(&after(wrench, None), 1.0, &level());
+        let asked = law().demand(&mut state, &wrench, &hold(), &level()).wrench;
         assert!((asked.thrust_N - wrench.thrust_N).abs() < 1e-12, "{asked:?}");
     }
 }

@@ -7,7 +7,7 @@
 //! an integrator's work without one's overshoot.
 #![allow(non_snake_case, reason = "a trailing _W names the frame a vector is written in")]
 
-use crate::controller::{ControllerState, Motion};
+use crate::control::MotionEstimate;
 use crate::gains_file::{bandwidth, limit};
 use nalgebra::Vector3;
 use vehicles::VehicleError;
@@ -21,6 +21,19 @@ pub struct Observer {
     pub bandwidth_rad_s: f64,
     /// The most that it believes along an axis of the world, m/s².
     pub acceleration_max_m_s2: f64,
+}
+
+/// What it remembers.
+#[derive(Debug, Clone, Copy, PartialEq, Default, bus::Message)]
+#[repr(C)]
+#[message(type_name = "hummingbus_msgs/msg/ObserverState")]
+pub struct ObserverState {
+    /// −d̂: the acceleration that answers the disturbance, as an integrator's would.
+    #[field(unit = "m/s^2", frame = "world")]
+    pub answer: [f64; 3],
+    /// Velocity that was foreseen for now, against which disturbances show.
+    #[field(unit = "m/s", frame = "world")]
+    pub velocity_foreseen: [f64; 3],
 }
 
 /// What it believes, in the world.
@@ -46,22 +59,22 @@ impl Observer {
         Ok(observer)
     }
 
-    /// The disturbance now, where the model explains `model_W_m_s2`; advances the memory by one period.
+    /// The disturbance now, where the model explains `model_W_m_s2`; advances the state by one period.
     pub fn step(
         &self,
-        memory: &mut ControllerState,
-        motion: &Motion,
+        state: &mut ObserverState,
+        motion: &MotionEstimate,
         model_W_m_s2: &Vector3<f64>,
         period_s: f64,
     ) -> Disturbance {
         let (omega, max_m_s2) = (self.bandwidth_rad_s, self.acceleration_max_m_s2);
-        let before_W_m_s = Vector3::from(memory.velocity_foreseen);
+        let before_W_m_s = Vector3::from(state.velocity_foreseen);
         let missed_W_m_s = motion.velocity_W_m_s - before_W_m_s;
-        let free_W_m_s2 = missed_W_m_s * (omega * omega * period_s) - Vector3::from(memory.position_integral);
+        let free_W_m_s2 = missed_W_m_s * (omega * omega * period_s) - Vector3::from(state.answer);
         let acceleration_W_m_s2 = free_W_m_s2.map(|along| along.clamp(-max_m_s2, max_m_s2));
         let slope_W_m_s2 = model_W_m_s2 + acceleration_W_m_s2 + missed_W_m_s * (2.0 * omega);
-        memory.position_integral = (-acceleration_W_m_s2).into();
-        memory.velocity_foreseen = (before_W_m_s + slope_W_m_s2 * period_s).into();
+        state.answer = (-acceleration_W_m_s2).into();
+        state.velocity_foreseen = (before_W_m_s + slope_W_m_s2 * period_s).into();
         // At its limit it does not move.
         let jerk_W_m_s3 = (missed_W_m_s * (omega * omega))
             .zip_map(&acceleration_W_m_s2, |along, held| if held.abs() < max_m_s2 { along } else { 0.0 });
@@ -69,10 +82,12 @@ impl Observer {
     }
 }
 
-/// Has the observer begin at this motion, without a disturbance.
-pub fn begin(memory: &mut ControllerState, motion: &Motion) {
-    memory.position_integral = [0.0; 3];
-    memory.velocity_foreseen = motion.velocity_W_m_s.into();
+impl ObserverState {
+    /// An observer that begins at this motion, without a disturbance.
+    #[must_use]
+    pub fn at(motion: &MotionEstimate) -> Self {
+        Self { answer: [0.0; 3], velocity_foreseen: motion.velocity_W_m_s.into() }
+    }
 }
 
 #[cfg(test)]
@@ -82,21 +97,20 @@ mod tests {
 
     const OBSERVER: Observer = Observer { bandwidth_rad_s: 5.0, acceleration_max_m_s2: 3.0 };
 
-    fn moving(velocity_W_m_s: Vector3<f64>) -> Motion {
+    fn moving(velocity_W_m_s: Vector3<f64>) -> MotionEstimate {
         let zero = Vector3::zeros();
         let attitude_WB = UnitQuaternion::identity();
-        Motion { position_W_m: zero, velocity_W_m_s, attitude_WB, angular_velocity_B_rad_s: zero }
+        MotionEstimate { position_W_m: zero, velocity_W_m_s, attitude_WB, angular_velocity_B_rad_s: zero }
     }
 
     /// What it believes after `time_s` of `true_W_m_s2` while the model says 1 m/s² along x.
     fn believed(true_W_m_s2: Vector3<f64>, time_s: f64) -> Vector3<f64> {
-        let mut memory = ControllerState::default();
         let mut velocity_W_m_s = Vector3::zeros();
-        begin(&mut memory, &moving(velocity_W_m_s));
+        let mut state = ObserverState::at(&moving(velocity_W_m_s));
         let mut believed = Vector3::zeros();
         for _ in 0..(time_s * 1e3) as usize {
             believed =
-                OBSERVER.step(&mut memory, &moving(velocity_W_m_s), &Vector3::x(), 1e-3).acceleration_W_m_s2;
+                OBSERVER.step(&mut state, &moving(velocity_W_m_s), &Vector3::x(), 1e-3).acceleration_W_m_s2;
             velocity_W_m_s += true_W_m_s2 * 1e-3;
         }
         believed

@@ -1,90 +1,165 @@
-//! What `lqr` and `geometric` remember beside their laws, and how it begins: the wrench that the rotors are foreseen
-//! to make, the velocity against which disturbances show, and the disturbance.
+//! What `lqr` and `geometric` remember, and how it begins: the wrench that the rotors are foreseen to make, and the
+//! observer of disturbances.
 //!
-//! A predecessor that is succeeded may be a broken one, so nothing of its memory is gone on from that this vehicle could
-//! not have: neither numbers that are none nor wrenches that its rotors cannot make.
+//! A predecessor may be a broken law, so nothing of its state is gone on from that this vehicle could not have: neither
+//! numbers that are none nor wrenches that its rotors cannot make.
 #![allow(
     non_snake_case,
     reason = "a trailing _W or _B names the frame a vector is written in, _N or _m names a unit"
 )]
 
-use crate::allocation::{Allocation, Wrench};
-use crate::controller::{Controller, ControllerState, Told, within};
-use crate::disturbance;
+use crate::airframe::ControlledVehicle;
+use crate::allocation::{Allocation, RotorWrench, THRUST_RESERVE};
+use crate::control::{ControlInput, Integrals, within};
+use crate::disturbance::{Observer, ObserverState};
+use crate::law::{Predecessor, Start};
 use crate::motor_lag::{Made, MotorLag};
 use nalgebra::Vector3;
-
-/// The laws that foresee: each understands what the other remembers of this.
-const FORESEEING_LAWS: [u32; 2] = [6, 7];
 
 /// How far the velocity that was foreseen may be from the one that is estimated, m/s. Tuned, no source: so far off is an
 /// observer of 5 rad/s against a disturbance that exceeds its limit by gravity.
 const VELOCITY_MISSED_MAX_M_S: f64 = 1.0;
 
-/// What a memory is held against.
-#[derive(Debug, Clone, Copy)]
-pub struct Foresight<'a> {
-    /// What the rotors can make.
-    pub allocation: &'a Allocation,
-    /// How fast they can.
-    pub lag: &'a MotorLag,
-    /// The vehicle's weight, N.
-    pub weight_N: f64,
-    /// The most that the law's observer believes along an axis, m/s².
-    pub disturbance_max_m_s2: f64,
+/// All that the laws that foresee remember.
+#[derive(Debug, Clone, Copy, PartialEq, Default, bus::Message)]
+#[repr(C)]
+#[message(type_name = "hummingbus_msgs/msg/ForesightState")]
+pub struct ForesightState {
+    /// Thrust that the rotors are foreseen to make.
+    #[field(unit = "N", frame = "body")]
+    pub thrust_made: f64,
+    /// Its rate of change.
+    #[field(unit = "N/s", frame = "body")]
+    pub thrust_made_rate: f64,
+    /// Torque that they are foreseen to make.
+    #[field(unit = "N*m", frame = "body")]
+    pub torque_made: [f64; 3],
+    /// Its rate of change.
+    #[field(unit = "N*m/s", frame = "body")]
+    pub torque_made_rate: [f64; 3],
+    /// The observer of disturbances.
+    pub observer: ObserverState,
 }
 
-impl Foresight<'_> {
-    /// The memory before the first tick: the rotors carry the weight.
-    #[must_use]
-    pub fn fresh(&self, told: &Told<'_>) -> ControllerState {
-        begun(&Made::settled(self.hover()), told)
+impl ForesightState {
+    fn new(made: &Made, observer: ObserverState) -> Self {
+        let mut state = Self { observer, ..Self::default() };
+        state.set_made(made);
+        state
     }
 
-    /// The memory of `C` after another law asked for `wrench`, which the rotors are taken to make where that law did
-    /// not foresee.
-    #[must_use]
-    pub fn tracking<C: Controller>(
-        &self,
-        memory: &ControllerState,
-        wrench: &Wrench,
-        told: &Told<'_>,
-    ) -> ControllerState {
-        let asked = self.possible(wrench);
-        let next = if FORESEEING_LAWS.contains(&memory.law) {
-            self.gone_on(memory, told)
-        } else {
-            self.tracked(memory, &asked, told)
-        };
-        ControllerState { law: C::LAW, thrust: asked.thrust_N, torque: asked.torque_B_N_m.into(), ..next }
-    }
-
-    /// After a law that does not foresee. What its integrators lift, the observer does from now on, and it alone: left
-    /// beside it, they would be counted twice by the next law.
-    fn tracked(&self, memory: &ControllerState, asked: &Wrench, told: &Told<'_>) -> ControllerState {
-        let lift_m_s2 = memory.handed_lift_m_s2(self.disturbance_max_m_s2).unwrap_or_default();
-        let position_integral = [0.0, 0.0, lift_m_s2];
-        ControllerState { position_integral, ..begun(&Made::settled(*asked), told) }
-    }
-
-    /// After one that does.
-    fn gone_on(&self, memory: &ControllerState, told: &Told<'_>) -> ControllerState {
-        let measured_W_m_s = told.motion.velocity_W_m_s;
-        let missed_W_m_s = Vector3::from(memory.velocity_foreseen) - measured_W_m_s;
-        let foreseen_W_m_s = measured_W_m_s + missed_W_m_s.map(|v| within(v, VELOCITY_MISSED_MAX_M_S));
-        ControllerState {
-            position_integral: memory.position_integral.map(|a| within(a, self.disturbance_max_m_s2)),
-            velocity_foreseen: foreseen_W_m_s.into(),
-            ..begun(&self.possible_change(&Made::recall(memory)), told)
+    fn made(&self) -> Made {
+        let wrench = |thrust_N, torque: [f64; 3]| RotorWrench { thrust_N, torque_B_N_m: torque.into() };
+        Made {
+            wrench: wrench(self.thrust_made, self.torque_made),
+            rate: wrench(self.thrust_made_rate, self.torque_made_rate),
         }
     }
 
-    fn hover(&self) -> Wrench {
-        Wrench { thrust_N: self.weight_N, ..Wrench::default() }
+    fn set_made(&mut self, made: &Made) {
+        self.thrust_made = made.wrench.thrust_N;
+        self.torque_made = made.wrench.torque_B_N_m.into();
+        self.thrust_made_rate = made.rate.thrust_N;
+        self.torque_made_rate = made.rate.torque_B_N_m.into();
+    }
+
+    /// What the observer lifts, as an integrator of another law would.
+    #[must_use]
+    pub fn integrals(&self) -> Integrals {
+        Integrals { lift: self.observer.answer[2], turn: [0.0; 3] }
+    }
+}
+
+/// What is foreseen of a vehicle at one period.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Foresight {
+    /// What the rotors can make.
+    allocation: Allocation,
+    /// How fast they can.
+    pub lag: MotorLag,
+    /// The vehicle's weight, N.
+    weight_N: f64,
+    /// The most that the law's observer believes along an axis, m/s².
+    disturbance_max_m_s2: f64,
+}
+
+impl Foresight {
+    /// What is foreseen of `craft` by a law that is stepped every `period_s` with `observer`.
+    #[must_use]
+    pub fn new(craft: &ControlledVehicle, observer: &Observer, period_s: f64) -> Self {
+        Self {
+            allocation: craft.allocation,
+            lag: MotorLag::new(craft.vehicle.motor, period_s),
+            weight_N: craft.vehicle.mass_kg * craft.vehicle.gravity_m_s2,
+            disturbance_max_m_s2: observer.acceleration_max_m_s2,
+        }
+    }
+
+    /// What the rotors make now, one period after `last` was asked for: they followed it as far as the allocation allows.
+    pub fn advance(&self, state: &mut ForesightState, last: &RotorWrench) -> Made {
+        let made = self.lag.advance(&state.made(), &self.allocation.allocate(last).wrench);
+        state.set_made(&made);
+        made
+    }
+
+    /// `thrust_N` within limits that leave room for roll and pitch.
+    #[must_use]
+    pub fn limited_N(&self, thrust_N: f64) -> f64 {
+        let (min_N, max_N) = self.allocation.thrust_range_N(THRUST_RESERVE);
+        thrust_N.clamp(min_N, max_N)
+    }
+
+    /// Before the first tick: the rotors carry the weight.
+    #[must_use]
+    pub fn start(&self, input: &ControlInput<'_>) -> Start<ForesightState> {
+        started(&Made::settled(self.hover()), ObserverState::at(&input.motion))
+    }
+
+    /// After another law. The rotors are taken to make what it asked for where it did not foresee.
+    #[must_use]
+    pub fn take_over(
+        &self,
+        from: &Predecessor<'_, ForesightState>,
+        input: &ControlInput<'_>,
+    ) -> Start<ForesightState> {
+        let wrench = self.possible(&from.wrench);
+        let start = match from.state {
+            Some(before) => self.after_foresight(before, input),
+            None => self.after_other(from.integrals, &wrench, input),
+        };
+        Start { wrench, ..start }
+    }
+
+    /// What the integrators of a law that does not foresee lift, the observer does from now on, and it alone: left
+    /// beside it, they would be counted twice by the next law.
+    fn after_other(
+        &self,
+        before: Option<Integrals>,
+        asked: &RotorWrench,
+        input: &ControlInput<'_>,
+    ) -> Start<ForesightState> {
+        let lift_m_s2 = before.map_or(0.0, |before| within(before.lift, self.disturbance_max_m_s2));
+        let observer = ObserverState { answer: [0.0, 0.0, lift_m_s2], ..ObserverState::at(&input.motion) };
+        started(&Made::settled(*asked), observer)
+    }
+
+    fn after_foresight(&self, before: &ForesightState, input: &ControlInput<'_>) -> Start<ForesightState> {
+        let measured_W_m_s = input.motion.velocity_W_m_s;
+        let missed_W_m_s = Vector3::from(before.observer.velocity_foreseen) - measured_W_m_s;
+        let foreseen_W_m_s = measured_W_m_s + missed_W_m_s.map(|v| within(v, VELOCITY_MISSED_MAX_M_S));
+        let observer = ObserverState {
+            answer: before.observer.answer.map(|a| within(a, self.disturbance_max_m_s2)),
+            velocity_foreseen: foreseen_W_m_s.into(),
+        };
+        started(&self.possible_change(&before.made()), observer)
+    }
+
+    fn hover(&self) -> RotorWrench {
+        RotorWrench { thrust_N: self.weight_N, ..RotorWrench::default() }
     }
 
     /// What of `wrench` the rotors can make; of one that is no number, hovering.
-    fn possible(&self, wrench: &Wrench) -> Wrench {
+    fn possible(&self, wrench: &RotorWrench) -> RotorWrench {
         let wrench = self.allocation.allocate(wrench).wrench;
         let is_finite =
             wrench.thrust_N.is_finite() && wrench.torque_B_N_m.iter().all(|part| part.is_finite());
@@ -95,11 +170,11 @@ impl Foresight<'_> {
     /// ahead is another wrench that the rotors can make.
     fn possible_change(&self, made: &Made) -> Made {
         let (now, delay_s) = (self.possible(&made.wrench), self.lag.delay_s());
-        let ahead = self.possible(&Wrench {
+        let ahead = self.possible(&RotorWrench {
             thrust_N: now.thrust_N + made.rate.thrust_N * delay_s,
             torque_B_N_m: now.torque_B_N_m + made.rate.torque_B_N_m * delay_s,
         });
-        let rate = Wrench {
+        let rate = RotorWrench {
             thrust_N: (ahead.thrust_N - now.thrust_N) / delay_s,
             torque_B_N_m: (ahead.torque_B_N_m - now.torque_B_N_m) / delay_s,
         };
@@ -107,11 +182,7 @@ impl Foresight<'_> {
     }
 }
 
-/// Rotors that make `made`, and an observer that begins at this motion.
-fn begun(made: &Made, told: &Told<'_>) -> ControllerState {
-    let thrust = made.wrench.thrust_N;
-    let mut begun = ControllerState { thrust, torque: made.wrench.torque_B_N_m.into(), ..Default::default() };
-    made.store(&mut begun);
-    disturbance::begin(&mut begun, &told.motion);
-    begun
+/// Rotors that were asked for what they make.
+fn started(made: &Made, observer: ObserverState) -> Start<ForesightState> {
+    Start { state: ForesightState::new(made, observer), wrench: made.wrench }
 }

@@ -1,6 +1,7 @@
 //! The geometric controller node: a trajectory's reference to four motor commands.
 
-use crate::controller::{self, Airframe};
+use crate::airframe::ControlledVehicle;
+use crate::controller;
 use crate::geometric_gains::GeometricGains;
 use crate::geometric_law::GeometricLaw;
 use crate::rehearsal;
@@ -24,8 +25,8 @@ pub const KIND: NodeKind = NodeKind {
         PortSpec::optional("status", ControlStatus::SCHEMA),
     ],
     check: |parameters, run| {
-        let (law, airframe) = build(&read_parameters(parameters)?, run.period_s())?;
-        rehearsal::check(&law, &airframe, run)
+        let (law, craft) = build(&read_parameters(parameters)?, run.period_s())?;
+        rehearsal::check(&law, &craft, run)
     },
     run,
 };
@@ -40,14 +41,14 @@ struct Parameters {
     gains: Option<PathBuf>,
 }
 
-fn build(parameters: &Parameters, period_s: f64) -> Result<(GeometricLaw, Airframe), String> {
-    let airframe = Airframe::load(&parameters.vehicle)?;
+fn build(parameters: &Parameters, period_s: f64) -> Result<(GeometricLaw, ControlledVehicle), String> {
+    let craft = ControlledVehicle::load(&parameters.vehicle)?;
     let gains = GeometricGains::load(parameters.gains.as_deref()).map_err(|error| error.to_string())?;
-    Ok((GeometricLaw::new(gains, &airframe, period_s), airframe))
+    Ok((GeometricLaw::new(gains, &craft, period_s), craft))
 }
 
 fn run() -> Result<(), BusError> {
     let node = Node::join()?;
-    let (law, airframe) = build(&node.parameters()?, node.period_s()).map_err(|error| node.error(error))?;
-    controller::run(node, &law, &airframe.allocation, &airframe.vehicle)
+    let (law, craft) = build(&node.parameters()?, node.period_s()).map_err(|error| node.error(error))?;
+    controller::run(node, &law, &craft)
 }

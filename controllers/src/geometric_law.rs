@@ -20,16 +20,17 @@
     reason = "a trailing _W or _B names the frame a vector is written in, _N the newton"
 )]
 
-use crate::allocation::{Allocation, THRUST_RESERVE, Wrench};
-use crate::controller::{Airframe, Controller, ControllerState, Demand, Motion, Told};
-use crate::course::Point;
-use crate::disturbance::Disturbance;
+use crate::airframe::ControlledVehicle;
+use crate::allocation::RotorWrench;
+use crate::control::{ControlInput, ControlOutput, MotionEstimate};
+use crate::disturbance::{Disturbance, ObserverState};
 use crate::flatness::{self, Moving, Target};
-use crate::foresight::Foresight;
+use crate::foresight::{Foresight, ForesightState};
 use crate::geometric_gains::GeometricGains;
-use crate::motor_lag::{Made, MotorLag};
+use crate::law::{Law, Predecessor, Start};
+use crate::motor_lag::Made;
 use crate::set_points::SetPoint;
-use crate::trajectory;
+use crate::trajectory::Point;
 use nalgebra::{Matrix3, Vector3};
 
 /// The law at one period: all that does not change during a run.
@@ -39,8 +40,7 @@ pub struct GeometricLaw {
     mass_kg: f64,
     inertia_B_kg_m2: Matrix3<f64>,
     gravity_m_s2: f64,
-    allocation: Allocation,
-    lag: MotorLag,
+    foresight: Foresight,
     period_s: f64,
 }
 
@@ -59,55 +59,45 @@ struct Push {
 }
 
 impl GeometricLaw {
-    /// The law for `airframe`.
+    /// The law for `craft`.
     #[must_use]
-    pub fn new(gains: GeometricGains, airframe: &Airframe, period_s: f64) -> Self {
-        let vehicle = &airframe.vehicle;
+    pub fn new(gains: GeometricGains, craft: &ControlledVehicle, period_s: f64) -> Self {
+        let vehicle = &craft.vehicle;
         Self {
             gains,
             mass_kg: vehicle.mass_kg,
             inertia_B_kg_m2: vehicle.inertia_kg_m2,
             gravity_m_s2: vehicle.gravity_m_s2,
-            allocation: airframe.allocation,
-            lag: MotorLag::new(vehicle.motor, period_s),
+            foresight: Foresight::new(craft, &gains.observer, period_s),
             period_s,
         }
     }
 
-    fn foresight(&self) -> Foresight<'_> {
-        Foresight {
-            allocation: &self.allocation,
-            lag: &self.lag,
-            weight_N: self.mass_kg * self.gravity_m_s2,
-            disturbance_max_m_s2: self.gains.observer.acceleration_max_m_s2,
-        }
-    }
-
     /// The demand, and the attitude behind it; advances the observer.
-    fn asked(&self, memory: &mut ControllerState, made: &Made, told: &Told<'_>) -> (Wrench, Target) {
-        let (reference, motion) = (&trajectory::point(told.reference), &told.motion);
+    fn asked(
+        &self,
+        observer: &mut ObserverState,
+        made: &Made,
+        input: &ControlInput<'_>,
+    ) -> (RotorWrench, Target) {
+        let (reference, motion) = (&Point::from(input.reference), &input.motion);
         let push = self.push(made, motion);
-        let disturbance = self.gains.observer.step(memory, motion, &push.acceleration_W_m_s2, self.period_s);
+        let disturbance =
+            self.gains.observer.step(observer, motion, &push.acceleration_W_m_s2, self.period_s);
         let errors = errors(&push, &disturbance, reference, motion);
         let thrust_W_m_s2 = self.thrust_vector(&disturbance, &errors, reference);
         let target = flatness::target(&thrust_W_m_s2, reference.yaw_rad, reference.yaw_rate_rad_s);
         let z_W = motion.attitude_WB * Vector3::z();
-        let wanted = Wrench {
+        let wanted = RotorWrench {
             thrust_N: self.mass_kg * thrust_W_m_s2.value.dot(&z_W),
             torque_B_N_m: self.torque(&target, motion),
         };
-        let hurried = self.lag.hurried(&self.gains.motor, made, &wanted);
-        (self.within_limits(hurried), target)
-    }
-
-    /// Leaves room for roll and pitch.
-    fn within_limits(&self, wrench: Wrench) -> Wrench {
-        let (min_N, max_N) = self.allocation.thrust_range_N(THRUST_RESERVE);
-        Wrench { thrust_N: wrench.thrust_N.clamp(min_N, max_N), ..wrench }
+        let hurried = self.foresight.lag.hurried(&self.gains.motor, made, &wanted);
+        (RotorWrench { thrust_N: self.foresight.limited_N(hurried.thrust_N), ..hurried }, target)
     }
 
     /// What the model makes of the vehicle's motion: rotors as foreseen, gravity, and drag where it is stated.
-    fn push(&self, made: &Made, motion: &Motion) -> Push {
+    fn push(&self, made: &Made, motion: &MotionEstimate) -> Push {
         let z_W = motion.attitude_WB * Vector3::z();
         let turning_W = motion.attitude_WB * motion.angular_velocity_B_rad_s.cross(&Vector3::z());
         let (push_m_s2, push_rate_m_s3) =
@@ -138,7 +128,7 @@ impl GeometricLaw {
         acceleration_W.against(self.gravity_m_s2)
     }
 
-    fn torque(&self, target: &Target, motion: &Motion) -> Vector3<f64> {
+    fn torque(&self, target: &Target, motion: &MotionEstimate) -> Vector3<f64> {
         let rate_B = motion.angular_velocity_B_rad_s;
         // Takes the target's axes to the body's: RᵀR_c.
         let relative = motion.attitude_WB.inverse() * target.attitude_WB;
@@ -158,32 +148,40 @@ impl GeometricLaw {
     }
 }
 
-impl Controller for GeometricLaw {
-    const LAW: u32 = 7;
+impl Law for GeometricLaw {
+    const NAME: &'static str = "geometric";
+    type State = ForesightState;
 
     fn rate_gain_1_s(&self) -> f64 {
         self.gains.attitude_derivative_1_s.max(self.gains.yaw_derivative_1_s)
     }
 
-    fn step(&self, memory: &mut ControllerState, told: &Told<'_>) -> Demand {
-        let made = Made::foreseen(&self.lag, &self.allocation, memory);
-        made.store(memory);
-        let (wrench, target) = self.asked(memory, &made, told);
-        let (roll_rad, pitch_rad, yaw_rad) = target.attitude_WB.euler_angles();
-        let set_point = SetPoint { altitude_m: told.reference.position.z, roll_rad, pitch_rad, yaw_rad };
-        Demand { wrench, set_point, ..Demand::default() }
+    fn start(&self, input: &ControlInput<'_>) -> Start<ForesightState> {
+        self.foresight.start(input)
     }
 
-    fn fresh(&self, told: &Told<'_>) -> ControllerState {
-        self.foresight().fresh(told)
+    fn take_over(
+        &self,
+        from: &Predecessor<'_, ForesightState>,
+        input: &ControlInput<'_>,
+    ) -> Start<ForesightState> {
+        self.foresight.take_over(from, input)
     }
 
-    fn tracking(&self, memory: &ControllerState, wrench: &Wrench, told: &Told<'_>) -> ControllerState {
-        self.foresight().tracking::<Self>(memory, wrench, told)
+    fn step(
+        &self,
+        state: &mut ForesightState,
+        last: &RotorWrench,
+        input: &ControlInput<'_>,
+    ) -> ControlOutput {
+        let made = self.foresight.advance(state, last);
+        let (wrench, target) = self.asked(&mut state.observer, &made, input);
+        let set_point = SetPoint::held(input.reference.position.z, &target.attitude_WB);
+        ControlOutput { wrench, integrals: state.integrals(), set_point, ..ControlOutput::default() }
     }
 }
 
-fn errors(push: &Push, disturbance: &Disturbance, reference: &Point, motion: &Motion) -> Errors {
+fn errors(push: &Push, disturbance: &Disturbance, reference: &Point, motion: &MotionEstimate) -> Errors {
     let acceleration_W_m_s2 = push.acceleration_W_m_s2 + disturbance.acceleration_W_m_s2;
     let jerk_W_m_s3 = push.jerk_W_m_s3 + disturbance.jerk_W_m_s3;
     Errors {

@@ -25,15 +25,18 @@
 //! - [`angle`]: the difference of two angles.
 #![forbid(unsafe_code)]
 
+pub mod airframe;
 pub mod allocation;
 pub mod altitude_loop;
 pub mod angle;
 pub mod approach;
+pub mod bumpless;
 pub mod cascade;
 pub mod cascade_gains;
 pub mod cascade_law;
+pub mod control;
 pub mod controller;
-pub mod course;
+pub mod controller_state;
 pub mod curve;
 pub mod disturbance;
 pub mod flatness;
@@ -43,6 +46,7 @@ pub mod gains_file;
 pub mod geometric;
 pub mod geometric_gains;
 pub mod geometric_law;
+pub mod law;
 pub mod lqr;
 pub mod lqr_gains;
 pub mod lqr_law;
@@ -60,6 +64,7 @@ pub mod room;
 pub mod set_points;
 pub mod sticks;
 pub mod trajectory;
+pub mod trajectory_node;
 pub mod velocity;
 pub mod velocity_law;
 pub mod wall_follow;

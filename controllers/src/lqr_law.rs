@@ -10,18 +10,19 @@
     reason = "a trailing _W or _B names the frame a vector is written in, _N the newton"
 )]
 
-use crate::allocation::{Allocation, THRUST_RESERVE, Wrench};
-use crate::controller::{Airframe, Controller, ControllerState, Demand, Motion, Told};
-use crate::course::Point;
+use crate::airframe::ControlledVehicle;
+use crate::allocation::RotorWrench;
+use crate::control::{ControlInput, ControlOutput, MotionEstimate};
 use crate::disturbance::Disturbance;
 use crate::flatness::{self, Moving, Target};
-use crate::foresight::Foresight;
+use crate::foresight::{Foresight, ForesightState};
+use crate::law::{Law, Predecessor, Start};
 use crate::lqr_gains::LqrGains;
 use crate::lqr_model::{self, INPUTS, MADE, MADE_RATE, RATE, ROTATION, STATES, VELOCITY};
-use crate::motor_lag::{Made, MotorLag};
+use crate::motor_lag::Made;
 use crate::riccati;
 use crate::set_points::SetPoint;
-use crate::trajectory;
+use crate::trajectory::Point;
 use nalgebra::{Matrix3, Rotation3, SMatrix, SVector, Vector3};
 
 /// The law at one period: all that does not change during a run.
@@ -32,25 +33,24 @@ pub struct LqrLaw {
     mass_kg: f64,
     inertia_B_kg_m2: Matrix3<f64>,
     gravity_m_s2: f64,
-    allocation: Allocation,
-    lag: MotorLag,
+    foresight: Foresight,
     period_s: f64,
 }
 
 /// What the reference needs.
 struct Needed {
     attitude: Target,
-    wrench: Wrench,
+    wrench: RotorWrench,
     thrust_rate_N_s: f64,
 }
 
 impl LqrLaw {
-    /// The law for `airframe`.
+    /// The law for `craft`.
     ///
     /// # Errors
     /// The Riccati equation has no solution that stabilises the vehicle, or none that can be computed.
-    pub fn new(gains: LqrGains, airframe: &Airframe, period_s: f64) -> Result<Self, String> {
-        let vehicle = &airframe.vehicle;
+    pub fn new(gains: LqrGains, craft: &ControlledVehicle, period_s: f64) -> Result<Self, String> {
+        let vehicle = &craft.vehicle;
         let (state_weights, input_weights) = lqr_model::weights(&gains);
         let regulator = lqr_model::step(vehicle, period_s).and_then(|step| {
             riccati::regulator(&step.transition, &step.input, &state_weights, &input_weights)
@@ -65,8 +65,7 @@ impl LqrLaw {
             mass_kg: vehicle.mass_kg,
             inertia_B_kg_m2: vehicle.inertia_kg_m2,
             gravity_m_s2: vehicle.gravity_m_s2,
-            allocation: airframe.allocation,
-            lag: MotorLag::new(vehicle.motor, period_s),
+            foresight: Foresight::new(craft, &gains.observer, period_s),
             period_s,
         })
     }
@@ -75,15 +74,6 @@ impl LqrLaw {
     #[must_use]
     pub fn gain(&self) -> &SMatrix<f64, INPUTS, STATES> {
         &self.gain
-    }
-
-    fn foresight(&self) -> Foresight<'_> {
-        Foresight {
-            allocation: &self.allocation,
-            lag: &self.lag,
-            weight_N: self.mass_kg * self.gravity_m_s2,
-            disturbance_max_m_s2: self.gains.observer.acceleration_max_m_s2,
-        }
     }
 
     fn needed(&self, disturbance: &Disturbance, reference: &Point) -> Needed {
@@ -101,7 +91,7 @@ impl LqrLaw {
         let z_W = thrust_W.value.normalize();
         Needed {
             attitude,
-            wrench: Wrench { thrust_N: self.mass_kg * thrust_W.value.norm(), torque_B_N_m },
+            wrench: RotorWrench { thrust_N: self.mass_kg * thrust_W.value.norm(), torque_B_N_m },
             thrust_rate_N_s: self.mass_kg * thrust_W.first.dot(&z_W),
         }
     }
@@ -111,7 +101,7 @@ impl LqrLaw {
         &self,
         needed: &Needed,
         made: &Made,
-        motion: &Motion,
+        motion: &MotionEstimate,
         reference: &Point,
     ) -> SVector<f64, STATES> {
         let off_W_m = motion.position_W_m - reference.path_W[0];
@@ -133,45 +123,53 @@ impl LqrLaw {
         deviation
     }
 
-    fn demand(&self, needed: &Needed, deviation: &SVector<f64, STATES>) -> Wrench {
+    fn demand(&self, needed: &Needed, deviation: &SVector<f64, STATES>) -> RotorWrench {
         let answer = self.gain * deviation;
-        let ahead_N = self.lag.delay_s() * needed.thrust_rate_N_s;
-        let (min_N, max_N) = self.allocation.thrust_range_N(THRUST_RESERVE);
-        Wrench {
-            thrust_N: (needed.wrench.thrust_N + ahead_N - answer[0]).clamp(min_N, max_N),
+        let ahead_N = self.foresight.lag.delay_s() * needed.thrust_rate_N_s;
+        RotorWrench {
+            thrust_N: self.foresight.limited_N(needed.wrench.thrust_N + ahead_N - answer[0]),
             torque_B_N_m: needed.wrench.torque_B_N_m - answer.fixed_rows::<3>(1),
         }
     }
 
     /// The acceleration that the foreseen thrust means.
-    fn explained_W_m_s2(&self, made: &Made, motion: &Motion) -> Vector3<f64> {
+    fn explained_W_m_s2(&self, made: &Made, motion: &MotionEstimate) -> Vector3<f64> {
         let thrust_B_m_s2 = Vector3::z() * (made.wrench.thrust_N / self.mass_kg);
         motion.attitude_WB * thrust_B_m_s2 - Vector3::z() * self.gravity_m_s2
     }
 }
 
-impl Controller for LqrLaw {
-    const LAW: u32 = 6;
+impl Law for LqrLaw {
+    const NAME: &'static str = "lqr";
+    type State = ForesightState;
 
-    fn step(&self, memory: &mut ControllerState, told: &Told<'_>) -> Demand {
-        let made = Made::foreseen(&self.lag, &self.allocation, memory);
-        made.store(memory);
-        let explained_W_m_s2 = self.explained_W_m_s2(&made, &told.motion);
-        let disturbance = self.gains.observer.step(memory, &told.motion, &explained_W_m_s2, self.period_s);
-        let reference = trajectory::point(told.reference);
+    fn start(&self, input: &ControlInput<'_>) -> Start<ForesightState> {
+        self.foresight.start(input)
+    }
+
+    fn take_over(
+        &self,
+        from: &Predecessor<'_, ForesightState>,
+        input: &ControlInput<'_>,
+    ) -> Start<ForesightState> {
+        self.foresight.take_over(from, input)
+    }
+
+    fn step(
+        &self,
+        state: &mut ForesightState,
+        last: &RotorWrench,
+        input: &ControlInput<'_>,
+    ) -> ControlOutput {
+        let (made, motion) = (self.foresight.advance(state, last), &input.motion);
+        let explained_W_m_s2 = self.explained_W_m_s2(&made, motion);
+        let observer = &mut state.observer;
+        let disturbance = self.gains.observer.step(observer, motion, &explained_W_m_s2, self.period_s);
+        let reference = Point::from(input.reference);
         let needed = self.needed(&disturbance, &reference);
-        let deviation = self.deviation(&needed, &made, &told.motion, &reference);
+        let deviation = self.deviation(&needed, &made, motion, &reference);
         let wrench = self.demand(&needed, &deviation);
-        let (roll_rad, pitch_rad, yaw_rad) = needed.attitude.attitude_WB.euler_angles();
-        let set_point = SetPoint { altitude_m: told.reference.position.z, roll_rad, pitch_rad, yaw_rad };
-        Demand { wrench, set_point, ..Demand::default() }
-    }
-
-    fn fresh(&self, told: &Told<'_>) -> ControllerState {
-        self.foresight().fresh(told)
-    }
-
-    fn tracking(&self, memory: &ControllerState, wrench: &Wrench, told: &Told<'_>) -> ControllerState {
-        self.foresight().tracking::<Self>(memory, wrench, told)
+        let set_point = SetPoint::held(input.reference.position.z, &needed.attitude.attitude_WB);
+        ControlOutput { wrench, integrals: state.integrals(), set_point, ..ControlOutput::default() }
     }
 }

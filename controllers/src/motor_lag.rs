@@ -9,8 +9,7 @@
 //! feedback). The foreseen w follows what the allocation could make of the demand, so saturation winds nothing up.
 #![allow(non_snake_case, reason = "a trailing _B names the frame a vector is written in, _N the newton")]
 
-use crate::allocation::{Allocation, Wrench};
-use crate::controller::ControllerState;
+use crate::allocation::RotorWrench;
 use nalgebra::{Matrix2, Matrix3, Vector2, Vector3};
 use vehicles::MotorModel;
 
@@ -37,9 +36,9 @@ pub struct LagTarget {
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Made {
     /// The wrench, N and N·m.
-    pub wrench: Wrench,
+    pub wrench: RotorWrench,
     /// Its rate of change, N/s and N·m/s.
-    pub rate: Wrench,
+    pub rate: RotorWrench,
 }
 
 impl MotorLag {
@@ -61,7 +60,7 @@ impl MotorLag {
 
     /// What the rotors make one period after `made` under the demand `asked`.
     #[must_use]
-    pub fn advance(&self, made: &Made, asked: &Wrench) -> Made {
+    pub fn advance(&self, made: &Made, asked: &RotorWrench) -> Made {
         let step = |value: f64, rate: f64, asked: f64| {
             let next = self.transition * Vector2::new(value, rate) + self.input * asked;
             (next.x, next.y)
@@ -70,17 +69,18 @@ impl MotorLag {
         let thrust = step(now.thrust_N, rate.thrust_N, asked.thrust_N);
         let torques: [(f64, f64); 3] =
             std::array::from_fn(|i| step(now.torque_B_N_m[i], rate.torque_B_N_m[i], asked.torque_B_N_m[i]));
-        let wrench = |thrust_N, torque: [f64; 3]| Wrench { thrust_N, torque_B_N_m: Vector3::from(torque) };
+        let wrench =
+            |thrust_N, torque: [f64; 3]| RotorWrench { thrust_N, torque_B_N_m: Vector3::from(torque) };
         Made { wrench: wrench(thrust.0, torques.map(|t| t.0)), rate: wrench(thrust.1, torques.map(|t| t.1)) }
     }
 
     /// The demand with which the rotors go towards `wanted` as motors of `target` would.
     #[must_use]
-    pub fn hurried(&self, target: &LagTarget, made: &Made, wanted: &Wrench) -> Wrench {
+    pub fn hurried(&self, target: &LagTarget, made: &Made, wanted: &RotorWrench) -> RotorWrench {
         let (now, rate) = (&made.wrench, &made.rate);
         let hurry = |now: f64, rate: f64, wanted: f64| self.hurry(target, now, rate, wanted);
         let torque = |i: usize| hurry(now.torque_B_N_m[i], rate.torque_B_N_m[i], wanted.torque_B_N_m[i]);
-        Wrench {
+        RotorWrench {
             thrust_N: hurry(now.thrust_N, rate.thrust_N, wanted.thrust_N),
             torque_B_N_m: Vector3::new(torque(0), torque(1), torque(2)),
         }
@@ -127,34 +127,8 @@ pub fn continuous(model: &MotorModel) -> (Matrix2<f64>, Vector2<f64>) {
 impl Made {
     /// Rotors that have settled at `wrench`.
     #[must_use]
-    pub fn settled(wrench: Wrench) -> Self {
-        Self { wrench, rate: Wrench::default() }
-    }
-
-    /// What the memory holds.
-    #[must_use]
-    pub fn recall(memory: &ControllerState) -> Self {
-        let wrench = |thrust_N, torque: [f64; 3]| Wrench { thrust_N, torque_B_N_m: torque.into() };
-        Self {
-            wrench: wrench(memory.thrust_made, memory.torque_made),
-            rate: wrench(memory.thrust_made_rate, memory.torque_made_rate),
-        }
-    }
-
-    /// Puts it into the memory.
-    pub fn store(&self, memory: &mut ControllerState) {
-        memory.thrust_made = self.wrench.thrust_N;
-        memory.torque_made = self.wrench.torque_B_N_m.into();
-        memory.thrust_made_rate = self.rate.thrust_N;
-        memory.torque_made_rate = self.rate.torque_B_N_m.into();
-    }
-
-    /// What the rotors make now, one period after `memory` was left: they followed what was demanded then, as far as
-    /// `allocation` allows.
-    #[must_use]
-    pub fn foreseen(lag: &MotorLag, allocation: &Allocation, memory: &ControllerState) -> Self {
-        let asked = Wrench { thrust_N: memory.thrust, torque_B_N_m: memory.torque.into() };
-        lag.advance(&Self::recall(memory), &allocation.allocate(&asked).wrench)
+    pub fn settled(wrench: RotorWrench) -> Self {
+        Self { wrench, rate: RotorWrench::default() }
     }
 }
 
@@ -167,8 +141,8 @@ mod tests {
     const FIRST: MotorModel = MotorModel::FirstOrder { time_constant_s: 0.05 };
     const TARGET: LagTarget = LagTarget { natural_frequency_rad_s: 50.0, damping_ratio: 0.7 };
 
-    fn thrust(thrust_N: f64) -> Wrench {
-        Wrench { thrust_N, ..Wrench::default() }
+    fn thrust(thrust_N: f64) -> RotorWrench {
+        RotorWrench { thrust_N, ..RotorWrench::default() }
     }
 
     /// The thrust after `time_s` from rest, by the closed form of a lag of second order.

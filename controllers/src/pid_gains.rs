@@ -26,53 +26,20 @@
 //! All of ours are tuned on that model, no source. The numbers are in `controllers/gains/pid.toml` and
 //! `pid-thesis.toml`; the former is built in.
 
-use crate::altitude_loop::AltitudeGains;
+use crate::altitude_loop::{AltitudeGains, LoopGains};
 use crate::gains_file::{gain, parse, tilt};
 use serde::Deserialize;
 use serde::de::{MapAccess, Visitor, value::MapAccessDeserializer};
 use std::path::{Path, PathBuf};
 use vehicles::VehicleError;
 use vehicles::reader::Section;
-use vehicles::units::{ANGULAR_ACCELERATION, PER_SECOND, PER_SECOND_2, PER_SECOND_3};
+use vehicles::units::ANGULAR_ACCELERATION;
 
 /// The gains that the law is tuned with.
 const OURS: &str = include_str!("../gains/pid.toml");
 
 /// The gains of the thesis.
 const THESIS: &str = include_str!("../gains/pid-thesis.toml");
-
-/// The gains of one loop, from an error to an acceleration (linear: m/s², angular: rad/s²).
-#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct LoopGains {
-    /// Acceleration for each unit of error, 1/s².
-    pub proportional_1_s2: f64,
-    /// Acceleration for each unit of error held for one second, 1/s³.
-    pub integral_1_s3: f64,
-    /// Acceleration against each unit of measured rate, 1/s.
-    pub derivative_1_s: f64,
-}
-
-impl LoopGains {
-    /// `proportional`, `integral` and `derivative` of a gains file's table.
-    pub(crate) fn read(section: &Section<'_, '_>) -> Result<Self, VehicleError> {
-        Ok(Self {
-            proportional_1_s2: gain(section, "proportional", PER_SECOND_2)?,
-            integral_1_s3: gain(section, "integral", PER_SECOND_3)?,
-            derivative_1_s: gain(section, "derivative", PER_SECOND)?,
-        })
-    }
-
-    /// The acceleration that the loop asks for.
-    pub(crate) fn demand(&self, error: f64, integral: f64, rate: f64) -> f64 {
-        self.proportional_1_s2 * error + integral - self.derivative_1_s * rate
-    }
-
-    /// The integrator's acceleration `period_s` on, kept within ±`max`.
-    pub(crate) fn integrate(&self, before: f64, error: f64, period_s: f64, max: f64) -> f64 {
-        (before + self.integral_1_s3 * error * period_s).clamp(-max, max)
-    }
-}
 
 /// Gains and limits of the four loops. A loop's table is given whole or left out.
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize)]

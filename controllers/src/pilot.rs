@@ -1,6 +1,6 @@
 //! The pilot: publishes the set points of a schedule, or of a recording of sticks.
 
-use crate::set_points::{ALTITUDES_IN_WORDS, ALTITUDES_M, Schedule, SetPoint as Values, SetPointEntry};
+use crate::set_points::{ALTITUDES_EXPECTED, ALTITUDES_M, Schedule, SetPoint as Values, SetPointEntry};
 use crate::sticks::Sticks;
 use bus::OutputPorts;
 use bus::component::{Component, Info, StepError};
@@ -61,7 +61,7 @@ impl Component for Pilot {
     fn new(parameters: Parameters, context: &NodeContext<'_>) -> Result<Self, String> {
         let altitude_m = parameters.initial_altitude_m;
         if !ALTITUDES_M.contains(&altitude_m) {
-            return Err(format!("`initial_altitude_m` is {altitude_m} m, expected {ALTITUDES_IN_WORDS}"));
+            return Err(format!("`initial_altitude_m` is {altitude_m} m, expected {ALTITUDES_EXPECTED}"));
         }
         let initial = Values { altitude_m: parameters.initial_altitude_m, ..Values::default() };
         let schedule = Schedule::new(&parameters.set_points, &initial, context.rate_hz())

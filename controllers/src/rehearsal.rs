@@ -7,7 +7,11 @@
     reason = "a trailing _W or _B names the frame a vector is written in, _N the newton"
 )]
 
-use crate::controller::{Airframe, Controller, ControllerState, Demand, Flown, Motion, Told};
+use crate::airframe::ControlledVehicle;
+use crate::bumpless::BumplessTransfer;
+use crate::control::{ControlInput, ControlOutput, MotionEstimate};
+use crate::controller_state::ControllerState;
+use crate::law::Law;
 use crate::set_points::SetPoint;
 use bus::context::NodeContext;
 use bus::messages::{Reference, WallEstimate};
@@ -30,15 +34,10 @@ const COARSE: f64 = 0.5;
 ///
 /// # Errors
 /// What goes wrong, and which keys are to blame.
-pub(crate) fn check<C: Controller>(
-    law: &C,
-    airframe: &Airframe,
-    run: &NodeContext<'_>,
-) -> Result<(), String> {
+pub(crate) fn check<L: Law>(law: &L, craft: &ControlledVehicle, run: &NodeContext<'_>) -> Result<(), String> {
     check_period(law.rate_gain_1_s(), run)?;
-    warn_of_weight(airframe, run);
-    let flown = Flown { law, vehicle: &airframe.vehicle, period_s: run.period_s() };
-    motions().iter().try_for_each(|motion| fly(&flown, airframe, motion, run))
+    warn_of_weight(craft, run);
+    motions().iter().try_for_each(|motion| fly(law, craft, motion, run))
 }
 
 fn check_period(gain_1_s: f64, run: &NodeContext<'_>) -> Result<(), String> {
@@ -62,20 +61,20 @@ fn check_period(gain_1_s: f64, run: &NodeContext<'_>) -> Result<(), String> {
     Ok(())
 }
 
-fn warn_of_weight(airframe: &Airframe, run: &NodeContext<'_>) {
-    let (_, most_N) = airframe.allocation.thrust_range_N(0.0);
-    let weight_N = airframe.vehicle.mass_kg * airframe.vehicle.gravity_m_s2;
+fn warn_of_weight(craft: &ControlledVehicle, run: &NodeContext<'_>) {
+    let (_, most_N) = craft.allocation.thrust_range_N(0.0);
+    let weight_N = craft.vehicle.mass_kg * craft.vehicle.gravity_m_s2;
     if weight_N > most_N {
         run.warn(format!(
             "`vehicle` \"{}\" weighs {weight_N:.4} N, and its rotors lift {most_N:.4} N at most: the law cannot hold it",
-            airframe.vehicle.name
+            craft.vehicle.name
         ));
     }
 }
 
 /// At rest; tilted, turning and moving; on its back in a fall.
-fn motions() -> [Motion; 3] {
-    let motion = |speed_m_s: f64, tilt_rad: f64, rate_rad_s: f64| Motion {
+fn motions() -> [MotionEstimate; 3] {
+    let motion = |speed_m_s: f64, tilt_rad: f64, rate_rad_s: f64| MotionEstimate {
         position_W_m: Vector3::new(0.1, -0.1, 1.0),
         velocity_W_m_s: Vector3::new(speed_m_s, -speed_m_s, speed_m_s),
         attitude_WB: UnitQuaternion::from_euler_angles(tilt_rad, -0.5 * tilt_rad, tilt_rad),
@@ -84,21 +83,23 @@ fn motions() -> [Motion; 3] {
     [motion(0.0, 0.0, 0.0), motion(2.0, 0.4, 1.0), motion(-20.0, 3.0, 10.0)]
 }
 
-fn fly<C: Controller>(
-    flown: &Flown<'_, C>,
-    airframe: &Airframe,
-    motion: &Motion,
+fn fly<L: Law>(
+    law: &L,
+    craft: &ControlledVehicle,
+    motion: &MotionEstimate,
     run: &NodeContext<'_>,
 ) -> Result<(), String> {
     let (reference, walls) = (Reference::default(), WallEstimate::default());
     let set_point = SetPoint { altitude_m: 1.5, roll_rad: 0.1, pitch_rad: -0.1, yaw_rad: 0.5 };
-    let mut memory = ControllerState::default();
+    let transfer = BumplessTransfer::to::<L>(&craft.vehicle, run.period_s());
+    let mut state = ControllerState::default();
     for step in 0..STEPS {
         let time_ns = u64::from(step) * u64::from(run.period_ticks) * run.tick_ns;
-        let told = Told { motion: *motion, set_point, reference: &reference, walls: &walls, time_ns };
-        let demand = flown.advance(&mut memory, &told, None);
-        let speeds_rad_s = airframe.allocation.allocate(&demand.wrench).speeds_rad_s;
-        if let Some(what) = demand.not_finite().or_else(|| first_not_finite("a rotor speed", &speeds_rad_s)) {
+        let input =
+            ControlInput { motion: *motion, set_point, reference: &reference, walls: &walls, time_ns };
+        let output = transfer.step(law, &mut state, &input, None);
+        let speeds_rad_s = craft.allocation.allocate(&output.wrench).speeds_rad_s;
+        if let Some(what) = output.not_finite().or_else(|| first_not_finite("a rotor speed", &speeds_rad_s)) {
             return Err(format!(
                 "its numbers lead to {what} after {} steps of {} s on a motion that any flight meets; `gains`, \
                  `vehicle` or run.rate_hz do not go together",
@@ -110,8 +111,8 @@ fn fly<C: Controller>(
     Ok(())
 }
 
-impl Demand {
-    /// The first of the numbers asked for that is none, in words.
+impl ControlOutput {
+    /// The first of the numbers asked for that is not finite, for a message.
     #[must_use]
     pub fn not_finite(&self) -> Option<String> {
         let set = &self.set_point;
@@ -138,17 +139,21 @@ mod tests {
     use bus::context::Warning;
     use vehicles::Vehicle;
 
-    fn hummingbird(change: impl Fn(&mut Vehicle)) -> Airframe {
+    fn hummingbird(change: impl Fn(&mut Vehicle)) -> ControlledVehicle {
         let text = include_str!("../../vehicles/hummingbird.toml");
         let mut vehicle = Vehicle::parse(text, "hummingbird.toml").unwrap();
         change(&mut vehicle);
-        Airframe::new(vehicle).unwrap()
+        ControlledVehicle::new(vehicle).unwrap()
     }
 
-    fn checked(airframe: &Airframe, gains: PidGains, tick_ns: u64) -> (Result<(), String>, Vec<Warning>) {
+    fn checked(
+        craft: &ControlledVehicle,
+        gains: PidGains,
+        tick_ns: u64,
+    ) -> (Result<(), String>, Vec<Warning>) {
         let run = NodeContext::new("node", &[]).timed(tick_ns, 1, 1000);
-        let law = PidLaw { gains, vehicle: airframe.known(), period_s: run.period_s() };
-        let outcome = check(&law, airframe, &run);
+        let law = PidLaw { gains, vehicle: craft.hover_model(), period_s: run.period_s() };
+        let outcome = check(&law, craft, &run);
         (outcome, run.into_warnings())
     }
 

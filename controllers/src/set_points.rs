@@ -6,6 +6,7 @@
 //! nothing, so that one of 1 s lasts 2 s as a whole. Pulses of half a second would bring the
 //! Hummingbird to 8° only: behind its motors' lag 9° take about 0.57 s (gains 16 and 6, linearised).
 
+use nalgebra::UnitQuaternion;
 use serde::Deserialize;
 use std::ops::RangeInclusive;
 
@@ -20,6 +21,16 @@ pub struct SetPoint {
     pub pitch_rad: f64,
     /// Yaw, counter-clockwise from above, rad.
     pub yaw_rad: f64,
+}
+
+impl SetPoint {
+    /// A height and the angles of an attitude, body to world.
+    #[must_use]
+    #[allow(non_snake_case, reason = "_WB names the frames that an attitude leads between")]
+    pub fn held(altitude_m: f64, attitude_WB: &UnitQuaternion<f64>) -> Self {
+        let (roll_rad, pitch_rad, yaw_rad) = attitude_WB.euler_angles();
+        Self { altitude_m, roll_rad, pitch_rad, yaw_rad }
+    }
 }
 
 /// One entry of a schedule as it stands in the manifest.
@@ -68,7 +79,7 @@ pub struct Schedule {
     channels: [ChannelPlan; 4],
 }
 
-/// One channel's course, in SI units.
+/// One channel's schedule, in SI units.
 #[derive(Debug, Clone, PartialEq, Default)]
 struct ChannelPlan {
     initial: f64,
@@ -97,8 +108,8 @@ struct Doublet {
 /// Heights in the world that a set point may ask for, m: the record of all rotorcraft is 12 442 m (SA 315B Lama, FAI,
 /// 1972), and the world's origin may lie as far above.
 pub const ALTITUDES_M: RangeInclusive<f64> = -20_000.0..=20_000.0;
-/// The same for people.
-pub const ALTITUDES_IN_WORDS: &str = "-20 000 m to 20 000 m: no rotorcraft has flown above 12 442 m";
+/// The same for messages.
+pub const ALTITUDES_EXPECTED: &str = "-20 000 m to 20 000 m: no rotorcraft has flown above 12 442 m";
 /// Angles that a set point may ask for, rad: a hundred turns of yaw.
 const ANGLES_RAD: RangeInclusive<f64> = -628.4..=628.4;
 
@@ -106,7 +117,7 @@ const ANGLES_RAD: RangeInclusive<f64> = -628.4..=628.4;
 const CHANNELS: [&str; 4] = ["altitude", "roll", "pitch", "yaw"];
 
 impl Schedule {
-    /// The course that `entries` describe from `initial` on, at `tick_rate_hz` ticks a second.
+    /// The schedule that `entries` describe from `initial` on, at `tick_rate_hz` ticks a second.
     ///
     /// # Errors
     /// An entry has an unknown kind, channel or unit, a key that its kind lacks or does not know, or a
@@ -246,7 +257,7 @@ impl Reader<'_> {
     fn value(&self, key: &'static str, value: Option<f64>, si_per_unit: f64) -> Result<f64, SetPointError> {
         let value = self.number(key, value)?;
         let (range, expected) = match self.entry.channel.as_str() {
-            "altitude" => (ALTITUDES_M, ALTITUDES_IN_WORDS),
+            "altitude" => (ALTITUDES_M, ALTITUDES_EXPECTED),
             _ => (ANGLES_RAD, "an angle of at most a hundred turns"),
         };
         match si_per_unit * value {

@@ -1,81 +1,422 @@
-//! The trajectory node: publishes the points of a course, with the derivatives that controllers feed forward.
+//! A trajectory: segments one after another, each from rest to rest, as a function of time.
 #![allow(non_snake_case, reason = "a trailing _W names the frame a vector is written in")]
 
-use crate::course::{Course, Point, Start};
-use bus::context::NodeContext;
-use bus::kind::{Inputs, NodeKind, PortSpec, read_parameters};
-use bus::messages::{Reference, Vector3};
-use bus::{BusError, Message, Node};
+use crate::curve::{Curve, Path, PhaseClock, Shape, smooth_step};
+use crate::minimum_snap::{MinimumSnap, spans_at_mean_speed};
+use bus::messages::Reference;
+use nalgebra::Vector3;
 use serde::Deserialize;
+use std::f64::consts::TAU;
 
-/// The trajectory, for manifests.
-pub const KIND: NodeKind = NodeKind {
-    name: "trajectory",
-    summary: "references from the manifest: hover, circle, figure eight, minimum snap through waypoints",
-    inputs: Inputs::Ports(&[]),
-    outputs: &[PortSpec::required("reference", Reference::SCHEMA)],
-    check: |parameters, run| {
-        let course = course(&read_parameters(parameters)?)?;
-        course.require_flyable()?;
-        warn_of_late(&course, run);
-        Ok(())
-    },
-    run,
-};
+/// The most waypoints of a segment: their equations are solved at once.
+const WAYPOINTS_MAX: usize = 64;
 
-/// Parameters of the trajectory.
-#[derive(Debug, Deserialize)]
+/// A segment as it stands in the manifest. All begin at rest where the one before ended, and end at rest.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(tag = "kind", rename_all = "kebab-case")]
+pub enum SegmentEntry {
+    /// Stays where it is.
+    Hover(HoverEntry),
+    /// Laps of a circle.
+    Circle(CircleEntry),
+    /// Laps of a figure eight.
+    FigureEight(FigureEightEntry),
+    /// A minimum-snap path through waypoints.
+    MinimumSnap(MinimumSnapEntry),
+}
+
+/// `{ kind = "hover", duration_s = 2.0, yaw_deg = 90.0 }`
+#[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
-struct Parameters {
-    /// Where it starts, in the world.
-    initial_position_m: [f64; 3],
-    /// Yaw at its start.
-    #[serde(default)]
-    initial_yaw_deg: f64,
-    /// The segments; it hovers where the last ends.
-    #[serde(default)]
-    segments: Vec<serde_json::Value>,
+pub struct HoverEntry {
+    /// How long, s.
+    pub duration_s: f64,
+    /// Yaw at its end, deg; as before where absent.
+    pub yaw_deg: Option<f64>,
 }
 
-fn course(parameters: &Parameters) -> Result<Course, String> {
-    let position_W_m = nalgebra::Vector3::from(parameters.initial_position_m);
-    Course::read(
-        &parameters.segments,
-        Start { position_W_m, yaw_rad: parameters.initial_yaw_deg.to_radians() },
-    )
+/// `{ kind = "circle", radius_m = 2.0, speed_m_s = 2.0, laps = 2, ramp_s = 2.0 }`
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct CircleEntry {
+    /// Radius, m; negative for a circle to the right.
+    pub radius_m: f64,
+    /// Speed between the ramps, m/s.
+    pub speed_m_s: f64,
+    /// Laps.
+    pub laps: u32,
+    /// How long the speed rises, and falls at the end, s.
+    pub ramp_s: f64,
+    /// Direction in which it starts, deg counter-clockwise from the world's x.
+    #[serde(default)]
+    pub direction_deg: f64,
+    /// Yaw at its end, deg; as before where absent.
+    pub yaw_deg: Option<f64>,
 }
 
-/// Warns of segments that the run ends before.
-fn warn_of_late(course: &Course, run: &NodeContext<'_>) {
-    let end_s = run.duration_s();
-    if let Some((index, start_s)) = course.starts_s().enumerate().find(|(_, start_s)| *start_s >= end_s) {
-        run.warn_behind_end(format!(
-            "`segments`: entry {index} (the first is 0) begins at {start_s:.3} s, and the run ends at {end_s} s: it and \
-             what follows is never flown"
-        ));
+/// `{ kind = "figure-eight", half_length_m = 2.0, speed_m_s = 3.0, laps = 3, ramp_s = 3.0 }`
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct FigureEightEntry {
+    /// From the middle to either end, m.
+    pub half_length_m: f64,
+    /// The greatest speed between the ramps, m/s: that in the middle.
+    pub speed_m_s: f64,
+    /// Laps.
+    pub laps: u32,
+    /// How long the speed rises, and falls at the end, s.
+    pub ramp_s: f64,
+    /// Direction of its length, deg counter-clockwise from the world's x.
+    #[serde(default)]
+    pub direction_deg: f64,
+    /// Yaw at its end, deg; as before where absent.
+    pub yaw_deg: Option<f64>,
+}
+
+/// `{ kind = "minimum-snap", waypoints_m = [[1.0, 0.0, 1.5], [2.0, 1.0, 1.0]], mean_speed_m_s = 1.5 }`
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct MinimumSnapEntry {
+    /// Waypoints in the world after the place where it begins, m.
+    pub waypoints_m: Vec<[f64; 3]>,
+    /// Time from each waypoint to the next, s.
+    pub times_s: Option<Vec<f64>>,
+    /// Or the mean speed along the straight lines between them, m/s.
+    pub mean_speed_m_s: Option<f64>,
+    /// Yaw at its end, deg; as before where absent.
+    pub yaw_deg: Option<f64>,
+}
+
+/// Where a trajectory starts.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Start {
+    /// Position in the world, m.
+    pub position_W_m: Vector3<f64>,
+    /// Yaw, rad.
+    pub yaw_rad: f64,
+}
+
+/// A point of a trajectory.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Point {
+    /// Position and its first four derivatives, in the world.
+    pub path_W: Path,
+    /// Yaw, rad.
+    pub yaw_rad: f64,
+    /// Its rate of change, rad/s.
+    pub yaw_rate_rad_s: f64,
+}
+
+/// Segments one after another; at rest in the last one's end from then on.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Trajectory {
+    segments: Vec<Segment>,
+    end: Start,
+}
+
+#[derive(Debug, Clone, PartialEq)]
+struct Segment {
+    start_s: f64,
+    duration_s: f64,
+    way: Way,
+    yaw_start_rad: f64,
+    yaw_end_rad: f64,
+}
+
+#[derive(Debug, Clone, PartialEq)]
+enum Way {
+    Rest(Vector3<f64>),
+    Curve(Curve),
+    Snap(MinimumSnap),
+}
+
+impl Trajectory {
+    /// The trajectory of `entries`, read one by one so that what is wrong with one names its place.
+    ///
+    /// # Errors
+    /// An entry of unknown kind, one that lacks a key or has an unknown one, a number out of its range: in words.
+    pub fn read(entries: &[serde_json::Value], start: Start) -> Result<Self, String> {
+        let mut trajectory = Self { segments: Vec::with_capacity(entries.len()), end: start };
+        for (index, entry) in entries.iter().enumerate() {
+            let reason = |reason: String| format!("`segments`, entry {index} (the first is 0): {reason}");
+            let entry = SegmentEntry::deserialize(entry).map_err(|error| reason(error.to_string()))?;
+            trajectory.append(&entry).map_err(reason)?;
+        }
+        Ok(trajectory)
+    }
+
+    fn append(&mut self, entry: &SegmentEntry) -> Result<(), String> {
+        let way = entry.way(self.end.position_W_m)?;
+        let yaw_end_rad = entry.yaw_end_rad(self.end.yaw_rad)?;
+        let duration_s = match entry {
+            SegmentEntry::Hover(hover) => positive("duration_s", hover.duration_s)?,
+            _ => way.duration_s(),
+        };
+        let (start_s, yaw_start_rad) = (self.duration_s(), self.end.yaw_rad);
+        self.end = Start { position_W_m: way.end(duration_s), yaw_rad: yaw_end_rad };
+        self.segments.push(Segment { start_s, duration_s, way, yaw_start_rad, yaw_end_rad });
+        Ok(())
+    }
+
+    /// When the last segment ends, s.
+    #[must_use]
+    pub fn duration_s(&self) -> f64 {
+        self.segments.last().map_or(0.0, |segment| segment.start_s + segment.duration_s)
+    }
+
+    /// When each segment begins, s.
+    pub fn starts_s(&self) -> impl Iterator<Item = f64> {
+        self.segments.iter().map(|segment| segment.start_s)
+    }
+
+    /// Refuses a trajectory that no vehicle flies: each segment is looked at in `LOOKS` places.
+    ///
+    /// # Errors
+    /// Which segment asks for how much, and where.
+    pub fn require_flyable(&self) -> Result<(), String> {
+        self.segments.iter().enumerate().try_for_each(|(index, segment)| {
+            let times = (0..=LOOKS).map(|look| segment.duration_s * f64::from(look) / f64::from(LOOKS));
+            times.map(|since_s| segment.at(segment.start_s + since_s)).try_for_each(|point| {
+                point.require_flyable().map_err(|reason| {
+                    format!("`segments`, entry {index} (the first is 0): it asks for {reason}")
+                })
+            })
+        })
+    }
+
+    /// The point at `time_s`, a function of the time alone.
+    #[must_use]
+    pub fn at(&self, time_s: f64) -> Point {
+        let next = self.segments.partition_point(|segment| segment.start_s <= time_s);
+        match next.checked_sub(1).map(|index| &self.segments[index]) {
+            Some(segment) if time_s < segment.start_s + segment.duration_s => segment.at(time_s),
+            _ => resting(self.end.position_W_m, self.end.yaw_rad),
+        }
     }
 }
 
-fn run() -> Result<(), BusError> {
-    let mut node = Node::join()?;
-    let output = node.output::<Reference>("reference")?;
-    let course = course(&node.parameters()?).map_err(|error| node.error(error))?;
-    node.run(|tick| tick.write(output, reference(&course.at(tick.time_ns() as f64 * 1e-9))))
+fn resting(position_W_m: Vector3<f64>, yaw_rad: f64) -> Point {
+    Point { path_W: at_rest(position_W_m), yaw_rad, yaw_rate_rad_s: 0.0 }
 }
 
-/// The message for a point.
-#[must_use]
-pub fn reference(point: &Point) -> Reference {
-    let [position, velocity, acceleration, jerk, snap] =
-        point.path_W.map(|vector| Vector3::from(<[f64; 3]>::from(vector)));
-    let (yaw, yaw_rate) = (point.yaw_rad, point.yaw_rate_rad_s);
-    Reference { position, velocity, acceleration, jerk, snap, yaw, yaw_rate, ..Default::default() }
+fn at_rest(position_W_m: Vector3<f64>) -> Path {
+    let mut path = Path::default();
+    path[0] = position_W_m;
+    path
 }
 
-/// The point in a message.
-#[must_use]
-pub fn point(message: &Reference) -> Point {
-    let Reference { position, velocity, acceleration, jerk, snap, .. } = *message;
-    let path_W = [position, velocity, acceleration, jerk, snap].map(|vector| <[f64; 3]>::from(vector).into());
-    Point { path_W, yaw_rad: message.yaw, yaw_rate_rad_s: message.yaw_rate }
+/// In how many places of a segment a trajectory is looked at before a run.
+const LOOKS: u32 = 200;
+
+/// What a reference may ask for at most, with its unit and why. Tuned, no source, a decade above what any vehicle does:
+/// a racing quadrotor reaches 100 m/s and 15 g; shock tests of electronics begin at 100 g.
+const ASKED_MAX: [(f64, &str); 3] = [
+    (1e6, "m from the world's origin; beyond 1000 km nanometres are lost in a double"),
+    (1e3, "m/s; no vehicle with rotors flies near the speed of sound"),
+    (1e3, "m/s^2; no vehicle that flies stands 100 g"),
+];
+
+impl From<&Point> for Reference {
+    fn from(point: &Point) -> Self {
+        let [position, velocity, acceleration, jerk, snap] =
+            point.path_W.map(|vector| <[f64; 3]>::from(vector).into());
+        let (yaw, yaw_rate) = (point.yaw_rad, point.yaw_rate_rad_s);
+        Self { position, velocity, acceleration, jerk, snap, yaw, yaw_rate, ..Self::default() }
+    }
+}
+
+impl From<&Reference> for Point {
+    fn from(message: &Reference) -> Self {
+        let Reference { position, velocity, acceleration, jerk, snap, .. } = *message;
+        let path_W =
+            [position, velocity, acceleration, jerk, snap].map(|vector| <[f64; 3]>::from(vector).into());
+        Self { path_W, yaw_rad: message.yaw, yaw_rate_rad_s: message.yaw_rate }
+    }
+}
+
+impl Point {
+    fn require_flyable(&self) -> Result<(), String> {
+        for (asked, (most, unit)) in self.path_W.iter().zip(ASKED_MAX) {
+            let length = asked.norm();
+            if length.is_nan() || length > most {
+                return Err(format!("{length:.4e} where at most {most:e} {unit}"));
+            }
+        }
+        let rate_rad_s = self.yaw_rate_rad_s;
+        let holds = self.path_W.iter().all(|asked| asked.iter().all(|number| number.is_finite()));
+        if holds && rate_rad_s.abs() <= YAW_RATE_MAX_RAD_S {
+            return Ok(());
+        }
+        Err(format!(
+            "a yaw rate of {rate_rad_s:.4e} rad/s, or derivatives that are no numbers; expected at most \
+             {YAW_RATE_MAX_RAD_S} rad/s"
+        ))
+    }
+}
+
+/// Faster than any vehicle turns about its vertical axis: 16 turns a second. Tuned, no source.
+const YAW_RATE_MAX_RAD_S: f64 = 100.0;
+
+impl Segment {
+    fn at(&self, time_s: f64) -> Point {
+        let since_s = time_s - self.start_s;
+        let path_W = match &self.way {
+            Way::Rest(position_W_m) => at_rest(*position_W_m),
+            Way::Curve(curve) => curve.at(since_s),
+            Way::Snap(snap) => snap.at(since_s),
+        };
+        let turn_rad = self.yaw_end_rad - self.yaw_start_rad;
+        let [part, part_rate, ..] = smooth_step(since_s / self.duration_s);
+        let yaw_rad = self.yaw_start_rad + turn_rad * part;
+        Point { path_W, yaw_rad, yaw_rate_rad_s: turn_rad * part_rate / self.duration_s }
+    }
+}
+
+impl Way {
+    fn duration_s(&self) -> f64 {
+        match self {
+            Self::Rest(_) => 0.0,
+            Self::Curve(curve) => curve.clock.duration_s,
+            Self::Snap(snap) => snap.duration_s(),
+        }
+    }
+
+    fn end(&self, duration_s: f64) -> Vector3<f64> {
+        match self {
+            Self::Rest(position_W_m) => *position_W_m,
+            // Laps end where they start; what rounding leaves would add up.
+            Self::Curve(curve) => curve.start_W_m,
+            Self::Snap(snap) => snap.at(duration_s)[0],
+        }
+    }
+}
+
+impl SegmentEntry {
+    fn way(&self, from_W_m: Vector3<f64>) -> Result<Way, String> {
+        match self {
+            Self::Hover(_) => Ok(Way::Rest(from_W_m)),
+            Self::Circle(circle) => circle.curve(from_W_m).map(Way::Curve),
+            Self::FigureEight(eight) => eight.curve(from_W_m).map(Way::Curve),
+            Self::MinimumSnap(snap) => snap.path(from_W_m).map(Way::Snap),
+        }
+    }
+
+    fn yaw_end_rad(&self, before_rad: f64) -> Result<f64, String> {
+        let stated = match self {
+            Self::Hover(HoverEntry { yaw_deg, .. })
+            | Self::Circle(CircleEntry { yaw_deg, .. })
+            | Self::FigureEight(FigureEightEntry { yaw_deg, .. })
+            | Self::MinimumSnap(MinimumSnapEntry { yaw_deg, .. }) => yaw_deg,
+        };
+        stated.map_or(Ok(before_rad), |deg| Ok(finite("yaw_deg", deg)?.to_radians()))
+    }
+}
+
+impl CircleEntry {
+    fn curve(&self, start_W_m: Vector3<f64>) -> Result<Curve, String> {
+        if self.radius_m == 0.0 {
+            return Err(wrong("radius_m", "a number other than 0", self.radius_m));
+        }
+        finite("radius_m", self.radius_m)?;
+        let shape = Shape::Circle { radius_m: self.radius_m };
+        Laps {
+            speed_m_s: self.speed_m_s,
+            laps: self.laps,
+            ramp_s: self.ramp_s,
+            direction_deg: self.direction_deg,
+        }
+        .of(shape, start_W_m)
+    }
+}
+
+impl FigureEightEntry {
+    fn curve(&self, start_W_m: Vector3<f64>) -> Result<Curve, String> {
+        let shape = Shape::FigureEight { half_length_m: positive("half_length_m", self.half_length_m)? };
+        Laps {
+            speed_m_s: self.speed_m_s,
+            laps: self.laps,
+            ramp_s: self.ramp_s,
+            direction_deg: self.direction_deg,
+        }
+        .of(shape, start_W_m)
+    }
+}
+
+/// What the entries of closed curves share.
+struct Laps {
+    speed_m_s: f64,
+    laps: u32,
+    ramp_s: f64,
+    direction_deg: f64,
+}
+
+impl Laps {
+    fn of(&self, shape: Shape, start_W_m: Vector3<f64>) -> Result<Curve, String> {
+        let rate_rad_s = positive("speed_m_s", self.speed_m_s)? / shape.speed_max_m_rad();
+        let ramp_s = positive("ramp_s", self.ramp_s)?;
+        let direction_rad = finite("direction_deg", self.direction_deg)?.to_radians();
+        let phase_rad = TAU * f64::from(self.laps);
+        let clock = PhaseClock::covering(phase_rad, rate_rad_s, ramp_s).ok_or_else(|| {
+            let expected =
+                format!("at least {}, in which the ramps find room", (rate_rad_s * ramp_s / TAU).ceil());
+            wrong("laps", &expected, self.laps)
+        })?;
+        Ok(Curve { shape, start_W_m, direction_rad, clock })
+    }
+}
+
+impl MinimumSnapEntry {
+    fn path(&self, from_W_m: Vector3<f64>) -> Result<MinimumSnap, String> {
+        let count = self.waypoints_m.len();
+        if !(1..=WAYPOINTS_MAX).contains(&count) {
+            return Err(wrong("waypoints_m", &format!("a list of 1 to {WAYPOINTS_MAX} points"), count));
+        }
+        let mut waypoints_W_m = vec![from_W_m];
+        for point in &self.waypoints_m {
+            point.iter().try_for_each(|&number| finite("waypoints_m", number).map(|_| ()))?;
+            waypoints_W_m.push(Vector3::from(*point));
+        }
+        let spans_s = self.spans_s(&waypoints_W_m)?;
+        MinimumSnap::new(&waypoints_W_m, &spans_s).ok_or_else(|| {
+            let expected = "of like size, so that the path's equations can be solved";
+            wrong("times_s", expected, format!("{spans_s:?}"))
+        })
+    }
+
+    fn spans_s(&self, waypoints_W_m: &[Vector3<f64>]) -> Result<Vec<f64>, String> {
+        match (&self.times_s, self.mean_speed_m_s) {
+            (Some(times_s), None) if times_s.len() == self.waypoints_m.len() => {
+                times_s.iter().map(|&time_s| positive("times_s", time_s)).collect()
+            }
+            (Some(times_s), None) => {
+                let expected = format!("one time for each of the {} waypoints", self.waypoints_m.len());
+                Err(wrong("times_s", &expected, times_s.len()))
+            }
+            (None, Some(speed_m_s)) => {
+                if let Some(index) = waypoints_W_m.windows(2).position(|ends| ends[0] == ends[1]) {
+                    let expected = "points that differ from the one before, or use times_s";
+                    return Err(wrong(
+                        "waypoints_m",
+                        expected,
+                        format!("point {index} where it was already"),
+                    ));
+                }
+                Ok(spans_at_mean_speed(waypoints_W_m, positive("mean_speed_m_s", speed_m_s)?))
+            }
+            _ => Err("give either `times_s` or `mean_speed_m_s`, and not both".to_owned()),
+        }
+    }
+}
+
+fn positive(key: &str, number: f64) -> Result<f64, String> {
+    let holds = number > 0.0 && number.is_finite();
+    if holds { Ok(number) } else { Err(wrong(key, "a finite number above 0", number)) }
+}
+
+fn finite(key: &str, number: f64) -> Result<f64, String> {
+    if number.is_finite() { Ok(number) } else { Err(wrong(key, "a finite number", number)) }
+}
+
+fn wrong(key: &str, expected: &str, found: impl std::fmt::Display) -> String {
+    format!("`{key}` must be {expected}, found {found}")
 }

@@ -1,8 +1,9 @@
 //! The velocity controller node: a velocity command to four motor commands.
 
-use crate::controller::{self, Airframe};
+use crate::airframe::ControlledVehicle;
+use crate::controller;
 use crate::rehearsal;
-use crate::velocity_law::{Course, LoopsGains, VelocityLaw, VelocityLoop};
+use crate::velocity_law::{LoopsGains, VelocityLaw, VelocityLoop, VelocitySetPoint};
 use bus::kind::{Inputs, NodeKind, PortSpec, read_parameters};
 use bus::messages::{AttitudeEstimate, ControlStatus, MotorCommand, Reference, StateEstimate};
 use bus::{BusError, Message, Node};
@@ -25,8 +26,8 @@ pub const KIND: NodeKind = NodeKind {
     check: |parameters, run| {
         let parameters: Parameters = read_parameters(parameters)?;
         parameters.check(run.has("reference"))?;
-        let (law, airframe) = build(&parameters, run.period_s())?;
-        rehearsal::check(&law, &airframe, run)
+        let (law, craft) = build(&parameters, run.period_s())?;
+        rehearsal::check(&law, &craft, run)
     },
     run,
 };
@@ -48,7 +49,7 @@ struct Parameters {
 }
 
 impl Parameters {
-    /// A course is given by a reference or by parameters, never by both.
+    /// The velocity is given by a reference or by parameters, never by both.
     fn check(&self, has_reference: bool) -> Result<(), String> {
         let given = [
             ("velocity_m_s", self.velocity_m_s.is_some()),
@@ -66,30 +67,30 @@ impl Parameters {
         }
     }
 
-    fn course(&self) -> Result<Option<Course>, String> {
+    fn constant(&self) -> Result<Option<VelocitySetPoint>, String> {
         let Some(altitude_m) = self.altitude_m else { return Ok(None) };
-        let course = Course {
+        let constant = VelocitySetPoint {
             velocity_m_s: self.velocity_m_s.unwrap_or_default(),
-            feed_forward_m_s2: [0.0; 2],
             altitude_m,
             yaw_rad: self.yaw_rad.unwrap_or_default(),
+            ..VelocitySetPoint::default()
         };
         controller::finite("altitude_m", altitude_m)?;
-        controller::finite("yaw_rad", course.yaw_rad)?;
-        course.velocity_m_s.iter().try_for_each(|speed| controller::finite("velocity_m_s", *speed))?;
-        Ok(Some(course))
+        controller::finite("yaw_rad", constant.yaw_rad)?;
+        constant.velocity_m_s.iter().try_for_each(|speed| controller::finite("velocity_m_s", *speed))?;
+        Ok(Some(constant))
     }
 }
 
-fn build(parameters: &Parameters, period_s: f64) -> Result<(VelocityLaw, Airframe), String> {
-    let airframe = Airframe::load(&parameters.vehicle)?;
+fn build(parameters: &Parameters, period_s: f64) -> Result<(VelocityLaw, ControlledVehicle), String> {
+    let craft = ControlledVehicle::load(&parameters.vehicle)?;
     let gains = LoopsGains::load(parameters.gains.as_deref()).map_err(|error| error.to_string())?;
-    let velocity = VelocityLoop::new(&gains, airframe.known(), period_s);
-    Ok((VelocityLaw { velocity, constant: parameters.course()? }, airframe))
+    let velocity = VelocityLoop::new(&gains, craft.hover_model(), period_s);
+    Ok((VelocityLaw { velocity, constant: parameters.constant()? }, craft))
 }
 
 fn run() -> Result<(), BusError> {
     let node = Node::join()?;
-    let (law, airframe) = build(&node.parameters()?, node.period_s()).map_err(|error| node.error(error))?;
-    controller::run(node, &law, &airframe.allocation, &airframe.vehicle)
+    let (law, craft) = build(&node.parameters()?, node.period_s()).map_err(|error| node.error(error))?;
+    controller::run(node, &law, &craft)
 }

@@ -8,12 +8,13 @@
 
 #![allow(non_snake_case, reason = "a trailing _W or _B names the frame a vector is written in")]
 
-use crate::allocation::Wrench;
+use crate::airframe::HoverModel;
+use crate::allocation::RotorWrench;
 use crate::cascade_gains::CascadeGains;
-use crate::cascade_law::CascadeLaw;
-use crate::controller::{Controller, ControllerState, Demand, Told};
+use crate::cascade_law::{CascadeLaw, CascadeState};
+use crate::control::{ControlInput, ControlOutput, HoverMotion};
 use crate::gains_file::{gain, limit, parse};
-use crate::pid_law::{Measurement, PidVehicle};
+use crate::law::{Law, Predecessor, Start};
 use crate::set_points::SetPoint;
 use std::path::Path;
 use vehicles::VehicleError;
@@ -91,17 +92,37 @@ impl LoopsGains {
     }
 }
 
-/// What is asked of the velocity loops at a step.
+/// What the velocity loops are asked to hold.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Course {
+pub struct VelocitySetPoint {
     /// Velocity along the heading's level x and y, m/s.
     pub velocity_m_s: [f64; 2],
     /// Acceleration that following it takes, m/s².
     pub feed_forward_m_s2: [f64; 2],
+    /// What the guidance's integrators ask for, m/s².
+    pub integral_m_s2: [f64; 2],
     /// Height, m.
     pub altitude_m: f64,
     /// Yaw, rad.
     pub yaw_rad: f64,
+}
+
+/// All that the velocity loops and the law around them remember.
+#[derive(Debug, Clone, Copy, PartialEq, Default, bus::Message)]
+#[repr(C)]
+#[message(type_name = "hummingbus_msgs/msg/VelocityState")]
+pub struct VelocityState {
+    /// The inner loops.
+    pub cascade: CascadeState,
+    /// Velocity behind the filter of the derivative, along the heading's level x and y.
+    #[field(unit = "m/s")]
+    pub velocity_filtered: [f64; 2],
+    /// Velocity that is asked for, along the heading's level x and y.
+    #[field(unit = "m/s")]
+    pub velocity_command: [f64; 2],
+    /// Altitude that is asked for.
+    #[field(unit = "m", frame = "world")]
+    pub altitude_command: f64,
 }
 
 /// The velocity loops around the cascade, at the cascade's period.
@@ -116,54 +137,48 @@ pub struct VelocityLoop {
 impl VelocityLoop {
     /// The loops with `gains` for `vehicle`.
     #[must_use]
-    pub fn new(gains: &LoopsGains, vehicle: PidVehicle, period_s: f64) -> Self {
+    pub fn new(gains: &LoopsGains, vehicle: HoverModel, period_s: f64) -> Self {
         let cascade = CascadeLaw { gains: gains.cascade, vehicle, period_s };
         Self { gains: gains.velocity, cascade }
     }
 
-    /// The demand for `course` at the measured `velocity_m_s` along the heading's axes.
+    /// The demand for `asked` at the measured `velocity_m_s` along the heading's axes.
     pub fn demand(
         &self,
-        memory: &mut ControllerState,
-        course: &Course,
+        state: &mut VelocityState,
+        last: &RotorWrench,
+        asked: &VelocitySetPoint,
         velocity_m_s: &[f64; 2],
-        measured: &Measurement,
-    ) -> Demand {
+        measured: &HoverMotion,
+    ) -> ControlOutput {
         let acceleration_m_s2 =
-            std::array::from_fn(|axis| self.acceleration_m_s2(memory, course, axis, velocity_m_s[axis]));
+            std::array::from_fn(|axis| self.acceleration_m_s2(state, asked, axis, velocity_m_s[axis]));
+        state.velocity_command = asked.velocity_m_s;
         let climb_max_m = self.gains.climb_max_m_s * self.cascade.period_s;
-        memory.altitude_hold += (course.altitude_m - memory.altitude_hold).clamp(-climb_max_m, climb_max_m);
+        state.altitude_command +=
+            (asked.altitude_m - state.altitude_command).clamp(-climb_max_m, climb_max_m);
         let (roll_rad, pitch_rad) = self.tilt_rad(&acceleration_m_s2);
         let set_point =
-            SetPoint { altitude_m: memory.altitude_hold, roll_rad, pitch_rad, yaw_rad: course.yaw_rad };
-        let demand = self.cascade.demand(memory, &set_point, measured);
-        Demand { velocity_m_s: course.velocity_m_s, ..demand }
+            SetPoint { altitude_m: state.altitude_command, roll_rad, pitch_rad, yaw_rad: asked.yaw_rad };
+        let output = self.cascade.demand(&mut state.cascade, last, &set_point, measured);
+        ControlOutput { velocity_m_s: asked.velocity_m_s, ..output }
     }
 
-    /// The memory of a vehicle that no law has flown yet.
+    /// The state of a vehicle that no law has flown yet.
     #[must_use]
-    pub fn begun(&self, velocity_m_s: &[f64; 2], measured: &Measurement) -> ControllerState {
-        ControllerState {
-            velocity_filtered: *velocity_m_s,
-            velocity_command: *velocity_m_s,
-            ..self.cascade.begun(measured)
-        }
+    pub fn initial(&self, velocity_m_s: &[f64; 2], measured: &HoverMotion) -> VelocityState {
+        at_speed(self.cascade.initial(measured), velocity_m_s, measured)
     }
 
-    /// The memory that goes on from another law's `wrench`, at the height and speed where the vehicle is.
+    /// The state that goes on from another law's, at the height and speed where the vehicle is.
     #[must_use]
-    pub fn taken_over(
+    pub fn continued<S>(
         &self,
-        memory: &ControllerState,
-        wrench: &Wrench,
+        from: &Predecessor<'_, S>,
         velocity_m_s: &[f64; 2],
-        measured: &Measurement,
-    ) -> ControllerState {
-        ControllerState {
-            velocity_filtered: *velocity_m_s,
-            velocity_command: *velocity_m_s,
-            ..self.cascade.taken_over(memory, wrench, measured.altitude_m, measured)
-        }
+        measured: &HoverMotion,
+    ) -> VelocityState {
+        at_speed(self.cascade.continued(from, measured.altitude_m, measured), velocity_m_s, measured)
     }
 
     /// `before` moved towards `asked`: at once where that is slower, no faster than the limit where it gathers
@@ -178,18 +193,18 @@ impl VelocityLoop {
 
     fn acceleration_m_s2(
         &self,
-        memory: &mut ControllerState,
-        course: &Course,
+        state: &mut VelocityState,
+        asked: &VelocitySetPoint,
         axis: usize,
         velocity_m_s: f64,
     ) -> f64 {
         let time_s = self.gains.derivative_filter_s + self.cascade.period_s;
-        let change_m_s2 = (velocity_m_s - memory.velocity_filtered[axis]) / time_s;
-        memory.velocity_filtered[axis] += change_m_s2 * self.cascade.period_s;
-        let asked_m_s2 = course.feed_forward_m_s2[axis]
-            + self.gains.proportional_1_s * (course.velocity_m_s[axis] - velocity_m_s)
+        let change_m_s2 = (velocity_m_s - state.velocity_filtered[axis]) / time_s;
+        state.velocity_filtered[axis] += change_m_s2 * self.cascade.period_s;
+        let asked_m_s2 = asked.feed_forward_m_s2[axis]
+            + self.gains.proportional_1_s * (asked.velocity_m_s[axis] - velocity_m_s)
             - self.gains.derivative * change_m_s2
-            + memory.position_integral[axis];
+            + asked.integral_m_s2[axis];
         let max_m_s2 = self.gains.acceleration_max_m_s2;
         asked_m_s2.clamp(-max_m_s2, max_m_s2)
     }
@@ -202,61 +217,74 @@ impl VelocityLoop {
     }
 }
 
+/// The loops' state where the vehicle is, at the speed that it has.
+fn at_speed(cascade: CascadeState, velocity_m_s: &[f64; 2], measured: &HoverMotion) -> VelocityState {
+    VelocityState {
+        cascade,
+        velocity_filtered: *velocity_m_s,
+        velocity_command: *velocity_m_s,
+        altitude_command: measured.altitude_m,
+    }
+}
+
 /// The controller `velocity`: a reference's velocity, or a constant one.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct VelocityLaw {
     /// The loops.
     pub velocity: VelocityLoop,
     /// What is flown where no reference is wired.
-    pub constant: Option<Course>,
+    pub constant: Option<VelocitySetPoint>,
 }
 
 impl VelocityLaw {
-    fn course(&self, told: &Told<'_>, measured: &Measurement) -> Course {
-        self.constant.unwrap_or_else(|| Course {
-            velocity_m_s: along_heading(
-                [told.reference.velocity.x, told.reference.velocity.y],
-                measured.yaw_rad,
-            ),
-            feed_forward_m_s2: [0.0; 2],
-            altitude_m: told.reference.position.z,
-            yaw_rad: told.reference.yaw,
+    fn asked(&self, input: &ControlInput<'_>, measured: &HoverMotion) -> VelocitySetPoint {
+        let reference = input.reference;
+        self.constant.unwrap_or_else(|| VelocitySetPoint {
+            velocity_m_s: along_heading([reference.velocity.x, reference.velocity.y], measured.yaw_rad),
+            altitude_m: reference.position.z,
+            yaw_rad: reference.yaw,
+            ..VelocitySetPoint::default()
         })
     }
 }
 
-impl Controller for VelocityLaw {
-    const LAW: u32 = 3;
+impl Law for VelocityLaw {
+    const NAME: &'static str = "velocity";
+    type State = VelocityState;
 
     fn rate_gain_1_s(&self) -> f64 {
         self.velocity.cascade.rate_gain_1_s()
     }
 
-    fn step(&self, memory: &mut ControllerState, told: &Told<'_>) -> Demand {
-        let measured = Measurement::from(told);
-        let mut course = self.course(told, &measured);
-        let gathered = |axis: usize| {
-            self.velocity.gathered_m_s(memory.velocity_command[axis], course.velocity_m_s[axis])
-        };
-        memory.velocity_command = [gathered(0), gathered(1)];
-        course.velocity_m_s = memory.velocity_command;
-        self.velocity.demand(memory, &course, &velocity_m_s(told, &measured), &measured)
+    fn start(&self, input: &ControlInput<'_>) -> Start<VelocityState> {
+        let measured = HoverMotion::of(&input.motion);
+        let state = self.velocity.initial(&velocity_m_s(input, &measured), &measured);
+        Start { state, wrench: RotorWrench::default() }
     }
 
-    fn fresh(&self, told: &Told<'_>) -> ControllerState {
-        let measured = Measurement::from(told);
-        self.velocity.begun(&velocity_m_s(told, &measured), &measured)
+    fn take_over(
+        &self,
+        from: &Predecessor<'_, VelocityState>,
+        input: &ControlInput<'_>,
+    ) -> Start<VelocityState> {
+        let measured = HoverMotion::of(&input.motion);
+        let state = self.velocity.continued(from, &velocity_m_s(input, &measured), &measured);
+        Start { state, wrench: from.wrench }
     }
 
-    fn tracking(&self, memory: &ControllerState, wrench: &Wrench, told: &Told<'_>) -> ControllerState {
-        let measured = Measurement::from(told);
-        self.velocity.taken_over(memory, wrench, &velocity_m_s(told, &measured), &measured)
+    fn step(&self, state: &mut VelocityState, last: &RotorWrench, input: &ControlInput<'_>) -> ControlOutput {
+        let measured = HoverMotion::of(&input.motion);
+        let mut asked = self.asked(input, &measured);
+        for (axis, asked_m_s) in asked.velocity_m_s.iter_mut().enumerate() {
+            *asked_m_s = self.velocity.gathered_m_s(state.velocity_command[axis], *asked_m_s);
+        }
+        self.velocity.demand(state, last, &asked, &velocity_m_s(input, &measured), &measured)
     }
 }
 
 /// The estimated velocity along the heading's level axes.
-fn velocity_m_s(told: &Told<'_>, measured: &Measurement) -> [f64; 2] {
-    let velocity_W_m_s = told.motion.velocity_W_m_s;
+fn velocity_m_s(input: &ControlInput<'_>, measured: &HoverMotion) -> [f64; 2] {
+    let velocity_W_m_s = input.motion.velocity_W_m_s;
     along_heading([velocity_W_m_s.x, velocity_W_m_s.y], measured.yaw_rad)
 }
 
@@ -272,7 +300,7 @@ mod tests {
     use nalgebra::Vector3;
 
     fn velocity() -> VelocityLoop {
-        let vehicle = PidVehicle {
+        let vehicle = HoverModel {
             mass_kg: 0.5,
             inertia_B_kg_m2: Vector3::new(5.0e-3, 6.0e-3, 8.0e-3),
             gravity_m_s2: 9.81,

@@ -1,6 +1,7 @@
 //! The wall-follow controller node: laps along the walls of a room.
 
-use crate::controller::{self, Airframe, finite, positive, positive_up_to};
+use crate::airframe::ControlledVehicle;
+use crate::controller::{self, finite, positive, positive_up_to};
 use crate::rehearsal;
 use crate::room::Room;
 use crate::velocity_law::VelocityLoop;
@@ -24,8 +25,8 @@ pub const KIND: NodeKind = NodeKind {
         PortSpec::optional("status", ControlStatus::SCHEMA),
     ],
     check: |parameters, run| {
-        let (law, airframe) = build(&read_parameters(parameters)?, run.period_s())?;
-        rehearsal::check(&law, &airframe, run)
+        let (law, craft) = build(&read_parameters(parameters)?, run.period_s())?;
+        rehearsal::check(&law, &craft, run)
     },
     run,
 };
@@ -138,14 +139,14 @@ impl Parameters {
     }
 }
 
-fn build(parameters: &Parameters, period_s: f64) -> Result<(WallFollowLaw, Airframe), String> {
+fn build(parameters: &Parameters, period_s: f64) -> Result<(WallFollowLaw, ControlledVehicle), String> {
     let mode = parameters.mode()?;
     parameters.check()?;
-    let airframe = Airframe::load(&parameters.vehicle)?;
+    let craft = ControlledVehicle::load(&parameters.vehicle)?;
     let gains = WallFollowGains::load(parameters.gains.as_deref()).map_err(|error| error.to_string())?;
     let usual_m_s = if mode == Mode::Varying { VARYING_SPEED_M_S } else { CONSTANT_SPEED_M_S };
     let law = WallFollowLaw {
-        velocity: VelocityLoop::new(&gains.loops, airframe.known(), period_s),
+        velocity: VelocityLoop::new(&gains.loops, craft.hover_model(), period_s),
         gains,
         mode,
         speed_m_s: parameters.speed_m_s.unwrap_or(usual_m_s),
@@ -155,11 +156,11 @@ fn build(parameters: &Parameters, period_s: f64) -> Result<(WallFollowLaw, Airfr
         start_state: parameters.start_state,
         shared: parameters.shared(mode)?,
     };
-    Ok((law, airframe))
+    Ok((law, craft))
 }
 
 fn run() -> Result<(), BusError> {
     let node = Node::join()?;
-    let (law, airframe) = build(&node.parameters()?, node.period_s()).map_err(|error| node.error(error))?;
-    controller::run(node, &law, &airframe.allocation, &airframe.vehicle)
+    let (law, craft) = build(&node.parameters()?, node.period_s()).map_err(|error| node.error(error))?;
+    controller::run(node, &law, &craft)
 }

@@ -16,13 +16,13 @@
 //! Where the room's size is known ([`Room`]), other vehicles in the beams are told from walls, and one that is
 //! ahead slows the vehicle down to a stop.
 
-use crate::allocation::Wrench;
+use crate::allocation::RotorWrench;
 use crate::approach::Approach;
-use crate::controller::{Controller, ControllerState, Demand, Told};
+use crate::control::{ControlInput, ControlOutput, HoverMotion};
 use crate::gains_file::{gain, limit, parse};
+use crate::law::{Law, Predecessor, Start};
 use crate::room::Room;
-use crate::velocity_law::{Course, LoopsGains, VelocityLoop};
-use crate::wall_stop_law::by_ranges;
+use crate::velocity_law::{LoopsGains, VelocityLoop, VelocitySetPoint, VelocityState};
 use bus::messages::WallEstimate;
 use std::path::Path;
 use vehicles::VehicleError;
@@ -169,60 +169,98 @@ impl Leg {
     }
 }
 
-impl Controller for WallFollowLaw {
-    const LAW: u32 = 5;
+/// All that the law remembers.
+#[derive(Debug, Clone, Copy, PartialEq, Default, bus::Message)]
+#[repr(C)]
+#[message(type_name = "hummingbus_msgs/msg/WallFollowState")]
+pub struct WallFollowState {
+    /// The loops inside.
+    pub velocity: VelocityState,
+    /// Acceleration that the integrators over the distance beside ask for, along the heading's level x and y.
+    #[field(unit = "m/s^2")]
+    pub integral: [f64; 2],
+    /// Distances from the walls at the heading's -x and -y, where the room is known.
+    #[field(unit = "m")]
+    pub room_position: [f64; 2],
+    /// The state of the guidance, 1 to 5.
+    #[field(unit = "1")]
+    pub phase: u32,
+    /// Laps flown.
+    #[field(unit = "1")]
+    pub laps: u32,
+}
+
+impl Law for WallFollowLaw {
+    const NAME: &'static str = "wall-follow";
+    type State = WallFollowState;
 
     fn rate_gain_1_s(&self) -> f64 {
         self.velocity.cascade.rate_gain_1_s()
     }
 
-    fn step(&self, memory: &mut ControllerState, told: &Told<'_>) -> Demand {
-        let distances_m = self.wall_distances_m(memory, told.walls);
-        self.enter_state(memory, told.time_ns, &distances_m);
-        let leg = Leg::of(memory.state);
-        let course = match self.mode {
-            Mode::Varying => self.varying(memory, leg, &distances_m),
-            Mode::Constant => self.constant(memory, leg, &distances_m, told.walls),
-        };
-        memory.velocity_command = course.velocity_m_s;
-        self.velocity.demand(memory, &course, &told.walls.velocity, &by_ranges(told))
+    fn start(&self, input: &ControlInput<'_>) -> Start<WallFollowState> {
+        let velocity = self.velocity.initial(&input.walls.velocity, &HoverMotion::by_ranges(input));
+        let start_m = self.shared.and_then(|shared| shared.start_m);
+        Start { state: self.initial(velocity, start_m, input.walls), wrench: RotorWrench::default() }
     }
 
-    fn fresh(&self, told: &Told<'_>) -> ControllerState {
-        self.begun(self.velocity.begun(&told.walls.velocity, &by_ranges(told)), told)
-    }
-
-    fn tracking(&self, memory: &ControllerState, wrench: &Wrench, told: &Told<'_>) -> ControllerState {
-        let measured = by_ranges(told);
-        let taken_over = self.velocity.taken_over(memory, wrench, &told.walls.velocity, &measured);
+    fn take_over(
+        &self,
+        from: &Predecessor<'_, WallFollowState>,
+        input: &ControlInput<'_>,
+    ) -> Start<WallFollowState> {
+        let measured = HoverMotion::by_ranges(input);
+        let velocity = self.velocity.continued(from, &input.walls.velocity, &measured);
         // A successor in flight goes on from where it is, not from where the run began.
-        let in_flight =
-            Self { shared: self.shared.map(|shared| Shared { start_m: None, ..shared }), ..*self };
-        in_flight.begun(taken_over, told)
+        Start { state: self.initial(velocity, None, input.walls), wrench: from.wrench }
+    }
+
+    fn step(
+        &self,
+        state: &mut WallFollowState,
+        last: &RotorWrench,
+        input: &ControlInput<'_>,
+    ) -> ControlOutput {
+        let distances_m = self.wall_distances_m(state, input.walls);
+        self.enter_phase(state, &distances_m);
+        let leg = Leg::of(state.phase);
+        let asked = match self.mode {
+            Mode::Varying => self.varying(state, leg, &distances_m),
+            Mode::Constant => self.constant(state, leg, &distances_m, input.walls),
+        };
+        let measured = HoverMotion::by_ranges(input);
+        let output =
+            self.velocity.demand(&mut state.velocity, last, &asked, &input.walls.velocity, &measured);
+        ControlOutput { phase: state.phase, laps: state.laps, ..output }
     }
 }
 
 impl WallFollowLaw {
-    fn begun(&self, memory: ControllerState, told: &Told<'_>) -> ControllerState {
-        let place_m = |shared: Shared| shared.start_m.unwrap_or_else(|| shared.room.begun_m(told.walls));
-        ControllerState {
-            state: self.start_state,
-            since_ns: told.time_ns,
+    fn initial(
+        &self,
+        velocity: VelocityState,
+        start_m: Option<[f64; 2]>,
+        walls: &WallEstimate,
+    ) -> WallFollowState {
+        let place_m = |shared: Shared| start_m.unwrap_or_else(|| shared.room.begun_m(walls));
+        WallFollowState {
+            velocity,
             room_position: self.shared.map_or([0.0; 2], place_m),
-            ..memory
+            phase: self.start_state,
+            ..WallFollowState::default()
         }
     }
 
     /// Distances of the walls at +x, −x, +y, −y: by the room's size where that is known, else what the beams see.
-    fn wall_distances_m(&self, memory: &mut ControllerState, walls: &WallEstimate) -> [f64; 4] {
+    fn wall_distances_m(&self, state: &mut WallFollowState, walls: &WallEstimate) -> [f64; 4] {
         let Some(Shared { room, .. }) = self.shared else { return walls.distance };
         let period_s = self.velocity.cascade.period_s;
-        memory.room_position = room.moved_m(&memory.room_position, walls, period_s);
-        room.distances_m(&memory.room_position)
+        state.room_position = room.moved_m(&state.room_position, walls, period_s);
+        room.distances_m(&state.room_position)
     }
 
-    fn enter_state(&self, memory: &mut ControllerState, time_ns: u64, distances_m: &[f64; 4]) {
-        let ahead = Leg::of(memory.state).ahead;
+    fn enter_phase(&self, state: &mut WallFollowState, distances_m: &[f64; 4]) {
+        let ahead = Leg::of(state.phase).ahead;
         let corner_m = match self.mode {
             Mode::Varying => self.distance_m,
             Mode::Constant => self.distance_m + self.gains.across.distance_m(self.speed_m_s),
@@ -230,29 +268,28 @@ impl WallFollowLaw {
         if distances_m[ahead.0] > corner_m {
             return;
         }
-        let state = if memory.state == 5 { 2 } else { memory.state + 1 };
-        memory.laps += u32::from(memory.state == 5);
-        (memory.state, memory.since_ns) = (state, time_ns);
+        state.laps += u32::from(state.phase == 5);
+        state.phase = if state.phase == 5 { 2 } else { state.phase + 1 };
     }
 
     /// Ahead by the distance still to go, nothing across.
-    fn varying(&self, memory: &ControllerState, leg: Leg, distances_m: &[f64; 4]) -> Course {
+    fn varying(&self, state: &WallFollowState, leg: Leg, distances_m: &[f64; 4]) -> VelocitySetPoint {
         let to_go_m = distances_m[leg.ahead.0] - self.distance_m;
         let wanted_m_s =
             (self.gains.varying_slope_1_s * to_go_m).max(self.gains.exit_speed_m_s).min(self.speed_m_s);
         let mut velocity_m_s = [0.0; 2];
-        velocity_m_s[leg.ahead.axis()] = self.gathered_m_s(memory, leg.ahead, wanted_m_s);
-        self.course(velocity_m_s, [0.0; 2])
+        velocity_m_s[leg.ahead.axis()] = self.gathered_m_s(state, leg.ahead, wanted_m_s);
+        self.asked(state, velocity_m_s, [0.0; 2])
     }
 
     /// Along the wall beside at a constant distance and speed.
     fn constant(
         &self,
-        memory: &mut ControllerState,
+        state: &mut WallFollowState,
         leg: Leg,
         distances_m: &[f64; 4],
         walls: &WallEstimate,
-    ) -> Course {
+    ) -> VelocitySetPoint {
         let (mut velocity_m_s, mut feed_forward_m_s2) = ([0.0; 2], [0.0; 2]);
         if let Some(beside) = leg.beside {
             let error_m = distances_m[beside.0] - self.distance_m;
@@ -261,22 +298,22 @@ impl WallFollowLaw {
             let bent_m_s2 = self.gains.across.acceleration_m_s2(error_m, closing_m_s);
             velocity_m_s[beside.axis()] = beside.sign() * wanted_m_s;
             feed_forward_m_s2[beside.axis()] = beside.sign() * bent_m_s2;
-            self.integrate(memory, beside, error_m);
+            self.integrate(state, beside, error_m);
         }
         let across_m_s = velocity_m_s[leg.across()];
         let left_m_s = (self.speed_m_s * self.speed_m_s - across_m_s * across_m_s).max(0.0).sqrt();
         let wanted_m_s = left_m_s * self.free_part(distances_m[leg.ahead.0], walls.distance[leg.ahead.0]);
-        velocity_m_s[leg.ahead.axis()] = self.gathered_m_s(memory, leg.ahead, wanted_m_s);
-        self.course(velocity_m_s, feed_forward_m_s2)
+        velocity_m_s[leg.ahead.axis()] = self.gathered_m_s(state, leg.ahead, wanted_m_s);
+        self.asked(state, velocity_m_s, feed_forward_m_s2)
     }
 
     /// Only small errors are integrated: in a corner the distance is on its way.
-    fn integrate(&self, memory: &mut ControllerState, beside: Beam, error_m: f64) {
+    fn integrate(&self, state: &mut WallFollowState, beside: Beam, error_m: f64) {
         let on_its_way_m = 0.5 * self.gains.across.distance_m(self.speed_m_s);
         if error_m.abs() < on_its_way_m {
             let step_m_s2 = self.gains.integral_1_s3 * error_m * self.velocity.cascade.period_s;
             let max_m_s2 = self.gains.integral_max_m_s2;
-            let integral = &mut memory.position_integral[beside.axis()];
+            let integral = &mut state.integral[beside.axis()];
             *integral = (*integral + beside.sign() * step_m_s2).clamp(-max_m_s2, max_m_s2);
         }
     }
@@ -291,13 +328,20 @@ impl WallFollowLaw {
         }
     }
 
-    fn gathered_m_s(&self, memory: &ControllerState, ahead: Beam, wanted_m_s: f64) -> f64 {
-        let before_m_s = memory.velocity_command[ahead.axis()];
+    fn gathered_m_s(&self, state: &WallFollowState, ahead: Beam, wanted_m_s: f64) -> f64 {
+        let before_m_s = state.velocity.velocity_command[ahead.axis()];
         self.velocity.gathered_m_s(before_m_s, ahead.sign() * wanted_m_s)
     }
 
-    fn course(&self, velocity_m_s: [f64; 2], feed_forward_m_s2: [f64; 2]) -> Course {
-        Course { velocity_m_s, feed_forward_m_s2, altitude_m: self.altitude_m, yaw_rad: self.heading_rad }
+    fn asked(
+        &self,
+        state: &WallFollowState,
+        velocity_m_s: [f64; 2],
+        feed_forward_m_s2: [f64; 2],
+    ) -> VelocitySetPoint {
+        let (altitude_m, yaw_rad) = (self.altitude_m, self.heading_rad);
+        let integral_m_s2 = state.integral;
+        VelocitySetPoint { velocity_m_s, feed_forward_m_s2, integral_m_s2, altitude_m, yaw_rad }
     }
 }
 

@@ -1,6 +1,7 @@
 //! The wall-stop controller node: flies along the heading and stops before the wall ahead.
 
-use crate::controller::{self, Airframe, finite, positive, positive_up_to};
+use crate::airframe::ControlledVehicle;
+use crate::controller::{self, finite, positive, positive_up_to};
 use crate::rehearsal;
 use crate::velocity_law::VelocityLoop;
 use crate::wall_stop_law::{WallStopGains, WallStopLaw};
@@ -23,8 +24,8 @@ pub const KIND: NodeKind = NodeKind {
         PortSpec::optional("status", ControlStatus::SCHEMA),
     ],
     check: |parameters, run| {
-        let (law, airframe) = build(&read_parameters(parameters)?, run.period_s())?;
-        rehearsal::check(&law, &airframe, run)
+        let (law, craft) = build(&read_parameters(parameters)?, run.period_s())?;
+        rehearsal::check(&law, &craft, run)
     },
     run,
 };
@@ -66,26 +67,26 @@ const DISTANCE_MAX_M: f64 = 5.0;
 /// keeps the speed below this in any case.
 const SPEED_MAX_M_S: f64 = 3.0;
 
-fn build(parameters: &Parameters, period_s: f64) -> Result<(WallStopLaw, Airframe), String> {
+fn build(parameters: &Parameters, period_s: f64) -> Result<(WallStopLaw, ControlledVehicle), String> {
     positive("altitude_m", parameters.altitude_m, "m")?;
     finite("heading_rad", parameters.heading_rad)?;
     positive_up_to("cruise_speed_m_s", parameters.cruise_speed_m_s, SPEED_MAX_M_S, "m/s")?;
     positive_up_to("distance_m", parameters.distance_m, DISTANCE_MAX_M, "m")?;
-    let airframe = Airframe::load(&parameters.vehicle)?;
+    let craft = ControlledVehicle::load(&parameters.vehicle)?;
     let gains = WallStopGains::load(parameters.gains.as_deref()).map_err(|error| error.to_string())?;
     let law = WallStopLaw {
-        velocity: VelocityLoop::new(&gains.loops, airframe.known(), period_s),
+        velocity: VelocityLoop::new(&gains.loops, craft.hover_model(), period_s),
         gains,
         cruise_speed_m_s: parameters.cruise_speed_m_s,
         distance_m: parameters.distance_m,
         altitude_m: parameters.altitude_m,
         heading_rad: parameters.heading_rad,
     };
-    Ok((law, airframe))
+    Ok((law, craft))
 }
 
 fn run() -> Result<(), BusError> {
     let node = Node::join()?;
-    let (law, airframe) = build(&node.parameters()?, node.period_s()).map_err(|error| node.error(error))?;
-    controller::run(node, &law, &airframe.allocation, &airframe.vehicle)
+    let (law, craft) = build(&node.parameters()?, node.period_s()).map_err(|error| node.error(error))?;
+    controller::run(node, &law, &craft)
 }

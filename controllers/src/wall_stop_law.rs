@@ -7,12 +7,12 @@
 //!
 //! It knows the wall by the range finders' estimate alone, and its height by the beam downwards.
 
-use crate::allocation::Wrench;
+use crate::allocation::RotorWrench;
 use crate::approach::Approach;
-use crate::controller::{Controller, ControllerState, Demand, Told};
+use crate::control::{ControlInput, ControlOutput, HoverMotion};
 use crate::gains_file::{gain, limit, parse};
-use crate::pid_law::Measurement;
-use crate::velocity_law::{Course, LoopsGains, VelocityLoop};
+use crate::law::{Law, Predecessor, Start};
+use crate::velocity_law::{LoopsGains, VelocityLoop, VelocitySetPoint, VelocityState};
 use std::path::Path;
 use vehicles::VehicleError;
 use vehicles::reader::Section;
@@ -103,84 +103,99 @@ pub struct WallStopLaw {
     pub heading_rad: f64,
 }
 
-impl Controller for WallStopLaw {
-    const LAW: u32 = 4;
+/// All that the law remembers.
+#[derive(Debug, Clone, Copy, PartialEq, Default, bus::Message)]
+#[repr(C)]
+#[message(type_name = "hummingbus_msgs/msg/WallStopState")]
+pub struct WallStopState {
+    /// The loops inside.
+    pub velocity: VelocityState,
+    /// Acceleration that the integrator over the distance asks for.
+    #[field(unit = "m/s^2")]
+    pub integral: f64,
+    /// [`CRUISING`], [`BRAKING`] or [`HOLDING`].
+    #[field(unit = "1")]
+    pub phase: u32,
+    /// Zero.
+    #[field(unit = "")]
+    pub pad0: u32,
+}
+
+impl Law for WallStopLaw {
+    const NAME: &'static str = "wall-stop";
+    type State = WallStopState;
 
     fn rate_gain_1_s(&self) -> f64 {
         self.velocity.cascade.rate_gain_1_s()
     }
 
-    fn step(&self, memory: &mut ControllerState, told: &Told<'_>) -> Demand {
-        let measured = by_ranges(told);
-        let to_go_m = told.walls.distance[0] - self.distance_m;
-        let speed_m_s = told.walls.velocity[0];
-        self.enter_state(memory, told.time_ns, to_go_m, speed_m_s);
-        self.integrate(memory, to_go_m);
-        let course = self.course(memory, to_go_m, speed_m_s);
-        memory.velocity_command = course.velocity_m_s;
-        self.velocity.demand(memory, &course, &told.walls.velocity, &measured)
+    fn start(&self, input: &ControlInput<'_>) -> Start<WallStopState> {
+        let velocity = self.velocity.initial(&input.walls.velocity, &HoverMotion::by_ranges(input));
+        Start { state: WallStopState { velocity, ..Default::default() }, wrench: RotorWrench::default() }
     }
 
-    fn fresh(&self, told: &Told<'_>) -> ControllerState {
-        self.velocity.begun(&told.walls.velocity, &by_ranges(told))
+    fn take_over(
+        &self,
+        from: &Predecessor<'_, WallStopState>,
+        input: &ControlInput<'_>,
+    ) -> Start<WallStopState> {
+        let measured = HoverMotion::by_ranges(input);
+        let velocity = self.velocity.continued(from, &input.walls.velocity, &measured);
+        Start { state: WallStopState { velocity, ..Default::default() }, wrench: from.wrench }
     }
 
-    fn tracking(&self, memory: &ControllerState, wrench: &Wrench, told: &Told<'_>) -> ControllerState {
-        self.velocity.taken_over(memory, wrench, &told.walls.velocity, &by_ranges(told))
+    fn step(&self, state: &mut WallStopState, last: &RotorWrench, input: &ControlInput<'_>) -> ControlOutput {
+        let to_go_m = input.walls.distance[0] - self.distance_m;
+        let speed_m_s = input.walls.velocity[0];
+        state.phase = self.phase(state.phase, to_go_m, speed_m_s);
+        self.integrate(state, to_go_m);
+        let asked = self.asked(state, to_go_m, speed_m_s);
+        let measured = HoverMotion::by_ranges(input);
+        let output =
+            self.velocity.demand(&mut state.velocity, last, &asked, &input.walls.velocity, &measured);
+        ControlOutput { phase: state.phase, ..output }
     }
 }
 
 impl WallStopLaw {
-    fn enter_state(&self, memory: &mut ControllerState, time_ns: u64, to_go_m: f64, speed_m_s: f64) {
+    fn phase(&self, before: u32, to_go_m: f64, speed_m_s: f64) -> u32 {
         let (near_m, slow_m_s) = (self.gains.holding_distance_m, self.gains.holding_speed_m_s);
         let has_left = to_go_m.abs() > HOLDING_LEFT_FACTOR * near_m;
         let has_arrived = to_go_m.abs() < near_m && speed_m_s.abs() < slow_m_s;
-        let state = if has_arrived || (memory.state == HOLDING && !has_left) {
+        if has_arrived || (before == HOLDING && !has_left) {
             HOLDING
         } else if self.gains.approach.speed_m_s(to_go_m) < self.cruise_speed_m_s {
             BRAKING
         } else {
             CRUISING
-        };
-        if state != memory.state {
-            (memory.state, memory.since_ns) = (state, time_ns);
         }
     }
 
     /// Only a vehicle that holds integrates: while it approaches, the distance still to go is no error.
-    fn integrate(&self, memory: &mut ControllerState, to_go_m: f64) {
-        if memory.state == HOLDING {
+    fn integrate(&self, state: &mut WallStopState, to_go_m: f64) {
+        if state.phase == HOLDING {
             let step_m_s2 = self.gains.integral_1_s3 * to_go_m * self.velocity.cascade.period_s;
             let max_m_s2 = self.gains.integral_max_m_s2;
-            memory.position_integral[0] =
-                (memory.position_integral[0] + step_m_s2).clamp(-max_m_s2, max_m_s2);
+            state.integral = (state.integral + step_m_s2).clamp(-max_m_s2, max_m_s2);
         }
     }
 
-    fn course(&self, memory: &ControllerState, to_go_m: f64, speed_m_s: f64) -> Course {
+    fn asked(&self, state: &WallStopState, to_go_m: f64, speed_m_s: f64) -> VelocitySetPoint {
         let near_m_s = self.gains.approach.speed_m_s(to_go_m);
         let wanted_m_s = near_m_s.clamp(-self.gains.retreat_max_m_s, self.cruise_speed_m_s);
-        let command_m_s = self.velocity.gathered_m_s(memory.velocity_command[0], wanted_m_s);
+        let command_m_s = self.velocity.gathered_m_s(state.velocity.velocity_command[0], wanted_m_s);
         // The curve's acceleration is that of a vehicle on the curve, not of one kept back by a limit. One that
         // holds is better off without: it would be moved by the velocity's error once more.
-        let is_on_curve = command_m_s == near_m_s && memory.state != HOLDING;
+        let is_on_curve = command_m_s == near_m_s && state.phase != HOLDING;
         let braking_m_s2 =
             if is_on_curve { self.gains.approach.acceleration_m_s2(to_go_m, speed_m_s) } else { 0.0 };
-        Course {
+        VelocitySetPoint {
             velocity_m_s: [command_m_s, 0.0],
             feed_forward_m_s2: [braking_m_s2, 0.0],
+            integral_m_s2: [state.integral, 0.0],
             altitude_m: self.altitude_m,
             yaw_rad: self.heading_rad,
         }
-    }
-}
-
-/// What is measured, height and climb by the beam downwards.
-pub(crate) fn by_ranges(told: &Told<'_>) -> Measurement {
-    Measurement {
-        altitude_m: told.walls.height,
-        climb_rate_m_s: told.walls.climb_rate,
-        ..Measurement::from(told)
     }
 }
 

@@ -5,19 +5,19 @@ mod flight;
 
 use controllers::cascade_gains::CascadeGains;
 use controllers::cascade_law::CascadeLaw;
-use controllers::velocity_law::{Course, LoopsGains, VelocityLaw, VelocityLoop};
-use flight::{Loop, NOISY, PERIOD_S, Senses, airframe, vehicle};
+use controllers::velocity_law::{LoopsGains, VelocityLaw, VelocityLoop, VelocitySetPoint};
+use flight::{Loop, NOISY, PERIOD_S, Senses, believed, vehicle};
 use nalgebra::Vector3;
 use vehicles::{MotorModel, Vehicle};
 
 const NO_WALLS: flight::Walls = [f64::INFINITY; 4];
 
 fn cascade() -> CascadeLaw {
-    CascadeLaw { gains: CascadeGains::default(), vehicle: airframe().known(), period_s: PERIOD_S }
+    CascadeLaw { gains: CascadeGains::default(), vehicle: believed().hover_model(), period_s: PERIOD_S }
 }
 
-fn velocity(constant: Option<Course>) -> VelocityLaw {
-    let velocity = VelocityLoop::new(&LoopsGains::default(), airframe().known(), PERIOD_S);
+fn velocity(constant: Option<VelocitySetPoint>) -> VelocityLaw {
+    let velocity = VelocityLoop::new(&LoopsGains::default(), believed().hover_model(), PERIOD_S);
     VelocityLaw { velocity, constant }
 }
 
@@ -86,10 +86,15 @@ fn the_cascade_flies_vehicles_that_differ_from_their_file() {
 #[test]
 fn a_constant_velocity_is_reached_along_both_axes_at_any_heading() {
     for yaw_rad in [0.0, 1.0] {
-        let course = Course { velocity_m_s: [1.0, -0.5], altitude_m: 1.2, yaw_rad, ..Course::default() };
+        let held = VelocitySetPoint {
+            velocity_m_s: [1.0, -0.5],
+            altitude_m: 1.2,
+            yaw_rad,
+            ..VelocitySetPoint::default()
+        };
         for seed in 1..=3 {
             let mut flight = Loop::new(Vector3::z(), Senses::new(seed, NO_WALLS, NOISY));
-            fly(&mut flight, &velocity(Some(course)));
+            fly(&mut flight, &velocity(Some(held)));
             let heading = nalgebra::Rotation2::new(flight.state.body.attitude_WB.euler_angles().2);
             let along_m_s = heading.inverse() * flight.state.body.velocity_W_m_s.xy();
             println!("yaw {yaw_rad}, seed {seed}: {along_m_s:?}, height {}", flight.position().z);

@@ -1,9 +1,10 @@
 //! The thesis's first scenario (Figs 5.1–5.5) in a closed loop: hover from 1.0 to 1.5 m at 2 s, then a
 //! roll doublet of ±10° at 6 s, with a noisy IMU and the complementary filter between plant and law.
 
-use controllers::allocation::{Allocation, RotorSet};
+use controllers::airframe::ControlledVehicle;
+use controllers::control::{HoverMotion, Integrals};
 use controllers::pid_gains::PidGains;
-use controllers::pid_law::{Measurement, PidLaw, PidState, PidVehicle};
+use controllers::pid_law::PidLaw;
 use controllers::set_points::{Schedule, SetPoint, SetPointEntry};
 use nalgebra::Vector3;
 use plant::{NewtonEuler, RigidBody, State};
@@ -70,8 +71,8 @@ fn imu_truth(plant: &NewtonEuler, state: &State) -> ImuReading {
     }
 }
 
-fn measurement(body: &RigidBody, estimate: &AttitudeEstimate) -> Measurement {
-    Measurement {
+fn measurement(body: &RigidBody, estimate: &AttitudeEstimate) -> HoverMotion {
+    HoverMotion {
         altitude_m: body.position_W_m.z,
         climb_rate_m_s: body.velocity_W_m_s.z,
         roll_rad: estimate.roll_rad,
@@ -85,24 +86,23 @@ fn measurement(body: &RigidBody, estimate: &AttitudeEstimate) -> Measurement {
 /// estimate k, law k, and its command acts until k+1.
 fn fly(flown: Vehicle, setup: &Setup) -> Flight {
     let (believed, schedule) = (vehicle(), schedule());
-    let allocation = Allocation::new(&RotorSet::from(&believed)).unwrap();
-    let pid_vehicle = PidVehicle::new(&believed, &allocation);
-    let law = PidLaw { gains: setup.gains, vehicle: pid_vehicle, period_s: PERIOD_S };
+    let believed = ControlledVehicle::new(believed).unwrap();
+    let law = PidLaw { gains: setup.gains, vehicle: believed.hover_model(), period_s: PERIOD_S };
     let imu = ImuModel::new(setup.imu, 1.0 / PERIOD_S).unwrap();
     let filter = Complementary::new(setup.filter, PERIOD_S).unwrap();
     let plant = NewtonEuler::new(flown, 1);
 
     let mut state = plant.start(RigidBody::level_at(Vector3::z()), plant.vehicle().hover_command());
     let (mut imu_state, mut filter_state) = (imu.initial_state(setup.seed, "imu"), Default::default());
-    let mut law_state = PidState::default();
+    let mut law_state = Integrals::default();
     let mut flight = Flight::default();
     for tick in 0..END_TICK {
         flight.log(&state.body);
         let reading = imu.read(&mut imu_state, &imu_truth(&plant, &state));
         let estimate = filter.step(&mut filter_state, &reading);
-        let wrench = law.step(&mut law_state, &schedule.at(tick), &measurement(&state.body, &estimate));
-        let speeds_rad_s = allocation.allocate(&wrench).speeds_rad_s;
-        plant.step(&mut state, &speeds_rad_s.map(|speed| believed.command.command(speed)), PERIOD_S);
+        let wrench = law.wrench(&mut law_state, &schedule.at(tick), &measurement(&state.body, &estimate));
+        let speeds_rad_s = believed.allocation.allocate(&wrench).speeds_rad_s;
+        plant.step(&mut state, &speeds_rad_s.map(|speed| believed.vehicle.command.command(speed)), PERIOD_S);
     }
     flight
 }

@@ -9,7 +9,7 @@ use controllers::cascade_gains::CascadeGains;
 use controllers::cascade_law::CascadeLaw;
 use controllers::set_points::SetPoint;
 use controllers::sticks::Sticks;
-use flight::{Loop, NOISY, PERIOD_S, Senses, airframe};
+use flight::{Loop, NOISY, PERIOD_S, Senses, believed};
 use nalgebra::Vector3;
 use std::path::Path;
 
@@ -55,7 +55,8 @@ fn a_recording_moves_like_a_hand_within_the_sticks_range_and_rests_at_its_ends()
 /// Free flight: the angle follows the stick with the loop's lag.
 #[test]
 fn the_cascade_follows_the_recordings() {
-    let law = CascadeLaw { gains: CascadeGains::default(), vehicle: airframe().known(), period_s: PERIOD_S };
+    let law =
+        CascadeLaw { gains: CascadeGains::default(), vehicle: believed().hover_model(), period_s: PERIOD_S };
     for (channel, ..) in STORED {
         let sticks = stored(channel);
         let no_walls = [f64::INFINITY; 4];

@@ -3,13 +3,13 @@
 
 mod common;
 
-use common::{Craft, Loop, PERIOD_S, airframe, course, vehicle};
-use controllers::allocation::Wrench;
+use common::{Craft, Loop, PERIOD_S, believed, trajectory, vehicle};
+use controllers::allocation::RotorWrench;
 use controllers::cascade_gains::CascadeGains;
 use controllers::cascade_law::CascadeLaw;
-use controllers::controller::Controller;
 use controllers::geometric_gains::GeometricGains;
 use controllers::geometric_law::GeometricLaw;
+use controllers::law::Law;
 use controllers::lqr_gains::LqrGains;
 use controllers::lqr_law::LqrLaw;
 use controllers::pid_gains::PidGains;
@@ -26,17 +26,17 @@ const SLALOM: &str = r#"{ kind = "hover", duration_s = 1.0 },
       waypoints_m = [[1.5, 1.0, 1.5], [3.0, -1.0, 2.0], [4.5, 1.0, 1.5], [6.0, 0.0, 1.0]] }"#;
 
 fn geometric() -> GeometricLaw {
-    GeometricLaw::new(GeometricGains::load(None).unwrap(), &airframe(), PERIOD_S)
+    GeometricLaw::new(GeometricGains::load(None).unwrap(), &believed(), PERIOD_S)
 }
 
 fn lqr() -> LqrLaw {
-    LqrLaw::new(LqrGains::load(None).unwrap(), &airframe(), PERIOD_S).unwrap()
+    LqrLaw::new(LqrGains::load(None).unwrap(), &believed(), PERIOD_S).unwrap()
 }
 
-/// Root mean square and greatest distance from the course, in m, until 2 s behind its end.
-fn distances<C: Controller>(name: &str, law: &C, segments: &str, craft: Craft) -> (f64, f64) {
-    let course = course(segments);
-    let (rms_m, greatest_m) = Loop::new(craft).fly(law, &course, 0.0, course.duration_s() + 2.0);
+/// Root mean square and greatest distance from the trajectory, in m, until 2 s behind its end.
+fn distances<L: Law>(name: &str, law: &L, segments: &str, craft: Craft) -> (f64, f64) {
+    let trajectory = trajectory(segments);
+    let (rms_m, greatest_m) = Loop::new(craft).fly(law, &trajectory, 0.0, trajectory.duration_s() + 2.0);
     println!("{name}: {rms_m:.4} m RMS, {greatest_m:.4} m at most");
     (rms_m, greatest_m)
 }
@@ -60,7 +60,7 @@ fn geometric_follows_without_drag_or_noise_as_its_feed_forward_says() {
 #[test]
 fn geometric_with_the_drag_fed_forward_follows_closer() {
     let gains = GeometricGains { drag_1_s: 0.28, ..GeometricGains::load(None).unwrap() };
-    let knowing = GeometricLaw::new(gains, &airframe(), PERIOD_S);
+    let knowing = GeometricLaw::new(gains, &believed(), PERIOD_S);
     let (without_m, _) = distances("unknown drag", &geometric(), FIGURE_EIGHT, Craft::dragged(0));
     let (with_m, _) = distances("known drag", &knowing, FIGURE_EIGHT, Craft::dragged(0));
     assert!(with_m < 0.5 * without_m);
@@ -98,7 +98,7 @@ fn geometric_flies_vehicles_that_differ_from_their_file() {
 }
 
 /// The greatest distance from 1 m above the origin in 10 s, in m.
-fn hover<C: Controller>(name: &str, law: &C, seed: u64) -> f64 {
+fn hover<L: Law>(name: &str, law: &L, seed: u64) -> f64 {
     distances(name, law, r#"{ kind = "hover", duration_s = 8.0 }"#, Craft::dragged(seed)).1
 }
 
@@ -110,13 +110,13 @@ fn geometric_hovers_within_a_few_centimetres_in_noise() {
 }
 
 /// The distance from where it was thrown, after 4 s, and the greatest until then.
-fn recovery<C: Controller>(law: &C, axis: Vector3<f64>, angle_deg: f64) -> (f64, f64) {
-    let course = course("");
+fn recovery<L: Law>(law: &L, axis: Vector3<f64>, angle_deg: f64) -> (f64, f64) {
+    let trajectory = trajectory("");
     let mut flight = Loop::new(Craft::dragged(1));
     flight.state.body.attitude_WB =
         UnitQuaternion::from_scaled_axis(axis.normalize() * angle_deg.to_radians());
-    let (_, greatest_m) = flight.fly(law, &course, 0.0, 4.0);
-    let (_, left_m) = flight.fly(law, &course, 4.0, 6.0);
+    let (_, greatest_m) = flight.fly(law, &trajectory, 0.0, 4.0);
+    let (_, left_m) = flight.fly(law, &trajectory, 4.0, 6.0);
     println!("thrown at {angle_deg} deg about {:?}: {greatest_m:.3} m, then {left_m:.4} m", axis.as_slice());
     (left_m, greatest_m)
 }
@@ -173,8 +173,8 @@ fn lqr_answers_alike_whatever_the_yaw() {
         let mut flight = Loop::new(Craft::ideal());
         flight.state.body.attitude_WB = turned;
         flight.state.body.position_W_m += turned * Vector3::new(0.3, 0.1, 0.0);
-        let course = common::course_from(yaw_deg.to_radians());
-        flight.fly(&law, &course, 0.0, 0.5);
+        let trajectory = common::trajectory_from(yaw_deg.to_radians());
+        flight.fly(&law, &trajectory, 0.0, 0.5);
         turned.inverse() * flight.state.body.position_W_m
     });
     assert!(answers.iter().all(|answer| (answer - answers[0]).norm() < 1e-6), "{answers:?}");
@@ -221,32 +221,32 @@ fn the_gain_of_the_lqr_is_the_one_that_scipy_finds() {
 #[test]
 fn an_lqr_without_a_solution_is_refused_with_a_reason() {
     let weightless =
-        controllers::controller::Airframe::new(Vehicle { gravity_m_s2: 0.0, ..vehicle() }).unwrap();
+        controllers::airframe::ControlledVehicle::new(Vehicle { gravity_m_s2: 0.0, ..vehicle() }).unwrap();
     let error = LqrLaw::new(LqrGains::load(None).unwrap(), &weightless, PERIOD_S).unwrap_err();
     assert!(error.contains("Riccati") && error.contains("`vehicle`"), "{error}");
 }
 
 /// The wrenches demanded at the last tick of `before`, which flew for 0.3 s without noise, and over the half second of `after` behind it;
-/// and how far it was from the course from 2.7 s after the swap on.
-fn swap<A: Controller, B: Controller>(before: &A, after: &B) -> (Vec<Wrench>, f64) {
-    let course = common::course_from(0.0);
+/// and how far it was from the trajectory from 2.7 s after the swap on.
+fn swap<A: Law, B: Law>(before: &A, after: &B) -> (Vec<RotorWrench>, f64) {
+    let trajectory = common::trajectory_from(0.0);
     let mut flight = Loop::new(Craft { seed: None, ..Craft::dragged(0) });
     // Off the reference, so that the laws do not all ask for the same, and by less than what a successor may not go on
     // from: `geometric` answers 2 cm with 10 rad/s².
     flight.state.body.position_W_m += Vector3::new(0.015, -0.01, 0.02);
-    flight.fly(before, &course, 0.0, 0.3);
+    flight.fly(before, &trajectory, 0.0, 0.3);
     let mut wrenches = vec![flight.demand];
     for _ in 0..500 {
-        flight.step(after, &course);
+        flight.step(after, &trajectory);
         wrenches.push(flight.demand);
     }
-    let (_, greatest_m) = flight.fly(after, &course, 3.0, 5.0);
+    let (_, greatest_m) = flight.fly(after, &trajectory, 3.0, 5.0);
     (wrenches, greatest_m)
 }
 
 /// The first demand of the successor against its predecessor's last, and the distance that is left.
 #[track_caller]
-fn assert_smooth<A: Controller, B: Controller>(name: &str, before: &A, after: &B, off_max_m: f64) {
+fn assert_smooth<A: Law, B: Law>(name: &str, before: &A, after: &B, off_max_m: f64) {
     let (wrenches, greatest_m) = swap(before, after);
     let jump_N = (wrenches[1].thrust_N - wrenches[0].thrust_N).abs();
     let jump_N_m = (wrenches[1].torque_B_N_m - wrenches[0].torque_B_N_m).norm();
@@ -258,9 +258,9 @@ fn assert_smooth<A: Controller, B: Controller>(name: &str, before: &A, after: &B
 #[test]
 fn a_swap_to_or_from_the_tracking_laws_goes_on_from_the_wrench_that_was_asked_for() {
     let (lqr, geometric) = (lqr(), geometric());
-    let pid = PidLaw { gains: PidGains::default(), vehicle: airframe().known(), period_s: PERIOD_S };
+    let pid = PidLaw { gains: PidGains::default(), vehicle: believed().hover_model(), period_s: PERIOD_S };
     let cascade =
-        CascadeLaw { gains: CascadeGains::default(), vehicle: airframe().known(), period_s: PERIOD_S };
+        CascadeLaw { gains: CascadeGains::default(), vehicle: believed().hover_model(), period_s: PERIOD_S };
     assert_smooth("lqr to geometric", &lqr, &geometric, 0.01);
     assert_smooth("geometric to lqr", &geometric, &lqr, 0.01);
     assert_smooth("pid to lqr", &pid, &lqr, 0.01);
@@ -275,10 +275,10 @@ fn a_swap_to_or_from_the_tracking_laws_goes_on_from_the_wrench_that_was_asked_fo
 }
 
 /// The greatest error of height under `law` in 3 s.
-fn height_error_m<C: Controller>(flight: &mut Loop, law: &C) -> f64 {
-    let course = common::course_from(0.0);
+fn height_error_m<L: Law>(flight: &mut Loop, law: &L) -> f64 {
+    let trajectory = common::trajectory_from(0.0);
     let off_m = (0..3000).map(|_| {
-        flight.step(law, &course);
+        flight.step(law, &trajectory);
         (flight.state.body.position_W_m.z - 1.0).abs()
     });
     off_m.fold(0.0, f64::max)
@@ -287,14 +287,14 @@ fn height_error_m<C: Controller>(flight: &mut Loop, law: &C) -> f64 {
 /// Counted twice, the lift of a vehicle 5 % heavier than its file would raise it by 4 cm.
 #[test]
 fn the_lift_that_a_heavier_vehicle_needs_is_handed_to_a_tracking_law_and_back_once() {
-    let pid = PidLaw { gains: PidGains::default(), vehicle: airframe().known(), period_s: PERIOD_S };
+    let pid = PidLaw { gains: PidGains::default(), vehicle: believed().hover_model(), period_s: PERIOD_S };
     let heavier = Vehicle { mass_kg: 1.05 * vehicle().mass_kg, ..vehicle() };
     let mut flight = Loop::new(Craft { vehicle: heavier, ..Craft::ideal() });
-    flight.fly(&pid, &common::course_from(0.0), 0.0, 20.0);
+    flight.fly(&pid, &common::trajectory_from(0.0), 0.0, 20.0);
     for _ in 0..2 {
         let there_m = height_error_m(&mut flight, &geometric());
         let back_m = height_error_m(&mut flight, &pid);
-        let lift_m_s2 = flight.memory.integrals.altitude_m_s2;
+        let lift_m_s2 = flight.law_state.integrals.lift;
         println!("to geometric {there_m:.4} m, back to pid {back_m:.4} m, lift {lift_m_s2:.3} m/s^2");
         assert!(there_m < 0.005 && back_m < 0.005, "{there_m} m, {back_m} m");
         assert!((lift_m_s2 - 0.05 * 9.81).abs() < 0.05, "{lift_m_s2} m/s^2");
@@ -303,12 +303,12 @@ fn the_lift_that_a_heavier_vehicle_needs_is_handed_to_a_tracking_law_and_back_on
 
 #[test]
 fn between_the_tracking_laws_a_swap_in_the_middle_of_a_figure_eight_is_no_more_than_a_ripple() {
-    let course = course(FIGURE_EIGHT);
+    let trajectory = trajectory(FIGURE_EIGHT);
     let mut flight = Loop::new(Craft::dragged(0));
-    flight.fly(&geometric(), &course, 0.0, 9.0);
-    let (rms_m, greatest_m) = flight.fly(&lqr(), &course, 9.0, 13.0);
+    flight.fly(&geometric(), &trajectory, 0.0, 9.0);
+    let (rms_m, greatest_m) = flight.fly(&lqr(), &trajectory, 9.0, 13.0);
     println!("geometric to lqr in the eight: {rms_m:.3} m RMS, {greatest_m:.3} m at most");
-    let (back_rms_m, back_greatest_m) = flight.fly(&geometric(), &course, 13.0, 17.0);
+    let (back_rms_m, back_greatest_m) = flight.fly(&geometric(), &trajectory, 13.0, 17.0);
     println!("and back: {back_rms_m:.3} m RMS, {back_greatest_m:.3} m at most");
     assert!(greatest_m < 0.2 && back_greatest_m < 0.2);
 }

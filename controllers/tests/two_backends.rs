@@ -1,9 +1,10 @@
 //! Both backends fly one flight: how far they are apart, and that halving rapier's step halves it.
 #![allow(non_snake_case, reason = "a trailing _B names the frame a vector is written in")]
 
-use controllers::allocation::{Allocation, RotorSet};
+use controllers::airframe::ControlledVehicle;
+use controllers::control::{HoverMotion, Integrals};
 use controllers::pid_gains::PidGains;
-use controllers::pid_law::{Measurement, PidLaw, PidState, PidVehicle};
+use controllers::pid_law::PidLaw;
 use controllers::set_points::{Schedule, SetPoint, SetPointEntry};
 use nalgebra::Vector3;
 use plant::{Backend, FreeFlight, NewtonEuler, Rapier, RigidBody, State};
@@ -37,10 +38,9 @@ struct Scenario {
 /// The scenario's pilot and controller, which sees the true attitude.
 struct Loop {
     schedule: Schedule,
-    allocation: Allocation,
+    craft: ControlledVehicle,
     law: PidLaw,
-    law_state: PidState,
-    vehicle: Vehicle,
+    integrals: Integrals,
 }
 
 fn vehicle() -> Vehicle {
@@ -49,22 +49,20 @@ fn vehicle() -> Vehicle {
 
 impl Loop {
     fn new() -> Self {
-        let (vehicle, scenario) = (vehicle(), toml::from_str::<Scenario>(SCENARIO).unwrap());
+        let scenario = toml::from_str::<Scenario>(SCENARIO).unwrap();
         let initial = SetPoint { altitude_m: 1.0, ..SetPoint::default() };
-        let allocation = Allocation::new(&RotorSet::from(&vehicle)).unwrap();
-        let pid_vehicle = PidVehicle::new(&vehicle, &allocation);
+        let craft = ControlledVehicle::new(vehicle()).unwrap();
         Self {
             schedule: Schedule::new(&scenario.set_points, &initial, 1000).unwrap(),
-            law: PidLaw { gains: PidGains::default(), vehicle: pid_vehicle, period_s: TICK_S },
-            law_state: PidState::default(),
-            allocation,
-            vehicle,
+            law: PidLaw { gains: PidGains::default(), vehicle: craft.hover_model(), period_s: TICK_S },
+            integrals: Integrals::default(),
+            craft,
         }
     }
 
     fn commands(&mut self, tick: u64, body: &RigidBody) -> [f64; 4] {
         let (roll_rad, pitch_rad, yaw_rad) = body.attitude_WB.euler_angles();
-        let measured = Measurement {
+        let measured = HoverMotion {
             altitude_m: body.position_W_m.z,
             climb_rate_m_s: body.velocity_W_m_s.z,
             roll_rad,
@@ -72,8 +70,9 @@ impl Loop {
             yaw_rad,
             angular_velocity_B_rad_s: body.angular_velocity_B_rad_s,
         };
-        let wrench = self.law.step(&mut self.law_state, &self.schedule.at(tick), &measured);
-        self.allocation.allocate(&wrench).speeds_rad_s.map(|speed| self.vehicle.command.command(speed))
+        let wrench = self.law.wrench(&mut self.integrals, &self.schedule.at(tick), &measured);
+        let speeds_rad_s = self.craft.allocation.allocate(&wrench).speeds_rad_s;
+        speeds_rad_s.map(|speed| self.craft.vehicle.command.command(speed))
     }
 }
 

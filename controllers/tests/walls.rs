@@ -8,7 +8,7 @@ use controllers::room::Room;
 use controllers::velocity_law::VelocityLoop;
 use controllers::wall_follow_law::{Mode, Shared, WallFollowGains, WallFollowLaw};
 use controllers::wall_stop_law::{HOLDING, WallStopGains, WallStopLaw};
-use flight::{Loop, NOISY, PERIOD_S, ROOM, Senses, airframe, vehicle};
+use flight::{Loop, NOISY, PERIOD_S, ROOM, Senses, believed, vehicle};
 use nalgebra::Vector3;
 use vehicles::{MotorModel, Vehicle};
 
@@ -17,7 +17,7 @@ const SEEDS: [u64; 3] = [1, 2, 3];
 fn wall_stop(cruise_speed_m_s: f64, distance_m: f64) -> WallStopLaw {
     let gains = WallStopGains::default();
     WallStopLaw {
-        velocity: VelocityLoop::new(&gains.loops, airframe().known(), PERIOD_S),
+        velocity: VelocityLoop::new(&gains.loops, believed().hover_model(), PERIOD_S),
         gains,
         cruise_speed_m_s,
         distance_m,
@@ -29,7 +29,7 @@ fn wall_stop(cruise_speed_m_s: f64, distance_m: f64) -> WallStopLaw {
 fn wall_follow(mode: Mode, speed_m_s: f64) -> WallFollowLaw {
     let gains = WallFollowGains::default();
     WallFollowLaw {
-        velocity: VelocityLoop::new(&gains.loops, airframe().known(), PERIOD_S),
+        velocity: VelocityLoop::new(&gains.loops, believed().hover_model(), PERIOD_S),
         gains,
         mode,
         speed_m_s,
@@ -71,7 +71,7 @@ fn stop_of(flown: Vehicle, law: &WallStopLaw, seed: u64, away_m: f64, seconds: u
             worst_error_m = worst_error_m.max((distance_m - law.distance_m).abs());
         }
     }
-    Stop { nearest_m, worst_error_m, fastest_m_s, state: flight.memory.state, altitude_error_m }
+    Stop { nearest_m, worst_error_m, fastest_m_s, state: flight.output.phase, altitude_error_m }
 }
 
 #[test]
@@ -129,11 +129,11 @@ fn two_laps(law: &WallFollowLaw, seed: u64) -> Laps {
 fn two_laps_of(flown: Vehicle, law: &WallFollowLaw, seed: u64) -> Laps {
     let mut flight = Loop::of(flown, Vector3::new(0.0, 0.0, 1.5), Senses::new(seed, ROOM, NOISY));
     let mut laps = Laps { nearest_m: f64::INFINITY, ..Laps::default() };
-    while flight.memory.laps < 2 && flight.time_s() < 200.0 {
+    while flight.output.laps < 2 && flight.time_s() < 200.0 {
         flight.step(law);
         laps.log(&flight, law);
     }
-    (laps.laps, laps.seconds) = (flight.memory.laps, flight.time_s());
+    (laps.laps, laps.seconds) = (flight.output.laps, flight.time_s());
     laps
 }
 
@@ -142,12 +142,12 @@ impl Laps {
         let (at, velocity) = (flight.position(), flight.state.body.velocity_W_m_s);
         self.nearest_m = self.nearest_m.min(clearance_m(&at));
         self.altitude_error_m = self.altitude_error_m.max((at.z - 1.5).abs());
-        if flight.memory.state == 1 {
+        if flight.output.phase == 1 {
             return;
         }
         self.speeds_m_s.push(velocity.xy().norm());
         // A side is the middle three quarters of the square's 4 m; the rest belongs to the corners.
-        let (along_m, error_m) = match flight.memory.state {
+        let (along_m, error_m) = match flight.output.phase {
             2 => (at.y, 5.0 - at.x - law.distance_m),
             3 => (at.x, 5.0 + at.y - law.distance_m),
             4 => (at.y, 5.0 + at.x - law.distance_m),
@@ -272,7 +272,7 @@ fn ten_vehicles_on_one_loop_keep_apart_and_do_their_laps() {
             nearest_m = apart.fold(nearest_m, f64::min);
         }
     }
-    let laps: Vec<_> = flights.iter().map(|flight| flight.memory.laps).collect();
+    let laps: Vec<_> = flights.iter().map(|flight| flight.output.laps).collect();
     println!("ten vehicles: nearest {nearest_m:.3} m apart, {clearance:.3} m from the walls, laps {laps:?}");
     assert!(nearest_m > 0.7, "centres {nearest_m} m apart");
     assert!(clearance > 2.5, "{clearance} m from the walls");

@@ -3,12 +3,16 @@
 #![allow(dead_code, reason = "each test file uses a part")]
 #![allow(non_snake_case, reason = "a trailing _W or _B names the frame a vector is written in")]
 
+use bus::messages::Reference;
 use bus::random::{Stream, stream};
-use controllers::allocation::Wrench;
-use controllers::controller::{Airframe, Controller, ControllerState, Flown, Motion, Told};
-use controllers::course::{Course, Start};
+use controllers::airframe::ControlledVehicle;
+use controllers::allocation::RotorWrench;
+use controllers::bumpless::BumplessTransfer;
+use controllers::control::{ControlInput, MotionEstimate};
+use controllers::controller_state::ControllerState;
+use controllers::law::Law;
 use controllers::set_points::SetPoint;
-use controllers::trajectory::reference;
+use controllers::trajectory::{Start, Trajectory};
 use nalgebra::{UnitQuaternion, Vector3};
 use plant::{NewtonEuler, RigidBody, State};
 use sensors::noise::WhiteNoise;
@@ -21,24 +25,24 @@ pub fn vehicle() -> Vehicle {
 }
 
 /// The Hummingbird as the laws know it.
-pub fn airframe() -> Airframe {
-    Airframe::new(vehicle()).unwrap()
+pub fn believed() -> ControlledVehicle {
+    ControlledVehicle::new(vehicle()).unwrap()
 }
 
-/// A course from 1 m above the origin; `segments` is a list in TOML.
-pub fn course(segments: &str) -> Course {
-    try_course(segments).unwrap()
+/// A trajectory from 1 m above the origin; `segments` is a list in TOML.
+pub fn trajectory(segments: &str) -> Trajectory {
+    try_trajectory(segments).unwrap()
 }
 
-pub fn try_course(segments: &str) -> Result<Course, String> {
+pub fn try_trajectory(segments: &str) -> Result<Trajectory, String> {
     let table: toml::Table = toml::from_str(&format!("segments = [{segments}]")).unwrap();
     let entries = serde_json::to_value(&table["segments"]).unwrap();
-    Course::read(entries.as_array().unwrap(), Start { position_W_m: Vector3::z(), yaw_rad: 0.0 })
+    Trajectory::read(entries.as_array().unwrap(), Start { position_W_m: Vector3::z(), yaw_rad: 0.0 })
 }
 
 /// Staying 1 m above the origin with this yaw.
-pub fn course_from(yaw_rad: f64) -> Course {
-    Course::read(&[], Start { position_W_m: Vector3::z(), yaw_rad }).unwrap()
+pub fn trajectory_from(yaw_rad: f64) -> Trajectory {
+    Trajectory::read(&[], Start { position_W_m: Vector3::z(), yaw_rad }).unwrap()
 }
 
 /// What the law flies and in what air.
@@ -87,13 +91,13 @@ impl Noise {
         Self { random: stream(seed, "estimate"), position_W_m: zero, velocity_W_m_s: zero, turn_B_rad: zero }
     }
 
-    fn estimate(&mut self, tick: u64, body: &RigidBody) -> Motion {
+    fn estimate(&mut self, tick: u64, body: &RigidBody) -> MotionEstimate {
         let mut draw = |sigma: f64| WhiteNoise::new(sigma, 1.0).sample(&mut self.random);
         let gyroscope = draw(5.4e-3);
         if tick.is_multiple_of(10) {
             (self.position_W_m, self.velocity_W_m_s, self.turn_B_rad) = (draw(1e-3), draw(2e-2), draw(3e-3));
         }
-        Motion {
+        MotionEstimate {
             position_W_m: body.position_W_m + self.position_W_m,
             velocity_W_m_s: body.velocity_W_m_s + self.velocity_W_m_s,
             attitude_WB: body.attitude_WB * UnitQuaternion::from_scaled_axis(self.turn_B_rad),
@@ -102,8 +106,8 @@ impl Noise {
     }
 }
 
-fn exact(body: &RigidBody) -> Motion {
-    Motion {
+fn exact(body: &RigidBody) -> MotionEstimate {
+    MotionEstimate {
         position_W_m: body.position_W_m,
         velocity_W_m_s: body.velocity_W_m_s,
         attitude_WB: body.attitude_WB,
@@ -111,18 +115,18 @@ fn exact(body: &RigidBody) -> Motion {
     }
 }
 
-/// A vehicle in flight, and what a controller remembers.
+/// A vehicle in flight, and the state of its controller.
 pub struct Loop {
     craft: Craft,
     plant: NewtonEuler,
-    airframe: Airframe,
+    believed: ControlledVehicle,
     noise: Option<Noise>,
     pub state: State,
-    pub memory: ControllerState,
+    pub law_state: ControllerState,
     pub tick: u64,
     pub set_point: SetPoint,
     /// The last demand.
-    pub demand: Wrench,
+    pub demand: RotorWrench,
     /// Whether the last demand was beyond the rotors.
     pub saturated: bool,
 }
@@ -133,42 +137,42 @@ impl Loop {
         let state = plant.start(RigidBody::level_at(Vector3::z()), plant.vehicle().hover_command());
         let noise = craft.seed.map(Noise::new);
         let set_point = SetPoint { altitude_m: 1.0, ..SetPoint::default() };
-        let (airframe, memory, demand) = (airframe(), ControllerState::default(), Wrench::default());
-        Self { craft, plant, airframe, noise, state, memory, tick: 0, set_point, demand, saturated: false }
+        let (believed, law_state, demand) = (believed(), ControllerState::default(), RotorWrench::default());
+        Self { craft, plant, believed, noise, state, law_state, tick: 0, set_point, demand, saturated: false }
     }
 
-    /// One tick under `law`: as the node runs it. Gives the true distance from the course.
-    pub fn step<C: Controller>(&mut self, law: &C, course: &Course) -> f64 {
-        let point = course.at(self.tick as f64 * PERIOD_S);
+    /// One tick under `law`: as the node runs it. Gives the true distance from the trajectory.
+    pub fn step<L: Law>(&mut self, law: &L, trajectory: &Trajectory) -> f64 {
+        let point = trajectory.at(self.tick as f64 * PERIOD_S);
         let off_m = (self.state.body.position_W_m - point.path_W[0]).norm();
         let motion = match &mut self.noise {
             Some(noise) => noise.estimate(self.tick, &self.state.body),
             None => exact(&self.state.body),
         };
-        let (reference, walls) = (reference(&point), Default::default());
-        let told = Told {
+        let (reference, walls) = (Reference::from(&point), Default::default());
+        let input = ControlInput {
             motion,
             set_point: self.set_point,
             reference: &reference,
             walls: &walls,
             time_ns: self.tick * 1_000_000,
         };
-        let known = Flown { law, vehicle: &self.airframe.vehicle, period_s: PERIOD_S };
-        self.demand = known.advance(&mut self.memory, &told, None).wrench;
-        let allocated = self.airframe.allocation.allocate(&self.demand);
+        let transfer = BumplessTransfer::to::<L>(&self.believed.vehicle, PERIOD_S);
+        self.demand = transfer.step(law, &mut self.law_state, &input, None).wrench;
+        let allocated = self.believed.allocation.allocate(&self.demand);
         self.saturated = allocated.is_saturated();
-        let counts = allocated.speeds_rad_s.map(|speed| self.airframe.vehicle.command.command(speed));
+        let counts = allocated.speeds_rad_s.map(|speed| self.believed.vehicle.command.command(speed));
         self.plant.step(&mut self.state, &counts, PERIOD_S);
         self.state.body.velocity_W_m_s += self.craft.drag_W_m_s2(&self.state.body) * PERIOD_S;
         self.tick += 1;
         off_m
     }
 
-    /// Flies until `until_s`; gives the root mean square and the greatest distance from the course since `from_s`.
-    pub fn fly<C: Controller>(&mut self, law: &C, course: &Course, from_s: f64, until_s: f64) -> (f64, f64) {
+    /// Flies until `until_s`; gives the root mean square and the greatest distance from the trajectory since `from_s`.
+    pub fn fly<L: Law>(&mut self, law: &L, trajectory: &Trajectory, from_s: f64, until_s: f64) -> (f64, f64) {
         let (mut squares, mut greatest_m, mut count) = (0.0, 0.0_f64, 0.0);
         while (self.tick as f64) * PERIOD_S < until_s {
-            let off_m = self.step(law, course);
+            let off_m = self.step(law, trajectory);
             if self.tick as f64 * PERIOD_S > from_s {
                 (squares, greatest_m, count) = (squares + off_m * off_m, greatest_m.max(off_m), count + 1.0);
             }

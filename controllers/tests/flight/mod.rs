@@ -7,7 +7,11 @@
 #![allow(non_snake_case, reason = "a trailing _W or _B names the frame a vector is written in")]
 
 use bus::messages::{Reference, WallEstimate};
-use controllers::controller::{Airframe, Controller, ControllerState, Demand, Flown, Motion, Told};
+use controllers::airframe::ControlledVehicle;
+use controllers::bumpless::BumplessTransfer;
+use controllers::control::{ControlInput, ControlOutput, MotionEstimate};
+use controllers::controller_state::ControllerState;
+use controllers::law::Law;
 use controllers::set_points::SetPoint;
 use nalgebra::Vector3;
 use plant::{NewtonEuler, RigidBody, State};
@@ -25,8 +29,8 @@ pub fn vehicle() -> Vehicle {
     Vehicle::parse(include_str!("../../../vehicles/hummingbird.toml"), "hummingbird.toml").unwrap()
 }
 
-pub fn airframe() -> Airframe {
-    Airframe::new(vehicle()).unwrap()
+pub fn believed() -> ControlledVehicle {
+    ControlledVehicle::new(vehicle()).unwrap()
 }
 
 /// Errors of the range finders' estimate.
@@ -145,8 +149,10 @@ pub struct Loop {
     pub plant: NewtonEuler,
     pub state: State,
     pub senses: Senses,
-    pub memory: ControllerState,
-    pub airframe: Airframe,
+    pub law_state: ControllerState,
+    /// What the law answered last.
+    pub output: ControlOutput,
+    pub believed: ControlledVehicle,
     pub set_point: SetPoint,
     pub reference: Reference,
     pub tick: u64,
@@ -166,8 +172,9 @@ impl Loop {
             plant,
             state,
             senses,
-            memory: ControllerState::default(),
-            airframe: airframe(),
+            law_state: ControllerState::default(),
+            output: ControlOutput::default(),
+            believed: believed(),
             set_point,
             reference: Reference::default(),
             tick: 0,
@@ -175,10 +182,10 @@ impl Loop {
     }
 
     /// One tick under `law`. Order: state k, measurements k, law k, and its command acts until k + 1.
-    pub fn step<C: Controller>(&mut self, law: &C) -> Demand {
+    pub fn step<L: Law>(&mut self, law: &L) -> ControlOutput {
         let attitude = self.senses.attitude(&self.plant, &self.state);
         let walls = self.senses.walls(self.tick, &self.state.body);
-        let motion = Motion {
+        let motion = MotionEstimate {
             position_W_m: self.state.body.position_W_m,
             velocity_W_m_s: self.state.body.velocity_W_m_s,
             attitude_WB: nalgebra::UnitQuaternion::from_euler_angles(
@@ -188,20 +195,21 @@ impl Loop {
             ),
             angular_velocity_B_rad_s: attitude.angular_velocity_B_rad_s,
         };
-        let told = Told {
+        let input = ControlInput {
             motion,
             set_point: self.set_point,
             reference: &self.reference,
             walls: &walls,
             time_ns: self.tick * PERIOD_NS,
         };
-        let flown = Flown { law, vehicle: &self.airframe.vehicle, period_s: PERIOD_S };
-        let demand = flown.advance(&mut self.memory, &told, None);
-        let speeds_rad_s = self.airframe.allocation.allocate(&demand.wrench).speeds_rad_s;
-        let counts = speeds_rad_s.map(|speed| self.airframe.vehicle.command.command(speed));
+        let transfer = BumplessTransfer::to::<L>(&self.believed.vehicle, PERIOD_S);
+        let output = transfer.step(law, &mut self.law_state, &input, None);
+        let speeds_rad_s = self.believed.allocation.allocate(&output.wrench).speeds_rad_s;
+        let counts = speeds_rad_s.map(|speed| self.believed.vehicle.command.command(speed));
         self.plant.step(&mut self.state, &counts, PERIOD_S);
         self.tick += 1;
-        demand
+        self.output = output;
+        output
     }
 
     pub fn position(&self) -> Vector3<f64> {

@@ -4,7 +4,7 @@
 #![allow(dead_code, reason = "each test binary uses a part of it")]
 
 use bus::random::Stream;
-use controllers::allocation::{Allocation, RotorSet, Wrench};
+use controllers::allocation::{Allocation, RotorSet, RotorWrench};
 use flights::{Channel, Flight, Role};
 use nalgebra::{UnitQuaternion, Vector3};
 use plant::effects::{Effect, find};
@@ -227,7 +227,7 @@ fn stirred(
     let levelling =
         vehicle.inertia_kg_m2 * (-2.0 * body.attitude_WB.scaled_axis() - 2.2 * body.angular_velocity_B_rad_s);
     let thrust_N = vehicle.mass_kg * vehicle.gravity_m_s2 * (1.0 + lift.clamp(-0.3, 0.3));
-    let wrench = Wrench { thrust_N, torque_B_N_m: levelling + Vector3::from(kick_N_m) };
+    let wrench = RotorWrench { thrust_N, torque_B_N_m: levelling + Vector3::from(kick_N_m) };
     allocation.allocate(&wrench).speeds_rad_s.map(|speed| vehicle.command.command(speed))
 }
 
@@ -273,7 +273,7 @@ impl Pilot {
         let turn = gains.0.component_mul(&error.scaled_axis())
             - gains.1.component_mul(&body.angular_velocity_B_rad_s)
             + 8.0 * self.leaned;
-        let wrench = Wrench { thrust_N, torque_B_N_m: vehicle.inertia_kg_m2 * turn };
+        let wrench = RotorWrench { thrust_N, torque_B_N_m: vehicle.inertia_kg_m2 * turn };
         self.hurried(self.allocation.allocate(&wrench).speeds_rad_s)
             .map(|speed| vehicle.command.command(speed))
     }

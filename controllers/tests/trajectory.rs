@@ -3,8 +3,8 @@
 
 mod common;
 
-use common::{course, try_course};
-use controllers::course::Course;
+use common::{trajectory, try_trajectory};
+use controllers::trajectory::Trajectory;
 use nalgebra::Vector3;
 
 const EVERYTHING: &str = r#"
@@ -17,16 +17,16 @@ const EVERYTHING: &str = r#"
 
 /// The greatest difference between a derivative and the central difference of the one below, for each order, over
 /// times that are not within `span_s` of a segment's end, where the snap may jump.
-fn differences(course: &Course, span_s: f64, ends_s: &[f64]) -> [f64; 4] {
+fn differences(trajectory: &Trajectory, span_s: f64, ends_s: &[f64]) -> [f64; 4] {
     let mut worst = [0.0; 4];
-    let steps = (course.duration_s() * 100.0) as usize;
+    let steps = (trajectory.duration_s() * 100.0) as usize;
     for step in 0..=steps {
         let time_s = step as f64 * 0.01 + 0.001;
         if ends_s.iter().any(|end_s| (end_s - time_s).abs() <= span_s) {
             continue;
         }
         let (before, now, after) =
-            (course.at(time_s - span_s), course.at(time_s), course.at(time_s + span_s));
+            (trajectory.at(time_s - span_s), trajectory.at(time_s), trajectory.at(time_s + span_s));
         for (order, worst) in worst.iter_mut().enumerate() {
             let difference_W = (after.path_W[order] - before.path_W[order]) / (2.0 * span_s);
             let off: f64 = (difference_W - now.path_W[order + 1]).norm();
@@ -38,14 +38,18 @@ fn differences(course: &Course, span_s: f64, ends_s: &[f64]) -> [f64; 4] {
 
 #[test]
 fn every_derivative_is_the_rate_of_change_of_the_one_below() {
-    let course = course(EVERYTHING);
+    let trajectory = trajectory(EVERYTHING);
     let ends_s: Vec<f64> = (0..=4)
         .map(|count| {
             let entries: Vec<&str> = EVERYTHING.split("},").take(count).collect();
-            if count == 0 { 0.0 } else { common::course(&format!("{}}}", entries.join("},"))).duration_s() }
+            if count == 0 {
+                0.0
+            } else {
+                common::trajectory(&format!("{}}}", entries.join("},"))).duration_s()
+            }
         })
         .collect();
-    let worst = differences(&course, 1e-4, &ends_s);
+    let worst = differences(&trajectory, 1e-4, &ends_s);
     println!("{worst:?}");
     // Of second order in the span: the errors grow with the derivatives three orders higher.
     assert!(worst[0] < 1e-6 && worst[1] < 1e-5 && worst[2] < 1e-4 && worst[3] < 1e-3, "{worst:?}");
@@ -53,25 +57,25 @@ fn every_derivative_is_the_rate_of_change_of_the_one_below() {
 
 #[test]
 fn the_yaw_rate_is_the_rate_of_change_of_the_yaw() {
-    let course = course(EVERYTHING);
-    for step in 1..(course.duration_s() * 100.0) as usize {
+    let trajectory = trajectory(EVERYTHING);
+    for step in 1..(trajectory.duration_s() * 100.0) as usize {
         let time_s = step as f64 * 0.01;
-        let rate = (course.at(time_s + 1e-5).yaw_rad - course.at(time_s - 1e-5).yaw_rad) / 2e-5;
-        assert!((rate - course.at(time_s).yaw_rate_rad_s).abs() < 1e-5, "at {time_s} s");
+        let rate = (trajectory.at(time_s + 1e-5).yaw_rad - trajectory.at(time_s - 1e-5).yaw_rad) / 2e-5;
+        assert!((rate - trajectory.at(time_s).yaw_rate_rad_s).abs() < 1e-5, "at {time_s} s");
     }
 }
 
 #[test]
 fn the_reference_moves_without_a_jump_and_rests_at_the_start_and_behind_the_end() {
-    let course = course(EVERYTHING);
-    let end_s = course.duration_s();
-    let (start, end) = (course.at(0.0).path_W, course.at(end_s + 1.0).path_W);
+    let trajectory = trajectory(EVERYTHING);
+    let end_s = trajectory.duration_s();
+    let (start, end) = (trajectory.at(0.0).path_W, trajectory.at(end_s + 1.0).path_W);
     assert_eq!(start[0], Vector3::z());
     assert!((end[0] - Vector3::z()).norm() < 1e-9, "the last waypoint is where it all began");
     assert!(start[1..].iter().chain(&end[1..]).all(|derivative| derivative.norm() == 0.0));
     let steps = (end_s / 1e-3) as usize + 10;
     for step in 0..steps {
-        let (now, next) = (course.at(step as f64 * 1e-3), course.at((step + 1) as f64 * 1e-3));
+        let (now, next) = (trajectory.at(step as f64 * 1e-3), trajectory.at((step + 1) as f64 * 1e-3));
         let jump = |order: usize| (next.path_W[order] - now.path_W[order]).norm();
         assert!(jump(0) < 0.01 && jump(1) < 0.05 && jump(2) < 0.2, "at {step} ms");
     }
@@ -80,9 +84,9 @@ fn the_reference_moves_without_a_jump_and_rests_at_the_start_and_behind_the_end(
 #[test]
 fn a_figure_eight_is_as_long_as_wide_and_as_fast_as_stated() {
     let entry = r#"{ kind = "figure-eight", half_length_m = 2.0, speed_m_s = 3.0, laps = 3, ramp_s = 3.0 }"#;
-    let course = course(entry);
+    let trajectory = trajectory(entry);
     let points: Vec<_> =
-        (0..(course.duration_s() * 1e3) as usize).map(|ms| course.at(ms as f64 * 1e-3)).collect();
+        (0..(trajectory.duration_s() * 1e3) as usize).map(|ms| trajectory.at(ms as f64 * 1e-3)).collect();
     let greatest = |value: &dyn Fn(&[Vector3<f64>; 5]) -> f64| {
         points.iter().map(|point| value(&point.path_W)).fold(0.0, f64::max)
     };
@@ -93,13 +97,14 @@ fn a_figure_eight_is_as_long_as_wide_and_as_fast_as_stated() {
 
 #[test]
 fn a_circle_keeps_its_radius_and_its_speed_between_the_ramps() {
-    let course = course(r#"{ kind = "circle", radius_m = 2.0, speed_m_s = 1.5, laps = 2, ramp_s = 2.0 }"#);
+    let trajectory =
+        trajectory(r#"{ kind = "circle", radius_m = 2.0, speed_m_s = 1.5, laps = 2, ramp_s = 2.0 }"#);
     let centre_W_m = Vector3::new(0.0, 2.0, 1.0);
-    for step in 0..(course.duration_s() * 10.0) as usize {
+    for step in 0..(trajectory.duration_s() * 10.0) as usize {
         let time_s = step as f64 * 0.1;
-        let [position, velocity, ..] = course.at(time_s).path_W;
+        let [position, velocity, ..] = trajectory.at(time_s).path_W;
         assert!(((position - centre_W_m).norm() - 2.0).abs() < 1e-9);
-        if time_s > 2.0 && time_s < course.duration_s() - 2.0 {
+        if time_s > 2.0 && time_s < trajectory.duration_s() - 2.0 {
             assert!((velocity.norm() - 1.5).abs() < 1e-9);
         }
     }
@@ -108,14 +113,14 @@ fn a_circle_keeps_its_radius_and_its_speed_between_the_ramps() {
 #[test]
 fn waypoints_are_hit_at_their_times_with_six_continuous_derivatives() {
     let points = [[1.0, 0.5, 1.5], [2.0, -0.5, 2.0], [2.5, 0.0, 1.5]];
-    let course = course(&format!(
+    let trajectory = trajectory(&format!(
         "{{ kind = \"minimum-snap\", times_s = [1.0, 1.5, 0.8], waypoints_m = {points:?} }}"
     ));
     for (point, time_s) in points.iter().zip([1.0, 2.5, 3.3]) {
-        assert!((course.at(time_s).path_W[0] - Vector3::from(*point)).norm() < 1e-9);
+        assert!((trajectory.at(time_s).path_W[0] - Vector3::from(*point)).norm() < 1e-9);
     }
     // Snap, and its first two derivatives by differences, on both sides of a waypoint.
-    let snap = |time_s: f64| course.at(time_s).path_W[4];
+    let snap = |time_s: f64| trajectory.at(time_s).path_W[4];
     for time_s in [1.0, 2.5] {
         let h = 1e-3;
         let slope = |from_s: f64| (snap(from_s + h) - snap(from_s)) / h;
@@ -127,9 +132,9 @@ fn waypoints_are_hit_at_their_times_with_six_continuous_derivatives() {
 }
 
 /// The integral of squared snap, by the rectangle rule.
-fn cost(course: &Course) -> f64 {
-    let steps = (course.duration_s() * 1e3) as usize;
-    (0..steps).map(|ms| course.at((ms as f64 + 0.5) * 1e-3).path_W[4].norm_squared() * 1e-3).sum()
+fn cost(trajectory: &Trajectory) -> f64 {
+    let steps = (trajectory.duration_s() * 1e3) as usize;
+    (0..steps).map(|ms| trajectory.at((ms as f64 + 0.5) * 1e-3).path_W[4].norm_squared() * 1e-3).sum()
 }
 
 /// A path that visits the same points at the same times, but also another on the way, has to cost more, and one that
@@ -137,7 +142,7 @@ fn cost(course: &Course) -> f64 {
 #[test]
 fn no_path_through_the_waypoints_has_less_snap() {
     let entry = |times: &str, points: &str| {
-        course(&format!("{{ kind = \"minimum-snap\", times_s = {times}, waypoints_m = {points} }}"))
+        trajectory(&format!("{{ kind = \"minimum-snap\", times_s = {times}, waypoints_m = {points} }}"))
     };
     let free = entry("[1.0, 1.0]", "[[1.0, 1.0, 1.0], [2.0, 0.0, 1.0]]");
     for shift_m in [-0.1, -0.01, 0.01, 0.1] {
@@ -182,7 +187,8 @@ fn what_is_wrong_with_a_segment_is_named_with_its_place() {
         ),
     ];
     for (entry, expected) in cases {
-        let error = try_course(&format!(r#"{{ kind = "hover", duration_s = 1.0 }}, {entry}"#)).unwrap_err();
+        let error =
+            try_trajectory(&format!(r#"{{ kind = "hover", duration_s = 1.0 }}, {entry}"#)).unwrap_err();
         assert!(error.starts_with("`segments`, entry 1 (the first is 0): "), "{error}");
         assert!(error.contains(expected), "{entry}: {error}");
     }
@@ -195,5 +201,5 @@ fn the_example_of_the_documentation_can_be_flown() {
     let of_segments: Vec<_> = examples.filter(|example| example.contains("segments = [")).collect();
     assert_eq!(of_segments.len(), 1);
     let segments = of_segments[0].split_once("segments = [").unwrap().1.rsplit_once(']').unwrap().0;
-    assert!(course(segments).duration_s() > 10.0);
+    assert!(trajectory(segments).duration_s() > 10.0);
 }

@@ -7,20 +7,23 @@
 mod flight;
 
 use bus::messages::Vector3 as Point;
-use controllers::allocation::Wrench;
+use controllers::allocation::RotorWrench;
 use controllers::cascade_gains::CascadeGains;
 use controllers::cascade_law::CascadeLaw;
-use controllers::controller::{Controller, ControllerState, Demand};
+use controllers::control::ControlOutput;
+use controllers::controller_state::ControllerState;
+use controllers::foresight::ForesightState;
 use controllers::geometric_gains::GeometricGains;
 use controllers::geometric_law::GeometricLaw;
+use controllers::law::Law as ControlLaw;
 use controllers::lqr_gains::LqrGains;
 use controllers::lqr_law::LqrLaw;
 use controllers::pid_gains::PidGains;
 use controllers::pid_law::PidLaw;
-use controllers::velocity_law::{Course, LoopsGains, VelocityLaw, VelocityLoop};
+use controllers::velocity_law::{LoopsGains, VelocityLaw, VelocityLoop, VelocitySetPoint};
 use controllers::wall_follow_law::{Mode, WallFollowGains, WallFollowLaw};
 use controllers::wall_stop_law::{WallStopGains, WallStopLaw};
-use flight::{Loop, NOISY, PERIOD_S, ROOM, Senses, airframe};
+use flight::{Loop, NOISY, PERIOD_S, ROOM, Senses, believed};
 use nalgebra::Vector3;
 
 /// The most that the demand changes from the last tick of a law to the first of its successor: about what the noise of
@@ -37,7 +40,7 @@ enum Law {
 }
 
 impl Law {
-    fn step(&self, flight: &mut Loop) -> Demand {
+    fn step(&self, flight: &mut Loop) -> ControlOutput {
         match self {
             Law::Pid(law) => flight.step(law),
             Law::Cascade(law) => flight.step(law),
@@ -49,9 +52,9 @@ impl Law {
 }
 
 fn laws() -> [(&'static str, Law); 5] {
-    let vehicle = airframe().known();
+    let vehicle = believed().hover_model();
     let velocity = VelocityLoop::new(&LoopsGains::default(), vehicle, PERIOD_S);
-    let course = Course { altitude_m: 1.5, ..Course::default() };
+    let held = VelocitySetPoint { altitude_m: 1.5, ..VelocitySetPoint::default() };
     let stop = WallStopLaw {
         gains: WallStopGains::default(),
         velocity,
@@ -74,23 +77,23 @@ fn laws() -> [(&'static str, Law); 5] {
     [
         ("pid", Law::Pid(PidLaw { gains: PidGains::default(), vehicle, period_s: PERIOD_S })),
         ("cascade", Law::Cascade(CascadeLaw { gains: CascadeGains::default(), vehicle, period_s: PERIOD_S })),
-        ("velocity", Law::Velocity(VelocityLaw { velocity, constant: Some(course) })),
+        ("velocity", Law::Velocity(VelocityLaw { velocity, constant: Some(held) })),
         ("wall-stop", Law::WallStop(stop)),
         ("wall-follow", Law::WallFollow(follow)),
     ]
 }
 
 /// Before the wall at +x, 3 m away, so that all laws but `wall-follow` hover.
-fn hovering(law: &Law) -> (Loop, Demand) {
+fn hovering(law: &Law) -> (Loop, ControlOutput) {
     let mut flight = Loop::new(Vector3::new(2.0, 0.0, 1.5), Senses::new(1, ROOM, NOISY));
-    let mut demand = Demand::default();
+    let mut output = ControlOutput::default();
     for _ in 0..4000 {
-        demand = law.step(&mut flight);
+        output = law.step(&mut flight);
     }
-    (flight, demand)
+    (flight, output)
 }
 
-fn step_between(before: &Wrench, after: &Wrench) -> (f64, f64) {
+fn step_between(before: &RotorWrench, after: &RotorWrench) -> (f64, f64) {
     let torque_B_N_m = after.torque_B_N_m - before.torque_B_N_m;
     ((after.thrust_N - before.thrust_N).abs(), torque_B_N_m.amax())
 }
@@ -103,8 +106,8 @@ fn every_law_takes_over_from_every_other_without_a_jump_in_the_demanded_wrench()
             let (mut first_step, mut worst_step) = ((0.0, 0.0), (0.0_f64, 0.0_f64));
             let (mut height_error_m, mut tilt_rad) = (0.0_f64, 0.0_f64);
             for tick in 0..2000 {
-                let demand = second.step(&mut flight);
-                let step = step_between(&before.wrench, &demand.wrench);
+                let output = second.step(&mut flight);
+                let step = step_between(&before.wrench, &output.wrench);
                 if tick == 0 {
                     first_step = step;
                 }
@@ -112,7 +115,7 @@ fn every_law_takes_over_from_every_other_without_a_jump_in_the_demanded_wrench()
                 height_error_m = height_error_m.max((flight.position().z - 1.5).abs());
                 let (roll_rad, pitch_rad, _) = flight.state.body.attitude_WB.euler_angles();
                 tilt_rad = tilt_rad.max(libm::hypot(roll_rad, pitch_rad));
-                before = demand;
+                before = output;
             }
             println!(
                 "{from} to {to}: {:.4} N, {:.2e} N m; within 2 s {:.4} N, {:.2e} N m, height {height_error_m:.3} m, \
@@ -136,7 +139,7 @@ fn a_take_over_amid_a_doublet_does_not_jump_either_and_fades_out() {
     let [(_, pid), (_, cascade), ..] = laws();
     let (mut flight, _) = hovering(&pid);
     flight.set_point.roll_rad = 0.17;
-    let mut before = Demand::default();
+    let mut before = ControlOutput::default();
     for _ in 0..100 {
         before = pid.step(&mut flight);
     }
@@ -146,21 +149,21 @@ fn a_take_over_amid_a_doublet_does_not_jump_either_and_fades_out() {
     for _ in 0..2000 {
         cascade.step(&mut flight);
     }
-    assert!(Vector3::from(flight.memory.handed_torque).norm() < 1e-9);
+    assert!(Vector3::from(flight.law_state.residual_torque).norm() < 1e-9);
     let (roll_rad, ..) = flight.state.body.attitude_WB.euler_angles();
     assert!((roll_rad - 0.17).abs() < 0.02, "the command is followed: {roll_rad}");
 }
 
 fn lqr() -> LqrLaw {
-    LqrLaw::new(LqrGains::load(None).unwrap(), &airframe(), PERIOD_S).unwrap()
+    LqrLaw::new(LqrGains::load(None).unwrap(), &believed(), PERIOD_S).unwrap()
 }
 
 fn geometric() -> GeometricLaw {
-    GeometricLaw::new(GeometricGains::load(None).unwrap(), &airframe(), PERIOD_S)
+    GeometricLaw::new(GeometricGains::load(None).unwrap(), &believed(), PERIOD_S)
 }
 
-/// `after` stays near and comes to hover again, although `before` left a memory in which `go_mad` was at work.
-fn assert_outlives<A: Controller, B: Controller>(
+/// `after` stays near and comes to hover again, although `before` left a state in which `go_mad` was at work.
+fn assert_outlives<A: ControlLaw, B: ControlLaw>(
     before: &A,
     after: &B,
     go_mad: impl Fn(&mut ControllerState),
@@ -170,7 +173,7 @@ fn assert_outlives<A: Controller, B: Controller>(
     for _ in 0..2000 {
         flight.step(before);
     }
-    go_mad(&mut flight.memory);
+    go_mad(&mut flight.law_state);
     let (mut height_error_m, mut tilt_rad) = (0.0_f64, 0.0_f64);
     for _ in 0..3000 {
         flight.step(after);
@@ -178,7 +181,7 @@ fn assert_outlives<A: Controller, B: Controller>(
         tilt_rad = tilt_rad.max(libm::hypot(roll_rad, pitch_rad));
         height_error_m = height_error_m.max((flight.position().z - 1.5).abs());
     }
-    let name = format!("law {} after {}", B::LAW, A::LAW);
+    let name = format!("{} after {}", B::NAME, A::NAME);
     println!("{name}: {height_error_m:.3} m and {tilt_rad:.3} rad at most");
     assert!(height_error_m < 0.3 && tilt_rad < 0.6, "{name}: {height_error_m} m, {tilt_rad} rad");
     let (roll_rad, pitch_rad, _) = flight.state.body.attitude_WB.euler_angles();
@@ -191,27 +194,30 @@ fn a_predecessor_gone_mad_is_not_gone_on_from() {
     let [(_, pid), (_, cascade), ..] = laws();
     let (Law::Pid(pid), Law::Cascade(cascade)) = (pid, cascade) else { unreachable!("as `laws` says") };
     for mad in [f64::NAN, f64::INFINITY, 1e9, -1e9] {
-        let go_mad = |memory: &mut ControllerState| {
-            (memory.thrust, memory.torque) = (mad, [mad; 3]);
+        let go_mad = |state: &mut ControllerState| {
+            (state.thrust, state.torque) = (mad, [mad; 3]);
         };
         assert_outlives(&pid, &cascade, go_mad);
         assert_outlives(&pid, &lqr(), go_mad);
         assert_outlives(&pid, &geometric(), go_mad);
     }
-    assert_outlives(&pid, &lqr(), |memory| memory.integrals.altitude_m_s2 = f64::NAN);
+    assert_outlives(&pid, &lqr(), |state| state.integrals.lift = f64::NAN);
 }
 
 #[test]
 fn what_a_tracking_law_gone_mad_foresaw_is_not_gone_on_from() {
     for mad in [f64::NAN, f64::INFINITY, 1e9, -1e9] {
-        let go_mad = |memory: &mut ControllerState| {
-            (memory.thrust_made, memory.thrust_made_rate) = (mad, mad);
-            (memory.torque_made, memory.torque_made_rate) = ([mad; 3], [mad; 3]);
-            memory.velocity_foreseen = [mad; 3];
+        let go_mad = |state: &mut ControllerState| {
+            let foresight: &mut ForesightState = state.law_state_mut();
+            (foresight.thrust_made, foresight.thrust_made_rate) = (mad, mad);
+            (foresight.torque_made, foresight.torque_made_rate) = ([mad; 3], [mad; 3]);
+            foresight.observer.velocity_foreseen = [mad; 3];
         };
         assert_outlives(&lqr(), &geometric(), go_mad);
         assert_outlives(&geometric(), &lqr(), go_mad);
-        assert_outlives(&geometric(), &lqr(), |memory| memory.position_integral = [mad; 3]);
-        assert_outlives(&lqr(), &geometric(), |memory| (memory.thrust, memory.torque) = (mad, [mad; 3]));
+        assert_outlives(&geometric(), &lqr(), |state| {
+            state.law_state_mut::<ForesightState>().observer.answer = [mad; 3];
+        });
+        assert_outlives(&lqr(), &geometric(), |state| (state.thrust, state.torque) = (mad, [mad; 3]));
     }
 }

@@ -1,0 +1,64 @@
+//! The vehicle as its controllers know it: its file, the allocation to its rotors, and what the loops need of both.
+#![allow(non_snake_case, reason = "a trailing _B names the frame a vector is written in, _N the newton")]
+
+use crate::allocation::{Allocation, AllocationError, RotorSet, THRUST_RESERVE};
+use nalgebra::Vector3;
+use std::path::Path;
+use vehicles::Vehicle;
+
+/// A vehicle, and how its rotors are reached.
+#[derive(Debug, Clone)]
+pub struct ControlledVehicle {
+    /// The vehicle.
+    pub vehicle: Vehicle,
+    /// The allocation to its rotors.
+    pub allocation: Allocation,
+}
+
+impl ControlledVehicle {
+    /// The vehicle of the file at `path`.
+    ///
+    /// # Errors
+    /// The file is refused, or four such rotors cannot be allocated to.
+    pub fn load(path: &Path) -> Result<Self, String> {
+        let vehicle = Vehicle::load(path).map_err(|error| error.to_string())?;
+        Self::new(vehicle).map_err(|error| error.to_string())
+    }
+
+    /// `vehicle` with its allocation.
+    ///
+    /// # Errors
+    /// Four such rotors cannot be allocated to.
+    pub fn new(vehicle: Vehicle) -> Result<Self, AllocationError> {
+        let allocation = Allocation::new(&RotorSet::from(&vehicle))?;
+        Ok(Self { vehicle, allocation })
+    }
+
+    /// What the loops about hover have to know of it. Products of inertia are left to the loops.
+    #[must_use]
+    pub fn hover_model(&self) -> HoverModel {
+        let (thrust_min_N, thrust_max_N) = self.allocation.thrust_range_N(THRUST_RESERVE);
+        HoverModel {
+            mass_kg: self.vehicle.mass_kg,
+            inertia_B_kg_m2: self.vehicle.inertia_kg_m2.diagonal(),
+            gravity_m_s2: self.vehicle.gravity_m_s2,
+            thrust_min_N,
+            thrust_max_N,
+        }
+    }
+}
+
+/// The part of a vehicle that the loops about hover have to know.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct HoverModel {
+    /// Mass, kg.
+    pub mass_kg: f64,
+    /// Moments of inertia about body x, y and z, kg·m².
+    pub inertia_B_kg_m2: Vector3<f64>,
+    /// Gravity, m/s².
+    pub gravity_m_s2: f64,
+    /// The least thrust to demand, N; see [`Allocation::thrust_range_N`].
+    pub thrust_min_N: f64,
+    /// The greatest thrust to demand, N.
+    pub thrust_max_N: f64,
+}

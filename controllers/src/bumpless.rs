@@ -1,0 +1,115 @@
+//! Bumpless transfer (K. J. Åström and T. Hägglund, "Advanced PID Control", section 3.5): a law goes on after another
+//! without a jump of the demanded wrench.
+//!
+//! A law finds its own state as it left it. Of another's it takes what means the same to all, the integrators, and
+//! sets the rest by what is measured. What was asked for last and the successor does not ask for is added to its demand
+//! and fades out ([`TIME_CONSTANT_S`]).
+#![allow(non_snake_case, reason = "a trailing _B names the frame a vector is written in, _N the newton")]
+
+use crate::allocation::RotorWrench;
+use crate::control::{ControlInput, ControlOutput, within};
+use crate::controller_state::{ControllerState, LawId};
+use crate::law::{Law, Predecessor};
+use nalgebra::Vector3;
+use vehicles::Vehicle;
+
+/// With which time constant the part of a predecessor's wrench fades that its successor does not ask for, s.
+/// Tuned, no source: about that of the Hummingbird's motors, which would smooth a jump likewise.
+const TIME_CONSTANT_S: f64 = 0.1;
+
+/// The most of a predecessor's acceleration that fades, m/s². Tuned, no source: what is more is a fault that
+/// is not to be prolonged.
+const ACCELERATION_MAX_M_S2: f64 = 3.0;
+
+/// The same of its angular acceleration, rad/s². Tuned, no source.
+const ACCELERATION_MAX_RAD_S2: f64 = 10.0;
+
+/// The transfer to one law on one vehicle.
+#[derive(Debug, Clone, Copy)]
+pub struct BumplessTransfer {
+    id: LawId,
+    thrust_max_N: f64,
+    torque_max_N_m: Vector3<f64>,
+    /// What one period leaves of what fades.
+    fade: f64,
+}
+
+impl BumplessTransfer {
+    /// The transfer to an `L` that is stepped every `period_s` on `vehicle`.
+    #[must_use]
+    pub fn to<L: Law>(vehicle: &Vehicle, period_s: f64) -> Self {
+        Self {
+            id: LawId::of::<L>(),
+            thrust_max_N: vehicle.mass_kg * ACCELERATION_MAX_M_S2,
+            torque_max_N_m: vehicle.inertia_kg_m2.diagonal() * ACCELERATION_MAX_RAD_S2,
+            fade: libm::exp(-period_s / TIME_CONSTANT_S),
+        }
+    }
+
+    /// One step of `law`, the one that this transfer was made for: takes over where another law flew before, asks, and
+    /// remembers what it asked for. `last_wrench` is that of the predecessor's last command, where no state was
+    /// transferred.
+    pub fn step<L: Law>(
+        &self,
+        law: &L,
+        state: &mut ControllerState,
+        input: &ControlInput<'_>,
+        last_wrench: Option<RotorWrench>,
+    ) -> ControlOutput {
+        self.take_over(law, state, input, last_wrench);
+        let last = state.wrench();
+        let mut output = law.step(state.law_state_mut(), &last, input);
+        output.wrench = self.with_residual(state, &output.wrench);
+        state.id = self.id;
+        state.integrals = output.integrals;
+        state.set_wrench(&output.wrench);
+        output
+    }
+
+    /// Where this is the first tick after another law flew, goes on from what that one asked for.
+    fn take_over<L: Law>(
+        &self,
+        law: &L,
+        state: &mut ControllerState,
+        input: &ControlInput<'_>,
+        last_wrench: Option<RotorWrench>,
+    ) {
+        let is_anothers = !state.is_new() && state.id != self.id;
+        if let Some(wrench) = last_wrench.or_else(|| is_anothers.then(|| state.wrench())) {
+            let from = Predecessor {
+                wrench,
+                integrals: (!state.is_new()).then_some(state.integrals),
+                state: (state.id.state == self.id.state).then(|| state.law_state()),
+            };
+            let mut start = law.take_over(&from, input);
+            *state = ControllerState::default();
+            *state.law_state_mut() = start.state;
+            state.set_wrench(&start.wrench);
+            let asked = law.step(&mut start.state, &start.wrench, input).wrench;
+            self.keep_residual(state, &wrench, &asked);
+        } else if state.is_new() {
+            let start = law.start(input);
+            *state.law_state_mut() = start.state;
+            state.set_wrench(&start.wrench);
+        }
+    }
+
+    /// Notes what of `wrench` the law does not ask for itself, within what a sane law asks for.
+    fn keep_residual(&self, state: &mut ControllerState, wrench: &RotorWrench, asked: &RotorWrench) {
+        let missing_B_N_m = wrench.torque_B_N_m - asked.torque_B_N_m;
+        state.residual_thrust = within(wrench.thrust_N - asked.thrust_N, self.thrust_max_N);
+        state.residual_torque =
+            std::array::from_fn(|axis| within(missing_B_N_m[axis], self.torque_max_N_m[axis]));
+    }
+
+    /// `asked` with what is left of the predecessor's wrench, which fades by one period.
+    fn with_residual(&self, state: &mut ControllerState, asked: &RotorWrench) -> RotorWrench {
+        let wrench = RotorWrench {
+            thrust_N: asked.thrust_N + state.residual_thrust,
+            torque_B_N_m: asked.torque_B_N_m + Vector3::from(state.residual_torque),
+        };
+        state.residual_thrust *= self.fade;
+        state.residual_torque = state.residual_torque.map(|torque_N_m| torque_N_m * self.fade);
+        wrench
+    }
+}

@@ -1,0 +1,118 @@
+//! What a control law reads and answers at a tick.
+#![allow(
+    non_snake_case,
+    reason = "a trailing _W or _B names the frame a vector is written in, _N the newton"
+)]
+
+use crate::allocation::RotorWrench;
+use crate::set_points::SetPoint;
+use bus::messages::{Reference, WallEstimate};
+use nalgebra::{UnitQuaternion, Vector3};
+
+/// The vehicle's motion as its estimators believe it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct MotionEstimate {
+    /// Position of the centre of mass in the world, m.
+    pub position_W_m: Vector3<f64>,
+    /// Velocity of the centre of mass in the world, m/s.
+    pub velocity_W_m_s: Vector3<f64>,
+    /// Attitude, body to world.
+    pub attitude_WB: UnitQuaternion<f64>,
+    /// Angular rate of the body against the world, body axes, rad/s.
+    pub angular_velocity_B_rad_s: Vector3<f64>,
+}
+
+/// What a law reads at a tick.
+#[derive(Debug, Clone, Copy)]
+pub struct ControlInput<'a> {
+    /// The vehicle's motion.
+    pub motion: MotionEstimate,
+    /// What the pilot asks for; the default where no pilot is wired.
+    pub set_point: SetPoint,
+    /// Where the trajectory is; zero where none is wired.
+    pub reference: &'a Reference,
+    /// What the range finders see; zero where none are wired.
+    pub walls: &'a WallEstimate,
+    /// Simulation time.
+    pub time_ns: u64,
+}
+
+/// What a law answers: the wrench to make, and what it reports beside it.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct ControlOutput {
+    /// The wrench.
+    pub wrench: RotorWrench,
+    /// What of it the integrators ask for.
+    pub integrals: Integrals,
+    /// What the inner loops hold.
+    pub set_point: SetPoint,
+    /// What the outer loop asks for: velocity along the heading's level x and y, m/s.
+    pub velocity_m_s: [f64; 2],
+    /// The state of the guidance; each guidance numbers its own.
+    pub phase: u32,
+    /// Laps flown.
+    pub laps: u32,
+}
+
+/// What the integrators of a law ask for, in units that mean the same to all laws.
+///
+/// They are accelerations, not integrals of an error, so that a successor with other gains goes on without a jump.
+#[derive(Debug, Clone, Copy, PartialEq, Default, bus::Message)]
+#[repr(C)]
+#[message(type_name = "hummingbus_msgs/msg/ControlIntegrals")]
+pub struct Integrals {
+    /// Vertical acceleration.
+    #[field(unit = "m/s^2", frame = "world")]
+    pub lift: f64,
+    /// Angular accelerations for roll, pitch and yaw; zero under `lqr` and `geometric`, which observe a lift alone.
+    #[field(unit = "rad/s^2", frame = "body")]
+    pub turn: [f64; 3],
+}
+
+/// The motion as the loops about hover see it: height, climb, the three angles and the body rates.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct HoverMotion {
+    /// Height, m.
+    pub altitude_m: f64,
+    /// Rate of climb, m/s.
+    pub climb_rate_m_s: f64,
+    /// Roll, rad.
+    pub roll_rad: f64,
+    /// Pitch, positive for nose down, rad.
+    pub pitch_rad: f64,
+    /// Yaw, counter-clockwise from above, rad.
+    pub yaw_rad: f64,
+    /// Angular rate of the body against the world, body axes, rad/s.
+    pub angular_velocity_B_rad_s: Vector3<f64>,
+}
+
+impl HoverMotion {
+    /// The estimated motion, height and climb in the world.
+    #[must_use]
+    pub fn of(motion: &MotionEstimate) -> Self {
+        let (roll_rad, pitch_rad, yaw_rad) = motion.attitude_WB.euler_angles();
+        Self {
+            altitude_m: motion.position_W_m.z,
+            climb_rate_m_s: motion.velocity_W_m_s.z,
+            roll_rad,
+            pitch_rad,
+            yaw_rad,
+            angular_velocity_B_rad_s: motion.angular_velocity_B_rad_s,
+        }
+    }
+
+    /// The same with height and climb by the beam downwards.
+    #[must_use]
+    pub fn by_ranges(input: &ControlInput<'_>) -> Self {
+        Self {
+            altitude_m: input.walls.height,
+            climb_rate_m_s: input.walls.climb_rate,
+            ..Self::of(&input.motion)
+        }
+    }
+}
+
+/// `value` cut to ±`max`; nothing of a value that is not a number.
+pub(crate) fn within(value: f64, max: f64) -> f64 {
+    if value.is_nan() { 0.0 } else { value.clamp(-max, max) }
+}
