@@ -5,7 +5,7 @@
 use bus::component::{Component, Info, StepError};
 use bus::context::{NodeContext, StepContext};
 use bus::messages::{MotorCommand, Quaternion, SetPoint, StateEstimate};
-use bus::{BusError, InputPorts, OutputPorts};
+use bus::{BusError, InputPorts, OutputPorts, ParameterError};
 use serde::Deserialize;
 
 /// What the manifest's `parameters` table holds; gains from an error to motor counts.
@@ -41,7 +41,7 @@ impl Component for Controller {
     type Outputs = Outputs;
     type State = ();
 
-    fn new(gains: Gains, _: &NodeContext<'_>) -> Result<Self, String> {
+    fn new(gains: Gains, _: &NodeContext<'_>) -> Result<Self, ParameterError> {
         Ok(Self(gains))
     }
 

@@ -232,6 +232,7 @@ fn no_number_of_shipped_gains_brings_a_law_down() {
         assert_eq!((kind.check)(&parameters, &NodeContext::new("node", &[])), Ok(()));
         let (_, refused) = try_all(&folder, &file, stride(2), || {
             (kind.check)(&parameters, &NodeContext::new("node", &[]))
+                .map_err(|error| error.to_string())
                 .map_err(|words| if words.contains(".toml:") { words } else { format!("{file}: {words}") })
         });
         assert!(refused > 10, "only {refused} refusals of {name}");

@@ -5,6 +5,7 @@ use crate::context::{NodeContext, StepContext};
 use crate::message::Message;
 use crate::ports::{InputPorts, OutputPorts};
 use crate::schema::Schema;
+use diagnostics::ParameterError;
 use serde::de::DeserializeOwned;
 
 /// What goes wrong in a step, in words. Any error, and any text, becomes one by `?` or `into`.
@@ -47,7 +48,7 @@ pub type StepError = Box<dyn std::error::Error + Send + Sync>;
 ///     type Outputs = Outputs;
 ///     type State = ();
 ///
-///     fn new(parameters: Parameters, _: &NodeContext<'_>) -> Result<Self, String> {
+///     fn new(parameters: Parameters, _: &NodeContext<'_>) -> Result<Self, bus::ParameterError> {
 ///         Ok(Self(parameters))
 ///     }
 ///
@@ -84,14 +85,14 @@ pub trait Component: Sized {
     /// Makes the component, for a check of the manifest as for a run.
     ///
     /// # Errors
-    /// A parameter or a file that cannot be meant, its key in backticks.
-    fn new(parameters: Self::Parameters, context: &NodeContext<'_>) -> Result<Self, String>;
+    /// A parameter or a file that cannot be meant.
+    fn new(parameters: Self::Parameters, context: &NodeContext<'_>) -> Result<Self, ParameterError>;
 
     /// Tries the component before a run, in a check: what goes wrong, or is odd, although each parameter can be meant.
     ///
     /// # Errors
-    /// What goes wrong, the keys to blame in backticks.
-    fn rehearse(self, _context: &NodeContext<'_>) -> Result<(), String> {
+    /// What goes wrong.
+    fn rehearse(self, _context: &NodeContext<'_>) -> Result<(), ParameterError> {
         Ok(())
     }
 

@@ -26,8 +26,10 @@ pub struct NodeContext<'a> {
 /// What is odd about a node in its run.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Warning {
-    /// A parameter is named in backticks, as in an error.
-    pub words: String,
+    /// The parameter that it is about; empty where it is none in particular.
+    pub key: String,
+    /// What is odd.
+    pub message: String,
     /// Whether it is odd only because the run ends so early.
     pub is_behind_end: bool,
 }
@@ -90,14 +92,18 @@ impl<'a> NodeContext<'a> {
         (1_000_000_000 / self.tick_ns.max(1)) as u32
     }
 
-    /// Leaves a warning: what is odd and flies all the same. A parameter is named in backticks, as in an error.
-    pub fn warn(&self, words: impl Into<String>) {
-        self.warnings.borrow_mut().push(Warning { words: words.into(), is_behind_end: false });
+    /// Leaves a warning: what is odd about the parameter `key` and flies all the same.
+    pub fn warn(&self, key: &str, message: impl Into<String>) {
+        self.push(key, message.into(), false);
     }
 
     /// Leaves a warning of what a longer run would come to.
-    pub fn warn_behind_end(&self, words: impl Into<String>) {
-        self.warnings.borrow_mut().push(Warning { words: words.into(), is_behind_end: true });
+    pub fn warn_behind_end(&self, key: &str, message: impl Into<String>) {
+        self.push(key, message.into(), true);
+    }
+
+    fn push(&self, key: &str, message: String, is_behind_end: bool) {
+        self.warnings.borrow_mut().push(Warning { key: key.to_owned(), message, is_behind_end });
     }
 
     /// The warnings left so far.

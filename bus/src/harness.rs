@@ -4,7 +4,7 @@ use crate::component::{Component, StepError};
 use crate::context::{NodeContext, StepContext};
 use crate::message::sample_words;
 use crate::ports::{OutputPorts, OutputSamples, PortSpec, SampleSink, SampleSource};
-use crate::registration::read_parameters;
+use diagnostics::ParameterError;
 
 /// A component with its state and its time, stepped by hand.
 ///
@@ -27,7 +27,7 @@ impl<C: Component> Harness<C> {
     ///
     /// # Errors
     /// As [`Component::new`].
-    pub fn new(parameters: C::Parameters) -> Result<Self, String> {
+    pub fn new(parameters: C::Parameters) -> Result<Self, ParameterError> {
         Self::in_context(parameters, &NodeContext::new(C::INFO.name, &[]))
     }
 
@@ -35,15 +35,15 @@ impl<C: Component> Harness<C> {
     ///
     /// # Errors
     /// They do not fit, or as [`Component::new`].
-    pub fn from_json(parameters: &serde_json::Value) -> Result<Self, String> {
-        Self::new(read_parameters(parameters)?)
+    pub fn from_json(parameters: &serde_json::Value) -> Result<Self, ParameterError> {
+        Self::new(diagnostics::read(parameters)?)
     }
 
     /// A component as the node that `context` tells of.
     ///
     /// # Errors
     /// As [`Component::new`].
-    pub fn in_context(parameters: C::Parameters, context: &NodeContext<'_>) -> Result<Self, String> {
+    pub fn in_context(parameters: C::Parameters, context: &NodeContext<'_>) -> Result<Self, ParameterError> {
         let component = C::new(parameters, context)?;
         let state = component.initial();
         let (tick_ns, period_ticks) = (context.tick_ns, context.period_ticks);

@@ -2,9 +2,9 @@
 
 use crate::context::NodeContext;
 use crate::error::BusError;
+use diagnostics::ParameterError;
 
 pub use crate::ports::{Inputs, PortSpec};
-pub use crate::registration::read_parameters;
 
 /// A kind of built-in node.
 #[derive(Clone, Copy, Debug)]
@@ -18,7 +18,7 @@ pub struct NodeKind {
     /// Outputs.
     pub outputs: &'static [PortSpec],
     /// Checks the parameters and the files they name for the run, without running.
-    pub check: fn(&serde_json::Value, &NodeContext<'_>) -> Result<(), String>,
+    pub check: fn(&serde_json::Value, &NodeContext<'_>) -> Result<(), ParameterError>,
     /// Runs the node in this process.
     pub run: fn() -> Result<(), BusError>,
 }

@@ -38,6 +38,7 @@ pub mod user_file;
 pub use bus_derive::{InputPorts, Message, OutputPorts};
 pub use component::Component;
 pub use connected::ConnectedNode;
+pub use diagnostics::ParameterError;
 pub use error::BusError;
 pub use harness::Harness;
 pub use message::Message;

@@ -9,7 +9,7 @@ use crate::message::Message;
 use crate::plan::{NodePlan, Pace, Plan};
 use crate::port::OutPort;
 use crate::ports::{Inputs, PortSpec};
-use crate::registration::{Registration, read_parameters};
+use crate::registration::Registration;
 use crate::run_process::Join;
 use crate::schema::Schema;
 use crate::tick::Tick;
@@ -161,7 +161,7 @@ impl Node {
     /// # Errors
     /// If they do not fit `P`; the error names the key.
     pub fn parameters<P: DeserializeOwned>(&self) -> Result<P, BusError> {
-        read_parameters(&self.node().parameters).map_err(|error| self.error(format!("parameters: {error}")))
+        diagnostics::read(&self.node().parameters).map_err(|error| self.error(format!("parameters: {error}")))
     }
 
     pub(crate) fn raw_parameters(&self) -> &serde_json::Value {

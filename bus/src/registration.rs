@@ -7,7 +7,7 @@ use crate::error::BusError;
 use crate::kind::NodeKind;
 use crate::ports::{InputPorts, InputSamples, Inputs, OutputPorts, OutputSamples, PortSpec};
 use crate::schema::Schema;
-use serde::de::DeserializeOwned;
+use diagnostics::ParameterError;
 use serde_json::Value;
 
 /// A component in a table of components: all that a launcher must know of it.
@@ -26,12 +26,12 @@ pub struct Registration {
     /// What happens to its state when another process takes its place.
     pub transfer: Transfer,
     /// Checks the parameters and the files that they name for a node, without running it.
-    pub check: fn(&Value, &NodeContext<'_>) -> Result<(), String>,
+    pub check: fn(&Value, &NodeContext<'_>) -> Result<(), ParameterError>,
     pub(crate) make: Make,
 }
 
 /// Makes a component.
-pub(crate) type MakeComponent = fn(&Value, &NodeContext<'_>) -> Result<Box<dyn Stepper>, String>;
+pub(crate) type MakeComponent = fn(&Value, &NodeContext<'_>) -> Result<Box<dyn Stepper>, ParameterError>;
 
 /// How a component is made.
 #[derive(Clone, Copy, Debug)]
@@ -76,20 +76,8 @@ impl Registration {
     }
 }
 
-fn make<C: Component>(parameters: &Value, context: &NodeContext<'_>) -> Result<C, String> {
-    C::new(read_parameters(parameters)?, context)
-}
-
-/// Reads the parameters of a component; the error names the key.
-///
-/// # Errors
-/// What does not fit `P`.
-pub fn read_parameters<P: DeserializeOwned>(parameters: &Value) -> Result<P, String> {
-    serde_path_to_error::deserialize(parameters).map_err(|error| {
-        let (path, words) = (error.path().to_string(), error.inner().to_string());
-        // An unknown or missing key is named by the words already.
-        if path == "." || words.contains("field `") { words } else { format!("`{path}`: {words}") }
-    })
+fn make<C: Component>(parameters: &Value, context: &NodeContext<'_>) -> Result<C, ParameterError> {
+    C::new(diagnostics::read(parameters)?, context)
 }
 
 /// A component that was made, without its type; its state is kept by whoever steps it.

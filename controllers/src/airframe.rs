@@ -2,6 +2,7 @@
 #![allow(non_snake_case, reason = "a trailing _B names the frame a vector is written in, _N the newton")]
 
 use crate::allocation::{Allocation, AllocationError, RotorSet, THRUST_RESERVE};
+use diagnostics::ParameterError;
 use nalgebra::Vector3;
 use std::path::Path;
 use vehicles::Vehicle;
@@ -20,9 +21,9 @@ impl ControlledVehicle {
     ///
     /// # Errors
     /// The file is refused, or four such rotors cannot be allocated to.
-    pub fn load(path: &Path) -> Result<Self, String> {
-        let vehicle = Vehicle::load(path).map_err(|error| error.to_string())?;
-        Self::new(vehicle).map_err(|error| error.to_string())
+    pub fn load(path: &Path) -> Result<Self, ParameterError> {
+        let vehicle = Vehicle::load(path).map_err(|error| ParameterError::conflict("vehicle", error))?;
+        Self::new(vehicle).map_err(|error| ParameterError::conflict("vehicle", error))
     }
 
     /// `vehicle` with its allocation.

@@ -5,10 +5,10 @@ use crate::airframe::HoverModel;
 use crate::control::{HoverMotion, Integrals, within};
 use crate::gains_file::{self, gain};
 use crate::law::Predecessor;
+use diagnostics::unit::{ACCELERATION, PER_SECOND, PER_SECOND_2, PER_SECOND_3, VELOCITY};
 use serde::Deserialize;
 use vehicles::VehicleError;
 use vehicles::reader::Section;
-use vehicles::units::{ACCELERATION, PER_SECOND, PER_SECOND_2, PER_SECOND_3, VELOCITY};
 
 /// The least cosine of the tilt that is compensated: beyond 60° more thrust would push sideways rather
 /// than up. Tuned, no source.

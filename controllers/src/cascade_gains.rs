@@ -16,10 +16,10 @@
 
 use crate::altitude_loop::AltitudeGains;
 use crate::gains_file::{gain, limit, parse, tilt};
+use diagnostics::unit::{ANGULAR_ACCELERATION, PER_SECOND, PER_SECOND_2, PURE_NUMBER, SPEED, TIME};
 use std::path::Path;
 use vehicles::VehicleError;
 use vehicles::reader::Section;
-use vehicles::units::{ANGULAR_ACCELERATION, PER_SECOND, PER_SECOND_2, PURE_NUMBER, SPEED, TIME};
 
 /// The gains that the law is tuned with.
 const OURS: &str = include_str!("../gains/cascade.toml");

@@ -18,36 +18,6 @@ use bus::messages::{
 use bus::{BusError, Input, Node, Output, Tick};
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 
-/// Refuses a parameter that is not finite.
-///
-/// # Errors
-/// It is not; the text names its key.
-pub(crate) fn finite(key: &str, value: f64) -> Result<(), String> {
-    if value.is_finite() { Ok(()) } else { Err(format!("`{key}` must be a finite number, found {value}")) }
-}
-
-/// Refuses a parameter that is not a finite number above zero.
-///
-/// # Errors
-/// It is not; the text names its key.
-pub(crate) fn positive(key: &str, value: f64, unit: &str) -> Result<(), String> {
-    if value.is_finite() && value > 0.0 {
-        return Ok(());
-    }
-    Err(format!("`{key}` must be a finite number above 0 {unit}, found {value}"))
-}
-
-/// Refuses a parameter that is not above zero and at most `max`.
-///
-/// # Errors
-/// It is not; the text names its key.
-pub(crate) fn positive_up_to(key: &str, value: f64, max: f64, unit: &str) -> Result<(), String> {
-    if value > 0.0 && value <= max {
-        return Ok(());
-    }
-    Err(format!("`{key}` must be above 0 and at most {max} {unit}, found {value}"))
-}
-
 /// Runs `law` on the bus, its demand allocated to the rotors of `craft`.
 ///
 /// # Errors

@@ -9,10 +9,10 @@
 
 use crate::control::MotionEstimate;
 use crate::gains_file::{bandwidth, limit};
+use diagnostics::unit::ACCELERATION;
 use nalgebra::Vector3;
 use vehicles::VehicleError;
 use vehicles::reader::Section;
-use vehicles::units::ACCELERATION;
 
 /// The observer's one number and its limit.
 #[derive(Debug, Clone, Copy, PartialEq)]

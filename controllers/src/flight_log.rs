@@ -1,6 +1,7 @@
 //! A measured flight: rows of a CSV file, read by a column map that states every unit.
 
 use bus::messages::Quaternion;
+use diagnostics::unit::{COUNT, Dimension, LENGTH, PURE_NUMBER, SPEED, TIME, VELOCITY};
 use serde::Deserialize;
 use std::path::{Path, PathBuf};
 use vehicles::quotes::StrayQuote;
@@ -136,14 +137,14 @@ pub enum FlightLogError {
     },
 }
 
-/// The units each quantity may have, with their factor to SI.
-const UNITS: [(&str, &[(&str, f64)]); 6] = [
-    ("time", &[("s", 1.0), ("ms", 1e-3), ("us", 1e-6)]),
-    ("command", &[("count", 1.0)]),
-    ("position", &[("m", 1.0), ("mm", 1e-3)]),
-    ("velocity", &[("m/s", 1.0), ("mm/s", 1e-3)]),
-    ("attitude", &[("1", 1.0)]),
-    ("angular_velocity", &[("rad/s", 1.0), ("deg/s", std::f64::consts::PI / 180.0)]),
+/// The dimension of each quantity.
+const DIMENSIONS: [(&str, Dimension); 6] = [
+    ("time", TIME),
+    ("command", COUNT),
+    ("position", LENGTH),
+    ("velocity", VELOCITY),
+    ("attitude", PURE_NUMBER),
+    ("angular_velocity", SPEED),
 ];
 
 impl FlightLog {
@@ -303,13 +304,11 @@ impl Source<'_> {
 }
 
 fn factor(quantity: &'static str, unit: &str) -> Result<f64, FlightLogError> {
-    let units = UNITS.iter().find(|(name, _)| *name == quantity).map_or(&[][..], |(_, units)| units);
-    units.iter().find(|(name, _)| *name == unit).map(|(_, factor)| *factor).ok_or_else(|| {
-        FlightLogError::Unit {
-            quantity,
-            found: unit.to_owned(),
-            expected: units.iter().map(|(name, _)| format!("`{name}`")).collect::<Vec<_>>().join(" or "),
-        }
+    let found = DIMENSIONS.iter().find(|(name, _)| *name == quantity);
+    found.and_then(|(_, dimension)| dimension.factor(unit)).ok_or_else(|| FlightLogError::Unit {
+        quantity,
+        found: unit.to_owned(),
+        expected: found.map(|(_, dimension)| dimension.names(" or ")).unwrap_or_default(),
     })
 }
 

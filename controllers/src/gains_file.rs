@@ -3,10 +3,11 @@
 //! Each law has a room that says which tables its file has. The file that a law is tuned with is built in, and
 //! serves where the manifest names none.
 
+use diagnostics::parameter::Bounds;
+use diagnostics::unit::Dimension;
 use std::path::Path;
 use vehicles::VehicleError;
-use vehicles::reader::{Bounds, Document, Section};
-use vehicles::units::Dimension;
+use vehicles::reader::{Document, Section};
 
 /// What makes gains of a file's root table.
 pub type Reader<G> = fn(&Section<'_, '_>) -> Result<G, VehicleError>;
@@ -39,16 +40,16 @@ pub fn parse<G>(text: &str, file_name: &str, read: Reader<G>) -> Result<G, Vehic
 /// The most that a gain is, in its unit: a loop that is closed once a tick of 1 µs, the shortest, holds an angle with
 /// less than 4/T², a rate with less than 2/T, and is far from either with every motor.
 pub(crate) const GAIN: Bounds = Bounds {
-    least: 0.0,
-    most: 1e9,
+    min: 0.0,
+    max: 1e9,
     unit: "in SI",
     why: "a negative gain turns a loop against itself, and no run has ticks short enough for a larger one",
 };
 
 /// A limit, a weight's deviation or a time, in its unit: none that is of use to a vehicle is so small or so large.
 const LIMIT: Bounds = Bounds {
-    least: 1e-12,
-    most: 1e12,
+    min: 1e-12,
+    max: 1e12,
     unit: "in SI",
     why: "a limit, a deviation or a time is above 0: less than 1e-12 of any unit lets nothing through, and from 1e12 \
           on squares and products of it are no figures of a vehicle",
@@ -84,11 +85,11 @@ const BANDWIDTH_MAX_RAD_S: f64 = 200.0;
 /// A bandwidth that steps of 1 ms resolve.
 pub(crate) fn bandwidth(section: &Section, name: &'static str) -> Result<f64, VehicleError> {
     let expected = "a bandwidth above 0 and below 200 rad/s, up to which steps of 1 ms resolve it";
-    limit_below(section, name, vehicles::units::SPEED, BANDWIDTH_MAX_RAD_S, expected)
+    limit_below(section, name, diagnostics::unit::SPEED, BANDWIDTH_MAX_RAD_S, expected)
 }
 
 /// A tilt that the altitude loop can make up for.
 pub(crate) fn tilt(section: &Section, name: &'static str) -> Result<f64, VehicleError> {
     let expected = "an angle above 0 and below 60 degrees, up to which the thrust makes up for a tilt";
-    limit_below(section, name, vehicles::units::ANGLE, std::f64::consts::FRAC_PI_3, expected)
+    limit_below(section, name, diagnostics::unit::ANGLE, std::f64::consts::FRAC_PI_3, expected)
 }

@@ -12,10 +12,10 @@
 use crate::disturbance::Observer;
 use crate::gains_file::{self, bandwidth, gain, limit};
 use crate::motor_lag::LagTarget;
+use diagnostics::unit::{ACCELERATION, PER_SECOND, PER_SECOND_2, PURE_NUMBER};
 use std::path::Path;
 use vehicles::VehicleError;
 use vehicles::reader::Section;
-use vehicles::units::{ACCELERATION, PER_SECOND, PER_SECOND_2, PURE_NUMBER};
 
 /// The gains that serve where the manifest names no file.
 const BUILT_IN: &str = include_str!("../gains/geometric.toml");

@@ -5,9 +5,10 @@ use crate::controller;
 use crate::lqr_gains::LqrGains;
 use crate::lqr_law::LqrLaw;
 use crate::rehearsal;
-use bus::kind::{Inputs, NodeKind, PortSpec, read_parameters};
+use bus::kind::{Inputs, NodeKind, PortSpec};
 use bus::messages::{AttitudeEstimate, ControlStatus, MotorCommand, Reference, StateEstimate};
 use bus::{BusError, Message, Node};
+use diagnostics::ParameterError;
 use serde::Deserialize;
 use std::path::PathBuf;
 
@@ -25,7 +26,7 @@ pub const KIND: NodeKind = NodeKind {
         PortSpec::optional("status", ControlStatus::SCHEMA),
     ],
     check: |parameters, run| {
-        let (law, craft) = build(&read_parameters(parameters)?, run.period_s())?;
+        let (law, craft) = build(&diagnostics::read(parameters)?, run.period_s())?;
         rehearsal::check(&law, &craft, run)
     },
     run,
@@ -41,9 +42,10 @@ struct Parameters {
     gains: Option<PathBuf>,
 }
 
-fn build(parameters: &Parameters, period_s: f64) -> Result<(LqrLaw, ControlledVehicle), String> {
+fn build(parameters: &Parameters, period_s: f64) -> Result<(LqrLaw, ControlledVehicle), ParameterError> {
     let craft = ControlledVehicle::load(&parameters.vehicle)?;
-    let gains = LqrGains::load(parameters.gains.as_deref()).map_err(|error| error.to_string())?;
+    let gains = LqrGains::load(parameters.gains.as_deref())
+        .map_err(|error| ParameterError::conflict("gains", error))?;
     Ok((LqrLaw::new(gains, &craft, period_s)?, craft))
 }
 

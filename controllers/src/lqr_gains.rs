@@ -3,10 +3,10 @@
 
 use crate::disturbance::Observer;
 use crate::gains_file::{self, limit};
+use diagnostics::unit::{ANGLE, Dimension, LENGTH, SPEED, TORQUE, VELOCITY};
 use std::path::Path;
 use vehicles::VehicleError;
 use vehicles::reader::Section;
-use vehicles::units::{ANGLE, Dimension, LENGTH, SPEED, TORQUE, VELOCITY};
 
 /// The weights that serve where the manifest names no file.
 const BUILT_IN: &str = include_str!("../gains/lqr.toml");

@@ -23,6 +23,7 @@ use crate::motor_lag::Made;
 use crate::riccati;
 use crate::set_points::SetPoint;
 use crate::trajectory::Point;
+use diagnostics::ParameterError;
 use nalgebra::{Matrix3, Rotation3, SMatrix, SVector, Vector3};
 
 /// The law at one period: all that does not change during a run.
@@ -49,16 +50,15 @@ impl LqrLaw {
     ///
     /// # Errors
     /// The Riccati equation has no solution that stabilises the vehicle, or none that can be computed.
-    pub fn new(gains: LqrGains, craft: &ControlledVehicle, period_s: f64) -> Result<Self, String> {
+    pub fn new(gains: LqrGains, craft: &ControlledVehicle, period_s: f64) -> Result<Self, ParameterError> {
         let vehicle = &craft.vehicle;
         let (state_weights, input_weights) = lqr_model::weights(&gains);
         let regulator = lqr_model::step(vehicle, period_s).and_then(|step| {
             riccati::regulator(&step.transition, &step.input, &state_weights, &input_weights)
         });
-        let regulator = regulator.ok_or(
-            "the Riccati equation for this `vehicle` and these `gains` has no stabilising solution that can be \
+        let regulator = regulator.ok_or_else(|| ParameterError::conflict("vehicle", "the Riccati equation for this `vehicle` and these `gains` has no stabilising solution that can be \
              computed: look for a vehicle without gravity, or weights that are many orders of magnitude apart",
-        )?;
+        ))?;
         Ok(Self {
             gains,
             gain: regulator.gain,

@@ -5,9 +5,10 @@ use crate::controller;
 use crate::pid_gains::GivenGains;
 use crate::pid_law::PidLaw;
 use crate::rehearsal;
-use bus::kind::{Inputs, NodeKind, PortSpec, read_parameters};
+use bus::kind::{Inputs, NodeKind, PortSpec};
 use bus::messages::{AttitudeEstimate, ControlStatus, MotorCommand, SetPoint, StateEstimate};
 use bus::{BusError, Message, Node};
+use diagnostics::ParameterError;
 use serde::Deserialize;
 use std::path::PathBuf;
 
@@ -25,7 +26,7 @@ pub const KIND: NodeKind = NodeKind {
         PortSpec::optional("status", ControlStatus::SCHEMA),
     ],
     check: |parameters, run| {
-        let (law, craft) = build(&read_parameters(parameters)?, run.period_s())?;
+        let (law, craft) = build(&diagnostics::read(parameters)?, run.period_s())?;
         rehearsal::check(&law, &craft, run)
     },
     run,
@@ -42,7 +43,7 @@ struct Parameters {
     gains: GivenGains,
 }
 
-fn build(parameters: &Parameters, period_s: f64) -> Result<(PidLaw, ControlledVehicle), String> {
+fn build(parameters: &Parameters, period_s: f64) -> Result<(PidLaw, ControlledVehicle), ParameterError> {
     let craft = ControlledVehicle::load(&parameters.vehicle)?;
     let gains = parameters.gains.gains()?;
     Ok((PidLaw { gains, vehicle: craft.hover_model(), period_s }, craft))

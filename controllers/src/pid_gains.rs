@@ -27,13 +27,14 @@
 //! `pid-thesis.toml`; the former is built in.
 
 use crate::altitude_loop::{AltitudeGains, LoopGains};
-use crate::gains_file::{gain, parse, tilt};
+use crate::gains_file::{GAIN, gain, parse, tilt};
+use diagnostics::parameter::{ParameterError, require};
+use diagnostics::unit::ANGULAR_ACCELERATION;
 use serde::Deserialize;
 use serde::de::{MapAccess, Visitor, value::MapAccessDeserializer};
 use std::path::{Path, PathBuf};
 use vehicles::VehicleError;
 use vehicles::reader::Section;
-use vehicles::units::ANGULAR_ACCELERATION;
 
 /// The gains that the law is tuned with.
 const OURS: &str = include_str!("../gains/pid.toml");
@@ -118,34 +119,21 @@ impl PidGains {
     }
 
     /// Refuses what a gains file could not say either.
-    fn check(&self) -> Result<(), String> {
+    fn check(&self) -> Result<(), ParameterError> {
         let loops =
             [("altitude", self.altitude), ("roll", self.roll), ("pitch", self.pitch), ("yaw", self.yaw)];
         for (name, of) in loops {
-            not_negative(name, "proportional_1_s2", of.proportional_1_s2)?;
-            not_negative(name, "integral_1_s3", of.integral_1_s3)?;
-            not_negative(name, "derivative_1_s", of.derivative_1_s)?;
+            GAIN.check(&format!("{name}.proportional_1_s2"), of.proportional_1_s2)?;
+            GAIN.check(&format!("{name}.integral_1_s3"), of.integral_1_s3)?;
+            GAIN.check(&format!("{name}.derivative_1_s"), of.derivative_1_s)?;
         }
-        not_negative("", "altitude_integral_climb_max_m_s", self.altitude_integral_climb_max_m_s)?;
-        not_negative("", "altitude_integral_max_m_s2", self.altitude_integral_max_m_s2)?;
-        not_negative("", "attitude_integral_max_rad_s2", self.attitude_integral_max_rad_s2)?;
+        GAIN.check("altitude_integral_climb_max_m_s", self.altitude_integral_climb_max_m_s)?;
+        GAIN.check("altitude_integral_max_m_s2", self.altitude_integral_max_m_s2)?;
+        GAIN.check("attitude_integral_max_rad_s2", self.attitude_integral_max_rad_s2)?;
         let tilt_rad = self.tilt_command_max_rad;
-        if tilt_rad > 0.0 && tilt_rad < std::f64::consts::FRAC_PI_3 {
-            return Ok(());
-        }
-        Err(format!(
-            "`gains`: `tilt_command_max_rad` must be above 0 and below 1.0472 (60 deg), found {tilt_rad}"
-        ))
+        let is_good = tilt_rad > 0.0 && tilt_rad < std::f64::consts::FRAC_PI_3;
+        require("tilt_command_max_rad", tilt_rad, is_good, "above 0 and below 1.0472 (60 deg)")
     }
-}
-
-fn not_negative(table: &str, key: &str, value: f64) -> Result<(), String> {
-    if crate::gains_file::GAIN.contains(value) {
-        return Ok(());
-    }
-    let dot = if table.is_empty() { "" } else { "." };
-    let most = crate::gains_file::GAIN.most;
-    Err(format!("`gains`: `{table}{dot}{key}` must be a number from 0 to {most:e}, found {value}"))
 }
 
 /// The gains as a manifest gives them: a table of parameters, or a gains file.
@@ -162,10 +150,12 @@ impl GivenGains {
     ///
     /// # Errors
     /// The file or a number is refused; the text names the key.
-    pub fn gains(&self) -> Result<PidGains, String> {
+    pub fn gains(&self) -> Result<PidGains, ParameterError> {
         match self {
-            GivenGains::Table(gains) => gains.check().map(|()| *gains),
-            GivenGains::File(path) => PidGains::load(path).map_err(|error| error.to_string()),
+            GivenGains::Table(gains) => gains.check().map(|()| *gains).map_err(|error| error.within("gains")),
+            GivenGains::File(path) => {
+                PidGains::load(path).map_err(|error| ParameterError::conflict("gains", error))
+            }
         }
     }
 }
@@ -231,10 +221,10 @@ mod tests {
         assert!(error.contains("attitude.command_max") && error.contains("below 60"), "{error}");
         let error = refused("unit = \"deg\"", "unit = \"m\"");
         assert!(error.contains("\"rad\", \"deg\""), "{error}");
-        let table = |text| GivenGains::Table(toml::from_str(text).unwrap()).gains().unwrap_err();
+        let table = |text| GivenGains::Table(toml::from_str(text).unwrap()).gains().unwrap_err().to_string();
         let error = table("yaw = { proportional_1_s2 = 1, integral_1_s3 = -1, derivative_1_s = 1 }");
-        assert!(error.contains("`yaw.integral_1_s3`") && error.contains("found -1"), "{error}");
-        assert!(table("tilt_command_max_rad = 2").contains("`tilt_command_max_rad` must be"));
+        assert!(error.contains("`gains.yaw.integral_1_s3`") && error.contains("found -1"), "{error}");
+        assert!(table("tilt_command_max_rad = 2").contains("`gains.tilt_command_max_rad` must be"));
     }
 
     #[test]
@@ -244,7 +234,7 @@ mod tests {
         assert!(matches!(given("{}").unwrap(), GivenGains::Table(gains) if gains == PidGains::default()));
         assert!(given("3").unwrap_err().to_string().contains("a table of gains or the path"));
         assert!(given("{\"rol\": 1}").unwrap_err().to_string().contains("unknown field `rol`"));
-        let error = GivenGains::File("no-such.toml".into()).gains().unwrap_err();
+        let error = GivenGains::File("no-such.toml".into()).gains().unwrap_err().to_string();
         assert!(error.contains("no-such.toml") && error.contains("cannot read"), "{error}");
     }
 

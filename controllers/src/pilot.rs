@@ -6,6 +6,7 @@ use bus::OutputPorts;
 use bus::component::{Component, Info, StepError};
 use bus::context::{NodeContext, StepContext};
 use bus::messages::SetPoint;
+use diagnostics::ParameterError;
 use serde::Deserialize;
 use std::path::PathBuf;
 
@@ -26,7 +27,7 @@ pub struct Parameters {
 fn warn_of_late(entries: &[SetPointEntry], run: &NodeContext<'_>) {
     let end_s = run.duration_s();
     for (index, entry) in entries.iter().enumerate().filter(|(_, entry)| entry.at_s >= end_s) {
-        run.warn_behind_end(format!(
+        run.warn_behind_end("set_points", format!(
             "`set_points`: set point {index} (the first is 0): `at_s` is {} s, and the run ends at {end_s} s: it never \
              acts",
             entry.at_s
@@ -58,25 +59,31 @@ impl Component for Pilot {
     type Outputs = Outputs;
     type State = ();
 
-    fn new(parameters: Parameters, context: &NodeContext<'_>) -> Result<Self, String> {
+    fn new(parameters: Parameters, context: &NodeContext<'_>) -> Result<Self, ParameterError> {
         let altitude_m = parameters.initial_altitude_m;
         if !ALTITUDES_M.contains(&altitude_m) {
-            return Err(format!("`initial_altitude_m` is {altitude_m} m, expected {ALTITUDES_EXPECTED}"));
+            return Err(ParameterError::conflict(
+                "initial_altitude_m",
+                format!("`initial_altitude_m` is {altitude_m} m, expected {ALTITUDES_EXPECTED}"),
+            ));
         }
         let initial = Values { altitude_m: parameters.initial_altitude_m, ..Values::default() };
         let schedule = Schedule::new(&parameters.set_points, &initial, context.rate_hz())
-            .map_err(|error| format!("`set_points`: {error}"))?;
+            .map_err(|error| ParameterError::conflict("set_points", format_args!("`set_points`: {error}")))?;
         let sticks = parameters.data.as_deref().map(Sticks::load).transpose();
-        let sticks = sticks.map_err(|error| error.to_string())?;
+        let sticks = sticks.map_err(|error| ParameterError::conflict("data", error))?;
         let taken = |entry: &&SetPointEntry| sticks.as_ref().is_some_and(|it| it.has(&entry.channel));
         match parameters.set_points.iter().find(taken) {
             None => {
                 warn_of_late(&parameters.set_points, context);
                 Ok(Self { schedule, sticks })
             }
-            Some(entry) => Err(format!(
-                "`set_points` has an entry on channel {}, which the sticks in `data` hold; leave one of them out",
-                entry.channel
+            Some(entry) => Err(ParameterError::conflict(
+                "set_points",
+                format!(
+                    "`set_points` has an entry on channel {}, which the sticks in `data` hold; leave one of them out",
+                    entry.channel
+                ),
             )),
         }
     }
@@ -108,7 +115,7 @@ mod tests {
     use super::*;
     use bus::Registration;
 
-    fn pilot(more: &str) -> Result<Pilot, String> {
+    fn pilot(more: &str) -> Result<Pilot, ParameterError> {
         let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../manifests/sticks/roll.csv");
         let text = format!("initial_altitude_m = 1.5\ndata = {path:?}\n{more}");
         Pilot::new(toml::from_str(&text).unwrap(), &NodeContext::new("pilot", &[]))
@@ -129,7 +136,7 @@ mod tests {
         let run = NodeContext::new("node", &[]).timed(1_000_000, 1, 1000);
         assert_eq!((Registration::of::<Pilot>().check)(&parameters, &run), Ok(()));
         let warnings = run.into_warnings();
-        assert!(warnings.len() == 1 && warnings[0].words.contains("set point 1"), "{warnings:?}");
+        assert!(warnings.len() == 1 && warnings[0].message.contains("set point 1"), "{warnings:?}");
     }
 
     #[test]
@@ -140,8 +147,9 @@ mod tests {
             serde_json::json!({"initial_altitude_m": -100_000.0}),
             serde_json::json!({"initial_altitude_m": 1.0, "set_points": [step]}),
         ] {
-            let words =
-                (Registration::of::<Pilot>().check)(&parameters, &NodeContext::new("node", &[])).unwrap_err();
+            let words = (Registration::of::<Pilot>().check)(&parameters, &NodeContext::new("node", &[]))
+                .unwrap_err()
+                .to_string();
             assert!(words.contains("-20 000 m to 20 000 m") && words.contains("00000 m"), "{words}");
         }
     }
@@ -149,7 +157,7 @@ mod tests {
     #[test]
     fn a_schedule_on_a_channel_of_the_sticks_is_refused() {
         let roll = r#"{kind="step", channel="roll", at_s=2.0, to=5.0, unit="deg"}"#;
-        let error = pilot(&format!("set_points = [{roll}]")).unwrap_err();
+        let error = pilot(&format!("set_points = [{roll}]")).unwrap_err().to_string();
         assert!(error.contains("channel roll") && error.contains("`set_points`"), "{error}");
     }
 }

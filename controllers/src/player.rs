@@ -2,9 +2,10 @@
 
 use crate::flight_log::{ColumnMap, FlightLog, Row};
 use bus::context::NodeContext;
-use bus::kind::{Inputs, NodeKind, PortSpec, read_parameters};
+use bus::kind::{Inputs, NodeKind, PortSpec};
 use bus::messages::{MeasuredState, MotorCommand};
 use bus::{BusError, Message, Node};
+use diagnostics::ParameterError;
 use serde::Deserialize;
 use std::path::PathBuf;
 
@@ -18,7 +19,7 @@ pub const KIND: NodeKind = NodeKind {
         PortSpec::required("measured", MeasuredState::SCHEMA),
     ],
     check: |parameters, run| {
-        let parameters = read_parameters(parameters)?;
+        let parameters = diagnostics::read(parameters)?;
         require_length(&load(&parameters)?, parameters.from_s, run)
     },
     run,
@@ -37,13 +38,17 @@ struct Parameters {
     columns: ColumnMap,
 }
 
-fn load(parameters: &Parameters) -> Result<FlightLog, String> {
-    let log = FlightLog::load(&parameters.data, &parameters.columns).map_err(|error| error.to_string())?;
+fn load(parameters: &Parameters) -> Result<FlightLog, ParameterError> {
+    let log = FlightLog::load(&parameters.data, &parameters.columns)
+        .map_err(|error| ParameterError::conflict("data", error))?;
     if (0.0..log.duration_s()).contains(&parameters.from_s) {
         Ok(log)
     } else {
         let (from_s, length_s) = (parameters.from_s, log.duration_s());
-        Err(format!("`from_s` is {from_s} s, the flight lasts {length_s:.3} s"))
+        Err(ParameterError::conflict(
+            "from_s",
+            format!("`from_s` is {from_s} s, the flight lasts {length_s:.3} s"),
+        ))
     }
 }
 
@@ -51,15 +56,18 @@ fn load(parameters: &Parameters) -> Result<FlightLog, String> {
 const SLACK_S: f64 = 1e-9;
 
 /// Refuses a run that goes on behind the end of the flight.
-fn require_length(log: &FlightLog, from_s: f64, run: &NodeContext<'_>) -> Result<(), String> {
+fn require_length(log: &FlightLog, from_s: f64, run: &NodeContext<'_>) -> Result<(), ParameterError> {
     let last_tick = (run.duration_ticks.max(1) - 1) / run.period_ticks * run.period_ticks;
     let (last_s, left_s) = (f64::from(last_tick) * run.tick_s(), log.duration_s() - from_s);
     if last_s <= left_s + SLACK_S {
         return Ok(());
     }
-    Err(format!(
-        "the flight ends {left_s:.3} s after `from_s`, and the run's last tick lies at {last_s:.3} s; shorten \
+    Err(ParameterError::conflict(
+        "from_s",
+        format!(
+            "the flight ends {left_s:.3} s after `from_s`, and the run's last tick lies at {last_s:.3} s; shorten \
          run.duration_s"
+        ),
     ))
 }
 

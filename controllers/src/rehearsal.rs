@@ -15,6 +15,7 @@ use crate::law::Law;
 use crate::set_points::SetPoint;
 use bus::context::NodeContext;
 use bus::messages::{Reference, WallEstimate};
+use diagnostics::ParameterError;
 use nalgebra::{UnitQuaternion, Vector3};
 
 /// Steps on each motion: a filter that a step multiplies by 2 overflows before 1100 of them, and they take a
@@ -34,13 +35,17 @@ const COARSE: f64 = 0.5;
 ///
 /// # Errors
 /// What goes wrong, and which keys are to blame.
-pub(crate) fn check<L: Law>(law: &L, craft: &ControlledVehicle, run: &NodeContext<'_>) -> Result<(), String> {
+pub(crate) fn check<L: Law>(
+    law: &L,
+    craft: &ControlledVehicle,
+    run: &NodeContext<'_>,
+) -> Result<(), ParameterError> {
     check_period(law.rate_gain_1_s(), run)?;
     warn_of_weight(craft, run);
     motions().iter().try_for_each(|motion| fly(law, craft, motion, run))
 }
 
-fn check_period(gain_1_s: f64, run: &NodeContext<'_>) -> Result<(), String> {
+fn check_period(gain_1_s: f64, run: &NodeContext<'_>) -> Result<(), ParameterError> {
     let (product, hz) = (gain_1_s * run.period_s(), run.period_s().recip());
     let words = || {
         format!(
@@ -49,14 +54,17 @@ fn check_period(gain_1_s: f64, run: &NodeContext<'_>) -> Result<(), String> {
         )
     };
     if product >= DIVERGES {
-        return Err(format!(
-            "{}, expected below {DIVERGES}, from where on the rate grows from step to step; raise run.rate_hz, or \
+        return Err(ParameterError::conflict(
+            "period_ticks",
+            format!(
+                "{}, expected below {DIVERGES}, from where on the rate grows from step to step; raise run.rate_hz, or \
              lower `period_ticks` or the gain",
-            words()
+                words()
+            ),
         ));
     }
     if product > COARSE {
-        run.warn(format!("{}, above {COARSE} little is left of the phase margin", words()));
+        run.warn("gains", format!("{}, above {COARSE} little is left of the phase margin", words()));
     }
     Ok(())
 }
@@ -65,7 +73,7 @@ fn warn_of_weight(craft: &ControlledVehicle, run: &NodeContext<'_>) {
     let (_, most_N) = craft.allocation.thrust_range_N(0.0);
     let weight_N = craft.vehicle.mass_kg * craft.vehicle.gravity_m_s2;
     if weight_N > most_N {
-        run.warn(format!(
+        run.warn("vehicle", format!(
             "`vehicle` \"{}\" weighs {weight_N:.4} N, and its rotors lift {most_N:.4} N at most: the law cannot hold it",
             craft.vehicle.name
         ));
@@ -88,7 +96,7 @@ fn fly<L: Law>(
     craft: &ControlledVehicle,
     motion: &MotionEstimate,
     run: &NodeContext<'_>,
-) -> Result<(), String> {
+) -> Result<(), ParameterError> {
     let (reference, walls) = (Reference::default(), WallEstimate::default());
     let set_point = SetPoint { altitude_m: 1.5, roll_rad: 0.1, pitch_rad: -0.1, yaw_rad: 0.5 };
     let transfer = BumplessTransfer::to::<L>(&craft.vehicle, run.period_s());
@@ -100,11 +108,14 @@ fn fly<L: Law>(
         let output = transfer.step(law, &mut state, &input, None);
         let speeds_rad_s = craft.allocation.allocate(&output.wrench).speeds_rad_s;
         if let Some(what) = output.not_finite().or_else(|| first_not_finite("a rotor speed", &speeds_rad_s)) {
-            return Err(format!(
-                "its numbers lead to {what} after {} steps of {} s on a motion that any flight meets; `gains`, \
+            return Err(ParameterError::conflict(
+                "gains",
+                format!(
+                    "its numbers lead to {what} after {} steps of {} s on a motion that any flight meets; `gains`, \
                  `vehicle` or run.rate_hz do not go together",
-                step + 1,
-                run.period_s()
+                    step + 1,
+                    run.period_s()
+                ),
             ));
         }
     }
@@ -150,7 +161,7 @@ mod tests {
         craft: &ControlledVehicle,
         gains: PidGains,
         tick_ns: u64,
-    ) -> (Result<(), String>, Vec<Warning>) {
+    ) -> (Result<(), ParameterError>, Vec<Warning>) {
         let run = NodeContext::new("node", &[]).timed(tick_ns, 1, 1000);
         let law = PidLaw { gains, vehicle: craft.hover_model(), period_s: run.period_s() };
         let outcome = check(&law, craft, &run);
@@ -162,8 +173,11 @@ mod tests {
         let airframe = hummingbird(|_| {});
         assert_eq!(checked(&airframe, PidGains::default(), 1_000_000), (Ok(()), vec![]));
         let (outcome, warnings) = checked(&airframe, PidGains::default(), 100_000_000);
-        assert!(outcome.is_ok() && warnings[0].words.contains("computes 10 times a second"), "{warnings:?}");
-        let words = checked(&airframe, PidGains::default(), 1_000_000_000).0.unwrap_err();
+        assert!(
+            outcome.is_ok() && warnings[0].message.contains("computes 10 times a second"),
+            "{warnings:?}"
+        );
+        let words = checked(&airframe, PidGains::default(), 1_000_000_000).0.unwrap_err().to_string();
         assert!(words.contains("6 1/s") && words.contains("expected below 2"), "{words}");
     }
 
@@ -171,7 +185,7 @@ mod tests {
     fn a_vehicle_too_heavy_for_its_rotors_is_told_with_both_forces() {
         let (outcome, warnings) =
             checked(&hummingbird(|it| it.mass_kg = 480.0), PidGains::default(), 1_000_000);
-        assert!(outcome.is_ok() && warnings[0].words.contains("weighs 4708.8000 N"), "{warnings:?}");
+        assert!(outcome.is_ok() && warnings[0].message.contains("weighs 4708.8000 N"), "{warnings:?}");
     }
 
     #[test]
@@ -181,7 +195,7 @@ mod tests {
         gains.roll.proportional_1_s2 = f64::MAX;
         gains.roll.derivative_1_s = 0.0;
         let airframe = hummingbird(|it| it.inertia_kg_m2 *= 1e10);
-        let words = checked(&airframe, gains, 1_000_000).0.unwrap_err();
+        let words = checked(&airframe, gains, 1_000_000).0.unwrap_err().to_string();
         assert!(words.contains("lead to a torque in N*m that is"), "{words}");
     }
 }

@@ -4,6 +4,7 @@
 use crate::curve::{Curve, Path, PhaseClock, Shape, smooth_step};
 use crate::minimum_snap::{MinimumSnap, spans_at_mean_speed};
 use bus::messages::Reference;
+use diagnostics::parameter::{ParameterError, all, finite, positive};
 use nalgebra::Vector3;
 use serde::Deserialize;
 use std::f64::consts::TAU;
@@ -135,21 +136,23 @@ impl Trajectory {
     ///
     /// # Errors
     /// An entry of unknown kind, one that lacks a key or has an unknown one, a number out of its range: in words.
-    pub fn read(entries: &[serde_json::Value], start: Start) -> Result<Self, String> {
+    pub fn read(entries: &[serde_json::Value], start: Start) -> Result<Self, ParameterError> {
         let mut trajectory = Self { segments: Vec::with_capacity(entries.len()), end: start };
         for (index, entry) in entries.iter().enumerate() {
-            let reason = |reason: String| format!("`segments`, entry {index} (the first is 0): {reason}");
-            let entry = SegmentEntry::deserialize(entry).map_err(|error| reason(error.to_string()))?;
-            trajectory.append(&entry).map_err(reason)?;
+            let appended = diagnostics::read(entry).and_then(|entry| trajectory.append(&entry));
+            appended.map_err(|error| error.within(&format!("segments.{index}")))?;
         }
         Ok(trajectory)
     }
 
-    fn append(&mut self, entry: &SegmentEntry) -> Result<(), String> {
+    fn append(&mut self, entry: &SegmentEntry) -> Result<(), ParameterError> {
         let way = entry.way(self.end.position_W_m)?;
         let yaw_end_rad = entry.yaw_end_rad(self.end.yaw_rad)?;
         let duration_s = match entry {
-            SegmentEntry::Hover(hover) => positive("duration_s", hover.duration_s)?,
+            SegmentEntry::Hover(hover) => {
+                positive("duration_s", hover.duration_s)?;
+                hover.duration_s
+            }
             _ => way.duration_s(),
         };
         let (start_s, yaw_start_rad) = (self.duration_s(), self.end.yaw_rad);
@@ -173,12 +176,13 @@ impl Trajectory {
     ///
     /// # Errors
     /// Which segment asks for how much, and where.
-    pub fn require_flyable(&self) -> Result<(), String> {
+    pub fn require_flyable(&self) -> Result<(), ParameterError> {
         self.segments.iter().enumerate().try_for_each(|(index, segment)| {
             let times = (0..=LOOKS).map(|look| segment.duration_s * f64::from(look) / f64::from(LOOKS));
             times.map(|since_s| segment.at(segment.start_s + since_s)).try_for_each(|point| {
-                point.require_flyable().map_err(|reason| {
-                    format!("`segments`, entry {index} (the first is 0): it asks for {reason}")
+                point.require_flyable().map_err(|asked| {
+                    ParameterError::conflict("", format_args!("it asks for {asked}"))
+                        .within(&format!("segments.{index}"))
                 })
             })
         })
@@ -292,7 +296,7 @@ impl Way {
 }
 
 impl SegmentEntry {
-    fn way(&self, from_W_m: Vector3<f64>) -> Result<Way, String> {
+    fn way(&self, from_W_m: Vector3<f64>) -> Result<Way, ParameterError> {
         match self {
             Self::Hover(_) => Ok(Way::Rest(from_W_m)),
             Self::Circle(circle) => circle.curve(from_W_m).map(Way::Curve),
@@ -301,21 +305,23 @@ impl SegmentEntry {
         }
     }
 
-    fn yaw_end_rad(&self, before_rad: f64) -> Result<f64, String> {
+    fn yaw_end_rad(&self, before_rad: f64) -> Result<f64, ParameterError> {
         let stated = match self {
             Self::Hover(HoverEntry { yaw_deg, .. })
             | Self::Circle(CircleEntry { yaw_deg, .. })
             | Self::FigureEight(FigureEightEntry { yaw_deg, .. })
             | Self::MinimumSnap(MinimumSnapEntry { yaw_deg, .. }) => yaw_deg,
         };
-        stated.map_or(Ok(before_rad), |deg| Ok(finite("yaw_deg", deg)?.to_radians()))
+        let Some(yaw_deg) = stated else { return Ok(before_rad) };
+        finite("yaw_deg", *yaw_deg)?;
+        Ok(yaw_deg.to_radians())
     }
 }
 
 impl CircleEntry {
-    fn curve(&self, start_W_m: Vector3<f64>) -> Result<Curve, String> {
+    fn curve(&self, start_W_m: Vector3<f64>) -> Result<Curve, ParameterError> {
         if self.radius_m == 0.0 {
-            return Err(wrong("radius_m", "a number other than 0", self.radius_m));
+            return Err(ParameterError::value("radius_m", "a number other than 0", self.radius_m));
         }
         finite("radius_m", self.radius_m)?;
         let shape = Shape::Circle { radius_m: self.radius_m };
@@ -330,8 +336,9 @@ impl CircleEntry {
 }
 
 impl FigureEightEntry {
-    fn curve(&self, start_W_m: Vector3<f64>) -> Result<Curve, String> {
-        let shape = Shape::FigureEight { half_length_m: positive("half_length_m", self.half_length_m)? };
+    fn curve(&self, start_W_m: Vector3<f64>) -> Result<Curve, ParameterError> {
+        positive("half_length_m", self.half_length_m)?;
+        let shape = Shape::FigureEight { half_length_m: self.half_length_m };
         Laps {
             speed_m_s: self.speed_m_s,
             laps: self.laps,
@@ -351,72 +358,70 @@ struct Laps {
 }
 
 impl Laps {
-    fn of(&self, shape: Shape, start_W_m: Vector3<f64>) -> Result<Curve, String> {
-        let rate_rad_s = positive("speed_m_s", self.speed_m_s)? / shape.speed_max_m_rad();
-        let ramp_s = positive("ramp_s", self.ramp_s)?;
-        let direction_rad = finite("direction_deg", self.direction_deg)?.to_radians();
+    fn of(&self, shape: Shape, start_W_m: Vector3<f64>) -> Result<Curve, ParameterError> {
+        positive("speed_m_s", self.speed_m_s)?;
+        positive("ramp_s", self.ramp_s)?;
+        finite("direction_deg", self.direction_deg)?;
+        let (rate_rad_s, ramp_s) = (self.speed_m_s / shape.speed_max_m_rad(), self.ramp_s);
+        let direction_rad = self.direction_deg.to_radians();
         let phase_rad = TAU * f64::from(self.laps);
         let clock = PhaseClock::covering(phase_rad, rate_rad_s, ramp_s).ok_or_else(|| {
             let expected =
                 format!("at least {}, in which the ramps find room", (rate_rad_s * ramp_s / TAU).ceil());
-            wrong("laps", &expected, self.laps)
+            ParameterError::value("laps", expected, self.laps)
         })?;
         Ok(Curve { shape, start_W_m, direction_rad, clock })
     }
 }
 
 impl MinimumSnapEntry {
-    fn path(&self, from_W_m: Vector3<f64>) -> Result<MinimumSnap, String> {
+    fn path(&self, from_W_m: Vector3<f64>) -> Result<MinimumSnap, ParameterError> {
         let count = self.waypoints_m.len();
         if !(1..=WAYPOINTS_MAX).contains(&count) {
-            return Err(wrong("waypoints_m", &format!("a list of 1 to {WAYPOINTS_MAX} points"), count));
+            return Err(ParameterError::value(
+                "waypoints_m",
+                format!("a list of 1 to {WAYPOINTS_MAX} points"),
+                count,
+            ));
         }
         let mut waypoints_W_m = vec![from_W_m];
         for point in &self.waypoints_m {
-            point.iter().try_for_each(|&number| finite("waypoints_m", number).map(|_| ()))?;
+            all(finite, "waypoints_m", point)?;
             waypoints_W_m.push(Vector3::from(*point));
         }
         let spans_s = self.spans_s(&waypoints_W_m)?;
         MinimumSnap::new(&waypoints_W_m, &spans_s).ok_or_else(|| {
             let expected = "of like size, so that the path's equations can be solved";
-            wrong("times_s", expected, format!("{spans_s:?}"))
+            ParameterError::value("times_s", expected, format!("{spans_s:?}"))
         })
     }
 
-    fn spans_s(&self, waypoints_W_m: &[Vector3<f64>]) -> Result<Vec<f64>, String> {
+    fn spans_s(&self, waypoints_W_m: &[Vector3<f64>]) -> Result<Vec<f64>, ParameterError> {
         match (&self.times_s, self.mean_speed_m_s) {
             (Some(times_s), None) if times_s.len() == self.waypoints_m.len() => {
-                times_s.iter().map(|&time_s| positive("times_s", time_s)).collect()
+                all(positive, "times_s", times_s)?;
+                Ok(times_s.clone())
             }
             (Some(times_s), None) => {
                 let expected = format!("one time for each of the {} waypoints", self.waypoints_m.len());
-                Err(wrong("times_s", &expected, times_s.len()))
+                Err(ParameterError::value("times_s", expected, times_s.len()))
             }
             (None, Some(speed_m_s)) => {
                 if let Some(index) = waypoints_W_m.windows(2).position(|ends| ends[0] == ends[1]) {
                     let expected = "points that differ from the one before, or use times_s";
-                    return Err(wrong(
+                    return Err(ParameterError::value(
                         "waypoints_m",
                         expected,
                         format!("point {index} where it was already"),
                     ));
                 }
-                Ok(spans_at_mean_speed(waypoints_W_m, positive("mean_speed_m_s", speed_m_s)?))
+                positive("mean_speed_m_s", speed_m_s)?;
+                Ok(spans_at_mean_speed(waypoints_W_m, speed_m_s))
             }
-            _ => Err("give either `times_s` or `mean_speed_m_s`, and not both".to_owned()),
+            _ => Err(ParameterError::conflict(
+                "times_s",
+                "give either `times_s` or `mean_speed_m_s`, and not both",
+            )),
         }
     }
-}
-
-fn positive(key: &str, number: f64) -> Result<f64, String> {
-    let holds = number > 0.0 && number.is_finite();
-    if holds { Ok(number) } else { Err(wrong(key, "a finite number above 0", number)) }
-}
-
-fn finite(key: &str, number: f64) -> Result<f64, String> {
-    if number.is_finite() { Ok(number) } else { Err(wrong(key, "a finite number", number)) }
-}
-
-fn wrong(key: &str, expected: &str, found: impl std::fmt::Display) -> String {
-    format!("`{key}` must be {expected}, found {found}")
 }

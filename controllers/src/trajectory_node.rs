@@ -3,9 +3,10 @@
 
 use crate::trajectory::{Start, Trajectory};
 use bus::context::NodeContext;
-use bus::kind::{Inputs, NodeKind, PortSpec, read_parameters};
+use bus::kind::{Inputs, NodeKind, PortSpec};
 use bus::messages::Reference;
 use bus::{BusError, Message, Node};
+use diagnostics::ParameterError;
 use serde::Deserialize;
 
 /// The trajectory, for manifests.
@@ -15,7 +16,7 @@ pub const KIND: NodeKind = NodeKind {
     inputs: Inputs::Ports(&[]),
     outputs: &[PortSpec::required("reference", Reference::SCHEMA)],
     check: |parameters, run| {
-        let trajectory = read(&read_parameters(parameters)?)?;
+        let trajectory = read(&diagnostics::read(parameters)?)?;
         trajectory.require_flyable()?;
         warn_of_late(&trajectory, run);
         Ok(())
@@ -37,7 +38,7 @@ struct Parameters {
     segments: Vec<serde_json::Value>,
 }
 
-fn read(parameters: &Parameters) -> Result<Trajectory, String> {
+fn read(parameters: &Parameters) -> Result<Trajectory, ParameterError> {
     let position_W_m = nalgebra::Vector3::from(parameters.initial_position_m);
     Trajectory::read(
         &parameters.segments,
@@ -49,7 +50,7 @@ fn read(parameters: &Parameters) -> Result<Trajectory, String> {
 fn warn_of_late(trajectory: &Trajectory, run: &NodeContext<'_>) {
     let end_s = run.duration_s();
     if let Some((index, start_s)) = trajectory.starts_s().enumerate().find(|(_, start_s)| *start_s >= end_s) {
-        run.warn_behind_end(format!(
+        run.warn_behind_end("segments", format!(
             "`segments`: entry {index} (the first is 0) begins at {start_s:.3} s, and the run ends at {end_s} s: it and \
              what follows is never flown"
         ));

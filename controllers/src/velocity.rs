@@ -4,9 +4,10 @@ use crate::airframe::ControlledVehicle;
 use crate::controller;
 use crate::rehearsal;
 use crate::velocity_law::{LoopsGains, VelocityLaw, VelocityLoop, VelocitySetPoint};
-use bus::kind::{Inputs, NodeKind, PortSpec, read_parameters};
+use bus::kind::{Inputs, NodeKind, PortSpec};
 use bus::messages::{AttitudeEstimate, ControlStatus, MotorCommand, Reference, StateEstimate};
 use bus::{BusError, Message, Node};
+use diagnostics::parameter::{ParameterError, all, finite};
 use serde::Deserialize;
 use std::path::PathBuf;
 
@@ -24,7 +25,7 @@ pub const KIND: NodeKind = NodeKind {
         PortSpec::optional("status", ControlStatus::SCHEMA),
     ],
     check: |parameters, run| {
-        let parameters: Parameters = read_parameters(parameters)?;
+        let parameters: Parameters = diagnostics::read(parameters)?;
         parameters.check(run.has("reference"))?;
         let (law, craft) = build(&parameters, run.period_s())?;
         rehearsal::check(&law, &craft, run)
@@ -50,24 +51,27 @@ struct Parameters {
 
 impl Parameters {
     /// The velocity is given by a reference or by parameters, never by both.
-    fn check(&self, has_reference: bool) -> Result<(), String> {
+    fn check(&self, has_reference: bool) -> Result<(), ParameterError> {
         let given = [
             ("velocity_m_s", self.velocity_m_s.is_some()),
             ("altitude_m", self.altitude_m.is_some()),
             ("yaw_rad", self.yaw_rad.is_some()),
         ];
         match given.into_iter().find(|(_, is_given)| *is_given) {
-            Some((key, _)) if has_reference => {
-                Err(format!("`{key}` is given, and so is the input `reference`; leave one of them out"))
-            }
-            _ if !has_reference && self.altitude_m.is_none() => Err("missing field `altitude_m`: without \
-                the input `reference` a velocity controller needs `altitude_m` and `velocity_m_s`"
-                .to_owned()),
+            Some((key, _)) if has_reference => Err(ParameterError::conflict(
+                "reference",
+                format!("`{key}` is given, and so is the input `reference`; leave one of them out"),
+            )),
+            _ if !has_reference && self.altitude_m.is_none() => Err(ParameterError::conflict(
+                "altitude_m",
+                "missing field `altitude_m`: without \
+                the input `reference` a velocity controller needs `altitude_m` and `velocity_m_s`",
+            )),
             _ => Ok(()),
         }
     }
 
-    fn constant(&self) -> Result<Option<VelocitySetPoint>, String> {
+    fn constant(&self) -> Result<Option<VelocitySetPoint>, ParameterError> {
         let Some(altitude_m) = self.altitude_m else { return Ok(None) };
         let constant = VelocitySetPoint {
             velocity_m_s: self.velocity_m_s.unwrap_or_default(),
@@ -75,16 +79,17 @@ impl Parameters {
             yaw_rad: self.yaw_rad.unwrap_or_default(),
             ..VelocitySetPoint::default()
         };
-        controller::finite("altitude_m", altitude_m)?;
-        controller::finite("yaw_rad", constant.yaw_rad)?;
-        constant.velocity_m_s.iter().try_for_each(|speed| controller::finite("velocity_m_s", *speed))?;
+        finite("altitude_m", altitude_m)?;
+        finite("yaw_rad", constant.yaw_rad)?;
+        all(finite, "velocity_m_s", &constant.velocity_m_s)?;
         Ok(Some(constant))
     }
 }
 
-fn build(parameters: &Parameters, period_s: f64) -> Result<(VelocityLaw, ControlledVehicle), String> {
+fn build(parameters: &Parameters, period_s: f64) -> Result<(VelocityLaw, ControlledVehicle), ParameterError> {
     let craft = ControlledVehicle::load(&parameters.vehicle)?;
-    let gains = LoopsGains::load(parameters.gains.as_deref()).map_err(|error| error.to_string())?;
+    let gains = LoopsGains::load(parameters.gains.as_deref())
+        .map_err(|error| ParameterError::conflict("gains", error))?;
     let velocity = VelocityLoop::new(&gains, craft.hover_model(), period_s);
     Ok((VelocityLaw { velocity, constant: parameters.constant()? }, craft))
 }

@@ -16,10 +16,10 @@ use crate::control::{ControlInput, ControlOutput, HoverMotion};
 use crate::gains_file::{gain, limit, parse};
 use crate::law::{Law, Predecessor, Start};
 use crate::set_points::SetPoint;
+use diagnostics::unit::{ACCELERATION, PER_SECOND, PURE_NUMBER, TIME, VELOCITY};
 use std::path::Path;
 use vehicles::VehicleError;
 use vehicles::reader::Section;
-use vehicles::units::{ACCELERATION, PER_SECOND, PURE_NUMBER, TIME, VELOCITY};
 
 /// The gains that the law is tuned with.
 const OURS: &str = include_str!("../gains/velocity.toml");

@@ -1,14 +1,15 @@
 //! The wall-follow controller node: laps along the walls of a room.
 
 use crate::airframe::ControlledVehicle;
-use crate::controller::{self, finite, positive, positive_up_to};
+use crate::controller;
 use crate::rehearsal;
 use crate::room::Room;
 use crate::velocity_law::VelocityLoop;
 use crate::wall_follow_law::{Mode, Shared, WallFollowGains, WallFollowLaw};
-use bus::kind::{Inputs, NodeKind, PortSpec, read_parameters};
+use bus::kind::{Inputs, NodeKind, PortSpec};
 use bus::messages::{AttitudeEstimate, ControlStatus, MotorCommand, WallEstimate};
 use bus::{BusError, Message, Node};
+use diagnostics::parameter::{ParameterError, finite, positive, positive_up_to};
 use serde::Deserialize;
 use std::path::PathBuf;
 
@@ -25,7 +26,7 @@ pub const KIND: NodeKind = NodeKind {
         PortSpec::optional("status", ControlStatus::SCHEMA),
     ],
     check: |parameters, run| {
-        let (law, craft) = build(&read_parameters(parameters)?, run.period_s())?;
+        let (law, craft) = build(&diagnostics::read(parameters)?, run.period_s())?;
         rehearsal::check(&law, &craft, run)
     },
     run,
@@ -84,16 +85,19 @@ const SPEED_MAX_M_S: f64 = 2.0;
 const DISTANCE_MAX_M: f64 = 5.0;
 
 impl Parameters {
-    fn mode(&self) -> Result<Mode, String> {
+    fn mode(&self) -> Result<Mode, ParameterError> {
         match self.mode.as_str() {
             "varying" => Ok(Mode::Varying),
             "constant" => Ok(Mode::Constant),
-            other => Err(format!("`mode` must be \"varying\" or \"constant\", found \"{other}\"")),
+            other => Err(ParameterError::conflict(
+                "mode",
+                format!("`mode` must be \"varying\" or \"constant\", found \"{other}\""),
+            )),
         }
     }
 
-    fn check(&self) -> Result<(), String> {
-        positive("altitude_m", self.altitude_m, "m")?;
+    fn check(&self) -> Result<(), ParameterError> {
+        positive("altitude_m", self.altitude_m)?;
         finite("heading_rad", self.heading_rad)?;
         positive_up_to("distance_m", self.distance_m, DISTANCE_MAX_M, "m")?;
         let speed_m_s = self.speed_m_s.unwrap_or(CONSTANT_SPEED_M_S);
@@ -101,27 +105,37 @@ impl Parameters {
         if (1..=5).contains(&self.start_state) {
             return Ok(());
         }
-        Err(format!("`start_state` must be 1 to 5, found {}", self.start_state))
+        Err(ParameterError::conflict(
+            "start_state",
+            format!("`start_state` must be 1 to 5, found {}", self.start_state),
+        ))
     }
 
-    fn shared(&self, mode: Mode) -> Result<Option<Shared>, String> {
+    fn shared(&self, mode: Mode) -> Result<Option<Shared>, ParameterError> {
         let of_a_room = [
             ("start_in_room_m", self.start_in_room_m.is_some()),
             ("ahead_min_m", self.ahead_min_m.is_some()),
         ];
         let Some(size_m) = self.room_m else {
             return match of_a_room.into_iter().find(|(_, is_given)| *is_given) {
-                Some((key, _)) => Err(format!("`{key}` has a meaning only with `room_m`; add that")),
+                Some((key, _)) => Err(ParameterError::conflict(
+                    "room_m",
+                    format!("`{key}` has a meaning only with `room_m`; add that"),
+                )),
                 None => Ok(None),
             };
         };
         if mode == Mode::Varying {
-            return Err("`room_m` has a meaning only in the mode \"constant\"; leave it out".to_owned());
+            return Err(ParameterError::conflict(
+                "room_m",
+                "`room_m` has a meaning only in the mode \"constant\"; leave it out",
+            ));
         }
         let least_m = 2.0 * self.distance_m;
         if !size_m.iter().all(|side_m| side_m.is_finite() && *side_m > least_m) {
-            return Err(format!(
-                "`room_m` must be two lengths above 2 distance_m = {least_m} m, found {size_m:?}"
+            return Err(ParameterError::conflict(
+                "room_m",
+                format!("`room_m` must be two lengths above 2 distance_m = {least_m} m, found {size_m:?}"),
             ));
         }
         let ahead_min_m = self.ahead_min_m.unwrap_or(AHEAD_MIN_M);
@@ -130,20 +144,27 @@ impl Parameters {
         Ok(Some(Shared { room: Room { size_m }, start_m: self.start_in_room_m, ahead_min_m }))
     }
 
-    fn check_start(&self, size_m: [f64; 2]) -> Result<(), String> {
+    fn check_start(&self, size_m: [f64; 2]) -> Result<(), ParameterError> {
         let start_m = self.start_in_room_m.unwrap_or(size_m);
         if start_m.iter().zip(size_m).all(|(at_m, side_m)| (0.0..=side_m).contains(at_m)) {
             return Ok(());
         }
-        Err(format!("`start_in_room_m` must lie within room_m = {size_m:?} m, found {start_m:?}"))
+        Err(ParameterError::conflict(
+            "start_in_room_m",
+            format!("`start_in_room_m` must lie within room_m = {size_m:?} m, found {start_m:?}"),
+        ))
     }
 }
 
-fn build(parameters: &Parameters, period_s: f64) -> Result<(WallFollowLaw, ControlledVehicle), String> {
+fn build(
+    parameters: &Parameters,
+    period_s: f64,
+) -> Result<(WallFollowLaw, ControlledVehicle), ParameterError> {
     let mode = parameters.mode()?;
     parameters.check()?;
     let craft = ControlledVehicle::load(&parameters.vehicle)?;
-    let gains = WallFollowGains::load(parameters.gains.as_deref()).map_err(|error| error.to_string())?;
+    let gains = WallFollowGains::load(parameters.gains.as_deref())
+        .map_err(|error| ParameterError::conflict("gains", error))?;
     let usual_m_s = if mode == Mode::Varying { VARYING_SPEED_M_S } else { CONSTANT_SPEED_M_S };
     let law = WallFollowLaw {
         velocity: VelocityLoop::new(&gains.loops, craft.hover_model(), period_s),

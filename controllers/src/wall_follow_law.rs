@@ -24,10 +24,10 @@ use crate::law::{Law, Predecessor, Start};
 use crate::room::Room;
 use crate::velocity_law::{LoopsGains, VelocityLoop, VelocitySetPoint, VelocityState};
 use bus::messages::WallEstimate;
+use diagnostics::unit::{ACCELERATION, PER_SECOND, PER_SECOND_3, VELOCITY};
 use std::path::Path;
 use vehicles::VehicleError;
 use vehicles::reader::Section;
-use vehicles::units::{ACCELERATION, PER_SECOND, PER_SECOND_3, VELOCITY};
 
 /// The gains that the law is tuned with.
 const OURS: &str = include_str!("../gains/wall-follow.toml");

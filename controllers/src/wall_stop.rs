@@ -1,13 +1,14 @@
 //! The wall-stop controller node: flies along the heading and stops before the wall ahead.
 
 use crate::airframe::ControlledVehicle;
-use crate::controller::{self, finite, positive, positive_up_to};
+use crate::controller;
 use crate::rehearsal;
 use crate::velocity_law::VelocityLoop;
 use crate::wall_stop_law::{WallStopGains, WallStopLaw};
-use bus::kind::{Inputs, NodeKind, PortSpec, read_parameters};
+use bus::kind::{Inputs, NodeKind, PortSpec};
 use bus::messages::{AttitudeEstimate, ControlStatus, MotorCommand, WallEstimate};
 use bus::{BusError, Message, Node};
+use diagnostics::parameter::{ParameterError, finite, positive, positive_up_to};
 use serde::Deserialize;
 use std::path::PathBuf;
 
@@ -24,7 +25,7 @@ pub const KIND: NodeKind = NodeKind {
         PortSpec::optional("status", ControlStatus::SCHEMA),
     ],
     check: |parameters, run| {
-        let (law, craft) = build(&read_parameters(parameters)?, run.period_s())?;
+        let (law, craft) = build(&diagnostics::read(parameters)?, run.period_s())?;
         rehearsal::check(&law, &craft, run)
     },
     run,
@@ -67,13 +68,14 @@ const DISTANCE_MAX_M: f64 = 5.0;
 /// keeps the speed below this in any case.
 const SPEED_MAX_M_S: f64 = 3.0;
 
-fn build(parameters: &Parameters, period_s: f64) -> Result<(WallStopLaw, ControlledVehicle), String> {
-    positive("altitude_m", parameters.altitude_m, "m")?;
+fn build(parameters: &Parameters, period_s: f64) -> Result<(WallStopLaw, ControlledVehicle), ParameterError> {
+    positive("altitude_m", parameters.altitude_m)?;
     finite("heading_rad", parameters.heading_rad)?;
     positive_up_to("cruise_speed_m_s", parameters.cruise_speed_m_s, SPEED_MAX_M_S, "m/s")?;
     positive_up_to("distance_m", parameters.distance_m, DISTANCE_MAX_M, "m")?;
     let craft = ControlledVehicle::load(&parameters.vehicle)?;
-    let gains = WallStopGains::load(parameters.gains.as_deref()).map_err(|error| error.to_string())?;
+    let gains = WallStopGains::load(parameters.gains.as_deref())
+        .map_err(|error| ParameterError::conflict("gains", error))?;
     let law = WallStopLaw {
         velocity: VelocityLoop::new(&gains.loops, craft.hover_model(), period_s),
         gains,

@@ -13,10 +13,10 @@ use crate::control::{ControlInput, ControlOutput, HoverMotion};
 use crate::gains_file::{gain, limit, parse};
 use crate::law::{Law, Predecessor, Start};
 use crate::velocity_law::{LoopsGains, VelocityLoop, VelocitySetPoint, VelocityState};
+use diagnostics::unit::{ACCELERATION, LENGTH, PER_SECOND, PER_SECOND_3, VELOCITY};
 use std::path::Path;
 use vehicles::VehicleError;
 use vehicles::reader::Section;
-use vehicles::units::{ACCELERATION, LENGTH, PER_SECOND, PER_SECOND_3, VELOCITY};
 
 /// The gains that the law is tuned with.
 const OURS: &str = include_str!("../gains/wall-stop.toml");

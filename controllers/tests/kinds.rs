@@ -58,7 +58,7 @@ fn the_gains_file_of_another_law_is_refused_by_name_and_place() {
             (kind.check)(&with(&parameters, "gains", json!(gains(other))), &NodeContext::new("node", &[]));
         // A velocity file may hold the cascade's tables alone.
         if kind.name != "velocity" {
-            let error = outcome.unwrap_err();
+            let error = outcome.unwrap_err().to_string();
             assert!(
                 error.contains(&format!("{other}.toml:")) && error.contains('`'),
                 "{}: {error}",
@@ -94,7 +94,7 @@ fn impossible_parameters_are_refused_by_their_key() {
         (pilot, with(&hold, "data", json!("no-such.csv")), "no-such.csv"),
     ];
     for (kind, parameters, key) in cases {
-        let error = (kind.check)(&parameters, &NodeContext::new("node", &[])).unwrap_err();
+        let error = (kind.check)(&parameters, &NodeContext::new("node", &[])).unwrap_err().to_string();
         assert!(error.contains(key), "{} with {parameters}: {error}", kind.name);
     }
 }
@@ -104,16 +104,20 @@ fn a_velocity_comes_from_a_reference_or_from_parameters_and_never_from_both() {
     let [_, _, (velocity, fly), ..] = accepted();
     let vehicle_only = json!({ "vehicle": VEHICLE });
     (velocity.check)(&vehicle_only, &NodeContext::new("node", &["estimate", "reference"])).unwrap();
-    let error = (velocity.check)(&vehicle_only, &NodeContext::new("node", &["estimate"])).unwrap_err();
+    let error =
+        (velocity.check)(&vehicle_only, &NodeContext::new("node", &["estimate"])).unwrap_err().to_string();
     assert!(error.starts_with("missing field `altitude_m`"), "{error}");
-    let error = (velocity.check)(&fly, &NodeContext::new("node", &["estimate", "reference"])).unwrap_err();
+    let error = (velocity.check)(&fly, &NodeContext::new("node", &["estimate", "reference"]))
+        .unwrap_err()
+        .to_string();
     assert!(error.contains("`altitude_m`") && error.contains("`reference`"), "{error}");
 }
 
 /// The parameters that a kind's refusal of an unknown one names as known.
 fn known(kind: &Registration, parameters: &Value) -> Vec<String> {
-    let error =
-        (kind.check)(&with(parameters, "unknown_key", json!(1)), &NodeContext::new("node", &[])).unwrap_err();
+    let error = (kind.check)(&with(parameters, "unknown_key", json!(1)), &NodeContext::new("node", &[]))
+        .unwrap_err()
+        .to_string();
     let list = error.split("unknown field `unknown_key`").nth(1).unwrap_or_else(|| panic!("{error}"));
     list.split('`').skip(1).step_by(2).map(str::to_owned).collect()
 }

@@ -222,7 +222,7 @@ fn the_gain_of_the_lqr_is_the_one_that_scipy_finds() {
 fn an_lqr_without_a_solution_is_refused_with_a_reason() {
     let weightless =
         controllers::airframe::ControlledVehicle::new(Vehicle { gravity_m_s2: 0.0, ..vehicle() }).unwrap();
-    let error = LqrLaw::new(LqrGains::load(None).unwrap(), &weightless, PERIOD_S).unwrap_err();
+    let error = LqrLaw::new(LqrGains::load(None).unwrap(), &weightless, PERIOD_S).unwrap_err().to_string();
     assert!(error.contains("Riccati") && error.contains("`vehicle`"), "{error}");
 }
 

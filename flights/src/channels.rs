@@ -6,7 +6,9 @@ use crate::declaration::{Entry, Frame};
 use crate::flight::Channel;
 use crate::frame;
 use crate::log::{Log, Samples};
-use crate::quantity::{ANGLES, FRACTION, PERCENT, Quantity, names};
+use crate::quantity::{FRACTION, PERCENT, Quantity};
+use diagnostics::Dimension;
+use diagnostics::unit::ANGLE;
 
 /// A channel as read, and what to say about it. Times need not grow yet and numbers need not be finite.
 pub type Read<const N: usize> = (Channel<N>, Vec<String>);
@@ -32,7 +34,7 @@ pub fn read<const N: usize>(
 /// Reads the yaw of an attitude that is level by assumption, in rad; `None` where the entry has none.
 pub fn read_yaw(log: &dyn Log, entry: &Entry) -> Result<Option<Read<1>>, String> {
     let Some(yaw) = &entry.yaw else { return Ok(None) };
-    let factor = factor(ANGLES, entry.unit.as_deref())?;
+    let factor = factor(ANGLE, entry.unit.as_deref())?;
     let samples = signed_samples(log, entry.topic.as_deref(), std::slice::from_ref(yaw))?;
     let sign = if entry.frame == Some(Frame::FrdNed) { -1.0 } else { 1.0 };
     let north = if entry.frame == Some(Frame::FrdNed) { std::f64::consts::FRAC_PI_2 } else { 0.0 };
@@ -67,13 +69,13 @@ impl<'a> Layout<'a> {
         let frame = entry.frame.unwrap_or_default();
         let (names, euler) = named(quantity, entry)?;
         let (factor, offset) = match (quantity, entry.unit.as_deref()) {
-            (Quantity::Attitude, unit) if euler => (factor(ANGLES, unit)?, 0.0),
+            (Quantity::Attitude, unit) if euler => (factor(ANGLE, unit)?, 0.0),
             (Quantity::Attitude, None) => (1.0, 0.0),
             (Quantity::Command, Some(unit @ (FRACTION | PERCENT))) => {
                 let range = vehicle.command.max - vehicle.command.min;
-                (factor(quantity.units(), Some(unit))? * range, vehicle.command.min)
+                (factor(quantity.dimension(), Some(unit))? * range, vehicle.command.min)
             }
-            (_, unit) => (factor(quantity.units(), unit)?, 0.0),
+            (_, unit) => (factor(quantity.dimension(), unit)?, 0.0),
         };
         Ok(Self { quantity, names, euler, factor, offset, frame })
     }
@@ -142,10 +144,12 @@ fn named(quantity: Quantity, entry: &Entry) -> Result<(&[String], bool), String>
     }
 }
 
-fn factor(units: &[(&'static str, f64)], unit: Option<&str>) -> Result<f64, String> {
-    let found = unit.and_then(|unit| units.iter().find(|(name, _)| *name == unit));
-    found.map(|(_, factor)| *factor).ok_or_else(|| match unit {
-        Some(unit) => format!("`unit` is \"{unit}\", expected {}; correct it", names(units)),
-        None => format!("no `unit`, expected {}; add it", names(units)),
-    })
+fn factor(dimension: Dimension, unit: Option<&str>) -> Result<f64, String> {
+    let expected = dimension.names(" or ");
+    match unit {
+        None => Err(format!("no `unit`, expected {expected}; add it")),
+        Some(unit) => dimension
+            .factor(unit)
+            .ok_or_else(|| format!("`unit` is \"{unit}\", expected {expected}; correct it")),
+    }
 }

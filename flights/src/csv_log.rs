@@ -70,8 +70,8 @@ fn time_column(headers: &[String], time: Option<&Entry>) -> Result<(usize, f64),
         return Err(format!("the channel `time` names no single column; {example}"));
     };
     let unit = time.unit.as_deref().unwrap_or("(none)");
-    let factor = Quantity::Time.factor(unit).ok_or_else(|| {
-        let units = Quantity::Time.unit_names();
+    let factor = Quantity::Time.dimension().factor(unit).ok_or_else(|| {
+        let units = Quantity::Time.dimension().names(" or ");
         format!("the channel `time` has the unit {unit}, expected {units}; correct `unit`")
     })?;
     Ok((find(headers, column)?, factor))

@@ -9,7 +9,8 @@ use crate::agreement::{Agreement, Pairs};
 use crate::declaration::{ChannelMap, Frame};
 use crate::flight::{Channel, Flight};
 use crate::frame;
-use crate::quantity::{ANGLES, FRACTION, PERCENT, Quantity};
+use crate::quantity::{FRACTION, PERCENT, Quantity};
+use diagnostics::unit::ANGLE;
 
 /// Above this correlation a logged and a derived vector are the same but for a factor.
 const SAME: f64 = 0.7;
@@ -120,7 +121,7 @@ impl Judge<'_> {
             let scale = other / factor;
             !is_wrong(scale * period_s, PERIOD_RANGE_S) && !is_wrong(scale * span_s, SPAN_RANGE_S)
         };
-        let (unit, other) = quantity.units().iter().find(fits)?;
+        let (unit, other) = quantity.dimension().units.iter().find(fits)?;
         let what = format!(
             "declared in {}, its samples are {period_s} s apart, over {span_s} s",
             self.unit(quantity)
@@ -315,9 +316,9 @@ impl Judge<'_> {
     fn angles_that_fit(&self, factor: f64) -> Option<String> {
         let entry = self.channels.get(&Quantity::Attitude)?.get_ref();
         entry.euler.as_ref()?;
-        let of = |name: &str| ANGLES.iter().find(|own| own.0 == name).map(|own| own.1);
+        let of = |name: &str| ANGLE.factor(name);
         let declared = entry.unit.as_deref()?;
-        let (name, other) = ANGLES.iter().find(|own| own.0 != declared)?;
+        let (name, other) = ANGLE.units.iter().find(|own| own.0 != declared)?;
         let off = libm::log(other / of(declared)? / factor).abs();
         (off < libm::log(LEANING_TOLERANCE)).then(|| format!("`unit = \"{name}\"` of `attitude`"))
     }
@@ -325,7 +326,7 @@ impl Judge<'_> {
     /// How much smaller a position can be than its true one, if its unit is declared too large.
     fn position_scale(&self) -> f64 {
         let declared = self.factor(Quantity::Position);
-        let largest = Quantity::Position.units().iter().map(|unit| unit.1).fold(declared, f64::max);
+        let largest = Quantity::Position.dimension().units.iter().map(|unit| unit.1).fold(declared, f64::max);
         declared / largest
     }
 
@@ -395,7 +396,7 @@ impl Judge<'_> {
     /// The unit in which the values would lie in `range`.
     fn units_within(&self, quantity: Quantity, value: f64, range: (f64, f64)) -> Option<String> {
         let raw = value / self.factor(quantity);
-        let others = quantity.units().iter().filter(|(name, _)| *name != self.unit(quantity));
+        let others = quantity.dimension().units.iter().filter(|(name, _)| *name != self.unit(quantity));
         let mut fitting = others.filter(|(_, factor)| (range.0..range.1).contains(&(raw * factor)));
         fitting.next_back().map(|(name, _)| format!("`unit = \"{name}\"`"))
     }
@@ -417,7 +418,7 @@ impl Judge<'_> {
     fn unit_that_fits(&self, quantity: Quantity, factor: f64, tolerance: f64) -> Option<String> {
         let declared = self.factor(quantity);
         let off = |other: f64| libm::log((factor * other / declared).abs()).abs();
-        let others = quantity.units().iter().filter(|(name, _)| *name != self.unit(quantity));
+        let others = quantity.dimension().units.iter().filter(|(name, _)| *name != self.unit(quantity));
         let best = others.min_by(|a, b| off(a.1).total_cmp(&off(b.1)))?;
         (off(best.1) < libm::log(tolerance)).then(|| format!("`unit = \"{}\"`", best.0))
     }
@@ -425,11 +426,11 @@ impl Judge<'_> {
     /// The declared unit; SI where the flights file leaves it to the type of message.
     fn unit(&self, quantity: Quantity) -> &str {
         let declared = self.channels.get(&quantity).and_then(|entry| entry.get_ref().unit.as_deref());
-        declared.unwrap_or(quantity.units()[0].0)
+        declared.unwrap_or(quantity.dimension().units[0].0)
     }
 
     fn factor(&self, quantity: Quantity) -> f64 {
-        quantity.factor(self.unit(quantity)).unwrap_or(1.0)
+        quantity.dimension().factor(self.unit(quantity)).unwrap_or(1.0)
     }
 
     fn other_frame(&self, quantity: Quantity) -> String {

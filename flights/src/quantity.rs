@@ -1,12 +1,12 @@
 //! The quantities that a log can hold, and the units each may be declared in.
 
-use std::f64::consts::PI;
 use std::fmt;
 
+use diagnostics::unit::{
+    ACCELERATION, ANGULAR_VELOCITY, COMMAND, Dimension, LENGTH, PURE_NUMBER, ROTOR_SPEED, TIME, VELOCITY,
+    VOLTAGE,
+};
 use serde::Deserialize;
-
-/// Standard gravity in m/s^2: what an accelerometer's `g` means.
-pub const STANDARD_GRAVITY: f64 = 9.80665;
 
 /// A quantity, under the name it has in a flights file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Deserialize)]
@@ -31,9 +31,6 @@ pub enum Quantity {
     /// Voltage of the battery.
     BatteryVoltage,
 }
-
-/// A unit with its factor to SI.
-pub type Unit = (&'static str, f64);
 
 /// The unit of commands that are a share of the vehicle's range of commands.
 pub const FRACTION: &str = "fraction";
@@ -79,44 +76,22 @@ impl Quantity {
         }
     }
 
-    /// The units it may be declared in. Those of commands that are a share of the range have the factor to a
-    /// fraction.
+    /// The dimension whose units it may be declared in. Of commands that are a share of the range, the factor is that
+    /// to a fraction.
     #[must_use]
-    pub fn units(self) -> &'static [Unit] {
+    pub fn dimension(self) -> Dimension {
         match self {
-            Self::Time => &[("s", 1.0), ("ms", 1e-3), ("us", 1e-6), ("ns", 1e-9)],
-            Self::Command => &[("count", 1.0), (FRACTION, 1.0), (PERCENT, 0.01)],
-            Self::RotorSpeed => &[("rad/s", 1.0), ("rpm", PI / 30.0), ("Hz", 2.0 * PI)],
-            Self::Position => &[("m", 1.0), ("cm", 1e-2), ("mm", 1e-3)],
-            Self::Velocity => &[("m/s", 1.0), ("cm/s", 1e-2), ("mm/s", 1e-3)],
-            Self::Attitude => &[("1", 1.0)],
-            Self::AngularVelocity => &[("rad/s", 1.0), ("deg/s", PI / 180.0), ("mrad/s", 1e-3)],
-            Self::SpecificForce => {
-                &[("m/s^2", 1.0), ("g", STANDARD_GRAVITY), ("mg", 1e-3 * STANDARD_GRAVITY)]
-            }
-            Self::BatteryVoltage => &[("V", 1.0), ("mV", 1e-3)],
+            Self::Time => TIME,
+            Self::Command => COMMAND,
+            Self::RotorSpeed => ROTOR_SPEED,
+            Self::Position => LENGTH,
+            Self::Velocity => VELOCITY,
+            Self::Attitude => PURE_NUMBER,
+            Self::AngularVelocity => ANGULAR_VELOCITY,
+            Self::SpecificForce => ACCELERATION,
+            Self::BatteryVoltage => VOLTAGE,
         }
     }
-
-    /// The factor of `unit` to SI, if the quantity can have that unit.
-    #[must_use]
-    pub fn factor(self, unit: &str) -> Option<f64> {
-        self.units().iter().find(|(name, _)| *name == unit).map(|(_, factor)| *factor)
-    }
-
-    /// The units it may be declared in, for messages.
-    #[must_use]
-    pub fn unit_names(self) -> String {
-        names(self.units())
-    }
-}
-
-/// The units of Euler angles.
-pub const ANGLES: &[Unit] = &[("deg", PI / 180.0), ("rad", 1.0)];
-
-/// The names of `units`, for messages.
-pub fn names(units: &[Unit]) -> String {
-    units.iter().map(|(name, _)| format!("\"{name}\"")).collect::<Vec<_>>().join(" or ")
 }
 
 impl fmt::Display for Quantity {

@@ -5,6 +5,7 @@ use crate::airframe::Airframe;
 use crate::backend::Backend;
 use crate::state::State;
 use bus::context::NodeContext;
+use diagnostics::ParameterError;
 use std::path::Path;
 use vehicles::{MotorModel, Vehicle};
 
@@ -32,7 +33,11 @@ const REHEARSAL_STEPS: u32 = 300;
 ///
 /// # Errors
 /// The lag, the step, and what to do.
-pub(crate) fn check_steps(airframe: &Airframe, span_s: f64, run: &NodeContext<'_>) -> Result<(), String> {
+pub(crate) fn check_steps(
+    airframe: &Airframe,
+    span_s: f64,
+    run: &NodeContext<'_>,
+) -> Result<(), ParameterError> {
     let product = fastest_pole_rad_s(&airframe.vehicle().motor) * span_s;
     let words = |limit: f64| {
         format!(
@@ -43,10 +48,13 @@ pub(crate) fn check_steps(airframe: &Airframe, span_s: f64, run: &NodeContext<'_
         )
     };
     if product > POLE_STEPS_MAX {
-        return Err(format!("{}: beyond it the integration diverges", words(POLE_STEPS_MAX)));
+        return Err(ParameterError::conflict(
+            "vehicle",
+            format!("{}: beyond it the integration diverges", words(POLE_STEPS_MAX)),
+        ));
     }
     if product > POLE_STEPS_ODD {
-        run.warn(format!("{}: beyond it the motion is coarse", words(POLE_STEPS_ODD)));
+        run.warn("vehicle", format!("{}: beyond it the motion is coarse", words(POLE_STEPS_ODD)));
     }
     Ok(())
 }
@@ -65,7 +73,11 @@ fn fastest_pole_rad_s(motor: &MotorModel) -> f64 {
 ///
 /// # Errors
 /// Both forces, and the keys that they come from.
-pub(crate) fn check_lift(vehicle: &Vehicle, path: &Path, run: &NodeContext<'_>) -> Result<(), String> {
+pub(crate) fn check_lift(
+    vehicle: &Vehicle,
+    path: &Path,
+    run: &NodeContext<'_>,
+) -> Result<(), ParameterError> {
     let (least_N, most_N) =
         (lift_N(vehicle, least_speed_rad_s(vehicle)), lift_N(vehicle, vehicle.command.speed_at_max_rad_s));
     let weight_N = vehicle.mass_kg * vehicle.gravity_m_s2;
@@ -83,22 +95,37 @@ pub(crate) fn check_lift(vehicle: &Vehicle, path: &Path, run: &NodeContext<'_>) 
         )
     };
     if ratio < 1.0 {
-        return Err(words("cannot fly, expected a thrust to weight of 1 or more"));
+        return Err(ParameterError::conflict(
+            "vehicle",
+            words("cannot fly, expected a thrust to weight of 1 or more"),
+        ));
     }
     if on_earth > LIFT_MAX {
-        return Err(words(&format!(
-            "is no vehicle that flies, expected a thrust to weight on Earth below {LIFT_MAX}"
-        )));
+        return Err(ParameterError::conflict(
+            "vehicle",
+            words(&format!(
+                "is no vehicle that flies, expected a thrust to weight on Earth below {LIFT_MAX}"
+            )),
+        ));
     }
     if least_N > weight_N {
-        return Err(words("cannot come down, expected less lift than weight at `command.speed_at_min`"));
+        return Err(ParameterError::conflict(
+            "command.speed_at_min",
+            words("cannot come down, expected less lift than weight at `command.speed_at_min`"),
+        ));
     }
     if ratio < LIFT_ODD {
-        run.warn(words(&format!("can hardly climb or tilt, below a thrust to weight of {LIFT_ODD}")));
+        run.warn(
+            "vehicle",
+            words(&format!("can hardly climb or tilt, below a thrust to weight of {LIFT_ODD}")),
+        );
     } else if on_earth > LIFT_HIGH {
-        run.warn(words(&format!(
-            "is stronger than any that flies, above a thrust to weight on Earth of {LIFT_HIGH}"
-        )));
+        run.warn(
+            "vehicle",
+            words(&format!(
+                "is stronger than any that flies, above a thrust to weight on Earth of {LIFT_HIGH}"
+            )),
+        );
     }
     Ok(())
 }
@@ -132,7 +159,7 @@ pub(crate) fn rehearse(
     vehicle: &Vehicle,
     substeps: u32,
     dt_s: f64,
-) -> Result<(), String> {
+) -> Result<(), ParameterError> {
     let ticks = (REHEARSAL_STEPS / substeps.max(1)).max(3);
     let (map, mut flown) = (&vehicle.command, 0);
     for command in [vehicle.hover_command(), map.max, map.min] {
@@ -141,10 +168,13 @@ pub(crate) fn rehearse(
             backend.step(&[command; 4], dt_s, &[]);
             flown += 1;
             if let Some(what) = first_not_finite(backend) {
-                return Err(format!(
-                    "`vehicle` \"{}\": its numbers lead to {what} that is no number after {flown} ticks; no vehicle \
+                return Err(ParameterError::conflict(
+                    "vehicle",
+                    format!(
+                        "`vehicle` \"{}\": its numbers lead to {what} that is no number after {flown} ticks; no vehicle \
                      that flies has them together",
-                    vehicle.name
+                        vehicle.name
+                    ),
                 ));
             }
         }
@@ -185,7 +215,7 @@ mod tests {
         vehicle
     }
 
-    fn lift(change: impl Fn(&mut Vehicle)) -> (Result<(), String>, Vec<Warning>) {
+    fn lift(change: impl Fn(&mut Vehicle)) -> (Result<(), ParameterError>, Vec<Warning>) {
         let run = NodeContext::new("node", &[]);
         let outcome = check_lift(&hummingbird(change), PATH.as_ref(), &run);
         (outcome, run.into_warnings())
@@ -198,7 +228,7 @@ mod tests {
         // On an asteroid the rotors are as strong as on Earth.
         let off = |it: &mut Vehicle| it.command.speed_at_min_rad_s = 0.0;
         assert_eq!(lift(|it| (off(it), it.gravity_m_s2 = 0.005).1), (Ok(()), vec![]));
-        let words = lift(|it| it.mass_kg = 480.0).0.unwrap_err();
+        let words = lift(|it| it.mass_kg = 480.0).0.unwrap_err().to_string();
         assert!(
             words.contains("thrust to weight of 0.0048") && words.contains("weighs 4708.8000 N"),
             "{words}"
@@ -206,15 +236,15 @@ mod tests {
         assert!(words.contains("hummingbird.toml:21: `body.mass`"), "{words}");
         // 4.785 as declared.
         let (outcome, warnings) = lift(|it| it.mass_kg *= 4.5);
-        assert!(outcome.is_ok() && warnings[0].words.contains("can hardly climb"), "{warnings:?}");
+        assert!(outcome.is_ok() && warnings[0].message.contains("can hardly climb"), "{warnings:?}");
         let (outcome, warnings) = lift(|it| it.mass_kg /= 20.0);
         assert!(outcome.is_err() && warnings.is_empty(), "at 1075 rpm it still rises");
-        let words = outcome.unwrap_err();
+        let words = outcome.unwrap_err().to_string();
         assert!(words.contains("cannot come down"), "{words}");
         let slow = |it: &mut Vehicle| it.command.speed_at_min_rad_s = 0.0;
         let strong = |factor: f64| lift(|it| (slow(it), it.mass_kg /= factor).1);
-        assert!(strong(20.0).1[0].words.contains("stronger than any"));
-        assert!(strong(1e4).0.unwrap_err().contains("no vehicle that flies"));
+        assert!(strong(20.0).1[0].message.contains("stronger than any"));
+        assert!(strong(1e4).0.unwrap_err().to_string().contains("no vehicle that flies"));
     }
 
     #[test]
@@ -225,8 +255,8 @@ mod tests {
             (outcome, run.into_warnings())
         };
         assert_eq!(steps(1e-3), (Ok(()), vec![]));
-        assert!(steps(0.1).1[0].words.contains("raise `substeps`"));
-        let words = steps(0.2).0.unwrap_err();
+        assert!(steps(0.1).1[0].message.contains("raise `substeps`"));
+        let words = steps(0.2).0.unwrap_err().to_string();
         assert!(words.contains("15.0756 rad/s") && words.contains("expected below 2.5"), "{words}");
     }
 
@@ -254,7 +284,7 @@ mod tests {
             rehearse(&mut backend, &vehicle, 1, 1e-3)
         };
         assert_eq!(rehearsed(|_| {}), Ok(()));
-        let words = rehearsed(|it| it.thrust_coefficient = 1e306).unwrap_err();
+        let words = rehearsed(|it| it.thrust_coefficient = 1e306).unwrap_err().to_string();
         assert!(words.contains("that is no number after"), "{words}");
     }
 }

@@ -33,9 +33,9 @@ pub mod situation;
 use crate::airframe::Drive;
 use crate::memory::Remembered;
 use crate::rotor::Wrench;
+use diagnostics::unit::Dimension;
 use situation::Situation;
 use vehicles::Vehicle;
-use vehicles::units::Dimension;
 
 /// The most parameters that an effect has.
 pub const PARAMETERS_MAX: usize = 6;

@@ -15,6 +15,7 @@ use bus::InputPorts;
 use bus::component::{Component, Info, Internal, StepError};
 use bus::context::{NodeContext, StepContext};
 use bus::messages::{MeasuredState, MotorCommand, Traffic};
+use diagnostics::ParameterError;
 use nalgebra::{UnitQuaternion, Vector3};
 use vehicles::Vehicle;
 
@@ -47,14 +48,14 @@ impl Component for Plant {
     type Outputs = Outputs;
     type State = Internal;
 
-    fn new(parameters: Parameters, context: &NodeContext<'_>) -> Result<Self, String> {
+    fn new(parameters: Parameters, context: &NodeContext<'_>) -> Result<Self, ParameterError> {
         let (dt_s, substeps) = (context.tick_s(), parameters.substeps);
         let (vehicle, backend) = parameters.backend(context)?;
         let window_ticks = parameters.window_ticks(dt_s)?;
         Ok(Self { vehicle, substeps, backend, window_ticks, dt_s, others: Others::new() })
     }
 
-    fn rehearse(mut self, _: &NodeContext<'_>) -> Result<(), String> {
+    fn rehearse(mut self, _: &NodeContext<'_>) -> Result<(), ParameterError> {
         airworthy::rehearse(&mut *self.backend, &self.vehicle, self.substeps, self.dt_s)
     }
 
@@ -122,7 +123,7 @@ mod tests {
         format!("{}/../{file}", env!("CARGO_MANIFEST_DIR"))
     }
 
-    fn checked(scene: &str, more: Value, ports: &[&str]) -> Result<(), String> {
+    fn checked(scene: &str, more: Value, ports: &[&str]) -> Result<(), ParameterError> {
         let mut parameters = json!({
             "vehicle": repository("vehicles/hummingbird.toml"),
             "scene": repository(scene),
@@ -138,7 +139,7 @@ mod tests {
         // The hull reaches 0.2716 m; the wall stands at 5 m.
         assert_eq!(start(4.7), Ok(()));
         for x in [4.8, 5.05, 5.3] {
-            let error = start(x).unwrap_err();
+            let error = start(x).unwrap_err().to_string();
             assert!(error.contains("`initial_position_m`") && error.contains("\"wall +x\""), "{error}");
         }
         let measured = json!({ "initial_position_m": [5.05, 0.0, 1.0], "window_s": 0.1 });
@@ -150,14 +151,15 @@ mod tests {
         let with = |substeps: u32| checked("scenes/ground.toml", json!({ "substeps": substeps }), &[]);
         assert_eq!((with(1), with(1000)), (Ok(()), Ok(())));
         for substeps in [0, 1001, u32::MAX] {
-            assert!(with(substeps).unwrap_err().contains("`substeps`"));
+            assert!(with(substeps).unwrap_err().to_string().contains("`substeps`"));
         }
     }
 
     #[test]
     fn contact_needs_a_backend_that_touches() {
         let free = json!({ "backend": "newton-euler" });
-        let error = checked("scenes/ground.toml", free.clone(), &["command", "contact"]).unwrap_err();
+        let error =
+            checked("scenes/ground.toml", free.clone(), &["command", "contact"]).unwrap_err().to_string();
         assert!(error.contains("`contact`") && error.contains("`backend`"), "{error}");
         assert_eq!(checked("scenes/ground.toml", free, &["command"]), Ok(()));
         assert_eq!(checked("scenes/ground.toml", json!({}), &["command", "contact"]), Ok(()));

@@ -100,7 +100,7 @@ mod tests {
     #[test]
     fn a_traffic_without_the_vehicle_or_with_two_at_its_place_is_refused() {
         let seen = |positions| Others::new().seen(&traffic(positions), &Vector3::zeros(), 0).map(<[_]>::len);
-        assert!(seen(&[[1.0; 3]]).unwrap_err().contains("none of the 1 vehicles"));
-        assert!(seen(&[[0.0; 3], [0.0; 3]]).unwrap_err().contains("start at one place"));
+        assert!(seen(&[[1.0; 3]]).unwrap_err().to_string().contains("none of the 1 vehicles"));
+        assert!(seen(&[[0.0; 3], [0.0; 3]]).unwrap_err().to_string().contains("start at one place"));
     }
 }

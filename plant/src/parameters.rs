@@ -10,6 +10,7 @@ use crate::newton_euler::NewtonEuler;
 use crate::rapier::Rapier;
 use crate::state::RigidBody;
 use bus::context::NodeContext;
+use diagnostics::parameter::{ParameterError, all, finite, positive, require};
 use nalgebra::{UnitQuaternion, Vector3};
 use scenes::Scene;
 use serde::Deserialize;
@@ -65,12 +66,13 @@ fn one() -> u32 {
 }
 
 /// A plant that ran less often would apply a command before it was computed.
-fn require_every_tick(period_ticks: u32) -> Result<(), String> {
+fn require_every_tick(period_ticks: u32) -> Result<(), ParameterError> {
     match period_ticks {
         1 => Ok(()),
-        other => {
-            Err(format!("`period_ticks` is {other}, expected 1: a plant runs at every tick; leave it out"))
-        }
+        other => Err(ParameterError::conflict(
+            "period_ticks",
+            format!("`period_ticks` is {other}, expected 1: a plant runs at every tick; leave it out"),
+        )),
     }
 }
 
@@ -80,26 +82,34 @@ fn require_every_tick(period_ticks: u32) -> Result<(), String> {
     clippy::cast_sign_loss,
     reason = "checked to be positive and short"
 )]
-fn window_ticks(window_s: f64, tick_s: f64) -> Result<u32, String> {
+fn window_ticks(window_s: f64, tick_s: f64) -> Result<u32, ParameterError> {
     let ticks = (window_s / tick_s).round();
     if (window_s / tick_s - ticks).abs() < 1e-6 && (1.0..=f64::from(u32::MAX)).contains(&ticks) {
         return Ok(ticks as u32);
     }
-    Err(format!(
-        "`window_s` is {window_s} s, which is not a whole number of ticks of {tick_s} s, at least one"
+    Err(ParameterError::conflict(
+        "window_s",
+        format!(
+            "`window_s` is {window_s} s, which is not a whole number of ticks of {tick_s} s, at least one"
+        ),
     ))
 }
 
 impl Parameters {
     /// Refuses what cannot be meant.
-    fn check(&self, run: &NodeContext<'_>) -> Result<(), String> {
+    fn check(&self, run: &NodeContext<'_>) -> Result<(), ParameterError> {
         self.check_numbers()?;
         self.check_ports(run)?;
         require_every_tick(run.period_ticks)
     }
 
     /// Refuses what cannot fly.
-    fn check_flight(&self, airframe: &Airframe, scene: &Scene, run: &NodeContext<'_>) -> Result<(), String> {
+    fn check_flight(
+        &self,
+        airframe: &Airframe,
+        scene: &Scene,
+        run: &NodeContext<'_>,
+    ) -> Result<(), ParameterError> {
         airworthy::check_steps(airframe, run.tick_s() / f64::from(self.substeps), run)?;
         if scene.rig.is_none() && self.window_s.is_none() {
             airworthy::check_lift(airframe.vehicle(), &self.vehicle, run)?;
@@ -108,56 +118,49 @@ impl Parameters {
     }
 
     /// Ticks of `tick_s` between two settings to what is measured; longer than any run without.
-    pub(crate) fn window_ticks(&self, tick_s: f64) -> Result<u32, String> {
+    pub(crate) fn window_ticks(&self, tick_s: f64) -> Result<u32, ParameterError> {
         self.window_s.map_or(Ok(u32::MAX), |window_s| window_ticks(window_s, tick_s))
     }
 
-    fn check_numbers(&self) -> Result<(), String> {
-        self.check_start()?;
-        if !(1..=SUBSTEPS_MAX).contains(&self.substeps) {
-            return Err(format!("`substeps` is {}, expected 1 to {SUBSTEPS_MAX}", self.substeps));
+    fn check_numbers(&self) -> Result<(), ParameterError> {
+        all(finite, "initial_position_m", &self.initial_position_m)?;
+        all(finite, "initial_velocity_m_s", &self.initial_velocity_m_s)?;
+        finite("initial_yaw_deg", self.initial_yaw_deg)?;
+        let substeps_are_good = (1..=SUBSTEPS_MAX).contains(&self.substeps);
+        require("substeps", self.substeps, substeps_are_good, format!("1 to {SUBSTEPS_MAX}"))?;
+        self.window_s.map_or(Ok(()), |window_s| positive("window_s", window_s))?;
+        self.crash_speed_m_s.map_or(Ok(()), |speed_m_s| positive("crash_speed_m_s", speed_m_s))?;
+        if self.crash_speed_m_s.is_some() && self.backend == BackendName::NewtonEuler {
+            let message = "`crash_speed_m_s` needs `backend` = \"rapier\": free flight touches nothing";
+            return Err(ParameterError::conflict("crash_speed_m_s", message));
         }
-        if self.window_s.is_some_and(|window_s| !is_positive(window_s)) {
-            return Err("`window_s` must be a positive number of seconds".to_owned());
-        }
-        match self.crash_speed_m_s {
-            Some(_) if self.backend == BackendName::NewtonEuler => {
-                Err("`crash_speed_m_s` needs `backend` = \"rapier\": free flight touches nothing".to_owned())
-            }
-            Some(speed_m_s) if !is_positive(speed_m_s) => {
-                Err("`crash_speed_m_s` must be a positive number of m/s".to_owned())
-            }
-            _ => Ok(()),
-        }
+        Ok(())
     }
 
-    fn check_start(&self) -> Result<(), String> {
-        let finite = |key: &str, numbers: &[f64]| match numbers.iter().find(|number| !number.is_finite()) {
-            Some(number) => Err(format!("`{key}` holds {number}, expected finite numbers")),
-            None => Ok(()),
-        };
-        finite("initial_position_m", &self.initial_position_m)?;
-        finite("initial_velocity_m_s", &self.initial_velocity_m_s)?;
-        finite("initial_yaw_deg", &[self.initial_yaw_deg])
-    }
-
-    fn check_ports(&self, run: &NodeContext<'_>) -> Result<(), String> {
+    fn check_ports(&self, run: &NodeContext<'_>) -> Result<(), ParameterError> {
         let needs_rapier = |port| run.has(port) && self.backend == BackendName::NewtonEuler;
         if needs_rapier("traffic") {
-            return Err(
-                "the input `traffic` needs `backend` = \"rapier\": free flight meets nobody".to_owned()
-            );
+            return Err(ParameterError::conflict(
+                "backend",
+                "the input `traffic` needs `backend` = \"rapier\": free flight meets nobody",
+            ));
         }
         if needs_rapier("contact") {
-            return Err(
+            return Err(ParameterError::conflict(
+                "backend",
                 "the output `contact` needs `backend` = \"rapier\": free flight touches nothing, and \
-                        would report a flight through a wall as one without contact"
-                    .to_owned(),
-            );
+                        would report a flight through a wall as one without contact",
+            ));
         }
         match (run.has("measured"), self.window_s) {
-            (true, None) => Err("the input `measured` needs the parameter `window_s`".to_owned()),
-            (false, Some(_)) => Err("the parameter `window_s` needs the input `measured`".to_owned()),
+            (true, None) => Err(ParameterError::conflict(
+                "window_s",
+                "the input `measured` needs the parameter `window_s`",
+            )),
+            (false, Some(_)) => Err(ParameterError::conflict(
+                "window_s",
+                "the parameter `window_s` needs the input `measured`",
+            )),
             _ => Ok(()),
         }
     }
@@ -167,7 +170,10 @@ impl Parameters {
     ///
     /// # Errors
     /// What cannot be meant, or cannot fly.
-    pub(crate) fn backend(&self, run: &NodeContext<'_>) -> Result<(Vehicle, Box<dyn Backend>), String> {
+    pub(crate) fn backend(
+        &self,
+        run: &NodeContext<'_>,
+    ) -> Result<(Vehicle, Box<dyn Backend>), ParameterError> {
         self.check(run)?;
         let (airframe, scene) = self.airframe()?;
         // Before the backend, which a vehicle that is none might not survive.
@@ -183,11 +189,14 @@ impl Parameters {
         model: NewtonEuler,
         memory: AirframeMemory,
         scene: &Scene,
-    ) -> Result<Box<dyn Backend>, String> {
+    ) -> Result<Box<dyn Backend>, ParameterError> {
         match self.backend {
-            BackendName::NewtonEuler if scene.rig.is_some() => Err(format!(
-                "`scene` \"{}\" holds a rig, which needs `backend` = \"rapier\": newton-euler flies freely",
-                scene.name
+            BackendName::NewtonEuler if scene.rig.is_some() => Err(ParameterError::conflict(
+                "scene",
+                format!(
+                    "`scene` \"{}\" holds a rig, which needs `backend` = \"rapier\": newton-euler flies freely",
+                    scene.name
+                ),
             )),
             BackendName::NewtonEuler => Ok(Box::new(FreeFlight::new(model, self.start(), memory))),
             BackendName::Rapier => {
@@ -200,22 +209,32 @@ impl Parameters {
     }
 
     /// The vehicle as it flies, and what stands around it.
-    fn airframe(&self) -> Result<(Airframe, Scene), String> {
-        let vehicle = Vehicle::load(&self.vehicle).map_err(|error| error.to_string())?;
-        let scene = self.scene.as_deref().map(Scene::load).transpose().map_err(|error| error.to_string())?;
+    fn airframe(&self) -> Result<(Airframe, Scene), ParameterError> {
+        let vehicle =
+            Vehicle::load(&self.vehicle).map_err(|error| ParameterError::conflict("vehicle", error))?;
+        let scene = self
+            .scene
+            .as_deref()
+            .map(Scene::load)
+            .transpose()
+            .map_err(|error| ParameterError::conflict("scene", error))?;
         let scene = scene.unwrap_or_default();
         refuse_double_rig(&vehicle, &scene)?;
-        let airframe = Airframe::from_files(vehicle, &scene.effects).map_err(|error| error.to_string())?;
+        let airframe = Airframe::from_files(vehicle, &scene.effects)
+            .map_err(|error| ParameterError::conflict("vehicle", error))?;
         Ok((airframe, scene))
     }
 
     /// Refuses a start inside of a box, unless a measured flight says where the vehicle starts.
-    fn refuse_inside(&self, rapier: &Rapier, scene: &Scene) -> Result<(), String> {
+    fn refuse_inside(&self, rapier: &Rapier, scene: &Scene) -> Result<(), ParameterError> {
         match rapier.box_around().and_then(|number| scene.boxes.get(number)) {
-            Some(cuboid) if self.window_s.is_none() => Err(format!(
-                "`initial_position_m` is {:?}, where the vehicle is partly inside of the box \"{}\" of the scene; \
+            Some(cuboid) if self.window_s.is_none() => Err(ParameterError::conflict(
+                "initial_position_m",
+                format!(
+                    "`initial_position_m` is {:?}, where the vehicle is partly inside of the box \"{}\" of the scene; \
                  move it out",
-                self.initial_position_m, cuboid.name
+                    self.initial_position_m, cuboid.name
+                ),
             )),
             _ => Ok(()),
         }
@@ -234,21 +253,20 @@ impl Parameters {
 }
 
 /// Refuses effects that stand for what the joints of a rig do.
-fn refuse_double_rig(vehicle: &Vehicle, scene: &Scene) -> Result<(), String> {
+fn refuse_double_rig(vehicle: &Vehicle, scene: &Scene) -> Result<(), ParameterError> {
     let is_rig_effect =
         |entry: &&EffectEntry| ["rig-pendulum", "bearing-friction"].contains(&entry.name.as_str());
     match vehicle.effects.iter().chain(&scene.effects).find(is_rig_effect) {
-        Some(effect) if scene.rig.is_some() => Err(format!(
-            "`scene` \"{}\" holds a rig, whose joints have what the effect \"{}\" stands for: it would count twice; \
+        Some(effect) if scene.rig.is_some() => Err(ParameterError::conflict(
+            "scene",
+            format!(
+                "`scene` \"{}\" holds a rig, whose joints have what the effect \"{}\" stands for: it would count twice; \
              leave the effect out",
-            scene.name, effect.name
+                scene.name, effect.name
+            ),
         )),
         _ => Ok(()),
     }
-}
-
-fn is_positive(number: f64) -> bool {
-    number > 0.0 && number.is_finite()
 }
 
 #[cfg(test)]
@@ -267,7 +285,7 @@ mod tests {
             let mut vehicle = Vehicle::load(repository("vehicles/hummingbird.toml").as_ref()).unwrap();
             assert_eq!(refuse_double_rig(&vehicle, &scene), Ok(()));
             vehicle.effects.push(entry(name.to_owned()));
-            let error = refuse_double_rig(&vehicle, &scene).unwrap_err();
+            let error = refuse_double_rig(&vehicle, &scene).unwrap_err().to_string();
             assert!(error.contains("`scene`") && error.contains(name), "{error}");
             scene.effects.append(&mut vehicle.effects);
             assert!(refuse_double_rig(&vehicle, &scene).is_err());

@@ -6,6 +6,7 @@ use bus::component::{Component, Info, StepError};
 use bus::context::{NodeContext, StepContext};
 use bus::messages::{PlantState, Traffic as Gathered};
 use bus::ports::Many;
+use diagnostics::ParameterError;
 use serde::Deserialize;
 
 /// Gathers the states of the plants of a run.
@@ -31,10 +32,13 @@ impl Component for Traffic {
     type Outputs = Outputs;
     type State = ();
 
-    fn new(Parameters {}: Parameters, context: &NodeContext<'_>) -> Result<Self, String> {
+    fn new(Parameters {}: Parameters, context: &NodeContext<'_>) -> Result<Self, ParameterError> {
         match context.inputs.len() {
             0..=TRAFFIC_MAX => Ok(Self),
-            count => Err(format!("{count} inputs, expected at most {TRAFFIC_MAX} vehicles")),
+            count => Err(ParameterError::conflict(
+                "",
+                format!("{count} inputs, expected at most {TRAFFIC_MAX} vehicles"),
+            )),
         }
     }
 

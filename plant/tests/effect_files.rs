@@ -29,7 +29,7 @@ fn airframe(vehicle: &str, scene: &str) -> Result<Airframe, String> {
 
 /// The fault is reported on `line` of what is added to the Hummingbird's file, with all these words.
 fn assert_refused(effects: &str, line: usize, words: &[&str]) {
-    let message = airframe(effects, "").unwrap_err();
+    let message = airframe(effects, "").unwrap_err().to_string();
     let start = format!("bird.toml:{}:", HUMMINGBIRD.lines().count() + line);
     assert!(message.starts_with(&start), "expected {start} in: {message}");
     for word in words {
@@ -116,7 +116,7 @@ fn a_fault_in_an_effect_is_named_with_its_place() {
 
 #[test]
 fn an_effect_in_both_files_is_refused_where_the_scene_repeats_it() {
-    let message = airframe(WIND, WIND).unwrap_err();
+    let message = airframe(WIND, WIND).unwrap_err().to_string();
     assert!(message.starts_with("here.toml:4:") && message.contains("each effect once"), "{message}");
 }
 

@@ -6,6 +6,7 @@ use bus::announcement::Announcement;
 use bus::component::{Component, Info, Internal, StepError};
 use bus::context::{NodeContext, StepContext};
 use bus::ports::AnyInputs;
+use diagnostics::ParameterError;
 use serde::Deserialize;
 use std::path::PathBuf;
 
@@ -71,7 +72,7 @@ impl Component for Recorder {
     type Outputs = ();
     type State = Internal;
 
-    fn new(parameters: Parameters, context: &NodeContext<'_>) -> Result<Self, String> {
+    fn new(parameters: Parameters, context: &NodeContext<'_>) -> Result<Self, ParameterError> {
         Ok(Self { parameters, flush_ticks: flush_period_ticks(context.tick_s()), recording: None })
     }
 

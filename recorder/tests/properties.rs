@@ -129,7 +129,12 @@ fn an_attachment_that_is_listed_twice_is_refused() {
     let crc = bytes.len() - 8 - 4;
     bytes[crc..crc + 4].fill(0);
     bytes.splice(at..at, index);
-    assert!(attachments(&bytes).unwrap_err().contains("expected an attachment that is not listed yet"));
+    assert!(
+        attachments(&bytes)
+            .unwrap_err()
+            .to_string()
+            .contains("expected an attachment that is not listed yet")
+    );
 }
 
 /// Reads `bytes` as a recording in every way; returns the number of messages, where it reads.
@@ -308,12 +313,16 @@ fn what_was_flushed_survives_at_every_byte_behind_it() {
 fn a_definition_that_holds_itself_or_repeats_nothing_is_refused() {
     let rule = "=".repeat(80);
     let definition = Definition::parse(&format!("A a\n{rule}\nMSG: A\nA a\n")).unwrap();
-    assert!(definition.decode(&[0, 1, 0, 0, 1, 2, 3]).unwrap_err().contains("messages deep"));
+    assert!(definition.decode(&[0, 1, 0, 0, 1, 2, 3]).unwrap_err().to_string().contains("messages deep"));
     let definition = Definition::parse(&format!("A[18446744073709551615] a\n{rule}\nMSG: A\n")).unwrap();
-    assert!(definition.decode(&[0, 1, 0, 0, 1, 2, 3]).unwrap_err().contains("more values than"));
+    assert!(definition.decode(&[0, 1, 0, 0, 1, 2, 3]).unwrap_err().to_string().contains("more values than"));
     let definition = Definition::parse(&format!("uint8[1000] {}\n", "a".repeat(5000))).unwrap();
     assert!(
-        definition.decode(&[[0, 1, 0, 0].as_slice(), &[7; 1000]].concat()).unwrap_err().contains("paths")
+        definition
+            .decode(&[[0, 1, 0, 0].as_slice(), &[7; 1000]].concat())
+            .unwrap_err()
+            .to_string()
+            .contains("paths")
     );
 }
 

@@ -6,7 +6,6 @@ use flights::state::{StateQuantity, WindowEndErrors};
 use recorder::reader::Recording;
 use recorder::series::Series;
 use runtime::manifest::{Comparison, Content, PassCondition, Statistic};
-use runtime::units::conversion;
 use serde::Serialize;
 
 /// A pass condition and how it came out.
@@ -101,7 +100,7 @@ fn verdict(pass: &PassCondition, series: &[Series]) -> Result<Verdict> {
     };
     let (judged, taken) =
         signals.split_at(if pass.minus.is_some() { signals.len() / 2 } else { signals.len() });
-    let factor = match conversion(&judged[0].unit, &pass.unit) {
+    let factor = match diagnostics::convert(&judged[0].unit, &pass.unit) {
         Ok(factor) => factor,
         Err(error) => bail!("pass condition `{}`: {error}", pass.name),
     };
@@ -230,7 +229,7 @@ fn compare_states(compare: &Comparison, recording: &Recording) -> Result<WindowE
 
 #[cfg(test)]
 mod tests {
-    use super::{conversion, statistic, verdict};
+    use super::{statistic, verdict};
     use recorder::series::Series;
     use runtime::manifest::{PassCondition, Statistic};
 
@@ -269,13 +268,6 @@ mod tests {
     fn a_gate_that_never_opens_fails() {
         let gated = condition("while = { topic = \"/g\", field = \"s\", min = 1 }");
         assert!(!verdict(&gated, &[series("m", &[1.0]), series("1", &[0.0])]).unwrap().passed);
-    }
-
-    #[test]
-    fn units_of_one_quantity_convert() {
-        assert!((conversion("rad", "deg").unwrap() - 180.0 / std::f64::consts::PI).abs() < 1e-12);
-        assert!(conversion("m", "deg").unwrap_err().contains("expected m or cm or mm"));
-        assert_eq!(conversion("foo", "foo"), Ok(1.0));
     }
 
     #[test]

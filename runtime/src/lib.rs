@@ -25,5 +25,4 @@ mod spawn;
 mod stall;
 pub mod succession;
 mod supervisor;
-pub mod units;
 mod watch_clock;

@@ -2,30 +2,30 @@
 
 use crate::rig;
 use crate::scene::{Cuboid, Scene};
+use diagnostics::parameter::Bounds;
+use diagnostics::unit::{ANGLE, LENGTH};
 use nalgebra::Vector3;
 use vehicles::VehicleError;
-use vehicles::reader::{Bounds, Document, Section};
-use vehicles::units::{ANGLE, LENGTH};
+use vehicles::reader::{Document, Section};
 
 /// Where things of a scene stand.
 pub(crate) const PLACE: Bounds = Bounds {
-    least: -1e6,
-    most: 1e6,
+    min: -1e6,
+    max: 1e6,
     unit: "m",
     why: "beyond 1000 km the ground is not flat, and contacts of a double lose their micrometres",
 };
 
 /// Lengths of a box.
 const SIZE: Bounds = Bounds {
-    least: 1e-4,
-    most: 1e6,
+    min: 1e-4,
+    max: 1e6,
     unit: "m",
     why: "three lengths above 0: contacts are resolved to 0.1 mm, and beyond 1000 km the ground is not flat",
 };
 
 /// Ten turns.
-const YAW: Bounds =
-    Bounds { least: -63.0, most: 63.0, unit: "rad", why: "ten turns, in case of a wrong unit" };
+const YAW: Bounds = Bounds { min: -63.0, max: 63.0, unit: "rad", why: "ten turns, in case of a wrong unit" };
 
 /// Reads the whole file; see `scenes/room.toml` for the layout.
 pub(crate) fn parse(text: &str, file_name: &str) -> Result<Scene, VehicleError> {

@@ -2,10 +2,11 @@
 #![allow(non_snake_case, reason = "a trailing _W or _B names the frame a vector is written in, N the newton")]
 
 use crate::file::PLACE;
+use diagnostics::parameter::Bounds;
+use diagnostics::unit::{ANGLE, FORCE, LENGTH, LINEAR_DAMPING, MASS, ROTARY_DAMPING, TORQUE};
 use nalgebra::Vector3;
 use vehicles::VehicleError;
-use vehicles::reader::{Bounds, Quantity, Section};
-use vehicles::units::{ANGLE, Dimension, LENGTH, MASS};
+use vehicles::reader::{Quantity, Section};
 
 /// The rod-end bearing of thesis section 5.2, and the tube that it hangs on.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -30,32 +31,26 @@ pub struct Rig {
     pub slide_damping_N_s_m: f64,
 }
 
-const TORQUE: Dimension = Dimension { name: "torque", units: &[("N*m", 1.0)] };
-const TORQUE_PER_SPEED: Dimension =
-    Dimension { name: "torque per angular velocity", units: &[("N*m*s", 1.0)] };
-const FORCE: Dimension = Dimension { name: "force", units: &[("N", 1.0)] };
-const FORCE_PER_SPEED: Dimension = Dimension { name: "force per speed", units: &[("N*s/m", 1.0)] };
-
 /// Where the vehicle is mounted, seen from its centre of mass.
 const MOUNT: Bounds = Bounds {
-    least: -100.0,
-    most: 100.0,
+    min: -100.0,
+    max: 100.0,
     unit: "m",
     why: "the longest helicopter measures 40 m over its rotors",
 };
 
 /// A mass that hangs in a bearing.
 const MOVING_MASS: Bounds = Bounds {
-    least: 1e-6,
-    most: 1e6,
+    min: 1e-6,
+    max: 1e6,
     unit: "kg",
     why: "the lightest that flies weighs 80 mg, the heaviest with rotors 56 t",
 };
 
 /// Heave, friction and damping, each in its unit of the SI.
 const AMOUNT: Bounds = Bounds {
-    least: 0.0,
-    most: 1e6,
+    min: 0.0,
+    max: 1e6,
     unit: "in SI",
     why: "no test rig travels so far or rubs so hard: the weight of 56 t, the heaviest with rotors, is 5.5e5 N",
 };
@@ -71,9 +66,9 @@ pub(crate) fn parse(section: &Section) -> Result<Rig, VehicleError> {
         heave_m: not_negative("heave", LENGTH)?.si,
         moving_mass_kg: section.quantity("moving_mass", MASS)?.within(doc, &MOVING_MASS)?.si,
         bearing_friction_N_m: not_negative("bearing_friction", TORQUE)?.si,
-        bearing_damping_N_m_s: not_negative("bearing_damping", TORQUE_PER_SPEED)?.si,
+        bearing_damping_N_m_s: not_negative("bearing_damping", ROTARY_DAMPING)?.si,
         slide_friction_N: not_negative("slide_friction", FORCE)?.si,
-        slide_damping_N_s_m: not_negative("slide_damping", FORCE_PER_SPEED)?.si,
+        slide_damping_N_s_m: not_negative("slide_damping", LINEAR_DAMPING)?.si,
     };
     section.finish()?;
     Ok(rig)

@@ -3,7 +3,7 @@
 
 use crate::complementary::{Complementary, ComplementaryParams, ComplementaryState};
 use crate::imu_model::ImuReading;
-use bus::kind::{Inputs, NodeKind, PortSpec, read_parameters};
+use bus::kind::{Inputs, NodeKind, PortSpec};
 use bus::messages::{AttitudeEstimate, Imu, Quaternion, Vector3};
 use bus::{BusError, Message, Node};
 
@@ -14,8 +14,8 @@ pub const KIND: NodeKind = NodeKind {
     inputs: Inputs::Ports(&[PortSpec::required("imu", Imu::SCHEMA)]),
     outputs: &[PortSpec::required("estimate", AttitudeEstimate::SCHEMA)],
     check: |parameters, run| {
-        let params: ComplementaryParams = read_parameters(parameters)?;
-        Complementary::new(params, run.period_s()).map(|_| ()).map_err(|error| error.to_string())
+        let params: ComplementaryParams = diagnostics::read(parameters)?;
+        Complementary::new(params, run.period_s()).map(|_| ())
     },
     run,
 };

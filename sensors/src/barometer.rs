@@ -9,12 +9,12 @@
 use crate::atmosphere::{SEA_LEVEL_PRESSURE_PA, height_m, pressure_Pa};
 use crate::channel::{Chance, Channel, ChannelState, QUEUE, Timing};
 use crate::noise::BiasWalk;
-use crate::parameter::{ParameterError, finite, not_negative, positive};
 use crate::steps::in_steps;
-use bus::kind::{Inputs, NodeKind, PortSpec, read_parameters};
+use bus::kind::{Inputs, NodeKind, PortSpec};
 use bus::messages::{Barometer, PlantState};
 use bus::random::normal;
 use bus::{BusError, Message, Node};
+use diagnostics::parameter::{ParameterError, finite, not_negative, positive};
 use serde::Deserialize;
 
 /// The barometer, for manifests.
@@ -24,8 +24,8 @@ pub const KIND: NodeKind = NodeKind {
     inputs: Inputs::Ports(&[PortSpec::required("state", PlantState::SCHEMA)]),
     outputs: &[PortSpec::required("barometer", Barometer::SCHEMA)],
     check: |parameters, run| {
-        let params: BarometerParams = read_parameters(parameters)?;
-        params.validate().map_err(|error| error.to_string())?;
+        let params: BarometerParams = diagnostics::read(parameters)?;
+        params.validate()?;
         params.timing().check(run)
     },
     run,
@@ -244,7 +244,8 @@ mod tests {
         for (key, value) in bad.into_iter().chain([("bias_walk_Pa_sqrt_s", -1.0), ("resolution_Pa", -1.0)]) {
             let reason =
                 (KIND.check)(&serde_json::json!({ key: value }), &NodeContext::new("node", &["state"]))
-                    .unwrap_err();
+                    .unwrap_err()
+                    .to_string();
             assert!(reason.contains(&format!("`{key}`")), "{reason}");
         }
     }

@@ -7,12 +7,12 @@
 #![allow(non_snake_case, reason = "trailing _V, _A and _Ah name units")]
 
 use crate::channel::{Chance, Channel, ChannelState, QUEUE, Timing};
-use crate::parameter::{ParameterError, check, finite, not_negative, positive};
 use crate::steps::in_steps;
-use bus::kind::{Inputs, NodeKind, PortSpec, read_parameters};
+use bus::kind::{Inputs, NodeKind, PortSpec};
 use bus::messages::Battery;
 use bus::random::normal;
 use bus::{BusError, Message, Node};
+use diagnostics::parameter::{ParameterError, finite, not_negative, positive, require};
 use serde::Deserialize;
 
 /// The battery monitor, for manifests.
@@ -22,8 +22,8 @@ pub const KIND: NodeKind = NodeKind {
     inputs: Inputs::Ports(&[PortSpec::required("battery", Battery::SCHEMA)]),
     outputs: &[PortSpec::required("measured", Battery::SCHEMA)],
     check: |parameters, run| {
-        let params: BatteryParams = read_parameters(parameters)?;
-        params.validate().map_err(|error| error.to_string())?;
+        let params: BatteryParams = diagnostics::read(parameters)?;
+        params.validate()?;
         params.timing().check(run)
     },
     run,
@@ -104,7 +104,7 @@ impl BatteryParams {
         not_negative("current_resolution_A", self.current_resolution_A)?;
         positive("capacity_Ah", self.capacity_Ah)?;
         let charge_is_good = (0.0..=1.0).contains(&self.initial_charge);
-        check("initial_charge", self.initial_charge, charge_is_good, "from 0 to 1")
+        require("initial_charge", self.initial_charge, charge_is_good, "from 0 to 1")
     }
 
     fn start(&self) -> Memory {
@@ -269,7 +269,8 @@ mod tests {
         for (key, value) in bad.into_iter().chain([("current_resolution_A", -1.0), ("dropout", 1.0)]) {
             let reason =
                 (KIND.check)(&serde_json::json!({ key: value }), &NodeContext::new("node", &["battery"]))
-                    .unwrap_err();
+                    .unwrap_err()
+                    .to_string();
             assert!(reason.contains(&format!("`{key}`")), "{reason}");
         }
     }

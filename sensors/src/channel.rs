@@ -10,10 +10,10 @@
 //! Journal 39, 1960): with probability `dropout` a measurement is lost, and losses last `dropout_mean_s` on
 //! average. They are drawn from a stream of their own: switching them on does not reshuffle the noise.
 
-use crate::parameter::{ParameterError, check, not_negative, positive};
 use bus::context::NodeContext;
 use bus::random::{Stream, stream, uniform};
 use bus::{BusError, Message, Node};
+use diagnostics::parameter::{ParameterError, not_negative, positive, require};
 
 /// Steps of a node between two measurements below which it tells that they are not evenly spaced: a fifth of the interval.
 /// Tuned, no source.
@@ -47,41 +47,47 @@ impl Timing {
         self.validate_at_any_rate()?;
         let under_way = self.delay_ms * 1e-3 * self.rate_hz;
         let expected = "at most 30 measurements long";
-        check("delay_ms", self.delay_ms, under_way <= UNDER_WAY_MAX, expected)?;
+        require("delay_ms", self.delay_ms, under_way <= UNDER_WAY_MAX, expected)?;
         let losses = Losses::new(self);
         let mean_is_good = losses.begin <= 1.0 && losses.go_on >= 0.0;
         let expected = "zero, or long enough for one measurement and for the fraction `dropout` of them";
-        check("dropout_mean_s", self.dropout_mean_s, mean_is_good, expected)
+        require("dropout_mean_s", self.dropout_mean_s, mean_is_good, expected)
     }
 
     /// Whether a node of `run` can measure so often; warns where measurements would be uneven or never arrive.
     ///
     /// # Errors
     /// The sensor measures more often than its node computes, or as [`Timing::validate`].
-    pub fn check(&self, run: &NodeContext<'_>) -> Result<(), String> {
-        self.validate().map_err(|error| error.to_string())?;
+    pub fn check(&self, run: &NodeContext<'_>) -> Result<(), ParameterError> {
+        self.validate()?;
         let (rate_hz, node_hz) = (self.rate_hz, run.period_s().recip());
         if !is_in_time(rate_hz, run.period_s()) {
-            return Err(format!(
-                "`rate_hz` is {rate_hz} Hz, expected at most {node_hz} Hz, at which its node computes (run.rate_hz = \
+            return Err(ParameterError::conflict(
+                "rate_hz",
+                format!(
+                    "`rate_hz` is {rate_hz} Hz, expected at most {node_hz} Hz, at which its node computes (run.rate_hz = \
                  {}, period_ticks = {}); raise run.rate_hz, or lower `period_ticks` or `rate_hz`",
-                run.rate_hz(),
-                run.period_ticks
+                    run.rate_hz(),
+                    run.period_ticks
+                ),
             ));
         }
         let share = node_hz / rate_hz;
         // Off by up to a step of the node: at 60 Hz of 1 kHz a sixteenth of the interval, which cameras have as well.
         if share < UNEVEN_SHARE && (share - share.round()).abs() > 1e-6 * share {
-            run.warn(format!(
+            run.warn("rate_hz", format!(
                 "`rate_hz` is {rate_hz} Hz, which does not divide the {node_hz} Hz at which its node computes: the \
                  measurements are not evenly spaced"
             ));
         }
         if self.delay_ms * 1e-3 >= run.duration_s() {
-            run.warn_behind_end(format!(
-                "`delay_ms` is {} ms, as long as the run: no measurement arrives before its end",
-                self.delay_ms
-            ));
+            run.warn_behind_end(
+                "delay_ms",
+                format!(
+                    "`delay_ms` is {} ms, as long as the run: no measurement arrives before its end",
+                    self.delay_ms
+                ),
+            );
         }
         Ok(())
     }
@@ -93,7 +99,7 @@ impl Timing {
     pub fn validate_at_any_rate(&self) -> Result<(), ParameterError> {
         not_negative("delay_ms", self.delay_ms)?;
         let dropout_is_good = (0.0..1.0).contains(&self.dropout);
-        check("dropout", self.dropout, dropout_is_good, "a fraction from 0 to below 1")?;
+        require("dropout", self.dropout, dropout_is_good, "a fraction from 0 to below 1")?;
         not_negative("dropout_mean_s", self.dropout_mean_s)
     }
 }
@@ -200,10 +206,9 @@ impl Channel {
     ///
     /// # Errors
     /// As [`Timing::check`].
-    pub fn in_context(timing: &Timing, context: &NodeContext<'_>) -> Result<Self, String> {
+    pub fn in_context(timing: &Timing, context: &NodeContext<'_>) -> Result<Self, ParameterError> {
         timing.check(context)?;
-        let channel = Self::new(timing, context.period_s(), context.seed, context.name);
-        channel.map_err(|error| error.to_string())
+        Self::new(timing, context.period_s(), context.seed, context.name)
     }
 
     /// The channel of node `node`, which computes every `period_s`, in a run seeded with `run_seed`.
@@ -213,7 +218,7 @@ impl Channel {
     pub fn new(timing: &Timing, period_s: f64, run_seed: u64, node: &str) -> Result<Self, ParameterError> {
         timing.validate()?;
         let expected = "at most the rate at which the node computes; lower its `period_ticks` or `rate_hz`";
-        check("rate_hz", timing.rate_hz, is_in_time(timing.rate_hz, period_s), expected)?;
+        require("rate_hz", timing.rate_hz, is_in_time(timing.rate_hz, period_s), expected)?;
         let (noise, mut loss) = (stream(run_seed, node), stream(run_seed, node));
         loss.set_stream(1);
         let (interval_ns, delay_ns) =
@@ -323,13 +328,13 @@ mod tests {
             (outcome, run.into_warnings())
         };
         for (tick_ns, period_ticks) in [(100_000_000, 1), (1_000_000, 100)] {
-            let words = rate_of(tick_ns, period_ticks).0.unwrap_err();
+            let words = rate_of(tick_ns, period_ticks).0.unwrap_err().to_string();
             assert!(words.contains("`rate_hz` is 200 Hz, expected at most 10 Hz"), "{words}");
         }
         assert_eq!(rate_of(1_000_000, 5), (Ok(()), vec![]));
         let (outcome, warnings) = rate_of(1_000_000, 3);
         assert_eq!(rate_of(700_000, 1), (Ok(()), vec![]), "a seventh of the interval");
-        assert!(outcome.is_ok() && warnings[0].words.contains("not evenly spaced"), "{warnings:?}");
+        assert!(outcome.is_ok() && warnings[0].message.contains("not evenly spaced"), "{warnings:?}");
     }
 
     #[test]
@@ -451,7 +456,7 @@ mod tests {
         ];
         for (key, timing) in cases {
             let error = refused(timing);
-            assert!(error.starts_with(&format!("parameter `{key}` must be ")), "{error}");
+            assert!(error.starts_with(&format!("`{key}` must be ")), "{error}");
         }
         let error = Channel::new(&timing(), 0.2, 1, "gps").unwrap_err().to_string();
         assert!(error.contains("`rate_hz`") && error.contains("`period_ticks`"), "{error}");

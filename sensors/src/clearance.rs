@@ -2,9 +2,10 @@
 //! and plots; controllers have no port for it.
 #![allow(non_snake_case, reason = "a trailing _W names the frame a vector is written in")]
 
-use bus::kind::{Inputs, NodeKind, PortSpec, read_parameters};
+use bus::kind::{Inputs, NodeKind, PortSpec};
 use bus::messages::{Clearance, PlantState, Vector3 as VectorMessage};
 use bus::{BusError, Message, Node};
+use diagnostics::parameter::{ParameterError, not_negative};
 use nalgebra::Vector3;
 use scenes::{RayCaster, Scene};
 use serde::Deserialize;
@@ -23,7 +24,7 @@ pub const KIND: NodeKind = NodeKind {
     summary: "true distances to the scene, for judging and plots",
     inputs: Inputs::Ports(&[PortSpec::required("state", PlantState::SCHEMA)]),
     outputs: &[PortSpec::required("clearance", Clearance::SCHEMA)],
-    check: |parameters, _| build(&read_parameters(parameters)?).map(|_| ()),
+    check: |parameters, _| build(&diagnostics::read(parameters)?).map(|_| ()),
     run,
 };
 
@@ -49,13 +50,11 @@ fn three_quarters_of_a_metre() -> f64 {
     0.75
 }
 
-fn build(parameters: &Parameters) -> Result<Judge, String> {
+fn build(parameters: &Parameters) -> Result<Judge, ParameterError> {
     for (key, value) in [("keep_m", parameters.keep_m), ("corner_m", parameters.corner_m)] {
-        if !(value.is_finite() && value >= 0.0) {
-            return Err(format!("parameter `{key}` must be a finite number, zero or more, found {value}"));
-        }
+        not_negative(key, value)?;
     }
-    let scene = Scene::load(&parameters.scene).map_err(|error| error.to_string())?;
+    let scene = Scene::load(&parameters.scene).map_err(|error| ParameterError::conflict("scene", error))?;
     Ok(Judge { caster: RayCaster::new(&scene), keep_m: parameters.keep_m, corner_m: parameters.corner_m })
 }
 

@@ -25,7 +25,7 @@
 )]
 
 use crate::imu_model::ImuReading;
-use crate::parameter::{ParameterError, not_negative, positive};
+use diagnostics::parameter::{ParameterError, not_negative, positive};
 use nalgebra::{UnitQuaternion, Vector3};
 use serde::Deserialize;
 use std::f64::consts::{PI, TAU};

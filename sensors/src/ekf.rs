@@ -9,7 +9,7 @@ pub mod start;
 pub mod transition;
 
 use crate::wire::{attitude, vector, vector_message};
-use bus::kind::{Inputs, NodeKind, PortSpec, read_parameters};
+use bus::kind::{Inputs, NodeKind, PortSpec};
 use bus::messages::{
     AttitudeEstimate, Barometer, Gps, Imu, Innovation, Magnetometer, Mocap, StateEstimate, Vector3,
 };
@@ -36,11 +36,11 @@ pub const KIND: NodeKind = NodeKind {
         PortSpec::optional("attitude", AttitudeEstimate::SCHEMA),
     ],
     check: |parameters, run| {
-        let params: EkfParams = read_parameters(parameters)?;
-        Ekf::new(params, run.period_s()).map_err(|error| error.to_string())?;
+        let params: EkfParams = diagnostics::read(parameters)?;
+        Ekf::new(params, run.period_s())?;
         let has_position = run.has("gps") || run.has("mocap");
         let unwired = "nothing tells the position: wire `inputs.gps`, `inputs.mocap` or both";
-        if has_position { Ok(()) } else { Err(unwired.to_owned()) }
+        if has_position { Ok(()) } else { Err(diagnostics::ParameterError::conflict("", unwired)) }
     },
     run,
 };
@@ -186,7 +186,9 @@ mod tests {
 
     #[test]
     fn a_filter_that_nothing_tells_the_position_is_refused() {
-        let error = (KIND.check)(&json!({}), &NodeContext::new("node", &["imu", "barometer"])).unwrap_err();
+        let error = (KIND.check)(&json!({}), &NodeContext::new("node", &["imu", "barometer"]))
+            .unwrap_err()
+            .to_string();
         assert!(error.contains("`inputs.gps`") && error.contains("`inputs.mocap`"), "{error}");
         assert_eq!((KIND.check)(&json!({}), &NodeContext::new("node", &["imu", "gps"])), Ok(()));
         assert_eq!((KIND.check)(&json!({}), &NodeContext::new("node", &["imu", "mocap"])), Ok(()));
@@ -201,7 +203,9 @@ mod tests {
             (json!({ "initial_position_m": [0.0, 0.0] }), "`initial_position_m`"),
             (json!({ "mocap_sigma": 1.0 }), "`mocap_sigma`"),
         ] {
-            let error = (KIND.check)(&parameters, &NodeContext::new("node", &["imu", "mocap"])).unwrap_err();
+            let error = (KIND.check)(&parameters, &NodeContext::new("node", &["imu", "mocap"]))
+                .unwrap_err()
+                .to_string();
             assert!(error.contains(key), "{error}");
         }
     }

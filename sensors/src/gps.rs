@@ -8,13 +8,13 @@
 
 use crate::channel::{Chance, Channel, ChannelState, QUEUE, Timing};
 use crate::noise::standard_normal;
-use crate::parameter::{ParameterError, all_finite, all_not_negative, positive};
 use crate::wire::{vector, vector_message};
 use bus::component::{Component, Info, StepError};
 use bus::context::{NodeContext, StepContext};
 use bus::messages::{Gps, PlantState};
 use bus::random::Stream;
 use bus::{InputPorts, Message, OutputPorts};
+use diagnostics::parameter::{ParameterError, all, finite, not_negative, positive};
 use nalgebra::Vector3;
 use serde::Deserialize;
 
@@ -72,11 +72,11 @@ impl GpsParams {
 
     fn validate(&self) -> Result<(), ParameterError> {
         self.timing().validate()?;
-        all_not_negative("position_noise_m", &self.position_noise_m)?;
-        all_not_negative("position_drift_m", &self.position_drift_m)?;
+        all(not_negative, "position_noise_m", &self.position_noise_m)?;
+        all(not_negative, "position_drift_m", &self.position_drift_m)?;
         positive("position_drift_time_s", self.position_drift_time_s)?;
-        all_finite("position_bias_m", &self.position_bias_m)?;
-        all_not_negative("velocity_noise_m_s", &self.velocity_noise_m_s)
+        all(finite, "position_bias_m", &self.position_bias_m)?;
+        all(not_negative, "velocity_noise_m_s", &self.velocity_noise_m_s)
     }
 
     /// The drift one measurement after `drift_W_m`; there is none before the first.
@@ -174,8 +174,8 @@ impl Component for GpsReceiver {
     type Outputs = Outputs;
     type State = Memory;
 
-    fn new(params: GpsParams, context: &NodeContext<'_>) -> Result<Self, String> {
-        params.validate().map_err(|error| error.to_string())?;
+    fn new(params: GpsParams, context: &NodeContext<'_>) -> Result<Self, ParameterError> {
+        params.validate()?;
         Ok(Self { params, channel: Channel::in_context(&params.timing(), context)? })
     }
 
@@ -287,7 +287,7 @@ mod tests {
 
     #[test]
     fn impossible_parameters_are_named() {
-        let refused = |parameters| Harness::<GpsReceiver>::from_json(&parameters).unwrap_err();
+        let refused = |parameters| Harness::<GpsReceiver>::from_json(&parameters).unwrap_err().to_string();
         let reason = refused(serde_json::json!({ "position_drift_time_s": 0.0 }));
         assert!(reason.contains("`position_drift_time_s`"), "{reason}");
         for key in ["position_noise_m", "position_drift_m", "velocity_noise_m_s"] {

@@ -6,11 +6,11 @@
 
 use crate::channel::{Channel, ChannelState, QUEUE};
 use crate::imu_model::{ImuModel, ImuParams, ImuReading, ImuState};
-use crate::units::STANDARD_GRAVITY_M_S2;
 use crate::wire::{vector, vector_message};
-use bus::kind::{Inputs, NodeKind, PortSpec, read_parameters};
+use bus::kind::{Inputs, NodeKind, PortSpec};
 use bus::messages::{Imu, PlantState, Vector3};
 use bus::{BusError, Message, Node};
+use diagnostics::unit::STANDARD_GRAVITY_M_S2;
 
 /// The IMU, for manifests.
 pub const KIND: NodeKind = NodeKind {
@@ -19,9 +19,9 @@ pub const KIND: NodeKind = NodeKind {
     inputs: Inputs::Ports(&[PortSpec::required("state", PlantState::SCHEMA)]),
     outputs: &[PortSpec::required("imu", Imu::SCHEMA)],
     check: |parameters, run| {
-        let params: ImuParams = read_parameters(parameters)?;
+        let params: ImuParams = diagnostics::read(parameters)?;
         let rate_hz = run.period_s().recip();
-        ImuModel::new(params, rate_hz).map_err(|error| error.to_string())?;
+        ImuModel::new(params, rate_hz)?;
         params.timing(rate_hz).check(run)
     },
     run,
@@ -207,7 +207,8 @@ mod tests {
         for (key, value) in [("delay_ms", -1.0), ("dropout", 1.0), ("dropout_mean_s", -1.0)] {
             let reason =
                 (KIND.check)(&serde_json::json!({ key: value }), &NodeContext::new("node", &["state"]))
-                    .unwrap_err();
+                    .unwrap_err()
+                    .to_string();
             assert!(reason.contains(&format!("`{key}`")), "{reason}");
         }
         // Whether this is long enough depends on the rate, which the check does not know.

@@ -9,8 +9,8 @@
 
 use crate::channel::Timing;
 use crate::noise::{BiasWalk, WhiteNoise};
-use crate::parameter::{ParameterError, finite, not_negative, positive};
 use bus::random::{Stream, stream};
+use diagnostics::parameter::{ParameterError, finite, not_negative, positive};
 use nalgebra::Vector3;
 use serde::Deserialize;
 
@@ -55,7 +55,7 @@ impl Default for ImuParams {
             accelerometer_noise_density_m_s2_sqrt_hz: 2.0e-3,
             accelerometer_bias_walk_m_s3_sqrt_hz: 3.0e-3,
             accelerometer_initial_bias_m_s2: [0.0; 3],
-            accelerometer_range_m_s2: 18.0 * crate::units::STANDARD_GRAVITY_M_S2,
+            accelerometer_range_m_s2: 18.0 * diagnostics::unit::STANDARD_GRAVITY_M_S2,
             gyroscope_noise_density_rad_s_sqrt_hz: 1.6968e-4,
             gyroscope_bias_walk_rad_s2_sqrt_hz: 1.9393e-5,
             gyroscope_initial_bias_rad_s: [0.0; 3],

@@ -1,7 +1,6 @@
 //! Sensor emulators and estimators.
 //!
 //! The rooms, pure cores first; no core knows the bus, the plant or the wall clock:
-//! - [`units`]: a data sheet's noise figures in SI units.
 //! - [`noise`]: white noise from its density, bias as a random walk.
 //! - [`imu_model`]: accelerometer and gyroscope.
 //! - [`complementary`]: attitude from an IMU's readings.
@@ -19,7 +18,6 @@
 //! - `steps`: what is left of a value at a resolution.
 //! - `channel`: when sensors measure, and how measurements are delayed and lost.
 //! - `wire`: the vectors of messages as those of nalgebra.
-//! - [`parameter`]: the error for a parameter outside its range.
 //! - `testing`: what the tests of sensors share.
 #![forbid(unsafe_code)]
 
@@ -39,12 +37,10 @@ pub mod imu_model;
 pub mod magnetometer;
 pub mod mocap;
 pub mod noise;
-pub mod parameter;
 pub mod range;
 pub mod range_inertial;
 pub mod rpm;
 mod steps;
 #[cfg(test)]
 mod testing;
-pub mod units;
 mod wire;

@@ -7,13 +7,13 @@
 use crate::channel::{Channel, ChannelState, QUEUE, Timing};
 use crate::earth_field::EarthField;
 use crate::noise::standard_normal;
-use crate::parameter::{ParameterError, all_finite, check, finite, not_negative, positive};
 use crate::steps::in_steps;
 use crate::wire::{attitude, vector_message};
-use bus::kind::{Inputs, NodeKind, PortSpec, read_parameters};
+use bus::kind::{Inputs, NodeKind, PortSpec};
 use bus::messages::{Magnetometer, PlantState};
 use bus::random::Stream;
 use bus::{BusError, Message, Node};
+use diagnostics::parameter::{ParameterError, all, finite, not_negative, positive, require};
 use nalgebra::{UnitQuaternion, Vector3};
 use serde::Deserialize;
 
@@ -24,8 +24,8 @@ pub const KIND: NodeKind = NodeKind {
     inputs: Inputs::Ports(&[PortSpec::required("state", PlantState::SCHEMA)]),
     outputs: &[PortSpec::required("magnetometer", Magnetometer::SCHEMA)],
     check: |parameters, run| {
-        let params: MagnetometerParams = read_parameters(parameters)?;
-        params.validate().map_err(|error| error.to_string())?;
+        let params: MagnetometerParams = diagnostics::read(parameters)?;
+        params.validate()?;
         params.timing().check(run)
     },
     run,
@@ -99,10 +99,10 @@ impl MagnetometerParams {
         self.timing().validate()?;
         not_negative("field_T", self.field_T)?;
         let inclination_is_good = self.inclination_deg.abs() <= 90.0;
-        check("inclination_deg", self.inclination_deg, inclination_is_good, "from -90 to 90")?;
+        require("inclination_deg", self.inclination_deg, inclination_is_good, "from -90 to 90")?;
         finite("declination_deg", self.declination_deg)?;
-        all_finite("hard_iron_T", &self.hard_iron_T)?;
-        all_finite("soft_iron_scale", &self.soft_iron_scale)?;
+        all(finite, "hard_iron_T", &self.hard_iron_T)?;
+        all(finite, "soft_iron_scale", &self.soft_iron_scale)?;
         not_negative("noise_T", self.noise_T)?;
         not_negative("resolution_T", self.resolution_T)?;
         positive("range_T", self.range_T)
@@ -257,7 +257,8 @@ mod tests {
         for (key, value) in bad {
             let reason =
                 (KIND.check)(&serde_json::json!({ key: value }), &NodeContext::new("node", &["state"]))
-                    .unwrap_err();
+                    .unwrap_err()
+                    .to_string();
             assert!(reason.contains(&format!("`{key}`")), "{reason}");
         }
     }

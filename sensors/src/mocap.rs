@@ -6,12 +6,12 @@
 
 use crate::channel::{Channel, ChannelState, QUEUE, Timing};
 use crate::noise::standard_normal;
-use crate::parameter::{ParameterError, all_finite, not_negative};
 use crate::wire::{attitude, attitude_message, vector, vector_message};
-use bus::kind::{Inputs, NodeKind, PortSpec, read_parameters};
+use bus::kind::{Inputs, NodeKind, PortSpec};
 use bus::messages::{Mocap, PlantState};
 use bus::random::Stream;
 use bus::{BusError, Message, Node};
+use diagnostics::parameter::{ParameterError, all, finite, not_negative};
 use nalgebra::{UnitQuaternion, Vector3};
 use serde::Deserialize;
 
@@ -22,8 +22,8 @@ pub const KIND: NodeKind = NodeKind {
     inputs: Inputs::Ports(&[PortSpec::required("state", PlantState::SCHEMA)]),
     outputs: &[PortSpec::required("mocap", Mocap::SCHEMA)],
     check: |parameters, run| {
-        let params: MocapParams = read_parameters(parameters)?;
-        params.validate().map_err(|error| error.to_string())?;
+        let params: MocapParams = diagnostics::read(parameters)?;
+        params.validate()?;
         params.timing().check(run)
     },
     run,
@@ -82,8 +82,8 @@ impl MocapParams {
         self.timing().validate()?;
         not_negative("position_noise_m", self.position_noise_m)?;
         not_negative("attitude_noise_deg", self.attitude_noise_deg)?;
-        all_finite("position_bias_m", &self.position_bias_m)?;
-        all_finite("attitude_bias_deg", &self.attitude_bias_deg)
+        all(finite, "position_bias_m", &self.position_bias_m)?;
+        all(finite, "attitude_bias_deg", &self.attitude_bias_deg)
     }
 
     /// What cameras make of a body at `position_W_m` with `attitude_WB`.
@@ -219,7 +219,8 @@ mod tests {
 
     #[test]
     fn impossible_parameters_are_named_and_unknown_ones_are_refused() {
-        let refused = |value| (KIND.check)(&value, &NodeContext::new("node", &["state"])).unwrap_err();
+        let refused =
+            |value| (KIND.check)(&value, &NodeContext::new("node", &["state"])).unwrap_err().to_string();
         assert!(refused(serde_json::json!({ "position_noise_m": -1.0 })).contains("`position_noise_m`"));
         assert!(refused(serde_json::json!({ "rate_hz": 0.0 })).contains("`rate_hz`"));
         assert!(refused(serde_json::json!({ "nose": 0.0 })).contains("`nose`"));

@@ -11,13 +11,13 @@
 
 use crate::channel::{Chance, Channel, ChannelState, QUEUE, Timing};
 use crate::cone::Cone;
-use crate::parameter::{ParameterError, all_finite, check, not_negative, positive};
 use crate::steps::in_steps;
 use crate::wire::{attitude, vector};
-use bus::kind::{Inputs, NodeKind, PortSpec, read_parameters};
+use bus::kind::{Inputs, NodeKind, PortSpec};
 use bus::messages::{PlantState, Ranges, Traffic};
 use bus::random::normal;
 use bus::{BusError, Message, Node};
+use diagnostics::parameter::{ParameterError, all, finite, not_negative, positive, require};
 use nalgebra::{UnitQuaternion, Vector3};
 use scenes::{RayCaster, Scene};
 use serde::Deserialize;
@@ -32,7 +32,7 @@ pub const KIND: NodeKind = NodeKind {
         PortSpec::optional("traffic", Traffic::SCHEMA),
     ]),
     outputs: &[PortSpec::required("ranges", Ranges::SCHEMA)],
-    check: |parameters, run| RangeFinders::new(read_parameters(parameters)?)?.params.timing().check(run),
+    check: |parameters, run| RangeFinders::new(diagnostics::read(parameters)?)?.params.timing().check(run),
     run,
 };
 
@@ -111,13 +111,13 @@ impl RangeParams {
     fn validate(&self) -> Result<(), ParameterError> {
         self.timing().validate()?;
         not_negative("noise_m", self.noise_m)?;
-        all_finite("bias_m", &self.bias_m)?;
+        all(finite, "bias_m", &self.bias_m)?;
         not_negative("resolution_m", self.resolution_m)?;
         positive("reach_m", self.reach_m)?;
         let nearest_is_good = (0.0..self.reach_m).contains(&self.nearest_m);
-        check("nearest_m", self.nearest_m, nearest_is_good, "zero or more and below `reach_m`")?;
+        require("nearest_m", self.nearest_m, nearest_is_good, "zero or more and below `reach_m`")?;
         let angle_is_good = (0.0..90.0).contains(&self.half_angle_deg);
-        check("half_angle_deg", self.half_angle_deg, angle_is_good, "zero or more and below 90")?;
+        require("half_angle_deg", self.half_angle_deg, angle_is_good, "zero or more and below 90")?;
         positive("vehicle_radius_m", self.vehicle_radius_m)
     }
 }
@@ -132,10 +132,11 @@ struct RangeFinders {
 
 impl RangeFinders {
     /// Checks the parameters and loads the scene; the error says what is wrong with either.
-    fn new(params: RangeParams) -> Result<Self, String> {
-        params.validate().map_err(|error| error.to_string())?;
-        let path = params.scene.as_ref().ok_or("missing field `scene`")?;
-        let scene = Scene::load(path).map_err(|error| error.to_string())?;
+    fn new(params: RangeParams) -> Result<Self, ParameterError> {
+        params.validate()?;
+        let path =
+            params.scene.as_ref().ok_or_else(|| ParameterError::Missing { key: "scene".to_owned() })?;
+        let scene = Scene::load(path).map_err(|error| ParameterError::conflict("scene", error))?;
         Ok(Self::in_scene(params, &scene))
     }
 
@@ -452,13 +453,16 @@ mod tests {
         let bad = [("nearest_m", 8.0), ("half_angle_deg", 90.0), ("reach_m", 0.0), ("noise_m", -1.0)];
         for (key, value) in bad.into_iter().chain([("vehicle_radius_m", 0.0), ("dropout", 1.5)]) {
             let reason = refused(key, value);
-            assert!(reason.contains(&format!("`{key}`")), "{reason}");
+            assert!(reason.to_string().contains(&format!("`{key}`")), "{reason}");
         }
-        let reason = (KIND.check)(&serde_json::json!({}), &NodeContext::new("node", &["state"])).unwrap_err();
+        let reason = (KIND.check)(&serde_json::json!({}), &NodeContext::new("node", &["state"]))
+            .unwrap_err()
+            .to_string();
         assert!(reason.starts_with("missing field `scene`"), "{reason}");
         let reason =
             (KIND.check)(&serde_json::json!({ "scene": "none.toml" }), &NodeContext::new("node", &["state"]))
-                .unwrap_err();
+                .unwrap_err()
+                .to_string();
         assert!(reason.contains("none.toml"), "{reason}");
         (KIND.check)(&serde_json::json!({ "scene": room }), &NodeContext::new("node", &["state"])).unwrap();
     }

@@ -7,7 +7,7 @@ pub mod params;
 
 use crate::imu_model::ImuReading;
 use crate::wire::{attitude as rotation, vector, vector_message};
-use bus::kind::{Inputs, NodeKind, PortSpec, read_parameters};
+use bus::kind::{Inputs, NodeKind, PortSpec};
 use bus::messages::{AttitudeEstimate, Imu, Ranges, StateEstimate, WallEstimate};
 use bus::{BusError, Message, Node};
 use filter::{RangeInertial, RangeInertialState};
@@ -27,8 +27,8 @@ pub const KIND: NodeKind = NodeKind {
         PortSpec::required("estimate", StateEstimate::SCHEMA),
     ],
     check: |parameters, run| {
-        let params: RangeInertialParams = read_parameters(parameters)?;
-        RangeInertial::new(params, run.period_s()).map(|_| ()).map_err(|error| error.to_string())
+        let params: RangeInertialParams = diagnostics::read(parameters)?;
+        RangeInertial::new(params, run.period_s()).map(|_| ())
     },
     run,
 };
@@ -110,7 +110,7 @@ mod tests {
             (json!({ "initial_height_m": -1.0 }), "`initial_height_m`"),
             (json!({ "dead_zone_m": 0.2 }), "`dead_zone_m`"),
         ] {
-            let error = (KIND.check)(&parameters, &NodeContext::new("node", &[])).unwrap_err();
+            let error = (KIND.check)(&parameters, &NodeContext::new("node", &[])).unwrap_err().to_string();
             assert!(error.contains(key), "{error}");
         }
         assert_eq!((KIND.check)(&json!({}), &NodeContext::new("node", &[])), Ok(()));

@@ -5,12 +5,12 @@
 //! physics of the vehicle: a rotor whose reading is stuck, and one of which half is read.
 
 use crate::channel::{Chance, Channel, ChannelState, QUEUE, Timing};
-use crate::parameter::{ParameterError, check, not_negative};
 use crate::steps::in_steps;
-use bus::kind::{Inputs, NodeKind, PortSpec, read_parameters};
+use bus::kind::{Inputs, NodeKind, PortSpec};
 use bus::messages::{PlantState, RotorSpeeds};
 use bus::random::normal;
 use bus::{BusError, Message, Node};
+use diagnostics::parameter::{ParameterError, not_negative, require};
 use serde::Deserialize;
 
 /// The rotor speed sensor, for manifests.
@@ -20,8 +20,8 @@ pub const KIND: NodeKind = NodeKind {
     inputs: Inputs::Ports(&[PortSpec::required("state", PlantState::SCHEMA)]),
     outputs: &[PortSpec::required("speeds", RotorSpeeds::SCHEMA)],
     check: |parameters, run| {
-        let params: RpmParams = read_parameters(parameters)?;
-        params.validate().map_err(|error| error.to_string())?;
+        let params: RpmParams = diagnostics::read(parameters)?;
+        params.validate()?;
         params.timing().check(run)
     },
     run,
@@ -79,7 +79,7 @@ impl RpmParams {
         not_negative("noise_rad_s", self.noise_rad_s)?;
         not_negative("resolution_rad_s", self.resolution_rad_s)?;
         let rotor = |key, number: usize| {
-            check(key, number as f64, number <= 4, "the number of a rotor, 1 to 4, or 0 for none")
+            require(key, number as f64, number <= 4, "the number of a rotor, 1 to 4, or 0 for none")
         };
         rotor("stuck_rotor", self.stuck_rotor)?;
         rotor("half_reading_rotor", self.half_reading_rotor)
@@ -222,12 +222,14 @@ mod tests {
         for (key, value) in bad {
             let reason =
                 (KIND.check)(&serde_json::json!({ key: value }), &NodeContext::new("node", &["state"]))
-                    .unwrap_err();
+                    .unwrap_err()
+                    .to_string();
             assert!(reason.contains(&format!("`{key}`")), "{reason}");
         }
         for key in ["stuck_rotor", "half_reading_rotor"] {
             let reason = (KIND.check)(&serde_json::json!({ key: 5 }), &NodeContext::new("node", &["state"]))
-                .unwrap_err();
+                .unwrap_err()
+                .to_string();
             assert!(reason.contains(&format!("`{key}`")), "{reason}");
         }
     }

@@ -5,10 +5,10 @@
 //! more beyond either. They are no design limits: they catch slipped exponents and wrong units, and keep the products
 //! of the physics within what a double holds.
 
-use crate::reader::Bounds;
+use diagnostics::parameter::Bounds;
 
-const fn bounds(least: f64, most: f64, unit: &'static str, why: &'static str) -> Bounds {
-    Bounds { least, most, unit, why }
+const fn bounds(min: f64, max: f64, unit: &'static str, why: &'static str) -> Bounds {
+    Bounds { min, max, unit, why }
 }
 
 /// Take-off mass.

@@ -9,10 +9,10 @@ use crate::effects;
 use crate::error::VehicleError;
 use crate::provenance::Uncertainty;
 use crate::reader::{Document, Quantity, Section};
-use crate::units::{
+use crate::vehicle::{MotorModel, Rotor, Spin, Vehicle};
+use diagnostics::unit::{
     ACCELERATION, INERTIA, LENGTH, MASS, PURE_NUMBER, SPEED, THRUST_COEFFICIENT, TIME, TORQUE_COEFFICIENT,
 };
-use crate::vehicle::{MotorModel, Rotor, Spin, Vehicle};
 
 /// How far a published tensor may miss the triangle inequality through rounding, relative to its size.
 const TRIANGLE_SLACK: f64 = 1e-9;

@@ -11,7 +11,6 @@
 //! | [`reader`] | walks the TOML tree with positions, refuses what it does not know; scene files and gains files use it too |
 //! | [`quotes`] | quotation marks in CSV files of measurements, whose rows are lines |
 //! | [`text`] | files that people write, read with an end to it |
-//! | [`units`] | the table of accepted units |
 //! | [`variables`] | variables of the environment within paths |
 //! | [`error`] | what can be wrong with a file, said for people |
 //!
@@ -32,7 +31,6 @@ pub mod provenance;
 pub mod quotes;
 pub mod reader;
 pub mod text;
-pub mod units;
 pub mod variables;
 pub mod vehicle;
 

@@ -10,7 +10,8 @@ use toml::de::{DeTable, DeValue};
 use crate::effects::Stated;
 use crate::error::{Place, VehicleError};
 use crate::provenance::{Provenance, Uncertainty};
-use crate::units::Dimension;
+use diagnostics::parameter::Bounds;
+use diagnostics::unit::Dimension;
 
 /// The file being read: for positions, and to gather provenance on the way.
 pub struct Document<'t> {
@@ -85,7 +86,7 @@ impl Quantity {
 
     /// Refuses what lies outside of `bounds`.
     pub fn within(self, doc: &Document, bounds: &Bounds) -> Result<Self, VehicleError> {
-        if bounds.contains(self.si) { Ok(self) } else { Err(bounds.refuse(doc, &self)) }
+        if bounds.contains(self.si) { Ok(self) } else { Err(refuse(bounds, doc, &self)) }
     }
 
     /// Refuses less than zero.
@@ -95,29 +96,14 @@ impl Quantity {
     }
 }
 
-/// What a quantity can be, in SI, and why it is not more or less.
-#[derive(Debug, Clone, Copy)]
-pub struct Bounds {
-    /// The least.
-    pub least: f64,
-    /// The most.
-    pub most: f64,
-    /// Their unit.
-    pub unit: &'static str,
-    /// What has the most and the least, or why nothing that flies has more.
-    pub why: &'static str,
-}
-
-impl Bounds {
-    /// Whether `si` lies within, both ends included; no NaN does.
-    pub fn contains(&self, si: f64) -> bool {
-        (self.least..=self.most).contains(&si)
-    }
-
-    fn refuse(&self, doc: &Document, found: &Quantity) -> VehicleError {
-        let expected = format!("{:?} to {:?} {} ({})", self.least, self.most, self.unit, self.why);
-        doc.bad(&found.at, &found.key, expected, format!("{:?} {}", found.si, self.unit))
-    }
+fn refuse(bounds: &Bounds, doc: &Document, found: &Quantity) -> VehicleError {
+    let Bounds { min, max, unit, why } = bounds;
+    doc.bad(
+        &found.at,
+        &found.key,
+        format!("{min:?} to {max:?} {unit} ({why})"),
+        format!("{:?} {unit}", found.si),
+    )
 }
 
 /// Whether a number describes what is there or was chosen by somebody.
@@ -270,7 +256,7 @@ impl<'d, 't> Section<'d, 't> {
         match numbers.iter().find(|number| !bounds.contains(**number)) {
             None => Ok(numbers),
             Some(&si) => {
-                Err(bounds.refuse(self.doc, &Quantity { si, key: parameter.path.clone(), at: value.span() }))
+                Err(refuse(bounds, self.doc, &Quantity { si, key: parameter.path.clone(), at: value.span() }))
             }
         }
     }

@@ -13,6 +13,7 @@ use controllers::controller_state::ControllerState;
 use controllers::law::Law;
 use controllers::set_points::SetPoint;
 use controllers::trajectory::{Start, Trajectory};
+use diagnostics::ParameterError;
 use nalgebra::{UnitQuaternion, Vector3};
 use plant::{NewtonEuler, RigidBody, State};
 use sensors::noise::WhiteNoise;
@@ -34,7 +35,7 @@ pub fn trajectory(segments: &str) -> Trajectory {
     try_trajectory(segments).unwrap()
 }
 
-pub fn try_trajectory(segments: &str) -> Result<Trajectory, String> {
+pub fn try_trajectory(segments: &str) -> Result<Trajectory, ParameterError> {
     let table: toml::Table = toml::from_str(&format!("segments = [{segments}]")).unwrap();
     let entries = serde_json::to_value(&table["segments"]).unwrap();
     Trajectory::read(entries.as_array().unwrap(), Start { position_W_m: Vector3::z(), yaw_rad: 0.0 })

@@ -2,16 +2,12 @@
 
 use std::path::{Path, PathBuf};
 
+use diagnostics::unit::{Dimension, FORCE, RATIO, SPEED, TIME, TORQUE};
 use serde::Deserialize;
-use vehicles::units::{Dimension, RATIO, SPEED, TIME, TORQUE};
 use vehicles::variables::expand;
 use vehicles::{Place, Vehicle};
 
 use super::RotorError;
-
-/// Forces of thrust; the gram-force by the standard gravity of 9.80665 m/s^2.
-const FORCE: Dimension =
-    Dimension { name: "force", units: &[("N", 1.0), ("gf", 9.806_65e-3), ("kgf", 9.806_65)] };
 
 /// A stand file, read.
 pub struct Stand {

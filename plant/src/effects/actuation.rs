@@ -3,7 +3,7 @@
 
 use super::situation::Situation;
 use super::{Action, EffectKind, ParameterSpec, Values};
-use vehicles::units::{RATIO, TIME};
+use diagnostics::unit::{RATIO, TIME};
 use vehicles::{MotorModel, Vehicle};
 
 /// Dead time.

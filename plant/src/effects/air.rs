@@ -2,8 +2,8 @@
 #![allow(non_snake_case, reason = "a trailing _W names the frame a vector is written in")]
 
 use super::{Action, Advance, EffectKind, ParameterSpec, Values};
+use diagnostics::unit::VELOCITY;
 use nalgebra::Vector3;
-use vehicles::units::VELOCITY;
 
 const FOOT_M: f64 = 0.3048;
 

@@ -3,8 +3,8 @@
 
 use super::{Action, Advance, EffectKind, ParameterSpec, Values};
 use crate::rotor;
+use diagnostics::unit::{CHARGE, RATIO, RESISTANCE, VOLTAGE};
 use vehicles::Vehicle;
-use vehicles::units::{CHARGE, RATIO, RESISTANCE, VOLTAGE};
 
 /// The battery at an instant.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -4,8 +4,8 @@
 use super::situation::Situation;
 use super::{Action, EffectKind, ParameterSpec, Values};
 use crate::rotor::Wrench;
+use diagnostics::unit::{DYNAMIC_DRAG, ROTOR_DRAG as ROTOR_DRAG_UNITS};
 use nalgebra::Vector3;
-use vehicles::units::{DYNAMIC_DRAG, ROTOR_DRAG as ROTOR_DRAG_UNITS};
 
 /// Induced drag and blade profile drag, lumped.
 pub static ROTOR_DRAG: EffectKind = EffectKind {

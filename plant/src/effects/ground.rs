@@ -3,7 +3,7 @@
 
 use super::situation::Situation;
 use super::{Action, Advance, EffectKind, ParameterSpec, Values};
-use vehicles::units::{LENGTH, RATIO, TIME};
+use diagnostics::unit::{LENGTH, RATIO, TIME};
 
 /// More thrust near the ground.
 pub static GROUND_EFFECT: EffectKind = EffectKind {

@@ -4,8 +4,8 @@
 use super::situation::Situation;
 use super::{Action, EffectKind, ParameterSpec, Values};
 use crate::rotor::Wrench;
+use diagnostics::unit::{DYNAMIC_DRAG, ROTARY_STIFFNESS, ROTOR_DRAG, TILT};
 use nalgebra::Vector3;
-use vehicles::units::{DYNAMIC_DRAG, ROTARY_STIFFNESS, ROTOR_DRAG, TILT};
 
 /// Thrust against vertical and horizontal speed.
 pub static TRANSLATIONAL_LIFT: EffectKind = EffectKind {

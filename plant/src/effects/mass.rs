@@ -2,9 +2,9 @@
 #![allow(non_snake_case, reason = "a trailing _B names the frame a vector is written in")]
 
 use super::{Action, EffectKind, ParameterSpec, Values};
+use diagnostics::unit::{LENGTH, RATIO};
 use nalgebra::{Matrix3, Vector3};
 use vehicles::Vehicle;
-use vehicles::units::{LENGTH, RATIO};
 
 /// Another mass than the declared one.
 pub static MASS_ERROR: EffectKind = EffectKind {

@@ -4,9 +4,9 @@
 use super::situation::Situation;
 use super::{Action, EffectKind, ParameterSpec, Values};
 use crate::rotor::Wrench;
+use diagnostics::unit::{INERTIA, ROTARY_DAMPING, STATIC_MOMENT, TORQUE};
 use nalgebra::Vector3;
 use vehicles::Vehicle;
-use vehicles::units::{INERTIA, ROTARY_DAMPING, STATIC_MOMENT, TORQUE};
 
 /// Below this speed dry friction is taken as viscous, so that it has no jump: tuned, no source.
 const SMOOTHING_RAD_S: f64 = 0.05;

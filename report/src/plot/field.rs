@@ -2,7 +2,6 @@
 
 use recorder::definition::Leaf;
 use recorder::series::roll_pitch_yaw;
-use runtime::units::conversion;
 use std::f64::consts::{PI, TAU};
 
 /// The angles that a quaternion is drawn as.
@@ -79,7 +78,7 @@ impl Channel {
             unit: shown.to_owned(),
             source,
             // No unit becomes the unit 1, which changes no number.
-            factor: conversion(unit, shown).unwrap_or(1.0),
+            factor: diagnostics::convert(unit, shown).unwrap_or(1.0),
             continued: is_angle.then(Continued::default),
         }
     }

@@ -4,7 +4,6 @@ use super::parameters::Notes;
 use crate::manifest::{Comparison, Manifest, PassCondition, Statistic};
 use crate::problem::{Problem, nearest};
 use crate::program::Program;
-use crate::units;
 use bus::plan::{NodePlan, Plan};
 use toml::Spanned;
 
@@ -177,8 +176,8 @@ fn check_field(manifest: &Manifest, plan: &Plan, pass: &Spanned<PassCondition>) 
             .map_err(|(message, help)| at(format!("`while`: {message}"), &help))?;
     }
     let Some(own) = unit(&condition.topic, &condition.field)? else { return Ok(()) };
-    units::conversion(&own, &condition.unit)
-        .map_err(|reason| at(reason, "state the limits in a unit of the field's quantity"))?;
+    diagnostics::convert(&own, &condition.unit)
+        .map_err(|error| at(error.to_string(), "state the limits in a unit of the field's quantity"))?;
     if let Some(minus) = &condition.minus
         && let Some(other) = unit(&minus.topic, &minus.field)?
         && other != own

@@ -3,10 +3,11 @@
 use super::processes::Member;
 use super::ranges;
 use crate::manifest::{Manifest, Process};
-use crate::problem::Problem;
+use crate::problem::{Problem, nearest};
 use crate::program::Executable;
 use bus::context::NodeContext;
 use bus::plan::{NodePlan, Plan};
+use diagnostics::ParameterError;
 use std::collections::BTreeMap;
 use std::ops::Range;
 use std::path::PathBuf;
@@ -105,15 +106,12 @@ pub fn set(
             .naming(&outputs)
             .timed(run.tick_ns, node.period_ticks, run.duration_ticks)
             .seeded(run.seed);
-        (kind.check)(&parameters, &context).map_err(|reason| refused(manifest, name, process, &reason))?;
+        (kind.check)(&parameters, &context).map_err(|error| refused(manifest, member, &error))?;
         for warning in context.into_warnings() {
-            let words = &warning.words;
-            let named = process.parameters.keys().find(|key| words.contains(&format!("`{}", key.get_ref())));
-            let at = named.map_or_else(|| name.span(), Spanned::span);
-            if warning.is_behind_end && notes.is_cut(manifest, &at) {
-                continue;
+            let at = place(member, &warning.key);
+            if !(warning.is_behind_end && notes.is_cut(manifest, &at)) {
+                notes.warnings.push(problem(manifest, member, &at, &warning.message, String::new()));
             }
-            notes.warnings.push(refused(manifest, name, process, &warning.words));
         }
     }
     node.parameters = parameters;
@@ -151,29 +149,39 @@ fn require_none(manifest: &Manifest, process: &Process) -> Result<(), Problem> {
     }
 }
 
-/// The place of a refused parameter: that of the first key or file the reason names, or of the process.
-fn refused(manifest: &Manifest, name: &Spanned<String>, process: &Process, reason: &str) -> Problem {
-    let mut named = files(process).into_iter().filter_map(|(_, file)| file.as_ref());
-    let is_named = |file: &&Spanned<String>| {
-        manifest.resolve(file).is_ok_and(|path| reason.contains(&*path.to_string_lossy()))
-    };
-    let named_file = named.find(is_named).map(Spanned::span);
-    let mut quoted = reason.split('`').skip(1).step_by(2);
-    let key = |word: &str| process.parameters.keys().find(|key| key.get_ref() == word).map(Spanned::span);
-    let file = |word: &str| {
-        let stated = files(process).into_iter().find(|(key, _)| *key == word);
-        stated.and_then(|(_, file)| file.as_ref()).map(Spanned::span)
-    };
-    let span = quoted
-        .find_map(|word| key(word).or_else(|| file(word)))
-        .or(named_file)
-        .unwrap_or_else(|| name.span());
-    let help = match reason.split('`').nth(1).filter(|_| reason.starts_with("missing field")) {
-        Some(file @ ("vehicle" | "scene" | "gains" | "data")) => {
-            format!("add {file} = \"PATH\" to [process.{}]", name.get_ref())
+/// A refused parameter, at its place.
+fn refused(manifest: &Manifest, member: &Member<'_>, error: &ParameterError) -> Problem {
+    let (name, key) = (member.name.get_ref(), error.key());
+    let help = match error {
+        ParameterError::Missing { .. } if files(member.process).iter().any(|(file, _)| *file == key) => {
+            format!("add {key} = \"PATH\" to [process.{name}]")
         }
-        Some(key) => format!("add {key} = … to [process.{}.parameters]", name.get_ref()),
-        None => String::new(),
+        ParameterError::Missing { .. } => format!("add {key} = … to [process.{name}.parameters]"),
+        ParameterError::Unknown { known, .. } => {
+            let last = key.rsplit('.').next().unwrap_or(key);
+            let near = nearest(last, known.iter().map(String::as_str));
+            near.map_or(String::new(), |near| format!("did you mean `{near}`?"))
+        }
+        ParameterError::Value { .. } | ParameterError::Conflict { .. } => String::new(),
     };
-    manifest.problem(&span, format!("process `{}`: {reason}", name.get_ref()), help)
+    problem(manifest, member, &place(member, key), &error.to_string(), help)
+}
+
+fn problem(
+    manifest: &Manifest,
+    member: &Member<'_>,
+    at: &Range<usize>,
+    message: &str,
+    help: String,
+) -> Problem {
+    manifest.problem(at, format!("process `{}`: {message}", member.name.get_ref()), help)
+}
+
+/// Where the dotted `key` stands: by its first name, which is a parameter or a file; else the place of the process.
+fn place(member: &Member<'_>, key: &str) -> Range<usize> {
+    let first = key.split('.').next().unwrap_or(key);
+    let parameter = member.process.parameters.keys().find(|key| key.get_ref() == first).map(Spanned::span);
+    let file = files(member.process).into_iter().find(|(key, _)| *key == first);
+    let file = file.and_then(|(_, file)| file.as_ref()).map(Spanned::span);
+    parameter.or(file).unwrap_or_else(|| member.name.span())
 }

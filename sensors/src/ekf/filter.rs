@@ -25,8 +25,8 @@ use super::observation::{self, Observation};
 use super::params::EkfParams;
 use super::start::{lost_covariance, start};
 use super::transition::{Covariance, STATES, Transition, symmetric};
-use crate::parameter::{ParameterError, check, positive};
 use bus::Message;
+use diagnostics::parameter::{ParameterError, positive, require};
 
 /// The covariance is carried over spans of at most this, since noise acts through the attitude in longer ones.
 const SPAN_MAX_NS: u64 = 20_000_000;
@@ -101,7 +101,7 @@ impl Ekf {
         positive("period_s", period_s)?;
         let span_s = params.delay_max_ms * 1e-3 + SPAN_MAX_NS as f64 * 1e-9;
         let fits = span_s / period_s <= (READINGS - 2) as f64;
-        check("delay_max_ms", params.delay_max_ms, fits, "20 ms shorter than 254 of the node's periods")?;
+        require("delay_max_ms", params.delay_max_ms, fits, "20 ms shorter than 254 of the node's periods")?;
         let (period_ns, delay_max_ns) = ((period_s * 1e9).round() as u64, (params.delay_max_ms * 1e6) as u64);
         Ok(Self { params, period_ns, delay_max_ns })
     }

@@ -2,7 +2,7 @@
 #![allow(non_snake_case, reason = "a trailing _T names the tesla")]
 
 use crate::earth_field::EarthField;
-use crate::parameter::{ParameterError, all_finite, all_not_negative, check, finite, not_negative, positive};
+use diagnostics::parameter::{ParameterError, all, finite, not_negative, positive, require};
 use nalgebra::Vector3;
 use serde::Deserialize;
 
@@ -126,13 +126,13 @@ impl EkfParams {
             positive("gps_position_noise_m", self.gps_position_noise_m[axis])?;
             positive("gps_velocity_noise_m_s", self.gps_velocity_noise_m_s[axis])?;
         }
-        all_not_negative("gps_position_drift_m", &self.gps_position_drift_m)?;
-        all_finite("magnetometer_hard_iron_T", &self.magnetometer_hard_iron_T)?;
-        all_finite("initial_position_m", &self.initial_position_m.unwrap_or_default())?;
+        all(not_negative, "gps_position_drift_m", &self.gps_position_drift_m)?;
+        all(finite, "magnetometer_hard_iron_T", &self.magnetometer_hard_iron_T)?;
+        all(finite, "initial_position_m", &self.initial_position_m.unwrap_or_default())?;
         finite("initial_yaw_deg", self.initial_yaw_deg.unwrap_or_default())?;
         finite("declination_deg", self.declination_deg)?;
         let inclination_is_good = self.inclination_deg.abs() < 90.0;
-        check("inclination_deg", self.inclination_deg, inclination_is_good, "between -90 and 90")
+        require("inclination_deg", self.inclination_deg, inclination_is_good, "between -90 and 90")
     }
 
     /// A filter that took one of these for zero would believe a measurement blindly, or divide by it.

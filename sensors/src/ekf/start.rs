@@ -13,8 +13,8 @@ use super::observation::measured_attitude_WB;
 use super::params::EkfParams;
 use super::transition::{ACCELEROMETER, ATTITUDE, BAROMETER, Covariance, GPS, GYROSCOPE, POSITION, VELOCITY};
 use crate::complementary::tilt_rad;
-use crate::units::STANDARD_GRAVITY_M_S2;
 use crate::wire::{attitude_message, vector};
+use diagnostics::unit::STANDARD_GRAVITY_M_S2;
 use nalgebra::{UnitQuaternion, Vector3};
 
 /// Hardly any confidence: far above what any sensor leaves.

@@ -18,10 +18,10 @@
 use super::axis::{Axis, Echo, Side};
 use super::params::RangeInertialParams;
 use crate::imu_model::ImuReading;
-use crate::parameter::{ParameterError, positive};
 use crate::wire::{attitude, attitude_message, vector, vector_message};
 use bus::Message;
 use bus::messages::{Quaternion, Ranges, Vector3 as Vector3Message};
+use diagnostics::parameter::{ParameterError, positive};
 use nalgebra::{UnitQuaternion, Vector3};
 
 /// The level directions of the beams, in the order of [`Ranges`].

@@ -1,7 +1,7 @@
 //! The parameters of the range-inertial estimator.
 
 use super::axis::Inertia;
-use crate::parameter::{ParameterError, check, not_negative, positive};
+use diagnostics::parameter::{ParameterError, not_negative, positive, require};
 use serde::Deserialize;
 
 /// What the range finders, the IMU and the attitude are worth, and where the vehicle starts.
@@ -94,13 +94,13 @@ impl RangeInertialParams {
             not_negative(key, value)?;
         }
         let angle_is_good = (0.0..90.0).contains(&self.half_angle_deg);
-        check("half_angle_deg", self.half_angle_deg, angle_is_good, "zero or more and below 90")?;
+        require("half_angle_deg", self.half_angle_deg, angle_is_good, "zero or more and below 90")?;
         self.validate_room()
     }
 
     /// A room has a size and a place within it, or is not known.
     fn validate_room(&self) -> Result<(), ParameterError> {
-        let missing = |key, expected| Err(ParameterError { key, expected, found: None });
+        let missing = |key, expected| Err(ParameterError::value(key, expected, "nothing"));
         match (self.room_m, self.start_in_room_m) {
             (Some(_), None) => return missing("start_in_room_m", "given where `room_m` is"),
             (None, Some(_)) => return missing("room_m", "given where `start_in_room_m` is"),
@@ -147,13 +147,7 @@ mod tests {
             params.validate().unwrap_err().to_string()
         };
         let given = Some([4.0, 4.0]);
-        assert_eq!(
-            refused(given, None),
-            "parameter `start_in_room_m` must be given where `room_m` is, found nothing"
-        );
-        assert_eq!(
-            refused(None, given),
-            "parameter `room_m` must be given where `start_in_room_m` is, found nothing"
-        );
+        assert_eq!(refused(given, None), "`start_in_room_m` must be given where `room_m` is, found nothing");
+        assert_eq!(refused(None, given), "`room_m` must be given where `start_in_room_m` is, found nothing");
     }
 }

@@ -1,0 +1,24 @@
+//! What can be wrong with what people write, as data until it is printed; and the units in which they write it.
+//!
+//! | room | what it holds |
+//! |---|---|
+//! | [`mod@parameter`] | parameters of components: the error, and the checks that raise it |
+//! | `read` | parameters from JSON, whose errors carry their keys |
+//! | [`mod@unit`] | every unit that a file may use, with its factor to SI |
+//!
+//! ```
+//! use diagnostics::parameter::positive;
+//!
+//! let error = positive("mass_kg", -1.0).unwrap_err();
+//! assert_eq!(error.key(), "mass_kg");
+//! assert_eq!(error.to_string(), "`mass_kg` must be a finite number above 0, found -1");
+//! ```
+#![forbid(unsafe_code)]
+
+pub mod parameter;
+mod read;
+pub mod unit;
+
+pub use parameter::ParameterError;
+pub use read::read;
+pub use unit::{Dimension, convert};

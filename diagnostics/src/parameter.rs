@@ -1,0 +1,228 @@
+//! Parameters of components: the error for one that is refused, and the checks that raise it.
+
+use std::fmt::Display;
+
+/// A parameter that a component refuses.
+///
+/// ```
+/// use diagnostics::ParameterError;
+///
+/// let error = ParameterError::value("mode", "\"varying\" or \"constant\"", "\"slow\"").within("gains");
+/// assert_eq!(error.key(), "gains.mode");
+/// assert_eq!(error.to_string(), "`gains.mode` must be \"varying\" or \"constant\", found \"slow\"");
+/// ```
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum ParameterError {
+    /// A value that the parameter cannot have.
+    #[error("`{key}` must be {expected}, found {found}")]
+    Value {
+        /// The dotted key, as the manifest has it.
+        key: String,
+        /// What is accepted, so that "must be" can stand before it.
+        expected: String,
+        /// What is there.
+        found: String,
+    },
+    /// A parameter that is needed and not given.
+    #[error("missing field `{key}`")]
+    Missing {
+        /// The dotted key.
+        key: String,
+    },
+    /// A parameter that the component does not have.
+    #[error("unknown field `{key}`, expected {}", list(.known))]
+    Unknown {
+        /// The dotted key.
+        key: String,
+        /// The keys that there are in its place.
+        known: Vec<String>,
+    },
+    /// Parameters, ports or files that do not go together, or a file that is refused.
+    #[error("{message}")]
+    Conflict {
+        /// The dotted key that is to blame first; empty where it is none in particular.
+        key: String,
+        /// What does not go together, and what to do.
+        message: String,
+    },
+}
+
+impl ParameterError {
+    /// A value that `key` cannot have.
+    #[must_use]
+    pub fn value(key: impl Into<String>, expected: impl Into<String>, found: impl Display) -> Self {
+        Self::Value { key: key.into(), expected: expected.into(), found: found.to_string() }
+    }
+
+    /// What does not go together, of which `key` is to blame first; empty where none is.
+    #[must_use]
+    pub fn conflict(key: impl Into<String>, message: impl Display) -> Self {
+        Self::Conflict { key: key.into(), message: message.to_string() }
+    }
+
+    /// The dotted key that is to blame; empty where none is in particular.
+    #[must_use]
+    pub fn key(&self) -> &str {
+        let (Self::Value { key, .. }
+        | Self::Missing { key }
+        | Self::Unknown { key, .. }
+        | Self::Conflict { key, .. }) = self;
+        key
+    }
+
+    /// The same error of the parameter within the table `table`.
+    #[must_use]
+    pub fn within(mut self, table: &str) -> Self {
+        let (Self::Value { key, .. }
+        | Self::Missing { key }
+        | Self::Unknown { key, .. }
+        | Self::Conflict { key, .. }) = &mut self;
+        *key = if key.is_empty() { table.to_owned() } else { format!("{table}.{key}") };
+        if let Self::Conflict { message, .. } = &mut self {
+            *message = format!("`{table}`: {message}");
+        }
+        self
+    }
+}
+
+fn list(names: &[String]) -> String {
+    match names {
+        [] => "none".to_owned(),
+        [one] => format!("`{one}`"),
+        _ => format!("one of `{}`", names.join("`, `")),
+    }
+}
+
+/// Passes a number that `is_good`.
+///
+/// # Errors
+/// It is not; `expected` says what is accepted.
+///
+/// ```
+/// use diagnostics::parameter::require;
+///
+/// let angle_deg = 91.0;
+/// let error = require("half_angle_deg", angle_deg, angle_deg < 90.0, "below 90").unwrap_err();
+/// assert_eq!(error.to_string(), "`half_angle_deg` must be below 90, found 91");
+/// ```
+pub fn require(
+    key: &str,
+    found: impl Display,
+    is_good: bool,
+    expected: impl Into<String>,
+) -> Result<(), ParameterError> {
+    if is_good { Ok(()) } else { Err(ParameterError::value(key, expected, found)) }
+}
+
+/// Passes a finite number.
+///
+/// # Errors
+/// It is infinite or none.
+pub fn finite(key: &str, value: f64) -> Result<(), ParameterError> {
+    require(key, value, value.is_finite(), "a finite number")
+}
+
+/// Passes a finite number above zero.
+///
+/// # Errors
+/// It is zero, less, infinite or none.
+pub fn positive(key: &str, value: f64) -> Result<(), ParameterError> {
+    require(key, value, value.is_finite() && value > 0.0, "a finite number above 0")
+}
+
+/// Passes a finite number that is zero or more.
+///
+/// # Errors
+/// It is less than zero, infinite or none.
+pub fn not_negative(key: &str, value: f64) -> Result<(), ParameterError> {
+    require(key, value, value.is_finite() && value >= 0.0, "a finite number, 0 or more")
+}
+
+/// Passes a number above zero and up to `max`, in `unit`.
+///
+/// # Errors
+/// It is not.
+pub fn positive_up_to(key: &str, value: f64, max: f64, unit: &str) -> Result<(), ParameterError> {
+    let is_good = value > 0.0 && value <= max;
+    require(key, value, is_good, format!("above 0 and at most {max} {unit}").trim_end())
+}
+
+/// Passes numbers that `check` passes, each.
+///
+/// # Errors
+/// The first that it refuses.
+///
+/// ```
+/// use diagnostics::parameter::{all, finite};
+///
+/// assert!(all(finite, "start_m", &[0.0, 1.0]).is_ok());
+/// assert!(all(finite, "start_m", &[0.0, f64::NAN]).is_err());
+/// ```
+pub fn all(
+    check: impl Fn(&str, f64) -> Result<(), ParameterError>,
+    key: &str,
+    values: &[f64],
+) -> Result<(), ParameterError> {
+    values.iter().try_for_each(|value| check(key, *value))
+}
+
+/// What a quantity can be, in SI, and why it is not more or less.
+///
+/// ```
+/// use diagnostics::parameter::Bounds;
+///
+/// const GRAVITY: Bounds = Bounds { min: 0.0, max: 300.0, unit: "m/s^2", why: "the sun has 274" };
+/// assert!(GRAVITY.check("gravity", 9.81).is_ok());
+/// let error = GRAVITY.check("gravity", 981.0).unwrap_err();
+/// assert_eq!(error.to_string(), "`gravity` must be 0.0 to 300.0 m/s^2 (the sun has 274), found 981.0 m/s^2");
+/// ```
+#[derive(Debug, Clone, Copy)]
+pub struct Bounds {
+    /// The least.
+    pub min: f64,
+    /// The most.
+    pub max: f64,
+    /// Their unit.
+    pub unit: &'static str,
+    /// What has the most and the least, or why nothing that flies has more.
+    pub why: &'static str,
+}
+
+impl Bounds {
+    /// Whether `si` lies within, both ends included; no NaN does.
+    #[must_use]
+    pub fn contains(&self, si: f64) -> bool {
+        (self.min..=self.max).contains(&si)
+    }
+
+    /// Passes a number within.
+    ///
+    /// # Errors
+    /// It is not within.
+    pub fn check(&self, key: &str, si: f64) -> Result<(), ParameterError> {
+        let Self { min, max, unit, why } = self;
+        let found = format!("{si:?} {unit}");
+        require(key, found.trim_end(), self.contains(si), format!("{min:?} to {max:?} {unit} ({why})"))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn no_check_passes_what_is_no_number() {
+        for check in [finite, positive, not_negative] {
+            assert!(check("a", f64::NAN).is_err() && check("a", f64::INFINITY).is_err());
+        }
+        assert!(positive_up_to("a", f64::NAN, 1.0, "m").is_err());
+        assert!(positive("a", 0.0).is_err() && not_negative("a", 0.0).is_ok());
+    }
+
+    #[test]
+    fn an_unknown_key_is_told_with_those_that_there_are() {
+        let known = vec!["gains".to_owned(), "vehicle".to_owned()];
+        let error = ParameterError::Unknown { key: "gain".to_owned(), known };
+        assert_eq!(error.to_string(), "unknown field `gain`, expected one of `gains`, `vehicle`");
+    }
+}

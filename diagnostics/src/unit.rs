@@ -1,0 +1,278 @@
+//! Every unit that a file, a log or a message may use, per dimension, with the factor that takes each to SI.
+
+#![cfg_attr(test, allow(non_snake_case, reason = "units stand last in names: thrust_N"))]
+
+use std::f64::consts::PI;
+
+/// One radian per second in revolutions per minute, inverted: rpm times this is rad/s.
+const RPM: f64 = PI / 30.0;
+
+/// Standard gravity (CGPM 1901), by which data sheets convert g to m/s^2, and scales a gram-force to newtons.
+pub const STANDARD_GRAVITY_M_S2: f64 = 9.806_65;
+
+/// A physical dimension and the units accepted for it.
+///
+/// ```
+/// use diagnostics::unit::MASS;
+///
+/// assert_eq!(MASS.factor("g"), Some(1e-3));
+/// assert_eq!(MASS.factor("m"), None);
+/// assert_eq!(MASS.describe(), "a unit of mass: \"kg\", \"g\"");
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Dimension {
+    /// Name for messages.
+    pub name: &'static str,
+    /// Unit as written in files, and the factor to SI. The first is the SI unit itself.
+    pub units: &'static [(&'static str, f64)],
+}
+
+impl Dimension {
+    /// The factor that takes `unit` to SI, if this dimension has it.
+    #[must_use]
+    pub fn factor(&self, unit: &str) -> Option<f64> {
+        self.units.iter().find(|(name, _)| *name == unit).map(|(_, factor)| *factor)
+    }
+
+    /// "a unit of mass: kg, g", for messages.
+    #[must_use]
+    pub fn describe(&self) -> String {
+        format!("a unit of {}: {}", self.name, self.names(", "))
+    }
+
+    /// The units in quotation marks with `between` them, for messages.
+    #[must_use]
+    pub fn names(&self, between: &str) -> String {
+        let names: Vec<_> = self.units.iter().map(|(name, _)| format!("\"{name}\"")).collect();
+        names.join(between)
+    }
+}
+
+/// Masses.
+pub const MASS: Dimension = Dimension { name: "mass", units: &[("kg", 1.0), ("g", 1e-3)] };
+
+/// Lengths.
+pub const LENGTH: Dimension = Dimension { name: "length", units: &[("m", 1.0), ("cm", 1e-2), ("mm", 1e-3)] };
+
+/// Times.
+pub const TIME: Dimension =
+    Dimension { name: "time", units: &[("s", 1.0), ("ms", 1e-3), ("us", 1e-6), ("ns", 1e-9)] };
+
+/// Accelerations.
+pub const ACCELERATION: Dimension = Dimension {
+    name: "acceleration",
+    units: &[("m/s^2", 1.0), ("g", STANDARD_GRAVITY_M_S2), ("mg", 1e-3 * STANDARD_GRAVITY_M_S2)],
+};
+
+/// Rates of change of accelerations.
+pub const JERK: Dimension = Dimension { name: "jerk", units: &[("m/s^3", 1.0)] };
+
+/// Angles.
+pub const ANGLE: Dimension = Dimension { name: "angle", units: &[("rad", 1.0), ("deg", PI / 180.0)] };
+
+/// Moments of inertia.
+pub const INERTIA: Dimension =
+    Dimension { name: "moment of inertia", units: &[("kg*m^2", 1.0), ("g*m^2", 1e-3), ("g*mm^2", 1e-9)] };
+
+/// Rotation speeds.
+pub const SPEED: Dimension =
+    Dimension { name: "rotation speed", units: &[("rad/s", 1.0), ("rpm", RPM), ("deg/s", PI / 180.0)] };
+
+/// Rotation speeds as logs of rotors have them.
+pub const ROTOR_SPEED: Dimension =
+    Dimension { name: "rotor speed", units: &[("rad/s", 1.0), ("rpm", RPM), ("Hz", 2.0 * PI)] };
+
+/// Rotation speeds as logs of gyroscopes have them.
+pub const ANGULAR_VELOCITY: Dimension =
+    Dimension { name: "angular velocity", units: &[("rad/s", 1.0), ("deg/s", PI / 180.0), ("mrad/s", 1e-3)] };
+
+/// Angular accelerations.
+pub const ANGULAR_ACCELERATION: Dimension =
+    Dimension { name: "angular acceleration", units: &[("rad/s^2", 1.0), ("deg/s^2", PI / 180.0)] };
+
+/// Gains from a quantity to its rate of change.
+pub const PER_SECOND: Dimension = Dimension { name: "gain per time", units: &[("1/s", 1.0)] };
+
+/// Gains from a quantity to its second rate of change.
+pub const PER_SECOND_2: Dimension = Dimension { name: "gain per time squared", units: &[("1/s^2", 1.0)] };
+
+/// Gains from a quantity to its third rate of change.
+pub const PER_SECOND_3: Dimension = Dimension { name: "gain per time cubed", units: &[("1/s^3", 1.0)] };
+
+/// Thrust coefficients.
+pub const THRUST_COEFFICIENT: Dimension = Dimension {
+    name: "thrust per rotation speed squared",
+    units: &[("N/(rad/s)^2", 1.0), ("N/rpm^2", 1.0 / (RPM * RPM))],
+};
+
+/// Torque coefficients.
+pub const TORQUE_COEFFICIENT: Dimension = Dimension {
+    name: "torque per rotation speed squared",
+    units: &[("N*m/(rad/s)^2", 1.0), ("N*m/rpm^2", 1.0 / (RPM * RPM))],
+};
+
+/// Pure numbers.
+pub const PURE_NUMBER: Dimension = Dimension { name: "a pure number", units: &[("1", 1.0)] };
+
+/// Parts of a whole, and relative deviations.
+pub const RATIO: Dimension = Dimension { name: "a ratio", units: &[("1", 1.0), ("%", 1e-2)] };
+
+/// Velocities.
+pub const VELOCITY: Dimension = Dimension {
+    name: "velocity",
+    units: &[("m/s", 1.0), ("cm/s", 1e-2), ("mm/s", 1e-3), ("knot", 1852.0 / 3600.0)],
+};
+
+/// Forces; the gram-force by standard gravity.
+pub const FORCE: Dimension =
+    Dimension { name: "force", units: &[("N", 1.0), ("gf", 9.806_65e-3), ("kgf", STANDARD_GRAVITY_M_S2)] };
+
+/// Forces against a motion.
+pub const LINEAR_DAMPING: Dimension = Dimension { name: "force per speed", units: &[("N*s/m", 1.0)] };
+
+/// Torques.
+pub const TORQUE: Dimension = Dimension { name: "torque", units: &[("N*m", 1.0), ("N*mm", 1e-3)] };
+
+/// Torques against a rotation.
+pub const ROTARY_DAMPING: Dimension =
+    Dimension { name: "torque per rotation speed", units: &[("N*m*s/rad", 1.0), ("N*m*s", 1.0)] };
+
+/// Torques against a deflection.
+pub const ROTARY_STIFFNESS: Dimension = Dimension { name: "torque per angle", units: &[("N*m/rad", 1.0)] };
+
+/// Masses times their distances from a point.
+pub const STATIC_MOMENT: Dimension =
+    Dimension { name: "static moment", units: &[("kg*m", 1.0), ("g*m", 1e-3)] };
+
+/// Forces linear in a rotor's speed and in that of the air.
+pub const ROTOR_DRAG: Dimension = Dimension {
+    name: "force per rotation speed and velocity",
+    units: &[("N*s^2/(m*rad)", 1.0), ("kg/rad", 1.0)],
+};
+
+/// Forces quadratic in the speed of the air.
+pub const DYNAMIC_DRAG: Dimension =
+    Dimension { name: "force per velocity squared", units: &[("N*s^2/m^2", 1.0), ("kg/m", 1.0)] };
+
+/// Angles linear in the speed of the air.
+pub const TILT: Dimension =
+    Dimension { name: "angle per velocity", units: &[("rad*s/m", 1.0), ("deg*s/m", PI / 180.0)] };
+
+/// Voltages.
+pub const VOLTAGE: Dimension = Dimension { name: "voltage", units: &[("V", 1.0), ("mV", 1e-3)] };
+
+/// Electrical resistances.
+pub const RESISTANCE: Dimension =
+    Dimension { name: "electrical resistance", units: &[("ohm", 1.0), ("mohm", 1e-3)] };
+
+/// Electrical charges.
+pub const CHARGE: Dimension =
+    Dimension { name: "electrical charge", units: &[("C", 1.0), ("A*h", 3600.0), ("mA*h", 3.6)] };
+
+/// Electrical currents.
+pub const CURRENT: Dimension = Dimension { name: "current", units: &[("A", 1.0), ("mA", 1e-3)] };
+
+/// Magnetic flux densities.
+pub const FLUX_DENSITY: Dimension = Dimension { name: "magnetic flux density", units: &[("T", 1.0)] };
+
+/// Pressures.
+pub const PRESSURE: Dimension = Dimension { name: "pressure", units: &[("Pa", 1.0), ("hPa", 100.0)] };
+
+/// Raw commands.
+pub const COUNT: Dimension = Dimension { name: "count", units: &[("count", 1.0)] };
+
+/// Raw commands, or shares of their range.
+pub const COMMAND: Dimension =
+    Dimension { name: "command", units: &[("count", 1.0), ("fraction", 1.0), ("%", 1e-2)] };
+
+/// The dimensions of what a message can hold: a field of any of these can be judged and drawn in its other units.
+const OF_MESSAGES: [Dimension; 15] = [
+    LENGTH,
+    ANGLE,
+    SPEED,
+    VELOCITY,
+    ACCELERATION,
+    JERK,
+    FORCE,
+    TORQUE,
+    VOLTAGE,
+    CURRENT,
+    FLUX_DENSITY,
+    PRESSURE,
+    TIME,
+    PURE_NUMBER,
+    COUNT,
+];
+
+/// Why a number cannot be converted from one unit to another.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum ConversionError {
+    /// The units are of two dimensions.
+    #[error("`{to}` is not a unit of {}; expected {}", .dimension.name, .dimension.names(" or "))]
+    OtherDimension {
+        /// The unit that was asked for.
+        to: String,
+        /// The dimension of the number.
+        dimension: Dimension,
+    },
+    /// The number's own unit is in no table.
+    #[error("the field's unit is `{from}`, which cannot be converted to `{to}`")]
+    UnknownUnit {
+        /// The number's unit.
+        from: String,
+        /// The unit that was asked for.
+        to: String,
+    },
+}
+
+/// The factor that turns a number in `from` into one in `to`.
+///
+/// # Errors
+/// The units are not of one dimension.
+///
+/// ```
+/// assert_eq!(diagnostics::convert("m", "cm"), Ok(100.0));
+/// assert!(diagnostics::convert("m", "deg").unwrap_err().to_string().contains("not a unit of length"));
+/// ```
+pub fn convert(from: &str, to: &str) -> Result<f64, ConversionError> {
+    if from == to {
+        return Ok(1.0);
+    }
+    let Some((dimension, factor)) =
+        OF_MESSAGES.iter().find_map(|dimension| Some((dimension, dimension.factor(from)?)))
+    else {
+        return Err(ConversionError::UnknownUnit { from: from.to_owned(), to: to.to_owned() });
+    };
+    let other = || ConversionError::OtherDimension { to: to.to_owned(), dimension: *dimension };
+    Ok(factor / dimension.factor(to).ok_or_else(other)?)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_coefficient_in_rpm_gives_the_same_thrust_in_rad_s() {
+        let factor = THRUST_COEFFICIENT.factor("N/rpm^2").unwrap();
+        let speed_rpm = 3930.0;
+        let thrust_N = 7.6184e-8 * speed_rpm * speed_rpm;
+        let speed_rad_s = speed_rpm * SPEED.factor("rpm").unwrap();
+        let same_N = 7.6184e-8 * factor * speed_rad_s * speed_rad_s;
+        assert!((thrust_N - same_N).abs() < 1e-14);
+    }
+
+    #[test]
+    fn a_number_is_converted_within_its_dimension_alone() {
+        assert!((convert("rad", "deg").unwrap() - 180.0 / PI).abs() < 1e-12);
+        let error = convert("m", "deg").unwrap_err();
+        assert!(error.to_string().contains("expected \"m\" or \"cm\" or \"mm\""), "{error}");
+        assert_eq!(convert("foo", "foo"), Ok(1.0));
+        assert!(convert("foo", "m").is_err());
+    }
+
+    #[test]
+    fn a_unit_of_another_dimension_is_not_accepted() {
+        assert_eq!(MASS.factor("m"), None);
+        assert!(MASS.describe().contains("\"kg\", \"g\""));
+    }
+}
