@@ -2,8 +2,8 @@
 
 use crate::component::{Component, StepError};
 use crate::context::{NodeContext, StepContext};
-use crate::message::sample_words;
-use crate::ports::{OutputPorts, OutputSamples, PortSpec, SampleSink, SampleSource};
+use crate::ports::SampleSource;
+use crate::sample_memory::SampleMemory;
 use diagnostics::ParameterError;
 
 /// A component with its state and its time, stepped by hand.
@@ -19,7 +19,7 @@ pub struct Harness<C: Component> {
     tick_ns: u64,
     period_ticks: u32,
     /// What a predecessor sent last, until the next step.
-    predecessor: Option<Sent>,
+    predecessor: Option<SampleMemory>,
 }
 
 impl<C: Component> Harness<C> {
@@ -58,7 +58,7 @@ impl<C: Component> Harness<C> {
 
     /// Has the next step take the place of a process that sent `outputs` last and transferred no state.
     pub fn replaces(&mut self, outputs: C::Outputs) {
-        self.predecessor = Some(Sent::of(outputs));
+        self.predecessor = Some(SampleMemory::of(outputs));
     }
 
     /// Computes the next tick.
@@ -90,7 +90,7 @@ impl<C: Component> Harness<C> {
         let (mut first, mut second) = (make(), make());
         let step = |harness: &mut Self| {
             let outputs = harness.step(inputs(harness.tick)).unwrap_or_else(|error| panic!("{error}"));
-            Sent::of(outputs)
+            SampleMemory::of(outputs)
         };
         for _ in 0..ALONE {
             step(&mut first);
@@ -102,48 +102,5 @@ impl<C: Component> Harness<C> {
             let is_same = bytemuck::bytes_of(&second.state) == bytemuck::bytes_of(&first.state);
             assert!(is_same, "another state after tick {tick}");
         }
-    }
-}
-
-/// Samples that were sent, by port.
-#[derive(Debug, PartialEq)]
-struct Sent {
-    samples: Vec<Box<[u64]>>,
-    is_sent: Vec<bool>,
-}
-
-impl Sent {
-    fn of<O: OutputPorts>(outputs: O) -> Self {
-        let sample = |port: &PortSpec| vec![0; sample_words(port.schema.size)].into_boxed_slice();
-        let samples = O::DECLARED.iter().map(sample).collect();
-        let mut sent = Self { samples, is_sent: vec![false; O::DECLARED.len()] };
-        let written = outputs.write(&mut OutputSamples(&mut sent));
-        written.unwrap_or_else(|error| unreachable!("this memory is there: {error}"));
-        sent
-    }
-}
-
-impl SampleSink for Sent {
-    fn words(&mut self, port: usize) -> Result<Option<&mut [u64]>, crate::BusError> {
-        self.is_sent[port] = true;
-        Ok(Some(&mut self.samples[port]))
-    }
-}
-
-impl SampleSource for Sent {
-    fn count(&self) -> usize {
-        self.samples.len()
-    }
-
-    fn words(&self, port: usize) -> Option<&[u64]> {
-        self.is_sent[port].then(|| &*self.samples[port])
-    }
-
-    fn fresh(&self, _: usize) -> Option<&[u8]> {
-        None
-    }
-
-    fn fresh_shadow(&self, _: usize) -> Option<&[u8]> {
-        None
     }
 }

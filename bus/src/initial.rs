@@ -1,6 +1,7 @@
 //! The value that a delayed input has before its first sample: a message made from named fields.
 
-use crate::message::{BODY_START, ENCAPSULATION_WORD, sample_words};
+use crate::message::BODY_START;
+use crate::sample_memory::empty_sample;
 use crate::schema::{Kind, Primitive, Schema};
 use serde_json::Value;
 
@@ -9,10 +10,9 @@ use serde_json::Value;
 /// # Errors
 /// What does not fit: an unknown field, a value of another kind, an array of another length.
 pub fn sample(schema: &Schema, value: &Value) -> Result<Box<[u64]>, String> {
-    let mut words = vec![0; sample_words(schema.size)];
-    words[0] = ENCAPSULATION_WORD;
+    let mut words = empty_sample(schema.size);
     write_message(schema, value, &mut bytemuck::cast_slice_mut(&mut words)[BODY_START..], "")?;
-    Ok(words.into_boxed_slice())
+    Ok(words)
 }
 
 fn write_message(schema: &Schema, value: &Value, bytes: &mut [u8], path: &str) -> Result<(), String> {

@@ -57,6 +57,14 @@ impl Registration {
         }
     }
 
+    /// Bytes of its state.
+    pub(crate) fn state_bytes(&self) -> usize {
+        match self.transfer {
+            Transfer::Message(schema) => schema.size,
+            Transfer::Nothing | Transfer::Internal => 0,
+        }
+    }
+
     /// The messages of its ports.
     pub fn messages(&self) -> impl Iterator<Item = &'static Schema> {
         let (inputs, one) = match self.inputs {

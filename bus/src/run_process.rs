@@ -87,8 +87,7 @@ impl Registration {
             Transfer::Message(schema) => Some(schema),
             Transfer::Nothing | Transfer::Internal => None,
         };
-        let size = schema.map_or(0, |schema| schema.size);
-        let state = &mut bytemuck::cast_slice_mut(state)[..size];
+        let state = &mut bytemuck::cast_slice_mut(state)[..self.state_bytes()];
         connected.run_with_state_of(schema, state, |tick, state| step(component, wiring, tick, state))
     }
 }

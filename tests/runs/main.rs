@@ -29,6 +29,7 @@
 mod clean;
 mod cleanup;
 mod commands;
+mod components;
 mod contract;
 mod corpus;
 mod determinism;

@@ -1,0 +1,163 @@
+//! A node of a plan, stepped without a run: what it reads is given to it as recorded bytes, and so is what it sends.
+
+use crate::component::StepError;
+use crate::context::{NodeContext, StepContext};
+use crate::initial;
+use crate::message::{CDR_START, cdr_bytes};
+use crate::messages::Time;
+use crate::plan::{NodePlan, Plan};
+use crate::ports::{InputSamples, Inputs, OutputSamples, PortSpec};
+use crate::registration::{Make, Registration, Stepper};
+use crate::sample_memory::SampleMemory;
+use crate::schema::Schema;
+use diagnostics::ParameterError;
+
+/// A node of a plan, stepped without a run.
+///
+/// It reads and sends CDR bytes, as recordings hold them, so that any component can be stepped on what was recorded.
+pub struct NodeHarness {
+    component: Box<dyn Stepper>,
+    state: Box<[u64]>,
+    state_bytes: usize,
+    tick_ns: u64,
+    inputs: Vec<Option<InputWire>>,
+    outputs: Vec<OutputWire>,
+}
+
+/// A wired input.
+struct InputWire {
+    topic: usize,
+    delay_ticks: u32,
+    initial: Option<Box<[u64]>>,
+}
+
+/// An output, wired or not.
+struct OutputWire {
+    schema: &'static Schema,
+    /// Topic and its period.
+    topic: Option<(usize, u32)>,
+}
+
+/// A message as CDR bytes, with the index of its topic.
+pub type Sample = (usize, Vec<u8>);
+
+impl NodeHarness {
+    /// Node number `node` of `plan`, which is one of `component`.
+    ///
+    /// # Errors
+    /// As [`Component::new`](crate::Component::new).
+    pub fn new(component: &Registration, plan: &Plan, node: usize) -> Result<Self, ParameterError> {
+        let node = &plan.nodes[node];
+        let made = make(component, plan, node)?;
+        let topic = |port: &PortSpec| {
+            let output = node.outputs.iter().find(|output| output.port == port.name)?;
+            Some((output.topic, plan.topics[output.topic].period_ticks))
+        };
+        let outputs =
+            component.outputs.iter().map(|port| OutputWire { schema: port.schema, topic: topic(port) });
+        Ok(Self {
+            state: made.initial(),
+            state_bytes: component.state_bytes(),
+            component: made,
+            tick_ns: plan.tick_ns,
+            inputs: inputs(component, node)?,
+            outputs: outputs.collect(),
+        })
+    }
+
+    /// The bytes of the state, in words.
+    #[must_use]
+    pub fn state(&self) -> &[u64] {
+        &self.state
+    }
+
+    /// Goes on from the state of another.
+    ///
+    /// # Panics
+    /// If it is of another size.
+    pub fn restore(&mut self, state: &[u64]) {
+        self.state.copy_from_slice(state);
+    }
+
+    /// Computes `tick`: `newest` gives the newest sample of a topic that was sent up to a tick. Returns what is sent.
+    ///
+    /// # Errors
+    /// As [`Component::step`](crate::Component::step).
+    pub fn step<'a>(
+        &mut self,
+        tick: u32,
+        newest: impl Fn(usize, u32) -> Option<&'a [u8]>,
+    ) -> Result<Vec<Sample>, StepError> {
+        let given = |wire: &Option<InputWire>| {
+            let wire = wire.as_ref()?;
+            let limit = tick.checked_sub(wire.delay_ticks);
+            limit.and_then(|limit| newest(wire.topic, limit)).map(words_of).or_else(|| wire.initial.clone())
+        };
+        let given = SampleMemory::given(self.inputs.iter().map(given).collect());
+        let mut sent = SampleMemory::empty(self.outputs.iter().map(|wire| wire.schema));
+        let time_ns = u64::from(tick) * self.tick_ns;
+        let context = StepContext { tick, time_ns, predecessor: None };
+        let state = &mut bytemuck::cast_slice_mut(&mut self.state)[..self.state_bytes];
+        self.component.step(&context, InputSamples(&given), state, &mut OutputSamples(&mut sent))?;
+        let due = self.outputs.iter().zip(sent.samples).filter_map(|(wire, words)| {
+            let (topic, period_ticks) = wire.topic?;
+            let words = words.filter(|_| tick.is_multiple_of(period_ticks))?;
+            Some((topic, stamped(words, wire.schema, time_ns)))
+        });
+        Ok(due.collect())
+    }
+}
+
+impl std::fmt::Debug for NodeHarness {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("NodeHarness").field("state_bytes", &self.state_bytes).finish_non_exhaustive()
+    }
+}
+
+fn make(component: &Registration, plan: &Plan, node: &NodePlan) -> Result<Box<dyn Stepper>, ParameterError> {
+    let inputs: Vec<&str> = node.inputs.iter().map(|input| input.port.as_str()).collect();
+    let outputs: Vec<&str> = node.outputs.iter().map(|output| output.port.as_str()).collect();
+    let context = NodeContext::new(&node.name, &inputs)
+        .naming(&outputs)
+        .timed(plan.tick_ns, node.period_ticks, plan.duration_ticks)
+        .seeded(plan.seed);
+    match component.make {
+        Make::Component(make) => make(&node.parameters, &context),
+        Make::Kind(_) => Err(ParameterError::conflict("", "it is not a type yet")),
+    }
+}
+
+/// The inputs of the node, in the order in which the component declares them.
+fn inputs(component: &Registration, node: &NodePlan) -> Result<Vec<Option<InputWire>>, ParameterError> {
+    let wire = |name: &str, schema: &Schema| {
+        let Some(input) = node.inputs.iter().find(|input| input.port == name) else { return Ok(None) };
+        let initial = input.initial.as_ref().map(|value| initial::sample(schema, value)).transpose();
+        let initial = initial.map_err(|reason| ParameterError::conflict(name, reason))?;
+        Ok(Some(InputWire { topic: input.topic, delay_ticks: input.delay_ticks, initial }))
+    };
+    match component.inputs {
+        Inputs::Ports(ports) => ports.iter().map(|port| wire(port.name, port.schema)).collect(),
+        Inputs::Many(schema) => {
+            let mut names: Vec<&str> = node.inputs.iter().map(|input| input.port.as_str()).collect();
+            names.sort_unstable();
+            names.into_iter().map(|name| wire(name, schema)).collect()
+        }
+        Inputs::Any => Err(ParameterError::conflict("", "what takes any messages learns their types from a run")),
+    }
+}
+
+/// The words of a sample whose CDR bytes are `cdr`.
+fn words_of(cdr: &[u8]) -> Box<[u64]> {
+    let mut words = vec![0; (CDR_START + cdr.len()).div_ceil(8)].into_boxed_slice();
+    bytemuck::cast_slice_mut(&mut words)[CDR_START..CDR_START + cdr.len()].copy_from_slice(cdr);
+    words
+}
+
+/// The CDR bytes of a sample, stamped as the bus stamps it.
+fn stamped(mut words: Box<[u64]>, schema: &Schema, time_ns: u64) -> Vec<u8> {
+    if let Some(offset) = schema.stamp_offset() {
+        let body: &mut [u8] = bytemuck::cast_slice_mut(&mut words[1..]);
+        body[offset..offset + size_of::<Time>()].copy_from_slice(bytemuck::bytes_of(&Time::from_ns(time_ns)));
+    }
+    cdr_bytes(&words, schema.size).to_vec()
+}

@@ -1,0 +1,66 @@
+//! Samples by port in a process's own memory: what a step without a run reads and sends.
+
+use crate::error::BusError;
+use crate::message::{ENCAPSULATION_WORD, sample_words};
+use crate::ports::{OutputPorts, OutputSamples, SampleSink, SampleSource};
+use crate::schema::Schema;
+
+/// Samples by port.
+#[derive(Debug, PartialEq)]
+pub(crate) struct SampleMemory {
+    /// What a port can be written as; empty where nothing is written.
+    sizes: Vec<usize>,
+    pub(crate) samples: Vec<Option<Box<[u64]>>>,
+}
+
+impl SampleMemory {
+    /// No samples yet, to be written to ports of `schemas`.
+    pub(crate) fn empty(schemas: impl Iterator<Item = &'static Schema>) -> Self {
+        let sizes: Vec<usize> = schemas.map(|schema| schema.size).collect();
+        Self { samples: vec![None; sizes.len()], sizes }
+    }
+
+    /// These samples, to be read.
+    pub(crate) fn given(samples: Vec<Option<Box<[u64]>>>) -> Self {
+        Self { sizes: Vec::new(), samples }
+    }
+
+    /// The samples of `outputs`.
+    pub(crate) fn of<O: OutputPorts>(outputs: O) -> Self {
+        let mut memory = Self::empty(O::DECLARED.iter().map(|port| port.schema));
+        let written = outputs.write(&mut OutputSamples(&mut memory));
+        written.unwrap_or_else(|error| unreachable!("this memory is there: {error}"));
+        memory
+    }
+}
+
+impl SampleSource for SampleMemory {
+    fn count(&self) -> usize {
+        self.samples.len()
+    }
+
+    fn words(&self, port: usize) -> Option<&[u64]> {
+        self.samples[port].as_deref()
+    }
+
+    fn fresh(&self, _: usize) -> Option<&[u8]> {
+        None
+    }
+
+    fn fresh_shadow(&self, _: usize) -> Option<&[u8]> {
+        None
+    }
+}
+
+impl SampleSink for SampleMemory {
+    fn words(&mut self, port: usize) -> Result<Option<&mut [u64]>, BusError> {
+        Ok(Some(self.samples[port].insert(empty_sample(self.sizes[port]))))
+    }
+}
+
+/// A sample of zeros whose message has `size` bytes.
+pub(crate) fn empty_sample(size: usize) -> Box<[u64]> {
+    let mut words = vec![0; sample_words(size)].into_boxed_slice();
+    words[0] = ENCAPSULATION_WORD;
+    words
+}

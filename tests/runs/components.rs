@@ -1,0 +1,152 @@
+//! Every component, flown once as a process and stepped on the recording of that flight in this one.
+
+use crate::support::{Place, repository};
+use bus::component::{Role, Transfer};
+use bus::plan::Plan;
+use bus::{NodeHarness, Registration};
+use hummingbus::COMPONENTS;
+use recorder::reader::Recording;
+use runtime::graph::Graph;
+use runtime::manifest::Manifest;
+use std::collections::BTreeMap;
+use std::fmt::Write as _;
+use std::path::Path;
+
+const TICKS: u32 = 1000;
+/// The tick at whose start another instance goes on from the state of the first.
+const TRANSFER_TICK: u32 = 500;
+
+/// All components in one run: the hover that every sensor watches, with the other estimators and laws beside it.
+fn manifest(place: &Place) -> String {
+    let (vehicle, room) = (repository("vehicles/hummingbird.toml"), repository("scenes/room.toml"));
+    let (include, flight) = (repository("manifests/sensors.toml"), place.write("flight.csv", flight()));
+    let law = |kind: &str, inputs: &str, parameters: &str| {
+        format!(
+            "[process.{kind}]\nkind = \"{kind}\"\nvehicle = {vehicle:?}\n\
+             inputs = {{ {inputs} }}\noutputs.status = {{}}\nparameters = {{ {parameters} }}\n"
+        )
+    };
+    let estimate = "estimate = \"/ekf/estimate\"";
+    let reference = format!("reference = \"/trajectory/reference\", {estimate}");
+    let walls = "walls = \"/odometry/walls\", attitude = \"/attitude/estimate\"";
+    let mut text = format!(
+        "include = [{include:?}]\n[run]\nduration_s = {}\n\
+         [process.plant]\noutputs.pose = {{}}\noutputs.tf = {{}}\n\
+         [process.range]\ninputs.traffic = \"/traffic/traffic\"\n\
+         [process.traffic]\nkind = \"traffic\"\ninputs.one = \"/plant/state\"\n\
+         [process.clearance]\nkind = \"clearance\"\nscene = {room:?}\ninputs.state = \"/plant/state\"\n\
+         [process.attitude]\nkind = \"attitude\"\ninputs.imu = \"/imu/imu\"\n\
+         [process.odometry]\nkind = \"range-inertial\"\n\
+         inputs = {{ ranges = \"/range/ranges\", imu = \"/imu/imu\", attitude = \"/attitude/estimate\" }}\n\
+         parameters = {{ initial_height_m = 1.0 }}\n\
+         [process.trajectory]\nkind = \"trajectory\"\n\
+         parameters = {{ initial_position_m = [0.0, 0.0, 1.0] }}\n\
+         [process.player]\nkind = \"player\"\ndata = {flight:?}\n\
+         parameters.columns.time = {{ columns = [\"t\"], unit = \"s\" }}\n\
+         parameters.columns.command = {{ columns = [\"m\", \"m\", \"m\", \"m\"], unit = \"count\" }}\n\
+         parameters.columns.position = {{ columns = [\"x\", \"x\", \"x\"], unit = \"m\" }}\n\
+         parameters.columns.velocity = {{ columns = [\"v\", \"v\", \"v\"], unit = \"m/s\" }}\n\
+         parameters.columns.attitude = {{ columns = [\"v\", \"v\", \"v\", \"w\"], unit = \"1\" }}\n\
+         parameters.columns.angular_velocity = {{ columns = [\"v\", \"v\", \"v\"], unit = \"rad/s\" }}\n",
+        f64::from(TICKS) * 1e-3
+    );
+    let set_point = format!("set_point = \"/pilot/set_point\", {estimate}");
+    for (kind, inputs, parameters) in [
+        ("cascade", set_point.as_str(), ""),
+        ("lqr", &reference, ""),
+        ("geometric", &reference, ""),
+        ("velocity", estimate, "altitude_m = 1.2"),
+        ("wall-stop", walls, "altitude_m = 1.2"),
+        ("wall-follow", walls, "altitude_m = 1.2, mode = \"constant\""),
+    ] {
+        text += &law(kind, inputs, parameters);
+    }
+    place.write("everything.toml", text)
+}
+
+/// A flight at constant velocity, a row every 10 ms.
+fn flight() -> String {
+    let mut text = "t,m,x,v,w\n".to_owned();
+    for row in 0..200 {
+        let _ = writeln!(text, "{},76.5,{},0.1,0.98", f64::from(row) * 0.01, f64::from(row) * 0.001);
+    }
+    text
+}
+
+/// The recorded samples of a run, by topic.
+struct Recorded {
+    topics: BTreeMap<String, Vec<(u32, Vec<u8>)>>,
+    plan: Plan,
+}
+
+impl Recorded {
+    fn open(path: &str, plan: Plan) -> Self {
+        let recording = Recording::open(Path::new(path)).unwrap();
+        let mut topics: BTreeMap<_, Vec<_>> = BTreeMap::new();
+        for record in recording.messages().map(Result::unwrap) {
+            topics.entry(record.topic).or_default().push((record.tick, record.cdr));
+        }
+        Self { topics, plan }
+    }
+
+    fn samples(&self, topic: usize) -> &[(u32, Vec<u8>)] {
+        &self.topics[&self.plan.topics[topic].name]
+    }
+
+    /// The newest sample of `topic` up to `tick`.
+    fn newest(&self, topic: usize, tick: u32) -> Option<&[u8]> {
+        let samples = self.samples(topic);
+        let next = samples.partition_point(|(sent, _)| *sent <= tick);
+        Some(&samples[next.checked_sub(1)?].1)
+    }
+
+    /// Steps `node` at `tick`, and requires that it sends what was recorded.
+    fn step(&self, harness: &mut NodeHarness, name: &str, tick: u32) {
+        let sent = harness.step(tick, |topic, tick| self.newest(topic, tick));
+        for (topic, cdr) in sent.unwrap_or_else(|error| panic!("{name} at tick {tick}: {error}")) {
+            let samples = self.samples(topic);
+            let place = samples.binary_search_by_key(&tick, |(sent, _)| *sent);
+            let recorded = place.map(|place| &samples[place].1);
+            assert_eq!(recorded, Ok(&cdr), "{name} at tick {tick}, {}", self.plan.topics[topic].name);
+        }
+    }
+}
+
+/// A node stepped from the first tick to the last, and another that goes on from its state amid the run.
+fn require_same(recorded: &Recorded, component: &Registration, node: usize) {
+    let make = || NodeHarness::new(component, &recorded.plan, node).unwrap();
+    let plan = &recorded.plan.nodes[node];
+    let (mut first, mut second) = (make(), make());
+    let has_internal_state = matches!(component.transfer, Transfer::Internal);
+    for tick in (0..TICKS).step_by(plan.period_ticks as usize) {
+        recorded.step(&mut first, &plan.name, tick);
+        if !has_internal_state && tick >= TRANSFER_TICK {
+            recorded.step(&mut second, &plan.name, tick);
+            assert!(first.state() == second.state(), "{}: another state after tick {tick}", plan.name);
+        } else {
+            second.restore(first.state());
+        }
+    }
+}
+
+#[test]
+fn every_component_steps_as_its_process_did_and_goes_on_from_a_state_byte_for_byte() {
+    let place = Place::new();
+    let (manifest, recording) = (manifest(&place), place.path("everything.mcap"));
+    let graph = Graph::build(&Manifest::load(Path::new(&manifest), &[], COMPONENTS).unwrap()).unwrap();
+    // Its conditions look behind the end of this shorter run.
+    place.call(&["run", &manifest, "--record", &recording]).with_code(1);
+    let recorded = Recorded::open(&recording, graph.plan);
+    let mut stepped = Vec::new();
+    for (node, program) in graph.programs.iter().enumerate() {
+        let component = program.component().unwrap();
+        // Until all are types.
+        let is_type = !matches!(NodeHarness::new(component, &recorded.plan, node), Err(error) if error.to_string().contains("not a type yet"));
+        if component.role == Role::Compute && is_type {
+            require_same(&recorded, component, node);
+        }
+        stepped.push(component.name);
+    }
+    let missing = COMPONENTS.iter().find(|component| !stepped.contains(&component.name));
+    assert!(missing.is_none(), "this run has no {missing:?}");
+}
