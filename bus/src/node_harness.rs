@@ -142,7 +142,9 @@ fn inputs(component: &Registration, node: &NodePlan) -> Result<Vec<Option<InputW
             names.sort_unstable();
             names.into_iter().map(|name| wire(name, schema)).collect()
         }
-        Inputs::Any => Err(ParameterError::conflict("", "what takes any messages learns their types from a run")),
+        Inputs::Any => {
+            Err(ParameterError::conflict("", "what takes any messages learns their types from a run"))
+        }
     }
 }
 
