@@ -1,4 +1,4 @@
-//! The files of the command `profile`.
+//! The command `profile`, and its files.
 
 use super::files::PAGE;
 use anyhow::Result;

@@ -39,6 +39,36 @@ pub struct RunArguments {
     pub json: bool,
 }
 
+/// What `profile` takes.
+#[derive(Args)]
+pub struct ProfileArguments {
+    #[command(flatten)]
+    run: RunArguments,
+    /// Write a timeline that ui.perfetto.dev opens.
+    #[arg(long, value_name = "FILE")]
+    trace: Option<PathBuf>,
+    /// Write a page with histograms and the slowest ticks.
+    #[arg(long, value_name = "FILE")]
+    html: Option<PathBuf>,
+}
+
+/// The command `run`.
+///
+/// # Errors
+/// As [`run`].
+pub fn fly(arguments: &RunArguments) -> Result<bool> {
+    run(arguments, None, None)
+}
+
+/// The command `profile`.
+///
+/// # Errors
+/// As [`run`].
+pub fn profile(arguments: &ProfileArguments) -> Result<bool> {
+    let files = Files { trace: arguments.trace.clone(), html: arguments.html.clone() };
+    run(&arguments.run, Some(files), None)
+}
+
 /// Flies a manifest, profiled where `files` are given, with an `extra_shadow` (a process, and TOML with what the shadow
 /// has otherwise) where one is asked for; false if a condition did not hold.
 pub fn run(

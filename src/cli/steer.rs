@@ -63,8 +63,8 @@ impl CtlVerb {
 ///
 /// # Errors
 /// If there is no such run, or it refuses.
-pub fn ctl(arguments: &CtlArguments) -> Result<()> {
-    ask(arguments.run.as_deref(), &arguments.verb.request(), arguments.json)
+pub fn ctl(arguments: &CtlArguments) -> Result<bool> {
+    ask(arguments.run.as_deref(), &arguments.verb.request(), arguments.json).map(|()| true)
 }
 
 /// The arguments of `hummingbus swap`.
@@ -94,14 +94,14 @@ pub struct SwapArguments {
 ///
 /// # Errors
 /// If there is no such run, the successor's description is no TOML, or the run refuses.
-pub fn swap(arguments: &SwapArguments) -> Result<()> {
+pub fn swap(arguments: &SwapArguments) -> Result<bool> {
     let request = Request::Swap {
         process: arguments.process.clone(),
         with: description(&arguments.with)?,
         shadow_ticks: arguments.shadow_ticks,
         at_tick: arguments.at_tick,
     };
-    ask(arguments.run.as_deref(), &request, arguments.json)
+    ask(arguments.run.as_deref(), &request, arguments.json).map(|()| true)
 }
 
 /// The TOML text that `words` are, or that the file of this name holds.

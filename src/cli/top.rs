@@ -38,18 +38,15 @@ pub struct TopArguments {
 ///
 /// # Errors
 /// If there is no such run, or no terminal to show it in.
-pub fn top(arguments: &TopArguments) -> Result<()> {
+pub fn top(arguments: &TopArguments) -> Result<bool> {
     if !arguments.once && !std::io::stdout().is_terminal() {
         bail!("standard output is no terminal: `hummingbus top --once` prints what it sees and ends");
     }
     let run = Arc::new(find_live(arguments.run.as_deref())?);
     if arguments.once {
         let view = top::look(&run)?;
-        return print_text(&if arguments.json {
-            serde_json::to_string_pretty(&view)?
-        } else {
-            view.to_string()
-        });
+        let text = if arguments.json { serde_json::to_string_pretty(&view)? } else { view.to_string() };
+        return print_text(&text).map(|()| true);
     }
     let is_terminated = Arc::new(AtomicBool::new(false));
     let flag = is_terminated.clone();
@@ -61,5 +58,5 @@ pub fn top(arguments: &TopArguments) -> Result<()> {
         top::restore_terminal();
         std::process::exit(1);
     })?;
-    top::watch(&run, &is_terminated)
+    top::watch(&run, &is_terminated).map(|()| true)
 }

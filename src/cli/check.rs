@@ -1,0 +1,30 @@
+//! The command `check`.
+
+use super::output::{print_text, print_warnings};
+use anyhow::Result;
+use clap::Args;
+use std::path::PathBuf;
+
+/// What `check` takes.
+#[derive(Args)]
+pub struct CheckArguments {
+    /// The manifest.
+    manifest: PathBuf,
+    /// Override a key of the manifest.
+    #[arg(long, value_name = "KEY=VALUE")]
+    set: Vec<String>,
+    /// Print the graph as JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+/// Checks a manifest and prints its graph.
+///
+/// # Errors
+/// What is wrong with it.
+pub fn check(arguments: &CheckArguments) -> Result<bool> {
+    let checked = crate::check(&arguments.manifest, &arguments.set)?;
+    print_warnings(checked.warnings());
+    print_text(&if arguments.json { checked.json() } else { checked.to_string() })?;
+    Ok(true)
+}

@@ -1,0 +1,40 @@
+//! The command `shadow`.
+
+use super::output::print_text;
+use super::run::{RunArguments, run};
+use super::steer;
+use anyhow::{Result, bail};
+use clap::Args;
+use recorder::reader::Recording;
+
+/// What `shadow` takes.
+#[derive(Args)]
+pub struct ShadowArguments {
+    #[command(flatten)]
+    run: RunArguments,
+    /// The process to shadow; left out where a recording is read.
+    #[arg(long)]
+    process: Option<String>,
+    /// What the shadow has otherwise: a TOML file, or TOML text, with the keys of a process in a manifest.
+    #[arg(long, value_name = "FILE|TOML", default_value = "")]
+    with: String,
+}
+
+/// Flies a manifest with a shadow more, or tells what the shadows of a recording did otherwise.
+///
+/// # Errors
+/// As `run`; or a recording cannot be read.
+pub fn shadow(arguments: &ShadowArguments) -> Result<bool> {
+    let path = &arguments.run.manifest;
+    match (&arguments.process, path.extension().is_some_and(|extension| extension == "mcap")) {
+        (Some(process), false) => {
+            let with = steer::description(&arguments.with)?;
+            run(&arguments.run, None, Some((process, &with)))
+        }
+        (None, true) => print_text(&report::shadow::report(&Recording::open(path)?)?).map(|()| true),
+        (None, false) => bail!("name the process to shadow: --process NAME; or give a recording (.mcap)"),
+        (Some(_), true) => {
+            bail!("{} is a recording: leave --process out, or give a manifest", path.display())
+        }
+    }
+}
