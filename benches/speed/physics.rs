@@ -58,13 +58,13 @@ fn model() -> Result<NewtonEuler> {
 
 fn free_flight() -> Result<Box<dyn Backend>> {
     let model = model()?;
-    let memory = model.airframe().memory(0, "plant", DT_S);
+    let memory = model.airframe().initial_state(0, "plant", DT_S);
     Ok(Box::new(FreeFlight::new(model, RigidBody::level_at(Vector3::z()), memory)))
 }
 
 fn rapier(scene: &Scene) -> Result<Box<dyn Backend>> {
     let model = model()?;
-    let memory = model.airframe().memory(0, "plant", DT_S);
+    let memory = model.airframe().initial_state(0, "plant", DT_S);
     Ok(Box::new(Rapier::new(model, memory, scene, &RigidBody::level_at(Vector3::z()), 1.0)))
 }
 

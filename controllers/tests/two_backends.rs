@@ -82,13 +82,13 @@ fn start(plant: &mut dyn Backend) {
 
 fn free_flight(substeps: u32) -> Box<dyn Backend> {
     let model = NewtonEuler::new(vehicle(), substeps);
-    let memory = model.airframe().memory(0, "plant", TICK_S);
+    let memory = model.airframe().initial_state(0, "plant", TICK_S);
     Box::new(FreeFlight::new(model, RigidBody::level_at(Vector3::z()), memory))
 }
 
 fn rapier(substeps: u32) -> Box<dyn Backend> {
     let model = NewtonEuler::new(vehicle(), substeps);
-    let memory = model.airframe().memory(0, "plant", TICK_S);
+    let memory = model.airframe().initial_state(0, "plant", TICK_S);
     Box::new(Rapier::new(model, memory, &Scene::default(), &RigidBody::level_at(Vector3::z()), 1.0))
 }
 

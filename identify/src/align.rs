@@ -6,10 +6,11 @@
 //! one lags. What the attitudes of all flights share is left to the candidate `sensor-delay`; what a single one has beyond
 //! that is taken off, and so is what position and velocity have beyond it.
 
-use crate::fit::{Bench, Weights};
+use crate::clock::Lateness;
+use crate::fit::{Problem, Weights};
 use crate::normal::{self, Block};
-use crate::parameter::{Owner, SensorParameter};
 use crate::prepared::{Equation, Prepared, Translation};
+use crate::sensor_effects::POSE_DELAY;
 use rayon::prelude::*;
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -49,17 +50,6 @@ impl Offset {
     }
 }
 
-/// What is taken off the clocks of one flight.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub struct Lateness {
-    /// Lateness of the attitude in s.
-    pub attitude_s: f64,
-    /// Lateness of the position in s.
-    pub position_s: f64,
-    /// Lateness of the velocity in s.
-    pub velocity_s: f64,
-}
-
 /// Offsets by channel; `None` where the flight has not what it takes, or too little of it.
 pub type Offsets = BTreeMap<&'static str, Option<Offset>>;
 
@@ -92,15 +82,14 @@ impl Found {
 }
 
 /// The attitude's offset from the gyroscope.
-fn of_attitude(bench: &Bench, flight: &Prepared) -> Option<Found> {
+fn of_attitude(problem: &Problem, flight: &Prepared) -> Option<Found> {
     flight.offset_of(Equation::Gyroscope)?;
-    let is_pose = |owner: &Owner| matches!(owner, Owner::Sensor(SensorParameter::PoseDelay));
-    let parameter = bench.model.parameters.all.iter().position(|own| is_pose(&own.owner))?;
-    let mut values = bench.model.parameters.declared();
+    let parameter = problem.model.parameters.all.iter().position(|own| *own.kind == POSE_DELAY)?;
+    let mut values = problem.model.parameters.baseline();
     let between_s = BETWEEN_SAMPLES * flight.flight.attitude.period_s().unwrap_or(0.0);
     descended(between_s, |late_s| {
         values[parameter] = late_s;
-        bench.blocks_of(flight, &values, &[parameter])
+        problem.blocks_of(flight, &values, &[parameter])
     })
 }
 
@@ -108,18 +97,18 @@ fn of_attitude(bench: &Bench, flight: &Prepared) -> Option<Found> {
 /// What is moved is the inertial side: a position's second derivative is noise for the most part, and that of a moved one
 /// would depend on how its samples lie on the grid.
 fn of_translation(
-    bench: &Bench,
+    problem: &Problem,
     flight: &Prepared,
     translation: Translation,
     attitude_s: f64,
 ) -> Option<Found> {
     const ASIDE_S: f64 = 1e-3;
-    let gravity_m_s2 = bench.model.vehicle.gravity_m_s2;
+    let gravity_m_s2 = problem.model.vehicle.gravity_m_s2;
     let rows = flight.translation_rows(translation)?;
     flight.offset_of(Equation::SpecificForce)?;
     let periods = [flight.flight.attitude.period_s(), flight.flight.specific_force.period_s()];
     let between_s = BETWEEN_SAMPLES * periods.into_iter().flatten().fold(0.0, f64::max);
-    let blocks = bench.block_knots(flight);
+    let blocks = problem.block_knots(flight);
     descended(between_s, |late_s| {
         let inertial = |aside_s: f64| {
             let moved_s = -late_s - aside_s;
@@ -152,7 +141,7 @@ fn descended(between_s: f64, mut blocks_at: impl FnMut(f64) -> Vec<Block>) -> Op
         }
         let step_s = -(normal::inverse(&total.gram) * &total.gradient)[0];
         let deviation_s = normal::covariance(&blocks)[(0, 0)].max(0.0).sqrt();
-        // How samples lie on the grid makes waves in the squares, over whose troughs a whole step can go to and fro.
+        // How samples lie on the grid makes waves in the cost, over whose troughs a whole step can go to and fro.
         if step_s * last_s < 0.0 {
             reach_s = last_s.abs() / 2.0;
         }
@@ -181,10 +170,10 @@ struct Clocks {
 }
 
 impl Clocks {
-    fn of(bench: &Bench, flight: &Prepared) -> Self {
-        let attitude = of_attitude(bench, flight);
+    fn of(problem: &Problem, flight: &Prepared) -> Self {
+        let attitude = of_attitude(problem, flight);
         // Without a gyroscope nobody knows which of the two is late.
-        let of = |translation| of_translation(bench, flight, translation, attitude?.late_s);
+        let of = |translation| of_translation(problem, flight, translation, attitude?.late_s);
         Self { attitude, position: of(Translation::Position), velocity: of(Translation::Velocity) }
     }
 
@@ -204,16 +193,17 @@ impl Clocks {
 /// Takes off each flight's attitude what it is late beyond the mean of the fit flights, and its position and its velocity
 /// what they are late beyond that mean if they are apart from the attitude; they come with it if they are not. Only what
 /// is sure is taken off. Says what was found for each flight of `fit` and then of `test`.
-pub fn align(bench: &mut Bench) -> Vec<(String, Offsets)> {
-    let weights = std::mem::replace(&mut bench.weights, kinematic_weights());
-    let flights: Vec<&Prepared> = bench.fit.iter().chain(&bench.test).collect();
-    let clocks: Vec<Clocks> = flights.par_iter().map(|flight| Clocks::of(bench, flight)).collect();
-    bench.weights = weights;
-    let of_fit: Vec<Found> = clocks[..bench.fit.len()].iter().filter_map(|own| own.attitude).collect();
+pub fn align(problem: &mut Problem) -> Vec<(String, Offsets)> {
+    let weights = std::mem::replace(&mut problem.weights, kinematic_weights());
+    let flights: Vec<&Prepared> = problem.estimation.iter().chain(&problem.validation).collect();
+    let clocks: Vec<Clocks> = flights.par_iter().map(|flight| Clocks::of(problem, flight)).collect();
+    problem.weights = weights;
+    let of_fit: Vec<Found> =
+        clocks[..problem.estimation.len()].iter().filter_map(|own| own.attitude).collect();
     let shared = Found::mean(&of_fit);
-    let least_s = bench.least_delay_s() / 2.0;
+    let least_s = problem.least_delay_s() / 2.0;
     let mut offsets = Vec::new();
-    for (flight, own) in bench.fit.iter_mut().chain(&mut bench.test).zip(clocks) {
+    for (flight, own) in problem.estimation.iter_mut().chain(&mut problem.validation).zip(clocks) {
         let late = own.taken_off(&shared, least_s);
         flight.set_late(late);
         let offset = |found: Option<Found>, taken_off_s| found.map(|found| Offset::of(found, taken_off_s));

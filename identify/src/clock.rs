@@ -1,4 +1,4 @@
-//! The grid of instants on which measured and modelled quantities are compared.
+//! The grid of instants on which measured and modelled quantities are compared, and clocks that are late on it.
 
 /// Instants at equal steps.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -29,4 +29,15 @@ impl Clock {
     pub fn at(&self, index: usize) -> f64 {
         self.start_s + index as f64 * self.step_s
     }
+}
+
+/// What is taken off the clocks of one flight.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Lateness {
+    /// Lateness of the attitude in s.
+    pub attitude_s: f64,
+    /// Lateness of the position in s.
+    pub position_s: f64,
+    /// Lateness of the velocity in s.
+    pub velocity_s: f64,
 }

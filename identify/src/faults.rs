@@ -3,7 +3,7 @@
 //! A measured speed that disagrees with its command is either wrong or a rotor that really turns so. The vehicle's own
 //! motion decides: whichever of the two speeds explains the measured forces and torques better is believed.
 
-use crate::fit::Bench;
+use crate::fit::Problem;
 use crate::prepared::{Equation, Prepared};
 use serde::Serialize;
 
@@ -25,16 +25,16 @@ pub struct Fault {
     pub consequence: &'static str,
 }
 
-/// Looks for faults of the rotors, and has the bench distrust the sensors that have one.
-pub fn find(bench: &mut Bench) -> Vec<Fault> {
+/// Looks for faults of the rotors, and has the problem distrust the sensors that have one.
+pub fn find(problem: &mut Problem) -> Vec<Fault> {
     let mut faults = Vec::new();
     for rotor in 0..4 {
-        let Some(suspicion) = suspicion(bench, rotor) else { continue };
-        let trusting = motion_squares(bench);
-        distrust(bench, rotor, true);
-        let distrusting = motion_squares(bench);
+        let Some(suspicion) = suspicion(problem, rotor) else { continue };
+        let trusting = motion_cost(problem);
+        distrust(problem, rotor, true);
+        let distrusting = motion_cost(problem);
         let is_sensor = distrusting < trusting;
-        distrust(bench, rotor, is_sensor);
+        distrust(problem, rotor, is_sensor);
         let channel = format!("rotor_speed.{}", rotor + 1);
         let evidence = format!(
             "{}; the measured motion is {} explained by the commanded speed (squared residual {:.3} of that with the \
@@ -59,8 +59,8 @@ struct Suspicion {
     finding: String,
 }
 
-fn suspicion(bench: &Bench, rotor: usize) -> Option<Suspicion> {
-    let pairs = speeds(bench)?;
+fn suspicion(problem: &Problem, rotor: usize) -> Option<Suspicion> {
+    let pairs = speeds(problem)?;
     let of = |rotor: usize| -> (Vec<f64>, Vec<f64>) {
         pairs.iter().map(|pair| (pair.0[rotor], pair.1[rotor])).unzip()
     };
@@ -84,13 +84,13 @@ fn suspicion(bench: &Bench, rotor: usize) -> Option<Suspicion> {
 }
 
 /// Measured and expected speeds of all rotors at all knots of all flights; `None` where no flight has both.
-fn speeds(bench: &Bench) -> Option<Vec<([f64; 4], [f64; 4])>> {
-    let declared = bench.model.parameters.declared();
+fn speeds(problem: &Problem) -> Option<Vec<([f64; 4], [f64; 4])>> {
+    let declared = problem.model.parameters.baseline();
     let mut pairs = Vec::new();
-    for flight in bench.fit.iter().chain(&bench.test) {
+    for flight in problem.estimation.iter().chain(&problem.validation) {
         let Some(offset) = flight.offset_of(Equation::RotorSpeed) else { continue };
-        let rows = bench.model.tracks(flight, &declared).rows;
-        let rotors = bench.model.rotors(flight, &declared);
+        let rows = problem.model.tracks(flight, &declared).rows;
+        let rotors = problem.model.rotors(flight, &declared);
         for (at, knot) in flight.layout.knots.iter().enumerate() {
             let first = at * flight.width() + offset;
             pairs.push((std::array::from_fn(|i| rows[first + i]), rotors.commanded[*knot]));
@@ -104,21 +104,21 @@ fn spread(values: &[f64]) -> f64 {
     (values.iter().map(|value| (value - mean).powi(2)).sum::<f64>() / values.len() as f64).sqrt()
 }
 
-fn distrust(bench: &mut Bench, rotor: usize, is_distrusted: bool) {
-    for flight in bench.fit.iter_mut().chain(&mut bench.test) {
+fn distrust(problem: &mut Problem, rotor: usize, is_distrusted: bool) {
+    for flight in problem.estimation.iter_mut().chain(&mut problem.validation) {
         flight.distrusted[rotor] = is_distrusted;
     }
 }
 
 /// Squared residual of forces and torques, each in units of its measured size.
-fn motion_squares(bench: &Bench) -> f64 {
-    let declared = bench.model.parameters.declared();
-    bench.fit.iter().map(|flight| flight_squares(bench, flight, &declared)).sum()
+fn motion_cost(problem: &Problem) -> f64 {
+    let declared = problem.model.parameters.baseline();
+    problem.estimation.iter().map(|flight| flight_cost(problem, flight, &declared)).sum()
 }
 
-fn flight_squares(bench: &Bench, flight: &Prepared, declared: &[f64]) -> f64 {
-    let residual = bench.model.residual_under(flight, declared);
-    let measured = bench.model.tracks(flight, declared).rows;
+fn flight_cost(problem: &Problem, flight: &Prepared, declared: &[f64]) -> f64 {
+    let residual = problem.model.residual_under(flight, declared);
+    let measured = problem.model.tracks(flight, declared).rows;
     let of_motion = |equation: &Equation| !matches!(equation, Equation::RotorSpeed | Equation::Gyroscope);
     let mut sum = 0.0;
     for equation in flight.layout.equations.iter().filter(|equation| of_motion(equation)) {

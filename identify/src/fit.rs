@@ -8,7 +8,7 @@ use crate::candidate::Candidate;
 use crate::model::Model;
 use crate::normal::{self, Block};
 use crate::prepared::{Equation, Prepared};
-use crate::trim;
+use crate::rows::{keep_means, take_off_means};
 use nalgebra::{DMatrix, DVector};
 use std::collections::BTreeMap;
 
@@ -20,15 +20,15 @@ const STEPS_MAX: usize = 12;
 /// A fit is done when a step changes every parameter by less than this part of its standard deviation.
 const SMALL_STEP: f64 = 0.02;
 
-/// Flights, the model that they are held against, and how.
+/// An estimation problem: flights, the model that they are held against, and how.
 #[derive(Debug)]
-pub struct Bench<'f> {
+pub struct Problem<'f> {
     /// The model.
     pub model: Model,
-    /// Flights that parameters are fitted on.
-    pub fit: Vec<Prepared<'f>>,
-    /// Flights that errors are judged on.
-    pub test: Vec<Prepared<'f>>,
+    /// Estimation data: flights that parameters are fitted on.
+    pub estimation: Vec<Prepared<'f>>,
+    /// Validation data: flights that errors are judged on.
+    pub validation: Vec<Prepared<'f>>,
     /// How much each component counts.
     pub weights: Weights,
     /// Length of the blocks that count as independent.
@@ -37,69 +37,68 @@ pub struct Bench<'f> {
     pub has_own_trims: bool,
 }
 
-/// Parameters fitted.
+/// What came of a fit.
 #[derive(Debug, Clone)]
-pub struct Fitted {
+pub struct FitResult {
     /// All values, those that were held included.
     pub values: Vec<f64>,
-    /// The parameters that were fitted.
-    pub which: Vec<usize>,
+    /// The free parameters, which were fitted.
+    pub free: Vec<usize>,
     /// Their covariance.
     pub covariance: DMatrix<f64>,
-    /// Weighted sums of squares of the blocks of the test flights.
-    pub test_squares: Vec<f64>,
-    /// Weighted sums of squares of the blocks of the fit flights.
-    pub fit_squares: Vec<f64>,
+    /// Weighted sums of squares of the blocks of the validation data.
+    pub validation_costs: Vec<f64>,
+    /// Weighted sums of squares of the blocks of the estimation data.
+    pub estimation_costs: Vec<f64>,
 }
 
-impl Fitted {
-    /// Sum of the squares of the test flights.
+impl FitResult {
+    /// Sum of the squares of the validation data.
     #[must_use]
-    pub fn test_sum(&self) -> f64 {
-        self.test_squares.iter().sum()
+    pub fn validation_cost(&self) -> f64 {
+        self.validation_costs.iter().sum()
     }
 
-    /// Sum of the squares of the fit flights.
+    /// Sum of the squares of the estimation data.
     #[must_use]
-    pub fn fit_sum(&self) -> f64 {
-        self.fit_squares.iter().sum()
+    pub fn estimation_cost(&self) -> f64 {
+        self.estimation_costs.iter().sum()
     }
 
-    /// Standard deviation of a parameter; `None` where it was held.
+    /// Standard error of a parameter; `None` where it was held.
     #[must_use]
-    pub fn deviation(&self, parameter: usize) -> Option<f64> {
-        let at = self.which.iter().position(|own| *own == parameter)?;
+    pub fn standard_error(&self, parameter: usize) -> Option<f64> {
+        let at = self.free.iter().position(|own| *own == parameter)?;
         Some(self.covariance[(at, at)].max(0.0).sqrt())
     }
 }
 
-impl Bench<'_> {
-    /// Fits the parameters `which`, starting from `start`.
+impl Problem<'_> {
+    /// Fits the parameters `free`, starting from `start`.
     #[must_use]
-    pub fn fitted(&self, start: &[f64], which: &[usize]) -> Fitted {
+    pub fn fitted(&self, start: &[f64], free: &[usize]) -> FitResult {
         let mut values = start.to_vec();
-        let mut blocks = self.blocks(&self.fit, &values, which);
-        let mut squares = normal::sum(&blocks).squares;
+        let mut blocks = self.blocks(&self.estimation, &values, free);
+        let mut cost = normal::sum(&blocks).cost;
         for _ in 0..STEPS_MAX {
-            let step = self.step(&blocks, &values, which);
-            if which.is_empty() || self.is_small(&step, &blocks) {
+            let step = self.step(&blocks, &values, free);
+            if free.is_empty() || self.is_small(&step, &blocks) {
                 break;
             }
-            let Some((next, next_blocks, next_squares)) = self.descended(&values, which, &step, squares)
-            else {
+            let Some((next, next_blocks, next_cost)) = self.descended(&values, free, &step, cost) else {
                 break;
             };
             (values, blocks) = (next, next_blocks);
-            let gain = squares - next_squares;
-            squares = next_squares;
-            if gain < 1e-9 * squares {
+            let gain = cost - next_cost;
+            cost = next_cost;
+            if gain < 1e-9 * cost {
                 break;
             }
         }
         let covariance = normal::covariance(&blocks);
-        let test_squares = self.squares(&self.test, &values);
-        let fit_squares = blocks.iter().map(|block| block.squares).collect();
-        Fitted { values, which: which.to_vec(), covariance, test_squares, fit_squares }
+        let validation_costs = self.costs(&self.validation, &values);
+        let estimation_costs = blocks.iter().map(|block| block.cost).collect();
+        FitResult { values, free: free.to_vec(), covariance, validation_costs, estimation_costs }
     }
 
     /// Whether a step is a small part of every parameter's standard deviation, if all rows were independent.
@@ -114,16 +113,16 @@ impl Bench<'_> {
     fn descended(
         &self,
         values: &[f64],
-        which: &[usize],
+        free: &[usize],
         step: &DVector<f64>,
-        squares: f64,
+        cost: f64,
     ) -> Option<(Vec<f64>, Vec<Block>, f64)> {
         let mut share = 1.0;
         for _ in 0..5 {
-            let next = self.moved(values, which, &(step * share));
-            let blocks = self.blocks(&self.fit, &next, which);
-            let sum = normal::sum(&blocks).squares;
-            if sum < squares {
+            let next = self.moved(values, free, &(step * share));
+            let blocks = self.blocks(&self.estimation, &next, free);
+            let sum = normal::sum(&blocks).cost;
+            if sum < cost {
                 return Some((next, blocks, sum));
             }
             share /= 4.0;
@@ -134,18 +133,18 @@ impl Bench<'_> {
     /// The Gauss-Newton step within the bounds: a parameter that would leave them stops there, and the others are
     /// fitted to that.
     #[must_use]
-    pub fn step(&self, blocks: &[Block], values: &[f64], which: &[usize]) -> DVector<f64> {
+    pub fn step(&self, blocks: &[Block], values: &[f64], free: &[usize]) -> DVector<f64> {
         let total = normal::sum(blocks);
-        let mut held: Vec<Option<f64>> = vec![None; which.len()];
-        let mut step = DVector::zeros(which.len());
-        for _ in 0..=which.len() {
+        let mut held: Vec<Option<f64>> = vec![None; free.len()];
+        let mut step = DVector::zeros(free.len());
+        for _ in 0..=free.len() {
             step = held_step(&total, &held);
             let mut is_within = true;
-            for (at, parameter) in which.iter().enumerate() {
+            for (at, parameter) in free.iter().enumerate() {
                 let own = &self.model.parameters.all[*parameter];
                 let wanted = values[*parameter] + step[at];
-                let bound = wanted.clamp(own.lower, own.upper);
-                if held[at].is_none() && (bound - wanted).abs() > 1e-12 * (own.upper - own.lower) {
+                let bound = wanted.clamp(own.spec().min, own.spec().max);
+                if held[at].is_none() && (bound - wanted).abs() > 1e-12 * (own.spec().max - own.spec().min) {
                     held[at] = Some(bound - values[*parameter]);
                     is_within = false;
                 }
@@ -159,30 +158,30 @@ impl Bench<'_> {
 
     /// The values after a step, within their bounds.
     #[must_use]
-    pub fn moved(&self, values: &[f64], which: &[usize], step: &DVector<f64>) -> Vec<f64> {
+    pub fn moved(&self, values: &[f64], free: &[usize], step: &DVector<f64>) -> Vec<f64> {
         let mut next = values.to_vec();
-        for (parameter, step) in which.iter().zip(step.iter()) {
+        for (parameter, step) in free.iter().zip(step.iter()) {
             let own = &self.model.parameters.all[*parameter];
-            next[*parameter] = (next[*parameter] + step).clamp(own.lower, own.upper);
+            next[*parameter] = (next[*parameter] + step).clamp(own.spec().min, own.spec().max);
         }
         next
     }
 
     /// The normal equations of all blocks of `flights`.
     #[must_use]
-    pub fn blocks(&self, flights: &[Prepared], values: &[f64], which: &[usize]) -> Vec<Block> {
-        flights.iter().flat_map(|flight| self.blocks_of(flight, values, which)).collect()
+    pub fn blocks(&self, flights: &[Prepared], values: &[f64], free: &[usize]) -> Vec<Block> {
+        flights.iter().flat_map(|flight| self.blocks_of(flight, values, free)).collect()
     }
 
-    /// The model's residual and its derivatives, without what this bench does not compare: the means of angular
+    /// The model's residual and its derivatives, without what this problem does not compare: the means of angular
     /// accelerations where flights have trims of their own, all but their means where the attitude was assumed.
-    fn linearised(&self, flight: &Prepared, values: &[f64], which: &[usize]) -> (Vec<f64>, Vec<Vec<f64>>) {
-        let (mut residual, mut columns) = self.model.linearised(flight, values, which);
+    fn linearised(&self, flight: &Prepared, values: &[f64], free: &[usize]) -> (Vec<f64>, Vec<Vec<f64>>) {
+        let (mut residual, mut columns) = self.model.linearised(flight, values, free);
         for rows in std::iter::once(&mut residual).chain(&mut columns) {
             if flight.is_assumed() {
-                trim::keep_means(flight, rows, &self.block_knots(flight));
+                keep_means(flight, rows, &self.block_knots(flight));
             } else if self.has_own_trims {
-                trim::take_off(flight, rows);
+                take_off_means(flight, rows);
             }
         }
         (residual, columns)
@@ -190,15 +189,15 @@ impl Bench<'_> {
 
     /// The normal equations of the blocks of one flight.
     #[must_use]
-    pub fn blocks_of(&self, flight: &Prepared, values: &[f64], which: &[usize]) -> Vec<Block> {
-        let (residual, columns) = self.linearised(flight, values, which);
+    pub fn blocks_of(&self, flight: &Prepared, values: &[f64], free: &[usize]) -> Vec<Block> {
+        let (residual, columns) = self.linearised(flight, values, free);
         self.flight_blocks(flight, &residual, &columns)
     }
 
     /// The weighted sums of squares of all blocks of `flights`.
     #[must_use]
-    pub fn squares(&self, flights: &[Prepared], values: &[f64]) -> Vec<f64> {
-        self.blocks(flights, values, &[]).iter().map(|block| block.squares).collect()
+    pub fn costs(&self, flights: &[Prepared], values: &[f64]) -> Vec<f64> {
+        self.blocks(flights, values, &[]).iter().map(|block| block.cost).collect()
     }
 
     fn flight_blocks(&self, flight: &Prepared, residual: &[f64], columns: &[Vec<f64>]) -> Vec<Block> {
@@ -265,34 +264,32 @@ fn held_step(total: &Block, held: &[Option<f64>]) -> DVector<f64> {
 /// A component without any noise would count infinitely: no sensor is better than this part of its own signal.
 const LEAST_NOISE: f64 = 1e-4;
 
-impl Bench<'_> {
+impl Problem<'_> {
     /// Sets the weights by the variance that is left on the fit flights when, from `base` on, all of `candidates` take
     /// the step that fits best.
-    pub fn weigh(&mut self, base: &Fitted, candidates: &[Candidate]) {
-        let mut all = base.which.clone();
+    pub fn weigh(&mut self, base: &FitResult, candidates: &[Candidate]) {
+        let mut all = base.free.clone();
         // Torques of an assumed attitude are zero, to which any scale of thrust or inertia could shrink the model's.
-        let is_assumed = self.fit.iter().any(Prepared::is_assumed);
-        // Of flapping the tilt is linear, if not the torque.
-        let is_linear = |own: &Candidate| own.starts.is_empty() || own.effect == "blade-flapping";
-        let counts = |own: &&Candidate| is_linear(own) && (!is_assumed || own.effect == "com-offset");
+        let is_assumed = self.estimation.iter().any(Prepared::is_assumed);
+        let counts = |own: &&Candidate| own.kind.is_linear && (!is_assumed || own.is_trim());
         for candidate in candidates.iter().filter(counts) {
-            all.extend(candidate.which.iter().filter(|at| !base.which.contains(at)));
+            all.extend(candidate.free.iter().filter(|at| !base.free.contains(at)));
         }
         for _ in 0..2 {
             if self.weights.is_empty() {
                 self.weights = self.variances(&base.values, &[], &DVector::zeros(0));
             }
-            let total = normal::sum(&self.blocks(&self.fit, &base.values, &all));
+            let total = normal::sum(&self.blocks(&self.estimation, &base.values, &all));
             let step = -(normal::inverse(&total.gram) * &total.gradient);
             self.weights = self.variances(&base.values, &all, &step);
         }
     }
 
     /// One over the variance of each component after a step.
-    fn variances(&self, values: &[f64], which: &[usize], step: &DVector<f64>) -> Weights {
+    fn variances(&self, values: &[f64], free: &[usize], step: &DVector<f64>) -> Weights {
         let mut sums: BTreeMap<(&'static str, usize), (f64, f64, f64)> = BTreeMap::new();
-        for flight in &self.fit {
-            let (residual, columns) = self.linearised(flight, values, which);
+        for flight in &self.estimation {
+            let (residual, columns) = self.linearised(flight, values, free);
             let measured = self.model.tracks(flight, values).rows;
             let width = flight.width();
             let equations = flight.layout.equations.iter();
@@ -305,8 +302,8 @@ impl Bench<'_> {
                 *sum = (sum.0 + left * left, sum.1 + measured[at] * measured[at], sum.2 + 1.0);
             }
         }
-        let weight = |(squares, signal, count): (f64, f64, f64)| {
-            let variance = (squares + LEAST_NOISE * LEAST_NOISE * signal) / count;
+        let weight = |(cost, signal, count): (f64, f64, f64)| {
+            let variance = (cost + LEAST_NOISE * LEAST_NOISE * signal) / count;
             if variance > 0.0 { 1.0 / variance } else { 0.0 }
         };
         sums.into_iter().map(|(name, sum)| (name, weight(sum))).collect()
@@ -316,8 +313,8 @@ impl Bench<'_> {
     /// linearised equations: those by which the weights were set. Delays, lags and the battery are far from linear and do
     /// not count.
     #[must_use]
-    pub fn left(&self, fitted: &Fitted) -> f64 {
-        fitted.fit_sum() / self.rows(&self.fit) as f64
+    pub fn left(&self, fitted: &FitResult) -> f64 {
+        fitted.estimation_cost() / self.rows(&self.estimation) as f64
     }
 
     /// How many rows of `flights` count, at least one.
@@ -333,7 +330,7 @@ impl Bench<'_> {
     /// The shortest delay that the grids can tell from none.
     #[must_use]
     pub fn least_delay_s(&self) -> f64 {
-        let flights = self.fit.iter().chain(&self.test);
+        let flights = self.estimation.iter().chain(&self.validation);
         0.5 * flights.map(|flight| flight.layout.clock.step_s).fold(0.0, f64::max)
     }
 }

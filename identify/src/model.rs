@@ -1,12 +1,13 @@
 //! What the model says of a flight: the rows of every equation under given parameters.
 #![allow(non_snake_case, reason = "a trailing _W or _B names the frame a vector is written in")]
 
-use crate::parameter::{Parameters, Stage};
+use crate::parameter::Parameters;
 use crate::prepared::{Equation, Held, Prepared, Tracks};
 use crate::sensing::SensorErrors;
 use crate::track::Track;
 use nalgebra::Vector3;
-use plant::{Airframe, Drive, NewtonEuler, RigidBody, RotorState, State};
+use plant::effects::Stage;
+use plant::{Actuation, Airframe, NewtonEuler, RigidBody, RotorState, State};
 use vehicles::Vehicle;
 
 /// The motors are simulated in steps of at most this length.
@@ -102,7 +103,7 @@ impl Model {
 
     fn sides(&self, flight: &Prepared, tracks: &Tracks, rotors: &Rotors, values: &[f64]) -> Sides {
         let airframe = self.airframe(values);
-        let drive = air(&airframe, flight.layout.clock.step_s);
+        let actuation = air(&airframe, flight.layout.clock.step_s);
         let model = NewtonEuler::flying(airframe, 1);
         let mounting = SensorErrors::of(&self.parameters, values).mounting();
         let gravity_m_s2 = model.vehicle().gravity_m_s2;
@@ -116,7 +117,7 @@ impl Model {
                 attitude_WB,
                 angular_velocity_B_rad_s: tracks.rates[i].into(),
             };
-            let motion = model.motion_under(&drive, &State { body, rotors: rotors.flown[i] });
+            let motion = model.accelerations_under(&actuation, &State { body, rotors: rotors.flown[i] });
             sides.force_B.push(motion.specific_force_B_m_s2.into());
             sides.angular_B.push(motion.angular_acceleration_B_rad_s2.into());
             if has_world {
@@ -128,25 +129,20 @@ impl Model {
         sides
     }
 
-    /// The residual under `values`, and its derivative by each parameter of `which`: one column each.
+    /// The residual under `values`, and its derivative by each parameter of `free`: one column each.
     #[must_use]
-    pub fn linearised(
-        &self,
-        flight: &Prepared,
-        values: &[f64],
-        which: &[usize],
-    ) -> (Vec<f64>, Vec<Vec<f64>>) {
+    pub fn linearised(&self, flight: &Prepared, values: &[f64], free: &[usize]) -> (Vec<f64>, Vec<Vec<f64>>) {
         let tracks = self.tracks(flight, values);
         let rotors = self.rotors(flight, values);
         let residual = self.residual(flight, &tracks, &rotors, values);
         let column = |&parameter: &usize| {
             let own = &self.parameters.all[parameter];
             let mut changed = values.to_vec();
-            let up = values[parameter] + own.step <= own.upper;
+            let up = values[parameter] + own.step <= own.spec().max;
             let step = if up { own.step } else { -own.step };
             changed[parameter] += step;
-            let moved = match own.stage() {
-                Stage::Tracks => {
+            let moved = match own.kind.stage {
+                Stage::Sampling => {
                     // The derivative holds the sensor's noise as well: of a difference to one side it would be
                     // correlated with the residual's, and every delay would come out too long.
                     let mut back = values.to_vec();
@@ -156,12 +152,12 @@ impl Model {
                     return ahead.iter().zip(&behind).map(|(a, b)| (a - b) / (2.0 * step)).collect();
                 }
                 Stage::Rotors => self.residual(flight, &tracks, &self.rotors(flight, &changed), &changed),
-                Stage::Body | Stage::Reading => self.residual(flight, &tracks, &rotors, &changed),
+                Stage::Body => self.residual(flight, &tracks, &rotors, &changed),
             };
             moved.iter().zip(&residual).map(|(moved, own)| (moved - own) / step).collect()
         };
         use rayon::prelude::*;
-        let columns = which.par_iter().map(column).collect();
+        let columns = free.par_iter().map(column).collect();
         (residual, columns)
     }
 
@@ -181,9 +177,9 @@ struct Sides {
 }
 
 /// How the air moves: what the steady effects make of it, which is the same at every instant.
-fn air(airframe: &Airframe, step_s: f64) -> Drive {
+fn air(airframe: &Airframe, step_s: f64) -> Actuation {
     let state = State { body: RigidBody::level_at(Vector3::zeros()), rotors: [RotorState::default(); 4] };
-    airframe.begin_tick(&mut airframe.memory(0, "identify", step_s), &state, &[0.0; 4], step_s)
+    airframe.begin_tick(&mut airframe.initial_state(0, "identify", step_s), &state, &[0.0; 4], step_s)
 }
 
 /// The rotors that follow from the commands: simulated in fine steps, averaged over one step about each instant.
@@ -197,7 +193,7 @@ fn spun(airframe: &Airframe, flight: &Prepared) -> Vec<[RotorState; 4]> {
     let start_s = clock.at(0) - clock.step_s / 2.0;
     let at_s = |step: usize| start_s + step as f64 * step_s;
     let first = commands.at(start_s);
-    let mut memory = airframe.memory(0, "identify", step_s);
+    let mut memory = airframe.initial_state(0, "identify", step_s);
     let rotors = first.map(|command| RotorState::steady(airframe.vehicle().command.speed(command)));
     let mut state = State { body: RigidBody::level_at(Vector3::zeros()), rotors };
     let mut out = Vec::with_capacity(clock.count);
@@ -205,8 +201,8 @@ fn spun(airframe: &Airframe, flight: &Prepared) -> Vec<[RotorState; 4]> {
         let mut sum = [RotorState::default(); 4];
         for part in 0..parts {
             let command = commands.at(at_s(index * parts + part));
-            let drive = airframe.begin_tick(&mut memory, &state, &command, step_s);
-            let after = airframe.spun(&drive, &state.rotors, step_s);
+            let actuation = airframe.begin_tick(&mut memory, &state, &command, step_s);
+            let after = airframe.spun(&actuation, &state.rotors, step_s);
             let half = 0.5 / parts as f64;
             for (sum, (before, after)) in sum.iter_mut().zip(state.rotors.iter().zip(&after)) {
                 sum.speed_rad_s += half * (before.speed_rad_s + after.speed_rad_s);

@@ -1,6 +1,6 @@
 //! What sensors scatter, and what follows from it for a prediction that starts at a measured state.
 
-use crate::fit::Bench;
+use crate::fit::Problem;
 use flights::{Channel, Flight};
 use std::collections::BTreeMap;
 
@@ -17,10 +17,10 @@ pub fn deviation<const N: usize>(channel: &Channel<N>) -> Option<f64> {
 
 /// The noise of each channel that was measured, over the test flights, with its unit.
 #[must_use]
-pub fn floor(bench: &Bench) -> BTreeMap<&'static str, (f64, &'static str)> {
+pub fn floor(problem: &Problem) -> BTreeMap<&'static str, (f64, &'static str)> {
     let mut floor = BTreeMap::new();
     let mut add = |name: &'static str, unit: &'static str, own: &dyn Fn(&Flight) -> Option<f64>| {
-        let found: Vec<f64> = bench.test.iter().filter_map(|flight| own(flight.flight)).collect();
+        let found: Vec<f64> = problem.validation.iter().filter_map(|flight| own(flight.flight)).collect();
         if !found.is_empty() {
             let mean_square = found.iter().map(|own| own * own).sum::<f64>() / found.len() as f64;
             floor.insert(name, (mean_square.sqrt(), unit));

@@ -17,23 +17,19 @@ pub struct Block {
     /// J'Wr.
     pub gradient: DVector<f64>,
     /// r'Wr.
-    pub squares: f64,
+    pub cost: f64,
 }
 
 impl Block {
     /// An empty block for so many parameters.
     #[must_use]
     pub fn zero(parameters: usize) -> Self {
-        Self {
-            gram: DMatrix::zeros(parameters, parameters),
-            gradient: DVector::zeros(parameters),
-            squares: 0.0,
-        }
+        Self { gram: DMatrix::zeros(parameters, parameters), gradient: DVector::zeros(parameters), cost: 0.0 }
     }
 
     /// Adds a row: its residual, its derivatives, its weight.
     pub fn add(&mut self, residual: f64, row: &[f64], weight: f64) {
-        self.squares += weight * residual * residual;
+        self.cost += weight * residual * residual;
         for (i, a) in row.iter().enumerate().filter(|(_, a)| **a != 0.0) {
             self.gradient[i] += weight * a * residual;
             for (j, b) in row[..=i].iter().enumerate() {
@@ -49,12 +45,12 @@ impl Block {
 
     /// The part of it for these parameters.
     #[must_use]
-    pub fn of(&self, which: &[usize]) -> Self {
-        let size = which.len();
+    pub fn of(&self, free: &[usize]) -> Self {
+        let size = free.len();
         Self {
-            gram: DMatrix::from_fn(size, size, |i, j| self.gram[(which[i], which[j])]),
-            gradient: DVector::from_fn(size, |i, _| self.gradient[which[i]]),
-            squares: self.squares,
+            gram: DMatrix::from_fn(size, size, |i, j| self.gram[(free[i], free[j])]),
+            gradient: DVector::from_fn(size, |i, _| self.gradient[free[i]]),
+            cost: self.cost,
         }
     }
 
@@ -62,13 +58,13 @@ impl Block {
     #[must_use]
     pub fn after(&self, step: &DVector<f64>) -> Self {
         let gradient = &self.gradient + &self.gram * step;
-        Self { gram: self.gram.clone(), gradient, squares: self.squares_after(step) }
+        Self { gram: self.gram.clone(), gradient, cost: self.cost_after(step) }
     }
 
     /// The sum of squares after a step.
     #[must_use]
-    pub fn squares_after(&self, step: &DVector<f64>) -> f64 {
-        self.squares + 2.0 * self.gradient.dot(step) + step.dot(&(&self.gram * step))
+    pub fn cost_after(&self, step: &DVector<f64>) -> f64 {
+        self.cost + 2.0 * self.gradient.dot(step) + step.dot(&(&self.gram * step))
     }
 }
 
@@ -79,7 +75,7 @@ pub fn sum(blocks: &[Block]) -> Block {
     blocks.iter().fold(Block::zero(size), |mut sum, block| {
         sum.gram += &block.gram;
         sum.gradient += &block.gradient;
-        sum.squares += block.squares;
+        sum.cost += block.cost;
         sum
     })
 }
@@ -151,7 +147,7 @@ mod tests {
         let block = line(&[(0.0, 1.0), (1.0, 3.0), (2.0, 5.0)]);
         let step = -(inverse(&block.gram) * &block.gradient);
         assert!((step[0] - 1.0).abs() < 1e-9 && (step[1] - 2.0).abs() < 1e-9, "{step}");
-        assert!(block.squares_after(&step).abs() < 1e-9);
+        assert!(block.cost_after(&step).abs() < 1e-9);
     }
 
     #[test]

@@ -90,7 +90,7 @@ impl Measured {
         every: usize,
     ) -> (Errors, Trace) {
         let window = (horizon_s / TICK_S).round() as usize;
-        let memory = airframe.memory(0, "predict", TICK_S);
+        let memory = airframe.initial_state(0, "predict", TICK_S);
         let mut commands = Held::new(&flight.command);
         let first = commands.at(self.clock.start_s);
         let mut plant = FreeFlight::new(NewtonEuler::flying(airframe, 1), self.bodies[0], memory);

@@ -1,8 +1,7 @@
 //! A flight made ready for comparison: its grid, its knots, and which equations it can be held against.
 #![allow(non_snake_case, reason = "a trailing _W or _B names the frame a vector is written in")]
 
-use crate::align::Lateness;
-use crate::clock::Clock;
+use crate::clock::{Clock, Lateness};
 use crate::track::{Track, valid_about};
 use crate::window::{NUMEROV, SIMPSON, Window, central_difference, second_difference};
 use flights::{Channel, Flight};

@@ -1,7 +1,7 @@
 //! What identification found, for programs (`report.json`) and for people.
 
 use crate::align::Offsets;
-use crate::candidate::Unseen;
+use crate::candidate::Unidentifiable;
 use crate::faults::Fault;
 use crate::trim::Trim;
 use crate::whiteness::Whiteness;
@@ -38,7 +38,7 @@ pub struct Report {
     /// What no candidate explains: the size of the part of the residual that is not noise, by equation.
     pub unexplained: BTreeMap<&'static str, Unexplained>,
     /// Effects that these flights cannot show, or sensors' parts of them, and what they would need.
-    pub not_identifiable: Vec<Unseen>,
+    pub not_identifiable: Vec<Unidentifiable>,
     /// Length of the blocks that count as independent.
     pub block_s: f64,
     /// So many of them have the flights that errors are judged on.
@@ -301,8 +301,8 @@ impl Report {
                 own.unit
             )?;
         }
-        for unseen in &self.not_identifiable {
-            writeln!(f, "not identifiable here: {} needs {}", unseen.effect, unseen.needs)?;
+        for own in &self.not_identifiable {
+            writeln!(f, "not identifiable here: {} needs {}", own.effect, own.needs)?;
         }
         Ok(())
     }

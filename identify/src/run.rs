@@ -1,10 +1,10 @@
 //! The whole way: from flights and the declared vehicle to a report.
 
-use crate::align::{Lateness, align};
-use crate::candidate::{Candidate, candidates};
-use crate::experiment;
+use crate::align::align;
+use crate::candidate::{Candidate, candidates, free_parameters};
+use crate::clock::Lateness;
 use crate::faults;
-use crate::fit::{Bench, Fitted, Weights};
+use crate::fit::{FitResult, Problem, Weights};
 use crate::model::Model;
 use crate::noise;
 use crate::parameter::Parameters;
@@ -12,13 +12,14 @@ use crate::predict::{Errors, Measured};
 use crate::prepared::{Equation, Prepared, SETTLE_S};
 use crate::regressor::{Regressor, regressors};
 use crate::report::{BeforeAfter, Change, EffectReport, Estimate, FlightReport, Noise, Report, Unexplained};
-use crate::select::{Selection, rivals, select, which};
+use crate::rows::column;
+use crate::select::{Selection, confounded, select};
 use crate::sensing::SensorErrors;
 use crate::trim;
 use crate::whiteness::whiteness;
 use flights::state::StateQuantity;
 use flights::{Flight, FlightSet, Role};
-use plant::effects::{Effect, entry};
+use plant::effects::{Effect, EffectKind, entry};
 use std::collections::BTreeMap;
 use vehicles::{Vehicle, VehicleError};
 
@@ -34,6 +35,10 @@ const UNEXPLAINED: f64 = 0.3;
 /// Samples of motion that are further apart, on average, say nothing about it; what is computed tick by tick would cost
 /// time and memory beyond what there is to compare.
 const SPACING_MAX_S: f64 = 0.5;
+
+/// The experiment for two effects of which no better one is known.
+const OTHER_FLIGHTS: &str =
+    "fly manoeuvres in which the two differ: other speeds, rates, heights or loads than in these flights";
 
 /// Why flights cannot be identified on.
 #[derive(Debug, thiserror::Error)]
@@ -106,24 +111,26 @@ pub fn identify(set: &FlightSet, progress: &mut dyn FnMut(&str)) -> Result<Outco
     let vehicle = Vehicle::load(&set.vehicle)?;
     let declared = entry::resolve(&vehicle.effects)?;
     progress("preparing flights");
-    let (mut bench, flight_reports) = bench(&vehicle, &declared, set)?;
-    let offsets = align(&mut bench);
-    let faults = faults::find(&mut bench);
-    let all: Vec<&Prepared> = bench.fit.iter().chain(&bench.test).collect();
-    let (open, unseen) = candidates(&bench.model.parameters, &all);
+    let (mut problem, flight_reports) = problem(&vehicle, &declared, set)?;
+    let offsets = align(&mut problem);
+    let faults = faults::find(&mut problem);
+    let all: Vec<&Prepared> = problem.estimation.iter().chain(&problem.validation).collect();
+    let (open, unidentifiable) = candidates(&problem.model.parameters, &all);
     progress("trims");
-    let trims = trim::compare(&mut bench, &open);
-    let selection = select(&mut bench, &open, progress);
-    progress("rivals");
-    let mut effects = judged_effects(&bench, &selection);
-    accepted_effects(&bench, &selection, &mut effects);
+    let trims = trim::compare(&mut problem, &open);
+    let selection = select(&mut problem, &open, progress);
+    progress("confounded effects");
+    let mut effects = judged_effects(&problem, &selection);
+    accepted_effects(&problem, &selection, &mut effects);
     progress("predictions");
     let values = &selection.after.values;
-    let sensor_errors = SensorErrors::of(&bench.model.parameters, values);
-    let predictions = predictions(&bench, set, values, &sensor_errors);
-    let floor = noise::floor(&bench);
-    let whiteness =
-        BeforeAfter { before: whiteness(&bench, &selection.before.values), after: whiteness(&bench, values) };
+    let sensor_errors = SensorErrors::of(&problem.model.parameters, values);
+    let predictions = predictions(&problem, set, values, &sensor_errors);
+    let floor = noise::floor(&problem);
+    let whiteness = BeforeAfter {
+        before: whiteness(&problem, &selection.before.values),
+        after: whiteness(&problem, values),
+    };
     let report = Report {
         vehicle: set.vehicle.display().to_string(),
         flights: flight_reports,
@@ -137,34 +144,39 @@ pub fn identify(set: &FlightSet, progress: &mut dyn FnMut(&str)) -> Result<Outco
         held_out: of_role(&predictions, Role::Test),
         fitted: of_role(&predictions, Role::Fit),
         noise_floor: noise_report(&floor, vehicle.gravity_m_s2),
-        not_identifiable: unseen,
-        block_s: bench.block_s,
-        test_blocks: selection.after.test_squares.len(),
+        not_identifiable: unidentifiable,
+        block_s: problem.block_s,
+        test_blocks: selection.after.validation_costs.len(),
     };
-    let effects = bench.model.parameters.effects_under(values);
-    let flown = bench.fit.iter().chain(&bench.test);
+    let effects = problem.model.parameters.effects_under(values);
+    let flown = problem.estimation.iter().chain(&problem.validation);
     let regressors =
-        flown.map(|own| (own.flight.name.clone(), regressors(&bench.model, own, values))).collect();
-    let late = bench.fit.iter().chain(&bench.test).map(|own| (own.flight.name.clone(), own.late)).collect();
-    Ok(Outcome { pictures: pictures(&bench, &selection), regressors, effects, late, sensor_errors, report })
+        flown.map(|own| (own.flight.name.clone(), regressors(&problem.model, own, values))).collect();
+    let late = problem
+        .estimation
+        .iter()
+        .chain(&problem.validation)
+        .map(|own| (own.flight.name.clone(), own.late))
+        .collect();
+    Ok(Outcome { pictures: pictures(&problem, &selection), regressors, effects, late, sensor_errors, report })
 }
 
 /// The flights on their grids, with the declared model.
 ///
 /// # Errors
 /// If the samples of a flight are too far apart, or no flight of a role can be used.
-pub fn bench<'f>(
+pub fn problem<'f>(
     vehicle: &Vehicle,
     declared: &[Effect],
     set: &'f FlightSet,
-) -> Result<(Bench<'f>, Vec<FlightReport>), IdentifyError> {
+) -> Result<(Problem<'f>, Vec<FlightReport>), IdentifyError> {
     let parameters = Parameters::of(vehicle, declared);
     let least_rad_s = FLYING * vehicle.hover_speed_rad_s();
     let is_flying = |drive: &[f64; 4], is_command: bool| {
         let speed = |own: &f64| if is_command { vehicle.command.speed(*own) } else { *own };
         drive.iter().map(speed).sum::<f64>() > 4.0 * least_rad_s
     };
-    let (mut fit, mut test, mut reports) = (Vec::new(), Vec::new(), Vec::new());
+    let (mut estimation, mut validation, mut reports) = (Vec::new(), Vec::new(), Vec::new());
     let mut too_sparse: Vec<(Role, IdentifyError)> = Vec::new();
     for flight in &set.flights {
         let (prepared, note) = match flight.check_span(SPACING_MAX_S) {
@@ -180,12 +192,12 @@ pub fn bench<'f>(
         report.notes.extend(note);
         reports.push(report);
         match (prepared, flight.role) {
-            (Some(prepared), Role::Fit) => fit.push(prepared),
-            (Some(prepared), Role::Test) => test.push(prepared),
+            (Some(prepared), Role::Fit) => estimation.push(prepared),
+            (Some(prepared), Role::Test) => validation.push(prepared),
             (None, _) => {}
         }
     }
-    for (role, own) in [("fit", &fit), ("test", &test)] {
+    for (role, own) in [("fit", &estimation), ("test", &validation)] {
         if own.is_empty() {
             let is_role = |(own, _): &(Role, IdentifyError)| (*own == Role::Fit) == (role == "fit");
             if let Some(index) = too_sparse.iter().position(is_role) {
@@ -204,10 +216,11 @@ pub fn bench<'f>(
             return Err(IdentifyError::NoFlight { role, reason });
         }
     }
-    let total_s: f64 = fit.iter().map(compared_s).sum();
+    let total_s: f64 = estimation.iter().map(compared_s).sum();
     let block_s = (total_s / 40.0).clamp(0.5, 2.0);
     let model = Model { vehicle: vehicle.clone(), parameters };
-    Ok((Bench { model, fit, test, weights: Weights::new(), block_s, has_own_trims: false }, reports))
+    let weights = Weights::new();
+    Ok((Problem { model, estimation, validation, weights, block_s, has_own_trims: false }, reports))
 }
 
 fn box_s(flight: &Flight) -> Option<f64> {
@@ -237,32 +250,32 @@ fn flight_report(flight: &Flight, prepared: Option<&Prepared>) -> FlightReport {
 fn verdict(selection: &Selection) -> Vec<&'static str> {
     let mut names = Vec::new();
     for candidate in &selection.accepted {
-        if !names.contains(&candidate.effect) {
-            names.push(candidate.effect);
+        if !names.contains(&candidate.kind.name) {
+            names.push(candidate.kind.name);
         }
     }
     names
 }
 
 /// The candidates as the last round that judged them left them.
-fn judged_effects(bench: &Bench, selection: &Selection) -> BTreeMap<&'static str, EffectReport> {
+fn judged_effects(problem: &Problem, selection: &Selection) -> BTreeMap<&'static str, EffectReport> {
     let mut effects: BTreeMap<&'static str, EffectReport> = BTreeMap::new();
     for round in &selection.rounds {
         let mut of_round: BTreeMap<&'static str, EffectReport> = BTreeMap::new();
         for judged in &round.judged {
-            let after = judged.fitted.test_sum();
+            let after = judged.fitted.validation_cost();
             let before = after / (1.0 - judged.gain).max(1e-12);
             let report = EffectReport {
                 accepted: false,
                 linearised: judged.is_promise,
-                parameters: estimates(bench, &judged.fitted, &judged.candidate.which),
-                held_out: BeforeAfter { before: size(bench, before), after: size(bench, after) },
-                chance: judged.gain_chance,
+                parameters: estimates(problem, &judged.fitted, &judged.candidate.free),
+                held_out: BeforeAfter { before: size(problem, before), after: size(problem, after) },
+                chance: judged.p_value,
                 confused_with: Vec::new(),
                 experiment: None,
             };
             // Of the parts of an effect the one that gains most.
-            let name = judged.candidate.effect;
+            let name = judged.candidate.kind.name;
             if of_round.get(name).is_none_or(|other| report.held_out.after < other.held_out.after) {
                 of_round.insert(name, report);
             }
@@ -273,35 +286,36 @@ fn judged_effects(bench: &Bench, selection: &Selection) -> BTreeMap<&'static str
 }
 
 fn accepted_effects(
-    bench: &Bench,
+    problem: &Problem,
     selection: &Selection,
     effects: &mut BTreeMap<&'static str, EffectReport>,
 ) {
     for name in verdict(selection) {
         let own: Vec<usize> =
-            (0..selection.accepted.len()).filter(|at| selection.accepted[*at].effect == name).collect();
+            (0..selection.accepted.len()).filter(|at| selection.accepted[*at].kind.name == name).collect();
         let others: Vec<Candidate> =
-            selection.accepted.iter().filter(|candidate| candidate.effect != name).cloned().collect();
+            selection.accepted.iter().filter(|candidate| candidate.kind.name != name).cloned().collect();
         let mut start = selection.after.values.clone();
         let mut parameters = BTreeMap::new();
         for at in &own {
             let candidate = &selection.accepted[*at];
-            parameters.extend(estimates(bench, &selection.after, &candidate.which));
-            candidate.which.iter().for_each(|at| start[*at] = bench.model.parameters.all[*at].declared);
+            parameters.extend(estimates(problem, &selection.after, &candidate.free));
+            candidate.free.iter().for_each(|at| start[*at] = problem.model.parameters.all[*at].baseline);
         }
-        let without = bench.fitted(&start, &which(&others));
-        let mut confused_with: Vec<&'static str> = Vec::new();
-        for at in &own {
-            confused_with.extend(rivals(bench, selection, *at));
-        }
-        confused_with.sort_unstable();
-        confused_with.dedup();
-        let experiment = confused_with.first().map(|rival| experiment::between(name, rival).to_owned());
+        let without = problem.fitted(&start, &free_parameters(&others));
+        let mut alike: Vec<&'static EffectKind> =
+            own.iter().flat_map(|at| confounded(problem, selection, *at)).collect();
+        alike.sort_by_key(|kind| kind.name);
+        alike.dedup_by_key(|kind| kind.name);
+        let experiment = alike.first().map(|other| {
+            let own = selection.accepted[own[0]].kind;
+            own.told_from(other).unwrap_or(OTHER_FLIGHTS).to_owned()
+        });
         let held_out = BeforeAfter {
-            before: size(bench, without.test_sum()),
-            after: size(bench, selection.after.test_sum()),
+            before: size(problem, without.validation_cost()),
+            after: size(problem, selection.after.validation_cost()),
         };
-        let chance = selection.chance(name);
+        let chance = selection.p_value(name);
         effects.insert(
             name,
             EffectReport {
@@ -310,7 +324,7 @@ fn accepted_effects(
                 parameters,
                 held_out,
                 chance,
-                confused_with,
+                confused_with: alike.iter().map(|kind| kind.name).collect(),
                 experiment,
             },
         );
@@ -318,42 +332,43 @@ fn accepted_effects(
 }
 
 /// The weighted root mean square of a sum of squares of the test flights.
-fn size(bench: &Bench, squares: f64) -> f64 {
-    (squares / bench.rows(&bench.test) as f64).sqrt()
+fn size(problem: &Problem, squares: f64) -> f64 {
+    (squares / problem.rows(&problem.validation) as f64).sqrt()
 }
 
 /// The estimates of these parameters, with 95 % intervals.
 #[must_use]
-pub fn estimates(bench: &Bench, fitted: &Fitted, which: &[usize]) -> BTreeMap<&'static str, Estimate> {
+pub fn estimates(problem: &Problem, fitted: &FitResult, free: &[usize]) -> BTreeMap<&'static str, Estimate> {
     let quantile = crate::statistics::student_quantile(
         0.975,
-        (fitted.fit_squares.len() as f64 - fitted.which.len() as f64).max(1.0),
+        (fitted.estimation_costs.len() as f64 - fitted.free.len() as f64).max(1.0),
     );
     let one = |at: &usize| {
-        let own = &bench.model.parameters.all[*at];
-        let (value, half) = (fitted.values[*at], quantile * fitted.deviation(*at).unwrap_or(f64::INFINITY));
-        let (low, high) = ((value - half).max(own.lower), (value + half).min(own.upper));
+        let own = &problem.model.parameters.all[*at];
+        let (value, half) =
+            (fitted.values[*at], quantile * fitted.standard_error(*at).unwrap_or(f64::INFINITY));
+        let (low, high) = ((value - half).max(own.spec().min), (value + half).min(own.spec().max));
         // Zero is where many effects begin, and no bound that data pushed against.
-        let at_bound = value != own.declared && (value <= own.lower || value >= own.upper);
-        let determined = low > own.lower || high < own.upper;
-        (own.name, Estimate { value, unit: own.unit, low, high, at_bound, determined })
+        let at_bound = value != own.baseline && (value <= own.spec().min || value >= own.spec().max);
+        let determined = low > own.spec().min || high < own.spec().max;
+        (own.spec().name, Estimate { value, unit: own.spec().unit(), low, high, at_bound, determined })
     };
-    which.iter().map(one).collect()
+    free.iter().map(one).collect()
 }
 
 type Prediction = (String, Role, f64, Errors, Errors);
 
 /// Errors of every flight at every horizon, declared and new.
 fn predictions(
-    bench: &Bench,
+    problem: &Problem,
     set: &FlightSet,
     values: &[f64],
     sensor_errors: &SensorErrors,
 ) -> Vec<Prediction> {
-    let declared = bench.model.parameters.declared();
+    let declared = problem.model.parameters.baseline();
     let mut predictions = Vec::new();
     for flight in &set.flights {
-        let all = bench.fit.iter().chain(&bench.test);
+        let all = problem.estimation.iter().chain(&problem.validation);
         let own = all.clone().find(|own| own.flight.name == flight.name);
         let late = own.map_or(Lateness::default(), |own| own.late);
         let aligned = SensorErrors::default().taken_off(flight, &late);
@@ -362,8 +377,8 @@ fn predictions(
             continue;
         };
         for horizon_s in HORIZONS_S {
-            let (old, _) = before.predicted(&aligned, bench.model.airframe(&declared), horizon_s, 0);
-            let (new, _) = after.predicted(&corrected, bench.model.airframe(values), horizon_s, 0);
+            let (old, _) = before.predicted(&aligned, problem.model.airframe(&declared), horizon_s, 0);
+            let (new, _) = after.predicted(&corrected, problem.model.airframe(values), horizon_s, 0);
             predictions.push((flight.name.clone(), flight.role, horizon_s, old, new));
         }
     }
@@ -411,17 +426,15 @@ fn unexplained(
     whiteness.after.iter().filter_map(one).collect()
 }
 
-fn pictures(bench: &Bench, selection: &Selection) -> Vec<Picture> {
+fn pictures(problem: &Problem, selection: &Selection) -> Vec<Picture> {
     let mut pictures = Vec::new();
-    for flight in bench.fit.iter().chain(&bench.test) {
-        let before = bench.model.residual_under(flight, &selection.before.values);
-        let after = bench.model.residual_under(flight, &selection.after.values);
-        let measured = bench.model.tracks(flight, &selection.after.values).rows;
+    for flight in problem.estimation.iter().chain(&problem.validation) {
+        let before = problem.model.residual_under(flight, &selection.before.values);
+        let after = problem.model.residual_under(flight, &selection.after.values);
+        let measured = problem.model.tracks(flight, &selection.after.values).rows;
         for equation in &flight.layout.equations {
             let columns = |rows: &[f64]| {
-                (0..equation.size())
-                    .map(|axis| crate::whiteness::column(flight, rows, *equation, axis))
-                    .collect()
+                (0..equation.size()).map(|axis| column(flight, rows, *equation, axis)).collect()
             };
             pictures.push(Picture {
                 flight: flight.flight.name.clone(),

@@ -1,7 +1,8 @@
 //! What is wrong with a flight's sensors, and the flight as sensors without it would have logged it.
 
-use crate::align::Lateness;
-use crate::parameter::{Parameters, SensorParameter};
+use crate::clock::Lateness;
+use crate::parameter::Parameters;
+use crate::sensor_effects::{ACCELEROMETER_BIAS, ATTITUDE_BIAS, GYROSCOPE_BIAS, IMU_DELAY, POSE_DELAY};
 use flights::{Channel, Flight};
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 
@@ -24,13 +25,17 @@ impl SensorErrors {
     /// Those of `values`.
     #[must_use]
     pub fn of(parameters: &Parameters, values: &[f64]) -> Self {
-        let own = |which| parameters.sensor(values, which);
+        let [pose_delay_s, ..] = parameters.values_of(&POSE_DELAY, values);
+        let [inertial_delay_s, ..] = parameters.values_of(&IMU_DELAY, values);
+        let [a_x, a_y, a_z, ..] = parameters.values_of(&ACCELEROMETER_BIAS, values);
+        let [w_x, w_y, w_z, ..] = parameters.values_of(&GYROSCOPE_BIAS, values);
+        let [turn_x, turn_y, ..] = parameters.values_of(&ATTITUDE_BIAS, values);
         Self {
-            pose_delay_s: own(SensorParameter::PoseDelay),
-            inertial_delay_s: own(SensorParameter::ImuDelay),
-            accelerometer_bias_m_s2: std::array::from_fn(|axis| own(SensorParameter::Accelerometer(axis))),
-            gyroscope_bias_rad_s: std::array::from_fn(|axis| own(SensorParameter::Gyroscope(axis))),
-            attitude_bias_rad: std::array::from_fn(|axis| own(SensorParameter::Attitude(axis))),
+            pose_delay_s,
+            inertial_delay_s,
+            accelerometer_bias_m_s2: [a_x, a_y, a_z],
+            gyroscope_bias_rad_s: [w_x, w_y, w_z],
+            attitude_bias_rad: [turn_x, turn_y],
         }
     }
 

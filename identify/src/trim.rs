@@ -5,10 +5,10 @@
 //! a fit that has to would bend whatever it can. So flights whose trims differ are compared without the mean of their
 //! angular accelerations, and the trims are reported for each.
 
-use crate::candidate::Candidate;
-use crate::fit::Bench;
+use crate::candidate::{Candidate, free_parameters};
+use crate::fit::Problem;
 use crate::prepared::{Equation, Prepared};
-use crate::whiteness::column;
+use crate::rows::column;
 use serde::Serialize;
 
 /// Trims differ beyond so many standard deviations.
@@ -27,55 +27,27 @@ pub struct Trim {
     pub deviation_rad_s2: [f64; 3],
 }
 
-/// Takes the mean of the angular acceleration's rows off them.
-pub fn take_off(flight: &Prepared, rows: &mut [f64]) {
-    let Some(offset) = flight.offset_of(Equation::AngularAcceleration) else { return };
-    let width = flight.width();
-    for axis in 0..3 {
-        let own = || (offset + axis..rows.len()).step_by(width);
-        let mean = own().map(|at| rows[at]).sum::<f64>() / own().count().max(1) as f64;
-        for at in (offset + axis..rows.len()).step_by(width) {
-            rows[at] -= mean;
-        }
-    }
-}
-
-/// Puts the mean of each block, given by its first and last knot, in place of the angular acceleration's rows.
-pub fn keep_means(flight: &Prepared, rows: &mut [f64], blocks: &[(usize, usize)]) {
-    let Some(offset) = flight.offset_of(Equation::AngularAcceleration) else { return };
-    let width = flight.width();
-    for (first, last) in blocks {
-        for axis in 0..3 {
-            let own = || (first * width + offset + axis..last * width).step_by(width);
-            let mean = own().map(|at| rows[at]).sum::<f64>() / own().count().max(1) as f64;
-            own().for_each(|at| rows[at] = mean);
-        }
-    }
-}
-
 /// The trims of all flights where they differ, after what a shift of the centre of mass that all share explains; then
-/// the bench compares without them. Empty where the flights agree.
-pub fn compare(bench: &mut Bench, open: &[Candidate]) -> Vec<Trim> {
-    if bench.fit.iter().chain(&bench.test).any(Prepared::is_assumed) {
+/// the problem compares without them. Empty where the flights agree.
+pub fn compare(problem: &mut Problem, open: &[Candidate]) -> Vec<Trim> {
+    if problem.estimation.iter().chain(&problem.validation).any(Prepared::is_assumed) {
         // Their means are all there is.
         return Vec::new();
     }
-    let declared = bench.model.parameters.declared();
-    bench.weigh(&bench.fitted(&declared, &[]), open);
-    let mut shared = bench.fitted(&declared, &[]);
-    for effect in ["com-offset", "weak-rotor"] {
-        let own = open.iter().filter(|candidate| candidate.effect == effect);
-        let which: Vec<usize> = own.flat_map(|candidate| candidate.which.clone()).collect();
-        if !which.is_empty() {
-            let fitted = bench.fitted(&declared, &which);
-            if fitted.test_sum() < shared.test_sum() {
-                shared = fitted;
-            }
+    let declared = problem.model.parameters.baseline();
+    problem.weigh(&problem.fitted(&declared, &[]), open);
+    let mut shared = problem.fitted(&declared, &[]);
+    let turning = |own: &&Candidate| own.kind.turns_steadily;
+    let turning: Vec<Candidate> = open.iter().filter(turning).cloned().collect();
+    for of_effect in turning.chunk_by(|a, b| a.kind == b.kind) {
+        let fitted = problem.fitted(&declared, &free_parameters(of_effect));
+        if fitted.validation_cost() < shared.validation_cost() {
+            shared = fitted;
         }
     }
-    let flights = bench.fit.iter().chain(&bench.test);
+    let flights = problem.estimation.iter().chain(&problem.validation);
     let found: Vec<(Trim, f64)> =
-        flights.filter_map(|flight| of_flight(bench, flight, &shared.values)).collect();
+        flights.filter_map(|flight| of_flight(problem, flight, &shared.values)).collect();
     let differ = (0..3).any(|axis| {
         let mean = found.iter().map(|(own, _)| own.angular_acceleration_rad_s2[axis]).sum::<f64>()
             / found.len() as f64;
@@ -84,15 +56,15 @@ pub fn compare(bench: &mut Bench, open: &[Candidate]) -> Vec<Trim> {
             away > SURE * own.deviation_rad_s2[axis] && away > LARGE * spread
         })
     });
-    bench.has_own_trims = differ;
+    problem.has_own_trims = differ;
     if differ { found.into_iter().map(|(own, _)| own).collect() } else { Vec::new() }
 }
 
 /// The trim of a flight and the spread of its angular acceleration.
-fn of_flight(bench: &Bench, flight: &Prepared, values: &[f64]) -> Option<(Trim, f64)> {
+fn of_flight(problem: &Problem, flight: &Prepared, values: &[f64]) -> Option<(Trim, f64)> {
     flight.offset_of(Equation::AngularAcceleration)?;
-    let residual = bench.model.residual_under(flight, values);
-    let per_block = ((bench.block_s / (flight.layout.box_steps as f64 * flight.layout.clock.step_s)).ceil()
+    let residual = problem.model.residual_under(flight, values);
+    let per_block = ((problem.block_s / (flight.layout.box_steps as f64 * flight.layout.clock.step_s)).ceil()
         as usize)
         .max(1);
     let (mut means, mut deviations, mut spread) = ([0.0; 3], [0.0; 3], 0.0_f64);

@@ -30,8 +30,8 @@ pub fn text(declared: &Path, effects: &[Effect], report: &Report) -> Result<Stri
     Ok(text)
 }
 
-/// Where a value comes from that is typical of a vehicle of this size, and not of the Hummingbird.
-const SCALED: &str = "typical of a vehicle of this size (crate identify, `fitting`)";
+/// Where a value comes from that is nominal for a vehicle of this size, and not of the Hummingbird.
+const SCALED: &str = "typical of a vehicle of this size (`scale_to` of the effect)";
 
 #[allow(clippy::float_cmp, reason = "a value that was not touched is the same")]
 fn entry(effect: &Effect, vehicle: &Vehicle, report: &Report) -> String {
@@ -50,7 +50,7 @@ fn entry(effect: &Effect, vehicle: &Vehicle, report: &Report) -> String {
             (None, None) => number(
                 value,
                 spec.unit(),
-                if value == spec.typical { spec.typical_source } else { SCALED },
+                if value == spec.nominal { spec.nominal_source } else { SCALED },
                 "\"not identified: held while the others were fitted\"",
             ),
         };

@@ -1,7 +1,8 @@
 //! What is left of a residual: whether it is noise, and how large the part of it is that is not.
 
-use crate::fit::Bench;
-use crate::prepared::{Equation, Prepared};
+use crate::fit::Problem;
+use crate::prepared::Equation;
+use crate::rows::column;
 use crate::statistics::{autocorrelation, ljung_box, white_noise_bound};
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -30,10 +31,10 @@ pub struct Whiteness {
 
 /// The whiteness of every equation under `values`, over the test flights.
 #[must_use]
-pub fn whiteness(bench: &Bench, values: &[f64]) -> BTreeMap<&'static str, Whiteness> {
+pub fn whiteness(problem: &Problem, values: &[f64]) -> BTreeMap<&'static str, Whiteness> {
     let mut columns: BTreeMap<&'static str, Vec<(Equation, Vec<f64>)>> = BTreeMap::new();
-    for flight in &bench.test {
-        let residual = bench.model.residual_under(flight, values);
+    for flight in &problem.validation {
+        let residual = problem.model.residual_under(flight, values);
         for equation in &flight.layout.equations {
             for axis in 0..equation.size() {
                 let column = column(flight, &residual, *equation, axis);
@@ -42,13 +43,6 @@ pub fn whiteness(bench: &Bench, values: &[f64]) -> BTreeMap<&'static str, Whiten
         }
     }
     columns.into_iter().map(|(name, columns)| (name, of_equation(&columns))).collect()
-}
-
-/// One component of an equation over the knots.
-#[must_use]
-pub fn column(flight: &Prepared, rows: &[f64], equation: Equation, axis: usize) -> Vec<f64> {
-    let Some(offset) = flight.offset_of(equation) else { return Vec::new() };
-    rows[offset + axis..].iter().step_by(flight.width()).copied().collect()
 }
 
 fn of_equation(columns: &[(Equation, Vec<f64>)]) -> Whiteness {

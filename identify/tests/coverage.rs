@@ -1,7 +1,7 @@
 //! 95 % intervals hold the truth as often as they say, of the effects that are true, without a selection.
 mod simulated;
 
-use identify::run::{bench, estimates};
+use identify::run::{estimates, problem};
 use rayon::prelude::*;
 use simulated::cases::Case;
 
@@ -14,21 +14,21 @@ fn holds(seed: u64) -> Vec<(&'static str, bool)> {
     case.plan.sensors.pose_ticks = 10;
     let set = case.flights();
     let (vehicle, declared) = case.declared();
-    let (mut bench, _) = bench(&vehicle, &declared, &set).expect("flights to identify on");
-    let parameters = &bench.model.parameters;
+    let (mut problem, _) = problem(&vehicle, &declared, &set).expect("flights to identify on");
+    let parameters = &problem.model.parameters;
     let values = case.true_values(parameters);
-    let which: Vec<usize> = case.effects().iter().flat_map(|name| parameters.of_name(name)).collect();
-    let start = parameters.declared();
+    let free: Vec<usize> = case.effects().iter().flat_map(|name| parameters.of_name(name)).collect();
+    let start = parameters.baseline();
     // The weights as they are at the end of a selection: from what is left when all has been said.
-    let truth = bench.fitted(&values, &[]);
-    bench.weigh(&truth, &[]);
-    let fitted = bench.fitted(&start, &which);
-    let found = estimates(&bench, &fitted, &which);
+    let truth = problem.fitted(&values, &[]);
+    problem.weigh(&truth, &[]);
+    let fitted = problem.fitted(&start, &free);
+    let found = estimates(&problem, &fitted, &free);
     let one = |at: &usize| {
-        let name = bench.model.parameters.all[*at].name;
+        let name = problem.model.parameters.all[*at].spec().name;
         (name, found[name].low <= values[*at] && values[*at] <= found[name].high)
     };
-    which.iter().map(one).collect()
+    free.iter().map(one).collect()
 }
 
 #[test]

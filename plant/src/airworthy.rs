@@ -183,7 +183,7 @@ pub(crate) fn rehearse(
 }
 
 fn first_not_finite(backend: &dyn Backend) -> Option<&'static str> {
-    let (State { body, rotors }, motion) = (backend.state(), backend.motion());
+    let (State { body, rotors }, motion) = (backend.state(), backend.accelerations());
     let vectors = [
         ("a position", &body.position_W_m),
         ("a velocity", &body.velocity_W_m_s),
@@ -278,9 +278,9 @@ mod tests {
         let rehearsed = |change: fn(&mut Vehicle)| {
             let vehicle = hummingbird(change);
             let airframe = Airframe::new(vehicle.clone());
-            let memory = airframe.memory(0, "", 1e-3);
+            let effects = airframe.initial_state(0, "", 1e-3);
             let model = NewtonEuler::flying(airframe, 1);
-            let mut backend = FreeFlight::new(model, RigidBody::level_at(Vector3::z()), memory);
+            let mut backend = FreeFlight::new(model, RigidBody::level_at(Vector3::z()), effects);
             rehearse(&mut backend, &vehicle, 1, 1e-3)
         };
         assert_eq!(rehearsed(|_| {}), Ok(()));

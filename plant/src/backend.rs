@@ -1,8 +1,8 @@
 //! What a plant can do, whichever physics moves it.
 #![allow(non_snake_case, reason = "a trailing _W names the frame a vector is written in, N the newton")]
 
-use crate::effects::battery::Battery;
-use crate::newton_euler::Motion;
+use crate::actuation::Battery;
+use crate::newton_euler::Accelerations;
 use crate::snapshot::SnapshotError;
 use crate::state::{RigidBody, State};
 use nalgebra::Vector3;
@@ -14,7 +14,7 @@ pub trait Backend {
     fn state(&self) -> &State;
 
     /// What sensors at the centre of mass measure at the end of the last tick.
-    fn motion(&self) -> Motion;
+    fn accelerations(&self) -> Accelerations;
 
     /// Moves the vehicle by one tick of `dt_s` under raw motor `commands` held over it. `traffic` are the other
     /// vehicles as they were at the start of the tick, always the same ones in the same order.

@@ -1,29 +1,29 @@
 //! The backend `newton-euler`: free flight, in which there is nothing to touch.
 
+use crate::actuation::Battery;
+use crate::airframe_state::AirframeState;
 use crate::backend::{Backend, ContactReport, Neighbour};
-use crate::effects::battery::Battery;
-use crate::memory::AirframeMemory;
-use crate::newton_euler::{Motion, NewtonEuler};
+use crate::newton_euler::{Accelerations, NewtonEuler};
 use crate::snapshot::{Snapshot, SnapshotError};
 use crate::state::{RigidBody, State};
 
 /// What its snapshots are called.
 const NAME: &str = "newton-euler";
 
-/// A vehicle in free flight: the model, the state that it moves, and what its effects remember.
+/// A vehicle in free flight: the model, the state that it moves, and the state of its effects.
 #[derive(Debug, Clone)]
 pub struct FreeFlight {
     model: NewtonEuler,
     state: State,
-    memory: AirframeMemory,
+    effects: AirframeState,
 }
 
 impl FreeFlight {
-    /// A vehicle that starts as `body`, its rotors at the lowest command; `memory` is made by its airframe.
+    /// A vehicle that starts as `body`, its rotors at the lowest command; `effects` are made by its airframe.
     #[must_use]
-    pub fn new(model: NewtonEuler, body: RigidBody, memory: AirframeMemory) -> Self {
+    pub fn new(model: NewtonEuler, body: RigidBody, effects: AirframeState) -> Self {
         let state = model.start(body, 0.0);
-        Self { model, state, memory }
+        Self { model, state, effects }
     }
 }
 
@@ -32,13 +32,13 @@ impl Backend for FreeFlight {
         &self.state
     }
 
-    fn motion(&self) -> Motion {
-        self.model.motion_under(&self.memory.drive, &self.state)
+    fn accelerations(&self) -> Accelerations {
+        self.model.accelerations_under(&self.effects.actuation, &self.state)
     }
 
     fn step(&mut self, commands: &[f64; 4], dt_s: f64, _traffic: &[Neighbour]) {
-        let drive = self.model.airframe().begin_tick(&mut self.memory, &self.state, commands, dt_s);
-        self.model.advance(&mut self.state, &drive, dt_s);
+        let actuation = self.model.airframe().begin_tick(&mut self.effects, &self.state, commands, dt_s);
+        self.model.advance(&mut self.state, &actuation, dt_s);
     }
 
     fn settle_rotors(&mut self, commands: &[f64; 4]) {
@@ -54,17 +54,17 @@ impl Backend for FreeFlight {
     }
 
     fn battery(&self) -> Option<Battery> {
-        self.model.airframe().battery(&self.memory, &self.state)
+        self.model.airframe().battery(&self.effects, &self.state)
     }
 
     fn snapshot(&self) -> Result<Vec<u8>, SnapshotError> {
-        Snapshot::of(NAME).with("state", &self.state)?.with("memory", &self.memory)?.bytes()
+        Snapshot::of(NAME).with("state", &self.state)?.with("effects", &self.effects)?.bytes()
     }
 
     fn restore(&mut self, snapshot: &[u8]) -> Result<(), SnapshotError> {
         let snapshot = Snapshot::read(snapshot, NAME)?;
-        let memory = snapshot.fitting("memory", |memory| self.memory.fits(memory))?;
-        (self.state, self.memory) = (snapshot.get("state")?, memory);
+        let effects = snapshot.fitting("effects", |effects| self.effects.fits(effects))?;
+        (self.state, self.effects) = (snapshot.get("state")?, effects);
         Ok(())
     }
 }

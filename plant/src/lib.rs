@@ -4,8 +4,8 @@
 //! |---|---|
 //! | [`state`] | the rigid body and the rotors, as carried from tick to tick |
 //! | [`airframe`] | the forces that every backend moves the body by |
+//! | `actuation`, `airframe_state` | what acts over a tick; what effects carry from tick to tick |
 //! | [`effects`] | the physics beyond the declared vehicle |
-//! | [`memory`] | what effects carry from tick to tick |
 //! | `motor` | the lag between commanded and actual rotor speed |
 //! | [`rotor`] | thrust and torques of the rotors on the body |
 //! | `rotation` | turning vectors inside of an integration step |
@@ -35,12 +35,13 @@
 //! ```
 #![forbid(unsafe_code)]
 
+mod actuation;
 pub mod airframe;
+mod airframe_state;
 mod airworthy;
 pub mod backend;
 pub mod effects;
 pub mod free_flight;
-pub mod memory;
 mod motor;
 pub mod newton_euler;
 pub mod node;
@@ -54,11 +55,12 @@ pub mod snapshot;
 pub mod state;
 pub mod traffic;
 
-pub use airframe::{Airframe, Drive};
+pub use actuation::{Actuation, Battery};
+pub use airframe::Airframe;
+pub use airframe_state::{AirframeState, EffectState};
 pub use backend::{Backend, ContactReport, Neighbour};
 pub use free_flight::FreeFlight;
-pub use memory::AirframeMemory;
-pub use newton_euler::{Motion, NewtonEuler};
+pub use newton_euler::{Accelerations, NewtonEuler};
 pub use rapier::Rapier;
 pub use rotor::Wrench;
 pub use state::{RigidBody, RotorState, State};

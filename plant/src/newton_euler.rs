@@ -9,7 +9,8 @@
 use nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};
 use vehicles::Vehicle;
 
-use crate::airframe::{Airframe, Drive};
+use crate::actuation::Actuation;
+use crate::airframe::Airframe;
 use crate::rotation::rotated;
 use crate::state::{Rates, RigidBody, RotorRates, RotorState, State};
 
@@ -24,7 +25,7 @@ pub struct NewtonEuler {
 
 /// What the body feels at an instant: what sensors at the centre of mass measure.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Motion {
+pub struct Accelerations {
     /// (all forces but gravity) / m, in the body frame: what an accelerometer at the centre of mass measures.
     pub specific_force_B_m_s2: Vector3<f64>,
     /// Rate of change of the angular velocity, in the body frame.
@@ -76,49 +77,49 @@ impl NewtonEuler {
     /// does.
     ///
     /// # Panics
-    /// If the airframe has effects: some of them have a memory, which [`NewtonEuler::advance`] gets by the drive.
+    /// If the airframe has effects: some of them have a state, which [`NewtonEuler::advance`] sees by the actuation.
     pub fn step(&self, state: &mut State, commands: &[f64; 4], dt_s: f64) {
         assert!(self.airframe.effects().is_empty(), "effects need begin_tick and advance");
-        self.advance(state, &self.airframe.asked(commands), dt_s);
+        self.advance(state, &self.airframe.commanded(commands), dt_s);
     }
 
-    /// Moves `state` by one tick of `dt_s` under the `drive` with which [`Airframe::begin_tick`] began it.
-    pub fn advance(&self, state: &mut State, drive: &Drive, dt_s: f64) {
+    /// Moves `state` by one tick of `dt_s` under the `actuation` with which [`Airframe::begin_tick`] began it.
+    pub fn advance(&self, state: &mut State, actuation: &Actuation, dt_s: f64) {
         let span_s = dt_s / f64::from(self.substeps);
         for _ in 0..self.substeps {
-            *state = self.runge_kutta(state, drive, span_s);
+            *state = self.runge_kutta(state, actuation, span_s);
         }
         state.body.attitude_WB = UnitQuaternion::new_normalize(state.body.attitude_WB.into_inner());
-        state.rotors = self.airframe.settled(drive, &state.rotors);
+        state.rotors = self.airframe.settled(actuation, &state.rotors);
     }
 
     /// Specific force and angular acceleration at `state`, in still air.
-    pub fn motion(&self, state: &State) -> Motion {
-        self.motion_under(&Drive::default(), state)
+    pub fn accelerations(&self, state: &State) -> Accelerations {
+        self.accelerations_under(&Actuation::default(), state)
     }
 
     /// Specific force and angular acceleration at `state`, with what acts over the tick that ends there.
-    pub fn motion_under(&self, drive: &Drive, state: &State) -> Motion {
-        let wrench = self.airframe.wrench(drive, state, &state.rotors.map(shown_rates));
-        Motion {
+    pub fn accelerations_under(&self, actuation: &Actuation, state: &State) -> Accelerations {
+        let wrench = self.airframe.wrench(actuation, state, &state.rotors.map(shown_rates));
+        Accelerations {
             specific_force_B_m_s2: wrench.force_B_N / self.vehicle().mass_kg,
             angular_acceleration_B_rad_s2: self.angular_acceleration(state, &wrench.torque_B_N_m),
         }
     }
 
     /// One classic Runge-Kutta step of fourth order over the full state, in free flight.
-    pub(crate) fn runge_kutta(&self, state: &State, drive: &Drive, span_s: f64) -> State {
-        let k1 = self.rates(state, drive);
-        let k2 = self.rates(&state.moved(&k1, span_s / 2.0), drive);
-        let k3 = self.rates(&state.moved(&k2, span_s / 2.0), drive);
-        let k4 = self.rates(&state.moved(&k3, span_s), drive);
+    pub(crate) fn runge_kutta(&self, state: &State, actuation: &Actuation, span_s: f64) -> State {
+        let k1 = self.rates(state, actuation);
+        let k2 = self.rates(&state.moved(&k1, span_s / 2.0), actuation);
+        let k3 = self.rates(&state.moved(&k2, span_s / 2.0), actuation);
+        let k4 = self.rates(&state.moved(&k3, span_s), actuation);
         let sum = k1.plus(&k2, 2.0).plus(&k3, 2.0).plus(&k4, 1.0);
         state.moved(&sum, span_s / 6.0)
     }
 
-    fn rates(&self, state: &State, drive: &Drive) -> Rates {
-        let rotors = self.airframe.rotor_rates(drive, state);
-        let wrench = self.airframe.wrench(drive, state, &rotors);
+    fn rates(&self, state: &State, actuation: &Actuation) -> Rates {
+        let rotors = self.airframe.rotor_rates(actuation, state);
+        let wrench = self.airframe.wrench(actuation, state, &rotors);
         let attitude_WB = state.body.attitude_WB.as_ref();
         let force_W_N = rotated(attitude_WB, &wrench.force_B_N);
         Rates {

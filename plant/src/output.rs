@@ -45,7 +45,7 @@ fn state(backend: &dyn Backend) -> PlantState {
         velocity: vector(&state.body.velocity_W_m_s),
         attitude: Quaternion { x, y, z, w },
         angular_velocity: vector(&state.body.angular_velocity_B_rad_s),
-        specific_force: vector(&backend.motion().specific_force_B_m_s2),
+        specific_force: vector(&backend.accelerations().specific_force_B_m_s2),
         rotor_speed: state.rotors.map(|rotor| rotor.speed_rad_s),
         ..Default::default()
     }
@@ -97,11 +97,11 @@ mod tests {
     fn published(effects: &[&str]) -> Battery {
         let text = include_str!("../../vehicles/hummingbird.toml");
         let vehicle = vehicles::Vehicle::parse(text, "hummingbird.toml").unwrap();
-        let effects = effects.iter().map(|name| crate::effects::find(name).unwrap().typical()).collect();
+        let effects = effects.iter().map(|name| crate::effects::find(name).unwrap().nominal()).collect();
         let airframe = Airframe::with_effects(vehicle, effects);
-        let memory = airframe.memory(0, "plant", 1e-3);
+        let effects = airframe.initial_state(0, "plant", 1e-3);
         let body = RigidBody::level_at(Vector3::z());
-        let mut plant = FreeFlight::new(NewtonEuler::flying(airframe, 1), body, memory);
+        let mut plant = FreeFlight::new(NewtonEuler::flying(airframe, 1), body, effects);
         plant.settle_rotors(&[76.5; 4]);
         battery_message(&plant, 7)
     }

@@ -2,10 +2,11 @@
 #![allow(non_snake_case, reason = "a trailing _W names the frame a vector is written in")]
 
 use crate::airframe::Airframe;
+use crate::airframe_state::AirframeState;
 use crate::airworthy;
 use crate::backend::Backend;
+use crate::effects::{self, Quantity};
 use crate::free_flight::FreeFlight;
-use crate::memory::AirframeMemory;
 use crate::newton_euler::NewtonEuler;
 use crate::rapier::Rapier;
 use crate::state::RigidBody;
@@ -179,15 +180,15 @@ impl Parameters {
         // Before the backend, which a vehicle that is none might not survive.
         self.check_flight(&airframe, &scene, run)?;
         let vehicle = airframe.vehicle().clone();
-        let memory = airframe.memory(run.seed, run.name, run.tick_s());
+        let effects = airframe.initial_state(run.seed, run.name, run.tick_s());
         let model = NewtonEuler::flying(airframe, self.substeps);
-        Ok((vehicle, self.fly(model, memory, &scene)?))
+        Ok((vehicle, self.fly(model, effects, &scene)?))
     }
 
     fn fly(
         &self,
         model: NewtonEuler,
-        memory: AirframeMemory,
+        effects: AirframeState,
         scene: &Scene,
     ) -> Result<Box<dyn Backend>, ParameterError> {
         match self.backend {
@@ -198,10 +199,10 @@ impl Parameters {
                     scene.name
                 ),
             )),
-            BackendName::NewtonEuler => Ok(Box::new(FreeFlight::new(model, self.start(), memory))),
+            BackendName::NewtonEuler => Ok(Box::new(FreeFlight::new(model, self.start(), effects))),
             BackendName::Rapier => {
                 let crash_speed_m_s = self.crash_speed_m_s.unwrap_or(CRASH_SPEED_M_S);
-                let rapier = Rapier::new(model, memory, scene, &self.start(), crash_speed_m_s);
+                let rapier = Rapier::new(model, effects, scene, &self.start(), crash_speed_m_s);
                 self.refuse_inside(&rapier, scene)?;
                 Ok(Box::new(rapier))
             }
@@ -254,8 +255,9 @@ impl Parameters {
 
 /// Refuses effects that stand for what the joints of a rig do.
 fn refuse_double_rig(vehicle: &Vehicle, scene: &Scene) -> Result<(), ParameterError> {
-    let is_rig_effect =
-        |entry: &&EffectEntry| ["rig-pendulum", "bearing-friction"].contains(&entry.name.as_str());
+    let is_rig_effect = |entry: &&EffectEntry| {
+        effects::find(&entry.name).is_some_and(|kind| kind.needs.contains(&Quantity::Rig))
+    };
     match vehicle.effects.iter().chain(&scene.effects).find(is_rig_effect) {
         Some(effect) if scene.rig.is_some() => Err(ParameterError::conflict(
             "scene",

@@ -20,11 +20,11 @@ pub mod hull;
 mod rig;
 mod world;
 
-use crate::airframe::Drive;
+use crate::actuation::Actuation;
+use crate::actuation::Battery;
+use crate::airframe_state::AirframeState;
 use crate::backend::{Backend, ContactReport, Neighbour, TRAFFIC_MAX};
-use crate::effects::battery::Battery;
-use crate::memory::AirframeMemory;
-use crate::newton_euler::{Motion, NewtonEuler};
+use crate::newton_euler::{Accelerations, NewtonEuler};
 use crate::snapshot::{Snapshot, SnapshotError};
 use crate::state::{RigidBody, State};
 use contacts::Contacts;
@@ -54,7 +54,7 @@ pub struct Rapier {
     world: World,
     contacts: Contacts,
     state: State,
-    memory: AirframeMemory,
+    effects: AirframeState,
     reaction: Reaction,
 }
 
@@ -70,11 +70,11 @@ struct Reaction {
 impl Rapier {
     /// A vehicle that starts as `body` in `scene`, its rotors at the lowest command; it crashes where it meets
     /// something faster than `crash_speed_m_s`. A body lower than the vehicle stands is raised onto its feet; in
-    /// a rig it is moved to hang from the bearing. `memory` is made by the vehicle's airframe.
+    /// a rig it is moved to hang from the bearing. `effects` are made by the vehicle's airframe.
     #[must_use]
     pub fn new(
         model: NewtonEuler,
-        memory: AirframeMemory,
+        effects: AirframeState,
         scene: &Scene,
         body: &RigidBody,
         crash_speed_m_s: f64,
@@ -92,7 +92,7 @@ impl Rapier {
             world: World::new(vehicle, &hull, scene, rig.as_ref(), body),
             contacts: Contacts::new(1 + scene.boxes.len() + TRAFFIC_MAX),
             state: model.start(*body, 0.0),
-            memory,
+            effects,
             reaction: Reaction::default(),
             model,
         };
@@ -107,9 +107,9 @@ impl Rapier {
     }
 
     /// One step of `span_s`; returns by how much contacts and joints changed the velocities.
-    fn substep(&mut self, drive: &Drive, span_s: f64) -> (Vector3<f64>, Vector3<f64>) {
+    fn substep(&mut self, actuation: &Actuation, span_s: f64) -> (Vector3<f64>, Vector3<f64>) {
         let before = self.state.body;
-        let free = self.model.runge_kutta(&self.state, drive, span_s);
+        let free = self.model.runge_kutta(&self.state, actuation, span_s);
         if !free.body.is_finite() {
             // The world would panic on it; what is published ends the run with the field that is no number.
             self.state = free;
@@ -154,7 +154,7 @@ impl Rapier {
     /// Before anything has moved, what carries a vehicle at rest is what takes its free acceleration away: so its
     /// accelerometer feels g from the first tick on.
     fn lean_on_support(&mut self) {
-        let free = self.model.motion_under(&self.memory.drive, &self.state);
+        let free = self.model.accelerations_under(&self.effects.actuation, &self.state);
         let body = &self.state.body;
         let gravity_W_m_s2 = Vector3::z() * self.model.vehicle().gravity_m_s2;
         let free_W_m_s2 = body.attitude_WB * free.specific_force_B_m_s2 - gravity_W_m_s2;
@@ -207,11 +207,11 @@ impl Backend for Rapier {
         &self.state
     }
 
-    fn motion(&self) -> Motion {
-        let free = self.model.motion_under(&self.memory.drive, &self.state);
+    fn accelerations(&self) -> Accelerations {
+        let free = self.model.accelerations_under(&self.effects.actuation, &self.state);
         let in_body = |v_W: &Vector3<f64>| self.state.body.attitude_WB.inverse_transform_vector(v_W);
         let Reaction { acceleration_W_m_s2, angular_acceleration_W_rad_s2, .. } = &self.reaction;
-        Motion {
+        Accelerations {
             specific_force_B_m_s2: free.specific_force_B_m_s2 + in_body(acceleration_W_m_s2),
             angular_acceleration_B_rad_s2: free.angular_acceleration_B_rad_s2
                 + in_body(angular_acceleration_W_rad_s2),
@@ -219,17 +219,17 @@ impl Backend for Rapier {
     }
 
     fn step(&mut self, commands: &[f64; 4], dt_s: f64, traffic: &[Neighbour]) {
-        let drive = self.model.airframe().begin_tick(&mut self.memory, &self.state, commands, dt_s);
+        let actuation = self.model.airframe().begin_tick(&mut self.effects, &self.state, commands, dt_s);
         let span_s = dt_s / f64::from(self.model.substeps());
         self.contacts.begin_tick();
         let (mut change_W_m_s, mut change_W_rad_s) = (Vector3::zeros(), Vector3::zeros());
         for substep in 1..=self.model.substeps() {
             self.world.move_neighbours(traffic, &self.hull, f64::from(substep) * span_s);
-            let (linear_W_m_s, angular_W_rad_s) = self.substep(&drive, span_s);
+            let (linear_W_m_s, angular_W_rad_s) = self.substep(&actuation, span_s);
             change_W_m_s += linear_W_m_s;
             change_W_rad_s += angular_W_rad_s;
         }
-        self.state.rotors = self.model.airframe().settled(&drive, &self.state.rotors);
+        self.state.rotors = self.model.airframe().settled(&actuation, &self.state.rotors);
         self.reaction = Reaction {
             acceleration_W_m_s2: change_W_m_s / dt_s,
             angular_acceleration_W_rad_s2: change_W_rad_s / dt_s,
@@ -257,13 +257,13 @@ impl Backend for Rapier {
     }
 
     fn battery(&self) -> Option<Battery> {
-        self.model.airframe().battery(&self.memory, &self.state)
+        self.model.airframe().battery(&self.effects, &self.state)
     }
 
     fn snapshot(&self) -> Result<Vec<u8>, SnapshotError> {
         let own = Snapshot::of(NAME)
             .with("state", &self.state)?
-            .with("memory", &self.memory)?
+            .with("effects", &self.effects)?
             .with("reaction", &self.reaction)?
             .with("contacts", &self.contacts)?;
         self.world.write(own)?.bytes()
@@ -272,9 +272,9 @@ impl Backend for Rapier {
     fn restore(&mut self, snapshot: &[u8]) -> Result<(), SnapshotError> {
         let snapshot = Snapshot::read(snapshot, NAME)?;
         let (state, reaction) = (snapshot.get("state")?, snapshot.get("reaction")?);
-        let memory = snapshot.fitting("memory", |memory| self.memory.fits(memory))?;
+        let effects = snapshot.fitting("effects", |effects| self.effects.fits(effects))?;
         let (contacts, world) = (snapshot.get("contacts")?, self.world.read(&snapshot)?);
-        (self.state, self.memory, self.reaction) = (state, memory, reaction);
+        (self.state, self.effects, self.reaction) = (state, effects, reaction);
         (self.contacts, self.world) = (contacts, world);
         Ok(())
     }

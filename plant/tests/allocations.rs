@@ -49,7 +49,7 @@ fn taken(plant: &mut dyn Backend, command: f64, traffic: &[Neighbour]) -> u64 {
     let before = TAKEN.get();
     for _ in 0..1_000 {
         plant.step(&[command; 4], TICK_S, traffic);
-        std::hint::black_box((plant.motion(), plant.contact()));
+        std::hint::black_box((plant.accelerations(), plant.contact()));
     }
     TAKEN.get() - before
 }

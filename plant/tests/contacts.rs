@@ -41,16 +41,16 @@ fn stand_m() -> f64 {
 fn at_rest_on_the_ground_the_accelerometer_feels_g_before_anything_has_moved() {
     let mut plant = plant(&Scene::default(), &RigidBody::level_at(Vector3::zeros()));
     plant.settle_rotors(&IDLE);
-    let felt = plant.motion().specific_force_B_m_s2;
+    let felt = plant.accelerations().specific_force_B_m_s2;
     assert!((felt - Vector3::z() * 9.81).norm() < 1e-9, "{felt:?}");
     assert!(plant.contact().force_W_N.z > 4.0, "the ground carries it: {:?}", plant.contact());
     // More than its weight: the ground does not hold it back.
     plant.settle_rotors(&[120.0; 4]);
-    assert!(plant.motion().specific_force_B_m_s2.z > 10.0);
+    assert!(plant.accelerations().specific_force_B_m_s2.z > 10.0);
     // In the air nothing carries it.
     plant.set_body(&RigidBody::level_at(Vector3::z()));
     plant.settle_rotors(&IDLE);
-    assert!(plant.motion().specific_force_B_m_s2.z < 1.0);
+    assert!(plant.accelerations().specific_force_B_m_s2.z < 1.0);
 }
 
 /// Its front feet 0.2 mm above the ground, coming down slowly; its nose coming down fast.
@@ -116,7 +116,7 @@ fn the_ground_carries_what_the_rotors_do_not_and_the_accelerometer_feels_g() {
     let mean_N = reports[1_000..].iter().map(|report| report.force_W_N).sum::<Vector3<f64>>() / 1_000.0;
     let expected_N = Vector3::z() * (vehicle.mass_kg * vehicle.gravity_m_s2 - lift_N);
     assert!((mean_N - expected_N).norm() < 0.02, "{mean_N:?} {expected_N:?}");
-    let felt = plant.motion().specific_force_B_m_s2;
+    let felt = plant.accelerations().specific_force_B_m_s2;
     assert!((felt - Vector3::z() * 9.81).norm() < 0.05, "{felt:?}");
 }
 

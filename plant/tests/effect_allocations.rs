@@ -43,14 +43,14 @@ static ALLOCATOR: Counting = Counting;
 fn a_tick_with_all_effects_allocates_nothing() {
     let vehicle = hummingbird();
     let hover = vehicle.hover_command();
-    let effects = CATALOGUE.iter().map(|kind| kind.typical()).collect();
+    let effects = CATALOGUE.iter().map(|kind| kind.nominal()).collect();
     let model = NewtonEuler::flying(Airframe::with_effects(vehicle, effects), 2);
-    let mut memory = model.airframe().memory(1, "plant", TICK_S);
+    let mut effects = model.airframe().initial_state(1, "plant", TICK_S);
     let mut state = model.start(RigidBody::level_at(Vector3::z()), hover);
     let before = ALLOCATIONS.get();
     for _ in 0..1000 {
-        let drive = model.airframe().begin_tick(&mut memory, &state, &[hover; 4], TICK_S);
-        model.advance(&mut state, &drive, TICK_S);
+        let actuation = model.airframe().begin_tick(&mut effects, &state, &[hover; 4], TICK_S);
+        model.advance(&mut state, &actuation, TICK_S);
     }
     assert_eq!(ALLOCATIONS.get() - before, 0);
 }

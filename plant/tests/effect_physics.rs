@@ -6,7 +6,7 @@ mod common;
 use common::{TICK_S, free_body, hummingbird};
 use nalgebra::{UnitQuaternion, Vector3};
 use plant::effects::{Effect, find};
-use plant::{Airframe, AirframeMemory, Motion, NewtonEuler, RigidBody, State};
+use plant::{Accelerations, Airframe, AirframeState, NewtonEuler, RigidBody, State};
 use vehicles::{MotorModel, Vehicle};
 
 fn effect(name: &str, values: &[f64]) -> Effect {
@@ -17,7 +17,7 @@ fn effect(name: &str, values: &[f64]) -> Effect {
 
 struct Flight {
     model: NewtonEuler,
-    memory: AirframeMemory,
+    effects: AirframeState,
     state: State,
 }
 
@@ -27,8 +27,8 @@ impl Flight {
         let state =
             NewtonEuler::new(vehicle.clone(), 1).start(RigidBody::level_at(Vector3::z() * 10.0), command);
         let model = NewtonEuler::flying(Airframe::with_effects(vehicle, effects), 1);
-        let memory = model.airframe().memory(1, "plant", TICK_S);
-        Self { model, memory, state }
+        let carried = model.airframe().initial_state(1, "plant", TICK_S);
+        Self { model, effects: carried, state }
     }
 
     fn hovering(effects: Vec<Effect>) -> Self {
@@ -39,17 +39,17 @@ impl Flight {
 
     fn fly(&mut self, command: f64, ticks: usize) {
         for _ in 0..ticks {
-            let drive =
-                self.model.airframe().begin_tick(&mut self.memory, &self.state, &[command; 4], TICK_S);
-            self.model.advance(&mut self.state, &drive, TICK_S);
+            let actuation =
+                self.model.airframe().begin_tick(&mut self.effects, &self.state, &[command; 4], TICK_S);
+            self.model.advance(&mut self.state, &actuation, TICK_S);
         }
     }
 
     /// What it feels now, once a tick has begun.
-    fn motion(&mut self) -> Motion {
+    fn accelerations(&mut self) -> Accelerations {
         let hover = hummingbird().hover_command();
-        let drive = self.model.airframe().begin_tick(&mut self.memory, &self.state, &[hover; 4], TICK_S);
-        self.model.motion_under(&drive, &self.state)
+        let actuation = self.model.airframe().begin_tick(&mut self.effects, &self.state, &[hover; 4], TICK_S);
+        self.model.accelerations_under(&actuation, &self.state)
     }
 }
 
@@ -69,12 +69,12 @@ fn rotor_drag_pushes_back_with_c_w_v_and_the_wind_pushes_too() {
     let mut flight = Flight::hovering(vec![drag]);
     flight.state.body.velocity_W_m_s = Vector3::new(2.0, -1.0, 5.0);
     let speed_rad_s = flight.state.rotors[0].speed_rad_s;
-    let force_N = flight.motion().specific_force_B_m_s2 * 0.480;
+    let force_N = flight.accelerations().specific_force_B_m_s2 * 0.480;
     let expected_N = Vector3::new(-2.0, 1.0, 0.0) * (4.0 * 8e-5 * speed_rad_s);
     assert!((force_N.xy() - expected_N.xy()).norm() < 1e-12);
     // Standing in the opposite wind is the same.
     let mut still = Flight::hovering(vec![effect("wind", &[-2.0, 1.0, -5.0]), drag]);
-    assert!((still.motion().specific_force_B_m_s2 * 0.480 - force_N).norm() < 1e-12);
+    assert!((still.accelerations().specific_force_B_m_s2 * 0.480 - force_N).norm() < 1e-12);
 }
 
 #[test]
@@ -82,7 +82,7 @@ fn a_yawing_vehicle_is_braked_at_its_hubs() {
     let mut flight = Flight::hovering(vec![effect("rotor-drag", &[8e-5])]);
     flight.state.body.angular_velocity_B_rad_s.z = 3.0;
     let brake_N_m = 4.0 * 8e-5 * flight.state.rotors[0].speed_rad_s * 0.17 * 0.17 * 3.0;
-    assert!((flight.motion().angular_acceleration_B_rad_s2.z + brake_N_m / 8.1e-3).abs() < 1e-9);
+    assert!((flight.accelerations().angular_acceleration_B_rad_s2.z + brake_N_m / 8.1e-3).abs() < 1e-9);
 }
 
 #[test]
@@ -90,7 +90,7 @@ fn climbing_costs_thrust_and_flying_sideways_gains_some() {
     let lift_N = |velocity_W_m_s: Vector3<f64>| {
         let mut flight = Flight::hovering(vec![effect("translational-lift", &[2e-4, 3e-3])]);
         flight.state.body.velocity_W_m_s = velocity_W_m_s;
-        flight.motion().specific_force_B_m_s2.z * 0.480
+        flight.accelerations().specific_force_B_m_s2.z * 0.480
     };
     let (weight_N, speed_rad_s) = (0.480 * 9.81, hummingbird().hover_speed_rad_s());
     assert!((lift_N(Vector3::z()) - (weight_N - 4.0 * 2e-4 * speed_rad_s)).abs() < 1e-9);
@@ -101,7 +101,7 @@ fn climbing_costs_thrust_and_flying_sideways_gains_some() {
 fn flapping_pushes_back_and_turns_the_nose_up() {
     let mut flight = Flight::hovering(vec![effect("blade-flapping", &[5e-3, 0.2])]);
     flight.state.body.velocity_W_m_s = Vector3::x() * 2.0;
-    let motion = flight.motion();
+    let motion = flight.accelerations();
     assert!((motion.specific_force_B_m_s2.x + 9.81 * 0.01).abs() < 1e-9, "thrust tilted back by 0.01 rad");
     assert!((motion.angular_acceleration_B_rad_s2.y + 4.0 * 0.2 * 0.01 / 5.6e-3).abs() < 1e-9, "nose up");
     assert!(motion.angular_acceleration_B_rad_s2.xz().norm() < 1e-9);
@@ -111,16 +111,16 @@ fn flapping_pushes_back_and_turns_the_nose_up() {
 fn a_radius_above_the_ground_thrust_is_a_fifteenth_more() {
     let mut flight = Flight::hovering(vec![effect("ground-effect", &[1.0, 0.1016])]);
     flight.state.body.position_W_m.z = 0.1016;
-    assert!((flight.motion().specific_force_B_m_s2.z / 9.81 - 16.0 / 15.0).abs() < 1e-9);
+    assert!((flight.accelerations().specific_force_B_m_s2.z / 9.81 - 16.0 / 15.0).abs() < 1e-9);
     // The lower side of a tilted vehicle is lifted more: it is levelled.
     flight.state.body.attitude_WB = UnitQuaternion::from_euler_angles(0.1, 0.0, 0.0);
-    assert!(flight.motion().angular_acceleration_B_rad_s2.x < -0.1);
+    assert!(flight.accelerations().angular_acceleration_B_rad_s2.x < -0.1);
 }
 
 #[test]
 fn a_heavy_vehicle_sinks_and_a_strong_one_climbs() {
     let z_m_s2 = |name: &str, error: f64| {
-        Flight::hovering(vec![effect(name, &[error])]).motion().specific_force_B_m_s2.z
+        Flight::hovering(vec![effect(name, &[error])]).accelerations().specific_force_B_m_s2.z
     };
     assert!((z_m_s2("mass-error", 0.1) - 9.81 / 1.1).abs() < 1e-9);
     assert!((z_m_s2("thrust-scale", 0.1) - 9.81 * 1.1).abs() < 1e-9);
@@ -128,7 +128,8 @@ fn a_heavy_vehicle_sinks_and_a_strong_one_climbs() {
 
 #[test]
 fn thrust_behind_the_centre_of_mass_lowers_the_nose_and_a_weak_rotor_drops() {
-    let acceleration = |effect: Effect| Flight::hovering(vec![effect]).motion().angular_acceleration_B_rad_s2;
+    let acceleration =
+        |effect: Effect| Flight::hovering(vec![effect]).accelerations().angular_acceleration_B_rad_s2;
     let weight_N = 0.480 * 9.81;
     let ahead = acceleration(effect("com-offset", &[0.01, 0.0, 0.0]));
     assert!((ahead - Vector3::y() * (weight_N * 0.01 / 5.6e-3)).norm() < 1e-9, "{ahead}");
@@ -149,7 +150,7 @@ fn inertia_and_gyroscopic_torque_scale() {
     flight.state.rotors[0].speed_rad_s = 0.0;
     flight.state.rotors[2].speed_rad_s = 0.0;
     flight.state.body.angular_velocity_B_rad_s = Vector3::x();
-    assert_eq!(flight.motion().angular_acceleration_B_rad_s2.y, 0.0);
+    assert_eq!(flight.accelerations().angular_acceleration_B_rad_s2.y, 0.0);
 }
 
 #[test]
@@ -171,7 +172,7 @@ fn a_slower_motor_is_the_same_motor_in_slower_time() {
 fn a_loaded_battery_sags_and_empties_as_ohm_and_coulomb_say() {
     // R, D, q_0, U_0, C, eta.
     let mut flight = Flight::hovering(vec![effect("battery-sag", &[0.05, 2.0, 0.1, 12.6, 7560.0, 0.7])]);
-    let battery = flight.model.airframe().battery(&flight.memory, &flight.state).unwrap();
+    let battery = flight.model.airframe().battery(&flight.effects, &flight.state).unwrap();
     let speed_rad_s = flight.state.rotors[0].speed_rad_s;
     let power_W = 4.0 * flight.model.vehicle().torque_coefficient * speed_rad_s.powi(3) / 0.7;
     assert!((battery.voltage_V * battery.current_A - power_W).abs() < 1e-9);
@@ -180,17 +181,17 @@ fn a_loaded_battery_sags_and_empties_as_ohm_and_coulomb_say() {
     let hover = hummingbird().hover_command();
     flight.fly(hover, 1);
     let target_rad_s = speed_rad_s * battery.voltage_V / 12.6;
-    assert!((flight.memory.drive.targets_rad_s[0] - target_rad_s).abs() < 1e-9);
-    let after = flight.model.airframe().battery(&flight.memory, &flight.state).unwrap();
+    assert!((flight.effects.actuation.targets_rad_s[0] - target_rad_s).abs() < 1e-9);
+    let after = flight.model.airframe().battery(&flight.effects, &flight.state).unwrap();
     assert!((battery.charge - after.charge - battery.current_A * TICK_S / 7560.0).abs() < 1e-12);
 }
 
 #[test]
 fn a_battery_that_cannot_give_the_power_gives_what_it_can() {
     let flight = Flight::hovering(vec![effect("battery-sag", &[1.0, 0.0, 0.0, 12.6, 7560.0, 0.7])]);
-    let battery = flight.model.airframe().battery(&flight.memory, &flight.state).unwrap();
+    let battery = flight.model.airframe().battery(&flight.effects, &flight.state).unwrap();
     assert_eq!((battery.voltage_V, battery.current_A), (6.3, 6.3));
-    assert!(Flight::hovering(Vec::new()).model.airframe().battery(&flight.memory, &flight.state).is_none());
+    assert!(Flight::hovering(Vec::new()).model.airframe().battery(&flight.effects, &flight.state).is_none());
 }
 
 #[test]

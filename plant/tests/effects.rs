@@ -5,9 +5,9 @@ mod common;
 
 use common::{TICK_S, crazyflie, hummingbird};
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
-use plant::effects::situation::Situation;
+use plant::effects::FlightCondition;
 use plant::effects::{Action, CATALOGUE, Effect, EffectKind, Values, find};
-use plant::{Airframe, AirframeMemory, NewtonEuler, RigidBody, RotorState, State, Wrench};
+use plant::{Airframe, AirframeState, NewtonEuler, RigidBody, RotorState, State, Wrench};
 use proptest::prelude::*;
 use vehicles::Vehicle;
 
@@ -46,7 +46,8 @@ const FREE_OF_THE_VERTICAL: [&str; 6] = [
 
 #[test]
 fn the_catalogue_has_the_names_that_files_use() {
-    assert_eq!(CATALOGUE.map(|kind| kind.name), NAMES);
+    let known: Vec<_> = CATALOGUE.iter().map(|kind| kind.name).filter(|name| NAMES.contains(name)).collect();
+    assert_eq!(known, NAMES);
     assert!(NAMES.iter().all(|name| find(name).is_some()));
     assert!(find("no-such-effect").is_none());
 }
@@ -61,10 +62,10 @@ fn the_page_of_effects_is_the_catalogues() {
 #[test]
 fn every_specification_is_whole() {
     for spec in CATALOGUE.iter().flat_map(|kind| kind.parameters) {
-        assert!(spec.lower < spec.upper && (spec.lower..=spec.upper).contains(&spec.typical), "{spec:?}");
-        assert!(spec.neutral.is_none_or(|neutral| (spec.lower..=spec.upper).contains(&neutral)), "{spec:?}");
+        assert!(spec.min < spec.max && (spec.min..=spec.max).contains(&spec.nominal), "{spec:?}");
+        assert!(spec.neutral.is_none_or(|neutral| (spec.min..=spec.max).contains(&neutral)), "{spec:?}");
         assert_eq!(spec.dimension.units[0].1, 1.0, "{spec:?}: its first unit has to be that of the SI");
-        assert!(!spec.meaning.is_empty() && !spec.typical_source.is_empty(), "{spec:?}");
+        assert!(!spec.meaning.is_empty() && !spec.nominal_source.is_empty(), "{spec:?}");
     }
     for kind in CATALOGUE {
         assert!(!kind.parameters.is_empty() && !kind.actions.is_empty(), "{}", kind.name);
@@ -76,20 +77,20 @@ fn every_specification_is_whole() {
 /// A flight with the effects it is given, tick by tick.
 struct Flight {
     model: NewtonEuler,
-    memory: AirframeMemory,
+    effects: AirframeState,
     state: State,
 }
 
 impl Flight {
     fn new(vehicle: Vehicle, effects: &[Effect], state: State) -> Self {
         let model = NewtonEuler::flying(Airframe::with_effects(vehicle, effects.to_vec()), 1);
-        let memory = model.airframe().memory(5, "plant", TICK_S);
-        Self { model, memory, state }
+        let carried = model.airframe().initial_state(5, "plant", TICK_S);
+        Self { model, effects: carried, state }
     }
 
     fn tick(&mut self, commands: &[f64; 4]) {
-        let drive = self.model.airframe().begin_tick(&mut self.memory, &self.state, commands, TICK_S);
-        self.model.advance(&mut self.state, &drive, TICK_S);
+        let actuation = self.model.airframe().begin_tick(&mut self.effects, &self.state, commands, TICK_S);
+        self.model.advance(&mut self.state, &actuation, TICK_S);
     }
 
     /// Commands that swing about hover, each with a rhythm of its own.
@@ -119,7 +120,7 @@ fn end(effects: &[Effect]) -> State {
 
 /// An effect, and behind it those that feel the air and push sideways at the hubs.
 fn with_drag(effect: Option<Effect>) -> Vec<Effect> {
-    let drag = ["rotor-drag", "parasitic-drag"].map(|name| find(name).unwrap().typical());
+    let drag = ["rotor-drag", "parasitic-drag"].map(|name| find(name).unwrap().nominal());
     let is_other = |drag: &Effect| effect.is_none_or(|effect| effect.kind.name != drag.kind.name);
     effect.into_iter().chain(drag.into_iter().filter(is_other)).collect()
 }
@@ -138,40 +139,40 @@ fn with_neutral_parameters_an_effect_does_nothing_to_the_last_bit() {
 #[test]
 fn every_parameter_of_every_effect_matters() {
     for kind in CATALOGUE {
-        let typical = end(&with_drag(Some(kind.typical())));
+        let nominal = end(&with_drag(Some(kind.nominal())));
         for (i, spec) in kind.parameters.iter().enumerate() {
-            let mut changed = kind.typical();
-            changed.values[i] = 0.5 * (spec.typical + spec.upper);
-            assert!(end(&with_drag(Some(changed))) != typical, "{}.{} does nothing", kind.name, spec.name);
+            let mut changed = kind.nominal();
+            changed.values[i] = 0.5 * (spec.nominal + spec.max);
+            assert!(end(&with_drag(Some(changed))) != nominal, "{}.{} does nothing", kind.name, spec.name);
         }
     }
 }
 
 #[test]
 fn effects_of_the_same_flight_are_the_same_and_another_seed_is_another_gust() {
-    let all: Vec<Effect> = CATALOGUE.iter().map(|kind| kind.typical()).collect();
+    let all: Vec<Effect> = CATALOGUE.iter().map(|kind| kind.nominal()).collect();
     assert_eq!(end(&all), end(&all));
     let mut flight = Flight::new(hummingbird(), &all, lively());
-    flight.memory = flight.model.airframe().memory(6, "plant", TICK_S);
+    flight.effects = flight.model.airframe().initial_state(6, "plant", TICK_S);
     flight.swing(0..300);
     assert!(flight.state != end(&all));
 }
 
 #[test]
-fn a_memory_written_down_and_read_back_goes_on_to_the_same_bits() {
-    let all: Vec<Effect> = CATALOGUE.iter().map(|kind| kind.typical()).collect();
+fn a_state_of_effects_written_down_and_read_back_goes_on_to_the_same_bits() {
+    let all: Vec<Effect> = CATALOGUE.iter().map(|kind| kind.nominal()).collect();
     let mut flight = Flight::new(hummingbird(), &all, lively());
     flight.swing(0..123);
-    let written = serde_json::to_string(&flight.memory).unwrap();
+    let written = serde_json::to_string(&flight.effects).unwrap();
     let mut restored = Flight::new(hummingbird(), &all, flight.state);
-    restored.memory = serde_json::from_str(&written).unwrap();
-    assert_eq!(restored.memory, flight.memory);
+    restored.effects = serde_json::from_str(&written).unwrap();
+    assert_eq!(restored.effects, flight.effects);
     flight.swing(123..600);
     restored.swing(123..600);
     assert_eq!(restored.state, flight.state);
     assert_eq!(
-        serde_json::to_string(&restored.memory).unwrap(),
-        serde_json::to_string(&flight.memory).unwrap()
+        serde_json::to_string(&restored.effects).unwrap(),
+        serde_json::to_string(&flight.effects).unwrap()
     );
 }
 
@@ -216,7 +217,7 @@ prop_compose! {
 fn between_bounds(kind: &'static EffectKind, shares: &[f64]) -> Effect {
     let mut effect = kind.neutral();
     for ((value, spec), share) in effect.values.iter_mut().zip(kind.parameters).zip(shares) {
-        *value = spec.lower + share * (spec.upper - spec.lower);
+        *value = spec.min + share * (spec.max - spec.min);
     }
     effect
 }
@@ -226,7 +227,7 @@ fn shares() -> impl Strategy<Value = Vec<f64>> {
     prop::collection::vec(prop_oneof![Just(0.0), Just(1.0), 0.0..1.0], 6)
 }
 
-fn wrench(effect: &Effect, situation: &Situation) -> Wrench {
+fn wrench(effect: &Effect, situation: &FlightCondition) -> Wrench {
     let mut sum = Wrench::default();
     for action in effect.kind.actions {
         if let Action::Wrench(wrench) = action {
@@ -237,7 +238,7 @@ fn wrench(effect: &Effect, situation: &Situation) -> Wrench {
 }
 
 /// Force, torque and changes of thrust.
-fn answer(effect: &Effect, situation: &Situation) -> Vec<f64> {
+fn answer(effect: &Effect, situation: &FlightCondition) -> Vec<f64> {
     let wrench = wrench(effect, situation);
     let mut numbers: Vec<f64> = wrench.force_B_N.iter().chain(wrench.torque_B_N_m.iter()).copied().collect();
     for action in effect.kind.actions {
@@ -259,7 +260,11 @@ fn turned(state: &State, turn: &UnitQuaternion<f64>, shift_W_m: Vector3<f64>) ->
     State { body, ..*state }
 }
 
-fn require_same(effect: &Effect, one: &Situation, other: &Situation) -> Result<(), TestCaseError> {
+fn require_same(
+    effect: &Effect,
+    one: &FlightCondition,
+    other: &FlightCondition,
+) -> Result<(), TestCaseError> {
     for (one, other) in answer(effect, one).into_iter().zip(answer(effect, other)) {
         let slack = 1e-9 * (1.0 + one.abs());
         prop_assert!((one - other).abs() < slack, "{}: {one} and {other}", effect.kind.name);
@@ -267,7 +272,7 @@ fn require_same(effect: &Effect, one: &Situation, other: &Situation) -> Result<(
     Ok(())
 }
 
-fn power_W(wrench: &Wrench, situation: &Situation) -> f64 {
+fn power_W(wrench: &Wrench, situation: &FlightCondition) -> f64 {
     wrench.force_B_N.dot(&situation.airspeed_B_m_s)
         + wrench.torque_B_N_m.dot(&situation.angular_velocity_B_rad_s)
 }
@@ -284,15 +289,15 @@ proptest! {
     ) {
         for (kind, vehicle) in CATALOGUE.into_iter().flat_map(|kind| [(kind, hummingbird()), (kind, crazyflie())]) {
             let effect = between_bounds(kind, &shares);
-            let answer = answer(&effect, &Situation::new(&vehicle, &state, &air_W_m_s));
+            let answer = answer(&effect, &FlightCondition::new(&vehicle, &state, &air_W_m_s));
             prop_assert!(answer.iter().all(|number| number.is_finite()), "{}: {answer:?}", kind.name);
             let airframe = Airframe::with_effects(vehicle, vec![effect]);
-            let mut memory = airframe.memory(1, "plant", TICK_S);
+            let mut carried = airframe.initial_state(1, "plant", TICK_S);
             for _ in 0..5 {
-                let drive = airframe.begin_tick(&mut memory, &state, &commands, TICK_S);
-                prop_assert!(drive.targets_rad_s.iter().all(|target| target.is_finite()), "{}", kind.name);
-                prop_assert!(drive.thrust_deviation.iter().all(|part| part.is_finite()), "{}", kind.name);
-                prop_assert!(drive.air_velocity_W_m_s.iter().all(|speed| speed.is_finite()), "{}", kind.name);
+                let actuation = airframe.begin_tick(&mut carried, &state, &commands, TICK_S);
+                prop_assert!(actuation.targets_rad_s.iter().all(|target| target.is_finite()), "{}", kind.name);
+                prop_assert!(actuation.thrust_deviation.iter().all(|part| part.is_finite()), "{}", kind.name);
+                prop_assert!(actuation.air_velocity_W_m_s.iter().all(|speed| speed.is_finite()), "{}", kind.name);
             }
         }
     }
@@ -321,8 +326,8 @@ proptest! {
         let state_turned = turned(&state, &turn, Vector3::new(shift.x, shift.y, 0.0));
         for kind in CATALOGUE {
             let effect = between_bounds(kind, &shares);
-            let one = Situation::new(&vehicle, &state, &air_W_m_s);
-            require_same(&effect, &one, &Situation::new(&vehicle, &state_turned, &(turn * air_W_m_s)))?;
+            let one = FlightCondition::new(&vehicle, &state, &air_W_m_s);
+            require_same(&effect, &one, &FlightCondition::new(&vehicle, &state_turned, &(turn * air_W_m_s)))?;
         }
     }
 
@@ -338,8 +343,8 @@ proptest! {
         let state_turned = turned(&state, &turn, shift);
         for name in FREE_OF_THE_VERTICAL {
             let effect = between_bounds(find(name).unwrap(), &shares);
-            let one = Situation::new(&vehicle, &state, &air_W_m_s);
-            require_same(&effect, &one, &Situation::new(&vehicle, &state_turned, &(turn * air_W_m_s)))?;
+            let one = FlightCondition::new(&vehicle, &state, &air_W_m_s);
+            require_same(&effect, &one, &FlightCondition::new(&vehicle, &state_turned, &(turn * air_W_m_s)))?;
         }
     }
 
@@ -350,13 +355,13 @@ proptest! {
         air_W_m_s in vector(10.0),
     ) {
         let vehicle = hummingbird();
-        let situation = Situation::new(&vehicle, &state, &air_W_m_s);
+        let situation = FlightCondition::new(&vehicle, &state, &air_W_m_s);
         for name in ["rotor-drag", "parasitic-drag", "bearing-friction"] {
             let wrench = wrench(&between_bounds(find(name).unwrap(), &shares), &situation);
             prop_assert!(power_W(&wrench, &situation) <= 0.0, "{name}");
         }
         // The hub's torque of a flapping rotor may work on a turning body; its force may not.
-        let still = Situation { angular_velocity_B_rad_s: Vector3::zeros(), ..situation };
+        let still = FlightCondition { angular_velocity_B_rad_s: Vector3::zeros(), ..situation };
         let flapping = wrench(&between_bounds(find("blade-flapping").unwrap(), &shares), &still);
         prop_assert!(power_W(&flapping, &still) <= 0.0);
     }
@@ -372,7 +377,7 @@ proptest! {
         let at = |height_m: f64| {
             let body = RigidBody::level_at(Vector3::z() * height_m);
             let state = State { body, rotors: [RotorState::steady(400.0); 4] };
-            answer(&effect, &Situation::new(&vehicle, &state, &Vector3::zeros()))[6]
+            answer(&effect, &FlightCondition::new(&vehicle, &state, &Vector3::zeros()))[6]
         };
         let (low, high, far) = (at(low_m), at(low_m + step_m), at(1000.0));
         prop_assert!(low >= high && high >= far && far >= 0.0, "{low} {high} {far}");
@@ -381,13 +386,13 @@ proptest! {
 }
 
 /// Draws of an effect's own numbers while the vehicle stands still at a height.
-fn lags(name: &str, values: Values, height_m: f64, dt_s: f64, ticks: usize) -> Vec<plant::Drive> {
+fn lags(name: &str, values: Values, height_m: f64, dt_s: f64, ticks: usize) -> Vec<plant::Actuation> {
     let effect = Effect { kind: find(name).unwrap(), values };
     let airframe = Airframe::with_effects(hummingbird(), vec![effect]);
-    let mut memory = airframe.memory(3, "plant", dt_s);
+    let mut carried = airframe.initial_state(3, "plant", dt_s);
     let body = RigidBody::level_at(Vector3::z() * height_m);
     let state = State { body, rotors: [RotorState::steady(400.0); 4] };
-    (0..ticks).map(|_| airframe.begin_tick(&mut memory, &state, &[76.5; 4], dt_s)).collect()
+    (0..ticks).map(|_| airframe.begin_tick(&mut carried, &state, &[76.5; 4], dt_s)).collect()
 }
 
 /// Standard deviation, and the autocorrelation after `lag` samples.
@@ -401,14 +406,15 @@ fn spread(samples: &[f64], lag: usize) -> (f64, f64) {
 fn turbulence_has_the_strength_and_length_of_the_specification() {
     // At 30.48 m, 100 feet, in a wind of 10 m/s: the bounds are six standard deviations of the estimates.
     let (dt_s, ticks) = (0.1, 400_000);
-    let drives = lags("turbulence", [10.0, 0.0, 0.0, 0.0, 0.0, 0.0], 30.48, dt_s, ticks);
+    let actuations = lags("turbulence", [10.0, 0.0, 0.0, 0.0, 0.0, 0.0], 30.48, dt_s, ticks);
     let shape: f64 = 0.177 + 0.0823;
     for (axis, sigma_m_s, length_m) in [
         (0, 1.0 / libm::pow(shape, 0.4), 30.48 / libm::pow(shape, 1.2)),
         (1, 1.0 / libm::pow(shape, 0.4), 30.48 / libm::pow(shape, 1.2)),
         (2, 1.0, 30.48),
     ] {
-        let samples: Vec<f64> = drives.iter().map(|drive| drive.air_velocity_W_m_s[axis]).collect();
+        let samples: Vec<f64> =
+            actuations.iter().map(|actuation| actuation.air_velocity_W_m_s[axis]).collect();
         let time_s = length_m / 10.0;
         let (sigma, correlation) = spread(&samples, (time_s / dt_s) as usize);
         let draws = ticks as f64 * dt_s / (2.0 * time_s);
@@ -424,8 +430,8 @@ fn turbulence_has_the_strength_and_length_of_the_specification() {
 fn turbulence_near_the_ground_fades_with_height_and_differs_between_rotors() {
     let values = [0.1, 0.3, 0.05, 0.0, 0.0, 0.0];
     let sigma = |height_m: f64| {
-        let drives = lags("ground-turbulence", values, height_m, TICK_S, 200_000);
-        spread(&drives.iter().map(|drive| drive.thrust_deviation[0]).collect::<Vec<_>>(), 50)
+        let actuations = lags("ground-turbulence", values, height_m, TICK_S, 200_000);
+        spread(&actuations.iter().map(|actuation| actuation.thrust_deviation[0]).collect::<Vec<_>>(), 50)
     };
     let ((ground, correlation), (above, _)) = (sigma(0.0), sigma(0.6));
     assert!(
@@ -433,9 +439,12 @@ fn turbulence_near_the_ground_fades_with_height_and_differs_between_rotors() {
         "{ground} {correlation}"
     );
     assert!((above / ground - libm::exp(-2.0)).abs() < 1e-9, "the same draws, weaker: {above} {ground}");
-    let drives = lags("ground-turbulence", values, 0.0, TICK_S, 200_000);
+    let actuations = lags("ground-turbulence", values, 0.0, TICK_S, 200_000);
     let product = |a: usize, b: usize| {
-        drives.iter().map(|drive| drive.thrust_deviation[a] * drive.thrust_deviation[b]).sum::<f64>()
+        actuations
+            .iter()
+            .map(|actuation| actuation.thrust_deviation[a] * actuation.thrust_deviation[b])
+            .sum::<f64>()
             / 200_000.0
     };
     assert!(product(0, 1).abs() < 0.1 * product(0, 0) && product(2, 3).abs() < 0.1 * product(0, 0));

@@ -28,11 +28,11 @@ fn without_thrust_it_falls_as_galileo_says() {
 fn falling_feels_no_force_and_hovering_feels_g() {
     let model = NewtonEuler::new(free_body(), 1);
     let state = model.start(RigidBody::level_at(Vector3::zeros()), 100.0);
-    assert_eq!(model.motion(&state).specific_force_B_m_s2, Vector3::zeros());
+    assert_eq!(model.accelerations(&state).specific_force_B_m_s2, Vector3::zeros());
     let (model, mut state, _) = hovering(hummingbird());
     // Tilted, the rotors still push along z of the body.
     state.body.attitude_WB = UnitQuaternion::from_euler_angles(0.4, -0.3, 2.0);
-    let motion = model.motion(&state);
+    let motion = model.accelerations(&state);
     assert!((motion.specific_force_B_m_s2 - Vector3::new(0.0, 0.0, 9.81)).norm() < 1e-12);
     assert_eq!(motion.angular_acceleration_B_rad_s2.norm(), 0.0);
 }

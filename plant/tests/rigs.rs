@@ -104,7 +104,7 @@ fn the_accelerometer_feels_g_where_the_rope_carries_the_vehicle() {
     for _ in 0..1_000 {
         plant.step(&[1.0; 4], TICK_S, &[]);
     }
-    let felt = plant.motion().specific_force_B_m_s2;
+    let felt = plant.accelerations().specific_force_B_m_s2;
     assert!((felt - Vector3::z() * 9.81).norm() < 1e-3, "{felt:?}");
     assert_eq!(plant.contact().count, 0, "a rig is no contact");
 }
@@ -115,13 +115,13 @@ fn hung_at_rest_the_accelerometer_feels_g_before_anything_has_moved() {
         for command in [1.0, 78.0] {
             let mut plant = hanging(&scene(text), 30.0);
             plant.settle_rotors(&[command; 4]);
-            let felt = plant.motion().specific_force_B_m_s2;
+            let felt = plant.accelerations().specific_force_B_m_s2;
             assert!((felt - Vector3::z() * 9.81).norm() < 1e-9, "{felt:?}");
         }
     }
     let mut plant = hanging(&scene(SLIDING), 0.0);
     plant.settle_rotors(&[120.0; 4]);
-    assert!(plant.motion().specific_force_B_m_s2.z > 10.0, "it rises");
+    assert!(plant.accelerations().specific_force_B_m_s2.z > 10.0, "it rises");
 }
 
 #[test]
@@ -129,10 +129,10 @@ fn the_bearing_holds_the_frame_where_it_is_whatever_the_centre_of_mass() {
     let kind = plant::effects::find("com-offset").unwrap();
     let effect = plant::effects::Effect { kind, values: [0.02, -0.01, 0.005, 0.0, 0.0, 0.0] };
     let model = NewtonEuler::flying(Airframe::with_effects(hummingbird(), vec![effect]), 1);
-    let memory = model.airframe().memory(0, "plant", TICK_S);
+    let effects = model.airframe().initial_state(0, "plant", TICK_S);
     let scene = scene(FIXED);
     let rig = scene.rig.unwrap();
-    let mut plant = Rapier::new(model, memory, &scene, &RigidBody::level_at(Vector3::zeros()), 1.0);
+    let mut plant = Rapier::new(model, effects, &scene, &RigidBody::level_at(Vector3::zeros()), 1.0);
     for tick in 0..500 {
         let body = plant.state().body;
         let mount_B_m = rig.mount_B_m - Vector3::new(0.02, -0.01, 0.005);

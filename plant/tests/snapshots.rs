@@ -10,7 +10,7 @@ use plant::{Airframe, Backend, FreeFlight, Neighbour, NewtonEuler, Rapier, Rigid
 use scenes::Scene;
 
 /// A situation that is caught in the middle.
-struct Situation {
+struct FlightCondition {
     name: &'static str,
     scene: &'static str,
     start: RigidBody,
@@ -35,7 +35,7 @@ fn uneven(tick: u32) -> [f64; 4] {
     [76.5 + swing, 80.0, 76.5 - swing, 70.0]
 }
 
-fn situations() -> [Situation; 4] {
+fn situations() -> [FlightCondition; 4] {
     let tumbling = RigidBody {
         position_W_m: Vector3::new(4.2, 0.0, 0.6),
         velocity_W_m_s: Vector3::new(1.0, 0.3, -1.0),
@@ -48,26 +48,26 @@ fn situations() -> [Situation; 4] {
     let fixed = include_str!("../../scenes/rig-fixed.toml");
     let falling = |_| [1.0; 4];
     [
-        Situation {
+        FlightCondition {
             name: "a crash into wall and floor",
             scene: room,
             start: tumbling,
             commands: falling,
             traffic: nobody,
         },
-        Situation {
+        FlightCondition {
             name: "among traffic",
             scene: room,
             start: tumbling,
             commands: falling,
             traffic: somebody,
         },
-        Situation { name: "rig A", scene: sliding, start: at_rest, commands: uneven, traffic: nobody },
-        Situation { name: "rig B", scene: fixed, start: at_rest, commands: uneven, traffic: nobody },
+        FlightCondition { name: "rig A", scene: sliding, start: at_rest, commands: uneven, traffic: nobody },
+        FlightCondition { name: "rig B", scene: fixed, start: at_rest, commands: uneven, traffic: nobody },
     ]
 }
 
-impl Situation {
+impl FlightCondition {
     fn plant(&self) -> Rapier {
         let scene = Scene::parse(self.scene, "scene.toml").unwrap();
         let mut plant = common::rapier(NewtonEuler::new(hummingbird(), 1), &scene, &self.start, 1.0);
@@ -86,7 +86,11 @@ impl Situation {
 fn assert_same(name: &str, a: &dyn Backend, b: &dyn Backend) {
     let difference = first_difference(&a.snapshot().unwrap(), &b.snapshot().unwrap()).unwrap();
     assert_eq!(difference, None, "{name}: the first component that differs");
-    assert_eq!((a.state(), a.motion(), a.contact()), (b.state(), b.motion(), b.contact()), "{name}");
+    assert_eq!(
+        (a.state(), a.accelerations(), a.contact()),
+        (b.state(), b.accelerations(), b.contact()),
+        "{name}"
+    );
 }
 
 #[test]
@@ -206,15 +210,15 @@ fn a_snapshot_of_another_scene_is_refused_and_changes_nothing() {
 fn a_snapshot_of_other_effects_or_another_delay_is_refused_by_both_backends() {
     let effects = ["battery-sag", "command-delay", "wind"];
     let with = |names: &[&str]| {
-        let effects = names.iter().map(|name| plant::effects::find(name).unwrap().typical()).collect();
+        let effects = names.iter().map(|name| plant::effects::find(name).unwrap().nominal()).collect();
         Airframe::with_effects(hummingbird(), effects)
     };
     let start = RigidBody::level_at(Vector3::z());
     let plants = |names: &[&str]| -> [Box<dyn Backend>; 2] {
         let model = || NewtonEuler::flying(with(names), 1);
-        let memory = || with(names).memory(0, "plant", TICK_S);
-        let rapier = Rapier::new(model(), memory(), &Scene::default(), &start, 1.0);
-        [Box::new(FreeFlight::new(model(), start, memory())), Box::new(rapier)]
+        let effects = || with(names).initial_state(0, "plant", TICK_S);
+        let rapier = Rapier::new(model(), effects(), &Scene::default(), &start, 1.0);
+        [Box::new(FreeFlight::new(model(), start, effects())), Box::new(rapier)]
     };
     for (mut plant, all) in plants(&effects).into_iter().zip(plants(&effects)) {
         plant.restore(&all.snapshot().unwrap()).unwrap();
@@ -222,7 +226,7 @@ fn a_snapshot_of_other_effects_or_another_delay_is_refused_by_both_backends() {
     for fewer in [&effects[..0], &effects[..1], &effects[1..], &["battery-sag", "turbulence", "wind"]] {
         for (mut plant, other) in plants(&effects).into_iter().zip(plants(fewer)) {
             let error = plant.restore(&other.snapshot().unwrap()).unwrap_err().to_string();
-            assert!(error.contains("\"memory\"") && error.contains("effects"), "{error}");
+            assert!(error.contains("\"effects\""), "{error}");
             plant.step(&uneven(0), TICK_S, &[]);
             assert!(plant.battery().is_some());
         }

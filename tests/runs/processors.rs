@@ -62,7 +62,7 @@ fn effect_table(kind: &EffectKind) -> String {
     let value = |own: &ParameterSpec| {
         let unit = own.dimension.units[0].0;
         let rest = format!("unit = {unit:?}, source = \"docs/effects.md\", uncertainty = \"not stated\"");
-        format!("{} = {{ value = {:?}, {rest} }}\n", own.name, own.typical)
+        format!("{} = {{ value = {:?}, {rest} }}\n", own.name, own.nominal)
     };
     let values: String = kind.parameters.iter().map(value).collect();
     format!("[[effects]]\nname = {:?}\n{values}\n", kind.name)

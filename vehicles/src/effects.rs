@@ -4,7 +4,7 @@
 //! (`plant::effects`): here any name will do.
 
 use crate::error::{Place, VehicleError};
-use crate::provenance::Uncertainty;
+use crate::provenance::Stated;
 use crate::reader::Section;
 
 /// One `[[effects]]` table.
@@ -20,25 +20,6 @@ pub struct EffectEntry {
     pub name_place: Place,
     /// Its parameters, by name.
     pub parameters: Vec<Stated>,
-}
-
-/// A number with everything that the file says of it.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Stated {
-    /// What it is called.
-    pub name: String,
-    /// The number, in the file's unit.
-    pub value: f64,
-    /// The file's unit.
-    pub unit: String,
-    /// Where it comes from.
-    pub source: String,
-    /// How well it is known, in the file's unit.
-    pub uncertainty: Uncertainty,
-    /// Where the number stands.
-    pub place: Place,
-    /// Where the unit stands.
-    pub unit_place: Place,
 }
 
 /// The `[[effects]]` of a file, in its order; none where it has none.

@@ -35,8 +35,8 @@ pub mod variables;
 pub mod vehicle;
 
 pub use command::CommandMap;
-pub use effects::{EffectEntry, Stated};
+pub use effects::EffectEntry;
 pub use error::{Place, VehicleError};
 pub use file::is_rigid;
-pub use provenance::{Provenance, Uncertainty};
+pub use provenance::{Provenance, Stated, Uncertainty};
 pub use vehicle::{MotorModel, Rotor, Spin, Vehicle};

@@ -1,5 +1,7 @@
 //! Where a number of a vehicle file came from: kept beside the physics for reports and refits.
 
+use crate::error::Place;
+
 /// How well a number is known.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Uncertainty {
@@ -22,4 +24,23 @@ pub struct Provenance {
     pub source: String,
     /// How well it is known.
     pub uncertainty: Uncertainty,
+}
+
+/// A number with everything that the file says of it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Stated {
+    /// What it is called.
+    pub name: String,
+    /// The number, in the file's unit.
+    pub value: f64,
+    /// The file's unit.
+    pub unit: String,
+    /// Where it comes from.
+    pub source: String,
+    /// How well it is known, in the file's unit.
+    pub uncertainty: Uncertainty,
+    /// Where the number stands.
+    pub place: Place,
+    /// Where the unit stands.
+    pub unit_place: Place,
 }

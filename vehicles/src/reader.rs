@@ -7,9 +7,8 @@ use std::ops::Range;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
-use crate::effects::Stated;
 use crate::error::{Place, VehicleError};
-use crate::provenance::{Provenance, Uncertainty};
+use crate::provenance::{Provenance, Stated, Uncertainty};
 use diagnostics::parameter::Bounds;
 use diagnostics::unit::Dimension;
 

@@ -94,7 +94,7 @@ impl Senses {
 
     pub fn attitude(&mut self, plant: &NewtonEuler, state: &State) -> AttitudeEstimate {
         let truth = ImuReading {
-            specific_force_B_m_s2: plant.motion(state).specific_force_B_m_s2,
+            specific_force_B_m_s2: plant.accelerations(state).specific_force_B_m_s2,
             angular_velocity_B_rad_s: state.body.angular_velocity_B_rad_s,
         };
         let reading = self.imu.read(&mut self.imu_state, &truth);

@@ -3,13 +3,14 @@
 
 use super::{Plan, Sensors, fly, vehicle_file};
 use flights::{Flight, FlightSet, Role};
-use identify::align::Lateness;
-use identify::fit::Bench;
-use identify::parameter::{Owner, Parameters, SENSOR_BIAS, SENSOR_DELAY, SensorParameter};
+use identify::clock::Lateness;
+use identify::fit::Problem;
+use identify::parameter::Parameters;
 use identify::predict::Measured;
 use identify::report::Report;
-use identify::run::{HORIZONS_S, bench, identify};
+use identify::run::{HORIZONS_S, identify, problem};
 use identify::sensing::SensorErrors;
+use identify::sensor_effects::{ACCELEROMETER_BIAS, GYROSCOPE_BIAS, POSE_DELAY, SENSOR_BIAS, SENSOR_DELAY};
 use plant::effects::{Effect, entry, find};
 use vehicles::Vehicle;
 
@@ -107,14 +108,14 @@ impl Judgement {
 pub fn scaled(name: &str, strength: f64) -> Effect {
     let kind = find(name).expect("a known effect");
     kind.with(|spec| {
-        let Some(neutral) = spec.neutral else { return spec.typical };
+        let Some(neutral) = spec.neutral else { return spec.nominal };
         let plausible = match (name, spec.name) {
             ("command-delay", _) => FREE_DELAY_S,
             // Four rotors alike would be a thrust scale.
             ("weak-rotor", "loss_1" | "loss_3" | "loss_4") => neutral,
-            _ => spec.typical,
+            _ => spec.nominal,
         };
-        (neutral + strength * (plausible - neutral)).clamp(spec.lower, spec.upper)
+        (neutral + strength * (plausible - neutral)).clamp(spec.min, spec.max)
     })
 }
 
@@ -181,15 +182,17 @@ impl Case {
     /// The true values of all parameters.
     pub fn true_values(&self, parameters: &Parameters) -> Vec<f64> {
         let sensors = &self.plan.sensors;
-        let value = |own: &identify::parameter::Parameter| match own.owner {
-            Owner::Plant(kind, index) => {
-                let effect = self.plan.truth.iter().find(|effect| effect.kind.name == kind.name);
-                effect.map_or(own.declared, |effect| effect.values[index])
+        let value = |own: &identify::parameter::Parameter| {
+            if *own.kind == POSE_DELAY {
+                sensors.pose_delay_s
+            } else if *own.kind == ACCELEROMETER_BIAS {
+                sensors.accelerometer_bias_m_s2[own.index]
+            } else if *own.kind == GYROSCOPE_BIAS {
+                sensors.gyroscope_bias_rad_s[own.index]
+            } else {
+                let effect = self.plan.truth.iter().find(|effect| effect.kind == own.kind);
+                effect.map_or(own.baseline, |effect| effect.values[own.index])
             }
-            Owner::Sensor(SensorParameter::PoseDelay) => sensors.pose_delay_s,
-            Owner::Sensor(SensorParameter::Accelerometer(axis)) => sensors.accelerometer_bias_m_s2[axis],
-            Owner::Sensor(SensorParameter::Gyroscope(axis)) => sensors.gyroscope_bias_rad_s[axis],
-            Owner::Sensor(_) => own.declared,
         };
         parameters.all.iter().map(value).collect()
     }
@@ -199,46 +202,46 @@ impl Case {
         let set = self.flights();
         let report = identify(&set, &mut |_| ()).expect("flights to identify on").report;
         let (vehicle, declared) = self.declared();
-        let (mut bench, _) = bench(&vehicle, &declared, &set).expect("flights to identify on");
-        let values = self.true_values(&bench.model.parameters);
-        let truth = bench.fitted(&values, &[]);
-        bench.weigh(&truth, &[]);
+        let (mut problem, _) = problem(&vehicle, &declared, &set).expect("flights to identify on");
+        let values = self.true_values(&problem.model.parameters);
+        let truth = problem.fitted(&values, &[]);
+        problem.weigh(&truth, &[]);
         let true_gains =
-            self.effects().iter().map(|name| (*name, self.true_gain(&bench, &values, name))).collect();
+            self.effects().iter().map(|name| (*name, self.true_gain(&problem, &values, name))).collect();
         Judgement {
             true_gains,
             named: report.verdict.clone(),
             confused_with: report.effects.values().flat_map(|effect| effect.confused_with.clone()).collect(),
-            intervals: intervals(&bench.model.parameters, &values, &report),
-            of_floor: self.of_floor(&bench, &values, &set, &report),
+            intervals: intervals(&problem.model.parameters, &values, &report),
+            of_floor: self.of_floor(&problem, &values, &set, &report),
             report,
         }
     }
 
     /// What only the effect `name` takes away of the squared error: the other true effects do their best without it.
-    fn true_gain(&self, bench: &Bench, values: &[f64], name: &str) -> f64 {
-        let parameters = &bench.model.parameters;
+    fn true_gain(&self, problem: &Problem, values: &[f64], name: &str) -> f64 {
+        let parameters = &problem.model.parameters;
         let mut without = values.to_vec();
-        parameters.of_name(name).iter().for_each(|at| without[*at] = parameters.all[*at].declared);
+        parameters.of_name(name).iter().for_each(|at| without[*at] = parameters.all[*at].baseline);
         let others: Vec<usize> = self
             .effects()
             .iter()
             .filter(|own| **own != name)
             .flat_map(|own| parameters.of_name(own))
             .collect();
-        let best: f64 = bench.squares(&bench.test, values).iter().sum();
-        1.0 - best / bench.fitted(&without, &others).test_sum()
+        let best: f64 = problem.costs(&problem.validation, values).iter().sum();
+        1.0 - best / problem.fitted(&without, &others).validation_cost()
     }
 
-    fn of_floor(&self, bench: &Bench, values: &[f64], set: &FlightSet, report: &Report) -> f64 {
+    fn of_floor(&self, problem: &Problem, values: &[f64], set: &FlightSet, report: &Report) -> f64 {
         let flight: &Flight =
             set.flights.iter().find(|flight| flight.role == Role::Test).expect("a test flight");
         let flight =
-            &SensorErrors::of(&bench.model.parameters, values).taken_off(flight, &Lateness::default());
+            &SensorErrors::of(&problem.model.parameters, values).taken_off(flight, &Lateness::default());
         let measured = Measured::of(flight).expect("motion");
         let mut worst = 0.0_f64;
         for horizon_s in HORIZONS_S {
-            let (truth, _) = measured.predicted(flight, bench.model.airframe(values), horizon_s, 0);
+            let (truth, _) = measured.predicted(flight, problem.model.airframe(values), horizon_s, 0);
             let after = &report.held_out[&flight.name][&format!("{horizon_s}")];
             worst = after.iter().map(|(channel, own)| own.after / truth[channel]).fold(worst, f64::max);
         }
@@ -254,7 +257,7 @@ fn intervals(parameters: &Parameters, values: &[f64], report: &Report) -> Vec<(S
             parameters
                 .of_name(effect)
                 .into_iter()
-                .find(|at| parameters.all[*at].name == name)
+                .find(|at| parameters.all[*at].spec().name == name)
                 .map(|at| values[at])
         };
         for (name, estimate) in &own.parameters {

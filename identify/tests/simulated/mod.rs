@@ -98,7 +98,7 @@ pub fn vehicle_file(name: &str) -> PathBuf {
 pub fn effect(name: &str, parameters: &[(&str, f64)]) -> Effect {
     let kind = find(name).expect("a known effect");
     let given = |name: &str| parameters.iter().find(|(own, _)| *own == name).map(|(_, value)| *value);
-    kind.with(|spec| given(spec.name).or(spec.neutral).unwrap_or(spec.typical))
+    kind.with(|spec| given(spec.name).or(spec.neutral).unwrap_or(spec.nominal))
 }
 
 /// The smooth course of a seed: sums of sines in all axes, up to about 3 m/s.
@@ -159,11 +159,11 @@ impl Course {
 /// Flies the plan with a controller that knows the declared vehicle only.
 pub fn fly(declared: &Vehicle, plan: &Plan, role: Role) -> Flight {
     let airframe = Airframe::with_effects(declared.clone(), plan.truth.clone());
-    let memory = airframe.memory(plan.seed, "plant", TICK_S);
+    let effects = airframe.initial_state(plan.seed, "plant", TICK_S);
     let course = Course::of(plan);
     let sticks = Sticks::of(plan);
     let start = RigidBody::level_at(course.at(0.0).0[0]);
-    let mut plant = FreeFlight::new(NewtonEuler::flying(airframe, 1), start, memory);
+    let mut plant = FreeFlight::new(NewtonEuler::flying(airframe, 1), start, effects);
     let allocation = Allocation::new(&RotorSet::from(declared)).expect("a quadrotor");
     let mut commands = [declared.hover_command(); 4];
     plant.settle_rotors(&commands);
@@ -313,7 +313,7 @@ impl Log {
         let body = plant.state().body;
         push(&mut self.flight.command, time_s, *commands);
         if tick.is_multiple_of(self.sensors.imu_ticks) && tick > 0 {
-            let motion = plant.motion();
+            let motion = plant.accelerations();
             let bias = Vector3::from(self.sensors.accelerometer_bias_m_s2);
             let force = self.noisy((motion.specific_force_B_m_s2 + bias).into(), 0.05);
             let drift = Vector3::from(self.sensors.gyroscope_bias_rad_s);

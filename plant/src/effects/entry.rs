@@ -1,7 +1,7 @@
 //! The effects that files list, checked against the catalogue.
 
-use super::mass::INERTIA_ERROR;
-use super::{CATALOGUE, Effect, EffectKind, ParameterSpec, Values, find};
+use super::catalogue::{CATALOGUE, find};
+use super::kind::{Effect, EffectKind, ParameterSpec, Values};
 use vehicles::{EffectEntry, Stated, Vehicle, VehicleError};
 
 /// The effects of `entries`, in their order.
@@ -13,7 +13,7 @@ pub fn resolve<'e>(entries: impl IntoIterator<Item = &'e EffectEntry>) -> Result
     let mut effects: Vec<Effect> = Vec::new();
     for entry in entries {
         let kind = kind(entry)?;
-        if effects.iter().any(|effect| effect.kind.name == kind.name) {
+        if effects.iter().any(|effect| effect.kind == kind) {
             return Err(bad_name(
                 entry,
                 "each effect once, vehicle and scene file together",
@@ -27,7 +27,7 @@ pub fn resolve<'e>(entries: impl IntoIterator<Item = &'e EffectEntry>) -> Result
 
 fn kind(entry: &EffectEntry) -> Result<&'static EffectKind, VehicleError> {
     find(&entry.name).ok_or_else(|| {
-        let names = CATALOGUE.map(|kind| kind.name).join(", ");
+        let names = CATALOGUE.iter().map(|kind| kind.name).collect::<Vec<_>>().join(", ");
         bad_name(entry, &format!("one of {names}"), "no such effect")
     })
 }
@@ -89,32 +89,27 @@ fn within_bounds(spec: &ParameterSpec, stated: &Stated, entry: &EffectEntry) -> 
     let si = stated.value * factor;
     // A pure number's unit would read as another number.
     let unit = if spec.unit() == "1" { String::new() } else { format!(" {}", spec.unit()) };
-    if (spec.lower..=spec.upper).contains(&si) {
+    if (spec.min..=spec.max).contains(&si) {
         return Ok(si);
     }
     Err(VehicleError::BadValue {
         place: stated.place.clone(),
         key,
-        expected: format!("{} to {}{unit}", spec.lower, spec.upper),
+        expected: format!("{} to {}{unit}", spec.min, spec.max),
         found: format!("{} {}", stated.value, stated.unit),
     })
 }
 
-/// Refuses an inertia that no body has; of all effects only `inertia-error` can lead there.
-pub(crate) fn require_rigid(vehicle: &Vehicle, entries: &[EffectEntry]) -> Result<(), VehicleError> {
-    let Some(entry) = entries.iter().find(|entry| entry.name == INERTIA_ERROR.name) else { return Ok(()) };
-    if vehicles::is_rigid(&vehicle.inertia_kg_m2) {
-        return Ok(());
+/// Refuses `vehicle`, which has these effects, if one of them must not have made it what it is.
+pub(crate) fn require(
+    vehicle: &Vehicle,
+    effects: &[Effect],
+    entries: &[EffectEntry],
+) -> Result<(), VehicleError> {
+    for (effect, entry) in effects.iter().zip(entries) {
+        if let Some(Err(expected)) = effect.kind.require.map(|require| require(vehicle)) {
+            return Err(bad_name(entry, expected, "which does not"));
+        }
     }
-    let expected =
-        "deviations that leave no principal moment of inertia larger than the sum of the other two";
-    Err(bad_name(entry, expected, "which does not"))
-}
-
-impl ParameterSpec {
-    /// The unit of the SI that bounds and values are in.
-    #[must_use]
-    pub fn unit(&self) -> &'static str {
-        self.dimension.units.first().map_or("1", |(unit, _)| unit)
-    }
+    Ok(())
 }

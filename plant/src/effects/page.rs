@@ -1,6 +1,7 @@
 //! The catalogue as the page `docs/effects.md`; a test compares the two.
 
-use super::{CATALOGUE, EffectKind, ParameterSpec};
+use super::catalogue::CATALOGUE;
+use super::kind::{EffectKind, FitAs, ParameterSpec, Randomness};
 use std::fmt::Write;
 
 const HEAD: &str = "# Effects
@@ -41,7 +42,7 @@ pub fn markdown() -> String {
     for kind in CATALOGUE {
         let _ = writeln!(page, "| [`{0}`](#{0}) | {1} |", kind.name, kind.summary);
     }
-    CATALOGUE.into_iter().for_each(|kind| section(&mut page, kind));
+    CATALOGUE.iter().for_each(|kind| section(&mut page, kind));
     page
 }
 
@@ -50,10 +51,36 @@ fn section(page: &mut String, kind: &EffectKind) {
     let _ = writeln!(page, "{}.\n", capitalised(kind.summary));
     let _ = writeln!(page, "- **Equation:** `{}`", kind.equation);
     let _ = writeln!(page, "- **Source:** {}.", kind.source);
-    let _ = writeln!(page, "- **Holds for:** {}.\n", kind.validity);
-    page.push_str("| parameter | meaning | units | least | most | neutral | plausible | source of the plausible value |\n");
+    let _ = writeln!(page, "- **Holds for:** {}.", kind.validity);
+    let _ = writeln!(page, "- **Fitted:** {}.", fitted(kind));
+    confounders(kind).for_each(|(other, experiment)| {
+        let _ = writeln!(page, "- **Told from [`{other}`](#{other}):** {experiment}.");
+    });
+    page.push('\n');
+    page.push_str(
+        "| parameter | meaning | units | min | max | neutral | nominal | source of the nominal value |\n",
+    );
     page.push_str("|---|---|---|---|---|---|---|---|\n");
     kind.parameters.iter().for_each(|spec| row(page, spec));
+}
+
+/// How an identification fits it, in words.
+fn fitted(kind: &EffectKind) -> String {
+    if kind.randomness == Randomness::Stochastic {
+        return "not at all: no fit can follow random numbers, what it leaves counts as unexplained"
+            .to_owned();
+    }
+    let part = match kind.fit_as {
+        FitAs::Whole => "as a whole",
+        FitAs::EachParameter => "each parameter by itself",
+    };
+    let needs: Vec<_> = kind.needs.iter().filter_map(|need| need.describe().split(':').next()).collect();
+    if needs.is_empty() { part.to_owned() } else { format!("{part}; needs {}", needs.join("; ")) }
+}
+
+/// The effects that look like `kind`, and the experiments that tell them apart.
+fn confounders(kind: &EffectKind) -> impl Iterator<Item = (&'static str, &'static str)> {
+    CATALOGUE.iter().filter_map(|other| Some((other.name, kind.told_from(other)?)))
 }
 
 fn row(page: &mut String, spec: &ParameterSpec) {
@@ -65,10 +92,10 @@ fn row(page: &mut String, spec: &ParameterSpec) {
         spec.name,
         spec.meaning,
         units.join(", "),
-        spec.lower,
-        spec.upper,
-        spec.typical,
-        spec.typical_source,
+        spec.min,
+        spec.max,
+        spec.nominal,
+        spec.nominal_source,
     );
 }
 

@@ -80,13 +80,13 @@ pub fn momentum_W(vehicle: &Vehicle, state: &State) -> Vector3<f64> {
 
 /// A vehicle without effects in a scene of the rapier backend.
 pub fn rapier(model: NewtonEuler, scene: &Scene, body: &RigidBody, crash_speed_m_s: f64) -> Rapier {
-    let memory = model.airframe().memory(0, "plant", TICK_S);
-    Rapier::new(model, memory, scene, body, crash_speed_m_s)
+    let effects = model.airframe().initial_state(0, "plant", TICK_S);
+    Rapier::new(model, effects, scene, body, crash_speed_m_s)
 }
 
 /// A vehicle without effects in free flight.
 pub fn free_flight(vehicle: Vehicle, body: RigidBody) -> FreeFlight {
     let model = NewtonEuler::new(vehicle, 1);
-    let memory = model.airframe().memory(0, "plant", TICK_S);
-    FreeFlight::new(model, body, memory)
+    let effects = model.airframe().initial_state(0, "plant", TICK_S);
+    FreeFlight::new(model, body, effects)
 }

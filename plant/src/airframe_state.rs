@@ -1,28 +1,28 @@
-//! What effects carry from tick to tick: commands under way, charge drawn, gusts, random streams.
+//! The state of an airframe's effects: commands under way, charge drawn, gusts, random streams.
 //!
 //! It belongs to whoever moves the vehicle, beside its [`State`](crate::State). Written down and read back it goes
 //! on to the same bits, random numbers included: a stream is written as its key and its position.
 
-use crate::airframe::Drive;
+use crate::actuation::Actuation;
 use bus::random::{Stream, normal};
 use serde::{Deserialize, Serialize};
 
 /// What the effects of one airframe carry from tick to tick; made by
-/// [`Airframe::memory`](crate::Airframe::memory). Only its making allocates.
+/// [`Airframe::initial_state`](crate::Airframe::initial_state). Only its making allocates.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct AirframeMemory {
+pub struct AirframeState {
     /// What acts over the tick that began last.
-    pub drive: Drive,
+    pub actuation: Actuation,
     pub(crate) commands: DelayLine,
     /// One for each effect, in their order.
-    pub(crate) remembered: Vec<Remembered>,
+    pub(crate) effects: Vec<EffectState>,
 }
 
-impl AirframeMemory {
+impl AirframeState {
     /// Whether `other` can go on in place of this one: as many effects, as long a delay.
     pub(crate) fn fits(&self, other: &Self) -> bool {
         let (ring, newest) = (&other.commands.ring, other.commands.newest);
-        other.remembered.len() == self.remembered.len()
+        other.effects.len() == self.effects.len()
             && ring.len() == self.commands.ring.len()
             && newest < ring.len()
     }
@@ -30,15 +30,15 @@ impl AirframeMemory {
 
 /// What one effect carries from tick to tick.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Remembered {
+pub struct EffectState {
     /// The effect's own numbers, zeros at the start.
-    pub lag: [f64; 4],
+    pub numbers: [f64; 4],
     random: Stream,
 }
 
-impl Remembered {
+impl EffectState {
     pub(crate) fn new(random: Stream) -> Self {
-        Self { lag: [0.0; 4], random }
+        Self { numbers: [0.0; 4], random }
     }
 
     /// The next four draws from the normal distribution of mean 0 and variance 1.

@@ -7,9 +7,9 @@ use crate::state::State;
 use nalgebra::Vector3;
 use vehicles::Vehicle;
 
-/// A vehicle at an instant.
+/// A vehicle at an instant: what forces depend on.
 #[derive(Debug, Clone)]
-pub struct Situation<'v> {
+pub struct FlightCondition<'v> {
     /// The vehicle as it flies.
     pub vehicle: &'v Vehicle,
     /// Velocity of the centre of mass relative to the air.
@@ -24,7 +24,7 @@ pub struct Situation<'v> {
     pub rotor_speeds_rad_s: [f64; 4],
 }
 
-impl<'v> Situation<'v> {
+impl<'v> FlightCondition<'v> {
     /// `vehicle` at `state`, in air that moves with `air_velocity_W_m_s`.
     #[must_use]
     pub fn new(vehicle: &'v Vehicle, state: &State, air_velocity_W_m_s: &Vector3<f64>) -> Self {

@@ -1,0 +1,34 @@
+//! Rows of a flight's equations, taken apart by component and changed by their means.
+
+use crate::prepared::{Equation, Prepared};
+
+/// One component of an equation over the knots.
+#[must_use]
+pub fn column(flight: &Prepared, rows: &[f64], equation: Equation, axis: usize) -> Vec<f64> {
+    let Some(offset) = flight.offset_of(equation) else { return Vec::new() };
+    rows[offset + axis..].iter().step_by(flight.width()).copied().collect()
+}
+
+/// Takes the mean of the angular acceleration's rows off them.
+pub fn take_off_means(flight: &Prepared, rows: &mut [f64]) {
+    let all = (0, flight.layout.knots.len());
+    on_means(flight, rows, &[all], |row, mean| *row -= mean);
+}
+
+/// Puts the mean of each block, given by its first knot and the one behind its last, in place of the angular
+/// acceleration's rows.
+pub fn keep_means(flight: &Prepared, rows: &mut [f64], blocks: &[(usize, usize)]) {
+    on_means(flight, rows, blocks, |row, mean| *row = mean);
+}
+
+fn on_means(flight: &Prepared, rows: &mut [f64], blocks: &[(usize, usize)], change: impl Fn(&mut f64, f64)) {
+    let Some(offset) = flight.offset_of(Equation::AngularAcceleration) else { return };
+    let width = flight.width();
+    for (first, last) in blocks {
+        for axis in 0..3 {
+            let own = || (first * width + offset + axis..last * width).step_by(width);
+            let mean = own().map(|at| rows[at]).sum::<f64>() / own().count().max(1) as f64;
+            own().for_each(|at| change(&mut rows[at], mean));
+        }
+    }
+}

@@ -1,0 +1,52 @@
+//! The list of all effects; each is a file of its own in the folder of this one.
+
+use super::kind::EffectKind;
+
+mod battery_sag;
+mod bearing_friction;
+mod blade_flapping;
+mod com_offset;
+pub(super) mod command_delay;
+mod ground_effect;
+mod ground_turbulence;
+mod gyroscopic_torque;
+mod inertia_error;
+mod mass_error;
+mod motor_lag;
+mod parasitic_drag;
+mod rig_pendulum;
+mod rotor_drag;
+mod thrust_scale;
+mod translational_lift;
+mod turbulence;
+mod weak_rotor;
+mod wind;
+
+/// All effects.
+pub static CATALOGUE: &[&EffectKind] = &[
+    &rotor_drag::EFFECT,
+    &parasitic_drag::EFFECT,
+    &translational_lift::EFFECT,
+    &blade_flapping::EFFECT,
+    &ground_effect::EFFECT,
+    &ground_turbulence::EFFECT,
+    &wind::EFFECT,
+    &turbulence::EFFECT,
+    &command_delay::EFFECT,
+    &motor_lag::EFFECT,
+    &battery_sag::EFFECT,
+    &weak_rotor::EFFECT,
+    &thrust_scale::EFFECT,
+    &mass_error::EFFECT,
+    &com_offset::EFFECT,
+    &inertia_error::EFFECT,
+    &gyroscopic_torque::EFFECT,
+    &rig_pendulum::EFFECT,
+    &bearing_friction::EFFECT,
+];
+
+/// The effect that files call `name`.
+#[must_use]
+pub fn find(name: &str) -> Option<&'static EffectKind> {
+    CATALOGUE.iter().copied().find(|kind| kind.name == name)
+}

@@ -1,0 +1,112 @@
+//! Sagging voltage.
+#![allow(non_snake_case, reason = "units stand last in names: _V, _A")]
+
+use super::{mass_error, thrust_scale};
+use crate::actuation::Battery;
+use crate::airframe_state::EffectState;
+use crate::effects::kind::{Action, Advance, Confounder, EffectKind, Quantity, Stage, Values};
+use crate::rotor;
+use vehicles::Vehicle;
+use diagnostics::unit::{CHARGE, RATIO, RESISTANCE, VOLTAGE};
+
+pub static EFFECT: EffectKind = EffectKind {
+    name: "battery-sag",
+    summary: "the battery's voltage falls as it empties and under load, and the speed that a command asks for with it",
+    equation: "w_target U / U_0 with U = U_0 - D (1 - q) - R I, U I = sum c_Q |w_i|^3 / eta, \
+               q = 1 - q_0 - (charge drawn) / C",
+    source: "equivalent circuit of a voltage and a resistance: Plett, Battery Management Systems I, 2015, chapter 2; a brushed or \
+             open-loop motor's speed follows its voltage. The charge's line from full to empty is own",
+    validity: "between a full and an empty battery, where the discharge curve is near a line; no recovery after load; \
+               a controller of rotor speed, which holds the speed until its headroom is gone, needs no sag",
+    parameters: Parameters::SPECS,
+    actions: &[Action::Tick(sag), Action::Battery(battery)],
+    needs: &[Quantity::Command],
+    stage: Stage::Rotors,
+    is_linear: false,
+    guesses: &[&[0.03, 1.0, 0.1], &[0.1, 1.0, 0.3], &[0.01, 0.5, 0.5]],
+    scale_to: Some(scale_to),
+    confounded_with: &[
+        Confounder { effect: &thrust_scale::EFFECT, experiment: DISCHARGE },
+        Confounder { effect: &mass_error::EFFECT, experiment: DISCHARGE },
+    ],
+    ..EffectKind::PLAIN
+};
+
+effect_parameters! {
+    struct Parameters {
+        internal_resistance: {
+            meaning: "R: of the pack with its leads", dimension: RESISTANCE, min: 0.0, max: 1.0,
+            neutral: Some(0.0), nominal: 0.06,
+            nominal_source: "tuned, no source: three cells of 15 mohm and leads",
+        },
+        discharge_drop: {
+            meaning: "D: open-circuit voltage of the full battery less that of the empty one",
+            dimension: VOLTAGE, min: 0.0, max: 10.0, neutral: Some(0.0), nominal: 2.1,
+            nominal_source: "tuned, no source: three lithium-polymer cells from 4.2 V to 3.5 V",
+        },
+        discharged: {
+            meaning: "q_0: part of the charge that is gone at the start", dimension: RATIO, min: 0.0, max: 1.0,
+            neutral: Some(0.0), nominal: 0.2, nominal_source: "tuned, no source",
+        },
+        nominal_voltage: {
+            meaning: "U_0: open-circuit voltage of the full battery, at which the declared command map holds",
+            dimension: VOLTAGE, min: 1.0, max: 60.0, neutral: None, nominal: 12.6,
+            nominal_source: "three lithium-polymer cells of 4.2 V",
+        },
+        capacity: {
+            meaning: "C", dimension: CHARGE, min: 100.0, max: 1e6, neutral: None, nominal: 7560.0,
+            nominal_source: "Hummingbird: 2100 mAh, thesis Table 2.1",
+        },
+        efficiency: {
+            meaning: "eta: power on the rotor shafts by power from the battery", dimension: RATIO, min: 0.1,
+            max: 1.0, neutral: None, nominal: 0.7, nominal_source: "tuned, no source",
+        },
+    }
+}
+
+const DISCHARGE: &str = "log the voltage, and fly from a full battery until it is nearly empty";
+
+/// What weighs less flies on one lithium-polymer cell, as a Crazyflie 2.1 does (Bitcraze: 250 mAh).
+const SMALL_KG: f64 = 0.1;
+
+fn scale_to(vehicle: &Vehicle, values: &mut Values) {
+    if vehicle.mass_kg < SMALL_KG {
+        *values = Parameters { nominal_voltage: 4.2, capacity: 900.0, ..(&*values).into() }.into();
+    }
+}
+
+fn sag(values: &Values, advance: &mut Advance) {
+    let condition = &advance.condition;
+    let battery = battery(values, advance.state, condition.vehicle, &condition.rotor_speeds_rad_s);
+    advance.state.numbers[0] += battery.current_A * advance.dt_s;
+    let share = battery.voltage_V / Parameters::from(values).nominal_voltage;
+    advance.actuation.targets_rad_s = advance.actuation.targets_rad_s.map(|target| target * share);
+}
+
+/// The battery when as much has been drawn since the start as the first of the effect's numbers says, in coulomb.
+fn battery(values: &Values, state: &EffectState, vehicle: &Vehicle, speeds_rad_s: &[f64; 4]) -> Battery {
+    let parameters = Parameters::from(values);
+    let charge = (1.0 - parameters.discharged - state.numbers[0] / parameters.capacity).max(0.0);
+    let power_W = shaft_power_W(vehicle, speeds_rad_s) / parameters.efficiency;
+    // A drop larger than the voltage itself leaves an empty battery, not a negative one.
+    let open_V = (parameters.nominal_voltage - parameters.discharge_drop * (1.0 - charge)).max(0.0);
+    let current_A = current_A(open_V, parameters.internal_resistance, power_W);
+    Battery { voltage_V: open_V - parameters.internal_resistance * current_A, current_A, charge }
+}
+
+fn shaft_power_W(vehicle: &Vehicle, speeds_rad_s: &[f64; 4]) -> f64 {
+    speeds_rad_s.iter().map(|speed| (rotor::drag_torque_N_m(vehicle, *speed) * speed).abs()).sum()
+}
+
+/// The smaller root of U I = P with U = U_oc - R I, in the form that holds for R = 0 too. Beyond the power that
+/// the battery has, it gives what it can: half of its voltage at the terminals.
+fn current_A(open_V: f64, resistance_ohm: f64, power_W: f64) -> f64 {
+    if open_V == 0.0 {
+        return 0.0;
+    }
+    let headroom_V2 = open_V * open_V - 4.0 * resistance_ohm * power_W;
+    if headroom_V2 < 0.0 {
+        return open_V / (2.0 * resistance_ohm);
+    }
+    2.0 * power_W / (open_V + headroom_V2.sqrt())
+}

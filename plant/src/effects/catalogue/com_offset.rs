@@ -1,0 +1,53 @@
+//! A centre of mass that is not amid the rotors.
+
+use super::weak_rotor;
+use crate::effects::kind::{Action, Confounder, EffectKind, Quantity, Values};
+use nalgebra::Vector3;
+use vehicles::Vehicle;
+use diagnostics::unit::LENGTH;
+
+pub static EFFECT: EffectKind = EffectKind {
+    name: "com-offset",
+    summary: "the centre of mass is not where it is declared, so that equal thrusts turn the vehicle",
+    equation: "r_i - d for the hub of each rotor, d = (x, y, z)",
+    source: "rigid-body mechanics: torques are taken about the centre of mass, which gravity acts on",
+    validity: "offsets that are small against the arms: the inertia stays, of which m d^2 would have to be taken, and \
+               the pose of the vehicle is that of the centre of mass, so that sensors move with it. z acts only where \
+               something pushes in the plane of the rotors, such as rotor-drag",
+    parameters: Parameters::SPECS,
+    actions: &[Action::Vehicle(shift)],
+    needs: &[Quantity::Torque],
+    steady_state: true,
+    turns_steadily: true,
+    confounded_with: &[Confounder {
+        effect: &weak_rotor::EFFECT,
+        experiment: "turn the propellers round by one motor: a weak rotor moves with them, the centre of mass does not",
+    }],
+    ..EffectKind::PLAIN
+};
+
+effect_parameters! {
+    struct Parameters {
+        x: {
+            meaning: "d_x: how far the centre of mass is in front of the declared one", dimension: LENGTH,
+            min: -0.1, max: 0.1, neutral: Some(0.0), nominal: 0.005,
+            nominal_source: "tuned, no source: a battery that is not strapped in the middle",
+        },
+        y: {
+            meaning: "d_y: how far it is left of it", dimension: LENGTH, min: -0.1, max: 0.1,
+            neutral: Some(0.0), nominal: 0.005,
+            nominal_source: "tuned, no source: a battery that is not strapped in the middle",
+        },
+        z: {
+            meaning: "d_z: how far it is above it", dimension: LENGTH, min: -0.1, max: 0.1, neutral: Some(0.0),
+            nominal: 0.005, nominal_source: "tuned, no source: a battery that is not strapped in the middle",
+        },
+    }
+}
+
+fn shift(values: &Values, vehicle: &mut Vehicle) {
+    let Parameters { x, y, z } = values.into();
+    for rotor in &mut vehicle.rotors {
+        rotor.position_m -= Vector3::new(x, y, z);
+    }
+}

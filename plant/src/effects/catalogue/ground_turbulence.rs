@@ -1,0 +1,47 @@
+//! Random thrust near the ground.
+
+use crate::effects::kind::{Action, Advance, EffectKind, Randomness, Values};
+use diagnostics::unit::{LENGTH, RATIO, TIME};
+
+pub static EFFECT: EffectKind = EffectKind {
+    name: "ground-turbulence",
+    summary: "downwash that the ground throws back shakes the thrust of each rotor at random, less with height",
+    equation: "dT_i = T_i exp(-max(z_i, 0) / h) n_i with n_i a Gauss-Markov process of deviation s and correlation \
+               time t_c, independent between rotors, constant over a tick",
+    source: "own; stands for the random air particles near the ground of thesis section 5.1",
+    validity: "not a model of the flow: spectrum and height are tuned. It depends on the run's seed",
+    parameters: Parameters::SPECS,
+    actions: &[Action::Tick(shake)],
+    randomness: Randomness::Stochastic,
+    ..EffectKind::PLAIN
+};
+
+effect_parameters! {
+    struct Parameters {
+        intensity: {
+            meaning: "s: standard deviation of the thrust on the ground, relative to the thrust",
+            dimension: RATIO, min: 0.0, max: 0.5, neutral: Some(0.0), nominal: 0.1,
+            nominal_source: "tuned, no source",
+        },
+        height_scale: {
+            meaning: "h: height above which the turbulence has fallen by a factor of e", dimension: LENGTH,
+            min: 0.01, max: 10.0, neutral: None, nominal: 0.3,
+            nominal_source: "tuned, no source: 3 rotor radii, where ground effect has faded too",
+        },
+        correlation_time: {
+            meaning: "t_c: time over which it forgets", dimension: TIME, min: 1e-3, max: 10.0, neutral: None,
+            nominal: 0.05, nominal_source: "tuned, no source",
+        },
+    }
+}
+
+fn shake(values: &Values, advance: &mut Advance) {
+    let Parameters { intensity, height_scale: scale_m, correlation_time: correlation_s } = values.into();
+    let keep = libm::exp(-advance.dt_s / correlation_s);
+    for (rotor, noise) in advance.state.normals().into_iter().enumerate() {
+        let lag = &mut advance.state.numbers[rotor];
+        *lag = keep * *lag + (1.0 - keep * keep).sqrt() * noise;
+        let height_m = advance.condition.hub_height_m(rotor).max(0.0);
+        advance.actuation.thrust_deviation[rotor] += intensity * libm::exp(-height_m / scale_m) * *lag;
+    }
+}

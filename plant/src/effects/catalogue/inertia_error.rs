@@ -1,0 +1,55 @@
+//! Another inertia than the declared one.
+
+use crate::effects::kind::{Action, EffectKind, Quantity, Values};
+use nalgebra::{Matrix3, Vector3};
+use vehicles::Vehicle;
+use diagnostics::unit::RATIO;
+
+pub static EFFECT: EffectKind = EffectKind {
+    name: "inertia-error",
+    summary: "the moments of inertia are larger or smaller than declared",
+    equation: "S J S with S = diag(sqrt(1 + e_xx), sqrt(1 + e_yy), sqrt(1 + e_zz)), so that J_xx (1 + e_xx)",
+    source: "own (deviations of the declared tensor, which keep it positive definite)",
+    validity: "a tensor of which one moment is larger than the sum of the other two is no rigid body's, and refused",
+    parameters: Parameters::SPECS,
+    actions: &[Action::Vehicle(stretch)],
+    needs: &[Quantity::Torque],
+    require: Some(require_rigid),
+    ..EffectKind::PLAIN
+};
+
+effect_parameters! {
+    struct Parameters {
+        error_xx: {
+            meaning: "e_xx: relative deviation about body x", dimension: RATIO, min: -0.5, max: 1.0,
+            neutral: Some(0.0), nominal: 0.1,
+            nominal_source: "tuned, no source: published Hummingbirds differ by 50 %",
+        },
+        error_yy: {
+            meaning: "e_yy: relative deviation about body y", dimension: RATIO, min: -0.5, max: 1.0,
+            neutral: Some(0.0), nominal: 0.1,
+            nominal_source: "tuned, no source: published Hummingbirds differ by 50 %",
+        },
+        error_zz: {
+            meaning: "e_zz: relative deviation about body z", dimension: RATIO, min: -0.5, max: 1.0,
+            neutral: Some(0.0), nominal: 0.1,
+            nominal_source: "tuned, no source: published Hummingbirds differ by 50 %",
+        },
+    }
+}
+
+fn stretch(values: &Values, vehicle: &mut Vehicle) {
+    let Parameters { error_xx, error_yy, error_zz } = values.into();
+    let roots = Vector3::new(error_xx, error_yy, error_zz).map(|error| (1.0 + error).sqrt());
+    let scale = Matrix3::from_diagonal(&roots);
+    vehicle.inertia_kg_m2 = scale * vehicle.inertia_kg_m2 * scale;
+}
+
+fn require_rigid(vehicle: &Vehicle) -> Result<(), &'static str> {
+    match vehicles::is_rigid(&vehicle.inertia_kg_m2) {
+        true => Ok(()),
+        false => {
+            Err("deviations that leave no principal moment of inertia larger than the sum of the other two")
+        }
+    }
+}

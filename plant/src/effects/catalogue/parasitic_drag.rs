@@ -1,0 +1,47 @@
+//! Drag of the body, quadratic in the speed of the air.
+#![allow(non_snake_case, reason = "a trailing _B names the frame a vector is written in, N the newton")]
+
+use super::rotor_drag;
+use crate::effects::condition::FlightCondition;
+use crate::effects::kind::{Action, Confounder, EffectKind, Quantity, Values};
+use crate::rotor::Wrench;
+use nalgebra::Vector3;
+use diagnostics::unit::DYNAMIC_DRAG;
+
+pub static EFFECT: EffectKind = EffectKind {
+    name: "parasitic-drag",
+    summary: "the air drags at fuselage and arms, quadratic in its speed",
+    equation: "F = -|v| (c_xy v_x, c_xy v_y, c_z v_z) at the centre of mass, v the velocity through the air",
+    source: "Folk, Paulos and Kumar, RotorPy, arXiv 2306.04485: aerodynamic wrenches",
+    validity: "a body alike in front and at its sides; no torque: pressure centre and centre of mass coincide",
+    parameters: Parameters::SPECS,
+    actions: &[Action::Wrench(drag)],
+    needs: &[Quantity::Airspeed, Quantity::Force],
+    confounded_with: &[Confounder {
+        effect: &rotor_drag::EFFECT,
+        experiment: "fly at twice the speed: parasitic drag grows with its square",
+    }],
+    ..EffectKind::PLAIN
+};
+
+effect_parameters! {
+    struct Parameters {
+        coefficient_xy: {
+            meaning: "c_xy: force per velocity squared along body x and y", dimension: DYNAMIC_DRAG, min: 0.0,
+            max: 0.1, neutral: Some(0.0), nominal: 0.5e-2,
+            nominal_source: "Hummingbird in RotorPy, rotorpy/vehicles/hummingbird_params.py",
+        },
+        coefficient_z: {
+            meaning: "c_z: force per velocity squared along body z", dimension: DYNAMIC_DRAG, min: 0.0,
+            max: 0.1, neutral: Some(0.0), nominal: 1e-2,
+            nominal_source: "Hummingbird in RotorPy, rotorpy/vehicles/hummingbird_params.py",
+        },
+    }
+}
+
+fn drag(values: &Values, condition: &FlightCondition) -> Wrench {
+    let Parameters { coefficient_xy: xy, coefficient_z: z } = values.into();
+    let v_B_m_s = condition.airspeed_B_m_s;
+    let force_B_N = v_B_m_s.component_mul(&Vector3::new(xy, xy, z)) * -v_B_m_s.norm();
+    Wrench { force_B_N, torque_B_N_m: Vector3::zeros() }
+}

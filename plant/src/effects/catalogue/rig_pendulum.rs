@@ -1,0 +1,50 @@
+//! A body that swings about a bearing beside its centre of mass.
+#![allow(non_snake_case, reason = "a trailing _B names the frame a vector is written in, N the newton")]
+
+use crate::effects::condition::FlightCondition;
+use crate::effects::kind::{Action, EffectKind, Quantity, Values};
+use crate::rotor::Wrench;
+use nalgebra::Vector3;
+use vehicles::Vehicle;
+use diagnostics::unit::{INERTIA, STATIC_MOMENT};
+
+pub static EFFECT: EffectKind = EffectKind {
+    name: "rig-pendulum",
+    summary: "a vehicle on a bearing beside its centre of mass swings as a pendulum, and turns more slowly",
+    equation: "tau = g S (z x up), J_xx + A and J_yy + A; S = sum m l, A = sum m l^2 over all masses at l below the \
+               bearing",
+    source: "the physical pendulum of any text on mechanics",
+    validity: "for flights on a rig, seen without it: the position is held by the bearing, whose force is not part of \
+               this. A scene with a rig has the pendulum by its joints already",
+    parameters: Parameters::SPECS,
+    actions: &[Action::Vehicle(slow), Action::Wrench(swing)],
+    needs: &[Quantity::Torque, Quantity::Attitude, Quantity::Rig],
+    ..EffectKind::PLAIN
+};
+
+effect_parameters! {
+    struct Parameters {
+        static_moment: {
+            meaning: "S: positive where the masses hang below the bearing", dimension: STATIC_MOMENT,
+            min: -0.5, max: 0.5, neutral: Some(0.0), nominal: 0.01,
+            nominal_source: "tuned, no source: 0.5 kg hanging 2 cm below the bearing",
+        },
+        added_inertia: {
+            meaning: "A: moment of inertia about the bearing beyond that about the centre of mass",
+            dimension: INERTIA, min: 0.0, max: 0.1, neutral: Some(0.0), nominal: 2e-4,
+            nominal_source: "tuned, no source: 0.5 kg at 2 cm",
+        },
+    }
+}
+
+fn slow(values: &Values, vehicle: &mut Vehicle) {
+    let Parameters { added_inertia, .. } = values.into();
+    vehicle.inertia_kg_m2[(0, 0)] += added_inertia;
+    vehicle.inertia_kg_m2[(1, 1)] += added_inertia;
+}
+
+fn swing(values: &Values, condition: &FlightCondition) -> Wrench {
+    let Parameters { static_moment, .. } = values.into();
+    let torque_B_N_m = Vector3::z().cross(&condition.up_B) * (static_moment * condition.vehicle.gravity_m_s2);
+    Wrench { force_B_N: Vector3::zeros(), torque_B_N_m }
+}

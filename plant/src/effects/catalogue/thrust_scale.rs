@@ -1,0 +1,30 @@
+//! All rotors alike.
+
+use crate::effects::kind::{Action, EffectKind, Values};
+use vehicles::Vehicle;
+use diagnostics::unit::RATIO;
+
+pub static EFFECT: EffectKind = EffectKind {
+    name: "thrust-scale",
+    summary: "all rotors have more or less thrust than declared",
+    equation: "c_T (1 + e)",
+    source: "own (a deviation of the declared coefficient)",
+    validity: "the drag torque stays",
+    parameters: Parameters::SPECS,
+    actions: &[Action::Vehicle(scale)],
+    steady_state: true,
+    ..EffectKind::PLAIN
+};
+
+effect_parameters! {
+    struct Parameters {
+        error: {
+            meaning: "e: relative deviation of the thrust coefficient", dimension: RATIO, min: -0.5, max: 1.0,
+            neutral: Some(0.0), nominal: -0.05, nominal_source: "tuned, no source",
+        },
+    }
+}
+
+fn scale(values: &Values, vehicle: &mut Vehicle) {
+    vehicle.thrust_coefficient *= 1.0 + Parameters::from(values).error;
+}

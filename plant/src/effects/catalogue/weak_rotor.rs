@@ -1,0 +1,46 @@
+//! Rotors that give less than they should.
+#![allow(non_snake_case, reason = "units stand last in names, N is the newton")]
+
+use crate::effects::condition::FlightCondition;
+use crate::effects::kind::{Action, EffectKind, FitAs, Values};
+use diagnostics::unit::RATIO;
+
+pub static EFFECT: EffectKind = EffectKind {
+    name: "weak-rotor",
+    summary: "single rotors have less thrust at the same speed",
+    equation: "dT_i = -l_i T_i",
+    source: "own (a definition)",
+    validity: "the rotor's drag torque stays, as for a damaged blade",
+    parameters: Parameters::SPECS,
+    actions: &[Action::Thrust(loss_N)],
+    fit_as: FitAs::EachParameter,
+    turns_steadily: true,
+    ..EffectKind::PLAIN
+};
+
+effect_parameters! {
+    struct Parameters {
+        loss_1: {
+            meaning: "l_1: part of the thrust that the first rotor of the vehicle file lacks",
+            dimension: RATIO, min: 0.0, max: 1.0, neutral: Some(0.0), nominal: 0.1,
+            nominal_source: "tuned, no source: a chipped propeller",
+        },
+        loss_2: {
+            meaning: "l_2: the same of the second rotor", dimension: RATIO, min: 0.0, max: 1.0,
+            neutral: Some(0.0), nominal: 0.1, nominal_source: "tuned, no source: a chipped propeller",
+        },
+        loss_3: {
+            meaning: "l_3: the same of the third rotor", dimension: RATIO, min: 0.0, max: 1.0,
+            neutral: Some(0.0), nominal: 0.1, nominal_source: "tuned, no source: a chipped propeller",
+        },
+        loss_4: {
+            meaning: "l_4: the same of the fourth rotor", dimension: RATIO, min: 0.0, max: 1.0,
+            neutral: Some(0.0), nominal: 0.1, nominal_source: "tuned, no source: a chipped propeller",
+        },
+    }
+}
+
+fn loss_N(values: &Values, condition: &FlightCondition, rotor: usize) -> f64 {
+    let Parameters { loss_1, loss_2, loss_3, loss_4 } = values.into();
+    -[loss_1, loss_2, loss_3, loss_4][rotor] * condition.thrust_N(rotor)
+}

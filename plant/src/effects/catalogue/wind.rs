@@ -1,0 +1,40 @@
+//! Steady wind. By itself it does nothing: drag and inflow do, which see the velocity through the air.
+
+use crate::effects::kind::{Action, Advance, EffectKind, Quantity, Values};
+use nalgebra::Vector3;
+use diagnostics::unit::VELOCITY;
+
+pub static EFFECT: EffectKind = EffectKind {
+    name: "wind",
+    summary: "the air moves steadily, everywhere alike",
+    equation: "v_air += (x, y, z) in the world",
+    source: "own (a definition)",
+    validity: "no shear near the ground or in the lee of walls; without an effect that feels the air, such as drag, \
+               it does nothing",
+    parameters: Parameters::SPECS,
+    actions: &[Action::Tick(blow)],
+    needs: &[Quantity::Airspeed, Quantity::Force],
+    ..EffectKind::PLAIN
+};
+
+effect_parameters! {
+    struct Parameters {
+        x: {
+            meaning: "velocity of the air along x of the world", dimension: VELOCITY, min: -30.0, max: 30.0,
+            neutral: Some(0.0), nominal: 3.0, nominal_source: "a light breeze: 3 m/s is Beaufort 2",
+        },
+        y: {
+            meaning: "velocity of the air along y of the world", dimension: VELOCITY, min: -30.0, max: 30.0,
+            neutral: Some(0.0), nominal: 1.0, nominal_source: "a light breeze: 3 m/s is Beaufort 2",
+        },
+        z: {
+            meaning: "velocity of the air along z of the world", dimension: VELOCITY, min: -30.0, max: 30.0,
+            neutral: Some(0.0), nominal: 0.2, nominal_source: "a light breeze: 3 m/s is Beaufort 2",
+        },
+    }
+}
+
+fn blow(values: &Values, advance: &mut Advance) {
+    let Parameters { x, y, z } = values.into();
+    advance.actuation.air_velocity_W_m_s += Vector3::new(x, y, z);
+}

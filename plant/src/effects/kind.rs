@@ -1,0 +1,288 @@
+//! The facts of an effect: what it does, by which numbers, and how it can be seen in measured flights.
+
+use super::condition::FlightCondition;
+use crate::actuation::{Actuation, Battery};
+use crate::airframe_state::EffectState;
+use crate::rotor::Wrench;
+use vehicles::Vehicle;
+use diagnostics::unit::Dimension;
+
+/// The most parameters that an effect has.
+pub const PARAMETERS_MAX: usize = 6;
+
+/// The parameters of an effect in SI, in the order of its specification; zeros behind the last one. Effects read them
+/// by name, see [`effect_parameters!`](crate::effect_parameters).
+pub type Values = [f64; PARAMETERS_MAX];
+
+/// An effect as the catalogue knows it. It is the same as another only if it is the very same static.
+#[derive(Debug)]
+pub struct EffectKind {
+    /// What files call it.
+    pub name: &'static str,
+    /// What it does, in one line.
+    pub summary: &'static str,
+    /// Its equation, in the symbols of its parameters.
+    pub equation: &'static str,
+    /// Where the equation is from.
+    pub source: &'static str,
+    /// Where it holds, and what it leaves out.
+    pub validity: &'static str,
+    /// Its parameters.
+    pub parameters: &'static [ParameterSpec],
+    /// What it does to the simulation.
+    pub actions: &'static [Action],
+    /// What has to be measured for it to show.
+    pub needs: &'static [Quantity],
+    /// What has to be computed anew when one of its parameters changes.
+    pub stage: Stage,
+    /// Whether a fit could follow it.
+    pub randomness: Randomness,
+    /// What of it makes sense alone.
+    pub fit_as: FitAs,
+    /// Whether it shows in the mean forces and torques of a flight, and can be told there from all other effects.
+    pub steady_state: bool,
+    /// Whether it turns the vehicle steadily, so that it can explain a trim.
+    pub turns_steadily: bool,
+    /// Whether its parameters shift a signal in time: then the flight's grid says how small a value can be seen.
+    pub is_delay: bool,
+    /// Whether equations linearised about the neutral values tell what it can explain.
+    pub is_linear: bool,
+    /// Where a fit may start, each a value for each fitted parameter. None: the neutral values are a start.
+    pub guesses: &'static [&'static [f64]],
+    /// Fits nominal values, which are a Hummingbird's, to a vehicle of another size.
+    pub scale_to: Option<fn(&Vehicle, &mut Values)>,
+    /// Effects that look like it, and how to tell them apart. Each pair stands with one of the two.
+    pub confounded_with: &'static [Confounder],
+    /// What must be true of the vehicle that it acts on; in words if it is not.
+    pub require: Option<fn(&Vehicle) -> Result<(), &'static str>>,
+}
+
+/// One parameter of an effect.
+#[derive(Debug)]
+pub struct ParameterSpec {
+    /// What files call it.
+    pub name: &'static str,
+    /// What it means, with its symbol.
+    pub meaning: &'static str,
+    /// Its units; bounds and values are in the first, which is that of the SI.
+    pub dimension: Dimension,
+    /// The least that it may be.
+    pub min: f64,
+    /// The most that it may be.
+    pub max: f64,
+    /// The value that it has where a file leaves it out. With all of these the effect is nothing. `None` where
+    /// none is more natural than another: a file has to give it, and the effect is nothing whatever it is.
+    pub neutral: Option<f64>,
+    /// A plausible value.
+    pub nominal: f64,
+    /// Where the plausible value is from.
+    pub nominal_source: &'static str,
+}
+
+/// What an effect acts on. All but the state of [`Action::Tick`] are pure functions.
+#[derive(Debug, Clone, Copy)]
+pub enum Action {
+    /// Changes what the vehicle is, once, before it flies.
+    Vehicle(fn(&Values, &mut Vehicle)),
+    /// Delays the motor commands by so many seconds.
+    Delay(fn(&Values) -> f64),
+    /// Advances the effect's state by a tick, and changes what acts over the tick.
+    Tick(fn(&Values, &mut Advance)),
+    /// Adds so many newtons to the thrust of a rotor.
+    Thrust(fn(&Values, &FlightCondition, usize) -> f64),
+    /// Adds a force and a torque.
+    Wrench(fn(&Values, &FlightCondition) -> Wrench),
+    /// Tells how the battery is under these speeds of the rotors.
+    Battery(fn(&Values, &EffectState, &Vehicle, &[f64; 4]) -> Battery),
+}
+
+/// What an effect sees and changes when a tick begins.
+#[derive(Debug)]
+pub struct Advance<'a> {
+    /// The vehicle at the beginning of the tick, in the air as the effects before this one moved it.
+    pub condition: FlightCondition<'a>,
+    /// What acts over the tick.
+    pub actuation: &'a mut Actuation,
+    /// What the effect carries from tick to tick.
+    pub state: &'a mut EffectState,
+    /// Length of the tick.
+    pub dt_s: f64,
+}
+
+/// What a flight must have measured for an effect to show.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Quantity {
+    /// Forces: by position, velocity or specific force.
+    Force,
+    /// Torques: by attitude or angular velocity.
+    Torque,
+    /// The velocity through the air, in the body.
+    Airspeed,
+    /// The height above the ground.
+    Height,
+    /// The attitude.
+    Attitude,
+    /// The motor commands.
+    Command,
+    /// A rig holds the vehicle. What such an effect stands for, the joints of a scene's rig have by themselves.
+    Rig,
+    /// Two clocks that can be held against each other.
+    TwoClocks,
+    /// What the accelerometer reads.
+    SpecificForce,
+    /// The same rotation by gyroscope and by attitude.
+    TwoRotations,
+    /// The direction of forces that the attitude says, and one that is measured.
+    TwoDirections,
+    /// An inertial unit.
+    InertialUnit,
+    /// A pose.
+    Pose,
+}
+
+/// What has to be computed anew when a parameter changes; the later stages follow from the earlier ones.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Stage {
+    /// When samples were taken.
+    Sampling,
+    /// What the rotors make of the commands.
+    Rotors,
+    /// Forces, torques, and what sensors read of them.
+    Body,
+}
+
+/// Whether an effect draws random numbers.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Randomness {
+    /// A function of parameters and flight.
+    Deterministic,
+    /// It draws from a stream of its own: no fit can follow it, and what it leaves is unexplained.
+    Stochastic,
+}
+
+/// What of an effect is a candidate by itself.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum FitAs {
+    /// All of its parameters together.
+    Whole,
+    /// Each of its parameters.
+    EachParameter,
+}
+
+/// An effect that looks like another on some flights.
+#[derive(Debug)]
+pub struct Confounder {
+    /// The other effect.
+    pub effect: &'static EffectKind,
+    /// The experiment that tells the two apart.
+    pub experiment: &'static str,
+}
+
+/// An effect with its parameters.
+#[derive(Debug, Clone, Copy)]
+pub struct Effect {
+    /// What it is.
+    pub kind: &'static EffectKind,
+    /// Its parameters in SI.
+    pub values: Values,
+}
+
+impl Quantity {
+    /// What it is measured by, and for what.
+    #[must_use]
+    pub fn describe(self) -> &'static str {
+        match self {
+            Self::Force => "position, velocity or specific force: something that shows forces",
+            Self::Torque => "attitude or angular velocity: something that shows torques",
+            Self::Airspeed => "position or velocity, together with attitude: the velocity through the air",
+            Self::Height => "position: the height above the ground",
+            Self::Attitude => "attitude",
+            Self::Command => "motor commands",
+            Self::Rig => "a rig: these flights move freely",
+            Self::TwoClocks => "gyroscope and attitude, or else commands, to be late against",
+            Self::SpecificForce => "specific force, for the accelerometer's",
+            Self::TwoRotations => "attitude and angular velocity, for the gyroscope's",
+            Self::TwoDirections => "attitude with position, velocity or specific force, for the attitude's",
+            Self::InertialUnit => "an inertial unit, for its own",
+            Self::Pose => "attitude or position, for the pose's",
+        }
+    }
+}
+
+impl PartialEq for EffectKind {
+    fn eq(&self, other: &Self) -> bool {
+        std::ptr::eq(self, other)
+    }
+}
+
+impl EffectKind {
+    /// What most effects are, to be completed by texts, parameters, actions and needs: a deterministic, near linear
+    /// effect on forces and torques that is fitted as a whole.
+    pub const PLAIN: Self = Self {
+        name: "",
+        summary: "",
+        equation: "",
+        source: "",
+        validity: "",
+        parameters: &[],
+        actions: &[],
+        needs: &[],
+        stage: Stage::Body,
+        randomness: Randomness::Deterministic,
+        fit_as: FitAs::Whole,
+        steady_state: false,
+        turns_steadily: false,
+        is_delay: false,
+        is_linear: true,
+        guesses: &[],
+        scale_to: None,
+        confounded_with: &[],
+        require: None,
+    };
+
+    /// The effect with neutral parameters, and nominal ones where none is neutral: it does nothing.
+    #[must_use]
+    pub fn neutral(&'static self) -> Effect {
+        self.with(|spec| spec.neutral.unwrap_or(spec.nominal))
+    }
+
+    /// The effect with neutral parameters, and those that fit `vehicle` where none is neutral.
+    #[must_use]
+    pub fn neutral_for(&'static self, vehicle: &Vehicle) -> Effect {
+        let mut effect = self.neutral();
+        if let Some(scale_to) = self.scale_to {
+            scale_to(vehicle, &mut effect.values);
+        }
+        effect
+    }
+
+    /// The effect with nominal parameters.
+    #[must_use]
+    pub fn nominal(&'static self) -> Effect {
+        self.with(|spec| spec.nominal)
+    }
+
+    /// The experiment that tells it from `other`, if the two look alike.
+    #[must_use]
+    pub fn told_from(&self, other: &Self) -> Option<&'static str> {
+        let found = |own: &Self, other: &Self| {
+            own.confounded_with.iter().find(|pair| pair.effect == other).map(|pair| pair.experiment)
+        };
+        found(self, other).or_else(|| found(other, self))
+    }
+
+    /// The effect with a value for each of its parameters.
+    #[must_use]
+    pub fn with(&'static self, value: impl Fn(&ParameterSpec) -> f64) -> Effect {
+        let values = std::array::from_fn(|i| self.parameters.get(i).map_or(0.0, &value));
+        Effect { kind: self, values }
+    }
+}
+
+impl ParameterSpec {
+    /// The unit of the SI that bounds and values are in.
+    #[must_use]
+    pub fn unit(&self) -> &'static str {
+        self.dimension.units.first().map_or("1", |(unit, _)| unit)
+    }
+}
