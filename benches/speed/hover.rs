@@ -122,7 +122,7 @@ mod chain {
                 self.plant.step(&mut self.state, &self.command, DT_S);
             }
             let truth = ImuReading {
-                specific_force_B_m_s2: self.plant.motion(&self.state).specific_force_B_m_s2,
+                specific_force_B_m_s2: self.plant.accelerations(&self.state).specific_force_B_m_s2,
                 angular_velocity_B_rad_s: self.state.body.angular_velocity_B_rad_s,
             };
             let reading = self.imu.read(&mut self.imu_state, &truth);

@@ -66,7 +66,7 @@ fn schedule() -> Schedule {
 
 fn imu_truth(plant: &NewtonEuler, state: &State) -> ImuReading {
     ImuReading {
-        specific_force_B_m_s2: plant.motion(state).specific_force_B_m_s2,
+        specific_force_B_m_s2: plant.accelerations(state).specific_force_B_m_s2,
         angular_velocity_B_rad_s: state.body.angular_velocity_B_rad_s,
     }
 }

@@ -47,7 +47,7 @@ fn every_shipped_manifest_flies_the_same_on_an_older_processor() {
 fn every_effect_is_the_same_on_an_older_processor() {
     let place = Place::new();
     let base = repository("vehicles/hummingbird.toml");
-    let effects = CATALOGUE.map(effect_table).concat();
+    let effects = CATALOGUE.iter().map(|kind| effect_table(kind)).collect::<String>();
     let text = format!("base = {base:?}\nname = \"every effect\"\n\n{effects}");
     let vehicle = format!("process.plant.vehicle={}", place.write("every-effect.toml", text));
     for manifest in ["manifests/hover.toml", "manifests/hover-rapier.toml"] {
