@@ -1,8 +1,8 @@
 //! What is wrong with sensors, as effects beside the plant's: they change nothing that flies, but what flights show.
 
+use diagnostics::unit::{ACCELERATION, ANGLE, SPEED, TIME};
 use plant::effect_parameters;
 use plant::effects::{COMMAND_DELAY, Confounder, EffectKind, Quantity, Stage};
-use diagnostics::unit::{ACCELERATION, ANGLE, SPEED, TIME};
 
 /// The delay of sensors, as an effect.
 pub const SENSOR_DELAY: &str = "sensor-delay";

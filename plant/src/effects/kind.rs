@@ -4,8 +4,8 @@ use super::condition::FlightCondition;
 use crate::actuation::{Actuation, Battery};
 use crate::airframe_state::EffectState;
 use crate::rotor::Wrench;
-use vehicles::Vehicle;
 use diagnostics::unit::Dimension;
+use vehicles::Vehicle;
 
 /// The most parameters that an effect has.
 pub const PARAMETERS_MAX: usize = 6;

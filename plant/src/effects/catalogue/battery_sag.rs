@@ -6,8 +6,8 @@ use crate::actuation::Battery;
 use crate::airframe_state::EffectState;
 use crate::effects::kind::{Action, Advance, Confounder, EffectKind, Quantity, Stage, Values};
 use crate::rotor;
-use vehicles::Vehicle;
 use diagnostics::unit::{CHARGE, RATIO, RESISTANCE, VOLTAGE};
+use vehicles::Vehicle;
 
 pub static EFFECT: EffectKind = EffectKind {
     name: "battery-sag",

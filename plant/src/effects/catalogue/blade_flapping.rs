@@ -5,8 +5,8 @@ use super::rotor_drag;
 use crate::effects::condition::FlightCondition;
 use crate::effects::kind::{Action, Confounder, EffectKind, Quantity, Values};
 use crate::rotor::Wrench;
-use nalgebra::Vector3;
 use diagnostics::unit::{ROTARY_STIFFNESS, TILT};
+use nalgebra::Vector3;
 
 pub static EFFECT: EffectKind = EffectKind {
     name: "blade-flapping",

@@ -2,9 +2,9 @@
 
 use super::weak_rotor;
 use crate::effects::kind::{Action, Confounder, EffectKind, Quantity, Values};
+use diagnostics::unit::LENGTH;
 use nalgebra::Vector3;
 use vehicles::Vehicle;
-use diagnostics::unit::LENGTH;
 
 pub static EFFECT: EffectKind = EffectKind {
     name: "com-offset",

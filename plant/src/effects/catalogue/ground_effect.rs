@@ -4,8 +4,8 @@
 use super::{mass_error, thrust_scale};
 use crate::effects::condition::FlightCondition;
 use crate::effects::kind::{Action, Confounder, EffectKind, Quantity, Values};
-use vehicles::Vehicle;
 use diagnostics::unit::{LENGTH, RATIO};
+use vehicles::Vehicle;
 
 pub static EFFECT: EffectKind = EffectKind {
     name: "ground-effect",

@@ -1,8 +1,8 @@
 //! Another angular momentum of the rotors than the declared one.
 
 use crate::effects::kind::{Action, EffectKind, Quantity, Values};
-use vehicles::Vehicle;
 use diagnostics::unit::RATIO;
+use vehicles::Vehicle;
 
 pub static EFFECT: EffectKind = EffectKind {
     name: "gyroscopic-torque",

@@ -1,9 +1,9 @@
 //! Another inertia than the declared one.
 
 use crate::effects::kind::{Action, EffectKind, Quantity, Values};
+use diagnostics::unit::RATIO;
 use nalgebra::{Matrix3, Vector3};
 use vehicles::Vehicle;
-use diagnostics::unit::RATIO;
 
 pub static EFFECT: EffectKind = EffectKind {
     name: "inertia-error",

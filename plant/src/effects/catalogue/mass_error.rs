@@ -2,8 +2,8 @@
 
 use super::thrust_scale;
 use crate::effects::kind::{Action, Confounder, EffectKind, Quantity, Values};
-use vehicles::Vehicle;
 use diagnostics::unit::RATIO;
+use vehicles::Vehicle;
 
 pub static EFFECT: EffectKind = EffectKind {
     name: "mass-error",

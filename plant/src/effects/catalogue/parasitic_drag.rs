@@ -5,8 +5,8 @@ use super::rotor_drag;
 use crate::effects::condition::FlightCondition;
 use crate::effects::kind::{Action, Confounder, EffectKind, Quantity, Values};
 use crate::rotor::Wrench;
-use nalgebra::Vector3;
 use diagnostics::unit::DYNAMIC_DRAG;
+use nalgebra::Vector3;
 
 pub static EFFECT: EffectKind = EffectKind {
     name: "parasitic-drag",

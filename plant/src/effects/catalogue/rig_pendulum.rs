@@ -4,9 +4,9 @@
 use crate::effects::condition::FlightCondition;
 use crate::effects::kind::{Action, EffectKind, Quantity, Values};
 use crate::rotor::Wrench;
+use diagnostics::unit::{INERTIA, STATIC_MOMENT};
 use nalgebra::Vector3;
 use vehicles::Vehicle;
-use diagnostics::unit::{INERTIA, STATIC_MOMENT};
 
 pub static EFFECT: EffectKind = EffectKind {
     name: "rig-pendulum",

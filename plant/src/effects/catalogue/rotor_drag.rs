@@ -4,8 +4,8 @@
 use crate::effects::condition::FlightCondition;
 use crate::effects::kind::{Action, EffectKind, Quantity, Values};
 use crate::rotor::Wrench;
-use nalgebra::Vector3;
 use diagnostics::unit::ROTOR_DRAG;
+use nalgebra::Vector3;
 
 pub static EFFECT: EffectKind = EffectKind {
     name: "rotor-drag",

@@ -1,8 +1,8 @@
 //! All rotors alike.
 
 use crate::effects::kind::{Action, EffectKind, Values};
-use vehicles::Vehicle;
 use diagnostics::unit::RATIO;
+use vehicles::Vehicle;
 
 pub static EFFECT: EffectKind = EffectKind {
     name: "thrust-scale",

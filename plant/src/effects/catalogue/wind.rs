@@ -1,8 +1,8 @@
 //! Steady wind. By itself it does nothing: drag and inflow do, which see the velocity through the air.
 
 use crate::effects::kind::{Action, Advance, EffectKind, Quantity, Values};
-use nalgebra::Vector3;
 use diagnostics::unit::VELOCITY;
+use nalgebra::Vector3;
 
 pub static EFFECT: EffectKind = EffectKind {
     name: "wind",
