@@ -404,7 +404,7 @@ impl Control {
     /// Whether the run was aborted.
     #[must_use]
     pub fn is_aborted(&self) -> bool {
-        self.word(0, 3).load(SeqCst) != 0
+        self.word(0, 3).load(SeqCst) != 0 || crate::hosted::is_cancelled()
     }
 
     /// Asks the clock to end the run at the next tick boundary.
@@ -777,7 +777,11 @@ pub fn monotonic_ns() -> u64 {
 
 /// Processor time of this process in nanoseconds.
 pub(crate) fn process_cpu_ns() -> u64 {
-    clock_ns(rustix::time::ClockId::ProcessCPUTime)
+    clock_ns(if crate::hosted::is_hosted() {
+        rustix::time::ClockId::ThreadCPUTime
+    } else {
+        rustix::time::ClockId::ProcessCPUTime
+    })
 }
 
 #[allow(clippy::cast_sign_loss, reason = "these clocks start at zero and only grow")]

@@ -12,6 +12,7 @@ pub mod control;
 pub mod error;
 mod finite;
 mod harness;
+pub mod hosted;
 pub mod initial;
 pub mod kind;
 mod live;

@@ -23,6 +23,9 @@ pub const RUN_VARIABLE: &str = "HUMMINGBUS_RUN";
 /// # Errors
 /// If it was not started by a launcher.
 pub(crate) fn join() -> Result<PathBuf, BusError> {
+    if let Some(join) = crate::hosted::join() {
+        return Ok(join.run_dir);
+    }
     let run_dir = std::env::var_os(RUN_VARIABLE).ok_or(BusError::NotInARun { variable: RUN_VARIABLE })?;
     die_with_parent();
     note_signals();
@@ -74,7 +77,8 @@ fn mask_stop_signals(how: libc::c_int) {
 
 /// Whether this process was asked to end.
 pub(crate) fn is_terminated() -> bool {
-    IS_TERMINATED.get().is_some_and(|flag| flag.load(Ordering::Relaxed))
+    // A signal is then its host's.
+    !crate::hosted::is_hosted() && IS_TERMINATED.get().is_some_and(|flag| flag.load(Ordering::Relaxed))
 }
 
 /// Has the kernel kill this process when its launcher dies, even by `kill -9`.
@@ -157,7 +161,7 @@ pub fn process_name(node: &str, generation: u32) -> String {
 /// Keeps this process on one core. Where the machine has no such core, it stays where it is: placement
 /// is a matter of speed, never of results.
 pub fn stay_on(cpu: Option<usize>) {
-    if let Some(cpu) = cpu.filter(|&cpu| cpu < CpuSet::MAX_CPU) {
+    if let Some(cpu) = cpu.filter(|&cpu| cpu < CpuSet::MAX_CPU && !crate::hosted::is_hosted()) {
         let mut set = CpuSet::new();
         set.set(cpu);
         let _ = sched_setaffinity(None, &set);
@@ -169,6 +173,9 @@ pub fn stay_on(cpu: Option<usize>) {
 /// On a core that the nodes of a loop share, an interrupted waker needs the core once more before it can
 /// sleep; measured, a tick of the hover run takes 4.0 context switches this way and 5.7 without.
 pub(crate) fn wait_for_turn() {
+    if crate::hosted::is_hosted() {
+        return;
+    }
     // SAFETY: the call takes and returns numbers. A process that was given a real-time priority keeps it.
     if unsafe { libc::sched_getscheduler(0) } != libc::SCHED_OTHER {
         return;
@@ -220,6 +227,9 @@ pub fn die_with_this_one(command: &mut Command) {
 /// # Errors
 /// If the system does not allow this much; the error names the right.
 pub(crate) fn lock_memory() -> Result<(), BusError> {
+    if crate::hosted::is_hosted() {
+        return Ok(());
+    }
     let all = rustix::mm::MlockAllFlags::CURRENT | rustix::mm::MlockAllFlags::FUTURE;
     rustix::mm::mlockall(all).map_err(|error| BusError::Denied {
         action: "lock the memory of this process (run.lock_memory)",

@@ -24,11 +24,14 @@ pub struct Join {
 }
 
 impl Join {
-    /// The part that the launcher gave this process, which from now on dies with its launcher.
+    /// The part that the launcher gave this process, which from now on dies with its launcher; or this thread.
     ///
     /// # Errors
     /// If the process was not started by a launcher.
     pub fn from_environment() -> Result<Self, BusError> {
+        if let Some(join) = crate::hosted::join() {
+            return Ok(join);
+        }
         let run_dir = crate::process::join()?;
         let node =
             std::env::var(NODE_VARIABLE).map_err(|_| BusError::NotInARun { variable: NODE_VARIABLE })?;

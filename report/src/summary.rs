@@ -2,7 +2,7 @@
 
 use crate::judge::{Verdict, WindowErrors};
 use crate::shadow::{Difference, Step};
-use runtime::launch::Outcome;
+use runtime::launcher::Outcome;
 use runtime::problem::Problem;
 use runtime::succession::{Purpose, Report};
 use serde::Serialize;

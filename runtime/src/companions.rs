@@ -19,6 +19,7 @@ const MESSAGE_BYTES: usize = 4096;
 /// The companions of a run; dropping them kills those that still live.
 pub struct Companions<'a> {
     all: Vec<Companion<'a>>,
+    exe: &'a Path,
     run_dir: &'a Path,
     clock: &'a WatchClock,
 }
@@ -52,8 +53,8 @@ pub struct Failure {
 
 impl<'a> Companions<'a> {
     /// No companions yet.
-    pub fn new(run_dir: &'a Path, clock: &'a WatchClock) -> Self {
-        Self { all: Vec::new(), run_dir, clock }
+    pub fn new(exe: &'a Path, run_dir: &'a Path, clock: &'a WatchClock) -> Self {
+        Self { all: Vec::new(), exe, run_dir, clock }
     }
 
     /// Starts a companion.
@@ -66,8 +67,14 @@ impl<'a> Companions<'a> {
             Readiness::Notify => Some(open_socket(name, self.all.len(), self.run_dir)?),
         };
         let notify = socket.as_ref().map(|(_, path)| path.as_path());
-        let process =
-            Process::start(name, Role::Companion { generation: 0 }, Some(program), self.run_dir, notify)?;
+        let process = Process::start(
+            self.exe,
+            name,
+            Role::Companion { generation: 0 },
+            Some(program),
+            self.run_dir,
+            notify,
+        )?;
         let (is_ready, started) = (socket.is_none(), self.clock.now());
         let was_ready = is_ready;
         self.all.push(Companion { program, process, generation: 0, socket, is_ready, was_ready, started });
@@ -102,7 +109,7 @@ impl<'a> Companions<'a> {
 
     /// The process numbers of all.
     pub fn ids(&self) -> impl Iterator<Item = u32> {
-        self.all.iter().map(|companion| companion.process.id())
+        self.all.iter().filter_map(|companion| companion.process.id())
     }
 
     /// Keeps logs in the run directory from filling its file system.
@@ -147,6 +154,7 @@ impl<'a> Companions<'a> {
         companion.is_ready = companion.socket.is_none();
         companion.process.remove_log(self.run_dir);
         companion.process = Process::start(
+            self.exe,
             &companion.process.name,
             Role::Companion { generation: companion.generation },
             Some(companion.program),
@@ -179,7 +187,7 @@ impl Companion<'_> {
     fn note_early_end(&mut self) {
         if !self.is_ready
             && self.process.verdict.is_none()
-            && self.process.end.is_some_and(|end| end.success())
+            && self.process.end.as_ref().is_some_and(|end| end.success())
         {
             let words =
                 "ended with exit code 0 before it said that it is ready: READY=1 on the socket NOTIFY_SOCKET";
@@ -189,7 +197,8 @@ impl Companion<'_> {
 
     /// Whether it has ended in another way than one that has done its part.
     fn has_failed(&self) -> bool {
-        self.process.end.is_some_and(|end| !end.success() || !self.is_ready) || self.process.verdict.is_some()
+        self.process.end.as_ref().is_some_and(|end| !end.success() || !self.is_ready)
+            || self.process.verdict.is_some()
     }
 }
 

@@ -9,7 +9,8 @@ pub mod describe;
 pub mod event;
 pub mod flight;
 pub mod graph;
-pub mod launch;
+pub mod host;
+pub mod launcher;
 pub mod manifest;
 pub mod output_file;
 pub mod outputs;
@@ -24,5 +25,27 @@ pub mod run_dir;
 mod spawn;
 mod stall;
 pub mod succession;
+mod supervision;
 mod supervisor;
 mod watch_clock;
+
+use bus::{BusError, Join};
+use registry::Registry;
+
+/// Is the component `name` of the run that started this process; the clock for `clock`. A program that hands the
+/// arguments `node KIND` of its command line on to this may be a [`host::Host::Exe`].
+///
+/// # Errors
+/// If there is no such component, or it fails.
+pub fn node(name: &str, registry: Registry) -> anyhow::Result<()> {
+    let ended = match (name, registry.find(name)) {
+        ("clock", _) => bus::clock::run(),
+        (_, Some(component)) => Join::from_environment().and_then(|join| component.run(join)),
+        (_, None) => anyhow::bail!("no kind `{name}`; there are {}", registry.names()),
+    };
+    match ended {
+        // The launcher ended the run and knows why.
+        Ok(()) | Err(BusError::Aborted) => Ok(()),
+        Err(error) => anyhow::bail!(error),
+    }
+}

@@ -1,14 +1,14 @@
 //! The processes of a run on the host: started, watched, and taken down.
 
+use crate::host::{Body, End, Host, Thread};
 use crate::process_log::{self, last_words};
-use crate::program::Program;
+use crate::program::{Executable, Program};
 use crate::spawn;
 use crate::watch_clock::WatchClock;
-use anyhow::{Context, Result};
+use anyhow::Result;
 use bus::control::Control;
-use std::os::unix::process::ExitStatusExt;
 use std::path::{Path, PathBuf};
-use std::process::{Child, ExitStatus};
+use std::sync::Arc;
 use std::time::Duration;
 
 /// How long processes have to leave by themselves after an abort.
@@ -34,6 +34,16 @@ pub enum Role {
     },
 }
 
+impl Role {
+    /// Counts the processes of this role; the first is 0.
+    pub fn generation(self) -> u32 {
+        match self {
+            Self::Clock => 0,
+            Self::Node { generation, .. } | Self::Companion { generation } => generation,
+        }
+    }
+}
+
 /// A process of a run.
 #[derive(Debug)]
 pub struct Process {
@@ -42,9 +52,9 @@ pub struct Process {
     /// What it is for.
     pub role: Role,
     log: PathBuf,
-    child: Child,
+    body: Body,
     /// How it ended.
-    pub end: Option<ExitStatus>,
+    pub end: Option<End>,
     /// Whether somebody has drawn the consequences of its end.
     pub is_settled: bool,
     /// Why the launcher killed it.
@@ -52,22 +62,33 @@ pub struct Process {
 }
 
 /// The processes of a run; dropping them kills those that still live.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub struct Processes {
+    host: Host,
+    control: Arc<Control>,
     /// Those that were started and whose end is not settled.
     pub running: Vec<Process>,
 }
 
 impl Processes {
+    /// No processes yet of the run that `control` is of.
+    pub fn new(host: Host, control: Arc<Control>) -> Self {
+        Self { host, control, running: Vec::new() }
+    }
+
     /// Starts a process; the clock where there is no program.
     pub fn start(&mut self, name: &str, role: Role, program: Option<&Program>, run_dir: &Path) -> Result<()> {
-        self.running.push(Process::start(name, role, program, run_dir, None)?);
+        let process = match &self.host {
+            Host::Exe(exe) => Process::start(exe, name, role, program, run_dir, None)?,
+            Host::InProcess => Process::start_thread(&self.control, name, role, program, run_dir)?,
+        };
+        self.running.push(process);
         Ok(())
     }
 
     /// The process numbers of all.
     pub fn ids(&self) -> impl Iterator<Item = u32> {
-        self.running.iter().map(Process::id)
+        self.running.iter().filter_map(Process::id)
     }
 
     /// Looks which processes have ended.
@@ -141,6 +162,7 @@ impl Process {
     /// Starts a process; the clock where there is no program. `notify` is the socket on which a companion says that
     /// it is ready.
     pub fn start(
+        exe: &Path,
         name: &str,
         role: Role,
         program: Option<&Program>,
@@ -148,19 +170,40 @@ impl Process {
         notify: Option<&Path>,
     ) -> Result<Self> {
         let (child, log) = match program {
-            None => spawn::start_clock(run_dir)?,
-            Some(program) => spawn::start(run_dir, name, role, program, notify)?,
+            None => spawn::start_clock(exe, run_dir)?,
+            Some(program) => spawn::start(exe, run_dir, name, role, program, notify)?,
         };
+        Ok(Self::new(name, role, log, Body::Process(child)))
+    }
+
+    /// Starts a component on a thread of this process; the clock where there is no program.
+    fn start_thread(
+        control: &Arc<Control>,
+        name: &str,
+        role: Role,
+        program: Option<&Program>,
+        run_dir: &Path,
+    ) -> Result<Self> {
+        program.map_or(Ok(()), |program| Host::InProcess.require(name, program))?;
+        let component = program.and_then(|program| match &program.executable {
+            Executable::Component(component) => Some(*component),
+            Executable::Command(_) => None,
+        });
+        let thread = Thread::start(component, run_dir.to_owned(), name, role.generation(), control.clone())?;
+        Ok(Self::new(name, role, PathBuf::new(), Body::Thread(thread)))
+    }
+
+    fn new(name: &str, role: Role, log: PathBuf, body: Body) -> Self {
         let name = match role {
             Role::Node { generation, .. } => bus::process::process_name(name, generation),
             Role::Clock | Role::Companion { .. } => name.to_owned(),
         };
-        Ok(Self { name, role, log, child, end: None, is_settled: false, verdict: None })
+        Self { name, role, log, body, end: None, is_settled: false, verdict: None }
     }
 
-    /// Its process number.
-    pub fn id(&self) -> u32 {
-        self.child.id()
+    /// Its process number, if it is a process of its own.
+    pub fn id(&self) -> Option<u32> {
+        self.body.id()
     }
 
     /// Removes its log, if that lies in the run directory.
@@ -173,7 +216,7 @@ impl Process {
     /// Looks whether the process has ended.
     pub fn look(&mut self) -> Result<()> {
         if self.end.is_none() {
-            self.end = self.child.try_wait().context("cannot watch a process")?;
+            self.end = self.body.end()?;
         }
         Ok(())
     }
@@ -181,7 +224,7 @@ impl Process {
     /// Kills the process and its group, and waits for its end.
     pub fn kill(&mut self) {
         if self.end.is_none() {
-            self.end = kill(&mut self.child);
+            self.end = self.body.kill();
         }
     }
 
@@ -194,28 +237,12 @@ impl Process {
 
     /// How the process ended before the run did, with the last lines it wrote.
     pub fn post_mortem(&self) -> String {
-        let end = match (&self.verdict, self.end) {
+        let end = match (&self.verdict, &self.end) {
             (Some(verdict), _) => verdict.clone(),
-            (None, Some(end)) => match (end.code(), end.signal()) {
-                (Some(0), _) => "ended with exit code 0 before the run did".to_owned(),
-                (Some(code), _) => format!("ended with exit code {code}"),
-                (None, Some(signal)) => format!(
-                    "was killed by {}{}",
-                    bus::process::signal_name(signal),
-                    bus::room::signal_message(signal)
-                ),
-                (None, None) => "ended".to_owned(),
-            },
+            (None, Some(end)) => end.message(),
             (None, None) => "is still running".to_owned(),
         };
         let words: String = last_words(&self.log).iter().map(|line| format!("\n  {line}")).collect();
         format!("process `{}` {end}{words}", self.name)
     }
-}
-
-/// Kills a process and its whole group, since a command may have started processes of its own.
-fn kill(child: &mut Child) -> Option<ExitStatus> {
-    bus::process::kill_group(child.id());
-    let _ = child.kill();
-    child.wait().ok()
 }

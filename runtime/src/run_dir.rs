@@ -93,7 +93,6 @@ impl RunDir {
     /// # Errors
     /// If shared memory or the folder for temporary files cannot be written to.
     pub fn create(manifest: &Path) -> Result<Self> {
-        bus::process::survive_file_limit();
         let manifest = std::path::absolute(manifest)?;
         let (entry, registered) = loop {
             let entry = Entry::new(&manifest)?;

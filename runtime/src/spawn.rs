@@ -19,9 +19,8 @@ const NOTIFY_VARIABLE: &str = "NOTIFY_SOCKET";
 ///
 /// # Errors
 /// If it cannot be started.
-pub fn start_clock(run_dir: &Path) -> Result<(Child, PathBuf)> {
-    let mut command = this_binary();
-    command.args(["node", "clock"]);
+pub fn start_clock(exe: &Path, run_dir: &Path) -> Result<(Child, PathBuf)> {
+    let mut command = component(exe, "clock");
     bus::process::hold_stop_signals(&mut command);
     spawn(command, "clock", Role::Clock, run_dir, None)
 }
@@ -31,6 +30,7 @@ pub fn start_clock(run_dir: &Path) -> Result<(Child, PathBuf)> {
 /// # Errors
 /// If it cannot be started, or the niceness or priority that it asks for is not allowed.
 pub fn start(
+    exe: &Path,
     run_dir: &Path,
     name: &str,
     role: Role,
@@ -38,11 +38,7 @@ pub fn start(
     notify: Option<&Path>,
 ) -> Result<(Child, PathBuf)> {
     let mut command = match &program.executable {
-        Executable::Component(kind) => {
-            let mut command = this_binary();
-            command.args(["node", kind.name]);
-            command
-        }
+        Executable::Component(registration) => component(exe, registration.name),
         Executable::Command(words) => {
             let mut command = Command::new(&words[0]);
             command.args(&words[1..]);
@@ -78,10 +74,10 @@ pub fn start(
     Ok((child, log))
 }
 
-/// This binary, also after the file that it was started from has been replaced by a newer one.
-fn this_binary() -> Command {
-    let mut command = Command::new("/proc/self/exe");
-    command.arg0("hummingbus");
+/// The component named `name`, which the binary `exe` becomes with these arguments.
+fn component(exe: &Path, name: &str) -> Command {
+    let mut command = Command::new(exe);
+    command.arg0("hummingbus").args(["node", name]);
     command
 }
 
@@ -112,10 +108,7 @@ fn spawn(
 /// Where a process's output goes: the file that the manifest names, to which a successor adds, or one in the
 /// run directory, of which a successor has its own.
 fn open_log(name: &str, role: Role, run_dir: &Path, log: Option<&Path>) -> Result<(File, PathBuf)> {
-    let generation = match role {
-        Role::Node { generation, .. } | Role::Companion { generation } => generation,
-        Role::Clock => 0,
-    };
+    let generation = role.generation();
     let number = if generation == 0 { String::new() } else { format!("#{generation}") };
     if let Some(path) = log {
         let file = append_to_log(path).with_context(|| format!("process `{name}`"))?;

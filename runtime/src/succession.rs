@@ -729,7 +729,7 @@ impl<'a> Successions<'a> {
         self.control.clear_slot(member);
         let crashed = processes
             .of(node, generation)
-            .is_some_and(|process| process.end.is_some_and(|end| !end.success()));
+            .is_some_and(|process| process.end.as_ref().is_some_and(|end| !end.success()));
         if crashed {
             // Its ports would keep their places; what cannot be removed now goes with the run.
             let _ = bus::reap_dead(self.run_dir, &self.plan.run_id);

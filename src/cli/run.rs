@@ -11,7 +11,8 @@ use report::profile::Profile;
 use report::summary::{Judgement, Summary};
 use report::{judge, shadow};
 use runtime::graph::{self, Graph, successor_of};
-use runtime::launch;
+use runtime::host::Host;
+use runtime::launcher::Launcher;
 use runtime::manifest::{Manifest, PaceSetting};
 use runtime::outputs::Outputs;
 use serde_json::json;
@@ -106,11 +107,14 @@ pub fn run(
     let pages = if graph.plan.profile { files.outputs() } else { Vec::new() };
     let mut outputs = Outputs::of(&manifest, &graph, &path, pages)?;
     let bar = Bar::new(arguments.json);
-    let flown = launch::fly(&manifest, &mut graph, &mut outputs, &stop, &mut |event| bar.show(event))
-        .and_then(|outcome| {
-            bar.finish();
-            Ok((outcome, outputs.finish()?))
-        });
+    let launcher = Launcher::new(Host::this_binary())
+        .stopped_by(&stop)
+        .adopting_orphans()
+        .followed_by(|event| bar.show(event));
+    let flown = launcher.launch(&manifest, &mut graph, &mut outputs).and_then(|outcome| {
+        bar.finish();
+        Ok((outcome, outputs.finish()?))
+    });
     let (mut outcome, recording) =
         flown.or_else(|error| Err(broken(&manifest, &error, outputs.left(), arguments.json)?))?;
     let flight = outcome.flight.take();

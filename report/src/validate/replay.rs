@@ -8,11 +8,10 @@ use anyhow::{Context, Result, bail};
 use flights::Flight;
 use recorder::reader::Recording;
 use runtime::event::RunEvent;
-use runtime::graph::Graph;
-use runtime::launch;
+use runtime::host::Host;
+use runtime::launcher::Launcher;
 use runtime::manifest::Manifest;
 use runtime::output_file::{self, Kind, Mark, is_same};
-use runtime::outputs::Outputs;
 use std::fmt::Write as _;
 use std::fs::File;
 use std::io::Write as _;
@@ -84,14 +83,14 @@ impl Replay {
     /// As `hummingbus run`; a run that was stopped too.
     pub fn fly(&self, how: &Validation<'_>, tell: &mut dyn FnMut(&str)) -> Result<(f64, Recording)> {
         let manifest = Manifest::load(&self.manifest_path(), &[], how.components)?;
-        let mut graph = Graph::build(&manifest)?;
-        let mut outputs = Outputs::of(&manifest, &graph, &self.folder.join(RECORDING), Vec::new())?;
-        let outcome = launch::fly(&manifest, &mut graph, &mut outputs, how.stop, &mut |event| {
-            if let RunEvent::Note(text) = event {
-                tell(text);
-            }
-        })?;
-        let recording = outputs.finish()?.context("it was not recorded")?;
+        let launcher =
+            Launcher::new(Host::this_binary()).stopped_by(how.stop).adopting_orphans().followed_by(|event| {
+                if let RunEvent::Note(text) = event {
+                    tell(text);
+                }
+            });
+        let (outcome, recording) = launcher.fly(&manifest, &self.folder.join(RECORDING))?;
+        let recording = recording.context("it was not recorded")?;
         if outcome.was_stopped {
             bail!("it was stopped after {} of {} ticks", outcome.ticks, self.ticks);
         }

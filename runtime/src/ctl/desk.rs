@@ -1,11 +1,12 @@
 //! What the launcher does with requests: holds, steps, paces and stops the run through its control segment.
 
 use crate::ctl::protocol::{Answer, Request, Status};
-use crate::ctl::server::{Reply, Server};
+use crate::ctl::server::{Asked, Remote, Reply, Server};
 use anyhow::Result;
 use bus::control::Control;
 use bus::plan::Plan;
 use std::path::Path;
+use std::sync::mpsc::Receiver;
 
 /// The hold tick of a run that is not to be held.
 const NEVER: u32 = u32::MAX;
@@ -38,12 +39,18 @@ impl<'a> Desk<'a> {
     ///
     /// # Errors
     /// If the socket cannot be made.
-    pub fn open(run_dir: &Path, plan: &'a Plan, control: &'a Control) -> Result<Self> {
-        Ok(Self { plan, control, server: Server::start(run_dir)?, wish: None })
+    pub fn open(
+        run_dir: &Path,
+        plan: &'a Plan,
+        control: &'a Control,
+        remote: Remote,
+        requests: Receiver<Asked>,
+    ) -> Result<Self> {
+        Ok(Self { plan, control, server: Server::start(run_dir, remote, requests)?, wish: None })
     }
 
     /// Serves what has been asked since the last look; returns a request that is not about the clock, a swap.
-    pub fn serve(&mut self) -> Option<(Request, Reply)> {
+    pub fn serve(&mut self) -> Option<Asked> {
         self.grant_wish();
         loop {
             let (request, reply) = self.server.poll()?;

@@ -1,4 +1,4 @@
-//! Launching a run: starts its processes, supervises them, and takes everything down again.
+//! Watching over a run: starts its processes, answers what happens, and takes everything down again.
 
 use crate::companions::Companions;
 use crate::ctl::desk::Desk;
@@ -6,18 +6,15 @@ use crate::ctl::protocol::{Answer, Request};
 use crate::ctl::server::Reply;
 use crate::descendants::Descendants;
 use crate::event::{Progress, RunEvent, StopToken};
-use crate::flight::Flight;
 use crate::graph::{Graph, successor_of};
 use crate::manifest::Manifest;
-use crate::outputs::Outputs;
 use crate::processes::{Processes, Role};
 use crate::program::{OnExit, Readiness, Successor};
-use crate::run_dir::RunDir;
 use crate::stall::{self, Culprit};
 use crate::succession::{Report, Stage, Standing, Successions, take_over_stride};
 use crate::supervisor::{Action, Event, State};
 use crate::watch_clock::WatchClock;
-use anyhow::{Context, Result, anyhow};
+use anyhow::{Result, anyhow};
 use bus::control::{Control, Phase, monotonic_ns};
 use bus::plan::{NodePlan, Plan};
 use std::path::Path;
@@ -33,86 +30,6 @@ const REAP_PERIOD: Duration = Duration::from_secs(5);
 
 /// Ticks that a successor shadows where a request does not say.
 const SHADOW_TICKS: u32 = 100;
-
-/// What is known about a run when it is over.
-#[derive(Debug)]
-pub struct Outcome {
-    /// Ticks that every node completed.
-    pub ticks: u32,
-    /// Whether the run was stopped before its end.
-    pub was_stopped: bool,
-    /// Host time from the first grant to the last completed tick.
-    pub host_s: f64,
-    /// Deadlines missed (paced runs).
-    pub missed_deadlines: u32,
-    /// Per process: name, processor share of one core, deadlines at which it was late.
-    pub processes: Vec<(String, f64, u32)>,
-    /// What became of those who were to succeed.
-    pub successions: Vec<Report>,
-    /// The host times that the processes noted, in a run that is profiled.
-    pub flight: Option<Flight>,
-}
-
-/// Flies `graph` and claims `outputs` for it; returns when every process is gone.
-///
-/// # Errors
-/// If another run writes to one of its files, or a process fails, stalls, or cannot be started; the error holds its
-/// last words.
-pub fn fly(
-    manifest: &Manifest,
-    graph: &mut Graph,
-    outputs: &mut Outputs,
-    stop: &StopToken,
-    on: &mut dyn FnMut(RunEvent<'_>),
-) -> Result<Outcome> {
-    let run_dir = RunDir::create(&manifest.path)?;
-    // Before anything is touched that an earlier run left.
-    bus::room::require(&graph.plan, &manifest.registry().messages())?;
-    outputs.claim(&run_dir)?;
-    if let Some(kept) = outputs.kept() {
-        on(RunEvent::Note(&format!("what an earlier run left unfinished is kept as {}", kept.display())));
-    }
-    prepare(manifest, graph, outputs.partial(), &run_dir)?;
-    graph.plan.run_id = run_dir.run_id().to_owned();
-    graph.plan.store(run_dir.path())?;
-    let graph = &*graph;
-    let control = Control::create(&graph.plan)?;
-    let (plan, dir) = (&graph.plan, run_dir.path());
-    let clock = WatchClock::new();
-    // Dropped behind the supervisor, which ends the processes.
-    let descendants = Descendants::of_run(dir);
-    let successions = Successions::new(plan, &control, dir, &clock, &graph.programs, &graph.successors);
-    let mut supervisor = Supervisor {
-        plan,
-        control: &control,
-        processes: Processes::default(),
-        companions: Companions::new(dir, &clock),
-        clock: &clock,
-        successions,
-        state: State::Starting,
-        desk: Desk::open(dir, plan, &control)?,
-        swaps: Vec::new(),
-        requests: 0,
-        stop,
-        seen_stops: 0,
-        manifest,
-        graph,
-        on,
-        last_change: (0, clock.now()),
-        logs_bounded: clock.now(),
-        run_dir: dir,
-        descendants: &descendants,
-        reaped: clock.now(),
-    };
-    supervisor.fly()?;
-    supervisor.tell_progress();
-    let mut outcome = outcome(plan, &control, &supervisor.successions);
-    outcome.successions = supervisor.successions.into_reports();
-    if plan.profile {
-        outcome.flight = Some(Flight::open(plan, dir, outcome.ticks, &outcome.successions)?);
-    }
-    Ok(outcome)
-}
 
 /// What became of a swap, for who asked for it.
 fn answer(report: &Report) -> Answer {
@@ -131,24 +48,6 @@ fn answer(report: &Report) -> Answer {
     }
 }
 
-/// Puts the files that recorders attach into the run directory and tells the recorders.
-fn prepare(manifest: &Manifest, graph: &mut Graph, recording: Option<&Path>, run_dir: &RunDir) -> Result<()> {
-    let manifest_copy = run_dir.path().join("manifest.toml");
-    std::fs::write(&manifest_copy, &manifest.recorded_text).context("cannot write the manifest's copy")?;
-    let name = |path: &Path| path.file_name().unwrap_or_default().to_string_lossy().into_owned();
-    let mut attachments = vec![(name(&manifest.path), manifest_copy)];
-    attachments.extend(manifest.included.iter().map(|path| (name(path), path.clone())));
-    attachments.extend(graph.models.iter().map(|path| (name(path), path.clone())));
-    let attachments: Vec<_> =
-        attachments.iter().map(|(name, path)| serde_json::json!({ "name": name, "path": path })).collect();
-    for (program, node) in graph.programs.iter().zip(&mut graph.plan.nodes) {
-        if program.is_recorder() {
-            node.parameters = serde_json::json!({ "path": recording, "attachments": attachments });
-        }
-    }
-    Ok(())
-}
-
 /// Fisher-Yates with the bus's own generator: the same seed gives the same order.
 fn shuffle<T>(items: &mut [T], seed: Option<u64>) {
     use rand_core::Rng;
@@ -161,29 +60,51 @@ fn shuffle<T>(items: &mut [T], seed: Option<u64>) {
 }
 
 /// Watches over a run: what happens is told to the state machine, and what that answers is done.
-struct Supervisor<'a> {
-    manifest: &'a Manifest,
-    graph: &'a Graph,
-    plan: &'a Plan,
-    control: &'a Control,
-    processes: Processes,
-    companions: Companions<'a>,
-    clock: &'a WatchClock,
-    successions: Successions<'a>,
-    state: State,
-    desk: Desk<'a>,
+pub struct Supervisor<'a> {
+    /// The manifest, for successors that are asked for.
+    pub manifest: &'a Manifest,
+    /// What it means.
+    pub graph: &'a Graph,
+    /// The plan of the run.
+    pub plan: &'a Plan,
+    /// Its control segment.
+    pub control: &'a Control,
+    /// The clock and the nodes.
+    pub processes: Processes,
+    /// Processes beside the ticks.
+    pub companions: Companions<'a>,
+    /// The watchdogs' clock.
+    pub clock: &'a WatchClock,
+    /// Who succeeds whom.
+    pub successions: Successions<'a>,
+    /// Where the run stands.
+    pub state: State,
+    /// Serves requests.
+    pub desk: Desk<'a>,
     /// Swaps that were asked for and have not come to their end: the request, and who asked.
-    swaps: Vec<(u32, Reply)>,
+    pub swaps: Vec<(u32, Reply)>,
     /// Requests so far.
-    requests: u32,
-    stop: &'a StopToken,
-    seen_stops: usize,
-    on: &'a mut dyn FnMut(RunEvent<'_>),
+    pub requests: u32,
+    /// Whether somebody asked for a stop.
+    pub stop: &'a StopToken,
+    /// How often somebody had at the last look.
+    pub seen_stops: usize,
+    /// Hears what happens.
+    pub on: &'a mut dyn FnMut(RunEvent<'_>),
     /// How far the run had come when it last came on, and when that was on the watchdogs' clock.
+    pub run_dir: &'a Path,
+    /// What the processes started, where that is to end with the run.
+    pub descendants: Option<&'a Descendants>,
+    /// When things were done last.
+    pub timing: Timing,
+}
+
+/// When the supervisor did what it does now and then, on the watchdogs' clock.
+#[derive(Debug, Default)]
+pub struct Timing {
+    /// How far the run had come when it last came on, and when that was.
     last_change: (u32, Duration),
     logs_bounded: Duration,
-    run_dir: &'a Path,
-    descendants: &'a Descendants,
     reaped: Duration,
 }
 
@@ -197,7 +118,10 @@ struct Death {
 impl Supervisor<'_> {
     /// Starts everybody and watches until all have ended. Whatever goes wrong, those that live may leave in order: the
     /// recorder finishes its file.
-    fn fly(&mut self) -> Result<()> {
+    ///
+    /// # Errors
+    /// What ended the run before its time, in words.
+    pub fn fly(&mut self) -> Result<()> {
         let flown = self.start().and_then(|()| self.watch());
         if flown.is_err() && !self.control.is_aborted() {
             self.processes.take_down(self.control)?;
@@ -265,7 +189,8 @@ impl Supervisor<'_> {
         (self.on)(RunEvent::Note(text));
     }
 
-    fn tell_progress(&mut self) {
+    /// Tells how far the run has come.
+    pub fn tell_progress(&mut self) {
         let (start_ns, _) = self.control.host_span_ns();
         let host_ns = if start_ns > 0 { monotonic_ns().saturating_sub(start_ns) } else { 0 };
         (self.on)(RunEvent::Progress(Progress {
@@ -278,16 +203,17 @@ impl Supervisor<'_> {
 
     /// Takes note of the end of orphans, which would otherwise stay in the table of processes for the whole run.
     fn reap(&mut self) {
-        if self.clock.since(self.reaped) >= REAP_PERIOD {
-            self.reaped = self.clock.now();
+        let Some(descendants) = self.descendants else { return };
+        if self.clock.since(self.timing.reaped) >= REAP_PERIOD {
+            self.timing.reaped = self.clock.now();
             let own: Vec<u32> = self.processes.ids().chain(self.companions.ids()).collect();
-            self.descendants.reap(&own);
+            descendants.reap(&own);
         }
     }
 
     fn bound_logs(&mut self) {
-        if self.clock.since(self.logs_bounded) >= LOG_PERIOD {
-            self.logs_bounded = self.clock.now();
+        if self.clock.since(self.timing.logs_bounded) >= LOG_PERIOD {
+            self.timing.logs_bounded = self.clock.now();
             self.processes.bound_logs(self.run_dir);
             self.companions.bound_logs();
         }
@@ -422,9 +348,9 @@ impl Supervisor<'_> {
     fn settle_ends(&mut self) -> Result<()> {
         for index in 0..self.processes.running.len() {
             let Some(process) = self.processes.running.get_mut(index) else { break };
-            let (Some(end), false) = (process.end, process.is_settled) else { continue };
-            let (name, role) = (process.name.clone(), process.role);
+            let (Some(end), false) = (&process.end, process.is_settled) else { continue };
             let succeeded = end.success() && process.verdict.is_none();
+            let (name, role) = (process.name.clone(), process.role);
             if succeeded && self.has_done_its_part(role) {
                 self.processes.running[index].is_settled = true;
                 continue;
@@ -613,7 +539,7 @@ impl Supervisor<'_> {
                 self.abort(format!("{}\nThe run was aborted at tick {tick}{silent}{why}", death.words))?;
             }
         }
-        self.last_change.1 = self.clock.now();
+        self.timing.last_change.1 = self.clock.now();
         Ok(true)
     }
 
@@ -642,14 +568,14 @@ impl Supervisor<'_> {
         let is_paused = self.control.held_at().is_some_and(|held| self.control.hold_tick() <= held);
         // A companion that does not get ready has a watchdog of its own.
         let is_waiting = self.control.held_at().is_some() && !self.companions.all_ready();
-        if ticks != self.last_change.0 || self.state.is_over() || is_paused || is_waiting {
-            self.last_change = (ticks, self.clock.now());
+        if ticks != self.timing.last_change.0 || self.state.is_over() || is_paused || is_waiting {
+            self.timing.last_change = (ticks, self.clock.now());
             return Ok(());
         }
         if let Some((node, generation, stage, since)) = self.successions.joining() {
-            return self.note_late_joiner(node, generation, stage, since.max(self.last_change.1));
+            return self.note_late_joiner(node, generation, stage, since.max(self.timing.last_change.1));
         }
-        let stood = self.clock.since(self.last_change.1);
+        let stood = self.clock.since(self.timing.last_change.1);
         let culprit = stall::culprit(self.plan, self.control, &self.successions, &self.processes);
         if stood <= self.patience(culprit).max(2 * stall::deadline(self.plan, self.control)) {
             return Ok(());
@@ -659,7 +585,7 @@ impl Supervisor<'_> {
             self.tell(Event::Died { policy: OnExit::Stop, is_possible: false })?;
             return self.abort(format!("{words}; it was aborted"));
         };
-        self.last_change.1 = self.clock.now();
+        self.timing.last_change.1 = self.clock.now();
         self.processes.kill_role(culprit.role(), Some(format!("was killed by the watchdog: {words}")));
         Ok(())
     }
@@ -703,25 +629,4 @@ impl Supervisor<'_> {
 fn silent_topics(node: &NodePlan, plan: &Plan) -> String {
     let topics: Vec<_> = node.outputs.iter().map(|output| plan.topics[output.topic].name.as_str()).collect();
     if topics.is_empty() { String::new() } else { format!("; nothing more came on {}", topics.join(", ")) }
-}
-
-fn outcome(plan: &Plan, control: &Control, successions: &Successions<'_>) -> Outcome {
-    let (start_ns, end_ns) = control.host_span_ns();
-    let host_s = end_ns.saturating_sub(start_ns) as f64 * 1e-9;
-    let share = |cpu_ns: u64| if host_s > 0.0 { cpu_ns as f64 * 1e-9 / host_s } else { 0.0 };
-    let clock = ("clock".to_owned(), share(control.clock_cpu_ns()), 0);
-    let nodes = plan.nodes.iter().enumerate();
-    let nodes = nodes.map(|(index, node)| {
-        let (cpu_ns, late) = successions.spent(index);
-        (node.name.clone(), share(cpu_ns), late)
-    });
-    Outcome {
-        ticks: control.completed_ticks(),
-        was_stopped: control.end_tick() < plan.duration_ticks,
-        host_s,
-        missed_deadlines: control.missed_deadlines(),
-        processes: std::iter::once(clock).chain(nodes).collect(),
-        successions: Vec::new(),
-        flight: None,
-    }
 }

@@ -1,0 +1,56 @@
+//! Nodes and the clock on threads of the launcher's own process.
+//!
+//! Such a thread is told by its launcher what a process reads from its environment, and it leaves its process as it is:
+//! signals, memory, cores and priorities belong to whoever owns the process.
+
+use crate::run_process::Join;
+use std::cell::RefCell;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// What a thread is in a run.
+#[derive(Clone, Debug)]
+pub struct Hosted {
+    /// Which part it takes; the clock has a name that no node has.
+    pub join: Join,
+    /// Whether the instance is to end: its waits return then as those of an aborted run do. Who sets it wakes the
+    /// sleepers ([`crate::control::Control::set_epoch`] does).
+    pub is_cancelled: Arc<AtomicBool>,
+}
+
+thread_local! {
+    static HOSTED: RefCell<Option<Hosted>> = const { RefCell::new(None) };
+}
+
+impl Hosted {
+    /// Runs `node` on this thread as this instance: [`Join::from_environment`] and [`crate::clock::run`] join its run.
+    pub fn run<R>(self, node: impl FnOnce() -> R) -> R {
+        /// Also where the node panics.
+        struct Forget;
+        impl Drop for Forget {
+            fn drop(&mut self) {
+                HOSTED.set(None);
+            }
+        }
+        HOSTED.set(Some(self));
+        let _forget = Forget;
+        node()
+    }
+}
+
+/// Whether this thread is an instance of a run beside others of its process.
+pub(crate) fn is_hosted() -> bool {
+    HOSTED.with_borrow(Option::is_some)
+}
+
+/// The part that this thread takes.
+pub(crate) fn join() -> Option<Join> {
+    HOSTED.with_borrow(|hosted| hosted.as_ref().map(|hosted| hosted.join.clone()))
+}
+
+/// Whether this thread is to end.
+pub(crate) fn is_cancelled() -> bool {
+    HOSTED.with_borrow(|hosted| {
+        hosted.as_ref().is_some_and(|hosted| hosted.is_cancelled.load(Ordering::SeqCst))
+    })
+}

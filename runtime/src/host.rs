@@ -1,0 +1,196 @@
+//! Where the instances of a run's nodes live: in processes of their own, or on threads of this one.
+
+use crate::program::{Executable, Program};
+use anyhow::{Context, Result, bail};
+use bus::control::Control;
+use bus::hosted::Hosted;
+use bus::{BusError, Join, Registration};
+use std::os::unix::process::ExitStatusExt;
+use std::path::PathBuf;
+use std::process::{Child, ExitStatus};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread::JoinHandle;
+use std::time::Duration;
+
+/// How long a thread may take to notice that it is to end.
+const GRACE: Duration = Duration::from_secs(2);
+const POLL: Duration = Duration::from_millis(1);
+/// As much as the main thread of a process has.
+const STACK_BYTES: usize = 8 << 20;
+
+/// Where the instances of a run's nodes live.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Host {
+    /// Each component is a process that executes this binary with the arguments `node KIND`.
+    Exe(PathBuf),
+    /// Each component is a thread of this process, which the run leaves as it is otherwise. A `command`, and what only
+    /// a process of its own can have (`nice`, `cpu`, …), is refused.
+    InProcess,
+}
+
+impl Host {
+    /// This program's own binary, also after its file has been replaced: for programs that hand the arguments
+    /// `node KIND` to [`crate::node()`].
+    #[must_use]
+    pub fn this_binary() -> Self {
+        Self::Exe("/proc/self/exe".into())
+    }
+
+    /// Refuses what `program`, the process `name`, asks for and cannot have here.
+    pub(crate) fn require(&self, name: &str, program: &Program) -> Result<()> {
+        if matches!(self, Self::Exe(_)) {
+            return Ok(());
+        }
+        let asked = [
+            ("command", matches!(program.executable, Executable::Command(_))),
+            ("environment", !program.environment.is_empty()),
+            ("working_directory", program.working_directory.is_some()),
+            ("nice", program.nice.is_some()),
+            ("realtime_priority", program.realtime_priority.is_some()),
+            ("log", program.log.is_some()),
+        ];
+        match asked.into_iter().find(|(_, is_asked)| *is_asked) {
+            None => Ok(()),
+            Some((key, _)) => bail!(
+                "process `{name}`: `{key}` needs a process of its own, and the nodes of this run are threads; leave \
+                 it out, or give the launcher a binary to execute (Host::Exe)"
+            ),
+        }
+    }
+}
+
+/// How an instance ended.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum End {
+    /// It returned, as a process with this exit code.
+    Exited(i32),
+    /// A signal killed its process.
+    Signalled(i32),
+    /// Its thread failed or panicked, in words.
+    Failed(String),
+    /// The launcher ended its thread.
+    Cancelled,
+}
+
+impl End {
+    /// Whether nothing went wrong.
+    pub fn success(&self) -> bool {
+        *self == Self::Exited(0)
+    }
+
+    /// How it ended before the run did.
+    pub fn message(&self) -> String {
+        match self {
+            Self::Exited(0) => "ended with exit code 0 before the run did".to_owned(),
+            Self::Exited(code) => format!("ended with exit code {code}"),
+            Self::Signalled(signal) => format!(
+                "was killed by {}{}",
+                bus::process::signal_name(*signal),
+                bus::room::signal_message(*signal)
+            ),
+            Self::Failed(message) => format!("failed: {message}"),
+            Self::Cancelled => "was ended".to_owned(),
+        }
+    }
+}
+
+impl From<ExitStatus> for End {
+    fn from(status: ExitStatus) -> Self {
+        // One of the two is there: it has ended.
+        status.code().map_or_else(|| Self::Signalled(status.signal().unwrap_or_default()), Self::Exited)
+    }
+}
+
+/// What runs: a process or a thread.
+#[derive(Debug)]
+pub enum Body {
+    /// A process.
+    Process(Child),
+    /// A thread.
+    Thread(Thread),
+}
+
+/// An instance on a thread.
+#[derive(Debug)]
+pub struct Thread {
+    handle: Option<JoinHandle<Result<(), BusError>>>,
+    is_cancelled: Arc<AtomicBool>,
+    control: Arc<Control>,
+}
+
+impl Thread {
+    /// Starts `component` as instance `generation` of `node`; the clock where there is no component.
+    pub fn start(
+        component: Option<&'static Registration>,
+        run_dir: PathBuf,
+        node: &str,
+        generation: u32,
+        control: Arc<Control>,
+    ) -> Result<Self> {
+        let is_cancelled = Arc::new(AtomicBool::new(false));
+        let join = Join { run_dir, node: node.to_owned(), generation };
+        let hosted = Hosted { join: join.clone(), is_cancelled: is_cancelled.clone() };
+        let thread = std::thread::Builder::new().name(node.to_owned()).stack_size(STACK_BYTES);
+        let handle =
+            thread.spawn(move || hosted.run(|| component.map_or_else(bus::clock::run, |component| component.run(join))));
+        let handle = handle.with_context(|| format!("process `{node}`: cannot start a thread"))?;
+        Ok(Self { handle: Some(handle), is_cancelled, control })
+    }
+
+    fn end(&mut self) -> Option<End> {
+        let handle = self.handle.take_if(|handle| handle.is_finished())?;
+        Some(match handle.join() {
+            Ok(Ok(()) | Err(BusError::Aborted)) => End::Exited(0),
+            Ok(Err(error)) => End::Failed(error.to_string()),
+            Err(panic) => {
+                let text = panic.downcast_ref::<String>().map(String::as_str);
+                let text =
+                    text.or_else(|| panic.downcast_ref::<&str>().copied()).unwrap_or("without a message");
+                End::Failed(format!("it panicked: {text}"))
+            }
+        })
+    }
+
+    /// A thread that computes without an end cannot be ended: it is left behind.
+    fn cancel(&mut self) -> End {
+        self.is_cancelled.store(true, Ordering::SeqCst);
+        self.control.set_epoch(self.control.epoch());
+        let mut waited = Duration::ZERO;
+        while waited < GRACE && self.end().is_none() && self.handle.is_some() {
+            std::thread::sleep(POLL);
+            waited += POLL;
+        }
+        End::Cancelled
+    }
+}
+
+impl Body {
+    /// How it ended, if it has.
+    pub fn end(&mut self) -> Result<Option<End>> {
+        match self {
+            Self::Process(child) => Ok(child.try_wait().context("cannot watch a process")?.map(End::from)),
+            Self::Thread(thread) => Ok(thread.end()),
+        }
+    }
+
+    /// Ends it, and for a process its whole group, since a command may have started processes of its own.
+    pub fn kill(&mut self) -> Option<End> {
+        match self {
+            Self::Process(child) => {
+                bus::process::kill_group(child.id());
+                let _ = child.kill();
+                child.wait().ok().map(End::from)
+            }
+            Self::Thread(thread) => Some(thread.cancel()),
+        }
+    }
+
+    /// The number of a process.
+    pub fn id(&self) -> Option<u32> {
+        match self {
+            Self::Process(child) => Some(child.id()),
+            Self::Thread(_) => None,
+        }
+    }
+}

@@ -1,0 +1,244 @@
+//! Launches runs: from a checked manifest to the outcome of its run.
+
+use crate::companions::Companions;
+use crate::ctl::desk::Desk;
+use crate::ctl::server::{self, Remote};
+use crate::descendants::Descendants;
+use crate::event::{RunEvent, StopToken};
+use crate::flight::Flight;
+use crate::graph::Graph;
+use crate::host::Host;
+use crate::manifest::Manifest;
+use crate::outputs::Outputs;
+use crate::processes::Processes;
+use crate::run_dir::RunDir;
+use crate::succession::{Report, Successions};
+use crate::supervision::{Supervisor, Timing};
+use crate::supervisor::State;
+use crate::watch_clock::WatchClock;
+use anyhow::{Context, Result, bail};
+use bus::control::Control;
+use bus::plan::Plan;
+use recorder::reader::Recording;
+use std::path::Path;
+use std::sync::Arc;
+use std::sync::mpsc::{Receiver, channel};
+
+/// What is known about a run when it is over.
+#[derive(Debug)]
+pub struct Outcome {
+    /// Ticks that every node completed.
+    pub ticks: u32,
+    /// Whether the run was stopped before its end.
+    pub was_stopped: bool,
+    /// Host time from the first grant to the last completed tick.
+    pub host_s: f64,
+    /// Deadlines missed (paced runs).
+    pub missed_deadlines: u32,
+    /// Per process: name, processor share of one core, deadlines at which it was late.
+    pub processes: Vec<(String, f64, u32)>,
+    /// What became of those who were to succeed.
+    pub successions: Vec<Report>,
+    /// The host times that the processes noted, in a run that is profiled.
+    pub flight: Option<Flight>,
+}
+
+/// Launches a run. By itself it takes no signal of this process and changes nothing else of it either: several runs may
+/// fly in one process, also at the same time.
+pub struct Launcher<'a> {
+    host: Host,
+    stop: StopToken,
+    adopts_orphans: bool,
+    on: Box<dyn FnMut(RunEvent<'_>) + 'a>,
+    remote: Remote,
+    requests: Receiver<server::Asked>,
+}
+
+impl<'a> Launcher<'a> {
+    /// A launcher of a run whose nodes live in `host`.
+    #[must_use]
+    pub fn new(host: Host) -> Self {
+        let (sender, requests) = channel();
+        Self {
+            host,
+            stop: StopToken::new(),
+            adopts_orphans: false,
+            on: Box::new(|_| {}),
+            remote: Remote::new(sender),
+            requests,
+        }
+    }
+
+    /// The run ends when `token` is used.
+    #[must_use]
+    pub fn stopped_by(mut self, token: &StopToken) -> Self {
+        self.stop = token.clone();
+        self
+    }
+
+    /// `listener` hears what happens in the run, on the thread that flies it.
+    #[must_use]
+    pub fn followed_by(mut self, listener: impl FnMut(RunEvent<'_>) + 'a) -> Self {
+        self.on = Box::new(listener);
+        self
+    }
+
+    /// What the nodes' processes start themselves is ended with the run, however it was detached: this process becomes
+    /// the parent of orphans (`PR_SET_CHILD_SUBREAPER`) while the run flies.
+    #[must_use]
+    pub fn adopting_orphans(mut self) -> Self {
+        self.adopts_orphans = true;
+        self
+    }
+
+    /// Steers the run from another thread.
+    #[must_use]
+    pub fn remote(&self) -> Remote {
+        self.remote.clone()
+    }
+
+    /// Checks `manifest`, flies it, and records to `recording` if it has a recorder; returns when everything that was
+    /// started has ended.
+    ///
+    /// # Errors
+    /// A problem in the manifest, or as [`Launcher::launch`].
+    pub fn fly(self, manifest: &Manifest, recording: &Path) -> Result<(Outcome, Option<Recording>)> {
+        let mut graph = Graph::build(manifest)?;
+        let mut outputs = Outputs::of(manifest, &graph, recording, Vec::new())?;
+        let outcome = self.launch(manifest, &mut graph, &mut outputs)?;
+        Ok((outcome, outputs.finish()?))
+    }
+
+    /// Flies `graph`, the checked `manifest`, and claims `outputs` for it; returns when everything that was started has
+    /// ended.
+    ///
+    /// # Errors
+    /// If another run writes to one of its files, or a process fails, stalls, or cannot be started; the error holds
+    /// what it wrote last.
+    pub fn launch(
+        mut self,
+        manifest: &Manifest,
+        graph: &mut Graph,
+        outputs: &mut Outputs,
+    ) -> Result<Outcome> {
+        require_host(&self.host, manifest, graph)?;
+        let run_dir = RunDir::create(&manifest.path)?;
+        // Before anything is touched that an earlier run left.
+        bus::room::require(&graph.plan, &manifest.registry().messages())?;
+        outputs.claim(&run_dir)?;
+        if let Some(kept) = outputs.kept() {
+            (self.on)(RunEvent::Note(&format!(
+                "what an earlier run left unfinished is kept as {}",
+                kept.display()
+            )));
+        }
+        prepare(manifest, graph, outputs.partial(), &run_dir)?;
+        graph.plan.run_id = run_dir.run_id().to_owned();
+        graph.plan.store(run_dir.path())?;
+        let graph = &*graph;
+        let control = Arc::new(Control::create(&graph.plan)?);
+        let (plan, dir) = (&graph.plan, run_dir.path());
+        let clock = WatchClock::new();
+        let exe = match &self.host {
+            Host::Exe(exe) => exe.clone(),
+            Host::InProcess => Path::new("").to_owned(),
+        };
+        // Dropped behind the supervisor, which ends the processes.
+        let descendants = self.adopts_orphans.then(|| Descendants::of_run(dir));
+        let mut supervisor = Supervisor {
+            plan,
+            control: &control,
+            processes: Processes::new(self.host, control.clone()),
+            companions: Companions::new(&exe, dir, &clock),
+            clock: &clock,
+            successions: Successions::new(plan, &control, dir, &clock, &graph.programs, &graph.successors),
+            state: State::Starting,
+            desk: Desk::open(dir, plan, &control, self.remote, self.requests)?,
+            swaps: Vec::new(),
+            requests: 0,
+            stop: &self.stop,
+            seen_stops: 0,
+            manifest,
+            graph,
+            on: &mut self.on,
+            run_dir: dir,
+            descendants: descendants.as_ref(),
+            timing: Timing::default(),
+        };
+        supervisor.fly()?;
+        supervisor.tell_progress();
+        let mut outcome = outcome(plan, &control, &supervisor.successions);
+        outcome.successions = supervisor.successions.into_reports();
+        if plan.profile {
+            outcome.flight = Some(Flight::open(plan, dir, outcome.ticks, &outcome.successions)?);
+        }
+        Ok(outcome)
+    }
+}
+
+/// Refuses what `host` cannot do.
+fn require_host(host: &Host, manifest: &Manifest, graph: &Graph) -> Result<()> {
+    if *host != Host::InProcess {
+        return Ok(());
+    }
+    for (program, node) in graph.programs.iter().zip(&graph.plan.nodes) {
+        host.require(&node.name, program)?;
+    }
+    for successor in &graph.successors {
+        host.require(&successor.plan.name, &successor.program)?;
+    }
+    let run = &manifest.content.run;
+    let core = manifest.content.process.iter().find(|(_, process)| process.cpu.is_some());
+    let asked = [
+        graph.companions.first().map(|(name, _)| format!("process `{name}`: `lockstep = false`")),
+        core.map(|(name, _)| format!("process `{}`: `cpu`", name.get_ref())),
+        run.clock_cpu.as_ref().map(|_| "`run.clock_cpu`".to_owned()),
+        run.lock_memory.then(|| "`run.lock_memory`".to_owned()),
+    ];
+    match asked.into_iter().flatten().next() {
+        None => Ok(()),
+        Some(key) => bail!(
+            "{key} needs a process of its own, and the nodes of this run are threads; leave it out, or give the \
+             launcher a binary to execute (Host::Exe)"
+        ),
+    }
+}
+
+/// Puts the files that recorders attach into the run directory and tells the recorders.
+fn prepare(manifest: &Manifest, graph: &mut Graph, recording: Option<&Path>, run_dir: &RunDir) -> Result<()> {
+    let manifest_copy = run_dir.path().join("manifest.toml");
+    std::fs::write(&manifest_copy, &manifest.recorded_text).context("cannot write the manifest's copy")?;
+    let name = |path: &Path| path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+    let mut attachments = vec![(name(&manifest.path), manifest_copy)];
+    attachments.extend(manifest.included.iter().map(|path| (name(path), path.clone())));
+    attachments.extend(graph.models.iter().map(|path| (name(path), path.clone())));
+    let attachments: Vec<_> =
+        attachments.iter().map(|(name, path)| serde_json::json!({ "name": name, "path": path })).collect();
+    for (program, node) in graph.programs.iter().zip(&mut graph.plan.nodes) {
+        if program.is_recorder() {
+            node.parameters = serde_json::json!({ "path": recording, "attachments": attachments });
+        }
+    }
+    Ok(())
+}
+
+fn outcome(plan: &Plan, control: &Control, successions: &Successions<'_>) -> Outcome {
+    let (start_ns, end_ns) = control.host_span_ns();
+    let host_s = end_ns.saturating_sub(start_ns) as f64 * 1e-9;
+    let share = |cpu_ns: u64| if host_s > 0.0 { cpu_ns as f64 * 1e-9 / host_s } else { 0.0 };
+    let clock = ("clock".to_owned(), share(control.clock_cpu_ns()), 0);
+    let nodes = plan.nodes.iter().enumerate();
+    let nodes = nodes.map(|(index, node)| {
+        let (cpu_ns, late) = successions.spent(index);
+        (node.name.clone(), share(cpu_ns), late)
+    });
+    Outcome {
+        ticks: control.completed_ticks(),
+        was_stopped: control.end_tick() < plan.duration_ticks,
+        host_s,
+        missed_deadlines: control.missed_deadlines(),
+        processes: std::iter::once(clock).chain(nodes).collect(),
+        successions: Vec::new(),
+        flight: None,
+    }
+}
