@@ -1,11 +1,38 @@
-//! hummingbus: launches process sets that simulate a vehicle in lockstep, and judges their recordings.
+//! hummingbus: a vehicle simulation as independent components in deterministic lockstep, on a zero-copy bus.
 //!
-//! What other programs can call: [`check()`] and [`check_text`], which check a manifest and all that it names without
-//! running it.
+//! A manifest says which components fly together, and how they are wired. [`load`] reads one, [`Launcher`] flies it, in
+//! processes or on threads, and what comes back is the recording and what there is to say about the run:
+//!
+//! ```
+//! use hummingbus::{Host, Launcher};
+//! let folder = tempfile::tempdir()?;
+//! let hover = concat!(env!("CARGO_MANIFEST_DIR"), "/manifests/hover.toml");
+//! let manifest = hummingbus::load(hover)?.set("run.duration_s", 0.1)?;
+//!
+//! let (outcome, recording) =
+//!     Launcher::new(Host::InProcess).fly(&manifest, &folder.path().join("hover.mcap"))?;
+//!
+//! assert_eq!(outcome.ticks, 100);
+//! let altitude = &recording.unwrap().series(&[("/plant/state", "position.z")])?[0];
+//! assert!((altitude.value[99] - 1.0).abs() < 0.01);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
+//! A run is followed with [`Launcher::followed_by`], steered from another thread with [`Launcher::remote`], and ended
+//! early with a [`StopToken`]. [`check()`] and [`check_text`] check a manifest and all that it names without flying it.
+//!
+//! | crate | what it holds |
+//! |---|---|
+//! | [`bus`] | components, messages, the lockstep |
+//! | [`runtime`] | manifests, plans, the launcher |
+//! | [`recorder`] | recordings, written and read |
+//! | [`report`] | verdicts, figures and pages from recordings |
+//! | [`plant`], [`sensors`], [`controllers`] | the components that this package brings |
+//! | [`vehicles`], [`scenes`] | files that describe what flies, and where |
+//! | [`flights`], [`identify`] | measured flights, and what they show that a vehicle file lacks |
 #![forbid(unsafe_code)]
 
-pub mod check;
-pub mod cli;
+mod check;
 #[cfg(test)]
 mod extremes;
 mod kinds;
@@ -16,4 +43,21 @@ mod successors;
 
 pub use check::{Checked, check, check_text};
 pub use kinds::COMPONENTS;
+pub use runtime::ctl::protocol::{Answer, Request};
+pub use runtime::ctl::server::Remote;
+pub use runtime::event::{Progress, RunEvent, StopToken};
+pub use runtime::host::Host;
+pub use runtime::launcher::{Launcher, Outcome};
+pub use runtime::manifest::{Manifest, ManifestBuilder};
 pub use runtime::problem::Problem;
+pub use {bus, controllers, flights, identify, plant, recorder, report, runtime, scenes, sensors, vehicles};
+
+use std::path::Path;
+
+/// Reads the manifest at `path`, which may name the components of this package ([`COMPONENTS`]).
+///
+/// # Errors
+/// The first problem, with its place and what to do.
+pub fn load(path: impl AsRef<Path>) -> Result<Manifest, Problem> {
+    Manifest::load(path.as_ref(), &[], COMPONENTS)
+}

@@ -1,6 +1,8 @@
 //! The program `hummingbus`.
 #![forbid(unsafe_code)]
 
+mod cli;
+
 fn main() -> std::process::ExitCode {
-    hummingbus::cli::main()
+    cli::main()
 }

@@ -8,4 +8,4 @@
 pub mod client;
 pub(crate) mod desk;
 pub mod protocol;
-pub(crate) mod server;
+pub mod server;

@@ -7,8 +7,10 @@
 //! - [`sets`]: vehicles of process sets become processes
 //! - [`succession`]: a successor's differences become a whole process
 //! - [`finite`]: no number is infinite or none
+//! - [`builder`]: a manifest that is built in code
 //! - [`content`]: the types that the whole is read into
 
+mod builder;
 mod content;
 mod finite;
 mod include;
@@ -19,6 +21,7 @@ mod sources;
 mod succession;
 mod tree;
 
+pub use builder::ManifestBuilder;
 pub use content::{
     Comparison, Content, InputSetting, OutputSetting, PaceSetting, PassCondition, Process, Statistic,
     SwapSetting,
@@ -68,16 +71,25 @@ impl Manifest {
     ) -> Result<Self, Problem> {
         let mut sources = include::read(path, text, registry)?;
         overrides.iter().for_each(|text| sources.add(Origin::Override, text.clone()));
+        Self::of(path.to_owned(), sources)
+    }
+
+    /// This manifest with another value at `key`, such as `process.controller.parameters.gains.altitude_p`.
+    ///
+    /// # Errors
+    /// A [`Problem`] if there is no such key, or the value does not fit it.
+    pub fn set(self, key: &str, value: impl Into<toml::Value>) -> Result<Self, Problem> {
+        let mut sources = self.sources;
+        sources.add(Origin::Override, format!("{key}={}", value.into()));
+        Self::of(self.path, sources)
+    }
+
+    fn of(path: PathBuf, sources: Sources) -> Result<Self, Problem> {
         let tree = whole_tree(&sources)?;
         let content = Content::deserialize(toml::Deserializer::from(Spanned::new(0..0, tree)))
             .map_err(|error| refused(&sources, &error))?;
-        Ok(Self {
-            path: path.to_owned(),
-            included: sources.included(),
-            recorded_text: recorded::text(&sources, overrides)?,
-            content,
-            sources,
-        })
+        let (included, recorded_text) = (sources.included(), recorded::text(&sources)?);
+        Ok(Self { path, included, recorded_text, content, sources })
     }
 
     /// The manifest's name: its file name without `.toml`.

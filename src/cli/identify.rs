@@ -3,10 +3,10 @@
 use super::files::PAGE;
 use super::interrupts::stop_token;
 use super::output::print_text;
-use crate::COMPONENTS;
 use anyhow::{Context, Result, bail};
 use clap::{Args, Subcommand};
 use flights::FlightSet;
+use hummingbus::COMPONENTS;
 use identify::report::Report;
 use identify::vehicle_file;
 use indicatif::{ProgressBar, ProgressStyle};

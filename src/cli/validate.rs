@@ -2,10 +2,10 @@
 
 use super::interrupts::stop_token;
 use super::output::{print_text, say};
-use crate::COMPONENTS;
 use anyhow::{Result, bail};
 use clap::Args;
 use flights::FlightSet;
+use hummingbus::COMPONENTS;
 use report::validate::Validation;
 use std::path::{Path, PathBuf};
 

@@ -21,13 +21,13 @@ const HOST_ONLY_PROCESS_KEYS: [&str; 8] = [
     "working_directory",
 ];
 
-/// The manifest's own text with those of `overrides` that may change what is simulated.
+/// The manifest's own text with those values of `--set` that may change what is simulated.
 ///
 /// # Errors
 /// If an included file is not TOML.
-pub fn text(sources: &Sources, overrides: &[String]) -> Result<String, Problem> {
+pub fn text(sources: &Sources) -> Result<String, Problem> {
     let original = &sources.all()[0].text;
-    let simulated: Vec<&String> = overrides.iter().filter(|text| !is_host_only(text)).collect();
+    let simulated: Vec<&String> = sources.override_texts().filter(|text| !is_host_only(text)).collect();
     let Ok(mut document) = original.parse::<toml_edit::DocumentMut>() else { return Ok(original.clone()) };
     if simulated.is_empty() {
         return Ok(original.clone());
@@ -148,8 +148,8 @@ mod tests {
         let mut sources = Sources::default();
         sources.add(Origin::File("a.toml".into()), manifest.to_owned());
         sources.order.push(0);
-        let overrides: Vec<String> = overrides.iter().map(|text| (*text).to_owned()).collect();
-        text(&sources, &overrides).unwrap()
+        overrides.iter().for_each(|text| sources.add(Origin::Override, (*text).to_owned()));
+        text(&sources).unwrap()
     }
 
     #[test]

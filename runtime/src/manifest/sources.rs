@@ -99,6 +99,12 @@ impl Sources {
         overrides.map(|source| Override::parse(source, self)).collect()
     }
 
+    /// Their texts.
+    pub fn override_texts(&self) -> impl Iterator<Item = &String> {
+        let overrides = self.all.iter().filter(|source| matches!(source.origin, Origin::Override));
+        overrides.map(|source| &source.text)
+    }
+
     /// Whether the place `offset` lies in a `--set`.
     pub fn is_override(&self, offset: usize) -> bool {
         matches!(self.at(offset).origin, Origin::Override)

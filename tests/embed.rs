@@ -1,0 +1,114 @@
+//! Runs in this very process: nodes on threads, two at a time, stopped, steered, and nodes that fail.
+
+use hummingbus::{Answer, Host, Launcher, Manifest, Request, RunEvent, StopToken};
+use std::path::{Path, PathBuf};
+
+fn hover() -> Manifest {
+    hummingbus::load(concat!(env!("CARGO_MANIFEST_DIR"), "/manifests/hover.toml")).unwrap()
+}
+
+fn threads() -> Launcher<'static> {
+    Launcher::new(Host::InProcess)
+}
+
+/// The bytes of a recording of `manifest`.
+fn recorded(launcher: Launcher<'_>, manifest: &Manifest, path: PathBuf) -> Vec<u8> {
+    launcher.fly(manifest, &path).unwrap();
+    std::fs::read(path).unwrap()
+}
+
+fn exe() -> Host {
+    Host::Exe(env!("CARGO_BIN_EXE_hummingbus").into())
+}
+
+#[test]
+fn threads_and_processes_record_the_same_bytes() {
+    let folder = tempfile::tempdir().unwrap();
+    let manifest = hover().set("run.duration_s", 0.5).unwrap();
+    let of_threads = recorded(threads(), &manifest, folder.path().join("threads.mcap"));
+    let of_processes = recorded(Launcher::new(exe()), &manifest, folder.path().join("processes.mcap"));
+    assert!(of_threads.len() > 100_000);
+    assert!(of_threads == of_processes, "{} and {} bytes", of_threads.len(), of_processes.len());
+}
+
+#[test]
+fn two_runs_in_one_process_do_not_disturb_each_other() {
+    /// The signals that this process handles itself, or ignores.
+    fn signals() -> Vec<String> {
+        let status = std::fs::read_to_string("/proc/self/status").unwrap();
+        status
+            .lines()
+            .filter(|line| line.starts_with("SigCgt") || line.starts_with("SigIgn"))
+            .map(str::to_owned)
+            .collect()
+    }
+    let before = signals();
+    let folder = tempfile::tempdir().unwrap();
+    let manifest = hover().set("run.duration_s", 0.5).unwrap();
+    let alone = recorded(threads(), &manifest, folder.path().join("alone.mcap"));
+    std::thread::scope(|scope| {
+        let runs = ["a.mcap", "b.mcap"].map(|name| {
+            let (path, manifest) = (folder.path().join(name), &manifest);
+            scope.spawn(move || recorded(threads(), manifest, path))
+        });
+        runs.into_iter().for_each(|run| assert!(run.join().unwrap() == alone));
+    });
+    assert_eq!(signals(), before);
+    assert!(rustix::process::child_subreaper().unwrap().is_none());
+}
+
+#[test]
+fn a_run_is_followed_steered_and_stopped_from_another_thread() {
+    let folder = tempfile::tempdir().unwrap();
+    let manifest = hover().set("run.duration_s", 1000.0).unwrap();
+    let (token, mut progress) = (StopToken::new(), 0);
+    let launcher = threads().stopped_by(&token);
+    let remote = launcher.remote();
+    let launcher = launcher.followed_by(|event| {
+        if let RunEvent::Progress(now) = event {
+            progress = now.ticks;
+        }
+    });
+    let (outcome, swapped) = std::thread::scope(|scope| {
+        let steering = scope.spawn(move || {
+            let Answer::Done { tick, .. } = remote.ask(Request::Pause) else { panic!("not paused") };
+            let Answer::Done { tick: stepped, .. } = remote.ask(Request::Step { ticks: 7 }) else {
+                panic!("not stepped")
+            };
+            assert_eq!(stepped, tick + 7);
+            assert!(matches!(remote.ask(Request::Resume), Answer::Done { .. }));
+            let swap = Request::Swap {
+                process: "controller".to_owned(),
+                with: String::new(),
+                shadow_ticks: Some(20),
+                at_tick: None,
+            };
+            let swapped = remote.ask(swap);
+            token.stop();
+            swapped
+        });
+        let (outcome, _) = launcher.fly(&manifest, &folder.path().join("a.mcap")).unwrap();
+        (outcome, steering.join().unwrap())
+    });
+    assert!(matches!(swapped, Answer::Done { .. }), "{swapped:?}");
+    assert!(outcome.was_stopped && outcome.ticks > 20);
+    assert_eq!(progress, outcome.ticks);
+    assert!(outcome.successions[0].take_over_tick.is_some(), "{:?}", outcome.successions);
+}
+
+#[test]
+fn what_threads_cannot_have_is_refused_in_words() {
+    let refused = |key: &str, value: toml::Value| {
+        let manifest = hover().set(key, value).unwrap();
+        threads().fly(&manifest, Path::new("/tmp/never.mcap")).map(|_| ()).unwrap_err().to_string()
+    };
+    for (key, value) in [
+        ("process.imu.nice", 1.into()),
+        ("process.imu.cpu", 0.into()),
+        ("process.imu.log", "/tmp/never.log".into()),
+        ("run.lock_memory", true.into()),
+    ] {
+        let (words, name) = (refused(key, value), key.rsplit('.').next().unwrap());
+        assert!(words.contains(name) && words.contains("needs a process of its own"), "{words}");
+    }
+}
