@@ -132,8 +132,9 @@ impl Thread {
         let join = Join { run_dir, node: node.to_owned(), generation };
         let hosted = Hosted { join: join.clone(), is_cancelled: is_cancelled.clone() };
         let thread = std::thread::Builder::new().name(node.to_owned()).stack_size(STACK_BYTES);
-        let handle =
-            thread.spawn(move || hosted.run(|| component.map_or_else(bus::clock::run, |component| component.run(join))));
+        let handle = thread.spawn(move || {
+            hosted.run(|| component.map_or_else(bus::clock::run, |component| component.run(join)))
+        });
         let handle = handle.with_context(|| format!("process `{node}`: cannot start a thread"))?;
         Ok(Self { handle: Some(handle), is_cancelled, control })
     }
