@@ -23,7 +23,7 @@ pub struct CheckArguments {
 /// # Errors
 /// What is wrong with it.
 pub fn check(arguments: &CheckArguments) -> Result<bool> {
-    let checked = crate::check(&arguments.manifest, &arguments.set)?;
+    let checked = hummingbus::check(&arguments.manifest, &arguments.set)?;
     print_warnings(checked.warnings());
     print_text(&if arguments.json { checked.json() } else { checked.to_string() })?;
     Ok(true)

@@ -1,9 +1,9 @@
 //! The command `schema`.
 
 use super::output::print_text;
-use crate::COMPONENTS;
 use anyhow::Result;
 use clap::Args;
+use hummingbus::COMPONENTS;
 use std::fmt::Write as _;
 
 /// What `schema` takes.
