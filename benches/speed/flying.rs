@@ -1,7 +1,8 @@
 //! A run in flight, looked at from outside.
 
 use crate::report::Result;
-use bus::control::{Control, Phase, shm_prefix};
+use bus::lockstep::{LiveView, Phase};
+use bus::names::shm_prefix;
 use bus::plan::Plan;
 use rustix::process::{Pid, Signal, kill_process};
 use std::os::unix::fs::MetadataExt;
@@ -93,10 +94,10 @@ impl Flying {
         Ok(())
     }
 
-    fn control(&self) -> Option<(Plan, Control)> {
+    fn control(&self) -> Option<(Plan, LiveView)> {
         let run_dir = std::fs::read_dir(self.folder.path()).ok()?.flatten().next()?.path();
         let plan = Plan::load(&run_dir).ok()?;
-        let control = Control::open(&plan).ok()?;
+        let control = LiveView::open(&plan).ok()?;
         Some((plan, control))
     }
 

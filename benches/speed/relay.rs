@@ -1,7 +1,7 @@
 //! A node that passes a payload on: the bus with nothing to compute.
 
 use crate::report::Result;
-use bus::control::monotonic_ns;
+use bus::host_time::monotonic_ns;
 use bus::messages::Time;
 use bus::{Message, Node};
 use hdrhistogram::Histogram;

@@ -1,6 +1,7 @@
 //! What a publisher announces about its topic before the run starts, and the check of every reader.
 
 use crate::error::BusError;
+use crate::json_file;
 use crate::schema::Schema;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
@@ -35,26 +36,12 @@ impl Announcement {
 
     /// Writes the announcement to `path`.
     pub(crate) fn store(&self, path: &Path) -> Result<(), BusError> {
-        let text = serde_json::to_string(self).unwrap_or_else(|error| unreachable!("{error}"));
-        std::fs::write(path, text).map_err(|source| BusError::File {
-            action: "write",
-            path: path.to_owned(),
-            source,
-        })
+        json_file::store(path, self)
     }
 
     /// Reads the announcement at `path`.
     pub(crate) fn load(path: &Path) -> Result<Self, BusError> {
-        let text = crate::user_file::read_text(path).map_err(|source| BusError::File {
-            action: "read",
-            path: path.to_owned(),
-            source,
-        })?;
-        serde_json::from_str(&text).map_err(|error| BusError::Content {
-            path: path.to_owned(),
-            expected: "the announcement of a message type",
-            found: error.to_string(),
-        })
+        json_file::load(path, "the announcement of a message type")
     }
 
     /// Checks that a reader built with `schema` reads these bytes as they are meant.

@@ -1,8 +1,9 @@
 //! The clock service: leads the processes of a run through the ready barrier and grants their ticks.
 
-use crate::control::{Control, Phase, Sequence, SlotState, Waited, Waiter, monotonic_ns, process_cpu_ns};
 use crate::error::BusError;
-use crate::plan::{Pace, Plan, SLOTS_PER_NODE, Wait};
+use crate::host_time::{monotonic_ns, process_cpu_ns};
+use crate::lockstep::{ClockView, Phase, SlotState, Waited};
+use crate::plan::{Pace, Plan};
 use crate::profile::GrantWriter;
 use rustix::thread::clock_nanosleep_absolute;
 use std::cell::RefCell;
@@ -17,31 +18,29 @@ const NAP_NS_MAX: u64 = 100_000_000;
 pub fn run() -> Result<(), BusError> {
     let run_dir = crate::process::join()?;
     let plan = Plan::load(&run_dir)?;
-    let _claim = crate::process::claim(&run_dir, "clock")?;
+    let _claim = crate::claim::claim(&run_dir, "clock")?;
     crate::process::stay_on(plan.clock_cpu);
     let grants = plan.profile.then(|| GrantWriter::create(&run_dir, &plan)).transpose()?;
-    let control = Control::open(&plan)?;
+    let lockstep = ClockView::open(&plan)?;
     if plan.lock_memory {
         crate::process::lock_memory()?;
     }
-    serve(&plan, &control, grants)
+    serve(&plan, &lockstep, grants)
 }
 
 /// Runs the clock of `plan` until the run is over; notes its grants in `grants`.
-pub(crate) fn serve(plan: &Plan, control: &Control, grants: Option<GrantWriter>) -> Result<(), BusError> {
-    control.set_clock_process();
-    let clock = Clock::new(plan, control, grants);
+pub(crate) fn serve(plan: &Plan, lockstep: &ClockView, grants: Option<GrantWriter>) -> Result<(), BusError> {
+    let clock = Clock { plan, lockstep, grants: grants.map(RefCell::new) };
     for phase in [Phase::Connecting, Phase::Running] {
         clock.gather(phase)?;
     }
     let cpu_start_ns = process_cpu_ns();
-    control.set_host_start();
+    lockstep.note_start();
     // By default the kernel may be 50 µs late to save power, a twentieth of a tick at 1 kHz.
     let _ = rustix::thread::set_current_timer_slack(std::num::NonZeroU64::new(1));
     let end = clock.run()?;
     clock.await_all(end)?;
-    control.set_host_end();
-    control.set_clock_cpu_ns(process_cpu_ns() - cpu_start_ns);
+    lockstep.note_end(process_cpu_ns() - cpu_start_ns);
     Ok(())
 }
 
@@ -66,23 +65,17 @@ impl Deadlines {
 
 struct Clock<'a> {
     plan: &'a Plan,
-    control: &'a Control,
-    grant_waiters: Vec<Waiter>,
+    lockstep: &'a ClockView,
     grants: Option<RefCell<GrantWriter>>,
 }
 
-impl<'a> Clock<'a> {
-    fn new(plan: &'a Plan, control: &'a Control, grants: Option<GrantWriter>) -> Self {
-        let grant_waiters = (0..SLOTS_PER_NODE * plan.nodes.len()).map(Waiter::Grant).collect();
-        Self { plan, control, grant_waiters, grants: grants.map(RefCell::new) }
-    }
-
+impl Clock<'_> {
     /// Waits until every node is ready for `phase`, then starts it.
     fn gather(&self, phase: Phase) -> Result<(), BusError> {
         for node in 0..self.plan.nodes.len() {
-            reached(self.control.wait_ready(node, phase))?;
+            self.lockstep.wait_ready(node, phase).or_aborted()?;
         }
-        self.control.set_phase(phase);
+        self.lockstep.set_phase(phase);
         Ok(())
     }
 
@@ -95,13 +88,13 @@ impl<'a> Clock<'a> {
             if granted >= end {
                 return Ok(end);
             }
-            if self.control.boundary() <= granted {
+            if self.lockstep.boundary() <= granted {
                 self.await_all(granted)?;
-                self.control.hold(granted, || self.is_stop_asked_for());
+                self.lockstep.hold(granted, || self.is_stop_asked_for());
                 deadlines = None;
                 continue;
             }
-            granted = match self.control.pace() {
+            granted = match self.lockstep.pace() {
                 Pace::Free => {
                     deadlines = None;
                     self.grant_window(granted, end)?
@@ -120,7 +113,7 @@ impl<'a> Clock<'a> {
         let window = self.plan.window_ticks.max(1);
         // Granting half a window at a time lets fast nodes go on while the slowest catches up.
         let stride = (window / 2).max(1);
-        let limit = end.min(self.control.boundary());
+        let limit = end.min(self.lockstep.boundary());
         let target = limit.min(self.slowest().saturating_add(window)).max(granted);
         self.grant(target, None);
         if target < limit {
@@ -142,7 +135,7 @@ impl<'a> Clock<'a> {
         self.await_all((tick + 1).saturating_sub(self.plan.window_ticks.max(1)))?;
         deadlines.granted_late = monotonic_ns() > deadlines.of(tick + 1, self.plan.tick_ns);
         if deadlines.granted_late {
-            self.control.count_missed_deadline(std::iter::empty());
+            self.lockstep.count_missed_deadline(std::iter::empty());
         }
         self.grant(tick + 1, Some(deadline_ns));
         Ok(tick + 1)
@@ -150,10 +143,10 @@ impl<'a> Clock<'a> {
 
     /// The end tick, moved to `granted` if a stop was asked for.
     fn end_after(&self, granted: u32) -> u32 {
-        if self.is_stop_asked_for() && granted < self.control.end_tick() {
-            self.control.set_end_tick(granted);
+        if self.is_stop_asked_for() && granted < self.lockstep.end_tick() {
+            self.lockstep.set_end_tick(granted);
         }
-        self.control.end_tick()
+        self.lockstep.end_tick()
     }
 
     /// Sleeps until `deadline_ns`; false if a stop, a hold or another pace was asked for, which at a slow pace
@@ -161,8 +154,8 @@ impl<'a> Clock<'a> {
     fn sleep_until(&self, tick: u32, deadline_ns: u64, factor: f64) -> bool {
         loop {
             if self.is_stop_asked_for()
-                || self.control.boundary() <= tick
-                || self.control.pace() != Pace::Factor(factor)
+                || self.lockstep.boundary() <= tick
+                || self.lockstep.pace() != Pace::Factor(factor)
             {
                 return false;
             }
@@ -176,37 +169,30 @@ impl<'a> Clock<'a> {
 
     fn is_stop_asked_for(&self) -> bool {
         if crate::process::is_terminated() {
-            self.control.request_stop();
+            self.lockstep.request_stop();
         }
-        self.control.is_stop_requested() || self.control.is_aborted()
+        self.lockstep.is_stop_requested() || self.lockstep.is_aborted()
     }
 
     fn grant(&self, ticks: u32, deadline_ns: Option<u64>) {
         if let Some(grants) = &self.grants {
             grants.borrow_mut().grant(ticks, deadline_ns);
         }
-        self.control.advance(Sequence::Grant, ticks, &self.grant_waiters);
+        self.lockstep.grant(ticks);
     }
 
     fn slowest(&self) -> u32 {
-        self.control
-            .computing()
-            .map(|slot| self.control.count(Sequence::Done(slot)))
-            .min()
-            .unwrap_or(u32::MAX)
+        self.lockstep.computing().map(|slot| self.lockstep.done(slot)).min().unwrap_or(u32::MAX)
     }
 
-    /// Waits until every slot has completed `ticks` ticks.
+    /// Waits until every process has completed `ticks` ticks.
     fn await_all(&self, ticks: u32) -> Result<(), BusError> {
-        let late = |slot: &usize| self.control.count(Sequence::Done(*slot)) < ticks;
-        while let Some(slot) = self.control.computing().find(late) {
-            // A slot that died is replaced, or leaves: then it is another's turn to be waited for.
-            let epoch = self.control.epoch();
-            let has_left =
-                |control: &Control| control.epoch() != epoch || control.slot_state(slot) != SlotState::Taken;
-            let waited =
-                self.control.wait(Sequence::Done(slot), ticks, Waiter::Done(slot), Wait::Block, has_left);
-            if waited == Waited::Over && self.control.is_aborted() {
+        let lockstep = self.lockstep;
+        while let Some(slot) = lockstep.computing().find(|&slot| lockstep.done(slot) < ticks) {
+            // A process that died is replaced, or leaves: then it is another's turn to be waited for.
+            let epoch = lockstep.epoch();
+            let has_left = || lockstep.epoch() != epoch || lockstep.slot_state(slot) != SlotState::Taken;
+            if lockstep.wait_done(slot, ticks, has_left) == Waited::Over && lockstep.is_aborted() {
                 return Err(BusError::Aborted);
             }
         }
@@ -214,15 +200,11 @@ impl<'a> Clock<'a> {
     }
 
     fn note_late_nodes(&self, tick: u32) {
-        let late = |slot: &usize| self.control.count(Sequence::Done(*slot)) < tick;
-        if self.control.computing().any(|slot| late(&slot)) {
-            self.control.count_missed_deadline(self.control.computing().filter(late));
+        let late = |&slot: &usize| self.lockstep.done(slot) < tick;
+        if self.lockstep.computing().any(|slot| late(&slot)) {
+            self.lockstep.count_missed_deadline(self.lockstep.computing().filter(late));
         }
     }
-}
-
-fn reached(waited: Waited) -> Result<(), BusError> {
-    if waited == Waited::Reached { Ok(()) } else { Err(BusError::Aborted) }
 }
 
 /// Host time that `ticks` ticks take at `factor` simulated seconds per second.

@@ -1,41 +1,24 @@
 //! A connected node: waits for what a tick needs, computes it, sends, and follows the changes of the run.
 
 use crate::announcement::{self, Announcement};
-use crate::control::{
-    Control, Phase, Sequence, SlotState, Transfer, Waited, Waiter, monotonic_ns, process_cpu_ns,
-};
 use crate::error::BusError;
-use crate::initial;
-use crate::membership::{Membership, NodeInstances};
+use crate::handles::{Declared, RawInput};
+use crate::host_time::{monotonic_ns, process_cpu_ns};
+use crate::links::Links;
+use crate::lockstep::{Need, Phase, SlotState, TransferOutcome, Waited};
+use crate::membership::Membership;
 use crate::message::Message;
-use crate::node::{Declared, RawInput, require_reached};
-use crate::plan::{InputPlan, NodePlan, Plan};
+use crate::plan::InputPlan;
 use crate::port::{InPort, OutPort, Source};
-use crate::process::Claim;
 use crate::profile::TickWriter;
 use crate::schema::Schema;
 use crate::state_transfer::StateRing;
 use crate::tick::Tick;
-use crate::transport::Transport;
 use std::fmt::Display;
-use std::path::PathBuf;
 use std::time::Duration;
 
 /// How long a process that retires sleeps before it looks again who still reads its last samples.
 const RETIREMENT_NAP: Duration = Duration::from_millis(1);
-
-/// What ties a node to its run.
-#[derive(Debug)]
-pub(crate) struct Links {
-    pub(crate) run_dir: PathBuf,
-    pub(crate) plan: Plan,
-    pub(crate) index: usize,
-    pub(crate) generation: u32,
-    pub(crate) node: NodePlan,
-    pub(crate) control: Control,
-    pub(crate) transport: Transport,
-    pub(crate) _claim: Claim,
-}
 
 /// A node whose ports are connected.
 #[derive(Debug)]
@@ -45,12 +28,12 @@ pub struct ConnectedNode {
     announcements: Vec<Announcement>,
     /// What the predecessor sends, by output; empty where its state is handed over.
     predecessor: Vec<InPort>,
-    /// Where the predecessor states its state, and where this process does.
-    handed: Option<StateRing>,
-    stated: Option<StateRing>,
+    /// Where the predecessor publishes its state, and where this process does.
+    predecessor_state: Option<StateRing>,
+    published_state: Option<StateRing>,
     /// The tick from which on this process goes on by itself, no longer as its predecessor's shadow.
     take_over_tick: u32,
-    /// The tick from which on a successor takes this process's place.
+    /// The tick from which on a backup takes this process's place.
     retirement_tick: u32,
     first_tick: u32,
     epoch: u32,
@@ -77,15 +60,16 @@ impl ConnectedNode {
         outputs: Vec<OutPort>,
         membership: &Membership,
     ) -> Result<Self, BusError> {
-        let own = membership.nodes[links.index].of(links.generation);
-        let first_tick = own.map_or(0, |instance| instance.join_tick);
+        let instance = membership.nodes[links.index].of(links.generation);
+        let instance = instance.expect("the membership by which a process joins names it");
+        let first_tick = instance.join_tick;
         let mut node = Self {
             inputs: Vec::new(),
             outputs,
             announcements: Vec::new(),
             predecessor: Vec::new(),
-            handed: None,
-            stated: None,
+            predecessor_state: None,
+            published_state: None,
             take_over_tick: 0,
             retirement_tick: u32::MAX,
             first_tick,
@@ -102,8 +86,8 @@ impl ConnectedNode {
             node.profile =
                 Some(TickWriter::create(&links.run_dir, &links.plan, index, generation, first_tick)?);
         }
-        node.links.control.set_process(node.links.slot());
-        node.links.control.acknowledge(node.links.slot(), membership.epoch);
+        node.links.lockstep.note_process();
+        node.links.lockstep.acknowledge(membership.epoch);
         Ok(node)
     }
 
@@ -113,7 +97,7 @@ impl ConnectedNode {
         membership: &Membership,
     ) -> Result<(), BusError> {
         let links = &self.links;
-        for (index, (input, declared)) in links.node.inputs.iter().zip(declared).enumerate() {
+        for (input, declared) in links.node.inputs.iter().zip(declared) {
             let topic = &links.plan.topics[input.topic];
             let announcement = Announcement::load(&announcement::topic_path(&links.run_dir, input.topic))?;
             if let Declared::Typed(schema) = declared {
@@ -124,8 +108,7 @@ impl ConnectedNode {
             let receiver = links.subscriber(input.topic, generation)?;
             let limit = self.first_tick.checked_sub(input.delay_ticks);
             let source = Source::joined(generation, receiver, limit, topic.period_ticks);
-            let waiter = links.plan.input_waiter(links.slot(), index);
-            let mut port = InPort::new(input, topic, announcement.size, waiter, initial, source);
+            let mut port = InPort::new(input, topic, announcement.size, initial, source);
             port.reads_shadow = matches!(declared, Declared::Raw);
             self.inputs.push(port);
             self.announcements.push(announcement);
@@ -182,7 +165,7 @@ impl ConnectedNode {
         if let Some(schema) = schema {
             let links = &self.links;
             let (dir, plan) = (&links.run_dir, &links.plan);
-            self.stated = Some(StateRing::create(dir, plan, links.index, links.generation, schema)?);
+            self.published_state = Some(StateRing::create(dir, plan, links.index, links.generation, schema)?);
         }
         self.fly(state, |tick, state| step(tick, state).map_err(|error| error.to_string()))
     }
@@ -195,13 +178,14 @@ impl ConnectedNode {
         }
         let generation = Membership::load(&links.run_dir, self.epoch)?.nodes[links.index].primary.generation;
         if let Some(schema) = state {
-            self.handed = StateRing::open(&links.run_dir, &links.plan, links.index, generation, schema)?;
+            self.predecessor_state =
+                StateRing::open(&links.run_dir, &links.plan, links.index, generation, schema)?;
         }
-        if self.handed.is_some() {
-            links.control.set_transfer(links.slot(), Transfer::State);
+        if self.predecessor_state.is_some() {
+            links.lockstep.set_transfer(TransferOutcome::State);
             return Ok(());
         }
-        links.control.set_transfer(links.slot(), Transfer::LastOutput);
+        links.lockstep.set_transfer(TransferOutcome::LastOutput);
         for output in &links.node.outputs {
             let topic = &links.plan.topics[output.topic];
             let receiver = links.subscriber(output.topic, generation)?;
@@ -210,7 +194,7 @@ impl ConnectedNode {
             let input =
                 InputPlan { port: output.port.clone(), topic: output.topic, delay_ticks: 1, initial: None };
             let size = Announcement::load(&announcement::topic_path(&links.run_dir, output.topic))?.size;
-            self.predecessor.push(InPort::new(&input, topic, size, 0, None, source));
+            self.predecessor.push(InPort::new(&input, topic, size, None, source));
         }
         links.transport.reserve()
     }
@@ -224,19 +208,19 @@ impl ConnectedNode {
         if self.links.plan.lock_memory {
             crate::process::lock_memory()?;
         }
-        let slot = self.links.slot();
         if self.links.generation == 0 {
-            // Who takes its place may have to begin with the first tick.
+            // A backup may have to begin with the first tick.
             self.publish_state(self.first_tick, state);
         }
-        self.links.control.set_ready(slot, Phase::Running);
-        if self.links.generation == 0 {
-            require_reached(self.links.control.wait_phase(Phase::Running))?;
-        } else {
-            require_reached(self.links.control.wait_slot(slot, SlotState::Taken))?;
-        }
+        let links = &self.links;
+        links.lockstep.set_ready(Phase::Running);
+        let waited = match links.generation {
+            0 => links.lockstep.wait_phase(Phase::Running),
+            _ => links.lockstep.wait_slot(SlotState::Taken),
+        };
+        waited.or_aborted()?;
         let cpu_start_ns = process_cpu_ns();
-        let period = self.links.node.period_ticks;
+        let period = links.node.period_ticks;
         let mut tick = self.first_tick;
         while self.await_tick(tick, state)? {
             if self.links.generation > 0 && tick <= self.take_over_tick.max(self.first_tick) {
@@ -245,51 +229,46 @@ impl ConnectedNode {
             }
             self.compute(tick, state, &mut step)?;
             tick += period;
-            self.links.control.advance(Sequence::Done(slot), tick, &self.links.done_waiters());
+            self.links.lockstep.completed(tick);
         }
+        self.links.lockstep.note_cpu(process_cpu_ns() - cpu_start_ns);
         // A node whose next due tick lies beyond the end has completed the run.
-        self.links.control.set_cpu_ns(slot, process_cpu_ns() - cpu_start_ns);
-        self.links.control.advance(Sequence::Done(slot), u32::MAX - 1, &self.links.done_waiters());
+        self.links.lockstep.completed(u32::MAX - 1);
         self.await_readers(tick)
     }
 
-    /// States the state at the start of `tick`, for whoever takes over there.
+    /// Publishes the state at the start of `tick`, for whoever takes over there.
     fn publish_state(&self, tick: u32, state: &[u8]) {
-        if let Some(ring) = &self.stated {
+        if let Some(ring) = &self.published_state {
             ring.store(tick, state);
-            let links = &self.links;
             // A count of zero is no state.
-            links.control.advance(
-                Sequence::State(links.slot()),
-                tick + 1,
-                &[Waiter::Replacement(links.other_slot())],
-            );
+            self.links.lockstep.state_published(tick + 1);
         }
     }
 
     /// Waits until `tick` may be computed; false when the run ends, or this process's part in it, before it.
     fn await_tick(&mut self, tick: u32, state: &mut [u8]) -> Result<bool, BusError> {
         loop {
-            let awaited = if self.links.control.epoch() != self.epoch {
+            let awaited = if self.links.lockstep.epoch() != self.epoch {
                 Await::Change
-            } else if self.links.control.end_tick() <= tick {
+            } else if self.links.lockstep.end_tick() <= tick {
                 Await::End
             } else if tick >= self.retirement_tick {
-                self.await_successor()
+                self.await_backup()
             } else {
                 self.await_needs(tick, state)?
             };
             match awaited {
                 // Who counts a promoted process's samples as there sees the change that promoted it, too.
-                Await::Tick if self.links.control.epoch() != self.epoch => {}
+                Await::Tick if self.links.lockstep.epoch() != self.epoch => {}
                 Await::Tick => return Ok(true),
-                Await::End if self.links.control.is_aborted() => return Err(BusError::Aborted),
+                Await::End if self.links.lockstep.is_aborted() => return Err(BusError::Aborted),
                 Await::End => return Ok(false),
                 Await::Change => {
-                    let epoch = self.links.control.epoch();
+                    let epoch = self.links.lockstep.epoch();
                     self.follow(&Membership::load(&self.links.run_dir, epoch)?, tick)?;
                     self.links.transport.reserve()?;
-                    self.links.control.acknowledge(self.links.slot(), epoch);
+                    self.links.lockstep.acknowledge(epoch);
                 }
             }
         }
@@ -304,30 +283,28 @@ impl ConnectedNode {
         let links = &self.links;
         // A node without outputs holds nobody up, so it lets samples gather and is woken less often.
         let batch = if links.node.outputs.is_empty() { (links.plan.window_ticks / 4).max(1) } else { 1 };
-        for input in &self.inputs {
+        for (index, input) in self.inputs.iter().enumerate() {
             let needed = (tick + 1).saturating_sub(input.delay_ticks);
-            let word = Sequence::Topic(input.topic);
-            if links.control.count(word) < needed {
-                let granted = links.control.count(Sequence::Grant);
+            if links.lockstep.ticks_sent(input.topic) < needed {
+                let granted = links.lockstep.granted_ticks();
                 let sleep_for = needed.max((tick + batch).min(granted).saturating_sub(input.delay_ticks));
-                let awaited = self.wait(word, sleep_for, Waiter::Input(input.waiter), tick);
+                let awaited = self.wait(Need::Samples { topic: input.topic, input: index }, sleep_for, tick);
                 // A node that lets samples gather may be sent home with some of them still to be taken: all
                 // that was sent before an abort is recorded.
-                let is_sent = awaited == Await::End && links.control.count(word) >= needed;
+                let is_sent = awaited == Await::End && links.lockstep.ticks_sent(input.topic) >= needed;
                 if awaited != Await::Tick && !is_sent {
                     return Ok(awaited);
                 }
             }
             if input.awaits_shadow(tick) {
-                let awaited =
-                    self.wait(Sequence::Shadow(input.topic), tick + 1, Waiter::Shadow(input.waiter), tick);
+                let awaited = self.wait(Need::Shadow { topic: input.topic, input: index }, tick + 1, tick);
                 if awaited != Await::Tick {
                     return Ok(awaited);
                 }
             }
         }
         // The inputs of this tick imply its grant, except where a node has none that are due at it.
-        Ok(self.wait(Sequence::Grant, tick + 1, Waiter::Grant(links.slot()), tick))
+        Ok(self.wait(Need::Grant, tick + 1, tick))
     }
 
     /// As a shadow, starts `tick` from the state of the predecessor, if that states one: what this process
@@ -336,9 +313,8 @@ impl ConnectedNode {
         if self.links.generation == 0 || tick > self.take_over_tick {
             return Ok(Await::Tick);
         }
-        let (predecessor, waiter) = (self.links.other_slot(), Waiter::Replacement(self.links.slot()));
-        if let Some(ring) = &self.handed {
-            let awaited = self.wait(Sequence::State(predecessor), tick + 1, waiter, tick);
+        if let Some(ring) = &self.predecessor_state {
+            let awaited = self.wait(Need::OtherState, tick + 1, tick);
             if awaited != Await::Tick {
                 return Ok(awaited);
             }
@@ -349,43 +325,42 @@ impl ConnectedNode {
                 });
             }
         }
-        if tick == self.take_over_tick && self.links.control.slot_state(predecessor) == SlotState::Taken {
-            return Ok(self.wait(Sequence::Done(predecessor), tick, waiter, tick));
+        if tick == self.take_over_tick && self.links.lockstep.other_computes() {
+            return Ok(self.wait(Need::OtherDone, tick, tick));
         }
         Ok(Await::Tick)
     }
 
-    /// Waits until the successor has completed its first tick, or is refused.
-    fn await_successor(&self) -> Await {
-        let (slot, successor) = (self.links.slot(), self.links.other_slot());
+    /// Waits until the backup has completed its first tick, or is refused.
+    fn await_backup(&self) -> Await {
         let tick = self.retirement_tick;
-        match self.wait(Sequence::Done(successor), tick + 1, Waiter::Replacement(slot), tick) {
+        match self.wait(Need::OtherDone, tick + 1, tick) {
             Await::Tick => Await::End,
             other => other,
         }
     }
 
-    fn wait(&self, word: Sequence, count: u32, waiter: Waiter, tick: u32) -> Await {
-        let over = |control: &Control| control.end_tick() <= tick || control.epoch() != self.epoch;
-        let control = &self.links.control;
-        match control.wait(word, count, waiter, self.links.node.wait, over) {
+    fn wait(&self, need: Need, count: u32, tick: u32) -> Await {
+        let lockstep = &self.links.lockstep;
+        let is_over = || lockstep.end_tick() <= tick || lockstep.epoch() != self.epoch;
+        match lockstep.wait(need, count, self.links.node.wait, is_over) {
             Waited::Reached => Await::Tick,
-            Waited::Over if control.is_aborted() || control.end_tick() <= tick => Await::End,
+            Waited::Over if lockstep.is_aborted() || lockstep.end_tick() <= tick => Await::End,
             Waited::Over => Await::Change,
         }
     }
 
-    /// Stays until every slot has taken the last samples of this process, where it leaves before the end.
+    /// Stays until every process has taken the last samples of this process, where it leaves before the end.
     fn await_readers(&self, tick: u32) -> Result<(), BusError> {
-        let (control, plan) = (&self.links.control, &self.links.plan);
+        let (lockstep, plan) = (&self.links.lockstep, &self.links.plan);
         let longest = plan.nodes.iter().map(|node| node.period_ticks).max().unwrap_or(1);
         let taken = tick.saturating_add(longest + 1);
         loop {
-            if control.is_aborted() {
+            if lockstep.is_aborted() {
                 return Err(BusError::Aborted);
             }
-            let needed = taken.min(control.end_tick());
-            if control.computing().all(|slot| control.count(Sequence::Done(slot)) >= needed) {
+            let needed = taken.min(lockstep.end_tick());
+            if lockstep.computing().all(|slot| lockstep.done(slot) >= needed) {
                 return Ok(());
             }
             std::thread::sleep(RETIREMENT_NAP);
@@ -395,24 +370,22 @@ impl ConnectedNode {
     /// Makes the connections agree with `membership`; `tick` is the next that this node computes.
     fn follow(&mut self, membership: &Membership, tick: u32) -> Result<(), BusError> {
         for input in &mut self.inputs {
-            self.links.connect_successor(input, membership, tick)?;
+            self.links.connect_backup(input, membership, tick)?;
         }
-        let own = &membership.nodes[self.links.index];
-        let is_successor =
-            own.backup.as_ref().is_some_and(|successor| successor.generation == self.links.generation);
-        if is_successor {
-            self.take_over_tick = own.take_over_tick;
+        let instances = &membership.nodes[self.links.index];
+        let generation = self.links.generation;
+        let is_backup = instances.backup.as_ref().is_some_and(|backup| backup.generation == generation);
+        if is_backup {
+            self.take_over_tick = instances.take_over_tick;
             self.retirement_tick = u32::MAX;
-        } else if own.primary.generation == self.links.generation {
-            self.retirement_tick = own.backup.as_ref().map_or(u32::MAX, |_| own.take_over_tick);
+        } else if instances.primary.generation == generation {
+            self.retirement_tick = instances.backup.as_ref().map_or(u32::MAX, |_| instances.take_over_tick);
         }
         for (index, output) in self.outputs.iter_mut().enumerate() {
-            output.readers = self.links.reader_waiters(membership, output.topic).map(Waiter::Input).collect();
-            output.shadow_readers =
-                self.links.reader_waiters(membership, output.topic).map(Waiter::Shadow).collect();
+            output.readers = self.links.readers(membership, output.topic);
             output.update_subscribers(&self.links.node.name)?;
-            if is_successor {
-                self.links.promote(output, own, index, tick);
+            if is_backup {
+                self.links.promote(output, instances, index, tick);
             }
         }
         self.epoch = membership.epoch;
@@ -428,7 +401,7 @@ impl ConnectedNode {
         let links = &self.links;
         let node = &links.node.name;
         for input in &mut self.inputs {
-            input.take(tick, node).inspect_err(|_| links.control.count_gap(input.topic))?;
+            input.take(tick, node).inspect_err(|_| links.lockstep.count_gap(input.topic))?;
         }
         for port in &mut self.predecessor {
             port.take_available(tick, node)?;
@@ -446,20 +419,20 @@ impl ConnectedNode {
             reason,
         })?;
         let done_ns = monotonic_ns();
-        links.control.count_step(links.slot(), done_ns - received_ns);
+        links.lockstep.count_step(done_ns - received_ns);
         // Before anything is sent: whoever sees the sample can go on from the state after it.
         self.publish_state(tick + self.links.node.period_ticks, state);
         self.send(tick, time_ns, received_ns, done_ns)?;
         if tick >= self.take_over_tick {
             // The predecessor leaves; nothing of it is read any more.
             self.predecessor.clear();
-            self.handed = None;
+            self.predecessor_state = None;
         }
         Ok(())
     }
 
     fn send(&mut self, tick: u32, time_ns: u64, received_ns: u64, done_ns: u64) -> Result<(), BusError> {
-        let (control, node) = (&self.links.control, &self.links.node.name);
+        let (lockstep, node) = (&self.links.lockstep, &self.links.node.name);
         let mut sent_before = false;
         let is_sent = |(_, output): &(usize, &mut OutPort)| output.is_sent(tick);
         for (index, output) in self.outputs.iter_mut().enumerate().filter(is_sent) {
@@ -471,9 +444,9 @@ impl ConnectedNode {
             output.send(tick, time_ns, [received_ns, done_ns, sent_ns], node)?;
             let next = tick + output.period_ticks;
             if tick >= output.counts_from {
-                control.advance(Sequence::Topic(output.topic), next, &output.readers);
+                lockstep.samples_sent(output.topic, next, &output.readers);
             } else {
-                control.advance(Sequence::Shadow(output.topic), next, &output.shadow_readers);
+                lockstep.shadow_sent(output.topic, next, &output.readers);
             }
             sent_before = true;
         }
@@ -484,83 +457,5 @@ impl ConnectedNode {
             profile.end(tick, received_ns, done_ns, monotonic_ns());
         }
         Ok(())
-    }
-}
-
-impl Links {
-    fn slot(&self) -> usize {
-        self.plan.slot(self.index, self.generation)
-    }
-
-    /// The other slot of this node: its predecessor's or its successor's.
-    fn other_slot(&self) -> usize {
-        self.plan.slot(self.index, self.generation + 1)
-    }
-
-    fn done_waiters(&self) -> [Waiter; 2] {
-        [Waiter::Done(self.slot()), Waiter::Replacement(self.other_slot())]
-    }
-
-    fn subscriber(&self, topic: usize, generation: u32) -> Result<crate::transport::Receiver, BusError> {
-        self.transport.subscriber(&self.plan.topics[topic].name, generation, self.plan.capacity(topic))
-    }
-
-    /// The processes of the node that publishes `topic`.
-    fn publisher<'a>(&self, membership: &'a Membership, topic: usize) -> &'a NodeInstances {
-        &membership.nodes[self.plan.publisher(topic).unwrap_or(self.index)]
-    }
-
-    fn reader_waiters(&self, membership: &Membership, topic: usize) -> impl Iterator<Item = usize> {
-        membership
-            .readers(topic)
-            .map(|(node, generation, input)| self.plan.input_waiter(self.plan.slot(node, generation), input))
-    }
-
-    fn initial_value(&self, input: &InputPlan, declared: Declared) -> Result<Option<Box<[u64]>>, BusError> {
-        let (Some(value), Declared::Typed(schema)) = (&input.initial, declared) else { return Ok(None) };
-        initial::sample(schema, value).map(Some).map_err(|reason| BusError::InitialValue {
-            node: self.node.name.clone(),
-            port: input.port.clone(),
-            type_name: schema.type_name,
-            reason,
-        })
-    }
-
-    /// Connects `input` to the process that shadows its publisher, and lets go of one that is gone.
-    fn connect_successor(
-        &self,
-        input: &mut InPort,
-        membership: &Membership,
-        tick: u32,
-    ) -> Result<(), BusError> {
-        let publisher = self.publisher(membership, input.topic);
-        let Some(successor) = &publisher.backup else {
-            input.drop_successors_of(publisher.primary.generation);
-            return Ok(());
-        };
-        let take_over_tick = publisher.topic_take_over_tick(input.topic);
-        if input.newest_generation() != successor.generation {
-            let receiver = self.subscriber(input.topic, successor.generation)?;
-            let first_tick = if successor.shadows { successor.join_tick } else { take_over_tick };
-            let period_ticks = self.plan.topics[input.topic].period_ticks;
-            // A reader that joined later than the shadow starts with what its own first tick reads.
-            let first_tick = first_tick.max(tick.saturating_sub(input.delay_ticks));
-            let source = Source::new(successor.generation, receiver, first_tick, period_ticks);
-            input.drop_successors_of(publisher.primary.generation);
-            input.add_successor(source, successor.shadows);
-        }
-        input.set_take_over_tick(take_over_tick);
-        Ok(())
-    }
-
-    /// Has the samples of `output` count from the take-over on, also those that were sent already.
-    fn promote(&self, output: &mut OutPort, own: &NodeInstances, index: usize, tick: u32) {
-        output.counts_from = own.take_over_ticks[index];
-        let shadows = own.backup.as_ref().is_some_and(|successor| successor.shadows);
-        output.sends_from = if shadows { 0 } else { output.counts_from };
-        let next_due = tick.div_ceil(output.period_ticks) * output.period_ticks;
-        if next_due > output.counts_from && self.control.count(Sequence::Topic(output.topic)) < next_due {
-            self.control.advance(Sequence::Topic(output.topic), next_due, &output.readers);
-        }
     }
 }

@@ -3,7 +3,7 @@
 //! Such a thread is told by its launcher what a process reads from its environment, and it leaves its process as it is:
 //! signals, memory, cores and priorities belong to whoever owns the process.
 
-use crate::run_process::Join;
+use crate::join::Join;
 use std::cell::RefCell;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -14,7 +14,7 @@ pub struct Hosted {
     /// Which part it takes; the clock has a name that no node has.
     pub join: Join,
     /// Whether the instance is to end: its waits return then as those of an aborted run do. Who sets it wakes the
-    /// sleepers ([`crate::control::Control::set_epoch`] does).
+    /// sleepers ([`crate::lockstep::SupervisorView::set_epoch`] does).
     pub is_cancelled: Arc<AtomicBool>,
 }
 

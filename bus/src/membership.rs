@@ -4,6 +4,7 @@
 //! it. A membership holds the whole state, not a change, so it does not matter which of them a node saw last.
 
 use crate::error::BusError;
+use crate::json_file;
 use crate::plan::{NodePlan, Plan};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
@@ -62,17 +63,7 @@ impl Membership {
     /// # Errors
     /// If the file is missing or is no membership.
     pub fn load(run_dir: &Path, epoch: u32) -> Result<Self, BusError> {
-        let path = path(run_dir, epoch);
-        let text = crate::user_file::read_text(&path).map_err(|source| BusError::File {
-            action: "read",
-            path: path.clone(),
-            source,
-        })?;
-        serde_json::from_str(&text).map_err(|error| BusError::Content {
-            path,
-            expected: "the membership of a run",
-            found: error.to_string(),
-        })
+        json_file::load(&path(run_dir, epoch), "the membership of a run")
     }
 
     /// Writes the membership into `run_dir`, and removes the one before the one before it, which nobody reads
@@ -81,12 +72,7 @@ impl Membership {
     /// # Errors
     /// If the file cannot be written.
     pub fn store(&self, run_dir: &Path) -> Result<(), BusError> {
-        let path = path(run_dir, self.epoch);
-        let text = serde_json::to_string(self).unwrap_or_else(|error| unreachable!("{error}"));
-        // In one step: a process that was told of it before may be reading it.
-        let draft = path.with_extension("draft");
-        let written = std::fs::write(&draft, text).and_then(|()| std::fs::rename(&draft, &path));
-        written.map_err(|source| BusError::File { action: "write", path, source })?;
+        json_file::store(&path(run_dir, self.epoch), self)?;
         if let Some(old) = self.epoch.checked_sub(2) {
             let _ = std::fs::remove_file(self::path(run_dir, old));
         }
@@ -118,8 +104,9 @@ impl NodeInstances {
 
     /// The tick from which on the successor's samples of topic `topic` count.
     pub(crate) fn topic_take_over_tick(&self, topic: usize) -> u32 {
-        let outputs = self.primary.plan.outputs.iter().zip(&self.take_over_ticks);
-        outputs.filter(|(output, _)| output.topic == topic).map(|(_, &tick)| tick).next().unwrap_or(u32::MAX)
+        let mut outputs = self.primary.plan.outputs.iter().zip(&self.take_over_ticks);
+        let found = outputs.find(|(output, _)| output.topic == topic);
+        *found.expect("the publisher of a topic has an output for it").1
     }
 }
 

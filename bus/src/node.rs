@@ -1,70 +1,26 @@
 //! A node before its first tick: it declares its ports by name and connects them.
 
 use crate::announcement::{self, Announcement};
-use crate::connected::{ConnectedNode, Links};
-use crate::control::{Control, Phase, SlotState, Waited};
+use crate::claim;
+use crate::connected::ConnectedNode;
 use crate::error::BusError;
+use crate::handles::{Declared, Input, Output, RawInput, Wiring};
+use crate::join::Join;
+use crate::links::Links;
+use crate::lockstep::{NodeView, Phase, SlotState};
 use crate::membership::Membership;
 use crate::message::Message;
+use crate::names::process_name;
 use crate::plan::{NodePlan, Pace, Plan};
 use crate::port::OutPort;
 use crate::ports::{Inputs, PortSpec};
 use crate::registration::Registration;
-use crate::run_process::Join;
 use crate::schema::Schema;
 use crate::tick::Tick;
 use crate::transport::Transport;
 use serde::de::DeserializeOwned;
 use std::fmt::Display;
-use std::marker::PhantomData;
 use std::path::PathBuf;
-
-/// The environment variable that names the node to itself.
-pub const NODE_VARIABLE: &str = "HUMMINGBUS_NODE";
-
-/// The environment variable that counts the processes of a node: 0 for the first, successors count up.
-pub const GENERATION_VARIABLE: &str = "HUMMINGBUS_GENERATION";
-
-/// Handle of an input whose messages are `T`.
-#[derive(Debug)]
-pub struct Input<T> {
-    pub(crate) index: usize,
-    message: PhantomData<T>,
-}
-
-impl<T> Clone for Input<T> {
-    fn clone(&self) -> Self {
-        *self
-    }
-}
-impl<T> Copy for Input<T> {}
-
-/// Handle of an input whose messages are read as bytes.
-#[derive(Clone, Copy, Debug)]
-pub struct RawInput {
-    pub(crate) index: usize,
-}
-
-/// Handle of an output whose messages are `T`.
-#[derive(Debug)]
-pub struct Output<T> {
-    pub(crate) index: usize,
-    message: PhantomData<T>,
-}
-
-impl<T> Clone for Output<T> {
-    fn clone(&self) -> Self {
-        *self
-    }
-}
-impl<T> Copy for Output<T> {}
-
-/// Where the ports of a component are among those of its node, in the order in which it declares them.
-#[derive(Debug)]
-pub(crate) struct Wiring {
-    pub(crate) inputs: Vec<Option<usize>>,
-    pub(crate) outputs: Vec<Option<usize>>,
-}
 
 /// A node that declares its ports.
 #[derive(Debug)]
@@ -79,23 +35,6 @@ pub struct Node {
     outputs: Vec<Option<&'static Schema>>,
     /// What was wrong with a declaration that does not return errors; connecting does.
     fault: Option<BusError>,
-}
-
-/// How a node reads an input.
-#[derive(Clone, Copy, Debug)]
-pub(crate) enum Declared {
-    Typed(&'static Schema),
-    Raw,
-}
-
-impl Declared {
-    /// The message type, in words where any is read.
-    fn type_name(self) -> &'static str {
-        match self {
-            Self::Typed(schema) => schema.type_name,
-            Self::Raw => "bytes of any type",
-        }
-    }
 }
 
 impl Node {
@@ -121,20 +60,16 @@ impl Node {
         Ok(Self { run_dir, plan, index, generation, node, inputs, outputs, fault: None })
     }
 
-    fn node(&self) -> &NodePlan {
-        &self.node
-    }
-
     /// The node's name in the run.
     #[must_use]
     pub fn name(&self) -> &str {
-        &self.node().name
+        &self.node.name
     }
 
     /// Simulated time between two computations of this node, in seconds.
     #[must_use]
     pub fn period_s(&self) -> f64 {
-        f64::from(self.node().period_ticks) * self.plan.tick_s()
+        f64::from(self.node.period_ticks) * self.plan.tick_s()
     }
 
     /// Simulated time of one tick, in seconds.
@@ -161,11 +96,11 @@ impl Node {
     /// # Errors
     /// If they do not fit `P`; the error names the key.
     pub fn parameters<P: DeserializeOwned>(&self) -> Result<P, BusError> {
-        diagnostics::read(&self.node().parameters).map_err(|error| self.error(format!("parameters: {error}")))
+        diagnostics::read(&self.node.parameters).map_err(|error| self.error(format!("parameters: {error}")))
     }
 
     pub(crate) fn raw_parameters(&self) -> &serde_json::Value {
-        &self.node().parameters
+        &self.node.parameters
     }
 
     pub(crate) fn tick_ns(&self) -> u64 {
@@ -173,7 +108,7 @@ impl Node {
     }
 
     pub(crate) fn period_ticks(&self) -> u32 {
-        self.node().period_ticks
+        self.node.period_ticks
     }
 
     pub(crate) fn duration_ticks(&self) -> u32 {
@@ -182,7 +117,7 @@ impl Node {
 
     /// The wired inputs, and the outputs.
     pub(crate) fn port_names(&self) -> (Vec<&str>, Vec<&str>) {
-        let NodePlan { inputs, outputs, .. } = self.node();
+        let NodePlan { inputs, outputs, .. } = &self.node;
         let inputs = inputs.iter().map(|input| input.port.as_str()).collect();
         (inputs, outputs.iter().map(|output| output.port.as_str()).collect())
     }
@@ -196,15 +131,16 @@ impl Node {
             Inputs::Ports(ports) => {
                 ports.iter().map(|port| self.declare_port(port)).collect::<Result<_, _>>()?
             }
-            Inputs::Many(schema) => self
-                .declare_all(Declared::Typed(schema), |node, index| node.node().inputs[index].port.clone()),
+            Inputs::Many(schema) => {
+                self.declare_all(Declared::Typed(schema), |node, index| node.node.inputs[index].port.clone())
+            }
             Inputs::Any => self.declare_all(Declared::Raw, |node, index| {
-                node.plan.topics[node.node().inputs[index].topic].name.clone()
+                node.plan.topics[node.node.inputs[index].topic].name.clone()
             }),
         };
         let mut outputs = Vec::new();
         for port in component.outputs {
-            let is_named = self.node().outputs.iter().any(|output| output.port == port.name);
+            let is_named = self.node.outputs.iter().any(|output| output.port == port.name);
             let is_there = port.required || is_named;
             outputs.push(is_there.then(|| self.declare_output(port.name, port.schema)).transpose()?);
         }
@@ -212,7 +148,7 @@ impl Node {
     }
 
     fn declare_port(&mut self, port: &PortSpec) -> Result<Option<usize>, BusError> {
-        let is_wired = self.node().inputs.iter().any(|input| input.port == port.name);
+        let is_wired = self.node.inputs.iter().any(|input| input.port == port.name);
         if !port.required && !is_wired {
             return Ok(None);
         }
@@ -228,13 +164,13 @@ impl Node {
     pub fn input<T: Message>(&mut self, port: &str) -> Result<Input<T>, BusError> {
         let index = self.input_index(port)?;
         self.declare_input(index, Declared::Typed(T::SCHEMA))?;
-        Ok(Input { index, message: PhantomData })
+        Ok(Input::new(index))
     }
 
     /// Declares the input `port` if the manifest wires it. A port that was declared before is refused when the node
     /// connects.
     pub fn optional_input<T: Message>(&mut self, port: &str) -> Option<Input<T>> {
-        let is_wired = self.node().inputs.iter().any(|input| input.port == port);
+        let is_wired = self.node.inputs.iter().any(|input| input.port == port);
         self.keep_fault(|node| is_wired.then(|| node.input(port)).transpose()).flatten()
     }
 
@@ -268,16 +204,16 @@ impl Node {
     /// Declares every input the manifest wires as one of `T`, in the order of their names. An input that was declared
     /// before is refused when the node connects.
     pub fn every_input<T: Message>(&mut self) -> Vec<Input<T>> {
-        let ports = self
-            .declare_all(Declared::Typed(T::SCHEMA), |node, index| node.node().inputs[index].port.clone());
-        ports.into_iter().flatten().map(|index| Input { index, message: PhantomData }).collect()
+        let ports =
+            self.declare_all(Declared::Typed(T::SCHEMA), |node, index| node.node.inputs[index].port.clone());
+        ports.into_iter().flatten().map(|index| Input::new(index)).collect()
     }
 
     /// Declares every input the manifest wires, to be read as bytes, in the order of their topics' names. As
     /// [`Node::every_input`].
     pub fn raw_inputs(&mut self) -> Vec<RawInput> {
         let ports = self.declare_all(Declared::Raw, |node, index| {
-            node.plan.topics[node.node().inputs[index].topic].name.clone()
+            node.plan.topics[node.node.inputs[index].topic].name.clone()
         });
         ports.into_iter().flatten().map(|index| RawInput { index }).collect()
     }
@@ -301,7 +237,7 @@ impl Node {
             self.inputs[index] = Some(declared);
             return Ok(());
         };
-        let port = self.node().inputs[index].port.clone();
+        let port = self.node.inputs[index].port.clone();
         Err(self.declared_twice("input", &port, before.type_name(), declared.type_name()))
     }
 
@@ -310,7 +246,7 @@ impl Node {
     /// # Errors
     /// If the manifest states another message type.
     pub fn optional_output<T: Message>(&mut self, port: &str) -> Result<Option<Output<T>>, BusError> {
-        let is_named = self.node().outputs.iter().any(|output| output.port == port);
+        let is_named = self.node.outputs.iter().any(|output| output.port == port);
         is_named.then(|| self.output(port)).transpose()
     }
 
@@ -320,7 +256,7 @@ impl Node {
     }
 
     fn input_index(&self, port: &str) -> Result<usize, BusError> {
-        let inputs = &self.node().inputs;
+        let inputs = &self.node.inputs;
         inputs.iter().position(|input| input.port == port).ok_or_else(|| BusError::UnwiredPort {
             node: self.name().to_owned(),
             direction: "input",
@@ -336,11 +272,11 @@ impl Node {
     /// If the manifest does not name it, or states another message type, or the node declared it before.
     pub fn output<T: Message>(&mut self, port: &str) -> Result<Output<T>, BusError> {
         let index = self.declare_output(port, T::SCHEMA)?;
-        Ok(Output { index, message: PhantomData })
+        Ok(Output::new(index))
     }
 
     fn declare_output(&mut self, port: &str, schema: &'static Schema) -> Result<usize, BusError> {
-        let outputs = &self.node().outputs;
+        let outputs = &self.node.outputs;
         let index =
             outputs.iter().position(|output| output.port == port).ok_or_else(|| BusError::UnwiredPort {
                 node: self.name().to_owned(),
@@ -373,29 +309,27 @@ impl Node {
     pub fn connect(mut self) -> Result<ConnectedNode, BusError> {
         self.fault.take().map_or(Ok(()), Err)?;
         self.require_all_declared()?;
-        let name = crate::process::process_name(self.name(), self.generation);
-        let claim = crate::process::claim(&self.run_dir, &name)?;
-        let control = Control::open(&self.plan)?;
-        crate::process::stay_on(self.node().cpu);
+        let claim = claim::claim(&self.run_dir, &process_name(self.name(), self.generation))?;
+        let lockstep = NodeView::open(&self.plan, self.index, self.generation)?;
+        crate::process::stay_on(self.node.cpu);
         if self.plan.pace == Pace::Free {
             crate::process::wait_for_turn();
         }
         if self.generation > 0 {
             // Every topic is announced by then.
-            require_reached(control.wait_phase(Phase::Connecting))?;
+            lockstep.wait_phase(Phase::Connecting).or_aborted()?;
         }
-        let slot = self.plan.slot(self.index, self.generation);
         let transport = Transport::new(&self.run_dir, &self.plan.run_id, self.name())?;
         let outputs = self.connect_outputs(&transport)?;
         transport.reserve()?;
-        control.set_ready(slot, Phase::Connecting);
+        lockstep.set_ready(Phase::Connecting);
         let membership = if self.generation == 0 {
-            require_reached(control.wait_phase(Phase::Connecting))?;
+            lockstep.wait_phase(Phase::Connecting).or_aborted()?;
             Membership::first(&self.plan)
         } else {
-            require_reached(control.wait_slot(slot, SlotState::Joining))?;
+            lockstep.wait_slot(SlotState::Joining).or_aborted()?;
             // It names this process already; the others are told when this one has connected.
-            Membership::load(&self.run_dir, control.epoch() + 1)?
+            Membership::load(&self.run_dir, lockstep.epoch() + 1)?
         };
         let links = Links {
             run_dir: self.run_dir,
@@ -403,7 +337,7 @@ impl Node {
             index: self.index,
             generation: self.generation,
             node: self.node,
-            control,
+            lockstep,
             transport,
             _claim: claim,
         };
@@ -417,16 +351,16 @@ impl Node {
             port: port.to_owned(),
         };
         if let Some(index) = self.inputs.iter().position(Option::is_none) {
-            return Err(undeclared("input", &self.node().inputs[index].port));
+            return Err(undeclared("input", &self.node.inputs[index].port));
         }
         if let Some(index) = self.outputs.iter().position(Option::is_none) {
-            return Err(undeclared("output", &self.node().outputs[index].port));
+            return Err(undeclared("output", &self.node.outputs[index].port));
         }
         Ok(())
     }
 
     fn connect_outputs(&self, transport: &Transport) -> Result<Vec<OutPort>, BusError> {
-        let ports = self.node().outputs.iter().zip(self.outputs.iter().flatten());
+        let ports = self.node.outputs.iter().zip(self.outputs.iter().flatten());
         ports
             .map(|(output, schema)| {
                 let topic = &self.plan.topics[output.topic];
@@ -483,17 +417,13 @@ fn known<'a>(names: impl Iterator<Item = &'a str>) -> String {
     if names.is_empty() { "none".to_owned() } else { names.join(", ") }
 }
 
-pub(crate) fn require_reached(waited: Waited) -> Result<(), BusError> {
-    if waited == Waited::Reached { Ok(()) } else { Err(BusError::Aborted) }
-}
-
 #[cfg(test)]
 mod tests {
     use super::Node;
-    use crate::control::Control;
+    use crate::join::Join;
+    use crate::lockstep::{ClockView, SupervisorView};
     use crate::messages::{MotorCommand, PlantState};
-    use crate::plan::{InputPlan, NodePlan, OutputPlan, Pace, Plan, TopicPlan, Wait};
-    use crate::run_process::Join;
+    use crate::plan::{InputPlan, NodePlan, OutputPlan, Plan, TopicPlan};
     use crate::tick::Tick;
     use crate::{BusError, Message};
     use std::alloc::{GlobalAlloc, Layout, System};
@@ -527,12 +457,6 @@ mod tests {
     const WARM_UP_TICKS: u32 = 500;
     const LAST_TICK: u32 = TICKS - 1;
 
-    fn node(name: &str, inputs: Vec<InputPlan>, outputs: Vec<OutputPlan>) -> NodePlan {
-        let (wait, parameters) = (Wait::Block, serde_json::Value::Null);
-        let (name, restarts) = (name.to_owned(), false);
-        NodePlan { name, period_ticks: 1, wait, cpu: None, inputs, outputs, parameters, restarts }
-    }
-
     fn source_and_sink() -> Plan {
         let topic = TopicPlan {
             name: "/source/command".to_owned(),
@@ -541,19 +465,9 @@ mod tests {
         };
         let input = InputPlan { port: "command".to_owned(), topic: 0, delay_ticks: 0, initial: None };
         let output = OutputPlan { port: "command".to_owned(), topic: 0 };
-        Plan {
-            run_id: format!("test-{:x}-{:x}", std::process::id(), crate::control::monotonic_ns()),
-            seed: 1,
-            tick_ns: 1_000_000,
-            duration_ticks: TICKS,
-            window_ticks: 64,
-            pace: Pace::Free,
-            clock_cpu: None,
-            profile: false,
-            lock_memory: false,
-            topics: vec![topic],
-            nodes: vec![node("source", vec![], vec![output]), node("sink", vec![input], vec![])],
-        }
+        let source = NodePlan::for_test("source", vec![], vec![output]);
+        let sink = NodePlan::for_test("sink", vec![input], vec![]);
+        Plan::for_test(TICKS, vec![topic], vec![source, sink])
     }
 
     /// Allocations of the calling thread's node between the warm-up and the last tick.
@@ -595,7 +509,7 @@ mod tests {
 
     /// As the launcher does: iceoryx2 leaves a file of its own until the last process is gone.
     fn remove_shared_memory(run_id: &str) {
-        let prefix = crate::control::shm_prefix(run_id);
+        let prefix = crate::names::shm_prefix(run_id);
         for entry in std::fs::read_dir("/dev/shm").unwrap().flatten() {
             if entry.file_name().to_string_lossy().starts_with(&prefix) {
                 std::fs::remove_file(entry.path()).unwrap();
@@ -641,11 +555,12 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let plan = source_and_sink();
         plan.store(folder.path()).unwrap();
-        let control = Control::create(&plan).unwrap();
+        let _segment = SupervisorView::create(&plan).unwrap();
+        let clock = ClockView::open(&plan).unwrap();
         let (source, sink) = std::thread::scope(|scope| {
             let source = scope.spawn(|| fly_source(folder.path()));
             let sink = scope.spawn(|| fly_sink(folder.path()));
-            crate::clock::serve(&plan, &control, None).unwrap();
+            crate::clock::serve(&plan, &clock, None).unwrap();
             (source.join().unwrap().unwrap(), sink.join().unwrap().unwrap())
         });
         remove_shared_memory(&plan.run_id);

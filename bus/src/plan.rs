@@ -1,14 +1,28 @@
 //! The resolved plan of a run: what the launcher writes and every process of the run reads.
 
 use crate::error::BusError;
-use crate::transport::Capacity;
+use crate::json_file;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
 /// Processes that a node can have at a time: the one that flies, and one that shadows it.
 pub const SLOTS_PER_NODE: usize = 2;
-/// Input waiters that a node has at least, for successors that read more than it does.
-pub const SPARE_INPUTS: usize = 8;
+/// Inputs that every process of a node may have, so that a backup may read more than its primary: their waiters are laid
+/// out before the run.
+pub const INPUTS_RESERVED: usize = 8;
+
+/// How a topic's queues are sized.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Capacity {
+    /// Samples that wait in a subscriber's queue at most.
+    pub(crate) queued_samples: usize,
+    /// Samples that a publisher keeps for a subscriber that joins later.
+    pub(crate) history_samples: usize,
+    /// Subscribers of the topic.
+    pub(crate) subscribers: usize,
+    /// Processes of the run.
+    pub(crate) nodes: usize,
+}
 
 /// How time passes for the clock service.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -94,17 +108,7 @@ impl NodePlan {
     /// # Errors
     /// If the file is missing or holds something else.
     pub(crate) fn load_backup(run_dir: &Path, node: usize, generation: u32) -> Result<Self, BusError> {
-        let path = backup_path(run_dir, node, generation);
-        let text = crate::user_file::read_text(&path).map_err(|source| BusError::File {
-            action: "read",
-            path: path.clone(),
-            source,
-        })?;
-        serde_json::from_str(&text).map_err(|error| BusError::Content {
-            path,
-            expected: "the plan of a successor",
-            found: error.to_string(),
-        })
+        json_file::load(&backup_path(run_dir, node, generation), "the plan of a backup")
     }
 
     /// Writes the same.
@@ -112,14 +116,13 @@ impl NodePlan {
     /// # Errors
     /// If the file cannot be written.
     pub fn store_backup(&self, run_dir: &Path, node: usize, generation: u32) -> Result<(), BusError> {
-        let path = backup_path(run_dir, node, generation);
-        let text = serde_json::to_string(self).unwrap_or_else(|error| unreachable!("{error}"));
-        std::fs::write(&path, text).map_err(|source| BusError::File { action: "write", path, source })
+        json_file::store(&backup_path(run_dir, node, generation), self)
     }
 
-    /// Input waiters set aside for each of its processes.
-    fn waiters(&self) -> usize {
-        self.inputs.len().max(SPARE_INPUTS)
+    /// Inputs that a process of this node may have.
+    #[must_use]
+    pub fn inputs_max(&self) -> usize {
+        self.inputs.len().max(INPUTS_RESERVED)
     }
 }
 
@@ -167,17 +170,7 @@ impl Plan {
     /// # Errors
     /// If the file is missing or is not a plan.
     pub fn load(run_dir: &Path) -> Result<Self, BusError> {
-        let path = run_dir.join(Self::FILE);
-        let text = crate::user_file::read_text(&path).map_err(|source| BusError::File {
-            action: "read",
-            path: path.clone(),
-            source,
-        })?;
-        serde_json::from_str(&text).map_err(|error| BusError::Content {
-            path,
-            expected: "the plan of a run",
-            found: error.to_string(),
-        })
+        json_file::load(&run_dir.join(Self::FILE), "the plan of a run")
     }
 
     /// Writes the plan into `run_dir`.
@@ -185,9 +178,7 @@ impl Plan {
     /// # Errors
     /// If the file cannot be written.
     pub fn store(&self, run_dir: &Path) -> Result<(), BusError> {
-        let path = run_dir.join(Self::FILE);
-        let text = serde_json::to_string_pretty(self).unwrap_or_else(|error| unreachable!("{error}"));
-        std::fs::write(&path, text).map_err(|source| BusError::File { action: "write", path, source })
+        json_file::store(&run_dir.join(Self::FILE), self)
     }
 
     /// Simulated time of one tick in seconds.
@@ -207,24 +198,24 @@ impl Plan {
         })
     }
 
-    /// Number of input waiters set aside for all nodes before node `node`.
-    fn input_waiters_before(&self, node: usize) -> usize {
-        self.nodes[..node].iter().map(NodePlan::waiters).sum()
+    /// Inputs that the processes of all nodes before node `node` may have, one of each.
+    fn inputs_before(&self, node: usize) -> usize {
+        self.nodes[..node].iter().map(NodePlan::inputs_max).sum()
     }
 
-    /// Number of input waiters set aside for the processes of one slot.
-    pub(crate) fn input_waiters(&self) -> usize {
-        self.input_waiters_before(self.nodes.len())
+    /// Inputs that the processes in all slots may have.
+    pub(crate) fn input_count(&self) -> usize {
+        SLOTS_PER_NODE * self.inputs_before(self.nodes.len())
     }
 
-    /// The number of the waiter of input `input` of the process in slot `slot`.
-    pub(crate) fn input_waiter(&self, slot: usize, input: usize) -> usize {
+    /// The number of the first input of the process in slot `slot` among those of all slots.
+    pub(crate) fn first_input(&self, slot: usize) -> usize {
         let (half, node) = (slot / self.nodes.len(), slot % self.nodes.len());
-        half * self.input_waiters() + self.input_waiters_before(node) + input
+        half * self.inputs_before(self.nodes.len()) + self.inputs_before(node)
     }
 
-    /// The place of generation `generation` of node `node` among the slots of the run: each node has two
-    /// slots, so that a successor can join while its predecessor flies.
+    /// The slot of generation `generation` of node `node` among the slots of the run: each node has two, so that a
+    /// backup can join while its primary flies.
     #[must_use]
     pub fn slot(&self, node: usize, generation: u32) -> usize {
         (generation as usize % SLOTS_PER_NODE) * self.nodes.len() + node
@@ -258,8 +249,43 @@ impl Plan {
     }
 
     /// The node that publishes topic `topic`.
+    ///
+    /// # Panics
+    /// If none does: a plan has topics for outputs only.
     #[must_use]
-    pub fn publisher(&self, topic: usize) -> Option<usize> {
-        self.nodes.iter().position(|node| node.outputs.iter().any(|output| output.topic == topic))
+    pub fn publisher(&self, topic: usize) -> usize {
+        let publishes = |node: &NodePlan| node.outputs.iter().any(|output| output.topic == topic);
+        let publisher = self.nodes.iter().position(publishes);
+        publisher.unwrap_or_else(|| panic!("topic {} of the plan has no publisher", self.topics[topic].name))
+    }
+}
+
+#[cfg(test)]
+impl NodePlan {
+    /// A node for tests: it computes at every tick.
+    pub(crate) fn for_test(name: &str, inputs: Vec<InputPlan>, outputs: Vec<OutputPlan>) -> Self {
+        let (wait, parameters) = (Wait::Block, serde_json::Value::Null);
+        let (name, restarts) = (name.to_owned(), false);
+        Self { name, period_ticks: 1, wait, cpu: None, inputs, outputs, parameters, restarts }
+    }
+}
+
+#[cfg(test)]
+impl Plan {
+    /// A free-running plan for tests, whose files no other test's are called like.
+    pub(crate) fn for_test(duration_ticks: u32, topics: Vec<TopicPlan>, nodes: Vec<NodePlan>) -> Self {
+        Self {
+            run_id: format!("test-{:x}-{:x}", std::process::id(), crate::host_time::monotonic_ns()),
+            seed: 1,
+            tick_ns: 1_000_000,
+            duration_ticks,
+            window_ticks: 64,
+            pace: Pace::Free,
+            clock_cpu: None,
+            profile: false,
+            lock_memory: false,
+            topics,
+            nodes,
+        }
     }
 }

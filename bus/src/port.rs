@@ -1,6 +1,5 @@
 //! The two ends of a connection inside a node: what may be read at a tick, and what must be sent.
 
-use crate::control::Waiter;
 use crate::error::BusError;
 use crate::finite::{Floats, field_at};
 use crate::message::{cdr_bytes, message_bytes};
@@ -57,7 +56,7 @@ impl Source {
 
 /// A process that shadows the publisher of an input, and whose samples count from `take_over_tick` on.
 #[derive(Debug)]
-struct Successor {
+struct Backup {
     source: Source,
     /// Whether it sends samples before they count; one that is started after a crash does not.
     shadows: bool,
@@ -71,8 +70,8 @@ pub(crate) struct InPort {
     current: Option<Received>,
     shadow: Option<Received>,
     active: Source,
-    /// Those that succeed it, in order: more than one where a successor died before this node turned to it.
-    successors: VecDeque<Successor>,
+    /// Those that succeed it, in order: more than one where a backup died before this node turned to it.
+    backups: VecDeque<Backup>,
     initial: Option<Box<[u64]>>,
     topic_name: String,
     size: usize,
@@ -81,8 +80,6 @@ pub(crate) struct InPort {
     pub(crate) reads_shadow: bool,
     pub(crate) topic: usize,
     pub(crate) delay_ticks: u32,
-    /// The number of the waiter.
-    pub(crate) waiter: usize,
 }
 
 impl InPort {
@@ -90,7 +87,6 @@ impl InPort {
         input: &InputPlan,
         topic: &TopicPlan,
         size: usize,
-        waiter: usize,
         initial: Option<Box<[u64]>>,
         active: Source,
     ) -> Self {
@@ -98,7 +94,7 @@ impl InPort {
             current: None,
             shadow: None,
             active,
-            successors: VecDeque::new(),
+            backups: VecDeque::new(),
             initial,
             topic_name: topic.name.clone(),
             size,
@@ -106,13 +102,12 @@ impl InPort {
             reads_shadow: false,
             topic: input.topic,
             delay_ticks: input.delay_ticks,
-            waiter,
         }
     }
 
     /// The newest generation that this input is connected to.
     pub(crate) fn newest_generation(&self) -> u32 {
-        self.successors.back().map_or(&self.active, |successor| &successor.source).generation
+        self.backups.back().map_or(&self.active, |backup| &backup.source).generation
     }
 
     /// The tick whose sample `tick` reads, unless that lies before the run.
@@ -120,29 +115,29 @@ impl InPort {
         tick.checked_sub(self.delay_ticks)
     }
 
-    /// Connects the publisher's successor; its samples do not count yet.
-    pub(crate) fn add_successor(&mut self, source: Source, shadows: bool) {
+    /// Connects the publisher's backup; its samples do not count yet.
+    pub(crate) fn add_backup(&mut self, source: Source, shadows: bool) {
         self.shadow = None;
-        self.successors.push_back(Successor { source, shadows, take_over_tick: u32::MAX });
+        self.backups.push_back(Backup { source, shadows, take_over_tick: u32::MAX });
     }
 
-    /// Lets go of successors that were refused: those behind `generation`, which flies.
-    pub(crate) fn drop_successors_of(&mut self, generation: u32) {
+    /// Lets go of backups that were refused: those behind `generation`, which flies.
+    pub(crate) fn drop_backups_beyond(&mut self, generation: u32) {
         self.shadow = None;
-        self.successors.retain(|successor| successor.source.generation <= generation);
+        self.backups.retain(|backup| backup.source.generation <= generation);
     }
 
-    /// Has the successor's samples count from `tick` on.
+    /// Has the backup's samples count from `tick` on.
     pub(crate) fn set_take_over_tick(&mut self, tick: u32) {
-        if let Some(successor) = self.successors.back_mut() {
-            successor.take_over_tick = tick;
+        if let Some(backup) = self.backups.back_mut() {
+            backup.take_over_tick = tick;
         }
     }
 
     /// Whether a shadow sample is due at `tick` that the node waits for.
     pub(crate) fn awaits_shadow(&self, tick: u32) -> bool {
-        let is_due = |successor: &Successor| successor.shadows && tick < successor.take_over_tick;
-        self.reads_shadow && self.successors.back().is_some_and(is_due)
+        let is_due = |backup: &Backup| backup.shadows && tick < backup.take_over_tick;
+        self.reads_shadow && self.backups.back().is_some_and(is_due)
     }
 
     /// Makes the newest sample stamped at or before `tick` minus the delay the current one.
@@ -175,15 +170,15 @@ impl InPort {
         Ok(())
     }
 
-    /// Turns to the successor when the next sample is one of those that count.
+    /// Turns to the backup when the next sample is one of those that count.
     fn pass_take_over(&mut self, newest_sequence: u64) {
-        while let Some(next) = self.successors.front() {
+        while let Some(next) = self.backups.front() {
             let first = u64::from(next.take_over_tick.div_ceil(self.topic_period_ticks));
             if next.take_over_tick == u32::MAX || newest_sequence < first || self.active.next_sequence < first
             {
                 return;
             }
-            let Some(Successor { mut source, .. }) = self.successors.pop_front() else { return };
+            let Some(Backup { mut source, .. }) = self.backups.pop_front() else { return };
             self.shadow = None;
             // A node that does not read the shadow may have left some of it in the queue.
             source.has_history |= source.next_sequence < first;
@@ -192,10 +187,10 @@ impl InPort {
         }
     }
 
-    /// Receives what successors have sent so far, so that their queues cannot run full; the error is the
+    /// Receives what backups have sent so far, so that their queues cannot run full; the error is the
     /// sequence number that was due, and what was found.
     fn take_shadow(&mut self, newest_sequence: u64) -> Result<(), (u64, String)> {
-        for Successor { source, .. } in &mut self.successors {
+        for Backup { source, .. } in &mut self.backups {
             while source.next_sequence <= newest_sequence {
                 let expected = source.next_sequence;
                 match source.next(self.topic_period_ticks).map_err(|found| (expected, found))? {
@@ -269,9 +264,8 @@ pub(crate) struct OutPort {
     pub(crate) counts_from: u32,
     /// The tick from which on samples are sent at all.
     pub(crate) sends_from: u32,
-    /// Those who wait for the samples that count, and those who wait for the shadow's.
-    pub(crate) readers: Vec<Waiter>,
-    pub(crate) shadow_readers: Vec<Waiter>,
+    /// The inputs that read it, by their numbers among those of all slots.
+    pub(crate) readers: Vec<usize>,
 }
 
 impl OutPort {
@@ -295,7 +289,6 @@ impl OutPort {
             counts_from: 0,
             sends_from: 0,
             readers: Vec::new(),
-            shadow_readers: Vec::new(),
         }
     }
 

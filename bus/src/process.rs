@@ -1,13 +1,12 @@
 //! What a process of a run does to itself: die with its launcher, stay on its core.
 
 use crate::error::BusError;
+use crate::join::{GENERATION_VARIABLE, Join, NODE_VARIABLE};
 use rustix::process::{Signal, getppid, set_parent_process_death_signal};
 use rustix::thread::{CpuSet, sched_getaffinity, sched_setaffinity};
-use std::fs::{File, TryLockError};
 use std::io;
-use std::os::unix::fs::OpenOptionsExt;
 use std::os::unix::process::CommandExt;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::Command;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, OnceLock};
@@ -17,6 +16,23 @@ pub const LAUNCHER_VARIABLE: &str = "HUMMINGBUS_LAUNCHER_PID";
 
 /// The environment variable that names the run directory.
 pub const RUN_VARIABLE: &str = "HUMMINGBUS_RUN";
+
+impl Join {
+    /// The part that the launcher gave this process, which from now on dies with its launcher; or this thread.
+    ///
+    /// # Errors
+    /// If the process was not started by a launcher.
+    pub fn from_environment() -> Result<Self, BusError> {
+        if let Some(join) = crate::hosted::join() {
+            return Ok(join);
+        }
+        let run_dir = join()?;
+        let node =
+            std::env::var(NODE_VARIABLE).map_err(|_| BusError::NotInARun { variable: NODE_VARIABLE })?;
+        let generation = std::env::var(GENERATION_VARIABLE).ok().and_then(|text| text.parse().ok());
+        Ok(Self { run_dir, node, generation: generation.unwrap_or(0) })
+    }
+}
 
 /// The directory of the run that started this process, with which the process from now on dies.
 ///
@@ -117,45 +133,6 @@ fn is_ignored(signal: libc::c_int) -> bool {
         (libc::sigaction(signal, std::ptr::null(), found.as_mut_ptr()) == 0).then(|| found.assume_init())
     };
     found.is_some_and(|found| found.sa_sigaction == libc::SIG_IGN)
-}
-
-/// A process's place in a run, taken for as long as this value lives: the kernel frees it when the process dies.
-#[derive(Debug)]
-pub(crate) struct Claim {
-    _lock: File,
-}
-
-/// Takes the place of process `name` in the run whose directory is `run_dir`.
-///
-/// # Errors
-/// If another process has it: two clocks, or two processes of one node, would mix their ticks.
-pub(crate) fn claim(run_dir: &Path, name: &str) -> Result<Claim, BusError> {
-    let path = claim_path(run_dir, name);
-    let fail = |source| BusError::File { action: "open", path: path.clone(), source };
-    let mut options = File::options();
-    options.create(true).truncate(false).write(true).mode(0o600).custom_flags(crate::user_file::FLAGS);
-    let lock = options.open(&path).map_err(fail)?;
-    match lock.try_lock() {
-        Ok(()) => Ok(Claim { _lock: lock }),
-        Err(TryLockError::WouldBlock) => Err(BusError::Claimed { name: name.to_owned() }),
-        Err(TryLockError::Error(source)) => Err(BusError::File { action: "lock", path, source }),
-    }
-}
-
-fn claim_path(run_dir: &Path, name: &str) -> PathBuf {
-    run_dir.join(format!("{}.claim", name.replace('/', ".")))
-}
-
-/// Removes the claim of a process that has left: generation `generation` of node `node`.
-pub fn remove_claim(run_dir: &Path, node: &str, generation: u32) {
-    // A process that never joined has none.
-    let _ = std::fs::remove_file(claim_path(run_dir, &process_name(node, generation)));
-}
-
-/// What generation `generation` of node `node` is called.
-#[must_use]
-pub fn process_name(node: &str, generation: u32) -> String {
-    if generation == 0 { node.to_owned() } else { format!("{node}.{generation}") }
 }
 
 /// Keeps this process on one core. Where the machine has no such core, it stays where it is: placement

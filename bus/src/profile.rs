@@ -4,11 +4,10 @@
 //! tick: noting a tick is a look at the clock and a few stores. What a node waited for is not noted: it follows
 //! from the plan and from what the other processes noted.
 
-use crate::control::monotonic_ns;
 use crate::error::BusError;
+use crate::host_time::monotonic_ns;
 use crate::plan::Plan;
 use memmap2::{Advice, Mmap, MmapMut};
-use std::fs::File;
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
@@ -226,16 +225,10 @@ struct RecordWriter {
 
 impl RecordWriter {
     fn create(path: PathBuf, words: usize, records: u32) -> Result<Self, BusError> {
-        let file = File::options()
-            .read(true)
-            .write(true)
-            .create_new(true)
-            .open(&path)
-            .map_err(|source| BusError::File { action: "create", path: path.clone(), source })?;
         let capacity = records.min(NOTED_TICKS_MAX) as usize;
         // One more than counts: when the file is full, that one takes what is not noted.
         let bytes = WORD_BYTES * (HEADER_WORDS + words * (capacity + 1));
-        crate::room::reserve(&file, &path, bytes as u64)?;
+        let file = crate::reserve::create(&path, bytes as u64)?;
         // SAFETY: the file was created by this call in the run's own directory; others read it only after
         // this process has ended.
         let map = unsafe { MmapMut::map_mut(&file) };
@@ -327,33 +320,12 @@ impl RecordReader {
 #[cfg(test)]
 mod tests {
     use super::{GrantReader, GrantWriter, TickReader, TickWriter, path};
-    use crate::plan::{NodePlan, OutputPlan, Pace, Plan, Wait};
+    use crate::plan::{NodePlan, OutputPlan, Plan};
 
     fn plan(period_ticks: u32) -> Plan {
         let output = |port: &str| OutputPlan { port: port.to_owned(), topic: 0 };
-        let node = NodePlan {
-            name: "arm/left".to_owned(),
-            period_ticks,
-            wait: Wait::Block,
-            cpu: None,
-            inputs: vec![],
-            outputs: vec![output("a"), output("b")],
-            parameters: serde_json::Value::Null,
-            restarts: false,
-        };
-        Plan {
-            run_id: "profile".to_owned(),
-            seed: 0,
-            tick_ns: 1000,
-            duration_ticks: 30,
-            window_ticks: 1,
-            pace: Pace::Free,
-            clock_cpu: None,
-            profile: true,
-            lock_memory: false,
-            topics: vec![],
-            nodes: vec![node],
-        }
+        let node = NodePlan::for_test("arm/left", vec![], vec![output("a"), output("b")]);
+        Plan::for_test(30, vec![], vec![NodePlan { period_ticks, ..node }])
     }
 
     #[test]

@@ -5,40 +5,13 @@ use crate::component::{Component, StepError, Transfer};
 use crate::connected::ConnectedNode;
 use crate::context::{NodeContext, StepContext};
 use crate::error::BusError;
-use crate::node::{GENERATION_VARIABLE, NODE_VARIABLE, Node, Wiring};
+use crate::handles::Wiring;
+use crate::join::Join;
+use crate::node::Node;
 use crate::port::{InPort, OutPort};
 use crate::ports::{InputSamples, OutputSamples, SampleSink, SampleSource};
 use crate::registration::{Make, MakeComponent, Registration, Stepper};
 use crate::tick::Tick;
-use std::path::PathBuf;
-
-/// Which part of which run a process or thread takes.
-#[derive(Clone, Debug)]
-pub struct Join {
-    /// The run directory.
-    pub run_dir: PathBuf,
-    /// The node's name.
-    pub node: String,
-    /// Which instance of the node it is: 0 for the first, those that replace it count up.
-    pub generation: u32,
-}
-
-impl Join {
-    /// The part that the launcher gave this process, which from now on dies with its launcher; or this thread.
-    ///
-    /// # Errors
-    /// If the process was not started by a launcher.
-    pub fn from_environment() -> Result<Self, BusError> {
-        if let Some(join) = crate::hosted::join() {
-            return Ok(join);
-        }
-        let run_dir = crate::process::join()?;
-        let node =
-            std::env::var(NODE_VARIABLE).map_err(|_| BusError::NotInARun { variable: NODE_VARIABLE })?;
-        let generation = std::env::var(GENERATION_VARIABLE).ok().and_then(|text| text.parse().ok());
-        Ok(Self { run_dir, node, generation: generation.unwrap_or(0) })
-    }
-}
 
 /// Runs the component `C` as the node that the launcher started this process for: the whole `main` of an executable
 /// that a manifest names as a `command`.

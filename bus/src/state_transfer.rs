@@ -5,10 +5,11 @@
 //! can be read, also when the process died right after.
 
 use crate::announcement::Announcement;
-use crate::control::shm_prefix;
 use crate::error::BusError;
+use crate::names::shm_path;
 use crate::plan::Plan;
 use crate::schema::Schema;
+use crate::shared_file;
 use memmap2::MmapRaw;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
@@ -33,15 +34,9 @@ impl StateRing {
         generation: u32,
         schema: &Schema,
     ) -> Result<Self, BusError> {
-        use std::os::unix::fs::OpenOptionsExt;
-        let path = ring_path(plan, node, generation);
-        let fail = |source| BusError::File { action: "create", path: path.clone(), source };
-        let mut options = std::fs::OpenOptions::new();
-        let file = options.read(true).write(true).create_new(true).mode(0o600).open(&path).map_err(fail)?;
-        crate::room::reserve(&file, &path, ring_bytes(plan, schema) as u64)?;
-        let ring = Self::map(plan, schema, &file).map_err(fail)?;
+        let map = shared_file::create(&ring_path(plan, node, generation), ring_bytes(plan, schema))?;
         Announcement::of(schema).store(&announcement_path(run_dir, node, generation))?;
-        Ok(ring)
+        Ok(Self::of(plan, schema, map))
     }
 
     /// Opens the ring of a process that flies; `None` where it states no state, or one of another type.
@@ -57,20 +52,15 @@ impl StateRing {
             return Ok(None);
         }
         let path = ring_path(plan, node, generation);
-        let fail = |source| BusError::File { action: "open", path: path.clone(), source };
-        let file = crate::user_file::open(&path, true).map_err(fail)?;
-        Self::map(plan, schema, &file).map_err(fail).map(Some)
+        let map = shared_file::open(&path, ring_bytes(plan, schema), "the states of a process")?;
+        Ok(Some(Self::of(plan, schema, map)))
     }
 
-    fn map(plan: &Plan, schema: &Schema, file: &std::fs::File) -> std::io::Result<Self> {
-        let map = MmapRaw::map_raw(file)?;
-        if map.len() < ring_bytes(plan, schema) {
-            return Err(std::io::Error::other("the file is shorter than the state it should hold"));
-        }
-        Ok(Self { map, entries: entries(plan), state_words: schema.size.div_ceil(8) })
+    fn of(plan: &Plan, schema: &Schema, map: MmapRaw) -> Self {
+        Self { map, entries: entries(plan), state_words: schema.size.div_ceil(8) }
     }
 
-    /// States `state` as that at the start of `tick`.
+    /// Publishes `state` as that at the start of `tick`.
     pub(crate) fn store(&self, tick: u32, state: &[u8]) {
         let (stamp, words) = self.entry(tick);
         stamp.store(u64::from(tick) + 1, Relaxed);
@@ -128,7 +118,7 @@ fn ring_bytes(plan: &Plan, schema: &Schema) -> usize {
 }
 
 fn ring_path(plan: &Plan, node: usize, generation: u32) -> PathBuf {
-    Path::new("/dev/shm").join(format!("{}state_{node}.{generation}", shm_prefix(&plan.run_id)))
+    shm_path(&plan.run_id, &format!("state_{node}.{generation}"))
 }
 
 fn announcement_path(run_dir: &Path, node: usize, generation: u32) -> PathBuf {

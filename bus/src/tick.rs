@@ -1,8 +1,8 @@
 //! One computation of a node: what it reads and writes at a tick.
 
 use crate::error::BusError;
+use crate::handles::{Input, Output, RawInput};
 use crate::message::{Message, view, view_mut};
-use crate::node::{Input, Output, RawInput};
 use crate::port::{InPort, OutPort};
 
 /// One computation of a node: its inputs and outputs at one tick.

@@ -3,10 +3,12 @@
 //! Each run has its own root path and its own prefix for shared-memory files, so runs never meet, and
 //! whatever a killed process leaves behind is found by name.
 
-use crate::control::{monotonic_ns, shm_prefix};
 use crate::error::BusError;
+use crate::host_time::monotonic_ns;
 use crate::message::{ENCAPSULATION_WORD, sample_words};
-use crate::room;
+use crate::names::{shm_path, shm_prefix};
+use crate::plan::Capacity;
+use crate::reserve;
 use iceoryx2::node::NodeState;
 use iceoryx2::port::publisher::Publisher;
 use iceoryx2::port::subscriber::Subscriber;
@@ -35,6 +37,11 @@ const PATH_BYTES_MAX: usize = 255;
 /// Samples a subscriber holds at a time: the current one and the one that replaces it.
 pub(crate) const BORROWED_SAMPLES: usize = 2;
 
+/// Asked for beside the samples: what iceoryx2 touches while it makes the files of a port would kill the process that
+/// lacks it. Measured with manifests/hover.toml and manifests/swarm.toml: at most 4 KiB for each connection and each
+/// service, 92 KiB and 304 KiB for all of a run; so there is room for what several processes make at a time.
+pub(crate) const PORT_MARGIN_BYTES: u64 = 256 << 10;
+
 /// What travels beside a sample: its place in the run, and host times that no recording holds.
 #[derive(Clone, Copy, Debug, Default, ZeroCopySend)]
 #[repr(C)]
@@ -59,19 +66,6 @@ pub(crate) struct Transport {
     run_id: String,
     /// The numbers of the ports whose pages are not reserved yet.
     new_ports: RefCell<Vec<String>>,
-}
-
-/// How a topic's queues are sized.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Capacity {
-    /// Samples that wait in a subscriber's queue at most.
-    pub(crate) queued_samples: usize,
-    /// Samples that a publisher keeps for a subscriber that joins later.
-    pub(crate) history_samples: usize,
-    /// Subscribers of the topic.
-    pub(crate) subscribers: usize,
-    /// Processes of the run.
-    pub(crate) nodes: usize,
 }
 
 /// The configuration of the run `run_id`, whose directory is `run_dir`; the error is iceoryx2's.
@@ -117,7 +111,7 @@ impl Transport {
             |reason: String| transport_error(node_name, "joining the shared memory of the run", reason);
         let config = config(run_dir, run_id).map_err(fail)?;
         let what = format!("node `{node_name}` in shared memory");
-        room::require_for_process(&what)?;
+        reserve::require_free(&what, PORT_MARGIN_BYTES)?;
         make_node_counter(&config, run_id)
             .map_err(|error| fail(format!("cannot make the counter of its nodes: {error}")))?;
         let node = NodeBuilder::new()
@@ -161,7 +155,7 @@ impl Transport {
         capacity: Capacity,
     ) -> Result<Sender, BusError> {
         let what = format!("node `{}` publishing on topic {topic}", self.node_name);
-        room::require_for_port(&what, size, capacity)?;
+        reserve::require_free(&what, samples_bytes(size, capacity) + PORT_MARGIN_BYTES)?;
         let publisher = self
             .service(topic, generation, capacity)?
             .publisher_builder()
@@ -190,7 +184,7 @@ impl Transport {
         capacity: Capacity,
     ) -> Result<Receiver, BusError> {
         let what = format!("node `{}` subscribing to topic {topic}", self.node_name);
-        room::require_for_process(&what)?;
+        reserve::require_free(&what, PORT_MARGIN_BYTES)?;
         let subscriber = self
             .service(topic, generation, capacity)?
             .subscriber_builder()
@@ -219,7 +213,7 @@ impl Transport {
             name.ends_with(".dynamic")
                 || name.split(['_', '.']).any(|part| ports.iter().any(|port| port == part))
         };
-        room::reserve_files(&self.run_id, is_new, &format!("the samples of node `{}`", self.node_name))
+        reserve::reserve_files(&self.run_id, is_new, &format!("the samples of node `{}`", self.node_name))
     }
 }
 
@@ -234,8 +228,7 @@ fn make_node_counter(config: &Config, run_id: &str) -> std::io::Result<()> {
     let (major, minor, patch) = (version.major(), version.minor(), version.patch());
     let hash = Sha1::new(COUNTER_TYPE.as_bytes()).value();
     let (hash, suffix) = (hash.as_base64url(), config.global.node.global_mgmt_suffix);
-    let name = format!("{}{hash}_node.{major}_{minor}_{patch}{suffix}", shm_prefix(run_id));
-    let path = Path::new(room::SHARED_MEMORY).join(name);
+    let path = shm_path(run_id, &format!("{hash}_node.{major}_{minor}_{patch}{suffix}"));
     // In one step, and never over another's: processes that come at the same time share one counter.
     let draft = path.with_extension(format!("{:x}-{:x}", std::process::id(), monotonic_ns()));
     let mut file = std::fs::OpenOptions::new().write(true).create_new(true).mode(0o600).open(&draft)?;
@@ -268,6 +261,14 @@ pub fn takes_run_dir(run_dir: &Path, run_id: &str) -> bool {
 fn run_dir_bytes_max(run_id: &str) -> usize {
     const LONGEST: usize = "/iceoryx2/".len() + 40 + "_".len() + 39 + "_".len() + 39 + ".connection".len();
     PATH_BYTES_MAX.saturating_sub(LONGEST + shm_prefix(run_id).len())
+}
+
+/// The samples that a publisher of the topic keeps: those in every queue, those that are read, the history, and the
+/// one in the making.
+pub(crate) fn samples_bytes(size: usize, capacity: Capacity) -> u64 {
+    let Capacity { queued_samples, history_samples, subscribers, .. } = capacity;
+    let samples = subscribers * (queued_samples + BORROWED_SAMPLES) + history_samples + 1;
+    (samples * (8 * sample_words(size) + size_of::<SampleHeader>())) as u64
 }
 
 fn transport_error(node: &str, action: &str, reason: String) -> BusError {
@@ -346,9 +347,10 @@ impl Received {
 
 #[cfg(test)]
 mod tests {
-    use super::{Capacity, Receiver, SampleHeader, Sender, Transport, run_dir_bytes_max, takes_run_dir};
-    use crate::control::{monotonic_ns, shm_prefix};
-    use crate::plan::{InputPlan, TopicPlan};
+    use super::{Receiver, SampleHeader, Sender, Transport, run_dir_bytes_max, takes_run_dir};
+    use crate::host_time::monotonic_ns;
+    use crate::names::shm_prefix;
+    use crate::plan::{Capacity, InputPlan, TopicPlan};
     use crate::port::{InPort, Source};
     use std::os::unix::fs::{MetadataExt, PermissionsExt};
 
@@ -394,7 +396,7 @@ mod tests {
             type_name: "test_msgs/msg/State".to_owned(),
             period_ticks: 1,
         };
-        InPort::new(&input, &topic, SIZE, 0, None, Source::joined(0, receiver, Some(0), 1))
+        InPort::new(&input, &topic, SIZE, None, Source::joined(0, receiver, Some(0), 1))
     }
 
     #[test]
@@ -477,7 +479,7 @@ mod tests {
         }
         // What is asked for before is neither more than is taken nor far from it.
         let largest = files.iter().map(|(_, data)| data.len()).max().unwrap();
-        let asked = crate::room::samples_bytes(1000, capacity);
+        let asked = super::samples_bytes(1000, capacity);
         assert!(largest > asked && largest < asked + asked / 4, "asked for {asked} bytes, took {largest}");
     }
 

@@ -2,8 +2,8 @@
 
 use crate::program::{Executable, Program};
 use anyhow::{Context, Result, bail};
-use bus::control::Control;
 use bus::hosted::Hosted;
+use bus::lockstep::SupervisorView;
 use bus::{BusError, Join, Registration};
 use std::os::unix::process::ExitStatusExt;
 use std::path::PathBuf;
@@ -116,7 +116,7 @@ pub enum Body {
 pub struct Thread {
     handle: Option<JoinHandle<Result<(), BusError>>>,
     is_cancelled: Arc<AtomicBool>,
-    control: Arc<Control>,
+    control: Arc<SupervisorView>,
 }
 
 impl Thread {
@@ -126,7 +126,7 @@ impl Thread {
         run_dir: PathBuf,
         node: &str,
         generation: u32,
-        control: Arc<Control>,
+        control: Arc<SupervisorView>,
     ) -> Result<Self> {
         let is_cancelled = Arc::new(AtomicBool::new(false));
         let join = Join { run_dir, node: node.to_owned(), generation };

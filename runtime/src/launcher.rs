@@ -17,7 +17,7 @@ use crate::supervision::{Supervisor, Timing};
 use crate::supervisor::State;
 use crate::watch_clock::WatchClock;
 use anyhow::{Context, Result, bail};
-use bus::control::Control;
+use bus::lockstep::SupervisorView;
 use bus::plan::Plan;
 use recorder::reader::Recording;
 use std::path::Path;
@@ -136,7 +136,7 @@ impl<'a> Launcher<'a> {
         graph.plan.run_id = run_dir.run_id().to_owned();
         graph.plan.store(run_dir.path())?;
         let graph = &*graph;
-        let control = Arc::new(Control::create(&graph.plan)?);
+        let control = Arc::new(SupervisorView::create(&graph.plan)?);
         let (plan, dir) = (&graph.plan, run_dir.path());
         let clock = WatchClock::new();
         let exe = match &self.host {
@@ -222,7 +222,7 @@ fn prepare(manifest: &Manifest, graph: &mut Graph, recording: Option<&Path>, run
     Ok(())
 }
 
-fn outcome(plan: &Plan, control: &Control, successions: &Successions<'_>) -> Outcome {
+fn outcome(plan: &Plan, control: &SupervisorView, successions: &Successions<'_>) -> Outcome {
     let (start_ns, end_ns) = control.host_span_ns();
     let host_s = end_ns.saturating_sub(start_ns) as f64 * 1e-9;
     let share = |cpu_ns: u64| if host_s > 0.0 { cpu_ns as f64 * 1e-9 / host_s } else { 0.0 };

@@ -6,7 +6,7 @@ use crate::program::{Executable, Program};
 use crate::spawn;
 use crate::watch_clock::WatchClock;
 use anyhow::Result;
-use bus::control::Control;
+use bus::lockstep::SupervisorView;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
@@ -65,14 +65,14 @@ pub struct Process {
 #[derive(Debug)]
 pub struct Processes {
     host: Host,
-    control: Arc<Control>,
+    control: Arc<SupervisorView>,
     /// Those that were started and whose end is not settled.
     pub running: Vec<Process>,
 }
 
 impl Processes {
     /// No processes yet of the run that `control` is of.
-    pub fn new(host: Host, control: Arc<Control>) -> Self {
+    pub fn new(host: Host, control: Arc<SupervisorView>) -> Self {
         Self { host, control, running: Vec::new() }
     }
 
@@ -140,7 +140,7 @@ impl Processes {
     }
 
     /// Aborts the run and gives the processes time to leave.
-    pub fn take_down(&mut self, control: &Control) -> Result<()> {
+    pub fn take_down(&mut self, control: &SupervisorView) -> Result<()> {
         control.abort();
         let clock = WatchClock::new();
         while !self.all_ended() && clock.now() < GRACE {
@@ -178,7 +178,7 @@ impl Process {
 
     /// Starts a component on a thread of this process; the clock where there is no program.
     fn start_thread(
-        control: &Arc<Control>,
+        control: &Arc<SupervisorView>,
         name: &str,
         role: Role,
         program: Option<&Program>,
@@ -195,7 +195,7 @@ impl Process {
 
     fn new(name: &str, role: Role, log: PathBuf, body: Body) -> Self {
         let name = match role {
-            Role::Node { generation, .. } => bus::process::process_name(name, generation),
+            Role::Node { generation, .. } => bus::names::process_name(name, generation),
             Role::Clock | Role::Companion { .. } => name.to_owned(),
         };
         Self { name, role, log, body, end: None, is_settled: false, verdict: None }

@@ -5,9 +5,9 @@
 //! launcher dies, however it dies: so who can have the lock knows that the run is dead.
 
 use anyhow::{Context, Result, bail};
-use bus::control::shm_prefix;
+pub use bus::names::SHARED_MEMORY;
+use bus::names::shm_prefix;
 use bus::process::user_id;
-pub use bus::room::SHARED_MEMORY;
 use bus::user_file;
 use rustix::fs::{FlockOperation, flock};
 use serde::{Deserialize, Serialize};
@@ -37,7 +37,7 @@ pub struct Entry {
 impl Entry {
     /// What a new run of `manifest` has to say.
     fn new(manifest: &Path) -> Result<Self> {
-        let run_id = format!("{:x}-{:x}", std::process::id(), bus::control::monotonic_ns());
+        let run_id = format!("{:x}-{:x}", std::process::id(), bus::host_time::monotonic_ns());
         let run_dir = new_run_dir(&run_id)?;
         Ok(Self { run_id, run_dir, manifest: manifest.to_owned(), launcher: std::process::id() })
     }

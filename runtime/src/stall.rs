@@ -2,7 +2,7 @@
 
 use crate::processes::{Processes, Role};
 use crate::succession::Successions;
-use bus::control::{Control, Phase, SlotState};
+use bus::lockstep::{Phase, SlotState, SupervisorView};
 use bus::plan::{Pace, Plan};
 use std::time::Duration;
 
@@ -28,7 +28,7 @@ impl Culprit {
 /// The living process that has all it needs and does not come on.
 pub fn culprit(
     plan: &Plan,
-    control: &Control,
+    control: &SupervisorView,
     successions: &Successions<'_>,
     processes: &Processes,
 ) -> Option<Culprit> {
@@ -43,7 +43,7 @@ pub fn culprit(
 }
 
 /// The first whose time is over of those that have not joined; the clock where all have.
-fn not_ready(plan: &Plan, control: &Control, successions: &Successions<'_>, phase: Phase) -> Culprit {
+fn not_ready(plan: &Plan, control: &SupervisorView, successions: &Successions<'_>, phase: Phase) -> Culprit {
     let late = (0..plan.nodes.len()).filter(|&node| !control.is_ready(node, phase));
     late.min_by_key(|&node| successions.program_of(node, 0).watchdog)
         .map_or(Culprit::Clock, |node| Culprit::Node(node, 0))
@@ -52,7 +52,7 @@ fn not_ready(plan: &Plan, control: &Control, successions: &Successions<'_>, phas
 /// The node that is furthest behind of those that have all they need.
 fn not_computing(
     plan: &Plan,
-    control: &Control,
+    control: &SupervisorView,
     successions: &Successions<'_>,
     processes: &Processes,
 ) -> Option<Culprit> {
@@ -79,7 +79,7 @@ fn not_left(processes: &Processes) -> Option<Culprit> {
 }
 
 /// Host time in which a paced run must come forward: that of the slowest node's period.
-pub fn deadline(plan: &Plan, control: &Control) -> Duration {
+pub fn deadline(plan: &Plan, control: &SupervisorView) -> Duration {
     let period_ticks = plan.nodes.iter().map(|node| node.period_ticks).max().unwrap_or(1);
     match control.pace() {
         Pace::Free => Duration::ZERO,
@@ -91,7 +91,7 @@ pub fn deadline(plan: &Plan, control: &Control) -> Duration {
 
 /// Who has not come as far as the others, and what it waits for.
 pub fn describe(
-    control: &Control,
+    control: &SupervisorView,
     plan: &Plan,
     successions: &Successions<'_>,
     culprit: Option<Culprit>,
@@ -119,7 +119,7 @@ pub fn describe(
 }
 
 /// Who is awake and does not come on, and which topics the others sleep for.
-fn describe_stuck(control: &Control, plan: &Plan, successions: &Successions<'_>) -> String {
+fn describe_stuck(control: &SupervisorView, plan: &Plan, successions: &Successions<'_>) -> String {
     let members: Vec<(usize, u32, usize)> = successions
         .members()
         .map(|(node, generation)| (node, generation, plan.slot(node, generation)))

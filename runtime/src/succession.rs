@@ -8,7 +8,7 @@ use crate::processes::{Processes, Role};
 use crate::program::{OnExit, Program, Successor};
 use crate::watch_clock::WatchClock;
 use anyhow::Result;
-use bus::control::{Control, Phase, SlotState, Transfer};
+use bus::lockstep::{Phase, SlotState, SupervisorView, TransferOutcome};
 use bus::membership::{Instance, Membership};
 use bus::plan::{InputPlan, OutputPlan, Plan, SLOTS_PER_NODE};
 use serde::Serialize;
@@ -129,7 +129,7 @@ pub struct Report {
 /// All successions of a run.
 pub struct Successions<'a> {
     plan: &'a Plan,
-    control: &'a Control,
+    control: &'a SupervisorView,
     run_dir: &'a Path,
     clock: &'a WatchClock,
     roster: Membership,
@@ -154,7 +154,7 @@ impl<'a> Successions<'a> {
     /// The successions of a run that begins: its planned successors wait for their ticks.
     pub fn new(
         plan: &'a Plan,
-        control: &'a Control,
+        control: &'a SupervisorView,
         run_dir: &'a Path,
         clock: &'a WatchClock,
         programs: &[Program],
@@ -606,9 +606,9 @@ impl<'a> Successions<'a> {
         let member = self.plan.slot(node, candidate.generation);
         candidate.report.hold_ms = candidate.held_since.map_or(0.0, milliseconds);
         candidate.report.hand_over = match self.control.transfer(member) {
-            Transfer::Unknown => None,
-            Transfer::State => Some("state"),
-            Transfer::LastOutput => Some("last output"),
+            TransferOutcome::Unknown => None,
+            TransferOutcome::State => Some("state"),
+            TransferOutcome::LastOutput => Some("last output"),
         };
         candidate.stage = Stage::Shadowing;
         self.control.set_slot_state(member, SlotState::Taken);
@@ -736,7 +736,7 @@ impl<'a> Successions<'a> {
         }
         bus::state_transfer::remove(self.run_dir, self.plan, node, generation);
         let _ = std::fs::remove_file(bus::plan::backup_path(self.run_dir, node, generation));
-        bus::process::remove_claim(self.run_dir, &self.plan.nodes[node].name, generation);
+        bus::claim::remove(self.run_dir, &self.plan.nodes[node].name, generation);
         processes.forget(node, generation, self.run_dir);
     }
 

@@ -15,7 +15,8 @@ use crate::succession::{Report, Stage, Standing, Successions, take_over_stride};
 use crate::supervisor::{Action, Event, State};
 use crate::watch_clock::WatchClock;
 use anyhow::{Result, anyhow};
-use bus::control::{Control, Phase, monotonic_ns};
+use bus::host_time::monotonic_ns;
+use bus::lockstep::{Phase, SupervisorView};
 use bus::plan::{NodePlan, Plan};
 use std::path::Path;
 use std::time::Duration;
@@ -68,7 +69,7 @@ pub struct Supervisor<'a> {
     /// The plan of the run.
     pub plan: &'a Plan,
     /// Its control segment.
-    pub control: &'a Control,
+    pub control: &'a SupervisorView,
     /// The clock and the nodes.
     pub processes: Processes,
     /// Processes beside the ticks.
@@ -156,7 +157,7 @@ impl Supervisor<'_> {
     /// Watches until all processes have ended.
     fn watch(&mut self) -> Result<()> {
         while !self.state.is_over() {
-            let news = self.control.notifications();
+            let news = self.control.notices();
             self.clock.look();
             self.processes.look()?;
             self.companions.look()?;
@@ -180,7 +181,7 @@ impl Supervisor<'_> {
             self.note_laggards();
             self.note_stall()?;
             self.tell_progress();
-            self.control.await_notification(news, POLL);
+            self.control.wait_for_notice(news, POLL);
         }
         Ok(())
     }

@@ -2,7 +2,7 @@
 
 use crate::saboteur;
 use crate::support::{Launch, Place, poll, repository};
-use bus::control::{Control, Phase, SlotState};
+use bus::lockstep::{Phase, SlotState, SupervisorView};
 use bus::membership::{Membership, NodeInstances};
 use bus::plan::Plan;
 use recorder::reader::Recording;
@@ -83,7 +83,7 @@ impl Reference {
 /// can be read after their end.
 pub struct Watched {
     pub plan: Plan,
-    pub control: Control,
+    pub control: SupervisorView,
 }
 
 impl Watched {
@@ -91,7 +91,7 @@ impl Watched {
     pub fn attach(place: &Place) -> Self {
         poll("no control segment", || {
             let plan = Plan::load(place.run_dirs().first()?).ok()?;
-            Control::open(&plan).ok().map(|control| Self { plan, control })
+            SupervisorView::open(&plan).ok().map(|control| Self { plan, control })
         })
     }
 
@@ -187,7 +187,7 @@ impl Watched {
     /// Every file of the run: those in its directory and those in shared memory.
     pub fn files(&self, place: &Place) -> Vec<PathBuf> {
         let mut folders = place.run_dirs();
-        let prefix = bus::control::shm_prefix(&self.plan.run_id);
+        let prefix = bus::names::shm_prefix(&self.plan.run_id);
         let shared = entries("/dev/shm".as_ref());
         let mut files: Vec<_> = shared
             .into_iter()

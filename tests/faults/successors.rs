@@ -5,7 +5,7 @@ use crate::flight::{Process, Reference, Watched, messages, write_manifest};
 use crate::kill_points::{GUARD_TICKS, end, signal_name, words_of};
 use crate::saboteur::{FAULT_VARIABLE, Fault, TICK_VARIABLE};
 use crate::support::{Ended, Launch, Place, partial};
-use bus::control::{Phase, SlotState};
+use bus::lockstep::{Phase, SlotState};
 use rand_core::Rng;
 use rustix::process::{Pid, Signal, kill_process};
 

@@ -243,7 +243,7 @@ fn a_run_that_a_process_of_a_dead_run_started_flies_on() {
         outer.start(&["run", &manifest, "--record", &outer.path("outer.mcap"), "--pace", "realtime"]);
     let inner_id = poll("the inner run does not fly", || {
         let plan = bus::plan::Plan::load(inner.run_dirs().first()?).ok()?;
-        let control = bus::control::Control::open(&plan).ok()?;
+        let control = bus::lockstep::SupervisorView::open(&plan).ok()?;
         (control.completed_ticks() > 500).then_some(plan.run_id)
     });
     let outer_id = outer.run_id();

@@ -1,6 +1,6 @@
 //! The processes that the tests put into runs: this executable itself, started by a launcher.
 
-use bus::control::Control;
+use bus::lockstep::LiveView;
 use bus::messages::Time;
 use bus::plan::Plan;
 use bus::process::RUN_VARIABLE;
@@ -124,12 +124,12 @@ fn run() -> Result<(), BusError> {
     })
 }
 
-fn control() -> Result<Control, BusError> {
+fn control() -> Result<LiveView, BusError> {
     let run_dir = std::env::var(RUN_VARIABLE).unwrap();
-    Control::open(&Plan::load(Path::new(&run_dir))?)
+    LiveView::open(&Plan::load(Path::new(&run_dir))?)
 }
 
-fn note(tick: &Tick<'_>, input: Option<Input<Note>>, control: &Control) -> Note {
+fn note(tick: &Tick<'_>, input: Option<Input<Note>>, control: &LiveView) -> Note {
     let seen = input.map(|input| *tick.get(input)).unwrap_or_default();
     Note {
         tick: tick.number().into(),

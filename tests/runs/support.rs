@@ -1,7 +1,7 @@
 //! A folder of its own for each test, launches under a watchdog, and what a run left behind.
 #![allow(clippy::disallowed_methods, reason = "a watchdog measures host time")]
 
-use bus::control::Control;
+use bus::lockstep::SupervisorView;
 use bus::plan::Plan;
 use rustix::process::{Pid, Signal, kill_process};
 use std::cell::RefCell;
@@ -248,7 +248,8 @@ impl Launch<'_> {
         poll(&format!("{node}.{generation} did not join"), || {
             let plan = Plan::load(self.place.run_dirs().first()?).ok()?;
             let member = plan.slot(plan.node_index(node).ok()?, generation);
-            (Control::open(&plan).ok()?.slot_state(member) == bus::control::SlotState::Taken).then_some(())
+            (SupervisorView::open(&plan).ok()?.slot_state(member) == bus::lockstep::SlotState::Taken)
+                .then_some(())
         });
     }
 
@@ -268,8 +269,8 @@ impl Launch<'_> {
         self.control().expect("the run is up").set_hold_tick(u32::MAX);
     }
 
-    fn control(&self) -> Option<Control> {
-        Control::open(&Plan::load(self.place.run_dirs().first()?).ok()?).ok()
+    fn control(&self) -> Option<SupervisorView> {
+        SupervisorView::open(&Plan::load(self.place.run_dirs().first()?).ok()?).ok()
     }
 
     /// What the run's own control segment says; `None` while it is not there yet.

@@ -1,7 +1,8 @@
 //! What a run shows at a moment: read from its control segment and from the kernel, without disturbing it.
 
 use anyhow::{Context, Result};
-use bus::control::{Control, Phase, monotonic_ns};
+use bus::host_time::monotonic_ns;
+use bus::lockstep::{LiveView, Phase};
 use bus::membership::{Membership, NodeInstances};
 use bus::plan::Plan;
 use bus::step_times::StepTimes;
@@ -20,7 +21,7 @@ pub struct Source {
     pub plan: Plan,
     pub manifest: PathBuf,
     run: Arc<LiveRun>,
-    control: Control,
+    control: LiveView,
 }
 
 /// What a run shows at a moment.
@@ -59,7 +60,7 @@ impl Source {
         let start = Instant::now();
         loop {
             let plan = Plan::load(&run.entry.run_dir);
-            match plan.and_then(|plan| Ok((Control::open(&plan)?, plan))) {
+            match plan.and_then(|plan| Ok((LiveView::open(&plan)?, plan))) {
                 Ok((control, plan)) => {
                     return Ok(Self {
                         plan,

@@ -3,7 +3,7 @@
 use crate::ctl::protocol::{Answer, Request, Status};
 use crate::ctl::server::{Asked, Remote, Reply, Server};
 use anyhow::Result;
-use bus::control::Control;
+use bus::lockstep::SupervisorView;
 use bus::plan::Plan;
 use std::path::Path;
 use std::sync::mpsc::Receiver;
@@ -14,7 +14,7 @@ const NEVER: u32 = u32::MAX;
 /// Serves requests about a run, a look at a time.
 pub struct Desk<'a> {
     plan: &'a Plan,
-    control: &'a Control,
+    control: &'a SupervisorView,
     server: Server,
     /// What was asked for and has not happened yet: one thing at a time, the newest.
     wish: Option<Wish>,
@@ -42,7 +42,7 @@ impl<'a> Desk<'a> {
     pub fn open(
         run_dir: &Path,
         plan: &'a Plan,
-        control: &'a Control,
+        control: &'a SupervisorView,
         remote: Remote,
         requests: Receiver<Asked>,
     ) -> Result<Self> {

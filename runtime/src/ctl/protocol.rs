@@ -1,7 +1,7 @@
 //! What can be asked of a live run: one JSON object a line, answered by one JSON object a line.
 
 use crate::manifest::PaceSetting;
-use bus::control::{Control, Phase};
+use bus::lockstep::{LiveView, Phase};
 use bus::plan::Plan;
 use serde::{Deserialize, Serialize};
 
@@ -92,7 +92,7 @@ pub enum State {
 
 impl State {
     /// What the run of `control` is doing.
-    pub fn of(control: &Control) -> Self {
+    pub fn of(control: &LiveView) -> Self {
         let ticks = control.completed_ticks();
         match control.hold_tick() {
             _ if control.phase() != Phase::Running => Self::Starting,
@@ -141,7 +141,7 @@ pub struct Status {
 
 impl Status {
     /// How far the run of `plan` has come.
-    pub fn of(plan: &Plan, control: &Control) -> Self {
+    pub fn of(plan: &Plan, control: &LiveView) -> Self {
         let tick = control.completed_ticks();
         Self {
             run_id: plan.run_id.clone(),

@@ -8,14 +8,11 @@ use crate::problem::Problem;
 use crate::program::{Executable, Program, Successor};
 use crate::succession::take_over_stride;
 use bus::Registration;
-use bus::plan::{NodePlan, Plan};
+use bus::plan::{INPUTS_RESERVED, NodePlan, Plan};
 use std::collections::BTreeMap;
 use std::ops::Range;
 use toml::Spanned;
 
-/// Inputs that a successor may have where the process it succeeds has fewer: its edges are laid out before
-/// the run.
-const INPUTS_MAX: usize = 8;
 /// More swaps of one kind than any run has use for.
 const REPEAT_MAX: u32 = 100_000;
 /// Ticks between a take-over and the next joining, beside two of the longest periods: until then the process
@@ -189,13 +186,12 @@ impl Run<'_> {
     }
 
     fn require_room(&self, node: usize, plan: &NodePlan, span: &Range<usize>) -> Result<(), Problem> {
-        let (found, present) = (plan.inputs.len(), self.plan.nodes[node].inputs.len());
-        let most = INPUTS_MAX.max(present);
+        let (found, most) = (plan.inputs.len(), self.plan.nodes[node].inputs_max());
         if found <= most {
             return Ok(());
         }
         let message = format!("the successor of `{}` has {found} inputs", plan.name);
-        let help = format!("it may have {most}: as many as the process it succeeds, or {INPUTS_MAX}");
+        let help = format!("it may have {most}: as many as the process it succeeds, or {INPUTS_RESERVED}");
         Err(self.manifest.problem(span, message, help))
     }
 

@@ -1,0 +1,74 @@
+//! Handles of declared ports: what a node reads and writes them by.
+
+use crate::schema::Schema;
+use std::marker::PhantomData;
+
+/// Handle of an input whose messages are `T`.
+#[derive(Debug)]
+pub struct Input<T> {
+    pub(crate) index: usize,
+    message: PhantomData<T>,
+}
+
+impl<T> Input<T> {
+    pub(crate) fn new(index: usize) -> Self {
+        Self { index, message: PhantomData }
+    }
+}
+
+impl<T> Clone for Input<T> {
+    fn clone(&self) -> Self {
+        *self
+    }
+}
+impl<T> Copy for Input<T> {}
+
+/// Handle of an input whose messages are read as bytes.
+#[derive(Clone, Copy, Debug)]
+pub struct RawInput {
+    pub(crate) index: usize,
+}
+
+/// Handle of an output whose messages are `T`.
+#[derive(Debug)]
+pub struct Output<T> {
+    pub(crate) index: usize,
+    message: PhantomData<T>,
+}
+
+impl<T> Output<T> {
+    pub(crate) fn new(index: usize) -> Self {
+        Self { index, message: PhantomData }
+    }
+}
+
+impl<T> Clone for Output<T> {
+    fn clone(&self) -> Self {
+        *self
+    }
+}
+impl<T> Copy for Output<T> {}
+
+/// How a node reads an input.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Declared {
+    Typed(&'static Schema),
+    Raw,
+}
+
+impl Declared {
+    /// The message type, in words where any is read.
+    pub(crate) fn type_name(self) -> &'static str {
+        match self {
+            Self::Typed(schema) => schema.type_name,
+            Self::Raw => "bytes of any type",
+        }
+    }
+}
+
+/// Where the ports of a component are among those of its node, in the order in which it declares them.
+#[derive(Debug)]
+pub(crate) struct Wiring {
+    pub(crate) inputs: Vec<Option<usize>>,
+    pub(crate) outputs: Vec<Option<usize>>,
+}

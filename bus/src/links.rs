@@ -1,0 +1,96 @@
+//! What ties a node to its run, and how its connections follow the membership.
+
+use crate::claim::Claim;
+use crate::error::BusError;
+use crate::handles::Declared;
+use crate::initial;
+use crate::lockstep::NodeView;
+use crate::membership::{Membership, NodeInstances};
+use crate::plan::{InputPlan, NodePlan, Plan};
+use crate::port::{InPort, OutPort, Source};
+use crate::transport::{Receiver, Transport};
+use std::path::PathBuf;
+
+/// What ties a node to its run.
+#[derive(Debug)]
+pub(crate) struct Links {
+    pub(crate) run_dir: PathBuf,
+    pub(crate) plan: Plan,
+    pub(crate) index: usize,
+    pub(crate) generation: u32,
+    pub(crate) node: NodePlan,
+    pub(crate) lockstep: NodeView,
+    pub(crate) transport: Transport,
+    pub(crate) _claim: Claim,
+}
+
+impl Links {
+    pub(crate) fn subscriber(&self, topic: usize, generation: u32) -> Result<Receiver, BusError> {
+        self.transport.subscriber(&self.plan.topics[topic].name, generation, self.plan.capacity(topic))
+    }
+
+    /// The processes of the node that publishes `topic`.
+    pub(crate) fn publisher<'a>(&self, membership: &'a Membership, topic: usize) -> &'a NodeInstances {
+        &membership.nodes[self.plan.publisher(topic)]
+    }
+
+    /// The inputs that read `topic`, by their numbers among those of all slots.
+    pub(crate) fn readers(&self, membership: &Membership, topic: usize) -> Vec<usize> {
+        let readers = membership.readers(topic);
+        let number =
+            |(node, generation, input)| self.plan.first_input(self.plan.slot(node, generation)) + input;
+        readers.map(number).collect()
+    }
+
+    pub(crate) fn initial_value(
+        &self,
+        input: &InputPlan,
+        declared: Declared,
+    ) -> Result<Option<Box<[u64]>>, BusError> {
+        let (Some(value), Declared::Typed(schema)) = (&input.initial, declared) else { return Ok(None) };
+        initial::sample(schema, value).map(Some).map_err(|reason| BusError::InitialValue {
+            node: self.node.name.clone(),
+            port: input.port.clone(),
+            type_name: schema.type_name,
+            reason,
+        })
+    }
+
+    /// Connects `input` to the process that shadows its publisher, and lets go of one that is gone.
+    pub(crate) fn connect_backup(
+        &self,
+        input: &mut InPort,
+        membership: &Membership,
+        tick: u32,
+    ) -> Result<(), BusError> {
+        let publisher = self.publisher(membership, input.topic);
+        let Some(backup) = &publisher.backup else {
+            input.drop_backups_beyond(publisher.primary.generation);
+            return Ok(());
+        };
+        let take_over_tick = publisher.topic_take_over_tick(input.topic);
+        if input.newest_generation() != backup.generation {
+            let receiver = self.subscriber(input.topic, backup.generation)?;
+            let first_tick = if backup.shadows { backup.join_tick } else { take_over_tick };
+            let period_ticks = self.plan.topics[input.topic].period_ticks;
+            // A reader that joined later than the shadow starts with what its own first tick reads.
+            let first_tick = first_tick.max(tick.saturating_sub(input.delay_ticks));
+            let source = Source::new(backup.generation, receiver, first_tick, period_ticks);
+            input.drop_backups_beyond(publisher.primary.generation);
+            input.add_backup(source, backup.shadows);
+        }
+        input.set_take_over_tick(take_over_tick);
+        Ok(())
+    }
+
+    /// Has the samples of `output` count from the take-over on, also those that were sent already.
+    pub(crate) fn promote(&self, output: &mut OutPort, instances: &NodeInstances, index: usize, tick: u32) {
+        output.counts_from = instances.take_over_ticks[index];
+        let shadows = instances.backup.as_ref().is_some_and(|backup| backup.shadows);
+        output.sends_from = if shadows { 0 } else { output.counts_from };
+        let next_due = tick.div_ceil(output.period_ticks) * output.period_ticks;
+        if next_due > output.counts_from && self.lockstep.ticks_sent(output.topic) < next_due {
+            self.lockstep.samples_sent(output.topic, next_due, &output.readers);
+        }
+    }
+}

@@ -1,0 +1,154 @@
+//! What a process of a node does to a run: it joins, waits for what its tick needs, and says how far it has come.
+
+use super::live_view::LiveView;
+use super::states::{Phase, SlotState, TransferOutcome, Waited};
+use super::wait::{set_state, wait_for_count, wait_for_state};
+use super::wake;
+use crate::error::BusError;
+use crate::plan::{Plan, Wait};
+use crate::step_times::bucket_of;
+use std::ops::Deref;
+use std::sync::atomic::AtomicU32;
+use std::sync::atomic::Ordering::{Relaxed, Release};
+
+/// The view of a process of a node.
+#[derive(Debug)]
+pub(crate) struct NodeView {
+    live: LiveView,
+    slot: usize,
+    /// The other slot of this node: its predecessor's or its successor's.
+    other_slot: usize,
+    first_input: usize,
+}
+
+/// A count that a process waits for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Need {
+    /// Ticks that may be computed.
+    Grant,
+    /// Ticks of the topic of one of its inputs whose samples are sent.
+    Samples { topic: usize, input: usize },
+    /// Ticks of that topic for which the publisher's backup has sent a shadow sample.
+    Shadow { topic: usize, input: usize },
+    /// Ticks at whose start the process in the other slot has published its state.
+    OtherState,
+    /// Ticks that it has completed.
+    OtherDone,
+}
+
+impl Deref for NodeView {
+    type Target = LiveView;
+
+    fn deref(&self) -> &LiveView {
+        &self.live
+    }
+}
+
+impl NodeView {
+    /// Opens the control segment of `plan` as generation `generation` of node `node`.
+    pub(crate) fn open(plan: &Plan, node: usize, generation: u32) -> Result<Self, BusError> {
+        let (slot, other_slot) = (plan.slot(node, generation), plan.slot(node, generation + 1));
+        Ok(Self { live: LiveView::open(plan)?, slot, other_slot, first_input: plan.first_input(slot) })
+    }
+
+    /// Notes that this process is ready for `phase`.
+    pub(crate) fn set_ready(&self, phase: Phase) {
+        set_state(&self.segment.slots()[self.slot].ready, phase as u32);
+        self.segment.notify_supervisor();
+    }
+
+    /// Waits until the run has reached `phase`.
+    pub(crate) fn wait_phase(&self, phase: Phase) -> Waited {
+        wait_for_state(&self.segment, &self.segment.head().run.phase, phase as u32)
+    }
+
+    /// Waits until the slot of this process is as far as `state`.
+    pub(crate) fn wait_slot(&self, state: SlotState) -> Waited {
+        wait_for_state(&self.segment, &self.segment.slots()[self.slot].state, state as u32)
+    }
+
+    /// Notes which process this is.
+    pub(crate) fn note_process(&self) {
+        self.segment.slots()[self.slot].process.store(std::process::id(), Relaxed);
+    }
+
+    /// Notes that the connections of this process agree with the membership number `epoch`.
+    pub(crate) fn acknowledge(&self, epoch: u32) {
+        self.segment.slots()[self.slot].epoch.store(epoch, Release);
+        self.segment.notify_supervisor();
+    }
+
+    /// Notes what this process goes on from.
+    pub(crate) fn set_transfer(&self, transfer: TransferOutcome) {
+        self.segment.slots()[self.slot].transfer.store(transfer as u32, Release);
+    }
+
+    /// Whether a process computes in the other slot of this node.
+    pub(crate) fn other_computes(&self) -> bool {
+        self.slot_state(self.other_slot) == SlotState::Taken
+    }
+
+    /// The sequence of `need`, and what this process sleeps on for it.
+    fn sequence_and_waiter(&self, need: Need) -> (&AtomicU32, &AtomicU32) {
+        let (segment, slot) = (&self.segment, &self.segment.slots()[self.slot]);
+        let waiters = |input: usize| &segment.inputs()[self.first_input + input];
+        match need {
+            Need::Grant => (&segment.head().clock.granted, &slot.grant_waiter.word),
+            Need::Samples { topic, input } => (&segment.topics()[topic].sent, &waiters(input).samples.word),
+            Need::Shadow { topic, input } => {
+                (&segment.topics()[topic].shadow.word, &waiters(input).shadow.word)
+            }
+            Need::OtherState => (&segment.slots()[self.other_slot].published, &slot.other_waiter.word),
+            Need::OtherDone => (&segment.slots()[self.other_slot].done, &slot.other_waiter.word),
+        }
+    }
+
+    /// Waits until the count of `need` reaches `count`, or `is_over` says that it never will.
+    pub(crate) fn wait(&self, need: Need, count: u32, wait: Wait, is_over: impl Fn() -> bool) -> Waited {
+        let (sequence, waiter) = self.sequence_and_waiter(need);
+        wait_for_count(&self.segment, sequence, count, waiter, wait, is_over)
+    }
+
+    /// The ticks before `count` have their samples of `topic`: `readers` wait for them, inputs among those of all slots.
+    pub(crate) fn samples_sent(&self, topic: usize, count: u32, readers: &[usize]) {
+        let inputs = self.segment.inputs();
+        let waiters = readers.iter().map(|&input| &inputs[input].samples.word);
+        wake::advance(&self.segment.topics()[topic].sent, count, waiters);
+    }
+
+    /// The same of shadow samples.
+    pub(crate) fn shadow_sent(&self, topic: usize, count: u32, readers: &[usize]) {
+        let inputs = self.segment.inputs();
+        let waiters = readers.iter().map(|&input| &inputs[input].shadow.word);
+        wake::advance(&self.segment.topics()[topic].shadow.word, count, waiters);
+    }
+
+    /// This process has published the state at the start of the ticks before `count`.
+    pub(crate) fn state_published(&self, count: u32) {
+        let slots = self.segment.slots();
+        wake::advance(&slots[self.slot].published, count, [&slots[self.other_slot].other_waiter.word]);
+    }
+
+    /// This process has completed the ticks before `count`.
+    pub(crate) fn completed(&self, count: u32) {
+        let slots = self.segment.slots();
+        let waiters = [&slots[self.slot].done_waiter.word, &slots[self.other_slot].other_waiter.word];
+        wake::advance(&slots[self.slot].done, count, waiters);
+    }
+
+    /// Counts a step that took `ns`. Only this process does so: a load and a store suffice.
+    pub(crate) fn count_step(&self, ns: u64) {
+        let count = &self.segment.slots()[self.slot].steps.counts[bucket_of(ns)];
+        count.store(count.load(Relaxed).wrapping_add(1), Relaxed);
+    }
+
+    /// Counts a gap that this process found in `topic`; it ends the run.
+    pub(crate) fn count_gap(&self, topic: usize) {
+        self.segment.topics()[topic].gaps.fetch_add(1, Relaxed);
+    }
+
+    /// Notes the processor time that this process used in its ticks.
+    pub(crate) fn note_cpu(&self, ns: u64) {
+        self.segment.slots()[self.slot].cpu_ns.store(ns, Relaxed);
+    }
+}

@@ -1,0 +1,132 @@
+//! What the supervisor does to a run: it makes the segment, changes the membership, steers the clock, and ends the run.
+
+use super::live_view::LiveView;
+use super::segment::Segment;
+use super::states::{Phase, SlotState, TransferOutcome};
+use super::wait::set_state;
+use super::wake::{self, AWAKE, NEVER, Word};
+use crate::error::BusError;
+use crate::plan::{Pace, Plan};
+use std::ops::Deref;
+use std::sync::atomic::Ordering::{Acquire, Relaxed, Release};
+use std::time::Duration;
+
+/// The supervisor's view of a run, which is also that of who steers it.
+#[derive(Debug)]
+pub struct SupervisorView {
+    live: LiveView,
+}
+
+impl Deref for SupervisorView {
+    type Target = LiveView;
+
+    fn deref(&self) -> &LiveView {
+        &self.live
+    }
+}
+
+impl SupervisorView {
+    /// Creates the control segment of `plan`, readable and writable by this user alone.
+    ///
+    /// # Errors
+    /// If the segment exists already or shared memory cannot be had.
+    pub fn create(plan: &Plan) -> Result<Self, BusError> {
+        let segment = Segment::create(plan)?;
+        let head = segment.head();
+        head.run.end_tick.store(plan.duration_ticks, Relaxed);
+        head.clock.held_at.store(NEVER, Relaxed);
+        head.steering.hold_tick.store(NEVER, Relaxed);
+        head.steering.join_tick.store(NEVER, Relaxed);
+        segment.waiters().for_each(|waiter| waiter.store(AWAKE, Relaxed));
+        let this = Self { live: LiveView { segment } };
+        this.set_pace(plan.pace);
+        // Generation 0 of every node is there from the start.
+        (0..plan.nodes.len()).for_each(|slot| this.set_slot_state(slot, SlotState::Taken));
+        this.segment.publish();
+        Ok(this)
+    }
+
+    /// Opens the control segment of `plan`, to steer a run that another process supervises.
+    ///
+    /// # Errors
+    /// If it does not exist or belongs to another plan.
+    pub fn open(plan: &Plan) -> Result<Self, BusError> {
+        Ok(Self { live: LiveView::open(plan)? })
+    }
+
+    /// Ends the run at once: every wait returns.
+    pub fn abort(&self) {
+        self.segment.head().run.is_aborted.store(1, Release);
+        self.segment.wake_everybody();
+    }
+
+    /// Asks the clock to end the run at the next tick boundary.
+    pub fn request_stop(&self) {
+        self.segment.request_stop();
+    }
+
+    /// Has the clock wait at the boundary before `tick`, or where it is if it has come further; `u32::MAX`
+    /// lets it run.
+    pub fn set_hold_tick(&self, tick: u32) {
+        let steering = &self.segment.head().steering;
+        wake::ask_for_hold(&steering.hold_tick, tick, &steering.changes);
+    }
+
+    /// The same where a process joins.
+    pub fn set_join_tick(&self, tick: u32) {
+        let steering = &self.segment.head().steering;
+        if steering.join_tick.load(Relaxed) != tick {
+            wake::ask_for_hold(&steering.join_tick, tick, &steering.changes);
+        }
+    }
+
+    /// Changes the pace; the clock follows at its next grant.
+    pub fn set_pace(&self, pace: Pace) {
+        let factor = if let Pace::Factor(factor) = pace { factor } else { 0.0 };
+        self.segment.head().steering.pace.store(factor.to_bits(), Release);
+    }
+
+    /// States what a slot holds, and wakes the process that waits for it.
+    pub fn set_slot_state(&self, slot: usize, state: SlotState) {
+        set_state(&self.segment.slots()[slot].state, state as u32);
+    }
+
+    /// Empties a slot, for another process.
+    pub fn clear_slot(&self, slot: usize) {
+        self.set_slot_state(slot, SlotState::Empty);
+        let cell = &self.segment.slots()[slot];
+        cell.ready.store(Phase::Announcing as u32, Relaxed);
+        cell.transfer.store(TransferOutcome::Unknown as u32, Relaxed);
+        for count in [&cell.late, &cell.epoch, &cell.done, &cell.published] {
+            count.store(0, Relaxed);
+        }
+        cell.cpu_ns.store(0, Relaxed);
+    }
+
+    /// Has the process in a slot begin at `tick`.
+    pub fn set_first_tick(&self, slot: usize, tick: u32) {
+        self.segment.slots()[slot].done.store(tick, Release);
+    }
+
+    /// Has the shadow samples of `topic` begin at `tick`.
+    pub fn start_shadow(&self, topic: usize, tick: u32) {
+        self.segment.topics()[topic].shadow.word.store(tick, Release);
+    }
+
+    /// Makes the membership number `epoch` the newest one, and wakes everybody to look at it.
+    pub fn set_epoch(&self, epoch: u32) {
+        self.segment.head().run.epoch.store(epoch, Release);
+        self.segment.wake_everybody();
+    }
+
+    /// The count of the supervisor's notices: to be read before a look at the run, and waited on after it.
+    #[must_use]
+    pub fn notices(&self) -> u32 {
+        self.segment.head().notices.count.load(Acquire)
+    }
+
+    /// Sleeps until there is something to look at since `notices`, at most `timeout`.
+    pub fn wait_for_notice(&self, notices: u32, timeout: Duration) {
+        self.segment.head().notices.count.sleep(notices, Some(timeout));
+    }
+}
