@@ -9,6 +9,7 @@ use crate::model::Model;
 use crate::normal::{self, Block};
 use crate::prepared::{Equation, Prepared};
 use crate::rows::{keep_means, take_off_means};
+use crate::statistics::student_quantile;
 use nalgebra::{DMatrix, DVector};
 use std::collections::BTreeMap;
 
@@ -70,6 +71,18 @@ impl FitResult {
     pub fn standard_error(&self, parameter: usize) -> Option<f64> {
         let at = self.free.iter().position(|own| *own == parameter)?;
         Some(self.covariance[(at, at)].max(0.0).sqrt())
+    }
+
+    /// The value that an estimate's error, in units of its standard error, stays below with `probability`: the quantile
+    /// of Student's t with G - 1 degrees of freedom for G blocks.
+    ///
+    /// Blocks, and not rows, count as independent draws, whatever the number of free parameters: G - 1 is what fixed-G
+    /// asymptotics of clustered data give (Bester, Conley and Hansen, J. Econometrics 165, 2011), what Cameron and
+    /// Miller (J. Human Resources 50(2), 2015, section VI) recommend, and what goes with the jackknife's standard errors
+    /// (MacKinnon, Nielsen and Webb, J. Econometrics 232(2), 2023), which already pay for the parameters.
+    #[must_use]
+    pub fn t_quantile(&self, probability: f64) -> f64 {
+        student_quantile(probability, (self.estimation_costs.len() as f64 - 1.0).max(1.0))
     }
 }
 

@@ -40,11 +40,8 @@ pub use command_map::CommandLine;
 pub use dynamics::{Comparison, Dynamics, Fitted, OneStep, Order};
 pub use error::RotorError;
 pub use report::RotorReport;
-pub use score::Score;
+pub use score::{LEVEL, Score};
 pub use statics::{Plausibility, Statics};
-
-/// How often an interval shall hold the truth.
-pub const LEVEL: f64 = 0.95;
 
 /// What came of a stand.
 #[derive(Debug, Clone)]

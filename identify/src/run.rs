@@ -339,10 +339,7 @@ fn size(problem: &Problem, squares: f64) -> f64 {
 /// The estimates of these parameters, with 95 % intervals.
 #[must_use]
 pub fn estimates(problem: &Problem, fitted: &FitResult, free: &[usize]) -> BTreeMap<&'static str, Estimate> {
-    let quantile = crate::statistics::student_quantile(
-        0.975,
-        (fitted.estimation_costs.len() as f64 - fitted.free.len() as f64).max(1.0),
-    );
+    let quantile = fitted.t_quantile(0.975);
     let one = |at: &usize| {
         let own = &problem.model.parameters.all[*at];
         let (value, half) =

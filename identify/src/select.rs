@@ -23,7 +23,6 @@ use crate::normal::{self, Block};
 use plant::effects::EffectKind;
 use rand_core::{Rng, SeedableRng};
 use rayon::prelude::*;
-use statrs::distribution::{ContinuousCDF, StudentsT};
 
 /// A smaller part of the squared error does not matter, however certain it is: what the comparison itself leaves at
 /// its joints is of the order of a tenth of it.
@@ -263,7 +262,7 @@ fn judged(
     let p_value = p_value(&base.validation_costs, &fitted.validation_costs);
     let t_value = t_value(problem, &fitted, candidate);
     let is_accepted = p_value < level
-        && t_value > t_quantile(1.0 - level / 2.0, fitted.estimation_costs.len())
+        && t_value > fitted.t_quantile(1.0 - level / 2.0)
         && gain > LEAST_GAIN * base.validation_cost()
         && is_seen(problem, candidate, &fitted)
         && !is_beyond_bounds(problem, candidate, &fitted);
@@ -340,12 +339,6 @@ fn p_value(before: &[f64], after: &[f64]) -> f64 {
     }
     // A few blocks that agree prove no more than a few coins that fall alike.
     ((losses + 1) as f64 / (drawn + 1) as f64).max(0.5_f64.powi(gains.len().min(1000) as i32))
-}
-
-/// The quantile of Student's distribution for a mean over so many blocks.
-fn t_quantile(probability: f64, blocks: usize) -> f64 {
-    let freedom = (blocks as f64 - 1.0).max(1.0);
-    StudentsT::new(0.0, 1.0, freedom).map_or(f64::INFINITY, |student| student.inverse_cdf(probability))
 }
 
 /// The accepted one with the greatest gain, or the one with the fewest parameters that is not worse beyond chance.

@@ -16,13 +16,7 @@ mod ljung_box;
 mod quantile;
 
 pub use bootstrap::{Bootstrap, MeanInterval, block_bootstrap_mean};
-pub use correlation::{autocorrelation, cross_correlation, white_noise_bound};
+pub use correlation::{autocorrelation, cross_correlation, mean, white_noise_bound};
 pub use jackknife::{Estimate, jackknife};
 pub use ljung_box::{LjungBox, ljung_box};
 pub use quantile::{chi_square_tail, normal_quantile, student_quantile};
-
-/// The mean; NaN of nothing.
-#[must_use]
-pub fn mean(values: &[f64]) -> f64 {
-    values.iter().sum::<f64>() / values.len() as f64
-}

@@ -2,8 +2,7 @@
 
 use serde::Serialize;
 
-use super::LEVEL;
-use super::score::Score;
+use super::score::{LEVEL, Score};
 use crate::statistics::{Estimate, jackknife};
 
 /// Plateaus that a fit needs.

@@ -3,13 +3,14 @@
 use serde::Serialize;
 
 use super::command_map::CommandLine;
+use super::error::RotorError;
 use super::lag::{self, Fit, Match, ONSET_ROWS_MAX};
 use super::plateau::median;
 use super::response::Lag;
+use super::score::LEVEL;
 use super::score::Score;
 use super::stand::{Clock, Stand};
 use super::step::{self, Hold, Step};
-use super::{LEVEL, RotorError};
 use crate::statistics::{Bootstrap, Estimate, MeanInterval, block_bootstrap_mean, jackknife};
 
 pub use super::lag::Order;

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use flights::{Channel, Comparison, same_file, twin};
 
-use super::RotorError;
+use super::error::RotorError;
 use super::stand::{Column, DynamicLog, Role, Stand, StaticLog};
 use super::table::Table;
 

@@ -4,9 +4,9 @@ use std::fmt;
 
 use serde::Serialize;
 
-use super::RotorError;
 use super::coefficient::Coefficient;
 use super::dynamics::{Dynamics, Fitted, Order};
+use super::error::RotorError;
 use super::plateau;
 use super::stand::Stand;
 use super::statics::Statics;

@@ -2,6 +2,9 @@
 
 use serde::Serialize;
 
+/// How often an interval shall hold the truth.
+pub const LEVEL: f64 = 0.95;
+
 /// Errors of predictions.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Score {

@@ -7,7 +7,7 @@ use serde::Deserialize;
 use vehicles::variables::expand;
 use vehicles::{Place, Vehicle};
 
-use super::RotorError;
+use super::error::RotorError;
 
 /// A stand file, read.
 pub struct Stand {

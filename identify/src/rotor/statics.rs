@@ -4,8 +4,8 @@ use std::f64::consts::PI;
 
 use serde::Serialize;
 
-use super::RotorError;
 use super::coefficient::{Coefficient, PLATEAUS_MIN, Point};
+use super::error::RotorError;
 use super::plateau::{self, Plateaus, REST_RAD_S, median, without_outliers};
 use super::stand::{Column, Scale, Stand, StaticLog, held_out, short_name};
 use super::table::Table;

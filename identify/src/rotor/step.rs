@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use super::RotorError;
+use super::error::RotorError;
 use super::plateau::{self, REST_RAD_S, median, spread};
 use super::stand::{Clock, DynamicLog, held_out, short_name};
 use super::table::Table;

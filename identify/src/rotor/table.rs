@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use super::RotorError;
+use super::error::RotorError;
 use super::stand::{Scale, short_name};
 
 /// Seconds of a day; a wall clock begins anew after them.

@@ -3,7 +3,7 @@
 use rand_chacha::ChaCha8Rng;
 use rand_core::{Rng, SeedableRng};
 
-use super::mean;
+use super::correlation::mean;
 
 /// How to resample.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -1,6 +1,6 @@
 //! Auto- and cross-correlation, and the bound that white noise keeps.
 
-use super::{mean, quantile::normal_quantile};
+use super::quantile::normal_quantile;
 
 /// Correlation of `x` with itself `k` samples later, for every lag `k` from 0 to `max_lag`.
 ///
@@ -44,4 +44,10 @@ fn centred(x: &[f64]) -> Vec<f64> {
 /// The sum of products as far as both have samples.
 fn product(x: &[f64], y: &[f64]) -> f64 {
     x.iter().zip(y).map(|(x, y)| x * y).sum()
+}
+
+/// The mean; NaN of nothing.
+#[must_use]
+pub fn mean(values: &[f64]) -> f64 {
+    values.iter().sum::<f64>() / values.len() as f64
 }

@@ -1,6 +1,7 @@
 //! One test of whiteness over many lags.
 
-use super::{autocorrelation, chi_square_tail};
+use super::correlation::autocorrelation;
+use super::quantile::chi_square_tail;
 
 /// What the test found.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
