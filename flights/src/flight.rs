@@ -88,8 +88,13 @@ impl<const N: usize> Channel<N> {
     /// The median time between two samples; `None` with fewer than two.
     #[must_use]
     pub fn period_s(&self) -> Option<f64> {
-        let mut steps: Vec<f64> = self.time_s.windows(2).map(|pair| pair[1] - pair[0]).collect();
-        steps.sort_by(f64::total_cmp);
-        steps.get(steps.len() / 2).copied()
+        median(self.time_s.windows(2).map(|pair| pair[1] - pair[0]))
     }
+}
+
+/// The median, of two in the middle the greater one, so that it is one of the numbers; `None` of nothing.
+pub(crate) fn median(numbers: impl Iterator<Item = f64>) -> Option<f64> {
+    let mut sorted: Vec<f64> = numbers.collect();
+    sorted.sort_by(f64::total_cmp);
+    sorted.get(sorted.len() / 2).copied()
 }

@@ -1,7 +1,7 @@
 //! Jumps of a pose: swapped markers, an estimator that starts anew. No vehicle moves so. The samples about a jump are
 //! left out, so that whatever reads the channel meets a gap there.
 
-use crate::flight::{Channel, Flight};
+use crate::flight::{Channel, Flight, median};
 use crate::quantity::Quantity;
 
 /// So many samples to both sides of a jump are left out: together more than the [`crate::clean::GAP_PERIODS`] of a gap.
@@ -39,7 +39,7 @@ fn without_jumps<const N: usize>(
     notes: &mut Vec<String>,
 ) -> Channel<N> {
     let steps = excesses(&channel);
-    let usual = median(steps.iter().map(|step| step.excess).collect());
+    let usual = median(steps.iter().map(|step| step.excess)).unwrap_or(0.0);
     let is_jump = |step: &&Step| {
         let possible = limits.least + limits.acceleration * step.span_s * step.span_s;
         step.excess > possible.max(UNUSUAL * usual)
@@ -90,11 +90,6 @@ fn excesses<const N: usize>(channel: &Channel<N>) -> Vec<Step> {
         Step { from: at, span_s: span_s(at - 1).max(span_s(at)).max(span_s(at + 1)), excess }
     };
     (1..channel.time_s.len().saturating_sub(2)).map(step).collect()
-}
-
-fn median(mut values: Vec<f64>) -> f64 {
-    values.sort_by(f64::total_cmp);
-    values.get(values.len() / 2).copied().unwrap_or(0.0)
 }
 
 #[cfg(test)]

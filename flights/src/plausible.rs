@@ -7,7 +7,7 @@ use vehicles::Vehicle;
 
 use crate::agreement::{Agreement, Pairs};
 use crate::declaration::{ChannelMap, Frame};
-use crate::flight::{Channel, Flight};
+use crate::flight::{Channel, Flight, median};
 use crate::frame;
 use crate::quantity::{FRACTION, PERCENT, Quantity};
 use diagnostics::unit::ANGLE;
@@ -479,12 +479,6 @@ fn z_up(attitude: &Channel<4>) -> Option<f64> {
         let q = UnitQuaternion::from_quaternion(frame::from_wxyz(*wxyz));
         (q * Vector3::z()).z
     }))
-}
-
-fn median(numbers: impl Iterator<Item = f64>) -> Option<f64> {
-    let mut sorted: Vec<f64> = numbers.collect();
-    sorted.sort_by(f64::total_cmp);
-    sorted.get(sorted.len() / 2).copied()
 }
 
 fn range(numbers: impl Iterator<Item = f64>) -> Option<(f64, f64)> {

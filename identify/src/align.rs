@@ -190,7 +190,7 @@ impl Clocks {
     }
 }
 
-/// Takes off each flight's attitude what it is late beyond the mean of the fit flights, and its position and its velocity
+/// Takes off each flight's attitude what it is late beyond the mean of the estimation data, and its position and its velocity
 /// what they are late beyond that mean if they are apart from the attitude; they come with it if they are not. Only what
 /// is sure is taken off. Says what was found for each flight of `fit` and then of `test`.
 pub fn align(problem: &mut Problem) -> Vec<(String, Offsets)> {

@@ -278,7 +278,7 @@ fn held_step(total: &Block, held: &[Option<f64>]) -> DVector<f64> {
 const LEAST_NOISE: f64 = 1e-4;
 
 impl Problem<'_> {
-    /// Sets the weights by the variance that is left on the fit flights when, from `base` on, all of `candidates` take
+    /// Sets the weights by the variance that is left on the estimation data when, from `base` on, all of `candidates` take
     /// the step that fits best.
     pub fn weigh(&mut self, base: &FitResult, candidates: &[Candidate]) {
         let mut all = base.free.clone();
@@ -322,7 +322,7 @@ impl Problem<'_> {
         sums.into_iter().map(|(name, sum)| (name, weight(sum))).collect()
     }
 
-    /// The squares that `fitted` leaves on the fit flights, in units of what all candidates together would leave by the
+    /// The cost that `fitted` leaves on the estimation data, in units of what all candidates together would leave by the
     /// linearised equations: those by which the weights were set. Delays, lags and the battery are far from linear and do
     /// not count.
     #[must_use]

@@ -15,7 +15,7 @@ pub fn deviation<const N: usize>(channel: &Channel<N>) -> Option<f64> {
     (count > 0.0).then(|| (squares / count / 20.0).sqrt())
 }
 
-/// The noise of each channel that was measured, over the test flights, with its unit.
+/// The noise of each channel that was measured, over the validation data, with its unit.
 #[must_use]
 pub fn floor(problem: &Problem) -> BTreeMap<&'static str, (f64, &'static str)> {
     let mut floor = BTreeMap::new();

@@ -20,7 +20,7 @@ pub struct Report {
     pub verdict: Vec<&'static str>,
     /// Every candidate that was judged, by name.
     pub effects: BTreeMap<&'static str, EffectReport>,
-    /// The residuals on the test flights.
+    /// The residuals on the validation data.
     pub whiteness: BeforeAfter<BTreeMap<&'static str, Whiteness>>,
     /// Clocks of each flight: attitude, position and velocity against the inertial unit; `null` where it has not what
     /// that takes, or too little of it.
@@ -29,9 +29,9 @@ pub struct Report {
     pub faults: Vec<Fault>,
     /// The trims of the flights where they differ between flights: constant torques that no one vehicle explains.
     pub trims: Vec<Trim>,
-    /// Prediction errors of the test flights: flight, horizon in s, channel.
+    /// Prediction errors of the validation data: flight, horizon in s, channel.
     pub held_out: BTreeMap<String, BTreeMap<String, BTreeMap<&'static str, Change>>>,
-    /// The same of the fit flights.
+    /// The same of the estimation data.
     pub fitted: BTreeMap<String, BTreeMap<String, BTreeMap<&'static str, Change>>>,
     /// White noise of each channel, and the prediction error that it alone makes at each horizon.
     pub noise_floor: BTreeMap<&'static str, Noise>,
@@ -93,7 +93,7 @@ pub struct EffectReport {
     pub linearised: bool,
     /// Its fitted parameters.
     pub parameters: BTreeMap<&'static str, Estimate>,
-    /// Weighted root mean square of the residual on the test flights, in units of what all candidates together leave:
+    /// Weighted root mean square of the residual on the validation data, in units of what all candidates together leave:
     /// without and with it.
     pub held_out: BeforeAfter<f64>,
     /// Chance of as much gain without it, by resampled blocks.
@@ -153,11 +153,11 @@ impl fmt::Display for Report {
     }
 }
 
-/// With fewer blocks of test flights nothing is beyond chance.
+/// With fewer blocks of validation data nothing is beyond chance.
 const ENOUGH_BLOCKS: usize = 12;
 
 impl Report {
-    /// Whether the verdict is empty only because the test flights are short.
+    /// Whether the verdict is empty only because the validation data are short.
     #[must_use]
     pub fn is_undecided(&self) -> bool {
         self.verdict.is_empty() && self.test_blocks < ENOUGH_BLOCKS

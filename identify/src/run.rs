@@ -331,9 +331,9 @@ fn accepted_effects(
     }
 }
 
-/// The weighted root mean square of a sum of squares of the test flights.
-fn size(problem: &Problem, squares: f64) -> f64 {
-    (squares / problem.rows(&problem.validation) as f64).sqrt()
+/// The weighted root mean square of a sum of squares of the validation data.
+fn size(problem: &Problem, cost: f64) -> f64 {
+    (cost / problem.rows(&problem.validation) as f64).sqrt()
 }
 
 /// The estimates of these parameters, with 95 % intervals.

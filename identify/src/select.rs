@@ -1,11 +1,11 @@
 //! Attribution: which candidates the flights ask for, one after the other.
 //!
-//! In each round every candidate is fitted, together with what was accepted before, on the fit flights, and judged
-//! on the test flights. It is accepted only if four things hold:
+//! In each round every candidate is fitted, together with what was accepted before, on the estimation data, and judged
+//! on the validation data. It is accepted only if four things hold:
 //!
-//! 1. The gain on the test flights is beyond chance: the mean of the blocks' gains is above zero at 5 % over all
+//! 1. The gain on the validation data is beyond chance: the mean of the blocks' gains is above zero at 5 % over all
 //!    candidates of the round together (Bonferroni; one-sided percentile bootstrap over blocks, Efron 1979).
-//! 2. One of its parameters differs from the declared value beyond chance on the fit flights, at the same level.
+//! 2. One of its parameters differs from its baseline beyond chance on the estimation data, at the same level.
 //! 3. The gain matters: it is at least [`LEAST_GAIN`] of the squared error.
 //! 4. It is not for an effect of which more is asked than it can be: not all parameters that moved stopped at a bound.
 //!
@@ -31,7 +31,7 @@ pub const LEAST_GAIN: f64 = 0.002;
 const LEAST_PART: f64 = 0.01;
 /// Chance of a false acceptance in a round.
 pub const FALSE_RATE: f64 = 0.05;
-/// Two rivals whose difference is within this one-sided level cannot be told apart.
+/// Two candidates whose difference is within this one-sided level cannot be told apart.
 const CONFOUNDED_LEVEL: f64 = 0.05;
 /// Resamples of a bootstrap: enough for the level of one among thirty candidates, tried beside four others.
 const RESAMPLES: usize = 20_000;
@@ -39,12 +39,12 @@ const RESAMPLES: usize = 20_000;
 const LOSSES_ENOUGH: usize = 500;
 /// So many candidates of a round are fitted in earnest.
 const CONFIRMED: usize = 4;
-/// A rival has at least this part of the gain.
+/// A confounded effect has at least this part of the gain.
 const NEAR: f64 = 0.5;
 /// More rounds than there are effects worth naming.
 const ROUNDS_MAX: usize = 12;
-/// Two that mask each other are looked for where this many times the squares are left that all candidates together
-/// would leave on the fit flights.
+/// Two that mask each other are looked for where this many times the cost is left that all candidates together
+/// would leave on the estimation data.
 const MUCH_LEFT: f64 = 1.5;
 /// So many candidates are tried as the first of two.
 const FIRSTS: usize = 4;
@@ -56,12 +56,10 @@ pub struct Judged {
     pub candidate: Candidate,
     /// The fit of it and of what was accepted before.
     pub fitted: FitResult,
-    /// Gain on the test flights as a part of their squared error.
+    /// Gain on the validation data as a part of their squared error.
     pub gain: f64,
     /// Chance of as much without the effect.
     pub p_value: f64,
-    /// The largest deviation of a parameter from the declared value, in units of its standard error.
-    pub t_value: f64,
     /// Whether it was accepted.
     pub is_accepted: bool,
     /// Whether `fitted` is no fit but what the linearised equations promise.
@@ -167,7 +165,7 @@ impl StepwiseSearch {
     }
 
     /// Accepts two that only gain together: of two strong effects each can make the blocks worse in which the other
-    /// acts. The firsts that are tried are chosen on the fit flights, the second in a round with the first, and then
+    /// acts. The firsts that are tried are chosen on the estimation data, the second in a round with the first, and then
     /// the first has to pass a round with the second.
     fn take_two(&mut self, problem: &Problem, candidates: &[Candidate]) -> bool {
         let Some(last) = self.rounds.last() else { return false };
@@ -270,7 +268,6 @@ fn judged(
         candidate: candidate.clone(),
         gain: gain / base.validation_cost(),
         p_value,
-        t_value,
         is_accepted,
         is_promise: false,
         fitted,
@@ -351,7 +348,7 @@ fn best(judged: &[Judged]) -> Option<usize> {
     accepted.iter().filter(is_alike).min_by(|a, b| size(**a).cmp(&size(**b)).then(by_gain(b, a))).copied()
 }
 
-/// Whether `fitted` is worse on the test flights than `other`, beyond chance.
+/// Whether `fitted` is worse on the validation data than `other`, beyond chance.
 #[must_use]
 pub fn is_worse(fitted: &FitResult, other: &FitResult) -> bool {
     p_value(&fitted.validation_costs, &other.validation_costs) < CONFOUNDED_LEVEL

@@ -12,7 +12,7 @@ const APART: usize = 4;
 /// Lags looked at, in windows that do not overlap.
 const LAGS: usize = 25;
 
-/// The residual of one equation on the test flights.
+/// The residual of one equation on the validation data.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Whiteness {
     /// Root mean square over all components.
@@ -29,7 +29,7 @@ pub struct Whiteness {
     pub persistent: f64,
 }
 
-/// The whiteness of every equation under `values`, over the test flights.
+/// The whiteness of every equation under `values`, over the validation data.
 #[must_use]
 pub fn whiteness(problem: &Problem, values: &[f64]) -> BTreeMap<&'static str, Whiteness> {
     let mut columns: BTreeMap<&'static str, Vec<(Equation, Vec<f64>)>> = BTreeMap::new();

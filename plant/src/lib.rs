@@ -2,16 +2,16 @@
 //!
 //! | room | what it holds |
 //! |---|---|
-//! | [`state`] | the rigid body and the rotors, as carried from tick to tick |
-//! | [`airframe`] | the forces that every backend moves the body by |
+//! | `state` | the rigid body and the rotors, as carried from tick to tick |
+//! | `airframe` | the forces that every backend moves the body by |
 //! | `actuation`, `airframe_state` | what acts over a tick; what effects carry from tick to tick |
 //! | [`effects`] | the physics beyond the declared vehicle |
 //! | `motor` | the lag between commanded and actual rotor speed |
 //! | [`rotor`] | thrust and torques of the rotors on the body |
 //! | `rotation` | turning vectors inside of an integration step |
-//! | [`newton_euler`] | equations of motion and their integration |
-//! | [`backend`] | what a plant can do, whichever physics moves it |
-//! | [`free_flight`] | the backend `newton-euler` |
+//! | `newton_euler` | equations of motion and their integration |
+//! | `backend` | what a plant can do, whichever physics moves it |
+//! | `free_flight` | the backend `newton-euler` |
 //! | [`rapier`] | the backend `rapier`: ground, walls, other vehicles, rigs |
 //! | [`snapshot`] | a backend's state as bytes |
 //! | [`node`] | the plant as a process of a run |
@@ -36,14 +36,14 @@
 #![forbid(unsafe_code)]
 
 mod actuation;
-pub mod airframe;
+mod airframe;
 mod airframe_state;
 mod airworthy;
-pub mod backend;
+mod backend;
 pub mod effects;
-pub mod free_flight;
+mod free_flight;
 mod motor;
-pub mod newton_euler;
+mod newton_euler;
 pub mod node;
 mod others;
 mod output;
@@ -52,7 +52,7 @@ pub mod rapier;
 mod rotation;
 pub mod rotor;
 pub mod snapshot;
-pub mod state;
+mod state;
 pub mod traffic;
 
 pub use actuation::{Actuation, Battery};

@@ -1,5 +1,6 @@
 //! Where a log stands still, and what it reads there.
 
+use statrs::statistics::{Data, OrderStatistics};
 use std::collections::VecDeque;
 use std::ops::Range;
 
@@ -91,13 +92,7 @@ pub fn spread(values: &[f64]) -> f64 {
 
 /// The median; NaN of nothing.
 pub fn median(values: &[f64]) -> f64 {
-    let mut sorted = values.to_vec();
-    sorted.sort_by(f64::total_cmp);
-    match sorted.len() {
-        0 => f64::NAN,
-        n if n % 2 == 1 => sorted[n / 2],
-        n => 0.5 * (sorted[n / 2 - 1] + sorted[n / 2]),
-    }
+    Data::new(values.to_vec()).median()
 }
 
 /// How many readings stand in runs of at least `shortest` equal ones while the rotor turns, and how many of these

@@ -31,6 +31,9 @@ the vertical, both in the body. T_i is c_T w_i |w_i|: effects do not act on each
 
 Delay and bias of a sensor are no effects: they are parameters of the sensors ([manifest.md](manifest.md)).
 
+An effect is one file in `plant/src/effects/catalogue` and its row in `catalogue.rs`. Manifests, this page, the tests of
+all effects and `hummingbus identify` know no more of it than stands there.
+
 | effect | what it does |
 |---|---|
 ";
