@@ -14,6 +14,7 @@ mod rows;
 mod windows;
 
 pub use errors::{ChannelErrors, Errors, FlightErrors, HorizonErrors};
+pub use replay::HORIZONS_MS;
 
 use anyhow::{Context, Result, bail};
 use flights::{Flight, FlightSet};
@@ -24,9 +25,6 @@ use runtime::run_dir::Scratch;
 use std::collections::BTreeMap;
 use std::path::Path;
 use vehicles::Vehicle;
-
-/// Lengths of the windows, in milliseconds.
-pub const HORIZONS_MS: [u32; 3] = [100, 500, 1000];
 
 /// How flights are flown again.
 #[derive(Clone, Copy, Debug)]
@@ -62,7 +60,7 @@ impl Validation<'_> {
             let replay = Replay::prepare(flight, vehicles, folder)
                 .with_context(|| format!("the flight `{}` cannot be replayed", flight.name))?;
             let (host_s, recording) = replay
-                .fly(self, tell)
+                .fly(self.components, self.stop, tell)
                 .with_context(|| not_flown(flight, self.keep.map(|_| replay.folder())))?;
             let flown = windows::flight_errors(flight, &replay, &recording, vehicles.len())?;
             tell(&format!("{}: {:.1} s flown in {host_s:.1} s", flight.name, replay.duration_s()));

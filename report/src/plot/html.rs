@@ -3,9 +3,9 @@
 //! It is drawn by `page.js` with plotly.js ([`crate::page`]).
 
 use crate::page::{PLOTLY_3D, Page};
+use crate::plot::drawing::{Drawing, TIME_LABEL, View};
 use crate::plot::figure::{Axes, Curve, Trail};
 use crate::plot::scene::{EDGES, Solid};
-use crate::plot::{Drawing, TIME_LABEL, View};
 use serde_json::{Value, json};
 
 const PAGE: Page =

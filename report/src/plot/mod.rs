@@ -6,13 +6,17 @@
 //! - [`thin`]: long curves as few points
 //! - [`figure`]: named and coloured curves on axes of one unit
 //! - [`scene`]: what stands around the vehicles
+//! - [`drawing`]: all that a file shows
 //! - [`html`]: the page
+//! - [`ink`]: lines, letters and legends of pictures
 //! - [`picture`], [`space`]: the same as SVG and PNG: sheets, time plots; views of the paths
 
 mod choice;
+mod drawing;
 mod field;
 mod figure;
 mod html;
+mod ink;
 mod picture;
 mod read;
 mod scene;
@@ -21,13 +25,10 @@ mod thin;
 
 use anyhow::{Result, bail};
 use choice::Choice;
-use figure::{Panel, Trail};
 use recorder::reader::Recording;
-use scene::Solid;
 use serde::Serialize;
-use serde_json::{Value, json};
-use std::fmt;
 
+pub use drawing::{Drawing, View};
 pub use picture::{PNG_MARK, SVG_MARK};
 pub use read::Span;
 
@@ -46,33 +47,16 @@ pub struct Request {
     pub title: Option<String>,
 }
 
-/// A way to look at a recording.
+/// A kind of file that shows a drawing.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
-pub enum View {
-    /// Curves over time.
-    Time,
-    /// The paths in space, with the scene.
-    Path,
-    /// The paths from above.
-    Top,
-    /// The paths from the side.
-    Side,
-}
-
-/// What the axis of time shows.
-const TIME_LABEL: &str = "simulated time [s]";
-
-/// All that a file shows; its text says how much that is.
-#[derive(Debug)]
-pub struct Drawing {
-    title: String,
-    recording: String,
-    span_s: [f64; 2],
-    views: Vec<View>,
-    panels: Vec<Panel>,
-    trails: Vec<Trail>,
-    solids: Vec<Solid>,
+pub enum Format {
+    /// A page that needs no network.
+    Html,
+    /// A picture of dots.
+    Png,
+    /// A picture of lines.
+    Svg,
 }
 
 impl Drawing {
@@ -110,55 +94,4 @@ impl Drawing {
             Format::Png => picture::svg(self).and_then(|svg| picture::png(&svg)),
         }
     }
-
-    /// What is drawn: names, units and numbers of points.
-    #[must_use]
-    pub fn json(&self) -> Value {
-        json!({
-            "recording": self.recording,
-            "span_s": self.span_s,
-            "panels": self.panels,
-            "trails": self.trails,
-            "solids": self.solids,
-        })
-    }
-
-    /// The views that were asked for, or else those of `usual` that there is something for.
-    fn views_or(&self, usual: &[View]) -> Vec<View> {
-        let has_some =
-            |view: &View| if *view == View::Time { !self.panels.is_empty() } else { !self.trails.is_empty() };
-        if self.views.is_empty() {
-            usual.iter().copied().filter(has_some).collect()
-        } else {
-            self.views.clone()
-        }
-    }
-}
-
-impl fmt::Display for Drawing {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let axes = self.panels.iter().flat_map(|panel| &panel.axes);
-        let curves: usize = axes.clone().map(|axes| axes.curves.len()).sum();
-        write!(
-            f,
-            "axes: {} with {curves} curves; paths: {}; boxes: {}; from {:.3} s to {:.3} s",
-            axes.count(),
-            self.trails.len(),
-            self.solids.len(),
-            self.span_s[0],
-            self.span_s[1]
-        )
-    }
-}
-
-/// A kind of file that shows a drawing.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Format {
-    /// A page that needs no network.
-    Html,
-    /// A picture of dots.
-    Png,
-    /// A picture of lines.
-    Svg,
 }

@@ -4,62 +4,32 @@
 //! Regular 2.138 (Google, Apache License 2.0), changed by leaving out all but Latin, Greek and Cyrillic letters and
 //! signs, with `pyftsubset --layout-features=kern --no-hinting`.
 
-use crate::plot::choice::Role;
+use crate::plot::drawing::{Drawing, TIME_LABEL, View};
 use crate::plot::figure::{Axes, Curve};
-use crate::plot::{Drawing, TIME_LABEL, View, space, thin};
+use crate::plot::ink::{
+    Area, GRID, INK, LABEL_SIZE, LEGEND_ROW, Look, UNITS_PER_PIXEL, WIDTH, at, draw_legend, draw_line,
+    letters, number, px,
+};
+use crate::plot::{space, thin};
 use anyhow::{Context, Result, bail};
-use plotters::coord::{CoordTranslate, Shift};
 use plotters::prelude::*;
-use plotters::style::text_anchor::{HPos, Pos, VPos};
 use resvg::tiny_skia::{Pixmap, Transform};
 use resvg::usvg::{Options, Tree};
 use std::ops::Range;
 
-/// A part of a picture that is drawn on.
-pub type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
-
 const FONT: &[u8] = include_bytes!("font/roboto-subset.ttf");
 
-/// Plotters places everything on whole units: finer ones than the picture's make its lines smooth.
-const UNITS_PER_PIXEL: u32 = 8;
 /// Dots of a PNG for each pixel of the picture, for sharp letters.
 const DOTS_PER_PIXEL: f32 = 1.5;
-const WIDTH: u32 = 1000;
 /// Bins of a curve: as many as its axes have pixels, or half of that.
 const BINS: usize = 700;
 const TITLE_HEIGHT: u32 = 40;
 const AXES_HEIGHT: u32 = 190;
 /// Room for the numbers and the name of the axis of time, below the last axes.
 const TIME_AXIS_HEIGHT: u32 = 34;
-const LEGEND_ROW: u32 = 18;
 const LETTER_WIDTH: u32 = 7;
-/// Bold enough beside the curves' names, and thin enough beside each other.
-const FLOWN_WIDTH: u32 = 14;
-const THIN_WIDTH: u32 = 7;
 const TITLE_SIZE: u32 = 18;
 const HEAD_SIZE: u32 = 15;
-/// Size of all other letters.
-pub const LABEL_SIZE: u32 = 13;
-/// Colour of lines that only guide the eye.
-pub const GRID: RGBColor = RGBColor(225, 225, 225);
-const INK: RGBColor = RGBColor(40, 40, 40);
-
-/// Units for `pixels`.
-pub const fn px(pixels: u32) -> u32 {
-    pixels * UNITS_PER_PIXEL
-}
-
-/// The same for a place.
-#[allow(clippy::cast_possible_wrap, reason = "a picture is far smaller than 2^31 units")]
-pub const fn at(pixels: u32) -> i32 {
-    px(pixels) as i32
-}
-
-/// Letters of `size` pixels.
-pub fn letters<'a>(size: u32) -> TextStyle<'a> {
-    ("sans-serif", px(size)).into_font().color(&INK)
-}
-
 /// Something on the sheet, with its height in pixels.
 enum Section<'a> {
     Axes(&'a Axes, bool),
@@ -163,7 +133,11 @@ pub fn png(svg: &str) -> Result<Vec<u8>> {
 
 fn draw_axes(area: &Area<'_>, axes: &Axes, drawing: &Drawing, legend: u32, is_last: bool) -> Result<()> {
     let names = axes.curves.iter().map(|curve| curve.name.as_str());
-    let plots = draw_legend(area, legend, names.zip(axes.curves.iter().map(Look::of)))?;
+    let plots = draw_legend(
+        area,
+        legend,
+        names.zip(axes.curves.iter().map(|curve| Look::new(curve.colour, curve.role))),
+    )?;
     let [from_s, to_s] = drawing.span_s;
     let values = axes.curves.iter().flat_map(|curve| &curve.points).map(|(_, value)| *value);
     let mut chart = ChartBuilder::on(&plots)
@@ -190,63 +164,10 @@ fn draw_axes(area: &Area<'_>, axes: &Axes, drawing: &Drawing, legend: u32, is_la
     let mut curves: Vec<&Curve> = axes.curves.iter().collect();
     curves.sort_by_key(|curve| curve.role.layer());
     for curve in curves {
-        let (look, points) = (Look::of(curve), thinned(&curve.points));
+        let (look, points) = (Look::new(curve.colour, curve.role), thinned(&curve.points));
         for stretch in finite(&points) {
             draw_line(&mut chart, stretch.iter().copied(), look)?;
         }
-    }
-    Ok(())
-}
-
-/// How a line looks.
-#[derive(Clone, Copy)]
-pub struct Look {
-    colour: RGBColor,
-    width: u32,
-    /// Whether it is dashed.
-    pub is_dashed: bool,
-}
-
-impl Look {
-    /// That of a line with a role; what is beside the flown one is darker, to be told from it.
-    pub fn new(colour: &str, role: Role) -> Self {
-        let colour = rgb(colour);
-        let darker = RGBColor(colour.0 / 2, colour.1 / 2, colour.2 / 2);
-        let (colour, width) = if role == Role::Flown { (colour, FLOWN_WIDTH) } else { (darker, THIN_WIDTH) };
-        Self { colour, width, is_dashed: role == Role::Asked }
-    }
-
-    fn of(curve: &Curve) -> Self {
-        Self::new(curve.colour, curve.role)
-    }
-
-    /// As plotters wants it.
-    pub fn style(self) -> ShapeStyle {
-        self.colour.stroke_width(self.width)
-    }
-}
-
-fn rgb(colour: &str) -> RGBColor {
-    let part = |index: usize| colour.get(index..index + 2).and_then(|hex| u8::from_str_radix(hex, 16).ok());
-    RGBColor(part(1).unwrap_or(0), part(3).unwrap_or(0), part(5).unwrap_or(0))
-}
-
-/// Draws a line on flat axes or in space.
-///
-/// # Errors
-/// If plotters cannot.
-pub fn draw_line<T: CoordTranslate>(
-    chart: &mut ChartContext<'_, SVGBackend<'_>, T>,
-    points: impl Iterator<Item = T::From> + Clone,
-    look: Look,
-) -> Result<()>
-where
-    T::From: Clone + 'static,
-{
-    if look.is_dashed {
-        chart.draw_series(DashedLineSeries::new(points, px(6), px(4), look.style()))?;
-    } else {
-        chart.draw_series(LineSeries::new(points, look.style()))?;
     }
     Ok(())
 }
@@ -260,31 +181,6 @@ fn legend_width(drawing: &Drawing, sections: &[Section<'_>]) -> u32 {
     #[allow(clippy::cast_possible_truncation, reason = "a name is short")]
     let longest = names.map(|name| name.chars().count() as u32).max().unwrap_or(0);
     (longest * LETTER_WIDTH + 52).clamp(130, WIDTH / 2)
-}
-
-/// Draws a legend, `width` pixels wide, at the right side of an area; returns what is left of it. Beside the curves it
-/// hides none.
-pub fn draw_legend<'a, 'n>(
-    area: &Area<'a>,
-    width: u32,
-    entries: impl Iterator<Item = (&'n str, Look)>,
-) -> Result<Area<'a>> {
-    let (plots, legend) = area.split_horizontally(px(WIDTH - width));
-    let anchor = Pos::new(HPos::Left, VPos::Center);
-    for (row, (name, look)) in (0..).zip(entries) {
-        let y = at(36 + row * LEGEND_ROW);
-        let ends = [(at(10), y), (at(36), y)];
-        if look.is_dashed {
-            let dashes = [(ends[0].0, at(18)), (at(22), at(30)), (at(34), at(36))];
-            for (from, to) in dashes {
-                legend.draw(&PathElement::new(vec![(from, y), (to, y)], look.style()))?;
-            }
-        } else {
-            legend.draw(&PathElement::new(ends.to_vec(), look.style()))?;
-        }
-        legend.draw(&Text::new(name.to_owned(), (at(44), y), letters(LABEL_SIZE).pos(anchor)))?;
-    }
-    Ok(plots)
 }
 
 /// As many points as a picture shows: a page has more, to zoom into.
@@ -308,13 +204,6 @@ pub fn range(values: impl Iterator<Item = f64>) -> Range<f64> {
     // What hardly moves is drawn as a line, not as noise over the whole height.
     let room = ((high - low) * 0.06).max(low.abs().max(high.abs()).max(1.0) * 0.005);
     low - room..high + room
-}
-
-/// A number at an axis: without the digits that steps of 0.1 add to it.
-pub fn number(value: &f64) -> String {
-    let rounded = (value * 1e6).round() / 1e6;
-    // No minus before a zero.
-    format!("{}", if rounded == 0.0 { 0.0 } else { rounded })
 }
 
 #[cfg(test)]

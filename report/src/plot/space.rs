@@ -1,8 +1,8 @@
 //! Views of the paths in space, with the scene: from above, from the side, and in three dimensions.
 
+use crate::plot::drawing::{Drawing, View};
 use crate::plot::figure::Trail;
-use crate::plot::picture::{Area, GRID, LABEL_SIZE, Look, at, draw_legend, draw_line, letters, number, px};
-use crate::plot::{Drawing, View};
+use crate::plot::ink::{Area, GRID, LABEL_SIZE, Look, at, draw_legend, draw_line, letters, number, px};
 use anyhow::Result;
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};

@@ -3,7 +3,7 @@
 //! It is drawn by `page.js` with plotly.js ([`crate::page`]).
 
 use crate::page::{PLOTLY_BASIC, Page};
-use crate::profile::Profile;
+use crate::profile::figures::Profile;
 use crate::profile::path::{Path, name};
 use crate::profile::times::Times;
 use bus::profile::TickTimes;

@@ -1,6 +1,6 @@
 //! A profile on the terminal: within 100 columns unless names are long.
 
-use crate::profile::Profile;
+use crate::profile::figures::Profile;
 use crate::profile::times::{Quantiles, Times};
 use std::fmt::{self, Display, Formatter};
 

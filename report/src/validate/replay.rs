@@ -3,19 +3,23 @@
 //! The player plays the flight from its first moment on. For each vehicle and each length of window a plant flies the
 //! commands, set to the measured state at the start of each window; all in one run, so that all fly the same.
 
-use super::{HORIZONS_MS, Validation, rows};
+use super::rows;
 use anyhow::{Context, Result, bail};
 use flights::Flight;
 use recorder::reader::Recording;
-use runtime::event::RunEvent;
+use runtime::event::{RunEvent, StopToken};
 use runtime::host::Host;
 use runtime::launcher::Launcher;
 use runtime::manifest::Manifest;
 use runtime::output_file::{self, Kind, Mark, is_same};
+use runtime::registry::Registry;
 use std::fmt::Write as _;
 use std::fs::File;
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
+
+/// Lengths of the windows, in milliseconds.
+pub const HORIZONS_MS: [u32; 3] = [100, 500, 1000];
 
 /// The topic of the measured states.
 pub const MEASURED: &str = "/player/measured";
@@ -81,10 +85,15 @@ impl Replay {
     ///
     /// # Errors
     /// As `hummingbus run`; a run that was stopped too.
-    pub fn fly(&self, how: &Validation<'_>, tell: &mut dyn FnMut(&str)) -> Result<(f64, Recording)> {
-        let manifest = Manifest::load(&self.manifest_path(), &[], how.components)?;
+    pub fn fly(
+        &self,
+        components: Registry,
+        stop: &StopToken,
+        tell: &mut dyn FnMut(&str),
+    ) -> Result<(f64, Recording)> {
+        let manifest = Manifest::load(&self.manifest_path(), &[], components)?;
         let launcher =
-            Launcher::new(Host::this_binary()).stopped_by(how.stop).adopting_orphans().followed_by(|event| {
+            Launcher::new(Host::this_binary()).stopped_by(stop).adopting_orphans().followed_by(|event| {
                 if let RunEvent::Note(text) = event {
                     tell(text);
                 }

@@ -1,8 +1,7 @@
 //! Errors at the ends of windows: the simulated states of a recording against the measured ones.
 
-use super::HORIZONS_MS;
 use super::errors::{ChannelErrors, FlightErrors, HorizonErrors};
-use super::replay::{MEASURED, Replay, plant};
+use super::replay::{HORIZONS_MS, MEASURED, Replay, plant};
 use crate::states::{FIELDS_OF_STATE, Track, tracks};
 use anyhow::Result;
 use flights::state::{StateQuantity, WindowEndErrors};

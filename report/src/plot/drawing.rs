@@ -1,0 +1,77 @@
+//! All that a file shows, whatever its format.
+
+use super::figure::{Panel, Trail};
+use super::scene::Solid;
+use serde::Serialize;
+use serde_json::{Value, json};
+use std::fmt;
+
+/// A way to look at a recording.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum View {
+    /// Curves over time.
+    Time,
+    /// The paths in space, with the scene.
+    Path,
+    /// The paths from above.
+    Top,
+    /// The paths from the side.
+    Side,
+}
+
+/// What the axis of time shows.
+pub const TIME_LABEL: &str = "simulated time [s]";
+
+/// All that a file shows; its text says how much that is.
+#[derive(Debug)]
+pub struct Drawing {
+    pub(super) title: String,
+    pub(super) recording: String,
+    pub(super) span_s: [f64; 2],
+    pub(super) views: Vec<View>,
+    pub(super) panels: Vec<Panel>,
+    pub(super) trails: Vec<Trail>,
+    pub(super) solids: Vec<Solid>,
+}
+
+impl Drawing {
+    /// What is drawn: names, units and numbers of points.
+    #[must_use]
+    pub fn json(&self) -> Value {
+        json!({
+            "recording": self.recording,
+            "span_s": self.span_s,
+            "panels": self.panels,
+            "trails": self.trails,
+            "solids": self.solids,
+        })
+    }
+
+    /// The views that were asked for, or else those of `usual` that there is something for.
+    pub fn views_or(&self, usual: &[View]) -> Vec<View> {
+        let has_some =
+            |view: &View| if *view == View::Time { !self.panels.is_empty() } else { !self.trails.is_empty() };
+        if self.views.is_empty() {
+            usual.iter().copied().filter(has_some).collect()
+        } else {
+            self.views.clone()
+        }
+    }
+}
+
+impl fmt::Display for Drawing {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let axes = self.panels.iter().flat_map(|panel| &panel.axes);
+        let curves: usize = axes.clone().map(|axes| axes.curves.len()).sum();
+        write!(
+            f,
+            "axes: {} with {curves} curves; paths: {}; boxes: {}; from {:.3} s to {:.3} s",
+            axes.count(),
+            self.trails.len(),
+            self.solids.len(),
+            self.span_s[0],
+            self.span_s[1]
+        )
+    }
+}

@@ -1,0 +1,123 @@
+//! Lines, letters, numbers and legends of pictures, in plotters' units.
+
+use crate::plot::choice::Role;
+use anyhow::Result;
+use plotters::coord::{CoordTranslate, Shift};
+use plotters::prelude::*;
+use plotters::style::text_anchor::{HPos, Pos, VPos};
+
+/// A part of a picture that is drawn on.
+pub type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
+
+/// Plotters places everything on whole units: finer ones than the picture's make its lines smooth.
+pub const UNITS_PER_PIXEL: u32 = 8;
+/// Width of a picture in pixels.
+pub const WIDTH: u32 = 1000;
+/// Height of a row of a legend in pixels.
+pub const LEGEND_ROW: u32 = 18;
+/// Bold enough beside the curves' names, and thin enough beside each other.
+const FLOWN_WIDTH: u32 = 14;
+const THIN_WIDTH: u32 = 7;
+/// Size of all other letters.
+pub const LABEL_SIZE: u32 = 13;
+/// Colour of lines that only guide the eye.
+pub const GRID: RGBColor = RGBColor(225, 225, 225);
+/// Colour of letters and axes.
+pub const INK: RGBColor = RGBColor(40, 40, 40);
+
+/// Units for `pixels`.
+pub const fn px(pixels: u32) -> u32 {
+    pixels * UNITS_PER_PIXEL
+}
+
+/// The same for a place.
+#[allow(clippy::cast_possible_wrap, reason = "a picture is far smaller than 2^31 units")]
+pub const fn at(pixels: u32) -> i32 {
+    px(pixels) as i32
+}
+
+/// Letters of `size` pixels.
+pub fn letters<'a>(size: u32) -> TextStyle<'a> {
+    ("sans-serif", px(size)).into_font().color(&INK)
+}
+
+/// How a line looks.
+#[derive(Clone, Copy)]
+pub struct Look {
+    colour: RGBColor,
+    width: u32,
+    /// Whether it is dashed.
+    pub is_dashed: bool,
+}
+
+impl Look {
+    /// That of a line with a role; what is beside the flown one is darker, to be told from it.
+    pub fn new(colour: &str, role: Role) -> Self {
+        let colour = rgb(colour);
+        let darker = RGBColor(colour.0 / 2, colour.1 / 2, colour.2 / 2);
+        let (colour, width) = if role == Role::Flown { (colour, FLOWN_WIDTH) } else { (darker, THIN_WIDTH) };
+        Self { colour, width, is_dashed: role == Role::Asked }
+    }
+
+    /// As plotters wants it.
+    pub fn style(self) -> ShapeStyle {
+        self.colour.stroke_width(self.width)
+    }
+}
+
+fn rgb(colour: &str) -> RGBColor {
+    let part = |index: usize| colour.get(index..index + 2).and_then(|hex| u8::from_str_radix(hex, 16).ok());
+    RGBColor(part(1).unwrap_or(0), part(3).unwrap_or(0), part(5).unwrap_or(0))
+}
+
+/// Draws a line on flat axes or in space.
+///
+/// # Errors
+/// If plotters cannot.
+pub fn draw_line<T: CoordTranslate>(
+    chart: &mut ChartContext<'_, SVGBackend<'_>, T>,
+    points: impl Iterator<Item = T::From> + Clone,
+    look: Look,
+) -> Result<()>
+where
+    T::From: Clone + 'static,
+{
+    if look.is_dashed {
+        chart.draw_series(DashedLineSeries::new(points, px(6), px(4), look.style()))?;
+    } else {
+        chart.draw_series(LineSeries::new(points, look.style()))?;
+    }
+    Ok(())
+}
+
+/// Draws a legend, `width` pixels wide, at the right side of an area; returns what is left of it. Beside the curves it
+/// hides none.
+pub fn draw_legend<'a, 'n>(
+    area: &Area<'a>,
+    width: u32,
+    entries: impl Iterator<Item = (&'n str, Look)>,
+) -> Result<Area<'a>> {
+    let (plots, legend) = area.split_horizontally(px(WIDTH - width));
+    let anchor = Pos::new(HPos::Left, VPos::Center);
+    for (row, (name, look)) in (0..).zip(entries) {
+        let y = at(36 + row * LEGEND_ROW);
+        let ends = [(at(10), y), (at(36), y)];
+        if look.is_dashed {
+            let dashes = [(ends[0].0, at(18)), (at(22), at(30)), (at(34), at(36))];
+            for (from, to) in dashes {
+                legend.draw(&PathElement::new(vec![(from, y), (to, y)], look.style()))?;
+            }
+        } else {
+            legend.draw(&PathElement::new(ends.to_vec(), look.style()))?;
+        }
+        legend.draw(&Text::new(name.to_owned(), (at(44), y), letters(LABEL_SIZE).pos(anchor)))?;
+    }
+    Ok(plots)
+}
+
+/// A number at an axis: without the digits that steps of 0.1 add to it.
+pub fn number(value: &f64) -> String {
+    let rounded = (value * 1e6).round() / 1e6;
+    // No minus before a zero.
+    format!("{}", if rounded == 0.0 { 0.0 } else { rounded })
+}

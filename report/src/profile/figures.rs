@@ -1,0 +1,42 @@
+//! All figures of a profiled run.
+
+use super::age::{Age, ages};
+use super::latency::{NodeLatency, Transport, latencies};
+use super::pacing::Pacing;
+use super::path::CriticalPath;
+use runtime::flight::Flight;
+use serde::Serialize;
+
+/// Where the host time of a run went.
+#[derive(Debug, Serialize)]
+pub struct Profile {
+    /// Ticks of the run.
+    pub ticks: u32,
+    /// Computations whose times were noted, over all nodes.
+    pub noted: usize,
+    /// Computations that were not noted because there were too many.
+    pub left_out: u64,
+    pub(super) nodes: Vec<NodeLatency>,
+    pub(super) transport: Vec<Transport>,
+    pub(super) age: Vec<Age>,
+    pub(super) critical_path: CriticalPath,
+    /// Deadlines; `None` for a run that was not paced.
+    pub(super) pacing: Option<Pacing>,
+}
+
+impl Profile {
+    /// The profile of `flight`, in which the clock counted `missed_deadlines`.
+    pub fn of(flight: &Flight, missed_deadlines: u32) -> Self {
+        let (nodes, transport) = latencies(flight);
+        Self {
+            ticks: flight.ticks,
+            noted: flight.noted(),
+            left_out: flight.left_out(),
+            nodes,
+            transport,
+            age: ages(flight),
+            critical_path: CriticalPath::of(flight),
+            pacing: Pacing::of(flight, missed_deadlines),
+        }
+    }
+}

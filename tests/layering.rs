@@ -1,0 +1,383 @@
+//! No two files of a crate need each other: what a file names lies in files below it, all the way down.
+//!
+//! A file needs another where it names something that the other defines, whatever path or re-export it takes; a
+//! module that is declared or re-exported is not yet needed. Tests may look at everything, and are left out.
+
+use proc_macro2::{Delimiter, TokenStream, TokenTree};
+use quote::ToTokens;
+use std::collections::{BTreeMap, BTreeSet};
+use std::fs;
+use std::path::{Path, PathBuf};
+use syn::{Attribute, Item, UseTree, Visibility};
+
+type Names = Vec<String>;
+
+/// A module of a crate, in a file of its own or within one.
+#[derive(Default)]
+struct Module {
+    file: PathBuf,
+    /// What it defines, but for modules.
+    defined: BTreeSet<String>,
+    children: BTreeSet<String>,
+    /// Imported names with their paths.
+    imports: BTreeMap<String, Names>,
+    /// Names that are imported for others, and so are not yet needed here.
+    reexported: BTreeSet<String>,
+    globs: Vec<Names>,
+    code: Vec<Token>,
+}
+
+/// A token without what groups them.
+enum Token {
+    Name(String),
+    /// `::`
+    Path,
+    /// `.`, behind which a field or a method stands.
+    Dot,
+    /// A bracket that opens.
+    Open,
+    Other,
+}
+
+/// The modules of a crate by their paths.
+#[derive(Default)]
+struct Crate {
+    modules: BTreeMap<Names, Module>,
+}
+
+impl Crate {
+    /// Reads the crate whose root is the file `root`.
+    fn read(root: &Path) -> Self {
+        let mut read = Self::default();
+        read.add_file(Vec::new(), root, root.parent().unwrap());
+        read
+    }
+
+    /// Adds the module `path` in `file`, whose children have files in `folder`.
+    fn add_file(&mut self, path: Names, file: &Path, folder: &Path) {
+        let text = fs::read_to_string(file).unwrap_or_else(|error| panic!("{}: {error}", file.display()));
+        let items =
+            syn::parse_file(&text).unwrap_or_else(|error| panic!("{}: {error}", file.display())).items;
+        self.add(path, file, folder, items);
+    }
+
+    fn add(&mut self, path: Names, file: &Path, folder: &Path, items: Vec<Item>) {
+        let mut module = Module { file: file.to_owned(), ..Module::default() };
+        for item in items.into_iter().filter(|item| !is_for_tests(attributes(item))) {
+            match item {
+                Item::Mod(child) => {
+                    let name = child.ident.to_string();
+                    let inner = [&path[..], &[name.clone()]].concat();
+                    let below = folder.join(&name);
+                    match child.content {
+                        Some((_, items)) => self.add(inner, file, &below, items),
+                        None => self.add_file(inner, &file_of(folder, &name), &below),
+                    }
+                    module.children.insert(name);
+                }
+                Item::Use(item) => {
+                    let is_for_others = !matches!(item.vis, Visibility::Inherited);
+                    module.import(&item.tree, &mut Vec::new(), is_for_others);
+                }
+                item => {
+                    module.defined.extend(defined(&item));
+                    flatten(item.to_token_stream(), &mut module.code);
+                }
+            }
+        }
+        self.modules.insert(path, module);
+    }
+
+    /// The file that defines what `names` lead to from the module `at`; `None` where that is outside of the crate.
+    fn file(&self, at: &[String], names: &[String], depth: usize) -> Option<&Path> {
+        let (first, rest) = names.split_first()?;
+        let module = self.modules.get(at)?;
+        match first.as_str() {
+            // Imports that lead to themselves do not compile; a limit all the same.
+            _ if depth > 20 => None,
+            "crate" => self.below(&[], rest, depth),
+            "self" => self.below(at, rest, depth),
+            "super" => self.below(at.split_last()?.1, rest, depth),
+            name if module.children.contains(name) => self.below(at, names, depth),
+            name => {
+                let target = module.imports.get(name).filter(|target| *target != names)?;
+                self.file(at, &[target, rest].concat(), depth + 1)
+            }
+        }
+    }
+
+    /// The same for names that are followed down from the module `at` alone.
+    fn below(&self, at: &[String], names: &[String], depth: usize) -> Option<&Path> {
+        let module = self.modules.get(at)?;
+        let Some((first, rest)) = names.split_first() else { return Some(&module.file) };
+        if first == "super" {
+            return self.below(at.split_last()?.1, rest, depth);
+        }
+        if module.children.contains(first) {
+            return self.below(&[at, &[first.clone()]].concat(), rest, depth);
+        }
+        if module.defined.contains(first) {
+            return Some(&module.file);
+        }
+        if module.imports.contains_key(first) {
+            return self.file(at, names, depth + 1);
+        }
+        let through = |glob: &Names| {
+            let found = self.file(at, &[&glob[..], names].concat(), depth + 1)?;
+            (found != module.file).then_some(found)
+        };
+        module.globs.iter().find_map(through).or(Some(&module.file))
+    }
+
+    /// The files that each file needs.
+    fn needs(&self) -> BTreeMap<&Path, BTreeSet<&Path>> {
+        let mut needs: BTreeMap<&Path, BTreeSet<&Path>> = BTreeMap::new();
+        for (path, module) in &self.modules {
+            let named = module.needed().into_iter().filter_map(|names| self.file(path, &names, 0));
+            needs.entry(&module.file).or_default().extend(named.filter(|file| *file != module.file));
+        }
+        needs
+    }
+}
+
+impl Module {
+    fn import(&mut self, tree: &UseTree, prefix: &mut Names, is_for_others: bool) {
+        let mut add = |name: String, path: Names| {
+            if is_for_others {
+                self.reexported.insert(name.clone());
+            }
+            self.imports.insert(name, path);
+        };
+        match tree {
+            UseTree::Path(path) => {
+                prefix.push(path.ident.to_string());
+                self.import(&path.tree, prefix, is_for_others);
+                prefix.pop();
+            }
+            UseTree::Name(name) if name.ident == "self" => {
+                add(prefix.last().cloned().unwrap_or_default(), prefix.clone());
+            }
+            UseTree::Name(name) => {
+                let name = name.ident.to_string();
+                add(name.clone(), [&prefix[..], &[name]].concat());
+            }
+            UseTree::Rename(rename) => {
+                add(rename.rename.to_string(), [&prefix[..], &[rename.ident.to_string()]].concat());
+            }
+            UseTree::Glob(_) => self.globs.push(prefix.clone()),
+            UseTree::Group(group) => {
+                group.items.iter().for_each(|tree| self.import(tree, prefix, is_for_others));
+            }
+        }
+    }
+
+    /// The paths that are named: those that are imported for this module, and those in its code.
+    fn needed(&self) -> Vec<Names> {
+        let own = self.imports.iter().filter(|(name, _)| !self.reexported.contains(*name));
+        let mut needed: Vec<Names> = own.map(|(_, path)| path.clone()).chain(self.globs.clone()).collect();
+        let mut at = 0;
+        while at < self.code.len() {
+            let is_field = at > 0 && matches!(self.code[at - 1], Token::Dot);
+            let mut names = Vec::new();
+            while let Some(Token::Name(name)) = self.code.get(at) {
+                names.push(name.clone());
+                at += 1;
+                match self.code.get(at) {
+                    Some(Token::Path) => at += 1,
+                    _ => break,
+                }
+            }
+            // One name alone may be a variable: it counts where it is called, or is a type or a constant.
+            let is_called = matches!(self.code.get(at), Some(Token::Open));
+            let is_large = names.first().is_some_and(|name| name.starts_with(char::is_uppercase));
+            if names.is_empty() {
+                at += 1;
+            } else if !is_field && (names.len() > 1 || is_called || is_large) {
+                needed.push(names);
+            }
+        }
+        needed
+    }
+}
+
+fn file_of(folder: &Path, name: &str) -> PathBuf {
+    let file = folder.join(format!("{name}.rs"));
+    if file.exists() { file } else { folder.join(name).join("mod.rs") }
+}
+
+fn flatten(stream: TokenStream, tokens: &mut Vec<Token>) {
+    let mut last_colon = false;
+    for tree in stream {
+        let is_colon = matches!(&tree, TokenTree::Punct(punct) if punct.as_char() == ':');
+        match tree {
+            TokenTree::Ident(name) => tokens.push(Token::Name(name.to_string())),
+            TokenTree::Punct(_) if is_colon && last_colon => {
+                tokens.pop();
+                tokens.push(Token::Path);
+            }
+            TokenTree::Punct(punct) => {
+                tokens.push(if punct.as_char() == '.' { Token::Dot } else { Token::Other });
+            }
+            TokenTree::Group(group) => {
+                let is_open = group.delimiter() == Delimiter::Parenthesis;
+                tokens.push(if is_open { Token::Open } else { Token::Other });
+                flatten(group.stream(), tokens);
+                tokens.push(Token::Other);
+            }
+            TokenTree::Literal(_) => tokens.push(Token::Other),
+        }
+        last_colon = is_colon && !last_colon;
+    }
+}
+
+fn is_for_tests(attributes: &[Attribute]) -> bool {
+    attributes.iter().any(|attribute| {
+        attribute.path().is_ident("cfg") && attribute.meta.to_token_stream().to_string().contains("test")
+    })
+}
+
+fn attributes(item: &Item) -> &[Attribute] {
+    match item {
+        Item::Const(item) => &item.attrs,
+        Item::Enum(item) => &item.attrs,
+        Item::Fn(item) => &item.attrs,
+        Item::Impl(item) => &item.attrs,
+        Item::Macro(item) => &item.attrs,
+        Item::Mod(item) => &item.attrs,
+        Item::Static(item) => &item.attrs,
+        Item::Struct(item) => &item.attrs,
+        Item::Trait(item) => &item.attrs,
+        Item::Type(item) => &item.attrs,
+        Item::Union(item) => &item.attrs,
+        Item::Use(item) => &item.attrs,
+        _ => &[],
+    }
+}
+
+fn defined(item: &Item) -> Option<String> {
+    let name = match item {
+        Item::Const(item) => &item.ident,
+        Item::Enum(item) => &item.ident,
+        Item::Fn(item) => &item.sig.ident,
+        Item::Macro(item) => item.ident.as_ref()?,
+        Item::Static(item) => &item.ident,
+        Item::Struct(item) => &item.ident,
+        Item::Trait(item) => &item.ident,
+        Item::Type(item) => &item.ident,
+        Item::Union(item) => &item.ident,
+        _ => return None,
+    };
+    Some(name.to_string())
+}
+
+/// The groups of files of which each needs, over others, all of its group.
+fn circles<'a>(needs: &BTreeMap<&'a Path, BTreeSet<&'a Path>>) -> BTreeSet<Vec<&'a Path>> {
+    let reached = |from: &'a Path| {
+        let (mut reached, mut open) = (BTreeSet::new(), vec![from]);
+        while let Some(file) = open.pop() {
+            open.extend(needs.get(file).into_iter().flatten().filter(|next| reached.insert(**next)));
+        }
+        reached
+    };
+    let reached: BTreeMap<&Path, BTreeSet<&Path>> = needs.keys().map(|file| (*file, reached(file))).collect();
+    let circle = |(file, others): (&&'a Path, &BTreeSet<&'a Path>)| -> Vec<&'a Path> {
+        others
+            .iter()
+            .copied()
+            .filter(|other| reached.get(other).is_some_and(|back| back.contains(file)))
+            .collect()
+    };
+    reached.iter().map(circle).filter(|circle| !circle.is_empty()).collect()
+}
+
+/// The roots of all crates of the workspace.
+fn roots() -> Vec<PathBuf> {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let manifest: toml::Table = fs::read_to_string(root.join("Cargo.toml")).unwrap().parse().unwrap();
+    let members = manifest["workspace"]["members"].as_array().unwrap().iter();
+    let members = members.map(|member| root.join(member.as_str().unwrap()));
+    let roots: Vec<PathBuf> = members.chain([root.to_owned()]).map(|path| path.join("src/lib.rs")).collect();
+    assert!(roots.len() > 10, "{roots:?}");
+    roots
+}
+
+#[test]
+fn no_files_need_each_other() {
+    let mut found = String::new();
+    for root in roots() {
+        let read = Crate::read(&root);
+        let needs = read.needs();
+        for circle in circles(&needs) {
+            let short =
+                |file: &Path| file.strip_prefix(env!("CARGO_MANIFEST_DIR")).unwrap().display().to_string();
+            found += &format!("circle of {} files:\n", circle.len());
+            for file in &circle {
+                let others = needs[file].iter().filter(|other| circle.contains(other));
+                let others: Vec<String> = others.map(|other| short(other)).collect();
+                found += &format!("  {} needs {}\n", short(file), others.join(", "));
+            }
+        }
+    }
+    assert!(found.is_empty(), "move types down, to where all who need them look:\n{found}");
+}
+
+/// The circles of a crate with these files.
+fn circles_of(files: &[(&str, &str)]) -> Vec<Vec<String>> {
+    let folder = tempfile::tempdir().unwrap();
+    for (name, text) in files {
+        let path = folder.path().join(name);
+        fs::create_dir_all(path.parent().unwrap()).unwrap();
+        fs::write(path, text).unwrap();
+    }
+    let read = Crate::read(&folder.path().join("lib.rs"));
+    let short = |file: &&Path| file.strip_prefix(folder.path()).unwrap().to_string_lossy().into_owned();
+    circles(&read.needs()).iter().map(|circle| circle.iter().map(short).collect()).collect()
+}
+
+#[test]
+fn a_circle_is_found_whatever_path_it_takes() {
+    let below = ("b.rs", "pub struct B; pub const N: u8 = 1;");
+    let cases: [(&str, &[(&str, &str)]); 5] = [
+        (
+            "imports",
+            &[("a.rs", "use crate::b::B; pub struct A(B);"), ("b.rs", "use crate::a::A; pub struct B(A);")],
+        ),
+        (
+            "a path in code",
+            &[("a.rs", "pub fn a() { crate::b::b() }"), ("b.rs", "pub fn b() { super::a::a() }")],
+        ),
+        (
+            "a path in a macro",
+            &[("a.rs", "pub fn a() { vec![crate::b::b()]; }"), ("b.rs", "pub fn b() { crate::a::a() }")],
+        ),
+        (
+            "a re-export",
+            &[("a.rs", "pub fn a() { crate::renamed() }"), ("b.rs", "use crate::a; pub fn b() { a::a() }")],
+        ),
+        (
+            "a glob",
+            &[
+                ("a.rs", "use crate::b::*; pub struct A(B);"),
+                ("b.rs", "pub struct B; pub fn b() -> crate::a::A { loop {} }"),
+            ],
+        ),
+    ];
+    for (what, files) in cases {
+        let lib = ("lib.rs", "mod a; mod b; pub use b::b as renamed;");
+        assert_eq!(circles_of(&[files, &[lib]].concat()), [["a.rs", "b.rs"]], "{what}");
+    }
+    let child = [
+        ("lib.rs", "mod a;"),
+        ("a.rs", "mod b; use b::B; pub struct A(B);"),
+        ("a/b.rs", "pub struct B(super::A);"),
+    ];
+    assert_eq!(circles_of(&child), [["a/b.rs", "a.rs"]], "a parent and its child");
+    let facade = [("lib.rs", "mod a; mod b; pub use a::A;"), ("a.rs", "pub struct A(crate::b::B);"), below];
+    assert_eq!(circles_of(&facade), Vec::<Vec<String>>::new(), "a facade needs nothing");
+    let tests = [
+        ("lib.rs", "mod a; mod b;"),
+        ("a.rs", "use crate::b::B; pub struct A(B);"),
+        ("b.rs", "pub struct B; #[cfg(test)] mod tests { use crate::a::A; }"),
+    ];
+    assert_eq!(circles_of(&tests), Vec::<Vec<String>>::new(), "tests look at everything");
+}
