@@ -37,6 +37,19 @@ pub struct Topic {
 }
 
 /// An open recording.
+///
+/// ```no_run
+/// use recorder::reader::Recording;
+///
+/// let recording = Recording::open("hover.mcap".as_ref())?;
+/// for record in recording.messages() {
+///     let record = record?;
+///     for leaf in recording.decode(&record)? {
+///         println!("{} {} {} = {} {}", record.tick, record.topic, leaf.path, leaf.value, leaf.unit);
+///     }
+/// }
+/// # Ok::<(), recorder::RecordingError>(())
+/// ```
 #[derive(Debug)]
 pub struct Recording {
     path: PathBuf,

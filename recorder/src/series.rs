@@ -22,6 +22,16 @@ pub struct Series {
 impl Recording {
     /// The values of `fields`, given as topic and field path: a series each, read in one pass.
     ///
+    /// ```no_run
+    /// use recorder::reader::Recording;
+    ///
+    /// let recording = Recording::open("hover.mcap".as_ref())?;
+    /// let series = recording.series(&[("/plant/state", "position.z"), ("/plant/state", "attitude.yaw")])?;
+    /// let highest_m = series[0].value.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    /// assert!(highest_m < 1.7);
+    /// # Ok::<(), recorder::RecordingError>(())
+    /// ```
+    ///
     /// # Errors
     /// If there is no such topic or field, or the file is damaged.
     pub fn series(&self, fields: &[(&str, &str)]) -> Result<Vec<Series>, RecordingError> {

@@ -4,7 +4,7 @@ use crate::support::repository;
 use std::path::Path;
 
 /// The sources that hold tests.
-const SOURCES: [&str; 10] = [
+const SOURCES: [&str; 11] = [
     "tests/faults",
     "tests/runs",
     "bus/src",
@@ -14,6 +14,7 @@ const SOURCES: [&str; 10] = [
     "identify/tests",
     "vehicles/tests",
     "vehicles/src",
+    "runtime/src",
     "src",
 ];
 

@@ -85,9 +85,9 @@ impl Source {
         }
         let clock = self.clock(status.state);
         // While it is being written, or gone with the run, that of the start serves.
-        let roster = Membership::load(&self.run.entry.run_dir, self.control.epoch());
-        let roster = roster.unwrap_or_else(|_| Membership::first(&self.plan));
-        let nodes = roster.nodes.iter().enumerate().map(|(node, roster)| self.node(node, roster));
+        let membership = Membership::load(&self.run.entry.run_dir, self.control.epoch());
+        let membership = membership.unwrap_or_else(|_| Membership::first(&self.plan));
+        let nodes = membership.nodes.iter().enumerate().map(|(node, own)| self.node(node, own));
         let topics = self.plan.topics.iter().enumerate().map(|(index, topic)| TopicSample {
             samples: self.control.ticks_sent(index).div_ceil(topic.period_ticks),
             lost: self.control.gaps(index),
@@ -115,31 +115,31 @@ impl Source {
         }
     }
 
-    fn node(&self, node: usize, roster: &NodeInstances) -> ProcessSample {
-        let member = self.plan.slot(node, roster.primary.generation);
-        let id = self.control.process(member);
+    fn node(&self, node: usize, instances: &NodeInstances) -> ProcessSample {
+        let slot = self.plan.slot(node, instances.primary.generation);
+        let id = self.control.process(slot);
         let kernel = id.and_then(KernelView::of);
         let trouble = kernel.as_ref().and_then(KernelView::trouble);
         ProcessSample {
             id,
-            state: trouble.map_or_else(|| self.node_state(member, roster), str::to_owned),
-            ticks: self.control.completed_by(member),
+            state: trouble.map_or_else(|| self.node_state(slot, instances), str::to_owned),
+            ticks: self.control.completed_by(slot),
             cpu_ticks: kernel.map(|kernel| kernel.cpu_ticks),
-            step_times: Some(self.control.step_times(member)),
-            late: self.control.late_count(member),
+            step_times: Some(self.control.step_times(slot)),
+            late: self.control.late_count(slot),
         }
     }
 
-    fn node_state(&self, member: usize, roster: &NodeInstances) -> String {
-        let awaited = self.control.awaited_topic(&self.plan, member, &roster.primary.plan.inputs);
+    fn node_state(&self, slot: usize, instances: &NodeInstances) -> String {
+        let awaited = self.control.awaited_topic(&self.plan, slot, &instances.primary.plan.inputs);
         let state = match awaited {
             _ if self.control.phase() != Phase::Running => "connects".to_owned(),
-            _ if self.control.has_completed(member) => "done".to_owned(),
+            _ if self.control.has_completed(slot) => "done".to_owned(),
             Some(topic) => format!("waits for {}", self.plan.topics[topic].name),
-            None if self.control.awaits_grant(member) => "waits for grant".to_owned(),
+            None if self.control.awaits_grant(slot) => "waits for grant".to_owned(),
             None => "computes".to_owned(),
         };
-        match &roster.backup {
+        match &instances.backup {
             Some(successor) => format!("{state}, shadowed by .{}", successor.generation),
             None => state,
         }
