@@ -67,7 +67,7 @@ impl Crate {
             match item {
                 Item::Mod(child) => {
                     let name = child.ident.to_string();
-                    let inner = [&path[..], &[name.clone()]].concat();
+                    let inner = [&path[..], std::slice::from_ref(&name)].concat();
                     let below = folder.join(&name);
                     match child.content {
                         Some((_, items)) => self.add(inner, file, &below, items),
@@ -114,7 +114,7 @@ impl Crate {
             return self.below(at.split_last()?.1, rest, depth);
         }
         if module.children.contains(first) {
-            return self.below(&[at, &[first.clone()]].concat(), rest, depth);
+            return self.below(&[at, std::slice::from_ref(first)].concat(), rest, depth);
         }
         if module.defined.contains(first) {
             return Some(&module.file);

@@ -3,26 +3,24 @@
 use std::fmt;
 
 /// A table: what its columns are called, and its rows. Its text has columns as wide as their longest cell.
-pub(crate) struct Cells<const N: usize> {
-    pub headings: [&'static str; N],
+pub(crate) struct Cells {
+    pub headings: Vec<String>,
     /// Whether a column holds numbers, which stand right.
-    pub is_number: [bool; N],
-    pub rows: Vec<[String; N]>,
+    pub is_number: Vec<bool>,
+    pub rows: Vec<Vec<String>>,
 }
 
-impl<const N: usize> fmt::Display for Cells<N> {
+impl fmt::Display for Cells {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let headings = self.headings.map(str::to_owned);
-        let rows = || std::iter::once(&headings).chain(&self.rows);
-        let width = |column: usize| rows().map(|row| row[column].chars().count()).max().unwrap_or(0);
-        let widths: [usize; N] = std::array::from_fn(width);
-        let cell = |row: &[String; N], column: usize| {
-            let (text, width) = (&row[column], widths[column]);
-            if self.is_number[column] { format!("{text:>width$}") } else { format!("{text:<width$}") }
+        let rows = || std::iter::once(&self.headings).chain(&self.rows);
+        let width = |column: usize| rows().filter_map(|row| Some(row.get(column)?.chars().count())).max();
+        let widths: Vec<usize> = (0..self.headings.len()).filter_map(width).collect();
+        let cell = |((text, width), is_number): ((&String, &usize), &bool)| {
+            if *is_number { format!("{text:>width$}") } else { format!("{text:<width$}") }
         };
         rows().try_for_each(|row| {
-            let cells: Vec<String> = (0..N).map(|column| cell(row, column)).collect();
-            writeln!(f, "{}", cells.join("  "))
+            let cells: Vec<String> = row.iter().zip(&widths).zip(&self.is_number).map(cell).collect();
+            writeln!(f, "{}", cells.join("  ").trim_end())
         })
     }
 }

@@ -1,17 +1,24 @@
-//! A profile on the terminal: within 100 columns unless names are long.
+//! A profile on the terminal.
 
+use crate::cells::Cells;
+use crate::profile::age::Age;
 use crate::profile::figures::Profile;
+use crate::profile::latency::{NodeLatency, Transport};
+use crate::profile::path::PlaceShare;
 use crate::profile::times::{Quantiles, Times};
 use std::fmt::{self, Display, Formatter};
 
-const NAME_COLUMNS: usize = 52;
-
 impl Display for Profile {
     fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
-        self.write_nodes(f)?;
-        self.write_transport(f)?;
-        self.write_ages(f)?;
-        self.write_path(f)?;
+        let ages = self.age.chunk_by(|a, b| a.command == b.command);
+        let ages =
+            ages.map(|ages| table(&format!("age in {} [µs]", ages[0].command), ages.iter().flat_map(age)));
+        let path = &self.critical_path;
+        let tick = std::iter::once(("tick".to_owned(), &path.tick_time));
+        let hops = table("transport, where the reader waited [µs]", self.transport.iter().map(hop));
+        let path = table("critical path [µs]", tick.chain(path.places.iter().map(place)));
+        write!(f, "{}", table("node, per tick [µs]", self.nodes.iter().flat_map(node)))?;
+        std::iter::once(hops).chain(ages).chain([path]).try_for_each(|table| write!(f, "\n{table}"))?;
         self.write_pacing(f)?;
         if self.left_out > 0 {
             writeln!(f, "not profiled: {} computations beyond the first of each node", self.left_out)?;
@@ -21,50 +28,10 @@ impl Display for Profile {
 }
 
 impl Profile {
-    fn write_nodes(&self, f: &mut Formatter<'_>) -> fmt::Result {
-        head(f, "node, per tick [µs]")?;
-        for node in &self.nodes {
-            row(f, &format!("{:<40} wait", node.name), &node.wait)?;
-            for (part, times) in
-                [("wake-up", &node.wake_up), ("compute", &node.compute), ("publish", &node.publish)]
-            {
-                row(f, &format!("{:<40} {part}", ""), times)?;
-            }
-        }
-        Ok(())
-    }
-
-    fn write_transport(&self, f: &mut Formatter<'_>) -> fmt::Result {
-        head(f, "\ntransport, where the reader waited [µs]")?;
-        let mut hops = self.transport.iter();
-        hops.try_for_each(|hop| row(f, &format!("{} → {}", hop.topic, hop.reader), &hop.transport))
-    }
-
-    fn write_ages(&self, f: &mut Formatter<'_>) -> fmt::Result {
-        for (index, age) in self.age.iter().enumerate() {
-            if index == 0 || self.age[index - 1].command != age.command {
-                head(f, &format!("\nage in {} [µs]", age.command))?;
-            }
-            row(f, &format!("{:<40} simulated", age.source), &age.simulated)?;
-            row(f, &format!("{:<40} host", ""), &age.host)?;
-        }
-        Ok(())
-    }
-
-    fn write_path(&self, f: &mut Formatter<'_>) -> fmt::Result {
-        head(f, "\ncritical path [µs]")?;
-        row(f, "tick", &self.critical_path.tick_time)?;
-        for place in &self.critical_path.places {
-            let share = format!("{:5.1} %", 100.0 * place.share);
-            row(f, &format!("{share} {}", place.place), &place.time)?;
-        }
-        Ok(())
-    }
-
     fn write_pacing(&self, f: &mut Formatter<'_>) -> fmt::Result {
         let Some(pacing) = &self.pacing else { return Ok(()) };
-        head(f, "\ndeadlines [µs]")?;
-        row(f, "jitter: deadline to grant", &pacing.jitter)?;
+        let jitter = ("jitter: deadline to grant".to_owned(), &pacing.jitter);
+        write!(f, "\n{}", table("deadlines [µs]", std::iter::once(jitter)))?;
         writeln!(f, "missed: {}; grants late by a tick: {}", pacing.missed_deadlines, pacing.late_grants)?;
         let overruns = pacing.overruns.iter().filter(|node| node.ticks > 0);
         let overruns: Vec<_> = overruns.map(|node| format!("{} {}", node.name, node.ticks)).collect();
@@ -72,27 +39,49 @@ impl Profile {
     }
 }
 
-fn head(f: &mut Formatter<'_>, title: &str) -> fmt::Result {
-    let (space, title) = title.strip_prefix('\n').map_or(("", title), |title| ("\n", title));
-    let columns = ["count", "p50", "p90", "p99", "p99.9", "max"];
-    write!(f, "{space}{title:<NAME_COLUMNS$}")?;
-    columns.iter().try_for_each(|column| write!(f, "{column:>8}"))?;
-    writeln!(f)
+type Row<'a> = (String, &'a Times);
+
+fn hop(hop: &Transport) -> Row<'_> {
+    (format!("{} → {}", hop.topic, hop.reader), &hop.transport)
 }
 
-fn row(f: &mut Formatter<'_>, name: &str, times: &Times) -> fmt::Result {
-    if name.chars().count() >= NAME_COLUMNS {
-        write!(f, "{name}\n{:NAME_COLUMNS$}", "")?;
-    } else {
-        write!(f, "{name:<NAME_COLUMNS$}")?;
+fn place(place: &PlaceShare) -> Row<'_> {
+    (format!("{:5.1} % {}", 100.0 * place.share, place.place), &place.time)
+}
+
+/// The parts of a node's ticks; its name stands before the first.
+fn node(node: &NodeLatency) -> [Row<'_>; 4] {
+    [
+        (format!("{:<40} wait", node.name), &node.wait),
+        (format!("{:<40} wake-up", ""), &node.wake_up),
+        (format!("{:<40} compute", ""), &node.compute),
+        (format!("{:<40} publish", ""), &node.publish),
+    ]
+}
+
+fn age(age: &Age) -> [Row<'_>; 2] {
+    [(format!("{:<40} simulated", age.source), &age.simulated), (format!("{:<40} host", ""), &age.host)]
+}
+
+fn table<'a>(title: &str, rows: impl Iterator<Item = Row<'a>>) -> Cells {
+    let quantiles = ["count", "p50", "p90", "p99", "p99.9", "max"];
+    // All tables have the same columns, unless names are long.
+    let row = |(name, times): Row<'a>| std::iter::once(format!("{name:<51}")).chain(numbers(times)).collect();
+    Cells {
+        headings: [title].iter().chain(&quantiles).map(|title| (*title).to_owned()).collect(),
+        is_number: (0..=quantiles.len()).map(|column| column > 0).collect(),
+        rows: rows.map(row).collect(),
     }
-    let quantiles = times.quantiles();
-    write!(f, "{:>8}", quantiles.count)?;
-    if !times.is_empty() {
-        let Quantiles { p50_us, p90_us, p99_us, p99_9_us, max_us, .. } = quantiles;
-        let values = [p50_us, p90_us, p99_us, p99_9_us, max_us];
-        // Times of ten milliseconds and more keep their columns, and need no tenths.
-        values.iter().try_for_each(|&us| write!(f, "{us:>8.*}", usize::from(us < 1e4)))?;
-    }
-    writeln!(f)
+}
+
+/// How many times there are, and their quantiles in µs where there are any; with room for ten milliseconds.
+fn numbers(times: &Times) -> Vec<String> {
+    let Quantiles { count, p50_us, p90_us, p99_us, p99_9_us, max_us, .. } = times.quantiles();
+    let values = [p50_us, p90_us, p99_us, p99_9_us, max_us];
+    // Times of ten milliseconds and more keep their columns, and need no tenths.
+    let text = |us: f64| match count {
+        0 => String::new(),
+        _ => format!("{us:>6.*}", usize::from(us < 1e4)),
+    };
+    std::iter::once(format!("{count:>6}")).chain(values.map(text)).collect()
 }

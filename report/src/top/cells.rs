@@ -4,18 +4,18 @@ use crate::cells::Cells;
 use crate::top::view::{ProcessRow, TopicRow, View};
 
 /// The table of the processes.
-pub fn processes(view: &View) -> Cells<7> {
+pub fn processes(view: &View) -> Cells {
     Cells {
-        headings: ["process", "state", "tick", "CPU %", "p50 µs", "p99 µs", "late"],
-        is_number: [false, false, true, true, true, true, true],
+        headings: ["process", "state", "tick", "CPU %", "p50 µs", "p99 µs", "late"].map(str::to_owned).into(),
+        is_number: vec![false, false, true, true, true, true, true],
         rows: view.processes.iter().map(process).collect(),
     }
 }
 
-fn process(row: &ProcessRow) -> [String; 7] {
+fn process(row: &ProcessRow) -> Vec<String> {
     let or_dash =
         |value: Option<f64>, digits| value.map_or("-".to_owned(), |value| format!("{value:.digits$}"));
-    [
+    vec![
         row.name.clone(),
         row.state.clone(),
         row.tick.to_string(),
@@ -27,17 +27,17 @@ fn process(row: &ProcessRow) -> [String; 7] {
 }
 
 /// The table of the topics.
-pub fn topics(view: &View) -> Cells<5> {
+pub fn topics(view: &View) -> Cells {
     Cells {
-        headings: ["topic", "publisher", "rate Hz", "samples", "lost"],
-        is_number: [false, false, true, true, true],
+        headings: ["topic", "publisher", "rate Hz", "samples", "lost"].map(str::to_owned).into(),
+        is_number: vec![false, false, true, true, true],
         rows: view.topics.iter().map(topic).collect(),
     }
 }
 
-fn topic(row: &TopicRow) -> [String; 5] {
+fn topic(row: &TopicRow) -> Vec<String> {
     let rate = format!("{:.0}", row.rate_hz);
-    [row.name.clone(), row.publisher.clone(), rate, row.samples.to_string(), row.lost.to_string()]
+    vec![row.name.clone(), row.publisher.clone(), rate, row.samples.to_string(), row.lost.to_string()]
 }
 
 /// What stands above the tables: the run, and how far it has come.

@@ -54,8 +54,8 @@ impl Widget for Screen<'_> {
         let [run, progress] = title(self.view);
         let lines = [Line::styled(run, title_style(self.view.status.state)), Line::raw(progress)];
         Text::from_iter(lines).render(head, buffer);
-        table(&processes, PROCESS_WIDTHS, self.scroll, first.height).render(first, buffer);
-        table(&topics, TOPIC_WIDTHS, self.scroll, second.height).render(second, buffer);
+        table(&processes, &PROCESS_WIDTHS, self.scroll, first.height).render(first, buffer);
+        table(&topics, &TOPIC_WIDTHS, self.scroll, second.height).render(second, buffer);
         Line::raw(self.notice).bold().render(notice, buffer);
         Line::raw(KEYS).dim().render(keys, buffer);
     }
@@ -78,22 +78,17 @@ fn title_style(state: State) -> Style {
     Style::new().fg(color).bold()
 }
 
-fn table<const N: usize>(
-    cells: &Cells<N>,
-    widths: [Constraint; N],
-    scroll: usize,
-    height: u16,
-) -> Table<'static> {
-    let row = |texts: [String; N]| {
-        let aligned = |(text, is_number)| {
-            let line = Line::raw(text);
-            Cell::new(if is_number { line.right_aligned() } else { line })
+fn table(cells: &Cells, widths: &[Constraint], scroll: usize, height: u16) -> Table<'static> {
+    let row = |texts: &Vec<String>| {
+        let aligned = |(text, is_number): (&String, &bool)| {
+            let line = Line::raw(text.clone());
+            Cell::new(if *is_number { line.right_aligned() } else { line })
         };
-        Row::new(texts.into_iter().zip(cells.is_number).map(aligned).collect::<Vec<_>>())
+        Row::new(texts.iter().zip(&cells.is_number).map(aligned).collect::<Vec<_>>())
     };
     let hidden = cells.rows.len().saturating_sub(usize::from(height.saturating_sub(1)));
-    let rows = cells.rows.iter().skip(scroll.min(hidden)).cloned().map(row).collect::<Vec<_>>();
-    Table::new(rows, widths).header(row(cells.headings.map(str::to_owned)).dim()).column_spacing(1)
+    let rows = cells.rows.iter().skip(scroll.min(hidden)).map(row).collect::<Vec<_>>();
+    Table::new(rows, widths).header(row(&cells.headings).dim()).column_spacing(1)
 }
 
 #[cfg(test)]

@@ -1,5 +1,6 @@
 //! What came of a validation: errors by flight, horizon and channel, for people and for programs.
 
+use crate::cells::Cells;
 use flights::Role;
 use flights::state::StateQuantity;
 use serde_json::{Map, Value, json};
@@ -89,56 +90,42 @@ impl Errors {
         };
         json!({ "flights": self.flights.iter().map(flight).collect::<Map<_, _>>() })
     }
-
-    /// Width of the widest flight's name.
-    fn name_width(&self) -> usize {
-        self.flights.iter().map(|flight| flight.name.chars().count()).chain([6]).max().unwrap_or(6)
+    fn cells(&self) -> Cells {
+        let own = ["flight", "role", "horizon", "windows", "channel"].map(str::to_owned);
+        let ratio = (self.vehicles.len() == 2).then(|| "ratio".to_owned());
+        let headings: Vec<String> = own.into_iter().chain(self.vehicles.clone()).chain(ratio).collect();
+        let is_number = (0..headings.len()).map(|column| !matches!(column, 0 | 1 | 4)).collect();
+        let rows = self.flights.iter().flat_map(|flight| {
+            flight.horizons.iter().flat_map(move |horizon| {
+                horizon.channels.iter().map(move |channel| row(flight, horizon, channel))
+            })
+        });
+        Cells { headings, is_number, rows: rows.collect() }
     }
 }
 
 impl fmt::Display for Errors {
     /// A line for each flight, horizon and channel.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let width = self.name_width();
-        let columns: Vec<usize> = self.vehicles.iter().map(|label| label.chars().count().max(9)).collect();
-        write!(f, "{:width$}  role  horizon  windows  channel         ", "flight")?;
-        for (label, width) in self.vehicles.iter().zip(&columns) {
-            write!(f, "  {label:>width$}")?;
-        }
-        writeln!(f, "{}", if self.vehicles.len() == 2 { "   ratio" } else { "" })?;
-        for flight in &self.flights {
-            for horizon in &flight.horizons {
-                for channel in &horizon.channels {
-                    write_line(f, width, &columns, flight, horizon, channel)?;
-                }
-            }
-        }
+        write!(f, "{}", self.cells())?;
         self.flights.iter().try_for_each(|flight| write_left_out(f, flight))
     }
 }
 
-fn write_line(
-    f: &mut fmt::Formatter<'_>,
-    name_width: usize,
-    columns: &[usize],
-    flight: &FlightErrors,
-    horizon: &HorizonErrors,
-    channel: &ChannelErrors,
-) -> fmt::Result {
+fn row(flight: &FlightErrors, horizon: &HorizonErrors, channel: &ChannelErrors) -> Vec<String> {
     let role = match flight.role {
         Role::Fit => "fit",
         Role::Test => "test",
     };
-    let what = format!("{}, {}", channel.quantity.name(), channel.quantity.unit());
-    let (seconds, windows) = (format!("{} s", horizon.horizon()), horizon.windows);
-    write!(f, "{:name_width$}  {role:4}  {seconds:>7}  {windows:>7}  {what:16}", flight.name)?;
-    for (rms, width) in channel.rms.iter().zip(columns) {
-        write!(f, "  {:>width$}", short(*rms))?;
-    }
-    match channel.ratio() {
-        Some(ratio) => writeln!(f, "  {ratio:>6.3}"),
-        None => writeln!(f),
-    }
+    let own = [
+        flight.name.clone(),
+        role.to_owned(),
+        format!("{} s", horizon.horizon()),
+        horizon.windows.to_string(),
+        format!("{}, {}", channel.quantity.name(), channel.quantity.unit()),
+    ];
+    let ratio = channel.ratio().map(|ratio| format!("{ratio:.3}"));
+    own.into_iter().chain(channel.rms.iter().map(|rms| short(*rms))).chain(ratio).collect()
 }
 
 /// Says how many windows of a flight do not count.
