@@ -10,10 +10,9 @@ use recorder::reader::Recording;
 use runtime::event::{RunEvent, StopToken};
 use runtime::host::Host;
 use runtime::launcher::Launcher;
-use runtime::manifest::Manifest;
+use runtime::manifest::ManifestBuilder;
 use runtime::output_file::{self, Kind, Mark, is_same};
 use runtime::registry::Registry;
-use std::fmt::Write as _;
 use std::fs::File;
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
@@ -30,6 +29,7 @@ const RATE_HZ: u32 = 1000;
 /// Ticks between two recorded states: 100 Hz, enough to plot; the ends of all windows are among them.
 const RECORDED_TICKS: u32 = 10;
 
+const DATA: &str = "flight.csv";
 const MANIFEST: &str = "manifest.toml";
 const RECORDING: &str = "flight.mcap";
 /// The first line of a manifest that is written here.
@@ -45,6 +45,7 @@ const VEHICLES: [&str; 2] = ["first", "second"];
 pub struct Replay {
     /// Where its files are.
     folder: PathBuf,
+    manifest: ManifestBuilder,
     /// The moment of the flight at which tick 0 lies.
     start_s: f64,
     /// Ticks of the run.
@@ -67,18 +68,21 @@ impl Replay {
         let folder = std::path::absolute(folder)?.join(file_name(&flight.name));
         std::fs::create_dir_all(&folder).with_context(|| format!("cannot create {}", folder.display()))?;
         let lock = output_file::lock_folder(&folder)?;
-        let data = folder.join("flight.csv");
+        let data = folder.join(DATA);
         for output in [data.clone(), folder.join(MANIFEST), folder.join(RECORDING)] {
             require_no_input(&output, flight, vehicles)?;
         }
         let (canonical, text) = flights::csv(&rows::with_rows_at_commands(flight))?;
         output_file::write(&data, &CSV, |out| out.write_all(text.as_bytes()))?;
         let (start_s, end_s) = rows::span_s(&data)?;
-        let replay = Self { folder, start_s, ticks: ticks(end_s - start_s)?, _lock: lock };
-        let initial = command_at(flight, replay.start_s).context("it has no motor commands")?;
-        let manifest = replay.manifest(&canonical.columns, initial, vehicles)?;
-        output_file::write(&replay.manifest_path(), &WRITTEN, |out| out.write_all(manifest.as_bytes()))?;
-        Ok(replay)
+        let ticks = ticks(end_s - start_s)?;
+        let initial = command_at(flight, start_s).context("it has no motor commands")?;
+        let manifest = manifest(ticks, &canonical.columns, initial, vehicles)?;
+        // For whoever keeps the folder, and flies it once more.
+        output_file::write(&folder.join(MANIFEST), &WRITTEN, |out| {
+            write!(out, "{MANIFEST_START}\n\n{manifest}")
+        })?;
+        Ok(Self { folder, manifest, start_s, ticks, _lock: lock })
     }
 
     /// Flies; returns how long that took on the host, in seconds, and the recording.
@@ -91,7 +95,7 @@ impl Replay {
         stop: &StopToken,
         tell: &mut dyn FnMut(&str),
     ) -> Result<(f64, Recording)> {
-        let manifest = Manifest::load(&self.manifest_path(), &[], components)?;
+        let manifest = self.manifest.build(&self.folder.join(MANIFEST), components)?;
         let launcher =
             Launcher::new(Host::this_binary()).stopped_by(stop).adopting_orphans().followed_by(|event| {
                 if let RunEvent::Note(text) = event {
@@ -129,37 +133,36 @@ impl Replay {
         std::fs::remove_dir_all(&self.folder)
             .with_context(|| format!("cannot remove {}", self.folder.display()))
     }
+}
 
-    fn manifest_path(&self) -> PathBuf {
-        self.folder.join(MANIFEST)
-    }
-
-    /// The manifest's text, with the column map `columns` and the command `initial` before the first.
-    fn manifest(&self, columns: &str, initial: [f64; 4], vehicles: &[&Path]) -> Result<String> {
-        let duration_s = f64::from(self.ticks) / f64::from(RATE_HZ);
-        let mut text = format!(
-            "{MANIFEST_START}\n\n\
-             [run]\nrate_hz = {RATE_HZ}\nduration_s = {duration_s:.3}\nseed = 1\n\n\
-             [process.player]\nkind = \"player\"\ndata = \"flight.csv\"\n\
-             outputs.measured = {{ every_ticks = {RECORDED_TICKS} }}\n\n\
-             [process.player.parameters.columns]\n{columns}\n\
-             [process.recorder]\nkind = \"recorder\"\n"
-        );
-        for (number, vehicle) in vehicles.iter().enumerate() {
-            let vehicle = std::path::absolute(vehicle)?.display().to_string();
-            for horizon_ms in HORIZONS_MS {
-                let (plant, window_s) = (plant(number, horizon_ms), f64::from(horizon_ms) * 1e-3);
-                write!(
-                    text,
-                    "\n[process.{plant}]\nkind = \"plant\"\nvehicle = {}\nparameters = {{ window_s = {window_s:?} }}\n\
-                     inputs.command = {{ topic = \"/player/command\", delay_ticks = 1, initial = {{ command = {initial:?} }} }}\n\
-                     inputs.measured = \"{MEASURED}\"\noutputs.state = {{ every_ticks = {RECORDED_TICKS} }}\n",
-                    toml::Value::from(vehicle.clone()),
-                )?;
-            }
+/// The manifest of a run of `ticks` ticks, with the column map `columns` and the command `initial` before the first.
+fn manifest(ticks: u32, columns: &str, initial: [f64; 4], vehicles: &[&Path]) -> Result<ManifestBuilder> {
+    let every = i64::from(RECORDED_TICKS);
+    let mut manifest = ManifestBuilder::new()
+        .set("run.rate_hz", i64::from(RATE_HZ))
+        .set("run.duration_s", f64::from(ticks) / f64::from(RATE_HZ))
+        .set("run.seed", 1)
+        .set("process.player.kind", "player")
+        .set("process.player.data", DATA)
+        .set("process.player.outputs.measured.every_ticks", every)
+        .set("process.player.parameters.columns", columns.parse::<toml::Table>()?)
+        .set("process.recorder.kind", "recorder");
+    for (number, vehicle) in vehicles.iter().enumerate() {
+        let vehicle = std::path::absolute(vehicle)?.display().to_string();
+        for horizon_ms in HORIZONS_MS {
+            let plant = format!("process.{}", plant(number, horizon_ms));
+            manifest = manifest
+                .set(&format!("{plant}.kind"), "plant")
+                .set(&format!("{plant}.vehicle"), vehicle.as_str())
+                .set(&format!("{plant}.parameters.window_s"), f64::from(horizon_ms) * 1e-3)
+                .set(&format!("{plant}.inputs.command.topic"), "/player/command")
+                .set(&format!("{plant}.inputs.command.delay_ticks"), 1)
+                .set(&format!("{plant}.inputs.command.initial.command"), initial.to_vec())
+                .set(&format!("{plant}.inputs.measured"), MEASURED)
+                .set(&format!("{plant}.outputs.state.every_ticks"), every);
         }
-        Ok(text)
     }
+    Ok(manifest)
 }
 
 /// Refuses to write where `flight` or one of `vehicles` was read from.
