@@ -78,11 +78,11 @@ fn impossible_parameters_are_refused_by_their_key() {
         (wall_stop, with(&stop, "cruise_speed_m_s", json!(9.0)), "cruise_speed_m_s"),
         (wall_stop, with(&stop, "distance_m", json!(-3.0)), "distance_m"),
         (wall_stop, with(&stop, "altitude_m", Value::Null), "altitude_m"),
-        (wall_stop, with(&stop, "altitude_m", json!(-1.5)), "`altitude_m` must be a finite number above 0 m"),
+        (wall_stop, with(&stop, "altitude_m", json!(-1.5)), "`altitude_m` must be a finite number above 0,"),
         (
             wall_follow,
             with(&follow, "altitude_m", json!(0.0)),
-            "`altitude_m` must be a finite number above 0 m",
+            "`altitude_m` must be a finite number above 0,",
         ),
         (wall_follow, with(&follow, "mode", json!("fast")), "mode"),
         (wall_follow, with(&follow, "start_state", json!(6)), "start_state"),

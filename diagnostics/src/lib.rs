@@ -2,6 +2,8 @@
 //!
 //! | room | what it holds |
 //! |---|---|
+//! | `nearest` | which of the names that there are was meant |
+//! | `place` | where something stands in a file |
 //! | [`mod@parameter`] | parameters of components: the error, and the checks that raise it |
 //! | `read` | parameters from JSON, whose errors carry their keys |
 //! | [`mod@unit`] | every unit that a file may use, with its factor to SI |
@@ -15,10 +17,14 @@
 //! ```
 #![forbid(unsafe_code)]
 
+mod nearest;
 pub mod parameter;
+mod place;
 mod read;
 pub mod unit;
 
+pub use nearest::nearest;
 pub use parameter::ParameterError;
+pub use place::Place;
 pub use read::read;
 pub use unit::{Dimension, convert};

@@ -3,8 +3,8 @@
 use std::ops::Range;
 use std::path::{Component, Path, PathBuf};
 
+use diagnostics::Place;
 use toml::Spanned;
-use vehicles::Place;
 
 use crate::error::FlightsError;
 

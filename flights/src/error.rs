@@ -2,7 +2,8 @@
 
 use std::path::PathBuf;
 
-use vehicles::{Place, VehicleError};
+use diagnostics::Place;
+use vehicles::VehicleError;
 
 use crate::plausible::Finding;
 

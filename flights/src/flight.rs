@@ -5,8 +5,6 @@
 
 use std::path::PathBuf;
 
-use crate::span;
-
 /// What a flight is for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Deserialize, serde::Serialize)]
 #[serde(rename_all = "kebab-case")]
@@ -57,19 +55,6 @@ pub struct Flight {
     pub assumed: Vec<String>,
     /// What the reader noticed: repeated samples left out, gaps, values that look like another unit.
     pub notes: Vec<String>,
-}
-
-impl Flight {
-    /// Holds the time that the flight lasts against the number of its samples, `spacing_max_s` apart on average: what is
-    /// computed on a grid in time must cost no more than the samples allow for. Flights that were read from files have
-    /// passed with 2 s.
-    ///
-    /// # Errors
-    /// If the samples are further apart, in words.
-    pub fn check_span(&self, spacing_max_s: f64) -> Result<(), String> {
-        let place = |time_s: f64| format!("{time_s} s");
-        span::sparse(self, spacing_max_s).map_or(Ok(()), |sparse| Err(sparse.words(place)))
-    }
 }
 
 impl<const N: usize> Channel<N> {

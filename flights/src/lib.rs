@@ -6,7 +6,8 @@
 //! | `set` | a flights file and all its logs |
 //! | `declaration`, `document` | what a flights file says, and where |
 //! | `quantity`, `frame` | units and frames |
-//! | `log` | a log of any format: `csv_log`, `mcap_log` (with `ros_definition`), `ulog`, `crazyflie`, `bytes` |
+//! | `log` | what every log can do: samples of numbers by name |
+//! | `formats` | the formats of logs: `csv_log`, `mcap_log`, `ulog`, `crazyflie`, `bytes` |
 //! | `known_types` | messages whose fields and units need not be said |
 //! | `channels`, `clean`, `jumps`, `reading` | from a log's numbers to a flight |
 //! | `plausible`, `agreement` | values against physics |
@@ -27,6 +28,7 @@ mod declaration;
 mod document;
 pub mod error;
 pub mod flight;
+mod formats;
 mod frame;
 mod held_out;
 mod jumps;
@@ -36,7 +38,6 @@ mod mcap_log;
 pub mod plausible;
 pub mod quantity;
 mod reading;
-mod ros_definition;
 mod set;
 mod span;
 pub mod state;

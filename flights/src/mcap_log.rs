@@ -6,7 +6,6 @@ use recorder::definition::{Definition, Leaf};
 use recorder::reader::Messages;
 
 use crate::log::{Log, Samples, known};
-use crate::ros_definition;
 
 /// A log, with what its topics are.
 pub struct McapLog {
@@ -66,7 +65,7 @@ impl Topic {
             return Self { kind: String::new(), definition: Err("it has no schema".to_owned()) };
         };
         let definition = if schema.encoding == "ros2msg" && channel.message_encoding == "cdr" {
-            Definition::parse(&ros_definition::plain(&schema.name, &String::from_utf8_lossy(&schema.data)))
+            Definition::parse(&schema.name, &String::from_utf8_lossy(&schema.data))
         } else {
             Err(format!(
                 "its messages are {} with a {} schema, expected cdr with ros2msg",

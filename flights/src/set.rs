@@ -9,8 +9,8 @@ use crate::declaration::{ChannelMap, Declaration, FlightEntry};
 use crate::document::{Bad, Document};
 use crate::error::FlightsError;
 use crate::flight::Flight;
+use crate::formats;
 use crate::held_out;
-use crate::log;
 use crate::reading::{Part, Reading};
 
 /// The flights of a flights file, in its order.
@@ -123,9 +123,10 @@ impl Context<'_> {
         let channels = self.channels(entry);
         let bytes = (self.read)(&file)
             .map_err(|error| broken(format!("cannot read it: {error}; check the path and its variables")))?;
-        let format = entry.format.or(self.declaration.format).unwrap_or_else(|| log::guess(&file, &bytes));
+        let format =
+            entry.format.or(self.declaration.format).unwrap_or_else(|| formats::guess(&file, &bytes));
         let time = channels.get(&crate::Quantity::Time).map(Spanned::get_ref);
-        let log = log::parse(bytes, format, time).map_err(broken)?;
+        let log = formats::parse(bytes, format, time).map_err(broken)?;
         Reading {
             document: self.document,
             vehicle: self.vehicle,

@@ -39,6 +39,19 @@ impl Sparse {
     }
 }
 
+impl Flight {
+    /// Holds the time that the flight lasts against the number of its samples, `spacing_max_s` apart on average: what is
+    /// computed on a grid in time must cost no more than the samples allow for. Flights that were read from files have
+    /// passed with 2 s.
+    ///
+    /// # Errors
+    /// If the samples are further apart, in words.
+    pub fn check_span(&self, spacing_max_s: f64) -> Result<(), String> {
+        let place = |time_s: f64| format!("{time_s} s");
+        sparse(self, spacing_max_s).map_or(Ok(()), |sparse| Err(sparse.words(place)))
+    }
+}
+
 /// What is wrong with the times of a flight, if its samples are more than `spacing_max_s` apart on average.
 pub fn sparse(flight: &Flight, spacing_max_s: f64) -> Option<Sparse> {
     let channels = [

@@ -75,24 +75,38 @@ pub struct Definition {
 }
 
 impl Definition {
-    /// Parses the text of a `ros2msg` schema.
+    /// Parses the text of a `ros2msg` schema of the type `name`, such as `geometry_msgs/msg/Pose`. Constants and defaults
+    /// count for nothing, bounds neither, and a type without a package is of the package that it stands in.
     ///
     /// # Errors
     /// The line that is not understood.
-    pub fn parse(text: &str) -> Result<Self, String> {
-        let rule = "=".repeat(80);
-        let mut sections = text.split(rule.as_str());
-        let root = parse_fields(sections.next().unwrap_or_default())?;
-        let types = sections
-            .map(|section| {
-                let section = section.trim_start();
-                let (head, body) = section.split_once('\n').unwrap_or((section, ""));
-                let name =
-                    head.strip_prefix("MSG: ").ok_or_else(|| format!("expected `MSG: …`, found {head:?}"))?;
-                Ok((name.trim().to_owned(), parse_fields(body)?))
-            })
-            .collect::<Result<_, String>>()?;
-        Ok(Self { root, types })
+    pub fn parse(name: &str, text: &str) -> Result<Self, String> {
+        let mut own = (String::new(), name.split('/').next().unwrap_or_default(), Vec::new());
+        let mut types = BTreeMap::new();
+        let mut root = None;
+        let mut lines = text.lines().map(str::trim_end);
+        while let Some(line) = lines.next() {
+            if !is_rule(line) {
+                own.2.extend(parse_field(line, own.1)?);
+                continue;
+            }
+            let head = lines.next().unwrap_or_default();
+            let next = head
+                .strip_prefix("MSG: ")
+                .ok_or_else(|| format!("expected `MSG: …`, found {head:?}"))?
+                .trim();
+            let package = next.split('/').next().unwrap_or_default();
+            let (name, _, fields) = std::mem::replace(&mut own, (two_part(next), package, Vec::new()));
+            match root {
+                None => root = Some(fields),
+                Some(_) => drop(types.insert(name, fields)),
+            }
+        }
+        match root {
+            None => root = Some(own.2),
+            Some(_) => drop(types.insert(own.0, own.2)),
+        }
+        Ok(Self { root: root.unwrap_or_default(), types })
     }
 
     /// Decodes a message: its encapsulation header and body.
@@ -116,19 +130,33 @@ impl Definition {
     }
 }
 
-fn parse_fields(text: &str) -> Result<Vec<Field>, String> {
-    let lines = text.lines().map(|line| line.split_once('#').unwrap_or((line, "")));
-    lines
-        .filter(|(code, _)| !code.trim().is_empty())
-        .map(|(code, comment)| parse_field(code, comment))
-        .collect()
+/// Whether a line parts two definitions.
+fn is_rule(line: &str) -> bool {
+    line.len() > 8 && line.bytes().all(|byte| byte == b'=')
 }
 
-fn parse_field(code: &str, comment: &str) -> Result<Field, String> {
-    let (kind, name) = code.trim().split_once(' ').ok_or_else(|| format!("not a field: {code:?}"))?;
+/// Types that are no messages.
+const PRIMITIVES: [&str; 15] = [
+    "bool", "byte", "char", "float32", "float64", "int8", "uint8", "int16", "uint16", "int32", "uint32",
+    "int64", "uint64", "string", "wstring",
+];
+
+/// The field in a line of a message of `package`, the unit from its comment; none where the line is a constant or empty.
+fn parse_field(line: &str, package: &str) -> Result<Option<Field>, String> {
+    let (code, comment) = line.split_once('#').unwrap_or((line, ""));
+    let code = code.trim();
+    if code.is_empty() {
+        return Ok(None);
+    }
+    let (kind, rest) =
+        code.split_once(char::is_whitespace).ok_or_else(|| format!("not a field: {code:?}"))?;
+    if rest.contains('=') {
+        return Ok(None);
+    }
+    let name = rest.split_whitespace().next().unwrap_or_default().to_owned();
     let (base, repeat) = match kind.strip_suffix(']').and_then(|kind| kind.split_once('[')) {
         None => (kind, Repeat::One),
-        Some((base, "")) => (base, Repeat::Sequence),
+        Some((base, length)) if length.is_empty() || length.starts_with("<=") => (base, Repeat::Sequence),
         Some((base, length)) => {
             let length = length.parse().map_err(|_| format!("not an array length: {length:?}"))?;
             (base, Repeat::Fixed(length))
@@ -136,7 +164,23 @@ fn parse_field(code: &str, comment: &str) -> Result<Field, String> {
     };
     let unit =
         comment.trim().strip_prefix('[').and_then(|rest| rest.split_once(']')).map_or("", |(unit, _)| unit);
-    Ok(Field { base: base.to_owned(), repeat, name: name.trim().to_owned(), unit: unit.to_owned() })
+    Ok(Some(Field { base: whole_name(base, package), repeat, name, unit: unit.to_owned() }))
+}
+
+/// The type without a bound, and with its package.
+fn whole_name(base: &str, package: &str) -> String {
+    match base.split_once("<=").map_or(base, |(base, _)| base) {
+        "char" => "uint8".to_owned(),
+        "Header" => "std_msgs/Header".to_owned(),
+        base if PRIMITIVES.contains(&base) => base.to_owned(),
+        base if base.contains('/') => two_part(base),
+        base => format!("{package}/{base}"),
+    }
+}
+
+/// `package/Type` of `package/msg/Type`.
+fn two_part(name: &str) -> String {
+    name.replace("/msg/", "/")
 }
 
 struct Walk<'a> {
@@ -247,7 +291,9 @@ mod tests {
 
     #[test]
     fn a_message_decodes_to_its_fields() {
-        let definition = Definition::parse(&MotorCommand::SCHEMA.ros2_definition()).unwrap();
+        let definition =
+            Definition::parse(MotorCommand::SCHEMA.type_name, &MotorCommand::SCHEMA.ros2_definition())
+                .unwrap();
         let message = MotorCommand { stamp: Time { sec: 3, nanosec: 4 }, command: [1.0, 2.0, 3.0, 4.5] };
         let leaves = definition.decode(&cdr(&message)).unwrap();
         let paths: Vec<_> = leaves.iter().map(|leaf| leaf.path.as_str()).collect();
@@ -258,11 +304,14 @@ mod tests {
 
     #[test]
     fn strings_and_sequences_of_standard_messages_decode() {
-        let definition = Definition::parse(&PoseStamped::SCHEMA.ros2_definition()).unwrap();
+        let definition =
+            Definition::parse(PoseStamped::SCHEMA.type_name, &PoseStamped::SCHEMA.ros2_definition()).unwrap();
         let leaves = definition.decode(&cdr(&PoseStamped::default())).unwrap();
         assert_eq!(leaves[2].value, Value::Text("map".to_owned()));
         assert_eq!(leaves.last().unwrap().path, "pose.orientation.w");
-        let definition = Definition::parse(&BodyTransform::SCHEMA.ros2_definition()).unwrap();
+        let definition =
+            Definition::parse(BodyTransform::SCHEMA.type_name, &BodyTransform::SCHEMA.ros2_definition())
+                .unwrap();
         let leaves =
             definition.decode(&cdr(&BodyTransform::new(Point::default(), Orientation::default()))).unwrap();
         assert_eq!(leaves[3].value, Value::Text("hb_body".to_owned()));
@@ -271,8 +320,33 @@ mod tests {
 
     #[test]
     fn a_short_message_is_an_error() {
-        let definition = Definition::parse(&MotorCommand::SCHEMA.ros2_definition()).unwrap();
+        let definition =
+            Definition::parse(MotorCommand::SCHEMA.type_name, &MotorCommand::SCHEMA.ros2_definition())
+                .unwrap();
         let error = definition.decode(&cdr(&MotorCommand::default())[..20]).unwrap_err();
         assert!(error.contains("a value of 8 bytes is due at 16"), "{error}");
+    }
+
+    #[test]
+    fn constants_defaults_bounds_and_short_names_are_read() {
+        let text = "Header header\nuint8 STATUS_FULL = 4 # full\nPose[<=3] poses\nstring<=8 name \"x\"\n\
+                    float32 voltage  # [V]\n========================================\nMSG: std_msgs/msg/Header\n\
+                    builtin_interfaces/Time stamp\n========================================\n\
+                    MSG: builtin_interfaces/msg/Time\nint32 sec\nuint32 nanosec\n\
+                    ========================================\nMSG: geometry_msgs/Pose\nchar x\n";
+        let definition = Definition::parse("geometry_msgs/msg/Poses", text).unwrap();
+        let body = [1, 0, 0, 0, 2, 0, 0, 0, 2, 0, 0, 0, 7, 8, 0, 0, 2, 0, 0, 0, b'a', 0, 0, 0, 0, 0, 128, 63];
+        let leaves = definition.decode(&[&[0, 1, 0, 0], &body[..]].concat()).unwrap();
+        let found: Vec<_> = leaves.iter().map(|leaf| (leaf.path.as_str(), leaf.value.clone())).collect();
+        let expected = [
+            ("header.stamp.sec", Value::Integer(1)),
+            ("header.stamp.nanosec", Value::Integer(2)),
+            ("poses[0].x", Value::Integer(7)),
+            ("poses[1].x", Value::Integer(8)),
+            ("name", Value::Text("a".to_owned())),
+            ("voltage", Value::Float(1.0)),
+        ];
+        assert_eq!(found, expected);
+        assert_eq!(leaves[5].unit, "V");
     }
 }

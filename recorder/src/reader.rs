@@ -209,12 +209,11 @@ fn topics<'a>(
     channels
         .filter_map(|(channel, count)| channel.schema.as_ref().map(|schema| (channel, schema, count)))
         .map(|(channel, schema, message_count)| {
-            let definition = Definition::parse(&String::from_utf8_lossy(&schema.data)).map_err(|reason| {
-                RecordingError::Content {
+            let definition = Definition::parse(&schema.name, &String::from_utf8_lossy(&schema.data))
+                .map_err(|reason| RecordingError::Content {
                     path: path.to_owned(),
                     reason: format!("schema {}: {reason}", schema.name),
-                }
-            })?;
+                })?;
             Ok((channel.topic.clone(), Topic { type_name: schema.name.clone(), definition, message_count }))
         })
         .collect()

@@ -97,7 +97,8 @@ pub fn unit_of(schema: &Schema, topic: &str, field: &str) -> Result<Option<Strin
         return Ok(None);
     }
     let zeros = [&[0, 1, 0, 0][..], &vec![0; schema.size]].concat();
-    let decoded = Definition::parse(&schema.ros2_definition()).and_then(|parsed| parsed.decode(&zeros));
+    let decoded = Definition::parse(schema.type_name, &schema.ros2_definition())
+        .and_then(|parsed| parsed.decode(&zeros));
     let leaves = decoded.map_err(|reason| RecordingError::Decode {
         topic: topic.to_owned(),
         type_name: schema.type_name.to_owned(),

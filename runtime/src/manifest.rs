@@ -27,8 +27,9 @@ pub use content::{
     SwapSetting,
 };
 
-use crate::problem::{Problem, nearest};
+use crate::problem::Problem;
 use crate::registry::Registry;
+use diagnostics::nearest;
 use serde::Deserialize;
 use sources::{Origin, Sources};
 use std::ops::Range;

@@ -1,5 +1,6 @@
 //! A problem in a manifest, for the person who wrote it: where, what, and what to do.
 
+use diagnostics::Place;
 use serde::ser::{Serialize, SerializeStruct, Serializer};
 use std::fmt;
 use std::ops::Range;
@@ -29,12 +30,10 @@ impl Problem {
         message: impl Into<String>,
         help: impl Into<String>,
     ) -> Self {
-        let before = &text[..text.floor_char_boundary(span.start.min(text.len()))];
-        let line = before.matches('\n').count() + 1;
-        let column = before.chars().rev().take_while(|&c| c != '\n').count() + 1;
+        let place = Place::of(file.display().to_string(), text, span.start);
         Self {
             file: file.to_owned(),
-            place: Some((line, column)),
+            place: Some((place.line, place.column)),
             message: message.into(),
             help: help.into(),
         }
@@ -67,30 +66,9 @@ impl fmt::Display for Problem {
 
 impl std::error::Error for Problem {}
 
-/// The name among `known` that `found` was probably meant to be.
-pub fn nearest<'a>(found: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
-    let scored = known.into_iter().map(|name| (edit_distance(found, name), name));
-    scored.filter(|(distance, name)| *distance <= name.len().div_ceil(3)).min().map(|(_, name)| name)
-}
-
-fn edit_distance(a: &str, b: &str) -> usize {
-    let b: Vec<char> = b.chars().collect();
-    let mut row: Vec<usize> = (0..=b.len()).collect();
-    for (i, x) in a.chars().enumerate() {
-        let mut diagonal = row[0];
-        row[0] = i + 1;
-        for (j, y) in b.iter().enumerate() {
-            let substituted = diagonal + usize::from(x != *y);
-            diagonal = row[j + 1];
-            row[j + 1] = substituted.min(diagonal + 1).min(row[j] + 1);
-        }
-    }
-    row[b.len()]
-}
-
 #[cfg(test)]
 mod tests {
-    use super::{Problem, nearest};
+    use super::Problem;
     use std::path::Path;
 
     #[test]
@@ -98,11 +76,5 @@ mod tests {
         let problem =
             Problem::at(Path::new("a.toml"), "x = 1\ny = 2\n", &(10..11), "bad value", "give another");
         assert_eq!(problem.to_string(), "a.toml:2:5: bad value\n  help: give another");
-    }
-
-    #[test]
-    fn a_misspelt_name_finds_its_neighbour() {
-        assert_eq!(nearest("comand", ["command", "state"]), Some("command"));
-        assert_eq!(nearest("xyz", ["command", "state"]), None);
     }
 }

@@ -3,9 +3,10 @@
 //! What an effect is, which parameters it has and in which units, is the business of the plant's catalogue
 //! (`plant::effects`): here any name will do.
 
-use crate::error::{Place, VehicleError};
+use crate::error::VehicleError;
 use crate::provenance::Stated;
 use crate::reader::Section;
+use diagnostics::Place;
 
 /// One `[[effects]]` table.
 #[derive(Debug, Clone, PartialEq)]

@@ -1,36 +1,6 @@
 //! What can be wrong with a vehicle file: which file, where, which key, what was expected and found.
 
-use std::fmt;
-
-/// A position in a file, for messages: `file:line:column`, both counted from 1.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Place {
-    /// The file's name as it was given to the reader.
-    pub file: String,
-    /// Line, from 1.
-    pub line: usize,
-    /// Column in characters, from 1.
-    pub column: usize,
-}
-
-impl Place {
-    /// The place of byte `offset` in `text`; an offset past the end means the end.
-    pub fn of(file: &str, text: &str, offset: usize) -> Self {
-        let before = text.get(..offset).unwrap_or(text);
-        let line_start = before.rfind('\n').map_or(0, |newline| newline + 1);
-        Place {
-            file: file.to_owned(),
-            line: before.matches('\n').count() + 1,
-            column: before[line_start..].chars().count() + 1,
-        }
-    }
-}
-
-impl fmt::Display for Place {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}:{}:{}", self.file, self.line, self.column)
-    }
-}
+use diagnostics::Place;
 
 /// Why a vehicle file was refused.
 #[derive(Debug, thiserror::Error)]

@@ -1,6 +1,6 @@
 //! Where a number of a vehicle file came from: kept beside the physics for reports and refits.
 
-use crate::error::Place;
+use diagnostics::Place;
 
 /// How well a number is known.
 #[derive(Debug, Clone, PartialEq)]

@@ -7,8 +7,9 @@ use std::ops::Range;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
-use crate::error::{Place, VehicleError};
+use crate::error::VehicleError;
 use crate::provenance::{Provenance, Stated, Uncertainty};
+use diagnostics::Place;
 use diagnostics::parameter::Bounds;
 use diagnostics::unit::Dimension;
 

@@ -1,6 +1,7 @@
 //! What can be wrong with a stand file, its logs, or the folder of the results.
 
-use vehicles::{Place, VehicleError};
+use diagnostics::Place;
+use vehicles::VehicleError;
 
 /// Why a rotor could not be identified.
 #[derive(Debug, thiserror::Error)]

@@ -2,10 +2,11 @@
 
 use std::path::{Path, PathBuf};
 
+use diagnostics::Place;
 use diagnostics::unit::{Dimension, FORCE, RATIO, SPEED, TIME, TORQUE};
 use serde::Deserialize;
+use vehicles::Vehicle;
 use vehicles::variables::expand;
-use vehicles::{Place, Vehicle};
 
 use super::error::RotorError;
 

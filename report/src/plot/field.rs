@@ -125,7 +125,7 @@ mod tests {
 
     fn leaves<T: Message>(message: &T) -> Vec<Leaf> {
         let cdr = [&[0, 1, 0, 0], bytemuck::bytes_of(message)].concat();
-        Definition::parse(&T::SCHEMA.ros2_definition()).unwrap().decode(&cdr).unwrap()
+        Definition::parse(T::SCHEMA.type_name, &T::SCHEMA.ros2_definition()).unwrap().decode(&cdr).unwrap()
     }
 
     fn described(channels: Option<Vec<Channel>>) -> Vec<(String, String)> {

@@ -2,9 +2,10 @@
 
 use super::parameters::Notes;
 use crate::manifest::{Comparison, Manifest, PassCondition, Statistic};
-use crate::problem::{Problem, nearest};
+use crate::problem::Problem;
 use crate::program::Program;
 use bus::plan::{NodePlan, Plan};
+use diagnostics::nearest;
 use toml::Spanned;
 
 /// Checks that what is evaluated after the run will be recorded, and that its fields and units exist.

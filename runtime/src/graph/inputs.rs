@@ -4,11 +4,12 @@ use super::outputs::{Published, require_known_ports};
 use super::processes::Member;
 use crate::manifest::{InputSetting, Manifest};
 use crate::placement;
-use crate::problem::{Problem, nearest};
+use crate::problem::Problem;
 use crate::program::{Executable, Program};
 use bus::Registration;
 use bus::plan::{InputPlan, NodePlan, TopicPlan};
 use bus::ports::{Inputs, PortSpec};
+use diagnostics::nearest;
 use toml::Spanned;
 
 /// The inputs of `member`, wired to `topics`.

@@ -2,11 +2,12 @@
 
 use super::processes::{Member, period_ticks};
 use crate::manifest::{Manifest, OutputSetting, Process};
-use crate::problem::{Problem, nearest};
+use crate::problem::Problem;
 use crate::program::Executable;
 use bus::plan::{OutputPlan, TopicPlan};
 use bus::ports::PortSpec;
 use bus::schema::Schema;
+use diagnostics::nearest;
 use std::ops::Range;
 use toml::Spanned;
 

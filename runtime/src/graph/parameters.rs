@@ -3,11 +3,12 @@
 use super::processes::Member;
 use super::ranges;
 use crate::manifest::{Manifest, Process};
-use crate::problem::{Problem, nearest};
+use crate::problem::Problem;
 use crate::program::Executable;
 use bus::context::NodeContext;
 use bus::plan::{NodePlan, Plan};
 use diagnostics::ParameterError;
+use diagnostics::nearest;
 use std::collections::BTreeMap;
 use std::ops::Range;
 use std::path::PathBuf;

@@ -2,7 +2,7 @@
 
 use crate::manifest::{Manifest, Process};
 use crate::output_file;
-use crate::problem::{Problem, nearest};
+use crate::problem::Problem;
 use crate::program::{Executable, OnExit, Program, Readiness};
 use bus::GENERATION_VARIABLE;
 use bus::NODE_VARIABLE;
@@ -10,6 +10,7 @@ use bus::Registration;
 use bus::component::Transfer;
 use bus::plan::NodePlan;
 use bus::process::{LAUNCHER_VARIABLE, RUN_VARIABLE};
+use diagnostics::nearest;
 use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::Read as _;

@@ -2,7 +2,8 @@
 
 use super::sources::{Source, Sources};
 use super::tree;
-use crate::problem::{Problem, nearest};
+use crate::problem::Problem;
+use diagnostics::nearest;
 use std::borrow::Cow;
 use std::ops::Range;
 use toml::Spanned;

@@ -6,8 +6,9 @@
 
 use super::sources::Sources;
 use super::{refused, tree};
-use crate::problem::{Problem, nearest};
+use crate::problem::Problem;
 use crate::registry::Registry;
+use diagnostics::nearest;
 use serde::Deserialize;
 use serde::de::IgnoredAny;
 use std::borrow::Cow;

@@ -2,7 +2,8 @@
 
 use super::sources::Sources;
 use super::tree;
-use crate::problem::{Problem, nearest};
+use crate::problem::Problem;
+use diagnostics::nearest;
 use std::ops::Range;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
