@@ -37,7 +37,7 @@ impl fmt::Display for Checked {
 /// Checks the manifest at `path` and every file that it names, with `overrides` as `--set` has them.
 ///
 /// # Errors
-/// The first problem, with its place and what to do.
+/// What is wrong, each with its place and what to do.
 ///
 /// ```
 /// # use std::path::Path;
@@ -56,7 +56,7 @@ pub fn check(path: &Path, overrides: &[String]) -> Result<Checked, Problem> {
 /// Checks `text` as the manifest at `path`, which need not exist: paths written in it start at its folder.
 ///
 /// # Errors
-/// The first problem, with its place and what to do.
+/// What is wrong, each with its place and what to do.
 ///
 /// ```
 /// # use std::path::Path;

@@ -57,7 +57,7 @@ impl Graph {
     /// Checks `manifest` and resolves it.
     ///
     /// # Errors
-    /// The first problem, with its place.
+    /// What is wrong with it, each with its place; what a fault hides from sight is not told beside it.
     pub fn build(manifest: &Manifest) -> Result<Self, Problem> {
         let members = processes::members(manifest)?;
         let companions = processes::companions(manifest)?;
@@ -70,10 +70,10 @@ impl Graph {
         let mut notes = Notes::default();
         periods::check(manifest, &members, &plan, &mut notes)?;
         let length = RunLength::of(&plan);
-        for (member, node) in members.iter().zip(&mut plan.nodes) {
+        Problem::gather(members.iter().zip(&mut plan.nodes).map(|(member, node)| {
             parameters::set(manifest, member, node, length, &mut notes)?;
-            processes::require_replaceable(manifest, member, node)?;
-        }
+            processes::require_replaceable(manifest, member, node)
+        }))?;
         recorders::require_one_recorder(manifest, &members)?;
         recorders::require_whole_recording(manifest, &members, &plan.nodes)?;
         let successors = successors::all(manifest, &plan, &members, &mut notes)?;
@@ -95,10 +95,9 @@ struct Wiring {
 fn wire(manifest: &Manifest, members: &[Member<'_>], changed: Option<usize>) -> Result<Wiring, Problem> {
     let published = outputs::publish_all(manifest, members)?;
     let topics: Vec<TopicPlan> = published.iter().map(|output| output.topic.clone()).collect();
-    let mut nodes = Vec::new();
-    for (index, member) in members.iter().enumerate() {
+    let mut nodes = Problem::gather(members.iter().enumerate().map(|(index, member)| {
         let process = member.process;
-        nodes.push(NodePlan {
+        Ok(NodePlan {
             name: member.name.get_ref().clone(),
             period_ticks: processes::period_ticks(manifest, process)?,
             wait: process.wait.unwrap_or_default(),
@@ -107,8 +106,8 @@ fn wire(manifest: &Manifest, members: &[Member<'_>], changed: Option<usize>) -> 
             outputs: outputs::outputs(&published, index),
             parameters: serde_json::Value::Null,
             restarts: member.program.on_exit == OnExit::Restart,
-        });
-    }
+        })
+    }))?;
     inputs::require_no_cycle(manifest, members, &nodes, &published, changed)?;
     inputs::order_inputs(&mut nodes, &published);
     Ok(Wiring { topics, nodes })

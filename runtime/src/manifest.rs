@@ -87,8 +87,7 @@ impl Manifest {
 
     fn of(path: PathBuf, sources: Sources) -> Result<Self, Problem> {
         let tree = whole_tree(&sources)?;
-        let content = Content::deserialize(toml::Deserializer::from(Spanned::new(0..0, tree)))
-            .map_err(|error| refused(&sources, &error))?;
+        let content = content(&sources, tree)?;
         let (included, recorded_text) = (sources.included(), recorded::text(&sources)?);
         Ok(Self { path, included, recorded_text, content, sources })
     }
@@ -145,12 +144,29 @@ impl Manifest {
         let whole = Spanned::new(span.clone(), DeValue::Table(whole));
         let whole = Process::deserialize(toml::de::ValueDeserializer::from(whole))
             .map_err(|error| refused(&sources, &error))?;
-        let content = Content::deserialize(toml::Deserializer::from(Spanned::new(0..0, tree)))
-            .map_err(|error| refused(&sources, &error))?;
+        let content = content(&sources, tree)?;
         let (path, included) = (self.path.clone(), self.included.clone());
         let recorded_text = self.recorded_text.clone();
         Ok((Self { path, included, recorded_text, content, sources }, Spanned::new(span, whole)))
     }
+}
+
+/// What the whole `tree` says.
+///
+/// # Errors
+/// Where it cannot be read: what is wrong there, and with each process.
+fn content(sources: &Sources, tree: DeTable<'_>) -> Result<Content, Problem> {
+    let whole = Spanned::new(0..0, tree.clone());
+    Content::deserialize(toml::Deserializer::from(whole)).map_err(|error| {
+        let first = refused(sources, &error);
+        let processes = tree::table(&tree, "process").into_iter().flat_map(|table| table.values());
+        let others = processes.filter_map(|process| {
+            let process = toml::de::ValueDeserializer::from(process.clone());
+            Process::deserialize(process).err().map(|error| refused(sources, &error))
+        });
+        let others: Vec<Problem> = others.filter(|other| *other != first).collect();
+        first.and(others)
+    })
 }
 
 /// The problem behind an error of the TOML reader.

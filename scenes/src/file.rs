@@ -5,8 +5,8 @@ use crate::scene::{Cuboid, Scene};
 use diagnostics::parameter::Bounds;
 use diagnostics::unit::{ANGLE, LENGTH};
 use nalgebra::Vector3;
-use vehicles::VehicleError;
 use vehicles::reader::{Document, Section};
+use vehicles::{Faults, VehicleError};
 
 /// Where things of a scene stand.
 pub(crate) const PLACE: Bounds = Bounds {
@@ -32,13 +32,21 @@ pub(crate) fn parse(text: &str, file_name: &str) -> Result<Scene, VehicleError> 
     let doc = Document::new(file_name, text);
     let tree = doc.tree()?;
     let root = Section::new(&doc, String::new(), 0..0, tree.get_ref());
-    let name = root.text("name")?.to_owned();
+    let mut faults = Faults::default();
+    let name = faults.keep(root.text("name"));
     let sections = if root.has("boxes") { root.sections("boxes")? } else { Vec::new() };
-    let boxes = sections.iter().map(one_box).collect::<Result<_, _>>()?;
-    let rig = if root.has("rig") { Some(rig::parse(&root.section("rig")?)?) } else { None };
-    let effects = vehicles::effects::read(&root)?;
-    root.finish()?;
-    Ok(Scene { name, boxes, rig, effects })
+    let boxes = faults.keep_all(sections.iter().map(one_box));
+    let rig = root.has("rig").then(|| faults.keep(root.section("rig").and_then(|rig| rig::parse(&rig))));
+    let effects = faults.keep(vehicles::effects::read(&root));
+    faults.keep(root.finish());
+    let scene = name.zip(boxes).zip(effects);
+    let scene = scene.map(|((name, boxes), effects)| Scene {
+        name: name.to_owned(),
+        boxes,
+        rig: rig.flatten(),
+        effects,
+    });
+    faults.finish(scene)
 }
 
 fn one_box(section: &Section) -> Result<Cuboid, VehicleError> {

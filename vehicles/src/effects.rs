@@ -3,7 +3,7 @@
 //! What an effect is, which parameters it has and in which units, is the business of the plant's catalogue
 //! (`plant::effects`): here any name will do.
 
-use crate::error::VehicleError;
+use crate::error::{Faults, VehicleError};
 use crate::provenance::Stated;
 use crate::reader::Section;
 use diagnostics::Place;
@@ -31,7 +31,9 @@ pub fn read(root: &Section) -> Result<Vec<EffectEntry>, VehicleError> {
     if !root.has("effects") {
         return Ok(Vec::new());
     }
-    root.sections("effects")?.iter().map(one_effect).collect()
+    let mut faults = Faults::default();
+    let effects = faults.keep_all(root.sections("effects")?.iter().map(one_effect));
+    faults.finish(effects)
 }
 
 fn one_effect(section: &Section) -> Result<EffectEntry, VehicleError> {

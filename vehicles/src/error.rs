@@ -54,10 +54,13 @@ pub enum VehicleError {
         /// What the file says.
         found: String,
     },
+    /// Several faults, in the order of the file's tables.
+    #[error("{}", .0.iter().map(ToString::to_string).collect::<Vec<_>>().join("\n"))]
+    Several(Vec<VehicleError>),
 }
 
 impl VehicleError {
-    /// Where in the file the fault is, or `None` if the file could not be read.
+    /// Where in the file the fault is, the first of several, or `None` if the file could not be read.
     pub fn place(&self) -> Option<&Place> {
         match self {
             VehicleError::Unreadable { .. } => None,
@@ -65,6 +68,37 @@ impl VehicleError {
             | VehicleError::UnknownKey { place, .. }
             | VehicleError::MissingKey { place, .. }
             | VehicleError::BadValue { place, .. } => Some(place),
+            VehicleError::Several(faults) => faults.first()?.place(),
+        }
+    }
+}
+
+/// The faults of a file, gathered so that one look shows all of them.
+#[derive(Debug, Default)]
+pub struct Faults(Vec<VehicleError>);
+
+impl Faults {
+    /// What was read; none where it is faulty, which is kept.
+    pub fn keep<T>(&mut self, read: Result<T, VehicleError>) -> Option<T> {
+        read.map_err(|fault| self.0.push(fault)).ok()
+    }
+
+    /// What all of `read` came to; none where some are faulty.
+    pub fn keep_all<T>(&mut self, read: impl IntoIterator<Item = Result<T, VehicleError>>) -> Option<Vec<T>> {
+        // All are read before the first that is faulty counts.
+        let read: Vec<Option<T>> = read.into_iter().map(|one| self.keep(one)).collect();
+        read.into_iter().collect()
+    }
+
+    /// `value`, which is there unless there were faults.
+    ///
+    /// # Errors
+    /// The faults there were.
+    pub fn finish<T>(mut self, value: Option<T>) -> Result<T, VehicleError> {
+        match (value, self.0.len()) {
+            (Some(value), 0) => Ok(value),
+            (_, 1) => Err(self.0.remove(0)),
+            _ => Err(VehicleError::Several(self.0)),
         }
     }
 }

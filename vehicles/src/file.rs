@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use crate::bounds;
 use crate::command::CommandMap;
 use crate::effects;
-use crate::error::VehicleError;
+use crate::error::{Faults, VehicleError};
 use crate::provenance::Uncertainty;
 use crate::reader::{Document, Quantity, Section};
 use crate::vehicle::{MotorModel, Rotor, Spin, Vehicle};
@@ -62,25 +62,34 @@ fn title(root: &Section) -> Result<String, VehicleError> {
 }
 
 fn complete(doc: &Document, root: &Section) -> Result<Vehicle, VehicleError> {
-    let name = title(root)?;
-    let (mass_kg, inertia_kg_m2, gravity_m_s2) = body(&root.section("body")?)?;
-    let [thrust_coefficient, torque_coefficient, rotor_inertia_kg_m2] = rotor(&root.section("rotor")?)?;
-    let vehicle = Vehicle {
-        name,
-        mass_kg,
-        inertia_kg_m2,
-        gravity_m_s2,
-        rotors: layout(root)?,
-        thrust_coefficient,
-        torque_coefficient,
-        rotor_inertia_kg_m2,
-        motor: motor(&root.section("motor")?)?,
-        command: command(&root.section("command")?)?,
-        effects: effects::read(root)?,
-        provenance: doc.provenance.take(),
-    };
-    root.finish()?;
-    Ok(vehicle)
+    let mut faults = Faults::default();
+    let name = faults.keep(title(root));
+    let body = faults.keep(root.section("body").and_then(|section| body(&section)));
+    let rotor = faults.keep(root.section("rotor").and_then(|section| rotor(&section)));
+    let rotors = faults.keep(layout(root));
+    let motor = faults.keep(root.section("motor").and_then(|section| motor(&section)));
+    let command = faults.keep(root.section("command").and_then(|section| command(&section)));
+    let effects = faults.keep(effects::read(root));
+    faults.keep(root.finish());
+    let vehicle = (|| {
+        let (mass_kg, inertia_kg_m2, gravity_m_s2) = body?;
+        let [thrust_coefficient, torque_coefficient, rotor_inertia_kg_m2] = rotor?;
+        Some(Vehicle {
+            name: name?,
+            mass_kg,
+            inertia_kg_m2,
+            gravity_m_s2,
+            rotors: rotors?,
+            thrust_coefficient,
+            torque_coefficient,
+            rotor_inertia_kg_m2,
+            motor: motor?,
+            command: command?,
+            effects: effects?,
+            provenance: doc.provenance.take(),
+        })
+    })();
+    faults.finish(vehicle)
 }
 
 fn body(section: &Section) -> Result<(f64, Matrix3<f64>, f64), VehicleError> {

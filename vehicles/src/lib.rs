@@ -36,7 +36,7 @@ pub mod vehicle;
 
 pub use command::CommandMap;
 pub use effects::EffectEntry;
-pub use error::VehicleError;
+pub use error::{Faults, VehicleError};
 pub use file::is_rigid;
 pub use provenance::{Provenance, Stated, Uncertainty};
 pub use vehicle::{MotorModel, Rotor, Spin, Vehicle};

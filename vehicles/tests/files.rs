@@ -240,3 +240,18 @@ fn no_text_makes_the_reader_panic_and_what_it_accepts_is_physical() {
         }
     }
 }
+
+#[test]
+fn several_faults_are_told_at_once_each_with_its_place() {
+    let text =
+        HUMMINGBIRD.replacen("value = 0.480", "value = -1", 1).replacen("\"first-order\"", "\"none\"", 1);
+    let text = text.replacen("\"second-order\"", "\"none\"", 1).replacen("spin", "spni", 1);
+    let error = Vehicle::parse(&text, "bird.toml").unwrap_err();
+    let VehicleError::Several(faults) = &error else { panic!("{error}") };
+    assert_eq!(faults.len(), 3, "{error}");
+    for (fault, key) in faults.iter().zip(["`body.mass", "spin", "`motor.model`"]) {
+        let message = fault.to_string();
+        assert!(message.starts_with("bird.toml:") && message.contains(key), "{message}");
+        assert!(error.to_string().contains(&message));
+    }
+}

@@ -16,12 +16,13 @@ pub fn check(
     notes: &mut Notes,
 ) -> Result<(), Problem> {
     check_recorded(manifest, plan, programs)?;
-    manifest.content.compare.iter().try_for_each(|compare| check_window(manifest, plan, compare))?;
-    for pass in &manifest.content.pass {
+    let content = &manifest.content;
+    Problem::gather(content.compare.iter().map(|compare| check_window(manifest, plan, compare)))?;
+    let conditions = content.pass.iter().map(|pass| {
         check_field(manifest, plan, pass)?;
-        check_span(manifest, plan, pass, notes)?;
-    }
-    Ok(())
+        check_span(manifest, plan, pass, notes)
+    });
+    Problem::gather(conditions).map(drop)
 }
 
 /// Refuses a span in which nothing can be judged; tells one that the run ends in. Where the run was cut short by other

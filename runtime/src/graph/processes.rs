@@ -40,7 +40,7 @@ pub fn members(manifest: &Manifest) -> Result<Vec<Member<'_>>, Problem> {
         require_no_companion(manifest, name, process)?;
         Ok(Member { name, process, program: program(manifest, name, process)? })
     };
-    let members = members.map(member).collect::<Result<Vec<_>, _>>()?;
+    let members = Problem::gather(members.map(member))?;
     if members.is_empty() {
         return Err(Problem::in_file(&manifest.path, "there is no process", "add [process.<name>] tables"));
     }
@@ -58,7 +58,7 @@ pub fn companions(manifest: &Manifest) -> Result<Vec<(String, Program)>, Problem
         require_no_standby(manifest, name, process)?;
         Ok((name.get_ref().clone(), program(manifest, name, process)?))
     };
-    companions.map(companion).collect()
+    Problem::gather(companions.map(companion))
 }
 
 fn takes_part(process: &Process) -> bool {

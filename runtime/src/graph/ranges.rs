@@ -56,15 +56,15 @@ pub fn check(manifest: &Manifest, name: &Spanned<String>, process: &Process) -> 
         let message = format!("process `{}`: {reason}", name.get_ref());
         manifest.problem(&at.span(), message, "correct the number or its unit: the key ends in the unit")
     };
-    for (key, value) in &process.parameters {
-        within(key.get_ref(), key.get_ref(), value).map_err(|reason| refused(key, reason))?;
-    }
-    for (port, input) in &process.inputs {
-        let Some(initial) = &input.initial else { continue };
+    let parameters = process.parameters.iter().map(|(key, value)| {
+        within(key.get_ref(), key.get_ref(), value).map_err(|reason| refused(key, reason))
+    });
+    let initial = process.inputs.iter().filter_map(|(port, input)| Some((port, input.initial.as_ref()?)));
+    let initial = initial.map(|(port, initial)| {
         let path = format!("inputs.{}.initial", port.get_ref());
-        within(&path, "", initial).map_err(|reason| refused(port, reason))?;
-    }
-    Ok(())
+        within(&path, "", initial).map_err(|reason| refused(port, reason))
+    });
+    Problem::gather(parameters.chain(initial)).map(drop)
 }
 
 /// Checks `value` at the dotted `path`; `key` is the last key on it that is a name.

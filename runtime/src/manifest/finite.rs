@@ -5,12 +5,13 @@ use crate::problem::Problem;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
-/// Refuses the first number in `table` that is not finite; `path` is the dotted key of the table.
+/// Refuses every number in `table` that is not finite; `path` is the dotted key of the table.
 ///
 /// # Errors
 /// Its place and key.
 pub fn require(table: &DeTable<'_>, path: &str, sources: &Sources) -> Result<(), Problem> {
-    table.iter().try_for_each(|(key, value)| require_value(value, &joined(path, key.get_ref()), sources))
+    let values = table.iter().map(|(key, value)| require_value(value, &joined(path, key.get_ref()), sources));
+    Problem::gather(values).map(drop)
 }
 
 fn require_value(value: &Spanned<DeValue<'_>>, path: &str, sources: &Sources) -> Result<(), Problem> {
