@@ -300,7 +300,7 @@ fn a_parameter_of_another_type_is_named() {
     let place = Place::new();
     let path = place.write("type.toml", good().replace("altitude_m = 1.0", "altitude_m = \"high\""));
     let ended = refused_words(&["run", &path], &path);
-    ended.says(&["process `pilot`", "initial_altitude_m", "\"high\"", "expected f64"]);
+    ended.says(&["process `pilot`", "initial_altitude_m", "\"high\"", "must be f64"]);
 }
 
 #[test]
@@ -401,7 +401,7 @@ fn a_flight_whose_time_stands_still() {
 fn a_column_map_without_a_unit_or_with_a_wrong_one() {
     let columns = "process.player.parameters.columns.time";
     let missing = format!("{columns}={{ columns = [\"t\"] }}");
-    refused_replay(&flight(), &["--set", &missing]).says(&["process `player`", "missing field `unit`"]);
+    refused_replay(&flight(), &["--set", &missing]).says(&["process `player`", "missing field `columns.time.unit`"]);
     let wrong = format!("{columns}.unit=h");
     refused_replay(&flight(), &["--set", &wrong]).says(&["`time` has the unit `h`", "`s` or `ms` or `us`"]);
 }
