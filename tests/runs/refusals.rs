@@ -401,7 +401,8 @@ fn a_flight_whose_time_stands_still() {
 fn a_column_map_without_a_unit_or_with_a_wrong_one() {
     let columns = "process.player.parameters.columns.time";
     let missing = format!("{columns}={{ columns = [\"t\"] }}");
-    refused_replay(&flight(), &["--set", &missing]).says(&["process `player`", "missing field `columns.time.unit`"]);
+    refused_replay(&flight(), &["--set", &missing])
+        .says(&["process `player`", "missing field `columns.time.unit`"]);
     let wrong = format!("{columns}.unit=h");
     refused_replay(&flight(), &["--set", &wrong]).says(&["`time` has the unit `h`", "`s` or `ms` or `us`"]);
 }
