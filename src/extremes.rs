@@ -205,17 +205,18 @@ fn no_number_of_a_shipped_scene_brings_the_plant_down() {
 
 #[test]
 fn no_number_of_shipped_gains_brings_a_law_down() {
+    use controllers::controller::Controller;
     use controllers::{cascade, geometric, lqr, pid, velocity, wall_follow, wall_stop};
     let folder = Folder::new();
-    let kinds: [(&str, Registration); 8] = [
-        ("pid", Registration::of_kind(&pid::KIND)),
-        ("pid-thesis", Registration::of_kind(&pid::KIND)),
-        ("cascade", Registration::of_kind(&cascade::KIND)),
-        ("velocity", Registration::of_kind(&velocity::KIND)),
-        ("wall-stop", Registration::of_kind(&wall_stop::KIND)),
-        ("wall-follow", Registration::of_kind(&wall_follow::KIND)),
-        ("lqr", Registration::of_kind(&lqr::KIND)),
-        ("geometric", Registration::of_kind(&geometric::KIND)),
+    let kinds = [
+        ("pid", Registration::of::<Controller<pid::PidLaw>>()),
+        ("pid-thesis", Registration::of::<Controller<pid::PidLaw>>()),
+        ("cascade", Registration::of::<Controller<cascade::CascadeLaw>>()),
+        ("velocity", Registration::of::<Controller<velocity::VelocityLaw>>()),
+        ("wall-stop", Registration::of::<Controller<wall_stop::WallStopLaw>>()),
+        ("wall-follow", Registration::of::<Controller<wall_follow::WallFollowLaw>>()),
+        ("lqr", Registration::of::<Controller<lqr::LqrLaw>>()),
+        ("geometric", Registration::of::<Controller<geometric::GeometricLaw>>()),
     ];
     for (name, kind) in kinds {
         let file = format!("controllers/gains/{name}.toml");

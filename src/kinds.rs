@@ -1,33 +1,35 @@
 //! The components that this package brings.
 
 use bus::Registration;
+use controllers::controller::Controller;
 use runtime::registry::Registry;
+use sensors::sensing::Sensing;
 
 /// Every component that this package brings, in alphabetical order.
 pub const COMPONENTS: Registry = Registry::new(&[
-    Registration::of_kind(&sensors::attitude::KIND),
-    Registration::of_kind(&sensors::barometer::KIND),
-    Registration::of_kind(&sensors::battery::KIND),
-    Registration::of_kind(&controllers::cascade::KIND),
-    Registration::of_kind(&sensors::clearance::KIND),
-    Registration::of_kind(&sensors::ekf::KIND),
-    Registration::of_kind(&controllers::geometric::KIND),
-    Registration::of::<sensors::gps::GpsReceiver>(),
-    Registration::of_kind(&sensors::imu::KIND),
-    Registration::of_kind(&controllers::lqr::KIND),
-    Registration::of_kind(&sensors::magnetometer::KIND),
-    Registration::of_kind(&sensors::mocap::KIND),
-    Registration::of_kind(&controllers::pid::KIND),
+    Registration::of::<sensors::complementary::Complementary>(),
+    Registration::of::<Sensing<sensors::barometer::BarometerParams>>(),
+    Registration::of::<Sensing<sensors::battery::BatteryParams>>(),
+    Registration::of::<Controller<controllers::cascade::CascadeLaw>>(),
+    Registration::of::<sensors::clearance::ClearanceJudge>(),
+    Registration::of::<sensors::ekf::filter::Ekf>(),
+    Registration::of::<Controller<controllers::geometric::GeometricLaw>>(),
+    Registration::of::<Sensing<sensors::gps::GpsParams>>(),
+    Registration::of::<sensors::imu::ImuSensor>(),
+    Registration::of::<Controller<controllers::lqr::LqrLaw>>(),
+    Registration::of::<Sensing<sensors::magnetometer::MagnetometerParams>>(),
+    Registration::of::<Sensing<sensors::mocap::MocapParams>>(),
+    Registration::of::<Controller<controllers::pid::PidLaw>>(),
     Registration::of::<controllers::pilot::Pilot>(),
     Registration::of::<plant::node::Plant>(),
-    Registration::of_kind(&controllers::player::KIND),
-    Registration::of_kind(&sensors::range::KIND),
-    Registration::of_kind(&sensors::range_inertial::KIND),
+    Registration::of::<controllers::player::Player>(),
+    Registration::of::<Sensing<sensors::range::RangeFinders>>(),
+    Registration::of::<sensors::range_inertial::filter::RangeInertial>(),
     Registration::of::<recorder::node::Recorder>(),
-    Registration::of_kind(&sensors::rpm::KIND),
+    Registration::of::<Sensing<sensors::rpm::RpmParams>>(),
     Registration::of::<plant::traffic::Traffic>(),
-    Registration::of_kind(&controllers::trajectory_node::KIND),
-    Registration::of_kind(&controllers::velocity::KIND),
-    Registration::of_kind(&controllers::wall_follow::KIND),
-    Registration::of_kind(&controllers::wall_stop::KIND),
+    Registration::of::<controllers::trajectory_node::TrajectoryNode>(),
+    Registration::of::<Controller<controllers::velocity::VelocityLaw>>(),
+    Registration::of::<Controller<controllers::wall_follow::WallFollowLaw>>(),
+    Registration::of::<Controller<controllers::wall_stop::WallStopLaw>>(),
 ]);

@@ -49,15 +49,15 @@ mod chain {
     use controllers::airframe::ControlledVehicle;
     use controllers::allocation::Allocation;
     use controllers::control::{HoverMotion, Integrals};
+    use controllers::pid::PidLaw;
     use controllers::pid_gains::PidGains;
-    use controllers::pid_law::PidLaw;
     use controllers::set_points::{Schedule, SetPoint, SetPointEntry};
     use nalgebra::{Quaternion, UnitQuaternion, Vector3};
     use plant::{NewtonEuler, RigidBody, State};
     use sensors::ekf::filter::{Ekf, EkfState};
-    use sensors::ekf::history::{Measurement, Newest, Reading, Sensor};
+    use sensors::ekf::history::{Measurement, Newest, Reading, Source};
     use sensors::ekf::params::EkfParams;
-    use sensors::imu_model::{ImuModel, ImuParams, ImuReading, ImuState};
+    use sensors::imu_model::{ImuModel, ImuModelState, ImuParams, ImuReading};
     use std::path::Path;
     use vehicles::Vehicle;
 
@@ -67,7 +67,7 @@ mod chain {
         plant: NewtonEuler,
         state: State,
         imu: ImuModel,
-        imu_state: ImuState,
+        imu_state: ImuModelState,
         filter: Ekf,
         filter_state: Box<EkfState>,
         newest: Newest,
@@ -100,7 +100,7 @@ mod chain {
             let plant = NewtonEuler::new(vehicle, 1);
             let state = plant.start(RigidBody::level_at(Vector3::new(0.0, 0.0, 1.0)), hover);
             let params = EkfParams { initial_position_m: Some([0.0, 0.0, 1.0]), ..EkfParams::default() };
-            let filter = Ekf::new(params, DT_S)?;
+            let filter = Ekf::with_period(params, DT_S)?;
             Ok(Self {
                 state,
                 filter_state: Box::new(filter.initial_state()),
@@ -137,13 +137,13 @@ mod chain {
                 let body = &self.state.body;
                 let pose: Vec<f64> =
                     body.position_W_m.iter().chain(body.attitude_WB.coords.iter()).copied().collect();
-                self.newest[Sensor::Mocap.index()] =
-                    Some(Some(Measurement::new(Sensor::Mocap, time_ns, &pose)));
+                self.newest[Source::Mocap.index()] =
+                    Some(Some(Measurement::new(Source::Mocap, time_ns, &pose)));
             }
             let specific_force = <[f64; 3]>::from(reading.specific_force_B_m_s2).into();
             let angular_velocity = <[f64; 3]>::from(reading.angular_velocity_B_rad_s).into();
             let reading = Reading { time_ns, specific_force, angular_velocity };
-            self.filter.step(&mut self.filter_state, &reading, &self.newest);
+            self.filter.update_to(&mut self.filter_state, &reading, &self.newest);
             let motion = self.filter_state.motion();
             let q = motion.attitude;
             let attitude = UnitQuaternion::new_normalize(Quaternion::new(q.w, q.x, q.y, q.z));

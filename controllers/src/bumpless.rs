@@ -53,7 +53,7 @@ impl BumplessTransfer {
         &self,
         law: &L,
         state: &mut ControllerState,
-        input: &ControlInput<'_>,
+        input: &ControlInput,
         last_wrench: Option<RotorWrench>,
     ) -> ControlOutput {
         self.take_over(law, state, input, last_wrench);
@@ -71,7 +71,7 @@ impl BumplessTransfer {
         &self,
         law: &L,
         state: &mut ControllerState,
-        input: &ControlInput<'_>,
+        input: &ControlInput,
         last_wrench: Option<RotorWrench>,
     ) {
         let is_anothers = !state.is_new() && state.id != self.id;

@@ -1,56 +1,365 @@
-//! The cascade controller node: the onboard structure of the AscTec, from sticks to four motor commands.
+//! The cascade of the AscTec's onboard computer (thesis §5.3, Figs 5.16–5.19): command filter, attitude loop
+//! around rate loop, and the altitude loop beside them; from set point and measurement to a wrench.
+//!
+//! - Command filter: roll and pitch are cut to ±30° and filtered, x'' = ω²(c − x) − 2ζω x'. The yaw command
+//!   turns towards the yaw that is asked for no faster than a yaw stick at full deflection would integrate
+//!   it, comes round at 360°, and is set to the measured yaw as long as no thrust is asked for.
+//! - Attitude loop: error of roll, pitch and yaw, times a gain, and a part of the filtered commands' own rates,
+//!   to their rates of change, and by the kinematics of the z-y-x sequence to body rates (the inverse of thesis eq. 3.18).
+//! - Rate loop: α = Kp·e + ∫Ki·e dt − Kd·dω/dt with e the error of a body rate; torque = inertia · α. The
+//!   cross product of rate and angular momentum is left to the loops.
+#![allow(non_snake_case, reason = "a trailing _B names the frame a vector is written in, _N the newton")]
 
-use crate::airframe::ControlledVehicle;
-use crate::cascade_gains::CascadeGains;
-use crate::cascade_law::CascadeLaw;
-use crate::controller;
-use crate::rehearsal;
-use bus::kind::{Inputs, NodeKind, PortSpec};
-use bus::messages::{AttitudeEstimate, ControlStatus, MotorCommand, SetPoint, StateEstimate};
-use bus::{BusError, Message, Node};
+use crate::airframe::{ControlledVehicle, HoverModel};
+use crate::allocation::RotorWrench;
+use crate::altitude_loop::AltitudeLoop;
+use crate::angle::wrap_rad;
+use crate::cascade_gains::{CascadeGains, CommandFilter};
+use crate::control::{ControlInput, ControlOutput, HoverMotion, Integrals};
+use crate::law::{FileParameters, Law, Predecessor, Start};
+use crate::law_inputs::SetPointInputs;
+use crate::set_points::SetPoint;
+use bus::component::Info;
+use bus::context::NodeContext;
 use diagnostics::ParameterError;
-use serde::Deserialize;
-use std::path::PathBuf;
+use nalgebra::Vector3;
 
-/// The cascade controller, for manifests.
-pub const KIND: NodeKind = NodeKind {
-    name: "cascade",
-    summary: "command filter, attitude loop around rate loop, altitude PID, control allocation",
-    inputs: Inputs::Ports(&[
-        PortSpec::required("set_point", SetPoint::SCHEMA),
-        PortSpec::required("estimate", StateEstimate::SCHEMA),
-        PortSpec::optional("attitude", AttitudeEstimate::SCHEMA),
-    ]),
-    outputs: &[
-        PortSpec::required("command", MotorCommand::SCHEMA),
-        PortSpec::optional("status", ControlStatus::SCHEMA),
-    ],
-    check: |parameters, run| {
-        let (law, craft) = build(&diagnostics::read(parameters)?, run.period_s())?;
-        rehearsal::check(&law, &craft, run)
-    },
-    run,
-};
-
-/// Parameters of the cascade controller.
-#[derive(Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct Parameters {
-    /// Vehicle file.
-    vehicle: PathBuf,
-    /// Gains file; the built-in `controllers/gains/cascade.toml` where there is none.
-    gains: Option<PathBuf>,
+/// The law at one period: all that does not change during a run.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct CascadeLaw {
+    /// Gains and limits.
+    pub gains: CascadeGains,
+    /// The vehicle that is flown.
+    pub vehicle: HoverModel,
+    /// Time between two steps, s.
+    pub period_s: f64,
 }
 
-fn build(parameters: &Parameters, period_s: f64) -> Result<(CascadeLaw, ControlledVehicle), ParameterError> {
-    let craft = ControlledVehicle::load(&parameters.vehicle)?;
-    let gains = CascadeGains::load(parameters.gains.as_deref())
-        .map_err(|error| ParameterError::conflict("gains", error))?;
-    Ok((CascadeLaw { gains, vehicle: craft.hover_model(), period_s }, craft))
+/// All that the law remembers.
+#[derive(Debug, Clone, Copy, PartialEq, Default, bus::Message)]
+#[repr(C)]
+#[message(type_name = "hummingbus_msgs/msg/CascadeState")]
+pub struct CascadeState {
+    /// What the integrators of altitude and rates ask for.
+    pub integrals: Integrals,
+    /// The command filter's roll, pitch and yaw.
+    #[field(unit = "rad", frame = "world")]
+    pub attitude_command: [f64; 3],
+    /// Their rates of change.
+    #[field(unit = "rad/s", frame = "world")]
+    pub attitude_command_rate: [f64; 3],
+    /// Body rates behind the filter of the rate loop's derivative.
+    #[field(unit = "rad/s", frame = "body")]
+    pub rate_filtered: [f64; 3],
 }
 
-fn run() -> Result<(), BusError> {
-    let node = Node::join()?;
-    let (law, craft) = build(&node.parameters()?, node.period_s()).map_err(|error| node.error(error))?;
-    controller::run(node, &law, &craft)
+impl Law for CascadeLaw {
+    const INFO: Info = Info::new(
+        "cascade",
+        "command filter, attitude loop around rate loop, altitude PID, control allocation",
+    );
+    type Parameters = FileParameters;
+    type Inputs<'a> = SetPointInputs<'a>;
+    type State = CascadeState;
+
+    fn new(
+        parameters: &FileParameters,
+        craft: &ControlledVehicle,
+        context: &NodeContext<'_>,
+    ) -> Result<Self, ParameterError> {
+        let gains = CascadeGains::load(parameters.gains.as_deref())
+            .map_err(|error| ParameterError::conflict("gains", error))?;
+        Ok(Self { gains, vehicle: craft.hover_model(), period_s: context.period_s() })
+    }
+
+    fn rate_gain_1_s(&self) -> f64 {
+        self.gains.rate.iter().fold(0.0, |most, axis| axis.proportional_1_s.max(most))
+    }
+
+    fn start(&self, input: &ControlInput) -> Start<CascadeState> {
+        Start { state: self.initial(&HoverMotion::of(&input.motion)), wrench: RotorWrench::default() }
+    }
+
+    fn take_over(&self, from: &Predecessor<'_, CascadeState>, input: &ControlInput) -> Start<CascadeState> {
+        let measured = HoverMotion::of(&input.motion);
+        Start { state: self.continued(from, input.set_point.altitude_m, &measured), wrench: from.wrench }
+    }
+
+    fn step(&self, state: &mut CascadeState, last: &RotorWrench, input: &ControlInput) -> ControlOutput {
+        self.demand(state, last, &input.set_point, &HoverMotion::of(&input.motion))
+    }
+}
+
+impl CascadeLaw {
+    /// The demand for `set_point`; advances the state of the inner loops by one period.
+    pub fn demand(
+        &self,
+        state: &mut CascadeState,
+        last: &RotorWrench,
+        set_point: &SetPoint,
+        measured: &HoverMotion,
+    ) -> ControlOutput {
+        // Before thrust is asked for, the vehicle may be turned by hand.
+        if last.thrust_N <= self.vehicle.thrust_min_N {
+            state.attitude_command[2] = measured.yaw_rad;
+        }
+        self.filter_commands(state, set_point);
+        let [roll_rad, pitch_rad, yaw_rad] = state.attitude_command;
+        let rates_B_rad_s = self.rate_command_B_rad_s(state, measured);
+        let torque_B_N_m = self.torque_B_N_m(state, &rates_B_rad_s, measured);
+        let altitude_m = set_point.altitude_m;
+        let thrust_N = self.altitude_loop().thrust_N(&mut state.integrals.lift, altitude_m, measured);
+        ControlOutput {
+            wrench: RotorWrench { thrust_N, torque_B_N_m },
+            integrals: state.integrals,
+            set_point: SetPoint { altitude_m, roll_rad, pitch_rad, yaw_rad },
+            ..ControlOutput::default()
+        }
+    }
+
+    /// The state of a vehicle that no law has flown yet: commands as it lies, filters as it turns.
+    #[must_use]
+    pub fn initial(&self, measured: &HoverMotion) -> CascadeState {
+        let limit =
+            |angle_rad: f64| angle_rad.clamp(-self.gains.filter.tilt_max_rad, self.gains.filter.tilt_max_rad);
+        CascadeState {
+            attitude_command: [limit(measured.roll_rad), limit(measured.pitch_rad), measured.yaw_rad],
+            rate_filtered: measured.angular_velocity_B_rad_s.into(),
+            ..CascadeState::default()
+        }
+    }
+
+    /// The state that goes on from another law's: its integrators, and commands from where the vehicle is.
+    #[must_use]
+    pub fn continued<S>(
+        &self,
+        from: &Predecessor<'_, S>,
+        altitude_set_m: f64,
+        measured: &HoverMotion,
+    ) -> CascadeState {
+        let gains = self.gains.rate.map(|axis| axis.integral_1_s2);
+        let max_rad_s2 = self.gains.integral_max_rad_s2;
+        let integrals = self.altitude_loop().continued(from, gains, max_rad_s2, altitude_set_m, measured);
+        CascadeState { integrals, ..self.initial(measured) }
+    }
+
+    fn altitude_loop(&self) -> AltitudeLoop<'_> {
+        AltitudeLoop { gains: self.gains.altitude, vehicle: &self.vehicle, period_s: self.period_s }
+    }
+
+    fn filter_commands(&self, state: &mut CascadeState, set_point: &SetPoint) {
+        let filter = &self.gains.filter;
+        for (axis, asked_rad) in [set_point.roll_rad, set_point.pitch_rad].into_iter().enumerate() {
+            let (angle, rate) = (state.attitude_command[axis], state.attitude_command_rate[axis]);
+            let (angle, rate) = filter.moved(angle, rate, asked_rad, self.period_s);
+            (state.attitude_command[axis], state.attitude_command_rate[axis]) = (angle, rate);
+        }
+        let turn_max_rad = filter.yaw_rate_max_rad_s * self.period_s;
+        let yaw_rad = state.attitude_command[2];
+        let turn_rad = wrap_rad(set_point.yaw_rad - yaw_rad).clamp(-turn_max_rad, turn_max_rad);
+        state.attitude_command[2] = wrap_rad(yaw_rad + turn_rad);
+    }
+
+    /// Body rates that lead roll, pitch and yaw to `command`.
+    fn rate_command_B_rad_s(&self, state: &CascadeState, measured: &HoverMotion) -> Vector3<f64> {
+        let command = &state.attitude_command;
+        let errors_rad = [
+            wrap_rad(command[0] - measured.roll_rad),
+            command[1] - measured.pitch_rad,
+            wrap_rad(command[2] - measured.yaw_rad),
+        ];
+        let [roll_rate, pitch_rate, yaw_rate]: [f64; 3] = std::array::from_fn(|axis| {
+            let max_rad_s = self.gains.rate_max_rad_s[axis];
+            // The yaw command's own rate stays zero: yaw is slow.
+            let fed_rad_s = self.gains.rate_feed_forward * state.attitude_command_rate[axis];
+            (self.gains.attitude_1_s[axis] * errors_rad[axis] + fed_rad_s).clamp(-max_rad_s, max_rad_s)
+        });
+        let (sin_roll, cos_roll) = libm::sincos(measured.roll_rad);
+        let (sin_pitch, cos_pitch) = libm::sincos(measured.pitch_rad);
+        Vector3::new(
+            roll_rate - yaw_rate * sin_pitch,
+            pitch_rate * cos_roll + yaw_rate * sin_roll * cos_pitch,
+            yaw_rate * cos_roll * cos_pitch - pitch_rate * sin_roll,
+        )
+    }
+
+    fn torque_B_N_m(
+        &self,
+        state: &mut CascadeState,
+        rates_B_rad_s: &Vector3<f64>,
+        measured: &HoverMotion,
+    ) -> Vector3<f64> {
+        let mut acceleration_B_rad_s2 = Vector3::zeros();
+        for (axis, integral) in state.integrals.turn.iter_mut().enumerate() {
+            let rate_rad_s = measured.angular_velocity_B_rad_s[axis];
+            let error_rad_s = rates_B_rad_s[axis] - rate_rad_s;
+            let change_rad_s2 = self.rate_change_rad_s2(&mut state.rate_filtered[axis], rate_rad_s);
+            let (gains, max) = (&self.gains.rate[axis], self.gains.integral_max_rad_s2);
+            *integral = (*integral + gains.integral_1_s2 * error_rad_s * self.period_s).clamp(-max, max);
+            acceleration_B_rad_s2[axis] =
+                gains.proportional_1_s * error_rad_s + *integral - gains.derivative * change_rad_s2;
+        }
+        self.vehicle.inertia_B_kg_m2.component_mul(&acceleration_B_rad_s2)
+    }
+
+    /// The measured rate's rate of change, behind a first-order filter whose state follows the rate.
+    fn rate_change_rad_s2(&self, filtered_rad_s: &mut f64, rate_rad_s: f64) -> f64 {
+        let time_s = self.gains.derivative_filter_s + self.period_s;
+        let change_rad_s2 = (rate_rad_s - *filtered_rad_s) / time_s;
+        *filtered_rad_s += change_rad_s2 * self.period_s;
+        change_rad_s2
+    }
+}
+
+impl CommandFilter {
+    /// Angle and rate `period_s` on. Implicit in the rate, so that it is stable at any period.
+    fn moved(&self, angle_rad: f64, rate_rad_s: f64, asked_rad: f64, period_s: f64) -> (f64, f64) {
+        let asked_rad = asked_rad.clamp(-self.tilt_max_rad, self.tilt_max_rad);
+        let step = self.natural_frequency_rad_s * period_s;
+        let pull_rad_s = self.natural_frequency_rad_s * step * (asked_rad - angle_rad);
+        let rate_rad_s = (rate_rad_s + pull_rad_s) / (1.0 + 2.0 * self.damping_ratio * step + step * step);
+        (angle_rad + rate_rad_s * period_s, rate_rad_s)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn law() -> CascadeLaw {
+        let vehicle = HoverModel {
+            mass_kg: 0.5,
+            inertia_B_kg_m2: Vector3::new(5.0e-3, 6.0e-3, 8.0e-3),
+            gravity_m_s2: 9.81,
+            thrust_min_N: 1.0,
+            thrust_max_N: 10.0,
+        };
+        CascadeLaw { gains: CascadeGains::default(), vehicle, period_s: 1e-3 }
+    }
+
+    fn level() -> HoverMotion {
+        HoverMotion {
+            altitude_m: 1.0,
+            climb_rate_m_s: 0.0,
+            roll_rad: 0.0,
+            pitch_rad: 0.0,
+            yaw_rad: 0.0,
+            angular_velocity_B_rad_s: Vector3::zeros(),
+        }
+    }
+
+    fn hold() -> SetPoint {
+        SetPoint { altitude_m: 1.0, ..SetPoint::default() }
+    }
+
+    /// What was asked for in flight, so that the yaw command is not reset.
+    const IN_FLIGHT: RotorWrench = RotorWrench { thrust_N: 5.0, torque_B_N_m: Vector3::new(0.0, 0.0, 0.0) };
+
+    fn flying(measured: &HoverMotion) -> CascadeState {
+        law().initial(measured)
+    }
+
+    /// `seconds` of asking for `set_point` at a measurement that stays as it is.
+    fn held(set_point: &SetPoint, measured: &HoverMotion, seconds: usize) -> (CascadeState, ControlOutput) {
+        let mut state = flying(measured);
+        let mut output = ControlOutput::default();
+        for _ in 0..1000 * seconds {
+            output = law().demand(&mut state, &IN_FLIGHT, set_point, measured);
+        }
+        (state, output)
+    }
+
+    #[test]
+    fn at_the_set_point_the_wrench_is_the_weight() {
+        let wrench = law().demand(&mut flying(&level()), &IN_FLIGHT, &hold(), &level()).wrench;
+        assert!((wrench.thrust_N - 0.5 * 9.81).abs() < 1e-12);
+        assert_eq!(wrench.torque_B_N_m, Vector3::zeros());
+    }
+
+    #[test]
+    fn a_step_of_the_stick_is_filtered_without_overshoot_and_cut_to_thirty_degrees() {
+        let far = SetPoint { roll_rad: 1.2, pitch_rad: -1.2, ..hold() };
+        let mut state = flying(&level());
+        let mut rolls = Vec::new();
+        for _ in 0..1000 {
+            rolls.push(law().demand(&mut state, &IN_FLIGHT, &far, &level()).set_point.roll_rad);
+        }
+        assert!(rolls[0] < 0.01 && rolls.windows(2).all(|pair| pair[0] <= pair[1]));
+        assert!((rolls[999] - 30.0_f64.to_radians()).abs() < 1e-6);
+        assert!((state.attitude_command[1] + 30.0_f64.to_radians()).abs() < 1e-6);
+    }
+
+    #[test]
+    fn every_error_and_rate_acts_with_its_sign() {
+        let set = SetPoint { roll_rad: 0.1, pitch_rad: -0.1, yaw_rad: 0.2, ..hold() };
+        let torque = held(&set, &level(), 1).1.wrench.torque_B_N_m;
+        assert!(torque.x > 0.0 && torque.y < 0.0 && torque.z > 0.0, "{torque}");
+        let turning = HoverMotion { angular_velocity_B_rad_s: Vector3::new(1.0, 0.0, 0.0), ..level() };
+        let torque = law().demand(&mut flying(&turning), &IN_FLIGHT, &hold(), &turning).wrench.torque_B_N_m;
+        let rate = law().gains.rate[0];
+        let expected_N_m = -5.0e-3 * (rate.proportional_1_s + rate.integral_1_s2 * 1e-3);
+        assert!((torque.x - expected_N_m).abs() < 1e-12, "{torque}");
+    }
+
+    #[test]
+    fn the_derivative_opposes_a_growing_rate() {
+        let turning = HoverMotion { angular_velocity_B_rad_s: Vector3::new(0.1, 0.0, 0.0), ..level() };
+        let mut at_rest = flying(&level());
+        let growing = law().demand(&mut at_rest, &IN_FLIGHT, &hold(), &turning).wrench.torque_B_N_m.x;
+        let steady = law().demand(&mut flying(&turning), &IN_FLIGHT, &hold(), &turning).wrench.torque_B_N_m.x;
+        assert!(growing < steady && steady < 0.0);
+    }
+
+    #[test]
+    fn the_yaw_command_turns_the_short_way_at_the_sticks_rate_and_comes_round() {
+        let at = |yaw_rad| HoverMotion { yaw_rad, ..level() };
+        let asked = SetPoint { yaw_rad: -3.0, ..hold() };
+        let mut state = flying(&at(3.0));
+        law().demand(&mut state, &IN_FLIGHT, &asked, &at(3.0));
+        let turned_rad = state.attitude_command[2] - 3.0;
+        assert!((turned_rad - 90.0_f64.to_radians() * 1e-3).abs() < 1e-9, "{turned_rad}");
+        let (state, _) = held(&asked, &at(3.0), 1);
+        assert!((state.attitude_command[2] + 3.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn without_thrust_the_yaw_command_is_the_measured_yaw() {
+        let turned = HoverMotion { yaw_rad: 2.0, ..level() };
+        let none = RotorWrench::default();
+        let output =
+            law().demand(&mut flying(&level()), &none, &SetPoint { yaw_rad: 2.0, ..hold() }, &turned);
+        assert_eq!(output.set_point.yaw_rad, 2.0);
+    }
+
+    #[test]
+    fn a_yaw_rate_in_a_bank_needs_body_pitch_rate() {
+        let banked = HoverMotion { roll_rad: 0.4, ..level() };
+        let state = CascadeState { attitude_command: [0.4, 0.0, 0.5], ..CascadeState::default() };
+        let rates = law().rate_command_B_rad_s(&state, &banked);
+        let yaw_rate = law().gains.attitude_1_s[2] * 0.5;
+        assert!((rates.y - yaw_rate * libm::sin(0.4)).abs() < 1e-12);
+        assert!((rates.z - yaw_rate * libm::cos(0.4)).abs() < 1e-12);
+    }
+
+    fn after(wrench: RotorWrench, integrals: Option<Integrals>) -> Predecessor<'static, CascadeState> {
+        Predecessor { wrench, integrals, state: None }
+    }
+
+    #[test]
+    fn a_successor_goes_on_from_the_integrators_and_from_where_the_vehicle_is() {
+        let wrench = RotorWrench { thrust_N: 5.2, torque_B_N_m: Vector3::new(1e-3, -2e-3, 1e-3) };
+        let measured = HoverMotion { roll_rad: 0.05, yaw_rad: 1.0, ..level() };
+        let before = Integrals { lift: 0.3, turn: [0.1, f64::NAN, 9.0] };
+        let state = law().continued(&after(wrench, Some(before)), 1.0, &measured);
+        assert_eq!(state.integrals, Integrals { lift: 0.3, turn: [0.1, 0.0, 2.0] });
+        assert_eq!(state.attitude_command, [0.05, 0.0, 1.0]);
+    }
+
+    #[test]
+    fn a_successor_that_knows_only_the_last_command_asks_for_its_thrust() {
+        let wrench = RotorWrench { thrust_N: 5.2, torque_B_N_m: Vector3::zeros() };
+        let mut state = law().continued(&after(wrench, None), 1.0, &level());
+        let asked = law().demand(&mut state, &wrench, &hold(), &level()).wrench;
+        assert!((asked.thrust_N - wrench.thrust_N).abs() < 1e-12, "{asked:?}");
+    }
 }

@@ -10,7 +10,7 @@ use bus::messages::{Reference, WallEstimate};
 use nalgebra::{UnitQuaternion, Vector3};
 
 /// The vehicle's motion as its estimators believe it.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct MotionEstimate {
     /// Position of the centre of mass in the world, m.
     pub position_W_m: Vector3<f64>,
@@ -23,18 +23,16 @@ pub struct MotionEstimate {
 }
 
 /// What a law reads at a tick.
-#[derive(Debug, Clone, Copy)]
-pub struct ControlInput<'a> {
+#[derive(Debug, Clone, Copy, Default)]
+pub struct ControlInput {
     /// The vehicle's motion.
     pub motion: MotionEstimate,
     /// What the pilot asks for; the default where no pilot is wired.
     pub set_point: SetPoint,
     /// Where the trajectory is; zero where none is wired.
-    pub reference: &'a Reference,
+    pub reference: Reference,
     /// What the range finders see; zero where none are wired.
-    pub walls: &'a WallEstimate,
-    /// Simulation time.
-    pub time_ns: u64,
+    pub walls: WallEstimate,
 }
 
 /// What a law answers: the wrench to make, and what it reports beside it.
@@ -103,7 +101,7 @@ impl HoverMotion {
 
     /// The same with height and climb by the beam downwards.
     #[must_use]
-    pub fn by_ranges(input: &ControlInput<'_>) -> Self {
+    pub fn by_ranges(input: &ControlInput) -> Self {
         Self {
             altitude_m: input.walls.height,
             climb_rate_m_s: input.walls.climb_rate,

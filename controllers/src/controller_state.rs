@@ -31,9 +31,9 @@ pub(crate) struct LawId {
 impl LawId {
     /// The identity of `L`.
     pub fn of<L: Law>() -> Self {
-        const { assert!(L::NAME.len() <= NAME_MAX, "a law's name fits into `NAME_MAX` bytes") }
+        const { assert!(L::INFO.name.len() <= NAME_MAX, "a law's name fits into `NAME_MAX` bytes") }
         let mut name = [0; NAME_MAX];
-        name[..L::NAME.len()].copy_from_slice(L::NAME.as_bytes());
+        name[..L::INFO.name.len()].copy_from_slice(L::INFO.name.as_bytes());
         Self { name, state: L::State::SCHEMA.layout_hash() }
     }
 }

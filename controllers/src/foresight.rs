@@ -111,7 +111,7 @@ impl Foresight {
 
     /// Before the first tick: the rotors carry the weight.
     #[must_use]
-    pub fn start(&self, input: &ControlInput<'_>) -> Start<ForesightState> {
+    pub fn start(&self, input: &ControlInput) -> Start<ForesightState> {
         started(&Made::settled(self.hover()), ObserverState::at(&input.motion))
     }
 
@@ -120,7 +120,7 @@ impl Foresight {
     pub fn take_over(
         &self,
         from: &Predecessor<'_, ForesightState>,
-        input: &ControlInput<'_>,
+        input: &ControlInput,
     ) -> Start<ForesightState> {
         let wrench = self.possible(&from.wrench);
         let start = match from.state {
@@ -136,14 +136,14 @@ impl Foresight {
         &self,
         before: Option<Integrals>,
         asked: &RotorWrench,
-        input: &ControlInput<'_>,
+        input: &ControlInput,
     ) -> Start<ForesightState> {
         let lift_m_s2 = before.map_or(0.0, |before| within(before.lift, self.disturbance_max_m_s2));
         let observer = ObserverState { answer: [0.0, 0.0, lift_m_s2], ..ObserverState::at(&input.motion) };
         started(&Made::settled(*asked), observer)
     }
 
-    fn after_foresight(&self, before: &ForesightState, input: &ControlInput<'_>) -> Start<ForesightState> {
+    fn after_foresight(&self, before: &ForesightState, input: &ControlInput) -> Start<ForesightState> {
         let measured_W_m_s = input.motion.velocity_W_m_s;
         let missed_W_m_s = Vector3::from(before.observer.velocity_foreseen) - measured_W_m_s;
         let foreseen_W_m_s = measured_W_m_s + missed_W_m_s.map(|v| within(v, VELOCITY_MISSED_MAX_M_S));

@@ -1,59 +1,207 @@
-//! The geometric controller node: a trajectory's reference to four motor commands.
+//! Geometric tracking on SE(3): a reference with its derivatives and a motion to a wrench, at any attitude.
+//!
+//! T. Lee, M. Leok and N. H. McClamroch, "Geometric tracking control of a quadrotor UAV on SE(3)", CDC 2010, their
+//! z axis turned up and their gains divided by mass and inertia:
+//!
+//! | here | in the paper |
+//! |---|---|
+//! | e_x = x − x_d, e_v = v − v_d | tracking errors of position and velocity |
+//! | t = a_d + g·z − k_p·e_x − k_v·e_v − d̂ | the vector that its b_3c lies along; d̂ is the `disturbance` that is observed |
+//! | R_c: body z along t, the yaw of the reference | R_c, with the yaw of `flatness` |
+//! | thrust = m·t·(R z) | f |
+//! | e_R = ½(R_cᵀR − RᵀR_c)^∨, e_Ω = Ω − RᵀR_c·Ω_c | tracking errors of attitude and angular velocity |
+//! | torque = J·(−k_R·e_R − k_Ω·e_Ω) + Ω × JΩ − J·(Ω × RᵀR_c·Ω_c − RᵀR_c·Ω_c′) | M |
+//!
+//! Ω_c and its rate follow from the first two derivatives of t, which hold the reference's jerk and snap and those of
+//! the errors: the paper leaves open where the errors of acceleration and jerk come from; here they are what the
+//! thrust that the rotors are foreseen to make (`motor_lag`) means at the estimated attitude and rates, and d̂.
+#![allow(
+    non_snake_case,
+    reason = "a trailing _W or _B names the frame a vector is written in, _N the newton"
+)]
 
 use crate::airframe::ControlledVehicle;
-use crate::controller;
+use crate::allocation::RotorWrench;
+use crate::control::{ControlInput, ControlOutput, MotionEstimate};
+use crate::disturbance::{Disturbance, ObserverState};
+use crate::flatness::{self, Moving, Target};
+use crate::foresight::{Foresight, ForesightState};
 use crate::geometric_gains::GeometricGains;
-use crate::geometric_law::GeometricLaw;
-use crate::rehearsal;
-use bus::kind::{Inputs, NodeKind, PortSpec};
-use bus::messages::{AttitudeEstimate, ControlStatus, MotorCommand, Reference, StateEstimate};
-use bus::{BusError, Message, Node};
+use crate::law::{FileParameters, Law, Predecessor, Start};
+use crate::law_inputs::ReferenceInputs;
+use crate::motor_lag::Made;
+use crate::set_points::SetPoint;
+use crate::trajectory::Point;
+use bus::component::Info;
+use bus::context::NodeContext;
 use diagnostics::ParameterError;
-use serde::Deserialize;
-use std::path::PathBuf;
+use nalgebra::{Matrix3, Vector3};
 
-/// The geometric controller, for manifests.
-pub const KIND: NodeKind = NodeKind {
-    name: "geometric",
-    summary: "tracking on SE(3) (Lee, Leok, McClamroch 2010) with jerk and snap fed forward",
-    inputs: Inputs::Ports(&[
-        PortSpec::required("reference", Reference::SCHEMA),
-        PortSpec::required("estimate", StateEstimate::SCHEMA),
-        PortSpec::optional("attitude", AttitudeEstimate::SCHEMA),
-    ]),
-    outputs: &[
-        PortSpec::required("command", MotorCommand::SCHEMA),
-        PortSpec::optional("status", ControlStatus::SCHEMA),
-    ],
-    check: |parameters, run| {
-        let (law, craft) = build(&diagnostics::read(parameters)?, run.period_s())?;
-        rehearsal::check(&law, &craft, run)
-    },
-    run,
-};
-
-/// Parameters of the geometric controller.
-#[derive(Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct Parameters {
-    /// Vehicle file.
-    vehicle: PathBuf,
-    /// Gains file; the built-in gains where absent.
-    gains: Option<PathBuf>,
-}
-
-fn build(
-    parameters: &Parameters,
+/// The law at one period: all that does not change during a run.
+#[derive(Debug, Clone, PartialEq)]
+pub struct GeometricLaw {
+    gains: GeometricGains,
+    mass_kg: f64,
+    inertia_B_kg_m2: Matrix3<f64>,
+    gravity_m_s2: f64,
+    foresight: Foresight,
     period_s: f64,
-) -> Result<(GeometricLaw, ControlledVehicle), ParameterError> {
-    let craft = ControlledVehicle::load(&parameters.vehicle)?;
-    let gains = GeometricGains::load(parameters.gains.as_deref())
-        .map_err(|error| ParameterError::conflict("gains", error))?;
-    Ok((GeometricLaw::new(gains, &craft, period_s), craft))
 }
 
-fn run() -> Result<(), BusError> {
-    let node = Node::join()?;
-    let (law, craft) = build(&node.parameters()?, node.period_s()).map_err(|error| node.error(error))?;
-    controller::run(node, &law, &craft)
+/// How far the vehicle is off its reference, and what the reference does: in the world.
+struct Errors {
+    position_W_m: Vector3<f64>,
+    velocity_W_m_s: Vector3<f64>,
+    acceleration_W_m_s2: Vector3<f64>,
+    jerk_W_m_s3: Vector3<f64>,
+}
+
+/// How the model has the vehicle move, in the world.
+struct Push {
+    acceleration_W_m_s2: Vector3<f64>,
+    jerk_W_m_s3: Vector3<f64>,
+}
+
+impl GeometricLaw {
+    /// The law for `craft`.
+    #[must_use]
+    pub fn for_craft(gains: GeometricGains, craft: &ControlledVehicle, period_s: f64) -> Self {
+        let vehicle = &craft.vehicle;
+        Self {
+            gains,
+            mass_kg: vehicle.mass_kg,
+            inertia_B_kg_m2: vehicle.inertia_kg_m2,
+            gravity_m_s2: vehicle.gravity_m_s2,
+            foresight: Foresight::new(craft, &gains.observer, period_s),
+            period_s,
+        }
+    }
+
+    /// The demand, and the attitude behind it; advances the observer.
+    fn asked(
+        &self,
+        observer: &mut ObserverState,
+        made: &Made,
+        input: &ControlInput,
+    ) -> (RotorWrench, Target) {
+        let (reference, motion) = (&Point::from(&input.reference), &input.motion);
+        let push = self.push(made, motion);
+        let disturbance =
+            self.gains.observer.step(observer, motion, &push.acceleration_W_m_s2, self.period_s);
+        let errors = errors(&push, &disturbance, reference, motion);
+        let thrust_W_m_s2 = self.thrust_vector(&disturbance, &errors, reference);
+        let target = flatness::target(&thrust_W_m_s2, reference.yaw_rad, reference.yaw_rate_rad_s);
+        let z_W = motion.attitude_WB * Vector3::z();
+        let wanted = RotorWrench {
+            thrust_N: self.mass_kg * thrust_W_m_s2.value.dot(&z_W),
+            torque_B_N_m: self.torque(&target, motion),
+        };
+        let hurried = self.foresight.lag.hurried(&self.gains.motor, made, &wanted);
+        (RotorWrench { thrust_N: self.foresight.limited_N(hurried.thrust_N), ..hurried }, target)
+    }
+
+    /// What the model makes of the vehicle's motion: rotors as foreseen, gravity, and drag where it is stated.
+    fn push(&self, made: &Made, motion: &MotionEstimate) -> Push {
+        let z_W = motion.attitude_WB * Vector3::z();
+        let turning_W = motion.attitude_WB * motion.angular_velocity_B_rad_s.cross(&Vector3::z());
+        let (push_m_s2, push_rate_m_s3) =
+            (made.wrench.thrust_N / self.mass_kg, made.rate.thrust_N / self.mass_kg);
+        let drag_1_s = self.gains.drag_1_s;
+        let acceleration_W_m_s2 =
+            z_W * push_m_s2 - Vector3::z() * self.gravity_m_s2 - motion.velocity_W_m_s * drag_1_s;
+        let jerk_W_m_s3 = turning_W * push_m_s2 + z_W * push_rate_m_s3 - acceleration_W_m_s2 * drag_1_s;
+        Push { acceleration_W_m_s2, jerk_W_m_s3 }
+    }
+
+    /// Thrust for each unit of mass with two derivatives: t of the table above.
+    fn thrust_vector(&self, disturbance: &Disturbance, errors: &Errors, reference: &Point) -> Moving {
+        let gains = &self.gains;
+        let (kp, kv) = (gains.position_proportional_1_s2, gains.position_derivative_1_s);
+        let answer = -errors.position_W_m * kp - errors.velocity_W_m_s * kv - disturbance.acceleration_W_m_s2;
+        let answer_first =
+            -errors.velocity_W_m_s * kp - errors.acceleration_W_m_s2 * kv - disturbance.jerk_W_m_s3;
+        let answer_second = -errors.acceleration_W_m_s2 * kp - errors.jerk_W_m_s3 * kv;
+        // What exceeds the limit is scaled down with its derivatives.
+        let part = (gains.acceleration_max_m_s2 / answer.norm()).min(1.0);
+        let ahead = |order: usize| reference.path_W[order] + reference.path_W[order - 1] * gains.drag_1_s;
+        let acceleration_W = Moving {
+            value: ahead(2) + answer * part,
+            first: ahead(3) + answer_first * part,
+            second: ahead(4) + answer_second * part,
+        };
+        acceleration_W.against(self.gravity_m_s2)
+    }
+
+    fn torque(&self, target: &Target, motion: &MotionEstimate) -> Vector3<f64> {
+        let rate_B = motion.angular_velocity_B_rad_s;
+        // Takes the target's axes to the body's: RᵀR_c.
+        let relative = motion.attitude_WB.inverse() * target.attitude_WB;
+        let matrix = relative.to_rotation_matrix().into_inner();
+        let skew = (matrix.transpose() - matrix) * 0.5;
+        let attitude_error = Vector3::new(skew.m32, skew.m13, skew.m21);
+        let target_rate_B = relative * target.angular_velocity_B_rad_s;
+        let rate_error_B = rate_B - target_rate_B;
+        let ahead_B = relative * target.angular_acceleration_B_rad_s2 - rate_B.cross(&target_rate_B);
+        let gains = &self.gains;
+        let (tilt, yaw) = (gains.attitude_proportional_1_s2, gains.yaw_proportional_1_s2);
+        let (tilt_rate, yaw_rate) = (gains.attitude_derivative_1_s, gains.yaw_derivative_1_s);
+        let acceleration_B = ahead_B
+            - Vector3::new(tilt, tilt, yaw).component_mul(&attitude_error)
+            - Vector3::new(tilt_rate, tilt_rate, yaw_rate).component_mul(&rate_error_B);
+        self.inertia_B_kg_m2 * acceleration_B + rate_B.cross(&(self.inertia_B_kg_m2 * rate_B))
+    }
+}
+
+impl Law for GeometricLaw {
+    const INFO: Info = Info::new(
+        "geometric",
+        "tracking on SE(3) (Lee, Leok, McClamroch 2010) with jerk and snap fed forward",
+    );
+    type Parameters = FileParameters;
+    type Inputs<'a> = ReferenceInputs<'a>;
+    type State = ForesightState;
+
+    fn new(
+        parameters: &FileParameters,
+        craft: &ControlledVehicle,
+        context: &NodeContext<'_>,
+    ) -> Result<Self, ParameterError> {
+        let gains = GeometricGains::load(parameters.gains.as_deref())
+            .map_err(|error| ParameterError::conflict("gains", error))?;
+        Ok(Self::for_craft(gains, craft, context.period_s()))
+    }
+
+    fn rate_gain_1_s(&self) -> f64 {
+        self.gains.attitude_derivative_1_s.max(self.gains.yaw_derivative_1_s)
+    }
+
+    fn start(&self, input: &ControlInput) -> Start<ForesightState> {
+        self.foresight.start(input)
+    }
+
+    fn take_over(
+        &self,
+        from: &Predecessor<'_, ForesightState>,
+        input: &ControlInput,
+    ) -> Start<ForesightState> {
+        self.foresight.take_over(from, input)
+    }
+
+    fn step(&self, state: &mut ForesightState, last: &RotorWrench, input: &ControlInput) -> ControlOutput {
+        let made = self.foresight.advance(state, last);
+        let (wrench, target) = self.asked(&mut state.observer, &made, input);
+        let set_point = SetPoint::held(input.reference.position.z, &target.attitude_WB);
+        ControlOutput { wrench, integrals: state.integrals(), set_point, ..ControlOutput::default() }
+    }
+}
+
+fn errors(push: &Push, disturbance: &Disturbance, reference: &Point, motion: &MotionEstimate) -> Errors {
+    let acceleration_W_m_s2 = push.acceleration_W_m_s2 + disturbance.acceleration_W_m_s2;
+    let jerk_W_m_s3 = push.jerk_W_m_s3 + disturbance.jerk_W_m_s3;
+    Errors {
+        position_W_m: motion.position_W_m - reference.path_W[0],
+        velocity_W_m_s: motion.velocity_W_m_s - reference.path_W[1],
+        acceleration_W_m_s2: acceleration_W_m_s2 - reference.path_W[2],
+        jerk_W_m_s3: jerk_W_m_s3 - reference.path_W[3],
+    }
 }

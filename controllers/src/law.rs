@@ -1,16 +1,40 @@
-//! What a control law is: its state, how it begins, how it goes on after another law, its step.
+//! What a control law is: how it is made, its inputs and state, how it begins, how it goes on after another law, its
+//! step.
 
+use crate::airframe::ControlledVehicle;
 use crate::allocation::RotorWrench;
 use crate::control::{ControlInput, ControlOutput, Integrals};
 use bus::Message;
+use bus::component::Info;
+use bus::context::NodeContext;
+use bus::ports::InputPorts;
+use diagnostics::ParameterError;
+use serde::Deserialize;
+use serde::de::DeserializeOwned;
+use std::path::{Path, PathBuf};
 
 /// A control law at one period, with all that does not change during a run.
-pub trait Law {
-    /// Name in manifests.
-    const NAME: &'static str;
-
+///
+/// [`crate::controller::Controller`] makes a component of it.
+pub trait Law: Sized {
+    /// Its name in manifests, and what it does.
+    const INFO: Info;
+    /// What the manifest's `parameters` table holds.
+    type Parameters: DeserializeOwned + VehicleFile;
+    /// What it reads.
+    type Inputs<'a>: InputPorts<'a> + Into<ControlInput>;
     /// All that it remembers between ticks.
     type State: Message;
+
+    /// Makes the law for `craft`.
+    ///
+    /// # Errors
+    /// A parameter or a file that cannot be meant.
+    fn new(
+        parameters: &Self::Parameters,
+        craft: &ControlledVehicle,
+        context: &NodeContext<'_>,
+    ) -> Result<Self, ParameterError>;
 
     /// The greatest angular acceleration that it asks for against a body rate, 1/s: with the period it tells whether
     /// the loop can be closed at all. 0 where the law is made for its period.
@@ -19,15 +43,15 @@ pub trait Law {
     }
 
     /// What it begins with before the first tick of a run.
-    fn start(&self, input: &ControlInput<'_>) -> Start<Self::State>;
+    fn start(&self, input: &ControlInput) -> Start<Self::State>;
 
     /// What it begins with after another law. It need not ask for the other's last wrench, since
     /// [`crate::bumpless::BumplessTransfer`] makes up for the rest, and an integrator should not take that up: it would
     /// keep amid a manoeuvre what is gone a moment later.
-    fn take_over(&self, from: &Predecessor<'_, Self::State>, input: &ControlInput<'_>) -> Start<Self::State>;
+    fn take_over(&self, from: &Predecessor<'_, Self::State>, input: &ControlInput) -> Start<Self::State>;
 
     /// The demand now; advances the state by one period. `last` was asked for one period ago.
-    fn step(&self, state: &mut Self::State, last: &RotorWrench, input: &ControlInput<'_>) -> ControlOutput;
+    fn step(&self, state: &mut Self::State, last: &RotorWrench, input: &ControlInput) -> ControlOutput;
 }
 
 /// What a law begins with.
@@ -48,4 +72,26 @@ pub struct Predecessor<'a, S> {
     pub integrals: Option<Integrals>,
     /// Its state, where that is of the same type as the successor's.
     pub state: Option<&'a S>,
+}
+
+/// Parameters that name a vehicle file.
+pub trait VehicleFile {
+    /// The file.
+    fn vehicle(&self) -> &Path;
+}
+
+/// Parameters of a law that has no others.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct FileParameters {
+    /// Vehicle file.
+    pub vehicle: PathBuf,
+    /// Gains file; the built-in gains where there is none.
+    pub gains: Option<PathBuf>,
+}
+
+impl VehicleFile for FileParameters {
+    fn vehicle(&self) -> &Path {
+        &self.vehicle
+    }
 }

@@ -1,56 +1,192 @@
-//! The LQR controller node: a trajectory's reference to four motor commands.
+//! The linear-quadratic regulator about hover, made to follow a reference.
+//!
+//! The gain K of `riccati` for the model of `lqr_model` is computed at the start from the vehicle file and the weights.
+//! The demand is u = u_d − K·(x − x_d): x_d is what the reference's acceleration, jerk and snap and the observed
+//! disturbance need by `flatness` (attitude, rates, wrench), u_d the wrench that the motors, which lag by 2ζ/ω_n, have to be
+//! asked for to make it. Position and velocity are compared in axes that turn with the vehicle's heading, attitude and
+//! rates in the axes of x_d, so that any yaw and any tilt of the reference is a hover to the regulator.
+#![allow(
+    non_snake_case,
+    reason = "a trailing _W or _B names the frame a vector is written in, _N the newton"
+)]
 
 use crate::airframe::ControlledVehicle;
-use crate::controller;
+use crate::allocation::RotorWrench;
+use crate::control::{ControlInput, ControlOutput, MotionEstimate};
+use crate::disturbance::Disturbance;
+use crate::flatness::{self, Moving, Target};
+use crate::foresight::{Foresight, ForesightState};
+use crate::law::{FileParameters, Law, Predecessor, Start};
+use crate::law_inputs::ReferenceInputs;
 use crate::lqr_gains::LqrGains;
-use crate::lqr_law::LqrLaw;
-use crate::rehearsal;
-use bus::kind::{Inputs, NodeKind, PortSpec};
-use bus::messages::{AttitudeEstimate, ControlStatus, MotorCommand, Reference, StateEstimate};
-use bus::{BusError, Message, Node};
+use crate::lqr_model::{self, INPUTS, MADE, MADE_RATE, RATE, ROTATION, STATES, VELOCITY};
+use crate::motor_lag::Made;
+use crate::riccati;
+use crate::set_points::SetPoint;
+use crate::trajectory::Point;
+use bus::component::Info;
+use bus::context::NodeContext;
 use diagnostics::ParameterError;
-use serde::Deserialize;
-use std::path::PathBuf;
+use nalgebra::{Matrix3, Rotation3, SMatrix, SVector, Vector3};
 
-/// The LQR controller, for manifests.
-pub const KIND: NodeKind = NodeKind {
-    name: "lqr",
-    summary: "linear-quadratic regulator about hover, its gains computed at the start from the vehicle file",
-    inputs: Inputs::Ports(&[
-        PortSpec::required("reference", Reference::SCHEMA),
-        PortSpec::required("estimate", StateEstimate::SCHEMA),
-        PortSpec::optional("attitude", AttitudeEstimate::SCHEMA),
-    ]),
-    outputs: &[
-        PortSpec::required("command", MotorCommand::SCHEMA),
-        PortSpec::optional("status", ControlStatus::SCHEMA),
-    ],
-    check: |parameters, run| {
-        let (law, craft) = build(&diagnostics::read(parameters)?, run.period_s())?;
-        rehearsal::check(&law, &craft, run)
-    },
-    run,
-};
-
-/// Parameters of the LQR controller.
-#[derive(Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct Parameters {
-    /// Vehicle file.
-    vehicle: PathBuf,
-    /// Weights file; the built-in weights where absent.
-    gains: Option<PathBuf>,
+/// The law at one period: all that does not change during a run.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LqrLaw {
+    gains: LqrGains,
+    gain: SMatrix<f64, INPUTS, STATES>,
+    mass_kg: f64,
+    inertia_B_kg_m2: Matrix3<f64>,
+    gravity_m_s2: f64,
+    foresight: Foresight,
+    period_s: f64,
 }
 
-fn build(parameters: &Parameters, period_s: f64) -> Result<(LqrLaw, ControlledVehicle), ParameterError> {
-    let craft = ControlledVehicle::load(&parameters.vehicle)?;
-    let gains = LqrGains::load(parameters.gains.as_deref())
-        .map_err(|error| ParameterError::conflict("gains", error))?;
-    Ok((LqrLaw::new(gains, &craft, period_s)?, craft))
+/// What the reference needs.
+struct Needed {
+    attitude: Target,
+    wrench: RotorWrench,
+    thrust_rate_N_s: f64,
 }
 
-fn run() -> Result<(), BusError> {
-    let node = Node::join()?;
-    let (law, craft) = build(&node.parameters()?, node.period_s()).map_err(|error| node.error(error))?;
-    controller::run(node, &law, &craft)
+impl LqrLaw {
+    /// The law for `craft`.
+    ///
+    /// # Errors
+    /// The Riccati equation has no solution that stabilises the vehicle, or none that can be computed.
+    pub fn for_craft(
+        gains: LqrGains,
+        craft: &ControlledVehicle,
+        period_s: f64,
+    ) -> Result<Self, ParameterError> {
+        let vehicle = &craft.vehicle;
+        let (state_weights, input_weights) = lqr_model::weights(&gains);
+        let regulator = lqr_model::step(vehicle, period_s).and_then(|step| {
+            riccati::regulator(&step.transition, &step.input, &state_weights, &input_weights)
+        });
+        let regulator = regulator.ok_or_else(|| ParameterError::conflict("vehicle", "the Riccati equation for this `vehicle` and these `gains` has no stabilising solution that can be \
+             computed: look for a vehicle without gravity, or weights that are many orders of magnitude apart",
+        ))?;
+        Ok(Self {
+            gains,
+            gain: regulator.gain,
+            mass_kg: vehicle.mass_kg,
+            inertia_B_kg_m2: vehicle.inertia_kg_m2,
+            gravity_m_s2: vehicle.gravity_m_s2,
+            foresight: Foresight::new(craft, &gains.observer, period_s),
+            period_s,
+        })
+    }
+
+    /// K: what each state's deviation takes off the demanded thrust (N) and torque (N·m).
+    #[must_use]
+    pub fn gain(&self) -> &SMatrix<f64, INPUTS, STATES> {
+        &self.gain
+    }
+
+    fn needed(&self, disturbance: &Disturbance, reference: &Point) -> Needed {
+        let [_, _, acceleration_W, jerk_W, snap_W] = reference.path_W;
+        let wanted_W = Moving {
+            value: acceleration_W - disturbance.acceleration_W_m_s2,
+            first: jerk_W - disturbance.jerk_W_m_s3,
+            second: snap_W,
+        };
+        let thrust_W = wanted_W.against(self.gravity_m_s2);
+        let attitude = flatness::target(&thrust_W, reference.yaw_rad, reference.yaw_rate_rad_s);
+        let (rate_B, inertia) = (attitude.angular_velocity_B_rad_s, &self.inertia_B_kg_m2);
+        let torque_B_N_m =
+            inertia * attitude.angular_acceleration_B_rad_s2 + rate_B.cross(&(inertia * rate_B));
+        let z_W = thrust_W.value.normalize();
+        Needed {
+            attitude,
+            wrench: RotorWrench { thrust_N: self.mass_kg * thrust_W.value.norm(), torque_B_N_m },
+            thrust_rate_N_s: self.mass_kg * thrust_W.first.dot(&z_W),
+        }
+    }
+
+    /// x − x_d.
+    fn deviation(
+        &self,
+        needed: &Needed,
+        made: &Made,
+        motion: &MotionEstimate,
+        reference: &Point,
+    ) -> SVector<f64, STATES> {
+        let off_W_m = motion.position_W_m - reference.path_W[0];
+        let off_W_m_s = motion.velocity_W_m_s - reference.path_W[1];
+        let (_, _, heading_rad) = motion.attitude_WB.euler_angles();
+        let to_heading = Rotation3::from_axis_angle(&Vector3::z_axis(), -heading_rad);
+        let relative = needed.attitude.attitude_WB.inverse() * motion.attitude_WB;
+        let rate = relative * motion.angular_velocity_B_rad_s - needed.attitude.angular_velocity_B_rad_s;
+        let mut deviation: SVector<f64, STATES> = SVector::zeros();
+        let mut set = |at: usize, part: Vector3<f64>| deviation.fixed_rows_mut::<3>(at).copy_from(&part);
+        set(0, to_heading * off_W_m.cap_magnitude(self.gains.position_max_m));
+        set(VELOCITY, to_heading * off_W_m_s.cap_magnitude(self.gains.velocity_max_m_s));
+        set(ROTATION, relative.scaled_axis());
+        set(RATE, rate);
+        set(MADE + 1, made.wrench.torque_B_N_m - needed.wrench.torque_B_N_m);
+        set(MADE_RATE + 1, made.rate.torque_B_N_m);
+        deviation[MADE] = made.wrench.thrust_N - needed.wrench.thrust_N;
+        deviation[MADE_RATE] = made.rate.thrust_N - needed.thrust_rate_N_s;
+        deviation
+    }
+
+    fn demand(&self, needed: &Needed, deviation: &SVector<f64, STATES>) -> RotorWrench {
+        let answer = self.gain * deviation;
+        let ahead_N = self.foresight.lag.delay_s() * needed.thrust_rate_N_s;
+        RotorWrench {
+            thrust_N: self.foresight.limited_N(needed.wrench.thrust_N + ahead_N - answer[0]),
+            torque_B_N_m: needed.wrench.torque_B_N_m - answer.fixed_rows::<3>(1),
+        }
+    }
+
+    /// The acceleration that the foreseen thrust means.
+    fn explained_W_m_s2(&self, made: &Made, motion: &MotionEstimate) -> Vector3<f64> {
+        let thrust_B_m_s2 = Vector3::z() * (made.wrench.thrust_N / self.mass_kg);
+        motion.attitude_WB * thrust_B_m_s2 - Vector3::z() * self.gravity_m_s2
+    }
+}
+
+impl Law for LqrLaw {
+    const INFO: Info = Info::new(
+        "lqr",
+        "linear-quadratic regulator about hover, its gains computed at the start from the vehicle file",
+    );
+    type Parameters = FileParameters;
+    type Inputs<'a> = ReferenceInputs<'a>;
+    type State = ForesightState;
+
+    fn new(
+        parameters: &FileParameters,
+        craft: &ControlledVehicle,
+        context: &NodeContext<'_>,
+    ) -> Result<Self, ParameterError> {
+        let gains = LqrGains::load(parameters.gains.as_deref())
+            .map_err(|error| ParameterError::conflict("gains", error))?;
+        Self::for_craft(gains, craft, context.period_s())
+    }
+
+    fn start(&self, input: &ControlInput) -> Start<ForesightState> {
+        self.foresight.start(input)
+    }
+
+    fn take_over(
+        &self,
+        from: &Predecessor<'_, ForesightState>,
+        input: &ControlInput,
+    ) -> Start<ForesightState> {
+        self.foresight.take_over(from, input)
+    }
+
+    fn step(&self, state: &mut ForesightState, last: &RotorWrench, input: &ControlInput) -> ControlOutput {
+        let (made, motion) = (self.foresight.advance(state, last), &input.motion);
+        let explained_W_m_s2 = self.explained_W_m_s2(&made, motion);
+        let observer = &mut state.observer;
+        let disturbance = self.gains.observer.step(observer, motion, &explained_W_m_s2, self.period_s);
+        let reference = Point::from(&input.reference);
+        let needed = self.needed(&disturbance, &reference);
+        let deviation = self.deviation(&needed, &made, motion, &reference);
+        let wrench = self.demand(&needed, &deviation);
+        let set_point = SetPoint::held(input.reference.position.z, &needed.attitude.attitude_WB);
+        ControlOutput { wrench, integrals: state.integrals(), set_point, ..ControlOutput::default() }
+    }
 }

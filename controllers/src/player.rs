@@ -1,34 +1,18 @@
 //! The player node: publishes the motor commands and the measured states of a real flight.
 
 use crate::flight_log::{ColumnMap, FlightLog, Row};
-use bus::context::NodeContext;
-use bus::kind::{Inputs, NodeKind, PortSpec};
+use bus::OutputPorts;
+use bus::component::{Component, Info, StepError};
+use bus::context::{NodeContext, StepContext};
 use bus::messages::{MeasuredState, MotorCommand};
-use bus::{BusError, Message, Node};
 use diagnostics::ParameterError;
 use serde::Deserialize;
 use std::path::PathBuf;
 
-/// The player, for manifests.
-pub const KIND: NodeKind = NodeKind {
-    name: "player",
-    summary: "commands and measured states of a recorded flight (CSV with a column map)",
-    inputs: Inputs::Ports(&[]),
-    outputs: &[
-        PortSpec::required("command", MotorCommand::SCHEMA),
-        PortSpec::required("measured", MeasuredState::SCHEMA),
-    ],
-    check: |parameters, run| {
-        let parameters = diagnostics::read(parameters)?;
-        require_length(&load(&parameters)?, parameters.from_s, run)
-    },
-    run,
-};
-
 /// Parameters of the player.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-struct Parameters {
+pub struct Parameters {
     /// The flight.
     data: PathBuf,
     /// Time in the flight, from its first row, at which tick 0 lies.
@@ -71,26 +55,54 @@ fn require_length(log: &FlightLog, from_s: f64, run: &NodeContext<'_>) -> Result
     ))
 }
 
-fn run() -> Result<(), BusError> {
-    let mut node = Node::join()?;
-    let command = node.output::<MotorCommand>("command")?;
-    let measured = node.output::<MeasuredState>("measured")?;
-    let parameters: Parameters = node.parameters()?;
-    let log = load(&parameters).map_err(|error| node.error(error))?;
-    let mut hint = 0;
-    node.run(|tick| {
-        let time_s = parameters.from_s + tick.time_s();
-        if time_s > log.duration_s() + SLACK_S {
-            return Err(format!(
-                "the flight ends {:.3} s after `from_s`; shorten run.duration_s",
-                log.duration_s() - parameters.from_s
-            ));
+/// What the player sends.
+#[derive(Debug, OutputPorts)]
+pub struct Outputs {
+    /// The commands of the flight.
+    pub command: MotorCommand,
+    /// The measured motion.
+    pub measured: MeasuredState,
+}
+
+/// A recorded flight that is played.
+#[derive(Debug)]
+pub struct Player {
+    log: FlightLog,
+    from_s: f64,
+    /// The row that was played last.
+    hint: usize,
+}
+
+impl Component for Player {
+    const INFO: Info =
+        Info::new("player", "commands and measured states of a recorded flight (CSV with a column map)");
+    type Parameters = Parameters;
+    type Inputs<'a> = ();
+    type Outputs = Outputs;
+    type State = ();
+
+    fn new(parameters: Parameters, _: &NodeContext<'_>) -> Result<Self, ParameterError> {
+        Ok(Self { log: load(&parameters)?, from_s: parameters.from_s, hint: 0 })
+    }
+
+    fn rehearse(self, context: &NodeContext<'_>) -> Result<(), ParameterError> {
+        require_length(&self.log, self.from_s, context)
+    }
+
+    fn initial(&self) {}
+
+    fn step(&mut self, context: &StepContext<'_>, (): (), (): &mut ()) -> Result<Outputs, StepError> {
+        let time_s = self.from_s + context.time_s();
+        let left_s = self.log.duration_s() - self.from_s;
+        if time_s > self.log.duration_s() + SLACK_S {
+            return Err(
+                format!("the flight ends {left_s:.3} s after `from_s`; shorten run.duration_s").into()
+            );
         }
-        let row = log.at(time_s, &mut hint);
-        tick.write(command, MotorCommand { command: row.command, ..Default::default() })
-            .and_then(|()| tick.write(measured, message(&row)))
-            .map_err(|error| error.to_string())
-    })
+        let row = self.log.at(time_s, &mut self.hint);
+        let command = MotorCommand { command: row.command, ..Default::default() };
+        Ok(Outputs { command, measured: message(&row) })
+    }
 }
 
 fn message(row: &Row) -> MeasuredState {

@@ -14,7 +14,6 @@ use crate::controller_state::ControllerState;
 use crate::law::Law;
 use crate::set_points::SetPoint;
 use bus::context::NodeContext;
-use bus::messages::{Reference, WallEstimate};
 use diagnostics::ParameterError;
 use nalgebra::{UnitQuaternion, Vector3};
 
@@ -47,7 +46,7 @@ pub(crate) fn check<L: Law>(
 
 fn check_period(gain_1_s: f64, run: &NodeContext<'_>) -> Result<(), ParameterError> {
     let (product, hz) = (gain_1_s * run.period_s(), run.period_s().recip());
-    let words = || {
+    let message = || {
         format!(
             "`gains` answer a body rate with {gain_1_s} 1/s, and the law computes {hz} times a second: their ratio is \
              {product:.3}"
@@ -59,12 +58,12 @@ fn check_period(gain_1_s: f64, run: &NodeContext<'_>) -> Result<(), ParameterErr
             format!(
                 "{}, expected below {DIVERGES}, from where on the rate grows from step to step; raise run.rate_hz, or \
              lower `period_ticks` or the gain",
-                words()
+                message()
             ),
         ));
     }
     if product > COARSE {
-        run.warn("gains", format!("{}, above {COARSE} little is left of the phase margin", words()));
+        run.warn("gains", format!("{}, above {COARSE} little is left of the phase margin", message()));
     }
     Ok(())
 }
@@ -97,14 +96,11 @@ fn fly<L: Law>(
     motion: &MotionEstimate,
     run: &NodeContext<'_>,
 ) -> Result<(), ParameterError> {
-    let (reference, walls) = (Reference::default(), WallEstimate::default());
     let set_point = SetPoint { altitude_m: 1.5, roll_rad: 0.1, pitch_rad: -0.1, yaw_rad: 0.5 };
+    let input = ControlInput { motion: *motion, set_point, ..ControlInput::default() };
     let transfer = BumplessTransfer::to::<L>(&craft.vehicle, run.period_s());
     let mut state = ControllerState::default();
     for step in 0..STEPS {
-        let time_ns = u64::from(step) * u64::from(run.period_ticks) * run.tick_ns;
-        let input =
-            ControlInput { motion: *motion, set_point, reference: &reference, walls: &walls, time_ns };
         let output = transfer.step(law, &mut state, &input, None);
         let speeds_rad_s = craft.allocation.allocate(&output.wrench).speeds_rad_s;
         if let Some(what) = output.not_finite().or_else(|| first_not_finite("a rotor speed", &speeds_rad_s)) {
@@ -145,8 +141,8 @@ fn first_not_finite(what: &str, numbers: &[f64]) -> Option<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::pid::PidLaw;
     use crate::pid_gains::PidGains;
-    use crate::pid_law::PidLaw;
     use bus::context::Warning;
     use vehicles::Vehicle;
 
@@ -177,8 +173,8 @@ mod tests {
             outcome.is_ok() && warnings[0].message.contains("computes 10 times a second"),
             "{warnings:?}"
         );
-        let words = checked(&airframe, PidGains::default(), 1_000_000_000).0.unwrap_err().to_string();
-        assert!(words.contains("6 1/s") && words.contains("expected below 2"), "{words}");
+        let message = checked(&airframe, PidGains::default(), 1_000_000_000).0.unwrap_err().to_string();
+        assert!(message.contains("6 1/s") && message.contains("expected below 2"), "{message}");
     }
 
     #[test]
@@ -195,7 +191,7 @@ mod tests {
         gains.roll.proportional_1_s2 = f64::MAX;
         gains.roll.derivative_1_s = 0.0;
         let airframe = hummingbird(|it| it.inertia_kg_m2 *= 1e10);
-        let words = checked(&airframe, gains, 1_000_000).0.unwrap_err().to_string();
-        assert!(words.contains("lead to a torque in N*m that is"), "{words}");
+        let message = checked(&airframe, gains, 1_000_000).0.unwrap_err().to_string();
+        assert!(message.contains("lead to a torque in N*m that is"), "{message}");
     }
 }

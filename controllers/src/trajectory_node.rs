@@ -2,32 +2,17 @@
 #![allow(non_snake_case, reason = "a trailing _W names the frame a vector is written in")]
 
 use crate::trajectory::{Start, Trajectory};
-use bus::context::NodeContext;
-use bus::kind::{Inputs, NodeKind, PortSpec};
+use bus::OutputPorts;
+use bus::component::{Component, Info, StepError};
+use bus::context::{NodeContext, StepContext};
 use bus::messages::Reference;
-use bus::{BusError, Message, Node};
 use diagnostics::ParameterError;
 use serde::Deserialize;
-
-/// The trajectory, for manifests.
-pub const KIND: NodeKind = NodeKind {
-    name: "trajectory",
-    summary: "references from the manifest: hover, circle, figure eight, minimum snap through waypoints",
-    inputs: Inputs::Ports(&[]),
-    outputs: &[PortSpec::required("reference", Reference::SCHEMA)],
-    check: |parameters, run| {
-        let trajectory = read(&diagnostics::read(parameters)?)?;
-        trajectory.require_flyable()?;
-        warn_of_late(&trajectory, run);
-        Ok(())
-    },
-    run,
-};
 
 /// Parameters of the trajectory.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-struct Parameters {
+pub struct Parameters {
     /// Where it starts, in the world.
     initial_position_m: [f64; 3],
     /// Yaw at its start.
@@ -36,14 +21,6 @@ struct Parameters {
     /// The segments; it hovers where the last ends.
     #[serde(default)]
     segments: Vec<serde_json::Value>,
-}
-
-fn read(parameters: &Parameters) -> Result<Trajectory, ParameterError> {
-    let position_W_m = nalgebra::Vector3::from(parameters.initial_position_m);
-    Trajectory::read(
-        &parameters.segments,
-        Start { position_W_m, yaw_rad: parameters.initial_yaw_deg.to_radians() },
-    )
 }
 
 /// Warns of segments that the run ends before.
@@ -57,9 +34,39 @@ fn warn_of_late(trajectory: &Trajectory, run: &NodeContext<'_>) {
     }
 }
 
-fn run() -> Result<(), BusError> {
-    let mut node = Node::join()?;
-    let output = node.output::<Reference>("reference")?;
-    let trajectory = read(&node.parameters()?).map_err(|error| node.error(error))?;
-    node.run(|tick| tick.write(output, Reference::from(&trajectory.at(tick.time_ns() as f64 * 1e-9))))
+/// What the node sends.
+#[derive(Debug, OutputPorts)]
+pub struct Outputs {
+    /// Where the trajectory is.
+    pub reference: Reference,
+}
+
+/// The component `trajectory`.
+#[derive(Debug)]
+pub struct TrajectoryNode(Trajectory);
+
+impl Component for TrajectoryNode {
+    const INFO: Info = Info::new(
+        "trajectory",
+        "references from the manifest: hover, circle, figure eight, minimum snap through waypoints",
+    );
+    type Parameters = Parameters;
+    type Inputs<'a> = ();
+    type Outputs = Outputs;
+    type State = ();
+
+    fn new(parameters: Parameters, context: &NodeContext<'_>) -> Result<Self, ParameterError> {
+        let position_W_m = parameters.initial_position_m.into();
+        let start = Start { position_W_m, yaw_rad: parameters.initial_yaw_deg.to_radians() };
+        let trajectory = Trajectory::read(&parameters.segments, start)?;
+        trajectory.require_flyable()?;
+        warn_of_late(&trajectory, context);
+        Ok(Self(trajectory))
+    }
+
+    fn initial(&self) {}
+
+    fn step(&mut self, context: &StepContext<'_>, (): (), (): &mut ()) -> Result<Outputs, StepError> {
+        Ok(Outputs { reference: Reference::from(&self.0.at(context.time_ns() as f64 * 1e-9)) })
+    }
 }

@@ -1,42 +1,262 @@
-//! The velocity controller node: a velocity command to four motor commands.
+//! Velocity PD around the cascade (thesis Fig 5.47): a velocity along the heading's level axes to roll and
+//! pitch commands.
+//!
+//! a = a_ff + Kp·(v_c − v) − Kd·dv/dt + integral, cut to a limit. At constant height the thrust is
+//! m·g / (cos φ·cos θ), and its level part accelerates by g·tan θ along the heading's x and by −g·tan φ / cos θ
+//! along its y. So θ = atan(a_x / g), positive for nose down, and φ = −atan(a_y·cos θ / g).
+//! The integral and a_ff are the guidance's; a law without guidance has none, as the thesis's.
 
-use crate::airframe::ControlledVehicle;
-use crate::controller;
-use crate::rehearsal;
-use crate::velocity_law::{LoopsGains, VelocityLaw, VelocityLoop, VelocitySetPoint};
-use bus::kind::{Inputs, NodeKind, PortSpec};
-use bus::messages::{AttitudeEstimate, ControlStatus, MotorCommand, Reference, StateEstimate};
-use bus::{BusError, Message, Node};
+#![allow(non_snake_case, reason = "a trailing _W or _B names the frame a vector is written in")]
+
+use crate::airframe::{ControlledVehicle, HoverModel};
+use crate::allocation::RotorWrench;
+use crate::cascade::{CascadeLaw, CascadeState};
+use crate::cascade_gains::CascadeGains;
+use crate::control::{ControlInput, ControlOutput, HoverMotion};
+use crate::gains_file::{gain, limit, parse};
+use crate::law::{Law, Predecessor, Start, VehicleFile};
+use crate::law_inputs::VelocityInputs;
+use crate::set_points::SetPoint;
+use bus::component::Info;
+use bus::context::NodeContext;
 use diagnostics::parameter::{ParameterError, all, finite};
+use diagnostics::unit::{ACCELERATION, PER_SECOND, PURE_NUMBER, TIME, VELOCITY};
 use serde::Deserialize;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
+use vehicles::VehicleError;
+use vehicles::reader::Section;
 
-/// The velocity controller, for manifests.
-pub const KIND: NodeKind = NodeKind {
-    name: "velocity",
-    summary: "velocity PD around the cascade's inner loops",
-    inputs: Inputs::Ports(&[
-        PortSpec::required("estimate", StateEstimate::SCHEMA),
-        PortSpec::optional("attitude", AttitudeEstimate::SCHEMA),
-        PortSpec::optional("reference", Reference::SCHEMA),
-    ]),
-    outputs: &[
-        PortSpec::required("command", MotorCommand::SCHEMA),
-        PortSpec::optional("status", ControlStatus::SCHEMA),
-    ],
-    check: |parameters, run| {
-        let parameters: Parameters = diagnostics::read(parameters)?;
-        parameters.check(run.has("reference"))?;
-        let (law, craft) = build(&parameters, run.period_s())?;
-        rehearsal::check(&law, &craft, run)
-    },
-    run,
-};
+/// The gains that the law is tuned with.
+const OURS: &str = include_str!("../gains/velocity.toml");
+
+/// Gains and limits of the velocity loops, the same along both axes.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct VelocityGains {
+    /// Error of velocity (m/s) to acceleration (m/s²), 1/s.
+    pub proportional_1_s: f64,
+    /// Measured acceleration (m/s²) to acceleration against it (m/s²), 1.
+    pub derivative: f64,
+    /// Time constant of the filter before the derivative, s.
+    pub derivative_filter_s: f64,
+    /// The demanded acceleration is cut to this, m/s².
+    pub acceleration_max_m_s2: f64,
+    /// A commanded velocity gathers speed no faster than this, m/s².
+    pub command_acceleration_max_m_s2: f64,
+    /// A commanded height moves no faster than this, m/s.
+    pub climb_max_m_s: f64,
+}
+
+impl Default for VelocityGains {
+    fn default() -> Self {
+        parse(OURS, "gains/velocity.toml", LoopsGains::read)
+            .expect("a test reads the built-in gains")
+            .velocity
+    }
+}
+
+impl VelocityGains {
+    fn read(section: &Section<'_, '_>) -> Result<Self, VehicleError> {
+        let gains = Self {
+            proportional_1_s: gain(section, "proportional", PER_SECOND)?,
+            derivative: gain(section, "derivative", PURE_NUMBER)?,
+            derivative_filter_s: limit(section, "derivative_filter", TIME)?,
+            acceleration_max_m_s2: limit(section, "acceleration_max", ACCELERATION)?,
+            command_acceleration_max_m_s2: limit(section, "command_acceleration_max", ACCELERATION)?,
+            climb_max_m_s: limit(section, "climb_max", VELOCITY)?,
+        };
+        section.finish()?;
+        Ok(gains)
+    }
+}
+
+/// The gains of the velocity loops and of the cascade inside: what a file leaves out is built in.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct LoopsGains {
+    /// Of the velocity loops.
+    pub velocity: VelocityGains,
+    /// Of the inner loops.
+    pub cascade: CascadeGains,
+}
+
+impl LoopsGains {
+    /// The gains in the file at `path`, or those built in.
+    ///
+    /// # Errors
+    /// The file cannot be read, or holds what no gains can be.
+    pub fn load(path: Option<&Path>) -> Result<Self, VehicleError> {
+        path.map_or_else(|| Ok(Self::default()), |path| crate::gains_file::load(path, Self::read))
+    }
+
+    pub(crate) fn read(root: &Section<'_, '_>) -> Result<Self, VehicleError> {
+        let velocity = if root.has("velocity") {
+            VelocityGains::read(&root.section("velocity")?)?
+        } else {
+            VelocityGains::default()
+        };
+        Ok(Self { velocity, cascade: CascadeGains::read_or_built_in(root)? })
+    }
+}
+
+/// What the velocity loops are asked to hold.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct VelocitySetPoint {
+    /// Velocity along the heading's level x and y, m/s.
+    pub velocity_m_s: [f64; 2],
+    /// Acceleration that following it takes, m/s².
+    pub feed_forward_m_s2: [f64; 2],
+    /// What the guidance's integrators ask for, m/s².
+    pub integral_m_s2: [f64; 2],
+    /// Height, m.
+    pub altitude_m: f64,
+    /// Yaw, rad.
+    pub yaw_rad: f64,
+}
+
+/// All that the velocity loops and the law around them remember.
+#[derive(Debug, Clone, Copy, PartialEq, Default, bus::Message)]
+#[repr(C)]
+#[message(type_name = "hummingbus_msgs/msg/VelocityState")]
+pub struct VelocityState {
+    /// The inner loops.
+    pub cascade: CascadeState,
+    /// Velocity behind the filter of the derivative, along the heading's level x and y.
+    #[field(unit = "m/s")]
+    pub velocity_filtered: [f64; 2],
+    /// Velocity that is asked for, along the heading's level x and y.
+    #[field(unit = "m/s")]
+    pub velocity_command: [f64; 2],
+    /// Altitude that is asked for.
+    #[field(unit = "m", frame = "world")]
+    pub altitude_command: f64,
+}
+
+/// The velocity loops around the cascade, at the cascade's period.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct VelocityLoop {
+    /// Gains and limits.
+    pub gains: VelocityGains,
+    /// The inner loops.
+    pub cascade: CascadeLaw,
+}
+
+impl VelocityLoop {
+    /// The loops with `gains` for `vehicle`.
+    #[must_use]
+    pub fn new(gains: &LoopsGains, vehicle: HoverModel, period_s: f64) -> Self {
+        let cascade = CascadeLaw { gains: gains.cascade, vehicle, period_s };
+        Self { gains: gains.velocity, cascade }
+    }
+
+    /// The demand for `asked` at the measured `velocity_m_s` along the heading's axes.
+    pub fn demand(
+        &self,
+        state: &mut VelocityState,
+        last: &RotorWrench,
+        asked: &VelocitySetPoint,
+        velocity_m_s: &[f64; 2],
+        measured: &HoverMotion,
+    ) -> ControlOutput {
+        let acceleration_m_s2 =
+            std::array::from_fn(|axis| self.acceleration_m_s2(state, asked, axis, velocity_m_s[axis]));
+        state.velocity_command = asked.velocity_m_s;
+        let climb_max_m = self.gains.climb_max_m_s * self.cascade.period_s;
+        state.altitude_command +=
+            (asked.altitude_m - state.altitude_command).clamp(-climb_max_m, climb_max_m);
+        let (roll_rad, pitch_rad) = self.tilt_rad(&acceleration_m_s2);
+        let set_point =
+            SetPoint { altitude_m: state.altitude_command, roll_rad, pitch_rad, yaw_rad: asked.yaw_rad };
+        let output = self.cascade.demand(&mut state.cascade, last, &set_point, measured);
+        ControlOutput { velocity_m_s: asked.velocity_m_s, ..output }
+    }
+
+    /// The state of a vehicle that no law has flown yet.
+    #[must_use]
+    pub fn initial(&self, velocity_m_s: &[f64; 2], measured: &HoverMotion) -> VelocityState {
+        at_speed(self.cascade.initial(measured), velocity_m_s, measured)
+    }
+
+    /// The state that goes on from another law's, at the height and speed where the vehicle is.
+    #[must_use]
+    pub fn continued<S>(
+        &self,
+        from: &Predecessor<'_, S>,
+        velocity_m_s: &[f64; 2],
+        measured: &HoverMotion,
+    ) -> VelocityState {
+        at_speed(self.cascade.continued(from, measured.altitude_m, measured), velocity_m_s, measured)
+    }
+
+    /// `before` moved towards `asked`: at once where that is slower, no faster than the limit where it gathers
+    /// speed.
+    #[must_use]
+    pub fn gathered_m_s(&self, before_m_s: f64, asked_m_s: f64) -> f64 {
+        let step_m_s = self.gains.command_acceleration_max_m_s2 * self.cascade.period_s;
+        // Gathering speed is measured from standstill where the direction turns round.
+        let same_way_m_s = if before_m_s * asked_m_s > 0.0 { before_m_s.abs() } else { 0.0 };
+        asked_m_s.abs().min(same_way_m_s + step_m_s).copysign(asked_m_s)
+    }
+
+    fn acceleration_m_s2(
+        &self,
+        state: &mut VelocityState,
+        asked: &VelocitySetPoint,
+        axis: usize,
+        velocity_m_s: f64,
+    ) -> f64 {
+        let time_s = self.gains.derivative_filter_s + self.cascade.period_s;
+        let change_m_s2 = (velocity_m_s - state.velocity_filtered[axis]) / time_s;
+        state.velocity_filtered[axis] += change_m_s2 * self.cascade.period_s;
+        let asked_m_s2 = asked.feed_forward_m_s2[axis]
+            + self.gains.proportional_1_s * (asked.velocity_m_s[axis] - velocity_m_s)
+            - self.gains.derivative * change_m_s2
+            + asked.integral_m_s2[axis];
+        let max_m_s2 = self.gains.acceleration_max_m_s2;
+        asked_m_s2.clamp(-max_m_s2, max_m_s2)
+    }
+
+    /// Roll and pitch that accelerate so at constant height.
+    fn tilt_rad(&self, acceleration_m_s2: &[f64; 2]) -> (f64, f64) {
+        let gravity_m_s2 = self.cascade.vehicle.gravity_m_s2;
+        let pitch_rad = libm::atan(acceleration_m_s2[0] / gravity_m_s2);
+        (-libm::atan(acceleration_m_s2[1] * libm::cos(pitch_rad) / gravity_m_s2), pitch_rad)
+    }
+}
+
+/// The loops' state where the vehicle is, at the speed that it has.
+fn at_speed(cascade: CascadeState, velocity_m_s: &[f64; 2], measured: &HoverMotion) -> VelocityState {
+    VelocityState {
+        cascade,
+        velocity_filtered: *velocity_m_s,
+        velocity_command: *velocity_m_s,
+        altitude_command: measured.altitude_m,
+    }
+}
+
+/// The controller `velocity`: a reference's velocity, or a constant one.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct VelocityLaw {
+    /// The loops.
+    pub velocity: VelocityLoop,
+    /// What is flown where no reference is wired.
+    pub constant: Option<VelocitySetPoint>,
+}
+
+impl VelocityLaw {
+    fn asked(&self, input: &ControlInput, measured: &HoverMotion) -> VelocitySetPoint {
+        let reference = &input.reference;
+        self.constant.unwrap_or_else(|| VelocitySetPoint {
+            velocity_m_s: along_heading([reference.velocity.x, reference.velocity.y], measured.yaw_rad),
+            altitude_m: reference.position.z,
+            yaw_rad: reference.yaw,
+            ..VelocitySetPoint::default()
+        })
+    }
+}
 
 /// Parameters of the velocity controller.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-struct Parameters {
+pub struct Parameters {
     /// Vehicle file.
     vehicle: PathBuf,
     /// Gains file; the built-in `controllers/gains/velocity.toml` where there is none.
@@ -86,16 +306,122 @@ impl Parameters {
     }
 }
 
-fn build(parameters: &Parameters, period_s: f64) -> Result<(VelocityLaw, ControlledVehicle), ParameterError> {
-    let craft = ControlledVehicle::load(&parameters.vehicle)?;
-    let gains = LoopsGains::load(parameters.gains.as_deref())
-        .map_err(|error| ParameterError::conflict("gains", error))?;
-    let velocity = VelocityLoop::new(&gains, craft.hover_model(), period_s);
-    Ok((VelocityLaw { velocity, constant: parameters.constant()? }, craft))
+impl VehicleFile for Parameters {
+    fn vehicle(&self) -> &Path {
+        &self.vehicle
+    }
 }
 
-fn run() -> Result<(), BusError> {
-    let node = Node::join()?;
-    let (law, craft) = build(&node.parameters()?, node.period_s()).map_err(|error| node.error(error))?;
-    controller::run(node, &law, &craft)
+impl Law for VelocityLaw {
+    const INFO: Info = Info::new("velocity", "velocity PD around the cascade's inner loops");
+    type Parameters = Parameters;
+    type Inputs<'a> = VelocityInputs<'a>;
+    type State = VelocityState;
+
+    fn new(
+        parameters: &Parameters,
+        craft: &ControlledVehicle,
+        context: &NodeContext<'_>,
+    ) -> Result<Self, ParameterError> {
+        parameters.check(context.has("reference"))?;
+        let gains = LoopsGains::load(parameters.gains.as_deref())
+            .map_err(|error| ParameterError::conflict("gains", error))?;
+        let velocity = VelocityLoop::new(&gains, craft.hover_model(), context.period_s());
+        Ok(Self { velocity, constant: parameters.constant()? })
+    }
+
+    fn rate_gain_1_s(&self) -> f64 {
+        self.velocity.cascade.rate_gain_1_s()
+    }
+
+    fn start(&self, input: &ControlInput) -> Start<VelocityState> {
+        let measured = HoverMotion::of(&input.motion);
+        let state = self.velocity.initial(&velocity_m_s(input, &measured), &measured);
+        Start { state, wrench: RotorWrench::default() }
+    }
+
+    fn take_over(&self, from: &Predecessor<'_, VelocityState>, input: &ControlInput) -> Start<VelocityState> {
+        let measured = HoverMotion::of(&input.motion);
+        let state = self.velocity.continued(from, &velocity_m_s(input, &measured), &measured);
+        Start { state, wrench: from.wrench }
+    }
+
+    fn step(&self, state: &mut VelocityState, last: &RotorWrench, input: &ControlInput) -> ControlOutput {
+        let measured = HoverMotion::of(&input.motion);
+        let mut asked = self.asked(input, &measured);
+        for (axis, asked_m_s) in asked.velocity_m_s.iter_mut().enumerate() {
+            *asked_m_s = self.velocity.gathered_m_s(state.velocity_command[axis], *asked_m_s);
+        }
+        self.velocity.demand(state, last, &asked, &velocity_m_s(input, &measured), &measured)
+    }
+}
+
+/// The estimated velocity along the heading's level axes.
+fn velocity_m_s(input: &ControlInput, measured: &HoverMotion) -> [f64; 2] {
+    let velocity_W_m_s = input.motion.velocity_W_m_s;
+    along_heading([velocity_W_m_s.x, velocity_W_m_s.y], measured.yaw_rad)
+}
+
+/// A level vector of the world along the axes of a heading.
+fn along_heading([x, y]: [f64; 2], yaw_rad: f64) -> [f64; 2] {
+    let (sin, cos) = libm::sincos(yaw_rad);
+    [cos * x + sin * y, cos * y - sin * x]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::Vector3;
+
+    fn velocity() -> VelocityLoop {
+        let vehicle = HoverModel {
+            mass_kg: 0.5,
+            inertia_B_kg_m2: Vector3::new(5.0e-3, 6.0e-3, 8.0e-3),
+            gravity_m_s2: 9.81,
+            thrust_min_N: 1.0,
+            thrust_max_N: 10.0,
+        };
+        VelocityLoop::new(&LoopsGains::default(), vehicle, 1e-3)
+    }
+
+    #[test]
+    fn forward_is_nose_down_and_left_is_right_side_up() {
+        let (roll_rad, pitch_rad) = velocity().tilt_rad(&[1.0, 0.0]);
+        assert!(pitch_rad > 0.0 && roll_rad == 0.0);
+        let (roll_rad, pitch_rad) = velocity().tilt_rad(&[0.0, 1.0]);
+        assert!(roll_rad < 0.0 && pitch_rad == 0.0);
+    }
+
+    /// The thrust that holds the height is turned by the tilt into the level acceleration that was asked for.
+    #[test]
+    fn the_tilt_makes_the_acceleration_on_both_axes_at_once() {
+        let asked_m_s2 = [1.5, -2.0];
+        let (roll_rad, pitch_rad) = velocity().tilt_rad(&asked_m_s2);
+        let up_B = nalgebra::UnitQuaternion::from_euler_angles(roll_rad, pitch_rad, 0.0) * Vector3::z();
+        let made_m_s2 = up_B * (9.81 / up_B.z);
+        assert!((made_m_s2.x - asked_m_s2[0]).abs() < 1e-12 && (made_m_s2.y - asked_m_s2[1]).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_command_gathers_speed_slowly_and_loses_it_at_once() {
+        let velocity = velocity();
+        let step_m_s = velocity.gains.command_acceleration_max_m_s2 * 1e-3;
+        assert!((velocity.gathered_m_s(0.5, 1.0) - (0.5 + step_m_s)).abs() < 1e-12);
+        assert_eq!(velocity.gathered_m_s(0.5, 0.1), 0.1);
+        assert!((velocity.gathered_m_s(0.5, -1.0) + step_m_s).abs() < 1e-12);
+        assert_eq!(velocity.gathered_m_s(0.0, 0.0), 0.0);
+    }
+
+    #[test]
+    fn a_world_velocity_is_seen_along_the_heading() {
+        let [x, y] = along_heading([0.0, 1.0], std::f64::consts::FRAC_PI_2);
+        assert!((x - 1.0).abs() < 1e-12 && y.abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_negative_gain_is_refused_with_its_key() {
+        let text = OURS.replace("value = 2.2", "value = -2.2");
+        let error = parse(&text, "my.toml", LoopsGains::read).unwrap_err().to_string();
+        assert!(error.contains("velocity.proportional"), "{error}");
+    }
 }

@@ -1,41 +1,205 @@
-//! The wall-follow controller node: laps along the walls of a room.
+//! Guidance along the walls of a room (thesis §5.5, Figs 5.36 and 5.46), around velocity PD and cascade.
+//!
+//! Five states: 1 along the heading's +x from the middle to the first wall, then 2 along −y, 3 along −x, 4 along
+//! +y, 5 along +x, then 2 again: clockwise seen from above, with the wall to the left. A lap is complete where
+//! 5 gives way to 2. A state gives way to the next where the wall ahead is as near as the wall that is followed
+//! is to be.
+//!
+//! - Mode *varying*: the velocity ahead shrinks with the distance to the wall ahead, and with it the tilt; the
+//!   velocity across is held at zero. Nothing holds the distance to the wall beside, as in the thesis.
+//! - Mode *constant*: the velocity across is the [`Approach`] curve over the error of the distance to the wall
+//!   beside, and the velocity ahead is what is left of the constant speed, √(v² − v_across²). The next state
+//!   begins where the curve's velocity towards the wall ahead, which is then the one beside, equals the speed.
+//!   So the velocity command turns in a corner without changing its length, and there is no jump in it.
+//!   An integrator over that error takes up what a tilted attitude estimate leaves.
+//!
+//! Where the room's size is known ([`Room`]), other vehicles in the beams are told from walls, and one that is
+//! ahead slows the vehicle down to a stop.
 
 use crate::airframe::ControlledVehicle;
-use crate::controller;
-use crate::rehearsal;
+use crate::allocation::RotorWrench;
+use crate::approach::Approach;
+use crate::control::{ControlInput, ControlOutput, HoverMotion};
+use crate::gains_file::{gain, limit, parse};
+use crate::law::{Law, Predecessor, Start, VehicleFile};
+use crate::law_inputs::WallInputs;
 use crate::room::Room;
-use crate::velocity_law::VelocityLoop;
-use crate::wall_follow_law::{Mode, Shared, WallFollowGains, WallFollowLaw};
-use bus::kind::{Inputs, NodeKind, PortSpec};
-use bus::messages::{AttitudeEstimate, ControlStatus, MotorCommand, WallEstimate};
-use bus::{BusError, Message, Node};
+use crate::velocity::{LoopsGains, VelocityLoop, VelocitySetPoint, VelocityState};
+use bus::component::Info;
+use bus::context::NodeContext;
+use bus::messages::WallEstimate;
 use diagnostics::parameter::{ParameterError, finite, positive, positive_up_to};
+use diagnostics::unit::{ACCELERATION, PER_SECOND, PER_SECOND_3, VELOCITY};
 use serde::Deserialize;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
+use vehicles::VehicleError;
+use vehicles::reader::Section;
 
-/// The wall-follow controller, for manifests.
-pub const KIND: NodeKind = NodeKind {
-    name: "wall-follow",
-    summary: "follows the walls of a room by range finders, at varying or constant speed",
-    inputs: Inputs::Ports(&[
-        PortSpec::required("walls", WallEstimate::SCHEMA),
-        PortSpec::required("attitude", AttitudeEstimate::SCHEMA),
-    ]),
-    outputs: &[
-        PortSpec::required("command", MotorCommand::SCHEMA),
-        PortSpec::optional("status", ControlStatus::SCHEMA),
-    ],
-    check: |parameters, run| {
-        let (law, craft) = build(&diagnostics::read(parameters)?, run.period_s())?;
-        rehearsal::check(&law, &craft, run)
-    },
-    run,
-};
+/// The gains that the law is tuned with.
+const OURS: &str = include_str!("../gains/wall-follow.toml");
+
+/// Something ahead is a vehicle where it is this much nearer than the wall must be, m. Tuned, no source: above the
+/// error of the wall's place, below any gap that matters.
+const OBSTACLE_MARGIN_M: f64 = 0.5;
+
+/// Gains of the guidance, and of the loops inside.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct WallFollowGains {
+    /// Mode varying: distance still to go (m) to velocity ahead (m/s), 1/s.
+    pub varying_slope_1_s: f64,
+    /// Mode varying: velocity with which the next state is reached, m/s.
+    pub exit_speed_m_s: f64,
+    /// Mode constant: error of the distance to the wall beside to velocity towards it.
+    pub across: Approach,
+    /// Mode constant: that error (m) held for one second to acceleration (m/s²), 1/s³.
+    pub integral_1_s3: f64,
+    /// The most that the integrator asks for, m/s².
+    pub integral_max_m_s2: f64,
+    /// The loops inside.
+    pub loops: LoopsGains,
+}
+
+impl Default for WallFollowGains {
+    fn default() -> Self {
+        parse(OURS, "gains/wall-follow.toml", Self::read).expect("a test reads the built-in gains")
+    }
+}
+
+impl WallFollowGains {
+    /// The gains in the file at `path`, or those built in.
+    ///
+    /// # Errors
+    /// The file cannot be read, or holds what no gains can be.
+    pub fn load(path: Option<&Path>) -> Result<Self, VehicleError> {
+        path.map_or_else(|| Ok(Self::default()), |path| crate::gains_file::load(path, Self::read))
+    }
+
+    fn read(root: &Section<'_, '_>) -> Result<Self, VehicleError> {
+        let (varying, constant) = (root.section("varying")?, root.section("constant")?);
+        let gains = Self {
+            varying_slope_1_s: limit(&varying, "slope", PER_SECOND)?,
+            exit_speed_m_s: limit(&varying, "exit_speed", VELOCITY)?,
+            across: Approach {
+                slope_1_s: limit(&constant, "slope", PER_SECOND)?,
+                deceleration_m_s2: limit(&constant, "deceleration", ACCELERATION)?,
+            },
+            integral_1_s3: gain(&constant, "integral", PER_SECOND_3)?,
+            integral_max_m_s2: gain(&constant, "integral_max", ACCELERATION)?,
+            loops: LoopsGains::read(root)?,
+        };
+        varying.finish()?;
+        constant.finish()?;
+        Ok(gains)
+    }
+}
+
+/// How the velocity along the walls is chosen.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Mode {
+    /// By the distance to the wall ahead.
+    Varying,
+    /// Constant, at a constant distance to the wall beside.
+    Constant,
+}
+
+/// What is known of the room beforehand, for a vehicle that shares it with others.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Shared {
+    /// The room.
+    pub room: Room,
+    /// Where the vehicle starts, from the walls at -x and -y, m; what the beams tell where it is not given.
+    pub start_m: Option<[f64; 2]>,
+    /// It stops where something ahead is nearer than this, and flies at full speed from twice this on, m.
+    pub ahead_min_m: f64,
+}
+
+/// The law.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct WallFollowLaw {
+    /// Gains of the guidance.
+    pub gains: WallFollowGains,
+    /// The loops inside.
+    pub velocity: VelocityLoop,
+    /// How the velocity is chosen.
+    pub mode: Mode,
+    /// The constant speed, or the most of the varying one, m/s.
+    pub speed_m_s: f64,
+    /// Level distance from the walls, m.
+    pub distance_m: f64,
+    /// Height above what is below, m.
+    pub altitude_m: f64,
+    /// Yaw, rad.
+    pub heading_rad: f64,
+    /// The state in which it begins, 1 to 5.
+    pub start_state: u32,
+    /// For a room that is shared.
+    pub shared: Option<Shared>,
+}
+
+/// One of the four beams: 0 is +x, 1 is −x, 2 is +y, 3 is −y of the heading.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+struct Beam(usize);
+
+impl Beam {
+    fn axis(self) -> usize {
+        self.0 / 2
+    }
+
+    fn sign(self) -> f64 {
+        if self.0.is_multiple_of(2) { 1.0 } else { -1.0 }
+    }
+}
+
+/// Where a state flies.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+struct Leg {
+    ahead: Beam,
+    beside: Option<Beam>,
+}
+
+impl Leg {
+    fn of(state: u32) -> Self {
+        let (ahead, beside) = match state {
+            2 => (3, Some(0)),
+            3 => (1, Some(3)),
+            4 => (2, Some(1)),
+            5 => (0, Some(2)),
+            _ => (0, None),
+        };
+        Self { ahead: Beam(ahead), beside: beside.map(Beam) }
+    }
+
+    /// The axis across the flight.
+    fn across(self) -> usize {
+        1 - self.ahead.axis()
+    }
+}
+
+/// All that the law remembers.
+#[derive(Debug, Clone, Copy, PartialEq, Default, bus::Message)]
+#[repr(C)]
+#[message(type_name = "hummingbus_msgs/msg/WallFollowState")]
+pub struct WallFollowState {
+    /// The loops inside.
+    pub velocity: VelocityState,
+    /// Acceleration that the integrators over the distance beside ask for, along the heading's level x and y.
+    #[field(unit = "m/s^2")]
+    pub integral: [f64; 2],
+    /// Distances from the walls at the heading's -x and -y, where the room is known.
+    #[field(unit = "m")]
+    pub room_position: [f64; 2],
+    /// The state of the guidance, 1 to 5.
+    #[field(unit = "1")]
+    pub phase: u32,
+    /// Laps flown.
+    #[field(unit = "1")]
+    pub laps: u32,
+}
 
 /// Parameters of the wall-follow controller.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-struct Parameters {
+pub struct Parameters {
     /// Vehicle file.
     vehicle: PathBuf,
     /// Gains file; the built-in `controllers/gains/wall-follow.toml` where there is none.
@@ -156,32 +320,209 @@ impl Parameters {
     }
 }
 
-fn build(
-    parameters: &Parameters,
-    period_s: f64,
-) -> Result<(WallFollowLaw, ControlledVehicle), ParameterError> {
-    let mode = parameters.mode()?;
-    parameters.check()?;
-    let craft = ControlledVehicle::load(&parameters.vehicle)?;
-    let gains = WallFollowGains::load(parameters.gains.as_deref())
-        .map_err(|error| ParameterError::conflict("gains", error))?;
-    let usual_m_s = if mode == Mode::Varying { VARYING_SPEED_M_S } else { CONSTANT_SPEED_M_S };
-    let law = WallFollowLaw {
-        velocity: VelocityLoop::new(&gains.loops, craft.hover_model(), period_s),
-        gains,
-        mode,
-        speed_m_s: parameters.speed_m_s.unwrap_or(usual_m_s),
-        distance_m: parameters.distance_m,
-        altitude_m: parameters.altitude_m,
-        heading_rad: parameters.heading_rad,
-        start_state: parameters.start_state,
-        shared: parameters.shared(mode)?,
-    };
-    Ok((law, craft))
+impl VehicleFile for Parameters {
+    fn vehicle(&self) -> &Path {
+        &self.vehicle
+    }
 }
 
-fn run() -> Result<(), BusError> {
-    let node = Node::join()?;
-    let (law, craft) = build(&node.parameters()?, node.period_s()).map_err(|error| node.error(error))?;
-    controller::run(node, &law, &craft)
+impl Law for WallFollowLaw {
+    const INFO: Info = Info::new(
+        "wall-follow",
+        "follows the walls of a room by range finders, at varying or constant speed",
+    );
+    type Parameters = Parameters;
+    type Inputs<'a> = WallInputs<'a>;
+    type State = WallFollowState;
+
+    fn new(
+        parameters: &Parameters,
+        craft: &ControlledVehicle,
+        context: &NodeContext<'_>,
+    ) -> Result<Self, ParameterError> {
+        let mode = parameters.mode()?;
+        parameters.check()?;
+        let gains = WallFollowGains::load(parameters.gains.as_deref())
+            .map_err(|error| ParameterError::conflict("gains", error))?;
+        let nominal_m_s = if mode == Mode::Varying { VARYING_SPEED_M_S } else { CONSTANT_SPEED_M_S };
+        Ok(Self {
+            velocity: VelocityLoop::new(&gains.loops, craft.hover_model(), context.period_s()),
+            gains,
+            mode,
+            speed_m_s: parameters.speed_m_s.unwrap_or(nominal_m_s),
+            distance_m: parameters.distance_m,
+            altitude_m: parameters.altitude_m,
+            heading_rad: parameters.heading_rad,
+            start_state: parameters.start_state,
+            shared: parameters.shared(mode)?,
+        })
+    }
+
+    fn rate_gain_1_s(&self) -> f64 {
+        self.velocity.cascade.rate_gain_1_s()
+    }
+
+    fn start(&self, input: &ControlInput) -> Start<WallFollowState> {
+        let velocity = self.velocity.initial(&input.walls.velocity, &HoverMotion::by_ranges(input));
+        let start_m = self.shared.and_then(|shared| shared.start_m);
+        Start { state: self.initial(velocity, start_m, &input.walls), wrench: RotorWrench::default() }
+    }
+
+    fn take_over(
+        &self,
+        from: &Predecessor<'_, WallFollowState>,
+        input: &ControlInput,
+    ) -> Start<WallFollowState> {
+        let measured = HoverMotion::by_ranges(input);
+        let velocity = self.velocity.continued(from, &input.walls.velocity, &measured);
+        // A successor in flight goes on from where it is, not from where the run began.
+        Start { state: self.initial(velocity, None, &input.walls), wrench: from.wrench }
+    }
+
+    fn step(&self, state: &mut WallFollowState, last: &RotorWrench, input: &ControlInput) -> ControlOutput {
+        let distances_m = self.wall_distances_m(state, &input.walls);
+        self.enter_phase(state, &distances_m);
+        let leg = Leg::of(state.phase);
+        let asked = match self.mode {
+            Mode::Varying => self.varying(state, leg, &distances_m),
+            Mode::Constant => self.constant(state, leg, &distances_m, &input.walls),
+        };
+        let measured = HoverMotion::by_ranges(input);
+        let output =
+            self.velocity.demand(&mut state.velocity, last, &asked, &input.walls.velocity, &measured);
+        ControlOutput { phase: state.phase, laps: state.laps, ..output }
+    }
+}
+
+impl WallFollowLaw {
+    fn initial(
+        &self,
+        velocity: VelocityState,
+        start_m: Option<[f64; 2]>,
+        walls: &WallEstimate,
+    ) -> WallFollowState {
+        let place_m = |shared: Shared| start_m.unwrap_or_else(|| shared.room.begun_m(walls));
+        WallFollowState {
+            velocity,
+            room_position: self.shared.map_or([0.0; 2], place_m),
+            phase: self.start_state,
+            ..WallFollowState::default()
+        }
+    }
+
+    /// Distances of the walls at +x, −x, +y, −y: by the room's size where that is known, else what the beams see.
+    fn wall_distances_m(&self, state: &mut WallFollowState, walls: &WallEstimate) -> [f64; 4] {
+        let Some(Shared { room, .. }) = self.shared else { return walls.distance };
+        let period_s = self.velocity.cascade.period_s;
+        state.room_position = room.moved_m(&state.room_position, walls, period_s);
+        room.distances_m(&state.room_position)
+    }
+
+    fn enter_phase(&self, state: &mut WallFollowState, distances_m: &[f64; 4]) {
+        let ahead = Leg::of(state.phase).ahead;
+        let corner_m = match self.mode {
+            Mode::Varying => self.distance_m,
+            Mode::Constant => self.distance_m + self.gains.across.distance_m(self.speed_m_s),
+        };
+        if distances_m[ahead.0] > corner_m {
+            return;
+        }
+        state.laps += u32::from(state.phase == 5);
+        state.phase = if state.phase == 5 { 2 } else { state.phase + 1 };
+    }
+
+    /// Ahead by the distance still to go, nothing across.
+    fn varying(&self, state: &WallFollowState, leg: Leg, distances_m: &[f64; 4]) -> VelocitySetPoint {
+        let to_go_m = distances_m[leg.ahead.0] - self.distance_m;
+        let wanted_m_s =
+            (self.gains.varying_slope_1_s * to_go_m).max(self.gains.exit_speed_m_s).min(self.speed_m_s);
+        let mut velocity_m_s = [0.0; 2];
+        velocity_m_s[leg.ahead.axis()] = self.gathered_m_s(state, leg.ahead, wanted_m_s);
+        self.asked(state, velocity_m_s, [0.0; 2])
+    }
+
+    /// Along the wall beside at a constant distance and speed.
+    fn constant(
+        &self,
+        state: &mut WallFollowState,
+        leg: Leg,
+        distances_m: &[f64; 4],
+        walls: &WallEstimate,
+    ) -> VelocitySetPoint {
+        let (mut velocity_m_s, mut feed_forward_m_s2) = ([0.0; 2], [0.0; 2]);
+        if let Some(beside) = leg.beside {
+            let error_m = distances_m[beside.0] - self.distance_m;
+            let closing_m_s = beside.sign() * walls.velocity[beside.axis()];
+            let wanted_m_s = self.gains.across.speed_m_s(error_m).clamp(-self.speed_m_s, self.speed_m_s);
+            let bent_m_s2 = self.gains.across.acceleration_m_s2(error_m, closing_m_s);
+            velocity_m_s[beside.axis()] = beside.sign() * wanted_m_s;
+            feed_forward_m_s2[beside.axis()] = beside.sign() * bent_m_s2;
+            self.integrate(state, beside, error_m);
+        }
+        let across_m_s = velocity_m_s[leg.across()];
+        let left_m_s = (self.speed_m_s * self.speed_m_s - across_m_s * across_m_s).max(0.0).sqrt();
+        let wanted_m_s = left_m_s * self.free_part(distances_m[leg.ahead.0], walls.distance[leg.ahead.0]);
+        velocity_m_s[leg.ahead.axis()] = self.gathered_m_s(state, leg.ahead, wanted_m_s);
+        self.asked(state, velocity_m_s, feed_forward_m_s2)
+    }
+
+    /// Only small errors are integrated: in a corner the distance is on its way.
+    fn integrate(&self, state: &mut WallFollowState, beside: Beam, error_m: f64) {
+        let on_its_way_m = 0.5 * self.gains.across.distance_m(self.speed_m_s);
+        if error_m.abs() < on_its_way_m {
+            let step_m_s2 = self.gains.integral_1_s3 * error_m * self.velocity.cascade.period_s;
+            let max_m_s2 = self.gains.integral_max_m_s2;
+            let integral = &mut state.integral[beside.axis()];
+            *integral = (*integral + beside.sign() * step_m_s2).clamp(-max_m_s2, max_m_s2);
+        }
+    }
+
+    /// The part of the speed that a vehicle ahead leaves: 1 where the beam ahead sees the wall.
+    fn free_part(&self, wall_m: f64, beam_m: f64) -> f64 {
+        match self.shared {
+            Some(Shared { ahead_min_m, .. }) if beam_m < wall_m - OBSTACLE_MARGIN_M => {
+                ((beam_m - ahead_min_m) / ahead_min_m).clamp(0.0, 1.0)
+            }
+            _ => 1.0,
+        }
+    }
+
+    fn gathered_m_s(&self, state: &WallFollowState, ahead: Beam, wanted_m_s: f64) -> f64 {
+        let before_m_s = state.velocity.velocity_command[ahead.axis()];
+        self.velocity.gathered_m_s(before_m_s, ahead.sign() * wanted_m_s)
+    }
+
+    fn asked(
+        &self,
+        state: &WallFollowState,
+        velocity_m_s: [f64; 2],
+        feed_forward_m_s2: [f64; 2],
+    ) -> VelocitySetPoint {
+        let (altitude_m, yaw_rad) = (self.altitude_m, self.heading_rad);
+        let integral_m_s2 = state.integral;
+        VelocitySetPoint { velocity_m_s, feed_forward_m_s2, integral_m_s2, altitude_m, yaw_rad }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_wall_is_on_the_left_in_every_state_and_was_ahead_in_the_one_before() {
+        for state in 2..=5 {
+            let (leg, before) = (Leg::of(state), Leg::of(if state == 2 { 5 } else { state - 1 }));
+            let beside = leg.beside.unwrap();
+            assert_eq!(beside, before.ahead, "state {state}");
+            assert_eq!(leg.across(), beside.axis());
+        }
+        assert_eq!(Leg::of(1), Leg { beside: None, ..Leg::of(5) });
+    }
+
+    #[test]
+    fn impossible_gains_are_refused_with_their_key() {
+        let text = OURS.replacen("value = 0.6", "value = -0.6", 1);
+        let error = parse(&text, "my.toml", WallFollowGains::read).unwrap_err().to_string();
+        assert!(error.contains("varying.slope"), "{error}");
+    }
 }

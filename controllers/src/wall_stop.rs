@@ -1,40 +1,136 @@
-//! The wall-stop controller node: flies along the heading and stops before the wall ahead.
+//! Guidance to a stop before a wall (thesis §5.5, Figs 5.30–5.34), around velocity PD and cascade.
+//!
+//! It flies along the heading's +x. The velocity command is the cruising speed, or the [`Approach`] curve over
+//! the distance still to go where that is slower, so that the pitch command shrinks with the distance as the
+//! thesis says; the curve's own acceleration is fed forward. The velocity along y is held at zero. Once it has
+//! arrived, an integrator over the distance takes up what a tilted attitude estimate leaves.
+//!
+//! It knows the wall by the range finders' estimate alone, and its height by the beam downwards.
 
 use crate::airframe::ControlledVehicle;
-use crate::controller;
-use crate::rehearsal;
-use crate::velocity_law::VelocityLoop;
-use crate::wall_stop_law::{WallStopGains, WallStopLaw};
-use bus::kind::{Inputs, NodeKind, PortSpec};
-use bus::messages::{AttitudeEstimate, ControlStatus, MotorCommand, WallEstimate};
-use bus::{BusError, Message, Node};
+use crate::allocation::RotorWrench;
+use crate::approach::Approach;
+use crate::control::{ControlInput, ControlOutput, HoverMotion};
+use crate::gains_file::{gain, limit, parse};
+use crate::law::{Law, Predecessor, Start, VehicleFile};
+use crate::law_inputs::WallInputs;
+use crate::velocity::{LoopsGains, VelocityLoop, VelocitySetPoint, VelocityState};
+use bus::component::Info;
+use bus::context::NodeContext;
 use diagnostics::parameter::{ParameterError, finite, positive, positive_up_to};
+use diagnostics::unit::{ACCELERATION, LENGTH, PER_SECOND, PER_SECOND_3, VELOCITY};
 use serde::Deserialize;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
+use vehicles::VehicleError;
+use vehicles::reader::Section;
 
-/// The wall-stop controller, for manifests.
-pub const KIND: NodeKind = NodeKind {
-    name: "wall-stop",
-    summary: "flies towards a wall and stops before it, by range finders",
-    inputs: Inputs::Ports(&[
-        PortSpec::required("walls", WallEstimate::SCHEMA),
-        PortSpec::required("attitude", AttitudeEstimate::SCHEMA),
-    ]),
-    outputs: &[
-        PortSpec::required("command", MotorCommand::SCHEMA),
-        PortSpec::optional("status", ControlStatus::SCHEMA),
-    ],
-    check: |parameters, run| {
-        let (law, craft) = build(&diagnostics::read(parameters)?, run.period_s())?;
-        rehearsal::check(&law, &craft, run)
-    },
-    run,
-};
+/// The gains that the law is tuned with.
+const OURS: &str = include_str!("../gains/wall-stop.toml");
+
+/// Flying at the cruising speed.
+pub const CRUISING: u32 = 1;
+/// Slowing down before the wall.
+pub const BRAKING: u32 = 2;
+/// Holding the distance.
+pub const HOLDING: u32 = 3;
+
+/// How far a holding vehicle may be from the distance, in units of what makes it holding, before it counts as
+/// braking again. Tuned, no source: so far that no noise does it.
+const HOLDING_LEFT_FACTOR: f64 = 3.0;
+
+/// Gains of the guidance, and of the loops inside.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct WallStopGains {
+    /// From the distance still to go to a velocity.
+    pub approach: Approach,
+    /// Back from a wall that is too near no faster than this, m/s.
+    pub retreat_max_m_s: f64,
+    /// Error of distance (m) held for one second to acceleration (m/s²), 1/s³.
+    pub integral_1_s3: f64,
+    /// The most that the integrator asks for, m/s².
+    pub integral_max_m_s2: f64,
+    /// Holding begins within this of the distance, m,
+    pub holding_distance_m: f64,
+    /// below this speed, m/s.
+    pub holding_speed_m_s: f64,
+    /// The loops inside.
+    pub loops: LoopsGains,
+}
+
+impl Default for WallStopGains {
+    fn default() -> Self {
+        parse(OURS, "gains/wall-stop.toml", Self::read).expect("a test reads the built-in gains")
+    }
+}
+
+impl WallStopGains {
+    /// The gains in the file at `path`, or those built in.
+    ///
+    /// # Errors
+    /// The file cannot be read, or holds what no gains can be.
+    pub fn load(path: Option<&Path>) -> Result<Self, VehicleError> {
+        path.map_or_else(|| Ok(Self::default()), |path| crate::gains_file::load(path, Self::read))
+    }
+
+    fn read(root: &Section<'_, '_>) -> Result<Self, VehicleError> {
+        let (approach, hold) = (root.section("approach")?, root.section("hold")?);
+        let gains = Self {
+            approach: Approach {
+                slope_1_s: limit(&approach, "slope", PER_SECOND)?,
+                deceleration_m_s2: limit(&approach, "deceleration", ACCELERATION)?,
+            },
+            retreat_max_m_s: limit(&approach, "retreat_max", VELOCITY)?,
+            integral_1_s3: gain(&hold, "integral", PER_SECOND_3)?,
+            integral_max_m_s2: gain(&hold, "integral_max", ACCELERATION)?,
+            holding_distance_m: limit(&hold, "distance", LENGTH)?,
+            holding_speed_m_s: limit(&hold, "speed", VELOCITY)?,
+            loops: LoopsGains::read(root)?,
+        };
+        approach.finish()?;
+        hold.finish()?;
+        Ok(gains)
+    }
+}
+
+/// The law.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct WallStopLaw {
+    /// Gains of the guidance.
+    pub gains: WallStopGains,
+    /// The loops inside.
+    pub velocity: VelocityLoop,
+    /// Speed towards the wall, m/s.
+    pub cruise_speed_m_s: f64,
+    /// Level distance from the wall at which it stops, m.
+    pub distance_m: f64,
+    /// Height above what is below, m.
+    pub altitude_m: f64,
+    /// Yaw, rad.
+    pub heading_rad: f64,
+}
+
+/// All that the law remembers.
+#[derive(Debug, Clone, Copy, PartialEq, Default, bus::Message)]
+#[repr(C)]
+#[message(type_name = "hummingbus_msgs/msg/WallStopState")]
+pub struct WallStopState {
+    /// The loops inside.
+    pub velocity: VelocityState,
+    /// Acceleration that the integrator over the distance asks for.
+    #[field(unit = "m/s^2")]
+    pub integral: f64,
+    /// [`CRUISING`], [`BRAKING`] or [`HOLDING`].
+    #[field(unit = "1")]
+    pub phase: u32,
+    /// Zero.
+    #[field(unit = "")]
+    pub pad0: u32,
+}
 
 /// Parameters of the wall-stop controller.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-struct Parameters {
+pub struct Parameters {
     /// Vehicle file.
     vehicle: PathBuf,
     /// Gains file; the built-in `controllers/gains/wall-stop.toml` where there is none.
@@ -68,27 +164,132 @@ const DISTANCE_MAX_M: f64 = 5.0;
 /// keeps the speed below this in any case.
 const SPEED_MAX_M_S: f64 = 3.0;
 
-fn build(parameters: &Parameters, period_s: f64) -> Result<(WallStopLaw, ControlledVehicle), ParameterError> {
-    positive("altitude_m", parameters.altitude_m)?;
-    finite("heading_rad", parameters.heading_rad)?;
-    positive_up_to("cruise_speed_m_s", parameters.cruise_speed_m_s, SPEED_MAX_M_S, "m/s")?;
-    positive_up_to("distance_m", parameters.distance_m, DISTANCE_MAX_M, "m")?;
-    let craft = ControlledVehicle::load(&parameters.vehicle)?;
-    let gains = WallStopGains::load(parameters.gains.as_deref())
-        .map_err(|error| ParameterError::conflict("gains", error))?;
-    let law = WallStopLaw {
-        velocity: VelocityLoop::new(&gains.loops, craft.hover_model(), period_s),
-        gains,
-        cruise_speed_m_s: parameters.cruise_speed_m_s,
-        distance_m: parameters.distance_m,
-        altitude_m: parameters.altitude_m,
-        heading_rad: parameters.heading_rad,
-    };
-    Ok((law, craft))
+impl VehicleFile for Parameters {
+    fn vehicle(&self) -> &Path {
+        &self.vehicle
+    }
 }
 
-fn run() -> Result<(), BusError> {
-    let node = Node::join()?;
-    let (law, craft) = build(&node.parameters()?, node.period_s()).map_err(|error| node.error(error))?;
-    controller::run(node, &law, &craft)
+impl Law for WallStopLaw {
+    const INFO: Info = Info::new("wall-stop", "flies towards a wall and stops before it, by range finders");
+    type Parameters = Parameters;
+    type Inputs<'a> = WallInputs<'a>;
+    type State = WallStopState;
+
+    fn new(
+        parameters: &Parameters,
+        craft: &ControlledVehicle,
+        context: &NodeContext<'_>,
+    ) -> Result<Self, ParameterError> {
+        positive("altitude_m", parameters.altitude_m)?;
+        finite("heading_rad", parameters.heading_rad)?;
+        positive_up_to("cruise_speed_m_s", parameters.cruise_speed_m_s, SPEED_MAX_M_S, "m/s")?;
+        positive_up_to("distance_m", parameters.distance_m, DISTANCE_MAX_M, "m")?;
+        let gains = WallStopGains::load(parameters.gains.as_deref())
+            .map_err(|error| ParameterError::conflict("gains", error))?;
+        Ok(Self {
+            velocity: VelocityLoop::new(&gains.loops, craft.hover_model(), context.period_s()),
+            gains,
+            cruise_speed_m_s: parameters.cruise_speed_m_s,
+            distance_m: parameters.distance_m,
+            altitude_m: parameters.altitude_m,
+            heading_rad: parameters.heading_rad,
+        })
+    }
+
+    fn rate_gain_1_s(&self) -> f64 {
+        self.velocity.cascade.rate_gain_1_s()
+    }
+
+    fn start(&self, input: &ControlInput) -> Start<WallStopState> {
+        let velocity = self.velocity.initial(&input.walls.velocity, &HoverMotion::by_ranges(input));
+        Start { state: WallStopState { velocity, ..Default::default() }, wrench: RotorWrench::default() }
+    }
+
+    fn take_over(&self, from: &Predecessor<'_, WallStopState>, input: &ControlInput) -> Start<WallStopState> {
+        let measured = HoverMotion::by_ranges(input);
+        let velocity = self.velocity.continued(from, &input.walls.velocity, &measured);
+        Start { state: WallStopState { velocity, ..Default::default() }, wrench: from.wrench }
+    }
+
+    fn step(&self, state: &mut WallStopState, last: &RotorWrench, input: &ControlInput) -> ControlOutput {
+        let to_go_m = input.walls.distance[0] - self.distance_m;
+        let speed_m_s = input.walls.velocity[0];
+        state.phase = self.phase(state.phase, to_go_m, speed_m_s);
+        self.integrate(state, to_go_m);
+        let asked = self.asked(state, to_go_m, speed_m_s);
+        let measured = HoverMotion::by_ranges(input);
+        let output =
+            self.velocity.demand(&mut state.velocity, last, &asked, &input.walls.velocity, &measured);
+        ControlOutput { phase: state.phase, ..output }
+    }
+}
+
+impl WallStopLaw {
+    fn phase(&self, before: u32, to_go_m: f64, speed_m_s: f64) -> u32 {
+        let (near_m, slow_m_s) = (self.gains.holding_distance_m, self.gains.holding_speed_m_s);
+        let has_left = to_go_m.abs() > HOLDING_LEFT_FACTOR * near_m;
+        let has_arrived = to_go_m.abs() < near_m && speed_m_s.abs() < slow_m_s;
+        if has_arrived || (before == HOLDING && !has_left) {
+            HOLDING
+        } else if self.gains.approach.speed_m_s(to_go_m) < self.cruise_speed_m_s {
+            BRAKING
+        } else {
+            CRUISING
+        }
+    }
+
+    /// Only a vehicle that holds integrates: while it approaches, the distance still to go is no error.
+    fn integrate(&self, state: &mut WallStopState, to_go_m: f64) {
+        if state.phase == HOLDING {
+            let step_m_s2 = self.gains.integral_1_s3 * to_go_m * self.velocity.cascade.period_s;
+            let max_m_s2 = self.gains.integral_max_m_s2;
+            state.integral = (state.integral + step_m_s2).clamp(-max_m_s2, max_m_s2);
+        }
+    }
+
+    fn asked(&self, state: &WallStopState, to_go_m: f64, speed_m_s: f64) -> VelocitySetPoint {
+        let near_m_s = self.gains.approach.speed_m_s(to_go_m);
+        let wanted_m_s = near_m_s.clamp(-self.gains.retreat_max_m_s, self.cruise_speed_m_s);
+        let command_m_s = self.velocity.gathered_m_s(state.velocity.velocity_command[0], wanted_m_s);
+        // The curve's acceleration is that of a vehicle on the curve, not of one kept back by a limit. One that
+        // holds is better off without: it would be moved by the velocity's error once more.
+        let is_on_curve = command_m_s == near_m_s && state.phase != HOLDING;
+        let braking_m_s2 =
+            if is_on_curve { self.gains.approach.acceleration_m_s2(to_go_m, speed_m_s) } else { 0.0 };
+        VelocitySetPoint {
+            velocity_m_s: [command_m_s, 0.0],
+            feed_forward_m_s2: [braking_m_s2, 0.0],
+            integral_m_s2: [state.integral, 0.0],
+            altitude_m: self.altitude_m,
+            yaw_rad: self.heading_rad,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn impossible_gains_are_refused_with_their_key() {
+        let cases = [
+            ("value = 1.1, unit = \"1/s\"", "value = 0, unit = \"1/s\"", "approach.slope"),
+            ("value = 0.4, unit = \"1/s^3\"", "value = -0.4, unit = \"1/s^3\"", "hold.integral"),
+        ];
+        for (good, bad, key) in cases {
+            assert_eq!(OURS.matches(good).count(), 1, "{good}");
+            let error =
+                parse(&OURS.replace(good, bad), "my.toml", WallStopGains::read).unwrap_err().to_string();
+            assert!(error.contains(key), "{error}");
+        }
+    }
+
+    #[test]
+    fn a_file_may_hold_the_gains_of_the_loops_inside_too() {
+        let velocity = include_str!("../gains/velocity.toml").replace("value = 2.2", "value = 1.5");
+        let gains = parse(&format!("{OURS}\n{velocity}"), "my.toml", WallStopGains::read).unwrap();
+        assert_eq!(gains.loops.velocity.proportional_1_s, 1.5);
+        assert_eq!(gains.loops.cascade, LoopsGains::default().cascade);
+    }
 }

@@ -8,21 +8,21 @@ mod flight;
 
 use bus::messages::Vector3 as Point;
 use controllers::allocation::RotorWrench;
+use controllers::cascade::CascadeLaw;
 use controllers::cascade_gains::CascadeGains;
-use controllers::cascade_law::CascadeLaw;
 use controllers::control::ControlOutput;
 use controllers::controller_state::ControllerState;
 use controllers::foresight::ForesightState;
+use controllers::geometric::GeometricLaw;
 use controllers::geometric_gains::GeometricGains;
-use controllers::geometric_law::GeometricLaw;
 use controllers::law::Law as ControlLaw;
+use controllers::lqr::LqrLaw;
 use controllers::lqr_gains::LqrGains;
-use controllers::lqr_law::LqrLaw;
+use controllers::pid::PidLaw;
 use controllers::pid_gains::PidGains;
-use controllers::pid_law::PidLaw;
-use controllers::velocity_law::{LoopsGains, VelocityLaw, VelocityLoop, VelocitySetPoint};
-use controllers::wall_follow_law::{Mode, WallFollowGains, WallFollowLaw};
-use controllers::wall_stop_law::{WallStopGains, WallStopLaw};
+use controllers::velocity::{LoopsGains, VelocityLaw, VelocityLoop, VelocitySetPoint};
+use controllers::wall_follow::{Mode, WallFollowGains, WallFollowLaw};
+use controllers::wall_stop::{WallStopGains, WallStopLaw};
 use flight::{Loop, NOISY, PERIOD_S, ROOM, Senses, believed};
 use nalgebra::Vector3;
 
@@ -155,11 +155,11 @@ fn a_take_over_amid_a_doublet_does_not_jump_either_and_fades_out() {
 }
 
 fn lqr() -> LqrLaw {
-    LqrLaw::new(LqrGains::load(None).unwrap(), &believed(), PERIOD_S).unwrap()
+    LqrLaw::for_craft(LqrGains::load(None).unwrap(), &believed(), PERIOD_S).unwrap()
 }
 
 fn geometric() -> GeometricLaw {
-    GeometricLaw::new(GeometricGains::load(None).unwrap(), &believed(), PERIOD_S)
+    GeometricLaw::for_craft(GeometricGains::load(None).unwrap(), &believed(), PERIOD_S)
 }
 
 /// `after` stays near and comes to hover again, although `before` left a state in which `go_mad` was at work.
@@ -181,7 +181,7 @@ fn assert_outlives<A: ControlLaw, B: ControlLaw>(
         tilt_rad = tilt_rad.max(libm::hypot(roll_rad, pitch_rad));
         height_error_m = height_error_m.max((flight.position().z - 1.5).abs());
     }
-    let name = format!("{} after {}", B::NAME, A::NAME);
+    let name = format!("{} after {}", B::INFO.name, A::INFO.name);
     println!("{name}: {height_error_m:.3} m and {tilt_rad:.3} rad at most");
     assert!(height_error_m < 0.3 && tilt_rad < 0.6, "{name}: {height_error_m} m, {tilt_rad} rad");
     let (roll_rad, pitch_rad, _) = flight.state.body.attitude_WB.euler_angles();

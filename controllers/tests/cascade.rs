@@ -3,9 +3,9 @@
 
 mod flight;
 
+use controllers::cascade::CascadeLaw;
 use controllers::cascade_gains::CascadeGains;
-use controllers::cascade_law::CascadeLaw;
-use controllers::velocity_law::{LoopsGains, VelocityLaw, VelocityLoop, VelocitySetPoint};
+use controllers::velocity::{LoopsGains, VelocityLaw, VelocityLoop, VelocitySetPoint};
 use flight::{Loop, NOISY, PERIOD_S, Senses, believed, vehicle};
 use nalgebra::Vector3;
 use vehicles::{MotorModel, Vehicle};

@@ -3,8 +3,8 @@
 
 use controllers::airframe::ControlledVehicle;
 use controllers::control::{HoverMotion, Integrals};
+use controllers::pid::PidLaw;
 use controllers::pid_gains::PidGains;
-use controllers::pid_law::PidLaw;
 use controllers::set_points::{Schedule, SetPoint, SetPointEntry};
 use nalgebra::Vector3;
 use plant::{NewtonEuler, RigidBody, State};
@@ -89,7 +89,7 @@ fn fly(flown: Vehicle, setup: &Setup) -> Flight {
     let believed = ControlledVehicle::new(believed).unwrap();
     let law = PidLaw { gains: setup.gains, vehicle: believed.hover_model(), period_s: PERIOD_S };
     let imu = ImuModel::new(setup.imu, 1.0 / PERIOD_S).unwrap();
-    let filter = Complementary::new(setup.filter, PERIOD_S).unwrap();
+    let filter = Complementary::with_period(setup.filter, PERIOD_S).unwrap();
     let plant = NewtonEuler::new(flown, 1);
 
     let mut state = plant.start(RigidBody::level_at(Vector3::z()), plant.vehicle().hover_command());
@@ -99,7 +99,7 @@ fn fly(flown: Vehicle, setup: &Setup) -> Flight {
     for tick in 0..END_TICK {
         flight.log(&state.body);
         let reading = imu.read(&mut imu_state, &imu_truth(&plant, &state));
-        let estimate = filter.step(&mut filter_state, &reading);
+        let estimate = filter.update(&mut filter_state, &reading);
         let wrench = law.wrench(&mut law_state, &schedule.at(tick), &measurement(&state.body, &estimate));
         let speeds_rad_s = believed.allocation.allocate(&wrench).speeds_rad_s;
         plant.step(&mut state, &speeds_rad_s.map(|speed| believed.vehicle.command.command(speed)), PERIOD_S);

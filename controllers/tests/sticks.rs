@@ -5,8 +5,8 @@ mod flight;
 #[path = "../examples/random_pilot.rs"]
 mod random_pilot;
 
+use controllers::cascade::CascadeLaw;
 use controllers::cascade_gains::CascadeGains;
-use controllers::cascade_law::CascadeLaw;
 use controllers::set_points::SetPoint;
 use controllers::sticks::Sticks;
 use flight::{Loop, NOISY, PERIOD_S, Senses, believed};

@@ -5,15 +5,15 @@ mod common;
 
 use common::{Craft, Loop, PERIOD_S, believed, trajectory, vehicle};
 use controllers::allocation::RotorWrench;
+use controllers::cascade::CascadeLaw;
 use controllers::cascade_gains::CascadeGains;
-use controllers::cascade_law::CascadeLaw;
+use controllers::geometric::GeometricLaw;
 use controllers::geometric_gains::GeometricGains;
-use controllers::geometric_law::GeometricLaw;
 use controllers::law::Law;
+use controllers::lqr::LqrLaw;
 use controllers::lqr_gains::LqrGains;
-use controllers::lqr_law::LqrLaw;
+use controllers::pid::PidLaw;
 use controllers::pid_gains::PidGains;
-use controllers::pid_law::PidLaw;
 use nalgebra::{UnitQuaternion, Vector3};
 use vehicles::{MotorModel, Vehicle};
 
@@ -26,11 +26,11 @@ const SLALOM: &str = r#"{ kind = "hover", duration_s = 1.0 },
       waypoints_m = [[1.5, 1.0, 1.5], [3.0, -1.0, 2.0], [4.5, 1.0, 1.5], [6.0, 0.0, 1.0]] }"#;
 
 fn geometric() -> GeometricLaw {
-    GeometricLaw::new(GeometricGains::load(None).unwrap(), &believed(), PERIOD_S)
+    GeometricLaw::for_craft(GeometricGains::load(None).unwrap(), &believed(), PERIOD_S)
 }
 
 fn lqr() -> LqrLaw {
-    LqrLaw::new(LqrGains::load(None).unwrap(), &believed(), PERIOD_S).unwrap()
+    LqrLaw::for_craft(LqrGains::load(None).unwrap(), &believed(), PERIOD_S).unwrap()
 }
 
 /// Root mean square and greatest distance from the trajectory, in m, until 2 s behind its end.
@@ -60,7 +60,7 @@ fn geometric_follows_without_drag_or_noise_as_its_feed_forward_says() {
 #[test]
 fn geometric_with_the_drag_fed_forward_follows_closer() {
     let gains = GeometricGains { drag_1_s: 0.28, ..GeometricGains::load(None).unwrap() };
-    let knowing = GeometricLaw::new(gains, &believed(), PERIOD_S);
+    let knowing = GeometricLaw::for_craft(gains, &believed(), PERIOD_S);
     let (without_m, _) = distances("unknown drag", &geometric(), FIGURE_EIGHT, Craft::dragged(0));
     let (with_m, _) = distances("known drag", &knowing, FIGURE_EIGHT, Craft::dragged(0));
     assert!(with_m < 0.5 * without_m);
@@ -222,7 +222,8 @@ fn the_gain_of_the_lqr_is_the_one_that_scipy_finds() {
 fn an_lqr_without_a_solution_is_refused_with_a_reason() {
     let weightless =
         controllers::airframe::ControlledVehicle::new(Vehicle { gravity_m_s2: 0.0, ..vehicle() }).unwrap();
-    let error = LqrLaw::new(LqrGains::load(None).unwrap(), &weightless, PERIOD_S).unwrap_err().to_string();
+    let error =
+        LqrLaw::for_craft(LqrGains::load(None).unwrap(), &weightless, PERIOD_S).unwrap_err().to_string();
     assert!(error.contains("Riccati") && error.contains("`vehicle`"), "{error}");
 }
 

@@ -3,8 +3,8 @@
 
 use controllers::airframe::ControlledVehicle;
 use controllers::control::{HoverMotion, Integrals};
+use controllers::pid::PidLaw;
 use controllers::pid_gains::PidGains;
-use controllers::pid_law::PidLaw;
 use controllers::set_points::{Schedule, SetPoint, SetPointEntry};
 use nalgebra::Vector3;
 use plant::{Backend, FreeFlight, NewtonEuler, Rapier, RigidBody, State};

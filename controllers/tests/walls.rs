@@ -5,9 +5,9 @@
 mod flight;
 
 use controllers::room::Room;
-use controllers::velocity_law::VelocityLoop;
-use controllers::wall_follow_law::{Mode, Shared, WallFollowGains, WallFollowLaw};
-use controllers::wall_stop_law::{HOLDING, WallStopGains, WallStopLaw};
+use controllers::velocity::VelocityLoop;
+use controllers::wall_follow::{Mode, Shared, WallFollowGains, WallFollowLaw};
+use controllers::wall_stop::{HOLDING, WallStopGains, WallStopLaw};
 use flight::{Loop, NOISY, PERIOD_S, ROOM, Senses, believed, vehicle};
 use nalgebra::Vector3;
 use vehicles::{MotorModel, Vehicle};

@@ -1,30 +1,19 @@
 //! The attitude node: the complementary filter over an IMU's readings.
-#![allow(non_snake_case, reason = "a trailing _B names the frame a vector is written in")]
 
 use crate::complementary::{Complementary, ComplementaryParams, ComplementaryState};
 use crate::imu_model::ImuReading;
-use bus::kind::{Inputs, NodeKind, PortSpec};
+use crate::wire::{attitude, attitude_message, vector, vector_message};
+use bus::component::{Component, Info, StepError};
+use bus::context::{NodeContext, StepContext};
 use bus::messages::{AttitudeEstimate, Imu, Quaternion, Vector3};
-use bus::{BusError, Message, Node};
+use bus::{InputPorts, Message, OutputPorts};
+use diagnostics::ParameterError;
 
-/// The attitude estimator, for manifests.
-pub const KIND: NodeKind = NodeKind {
-    name: "attitude",
-    summary: "complementary filter: roll, pitch and yaw from an IMU",
-    inputs: Inputs::Ports(&[PortSpec::required("imu", Imu::SCHEMA)]),
-    outputs: &[PortSpec::required("estimate", AttitudeEstimate::SCHEMA)],
-    check: |parameters, run| {
-        let params: ComplementaryParams = diagnostics::read(parameters)?;
-        Complementary::new(params, run.period_s()).map(|_| ())
-    },
-    run,
-};
-
-/// What the filter remembers, as it is handed over.
-#[derive(Clone, Copy, Message)]
+/// All that the filter remembers.
+#[derive(Debug, Clone, Copy, Message)]
 #[repr(C)]
 #[message(type_name = "hummingbus_msgs/msg/ComplementaryState")]
-struct Memory {
+pub struct AttitudeState {
     /// The estimated attitude, body to world.
     #[field(frame = "world")]
     attitude: Quaternion,
@@ -33,53 +22,72 @@ struct Memory {
     last_angular_velocity: Vector3,
 }
 
-impl From<&ComplementaryState> for Memory {
+impl From<&ComplementaryState> for AttitudeState {
     fn from(state: &ComplementaryState) -> Self {
-        let [x, y, z, w] = state.attitude_WB.coords.into();
-        let rate_B_rad_s = state.last_angular_velocity_B_rad_s;
-        let last = rate_B_rad_s.map_or([f64::NAN; 3], <[f64; 3]>::from);
-        Self { attitude: Quaternion { x, y, z, w }, last_angular_velocity: last.into() }
+        let last = state.last_angular_velocity_B_rad_s;
+        Self {
+            attitude: attitude_message(state.attitude_WB),
+            last_angular_velocity: last.map_or([f64::NAN; 3].into(), vector_message),
+        }
     }
 }
 
-impl From<&Memory> for ComplementaryState {
-    fn from(memory: &Memory) -> Self {
-        let Quaternion { x, y, z, w } = memory.attitude;
-        let last = nalgebra::Vector3::from(<[f64; 3]>::from(memory.last_angular_velocity));
+impl From<&AttitudeState> for ComplementaryState {
+    fn from(state: &AttitudeState) -> Self {
+        let last = vector(state.last_angular_velocity);
         Self {
-            // It was a unit quaternion: normalising it again would change its last bits.
-            attitude_WB: nalgebra::UnitQuaternion::new_unchecked(nalgebra::Quaternion::new(w, x, y, z)),
+            attitude_WB: attitude(state.attitude),
             last_angular_velocity_B_rad_s: (!last.x.is_nan()).then_some(last),
         }
     }
 }
 
-fn run() -> Result<(), BusError> {
-    let mut node = Node::join()?;
-    let imu = node.input::<Imu>("imu")?;
-    let output = node.output::<AttitudeEstimate>("estimate")?;
-    let filter =
-        Complementary::new(node.parameters()?, node.period_s()).map_err(|error| node.error(error))?;
-    node.run_with_state(Memory::from(&ComplementaryState::default()), |tick, memory| {
-        let imu = tick.get(imu);
-        let reading = ImuReading {
-            specific_force_B_m_s2: <[f64; 3]>::from(imu.specific_force).into(),
-            angular_velocity_B_rad_s: <[f64; 3]>::from(imu.angular_velocity).into(),
+/// What the filter reads.
+#[derive(Debug, InputPorts)]
+pub struct ImuInputs<'a> {
+    /// Readings of the inertial measurement unit.
+    pub imu: &'a Imu,
+}
+
+/// What the filter sends.
+#[derive(Debug, OutputPorts)]
+pub struct Outputs {
+    /// The attitude.
+    pub estimate: AttitudeEstimate,
+}
+
+impl Component for Complementary {
+    const INFO: Info = Info::new("attitude", "complementary filter: roll, pitch and yaw from an IMU");
+    type Parameters = ComplementaryParams;
+    type Inputs<'a> = ImuInputs<'a>;
+    type Outputs = Outputs;
+    type State = AttitudeState;
+
+    fn new(params: ComplementaryParams, context: &NodeContext<'_>) -> Result<Self, ParameterError> {
+        Self::with_period(params, context.period_s())
+    }
+
+    fn initial(&self) -> AttitudeState {
+        AttitudeState::from(&ComplementaryState::default())
+    }
+
+    fn step(
+        &mut self,
+        _: &StepContext<'_>,
+        inputs: ImuInputs<'_>,
+        state: &mut AttitudeState,
+    ) -> Result<Outputs, StepError> {
+        let mut filter_state = ComplementaryState::from(&*state);
+        let estimate = self.update(&mut filter_state, &ImuReading::from(inputs.imu));
+        *state = AttitudeState::from(&filter_state);
+        let estimate = AttitudeEstimate {
+            attitude: attitude_message(estimate.attitude_WB),
+            roll: estimate.roll_rad,
+            pitch: estimate.pitch_rad,
+            yaw: estimate.yaw_rad,
+            angular_velocity: vector_message(estimate.angular_velocity_B_rad_s),
+            ..Default::default()
         };
-        let mut state = ComplementaryState::from(&*memory);
-        let estimate = filter.step(&mut state, &reading);
-        *memory = Memory::from(&state);
-        let [x, y, z, w] = estimate.attitude_WB.coords.into();
-        tick.write(
-            output,
-            AttitudeEstimate {
-                attitude: Quaternion { x, y, z, w },
-                roll: estimate.roll_rad,
-                pitch: estimate.pitch_rad,
-                yaw: estimate.yaw_rad,
-                angular_velocity: Vector3::from(<[f64; 3]>::from(estimate.angular_velocity_B_rad_s)),
-                ..Default::default()
-            },
-        )
-    })
+        Ok(Outputs { estimate })
+    }
 }

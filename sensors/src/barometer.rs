@@ -9,27 +9,14 @@
 use crate::atmosphere::{SEA_LEVEL_PRESSURE_PA, height_m, pressure_Pa};
 use crate::channel::{Chance, Channel, ChannelState, QUEUE, Timing};
 use crate::noise::BiasWalk;
+use crate::sensing::{Sensor, TruthInputs};
 use crate::steps::in_steps;
-use bus::kind::{Inputs, NodeKind, PortSpec};
-use bus::messages::{Barometer, PlantState};
+use bus::component::Info;
+use bus::messages::Barometer;
 use bus::random::normal;
-use bus::{BusError, Message, Node};
+use bus::{Message, OutputPorts};
 use diagnostics::parameter::{ParameterError, finite, not_negative, positive};
 use serde::Deserialize;
-
-/// The barometer, for manifests.
-pub const KIND: NodeKind = NodeKind {
-    name: "barometer",
-    summary: "air pressure and altitude with noise, walking bias and delay",
-    inputs: Inputs::Ports(&[PortSpec::required("state", PlantState::SCHEMA)]),
-    outputs: &[PortSpec::required("barometer", Barometer::SCHEMA)],
-    check: |parameters, run| {
-        let params: BarometerParams = diagnostics::read(parameters)?;
-        params.validate()?;
-        params.timing().check(run)
-    },
-    run,
-};
 
 /// The least pressure that the part reads, Pa (MS5611-01BA03 data sheet: 10 mbar).
 const PRESSURE_MIN_PA: f64 = 1.0e3;
@@ -86,24 +73,13 @@ impl Default for BarometerParams {
 }
 
 impl BarometerParams {
-    fn timing(&self) -> Timing {
-        let Self { rate_hz, delay_ms, dropout, dropout_mean_s, .. } = *self;
-        Timing { rate_hz, delay_ms, dropout, dropout_mean_s }
-    }
-
     fn validate(&self) -> Result<(), ParameterError> {
-        self.timing().validate()?;
         positive("ground_pressure_Pa", self.ground_pressure_Pa)?;
         positive("reference_pressure_Pa", self.reference_pressure_Pa)?;
         not_negative("noise_Pa", self.noise_Pa)?;
         finite("initial_bias_Pa", self.initial_bias_Pa)?;
         not_negative("bias_walk_Pa_sqrt_s", self.bias_walk_Pa_sqrt_s)?;
         not_negative("resolution_Pa", self.resolution_Pa)
-    }
-
-    fn start(&self) -> Memory {
-        let queue = [Barometer::default(); QUEUE];
-        Memory { channel: ChannelState::default(), queue, bias: self.initial_bias_Pa }
     }
 
     /// What is read at `altitude_m`, Pa; the bias then walks one step on.
@@ -114,32 +90,13 @@ impl BarometerParams {
         *bias_Pa += BiasWalk::new(self.bias_walk_Pa_sqrt_s, self.rate_hz).step_sigma() * step;
         in_steps(read_Pa, self.resolution_Pa).clamp(PRESSURE_MIN_PA, PRESSURE_MAX_PA)
     }
-
-    /// The sample to send at `now_ns`.
-    fn sample(
-        &self,
-        channel: &mut Channel,
-        memory: &mut Memory,
-        now_ns: u64,
-        truth: &PlantState,
-    ) -> Barometer {
-        let Memory { channel: state, queue, bias } = memory;
-        channel.step(state, queue, now_ns, |last, chance| {
-            let pressure = self.measure(truth.position.z, bias, chance);
-            if chance.is_lost(0) {
-                return Barometer { valid: 0, ..*last };
-            }
-            let altitude = height_m(pressure, self.reference_pressure_Pa);
-            Barometer { measured_ns: now_ns, pressure, altitude, valid: 1, ..Default::default() }
-        })
-    }
 }
 
-/// What the node remembers, as it is handed over.
-#[derive(Clone, Copy, Message)]
+/// All that the sensor remembers.
+#[derive(Debug, Clone, Copy, Message)]
 #[repr(C)]
 #[message(type_name = "hummingbus_msgs/msg/BarometerState")]
-struct Memory {
+pub struct BarometerState {
     /// What is under way.
     channel: ChannelState,
     /// The last measurements.
@@ -149,24 +106,62 @@ struct Memory {
     bias: f64,
 }
 
-fn run() -> Result<(), BusError> {
-    let mut node = Node::join()?;
-    let state = node.input::<PlantState>("state")?;
-    let output = node.output::<Barometer>("barometer")?;
-    let params: BarometerParams = node.parameters()?;
-    params.validate().map_err(|error| node.error(error))?;
-    let mut channel = Channel::of_node(&params.timing(), &node)?;
-    node.run_with_state(params.start(), |tick, memory| {
-        let sent = params.sample(&mut channel, memory, tick.time_ns(), tick.get(state));
-        tick.write(output, sent)
-    })
+/// What the sensor sends.
+#[derive(Debug, OutputPorts)]
+pub struct Outputs {
+    /// The measurement that arrived last.
+    pub barometer: Barometer,
+}
+
+impl Sensor for BarometerParams {
+    const INFO: Info = Info::new("barometer", "air pressure and altitude with noise, walking bias and delay");
+    type Parameters = Self;
+    type Inputs<'a> = TruthInputs<'a>;
+    type Outputs = Outputs;
+    type State = BarometerState;
+
+    fn new(parameters: Self) -> Result<Self, ParameterError> {
+        parameters.validate()?;
+        Ok(parameters)
+    }
+
+    fn timing(&self) -> Timing {
+        let Self { rate_hz, delay_ms, dropout, dropout_mean_s, .. } = *self;
+        Timing { rate_hz, delay_ms, dropout, dropout_mean_s }
+    }
+
+    fn initial(&self) -> BarometerState {
+        let queue = [Barometer::default(); QUEUE];
+        BarometerState { channel: ChannelState::default(), queue, bias: self.initial_bias_Pa }
+    }
+
+    fn sample(
+        &self,
+        channel: &mut Channel,
+        state: &mut BarometerState,
+        now_ns: u64,
+        inputs: TruthInputs<'_>,
+    ) -> Outputs {
+        let truth = inputs.state;
+        let BarometerState { channel: under_way, queue, bias } = state;
+        let barometer = channel.step(under_way, queue, now_ns, |last, chance| {
+            let pressure = self.measure(truth.position.z, bias, chance);
+            if chance.is_lost(0) {
+                return Barometer { valid: 0, ..*last };
+            }
+            let altitude = height_m(pressure, self.reference_pressure_Pa);
+            Barometer { measured_ns: now_ns, pressure, altitude, valid: 1, ..Default::default() }
+        });
+        Outputs { barometer }
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::testing::{TICK_NS, require_hand_over, require_normal};
-    use bus::context::NodeContext;
+    use crate::testing::{harness, refusal, require_normal};
+    use bus::Harness;
+    use bus::messages::PlantState;
 
     fn perfect() -> BarometerParams {
         let (noise_Pa, bias_walk_Pa_sqrt_s, resolution_Pa) = (0.0, 0.0, 0.0);
@@ -178,9 +173,8 @@ mod tests {
     }
 
     fn samples(params: &BarometerParams, truth: &PlantState, count: u64) -> Vec<Barometer> {
-        let mut channel = Channel::new(&params.timing(), 0.02, 5, "barometer").unwrap();
-        let mut memory = params.start();
-        (0..count).map(|n| params.sample(&mut channel, &mut memory, n * 20 * TICK_NS, truth)).collect()
+        let mut sensor = harness::<BarometerParams>(*params, 20);
+        (0..count).map(|_| sensor.step(TruthInputs { state: truth }).unwrap().barometer).collect()
     }
 
     #[test]
@@ -230,22 +224,18 @@ mod tests {
     }
 
     #[test]
-    fn a_memory_that_is_handed_over_goes_on_byte_for_byte() {
+    fn a_state_that_is_transferred_goes_on_byte_for_byte() {
         let params = BarometerParams { dropout: 0.2, delay_ms: 145.0, ..Default::default() };
-        let channel = || Channel::new(&params.timing(), 1e-3, 5, "barometer").unwrap();
-        require_hand_over(channel, params.start(), |channel, memory: &mut Memory, now_ns| {
-            params.sample(channel, memory, now_ns, &at(now_ns as f64 * 1e-9))
-        });
+        let truths: Vec<_> = (0..2000).map(|tick| at(f64::from(tick) * 1e-3)).collect();
+        let inputs = |tick| TruthInputs { state: &truths[tick as usize] };
+        Harness::require_transfer(|| harness::<BarometerParams>(params, 1), inputs);
     }
 
     #[test]
     fn impossible_parameters_are_named() {
         let bad = [("ground_pressure_Pa", 0.0), ("reference_pressure_Pa", -1.0), ("noise_Pa", -1.0)];
         for (key, value) in bad.into_iter().chain([("bias_walk_Pa_sqrt_s", -1.0), ("resolution_Pa", -1.0)]) {
-            let reason =
-                (KIND.check)(&serde_json::json!({ key: value }), &NodeContext::new("node", &["state"]))
-                    .unwrap_err()
-                    .to_string();
+            let reason = refusal::<BarometerParams>(&serde_json::json!({ key: value }));
             assert!(reason.contains(&format!("`{key}`")), "{reason}");
         }
     }

@@ -7,27 +7,14 @@
 #![allow(non_snake_case, reason = "trailing _V, _A and _Ah name units")]
 
 use crate::channel::{Chance, Channel, ChannelState, QUEUE, Timing};
+use crate::sensing::Sensor;
 use crate::steps::in_steps;
-use bus::kind::{Inputs, NodeKind, PortSpec};
+use bus::component::Info;
 use bus::messages::Battery;
 use bus::random::normal;
-use bus::{BusError, Message, Node};
+use bus::{InputPorts, Message, OutputPorts};
 use diagnostics::parameter::{ParameterError, finite, not_negative, positive, require};
 use serde::Deserialize;
-
-/// The battery monitor, for manifests.
-pub const KIND: NodeKind = NodeKind {
-    name: "battery",
-    summary: "battery monitor: voltage and current with noise, and the charge counted from it",
-    inputs: Inputs::Ports(&[PortSpec::required("battery", Battery::SCHEMA)]),
-    outputs: &[PortSpec::required("measured", Battery::SCHEMA)],
-    check: |parameters, run| {
-        let params: BatteryParams = diagnostics::read(parameters)?;
-        params.validate()?;
-        params.timing().check(run)
-    },
-    run,
-};
 
 /// What a battery monitor makes of the truth; the defaults are a Texas Instruments INA226 with a shunt of 2 mΩ.
 ///
@@ -89,13 +76,7 @@ fn read(truth: f64, bias: f64, sigma: f64, step: f64, chance: &mut Chance<'_>) -
 }
 
 impl BatteryParams {
-    fn timing(&self) -> Timing {
-        let Self { rate_hz, delay_ms, dropout, dropout_mean_s, .. } = *self;
-        Timing { rate_hz, delay_ms, dropout, dropout_mean_s }
-    }
-
     fn validate(&self) -> Result<(), ParameterError> {
-        self.timing().validate()?;
         not_negative("voltage_noise_V", self.voltage_noise_V)?;
         finite("voltage_bias_V", self.voltage_bias_V)?;
         not_negative("voltage_resolution_V", self.voltage_resolution_V)?;
@@ -105,11 +86,6 @@ impl BatteryParams {
         positive("capacity_Ah", self.capacity_Ah)?;
         let charge_is_good = (0.0..=1.0).contains(&self.initial_charge);
         require("initial_charge", self.initial_charge, charge_is_good, "from 0 to 1")
-    }
-
-    fn start(&self) -> Memory {
-        let (channel, queue) = (ChannelState::default(), [Battery::default(); QUEUE]);
-        Memory { channel, queue, charge: self.initial_charge, counted_ns: u64::MAX }
     }
 
     fn measure(&self, truth: &Battery, chance: &mut Chance<'_>) -> Battery {
@@ -124,31 +100,13 @@ impl BatteryParams {
     fn drawn(&self, current_A: f64, elapsed_ns: u64) -> f64 {
         current_A * elapsed_ns as f64 * 1e-9 / 3600.0 / self.capacity_Ah
     }
-
-    /// The sample to send at `now_ns`.
-    fn sample(&self, channel: &mut Channel, memory: &mut Memory, now_ns: u64, truth: &Battery) -> Battery {
-        let Memory { channel: state, queue, charge, counted_ns } = memory;
-        channel.step(state, queue, now_ns, |last, chance| {
-            if truth.valid == 0 {
-                return Battery { valid: 0, ..*last };
-            }
-            let measured = self.measure(truth, chance);
-            let elapsed_ns = now_ns.saturating_sub(*counted_ns);
-            *charge = (*charge - self.drawn(measured.current, elapsed_ns)).clamp(0.0, 1.0);
-            *counted_ns = now_ns;
-            if chance.is_lost(0) {
-                return Battery { valid: 0, ..*last };
-            }
-            Battery { measured_ns: now_ns, charge: *charge, valid: 1, ..measured }
-        })
-    }
 }
 
-/// What the node remembers, as it is handed over.
-#[derive(Clone, Copy, Message)]
+/// All that the sensor remembers.
+#[derive(Debug, Clone, Copy, Message)]
 #[repr(C)]
 #[message(type_name = "hummingbus_msgs/msg/BatteryMonitorState")]
-struct Memory {
+pub struct BatteryMonitorState {
     /// What is under way.
     channel: ChannelState,
     /// The last measurements.
@@ -161,33 +119,84 @@ struct Memory {
     counted_ns: u64,
 }
 
-fn run() -> Result<(), BusError> {
-    let mut node = Node::join()?;
-    let battery = node.input::<Battery>("battery")?;
-    let output = node.output::<Battery>("measured")?;
-    let params: BatteryParams = node.parameters()?;
-    params.validate().map_err(|error| node.error(error))?;
-    let mut channel = Channel::of_node(&params.timing(), &node)?;
-    node.run_with_state(params.start(), |tick, memory| {
-        let sent = params.sample(&mut channel, memory, tick.time_ns(), tick.get(battery));
-        tick.write(output, sent)
-    })
+/// What the monitor reads.
+#[derive(Debug, InputPorts)]
+pub struct BatteryInputs<'a> {
+    /// The truth.
+    pub battery: &'a Battery,
+}
+
+/// What the sensor sends.
+#[derive(Debug, OutputPorts)]
+pub struct Outputs {
+    /// The measurement that arrived last.
+    pub measured: Battery,
+}
+
+impl Sensor for BatteryParams {
+    const INFO: Info = Info::new(
+        "battery",
+        "battery monitor: voltage and current with noise, and the charge counted from it",
+    );
+    type Parameters = Self;
+    type Inputs<'a> = BatteryInputs<'a>;
+    type Outputs = Outputs;
+    type State = BatteryMonitorState;
+
+    fn new(parameters: Self) -> Result<Self, ParameterError> {
+        parameters.validate()?;
+        Ok(parameters)
+    }
+
+    fn timing(&self) -> Timing {
+        let Self { rate_hz, delay_ms, dropout, dropout_mean_s, .. } = *self;
+        Timing { rate_hz, delay_ms, dropout, dropout_mean_s }
+    }
+
+    fn initial(&self) -> BatteryMonitorState {
+        let (channel, queue) = (ChannelState::default(), [Battery::default(); QUEUE]);
+        BatteryMonitorState { channel, queue, charge: self.initial_charge, counted_ns: u64::MAX }
+    }
+
+    fn sample(
+        &self,
+        channel: &mut Channel,
+        state: &mut BatteryMonitorState,
+        now_ns: u64,
+        inputs: BatteryInputs<'_>,
+    ) -> Outputs {
+        let truth = inputs.battery;
+        let BatteryMonitorState { channel: under_way, queue, charge, counted_ns } = state;
+        let measured = channel.step(under_way, queue, now_ns, |last, chance| {
+            if truth.valid == 0 {
+                return Battery { valid: 0, ..*last };
+            }
+            let measured = self.measure(truth, chance);
+            let elapsed_ns = now_ns.saturating_sub(*counted_ns);
+            *charge = (*charge - self.drawn(measured.current, elapsed_ns)).clamp(0.0, 1.0);
+            *counted_ns = now_ns;
+            if chance.is_lost(0) {
+                return Battery { valid: 0, ..*last };
+            }
+            Battery { measured_ns: now_ns, charge: *charge, valid: 1, ..measured }
+        });
+        Outputs { measured }
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::testing::{TICK_NS, require_hand_over, require_normal};
-    use bus::context::NodeContext;
+    use crate::testing::{harness, refusal, require_normal};
+    use bus::Harness;
 
     fn truth() -> Battery {
         Battery { voltage: 11.3, current: 8.4, charge: 0.5, valid: 1, ..Default::default() }
     }
 
     fn samples(params: &BatteryParams, count: u64) -> Vec<Battery> {
-        let mut channel = Channel::new(&params.timing(), 0.1, 5, "battery").unwrap();
-        let mut memory = params.start();
-        (0..count).map(|n| params.sample(&mut channel, &mut memory, n * 100 * TICK_NS, &truth())).collect()
+        let mut sensor = harness::<BatteryParams>(*params, 100);
+        (0..count).map(|_| sensor.step(BatteryInputs { battery: &truth() }).unwrap().measured).collect()
     }
 
     fn undelayed() -> BatteryParams {
@@ -239,13 +248,12 @@ mod tests {
     #[test]
     fn nothing_is_measured_of_a_battery_that_the_plant_does_not_model() {
         let params = undelayed();
-        let mut channel = Channel::new(&params.timing(), 0.1, 5, "battery").unwrap();
-        let mut memory = params.start();
-        for n in 0..100 {
-            let sent = params.sample(&mut channel, &mut memory, n * 100 * TICK_NS, &Battery::default());
+        let mut sensor = harness::<BatteryParams>(params, 100);
+        for _ in 0..100 {
+            let sent = sensor.step(BatteryInputs { battery: &Battery::default() }).unwrap().measured;
             assert_eq!((sent.valid, sent.voltage, sent.current), (0, 0.0, 0.0));
         }
-        assert_eq!(memory.charge, params.initial_charge, "nothing is drawn from it");
+        assert_eq!(sensor.state.charge, params.initial_charge, "nothing is drawn from it");
     }
 
     #[test]
@@ -255,22 +263,20 @@ mod tests {
     }
 
     #[test]
-    fn a_memory_that_is_handed_over_goes_on_byte_for_byte() {
+    fn a_state_that_is_transferred_goes_on_byte_for_byte() {
         let params = BatteryParams { dropout: 0.2, delay_ms: 245.0, ..BatteryParams::default() };
-        let channel = || Channel::new(&params.timing(), 1e-3, 5, "battery").unwrap();
-        require_hand_over(channel, params.start(), |channel, memory: &mut Memory, now_ns| {
-            params.sample(channel, memory, now_ns, &truth())
-        });
+        let truth = truth();
+        Harness::require_transfer(
+            || harness::<BatteryParams>(params, 1),
+            |_| BatteryInputs { battery: &truth },
+        );
     }
 
     #[test]
     fn impossible_parameters_are_named() {
         let bad = [("capacity_Ah", 0.0), ("initial_charge", 1.1), ("voltage_noise_V", -1.0)];
         for (key, value) in bad.into_iter().chain([("current_resolution_A", -1.0), ("dropout", 1.0)]) {
-            let reason =
-                (KIND.check)(&serde_json::json!({ key: value }), &NodeContext::new("node", &["battery"]))
-                    .unwrap_err()
-                    .to_string();
+            let reason = refusal::<BatteryParams>(&serde_json::json!({ key: value }));
             assert!(reason.contains(&format!("`{key}`")), "{reason}");
         }
     }

@@ -10,9 +10,9 @@
 //! Journal 39, 1960): with probability `dropout` a measurement is lost, and losses last `dropout_mean_s` on
 //! average. They are drawn from a stream of their own: switching them on does not reshuffle the noise.
 
+use bus::Message;
 use bus::context::NodeContext;
 use bus::random::{Stream, stream, uniform};
-use bus::{BusError, Message, Node};
 use diagnostics::parameter::{ParameterError, not_negative, positive, require};
 
 /// Steps of a node between two measurements below which it tells that they are not evenly spaced: a fifth of the interval.
@@ -20,7 +20,7 @@ use diagnostics::parameter::{ParameterError, not_negative, positive, require};
 const UNEVEN_SHARE: f64 = 5.0;
 
 /// How many measurements a queue holds: those under way, and the one that arrived last.
-pub(crate) const QUEUE: usize = 32;
+pub const QUEUE: usize = 32;
 
 /// How many measurements may be under way: one place of the queue is for the one that arrived last, and one for
 /// a delay that is rounded up to the node's period.
@@ -28,7 +28,7 @@ const UNDER_WAY_MAX: f64 = (QUEUE - 2) as f64;
 
 /// When a sensor measures, and what becomes of it on the way.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Timing {
+pub struct Timing {
     /// Measurements a second.
     pub rate_hz: f64,
     /// How long after measuring a measurement arrives.
@@ -49,7 +49,7 @@ impl Timing {
         let expected = "at most 30 measurements long";
         require("delay_ms", self.delay_ms, under_way <= UNDER_WAY_MAX, expected)?;
         let losses = Losses::new(self);
-        let mean_is_good = losses.begin <= 1.0 && losses.go_on >= 0.0;
+        let mean_is_good = losses.begin <= 1.0 && losses.stay >= 0.0;
         let expected = "zero, or long enough for one measurement and for the fraction `dropout` of them";
         require("dropout_mean_s", self.dropout_mean_s, mean_is_good, expected)
     }
@@ -109,24 +109,24 @@ fn is_in_time(rate_hz: f64, period_s: f64) -> bool {
     rate_hz * period_s <= 1.0 + 1e-9
 }
 
-/// The chances with which losses begin and go on.
+/// The chances with which losses begin and last.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Losses {
     /// Probability of losing a measurement after one that was not lost.
     begin: f64,
     /// Probability of losing a measurement after one that was lost.
-    go_on: f64,
+    stay: f64,
 }
 
 impl Losses {
-    /// In the long run begin · (1 − dropout) = (1 − go_on) · dropout, and losses last 1 / (1 − go_on).
+    /// In the long run begin · (1 − dropout) = (1 − stay) · dropout, and losses last 1 / (1 − stay).
     fn new(timing: &Timing) -> Self {
         let dropout = timing.dropout;
         if timing.dropout_mean_s == 0.0 {
-            return Self { begin: dropout, go_on: dropout };
+            return Self { begin: dropout, stay: dropout };
         }
         let end = (timing.dropout_mean_s * timing.rate_hz).recip();
-        Self { begin: end * dropout / (1.0 - dropout), go_on: 1.0 - end }
+        Self { begin: end * dropout / (1.0 - dropout), stay: 1.0 - end }
     }
 }
 
@@ -134,7 +134,7 @@ impl Losses {
 #[derive(Debug, Clone, Copy, Default, PartialEq, Message)]
 #[repr(C)]
 #[message(type_name = "hummingbus_msgs/msg/ChannelState")]
-pub(crate) struct ChannelState {
+pub struct ChannelState {
     /// Simulation time from which on the next measurement is due.
     #[field(unit = "ns")]
     next_ns: u64,
@@ -163,7 +163,7 @@ pub(crate) struct ChannelState {
 
 /// The channel of a node: all that does not change during a run, and its random streams.
 #[derive(Debug, Clone)]
-pub(crate) struct Channel {
+pub struct Channel {
     interval_ns: u64,
     delay_ns: u64,
     losses: Losses,
@@ -173,7 +173,7 @@ pub(crate) struct Channel {
 
 /// The chance in one measurement.
 #[derive(Debug)]
-pub(crate) struct Chance<'a> {
+pub struct Chance<'a> {
     /// The node's random stream.
     pub noise: &'a mut Stream,
     loss: &'a mut Stream,
@@ -185,7 +185,7 @@ impl Chance<'_> {
     /// Whether part `part` of the measurement, numbered from 0, is lost; to be asked once for each.
     pub fn is_lost(&mut self, part: u32) -> bool {
         let was_lost = *self.lost >> part & 1 == 1;
-        let chance = if was_lost { self.losses.go_on } else { self.losses.begin };
+        let chance = if was_lost { self.losses.stay } else { self.losses.begin };
         let is_lost = uniform(self.loss) < chance;
         *self.lost = *self.lost & !(1 << part) | u32::from(is_lost) << part;
         is_lost
@@ -193,15 +193,6 @@ impl Chance<'_> {
 }
 
 impl Channel {
-    /// The channel of `node`.
-    ///
-    /// # Errors
-    /// As [`Channel::new`].
-    pub fn of_node(timing: &Timing, node: &Node) -> Result<Self, BusError> {
-        let channel = Self::new(timing, node.period_s(), node.seed(), node.name());
-        channel.map_err(|error| node.error(error))
-    }
-
     /// The channel of the node that `context` tells of; warns where measurements would be uneven or never arrive.
     ///
     /// # Errors
@@ -328,8 +319,8 @@ mod tests {
             (outcome, run.into_warnings())
         };
         for (tick_ns, period_ticks) in [(100_000_000, 1), (1_000_000, 100)] {
-            let words = rate_of(tick_ns, period_ticks).0.unwrap_err().to_string();
-            assert!(words.contains("`rate_hz` is 200 Hz, expected at most 10 Hz"), "{words}");
+            let message = rate_of(tick_ns, period_ticks).0.unwrap_err().to_string();
+            assert!(message.contains("`rate_hz` is 200 Hz, expected at most 10 Hz"), "{message}");
         }
         assert_eq!(rate_of(1_000_000, 5), (Ok(()), vec![]));
         let (outcome, warnings) = rate_of(1_000_000, 3);

@@ -2,9 +2,11 @@
 //! and plots; controllers have no port for it.
 #![allow(non_snake_case, reason = "a trailing _W names the frame a vector is written in")]
 
-use bus::kind::{Inputs, NodeKind, PortSpec};
-use bus::messages::{Clearance, PlantState, Vector3 as VectorMessage};
-use bus::{BusError, Message, Node};
+use crate::sensing::TruthInputs;
+use bus::component::{Component, Info, StepError};
+use bus::context::{NodeContext, StepContext};
+use bus::messages::{Clearance, Vector3 as VectorMessage};
+use bus::{Message, OutputPorts};
 use diagnostics::parameter::{ParameterError, not_negative};
 use nalgebra::Vector3;
 use scenes::{RayCaster, Scene};
@@ -18,20 +20,10 @@ const REACH_M: f64 = 1000.0;
 /// Nearer to the world's origin than this no laps are counted, m.
 const MIDDLE_M: f64 = 0.5;
 
-/// The clearance node, for manifests.
-pub const KIND: NodeKind = NodeKind {
-    name: "clearance",
-    summary: "true distances to the scene, for judging and plots",
-    inputs: Inputs::Ports(&[PortSpec::required("state", PlantState::SCHEMA)]),
-    outputs: &[PortSpec::required("clearance", Clearance::SCHEMA)],
-    check: |parameters, _| build(&diagnostics::read(parameters)?).map(|_| ()),
-    run,
-};
-
 /// Parameters of the clearance node.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-struct Parameters {
+pub struct Parameters {
     /// Scene file.
     scene: PathBuf,
     /// The distance from the wall that is to be kept, m.
@@ -50,19 +42,11 @@ fn three_quarters_of_a_metre() -> f64 {
     0.75
 }
 
-fn build(parameters: &Parameters) -> Result<Judge, ParameterError> {
-    for (key, value) in [("keep_m", parameters.keep_m), ("corner_m", parameters.corner_m)] {
-        not_negative(key, value)?;
-    }
-    let scene = Scene::load(&parameters.scene).map_err(|error| ParameterError::conflict("scene", error))?;
-    Ok(Judge { caster: RayCaster::new(&scene), keep_m: parameters.keep_m, corner_m: parameters.corner_m })
-}
-
-/// What a successor is told.
-#[derive(Clone, Copy, Default, Message)]
+/// All that the component remembers.
+#[derive(Debug, Clone, Copy, Default, Message)]
 #[repr(C)]
 #[message(type_name = "hummingbus_msgs/msg/ClearanceState")]
-struct Memory {
+pub struct ClearanceState {
     /// Bearing of the vehicle from the world's origin at the last tick; not a number before the first.
     #[field(unit = "rad", frame = "world")]
     bearing: f64,
@@ -71,38 +55,64 @@ struct Memory {
     laps: f64,
 }
 
-fn run() -> Result<(), BusError> {
-    let mut node = Node::join()?;
-    let state = node.input::<PlantState>("state")?;
-    let output = node.output::<Clearance>("clearance")?;
-    let judge = build(&node.parameters()?).map_err(|error| node.error(error))?;
-    let start = Memory { bearing: f64::NAN, laps: 0.0 };
-    node.run_with_state(start, |tick, memory| {
-        let position = tick.get(state).position;
-        let clearance = judge.clearance(memory, &position);
-        tick.write(output, clearance)
-    })
+/// What the component sends.
+#[derive(Debug, OutputPorts)]
+pub struct Outputs {
+    /// The distances.
+    pub clearance: Clearance,
 }
 
-struct Judge {
+/// The component `clearance`.
+#[derive(Debug)]
+pub struct ClearanceJudge {
     caster: RayCaster,
     keep_m: f64,
     corner_m: f64,
 }
 
-impl Judge {
-    fn clearance(&self, memory: &mut Memory, position: &VectorMessage) -> Clearance {
+impl Component for ClearanceJudge {
+    const INFO: Info = Info::new("clearance", "true distances to the scene, for judging and plots");
+    type Parameters = Parameters;
+    type Inputs<'a> = TruthInputs<'a>;
+    type Outputs = Outputs;
+    type State = ClearanceState;
+
+    fn new(parameters: Parameters, _: &NodeContext<'_>) -> Result<Self, ParameterError> {
+        let Parameters { scene, keep_m, corner_m } = parameters;
+        for (key, value) in [("keep_m", keep_m), ("corner_m", corner_m)] {
+            not_negative(key, value)?;
+        }
+        let scene = Scene::load(&scene).map_err(|error| ParameterError::conflict("scene", error))?;
+        Ok(Self { caster: RayCaster::new(&scene), keep_m, corner_m })
+    }
+
+    fn initial(&self) -> ClearanceState {
+        ClearanceState { bearing: f64::NAN, laps: 0.0 }
+    }
+
+    fn step(
+        &mut self,
+        _: &StepContext<'_>,
+        inputs: TruthInputs<'_>,
+        state: &mut ClearanceState,
+    ) -> Result<Outputs, StepError> {
+        Ok(Outputs { clearance: self.clearance(state, &inputs.state.position) })
+    }
+}
+
+impl ClearanceJudge {
+    fn clearance(&self, state: &mut ClearanceState, position: &VectorMessage) -> Clearance {
         let position_W_m = Vector3::new(position.x, position.y, position.z);
         let along = [Vector3::x(), -Vector3::x(), Vector3::y(), -Vector3::y()];
         let wall =
             along.map(|along_W| self.caster.distance_m(&position_W_m, &along_W, REACH_M).unwrap_or(REACH_M));
         let (x_m, y_m) = (wall[0].min(wall[1]), wall[2].min(wall[3]));
-        count_laps(memory, &position_W_m);
+        count_laps(state, &position_W_m);
         Clearance {
             nearest: self.caster.clearance_m(&position_W_m).min(REACH_M),
             wall,
             side_error: x_m.min(y_m) - self.keep_m,
-            laps: memory.laps,
+            laps: state.laps,
             corner: u32::from(x_m.max(y_m) < self.keep_m + self.corner_m),
             ..Default::default()
         }
@@ -110,32 +120,32 @@ impl Judge {
 }
 
 /// Adds the turn since the last tick, less than half of one.
-fn count_laps(memory: &mut Memory, position_W_m: &Vector3<f64>) {
+fn count_laps(state: &mut ClearanceState, position_W_m: &Vector3<f64>) {
     if libm::hypot(position_W_m.x, position_W_m.y) < MIDDLE_M {
         // There a bearing jumps with every millimetre.
-        memory.bearing = f64::NAN;
+        state.bearing = f64::NAN;
         return;
     }
     let bearing_rad = libm::atan2(position_W_m.y, position_W_m.x);
-    if !memory.bearing.is_nan() {
-        let turn_rad = (bearing_rad - memory.bearing + PI).rem_euclid(TAU) - PI;
-        memory.laps -= turn_rad / TAU;
+    if !state.bearing.is_nan() {
+        let turn_rad = (bearing_rad - state.bearing + PI).rem_euclid(TAU) - PI;
+        state.laps -= turn_rad / TAU;
     }
-    memory.bearing = bearing_rad;
+    state.bearing = bearing_rad;
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    fn judge() -> Judge {
+    fn judge() -> ClearanceJudge {
         let scene = Scene::parse(include_str!("../../scenes/room.toml"), "room.toml").unwrap();
-        Judge { caster: RayCaster::new(&scene), keep_m: 3.0, corner_m: 0.75 }
+        ClearanceJudge { caster: RayCaster::new(&scene), keep_m: 3.0, corner_m: 0.75 }
     }
 
     fn at(x: f64, y: f64) -> Clearance {
-        let mut memory = Memory { bearing: f64::NAN, laps: 0.0 };
-        judge().clearance(&mut memory, &VectorMessage { x, y, z: 1.0 })
+        let mut state = ClearanceState { bearing: f64::NAN, laps: 0.0 };
+        judge().clearance(&mut state, &VectorMessage { x, y, z: 1.0 })
     }
 
     #[test]
@@ -149,13 +159,13 @@ mod tests {
 
     #[test]
     fn two_rounds_clockwise_are_two_laps() {
-        let mut memory = Memory { bearing: f64::NAN, laps: 0.0 };
+        let mut state = ClearanceState { bearing: f64::NAN, laps: 0.0 };
         for step in 0..=2000 {
             let angle_rad = -TAU * f64::from(step) / 1000.0;
             let position =
                 VectorMessage { x: 2.0 * libm::cos(angle_rad), y: 2.0 * libm::sin(angle_rad), z: 1.0 };
-            judge().clearance(&mut memory, &position);
+            judge().clearance(&mut state, &position);
         }
-        assert!((memory.laps - 2.0).abs() < 1e-9, "{}", memory.laps);
+        assert!((state.laps - 2.0).abs() < 1e-9, "{}", state.laps);
     }
 }

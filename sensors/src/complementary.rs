@@ -132,7 +132,7 @@ impl Complementary {
     ///
     /// # Errors
     /// A parameter or the period is outside its range.
-    pub fn new(params: ComplementaryParams, period_s: f64) -> Result<Self, ParameterError> {
+    pub fn with_period(params: ComplementaryParams, period_s: f64) -> Result<Self, ParameterError> {
         positive("time_constant_s", params.time_constant_s)?;
         not_negative("gravity_tolerance", params.gravity_tolerance)?;
         positive("gravity_m_s2", params.gravity_m_s2)?;
@@ -144,7 +144,7 @@ impl Complementary {
     /// The estimate at the time of `reading`, one period after the last one.
     ///
     /// The first reading does not turn the attitude: the state already holds that sample's attitude.
-    pub fn step(&self, state: &mut ComplementaryState, reading: &ImuReading) -> AttitudeEstimate {
+    pub fn update(&self, state: &mut ComplementaryState, reading: &ImuReading) -> AttitudeEstimate {
         let rate_B_rad_s = reading.angular_velocity_B_rad_s;
         let turned = self.propagate(state, rate_B_rad_s);
         state.attitude_WB = self.blend(turned, &reading.specific_force_B_m_s2);
@@ -203,7 +203,7 @@ mod tests {
 
     fn filter(time_constant_s: f64) -> Complementary {
         let params = ComplementaryParams { time_constant_s, ..ComplementaryParams::default() };
-        Complementary::new(params, PERIOD_S).unwrap()
+        Complementary::with_period(params, PERIOD_S).unwrap()
     }
 
     fn reading(force_B: Vector3<f64>, rate_B: Vector3<f64>) -> ImuReading {
@@ -230,7 +230,7 @@ mod tests {
         let rate_B = Vector3::new(0.5, 0.0, 0.0);
         state.last_angular_velocity_B_rad_s = Some(rate_B);
         let force_B = at_rest(0.2, 0.0).specific_force_B_m_s2;
-        let estimate = filter.step(&mut state, &reading(force_B, rate_B));
+        let estimate = filter.update(&mut state, &reading(force_B, rate_B));
         let expected = 0.98 * (0.1 + 0.5 * PERIOD_S) + 0.02 * 0.2;
         assert!((estimate.roll_rad - expected).abs() < 1e-12);
     }
@@ -247,12 +247,12 @@ mod tests {
     fn at_rest_the_estimate_settles_on_the_accelerometer_within_the_time_constant() {
         let filter = filter(0.5);
         let mut state = ComplementaryState::default();
-        let mut estimate = filter.step(&mut state, &at_rest(0.2, -0.1));
-        (0..500).for_each(|_| estimate = filter.step(&mut state, &at_rest(0.2, -0.1)));
+        let mut estimate = filter.update(&mut state, &at_rest(0.2, -0.1));
+        (0..500).for_each(|_| estimate = filter.update(&mut state, &at_rest(0.2, -0.1)));
         let left = libm::exp(-1.0);
         assert!((estimate.roll_rad - 0.2 * (1.0 - left)).abs() < 1e-3);
         assert!((estimate.pitch_rad + 0.1 * (1.0 - left)).abs() < 1e-3);
-        (0..5000).for_each(|_| estimate = filter.step(&mut state, &at_rest(0.2, -0.1)));
+        (0..5000).for_each(|_| estimate = filter.update(&mut state, &at_rest(0.2, -0.1)));
         assert!((estimate.roll_rad - 0.2).abs() < 1e-4 && (estimate.pitch_rad + 0.1).abs() < 1e-4);
         assert!(estimate.yaw_rad.abs() < 1e-9);
     }
@@ -265,7 +265,7 @@ mod tests {
         let mut state = ComplementaryState::at_attitude(roll, pitch, yaw);
         state.last_angular_velocity_B_rad_s = Some(Vector3::new(p, q, r));
         let fall = reading(Vector3::zeros(), Vector3::new(p, q, r));
-        let estimate = filter(30.0).step(&mut state, &fall);
+        let estimate = filter(30.0).update(&mut state, &fall);
         let roll_rate = p + libm::tan(pitch) * (q * libm::sin(roll) + r * libm::cos(roll));
         let pitch_rate = q * libm::cos(roll) - r * libm::sin(roll);
         let yaw_rate = (q * libm::sin(roll) + r * libm::cos(roll)) / libm::cos(pitch);
@@ -280,8 +280,8 @@ mod tests {
         let filter = filter(30.0);
         let mut state = ComplementaryState::default();
         let rate_B = Vector3::new(0.0, TAU, 0.0);
-        let mut estimate = filter.step(&mut state, &reading(Vector3::zeros(), rate_B));
-        (0..1000).for_each(|_| estimate = filter.step(&mut state, &reading(Vector3::zeros(), rate_B)));
+        let mut estimate = filter.update(&mut state, &reading(Vector3::zeros(), rate_B));
+        (0..1000).for_each(|_| estimate = filter.update(&mut state, &reading(Vector3::zeros(), rate_B)));
         assert!(estimate.attitude_WB.angle() < 1e-9);
         assert!((estimate.attitude_WB.norm() - 1.0).abs() < 1e-12);
     }
@@ -293,7 +293,7 @@ mod tests {
         let held_deg = |time_constant_s| {
             let mut state = ComplementaryState::at_attitude(10.0_f64.to_radians(), 0.0, 0.0);
             (0..1000).for_each(|_| {
-                filter(time_constant_s).step(&mut state, &thrust_only);
+                filter(time_constant_s).update(&mut state, &thrust_only);
             });
             state.attitude_WB.euler_angles().0.to_degrees()
         };
@@ -305,14 +305,14 @@ mod tests {
     fn a_hard_push_is_not_taken_for_gravity() {
         let mut state = ComplementaryState::default();
         let push = reading(Vector3::new(15.0, 0.0, 9.81), Vector3::zeros());
-        let estimate = filter(0.1).step(&mut state, &push);
+        let estimate = filter(0.1).update(&mut state, &push);
         assert_eq!(estimate.pitch_rad, 0.0);
     }
 
     #[test]
     fn impossible_parameters_are_named() {
         let params = ComplementaryParams { time_constant_s: -1.0, ..ComplementaryParams::default() };
-        let error = Complementary::new(params, PERIOD_S).unwrap_err().to_string();
+        let error = Complementary::with_period(params, PERIOD_S).unwrap_err().to_string();
         assert!(error.contains("time_constant_s") && error.contains("-1"), "{error}");
     }
 }

@@ -9,96 +9,90 @@ pub mod start;
 pub mod transition;
 
 use crate::wire::{attitude, vector, vector_message};
-use bus::kind::{Inputs, NodeKind, PortSpec};
+use bus::component::{Component, Info, StepError};
+use bus::context::{NodeContext, StepContext};
 use bus::messages::{
     AttitudeEstimate, Barometer, Gps, Imu, Innovation, Magnetometer, Mocap, StateEstimate, Vector3,
 };
-use bus::{BusError, Input, Message, Node, Tick};
+use bus::{InputPorts, OutputPorts};
+use diagnostics::ParameterError;
 use filter::{Ekf, EkfState};
-use history::{Measurement, Newest, Reading, Sensor};
+use history::{Measurement, Reading, Source};
 use params::EkfParams;
 use transition::{ATTITUDE, Covariance, POSITION, VELOCITY};
-
-/// The filter, for manifests.
-pub const KIND: NodeKind = NodeKind {
-    name: "ekf",
-    summary: "extended Kalman filter: the motion from an IMU, GPS or motion capture, barometer, magnetometer",
-    inputs: Inputs::Ports(&[
-        PortSpec::required("imu", Imu::SCHEMA),
-        PortSpec::optional("gps", Gps::SCHEMA),
-        PortSpec::optional("mocap", Mocap::SCHEMA),
-        PortSpec::optional("barometer", Barometer::SCHEMA),
-        PortSpec::optional("magnetometer", Magnetometer::SCHEMA),
-    ]),
-    outputs: &[
-        PortSpec::required("estimate", StateEstimate::SCHEMA),
-        PortSpec::optional("innovation", Innovation::SCHEMA),
-        PortSpec::optional("attitude", AttitudeEstimate::SCHEMA),
-    ],
-    check: |parameters, run| {
-        let params: EkfParams = diagnostics::read(parameters)?;
-        Ekf::new(params, run.period_s())?;
-        let has_position = run.has("gps") || run.has("mocap");
-        let unwired = "nothing tells the position: wire `inputs.gps`, `inputs.mocap` or both";
-        if has_position { Ok(()) } else { Err(diagnostics::ParameterError::conflict("", unwired)) }
-    },
-    run,
-};
 
 /// The position's standard deviation before the filter has begun, m, and likewise of all else: nothing is known.
 const UNKNOWN_SIGMA: f64 = 1e6;
 
-/// Degrees of freedom of the measurements, in the order of [`Sensor::ALL`].
+/// Degrees of freedom of the measurements, in the order of [`Source::ALL`].
 const DEGREES_OF_FREEDOM: [u32; 4] = [6, 6, 1, 3];
 
-/// The sensors that are wired.
-#[derive(Clone, Copy)]
-struct Sensors {
-    gps: Option<Input<Gps>>,
-    mocap: Option<Input<Mocap>>,
-    barometer: Option<Input<Barometer>>,
-    magnetometer: Option<Input<Magnetometer>>,
+/// What the filter reads.
+#[derive(Debug, InputPorts)]
+pub struct EkfInputs<'a> {
+    /// Readings of the inertial measurement unit.
+    pub imu: &'a Imu,
+    /// Positions and velocities.
+    pub gps: Option<&'a Gps>,
+    /// Positions and attitudes.
+    pub mocap: Option<&'a Mocap>,
+    /// Altitudes.
+    pub barometer: Option<&'a Barometer>,
+    /// The earth's magnetic field.
+    pub magnetometer: Option<&'a Magnetometer>,
 }
 
-impl Sensors {
-    fn declare(node: &mut Node) -> Self {
-        Self {
-            gps: node.optional_input("gps"),
-            mocap: node.optional_input("mocap"),
-            barometer: node.optional_input("barometer"),
-            magnetometer: node.optional_input("magnetometer"),
-        }
-    }
-
-    fn newest(&self, tick: &Tick<'_>) -> Newest {
-        [
-            self.gps.map(|input| gps(tick.get(input))),
-            self.mocap.map(|input| mocap(tick.get(input))),
-            self.barometer.map(|input| barometer(tick.get(input))),
-            self.magnetometer.map(|input| magnetometer(tick.get(input))),
-        ]
-    }
+/// What the filter sends.
+#[derive(Debug, OutputPorts)]
+pub struct Outputs {
+    /// The motion.
+    pub estimate: StateEstimate,
+    /// How well the measurements agree with it.
+    pub innovation: Option<Innovation>,
+    /// The attitude alone, for controllers that take it from another estimator than the position.
+    pub attitude: Option<AttitudeEstimate>,
 }
 
-fn run() -> Result<(), BusError> {
-    let mut node = Node::join()?;
-    let imu = node.input::<Imu>("imu")?;
-    let sensors = Sensors::declare(&mut node);
-    let estimate = node.output::<StateEstimate>("estimate")?;
-    let innovation = node.optional_output::<Innovation>("innovation")?;
-    let attitude = node.optional_output::<AttitudeEstimate>("attitude")?;
-    let filter = Ekf::new(node.parameters()?, node.period_s()).map_err(|error| node.error(error))?;
-    node.run_with_state(filter.initial_state(), |tick, state| {
-        let newest = sensors.newest(tick);
-        filter.step(state, &reading(tick.get(imu), tick.time_ns()), &newest);
-        if tick.is_due(estimate) {
-            tick.write(estimate, state_estimate(&filter, state))?;
-        }
-        if let Some(attitude) = attitude {
-            tick.write(attitude, attitude_estimate(state))?;
-        }
-        innovation.map_or(Ok(()), |innovation| tick.write(innovation, innovations(state)))
-    })
+impl Component for Ekf {
+    const INFO: Info = Info::new(
+        "ekf",
+        "extended Kalman filter: the motion from an IMU, GPS or motion capture, barometer, magnetometer",
+    );
+    type Parameters = EkfParams;
+    type Inputs<'a> = EkfInputs<'a>;
+    type Outputs = Outputs;
+    type State = EkfState;
+
+    fn new(params: EkfParams, context: &NodeContext<'_>) -> Result<Self, ParameterError> {
+        let filter = Self::with_period(params, context.period_s())?;
+        let has_position = context.has("gps") || context.has("mocap");
+        let unwired = "nothing tells the position: wire `inputs.gps`, `inputs.mocap` or both";
+        if has_position { Ok(filter) } else { Err(ParameterError::conflict("", unwired)) }
+    }
+
+    fn initial(&self) -> EkfState {
+        self.initial_state()
+    }
+
+    fn step(
+        &mut self,
+        context: &StepContext<'_>,
+        inputs: EkfInputs<'_>,
+        state: &mut EkfState,
+    ) -> Result<Outputs, StepError> {
+        let newest = [
+            inputs.gps.map(gps),
+            inputs.mocap.map(mocap),
+            inputs.barometer.map(barometer),
+            inputs.magnetometer.map(magnetometer),
+        ];
+        self.update_to(state, &reading(inputs.imu, context.time_ns()), &newest);
+        Ok(Outputs {
+            estimate: state_estimate(self, state),
+            innovation: Some(innovations(state)),
+            attitude: Some(attitude_estimate(state)),
+        })
+    }
 }
 
 fn reading(imu: &Imu, time_ns: u64) -> Reading {
@@ -108,22 +102,22 @@ fn reading(imu: &Imu, time_ns: u64) -> Reading {
 fn gps(sample: &Gps) -> Option<Measurement> {
     let (p, v) = (sample.position, sample.velocity);
     let values = [p.x, p.y, p.z, v.x, v.y, v.z];
-    (sample.valid == 1).then(|| Measurement::new(Sensor::Gps, sample.measured_ns, &values))
+    (sample.valid == 1).then(|| Measurement::new(Source::Gps, sample.measured_ns, &values))
 }
 
 fn mocap(sample: &Mocap) -> Option<Measurement> {
     let (p, q) = (sample.position, sample.attitude);
     let values = [p.x, p.y, p.z, q.x, q.y, q.z, q.w];
-    (sample.valid == 1).then(|| Measurement::new(Sensor::Mocap, sample.measured_ns, &values))
+    (sample.valid == 1).then(|| Measurement::new(Source::Mocap, sample.measured_ns, &values))
 }
 
 fn barometer(sample: &Barometer) -> Option<Measurement> {
-    (sample.valid == 1).then(|| Measurement::new(Sensor::Barometer, sample.measured_ns, &[sample.altitude]))
+    (sample.valid == 1).then(|| Measurement::new(Source::Barometer, sample.measured_ns, &[sample.altitude]))
 }
 
 fn magnetometer(sample: &Magnetometer) -> Option<Measurement> {
     let values = <[f64; 3]>::from(sample.field);
-    (sample.valid == 1).then(|| Measurement::new(Sensor::Magnetometer, sample.measured_ns, &values))
+    (sample.valid == 1).then(|| Measurement::new(Source::Magnetometer, sample.measured_ns, &values))
 }
 
 fn state_estimate(filter: &Ekf, state: &EkfState) -> StateEstimate {
@@ -180,18 +174,22 @@ fn innovations(state: &EkfState) -> Innovation {
 
 #[cfg(test)]
 mod tests {
-    use super::KIND;
-    use bus::context::NodeContext;
+    use super::*;
+    use bus::Registration;
     use serde_json::json;
+
+    fn refused(parameters: &serde_json::Value, inputs: &[&str]) -> Option<String> {
+        (Registration::of::<Ekf>().check)(parameters, &NodeContext::new("ekf", inputs))
+            .err()
+            .map(|error| error.to_string())
+    }
 
     #[test]
     fn a_filter_that_nothing_tells_the_position_is_refused() {
-        let error = (KIND.check)(&json!({}), &NodeContext::new("node", &["imu", "barometer"]))
-            .unwrap_err()
-            .to_string();
+        let error = refused(&json!({}), &["imu", "barometer"]).unwrap();
         assert!(error.contains("`inputs.gps`") && error.contains("`inputs.mocap`"), "{error}");
-        assert_eq!((KIND.check)(&json!({}), &NodeContext::new("node", &["imu", "gps"])), Ok(()));
-        assert_eq!((KIND.check)(&json!({}), &NodeContext::new("node", &["imu", "mocap"])), Ok(()));
+        assert_eq!(refused(&json!({}), &["imu", "gps"]), None);
+        assert_eq!(refused(&json!({}), &["imu", "mocap"]), None);
     }
 
     #[test]
@@ -203,9 +201,7 @@ mod tests {
             (json!({ "initial_position_m": [0.0, 0.0] }), "`initial_position_m`"),
             (json!({ "mocap_sigma": 1.0 }), "`mocap_sigma`"),
         ] {
-            let error = (KIND.check)(&parameters, &NodeContext::new("node", &["imu", "mocap"]))
-                .unwrap_err()
-                .to_string();
+            let error = refused(&parameters, &["imu", "mocap"]).unwrap();
             assert!(error.contains(key), "{error}");
         }
     }

@@ -8,12 +8,12 @@
 
 use crate::channel::{Chance, Channel, ChannelState, QUEUE, Timing};
 use crate::noise::standard_normal;
+use crate::sensing::{Sensor, TruthInputs};
 use crate::wire::{vector, vector_message};
-use bus::component::{Component, Info, StepError};
-use bus::context::{NodeContext, StepContext};
+use bus::component::Info;
 use bus::messages::{Gps, PlantState};
 use bus::random::Stream;
-use bus::{InputPorts, Message, OutputPorts};
+use bus::{Message, OutputPorts};
 use diagnostics::parameter::{ParameterError, all, finite, not_negative, positive};
 use nalgebra::Vector3;
 use serde::Deserialize;
@@ -65,13 +65,7 @@ impl Default for GpsParams {
 }
 
 impl GpsParams {
-    fn timing(&self) -> Timing {
-        let Self { rate_hz, delay_ms, dropout, dropout_mean_s, .. } = *self;
-        Timing { rate_hz, delay_ms, dropout, dropout_mean_s }
-    }
-
     fn validate(&self) -> Result<(), ParameterError> {
-        self.timing().validate()?;
         all(not_negative, "position_noise_m", &self.position_noise_m)?;
         all(not_negative, "position_drift_m", &self.position_drift_m)?;
         positive("position_drift_time_s", self.position_drift_time_s)?;
@@ -110,25 +104,13 @@ impl GpsParams {
             ..Default::default()
         }
     }
-
-    /// The sample to send at `now_ns`.
-    fn sample(&self, channel: &mut Channel, memory: &mut Memory, now_ns: u64, truth: &PlantState) -> Gps {
-        let Memory { channel: state, queue, drift } = memory;
-        channel.step(state, queue, now_ns, |last, chance| {
-            let measured = self.measure(truth, drift, chance);
-            if chance.is_lost(0) {
-                return Gps { valid: 0, ..*last };
-            }
-            Gps { measured_ns: now_ns, valid: 1, ..measured }
-        })
-    }
 }
 
-/// What the receiver remembers.
+/// All that the sensor remembers.
 #[derive(Debug, Clone, Copy, Message)]
 #[repr(C)]
 #[message(type_name = "hummingbus_msgs/msg/GpsState")]
-pub struct Memory {
+pub struct GpsState {
     /// What is under way.
     channel: ChannelState,
     /// The last measurements.
@@ -138,67 +120,69 @@ pub struct Memory {
     drift: bus::messages::Vector3,
 }
 
-impl Default for Memory {
+impl Default for GpsState {
     fn default() -> Self {
         let (channel, queue) = (ChannelState::default(), [Gps::default(); QUEUE]);
         Self { channel, queue, drift: [f64::NAN; 3].into() }
     }
 }
 
-/// What the receiver reads.
-#[derive(Debug, InputPorts)]
-pub struct Inputs<'a> {
-    /// The truth.
-    pub state: &'a PlantState,
-}
-
-/// What the receiver sends.
+/// What the sensor sends.
 #[derive(Debug, OutputPorts)]
 pub struct Outputs {
     /// The measurement that arrived last.
     pub gps: Gps,
 }
 
-/// A satellite receiver.
-#[derive(Debug)]
-pub struct GpsReceiver {
-    params: GpsParams,
-    channel: Channel,
-}
-
-impl Component for GpsReceiver {
+impl Sensor for GpsParams {
     const INFO: Info =
         Info::new("gps", "satellite receiver: position and velocity with noise, drift and delay");
-    type Parameters = GpsParams;
-    type Inputs<'a> = Inputs<'a>;
+    type Parameters = Self;
+    type Inputs<'a> = TruthInputs<'a>;
     type Outputs = Outputs;
-    type State = Memory;
+    type State = GpsState;
 
-    fn new(params: GpsParams, context: &NodeContext<'_>) -> Result<Self, ParameterError> {
-        params.validate()?;
-        Ok(Self { params, channel: Channel::in_context(&params.timing(), context)? })
+    fn new(parameters: Self) -> Result<Self, ParameterError> {
+        parameters.validate()?;
+        Ok(parameters)
     }
 
-    fn initial(&self) -> Memory {
-        Memory::default()
+    fn timing(&self) -> Timing {
+        let Self { rate_hz, delay_ms, dropout, dropout_mean_s, .. } = *self;
+        Timing { rate_hz, delay_ms, dropout, dropout_mean_s }
     }
 
-    fn step(
-        &mut self,
-        context: &StepContext<'_>,
-        inputs: Inputs<'_>,
-        memory: &mut Memory,
-    ) -> Result<Outputs, StepError> {
-        let gps = self.params.sample(&mut self.channel, memory, context.time_ns(), inputs.state);
-        Ok(Outputs { gps })
+    fn initial(&self) -> GpsState {
+        GpsState::default()
+    }
+
+    fn sample(
+        &self,
+        channel: &mut Channel,
+        state: &mut GpsState,
+        now_ns: u64,
+        inputs: TruthInputs<'_>,
+    ) -> Outputs {
+        let truth = inputs.state;
+        let GpsState { channel: under_way, queue, drift } = state;
+        let gps = channel.step(under_way, queue, now_ns, |last, chance| {
+            let measured = self.measure(truth, drift, chance);
+            if chance.is_lost(0) {
+                return Gps { valid: 0, ..*last };
+            }
+            Gps { measured_ns: now_ns, valid: 1, ..measured }
+        });
+        Outputs { gps }
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::testing::{TICK_NS, require_normal};
+    use crate::sensing::Sensing;
+    use crate::testing::{TICK_NS, refusal, require_normal};
     use bus::Harness;
+    use bus::context::NodeContext;
 
     fn truth() -> PlantState {
         PlantState {
@@ -215,8 +199,8 @@ mod tests {
     /// The samples of `count` measurements in the run seeded with `seed`.
     fn samples(params: &GpsParams, seed: u64, count: u64) -> Vec<Gps> {
         let context = NodeContext::new("gps", &["state"]).timed(100 * TICK_NS, 1, 1_000_000).seeded(seed);
-        let mut receiver = Harness::<GpsReceiver>::in_context(*params, &context).unwrap();
-        (0..count).map(|_| receiver.step(Inputs { state: &truth() }).unwrap().gps).collect()
+        let mut receiver = Harness::<Sensing<GpsParams>>::in_context(*params, &context).unwrap();
+        (0..count).map(|_| receiver.step(TruthInputs { state: &truth() }).unwrap().gps).collect()
     }
 
     #[test]
@@ -266,10 +250,10 @@ mod tests {
             velocity_noise_m_s: [0.0; 3],
             ..GpsParams::default()
         };
-        let mut receiver = Harness::<GpsReceiver>::new(perfect).unwrap();
+        let mut receiver = Harness::<Sensing<GpsParams>>::new(perfect).unwrap();
         for tick in 0..1000_u64 {
             let state = &PlantState { position: [tick as f64, 0.0, 0.0].into(), ..Default::default() };
-            let sample = receiver.step(Inputs { state }).unwrap().gps;
+            let sample = receiver.step(TruthInputs { state }).unwrap().gps;
             let expected = tick.checked_sub(80).map(|tick| tick / 100 * 100);
             assert_eq!(sample.valid, u32::from(expected.is_some()), "at tick {tick}");
             assert_eq!(sample.measured_ns, expected.unwrap_or(0) * TICK_NS);
@@ -281,13 +265,13 @@ mod tests {
     fn a_state_that_is_transferred_goes_on_byte_for_byte() {
         let params = GpsParams { dropout: 0.2, delay_ms: 245.0, ..GpsParams::default() };
         let state = truth();
-        let receiver = || Harness::<GpsReceiver>::new(params).unwrap();
-        Harness::require_transfer(receiver, |_| Inputs { state: &state });
+        let receiver = || Harness::<Sensing<GpsParams>>::new(params).unwrap();
+        Harness::require_transfer(receiver, |_| TruthInputs { state: &state });
     }
 
     #[test]
     fn impossible_parameters_are_named() {
-        let refused = |parameters| Harness::<GpsReceiver>::from_json(&parameters).unwrap_err().to_string();
+        let refused = |parameters| refusal::<GpsParams>(&parameters);
         let reason = refused(serde_json::json!({ "position_drift_time_s": 0.0 }));
         assert!(reason.contains("`position_drift_time_s`"), "{reason}");
         for key in ["position_noise_m", "position_drift_m", "velocity_noise_m_s"] {

@@ -5,34 +5,22 @@
 #![allow(non_snake_case, reason = "a trailing _B names the frame a vector is written in")]
 
 use crate::channel::{Channel, ChannelState, QUEUE};
-use crate::imu_model::{ImuModel, ImuParams, ImuReading, ImuState};
+use crate::imu_model::{ImuModel, ImuModelState, ImuParams, ImuReading};
+use crate::sensing::TruthInputs;
 use crate::wire::{vector, vector_message};
-use bus::kind::{Inputs, NodeKind, PortSpec};
+use bus::component::{Component, Info, StepError};
+use bus::context::{NodeContext, StepContext};
 use bus::messages::{Imu, PlantState, Vector3};
-use bus::{BusError, Message, Node};
+use bus::{Message, OutputPorts};
+use diagnostics::ParameterError;
 use diagnostics::unit::STANDARD_GRAVITY_M_S2;
 
-/// The IMU, for manifests.
-pub const KIND: NodeKind = NodeKind {
-    name: "imu",
-    summary: "accelerometer and gyroscope with noise and walking bias",
-    inputs: Inputs::Ports(&[PortSpec::required("state", PlantState::SCHEMA)]),
-    outputs: &[PortSpec::required("imu", Imu::SCHEMA)],
-    check: |parameters, run| {
-        let params: ImuParams = diagnostics::read(parameters)?;
-        let rate_hz = run.period_s().recip();
-        ImuModel::new(params, rate_hz)?;
-        params.timing(rate_hz).check(run)
-    },
-    run,
-};
-
-/// What the IMU remembers, as it is handed over: its biases, how far its random stream was drawn, and the readings
+/// All that the IMU remembers: its biases, how far its random stream was drawn, and the readings
 /// under way.
-#[derive(Clone, Copy, Message)]
+#[derive(Debug, Clone, Copy, Message)]
 #[repr(C)]
 #[message(type_name = "hummingbus_msgs/msg/ImuState")]
-struct Memory {
+pub struct ImuState {
     /// The accelerometer's bias at the next reading.
     #[field(unit = "m/s^2", frame = "body")]
     accelerometer_bias: Vector3,
@@ -48,66 +36,87 @@ struct Memory {
     queue: [Imu; QUEUE],
 }
 
-impl Memory {
+impl ImuState {
     /// Before the first reading: until it arrives, the IMU says that it rests level.
-    fn new(state: &ImuState) -> Self {
+    fn new(model: &ImuModelState) -> Self {
         let at_rest = Imu { specific_force: [0.0, 0.0, STANDARD_GRAVITY_M_S2].into(), ..Default::default() };
-        let mut memory = Self {
+        let mut state = Self {
             accelerometer_bias: Vector3::default(),
             gyroscope_bias: Vector3::default(),
             random_words: [0; 2],
             channel: ChannelState::default(),
             queue: [at_rest; QUEUE],
         };
-        memory.store(state);
-        memory
+        state.store(model);
+        state
     }
 
     #[allow(clippy::cast_possible_truncation, reason = "the halves of the count are taken apart")]
-    fn store(&mut self, state: &ImuState) {
-        let words = state.random_words();
-        self.accelerometer_bias = vector_message(state.accelerometer_bias_B_m_s2);
-        self.gyroscope_bias = vector_message(state.gyroscope_bias_B_rad_s);
+    fn store(&mut self, model: &ImuModelState) {
+        let words = model.random_words();
+        self.accelerometer_bias = vector_message(model.accelerometer_bias_B_m_s2);
+        self.gyroscope_bias = vector_message(model.gyroscope_bias_B_rad_s);
         self.random_words = [words as u64, (words >> 64) as u64];
     }
 
-    fn restore(&self, state: &mut ImuState) {
-        state.accelerometer_bias_B_m_s2 = vector(self.accelerometer_bias);
-        state.gyroscope_bias_B_rad_s = vector(self.gyroscope_bias);
+    fn restore(&self, model: &mut ImuModelState) {
+        model.accelerometer_bias_B_m_s2 = vector(self.accelerometer_bias);
+        model.gyroscope_bias_B_rad_s = vector(self.gyroscope_bias);
         let [low, high] = self.random_words;
-        state.set_random_words(u128::from(high) << 64 | u128::from(low));
+        model.set_random_words(u128::from(high) << 64 | u128::from(low));
     }
 }
 
-fn run() -> Result<(), BusError> {
-    let mut node = Node::join()?;
-    let state = node.input::<PlantState>("state")?;
-    let output = node.output::<Imu>("imu")?;
-    let params: ImuParams = node.parameters()?;
-    let rate_hz = node.period_s().recip();
-    let model = ImuModel::new(params, rate_hz).map_err(|error| node.error(error))?;
-    let mut channel = Channel::of_node(&params.timing(rate_hz), &node)?;
-    let mut imu_state = model.initial_state(node.seed(), node.name());
-    node.run_with_state(Memory::new(&imu_state), |tick, memory| {
-        let reading = read(&model, &mut imu_state, memory, &truth(tick.get(state)));
-        let sent = send(&mut channel, memory, tick.time_ns(), reading);
-        tick.write(output, sent)
-    })
+/// What the IMU sends.
+#[derive(Debug, OutputPorts)]
+pub struct Outputs {
+    /// The reading that arrived last.
+    pub imu: Imu,
 }
 
-/// The reading of `truth`; the memory then holds what the next one needs.
-fn read(model: &ImuModel, state: &mut ImuState, memory: &mut Memory, truth: &ImuReading) -> Imu {
-    memory.restore(state);
-    let reading = model.read(state, truth);
-    memory.store(state);
-    message(&reading)
+/// An inertial measurement unit.
+#[derive(Debug)]
+pub struct ImuSensor {
+    model: ImuModel,
+    channel: Channel,
+    /// The model's state, drawn anew from the transferred one at each step; it holds the random stream.
+    model_state: ImuModelState,
 }
 
-/// What is sent at `now_ns`, at which `reading` was made.
-fn send(channel: &mut Channel, memory: &mut Memory, now_ns: u64, reading: Imu) -> Imu {
-    channel.step(&mut memory.channel, &mut memory.queue, now_ns, |last, chance| {
-        if chance.is_lost(0) { *last } else { reading }
-    })
+impl Component for ImuSensor {
+    const INFO: Info = Info::new("imu", "accelerometer and gyroscope with noise and walking bias");
+    type Parameters = ImuParams;
+    type Inputs<'a> = TruthInputs<'a>;
+    type Outputs = Outputs;
+    type State = ImuState;
+
+    fn new(params: ImuParams, context: &NodeContext<'_>) -> Result<Self, ParameterError> {
+        let rate_hz = context.period_s().recip();
+        let model = ImuModel::new(params, rate_hz)?;
+        let channel = Channel::in_context(&params.timing(rate_hz), context)?;
+        let model_state = model.initial_state(context.seed, context.name);
+        Ok(Self { model, channel, model_state })
+    }
+
+    fn initial(&self) -> ImuState {
+        ImuState::new(&self.model_state)
+    }
+
+    fn step(
+        &mut self,
+        context: &StepContext<'_>,
+        inputs: TruthInputs<'_>,
+        state: &mut ImuState,
+    ) -> Result<Outputs, StepError> {
+        state.restore(&mut self.model_state);
+        let reading = message(&self.model.read(&mut self.model_state, &truth(inputs.state)));
+        state.store(&self.model_state);
+        let ImuState { channel, queue, .. } = state;
+        let imu = self.channel.step(channel, queue, context.time_ns(), |last, chance| {
+            if chance.is_lost(0) { *last } else { reading }
+        });
+        Ok(Outputs { imu })
+    }
 }
 
 fn truth(state: &PlantState) -> ImuReading {
@@ -128,28 +137,32 @@ fn message(reading: &ImuReading) -> Imu {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::testing::{TICK_NS, require_hand_over};
-    use bus::context::NodeContext;
+    use bus::Harness;
 
-    fn truth_at(tick: u64) -> ImuReading {
-        ImuReading {
-            specific_force_B_m_s2: nalgebra::Vector3::new(0.3, tick as f64 * 1e-3, 9.81),
-            angular_velocity_B_rad_s: nalgebra::Vector3::new(0.1, -0.7, 0.02),
+    fn truth_at(tick: u32) -> PlantState {
+        PlantState {
+            specific_force: [0.3, f64::from(tick) * 1e-3, 9.81].into(),
+            angular_velocity: [0.1, -0.7, 0.02].into(),
+            ..Default::default()
         }
     }
 
-    /// What is sent, and what was read, tick by tick.
-    fn flown(params: ImuParams, ticks: u64) -> Vec<(Imu, Imu)> {
+    fn imu(params: ImuParams) -> Harness<ImuSensor> {
+        Harness::in_context(params, &NodeContext::new("imu", &[]).seeded(7)).unwrap()
+    }
+
+    /// What the model reads of the truth, tick by tick.
+    fn read(params: ImuParams, ticks: u32) -> Vec<Imu> {
         let model = ImuModel::new(params, 1000.0).unwrap();
-        let mut channel = Channel::new(&params.timing(1000.0), 1e-3, 7, "imu").unwrap();
         let mut state = model.initial_state(7, "imu");
-        let mut memory = Memory::new(&state);
-        (0..ticks)
-            .map(|tick| {
-                let reading = read(&model, &mut state, &mut memory, &truth_at(tick));
-                (send(&mut channel, &mut memory, tick * TICK_NS, reading), reading)
-            })
-            .collect()
+        (0..ticks).map(|tick| message(&model.read(&mut state, &truth(&truth_at(tick))))).collect()
+    }
+
+    /// What is sent, and what was read, tick by tick.
+    fn flown(params: ImuParams, ticks: u32) -> Vec<(Imu, Imu)> {
+        let mut imu = imu(params);
+        let sent = (0..ticks).map(|tick| imu.step(TruthInputs { state: &truth_at(tick) }).unwrap().imu);
+        sent.zip(read(params, ticks)).collect()
     }
 
     fn bytes(imu: &Imu) -> &[u8] {
@@ -158,10 +171,8 @@ mod tests {
 
     #[test]
     fn by_default_the_readings_of_the_model_are_sent_as_they_are_made() {
-        let model = ImuModel::new(ImuParams::default(), 1000.0).unwrap();
-        let mut state = model.initial_state(7, "imu");
-        for (tick, (sent, _)) in (0..1000).zip(flown(ImuParams::default(), 1000)) {
-            assert_eq!(bytes(&sent), bytes(&message(&model.read(&mut state, &truth_at(tick)))));
+        for (sent, read) in flown(ImuParams::default(), 1000) {
+            assert_eq!(bytes(&sent), bytes(&read));
         }
     }
 
@@ -190,29 +201,21 @@ mod tests {
     }
 
     #[test]
-    fn a_memory_that_is_handed_over_goes_on_byte_for_byte() {
+    fn a_state_that_is_transferred_goes_on_byte_for_byte() {
         let params = ImuParams { delay_ms: 9.0, dropout: 0.1, dropout_mean_s: 0.02, ..ImuParams::default() };
-        let model = ImuModel::new(params, 1000.0).unwrap();
-        let start = Memory::new(&model.initial_state(7, "imu"));
-        let channel = || Channel::new(&params.timing(1000.0), 1e-3, 7, "imu").unwrap();
-        require_hand_over(channel, start, |channel, memory: &mut Memory, now_ns| {
-            let mut state = model.initial_state(7, "imu");
-            let reading = read(&model, &mut state, memory, &truth_at(now_ns / TICK_NS));
-            send(channel, memory, now_ns, reading)
-        });
+        let truths: Vec<_> = (0..2000).map(truth_at).collect();
+        Harness::require_transfer(|| imu(params), |tick| TruthInputs { state: &truths[tick as usize] });
     }
 
     #[test]
     fn impossible_losses_and_delays_are_named() {
         for (key, value) in [("delay_ms", -1.0), ("dropout", 1.0), ("dropout_mean_s", -1.0)] {
-            let reason =
-                (KIND.check)(&serde_json::json!({ key: value }), &NodeContext::new("node", &["state"]))
-                    .unwrap_err()
-                    .to_string();
+            let parameters = serde_json::json!({ key: value });
+            let reason = Harness::<ImuSensor>::from_json(&parameters).unwrap_err().to_string();
             assert!(reason.contains(&format!("`{key}`")), "{reason}");
         }
         // Whether this is long enough depends on the rate, which the check does not know.
         let bursts = serde_json::json!({ "dropout": 0.1, "dropout_mean_s": 0.05 });
-        (KIND.check)(&bursts, &NodeContext::new("node", &["state"])).unwrap();
+        Harness::<ImuSensor>::from_json(&bursts).unwrap();
     }
 }

@@ -9,6 +9,8 @@
 
 use crate::channel::Timing;
 use crate::noise::{BiasWalk, WhiteNoise};
+use crate::wire::vector;
+use bus::messages::Imu;
 use bus::random::{Stream, stream};
 use diagnostics::parameter::{ParameterError, finite, not_negative, positive};
 use nalgebra::Vector3;
@@ -115,6 +117,15 @@ pub struct ImuReading {
     pub angular_velocity_B_rad_s: Vector3<f64>,
 }
 
+impl From<&Imu> for ImuReading {
+    fn from(imu: &Imu) -> Self {
+        Self {
+            specific_force_B_m_s2: vector(imu.specific_force),
+            angular_velocity_B_rad_s: vector(imu.angular_velocity),
+        }
+    }
+}
+
 /// The IMU at one sample rate: all that does not change during a run.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ImuModel {
@@ -127,7 +138,7 @@ pub struct ImuModel {
 
 /// All that does change: where the biases have walked to, and the node's random stream.
 #[derive(Debug, Clone)]
-pub struct ImuState {
+pub struct ImuModelState {
     /// The accelerometer's bias at the next reading, body axes, m/s².
     pub accelerometer_bias_B_m_s2: Vector3<f64>,
     /// The gyroscope's bias at the next reading, body axes, rad/s.
@@ -135,7 +146,7 @@ pub struct ImuState {
     random: Stream,
 }
 
-impl ImuState {
+impl ImuModelState {
     /// How far the random stream has been drawn, in words of 32 bits.
     #[must_use]
     pub fn random_words(&self) -> u128 {
@@ -171,8 +182,8 @@ impl ImuModel {
 
     /// The state before the first reading of the IMU node `node` in a run seeded with `run_seed`.
     #[must_use]
-    pub fn initial_state(&self, run_seed: u64, node: &str) -> ImuState {
-        ImuState {
+    pub fn initial_state(&self, run_seed: u64, node: &str) -> ImuModelState {
+        ImuModelState {
             accelerometer_bias_B_m_s2: self.params.accelerometer_initial_bias_m_s2.into(),
             gyroscope_bias_B_rad_s: self.params.gyroscope_initial_bias_rad_s.into(),
             random: stream(run_seed, node),
@@ -183,7 +194,7 @@ impl ImuModel {
     ///
     /// The stream is drawn in a fixed order whatever the parameters, so that changing one of them does
     /// not reshuffle the noise of the others.
-    pub fn read(&self, state: &mut ImuState, truth: &ImuReading) -> ImuReading {
+    pub fn read(&self, state: &mut ImuModelState, truth: &ImuReading) -> ImuReading {
         let random = &mut state.random;
         let force_noise = self.accelerometer_noise.sample(random);
         let rate_noise = self.gyroscope_noise.sample(random);

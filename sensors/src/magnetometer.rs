@@ -7,29 +7,16 @@
 use crate::channel::{Channel, ChannelState, QUEUE, Timing};
 use crate::earth_field::EarthField;
 use crate::noise::standard_normal;
+use crate::sensing::{Sensor, TruthInputs};
 use crate::steps::in_steps;
 use crate::wire::{attitude, vector_message};
-use bus::kind::{Inputs, NodeKind, PortSpec};
-use bus::messages::{Magnetometer, PlantState};
+use bus::component::Info;
+use bus::messages::Magnetometer;
 use bus::random::Stream;
-use bus::{BusError, Message, Node};
+use bus::{Message, OutputPorts};
 use diagnostics::parameter::{ParameterError, all, finite, not_negative, positive, require};
 use nalgebra::{UnitQuaternion, Vector3};
 use serde::Deserialize;
-
-/// The magnetometer, for manifests.
-pub const KIND: NodeKind = NodeKind {
-    name: "magnetometer",
-    summary: "the earth's magnetic field with hard and soft iron, noise and delay",
-    inputs: Inputs::Ports(&[PortSpec::required("state", PlantState::SCHEMA)]),
-    outputs: &[PortSpec::required("magnetometer", Magnetometer::SCHEMA)],
-    check: |parameters, run| {
-        let params: MagnetometerParams = diagnostics::read(parameters)?;
-        params.validate()?;
-        params.timing().check(run)
-    },
-    run,
-};
 
 /// What a magnetometer makes of the earth's field; the defaults are a Honeywell HMC5883L.
 ///
@@ -85,18 +72,12 @@ impl Default for MagnetometerParams {
 }
 
 impl MagnetometerParams {
-    fn timing(&self) -> Timing {
-        let Self { rate_hz, delay_ms, dropout, dropout_mean_s, .. } = *self;
-        Timing { rate_hz, delay_ms, dropout, dropout_mean_s }
-    }
-
     fn field_W_T(&self) -> Vector3<f64> {
         let Self { field_T, inclination_deg, declination_deg, .. } = *self;
         EarthField { field_T, inclination_deg, declination_deg }.vector_W_T()
     }
 
     fn validate(&self) -> Result<(), ParameterError> {
-        self.timing().validate()?;
         not_negative("field_T", self.field_T)?;
         let inclination_is_good = self.inclination_deg.abs() <= 90.0;
         require("inclination_deg", self.inclination_deg, inclination_is_good, "from -90 to 90")?;
@@ -115,55 +96,74 @@ impl MagnetometerParams {
         let read_B_T = through_B_T + Vector3::from(self.hard_iron_T) + self.noise_T * standard_normal(random);
         read_B_T.map(|axis_T| in_steps(axis_T, self.resolution_T).clamp(-self.range_T, self.range_T))
     }
-
-    /// The sample to send at `now_ns`.
-    fn sample(
-        &self,
-        channel: &mut Channel,
-        memory: &mut Memory,
-        now_ns: u64,
-        truth: &PlantState,
-    ) -> Magnetometer {
-        channel.step(&mut memory.channel, &mut memory.queue, now_ns, |last, chance| {
-            let field = vector_message(self.measure(attitude(truth.attitude), chance.noise));
-            if chance.is_lost(0) {
-                return Magnetometer { valid: 0, ..*last };
-            }
-            Magnetometer { measured_ns: now_ns, field, valid: 1, ..Default::default() }
-        })
-    }
 }
 
-/// What the node remembers, as it is handed over.
-#[derive(Clone, Copy, Default, Message)]
+/// All that the sensor remembers.
+#[derive(Debug, Clone, Copy, Default, Message)]
 #[repr(C)]
 #[message(type_name = "hummingbus_msgs/msg/MagnetometerState")]
-struct Memory {
+pub struct MagnetometerState {
     /// What is under way.
     channel: ChannelState,
     /// The last measurements.
     queue: [Magnetometer; QUEUE],
 }
 
-fn run() -> Result<(), BusError> {
-    let mut node = Node::join()?;
-    let state = node.input::<PlantState>("state")?;
-    let output = node.output::<Magnetometer>("magnetometer")?;
-    let params: MagnetometerParams = node.parameters()?;
-    params.validate().map_err(|error| node.error(error))?;
-    let mut channel = Channel::of_node(&params.timing(), &node)?;
-    node.run_with_state(Memory::default(), |tick, memory| {
-        let sent = params.sample(&mut channel, memory, tick.time_ns(), tick.get(state));
-        tick.write(output, sent)
-    })
+/// What the sensor sends.
+#[derive(Debug, OutputPorts)]
+pub struct Outputs {
+    /// The measurement that arrived last.
+    pub magnetometer: Magnetometer,
+}
+
+impl Sensor for MagnetometerParams {
+    const INFO: Info =
+        Info::new("magnetometer", "the earth's magnetic field with hard and soft iron, noise and delay");
+    type Parameters = Self;
+    type Inputs<'a> = TruthInputs<'a>;
+    type Outputs = Outputs;
+    type State = MagnetometerState;
+
+    fn new(parameters: Self) -> Result<Self, ParameterError> {
+        parameters.validate()?;
+        Ok(parameters)
+    }
+
+    fn timing(&self) -> Timing {
+        let Self { rate_hz, delay_ms, dropout, dropout_mean_s, .. } = *self;
+        Timing { rate_hz, delay_ms, dropout, dropout_mean_s }
+    }
+
+    fn initial(&self) -> MagnetometerState {
+        MagnetometerState::default()
+    }
+
+    fn sample(
+        &self,
+        channel: &mut Channel,
+        state: &mut MagnetometerState,
+        now_ns: u64,
+        inputs: TruthInputs<'_>,
+    ) -> Outputs {
+        let truth = inputs.state;
+        let magnetometer = channel.step(&mut state.channel, &mut state.queue, now_ns, |last, chance| {
+            let field = vector_message(self.measure(attitude(truth.attitude), chance.noise));
+            if chance.is_lost(0) {
+                return Magnetometer { valid: 0, ..*last };
+            }
+            Magnetometer { measured_ns: now_ns, field, valid: 1, ..Default::default() }
+        });
+        Outputs { magnetometer }
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::testing::{TICK_NS, require_hand_over, require_normal};
+    use crate::testing::{harness, refusal, require_normal};
     use crate::wire::{attitude_message, vector};
-    use bus::context::NodeContext;
+    use bus::Harness;
+    use bus::messages::PlantState;
 
     fn perfect() -> MagnetometerParams {
         MagnetometerParams { delay_ms: 0.0, noise_T: 0.0, resolution_T: 0.0, ..Default::default() }
@@ -176,9 +176,8 @@ mod tests {
     }
 
     fn samples(params: &MagnetometerParams, truth: &PlantState, count: u64) -> Vec<Magnetometer> {
-        let mut channel = Channel::new(&params.timing(), 0.01, 5, "magnetometer").unwrap();
-        let mut memory = Memory::default();
-        (0..count).map(|n| params.sample(&mut channel, &mut memory, n * 10 * TICK_NS, truth)).collect()
+        let mut sensor = harness::<MagnetometerParams>(*params, 10);
+        (0..count).map(|_| sensor.step(TruthInputs { state: truth }).unwrap().magnetometer).collect()
     }
 
     fn read(params: &MagnetometerParams, truth: &PlantState) -> Vector3<f64> {
@@ -242,23 +241,18 @@ mod tests {
     }
 
     #[test]
-    fn a_memory_that_is_handed_over_goes_on_byte_for_byte() {
+    fn a_state_that_is_transferred_goes_on_byte_for_byte() {
         let params = MagnetometerParams { dropout: 0.2, delay_ms: 45.0, ..Default::default() };
-        let channel = || Channel::new(&params.timing(), 1e-3, 5, "magnetometer").unwrap();
-        let truth = |now_ns| turned(1.0, 2.0, now_ns as f64 * 1e-7);
-        require_hand_over(channel, Memory::default(), |channel, memory: &mut Memory, now_ns| {
-            params.sample(channel, memory, now_ns, &truth(now_ns))
-        });
+        let truths: Vec<_> = (0..2000).map(|tick| turned(1.0, 2.0, f64::from(tick) * 0.1)).collect();
+        let inputs = |tick| TruthInputs { state: &truths[tick as usize] };
+        Harness::require_transfer(|| harness::<MagnetometerParams>(params, 1), inputs);
     }
 
     #[test]
     fn impossible_parameters_are_named() {
         let bad = [("field_T", -1.0), ("inclination_deg", 91.0), ("noise_T", -1.0), ("range_T", 0.0)];
         for (key, value) in bad {
-            let reason =
-                (KIND.check)(&serde_json::json!({ key: value }), &NodeContext::new("node", &["state"]))
-                    .unwrap_err()
-                    .to_string();
+            let reason = refusal::<MagnetometerParams>(&serde_json::json!({ key: value }));
             assert!(reason.contains(&format!("`{key}`")), "{reason}");
         }
     }

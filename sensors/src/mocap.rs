@@ -6,28 +6,15 @@
 
 use crate::channel::{Channel, ChannelState, QUEUE, Timing};
 use crate::noise::standard_normal;
+use crate::sensing::{Sensor, TruthInputs};
 use crate::wire::{attitude, attitude_message, vector, vector_message};
-use bus::kind::{Inputs, NodeKind, PortSpec};
-use bus::messages::{Mocap, PlantState};
+use bus::component::Info;
+use bus::messages::Mocap;
 use bus::random::Stream;
-use bus::{BusError, Message, Node};
+use bus::{Message, OutputPorts};
 use diagnostics::parameter::{ParameterError, all, finite, not_negative};
 use nalgebra::{UnitQuaternion, Vector3};
 use serde::Deserialize;
-
-/// Motion capture, for manifests.
-pub const KIND: NodeKind = NodeKind {
-    name: "mocap",
-    summary: "motion capture: position and attitude with noise, delay and drop-outs",
-    inputs: Inputs::Ports(&[PortSpec::required("state", PlantState::SCHEMA)]),
-    outputs: &[PortSpec::required("mocap", Mocap::SCHEMA)],
-    check: |parameters, run| {
-        let params: MocapParams = diagnostics::read(parameters)?;
-        params.validate()?;
-        params.timing().check(run)
-    },
-    run,
-};
 
 /// What motion capture does to the truth; the defaults are a Vicon system of MX cameras.
 ///
@@ -73,13 +60,7 @@ impl Default for MocapParams {
 }
 
 impl MocapParams {
-    fn timing(&self) -> Timing {
-        let Self { rate_hz, delay_ms, dropout, dropout_mean_s, .. } = *self;
-        Timing { rate_hz, delay_ms, dropout, dropout_mean_s }
-    }
-
     fn validate(&self) -> Result<(), ParameterError> {
-        self.timing().validate()?;
         not_negative("position_noise_m", self.position_noise_m)?;
         not_negative("attitude_noise_deg", self.attitude_noise_deg)?;
         all(finite, "position_bias_m", &self.position_bias_m)?;
@@ -100,49 +81,75 @@ impl MocapParams {
         let turn = UnitQuaternion::from_scaled_axis(turn_B_deg.map(f64::to_radians));
         (position_W_m + position_error_W_m, attitude_WB * turn)
     }
-
-    /// The sample to send at `now_ns`.
-    fn sample(&self, channel: &mut Channel, memory: &mut Memory, now_ns: u64, truth: &PlantState) -> Mocap {
-        channel.step(&mut memory.channel, &mut memory.queue, now_ns, |last, chance| {
-            let measured = self.measure(vector(truth.position), attitude(truth.attitude), chance.noise);
-            if chance.is_lost(0) {
-                return Mocap { valid: 0, ..*last };
-            }
-            let (position, attitude) = (vector_message(measured.0), attitude_message(measured.1));
-            Mocap { measured_ns: now_ns, position, attitude, valid: 1, ..Default::default() }
-        })
-    }
 }
 
-/// What the node remembers, as it is handed over.
-#[derive(Clone, Copy, Default, Message)]
+/// All that the sensor remembers.
+#[derive(Debug, Clone, Copy, Default, Message)]
 #[repr(C)]
 #[message(type_name = "hummingbus_msgs/msg/MocapState")]
-struct Memory {
+pub struct MocapState {
     /// What is under way.
     channel: ChannelState,
     /// The last measurements.
     queue: [Mocap; QUEUE],
 }
 
-fn run() -> Result<(), BusError> {
-    let mut node = Node::join()?;
-    let state = node.input::<PlantState>("state")?;
-    let output = node.output::<Mocap>("mocap")?;
-    let params: MocapParams = node.parameters()?;
-    params.validate().map_err(|error| node.error(error))?;
-    let mut channel = Channel::of_node(&params.timing(), &node)?;
-    node.run_with_state(Memory::default(), |tick, memory| {
-        let sent = params.sample(&mut channel, memory, tick.time_ns(), tick.get(state));
-        tick.write(output, sent)
-    })
+/// What the sensor sends.
+#[derive(Debug, OutputPorts)]
+pub struct Outputs {
+    /// The measurement that arrived last.
+    pub mocap: Mocap,
+}
+
+impl Sensor for MocapParams {
+    const INFO: Info =
+        Info::new("mocap", "motion capture: position and attitude with noise, delay and drop-outs");
+    type Parameters = Self;
+    type Inputs<'a> = TruthInputs<'a>;
+    type Outputs = Outputs;
+    type State = MocapState;
+
+    fn new(parameters: Self) -> Result<Self, ParameterError> {
+        parameters.validate()?;
+        Ok(parameters)
+    }
+
+    fn timing(&self) -> Timing {
+        let Self { rate_hz, delay_ms, dropout, dropout_mean_s, .. } = *self;
+        Timing { rate_hz, delay_ms, dropout, dropout_mean_s }
+    }
+
+    fn initial(&self) -> MocapState {
+        MocapState::default()
+    }
+
+    fn sample(
+        &self,
+        channel: &mut Channel,
+        state: &mut MocapState,
+        now_ns: u64,
+        inputs: TruthInputs<'_>,
+    ) -> Outputs {
+        let truth = inputs.state;
+        let mocap = channel.step(&mut state.channel, &mut state.queue, now_ns, |last, chance| {
+            let measured = self.measure(vector(truth.position), attitude(truth.attitude), chance.noise);
+            if chance.is_lost(0) {
+                return Mocap { valid: 0, ..*last };
+            }
+            let (position, attitude) = (vector_message(measured.0), attitude_message(measured.1));
+            Mocap { measured_ns: now_ns, position, attitude, valid: 1, ..Default::default() }
+        });
+        Outputs { mocap }
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::testing::{TICK_NS, require_hand_over, require_normal};
-    use bus::context::NodeContext;
+    use crate::sensing::Sensing;
+    use crate::testing::{TICK_NS, harness, refusal, require_normal};
+    use bus::Harness;
+    use bus::messages::PlantState;
 
     fn truth() -> PlantState {
         PlantState {
@@ -155,9 +162,8 @@ mod tests {
     /// The samples of `count` measurements, none delayed.
     fn samples(params: &MocapParams, count: u64) -> Vec<Mocap> {
         let params = MocapParams { delay_ms: 0.0, ..*params };
-        let mut channel = Channel::new(&params.timing(), 0.01, 5, "mocap").unwrap();
-        let mut memory = Memory::default();
-        (0..count).map(|n| params.sample(&mut channel, &mut memory, n * 10 * TICK_NS, &truth())).collect()
+        let mut sensor = harness::<MocapParams>(params, 10);
+        (0..count).map(|_| sensor.step(TruthInputs { state: &truth() }).unwrap().mocap).collect()
     }
 
     fn position_error_m(sample: &Mocap) -> Vector3<f64> {
@@ -209,21 +215,18 @@ mod tests {
     }
 
     #[test]
-    fn a_memory_that_is_handed_over_goes_on_byte_for_byte() {
+    fn a_state_that_is_transferred_goes_on_byte_for_byte() {
         let params = MocapParams { delay_ms: 45.0, dropout: 0.2, ..MocapParams::default() };
-        let channel = || Channel::new(&params.timing(), 1e-3, 5, "mocap").unwrap();
-        require_hand_over(channel, Memory::default(), |channel, memory: &mut Memory, now_ns| {
-            params.sample(channel, memory, now_ns, &truth())
-        });
+        let truth = truth();
+        Harness::require_transfer(|| harness::<MocapParams>(params, 1), |_| TruthInputs { state: &truth });
     }
 
     #[test]
     fn impossible_parameters_are_named_and_unknown_ones_are_refused() {
-        let refused =
-            |value| (KIND.check)(&value, &NodeContext::new("node", &["state"])).unwrap_err().to_string();
+        let refused = |value| refusal::<MocapParams>(&value);
         assert!(refused(serde_json::json!({ "position_noise_m": -1.0 })).contains("`position_noise_m`"));
         assert!(refused(serde_json::json!({ "rate_hz": 0.0 })).contains("`rate_hz`"));
         assert!(refused(serde_json::json!({ "nose": 0.0 })).contains("`nose`"));
-        (KIND.check)(&serde_json::json!({}), &NodeContext::new("node", &["state"])).unwrap();
+        Harness::<Sensing<MocapParams>>::from_json(&serde_json::json!({})).unwrap();
     }
 }

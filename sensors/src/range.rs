@@ -11,30 +11,18 @@
 
 use crate::channel::{Chance, Channel, ChannelState, QUEUE, Timing};
 use crate::cone::Cone;
+use crate::sensing::Sensor;
 use crate::steps::in_steps;
 use crate::wire::{attitude, vector};
-use bus::kind::{Inputs, NodeKind, PortSpec};
+use bus::component::Info;
 use bus::messages::{PlantState, Ranges, Traffic};
 use bus::random::normal;
-use bus::{BusError, Message, Node};
+use bus::{InputPorts, Message, OutputPorts};
 use diagnostics::parameter::{ParameterError, all, finite, not_negative, positive, require};
 use nalgebra::{UnitQuaternion, Vector3};
 use scenes::{RayCaster, Scene};
 use serde::Deserialize;
 use std::path::PathBuf;
-
-/// The range finders, for manifests.
-pub const KIND: NodeKind = NodeKind {
-    name: "range",
-    summary: "five ultrasonic range finders in the scene of a scene file",
-    inputs: Inputs::Ports(&[
-        PortSpec::required("state", PlantState::SCHEMA),
-        PortSpec::optional("traffic", Traffic::SCHEMA),
-    ]),
-    outputs: &[PortSpec::required("ranges", Ranges::SCHEMA)],
-    check: |parameters, run| RangeFinders::new(diagnostics::read(parameters)?)?.params.timing().check(run),
-    run,
-};
 
 const BEAMS: usize = 5;
 
@@ -103,13 +91,7 @@ impl Default for RangeParams {
 }
 
 impl RangeParams {
-    fn timing(&self) -> Timing {
-        let Self { rate_hz, delay_ms, dropout, dropout_mean_s, .. } = *self;
-        Timing { rate_hz, delay_ms, dropout, dropout_mean_s }
-    }
-
     fn validate(&self) -> Result<(), ParameterError> {
-        self.timing().validate()?;
         not_negative("noise_m", self.noise_m)?;
         all(finite, "bias_m", &self.bias_m)?;
         not_negative("resolution_m", self.resolution_m)?;
@@ -124,29 +106,13 @@ impl RangeParams {
 
 /// The five range finders in their scene: all that does not change during a run.
 #[derive(Debug, Clone)]
-struct RangeFinders {
+pub struct RangeFinders {
     params: RangeParams,
     cones: [Cone; BEAMS],
     scene: RayCaster,
 }
 
 impl RangeFinders {
-    /// Checks the parameters and loads the scene; the error says what is wrong with either.
-    fn new(params: RangeParams) -> Result<Self, ParameterError> {
-        params.validate()?;
-        let path =
-            params.scene.as_ref().ok_or_else(|| ParameterError::Missing { key: "scene".to_owned() })?;
-        let scene = Scene::load(path).map_err(|error| ParameterError::conflict("scene", error))?;
-        Ok(Self::in_scene(params, &scene))
-    }
-
-    fn in_scene(params: RangeParams, scene: &Scene) -> Self {
-        let (x, y, z) = (Vector3::x_axis(), Vector3::y_axis(), Vector3::z_axis());
-        let half_angle_rad = params.half_angle_deg.to_radians();
-        let cones = [x, -x, y, -y, -z].map(|axis_B| Cone::new(axis_B, half_angle_rad));
-        Self { params, cones, scene: RayCaster::new(scene) }
-    }
-
     /// What each beam meets first, within its reach.
     fn distances_m(&self, truth: &PlantState, traffic: Option<&Traffic>) -> [Option<f64>; BEAMS] {
         let (position_W_m, attitude_WB) = (vector(truth.position), attitude(truth.attitude));
@@ -208,65 +174,91 @@ impl RangeFinders {
         }
         ranges
     }
-
-    /// Until the first measurement arrives, nothing is met.
-    fn start(&self) -> Memory {
-        let nothing = Ranges { distance: [self.params.reach_m; BEAMS], ..Default::default() };
-        Memory { channel: ChannelState::default(), queue: [nothing; QUEUE] }
-    }
-
-    /// The sample to send at `now_ns`.
-    fn sample(
-        &self,
-        channel: &mut Channel,
-        memory: &mut Memory,
-        now_ns: u64,
-        truth: &PlantState,
-        traffic: Option<&Traffic>,
-    ) -> Ranges {
-        channel.step(&mut memory.channel, &mut memory.queue, now_ns, |last, chance| {
-            let measured = self.measure(last, chance, truth, traffic);
-            Ranges { measured_ns: now_ns, ..measured }
-        })
-    }
 }
 
-/// What the node remembers, as it is handed over.
-#[derive(Clone, Copy, Message)]
+/// All that the range finders remember.
+#[derive(Debug, Clone, Copy, Message)]
 #[repr(C)]
 #[message(type_name = "hummingbus_msgs/msg/RangeState")]
-struct Memory {
+pub struct RangeState {
     /// What is under way.
     channel: ChannelState,
     /// The last measurements.
     queue: [Ranges; QUEUE],
 }
 
-fn run() -> Result<(), BusError> {
-    let mut node = Node::join()?;
-    let state = node.input::<PlantState>("state")?;
-    let traffic = node.optional_input::<Traffic>("traffic");
-    let output = node.output::<Ranges>("ranges")?;
-    let finders = RangeFinders::new(node.parameters()?).map_err(|error| node.error(error))?;
-    let mut channel = Channel::of_node(&finders.params.timing(), &node)?;
-    node.run_with_state(finders.start(), |tick, memory| {
-        let traffic = traffic.map(|traffic| tick.get(traffic));
-        let sent = finders.sample(&mut channel, memory, tick.time_ns(), tick.get(state), traffic);
-        tick.write(output, sent)
-    })
+/// What the range finders read.
+#[derive(Debug, InputPorts)]
+pub struct RangeInputs<'a> {
+    /// The truth.
+    pub state: &'a PlantState,
+    /// Where all vehicles of the run are.
+    pub traffic: Option<&'a Traffic>,
+}
+
+/// What the range finders send.
+#[derive(Debug, OutputPorts)]
+pub struct Outputs {
+    /// The measurements that arrived last.
+    pub ranges: Ranges,
+}
+
+impl Sensor for RangeFinders {
+    const INFO: Info = Info::new("range", "five ultrasonic range finders in the scene of a scene file");
+    type Parameters = RangeParams;
+    type Inputs<'a> = RangeInputs<'a>;
+    type Outputs = Outputs;
+    type State = RangeState;
+
+    fn new(params: RangeParams) -> Result<Self, ParameterError> {
+        params.validate()?;
+        let path =
+            params.scene.as_ref().ok_or_else(|| ParameterError::Missing { key: "scene".to_owned() })?;
+        let scene = Scene::load(path).map_err(|error| ParameterError::conflict("scene", error))?;
+        let (x, y, z) = (Vector3::x_axis(), Vector3::y_axis(), Vector3::z_axis());
+        let half_angle_rad = params.half_angle_deg.to_radians();
+        let cones = [x, -x, y, -y, -z].map(|axis_B| Cone::new(axis_B, half_angle_rad));
+        Ok(Self { params, cones, scene: RayCaster::new(&scene) })
+    }
+
+    fn timing(&self) -> Timing {
+        let RangeParams { rate_hz, delay_ms, dropout, dropout_mean_s, .. } = self.params;
+        Timing { rate_hz, delay_ms, dropout, dropout_mean_s }
+    }
+
+    /// Until the first measurement arrives, nothing is met.
+    fn initial(&self) -> RangeState {
+        let nothing = Ranges { distance: [self.params.reach_m; BEAMS], ..Default::default() };
+        RangeState { channel: ChannelState::default(), queue: [nothing; QUEUE] }
+    }
+
+    fn sample(
+        &self,
+        channel: &mut Channel,
+        state: &mut RangeState,
+        now_ns: u64,
+        inputs: RangeInputs<'_>,
+    ) -> Outputs {
+        let ranges = channel.step(&mut state.channel, &mut state.queue, now_ns, |last, chance| Ranges {
+            measured_ns: now_ns,
+            ..self.measure(last, chance, inputs.state, inputs.traffic)
+        });
+        Outputs { ranges }
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::testing::{TICK_NS, require_hand_over, require_normal};
+    use crate::sensing::Sensing;
+    use crate::testing::{TICK_NS, harness, refusal, require_normal};
     use crate::wire::attitude_message;
-    use bus::context::NodeContext;
+    use bus::Harness;
 
-    fn finders(params: RangeParams) -> RangeFinders {
-        params.validate().unwrap();
-        let room = include_str!("../../scenes/room.toml");
-        RangeFinders::in_scene(params, &Scene::parse(room, "room.toml").unwrap())
+    const ROOM: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../scenes/room.toml");
+
+    fn in_room(params: RangeParams) -> RangeParams {
+        RangeParams { scene: Some(ROOM.into()), ..params }
     }
 
     /// Thin beams that read what they meet, at once.
@@ -282,20 +274,18 @@ mod tests {
     }
 
     fn read(params: RangeParams, truth: &PlantState, traffic: Option<&Traffic>) -> Ranges {
-        samples(&finders(params), truth, traffic, 1)[0]
+        samples(params, truth, traffic, 1)[0]
     }
 
     /// The samples of `count` measurements.
     fn samples(
-        finders: &RangeFinders,
+        params: RangeParams,
         truth: &PlantState,
         traffic: Option<&Traffic>,
         count: u64,
     ) -> Vec<Ranges> {
-        let mut channel = Channel::new(&finders.params.timing(), 0.1, 5, "range").unwrap();
-        let mut memory = finders.start();
-        let sample = |n| finders.sample(&mut channel, &mut memory, n * 100 * TICK_NS, truth, traffic);
-        (0..count).map(sample).collect()
+        let mut finders = harness::<RangeFinders>(in_room(params), 100);
+        (0..count).map(|_| finders.step(RangeInputs { state: truth, traffic }).unwrap().ranges).collect()
     }
 
     #[track_caller]
@@ -348,8 +338,7 @@ mod tests {
     #[test]
     fn readings_are_multiples_of_the_resolution() {
         let params = RangeParams { delay_ms: 0.0, ..RangeParams::default() };
-        let finders = finders(params);
-        for ranges in samples(&finders, &at([1.003, 2.0, 1.5], 0.0, 0.0, 0.0), None, 200) {
+        for ranges in samples(params, &at([1.003, 2.0, 1.5], 0.0, 0.0, 0.0), None, 200) {
             for distance_m in ranges.distance {
                 let steps = distance_m / 0.01;
                 assert!((steps - steps.round()).abs() < 1e-6, "{distance_m}");
@@ -361,7 +350,7 @@ mod tests {
     fn each_beam_has_noise_of_its_own_and_its_bias() {
         let bias_m = [0.1, -0.1, 0.0, 0.2, 0.05];
         let params = RangeParams { noise_m: 0.02, bias_m, ..perfect() };
-        let samples = samples(&finders(params), &at([1.0, 2.0, 1.5], 0.0, 0.0, 0.0), None, 10_000);
+        let samples = samples(params, &at([1.0, 2.0, 1.5], 0.0, 0.0, 0.0), None, 10_000);
         let truth_m = [4.0, 6.0, 3.0, 7.0, 1.5];
         let errors = |beam: usize| {
             let expected_m = truth_m[beam] + bias_m[beam];
@@ -378,7 +367,7 @@ mod tests {
     #[test]
     fn a_beam_is_lost_on_its_own_and_keeps_what_it_read_last() {
         let params = RangeParams { dropout: 0.25, ..perfect() };
-        let samples = samples(&finders(params), &at([1.0, 2.0, 1.5], 0.0, 0.0, 0.0), None, 4000);
+        let samples = samples(params, &at([1.0, 2.0, 1.5], 0.0, 0.0, 0.0), None, 4000);
         for beam in 0..BEAMS {
             let lost = samples.iter().filter(|ranges| ranges.valid[beam] == 0).count() as f64 / 4000.0;
             assert!((lost - 0.25).abs() < 6.0 * (0.25 * 0.75 / 4000.0_f64).sqrt(), "{lost}");
@@ -432,38 +421,30 @@ mod tests {
     }
 
     #[test]
-    fn a_memory_that_is_handed_over_goes_on_byte_for_byte() {
-        let params = RangeParams { dropout: 0.2, delay_ms: 130.0, ..RangeParams::default() };
-        let finders = finders(params);
-        let channel = || Channel::new(&finders.params.timing(), 1e-3, 5, "range").unwrap();
-        let truth = |tick: u64| at([1.0, tick as f64 * 1e-3, 1.5], 3.0, 4.0, tick as f64 * 0.1);
-        require_hand_over(channel, finders.start(), |channel, memory: &mut Memory, now_ns| {
-            finders.sample(channel, memory, now_ns, &truth(now_ns / TICK_NS), None)
-        });
+    fn a_state_that_is_transferred_goes_on_byte_for_byte() {
+        let params = || in_room(RangeParams { dropout: 0.2, delay_ms: 130.0, ..RangeParams::default() });
+        let truth = |tick| at([1.0, f64::from(tick) * 1e-3, 1.5], 3.0, 4.0, f64::from(tick) * 0.1);
+        let truths: Vec<_> = (0..2000).map(truth).collect();
+        let inputs = |tick| RangeInputs { state: &truths[tick as usize], traffic: None };
+        Harness::require_transfer(|| harness::<RangeFinders>(params(), 1), inputs);
     }
 
     #[test]
     fn impossible_parameters_are_named() {
-        let room = concat!(env!("CARGO_MANIFEST_DIR"), "/../scenes/room.toml");
         let refused = |key: &str, value: f64| {
-            let mut parameters = serde_json::json!({ "scene": room });
+            let mut parameters = serde_json::json!({ "scene": ROOM });
             parameters[key] = value.into();
-            (KIND.check)(&parameters, &NodeContext::new("node", &["state"])).unwrap_err()
+            refusal::<RangeFinders>(&parameters)
         };
         let bad = [("nearest_m", 8.0), ("half_angle_deg", 90.0), ("reach_m", 0.0), ("noise_m", -1.0)];
         for (key, value) in bad.into_iter().chain([("vehicle_radius_m", 0.0), ("dropout", 1.5)]) {
             let reason = refused(key, value);
-            assert!(reason.to_string().contains(&format!("`{key}`")), "{reason}");
+            assert!(reason.contains(&format!("`{key}`")), "{reason}");
         }
-        let reason = (KIND.check)(&serde_json::json!({}), &NodeContext::new("node", &["state"]))
-            .unwrap_err()
-            .to_string();
+        let reason = refusal::<RangeFinders>(&serde_json::json!({}));
         assert!(reason.starts_with("missing field `scene`"), "{reason}");
-        let reason =
-            (KIND.check)(&serde_json::json!({ "scene": "none.toml" }), &NodeContext::new("node", &["state"]))
-                .unwrap_err()
-                .to_string();
+        let reason = refusal::<RangeFinders>(&serde_json::json!({ "scene": "none.toml" }));
         assert!(reason.contains("none.toml"), "{reason}");
-        (KIND.check)(&serde_json::json!({ "scene": room }), &NodeContext::new("node", &["state"])).unwrap();
+        Harness::<Sensing<RangeFinders>>::from_json(&serde_json::json!({ "scene": ROOM })).unwrap();
     }
 }

@@ -6,59 +6,71 @@ pub mod filter;
 pub mod params;
 
 use crate::imu_model::ImuReading;
-use crate::wire::{attitude as rotation, vector, vector_message};
-use bus::kind::{Inputs, NodeKind, PortSpec};
+use crate::wire::{attitude as rotation, vector_message};
+use bus::component::{Component, Info, StepError};
+use bus::context::{NodeContext, StepContext};
 use bus::messages::{AttitudeEstimate, Imu, Ranges, StateEstimate, WallEstimate};
-use bus::{BusError, Message, Node};
+use bus::{InputPorts, OutputPorts};
+use diagnostics::ParameterError;
 use filter::{RangeInertial, RangeInertialState};
 use params::RangeInertialParams;
 
-/// The range-inertial estimator, for manifests.
-pub const KIND: NodeKind = NodeKind {
-    name: "range-inertial",
-    summary: "velocity, height and distances to walls from range finders, IMU and attitude",
-    inputs: Inputs::Ports(&[
-        PortSpec::required("ranges", Ranges::SCHEMA),
-        PortSpec::required("imu", Imu::SCHEMA),
-        PortSpec::required("attitude", AttitudeEstimate::SCHEMA),
-    ]),
-    outputs: &[
-        PortSpec::required("walls", WallEstimate::SCHEMA),
-        PortSpec::required("estimate", StateEstimate::SCHEMA),
-    ],
-    check: |parameters, run| {
-        let params: RangeInertialParams = diagnostics::read(parameters)?;
-        RangeInertial::new(params, run.period_s()).map(|_| ())
-    },
-    run,
-};
-
-fn run() -> Result<(), BusError> {
-    let mut node = Node::join()?;
-    let ranges = node.input::<Ranges>("ranges")?;
-    let imu = node.input::<Imu>("imu")?;
-    let attitude = node.input::<AttitudeEstimate>("attitude")?;
-    let walls = node.output::<WallEstimate>("walls")?;
-    let estimate = node.output::<StateEstimate>("estimate")?;
-    let filter = RangeInertial::new(node.parameters()?, node.period_s()).map_err(|e| node.error(e))?;
-    node.run_with_state(filter.initial_state(), |tick, state| {
-        let attitude = *tick.get(attitude);
-        let inputs = filter::Inputs {
-            now_ns: tick.time_ns(),
-            imu: reading(tick.get(imu)),
-            attitude_WB: rotation(attitude.attitude),
-            ranges: tick.get(ranges),
-        };
-        filter.step(state, &inputs);
-        tick.write(walls, wall_estimate(&filter, state, attitude.yaw, tick.time_ns()))?;
-        tick.write(estimate, state_estimate(&filter, state, &attitude))
-    })
+/// What the estimator reads.
+#[derive(Debug, InputPorts)]
+pub struct RangeInertialInputs<'a> {
+    /// Measurements of the range finders.
+    pub ranges: &'a Ranges,
+    /// Readings of the inertial measurement unit.
+    pub imu: &'a Imu,
+    /// The attitude.
+    pub attitude: &'a AttitudeEstimate,
 }
 
-fn reading(imu: &Imu) -> ImuReading {
-    ImuReading {
-        specific_force_B_m_s2: vector(imu.specific_force),
-        angular_velocity_B_rad_s: vector(imu.angular_velocity),
+/// What the estimator sends.
+#[derive(Debug, OutputPorts)]
+pub struct Outputs {
+    /// Walls, height and velocities.
+    pub walls: WallEstimate,
+    /// The motion.
+    pub estimate: StateEstimate,
+}
+
+impl Component for RangeInertial {
+    const INFO: Info = Info::new(
+        "range-inertial",
+        "velocity, height and distances to walls from range finders, IMU and attitude",
+    );
+    type Parameters = RangeInertialParams;
+    type Inputs<'a> = RangeInertialInputs<'a>;
+    type Outputs = Outputs;
+    type State = RangeInertialState;
+
+    fn new(params: RangeInertialParams, context: &NodeContext<'_>) -> Result<Self, ParameterError> {
+        Self::with_period(params, context.period_s())
+    }
+
+    fn initial(&self) -> RangeInertialState {
+        self.initial_state()
+    }
+
+    fn step(
+        &mut self,
+        context: &StepContext<'_>,
+        inputs: RangeInertialInputs<'_>,
+        state: &mut RangeInertialState,
+    ) -> Result<Outputs, StepError> {
+        let (now_ns, attitude) = (context.time_ns(), inputs.attitude);
+        let measured = filter::Measured {
+            now_ns,
+            imu: ImuReading::from(inputs.imu),
+            attitude_WB: rotation(attitude.attitude),
+            ranges: inputs.ranges,
+        };
+        self.update(state, &measured);
+        Ok(Outputs {
+            walls: wall_estimate(self, state, attitude.yaw, now_ns),
+            estimate: state_estimate(self, state, attitude),
+        })
     }
 }
 
@@ -98,8 +110,8 @@ fn state_estimate(
 
 #[cfg(test)]
 mod tests {
-    use super::KIND;
-    use bus::context::NodeContext;
+    use super::*;
+    use bus::Harness;
     use serde_json::json;
 
     #[test]
@@ -110,9 +122,9 @@ mod tests {
             (json!({ "initial_height_m": -1.0 }), "`initial_height_m`"),
             (json!({ "dead_zone_m": 0.2 }), "`dead_zone_m`"),
         ] {
-            let error = (KIND.check)(&parameters, &NodeContext::new("node", &[])).unwrap_err().to_string();
+            let error = Harness::<RangeInertial>::from_json(&parameters).unwrap_err().to_string();
             assert!(error.contains(key), "{error}");
         }
-        assert_eq!((KIND.check)(&json!({}), &NodeContext::new("node", &[])), Ok(()));
+        Harness::<RangeInertial>::from_json(&json!({})).unwrap();
     }
 }

@@ -5,27 +5,14 @@
 //! physics of the vehicle: a rotor whose reading is stuck, and one of which half is read.
 
 use crate::channel::{Chance, Channel, ChannelState, QUEUE, Timing};
+use crate::sensing::{Sensor, TruthInputs};
 use crate::steps::in_steps;
-use bus::kind::{Inputs, NodeKind, PortSpec};
-use bus::messages::{PlantState, RotorSpeeds};
+use bus::component::Info;
+use bus::messages::RotorSpeeds;
 use bus::random::normal;
-use bus::{BusError, Message, Node};
+use bus::{Message, OutputPorts};
 use diagnostics::parameter::{ParameterError, not_negative, require};
 use serde::Deserialize;
-
-/// The rotor speed sensor, for manifests.
-pub const KIND: NodeKind = NodeKind {
-    name: "rpm",
-    summary: "rotor speeds with noise and resolution, and faults of single rotors",
-    inputs: Inputs::Ports(&[PortSpec::required("state", PlantState::SCHEMA)]),
-    outputs: &[PortSpec::required("speeds", RotorSpeeds::SCHEMA)],
-    check: |parameters, run| {
-        let params: RpmParams = diagnostics::read(parameters)?;
-        params.validate()?;
-        params.timing().check(run)
-    },
-    run,
-};
 
 /// What the motors' controllers make of the truth.
 ///
@@ -69,13 +56,7 @@ impl Default for RpmParams {
 }
 
 impl RpmParams {
-    fn timing(&self) -> Timing {
-        let Self { rate_hz, delay_ms, dropout, dropout_mean_s, .. } = *self;
-        Timing { rate_hz, delay_ms, dropout, dropout_mean_s }
-    }
-
     fn validate(&self) -> Result<(), ParameterError> {
-        self.timing().validate()?;
         not_negative("noise_rad_s", self.noise_rad_s)?;
         not_negative("resolution_rad_s", self.resolution_rad_s)?;
         let rotor = |key, number: usize| {
@@ -102,32 +83,13 @@ impl RpmParams {
         let part = if rotor + 1 == self.half_reading_rotor { 0.5 } else { 1.0 };
         in_steps(part * speed_rad_s.max(0.0), self.resolution_rad_s)
     }
-
-    /// The sample to send at `now_ns`.
-    fn sample(
-        &self,
-        channel: &mut Channel,
-        memory: &mut Memory,
-        now_ns: u64,
-        truth: &PlantState,
-    ) -> RotorSpeeds {
-        let Memory { channel: state, queue, read, has_read } = memory;
-        channel.step(state, queue, now_ns, |last, chance| {
-            *read = self.read(&truth.rotor_speed, (*has_read == 1).then_some(*read), chance);
-            *has_read = 1;
-            if chance.is_lost(0) {
-                return RotorSpeeds { valid: 0, ..*last };
-            }
-            RotorSpeeds { measured_ns: now_ns, rotor_speed: *read, valid: 1, ..Default::default() }
-        })
-    }
 }
 
-/// What the node remembers, as it is handed over.
-#[derive(Clone, Copy, Default, Message)]
+/// All that the sensor remembers.
+#[derive(Debug, Clone, Copy, Default, Message)]
 #[repr(C)]
 #[message(type_name = "hummingbus_msgs/msg/RpmState")]
-struct Memory {
+pub struct RpmState {
     /// What is under way.
     channel: ChannelState,
     /// The last measurements.
@@ -140,24 +102,62 @@ struct Memory {
     has_read: u64,
 }
 
-fn run() -> Result<(), BusError> {
-    let mut node = Node::join()?;
-    let state = node.input::<PlantState>("state")?;
-    let output = node.output::<RotorSpeeds>("speeds")?;
-    let params: RpmParams = node.parameters()?;
-    params.validate().map_err(|error| node.error(error))?;
-    let mut channel = Channel::of_node(&params.timing(), &node)?;
-    node.run_with_state(Memory::default(), |tick, memory| {
-        let sent = params.sample(&mut channel, memory, tick.time_ns(), tick.get(state));
-        tick.write(output, sent)
-    })
+/// What the sensor sends.
+#[derive(Debug, OutputPorts)]
+pub struct Outputs {
+    /// The measurement that arrived last.
+    pub speeds: RotorSpeeds,
+}
+
+impl Sensor for RpmParams {
+    const INFO: Info =
+        Info::new("rpm", "rotor speeds with noise and resolution, and faults of single rotors");
+    type Parameters = Self;
+    type Inputs<'a> = TruthInputs<'a>;
+    type Outputs = Outputs;
+    type State = RpmState;
+
+    fn new(parameters: Self) -> Result<Self, ParameterError> {
+        parameters.validate()?;
+        Ok(parameters)
+    }
+
+    fn timing(&self) -> Timing {
+        let Self { rate_hz, delay_ms, dropout, dropout_mean_s, .. } = *self;
+        Timing { rate_hz, delay_ms, dropout, dropout_mean_s }
+    }
+
+    fn initial(&self) -> RpmState {
+        RpmState::default()
+    }
+
+    fn sample(
+        &self,
+        channel: &mut Channel,
+        state: &mut RpmState,
+        now_ns: u64,
+        inputs: TruthInputs<'_>,
+    ) -> Outputs {
+        let truth = inputs.state;
+        let RpmState { channel: under_way, queue, read, has_read } = state;
+        let speeds = channel.step(under_way, queue, now_ns, |last, chance| {
+            *read = self.read(&truth.rotor_speed, (*has_read == 1).then_some(*read), chance);
+            *has_read = 1;
+            if chance.is_lost(0) {
+                return RotorSpeeds { valid: 0, ..*last };
+            }
+            RotorSpeeds { measured_ns: now_ns, rotor_speed: *read, valid: 1, ..Default::default() }
+        });
+        Outputs { speeds }
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::testing::{TICK_NS, require_hand_over, require_normal};
-    use bus::context::NodeContext;
+    use crate::testing::{harness, refusal, require_normal};
+    use bus::Harness;
+    use bus::messages::PlantState;
 
     fn truth_at(time_s: f64) -> PlantState {
         let rotor_speed = [400.0, 410.0 + 50.0 * time_s, 420.0, 430.0];
@@ -166,11 +166,10 @@ mod tests {
 
     /// Readings every 5 ms while the second rotor speeds up.
     fn readings(params: &RpmParams, count: u64) -> Vec<[f64; 4]> {
-        let mut channel = Channel::new(&params.timing(), 5e-3, 5, "rpm").unwrap();
-        let mut memory = Memory::default();
+        let mut sensor = harness::<RpmParams>(*params, 5);
         let sample = |n: u64| {
-            let truth = truth_at(n as f64 * 5e-3);
-            params.sample(&mut channel, &mut memory, n * 5 * TICK_NS, &truth).rotor_speed
+            let state = truth_at(n as f64 * 5e-3);
+            sensor.step(TruthInputs { state: &state }).unwrap().speeds.rotor_speed
         };
         (0..count).map(sample).collect()
     }
@@ -208,28 +207,22 @@ mod tests {
     }
 
     #[test]
-    fn a_memory_that_is_handed_over_goes_on_byte_for_byte() {
+    fn a_state_that_is_transferred_goes_on_byte_for_byte() {
         let params = RpmParams { dropout: 0.2, delay_ms: 45.0, stuck_rotor: 3, ..RpmParams::default() };
-        let channel = || Channel::new(&params.timing(), 1e-3, 5, "rpm").unwrap();
-        require_hand_over(channel, Memory::default(), |channel, memory: &mut Memory, now_ns| {
-            params.sample(channel, memory, now_ns, &truth_at(now_ns as f64 * 1e-9))
-        });
+        let truths: Vec<_> = (0..2000).map(|tick| truth_at(f64::from(tick) * 1e-3)).collect();
+        let inputs = |tick| TruthInputs { state: &truths[tick as usize] };
+        Harness::require_transfer(|| harness::<RpmParams>(params, 1), inputs);
     }
 
     #[test]
     fn impossible_parameters_are_named() {
         let bad = [("noise_rad_s", -1.0), ("resolution_rad_s", -1.0), ("dropout", 1.0)];
         for (key, value) in bad {
-            let reason =
-                (KIND.check)(&serde_json::json!({ key: value }), &NodeContext::new("node", &["state"]))
-                    .unwrap_err()
-                    .to_string();
+            let reason = refusal::<RpmParams>(&serde_json::json!({ key: value }));
             assert!(reason.contains(&format!("`{key}`")), "{reason}");
         }
         for key in ["stuck_rotor", "half_reading_rotor"] {
-            let reason = (KIND.check)(&serde_json::json!({ key: 5 }), &NodeContext::new("node", &["state"]))
-                .unwrap_err()
-                .to_string();
+            let reason = refusal::<RpmParams>(&serde_json::json!({ key: 5 }));
             assert!(reason.contains(&format!("`{key}`")), "{reason}");
         }
     }

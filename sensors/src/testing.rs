@@ -1,10 +1,22 @@
 //! What the tests of sensors share.
 
-use crate::channel::Channel;
-use bus::Message;
+use crate::sensing::{Sensing, Sensor};
+use bus::Harness;
+use bus::context::NodeContext;
 
 /// A tick of 1 ms.
 pub(crate) const TICK_NS: u64 = 1_000_000;
+
+/// A sensor whose node computes every `interval_ms`.
+pub(crate) fn harness<S: Sensor>(parameters: S::Parameters, interval_ms: u64) -> Harness<Sensing<S>> {
+    let context = NodeContext::new(S::INFO.name, &[]).timed(interval_ms * TICK_NS, 1, 1_000_000).seeded(5);
+    Harness::in_context(parameters, &context).unwrap()
+}
+
+/// Why a sensor refuses a parameter.
+pub(crate) fn refusal<S: Sensor>(parameters: &serde_json::Value) -> String {
+    Harness::<Sensing<S>>::from_json(parameters).err().expect("it is refused").to_string()
+}
 
 /// Requires that mean and variance of `values` are within six of their standard deviations of those of a normal
 /// distribution: passed by luck once in 10⁹ seeds.
@@ -19,25 +31,4 @@ pub(crate) fn require_normal(values: impl Iterator<Item = f64>, mean: f64, sigma
         (variance - 1.0).abs() < 6.0 * (2.0 / count).sqrt(),
         "the variance is {variance} of the expected"
     );
-}
-
-/// Requires that a node with a channel of its own goes on from the memory of another, in mid-flight, with the same
-/// bytes.
-#[track_caller]
-pub(crate) fn require_hand_over<S: Message, R: Message>(
-    channel: impl Fn() -> Channel,
-    mut memory: S,
-    sample: impl Fn(&mut Channel, &mut S, u64) -> R,
-) {
-    let mut first = channel();
-    for tick in 0..777 {
-        sample(&mut first, &mut memory, tick * TICK_NS);
-    }
-    let (mut second, mut handed) = (channel(), memory);
-    for tick in 777..2000 {
-        let expected = sample(&mut first, &mut memory, tick * TICK_NS);
-        let found = sample(&mut second, &mut handed, tick * TICK_NS);
-        assert!(bytemuck::bytes_of(&found) == bytemuck::bytes_of(&expected), "another sample at tick {tick}");
-    }
-    assert!(bytemuck::bytes_of(&handed) == bytemuck::bytes_of(&memory), "another memory");
 }

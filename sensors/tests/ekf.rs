@@ -13,9 +13,9 @@ mod support;
 use bus::random::{Stream, normal, stream};
 use nalgebra::{SVector, UnitQuaternion, Vector3};
 use sensors::ekf::filter::{Ekf, EkfState, deviation};
-use sensors::ekf::history::{Measurement, Newest, Reading, Sensor};
+use sensors::ekf::history::{Measurement, Newest, Reading, Source};
 use sensors::ekf::params::EkfParams;
-use sensors::imu_model::{ImuModel, ImuParams, ImuReading, ImuState};
+use sensors::imu_model::{ImuModel, ImuModelState, ImuParams, ImuReading};
 use std::collections::VecDeque;
 use std::f64::consts::TAU;
 use support::{PERIOD_NS, PERIOD_S, Truth, fly};
@@ -36,21 +36,21 @@ fn excited(time_s: f64) -> [f64; 4] {
 /// When a sensor measures, and how late that arrives, in samples.
 #[derive(Clone, Copy)]
 struct Timing {
-    sensor: Sensor,
+    sensor: Source,
     period: usize,
     delay: usize,
 }
 
-const GPS: Timing = Timing { sensor: Sensor::Gps, period: 100, delay: 80 };
-const MOCAP: Timing = Timing { sensor: Sensor::Mocap, period: 10, delay: 10 };
-const BAROMETER: Timing = Timing { sensor: Sensor::Barometer, period: 20, delay: 16 };
-const MAGNETOMETER: Timing = Timing { sensor: Sensor::Magnetometer, period: 10, delay: 6 };
+const GPS: Timing = Timing { sensor: Source::Gps, period: 100, delay: 80 };
+const MOCAP: Timing = Timing { sensor: Source::Mocap, period: 10, delay: 10 };
+const BAROMETER: Timing = Timing { sensor: Source::Barometer, period: 20, delay: 16 };
+const MAGNETOMETER: Timing = Timing { sensor: Source::Magnetometer, period: 10, delay: 6 };
 
 /// The sensors of a flight, which are worth what `params` says.
 struct World {
     params: EkfParams,
     imu: ImuModel,
-    imu_state: ImuState,
+    imu_state: ImuModelState,
     random: Stream,
     gps_drift_W_m: Vector3<f64>,
     barometer_bias_m: f64,
@@ -82,12 +82,12 @@ impl World {
         self.barometer_bias_m += walk * normal(&mut self.random);
     }
 
-    fn measure(&mut self, sensor: Sensor, truth: &Truth, now_ns: u64) -> Measurement {
+    fn measure(&mut self, sensor: Source, truth: &Truth, now_ns: u64) -> Measurement {
         let values = match sensor {
-            Sensor::Gps => self.gps(truth),
-            Sensor::Mocap => self.mocap(truth),
-            Sensor::Barometer => vec![self.barometer(truth)],
-            Sensor::Magnetometer => self.magnetometer(truth),
+            Source::Gps => self.gps(truth),
+            Source::Mocap => self.mocap(truth),
+            Source::Barometer => vec![self.barometer(truth)],
+            Source::Magnetometer => self.magnetometer(truth),
         };
         Measurement::new(sensor, now_ns, &values)
     }
@@ -154,7 +154,7 @@ fn run_with(
     judge: &mut impl FnMut(&Sample<'_>),
 ) {
     let mut world = World::new(true_params, seed);
-    let filter = Ekf::new(believed, PERIOD_S).unwrap();
+    let filter = Ekf::with_period(believed, PERIOD_S).unwrap();
     let mut state = filter.initial_state();
     let mut newest: Newest = [None; 4];
     timings.iter().for_each(|timing| newest[timing.sensor.index()] = Some(None));
@@ -171,7 +171,7 @@ fn run_with(
         under_way.retain(|(arrives, _)| *arrives > number);
         let biases = (world.imu_state.gyroscope_bias_B_rad_s, world.imu_state.accelerometer_bias_B_m_s2);
         let read = world.imu.read(&mut world.imu_state, &truth.felt);
-        filter.step(&mut state, &reading(&read, now_ns), &newest);
+        filter.update_to(&mut state, &reading(&read, now_ns), &newest);
         world.wander();
         judge(&Sample { number, truth, biases, filter: &filter, state: &state });
     }
@@ -372,7 +372,7 @@ fn outliers_are_refused_and_counted_and_leave_no_mark() {
     };
     let mut refused = 0;
     run_spoilt(spoil, |sample| {
-        refused = sample.state.refused()[Sensor::Mocap.index()];
+        refused = sample.state.refused()[Source::Mocap.index()];
         if sample.number > 2000 {
             assert!(errors(sample).fixed_rows::<3>(0).norm() < 2e-3, "at sample {}", sample.number);
         }
@@ -437,7 +437,7 @@ fn a_filter_that_is_told_a_wrong_start_finds_its_way() {
     let believed = EkfParams { initial_position_m: Some([2.0, -1.0, 5.0]), ..EkfParams::default() };
     let mut refused = 0;
     let mut judge = |sample: &Sample<'_>| {
-        refused = sample.state.refused()[Sensor::Mocap.index()];
+        refused = sample.state.refused()[Source::Mocap.index()];
         if sample.number > 1000 {
             assert!(errors(sample).fixed_rows::<3>(0).norm() < 5e-3, "at sample {}", sample.number);
         }

@@ -11,7 +11,7 @@ use bus::random::{Stream, normal, stream};
 use nalgebra::Vector3;
 use sensors::complementary::{Complementary, ComplementaryParams, ComplementaryState};
 use sensors::imu_model::{ImuModel, ImuParams};
-use sensors::range_inertial::filter::{Inputs, RangeInertial, RangeInertialState, Wall};
+use sensors::range_inertial::filter::{Measured, RangeInertial, RangeInertialState, Wall};
 use sensors::range_inertial::params::RangeInertialParams;
 use support::{Manoeuvre, PERIOD_NS, PERIOD_S, Truth, fly};
 
@@ -60,11 +60,11 @@ fn ranges(truth: &Truth, measured_ns: u64, walls: [Option<f64>; 4], random: &mut
 fn estimate(flight: &[Truth], room: Room, seed: u64, mut judge: impl FnMut(&Run)) {
     let imu = ImuModel::new(ImuParams::default(), 1.0 / PERIOD_S).unwrap();
     let mut imu_state = imu.initial_state(seed, "imu");
-    let complementary = Complementary::new(ComplementaryParams::default(), PERIOD_S).unwrap();
+    let complementary = Complementary::with_period(ComplementaryParams::default(), PERIOD_S).unwrap();
     let mut attitude_state = ComplementaryState::default();
     let initial_height_m = flight[0].position_W_m.z;
     let params = RangeInertialParams { initial_height_m, half_angle_deg: 0.0, ..Default::default() };
-    let filter = RangeInertial::new(params, PERIOD_S).unwrap();
+    let filter = RangeInertial::with_period(params, PERIOD_S).unwrap();
     let mut state = filter.initial_state();
     let mut random = stream(seed, "range");
     let (mut sent, mut pending) = (Ranges::default(), Ranges::default());
@@ -77,8 +77,8 @@ fn estimate(flight: &[Truth], room: Room, seed: u64, mut judge: impl FnMut(&Run)
             sent = pending;
         }
         let imu = imu.read(&mut imu_state, &truth.felt);
-        let attitude_WB = complementary.step(&mut attitude_state, &imu).attitude_WB;
-        filter.step(&mut state, &Inputs { now_ns, imu, attitude_WB, ranges: &sent });
+        let attitude_WB = complementary.update(&mut attitude_state, &imu).attitude_WB;
+        filter.update(&mut state, &Measured { now_ns, imu, attitude_WB, ranges: &sent });
         let yaw_rad = attitude_WB.euler_angles().2;
         let walls = filter.walls(&state, yaw_rad, now_ns);
         judge(&Run { truth: *truth, time_s, state, walls, yaw_rad });

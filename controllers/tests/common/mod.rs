@@ -151,13 +151,7 @@ impl Loop {
             None => exact(&self.state.body),
         };
         let (reference, walls) = (Reference::from(&point), Default::default());
-        let input = ControlInput {
-            motion,
-            set_point: self.set_point,
-            reference: &reference,
-            walls: &walls,
-            time_ns: self.tick * 1_000_000,
-        };
+        let input = ControlInput { motion, set_point: self.set_point, reference, walls };
         let transfer = BumplessTransfer::to::<L>(&self.believed.vehicle, PERIOD_S);
         self.demand = transfer.step(law, &mut self.law_state, &input, None).wrench;
         let allocated = self.believed.allocation.allocate(&self.demand);

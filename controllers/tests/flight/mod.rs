@@ -16,7 +16,7 @@ use controllers::set_points::SetPoint;
 use nalgebra::Vector3;
 use plant::{NewtonEuler, RigidBody, State};
 use sensors::complementary::{AttitudeEstimate, Complementary, ComplementaryParams, ComplementaryState};
-use sensors::imu_model::{ImuModel, ImuParams, ImuReading, ImuState};
+use sensors::imu_model::{ImuModel, ImuModelState, ImuParams, ImuReading};
 use vehicles::Vehicle;
 
 pub const PERIOD_S: f64 = 1e-3;
@@ -59,7 +59,7 @@ pub const ROOM: Walls = [5.0, 5.0, 5.0, 5.0];
 /// The sensors' side of a flight.
 pub struct Senses {
     imu: ImuModel,
-    imu_state: ImuState,
+    imu_state: ImuModelState,
     filter: Complementary,
     filter_state: ComplementaryState,
     errors: RangeErrors,
@@ -77,7 +77,7 @@ impl Senses {
         Self {
             imu_state: imu.initial_state(seed, "imu"),
             imu,
-            filter: Complementary::new(ComplementaryParams::default(), PERIOD_S).unwrap(),
+            filter: Complementary::with_period(ComplementaryParams::default(), PERIOD_S).unwrap(),
             filter_state: ComplementaryState::default(),
             errors,
             walls,
@@ -98,7 +98,7 @@ impl Senses {
             angular_velocity_B_rad_s: state.body.angular_velocity_B_rad_s,
         };
         let reading = self.imu.read(&mut self.imu_state, &truth);
-        self.filter.step(&mut self.filter_state, &reading)
+        self.filter.update(&mut self.filter_state, &reading)
     }
 
     /// What the estimator of walls believes; the heading is the world's x.
@@ -195,13 +195,7 @@ impl Loop {
             ),
             angular_velocity_B_rad_s: attitude.angular_velocity_B_rad_s,
         };
-        let input = ControlInput {
-            motion,
-            set_point: self.set_point,
-            reference: &self.reference,
-            walls: &walls,
-            time_ns: self.tick * PERIOD_NS,
-        };
+        let input = ControlInput { motion, set_point: self.set_point, reference: self.reference, walls };
         let transfer = BumplessTransfer::to::<L>(&self.believed.vehicle, PERIOD_S);
         let output = transfer.step(law, &mut self.law_state, &input, None);
         let speeds_rad_s = self.believed.allocation.allocate(&output.wrench).speeds_rad_s;

@@ -19,7 +19,7 @@
     reason = "a trailing _W or _B names the frame a vector is written in, _WB a rotation between the two"
 )]
 
-use super::history::{Newest, READINGS, Reading, Readings, Sensor, Waiting};
+use super::history::{Newest, READINGS, Reading, Readings, Source, Waiting};
 use super::motion::Motion;
 use super::observation::{self, Observation};
 use super::params::EkfParams;
@@ -96,7 +96,7 @@ impl Ekf {
         clippy::cast_sign_loss,
         reason = "a delay is small, not negative"
     )]
-    pub fn new(params: EkfParams, period_s: f64) -> Result<Self, ParameterError> {
+    pub fn with_period(params: EkfParams, period_s: f64) -> Result<Self, ParameterError> {
         params.validate()?;
         positive("period_s", period_s)?;
         let span_s = params.delay_max_ms * 1e-3 + SPAN_MAX_NS as f64 * 1e-9;
@@ -128,7 +128,7 @@ impl Ekf {
     }
 
     /// Moves `state` on to `reading`, with what the sensors have measured last.
-    pub fn step(&self, state: &mut EkfState, reading: &Reading, newest: &Newest) {
+    pub fn update_to(&self, state: &mut EkfState, reading: &Reading, newest: &Newest) {
         let last = state.readings.newest();
         // Without a reading that can be used, the last one goes on.
         let usable = if reading.is_finite() { *reading } else { last.unwrap_or_default() };
@@ -195,11 +195,11 @@ impl Ekf {
 
     /// Up to when nothing can arrive any more: no sensor sends its measurements out of order.
     fn settled_ns(&self, state: &EkfState, newest: &Newest, now_ns: u64) -> u64 {
-        let seen = |sensor: &Sensor| match state.newest_ns[sensor.index()] {
+        let seen = |sensor: &Source| match state.newest_ns[sensor.index()] {
             NEVER => 0,
             newest_ns => newest_ns,
         };
-        let wired = Sensor::ALL.iter().filter(|sensor| newest[sensor.index()].is_some());
+        let wired = Source::ALL.iter().filter(|sensor| newest[sensor.index()].is_some());
         let all_seen_ns = wired.map(seen).min().unwrap_or(0);
         all_seen_ns.max(now_ns.saturating_sub(self.delay_max_ns))
     }
@@ -215,17 +215,17 @@ impl Ekf {
         }
         let (motion, params) = (&state.settled, &self.params);
         match measurement.sensor() {
-            Sensor::Gps => self.update(state, Sensor::Gps, &observation::gps(motion, &measurement, params)),
-            Sensor::Mocap => {
-                self.update(state, Sensor::Mocap, &observation::mocap(motion, &measurement, params))
+            Source::Gps => self.update(state, Source::Gps, &observation::gps(motion, &measurement, params)),
+            Source::Mocap => {
+                self.update(state, Source::Mocap, &observation::mocap(motion, &measurement, params))
             }
-            Sensor::Barometer => {
-                self.update(state, Sensor::Barometer, &observation::barometer(motion, &measurement, params));
+            Source::Barometer => {
+                self.update(state, Source::Barometer, &observation::barometer(motion, &measurement, params));
             }
-            Sensor::Magnetometer => {
+            Source::Magnetometer => {
                 self.update(
                     state,
-                    Sensor::Magnetometer,
+                    Source::Magnetometer,
                     &observation::magnetometer(motion, &measurement, params),
                 );
             }
@@ -262,7 +262,7 @@ impl Ekf {
     }
 
     /// The Kalman update, or the refusal of an outlier.
-    fn update<const N: usize>(&self, state: &mut EkfState, sensor: Sensor, observed: &Observation<N>) {
+    fn update<const N: usize>(&self, state: &mut EkfState, sensor: Source, observed: &Observation<N>) {
         let index = sensor.index();
         let covariance = state.covariance();
         let cross = covariance * observed.jacobian.transpose();
@@ -312,7 +312,7 @@ impl EkfState {
         self.has_begun == 1
     }
 
-    /// Normalised innovation squared of the last update of each sensor, in the order of [`Sensor::ALL`].
+    /// Normalised innovation squared of the last update of each sensor, in the order of [`Source::ALL`].
     #[must_use]
     pub fn normalised_squared(&self) -> [f64; 4] {
         self.normalised_squared

@@ -130,7 +130,7 @@ impl Readings {
 
 /// A sensor that measures what the filter estimates, in the order of `bus::messages::Innovation`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Sensor {
+pub enum Source {
     /// A satellite receiver.
     Gps,
     /// Motion capture.
@@ -141,7 +141,7 @@ pub enum Sensor {
     Magnetometer,
 }
 
-impl Sensor {
+impl Source {
     /// All, in order.
     pub const ALL: [Self; 4] = [Self::Gps, Self::Mocap, Self::Barometer, Self::Magnetometer];
 
@@ -169,7 +169,7 @@ pub struct Measurement {
     /// What was measured: position and velocity, position and quaternion, altitude, or field.
     #[field(unit = "")]
     pub values: [f64; 7],
-    /// The sensor's place in `Sensor::ALL`.
+    /// The sensor's place in `Source::ALL`.
     #[field(unit = "1")]
     pub sensor: u32,
     /// Zero.
@@ -180,7 +180,7 @@ pub struct Measurement {
 impl Measurement {
     /// What `sensor` measured at `measured_ns`; `values` are at most seven.
     #[must_use]
-    pub fn new(sensor: Sensor, measured_ns: u64, values: &[f64]) -> Self {
+    pub fn new(sensor: Source, measured_ns: u64, values: &[f64]) -> Self {
         let mut measurement = Self { measured_ns, sensor: sensor as u32, ..Default::default() };
         measurement.values[..values.len()].copy_from_slice(values);
         measurement
@@ -188,13 +188,13 @@ impl Measurement {
 
     /// The sensor that measured it.
     #[must_use]
-    pub fn sensor(&self) -> Sensor {
-        Sensor::ALL[self.sensor as usize % Sensor::ALL.len()]
+    pub fn sensor(&self) -> Source {
+        Source::ALL[self.sensor as usize % Source::ALL.len()]
     }
 }
 
 /// The newest measurement of each sensor that is wired: outside `None` where there is no such sensor, inside where
-/// it has not measured yet. In the order of [`Sensor::ALL`].
+/// it has not measured yet. In the order of [`Source::ALL`].
 pub type Newest = [Option<Option<Measurement>>; 4];
 
 /// Measurements that wait until no earlier one can arrive, in the order of their times.

@@ -7,7 +7,7 @@
     reason = "a trailing _W or _B names the frame a vector is written in, _WB a rotation between the two, _T the tesla"
 )]
 
-use super::history::{Measurement, Newest, Reading, Readings, Sensor};
+use super::history::{Measurement, Newest, Reading, Readings, Source};
 use super::motion::Motion;
 use super::observation::measured_attitude_WB;
 use super::params::EkfParams;
@@ -117,16 +117,16 @@ pub fn lost_covariance(params: &EkfParams) -> Covariance {
 /// The reading and the motion to begin with, if a position is known.
 #[must_use]
 pub fn start(newest: &Newest, readings: &Readings, params: &EkfParams) -> Option<(Reading, Start)> {
-    let measured = |sensor: Sensor| newest[sensor.index()].flatten();
+    let measured = |sensor: Source| newest[sensor.index()].flatten();
     if let Some(position_m) = params.initial_position_m {
         let reading = readings.newest()?;
         return Some((reading, Start::given(position_m, &reading, params)));
     }
-    if let Some(pose) = measured(Sensor::Mocap) {
+    if let Some(pose) = measured(Source::Mocap) {
         return Some((readings.at(pose.measured_ns)?, Start::at_pose(&pose, params)));
     }
-    let (fix, field) = (measured(Sensor::Gps)?, measured(Sensor::Magnetometer));
-    let has_compass = newest[Sensor::Magnetometer.index()].is_some();
+    let (fix, field) = (measured(Source::Gps)?, measured(Source::Magnetometer));
+    let has_compass = newest[Source::Magnetometer.index()].is_some();
     if has_compass && field.is_none() && params.initial_yaw_deg.is_none() {
         // It will say where north is.
         return None;

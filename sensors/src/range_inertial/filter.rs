@@ -91,7 +91,7 @@ pub struct RangeInertialState {
 
 /// What is known at a sample.
 #[derive(Clone, Copy, Debug)]
-pub struct Inputs<'a> {
+pub struct Measured<'a> {
     /// Simulation time, ns.
     pub now_ns: u64,
     /// What the IMU reads.
@@ -123,7 +123,7 @@ impl RangeInertial {
     ///
     /// # Errors
     /// A parameter or the period is outside its range.
-    pub fn new(params: RangeInertialParams, period_s: f64) -> Result<Self, ParameterError> {
+    pub fn with_period(params: RangeInertialParams, period_s: f64) -> Result<Self, ParameterError> {
         params.validate()?;
         positive("period_s", period_s)?;
         Ok(Self { params, period_s })
@@ -155,7 +155,7 @@ impl RangeInertial {
     }
 
     /// Moves `state` on to the time of `inputs`, one period after the last.
-    pub fn step(&self, state: &mut RangeInertialState, inputs: &Inputs<'_>) {
+    pub fn update(&self, state: &mut RangeInertialState, inputs: &Measured<'_>) {
         self.predict(state, inputs);
         state.remember(&inputs.attitude_WB);
         if is_new(state, inputs.ranges) {
@@ -165,7 +165,7 @@ impl RangeInertial {
         self.lose_sight(state, inputs.now_ns);
     }
 
-    fn predict(&self, state: &mut RangeInertialState, inputs: &Inputs<'_>) {
+    fn predict(&self, state: &mut RangeInertialState, inputs: &Measured<'_>) {
         let force_B = inputs.imu.specific_force_B_m_s2;
         if !force_B.iter().all(|axis| axis.is_finite()) {
             return;
@@ -194,7 +194,7 @@ impl RangeInertial {
         -level_W / self.params.attitude_time_constant_s
     }
 
-    fn correct(&self, state: &mut RangeInertialState, inputs: &Inputs<'_>) {
+    fn correct(&self, state: &mut RangeInertialState, inputs: &Measured<'_>) {
         let age_ns = inputs.now_ns.saturating_sub(inputs.ranges.measured_ns);
         let age_s = age_ns as f64 * 1e-9;
         let Some(past) = state.past(age_s / self.period_s) else { return };

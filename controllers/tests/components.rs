@@ -1,8 +1,14 @@
-//! What the kinds of controller and the pilot accept and refuse before a start, and that the documentation says so.
+//! What the controllers and the pilot accept and refuse before a start, and that the documentation says so.
 
 use bus::Registration;
 use bus::context::NodeContext;
-use controllers::{cascade, pid, pilot, velocity, wall_follow, wall_stop};
+use controllers::cascade::CascadeLaw;
+use controllers::controller::Controller;
+use controllers::pid::PidLaw;
+use controllers::pilot::Pilot;
+use controllers::velocity::VelocityLaw;
+use controllers::wall_follow::WallFollowLaw;
+use controllers::wall_stop::WallStopLaw;
 use serde_json::{Value, json};
 
 const VEHICLE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../vehicles/hummingbird.toml");
@@ -11,18 +17,18 @@ fn gains(name: &str) -> String {
     format!("{}/gains/{name}.toml", env!("CARGO_MANIFEST_DIR"))
 }
 
-/// Each kind with parameters that it accepts.
+/// Each component with parameters that it accepts.
 fn accepted() -> [(Registration, Value); 6] {
     [
-        (Registration::of_kind(&pid::KIND), json!({ "vehicle": VEHICLE })),
-        (Registration::of_kind(&cascade::KIND), json!({ "vehicle": VEHICLE })),
-        (Registration::of_kind(&velocity::KIND), json!({ "vehicle": VEHICLE, "altitude_m": 1.5 })),
-        (Registration::of_kind(&wall_stop::KIND), json!({ "vehicle": VEHICLE, "altitude_m": 1.5 })),
+        (Registration::of::<Controller<PidLaw>>(), json!({ "vehicle": VEHICLE })),
+        (Registration::of::<Controller<CascadeLaw>>(), json!({ "vehicle": VEHICLE })),
+        (Registration::of::<Controller<VelocityLaw>>(), json!({ "vehicle": VEHICLE, "altitude_m": 1.5 })),
+        (Registration::of::<Controller<WallStopLaw>>(), json!({ "vehicle": VEHICLE, "altitude_m": 1.5 })),
         (
-            Registration::of_kind(&wall_follow::KIND),
+            Registration::of::<Controller<WallFollowLaw>>(),
             json!({ "vehicle": VEHICLE, "altitude_m": 1.5, "mode": "constant" }),
         ),
-        (Registration::of::<pilot::Pilot>(), json!({ "initial_altitude_m": 1.0 })),
+        (Registration::of::<Pilot>(), json!({ "initial_altitude_m": 1.0 })),
     ]
 }
 
