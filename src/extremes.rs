@@ -230,9 +230,9 @@ fn no_number_of_shipped_gains_brings_a_law_down() {
         if kind.name == "wall-follow" {
             parameters["mode"] = "constant".into();
         }
-        assert_eq!((kind.check)(&parameters, &NodeContext::new("node", &[])), Ok(()));
+        assert_eq!(kind.check(&parameters, &NodeContext::new("node", &[])), Ok(()));
         let (_, refused) = try_all(&folder, &file, stride(2), || {
-            (kind.check)(&parameters, &NodeContext::new("node", &[]))
+            kind.check(&parameters, &NodeContext::new("node", &[]))
                 .map_err(|error| error.to_string())
                 .map_err(|words| if words.contains(".toml:") { words } else { format!("{file}: {words}") })
         });

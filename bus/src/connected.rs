@@ -2,12 +2,11 @@
 
 use crate::announcement::{self, Announcement};
 use crate::error::BusError;
-use crate::handles::{Declared, RawInput};
+use crate::handles::Declared;
 use crate::host_time::{monotonic_ns, process_cpu_ns};
 use crate::links::Links;
 use crate::lockstep::{Need, Phase, SlotState, TransferOutcome, Waited};
 use crate::membership::Membership;
-use crate::message::Message;
 use crate::plan::InputPlan;
 use crate::port::{InPort, OutPort, Source};
 use crate::profile::TickWriter;
@@ -22,7 +21,7 @@ const RETIREMENT_NAP: Duration = Duration::from_millis(1);
 
 /// A node whose ports are connected.
 #[derive(Debug)]
-pub struct ConnectedNode {
+pub(crate) struct ConnectedNode {
     inputs: Vec<InPort>,
     outputs: Vec<OutPort>,
     announcements: Vec<Announcement>,
@@ -116,46 +115,18 @@ impl ConnectedNode {
         Ok(())
     }
 
-    /// Topic name and announced type of a raw input.
-    #[must_use]
-    pub fn announcement(&self, input: RawInput) -> (&str, &Announcement) {
-        self.announced(input.index)
-    }
-
     /// Topic name and announced type of input `input`.
     pub(crate) fn announced(&self, input: usize) -> (&str, &Announcement) {
         let topic = self.links.node.inputs[input].topic;
         (&self.links.plan.topics[topic].name, &self.announcements[input])
     }
 
-    /// Computes `step` at every due tick until the run ends, or until a successor has taken over.
+    /// Computes `step` at every due tick until the run ends, or until another process has taken over. The state, a
+    /// message of `schema`, is transferred to it if that knows the same type, and to one that is started after a crash.
     ///
     /// # Errors
     /// If a step fails, a due output stays unwritten, a sample is lost, or the run is aborted.
-    pub fn run<E: Display>(
-        self,
-        mut step: impl FnMut(&mut Tick<'_>) -> Result<(), E>,
-    ) -> Result<(), BusError> {
-        self.run_with_state_of(None, &mut [], |tick, _| step(tick))
-    }
-
-    /// As [`ConnectedNode::run`], for a node that remembers something from tick to tick: `state` is handed
-    /// over to a successor that knows the same type, and to one that is started after a crash.
-    ///
-    /// # Errors
-    /// As [`ConnectedNode::run`].
-    pub fn run_with_state<S: Message, E: Display>(
-        self,
-        mut state: S,
-        mut step: impl FnMut(&mut Tick<'_>, &mut S) -> Result<(), E>,
-    ) -> Result<(), BusError> {
-        self.run_with_state_of(Some(S::SCHEMA), bytemuck::bytes_of_mut(&mut state), |tick, state| {
-            step(tick, bytemuck::from_bytes_mut(state))
-        })
-    }
-
-    /// The same with a state that is a message of `schema`; none where that is `None`.
-    pub(crate) fn run_with_state_of<E: Display>(
+    pub(crate) fn run<E: Display>(
         mut self,
         schema: Option<&'static Schema>,
         state: &mut [u8],

@@ -23,12 +23,6 @@ impl<T> Clone for Input<T> {
 }
 impl<T> Copy for Input<T> {}
 
-/// Handle of an input whose messages are read as bytes.
-#[derive(Clone, Copy, Debug)]
-pub struct RawInput {
-    pub(crate) index: usize,
-}
-
 /// Handle of an output whose messages are `T`.
 #[derive(Debug)]
 pub struct Output<T> {

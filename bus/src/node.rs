@@ -4,7 +4,7 @@ use crate::announcement::{self, Announcement};
 use crate::claim;
 use crate::connected::ConnectedNode;
 use crate::error::BusError;
-use crate::handles::{Declared, Input, Output, RawInput, Wiring};
+use crate::handles::{Declared, Input, Output, Wiring};
 use crate::join::Join;
 use crate::links::Links;
 use crate::lockstep::{NodeView, Phase, SlotState};
@@ -201,23 +201,6 @@ impl Node {
         error()
     }
 
-    /// Declares every input the manifest wires as one of `T`, in the order of their names. An input that was declared
-    /// before is refused when the node connects.
-    pub fn every_input<T: Message>(&mut self) -> Vec<Input<T>> {
-        let ports =
-            self.declare_all(Declared::Typed(T::SCHEMA), |node, index| node.node.inputs[index].port.clone());
-        ports.into_iter().flatten().map(|index| Input::new(index)).collect()
-    }
-
-    /// Declares every input the manifest wires, to be read as bytes, in the order of their topics' names. As
-    /// [`Node::every_input`].
-    pub fn raw_inputs(&mut self) -> Vec<RawInput> {
-        let ports = self.declare_all(Declared::Raw, |node, index| {
-            node.plan.topics[node.node.inputs[index].topic].name.clone()
-        });
-        ports.into_iter().flatten().map(|index| RawInput { index }).collect()
-    }
-
     /// Declares every input, in the order of what `key` gives of them.
     fn declare_all(
         &mut self,
@@ -306,7 +289,7 @@ impl Node {
     ///
     /// # Errors
     /// If a port of the manifest was not declared or declared twice, two sides disagree on a layout, or the run is aborted.
-    pub fn connect(mut self) -> Result<ConnectedNode, BusError> {
+    pub(crate) fn connect(mut self) -> Result<ConnectedNode, BusError> {
         self.fault.take().map_or(Ok(()), Err)?;
         self.require_all_declared()?;
         let claim = claim::claim(&self.run_dir, &process_name(self.name(), self.generation))?;
@@ -394,21 +377,11 @@ impl Node {
     ///
     /// # Errors
     /// As [`Node::connect`] and [`ConnectedNode::run`].
-    pub fn run<E: Display>(self, step: impl FnMut(&mut Tick<'_>) -> Result<(), E>) -> Result<(), BusError> {
-        self.connect()?.run(step)
-    }
-
-    /// As [`Node::run`], for a node that remembers something from tick to tick: `state` is handed over to a
-    /// successor that knows the same type.
-    ///
-    /// # Errors
-    /// As [`Node::connect`] and [`ConnectedNode::run`].
-    pub fn run_with_state<S: Message, E: Display>(
+    pub fn run<E: Display>(
         self,
-        state: S,
-        step: impl FnMut(&mut Tick<'_>, &mut S) -> Result<(), E>,
+        mut step: impl FnMut(&mut Tick<'_>) -> Result<(), E>,
     ) -> Result<(), BusError> {
-        self.connect()?.run_with_state(state, step)
+        self.connect()?.run(None, &mut [], |tick, _| step(tick))
     }
 }
 
@@ -535,11 +508,9 @@ mod tests {
         assert!(words.contains("declares its input `command` twice") && words.contains(both), "{words}");
 
         // Where the declaration returns no error, or nobody looks at it, connecting does.
-        let late: [fn(&mut Node); 4] = [
+        let late: [fn(&mut Node); 2] = [
             |node| drop(node.input::<PlantState>("command")),
             |node| assert!(node.optional_input::<PlantState>("command").is_none()),
-            |node| drop(node.every_input::<PlantState>()),
-            |node| drop(node.raw_inputs()),
         ];
         for declare in late {
             let mut sink = open("sink");

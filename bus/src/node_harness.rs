@@ -7,7 +7,7 @@ use crate::message::{CDR_START, cdr_bytes};
 use crate::messages::Time;
 use crate::plan::{NodePlan, Plan};
 use crate::ports::{InputSamples, Inputs, OutputSamples, PortSpec};
-use crate::registration::{Make, Registration, Stepper};
+use crate::registration::{Registration, Stepper};
 use crate::sample_memory::SampleMemory;
 use crate::schema::Schema;
 use diagnostics::ParameterError;
@@ -121,10 +121,7 @@ fn make(component: &Registration, plan: &Plan, node: &NodePlan) -> Result<Box<dy
         .naming(&outputs)
         .timed(plan.tick_ns, node.period_ticks, plan.duration_ticks)
         .seeded(plan.seed);
-    match component.make {
-        Make::Component(make) => make(&node.parameters, &context),
-        Make::Kind(_) => Err(ParameterError::conflict("", "it is not a type yet")),
-    }
+    (component.make)(&node.parameters, &context)
 }
 
 /// The inputs of the node, in the order in which the component declares them.

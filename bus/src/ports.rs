@@ -18,20 +18,6 @@ pub struct PortSpec {
     pub required: bool,
 }
 
-impl PortSpec {
-    /// A port that must be wired.
-    #[must_use]
-    pub const fn required(name: &'static str, schema: &'static Schema) -> Self {
-        Self { name, doc: "", schema, required: true }
-    }
-
-    /// A port that may be left out; an optional output exists only where the manifest names it.
-    #[must_use]
-    pub const fn optional(name: &'static str, schema: &'static Schema) -> Self {
-        Self { name, doc: "", schema, required: false }
-    }
-}
-
 /// Which inputs a component has.
 #[derive(Clone, Copy, Debug)]
 pub enum Inputs {

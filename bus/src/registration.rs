@@ -3,8 +3,6 @@
 use crate::announcement::Announcement;
 use crate::component::{Component, Info, Role, State, StepError, Transfer};
 use crate::context::{NodeContext, StepContext};
-use crate::error::BusError;
-use crate::kind::NodeKind;
 use crate::ports::{InputPorts, InputSamples, Inputs, OutputPorts, OutputSamples, PortSpec};
 use crate::schema::Schema;
 use diagnostics::ParameterError;
@@ -25,20 +23,12 @@ pub struct Registration {
     pub outputs: &'static [PortSpec],
     /// What happens to its state when another process takes its place.
     pub transfer: Transfer,
-    /// Checks the parameters and the files that they name for a node, without running it.
-    pub check: fn(&Value, &NodeContext<'_>) -> Result<(), ParameterError>,
+    check: fn(&Value, &NodeContext<'_>) -> Result<(), ParameterError>,
     pub(crate) make: Make,
 }
 
 /// Makes a component.
-pub(crate) type MakeComponent = fn(&Value, &NodeContext<'_>) -> Result<Box<dyn Stepper>, ParameterError>;
-
-/// How a component is made.
-#[derive(Clone, Copy, Debug)]
-pub(crate) enum Make {
-    Component(MakeComponent),
-    Kind(fn() -> Result<(), BusError>),
-}
+pub(crate) type Make = fn(&Value, &NodeContext<'_>) -> Result<Box<dyn Stepper>, ParameterError>;
 
 impl Registration {
     /// The component `C`.
@@ -53,8 +43,16 @@ impl Registration {
             outputs: C::Outputs::DECLARED,
             transfer: C::State::TRANSFER,
             check: |parameters, context| make::<C>(parameters, context)?.rehearse(context),
-            make: Make::Component(|parameters, context| Ok(Box::new(make::<C>(parameters, context)?))),
+            make: |parameters, context| Ok(Box::new(make::<C>(parameters, context)?)),
         }
+    }
+
+    /// Checks `parameters` and the files that they name for a node, without running it.
+    ///
+    /// # Errors
+    /// What cannot be meant.
+    pub fn check(&self, parameters: &Value, context: &NodeContext<'_>) -> Result<(), ParameterError> {
+        (self.check)(parameters, context)
     }
 
     /// Bytes of its state.
@@ -73,14 +71,6 @@ impl Registration {
             Inputs::Any => (&[] as &[_], None),
         };
         inputs.iter().chain(self.outputs).map(|port| port.schema).chain(one)
-    }
-
-    /// A component that is not a type yet.
-    #[must_use]
-    pub const fn of_kind(kind: &NodeKind) -> Self {
-        let NodeKind { name, summary, inputs, outputs, check, run } = *kind;
-        let (role, transfer) = (Role::Compute, Transfer::Nothing);
-        Self { name, summary, role, inputs, outputs, transfer, check, make: Make::Kind(run) }
     }
 }
 

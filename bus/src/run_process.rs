@@ -10,7 +10,7 @@ use crate::join::Join;
 use crate::node::Node;
 use crate::port::{InPort, OutPort};
 use crate::ports::{InputSamples, OutputSamples, SampleSink, SampleSource};
-use crate::registration::{Make, MakeComponent, Registration, Stepper};
+use crate::registration::{Make, Registration, Stepper};
 use crate::tick::Tick;
 
 /// Runs the component `C` as the node that the launcher started this process for: the whole `main` of an executable
@@ -28,13 +28,9 @@ impl Registration {
     /// # Errors
     /// If the manifest and the component do not fit, a step fails, or the run is aborted.
     pub fn run(&self, join: Join) -> Result<(), BusError> {
-        let make = match self.make {
-            Make::Component(make) => make,
-            Make::Kind(run) => return run(),
-        };
         let mut node = Node::open(join)?;
         let wiring = node.declare(self)?;
-        let mut component = made(make, &node)?;
+        let mut component = made(self.make, &node)?;
         let name = node.name().to_owned();
         let failed =
             |error: StepError| BusError::Parameters { node: name.clone(), reason: error.to_string() };
@@ -64,12 +60,12 @@ impl Registration {
             Transfer::Nothing | Transfer::Internal => None,
         };
         let state = &mut bytemuck::cast_slice_mut(state)[..self.state_bytes()];
-        connected.run_with_state_of(schema, state, |tick, state| step(component, wiring, tick, state))
+        connected.run(schema, state, |tick, state| step(component, wiring, tick, state))
     }
 }
 
 /// The component, made for the node.
-fn made(make: MakeComponent, node: &Node) -> Result<Box<dyn Stepper>, BusError> {
+fn made(make: Make, node: &Node) -> Result<Box<dyn Stepper>, BusError> {
     let (inputs, outputs) = node.port_names();
     let context = NodeContext::new(node.name(), &inputs)
         .naming(&outputs)

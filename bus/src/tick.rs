@@ -1,7 +1,7 @@
 //! One computation of a node: what it reads and writes at a tick.
 
 use crate::error::BusError;
-use crate::handles::{Input, Output, RawInput};
+use crate::handles::{Input, Output};
 use crate::message::{Message, view, view_mut};
 use crate::port::{InPort, OutPort};
 
@@ -48,25 +48,6 @@ impl Tick<'_> {
     #[must_use]
     pub fn host_times_ns<T: Message>(&self, input: Input<T>) -> [u64; 3] {
         self.inputs[input.index].host_times_ns()
-    }
-
-    /// The newest sample of a raw input as CDR bytes with its sequence number, if it was sent at this tick.
-    #[must_use]
-    pub fn fresh(&self, input: RawInput) -> Option<(&[u8], u64)> {
-        self.inputs[input.index].fresh(self.tick)
-    }
-
-    /// The same of the process that shadows the publisher of this input.
-    #[must_use]
-    pub fn fresh_shadow(&self, input: RawInput) -> Option<(&[u8], u64)> {
-        self.inputs[input.index].fresh_shadow(self.tick)
-    }
-
-    /// The last message that the predecessor of this process sent on `output`, at the tick of the take-over
-    /// and only where no state was handed over: the command to go on from without a jump.
-    #[must_use]
-    pub fn predecessor<T: Message>(&self, output: Output<T>) -> Option<&T> {
-        self.predecessor.get(output.index)?.sample().map(view)
     }
 
     /// Whether `output` is due at this tick.

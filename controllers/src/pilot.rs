@@ -134,7 +134,7 @@ mod tests {
         let step = |at_s: f64| serde_json::json!({"kind": "step", "channel": "altitude", "at_s": at_s, "to": 2.0, "unit": "m"});
         let parameters = serde_json::json!({"initial_altitude_m": 1.0, "set_points": [step(0.5), step(1.0)]});
         let run = NodeContext::new("node", &[]).timed(1_000_000, 1, 1000);
-        assert_eq!((Registration::of::<Pilot>().check)(&parameters, &run), Ok(()));
+        assert_eq!(Registration::of::<Pilot>().check(&parameters, &run), Ok(()));
         let warnings = run.into_warnings();
         assert!(warnings.len() == 1 && warnings[0].message.contains("set point 1"), "{warnings:?}");
     }
@@ -147,7 +147,8 @@ mod tests {
             serde_json::json!({"initial_altitude_m": -100_000.0}),
             serde_json::json!({"initial_altitude_m": 1.0, "set_points": [step]}),
         ] {
-            let words = (Registration::of::<Pilot>().check)(&parameters, &NodeContext::new("node", &[]))
+            let words = Registration::of::<Pilot>()
+                .check(&parameters, &NodeContext::new("node", &[]))
                 .unwrap_err()
                 .to_string();
             assert!(words.contains("-20 000 m to 20 000 m") && words.contains("00000 m"), "{words}");

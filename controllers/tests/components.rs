@@ -42,17 +42,14 @@ fn with(parameters: &Value, key: &str, value: Value) -> Value {
 #[test]
 fn every_kind_flies_with_its_own_gains_file() {
     for (kind, parameters) in accepted() {
-        (kind.check)(&parameters, &NodeContext::new("node", &[])).unwrap();
+        kind.check(&parameters, &NodeContext::new("node", &[])).unwrap();
         if kind.name != "pilot" {
-            (kind.check)(
-                &with(&parameters, "gains", json!(gains(kind.name))),
-                &NodeContext::new("node", &[]),
-            )
-            .unwrap();
+            kind.check(&with(&parameters, "gains", json!(gains(kind.name))), &NodeContext::new("node", &[]))
+                .unwrap();
         }
     }
     let [(pid, parameters), ..] = accepted();
-    (pid.check)(&with(&parameters, "gains", json!(gains("pid-thesis"))), &NodeContext::new("node", &[]))
+    pid.check(&with(&parameters, "gains", json!(gains("pid-thesis"))), &NodeContext::new("node", &[]))
         .unwrap();
 }
 
@@ -61,7 +58,7 @@ fn the_gains_file_of_another_law_is_refused_by_name_and_place() {
     for (kind, parameters) in accepted().into_iter().take(5) {
         let other = if kind.name == "cascade" { "pid" } else { "cascade" };
         let outcome =
-            (kind.check)(&with(&parameters, "gains", json!(gains(other))), &NodeContext::new("node", &[]));
+            kind.check(&with(&parameters, "gains", json!(gains(other))), &NodeContext::new("node", &[]));
         // A velocity file may hold the cascade's tables alone.
         if kind.name != "velocity" {
             let error = outcome.unwrap_err().to_string();
@@ -100,7 +97,7 @@ fn impossible_parameters_are_refused_by_their_key() {
         (pilot, with(&hold, "data", json!("no-such.csv")), "no-such.csv"),
     ];
     for (kind, parameters, key) in cases {
-        let error = (kind.check)(&parameters, &NodeContext::new("node", &[])).unwrap_err().to_string();
+        let error = kind.check(&parameters, &NodeContext::new("node", &[])).unwrap_err().to_string();
         assert!(error.contains(key), "{} with {parameters}: {error}", kind.name);
     }
 }
@@ -109,19 +106,19 @@ fn impossible_parameters_are_refused_by_their_key() {
 fn a_velocity_comes_from_a_reference_or_from_parameters_and_never_from_both() {
     let [_, _, (velocity, fly), ..] = accepted();
     let vehicle_only = json!({ "vehicle": VEHICLE });
-    (velocity.check)(&vehicle_only, &NodeContext::new("node", &["estimate", "reference"])).unwrap();
+    velocity.check(&vehicle_only, &NodeContext::new("node", &["estimate", "reference"])).unwrap();
     let error =
-        (velocity.check)(&vehicle_only, &NodeContext::new("node", &["estimate"])).unwrap_err().to_string();
+        velocity.check(&vehicle_only, &NodeContext::new("node", &["estimate"])).unwrap_err().to_string();
     assert!(error.starts_with("missing field `altitude_m`"), "{error}");
-    let error = (velocity.check)(&fly, &NodeContext::new("node", &["estimate", "reference"]))
-        .unwrap_err()
-        .to_string();
+    let error =
+        velocity.check(&fly, &NodeContext::new("node", &["estimate", "reference"])).unwrap_err().to_string();
     assert!(error.contains("`altitude_m`") && error.contains("`reference`"), "{error}");
 }
 
 /// The parameters that a kind's refusal of an unknown one names as known.
 fn known(kind: &Registration, parameters: &Value) -> Vec<String> {
-    let error = (kind.check)(&with(parameters, "unknown_key", json!(1)), &NodeContext::new("node", &[]))
+    let error = kind
+        .check(&with(parameters, "unknown_key", json!(1)), &NodeContext::new("node", &[]))
         .unwrap_err()
         .to_string();
     let list = error.split("unknown field `unknown_key`").nth(1).unwrap_or_else(|| panic!("{error}"));

@@ -130,7 +130,7 @@ mod tests {
             "backend": "rapier",
         });
         parameters.as_object_mut().unwrap().extend(more.as_object().unwrap().clone());
-        (Registration::of::<Plant>().check)(&parameters, &NodeContext::new("plant", ports))
+        Registration::of::<Plant>().check(&parameters, &NodeContext::new("plant", ports))
     }
 
     #[test]

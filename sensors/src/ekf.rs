@@ -179,7 +179,8 @@ mod tests {
     use serde_json::json;
 
     fn refused(parameters: &serde_json::Value, inputs: &[&str]) -> Option<String> {
-        (Registration::of::<Ekf>().check)(parameters, &NodeContext::new("ekf", inputs))
+        Registration::of::<Ekf>()
+            .check(parameters, &NodeContext::new("ekf", inputs))
             .err()
             .map(|error| error.to_string())
     }

@@ -17,6 +17,7 @@ mod run;
 mod schema;
 mod shadow;
 mod steer;
+mod table;
 mod top;
 mod validate;
 
@@ -24,6 +25,7 @@ use anyhow::Result;
 use clap::{Parser, Subcommand};
 use output::{say, words};
 use std::process::ExitCode;
+use table::commands;
 
 /// A vehicle simulation as independent processes in deterministic lockstep.
 #[derive(Parser)]
@@ -31,25 +33,6 @@ use std::process::ExitCode;
 struct Cli {
     #[command(subcommand)]
     command: Command,
-}
-
-/// Makes the commands of a table: their names and help, what they take, and the function that does it; it returns false
-/// for exit code 1.
-macro_rules! commands {
-    ($($(#[$help:meta])* $name:ident($arguments:ty) => $function:path;)*) => {
-        #[derive(Subcommand)]
-        enum Command {
-            $($(#[$help])* $name($arguments),)*
-        }
-
-        impl Command {
-            fn run(&self) -> Result<bool> {
-                match self {
-                    $(Self::$name(arguments) => $function(arguments),)*
-                }
-            }
-        }
-    };
 }
 
 commands! {

@@ -107,7 +107,7 @@ pub fn set(
             .naming(&outputs)
             .timed(run.tick_ns, node.period_ticks, run.duration_ticks)
             .seeded(run.seed);
-        (kind.check)(&parameters, &context).map_err(|error| refused(manifest, member, &error))?;
+        kind.check(&parameters, &context).map_err(|error| refused(manifest, member, &error))?;
         for warning in context.into_warnings() {
             let at = place(member, &warning.key);
             if !(warning.is_behind_end && notes.is_cut(manifest, &at)) {

@@ -1,0 +1,90 @@
+//! The law `level`: holds height and attitude by proportional-derivative control, with nothing to remember.
+#![allow(non_snake_case, reason = "a trailing _B names the frame a vector is written in, _N the newton")]
+
+use crate::airframe::{ControlledVehicle, HoverModel};
+use crate::allocation::RotorWrench;
+use crate::control::{ControlInput, ControlOutput, HoverMotion};
+use crate::law::{Law, Predecessor, Start, VehicleFile};
+use crate::law_inputs::SetPointInputs;
+use bus::component::Info;
+use bus::context::NodeContext;
+use bus::messages::Time;
+use diagnostics::ParameterError;
+use diagnostics::parameter::positive;
+use nalgebra::Vector3;
+use serde::Deserialize;
+use std::path::{Path, PathBuf};
+
+/// Parameters of the law.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Parameters {
+    /// Vehicle file.
+    vehicle: PathBuf,
+    /// Bandwidth of the loops of height and attitude, rad/s.
+    bandwidth_rad_s: f64,
+}
+
+impl VehicleFile for Parameters {
+    fn vehicle(&self) -> &Path {
+        &self.vehicle
+    }
+}
+
+/// The law: critically damped loops.
+#[derive(Debug)]
+pub struct LevelLaw {
+    model: HoverModel,
+    bandwidth_rad_s: f64,
+}
+
+/// It remembers nothing; a state has a field all the same.
+#[derive(Debug, Clone, Copy, Default, bus::Message)]
+#[repr(C)]
+#[message(type_name = "hummingbus_msgs/msg/LevelState")]
+pub struct LevelState {
+    /// Zero.
+    stamp: Time,
+}
+
+impl Law for LevelLaw {
+    const INFO: Info = Info::new("level", "holds height and attitude by proportional-derivative control");
+    type Parameters = Parameters;
+    type Inputs<'a> = SetPointInputs<'a>;
+    type State = LevelState;
+
+    fn new(
+        parameters: &Parameters,
+        craft: &ControlledVehicle,
+        _: &NodeContext<'_>,
+    ) -> Result<Self, ParameterError> {
+        positive("bandwidth_rad_s", parameters.bandwidth_rad_s)?;
+        Ok(Self { model: craft.hover_model(), bandwidth_rad_s: parameters.bandwidth_rad_s })
+    }
+
+    fn rate_gain_1_s(&self) -> f64 {
+        2.0 * self.bandwidth_rad_s
+    }
+
+    fn start(&self, _: &ControlInput) -> Start<LevelState> {
+        Start { state: LevelState::default(), wrench: RotorWrench::default() }
+    }
+
+    fn take_over(&self, from: &Predecessor<'_, LevelState>, _: &ControlInput) -> Start<LevelState> {
+        Start { state: LevelState::default(), wrench: from.wrench }
+    }
+
+    fn step(&self, _: &mut LevelState, _: &RotorWrench, input: &ControlInput) -> ControlOutput {
+        let (asked, found) = (&input.set_point, HoverMotion::of(&input.motion));
+        let [stiffness, damping] = [self.bandwidth_rad_s * self.bandwidth_rad_s, 2.0 * self.bandwidth_rad_s];
+        let climb_m_s2 = stiffness * (asked.altitude_m - found.altitude_m) - damping * found.climb_rate_m_s;
+        let tilt_rad = Vector3::new(found.roll_rad, found.pitch_rad, found.yaw_rad);
+        let asked_rad = Vector3::new(asked.roll_rad, asked.pitch_rad, asked.yaw_rad);
+        let turn_B_rad_s2 = stiffness * (asked_rad - tilt_rad) - damping * found.angular_velocity_B_rad_s;
+        let wrench = RotorWrench {
+            thrust_N: self.model.mass_kg * (self.model.gravity_m_s2 + climb_m_s2),
+            torque_B_N_m: self.model.inertia_B_kg_m2.component_mul(&turn_B_rad_s2),
+        };
+        ControlOutput { wrench, set_point: *asked, ..ControlOutput::default() }
+    }
+}

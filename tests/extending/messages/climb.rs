@@ -1,0 +1,16 @@
+//! How fast a vehicle rises.
+
+use super::Time;
+use bus::Message;
+
+/// What a variometer reads.
+#[derive(Clone, Copy, Debug, Default, Message)]
+#[repr(C)]
+#[message(type_name = "hummingbus_msgs/msg/Climb")]
+pub struct Climb {
+    /// Simulation time.
+    pub stamp: Time,
+    /// Rate of climb.
+    #[field(unit = "m/s", frame = "world")]
+    pub rate: f64,
+}

@@ -1,0 +1,87 @@
+//! The variometer: the rate of climb, behind a lag, with white noise.
+
+use bus::component::{Component, Info, StepError};
+use bus::context::{NodeContext, StepContext};
+use bus::messages::{Climb, PlantState};
+use bus::random::{Stream, normal, stream};
+use bus::{InputPorts, Message, OutputPorts};
+use diagnostics::ParameterError;
+use diagnostics::parameter::{not_negative, positive};
+use serde::Deserialize;
+
+/// What the variometer makes of the truth. Tuned, no source.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Parameters {
+    /// Time constant of the lag, s.
+    lag_s: f64,
+    /// Standard deviation of the noise, m/s.
+    #[serde(default)]
+    noise_m_s: f64,
+}
+
+/// What it reads.
+#[derive(Debug, InputPorts)]
+pub struct Inputs<'a> {
+    /// The truth.
+    pub state: &'a PlantState,
+}
+
+/// What it sends.
+#[derive(Debug, OutputPorts)]
+pub struct Outputs {
+    /// The reading.
+    pub climb: Climb,
+}
+
+/// What it remembers.
+#[derive(Debug, Clone, Copy, Default, Message)]
+#[repr(C)]
+#[message(type_name = "hummingbus_msgs/msg/VariometerState")]
+pub struct State {
+    /// The reading behind the lag.
+    #[field(unit = "m/s", frame = "world")]
+    rate: f64,
+}
+
+/// A variometer.
+#[derive(Debug)]
+pub struct Variometer {
+    /// The part of a change that a reading follows in one period.
+    followed: f64,
+    noise_m_s: f64,
+    random: Stream,
+}
+
+impl Component for Variometer {
+    const INFO: Info = Info::new("variometer", "rate of climb with lag and noise");
+    type Parameters = Parameters;
+    type Inputs<'a> = Inputs<'a>;
+    type Outputs = Outputs;
+    type State = State;
+
+    fn new(parameters: Parameters, context: &NodeContext<'_>) -> Result<Self, ParameterError> {
+        positive("lag_s", parameters.lag_s)?;
+        not_negative("noise_m_s", parameters.noise_m_s)?;
+        let followed = 1.0 - libm::exp(-context.period_s() / parameters.lag_s);
+        let random = stream(context.seed, context.name);
+        Ok(Self { followed, noise_m_s: parameters.noise_m_s, random })
+    }
+
+    fn initial(&self) -> State {
+        State::default()
+    }
+
+    fn step(
+        &mut self,
+        context: &StepContext<'_>,
+        inputs: Inputs<'_>,
+        state: &mut State,
+    ) -> Result<Outputs, StepError> {
+        state.rate += self.followed * (inputs.state.velocity.z - state.rate);
+        // A place in the stream for each tick: what was drawn need not be remembered.
+        self.random.set_word_pos(u128::from(context.tick()) << 8);
+        let rate = state.rate + self.noise_m_s * normal(&mut self.random);
+        Ok(Outputs { climb: Climb { rate, ..Default::default() } })
+    }
+}

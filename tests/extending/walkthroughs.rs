@@ -1,0 +1,73 @@
+//! docs/extending.md: its diffs fit the tree, and their new files are those that are compiled here.
+
+use std::path::{Path, PathBuf};
+
+fn root() -> PathBuf {
+    env!("CARGO_MANIFEST_DIR").into()
+}
+
+/// A file of a diff: its path, whether it is new, and its hunks' lines with their marks.
+struct Change {
+    path: String,
+    is_new: bool,
+    hunks: Vec<Vec<String>>,
+}
+
+/// The changes in the ```diff blocks of `text`.
+fn changes(text: &str) -> Vec<Change> {
+    let mut changes: Vec<Change> = Vec::new();
+    let (mut in_block, mut is_new) = (false, false);
+    for line in text.lines() {
+        match line {
+            "```diff" => in_block = true,
+            "```" => in_block = false,
+            _ if !in_block => {}
+            "--- /dev/null" => is_new = true,
+            _ if line.starts_with("--- a/") => is_new = false,
+            _ if line.starts_with("+++ b/") => {
+                changes.push(Change { path: line[6..].to_owned(), is_new, hunks: Vec::new() });
+            }
+            _ if line.starts_with("@@") => changes.last_mut().unwrap().hunks.push(Vec::new()),
+            _ => changes.last_mut().unwrap().hunks.last_mut().unwrap().push(line.to_owned()),
+        }
+    }
+    changes
+}
+
+/// The lines of a hunk that are there before it, or after it.
+fn side(hunk: &[String], mark: char) -> String {
+    let of_side = hunk.iter().filter(|line| line.starts_with([' ', mark]) || line.is_empty());
+    of_side.map(|line| format!("{}\n", line.get(1..).unwrap_or_default())).collect()
+}
+
+/// Where the file of a walk-through is compiled: its name in this folder or one below.
+fn compiled(path: &str) -> Option<String> {
+    let name = Path::new(path).file_name()?;
+    let folders = ["", "messages", "effects/catalogue", "cli"];
+    let files = folders.map(|folder| root().join("tests/extending").join(folder).join(name));
+    files.iter().find_map(|file| std::fs::read_to_string(file).ok())
+}
+
+#[test]
+fn every_diff_of_the_page_fits_the_tree_and_every_new_file_is_compiled_as_it_stands() {
+    let page = std::fs::read_to_string(root().join("docs/extending.md")).unwrap();
+    let changes = changes(&page);
+    assert_eq!(
+        changes.iter().filter(|change| change.is_new).count(),
+        5,
+        "a sensor, a law, an effect, a message, a command"
+    );
+    for Change { path, is_new, hunks } in &changes {
+        if *is_new {
+            assert!(!root().join(path).exists(), "{path} is in the tree already");
+            assert_eq!(compiled(path).as_deref(), Some(&*side(&hunks[0], '+')), "{path}");
+            continue;
+        }
+        let text = std::fs::read_to_string(root().join(path)).unwrap();
+        for hunk in hunks {
+            let before = side(hunk, '-');
+            assert_eq!(text.matches(&before).count(), 1, "{path} has not once:\n{before}");
+            assert!(hunk.iter().any(|line| line.starts_with('+')), "{path}: a hunk adds nothing");
+        }
+    }
+}
