@@ -12,6 +12,8 @@ mod states;
 mod supervisor_view;
 mod wait;
 mod wake;
+#[cfg(test)]
+mod wake_model;
 
 pub(crate) use clock_view::ClockView;
 pub use live_view::LiveView;

@@ -6,7 +6,7 @@
 //!
 //! Both sides store, and then load what the other side stores; between the two stands a fence. All parties see the
 //! fences in one order. If the reader's comes later, the reader finds the new count and does not sleep; if the writer's
-//! does, the writer finds what the reader sleeps for.
+//! does, the writer finds what the reader sleeps for. `wake_model.rs` explores the orders in which this can happen.
 
 use std::sync::atomic::AtomicU32;
 use std::sync::atomic::Ordering::{self, Acquire, Relaxed, Release};
