@@ -452,3 +452,29 @@ fn a_filter_that_is_told_a_wrong_start_finds_its_way() {
     );
     assert_eq!(refused, 20);
 }
+
+/// The least eigenvalue of the covariance, scaled to ones on its diagonal, over a flight; and whether it is symmetric.
+fn conditioning(timings: &[Timing]) -> (f64, bool) {
+    let flight = fly(excited, [0.0, 0.0, 5.0], SECONDS * 1000);
+    let (mut least, mut is_symmetric) = (f64::INFINITY, true);
+    run(&flight, timings, (EkfParams::default(), EkfParams::default()), 1, |sample| {
+        if sample.number % 100 == 99 && sample.state.has_begun() {
+            let covariance = sample.filter.covariance(sample.state);
+            let sigma = covariance.diagonal().map(f64::sqrt);
+            let scaled = covariance.component_div(&(sigma * sigma.transpose()));
+            least = least.min(scaled.symmetric_eigenvalues().min());
+            is_symmetric &= covariance == covariance.transpose();
+        }
+    });
+    (least, is_symmetric)
+}
+
+/// Why the update of the covariance needs no Joseph's form: docs/decisions/011 has an hour of it.
+#[test]
+fn the_covariance_stays_well_conditioned() {
+    for (timings, expected) in [(&[MOCAP][..], 0.03), (&OUTDOORS, 5e-5)] {
+        let (least, is_symmetric) = conditioning(timings);
+        println!("least eigenvalue {least}");
+        assert!(least > expected && is_symmetric, "{least}");
+    }
+}

@@ -27,6 +27,7 @@ use super::start::{lost_covariance, start};
 use super::transition::{Covariance, STATES, Transition, symmetric};
 use bus::Message;
 use diagnostics::parameter::{ParameterError, positive, require};
+use nalgebra::SMatrix;
 
 /// The covariance is carried over spans of at most this, since noise acts through the attitude in longer ones.
 const SPAN_MAX_NS: u64 = 20_000_000;
@@ -288,7 +289,7 @@ impl Ekf {
         state.refused_in_row[index] = 0;
         let gain = cross * spread.inverse();
         state.settled.correct(&(gain * observed.innovation));
-        state.covariance = flat(&symmetric(&(covariance - gain * cross.transpose())));
+        state.covariance = flat(&reduced(&covariance, &gain, &cross));
         state.updates[index] += 1;
     }
 
@@ -341,6 +342,15 @@ impl EkfState {
     }
 }
 
+/// The covariance after an update: the short form, for which docs/decisions/011 has the figures.
+fn reduced<const N: usize>(
+    covariance: &Covariance,
+    gain: &SMatrix<f64, STATES, N>,
+    cross: &SMatrix<f64, STATES, N>,
+) -> Covariance {
+    symmetric(&(covariance - gain * cross.transpose()))
+}
+
 /// How many standard deviations a chi-square of `degrees` of freedom is from what it is on average: its cube root
 /// is nearly normal (Wilson and Hilferty, "The distribution of chi-square", PNAS 17, 1931).
 #[must_use]
@@ -352,4 +362,45 @@ pub fn deviation(chi_square: f64, degrees: usize) -> f64 {
 
 fn flat(covariance: &Covariance) -> [f64; STATES * STATES] {
     std::array::from_fn(|index| covariance[index])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::ekf::history::Measurement;
+
+    /// The covariance after a second of hover under motion capture.
+    fn settled(params: EkfParams) -> (Motion, Covariance) {
+        let filter = Ekf::with_period(params, 1e-3).unwrap();
+        let mut state = filter.initial_state();
+        for tick in 0..1000 {
+            let time_ns = tick * 1_000_000;
+            let specific_force = [0.0, 0.0, params.gravity_m_s2].into();
+            let reading = Reading { time_ns, specific_force, angular_velocity: Default::default() };
+            let pose = Measurement::new(Source::Mocap, time_ns / 10_000_000 * 10_000_000, &POSE);
+            filter.update_to(&mut state, &reading, &[None, Some(Some(pose)), None, None]);
+        }
+        assert_eq!(state.updates()[Source::Mocap.index()], 100);
+        (state.settled, state.covariance())
+    }
+
+    const POSE: [f64; 7] = [1.0, 2.0, 3.0, 0.0, 0.0, 0.0, 1.0];
+
+    #[test]
+    fn the_short_form_of_the_update_is_josephs() {
+        let params = EkfParams::default();
+        let (motion, covariance) = settled(params);
+        let pose = Measurement::new(Source::Mocap, 0, &POSE);
+        let observed = observation::mocap(&motion, &pose, &params);
+        let cross = covariance * observed.jacobian.transpose();
+        let noise = SMatrix::<f64, 6, 6>::from_diagonal(&observed.variance);
+        let gain = cross * (observed.jacobian * cross + noise).cholesky().unwrap().inverse();
+        let left = Covariance::identity() - gain * observed.jacobian;
+        let joseph = left * covariance * left.transpose() + gain * noise * gain.transpose();
+        let short = reduced(&covariance, &gain, &cross);
+        let sigma = joseph.diagonal().map(f64::sqrt);
+        let worst = (short - joseph).component_div(&(sigma * sigma.transpose())).amax();
+        assert!(worst < 1e-12, "{worst}");
+        assert!(short[(0, 0)] < covariance[(0, 0)]);
+    }
 }
