@@ -29,9 +29,8 @@ pub use content::{
 
 use crate::problem::Problem;
 use crate::registry::Registry;
-use diagnostics::nearest;
 use serde::Deserialize;
-use sources::{Origin, Sources};
+use sources::{Origin, Sources, refused};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use toml::Spanned;
@@ -169,28 +168,13 @@ fn content(sources: &Sources, tree: DeTable<'_>) -> Result<Content, Problem> {
     })
 }
 
-/// The problem behind an error of the TOML reader.
-fn refused(sources: &Sources, error: &toml::de::Error) -> Problem {
-    let span = error.span().unwrap_or(0..0);
-    sources.problem(&span, error.message().trim(), help_for(error.message()))
-}
-
-fn help_for(message: &str) -> String {
-    let mut quoted = message.split('`').skip(1).step_by(2);
-    let found = quoted.next().unwrap_or_default();
-    match message.starts_with("unknown field").then(|| nearest(found, quoted)).flatten() {
-        Some(known) => format!("did you mean `{known}`?"),
-        None => "docs/manifest.md lists every key".to_owned(),
-    }
-}
-
 /// Everything that the sources say, with sets expanded and successors made whole.
 fn whole_tree(sources: &Sources) -> Result<DeTable<'_>, Problem> {
     // In every file, also where another one's number takes the place of what is none.
     sources.files().try_for_each(|file| finite::require(&sources.table(file)?, "", sources))?;
     let mut tree = include::merged(sources)?;
     let (late, early): (Vec<_>, Vec<_>) =
-        sources.overrides()?.into_iter().partition(overrides::Override::is_of_an_expanded_process);
+        overrides::all(sources)?.into_iter().partition(overrides::Override::is_of_an_expanded_process);
     early.into_iter().try_for_each(|change| change.apply(&mut tree, sources))?;
     sets::expand(&mut tree, sources)?;
     late.into_iter().try_for_each(|change| change.apply(&mut tree, sources))?;

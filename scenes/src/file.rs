@@ -1,20 +1,13 @@
 //! Which keys a scene file has, and in which dimension.
 
-use crate::rig;
+use crate::rig::{self, PLACE};
 use crate::scene::{Cuboid, Scene};
 use diagnostics::parameter::Bounds;
 use diagnostics::unit::{ANGLE, LENGTH};
 use nalgebra::Vector3;
+use std::path::Path;
 use vehicles::reader::{Document, Section};
 use vehicles::{Faults, VehicleError};
-
-/// Where things of a scene stand.
-pub(crate) const PLACE: Bounds = Bounds {
-    min: -1e6,
-    max: 1e6,
-    unit: "m",
-    why: "beyond 1000 km the ground is not flat, and contacts of a double lose their micrometres",
-};
 
 /// Lengths of a box.
 const SIZE: Bounds = Bounds {
@@ -27,8 +20,30 @@ const SIZE: Bounds = Bounds {
 /// Ten turns.
 const YAW: Bounds = Bounds { min: -63.0, max: 63.0, unit: "rad", why: "ten turns, in case of a wrong unit" };
 
+impl Scene {
+    /// Reads and checks a scene file.
+    ///
+    /// # Errors
+    /// What is wrong with the file, and where.
+    pub fn load(path: &Path) -> Result<Self, VehicleError> {
+        let file = path.display().to_string();
+        match vehicles::text::read(path) {
+            Ok(text) => Self::parse(&text, &file),
+            Err(cause) => Err(VehicleError::Unreadable { file, cause }),
+        }
+    }
+
+    /// Reads and checks the text of a scene file; `file_name` is for messages only.
+    ///
+    /// # Errors
+    /// What is wrong with the text, and where.
+    pub fn parse(text: &str, file_name: &str) -> Result<Self, VehicleError> {
+        parse(text, file_name)
+    }
+}
+
 /// Reads the whole file; see `scenes/room.toml` for the layout.
-pub(crate) fn parse(text: &str, file_name: &str) -> Result<Scene, VehicleError> {
+fn parse(text: &str, file_name: &str) -> Result<Scene, VehicleError> {
     let doc = Document::new(file_name, text);
     let tree = doc.tree()?;
     let root = Section::new(&doc, String::new(), 0..0, tree.get_ref());

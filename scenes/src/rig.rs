@@ -1,7 +1,6 @@
 //! A test rig: the vehicle hangs from a ball joint that limits its tilt, and that may slide up and down.
 #![allow(non_snake_case, reason = "a trailing _W or _B names the frame a vector is written in, N the newton")]
 
-use crate::file::PLACE;
 use diagnostics::parameter::Bounds;
 use diagnostics::unit::{ANGLE, FORCE, LENGTH, LINEAR_DAMPING, MASS, ROTARY_DAMPING, TORQUE};
 use nalgebra::Vector3;
@@ -30,6 +29,14 @@ pub struct Rig {
     /// Force of its viscous friction per speed.
     pub slide_damping_N_s_m: f64,
 }
+
+/// Where things of a scene stand.
+pub(crate) const PLACE: Bounds = Bounds {
+    min: -1e6,
+    max: 1e6,
+    unit: "m",
+    why: "beyond 1000 km the ground is not flat, and contacts of a double lose their micrometres",
+};
 
 /// Where the vehicle is mounted, seen from its centre of mass.
 const MOUNT: Bounds = Bounds {

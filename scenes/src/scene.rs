@@ -3,8 +3,7 @@
 
 use crate::rig::Rig;
 use nalgebra::Vector3;
-use std::path::Path;
-use vehicles::{EffectEntry, VehicleError};
+use vehicles::EffectEntry;
 
 /// What stands around the vehicles, beside the ground at z = 0.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -30,26 +29,4 @@ pub struct Cuboid {
     pub half_extents_m: Vector3<f64>,
     /// How far its x axis is turned from that of the world, counter-clockwise from above.
     pub yaw_rad: f64,
-}
-
-impl Scene {
-    /// Reads and checks a scene file.
-    ///
-    /// # Errors
-    /// What is wrong with the file, and where.
-    pub fn load(path: &Path) -> Result<Self, VehicleError> {
-        let file = path.display().to_string();
-        match vehicles::text::read(path) {
-            Ok(text) => Self::parse(&text, &file),
-            Err(cause) => Err(VehicleError::Unreadable { file, cause }),
-        }
-    }
-
-    /// Reads and checks the text of a scene file; `file_name` is for messages only.
-    ///
-    /// # Errors
-    /// What is wrong with the text, and where.
-    pub fn parse(text: &str, file_name: &str) -> Result<Self, VehicleError> {
-        crate::file::parse(text, file_name)
-    }
 }

@@ -17,9 +17,33 @@ use diagnostics::unit::{
 /// How far a published tensor may miss the triangle inequality through rounding, relative to its size.
 const TRIANGLE_SLACK: f64 = 1e-9;
 
+impl Vehicle {
+    /// Reads and checks a vehicle file.
+    pub fn load(path: &Path) -> Result<Self, VehicleError> {
+        let file = path.display().to_string();
+        match crate::text::read(path) {
+            Ok(text) => Self::parse(&text, &file),
+            Err(cause) => Err(VehicleError::Unreadable { file, cause }),
+        }
+    }
+
+    /// Reads and checks the text of a vehicle file; `file_name` is for messages, and the path of its `base` is
+    /// relative to it.
+    pub fn parse(text: &str, file_name: &str) -> Result<Self, VehicleError> {
+        parse(text, file_name)
+    }
+
+    /// The file that the vehicle file at `path` adds effects to, if it names one.
+    pub fn base(path: &Path) -> Option<PathBuf> {
+        let text = crate::text::read(path).ok()?;
+        let table: toml::Table = text.parse().ok()?;
+        Some(beside(path, table.get("base")?.as_str()?))
+    }
+}
+
 /// Reads the whole file; see `vehicles/hummingbird.toml` for the layout. A file with a `base` has that file's
 /// vehicle, and its effects before its own.
-pub(crate) fn parse(text: &str, file_name: &str) -> Result<Vehicle, VehicleError> {
+fn parse(text: &str, file_name: &str) -> Result<Vehicle, VehicleError> {
     let doc = Document::new(file_name, text);
     let tree = doc.tree()?;
     let root = Section::new(&doc, String::new(), 0..0, tree.get_ref());
@@ -30,7 +54,7 @@ pub(crate) fn parse(text: &str, file_name: &str) -> Result<Vehicle, VehicleError
 }
 
 /// The path that a file at `path` calls `other`.
-pub(crate) fn beside(path: &Path, other: &str) -> PathBuf {
+fn beside(path: &Path, other: &str) -> PathBuf {
     path.parent().unwrap_or(Path::new("")).join(other)
 }
 

@@ -2,13 +2,10 @@
 //!
 //! Body frame B: x forward, y left, z up, origin at the centre of mass. World frame W: z up.
 
-use std::path::{Path, PathBuf};
-
 use nalgebra::{Matrix3, Vector3};
 
 use crate::command::CommandMap;
 use crate::effects::EffectEntry;
-use crate::error::VehicleError;
 use crate::provenance::Provenance;
 
 /// A quadrotor, in SI units.
@@ -90,28 +87,6 @@ pub enum MotorModel {
 }
 
 impl Vehicle {
-    /// Reads and checks a vehicle file.
-    pub fn load(path: &Path) -> Result<Self, VehicleError> {
-        let file = path.display().to_string();
-        match crate::text::read(path) {
-            Ok(text) => Self::parse(&text, &file),
-            Err(cause) => Err(VehicleError::Unreadable { file, cause }),
-        }
-    }
-
-    /// Reads and checks the text of a vehicle file; `file_name` is for messages, and the path of its `base` is
-    /// relative to it.
-    pub fn parse(text: &str, file_name: &str) -> Result<Self, VehicleError> {
-        crate::file::parse(text, file_name)
-    }
-
-    /// The file that the vehicle file at `path` adds effects to, if it names one.
-    pub fn base(path: &Path) -> Option<PathBuf> {
-        let text = crate::text::read(path).ok()?;
-        let table: toml::Table = text.parse().ok()?;
-        Some(crate::file::beside(path, table.get("base")?.as_str()?))
-    }
-
     /// The rotor speed at which four equal thrusts carry the weight: sqrt(m g / (4 c_T)), in rad/s.
     /// Infinite for a vehicle whose rotors make no thrust.
     pub fn hover_speed_rad_s(&self) -> f64 {

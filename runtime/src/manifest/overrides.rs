@@ -19,6 +19,11 @@ pub struct Override<'s> {
     value: Spanned<DeValue<'s>>,
 }
 
+/// All values given with `--set`, in their order.
+pub fn all(sources: &Sources) -> Result<Vec<Override<'_>>, Problem> {
+    sources.overrides().map(|source| Override::parse(source, sources)).collect()
+}
+
 impl<'s> Override<'s> {
     /// Reads a `--set`.
     pub fn parse(source: &'s Source, sources: &Sources) -> Result<Self, Problem> {
@@ -166,7 +171,7 @@ mod tests {
         sources.add(Origin::File("a.toml".into()), text.to_owned());
         sources.add(Origin::Override, change.to_owned());
         let mut table = sources.table(&sources.all()[0]).unwrap();
-        let changes = sources.overrides().map_err(|problem| problem.to_string())?;
+        let changes = super::all(&sources).map_err(|problem| problem.to_string())?;
         for change in changes {
             change.apply(&mut table, &sources).map_err(|problem| problem.to_string())?;
         }

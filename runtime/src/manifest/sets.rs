@@ -4,8 +4,8 @@
 //! the topic `/plant/state` to `/h1/plant/state` where its own processes publish that, and leaves it alone
 //! where not.
 
-use super::sources::Sources;
-use super::{refused, tree};
+use super::sources::{Sources, refused};
+use super::tree;
 use crate::problem::Problem;
 use crate::registry::Registry;
 use diagnostics::nearest;

@@ -1,9 +1,9 @@
 //! The texts a manifest is made of, laid end to end: one offset names a place in any of them.
 
-use super::overrides::Override;
 use super::tree;
 use crate::problem::Problem;
 use crate::registry::Registry;
+use diagnostics::nearest;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use toml::Spanned;
@@ -93,16 +93,14 @@ impl Sources {
         self.all.iter().skip(1).filter_map(file).collect()
     }
 
-    /// Every `--set`, in the order in which they were given.
-    pub fn overrides(&self) -> Result<Vec<Override<'_>>, Problem> {
-        let overrides = self.all.iter().filter(|source| matches!(source.origin, Origin::Override));
-        overrides.map(|source| Override::parse(source, self)).collect()
+    /// The values given with `--set`.
+    pub fn overrides(&self) -> impl Iterator<Item = &Source> {
+        self.all.iter().filter(|source| matches!(source.origin, Origin::Override))
     }
 
     /// Their texts.
     pub fn override_texts(&self) -> impl Iterator<Item = &String> {
-        let overrides = self.all.iter().filter(|source| matches!(source.origin, Origin::Override));
-        overrides.map(|source| &source.text)
+        self.overrides().map(|source| &source.text)
     }
 
     /// Whether the place `offset` lies in a `--set`.
@@ -170,6 +168,21 @@ impl Sources {
 
     fn at(&self, offset: usize) -> &Source {
         &self.all[self.all.partition_point(|source| source.base <= offset).saturating_sub(1)]
+    }
+}
+
+/// The problem behind an error of the TOML reader.
+pub fn refused(sources: &Sources, error: &toml::de::Error) -> Problem {
+    let span = error.span().unwrap_or(0..0);
+    sources.problem(&span, error.message().trim(), help_for(error.message()))
+}
+
+fn help_for(message: &str) -> String {
+    let mut quoted = message.split('`').skip(1).step_by(2);
+    let found = quoted.next().unwrap_or_default();
+    match message.starts_with("unknown field").then(|| nearest(found, quoted)).flatten() {
+        Some(known) => format!("did you mean `{known}`?"),
+        None => "docs/manifest.md lists every key".to_owned(),
     }
 }
 
