@@ -54,8 +54,11 @@ pub struct EffectKind {
     /// Effects that look like it, and how to tell them apart. Each pair stands with one of the two.
     pub confounded_with: &'static [Confounder],
     /// What must be true of the vehicle that it acts on; in words if it is not.
-    pub require: Option<fn(&Vehicle) -> Result<(), &'static str>>,
+    pub require: Option<Requirement>,
 }
+
+/// A condition on the vehicle that an effect acts on; the error says what it is in words.
+pub type Requirement = fn(&Vehicle) -> Result<(), &'static str>;
 
 /// One parameter of an effect.
 #[derive(Debug)]
