@@ -287,7 +287,7 @@ proptest! {
         air_W_m_s in vector(30.0),
         commands in prop::array::uniform4(-10.0..250.0),
     ) {
-        for (kind, vehicle) in CATALOGUE.into_iter().flat_map(|kind| [(kind, hummingbird()), (kind, crazyflie())]) {
+        for (kind, vehicle) in CATALOGUE.iter().flat_map(|kind| [(kind, hummingbird()), (kind, crazyflie())]) {
             let effect = between_bounds(kind, &shares);
             let answer = answer(&effect, &FlightCondition::new(&vehicle, &state, &air_W_m_s));
             prop_assert!(answer.iter().all(|number| number.is_finite()), "{}: {answer:?}", kind.name);

@@ -181,9 +181,9 @@ fn an_abort_wakes_a_sleeper_whatever_it_waits_for() {
 /// How far a writer comes that is killed while it advances a sequence.
 #[derive(Clone, Copy)]
 enum Death {
-    BeforeItStores,
-    BeforeItLooks,
-    BeforeItWakes,
+    BeforeStore,
+    BeforeLook,
+    BeforeWake,
 }
 
 /// A writer dies, a reader sleeps for it, and the supervisor, which notices, raises the epoch.
@@ -196,9 +196,9 @@ fn writer_dies(death: Death) {
     let writer = {
         let waiter = waiter.clone();
         thread::spawn(move || match death {
-            Death::BeforeItStores => {}
-            Death::BeforeItLooks => sequence.store(1, Release),
-            Death::BeforeItWakes => {
+            Death::BeforeStore => {}
+            Death::BeforeLook => sequence.store(1, Release),
+            Death::BeforeWake => {
                 sequence.store(1, Release);
                 Fenced::fence();
                 if waiter.load(Relaxed) <= 1 {
@@ -215,7 +215,7 @@ fn writer_dies(death: Death) {
 
 #[test]
 fn three_parties_the_next_epoch_wakes_whom_a_dead_writer_left_asleep() {
-    for death in [Death::BeforeItStores, Death::BeforeItLooks, Death::BeforeItWakes] {
+    for death in [Death::BeforeStore, Death::BeforeLook, Death::BeforeWake] {
         model(move || writer_dies(death));
     }
 }
