@@ -88,14 +88,17 @@ fn rouse<W: Word>(waiter: &W) {
 
 /// Sleeps on `waiter` until `sequence` has reached `count`, if it has not yet and the wait is not over; it may return
 /// early, so the caller looks again.
+///
+/// Both changes of the waiter are swaps: beside a system call they cost nothing, and the model can follow them over
+/// several counts, while of plain stores it lets a writer see its own older swap.
 pub(super) fn sleep<W: Word>(sequence: &W, count: u32, waiter: &W, is_over: impl Fn() -> bool) {
-    waiter.store(count, Relaxed);
+    waiter.swap(count, Relaxed);
     W::fence();
     if sequence.load(Acquire) < count && !is_over() {
         waiter.sleep(count, None);
     }
-    // Nothing is ordered by this store: a writer that misses it wakes somebody who is awake.
-    waiter.store(AWAKE, Relaxed);
+    // Nothing is ordered by this: a writer that misses it wakes somebody who is awake.
+    waiter.swap(AWAKE, Relaxed);
 }
 
 /// Wakes everybody, so that they look at what was stored before. A process that died may have noted that it wakes

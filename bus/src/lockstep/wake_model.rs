@@ -178,16 +178,16 @@ fn an_abort_wakes_a_sleeper_whatever_it_waits_for() {
     });
 }
 
-/// How far a writer comes that is killed while it advances a sequence.
+/// The last that a writer does that is killed while it advances a sequence.
 #[derive(Clone, Copy)]
-enum Death {
-    BeforeStore,
-    BeforeLook,
-    BeforeWake,
+enum LastStep {
+    None,
+    Store,
+    Look,
 }
 
 /// A writer dies, a reader sleeps for it, and the supervisor, which notices, raises the epoch.
-fn writer_dies(death: Death) {
+fn writer_dies(last: LastStep) {
     let (sequence, waiter, epoch) = (Fenced::new(0), Fenced::new(AWAKE), Fenced::new(0));
     let reader = {
         let (sequence, waiter, epoch) = (sequence.clone(), waiter.clone(), epoch.clone());
@@ -195,10 +195,10 @@ fn writer_dies(death: Death) {
     };
     let writer = {
         let waiter = waiter.clone();
-        thread::spawn(move || match death {
-            Death::BeforeStore => {}
-            Death::BeforeLook => sequence.store(1, Release),
-            Death::BeforeWake => {
+        thread::spawn(move || match last {
+            LastStep::None => {}
+            LastStep::Store => sequence.store(1, Release),
+            LastStep::Look => {
                 sequence.store(1, Release);
                 Fenced::fence();
                 if waiter.load(Relaxed) <= 1 {
@@ -215,8 +215,8 @@ fn writer_dies(death: Death) {
 
 #[test]
 fn three_parties_the_next_epoch_wakes_whom_a_dead_writer_left_asleep() {
-    for death in [Death::BeforeStore, Death::BeforeLook, Death::BeforeWake] {
-        model(move || writer_dies(death));
+    for last in [LastStep::None, LastStep::Store, LastStep::Look] {
+        model(move || writer_dies(last));
     }
 }
 
@@ -279,4 +279,18 @@ fn no_tick_is_granted_in_a_hold_and_whoever_lifts_it_is_heard() {
 #[should_panic(expected = "a tick was granted in a hold")]
 fn without_the_fences_a_tick_is_granted_in_a_hold() {
     loom::model(hold_and_grant::<false>);
+}
+
+/// A reader waits twice. More than four preemptions find nothing more and take seconds.
+#[test]
+fn two_parties_two_counts() {
+    let mut exploration = loom::model::Builder::new();
+    exploration.preemption_bound = Some(4);
+    exploration.check(|| {
+        let (sequence, waiter) = (Fenced::new(0), Fenced::new(AWAKE));
+        let (sent, reader) = (sequence.clone(), waiter.clone());
+        let sender = thread::spawn(move || (1..=2).for_each(|count| advance(&*sent, count, [&*reader])));
+        (1..=2).for_each(|count| wait(&sequence, count, &waiter, || false));
+        sender.join().unwrap();
+    });
 }
