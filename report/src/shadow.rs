@@ -8,7 +8,7 @@ use serde::Serialize;
 use std::collections::BTreeMap;
 use std::fmt;
 
-use runtime::succession::Report;
+use runtime::replacement::Report;
 
 /// The difference between a field of a shadow topic and the same field of the topic itself, over all ticks
 /// that have both.

@@ -4,7 +4,7 @@ use crate::judge::{Verdict, WindowErrors};
 use crate::shadow::{Difference, Step};
 use runtime::launcher::Outcome;
 use runtime::problem::Problem;
-use runtime::succession::{Purpose, Report};
+use runtime::replacement::{Purpose, Report};
 use serde::Serialize;
 use std::fmt;
 use std::path::PathBuf;

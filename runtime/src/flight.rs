@@ -1,6 +1,6 @@
 //! What the processes of a run noted, and what follows from it with the plan.
 
-use crate::succession::Report;
+use crate::replacement::Report;
 use bus::BusError;
 use bus::plan::{InputPlan, Plan};
 use bus::profile::{Grant, GrantReader, TickReader, TickTimes};

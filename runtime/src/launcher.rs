@@ -10,19 +10,23 @@ use crate::graph::Graph;
 use crate::host::Host;
 use crate::manifest::Manifest;
 use crate::outputs::Outputs;
+use crate::overseer::Overseer;
 use crate::processes::Processes;
+use crate::replacement::{Replacements, Report};
 use crate::run_dir::RunDir;
-use crate::succession::{Report, Successions};
 use crate::supervision::{Supervisor, Timing};
 use crate::supervisor::State;
+use crate::view::View;
 use crate::watch_clock::WatchClock;
 use anyhow::{Context, Result, bail};
 use bus::lockstep::SupervisorView;
 use bus::plan::Plan;
 use recorder::reader::Recording;
+use std::collections::BTreeSet;
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, channel};
+use std::time::Duration;
 
 /// What is known about a run when it is over.
 #[derive(Debug)]
@@ -145,14 +149,21 @@ impl<'a> Launcher<'a> {
         };
         // Dropped behind the supervisor, which ends the processes.
         let descendants = self.adopts_orphans.then(|| Descendants::of_run(dir));
+        let view = View::of(plan, &control, BTreeSet::new(), [Duration::ZERO; 2]);
         let mut supervisor = Supervisor {
             plan,
             control: &control,
             processes: Processes::new(self.host, control.clone()),
             companions: Companions::new(&exe, dir, &clock),
             clock: &clock,
-            successions: Successions::new(plan, &control, dir, &clock, &graph.programs, &graph.successors),
-            state: State::Starting,
+            spent: vec![(0, 0); plan.nodes.len()],
+            overseer: Overseer {
+                plan,
+                state: State::Starting,
+                replacements: Replacements::new(plan, view, &graph.programs, &graph.successors),
+                notes: Vec::new(),
+                has_answered: false,
+            },
             desk: Desk::open(dir, plan, &control, self.remote, self.requests)?,
             swaps: Vec::new(),
             requests: 0,
@@ -167,8 +178,8 @@ impl<'a> Launcher<'a> {
         };
         supervisor.fly()?;
         supervisor.tell_progress();
-        let mut outcome = outcome(plan, &control, &supervisor.successions);
-        outcome.successions = supervisor.successions.into_reports();
+        let mut outcome = outcome(plan, &control, &supervisor);
+        outcome.successions = supervisor.overseer.replacements.into_reports();
         if plan.profile {
             outcome.flight = Some(Flight::open(plan, dir, outcome.ticks, &outcome.successions)?);
         }
@@ -222,14 +233,14 @@ fn prepare(manifest: &Manifest, graph: &mut Graph, recording: Option<&Path>, run
     Ok(())
 }
 
-fn outcome(plan: &Plan, control: &SupervisorView, successions: &Successions<'_>) -> Outcome {
+fn outcome(plan: &Plan, control: &SupervisorView, supervisor: &Supervisor<'_>) -> Outcome {
     let (start_ns, end_ns) = control.host_span_ns();
     let host_s = end_ns.saturating_sub(start_ns) as f64 * 1e-9;
     let share = |cpu_ns: u64| if host_s > 0.0 { cpu_ns as f64 * 1e-9 / host_s } else { 0.0 };
     let clock = ("clock".to_owned(), share(control.clock_cpu_ns()), 0);
     let nodes = plan.nodes.iter().enumerate();
     let nodes = nodes.map(|(index, node)| {
-        let (cpu_ns, late) = successions.spent(index);
+        let (cpu_ns, late) = supervisor.spent_by(index);
         (node.name.clone(), share(cpu_ns), late)
     });
     Outcome {

@@ -14,6 +14,7 @@ pub mod launcher;
 pub mod manifest;
 pub mod output_file;
 pub mod outputs;
+mod overseer;
 mod placement;
 pub mod problem;
 mod process_log;
@@ -21,12 +22,15 @@ mod process_table;
 mod processes;
 pub mod program;
 pub mod registry;
+pub mod replacement;
 pub mod run_dir;
+#[cfg(test)]
+mod simulation;
 mod spawn;
 mod stall;
-pub mod succession;
 mod supervision;
 mod supervisor;
+mod view;
 mod watch_clock;
 
 use bus::{BusError, Join};

@@ -1,7 +1,7 @@
 //! A run that stands still: because of whom, and what the others wait for.
 
 use crate::processes::{Processes, Role};
-use crate::succession::Successions;
+use crate::replacement::Replacements;
 use bus::lockstep::{Phase, SlotState, SupervisorView};
 use bus::plan::{Pace, Plan};
 use std::time::Duration;
@@ -29,23 +29,28 @@ impl Culprit {
 pub fn culprit(
     plan: &Plan,
     control: &SupervisorView,
-    successions: &Successions<'_>,
+    replacements: &Replacements<'_>,
     processes: &Processes,
 ) -> Option<Culprit> {
     match control.phase() {
-        Phase::Announcing => Some(not_ready(plan, control, successions, Phase::Connecting)),
-        Phase::Connecting => Some(not_ready(plan, control, successions, Phase::Running)),
+        Phase::Announcing => Some(not_ready(plan, control, replacements, Phase::Connecting)),
+        Phase::Connecting => Some(not_ready(plan, control, replacements, Phase::Running)),
         Phase::Running if control.awaits_clock() => Some(Culprit::Clock),
         Phase::Running if control.held_at().is_some() => None,
         Phase::Running if control.completed_ticks() >= control.end_tick() => not_left(processes),
-        Phase::Running => not_computing(plan, control, successions, processes),
+        Phase::Running => not_computing(plan, control, replacements, processes),
     }
 }
 
 /// The first whose time is over of those that have not joined; the clock where all have.
-fn not_ready(plan: &Plan, control: &SupervisorView, successions: &Successions<'_>, phase: Phase) -> Culprit {
+fn not_ready(
+    plan: &Plan,
+    control: &SupervisorView,
+    replacements: &Replacements<'_>,
+    phase: Phase,
+) -> Culprit {
     let late = (0..plan.nodes.len()).filter(|&node| !control.is_ready(node, phase));
-    late.min_by_key(|&node| successions.program_of(node, 0).watchdog)
+    late.min_by_key(|&node| replacements.program_of(node, 0).watchdog)
         .map_or(Culprit::Clock, |node| Culprit::Node(node, 0))
 }
 
@@ -53,16 +58,16 @@ fn not_ready(plan: &Plan, control: &SupervisorView, successions: &Successions<'_
 fn not_computing(
     plan: &Plan,
     control: &SupervisorView,
-    successions: &Successions<'_>,
+    replacements: &Replacements<'_>,
     processes: &Processes,
 ) -> Option<Culprit> {
     let stuck = |&(node, generation): &(usize, u32)| {
         let member = plan.slot(node, generation);
         control.slot_state(member) == SlotState::Taken
             && processes.lives(node, generation)
-            && control.can_compute(plan, member, successions.inputs(node, generation))
+            && control.can_compute(plan, member, replacements.inputs(node, generation))
     };
-    let members = successions.members().filter(stuck);
+    let members = replacements.members().filter(stuck);
     let slowest = members.min_by_key(|&(node, generation)| control.done(plan.slot(node, generation)));
     slowest.map(|(node, generation)| Culprit::Node(node, generation))
 }
@@ -93,7 +98,7 @@ pub fn deadline(plan: &Plan, control: &SupervisorView) -> Duration {
 pub fn describe(
     control: &SupervisorView,
     plan: &Plan,
-    successions: &Successions<'_>,
+    replacements: &Replacements<'_>,
     culprit: Option<Culprit>,
     stood: Duration,
 ) -> String {
@@ -113,14 +118,14 @@ pub fn describe(
         (Phase::Running, Some(Culprit::Clock)) => {
             format!("tick {} is not granted by `clock`", control.granted_ticks())
         }
-        (Phase::Running, _) => describe_stuck(control, plan, successions),
+        (Phase::Running, _) => describe_stuck(control, plan, replacements),
     };
     format!("the run stood still for {:.1} s: {waiting}", stood.as_secs_f64())
 }
 
 /// Who is awake and does not come on, and which topics the others sleep for.
-fn describe_stuck(control: &SupervisorView, plan: &Plan, successions: &Successions<'_>) -> String {
-    let members: Vec<(usize, u32, usize)> = successions
+fn describe_stuck(control: &SupervisorView, plan: &Plan, replacements: &Replacements<'_>) -> String {
+    let members: Vec<(usize, u32, usize)> = replacements
         .members()
         .map(|(node, generation)| (node, generation, plan.slot(node, generation)))
         .filter(|&(.., member)| {
@@ -132,7 +137,7 @@ fn describe_stuck(control: &SupervisorView, plan: &Plan, successions: &Successio
         _ => format!("`{}.{generation}`", plan.nodes[node].name),
     };
     let can_compute = |&&(node, generation, member): &&(usize, u32, usize)| {
-        control.can_compute(plan, member, successions.inputs(node, generation))
+        control.can_compute(plan, member, replacements.inputs(node, generation))
     };
     let mut stuck: Vec<&(usize, u32, usize)> = members.iter().filter(can_compute).collect();
     if stuck.is_empty() {
@@ -141,7 +146,7 @@ fn describe_stuck(control: &SupervisorView, plan: &Plan, successions: &Successio
     }
     let tick = stuck.iter().map(|&&(.., member)| control.completed_by(member)).min().unwrap_or(0);
     let waiting = members.iter().filter_map(|&(node, generation, member)| {
-        let topic = control.awaited_topic(plan, member, successions.inputs(node, generation))?;
+        let topic = control.awaited_topic(plan, member, replacements.inputs(node, generation))?;
         Some(format!("; {} waits for {}", name(node, generation), plan.topics[topic].name))
     });
     let stuck: Vec<String> = stuck.iter().map(|&&(node, generation, _)| name(node, generation)).collect();

@@ -8,16 +8,18 @@ use crate::descendants::Descendants;
 use crate::event::{Progress, RunEvent, StopToken};
 use crate::graph::{Graph, successor_of};
 use crate::manifest::Manifest;
+use crate::overseer::{Abort, Death, Overseer};
 use crate::processes::{Processes, Role};
 use crate::program::{OnExit, Readiness, Successor};
+use crate::replacement::{Report, Stage, take_over_stride};
 use crate::stall::{self, Culprit};
-use crate::succession::{Report, Stage, Standing, Successions, take_over_stride};
 use crate::supervisor::{Action, Event, State};
+use crate::view::{Command, View};
 use crate::watch_clock::WatchClock;
 use anyhow::{Result, anyhow};
 use bus::host_time::monotonic_ns;
-use bus::lockstep::{Phase, SupervisorView};
-use bus::plan::{NodePlan, Plan};
+use bus::lockstep::SupervisorView;
+use bus::plan::{Plan, SLOTS_PER_NODE};
 use std::path::Path;
 use std::time::Duration;
 
@@ -76,10 +78,10 @@ pub struct Supervisor<'a> {
     pub companions: Companions<'a>,
     /// The watchdogs' clock.
     pub clock: &'a WatchClock,
-    /// Who succeeds whom.
-    pub successions: Successions<'a>,
-    /// Where the run stands.
-    pub state: State,
+    /// Per node: processor time in nanoseconds, and deadlines missed, of the instances that have left.
+    pub spent: Vec<(u64, u32)>,
+    /// What follows when something ends.
+    pub overseer: Overseer<'a>,
     /// Serves requests.
     pub desk: Desk<'a>,
     /// Swaps that were asked for and have not come to their end: the request, and who asked.
@@ -107,13 +109,6 @@ pub struct Timing {
     last_change: (u32, Duration),
     logs_bounded: Duration,
     reaped: Duration,
-}
-
-/// A process that ended, or was found to hang.
-struct Death {
-    name: String,
-    role: Role,
-    words: String,
 }
 
 impl Supervisor<'_> {
@@ -151,34 +146,39 @@ impl Supervisor<'_> {
 
     /// The tick at which the clock must wait: for who joins, and for companions that are not ready.
     fn hold_tick(&self) -> u32 {
-        if self.companions.all_ready() { self.successions.hold_tick() } else { 0 }
+        if self.companions.all_ready() { self.overseer.replacements.hold_tick() } else { 0 }
     }
 
     /// Watches until all processes have ended.
     fn watch(&mut self) -> Result<()> {
-        while !self.state.is_over() {
+        while !self.overseer.state.is_over() {
             let news = self.control.notices();
             self.clock.look();
             self.processes.look()?;
             self.companions.look()?;
             self.bound_logs();
             self.reap();
+            self.see();
             self.settle_ends()?;
             self.settle_companions()?;
             self.note_interrupts()?;
             self.note_progress()?;
             self.serve_requests();
-            if self.state == State::Draining {
-                self.successions.end(&mut self.processes);
+            if self.overseer.state == State::Draining {
+                self.overseer.replacements.end();
+                self.carry_out()?;
             }
-            if let Some(node) = self.successions.too_late() {
-                self.refuse(node, "the run had passed the tick at which it was to join".to_owned())?;
-            }
+            let ended = self.overseer.note_too_late();
+            self.follow(ended)?;
             // Before it too: what is held now must stay held while somebody joins.
+            self.see();
             self.control.set_join_tick(self.hold_tick());
-            self.successions.advance(&mut self.processes)?;
+            self.see();
+            self.overseer.replacements.advance();
+            self.carry_out()?;
             self.control.set_join_tick(self.hold_tick());
-            self.note_laggards();
+            self.overseer.note_laggards();
+            self.carry_out()?;
             self.note_stall()?;
             self.tell_progress();
             self.control.wait_for_notice(news, POLL);
@@ -202,6 +202,89 @@ impl Supervisor<'_> {
         }));
     }
 
+    /// Looks at the run for the replacements.
+    fn see(&mut self) {
+        let living = self.processes.running.iter().filter(|process| process.end.is_none());
+        let living = living.filter_map(|process| match process.role {
+            Role::Node { node, generation } => Some((node, generation)),
+            Role::Clock | Role::Companion { .. } => None,
+        });
+        let times = [self.clock.now(), Duration::from_nanos(monotonic_ns())];
+        self.overseer.replacements.view = View::of(self.plan, self.control, living.collect(), times);
+    }
+
+    /// Does what the replacements want done.
+    fn carry_out(&mut self) -> Result<()> {
+        while !self.overseer.replacements.view.commands.is_empty() {
+            for command in std::mem::take(&mut self.overseer.replacements.view.commands) {
+                self.execute(command)?;
+            }
+        }
+        Ok(())
+    }
+
+    fn execute(&mut self, command: Command) -> Result<()> {
+        let (control, run_dir) = (self.control, self.run_dir);
+        match command {
+            Command::Spawn { node, generation, successor } => {
+                let name = &self.plan.nodes[node].name;
+                let stored = successor.plan.store_backup(run_dir, node, generation);
+                let started = stored.map_err(anyhow::Error::from).and_then(|()| {
+                    self.processes.start(
+                        name,
+                        Role::Node { node, generation },
+                        Some(&successor.program),
+                        run_dir,
+                    )
+                });
+                if let Err(error) = started {
+                    self.overseer.replacements.note_not_started(node, generation, &error)?;
+                }
+            }
+            Command::Kill { node, generation, message } => self.processes.kill(node, generation, message),
+            Command::RequestStop => control.request_stop(),
+            Command::Settle { node, generation } => {
+                if let Some(process) = self.processes.of(node, generation) {
+                    process.is_settled = true;
+                }
+            }
+            Command::Free { node, generation, slot } => self.free(node, generation, slot),
+            Command::Clear(slot) => control.clear_slot(slot),
+            Command::SetSlot(slot, state) => control.set_slot_state(slot, state),
+            Command::FirstTick(slot, tick) => control.set_first_tick(slot, tick),
+            Command::StartShadow(topic, tick) => control.start_shadow(topic, tick),
+            Command::Store(membership) => membership.store(run_dir)?,
+            Command::Publish(epoch) => control.set_epoch(epoch),
+        }
+        Ok(())
+    }
+
+    /// Removes what a process that has ended left behind, and frees its slot.
+    fn free(&mut self, node: usize, generation: u32, slot: usize) {
+        let (control, run_dir) = (self.control, self.run_dir);
+        let spent = &mut self.spent[node];
+        *spent = (spent.0 + control.cpu_ns(slot), spent.1 + control.late_count(slot));
+        control.clear_slot(slot);
+        let process = self.processes.of(node, generation);
+        let end = process.and_then(|process| process.end.as_ref());
+        if end.is_some_and(|end| !end.success()) {
+            // Its ports would keep their places; what cannot be removed now goes with the run.
+            let _ = bus::reap_dead(run_dir, &self.plan.run_id);
+        }
+        bus::state_transfer::remove(run_dir, self.plan, node, generation);
+        let _ = std::fs::remove_file(bus::plan::backup_path(run_dir, node, generation));
+        bus::claim::remove(run_dir, &self.plan.nodes[node].name, generation);
+        self.processes.forget(node, generation, run_dir);
+    }
+
+    /// Processor time in nanoseconds, and deadlines missed, of all instances of `node`.
+    pub fn spent_by(&self, node: usize) -> (u64, u32) {
+        let slots = (0..SLOTS_PER_NODE).map(|slot| slot * self.plan.nodes.len() + node);
+        slots.fold(self.spent[node], |sum, slot| {
+            (sum.0 + self.control.cpu_ns(slot), sum.1 + self.control.late_count(slot))
+        })
+    }
+
     /// Takes note of the end of orphans, which would otherwise stay in the table of processes for the whole run.
     fn reap(&mut self) {
         let Some(descendants) = self.descendants else { return };
@@ -220,14 +303,26 @@ impl Supervisor<'_> {
         }
     }
 
-    /// Tells the state machine what happened; an abort is left to the caller, who knows the words.
+    /// Tells the state machine what happened.
     fn tell(&mut self, event: Event) -> Result<Action> {
-        let (state, action) = self.state.after(event);
-        self.state = state;
-        if action == Action::RequestStop {
-            self.control.request_stop();
-        }
+        let action = self.overseer.tell(event);
+        self.carry_out()?;
         Ok(action)
+    }
+
+    /// Does what was decided, and ends the run if that was it.
+    fn follow<T>(&mut self, decided: Result<T, Abort>) -> Result<T> {
+        for note in std::mem::take(&mut self.overseer.notes) {
+            self.say(&note);
+        }
+        self.carry_out()?;
+        if std::mem::take(&mut self.overseer.has_answered) {
+            self.timing.last_change.1 = self.clock.now();
+        }
+        decided.or_else(|Abort(message)| {
+            self.processes.take_down(self.control)?;
+            Err(anyhow!(message))
+        })
     }
 
     fn abort(&mut self, words: String) -> Result<()> {
@@ -245,7 +340,7 @@ impl Supervisor<'_> {
             }
         }
         for (request, reply) in std::mem::take(&mut self.swaps) {
-            match self.successions.reports.iter().find(|report| report.request == Some(request)) {
+            match self.overseer.replacements.reports.iter().find(|report| report.request == Some(request)) {
                 Some(report) => reply.send(&answer(report)),
                 None => self.swaps.push((request, reply)),
             }
@@ -263,10 +358,10 @@ impl Supervisor<'_> {
         let successor = successor_of(self.manifest, self.graph, process, with).map_err(|e| e.to_string())?;
         let node = successor.node;
         self.require_claimed_log(&successor)?;
-        if self.state != State::Running {
+        if self.overseer.state != State::Running {
             return Err(format!("the run does not fly: `{process}` cannot be swapped now"));
         }
-        if self.successions.is_busy(node) {
+        if self.overseer.replacements.is_busy(node) {
             return Err(format!("`{process}` has a successor, a standby or a shadow already; one at a time"));
         }
         let shadow_ticks = shadow_ticks.unwrap_or(SHADOW_TICKS);
@@ -293,7 +388,7 @@ impl Supervisor<'_> {
             }
         }
         self.requests += 1;
-        self.successions.request_swap(successor, shadow_ticks, at_tick, self.requests);
+        self.overseer.replacements.request_swap(successor, shadow_ticks, at_tick, self.requests);
         Ok(self.requests)
     }
 
@@ -324,19 +419,10 @@ impl Supervisor<'_> {
         Ok(())
     }
 
-    fn note_gathered(&mut self) -> Result<()> {
-        if self.state == State::Gathering && self.control.phase() == Phase::Running {
-            self.tell(Event::Gathered)?;
-            if self.control.is_stop_requested() {
-                self.tell(Event::StopRequested)?;
-            }
-        }
-        Ok(())
-    }
-
     fn note_progress(&mut self) -> Result<()> {
-        self.note_gathered()?;
-        if self.state == State::Running && self.control.granted_ticks() >= self.control.end_tick() {
+        self.overseer.note_gathered();
+        self.carry_out()?;
+        if self.overseer.state == State::Running && self.control.granted_ticks() >= self.control.end_tick() {
             self.tell(Event::EndReached)?;
         }
         if self.processes.all_ended() && self.processes.running.iter().all(|process| process.is_settled) {
@@ -352,12 +438,13 @@ impl Supervisor<'_> {
             let (Some(end), false) = (&process.end, process.is_settled) else { continue };
             let succeeded = end.success() && process.verdict.is_none();
             let (name, role) = (process.name.clone(), process.role);
-            if succeeded && self.has_done_its_part(role) {
+            if succeeded && self.overseer.has_done_its_part(role) {
                 self.processes.running[index].is_settled = true;
                 continue;
             }
             let words = self.processes.running[index].post_mortem();
-            if self.settle(Death { name, role, words })?
+            let settled = self.overseer.settle(&Death { name, role, words });
+            if self.follow(settled)?
                 && let Some(process) = self.processes.running.get_mut(index)
                 && process.role == role
             {
@@ -394,174 +481,6 @@ impl Supervisor<'_> {
         Ok(())
     }
 
-    fn has_done_its_part(&self, role: Role) -> bool {
-        match role {
-            Role::Companion { .. } => true,
-            Role::Clock => self.control.completed_ticks() >= self.control.end_tick(),
-            Role::Node { node, generation } => {
-                let has_completed = self.control.has_completed(self.plan.slot(node, generation));
-                match self.successions.standing(node, generation) {
-                    Standing::Former => true,
-                    Standing::Active => has_completed,
-                    Standing::Candidate => {
-                        has_completed && self.successions.stage(node) >= Some(Stage::Shadowing)
-                    }
-                }
-            }
-        }
-    }
-
-    /// Draws the consequences of a death; false if that must wait.
-    fn settle(&mut self, death: Death) -> Result<bool> {
-        let Role::Node { node, generation } = death.role else {
-            let ticks = self.control.completed_ticks();
-            self.tell(Event::Died { policy: OnExit::Stop, is_possible: false })?;
-            self.abort(format!("{}\nThe run was aborted at tick {ticks}", death.words))?;
-            return Ok(true);
-        };
-        if self.successions.has_taken_over(node) {
-            if !self.successions.all_agree(&self.processes) {
-                return Ok(false);
-            }
-            self.successions.commit(node)?;
-        }
-        match self.successions.standing(node, generation) {
-            Standing::Former => {
-                self.successions.note_end_of_former(node, generation);
-                Ok(true)
-            }
-            Standing::Candidate if self.has_died_behind_the_end(node, generation) => {
-                self.say_died_behind_the_end(&death);
-                Ok(true)
-            }
-            Standing::Candidate => {
-                if self.successions.stage(node) > Some(Stage::Starting)
-                    && !self.successions.may_change(node, &self.processes)
-                {
-                    return Ok(false);
-                }
-                if self.tell(Event::SuccessorFailed)? == Action::Refuse {
-                    let tick = self.control.done(self.plan.slot(node, generation));
-                    let reason = match self.successions.stage(node) {
-                        Some(Stage::Starting) => format!("{} (it had not joined yet)", death.words),
-                        _ => format!("{} (it had come to tick {tick})", death.words),
-                    };
-                    self.refuse(node, reason)?;
-                }
-                Ok(true)
-            }
-            Standing::Active => self.settle_active(node, generation, &death),
-        }
-    }
-
-    /// Whether a process had completed its last tick when it died, and need not be missed by its node's policy: all that
-    /// it had to send is sent, and there is nothing left that another could do in its place.
-    fn has_died_behind_the_end(&self, node: usize, generation: u32) -> bool {
-        self.control.phase() == Phase::Running
-            && self.successions.program(node).on_exit != OnExit::Stop
-            && self.control.has_completed(self.plan.slot(node, generation))
-    }
-
-    fn say_died_behind_the_end(&mut self, death: &Death) {
-        self.say(&format!("{}\nIt had completed its last tick: the run ends without it", death.words));
-    }
-
-    fn refuse(&mut self, node: usize, reason: String) -> Result<()> {
-        let vacant = self.successions.is_vacant(node);
-        if !vacant {
-            let name = &self.plan.nodes[node].name;
-            self.say(&format!("the successor of `{name}` was refused: {reason}\n`{name}` flies on"));
-        }
-        self.successions.refuse(node, reason.clone(), &mut self.processes)?;
-        if vacant {
-            let ticks = self.control.completed_ticks();
-            self.tell(Event::Died { policy: OnExit::Stop, is_possible: false })?;
-            return self.abort(format!(
-                "{reason}\nThe run was aborted at tick {ticks}: it came in the place of a process that had died, \
-                 and completed no tick"
-            ));
-        }
-        Ok(())
-    }
-
-    fn settle_active(&mut self, node: usize, generation: u32, death: &Death) -> Result<bool> {
-        if self.successions.is_vacant(node) {
-            return Ok(true);
-        }
-        // It may have flown for a while before anybody looked.
-        self.note_gathered()?;
-        let flies = self.control.phase() == Phase::Running;
-        let on_exit = self.successions.program(node).on_exit;
-        if self.has_died_behind_the_end(node, generation) {
-            self.say_died_behind_the_end(death);
-            return Ok(true);
-        }
-        if flies && on_exit != OnExit::Stop && !self.successions.may_replace(node, &self.processes) {
-            return Ok(false);
-        }
-        let policy = match on_exit {
-            OnExit::Restart if self.successions.can_promote(node) => OnExit::Standby,
-            policy => policy,
-        };
-        let is_possible = flies
-            && match policy {
-                OnExit::Stop | OnExit::Ignore => false,
-                OnExit::Restart => self.successions.has_come_on(node),
-                OnExit::Standby => self.successions.can_promote(node),
-            };
-        let tick = self.control.completed_by(self.plan.slot(node, generation));
-        match self.tell(Event::Died { policy, is_possible })? {
-            Action::Restart => {
-                self.successions.close_early(node, &mut self.processes);
-                self.successions.postpone(node, &mut self.processes);
-                if self.successions.stage(node).is_some() {
-                    self.refuse(node, "the process it was to succeed died first".to_owned())?;
-                }
-                self.say(&format!("{}\n`{}` is restarted at tick {tick}", death.words, death.name));
-                self.successions.restart(node, &mut self.processes)?;
-            }
-            Action::Promote => {
-                self.say(&format!(
-                    "{}\nThe standby of `{}` takes over at tick {tick}",
-                    death.words, self.plan.nodes[node].name
-                ));
-                self.successions.promote(node)?;
-            }
-            _ => {
-                let why = match policy {
-                    OnExit::Stop | OnExit::Ignore => "",
-                    _ if !flies => ": the run did not fly yet",
-                    OnExit::Restart => {
-                        ": it was restarted and came to its end again without completing a tick"
-                    }
-                    OnExit::Standby => ": no standby was ready to take over",
-                };
-                let silent = silent_topics(&self.plan.nodes[node], self.plan);
-                self.abort(format!("{}\nThe run was aborted at tick {tick}{silent}{why}", death.words))?;
-            }
-        }
-        self.timing.last_change.1 = self.clock.now();
-        Ok(true)
-    }
-
-    /// Ends those that do not come up or do not leave in their time; their ends are settled like any other.
-    fn note_laggards(&mut self) {
-        if let Some((node, generation)) = self.successions.unprepared() {
-            let patience = self.successions.program_of(node, generation).watchdog.as_millis();
-            let words = format!(
-                "was killed by the watchdog: it did not join within {patience} ms; does it link `bus` and connect?"
-            );
-            self.processes.kill(node, generation, Some(words));
-        }
-        if let Some((node, generation)) = self.successions.lingering(&self.processes) {
-            self.processes.kill(
-                node,
-                generation,
-                Some("was killed by the watchdog: it did not leave".to_owned()),
-            );
-        }
-    }
-
     /// Looks whether the run stands still, and because of whom.
     fn note_stall(&mut self) -> Result<()> {
         let ticks = self.control.completed_ticks();
@@ -569,19 +488,19 @@ impl Supervisor<'_> {
         let is_paused = self.control.held_at().is_some_and(|held| self.control.hold_tick() <= held);
         // A companion that does not get ready has a watchdog of its own.
         let is_waiting = self.control.held_at().is_some() && !self.companions.all_ready();
-        if ticks != self.timing.last_change.0 || self.state.is_over() || is_paused || is_waiting {
+        if ticks != self.timing.last_change.0 || self.overseer.state.is_over() || is_paused || is_waiting {
             self.timing.last_change = (ticks, self.clock.now());
             return Ok(());
         }
-        if let Some((node, generation, stage, since)) = self.successions.joining() {
+        if let Some((node, generation, stage, since)) = self.overseer.replacements.joining() {
             return self.note_late_joiner(node, generation, stage, since.max(self.timing.last_change.1));
         }
         let stood = self.clock.since(self.timing.last_change.1);
-        let culprit = stall::culprit(self.plan, self.control, &self.successions, &self.processes);
+        let culprit = stall::culprit(self.plan, self.control, &self.overseer.replacements, &self.processes);
         if stood <= self.patience(culprit).max(2 * stall::deadline(self.plan, self.control)) {
             return Ok(());
         }
-        let words = stall::describe(self.control, self.plan, &self.successions, culprit, stood);
+        let words = stall::describe(self.control, self.plan, &self.overseer.replacements, culprit, stood);
         let Some(culprit) = culprit else {
             self.tell(Event::Died { policy: OnExit::Stop, is_possible: false })?;
             return self.abort(format!("{words}; it was aborted"));
@@ -595,7 +514,9 @@ impl Supervisor<'_> {
     /// for the node that may take longest.
     fn patience(&self, culprit: Option<Culprit>) -> Duration {
         match culprit {
-            Some(Culprit::Node(node, generation)) => self.successions.program_of(node, generation).watchdog,
+            Some(Culprit::Node(node, generation)) => {
+                self.overseer.replacements.program_of(node, generation).watchdog
+            }
             Some(Culprit::Clock) | None => {
                 self.graph.programs.iter().map(|program| program.watchdog).max().unwrap_or_default()
             }
@@ -610,9 +531,9 @@ impl Supervisor<'_> {
         stage: Stage,
         since: Duration,
     ) -> Result<()> {
-        let disagreeing = self.successions.disagreeing(&self.processes);
+        let disagreeing = self.overseer.replacements.disagreeing();
         let late = disagreeing.filter(|_| stage != Stage::Joining).unwrap_or((node, generation));
-        let patience = self.successions.program_of(late.0, late.1).watchdog;
+        let patience = self.overseer.replacements.program_of(late.0, late.1).watchdog;
         if self.clock.since(since) > patience {
             let what = if late == (node, generation) {
                 "did not join".to_owned()
@@ -624,10 +545,4 @@ impl Supervisor<'_> {
         }
         Ok(())
     }
-}
-
-/// The topics on which nothing came any more once the process of `node` had ended, in words.
-fn silent_topics(node: &NodePlan, plan: &Plan) -> String {
-    let topics: Vec<_> = node.outputs.iter().map(|output| plan.topics[output.topic].name.as_str()).collect();
-    if topics.is_empty() { String::new() } else { format!("; nothing more came on {}", topics.join(", ")) }
 }

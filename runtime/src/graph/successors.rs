@@ -6,7 +6,7 @@ use super::{Graph, parameters, wire};
 use crate::manifest::{Manifest, OutputSetting, Process, SwapSetting};
 use crate::problem::Problem;
 use crate::program::{Executable, Program, Successor};
-use crate::succession::take_over_stride;
+use crate::replacement::take_over_stride;
 use bus::Registration;
 use bus::plan::{INPUTS_RESERVED, NodePlan, Plan};
 use std::collections::BTreeMap;

@@ -1,0 +1,248 @@
+//! What follows when a process of a run ends: decided on what is seen, without touching a process.
+
+use crate::processes::Role;
+use crate::program::OnExit;
+use crate::replacement::{Replacements, Role as Standing, Stage};
+use crate::supervisor::{Action, Event, State};
+use bus::lockstep::Phase;
+use bus::plan::{NodePlan, Plan};
+
+/// A process that ended, or was found to hang.
+#[derive(Clone, Debug)]
+pub struct Death {
+    /// Its name.
+    pub name: String,
+    /// What it was for.
+    pub role: Role,
+    /// How it ended, with the last lines that it wrote.
+    pub words: String,
+}
+
+/// Why the run ends at once, in words.
+#[derive(Clone, Debug)]
+pub struct Abort(pub String);
+
+/// Decides what follows: the states of the run, and those of its replacements.
+#[derive(Debug)]
+pub struct Overseer<'a> {
+    /// The plan of the run.
+    pub plan: &'a Plan,
+    /// Where the run stands.
+    pub state: State,
+    /// Who replaces whom.
+    pub replacements: Replacements<'a>,
+    /// What the user should know, since it was told last.
+    pub notes: Vec<String>,
+    /// Whether somebody is on the way to the place of a process that died: the run may stand still meanwhile.
+    pub has_answered: bool,
+}
+
+impl Overseer<'_> {
+    /// Whether an end without an error is one in good order.
+    pub fn has_done_its_part(&self, role: Role) -> bool {
+        match role {
+            Role::Companion { .. } => true,
+            Role::Clock => self.replacements.view.completed_ticks() >= self.replacements.view.end_tick(),
+            Role::Node { node, generation } => {
+                let has_completed = self.replacements.view.has_completed(self.plan.slot(node, generation));
+                match self.replacements.role(node, generation) {
+                    Standing::Retired => true,
+                    Standing::Primary => has_completed,
+                    Standing::Backup => {
+                        has_completed && self.replacements.stage(node) >= Some(Stage::Shadowing)
+                    }
+                }
+            }
+        }
+    }
+
+    /// Notes that ticks are granted.
+    pub fn note_gathered(&mut self) {
+        if self.state == State::Gathering && self.replacements.view.phase() == Phase::Running {
+            self.tell(Event::Gathered);
+            if self.replacements.view.is_stop_requested {
+                self.tell(Event::StopRequested);
+            }
+        }
+    }
+
+    /// Tells the state machine what happened; an abort is left to the caller, who knows the words.
+    pub fn tell(&mut self, event: Event) -> Action {
+        let (state, action) = self.state.after(event);
+        self.state = state;
+        if action == Action::RequestStop {
+            self.replacements.view.request_stop();
+        }
+        action
+    }
+
+    /// Draws the consequences of a death; false if that must wait.
+    ///
+    /// # Errors
+    /// If the run ends with it.
+    pub fn settle(&mut self, death: &Death) -> Result<bool, Abort> {
+        let Role::Node { node, generation } = death.role else {
+            let ticks = self.replacements.view.completed_ticks();
+            self.tell(Event::Died { policy: OnExit::Stop, is_possible: false });
+            return Err(Abort(format!("{}\nThe run was aborted at tick {ticks}", death.words)));
+        };
+        if self.replacements.has_taken_over(node) {
+            if !self.replacements.all_agree() {
+                return Ok(false);
+            }
+            self.replacements.commit(node);
+        }
+        match self.replacements.role(node, generation) {
+            Standing::Retired => {
+                self.replacements.note_end_of_retired(node, generation);
+                Ok(true)
+            }
+            Standing::Backup if self.has_died_behind_the_end(node, generation) => {
+                self.say_died_behind_the_end(death);
+                Ok(true)
+            }
+            Standing::Backup => {
+                if self.replacements.stage(node) > Some(Stage::Starting)
+                    && !self.replacements.may_change(node)
+                {
+                    return Ok(false);
+                }
+                if self.tell(Event::SuccessorFailed) == Action::Refuse {
+                    let tick = self.replacements.view.done(self.plan.slot(node, generation));
+                    let reason = match self.replacements.stage(node) {
+                        Some(Stage::Starting) => format!("{} (it had not joined yet)", death.words),
+                        _ => format!("{} (it had come to tick {tick})", death.words),
+                    };
+                    self.refuse(node, reason)?;
+                }
+                Ok(true)
+            }
+            Standing::Primary => self.settle_active(node, generation, death),
+        }
+    }
+
+    /// Whether a process had completed its last tick when it died, and need not be missed by its node's policy: all that
+    /// it had to send is sent, and there is nothing left that another could do in its place.
+    fn has_died_behind_the_end(&self, node: usize, generation: u32) -> bool {
+        self.replacements.view.phase() == Phase::Running
+            && self.replacements.program(node).on_exit != OnExit::Stop
+            && self.replacements.view.has_completed(self.plan.slot(node, generation))
+    }
+
+    fn say_died_behind_the_end(&mut self, death: &Death) {
+        self.notes.push(format!("{}\nIt had completed its last tick: the run ends without it", death.words));
+    }
+
+    fn refuse(&mut self, node: usize, reason: String) -> Result<(), Abort> {
+        let vacant = self.replacements.is_vacant(node);
+        if !vacant {
+            let name = &self.plan.nodes[node].name;
+            self.notes.push(format!("the successor of `{name}` was refused: {reason}\n`{name}` flies on"));
+        }
+        self.replacements.refuse(node, reason.clone());
+        if vacant {
+            let ticks = self.replacements.view.completed_ticks();
+            self.tell(Event::Died { policy: OnExit::Stop, is_possible: false });
+            return Err(Abort(format!(
+                "{reason}\nThe run was aborted at tick {ticks}: it came in the place of a process that had died, \
+                 and completed no tick"
+            )));
+        }
+        Ok(())
+    }
+
+    fn settle_active(&mut self, node: usize, generation: u32, death: &Death) -> Result<bool, Abort> {
+        if self.replacements.is_vacant(node) {
+            return Ok(true);
+        }
+        // It may have flown for a while before anybody looked.
+        self.note_gathered();
+        let flies = self.replacements.view.phase() == Phase::Running;
+        let on_exit = self.replacements.program(node).on_exit;
+        if self.has_died_behind_the_end(node, generation) {
+            self.say_died_behind_the_end(death);
+            return Ok(true);
+        }
+        if flies && on_exit != OnExit::Stop && !self.replacements.may_replace(node) {
+            return Ok(false);
+        }
+        let policy = match on_exit {
+            OnExit::Restart if self.replacements.can_promote(node) => OnExit::Standby,
+            policy => policy,
+        };
+        let is_possible = flies
+            && match policy {
+                OnExit::Stop | OnExit::Ignore => false,
+                OnExit::Restart => self.replacements.has_come_on(node),
+                OnExit::Standby => self.replacements.can_promote(node),
+            };
+        let tick = self.replacements.view.completed_by(self.plan.slot(node, generation));
+        match self.tell(Event::Died { policy, is_possible }) {
+            Action::Restart => {
+                self.replacements.close_early(node);
+                self.replacements.postpone(node);
+                if self.replacements.stage(node).is_some() {
+                    self.refuse(node, "the process it was to succeed died first".to_owned())?;
+                }
+                self.notes.push(format!("{}\n`{}` is restarted at tick {tick}", death.words, death.name));
+                self.replacements.restart(node);
+            }
+            Action::Promote => {
+                self.notes.push(format!(
+                    "{}\nThe standby of `{}` takes over at tick {tick}",
+                    death.words, self.plan.nodes[node].name
+                ));
+                self.replacements.promote(node);
+            }
+            _ => {
+                let why = match policy {
+                    OnExit::Stop | OnExit::Ignore => "",
+                    _ if !flies => ": the run did not fly yet",
+                    OnExit::Restart => {
+                        ": it was restarted and came to its end again without completing a tick"
+                    }
+                    OnExit::Standby => ": no standby was ready to take over",
+                };
+                let silent = silent_topics(&self.plan.nodes[node], self.plan);
+                return Err(Abort(format!(
+                    "{}\nThe run was aborted at tick {tick}{silent}{why}",
+                    death.words
+                )));
+            }
+        }
+        self.has_answered = true;
+        Ok(true)
+    }
+
+    /// Ends those that do not come up or do not leave in their time; their ends are settled like any other.
+    pub fn note_laggards(&mut self) {
+        if let Some((node, generation)) = self.replacements.unprepared() {
+            let patience = self.replacements.program_of(node, generation).watchdog.as_millis();
+            let message = format!(
+                "was killed by the watchdog: it did not join within {patience} ms; does it link `bus` and connect?"
+            );
+            self.replacements.view.kill_for(node, generation, message);
+        }
+        if let Some((node, generation)) = self.replacements.lingering() {
+            let message = "was killed by the watchdog: it did not leave".to_owned();
+            self.replacements.view.kill_for(node, generation, message);
+        }
+    }
+
+    /// Takes a backup out of the run that was to join at a tick which the run has passed.
+    ///
+    /// # Errors
+    /// If nobody else can go on.
+    pub fn note_too_late(&mut self) -> Result<(), Abort> {
+        match self.replacements.too_late() {
+            Some(node) => self.refuse(node, "the run had passed the tick at which it was to join".to_owned()),
+            None => Ok(()),
+        }
+    }
+}
+
+/// The topics on which nothing came any more once the process of `node` had ended, in words.
+fn silent_topics(node: &NodePlan, plan: &Plan) -> String {
+    let topics: Vec<_> = node.outputs.iter().map(|output| plan.topics[output.topic].name.as_str()).collect();
+    if topics.is_empty() { String::new() } else { format!("; nothing more came on {}", topics.join(", ")) }
+}

@@ -1,0 +1,307 @@
+//! What the supervisor sees of a run, and what it commands.
+
+use crate::program::Successor;
+use bus::lockstep::{Phase, SlotState, SupervisorView, TransferOutcome};
+use bus::membership::Membership;
+use bus::plan::{Plan, SLOTS_PER_NODE};
+use std::collections::BTreeSet;
+use std::time::Duration;
+
+/// What is to be done to a run.
+#[derive(Clone, Debug)]
+pub enum Command {
+    /// Start an instance of a node.
+    Spawn {
+        /// The node.
+        node: usize,
+        /// Which of its instances.
+        generation: u32,
+        /// What to start, and what it reads about itself.
+        successor: Box<Successor>,
+    },
+    /// Kill an instance, if it lives.
+    Kill {
+        /// The node.
+        node: usize,
+        /// Which of its instances.
+        generation: u32,
+        /// Why, for the user; `None` where that is no failure.
+        message: Option<String>,
+    },
+    /// The end of an instance needs no answer.
+    Settle {
+        /// The node.
+        node: usize,
+        /// Which of its instances.
+        generation: u32,
+    },
+    /// Remove what an instance that has ended left behind, and clear its slot.
+    Free {
+        /// The node.
+        node: usize,
+        /// Which of its instances.
+        generation: u32,
+        /// Its slot.
+        slot: usize,
+    },
+    /// Clear a slot for another instance.
+    Clear(usize),
+    /// State what a slot holds.
+    SetSlot(usize, SlotState),
+    /// Have the instance in a slot begin at a tick.
+    FirstTick(usize, u32),
+    /// Have the shadow samples of a topic begin at a tick.
+    StartShadow(usize, u32),
+    /// Write a membership.
+    Store(Box<Membership>),
+    /// Make this membership the newest one.
+    Publish(u32),
+    /// Have the clock end the run at the next tick boundary.
+    RequestStop,
+}
+
+/// What is seen of a slot.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SlotView {
+    /// What it holds.
+    pub state: SlotState,
+    /// How far its instance has joined.
+    pub ready: Phase,
+    /// Ticks that it has completed.
+    pub done: u32,
+    /// The membership that it has acknowledged.
+    pub acknowledged: u32,
+    /// What it goes on from.
+    pub transfer: TransferOutcome,
+}
+
+impl SlotView {
+    /// A slot without an instance.
+    pub const EMPTY: Self = Self {
+        state: SlotState::Empty,
+        ready: Phase::Announcing,
+        done: 0,
+        acknowledged: 0,
+        transfer: TransferOutcome::Unknown,
+    };
+}
+
+/// What is seen of a run at a moment; what is commanded afterwards counts as done already.
+#[derive(Clone, Debug)]
+pub struct View {
+    /// Time on the watchdogs' clock.
+    pub now: Duration,
+    /// Host time, for reports.
+    pub host: Duration,
+    /// How far the first instances have joined.
+    pub phase: Phase,
+    /// The tick at which the clock waits.
+    pub held_at: Option<u32>,
+    /// The tick at which the run ends.
+    pub end_tick: u32,
+    /// Whether a stop was asked for.
+    pub is_stop_requested: bool,
+    /// The number of the newest membership.
+    pub epoch: u32,
+    /// Per topic: ticks whose sample has been sent.
+    pub sent: Vec<u32>,
+    /// The slots.
+    pub slots: Vec<SlotView>,
+    /// Instances that live: node and generation.
+    pub living: BTreeSet<(usize, u32)>,
+    /// What was commanded since the look.
+    pub commands: Vec<Command>,
+}
+
+impl View {
+    /// What `control` shows of the run of `plan`.
+    pub fn of(
+        plan: &Plan,
+        control: &SupervisorView,
+        living: BTreeSet<(usize, u32)>,
+        [now, host]: [Duration; 2],
+    ) -> Self {
+        let phase = |slot| {
+            let phases = [Phase::Running, Phase::Connecting];
+            phases.into_iter().find(|&phase| control.is_ready(slot, phase)).unwrap_or(Phase::Announcing)
+        };
+        let slot = |slot| SlotView {
+            state: control.slot_state(slot),
+            ready: phase(slot),
+            done: control.done(slot),
+            acknowledged: control.acknowledged_epoch(slot),
+            transfer: control.transfer(slot),
+        };
+        Self {
+            now,
+            host,
+            phase: control.phase(),
+            held_at: control.held_at(),
+            end_tick: control.end_tick(),
+            is_stop_requested: control.is_stop_requested(),
+            epoch: control.epoch(),
+            sent: (0..plan.topics.len()).map(|topic| control.ticks_sent(topic)).collect(),
+            slots: (0..SLOTS_PER_NODE * plan.nodes.len()).map(slot).collect(),
+            living,
+            commands: Vec::new(),
+        }
+    }
+
+    /// Time on the watchdogs' clock.
+    pub fn now(&self) -> Duration {
+        self.now
+    }
+
+    /// Host time.
+    pub fn host(&self) -> Duration {
+        self.host
+    }
+
+    /// Watchdogs' time since `then`.
+    pub fn since(&self, then: Duration) -> Duration {
+        self.now.saturating_sub(then)
+    }
+
+    /// How far the first instances have joined.
+    pub fn phase(&self) -> Phase {
+        self.phase
+    }
+
+    /// The tick at which the clock waits.
+    pub fn held_at(&self) -> Option<u32> {
+        self.held_at
+    }
+
+    /// The tick at which the run ends.
+    pub fn end_tick(&self) -> u32 {
+        self.end_tick
+    }
+
+    /// The number of the newest membership.
+    pub fn epoch(&self) -> u32 {
+        self.epoch
+    }
+
+    /// Ticks of a topic whose sample has been sent.
+    pub fn ticks_sent(&self, topic: usize) -> u32 {
+        self.sent[topic]
+    }
+
+    /// What a slot holds.
+    pub fn slot_state(&self, slot: usize) -> SlotState {
+        self.slots[slot].state
+    }
+
+    /// Whether the instance of a slot is ready for `phase`.
+    pub fn is_ready(&self, slot: usize, phase: Phase) -> bool {
+        self.slots[slot].ready >= phase
+    }
+
+    /// Ticks that the instance of a slot has completed.
+    pub fn done(&self, slot: usize) -> u32 {
+        self.slots[slot].done
+    }
+
+    /// Whether the instance of a slot has completed the run.
+    pub fn has_completed(&self, slot: usize) -> bool {
+        self.slots[slot].done >= self.end_tick
+    }
+
+    /// The membership that the instance of a slot has acknowledged.
+    pub fn acknowledged_epoch(&self, slot: usize) -> u32 {
+        self.slots[slot].acknowledged
+    }
+
+    /// What the instance of a slot goes on from.
+    pub fn transfer(&self, slot: usize) -> TransferOutcome {
+        self.slots[slot].transfer
+    }
+
+    /// The slots that compute.
+    pub fn computing(&self) -> impl Iterator<Item = usize> + '_ {
+        (0..self.slots.len()).filter(|&slot| self.slots[slot].state == SlotState::Taken)
+    }
+
+    /// Whether an instance lives.
+    pub fn lives(&self, node: usize, generation: u32) -> bool {
+        self.living.contains(&(node, generation))
+    }
+
+    /// Commands a start.
+    pub fn spawn(&mut self, node: usize, generation: u32, successor: &Successor) {
+        self.living.insert((node, generation));
+        self.commands.push(Command::Spawn { node, generation, successor: Box::new(successor.clone()) });
+    }
+
+    /// Commands the end of an instance.
+    pub fn kill(&mut self, node: usize, generation: u32) {
+        self.living.remove(&(node, generation));
+        self.commands.push(Command::Kill { node, generation, message: None });
+    }
+
+    /// Commands the end of an instance that has failed: it is answered as any other end.
+    pub fn kill_for(&mut self, node: usize, generation: u32, message: String) {
+        self.commands.push(Command::Kill { node, generation, message: Some(message) });
+    }
+
+    /// Commands the end of the run at the next tick boundary.
+    pub fn request_stop(&mut self) {
+        self.is_stop_requested = true;
+        self.commands.push(Command::RequestStop);
+    }
+
+    /// Ticks that every node has completed.
+    pub fn completed_ticks(&self) -> u32 {
+        self.computing().map(|slot| self.done(slot)).min().unwrap_or(0).min(self.end_tick)
+    }
+
+    /// Ticks of the run that the instance of a slot has completed.
+    pub fn completed_by(&self, slot: usize) -> u32 {
+        self.done(slot).min(self.end_tick)
+    }
+
+    /// Commands that nobody answers the end of an instance.
+    pub fn settle(&mut self, node: usize, generation: u32) {
+        self.commands.push(Command::Settle { node, generation });
+    }
+
+    /// Commands that nothing of an instance stays.
+    pub fn free(&mut self, node: usize, generation: u32, slot: usize) {
+        self.slots[slot] = SlotView::EMPTY;
+        self.commands.push(Command::Free { node, generation, slot });
+    }
+
+    /// Commands that a slot is cleared.
+    pub fn clear_slot(&mut self, slot: usize) {
+        self.slots[slot] = SlotView::EMPTY;
+        self.commands.push(Command::Clear(slot));
+    }
+
+    /// Commands what a slot holds.
+    pub fn set_slot_state(&mut self, slot: usize, state: SlotState) {
+        self.slots[slot].state = state;
+        self.commands.push(Command::SetSlot(slot, state));
+    }
+
+    /// Commands the first tick of an instance.
+    pub fn set_first_tick(&mut self, slot: usize, tick: u32) {
+        self.slots[slot].done = tick;
+        self.commands.push(Command::FirstTick(slot, tick));
+    }
+
+    /// Commands the first tick of shadow samples.
+    pub fn start_shadow(&mut self, topic: usize, tick: u32) {
+        self.commands.push(Command::StartShadow(topic, tick));
+    }
+
+    /// Commands that a membership is written.
+    pub fn store(&mut self, membership: &Membership) {
+        self.commands.push(Command::Store(Box::new(membership.clone())));
+    }
+
+    /// Commands that a membership is the newest one.
+    pub fn set_epoch(&mut self, epoch: u32) {
+        self.epoch = epoch;
+        self.commands.push(Command::Publish(epoch));
+    }
+}
