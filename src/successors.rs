@@ -16,7 +16,7 @@ fn hover() -> (Manifest, Graph) {
 fn a_successor_in_a_live_run_differs_in_what_is_asked_for() {
     let (manifest, graph) = hover();
     let with = "parameters.gains.altitude_integral_max_m_s2 = 1.5";
-    let successor = successor_of(&manifest, &graph, "controller", with).unwrap();
+    let successor = successor_of(&manifest, &graph.plan, "controller", with).unwrap();
     let node = &graph.plan.nodes[successor.node];
     assert_eq!(
         (node.name.as_str(), successor.take_over_tick, successor.is_standby),
@@ -33,7 +33,7 @@ fn a_successor_in_a_live_run_differs_in_what_is_asked_for() {
 fn a_successor_in_a_live_run_that_cannot_be_is_refused_with_its_place() {
     let (manifest, graph) = hover();
     let refused = |process: &str, with: &str| {
-        successor_of(&manifest, &graph, process, with).map(|_| ()).unwrap_err().to_string()
+        successor_of(&manifest, &graph.plan, process, with).map(|_| ()).unwrap_err().to_string()
     };
     let words = refused("contorller", "");
     assert!(words.starts_with("--with:1:1: there is no process `contorller`"), "{words}");

@@ -302,7 +302,6 @@ fn roots() -> Vec<PathBuf> {
 }
 
 #[test]
-#[ignore = "some crates still have circles: scripts/dev circles lists them"]
 fn no_files_need_each_other() {
     let mut found = String::new();
     for root in roots() {

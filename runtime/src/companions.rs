@@ -1,8 +1,9 @@
 //! Companions: processes beside the ticks, such as a viewer. They are started with the run, may say when they are ready,
 //! and end with it; an end with an error has the consequences that the manifest names.
 
-use crate::processes::{Process, Role};
+use crate::processes::Process;
 use crate::program::{OnExit, Program, Readiness};
+use crate::role::Role;
 use crate::watch_clock::WatchClock;
 use anyhow::{Context, Result};
 use std::os::unix::net::UnixDatagram;

@@ -1,7 +1,7 @@
 //! From a manifest to the plan of a run, checked before anything starts.
 //!
 //! - [`processes`]: what each process executes, and how it runs on the host
-//! - [`outputs`], [`inputs`]: topics and edges
+//! - [`outputs`], [`inputs`], [`wiring`]: topics and edges
 //! - [`parameters`], [`recorders`]: what each node is given
 //! - [`periods`]: nodes and outputs that compute once or never count on
 //! - [`ranges`]: ranges of numbers by their units
@@ -17,18 +17,19 @@ mod processes;
 mod ranges;
 mod recorders;
 mod successors;
+mod wiring;
 
 pub use successors::successor_of;
 
 use crate::manifest::Manifest;
 use crate::placement;
 use crate::problem::Problem;
-use crate::program::{OnExit, Program, Successor};
-use bus::plan::{NodePlan, Plan, TopicPlan};
+use crate::program::{Program, Successor};
+use bus::plan::Plan;
 use parameters::{Notes, RunLength};
-use processes::Member;
 use std::path::PathBuf;
 use toml::Spanned;
+use wiring::{Wiring, wire};
 
 /// Ticks that a fast node may be ahead of the slowest where the manifest does not say.
 const DEFAULT_WINDOW_TICKS: u32 = 64;
@@ -82,35 +83,6 @@ impl Graph {
         let (models, warnings) = notes.into_parts(manifest);
         Ok(Self { plan, programs, successors, companions, models, warnings })
     }
-}
-
-/// Topics and nodes, wired to each other.
-struct Wiring {
-    topics: Vec<TopicPlan>,
-    nodes: Vec<NodePlan>,
-}
-
-/// Wires `members`; their nodes have no parameters and no place yet. `changed` is the one that is to blame
-/// for a cycle it is in.
-fn wire(manifest: &Manifest, members: &[Member<'_>], changed: Option<usize>) -> Result<Wiring, Problem> {
-    let published = outputs::publish_all(manifest, members)?;
-    let topics: Vec<TopicPlan> = published.iter().map(|output| output.topic.clone()).collect();
-    let mut nodes = Problem::gather(members.iter().enumerate().map(|(index, member)| {
-        let process = member.process;
-        Ok(NodePlan {
-            name: member.name.get_ref().clone(),
-            period_ticks: processes::period_ticks(manifest, process)?,
-            wait: process.wait.unwrap_or_default(),
-            cpu: process.cpu.as_ref().map(|cpu| *cpu.get_ref()),
-            inputs: inputs::inputs(manifest, member, &topics)?,
-            outputs: outputs::outputs(&published, index),
-            parameters: serde_json::Value::Null,
-            restarts: member.program.on_exit == OnExit::Restart,
-        })
-    }))?;
-    inputs::require_no_cycle(manifest, members, &nodes, &published, changed)?;
-    inputs::order_inputs(&mut nodes, &published);
-    Ok(Wiring { topics, nodes })
 }
 
 fn plan(manifest: &Manifest, wiring: Wiring) -> Result<Plan, Problem> {

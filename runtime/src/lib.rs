@@ -23,6 +23,7 @@ mod processes;
 pub mod program;
 pub mod registry;
 pub mod replacement;
+mod role;
 pub mod run_dir;
 #[cfg(test)]
 mod simulation;

@@ -1,8 +1,8 @@
 //! What follows when a process of a run ends: decided on what is seen, without touching a process.
 
-use crate::processes::Role;
 use crate::program::OnExit;
-use crate::replacement::{Replacements, Role as Standing, Stage};
+use crate::replacement::{InstanceRole, Replacements, Stage};
+use crate::role::Role;
 use crate::supervisor::{Action, Event, State};
 use bus::lockstep::Phase;
 use bus::plan::{NodePlan, Plan};
@@ -46,9 +46,9 @@ impl Overseer<'_> {
             Role::Node { node, generation } => {
                 let has_completed = self.replacements.view.has_completed(self.plan.slot(node, generation));
                 match self.replacements.role(node, generation) {
-                    Standing::Retired => true,
-                    Standing::Primary => has_completed,
-                    Standing::Backup => {
+                    InstanceRole::Retired => true,
+                    InstanceRole::Primary => has_completed,
+                    InstanceRole::Backup => {
                         has_completed && self.replacements.stage(node) >= Some(Stage::Shadowing)
                     }
                 }
@@ -93,15 +93,15 @@ impl Overseer<'_> {
             self.replacements.commit(node);
         }
         match self.replacements.role(node, generation) {
-            Standing::Retired => {
+            InstanceRole::Retired => {
                 self.replacements.note_end_of_retired(node, generation);
                 Ok(true)
             }
-            Standing::Backup if self.has_died_behind_the_end(node, generation) => {
+            InstanceRole::Backup if self.has_died_behind_the_end(node, generation) => {
                 self.say_died_behind_the_end(death);
                 Ok(true)
             }
-            Standing::Backup => {
+            InstanceRole::Backup => {
                 if self.replacements.stage(node) > Some(Stage::Starting)
                     && !self.replacements.may_change(node)
                 {
@@ -117,7 +117,7 @@ impl Overseer<'_> {
                 }
                 Ok(true)
             }
-            Standing::Primary => self.settle_active(node, generation, death),
+            InstanceRole::Primary => self.settle_active(node, generation, death),
         }
     }
 

@@ -3,6 +3,7 @@
 use crate::host::{Body, End, Host, Thread};
 use crate::process_log::{self, last_words};
 use crate::program::{Executable, Program};
+use crate::role::Role;
 use crate::spawn;
 use crate::watch_clock::WatchClock;
 use anyhow::Result;
@@ -14,35 +15,6 @@ use std::time::Duration;
 /// How long processes have to leave by themselves after an abort.
 const GRACE: Duration = Duration::from_secs(2);
 const POLL: Duration = Duration::from_millis(2);
-
-/// What a process is for.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Role {
-    /// The clock service.
-    Clock,
-    /// A process of a node.
-    Node {
-        /// Index in the plan.
-        node: usize,
-        /// Counts the processes of this node.
-        generation: u32,
-    },
-    /// A process that takes no part in the ticks.
-    Companion {
-        /// Counts the processes of this companion.
-        generation: u32,
-    },
-}
-
-impl Role {
-    /// Counts the processes of this role; the first is 0.
-    pub fn generation(self) -> u32 {
-        match self {
-            Self::Clock => 0,
-            Self::Node { generation, .. } | Self::Companion { generation } => generation,
-        }
-    }
-}
 
 /// A process of a run.
 #[derive(Debug)]

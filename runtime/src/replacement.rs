@@ -136,7 +136,7 @@ pub struct Replacements<'a> {
 
 /// What a process is to its node.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Role {
+pub enum InstanceRole {
     /// Its samples count.
     Primary,
     /// It shadows the primary, or is on the way in.
@@ -199,14 +199,14 @@ impl<'a> Replacements<'a> {
     }
 
     /// What the process of a node's generation is to it now.
-    pub fn role(&self, node: usize, generation: u32) -> Role {
+    pub fn role(&self, node: usize, generation: u32) -> InstanceRole {
         let backup = self.nodes[node].backup.as_ref();
         if self.membership.nodes[node].primary.generation == generation {
-            Role::Primary
+            InstanceRole::Primary
         } else if backup.is_some_and(|backup| backup.generation == generation) {
-            Role::Backup
+            InstanceRole::Backup
         } else {
-            Role::Retired
+            InstanceRole::Retired
         }
     }
 

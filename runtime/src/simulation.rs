@@ -2,9 +2,9 @@
 //! and any order of events, all drawn from one seed. When the faults stop, the run must end.
 
 use crate::overseer::{Death, Overseer};
-use crate::processes::Role;
 use crate::program::{Executable, OnExit, Program, Successor};
 use crate::replacement::Replacements;
+use crate::role::Role;
 use crate::supervisor::{Event, State};
 use crate::view::{Command, SlotView, View};
 use bus::lockstep::{Phase, SlotState, TransferOutcome};

@@ -1,8 +1,8 @@
 //! Starting one process of a run.
 
 use crate::output_file::append_to_log;
-use crate::processes::Role;
 use crate::program::{Executable, Program};
+use crate::role::Role;
 use anyhow::{Context, Result};
 use bus::process::{LAUNCHER_VARIABLE, RUN_VARIABLE};
 use bus::{GENERATION_VARIABLE, NODE_VARIABLE};

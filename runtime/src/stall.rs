@@ -1,21 +1,22 @@
 //! A run that stands still: because of whom, and what the others wait for.
 
-use crate::processes::{Processes, Role};
+use crate::processes::Processes;
 use crate::replacement::Replacements;
+use crate::role::Role;
 use bus::lockstep::{Phase, SlotState, SupervisorView};
 use bus::plan::{Pace, Plan};
 use std::time::Duration;
 
 /// A living process because of which the run stands still.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Culprit {
+pub enum Straggler {
     /// The clock service.
     Clock,
     /// A node's index, and the generation of its process.
     Node(usize, u32),
 }
 
-impl Culprit {
+impl Straggler {
     /// The role of the process.
     pub fn role(self) -> Role {
         match self {
@@ -26,16 +27,16 @@ impl Culprit {
 }
 
 /// The living process that has all it needs and does not come on.
-pub fn culprit(
+pub fn straggler(
     plan: &Plan,
     control: &SupervisorView,
     replacements: &Replacements<'_>,
     processes: &Processes,
-) -> Option<Culprit> {
+) -> Option<Straggler> {
     match control.phase() {
         Phase::Announcing => Some(not_ready(plan, control, replacements, Phase::Connecting)),
         Phase::Connecting => Some(not_ready(plan, control, replacements, Phase::Running)),
-        Phase::Running if control.awaits_clock() => Some(Culprit::Clock),
+        Phase::Running if control.awaits_clock() => Some(Straggler::Clock),
         Phase::Running if control.held_at().is_some() => None,
         Phase::Running if control.completed_ticks() >= control.end_tick() => not_left(processes),
         Phase::Running => not_computing(plan, control, replacements, processes),
@@ -48,10 +49,10 @@ fn not_ready(
     control: &SupervisorView,
     replacements: &Replacements<'_>,
     phase: Phase,
-) -> Culprit {
+) -> Straggler {
     let late = (0..plan.nodes.len()).filter(|&node| !control.is_ready(node, phase));
     late.min_by_key(|&node| replacements.program_of(node, 0).watchdog)
-        .map_or(Culprit::Clock, |node| Culprit::Node(node, 0))
+        .map_or(Straggler::Clock, |node| Straggler::Node(node, 0))
 }
 
 /// The node that is furthest behind of those that have all they need.
@@ -60,7 +61,7 @@ fn not_computing(
     control: &SupervisorView,
     replacements: &Replacements<'_>,
     processes: &Processes,
-) -> Option<Culprit> {
+) -> Option<Straggler> {
     let stuck = |&(node, generation): &(usize, u32)| {
         let member = plan.slot(node, generation);
         control.slot_state(member) == SlotState::Taken
@@ -69,18 +70,18 @@ fn not_computing(
     };
     let members = replacements.members().filter(stuck);
     let slowest = members.min_by_key(|&(node, generation)| control.done(plan.slot(node, generation)));
-    slowest.map(|(node, generation)| Culprit::Node(node, generation))
+    slowest.map(|(node, generation)| Straggler::Node(node, generation))
 }
 
 /// A process that has completed the run and has not ended: a node, or else the clock.
-fn not_left(processes: &Processes) -> Option<Culprit> {
+fn not_left(processes: &Processes) -> Option<Straggler> {
     let left = processes.running.iter().filter(|process| process.end.is_none());
-    let culprits = left.filter_map(|process| match process.role {
-        Role::Node { node, generation } => Some(Culprit::Node(node, generation)),
-        Role::Clock => Some(Culprit::Clock),
+    let stragglers = left.filter_map(|process| match process.role {
+        Role::Node { node, generation } => Some(Straggler::Node(node, generation)),
+        Role::Clock => Some(Straggler::Clock),
         Role::Companion { .. } => None,
     });
-    culprits.max_by_key(|culprit| matches!(culprit, Culprit::Node(..)))
+    stragglers.max_by_key(|straggler| matches!(straggler, Straggler::Node(..)))
 }
 
 /// Host time in which a paced run must come forward: that of the slowest node's period.
@@ -99,15 +100,15 @@ pub fn describe(
     control: &SupervisorView,
     plan: &Plan,
     replacements: &Replacements<'_>,
-    culprit: Option<Culprit>,
+    straggler: Option<Straggler>,
     stood: Duration,
 ) -> String {
     let names = |phase| {
         let late = plan.nodes.iter().enumerate().filter(|(index, _)| !control.is_ready(*index, phase));
         late.map(|(_, node)| format!("`{}`", node.name)).collect::<Vec<_>>().join(", ")
     };
-    let waiting = match (control.phase(), culprit) {
-        (Phase::Announcing | Phase::Connecting, Some(Culprit::Clock)) => {
+    let waiting = match (control.phase(), straggler) {
+        (Phase::Announcing | Phase::Connecting, Some(Straggler::Clock)) => {
             "every node has joined, and `clock` does not let them begin".to_owned()
         }
         (Phase::Announcing, _) => format!("waiting for {} to join", names(Phase::Connecting)),
@@ -115,7 +116,7 @@ pub fn describe(
         (Phase::Running, _) if control.completed_ticks() >= control.end_tick() => {
             "every tick is completed, and it does not end".to_owned()
         }
-        (Phase::Running, Some(Culprit::Clock)) => {
+        (Phase::Running, Some(Straggler::Clock)) => {
             format!("tick {} is not granted by `clock`", control.granted_ticks())
         }
         (Phase::Running, _) => describe_stuck(control, plan, replacements),

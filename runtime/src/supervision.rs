@@ -9,10 +9,11 @@ use crate::event::{Progress, RunEvent, StopToken};
 use crate::graph::{Graph, successor_of};
 use crate::manifest::Manifest;
 use crate::overseer::{Abort, Death, Overseer};
-use crate::processes::{Processes, Role};
+use crate::processes::Processes;
 use crate::program::{OnExit, Readiness, Successor};
 use crate::replacement::{Report, Stage, take_over_stride};
-use crate::stall::{self, Culprit};
+use crate::role::Role;
+use crate::stall::{self, Straggler};
 use crate::supervisor::{Action, Event, State};
 use crate::view::{Command, View};
 use crate::watch_clock::WatchClock;
@@ -355,7 +356,7 @@ impl Supervisor<'_> {
         shadow_ticks: Option<u32>,
         at_tick: Option<u32>,
     ) -> Result<u32, String> {
-        let successor = successor_of(self.manifest, self.graph, process, with).map_err(|e| e.to_string())?;
+        let successor = successor_of(self.manifest, self.plan, process, with).map_err(|e| e.to_string())?;
         let node = successor.node;
         self.require_claimed_log(&successor)?;
         if self.overseer.state != State::Running {
@@ -496,28 +497,29 @@ impl Supervisor<'_> {
             return self.note_late_joiner(node, generation, stage, since.max(self.timing.last_change.1));
         }
         let stood = self.clock.since(self.timing.last_change.1);
-        let culprit = stall::culprit(self.plan, self.control, &self.overseer.replacements, &self.processes);
-        if stood <= self.patience(culprit).max(2 * stall::deadline(self.plan, self.control)) {
+        let straggler =
+            stall::straggler(self.plan, self.control, &self.overseer.replacements, &self.processes);
+        if stood <= self.patience(straggler).max(2 * stall::deadline(self.plan, self.control)) {
             return Ok(());
         }
-        let words = stall::describe(self.control, self.plan, &self.overseer.replacements, culprit, stood);
-        let Some(culprit) = culprit else {
+        let words = stall::describe(self.control, self.plan, &self.overseer.replacements, straggler, stood);
+        let Some(straggler) = straggler else {
             self.tell(Event::Died { policy: OnExit::Stop, is_possible: false })?;
             return self.abort(format!("{words}; it was aborted"));
         };
         self.timing.last_change.1 = self.clock.now();
-        self.processes.kill_role(culprit.role(), Some(format!("was killed by the watchdog: {words}")));
+        self.processes.kill_role(straggler.role(), Some(format!("was killed by the watchdog: {words}")));
         Ok(())
     }
 
-    /// How long the run may stand still because of `culprit`: for the clock, and where nobody is to blame, as long as
+    /// How long the run may stand still because of `straggler`: for the clock, and where nobody is to blame, as long as
     /// for the node that may take longest.
-    fn patience(&self, culprit: Option<Culprit>) -> Duration {
-        match culprit {
-            Some(Culprit::Node(node, generation)) => {
+    fn patience(&self, straggler: Option<Straggler>) -> Duration {
+        match straggler {
+            Some(Straggler::Node(node, generation)) => {
                 self.overseer.replacements.program_of(node, generation).watchdog
             }
-            Some(Culprit::Clock) | None => {
+            Some(Straggler::Clock) | None => {
                 self.graph.programs.iter().map(|program| program.watchdog).max().unwrap_or_default()
             }
         }

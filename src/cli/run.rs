@@ -90,7 +90,7 @@ pub fn run(
     print_warnings(&graph.warnings);
     graph.plan.profile |= files.is_some();
     if let Some((process, with)) = extra_shadow {
-        let shadow = successor_of(&manifest, &graph, process, with)?;
+        let shadow = successor_of(&manifest, &graph.plan, process, with)?;
         if graph.successors.iter().any(|other| other.node == shadow.node) {
             bail!(
                 "`{process}` has a successor, a standby or a shadow in this manifest already; one at a time"

@@ -1,8 +1,9 @@
 //! Successors: processes that shadow a node, take over from it, or stand by for it.
 
+use super::parameters;
 use super::parameters::{Notes, RunLength};
 use super::processes::{Member, irreplaceable, members, program};
-use super::{Graph, parameters, wire};
+use super::wiring::wire;
 use crate::manifest::{Manifest, OutputSetting, Process, SwapSetting};
 use crate::problem::Problem;
 use crate::program::{Executable, Program, Successor};
@@ -70,20 +71,20 @@ pub fn all(
     Ok(placed.into_iter().map(|placed| placed.successor).collect())
 }
 
-/// The successor of `process` in a run of `manifest` that is under way; `with_text` is TOML that says in what
+/// The successor of `process` in a run of `manifest` by `plan` that is under way; `with_text` is TOML that says in what
 /// it differs, as `with` does. When it joins and takes over is left open.
 ///
 /// # Errors
 /// If there is no such process, or it cannot be succeeded by that.
 pub fn successor_of(
     manifest: &Manifest,
-    graph: &Graph,
+    plan: &Plan,
     process: &str,
     with_text: &str,
 ) -> Result<Successor, Problem> {
     let (manifest, whole) = manifest.succeed(process, with_text)?;
     let members = members(&manifest)?;
-    let run = Run { manifest: &manifest, plan: &graph.plan, members: &members };
+    let run = Run { manifest: &manifest, plan, members: &members };
     let node = run.node(&Spanned::new(whole.span(), process.to_owned()))?;
     let (plan, program) = run.resolve(node, whole.get_ref(), &whole.span(), &mut Notes::default())?;
     Ok(lasting(node, false, plan, program))

@@ -1,0 +1,30 @@
+//! What a process is for in its run.
+
+/// What a process is for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Role {
+    /// The clock service.
+    Clock,
+    /// A process of a node.
+    Node {
+        /// Index in the plan.
+        node: usize,
+        /// Counts the processes of this node.
+        generation: u32,
+    },
+    /// A process that takes no part in the ticks.
+    Companion {
+        /// Counts the processes of this companion.
+        generation: u32,
+    },
+}
+
+impl Role {
+    /// Counts the processes of this role; the first is 0.
+    pub fn generation(self) -> u32 {
+        match self {
+            Self::Clock => 0,
+            Self::Node { generation, .. } | Self::Companion { generation } => generation,
+        }
+    }
+}
