@@ -376,7 +376,7 @@ impl Node {
     /// Connects, then computes `step` at every due tick until the run ends.
     ///
     /// # Errors
-    /// As [`Node::connect`] and [`ConnectedNode::run`].
+    /// As `Node::connect` and `ConnectedNode::run`.
     pub fn run<E: Display>(
         self,
         mut step: impl FnMut(&mut Tick<'_>) -> Result<(), E>,

@@ -7,7 +7,7 @@
 //!
 //! - Mode *varying*: the velocity ahead shrinks with the distance to the wall ahead, and with it the tilt; the
 //!   velocity across is held at zero. Nothing holds the distance to the wall beside, as in the thesis.
-//! - Mode *constant*: the velocity across is the [`Approach`] curve over the error of the distance to the wall
+//! - Mode *constant*: the velocity across is the `Approach` curve over the error of the distance to the wall
 //!   beside, and the velocity ahead is what is left of the constant speed, √(v² − v_across²). The next state
 //!   begins where the curve's velocity towards the wall ahead, which is then the one beside, equals the speed.
 //!   So the velocity command turns in a corner without changing its length, and there is no jump in it.

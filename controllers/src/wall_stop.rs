@@ -1,6 +1,6 @@
 //! Guidance to a stop before a wall (thesis §5.5, Figs 5.30–5.34), around velocity PD and cascade.
 //!
-//! It flies along the heading's +x. The velocity command is the cruising speed, or the [`Approach`] curve over
+//! It flies along the heading's +x. The velocity command is the cruising speed, or the `Approach` curve over
 //! the distance still to go where that is slower, so that the pitch command shrinks with the distance as the
 //! thesis says; the curve's own acceleration is fed forward. The velocity along y is held at zero. Once it has
 //! arrived, an integrator over the distance takes up what a tilted attitude estimate leaves.

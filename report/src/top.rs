@@ -1,10 +1,10 @@
 //! A live run in the terminal, steered from the keyboard.
 //!
-//! - [`sample`]: what a run shows at a moment
-//! - [`view`]: what two moments say about the time between them
-//! - [`cells`]: the view as words, for screen and paper
-//! - [`screen`]: how it is drawn
-//! - [`keys`]: what the keys do
+//! - `sample`: what a run shows at a moment
+//! - `view`: what two moments say about the time between them
+//! - `cells`: the view as words, for screen and paper
+//! - `screen`: how it is drawn
+//! - `keys`: what the keys do
 #![allow(clippy::disallowed_methods, reason = "rates are per host time")]
 
 mod cells;

@@ -2,7 +2,7 @@
 //!
 //! - [`protocol`]: what can be asked of a run, and what it answers
 //! - [`server`]: the launcher's socket in the run directory
-//! - [`desk`]: what the launcher does with a request
+//! - `desk`: what the launcher does with a request
 //! - [`client`]: the other end of the socket
 
 pub mod client;

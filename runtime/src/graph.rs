@@ -1,12 +1,12 @@
 //! From a manifest to the plan of a run, checked before anything starts.
 //!
-//! - [`processes`]: what each process executes, and how it runs on the host
-//! - [`outputs`], [`inputs`], [`wiring`]: topics and edges
-//! - [`parameters`], [`recorders`]: what each node is given
-//! - [`periods`]: nodes and outputs that compute once or never count on
-//! - [`ranges`]: ranges of numbers by their units
-//! - [`evaluations`]: what is judged after the run
-//! - [`successors`]: who shadows, takes over or stands by
+//! - `processes`: what each process executes, and how it runs on the host
+//! - `outputs`, `inputs`, `wiring`: topics and edges
+//! - `parameters`, `recorders`: what each node is given
+//! - `periods`: nodes and outputs that compute once or never count on
+//! - `ranges`: ranges of numbers by their units
+//! - `evaluations`: what is judged after the run
+//! - `successors`: who shadows, takes over or stands by
 
 mod evaluations;
 mod inputs;

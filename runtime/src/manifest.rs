@@ -1,14 +1,14 @@
 //! The manifest: what a user writes to describe a run, read with the place of every value.
 //!
-//! - [`sources`]: the texts it is made of, laid end to end, so that one offset names a place in any of them
-//! - [`mod@include`]: reads the file and the files it includes
-//! - [`overrides`]: the values given with `--set`
-//! - [`tree`]: tables with the places of their values, merged
-//! - [`sets`]: vehicles of process sets become processes
-//! - [`succession`]: a successor's differences become a whole process
-//! - [`finite`]: no number is infinite or none
-//! - [`builder`]: a manifest that is built in code
-//! - [`content`]: the types that the whole is read into
+//! - `sources`: the texts it is made of, laid end to end, so that one offset names a place in any of them
+//! - `mod@include`: reads the file and the files it includes
+//! - `overrides`: the values given with `--set`
+//! - `tree`: tables with the places of their values, merged
+//! - `sets`: vehicles of process sets become processes
+//! - `succession`: a successor's differences become a whole process
+//! - `finite`: no number is infinite or none
+//! - `builder`: a manifest that is built in code
+//! - `content`: the types that the whole is read into
 
 mod builder;
 mod content;

@@ -1,6 +1,6 @@
 //! Who replaces whom: backups are started, join, shadow the primary, take over and see it retire.
 //!
-//! A pure state machine: what it sees of the run is a [`View`], what it wants done are [`Command`](crate::view::Command)s.
+//! A pure state machine: what it sees of the run is a `View`, what it wants done are `Command`s.
 //! Each node has at most one backup at a time, which goes through the stages below. A change of the run is a new
 //! membership: it is written, every instance acknowledges it, and only then the next one is made.
 

@@ -1,15 +1,15 @@
 //! Pictures of a recording: curves over time, and paths in space.
 //!
-//! - [`choice`]: what is plotted, by `--plot` or by the types of the topics
-//! - [`field`]: the numbers that a field is drawn as, in the units that people read
-//! - [`read`]: the one pass over the recording
-//! - [`thin`]: long curves as few points
-//! - [`figure`]: named and coloured curves on axes of one unit
-//! - [`scene`]: what stands around the vehicles
-//! - [`drawing`]: all that a file shows
-//! - [`html`]: the page
-//! - [`ink`]: lines, letters and legends of pictures
-//! - [`picture`], [`space`]: the same as SVG and PNG: sheets, time plots; views of the paths
+//! - `choice`: what is plotted, by `--plot` or by the types of the topics
+//! - `field`: the numbers that a field is drawn as, in the units that people read
+//! - `read`: the one pass over the recording
+//! - `thin`: long curves as few points
+//! - `figure`: named and coloured curves on axes of one unit
+//! - `scene`: what stands around the vehicles
+//! - `drawing`: all that a file shows
+//! - `html`: the page
+//! - `ink`: lines, letters and legends of pictures
+//! - `picture`, `space`: the same as SVG and PNG: sheets, time plots; views of the paths
 
 mod choice;
 mod drawing;

@@ -1,14 +1,14 @@
 //! Where the host time of a run's ticks goes.
 //!
-//! - [`times`]: histograms of host times
-//! - [`latency`]: wait, wake-up, computation and sending per node; transport per topic
-//! - [`age`]: how old the measurements are that a command rests on
-//! - [`path`]: the nodes and hops that the end of a tick waited for
-//! - [`pacing`]: deadlines of a paced run
-//! - [`figures`]: all of these
-//! - [`table`]: all of it on the terminal
-//! - [`trace`]: a timeline for Perfetto
-//! - [`page`]: a page with histograms and the slowest ticks
+//! - `times`: histograms of host times
+//! - `latency`: wait, wake-up, computation and sending per node; transport per topic
+//! - `age`: how old the measurements are that a command rests on
+//! - `path`: the nodes and hops that the end of a tick waited for
+//! - `pacing`: deadlines of a paced run
+//! - `figures`: all of these
+//! - `table`: all of it on the terminal
+//! - `trace`: a timeline for Perfetto
+//! - `page`: a page with histograms and the slowest ticks
 
 mod age;
 mod figures;
