@@ -57,7 +57,7 @@ use std::path::Path;
 /// Reads the manifest at `path`, which may name the components of this package ([`COMPONENTS`]).
 ///
 /// # Errors
-/// The first problem, with its place and what to do.
+/// All problems, each with its place and what to do.
 pub fn load(path: impl AsRef<Path>) -> Result<Manifest, Problem> {
     Manifest::load(path.as_ref(), &[], COMPONENTS)
 }

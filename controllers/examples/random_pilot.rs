@@ -1,6 +1,6 @@
 //! A random pilot: writes a recording of one stick as a hand moves it, and nothing on the other.
 //!
-//! `cargo run -p controllers --example random_pilot -- roll 1 > manifests/sticks/roll.csv` and
+//! `cargo run -p hummingbus-controllers --example random_pilot -- roll 1 > manifests/sticks/roll.csv` and
 //! `… -- pitch 2 > manifests/sticks/pitch.csv` wrote the two that are stored; a test writes them anew.
 //!
 //! The hand makes one move after another, drawn at random: a rest, a pulse, a step held for a while, each of the

@@ -118,10 +118,13 @@ pub const PURE_NUMBER: Dimension = Dimension { name: "a pure number", units: &[(
 pub const RATIO: Dimension = Dimension { name: "a ratio", units: &[("1", 1.0), ("%", 1e-2)] };
 
 /// Velocities.
-pub const VELOCITY: Dimension = Dimension {
-    name: "velocity",
-    units: &[("m/s", 1.0), ("cm/s", 1e-2), ("mm/s", 1e-3), ("knot", 1852.0 / 3600.0)],
-};
+pub const VELOCITY: Dimension =
+    Dimension { name: "velocity", units: &[("m/s", 1.0), ("cm/s", 1e-2), ("mm/s", 1e-3)] };
+
+/// Velocities of the air, which weather services give in knots. No log of a vehicle is in them: there they would only be
+/// one more unit that a wrong scale could be taken for.
+pub const WIND_VELOCITY: Dimension =
+    Dimension { name: "velocity", units: &[("m/s", 1.0), ("knot", 1852.0 / 3600.0)] };
 
 /// Forces; the gram-force by standard gravity.
 pub const FORCE: Dimension =

@@ -47,8 +47,7 @@ impl Descendants {
     /// Takes note of children that have ended, but for `own`, which somebody waits for.
     pub fn reap(&self, own: &[u32]) {
         let is_own = |child: &Pid| own.contains(&child.as_raw_nonzero().get().cast_unsigned());
-        let came = children().into_iter().filter(|child| !self.before.contains(child) && !is_own(child));
-        for child in came {
+        for child in self.left().into_iter().filter(|child| !is_own(child)) {
             let _ = waitpid(Some(child), WaitOptions::NOHANG);
         }
     }

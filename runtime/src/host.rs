@@ -158,7 +158,12 @@ impl Thread {
         self.is_cancelled.store(true, Ordering::SeqCst);
         self.control.set_epoch(self.control.epoch());
         let mut waited = Duration::ZERO;
-        while waited < GRACE && self.end().is_none() && self.handle.is_some() {
+        while waited < GRACE {
+            match self.end() {
+                Some(End::Failed(message)) => return End::Failed(message),
+                Some(_) => return End::Cancelled,
+                None => {}
+            }
             std::thread::sleep(POLL);
             waited += POLL;
         }

@@ -1,5 +1,9 @@
-//! The overseer in a simulated run: processes that die, freeze, come late and hear late, a clock that jumps, requests,
-//! and any order of events, all drawn from one seed. When the faults stop, the run must end.
+//! The overseer in a simulated run: processes that die, freeze, come late, hear late or cannot be started, a clock that
+//! jumps, holds, and any order of events, all drawn from one seed. When the faults stop, the run must end.
+//!
+//! Not drawn, and left to the runs of real processes: swaps and stops that are asked for in flight, watchdogs that
+//! expire, sidecars, and files that cannot be written. `SIMULATED_RUNS` says how many seeds are flown, and
+//! `SIMULATED_SEED` with which they begin.
 
 use crate::overseer::{Death, Overseer};
 use crate::program::{Executable, OnExit, Program, Successor};
@@ -114,6 +118,13 @@ fn plan() -> Plan {
             node("c", vec![input(0, 0), input(1, 0)], &[]),
         ],
     }
+}
+
+/// Whether samples that count are new, or were sent as a shadow's before the promotion.
+#[derive(Clone, Copy, PartialEq)]
+enum Sending {
+    Computed,
+    Again,
 }
 
 impl World {
@@ -266,7 +277,7 @@ impl World {
             self.processes[index].membership = membership;
             self.slots[slot].acknowledged = self.epoch;
             // A backup that is promoted has its shadow samples count.
-            (0..tick).for_each(|tick| self.send(index, node, generation, tick));
+            (0..tick).for_each(|tick| self.send(index, tick, Sending::Again));
             return Doing::Computing;
         }
         if tick >= self.end_tick {
@@ -286,12 +297,13 @@ impl World {
         if self.granted <= tick || !self.plan.nodes[node].inputs.iter().all(has) {
             return Doing::Computing;
         }
-        self.send(index, node, generation, tick);
+        self.send(index, tick, Sending::Computed);
         Doing::Sent
     }
 
     /// Sends the samples of `tick` that count.
-    fn send(&mut self, index: usize, node: usize, generation: u32, tick: u32) {
+    fn send(&mut self, index: usize, tick: u32, sending: Sending) {
+        let Process { node, generation, .. } = self.processes[index];
         let own = &self.processes[index].membership.nodes[node];
         for (output, topic) in self.plan.nodes[node].outputs.iter().map(|output| output.topic).enumerate() {
             let take_over = own.take_over_ticks[output];
@@ -300,8 +312,12 @@ impl World {
                 Some(backup) if backup.generation == generation => tick >= take_over,
                 Some(_) | None => false,
             };
-            if counts && self.sent[topic] <= tick {
-                assert_eq!(self.sent[topic], tick, "tick {} of topic {topic} is skipped", self.sent[topic]);
+            if counts && (sending == Sending::Computed || self.sent[topic] <= tick) {
+                assert_eq!(
+                    self.sent[topic], tick,
+                    "{node}.{generation} writes tick {tick} of topic {topic} when tick {} is due",
+                    self.sent[topic]
+                );
                 self.sent[topic] = tick + 1;
                 let other = self.writers.insert((topic, tick), generation);
                 assert_eq!(other, None, "two write tick {tick} of topic {topic}");
@@ -469,6 +485,13 @@ fn live(seed: u64) -> (State, Vec<String>) {
             }
         }
         if overseer.state.is_over() {
+            if overseer.state == State::Stopped {
+                assert!(
+                    world.sent.iter().all(|&sent| sent == world.end_tick),
+                    "samples are missing: {:?}",
+                    world.sent
+                );
+            }
             return (overseer.state, world.log);
         }
     }
@@ -555,6 +578,9 @@ fn whatever_dies_hangs_or_comes_late_the_run_ends_and_every_sample_has_one_write
         let (state, _) = std::panic::catch_unwind(|| live(seed)).unwrap_or_else(|_| panic!("seed {seed}"));
         *ends.entry(format!("{state:?}")).or_insert(0) += 1;
     }
-    // Both ways out are taken.
-    assert!(ends.len() == 2 || seeds < 100, "{ends:?}");
+    // Runs come to their end, and runs are aborted because of what nobody can answer.
+    let share =
+        |state: State| f64::from(ends.get(&format!("{state:?}")).copied().unwrap_or(0)) / seeds as f64;
+    let shares = [State::Stopped, State::Failed].map(share);
+    assert!(shares.iter().all(|&share| share > 0.2) || seeds < 100, "{ends:?}");
 }

@@ -404,7 +404,8 @@ fn a_column_map_without_a_unit_or_with_a_wrong_one() {
     refused_replay(&flight(), &["--set", &missing])
         .says(&["process `player`", "missing field `columns.time.unit`"]);
     let wrong = format!("{columns}.unit=h");
-    refused_replay(&flight(), &["--set", &wrong]).says(&["`time` has the unit `h`", "`s` or `ms` or `us`"]);
+    refused_replay(&flight(), &["--set", &wrong])
+        .says(&["`time` has the unit `h`", "\"s\" or \"ms\" or \"us\""]);
 }
 
 #[test]

@@ -103,7 +103,8 @@ fn what_free_flight_does_not_know_is_refused() {
     refused("kind = \"plant\"", "kind = \"plant\"\nparameters.§crash_speed_m_s = 2.0")
         .says(&["touches nothing"]);
     refused("kind = \"plant\"", "kind = \"plant\"\nparameters.§backend = \"bullet\"").says(&[
-        "unknown variant `bullet`",
+        "`backend` must be one of",
+        "found `bullet`",
         "`newton-euler`",
         "`rapier`",
     ]);

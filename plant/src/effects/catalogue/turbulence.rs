@@ -1,7 +1,7 @@
 //! Gusts.
 
 use crate::effects::kind::{Action, Advance, EffectKind, Randomness, Values};
-use diagnostics::unit::VELOCITY;
+use diagnostics::unit::WIND_VELOCITY;
 
 pub static EFFECT: EffectKind = EffectKind {
     name: "turbulence",
@@ -23,7 +23,7 @@ effect_parameters! {
     struct Parameters {
         wind_at_20_ft: {
             meaning: "W: mean wind 20 feet above the ground; the mean itself is for `wind`",
-            dimension: VELOCITY, min: 0.0, max: 25.0, neutral: Some(0.0), nominal: 7.717,
+            dimension: WIND_VELOCITY, min: 0.0, max: 25.0, neutral: Some(0.0), nominal: 7.717,
             nominal_source: "light turbulence of MIL-F-8785C: 15 knots",
         },
     }

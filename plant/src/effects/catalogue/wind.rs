@@ -1,7 +1,7 @@
 //! Steady wind. By itself it does nothing: drag and inflow do, which see the velocity through the air.
 
 use crate::effects::kind::{Action, Advance, EffectKind, Quantity, Values};
-use diagnostics::unit::VELOCITY;
+use diagnostics::unit::WIND_VELOCITY;
 use nalgebra::Vector3;
 
 pub static EFFECT: EffectKind = EffectKind {
@@ -20,15 +20,15 @@ pub static EFFECT: EffectKind = EffectKind {
 effect_parameters! {
     struct Parameters {
         x: {
-            meaning: "velocity of the air along x of the world", dimension: VELOCITY, min: -30.0, max: 30.0,
+            meaning: "velocity of the air along x of the world", dimension: WIND_VELOCITY, min: -30.0, max: 30.0,
             neutral: Some(0.0), nominal: 3.0, nominal_source: "a light breeze: 3 m/s is Beaufort 2",
         },
         y: {
-            meaning: "velocity of the air along y of the world", dimension: VELOCITY, min: -30.0, max: 30.0,
+            meaning: "velocity of the air along y of the world", dimension: WIND_VELOCITY, min: -30.0, max: 30.0,
             neutral: Some(0.0), nominal: 1.0, nominal_source: "a light breeze: 3 m/s is Beaufort 2",
         },
         z: {
-            meaning: "velocity of the air along z of the world", dimension: VELOCITY, min: -30.0, max: 30.0,
+            meaning: "velocity of the air along z of the world", dimension: WIND_VELOCITY, min: -30.0, max: 30.0,
             neutral: Some(0.0), nominal: 0.2, nominal_source: "a light breeze: 3 m/s is Beaufort 2",
         },
     }
