@@ -1,6 +1,8 @@
 //! docs/extending.md: its diffs fit the tree, and their new files are those that are compiled here.
 
+use std::io::Write as _;
 use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
 
 fn root() -> PathBuf {
     env!("CARGO_MANIFEST_DIR").into()
@@ -70,4 +72,22 @@ fn every_diff_of_the_page_fits_the_tree_and_every_new_file_is_compiled_as_it_sta
             assert!(hunk.iter().any(|line| line.starts_with('+')), "{path}: a hunk adds nothing");
         }
     }
+}
+
+/// As a reader would: one after another, so that no two are about the same lines.
+#[test]
+fn git_applies_every_diff_of_the_page() {
+    let page = std::fs::read_to_string(root().join("docs/extending.md")).unwrap();
+    let diffs: String =
+        page.split("```diff\n").skip(1).map(|rest| rest.split("```").next().unwrap()).collect();
+    let mut git = Command::new("git")
+        .args(["apply", "--check", "-"])
+        .current_dir(root())
+        .stdin(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    git.stdin.take().unwrap().write_all(diffs.as_bytes()).unwrap();
+    let ended = git.wait_with_output().unwrap();
+    assert!(ended.status.success(), "{}", String::from_utf8_lossy(&ended.stderr));
 }
