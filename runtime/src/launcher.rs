@@ -88,7 +88,8 @@ impl<'a> Launcher<'a> {
     }
 
     /// What the nodes' processes start themselves is ended with the run, however it was detached: this process becomes
-    /// the parent of orphans (`PR_SET_CHILD_SUBREAPER`) while the run flies.
+    /// the parent of orphans (`PR_SET_CHILD_SUBREAPER`) while the run flies. For a process that flies one run at a time and starts no other
+    /// children meanwhile: those would be ended with the run.
     #[must_use]
     pub fn adopting_orphans(mut self) -> Self {
         self.adopts_orphans = true;

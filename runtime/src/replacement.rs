@@ -225,12 +225,12 @@ impl<'a> Replacements<'a> {
         self.plan.slot(node, generation)
     }
 
-    /// Whether every living slot agrees with the newest membership.
+    /// Whether every living instance has acknowledged the newest membership.
     pub fn all_agree(&self) -> bool {
         self.disagreeing().is_none()
     }
 
-    /// A living slot that does not agree with the newest membership yet: its node and generation.
+    /// A living instance that has not acknowledged the newest membership yet: its node and generation.
     pub fn disagreeing(&self) -> Option<(usize, u32)> {
         self.members().find(|&(node, generation)| {
             let slot = self.slot(node, generation);
@@ -330,7 +330,7 @@ impl<'a> Replacements<'a> {
         self.view.is_ready(slot, Phase::Connecting)
     }
 
-    /// Starts the processes of those whose node has a free seat, and takes every backup as far as it can
+    /// Starts the processes of those whose node has a free slot, and takes every backup as far as it can
     /// go now.
     pub fn advance(&mut self) {
         self.start_pending();
@@ -355,11 +355,11 @@ impl<'a> Replacements<'a> {
 
     fn start_backup(&mut self, pending: Pending) {
         let node = pending.successor.node;
-        // A backup that failed leaves its generation unused, and its seat is the active one's other.
+        // A backup that failed leaves its generation unused, and its slot is the primary's other one.
         let active = self.membership.nodes[node].primary.generation;
         let next = self.nodes[node].newest_generation + 1;
-        let is_other_seat = self.slot(node, next) != self.slot(node, active);
-        let generation = if is_other_seat { next } else { next + 1 };
+        let is_other_slot = self.slot(node, next) != self.slot(node, active);
+        let generation = if is_other_slot { next } else { next + 1 };
         let name = self.plan.nodes[node].name.clone();
         self.view.clear_slot(self.slot(node, generation));
         self.nodes[node].newest_generation = generation;
@@ -669,7 +669,7 @@ impl<'a> Replacements<'a> {
         self.view.computing().all(|slot| self.view.done(slot) >= taken)
     }
 
-    /// The predecessor is gone: its seat is free, and nothing of it stays.
+    /// The predecessor is gone: its slot is free, and nothing of it stays.
     fn close(&mut self, node: usize) {
         let Some(backup) = self.nodes[node].backup.take() else { return };
         if let Some(retired) = backup.retired {

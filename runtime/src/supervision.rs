@@ -95,7 +95,7 @@ pub struct Supervisor<'a> {
     pub seen_stops: usize,
     /// Hears what happens.
     pub on: &'a mut dyn FnMut(RunEvent<'_>),
-    /// How far the run had come when it last came on, and when that was on the watchdogs' clock.
+    /// Where the run keeps its files.
     pub run_dir: &'a Path,
     /// What the processes started, where that is to end with the run.
     pub descendants: Option<&'a Descendants>,
