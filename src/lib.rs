@@ -32,17 +32,17 @@
 //! | [`flights`], [`identify`] | measured flights, and what they show that a vehicle file lacks |
 #![forbid(unsafe_code)]
 
+#[cfg(test)]
+mod backups;
 mod check;
+mod components;
 #[cfg(test)]
 mod extremes;
-mod kinds;
 #[cfg(test)]
 mod properties;
-#[cfg(test)]
-mod successors;
 
 pub use check::{Checked, check, check_text};
-pub use kinds::COMPONENTS;
+pub use components::COMPONENTS;
 pub use runtime::ctl::protocol::{Answer, Request};
 pub use runtime::ctl::server::Remote;
 pub use runtime::event::{Progress, RunEvent, StopToken};

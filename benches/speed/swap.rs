@@ -1,4 +1,4 @@
-//! What a swap costs: the start of the successor, the clock's hold, and the run as a whole.
+//! What a swap costs: the start of the backup, the clock's hold, and the run as a whole.
 
 use crate::report::{Result, Spread, number, run_manifest};
 use serde_json::Value;
@@ -52,7 +52,7 @@ fn print(pace: &str, plain: &[Value], swapped: &[Value]) -> Result<()> {
         let found = swapped.iter().flat_map(successions).map(|succession| number(succession, key));
         Ok(Spread::of(found.collect::<Result<Vec<f64>>>()?))
     };
-    println!("  {pace}: start of the successor's process  {}", all("start_ms")?);
+    println!("  {pace}: start of the backup's process  {}", all("start_ms")?);
     println!("  {pace}: clock held                        {}", all("hold_ms")?);
     println!("  {pace}: run with swaps − run without, per swap  {}", Spread::of(cost));
     if pace != "free" {

@@ -140,9 +140,9 @@ pub enum BusError {
         /// The layout the publisher announced.
         found: String,
     },
-    /// A successor sends other bytes than the process it would succeed.
+    /// A backup sends other bytes than the process it would succeed.
     #[error(
-        "layout mismatch on topic {topic}: the successor of node `{node}` sends\n{found}\nbut the topic carries\n\
+        "layout mismatch on topic {topic}: the backup of node `{node}` sends\n{found}\nbut the topic carries\n\
          {expected}\nBuild both against the same message definition"
     )]
     BackupLayout {
@@ -152,7 +152,7 @@ pub enum BusError {
         topic: String,
         /// The layout the topic carries.
         expected: String,
-        /// The layout the successor was built with.
+        /// The layout the backup was built with.
         found: String,
     },
     /// The type the manifest states for an output is not the type the node publishes.

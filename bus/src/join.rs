@@ -5,7 +5,7 @@ use std::path::PathBuf;
 /// The environment variable that names the node to itself.
 pub const NODE_VARIABLE: &str = "HUMMINGBUS_NODE";
 
-/// The environment variable that counts the processes of a node: 0 for the first, successors count up.
+/// The environment variable that counts the processes of a node: 0 for the first, backups count up.
 pub const GENERATION_VARIABLE: &str = "HUMMINGBUS_GENERATION";
 
 /// Which part of which run a process or thread takes.

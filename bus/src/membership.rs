@@ -25,9 +25,9 @@ pub struct NodeInstances {
     pub primary: Instance,
     /// The process that shadows it.
     pub backup: Option<Instance>,
-    /// The tick from which on the successor goes on by itself; `u32::MAX` where it only shadows.
+    /// The tick from which on the backup goes on by itself; `u32::MAX` where it only shadows.
     pub take_over_tick: u32,
-    /// Per output: the tick from which on the successor's samples count. After a crash some outputs of the
+    /// Per output: the tick from which on the backup's samples count. After a crash some outputs of the
     /// take-over tick may have been sent already.
     pub take_over_ticks: Vec<u32>,
 }
@@ -102,7 +102,7 @@ impl NodeInstances {
         std::iter::once(&self.primary).chain(&self.backup)
     }
 
-    /// The tick from which on the successor's samples of topic `topic` count.
+    /// The tick from which on the backup's samples of topic `topic` count.
     pub(crate) fn topic_take_over_tick(&self, topic: usize) -> u32 {
         let mut outputs = self.primary.plan.outputs.iter().zip(&self.take_over_ticks);
         let found = outputs.find(|(output, _)| output.topic == topic);

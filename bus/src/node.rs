@@ -284,7 +284,7 @@ impl Node {
         Ok(index)
     }
 
-    /// Connects the declared ports; returns when every node of the run has done so. A successor connects
+    /// Connects the declared ports; returns when every node of the run has done so. A backup connects
     /// while the clock holds the tick from which on it computes.
     ///
     /// # Errors
@@ -355,7 +355,7 @@ impl Node {
             .collect()
     }
 
-    /// Announces the type of a topic, or checks that a successor sends what was announced.
+    /// Announces the type of a topic, or checks that a backup sends what was announced.
     fn announce(&self, topic: usize, schema: &Schema) -> Result<(), BusError> {
         let path = announcement::topic_path(&self.run_dir, topic);
         if self.generation == 0 {

@@ -155,7 +155,7 @@ pub struct Plan {
     pub nodes: Vec<NodePlan>,
 }
 
-/// Where the plan of a successor lies.
+/// Where the plan of a backup lies.
 #[must_use]
 pub fn backup_path(run_dir: &Path, node: usize, generation: u32) -> PathBuf {
     run_dir.join(format!("node-{node}.{generation}.json"))
@@ -241,7 +241,7 @@ impl Plan {
         Capacity {
             queued_samples,
             history_samples: if restarts { samples(ticks) } else { 1 },
-            // Each reader and its successor, a successor of the publisher, and successors that read more than
+            // Each reader and its backup, a backup of the publisher, and backups that read more than
             // their predecessors.
             subscribers: SLOTS_PER_NODE * self.nodes.iter().filter(reads).count() + 3,
             nodes: SLOTS_PER_NODE * self.nodes.len() + 1,

@@ -1,7 +1,7 @@
 //! The state that a node hands over: stated after every tick, in shared memory that outlives the process.
 //!
 //! A ring holds the state at the start of each of the last ticks, as many as a slot can be ahead of its
-//! successor. It is stated before the tick's outputs are sent: whatever was sent, the state that follows it
+//! backup. It is stated before the tick's outputs are sent: whatever was sent, the state that follows it
 //! can be read, also when the process died right after.
 
 use crate::announcement::Announcement;
@@ -107,7 +107,7 @@ fn word_of(bytes: &[u8]) -> u64 {
     u64::from_le_bytes(word)
 }
 
-/// A slot is at most a window ahead of its successor; one state more belongs to the tick that it computes.
+/// A slot is at most a window ahead of its backup; one state more belongs to the tick that it computes.
 fn entries(plan: &Plan) -> usize {
     let longest = plan.nodes.iter().map(|node| node.period_ticks).max().unwrap_or(1);
     (plan.window_ticks + longest + 2) as usize

@@ -2,7 +2,7 @@
 //! without a jump of the demanded wrench.
 //!
 //! A law finds its own state as it left it. Of another's it takes what means the same to all, the integrators, and
-//! sets the rest by what is measured. What was asked for last and the successor does not ask for is added to its demand
+//! sets the rest by what is measured. What was asked for last and the backup does not ask for is added to its demand
 //! and fades out (`TIME_CONSTANT_S`).
 #![allow(non_snake_case, reason = "a trailing _B names the frame a vector is written in, _N the newton")]
 
@@ -13,7 +13,7 @@ use crate::law::{Law, Predecessor};
 use nalgebra::Vector3;
 use vehicles::Vehicle;
 
-/// With which time constant the part of a predecessor's wrench fades that its successor does not ask for, s.
+/// With which time constant the part of a predecessor's wrench fades that its backup does not ask for, s.
 /// Tuned, no source: about that of the Hummingbird's motors, which would smooth a jump likewise.
 const TIME_CONSTANT_S: f64 = 0.1;
 

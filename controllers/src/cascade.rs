@@ -346,7 +346,7 @@ mod tests {
     }
 
     #[test]
-    fn a_successor_goes_on_from_the_integrators_and_from_where_the_vehicle_is() {
+    fn a_backup_goes_on_from_the_integrators_and_from_where_the_vehicle_is() {
         let wrench = RotorWrench { thrust_N: 5.2, torque_B_N_m: Vector3::new(1e-3, -2e-3, 1e-3) };
         let measured = HoverMotion { roll_rad: 0.05, yaw_rad: 1.0, ..level() };
         let before = Integrals { lift: 0.3, turn: [0.1, f64::NAN, 9.0] };
@@ -356,7 +356,7 @@ mod tests {
     }
 
     #[test]
-    fn a_successor_that_knows_only_the_last_command_asks_for_its_thrust() {
+    fn a_backup_that_knows_only_the_last_command_asks_for_its_thrust() {
         let wrench = RotorWrench { thrust_N: 5.2, torque_B_N_m: Vector3::zeros() };
         let mut state = law().continued(&after(wrench, None), 1.0, &level());
         let asked = law().demand(&mut state, &wrench, &hold(), &level()).wrench;

@@ -54,7 +54,7 @@ pub struct ControlOutput {
 
 /// What the integrators of a law ask for, in units that mean the same to all laws.
 ///
-/// They are accelerations, not integrals of an error, so that a successor with other gains goes on without a jump.
+/// They are accelerations, not integrals of an error, so that a backup with other gains goes on without a jump.
 #[derive(Debug, Clone, Copy, PartialEq, Default, bus::Message)]
 #[repr(C)]
 #[message(type_name = "hummingbus_msgs/msg/ControlIntegrals")]

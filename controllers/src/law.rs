@@ -70,7 +70,7 @@ pub struct Predecessor<'a, S> {
     pub wrench: RotorWrench,
     /// What its integrators asked for; `None` where only its last command is known.
     pub integrals: Option<Integrals>,
-    /// Its state, where that is of the same type as the successor's.
+    /// Its state, where that is of the same type as the backup's.
     pub state: Option<&'a S>,
 }
 

@@ -213,7 +213,7 @@ mod tests {
     }
 
     #[test]
-    fn a_successor_goes_on_from_the_integrators_that_it_has_a_gain_for() {
+    fn a_backup_goes_on_from_the_integrators_that_it_has_a_gain_for() {
         let wrench = RotorWrench { thrust_N: 5.2, torque_B_N_m: Vector3::new(1e-3, -2e-3, 1e-3) };
         let before = after(wrench, Some(Integrals { lift: 9.0, turn: [0.1; 3] }));
         let integrals = law().continued(&before, 1.0, &level());
@@ -221,7 +221,7 @@ mod tests {
     }
 
     #[test]
-    fn a_successor_that_knows_only_the_last_command_asks_for_its_thrust() {
+    fn a_backup_that_knows_only_the_last_command_asks_for_its_thrust() {
         let wrench = RotorWrench { thrust_N: 5.2, torque_B_N_m: Vector3::zeros() };
         let measured = HoverMotion { roll_rad: 0.05, altitude_m: 0.99, ..level() };
         let mut integrals = law().continued(&after(wrench, None), 1.0, &measured);

@@ -375,7 +375,7 @@ impl Law for WallFollowLaw {
     ) -> Start<WallFollowState> {
         let measured = HoverMotion::by_ranges(input);
         let velocity = self.velocity.continued(from, &input.walls.velocity, &measured);
-        // A successor in flight goes on from where it is, not from where the run began.
+        // A backup in flight goes on from where it is, not from where the run began.
         Start { state: self.initial(velocity, None, &input.walls), wrench: from.wrench }
     }
 

@@ -232,7 +232,7 @@ fn an_lqr_without_a_solution_is_refused_with_a_reason() {
 fn swap<A: Law, B: Law>(before: &A, after: &B) -> (Vec<RotorWrench>, f64) {
     let trajectory = common::trajectory_from(0.0);
     let mut flight = Loop::new(Craft { seed: None, ..Craft::dragged(0) });
-    // Off the reference, so that the laws do not all ask for the same, and by less than what a successor may not go on
+    // Off the reference, so that the laws do not all ask for the same, and by less than what a backup may not go on
     // from: `geometric` answers 2 cm with 10 rad/s².
     flight.state.body.position_W_m += Vector3::new(0.015, -0.01, 0.02);
     flight.fly(before, &trajectory, 0.0, 0.3);
@@ -245,7 +245,7 @@ fn swap<A: Law, B: Law>(before: &A, after: &B) -> (Vec<RotorWrench>, f64) {
     (wrenches, greatest_m)
 }
 
-/// The first demand of the successor against its predecessor's last, and the distance that is left.
+/// The first demand of the backup against its predecessor's last, and the distance that is left.
 #[track_caller]
 fn assert_smooth<A: Law, B: Law>(name: &str, before: &A, after: &B, off_max_m: f64) {
     let (wrenches, greatest_m) = swap(before, after);

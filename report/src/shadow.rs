@@ -44,11 +44,11 @@ pub struct Step {
     pub field: String,
     /// Its unit.
     pub unit: String,
-    /// The successor's first value minus its predecessor's last, without its sign.
+    /// The backup's first value minus its predecessor's last, without its sign.
     pub step: f64,
     /// The same one sample earlier, between two samples of the predecessor.
     pub step_before: f64,
-    /// What the successor asked for otherwise than its predecessor in its last shadow sample.
+    /// What the backup asked for otherwise than its predecessor in its last shadow sample.
     pub law_difference: Option<f64>,
 }
 

@@ -49,7 +49,7 @@ pub struct Summary {
     pub warnings: Vec<Problem>,
 }
 
-/// What there is to say about a successor.
+/// What there is to say about a backup.
 #[derive(Debug, Serialize)]
 pub struct Succession {
     /// What became of it.
@@ -179,8 +179,8 @@ impl Summary {
         match (self.passed, refused) {
             (true, _) => write!(f, "passed"),
             (false, 0) => write!(f, "FAILED"),
-            (false, 1) => write!(f, "FAILED: a successor was refused"),
-            (false, _) => write!(f, "FAILED: {refused} successors were refused"),
+            (false, 1) => write!(f, "FAILED: a backup was refused"),
+            (false, _) => write!(f, "FAILED: {refused} backups were refused"),
         }
     }
 }

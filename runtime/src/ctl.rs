@@ -2,10 +2,10 @@
 //!
 //! - [`protocol`]: what can be asked of a run, and what it answers
 //! - [`server`]: the launcher's socket in the run directory
-//! - `desk`: what the launcher does with a request
+//! - `control`: what the launcher does with a request
 //! - [`client`]: the other end of the socket
 
 pub mod client;
-pub(crate) mod desk;
+pub(crate) mod control;
 pub mod protocol;
 pub mod server;

@@ -1,7 +1,7 @@
 //! A checked manifest in words and as JSON.
 
 use crate::graph::Graph;
-use crate::program::{Executable, OnExit, Program, Readiness, Successor};
+use crate::program::{BackupSpec, Executable, OnExit, Program, Readiness};
 use bus::plan::{Pace, Wait};
 use std::fmt::Write as _;
 
@@ -51,7 +51,7 @@ pub fn graph(graph: &Graph) -> String {
         }
         text += &succession(graph, index);
     }
-    for (name, program) in &graph.companions {
+    for (name, program) in &graph.sidecars {
         let ready = match program.ready {
             Readiness::Started => "",
             Readiness::Notify => "; tick 0 waits until it says that it is ready",
@@ -79,14 +79,14 @@ fn succession(graph: &Graph, node: usize) -> String {
         OnExit::Restart => "  if it ends, it is started again\n".to_owned(),
         OnExit::Stop | OnExit::Standby | OnExit::Ignore => String::new(),
     };
-    let successors = graph.successors.iter().filter(|successor| successor.node == node);
-    let lines = successors.map(|successor| {
-        let (what, join_tick) = (what(&successor.program), successor.join_tick);
-        match successor.take_over_tick {
+    let backups = graph.backups.iter().filter(|backup| backup.node == node);
+    let lines = backups.map(|backup| {
+        let (what, join_tick) = (what(&backup.program), backup.join_tick);
+        match backup.take_over_tick {
             Some(tick) => {
                 format!("  succeeded by {what} at tick {tick}, shadowing from tick {join_tick} on\n")
             }
-            None if successor.is_standby => format!("  if it ends, {what} is promoted, which shadows it\n"),
+            None if backup.is_standby => format!("  if it ends, {what} is promoted, which shadows it\n"),
             None => format!("  shadowed by {what}\n"),
         }
     });
@@ -102,22 +102,22 @@ fn succession(graph: &Graph, node: usize) -> String {
 
 /// The graph as JSON: the plan, with who succeeds whom and who takes no part.
 pub fn graph_json(graph: &Graph) -> String {
-    let successor = |successor: &Successor| {
+    let backup = |backup: &BackupSpec| {
         serde_json::json!({
-            "process": graph.plan.nodes[successor.node].name,
-            "what": what(&successor.program),
-            "join_tick": successor.join_tick,
-            "take_over_tick": successor.take_over_tick,
-            "is_standby": successor.is_standby,
-            "plan": successor.plan,
+            "process": graph.plan.nodes[backup.node].name,
+            "what": what(&backup.program),
+            "join_tick": backup.join_tick,
+            "take_over_tick": backup.take_over_tick,
+            "is_standby": backup.is_standby,
+            "plan": backup.plan,
         })
     };
     let mut value = serde_json::to_value(&graph.plan).unwrap_or_default();
     for (index, program) in graph.programs.iter().enumerate() {
         value["nodes"][index]["what"] = what(program).into();
     }
-    value["successors"] = graph.successors.iter().map(successor).collect();
+    value["backups"] = graph.backups.iter().map(backup).collect();
     value["warnings"] = serde_json::to_value(&graph.warnings).unwrap_or_default();
-    value["companions"] = graph.companions.iter().map(|(name, _)| name.clone()).collect();
+    value["sidecars"] = graph.sidecars.iter().map(|(name, _)| name.clone()).collect();
     serde_json::to_string_pretty(&value).unwrap_or_default()
 }

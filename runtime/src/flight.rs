@@ -21,7 +21,7 @@ pub struct Flight {
 /// The time in which one process was a node: its samples counted.
 #[derive(Debug)]
 struct Era {
-    /// The first tick that was its own. A successor noted ticks before, as a shadow: nobody read those.
+    /// The first tick that was its own. A backup noted ticks before, as a shadow: nobody read those.
     first_tick: u32,
     inputs: Vec<InputPlan>,
     noted: TickReader,
@@ -114,7 +114,7 @@ impl Flight {
         let mut found = self.eras_at(node, tick).filter_map(|era| era.noted.at(tick));
         let newest = found.next()?;
         let has_sent = |times: &TickTimes<'_>| times.sent_ns.iter().any(|&ns| ns > 0);
-        // A process that died may have sent the tick that its successor did again.
+        // A process that died may have sent the tick that its backup did again.
         if has_sent(&newest) { Some(newest) } else { found.find(has_sent).or(Some(newest)) }
     }
 
@@ -123,7 +123,7 @@ impl Flight {
         self.nodes[node].iter().rev().filter(move |era| era.first_tick <= tick)
     }
 
-    /// The inputs that `node` has at `tick`: a successor may read other topics.
+    /// The inputs that `node` has at `tick`: a backup may read other topics.
     pub fn inputs(&self, node: usize, tick: u32) -> &[InputPlan] {
         self.eras_at(node, tick).next().map_or(&[], |era| &era.inputs)
     }

@@ -6,8 +6,9 @@
 //! - `periods`: nodes and outputs that compute once or never count on
 //! - `ranges`: ranges of numbers by their units
 //! - `evaluations`: what is judged after the run
-//! - `successors`: who shadows, takes over or stands by
+//! - `backups`: who shadows, takes over or stands by
 
+mod backups;
 mod evaluations;
 mod inputs;
 mod outputs;
@@ -16,15 +17,14 @@ mod periods;
 mod processes;
 mod ranges;
 mod recorders;
-mod successors;
 mod wiring;
 
-pub use successors::successor_of;
+pub use backups::backup_of;
 
 use crate::manifest::Manifest;
 use crate::placement;
 use crate::problem::Problem;
-use crate::program::{Program, Successor};
+use crate::program::{BackupSpec, Program};
 use bus::plan::Plan;
 use parameters::{Notes, RunLength};
 use std::path::PathBuf;
@@ -45,9 +45,9 @@ pub struct Graph {
     /// What to start, in the order of the plan's nodes.
     pub programs: Vec<Program>,
     /// Who stands by or takes over, in the order in which they join.
-    pub successors: Vec<Successor>,
+    pub backups: Vec<BackupSpec>,
     /// Processes that take no part in the ticks: their names and what to start.
-    pub companions: Vec<(String, Program)>,
+    pub sidecars: Vec<(String, Program)>,
     /// The vehicle, scene and gains files the processes name, each once.
     pub models: Vec<PathBuf>,
     /// What is odd and flies all the same; `check` and `run` tell it.
@@ -61,7 +61,7 @@ impl Graph {
     /// What is wrong with it, each with its place; what a fault hides from sight is not told beside it.
     pub fn build(manifest: &Manifest) -> Result<Self, Problem> {
         let members = processes::members(manifest)?;
-        let companions = processes::companions(manifest)?;
+        let sidecars = processes::sidecars(manifest)?;
         processes::require_own_logs(manifest)?;
         let wiring = wire(manifest, &members, None)?;
         let mut plan = plan(manifest, wiring)?;
@@ -77,11 +77,11 @@ impl Graph {
         }))?;
         recorders::require_one_recorder(manifest, &members)?;
         recorders::require_whole_recording(manifest, &members, &plan.nodes)?;
-        let successors = successors::all(manifest, &plan, &members, &mut notes)?;
+        let backups = backups::all(manifest, &plan, &members, &mut notes)?;
         let programs: Vec<Program> = members.into_iter().map(|member| member.program).collect();
         evaluations::check(manifest, &plan, &programs, &mut notes)?;
         let (models, warnings) = notes.into_parts(manifest);
-        Ok(Self { plan, programs, successors, companions, models, warnings })
+        Ok(Self { plan, programs, backups, sidecars, models, warnings })
     }
 }
 

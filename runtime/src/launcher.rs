@@ -1,7 +1,6 @@
 //! Launches runs: from a checked manifest to the outcome of its run.
 
-use crate::companions::Companions;
-use crate::ctl::desk::Desk;
+use crate::ctl::control::ControlServer;
 use crate::ctl::server::{self, Remote};
 use crate::descendants::Descendants;
 use crate::event::{RunEvent, StopToken};
@@ -14,6 +13,7 @@ use crate::overseer::Overseer;
 use crate::processes::Processes;
 use crate::replacement::{Replacements, Report};
 use crate::run_dir::RunDir;
+use crate::sidecars::Sidecars;
 use crate::supervision::{Supervisor, Timing};
 use crate::supervisor::State;
 use crate::view::View;
@@ -155,17 +155,17 @@ impl<'a> Launcher<'a> {
             plan,
             control: &control,
             processes: Processes::new(self.host, control.clone()),
-            companions: Companions::new(&exe, dir, &clock),
+            sidecars: Sidecars::new(&exe, dir, &clock),
             clock: &clock,
             spent: vec![(0, 0); plan.nodes.len()],
             overseer: Overseer {
                 plan,
                 state: State::Starting,
-                replacements: Replacements::new(plan, view, &graph.programs, &graph.successors),
+                replacements: Replacements::new(plan, view, &graph.programs, &graph.backups),
                 notes: Vec::new(),
                 has_answered: false,
             },
-            desk: Desk::open(dir, plan, &control, self.remote, self.requests)?,
+            control_server: ControlServer::open(dir, plan, &control, self.remote, self.requests)?,
             swaps: Vec::new(),
             requests: 0,
             stop: &self.stop,
@@ -196,13 +196,13 @@ fn require_host(host: &Host, manifest: &Manifest, graph: &Graph) -> Result<()> {
     for (program, node) in graph.programs.iter().zip(&graph.plan.nodes) {
         host.require(&node.name, program)?;
     }
-    for successor in &graph.successors {
-        host.require(&successor.plan.name, &successor.program)?;
+    for backup in &graph.backups {
+        host.require(&backup.plan.name, &backup.program)?;
     }
     let run = &manifest.content.run;
     let core = manifest.content.process.iter().find(|(_, process)| process.cpu.is_some());
     let asked = [
-        graph.companions.first().map(|(name, _)| format!("process `{name}`: `lockstep = false`")),
+        graph.sidecars.first().map(|(name, _)| format!("process `{name}`: `lockstep = false`")),
         core.map(|(name, _)| format!("process `{}`: `cpu`", name.get_ref())),
         run.clock_cpu.as_ref().map(|_| "`run.clock_cpu`".to_owned()),
         run.lock_memory.then(|| "`run.lock_memory`".to_owned()),

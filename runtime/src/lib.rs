@@ -2,7 +2,6 @@
 //! everything down again.
 
 pub mod clean;
-mod companions;
 pub mod ctl;
 mod descendants;
 pub mod describe;
@@ -25,6 +24,7 @@ pub mod registry;
 pub mod replacement;
 mod role;
 pub mod run_dir;
+mod sidecars;
 #[cfg(test)]
 mod simulation;
 mod spawn;

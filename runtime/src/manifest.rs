@@ -5,7 +5,7 @@
 //! - `overrides`: the values given with `--set`
 //! - `tree`: tables with the places of their values, merged
 //! - `sets`: vehicles of process sets become processes
-//! - `succession`: a successor's differences become a whole process
+//! - `succession`: a backup's differences become a whole process
 //! - `finite`: no number is infinite or none
 //! - `builder`: a manifest that is built in code
 //! - `content`: the types that the whole is read into
@@ -127,7 +127,7 @@ impl Manifest {
         self.sources.is_one_text(a.start, b.start)
     }
 
-    /// This manifest with one more `[[swap]]`-like successor of `process`, whose differences are the TOML
+    /// This manifest with one more `[[swap]]`-like backup of `process`, whose differences are the TOML
     /// `with_text`: the manifest that its places refer to, and the whole process.
     ///
     /// # Errors
@@ -168,7 +168,7 @@ fn content(sources: &Sources, tree: DeTable<'_>) -> Result<Content, Problem> {
     })
 }
 
-/// Everything that the sources say, with sets expanded and successors made whole.
+/// Everything that the sources say, with sets expanded and backups made whole.
 fn whole_tree(sources: &Sources) -> Result<DeTable<'_>, Problem> {
     // In every file, also where another one's number takes the place of what is none.
     sources.files().try_for_each(|file| finite::require(&sources.table(file)?, "", sources))?;

@@ -337,7 +337,7 @@ fn claim_new(path: &Path) -> io::Result<Option<(File, Option<PathBuf>)>> {
         match old {
             Attempt::Held => return Ok(None),
             Attempt::Gone => {}
-            // Locked until its name is gone: nobody removes a successor instead.
+            // Locked until its name is gone: nobody removes a backup instead.
             Attempt::Locked(old) => {
                 if let Some(words) = RECORDING.objection(&old)? {
                     return Err(io::Error::other(words));
@@ -436,7 +436,7 @@ impl Drop for LogClaim {
     }
 }
 
-/// Opens the log at `path` to write at its end, one that was claimed or one that a successor brings with it.
+/// Opens the log at `path` to write at its end, one that was claimed or one that a backup brings with it.
 ///
 /// # Errors
 /// If something else is there.

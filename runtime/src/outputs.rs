@@ -185,13 +185,13 @@ fn writer_of(real: &Path) -> Option<String> {
     Some(format!("run {} of {} (launcher {})", entry.run_id, entry.manifest.display(), entry.launcher))
 }
 
-/// The logs that the processes of `graph` name, each once: a successor writes to that of its predecessor.
+/// The logs that the processes of `graph` name, each once: a backup writes to that of its predecessor.
 fn logs(graph: &Graph) -> Vec<Output> {
     let nodes = graph.programs.iter().zip(&graph.plan.nodes).map(|(program, node)| (&node.name, program));
-    let companions = graph.companions.iter().map(|(name, program)| (name, program));
-    let successors = graph.successors.iter().map(|other| (&other.plan.name, &other.program));
+    let sidecars = graph.sidecars.iter().map(|(name, program)| (name, program));
+    let backups = graph.backups.iter().map(|other| (&other.plan.name, &other.program));
     let mut logs: Vec<Output> = Vec::new();
-    for (name, program) in nodes.chain(companions).chain(successors) {
+    for (name, program) in nodes.chain(sidecars).chain(backups) {
         let Some(path) = &program.log else { continue };
         let what = format!("the log of `{name}`");
         if !logs.iter().any(|log| log.what == what && is_same(&log.path, path)) {
@@ -204,7 +204,7 @@ fn logs(graph: &Graph) -> Vec<Output> {
 
 /// The files that a run of `graph` reads.
 fn inputs(manifest: &Manifest, graph: &Graph) -> Vec<PathBuf> {
-    let nodes = graph.plan.nodes.iter().chain(graph.successors.iter().map(|successor| &successor.plan));
+    let nodes = graph.plan.nodes.iter().chain(graph.backups.iter().map(|backup| &backup.plan));
     let data = nodes.filter_map(|node| node.parameters.get("data")?.as_str().map(PathBuf::from));
     let files = manifest.included.iter().chain(&graph.models).cloned();
     std::iter::once(manifest.path.clone()).chain(files).chain(data).collect()

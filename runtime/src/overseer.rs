@@ -41,7 +41,7 @@ impl Overseer<'_> {
     /// Whether an end without an error is one in good order.
     pub fn has_done_its_part(&self, role: Role) -> bool {
         match role {
-            Role::Companion { .. } => true,
+            Role::Sidecar { .. } => true,
             Role::Clock => self.replacements.view.completed_ticks() >= self.replacements.view.end_tick(),
             Role::Node { node, generation } => {
                 let has_completed = self.replacements.view.has_completed(self.plan.slot(node, generation));
@@ -107,7 +107,7 @@ impl Overseer<'_> {
                 {
                     return Ok(false);
                 }
-                if self.tell(Event::SuccessorFailed) == Action::Refuse {
+                if self.tell(Event::BackupFailed) == Action::Refuse {
                     let tick = self.replacements.view.done(self.plan.slot(node, generation));
                     let reason = match self.replacements.stage(node) {
                         Some(Stage::Starting) => format!("{} (it had not joined yet)", death.words),
@@ -137,7 +137,7 @@ impl Overseer<'_> {
         let vacant = self.replacements.is_vacant(node);
         if !vacant {
             let name = &self.plan.nodes[node].name;
-            self.notes.push(format!("the successor of `{name}` was refused: {reason}\n`{name}` flies on"));
+            self.notes.push(format!("the backup of `{name}` was refused: {reason}\n`{name}` flies on"));
         }
         self.replacements.refuse(node, reason.clone());
         if vacant {

@@ -19,7 +19,7 @@ const POLL: Duration = Duration::from_millis(2);
 /// A process of a run.
 #[derive(Debug)]
 pub struct Process {
-    /// The name in messages: that of its node, and for a successor its generation.
+    /// The name in messages: that of its node, and for a backup its generation.
     pub name: String,
     /// What it is for.
     pub role: Role,
@@ -131,7 +131,7 @@ impl Drop for Processes {
 }
 
 impl Process {
-    /// Starts a process; the clock where there is no program. `notify` is the socket on which a companion says that
+    /// Starts a process; the clock where there is no program. `notify` is the socket on which a sidecar says that
     /// it is ready.
     pub fn start(
         exe: &Path,
@@ -168,7 +168,7 @@ impl Process {
     fn new(name: &str, role: Role, log: PathBuf, body: Body) -> Self {
         let name = match role {
             Role::Node { generation, .. } => bus::names::process_name(name, generation),
-            Role::Clock | Role::Companion { .. } => name.to_owned(),
+            Role::Clock | Role::Sidecar { .. } => name.to_owned(),
         };
         Self { name, role, log, body, end: None, is_settled: false, verdict: None }
     }

@@ -33,11 +33,11 @@ pub enum OnExit {
     Restart,
     /// A process that shadows it from the start is promoted.
     Standby,
-    /// The run goes on without it: for companions, which send nothing.
+    /// The run goes on without it: for sidecars, which send nothing.
     Ignore,
 }
 
-/// When a companion counts as ready: tick 0 waits for it.
+/// When a sidecar counts as ready: tick 0 waits for it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Readiness {
@@ -65,7 +65,7 @@ pub struct Program {
     pub on_exit: OnExit,
     /// How long the run may stand still because of it.
     pub watchdog: Duration,
-    /// When a companion counts as ready.
+    /// When a sidecar counts as ready.
     pub ready: Readiness,
     /// Where its standard output and error go; into the run directory where absent.
     pub log: Option<PathBuf>,
@@ -103,7 +103,7 @@ impl Program {
 
 /// A process that shadows a node, and takes over from it when its time comes.
 #[derive(Clone, Debug)]
-pub struct Successor {
+pub struct BackupSpec {
     /// Index of the node in the plan.
     pub node: usize,
     /// The tick from which on it computes.
@@ -114,6 +114,6 @@ pub struct Successor {
     pub is_standby: bool,
     /// What to start.
     pub program: Program,
-    /// What it reads about itself: the node's own plan with the successor's parameters and inputs.
+    /// What it reads about itself: the node's own plan with the backup's parameters and inputs.
     pub plan: NodePlan,
 }

@@ -4,7 +4,7 @@
 //! Each node has at most one backup at a time, which goes through the stages below. A change of the run is a new
 //! membership: it is written, every instance acknowledges it, and only then the next one is made.
 
-use crate::program::{OnExit, Program, Successor};
+use crate::program::{BackupSpec, OnExit, Program};
 use crate::view::View;
 use bus::lockstep::{Phase, SlotState, TransferOutcome};
 use bus::membership::{Instance, Membership};
@@ -55,7 +55,7 @@ enum Join {
 
 #[derive(Debug)]
 struct Pending {
-    successor: Successor,
+    spec: BackupSpec,
     purpose: Purpose,
     is_planned: bool,
     join: Join,
@@ -90,7 +90,7 @@ struct Node {
     is_vacant: bool,
 }
 
-/// What became of a successor.
+/// What became of a backup.
 #[derive(Clone, Debug, Serialize)]
 pub struct Report {
     /// The node.
@@ -147,34 +147,34 @@ pub enum InstanceRole {
 
 impl<'a> Replacements<'a> {
     /// The replacements of a run that begins: those that are planned wait for their ticks.
-    pub fn new(plan: &'a Plan, view: View, programs: &[Program], successors: &[Successor]) -> Self {
+    pub fn new(plan: &'a Plan, view: View, programs: &[Program], planned: &[BackupSpec]) -> Self {
         let nodes = programs.iter().map(|program| Node {
             program: program.clone(),
             backup: None,
             newest_generation: 0,
             is_vacant: false,
         });
-        let pending = successors.iter().map(|successor| Pending {
-            purpose: match (successor.take_over_tick, successor.is_standby) {
+        let pending = planned.iter().map(|spec| Pending {
+            purpose: match (spec.take_over_tick, spec.is_standby) {
                 (Some(_), _) => Purpose::Swap,
                 (None, true) => Purpose::Standby,
                 (None, false) => Purpose::Shadow,
             },
             is_planned: true,
             request: None,
-            join: Join::At(successor.join_tick),
-            successor: successor.clone(),
+            join: Join::At(spec.join_tick),
+            spec: spec.clone(),
         });
         let (nodes, pending) = (nodes.collect(), pending.collect());
         let membership = Membership::first(plan);
         Self { plan, view, membership, nodes, pending, reports: Vec::new() }
     }
 
-    /// Has `successor` join and take over after `shadow_ticks`: at `at_tick`, or as soon as its process is
+    /// Has `spec` join and take over after `shadow_ticks`: at `at_tick`, or as soon as its process is
     /// prepared.
     pub fn request_swap(
         &mut self,
-        mut successor: Successor,
+        mut spec: BackupSpec,
         shadow_ticks: u32,
         at_tick: Option<u32>,
         request: u32,
@@ -183,9 +183,9 @@ impl<'a> Replacements<'a> {
             Some(tick) => Join::At(tick.saturating_sub(shadow_ticks)),
             None => Join::Next { shadow_ticks: Some(shadow_ticks) },
         };
-        successor.take_over_tick = at_tick;
+        spec.take_over_tick = at_tick;
         self.pending.push_back(Pending {
-            successor,
+            spec,
             purpose: Purpose::Swap,
             is_planned: true,
             request: Some(request),
@@ -193,9 +193,9 @@ impl<'a> Replacements<'a> {
         });
     }
 
-    /// Whether a successor of `node` waits or is on its way.
+    /// Whether a backup of `node` waits or is on its way.
     pub fn is_busy(&self, node: usize) -> bool {
-        self.nodes[node].backup.is_some() || self.pending.iter().any(|pending| pending.successor.node == node)
+        self.nodes[node].backup.is_some() || self.pending.iter().any(|pending| pending.spec.node == node)
     }
 
     /// What the process of a node's generation is to it now.
@@ -218,7 +218,7 @@ impl<'a> Replacements<'a> {
     /// The program of a process of `node`.
     pub fn program_of(&self, node: usize, generation: u32) -> &Program {
         let backup = self.nodes[node].backup.as_ref().filter(|c| c.generation == generation);
-        backup.map_or(&self.nodes[node].program, |backup| &backup.pending.successor.program)
+        backup.map_or(&self.nodes[node].program, |backup| &backup.pending.spec.program)
     }
 
     fn slot(&self, node: usize, generation: u32) -> usize {
@@ -259,7 +259,7 @@ impl<'a> Replacements<'a> {
     pub fn inputs(&self, node: usize, generation: u32) -> &[InputPlan] {
         let backup = self.nodes[node].backup.as_ref().filter(|c| c.generation == generation);
         backup.map_or(&self.membership.nodes[node].primary.plan.inputs, |backup| {
-            &backup.pending.successor.plan.inputs
+            &backup.pending.spec.plan.inputs
         })
     }
 
@@ -293,7 +293,7 @@ impl<'a> Replacements<'a> {
         });
         let pending = self.pending.iter().filter_map(|pending| match pending.join {
             // Who took a dead process's place comes first, even if the run passes the tick.
-            Join::At(_) if self.is_recovering(pending.successor.node) => None,
+            Join::At(_) if self.is_recovering(pending.spec.node) => None,
             Join::At(tick) => Some(tick),
             Join::Next { .. } | Join::AtOnce => None,
         });
@@ -310,7 +310,7 @@ impl<'a> Replacements<'a> {
 
     /// Where the clock must wait for a backup: where it is, or at the node's next period.
     fn next_boundary(&self, backup: &Backup) -> u32 {
-        let period = backup.pending.successor.plan.period_ticks;
+        let period = backup.pending.spec.plan.period_ticks;
         self.view.held_at().map_or(0, |held| held.next_multiple_of(period))
     }
 
@@ -326,7 +326,7 @@ impl<'a> Replacements<'a> {
     }
 
     fn is_prepared(&self, backup: &Backup) -> bool {
-        let slot = self.slot(backup.pending.successor.node, backup.generation);
+        let slot = self.slot(backup.pending.spec.node, backup.generation);
         self.view.is_ready(slot, Phase::Connecting)
     }
 
@@ -342,8 +342,8 @@ impl<'a> Replacements<'a> {
     fn start_pending(&mut self) {
         let mut waiting = VecDeque::new();
         while let Some(pending) = self.pending.pop_front() {
-            let node = pending.successor.node;
-            let is_first = waiting.iter().all(|other: &Pending| other.successor.node != node);
+            let node = pending.spec.node;
+            let is_first = waiting.iter().all(|other: &Pending| other.spec.node != node);
             if self.nodes[node].backup.is_none() && is_first {
                 self.start_backup(pending);
             } else {
@@ -354,7 +354,7 @@ impl<'a> Replacements<'a> {
     }
 
     fn start_backup(&mut self, pending: Pending) {
-        let node = pending.successor.node;
+        let node = pending.spec.node;
         // A backup that failed leaves its generation unused, and its slot is the primary's other one.
         let active = self.membership.nodes[node].primary.generation;
         let next = self.nodes[node].newest_generation + 1;
@@ -375,9 +375,9 @@ impl<'a> Replacements<'a> {
             start_ms: 0.0,
             hold_ms: 0.0,
             refused: None,
-            inputs: pending.successor.plan.inputs.clone(),
+            inputs: pending.spec.plan.inputs.clone(),
         };
-        self.view.spawn(node, generation, &pending.successor);
+        self.view.spawn(node, generation, &pending.spec);
         self.nodes[node].backup = Some(Backup {
             pending,
             generation,
@@ -456,7 +456,7 @@ impl<'a> Replacements<'a> {
     pub fn unprepared(&self) -> Option<(usize, u32)> {
         self.nodes.iter().enumerate().find_map(|(node, nodes)| {
             let backup = nodes.backup.as_ref().filter(|backup| backup.stage == Stage::Starting)?;
-            let is_late = self.view.since(backup.started) > backup.pending.successor.program.watchdog;
+            let is_late = self.view.since(backup.started) > backup.pending.spec.program.watchdog;
             let is_up = self.view.phase() != Phase::Running || self.is_prepared(backup);
             (is_late && !is_up).then_some((node, backup.generation))
         })
@@ -510,7 +510,7 @@ impl<'a> Replacements<'a> {
             && self.all_agree()
     }
 
-    /// Whether the dead active process of `node` can be replaced now: whoever is on the way in, its own successor
+    /// Whether the dead active process of `node` can be replaced now: whoever is on the way in, its own backup
     /// included, comes to the end of that or is refused first.
     pub fn may_replace(&self, node: usize) -> bool {
         let backup = self.nodes[node].backup.as_ref();
@@ -522,9 +522,7 @@ impl<'a> Replacements<'a> {
     fn is_at_join(&self, backup: &Backup) -> bool {
         match (backup.pending.join, self.view.held_at()) {
             (Join::At(tick), Some(held)) => held == tick,
-            (Join::Next { .. }, Some(held)) => {
-                held.is_multiple_of(backup.pending.successor.plan.period_ticks)
-            }
+            (Join::Next { .. }, Some(held)) => held.is_multiple_of(backup.pending.spec.plan.period_ticks),
             (Join::AtOnce, _) => true,
             (_, None) => false,
         }
@@ -535,10 +533,10 @@ impl<'a> Replacements<'a> {
         let Some(backup) = &mut self.nodes[node].backup else { return };
         let (plan, view) = (self.plan, &mut self.view);
         let active = plan.slot(node, self.membership.nodes[node].primary.generation);
-        let successor = &backup.pending.successor;
-        let outputs = &successor.plan.outputs;
+        let spec = &backup.pending.spec;
+        let outputs = &spec.plan.outputs;
         let (join_tick, take_over_tick) = match backup.pending.join {
-            Join::At(tick) => (tick, successor.take_over_tick.unwrap_or(u32::MAX)),
+            Join::At(tick) => (tick, spec.take_over_tick.unwrap_or(u32::MAX)),
             Join::Next { shadow_ticks } => {
                 let tick = view.held_at().unwrap_or_default();
                 let stride = take_over_stride(plan, node);
@@ -563,12 +561,8 @@ impl<'a> Replacements<'a> {
             view.start_shadow(output.topic, if shadows { due } else { take_over_tick });
         }
         view.set_first_tick(slot, join_tick);
-        membership.backup = Some(Instance {
-            generation: backup.generation,
-            join_tick,
-            shadows,
-            plan: successor.plan.clone(),
-        });
+        membership.backup =
+            Some(Instance { generation: backup.generation, join_tick, shadows, plan: spec.plan.clone() });
         self.membership.epoch += 1;
         view.store(&self.membership);
         backup.report.join_tick = Some(join_tick);
@@ -623,8 +617,8 @@ impl<'a> Replacements<'a> {
         let membership = &mut self.membership.nodes[node];
         let take_over_tick = membership.take_over_tick;
         let retired = membership.primary.generation;
-        if let Some(successor) = membership.backup.take() {
-            membership.primary = successor;
+        if let Some(backup) = membership.backup.take() {
+            membership.primary = backup;
         }
         membership.take_over_tick = u32::MAX;
         membership.take_over_ticks.fill(u32::MAX);
@@ -676,11 +670,11 @@ impl<'a> Replacements<'a> {
             self.free(node, retired);
         }
         let on_exit = self.nodes[node].program.on_exit;
-        self.nodes[node].program = Program { on_exit, ..backup.pending.successor.program.clone() };
+        self.nodes[node].program = Program { on_exit, ..backup.pending.spec.program.clone() };
         if on_exit == OnExit::Standby {
             // Who was promoted gets a standby of its own, as soon as a tick boundary comes.
             let pending = Pending {
-                successor: backup.pending.successor,
+                spec: backup.pending.spec,
                 purpose: Purpose::Standby,
                 is_planned: false,
                 request: None,
@@ -739,7 +733,7 @@ impl<'a> Replacements<'a> {
 
     /// The active process of `node` is dead: another one of its kind is started in its place.
     pub fn restart(&mut self, node: usize) {
-        let successor = Successor {
+        let spec = BackupSpec {
             node,
             join_tick: 0,
             take_over_tick: None,
@@ -749,7 +743,7 @@ impl<'a> Replacements<'a> {
         };
         self.nodes[node].is_vacant = true;
         let (purpose, join) = (Purpose::Restart, Join::AtOnce);
-        self.start_backup(Pending { successor, purpose, is_planned: false, request: None, join });
+        self.start_backup(Pending { spec, purpose, is_planned: false, request: None, join });
     }
 
     /// Whether the active process of `node` is dead and somebody is on the way to its place.
@@ -797,7 +791,7 @@ impl<'a> Replacements<'a> {
         }
     }
 
-    /// What became of all successors, those included that still shadow.
+    /// What became of all backups, those included that still shadow.
     pub fn into_reports(mut self) -> Vec<Report> {
         for mut backup in self.nodes.into_iter().filter_map(|nodes| nodes.backup) {
             if backup.report.purpose == Purpose::Swap && backup.report.take_over_tick.is_none() {
@@ -809,7 +803,7 @@ impl<'a> Replacements<'a> {
     }
 }
 
-/// What the tick of a take-over must be a multiple of: so that the successor sends on every output at once, and who
+/// What the tick of a take-over must be a multiple of: so that the backup sends on every output at once, and who
 /// joins later finds its samples.
 pub fn take_over_stride(plan: &Plan, node: usize) -> u32 {
     let periods = plan.nodes[node].outputs.iter().map(|output| plan.topics[output.topic].period_ticks);

@@ -13,8 +13,8 @@ pub enum Role {
         generation: u32,
     },
     /// A process that takes no part in the ticks.
-    Companion {
-        /// Counts the processes of this companion.
+    Sidecar {
+        /// Counts the processes of this sidecar.
         generation: u32,
     },
 }
@@ -24,7 +24,7 @@ impl Role {
     pub fn generation(self) -> u32 {
         match self {
             Self::Clock => 0,
-            Self::Node { generation, .. } | Self::Companion { generation } => generation,
+            Self::Node { generation, .. } | Self::Sidecar { generation } => generation,
         }
     }
 }

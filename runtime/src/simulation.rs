@@ -6,7 +6,7 @@
 //! `SIMULATED_SEED` with which they begin.
 
 use crate::overseer::{Death, Overseer};
-use crate::program::{Executable, OnExit, Program, Successor};
+use crate::program::{BackupSpec, Executable, OnExit, Program};
 use crate::replacement::Replacements;
 use crate::role::Role;
 use crate::supervisor::{Event, State};
@@ -354,8 +354,8 @@ impl World {
             processes.iter().position(|process| (process.node, process.generation) == (node, generation))
         };
         match command {
-            Command::Spawn { node, generation, successor } => {
-                assert_eq!(successor.node, node);
+            Command::Spawn { node, generation, backup } => {
+                assert_eq!(backup.node, node);
                 if self.has_faults && self.happens(10) {
                     return Some((node, generation));
                 }
@@ -423,14 +423,14 @@ impl World {
 }
 
 /// What the manifest of a seed says.
-fn settings(world: &mut World) -> (Vec<Program>, Vec<Successor>) {
+fn settings(world: &mut World) -> (Vec<Program>, Vec<BackupSpec>) {
     let program = |on_exit| Program { on_exit, ..Program::of(Executable::Command(Vec::new())) };
     let mut programs = Vec::new();
-    let mut successors = Vec::new();
+    let mut backups = Vec::new();
     for node in 0..NODES {
         let on_exit = [OnExit::Restart, OnExit::Standby, OnExit::Restart][world.draw(3) as usize];
         programs.push(program(on_exit));
-        let successor = |join_tick, take_over_tick, is_standby| Successor {
+        let backup = |join_tick, take_over_tick, is_standby| BackupSpec {
             node,
             join_tick,
             take_over_tick,
@@ -439,25 +439,25 @@ fn settings(world: &mut World) -> (Vec<Program>, Vec<Successor>) {
             plan: world.plan.nodes[node].clone(),
         };
         if on_exit == OnExit::Standby {
-            successors.push(successor(0, None, true));
+            backups.push(backup(0, None, true));
         } else {
             let join = 1 + (node as u32) * 9;
-            successors.push(successor(join, Some(join + 5), false));
+            backups.push(backup(join, Some(join + 5), false));
         }
     }
-    successors.sort_by_key(|successor| successor.join_tick);
-    (programs, successors)
+    backups.sort_by_key(|backup| backup.join_tick);
+    (programs, backups)
 }
 
 /// The whole life of a run; how it ended.
 fn live(seed: u64) -> (State, Vec<String>) {
     let mut world = World::new(seed);
-    let (programs, successors) = settings(&mut world);
+    let (programs, backups) = settings(&mut world);
     let plan = world.plan.clone();
     let mut overseer = Overseer {
         plan: &plan,
         state: State::Starting,
-        replacements: Replacements::new(&plan, world.view(), &programs, &successors),
+        replacements: Replacements::new(&plan, world.view(), &programs, &backups),
         notes: Vec::new(),
         has_answered: false,
     };

@@ -12,7 +12,7 @@ use std::os::unix::process::CommandExt;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 
-/// The environment variable with the socket on which a companion says that it is ready (sd_notify(3)).
+/// The environment variable with the socket on which a sidecar says that it is ready (sd_notify(3)).
 const NOTIFY_VARIABLE: &str = "NOTIFY_SOCKET";
 
 /// The clock service.
@@ -58,8 +58,8 @@ pub fn start(
             }
             command.env(NODE_VARIABLE, name).env(GENERATION_VARIABLE, generation.to_string());
         }
-        Role::Companion { .. } => {
-            // One that this launcher's own service manager listens on is not the companion's.
+        Role::Sidecar { .. } => {
+            // One that this launcher's own service manager listens on is not the sidecar's.
             command.env_remove(NOTIFY_VARIABLE);
             command.envs(notify.map(|socket| (NOTIFY_VARIABLE, socket)));
             bus::process::die_with_this_one(&mut command);
@@ -105,8 +105,8 @@ fn spawn(
     Ok((child, path))
 }
 
-/// Where a process's output goes: the file that the manifest names, to which a successor adds, or one in the
-/// run directory, of which a successor has its own.
+/// Where a process's output goes: the file that the manifest names, to which a backup adds, or one in the
+/// run directory, of which a backup has its own.
 fn open_log(name: &str, role: Role, run_dir: &Path, log: Option<&Path>) -> Result<(File, PathBuf)> {
     let generation = role.generation();
     let number = if generation == 0 { String::new() } else { format!("#{generation}") };

@@ -79,7 +79,7 @@ fn not_left(processes: &Processes) -> Option<Straggler> {
     let stragglers = left.filter_map(|process| match process.role {
         Role::Node { node, generation } => Some(Straggler::Node(node, generation)),
         Role::Clock => Some(Straggler::Clock),
-        Role::Companion { .. } => None,
+        Role::Sidecar { .. } => None,
     });
     stragglers.max_by_key(|straggler| matches!(straggler, Straggler::Node(..)))
 }

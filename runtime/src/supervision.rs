@@ -1,18 +1,18 @@
 //! Watching over a run: starts its processes, answers what happens, and takes everything down again.
 
-use crate::companions::Companions;
-use crate::ctl::desk::Desk;
+use crate::ctl::control::ControlServer;
 use crate::ctl::protocol::{Answer, Request};
 use crate::ctl::server::Reply;
 use crate::descendants::Descendants;
 use crate::event::{Progress, RunEvent, StopToken};
-use crate::graph::{Graph, successor_of};
+use crate::graph::{Graph, backup_of};
 use crate::manifest::Manifest;
 use crate::overseer::{Abort, Death, Overseer};
 use crate::processes::Processes;
-use crate::program::{OnExit, Readiness, Successor};
+use crate::program::{BackupSpec, OnExit, Readiness};
 use crate::replacement::{Report, Stage, take_over_stride};
 use crate::role::Role;
+use crate::sidecars::Sidecars;
 use crate::stall::{self, Straggler};
 use crate::supervisor::{Action, Event, State};
 use crate::view::{Command, View};
@@ -32,7 +32,7 @@ const LOG_PERIOD: Duration = Duration::from_millis(100);
 /// How often orphans that have ended are looked for.
 const REAP_PERIOD: Duration = Duration::from_secs(5);
 
-/// Ticks that a successor shadows where a request does not say.
+/// Ticks that a backup shadows where a request does not say.
 const SHADOW_TICKS: u32 = 100;
 
 /// What became of a swap, for who asked for it.
@@ -65,7 +65,7 @@ fn shuffle<T>(items: &mut [T], seed: Option<u64>) {
 
 /// Watches over a run: what happens is told to the state machine, and what that answers is done.
 pub struct Supervisor<'a> {
-    /// The manifest, for successors that are asked for.
+    /// The manifest, for backups that are asked for.
     pub manifest: &'a Manifest,
     /// What it means.
     pub graph: &'a Graph,
@@ -76,7 +76,7 @@ pub struct Supervisor<'a> {
     /// The clock and the nodes.
     pub processes: Processes,
     /// Processes beside the ticks.
-    pub companions: Companions<'a>,
+    pub sidecars: Sidecars<'a>,
     /// The watchdogs' clock.
     pub clock: &'a WatchClock,
     /// Per node: processor time in nanoseconds, and deadlines missed, of the instances that have left.
@@ -84,7 +84,7 @@ pub struct Supervisor<'a> {
     /// What follows when something ends.
     pub overseer: Overseer<'a>,
     /// Serves requests.
-    pub desk: Desk<'a>,
+    pub control_server: ControlServer<'a>,
     /// Swaps that were asked for and have not come to their end: the request, and who asked.
     pub swaps: Vec<(u32, Reply)>,
     /// Requests so far.
@@ -128,7 +128,7 @@ impl Supervisor<'_> {
 
     fn start(&mut self) -> Result<()> {
         let graph = self.graph;
-        let waits = graph.companions.iter().any(|(_, program)| program.ready == Readiness::Notify);
+        let waits = graph.sidecars.iter().any(|(_, program)| program.ready == Readiness::Notify);
         self.control.set_join_tick(if waits { 0 } else { self.hold_tick() });
         let nodes = graph.programs.iter().zip(&graph.plan.nodes).enumerate();
         let nodes = nodes.map(|(node, (program, plan))| {
@@ -139,15 +139,15 @@ impl Supervisor<'_> {
         for (name, role, program) in all {
             self.processes.start(name, role, program, self.run_dir)?;
         }
-        for (name, program) in &graph.companions {
-            self.companions.start(name, program)?;
+        for (name, program) in &graph.sidecars {
+            self.sidecars.start(name, program)?;
         }
         self.tell(Event::Started).map(|_| ())
     }
 
-    /// The tick at which the clock must wait: for who joins, and for companions that are not ready.
+    /// The tick at which the clock must wait: for who joins, and for sidecars that are not ready.
     fn hold_tick(&self) -> u32 {
-        if self.companions.all_ready() { self.overseer.replacements.hold_tick() } else { 0 }
+        if self.sidecars.all_ready() { self.overseer.replacements.hold_tick() } else { 0 }
     }
 
     /// Watches until all processes have ended.
@@ -156,12 +156,12 @@ impl Supervisor<'_> {
             let news = self.control.notices();
             self.clock.look();
             self.processes.look()?;
-            self.companions.look()?;
+            self.sidecars.look()?;
             self.bound_logs();
             self.reap();
             self.see();
             self.settle_ends()?;
-            self.settle_companions()?;
+            self.settle_sidecars()?;
             self.note_interrupts()?;
             self.note_progress()?;
             self.serve_requests();
@@ -208,7 +208,7 @@ impl Supervisor<'_> {
         let living = self.processes.running.iter().filter(|process| process.end.is_none());
         let living = living.filter_map(|process| match process.role {
             Role::Node { node, generation } => Some((node, generation)),
-            Role::Clock | Role::Companion { .. } => None,
+            Role::Clock | Role::Sidecar { .. } => None,
         });
         let times = [self.clock.now(), Duration::from_nanos(monotonic_ns())];
         self.overseer.replacements.view = View::of(self.plan, self.control, living.collect(), times);
@@ -227,14 +227,14 @@ impl Supervisor<'_> {
     fn execute(&mut self, command: Command) -> Result<()> {
         let (control, run_dir) = (self.control, self.run_dir);
         match command {
-            Command::Spawn { node, generation, successor } => {
+            Command::Spawn { node, generation, backup } => {
                 let name = &self.plan.nodes[node].name;
-                let stored = successor.plan.store_backup(run_dir, node, generation);
+                let stored = backup.plan.store_backup(run_dir, node, generation);
                 let started = stored.map_err(anyhow::Error::from).and_then(|()| {
                     self.processes.start(
                         name,
                         Role::Node { node, generation },
-                        Some(&successor.program),
+                        Some(&backup.program),
                         run_dir,
                     )
                 });
@@ -291,7 +291,7 @@ impl Supervisor<'_> {
         let Some(descendants) = self.descendants else { return };
         if self.clock.since(self.timing.reaped) >= REAP_PERIOD {
             self.timing.reaped = self.clock.now();
-            let own: Vec<u32> = self.processes.ids().chain(self.companions.ids()).collect();
+            let own: Vec<u32> = self.processes.ids().chain(self.sidecars.ids()).collect();
             descendants.reap(&own);
         }
     }
@@ -300,7 +300,7 @@ impl Supervisor<'_> {
         if self.clock.since(self.timing.logs_bounded) >= LOG_PERIOD {
             self.timing.logs_bounded = self.clock.now();
             self.processes.bound_logs(self.run_dir);
-            self.companions.bound_logs();
+            self.sidecars.bound_logs();
         }
     }
 
@@ -333,7 +333,7 @@ impl Supervisor<'_> {
 
     /// Serves what was asked of the run, and answers those whose swap has come to its end.
     fn serve_requests(&mut self) {
-        while let Some((request, reply)) = self.desk.serve() {
+        while let Some((request, reply)) = self.control_server.serve() {
             let Request::Swap { process, with, shadow_ticks, at_tick } = request else { continue };
             match self.request_swap(&process, &with, shadow_ticks, at_tick) {
                 Ok(request) => self.swaps.push((request, reply)),
@@ -348,7 +348,7 @@ impl Supervisor<'_> {
         }
     }
 
-    /// Checks a swap that was asked for and has its successor started; the error is the reason to refuse it.
+    /// Checks a swap that was asked for and has its backup started; the error is the reason to refuse it.
     fn request_swap(
         &mut self,
         process: &str,
@@ -356,21 +356,21 @@ impl Supervisor<'_> {
         shadow_ticks: Option<u32>,
         at_tick: Option<u32>,
     ) -> Result<u32, String> {
-        let successor = successor_of(self.manifest, self.plan, process, with).map_err(|e| e.to_string())?;
-        let node = successor.node;
-        self.require_claimed_log(&successor)?;
+        let backup = backup_of(self.manifest, self.plan, process, with).map_err(|e| e.to_string())?;
+        let node = backup.node;
+        self.require_claimed_log(&backup)?;
         if self.overseer.state != State::Running {
             return Err(format!("the run does not fly: `{process}` cannot be swapped now"));
         }
         if self.overseer.replacements.is_busy(node) {
-            return Err(format!("`{process}` has a successor, a standby or a shadow already; one at a time"));
+            return Err(format!("`{process}` has a backup, a standby or a shadow already; one at a time"));
         }
         let shadow_ticks = shadow_ticks.unwrap_or(SHADOW_TICKS);
         if shadow_ticks == 0 || shadow_ticks >= self.control.end_tick() {
             let end = self.control.end_tick();
             return Err(format!("shadowing for {shadow_ticks} ticks is not within the run's {end} ticks"));
         }
-        let (period, stride) = (successor.plan.period_ticks, take_over_stride(self.plan, node));
+        let (period, stride) = (backup.plan.period_ticks, take_over_stride(self.plan, node));
         if let Some(tick) = at_tick {
             let join = tick.saturating_sub(shadow_ticks);
             if join <= self.control.granted_ticks() || tick >= self.control.end_tick() {
@@ -389,15 +389,15 @@ impl Supervisor<'_> {
             }
         }
         self.requests += 1;
-        self.overseer.replacements.request_swap(successor, shadow_ticks, at_tick, self.requests);
+        self.overseer.replacements.request_swap(backup, shadow_ticks, at_tick, self.requests);
         Ok(self.requests)
     }
 
-    /// Refuses a log of its own to a successor that was asked for in flight: this run has not claimed the file.
-    fn require_claimed_log(&self, successor: &Successor) -> Result<(), String> {
-        let planned = self.graph.successors.iter().filter(|other| other.node == successor.node);
-        let mut known = planned.map(|other| &other.program).chain([&self.graph.programs[successor.node]]);
-        match &successor.program.log {
+    /// Refuses a log of its own to a backup that was asked for in flight: this run has not claimed the file.
+    fn require_claimed_log(&self, backup: &BackupSpec) -> Result<(), String> {
+        let planned = self.graph.backups.iter().filter(|other| other.node == backup.node);
+        let mut known = planned.map(|other| &other.program).chain([&self.graph.programs[backup.node]]);
+        match &backup.program.log {
             Some(log) if !known.any(|program| program.log.as_ref() == Some(log)) => Err(format!(
                 "`log` = {}: a run claims its logs when it starts, and cannot claim another in flight; leave it out, or \
                  write the swap into the manifest",
@@ -455,10 +455,10 @@ impl Supervisor<'_> {
         Ok(())
     }
 
-    /// Draws the consequences of every companion that has failed.
-    fn settle_companions(&mut self) -> Result<()> {
-        while let Some(failure) = self.companions.next_failure() {
-            let event = Event::CompanionFailed { policy: failure.policy, is_possible: failure.is_possible };
+    /// Draws the consequences of every sidecar that has failed.
+    fn settle_sidecars(&mut self) -> Result<()> {
+        while let Some(failure) = self.sidecars.next_failure() {
+            let event = Event::SidecarFailed { policy: failure.policy, is_possible: failure.is_possible };
             match self.tell(event)? {
                 Action::Abort => {
                     let why = match failure.policy {
@@ -471,11 +471,11 @@ impl Supervisor<'_> {
                 }
                 Action::Restart => {
                     self.say(&format!("{}\n`{}` is restarted", failure.words, failure.name));
-                    self.companions.restart(failure.index)?;
+                    self.sidecars.restart(failure.index)?;
                 }
                 _ => {
                     self.say(&format!("{}\nThe run goes on without it", failure.words));
-                    self.companions.forget(failure.index);
+                    self.sidecars.forget(failure.index);
                 }
             }
         }
@@ -487,8 +487,8 @@ impl Supervisor<'_> {
         let ticks = self.control.completed_ticks();
         // A paused run stands still because it was told to.
         let is_paused = self.control.held_at().is_some_and(|held| self.control.hold_tick() <= held);
-        // A companion that does not get ready has a watchdog of its own.
-        let is_waiting = self.control.held_at().is_some() && !self.companions.all_ready();
+        // A sidecar that does not get ready has a watchdog of its own.
+        let is_waiting = self.control.held_at().is_some() && !self.sidecars.all_ready();
         if ticks != self.timing.last_change.0 || self.overseer.state.is_over() || is_paused || is_waiting {
             self.timing.last_change = (ticks, self.clock.now());
             return Ok(());

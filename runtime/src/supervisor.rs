@@ -41,10 +41,10 @@ pub enum Event {
         /// Whether that can be done: a standby is there, a restart makes progress.
         is_possible: bool,
     },
-    /// A successor failed before it took over.
-    SuccessorFailed,
-    /// A companion ended with an error, was killed, or did not get ready.
-    CompanionFailed {
+    /// A backup failed before it took over.
+    BackupFailed,
+    /// A sidecar ended with an error, was killed, or did not get ready.
+    SidecarFailed {
         /// What its manifest says.
         policy: OnExit,
         /// Whether a restart leads somewhere.
@@ -67,7 +67,7 @@ pub enum Action {
     Restart,
     /// Have the standby take the place of the one that died.
     Promote,
-    /// Take the successor out of the run; the active process flies on.
+    /// Take the backup out of the run; the active process flies on.
     Refuse,
 }
 
@@ -95,12 +95,12 @@ impl State {
                 (self, Promote)
             }
             (_, Event::Died { .. }) => (Failed, Abort),
-            (_, Event::SuccessorFailed) => (self, Refuse),
+            (_, Event::BackupFailed) => (self, Refuse),
             // Nobody needs it any more; it may have ended because the nodes have.
-            (Draining, Event::CompanionFailed { .. }) => (self, Nothing),
-            (_, Event::CompanionFailed { policy: OnExit::Restart, is_possible: true }) => (self, Restart),
-            (_, Event::CompanionFailed { policy: OnExit::Ignore, .. }) => (self, Nothing),
-            (_, Event::CompanionFailed { .. }) => (Failed, Abort),
+            (Draining, Event::SidecarFailed { .. }) => (self, Nothing),
+            (_, Event::SidecarFailed { policy: OnExit::Restart, is_possible: true }) => (self, Restart),
+            (_, Event::SidecarFailed { policy: OnExit::Ignore, .. }) => (self, Nothing),
+            (_, Event::SidecarFailed { .. }) => (Failed, Abort),
             (Starting | Gathering | Running | Draining, Event::AllEnded) => (Stopped, Nothing),
             (Gathering | Running | Draining, Event::Started)
             | (Starting | Running | Draining, Event::Gathered)
@@ -127,17 +127,17 @@ mod tests {
             .into_iter()
             .flat_map(|policy| [false, true].map(|is_possible| (policy, is_possible)));
         let died = ends.clone().map(|(policy, is_possible)| Event::Died { policy, is_possible });
-        let companions = ends.map(|(policy, is_possible)| Event::CompanionFailed { policy, is_possible });
+        let sidecars = ends.map(|(policy, is_possible)| Event::SidecarFailed { policy, is_possible });
         let others = [
             Event::Started,
             Event::Gathered,
             Event::EndReached,
             Event::StopRequested,
             Event::Interrupted,
-            Event::SuccessorFailed,
+            Event::BackupFailed,
             Event::AllEnded,
         ];
-        died.chain(companions).chain(others).collect()
+        died.chain(sidecars).chain(others).collect()
     }
 
     fn all() -> impl Iterator<Item = (State, Event, State, Action)> {
@@ -187,9 +187,9 @@ mod tests {
     }
 
     #[test]
-    fn a_companion_that_fails_ends_the_run_unless_its_manifest_says_otherwise() {
+    fn a_sidecar_that_fails_ends_the_run_unless_its_manifest_says_otherwise() {
         for (state, event, next, action) in all() {
-            let Event::CompanionFailed { policy, is_possible } = event else { continue };
+            let Event::SidecarFailed { policy, is_possible } = event else { continue };
             let expected = match policy {
                 _ if state.is_over() || state == State::Draining => Action::Nothing,
                 OnExit::Ignore => Action::Nothing,
@@ -236,8 +236,8 @@ mod tests {
     }
 
     #[test]
-    fn a_failed_successor_never_ends_the_run() {
-        for (state, _, next, action) in all().filter(|(_, event, ..)| *event == Event::SuccessorFailed) {
+    fn a_failed_backup_never_ends_the_run() {
+        for (state, _, next, action) in all().filter(|(_, event, ..)| *event == Event::BackupFailed) {
             assert_eq!(next, state);
             assert_eq!(action == Action::Refuse, !state.is_over());
         }

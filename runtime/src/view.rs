@@ -1,6 +1,6 @@
 //! What the supervisor sees of a run, and what it commands.
 
-use crate::program::Successor;
+use crate::program::BackupSpec;
 use bus::lockstep::{Phase, SlotState, SupervisorView, TransferOutcome};
 use bus::membership::Membership;
 use bus::plan::{Plan, SLOTS_PER_NODE};
@@ -17,7 +17,7 @@ pub enum Command {
         /// Which of its instances.
         generation: u32,
         /// What to start, and what it reads about itself.
-        successor: Box<Successor>,
+        backup: Box<BackupSpec>,
     },
     /// Kill an instance, if it lives.
     Kill {
@@ -228,9 +228,9 @@ impl View {
     }
 
     /// Commands a start.
-    pub fn spawn(&mut self, node: usize, generation: u32, successor: &Successor) {
+    pub fn spawn(&mut self, node: usize, generation: u32, backup: &BackupSpec) {
         self.living.insert((node, generation));
-        self.commands.push(Command::Spawn { node, generation, successor: Box::new(successor.clone()) });
+        self.commands.push(Command::Spawn { node, generation, backup: Box::new(backup.clone()) });
     }
 
     /// Commands the end of an instance.

@@ -2,7 +2,7 @@
 //!
 //! A sensor's node computes at each of its periods. It *measures* at the first of them at or after each multiple
 //! of 1 / `rate_hz`; a measurement *arrives* at the first at or after `delay_ms` later. In between it waits in a
-//! queue that is part of the node's hand-over state, so that a successor goes on with what is under way. Rate
+//! queue that is part of the node's hand-over state, so that a backup goes on with what is under way. Rate
 //! and delay are therefore exact where they are multiples of the node's period, and rounded up to it elsewhere;
 //! a measurement always holds the truth of the time that it states.
 //!

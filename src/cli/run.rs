@@ -10,7 +10,7 @@ use hummingbus::COMPONENTS;
 use report::profile::Profile;
 use report::summary::{Judgement, Summary};
 use report::{judge, shadow};
-use runtime::graph::{self, Graph, successor_of};
+use runtime::graph::{self, Graph, backup_of};
 use runtime::host::Host;
 use runtime::launcher::Launcher;
 use runtime::manifest::{Manifest, PaceSetting};
@@ -90,13 +90,11 @@ pub fn run(
     print_warnings(&graph.warnings);
     graph.plan.profile |= files.is_some();
     if let Some((process, with)) = extra_shadow {
-        let shadow = successor_of(&manifest, &graph.plan, process, with)?;
-        if graph.successors.iter().any(|other| other.node == shadow.node) {
-            bail!(
-                "`{process}` has a successor, a standby or a shadow in this manifest already; one at a time"
-            );
+        let shadow = backup_of(&manifest, &graph.plan, process, with)?;
+        if graph.backups.iter().any(|other| other.node == shadow.node) {
+            bail!("`{process}` has a backup, a standby or a shadow in this manifest already; one at a time");
         }
-        graph.successors.push(shadow);
+        graph.backups.push(shadow);
     }
     let mut path = recording_path(&manifest, arguments.record.as_deref())?;
     if extra_shadow.is_some() && arguments.record.is_none() {

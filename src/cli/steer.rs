@@ -72,14 +72,14 @@ pub fn ctl(arguments: &CtlArguments) -> Result<bool> {
 pub struct SwapArguments {
     /// The process to replace.
     process: String,
-    /// What its successor has otherwise: a TOML file, or TOML text, with the keys of a process in a manifest;
+    /// What its backup has otherwise: a TOML file, or TOML text, with the keys of a process in a manifest;
     /// nothing where absent.
     #[arg(long, value_name = "FILE|TOML", default_value = "")]
     with: String,
-    /// Ticks that the successor computes beside the process before it takes over.
+    /// Ticks that the backup computes beside the process before it takes over.
     #[arg(long, value_name = "TICKS")]
     shadow_ticks: Option<u32>,
-    /// The tick from which on the successor's outputs count; as soon as possible where absent.
+    /// The tick from which on the backup's outputs count; as soon as possible where absent.
     #[arg(long, value_name = "TICK")]
     at_tick: Option<u32>,
     /// The run, as `hummingbus top` names it; needed only if several are alive.
@@ -93,7 +93,7 @@ pub struct SwapArguments {
 /// Has a live run replace one of its processes, and prints what came of it.
 ///
 /// # Errors
-/// If there is no such run, the successor's description is no TOML, or the run refuses.
+/// If there is no such run, the backup's description is no TOML, or the run refuses.
 pub fn swap(arguments: &SwapArguments) -> Result<bool> {
     let request = Request::Swap {
         process: arguments.process.clone(),
@@ -137,7 +137,7 @@ mod tests {
     use super::description;
 
     #[test]
-    fn a_successor_is_described_by_a_file_or_by_text() {
+    fn a_backup_is_described_by_a_file_or_by_text() {
         let file = tempfile::NamedTempFile::new().unwrap();
         std::fs::write(file.path(), "kind = 'pid'\n").unwrap();
         assert_eq!(description(file.path().to_str().unwrap()).unwrap(), "kind = 'pid'\n");

@@ -148,9 +148,9 @@ impl Watched {
         })
     }
 
-    /// Waits until the successor of `node` computes beside it; returns its generation.
+    /// Waits until the backup of `node` computes beside it; returns its generation.
     pub fn await_shadow(&self, place: &Place, node: usize) -> u32 {
-        self.look("no successor has joined", || {
+        self.look("no backup has joined", || {
             let generation = self.roster(place, node).backup?.generation;
             let state = self.control.slot_state(self.plan.slot(node, generation));
             (state == SlotState::Taken).then_some(generation)
@@ -160,7 +160,7 @@ impl Watched {
     /// Waits until the process `generation` of `node` flies.
     pub fn await_active(&self, place: &Place, node: usize, generation: u32) {
         let is_active = || (self.roster(place, node).primary.generation == generation).then_some(());
-        self.look("the successor has not taken over", is_active);
+        self.look("the backup has not taken over", is_active);
     }
 
     /// Waits until `slot` is ready for `phase`.

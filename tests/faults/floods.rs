@@ -10,7 +10,7 @@ const LAUNCHER_KIB: u32 = 280_000;
 /// What the launcher prints at most of a run that fails.
 const SAID_BYTES: usize = 16 * 1024;
 
-/// Flies with a companion that writes and then fails.
+/// Flies with a sidecar that writes and then fails.
 fn fly(script: &str) -> Ended {
     let place = Place::new();
     let tables = format!("[process.viewer]\nlockstep = false\ncommand = [\"sh\", \"-c\", {script:?}]\n");

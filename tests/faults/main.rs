@@ -6,10 +6,10 @@
 //! - [`campaign`]: many seeded cases, each of which can be repeated
 //! - [`kill_points`]: seeded strikes over processes, ticks and signals, where the run is to stop
 //! - [`survival`]: the same where the process is restarted or has a standby
-//! - [`successors`]: successors that fail before they fly, and strikes at whoever else is there meanwhile
+//! - [`backups`]: backups that fail before they fly, and strikes at whoever else is there meanwhile
 //! - [`last_tick`]: processes that die behind their last tick
 //! - [`silence`]: processes that neither end nor go on
-//! - [`companions`]: companions that fail or are not ready
+//! - [`sidecars`]: sidecars that fail or are not ready
 //! - [`strays`]: what the nodes of a run started themselves
 //! - [`floods`]: too much output, and nowhere to write
 //! - [`slow`]: steps that take too long
@@ -22,9 +22,9 @@
 //! - [`bad_files`]: corrupted manifests, truncated recordings
 //! - [`documentation`]: the list names tests that there are
 
+mod backups;
 mod bad_files;
 mod campaign;
-mod companions;
 mod disk;
 mod documentation;
 mod early;
@@ -36,10 +36,10 @@ mod kill_points;
 mod last_tick;
 mod memory;
 mod saboteur;
+mod sidecars;
 mod silence;
 mod slow;
 mod strays;
-mod successors;
 #[allow(dead_code, reason = "shared with the tests of undisturbed runs, which use the rest")]
 #[path = "../runs/support.rs"]
 mod support;

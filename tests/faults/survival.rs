@@ -41,7 +41,7 @@ impl Policy {
 enum Second {
     /// Another process, at the same moment.
     Together(&'static str),
-    /// Any process, the first one's successor included, once the first is replaced.
+    /// Any process, the first one's backup included, once the first is replaced.
     Later(&'static str),
 }
 

@@ -234,11 +234,10 @@ fn a_run_that_a_process_of_a_dead_run_started_flies_on() {
         .iter()
         .map(|word| format!("'{word}'"))
         .collect();
-    // Detached as a daemon is; what it says goes where the outer run has its companion write.
+    // Detached as a daemon is; what it says goes where the outer run has its sidecar write.
     let command = format!("setsid --fork env TMPDIR='{}' {}; sleep 1000", inner.path("tmp"), words.join(" "));
-    let companion =
-        format!("\n[process.nested]\nlockstep = false\ncommand = [\"sh\", \"-c\", {command:?}]\n");
-    let manifest = outer.write("outer.toml", format!("include = [{hover:?}]\n{companion}"));
+    let sidecar = format!("\n[process.nested]\nlockstep = false\ncommand = [\"sh\", \"-c\", {command:?}]\n");
+    let manifest = outer.write("outer.toml", format!("include = [{hover:?}]\n{sidecar}"));
     let launch =
         outer.start(&["run", &manifest, "--record", &outer.path("outer.mcap"), "--pace", "realtime"]);
     let inner_id = poll("the inner run does not fly", || {

@@ -171,7 +171,7 @@ fn a_run_that_is_not_there_or_has_ended_is_an_error() {
 }
 
 #[test]
-fn a_successor_that_cannot_be_read_is_refused_before_the_run_is_asked() {
+fn a_backup_that_cannot_be_read_is_refused_before_the_run_is_asked() {
     let place = Place::new();
     let nowhere = place.path("nowhere.toml");
     place.call(&["swap", "controller", "--with", &nowhere]).with_code(2).says(&["cannot read", &nowhere]);

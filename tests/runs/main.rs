@@ -14,7 +14,7 @@
 //! - [`failures`]: nodes that fail, in every way
 //! - [`cleanup`]: runs that are stopped or killed
 //! - [`refusals`]: manifests that are wrong
-//! - [`manifests`]: includes, sets, settings, successors, companions
+//! - [`manifests`]: includes, sets, settings, backups, sidecars
 //! - [`commands`]: the other subcommands, exit codes and JSON
 //! - [`outputs`]: what runs and other commands write, where something is there already
 //! - [`profile`]: where the host time of a run's ticks goes

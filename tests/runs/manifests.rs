@@ -1,5 +1,5 @@
 //! What a manifest can say beyond a flat list of processes: includes, sets of processes, settings of any key,
-//! successors, companions, and how a process runs on the host.
+//! backups, sidecars, and how a process runs on the host.
 
 use crate::nodes::{manifest, sender, table};
 use crate::recordings::{open, require_same};
@@ -275,7 +275,7 @@ fn a_process_of_no_vehicle_cannot_have_a_slash_in_its_name() {
 fn a_setting_reaches_elements_of_lists_and_of_included_files() {
     let path = repository("manifests/swap-identical.toml");
     let graph = graph(&path, &["swap.0.at_tick=500", "process.pilot.parameters.set_points.1.amplitude=5.0"]);
-    assert_eq!(graph["successors"][0]["take_over_tick"], 500);
+    assert_eq!(graph["backups"][0]["take_over_tick"], 500);
     assert_eq!(node(&graph, "pilot")["parameters"]["set_points"][1]["amplitude"], 5.0);
     assert_eq!(node(&graph, "pilot")["parameters"]["set_points"][0]["to"], 1.5);
 }
@@ -327,7 +327,7 @@ fn settings_of_where_and_how_fast_change_no_byte_of_a_recording() {
     assert!(Path::new(&place.path("imu.log")).exists(), "the log was not written");
 }
 
-// Successors
+// Backups
 
 /// The good manifest with a swap of the controller, its keys `keys`.
 fn swap(keys: &str) -> String {
@@ -341,12 +341,12 @@ fn a_swap_joins_before_it_takes_over() {
                 with = { parameters.gains.altitude_integral_max_m_s2 = 1.0 }\n";
     let path = place.write("swap.toml", good().replace("0.1\nwindow", "0.2\nwindow") + swap);
     let graph = graph(&path, &[]);
-    let ticks = |successor: &Value| (successor["join_tick"].as_u64(), successor["take_over_tick"].as_u64());
-    let successors = graph["successors"].as_array().unwrap();
-    let found: Vec<_> = successors.iter().map(ticks).collect();
+    let ticks = |backup: &Value| (backup["join_tick"].as_u64(), backup["take_over_tick"].as_u64());
+    let backups = graph["backups"].as_array().unwrap();
+    let found: Vec<_> = backups.iter().map(ticks).collect();
     assert_eq!(found, [(41, 50), (71, 80), (101, 110)].map(|(join, take)| (Some(join), Some(take))));
-    for successor in successors {
-        let plan = &successor["plan"];
+    for backup in backups {
+        let plan = &backup["plan"];
         assert_eq!(plan["parameters"]["gains"]["altitude_integral_max_m_s2"], 1.0);
         assert_eq!(plan["parameters"]["vehicle"], node(&graph, "controller")["parameters"]["vehicle"]);
         for key in ["name", "inputs", "outputs", "period_ticks", "cpu", "wait"] {
@@ -362,11 +362,11 @@ fn a_shadow_and_a_standby_are_there_from_the_first_tick() {
     let standby = "kind = \"pid\"\non_exit = \"standby\"\nstandby = { wait = \"spin\" }";
     let path = place.write("s.toml", good().replace("kind = \"pid\"", standby) + shadow);
     let graph = graph(&path, &[]);
-    let [standby, shadow] = [0, 1].map(|index| &graph["successors"][index]);
-    for (successor, process, is_standby) in [(standby, "controller", true), (shadow, "imu", false)] {
-        assert_eq!(successor["process"], process);
-        assert_eq!((&successor["join_tick"], &successor["take_over_tick"]), (&0.into(), &Value::Null));
-        assert_eq!(successor["is_standby"], is_standby);
+    let [standby, shadow] = [0, 1].map(|index| &graph["backups"][index]);
+    for (backup, process, is_standby) in [(standby, "controller", true), (shadow, "imu", false)] {
+        assert_eq!(backup["process"], process);
+        assert_eq!((&backup["join_tick"], &backup["take_over_tick"]), (&0.into(), &Value::Null));
+        assert_eq!(backup["is_standby"], is_standby);
     }
     assert_eq!(standby["plan"]["wait"], "spin");
     assert_eq!(shadow["plan"]["parameters"]["gyroscope_range_rad_s"], 3.0);
@@ -375,7 +375,7 @@ fn a_shadow_and_a_standby_are_there_from_the_first_tick() {
 }
 
 #[test]
-fn a_successor_of_another_kind_has_parameters_and_inputs_of_its_own() {
+fn a_backup_of_another_kind_has_parameters_and_inputs_of_its_own() {
     let place = Place::new();
     let other = table("other", "").replace("[process.other]\ncommand = ", "");
     let with = format!("command = {}, inputs.set_point = \"/pilot/set_point\"", other.trim());
@@ -384,7 +384,7 @@ fn a_successor_of_another_kind_has_parameters_and_inputs_of_its_own() {
     );
     let path = place.write("other.toml", good() + &swap);
     let graph = graph(&path, &[]);
-    let plan = &graph["successors"][0]["plan"];
+    let plan = &graph["backups"][0]["plan"];
     assert_eq!(plan["parameters"], serde_json::json!({}));
     assert_eq!(plan["inputs"].as_array().unwrap().len(), 1);
     // What it publishes is what the process before it publishes.
@@ -424,7 +424,7 @@ fn a_swap_whose_times_say_too_little_or_too_much() {
 }
 
 #[test]
-fn successors_of_one_process_that_are_there_at_the_same_time() {
+fn backups_of_one_process_that_are_there_at_the_same_time() {
     let first = swap("at_tick = 30\nshadow_ticks = 9").replace('§', "");
     let ended = refused_with(&(first.clone() + &swap("at_tick = 40\nshadow_ticks = 9")));
     ended.says(&["would join at tick 31, too soon after the take-over at tick 30", "at tick 42 or later"]);
@@ -457,13 +457,13 @@ fn a_process_that_cannot_be_succeeded() {
 }
 
 #[test]
-fn a_successor_that_would_not_fit_the_graph() {
+fn a_backup_that_would_not_fit_the_graph() {
     let swap = |with: &str| {
         let head = "\n[[swap]]\nprocess = \"controller\"\nat_tick = 50\nshadow_ticks = 9\n";
         refused_with(&format!("{head}[swap.with]\n{with}\n"))
     };
-    swap("§period_ticks = 2").says(&["a successor cannot have another `period_ticks`"]);
-    swap("§outputs.command.topic = \"/x\"").says(&["a successor cannot have another `outputs`"]);
+    swap("§period_ticks = 2").says(&["a backup cannot have another `period_ticks`"]);
+    swap("§outputs.command.topic = \"/x\"").says(&["a backup cannot have another `outputs`"]);
     swap("§knid = \"pid\"").says(&["unknown field `knid`"]);
     swap("kind = §\"pdi\"").says(&["there is no kind `pdi`"]);
     let inputs = "inputs.set_point = \"/pilot/set_point\"\n";
@@ -485,7 +485,7 @@ fn a_successor_that_would_not_fit_the_graph() {
 }
 
 #[test]
-fn a_successor_that_would_close_a_cycle_or_has_too_many_inputs() {
+fn a_backup_that_would_close_a_cycle_or_has_too_many_inputs() {
     let [a, b] = [sender("a", 1, ""), sender("b", 1, "inputs.input = \"/a/note\"")];
     let base = manifest(100, &[a, b]);
     let swap = |inputs: &str| {
@@ -496,23 +496,23 @@ fn a_successor_that_would_close_a_cycle_or_has_too_many_inputs() {
     let many: Vec<String> = (0..9)
         .map(|port| format!("i{port} = {{ topic = \"/b/note\", delay_ticks = 1, initial = {{}} }}"))
         .collect();
-    swap(&many.join(", ")).says(&["the successor of `a` has 9 inputs", "it may have 8"]);
+    swap(&many.join(", ")).says(&["the backup of `a` has 9 inputs", "it may have 8"]);
 }
 
 // Processes on the host
 
 /// Flies a script as a command beside the good manifest's nodes; it writes what it finds to a file.
 #[test]
-fn a_companion_runs_beside_the_ticks_and_ends_with_the_run() {
+fn a_sidecar_runs_beside_the_ticks_and_ends_with_the_run() {
     let place = Place::new();
     let script =
         "echo \"$COLOUR $PWD ${HUMMINGBUS_NODE-none} $(basename \"$HUMMINGBUS_RUN\")\" > \"$OUT\"; sleep 600";
     let (out, folder) = (place.path("out"), repository("docs"));
-    let companion = format!(
+    let sidecar = format!(
         "\n[process.viewer]\nlockstep = false\ncommand = [\"sh\", \"-c\", {script:?}]\n\
          environment = {{ COLOUR = \"blue\", OUT = {out:?} }}\nworking_directory = {folder:?}\n"
     );
-    let text = good().replace("duration_s = 0.1", "duration_s = 100\npace = \"realtime\"") + &companion;
+    let text = good().replace("duration_s = 0.1", "duration_s = 100\npace = \"realtime\"") + &sidecar;
     let path = place.write("beside.toml", text);
     place.call(&["check", &path]).with_code(0).prints(&["viewer (", "takes no part in the ticks"]);
     let mut launch = place.start(&["run", &path]);
@@ -534,19 +534,19 @@ fn await_it<T>(launch: &mut Launch<'_>, look: impl Fn() -> Option<T>) -> T {
 }
 
 #[test]
-fn a_companion_dies_with_a_launcher_that_is_killed() {
+fn a_sidecar_dies_with_a_launcher_that_is_killed() {
     let place = Place::new();
-    let companion = "\n[process.viewer]\nlockstep = false\ncommand = [\"sleep\", \"600\"]\n";
-    let text = good().replace("duration_s = 0.1", "duration_s = 100\npace = \"realtime\"") + companion;
+    let sidecar = "\n[process.viewer]\nlockstep = false\ncommand = [\"sleep\", \"600\"]\n";
+    let text = good().replace("duration_s = 0.1", "duration_s = 100\npace = \"realtime\"") + sidecar;
     let mut launch = place.start(&["run", &place.write("beside.toml", text)]);
-    // The launcher, the clock, seven nodes and the companion.
+    // The launcher, the clock, seven nodes and the sidecar.
     await_it(&mut launch, || (place.processes().len() >= 10).then_some(()));
     launch.kill();
     place.await_no_process();
 }
 
 #[test]
-fn a_companion_that_would_be_a_node() {
+fn a_sidecar_that_would_be_a_node() {
     let with = |more: &str| {
         refused_with(&format!("\n[process.viewer]\nlockstep = false\ncommand = [\"sleep\"]\n{more}\n"))
     };

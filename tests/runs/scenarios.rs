@@ -148,7 +148,7 @@ fn the_wall_scenarios_know_range_finders_and_imu_alone() {
 
 /// The nodes of a graph and those that succeed them.
 fn nodes(graph: &Value) -> impl Iterator<Item = &Value> {
-    graph["nodes"].as_array().unwrap().iter().chain(graph["successors"].as_array().unwrap())
+    graph["nodes"].as_array().unwrap().iter().chain(graph["backups"].as_array().unwrap())
 }
 
 fn kind(node: &Value) -> &str {

@@ -1,4 +1,4 @@
-//! Contracts of successors: a swap, a shadow, a standby and a restart change what the manifest says and nothing
+//! Contracts of backups: a swap, a shadow, a standby and a restart change what the manifest says and nothing
 //! else.
 
 use crate::support::{Ended, Place, repository};
@@ -143,7 +143,7 @@ fn a_process_of_a_live_run_is_swapped() {
     let run = place.run_id();
     let words = ["swap", "controller", "--with", "kind = \"pid\"", "--shadow-ticks", "20", "--run", &run];
     let swap = place.start(&words);
-    // The run is held: the successor joins at the tick at which it stands.
+    // The run is held: the backup joins at the tick at which it stands.
     launch.await_slot("controller", 1);
     let refused = place.start(&["swap", "recorder", "--run", &run]).end_among_others().with_code(2);
     refused.says(&["recorder"]);
@@ -233,14 +233,14 @@ fn a_thousand_swaps_in_one_run_leak_nothing() {
     let manifest = place.write("swaps.toml", text);
     let recording = place.path("swaps.mcap");
     let mut launch = place.start(&["run", &manifest, "--record", &recording, "--json"]);
-    // Between two swaps, after the tenth and before the last: the successor before has left and the next is prepared.
+    // Between two swaps, after the tenth and before the last: the backup before has left and the next is prepared.
     launch.hold_at(593);
-    // The clock, seven nodes, and the successor that is prepared.
+    // The clock, seven nodes, and the backup that is prepared.
     launch.await_process_count(&place, 9);
     let before = settled(&place);
     launch.release();
     launch.hold_at(20_373);
-    // What one swap left behind would by now be there almost a thousand times; the next successor may hold more or less
+    // What one swap left behind would by now be there almost a thousand times; the next backup may hold more or less
     // than that of then, as it is further with its preparations or not.
     let is_like_before =
         |(files, segments): (usize, usize)| files < before.0 + 100 && segments < before.1 + 100;

@@ -16,7 +16,7 @@ use std::sync::atomic::Ordering::{Relaxed, Release};
 pub(crate) struct NodeView {
     live: LiveView,
     slot: usize,
-    /// The other slot of this node: its predecessor's or its successor's.
+    /// The other slot of this node: its predecessor's or its backup's.
     other_slot: usize,
     first_input: usize,
 }

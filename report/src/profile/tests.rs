@@ -256,7 +256,7 @@ fn succession(generation: u32, take_over_tick: Option<u32>, inputs: &[InputPlan]
 }
 
 #[test]
-fn ticks_of_shadows_do_not_count_and_a_successor_waits_for_its_own_inputs() {
+fn ticks_of_shadows_do_not_count_and_a_backup_waits_for_its_own_inputs() {
     let (folder, plan) = (tempfile::tempdir().unwrap(), plan());
     let write = |node: usize, generation: u32, ticks: Ticks<'_>| {
         let mut writer = TickWriter::create(folder.path(), &plan, node, generation, 0).unwrap();

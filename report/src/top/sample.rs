@@ -140,7 +140,7 @@ impl Source {
             None => "computes".to_owned(),
         };
         match &instances.backup {
-            Some(successor) => format!("{state}, shadowed by .{}", successor.generation),
+            Some(backup) => format!("{state}, shadowed by .{}", backup.generation),
             None => state,
         }
     }

@@ -30,11 +30,11 @@ pub enum Request {
     },
     /// End at the next tick boundary.
     Stop,
-    /// Replace a process; answered when the successor has taken over.
+    /// Replace a process; answered when the backup has taken over.
     Swap {
         /// The process to replace.
         process: String,
-        /// The successor: TOML with the keys of a process in a manifest.
+        /// The backup: TOML with the keys of a process in a manifest.
         with: String,
         /// Ticks that it computes beside the process first.
         shadow_ticks: Option<u32>,

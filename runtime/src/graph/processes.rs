@@ -37,7 +37,7 @@ pub struct Member<'m> {
 pub fn members(manifest: &Manifest) -> Result<Vec<Member<'_>>, Problem> {
     let members = manifest.content.process.iter().filter(|(_, process)| takes_part(process));
     let member = |(name, process)| {
-        require_no_companion(manifest, name, process)?;
+        require_no_sidecar(manifest, name, process)?;
         Ok(Member { name, process, program: program(manifest, name, process)? })
     };
     let members = Problem::gather(members.map(member))?;
@@ -51,21 +51,21 @@ pub fn members(manifest: &Manifest) -> Result<Vec<Member<'_>>, Problem> {
 ///
 /// # Errors
 /// If one says what only a node can, or cannot be started.
-pub fn companions(manifest: &Manifest) -> Result<Vec<(String, Program)>, Problem> {
-    let companions = manifest.content.process.iter().filter(|(_, process)| !takes_part(process));
-    let companion = |(name, process): (&Spanned<String>, &Process)| {
+pub fn sidecars(manifest: &Manifest) -> Result<Vec<(String, Program)>, Problem> {
+    let sidecars = manifest.content.process.iter().filter(|(_, process)| !takes_part(process));
+    let sidecar = |(name, process): (&Spanned<String>, &Process)| {
         require_no_node(manifest, name, process)?;
         require_no_standby(manifest, name, process)?;
         Ok((name.get_ref().clone(), program(manifest, name, process)?))
     };
-    Problem::gather(companions.map(companion))
+    Problem::gather(sidecars.map(sidecar))
 }
 
 fn takes_part(process: &Process) -> bool {
     process.lockstep.as_ref().is_none_or(|lockstep| *lockstep.get_ref())
 }
 
-/// A companion has no ports and no place in the ticks.
+/// A sidecar has no ports and no place in the ticks.
 fn require_no_node(manifest: &Manifest, name: &Spanned<String>, process: &Process) -> Result<(), Problem> {
     let first_key = |key: Option<&Spanned<String>>| key.map(Spanned::span);
     let stated = [
@@ -86,12 +86,12 @@ fn require_no_node(manifest: &Manifest, name: &Spanned<String>, process: &Proces
         Some((key, span)) => Err(manifest.problem(
             &span,
             format!("`{key}` of `{}`, which has lockstep = false", name.get_ref()),
-            "a companion is a `command` that takes no part in the ticks; leave the key or `lockstep` out",
+            "a sidecar is a `command` that takes no part in the ticks; leave the key or `lockstep` out",
         )),
     }
 }
 
-/// A companion keeps no state of the run that a standby could go on from.
+/// A sidecar keeps no state of the run that a standby could go on from.
 fn require_no_standby(manifest: &Manifest, name: &Spanned<String>, process: &Process) -> Result<(), Problem> {
     match process.on_exit.as_ref().filter(|on_exit| *on_exit.get_ref() == OnExit::Standby) {
         None => Ok(()),
@@ -106,16 +106,11 @@ fn require_no_standby(manifest: &Manifest, name: &Spanned<String>, process: &Pro
     }
 }
 
-/// What only a companion may say.
-fn require_no_companion(
-    manifest: &Manifest,
-    name: &Spanned<String>,
-    process: &Process,
-) -> Result<(), Problem> {
+/// What only a sidecar may say.
+fn require_no_sidecar(manifest: &Manifest, name: &Spanned<String>, process: &Process) -> Result<(), Problem> {
     if let Some(ready) = &process.ready {
         let message = format!("`ready` of `{}`, which takes part in the ticks", name.get_ref());
-        let help =
-            "leave it out: a node is ready when it has joined; companions (lockstep = false) may say so";
+        let help = "leave it out: a node is ready when it has joined; sidecars (lockstep = false) may say so";
         return Err(manifest.problem(&ready.span(), message, help));
     }
     match process.on_exit.as_ref().filter(|on_exit| *on_exit.get_ref() == OnExit::Ignore) {
@@ -123,7 +118,7 @@ fn require_no_companion(
         Some(on_exit) => Err(manifest.problem(
             &on_exit.span(),
             format!("`on_exit` of `{}`: no tick can be computed without a node", name.get_ref()),
-            "stop (the default), restart or standby; only companions (lockstep = false) can be ignored",
+            "stop (the default), restart or standby; only sidecars (lockstep = false) can be ignored",
         )),
     }
 }

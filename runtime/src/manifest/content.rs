@@ -74,7 +74,7 @@ pub struct Process {
     pub kind: Option<Spanned<String>>,
     /// Any executable that links `bus`, with its arguments.
     pub command: Option<Spanned<Vec<String>>>,
-    /// Whether it takes part in the ticks; a companion, such as a viewer, does not.
+    /// Whether it takes part in the ticks; a sidecar, such as a viewer, does not.
     pub lockstep: Option<Spanned<bool>>,
     /// Vehicle file, relative to the manifest.
     pub vehicle: Option<Spanned<String>>,
@@ -103,7 +103,7 @@ pub struct Process {
     pub on_exit: Option<Spanned<OnExit>>,
     /// The process that stands by for it, whole.
     pub standby: Option<Spanned<Box<Process>>>,
-    /// When a companion counts as ready.
+    /// When a sidecar counts as ready.
     pub ready: Option<Spanned<Readiness>>,
     /// How long the run may stand still because of it, in milliseconds of host time.
     pub watchdog_ms_host: Option<Spanned<u64>>,
@@ -344,7 +344,7 @@ pub struct SwapSetting {
     pub repeat: Option<Spanned<u32>>,
     /// Ticks between two times.
     pub every_ticks: Option<Spanned<u32>>,
-    /// The successor, whole.
+    /// The backup, whole.
     pub with: Process,
 }
 

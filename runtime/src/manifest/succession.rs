@@ -1,4 +1,4 @@
-//! Successors: what `with` and `standby` change is put on top of the process they succeed.
+//! Backups: what `with` and `standby` change is put on top of the process they succeed.
 
 use super::sources::Sources;
 use super::tree;
@@ -8,13 +8,13 @@ use std::ops::Range;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
-/// Keys that a successor has in common with the process it succeeds.
+/// Keys that a backup has in common with the process it succeeds.
 const FIXED: [&str; 5] = ["lockstep", "on_exit", "outputs", "period_ticks", "standby"];
 
 /// Makes every `with` of `[[swap]]` and `[[shadow]]`, and every `standby`, a whole process.
 ///
 /// # Errors
-/// A process that is not there, or a key in which a successor cannot differ.
+/// A process that is not there, or a key in which a backup cannot differ.
 pub fn complete(root: &mut DeTable<'_>, sources: &Sources) -> Result<(), Problem> {
     for list in ["swap", "shadow"] {
         let Some(DeValue::Array(mut array)) = root.get(list).map(|value| value.get_ref().clone()) else {
@@ -78,7 +78,7 @@ fn no_table(sources: &Sources, span: Range<usize>, key: &str) -> Problem {
     sources.problem(&span, format!("`{key}` is not a table of keys of a process"), help)
 }
 
-/// The process `name` of `root` as its successor is, which differs by `with`.
+/// The process `name` of `root` as its backup is, which differs by `with`.
 ///
 /// # Errors
 /// If there is no such process, or it cannot differ in that.
@@ -108,7 +108,7 @@ fn differing<'s>(
     sources: &Sources,
 ) -> Result<DeTable<'s>, Problem> {
     if let Some(key) = with.keys().find(|key| FIXED.contains(&key.get_ref().as_ref())) {
-        let message = format!("a successor cannot have another `{}`", key.get_ref());
+        let message = format!("a backup cannot have another `{}`", key.get_ref());
         let help = "what reads its topics must find them as they were; leave the key out";
         return Err(sources.problem(&key.span(), message, help));
     }

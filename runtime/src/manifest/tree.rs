@@ -181,7 +181,7 @@ mod tests {
     }
 
     #[test]
-    fn a_successor_replaces_keys_and_merges_parameters() {
+    fn a_backup_replaces_keys_and_merges_parameters() {
         let base = "kind = \"pid\"\nparameters.a = 1\ninputs.i = \"/t\"";
         let found = merged(base, "parameters.b = 2\ninputs.j = \"/u\"", replace_keys);
         let expected =

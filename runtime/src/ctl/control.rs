@@ -12,7 +12,7 @@ use std::sync::mpsc::Receiver;
 const NEVER: u32 = u32::MAX;
 
 /// Serves requests about a run, a look at a time.
-pub struct Desk<'a> {
+pub struct ControlServer<'a> {
     plan: &'a Plan,
     control: &'a SupervisorView,
     server: Server,
@@ -34,7 +34,7 @@ enum Goal {
     Step { ticks: u32, target: u32 },
 }
 
-impl<'a> Desk<'a> {
+impl<'a> ControlServer<'a> {
     /// Opens the control socket in `run_dir`.
     ///
     /// # Errors
@@ -154,7 +154,7 @@ fn ticks_in_words(ticks: u32) -> String {
     if ticks == 1 { "1 tick".to_owned() } else { format!("{ticks} ticks") }
 }
 
-impl Drop for Desk<'_> {
+impl Drop for ControlServer<'_> {
     fn drop(&mut self) {
         // A step may have come to the run's end since the last look.
         self.grant_wish();

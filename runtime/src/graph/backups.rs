@@ -1,4 +1,4 @@
-//! Successors: processes that shadow a node, take over from it, or stand by for it.
+//! Backups: processes that shadow a node, take over from it, or stand by for it.
 
 use super::parameters;
 use super::parameters::{Notes, RunLength};
@@ -6,7 +6,7 @@ use super::processes::{Member, irreplaceable, members, program};
 use super::wiring::wire;
 use crate::manifest::{Manifest, OutputSetting, Process, SwapSetting};
 use crate::problem::Problem;
-use crate::program::{Executable, Program, Successor};
+use crate::program::{BackupSpec, Executable, Program};
 use crate::replacement::take_over_stride;
 use bus::Registration;
 use bus::plan::{INPUTS_RESERVED, NodePlan, Plan};
@@ -20,20 +20,20 @@ const REPEAT_MAX: u32 = 100_000;
 /// before has left.
 const SETTLE_TICKS: u64 = 2;
 
-/// What is known about the run that the successors join.
+/// What is known about the run that the backups join.
 struct Run<'m> {
     manifest: &'m Manifest,
     plan: &'m Plan,
     members: &'m [Member<'m>],
 }
 
-/// A successor and the place that asks for it.
+/// A backup and the place that asks for it.
 struct Placed {
-    successor: Successor,
+    backup: BackupSpec,
     span: Range<usize>,
 }
 
-/// Every successor that the manifest asks for, in the order in which they join.
+/// Every backup that the manifest asks for, in the order in which they join.
 ///
 /// # Errors
 /// One that cannot join, or cannot be what it is asked to be.
@@ -42,19 +42,19 @@ pub fn all(
     plan: &Plan,
     members: &[Member<'_>],
     notes: &mut Notes,
-) -> Result<Vec<Successor>, Problem> {
+) -> Result<Vec<BackupSpec>, Problem> {
     let run = Run { manifest, plan, members };
     let mut placed = Vec::new();
     for (node, member) in members.iter().enumerate() {
         if let Some(standby) = &member.process.standby {
             let (plan, program) = run.resolve(node, standby.get_ref(), &standby.span(), notes)?;
-            placed.push(Placed { successor: lasting(node, true, plan, program), span: standby.span() });
+            placed.push(Placed { backup: lasting(node, true, plan, program), span: standby.span() });
         }
     }
     for shadow in &manifest.content.shadow {
         let node = run.node(&shadow.get_ref().process)?;
         let (plan, program) = run.resolve(node, &shadow.get_ref().with, &shadow.span(), notes)?;
-        placed.push(Placed { successor: lasting(node, false, plan, program), span: shadow.span() });
+        placed.push(Placed { backup: lasting(node, false, plan, program), span: shadow.span() });
     }
     for swap in &manifest.content.swap {
         let node = run.node(&swap.get_ref().process)?;
@@ -62,26 +62,26 @@ pub fn all(
         for (join_tick, at_tick) in run.times(node, swap)? {
             let (plan, program) = (plan.clone(), program.clone());
             let take_over_tick = Some(at_tick);
-            let successor = Successor { node, join_tick, take_over_tick, is_standby: false, program, plan };
-            placed.push(Placed { successor, span: swap.span() });
+            let backup = BackupSpec { node, join_tick, take_over_tick, is_standby: false, program, plan };
+            placed.push(Placed { backup, span: swap.span() });
         }
     }
-    placed.sort_by_key(|placed| (placed.successor.join_tick, placed.successor.node));
+    placed.sort_by_key(|placed| (placed.backup.join_tick, placed.backup.node));
     run.require_one_at_a_time(&placed)?;
-    Ok(placed.into_iter().map(|placed| placed.successor).collect())
+    Ok(placed.into_iter().map(|placed| placed.backup).collect())
 }
 
-/// The successor of `process` in a run of `manifest` by `plan` that is under way; `with_text` is TOML that says in what
+/// The backup of `process` in a run of `manifest` by `plan` that is under way; `with_text` is TOML that says in what
 /// it differs, as `with` does. When it joins and takes over is left open.
 ///
 /// # Errors
 /// If there is no such process, or it cannot be succeeded by that.
-pub fn successor_of(
+pub fn backup_of(
     manifest: &Manifest,
     plan: &Plan,
     process: &str,
     with_text: &str,
-) -> Result<Successor, Problem> {
+) -> Result<BackupSpec, Problem> {
     let (manifest, whole) = manifest.succeed(process, with_text)?;
     let members = members(&manifest)?;
     let run = Run { manifest: &manifest, plan, members: &members };
@@ -90,9 +90,9 @@ pub fn successor_of(
     Ok(lasting(node, false, plan, program))
 }
 
-/// A successor that computes from the first tick on and does not take over by the clock.
-fn lasting(node: usize, is_standby: bool, plan: NodePlan, program: Program) -> Successor {
-    Successor { node, join_tick: 0, take_over_tick: None, is_standby, program, plan }
+/// A backup that computes from the first tick on and does not take over by the clock.
+fn lasting(node: usize, is_standby: bool, plan: NodePlan, program: Program) -> BackupSpec {
+    BackupSpec { node, join_tick: 0, take_over_tick: None, is_standby, program, plan }
 }
 
 impl Run<'_> {
@@ -109,7 +109,7 @@ impl Run<'_> {
         }
     }
 
-    /// What the successor `whole` of `node` reads about itself, and what to start.
+    /// What the backup `whole` of `node` reads about itself, and what to start.
     fn resolve(
         &self,
         node: usize,
@@ -183,7 +183,7 @@ impl Run<'_> {
             self.plan.nodes[node].name,
             list(present),
         );
-        Err(self.manifest.problem(span, message, "a successor publishes the same messages on the same ports"))
+        Err(self.manifest.problem(span, message, "a backup publishes the same messages on the same ports"))
     }
 
     fn require_room(&self, node: usize, plan: &NodePlan, span: &Range<usize>) -> Result<(), Problem> {
@@ -191,12 +191,12 @@ impl Run<'_> {
         if found <= most {
             return Ok(());
         }
-        let message = format!("the successor of `{}` has {found} inputs", plan.name);
+        let message = format!("the backup of `{}` has {found} inputs", plan.name);
         let help = format!("it may have {most}: as many as the process it succeeds, or {INPUTS_RESERVED}");
         Err(self.manifest.problem(span, message, help))
     }
 
-    /// When a swap's successors join and take over.
+    /// When a swap's backups join and take over.
     fn times(&self, node: usize, swap: &Spanned<SwapSetting>) -> Result<Vec<(u32, u32)>, Problem> {
         let setting = swap.get_ref();
         let (at_tick, span) = self.at_tick(swap)?;
@@ -231,7 +231,7 @@ impl Run<'_> {
             if !tick.is_multiple_of(stride) {
                 let name = &self.plan.nodes[node].name;
                 let message = format!("it {what} tick {tick}, but `{name}` sends every {stride} ticks");
-                let help = format!("choose multiples of {stride}: a successor sends on every output at once");
+                let help = format!("choose multiples of {stride}: a backup sends on every output at once");
                 return Err(at(message, help));
             }
         }
@@ -242,7 +242,7 @@ impl Run<'_> {
     fn at_tick(&self, swap: &Spanned<SwapSetting>) -> Result<(u32, Range<usize>), Problem> {
         let at = |span: Range<usize>, message: &str, help: &str| self.manifest.problem(&span, message, help);
         if swap.get_ref().shadow_ticks == 0 {
-            let help = "a successor computes at least one tick beside the process it succeeds";
+            let help = "a backup computes at least one tick beside the process it succeeds";
             return Err(at(swap.span(), "`shadow_ticks` is 0", help));
         }
         match (&swap.get_ref().at_tick, &swap.get_ref().at_s) {
@@ -283,24 +283,24 @@ impl Run<'_> {
         }
     }
 
-    /// Refuses a successor that joins while another one of the same node is there; `placed` is in order.
+    /// Refuses a backup that joins while another one of the same node is there; `placed` is in order.
     fn require_one_at_a_time(&self, placed: &[Placed]) -> Result<(), Problem> {
         let longest = self.plan.nodes.iter().map(|node| node.period_ticks).max().unwrap_or(1);
         let gap = SETTLE_TICKS + 2 * u64::from(longest);
         let mut before: BTreeMap<usize, &Placed> = BTreeMap::new();
         for next in placed {
-            let (node, join_tick) = (next.successor.node, next.successor.join_tick);
+            let (node, join_tick) = (next.backup.node, next.backup.join_tick);
             let Some(earlier) = before.insert(node, next) else { continue };
             let name = &self.plan.nodes[node].name;
             let at = |message: String, help: String| Err(self.manifest.problem(&next.span, message, help));
-            let Some(take_over) = earlier.successor.take_over_tick else {
-                let what = if earlier.successor.is_standby { "standby" } else { "shadow" };
+            let Some(take_over) = earlier.backup.take_over_tick else {
+                let what = if earlier.backup.is_standby { "standby" } else { "shadow" };
                 let message = format!("`{name}` has a {what} already, which is there until the end");
                 return at(message, "a process has one shadow at a time: leave one of them out".to_owned());
             };
             if u64::from(join_tick) < u64::from(take_over) + gap {
                 let message = format!(
-                    "a successor of `{name}` would join at tick {join_tick}, too soon after the take-over at \
+                    "a backup of `{name}` would join at tick {join_tick}, too soon after the take-over at \
                      tick {take_over}"
                 );
                 let earliest = u64::from(take_over) + gap;

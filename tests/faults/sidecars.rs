@@ -1,15 +1,15 @@
-//! Companions that fail, that are not ready, and what follows by their manifest.
+//! Sidecars that fail, that are not ready, and what follows by their manifest.
 
 use crate::flight::write_manifest;
 use crate::support::{Ended, Launch, Place, poll};
 
-/// Starts a flight of 0.5 s with a companion that runs `script`.
+/// Starts a flight of 0.5 s with a sidecar that runs `script`.
 fn start<'a>(place: &'a Place, script: &str, more: &str, settings: &[&str]) -> Launch<'a> {
-    let companion = format!(
+    let sidecar = format!(
         "[process.viewer]\nlockstep = false\ncommand = [\"sh\", \"-c\", {script:?}]\nworking_directory = {:?}\n{more}\n",
         place.path("")
     );
-    let manifest = write_manifest(place, &companion);
+    let manifest = write_manifest(place, &sidecar);
     let recording = place.path("flight.mcap");
     let mut words = vec!["run", &manifest, "--record", &recording, "--set", "run.duration_s=0.5"];
     settings.iter().for_each(|setting| words.extend(["--set", setting]));
@@ -20,7 +20,7 @@ fn fly(script: &str, more: &str, settings: &[&str]) -> Ended {
     start(&Place::new(), script, more, settings).end()
 }
 
-/// Long enough for the companion to end in.
+/// Long enough for the sidecar to end in.
 const PACED: &str = "run.pace=\"realtime\"";
 /// A second is its shortest life under `restart`.
 const LONGER: &str = "run.duration_s=4";
@@ -30,26 +30,26 @@ const NOTIFY: &str = "python3 -c \"import os, socket; \
     socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM).sendto(b'STATUS=up\\nREADY=1', os.environ['NOTIFY_SOCKET'])\"";
 
 #[test]
-fn a_companion_that_ends_with_an_error_ends_the_run() {
+fn a_sidecar_that_ends_with_an_error_ends_the_run() {
     let ended = fly("echo no display >&2; exit 4", "", &[PACED]).with_code(2);
     ended.says(&["process `viewer` ended with exit code 4", "no display", "The run was aborted at tick"]);
     fly("kill -9 $$", "", &[PACED]).with_code(2).says(&["process `viewer` was killed by signal 9 (SIGKILL)"]);
 }
 
 #[test]
-fn a_companion_that_has_done_its_part_is_not_missed() {
+fn a_sidecar_that_has_done_its_part_is_not_missed() {
     let ended = fly("exit 0", "", &[PACED]).with_code(0);
     assert!(!ended.error.contains("viewer"), "{ended}");
 }
 
 #[test]
-fn a_companion_that_may_be_missing_is_named_and_the_run_goes_on() {
+fn a_sidecar_that_may_be_missing_is_named_and_the_run_goes_on() {
     let ended = fly("exit 4", "on_exit = \"ignore\"", &[PACED]).with_code(0);
     ended.says(&["process `viewer` ended with exit code 4", "The run goes on without it"]);
 }
 
 #[test]
-fn a_companion_is_restarted_unless_it_ends_again_at_once() {
+fn a_sidecar_is_restarted_unless_it_ends_again_at_once() {
     let place = Place::new();
     let once = "if [ -e started ]; then sleep 600; else touch started; exit 4; fi";
     let ended = start(&place, once, "on_exit = \"restart\"", &[PACED]).end().with_code(0);
@@ -59,7 +59,7 @@ fn a_companion_is_restarted_unless_it_ends_again_at_once() {
 }
 
 #[test]
-fn the_first_tick_waits_for_a_companion_that_says_when_it_is_ready() {
+fn the_first_tick_waits_for_a_sidecar_that_says_when_it_is_ready() {
     let place = Place::new();
     let script = format!("while ! [ -e go ]; do sleep 0.02; done; {NOTIFY}; sleep 600");
     let mut launch = start(&place, &script, "ready = \"notify\"", &[]);
@@ -76,7 +76,7 @@ fn the_first_tick_waits_for_a_companion_that_says_when_it_is_ready() {
 }
 
 #[test]
-fn the_first_tick_waits_for_a_companion_that_is_restarted_before_it_is_ready() {
+fn the_first_tick_waits_for_a_sidecar_that_is_restarted_before_it_is_ready() {
     let place = Place::new();
     let script = format!(
         "if [ -e started ]; then until [ -e go ]; do sleep 0.02; done; {NOTIFY}; sleep 600; \
@@ -92,14 +92,14 @@ fn the_first_tick_waits_for_a_companion_that_is_restarted_before_it_is_ready() {
 }
 
 #[test]
-fn a_companion_that_never_ends_to_say_that_it_is_ready_keeps_nobody_waiting() {
+fn a_sidecar_that_never_ends_to_say_that_it_is_ready_keeps_nobody_waiting() {
     let endless = "python3 -c \"import os, socket\ns = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)\n\
                    while True: s.sendto(b'READY=1', os.environ['NOTIFY_SOCKET'])\"";
     fly(endless, "ready = \"notify\"", &[]).with_code(0);
 }
 
 #[test]
-fn a_companion_that_does_not_get_ready_is_named() {
+fn a_sidecar_that_does_not_get_ready_is_named() {
     let more = "ready = \"notify\"\nwatchdog_ms_host = 1500";
     let ended = fly("sleep 600", more, &[]).with_code(2);
     ended.says(&[
@@ -114,11 +114,11 @@ fn a_companion_that_does_not_get_ready_is_named() {
 }
 
 #[test]
-fn a_companion_dies_with_all_that_it_started() {
+fn a_sidecar_dies_with_all_that_it_started() {
     let place = Place::new();
     let script = "setsid sleep 600 & sleep 600";
     let launch = start(&place, script, "", &[PACED]);
-    poll("no child of the companion", || (place.processes().len() >= 12).then_some(()));
+    poll("no child of the sidecar", || (place.processes().len() >= 12).then_some(()));
     // `end` requires that no process of the run is left.
     launch.end().with_code(0);
 }

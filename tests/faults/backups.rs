@@ -1,4 +1,4 @@
-//! Successors that fail before they fly, and strikes at the others while one is on its way.
+//! Backups that fail before they fly, and strikes at the others while one is on its way.
 
 use crate::campaign;
 use crate::flight::{Process, Reference, Watched, messages, write_manifest};
@@ -11,10 +11,10 @@ use rustix::process::{Pid, Signal, kill_process};
 
 const KILL_POINTS: u64 = 60;
 const VICTIMS: [&str; 5] = ["controller", "ekf", "imu", "pilot", "saboteur"];
-/// When the successor joins, and when it takes over.
+/// When the backup joins, and when it takes over.
 const JOIN_TICK: u32 = 1000;
 const TAKE_OVER_TICK: u32 = 1500;
-/// A tick by which no successor has joined.
+/// A tick by which no backup has joined.
 const EARLY_TICK: u32 = 900;
 const LAST_TICK: u32 = 1600;
 /// Long enough for a process to start in on a machine that is busy.
@@ -29,10 +29,10 @@ fn swap(victim: &str, more: &str) -> String {
     )
 }
 
-/// Requires that the successor was refused with these words and that the flight was the undisturbed one.
+/// Requires that the backup was refused with these words and that the flight was the undisturbed one.
 fn require_refused(ended: &Ended, victim: &str, words: &[&str], recording: &str, reference: &str) {
     assert_eq!(ended.code, Some(1), "{ended}");
-    ended.says(&[&format!("the successor of `{victim}` was refused: "), &format!("`{victim}` flies on")]);
+    ended.says(&[&format!("the backup of `{victim}` was refused: "), &format!("`{victim}` flies on")]);
     ended.says(words);
     let succession = &ended.json()["successions"][0];
     let refused = succession["refused"].as_str().unwrap_or_else(|| panic!("not refused: {ended}"));
@@ -43,7 +43,7 @@ fn require_refused(ended: &Ended, victim: &str, words: &[&str], recording: &str,
 }
 
 #[test]
-fn a_successor_that_fails_from_the_inside_is_refused_with_its_last_words() {
+fn a_backup_that_fails_from_the_inside_is_refused_with_its_last_words() {
     let flown = Reference::fly();
     let reference = flown.path();
     let watchdog = ["was killed by the watchdog"];
@@ -75,18 +75,18 @@ fn start_swap<'a>(place: &'a Place, victim: &str, tables: &str) -> (Launch<'a>, 
 }
 
 #[test]
-fn a_successor_that_dies_before_its_predecessor_has_left_is_replaced() {
+fn a_backup_that_dies_before_its_predecessor_has_left_is_replaced() {
     let place = Place::new();
     let (launch, watched) = start_swap(&place, "controller", "[process.controller]\non_exit = \"restart\"\n");
     let node = watched.node("controller").unwrap();
     assert_eq!(watched.hold_at(TAKE_OVER_TICK), TAKE_OVER_TICK);
-    let successor = place.process_of_generation("controller", 1);
-    // It cannot leave: the recorder is given no time to turn to the successor before the next one is there.
+    let backup = place.process_of_generation("controller", 1);
+    // It cannot leave: the recorder is given no time to turn to the backup before the next one is there.
     kill_process(place.process_of_generation("controller", 0), Signal::STOP).unwrap();
     kill_process(place.process_of("recorder"), Signal::STOP).unwrap();
     watched.control.set_hold_tick(TAKE_OVER_TICK + GUARD_TICKS);
     watched.await_ticks(Some(watched.plan.slot(node, 1)), TAKE_OVER_TICK + 20);
-    kill_process(successor, Signal::KILL).unwrap();
+    kill_process(backup, Signal::KILL).unwrap();
     kill_process(place.process_of("recorder"), Signal::CONT).unwrap();
     watched.control.set_hold_tick(u32::MAX);
     let ended = launch.end().with_code(0);
@@ -97,7 +97,7 @@ fn a_successor_that_dies_before_its_predecessor_has_left_is_replaced() {
 }
 
 #[test]
-fn a_successor_that_waits_for_its_tick_is_not_late() {
+fn a_backup_that_waits_for_its_tick_is_not_late() {
     let place = Place::new();
     let manifest = write_manifest(&place, &format!("[run]\npace = 1.0\n{}", swap("controller", "")));
     // Its tick comes three watchdogs after its start.
@@ -113,20 +113,20 @@ enum Target {
     /// The process that flies.
     Active,
     /// The one that is to succeed it, or has.
-    Successor,
-    /// A process that has no successor.
+    BackupSpec,
+    /// A process that has no backup.
     Other(Process),
 }
 
 /// When.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Moment {
-    /// While the clock waits at the boundary before this tick, before the successor's, in its shadow phase, at its
+    /// While the clock waits at the boundary before this tick, before the backup's, in its shadow phase, at its
     /// take-over or behind it.
     Boundary(u32),
     /// In flight, once the node has completed this many ticks.
     Flight(u32),
-    /// While the clock waits at the tick at which the successor joins, and it does not, since it was stopped.
+    /// While the clock waits at the tick at which the backup joins, and it does not, since it was stopped.
     Joining,
 }
 
@@ -148,7 +148,7 @@ impl Case {
         let others = [Process::Node("recorder"), Process::Clock, Process::Launcher];
         let target = match below(5) {
             0 | 1 => Target::Active,
-            2 | 3 => Target::Successor,
+            2 | 3 => Target::BackupSpec,
             _ => Target::Other(others[below(3) as usize]),
         };
         let tick = match below(4) {
@@ -162,9 +162,9 @@ impl Case {
             _ => Moment::Flight(tick),
         };
         let signal = match (target, below(5)) {
-            (Target::Successor, 0) => Signal::STOP,
+            (Target::BackupSpec, 0) => Signal::STOP,
             // A stopped process dies of nothing less than SIGKILL.
-            (Target::Active | Target::Successor, 1) if moment != Moment::Joining => Signal::USR1,
+            (Target::Active | Target::BackupSpec, 1) if moment != Moment::Joining => Signal::USR1,
             _ => Signal::KILL,
         };
         Self { victim: VICTIMS[number % VICTIMS.len()], restarts: below(2) == 0, target, moment, signal }
@@ -176,7 +176,7 @@ impl Case {
     }
 }
 
-/// Where the successor stood when it or another was struck, as far as the striker can tell.
+/// Where the backup stood when it or another was struck, as far as the striker can tell.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd)]
 enum Stage {
     Starting,
@@ -202,7 +202,7 @@ fn a_strike_in_the_middle_of_a_swap_ends_as_documented() {
     });
     let plain = plain.path();
     let swapped = swapped.each_ref().map(Reference::path);
-    campaign::run("successors", KILL_POINTS, Case::draw, |case| {
+    campaign::run("backups", KILL_POINTS, Case::draw, |case| {
         let of_victim = VICTIMS.iter().position(|victim| *victim == case.victim).unwrap();
         strike(case, &plain, &swapped[of_victim]);
     });
@@ -217,7 +217,7 @@ fn strike(case: &Case, plain: &str, swapped: &str) {
     let ended = end(&place, launch, case.target == Target::Other(Process::Launcher));
     match case.target {
         Target::Other(other) => require_stopped(case, other.name(), &ended),
-        Target::Successor if stage < Stage::Between => {
+        Target::BackupSpec if stage < Stage::Between => {
             let how = match case.signal {
                 Signal::STOP => "was killed by the watchdog".to_owned(),
                 signal => format!("was killed by {}", signal_name(signal)),
@@ -225,7 +225,7 @@ fn strike(case: &Case, plain: &str, swapped: &str) {
             return require_refused(&ended, case.victim, &[&how], &recording, plain);
         }
         _ if stage == Stage::Between && ended.code != Some(2) => {
-            // Struck before its first sample the successor is refused; its predecessor may have been through already.
+            // Struck before its first sample the backup is refused; its predecessor may have been through already.
             return assert!(messages(&recording) == messages(plain), "other messages: {ended}");
         }
         _ if case.restarts => return require_replaced(case, stage, &ended, &recording, plain),
@@ -236,7 +236,7 @@ fn strike(case: &Case, plain: &str, swapped: &str) {
 
 /// Requires that the run went on with another process.
 fn require_replaced(case: &Case, stage: Stage, ended: &Ended, recording: &str, plain: &str) {
-    // A successor that had not joined yet waits for its turn again, and may have missed its tick by then: what was asked
+    // A backup that had not joined yet waits for its turn again, and may have missed its tick by then: what was asked
     // for did not happen.
     let is_refused = ended.error.contains("was refused");
     assert!(!is_refused || stage < Stage::Shadowing, "{ended}");
@@ -265,15 +265,15 @@ fn require_prefix(place: &Place, recording: &str, swapped: &str) {
     place.start(&["diff", recording, swapped]).end_among_others().with_code(1).prints(&["is a prefix of"]);
 }
 
-/// Strikes, and says where the successor stood.
+/// Strikes, and says where the backup stood.
 fn deliver(case: &Case, place: &Place, launch: &Launch<'_>, watched: &Watched) -> Stage {
     let node = watched.node(case.victim).unwrap();
-    let successor = watched.plan.slot(node, 1);
+    let backup = watched.plan.slot(node, 1);
     let pid = |target| match target {
         Target::Active => {
             place.process_of_generation(case.victim, watched.roster(place, node).primary.generation)
         }
-        Target::Successor => place.process_of_generation(case.victim, 1),
+        Target::BackupSpec => place.process_of_generation(case.victim, 1),
         Target::Other(process) => process.pid(place, launch),
     };
     match case.moment {
@@ -310,13 +310,13 @@ fn deliver(case: &Case, place: &Place, launch: &Launch<'_>, watched: &Watched) -
         }
         Moment::Joining => {
             assert_eq!(watched.hold_at(EARLY_TICK), EARLY_TICK);
-            watched.await_ready(successor, Phase::Connecting);
-            let joining = pid(Target::Successor);
+            watched.await_ready(backup, Phase::Connecting);
+            let joining = pid(Target::BackupSpec);
             kill_process(joining, Signal::STOP).unwrap();
             watched.control.set_hold_tick(u32::MAX);
-            watched.await_slot(successor, SlotState::Joining);
+            watched.await_slot(backup, SlotState::Joining);
             hit(case, watched, pid(case.target));
-            if case.target != Target::Successor {
+            if case.target != Target::BackupSpec {
                 // The launcher may have ended it by now.
                 let _ = kill_process(joining, Signal::CONT);
             }
@@ -331,7 +331,7 @@ fn hit(case: &Case, watched: &Watched, struck: Pid) {
     watched.control.set_hold_tick(u32::MAX);
 }
 
-/// Where the successor stands while the clock waits before `tick`.
+/// Where the backup stands while the clock waits before `tick`.
 fn stage_at(tick: u32) -> Stage {
     match tick {
         ..JOIN_TICK => Stage::Starting,

@@ -1,7 +1,7 @@
-//! Successors that are asked for in flight, checked against a manifest of this package.
+//! Backups that are asked for in flight, checked against a manifest of this package.
 
 use crate::COMPONENTS;
-use runtime::graph::{Graph, successor_of};
+use runtime::graph::{Graph, backup_of};
 use runtime::manifest::Manifest;
 use std::path::Path;
 
@@ -13,27 +13,24 @@ fn hover() -> (Manifest, Graph) {
 }
 
 #[test]
-fn a_successor_in_a_live_run_differs_in_what_is_asked_for() {
+fn a_backup_in_a_live_run_differs_in_what_is_asked_for() {
     let (manifest, graph) = hover();
     let with = "parameters.gains.altitude_integral_max_m_s2 = 1.5";
-    let successor = successor_of(&manifest, &graph.plan, "controller", with).unwrap();
-    let node = &graph.plan.nodes[successor.node];
-    assert_eq!(
-        (node.name.as_str(), successor.take_over_tick, successor.is_standby),
-        ("controller", None, false)
-    );
-    assert_eq!(successor.plan.parameters["gains"]["altitude_integral_max_m_s2"], 1.5);
-    assert_eq!(successor.plan.parameters["vehicle"], node.parameters["vehicle"]);
+    let backup = backup_of(&manifest, &graph.plan, "controller", with).unwrap();
+    let node = &graph.plan.nodes[backup.node];
+    assert_eq!((node.name.as_str(), backup.take_over_tick, backup.is_standby), ("controller", None, false));
+    assert_eq!(backup.plan.parameters["gains"]["altitude_integral_max_m_s2"], 1.5);
+    assert_eq!(backup.plan.parameters["vehicle"], node.parameters["vehicle"]);
     let topics = |plan: &bus::plan::NodePlan| plan.inputs.iter().map(|input| input.topic).collect::<Vec<_>>();
-    assert_eq!(topics(&successor.plan), topics(node));
-    assert_eq!(successor.plan.cpu, node.cpu);
+    assert_eq!(topics(&backup.plan), topics(node));
+    assert_eq!(backup.plan.cpu, node.cpu);
 }
 
 #[test]
-fn a_successor_in_a_live_run_that_cannot_be_is_refused_with_its_place() {
+fn a_backup_in_a_live_run_that_cannot_be_is_refused_with_its_place() {
     let (manifest, graph) = hover();
     let refused = |process: &str, with: &str| {
-        successor_of(&manifest, &graph.plan, process, with).map(|_| ()).unwrap_err().to_string()
+        backup_of(&manifest, &graph.plan, process, with).map(|_| ()).unwrap_err().to_string()
     };
     let words = refused("contorller", "");
     assert!(words.starts_with("--with:1:1: there is no process `contorller`"), "{words}");

@@ -1,4 +1,4 @@
-//! Companions: processes beside the ticks, such as a viewer. They are started with the run, may say when they are ready,
+//! Sidecars: processes beside the ticks, such as a viewer. They are started with the run, may say when they are ready,
 //! and end with it; an end with an error has the consequences that the manifest names.
 
 use crate::processes::Process;
@@ -10,22 +10,22 @@ use std::os::unix::net::UnixDatagram;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-/// How long a companion must have lived for a restart to lead somewhere.
+/// How long a sidecar must have lived for a restart to lead somewhere.
 const LIFE_MIN: Duration = Duration::from_secs(1);
-/// Messages of a companion that are read in one look, so that one that never ends keeps nobody waiting.
+/// Messages of a sidecar that are read in one look, so that one that never ends keeps nobody waiting.
 const MESSAGES_MAX: usize = 32;
 /// The longest message of sd_notify(3) that is looked at.
 const MESSAGE_BYTES: usize = 4096;
 
-/// The companions of a run; dropping them kills those that still live.
-pub struct Companions<'a> {
-    all: Vec<Companion<'a>>,
+/// The sidecars of a run; dropping them kills those that still live.
+pub struct Sidecars<'a> {
+    all: Vec<Sidecar<'a>>,
     exe: &'a Path,
     run_dir: &'a Path,
     clock: &'a WatchClock,
 }
 
-struct Companion<'a> {
+struct Sidecar<'a> {
     program: &'a Program,
     process: Process,
     generation: u32,
@@ -37,7 +37,7 @@ struct Companion<'a> {
     started: Duration,
 }
 
-/// A companion that ended with an error, was killed, or ended before it was ready.
+/// A sidecar that ended with an error, was killed, or ended before it was ready.
 #[derive(Debug)]
 pub struct Failure {
     /// Which.
@@ -52,13 +52,13 @@ pub struct Failure {
     pub words: String,
 }
 
-impl<'a> Companions<'a> {
-    /// No companions yet.
+impl<'a> Sidecars<'a> {
+    /// No sidecars yet.
     pub fn new(exe: &'a Path, run_dir: &'a Path, clock: &'a WatchClock) -> Self {
         Self { all: Vec::new(), exe, run_dir, clock }
     }
 
-    /// Starts a companion.
+    /// Starts a sidecar.
     ///
     /// # Errors
     /// If it cannot be started.
@@ -71,14 +71,14 @@ impl<'a> Companions<'a> {
         let process = Process::start(
             self.exe,
             name,
-            Role::Companion { generation: 0 },
+            Role::Sidecar { generation: 0 },
             Some(program),
             self.run_dir,
             notify,
         )?;
         let (is_ready, started) = (socket.is_none(), self.clock.now());
         let was_ready = is_ready;
-        self.all.push(Companion { program, process, generation: 0, socket, is_ready, was_ready, started });
+        self.all.push(Sidecar { program, process, generation: 0, socket, is_ready, was_ready, started });
         Ok(())
     }
 
@@ -87,18 +87,18 @@ impl<'a> Companions<'a> {
     /// # Errors
     /// If a process cannot be watched.
     pub fn look(&mut self) -> Result<()> {
-        for companion in &mut self.all {
-            companion.hear();
-            companion.process.look()?;
-            companion.note_early_end();
-            let patience = companion.program.watchdog;
-            if !companion.is_ready
-                && companion.process.end.is_none()
-                && self.clock.since(companion.started) > patience
+        for sidecar in &mut self.all {
+            sidecar.hear();
+            sidecar.process.look()?;
+            sidecar.note_early_end();
+            let patience = sidecar.program.watchdog;
+            if !sidecar.is_ready
+                && sidecar.process.end.is_none()
+                && self.clock.since(sidecar.started) > patience
             {
                 let milliseconds = patience.as_millis();
-                companion.process.kill();
-                companion.process.verdict = Some(format!(
+                sidecar.process.kill();
+                sidecar.process.verdict = Some(format!(
                     "was killed by the watchdog: it did not say within {milliseconds} ms that it is ready; \
                      `ready = \"notify\"` waits for READY=1 on the socket NOTIFY_SOCKET, as `systemd-notify \
                      --ready` sends it"
@@ -110,69 +110,69 @@ impl<'a> Companions<'a> {
 
     /// The process numbers of all.
     pub fn ids(&self) -> impl Iterator<Item = u32> {
-        self.all.iter().filter_map(|companion| companion.process.id())
+        self.all.iter().filter_map(|sidecar| sidecar.process.id())
     }
 
     /// Keeps logs in the run directory from filling its file system.
     pub fn bound_logs(&self) {
-        self.all.iter().for_each(|companion| companion.process.bound_log(self.run_dir));
+        self.all.iter().for_each(|sidecar| sidecar.process.bound_log(self.run_dir));
     }
 
     /// Whether all that the first tick waits for are ready.
     pub fn all_ready(&self) -> bool {
-        self.all.iter().all(|companion| companion.was_ready)
+        self.all.iter().all(|sidecar| sidecar.was_ready)
     }
 
     /// The next one that has failed and of which nobody has drawn the consequences; it counts as settled then.
     pub fn next_failure(&mut self) -> Option<Failure> {
-        let has_failed = |companion: &Companion<'_>| !companion.process.is_settled && companion.has_failed();
+        let has_failed = |sidecar: &Sidecar<'_>| !sidecar.process.is_settled && sidecar.has_failed();
         let index = self.all.iter().position(has_failed)?;
-        let companion = &mut self.all[index];
-        companion.process.is_settled = true;
-        let lived = self.clock.since(companion.started);
+        let sidecar = &mut self.all[index];
+        sidecar.process.is_settled = true;
+        let lived = self.clock.since(sidecar.started);
         Some(Failure {
             index,
-            name: companion.process.name.clone(),
-            policy: companion.program.on_exit,
-            is_possible: companion.generation == 0 || lived >= LIFE_MIN,
-            words: companion.process.post_mortem(),
+            name: sidecar.process.name.clone(),
+            policy: sidecar.program.on_exit,
+            is_possible: sidecar.generation == 0 || lived >= LIFE_MIN,
+            words: sidecar.process.post_mortem(),
         })
     }
 
-    /// The run goes on without companion `index`: nobody waits for it.
+    /// The run goes on without sidecar `index`: nobody waits for it.
     pub fn forget(&mut self, index: usize) {
         self.all[index].was_ready = true;
     }
 
-    /// Starts companion `index` once more.
+    /// Starts sidecar `index` once more.
     ///
     /// # Errors
     /// If it cannot be started.
     pub fn restart(&mut self, index: usize) -> Result<()> {
-        let companion = &mut self.all[index];
-        companion.generation += 1;
-        companion.started = self.clock.now();
-        companion.is_ready = companion.socket.is_none();
-        companion.process.remove_log(self.run_dir);
-        companion.process = Process::start(
+        let sidecar = &mut self.all[index];
+        sidecar.generation += 1;
+        sidecar.started = self.clock.now();
+        sidecar.is_ready = sidecar.socket.is_none();
+        sidecar.process.remove_log(self.run_dir);
+        sidecar.process = Process::start(
             self.exe,
-            &companion.process.name,
-            Role::Companion { generation: companion.generation },
-            Some(companion.program),
+            &sidecar.process.name,
+            Role::Sidecar { generation: sidecar.generation },
+            Some(sidecar.program),
             self.run_dir,
-            companion.socket.as_ref().map(|(_, path)| path.as_path()),
+            sidecar.socket.as_ref().map(|(_, path)| path.as_path()),
         )?;
         Ok(())
     }
 }
 
-impl Drop for Companions<'_> {
+impl Drop for Sidecars<'_> {
     fn drop(&mut self) {
-        self.all.iter_mut().for_each(|companion| companion.process.kill());
+        self.all.iter_mut().for_each(|sidecar| sidecar.process.kill());
     }
 }
 
-impl Companion<'_> {
+impl Sidecar<'_> {
     /// Reads what it said: lines of `NAME=VALUE`, of which one is `READY=1`.
     fn hear(&mut self) {
         let Some((socket, _)) = &self.socket else { return };
@@ -184,7 +184,7 @@ impl Companion<'_> {
         self.was_ready |= self.is_ready;
     }
 
-    /// An end with code 0 is one of a companion that has done its part, but for one that was to say that it is ready.
+    /// An end with code 0 is one of a sidecar that has done its part, but for one that was to say that it is ready.
     fn note_early_end(&mut self) {
         if !self.is_ready
             && self.process.verdict.is_none()
@@ -203,7 +203,7 @@ impl Companion<'_> {
     }
 }
 
-/// The socket on which companion `name`, the one of this number, says that it is ready, and where it lies. The path of
+/// The socket on which sidecar `name`, the one of this number, says that it is ready, and where it lies. The path of
 /// a socket may have 107 bytes only, so that the name is not in it.
 fn open_socket(name: &str, number: usize, run_dir: &Path) -> Result<(UnixDatagram, PathBuf)> {
     let path = run_dir.join(format!("{number}.notify"));
