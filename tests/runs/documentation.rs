@@ -1,11 +1,13 @@
-//! The documentation names only what is there.
+//! The documentation names only what is there, and every key of manifests.
 
-use crate::support::repository;
+use crate::refusals::good;
+use crate::support::{Place, repository};
 use std::collections::BTreeSet;
+use std::fs;
 
 /// The words of a Markdown file that stand in backticks.
 fn quoted(file: &str) -> Vec<String> {
-    let text = std::fs::read_to_string(repository(file)).unwrap();
+    let text = fs::read_to_string(repository(file)).unwrap();
     text.split('`').skip(1).step_by(2).map(str::to_owned).collect()
 }
 
@@ -21,9 +23,9 @@ fn every_path_that_the_architecture_names_exists() {
 
 /// The names of the workspace's libraries that the crate in `folder` depends on.
 fn known_to(folder: &str) -> BTreeSet<String> {
-    let text = std::fs::read_to_string(repository(&format!("{folder}Cargo.toml"))).unwrap();
+    let text = fs::read_to_string(repository(&format!("{folder}Cargo.toml"))).unwrap();
     let manifest: toml::Table = text.parse().unwrap();
-    let root: toml::Table = std::fs::read_to_string(repository("Cargo.toml")).unwrap().parse().unwrap();
+    let root: toml::Table = fs::read_to_string(repository("Cargo.toml")).unwrap().parse().unwrap();
     let is_ours = |name: &String| root["workspace"]["dependencies"][name].get("path").is_some();
     let known = manifest.get("dependencies").and_then(toml::Value::as_table).cloned().unwrap_or_default();
     known.keys().filter(|name| is_ours(name)).cloned().collect()
@@ -31,7 +33,7 @@ fn known_to(folder: &str) -> BTreeSet<String> {
 
 #[test]
 fn the_architecture_tells_every_crate_and_whom_it_knows() {
-    let text = std::fs::read_to_string(repository("docs/architecture.md")).unwrap();
+    let text = fs::read_to_string(repository("docs/architecture.md")).unwrap();
     let rows =
         text.lines().filter_map(|line| line.strip_prefix("| `")?.strip_suffix(" |")?.split_once("/` |"));
     let mut told = BTreeSet::new();
@@ -43,7 +45,7 @@ fn the_architecture_tells_every_crate_and_whom_it_knows() {
         assert_eq!(known, known_to(&crate_folder), "docs/architecture.md, {folder}");
         told.insert(folder.to_owned());
     }
-    let root: toml::Table = std::fs::read_to_string(repository("Cargo.toml")).unwrap().parse().unwrap();
+    let root: toml::Table = fs::read_to_string(repository("Cargo.toml")).unwrap().parse().unwrap();
     let members = root["workspace"]["members"].as_array().unwrap().iter();
     let members = members.map(|member| member.as_str().unwrap().to_owned());
     assert_eq!(told, members.chain(["src".to_owned()]).collect());
@@ -51,9 +53,68 @@ fn the_architecture_tells_every_crate_and_whom_it_knows() {
 
 #[test]
 fn every_manifest_is_named_in_the_readme() {
-    let readme = std::fs::read_to_string(repository("README.md")).unwrap();
-    for entry in std::fs::read_dir(repository("manifests")).unwrap() {
+    let readme = fs::read_to_string(repository("README.md")).unwrap();
+    for entry in fs::read_dir(repository("manifests")).unwrap() {
         let name = entry.unwrap().file_name().to_string_lossy().into_owned();
         assert!(!name.ends_with(".toml") || readme.contains(&name), "README.md does not name {name}");
+    }
+}
+
+/// The keys that the refusal of `unknown_key` in the good manifest, with `from` replaced by `to`, names as known.
+#[track_caller]
+fn known_keys(from: &str, to: &str) -> Vec<String> {
+    let place = Place::new();
+    assert_eq!(good().matches(from).count(), 1, "{from}");
+    let ended = place.call(&["check", &place.write("keys.toml", good().replace(from, to))]).with_code(2);
+    ended.says(&["unknown field `", "unknown_key`, expected "]);
+    let list = ended.error.split("unknown_key`, expected ").nth(1).unwrap().lines().next().unwrap();
+    list.split('`').skip(1).step_by(2).map(str::to_owned).collect()
+}
+
+#[test]
+fn the_documentation_has_every_key() {
+    let text = fs::read_to_string(repository("docs/manifest.md")).unwrap();
+    let end = "[process.recorder]\nkind = \"recorder\"\n";
+    let list = |name: &str| format!("{end}\n[[{name}]]\nunknown_key = 1\n");
+    let within = |process: &str, key: &str| format!("kind = \"{process}\"\n{key}.unknown_key = 1");
+    let sensor = |kind: &str| {
+        let port = if kind == "battery" { "battery" } else { "state" };
+        let input = format!("inputs.{port} = \"/plant/{port}\"\n[process.plant.outputs.battery]\n");
+        format!("{end}\n[process.sensor]\n{}\n{input}", within(kind, "parameters"))
+    };
+    let keys = [
+        known_keys("window_ticks = 64", "unknown_key = 64"),
+        known_keys("kind = \"imu\"", "kind = \"imu\"\nunknown_key = 1"),
+        known_keys("kind = \"imu\"", &within("imu", "outputs.imu")),
+        known_keys(end, &list("pass")),
+        known_keys(end, &list("compare")),
+        known_keys(end, &list("swap")),
+        known_keys(end, &list("shadow")),
+        known_keys(end, &list("vehicle")),
+        known_keys("kind = \"plant\"", &within("plant", "parameters")),
+        known_keys("kind = \"imu\"", &within("imu", "parameters")),
+        known_keys("kind = \"pid\"", &within("pid", "parameters.gains")),
+        known_keys("kind = \"pid\"", &within("pid", "parameters.gains.roll")),
+        known_keys("initial_altitude_m = 1.0", "initial_altitude_m = 1.0\nunknown_key = 1"),
+    ];
+    let sensors = ["gps", "barometer", "magnetometer", "mocap", "range", "battery", "rpm"];
+    let keys = [keys.concat(), sensors.map(|kind| known_keys(end, &sensor(kind))).concat()].concat();
+    assert!(keys.len() > 150, "{keys:?}");
+    for key in keys {
+        let is_named = [format!("`{key}`"), format!("`{key}."), format!(".{key}`")];
+        let is_shown = [format!("{key} = "), format!("{key}.")];
+        let is_there = is_named.iter().chain(&is_shown).any(|form| text.contains(form));
+        assert!(is_there, "docs/manifest.md has no `{key}`");
+    }
+}
+
+#[test]
+fn the_examples_of_the_documentation_are_toml() {
+    let text = fs::read_to_string(repository("docs/manifest.md")).unwrap();
+    let examples: Vec<&str> =
+        text.split("```toml\n").skip(1).map(|rest| rest.split("```").next().unwrap()).collect();
+    assert!(examples.len() >= 10, "{}", examples.len());
+    for example in examples {
+        toml::from_str::<toml::Table>(example).unwrap_or_else(|error| panic!("{error}\n{example}"));
     }
 }

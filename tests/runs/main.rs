@@ -13,8 +13,10 @@
 //! - [`corpus`]: what fuzzers found is read once more
 //! - [`failures`]: nodes that fail, in every way
 //! - [`cleanup`]: runs that are stopped or killed
-//! - [`refusals`]: manifests that are wrong
-//! - [`manifests`]: includes, sets, settings, backups, sidecars
+//! - [`refusals`], [`refused_parameters`], [`refused_conditions`], [`refused_flights`]: manifests that are wrong
+//! - [`manifests`]: includes, sets, settings
+//! - [`backups`]: swaps, shadows and standbys in manifests
+//! - [`processes`]: sidecars, and how a process runs on the host
 //! - [`commands`]: the other subcommands, exit codes and JSON
 //! - [`outputs`]: what runs and other commands write, where something is there already
 //! - [`profile`]: where the host time of a run's ticks goes
@@ -26,6 +28,7 @@
 //! - [`scenarios`]: the thesis's scenarios and those beyond
 //! - [`scenes`]: ground, walls, rigs and other vehicles
 
+mod backups;
 mod clean;
 mod cleanup;
 mod commands;
@@ -43,10 +46,14 @@ mod manifests;
 mod nodes;
 mod outputs;
 mod plot;
+mod processes;
 mod processors;
 mod profile;
 mod recordings;
 mod refusals;
+mod refused_conditions;
+mod refused_flights;
+mod refused_parameters;
 mod replay;
 mod rights;
 mod scenarios;

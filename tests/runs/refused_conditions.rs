@@ -1,0 +1,108 @@
+//! Refused: pass conditions and comparisons.
+
+use crate::nodes::{sender, table};
+use crate::refusals::{good, refused, refused_text, refused_with};
+use crate::support::{Place, repository};
+
+/// A condition that holds at the start of the good manifest's flight.
+const PASS: &str = "[[pass]]\nname = \"low\"\ntopic = \"/plant/state\"\nfield = \"position.z\"\nunit = \"m\"\nstatistic = \"max\"\nmax = 1\n";
+
+#[test]
+fn a_condition_on_a_topic_that_nobody_publishes() {
+    let pass = "name = \"high\"\ntopic = \"/plant/stat\"\nfield = \"position.z\"\nunit = \"m\"\nstatistic = \"max\"\nmin = 1\n";
+    let ended = refused_with(&format!("\n§[[pass]]\n{pass}"));
+    ended.says(&["nobody publishes /plant/stat", "did you mean /plant/state?"]);
+    let compare = "simulated = \"/plant/state\"\nmeasured = \"/player/measured\"\nwindow_s = 0.1\n";
+    refused_with(&format!("\n§[[compare]]\n{compare}")).says(&["nobody publishes /player/measured"]);
+}
+
+#[test]
+fn a_condition_on_a_field_or_in_a_unit_that_is_none() {
+    let with = |from: &str, to: &str| refused_with(&format!("\n§{}", PASS.replace(from, to)));
+    with("position.z", "position.q").says(&["pass condition `low`", "`position.q`", "position.z"]);
+    with("\"m\"", "\"deg\"").says(&["pass condition `low`", "`deg` is not a unit of length", "cm"]);
+    with("max = 1\n", "").says(&["pass condition `low`", "no limit", "add `min`, `max`"]);
+}
+
+#[test]
+fn a_condition_without_a_recorder() {
+    let ended = refused("[process.recorder]\nkind = \"recorder\"\n", &format!("§{PASS}"));
+    ended.says(&["/plant/state is judged but not recorded", "kind = \"recorder\""]);
+}
+
+#[test]
+fn a_condition_on_a_topic_that_only_another_reader_takes() {
+    let nodes = sender("source", 1, "") + &table("reader", "inputs.input = \"/source/note\"");
+    let pass = PASS.replace("/plant/state", "/source/note").replace("position.z", "tick");
+    let ended = refused_text(&format!("[run]\nduration_s = 0.1\n{nodes}§{pass}"));
+    ended.says(&["/source/note is judged but not recorded", "kind = \"recorder\""]);
+}
+
+#[test]
+fn a_comparison_without_a_limit_or_with_another_window_than_the_plant_has() {
+    let place = Place::new();
+    let flight = format!("process.player.data={}", place.write("flight.csv", crate::replay::flight()));
+    let manifest = repository("manifests/replay-nanobench.toml");
+    let set =
+        |args: &[&str]| place.call(&[&["check", &manifest, "--set", &flight], args].concat()).with_code(2);
+    let window = [
+        "--set",
+        "process.player.parameters.from_s=0.0",
+        "--set",
+        "run.duration_s=1.001",
+        "--set",
+        "process.plant-1s.parameters.window_s=0.2",
+    ];
+    set(&window).says(&["`window_s` is 1 s, but the plant behind /plant-1s/state is set every 0.2 s"]);
+    let text = std::fs::read_to_string(&manifest).unwrap().replace("../vehicles", &repository("vehicles"));
+    let lines: Vec<&str> = text.lines().filter(|line| !line.starts_with("max_")).collect();
+    let limitless = place.write("limitless.toml", lines.join("\n"));
+    let args = ["check", &limitless, "--set", &flight, "--set", "process.player.parameters.from_s=0.0"];
+    let args = [&args[..], &["--set", "run.duration_s=1.001"]].concat();
+    place.call(&args).with_code(2).says(&["the comparison has no limit, so it cannot fail"]);
+}
+
+#[test]
+fn a_condition_that_nothing_can_hold() {
+    let with = |limits: &str| refused_with(&format!("§{}", PASS.replace("max = 1\n", limits)));
+    with("min = 2\nmax = 1\n").says(&[
+        "pass condition `low`",
+        "`min` is 2 and `max` is 1",
+        "nothing lies between",
+    ]);
+    with("max = 1\nfrom_s = 0.1\n")
+        .says(&["`from_s` is 0.1 s, and the run ends at 0.1 s", "raise run.duration_s"]);
+    with("max = 1\nfrom_s = 5\nto_s = 4\n").says(&["`from_s` is 5 s and `to_s` is 4 s"]);
+    with("max = 1\nfrom_s = 0.0501\nto_s = 0.0504\n")
+        .says(&["no sample of /plant/state", "it comes every 0.001 s"]);
+    with("max = 1\nfrom_s = -1\n").says(&["`from_s` is -1 s"]);
+    let gate = "max = 1\nwhile = { topic = \"/plant/state\", field = \"position.z\", min = 1, max = 0 }\n";
+    with(gate).says(&["`while`: `min` is 1 and `max` is 0"]);
+    let rms = PASS.replace("statistic = \"max\"", "statistic = \"rms\"").replace("max = 1\n", "max = -1\n");
+    refused_with(&format!("§{rms}")).says(&["`max` is -1", "the root of a mean square is never below 0"]);
+    for number in ["nan", "inf", "-inf", "1e999"] {
+        let ended = refused_with(&PASS.replace("max = 1\n", &format!("max = §{number}\n")));
+        ended.says(&[&format!("`pass.0.max` is {number}, expected a finite number")]);
+    }
+}
+
+#[test]
+fn what_is_odd_is_told_by_check_and_run_and_flies() {
+    let place = Place::new();
+    let path = place.write("good.toml", good());
+    let line = good().lines().position(|line| line.starts_with("set_points")).unwrap() + 1;
+    let expected = [
+        format!("warning: {path}:{line}:1: process `pilot`: `set_points`: set point 0"),
+        "`at_s` is 0.1 s, and the run ends at 0.1 s: it never acts".to_owned(),
+    ];
+    let expected = expected.each_ref().map(String::as_str);
+    place.call(&["check", &path]).with_code(0).says(&expected);
+    place.call(&["run", &path]).with_code(0).says(&expected);
+    let longer = place.call(&["check", &path, "--set", "run.duration_s=1"]).with_code(0);
+    assert_eq!(longer.error, "");
+    // A run that is cut short by hand flies: what cannot be judged then is told, and does not pass.
+    let pass = PASS.replace("max = 1\n", "max = 1\nfrom_s = 0.05\n");
+    let path = place.write("judged.toml", good() + &pass);
+    let ended = place.call(&["run", &path, "--set", "run.duration_s=0.04"]).with_code(1);
+    ended.says(&["warning: ", "--set run.duration_s=0.04", "a condition without a sample does not pass"]);
+}

@@ -1,0 +1,227 @@
+//! Refused: parameters, vehicles, rates and other numbers of a manifest, and settings.
+
+use crate::refusals::{good, refused, refused_args, refused_setting, refused_text, refused_with};
+use crate::support::{Place, repository};
+use std::fs;
+
+#[test]
+fn set_points_that_cannot_be_flown() {
+    let marked = good().replace("\nset_points =", "\n§set_points =");
+    let with = |from: &str, to: &str| {
+        assert_eq!(marked.matches(from).count(), 1);
+        refused_text(&marked.replace(from, to))
+    };
+    let ended = with("unit = \"m\"", "unit = \"ft\"");
+    ended.says(&["process `pilot`: `set_points`: set point 0", "`unit` must be \"m\"", "found \"ft\""]);
+    with("\"altitude\"", "\"height\"").says(&["`channel` must be", "found \"height\""]);
+    with("to = 1.5, ", "").says(&["`to` must be a finite number in a step, found nothing"]);
+}
+
+#[test]
+fn a_file_and_a_parameter_that_say_the_same() {
+    let gains = repository("controllers/gains/pid.toml");
+    let ended = refused(
+        "kind = \"pid\"",
+        &format!("kind = \"pid\"\ngains = §\"{gains}\"\nparameters.gains.roll = 1"),
+    );
+    ended.says(&["`controller` has `gains` twice", "leave one of them out"]);
+}
+
+#[test]
+fn a_parameter_that_is_unknown() {
+    let ended = refused("initial_altitude_m", "§initial_altitude_ft");
+    ended.says(&["process `pilot`", "unknown field `initial_altitude_ft`", "initial_altitude_m"]);
+}
+
+#[test]
+fn a_parameter_of_another_type_is_named() {
+    let place = Place::new();
+    let path = place.write("type.toml", good().replace("altitude_m = 1.0", "altitude_m = \"high\""));
+    let ended = refused_args(&["run", &path], &path);
+    ended.says(&["process `pilot`", "initial_altitude_m", "\"high\"", "must be f64"]);
+}
+
+#[test]
+fn a_parameter_that_the_recorder_does_not_have() {
+    let ended = refused_with("\n[process.recorder.parameters]\n§compression = \"none\"\n");
+    ended.says(&["recorder", "no parameter `compression`"]);
+}
+
+#[test]
+fn a_vehicle_file_that_is_not_there() {
+    let place = Place::new();
+    let manifest = repository("manifests/hover.toml");
+    let vehicle = place.path("none.toml");
+    let ended = refused_setting(&manifest, &[&format!("process.plant.vehicle={vehicle}")]);
+    ended.says(&["process `plant`", &vehicle, "cannot read this file", "check the path"]);
+}
+
+#[test]
+fn a_vehicle_file_with_a_unit_of_another_quantity() {
+    let place = Place::new();
+    let text = fs::read_to_string(repository("vehicles/hummingbird.toml")).unwrap();
+    let line = text.lines().position(|line| line.starts_with("mass =")).unwrap() + 1;
+    let vehicle = place.write("stone.toml", text.replacen("unit = \"kg\"", "unit = \"stone\"", 1));
+    let manifest = repository("manifests/hover.toml");
+    let ended = refused_setting(&manifest, &[&format!("process.plant.vehicle={vehicle}")]);
+    ended.says(&["process `plant`", &format!("{vehicle}:{line}:"), "body.mass", "stone", "kg"]);
+}
+
+#[test]
+fn a_run_of_no_length() {
+    let with = |duration: &str| refused("duration_s = 0.1", &format!("duration_s = §{duration}"));
+    with("0").says(&["`duration_s` is 0 s, which is 0 ticks", "between 1 and"]);
+    with("-1.0").says(&["`duration_s` is -1 s"]);
+    with("nan").says(&["`run.duration_s` is nan, expected a finite number"]);
+    with("1e9").says(&["`duration_s` is 1000000000 s"]);
+    with("\"long\"").says(&["expected f64"]);
+}
+
+#[test]
+fn a_rate_whose_tick_is_no_whole_number_of_nanoseconds() {
+    let with = |rate: &str| refused("duration_s = 0.1", &format!("duration_s = 0.1\nrate_hz = §{rate}"));
+    with("300").says(&["`rate_hz` is 300", "divisor of 1 000 000 000"]);
+    with("0").says(&["`rate_hz` is 0"]);
+    with("-5").says(&["-5"]);
+}
+
+#[test]
+fn a_window_of_no_tick_or_of_too_many() {
+    let with = |window: &str| refused("window_ticks = 64", &format!("window_ticks = §{window}"));
+    with("0").says(&["`window_ticks` is 0", "1 to 4096 ticks"]);
+    with("5000").says(&["`window_ticks` is 5000"]);
+}
+
+#[test]
+fn a_window_argument_is_not_blamed_on_the_manifest() {
+    let manifest = repository("manifests/hover.toml");
+    let ended = Place::new().call(&["run", &manifest, "--window", "0"]).with_code(2);
+    ended.says(&["--window", "0 is not in 1..=4096"]);
+    assert!(!ended.error.contains("hover.toml:1:1"), "a place that has nothing to do with it: {ended}");
+}
+
+#[test]
+fn a_pace_that_is_none() {
+    let manifest = repository("manifests/hover.toml");
+    for pace in ["fast", "0", "-1", "nan", "inf"] {
+        let ended = Place::new().call(&["run", &manifest, &format!("--pace={pace}")]).with_code(2);
+        ended.says(&[&format!("`{pace}` is not a pace"), "free, realtime, or a factor"]);
+    }
+    refused("window_ticks = 64", "pace = §\"slow\"").says(&["`slow` is not a pace", "free, realtime"]);
+}
+
+#[test]
+fn an_override_that_is_none() {
+    let manifest = repository("manifests/hover.toml");
+    let set = |text: &str| refused_setting(&manifest, &[text]);
+    set("run.seed").says(&["--set run.seed: expected KEY=VALUE", "run.seed=3"]);
+    set("run.seed.low=1").says(&["--set run.seed.low=1", "`seed` is not a table"]);
+    set("run.seeed=1").says(&["unknown field `seeed`", "did you mean `seed`?"]);
+    set("run.seed=one").says(&["\"one\""]);
+    set("process.plnat.cpu=1").says(&["there is no process `plnat`", "did you mean `plant`?"]);
+    set("process.h1/plant.cpu=1").says(&["there is no process `h1/plant`"]);
+    set("=1").says(&["expected keys with dots between them"]);
+    set("pass.9.max=1").says(&["`pass` is a list of 4, and `9` is none of them", "numbered from 0"]);
+    set("include=[]").says(&["unknown field `include`"]);
+}
+
+/// Writes the good manifest with another vehicle into `place`: the Hummingbird with `from` replaced by `to`.
+fn with_vehicle(place: &Place, from: &str, to: &str) -> (String, String) {
+    let text = fs::read_to_string(repository("vehicles/hummingbird.toml")).unwrap();
+    assert_eq!(text.matches(from).count(), 1, "{from} stands once in the vehicle file");
+    let vehicle = place.write("vehicle.toml", text.replace(from, to));
+    let manifest = good().replace(&repository("vehicles/hummingbird.toml"), &vehicle);
+    (place.write("vehicle-manifest.toml", manifest), vehicle)
+}
+
+#[test]
+fn a_vehicle_with_a_number_that_none_has_is_refused_with_its_file_line_and_key() {
+    let cases = [
+        (
+            "{ value = 8600, unit = \"rpm\"",
+            "{ value = 1e308, unit = \"rpm\"",
+            "command.speed_at_max",
+            "1e308",
+        ),
+        ("{ value = 9.81,", "{ value = 9e300,", "body.gravity", "9e300"),
+        ("{ value = 9.81,", "{ value = -9.81,", "body.gravity", "-9.81"),
+        ("{ value = 0.480,", "{ value = 4.8e-300,", "body.mass", "4.8e-300"),
+        ("{ value = 7.6184e-8,", "{ value = inf,", "rotor.thrust_coefficient", "inf"),
+        ("{ value = [0.17, 0, 0]", "{ value = [0.17, 1e200, 0]", "rotors[0].position", "1e200"),
+    ];
+    for (from, to, key, found) in cases {
+        let place = Place::new();
+        let (manifest, vehicle) = with_vehicle(&place, from, to);
+        let number = if found == "1e308" { "1.047" } else { found };
+        refused_args(&["run", &manifest], &manifest).says(&[
+            &format!("{vehicle}:"),
+            &format!("`{key}"),
+            number,
+        ]);
+    }
+}
+
+#[test]
+fn a_vehicle_that_its_rotors_do_not_carry_is_refused_and_one_they_hardly_carry_is_told() {
+    let place = Place::new();
+    let (manifest, vehicle) = with_vehicle(&place, "{ value = 0.480,", "{ value = 480,");
+    let ended = refused_args(&["run", &manifest], &manifest);
+    ended.says(&[
+        "process `plant`",
+        "cannot fly",
+        "thrust to weight of 0.0048",
+        &format!("{vehicle}:21: `body.mass`"),
+    ]);
+    let (manifest, _) = with_vehicle(&place, "{ value = 0.480,", "{ value = 2.0,");
+    let ended = place.call(&["run", &manifest, "--json"]).with_code(0);
+    ended.says(&["warning: ", "process `plant`", "can hardly climb or tilt"]);
+    let warnings = ended.json()["warnings"].clone();
+    let told = warnings.as_array().unwrap().iter().find(|warning| {
+        warning["message"].as_str().unwrap().contains("can hardly climb")
+            && warning["line"].as_u64().is_some()
+            && warning["file"].as_str() == Some(&manifest)
+    });
+    assert!(told.is_some(), "{warnings}");
+    let ended = place.call(&["check", &manifest, "--json"]).with_code(0);
+    ended.says(&["can hardly climb or tilt"]);
+    assert_eq!(ended.json()["warnings"], warnings);
+}
+
+#[test]
+fn a_rate_at_which_a_sensor_cannot_measure_or_a_plant_cannot_move() {
+    let sensor = "[process.rpm]\nkind = \"rpm\"\ninputs.state = \"/plant/state\"\n";
+    let text = good().replace("duration_s = 0.1", "duration_s = 10\nrate_hz = 10");
+    let text =
+        text.replace("[process.imu]", &format!("{sensor}[process.imu]")).replace("period_ticks = 5\n", "");
+    let place = Place::new();
+    let path = place.write("slow.toml", &text);
+    // Motion capture at 100 Hz comes first.
+    refused_args(&["check", &path], &path)
+        .says(&["process `mocap`", "`rate_hz` is 100 Hz, expected at most 10 Hz"]);
+    let path = place
+        .write("slow.toml", text.replace("kind = \"mocap\"", "kind = \"mocap\"\nparameters.rate_hz = 5"));
+    let ended = refused_args(&["check", &path], &path);
+    ended.says(&["process `rpm`", "`rate_hz` is 200 Hz, expected at most 10 Hz", "run.rate_hz = 10"]);
+    let text = text.replace("rate_hz = 10", "rate_hz = 4").replace(sensor, "");
+    let path = place
+        .write("slow.toml", text.replace("kind = \"mocap\"", "kind = \"mocap\"\nparameters.rate_hz = 2"));
+    refused_args(&["check", &path], &path).says(&["process `plant`", "the integration diverges"]);
+}
+
+#[test]
+fn a_number_that_is_none_anywhere_is_refused_where_it_stands() {
+    let ended = refused("initial_altitude_m = 1.0", "initial_altitude_m = §nan");
+    ended.says(&["`process.pilot.parameters.initial_altitude_m` is nan, expected a finite number"]);
+    refused("70, 70, 70, 70", "70, §inf, 70, 70")
+        .says(&["`process.plant.inputs.command.initial.command.1` is inf"]);
+    let ended = refused("initial_altitude_m = 1.0", "§initial_altitude_m = 1e300");
+    ended.says(&["`initial_altitude_m` is 1e300 m, expected at most 1e7 m in size"]);
+    let manifest = repository("manifests/hover.toml");
+    refused_setting(&manifest, &["pass.0.max=nan"]).says(&["`pass.0.max` is nan"]);
+}
+
+#[test]
+fn a_period_that_overflows_the_count_of_ticks() {
+    let ended = refused("period_ticks = 5", "period_ticks = §4294967295");
+    ended.says(&["`period_ticks` of `mocap` is 4294967295, and the run has 100 ticks", "32 bits"]);
+}
