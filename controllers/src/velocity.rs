@@ -284,7 +284,7 @@ impl Parameters {
             )),
             _ if !has_reference && self.altitude_m.is_none() => Err(ParameterError::conflict(
                 "altitude_m",
-                "missing field `altitude_m`: without \
+                "missing key `altitude_m`: without \
                 the input `reference` a velocity controller needs `altitude_m` and `velocity_m_s`",
             )),
             _ => Ok(()),

@@ -109,7 +109,7 @@ fn a_velocity_comes_from_a_reference_or_from_parameters_and_never_from_both() {
     velocity.check(&vehicle_only, &NodeContext::new("node", &["estimate", "reference"])).unwrap();
     let error =
         velocity.check(&vehicle_only, &NodeContext::new("node", &["estimate"])).unwrap_err().to_string();
-    assert!(error.starts_with("missing field `altitude_m`"), "{error}");
+    assert!(error.starts_with("missing key `altitude_m`"), "{error}");
     let error =
         velocity.check(&fly, &NodeContext::new("node", &["estimate", "reference"])).unwrap_err().to_string();
     assert!(error.contains("`altitude_m`") && error.contains("`reference`"), "{error}");
@@ -121,7 +121,7 @@ fn known(kind: &Registration, parameters: &Value) -> Vec<String> {
         .check(&with(parameters, "unknown_key", json!(1)), &NodeContext::new("node", &[]))
         .unwrap_err()
         .to_string();
-    let list = error.split("unknown field `unknown_key`").nth(1).unwrap_or_else(|| panic!("{error}"));
+    let list = error.split("unknown key `unknown_key`").nth(1).unwrap_or_else(|| panic!("{error}"));
     list.split('`').skip(1).step_by(2).map(str::to_owned).collect()
 }
 

@@ -157,12 +157,12 @@ fn no_path_through_the_waypoints_has_less_snap() {
 fn what_is_wrong_with_a_segment_is_named_with_its_place() {
     let cases = [
         (r#"{ kind = "spiral" }"#, "found `spiral`"),
-        (r#"{ kind = "hover" }"#, "missing field `segments.1.duration_s`"),
+        (r#"{ kind = "hover" }"#, "missing key `segments.1.duration_s`"),
         (
             r#"{ kind = "hover", duration_s = 0.0 }"#,
             "`segments.1.duration_s` must be a finite number above 0, found 0",
         ),
-        (r#"{ kind = "hover", duration_s = 1.0, radius_m = 1.0 }"#, "unknown field `segments.1.radius_m`"),
+        (r#"{ kind = "hover", duration_s = 1.0, radius_m = 1.0 }"#, "unknown key `segments.1.radius_m`"),
         (
             r#"{ kind = "circle", radius_m = 0.0, speed_m_s = 1.0, laps = 1, ramp_s = 1.0 }"#,
             "`segments.1.radius_m` must be",

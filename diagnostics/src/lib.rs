@@ -2,10 +2,11 @@
 //!
 //! | room | what it holds |
 //! |---|---|
+//! | [`Diagnostic`] | what is wrong with a file: where, what was expected, what was found, what to do |
 //! | `nearest` | which of the names that there are was meant |
 //! | `place` | where something stands in a file |
 //! | [`mod@parameter`] | parameters of components: the error, and the checks that raise it |
-//! | `read` | parameters from JSON, whose errors carry their keys |
+//! | `read` | types from JSON and TOML, whose errors carry their keys and places |
 //! | [`mod@unit`] | every unit that a file may use, with its factor to SI |
 //!
 //! ```
@@ -17,14 +18,16 @@
 //! ```
 #![forbid(unsafe_code)]
 
+mod diagnostic;
 mod nearest;
 pub mod parameter;
 mod place;
 mod read;
 pub mod unit;
 
+pub use diagnostic::{Diagnostic, Severity};
 pub use nearest::nearest;
 pub use parameter::ParameterError;
 pub use place::Place;
-pub use read::read;
+pub use read::{Misread, parse_toml, read, read_toml, read_tree};
 pub use unit::{Dimension, convert};

@@ -1,5 +1,6 @@
 //! Parameters of components: the error for one that is refused, and the checks that raise it.
 
+use crate::nearest::nearest;
 use std::fmt::Display;
 
 /// A parameter that a component refuses.
@@ -24,13 +25,15 @@ pub enum ParameterError {
         found: String,
     },
     /// A parameter that is needed and not given.
-    #[error("missing field `{key}`")]
+    #[error("missing key `{key}`{}", after_comma(.expected))]
     Missing {
         /// The dotted key.
         key: String,
+        /// What it should hold; empty where that is not known.
+        expected: String,
     },
     /// A parameter that the component does not have.
-    #[error("unknown field `{key}`, expected {}", list(.known))]
+    #[error("unknown key `{key}`, expected {}", list(.known))]
     Unknown {
         /// The dotted key.
         key: String,
@@ -54,6 +57,18 @@ impl ParameterError {
         Self::Value { key: key.into(), expected: expected.into(), found: found.to_string() }
     }
 
+    /// A parameter that is needed and not given; `expected` is what it should hold, empty where that is not known.
+    #[must_use]
+    pub fn missing(key: impl Into<String>, expected: impl Into<String>) -> Self {
+        Self::Missing { key: key.into(), expected: expected.into() }
+    }
+
+    /// A parameter that there is not, but `known` ones in its place.
+    #[must_use]
+    pub fn unknown(key: impl Into<String>, known: &[&str]) -> Self {
+        Self::Unknown { key: key.into(), known: known.iter().map(|&key| key.to_owned()).collect() }
+    }
+
     /// What does not go together, of which `key` is to blame first; empty where none is.
     #[must_use]
     pub fn conflict(key: impl Into<String>, message: impl Display) -> Self {
@@ -64,17 +79,40 @@ impl ParameterError {
     #[must_use]
     pub fn key(&self) -> &str {
         let (Self::Value { key, .. }
-        | Self::Missing { key }
+        | Self::Missing { key, .. }
         | Self::Unknown { key, .. }
         | Self::Conflict { key, .. }) = self;
         key
+    }
+
+    /// What to do about it; empty for a conflict, which says it in its message.
+    #[must_use]
+    pub fn help(&self) -> String {
+        match self {
+            Self::Value { .. } => "correct this value".to_owned(),
+            Self::Missing { .. } => "add it to this table".to_owned(),
+            Self::Unknown { .. } => match self.meant() {
+                Some(known) => format!("did you mean `{known}`?"),
+                None => "remove it, or correct its spelling".to_owned(),
+            },
+            Self::Conflict { .. } => String::new(),
+        }
+    }
+
+    /// The known key that an unknown one was probably meant to be.
+    #[must_use]
+    pub fn meant(&self) -> Option<&str> {
+        let Self::Unknown { key, known } = self else { return None };
+        // The tables on the way are no part of what was misspelt.
+        let written = key.rsplit('.').next().unwrap_or(key);
+        nearest(written, known.iter().map(String::as_str))
     }
 
     /// The same error of the parameter within the table `table`.
     #[must_use]
     pub fn within(mut self, table: &str) -> Self {
         let (Self::Value { key, .. }
-        | Self::Missing { key }
+        | Self::Missing { key, .. }
         | Self::Unknown { key, .. }
         | Self::Conflict { key, .. }) = &mut self;
         *key = if key.is_empty() { table.to_owned() } else { format!("{table}.{key}") };
@@ -83,6 +121,24 @@ impl ParameterError {
         }
         self
     }
+}
+
+/// A message without a key.
+impl From<String> for ParameterError {
+    fn from(message: String) -> Self {
+        Self::conflict("", message)
+    }
+}
+
+/// A message without a key.
+impl From<&str> for ParameterError {
+    fn from(message: &str) -> Self {
+        Self::conflict("", message)
+    }
+}
+
+fn after_comma(expected: &str) -> String {
+    if expected.is_empty() { String::new() } else { format!(", expected {expected}") }
 }
 
 fn list(names: &[String]) -> String {
@@ -223,6 +279,6 @@ mod tests {
     fn an_unknown_key_is_told_with_those_that_there_are() {
         let known = vec!["gains".to_owned(), "vehicle".to_owned()];
         let error = ParameterError::Unknown { key: "gain".to_owned(), known };
-        assert_eq!(error.to_string(), "unknown field `gain`, expected one of `gains`, `vehicle`");
+        assert_eq!(error.to_string(), "unknown key `gain`, expected one of `gains`, `vehicle`");
     }
 }

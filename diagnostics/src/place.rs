@@ -1,12 +1,16 @@
 //! Where something stands in a file.
 
+use annotate_snippets::{AnnotationKind, Group, Level, Renderer, Snippet};
 use std::fmt;
+use std::ops::Range;
 
 /// A place in a file, for messages: `file:line:column`, both counted from 1.
 ///
+/// `{:#}` draws the line as well, with the place marked:
 /// ```
-/// let place = diagnostics::Place::of("a.toml", "x = 1\ny = 2\n", 10);
+/// let place = diagnostics::Place::of("a.toml", "x = 1\ny = 2\n", &(10..11));
 /// assert_eq!(place.to_string(), "a.toml:2:5");
+/// assert_eq!(format!("{place:#}"), "  |\n2 | y = 2\n  |     ^");
 /// ```
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Place {
@@ -16,24 +20,54 @@ pub struct Place {
     pub line: usize,
     /// Column in characters, from 1.
     pub column: usize,
+    /// The text of the line.
+    source: String,
+    /// The bytes of `source` that are meant.
+    marked: Range<usize>,
 }
 
 impl Place {
-    /// The place of byte `offset` in `text`; an offset past the end means the end, one within a character its begin.
+    /// The place of the bytes `span` of `text`; an offset past the end means the end, one within a character its begin.
     #[must_use]
-    pub fn of(file: impl Into<String>, text: &str, offset: usize) -> Self {
-        let before = &text[..text.floor_char_boundary(offset)];
+    pub fn of(file: impl Into<String>, text: &str, span: &Range<usize>) -> Self {
+        let before = &text[..text.floor_char_boundary(span.start)];
         let line_start = before.rfind('\n').map_or(0, |newline| newline + 1);
+        let source = text[line_start..].lines().next().unwrap_or_default();
+        let in_line = |offset: usize| source.floor_char_boundary(offset.saturating_sub(line_start));
         Place {
             file: file.into(),
             line: before.matches('\n').count() + 1,
             column: before[line_start..].chars().count() + 1,
+            marked: in_line(span.start)..in_line(span.end.max(span.start)),
+            source: source.to_owned(),
         }
     }
 }
 
 impl fmt::Display for Place {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}:{}:{}", self.file, self.line, self.column)
+        if !f.alternate() {
+            return write!(f, "{}:{}:{}", self.file, self.line, self.column);
+        }
+        let mark = AnnotationKind::Primary.span(self.marked.clone());
+        let snippet = Snippet::source(&self.source).line_start(self.line).annotation(mark);
+        f.write_str(&Renderer::plain().render(&[Group::with_level(Level::ERROR).element(snippet)]))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Place;
+
+    #[test]
+    fn any_offset_is_a_place() {
+        let text = "a = \"ä\"\nb";
+        for start in 0..text.len() + 3 {
+            for end in 0..text.len() + 3 {
+                assert!(!format!("{:#}", Place::of("a.toml", text, &(start..end))).is_empty());
+            }
+        }
+        assert_eq!(Place::of("a.toml", text, &(50..51)).to_string(), "a.toml:2:2");
+        assert_eq!(Place::of("a.toml", "", &(0..0)).to_string(), "a.toml:1:1");
     }
 }

@@ -1,11 +1,17 @@
-//! Reads a component's parameters from JSON, so that an error carries its key and what was expected there.
+//! Reads types from JSON and TOML, so that an error carries its key, what was expected there and where it stands.
 
+use crate::diagnostic::Diagnostic;
 use crate::parameter::ParameterError;
-use serde::de::value::{MapAccessDeserializer, MapDeserializer, SeqDeserializer, StrDeserializer};
-use serde::de::{self, DeserializeOwned, IntoDeserializer, Visitor};
+use crate::place::Place;
+use serde::de::value::{BorrowedStrDeserializer, MapAccessDeserializer};
+use serde::de::{self, DeserializeOwned, DeserializeSeed, IntoDeserializer, Unexpected, Visitor};
 use serde::{Deserializer, forward_to_deserialize_any};
 use serde_json::Value;
+use serde_spanned::Spanned;
+use serde_spanned::de::{SpannedDeserializer, is_spanned};
 use std::fmt::Display;
+use std::ops::Range;
+use toml::de::{DeString, DeTable, DeValue};
 
 /// Reads `parameters` as a `P`.
 ///
@@ -24,65 +30,226 @@ use std::fmt::Display;
 /// let error = read(r#"{ "roll": "two" }"#).unwrap_err();
 /// assert_eq!((error.key(), error.to_string().as_str()), ("roll", "`roll` must be f64, found string \"two\""));
 /// let error = read(r#"{ "rol": 2.0 }"#).unwrap_err();
-/// assert_eq!((error.key(), error.to_string().as_str()), ("rol", "unknown field `rol`, expected `roll`"));
+/// assert_eq!((error.key(), error.to_string().as_str()), ("rol", "unknown key `rol`, expected `roll`"));
 /// ```
 pub fn read<P: DeserializeOwned>(parameters: &Value) -> Result<P, ParameterError> {
-    serde_path_to_error::deserialize(Json(parameters)).map_err(|error| {
-        let path = error.path().to_string();
-        let error = error.into_inner();
-        // The path of an unknown key ends in it already.
-        match path.as_str() {
-            "." => error,
-            path if matches!(error, ParameterError::Unknown { .. }) => {
-                path.rsplit_once('.').map_or(error.clone(), |(table, _)| error.within(table))
-            }
-            path => error.within(path),
-        }
+    P::deserialize(Tree::Json(parameters)).map_err(|misread| misread.error)
+}
+
+/// Reads the TOML `text` of `file` as a `T`.
+///
+/// # Errors
+/// The first place where it is no TOML, or does not hold what `T` has there.
+///
+/// ```
+/// #[derive(Debug, serde::Deserialize)]
+/// #[serde(deny_unknown_fields)]
+/// struct Run {
+///     seed: u64,
+/// }
+///
+/// let error = diagnostics::read_toml::<Run>("a.toml", "seed = 1\nsede = 2").unwrap_err();
+/// assert_eq!(
+///     error.to_string(),
+///     "a.toml:2:1: unknown key `sede`, expected `seed`\n  help: did you mean `seed`?"
+/// );
+/// let error = diagnostics::read_toml::<Run>("a.toml", "seed = 'x'").unwrap_err();
+/// assert_eq!(error.to_string().lines().next(), Some("a.toml:1:8: `seed` must be u64, found string \"x\""));
+/// ```
+pub fn read_toml<T: DeserializeOwned>(file: &str, text: &str) -> Result<T, Diagnostic> {
+    let misread = |misread: Misread| Diagnostic::at(Place::of(file, text, &misread.span()), misread.error);
+    let table = parse_toml(text).map_err(misread)?;
+    let span = table.span();
+    read_tree(&Spanned::new(span, DeValue::Table(table.into_inner()))).map_err(misread)
+}
+
+/// What `text` says.
+///
+/// # Errors
+/// Where it is not TOML, and why.
+pub fn parse_toml(text: &str) -> Result<Spanned<DeTable<'_>>, Misread> {
+    DeTable::parse(text).map_err(|error| {
+        let message = format!("not valid TOML: {}", error.message().trim());
+        Misread { error: message.into(), span: error.span() }
     })
 }
 
+/// Reads a part of a TOML file as a `T`.
+///
+/// # Errors
+/// The first place where it does not hold what `T` has there.
+///
+/// ```
+/// let table = diagnostics::parse_toml("wheel = { radius_m = true }").unwrap();
+/// let wheel = &table.get_ref()["wheel"];
+/// let misread = diagnostics::read_tree::<std::collections::BTreeMap<String, f64>>(wheel).unwrap_err();
+/// assert_eq!((misread.error.key(), misread.span()), ("radius_m", 21..25));
+/// ```
+pub fn read_tree<T: DeserializeOwned>(tree: &Spanned<DeValue<'_>>) -> Result<T, Misread> {
+    T::deserialize(Tree::Toml(tree))
+}
+
+/// What is not as the type to be read has it.
+#[derive(Debug, thiserror::Error)]
+#[error("{error}")]
+pub struct Misread {
+    /// The key, what was expected and what was found.
+    pub error: ParameterError,
+    span: Option<Range<usize>>,
+}
+
+impl Misread {
+    /// Which bytes of the text are to blame; the very first where it is none in particular.
+    #[must_use]
+    pub fn span(&self) -> Range<usize> {
+        self.span.clone().unwrap_or(0..0)
+    }
+
+    fn at(self, span: Option<Range<usize>>) -> Self {
+        Self { span: self.span.or(span), ..self }
+    }
+
+    fn within(self, table: &str) -> Self {
+        Self { error: self.error.within(table), ..self }
+    }
+}
+
 /// A value on its way into a type.
-struct Json<'v>(&'v Value);
+#[derive(Clone, Copy)]
+enum Tree<'v> {
+    Json(&'v Value),
+    Toml(&'v Spanned<DeValue<'v>>),
+}
 
-impl<'de> Deserializer<'de> for Json<'de> {
-    type Error = ParameterError;
+/// A value in a table, with its key.
+struct Entry<'v> {
+    key: &'v str,
+    key_span: Option<Range<usize>>,
+    value: Tree<'v>,
+}
 
-    fn deserialize_any<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, ParameterError> {
-        match self.0 {
-            Value::Null => visitor.visit_unit(),
-            Value::Bool(flag) => visitor.visit_bool(*flag),
-            Value::Number(number) => match (number.as_u64(), number.as_i64()) {
-                (Some(number), _) => visitor.visit_u64(number),
-                (None, Some(number)) => visitor.visit_i64(number),
-                (None, None) => visitor.visit_f64(number.as_f64().unwrap_or(f64::NAN)),
-            },
-            Value::String(text) => visitor.visit_borrowed_str(text),
-            Value::Array(items) => {
-                let mut items = SeqDeserializer::new(items.iter().map(Json));
-                let value = visitor.visit_seq(&mut items)?;
-                items.end()?;
-                Ok(value)
-            }
-            Value::Object(table) => {
-                let entries = table.iter().map(|(key, value)| (key.as_str(), Json(value)));
-                let mut entries = MapDeserializer::new(entries);
-                let value = visitor.visit_map(&mut entries)?;
-                entries.end()?;
-                Ok(value)
-            }
+impl<'v> Tree<'v> {
+    fn span(self) -> Option<Range<usize>> {
+        match self {
+            Self::Json(_) => None,
+            Self::Toml(value) => Some(value.span()),
         }
     }
 
-    fn deserialize_option<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, ParameterError> {
-        if self.0.is_null() { visitor.visit_none() } else { visitor.visit_some(self) }
+    fn of_toml_entry((key, value): (&'v Spanned<DeString<'v>>, &'v Spanned<DeValue<'v>>)) -> Entry<'v> {
+        Entry { key: key.get_ref(), key_span: Some(key.span()), value: Self::Toml(value) }
+    }
+
+    fn of_json_entry((key, value): (&'v String, &'v Value)) -> Entry<'v> {
+        Entry { key, key_span: None, value: Self::Json(value) }
+    }
+
+    fn shape(self) -> Shape<'v> {
+        match self {
+            Self::Json(value) => match value {
+                Value::Null => Shape::Null,
+                Value::Bool(flag) => Shape::Bool(*flag),
+                Value::Number(number) => match (number.as_u64(), number.as_i64()) {
+                    (Some(number), _) => Shape::Unsigned(number),
+                    (None, Some(number)) => Shape::Signed(number),
+                    (None, None) => Shape::Float(number.as_f64().unwrap_or(f64::NAN)),
+                },
+                Value::String(text) => Shape::Text(text),
+                Value::Array(items) => Shape::List(items.iter().map(Self::Json).collect()),
+                Value::Object(table) => Shape::Table(table.iter().map(Self::of_json_entry).collect()),
+            },
+            Self::Toml(value) => match value.get_ref() {
+                DeValue::Boolean(flag) => Shape::Bool(*flag),
+                DeValue::Integer(number) => {
+                    let (digits, radix) = (number.as_str(), number.radix());
+                    match (u64::from_str_radix(digits, radix), i64::from_str_radix(digits, radix)) {
+                        (Ok(number), _) => Shape::Unsigned(number),
+                        (Err(_), Ok(number)) => Shape::Signed(number),
+                        (Err(_), Err(_)) => Shape::Other("an integer of more than 64 bits"),
+                    }
+                }
+                DeValue::Float(number) => {
+                    number.as_str().parse().map_or(Shape::Other("a number that is none"), Shape::Float)
+                }
+                DeValue::String(text) => Shape::Text(text),
+                DeValue::Datetime(_) => Shape::Other("a date or time"),
+                DeValue::Array(items) => Shape::List(items.iter().map(Self::Toml).collect()),
+                DeValue::Table(table) => Shape::Table(table.iter().map(Self::of_toml_entry).collect()),
+            },
+        }
+    }
+
+    fn visit<V: Visitor<'v>>(self, visitor: V) -> Result<V::Value, Misread> {
+        match self.shape() {
+            Shape::Null => visitor.visit_unit(),
+            Shape::Bool(flag) => visitor.visit_bool(flag),
+            Shape::Unsigned(number) => visitor.visit_u64(number),
+            Shape::Signed(number) => visitor.visit_i64(number),
+            Shape::Float(number) => visitor.visit_f64(number),
+            Shape::Text(text) => visitor.visit_borrowed_str(text),
+            Shape::Other(what) => Err(de::Error::invalid_type(Unexpected::Other(what), &visitor)),
+            Shape::Table(entries) => visitor.visit_map(Entries::of(entries)),
+            Shape::List(items) => {
+                let count = items.len();
+                let mut items = Items(items.into_iter().enumerate());
+                let value = visitor.visit_seq(&mut items)?;
+                match items.0.len() {
+                    0 => Ok(value),
+                    left => {
+                        Err(de::Error::invalid_length(count, &format!("a list of {}", count - left).as_str()))
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// What a value is, in either language.
+enum Shape<'v> {
+    Null,
+    Bool(bool),
+    Unsigned(u64),
+    Signed(i64),
+    Float(f64),
+    Text(&'v str),
+    /// What no type is read from.
+    Other(&'static str),
+    List(Vec<Tree<'v>>),
+    Table(Vec<Entry<'v>>),
+}
+
+impl<'de> Deserializer<'de> for Tree<'de> {
+    type Error = Misread;
+
+    fn deserialize_any<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, Misread> {
+        self.visit(visitor).map_err(|misread| misread.at(self.span()))
+    }
+
+    fn deserialize_option<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, Misread> {
+        match self {
+            Self::Json(Value::Null) => visitor.visit_none(),
+            _ => visitor.visit_some(self),
+        }
     }
 
     fn deserialize_newtype_struct<V: Visitor<'de>>(
         self,
         _: &'static str,
         visitor: V,
-    ) -> Result<V::Value, ParameterError> {
-        visitor.visit_newtype_struct(self)
+    ) -> Result<V::Value, Misread> {
+        visitor.visit_newtype_struct(self).map_err(|misread| misread.at(self.span()))
+    }
+
+    fn deserialize_struct<V: Visitor<'de>>(
+        self,
+        name: &'static str,
+        _: &'static [&'static str],
+        visitor: V,
+    ) -> Result<V::Value, Misread> {
+        if is_spanned(name) {
+            return visitor.visit_map(SpannedDeserializer::new(self, self.span().unwrap_or(0..0)));
+        }
+        self.deserialize_any(visitor)
     }
 
     fn deserialize_enum<V: Visitor<'de>>(
@@ -90,28 +257,27 @@ impl<'de> Deserializer<'de> for Json<'de> {
         name: &'static str,
         variants: &'static [&'static str],
         visitor: V,
-    ) -> Result<V::Value, ParameterError> {
-        match self.0 {
-            Value::String(variant) => {
-                let variant: StrDeserializer<'_, ParameterError> = variant.as_str().into_deserializer();
-                variant.deserialize_enum(name, variants, visitor)
+    ) -> Result<V::Value, Misread> {
+        match self.shape() {
+            Shape::Text(variant) => {
+                BorrowedStrDeserializer::new(variant).deserialize_enum(name, variants, visitor)
             }
-            Value::Object(table) => {
-                let entries = table.iter().map(|(key, value)| (key.as_str(), Json(value)));
-                MapAccessDeserializer::new(MapDeserializer::new(entries))
-                    .deserialize_enum(name, variants, visitor)
+            Shape::Table(entries) if entries.len() == 1 => {
+                MapAccessDeserializer::new(Entries::of(entries)).deserialize_enum(name, variants, visitor)
             }
-            other => Err(ParameterError::value("", "a string", other)),
+            Shape::Table(_) => Err(de::Error::custom("expected a table with one key, the variant's name")),
+            _ => self.visit(visitor),
         }
+        .map_err(|misread: Misread| misread.at(self.span()))
     }
 
     forward_to_deserialize_any! {
         bool i8 i16 i32 i64 u8 u16 u32 u64 f32 f64 char str string bytes byte_buf unit unit_struct seq tuple
-        tuple_struct map struct identifier ignored_any
+        tuple_struct map identifier ignored_any
     }
 }
 
-impl<'v> IntoDeserializer<'v, ParameterError> for Json<'v> {
+impl<'v> IntoDeserializer<'v, Misread> for Tree<'v> {
     type Deserializer = Self;
 
     fn into_deserializer(self) -> Self {
@@ -119,34 +285,133 @@ impl<'v> IntoDeserializer<'v, ParameterError> for Json<'v> {
     }
 }
 
-/// What serde has to say, with the key that it is about; [`read`] puts the tables on the way in front.
-impl de::Error for ParameterError {
+/// The entries of a table on their way into a type.
+struct Entries<'v> {
+    rest: std::vec::IntoIter<Entry<'v>>,
+    /// The one whose key is read and whose value is not.
+    open: Option<Entry<'v>>,
+}
+
+impl<'v> Entries<'v> {
+    fn of(entries: Vec<Entry<'v>>) -> Self {
+        Self { rest: entries.into_iter(), open: None }
+    }
+}
+
+impl<'v> de::MapAccess<'v> for Entries<'v> {
+    type Error = Misread;
+
+    fn next_key_seed<K: DeserializeSeed<'v>>(&mut self, seed: K) -> Result<Option<K::Value>, Misread> {
+        let Some(entry) = self.rest.next() else { return Ok(None) };
+        let entry = self.open.insert(entry);
+        let key = seed.deserialize(BorrowedStrDeserializer::new(entry.key));
+        key.map(Some).map_err(|misread: Misread| misread.at(entry.key_span.clone()))
+    }
+
+    fn next_value_seed<S: DeserializeSeed<'v>>(&mut self, seed: S) -> Result<S::Value, Misread> {
+        let entry = self.open.take().expect("the key of an entry is read before its value");
+        seed.deserialize(entry.value).map_err(|misread| misread.within(entry.key))
+    }
+}
+
+/// The elements of a list on their way into a type.
+struct Items<'v>(std::iter::Enumerate<std::vec::IntoIter<Tree<'v>>>);
+
+impl<'v> de::SeqAccess<'v> for Items<'v> {
+    type Error = Misread;
+
+    fn next_element_seed<S: DeserializeSeed<'v>>(&mut self, seed: S) -> Result<Option<S::Value>, Misread> {
+        let Some((index, item)) = self.0.next() else { return Ok(None) };
+        seed.deserialize(item).map(Some).map_err(|misread| misread.within(&index.to_string()))
+    }
+}
+
+impl From<ParameterError> for Misread {
+    fn from(error: ParameterError) -> Self {
+        Self { error, span: None }
+    }
+}
+
+/// What serde has to say, with the key that it is about; the tables on the way are put in front on the way out.
+impl de::Error for Misread {
     fn custom<T: Display>(message: T) -> Self {
-        Self::conflict("", message)
+        ParameterError::conflict("", message).into()
     }
 
-    fn invalid_type(found: de::Unexpected<'_>, expected: &dyn de::Expected) -> Self {
-        Self::value("", expected.to_string(), found)
+    fn invalid_type(found: Unexpected<'_>, expected: &dyn de::Expected) -> Self {
+        ParameterError::value("", expected.to_string(), found).into()
     }
 
-    fn invalid_value(found: de::Unexpected<'_>, expected: &dyn de::Expected) -> Self {
-        Self::value("", expected.to_string(), found)
+    fn invalid_value(found: Unexpected<'_>, expected: &dyn de::Expected) -> Self {
+        ParameterError::value("", expected.to_string(), found).into()
     }
 
     fn invalid_length(length: usize, expected: &dyn de::Expected) -> Self {
-        Self::value("", expected.to_string(), format_args!("a list of {length}"))
+        ParameterError::value("", expected.to_string(), format_args!("a list of {length}")).into()
     }
 
     fn unknown_variant(variant: &str, expected: &'static [&'static str]) -> Self {
-        Self::value("", format!("one of `{}`", expected.join("`, `")), format_args!("`{variant}`"))
+        let expected = format!("one of `{}`", expected.join("`, `"));
+        ParameterError::value("", expected, format_args!("`{variant}`")).into()
     }
 
     fn unknown_field(field: &str, expected: &'static [&'static str]) -> Self {
-        let known = expected.iter().map(|key| (*key).to_owned()).collect();
-        Self::Unknown { key: field.to_owned(), known }
+        ParameterError::unknown(field, expected).into()
     }
 
     fn missing_field(field: &'static str) -> Self {
-        Self::Missing { key: field.to_owned() }
+        ParameterError::missing(field, "").into()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{read, read_toml};
+    use std::collections::BTreeMap;
+
+    #[derive(Debug, serde::Deserialize)]
+    #[serde(deny_unknown_fields)]
+    struct Wheel {
+        #[serde(rename = "radius_m")]
+        _radius_m: f64,
+    }
+
+    type Wheels = BTreeMap<String, Vec<Wheel>>;
+
+    fn refused(text: &str) -> (String, String) {
+        let in_toml = read_toml::<Wheels>("a.toml", text).unwrap_err();
+        let json: serde_json::Value = toml::from_str(text).unwrap();
+        assert_eq!(read::<Wheels>(&json).unwrap_err(), in_toml.error, "alike in both languages");
+        let place = in_toml.place.as_ref().unwrap();
+        (format!("{}:{}", place.line, place.column), in_toml.error.to_string())
+    }
+
+    #[test]
+    fn an_error_has_the_whole_key_and_its_place() {
+        let told = |text| {
+            let (place, error) = refused(text);
+            format!("{place} {error}")
+        };
+        assert_eq!(told("[[a]]\nradius_m = 'x'"), "2:12 `a.0.radius_m` must be f64, found string \"x\"");
+        assert_eq!(told("[[a]]\nradius_m = 1\n[[a]]"), "3:1 missing key `a.1.radius_m`");
+        assert_eq!(told("a = 3"), "1:5 `a` must be a sequence, found integer `3`");
+    }
+
+    #[test]
+    fn an_unknown_key_may_contain_a_dot() {
+        let (place, error) = refused("[[a]]\n'b.c' = 1");
+        assert_eq!((place.as_str(), error.as_str()), ("2:1", "unknown key `a.0.b.c`, expected `radius_m`"));
+    }
+
+    #[test]
+    fn a_list_that_is_too_long_is_refused() {
+        let error = read_toml::<BTreeMap<String, [f64; 2]>>("a.toml", "a = [1, 2, 3]").unwrap_err();
+        assert_eq!(error.error.to_string(), "`a` must be a list of 2, found a list of 3");
+    }
+
+    #[test]
+    fn what_is_no_toml_is_told_with_its_place() {
+        let error = read_toml::<Wheels>("a.toml", "a = 1\nb = ").unwrap_err().to_string();
+        assert!(error.starts_with("a.toml:2:5: not valid TOML: "), "{error}");
     }
 }

@@ -30,7 +30,7 @@ impl Document {
 
     /// Where `span` begins.
     pub fn place(&self, span: &Range<usize>) -> Place {
-        Place::of(self.path.display().to_string(), &self.text, span.start)
+        Place::of(self.path.display().to_string(), &self.text, span)
     }
 
     /// A value that cannot be meant.

@@ -62,7 +62,7 @@ impl Problem {
         message: impl Into<String>,
         help: impl Into<String>,
     ) -> Self {
-        let place = Place::of(file.display().to_string(), text, span.start);
+        let place = Place::of(file.display().to_string(), text, span);
         Self {
             file: file.to_owned(),
             place: Some((place.line, place.column)),

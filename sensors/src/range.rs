@@ -212,8 +212,7 @@ impl Sensor for RangeFinders {
 
     fn new(params: RangeParams) -> Result<Self, ParameterError> {
         params.validate()?;
-        let path =
-            params.scene.as_ref().ok_or_else(|| ParameterError::Missing { key: "scene".to_owned() })?;
+        let path = params.scene.as_ref().ok_or_else(|| ParameterError::missing("scene", ""))?;
         let scene = Scene::load(path).map_err(|error| ParameterError::conflict("scene", error))?;
         let (x, y, z) = (Vector3::x_axis(), Vector3::y_axis(), Vector3::z_axis());
         let half_angle_rad = params.half_angle_deg.to_radians();
@@ -442,7 +441,7 @@ mod tests {
             assert!(reason.contains(&format!("`{key}`")), "{reason}");
         }
         let reason = refusal::<RangeFinders>(&serde_json::json!({}));
-        assert!(reason.starts_with("missing field `scene`"), "{reason}");
+        assert!(reason.starts_with("missing key `scene`"), "{reason}");
         let reason = refusal::<RangeFinders>(&serde_json::json!({ "scene": "none.toml" }));
         assert!(reason.contains("none.toml"), "{reason}");
         Harness::<Sensing<RangeFinders>>::from_json(&serde_json::json!({ "scene": ROOM })).unwrap();

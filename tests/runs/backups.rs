@@ -147,7 +147,7 @@ fn a_backup_that_would_not_fit_the_graph() {
     let ended = swap(&format!("{inputs}inputs.§estimate = \"/plant/stat\""));
     ended.says(&["input `estimate` of `controller`: nobody publishes /plant/stat"]);
     let ended = swap("parameters.§gain = 3");
-    ended.says(&["process `controller`", "unknown field `gain`"]);
+    ended.says(&["process `controller`", "unknown key `gain`"]);
     swap("parameters = §3").says(&["invalid type"]);
     let at_swap = |with: &str| {
         let head = "\n§[[swap]]\nprocess = \"controller\"\nat_tick = 50\nshadow_ticks = 9\n";

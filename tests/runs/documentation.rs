@@ -66,7 +66,7 @@ fn known_keys(from: &str, to: &str) -> Vec<String> {
     let place = Place::new();
     assert_eq!(good().matches(from).count(), 1, "{from}");
     let ended = place.call(&["check", &place.write("keys.toml", good().replace(from, to))]).with_code(2);
-    ended.says(&["unknown field `", "unknown_key`, expected "]);
+    ended.says(&["unknown key `", "unknown_key`, expected "]);
     let list = ended.error.split("unknown_key`, expected ").nth(1).unwrap().lines().next().unwrap();
     list.split('`').skip(1).step_by(2).map(str::to_owned).collect()
 }

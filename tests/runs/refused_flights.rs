@@ -77,7 +77,7 @@ fn a_column_map_without_a_unit_or_with_a_wrong_one() {
     let columns = "process.player.parameters.columns.time";
     let missing = format!("{columns}={{ columns = [\"t\"] }}");
     refused_replay(&flight(), &["--set", &missing])
-        .says(&["process `player`", "missing field `columns.time.unit`"]);
+        .says(&["process `player`", "missing key `columns.time.unit`"]);
     let wrong = format!("{columns}.unit=h");
     refused_replay(&flight(), &["--set", &wrong])
         .says(&["`time` has the unit `h`", "\"s\" or \"ms\" or \"us\""]);

@@ -30,7 +30,7 @@ fn a_file_and_a_parameter_that_say_the_same() {
 #[test]
 fn a_parameter_that_is_unknown() {
     let ended = refused("initial_altitude_m", "§initial_altitude_ft");
-    ended.says(&["process `pilot`", "unknown field `initial_altitude_ft`", "initial_altitude_m"]);
+    ended.says(&["process `pilot`", "unknown key `initial_altitude_ft`", "initial_altitude_m"]);
 }
 
 #[test]

@@ -37,7 +37,7 @@ impl<'t> Document<'t> {
 
     /// The place of byte `offset`, for messages.
     pub fn place(&self, offset: usize) -> Place {
-        Place::of(self.file, self.text, offset)
+        Place::of(self.file, self.text, &(offset..offset))
     }
 
     /// A value that cannot be meant.

@@ -170,7 +170,7 @@ impl Stand {
         let text = vehicles::text::read(path)
             .map_err(|cause| RotorError::Unreadable { file: name.clone(), cause })?;
         let file: File = toml::from_str(&text).map_err(|error| RotorError::Syntax {
-            place: Place::of(&name, &text, error.span().map_or(0, |span| span.start)),
+            place: Place::of(&name, &text, &error.span().unwrap_or(0..0)),
             message: error.message().trim().replace('\n', ", "),
         })?;
         let check = Check { file: &name };

@@ -1,0 +1,207 @@
+//! What is wrong with a file that somebody wrote: where, what was expected, what was found, what to do.
+
+use crate::parameter::ParameterError;
+use crate::place::Place;
+use serde::ser::{Serialize, SerializeStruct, Serializer};
+use std::fmt;
+use std::io;
+
+/// Whether what was written can be used.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub enum Severity {
+    /// It cannot.
+    #[default]
+    Error,
+    /// It can, but is odd.
+    Warning,
+}
+
+impl fmt::Display for Severity {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Error => "error",
+            Self::Warning => "warning",
+        })
+    }
+}
+
+/// What is wrong at a place in a file, and what else is.
+///
+/// ```
+/// use diagnostics::{Diagnostic, ParameterError, Place};
+///
+/// let text = "[body]\nmass_kg = -1\n";
+/// let place = Place::of("a.toml", text, &(17..19));
+/// let error = Diagnostic::at(place, ParameterError::value("body.mass_kg", "a number above 0", -1));
+/// assert_eq!(error.key(), "body.mass_kg");
+/// assert_eq!(
+///     error.to_string(),
+///     "a.toml:2:11: `body.mass_kg` must be a number above 0, found -1\n  help: correct this value"
+/// );
+///
+/// // All errors of a file at once.
+/// let missing = Diagnostic::in_file("a.toml", "no rotors").help("add [[rotors]]");
+/// let both = Diagnostic::gather([Ok(1), Err(error), Err(missing)]).unwrap_err();
+/// assert_eq!(both.all().count(), 2);
+///
+/// // For terminals, with the line.
+/// assert_eq!(
+///     format!("{both:#}"),
+///     "a.toml:2:11: `body.mass_kg` must be a number above 0, found -1
+///   |
+/// 2 | mass_kg = -1
+///   |           ^^
+///   help: correct this value
+/// a.toml: no rotors
+///   help: add [[rotors]]"
+/// );
+/// ```
+#[derive(Debug, Clone, PartialEq)]
+pub struct Diagnostic {
+    /// Whether it can be used all the same.
+    pub severity: Severity,
+    /// The file's name as it was given to the reader; empty where it is about none.
+    pub file: String,
+    /// Where in the file; none where it is about the whole.
+    pub place: Option<Place>,
+    /// The key, what was expected and what was found.
+    pub error: ParameterError,
+    /// What to do; empty where the message says it.
+    pub help: String,
+    /// What else is wrong.
+    others: Vec<Diagnostic>,
+}
+
+impl Diagnostic {
+    /// What is wrong with the whole file.
+    #[must_use]
+    pub fn in_file(file: impl Into<String>, error: impl Into<ParameterError>) -> Self {
+        let error = error.into();
+        let (severity, help) = (Severity::Error, error.help());
+        Self { severity, file: file.into(), place: None, error, help, others: Vec::new() }
+    }
+
+    /// What is wrong at `place`.
+    #[must_use]
+    pub fn at(place: Place, error: impl Into<ParameterError>) -> Self {
+        Self { place: Some(place.clone()), ..Self::in_file(place.file, error) }
+    }
+
+    /// A file that cannot be read at all.
+    #[must_use]
+    pub fn unreadable(file: impl Into<String>, cause: &io::Error) -> Self {
+        Self::in_file(file, format!("cannot read this file: {cause}"))
+            .help("check the path and that it is UTF-8 text")
+    }
+
+    /// The same with `help` as what to do.
+    #[must_use]
+    pub fn help(self, help: impl Into<String>) -> Self {
+        Self { help: help.into(), ..self }
+    }
+
+    /// The same as a warning.
+    #[must_use]
+    pub fn warning(self) -> Self {
+        Self { severity: Severity::Warning, ..self }
+    }
+
+    /// The dotted key that is to blame; empty where none is in particular.
+    #[must_use]
+    pub fn key(&self) -> &str {
+        self.error.key()
+    }
+
+    /// This and whatever else is wrong, each on its own.
+    pub fn all(&self) -> impl Iterator<Item = &Self> {
+        std::iter::once(self).chain(&self.others)
+    }
+
+    /// This, and `others` beside it.
+    #[must_use]
+    pub fn and(mut self, others: impl IntoIterator<Item = Self>) -> Self {
+        for mut other in others {
+            let more = std::mem::take(&mut other.others);
+            self.others.push(other);
+            self.others.extend(more);
+        }
+        self
+    }
+
+    /// What all `checks` came to.
+    ///
+    /// # Errors
+    /// Those of all checks as one, so that one look shows every fault.
+    pub fn gather<T>(checks: impl IntoIterator<Item = Result<T, Self>>) -> Result<Vec<T>, Self> {
+        let (mut passed, mut failed) = (Vec::new(), Vec::new());
+        for check in checks {
+            match check {
+                Ok(value) => passed.push(value),
+                Err(error) => failed.push(error),
+            }
+        }
+        let mut failed = failed.into_iter();
+        failed.next().map_or(Ok(passed), |first| Err(first.and(failed)))
+    }
+}
+
+/// As an object: file, line, column, message, help.
+impl Serialize for Diagnostic {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let mut object = serializer.serialize_struct("Diagnostic", 5)?;
+        object.serialize_field("file", &self.file)?;
+        object.serialize_field("line", &self.place.as_ref().map(|place| place.line))?;
+        object.serialize_field("column", &self.place.as_ref().map(|place| place.column))?;
+        object.serialize_field("message", &self.error.to_string())?;
+        object.serialize_field("help", &self.help)?;
+        object.end()
+    }
+}
+
+/// `file:line:column: message`, which editors jump to, then `help:`; with `{:#}` the line of the file between them.
+impl fmt::Display for Diagnostic {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match &self.place {
+            Some(place) => write!(f, "{place}: {}", self.error)?,
+            None if self.file.is_empty() => write!(f, "{}", self.error)?,
+            None => write!(f, "{}: {}", self.file, self.error)?,
+        }
+        if let (Some(place), true) = (&self.place, f.alternate()) {
+            write!(f, "\n{place:#}")?;
+        }
+        if !self.help.is_empty() {
+            write!(f, "\n  help: {}", self.help)?;
+        }
+        for other in &self.others {
+            f.write_str("\n")?;
+            other.fmt(f)?;
+        }
+        Ok(())
+    }
+}
+
+impl std::error::Error for Diagnostic {}
+
+#[cfg(test)]
+mod tests {
+    use super::{Diagnostic, Place};
+
+    fn at(offset: usize) -> Diagnostic {
+        Diagnostic::at(Place::of("a.toml", "x = 1\ny = 2\n", &(offset..offset + 1)), "bad value")
+    }
+
+    #[test]
+    fn a_diagnostic_names_file_line_and_column() {
+        let error = at(10).help("give another");
+        assert_eq!(error.to_string(), "a.toml:2:5: bad value\n  help: give another");
+    }
+
+    #[test]
+    fn several_are_told_at_once_each_with_its_place() {
+        let gathered = Diagnostic::gather([Ok(1), Err(at(4)), Ok(2), Err(at(10))]).unwrap_err();
+        assert_eq!(gathered.to_string(), "a.toml:1:5: bad value\na.toml:2:5: bad value");
+        let gathered = Diagnostic::in_file("b.toml", "bad").and([gathered]);
+        assert_eq!(gathered.all().count(), 3);
+        assert_eq!(Diagnostic::gather::<i32>([Ok(1), Ok(2)]), Ok(vec![1, 2]));
+    }
+}
