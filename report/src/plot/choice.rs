@@ -1,9 +1,17 @@
 //! What is plotted: chosen with `--plot`, or by the types of the recording's topics.
 
+use crate::plot::field::Channel;
+use crate::plot::thin::{Curve, Trail};
 use anyhow::{Context, Result, bail};
 use recorder::reader::Recording;
 use serde::Serialize;
 use std::collections::BTreeSet;
+
+/// Points of a path in space.
+const TRAIL_POINTS_MAX: usize = 2000;
+
+/// What was read for one [`Ask`]: its channels with their curves; none where no message was in the span.
+pub type Curves = Vec<(Channel, Curve)>;
 
 /// What a curve stands for; it decides how its line looks.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
@@ -23,7 +31,7 @@ impl Role {
     /// The role of `field` in what a topic of type `type_name` carries.
     fn of(type_name: &str, field: &str) -> Self {
         let name = field.split('[').next().unwrap_or_default();
-        match own_name(type_name) {
+        match short_name(type_name) {
             "SetPoint" | "Reference" => Self::Asked,
             // The rest of it is what the controller does.
             "ControlStatus" if name.ends_with("set_point") => Self::Asked,
@@ -54,71 +62,43 @@ impl Role {
     }
 }
 
-/// A figure that is drawn where the recording has topics of these types.
-struct Figure {
-    title: &'static str,
-    /// What its vertical axis shows.
-    label: &'static str,
-    /// Message types and the fields of theirs that belong here. Of the types that ask for something, only the first
-    /// that is there is drawn: mostly the others ask for the same.
-    rows: &'static [(&'static str, &'static [&'static str])],
-}
-
-/// The figures in which the thesis shows a flight (its Figs 5.1–5.5), and the distances that its wall following uses.
-const FIGURES: [Figure; 7] = [
-    Figure {
-        title: "Attitude",
-        label: "angle",
-        rows: &[
-            ("PlantState", &["attitude"]),
-            ("MeasuredState", &["attitude"]),
-            ("AttitudeEstimate", &["attitude"]),
-            ("StateEstimate", &["attitude"]),
-            ("ControlStatus", &["attitude_set_point"]),
-            ("SetPoint", &["roll", "pitch", "yaw"]),
-            ("Reference", &["yaw"]),
+/// Figures that are drawn where the recording has topics of these types: title, what the vertical axis shows, and rows
+/// of types with the fields of theirs that belong there. Of the rows that ask for something, only the first that is there
+/// is drawn: mostly the others ask for the same. They are those in which the thesis shows a flight (its Figs 5.1–5.5),
+/// and the distances that its wall following uses.
+const FIGURES: [(&str, &str, &[Row]); 7] = [
+    (
+        "Attitude",
+        "angle",
+        &[
+            (&["PlantState", "MeasuredState", "AttitudeEstimate", "StateEstimate"], &["attitude"]),
+            (&["ControlStatus"], &["attitude_set_point"]),
+            (&["SetPoint"], &["roll", "pitch", "yaw"]),
+            (&["Reference"], &["yaw"]),
         ],
-    },
-    Figure {
-        title: "Body rates",
-        label: "angular velocity in the body",
-        rows: &[
-            ("PlantState", &["angular_velocity"]),
-            ("MeasuredState", &["angular_velocity"]),
-            ("AttitudeEstimate", &["angular_velocity"]),
-            ("StateEstimate", &["angular_velocity"]),
+    ),
+    (
+        "Body rates",
+        "angular velocity in the body",
+        &[(&["PlantState", "MeasuredState", "AttitudeEstimate", "StateEstimate"], &["angular_velocity"])],
+    ),
+    ("Velocity", "velocity in the world", &[(&MOVING, &["velocity"])]),
+    (
+        "Position",
+        "position in the world",
+        &[
+            (&MOVING, &["position"]),
+            (&["ControlStatus"], &["altitude_set_point"]),
+            (&["SetPoint"], &["altitude"]),
         ],
-    },
-    Figure {
-        title: "Velocity",
-        label: "velocity in the world",
-        rows: &[
-            ("PlantState", &["velocity"]),
-            ("MeasuredState", &["velocity"]),
-            ("StateEstimate", &["velocity"]),
-            ("Reference", &["velocity"]),
-        ],
-    },
-    Figure {
-        title: "Position",
-        label: "position in the world",
-        rows: &[
-            ("PlantState", &["position"]),
-            ("MeasuredState", &["position"]),
-            ("StateEstimate", &["position"]),
-            ("Reference", &["position"]),
-            ("ControlStatus", &["altitude_set_point"]),
-            ("SetPoint", &["altitude"]),
-        ],
-    },
-    Figure {
-        title: "Distances",
-        label: "distance",
-        rows: &[("Ranges", &["distance"]), ("WallEstimate", &["distance"])],
-    },
-    Figure { title: "Motor command", label: "command", rows: &[("MotorCommand", &["command"])] },
-    Figure { title: "Rotor speed", label: "rotor speed", rows: &[("PlantState", &["rotor_speed"])] },
+    ),
+    ("Distances", "distance", &[(&["Ranges", "WallEstimate"], &["distance"])]),
+    ("Motor command", "command", &[(&["MotorCommand"], &["command"])]),
+    ("Rotor speed", "rotor speed", &[(&["PlantState"], &["rotor_speed"])]),
 ];
+
+/// Message types, and fields of theirs.
+type Row = (&'static [&'static str], &'static [&'static str]);
 
 /// The types of what moves, which have a field `position`; the first two make a vehicle.
 const MOVING: [&str; 4] = ["PlantState", "MeasuredState", "StateEstimate", "Reference"];
@@ -135,6 +115,10 @@ pub struct Ask {
 }
 
 impl Ask {
+    fn new(topic: &str, field: &str, type_name: &str) -> Self {
+        Self { topic: topic.to_owned(), field: field.to_owned(), role: Role::of(type_name, field) }
+    }
+
     /// The vehicle whose topic it is; empty where it has no name.
     pub fn vehicle(&self) -> &str {
         prefix(&self.topic)
@@ -144,30 +128,23 @@ impl Ask {
 /// One set of axes over time.
 #[derive(Clone, Debug)]
 pub struct Wanted {
+    /// Vehicle; empty where the recording has one without a name, or fields were named.
+    pub vehicle: String,
     /// Title; empty where the fields say it.
     pub title: &'static str,
     /// What the vertical axis shows; empty where the fields say it.
     pub label: &'static str,
-    /// What is drawn.
-    pub asks: Vec<Ask>,
+    /// What is drawn, with what was read of it.
+    pub asks: Vec<(Ask, Curves)>,
 }
 
-/// The axes of a vehicle.
-#[derive(Clone, Debug)]
-pub struct Panel {
-    /// Vehicle; empty where the recording has one without a name.
-    pub vehicle: String,
-    /// Its axes.
-    pub axes: Vec<Wanted>,
-}
-
-/// All that is drawn.
+/// All that is drawn, and what was read of it.
 #[derive(Clone, Debug)]
 pub struct Choice {
-    /// Axes over time.
-    pub panels: Vec<Panel>,
+    /// Axes over time, vehicle by vehicle.
+    pub axes: Vec<Wanted>,
     /// Paths in space.
-    pub trails: Vec<Ask>,
+    pub trails: Vec<(Ask, Trail)>,
     /// Whether people named the fields: then what is not there is an error.
     pub is_named: bool,
 }
@@ -179,25 +156,21 @@ impl Choice {
     /// If a topic or the vehicle is not there, or nothing is.
     pub fn of(recording: &Recording, plots: &[String], vehicle: Option<&str>) -> Result<Self> {
         let vehicles = vehicles(recording);
-        let shown: Vec<&str> = match vehicle {
-            None => vehicles.iter().map(String::as_str).collect(),
-            Some(name) if vehicles.iter().any(|known| known == name) => vec![name],
-            Some(name) => bail!("the recording has no vehicle `{name}`; it has {}", listed(&vehicles)),
+        let shown = match vehicle {
+            None => &vehicles[..],
+            Some(name) => match vehicles.iter().position(|known| known == name) {
+                Some(index) => &vehicles[index..=index],
+                None => bail!("the recording has no vehicle `{name}`; it has {}", listed(&vehicles)),
+            },
         };
-        let panels = if plots.is_empty() {
-            shown.iter().map(|vehicle| default_panel(recording, vehicle, &vehicles)).collect()
+        let axes = if plots.is_empty() {
+            shown.iter().flat_map(|vehicle| default_axes(recording, vehicle, &vehicles)).collect()
         } else {
-            let axes = plots.iter().map(|plot| named(recording, plot)).collect::<Result<_>>()?;
-            vec![Panel { vehicle: String::new(), axes }]
+            plots.iter().map(|plot| named(recording, plot)).collect::<Result<_>>()?
         };
         let is_shown = |topic: &str| shown.iter().any(|vehicle| belongs(topic, vehicle, &vehicles));
-        let choice = Self { panels, trails: trails(recording, is_shown), is_named: !plots.is_empty() };
-        choice.require_something(recording)?;
-        Ok(choice)
-    }
-
-    fn require_something(&self, recording: &Recording) -> Result<()> {
-        if self.trails.is_empty() && self.panels.iter().all(|panel| panel.axes.is_empty()) {
+        let choice = Self { axes, trails: trails(recording, is_shown), is_named: !plots.is_empty() };
+        if choice.axes.is_empty() && choice.trails.is_empty() {
             let topics: Vec<_> = recording.topics().keys().cloned().collect();
             bail!(
                 "no topic of the recording is of a type that is plotted by itself: name fields with --plot \
@@ -205,12 +178,7 @@ impl Choice {
                 listed(&topics)
             );
         }
-        Ok(())
-    }
-
-    /// Everything that is read, the axes' first.
-    pub fn asks(&self) -> impl Iterator<Item = &Ask> {
-        self.panels.iter().flat_map(|panel| &panel.axes).flat_map(|axes| &axes.asks)
+        Ok(choice)
     }
 }
 
@@ -223,7 +191,7 @@ fn listed(names: &[String]) -> String {
 }
 
 /// The last part of the name of a message of ours; nothing of others', which may be called the same.
-fn own_name(type_name: &str) -> &str {
+fn short_name(type_name: &str) -> &str {
     type_name.strip_prefix("hummingbus_msgs/msg/").unwrap_or_default()
 }
 
@@ -241,7 +209,7 @@ fn is_of_shadow(topic: &str) -> bool {
 /// The vehicles by name, `h2` before `h10`.
 fn vehicles(recording: &Recording) -> Vec<String> {
     let topics = recording.topics().iter();
-    let makes_one = |type_name: &str| MOVING[..2].contains(&own_name(type_name));
+    let makes_one = |type_name: &str| MOVING[..2].contains(&short_name(type_name));
     let states = topics.filter(|(name, topic)| makes_one(&topic.type_name) && !is_of_shadow(name));
     let names: BTreeSet<_> = states.map(|(name, _)| (prefix(name).len(), prefix(name))).collect();
     let mut names: Vec<_> = names.into_iter().map(|(_, name)| name.to_owned()).collect();
@@ -260,43 +228,44 @@ fn belongs(topic: &str, vehicle: &str, vehicles: &[String]) -> bool {
     !is_of_shadow(topic) && (is_under(vehicle) || !vehicles.iter().any(|other| is_under(other)))
 }
 
-fn default_panel(recording: &Recording, vehicle: &str, vehicles: &[String]) -> Panel {
-    let own: Vec<(&str, &str)> = recording
+fn default_axes(recording: &Recording, vehicle: &str, vehicles: &[String]) -> Vec<Wanted> {
+    let topics: Vec<(&str, &str)> = recording
         .topics()
         .iter()
         .filter(|(name, _)| belongs(name, vehicle, vehicles))
         .map(|(name, topic)| (name.as_str(), topic.type_name.as_str()))
         .collect();
-    let axes = FIGURES.iter().map(|figure| Wanted {
-        title: figure.title,
-        label: figure.label,
-        asks: default_asks(figure, &own),
+    let axes = FIGURES.map(|(title, label, rows)| Wanted {
+        vehicle: vehicle.to_owned(),
+        title,
+        label,
+        asks: default_asks(rows, &topics),
     });
-    Panel { vehicle: vehicle.to_owned(), axes: axes.filter(|axes| !axes.asks.is_empty()).collect() }
+    axes.into_iter().filter(|axes| !axes.asks.is_empty()).collect()
 }
 
-/// What a figure draws of these topics, given with their types.
-fn default_asks(figure: &Figure, topics: &[(&str, &str)]) -> Vec<Ask> {
-    let mut asks: Vec<Ask> = Vec::new();
-    for (row, fields) in figure.rows {
-        let of_type = topics.iter().filter(|(_, type_name)| own_name(type_name) == *row);
-        let more =
-            of_type.flat_map(|(topic, type_name)| fields.iter().map(|field| ask(topic, field, type_name)));
-        let is_asked = asks.iter().any(|ask| ask.role == Role::Asked);
-        asks.extend(more.filter(|ask| !is_asked || ask.role != Role::Asked));
+/// What a figure with these rows draws of these topics, given with their types.
+fn default_asks(rows: &[Row], topics: &[(&str, &str)]) -> Vec<(Ask, Curves)> {
+    let mut asks: Vec<(Ask, Curves)> = Vec::new();
+    let rows = rows.iter().flat_map(|(types, fields)| types.iter().map(move |name| (name, fields)));
+    for (wanted, fields) in rows {
+        let of_type = topics.iter().filter(|(_, type_name)| short_name(type_name) == *wanted);
+        let more = of_type
+            .flat_map(|(topic, type_name)| fields.iter().map(|field| Ask::new(topic, field, type_name)));
+        let is_asked = asks.iter().any(|(ask, _)| ask.role == Role::Asked);
+        let more = more.filter(|ask| !is_asked || ask.role != Role::Asked);
+        asks.extend(more.map(|ask| (ask, Curves::new())));
     }
     asks
 }
 
-fn ask(topic: &str, field: &str, type_name: &str) -> Ask {
-    Ask { topic: topic.to_owned(), field: field.to_owned(), role: Role::of(type_name, field) }
-}
-
-fn trails(recording: &Recording, is_shown: impl Fn(&str) -> bool) -> Vec<Ask> {
+fn trails(recording: &Recording, is_shown: impl Fn(&str) -> bool) -> Vec<(Ask, Trail)> {
     let moving = recording.topics().iter().filter(|(name, topic)| {
-        MOVING.contains(&own_name(&topic.type_name)) && is_shown(name) && topic.message_count > 0
+        MOVING.contains(&short_name(&topic.type_name)) && is_shown(name) && topic.message_count > 0
     });
-    moving.map(|(name, topic)| ask(name, "position", &topic.type_name)).collect()
+    moving
+        .map(|(name, topic)| (Ask::new(name, "position", &topic.type_name), Trail::new(TRAIL_POINTS_MAX)))
+        .collect()
 }
 
 /// The axes that `TOPIC:FIELD,TOPIC:FIELD…` names; a field without a topic is of the topic before.
@@ -315,10 +284,10 @@ fn named(recording: &Recording, plot: &str) -> Result<Wanted> {
             bail!("--plot {plot}: `{part}` names no field");
         }
         let found = recording.topic(topic).with_context(|| format!("--plot {plot}"))?;
-        asks.push(ask(topic, field, &found.type_name));
+        asks.push((Ask::new(topic, field, &found.type_name), Curves::new()));
         last_topic = Some(topic);
     }
-    Ok(Wanted { title: "", label: "", asks })
+    Ok(Wanted { vehicle: String::new(), title: "", label: "", asks })
 }
 
 #[cfg(test)]

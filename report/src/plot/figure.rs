@@ -1,10 +1,9 @@
 //! What is drawn, ready for any kind of file: axes with named, coloured curves of one unit, and paths in space.
 
-use crate::plot::choice::{Choice, Role, Wanted};
-use crate::plot::read::{Curves, Read};
+use crate::plot::choice::{Ask, Curves, Role, Wanted};
+use crate::plot::thin;
 use anyhow::{Result, bail};
 use serde::{Serialize, Serializer};
-use std::collections::BTreeSet;
 
 /// Distinguishable also without colour vision (Okabe and Ito).
 const COLOURS: [&str; 7] = ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#000000"];
@@ -73,74 +72,68 @@ fn count<T, S: Serializer>(points: &[T], serializer: S) -> std::result::Result<S
     serializer.serialize_u64(points.len() as u64)
 }
 
-/// The axes of all panels.
+/// The axes of all vehicles, those without a curve left out.
 ///
 /// # Errors
 /// If the curves of one set of axes have different units.
-pub fn panels(choice: &Choice, read: &Read) -> Result<Vec<Panel>> {
-    let mut rest = &read.curves[..];
-    let panels = choice.panels.iter().map(|panel| {
-        let axes = panel.axes.iter().map(|wanted| {
-            let (own, others) = rest.split_at(wanted.asks.len());
-            rest = others;
-            axes(wanted, own)
-        });
-        let axes = axes.filter(|axes| !matches!(axes, Ok(axes) if axes.curves.is_empty()));
-        Ok(Panel { vehicle: panel.vehicle.clone(), axes: axes.collect::<Result<_>>()? })
-    });
-    let panels: Vec<Panel> = panels.collect::<Result<_>>()?;
-    Ok(panels.into_iter().filter(|panel| !panel.axes.is_empty()).collect())
+pub fn panels(wanted: &[Wanted]) -> Result<Vec<Panel>> {
+    let mut panels: Vec<Panel> = Vec::new();
+    for wanted in wanted {
+        let axes = axes(wanted)?;
+        match panels.last_mut() {
+            _ if axes.curves.is_empty() => {}
+            Some(panel) if panel.vehicle == wanted.vehicle => panel.axes.push(axes),
+            _ => panels.push(Panel { vehicle: wanted.vehicle.clone(), axes: vec![axes] }),
+        }
+    }
+    Ok(panels)
 }
 
-fn axes(wanted: &Wanted, read: &[Curves]) -> Result<Axes> {
-    let unit = unit(wanted, read)?;
-    let pairs =
-        wanted.asks.iter().zip(read).flat_map(|(ask, curves)| curves.iter().map(move |curve| (ask, curve)));
-    let mut curves: Vec<Curve> = pairs
-        .map(|(ask, (channel, curve))| Curve {
-            name: String::new(),
-            topic: ask.topic.clone(),
-            field: channel.path.clone(),
-            role: ask.role,
-            colour: "",
-            samples: curve.samples(),
-            points: curve.points(),
-        })
-        .collect();
+fn axes(wanted: &Wanted) -> Result<Axes> {
+    let unit = unit(&wanted.asks)?;
+    let curves = wanted.asks.iter().flat_map(|(ask, curves)| curves.iter().map(move |curve| (ask, curve)));
+    let curves = curves.map(|(ask, (channel, curve))| Curve {
+        name: String::new(),
+        topic: ask.topic.clone(),
+        field: channel.path.clone(),
+        role: ask.role,
+        colour: "",
+        samples: curve.samples,
+        points: curve.points(),
+    });
+    let mut curves: Vec<Curve> = curves.collect();
     curves.sort_by_key(|curve| curve.role);
     name(&mut curves);
     colour(&mut curves);
-    let fields = || distinct(wanted.asks.iter().map(|ask| ask.field.as_str()));
-    let label = if wanted.label.is_empty() { fields() } else { wanted.label.to_owned() };
-    let title = if wanted.title.is_empty() { fields() } else { wanted.title.to_owned() };
-    Ok(Axes { title, label, unit, curves })
+    let fields = distinct(wanted.asks.iter().map(|(ask, _)| ask.field.as_str())).join(", ");
+    let or_fields = |text: &str| if text.is_empty() { fields.clone() } else { text.to_owned() };
+    Ok(Axes { title: or_fields(wanted.title), label: or_fields(wanted.label), unit, curves })
 }
 
 /// The one unit of all curves.
-fn unit(wanted: &Wanted, read: &[Curves]) -> Result<String> {
-    let channels = read.iter().flatten().map(|(channel, _)| channel);
-    let units: BTreeSet<&str> = channels.map(|channel| channel.unit.as_str()).collect();
+fn unit(asks: &[(Ask, Curves)]) -> Result<String> {
+    let units_of = |curves: &'_ Curves| distinct(curves.iter().map(|(channel, _)| channel.unit.clone()));
+    let units = distinct(asks.iter().flat_map(|(_, curves)| units_of(curves)));
     if units.len() > 1 {
-        let ask_units = wanted.asks.iter().zip(read).map(|(ask, curves)| {
-            let units = distinct(curves.iter().map(|(channel, _)| channel.unit.as_str()));
-            format!("{}:{} in {units}", ask.topic, ask.field)
-        });
-        let curves = ask_units.collect::<Vec<_>>().join(", ");
+        let asks = asks
+            .iter()
+            .map(|(ask, curves)| format!("{}:{} in {}", ask.topic, ask.field, units_of(curves).join(", ")));
         bail!(
-            "one set of axes has one unit, but it was asked for {curves}: give each unit a --plot of its own"
+            "one set of axes has one unit, but it was asked for {}: give each unit a --plot of its own",
+            asks.collect::<Vec<_>>().join(", ")
         );
     }
-    Ok(units.first().copied().unwrap_or_default().to_owned())
+    Ok(units.into_iter().next().unwrap_or_default())
 }
 
-fn distinct<'a>(words: impl Iterator<Item = &'a str>) -> String {
-    let mut seen = Vec::new();
-    words.for_each(|word| {
-        if !seen.contains(&word) {
-            seen.push(word);
+/// The items without those that came before, in their order.
+fn distinct<T: PartialEq>(items: impl Iterator<Item = T>) -> Vec<T> {
+    items.fold(Vec::new(), |mut seen, item| {
+        if !seen.contains(&item) {
+            seen.push(item);
         }
-    });
-    seen.join(", ")
+        seen
+    })
 }
 
 /// The last part of a field's path.
@@ -179,17 +172,17 @@ fn component(field: &str) -> Option<usize> {
 
 /// Gives the flown curves different colours, and every other that of the flown one of its component.
 fn colour(curves: &mut [Curve]) {
-    // Colour and component of the curves that were given one of their own.
+    // Colour and component of the curves that have a colour which no other has.
     let mut taken: Vec<(usize, Option<usize>)> = Vec::new();
     for curve in curves {
-        let own = component(&curve.field);
-        let fellow = taken.iter().find(|(_, other)| own.is_some() && *other == own);
+        let part = component(&curve.field);
+        let fellow = taken.iter().find(|(_, other)| part.is_some() && *other == part);
         let index = match fellow.filter(|_| curve.role != Role::Flown) {
             Some((index, _)) => *index,
             None => {
                 let is_free = |index: &usize| taken.iter().all(|(other, _)| other != index);
-                let free = own.into_iter().chain(0..COLOURS.len()).find(is_free).unwrap_or(taken.len());
-                taken.push((free, own));
+                let free = part.into_iter().chain(0..COLOURS.len()).find(is_free).unwrap_or(taken.len());
+                taken.push((free, part));
                 free
             }
         };
@@ -198,10 +191,9 @@ fn colour(curves: &mut [Curve]) {
 }
 
 /// The paths in space: those of one vehicle have one colour.
-pub fn trails(choice: &Choice, read: &Read) -> Vec<Trail> {
-    let drawn = || choice.trails.iter().zip(&read.trails).filter(|(_, trail)| trail.samples() > 0);
+pub fn trails(read: &[(Ask, thin::Trail)]) -> Vec<Trail> {
+    let drawn = || read.iter().filter(|(_, trail)| trail.samples > 0);
     let vehicles = distinct(drawn().map(|(ask, _)| ask.vehicle()));
-    let vehicles: Vec<&str> = vehicles.split(", ").collect();
     let mut trails: Vec<Trail> = drawn()
         .map(|(ask, trail)| {
             let index = vehicles.iter().position(|vehicle| *vehicle == ask.vehicle()).unwrap_or_default();
@@ -210,7 +202,7 @@ pub fn trails(choice: &Choice, read: &Read) -> Vec<Trail> {
                 topic: ask.topic.clone(),
                 role: ask.role,
                 colour: COLOURS[index % COLOURS.len()],
-                samples: trail.samples(),
+                samples: trail.samples,
                 points: trail.points(),
             }
         })

@@ -1,10 +1,12 @@
-//! Lines, letters, numbers and legends of pictures, in plotters' units.
+//! Lines, letters, flat axes and legends of pictures, in plotters' units.
 
 use crate::plot::choice::Role;
 use anyhow::Result;
+use plotters::coord::types::RangedCoordf64;
 use plotters::coord::{CoordTranslate, Shift};
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
+use std::ops::Range;
 
 /// A part of a picture that is drawn on.
 pub type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
@@ -18,6 +20,8 @@ pub const LEGEND_ROW: u32 = 18;
 /// Bold enough beside the curves' names, and thin enough beside each other.
 const FLOWN_WIDTH: u32 = 14;
 const THIN_WIDTH: u32 = 7;
+/// Size of the letters of titles, but for the sheet's.
+pub const HEAD_SIZE: u32 = 15;
 /// Size of all other letters.
 pub const LABEL_SIZE: u32 = 13;
 /// Colour of lines that only guide the eye.
@@ -101,18 +105,60 @@ pub fn draw_legend<'a, 'n>(
     let anchor = Pos::new(HPos::Left, VPos::Center);
     for (row, (name, look)) in (0..).zip(entries) {
         let y = at(36 + row * LEGEND_ROW);
-        let ends = [(at(10), y), (at(36), y)];
-        if look.is_dashed {
-            let dashes = [(ends[0].0, at(18)), (at(22), at(30)), (at(34), at(36))];
-            for (from, to) in dashes {
-                legend.draw(&PathElement::new(vec![(from, y), (to, y)], look.style()))?;
-            }
-        } else {
-            legend.draw(&PathElement::new(ends.to_vec(), look.style()))?;
+        let dashes: &[(u32, u32)] =
+            if look.is_dashed { &[(10, 18), (22, 30), (34, 36)] } else { &[(10, 36)] };
+        for (from, to) in dashes {
+            legend.draw(&PathElement::new([(at(*from), y), (at(*to), y)], look.style()))?;
         }
-        legend.draw(&Text::new(name.to_owned(), (at(44), y), letters(LABEL_SIZE).pos(anchor)))?;
+        legend.draw(&Text::new(name, (at(44), y), letters(LABEL_SIZE).pos(anchor)))?;
     }
     Ok(plots)
+}
+
+/// What flat axes look like.
+pub struct Flat<'a> {
+    /// Title.
+    pub title: &'a str,
+    /// What the axes across and up show, the first only where it has room.
+    pub names: [String; 2],
+    /// Their ends.
+    pub ranges: [Range<f64>; 2],
+    /// How many numbers stand along them.
+    pub labels: [usize; 2],
+    /// Room beside them in pixels: left, right, below.
+    pub margins: [u32; 3],
+}
+
+/// A chart with flat axes.
+pub type FlatChart<'a> = ChartContext<'a, SVGBackend<'a>, Cartesian2d<RangedCoordf64, RangedCoordf64>>;
+
+impl Flat<'_> {
+    /// Draws the axes.
+    ///
+    /// # Errors
+    /// If plotters cannot.
+    pub fn draw<'a>(self, area: &Area<'a>) -> Result<FlatChart<'a>> {
+        let Self { title, names: [across, up], ranges: [x, y], labels, margins: [left, right, below] } = self;
+        let mut chart = ChartBuilder::on(area)
+            .caption(title, letters(HEAD_SIZE))
+            .margin_left(px(12))
+            .margin_right(px(right))
+            .set_label_area_size(LabelAreaPosition::Left, px(left - 12))
+            .set_label_area_size(LabelAreaPosition::Bottom, px(below))
+            .build_cartesian_2d(x, y)?;
+        let mut mesh = chart.configure_mesh();
+        mesh.label_style(letters(LABEL_SIZE)).axis_desc_style(letters(LABEL_SIZE));
+        mesh.axis_style(INK.stroke_width(UNITS_PER_PIXEL)).light_line_style(TRANSPARENT);
+        mesh.bold_line_style(GRID.stroke_width(UNITS_PER_PIXEL)).set_all_tick_mark_size(px(4));
+        mesh.x_labels(labels[0]).y_labels(labels[1]).y_desc(up).y_label_formatter(&number);
+        if across.is_empty() {
+            mesh.x_label_formatter(&|_| String::new());
+        } else {
+            mesh.x_desc(across).x_label_formatter(&number);
+        }
+        mesh.draw()?;
+        Ok(chart)
+    }
 }
 
 /// A number at an axis: without the digits that steps of 0.1 add to it.

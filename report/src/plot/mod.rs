@@ -65,16 +65,16 @@ impl Drawing {
     /// # Errors
     /// If something that was asked for is not in the recording.
     pub fn of(recording: &Recording, request: &Request, read: &mut dyn FnMut(u64)) -> Result<Self> {
-        let choice = Choice::of(recording, &request.plots, request.vehicle.as_deref())?;
-        let read = read::read(recording, &choice, request.span, read)?;
+        let mut choice = Choice::of(recording, &request.plots, request.vehicle.as_deref())?;
+        let span_s = read::read(recording, &mut choice, request.span, read)?;
         let name = recording.path().file_name().unwrap_or_default().to_string_lossy().into_owned();
         let drawing = Self {
             title: request.title.clone().unwrap_or_else(|| name.clone()),
             recording: name,
-            span_s: read.span_s,
+            span_s,
             views: request.views.clone(),
-            panels: figure::panels(&choice, &read)?,
-            trails: figure::trails(&choice, &read),
+            panels: figure::panels(&choice.axes)?,
+            trails: figure::trails(&choice.trails),
             solids: scene::scene_of(recording)?,
         };
         if drawing.trails.is_empty() && request.views.iter().any(|view| *view != View::Time) {

@@ -5,11 +5,8 @@
 //! signs, with `pyftsubset --layout-features=kern --no-hinting`.
 
 use crate::plot::drawing::{Drawing, TIME_LABEL, View};
-use crate::plot::figure::{Axes, Curve};
-use crate::plot::ink::{
-    Area, GRID, INK, LABEL_SIZE, LEGEND_ROW, Look, UNITS_PER_PIXEL, WIDTH, at, draw_legend, draw_line,
-    letters, number, px,
-};
+use crate::plot::figure::{Axes, Curve, Panel};
+use crate::plot::ink::{Area, Flat, LEGEND_ROW, Look, WIDTH, at, draw_legend, draw_line, letters, px};
 use crate::plot::{space, thin};
 use anyhow::{Context, Result, bail};
 use plotters::prelude::*;
@@ -29,26 +26,6 @@ const AXES_HEIGHT: u32 = 190;
 const TIME_AXIS_HEIGHT: u32 = 34;
 const LETTER_WIDTH: u32 = 7;
 const TITLE_SIZE: u32 = 18;
-const HEAD_SIZE: u32 = 15;
-/// Something on the sheet, with its height in pixels.
-enum Section<'a> {
-    Axes(&'a Axes, bool),
-    View(View),
-}
-
-impl Section<'_> {
-    fn height(&self, drawing: &Drawing, legend: u32) -> u32 {
-        match self {
-            #[allow(clippy::cast_possible_truncation, reason = "a legend is short")]
-            Self::Axes(axes, is_last) => {
-                let rows = axes.curves.len() as u32 + 2;
-                AXES_HEIGHT.max(rows * LEGEND_ROW) + if *is_last { TIME_AXIS_HEIGHT } else { 0 }
-            }
-            Self::View(view) => space::height(drawing, *view, WIDTH - legend),
-        }
-    }
-}
-
 /// What says in an SVG picture who wrote it: a comment.
 pub const SVG_MARK: &str = "<!-- Written by hummingbus plot -->";
 /// The same in a PNG picture: a chunk "tEXt" with its length and CRC-32 (PNG specification, 11.3.3.3) behind the
@@ -61,21 +38,40 @@ const PNG_HEAD_BYTES: usize = 8 + 25;
 /// # Errors
 /// If there is nothing to draw.
 pub fn svg(drawing: &Drawing) -> Result<String> {
-    let sections = sections(drawing)?;
-    let legend = legend_width(drawing, &sections);
-    let height = TITLE_HEIGHT + sections.iter().map(|section| section.height(drawing, legend)).sum::<u32>();
+    let views = drawing.views_or(&[View::Time]);
+    // Of several vehicles only the first has room.
+    let panel = drawing.panels.first().filter(|_| views.contains(&View::Time));
+    let axes = panel.map_or(&[][..], |panel| &panel.axes);
+    if axes.is_empty() && views.iter().all(|view| *view == View::Time) {
+        bail!("there is nothing over time to draw: choose fields with --plot, or a view with --figure");
+    }
+    let legend = legend_width(drawing, axes, &views);
+    let heights = views.iter().map(|view| match view {
+        View::Time => {
+            axes.iter().map(axes_height).sum::<u32>() + TIME_AXIS_HEIGHT * u32::from(!axes.is_empty())
+        }
+        view => space::height(drawing, *view, WIDTH - legend),
+    });
+    let height = TITLE_HEIGHT + heights.sum::<u32>();
     let mut text = String::new();
     {
         let sheet = SVGBackend::with_string(&mut text, (px(WIDTH), px(height))).into_drawing_area();
         sheet.fill(&WHITE)?;
         let (title, mut rest) = sheet.split_vertically(px(TITLE_HEIGHT));
-        title.draw_text(&heading(drawing, &sections), &letters(TITLE_SIZE), (at(16), at(14)))?;
-        for section in &sections {
-            let (area, below) = rest.split_vertically(px(section.height(drawing, legend)));
+        title.draw_text(&heading(drawing, panel), &letters(TITLE_SIZE), (at(16), at(14)))?;
+        let mut next = |height: u32| {
+            let (area, below) = rest.split_vertically(px(height));
             rest = below;
-            match section {
-                Section::Axes(axes, is_last) => draw_axes(&area, axes, drawing, legend, *is_last)?,
-                Section::View(view) => space::draw(&area, drawing, legend, *view)?,
+            area
+        };
+        for view in views {
+            if view != View::Time {
+                space::draw(&next(space::height(drawing, view, WIDTH - legend)), drawing, legend, view)?;
+                continue;
+            }
+            for (index, shown) in axes.iter().enumerate() {
+                let room = if index + 1 == axes.len() { TIME_AXIS_HEIGHT } else { 0 };
+                draw_axes(&next(axes_height(shown) + room), shown, drawing.span_s, legend, room)?;
             }
         }
         sheet.present()?;
@@ -88,29 +84,17 @@ pub fn svg(drawing: &Drawing) -> Result<String> {
 }
 
 /// The title, with the vehicle where its axes are drawn.
-fn heading(drawing: &Drawing, sections: &[Section<'_>]) -> String {
-    let shows_axes = sections.iter().any(|section| matches!(section, Section::Axes(..)));
-    match drawing.panels.first().filter(|panel| shows_axes && !panel.vehicle.is_empty()) {
+fn heading(drawing: &Drawing, panel: Option<&Panel>) -> String {
+    match panel.filter(|panel| !panel.vehicle.is_empty()) {
         Some(panel) => format!("{}: {}", drawing.title, panel.vehicle),
         None => drawing.title.clone(),
     }
 }
 
-fn sections(drawing: &Drawing) -> Result<Vec<Section<'_>>> {
-    let mut sections = Vec::new();
-    for view in drawing.views_or(&[View::Time]) {
-        if view == View::Time {
-            let axes = drawing.panels.first().map_or(&[][..], |panel| &panel.axes);
-            let is_last = |index: usize| index + 1 == axes.len();
-            sections.extend(axes.iter().enumerate().map(|(index, axes)| Section::Axes(axes, is_last(index))));
-        } else {
-            sections.push(Section::View(view));
-        }
-    }
-    if sections.is_empty() {
-        bail!("there is nothing over time to draw: choose fields with --plot, or a view with --figure");
-    }
-    Ok(sections)
+/// The height of axes over time without the numbers below the last ones, in pixels.
+#[allow(clippy::cast_possible_truncation, reason = "a legend is short")]
+fn axes_height(axes: &Axes) -> u32 {
+    AXES_HEIGHT.max((axes.curves.len() as u32 + 2) * LEGEND_ROW)
 }
 
 /// The picture as PNG.
@@ -131,55 +115,40 @@ pub fn png(svg: &str) -> Result<Vec<u8>> {
     Ok(bytes)
 }
 
-fn draw_axes(area: &Area<'_>, axes: &Axes, drawing: &Drawing, legend: u32, is_last: bool) -> Result<()> {
-    let names = axes.curves.iter().map(|curve| curve.name.as_str());
-    let plots = draw_legend(
-        area,
-        legend,
-        names.zip(axes.curves.iter().map(|curve| Look::new(curve.colour, curve.role))),
-    )?;
-    let [from_s, to_s] = drawing.span_s;
+/// Draws axes over time, with numbers below where there is `room` for them.
+fn draw_axes(area: &Area<'_>, axes: &Axes, span_s: [f64; 2], legend: u32, room: u32) -> Result<()> {
+    let look = |curve: &Curve| Look::new(curve.colour, curve.role);
+    let entries = axes.curves.iter().map(|curve| (curve.name.as_str(), look(curve)));
+    let area = draw_legend(area, legend, entries)?.margin(0, px(8), 0, 0);
+    let [from_s, to_s] = span_s;
     let values = axes.curves.iter().flat_map(|curve| &curve.points).map(|(_, value)| *value);
-    let mut chart = ChartBuilder::on(&plots)
-        .caption(&axes.title, letters(HEAD_SIZE))
-        .margin_left(px(12))
-        .margin_bottom(px(8))
-        .set_label_area_size(LabelAreaPosition::Left, px(66))
-        .set_label_area_size(LabelAreaPosition::Bottom, px(if is_last { TIME_AXIS_HEIGHT + 8 } else { 8 }))
-        .build_cartesian_2d(from_s..to_s.max(from_s + 1e-3), range(values))?;
-    let mut mesh = chart.configure_mesh();
-    mesh.x_labels(13)
-        .y_labels(6)
-        .label_style(letters(LABEL_SIZE))
-        .axis_style(INK.stroke_width(UNITS_PER_PIXEL));
-    mesh.light_line_style(TRANSPARENT).bold_line_style(GRID.stroke_width(UNITS_PER_PIXEL));
-    mesh.y_desc(format!("{} [{}]", axes.label, axes.unit)).axis_desc_style(letters(LABEL_SIZE));
-    mesh.set_all_tick_mark_size(px(4)).x_label_formatter(&number).y_label_formatter(&number);
-    if is_last {
-        mesh.x_desc(TIME_LABEL);
-    } else {
-        mesh.x_labels(13).x_label_formatter(&|_| String::new());
-    }
-    mesh.draw()?;
+    let time = if room > 0 { TIME_LABEL } else { "" };
+    let flat = Flat {
+        title: &axes.title,
+        names: [time.to_owned(), format!("{} [{}]", axes.label, axes.unit)],
+        ranges: [from_s..to_s.max(from_s + 1e-3), range(values)],
+        labels: [13, 6],
+        margins: [78, 0, room + 8],
+    };
+    let mut chart = flat.draw(&area)?;
     let mut curves: Vec<&Curve> = axes.curves.iter().collect();
     curves.sort_by_key(|curve| curve.role.layer());
     for curve in curves {
-        let (look, points) = (Look::new(curve.colour, curve.role), thinned(&curve.points));
-        for stretch in finite(&points) {
-            draw_line(&mut chart, stretch.iter().copied(), look)?;
+        // The stretches between gaps.
+        for stretch in thinned(&curve.points).split(|(_, value)| !value.is_finite()) {
+            draw_line(&mut chart, stretch.iter().copied(), look(curve))?;
         }
     }
     Ok(())
 }
 
 /// The width of the legends, in pixels: one for all, so that the axes are as wide as each other.
-fn legend_width(drawing: &Drawing, sections: &[Section<'_>]) -> u32 {
-    let names = sections.iter().flat_map(|section| match section {
-        Section::Axes(axes, _) => axes.curves.iter().map(|curve| &curve.name).collect::<Vec<_>>(),
-        Section::View(_) => drawing.trails.iter().map(|trail| &trail.name).collect(),
-    });
+fn legend_width(drawing: &Drawing, axes: &[Axes], views: &[View]) -> u32 {
+    let curves = axes.iter().flat_map(|axes| &axes.curves).map(|curve| &curve.name);
+    let has_paths = views.iter().any(|view| *view != View::Time);
+    let paths = drawing.trails.iter().filter(|_| has_paths).map(|trail| &trail.name);
     #[allow(clippy::cast_possible_truncation, reason = "a name is short")]
-    let longest = names.map(|name| name.chars().count() as u32).max().unwrap_or(0);
+    let longest = curves.chain(paths).map(|name| name.chars().count() as u32).max().unwrap_or(0);
     (longest * LETTER_WIDTH + 52).clamp(130, WIDTH / 2)
 }
 
@@ -190,17 +159,10 @@ fn thinned(points: &[(f64, f64)]) -> Vec<(f64, f64)> {
     curve.points()
 }
 
-/// The stretches of a curve without gaps.
-fn finite(points: &[(f64, f64)]) -> impl Iterator<Item = &[(f64, f64)]> {
-    points.split(|(_, value)| !value.is_finite()).filter(|stretch| !stretch.is_empty())
-}
-
 /// A range that holds all values, with some room.
-pub fn range(values: impl Iterator<Item = f64>) -> Range<f64> {
-    let ends = values.filter(|value| value.is_finite()).fold(None, |ends: Option<(f64, f64)>, value| {
-        Some(ends.map_or((value, value), |(low, high)| (low.min(value), high.max(value))))
-    });
-    let (low, high) = ends.unwrap_or((0.0, 0.0));
+fn range(values: impl Iterator<Item = f64>) -> Range<f64> {
+    let ends = values.filter(|value| value.is_finite()).map(|value| (value, value));
+    let (low, high) = ends.reduce(|a, b| (a.0.min(b.0), a.1.max(b.1))).unwrap_or((0.0, 0.0));
     // What hardly moves is drawn as a line, not as noise over the whole height.
     let room = ((high - low) * 0.06).max(low.abs().max(high.abs()).max(1.0) * 0.005);
     low - room..high + room

@@ -1,7 +1,7 @@
 //! The one pass over a recording that takes out everything that is drawn.
 
-use crate::plot::choice::{Ask, Choice};
-use crate::plot::field::{self, Channel};
+use crate::plot::choice::{Ask, Choice, Curves};
+use crate::plot::field;
 use crate::plot::thin::{Curve, Trail};
 use anyhow::{Result, bail};
 use recorder::RecordingError;
@@ -13,8 +13,6 @@ use std::collections::BTreeMap;
 const POINTS_MAX: usize = 400_000;
 /// Bins of a curve: enough for a wide screen, and few enough for a small file.
 const BINS: std::ops::RangeInclusive<usize> = 100..=1000;
-/// Points of a path in space.
-const TRAIL_POINTS_MAX: usize = 2000;
 /// Messages between two reports of progress.
 const PROGRESS_EVERY: u64 = 4096;
 /// Channels that a field has, as a guess before the first message is there.
@@ -36,46 +34,25 @@ impl Span {
     }
 }
 
-/// What was read for one [`Ask`]: its channels with their curves; none where no message was in the span.
-pub type Curves = Vec<(Channel, Curve)>;
-
-/// What was read.
-#[derive(Debug)]
-pub struct Read {
-    /// For each of the choice's asks.
-    pub curves: Vec<Curves>,
-    /// For each of the choice's paths.
-    pub trails: Vec<Trail>,
-    /// First and last time of what was drawn, in seconds.
-    pub span_s: [f64; 2],
-}
-
 /// What a topic is read for.
-#[derive(Default)]
-struct Uses {
-    asks: Vec<usize>,
-    trails: Vec<usize>,
-}
+type Uses<'a> = (Vec<(&'a Ask, &'a mut Curves)>, Vec<&'a mut Trail>);
 
-/// Reads what `choice` asks for in `span`; `progress` hears the number of messages read, now and then.
+/// Reads what `choice` asks for in `span`; returns the first and the last time of it, in seconds. `progress` hears the
+/// number of messages read, now and then.
 ///
 /// # Errors
 /// If the file is damaged, a named field is not there, or nothing is in the span.
 pub fn read(
     recording: &Recording,
-    choice: &Choice,
+    choice: &mut Choice,
     span: Span,
     progress: &mut dyn FnMut(u64),
-) -> Result<Read> {
-    let asks: Vec<&Ask> = choice.asks().collect();
-    let bins = (POINTS_MAX / 4 / (CHANNELS_PER_ASK * asks.len()).max(1)).clamp(*BINS.start(), *BINS.end());
-    let uses = uses(&asks, &choice.trails);
-    let mut read = Read {
-        curves: vec![Curves::new(); asks.len()],
-        trails: vec![Trail::new(TRAIL_POINTS_MAX); choice.trails.len()],
-        span_s: [f64::INFINITY, f64::NEG_INFINITY],
-    };
-    let mut whole_s = [f64::INFINITY, f64::NEG_INFINITY];
+) -> Result<[f64; 2]> {
+    let count: usize = choice.axes.iter().map(|axes| axes.asks.len()).sum();
+    let bins = (POINTS_MAX / 4 / (CHANNELS_PER_ASK * count).max(1)).clamp(*BINS.start(), *BINS.end());
+    let is_named = choice.is_named;
+    let mut uses = uses(choice);
+    let [mut read_s, mut whole_s] = [[f64::INFINITY, f64::NEG_INFINITY]; 2];
     for (number, record) in (0_u64..).zip(recording.messages()) {
         let record = record?;
         if number.is_multiple_of(PROGRESS_EVERY) {
@@ -83,63 +60,43 @@ pub fn read(
         }
         let time_s = record.time_ns as f64 * 1e-9;
         widen(&mut whole_s, time_s);
-        let Some(uses) = uses.get(record.topic.as_str()).filter(|_| span.holds(time_s)) else { continue };
+        let uses = uses.get_mut(record.topic.as_str()).filter(|_| span.holds(time_s));
+        let Some((asks, trails)) = uses else { continue };
         let leaves = recording.decode(&record)?;
-        widen(&mut read.span_s, time_s);
-        for &index in &uses.asks {
-            read.add(index, asks[index], time_s, &leaves, bins, choice.is_named)?;
+        widen(&mut read_s, time_s);
+        for (ask, curves) in asks {
+            if curves.is_empty() {
+                **curves = channels(ask, &leaves, bins, is_named)?;
+            }
+            curves.iter_mut().for_each(|(channel, curve)| curve.push(time_s, channel.value(&leaves)));
         }
-        for &index in &uses.trails {
-            read.trails[index].push(position(&leaves));
-        }
+        trails.iter_mut().for_each(|trail| trail.push(position(&leaves)));
     }
-    require_samples(&read, &asks, choice, span, whole_s)?;
-    Ok(read)
+    require_samples(choice, span, read_s, whole_s)?;
+    Ok(read_s)
 }
 
-fn uses<'a>(asks: &[&'a Ask], trails: &'a [Ask]) -> BTreeMap<&'a str, Uses> {
-    let mut uses: BTreeMap<&str, Uses> = BTreeMap::new();
-    for (index, ask) in asks.iter().enumerate() {
-        uses.entry(&ask.topic).or_default().asks.push(index);
+fn uses(choice: &mut Choice) -> BTreeMap<&str, Uses<'_>> {
+    let mut uses: BTreeMap<&str, Uses<'_>> = BTreeMap::new();
+    for (ask, curves) in choice.axes.iter_mut().flat_map(|axes| &mut axes.asks) {
+        uses.entry(&ask.topic).or_default().0.push((ask, curves));
     }
-    for (index, trail) in trails.iter().enumerate() {
-        uses.entry(&trail.topic).or_default().trails.push(index);
+    for (ask, trail) in &mut choice.trails {
+        uses.entry(&ask.topic).or_default().1.push(trail);
     }
     uses
 }
 
-impl Read {
-    /// Adds a message to the curves of an ask; the first shows which numbers the field has.
-    fn add(
-        &mut self,
-        index: usize,
-        ask: &Ask,
-        time_s: f64,
-        leaves: &[Leaf],
-        bins: usize,
-        is_named: bool,
-    ) -> Result<(), RecordingError> {
-        let curves = &mut self.curves[index];
-        if curves.is_empty() {
-            let channels = match field::channels(leaves, &ask.field) {
-                Some(channels) => channels,
-                None if is_named => return Err(unknown(ask, leaves)),
-                None => Vec::new(),
-            };
-            *curves = channels.into_iter().map(|channel| (channel, Curve::new(bins))).collect();
-        }
-        for (channel, curve) in curves {
-            curve.push(time_s, channel.value(leaves));
-        }
-        Ok(())
-    }
-}
-
-fn unknown(ask: &Ask, leaves: &[Leaf]) -> RecordingError {
-    RecordingError::UnknownField {
-        topic: ask.topic.clone(),
-        field: ask.field.clone(),
-        known: leaves.iter().map(|leaf| leaf.path.as_str()).collect::<Vec<_>>().join(", "),
+/// The channels of an ask: its first message shows which numbers the field has.
+fn channels(ask: &Ask, leaves: &[Leaf], bins: usize, is_named: bool) -> Result<Curves, RecordingError> {
+    match field::channels(leaves, &ask.field) {
+        Some(channels) => Ok(channels.into_iter().map(|channel| (channel, Curve::new(bins))).collect()),
+        None if is_named => Err(RecordingError::UnknownField {
+            topic: ask.topic.clone(),
+            field: ask.field.clone(),
+            known: leaves.iter().map(|leaf| leaf.path.as_str()).collect::<Vec<_>>().join(", "),
+        }),
+        None => Ok(Curves::new()),
     }
 }
 
@@ -153,21 +110,18 @@ fn widen(span_s: &mut [f64; 2], time_s: f64) {
     *span_s = [span_s[0].min(time_s), span_s[1].max(time_s)];
 }
 
-fn require_samples(read: &Read, asks: &[&Ask], choice: &Choice, span: Span, whole_s: [f64; 2]) -> Result<()> {
-    let missing = asks.iter().zip(&read.curves).find(|(_, curves)| choice.is_named && curves.is_empty());
-    let what = match missing {
+fn require_samples(choice: &Choice, span: Span, read_s: [f64; 2], whole_s: [f64; 2]) -> Result<()> {
+    let mut asks = choice.axes.iter().flat_map(|axes| &axes.asks);
+    let what = match asks.find(|(_, curves)| choice.is_named && curves.is_empty()) {
         Some((ask, _)) => format!("{} has no sample", ask.topic),
-        None if read.span_s[0] > read.span_s[1] => "there is nothing to plot".to_owned(),
+        None if read_s[0] > read_s[1] => "there is nothing to plot".to_owned(),
         None => return Ok(()),
     };
-    let to = span.to_s.map_or(String::new(), |to_s| format!(" to {to_s} s"));
-    if whole_s[0] > whole_s[1] {
+    let Span { from_s, to_s } = span;
+    let to = to_s.map_or(String::new(), |to_s| format!(" to {to_s} s"));
+    let [first_s, last_s] = whole_s;
+    if first_s > last_s {
         bail!("{what}: the recording has no message");
     }
-    bail!(
-        "{what} from {} s{to}: the recording spans {:.3} s to {:.3} s",
-        span.from_s,
-        whole_s[0],
-        whole_s[1]
-    );
+    bail!("{what} from {from_s} s{to}: the recording spans {first_s:.3} s to {last_s:.3} s");
 }

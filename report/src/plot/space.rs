@@ -2,8 +2,11 @@
 
 use crate::plot::drawing::{Drawing, View};
 use crate::plot::figure::Trail;
-use crate::plot::ink::{Area, GRID, LABEL_SIZE, Look, at, draw_legend, draw_line, letters, number, px};
+use crate::plot::ink::{
+    Area, Flat, GRID, HEAD_SIZE, LABEL_SIZE, Look, at, draw_legend, draw_line, letters, number, px,
+};
 use anyhow::Result;
+use plotters::coord::CoordTranslate;
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 use std::ops::Range;
@@ -82,34 +85,39 @@ fn draw_flat(plots: &Area<'_>, drawing: &Drawing, view: View) -> Result<()> {
     let (width, height) = plots.dim_in_pixel();
     let [left, right, above, below] = MARGINS;
     let room = [width - px(left + right), height - px(above + below)];
-    let [across, up] = equal(axes.map(|axis| extent[axis].clone()), room);
-    let title = if view == View::Side { "Path from the side" } else { "Path from above" };
-    let mut chart = ChartBuilder::on(plots)
-        .caption(title, letters(15))
-        .margin_left(px(12))
-        .margin_right(px(right))
-        .set_label_area_size(LabelAreaPosition::Left, px(left - 12))
-        .set_label_area_size(LabelAreaPosition::Bottom, px(below))
-        .build_cartesian_2d(across, up)?;
-    let mut mesh = chart.configure_mesh();
-    mesh.label_style(letters(LABEL_SIZE))
-        .light_line_style(TRANSPARENT)
-        .bold_line_style(GRID.stroke_width(px(1)));
-    mesh.x_desc(format!("{} [m]", AXES[axes[0]])).y_desc(format!("{} [m]", AXES[axes[1]]));
-    mesh.x_labels(labels(room[0])).y_labels(labels(room[1]));
-    mesh.x_label_formatter(&number).y_label_formatter(&number).set_all_tick_mark_size(px(4)).draw()?;
+    let flat = Flat {
+        title: if view == View::Side { "Path from the side" } else { "Path from above" },
+        names: axes.map(|axis| format!("{} [m]", AXES[axis])),
+        ranges: equal(axes.map(|axis| extent[axis].clone()), room),
+        labels: room.map(labels),
+        margins: [left, right, below],
+    };
+    let mut chart = flat.draw(plots)?;
     for solid in &drawing.solids {
         let outline = solid.outline(axes[0], axes[1]);
         chart.draw_series([Polygon::new(outline.clone(), SOLID.mix(0.3))])?;
         chart.draw_series([PathElement::new(outline, SOLID.stroke_width(px(1)))])?;
     }
-    for trail in layered(drawing) {
+    draw_trails(&mut chart, drawing, |point| (point[axes[0]], point[axes[1]]))
+}
+
+/// Draws the paths and where they start, those on top last: an estimate must not hide what was flown.
+fn draw_trails<'a, T: CoordTranslate>(
+    chart: &mut ChartContext<'a, SVGBackend<'a>, T>,
+    drawing: &Drawing,
+    place: impl Fn([f64; 3]) -> T::From + Copy,
+) -> Result<()>
+where
+    T::From: Clone + 'static,
+{
+    let mut trails: Vec<&Trail> = drawing.trails.iter().collect();
+    trails.sort_by_key(|trail| trail.role.layer());
+    for trail in trails {
         let look = Look::new(trail.colour, trail.role);
-        let points = finite(trail).map(|point| (point[axes[0]], point[axes[1]]));
-        draw_line(&mut chart, points, look)?;
-        chart.draw_series(
-            start(trail).map(|p| Circle::new((p[axes[0]], p[axes[1]]), px(4), look.style().filled())),
-        )?;
+        let finite = trail.points.iter().filter(|point| point.iter().all(|value| value.is_finite()));
+        let places = finite.map(|point| place(*point));
+        draw_line(chart, places.clone(), look)?;
+        chart.draw_series(places.take(1).map(|start| Circle::new(start, px(4), look.style().filled())))?;
     }
     Ok(())
 }
@@ -120,22 +128,6 @@ fn labels(units: u32) -> usize {
 }
 
 const AXES: [&str; 3] = ["x", "y", "z"];
-
-fn finite(trail: &Trail) -> impl Iterator<Item = &[f64; 3]> + Clone {
-    trail.points.iter().filter(|point| point.iter().all(|value| value.is_finite()))
-}
-
-/// The paths, those on top last: an estimate must not hide what was flown.
-fn layered(drawing: &Drawing) -> Vec<&Trail> {
-    let mut trails: Vec<&Trail> = drawing.trails.iter().collect();
-    trails.sort_by_key(|trail| trail.role.layer());
-    trails
-}
-
-/// Where a path starts.
-fn start(trail: &Trail) -> std::option::IntoIter<[f64; 3]> {
-    finite(trail).next().copied().into_iter()
-}
 
 /// Widens one of two ranges, so that a metre is as long on both axes.
 fn equal([across, up]: [Range<f64>; 2], [width, height]: [u32; 2]) -> [Range<f64>; 2] {
@@ -161,11 +153,10 @@ fn draw_path(plots: &Area<'_>, drawing: &Drawing) -> Result<()> {
     let [x, y, z] = extent(drawing);
     let lengths = [length(&x), length(&z), length(&y)];
     let size = cube(lengths, plots.dim_in_pixel());
-    let mut chart = ChartBuilder::on(plots).caption("Path", letters(15)).margin(px(8)).build_cartesian_3d(
-        x.clone(),
-        z.clone(),
-        -y.end..-y.start,
-    )?;
+    let mut chart = ChartBuilder::on(plots)
+        .caption("Path", letters(HEAD_SIZE))
+        .margin(px(8))
+        .build_cartesian_3d(x.clone(), z.clone(), -y.end..-y.start)?;
     chart.set_3d_pixel_range(size).with_projection(|mut view| {
         (view.yaw, view.pitch) = (YAW, PITCH);
         view.into_matrix()
@@ -193,15 +184,7 @@ fn draw_path(plots: &Area<'_>, drawing: &Drawing) -> Result<()> {
             chart.draw_series([PathElement::new(edge.to_vec(), SOLID.mix(0.7).stroke_width(px(1)))])?;
         }
     }
-    for trail in layered(drawing) {
-        let look = Look::new(trail.colour, trail.role);
-        let points = finite(trail).map(|point| turned(*point));
-        draw_line(&mut chart, points, look)?;
-        chart.draw_series(
-            start(trail).map(|point| Circle::new(turned(point), px(4), look.style().filled())),
-        )?;
-    }
-    Ok(())
+    draw_trails(&mut chart, drawing, turned)
 }
 
 /// The edges, in units, of a box with edges of these lengths that fills an area when it is looked at.

@@ -1,26 +1,22 @@
 //! Long curves as few points, made while a recording is read: memory does not grow with its length.
 
-/// A curve that keeps, of each of its bins, the first, the lowest, the highest and the last sample, and one that is no
-/// number, where the line breaks off. Drawn over no more pixels than it has bins, it is the same line as the whole
-/// curve, extremes and gaps included.
+/// A time in seconds and a value.
+pub type Sample = (f64, f64);
+
+/// The first, the lowest, the highest and the last sample of a stretch, and one that is no number, where the line breaks
+/// off; in the order of time, and some of them the same.
+type Bin = [Sample; 5];
+
+/// A curve that keeps the extremes, ends and gaps of each of its bins. Drawn over no more pixels than it has bins, it is
+/// the same line as the whole curve.
 #[derive(Clone, Debug)]
 pub struct Curve {
     bins: Vec<Bin>,
     bins_max: usize,
     /// Samples of a full bin: a power of two.
     bin_samples: u64,
-    samples: u64,
-}
-
-type Sample = (f64, f64);
-
-#[derive(Clone, Copy, Debug)]
-struct Bin {
-    first: Sample,
-    lowest: Sample,
-    highest: Sample,
-    gap: Option<Sample>,
-    last: Sample,
+    /// Samples that were pushed.
+    pub samples: u64,
 }
 
 impl Curve {
@@ -29,67 +25,44 @@ impl Curve {
         Self { bins: Vec::new(), bins_max: bins_max.max(2), bin_samples: 1, samples: 0 }
     }
 
-    /// Samples that were pushed.
-    pub fn samples(&self) -> u64 {
-        self.samples
-    }
-
     /// Adds a sample at time `time_s`, later than those before.
     pub fn push(&mut self, time_s: f64, value: f64) {
         if self.bins.len() == self.bins_max && self.samples.is_multiple_of(self.bin_samples) {
-            self.bins = self.bins.chunks(2).map(Bin::merged).collect();
+            self.bins = self.bins.chunks(2).map(|pair| bin(pair.as_flattened())).collect();
             self.bin_samples *= 2;
         }
-        let bin = Bin::of((time_s, value));
+        let sample = (time_s, value);
         match self.bins.last_mut() {
             Some(last) if !self.samples.is_multiple_of(self.bin_samples) => {
-                *last = Bin::merged(&[*last, bin])
+                let [a, b, c, d, e] = *last;
+                *last = bin(&[a, b, c, d, e, sample]);
             }
-            _ => self.bins.push(bin),
+            _ => self.bins.push([sample; 5]),
         }
         self.samples += 1;
     }
 
     /// The points in the order of time.
     pub fn points(&self) -> Vec<Sample> {
-        let mut points: Vec<Sample> = self.bins.iter().flat_map(Bin::points).collect();
+        let mut points = self.bins.as_flattened().to_vec();
         points.dedup_by_key(|(time_s, _)| *time_s);
         points
     }
 }
 
-impl Bin {
-    fn of(sample: Sample) -> Self {
-        let gap = sample.1.is_nan().then_some(sample);
-        Self { first: sample, lowest: sample, highest: sample, gap, last: sample }
-    }
-
-    /// One bin for one or two that follow each other. A number is lower and higher than what is none.
-    fn merged(bins: &[Self]) -> Self {
-        let (first, last) = (bins[0], bins[bins.len() - 1]);
-        Self {
-            first: first.first,
-            lowest: if first.lowest.1.min(last.lowest.1) == first.lowest.1 {
-                first.lowest
-            } else {
-                last.lowest
-            },
-            highest: if first.highest.1.max(last.highest.1) == first.highest.1 {
-                first.highest
-            } else {
-                last.highest
-            },
-            gap: first.gap.or(last.gap),
-            last: last.last,
-        }
-    }
-
-    fn points(&self) -> [Sample; 5] {
-        let gap = self.gap.unwrap_or(self.first);
-        let mut points = [self.first, self.lowest, self.highest, gap, self.last];
-        points.sort_by(|a, b| a.0.total_cmp(&b.0));
-        points
-    }
+/// The bin of samples that follow each other.
+fn bin(samples: &[Sample]) -> Bin {
+    let first = samples[0];
+    let extreme = |is_beyond: fn(f64, f64) -> bool| {
+        let numbers = samples.iter().filter(|sample| !sample.1.is_nan());
+        numbers.copied().reduce(|best, other| if is_beyond(other.1, best.1) { other } else { best })
+    };
+    let gap = samples.iter().find(|sample| sample.1.is_nan()).copied();
+    let last = samples.last().copied();
+    let kept = [Some(first), extreme(|a, b| a < b), extreme(|a, b| a > b), gap, last];
+    let mut bin = kept.map(|sample| sample.unwrap_or(first));
+    bin.sort_by(|a, b| a.0.total_cmp(&b.0));
+    bin
 }
 
 /// A path in space that keeps every n-th point, and the last.
@@ -99,7 +72,8 @@ pub struct Trail {
     last: Option<[f64; 3]>,
     points_max: usize,
     every: u64,
-    samples: u64,
+    /// Samples that were pushed.
+    pub samples: u64,
 }
 
 impl Trail {
@@ -108,22 +82,15 @@ impl Trail {
         Self { points: Vec::new(), last: None, points_max: points_max.max(2), every: 1, samples: 0 }
     }
 
-    /// Samples that were pushed.
-    pub fn samples(&self) -> u64 {
-        self.samples
-    }
-
     /// Adds a point.
     pub fn push(&mut self, point: [f64; 3]) {
+        let is_full = self.points.len() + 1 >= self.points_max;
+        if is_full && self.samples.is_multiple_of(self.every) {
+            self.points = self.points.iter().step_by(2).copied().collect();
+            self.every *= 2;
+        }
         if self.samples.is_multiple_of(self.every) {
-            if self.points.len() + 1 >= self.points_max {
-                self.points = self.points.iter().step_by(2).copied().collect();
-                self.every *= 2;
-            }
-            // Since the step has doubled, this one may be between two.
-            if self.samples.is_multiple_of(self.every) {
-                self.points.push(point);
-            }
+            self.points.push(point);
         }
         self.last = Some(point);
         self.samples += 1;
@@ -144,7 +111,7 @@ mod tests {
     fn thinned(values: &[f64], bins: usize) -> Vec<(f64, f64)> {
         let mut curve = Curve::new(bins);
         values.iter().enumerate().for_each(|(index, value)| curve.push(index as f64, *value));
-        assert_eq!(curve.samples(), values.len() as u64);
+        assert_eq!(curve.samples, values.len() as u64);
         curve.points()
     }
 
