@@ -1,13 +1,11 @@
 //! A live run in the terminal, steered from the keyboard.
 //!
-//! - `sample`: what a run shows at a moment
-//! - `view`: what two moments say about the time between them
-//! - `cells`: the view as words, for screen and paper
+//! - `view`: a run as it is shown, for screen and paper
+//! - `sample`: what a run shows at a moment, and what two moments say about the time between them
 //! - `screen`: how it is drawn
 //! - `keys`: what the keys do
 #![allow(clippy::disallowed_methods, reason = "rates are per host time")]
 
-mod cells;
 mod keys;
 mod sample;
 mod screen;
@@ -42,7 +40,7 @@ pub fn look(run: &Arc<LiveRun>) -> Result<View> {
     let source = Source::open(run)?;
     let before = source.sample();
     std::thread::sleep(ONCE);
-    Ok(View::new(&source, &before, &source.sample()))
+    Ok(source.between(&before, &source.sample()))
 }
 
 /// Shows `run` in the terminal and lets the keys steer it until the user leaves, or `is_terminated` becomes true.
@@ -70,14 +68,14 @@ fn draw_until_left(
 ) -> Result<()> {
     let mut looks: VecDeque<Sample> = VecDeque::from([source.sample()]);
     let mut last_look = Instant::now();
-    while !keys.has_left() && !is_terminated.load(Ordering::SeqCst) {
+    while !keys.has_left && !is_terminated.load(Ordering::SeqCst) {
         if last_look.elapsed() >= REFRESH {
             last_look = Instant::now();
             looks.push_back(source.sample());
             looks.drain(..looks.len().saturating_sub(LOOKS));
         }
-        let view = View::new(source, &looks[0], &looks[looks.len() - 1]);
-        let scroll = keys.scroll();
+        let view = source.between(&looks[0], &looks[looks.len() - 1]);
+        let scroll = keys.scroll;
         let screen = Screen { view: &view, notice: keys.notice(), scroll };
         terminal.draw(|frame| frame.render_widget(screen, frame.area()))?;
         if event::poll(REFRESH.saturating_sub(last_look.elapsed()))? {

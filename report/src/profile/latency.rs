@@ -1,6 +1,7 @@
 //! What a tick costs a node, and a sample on its way.
 
 use crate::profile::times::Times;
+use bus::profile::TickTimes;
 use runtime::flight::{Cause, Flight};
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -61,4 +62,37 @@ fn latency(flight: &Flight, node: usize, transport: &mut BTreeMap<(usize, usize)
         }
     }
     NodeLatency { name, wait, wake_up, compute, publish }
+}
+
+/// The parts of a tick.
+pub const PARTS: [&str; 4] = ["wait", "wake-up", "compute", "publish"];
+
+/// A part of a node's tick, in nanoseconds of the monotonic clock.
+pub struct Part {
+    pub start_ns: u64,
+    pub end_ns: u64,
+    /// What the node waited for.
+    pub cause: Option<Cause>,
+}
+
+/// The [`PARTS`] of the tick `times` of `node`; those that were not noted have no length.
+pub fn parts(flight: &Flight, node: usize, times: &TickTimes<'_>) -> [Part; 4] {
+    let began_ns = times.began_ns.unwrap_or(times.received_ns);
+    let waited = flight.waited(node, times);
+    let ready_ns = waited.map_or(began_ns, |waited| waited.ready_ns.clamp(began_ns, times.received_ns));
+    let ends = [began_ns, ready_ns, times.received_ns, times.done_ns, times.ended_ns];
+    std::array::from_fn(|part| Part {
+        start_ns: ends[part],
+        end_ns: ends[part + 1],
+        cause: waited.map(|waited| waited.cause).filter(|_| part < 2),
+    })
+}
+
+/// What people call the cause of a wait.
+pub fn cause_name(flight: &Flight, cause: Cause) -> &str {
+    match cause {
+        Cause::Sample { topic, .. } => flight.topic_name(topic),
+        Cause::Grant => "grant",
+        Cause::Itself => "its own tick before",
+    }
 }

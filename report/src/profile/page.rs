@@ -4,10 +4,10 @@
 
 use crate::page::{PLOTLY_BASIC, Page};
 use crate::profile::figures::Profile;
+use crate::profile::latency::{PARTS, cause_name, parts};
 use crate::profile::path::{Path, name};
 use crate::profile::times::Times;
-use bus::profile::TickTimes;
-use runtime::flight::{Cause, Flight};
+use runtime::flight::Flight;
 use serde_json::{Value, json};
 
 const PAGE: Page =
@@ -17,8 +17,8 @@ const PAGE: Page =
 const SLOWEST_TICKS: usize = 20;
 /// Bars on a timeline at most: the longest.
 const BARS_MAX: usize = 1500;
-/// The parts of a tick, as `page.js` numbers them.
-const PARTS: [&str; 4] = ["wait", "wake-up", "compute", "publish"];
+/// Ticks before and after a slow one that are looked at: fast nodes are that far ahead at most.
+const TICKS_AROUND: u32 = 40;
 /// Points of the course of the tick time over the run: of the ticks that fall on one, the slowest is shown.
 const COURSE_POINTS: usize = 2000;
 /// Bins per decade of the histograms.
@@ -67,103 +67,39 @@ fn slowest(flight: &Flight, profile: &Profile) -> Vec<Value> {
 /// What every node does while the critical path of `tick` is walked, in µs from the path's start.
 fn timeline(flight: &Flight, closing: &[usize], tick: u32) -> Option<Value> {
     let path = Path::of(flight, closing, tick)?;
-    let window = Window::around(&path);
+    let (origin_ns, end_ns) = path.span_ns();
+    let margin_ns = path.length_ns() / 5;
+    let seen = origin_ns.saturating_sub(margin_ns)..end_ns + margin_ns;
+    let us = |ns: u64| (ns as f64 - origin_ns as f64) / 1e3;
+    let ticks = tick.saturating_sub(TICKS_AROUND)..=(tick + TICKS_AROUND).min(flight.ticks.saturating_sub(1));
     let mut bars = Vec::new();
     for node in 0..flight.plan.nodes.len() {
-        let first = tick.saturating_sub(window.ticks);
-        let ticks = first..=tick.saturating_add(window.ticks).min(flight.ticks.saturating_sub(1));
-        for times in ticks.filter_map(|tick| flight.at(node, tick)) {
-            bars.extend(node_bars(flight, node, &times, &window));
+        for times in ticks.clone().filter_map(|tick| flight.at(node, tick)) {
+            for (number, part) in parts(flight, node, &times).into_iter().enumerate() {
+                let (start_ns, end_ns) = (part.start_ns.max(seen.start), part.end_ns.min(seen.end));
+                if part.start_ns < part.end_ns && start_ns < end_ns {
+                    let cause = part.cause.map(|cause| cause_name(flight, cause));
+                    let whole_ns = part.end_ns - part.start_ns;
+                    let (length_us, whole_us) = ((end_ns - start_ns) as f64 / 1e3, whole_ns as f64 / 1e3);
+                    let bar = json!([node, number, times.tick, us(start_ns), length_us, whole_us, cause]);
+                    bars.push((whole_ns, bar));
+                }
+            }
         }
     }
-    bars.sort_by_key(|bar: &Bar| std::cmp::Reverse(bar.end_ns - bar.start_ns));
-    let bars: Vec<Value> = bars.iter().take(BARS_MAX).map(|bar| bar.json(flight, &window)).collect();
+    bars.sort_by_key(|(whole_ns, _)| std::cmp::Reverse(*whole_ns));
     let places = path.0.iter().map(|stretch| {
         json!({
             "place": name(flight, stretch.place),
             "node": flight.node_name(stretch.place.node()),
-            "start": window.us(stretch.start_ns),
-            "end": window.us(stretch.end_ns),
+            "start": us(stretch.start_ns),
+            "end": us(stretch.end_ns),
         })
     });
     Some(json!({
         "tick": tick,
         "length_us": path.length_ns() as f64 / 1e3,
-        "bars": bars,
+        "bars": bars.into_iter().take(BARS_MAX).map(|(_, bar)| bar).collect::<Vec<_>>(),
         "path": places.collect::<Vec<_>>(),
     }))
-}
-
-/// The stretch of host time that a timeline shows.
-struct Window {
-    origin_ns: u64,
-    start_ns: u64,
-    end_ns: u64,
-    /// Ticks before and after that are looked at: fast nodes are that far ahead at most.
-    ticks: u32,
-}
-
-impl Window {
-    fn around(path: &Path) -> Self {
-        let (start_ns, end_ns) = path.span_ns();
-        let margin_ns = path.length_ns() / 5;
-        Self {
-            origin_ns: start_ns,
-            start_ns: start_ns.saturating_sub(margin_ns),
-            end_ns: end_ns + margin_ns,
-            ticks: 40,
-        }
-    }
-
-    fn us(&self, ns: u64) -> f64 {
-        if ns >= self.origin_ns {
-            (ns - self.origin_ns) as f64 / 1e3
-        } else {
-            -((self.origin_ns - ns) as f64) / 1e3
-        }
-    }
-}
-
-/// A part of a node's tick.
-struct Bar {
-    node: usize,
-    tick: u32,
-    part: usize,
-    start_ns: u64,
-    end_ns: u64,
-    /// What the node waited for.
-    cause: Option<Cause>,
-}
-
-fn node_bars(flight: &Flight, node: usize, times: &TickTimes<'_>, window: &Window) -> Vec<Bar> {
-    let began_ns = times.began_ns.unwrap_or(times.received_ns);
-    let waited = flight.waited(node, times);
-    let ready_ns = waited.map_or(began_ns, |waited| waited.ready_ns.clamp(began_ns, times.received_ns));
-    let ends = [began_ns, ready_ns, times.received_ns, times.done_ns, times.ended_ns];
-    let is_seen =
-        |bar: &Bar| bar.start_ns < bar.end_ns && bar.end_ns > window.start_ns && bar.start_ns < window.end_ns;
-    let bars = ends.windows(2).enumerate().map(|(part, ends)| Bar {
-        node,
-        tick: times.tick,
-        part,
-        start_ns: ends[0],
-        end_ns: ends[1],
-        cause: waited.map(|waited| waited.cause).filter(|_| part < 2),
-    });
-    bars.filter(is_seen).collect()
-}
-
-impl Bar {
-    /// Node, part, tick, start and length of what is seen and whole length in µs, what was waited for.
-    fn json(&self, flight: &Flight, window: &Window) -> Value {
-        let (from_ns, to_ns) = (self.start_ns.max(window.start_ns), self.end_ns.min(window.end_ns));
-        let why = self.cause.map(|cause| match cause {
-            Cause::Sample { topic, .. } => flight.topic_name(topic),
-            Cause::Grant => "grant",
-            Cause::Itself => "its own tick before",
-        });
-        let us = |ns: u64| ns as f64 / 1e3;
-        let whole_ns = self.end_ns - self.start_ns;
-        json!([self.node, self.part, self.tick, window.us(from_ns), us(to_ns - from_ns), us(whole_ns), why])
-    }
 }

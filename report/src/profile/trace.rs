@@ -1,5 +1,6 @@
 //! A timeline in the Trace Event Format (JSON), which ui.perfetto.dev and chrome://tracing open.
 
+use crate::profile::latency::{PARTS, cause_name, parts};
 use crate::profile::path::CriticalPath;
 use bus::profile::{Grant, TickTimes};
 use runtime::flight::{Cause, Flight};
@@ -22,9 +23,8 @@ pub const START: &str = r#"{"otherData":{"writer":"hummingbus"},"#;
 /// Writes the trace; returns which ticks it holds, in words.
 pub fn write(flight: &Flight, path: &CriticalPath, out: &mut impl Write) -> io::Result<String> {
     let ticks = Ticks::of(flight, path);
-    let mut trace =
-        Trace { flight, ticks: &ticks.all, origin_ns: origin_ns(flight, &ticks.all), flows: 0, out };
-    trace.write()?;
+    let origin_ns = origin_ns(flight, &ticks.all);
+    Trace { flight, ticks: &ticks.all, origin_ns, flows: 0, separator: "", out }.write()?;
     Ok(format!("the first {} ticks and around the {} slowest", ticks.first, ticks.slowest))
 }
 
@@ -60,80 +60,79 @@ struct Trace<'a, W: Write> {
     ticks: &'a BTreeSet<u32>,
     origin_ns: u64,
     flows: u64,
+    /// What stands before the next event.
+    separator: &'static str,
     out: &'a mut W,
 }
 
 impl<W: Write> Trace<'_, W> {
     fn write(&mut self) -> io::Result<()> {
         write!(self.out, "{START}\"displayTimeUnit\":\"ns\",\"traceEvents\":[")?;
-        self.name(CLOCK, "clock", true)?;
-        for node in 0..self.flight.plan.nodes.len() {
-            self.name(node + 2, self.flight.node_name(node), false)?;
-        }
+        self.name(CLOCK, "clock")?;
+        let nodes = 0..self.flight.plan.nodes.len();
+        nodes.clone().try_for_each(|node| self.name(node + 2, self.flight.node_name(node)))?;
         self.write_grants()?;
-        for node in 0..self.flight.plan.nodes.len() {
-            for &tick in self.ticks {
-                if let Some(times) = self.flight.at(node, tick) {
-                    self.write_tick(node, &times)?;
-                }
+        for node in nodes {
+            for times in self.ticks.iter().filter_map(|tick| self.flight.at(node, *tick)) {
+                self.write_tick(node, &times)?;
             }
         }
         writeln!(self.out, "\n]}}")
     }
 
-    fn name(&mut self, process: usize, name: &str, is_first: bool) -> io::Result<()> {
-        let event = |key: &str, value: Value| json!({ "ph": "M", "name": key, "pid": process, "tid": 1, "args": value });
-        self.event(&event("process_name", json!({ "name": name })), is_first)?;
-        self.event(&event("process_sort_index", json!({ "sort_index": process })), false)?;
-        self.event(&event("thread_name", json!({ "name": name })), false)
+    fn name(&mut self, process: usize, name: &str) -> io::Result<()> {
+        let named = json!({ "name": name });
+        let order = json!({ "sort_index": process });
+        for (key, value) in
+            [("process_name", &named), ("process_sort_index", &order), ("thread_name", &named)]
+        {
+            self.event(&json!({ "ph": "M", "name": key, "pid": process, "tid": 1, "args": value }))?;
+        }
+        Ok(())
     }
 
     fn write_grants(&mut self) -> io::Result<()> {
         let is_in = |grant: &Grant| self.ticks.range(grant.first_tick..grant.end_tick).next().is_some();
-        let grants: Vec<Grant> = self.flight.grants().filter(is_in).collect();
         let mut free_from_ns = 0;
-        for grant in grants {
+        for grant in self.flight.grants().filter(is_in) {
             let name = format!("grant {}…{}", grant.first_tick, grant.end_tick - 1);
-            let event = match grant.deadline_ns {
+            if let Some(deadline_ns) = grant.deadline_ns {
                 // From the deadline to the grant, without what it shares with a late grant before it.
-                Some(deadline_ns) => {
-                    let late_us = grant.granted_ns.saturating_sub(deadline_ns) as f64 / 1e3;
-                    let start_ns = deadline_ns.max(free_from_ns);
-                    let arguments = json!({ "late_us": late_us });
-                    self.slice(CLOCK, &name, start_ns, grant.granted_ns, &arguments)
-                }
-                None => json!({
-                    "ph": "i", "s": "p", "name": name, "pid": CLOCK, "tid": 1, "ts": self.us(grant.granted_ns)
-                }),
-            };
-            self.event(&event, false)?;
+                let late_us = grant.granted_ns.saturating_sub(deadline_ns) as f64 / 1e3;
+                let start_ns = deadline_ns.max(free_from_ns);
+                self.slice(CLOCK, &name, [start_ns, grant.granted_ns], &json!({ "late_us": late_us }))?;
+            } else {
+                let at_us = self.us(grant.granted_ns);
+                self.event(
+                    &json!({ "ph": "i", "s": "p", "name": name, "pid": CLOCK, "tid": 1, "ts": at_us }),
+                )?;
+            }
             free_from_ns = grant.granted_ns;
         }
         Ok(())
     }
 
     fn write_tick(&mut self, node: usize, times: &TickTimes<'_>) -> io::Result<()> {
-        let (process, tick) = (node + 2, times.tick);
-        let waited = self.flight.waited(node, times);
-        if let (Some(waited), Some(began_ns)) = (waited, times.began_ns.filter(|ns| *ns >= self.origin_ns)) {
-            let end_ns = waited.ready_ns.clamp(began_ns, times.received_ns);
-            let why = json!({ "for": self.cause(waited.cause) });
-            if end_ns > began_ns {
-                self.event(&self.slice(process, "wait", began_ns, end_ns, &why), false)?;
-            }
-            if times.received_ns > end_ns {
-                self.event(&self.slice(process, "wake-up", end_ns, times.received_ns, &why), false)?;
+        let parts = parts(self.flight, node, times);
+        let cause = parts[0].cause;
+        let is_noted = times.began_ns.is_some_and(|ns| ns >= self.origin_ns);
+        let [wait, wake_up, compute, publish] = parts.map(|part| [part.start_ns, part.end_ns]);
+        if let Some(cause) = cause.filter(|_| is_noted) {
+            let why = json!({ "for": cause_name(self.flight, cause) });
+            for (name, ends) in [(PARTS[0], wait), (PARTS[1], wake_up)] {
+                if ends[0] < ends[1] {
+                    self.slice(node + 2, name, ends, &why)?;
+                }
             }
         }
-        let whole =
-            self.slice(process, &format!("tick {tick}"), times.received_ns, times.ended_ns, &json!({}));
-        self.event(&whole, false)?;
-        self.event(&self.slice(process, "compute", times.received_ns, times.done_ns, &json!({})), false)?;
-        self.event(&self.slice(process, "publish", times.done_ns, times.ended_ns, &json!({})), false)?;
-        if let Some(Cause::Sample { topic, tick: stamp }) = waited.map(|waited| waited.cause) {
-            self.write_flow(node, topic, stamp, times.received_ns)?;
+        let whole = [times.received_ns, times.ended_ns];
+        self.slice(node + 2, &format!("tick {}", times.tick), whole, &json!({}))?;
+        self.slice(node + 2, PARTS[2], compute, &json!({}))?;
+        self.slice(node + 2, PARTS[3], publish, &json!({}))?;
+        match cause {
+            Some(Cause::Sample { topic, tick }) => self.write_flow(node, topic, tick, times.received_ns),
+            _ => Ok(()),
         }
-        Ok(())
     }
 
     /// The arrow from the sending of a sample to the reader that waited for it.
@@ -143,38 +142,28 @@ impl<W: Write> Trace<'_, W> {
         };
         self.flows += 1;
         let sender = self.flight.publisher(topic).node;
-        let event = |phase: &str, node: usize, ns: u64| {
-            json!({
+        for (phase, node, ns) in [("s", sender, sent_ns), ("f", reader, received_ns)] {
+            self.event(&json!({
                 "ph": phase, "bp": "e", "cat": "hop", "name": self.flight.topic_name(topic), "id": self.flows,
                 "pid": node + 2, "tid": 1, "ts": self.us(ns)
-            })
-        };
-        let (start, finish) = (event("s", sender, sent_ns), event("f", reader, received_ns));
-        self.event(&start, false)?;
-        self.event(&finish, false)
-    }
-
-    fn cause(&self, cause: Cause) -> String {
-        match cause {
-            Cause::Sample { topic, .. } => self.flight.topic_name(topic).to_owned(),
-            Cause::Grant => "grant".to_owned(),
-            Cause::Itself => "its own last tick".to_owned(),
+            }))?;
         }
+        Ok(())
     }
 
-    fn slice(&self, process: usize, name: &str, start_ns: u64, end_ns: u64, arguments: &Value) -> Value {
-        let duration_us = end_ns.saturating_sub(start_ns) as f64 / 1e3;
-        json!({
-            "ph": "X", "cat": "tick", "name": name, "pid": process, "tid": 1, "ts": self.us(start_ns),
-            "dur": duration_us, "args": arguments
-        })
+    fn slice(&mut self, process: usize, name: &str, ends_ns: [u64; 2], args: &Value) -> io::Result<()> {
+        let duration_us = ends_ns[1].saturating_sub(ends_ns[0]) as f64 / 1e3;
+        self.event(&json!({
+            "ph": "X", "cat": "tick", "name": name, "pid": process, "tid": 1, "ts": self.us(ends_ns[0]),
+            "dur": duration_us, "args": args
+        }))
     }
 
     fn us(&self, ns: u64) -> f64 {
         ns.saturating_sub(self.origin_ns) as f64 / 1e3
     }
 
-    fn event(&mut self, event: &Value, is_first: bool) -> io::Result<()> {
-        write!(self.out, "{}\n{event}", if is_first { "" } else { "," })
+    fn event(&mut self, event: &Value) -> io::Result<()> {
+        write!(self.out, "{}\n{event}", std::mem::replace(&mut self.separator, ","))
     }
 }

@@ -18,8 +18,10 @@ pub struct Keys {
     sender: Sender<String>,
     notice: String,
     asks_to_stop: bool,
-    scroll: usize,
-    has_left: bool,
+    /// Rows that are scrolled over.
+    pub scroll: usize,
+    /// Whether the user has left.
+    pub has_left: bool,
 }
 
 /// What a key asks for.
@@ -38,16 +40,6 @@ impl Keys {
         let (sender, answers) = channel();
         let (run, notice) = (run.clone(), String::new());
         Self { run, answers, sender, notice, asks_to_stop: false, scroll: 0, has_left: false }
-    }
-
-    /// Whether the user has left.
-    pub fn has_left(&self) -> bool {
-        self.has_left
-    }
-
-    /// Rows that are scrolled over.
-    pub fn scroll(&self) -> usize {
-        self.scroll
     }
 
     /// The newest thing to tell the user.
@@ -72,7 +64,7 @@ impl Keys {
         }
         match action(*key, status) {
             Action::Ask(request) => self.ask(request),
-            Action::Tell(words) => words.clone_into(&mut self.notice),
+            Action::Tell(text) => text.clone_into(&mut self.notice),
             Action::AskToStop => {
                 self.asks_to_stop = true;
                 STOP_QUESTION.clone_into(&mut self.notice);
@@ -87,13 +79,13 @@ impl Keys {
     fn ask(&self, request: Request) {
         let (run, sender) = (self.run.clone(), self.sender.clone());
         std::thread::spawn(move || {
-            let words = match client::ask(&run, &request) {
+            let text = match client::ask(&run, &request) {
                 Ok(Answer::Done { text, .. }) => text,
                 Ok(Answer::Refused { reason }) => reason,
                 Ok(Answer::Status(status)) => status.to_string(),
                 Err(error) => format!("{error:#}"),
             };
-            let _ = sender.send(words);
+            let _ = sender.send(text);
         });
     }
 }

@@ -1,14 +1,15 @@
 //! What a run shows at a moment: read from its control segment and from the kernel, without disturbing it.
 
+use crate::top::view::{ProcessRow, TopicRow, View};
 use anyhow::{Context, Result};
 use bus::host_time::monotonic_ns;
 use bus::lockstep::{LiveView, Phase};
 use bus::membership::{Membership, NodeInstances};
-use bus::plan::Plan;
+use bus::plan::{NodePlan, Plan};
 use bus::step_times::StepTimes;
 use runtime::ctl::protocol::{State, Status};
 use runtime::run_dir::LiveRun;
-use std::path::PathBuf;
+use rustix::param::clock_ticks_per_second;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
@@ -18,8 +19,7 @@ const POLL: Duration = Duration::from_millis(5);
 
 /// A live run that is looked at.
 pub struct Source {
-    pub plan: Plan,
-    pub manifest: PathBuf,
+    plan: Plan,
     run: Arc<LiveRun>,
     control: LiveView,
 }
@@ -27,28 +27,11 @@ pub struct Source {
 /// What a run shows at a moment.
 pub struct Sample {
     /// When, by the host's monotonic clock.
-    pub at_ns: u64,
-    pub status: Status,
-    /// The clock's, then the nodes'.
-    pub processes: Vec<ProcessSample>,
-    pub topics: Vec<TopicSample>,
-}
-
-/// What a process shows.
-pub struct ProcessSample {
-    pub id: Option<u32>,
-    pub state: String,
-    pub ticks: u32,
-    /// Processor time in ticks of the kernel; `None` where the process is gone.
-    pub cpu_ticks: Option<u64>,
-    pub step_times: Option<StepTimes>,
-    pub late: u32,
-}
-
-/// What a topic shows.
-pub struct TopicSample {
-    pub samples: u32,
-    pub lost: u32,
+    at_ns: u64,
+    /// The run; what takes two looks, such as rates, is missing.
+    view: View,
+    /// By process: processor time in ticks of the kernel, `None` where the process is gone, and the times of the steps.
+    used: Vec<(Option<u64>, Option<StepTimes>)>,
 }
 
 impl Source {
@@ -62,12 +45,7 @@ impl Source {
             let plan = Plan::load(&run.entry.run_dir);
             match plan.and_then(|plan| Ok((LiveView::open(&plan)?, plan))) {
                 Ok((control, plan)) => {
-                    return Ok(Self {
-                        plan,
-                        manifest: run.entry.manifest.clone(),
-                        run: run.clone(),
-                        control,
-                    });
+                    return Ok(Self { plan, run: run.clone(), control });
                 }
                 Err(_) if run.is_live() && start.elapsed() < START => std::thread::sleep(POLL),
                 Err(error) => {
@@ -87,47 +65,72 @@ impl Source {
         // While it is being written, or gone with the run, that of the start serves.
         let membership = Membership::load(&self.run.entry.run_dir, self.control.epoch());
         let membership = membership.unwrap_or_else(|_| Membership::first(&self.plan));
-        let nodes = membership.nodes.iter().enumerate().map(|(node, own)| self.node(node, own));
-        let topics = self.plan.topics.iter().enumerate().map(|(index, topic)| TopicSample {
-            samples: self.control.ticks_sent(index).div_ceil(topic.period_ticks),
-            lost: self.control.gaps(index),
-        });
-        let processes = std::iter::once(clock).chain(nodes).collect();
-        Sample { at_ns: monotonic_ns(), status, processes, topics: topics.collect() }
+        let nodes = membership.nodes.iter().enumerate();
+        let nodes = nodes.map(|(node, instances)| self.node(node, instances));
+        let (processes, used) = std::iter::once(clock).chain(nodes).unzip();
+        let topics = (0..self.plan.topics.len()).map(|index| self.topic(index)).collect();
+        let manifest = self.run.entry.manifest.display().to_string();
+        let view = View { manifest, status, span_s: 0.0, real_time_factor: 0.0, processes, topics };
+        Sample { at_ns: monotonic_ns(), view, used }
     }
 
-    fn clock(&self, state: State) -> ProcessSample {
-        let id = self.control.clock_process();
-        let kernel = id.and_then(KernelView::of);
+    /// What `before` and `after` say about the time between them.
+    pub fn between(&self, before: &Sample, after: &Sample) -> View {
+        let mut view = after.view.clone();
+        view.span_s = after.at_ns.saturating_sub(before.at_ns) as f64 * 1e-9;
+        let per_s = |count: f64| if view.span_s > 0.0 { count / view.span_s } else { 0.0 };
+        let ticks = after.view.status.tick.saturating_sub(before.view.status.tick);
+        view.real_time_factor = per_s(f64::from(ticks)) * self.plan.tick_s();
+        for (topic, before) in view.topics.iter_mut().zip(&before.view.topics) {
+            topic.rate_hz = per_s(f64::from(topic.samples.saturating_sub(before.samples)));
+        }
+        let rows = view.processes.iter_mut().zip(&before.view.processes);
+        for ((row, last), (before, after)) in rows.zip(before.used.iter().zip(&after.used)) {
+            // Not where another process has come in between.
+            let is_same = row.process == last.process && view.span_s > 0.0;
+            let used = before.0.zip(after.0).filter(|_| is_same);
+            row.cpu_share = used.map(|(before, after)| {
+                per_s(after.saturating_sub(before) as f64 / clock_ticks_per_second() as f64)
+            });
+            let steps = before.1.as_ref().zip(after.1.as_ref()).map(|(before, after)| after.since(before));
+            let percentile_us = |share| steps.as_ref()?.percentile_ns(share).map(|ns| ns * 1e-3);
+            (row.step_p50_us, row.step_p99_us) = (percentile_us(0.5), percentile_us(0.99));
+        }
+        view
+    }
+
+    fn topic(&self, index: usize) -> TopicRow {
+        let topic = &self.plan.topics[index];
+        let sends = |node: &&NodePlan| node.outputs.iter().any(|output| output.topic == index);
+        let publisher = self.plan.nodes.iter().find(sends).map(|node| node.name.clone());
+        TopicRow {
+            name: topic.name.clone(),
+            publisher: publisher.unwrap_or_default(),
+            rate_hz: 0.0,
+            samples: self.control.ticks_sent(index).div_ceil(topic.period_ticks),
+            lost: self.control.gaps(index),
+        }
+    }
+
+    fn clock(&self, state: State) -> (ProcessRow, (Option<u64>, Option<StepTimes>)) {
         let state = match state {
             State::Starting => "waits for the nodes",
             State::Paused => "holds the run",
             State::Ended => "done",
             _ => "grants ticks",
         };
-        ProcessSample {
-            id,
-            state: kernel.as_ref().and_then(KernelView::trouble).unwrap_or(state).to_owned(),
-            ticks: self.control.completed_ticks(),
-            cpu_ticks: kernel.map(|kernel| kernel.cpu_ticks),
-            step_times: None,
-            late: 0,
-        }
+        let (id, tick) = (self.control.clock_process(), self.control.completed_ticks());
+        let (row, cpu_ticks) = process("clock", id, tick, || state.to_owned());
+        (row, (cpu_ticks, None))
     }
 
-    fn node(&self, node: usize, instances: &NodeInstances) -> ProcessSample {
+    fn node(&self, node: usize, instances: &NodeInstances) -> (ProcessRow, (Option<u64>, Option<StepTimes>)) {
         let slot = self.plan.slot(node, instances.primary.generation);
-        let id = self.control.process(slot);
-        let kernel = id.and_then(KernelView::of);
-        let trouble = kernel.as_ref().and_then(KernelView::trouble);
-        ProcessSample {
-            id,
-            state: trouble.map_or_else(|| self.node_state(slot, instances), str::to_owned),
-            ticks: self.control.completed_by(slot),
-            cpu_ticks: kernel.map(|kernel| kernel.cpu_ticks),
-            step_times: Some(self.control.step_times(slot)),
-            late: self.control.late_count(slot),
-        }
+        let (id, tick) = (self.control.process(slot), self.control.completed_by(slot));
+        let name = &self.plan.nodes[node].name;
+        let (mut row, cpu_ticks) = process(name, id, tick, || self.node_state(slot, instances));
+        row.late = self.control.late_count(slot);
+        (row, (cpu_ticks, Some(self.control.step_times(slot))))
     }
 
     fn node_state(&self, slot: usize, instances: &NodeInstances) -> String {
@@ -146,6 +149,28 @@ impl Source {
     }
 }
 
+/// A process and its processor time; `state` is what it does if nothing keeps it from computing.
+fn process(
+    name: &str,
+    process: Option<u32>,
+    tick: u32,
+    state: impl FnOnce() -> String,
+) -> (ProcessRow, Option<u64>) {
+    let kernel = process.and_then(KernelView::of);
+    let trouble = kernel.as_ref().and_then(KernelView::trouble);
+    let row = ProcessRow {
+        name: name.to_owned(),
+        process,
+        state: trouble.map_or_else(state, str::to_owned),
+        tick,
+        cpu_share: None,
+        step_p50_us: None,
+        step_p99_us: None,
+        late: 0,
+    };
+    (row, kernel.map(|kernel| kernel.cpu_ticks))
+}
+
 /// What the kernel says about a process.
 struct KernelView {
     state: char,
@@ -159,9 +184,9 @@ impl KernelView {
 
     /// Reads the line of /proc/PID/stat: the name in brackets may hold anything, brackets and spaces too.
     fn parse(line: &str) -> Option<Self> {
-        let mut words = line.rsplit_once(')')?.1.split_whitespace();
-        let state = words.next()?.chars().next()?;
-        let mut times = words.skip(10).map(|word| word.parse::<u64>().ok());
+        let mut fields = line.rsplit_once(')')?.1.split_whitespace();
+        let state = fields.next()?.chars().next()?;
+        let mut times = fields.skip(10).map(|field| field.parse::<u64>().ok());
         Some(Self { state, cpu_ticks: times.next()?? + times.next()?? })
     }
 

@@ -1,8 +1,7 @@
 //! How a view is drawn: title, processes, topics, and what the keys do. 80 × 24 characters are enough for hover.toml.
 
 use crate::cells::Cells;
-use crate::top::cells::{processes, title, topics};
-use crate::top::view::View;
+use crate::top::view::{View, processes, title, topics};
 use ratatui::buffer::Buffer;
 use ratatui::layout::{Constraint, Layout, Rect};
 use ratatui::style::{Color, Style, Stylize};

@@ -1,11 +1,13 @@
-//! What two looks at a run say about the time between them.
+//! A run as it is shown: in words for screen and paper, and as JSON.
 
-use crate::top::sample::{ProcessSample, Sample, Source};
+use crate::cells::Cells;
 use runtime::ctl::protocol::Status;
 use serde::Serialize;
+use std::fmt;
+use std::path::Path;
 
 /// A run as it is shown.
-#[derive(Debug, Serialize)]
+#[derive(Clone, Debug, Serialize)]
 pub struct View {
     /// The manifest that it flies.
     pub manifest: String,
@@ -23,7 +25,7 @@ pub struct View {
 }
 
 /// A process as it is shown.
-#[derive(Debug, Serialize)]
+#[derive(Clone, Debug, Serialize)]
 pub struct ProcessRow {
     /// Name.
     pub name: String,
@@ -44,7 +46,7 @@ pub struct ProcessRow {
 }
 
 /// A topic as it is shown.
-#[derive(Debug, Serialize)]
+#[derive(Clone, Debug, Serialize)]
 pub struct TopicRow {
     /// Name.
     pub name: String,
@@ -58,65 +60,61 @@ pub struct TopicRow {
     pub lost: u32,
 }
 
-impl View {
-    /// What `before` and `after` say about the run of `source`.
-    pub fn new(source: &Source, before: &Sample, after: &Sample) -> Self {
-        let span_s = after.at_ns.saturating_sub(before.at_ns) as f64 * 1e-9;
-        let per_s = |count: u32| if span_s > 0.0 { f64::from(count) / span_s } else { 0.0 };
-        let clock = "clock".to_owned();
-        let names = std::iter::once(&clock).chain(source.plan.nodes.iter().map(|node| &node.name));
-        let processes = names.zip(before.processes.iter().zip(&after.processes));
-        let topics = source.plan.topics.iter().zip(before.topics.iter().zip(&after.topics));
-        Self {
-            manifest: source.manifest.display().to_string(),
-            status: after.status.clone(),
-            span_s,
-            real_time_factor: per_s(after.status.tick.saturating_sub(before.status.tick))
-                * source.plan.tick_s(),
-            processes: processes
-                .map(|(name, (before, after))| ProcessRow::new(name.clone(), before, after, span_s))
-                .collect(),
-            topics: topics
-                .enumerate()
-                .map(|(index, (topic, (before, after)))| TopicRow {
-                    name: topic.name.clone(),
-                    publisher: publisher(source, index),
-                    rate_hz: per_s(after.samples.saturating_sub(before.samples)),
-                    samples: after.samples,
-                    lost: after.lost,
-                })
-                .collect(),
-        }
+/// The table of the processes.
+pub fn processes(view: &View) -> Cells {
+    Cells {
+        headings: ["process", "state", "tick", "CPU %", "p50 µs", "p99 µs", "late"].map(str::to_owned).into(),
+        is_number: vec![false, false, true, true, true, true, true],
+        rows: view.processes.iter().map(process).collect(),
     }
 }
 
-fn publisher(source: &Source, topic: usize) -> String {
-    let sends = |node: &&bus::plan::NodePlan| node.outputs.iter().any(|output| output.topic == topic);
-    source.plan.nodes.iter().find(sends).map(|node| node.name.clone()).unwrap_or_default()
+fn process(row: &ProcessRow) -> Vec<String> {
+    let or_dash =
+        |value: Option<f64>, digits| value.map_or("-".to_owned(), |value| format!("{value:.digits$}"));
+    vec![
+        row.name.clone(),
+        row.state.clone(),
+        row.tick.to_string(),
+        or_dash(row.cpu_share.map(|share| share * 100.0), 0),
+        or_dash(row.step_p50_us, 1),
+        or_dash(row.step_p99_us, 1),
+        row.late.to_string(),
+    ]
 }
 
-impl ProcessRow {
-    fn new(name: String, before: &ProcessSample, after: &ProcessSample, span_s: f64) -> Self {
-        let times = before.step_times.as_ref().zip(after.step_times.as_ref());
-        let recent = times.map(|(before, after)| after.since(before));
-        let percentile_us = |share| recent.as_ref()?.percentile_ns(share).map(|ns| ns * 1e-3);
-        Self {
-            name,
-            process: after.id,
-            state: after.state.clone(),
-            tick: after.ticks,
-            cpu_share: cpu_share(before, after, span_s),
-            step_p50_us: percentile_us(0.5),
-            step_p99_us: percentile_us(0.99),
-            late: after.late,
-        }
+/// The table of the topics.
+pub fn topics(view: &View) -> Cells {
+    Cells {
+        headings: ["topic", "publisher", "rate Hz", "samples", "lost"].map(str::to_owned).into(),
+        is_number: vec![false, false, true, true, true],
+        rows: view.topics.iter().map(topic).collect(),
     }
 }
 
-/// Processor time per host time; `None` where another process has come in between.
-fn cpu_share(before: &ProcessSample, after: &ProcessSample, span_s: f64) -> Option<f64> {
-    let is_same = before.id == after.id && span_s > 0.0;
-    let (before, after) = before.cpu_ticks.zip(after.cpu_ticks).filter(|_| is_same)?;
-    let used_s = after.saturating_sub(before) as f64 / rustix::param::clock_ticks_per_second() as f64;
-    Some(used_s / span_s)
+fn topic(row: &TopicRow) -> Vec<String> {
+    let rate = format!("{:.0}", row.rate_hz);
+    vec![row.name.clone(), row.publisher.clone(), rate, row.samples.to_string(), row.lost.to_string()]
+}
+
+/// What stands above the tables: the run, and how far it has come.
+pub fn title(view: &View) -> [String; 2] {
+    let status = &view.status;
+    let missed = format!("{} deadlines missed", status.missed_deadlines);
+    let manifest = Path::new(&view.manifest).file_name().unwrap_or_default().to_string_lossy();
+    [
+        format!("{manifest}  run {}  {}", status.run_id, status.state.word()),
+        format!(
+            "tick {} / {}  {:.3} s  {:.2} × real time  pace {}  {missed}",
+            status.tick, status.end_tick, status.time_s, view.real_time_factor, status.pace
+        ),
+    ]
+}
+
+impl fmt::Display for View {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let [run, progress] = title(self);
+        let (processes, topics) = (processes(self), topics(self));
+        write!(f, "{run}\n{progress}\n\n{processes}\n{topics}")
+    }
 }
