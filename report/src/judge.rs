@@ -1,12 +1,13 @@
 //! The judgement of a run: its pass conditions and comparisons, evaluated on the recording.
 
-use crate::states::{FIELDS_OF_POSE, tracks};
+use crate::states::{FIELDS_OF_POSE, errors_at, tracks};
 use anyhow::{Result, bail};
-use flights::state::{StateQuantity, WindowEndErrors};
+use flights::state::StateQuantity;
 use recorder::reader::Recording;
 use recorder::series::Series;
 use runtime::manifest::{Comparison, Content, PassCondition, Statistic};
 use serde::Serialize;
+use std::fmt;
 
 /// A pass condition and how it came out.
 #[derive(Debug, Serialize)]
@@ -60,18 +61,19 @@ pub fn verdicts(content: &Content, recording: &Recording) -> Result<Vec<Verdict>
     conditions()
         .zip(&wanted)
         .map(|(pass, wanted)| {
-            let own: Vec<Series> = series.by_ref().take(wanted.len()).collect();
-            verdict(pass, &own)
+            let series: Vec<Series> = series.by_ref().take(wanted.len()).collect();
+            verdict(pass, &series)
         })
         .collect()
 }
 
 /// The parts of a vector field; of any other, the field itself.
 fn parts(topic: &str, field: &str, recording: &Recording) -> Result<Vec<(String, String)>> {
-    let is_field = recording.unit_of(topic, field)?.is_some();
-    let name =
-        |axis: &str| (topic.to_owned(), if is_field { field.to_owned() } else { format!("{field}.{axis}") });
-    Ok(if is_field { vec![name("")] } else { ["x", "y", "z"].map(name).to_vec() })
+    let fields = match recording.unit_of(topic, field)? {
+        Some(_) => vec![field.to_owned()],
+        None => ["x", "y", "z"].map(|axis| format!("{field}.{axis}")).into(),
+    };
+    Ok(fields.into_iter().map(|field| (topic.to_owned(), field)).collect())
 }
 
 /// All series that a condition needs: the judged field's parts, those that are taken off, the gate's.
@@ -181,6 +183,34 @@ fn statistic(statistic: Statistic, samples: impl Iterator<Item = f64>) -> Vec<f6
     }
 }
 
+impl fmt::Display for Verdict {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let values: Vec<String> = self.values.iter().map(|value| format!("{value:.4}")).collect();
+        let values = if values.is_empty() { "no samples".to_owned() } else { values.join(" … ") };
+        let limit = match (self.min, self.max) {
+            (Some(min), Some(max)) => format!("{min} … {max}"),
+            (Some(min), None) => format!("at least {min}"),
+            (None, Some(max)) => format!("at most {max}"),
+            (None, None) => "no limit".to_owned(),
+        };
+        let mark = if self.passed { "ok    " } else { "FAILED" };
+        write!(f, "  {mark} {}: {values} {} ({limit})", self.name, self.unit)
+    }
+}
+
+impl fmt::Display for WindowErrors {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { simulated, window_s, windows, position_rms_m, velocity_rms_m_s, attitude_rms_deg, .. } =
+            self;
+        let mark = if self.passed { "" } else { "  FAILED" };
+        write!(
+            f,
+            "  {simulated} after {window_s} s (RMS over {windows} windows): position {position_rms_m:.4} m, \
+             velocity {velocity_rms_m_s:.4} m/s, attitude {attitude_rms_deg:.3} deg{mark}"
+        )
+    }
+}
+
 /// Evaluates the comparisons of `content` on `recording`.
 ///
 /// # Errors
@@ -196,12 +226,7 @@ fn compare_states(compare: &Comparison, recording: &Recording) -> Result<WindowE
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a positive time of a run")]
     let window_ns = (compare.window_s * 1e9).round() as u64;
     let is_end = |time_ns: &&u64| **time_ns > 0 && window_ns > 0 && time_ns.is_multiple_of(window_ns);
-    let mut errors = WindowEndErrors::default();
-    for &time_ns in simulated.time_ns().iter().filter(is_end) {
-        if let (Some(simulated), Some(measured)) = (simulated.at(time_ns), measured.at(time_ns)) {
-            errors.add(&simulated, &measured);
-        }
-    }
+    let errors = errors_at(simulated, measured, simulated.time_ns().iter().filter(is_end).copied());
     if errors.windows() == 0 {
         bail!(
             "{} and {} have no common sample at the end of a window of {} s",

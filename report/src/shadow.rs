@@ -60,17 +60,9 @@ type Values = BTreeMap<(String, String), (String, BTreeMap<u32, f64>)>;
 /// # Errors
 /// If the recording is damaged.
 pub fn differences(recording: &Recording) -> Result<Vec<Difference>> {
-    let shadowed: Vec<String> = recording
-        .topics()
-        .keys()
-        .filter_map(|topic| topic.strip_prefix(SHADOW_PREFIX))
-        .map(str::to_owned)
-        .collect();
-    let wanted = |topic: &str| {
-        let active = topic.strip_prefix(SHADOW_PREFIX).unwrap_or(topic);
-        shadowed.iter().any(|shadowed| shadowed == active)
-    };
-    let values = values(recording, wanted)?;
+    let shadowed = recording.topics().keys().filter_map(|topic| topic.strip_prefix(SHADOW_PREFIX));
+    let shadowed: Vec<String> = shadowed.map(str::to_owned).collect();
+    let values = values(recording, &shadowed)?;
     let shadows = values.iter().filter_map(|((topic, field), (unit, shadow))| {
         let topic = topic.strip_prefix(SHADOW_PREFIX)?;
         let (_, active) = values.get(&(topic.to_owned(), field.clone()))?;
@@ -135,11 +127,7 @@ pub fn steps(recording: &Recording, plan: &Plan, reports: &[Report]) -> Result<V
     };
     let taken_over = reports.iter().filter(|report| report.take_over_tick.is_some());
     let topics: Vec<String> = taken_over.flat_map(outputs).collect();
-    let wanted = |topic: &str| {
-        let active = topic.strip_prefix(SHADOW_PREFIX).unwrap_or(topic);
-        topics.iter().any(|topic| topic == active)
-    };
-    let values = values(recording, wanted)?;
+    let values = values(recording, &topics)?;
     let step = |report: &Report| match report.take_over_tick {
         Some(tick) => outputs(report).iter().filter_map(|topic| step_at(&values, topic, tick)).collect(),
         None => Vec::new(),
@@ -170,11 +158,13 @@ fn step_at(values: &Values, topic: &str, tick: u32) -> Option<Step> {
     steps.max_by(|a, b| a.step.total_cmp(&b.step))
 }
 
-fn values(recording: &Recording, wanted: impl Fn(&str) -> bool) -> Result<Values> {
+/// The numbers of `topics` and of their shadows.
+fn values(recording: &Recording, topics: &[String]) -> Result<Values> {
     let mut values = Values::new();
     for record in recording.messages() {
         let record = record?;
-        if !wanted(&record.topic) {
+        let active = record.topic.strip_prefix(SHADOW_PREFIX).unwrap_or(&record.topic);
+        if !topics.iter().any(|topic| topic == active) {
             continue;
         }
         for leaf in recording.decode(&record)? {
@@ -192,29 +182,21 @@ fn values(recording: &Recording, wanted: impl Fn(&str) -> bool) -> Result<Values
 
 impl fmt::Display for Difference {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { topic, field, unit, samples, mean, rms, max, max_tick, active_deviation } = self;
         write!(
             f,
-            "  {} {}: shadow − active: rms {:.4} {}, mean {:+.4}, max {:.4} at tick {} ({} samples; the active \
-             deviates by {:.4})",
-            self.topic,
-            self.field,
-            self.rms,
-            self.unit,
-            self.mean,
-            self.max,
-            self.max_tick,
-            self.samples,
-            self.active_deviation
+            "  {topic} {field}: shadow − active: rms {rms:.4} {unit}, mean {mean:+.4}, max {max:.4} at tick {max_tick} \
+             ({samples} samples; the active deviates by {active_deviation:.4})"
         )
     }
 }
 
 impl fmt::Display for Step {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { topic, field, unit, step, step_before, .. } = self;
         write!(
             f,
-            "    {} {}: step {:.4} {} at the take-over, {:.4} one sample earlier",
-            self.topic, self.field, self.step, self.unit, self.step_before
+            "    {topic} {field}: step {step:.4} {unit} at the take-over, {step_before:.4} one sample earlier"
         )?;
         match self.law_difference {
             Some(difference) => write!(f, "; the new law asked for {difference:.4} otherwise there"),

@@ -1,7 +1,7 @@
 //! States of vehicles over time, read from a recording.
 
 use anyhow::Result;
-use flights::state::VehicleState;
+use flights::state::{VehicleState, WindowEndErrors};
 use recorder::reader::Recording;
 use recorder::series::Series;
 
@@ -49,6 +49,21 @@ impl Track {
             angular_velocity_B_rad_s: std::array::from_fn(|axis| field(10 + axis)),
         })
     }
+}
+
+/// The errors of simulated states against measured ones at `times_ns`, where both have a state.
+pub(crate) fn errors_at(
+    simulated: &Track,
+    measured: &Track,
+    times_ns: impl Iterator<Item = u64>,
+) -> WindowEndErrors {
+    let mut errors = WindowEndErrors::default();
+    for time_ns in times_ns {
+        if let (Some(simulated), Some(measured)) = (simulated.at(time_ns), measured.at(time_ns)) {
+            errors.add(&simulated, &measured);
+        }
+    }
+    errors
 }
 
 /// The first `fields` fields of the states of all `topics`, read in one pass.

@@ -95,15 +95,13 @@ impl Summary {
         let Judgement { pass, compare, steps, shadows } = judgement;
         let ticks_per_s = f64::from(outcome.ticks) / outcome.host_s.max(1e-9);
         let held = pass.iter().all(|verdict| verdict.passed) && compare.iter().all(|errors| errors.passed);
-        let all_joined =
-            outcome.successions.iter().all(|report| !report.is_planned || report.refused.is_none());
         let steps = steps.into_iter().chain(std::iter::repeat_with(Vec::new));
         let successions = outcome.successions.into_iter().zip(steps);
-        let successions = successions.map(|(report, steps)| Succession { report, steps }).collect();
+        let successions: Vec<_> = successions.map(|(report, steps)| Succession { report, steps }).collect();
         let processes = outcome.processes.into_iter();
         Self {
             manifest,
-            passed: held && all_joined && !outcome.was_stopped,
+            passed: held && !successions.iter().any(Succession::has_failed) && !outcome.was_stopped,
             ticks: outcome.ticks,
             simulated_s: f64::from(outcome.ticks) * tick_s,
             host_s: outcome.host_s,
@@ -122,6 +120,29 @@ impl Summary {
             warnings: Vec::new(),
         }
     }
+
+    /// The replacements as text; those that were refused are never left out.
+    fn write_successions(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let mut left_out = 0;
+        for (index, succession) in self.successions.iter().enumerate() {
+            if index < SUCCESSIONS_SHOWN || succession.report.refused.is_some() {
+                writeln!(f, "{succession}")?;
+            } else {
+                left_out += 1;
+            }
+        }
+        match left_out {
+            0 => Ok(()),
+            more => writeln!(f, "  … and {more} more; --json has them all"),
+        }
+    }
+}
+
+impl Succession {
+    /// Whether it was planned and did not come about, which fails the run.
+    fn has_failed(&self) -> bool {
+        self.report.is_planned && self.report.refused.is_some()
+    }
 }
 
 impl fmt::Display for Summary {
@@ -137,45 +158,16 @@ impl fmt::Display for Summary {
         if self.missed_deadlines > 0 {
             writeln!(f, "  {} deadlines missed", self.missed_deadlines)?;
         }
-        let shares: Vec<String> = self
-            .processes
-            .iter()
-            .map(|process| format!("{} {:.0} %", process.name, process.cpu_share * 100.0))
-            .collect();
-        writeln!(f, "  cpu: {}", shares.join(", "))?;
+        let share = |process: &ProcessSummary| format!("{} {:.0} %", process.name, process.cpu_share * 100.0);
+        writeln!(f, "  cpu: {}", self.processes.iter().map(share).collect::<Vec<_>>().join(", "))?;
         self.write_successions(f)?;
         self.shadows.iter().try_for_each(|difference| writeln!(f, "{difference}"))?;
-        self.compare.iter().try_for_each(|errors| writeln!(f, "{}", DisplayErrors(errors)))?;
-        self.pass.iter().try_for_each(|verdict| writeln!(f, "{}", DisplayVerdict(verdict)))?;
+        self.compare.iter().try_for_each(|errors| writeln!(f, "{errors}"))?;
+        self.pass.iter().try_for_each(|verdict| writeln!(f, "{verdict}"))?;
         if let Some(recording) = &self.recording {
             writeln!(f, "  recording: {}", recording.display())?;
         }
-        self.write_verdict(f)
-    }
-}
-
-impl Summary {
-    /// Those that were refused are never left out.
-    fn write_successions(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let is_shown = |&(index, succession): &(usize, &Succession)| {
-            index < SUCCESSIONS_SHOWN || succession.report.refused.is_some()
-        };
-        let mut shown = 0;
-        for (_, succession) in self.successions.iter().enumerate().filter(is_shown) {
-            writeln!(f, "  {}", DisplayReport(&succession.report))?;
-            succession.steps.iter().try_for_each(|step| writeln!(f, "{step}"))?;
-            shown += 1;
-        }
-        match self.successions.len() - shown {
-            0 => Ok(()),
-            more => writeln!(f, "  … and {more} more; --json has them all"),
-        }
-    }
-
-    fn write_verdict(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let is_refused =
-            |succession: &&Succession| succession.report.is_planned && succession.report.refused.is_some();
-        let refused = self.successions.iter().filter(is_refused).count();
+        let refused = self.successions.iter().filter(|succession| succession.has_failed()).count();
         match (self.passed, refused) {
             (true, _) => write!(f, "passed"),
             (false, 0) => write!(f, "FAILED"),
@@ -185,18 +177,16 @@ impl Summary {
     }
 }
 
-struct DisplayReport<'a>(&'a Report);
-
-impl fmt::Display for DisplayReport<'_> {
+impl fmt::Display for Succession {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let report = self.0;
+        let report = &self.report;
         let purpose = match report.purpose {
             Purpose::Swap => "swap",
             Purpose::Standby => "standby",
             Purpose::Shadow => "shadow",
             Purpose::Restart => "restart",
         };
-        write!(f, "{purpose} of `{}`", report.process)?;
+        write!(f, "  {purpose} of `{}`", report.process)?;
         match (report.join_tick, report.take_over_tick, report.purpose) {
             (_, Some(take_over), Purpose::Restart) => write!(f, " at tick {take_over}")?,
             (Some(join), Some(take_over), _) => {
@@ -209,56 +199,14 @@ impl fmt::Display for DisplayReport<'_> {
             write!(f, ", handed over: {hand_over}")?;
         }
         if report.join_tick.is_some() {
-            write!(
-                f,
-                " (started in {:.1} ms, held the clock for {:.1} ms)",
-                report.start_ms, report.hold_ms
-            )?;
+            let (start_ms, hold_ms) = (report.start_ms, report.hold_ms);
+            write!(f, " (started in {start_ms:.1} ms, held the clock for {hold_ms:.1} ms)")?;
         }
-        match &report.refused {
-            Some(reason) => {
-                // Its last words stand below how it ended.
-                let lines: Vec<&str> = reason.lines().map(str::trim).take(3).collect();
-                write!(f, ": REFUSED: {}", lines.join("; "))
-            }
-            None => Ok(()),
+        if let Some(reason) = &report.refused {
+            // Its last words stand below how it ended.
+            let lines: Vec<&str> = reason.lines().map(str::trim).take(3).collect();
+            write!(f, ": REFUSED: {}", lines.join("; "))?;
         }
-    }
-}
-
-struct DisplayErrors<'a>(&'a WindowErrors);
-
-impl fmt::Display for DisplayErrors<'_> {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let errors = self.0;
-        write!(
-            f,
-            "  {} after {} s (RMS over {} windows): position {:.4} m, velocity {:.4} m/s, attitude {:.3} deg{}",
-            errors.simulated,
-            errors.window_s,
-            errors.windows,
-            errors.position_rms_m,
-            errors.velocity_rms_m_s,
-            errors.attitude_rms_deg,
-            if errors.passed { "" } else { "  FAILED" }
-        )
-    }
-}
-
-struct DisplayVerdict<'a>(&'a Verdict);
-
-impl fmt::Display for DisplayVerdict<'_> {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let verdict = self.0;
-        let values: Vec<String> = verdict.values.iter().map(|value| format!("{value:.4}")).collect();
-        let values = if values.is_empty() { "no samples".to_owned() } else { values.join(" … ") };
-        let limit = match (verdict.min, verdict.max) {
-            (Some(min), Some(max)) => format!("{min} … {max}"),
-            (Some(min), None) => format!("at least {min}"),
-            (None, Some(max)) => format!("at most {max}"),
-            (None, None) => "no limit".to_owned(),
-        };
-        let mark = if verdict.passed { "ok    " } else { "FAILED" };
-        write!(f, "  {mark} {}: {values} {} ({limit})", verdict.name, verdict.unit)
+        self.steps.iter().try_for_each(|step| write!(f, "\n{step}"))
     }
 }

@@ -52,7 +52,7 @@ impl Validation<'_> {
         for vehicle in vehicles {
             Vehicle::load(vehicle)?;
         }
-        require_own_folders(flights)?;
+        require_distinct_folders(flights)?;
         let scratch = if self.keep.is_none() { Some(Scratch::create()?) } else { None };
         let folder = self.keep.or(scratch.as_ref().map(Scratch::path)).context("no folder to fly in")?;
         let mut errors = Errors { vehicles: labels(vehicles), flights: Vec::new() };
@@ -61,7 +61,7 @@ impl Validation<'_> {
                 .with_context(|| format!("the flight `{}` cannot be replayed", flight.name))?;
             let (host_s, recording) = replay
                 .fly(self.components, self.stop, tell)
-                .with_context(|| not_flown(flight, self.keep.map(|_| replay.folder())))?;
+                .with_context(|| not_flown(flight, self.keep.map(|_| replay.folder.as_path())))?;
             let flown = windows::flight_errors(flight, &replay, &recording, vehicles.len())?;
             tell(&format!("{}: {:.1} s flown in {host_s:.1} s", flight.name, replay.duration_s()));
             errors.flights.push(flown);
@@ -79,11 +79,11 @@ fn not_flown(flight: &Flight, kept: Option<&Path>) -> String {
 }
 
 /// Refuses two flights whose files would lie in one folder.
-fn require_own_folders(set: &FlightSet) -> Result<()> {
+fn require_distinct_folders(set: &FlightSet) -> Result<()> {
     let mut folders = BTreeMap::new();
     for Flight { name, .. } in &set.flights {
-        if let Some(other) = folders.insert(replay::file_name(name), name) {
-            let folder = replay::file_name(name);
+        let folder = replay::file_name(name);
+        if let Some(other) = folders.insert(folder.clone(), name) {
             bail!("the flights `{other}` and `{name}` would both be kept in the folder {folder}: rename one");
         }
     }
@@ -92,10 +92,8 @@ fn require_own_folders(set: &FlightSet) -> Result<()> {
 
 /// What reports call the vehicles: the names of their files, or the whole paths where the names are the same.
 fn labels(vehicles: &[&Path]) -> Vec<String> {
-    let stems: Vec<String> = vehicles
-        .iter()
-        .map(|path| path.file_stem().unwrap_or_default().to_string_lossy().into_owned())
-        .collect();
+    let stem = |path: &&Path| path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+    let stems: Vec<String> = vehicles.iter().map(stem).collect();
     match &stems[..] {
         [one, other] if one == other => vehicles.iter().map(|path| path.display().to_string()).collect(),
         _ => stems,

@@ -66,13 +66,12 @@ impl HorizonErrors {
     fn json(&self, vehicles: &[String]) -> Value {
         let mut value = json!({ "windows": self.windows, "left_out": self.left_out });
         for channel in &self.channels {
-            let rms = vehicles.iter().cloned().zip(channel.rms.iter().map(|rms| json!(rms)));
-            let mut entry: Map<String, Value> =
-                [("unit".to_owned(), json!(channel.quantity.unit()))].into_iter().chain(rms).collect();
+            let entry = &mut value[channel.quantity.name()];
+            entry["unit"] = json!(channel.quantity.unit());
+            vehicles.iter().zip(&channel.rms).for_each(|(vehicle, rms)| entry[vehicle.as_str()] = json!(rms));
             if let Some(ratio) = channel.ratio() {
-                entry.insert("ratio".to_owned(), json!(ratio));
+                entry["ratio"] = json!(ratio);
             }
-            value[channel.quantity.name()] = Value::Object(entry);
         }
         value
     }
@@ -90,25 +89,36 @@ impl Errors {
         };
         json!({ "flights": self.flights.iter().map(flight).collect::<Map<_, _>>() })
     }
+
     fn cells(&self) -> Cells {
-        let own = ["flight", "role", "horizon", "windows", "channel"].map(str::to_owned);
+        let first = ["flight", "role", "horizon", "windows", "channel"].map(str::to_owned);
         let ratio = (self.vehicles.len() == 2).then(|| "ratio".to_owned());
-        let headings: Vec<String> = own.into_iter().chain(self.vehicles.clone()).chain(ratio).collect();
+        let headings: Vec<String> = first.into_iter().chain(self.vehicles.clone()).chain(ratio).collect();
         let is_number = (0..headings.len()).map(|column| !matches!(column, 0 | 1 | 4)).collect();
-        let rows = self.flights.iter().flat_map(|flight| {
-            flight.horizons.iter().flat_map(move |horizon| {
-                horizon.channels.iter().map(move |channel| row(flight, horizon, channel))
-            })
-        });
-        Cells { headings, is_number, rows: rows.collect() }
+        let mut rows = Vec::new();
+        for flight in &self.flights {
+            for horizon in &flight.horizons {
+                rows.extend(horizon.channels.iter().map(|channel| row(flight, horizon, channel)));
+            }
+        }
+        Cells { headings, is_number, rows }
     }
 }
 
 impl fmt::Display for Errors {
-    /// A line for each flight, horizon and channel.
+    /// A line for each flight, horizon and channel, and how many windows of a flight do not count.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{}", self.cells())?;
-        self.flights.iter().try_for_each(|flight| write_left_out(f, flight))
+        for flight in &self.flights {
+            let horizons = flight.horizons.iter().filter(|horizon| horizon.left_out > 0);
+            let counts = horizons.map(|horizon| format!("{} of {} s", horizon.left_out, horizon.horizon()));
+            let counts = counts.collect::<Vec<_>>().join(", ");
+            if !counts.is_empty() {
+                let name = &flight.name;
+                writeln!(f, "{name}: not counted, at the start or at gaps in what was measured: {counts}")?;
+            }
+        }
+        Ok(())
     }
 }
 
@@ -117,46 +127,27 @@ fn row(flight: &FlightErrors, horizon: &HorizonErrors, channel: &ChannelErrors) 
         Role::Fit => "fit",
         Role::Test => "test",
     };
-    let own = [
+    let mut row = vec![
         flight.name.clone(),
         role.to_owned(),
         format!("{} s", horizon.horizon()),
         horizon.windows.to_string(),
         format!("{}, {}", channel.quantity.name(), channel.quantity.unit()),
     ];
-    let ratio = channel.ratio().map(|ratio| format!("{ratio:.3}"));
-    own.into_iter().chain(channel.rms.iter().map(|rms| short(*rms))).chain(ratio).collect()
-}
-
-/// Says how many windows of a flight do not count.
-fn write_left_out(f: &mut fmt::Formatter<'_>, flight: &FlightErrors) -> fmt::Result {
-    let counts: Vec<String> = flight
-        .horizons
-        .iter()
-        .filter(|horizon| horizon.left_out > 0)
-        .map(|horizon| format!("{} of {} s", horizon.left_out, horizon.horizon()))
-        .collect();
-    if counts.is_empty() {
-        return Ok(());
-    }
-    writeln!(
-        f,
-        "{}: not counted, at the start or at gaps in what was measured: {}",
-        flight.name,
-        counts.join(", ")
-    )
+    row.extend(channel.rms.iter().map(|rms| short(*rms)));
+    row.extend(channel.ratio().map(|ratio| format!("{ratio:.3}")));
+    row
 }
 
 /// A number with three digits that count.
 fn short(number: f64) -> String {
     match number.abs() {
-        size if !size.is_finite() => number.to_string(),
-        size if size >= 100.0 => format!("{number:.0}"),
-        size if size >= 10.0 => format!("{number:.1}"),
-        size if size >= 1.0 => format!("{number:.2}"),
-        size if size >= 0.1 => format!("{number:.3}"),
-        size if size >= 0.01 => format!("{number:.4}"),
-        _ => format!("{number:.2e}"),
+        size if (0.01..1e308).contains(&size) => {
+            let decimals = [100.0, 10.0, 1.0, 0.1].iter().filter(|limit| size < **limit).count();
+            format!("{number:.decimals$}")
+        }
+        size if size.is_finite() => format!("{number:.2e}"),
+        _ => number.to_string(),
     }
 }
 
@@ -185,9 +176,9 @@ mod tests {
         let text = two().to_string();
         let lines: Vec<&str> = text.lines().collect();
         assert_eq!(lines.len(), 3, "{text}");
-        let words = |line: usize| lines[line].split_whitespace().collect::<Vec<_>>();
-        assert_eq!(words(0), ["flight", "role", "horizon", "windows", "channel", "old", "new", "ratio"]);
-        assert_eq!(words(1), ["loop", "test", "0.1", "s", "7", "position,", "m", "0.500", "0.250", "0.500"]);
+        let cells = |line: usize| lines[line].split_whitespace().collect::<Vec<_>>();
+        assert_eq!(cells(0), ["flight", "role", "horizon", "windows", "channel", "old", "new", "ratio"]);
+        assert_eq!(cells(1), ["loop", "test", "0.1", "s", "7", "position,", "m", "0.500", "0.250", "0.500"]);
         assert!(lines[2].contains("2 of 0.1 s"), "{text}");
     }
 

@@ -44,10 +44,10 @@ const VEHICLES: [&str; 2] = ["first", "second"];
 #[derive(Debug)]
 pub struct Replay {
     /// Where its files are.
-    folder: PathBuf,
+    pub folder: PathBuf,
     manifest: ManifestBuilder,
     /// The moment of the flight at which tick 0 lies.
-    start_s: f64,
+    pub start_s: f64,
     /// Ticks of the run.
     ticks: u32,
     /// Held so that no other command writes to the folder.
@@ -96,28 +96,18 @@ impl Replay {
         tell: &mut dyn FnMut(&str),
     ) -> Result<(f64, Recording)> {
         let manifest = self.manifest.build(&self.folder.join(MANIFEST), components)?;
-        let launcher =
-            Launcher::new(Host::this_binary()).stopped_by(stop).adopting_orphans().followed_by(|event| {
-                if let RunEvent::Note(text) = event {
-                    tell(text);
-                }
-            });
+        let launcher = Launcher::new(Host::this_binary()).stopped_by(stop).adopting_orphans();
+        let launcher = launcher.followed_by(|event| {
+            if let RunEvent::Note(text) = event {
+                tell(text);
+            }
+        });
         let (outcome, recording) = launcher.fly(&manifest, &self.folder.join(RECORDING))?;
         let recording = recording.context("it was not recorded")?;
         if outcome.was_stopped {
             bail!("it was stopped after {} of {} ticks", outcome.ticks, self.ticks);
         }
         Ok((outcome.host_s, recording))
-    }
-
-    /// Where its files are.
-    pub fn folder(&self) -> &Path {
-        &self.folder
-    }
-
-    /// The moment of the flight at which tick 0 lies, in seconds.
-    pub fn start_s(&self) -> f64 {
-        self.start_s
     }
 
     /// How long the run is, in seconds.
@@ -151,13 +141,14 @@ fn manifest(ticks: u32, columns: &str, initial: [f64; 4], vehicles: &[&Path]) ->
         let vehicle = std::path::absolute(vehicle)?.display().to_string();
         for horizon_ms in HORIZONS_MS {
             let plant = format!("process.{}", plant(number, horizon_ms));
+            let command = format!("{plant}.inputs.command");
             manifest = manifest
                 .set(&format!("{plant}.kind"), "plant")
                 .set(&format!("{plant}.vehicle"), vehicle.as_str())
                 .set(&format!("{plant}.parameters.window_s"), f64::from(horizon_ms) * 1e-3)
-                .set(&format!("{plant}.inputs.command.topic"), "/player/command")
-                .set(&format!("{plant}.inputs.command.delay_ticks"), 1)
-                .set(&format!("{plant}.inputs.command.initial.command"), initial.to_vec())
+                .set(&format!("{command}.topic"), "/player/command")
+                .set(&format!("{command}.delay_ticks"), 1)
+                .set(&format!("{command}.initial.command"), initial.to_vec())
                 .set(&format!("{plant}.inputs.measured"), MEASURED)
                 .set(&format!("{plant}.outputs.state.every_ticks"), every);
         }

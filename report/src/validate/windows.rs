@@ -2,7 +2,7 @@
 
 use super::errors::{ChannelErrors, FlightErrors, HorizonErrors};
 use super::replay::{HORIZONS_MS, MEASURED, Replay, plant};
-use crate::states::{FIELDS_OF_STATE, Track, tracks};
+use crate::states::{FIELDS_OF_STATE, Track, errors_at, tracks};
 use anyhow::Result;
 use flights::state::{StateQuantity, WindowEndErrors};
 use flights::{Channel, Flight};
@@ -51,23 +51,14 @@ fn horizon_errors(
     let ends: Vec<u64> = (1..=last_ns / window_ns).map(|number| number * window_ns).collect();
     let is_whole = |end_ns: u64| {
         let begin_ns = end_ns - window_ns;
-        let (from_s, to_s) =
-            (replay.start_s() + begin_ns as f64 * 1e-9, replay.start_s() + end_ns as f64 * 1e-9);
+        let [from_s, to_s] = [begin_ns, end_ns].map(|ns| replay.start_s + ns as f64 * 1e-9);
         // Of the gaps that begin before the window's end, the one that ends last.
         let begun = gaps.partition_point(|gap| gap.0 < to_s);
         begin_ns >= SETTLE_NS && !begun.checked_sub(1).is_some_and(|last| from_s < gaps[last].1)
     };
     let counted: Vec<u64> = ends.iter().copied().filter(|end_ns| is_whole(*end_ns)).collect();
-    let errors_of = |track: &Track| {
-        let mut errors = WindowEndErrors::default();
-        for end_ns in &counted {
-            if let (Some(simulated), Some(measured)) = (track.at(*end_ns), measured.at(*end_ns)) {
-                errors.add(&simulated, &measured);
-            }
-        }
-        errors
-    };
-    let errors: Vec<WindowEndErrors> = simulated.iter().map(errors_of).collect();
+    let errors = simulated.iter().map(|track| errors_at(track, measured, counted.iter().copied()));
+    let errors: Vec<WindowEndErrors> = errors.collect();
     let channel = |quantity: StateQuantity| ChannelErrors {
         quantity,
         rms: errors.iter().map(|errors| errors.rms(quantity)).collect(),
@@ -84,14 +75,10 @@ fn horizon_errors(
 /// The gaps of all measured channels of the state, in seconds of the flight, by when they begin; each with the end of the
 /// longest so far, as there can be as many as rows.
 fn gaps(flight: &Flight) -> Vec<(f64, f64)> {
-    let attitude = if flight.assumed.is_empty() { channel_gaps(&flight.attitude) } else { Vec::new() };
-    let mut gaps = [
-        channel_gaps(&flight.position),
-        channel_gaps(&flight.velocity),
-        attitude,
-        channel_gaps(&flight.angular_velocity),
-    ]
-    .concat();
+    let mut gaps = [&flight.position, &flight.velocity, &flight.angular_velocity].map(channel_gaps).concat();
+    if flight.assumed.is_empty() {
+        gaps.extend(channel_gaps(&flight.attitude));
+    }
     gaps.sort_by(|a, b| a.0.total_cmp(&b.0));
     let mut last_s = f64::NEG_INFINITY;
     for gap in &mut gaps {
