@@ -6,6 +6,7 @@
 use crate::process_table::{children, run_dir_of};
 use crate::run_dir::run_of_dir;
 use crate::watch_clock::WatchClock;
+use bus::host_time::monotonic_ns;
 use rustix::process::{
     Pid, Signal, WaitOptions, child_subreaper, kill_process, set_child_subreaper, waitpid,
 };
@@ -68,7 +69,8 @@ impl Descendants {
 
 impl Drop for Descendants {
     fn drop(&mut self) {
-        let clock = WatchClock::new();
+        let now = || Duration::from_nanos(monotonic_ns());
+        let mut clock = WatchClock::new(now());
         let mut asked: Vec<Pid> = Vec::new();
         // Each that ends may leave children of its own, which are this process's then.
         while clock.now() < 2 * GRACE {
@@ -88,7 +90,7 @@ impl Drop for Descendants {
                 }
             }
             std::thread::sleep(POLL);
-            clock.look();
+            clock.look(now());
         }
         if !self.was_reaper {
             let _ = set_child_subreaper(None);

@@ -7,26 +7,20 @@ use crate::event::{RunEvent, StopToken};
 use crate::flight::Flight;
 use crate::graph::Graph;
 use crate::host::Host;
+use crate::host_world::HostWorld;
 use crate::manifest::Manifest;
 use crate::outputs::Outputs;
-use crate::overseer::Overseer;
-use crate::processes::Processes;
-use crate::replacement::{Replacements, Report};
+use crate::replacement::Report;
 use crate::run_dir::RunDir;
-use crate::sidecars::Sidecars;
-use crate::supervision::{Supervisor, Timing};
-use crate::supervisor::State;
-use crate::view::View;
-use crate::watch_clock::WatchClock;
+use crate::supervision::Supervisor;
 use anyhow::{Context, Result, bail};
 use bus::lockstep::SupervisorView;
 use bus::plan::Plan;
 use recorder::reader::Recording;
-use std::collections::BTreeSet;
+use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, channel};
-use std::time::Duration;
 
 /// What is known about a run when it is over.
 #[derive(Debug)]
@@ -143,42 +137,20 @@ impl<'a> Launcher<'a> {
         let graph = &*graph;
         let control = Arc::new(SupervisorView::create(&graph.plan)?);
         let (plan, dir) = (&graph.plan, run_dir.path());
-        let clock = WatchClock::new();
-        let exe = match &self.host {
-            Host::Exe(exe) => exe.clone(),
-            Host::InProcess => Path::new("").to_owned(),
-        };
         // Dropped behind the supervisor, which ends the processes.
         let descendants = self.adopts_orphans.then(|| Descendants::of_run(dir));
-        let view = View::of(plan, &control, BTreeSet::new(), [Duration::ZERO; 2]);
-        let mut supervisor = Supervisor {
-            plan,
-            control: &control,
-            processes: Processes::new(self.host, control.clone()),
-            sidecars: Sidecars::new(&exe, dir, &clock),
-            clock: &clock,
-            spent: vec![(0, 0); plan.nodes.len()],
-            overseer: Overseer {
-                plan,
-                state: State::Starting,
-                replacements: Replacements::new(plan, view, &graph.programs, &graph.backups),
-                notes: Vec::new(),
-                has_answered: false,
-            },
-            control_server: ControlServer::open(dir, plan, &control, self.remote, self.requests)?,
-            swaps: Vec::new(),
-            requests: 0,
-            stop: &self.stop,
-            seen_stops: 0,
+        let world = HostWorld {
+            host: self.host,
             manifest,
-            graph,
-            on: &mut self.on,
+            plan,
+            control_server: ControlServer::open(dir, plan, &control, self.remote, self.requests)?,
+            control: control.clone(),
             run_dir: dir,
             descendants: descendants.as_ref(),
-            timing: Timing::default(),
+            sockets: BTreeMap::new(),
         };
-        supervisor.fly()?;
-        supervisor.tell_progress();
+        let mut supervisor = Supervisor::new(graph, world, &self.stop, &mut self.on);
+        supervisor.fly(manifest.content.run.start_order_seed)?;
         let mut outcome = outcome(plan, &control, &supervisor);
         outcome.successions = supervisor.overseer.replacements.into_reports();
         if plan.profile {
@@ -234,7 +206,7 @@ fn prepare(manifest: &Manifest, graph: &mut Graph, recording: Option<&Path>, run
     Ok(())
 }
 
-fn outcome(plan: &Plan, control: &SupervisorView, supervisor: &Supervisor<'_>) -> Outcome {
+fn outcome(plan: &Plan, control: &SupervisorView, supervisor: &Supervisor<'_, HostWorld<'_>>) -> Outcome {
     let (start_ns, end_ns) = control.host_span_ns();
     let host_s = end_ns.saturating_sub(start_ns) as f64 * 1e-9;
     let share = |cpu_ns: u64| if host_s > 0.0 { cpu_ns as f64 * 1e-9 / host_s } else { 0.0 };

@@ -9,6 +9,7 @@ pub mod event;
 pub mod flight;
 pub mod graph;
 pub mod host;
+mod host_world;
 pub mod launcher;
 pub mod manifest;
 pub mod output_file;
@@ -33,6 +34,7 @@ mod supervision;
 mod supervisor;
 mod view;
 mod watch_clock;
+mod world;
 
 use bus::{BusError, Join};
 use registry::Registry;

@@ -15,18 +15,17 @@ pub struct Death {
     /// What it was for.
     pub role: Role,
     /// How it ended, with the last lines that it wrote.
-    pub words: String,
+    pub message: String,
 }
 
-/// Why the run ends at once, in words.
+/// Why the run ends at once.
 #[derive(Clone, Debug)]
 pub struct Abort(pub String);
 
 /// Decides what follows: the states of the run, and those of its replacements.
 #[derive(Debug)]
 pub struct Overseer<'a> {
-    /// The plan of the run.
-    pub plan: &'a Plan,
+    plan: &'a Plan,
     /// Where the run stands.
     pub state: State,
     /// Who replaces whom.
@@ -37,12 +36,17 @@ pub struct Overseer<'a> {
     pub has_answered: bool,
 }
 
-impl Overseer<'_> {
+impl<'a> Overseer<'a> {
+    /// Decides for the run of `plan`, which begins.
+    pub fn new(plan: &'a Plan, replacements: Replacements<'a>) -> Self {
+        Self { plan, state: State::Starting, replacements, notes: Vec::new(), has_answered: false }
+    }
+
     /// Whether an end without an error is one in good order.
     pub fn has_done_its_part(&self, role: Role) -> bool {
         match role {
             Role::Sidecar { .. } => true,
-            Role::Clock => self.replacements.view.completed_ticks() >= self.replacements.view.end_tick(),
+            Role::Clock => self.replacements.view.completed_ticks() >= self.replacements.view.end_tick,
             Role::Node { node, generation } => {
                 let has_completed = self.replacements.view.has_completed(self.plan.slot(node, generation));
                 match self.replacements.role(node, generation) {
@@ -58,7 +62,7 @@ impl Overseer<'_> {
 
     /// Notes that ticks are granted.
     pub fn note_gathered(&mut self) {
-        if self.state == State::Gathering && self.replacements.view.phase() == Phase::Running {
+        if self.state == State::Gathering && self.replacements.view.phase == Phase::Running {
             self.tell(Event::Gathered);
             if self.replacements.view.is_stop_requested {
                 self.tell(Event::StopRequested);
@@ -84,7 +88,7 @@ impl Overseer<'_> {
         let Role::Node { node, generation } = death.role else {
             let ticks = self.replacements.view.completed_ticks();
             self.tell(Event::Died { policy: OnExit::Stop, is_possible: false });
-            return Err(Abort(format!("{}\nThe run was aborted at tick {ticks}", death.words)));
+            return Err(Abort(format!("{}\nThe run was aborted at tick {ticks}", death.message)));
         };
         if self.replacements.has_taken_over(node) {
             if !self.replacements.all_agree() {
@@ -108,10 +112,10 @@ impl Overseer<'_> {
                     return Ok(false);
                 }
                 if self.tell(Event::BackupFailed) == Action::Refuse {
-                    let tick = self.replacements.view.done(self.plan.slot(node, generation));
+                    let tick = self.replacements.view.slots[self.plan.slot(node, generation)].done;
                     let reason = match self.replacements.stage(node) {
-                        Some(Stage::Starting) => format!("{} (it had not joined yet)", death.words),
-                        _ => format!("{} (it had come to tick {tick})", death.words),
+                        Some(Stage::Starting) => format!("{} (it had not joined yet)", death.message),
+                        _ => format!("{} (it had come to tick {tick})", death.message),
                     };
                     self.refuse(node, reason)?;
                 }
@@ -124,13 +128,14 @@ impl Overseer<'_> {
     /// Whether a process had completed its last tick when it died, and need not be missed by its node's policy: all that
     /// it had to send is sent, and there is nothing left that another could do in its place.
     fn has_died_behind_the_end(&self, node: usize, generation: u32) -> bool {
-        self.replacements.view.phase() == Phase::Running
+        self.replacements.view.phase == Phase::Running
             && self.replacements.program(node).on_exit != OnExit::Stop
             && self.replacements.view.has_completed(self.plan.slot(node, generation))
     }
 
     fn say_died_behind_the_end(&mut self, death: &Death) {
-        self.notes.push(format!("{}\nIt had completed its last tick: the run ends without it", death.words));
+        self.notes
+            .push(format!("{}\nIt had completed its last tick: the run ends without it", death.message));
     }
 
     fn refuse(&mut self, node: usize, reason: String) -> Result<(), Abort> {
@@ -157,7 +162,7 @@ impl Overseer<'_> {
         }
         // It may have flown for a while before anybody looked.
         self.note_gathered();
-        let flies = self.replacements.view.phase() == Phase::Running;
+        let flies = self.replacements.view.phase == Phase::Running;
         let on_exit = self.replacements.program(node).on_exit;
         if self.has_died_behind_the_end(node, generation) {
             self.say_died_behind_the_end(death);
@@ -184,13 +189,13 @@ impl Overseer<'_> {
                 if self.replacements.stage(node).is_some() {
                     self.refuse(node, "the process it was to succeed died first".to_owned())?;
                 }
-                self.notes.push(format!("{}\n`{}` is restarted at tick {tick}", death.words, death.name));
+                self.notes.push(format!("{}\n`{}` is restarted at tick {tick}", death.message, death.name));
                 self.replacements.restart(node);
             }
             Action::Promote => {
                 self.notes.push(format!(
                     "{}\nThe standby of `{}` takes over at tick {tick}",
-                    death.words, self.plan.nodes[node].name
+                    death.message, self.plan.nodes[node].name
                 ));
                 self.replacements.promote(node);
             }
@@ -206,7 +211,7 @@ impl Overseer<'_> {
                 let silent = silent_topics(&self.plan.nodes[node], self.plan);
                 return Err(Abort(format!(
                     "{}\nThe run was aborted at tick {tick}{silent}{why}",
-                    death.words
+                    death.message
                 )));
             }
         }

@@ -14,6 +14,8 @@ pub enum Role {
     },
     /// A process that takes no part in the ticks.
     Sidecar {
+        /// Its number among the sidecars of the run.
+        index: usize,
         /// Counts the processes of this sidecar.
         generation: u32,
     },
@@ -24,7 +26,7 @@ impl Role {
     pub fn generation(self) -> u32 {
         match self {
             Self::Clock => 0,
-            Self::Node { generation, .. } | Self::Sidecar { generation } => generation,
+            Self::Node { generation, .. } | Self::Sidecar { generation, .. } => generation,
         }
     }
 }

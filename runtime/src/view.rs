@@ -1,9 +1,9 @@
 //! What the supervisor sees of a run, and what it commands.
 
 use crate::program::BackupSpec;
-use bus::lockstep::{Phase, SlotState, SupervisorView, TransferOutcome};
+use bus::lockstep::{LiveView, Phase, SlotState, TransferOutcome};
 use bus::membership::Membership;
-use bus::plan::{Plan, SLOTS_PER_NODE};
+use bus::plan::{InputPlan, Pace, Plan, SLOTS_PER_NODE};
 use std::collections::BTreeSet;
 use std::time::Duration;
 
@@ -44,6 +44,15 @@ pub enum Command {
         /// Its slot.
         slot: usize,
     },
+    /// Write a membership.
+    Store(Box<Membership>),
+    /// Write to the control segment.
+    Write(SegmentWrite),
+}
+
+/// What is written to the control segment.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum SegmentWrite {
     /// Clear a slot for another instance.
     Clear(usize),
     /// State what a slot holds.
@@ -52,12 +61,14 @@ pub enum Command {
     FirstTick(usize, u32),
     /// Have the shadow samples of a topic begin at a tick.
     StartShadow(usize, u32),
-    /// Write a membership.
-    Store(Box<Membership>),
     /// Make this membership the newest one.
     Publish(u32),
+    /// Have the clock wait at this tick for those who join; `u32::MAX` for none.
+    JoinTick(u32),
     /// Have the clock end the run at the next tick boundary.
     RequestStop,
+    /// End the run at once: every wait returns.
+    Abort,
 }
 
 /// What is seen of a slot.
@@ -73,6 +84,8 @@ pub struct SlotView {
     pub acknowledged: u32,
     /// What it goes on from.
     pub transfer: TransferOutcome,
+    /// Whether it sleeps until the other instance of its node has come as far as it must.
+    pub awaits_other: bool,
 }
 
 impl SlotView {
@@ -83,6 +96,7 @@ impl SlotView {
         done: 0,
         acknowledged: 0,
         transfer: TransferOutcome::Unknown,
+        awaits_other: false,
     };
 }
 
@@ -91,16 +105,28 @@ impl SlotView {
 pub struct View {
     /// Time on the watchdogs' clock.
     pub now: Duration,
-    /// Host time, for reports.
+    /// Host time.
     pub host: Duration,
+    /// Host time of the first grant; zero until then.
+    pub first_grant: Duration,
     /// How far the first instances have joined.
     pub phase: Phase,
+    /// The pace at which the clock grants ticks.
+    pub pace: Pace,
+    /// Ticks that may be computed.
+    pub granted: u32,
     /// The tick at which the clock waits.
     pub held_at: Option<u32>,
+    /// The tick at which a user wants the clock to wait; `u32::MAX` if nobody does.
+    pub hold_tick: u32,
+    /// Whether the clock has to act next.
+    pub awaits_clock: bool,
     /// The tick at which the run ends.
     pub end_tick: u32,
     /// Whether a stop was asked for.
     pub is_stop_requested: bool,
+    /// Whether the run was aborted.
+    pub is_aborted: bool,
     /// The number of the newest membership.
     pub epoch: u32,
     /// Per topic: ticks whose sample has been sent.
@@ -114,13 +140,8 @@ pub struct View {
 }
 
 impl View {
-    /// What `control` shows of the run of `plan`.
-    pub fn of(
-        plan: &Plan,
-        control: &SupervisorView,
-        living: BTreeSet<(usize, u32)>,
-        [now, host]: [Duration; 2],
-    ) -> Self {
+    /// What `control` shows of the run of `plan`; who lives, and the time, is for others to say.
+    pub fn of(plan: &Plan, control: &LiveView) -> Self {
         let phase = |slot| {
             let phases = [Phase::Running, Phase::Connecting];
             phases.into_iter().find(|&phase| control.is_ready(slot, phase)).unwrap_or(Phase::Announcing)
@@ -131,30 +152,27 @@ impl View {
             done: control.done(slot),
             acknowledged: control.acknowledged_epoch(slot),
             transfer: control.transfer(slot),
+            awaits_other: control.awaits_other(slot),
         };
         Self {
-            now,
-            host,
+            now: Duration::ZERO,
+            host: Duration::ZERO,
+            first_grant: Duration::from_nanos(control.host_span_ns().0),
             phase: control.phase(),
+            pace: control.pace(),
+            granted: control.granted_ticks(),
             held_at: control.held_at(),
+            hold_tick: control.hold_tick(),
+            awaits_clock: control.awaits_clock(),
             end_tick: control.end_tick(),
             is_stop_requested: control.is_stop_requested(),
+            is_aborted: control.is_aborted(),
             epoch: control.epoch(),
             sent: (0..plan.topics.len()).map(|topic| control.ticks_sent(topic)).collect(),
             slots: (0..SLOTS_PER_NODE * plan.nodes.len()).map(slot).collect(),
-            living,
+            living: BTreeSet::new(),
             commands: Vec::new(),
         }
-    }
-
-    /// Time on the watchdogs' clock.
-    pub fn now(&self) -> Duration {
-        self.now
-    }
-
-    /// Host time.
-    pub fn host(&self) -> Duration {
-        self.host
     }
 
     /// Watchdogs' time since `then`.
@@ -162,59 +180,14 @@ impl View {
         self.now.saturating_sub(then)
     }
 
-    /// How far the first instances have joined.
-    pub fn phase(&self) -> Phase {
-        self.phase
-    }
-
-    /// The tick at which the clock waits.
-    pub fn held_at(&self) -> Option<u32> {
-        self.held_at
-    }
-
-    /// The tick at which the run ends.
-    pub fn end_tick(&self) -> u32 {
-        self.end_tick
-    }
-
-    /// The number of the newest membership.
-    pub fn epoch(&self) -> u32 {
-        self.epoch
-    }
-
-    /// Ticks of a topic whose sample has been sent.
-    pub fn ticks_sent(&self, topic: usize) -> u32 {
-        self.sent[topic]
-    }
-
-    /// What a slot holds.
-    pub fn slot_state(&self, slot: usize) -> SlotState {
-        self.slots[slot].state
-    }
-
     /// Whether the instance of a slot is ready for `phase`.
     pub fn is_ready(&self, slot: usize, phase: Phase) -> bool {
         self.slots[slot].ready >= phase
     }
 
-    /// Ticks that the instance of a slot has completed.
-    pub fn done(&self, slot: usize) -> u32 {
-        self.slots[slot].done
-    }
-
     /// Whether the instance of a slot has completed the run.
     pub fn has_completed(&self, slot: usize) -> bool {
         self.slots[slot].done >= self.end_tick
-    }
-
-    /// The membership that the instance of a slot has acknowledged.
-    pub fn acknowledged_epoch(&self, slot: usize) -> u32 {
-        self.slots[slot].acknowledged
-    }
-
-    /// What the instance of a slot goes on from.
-    pub fn transfer(&self, slot: usize) -> TransferOutcome {
-        self.slots[slot].transfer
     }
 
     /// The slots that compute.
@@ -225,6 +198,19 @@ impl View {
     /// Whether an instance lives.
     pub fn lives(&self, node: usize, generation: u32) -> bool {
         self.living.contains(&(node, generation))
+    }
+
+    /// Whether the instance of a slot has all samples and the grant that its next tick needs.
+    pub fn has_needs(&self, slot: usize, inputs: &[InputPlan]) -> bool {
+        let tick = self.slots[slot].done;
+        let is_sent = |input: &InputPlan| {
+            self.sent[input.topic] >= tick.saturating_add(1).saturating_sub(input.delay_ticks)
+        };
+        tick < self.end_tick && self.granted > tick && inputs.iter().all(is_sent)
+    }
+
+    fn write(&mut self, write: SegmentWrite) {
+        self.commands.push(Command::Write(write));
     }
 
     /// Commands a start.
@@ -247,17 +233,17 @@ impl View {
     /// Commands the end of the run at the next tick boundary.
     pub fn request_stop(&mut self) {
         self.is_stop_requested = true;
-        self.commands.push(Command::RequestStop);
+        self.write(SegmentWrite::RequestStop);
     }
 
     /// Ticks that every node has completed.
     pub fn completed_ticks(&self) -> u32 {
-        self.computing().map(|slot| self.done(slot)).min().unwrap_or(0).min(self.end_tick)
+        self.computing().map(|slot| self.slots[slot].done).min().unwrap_or(0).min(self.end_tick)
     }
 
     /// Ticks of the run that the instance of a slot has completed.
     pub fn completed_by(&self, slot: usize) -> u32 {
-        self.done(slot).min(self.end_tick)
+        self.slots[slot].done.min(self.end_tick)
     }
 
     /// Commands that nobody answers the end of an instance.
@@ -274,24 +260,24 @@ impl View {
     /// Commands that a slot is cleared.
     pub fn clear_slot(&mut self, slot: usize) {
         self.slots[slot] = SlotView::EMPTY;
-        self.commands.push(Command::Clear(slot));
+        self.write(SegmentWrite::Clear(slot));
     }
 
     /// Commands what a slot holds.
     pub fn set_slot_state(&mut self, slot: usize, state: SlotState) {
         self.slots[slot].state = state;
-        self.commands.push(Command::SetSlot(slot, state));
+        self.write(SegmentWrite::SetSlot(slot, state));
     }
 
     /// Commands the first tick of an instance.
     pub fn set_first_tick(&mut self, slot: usize, tick: u32) {
         self.slots[slot].done = tick;
-        self.commands.push(Command::FirstTick(slot, tick));
+        self.write(SegmentWrite::FirstTick(slot, tick));
     }
 
     /// Commands the first tick of shadow samples.
     pub fn start_shadow(&mut self, topic: usize, tick: u32) {
-        self.commands.push(Command::StartShadow(topic, tick));
+        self.write(SegmentWrite::StartShadow(topic, tick));
     }
 
     /// Commands that a membership is written.
@@ -302,6 +288,6 @@ impl View {
     /// Commands that a membership is the newest one.
     pub fn set_epoch(&mut self, epoch: u32) {
         self.epoch = epoch;
-        self.commands.push(Command::Publish(epoch));
+        self.write(SegmentWrite::Publish(epoch));
     }
 }

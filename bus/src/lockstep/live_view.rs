@@ -214,22 +214,6 @@ impl LiveView {
         StepTimes::new(std::array::from_fn(|bucket| counts[bucket].load(Relaxed)))
     }
 
-    /// Whether the process in `slot`, whose inputs are `inputs`, has all it needs for its next tick: if it does not come
-    /// on then, it is at fault itself. One that sleeps does not count: nobody has come as far as it waits for, or it
-    /// would have been woken. A recorder sleeps until samples have gathered that the tick alone does not need.
-    #[must_use]
-    pub fn can_compute(&self, plan: &Plan, slot: usize, inputs: &[InputPlan]) -> bool {
-        let tick = self.done(slot);
-        let has = |input: &InputPlan| {
-            self.ticks_sent(input.topic) >= (tick.saturating_add(1)).saturating_sub(input.delay_ticks)
-        };
-        tick < self.end_tick()
-            && self.granted_ticks() > tick
-            && inputs.iter().all(has)
-            && self.awaited_topic(plan, slot, inputs).is_none()
-            && !self.awaits_other(slot)
-    }
-
     /// The topic for which the process in `slot`, whose inputs are `inputs`, sleeps; `None` for one that computes,
     /// spins, or waits for something else.
     #[must_use]

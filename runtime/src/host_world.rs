@@ -1,0 +1,223 @@
+//! The world of a real run: the control segment in shared memory, processes or threads of the host, and the run directory.
+
+use crate::ctl::control::ControlServer;
+use crate::ctl::protocol::{Answer, Request};
+use crate::ctl::server::Reply;
+use crate::descendants::Descendants;
+use crate::graph::backup_of;
+use crate::host::{self, End, Host, Thread};
+use crate::manifest::Manifest;
+use crate::problem::Problem;
+use crate::process_log;
+use crate::program::{BackupSpec, Program, Readiness};
+use crate::role::Role;
+use crate::spawn;
+use crate::view::{SegmentWrite, View};
+use crate::world::{Body, World};
+use anyhow::{Context, Result};
+use bus::BusError;
+use bus::host_time::monotonic_ns;
+use bus::lockstep::SupervisorView;
+use bus::membership::Membership;
+use bus::plan::{InputPlan, NodePlan, Plan};
+use std::collections::BTreeMap;
+use std::os::unix::net::UnixDatagram;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::time::Duration;
+
+/// Messages of a sidecar that are read in one look, so that one that never ends keeps nobody waiting.
+const MESSAGES_MAX: usize = 32;
+/// The longest message of sd_notify(3) that is looked at.
+const MESSAGE_BYTES: usize = 4096;
+
+/// The world of a run on this host.
+pub struct HostWorld<'a> {
+    /// Where its instances live.
+    pub host: Host,
+    /// What it flies.
+    pub manifest: &'a Manifest,
+    /// Its plan.
+    pub plan: &'a Plan,
+    /// Its control segment.
+    pub control: Arc<SupervisorView>,
+    /// Where it keeps its files.
+    pub run_dir: &'a Path,
+    /// Serves requests.
+    pub control_server: ControlServer<'a>,
+    /// What its processes started, where that is to end with the run.
+    pub descendants: Option<&'a Descendants>,
+    /// Where sidecars say that they are ready, by their number.
+    pub sockets: BTreeMap<usize, UnixDatagram>,
+}
+
+impl HostWorld<'_> {
+    /// The socket on which sidecar `index` says that it is ready. The path of a socket may have 107 bytes only, so that
+    /// the name is not in it.
+    fn notify_socket(&mut self, name: &str, index: usize) -> Result<PathBuf> {
+        let path = self.run_dir.join(format!("{index}.notify"));
+        if !self.sockets.contains_key(&index) {
+            let socket = UnixDatagram::bind(&path)
+                .with_context(|| format!("process `{name}`: cannot open the socket {}", path.display()))?;
+            socket.set_nonblocking(true).context("cannot read a socket without waiting")?;
+            self.sockets.insert(index, socket);
+        }
+        Ok(path)
+    }
+}
+
+impl World for HostWorld<'_> {
+    type Body = HostBody;
+    type Reply = Reply;
+
+    fn now(&self) -> Duration {
+        Duration::from_nanos(monotonic_ns())
+    }
+
+    fn see(&self) -> View {
+        View::of(self.plan, &self.control)
+    }
+
+    fn awaited_topic(&self, slot: usize, inputs: &[InputPlan]) -> Option<usize> {
+        self.control.awaited_topic(self.plan, slot, inputs)
+    }
+
+    fn write(&mut self, write: SegmentWrite) {
+        let control = &self.control;
+        match write {
+            SegmentWrite::Clear(slot) => control.clear_slot(slot),
+            SegmentWrite::SetSlot(slot, state) => control.set_slot_state(slot, state),
+            SegmentWrite::FirstTick(slot, tick) => control.set_first_tick(slot, tick),
+            SegmentWrite::StartShadow(topic, tick) => control.start_shadow(topic, tick),
+            SegmentWrite::Publish(epoch) => control.set_epoch(epoch),
+            SegmentWrite::JoinTick(tick) => control.set_join_tick(tick),
+            SegmentWrite::RequestStop => control.request_stop(),
+            SegmentWrite::Abort => control.abort(),
+        }
+    }
+
+    fn notices(&self) -> u32 {
+        self.control.notices()
+    }
+
+    fn wait(&mut self, notices: u32, timeout: Duration) {
+        self.control.wait_for_notice(notices, timeout);
+    }
+
+    fn spent(&self, slot: usize) -> (u64, u32) {
+        (self.control.cpu_ns(slot), self.control.late_count(slot))
+    }
+
+    fn start(&mut self, name: &str, role: Role, program: Option<&Program>) -> Result<HostBody> {
+        let notify = match (role, program) {
+            (Role::Sidecar { index, .. }, Some(program)) if program.ready == Readiness::Notify => {
+                Some(self.notify_socket(name, index)?)
+            }
+            _ => None,
+        };
+        let run_dir = self.run_dir;
+        let (body, log) = match (&self.host, program) {
+            (Host::Exe(exe), program) => {
+                let (child, log) = match program {
+                    None => spawn::start_clock(exe, run_dir)?,
+                    Some(program) => spawn::start(exe, run_dir, name, role, program, notify.as_deref())?,
+                };
+                (host::Body::Process(child), log)
+            }
+            (Host::InProcess, program) => {
+                program.map_or(Ok(()), |program| self.host.require(name, program))?;
+                let component = program.and_then(Program::component);
+                let (dir, control) = (run_dir.to_owned(), self.control.clone());
+                let thread = Thread::start(component, dir, name, role.generation(), control)?;
+                (host::Body::Thread(thread), PathBuf::new())
+            }
+        };
+        Ok(HostBody { is_log_of_run: log.starts_with(run_dir), body, log })
+    }
+
+    fn hears_ready(&mut self, index: usize) -> bool {
+        let Some(socket) = self.sockets.get(&index) else { return false };
+        let mut message = [0; MESSAGE_BYTES];
+        let mut is_ready = false;
+        for _ in 0..MESSAGES_MAX {
+            let Ok(length) = socket.recv(&mut message) else { break };
+            // Lines of `NAME=VALUE`.
+            is_ready |= message[..length].split(|&byte| byte == b'\n').any(|line| line == b"READY=1");
+        }
+        is_ready
+    }
+
+    fn reap(&self, known: &[u32]) {
+        if let Some(descendants) = self.descendants {
+            descendants.reap(known);
+        }
+    }
+
+    fn store_backup(&mut self, plan: &NodePlan, node: usize, generation: u32) -> Result<(), BusError> {
+        plan.store_backup(self.run_dir, node, generation)
+    }
+
+    fn store_membership(&mut self, membership: &Membership) -> Result<(), BusError> {
+        membership.store(self.run_dir)
+    }
+
+    fn remove_traces(&mut self, node: usize, generation: u32, was_killed: bool) {
+        if was_killed {
+            // Its ports would keep their places; what cannot be removed now goes with the run.
+            let _ = bus::reap_dead(self.run_dir, &self.plan.run_id);
+        }
+        bus::state_transfer::remove(self.run_dir, self.plan, node, generation);
+        let _ = std::fs::remove_file(bus::plan::backup_path(self.run_dir, node, generation));
+        bus::claim::remove(self.run_dir, &self.plan.nodes[node].name, generation);
+    }
+
+    fn next_request(&mut self) -> Option<(Request, Reply)> {
+        self.control_server.serve()
+    }
+
+    fn answer(&mut self, reply: Reply, answer: &Answer) {
+        reply.send(answer);
+    }
+
+    fn backup_of(&self, process: &str, with: &str) -> Result<BackupSpec, Problem> {
+        backup_of(self.manifest, self.plan, process, with)
+    }
+}
+
+/// A process or thread, and its log.
+#[derive(Debug)]
+pub struct HostBody {
+    body: host::Body,
+    log: PathBuf,
+    is_log_of_run: bool,
+}
+
+impl Body for HostBody {
+    fn id(&self) -> Option<u32> {
+        self.body.id()
+    }
+
+    fn end(&mut self) -> Result<Option<End>> {
+        self.body.end()
+    }
+
+    fn kill(&mut self) -> Option<End> {
+        self.body.kill()
+    }
+
+    fn last_lines(&self) -> Vec<String> {
+        process_log::last_words(&self.log)
+    }
+
+    fn bound_log(&self) {
+        if self.is_log_of_run {
+            process_log::bound(&self.log);
+        }
+    }
+
+    fn remove_log(&self) {
+        if self.is_log_of_run {
+            let _ = std::fs::remove_file(&self.log);
+        }
+    }
+}

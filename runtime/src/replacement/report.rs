@@ -1,0 +1,49 @@
+//! What became of backups, for those who read about a run.
+
+use bus::plan::InputPlan;
+use serde::Serialize;
+
+/// Why a process joins a run that flies.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Purpose {
+    /// It shadows the active process for a while, then takes over.
+    Swap,
+    /// It shadows the active process, and takes over when that dies.
+    Standby,
+    /// It shadows the active process and never flies.
+    Shadow,
+    /// It takes the place of a process that died.
+    Restart,
+}
+
+/// What became of a backup.
+#[derive(Clone, Debug, Serialize)]
+pub struct Report {
+    /// The node.
+    pub process: String,
+    /// Counts the processes of the node; the first is 0.
+    pub generation: u32,
+    /// Why it joined.
+    pub purpose: Purpose,
+    /// Whether the manifest or a request names it; a restart and the next standby come by themselves.
+    pub is_planned: bool,
+    /// The request that asked for it.
+    #[serde(skip)]
+    pub request: Option<u32>,
+    /// The first tick it computed.
+    pub join_tick: Option<u32>,
+    /// The first tick whose outputs were its own.
+    pub take_over_tick: Option<u32>,
+    /// What it went on from: `state` or `last output`.
+    pub hand_over: Option<&'static str>,
+    /// Host time from the start of its process until that was prepared to join, in milliseconds.
+    pub start_ms: f64,
+    /// Host time for which the clock held the tick, in milliseconds.
+    pub hold_ms: f64,
+    /// Why it did not fly, if it was to.
+    pub refused: Option<String>,
+    /// What it reads, for a profile of the run.
+    #[serde(skip)]
+    pub inputs: Vec<InputPlan>,
+}

@@ -1,0 +1,352 @@
+//! The memory of a simulated run, its instances, and the order in which they go on.
+
+use crate::ctl::protocol::{Answer, Request};
+use crate::host::End;
+use crate::role::Role;
+use crate::view::{SlotView, View};
+use bus::lockstep::{Phase, SlotState};
+use bus::membership::Membership;
+use bus::plan::{InputPlan, Plan};
+use bus::random::Stream;
+use rand_core::Rng as _;
+use std::cell::RefCell;
+use std::collections::{BTreeMap, BTreeSet, VecDeque};
+use std::rc::Rc;
+use std::time::Duration;
+
+pub(super) const NODES: usize = 3;
+pub(super) const WINDOW: u32 = 4;
+pub(super) const NEVER: u32 = u32::MAX;
+/// Simulated time within which a run must end once nothing happens to it any more.
+const QUIET: Duration = Duration::from_secs(60);
+/// What never ends by itself.
+pub(super) const FOR_EVER: Duration = Duration::MAX;
+
+/// What happened, where somebody wants to read it.
+pub(super) type Log = Option<Rc<RefCell<Vec<String>>>>;
+
+/// Numbers drawn from the seed.
+#[derive(Debug)]
+pub(super) struct Draw(Stream);
+
+impl Draw {
+    pub(super) fn new(seed: u64) -> Self {
+        Self(bus::random::stream(seed, "simulation"))
+    }
+
+    pub(super) fn below(&mut self, bound: u64) -> u64 {
+        self.0.next_u64() % bound
+    }
+
+    pub(super) fn one_in(&mut self, count: u64) -> bool {
+        self.below(count) == 0
+    }
+
+    pub(super) fn micros(&mut self, bound: u64) -> Duration {
+        Duration::from_micros(self.below(bound))
+    }
+}
+
+/// A bug that is planted to see that it is found.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Bug {
+    /// Nodes acknowledge a membership that they do not follow.
+    AcknowledgesUnread,
+    /// The supervisor takes every membership for acknowledged.
+    AwaitsNobody,
+    /// A backup is promoted at a tick that its predecessor has sent.
+    PromotesTwo,
+    /// A new membership wakes nobody.
+    LosesWakeUp,
+    /// A stop never comes to the clock.
+    ForgetsStop,
+    /// A process that was killed lives on.
+    KillMisses,
+}
+
+/// What an instance sleeps for.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Need {
+    Samples(usize),
+    Shadow(usize),
+    Grant,
+    /// The other instance of its node.
+    Other(usize),
+    /// Completed ticks: what the clock waits for.
+    Done,
+    /// A phase, or the state of a slot.
+    State,
+    /// A hold, a join or a stop.
+    Steering,
+    /// Nothing.
+    Nothing,
+}
+
+/// What an instance does next.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Doing {
+    Starting,
+    /// It waits until its slot may join.
+    Prepared,
+    /// It waits until its slot is taken.
+    Connected,
+    /// It waits for the next tick.
+    Waiting,
+    /// It stores the sample of this output, or wakes its readers.
+    Sending {
+        output: usize,
+        is_stored: bool,
+    },
+    /// It waits until its last samples are read.
+    Leaving {
+        taken: u32,
+    },
+    /// The clock waits until everybody is ready for a phase.
+    Gathering(Phase),
+    /// The clock waits until these ticks are completed.
+    Awaiting(u32),
+    /// The clock holds the tick.
+    Holding,
+    /// Nothing: a sidecar.
+    Idle,
+}
+
+/// A simulated process.
+#[derive(Debug)]
+pub(super) struct Instance {
+    pub(super) role: Role,
+    pub(super) doing: Doing,
+    /// What it sleeps for, and how long at most.
+    pub(super) sleep: Option<(Need, Duration)>,
+    pub(super) frozen_until: Duration,
+    pub(super) end: Option<End>,
+    /// The membership that it follows, and what that says of it.
+    pub(super) epoch: u32,
+    pub(super) take_over_tick: u32,
+    pub(super) retirement_tick: u32,
+    pub(super) counts_from: Vec<u32>,
+    pub(super) sends_from: Vec<u32>,
+    /// Per input: up to which tick it waits for shadow samples.
+    pub(super) shadows_until: Vec<u32>,
+    /// The next tick that it computes.
+    pub(super) tick: u32,
+    /// Whether a sidecar has said that it is ready, and nobody has heard it yet.
+    pub(super) says_ready: bool,
+}
+
+/// Everything outside the supervisor.
+#[derive(Debug)]
+pub(super) struct Sim {
+    pub(super) plan: Plan,
+    pub(super) draw: Draw,
+    pub(super) bug: Option<Bug>,
+    /// The faults that are drawn; none once the storm is over.
+    pub(super) faults: BTreeSet<super::faults::Fault>,
+    pub(super) now: Duration,
+    /// The control segment.
+    pub(super) segment: View,
+    pub(super) join_tick: u32,
+    pub(super) shadow: Vec<u32>,
+    pub(super) published: Vec<u32>,
+    pub(super) notices: u32,
+    pub(super) instances: Vec<Instance>,
+    /// The memberships in the run directory.
+    pub(super) stored: BTreeMap<u32, Membership>,
+    /// Who wrote the sample that counts: by topic and tick.
+    pub(super) writers: BTreeMap<(usize, u32), u32>,
+    /// What was struck that may end a run.
+    pub(super) excuses: Vec<String>,
+    pub(super) requests: VecDeque<Request>,
+    /// What requests were answered.
+    pub(super) answers: Vec<Option<Answer>>,
+    pub(super) looks: u32,
+    /// The look at which a stop was asked for.
+    pub(super) stop_look: Option<u32>,
+    pub(super) stop: crate::event::StopToken,
+    pub(super) log: Log,
+    /// Steps so far, and with how many of them the storm is over; when that was.
+    pub(super) steps: u32,
+    pub(super) storm_steps: u32,
+    pub(super) quiet_since: Option<Duration>,
+}
+
+impl Sim {
+    pub(super) fn new(plan: &Plan, mut draw: Draw, faults: BTreeSet<super::faults::Fault>) -> Self {
+        let mut slots = vec![SlotView::EMPTY; 2 * NODES];
+        slots[..NODES].iter_mut().for_each(|slot| slot.state = SlotState::Taken);
+        let segment = View {
+            now: Duration::ZERO,
+            host: Duration::ZERO,
+            first_grant: Duration::ZERO,
+            phase: Phase::Announcing,
+            pace: plan.pace,
+            granted: 0,
+            held_at: None,
+            hold_tick: NEVER,
+            awaits_clock: false,
+            end_tick: plan.duration_ticks,
+            is_stop_requested: false,
+            is_aborted: false,
+            epoch: 0,
+            sent: vec![0; plan.topics.len()],
+            slots,
+            living: BTreeSet::new(),
+            commands: Vec::new(),
+        };
+        Self {
+            bug: None,
+            faults,
+            now: Duration::from_secs(1),
+            segment,
+            join_tick: NEVER,
+            shadow: vec![0; plan.topics.len()],
+            published: vec![0; 2 * NODES],
+            notices: 0,
+            instances: Vec::new(),
+            stored: BTreeMap::from([(0, Membership::first(plan))]),
+            writers: BTreeMap::new(),
+            excuses: Vec::new(),
+            requests: VecDeque::new(),
+            answers: Vec::new(),
+            looks: 0,
+            stop_look: None,
+            stop: crate::event::StopToken::new(),
+            log: None,
+            steps: 0,
+            storm_steps: 500 + draw.below(2500) as u32,
+            quiet_since: None,
+            draw,
+            plan: plan.clone(),
+        }
+    }
+
+    pub(super) fn note(&self, text: impl FnOnce(&Self) -> String) {
+        if let Some(log) = &self.log {
+            let View { granted, end_tick, .. } = self.segment;
+            log.borrow_mut().push(format!("{:?}, tick {granted} of {end_tick}: {}", self.now, text(self)));
+        }
+    }
+
+    /// Starts an instance; returns its number.
+    pub(super) fn start(&mut self, role: Role) -> usize {
+        let outputs = match role {
+            Role::Node { node, .. } => self.plan.nodes[node].outputs.len(),
+            Role::Clock | Role::Sidecar { .. } => 0,
+        };
+        let doing = if role == Role::Clock { Doing::Gathering(Phase::Connecting) } else { Doing::Starting };
+        let start = self.draw.micros(1000);
+        self.instances.push(Instance {
+            role,
+            doing,
+            sleep: None,
+            frozen_until: self.now + start,
+            end: None,
+            epoch: 0,
+            take_over_tick: 0,
+            retirement_tick: NEVER,
+            counts_from: vec![0; outputs],
+            sends_from: vec![0; outputs],
+            shadows_until: Vec::new(),
+            tick: 0,
+            says_ready: false,
+        });
+        self.instances.len() - 1
+    }
+
+    /// The slot of an instance of a node.
+    pub(super) fn slot(&self, role: Role) -> usize {
+        let Role::Node { node, generation } = role else { unreachable!("{role:?} has no slot") };
+        self.plan.slot(node, generation)
+    }
+
+    pub(super) fn inputs(&self, role: Role) -> &[InputPlan] {
+        let Role::Node { node, .. } = role else { unreachable!("{role:?} has no inputs") };
+        &self.plan.nodes[node].inputs
+    }
+
+    pub(super) fn living(&self) -> impl Iterator<Item = &Instance> {
+        self.instances.iter().filter(|instance| instance.end.is_none())
+    }
+
+    pub(super) fn slowest(&self) -> u32 {
+        self.segment.computing().map(|slot| self.segment.slots[slot].done).min().unwrap_or(NEVER)
+    }
+
+    /// Wakes those who sleep for `need`.
+    pub(super) fn wake(&mut self, need: Need) {
+        for instance in &mut self.instances {
+            instance.sleep.take_if(|(other, _)| *other == need);
+        }
+    }
+
+    pub(super) fn wake_all(&mut self) {
+        self.instances.iter_mut().for_each(|instance| instance.sleep = None);
+    }
+
+    /// Tells the supervisor that there is something to look at.
+    pub(super) fn notify(&mut self) {
+        if !self.strikes(super::faults::Fault::LostNotice, 3) {
+            self.notices += 1;
+        }
+    }
+
+    /// Everything goes on until `deadline`, or until there is a notice beyond `notices`.
+    pub(super) fn go_on_until(&mut self, deadline: Duration, notices: u32) {
+        while self.now < deadline && self.notices == notices {
+            self.step(deadline);
+        }
+    }
+
+    /// Somebody does something, while the supervisor is busy.
+    pub(super) fn preempt(&mut self) {
+        while self.draw.one_in(4) {
+            self.step(self.now + Duration::from_micros(50));
+        }
+    }
+
+    fn step(&mut self, deadline: Duration) {
+        self.steps += 1;
+        if self.steps == self.storm_steps {
+            self.calm();
+        }
+        if self.quiet_since.is_some_and(|since| self.now > since + QUIET) {
+            panic!("it does not end: {:?} {:?}", self.segment, self.living().collect::<Vec<_>>());
+        }
+        self.strike();
+        let spurious = self.strikes(super::faults::Fault::SpuriousWakeUp, 20);
+        let is_awake = |sim: &Self, index: usize| {
+            let instance = &sim.instances[index];
+            let is_asleep = instance.sleep.is_some_and(|(_, until)| until > sim.now);
+            instance.end.is_none() && instance.frozen_until <= sim.now && (spurious || !is_asleep)
+        };
+        let count = self.instances.len();
+        let first = self.draw.below(count.max(1) as u64) as usize;
+        let awake = (0..count).map(|offset| (first + offset) % count).find(|&index| is_awake(self, index));
+        let Some(index) = awake else {
+            let moments = self.living().map(|instance| {
+                instance.frozen_until.max(instance.sleep.map_or(Duration::ZERO, |(_, until)| until))
+            });
+            let next = moments.chain([deadline]).min().unwrap_or(deadline);
+            self.now = next.max(self.now + Duration::from_micros(1));
+            return;
+        };
+        self.now += self.draw.micros(60);
+        self.instances[index].sleep = None;
+        match self.instances[index].role {
+            _ if self.segment.is_aborted => self.instances[index].end = Some(End::Exited(0)),
+            Role::Clock => self.step_clock(index),
+            Role::Node { .. } => self.step_node(index),
+            Role::Sidecar { .. } => self.step_sidecar(index),
+        }
+    }
+
+    fn step_sidecar(&mut self, index: usize) {
+        let is_late = self.strikes(super::faults::Fault::NeverReady, 2);
+        let instance = &mut self.instances[index];
+        if instance.doing == Doing::Starting && !is_late {
+            instance.says_ready = true;
+        }
+        instance.doing = Doing::Idle;
+        instance.sleep = Some((Need::Nothing, FOR_EVER));
+    }
+}

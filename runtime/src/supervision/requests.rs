@@ -1,0 +1,141 @@
+//! Swaps that are asked for while the run flies.
+
+use super::Supervisor;
+use crate::ctl::protocol::{Answer, Request};
+use crate::problem::Problem;
+use crate::program::BackupSpec;
+use crate::replacement::{Report, take_over_stride};
+use crate::supervisor::State;
+use crate::world::World;
+use std::path::PathBuf;
+
+/// Ticks that a backup shadows where a request does not say.
+const SHADOW_TICKS: u32 = 100;
+
+/// Why a swap is refused.
+#[derive(Debug, thiserror::Error)]
+enum SwapRefused {
+    #[error(transparent)]
+    Manifest(#[from] Problem),
+    #[error(
+        "`log` = {}: a run claims its logs when it starts, and cannot claim another in flight; leave it out, or \
+         write the swap into the manifest", .0.display()
+    )]
+    UnclaimedLog(PathBuf),
+    #[error("the run does not fly: `{0}` cannot be swapped now")]
+    NotRunning(String),
+    #[error("`{0}` has a backup, a standby or a shadow already; one at a time")]
+    HasBackup(String),
+    #[error("shadowing for {shadow_ticks} ticks is not within the run's {end} ticks")]
+    ShadowsTooLong { shadow_ticks: u32, end: u32 },
+    #[error(
+        "tick {tick} less {shadow_ticks} ticks of shadowing is not ahead of the run, which has granted {granted} of \
+         {end} ticks"
+    )]
+    NotAhead { tick: u32, shadow_ticks: u32, granted: u32, end: u32 },
+    #[error(
+        "`{process}` sends every {stride} and computes every {period} ticks: let it take over at a multiple of the \
+         first and join at one of the second"
+    )]
+    BetweenPeriods { process: String, stride: u32, period: u32 },
+}
+
+/// What became of a swap, for whoever asked for it.
+fn answer(report: &Report) -> Answer {
+    match (&report.refused, report.take_over_tick) {
+        (Some(reason), _) => Answer::refused(reason.clone()),
+        (None, Some(tick)) => Answer::Done {
+            text: format!(
+                "`{}.{}` flies from tick {tick}; handed over: {}",
+                report.process,
+                report.generation,
+                report.hand_over.unwrap_or("nothing")
+            ),
+            tick,
+        },
+        (None, None) => Answer::refused("the run ended before the take-over"),
+    }
+}
+
+impl<W: World> Supervisor<'_, W> {
+    /// Serves what was asked of the run, and answers swaps that have come to their end.
+    pub(super) fn serve_requests(&mut self) {
+        while let Some((request, reply)) = self.world.next_request() {
+            let Request::Swap { process, with, shadow_ticks, at_tick } = request else { continue };
+            match self.request_swap(&process, &with, shadow_ticks, at_tick) {
+                Ok(request) => self.swaps.push((request, reply)),
+                Err(refused) => self.world.answer(reply, &Answer::refused(refused.to_string())),
+            }
+        }
+        for (request, reply) in std::mem::take(&mut self.swaps) {
+            let mut reports = self.overseer.replacements.reports.iter();
+            match reports.find(|report| report.request == Some(request)) {
+                Some(report) => self.world.answer(reply, &answer(report)),
+                None => self.swaps.push((request, reply)),
+            }
+        }
+    }
+
+    /// Checks a swap that was asked for, and has its backup started; returns the number of the request.
+    fn request_swap(
+        &mut self,
+        process: &str,
+        with: &str,
+        shadow_ticks: Option<u32>,
+        at_tick: Option<u32>,
+    ) -> Result<u32, SwapRefused> {
+        let backup = self.world.backup_of(process, with)?;
+        self.require_claimed_log(&backup)?;
+        if self.overseer.state != State::Running {
+            return Err(SwapRefused::NotRunning(process.to_owned()));
+        }
+        if self.overseer.replacements.is_busy(backup.node) {
+            return Err(SwapRefused::HasBackup(process.to_owned()));
+        }
+        self.see();
+        let end = self.overseer.replacements.view.end_tick;
+        let shadow_ticks = shadow_ticks.unwrap_or(SHADOW_TICKS);
+        if shadow_ticks == 0 || shadow_ticks >= end {
+            return Err(SwapRefused::ShadowsTooLong { shadow_ticks, end });
+        }
+        if let Some(tick) = at_tick {
+            self.require_joinable(process, &backup, shadow_ticks, tick)?;
+        }
+        self.requests += 1;
+        self.overseer.replacements.request_swap(backup, shadow_ticks, at_tick, self.requests);
+        Ok(self.requests)
+    }
+
+    /// Refuses a take-over at `tick` for which `backup` cannot join in time, or at which it does not send.
+    fn require_joinable(
+        &self,
+        process: &str,
+        backup: &BackupSpec,
+        shadow_ticks: u32,
+        tick: u32,
+    ) -> Result<(), SwapRefused> {
+        let (granted, end) =
+            (self.overseer.replacements.view.granted, self.overseer.replacements.view.end_tick);
+        let join = tick.saturating_sub(shadow_ticks);
+        if join <= granted || tick >= end {
+            return Err(SwapRefused::NotAhead { tick, shadow_ticks, granted, end });
+        }
+        let (period, stride) = (backup.plan.period_ticks, take_over_stride(self.plan, backup.node));
+        if !tick.is_multiple_of(stride) || !join.is_multiple_of(period) {
+            return Err(SwapRefused::BetweenPeriods { process: process.to_owned(), stride, period });
+        }
+        Ok(())
+    }
+
+    /// Refuses a log of its own to a backup that was asked for in flight: this run has not claimed the file.
+    fn require_claimed_log(&self, backup: &BackupSpec) -> Result<(), SwapRefused> {
+        let planned = self.graph.backups.iter().filter(|other| other.node == backup.node);
+        let mut known = planned.map(|other| &other.program).chain([&self.graph.programs[backup.node]]);
+        match &backup.program.log {
+            Some(log) if !known.any(|program| program.log.as_ref() == Some(log)) => {
+                Err(SwapRefused::UnclaimedLog(log.clone()))
+            }
+            _ => Ok(()),
+        }
+    }
+}

@@ -1,0 +1,76 @@
+//! Runs that stand still, and backups that do not join in their time.
+
+use super::Supervisor;
+use crate::program::OnExit;
+use crate::replacement::Stage;
+use crate::role::Role;
+use crate::stall::{Standstill, Straggler};
+use crate::supervisor::Event;
+use crate::world::World;
+use anyhow::Result;
+use std::time::Duration;
+
+impl<W: World> Supervisor<'_, W> {
+    /// Looks whether the run stands still, and because of whom.
+    pub(super) fn note_stall(&mut self) -> Result<()> {
+        let view = &self.overseer.replacements.view;
+        let ticks = view.completed_ticks();
+        // A paused run stands still because it was told to.
+        let is_paused = view.held_at.is_some_and(|held| view.hold_tick <= held);
+        // A sidecar that does not get ready has a watchdog of its own.
+        let is_waiting = view.held_at.is_some() && !self.sidecars.all_ready();
+        if ticks != self.timing.last_change.0 || self.overseer.state.is_over() || is_paused || is_waiting {
+            self.timing.last_change = (ticks, self.clock.now());
+            return Ok(());
+        }
+        if let Some((node, generation, stage, since)) = self.overseer.replacements.joining() {
+            self.note_late_joiner(node, generation, stage, since.max(self.timing.last_change.1));
+            return Ok(());
+        }
+        let stood = self.clock.since(self.timing.last_change.1);
+        let replacements = &self.overseer.replacements;
+        let (plan, world, processes) = (self.plan, &self.world, &self.processes);
+        let standstill = Standstill { plan, world, replacements, processes };
+        let straggler = standstill.straggler();
+        if stood <= self.patience(straggler).max(2 * standstill.deadline()) {
+            return Ok(());
+        }
+        let text = standstill.describe(straggler, stood);
+        let Some(straggler) = straggler else {
+            self.tell(Event::Died { policy: OnExit::Stop, is_possible: false })?;
+            return self.abort(format!("{text}; it was aborted"));
+        };
+        self.timing.last_change.1 = self.clock.now();
+        self.processes.kill(straggler.role(), Some(format!("was killed by the watchdog: {text}")));
+        Ok(())
+    }
+
+    /// How long the run may stand still because of `straggler`: for the clock, and where nobody is to blame, as long as
+    /// for the node that may take longest.
+    fn patience(&self, straggler: Option<Straggler>) -> Duration {
+        match straggler {
+            Some(Straggler::Node(node, generation)) => {
+                self.overseer.replacements.program_of(node, generation).watchdog
+            }
+            Some(Straggler::Clock) | None => {
+                self.graph.programs.iter().map(|program| program.watchdog).max().unwrap_or_default()
+            }
+        }
+    }
+
+    /// Kills a process that does not join, or an instance that does not connect to it.
+    fn note_late_joiner(&mut self, node: usize, generation: u32, stage: Stage, since: Duration) {
+        let disagreeing = self.overseer.replacements.disagreeing();
+        let late = disagreeing.filter(|_| stage != Stage::Joining).unwrap_or((node, generation));
+        let patience = self.overseer.replacements.program_of(late.0, late.1).watchdog;
+        if self.clock.since(since) > patience {
+            let what = if late == (node, generation) {
+                "did not join".to_owned()
+            } else {
+                format!("did not connect to `{}.{generation}`", self.plan.nodes[node].name)
+            };
+            let text = format!("was killed by the watchdog: it {what} within {} ms", patience.as_millis());
+            self.processes.kill(Role::Node { node: late.0, generation: late.1 }, Some(text));
+        }
+    }
+}

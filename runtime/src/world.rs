@@ -1,0 +1,90 @@
+//! What a supervisor needs of the world outside it: the control segment, processes, files, the host's clock, and those who
+//! ask for swaps. `host_world.rs` is the real one; the simulation draws another from a seed.
+
+use crate::ctl::protocol::{Answer, Request};
+use crate::host::End;
+use crate::problem::Problem;
+use crate::program::{BackupSpec, Program};
+use crate::role::Role;
+use crate::view::{SegmentWrite, View};
+use anyhow::Result;
+use bus::BusError;
+use bus::membership::Membership;
+use bus::plan::{InputPlan, NodePlan};
+use std::time::Duration;
+
+/// What is outside a supervisor.
+pub trait World {
+    /// A started process.
+    type Body: Body;
+    /// Where the answer to a request goes.
+    type Reply;
+
+    /// The host's monotonic clock.
+    fn now(&self) -> Duration;
+
+    /// What the control segment shows; who lives, and the time, is left out.
+    fn see(&self) -> View;
+    /// The topic for which the instance in `slot`, whose inputs are `inputs`, sleeps.
+    fn awaited_topic(&self, slot: usize, inputs: &[InputPlan]) -> Option<usize>;
+    /// Writes to the control segment, and wakes those who wait for it.
+    fn write(&mut self, write: SegmentWrite);
+    /// The count of the supervisor's notices: to be read before a look at the run, and waited on after it.
+    fn notices(&self) -> u32;
+    /// Sleeps until there is something to look at since `notices`, at most `timeout`.
+    fn wait(&mut self, notices: u32, timeout: Duration);
+    /// Processor time in nanoseconds, and deadlines missed, of the instance in `slot`.
+    fn spent(&self, slot: usize) -> (u64, u32);
+
+    /// Starts a process; the clock where there is no program.
+    ///
+    /// # Errors
+    /// If it cannot be started.
+    fn start(&mut self, name: &str, role: Role, program: Option<&Program>) -> Result<Self::Body>;
+    /// Whether sidecar `index` has said that it is ready since this was asked last.
+    fn hears_ready(&mut self, index: usize) -> bool;
+    /// Takes note of the end of orphans, but for the processes `known`, which somebody waits for.
+    fn reap(&self, known: &[u32]);
+
+    /// Writes what a backup of `node` reads about itself.
+    ///
+    /// # Errors
+    /// If the file cannot be written.
+    fn store_backup(&mut self, plan: &NodePlan, node: usize, generation: u32) -> Result<(), BusError>;
+    /// Writes a membership.
+    ///
+    /// # Errors
+    /// If the file cannot be written.
+    fn store_membership(&mut self, membership: &Membership) -> Result<(), BusError>;
+    /// Removes what an instance that has ended left behind; one that was killed has removed nothing itself.
+    fn remove_traces(&mut self, node: usize, generation: u32, was_killed: bool);
+
+    /// Serves what has been asked of the run; returns a request that is for the supervisor, a swap.
+    fn next_request(&mut self) -> Option<(Request, Self::Reply)>;
+    /// Answers a request.
+    fn answer(&mut self, reply: Self::Reply, answer: &Answer);
+    /// The backup of `process` that a request describes as `with`.
+    ///
+    /// # Errors
+    /// If there is no such process, or that cannot replace it.
+    fn backup_of(&self, process: &str, with: &str) -> Result<BackupSpec, Problem>;
+}
+
+/// A started process.
+pub trait Body {
+    /// Its process number, if it is a process of its own.
+    fn id(&self) -> Option<u32>;
+    /// How it ended, if it has.
+    ///
+    /// # Errors
+    /// If it cannot be watched.
+    fn end(&mut self) -> Result<Option<End>>;
+    /// Kills it and its group, and waits for its end.
+    fn kill(&mut self) -> Option<End>;
+    /// The last lines that it wrote.
+    fn last_lines(&self) -> Vec<String>;
+    /// Keeps its log from filling the file system of the run directory. A log that the manifest names is its user's.
+    fn bound_log(&self);
+    /// Removes its log, if that lies in the run directory.
+    fn remove_log(&self);
+}
