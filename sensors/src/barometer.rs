@@ -1,13 +1,13 @@
 //! The barometer node: air pressure, and the height that it means.
 //!
-//! Reading = pressure at the centre of mass in the standard atmosphere ([`crate::atmosphere`]) + bias + white
+//! Reading = pressure at the centre of mass in the standard atmosphere (`crate::atmosphere`) + bias + white
 //! noise, in steps of the part's resolution and cut off at its range; the bias walks at random, as weather and
 //! temperature move it. The altitude follows from the reading and a reference pressure. `crate::channel` says
 //! when it measures, how measurements are delayed and lost.
 #![allow(non_snake_case, reason = "a trailing _Pa names the pascal")]
 
 use crate::atmosphere::{SEA_LEVEL_PRESSURE_PA, height_m, pressure_Pa};
-use crate::channel::{Chance, Channel, ChannelState, QUEUE, Timing};
+use crate::channel::{Chance, ChannelState, QUEUE, Tick};
 use crate::noise::BiasWalk;
 use crate::sensing::{Sensor, TruthInputs};
 use crate::steps::in_steps;
@@ -16,72 +16,38 @@ use bus::messages::Barometer;
 use bus::random::normal;
 use bus::{Message, OutputPorts};
 use diagnostics::parameter::{ParameterError, finite, not_negative, positive};
-use serde::Deserialize;
 
 /// The least pressure that the part reads, Pa (MS5611-01BA03 data sheet: 10 mbar).
 const PRESSURE_MIN_PA: f64 = 1.0e3;
 /// The most, Pa (the same: 1200 mbar).
 const PRESSURE_MAX_PA: f64 = 1.2e5;
 
-/// What a barometer makes of the truth; the defaults are a MEAS Switzerland (TE Connectivity) MS5611-01BA03.
-///
-/// Its data sheet (DA5611-01BA03): resolution 0.012 mbar RMS at an oversampling ratio of 4096, which is its noise;
-/// the compensated reading in steps of 0.01 mbar; conversions of pressure and temperature of 8.22 ms each, one
-/// after the other, so that a reading is 16 ms old and 50 a second are possible. Bias walk: the data sheet states
-/// ±1 mbar a year, which is nothing in a flight; 0.2 Pa/√s, 1.5 Pa (13 cm) in a minute, stands for weather and
-/// warming (tuned, no source). The bias starts at zero: an autopilot nulls its altitude before take-off.
-#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct BarometerParams {
-    /// Measurements a second.
-    pub rate_hz: f64,
-    /// How long after measuring a measurement arrives, ms.
-    pub delay_ms: f64,
-    /// The fraction of measurements that are lost.
-    pub dropout: f64,
-    /// How long losses last on average, s; 0 where each is independent of the one before.
-    pub dropout_mean_s: f64,
-    /// True pressure at the world's origin, Pa.
-    pub ground_pressure_Pa: f64,
-    /// Pressure at which the altitude is zero, Pa.
-    pub reference_pressure_Pa: f64,
-    /// Standard deviation of a reading, Pa.
-    pub noise_Pa: f64,
-    /// The bias at the first reading, Pa.
-    pub initial_bias_Pa: f64,
-    /// Random walk of the bias, Pa/√s.
-    pub bias_walk_Pa_sqrt_s: f64,
-    /// Readings are multiples of this, Pa; 0 for any reading.
-    pub resolution_Pa: f64,
-}
-
-impl Default for BarometerParams {
-    fn default() -> Self {
-        Self {
-            rate_hz: 50.0,
-            delay_ms: 16.0,
-            dropout: 0.0,
-            dropout_mean_s: 0.0,
-            ground_pressure_Pa: SEA_LEVEL_PRESSURE_PA,
-            reference_pressure_Pa: SEA_LEVEL_PRESSURE_PA,
-            noise_Pa: 1.2,
-            initial_bias_Pa: 0.0,
-            bias_walk_Pa_sqrt_s: 0.2,
-            resolution_Pa: 1.0,
-        }
+parameters! {
+    /// What a barometer makes of the truth; the defaults are a MEAS Switzerland (TE Connectivity) MS5611-01BA03.
+    ///
+    /// Its data sheet (DA5611-01BA03): resolution 0.012 mbar RMS at an oversampling ratio of 4096, which is its noise;
+    /// the compensated reading in steps of 0.01 mbar; conversions of pressure and temperature of 8.22 ms each, one
+    /// after the other, so that a reading is 16 ms old and 50 a second are possible. Bias walk: the data sheet states
+    /// ±1 mbar a year, which is nothing in a flight; 0.2 Pa/√s, 1.5 Pa (13 cm) in a minute, stands for weather and
+    /// warming (tuned, no source). The bias starts at zero: an autopilot nulls its altitude before take-off.
+    #[derive(Copy)]
+    pub struct BarometerParams timed { rate_hz: 50.0, delay_ms: 16.0 } {
+        /// True pressure at the world's origin, Pa.
+        ground_pressure_Pa: f64 = SEA_LEVEL_PRESSURE_PA => positive,
+        /// Pressure at which the altitude is zero, Pa.
+        reference_pressure_Pa: f64 = SEA_LEVEL_PRESSURE_PA => positive,
+        /// Standard deviation of a reading, Pa.
+        noise_Pa: f64 = 1.2 => not_negative,
+        /// The bias at the first reading, Pa.
+        initial_bias_Pa: f64 = 0.0 => finite,
+        /// Random walk of the bias, Pa/√s.
+        bias_walk_Pa_sqrt_s: f64 = 0.2 => not_negative,
+        /// Readings are multiples of this, Pa; 0 for any reading.
+        resolution_Pa: f64 = 1.0 => not_negative,
     }
 }
 
 impl BarometerParams {
-    fn validate(&self) -> Result<(), ParameterError> {
-        positive("ground_pressure_Pa", self.ground_pressure_Pa)?;
-        positive("reference_pressure_Pa", self.reference_pressure_Pa)?;
-        not_negative("noise_Pa", self.noise_Pa)?;
-        finite("initial_bias_Pa", self.initial_bias_Pa)?;
-        not_negative("bias_walk_Pa_sqrt_s", self.bias_walk_Pa_sqrt_s)?;
-        not_negative("resolution_Pa", self.resolution_Pa)
-    }
-
     /// What is read at `altitude_m`, Pa; the bias then walks one step on.
     fn measure(&self, altitude_m: f64, bias_Pa: &mut f64, chance: &mut Chance<'_>) -> f64 {
         let noise = normal(chance.noise);
@@ -121,13 +87,7 @@ impl Sensor for BarometerParams {
     type State = BarometerState;
 
     fn new(parameters: Self) -> Result<Self, ParameterError> {
-        parameters.validate()?;
         Ok(parameters)
-    }
-
-    fn timing(&self) -> Timing {
-        let Self { rate_hz, delay_ms, dropout, dropout_mean_s, .. } = *self;
-        Timing { rate_hz, delay_ms, dropout, dropout_mean_s }
     }
 
     fn initial(&self) -> BarometerState {
@@ -135,22 +95,16 @@ impl Sensor for BarometerParams {
         BarometerState { channel: ChannelState::default(), queue, bias: self.initial_bias_Pa }
     }
 
-    fn sample(
-        &self,
-        channel: &mut Channel,
-        state: &mut BarometerState,
-        now_ns: u64,
-        inputs: TruthInputs<'_>,
-    ) -> Outputs {
+    fn sample(&self, tick: &mut Tick<'_>, state: &mut Self::State, inputs: Self::Inputs<'_>) -> Outputs {
         let truth = inputs.state;
         let BarometerState { channel: under_way, queue, bias } = state;
-        let barometer = channel.step(under_way, queue, now_ns, |last, chance| {
+        let barometer = tick.measure(under_way, queue, |last, chance| {
             let pressure = self.measure(truth.position.z, bias, chance);
             if chance.is_lost(0) {
                 return Barometer { valid: 0, ..*last };
             }
             let altitude = height_m(pressure, self.reference_pressure_Pa);
-            Barometer { measured_ns: now_ns, pressure, altitude, valid: 1, ..Default::default() }
+            Barometer { measured_ns: chance.now_ns, pressure, altitude, valid: 1, ..Default::default() }
         });
         Outputs { barometer }
     }

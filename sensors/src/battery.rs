@@ -6,66 +6,40 @@
 //! has no model of its battery, nothing is measured and `valid` is 0.
 #![allow(non_snake_case, reason = "trailing _V, _A and _Ah name units")]
 
-use crate::channel::{Chance, Channel, ChannelState, QUEUE, Timing};
+use crate::channel::{Chance, ChannelState, QUEUE, Tick};
+use crate::parameters::within;
 use crate::sensing::Sensor;
 use crate::steps::in_steps;
 use bus::component::Info;
 use bus::messages::Battery;
 use bus::random::normal;
 use bus::{InputPorts, Message, OutputPorts};
-use diagnostics::parameter::{ParameterError, finite, not_negative, positive, require};
-use serde::Deserialize;
+use diagnostics::parameter::{ParameterError, finite, not_negative, positive};
 
-/// What a battery monitor makes of the truth; the defaults are a Texas Instruments INA226 with a shunt of 2 mΩ.
-///
-/// Its data sheet (SBOS547): 1.25 mV a count of voltage, 2.5 µV a count of shunt voltage, which is 1.25 mA; 1.1 ms
-/// for each of the two conversions. It states no noise: one count of each, no source. The rate is 10 Hz, tuned, no
-/// source. The capacity is the Hummingbird's (thesis, Table 2.1: 2100 mAh).
-#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct BatteryParams {
-    /// Measurements a second.
-    pub rate_hz: f64,
-    /// How long after measuring a measurement arrives, ms.
-    pub delay_ms: f64,
-    /// The fraction of measurements that are lost.
-    pub dropout: f64,
-    /// How long losses last on average, s; 0 where each is independent of the one before.
-    pub dropout_mean_s: f64,
-    /// Standard deviation of a voltage, V.
-    pub voltage_noise_V: f64,
-    /// Constant error of the voltage, V.
-    pub voltage_bias_V: f64,
-    /// Voltages are multiples of this, V; 0 for any.
-    pub voltage_resolution_V: f64,
-    /// Standard deviation of a current, A.
-    pub current_noise_A: f64,
-    /// Constant error of the current, A.
-    pub current_bias_A: f64,
-    /// Currents are multiples of this, A; 0 for any.
-    pub current_resolution_A: f64,
-    /// Capacity of the battery, A·h.
-    pub capacity_Ah: f64,
-    /// The charge that is taken for granted at the first measurement, 0 to 1.
-    pub initial_charge: f64,
-}
-
-impl Default for BatteryParams {
-    fn default() -> Self {
-        Self {
-            rate_hz: 10.0,
-            delay_ms: 2.2,
-            dropout: 0.0,
-            dropout_mean_s: 0.0,
-            voltage_noise_V: 1.25e-3,
-            voltage_bias_V: 0.0,
-            voltage_resolution_V: 1.25e-3,
-            current_noise_A: 1.25e-3,
-            current_bias_A: 0.0,
-            current_resolution_A: 1.25e-3,
-            capacity_Ah: 2.1,
-            initial_charge: 1.0,
-        }
+parameters! {
+    /// What a battery monitor makes of the truth; the defaults are a Texas Instruments INA226 with a shunt of 2 mΩ.
+    ///
+    /// Its data sheet (SBOS547): 1.25 mV a count of voltage, 2.5 µV a count of shunt voltage, which is 1.25 mA; 1.1 ms
+    /// for each of the two conversions. It states no noise: one count of each, no source. The rate is 10 Hz, tuned, no
+    /// source. The capacity is the Hummingbird's (thesis, Table 2.1: 2100 mAh).
+    #[derive(Copy)]
+    pub struct BatteryParams timed { rate_hz: 10.0, delay_ms: 2.2 } {
+        /// Standard deviation of a voltage, V.
+        voltage_noise_V: f64 = 1.25e-3 => not_negative,
+        /// Constant error of the voltage, V.
+        voltage_bias_V: f64 = 0.0 => finite,
+        /// Voltages are multiples of this, V; 0 for any.
+        voltage_resolution_V: f64 = 1.25e-3 => not_negative,
+        /// Standard deviation of a current, A.
+        current_noise_A: f64 = 1.25e-3 => not_negative,
+        /// Constant error of the current, A.
+        current_bias_A: f64 = 0.0 => finite,
+        /// Currents are multiples of this, A; 0 for any.
+        current_resolution_A: f64 = 1.25e-3 => not_negative,
+        /// Capacity of the battery, A·h.
+        capacity_Ah: f64 = 2.1 => positive,
+        /// The charge that is taken for granted at the first measurement, 0 to 1.
+        initial_charge: f64 = 1.0 => within(0.0..=1.0, "from 0 to 1"),
     }
 }
 
@@ -76,18 +50,6 @@ fn read(truth: f64, bias: f64, sigma: f64, step: f64, chance: &mut Chance<'_>) -
 }
 
 impl BatteryParams {
-    fn validate(&self) -> Result<(), ParameterError> {
-        not_negative("voltage_noise_V", self.voltage_noise_V)?;
-        finite("voltage_bias_V", self.voltage_bias_V)?;
-        not_negative("voltage_resolution_V", self.voltage_resolution_V)?;
-        not_negative("current_noise_A", self.current_noise_A)?;
-        finite("current_bias_A", self.current_bias_A)?;
-        not_negative("current_resolution_A", self.current_resolution_A)?;
-        positive("capacity_Ah", self.capacity_Ah)?;
-        let charge_is_good = (0.0..=1.0).contains(&self.initial_charge);
-        require("initial_charge", self.initial_charge, charge_is_good, "from 0 to 1")
-    }
-
     fn measure(&self, truth: &Battery, chance: &mut Chance<'_>) -> Battery {
         let Self { voltage_bias_V, voltage_noise_V, voltage_resolution_V, .. } = *self;
         let Self { current_bias_A, current_noise_A, current_resolution_A, .. } = *self;
@@ -144,13 +106,7 @@ impl Sensor for BatteryParams {
     type State = BatteryMonitorState;
 
     fn new(parameters: Self) -> Result<Self, ParameterError> {
-        parameters.validate()?;
         Ok(parameters)
-    }
-
-    fn timing(&self) -> Timing {
-        let Self { rate_hz, delay_ms, dropout, dropout_mean_s, .. } = *self;
-        Timing { rate_hz, delay_ms, dropout, dropout_mean_s }
     }
 
     fn initial(&self) -> BatteryMonitorState {
@@ -158,27 +114,21 @@ impl Sensor for BatteryParams {
         BatteryMonitorState { channel, queue, charge: self.initial_charge, counted_ns: u64::MAX }
     }
 
-    fn sample(
-        &self,
-        channel: &mut Channel,
-        state: &mut BatteryMonitorState,
-        now_ns: u64,
-        inputs: BatteryInputs<'_>,
-    ) -> Outputs {
+    fn sample(&self, tick: &mut Tick<'_>, state: &mut Self::State, inputs: Self::Inputs<'_>) -> Outputs {
         let truth = inputs.battery;
         let BatteryMonitorState { channel: under_way, queue, charge, counted_ns } = state;
-        let measured = channel.step(under_way, queue, now_ns, |last, chance| {
+        let measured = tick.measure(under_way, queue, |last, chance| {
             if truth.valid == 0 {
                 return Battery { valid: 0, ..*last };
             }
             let measured = self.measure(truth, chance);
-            let elapsed_ns = now_ns.saturating_sub(*counted_ns);
+            let elapsed_ns = chance.now_ns.saturating_sub(*counted_ns);
             *charge = (*charge - self.drawn(measured.current, elapsed_ns)).clamp(0.0, 1.0);
-            *counted_ns = now_ns;
+            *counted_ns = chance.now_ns;
             if chance.is_lost(0) {
                 return Battery { valid: 0, ..*last };
             }
-            Battery { measured_ns: now_ns, charge: *charge, valid: 1, ..measured }
+            Battery { measured_ns: chance.now_ns, charge: *charge, valid: 1, ..measured }
         });
         Outputs { measured }
     }

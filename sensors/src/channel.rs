@@ -10,6 +10,7 @@
 //! Journal 39, 1960): with probability `dropout` a measurement is lost, and losses last `dropout_mean_s` on
 //! average. They are drawn from a stream of their own: switching them on does not reshuffle the noise.
 
+use crate::noise::{drawn_words, set_drawn_words};
 use bus::Message;
 use bus::context::NodeContext;
 use bus::random::{Stream, stream, uniform};
@@ -44,7 +45,10 @@ impl Timing {
     /// A parameter is outside its range.
     pub fn validate(&self) -> Result<(), ParameterError> {
         positive("rate_hz", self.rate_hz)?;
-        self.validate_at_any_rate()?;
+        not_negative("delay_ms", self.delay_ms)?;
+        let dropout_is_good = (0.0..1.0).contains(&self.dropout);
+        require("dropout", self.dropout, dropout_is_good, "a fraction from 0 to below 1")?;
+        not_negative("dropout_mean_s", self.dropout_mean_s)?;
         let under_way = self.delay_ms * 1e-3 * self.rate_hz;
         let expected = "at most 30 measurements long";
         require("delay_ms", self.delay_ms, under_way <= UNDER_WAY_MAX, expected)?;
@@ -90,17 +94,6 @@ impl Timing {
             );
         }
         Ok(())
-    }
-
-    /// What can be said of the parameters where the rate is not known yet.
-    ///
-    /// # Errors
-    /// A parameter is outside its range.
-    pub fn validate_at_any_rate(&self) -> Result<(), ParameterError> {
-        not_negative("delay_ms", self.delay_ms)?;
-        let dropout_is_good = (0.0..1.0).contains(&self.dropout);
-        require("dropout", self.dropout, dropout_is_good, "a fraction from 0 to below 1")?;
-        not_negative("dropout_mean_s", self.dropout_mean_s)
     }
 }
 
@@ -174,6 +167,8 @@ pub struct Channel {
 /// The chance in one measurement.
 #[derive(Debug)]
 pub struct Chance<'a> {
+    /// Simulation time.
+    pub now_ns: u64,
     /// The node's random stream.
     pub noise: &'a mut Stream,
     loss: &'a mut Stream,
@@ -217,36 +212,58 @@ impl Channel {
         Ok(Self { interval_ns, delay_ns, losses: Losses::new(timing), noise, loss })
     }
 
-    /// What has arrived last at `now_ns`: an element of `queue`, which starts filled with what is sent until the
-    /// first measurement arrives. Where a measurement is due, `measure` makes it from the one before.
-    pub fn step<M: Copy>(
+    /// The channel at a tick of its node.
+    pub(crate) fn at(&mut self, now_ns: u64) -> Tick<'_> {
+        Tick { channel: self, now_ns }
+    }
+}
+
+/// A tick of a sensor's node.
+#[derive(Debug)]
+pub struct Tick<'a> {
+    channel: &'a mut Channel,
+    now_ns: u64,
+}
+
+impl Tick<'_> {
+    /// What has arrived last: an element of `queue`, which starts filled with what is sent until the first measurement
+    /// arrives. Where a measurement is due, `measure` makes it from the one before.
+    pub(crate) fn measure<M: Copy>(
         &mut self,
         state: &mut ChannelState,
         queue: &mut [M; QUEUE],
-        now_ns: u64,
         measure: impl FnOnce(&M, &mut Chance<'_>) -> M,
     ) -> M {
+        let (channel, now_ns) = (&mut *self.channel, self.now_ns);
         if now_ns >= state.next_ns {
             let last = queue[before(state.measured)];
-            queue[place(state.measured)] = self.measure(state, |chance| measure(&last, chance));
-            state.arrival_ns[place(state.measured)] = now_ns.saturating_add(self.delay_ns);
+            queue[place(state.measured)] = channel.draw(state, now_ns, |chance| measure(&last, chance));
+            state.arrival_ns[place(state.measured)] = now_ns.saturating_add(channel.delay_ns);
             state.measured += 1;
-            state.next_ns = (now_ns / self.interval_ns + 1).saturating_mul(self.interval_ns);
+            state.next_ns = (now_ns / channel.interval_ns + 1).saturating_mul(channel.interval_ns);
         }
         while state.arrived < state.measured && state.arrival_ns[place(state.arrived)] <= now_ns {
             state.arrived += 1;
         }
         queue[before(state.arrived)]
     }
+}
 
+impl Channel {
     /// One measurement, the streams drawn from where `state` says and left there.
-    fn measure<M>(&mut self, state: &mut ChannelState, measure: impl FnOnce(&mut Chance<'_>) -> M) -> M {
-        go_to(&mut self.noise, state.noise_words);
-        go_to(&mut self.loss, state.loss_words);
+    fn draw<M>(
+        &mut self,
+        state: &mut ChannelState,
+        now_ns: u64,
+        measure: impl FnOnce(&mut Chance<'_>) -> M,
+    ) -> M {
+        set_drawn_words(&mut self.noise, state.noise_words);
+        set_drawn_words(&mut self.loss, state.loss_words);
         let (noise, loss) = (&mut self.noise, &mut self.loss);
-        let measurement = measure(&mut Chance { noise, loss, losses: self.losses, lost: &mut state.lost });
-        state.noise_words = words(&self.noise);
-        state.loss_words = words(&self.loss);
+        let lost = &mut state.lost;
+        let measurement = measure(&mut Chance { now_ns, noise, loss, losses: self.losses, lost });
+        state.noise_words = drawn_words(&self.noise);
+        state.loss_words = drawn_words(&self.loss);
         measurement
     }
 }
@@ -271,20 +288,6 @@ fn nanoseconds(seconds: f64) -> u64 {
     (seconds * 1e9).round() as u64
 }
 
-fn go_to(random: &mut Stream, [low, high]: [u64; 2]) {
-    let words = u128::from(high) << 64 | u128::from(low);
-    // Where it is there already, its block need not be computed again.
-    if random.get_word_pos() != words {
-        random.set_word_pos(words);
-    }
-}
-
-#[allow(clippy::cast_possible_truncation, reason = "the halves of the count are taken apart")]
-fn words(random: &Stream) -> [u64; 2] {
-    let words = random.get_word_pos();
-    [words as u64, (words >> 64) as u64]
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -304,7 +307,7 @@ mod tests {
             .step_by(usize::try_from(period_ticks).unwrap())
             .map(|tick| {
                 let now_ns = tick * TICK_NS;
-                (tick, channel.step(&mut state, &mut queue, now_ns, |_, _| now_ns) / TICK_NS)
+                (tick, channel.at(now_ns).measure(&mut state, &mut queue, |_, _| now_ns) / TICK_NS)
             })
             .collect()
     }
@@ -363,7 +366,7 @@ mod tests {
         let (mut state, mut queue) = (ChannelState::default(), [(); QUEUE]);
         let mut count = 0;
         for tick in 5031..5331 {
-            channel.step(&mut state, &mut queue, tick * TICK_NS, |_, _| count += 1);
+            channel.at(tick * TICK_NS).measure(&mut state, &mut queue, |_, _| count += 1);
         }
         assert_eq!(count, 4);
     }
@@ -373,7 +376,9 @@ mod tests {
         let (mut state, mut queue) = (ChannelState::default(), [false; QUEUE]);
         let interval_ns = channel.interval_ns;
         (0..count as u64)
-            .map(|n| channel.step(&mut state, &mut queue, n * interval_ns, |_, chance| chance.is_lost(0)))
+            .map(|n| {
+                channel.at(n * interval_ns).measure(&mut state, &mut queue, |_, chance| chance.is_lost(0))
+            })
             .collect()
     }
 
@@ -404,7 +409,7 @@ mod tests {
                 chance.is_lost(0);
                 chance.noise.next_u64()
             };
-            [0, 1, 2].map(|n| channel.step(&mut state, &mut queue, n * 100 * TICK_NS, measure))
+            [0, 1, 2].map(|n| channel.at(n * 100 * TICK_NS).measure(&mut state, &mut queue, measure))
         };
         assert_eq!(noise(0.0), noise(0.9));
     }
@@ -418,13 +423,13 @@ mod tests {
         let mut first = Channel::new(&timing, 1e-3, 3, "gps").unwrap();
         let (mut state, mut queue) = (ChannelState::default(), [1; QUEUE]);
         for tick in 0..333 {
-            first.step(&mut state, &mut queue, tick * TICK_NS, measure);
+            first.at(tick * TICK_NS).measure(&mut state, &mut queue, measure);
         }
         let mut second = Channel::new(&timing, 1e-3, 3, "gps").unwrap();
         let (mut handed_state, mut handed_queue) = (state, queue);
         for tick in 333..1000 {
-            let expected = first.step(&mut state, &mut queue, tick * TICK_NS, measure);
-            let found = second.step(&mut handed_state, &mut handed_queue, tick * TICK_NS, measure);
+            let expected = first.at(tick * TICK_NS).measure(&mut state, &mut queue, measure);
+            let found = second.at(tick * TICK_NS).measure(&mut handed_state, &mut handed_queue, measure);
             assert_eq!(found, expected, "at tick {tick}");
         }
         assert_eq!(handed_state, state);

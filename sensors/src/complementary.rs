@@ -27,7 +27,6 @@
 use crate::imu_model::ImuReading;
 use diagnostics::parameter::{ParameterError, not_negative, positive};
 use nalgebra::{UnitQuaternion, Vector3};
-use serde::Deserialize;
 use std::f64::consts::{PI, TAU};
 
 /// The thesis's weight of the gyroscope, once a sample (§4.3).
@@ -36,23 +35,18 @@ pub const THESIS_GYROSCOPE_WEIGHT: f64 = 0.98;
 /// Beyond this pitch (rad) roll and yaw are hard to tell apart, and the accelerometer is left out.
 const PITCH_BLEND_MAX_RAD: f64 = 1.4;
 
-/// How much the accelerometer is trusted.
-#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct ComplementaryParams {
-    /// Time constant with which roll and pitch follow the accelerometer, s. Default 30 (tuned, no
-    /// source, see the head of this file); the thesis's 0.98 at 1 kHz is 0.049 s.
-    pub time_constant_s: f64,
-    /// The accelerometer is left out while the size of what it reads differs from gravity by more than
-    /// this fraction: then it surely measures more than gravity. Default 0.2 (tuned, no source).
-    pub gravity_tolerance: f64,
-    /// Gravity, m/s². Default 9.81 (thesis §3.1).
-    pub gravity_m_s2: f64,
-}
-
-impl Default for ComplementaryParams {
-    fn default() -> Self {
-        Self { time_constant_s: 30.0, gravity_tolerance: 0.2, gravity_m_s2: 9.81 }
+parameters! {
+    /// How much the accelerometer is trusted.
+    #[derive(Copy)]
+    pub struct ComplementaryParams {
+        /// Time constant with which roll and pitch follow the accelerometer, s. Default 30 (tuned, no
+        /// source, see the head of this file); the thesis's 0.98 at 1 kHz is 0.049 s.
+        time_constant_s: f64 = 30.0 => positive,
+        /// The accelerometer is left out while the size of what it reads differs from gravity by more than
+        /// this fraction: then it surely measures more than gravity. Default 0.2 (tuned, no source).
+        gravity_tolerance: f64 = 0.2 => not_negative,
+        /// Gravity, m/s². Default 9.81 (thesis §3.1).
+        gravity_m_s2: f64 = 9.81 => positive,
     }
 }
 
@@ -133,9 +127,7 @@ impl Complementary {
     /// # Errors
     /// A parameter or the period is outside its range.
     pub fn with_period(params: ComplementaryParams, period_s: f64) -> Result<Self, ParameterError> {
-        positive("time_constant_s", params.time_constant_s)?;
-        not_negative("gravity_tolerance", params.gravity_tolerance)?;
-        positive("gravity_m_s2", params.gravity_m_s2)?;
+        params.validate()?;
         positive("period_s", period_s)?;
         let accelerometer_weight = 1.0 - gyroscope_weight(params.time_constant_s, period_s);
         Ok(Self { params, accelerometer_weight, period_s })

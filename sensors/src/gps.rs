@@ -6,7 +6,7 @@
 //! Press 1974, §3.6). `crate::channel` says when it measures, how measurements are delayed and lost.
 #![allow(non_snake_case, reason = "a trailing _W names the frame a vector is written in")]
 
-use crate::channel::{Chance, Channel, ChannelState, QUEUE, Timing};
+use crate::channel::{Chance, ChannelState, QUEUE, Tick};
 use crate::noise::standard_normal;
 use crate::sensing::{Sensor, TruthInputs};
 use crate::wire::{vector, vector_message};
@@ -14,65 +14,33 @@ use bus::component::Info;
 use bus::messages::{Gps, PlantState};
 use bus::random::Stream;
 use bus::{Message, OutputPorts};
-use diagnostics::parameter::{ParameterError, all, finite, not_negative, positive};
+use diagnostics::parameter::{ParameterError, finite, not_negative, positive};
 use nalgebra::Vector3;
-use serde::Deserialize;
 
-/// What a satellite receiver makes of the truth; the defaults are a u-blox NEO-M8N.
-///
-/// Its data sheet (UBX-15031086): 10 Hz; horizontal position within 2.5 m half of the time, which for equal axes
-/// is σ = 2.5 m / 1.177 = 2.1 m each; velocity within 0.05 m/s half of the time, σ = 0.05 / 0.6745 = 0.074 m/s.
-/// It has no vertical figures: 1.5 times the horizontal ones, the usual ratio of the dilutions of precision. Nearly
-/// all of the position's error is drift. Its time constant (300 s), the white part (0.3 m) and the delay (80 ms)
-/// are tuned, no source.
-#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct GpsParams {
-    /// Measurements a second.
-    pub rate_hz: f64,
-    /// How long after measuring a measurement arrives, ms.
-    pub delay_ms: f64,
-    /// The fraction of measurements that are lost.
-    pub dropout: f64,
-    /// How long losses last on average, s; 0 where each is independent of the one before.
-    pub dropout_mean_s: f64,
-    /// Standard deviation of the position's white noise along each axis, m.
-    pub position_noise_m: [f64; 3],
-    /// Standard deviation of the position's drift along each axis, m.
-    pub position_drift_m: [f64; 3],
-    /// Time constant of the drift, s.
-    pub position_drift_time_s: f64,
-    /// Constant error of the position, m.
-    pub position_bias_m: [f64; 3],
-    /// Standard deviation of the velocity's white noise along each axis, m/s.
-    pub velocity_noise_m_s: [f64; 3],
-}
-
-impl Default for GpsParams {
-    fn default() -> Self {
-        Self {
-            rate_hz: 10.0,
-            delay_ms: 80.0,
-            dropout: 0.0,
-            dropout_mean_s: 0.0,
-            position_noise_m: [0.3, 0.3, 0.45],
-            position_drift_m: [2.1, 2.1, 3.15],
-            position_drift_time_s: 300.0,
-            position_bias_m: [0.0; 3],
-            velocity_noise_m_s: [0.074, 0.074, 0.111],
-        }
+parameters! {
+    /// What a satellite receiver makes of the truth; the defaults are a u-blox NEO-M8N.
+    ///
+    /// Its data sheet (UBX-15031086): 10 Hz; horizontal position within 2.5 m half of the time, which for equal axes
+    /// is σ = 2.5 m / 1.177 = 2.1 m each; velocity within 0.05 m/s half of the time, σ = 0.05 / 0.6745 = 0.074 m/s.
+    /// It has no vertical figures: 1.5 times the horizontal ones, the usual ratio of the dilutions of precision. Nearly
+    /// all of the position's error is drift. Its time constant (300 s), the white part (0.3 m) and the delay (80 ms)
+    /// are tuned, no source.
+    #[derive(Copy)]
+    pub struct GpsParams timed { rate_hz: 10.0, delay_ms: 80.0 } {
+        /// Standard deviation of the position's white noise along each axis, m.
+        position_noise_m: [f64; 3] = [0.3, 0.3, 0.45] => not_negative,
+        /// Standard deviation of the position's drift along each axis, m.
+        position_drift_m: [f64; 3] = [2.1, 2.1, 3.15] => not_negative,
+        /// Time constant of the drift, s.
+        position_drift_time_s: f64 = 300.0 => positive,
+        /// Constant error of the position, m.
+        position_bias_m: [f64; 3] = [0.0; 3] => finite,
+        /// Standard deviation of the velocity's white noise along each axis, m/s.
+        velocity_noise_m_s: [f64; 3] = [0.074, 0.074, 0.111] => not_negative,
     }
 }
 
 impl GpsParams {
-    fn validate(&self) -> Result<(), ParameterError> {
-        all(not_negative, "position_noise_m", &self.position_noise_m)?;
-        all(not_negative, "position_drift_m", &self.position_drift_m)?;
-        positive("position_drift_time_s", self.position_drift_time_s)?;
-        all(finite, "position_bias_m", &self.position_bias_m)?;
-        all(not_negative, "velocity_noise_m_s", &self.velocity_noise_m_s)
-    }
-
     /// The drift one measurement after `drift_W_m`; there is none before the first.
     fn drift(&self, drift_W_m: Option<Vector3<f64>>, random: &mut Stream) -> Vector3<f64> {
         let sigma_m = Vector3::from(self.position_drift_m);
@@ -143,34 +111,22 @@ impl Sensor for GpsParams {
     type State = GpsState;
 
     fn new(parameters: Self) -> Result<Self, ParameterError> {
-        parameters.validate()?;
         Ok(parameters)
-    }
-
-    fn timing(&self) -> Timing {
-        let Self { rate_hz, delay_ms, dropout, dropout_mean_s, .. } = *self;
-        Timing { rate_hz, delay_ms, dropout, dropout_mean_s }
     }
 
     fn initial(&self) -> GpsState {
         GpsState::default()
     }
 
-    fn sample(
-        &self,
-        channel: &mut Channel,
-        state: &mut GpsState,
-        now_ns: u64,
-        inputs: TruthInputs<'_>,
-    ) -> Outputs {
+    fn sample(&self, tick: &mut Tick<'_>, state: &mut Self::State, inputs: Self::Inputs<'_>) -> Outputs {
         let truth = inputs.state;
         let GpsState { channel: under_way, queue, drift } = state;
-        let gps = channel.step(under_way, queue, now_ns, |last, chance| {
+        let gps = tick.measure(under_way, queue, |last, chance| {
             let measured = self.measure(truth, drift, chance);
             if chance.is_lost(0) {
                 return Gps { valid: 0, ..*last };
             }
-            Gps { measured_ns: now_ns, valid: 1, ..measured }
+            Gps { measured_ns: chance.now_ns, valid: 1, ..measured }
         });
         Outputs { gps }
     }

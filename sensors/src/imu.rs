@@ -6,6 +6,7 @@
 
 use crate::channel::{Channel, ChannelState, QUEUE};
 use crate::imu_model::{ImuModel, ImuModelState, ImuParams, ImuReading};
+use crate::noise::{drawn_words, set_drawn_words};
 use crate::sensing::TruthInputs;
 use crate::wire::{vector, vector_message};
 use bus::component::{Component, Info, StepError};
@@ -51,19 +52,16 @@ impl ImuState {
         state
     }
 
-    #[allow(clippy::cast_possible_truncation, reason = "the halves of the count are taken apart")]
     fn store(&mut self, model: &ImuModelState) {
-        let words = model.random_words();
         self.accelerometer_bias = vector_message(model.accelerometer_bias_B_m_s2);
         self.gyroscope_bias = vector_message(model.gyroscope_bias_B_rad_s);
-        self.random_words = [words as u64, (words >> 64) as u64];
+        self.random_words = drawn_words(&model.random);
     }
 
     fn restore(&self, model: &mut ImuModelState) {
         model.accelerometer_bias_B_m_s2 = vector(self.accelerometer_bias);
         model.gyroscope_bias_B_rad_s = vector(self.gyroscope_bias);
-        let [low, high] = self.random_words;
-        model.set_random_words(u128::from(high) << 64 | u128::from(low));
+        set_drawn_words(&mut model.random, self.random_words);
     }
 }
 
@@ -112,9 +110,10 @@ impl Component for ImuSensor {
         let reading = message(&self.model.read(&mut self.model_state, &truth(inputs.state)));
         state.store(&self.model_state);
         let ImuState { channel, queue, .. } = state;
-        let imu = self.channel.step(channel, queue, context.time_ns(), |last, chance| {
-            if chance.is_lost(0) { *last } else { reading }
-        });
+        let imu = self
+            .channel
+            .at(context.time_ns())
+            .measure(channel, queue, |last, chance| if chance.is_lost(0) { *last } else { reading });
         Ok(Outputs { imu })
     }
 }

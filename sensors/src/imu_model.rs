@@ -14,58 +14,40 @@ use bus::messages::Imu;
 use bus::random::{Stream, stream};
 use diagnostics::parameter::{ParameterError, finite, not_negative, positive};
 use nalgebra::Vector3;
-use serde::Deserialize;
 
-/// What an IMU does to the truth; the defaults are an Analog Devices ADIS16448.
-///
-/// The noise densities and bias walks are those that the EuRoC micro aerial vehicle data set gives for
-/// its ADIS16448 (Burri et al., "The EuRoC micro aerial vehicle datasets", IJRR 2016, file
-/// `imu0/sensor.yaml`); no data sheet of a part of this class gives a bias walk. The ranges are the
-/// data sheet's (±18 g, ±1000 °/s). The thesis does not name the part on the Hummingbird, so none of
-/// these is its own. The initial biases are zero: an autopilot nulls them at rest before take-off. Readings are neither
-/// delayed nor lost: the autopilot reads the part over a wire of a few centimetres.
-#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct ImuParams {
-    /// White noise of the accelerometer, m/s²/√Hz.
-    pub accelerometer_noise_density_m_s2_sqrt_hz: f64,
-    /// Random walk of the accelerometer's bias, m/s³/√Hz.
-    pub accelerometer_bias_walk_m_s3_sqrt_hz: f64,
-    /// The accelerometer's bias at the first reading, body axes, m/s².
-    pub accelerometer_initial_bias_m_s2: [f64; 3],
-    /// The accelerometer reads no more than this on any axis, m/s².
-    pub accelerometer_range_m_s2: f64,
-    /// White noise of the gyroscope, rad/s/√Hz.
-    pub gyroscope_noise_density_rad_s_sqrt_hz: f64,
-    /// Random walk of the gyroscope's bias, rad/s²/√Hz.
-    pub gyroscope_bias_walk_rad_s2_sqrt_hz: f64,
-    /// The gyroscope's bias at the first reading, body axes, rad/s.
-    pub gyroscope_initial_bias_rad_s: [f64; 3],
-    /// The gyroscope reads no more than this on any axis, rad/s.
-    pub gyroscope_range_rad_s: f64,
-    /// How long after it is made a reading arrives, ms.
-    pub delay_ms: f64,
-    /// The fraction of readings that are lost.
-    pub dropout: f64,
-    /// How long losses last on average, s; 0 where each is independent of the one before.
-    pub dropout_mean_s: f64,
-}
-
-impl Default for ImuParams {
-    fn default() -> Self {
-        Self {
-            accelerometer_noise_density_m_s2_sqrt_hz: 2.0e-3,
-            accelerometer_bias_walk_m_s3_sqrt_hz: 3.0e-3,
-            accelerometer_initial_bias_m_s2: [0.0; 3],
-            accelerometer_range_m_s2: 18.0 * diagnostics::unit::STANDARD_GRAVITY_M_S2,
-            gyroscope_noise_density_rad_s_sqrt_hz: 1.6968e-4,
-            gyroscope_bias_walk_rad_s2_sqrt_hz: 1.9393e-5,
-            gyroscope_initial_bias_rad_s: [0.0; 3],
-            gyroscope_range_rad_s: 1000.0_f64.to_radians(),
-            delay_ms: 0.0,
-            dropout: 0.0,
-            dropout_mean_s: 0.0,
-        }
+parameters! {
+    /// What an IMU does to the truth; the defaults are an Analog Devices ADIS16448.
+    ///
+    /// The noise densities and bias walks are those that the EuRoC micro aerial vehicle data set gives for
+    /// its ADIS16448 (Burri et al., "The EuRoC micro aerial vehicle datasets", IJRR 2016, file
+    /// `imu0/sensor.yaml`); no data sheet of a part of this class gives a bias walk. The ranges are the
+    /// data sheet's (±18 g, ±1000 °/s). The thesis does not name the part on the Hummingbird, so none of
+    /// these is its own. The initial biases are zero: an autopilot nulls them at rest before take-off. Readings are neither
+    /// delayed nor lost: the autopilot reads the part over a wire of a few centimetres.
+    #[derive(Copy)]
+    pub struct ImuParams {
+        /// White noise of the accelerometer, m/s²/√Hz.
+        accelerometer_noise_density_m_s2_sqrt_hz: f64 = 2.0e-3 => not_negative,
+        /// Random walk of the accelerometer's bias, m/s³/√Hz.
+        accelerometer_bias_walk_m_s3_sqrt_hz: f64 = 3.0e-3 => not_negative,
+        /// The accelerometer's bias at the first reading, body axes, m/s².
+        accelerometer_initial_bias_m_s2: [f64; 3] = [0.0; 3] => finite,
+        /// The accelerometer reads no more than this on any axis, m/s².
+        accelerometer_range_m_s2: f64 = 18.0 * diagnostics::unit::STANDARD_GRAVITY_M_S2 => positive,
+        /// White noise of the gyroscope, rad/s/√Hz.
+        gyroscope_noise_density_rad_s_sqrt_hz: f64 = 1.6968e-4 => not_negative,
+        /// Random walk of the gyroscope's bias, rad/s²/√Hz.
+        gyroscope_bias_walk_rad_s2_sqrt_hz: f64 = 1.9393e-5 => not_negative,
+        /// The gyroscope's bias at the first reading, body axes, rad/s.
+        gyroscope_initial_bias_rad_s: [f64; 3] = [0.0; 3] => finite,
+        /// The gyroscope reads no more than this on any axis, rad/s.
+        gyroscope_range_rad_s: f64 = 1000.0_f64.to_radians() => positive,
+        /// How long after it is made a reading arrives, ms.
+        delay_ms: f64 = 0.0,
+        /// The fraction of readings that are lost.
+        dropout: f64 = 0.0,
+        /// How long losses last on average, s; 0 where each is independent of the one before.
+        dropout_mean_s: f64 = 0.0,
     }
 }
 
@@ -86,25 +68,6 @@ impl ImuParams {
             gyroscope_bias_walk_rad_s2_sqrt_hz: 0.0,
             ..Self::default()
         }
-    }
-
-    fn validate(&self) -> Result<(), ParameterError> {
-        // The rate follows from the node's period, which is known when it starts.
-        self.timing(1.0).validate_at_any_rate()?;
-        not_negative(
-            "accelerometer_noise_density_m_s2_sqrt_hz",
-            self.accelerometer_noise_density_m_s2_sqrt_hz,
-        )?;
-        not_negative("accelerometer_bias_walk_m_s3_sqrt_hz", self.accelerometer_bias_walk_m_s3_sqrt_hz)?;
-        not_negative("gyroscope_noise_density_rad_s_sqrt_hz", self.gyroscope_noise_density_rad_s_sqrt_hz)?;
-        not_negative("gyroscope_bias_walk_rad_s2_sqrt_hz", self.gyroscope_bias_walk_rad_s2_sqrt_hz)?;
-        positive("accelerometer_range_m_s2", self.accelerometer_range_m_s2)?;
-        positive("gyroscope_range_rad_s", self.gyroscope_range_rad_s)?;
-        for axis in 0..3 {
-            finite("accelerometer_initial_bias_m_s2", self.accelerometer_initial_bias_m_s2[axis])?;
-            finite("gyroscope_initial_bias_rad_s", self.gyroscope_initial_bias_rad_s[axis])?;
-        }
-        Ok(())
     }
 }
 
@@ -143,23 +106,8 @@ pub struct ImuModelState {
     pub accelerometer_bias_B_m_s2: Vector3<f64>,
     /// The gyroscope's bias at the next reading, body axes, rad/s.
     pub gyroscope_bias_B_rad_s: Vector3<f64>,
-    random: Stream,
-}
-
-impl ImuModelState {
-    /// How far the random stream has been drawn, in words of 32 bits.
-    #[must_use]
-    pub fn random_words(&self) -> u128 {
-        self.random.get_word_pos()
-    }
-
-    /// Goes on at `words` of the random stream.
-    pub fn set_random_words(&mut self, words: u128) {
-        // Where it is there already, its block need not be computed again.
-        if self.random.get_word_pos() != words {
-            self.random.set_word_pos(words);
-        }
-    }
+    /// The node's random stream.
+    pub(crate) random: Stream,
 }
 
 impl ImuModel {
@@ -217,6 +165,7 @@ fn saturate(value: Vector3<f64>, range: f64) -> Vector3<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::noise::{drawn_words, set_drawn_words};
 
     const RATE_HZ: f64 = 1000.0;
 
@@ -305,7 +254,7 @@ mod tests {
         let mut second = model.initial_state(7, "imu");
         second.accelerometer_bias_B_m_s2 = first.accelerometer_bias_B_m_s2;
         second.gyroscope_bias_B_rad_s = first.gyroscope_bias_B_rad_s;
-        second.set_random_words(first.random_words());
+        set_drawn_words(&mut second.random, drawn_words(&first.random));
         for _ in 0..100 {
             assert_eq!(model.read(&mut first, &truth()), model.read(&mut second, &truth()));
         }

@@ -1,31 +1,36 @@
 //! Sensor emulators and estimators.
 //!
 //! A sensor is a type that implements [`sensing::Sensor`]; [`sensing::Sensing`] makes a component of it. The rooms:
-//! - [`sensing`]: sensors as components; [`channel`]: when they measure, and how measurements are delayed and lost.
+//! - [`sensing`]: sensors as components; `channel`: when they measure, and how measurements are delayed and lost.
+//! - `parameters`: tables of parameters, each with its default and bounds.
 //! - [`noise`]: white noise from its density, bias as a random walk.
 //! - [`imu_model`], [`imu`]: accelerometer and gyroscope.
 //! - [`gps`], [`mocap`]: position from satellites, position and attitude from cameras.
-//! - [`barometer`], [`atmosphere`]: air pressure, and how it falls with height.
-//! - [`magnetometer`], [`earth_field`]: the earth's magnetic field, at the vehicle and in the world.
-//! - [`range`], [`cone`]: five range finders, and what their beams meet.
+//! - [`barometer`], `atmosphere`: air pressure, and how it falls with height.
+//! - [`magnetometer`], `earth_field`: the earth's magnetic field, at the vehicle and in the world.
+//! - [`range`], `cone`: five range finders, and what their beams meet.
 //! - [`rpm`]: rotor speeds, and faults of their sensors; [`battery`]: voltage, current and charge.
 //! - [`clearance`]: true distances to the scene, for judging.
-//! - [`complementary`], [`attitude`]: attitude from an IMU's readings.
+//! - [`complementary`], `attitude`: attitude from an IMU's readings.
 //! - [`ekf`]: position, velocity and attitude from an IMU, GPS or motion capture, barometer, magnetometer.
 //! - [`range_inertial`]: velocity, height and walls from range finders, an IMU and an attitude.
 //! - `steps`: what is left of a value at a resolution; `wire`: the vectors of messages as those of nalgebra.
 //! - `testing`: what the tests of sensors share.
 #![forbid(unsafe_code)]
 
-pub mod atmosphere;
-pub mod attitude;
+// First: modules behind it see its macro without importing it.
+#[macro_use]
+mod parameters;
+
+mod atmosphere;
+mod attitude;
 pub mod barometer;
 pub mod battery;
-pub mod channel;
+mod channel;
 pub mod clearance;
 pub mod complementary;
-pub mod cone;
-pub mod earth_field;
+mod cone;
+mod earth_field;
 pub mod ekf;
 pub mod gps;
 pub mod imu;

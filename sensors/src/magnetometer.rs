@@ -4,9 +4,10 @@
 //! cut off at its range. `crate::channel` says when it measures, how measurements are delayed and lost.
 #![allow(non_snake_case, reason = "a trailing _W or _B names the frame a vector is written in, _T the tesla")]
 
-use crate::channel::{Channel, ChannelState, QUEUE, Timing};
+use crate::channel::{ChannelState, QUEUE, Tick};
 use crate::earth_field::EarthField;
 use crate::noise::standard_normal;
+use crate::parameters::within;
 use crate::sensing::{Sensor, TruthInputs};
 use crate::steps::in_steps;
 use crate::wire::{attitude, vector_message};
@@ -14,60 +15,32 @@ use bus::component::Info;
 use bus::messages::Magnetometer;
 use bus::random::Stream;
 use bus::{Message, OutputPorts};
-use diagnostics::parameter::{ParameterError, all, finite, not_negative, positive, require};
+use diagnostics::parameter::{ParameterError, finite, not_negative, positive};
 use nalgebra::{UnitQuaternion, Vector3};
-use serde::Deserialize;
 
-/// What a magnetometer makes of the earth's field; the defaults are a Honeywell HMC5883L.
-///
-/// Its data sheet (900405): noise floor 2 mG, 1090 counts per gauss in its default range of ±1.3 gauss, up to
-/// 160 Hz in single measurements of 6 ms each. The default field is that of [`EarthField`].
-#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct MagnetometerParams {
-    /// Measurements a second.
-    pub rate_hz: f64,
-    /// How long after measuring a measurement arrives, ms.
-    pub delay_ms: f64,
-    /// The fraction of measurements that are lost.
-    pub dropout: f64,
-    /// How long losses last on average, s; 0 where each is independent of the one before.
-    pub dropout_mean_s: f64,
-    /// Magnetic flux density of the earth's field, T.
-    pub field_T: f64,
-    /// How far the earth's field points below the horizon, degrees.
-    pub inclination_deg: f64,
-    /// How far magnetic north lies east of the world's x axis, degrees.
-    pub declination_deg: f64,
-    /// Field of what is magnetised on the vehicle, body axes, T.
-    pub hard_iron_T: [f64; 3],
-    /// What is left of the field along each body axis.
-    pub soft_iron_scale: [f64; 3],
-    /// Standard deviation of each axis, T.
-    pub noise_T: f64,
-    /// Readings are multiples of this, T; 0 for any reading.
-    pub resolution_T: f64,
-    /// The most that an axis reads, T.
-    pub range_T: f64,
-}
-
-impl Default for MagnetometerParams {
-    fn default() -> Self {
-        let EarthField { field_T, inclination_deg, declination_deg } = EarthField::default();
-        Self {
-            rate_hz: 100.0,
-            delay_ms: 6.0,
-            dropout: 0.0,
-            dropout_mean_s: 0.0,
-            field_T,
-            inclination_deg,
-            declination_deg,
-            hard_iron_T: [0.0; 3],
-            soft_iron_scale: [1.0; 3],
-            noise_T: 2.0e-7,
-            resolution_T: 1e-4 / 1090.0,
-            range_T: 1.3e-4,
-        }
+parameters! {
+    /// What a magnetometer makes of the earth's field; the defaults are a Honeywell HMC5883L.
+    ///
+    /// Its data sheet (900405): noise floor 2 mG, 1090 counts per gauss in its default range of ±1.3 gauss, up to
+    /// 160 Hz in single measurements of 6 ms each. The default field is that of [`EarthField`].
+    #[derive(Copy)]
+    pub struct MagnetometerParams timed { rate_hz: 100.0, delay_ms: 6.0 } {
+        /// Magnetic flux density of the earth's field, T.
+        field_T: f64 = EarthField::default().field_T => not_negative,
+        /// How far the earth's field points below the horizon, degrees.
+        inclination_deg: f64 = EarthField::default().inclination_deg => within(-90.0..=90.0, "from -90 to 90"),
+        /// How far magnetic north lies east of the world's x axis, degrees.
+        declination_deg: f64 = EarthField::default().declination_deg => finite,
+        /// Field of what is magnetised on the vehicle, body axes, T.
+        hard_iron_T: [f64; 3] = [0.0; 3] => finite,
+        /// What is left of the field along each body axis.
+        soft_iron_scale: [f64; 3] = [1.0; 3] => finite,
+        /// Standard deviation of each axis, T.
+        noise_T: f64 = 2.0e-7 => not_negative,
+        /// Readings are multiples of this, T; 0 for any reading.
+        resolution_T: f64 = 1e-4 / 1090.0 => not_negative,
+        /// The most that an axis reads, T.
+        range_T: f64 = 1.3e-4 => positive,
     }
 }
 
@@ -75,18 +48,6 @@ impl MagnetometerParams {
     fn field_W_T(&self) -> Vector3<f64> {
         let Self { field_T, inclination_deg, declination_deg, .. } = *self;
         EarthField { field_T, inclination_deg, declination_deg }.vector_W_T()
-    }
-
-    fn validate(&self) -> Result<(), ParameterError> {
-        not_negative("field_T", self.field_T)?;
-        let inclination_is_good = self.inclination_deg.abs() <= 90.0;
-        require("inclination_deg", self.inclination_deg, inclination_is_good, "from -90 to 90")?;
-        finite("declination_deg", self.declination_deg)?;
-        all(finite, "hard_iron_T", &self.hard_iron_T)?;
-        all(finite, "soft_iron_scale", &self.soft_iron_scale)?;
-        not_negative("noise_T", self.noise_T)?;
-        not_negative("resolution_T", self.resolution_T)?;
-        positive("range_T", self.range_T)
     }
 
     /// What is read on a body with `attitude_WB`, body axes, T.
@@ -125,33 +86,21 @@ impl Sensor for MagnetometerParams {
     type State = MagnetometerState;
 
     fn new(parameters: Self) -> Result<Self, ParameterError> {
-        parameters.validate()?;
         Ok(parameters)
-    }
-
-    fn timing(&self) -> Timing {
-        let Self { rate_hz, delay_ms, dropout, dropout_mean_s, .. } = *self;
-        Timing { rate_hz, delay_ms, dropout, dropout_mean_s }
     }
 
     fn initial(&self) -> MagnetometerState {
         MagnetometerState::default()
     }
 
-    fn sample(
-        &self,
-        channel: &mut Channel,
-        state: &mut MagnetometerState,
-        now_ns: u64,
-        inputs: TruthInputs<'_>,
-    ) -> Outputs {
+    fn sample(&self, tick: &mut Tick<'_>, state: &mut Self::State, inputs: Self::Inputs<'_>) -> Outputs {
         let truth = inputs.state;
-        let magnetometer = channel.step(&mut state.channel, &mut state.queue, now_ns, |last, chance| {
+        let magnetometer = tick.measure(&mut state.channel, &mut state.queue, |last, chance| {
             let field = vector_message(self.measure(attitude(truth.attitude), chance.noise));
             if chance.is_lost(0) {
                 return Magnetometer { valid: 0, ..*last };
             }
-            Magnetometer { measured_ns: now_ns, field, valid: 1, ..Default::default() }
+            Magnetometer { measured_ns: chance.now_ns, field, valid: 1, ..Default::default() }
         });
         Outputs { magnetometer }
     }

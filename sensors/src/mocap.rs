@@ -4,7 +4,7 @@
 //! it measures, how measurements are delayed and lost.
 #![allow(non_snake_case, reason = "a trailing _W or _B names the frame a vector is written in")]
 
-use crate::channel::{Channel, ChannelState, QUEUE, Timing};
+use crate::channel::{ChannelState, QUEUE, Tick};
 use crate::noise::standard_normal;
 use crate::sensing::{Sensor, TruthInputs};
 use crate::wire::{attitude, attitude_message, vector, vector_message};
@@ -12,61 +12,31 @@ use bus::component::Info;
 use bus::messages::Mocap;
 use bus::random::Stream;
 use bus::{Message, OutputPorts};
-use diagnostics::parameter::{ParameterError, all, finite, not_negative};
+use diagnostics::parameter::{ParameterError, finite, not_negative};
 use nalgebra::{UnitQuaternion, Vector3};
-use serde::Deserialize;
 
-/// What motion capture does to the truth; the defaults are a Vicon system of MX cameras.
-///
-/// *Position*: Merriaux et al., "A study of Vicon system positioning performance" (Sensors 17(7), 2017), find a
-/// mean error of 0.15 mm at rest and below 2 mm in motion; 0.5 mm lies between. *Attitude*: 0.5 mm seen on
-/// markers 0.3 m apart is about 0.1°. *Rate and delay*: such systems stream at 100 Hz and more; 10 ms are one
-/// frame of exposure and solving, as the network adds little (tuned, no source). Losses are off: they depend on
-/// the room.
-#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct MocapParams {
-    /// Measurements a second.
-    pub rate_hz: f64,
-    /// How long after measuring a measurement arrives, ms.
-    pub delay_ms: f64,
-    /// The fraction of measurements that are lost.
-    pub dropout: f64,
-    /// How long losses last on average, s; 0 where each is independent of the one before.
-    pub dropout_mean_s: f64,
-    /// Standard deviation of each axis of a position, m.
-    pub position_noise_m: f64,
-    /// Standard deviation of the rotation about each body axis, degrees.
-    pub attitude_noise_deg: f64,
-    /// Constant error of the position, world axes, m.
-    pub position_bias_m: [f64; 3],
-    /// Constant error of the attitude: a rotation about the body's axes, degrees.
-    pub attitude_bias_deg: [f64; 3],
-}
-
-impl Default for MocapParams {
-    fn default() -> Self {
-        Self {
-            rate_hz: 100.0,
-            delay_ms: 10.0,
-            dropout: 0.0,
-            dropout_mean_s: 0.0,
-            position_noise_m: 0.5e-3,
-            attitude_noise_deg: 0.1,
-            position_bias_m: [0.0; 3],
-            attitude_bias_deg: [0.0; 3],
-        }
+parameters! {
+    /// What motion capture does to the truth; the defaults are a Vicon system of MX cameras.
+    ///
+    /// *Position*: Merriaux et al., "A study of Vicon system positioning performance" (Sensors 17(7), 2017), find a
+    /// mean error of 0.15 mm at rest and below 2 mm in motion; 0.5 mm lies between. *Attitude*: 0.5 mm seen on
+    /// markers 0.3 m apart is about 0.1°. *Rate and delay*: such systems stream at 100 Hz and more; 10 ms are one
+    /// frame of exposure and solving, as the network adds little (tuned, no source). Losses are off: they depend on
+    /// the room.
+    #[derive(Copy)]
+    pub struct MocapParams timed { rate_hz: 100.0, delay_ms: 10.0 } {
+        /// Standard deviation of each axis of a position, m.
+        position_noise_m: f64 = 0.5e-3 => not_negative,
+        /// Standard deviation of the rotation about each body axis, degrees.
+        attitude_noise_deg: f64 = 0.1 => not_negative,
+        /// Constant error of the position, world axes, m.
+        position_bias_m: [f64; 3] = [0.0; 3] => finite,
+        /// Constant error of the attitude: a rotation about the body's axes, degrees.
+        attitude_bias_deg: [f64; 3] = [0.0; 3] => finite,
     }
 }
 
 impl MocapParams {
-    fn validate(&self) -> Result<(), ParameterError> {
-        not_negative("position_noise_m", self.position_noise_m)?;
-        not_negative("attitude_noise_deg", self.attitude_noise_deg)?;
-        all(finite, "position_bias_m", &self.position_bias_m)?;
-        all(finite, "attitude_bias_deg", &self.attitude_bias_deg)
-    }
-
     /// What cameras make of a body at `position_W_m` with `attitude_WB`.
     fn measure(
         &self,
@@ -110,34 +80,22 @@ impl Sensor for MocapParams {
     type State = MocapState;
 
     fn new(parameters: Self) -> Result<Self, ParameterError> {
-        parameters.validate()?;
         Ok(parameters)
-    }
-
-    fn timing(&self) -> Timing {
-        let Self { rate_hz, delay_ms, dropout, dropout_mean_s, .. } = *self;
-        Timing { rate_hz, delay_ms, dropout, dropout_mean_s }
     }
 
     fn initial(&self) -> MocapState {
         MocapState::default()
     }
 
-    fn sample(
-        &self,
-        channel: &mut Channel,
-        state: &mut MocapState,
-        now_ns: u64,
-        inputs: TruthInputs<'_>,
-    ) -> Outputs {
+    fn sample(&self, tick: &mut Tick<'_>, state: &mut Self::State, inputs: Self::Inputs<'_>) -> Outputs {
         let truth = inputs.state;
-        let mocap = channel.step(&mut state.channel, &mut state.queue, now_ns, |last, chance| {
+        let mocap = tick.measure(&mut state.channel, &mut state.queue, |last, chance| {
             let measured = self.measure(vector(truth.position), attitude(truth.attitude), chance.noise);
             if chance.is_lost(0) {
                 return Mocap { valid: 0, ..*last };
             }
             let (position, attitude) = (vector_message(measured.0), attitude_message(measured.1));
-            Mocap { measured_ns: now_ns, position, attitude, valid: 1, ..Default::default() }
+            Mocap { measured_ns: chance.now_ns, position, attitude, valid: 1, ..Default::default() }
         });
         Outputs { mocap }
     }

@@ -72,6 +72,22 @@ pub(crate) fn standard_normal(random: &mut Stream) -> Vector3<f64> {
     Vector3::new(x, y, z)
 }
 
+/// How far a random stream has been drawn, in words of 32 bits: the low and the high half of the count.
+#[allow(clippy::cast_possible_truncation, reason = "the halves of the count are taken apart")]
+pub(crate) fn drawn_words(random: &Stream) -> [u64; 2] {
+    let words = random.get_word_pos();
+    [words as u64, (words >> 64) as u64]
+}
+
+/// Has a random stream go on where it was drawn so far.
+pub(crate) fn set_drawn_words(random: &mut Stream, [low, high]: [u64; 2]) {
+    let words = u128::from(high) << 64 | u128::from(low);
+    // Where it is there already, its block need not be computed again.
+    if random.get_word_pos() != words {
+        random.set_word_pos(words);
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -1,6 +1,6 @@
 //! The range node: five ultrasonic range finders along the body's +x, −x, +y, −y and −z axes.
 //!
-//! The beams tilt with the body. Each reads the nearest of what stands in its cone ([`crate::cone`]): the ground,
+//! The beams tilt with the body. Each reads the nearest of what stands in its cone (`crate::cone`): the ground,
 //! the boxes of the scene and, with the input `traffic`, the other vehicles. Reading = distance + bias + white
 //! noise, in steps of the part's resolution; each beam has its own noise and is lost on its own.
 //! `crate::channel` says when they measure, how measurements are delayed and lost.
@@ -9,8 +9,9 @@
 //! angle of incidence; a real beam that grazes a smooth floor or wall hears none.
 #![allow(non_snake_case, reason = "a trailing _W or _B names the frame a vector is written in")]
 
-use crate::channel::{Chance, Channel, ChannelState, QUEUE, Timing};
+use crate::channel::{Chance, ChannelState, QUEUE, Tick};
 use crate::cone::Cone;
+use crate::parameters::within;
 use crate::sensing::Sensor;
 use crate::steps::in_steps;
 use crate::wire::{attitude, vector};
@@ -18,10 +19,9 @@ use bus::component::Info;
 use bus::messages::{PlantState, Ranges, Traffic};
 use bus::random::normal;
 use bus::{InputPorts, Message, OutputPorts};
-use diagnostics::parameter::{ParameterError, all, finite, not_negative, positive, require};
+use diagnostics::parameter::{ParameterError, finite, not_negative, positive, require};
 use nalgebra::{UnitQuaternion, Vector3};
 use scenes::{RayCaster, Scene};
-use serde::Deserialize;
 use std::path::PathBuf;
 
 const BEAMS: usize = 5;
@@ -29,78 +29,36 @@ const BEAMS: usize = 5;
 /// A vehicle of the traffic that is nearer than this is the sensors' own: positions of one tick differ by less.
 const SELF_MAX_M: f64 = 0.01;
 
-/// What the range finders make of the truth; the defaults are five MaxBotix XL-MaxSonar-AE0 (MB1300).
-///
-/// *Reach, resolution, nearest reading and rate* are the data sheet's (PD11840): 7.65 m, 1 cm, 20 cm, which it
-/// reads from anything nearer too, and 10 Hz. *Delay*: sound takes 45 ms to the end of the reach and back, and
-/// the serial output another 5 ms. *Noise*: the data sheet has no figure but the resolution; 1 cm is tuned, no
-/// source. *Half angle*: it draws the beam as a shape that changes with target and distance; 5° is tuned, no
-/// source. The vehicle's radius is that of the Hummingbird: half of the 0.34 m between rotor axes (thesis,
-/// Table 2.1) and the radius of its 8 inch propellers (thesis, §2.1).
-#[derive(Debug, Clone, PartialEq, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct RangeParams {
-    /// Scene file; there is no default.
-    pub scene: Option<PathBuf>,
-    /// Measurements a second.
-    pub rate_hz: f64,
-    /// How long after measuring a measurement arrives, ms.
-    pub delay_ms: f64,
-    /// The fraction of measurements that each beam loses.
-    pub dropout: f64,
-    /// How long losses last on average, s; 0 where each is independent of the one before.
-    pub dropout_mean_s: f64,
-    /// Standard deviation of a reading, m.
-    pub noise_m: f64,
-    /// Constant error of each beam, m.
-    pub bias_m: [f64; BEAMS],
-    /// Readings are multiples of this, m; 0 for any reading.
-    pub resolution_m: f64,
-    /// Nothing beyond this is met, m.
-    pub reach_m: f64,
-    /// Whatever is nearer reads as this, m.
-    pub nearest_m: f64,
-    /// Half angle of the beams' cones, degrees, below 90.
-    pub half_angle_deg: f64,
-    /// Radius of the spheres that other vehicles are, m.
-    pub vehicle_radius_m: f64,
-    /// Which of the vehicles in the traffic is this one, numbered from 0; where absent, it is one that is nearer
-    /// than 1 cm.
-    #[serde(rename = "self")]
-    pub own_index: Option<u32>,
-}
-
-impl Default for RangeParams {
-    fn default() -> Self {
-        Self {
-            scene: None,
-            rate_hz: 10.0,
-            delay_ms: 50.0,
-            dropout: 0.0,
-            dropout_mean_s: 0.0,
-            noise_m: 0.01,
-            bias_m: [0.0; BEAMS],
-            resolution_m: 0.01,
-            reach_m: 7.65,
-            nearest_m: 0.20,
-            half_angle_deg: 5.0,
-            vehicle_radius_m: 0.27,
-            own_index: None,
-        }
-    }
-}
-
-impl RangeParams {
-    fn validate(&self) -> Result<(), ParameterError> {
-        not_negative("noise_m", self.noise_m)?;
-        all(finite, "bias_m", &self.bias_m)?;
-        not_negative("resolution_m", self.resolution_m)?;
-        positive("reach_m", self.reach_m)?;
-        let nearest_is_good = (0.0..self.reach_m).contains(&self.nearest_m);
-        require("nearest_m", self.nearest_m, nearest_is_good, "zero or more and below `reach_m`")?;
-        let angle_is_good = (0.0..90.0).contains(&self.half_angle_deg);
-        require("half_angle_deg", self.half_angle_deg, angle_is_good, "zero or more and below 90")?;
-        positive("vehicle_radius_m", self.vehicle_radius_m)
+parameters! {
+    /// What the range finders make of the truth; the defaults are five MaxBotix XL-MaxSonar-AE0 (MB1300).
+    ///
+    /// *Reach, resolution, nearest reading and rate* are the data sheet's (PD11840): 7.65 m, 1 cm, 20 cm, which it
+    /// reads from anything nearer too, and 10 Hz. *Delay*: sound takes 45 ms to the end of the reach and back, and
+    /// the serial output another 5 ms. *Noise*: the data sheet has no figure but the resolution; 1 cm is tuned, no
+    /// source. *Half angle*: it draws the beam as a shape that changes with target and distance; 5° is tuned, no
+    /// source. The vehicle's radius is that of the Hummingbird: half of the 0.34 m between rotor axes (thesis,
+    /// Table 2.1) and the radius of its 8 inch propellers (thesis, §2.1).
+    pub struct RangeParams timed { rate_hz: 10.0, delay_ms: 50.0 } {
+        /// Scene file; there is no default.
+        scene: Option<PathBuf> = None,
+        /// Standard deviation of a reading, m.
+        noise_m: f64 = 0.01 => not_negative,
+        /// Constant error of each beam, m.
+        bias_m: [f64; BEAMS] = [0.0; BEAMS] => finite,
+        /// Readings are multiples of this, m; 0 for any reading.
+        resolution_m: f64 = 0.01 => not_negative,
+        /// Nothing beyond this is met, m.
+        reach_m: f64 = 7.65 => positive,
+        /// Whatever is nearer reads as this, m.
+        nearest_m: f64 = 0.20,
+        /// Half angle of the beams' cones, degrees, below 90.
+        half_angle_deg: f64 = 5.0 => within(0.0..90.0, "zero or more and below 90"),
+        /// Radius of the spheres that other vehicles are, m.
+        vehicle_radius_m: f64 = 0.27 => positive,
+        /// Which of the vehicles in the traffic is this one, numbered from 0; where absent, it is one that is nearer
+        /// than 1 cm.
+        #[serde(rename = "self")]
+        own_index: Option<u32> = None,
     }
 }
 
@@ -211,7 +169,8 @@ impl Sensor for RangeFinders {
     type State = RangeState;
 
     fn new(params: RangeParams) -> Result<Self, ParameterError> {
-        params.validate()?;
+        let nearest_is_good = (0.0..params.reach_m).contains(&params.nearest_m);
+        require("nearest_m", params.nearest_m, nearest_is_good, "zero or more and below `reach_m`")?;
         let path = params.scene.as_ref().ok_or_else(|| ParameterError::missing("scene", ""))?;
         let scene = Scene::load(path).map_err(|error| ParameterError::conflict("scene", error))?;
         let (x, y, z) = (Vector3::x_axis(), Vector3::y_axis(), Vector3::z_axis());
@@ -220,26 +179,15 @@ impl Sensor for RangeFinders {
         Ok(Self { params, cones, scene: RayCaster::new(&scene) })
     }
 
-    fn timing(&self) -> Timing {
-        let RangeParams { rate_hz, delay_ms, dropout, dropout_mean_s, .. } = self.params;
-        Timing { rate_hz, delay_ms, dropout, dropout_mean_s }
-    }
-
     /// Until the first measurement arrives, nothing is met.
     fn initial(&self) -> RangeState {
         let nothing = Ranges { distance: [self.params.reach_m; BEAMS], ..Default::default() };
         RangeState { channel: ChannelState::default(), queue: [nothing; QUEUE] }
     }
 
-    fn sample(
-        &self,
-        channel: &mut Channel,
-        state: &mut RangeState,
-        now_ns: u64,
-        inputs: RangeInputs<'_>,
-    ) -> Outputs {
-        let ranges = channel.step(&mut state.channel, &mut state.queue, now_ns, |last, chance| Ranges {
-            measured_ns: now_ns,
+    fn sample(&self, tick: &mut Tick<'_>, state: &mut Self::State, inputs: Self::Inputs<'_>) -> Outputs {
+        let ranges = tick.measure(&mut state.channel, &mut state.queue, |last, chance| Ranges {
+            measured_ns: chance.now_ns,
             ..self.measure(last, chance, inputs.state, inputs.traffic)
         });
         Outputs { ranges }

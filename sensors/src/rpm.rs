@@ -4,7 +4,7 @@
 //! measures, how measurements are delayed and lost. Two faults can be put in, to see whether they are taken for
 //! physics of the vehicle: a rotor whose reading is stuck, and one of which half is read.
 
-use crate::channel::{Chance, Channel, ChannelState, QUEUE, Timing};
+use crate::channel::{Chance, ChannelState, QUEUE, Tick};
 use crate::sensing::{Sensor, TruthInputs};
 use crate::steps::in_steps;
 use bus::component::Info;
@@ -12,60 +12,31 @@ use bus::messages::RotorSpeeds;
 use bus::random::normal;
 use bus::{Message, OutputPorts};
 use diagnostics::parameter::{ParameterError, not_negative, require};
-use serde::Deserialize;
 
-/// What the motors' controllers make of the truth.
-///
-/// *Resolution*: telemetry of electronic speed controllers (KISS, BLHeli_32) counts hundreds of electrical revolutions
-/// a minute; with 7 pole pairs, usual for motors of this size, these are 14.3 rpm, 1.5 rad/s. *Noise* and *rate* are
-/// tuned, no source: one count, 200 Hz. *Delay* is off: the count is timed where it is made.
-#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct RpmParams {
-    /// Measurements a second.
-    pub rate_hz: f64,
-    /// How long after measuring a measurement arrives, ms.
-    pub delay_ms: f64,
-    /// The fraction of measurements that are lost.
-    pub dropout: f64,
-    /// How long losses last on average, s; 0 where each is independent of the one before.
-    pub dropout_mean_s: f64,
-    /// Standard deviation of a speed, rad/s.
-    pub noise_rad_s: f64,
-    /// Speeds are multiples of this, rad/s; 0 for any.
-    pub resolution_rad_s: f64,
-    /// The rotor, from 1, that reads for ever what it read first; 0 for none.
-    pub stuck_rotor: usize,
-    /// The rotor, from 1, of whose speed half is read; 0 for none.
-    pub half_reading_rotor: usize,
+parameters! {
+    /// What the motors' controllers make of the truth.
+    ///
+    /// *Resolution*: telemetry of electronic speed controllers (KISS, BLHeli_32) counts hundreds of electrical revolutions
+    /// a minute; with 7 pole pairs, usual for motors of this size, these are 14.3 rpm, 1.5 rad/s. *Noise* and *rate* are
+    /// tuned, no source: one count, 200 Hz. *Delay* is off: the count is timed where it is made.
+    #[derive(Copy)]
+    pub struct RpmParams timed { rate_hz: 200.0, delay_ms: 0.0 } {
+        /// Standard deviation of a speed, rad/s.
+        noise_rad_s: f64 = 1.5 => not_negative,
+        /// Speeds are multiples of this, rad/s; 0 for any.
+        resolution_rad_s: f64 = 1.5 => not_negative,
+        /// The rotor, from 1, that reads for ever what it read first; 0 for none.
+        stuck_rotor: usize = 0 => rotor,
+        /// The rotor, from 1, of whose speed half is read; 0 for none.
+        half_reading_rotor: usize = 0 => rotor,
+    }
 }
 
-impl Default for RpmParams {
-    fn default() -> Self {
-        Self {
-            rate_hz: 200.0,
-            delay_ms: 0.0,
-            dropout: 0.0,
-            dropout_mean_s: 0.0,
-            noise_rad_s: 1.5,
-            resolution_rad_s: 1.5,
-            stuck_rotor: 0,
-            half_reading_rotor: 0,
-        }
-    }
+fn rotor(key: &str, number: f64) -> Result<(), ParameterError> {
+    require(key, number, number <= 4.0, "the number of a rotor, 1 to 4, or 0 for none")
 }
 
 impl RpmParams {
-    fn validate(&self) -> Result<(), ParameterError> {
-        not_negative("noise_rad_s", self.noise_rad_s)?;
-        not_negative("resolution_rad_s", self.resolution_rad_s)?;
-        let rotor = |key, number: usize| {
-            require(key, number as f64, number <= 4, "the number of a rotor, 1 to 4, or 0 for none")
-        };
-        rotor("stuck_rotor", self.stuck_rotor)?;
-        rotor("half_reading_rotor", self.half_reading_rotor)
-    }
-
     /// What is read of `truth_rad_s`, after `before`, the reading before; none before the first.
     fn read(&self, truth_rad_s: &[f64; 4], before: Option<[f64; 4]>, chance: &mut Chance<'_>) -> [f64; 4] {
         std::array::from_fn(|rotor| {
@@ -118,35 +89,23 @@ impl Sensor for RpmParams {
     type State = RpmState;
 
     fn new(parameters: Self) -> Result<Self, ParameterError> {
-        parameters.validate()?;
         Ok(parameters)
-    }
-
-    fn timing(&self) -> Timing {
-        let Self { rate_hz, delay_ms, dropout, dropout_mean_s, .. } = *self;
-        Timing { rate_hz, delay_ms, dropout, dropout_mean_s }
     }
 
     fn initial(&self) -> RpmState {
         RpmState::default()
     }
 
-    fn sample(
-        &self,
-        channel: &mut Channel,
-        state: &mut RpmState,
-        now_ns: u64,
-        inputs: TruthInputs<'_>,
-    ) -> Outputs {
+    fn sample(&self, tick: &mut Tick<'_>, state: &mut Self::State, inputs: Self::Inputs<'_>) -> Outputs {
         let truth = inputs.state;
         let RpmState { channel: under_way, queue, read, has_read } = state;
-        let speeds = channel.step(under_way, queue, now_ns, |last, chance| {
+        let speeds = tick.measure(under_way, queue, |last, chance| {
             *read = self.read(&truth.rotor_speed, (*has_read == 1).then_some(*read), chance);
             *has_read = 1;
             if chance.is_lost(0) {
                 return RotorSpeeds { valid: 0, ..*last };
             }
-            RotorSpeeds { measured_ns: now_ns, rotor_speed: *read, valid: 1, ..Default::default() }
+            RotorSpeeds { measured_ns: chance.now_ns, rotor_speed: *read, valid: 1, ..Default::default() }
         });
         Outputs { speeds }
     }

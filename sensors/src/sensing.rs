@@ -1,20 +1,20 @@
 //! A sensor as a component: it measures what its inputs hold, and a [`Channel`] says when, and what becomes of it.
 
-use crate::channel::{Channel, Timing};
+use crate::channel::{Channel, Tick};
+use crate::parameters::Parameters;
 use bus::component::{Component, Info, StepError};
 use bus::context::{NodeContext, StepContext};
 use bus::messages::PlantState;
 use bus::ports::{InputPorts, OutputPorts};
 use bus::{InputPorts, Message};
 use diagnostics::ParameterError;
-use serde::de::DeserializeOwned;
 
 /// A sensor: all of it that does not change during a run.
 pub trait Sensor: Sized {
     /// Its name in manifests, and what it does.
     const INFO: Info;
     /// What the manifest's `parameters` table holds.
-    type Parameters: DeserializeOwned;
+    type Parameters: Parameters;
     /// What it reads.
     type Inputs<'a>: InputPorts<'a>;
     /// What it sends.
@@ -22,26 +22,18 @@ pub trait Sensor: Sized {
     /// All that it remembers from tick to tick.
     type State: Message;
 
-    /// Makes the sensor.
+    /// Makes the sensor of parameters that are within their ranges.
     ///
     /// # Errors
-    /// A parameter or a file that cannot be meant.
+    /// Parameters that do not go together, or a file that is refused.
     fn new(parameters: Self::Parameters) -> Result<Self, ParameterError>;
-
-    /// When it measures, and what becomes of it on the way.
-    fn timing(&self) -> Timing;
 
     /// The state before the first tick.
     fn initial(&self) -> Self::State;
 
-    /// What is sent at `now_ns`.
-    fn sample(
-        &self,
-        channel: &mut Channel,
-        state: &mut Self::State,
-        now_ns: u64,
-        inputs: Self::Inputs<'_>,
-    ) -> Self::Outputs;
+    /// What is sent at `tick`.
+    fn sample(&self, tick: &mut Tick<'_>, state: &mut Self::State, inputs: Self::Inputs<'_>)
+    -> Self::Outputs;
 }
 
 /// What most sensors read.
@@ -78,9 +70,9 @@ impl<S: Sensor> Component for Sensing<S> {
     type State = S::State;
 
     fn new(parameters: S::Parameters, context: &NodeContext<'_>) -> Result<Self, ParameterError> {
-        let sensor = S::new(parameters)?;
-        let channel = Channel::in_context(&sensor.timing(), context)?;
-        Ok(Self { sensor, channel })
+        parameters.validate()?;
+        let channel = Channel::in_context(&parameters.timing(), context)?;
+        Ok(Self { sensor: S::new(parameters)?, channel })
     }
 
     fn initial(&self) -> S::State {
@@ -93,6 +85,6 @@ impl<S: Sensor> Component for Sensing<S> {
         inputs: S::Inputs<'_>,
         state: &mut S::State,
     ) -> Result<S::Outputs, StepError> {
-        Ok(self.sensor.sample(&mut self.channel, state, context.time_ns(), inputs))
+        Ok(self.sensor.sample(&mut self.channel.at(context.time_ns()), state, inputs))
     }
 }

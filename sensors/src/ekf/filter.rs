@@ -62,13 +62,15 @@ pub struct EkfState {
     /// When the newest measurement of each sensor was taken; the largest number before the first.
     #[field(unit = "ns")]
     newest_ns: [u64; 4],
-    /// How the last update of each sensor went, and how often it did.
+    /// Normalised innovation squared of the last update of each sensor, in the order of [`Source::ALL`].
     #[field(unit = "1")]
-    normalised_squared: [f64; 4],
+    pub normalised_squared: [f64; 4],
+    /// Updates of each sensor so far.
     #[field(unit = "1")]
-    updates: [u32; 4],
+    pub updates: [u32; 4],
+    /// Measurements of each sensor that were refused so far.
     #[field(unit = "1")]
-    refused: [u32; 4],
+    pub refused: [u32; 4],
     /// The same without one that was used in between.
     #[field(unit = "1")]
     refused_in_row: [u32; 4],
@@ -215,20 +217,15 @@ impl Ekf {
             return;
         }
         let (motion, params) = (&state.settled, &self.params);
-        match measurement.sensor() {
-            Source::Gps => self.update(state, Source::Gps, &observation::gps(motion, &measurement, params)),
-            Source::Mocap => {
-                self.update(state, Source::Mocap, &observation::mocap(motion, &measurement, params))
-            }
+        let sensor = measurement.sensor();
+        match sensor {
+            Source::Gps => self.update(state, sensor, &observation::gps(motion, &measurement, params)),
+            Source::Mocap => self.update(state, sensor, &observation::mocap(motion, &measurement, params)),
             Source::Barometer => {
-                self.update(state, Source::Barometer, &observation::barometer(motion, &measurement, params));
+                self.update(state, sensor, &observation::barometer(motion, &measurement, params));
             }
             Source::Magnetometer => {
-                self.update(
-                    state,
-                    Source::Magnetometer,
-                    &observation::magnetometer(motion, &measurement, params),
-                );
+                self.update(state, sensor, &observation::magnetometer(motion, &measurement, params));
             }
         }
     }
@@ -313,24 +310,6 @@ impl EkfState {
         self.has_begun == 1
     }
 
-    /// Normalised innovation squared of the last update of each sensor, in the order of [`Source::ALL`].
-    #[must_use]
-    pub fn normalised_squared(&self) -> [f64; 4] {
-        self.normalised_squared
-    }
-
-    /// Updates of each sensor so far.
-    #[must_use]
-    pub fn updates(&self) -> [u32; 4] {
-        self.updates
-    }
-
-    /// Measurements of each sensor that were refused so far.
-    #[must_use]
-    pub fn refused(&self) -> [u32; 4] {
-        self.refused
-    }
-
     /// The newest reading.
     #[must_use]
     pub fn newest_reading(&self) -> Reading {
@@ -380,7 +359,7 @@ mod tests {
             let pose = Measurement::new(Source::Mocap, time_ns / 10_000_000 * 10_000_000, &POSE);
             filter.update_to(&mut state, &reading, &[None, Some(Some(pose)), None, None]);
         }
-        assert_eq!(state.updates()[Source::Mocap.index()], 100);
+        assert_eq!(state.updates[Source::Mocap.index()], 100);
         (state.settled, state.covariance())
     }
 

@@ -4,11 +4,11 @@ use bus::Message;
 use nalgebra::{SMatrix, SVector};
 
 const STATES: usize = 5;
-const VELOCITY: usize = 0;
+pub(super) const VELOCITY: usize = 0;
 const BIAS: usize = 1;
-const PATH: usize = 2;
+pub(super) const PATH: usize = 2;
 /// The distance ahead, in the axis's positive direction; the distance behind follows it.
-const AHEAD: usize = 3;
+pub(super) const AHEAD: usize = 3;
 
 type Mean = SVector<f64, STATES>;
 type Covariance = SMatrix<f64, STATES, STATES>;
@@ -168,22 +168,8 @@ impl Axis {
         self.in_sight[side.index()] = 0;
     }
 
-    /// Standard deviation of the velocity, m/s.
-    #[must_use]
-    pub fn velocity_sigma_m_s(&self) -> f64 {
-        self.covariance()[(VELOCITY, VELOCITY)].sqrt()
-    }
-
-    /// Standard deviation of the path, m.
-    #[must_use]
-    pub fn path_sigma_m(&self) -> f64 {
-        self.covariance()[(PATH, PATH)].sqrt()
-    }
-
-    /// Standard deviation of a distance, m.
-    #[must_use]
-    pub fn distance_sigma_m(&self, side: Side) -> f64 {
-        let state = AHEAD + side.index();
+    /// Standard deviation of one of the states.
+    pub(super) fn sigma(&self, state: usize) -> f64 {
         self.covariance()[(state, state)].sqrt()
     }
 

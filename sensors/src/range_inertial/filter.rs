@@ -15,7 +15,7 @@
 //! than the beam's way to the floor is not one of a wall.
 #![allow(non_snake_case, reason = "a trailing _W or _B names the frame a vector is written in")]
 
-use super::axis::{Axis, Echo, Side};
+use super::axis::{AHEAD, Axis, Echo, PATH, Side, VELOCITY};
 use super::params::RangeInertialParams;
 use crate::imu_model::ImuReading;
 use crate::wire::{attitude, attitude_message, vector, vector_message};
@@ -125,6 +125,7 @@ impl RangeInertial {
     /// A parameter or the period is outside its range.
     pub fn with_period(params: RangeInertialParams, period_s: f64) -> Result<Self, ParameterError> {
         params.validate()?;
+        params.validate_room()?;
         positive("period_s", period_s)?;
         Ok(Self { params, period_s })
     }
@@ -334,14 +335,14 @@ impl RangeInertialState {
     /// Standard deviation of the velocity, world axes, m/s.
     #[must_use]
     pub fn velocity_sigma_W_m_s(&self) -> Vector3<f64> {
-        Vector3::from(self.axes.map(|axis| axis.velocity_sigma_m_s()))
+        Vector3::from(self.axes.map(|axis| axis.sigma(VELOCITY)))
     }
 
     /// Standard deviation of the position, world axes, m.
     #[must_use]
     pub fn position_sigma_W_m(&self) -> Vector3<f64> {
-        let height_m = self.axes[2].distance_sigma_m(Side::Behind);
-        Vector3::new(self.axes[0].path_sigma_m(), self.axes[1].path_sigma_m(), height_m)
+        let height_m = self.axes[2].sigma(AHEAD + Side::Behind.index());
+        Vector3::new(self.axes[0].sigma(PATH), self.axes[1].sigma(PATH), height_m)
     }
 
     /// Height above what is below, m.

@@ -1,105 +1,62 @@
 //! The parameters of the range-inertial estimator.
 
 use super::axis::Inertia;
-use diagnostics::parameter::{ParameterError, not_negative, positive, require};
-use serde::Deserialize;
+use crate::parameters::within;
+use diagnostics::parameter::{ParameterError, not_negative, positive};
 
-/// What the range finders, the IMU and the attitude are worth, and where the vehicle starts.
-#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct RangeInertialParams {
-    /// Standard deviation of a range, m. Default 0.0104: the noise of the kind `range`, 0.01 m, and rounding
-    /// to its centimetre, 0.01 m / √12.
-    pub range_sigma_m: f64,
-    /// What a range finder reads where it meets nothing, m. Default 7.65, the MB1300 (thesis §5.5).
-    pub reach_m: f64,
-    /// What a range finder reads of anything nearer, m. Default 0.20 (MB1300 data sheet).
-    pub nearest_m: f64,
-    /// Half angle of the beams' cones, degrees: a wall that is turned by less is met at right angles.
-    /// Default 5, as of the kind `range`.
-    pub half_angle_deg: f64,
-    /// A range is left out if its beam meets the wall further than this from the right angle, rad.
-    /// Default 0.6 (tuned, no source).
-    pub incidence_max_rad: f64,
-    /// A range further than this many standard deviations from what was expected comes from something
-    /// new: a wall that is passed, or another vehicle. Default 4 (tuned, no source), one wall in 16 000 echoes.
-    pub gate_sigma: f64,
-    /// How long a wall stays in sight without an echo, s. Default 0.5, five of the MB1300's readings.
-    pub sight_hold_s: f64,
-    /// Time constant with which the attitude estimate follows the accelerometer, s: what it does so to
-    /// the level acceleration is taken off. Default 30, as of the kind `attitude`.
-    pub attitude_time_constant_s: f64,
-    /// Standard deviation of the estimated attitude, rad, by which ranges at an angle are trusted less.
-    /// Default 0.01 (tuned, no source).
-    pub attitude_sigma_rad: f64,
-    /// White noise of the accelerometer, m/s²/√Hz. Default 2.0e-3, as of the kind `imu`.
-    pub accelerometer_noise_density_m_s2_sqrt_hz: f64,
-    /// Random walk of the acceleration's bias, m/s³/√Hz. Default 4.0e-3: the 3.0e-3 of the kind `imu`, and
-    /// gravity times its gyroscope's 1.7e-4 rad/s/√Hz, since a wrong tilt shows as acceleration.
-    pub acceleration_bias_walk_m_s3_sqrt_hz: f64,
-    /// Standard deviation of the level acceleration's bias at the start, m/s². Default 0.02, which is a
-    /// tilt of 0.1° (tuned, no source).
-    pub initial_acceleration_bias_sigma_m_s2: f64,
-    /// Standard deviation of the velocity at the start, which is taken for zero, m/s. Default 0.01.
-    pub initial_velocity_sigma_m_s: f64,
-    /// Height at the start, m. Default 0.0.
-    pub initial_height_m: f64,
-    /// Size of the room along the world's x and y, m, where it is shared with other vehicles: an echo that is not
-    /// that of a wall then says nothing about the velocity. Without it whatever is in sight is taken to stand still.
-    pub room_m: Option<[f64; 2]>,
-    /// With it: where the vehicle starts, from the walls at -x and -y, m.
-    pub start_in_room_m: Option<[f64; 2]>,
-    /// Gravity, m/s². Default 9.81 (thesis §3.1).
-    pub gravity_m_s2: f64,
-}
-
-impl Default for RangeInertialParams {
-    fn default() -> Self {
-        Self {
-            range_sigma_m: 0.0104,
-            reach_m: 7.65,
-            nearest_m: 0.20,
-            half_angle_deg: 5.0,
-            incidence_max_rad: 0.6,
-            gate_sigma: 4.0,
-            sight_hold_s: 0.5,
-            attitude_time_constant_s: 30.0,
-            attitude_sigma_rad: 0.01,
-            accelerometer_noise_density_m_s2_sqrt_hz: 2.0e-3,
-            acceleration_bias_walk_m_s3_sqrt_hz: 4.0e-3,
-            initial_acceleration_bias_sigma_m_s2: 0.02,
-            initial_velocity_sigma_m_s: 0.01,
-            initial_height_m: 0.0,
-            room_m: None,
-            start_in_room_m: None,
-            gravity_m_s2: 9.81,
-        }
+parameters! {
+    /// What the range finders, the IMU and the attitude are worth, and where the vehicle starts.
+    #[derive(Copy)]
+    pub struct RangeInertialParams {
+        /// Standard deviation of a range, m. Default 0.0104: the noise of the kind `range`, 0.01 m, and rounding
+        /// to its centimetre, 0.01 m / √12.
+        range_sigma_m: f64 = 0.0104 => positive,
+        /// What a range finder reads where it meets nothing, m. Default 7.65, the MB1300 (thesis §5.5).
+        reach_m: f64 = 7.65 => positive,
+        /// What a range finder reads of anything nearer, m. Default 0.20 (MB1300 data sheet).
+        nearest_m: f64 = 0.20 => not_negative,
+        /// Half angle of the beams' cones, degrees: a wall that is turned by less is met at right angles.
+        /// Default 5, as of the kind `range`.
+        half_angle_deg: f64 = 5.0 => within(0.0..90.0, "zero or more and below 90"),
+        /// A range is left out if its beam meets the wall further than this from the right angle, rad.
+        /// Default 0.6 (tuned, no source).
+        incidence_max_rad: f64 = 0.6 => positive,
+        /// A range further than this many standard deviations from what was expected comes from something
+        /// new: a wall that is passed, or another vehicle. Default 4 (tuned, no source), one wall in 16 000 echoes.
+        gate_sigma: f64 = 4.0 => positive,
+        /// How long a wall stays in sight without an echo, s. Default 0.5, five of the MB1300's readings.
+        sight_hold_s: f64 = 0.5 => positive,
+        /// Time constant with which the attitude estimate follows the accelerometer, s: what it does so to
+        /// the level acceleration is taken off. Default 30, as of the kind `attitude`.
+        attitude_time_constant_s: f64 = 30.0 => positive,
+        /// Standard deviation of the estimated attitude, rad, by which ranges at an angle are trusted less.
+        /// Default 0.01 (tuned, no source).
+        attitude_sigma_rad: f64 = 0.01 => not_negative,
+        /// White noise of the accelerometer, m/s²/√Hz. Default 2.0e-3, as of the kind `imu`.
+        accelerometer_noise_density_m_s2_sqrt_hz: f64 = 2.0e-3 => not_negative,
+        /// Random walk of the acceleration's bias, m/s³/√Hz. Default 4.0e-3: the 3.0e-3 of the kind `imu`, and
+        /// gravity times its gyroscope's 1.7e-4 rad/s/√Hz, since a wrong tilt shows as acceleration.
+        acceleration_bias_walk_m_s3_sqrt_hz: f64 = 4.0e-3 => not_negative,
+        /// Standard deviation of the level acceleration's bias at the start, m/s². Default 0.02, which is a
+        /// tilt of 0.1° (tuned, no source).
+        initial_acceleration_bias_sigma_m_s2: f64 = 0.02 => not_negative,
+        /// Standard deviation of the velocity at the start, which is taken for zero, m/s. Default 0.01.
+        initial_velocity_sigma_m_s: f64 = 0.01 => not_negative,
+        /// Height at the start, m. Default 0.0.
+        initial_height_m: f64 = 0.0 => not_negative,
+        /// Size of the room along the world's x and y, m, where it is shared with other vehicles: an echo that is not
+        /// that of a wall then says nothing about the velocity. Without it whatever is in sight is taken to stand still.
+        room_m: Option<[f64; 2]> = None,
+        /// With it: where the vehicle starts, from the walls at -x and -y, m.
+        start_in_room_m: Option<[f64; 2]> = None,
+        /// Gravity, m/s². Default 9.81 (thesis §3.1).
+        gravity_m_s2: f64 = 9.81 => positive,
     }
 }
 
 impl RangeInertialParams {
-    /// Refuses what no flight can have.
-    ///
-    /// # Errors
-    /// A parameter is outside its range.
-    pub fn validate(&self) -> Result<(), ParameterError> {
-        positive("range_sigma_m", self.range_sigma_m)?;
-        positive("reach_m", self.reach_m)?;
-        positive("incidence_max_rad", self.incidence_max_rad)?;
-        positive("gate_sigma", self.gate_sigma)?;
-        positive("sight_hold_s", self.sight_hold_s)?;
-        positive("attitude_time_constant_s", self.attitude_time_constant_s)?;
-        positive("gravity_m_s2", self.gravity_m_s2)?;
-        for (key, value) in self.not_negative() {
-            not_negative(key, value)?;
-        }
-        let angle_is_good = (0.0..90.0).contains(&self.half_angle_deg);
-        require("half_angle_deg", self.half_angle_deg, angle_is_good, "zero or more and below 90")?;
-        self.validate_room()
-    }
-
     /// A room has a size and a place within it, or is not known.
-    fn validate_room(&self) -> Result<(), ParameterError> {
+    pub(super) fn validate_room(&self) -> Result<(), ParameterError> {
         let missing = |key, expected| Err(ParameterError::value(key, expected, "nothing"));
         match (self.room_m, self.start_in_room_m) {
             (Some(_), None) => return missing("start_in_room_m", "given where `room_m` is"),
@@ -112,18 +69,6 @@ impl RangeInertialParams {
             positive("room_m", size_m - start_m)?;
         }
         Ok(())
-    }
-
-    fn not_negative(&self) -> [(&'static str, f64); 7] {
-        [
-            ("nearest_m", self.nearest_m),
-            ("attitude_sigma_rad", self.attitude_sigma_rad),
-            ("accelerometer_noise_density_m_s2_sqrt_hz", self.accelerometer_noise_density_m_s2_sqrt_hz),
-            ("acceleration_bias_walk_m_s3_sqrt_hz", self.acceleration_bias_walk_m_s3_sqrt_hz),
-            ("initial_acceleration_bias_sigma_m_s2", self.initial_acceleration_bias_sigma_m_s2),
-            ("initial_velocity_sigma_m_s", self.initial_velocity_sigma_m_s),
-            ("initial_height_m", self.initial_height_m),
-        ]
     }
 
     /// What the level acceleration is worth.
@@ -144,7 +89,7 @@ mod tests {
     fn of_a_room_and_the_place_in_it_the_one_that_is_missing_is_named() {
         let refused = |room_m, start_in_room_m| {
             let params = RangeInertialParams { room_m, start_in_room_m, ..Default::default() };
-            params.validate().unwrap_err().to_string()
+            params.validate_room().unwrap_err().to_string()
         };
         let given = Some([4.0, 4.0]);
         assert_eq!(refused(given, None), "`start_in_room_m` must be given where `room_m` is, found nothing");
