@@ -3,39 +3,29 @@
 
 use crate::airframe::HoverModel;
 use crate::control::{HoverMotion, Integrals, within};
-use crate::gains_file::{self, gain};
 use crate::law::Predecessor;
 use diagnostics::unit::{ACCELERATION, PER_SECOND, PER_SECOND_2, PER_SECOND_3, VELOCITY};
 use serde::Deserialize;
-use vehicles::VehicleError;
-use vehicles::reader::Section;
 
 /// The least cosine of the tilt that is compensated: beyond 60° more thrust would push sideways rather
 /// than up. Tuned, no source.
 const TILT_COSINE_MIN: f64 = 0.5;
 
-/// The gains of one loop, from an error to an acceleration (linear: m/s², angular: rad/s²).
-#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct LoopGains {
-    /// Acceleration for each unit of error, 1/s².
-    pub proportional_1_s2: f64,
-    /// Acceleration for each unit of error held for one second, 1/s³.
-    pub integral_1_s3: f64,
-    /// Acceleration against each unit of measured rate, 1/s.
-    pub derivative_1_s: f64,
+gains! {
+    /// The gains of one loop, from an error to an acceleration (linear: m/s², angular: rad/s²).
+    #[derive(Deserialize)]
+    #[serde(deny_unknown_fields)]
+    pub struct LoopGains of file {
+        /// Acceleration for each unit of error, 1/s².
+        proportional_1_s2: f64 = file.gain("proportional", PER_SECOND_2),
+        /// Acceleration for each unit of error held for one second, 1/s³.
+        integral_1_s3: f64 = file.gain("integral", PER_SECOND_3),
+        /// Acceleration against each unit of measured rate, 1/s.
+        derivative_1_s: f64 = file.gain("derivative", PER_SECOND),
+    }
 }
 
 impl LoopGains {
-    /// `proportional`, `integral` and `derivative` of a gains file's table.
-    pub(crate) fn read(section: &Section<'_, '_>) -> Result<Self, VehicleError> {
-        Ok(Self {
-            proportional_1_s2: gain(section, "proportional", PER_SECOND_2)?,
-            integral_1_s3: gain(section, "integral", PER_SECOND_3)?,
-            derivative_1_s: gain(section, "derivative", PER_SECOND)?,
-        })
-    }
-
     /// The acceleration that the loop asks for.
     pub(crate) fn demand(&self, error: f64, integral: f64, rate: f64) -> f64 {
         self.proportional_1_s2 * error + integral - self.derivative_1_s * rate
@@ -47,29 +37,17 @@ impl LoopGains {
     }
 }
 
-/// Gains and limits of the altitude loop.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct AltitudeGains {
-    /// Error of height (m) and rate of climb (m/s) to vertical acceleration (m/s²).
-    pub loop_gains: LoopGains,
-    /// The integrator rests while the vehicle climbs or sinks faster than this, m/s. Without it a step of
-    /// 0.5 m leaves the integrator a surplus that takes Kp/Ki to decay; a limit on the error instead would
-    /// lock it out when the weight is far off.
-    pub integral_climb_max_m_s: f64,
-    /// The most that the integrator may ask for, m/s².
-    pub integral_max_m_s2: f64,
-}
-
-impl AltitudeGains {
-    /// The table `altitude` of a gains file.
-    pub(crate) fn read(section: &Section<'_, '_>) -> Result<Self, VehicleError> {
-        let gains = Self {
-            loop_gains: LoopGains::read(section)?,
-            integral_climb_max_m_s: gains_file::limit(section, "integral_climb_max", VELOCITY)?,
-            integral_max_m_s2: gain(section, "integral_max", ACCELERATION)?,
-        };
-        section.finish()?;
-        Ok(gains)
+gains! {
+    /// Gains and limits of the altitude loop.
+    pub struct AltitudeGains of file {
+        /// Error of height (m) and rate of climb (m/s) to vertical acceleration (m/s²).
+        loop_gains: LoopGains = LoopGains::read(file),
+        /// The integrator rests while the vehicle climbs or sinks faster than this, m/s. Without it a step of
+        /// 0.5 m leaves the integrator a surplus that takes Kp/Ki to decay; a limit on the error instead would
+        /// lock it out when the weight is far off.
+        integral_climb_max_m_s: f64 = file.limit("integral_climb_max", VELOCITY),
+        /// The most that the integrator may ask for, m/s².
+        integral_max_m_s2: f64 = file.gain("integral_max", ACCELERATION),
     }
 }
 

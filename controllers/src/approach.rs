@@ -3,13 +3,16 @@
 //! Near the end the velocity is proportional to the distance, v = k·e; further away it is that from which the
 //! deceleration a stops in time, v = √(2a·(e − a/2k²)). The two meet at e = a/k² with the same slope, so that
 //! the acceleration that braking takes, −v·dv/de, has no step there.
-/// The curve: slope and deceleration above zero.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Approach {
-    /// k, 1/s.
-    pub slope_1_s: f64,
-    /// a, m/s².
-    pub deceleration_m_s2: f64,
+use diagnostics::unit::{ACCELERATION, PER_SECOND};
+
+gains! {
+    /// The curve: slope and deceleration above zero.
+    pub struct Approach of file {
+        /// k, 1/s.
+        slope_1_s: f64 = file.limit("slope", PER_SECOND),
+        /// a, m/s².
+        deceleration_m_s2: f64 = file.limit("deceleration", ACCELERATION),
+    }
 }
 
 impl Approach {

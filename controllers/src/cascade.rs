@@ -10,19 +10,19 @@
 //!   cross product of rate and angular momentum is left to the loops.
 #![allow(non_snake_case, reason = "a trailing _B names the frame a vector is written in, _N the newton")]
 
-use crate::airframe::{ControlledVehicle, HoverModel};
+use crate::airframe::HoverModel;
 use crate::allocation::RotorWrench;
 use crate::altitude_loop::AltitudeLoop;
 use crate::angle::wrap_rad;
 use crate::cascade_gains::{CascadeGains, CommandFilter};
 use crate::control::{ControlInput, ControlOutput, HoverMotion, Integrals};
-use crate::law::{FileParameters, Law, Predecessor, Start};
+use crate::law::{FileParameters, Law, LawContext, Predecessor, Start};
 use crate::law_inputs::SetPointInputs;
 use crate::set_points::SetPoint;
 use bus::component::Info;
-use bus::context::NodeContext;
 use diagnostics::ParameterError;
 use nalgebra::Vector3;
+use std::path::Path;
 
 /// The law at one period: all that does not change during a run.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -62,14 +62,13 @@ impl Law for CascadeLaw {
     type Inputs<'a> = SetPointInputs<'a>;
     type State = CascadeState;
 
-    fn new(
-        parameters: &FileParameters,
-        craft: &ControlledVehicle,
-        context: &NodeContext<'_>,
-    ) -> Result<Self, ParameterError> {
-        let gains = CascadeGains::load(parameters.gains.as_deref())
-            .map_err(|error| ParameterError::conflict("gains", error))?;
-        Ok(Self { gains, vehicle: craft.hover_model(), period_s: context.period_s() })
+    fn vehicle(parameters: &Self::Parameters) -> &Path {
+        &parameters.vehicle
+    }
+
+    fn new(parameters: &Self::Parameters, context: &LawContext<'_>) -> Result<Self, ParameterError> {
+        let gains = CascadeGains::load(parameters.gains.as_deref())?;
+        Ok(Self { gains, vehicle: context.craft.hover_model(), period_s: context.node.period_s() })
     }
 
     fn rate_gain_1_s(&self) -> f64 {
@@ -80,7 +79,7 @@ impl Law for CascadeLaw {
         Start { state: self.initial(&HoverMotion::of(&input.motion)), wrench: RotorWrench::default() }
     }
 
-    fn take_over(&self, from: &Predecessor<'_, CascadeState>, input: &ControlInput) -> Start<CascadeState> {
+    fn take_over(&self, from: &Predecessor<'_, Self::State>, input: &ControlInput) -> Start<Self::State> {
         let measured = HoverMotion::of(&input.motion);
         Start { state: self.continued(from, input.set_point.altitude_m, &measured), wrench: from.wrench }
     }

@@ -5,7 +5,7 @@ use crate::allocation::{Allocated, RotorWrench};
 use crate::bumpless::BumplessTransfer;
 use crate::control::ControlOutput;
 use crate::controller_state::ControllerState;
-use crate::law::{Law, VehicleFile};
+use crate::law::{Law, LawContext};
 use crate::rehearsal;
 use bus::OutputPorts;
 use bus::component::{Component, Info, StepError};
@@ -54,8 +54,8 @@ impl<L: Law> Component for Controller<L> {
     type State = ControllerState;
 
     fn new(parameters: L::Parameters, context: &NodeContext<'_>) -> Result<Self, ParameterError> {
-        let craft = ControlledVehicle::load(parameters.vehicle())?;
-        let law = L::new(&parameters, &craft, context)?;
+        let craft = ControlledVehicle::load(L::vehicle(&parameters))?;
+        let law = L::new(&parameters, &LawContext { craft: &craft, node: context })?;
         let transfer = BumplessTransfer::to::<L>(&craft.vehicle, context.period_s());
         Ok(Self { law, craft, transfer })
     }

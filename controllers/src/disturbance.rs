@@ -8,19 +8,17 @@
 #![allow(non_snake_case, reason = "a trailing _W names the frame a vector is written in")]
 
 use crate::control::MotionEstimate;
-use crate::gains_file::{bandwidth, limit};
 use diagnostics::unit::ACCELERATION;
 use nalgebra::Vector3;
-use vehicles::VehicleError;
-use vehicles::reader::Section;
 
-/// The observer's one number and its limit.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Observer {
-    /// ω, rad/s.
-    pub bandwidth_rad_s: f64,
-    /// The most that it believes along an axis of the world, m/s².
-    pub acceleration_max_m_s2: f64,
+gains! {
+    /// The observer's one number and its limit.
+    pub struct Observer of file {
+        /// ω, rad/s.
+        bandwidth_rad_s: f64 = file.bandwidth("bandwidth"),
+        /// The most that it believes along an axis of the world, m/s².
+        acceleration_max_m_s2: f64 = file.limit("acceleration_max", ACCELERATION),
+    }
 }
 
 /// What it remembers.
@@ -46,19 +44,6 @@ pub struct Disturbance {
 }
 
 impl Observer {
-    /// The observer as a gains file's section states it.
-    ///
-    /// # Errors
-    /// A number is missing or cannot be meant.
-    pub fn read(section: &Section<'_, '_>) -> Result<Self, VehicleError> {
-        let observer = Self {
-            bandwidth_rad_s: bandwidth(section, "bandwidth")?,
-            acceleration_max_m_s2: limit(section, "acceleration_max", ACCELERATION)?,
-        };
-        section.finish()?;
-        Ok(observer)
-    }
-
     /// The disturbance now, where the model explains `model_W_m_s2`; advances the state by one period.
     pub fn step(
         &self,

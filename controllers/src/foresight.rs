@@ -14,7 +14,7 @@ use crate::control::{ControlInput, Integrals, within};
 use crate::disturbance::{Observer, ObserverState};
 use crate::law::{Predecessor, Start};
 use crate::motor_lag::{Made, MotorLag};
-use nalgebra::Vector3;
+use nalgebra::{Matrix3, Vector3};
 
 /// How far the velocity that was foreseen may be from the one that is estimated, m/s. Tuned, no source: so far off is an
 /// observer of 5 rad/s against a disturbance that exceeds its limit by gravity.
@@ -77,8 +77,14 @@ pub struct Foresight {
     allocation: Allocation,
     /// How fast they can.
     pub lag: MotorLag,
-    /// The vehicle's weight, N.
-    weight_N: f64,
+    /// Mass, kg.
+    pub mass_kg: f64,
+    /// Moments and products of inertia in body axes, kg·m².
+    pub inertia_B_kg_m2: Matrix3<f64>,
+    /// Gravity, m/s².
+    pub gravity_m_s2: f64,
+    /// Time between two steps, s.
+    pub period_s: f64,
     /// The most that the law's observer believes along an axis, m/s².
     disturbance_max_m_s2: f64,
 }
@@ -90,7 +96,10 @@ impl Foresight {
         Self {
             allocation: craft.allocation,
             lag: MotorLag::new(craft.vehicle.motor, period_s),
-            weight_N: craft.vehicle.mass_kg * craft.vehicle.gravity_m_s2,
+            mass_kg: craft.vehicle.mass_kg,
+            inertia_B_kg_m2: craft.vehicle.inertia_kg_m2,
+            gravity_m_s2: craft.vehicle.gravity_m_s2,
+            period_s,
             disturbance_max_m_s2: observer.acceleration_max_m_s2,
         }
     }
@@ -155,7 +164,7 @@ impl Foresight {
     }
 
     fn hover(&self) -> RotorWrench {
-        RotorWrench { thrust_N: self.weight_N, ..RotorWrench::default() }
+        RotorWrench { thrust_N: (self.mass_kg * self.gravity_m_s2), ..RotorWrench::default() }
     }
 
     /// What of `wrench` the rotors can make; of one that is no number, hovering.

@@ -1,40 +1,123 @@
 //! Gains files: TOML as vehicle files are, every number with its unit and source, positions in the errors.
 //!
-//! Each law has a room that says which tables its file has. The file that a law is tuned with is built in, and
-//! serves where the manifest names none.
+//! `gains!` declares the gains of a law: the fields, and where in the file each stands. The file that a law is tuned with
+//! is built in, and serves where the manifest names none. A file is read to its end whatever is wrong with it, so that
+//! all its faults are told at once.
 
+use diagnostics::ParameterError;
 use diagnostics::parameter::Bounds;
-use diagnostics::unit::Dimension;
+use diagnostics::unit::{ANGLE, Dimension, SPEED};
+use std::cell::RefCell;
+use std::collections::BTreeMap;
+use std::f64::consts::FRAC_PI_3;
 use std::path::Path;
-use vehicles::VehicleError;
-use vehicles::reader::{Document, Section};
+use std::rc::Rc;
+use vehicles::reader::{Document, Quantity, Section};
+use vehicles::{Faults, VehicleError};
+
+/// Declares gains as `name: type = reading` for each field, where `reading` is of the [`Table`] that the head names; after
+/// `built in "FILE"` those of the file in `controllers/gains` are the default.
+macro_rules! gains {
+    (
+        $(#[$meta:meta])*
+        pub struct $name:ident of $table:ident, built in $file:literal { $($fields:tt)* }
+    ) => {
+        gains! {
+            $(#[$meta])*
+            pub struct $name of $table { $($fields)* }
+        }
+
+        impl $name {
+            /// The text of the file that is built in.
+            pub(crate) const BUILT_IN: &str = include_str!(concat!("../gains/", $file));
+
+            /// The gains in the file at `path`, or those built in.
+            ///
+            /// # Errors
+            /// The file cannot be read, or holds what no gains can be; all its faults.
+            pub fn load(path: Option<&std::path::Path>) -> Result<Self, diagnostics::ParameterError> {
+                path.map_or_else(|| Ok(Self::default()), |path| $crate::gains_file::load(path, Self::read))
+            }
+        }
+
+        impl Default for $name {
+            fn default() -> Self {
+                $crate::gains_file::parse(Self::BUILT_IN, concat!("controllers/gains/", $file), Self::read)
+                    .expect("a test reads the built-in gains")
+            }
+        }
+    };
+    (
+        $(#[$meta:meta])*
+        pub struct $name:ident of $table:ident {
+            $($(#[$field_meta:meta])* $field:ident: $type:ty = $reading:expr,)*
+        }
+    ) => {
+        $(#[$meta])*
+        #[derive(Debug, Clone, Copy, PartialEq)]
+        pub struct $name {
+            $($(#[$field_meta])* pub $field: $type,)*
+        }
+
+        impl $name {
+            pub(crate) fn read($table: &$crate::gains_file::Table<'_, '_>) -> Self {
+                Self { $($field: $reading,)* }
+            }
+        }
+    };
+}
 
 /// What makes gains of a file's root table.
-pub type Reader<G> = fn(&Section<'_, '_>) -> Result<G, VehicleError>;
+pub(crate) type Reader<G> = fn(&Table<'_, '_>) -> G;
 
-/// The gains in the file at `path`.
+/// The gains in the file at `path`, the manifest's parameter `gains`.
 ///
 /// # Errors
-/// The file cannot be read, or `read` refuses it.
-pub fn load<G>(path: &Path, read: Reader<G>) -> Result<G, VehicleError> {
+/// The file cannot be read, or holds what no gains can be; all its faults.
+pub(crate) fn load<G>(path: &Path, read: Reader<G>) -> Result<G, ParameterError> {
     let file = path.display().to_string();
-    match vehicles::text::read(path) {
-        Ok(text) => parse(&text, &file, read),
-        Err(cause) => Err(VehicleError::Unreadable { file, cause }),
-    }
+    let text = vehicles::text::read(path);
+    let unreadable = |cause| VehicleError::Unreadable { file: file.clone(), cause };
+    let gains = text.map_err(unreadable).and_then(|text| parse(&text, &file, read));
+    gains.map_err(|error| ParameterError::conflict("gains", error))
 }
 
 /// The gains in `text`; `file_name` is for messages only.
 ///
 /// # Errors
-/// `read` refuses the text, or it has a table that `read` does not know.
-pub fn parse<G>(text: &str, file_name: &str, read: Reader<G>) -> Result<G, VehicleError> {
+/// All that is missing, unknown or no gain in the text.
+pub(crate) fn parse<G>(text: &str, file_name: &str, read: Reader<G>) -> Result<G, VehicleError> {
     let doc = Document::new(file_name, text);
     let tree = doc.tree()?;
-    let root = Section::new(&doc, String::new(), 0..0, tree.get_ref());
-    let gains = read(&root)?;
-    root.finish()?;
-    Ok(gains)
+    let root = Rc::new(Section::new(&doc, String::new(), 0..0, tree.get_ref()));
+    let tables = RefCell::new(BTreeMap::from([(String::new(), Some(root.clone()))]));
+    let opened = Rc::new(Opened { tables, faults: RefCell::default() });
+    let gains = read(&Table { section: Some(root), opened: opened.clone() });
+    let mut faults = opened.faults.take();
+    for table in opened.tables.take().into_values().flatten() {
+        faults.keep(table.finish());
+    }
+    faults.finish(Some(gains))
+}
+
+/// The tables of a file that were asked for, and what was wrong so far.
+struct Opened<'d, 't> {
+    tables: RefCell<BTreeMap<String, Option<Rc<Section<'d, 't>>>>>,
+    faults: RefCell<Faults>,
+}
+
+impl Opened<'_, '_> {
+    fn keep<T>(&self, read: Result<T, VehicleError>) -> Option<T> {
+        self.faults.borrow_mut().keep(read)
+    }
+}
+
+/// A table of a gains file. A number that is missing or no gain is noted, and read as no number.
+#[derive(Clone)]
+pub(crate) struct Table<'d, 't> {
+    /// None where the file has no such table, which is noted.
+    section: Option<Rc<Section<'d, 't>>>,
+    opened: Rc<Opened<'d, 't>>,
 }
 
 /// The most that a gain is, in its unit: a loop that is closed once a tick of 1 µs, the shortest, holds an angle with
@@ -55,41 +138,89 @@ const LIMIT: Bounds = Bounds {
           on squares and products of it are no figures of a vehicle",
 };
 
-/// A gain: zero or more, since a negative one turns a loop against itself.
-pub(crate) fn gain(section: &Section, name: &'static str, of: Dimension) -> Result<f64, VehicleError> {
-    Ok(section.chosen(name, of)?.not_negative(section.doc)?.within(section.doc, &GAIN)?.si)
-}
+impl Table<'_, '_> {
+    /// Whether it has `name`.
+    pub(crate) fn has(&self, name: &'static str) -> bool {
+        self.section.as_ref().is_some_and(|section| section.has(name))
+    }
 
-/// A limit or a time: more than zero.
-pub(crate) fn limit(section: &Section, name: &'static str, of: Dimension) -> Result<f64, VehicleError> {
-    Ok(section.chosen(name, of)?.positive(section.doc)?.within(section.doc, &LIMIT)?.si)
-}
+    /// The table at the dotted `path` within this one.
+    pub(crate) fn table(&self, path: &'static str) -> Self {
+        path.split('.').fold(self.clone(), |table, name| table.child(name))
+    }
 
-/// A limit that is more than zero and less than `bound`, which `expected` describes.
-pub(crate) fn limit_below(
-    section: &Section,
-    name: &'static str,
-    of: Dimension,
-    bound: f64,
-    expected: &str,
-) -> Result<f64, VehicleError> {
-    let chosen = section.chosen(name, of)?.positive(section.doc)?.within(section.doc, &LIMIT)?;
-    let holds = chosen.si < bound;
-    Ok(chosen.require(section.doc, holds, expected)?.si)
+    fn child(&self, name: &'static str) -> Self {
+        let Some(section) = &self.section else { return self.clone() };
+        let open = || self.opened.keep(section.section(name)).map(Rc::new);
+        let section = self.opened.tables.borrow_mut().entry(section.key(name)).or_insert_with(open).clone();
+        Self { section, opened: self.opened.clone() }
+    }
+
+    /// The number at the dotted `key` that `check` passes.
+    fn number(
+        &self,
+        key: &'static str,
+        of: Dimension,
+        check: impl FnOnce(Quantity, &Document<'_>) -> Result<Quantity, VehicleError>,
+    ) -> f64 {
+        let (table, name) = match key.rsplit_once('.') {
+            Some((path, name)) => (self.table(path), name),
+            None => (self.clone(), key),
+        };
+        let Some(section) = table.section else { return f64::NAN };
+        let read = section.chosen(name, of).and_then(|number| check(number, section.doc));
+        self.opened.keep(read).map_or(f64::NAN, |number| number.si)
+    }
+
+    /// A gain: zero or more, since a negative one turns a loop against itself.
+    pub(crate) fn gain(&self, key: &'static str, of: Dimension) -> f64 {
+        self.number(key, of, |number, doc| number.not_negative(doc)?.within(doc, &GAIN))
+    }
+
+    /// A limit or a time: more than zero.
+    pub(crate) fn limit(&self, key: &'static str, of: Dimension) -> f64 {
+        self.number(key, of, |number, doc| number.positive(doc)?.within(doc, &LIMIT))
+    }
+
+    /// A limit that is more than zero and less than `bound`, which `expected` describes.
+    fn limit_below(&self, key: &'static str, of: Dimension, bound: f64, expected: &str) -> f64 {
+        self.number(key, of, |number, doc| {
+            let number = number.positive(doc)?.within(doc, &LIMIT)?;
+            let holds = number.si < bound;
+            number.require(doc, holds, expected)
+        })
+    }
+
+    /// A bandwidth that steps of 1 ms resolve.
+    pub(crate) fn bandwidth(&self, key: &'static str) -> f64 {
+        let expected = "a bandwidth above 0 and below 200 rad/s, up to which steps of 1 ms resolve it";
+        self.limit_below(key, SPEED, BANDWIDTH_MAX_RAD_S, expected)
+    }
+
+    /// A tilt that the altitude loop can make up for.
+    pub(crate) fn tilt(&self, key: &'static str) -> f64 {
+        let expected = "an angle above 0 and below 60 degrees, up to which the thrust makes up for a tilt";
+        self.limit_below(key, ANGLE, FRAC_PI_3, expected)
+    }
 }
 
 /// Bandwidths stay below this, rad/s. Tuned, no source: a fifth of 1 kHz, at which an observer or a lag that is stepped
 /// once a tick still behaves as the continuous one; from some 1000 rad/s on it diverges.
 const BANDWIDTH_MAX_RAD_S: f64 = 200.0;
 
-/// A bandwidth that steps of 1 ms resolve.
-pub(crate) fn bandwidth(section: &Section, name: &'static str) -> Result<f64, VehicleError> {
-    let expected = "a bandwidth above 0 and below 200 rad/s, up to which steps of 1 ms resolve it";
-    limit_below(section, name, diagnostics::unit::SPEED, BANDWIDTH_MAX_RAD_S, expected)
-}
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::cascade_gains::CascadeGains;
 
-/// A tilt that the altitude loop can make up for.
-pub(crate) fn tilt(section: &Section, name: &'static str) -> Result<f64, VehicleError> {
-    let expected = "an angle above 0 and below 60 degrees, up to which the thrust makes up for a tilt";
-    limit_below(section, name, diagnostics::unit::ANGLE, std::f64::consts::FRAC_PI_3, expected)
+    #[test]
+    fn all_faults_of_a_file_are_told_at_once() {
+        let text = CascadeGains::BUILT_IN.replace("[command_filter]", "[filter]");
+        let text = text.replace("damping_ratio", "damping").replace("rate_feed_forward", "feed_forward");
+        let error = parse(&text, "my.toml", CascadeGains::read).unwrap_err().to_string();
+        let told = ["missing key `command_filter`", "missing key `attitude.rate_feed_forward`"];
+        let unknown = ["unknown key `filter`", "unknown key `attitude.feed_forward`"];
+        assert!(told.iter().chain(&unknown).all(|fault| error.contains(fault)), "{error}");
+        assert_eq!(error.lines().count(), 4, "one line for each: {error}");
+    }
 }

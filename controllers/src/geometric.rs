@@ -27,25 +27,21 @@ use crate::disturbance::{Disturbance, ObserverState};
 use crate::flatness::{self, Moving, Target};
 use crate::foresight::{Foresight, ForesightState};
 use crate::geometric_gains::GeometricGains;
-use crate::law::{FileParameters, Law, Predecessor, Start};
+use crate::law::{FileParameters, Law, LawContext, Predecessor, Start};
 use crate::law_inputs::ReferenceInputs;
 use crate::motor_lag::Made;
 use crate::set_points::SetPoint;
 use crate::trajectory::Point;
 use bus::component::Info;
-use bus::context::NodeContext;
 use diagnostics::ParameterError;
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::Vector3;
+use std::path::Path;
 
 /// The law at one period: all that does not change during a run.
 #[derive(Debug, Clone, PartialEq)]
 pub struct GeometricLaw {
     gains: GeometricGains,
-    mass_kg: f64,
-    inertia_B_kg_m2: Matrix3<f64>,
-    gravity_m_s2: f64,
     foresight: Foresight,
-    period_s: f64,
 }
 
 /// How far the vehicle is off its reference, and what the reference does: in the world.
@@ -66,15 +62,7 @@ impl GeometricLaw {
     /// The law for `craft`.
     #[must_use]
     pub fn for_craft(gains: GeometricGains, craft: &ControlledVehicle, period_s: f64) -> Self {
-        let vehicle = &craft.vehicle;
-        Self {
-            gains,
-            mass_kg: vehicle.mass_kg,
-            inertia_B_kg_m2: vehicle.inertia_kg_m2,
-            gravity_m_s2: vehicle.gravity_m_s2,
-            foresight: Foresight::new(craft, &gains.observer, period_s),
-            period_s,
-        }
+        Self { gains, foresight: Foresight::new(craft, &gains.observer, period_s) }
     }
 
     /// The demand, and the attitude behind it; advances the observer.
@@ -87,13 +75,13 @@ impl GeometricLaw {
         let (reference, motion) = (&Point::from(&input.reference), &input.motion);
         let push = self.push(made, motion);
         let disturbance =
-            self.gains.observer.step(observer, motion, &push.acceleration_W_m_s2, self.period_s);
+            self.gains.observer.step(observer, motion, &push.acceleration_W_m_s2, self.foresight.period_s);
         let errors = errors(&push, &disturbance, reference, motion);
         let thrust_W_m_s2 = self.thrust_vector(&disturbance, &errors, reference);
         let target = flatness::target(&thrust_W_m_s2, reference.yaw_rad, reference.yaw_rate_rad_s);
         let z_W = motion.attitude_WB * Vector3::z();
         let wanted = RotorWrench {
-            thrust_N: self.mass_kg * thrust_W_m_s2.value.dot(&z_W),
+            thrust_N: self.foresight.mass_kg * thrust_W_m_s2.value.dot(&z_W),
             torque_B_N_m: self.torque(&target, motion),
         };
         let hurried = self.foresight.lag.hurried(&self.gains.motor, made, &wanted);
@@ -105,10 +93,10 @@ impl GeometricLaw {
         let z_W = motion.attitude_WB * Vector3::z();
         let turning_W = motion.attitude_WB * motion.angular_velocity_B_rad_s.cross(&Vector3::z());
         let (push_m_s2, push_rate_m_s3) =
-            (made.wrench.thrust_N / self.mass_kg, made.rate.thrust_N / self.mass_kg);
+            (made.wrench.thrust_N / self.foresight.mass_kg, made.rate.thrust_N / self.foresight.mass_kg);
         let drag_1_s = self.gains.drag_1_s;
         let acceleration_W_m_s2 =
-            z_W * push_m_s2 - Vector3::z() * self.gravity_m_s2 - motion.velocity_W_m_s * drag_1_s;
+            z_W * push_m_s2 - Vector3::z() * self.foresight.gravity_m_s2 - motion.velocity_W_m_s * drag_1_s;
         let jerk_W_m_s3 = turning_W * push_m_s2 + z_W * push_rate_m_s3 - acceleration_W_m_s2 * drag_1_s;
         Push { acceleration_W_m_s2, jerk_W_m_s3 }
     }
@@ -129,7 +117,7 @@ impl GeometricLaw {
             first: ahead(3) + answer_first * part,
             second: ahead(4) + answer_second * part,
         };
-        acceleration_W.against(self.gravity_m_s2)
+        acceleration_W.against(self.foresight.gravity_m_s2)
     }
 
     fn torque(&self, target: &Target, motion: &MotionEstimate) -> Vector3<f64> {
@@ -148,7 +136,8 @@ impl GeometricLaw {
         let acceleration_B = ahead_B
             - Vector3::new(tilt, tilt, yaw).component_mul(&attitude_error)
             - Vector3::new(tilt_rate, tilt_rate, yaw_rate).component_mul(&rate_error_B);
-        self.inertia_B_kg_m2 * acceleration_B + rate_B.cross(&(self.inertia_B_kg_m2 * rate_B))
+        self.foresight.inertia_B_kg_m2 * acceleration_B
+            + rate_B.cross(&(self.foresight.inertia_B_kg_m2 * rate_B))
     }
 }
 
@@ -161,14 +150,13 @@ impl Law for GeometricLaw {
     type Inputs<'a> = ReferenceInputs<'a>;
     type State = ForesightState;
 
-    fn new(
-        parameters: &FileParameters,
-        craft: &ControlledVehicle,
-        context: &NodeContext<'_>,
-    ) -> Result<Self, ParameterError> {
-        let gains = GeometricGains::load(parameters.gains.as_deref())
-            .map_err(|error| ParameterError::conflict("gains", error))?;
-        Ok(Self::for_craft(gains, craft, context.period_s()))
+    fn vehicle(parameters: &Self::Parameters) -> &Path {
+        &parameters.vehicle
+    }
+
+    fn new(parameters: &Self::Parameters, context: &LawContext<'_>) -> Result<Self, ParameterError> {
+        let gains = GeometricGains::load(parameters.gains.as_deref())?;
+        Ok(Self::for_craft(gains, context.craft, context.node.period_s()))
     }
 
     fn rate_gain_1_s(&self) -> f64 {
@@ -179,11 +167,7 @@ impl Law for GeometricLaw {
         self.foresight.start(input)
     }
 
-    fn take_over(
-        &self,
-        from: &Predecessor<'_, ForesightState>,
-        input: &ControlInput,
-    ) -> Start<ForesightState> {
+    fn take_over(&self, from: &Predecessor<'_, Self::State>, input: &ControlInput) -> Start<Self::State> {
         self.foresight.take_over(from, input)
     }
 

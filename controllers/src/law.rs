@@ -20,21 +20,20 @@ pub trait Law: Sized {
     /// Its name in manifests, and what it does.
     const INFO: Info;
     /// What the manifest's `parameters` table holds.
-    type Parameters: DeserializeOwned + VehicleFile;
+    type Parameters: DeserializeOwned;
     /// What it reads.
     type Inputs<'a>: InputPorts<'a> + Into<ControlInput>;
     /// All that it remembers between ticks.
     type State: Message;
 
-    /// Makes the law for `craft`.
+    /// The vehicle file that `parameters` name.
+    fn vehicle(parameters: &Self::Parameters) -> &Path;
+
+    /// Makes the law.
     ///
     /// # Errors
     /// A parameter or a file that cannot be meant.
-    fn new(
-        parameters: &Self::Parameters,
-        craft: &ControlledVehicle,
-        context: &NodeContext<'_>,
-    ) -> Result<Self, ParameterError>;
+    fn new(parameters: &Self::Parameters, context: &LawContext<'_>) -> Result<Self, ParameterError>;
 
     /// The greatest angular acceleration that it asks for against a body rate, 1/s: with the period it tells whether
     /// the loop can be closed at all. 0 where the law is made for its period.
@@ -74,10 +73,13 @@ pub struct Predecessor<'a, S> {
     pub state: Option<&'a S>,
 }
 
-/// Parameters that name a vehicle file.
-pub trait VehicleFile {
-    /// The file.
-    fn vehicle(&self) -> &Path;
+/// What a law is made for.
+#[derive(Debug, Clone, Copy)]
+pub struct LawContext<'a> {
+    /// The vehicle that it flies.
+    pub craft: &'a ControlledVehicle,
+    /// Its node in the run.
+    pub node: &'a NodeContext<'a>,
 }
 
 /// Parameters of a law that has no others.
@@ -88,10 +90,4 @@ pub struct FileParameters {
     pub vehicle: PathBuf,
     /// Gains file; the built-in gains where there is none.
     pub gains: Option<PathBuf>,
-}
-
-impl VehicleFile for FileParameters {
-    fn vehicle(&self) -> &Path {
-        &self.vehicle
-    }
 }

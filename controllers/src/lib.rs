@@ -5,7 +5,7 @@
 //! - [`set_points`]: a pilot's schedule of steps, ramps and doublets; [`sticks`]: a recording of sticks.
 //! - [`allocation`]: from a wrench to the speeds of four rotors; [`airframe`]: the vehicle that a law knows.
 //! - [`control`]: what a law reads and answers; [`law_inputs`]: the ports that it comes from.
-//! - [`gains_file`]: gains with units and sources; a law's gains are beside it, ours and the thesis's.
+//! - `gains_file`: gains with units and sources; a law's gains are beside it, ours and the thesis's.
 //! - `altitude_loop`: the part that all laws about hover share.
 //! - [`pid`]: altitude and attitude PID.
 //! - [`cascade`]: command filter, attitude loop, rate loop: the inner loops of all that follows.
@@ -24,6 +24,10 @@
 //!   as CSV with a column map.
 #![forbid(unsafe_code)]
 
+// First: modules behind it see its macro without importing it.
+#[macro_use]
+mod gains_file;
+
 pub mod airframe;
 pub mod allocation;
 mod altitude_loop;
@@ -40,7 +44,6 @@ mod disturbance;
 mod flatness;
 pub mod flight_log;
 pub mod foresight;
-pub mod gains_file;
 pub mod geometric;
 pub mod geometric_gains;
 pub mod law;

@@ -16,7 +16,7 @@ use crate::control::{ControlInput, ControlOutput, MotionEstimate};
 use crate::disturbance::Disturbance;
 use crate::flatness::{self, Moving, Target};
 use crate::foresight::{Foresight, ForesightState};
-use crate::law::{FileParameters, Law, Predecessor, Start};
+use crate::law::{FileParameters, Law, LawContext, Predecessor, Start};
 use crate::law_inputs::ReferenceInputs;
 use crate::lqr_gains::LqrGains;
 use crate::lqr_model::{self, INPUTS, MADE, MADE_RATE, RATE, ROTATION, STATES, VELOCITY};
@@ -25,20 +25,16 @@ use crate::riccati;
 use crate::set_points::SetPoint;
 use crate::trajectory::Point;
 use bus::component::Info;
-use bus::context::NodeContext;
 use diagnostics::ParameterError;
-use nalgebra::{Matrix3, Rotation3, SMatrix, SVector, Vector3};
+use nalgebra::{Rotation3, SMatrix, SVector, Vector3};
+use std::path::Path;
 
 /// The law at one period: all that does not change during a run.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LqrLaw {
     gains: LqrGains,
     gain: SMatrix<f64, INPUTS, STATES>,
-    mass_kg: f64,
-    inertia_B_kg_m2: Matrix3<f64>,
-    gravity_m_s2: f64,
     foresight: Foresight,
-    period_s: f64,
 }
 
 /// What the reference needs.
@@ -58,23 +54,16 @@ impl LqrLaw {
         craft: &ControlledVehicle,
         period_s: f64,
     ) -> Result<Self, ParameterError> {
-        let vehicle = &craft.vehicle;
         let (state_weights, input_weights) = lqr_model::weights(&gains);
-        let regulator = lqr_model::step(vehicle, period_s).and_then(|step| {
+        let regulator = lqr_model::step(&craft.vehicle, period_s).and_then(|step| {
             riccati::regulator(&step.transition, &step.input, &state_weights, &input_weights)
         });
-        let regulator = regulator.ok_or_else(|| ParameterError::conflict("vehicle", "the Riccati equation for this `vehicle` and these `gains` has no stabilising solution that can be \
-             computed: look for a vehicle without gravity, or weights that are many orders of magnitude apart",
-        ))?;
-        Ok(Self {
-            gains,
-            gain: regulator.gain,
-            mass_kg: vehicle.mass_kg,
-            inertia_B_kg_m2: vehicle.inertia_kg_m2,
-            gravity_m_s2: vehicle.gravity_m_s2,
-            foresight: Foresight::new(craft, &gains.observer, period_s),
-            period_s,
-        })
+        let unsolved = "the Riccati equation for this `vehicle` and these `gains` has no stabilising solution that can be \
+                        computed: look for a vehicle without gravity, or weights that are many orders of magnitude \
+                        apart";
+        let regulator = regulator.ok_or_else(|| ParameterError::conflict("vehicle", unsolved))?;
+        let foresight = Foresight::new(craft, &gains.observer, period_s);
+        Ok(Self { gains, gain: regulator.gain, foresight })
     }
 
     /// K: what each state's deviation takes off the demanded thrust (N) and torque (N·m).
@@ -90,16 +79,16 @@ impl LqrLaw {
             first: jerk_W - disturbance.jerk_W_m_s3,
             second: snap_W,
         };
-        let thrust_W = wanted_W.against(self.gravity_m_s2);
+        let thrust_W = wanted_W.against(self.foresight.gravity_m_s2);
         let attitude = flatness::target(&thrust_W, reference.yaw_rad, reference.yaw_rate_rad_s);
-        let (rate_B, inertia) = (attitude.angular_velocity_B_rad_s, &self.inertia_B_kg_m2);
+        let (rate_B, inertia) = (attitude.angular_velocity_B_rad_s, &self.foresight.inertia_B_kg_m2);
         let torque_B_N_m =
             inertia * attitude.angular_acceleration_B_rad_s2 + rate_B.cross(&(inertia * rate_B));
         let z_W = thrust_W.value.normalize();
         Needed {
             attitude,
-            wrench: RotorWrench { thrust_N: self.mass_kg * thrust_W.value.norm(), torque_B_N_m },
-            thrust_rate_N_s: self.mass_kg * thrust_W.first.dot(&z_W),
+            wrench: RotorWrench { thrust_N: self.foresight.mass_kg * thrust_W.value.norm(), torque_B_N_m },
+            thrust_rate_N_s: self.foresight.mass_kg * thrust_W.first.dot(&z_W),
         }
     }
 
@@ -141,8 +130,8 @@ impl LqrLaw {
 
     /// The acceleration that the foreseen thrust means.
     fn explained_W_m_s2(&self, made: &Made, motion: &MotionEstimate) -> Vector3<f64> {
-        let thrust_B_m_s2 = Vector3::z() * (made.wrench.thrust_N / self.mass_kg);
-        motion.attitude_WB * thrust_B_m_s2 - Vector3::z() * self.gravity_m_s2
+        let thrust_B_m_s2 = Vector3::z() * (made.wrench.thrust_N / self.foresight.mass_kg);
+        motion.attitude_WB * thrust_B_m_s2 - Vector3::z() * self.foresight.gravity_m_s2
     }
 }
 
@@ -155,25 +144,20 @@ impl Law for LqrLaw {
     type Inputs<'a> = ReferenceInputs<'a>;
     type State = ForesightState;
 
-    fn new(
-        parameters: &FileParameters,
-        craft: &ControlledVehicle,
-        context: &NodeContext<'_>,
-    ) -> Result<Self, ParameterError> {
-        let gains = LqrGains::load(parameters.gains.as_deref())
-            .map_err(|error| ParameterError::conflict("gains", error))?;
-        Self::for_craft(gains, craft, context.period_s())
+    fn vehicle(parameters: &Self::Parameters) -> &Path {
+        &parameters.vehicle
+    }
+
+    fn new(parameters: &Self::Parameters, context: &LawContext<'_>) -> Result<Self, ParameterError> {
+        let gains = LqrGains::load(parameters.gains.as_deref())?;
+        Self::for_craft(gains, context.craft, context.node.period_s())
     }
 
     fn start(&self, input: &ControlInput) -> Start<ForesightState> {
         self.foresight.start(input)
     }
 
-    fn take_over(
-        &self,
-        from: &Predecessor<'_, ForesightState>,
-        input: &ControlInput,
-    ) -> Start<ForesightState> {
+    fn take_over(&self, from: &Predecessor<'_, Self::State>, input: &ControlInput) -> Start<Self::State> {
         self.foresight.take_over(from, input)
     }
 
@@ -181,7 +165,8 @@ impl Law for LqrLaw {
         let (made, motion) = (self.foresight.advance(state, last), &input.motion);
         let explained_W_m_s2 = self.explained_W_m_s2(&made, motion);
         let observer = &mut state.observer;
-        let disturbance = self.gains.observer.step(observer, motion, &explained_W_m_s2, self.period_s);
+        let disturbance =
+            self.gains.observer.step(observer, motion, &explained_W_m_s2, self.foresight.period_s);
         let reference = Point::from(&input.reference);
         let needed = self.needed(&disturbance, &reference);
         let deviation = self.deviation(&needed, &made, motion, &reference);

@@ -10,6 +10,7 @@
 #![allow(non_snake_case, reason = "a trailing _B names the frame a vector is written in, _N the newton")]
 
 use crate::allocation::RotorWrench;
+use diagnostics::unit::PURE_NUMBER;
 use nalgebra::{Matrix2, Matrix3, Vector2, Vector3};
 use vehicles::MotorModel;
 
@@ -23,13 +24,14 @@ pub struct MotorLag {
     input: Vector2<f64>,
 }
 
-/// How fast the lag is to be: its poles as placed anew.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct LagTarget {
-    /// ω_f, rad/s.
-    pub natural_frequency_rad_s: f64,
-    /// ζ_f.
-    pub damping_ratio: f64,
+gains! {
+    /// How fast the lag is to be: its poles as placed anew.
+    pub struct LagTarget of file {
+        /// ω_f, rad/s.
+        natural_frequency_rad_s: f64 = file.bandwidth("natural_frequency"),
+        /// ζ_f.
+        damping_ratio: f64 = file.limit("damping_ratio", PURE_NUMBER),
+    }
 }
 
 /// The wrench that the rotors are foreseen to make, and its rate of change.

@@ -6,17 +6,16 @@
     reason = "a trailing _W or _B names the frame a vector is written in, _N the newton"
 )]
 
-use crate::airframe::{ControlledVehicle, HoverModel};
+use crate::airframe::HoverModel;
 use crate::allocation::RotorWrench;
 use crate::altitude_loop::{AltitudeLoop, LoopGains};
 use crate::angle::wrap_rad;
 use crate::control::{ControlInput, ControlOutput, HoverMotion, Integrals};
-use crate::law::{Law, Predecessor, Start, VehicleFile};
+use crate::law::{Law, LawContext, Predecessor, Start};
 use crate::law_inputs::SetPointInputs;
 use crate::pid_gains::{GivenGains, PidGains};
 use crate::set_points::SetPoint;
 use bus::component::Info;
-use bus::context::NodeContext;
 use diagnostics::ParameterError;
 use nalgebra::Vector3;
 use serde::Deserialize;
@@ -53,12 +52,6 @@ pub struct Parameters {
     gains: GivenGains,
 }
 
-impl VehicleFile for Parameters {
-    fn vehicle(&self) -> &Path {
-        &self.vehicle
-    }
-}
-
 impl Law for PidLaw {
     const INFO: Info =
         Info::new("pid", "altitude, roll, pitch and yaw PID of the thesis with control allocation");
@@ -66,13 +59,13 @@ impl Law for PidLaw {
     type Inputs<'a> = SetPointInputs<'a>;
     type State = PidState;
 
-    fn new(
-        parameters: &Parameters,
-        craft: &ControlledVehicle,
-        context: &NodeContext<'_>,
-    ) -> Result<Self, ParameterError> {
+    fn vehicle(parameters: &Self::Parameters) -> &Path {
+        &parameters.vehicle
+    }
+
+    fn new(parameters: &Self::Parameters, context: &LawContext<'_>) -> Result<Self, ParameterError> {
         let gains = parameters.gains.gains()?;
-        Ok(Self { gains, vehicle: craft.hover_model(), period_s: context.period_s() })
+        Ok(Self { gains, vehicle: context.craft.hover_model(), period_s: context.node.period_s() })
     }
 
     fn rate_gain_1_s(&self) -> f64 {
@@ -84,7 +77,7 @@ impl Law for PidLaw {
         Start { state: PidState::default(), wrench: RotorWrench::default() }
     }
 
-    fn take_over(&self, from: &Predecessor<'_, PidState>, input: &ControlInput) -> Start<PidState> {
+    fn take_over(&self, from: &Predecessor<'_, Self::State>, input: &ControlInput) -> Start<Self::State> {
         let integrals = self.continued(from, input.set_point.altitude_m, &HoverMotion::of(&input.motion));
         Start { state: PidState { integrals }, wrench: from.wrench }
     }

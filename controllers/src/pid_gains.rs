@@ -27,46 +27,37 @@
 //! `pid-thesis.toml`; the former is built in.
 
 use crate::altitude_loop::{AltitudeGains, LoopGains};
-use crate::gains_file::{GAIN, gain, parse, tilt};
+use crate::gains_file::{self, GAIN};
 use diagnostics::parameter::{ParameterError, require};
-use diagnostics::unit::ANGULAR_ACCELERATION;
+use diagnostics::unit::{ACCELERATION, ANGULAR_ACCELERATION, VELOCITY};
 use serde::Deserialize;
 use serde::de::{MapAccess, Visitor, value::MapAccessDeserializer};
-use std::path::{Path, PathBuf};
-use vehicles::VehicleError;
-use vehicles::reader::Section;
-
-/// The gains that the law is tuned with.
-const OURS: &str = include_str!("../gains/pid.toml");
+use std::path::PathBuf;
 
 /// The gains of the thesis.
 const THESIS: &str = include_str!("../gains/pid-thesis.toml");
 
-/// Gains and limits of the four loops. A loop's table is given whole or left out.
-#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct PidGains {
-    /// Altitude error (m) and rate of climb (m/s) to vertical acceleration (m/s²).
-    pub altitude: LoopGains,
-    /// Roll error (rad) and body rate p (rad/s) to angular acceleration about body x (rad/s²).
-    pub roll: LoopGains,
-    /// Pitch error (rad) and body rate q (rad/s) to angular acceleration about body y (rad/s²).
-    pub pitch: LoopGains,
-    /// Yaw error (rad) and body rate r (rad/s) to angular acceleration about body z (rad/s²).
-    pub yaw: LoopGains,
-    /// The altitude's integrator rests while the vehicle climbs or sinks faster than this, m/s.
-    pub altitude_integral_climb_max_m_s: f64,
-    /// The most that the altitude's integrator may ask for, m/s².
-    pub altitude_integral_max_m_s2: f64,
-    /// The most that an angle's integrator may ask for, rad/s².
-    pub attitude_integral_max_rad_s2: f64,
-    /// Roll and pitch commands are cut to this, rad.
-    pub tilt_command_max_rad: f64,
-}
-
-impl Default for PidGains {
-    fn default() -> Self {
-        parse(OURS, "gains/pid.toml", Self::read).expect("a test reads the built-in gains")
+gains! {
+    /// Gains and limits of the four loops. A loop's table is given whole or left out.
+    #[derive(Deserialize)]
+    #[serde(default, deny_unknown_fields)]
+    pub struct PidGains of file, built in "pid.toml" {
+        /// Altitude error (m) and rate of climb (m/s) to vertical acceleration (m/s²).
+        altitude: LoopGains = LoopGains::read(&file.table("altitude")),
+        /// Roll error (rad) and body rate p (rad/s) to angular acceleration about body x (rad/s²).
+        roll: LoopGains = LoopGains::read(&file.table("roll")),
+        /// Pitch error (rad) and body rate q (rad/s) to angular acceleration about body y (rad/s²).
+        pitch: LoopGains = LoopGains::read(&file.table("pitch")),
+        /// Yaw error (rad) and body rate r (rad/s) to angular acceleration about body z (rad/s²).
+        yaw: LoopGains = LoopGains::read(&file.table("yaw")),
+        /// The altitude's integrator rests while the vehicle climbs or sinks faster than this, m/s.
+        altitude_integral_climb_max_m_s: f64 = file.limit("altitude.integral_climb_max", VELOCITY),
+        /// The most that the altitude's integrator may ask for, m/s².
+        altitude_integral_max_m_s2: f64 = file.gain("altitude.integral_max", ACCELERATION),
+        /// The most that an angle's integrator may ask for, rad/s².
+        attitude_integral_max_rad_s2: f64 = file.gain("attitude.integral_max", ANGULAR_ACCELERATION),
+        /// Roll and pitch commands are cut to this, rad.
+        tilt_command_max_rad: f64 = file.tilt("attitude.command_max"),
     }
 }
 
@@ -74,38 +65,8 @@ impl PidGains {
     /// The thesis's own numbers (Table 5.1), with our yaw loop and limits, which it does not give.
     #[must_use]
     pub fn thesis() -> Self {
-        parse(THESIS, "gains/pid-thesis.toml", Self::read).expect("a test reads the built-in gains")
-    }
-
-    /// The gains in the file at `path`.
-    ///
-    /// # Errors
-    /// The file cannot be read, or holds what no gains can be.
-    pub fn load(path: &Path) -> Result<Self, VehicleError> {
-        crate::gains_file::load(path, Self::read)
-    }
-
-    fn read(root: &Section<'_, '_>) -> Result<Self, VehicleError> {
-        let altitude = AltitudeGains::read(&root.section("altitude")?)?;
-        let axis = |name| {
-            let section = root.section(name)?;
-            let gains = LoopGains::read(&section)?;
-            section.finish().map(|()| gains)
-        };
-        let (roll, pitch, yaw) = (axis("roll")?, axis("pitch")?, axis("yaw")?);
-        let attitude = root.section("attitude")?;
-        let gains = Self {
-            altitude: altitude.loop_gains,
-            roll,
-            pitch,
-            yaw,
-            altitude_integral_climb_max_m_s: altitude.integral_climb_max_m_s,
-            altitude_integral_max_m_s2: altitude.integral_max_m_s2,
-            attitude_integral_max_rad_s2: gain(&attitude, "integral_max", ANGULAR_ACCELERATION)?,
-            tilt_command_max_rad: tilt(&attitude, "command_max")?,
-        };
-        attitude.finish()?;
-        Ok(gains)
+        gains_file::parse(THESIS, "controllers/gains/pid-thesis.toml", Self::read)
+            .expect("a test reads the built-in gains")
     }
 
     /// What the altitude loop needs of these.
@@ -153,9 +114,7 @@ impl GivenGains {
     pub fn gains(&self) -> Result<PidGains, ParameterError> {
         match self {
             GivenGains::Table(gains) => gains.check().map(|()| *gains).map_err(|error| error.within("gains")),
-            GivenGains::File(path) => {
-                PidGains::load(path).map_err(|error| ParameterError::conflict("gains", error))
-            }
+            GivenGains::File(path) => PidGains::load(Some(path)),
         }
     }
 }
@@ -212,8 +171,10 @@ mod tests {
     #[test]
     fn negative_gains_and_impossible_limits_are_refused_with_their_key() {
         let refused = |from: &str, to: &str| {
-            assert_eq!(OURS.matches(from).count(), 1, "{from}");
-            parse(&OURS.replace(from, to), "my.toml", PidGains::read).unwrap_err().to_string()
+            assert_eq!(PidGains::BUILT_IN.matches(from).count(), 1, "{from}");
+            gains_file::parse(&PidGains::BUILT_IN.replace(from, to), "my.toml", PidGains::read)
+                .unwrap_err()
+                .to_string()
         };
         let error = refused("value = 12", "value = -12");
         assert!(error.contains("my.toml:") && error.contains("altitude.proportional"), "{error}");

@@ -6,7 +6,7 @@ use bus::OutputPorts;
 use bus::component::{Component, Info, StepError};
 use bus::context::{NodeContext, StepContext};
 use bus::messages::SetPoint;
-use diagnostics::ParameterError;
+use diagnostics::parameter::{ParameterError, refuse};
 use serde::Deserialize;
 use std::path::PathBuf;
 
@@ -61,31 +61,22 @@ impl Component for Pilot {
 
     fn new(parameters: Parameters, context: &NodeContext<'_>) -> Result<Self, ParameterError> {
         let altitude_m = parameters.initial_altitude_m;
-        if !ALTITUDES_M.contains(&altitude_m) {
-            return Err(ParameterError::conflict(
-                "initial_altitude_m",
-                format!("`initial_altitude_m` is {altitude_m} m, expected {ALTITUDES_EXPECTED}"),
-            ));
-        }
-        let initial = Values { altitude_m: parameters.initial_altitude_m, ..Values::default() };
-        let schedule = Schedule::new(&parameters.set_points, &initial, context.rate_hz())
-            .map_err(|error| ParameterError::conflict("set_points", format_args!("`set_points`: {error}")))?;
+        refuse(!ALTITUDES_M.contains(&altitude_m), "initial_altitude_m", || {
+            format!("`initial_altitude_m` is {altitude_m} m, expected {ALTITUDES_EXPECTED}")
+        })?;
+        let initial = Values { altitude_m, ..Values::default() };
+        let schedule = Schedule::new(&parameters.set_points, &initial, context.rate_hz())?;
         let sticks = parameters.data.as_deref().map(Sticks::load).transpose();
         let sticks = sticks.map_err(|error| ParameterError::conflict("data", error))?;
         let taken = |entry: &&SetPointEntry| sticks.as_ref().is_some_and(|it| it.has(&entry.channel));
-        match parameters.set_points.iter().find(taken) {
-            None => {
-                warn_of_late(&parameters.set_points, context);
-                Ok(Self { schedule, sticks })
-            }
-            Some(entry) => Err(ParameterError::conflict(
-                "set_points",
-                format!(
-                    "`set_points` has an entry on channel {}, which the sticks in `data` hold; leave one of them out",
-                    entry.channel
-                ),
-            )),
+        if let Some(SetPointEntry { channel, .. }) = parameters.set_points.iter().find(taken) {
+            let message = format!(
+                "`set_points` has an entry on channel {channel}, which the sticks in `data` hold; leave one of them out"
+            );
+            return Err(ParameterError::conflict("set_points", message));
         }
+        warn_of_late(&parameters.set_points, context);
+        Ok(Self { schedule, sticks })
     }
 
     fn initial(&self) {}

@@ -5,7 +5,7 @@ use bus::OutputPorts;
 use bus::component::{Component, Info, StepError};
 use bus::context::{NodeContext, StepContext};
 use bus::messages::{MeasuredState, MotorCommand};
-use diagnostics::ParameterError;
+use diagnostics::parameter::{ParameterError, refuse};
 use serde::Deserialize;
 use std::path::PathBuf;
 
@@ -23,17 +23,13 @@ pub struct Parameters {
 }
 
 fn load(parameters: &Parameters) -> Result<FlightLog, ParameterError> {
-    let log = FlightLog::load(&parameters.data, &parameters.columns)
-        .map_err(|error| ParameterError::conflict("data", error))?;
-    if (0.0..log.duration_s()).contains(&parameters.from_s) {
-        Ok(log)
-    } else {
-        let (from_s, length_s) = (parameters.from_s, log.duration_s());
-        Err(ParameterError::conflict(
-            "from_s",
-            format!("`from_s` is {from_s} s, the flight lasts {length_s:.3} s"),
-        ))
-    }
+    let log = FlightLog::load(&parameters.data, &parameters.columns);
+    let log = log.map_err(|error| ParameterError::conflict("data", error))?;
+    let (from_s, length_s) = (parameters.from_s, log.duration_s());
+    refuse(!(0.0..length_s).contains(&from_s), "from_s", || {
+        format!("`from_s` is {from_s} s, the flight lasts {length_s:.3} s")
+    })?;
+    Ok(log)
 }
 
 /// Times are sums of decimal fractions: a nanosecond of slack, as for the rows.
@@ -43,16 +39,12 @@ const SLACK_S: f64 = 1e-9;
 fn require_length(log: &FlightLog, from_s: f64, run: &NodeContext<'_>) -> Result<(), ParameterError> {
     let last_tick = (run.duration_ticks.max(1) - 1) / run.period_ticks * run.period_ticks;
     let (last_s, left_s) = (f64::from(last_tick) * run.tick_s(), log.duration_s() - from_s);
-    if last_s <= left_s + SLACK_S {
-        return Ok(());
-    }
-    Err(ParameterError::conflict(
-        "from_s",
+    refuse(last_s > left_s + SLACK_S, "from_s", || {
         format!(
             "the flight ends {left_s:.3} s after `from_s`, and the run's last tick lies at {last_s:.3} s; shorten \
-         run.duration_s"
-        ),
-    ))
+             run.duration_s"
+        )
+    })
 }
 
 /// What the player sends.

@@ -14,7 +14,7 @@ use crate::controller_state::ControllerState;
 use crate::law::Law;
 use crate::set_points::SetPoint;
 use bus::context::NodeContext;
-use diagnostics::ParameterError;
+use diagnostics::parameter::{ParameterError, refuse};
 use nalgebra::{UnitQuaternion, Vector3};
 
 /// Steps on each motion: a filter that a step multiplies by 2 overflows before 1100 of them, and they take a
@@ -52,16 +52,13 @@ fn check_period(gain_1_s: f64, run: &NodeContext<'_>) -> Result<(), ParameterErr
              {product:.3}"
         )
     };
-    if product >= DIVERGES {
-        return Err(ParameterError::conflict(
-            "period_ticks",
-            format!(
-                "{}, expected below {DIVERGES}, from where on the rate grows from step to step; raise run.rate_hz, or \
-             lower `period_ticks` or the gain",
-                message()
-            ),
-        ));
-    }
+    refuse(product >= DIVERGES, "period_ticks", || {
+        format!(
+            "{}, expected below {DIVERGES}, from where on the rate grows from step to step; raise run.rate_hz, or lower \
+             `period_ticks` or the gain",
+            message()
+        )
+    })?;
     if product > COARSE {
         run.warn("gains", format!("{}, above {COARSE} little is left of the phase margin", message()));
     }
@@ -103,17 +100,16 @@ fn fly<L: Law>(
     for step in 0..STEPS {
         let output = transfer.step(law, &mut state, &input, None);
         let speeds_rad_s = craft.allocation.allocate(&output.wrench).speeds_rad_s;
-        if let Some(what) = output.not_finite().or_else(|| first_not_finite("a rotor speed", &speeds_rad_s)) {
-            return Err(ParameterError::conflict(
-                "gains",
-                format!(
-                    "its numbers lead to {what} after {} steps of {} s on a motion that any flight meets; `gains`, \
-                 `vehicle` or run.rate_hz do not go together",
-                    step + 1,
-                    run.period_s()
-                ),
-            ));
-        }
+        let odd = output.not_finite().or_else(|| first_not_finite("a rotor speed", &speeds_rad_s));
+        refuse(odd.is_some(), "gains", || {
+            format!(
+                "its numbers lead to {} after {} steps of {} s on a motion that any flight meets; `gains`, `vehicle` or \
+                 run.rate_hz do not go together",
+                odd.unwrap_or_default(),
+                step + 1,
+                run.period_s()
+            )
+        })?;
     }
     Ok(())
 }
@@ -122,14 +118,15 @@ impl ControlOutput {
     /// The first of the numbers asked for that is not finite, for a message.
     #[must_use]
     pub fn not_finite(&self) -> Option<String> {
-        let set = &self.set_point;
-        first_not_finite("a thrust in N", &[self.wrench.thrust_N])
-            .or_else(|| first_not_finite("a torque in N*m", self.wrench.torque_B_N_m.as_slice()))
-            .or_else(|| first_not_finite("a velocity set point in m/s", &self.velocity_m_s))
-            .or_else(|| first_not_finite("an altitude set point in m", &[set.altitude_m]))
-            .or_else(|| {
-                first_not_finite("an attitude set point in rad", &[set.roll_rad, set.pitch_rad, set.yaw_rad])
-            })
+        let (wrench, set) = (&self.wrench, &self.set_point);
+        let asked: [(&str, &[f64]); 5] = [
+            ("a thrust in N", &[wrench.thrust_N]),
+            ("a torque in N*m", wrench.torque_B_N_m.as_slice()),
+            ("a velocity set point in m/s", &self.velocity_m_s),
+            ("an altitude set point in m", &[set.altitude_m]),
+            ("an attitude set point in rad", &[set.roll_rad, set.pitch_rad, set.yaw_rad]),
+        ];
+        asked.into_iter().find_map(|(what, numbers)| first_not_finite(what, numbers))
     }
 }
 

@@ -6,6 +6,7 @@
 //! nothing, so that one of 1 s lasts 2 s as a whole. Pulses of half a second would bring the
 //! Hummingbird to 8° only: behind its motors' lag 9° take about 0.57 s (gains 16 and 6, linearised).
 
+use diagnostics::ParameterError;
 use nalgebra::UnitQuaternion;
 use serde::Deserialize;
 use std::ops::RangeInclusive;
@@ -57,20 +58,6 @@ pub struct SetPointEntry {
     pub amplitude: Option<f64>,
     /// How long each of a doublet's two pulses takes, s.
     pub duration_s: Option<f64>,
-}
-
-/// An entry that cannot be flown.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[error("set point {index} (the first is 0): `{key}` must be {expected}, found {found}")]
-pub struct SetPointError {
-    /// The entry's place in the list, from 0.
-    pub index: usize,
-    /// The key at fault.
-    pub key: &'static str,
-    /// What it may hold.
-    pub expected: String,
-    /// What it holds.
-    pub found: String,
 }
 
 /// A schedule compiled for one tick rate.
@@ -126,10 +113,11 @@ impl Schedule {
         entries: &[SetPointEntry],
         initial: &SetPoint,
         tick_rate_hz: u32,
-    ) -> Result<Self, SetPointError> {
+    ) -> Result<Self, ParameterError> {
         let mut schedule = Self::holding(initial);
         for (index, entry) in entries.iter().enumerate() {
-            Reader { index, entry, tick_rate_hz }.add_to(&mut schedule.channels)?;
+            let read = Reader { entry, tick_rate_hz }.add_to(&mut schedule.channels);
+            read.map_err(|error| error.within(&format!("set_points.{index}")))?;
         }
         schedule.channels.iter_mut().for_each(ChannelPlan::link);
         Ok(schedule)
@@ -189,72 +177,69 @@ impl Doublet {
     }
 }
 
-/// Reads one entry, and knows its place for the errors.
+/// Reads one entry.
 struct Reader<'a> {
-    index: usize,
     entry: &'a SetPointEntry,
     tick_rate_hz: u32,
 }
 
 impl Reader<'_> {
-    fn add_to(&self, channels: &mut [ChannelPlan; 4]) -> Result<(), SetPointError> {
+    fn add_to(&self, channels: &mut [ChannelPlan; 4]) -> Result<(), ParameterError> {
         let channel = self.channel()?;
         let plan = &mut channels[channel];
         let si_per_unit = self.si_per_unit(channel)?;
         match self.entry.kind.as_str() {
-            "step" => plan.legs.push(self.step(si_per_unit)?),
-            "ramp" => plan.legs.push(self.ramp(si_per_unit)?),
+            "step" => plan.legs.push(self.leg(si_per_unit, &["to"])?),
+            "ramp" => plan.legs.push(self.leg(si_per_unit, &["to", "over_s"])?),
             "doublet" => plan.doublets.push(self.doublet(si_per_unit)?),
-            other => return Err(self.error("kind", "\"step\", \"ramp\" or \"doublet\"", quoted(other))),
+            other => {
+                return Err(ParameterError::value("kind", "\"step\", \"ramp\" or \"doublet\"", quoted(other)));
+            }
         }
         Ok(())
     }
 
-    fn step(&self, si_per_unit: f64) -> Result<Leg, SetPointError> {
-        self.refuse("over_s", self.entry.over_s)?;
-        self.refuse("amplitude", self.entry.amplitude)?;
-        self.refuse("duration_s", self.entry.duration_s)?;
+    /// A step, or where the entry has `over_s` a ramp.
+    fn leg(&self, si_per_unit: f64, keys: &[&str]) -> Result<Leg, ParameterError> {
+        self.require_only(keys)?;
         let to = self.value("to", self.entry.to, si_per_unit)?;
-        Ok(Leg { start_tick: self.start_tick()?, length_ticks: 0, from: to, to })
-    }
-
-    fn ramp(&self, si_per_unit: f64) -> Result<Leg, SetPointError> {
-        self.refuse("amplitude", self.entry.amplitude)?;
-        self.refuse("duration_s", self.entry.duration_s)?;
-        let to = self.value("to", self.entry.to, si_per_unit)?;
-        let length_ticks = self.length_ticks("over_s", self.entry.over_s)?;
+        let is_ramp = keys.contains(&"over_s");
+        let length_ticks = if is_ramp { self.length_ticks("over_s", self.entry.over_s)? } else { 0 };
         Ok(Leg { start_tick: self.start_tick()?, length_ticks, from: to, to })
     }
 
-    fn doublet(&self, si_per_unit: f64) -> Result<Doublet, SetPointError> {
-        self.refuse("to", self.entry.to)?;
-        self.refuse("over_s", self.entry.over_s)?;
+    fn doublet(&self, si_per_unit: f64) -> Result<Doublet, ParameterError> {
+        self.require_only(&["amplitude", "duration_s"])?;
         let amplitude = self.value("amplitude", self.entry.amplitude, si_per_unit)?;
         let pulse_ticks = self.length_ticks("duration_s", self.entry.duration_s)?;
         Ok(Doublet { start_tick: self.start_tick()?, pulse_ticks, amplitude })
     }
 
-    fn channel(&self) -> Result<usize, SetPointError> {
+    fn channel(&self) -> Result<usize, ParameterError> {
         let given = self.entry.channel.as_str();
         CHANNELS.iter().position(|name| *name == given).ok_or_else(|| {
-            self.error("channel", "\"altitude\", \"roll\", \"pitch\" or \"yaw\"", quoted(given))
+            ParameterError::value("channel", "\"altitude\", \"roll\", \"pitch\" or \"yaw\"", quoted(given))
         })
     }
 
-    fn si_per_unit(&self, channel: usize) -> Result<f64, SetPointError> {
+    fn si_per_unit(&self, channel: usize) -> Result<f64, ParameterError> {
         match (CHANNELS[channel], self.entry.unit.as_str()) {
             ("altitude", "m") => Ok(1.0),
-            ("altitude", other) => Err(self.error("unit", "\"m\" on channel altitude", quoted(other))),
+            ("altitude", other) => {
+                Err(ParameterError::value("unit", "\"m\" on channel altitude", quoted(other)))
+            }
             (_, "rad") => Ok(1.0),
             (_, "deg") => Ok(1.0_f64.to_radians()),
-            (name, other) => {
-                Err(self.error("unit", &format!("\"rad\" or \"deg\" on channel {name}"), quoted(other)))
-            }
+            (name, other) => Err(ParameterError::value(
+                "unit",
+                format!("\"rad\" or \"deg\" on channel {name}"),
+                quoted(other),
+            )),
         }
     }
 
     /// A value of the channel in SI, within what a vehicle can be asked for.
-    fn value(&self, key: &'static str, value: Option<f64>, si_per_unit: f64) -> Result<f64, SetPointError> {
+    fn value(&self, key: &'static str, value: Option<f64>, si_per_unit: f64) -> Result<f64, ParameterError> {
         let value = self.number(key, value)?;
         let (range, expected) = match self.entry.channel.as_str() {
             "altitude" => (ALTITUDES_M, ALTITUDES_EXPECTED),
@@ -262,49 +247,47 @@ impl Reader<'_> {
         };
         match si_per_unit * value {
             si if range.contains(&si) => Ok(si),
-            _ => Err(self.error(key, expected, format!("{value} {}", self.entry.unit))),
+            _ => Err(ParameterError::value(key, expected, format!("{value} {}", self.entry.unit))),
         }
     }
 
     /// The first tick that is not before `at_s`.
-    fn start_tick(&self) -> Result<u64, SetPointError> {
+    fn start_tick(&self) -> Result<u64, ParameterError> {
         let at_s = self.entry.at_s;
         if !(at_s.is_finite() && at_s >= 0.0) {
-            return Err(self.error("at_s", "a finite time, zero or more", at_s.to_string()));
+            return Err(ParameterError::value("at_s", "a finite time, zero or more", at_s));
         }
         // A time that is a tick's in decimal may come out just above it in binary.
         Ok((at_s * f64::from(self.tick_rate_hz) - 1e-6).ceil().max(0.0) as u64)
     }
 
     /// A length of time as a whole number of ticks, at least one.
-    fn length_ticks(&self, key: &'static str, value: Option<f64>) -> Result<u64, SetPointError> {
+    fn length_ticks(&self, key: &'static str, value: Option<f64>) -> Result<u64, ParameterError> {
         let length_s = self.number(key, value)?;
         if length_s <= 0.0 {
-            return Err(self.error(key, "a time greater than zero", length_s.to_string()));
+            return Err(ParameterError::value(key, "a time greater than zero", length_s));
         }
         Ok((length_s * f64::from(self.tick_rate_hz)).round().max(1.0) as u64)
     }
 
-    fn number(&self, key: &'static str, value: Option<f64>) -> Result<f64, SetPointError> {
+    fn number(&self, key: &'static str, value: Option<f64>) -> Result<f64, ParameterError> {
         let expected = format!("a finite number in a {}", self.entry.kind);
         match value {
             Some(number) if number.is_finite() => Ok(number),
-            Some(number) => Err(self.error(key, &expected, number.to_string())),
-            None => Err(self.error(key, &expected, "nothing".to_owned())),
+            Some(number) => Err(ParameterError::value(key, expected, number)),
+            None => Err(ParameterError::value(key, expected, "nothing")),
         }
     }
 
-    fn refuse(&self, key: &'static str, value: Option<f64>) -> Result<(), SetPointError> {
-        match value {
+    /// Refuses numbers that the entry's kind does not have: all but those under `keys`.
+    fn require_only(&self, keys: &[&str]) -> Result<(), ParameterError> {
+        let SetPointEntry { kind, to, over_s, amplitude, duration_s, .. } = self.entry;
+        let given = [("to", to), ("over_s", over_s), ("amplitude", amplitude), ("duration_s", duration_s)];
+        let mut others = given.into_iter().filter(|(key, _)| !keys.contains(key));
+        match others.find_map(|(key, value)| Some((key, (*value)?))) {
+            Some((key, number)) => Err(ParameterError::value(key, format!("left out of a {kind}"), number)),
             None => Ok(()),
-            Some(number) => {
-                Err(self.error(key, &format!("left out of a {}", self.entry.kind), number.to_string()))
-            }
         }
-    }
-
-    fn error(&self, key: &'static str, expected: &str, found: String) -> SetPointError {
-        SetPointError { index: self.index, key, expected: expected.to_owned(), found }
     }
 }
 
@@ -321,7 +304,7 @@ mod tests {
         set_points: Vec<SetPointEntry>,
     }
 
-    fn schedule(entries: &str) -> Result<Schedule, SetPointError> {
+    fn schedule(entries: &str) -> Result<Schedule, ParameterError> {
         let manifest: Manifest = toml::from_str(&format!("set_points = [{entries}]")).unwrap();
         Schedule::new(&manifest.set_points, &SetPoint { altitude_m: 1.0, ..SetPoint::default() }, 1000)
     }
@@ -386,7 +369,7 @@ mod tests {
         ];
         for (entry, expected) in cases {
             let error = schedule(&format!("{good}, {entry}")).unwrap_err().to_string();
-            assert!(error.contains("set point 1") && error.contains(expected), "{error}");
+            assert!(error.contains("`set_points.1.") && error.contains(expected), "{error}");
         }
     }
 }

@@ -36,41 +36,29 @@ struct Row {
 
 /// A recording that cannot be read.
 #[derive(Debug, thiserror::Error)]
-pub enum SticksError {
+#[error("{file}{fault}")]
+pub struct SticksError {
+    /// The path as given.
+    pub file: String,
+    /// What is wrong with it, behind its name.
+    pub fault: SticksFault,
+}
+
+/// What is wrong with a recording.
+#[derive(Debug, thiserror::Error)]
+pub enum SticksFault {
     /// Not there, or not CSV.
-    #[error(
-        "{file}: cannot read these sticks: {cause}; check the path, and that it is a CSV file with a header"
-    )]
-    Unreadable {
-        /// The path as given.
-        file: String,
-        /// Why.
-        #[source]
-        cause: csv::Error,
-    },
+    #[error(": cannot read these sticks: {0}; check the path, and that it is a CSV file with a header")]
+    Unreadable(#[from] csv::Error),
     /// A quotation mark makes one cell of what are many.
-    #[error("{file}: {stray}")]
-    Quote {
-        /// The path as given.
-        file: String,
-        /// Where it stands, and what to do.
-        stray: StrayQuote,
-    },
-    /// A header that lacks a column or has one too many.
-    #[error("{file}:1: expected the columns {expected}, found {found}")]
-    Columns {
-        /// The path as given.
-        file: String,
-        /// What may stand there.
-        expected: &'static str,
-        /// What does.
-        found: String,
-    },
+    #[error(": {0}")]
+    Quote(StrayQuote),
+    /// A header that lacks a column or has one too many: these.
+    #[error(":1: expected the columns {EXPECTED}, found {0}")]
+    Columns(String),
     /// A value that cannot be meant.
-    #[error("{file}:{line}: column `{column}`: expected {expected}, found {found}")]
+    #[error(":{line}: column `{column}`: expected {expected}, found {found}")]
     Value {
-        /// The path as given.
-        file: String,
         /// The line, from 1.
         line: u64,
         /// The column.
@@ -81,11 +69,8 @@ pub enum SticksError {
         found: String,
     },
     /// No rows.
-    #[error("{file}: expected at least one row of sticks, found none")]
-    Empty {
-        /// The path as given.
-        file: String,
-    },
+    #[error(": expected at least one row of sticks, found none")]
+    Empty,
 }
 
 const COLUMNS: [&str; 5] = ["time_s", "roll_deg", "pitch_deg", "yaw_rate_deg_s", "altitude_m"];
@@ -105,26 +90,22 @@ impl Sticks {
     /// # Errors
     /// It cannot be read, or holds what no sticks can ask for.
     pub fn load(path: &Path) -> Result<Self, SticksError> {
-        let file = path.display().to_string();
-        match vehicles::text::read_log(path) {
-            Ok(bytes) => Self::read(&bytes, &file),
-            Err(cause) => Err(SticksError::Unreadable { file, cause: cause.into() }),
-        }
+        let bytes = vehicles::text::read_log(path).map_err(|cause| SticksFault::Unreadable(cause.into()));
+        let sticks = bytes.and_then(|bytes| Self::read(&bytes));
+        sticks.map_err(|fault| SticksError { file: path.display().to_string(), fault })
     }
 
-    fn read(bytes: &[u8], file: &str) -> Result<Self, SticksError> {
-        let quote = |stray| SticksError::Quote { file: file.to_owned(), stray };
-        vehicles::quotes::check(bytes, b',').map_err(quote)?;
+    fn read(bytes: &[u8]) -> Result<Self, SticksFault> {
+        vehicles::quotes::check(bytes, b',').map_err(SticksFault::Quote)?;
         let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(bytes);
-        let unreadable = |cause| SticksError::Unreadable { file: file.to_owned(), cause };
-        let places = Places::of(reader.headers().map_err(unreadable)?, file)?;
+        let places = Places::of(reader.headers()?)?;
         let mut rows: Vec<Row> = Vec::new();
         for record in reader.records() {
-            let row = places.row(&record.map_err(unreadable)?, rows.last(), file)?;
+            let row = places.row(&record?, rows.last())?;
             rows.push(row);
         }
         if rows.is_empty() {
-            return Err(SticksError::Empty { file: file.to_owned() });
+            return Err(SticksFault::Empty);
         }
         Ok(Self { rows, has_yaw_rate: places.0[3].is_some(), has_altitude: places.0[4].is_some() })
     }
@@ -187,22 +168,21 @@ impl Row {
 struct Places([Option<usize>; 5]);
 
 impl Places {
-    fn of(header: &csv::StringRecord, file: &str) -> Result<Self, SticksError> {
+    fn of(header: &csv::StringRecord) -> Result<Self, SticksFault> {
         let places = COLUMNS.map(|column| header.iter().position(|name| name == column));
         let known = places.iter().flatten().count();
         if places[..3].iter().all(Option::is_some) && known == header.len() {
             return Ok(Self(places));
         }
-        let found = header.iter().collect::<Vec<_>>().join(", ");
-        Err(SticksError::Columns { file: file.to_owned(), expected: EXPECTED, found })
+        Err(SticksFault::Columns(header.iter().collect::<Vec<_>>().join(", ")))
     }
 
-    fn row(&self, record: &csv::StringRecord, before: Option<&Row>, file: &str) -> Result<Row, SticksError> {
-        let number = |column: usize| self.number(record, column, file);
+    fn row(&self, record: &csv::StringRecord, before: Option<&Row>) -> Result<Row, SticksFault> {
+        let number = |column: usize| self.number(record, column);
         let time_s = number(0)?;
         if before.is_some_and(|before| before.time_s >= time_s) {
             let expected = "a time after the row before";
-            return Err(value_error(record, file, 0, expected, time_s.to_string()));
+            return Err(value_fault(record, 0, expected, time_s.to_string()));
         }
         let yaw_rate_rad_s = number(3)?.to_radians();
         Ok(Row {
@@ -216,12 +196,12 @@ impl Places {
     }
 
     /// The number in a column, 0 where the recording does not have it.
-    fn number(&self, record: &csv::StringRecord, column: usize, file: &str) -> Result<f64, SticksError> {
+    fn number(&self, record: &csv::StringRecord, column: usize) -> Result<f64, SticksFault> {
         let Some(place) = self.0[column] else { return Ok(0.0) };
         let text = record.get(place).unwrap_or_default();
         let number = text.parse().ok().filter(|number: &f64| number.is_finite());
         let (most, expected) = MOST[column];
-        let refused = |expected| value_error(record, file, column, expected, format!("\"{text}\""));
+        let refused = |expected| value_fault(record, column, expected, format!("\"{text}\""));
         match number.ok_or_else(|| refused("a finite number"))? {
             number if number.abs() <= most => Ok(number),
             _ => Err(refused(expected)),
@@ -229,15 +209,14 @@ impl Places {
     }
 }
 
-fn value_error(
+fn value_fault(
     record: &csv::StringRecord,
-    file: &str,
     column: usize,
     expected: &'static str,
     found: String,
-) -> SticksError {
+) -> SticksFault {
     let line = record.position().map_or(0, csv::Position::line);
-    SticksError::Value { file: file.to_owned(), line, column: COLUMNS[column], expected, found }
+    SticksFault::Value { line, column: COLUMNS[column], expected, found }
 }
 
 #[cfg(test)]
@@ -245,7 +224,7 @@ mod tests {
     use super::*;
 
     fn sticks(text: &str) -> Result<Sticks, SticksError> {
-        Sticks::read(text.as_bytes(), "s.csv")
+        Sticks::read(text.as_bytes()).map_err(|fault| SticksError { file: "s.csv".into(), fault })
     }
 
     fn beside() -> SetPoint {

@@ -324,28 +324,16 @@ impl CircleEntry {
             return Err(ParameterError::value("radius_m", "a number other than 0", self.radius_m));
         }
         finite("radius_m", self.radius_m)?;
-        let shape = Shape::Circle { radius_m: self.radius_m };
-        Laps {
-            speed_m_s: self.speed_m_s,
-            laps: self.laps,
-            ramp_s: self.ramp_s,
-            direction_deg: self.direction_deg,
-        }
-        .of(shape, start_W_m)
+        let Self { radius_m, speed_m_s, laps, ramp_s, direction_deg, .. } = *self;
+        Laps { speed_m_s, laps, ramp_s, direction_deg }.of(Shape::Circle { radius_m }, start_W_m)
     }
 }
 
 impl FigureEightEntry {
     fn curve(&self, start_W_m: Vector3<f64>) -> Result<Curve, ParameterError> {
         positive("half_length_m", self.half_length_m)?;
-        let shape = Shape::FigureEight { half_length_m: self.half_length_m };
-        Laps {
-            speed_m_s: self.speed_m_s,
-            laps: self.laps,
-            ramp_s: self.ramp_s,
-            direction_deg: self.direction_deg,
-        }
-        .of(shape, start_W_m)
+        let Self { half_length_m, speed_m_s, laps, ramp_s, direction_deg, .. } = *self;
+        Laps { speed_m_s, laps, ramp_s, direction_deg }.of(Shape::FigureEight { half_length_m }, start_W_m)
     }
 }
 

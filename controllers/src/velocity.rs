@@ -8,92 +8,56 @@
 
 #![allow(non_snake_case, reason = "a trailing _W or _B names the frame a vector is written in")]
 
-use crate::airframe::{ControlledVehicle, HoverModel};
+use crate::airframe::HoverModel;
 use crate::allocation::RotorWrench;
 use crate::cascade::{CascadeLaw, CascadeState};
 use crate::cascade_gains::CascadeGains;
 use crate::control::{ControlInput, ControlOutput, HoverMotion};
-use crate::gains_file::{gain, limit, parse};
-use crate::law::{Law, Predecessor, Start, VehicleFile};
+use crate::gains_file::Table;
+use crate::law::{Law, LawContext, Predecessor, Start};
 use crate::law_inputs::VelocityInputs;
 use crate::set_points::SetPoint;
 use bus::component::Info;
-use bus::context::NodeContext;
-use diagnostics::parameter::{ParameterError, all, finite};
+use diagnostics::parameter::{ParameterError, all, finite, refuse};
 use diagnostics::unit::{ACCELERATION, PER_SECOND, PURE_NUMBER, TIME, VELOCITY};
 use serde::Deserialize;
 use std::path::{Path, PathBuf};
-use vehicles::VehicleError;
-use vehicles::reader::Section;
 
-/// The gains that the law is tuned with.
-const OURS: &str = include_str!("../gains/velocity.toml");
-
-/// Gains and limits of the velocity loops, the same along both axes.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct VelocityGains {
-    /// Error of velocity (m/s) to acceleration (m/s²), 1/s.
-    pub proportional_1_s: f64,
-    /// Measured acceleration (m/s²) to acceleration against it (m/s²), 1.
-    pub derivative: f64,
-    /// Time constant of the filter before the derivative, s.
-    pub derivative_filter_s: f64,
-    /// The demanded acceleration is cut to this, m/s².
-    pub acceleration_max_m_s2: f64,
-    /// A commanded velocity gathers speed no faster than this, m/s².
-    pub command_acceleration_max_m_s2: f64,
-    /// A commanded height moves no faster than this, m/s.
-    pub climb_max_m_s: f64,
-}
-
-impl Default for VelocityGains {
-    fn default() -> Self {
-        parse(OURS, "gains/velocity.toml", LoopsGains::read)
-            .expect("a test reads the built-in gains")
-            .velocity
+gains! {
+    /// Gains and limits of the velocity loops, the same along both axes.
+    pub struct VelocityGains of file {
+        /// Error of velocity (m/s) to acceleration (m/s²), 1/s.
+        proportional_1_s: f64 = file.gain("proportional", PER_SECOND),
+        /// Measured acceleration (m/s²) to acceleration against it (m/s²), 1.
+        derivative: f64 = file.gain("derivative", PURE_NUMBER),
+        /// Time constant of the filter before the derivative, s.
+        derivative_filter_s: f64 = file.limit("derivative_filter", TIME),
+        /// The demanded acceleration is cut to this, m/s².
+        acceleration_max_m_s2: f64 = file.limit("acceleration_max", ACCELERATION),
+        /// A commanded velocity gathers speed no faster than this, m/s².
+        command_acceleration_max_m_s2: f64 = file.limit("command_acceleration_max", ACCELERATION),
+        /// A commanded height moves no faster than this, m/s.
+        climb_max_m_s: f64 = file.limit("climb_max", VELOCITY),
     }
 }
 
 impl VelocityGains {
-    fn read(section: &Section<'_, '_>) -> Result<Self, VehicleError> {
-        let gains = Self {
-            proportional_1_s: gain(section, "proportional", PER_SECOND)?,
-            derivative: gain(section, "derivative", PURE_NUMBER)?,
-            derivative_filter_s: limit(section, "derivative_filter", TIME)?,
-            acceleration_max_m_s2: limit(section, "acceleration_max", ACCELERATION)?,
-            command_acceleration_max_m_s2: limit(section, "command_acceleration_max", ACCELERATION)?,
-            climb_max_m_s: limit(section, "climb_max", VELOCITY)?,
-        };
-        section.finish()?;
-        Ok(gains)
-    }
-}
-
-/// The gains of the velocity loops and of the cascade inside: what a file leaves out is built in.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct LoopsGains {
-    /// Of the velocity loops.
-    pub velocity: VelocityGains,
-    /// Of the inner loops.
-    pub cascade: CascadeGains,
-}
-
-impl LoopsGains {
-    /// The gains in the file at `path`, or those built in.
-    ///
-    /// # Errors
-    /// The file cannot be read, or holds what no gains can be.
-    pub fn load(path: Option<&Path>) -> Result<Self, VehicleError> {
-        path.map_or_else(|| Ok(Self::default()), |path| crate::gains_file::load(path, Self::read))
-    }
-
-    pub(crate) fn read(root: &Section<'_, '_>) -> Result<Self, VehicleError> {
-        let velocity = if root.has("velocity") {
-            VelocityGains::read(&root.section("velocity")?)?
+    fn read_or_built_in(file: &Table<'_, '_>) -> Self {
+        if file.has("velocity") {
+            Self::read(&file.table("velocity"))
         } else {
-            VelocityGains::default()
-        };
-        Ok(Self { velocity, cascade: CascadeGains::read_or_built_in(root)? })
+            LoopsGains::default().velocity
+        }
+    }
+}
+
+gains! {
+    /// The gains of the velocity loops and of the cascade inside: what a file leaves out is built in.
+    pub struct LoopsGains of file, built in "velocity.toml" {
+        /// Of the velocity loops.
+        velocity: VelocityGains = VelocityGains::read_or_built_in(file),
+        /// Of the inner loops.
+        cascade: CascadeGains = CascadeGains::read_or_built_in(file),
     }
 }
 
@@ -277,18 +241,14 @@ impl Parameters {
             ("altitude_m", self.altitude_m.is_some()),
             ("yaw_rad", self.yaw_rad.is_some()),
         ];
-        match given.into_iter().find(|(_, is_given)| *is_given) {
-            Some((key, _)) if has_reference => Err(ParameterError::conflict(
-                "reference",
-                format!("`{key}` is given, and so is the input `reference`; leave one of them out"),
-            )),
-            _ if !has_reference && self.altitude_m.is_none() => Err(ParameterError::conflict(
-                "altitude_m",
-                "missing key `altitude_m`: without \
-                the input `reference` a velocity controller needs `altitude_m` and `velocity_m_s`",
-            )),
-            _ => Ok(()),
+        if let Some((key, _)) = given.into_iter().find(|(_, is_given)| has_reference && *is_given) {
+            let message = format!("`{key}` is given, and so is the input `reference`; leave one of them out");
+            return Err(ParameterError::conflict("reference", message));
         }
+        refuse(!has_reference && self.altitude_m.is_none(), "altitude_m", || {
+            "missing key `altitude_m`: without the input `reference` a velocity controller needs `altitude_m` and \
+             `velocity_m_s`"
+        })
     }
 
     fn constant(&self) -> Result<Option<VelocitySetPoint>, ParameterError> {
@@ -306,27 +266,20 @@ impl Parameters {
     }
 }
 
-impl VehicleFile for Parameters {
-    fn vehicle(&self) -> &Path {
-        &self.vehicle
-    }
-}
-
 impl Law for VelocityLaw {
     const INFO: Info = Info::new("velocity", "velocity PD around the cascade's inner loops");
     type Parameters = Parameters;
     type Inputs<'a> = VelocityInputs<'a>;
     type State = VelocityState;
 
-    fn new(
-        parameters: &Parameters,
-        craft: &ControlledVehicle,
-        context: &NodeContext<'_>,
-    ) -> Result<Self, ParameterError> {
-        parameters.check(context.has("reference"))?;
-        let gains = LoopsGains::load(parameters.gains.as_deref())
-            .map_err(|error| ParameterError::conflict("gains", error))?;
-        let velocity = VelocityLoop::new(&gains, craft.hover_model(), context.period_s());
+    fn vehicle(parameters: &Self::Parameters) -> &Path {
+        &parameters.vehicle
+    }
+
+    fn new(parameters: &Self::Parameters, context: &LawContext<'_>) -> Result<Self, ParameterError> {
+        parameters.check(context.node.has("reference"))?;
+        let gains = LoopsGains::load(parameters.gains.as_deref())?;
+        let velocity = VelocityLoop::new(&gains, context.craft.hover_model(), context.node.period_s());
         Ok(Self { velocity, constant: parameters.constant()? })
     }
 
@@ -340,7 +293,7 @@ impl Law for VelocityLaw {
         Start { state, wrench: RotorWrench::default() }
     }
 
-    fn take_over(&self, from: &Predecessor<'_, VelocityState>, input: &ControlInput) -> Start<VelocityState> {
+    fn take_over(&self, from: &Predecessor<'_, Self::State>, input: &ControlInput) -> Start<Self::State> {
         let measured = HoverMotion::of(&input.motion);
         let state = self.velocity.continued(from, &velocity_m_s(input, &measured), &measured);
         Start { state, wrench: from.wrench }
@@ -371,6 +324,7 @@ fn along_heading([x, y]: [f64; 2], yaw_rad: f64) -> [f64; 2] {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::gains_file::parse;
     use nalgebra::Vector3;
 
     fn velocity() -> VelocityLoop {
@@ -420,7 +374,7 @@ mod tests {
 
     #[test]
     fn a_negative_gain_is_refused_with_its_key() {
-        let text = OURS.replace("value = 2.2", "value = -2.2");
+        let text = LoopsGains::BUILT_IN.replace("value = 2.2", "value = -2.2");
         let error = parse(&text, "my.toml", LoopsGains::read).unwrap_err().to_string();
         assert!(error.contains("velocity.proportional"), "{error}");
     }

@@ -16,85 +16,45 @@
 //! Where the room's size is known ([`Room`]), other vehicles in the beams are told from walls, and one that is
 //! ahead slows the vehicle down to a stop.
 
-use crate::airframe::ControlledVehicle;
 use crate::allocation::RotorWrench;
 use crate::approach::Approach;
 use crate::control::{ControlInput, ControlOutput, HoverMotion};
-use crate::gains_file::{gain, limit, parse};
-use crate::law::{Law, Predecessor, Start, VehicleFile};
+use crate::law::{Law, LawContext, Predecessor, Start};
 use crate::law_inputs::WallInputs;
 use crate::room::Room;
 use crate::velocity::{LoopsGains, VelocityLoop, VelocitySetPoint, VelocityState};
 use bus::component::Info;
-use bus::context::NodeContext;
 use bus::messages::WallEstimate;
-use diagnostics::parameter::{ParameterError, finite, positive, positive_up_to};
+use diagnostics::parameter::{ParameterError, finite, positive, positive_up_to, refuse, require};
 use diagnostics::unit::{ACCELERATION, PER_SECOND, PER_SECOND_3, VELOCITY};
 use serde::Deserialize;
 use std::path::{Path, PathBuf};
-use vehicles::VehicleError;
-use vehicles::reader::Section;
-
-/// The gains that the law is tuned with.
-const OURS: &str = include_str!("../gains/wall-follow.toml");
 
 /// Something ahead is a vehicle where it is this much nearer than the wall must be, m. Tuned, no source: above the
 /// error of the wall's place, below any gap that matters.
 const OBSTACLE_MARGIN_M: f64 = 0.5;
 
-/// Gains of the guidance, and of the loops inside.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct WallFollowGains {
-    /// Mode varying: distance still to go (m) to velocity ahead (m/s), 1/s.
-    pub varying_slope_1_s: f64,
-    /// Mode varying: velocity with which the next state is reached, m/s.
-    pub exit_speed_m_s: f64,
-    /// Mode constant: error of the distance to the wall beside to velocity towards it.
-    pub across: Approach,
-    /// Mode constant: that error (m) held for one second to acceleration (m/s²), 1/s³.
-    pub integral_1_s3: f64,
-    /// The most that the integrator asks for, m/s².
-    pub integral_max_m_s2: f64,
-    /// The loops inside.
-    pub loops: LoopsGains,
-}
-
-impl Default for WallFollowGains {
-    fn default() -> Self {
-        parse(OURS, "gains/wall-follow.toml", Self::read).expect("a test reads the built-in gains")
-    }
-}
-
-impl WallFollowGains {
-    /// The gains in the file at `path`, or those built in.
-    ///
-    /// # Errors
-    /// The file cannot be read, or holds what no gains can be.
-    pub fn load(path: Option<&Path>) -> Result<Self, VehicleError> {
-        path.map_or_else(|| Ok(Self::default()), |path| crate::gains_file::load(path, Self::read))
-    }
-
-    fn read(root: &Section<'_, '_>) -> Result<Self, VehicleError> {
-        let (varying, constant) = (root.section("varying")?, root.section("constant")?);
-        let gains = Self {
-            varying_slope_1_s: limit(&varying, "slope", PER_SECOND)?,
-            exit_speed_m_s: limit(&varying, "exit_speed", VELOCITY)?,
-            across: Approach {
-                slope_1_s: limit(&constant, "slope", PER_SECOND)?,
-                deceleration_m_s2: limit(&constant, "deceleration", ACCELERATION)?,
-            },
-            integral_1_s3: gain(&constant, "integral", PER_SECOND_3)?,
-            integral_max_m_s2: gain(&constant, "integral_max", ACCELERATION)?,
-            loops: LoopsGains::read(root)?,
-        };
-        varying.finish()?;
-        constant.finish()?;
-        Ok(gains)
+gains! {
+    /// Gains of the guidance, and of the loops inside.
+    pub struct WallFollowGains of file, built in "wall-follow.toml" {
+        /// Mode varying: distance still to go (m) to velocity ahead (m/s), 1/s.
+        varying_slope_1_s: f64 = file.limit("varying.slope", PER_SECOND),
+        /// Mode varying: velocity with which the next state is reached, m/s.
+        exit_speed_m_s: f64 = file.limit("varying.exit_speed", VELOCITY),
+        /// Mode constant: error of the distance to the wall beside to velocity towards it.
+        across: Approach = Approach::read(&file.table("constant")),
+        /// Mode constant: that error (m) held for one second to acceleration (m/s²), 1/s³.
+        integral_1_s3: f64 = file.gain("constant.integral", PER_SECOND_3),
+        /// The most that the integrator asks for, m/s².
+        integral_max_m_s2: f64 = file.gain("constant.integral_max", ACCELERATION),
+        /// The loops inside.
+        loops: LoopsGains = LoopsGains::read(file),
     }
 }
 
 /// How the velocity along the walls is chosen.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "lowercase")]
 pub enum Mode {
     /// By the distance to the wall ahead.
     Varying,
@@ -205,7 +165,7 @@ pub struct Parameters {
     /// Gains file; the built-in `controllers/gains/wall-follow.toml` where there is none.
     gains: Option<PathBuf>,
     /// "varying" or "constant".
-    mode: String,
+    mode: Mode,
     /// Height above what is below.
     altitude_m: f64,
     /// The constant speed, or the most of the varying one.
@@ -249,80 +209,41 @@ const SPEED_MAX_M_S: f64 = 2.0;
 const DISTANCE_MAX_M: f64 = 5.0;
 
 impl Parameters {
-    fn mode(&self) -> Result<Mode, ParameterError> {
-        match self.mode.as_str() {
-            "varying" => Ok(Mode::Varying),
-            "constant" => Ok(Mode::Constant),
-            other => Err(ParameterError::conflict(
-                "mode",
-                format!("`mode` must be \"varying\" or \"constant\", found \"{other}\""),
-            )),
-        }
-    }
-
     fn check(&self) -> Result<(), ParameterError> {
         positive("altitude_m", self.altitude_m)?;
         finite("heading_rad", self.heading_rad)?;
         positive_up_to("distance_m", self.distance_m, DISTANCE_MAX_M, "m")?;
         let speed_m_s = self.speed_m_s.unwrap_or(CONSTANT_SPEED_M_S);
         positive_up_to("speed_m_s", speed_m_s, SPEED_MAX_M_S, "m/s")?;
-        if (1..=5).contains(&self.start_state) {
-            return Ok(());
-        }
-        Err(ParameterError::conflict(
-            "start_state",
-            format!("`start_state` must be 1 to 5, found {}", self.start_state),
-        ))
+        require("start_state", self.start_state, (1..=5).contains(&self.start_state), "1 to 5")
     }
 
-    fn shared(&self, mode: Mode) -> Result<Option<Shared>, ParameterError> {
+    fn shared(&self) -> Result<Option<Shared>, ParameterError> {
         let of_a_room = [
             ("start_in_room_m", self.start_in_room_m.is_some()),
             ("ahead_min_m", self.ahead_min_m.is_some()),
         ];
         let Some(size_m) = self.room_m else {
-            return match of_a_room.into_iter().find(|(_, is_given)| *is_given) {
-                Some((key, _)) => Err(ParameterError::conflict(
-                    "room_m",
-                    format!("`{key}` has a meaning only with `room_m`; add that"),
-                )),
-                None => Ok(None),
-            };
+            let without = |(key, _)| format!("`{key}` has a meaning only with `room_m`; add that");
+            let lonely = of_a_room.into_iter().find(|(_, is_given)| *is_given).map(without);
+            return lonely.map_or(Ok(None), |message| Err(ParameterError::conflict("room_m", message)));
         };
-        if mode == Mode::Varying {
-            return Err(ParameterError::conflict(
-                "room_m",
-                "`room_m` has a meaning only in the mode \"constant\"; leave it out",
-            ));
-        }
+        refuse(
+            self.mode == Mode::Varying,
+            "room_m",
+            || "`room_m` has a meaning only in the mode \"constant\"; leave it out",
+        )?;
         let least_m = 2.0 * self.distance_m;
-        if !size_m.iter().all(|side_m| side_m.is_finite() && *side_m > least_m) {
-            return Err(ParameterError::conflict(
-                "room_m",
-                format!("`room_m` must be two lengths above 2 distance_m = {least_m} m, found {size_m:?}"),
-            ));
-        }
+        let has_room = size_m.iter().all(|side_m| side_m.is_finite() && *side_m > least_m);
+        let expected = format!("two lengths above 2 distance_m = {least_m} m");
+        require("room_m", format_args!("{size_m:?}"), has_room, expected)?;
         let ahead_min_m = self.ahead_min_m.unwrap_or(AHEAD_MIN_M);
         positive_up_to("ahead_min_m", ahead_min_m, DISTANCE_MAX_M, "m")?;
-        self.check_start(size_m)?;
-        Ok(Some(Shared { room: Room { size_m }, start_m: self.start_in_room_m, ahead_min_m }))
-    }
-
-    fn check_start(&self, size_m: [f64; 2]) -> Result<(), ParameterError> {
         let start_m = self.start_in_room_m.unwrap_or(size_m);
-        if start_m.iter().zip(size_m).all(|(at_m, side_m)| (0.0..=side_m).contains(at_m)) {
-            return Ok(());
-        }
-        Err(ParameterError::conflict(
-            "start_in_room_m",
-            format!("`start_in_room_m` must lie within room_m = {size_m:?} m, found {start_m:?}"),
-        ))
-    }
-}
-
-impl VehicleFile for Parameters {
-    fn vehicle(&self) -> &Path {
-        &self.vehicle
+        let is_within = start_m.iter().zip(size_m).all(|(at_m, side_m)| (0.0..=side_m).contains(at_m));
+        let expected = format!("within room_m = {size_m:?} m");
+        require("start_in_room_m", format_args!("{start_m:?}"), is_within, expected)?;
+        Ok(Some(Shared { room: Room { size_m }, start_m: self.start_in_room_m, ahead_min_m }))
     }
 }
 
@@ -335,26 +256,25 @@ impl Law for WallFollowLaw {
     type Inputs<'a> = WallInputs<'a>;
     type State = WallFollowState;
 
-    fn new(
-        parameters: &Parameters,
-        craft: &ControlledVehicle,
-        context: &NodeContext<'_>,
-    ) -> Result<Self, ParameterError> {
-        let mode = parameters.mode()?;
+    fn vehicle(parameters: &Self::Parameters) -> &Path {
+        &parameters.vehicle
+    }
+
+    fn new(parameters: &Self::Parameters, context: &LawContext<'_>) -> Result<Self, ParameterError> {
         parameters.check()?;
-        let gains = WallFollowGains::load(parameters.gains.as_deref())
-            .map_err(|error| ParameterError::conflict("gains", error))?;
-        let nominal_m_s = if mode == Mode::Varying { VARYING_SPEED_M_S } else { CONSTANT_SPEED_M_S };
+        let gains = WallFollowGains::load(parameters.gains.as_deref())?;
+        let nominal_m_s =
+            if parameters.mode == Mode::Varying { VARYING_SPEED_M_S } else { CONSTANT_SPEED_M_S };
         Ok(Self {
-            velocity: VelocityLoop::new(&gains.loops, craft.hover_model(), context.period_s()),
+            velocity: VelocityLoop::new(&gains.loops, context.craft.hover_model(), context.node.period_s()),
             gains,
-            mode,
+            mode: parameters.mode,
             speed_m_s: parameters.speed_m_s.unwrap_or(nominal_m_s),
             distance_m: parameters.distance_m,
             altitude_m: parameters.altitude_m,
             heading_rad: parameters.heading_rad,
             start_state: parameters.start_state,
-            shared: parameters.shared(mode)?,
+            shared: parameters.shared()?,
         })
     }
 
@@ -368,11 +288,7 @@ impl Law for WallFollowLaw {
         Start { state: self.initial(velocity, start_m, &input.walls), wrench: RotorWrench::default() }
     }
 
-    fn take_over(
-        &self,
-        from: &Predecessor<'_, WallFollowState>,
-        input: &ControlInput,
-    ) -> Start<WallFollowState> {
+    fn take_over(&self, from: &Predecessor<'_, Self::State>, input: &ControlInput) -> Start<Self::State> {
         let measured = HoverMotion::by_ranges(input);
         let velocity = self.velocity.continued(from, &input.walls.velocity, &measured);
         // A backup in flight goes on from where it is, not from where the run began.
@@ -507,6 +423,7 @@ impl WallFollowLaw {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::gains_file::parse;
 
     #[test]
     fn the_wall_is_on_the_left_in_every_state_and_was_ahead_in_the_one_before() {
@@ -521,7 +438,7 @@ mod tests {
 
     #[test]
     fn impossible_gains_are_refused_with_their_key() {
-        let text = OURS.replacen("value = 0.6", "value = -0.6", 1);
+        let text = WallFollowGains::BUILT_IN.replacen("value = 0.6", "value = -0.6", 1);
         let error = parse(&text, "my.toml", WallFollowGains::read).unwrap_err().to_string();
         assert!(error.contains("varying.slope"), "{error}");
     }

@@ -7,25 +7,17 @@
 //!
 //! It knows the wall by the range finders' estimate alone, and its height by the beam downwards.
 
-use crate::airframe::ControlledVehicle;
 use crate::allocation::RotorWrench;
 use crate::approach::Approach;
 use crate::control::{ControlInput, ControlOutput, HoverMotion};
-use crate::gains_file::{gain, limit, parse};
-use crate::law::{Law, Predecessor, Start, VehicleFile};
+use crate::law::{Law, LawContext, Predecessor, Start};
 use crate::law_inputs::WallInputs;
 use crate::velocity::{LoopsGains, VelocityLoop, VelocitySetPoint, VelocityState};
 use bus::component::Info;
-use bus::context::NodeContext;
 use diagnostics::parameter::{ParameterError, finite, positive, positive_up_to};
-use diagnostics::unit::{ACCELERATION, LENGTH, PER_SECOND, PER_SECOND_3, VELOCITY};
+use diagnostics::unit::{ACCELERATION, LENGTH, PER_SECOND_3, VELOCITY};
 use serde::Deserialize;
 use std::path::{Path, PathBuf};
-use vehicles::VehicleError;
-use vehicles::reader::Section;
-
-/// The gains that the law is tuned with.
-const OURS: &str = include_str!("../gains/wall-stop.toml");
 
 /// Flying at the cruising speed.
 pub const CRUISING: u32 = 1;
@@ -38,57 +30,23 @@ pub const HOLDING: u32 = 3;
 /// braking again. Tuned, no source: so far that no noise does it.
 const HOLDING_LEFT_FACTOR: f64 = 3.0;
 
-/// Gains of the guidance, and of the loops inside.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct WallStopGains {
-    /// From the distance still to go to a velocity.
-    pub approach: Approach,
-    /// Back from a wall that is too near no faster than this, m/s.
-    pub retreat_max_m_s: f64,
-    /// Error of distance (m) held for one second to acceleration (m/s²), 1/s³.
-    pub integral_1_s3: f64,
-    /// The most that the integrator asks for, m/s².
-    pub integral_max_m_s2: f64,
-    /// Holding begins within this of the distance, m,
-    pub holding_distance_m: f64,
-    /// below this speed, m/s.
-    pub holding_speed_m_s: f64,
-    /// The loops inside.
-    pub loops: LoopsGains,
-}
-
-impl Default for WallStopGains {
-    fn default() -> Self {
-        parse(OURS, "gains/wall-stop.toml", Self::read).expect("a test reads the built-in gains")
-    }
-}
-
-impl WallStopGains {
-    /// The gains in the file at `path`, or those built in.
-    ///
-    /// # Errors
-    /// The file cannot be read, or holds what no gains can be.
-    pub fn load(path: Option<&Path>) -> Result<Self, VehicleError> {
-        path.map_or_else(|| Ok(Self::default()), |path| crate::gains_file::load(path, Self::read))
-    }
-
-    fn read(root: &Section<'_, '_>) -> Result<Self, VehicleError> {
-        let (approach, hold) = (root.section("approach")?, root.section("hold")?);
-        let gains = Self {
-            approach: Approach {
-                slope_1_s: limit(&approach, "slope", PER_SECOND)?,
-                deceleration_m_s2: limit(&approach, "deceleration", ACCELERATION)?,
-            },
-            retreat_max_m_s: limit(&approach, "retreat_max", VELOCITY)?,
-            integral_1_s3: gain(&hold, "integral", PER_SECOND_3)?,
-            integral_max_m_s2: gain(&hold, "integral_max", ACCELERATION)?,
-            holding_distance_m: limit(&hold, "distance", LENGTH)?,
-            holding_speed_m_s: limit(&hold, "speed", VELOCITY)?,
-            loops: LoopsGains::read(root)?,
-        };
-        approach.finish()?;
-        hold.finish()?;
-        Ok(gains)
+gains! {
+    /// Gains of the guidance, and of the loops inside.
+    pub struct WallStopGains of file, built in "wall-stop.toml" {
+        /// From the distance still to go to a velocity.
+        approach: Approach = Approach::read(&file.table("approach")),
+        /// Back from a wall that is too near no faster than this, m/s.
+        retreat_max_m_s: f64 = file.limit("approach.retreat_max", VELOCITY),
+        /// Error of distance (m) held for one second to acceleration (m/s²), 1/s³.
+        integral_1_s3: f64 = file.gain("hold.integral", PER_SECOND_3),
+        /// The most that the integrator asks for, m/s².
+        integral_max_m_s2: f64 = file.gain("hold.integral_max", ACCELERATION),
+        /// Holding begins within this of the distance, m,
+        holding_distance_m: f64 = file.limit("hold.distance", LENGTH),
+        /// below this speed, m/s.
+        holding_speed_m_s: f64 = file.limit("hold.speed", VELOCITY),
+        /// The loops inside.
+        loops: LoopsGains = LoopsGains::read(file),
     }
 }
 
@@ -164,31 +122,24 @@ const DISTANCE_MAX_M: f64 = 5.0;
 /// keeps the speed below this in any case.
 const SPEED_MAX_M_S: f64 = 3.0;
 
-impl VehicleFile for Parameters {
-    fn vehicle(&self) -> &Path {
-        &self.vehicle
-    }
-}
-
 impl Law for WallStopLaw {
     const INFO: Info = Info::new("wall-stop", "flies towards a wall and stops before it, by range finders");
     type Parameters = Parameters;
     type Inputs<'a> = WallInputs<'a>;
     type State = WallStopState;
 
-    fn new(
-        parameters: &Parameters,
-        craft: &ControlledVehicle,
-        context: &NodeContext<'_>,
-    ) -> Result<Self, ParameterError> {
+    fn vehicle(parameters: &Self::Parameters) -> &Path {
+        &parameters.vehicle
+    }
+
+    fn new(parameters: &Self::Parameters, context: &LawContext<'_>) -> Result<Self, ParameterError> {
         positive("altitude_m", parameters.altitude_m)?;
         finite("heading_rad", parameters.heading_rad)?;
         positive_up_to("cruise_speed_m_s", parameters.cruise_speed_m_s, SPEED_MAX_M_S, "m/s")?;
         positive_up_to("distance_m", parameters.distance_m, DISTANCE_MAX_M, "m")?;
-        let gains = WallStopGains::load(parameters.gains.as_deref())
-            .map_err(|error| ParameterError::conflict("gains", error))?;
+        let gains = WallStopGains::load(parameters.gains.as_deref())?;
         Ok(Self {
-            velocity: VelocityLoop::new(&gains.loops, craft.hover_model(), context.period_s()),
+            velocity: VelocityLoop::new(&gains.loops, context.craft.hover_model(), context.node.period_s()),
             gains,
             cruise_speed_m_s: parameters.cruise_speed_m_s,
             distance_m: parameters.distance_m,
@@ -206,7 +157,7 @@ impl Law for WallStopLaw {
         Start { state: WallStopState { velocity, ..Default::default() }, wrench: RotorWrench::default() }
     }
 
-    fn take_over(&self, from: &Predecessor<'_, WallStopState>, input: &ControlInput) -> Start<WallStopState> {
+    fn take_over(&self, from: &Predecessor<'_, Self::State>, input: &ControlInput) -> Start<Self::State> {
         let measured = HoverMotion::by_ranges(input);
         let velocity = self.velocity.continued(from, &input.walls.velocity, &measured);
         Start { state: WallStopState { velocity, ..Default::default() }, wrench: from.wrench }
@@ -270,6 +221,7 @@ impl WallStopLaw {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::gains_file::parse;
 
     #[test]
     fn impossible_gains_are_refused_with_their_key() {
@@ -278,9 +230,10 @@ mod tests {
             ("value = 0.4, unit = \"1/s^3\"", "value = -0.4, unit = \"1/s^3\"", "hold.integral"),
         ];
         for (good, bad, key) in cases {
-            assert_eq!(OURS.matches(good).count(), 1, "{good}");
-            let error =
-                parse(&OURS.replace(good, bad), "my.toml", WallStopGains::read).unwrap_err().to_string();
+            assert_eq!(WallStopGains::BUILT_IN.matches(good).count(), 1, "{good}");
+            let error = parse(&WallStopGains::BUILT_IN.replace(good, bad), "my.toml", WallStopGains::read)
+                .unwrap_err()
+                .to_string();
             assert!(error.contains(key), "{error}");
         }
     }
@@ -288,7 +241,9 @@ mod tests {
     #[test]
     fn a_file_may_hold_the_gains_of_the_loops_inside_too() {
         let velocity = include_str!("../gains/velocity.toml").replace("value = 2.2", "value = 1.5");
-        let gains = parse(&format!("{OURS}\n{velocity}"), "my.toml", WallStopGains::read).unwrap();
+        let gains =
+            parse(&format!("{}\n{velocity}", WallStopGains::BUILT_IN), "my.toml", WallStopGains::read)
+                .unwrap();
         assert_eq!(gains.loops.velocity.proportional_1_s, 1.5);
         assert_eq!(gains.loops.cascade, LoopsGains::default().cascade);
     }

@@ -170,6 +170,26 @@ pub fn require(
     if is_good { Ok(()) } else { Err(ParameterError::value(key, expected, found)) }
 }
 
+/// Refuses parameters that do not go together; `key` is to blame first.
+///
+/// # Errors
+/// They do not, as `is_wrong` says; `message` tells what, and what to do.
+///
+/// ```
+/// use diagnostics::parameter::refuse;
+///
+/// let period_ticks = 2;
+/// let error = refuse(period_ticks != 1, "period_ticks", || format!("it is {period_ticks}, expected 1")).unwrap_err();
+/// assert_eq!((error.key(), error.to_string().as_str()), ("period_ticks", "it is 2, expected 1"));
+/// ```
+pub fn refuse<M: Display>(
+    is_wrong: bool,
+    key: &str,
+    message: impl FnOnce() -> M,
+) -> Result<(), ParameterError> {
+    if is_wrong { Err(ParameterError::conflict(key, message())) } else { Ok(()) }
+}
+
 /// Passes a finite number.
 ///
 /// # Errors

@@ -1,13 +1,12 @@
 //! The law `level`: holds height and attitude by proportional-derivative control, with nothing to remember.
 #![allow(non_snake_case, reason = "a trailing _B names the frame a vector is written in, _N the newton")]
 
-use crate::airframe::{ControlledVehicle, HoverModel};
+use crate::airframe::HoverModel;
 use crate::allocation::RotorWrench;
 use crate::control::{ControlInput, ControlOutput, HoverMotion};
-use crate::law::{Law, Predecessor, Start, VehicleFile};
+use crate::law::{Law, LawContext, Predecessor, Start};
 use crate::law_inputs::SetPointInputs;
 use bus::component::Info;
-use bus::context::NodeContext;
 use bus::messages::Time;
 use diagnostics::ParameterError;
 use diagnostics::parameter::positive;
@@ -23,12 +22,6 @@ pub struct Parameters {
     vehicle: PathBuf,
     /// Bandwidth of the loops of height and attitude, rad/s.
     bandwidth_rad_s: f64,
-}
-
-impl VehicleFile for Parameters {
-    fn vehicle(&self) -> &Path {
-        &self.vehicle
-    }
 }
 
 /// The law: critically damped loops.
@@ -53,13 +46,13 @@ impl Law for LevelLaw {
     type Inputs<'a> = SetPointInputs<'a>;
     type State = LevelState;
 
-    fn new(
-        parameters: &Parameters,
-        craft: &ControlledVehicle,
-        _: &NodeContext<'_>,
-    ) -> Result<Self, ParameterError> {
+    fn vehicle(parameters: &Self::Parameters) -> &Path {
+        &parameters.vehicle
+    }
+
+    fn new(parameters: &Self::Parameters, context: &LawContext<'_>) -> Result<Self, ParameterError> {
         positive("bandwidth_rad_s", parameters.bandwidth_rad_s)?;
-        Ok(Self { model: craft.hover_model(), bandwidth_rad_s: parameters.bandwidth_rad_s })
+        Ok(Self { model: context.craft.hover_model(), bandwidth_rad_s: parameters.bandwidth_rad_s })
     }
 
     fn rate_gain_1_s(&self) -> f64 {
@@ -70,7 +63,7 @@ impl Law for LevelLaw {
         Start { state: LevelState::default(), wrench: RotorWrench::default() }
     }
 
-    fn take_over(&self, from: &Predecessor<'_, LevelState>, _: &ControlInput) -> Start<LevelState> {
+    fn take_over(&self, from: &Predecessor<'_, Self::State>, _: &ControlInput) -> Start<Self::State> {
         Start { state: LevelState::default(), wrench: from.wrench }
     }
 
