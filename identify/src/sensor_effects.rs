@@ -60,65 +60,48 @@ pub static ATTITUDE_BIAS: EffectKind =
 
 effect_parameters! {
     struct PoseDelay {
-        pose: {
-            meaning: "d of position, velocity and attitude", dimension: TIME, min: -0.5, max: 0.5, neutral: Some(0.0),
-            nominal: 0.1, nominal_source: "tuned, no source",
-        },
+        /// d of position, velocity and attitude
+        pose: TIME, min: -0.5, max: 0.5, neutral: Some(0.0), nominal: 0.1, source: "tuned, no source";
     }
 }
 
 effect_parameters! {
     struct ImuDelay {
-        imu: {
-            meaning: "d of gyroscope and accelerometer", dimension: TIME, min: -0.5, max: 0.5, neutral: Some(0.0),
-            nominal: 0.1, nominal_source: "tuned, no source",
-        },
+        /// d of gyroscope and accelerometer
+        imu: TIME, min: -0.5, max: 0.5, neutral: Some(0.0), nominal: 0.1, source: "tuned, no source";
     }
 }
 
 effect_parameters! {
     struct Accelerometer {
-        accelerometer_x: {
-            meaning: "b_x in the body", dimension: ACCELERATION, min: -5.0, max: 5.0, neutral: Some(0.0), nominal: 0.5,
-            nominal_source: "tuned, no source",
-        },
-        accelerometer_y: {
-            meaning: "b_y in the body", dimension: ACCELERATION, min: -5.0, max: 5.0, neutral: Some(0.0), nominal: 0.5,
-            nominal_source: "tuned, no source",
-        },
-        accelerometer_z: {
-            meaning: "b_z in the body", dimension: ACCELERATION, min: -5.0, max: 5.0, neutral: Some(0.0), nominal: 0.5,
-            nominal_source: "tuned, no source",
-        },
+        /// b_x in the body
+        accelerometer_x: ACCELERATION, min: -5.0, max: 5.0, neutral: Some(0.0), nominal: 0.5,
+            source: "tuned, no source";
+        /// b_y in the body
+        accelerometer_y: ACCELERATION, min: -5.0, max: 5.0, neutral: Some(0.0), nominal: 0.5,
+            source: "tuned, no source";
+        /// b_z in the body
+        accelerometer_z: ACCELERATION, min: -5.0, max: 5.0, neutral: Some(0.0), nominal: 0.5,
+            source: "tuned, no source";
     }
 }
 
 effect_parameters! {
     struct Gyroscope {
-        gyroscope_x: {
-            meaning: "b_x in the body", dimension: SPEED, min: -1.0, max: 1.0, neutral: Some(0.0), nominal: 0.05,
-            nominal_source: "tuned, no source",
-        },
-        gyroscope_y: {
-            meaning: "b_y in the body", dimension: SPEED, min: -1.0, max: 1.0, neutral: Some(0.0), nominal: 0.05,
-            nominal_source: "tuned, no source",
-        },
-        gyroscope_z: {
-            meaning: "b_z in the body", dimension: SPEED, min: -1.0, max: 1.0, neutral: Some(0.0), nominal: 0.05,
-            nominal_source: "tuned, no source",
-        },
+        /// b_x in the body
+        gyroscope_x: SPEED, min: -1.0, max: 1.0, neutral: Some(0.0), nominal: 0.05, source: "tuned, no source";
+        /// b_y in the body
+        gyroscope_y: SPEED, min: -1.0, max: 1.0, neutral: Some(0.0), nominal: 0.05, source: "tuned, no source";
+        /// b_z in the body
+        gyroscope_z: SPEED, min: -1.0, max: 1.0, neutral: Some(0.0), nominal: 0.05, source: "tuned, no source";
     }
 }
 
 effect_parameters! {
     struct Attitude {
-        attitude_x: {
-            meaning: "rotation about x of the body", dimension: ANGLE, min: -0.3, max: 0.3, neutral: Some(0.0),
-            nominal: 0.05, nominal_source: "tuned, no source",
-        },
-        attitude_y: {
-            meaning: "rotation about y of the body", dimension: ANGLE, min: -0.3, max: 0.3, neutral: Some(0.0),
-            nominal: 0.05, nominal_source: "tuned, no source",
-        },
+        /// rotation about x of the body
+        attitude_x: ANGLE, min: -0.3, max: 0.3, neutral: Some(0.0), nominal: 0.05, source: "tuned, no source";
+        /// rotation about y of the body
+        attitude_y: ANGLE, min: -0.3, max: 0.3, neutral: Some(0.0), nominal: 0.05, source: "tuned, no source";
     }
 }

@@ -5,7 +5,7 @@ use crate::airframe::Airframe;
 use crate::backend::Backend;
 use crate::state::State;
 use bus::context::NodeContext;
-use diagnostics::ParameterError;
+use diagnostics::parameter::{ParameterError, refuse};
 use std::path::Path;
 use vehicles::{MotorModel, Vehicle};
 
@@ -39,22 +39,18 @@ pub(crate) fn check_steps(
     run: &NodeContext<'_>,
 ) -> Result<(), ParameterError> {
     let product = fastest_pole_rad_s(&airframe.vehicle().motor) * span_s;
-    let words = |limit: f64| {
+    let told = |limit: f64, beyond: &str| {
         format!(
             "`vehicle` \"{}\" has motors whose fastest pole, {:.4} rad/s, times a step of {span_s} s is {product:.4}, \
-             expected below {limit}; raise `substeps` or run.rate_hz, or correct `[motor]` of the file",
+             expected below {limit}; raise `substeps` or run.rate_hz, or correct `[motor]` of the file: beyond it the \
+             {beyond}",
             airframe.vehicle().name,
             product / span_s
         )
     };
-    if product > POLE_STEPS_MAX {
-        return Err(ParameterError::conflict(
-            "vehicle",
-            format!("{}: beyond it the integration diverges", words(POLE_STEPS_MAX)),
-        ));
-    }
+    refuse(product > POLE_STEPS_MAX, "vehicle", || told(POLE_STEPS_MAX, "integration diverges"))?;
     if product > POLE_STEPS_ODD {
-        run.warn("vehicle", format!("{}: beyond it the motion is coarse", words(POLE_STEPS_ODD)));
+        run.warn("vehicle", told(POLE_STEPS_ODD, "motion is coarse"));
     }
     Ok(())
 }
@@ -86,7 +82,7 @@ pub(crate) fn check_lift(
     }
     let ratio = most_N / weight_N;
     let on_earth = most_N / (vehicle.mass_kg * GRAVITY_M_S2);
-    let words = |what: &str| {
+    let told = |what: String| {
         format!(
             "`vehicle` \"{}\" {what}: its rotors lift {least_N:.4} N to {most_N:.4} N and it weighs {weight_N:.4} N, a \
              thrust to weight of {ratio:.4}; look at {}",
@@ -94,38 +90,20 @@ pub(crate) fn check_lift(
             places(vehicle, path)
         )
     };
-    if ratio < 1.0 {
-        return Err(ParameterError::conflict(
-            "vehicle",
-            words("cannot fly, expected a thrust to weight of 1 or more"),
-        ));
-    }
-    if on_earth > LIFT_MAX {
-        return Err(ParameterError::conflict(
-            "vehicle",
-            words(&format!(
-                "is no vehicle that flies, expected a thrust to weight on Earth below {LIFT_MAX}"
-            )),
-        ));
-    }
-    if least_N > weight_N {
-        return Err(ParameterError::conflict(
-            "command.speed_at_min",
-            words("cannot come down, expected less lift than weight at `command.speed_at_min`"),
-        ));
-    }
+    refuse(ratio < 1.0, "vehicle", || told("cannot fly, expected a thrust to weight of 1 or more".into()))?;
+    refuse(on_earth > LIFT_MAX, "vehicle", || {
+        told(format!("is no vehicle that flies, expected a thrust to weight on Earth below {LIFT_MAX}"))
+    })?;
+    refuse(least_N > weight_N, "command.speed_at_min", || {
+        told("cannot come down, expected less lift than weight at `command.speed_at_min`".into())
+    })?;
     if ratio < LIFT_ODD {
-        run.warn(
-            "vehicle",
-            words(&format!("can hardly climb or tilt, below a thrust to weight of {LIFT_ODD}")),
-        );
+        let odd = format!("can hardly climb or tilt, below a thrust to weight of {LIFT_ODD}");
+        run.warn("vehicle", told(odd));
     } else if on_earth > LIFT_HIGH {
-        run.warn(
-            "vehicle",
-            words(&format!(
-                "is stronger than any that flies, above a thrust to weight on Earth of {LIFT_HIGH}"
-            )),
-        );
+        let odd =
+            format!("is stronger than any that flies, above a thrust to weight on Earth of {LIFT_HIGH}");
+        run.warn("vehicle", told(odd));
     }
     Ok(())
 }
@@ -167,16 +145,15 @@ pub(crate) fn rehearse(
         for _ in 0..ticks {
             backend.step(&[command; 4], dt_s, &[]);
             flown += 1;
-            if let Some(what) = first_not_finite(backend) {
-                return Err(ParameterError::conflict(
-                    "vehicle",
-                    format!(
-                        "`vehicle` \"{}\": its numbers lead to {what} that is no number after {flown} ticks; no vehicle \
-                     that flies has them together",
-                        vehicle.name
-                    ),
-                ));
-            }
+            let odd = first_not_finite(backend);
+            refuse(odd.is_some(), "vehicle", || {
+                format!(
+                    "`vehicle` \"{}\": its numbers lead to {} that is no number after {flown} ticks; no vehicle that \
+                     flies has them together",
+                    vehicle.name,
+                    odd.unwrap_or_default()
+                )
+            })?;
         }
     }
     Ok(())
@@ -184,20 +161,20 @@ pub(crate) fn rehearse(
 
 fn first_not_finite(backend: &dyn Backend) -> Option<&'static str> {
     let (State { body, rotors }, motion) = (backend.state(), backend.accelerations());
-    let vectors = [
-        ("a position", &body.position_W_m),
-        ("a velocity", &body.velocity_W_m_s),
-        ("an angular velocity", &body.angular_velocity_B_rad_s),
-        ("a specific force", &motion.specific_force_B_m_s2),
-        ("an angular acceleration", &motion.angular_acceleration_B_rad_s2),
+    let speeds_rad_s = rotors.map(|rotor| rotor.speed_rad_s);
+    let found: [(&str, &[f64]); 7] = [
+        ("a position", body.position_W_m.as_slice()),
+        ("a velocity", body.velocity_W_m_s.as_slice()),
+        ("an angular velocity", body.angular_velocity_B_rad_s.as_slice()),
+        ("a specific force", motion.specific_force_B_m_s2.as_slice()),
+        ("an angular acceleration", motion.angular_acceleration_B_rad_s2.as_slice()),
+        ("an attitude", body.attitude_WB.coords.as_slice()),
+        ("a rotor speed", &speeds_rad_s),
     ];
-    let vector = vectors.iter().find(|(_, vector)| vector.iter().any(|number| !number.is_finite()));
-    let turns = body.attitude_WB.coords.iter().all(|number| number.is_finite());
-    let spins = rotors.iter().all(|rotor| rotor.speed_rad_s.is_finite());
-    vector
-        .map(|(what, _)| *what)
-        .or((!turns).then_some("an attitude"))
-        .or((!spins).then_some("a rotor speed"))
+    found
+        .into_iter()
+        .find(|(_, numbers)| numbers.iter().any(|number| !number.is_finite()))
+        .map(|(what, _)| what)
 }
 
 #[cfg(test)]

@@ -11,7 +11,7 @@ use crate::newton_euler::NewtonEuler;
 use crate::rapier::Rapier;
 use crate::state::RigidBody;
 use bus::context::NodeContext;
-use diagnostics::parameter::{ParameterError, all, finite, positive, require};
+use diagnostics::parameter::{ParameterError, all, finite, positive, refuse, require};
 use nalgebra::{UnitQuaternion, Vector3};
 use scenes::Scene;
 use serde::Deserialize;
@@ -66,17 +66,6 @@ fn one() -> u32 {
     1
 }
 
-/// A plant that ran less often would apply a command before it was computed.
-fn require_every_tick(period_ticks: u32) -> Result<(), ParameterError> {
-    match period_ticks {
-        1 => Ok(()),
-        other => Err(ParameterError::conflict(
-            "period_ticks",
-            format!("`period_ticks` is {other}, expected 1: a plant runs at every tick; leave it out"),
-        )),
-    }
-}
-
 /// The ticks between two settings to what is measured.
 #[allow(
     clippy::cast_possible_truncation,
@@ -85,15 +74,13 @@ fn require_every_tick(period_ticks: u32) -> Result<(), ParameterError> {
 )]
 fn window_ticks(window_s: f64, tick_s: f64) -> Result<u32, ParameterError> {
     let ticks = (window_s / tick_s).round();
-    if (window_s / tick_s - ticks).abs() < 1e-6 && (1.0..=f64::from(u32::MAX)).contains(&ticks) {
-        return Ok(ticks as u32);
-    }
-    Err(ParameterError::conflict(
-        "window_s",
+    let is_whole = (window_s / tick_s - ticks).abs() < 1e-6 && (1.0..=f64::from(u32::MAX)).contains(&ticks);
+    refuse(!is_whole, "window_s", || {
         format!(
             "`window_s` is {window_s} s, which is not a whole number of ticks of {tick_s} s, at least one"
-        ),
-    ))
+        )
+    })?;
+    Ok(ticks as u32)
 }
 
 impl Parameters {
@@ -101,7 +88,11 @@ impl Parameters {
     fn check(&self, run: &NodeContext<'_>) -> Result<(), ParameterError> {
         self.check_numbers()?;
         self.check_ports(run)?;
-        require_every_tick(run.period_ticks)
+        // A plant that ran less often would apply a command before it was computed.
+        let ticks = run.period_ticks;
+        refuse(ticks != 1, "period_ticks", || {
+            format!("`period_ticks` is {ticks}, expected 1: a plant runs at every tick; leave it out")
+        })
     }
 
     /// Refuses what cannot fly.
@@ -131,39 +122,36 @@ impl Parameters {
         require("substeps", self.substeps, substeps_are_good, format!("1 to {SUBSTEPS_MAX}"))?;
         self.window_s.map_or(Ok(()), |window_s| positive("window_s", window_s))?;
         self.crash_speed_m_s.map_or(Ok(()), |speed_m_s| positive("crash_speed_m_s", speed_m_s))?;
-        if self.crash_speed_m_s.is_some() && self.backend == BackendName::NewtonEuler {
-            let message = "`crash_speed_m_s` needs `backend` = \"rapier\": free flight touches nothing";
-            return Err(ParameterError::conflict("crash_speed_m_s", message));
-        }
-        Ok(())
+        let flies_freely = self.backend == BackendName::NewtonEuler;
+        refuse(
+            self.crash_speed_m_s.is_some() && flies_freely,
+            "crash_speed_m_s",
+            || "`crash_speed_m_s` needs `backend` = \"rapier\": free flight touches nothing",
+        )
     }
 
     fn check_ports(&self, run: &NodeContext<'_>) -> Result<(), ParameterError> {
         let needs_rapier = |port| run.has(port) && self.backend == BackendName::NewtonEuler;
-        if needs_rapier("traffic") {
-            return Err(ParameterError::conflict(
-                "backend",
-                "the input `traffic` needs `backend` = \"rapier\": free flight meets nobody",
-            ));
-        }
-        if needs_rapier("contact") {
-            return Err(ParameterError::conflict(
-                "backend",
-                "the output `contact` needs `backend` = \"rapier\": free flight touches nothing, and \
-                        would report a flight through a wall as one without contact",
-            ));
-        }
-        match (run.has("measured"), self.window_s) {
-            (true, None) => Err(ParameterError::conflict(
-                "window_s",
-                "the input `measured` needs the parameter `window_s`",
-            )),
-            (false, Some(_)) => Err(ParameterError::conflict(
-                "window_s",
-                "the parameter `window_s` needs the input `measured`",
-            )),
-            _ => Ok(()),
-        }
+        refuse(
+            needs_rapier("traffic"),
+            "backend",
+            || "the input `traffic` needs `backend` = \"rapier\": free flight meets nobody",
+        )?;
+        refuse(needs_rapier("contact"), "backend", || {
+            "the output `contact` needs `backend` = \"rapier\": free flight touches nothing, and would report a flight \
+             through a wall as one without contact"
+        })?;
+        let (is_measured, has_window) = (run.has("measured"), self.window_s.is_some());
+        refuse(
+            is_measured && !has_window,
+            "window_s",
+            || "the input `measured` needs the parameter `window_s`",
+        )?;
+        refuse(
+            !is_measured && has_window,
+            "window_s",
+            || "the parameter `window_s` needs the input `measured`",
+        )
     }
 
     /// The vehicle, and the backend that flies it, as it is at tick 0; the effects draw their random numbers by the
@@ -191,14 +179,14 @@ impl Parameters {
         effects: AirframeState,
         scene: &Scene,
     ) -> Result<Box<dyn Backend>, ParameterError> {
+        let flies_freely = self.backend == BackendName::NewtonEuler;
+        refuse(flies_freely && scene.rig.is_some(), "scene", || {
+            let name = &scene.name;
+            format!(
+                "`scene` \"{name}\" holds a rig, which needs `backend` = \"rapier\": newton-euler flies freely"
+            )
+        })?;
         match self.backend {
-            BackendName::NewtonEuler if scene.rig.is_some() => Err(ParameterError::conflict(
-                "scene",
-                format!(
-                    "`scene` \"{}\" holds a rig, which needs `backend` = \"rapier\": newton-euler flies freely",
-                    scene.name
-                ),
-            )),
             BackendName::NewtonEuler => Ok(Box::new(FreeFlight::new(model, self.start(), effects))),
             BackendName::Rapier => {
                 let crash_speed_m_s = self.crash_speed_m_s.unwrap_or(CRASH_SPEED_M_S);
@@ -213,32 +201,25 @@ impl Parameters {
     fn airframe(&self) -> Result<(Airframe, Scene), ParameterError> {
         let vehicle =
             Vehicle::load(&self.vehicle).map_err(|error| ParameterError::conflict("vehicle", error))?;
-        let scene = self
-            .scene
-            .as_deref()
-            .map(Scene::load)
-            .transpose()
-            .map_err(|error| ParameterError::conflict("scene", error))?;
-        let scene = scene.unwrap_or_default();
+        let scene = self.scene.as_deref().map_or_else(|| Ok(Scene::default()), Scene::load);
+        let scene = scene.map_err(|error| ParameterError::conflict("scene", error))?;
         refuse_double_rig(&vehicle, &scene)?;
-        let airframe = Airframe::from_files(vehicle, &scene.effects)
-            .map_err(|error| ParameterError::conflict("vehicle", error))?;
-        Ok((airframe, scene))
+        let airframe = Airframe::from_files(vehicle, &scene.effects);
+        Ok((airframe.map_err(|error| ParameterError::conflict("vehicle", error))?, scene))
     }
 
     /// Refuses a start inside of a box, unless a measured flight says where the vehicle starts.
     fn refuse_inside(&self, rapier: &Rapier, scene: &Scene) -> Result<(), ParameterError> {
-        match rapier.box_around().and_then(|number| scene.boxes.get(number)) {
-            Some(cuboid) if self.window_s.is_none() => Err(ParameterError::conflict(
-                "initial_position_m",
-                format!(
-                    "`initial_position_m` is {:?}, where the vehicle is partly inside of the box \"{}\" of the scene; \
+        let Some(cuboid) = rapier.box_around().and_then(|number| scene.boxes.get(number)) else {
+            return Ok(());
+        };
+        refuse(self.window_s.is_none(), "initial_position_m", || {
+            format!(
+                "`initial_position_m` is {:?}, where the vehicle is partly inside of the box \"{}\" of the scene; \
                  move it out",
-                    self.initial_position_m, cuboid.name
-                ),
-            )),
-            _ => Ok(()),
-        }
+                self.initial_position_m, cuboid.name
+            )
+        })
     }
 
     fn start(&self) -> RigidBody {
@@ -258,17 +239,15 @@ fn refuse_double_rig(vehicle: &Vehicle, scene: &Scene) -> Result<(), ParameterEr
     let is_rig_effect = |entry: &&EffectEntry| {
         effects::find(&entry.name).is_some_and(|kind| kind.needs.contains(&Quantity::Rig))
     };
-    match vehicle.effects.iter().chain(&scene.effects).find(is_rig_effect) {
-        Some(effect) if scene.rig.is_some() => Err(ParameterError::conflict(
-            "scene",
-            format!(
-                "`scene` \"{}\" holds a rig, whose joints have what the effect \"{}\" stands for: it would count twice; \
+    let mut effects = vehicle.effects.iter().chain(&scene.effects);
+    let Some(effect) = effects.find(is_rig_effect) else { return Ok(()) };
+    refuse(scene.rig.is_some(), "scene", || {
+        format!(
+            "`scene` \"{}\" holds a rig, whose joints have what the effect \"{}\" stands for: it would count twice; \
              leave the effect out",
-                scene.name, effect.name
-            ),
-        )),
-        _ => Ok(()),
-    }
+            scene.name, effect.name
+        )
+    })
 }
 
 #[cfg(test)]

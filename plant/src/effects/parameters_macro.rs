@@ -9,8 +9,8 @@
 /// plant::effect_parameters! {
 ///     /// An offset.
 ///     struct Offset {
-///         ahead: { meaning: "x: how far it is in front", dimension: LENGTH, min: -0.1, max: 0.1, neutral: Some(0.0),
-///                  nominal: 0.005, nominal_source: "tuned, no source" },
+///         /// x: how far it is in front
+///         ahead: LENGTH, min: -0.1, max: 0.1, neutral: Some(0.0), nominal: 0.005, source: "tuned, no source";
 ///     }
 /// }
 ///
@@ -21,13 +21,26 @@
 /// ```
 #[macro_export]
 macro_rules! effect_parameters {
-    ($(#[$doc:meta])* struct $View:ident { $($name:ident: { $($fact:tt)* }),* $(,)? }) => {
+    ($(#[$doc:meta])* struct $View:ident { $(
+        $(#[doc = $meaning:literal])+
+        $name:ident: $dimension:ident, min: $min:expr, max: $max:expr, neutral: $neutral:expr, nominal: $nominal:expr,
+        source: $source:expr;
+    )* }) => {
         $(#[$doc])*
         struct $View { $($name: f64),* }
 
         impl $View {
             const SPECS: &'static [$crate::effects::ParameterSpec] = &[
-                $($crate::effects::ParameterSpec { name: stringify!($name), $($fact)* }),*
+                $($crate::effects::ParameterSpec {
+                    name: stringify!($name),
+                    meaning: concat!($($meaning),+).trim_ascii_start(),
+                    dimension: $dimension,
+                    min: $min,
+                    max: $max,
+                    neutral: $neutral,
+                    nominal: $nominal,
+                    nominal_source: $source,
+                }),*
             ];
         }
 
@@ -40,7 +53,7 @@ macro_rules! effect_parameters {
         impl From<$View> for $crate::effects::Values {
             fn from(view: $View) -> Self {
                 let mut values = Self::default();
-                values.iter_mut().zip([$(view.$name),*]).for_each(|(value, own)| *value = own);
+                values.iter_mut().zip([$(view.$name),*]).for_each(|(value, named)| *value = named);
                 values
             }
         }

@@ -34,33 +34,22 @@ pub static EFFECT: EffectKind = EffectKind {
 
 effect_parameters! {
     struct Parameters {
-        internal_resistance: {
-            meaning: "R: of the pack with its leads", dimension: RESISTANCE, min: 0.0, max: 1.0,
-            neutral: Some(0.0), nominal: 0.06,
-            nominal_source: "tuned, no source: three cells of 15 mohm and leads",
-        },
-        discharge_drop: {
-            meaning: "D: open-circuit voltage of the full battery less that of the empty one",
-            dimension: VOLTAGE, min: 0.0, max: 10.0, neutral: Some(0.0), nominal: 2.1,
-            nominal_source: "tuned, no source: three lithium-polymer cells from 4.2 V to 3.5 V",
-        },
-        discharged: {
-            meaning: "q_0: part of the charge that is gone at the start", dimension: RATIO, min: 0.0, max: 1.0,
-            neutral: Some(0.0), nominal: 0.2, nominal_source: "tuned, no source",
-        },
-        nominal_voltage: {
-            meaning: "U_0: open-circuit voltage of the full battery, at which the declared command map holds",
-            dimension: VOLTAGE, min: 1.0, max: 60.0, neutral: None, nominal: 12.6,
-            nominal_source: "three lithium-polymer cells of 4.2 V",
-        },
-        capacity: {
-            meaning: "C", dimension: CHARGE, min: 100.0, max: 1e6, neutral: None, nominal: 7560.0,
-            nominal_source: "Hummingbird: 2100 mAh, thesis Table 2.1",
-        },
-        efficiency: {
-            meaning: "eta: power on the rotor shafts by power from the battery", dimension: RATIO, min: 0.1,
-            max: 1.0, neutral: None, nominal: 0.7, nominal_source: "tuned, no source",
-        },
+        /// R: of the pack with its leads
+        internal_resistance: RESISTANCE, min: 0.0, max: 1.0, neutral: Some(0.0), nominal: 0.06,
+            source: "tuned, no source: three cells of 15 mohm and leads";
+        /// D: open-circuit voltage of the full battery less that of the empty one
+        discharge_drop: VOLTAGE, min: 0.0, max: 10.0, neutral: Some(0.0), nominal: 2.1,
+            source: "tuned, no source: three lithium-polymer cells from 4.2 V to 3.5 V";
+        /// q_0: part of the charge that is gone at the start
+        discharged: RATIO, min: 0.0, max: 1.0, neutral: Some(0.0), nominal: 0.2, source: "tuned, no source";
+        /// U_0: open-circuit voltage of the full battery, at which the declared command map holds
+        nominal_voltage: VOLTAGE, min: 1.0, max: 60.0, neutral: None, nominal: 12.6,
+            source: "three lithium-polymer cells of 4.2 V";
+        /// C
+        capacity: CHARGE, min: 100.0, max: 1e6, neutral: None, nominal: 7560.0,
+            source: "Hummingbird: 2100 mAh, thesis Table 2.1";
+        /// eta: power on the rotor shafts by power from the battery
+        efficiency: RATIO, min: 0.1, max: 1.0, neutral: None, nominal: 0.7, source: "tuned, no source";
     }
 }
 

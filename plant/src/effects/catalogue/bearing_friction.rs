@@ -23,14 +23,10 @@ pub static EFFECT: EffectKind = EffectKind {
 
 effect_parameters! {
     struct Parameters {
-        coulomb: {
-            meaning: "c: torque at any rate well above w_0", dimension: TORQUE, min: 0.0, max: 0.5,
-            neutral: Some(0.0), nominal: 0.01, nominal_source: "tuned, no source",
-        },
-        viscous: {
-            meaning: "b: torque per rate", dimension: ROTARY_DAMPING, min: 0.0, max: 0.5, neutral: Some(0.0),
-            nominal: 0.005, nominal_source: "tuned, no source",
-        },
+        /// c: torque at any rate well above w_0
+        coulomb: TORQUE, min: 0.0, max: 0.5, neutral: Some(0.0), nominal: 0.01, source: "tuned, no source";
+        /// b: torque per rate
+        viscous: ROTARY_DAMPING, min: 0.0, max: 0.5, neutral: Some(0.0), nominal: 0.005, source: "tuned, no source";
     }
 }
 

@@ -30,14 +30,11 @@ pub static EFFECT: EffectKind = EffectKind {
 
 effect_parameters! {
     struct Parameters {
-        tilt_per_speed: {
-            meaning: "k: tilt of the thrust per velocity across the axis", dimension: TILT, min: 0.0,
-            max: 0.05, neutral: Some(0.0), nominal: 5e-3, nominal_source: "tuned, no source",
-        },
-        hub_stiffness: {
-            meaning: "K_b: torque on the hub per tilt, of each rotor", dimension: ROTARY_STIFFNESS, min: 0.0,
-            max: 5.0, neutral: Some(0.0), nominal: 0.2, nominal_source: "tuned, no source",
-        },
+        /// k: tilt of the thrust per velocity across the axis
+        tilt_per_speed: TILT, min: 0.0, max: 0.05, neutral: Some(0.0), nominal: 5e-3, source: "tuned, no source";
+        /// K_b: torque on the hub per tilt, of each rotor
+        hub_stiffness: ROTARY_STIFFNESS, min: 0.0, max: 5.0, neutral: Some(0.0), nominal: 0.2,
+            source: "tuned, no source";
     }
 }
 

@@ -28,20 +28,15 @@ pub static EFFECT: EffectKind = EffectKind {
 
 effect_parameters! {
     struct Parameters {
-        x: {
-            meaning: "d_x: how far the centre of mass is in front of the declared one", dimension: LENGTH,
-            min: -0.1, max: 0.1, neutral: Some(0.0), nominal: 0.005,
-            nominal_source: "tuned, no source: a battery that is not strapped in the middle",
-        },
-        y: {
-            meaning: "d_y: how far it is left of it", dimension: LENGTH, min: -0.1, max: 0.1,
-            neutral: Some(0.0), nominal: 0.005,
-            nominal_source: "tuned, no source: a battery that is not strapped in the middle",
-        },
-        z: {
-            meaning: "d_z: how far it is above it", dimension: LENGTH, min: -0.1, max: 0.1, neutral: Some(0.0),
-            nominal: 0.005, nominal_source: "tuned, no source: a battery that is not strapped in the middle",
-        },
+        /// d_x: how far the centre of mass is in front of the declared one
+        x: LENGTH, min: -0.1, max: 0.1, neutral: Some(0.0), nominal: 0.005,
+            source: "tuned, no source: a battery that is not strapped in the middle";
+        /// d_y: how far it is left of it
+        y: LENGTH, min: -0.1, max: 0.1, neutral: Some(0.0), nominal: 0.005,
+            source: "tuned, no source: a battery that is not strapped in the middle";
+        /// d_z: how far it is above it
+        z: LENGTH, min: -0.1, max: 0.1, neutral: Some(0.0), nominal: 0.005,
+            source: "tuned, no source: a battery that is not strapped in the middle";
     }
 }
 

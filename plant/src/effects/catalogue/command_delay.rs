@@ -22,10 +22,9 @@ pub static EFFECT: EffectKind = EffectKind {
 
 effect_parameters! {
     struct Parameters {
-        delay: {
-            meaning: "d", dimension: TIME, min: 0.0, max: 0.5, neutral: Some(0.0), nominal: 0.15,
-            nominal_source: "thesis section 5.4: unexplained delay of about 150 ms",
-        },
+        /// d
+        delay: TIME, min: 0.0, max: 0.5, neutral: Some(0.0), nominal: 0.15,
+            source: "thesis section 5.4: unexplained delay of about 150 ms";
     }
 }
 

@@ -29,14 +29,11 @@ pub static EFFECT: EffectKind = EffectKind {
 
 effect_parameters! {
     struct Parameters {
-        strength: {
-            meaning: "s: 1 for a single rotor", dimension: RATIO, min: 0.0, max: 3.0, neutral: Some(0.0),
-            nominal: 1.0, nominal_source: "Cheeseman and Bennett 1955",
-        },
-        rotor_radius: {
-            meaning: "R: radius of the rotors", dimension: LENGTH, min: 0.01, max: 1.0, neutral: None,
-            nominal: 0.1016, nominal_source: "Hummingbird: propellers of 8 inch, thesis Table 2.1",
-        },
+        /// s: 1 for a single rotor
+        strength: RATIO, min: 0.0, max: 3.0, neutral: Some(0.0), nominal: 1.0, source: "Cheeseman and Bennett 1955";
+        /// R: radius of the rotors
+        rotor_radius: LENGTH, min: 0.01, max: 1.0, neutral: None, nominal: 0.1016,
+            source: "Hummingbird: propellers of 8 inch, thesis Table 2.1";
     }
 }
 

@@ -18,20 +18,13 @@ pub static EFFECT: EffectKind = EffectKind {
 
 effect_parameters! {
     struct Parameters {
-        intensity: {
-            meaning: "s: standard deviation of the thrust on the ground, relative to the thrust",
-            dimension: RATIO, min: 0.0, max: 0.5, neutral: Some(0.0), nominal: 0.1,
-            nominal_source: "tuned, no source",
-        },
-        height_scale: {
-            meaning: "h: height above which the turbulence has fallen by a factor of e", dimension: LENGTH,
-            min: 0.01, max: 10.0, neutral: None, nominal: 0.3,
-            nominal_source: "tuned, no source: 3 rotor radii, where ground effect has faded too",
-        },
-        correlation_time: {
-            meaning: "t_c: time over which it forgets", dimension: TIME, min: 1e-3, max: 10.0, neutral: None,
-            nominal: 0.05, nominal_source: "tuned, no source",
-        },
+        /// s: standard deviation of the thrust on the ground, relative to the thrust
+        intensity: RATIO, min: 0.0, max: 0.5, neutral: Some(0.0), nominal: 0.1, source: "tuned, no source";
+        /// h: height above which the turbulence has fallen by a factor of e
+        height_scale: LENGTH, min: 0.01, max: 10.0, neutral: None, nominal: 0.3,
+            source: "tuned, no source: 3 rotor radii, where ground effect has faded too";
+        /// t_c: time over which it forgets
+        correlation_time: TIME, min: 1e-3, max: 10.0, neutral: None, nominal: 0.05, source: "tuned, no source";
     }
 }
 

@@ -18,11 +18,9 @@ pub static EFFECT: EffectKind = EffectKind {
 
 effect_parameters! {
     struct Parameters {
-        scale_error: {
-            meaning: "e: relative deviation of the rotors' moment of inertia; -1 takes both torques away",
-            dimension: RATIO, min: -1.0, max: 4.0, neutral: Some(0.0), nominal: 0.5,
-            nominal_source: "uncertainty of the Hummingbird's rotor inertia, vehicles/hummingbird.toml",
-        },
+        /// e: relative deviation of the rotors' moment of inertia; -1 takes both torques away
+        scale_error: RATIO, min: -1.0, max: 4.0, neutral: Some(0.0), nominal: 0.5,
+            source: "uncertainty of the Hummingbird's rotor inertia, vehicles/hummingbird.toml";
     }
 }
 

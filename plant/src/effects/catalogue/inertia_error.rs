@@ -20,21 +20,15 @@ pub static EFFECT: EffectKind = EffectKind {
 
 effect_parameters! {
     struct Parameters {
-        error_xx: {
-            meaning: "e_xx: relative deviation about body x", dimension: RATIO, min: -0.5, max: 1.0,
-            neutral: Some(0.0), nominal: 0.1,
-            nominal_source: "tuned, no source: published Hummingbirds differ by 50 %",
-        },
-        error_yy: {
-            meaning: "e_yy: relative deviation about body y", dimension: RATIO, min: -0.5, max: 1.0,
-            neutral: Some(0.0), nominal: 0.1,
-            nominal_source: "tuned, no source: published Hummingbirds differ by 50 %",
-        },
-        error_zz: {
-            meaning: "e_zz: relative deviation about body z", dimension: RATIO, min: -0.5, max: 1.0,
-            neutral: Some(0.0), nominal: 0.1,
-            nominal_source: "tuned, no source: published Hummingbirds differ by 50 %",
-        },
+        /// e_xx: relative deviation about body x
+        error_xx: RATIO, min: -0.5, max: 1.0, neutral: Some(0.0), nominal: 0.1,
+            source: "tuned, no source: published Hummingbirds differ by 50 %";
+        /// e_yy: relative deviation about body y
+        error_yy: RATIO, min: -0.5, max: 1.0, neutral: Some(0.0), nominal: 0.1,
+            source: "tuned, no source: published Hummingbirds differ by 50 %";
+        /// e_zz: relative deviation about body z
+        error_zz: RATIO, min: -0.5, max: 1.0, neutral: Some(0.0), nominal: 0.1,
+            source: "tuned, no source: published Hummingbirds differ by 50 %";
     }
 }
 

@@ -26,14 +26,10 @@ pub static EFFECT: EffectKind = EffectKind {
 
 effect_parameters! {
     struct Parameters {
-        slowness: {
-            meaning: "e: relative deviation of the time constant", dimension: RATIO, min: -0.9, max: 4.0,
-            neutral: Some(0.0), nominal: 0.3, nominal_source: "tuned, no source",
-        },
-        damping_error: {
-            meaning: "e_z: relative deviation of the damping ratio", dimension: RATIO, min: -0.8, max: 3.0,
-            neutral: Some(0.0), nominal: -0.2, nominal_source: "tuned, no source",
-        },
+        /// e: relative deviation of the time constant
+        slowness: RATIO, min: -0.9, max: 4.0, neutral: Some(0.0), nominal: 0.3, source: "tuned, no source";
+        /// e_z: relative deviation of the damping ratio
+        damping_error: RATIO, min: -0.8, max: 3.0, neutral: Some(0.0), nominal: -0.2, source: "tuned, no source";
     }
 }
 

@@ -26,16 +26,12 @@ pub static EFFECT: EffectKind = EffectKind {
 
 effect_parameters! {
     struct Parameters {
-        coefficient_xy: {
-            meaning: "c_xy: force per velocity squared along body x and y", dimension: DYNAMIC_DRAG, min: 0.0,
-            max: 0.1, neutral: Some(0.0), nominal: 0.5e-2,
-            nominal_source: "Hummingbird in RotorPy, rotorpy/vehicles/hummingbird_params.py",
-        },
-        coefficient_z: {
-            meaning: "c_z: force per velocity squared along body z", dimension: DYNAMIC_DRAG, min: 0.0,
-            max: 0.1, neutral: Some(0.0), nominal: 1e-2,
-            nominal_source: "Hummingbird in RotorPy, rotorpy/vehicles/hummingbird_params.py",
-        },
+        /// c_xy: force per velocity squared along body x and y
+        coefficient_xy: DYNAMIC_DRAG, min: 0.0, max: 0.1, neutral: Some(0.0), nominal: 0.5e-2,
+            source: "Hummingbird in RotorPy, rotorpy/vehicles/hummingbird_params.py";
+        /// c_z: force per velocity squared along body z
+        coefficient_z: DYNAMIC_DRAG, min: 0.0, max: 0.1, neutral: Some(0.0), nominal: 1e-2,
+            source: "Hummingbird in RotorPy, rotorpy/vehicles/hummingbird_params.py";
     }
 }
 

@@ -24,16 +24,12 @@ pub static EFFECT: EffectKind = EffectKind {
 
 effect_parameters! {
     struct Parameters {
-        static_moment: {
-            meaning: "S: positive where the masses hang below the bearing", dimension: STATIC_MOMENT,
-            min: -0.5, max: 0.5, neutral: Some(0.0), nominal: 0.01,
-            nominal_source: "tuned, no source: 0.5 kg hanging 2 cm below the bearing",
-        },
-        added_inertia: {
-            meaning: "A: moment of inertia about the bearing beyond that about the centre of mass",
-            dimension: INERTIA, min: 0.0, max: 0.1, neutral: Some(0.0), nominal: 2e-4,
-            nominal_source: "tuned, no source: 0.5 kg at 2 cm",
-        },
+        /// S: positive where the masses hang below the bearing
+        static_moment: STATIC_MOMENT, min: -0.5, max: 0.5, neutral: Some(0.0), nominal: 0.01,
+            source: "tuned, no source: 0.5 kg hanging 2 cm below the bearing";
+        /// A: moment of inertia about the bearing beyond that about the centre of mass
+        added_inertia: INERTIA, min: 0.0, max: 0.1, neutral: Some(0.0), nominal: 2e-4,
+            source: "tuned, no source: 0.5 kg at 2 cm";
     }
 }
 

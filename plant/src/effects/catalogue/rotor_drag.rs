@@ -22,11 +22,9 @@ pub static EFFECT: EffectKind = EffectKind {
 
 effect_parameters! {
     struct Parameters {
-        coefficient: {
-            meaning: "c: force per rotor speed and velocity, of each rotor", dimension: ROTOR_DRAG, min: 0.0,
-            max: 1e-3, neutral: Some(0.0), nominal: 8.06428e-5,
-            nominal_source: "Hummingbird in RotorS, rotors_description/urdf/hummingbird.xacro",
-        },
+        /// c: force per rotor speed and velocity, of each rotor
+        coefficient: ROTOR_DRAG, min: 0.0, max: 1e-3, neutral: Some(0.0), nominal: 8.06428e-5,
+            source: "Hummingbird in RotorS, rotors_description/urdf/hummingbird.xacro";
     }
 }
 

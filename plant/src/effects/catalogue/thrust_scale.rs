@@ -18,10 +18,8 @@ pub static EFFECT: EffectKind = EffectKind {
 
 effect_parameters! {
     struct Parameters {
-        error: {
-            meaning: "e: relative deviation of the thrust coefficient", dimension: RATIO, min: -0.5, max: 1.0,
-            neutral: Some(0.0), nominal: -0.05, nominal_source: "tuned, no source",
-        },
+        /// e: relative deviation of the thrust coefficient
+        error: RATIO, min: -0.5, max: 1.0, neutral: Some(0.0), nominal: -0.05, source: "tuned, no source";
     }
 }
 

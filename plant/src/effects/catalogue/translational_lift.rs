@@ -22,16 +22,12 @@ pub static EFFECT: EffectKind = EffectKind {
 
 effect_parameters! {
     struct Parameters {
-        climb_coefficient: {
-            meaning: "k_z: thrust lost per rotor speed and velocity along the axis, of each rotor",
-            dimension: ROTOR_DRAG, min: 0.0, max: 2e-3, neutral: Some(0.0), nominal: 2.32e-4,
-            nominal_source: "Hummingbird in RotorPy, rotorpy/vehicles/hummingbird_params.py, k_z",
-        },
-        translational_coefficient: {
-            meaning: "k_h: thrust gained per velocity squared across the axis, of each rotor",
-            dimension: DYNAMIC_DRAG, min: 0.0, max: 0.05, neutral: Some(0.0), nominal: 3e-3,
-            nominal_source: "tuned, no source: 2 % more thrust than in hover at 3 m/s",
-        },
+        /// k_z: thrust lost per rotor speed and velocity along the axis, of each rotor
+        climb_coefficient: ROTOR_DRAG, min: 0.0, max: 2e-3, neutral: Some(0.0), nominal: 2.32e-4,
+            source: "Hummingbird in RotorPy, rotorpy/vehicles/hummingbird_params.py, k_z";
+        /// k_h: thrust gained per velocity squared across the axis, of each rotor
+        translational_coefficient: DYNAMIC_DRAG, min: 0.0, max: 0.05, neutral: Some(0.0), nominal: 3e-3,
+            source: "tuned, no source: 2 % more thrust than in hover at 3 m/s";
     }
 }
 

@@ -21,11 +21,9 @@ pub static EFFECT: EffectKind = EffectKind {
 
 effect_parameters! {
     struct Parameters {
-        wind_at_20_ft: {
-            meaning: "W: mean wind 20 feet above the ground; the mean itself is for `wind`",
-            dimension: WIND_VELOCITY, min: 0.0, max: 25.0, neutral: Some(0.0), nominal: 7.717,
-            nominal_source: "light turbulence of MIL-F-8785C: 15 knots",
-        },
+        /// W: mean wind 20 feet above the ground; the mean itself is for `wind`
+        wind_at_20_ft: WIND_VELOCITY, min: 0.0, max: 25.0, neutral: Some(0.0), nominal: 7.717,
+            source: "light turbulence of MIL-F-8785C: 15 knots";
     }
 }
 

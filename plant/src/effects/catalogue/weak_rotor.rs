@@ -20,23 +20,18 @@ pub static EFFECT: EffectKind = EffectKind {
 
 effect_parameters! {
     struct Parameters {
-        loss_1: {
-            meaning: "l_1: part of the thrust that the first rotor of the vehicle file lacks",
-            dimension: RATIO, min: 0.0, max: 1.0, neutral: Some(0.0), nominal: 0.1,
-            nominal_source: "tuned, no source: a chipped propeller",
-        },
-        loss_2: {
-            meaning: "l_2: the same of the second rotor", dimension: RATIO, min: 0.0, max: 1.0,
-            neutral: Some(0.0), nominal: 0.1, nominal_source: "tuned, no source: a chipped propeller",
-        },
-        loss_3: {
-            meaning: "l_3: the same of the third rotor", dimension: RATIO, min: 0.0, max: 1.0,
-            neutral: Some(0.0), nominal: 0.1, nominal_source: "tuned, no source: a chipped propeller",
-        },
-        loss_4: {
-            meaning: "l_4: the same of the fourth rotor", dimension: RATIO, min: 0.0, max: 1.0,
-            neutral: Some(0.0), nominal: 0.1, nominal_source: "tuned, no source: a chipped propeller",
-        },
+        /// l_1: part of the thrust that the first rotor of the vehicle file lacks
+        loss_1: RATIO, min: 0.0, max: 1.0, neutral: Some(0.0), nominal: 0.1,
+            source: "tuned, no source: a chipped propeller";
+        /// l_2: the same of the second rotor
+        loss_2: RATIO, min: 0.0, max: 1.0, neutral: Some(0.0), nominal: 0.1,
+            source: "tuned, no source: a chipped propeller";
+        /// l_3: the same of the third rotor
+        loss_3: RATIO, min: 0.0, max: 1.0, neutral: Some(0.0), nominal: 0.1,
+            source: "tuned, no source: a chipped propeller";
+        /// l_4: the same of the fourth rotor
+        loss_4: RATIO, min: 0.0, max: 1.0, neutral: Some(0.0), nominal: 0.1,
+            source: "tuned, no source: a chipped propeller";
     }
 }
 

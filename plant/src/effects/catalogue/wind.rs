@@ -19,18 +19,15 @@ pub static EFFECT: EffectKind = EffectKind {
 
 effect_parameters! {
     struct Parameters {
-        x: {
-            meaning: "velocity of the air along x of the world", dimension: WIND_VELOCITY, min: -30.0, max: 30.0,
-            neutral: Some(0.0), nominal: 3.0, nominal_source: "a light breeze: 3 m/s is Beaufort 2",
-        },
-        y: {
-            meaning: "velocity of the air along y of the world", dimension: WIND_VELOCITY, min: -30.0, max: 30.0,
-            neutral: Some(0.0), nominal: 1.0, nominal_source: "a light breeze: 3 m/s is Beaufort 2",
-        },
-        z: {
-            meaning: "velocity of the air along z of the world", dimension: WIND_VELOCITY, min: -30.0, max: 30.0,
-            neutral: Some(0.0), nominal: 0.2, nominal_source: "a light breeze: 3 m/s is Beaufort 2",
-        },
+        /// velocity of the air along x of the world
+        x: WIND_VELOCITY, min: -30.0, max: 30.0, neutral: Some(0.0), nominal: 3.0,
+            source: "a light breeze: 3 m/s is Beaufort 2";
+        /// velocity of the air along y of the world
+        y: WIND_VELOCITY, min: -30.0, max: 30.0, neutral: Some(0.0), nominal: 1.0,
+            source: "a light breeze: 3 m/s is Beaufort 2";
+        /// velocity of the air along z of the world
+        z: WIND_VELOCITY, min: -30.0, max: 30.0, neutral: Some(0.0), nominal: 0.2,
+            source: "a light breeze: 3 m/s is Beaufort 2";
     }
 }
 

@@ -21,10 +21,8 @@ pub static EFFECT: EffectKind = EffectKind {
 
 effect_parameters! {
     struct Parameters {
-        damping: {
-            meaning: "k: torque per yaw rate", dimension: ROTARY_DAMPING, min: 0.0, max: 1.0,
-            neutral: Some(0.0), nominal: 1e-4, nominal_source: "tuned, no source",
-        },
+        /// k: torque per yaw rate
+        damping: ROTARY_DAMPING, min: 0.0, max: 1.0, neutral: Some(0.0), nominal: 1e-4, source: "tuned, no source";
     }
 }
 
