@@ -1,5 +1,4 @@
 //! The vehicle as its controllers know it: its file, the allocation to its rotors, and what the loops need of both.
-#![allow(non_snake_case, reason = "a trailing _B names the frame a vector is written in, _N the newton")]
 
 use crate::allocation::{Allocation, AllocationError, RotorSet, THRUST_RESERVE};
 use diagnostics::ParameterError;

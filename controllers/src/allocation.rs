@@ -4,10 +4,6 @@
 //! torque on the body is r × thrust, that is (y, −x)·c_T·ω² about x and y, and against its own sense of
 //! turning, −spin·c_Q·ω² about z. This is eq. 3.7 of the thesis with the moment arm (not the distance
 //! between the axes), and with signs that follow from the axes rather than from a rotor numbering.
-#![allow(
-    non_snake_case,
-    reason = "a trailing _W or _B names the frame a vector is written in, _N the newton"
-)]
 
 use nalgebra::{Matrix4, Vector3, Vector4};
 use vehicles::Vehicle;
@@ -75,6 +71,18 @@ pub enum AllocationError {
 }
 
 /// The inverse of the rotors' effectiveness, and their limits.
+///
+/// ```
+/// use controllers::airframe::ControlledVehicle;
+/// use controllers::allocation::RotorWrench;
+/// use nalgebra::Vector3;
+///
+/// let vehicle = concat!(env!("CARGO_MANIFEST_DIR"), "/../vehicles/hummingbird.toml");
+/// let allocation = ControlledVehicle::load(vehicle.as_ref()).unwrap().allocation;
+/// let asked = RotorWrench { thrust_N: 4.7, torque_B_N_m: Vector3::new(0.02, 0.0, 0.0) };
+/// let allocated = allocation.allocate(&asked);
+/// assert!((allocated.wrench.torque_B_N_m.x - 0.02).abs() < 1e-9 && !allocated.is_saturated());
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Allocation {
     /// Thrust and torques (rows) from squared speeds (columns).

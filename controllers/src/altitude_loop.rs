@@ -1,5 +1,4 @@
 //! The altitude PID that `pid` and all laws with the cascade's inner loops share: height to thrust.
-#![allow(non_snake_case, reason = "a trailing _N is the newton")]
 
 use crate::airframe::HoverModel;
 use crate::control::{HoverMotion, Integrals, within};
@@ -65,7 +64,6 @@ pub struct AltitudeLoop<'a> {
 impl AltitudeLoop<'_> {
     /// Thrust = m·(g + a) / (cos φ·cos θ): eq. 3.19 with its denominator corrected, where a is the
     /// acceleration that the loop asks for. `integral_m_s2` advances by one period.
-    #[must_use]
     pub fn thrust_N(&self, integral_m_s2: &mut f64, altitude_set_m: f64, measured: &HoverMotion) -> f64 {
         let error_m = altitude_set_m - measured.altitude_m;
         let advanced_m_s2 = self.advanced_m_s2(*integral_m_s2, error_m, measured.climb_rate_m_s);
@@ -83,7 +81,6 @@ impl AltitudeLoop<'_> {
     /// What the integrators ask for after another law: what the other's asked for, where this law has a gain for it.
     /// Where only its last thrust is known, the lift is what it takes to ask for that. `turn_gains` and `turn_max_rad_s2`
     /// are those of the law's own attitude loops.
-    #[must_use]
     pub fn continued<S>(
         &self,
         from: &Predecessor<'_, S>,

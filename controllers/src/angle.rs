@@ -3,7 +3,6 @@
 use std::f64::consts::{PI, TAU};
 
 /// `angle_rad` less whole turns, from −π up to but not including π.
-#[must_use]
 pub fn wrap_rad(angle_rad: f64) -> f64 {
     (angle_rad + PI).rem_euclid(TAU) - PI
 }

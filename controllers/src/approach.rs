@@ -17,7 +17,6 @@ gains! {
 
 impl Approach {
     /// The velocity towards a place that is `distance_m` away; away from it where that is negative.
-    #[must_use]
     pub fn speed_m_s(&self, distance_m: f64) -> f64 {
         let (k, a, away_m) = (self.slope_1_s, self.deceleration_m_s2, distance_m.abs());
         let speed_m_s =
@@ -26,7 +25,6 @@ impl Approach {
     }
 
     /// The distance at which the velocity is `speed_m_s`.
-    #[must_use]
     pub fn distance_m(&self, speed_m_s: f64) -> f64 {
         let (k, a, v) = (self.slope_1_s, self.deceleration_m_s2, speed_m_s);
         if v < a / k { v / k } else { v * v / (2.0 * a) + 0.5 * a / (k * k) }
@@ -34,7 +32,6 @@ impl Approach {
 
     /// The rate of change of [`Self::speed_m_s`] while the distance shrinks by `closing_m_s`: what a vehicle
     /// that follows the curve has to accelerate by.
-    #[must_use]
     pub fn acceleration_m_s2(&self, distance_m: f64, closing_m_s: f64) -> f64 {
         let (k, a, away_m) = (self.slope_1_s, self.deceleration_m_s2, distance_m.abs());
         let slope_1_s = if away_m < a / (k * k) { k } else { a / self.speed_m_s(away_m) };

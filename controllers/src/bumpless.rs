@@ -4,7 +4,6 @@
 //! A law finds its own state as it left it. Of another's it takes what means the same to all, the integrators, and
 //! sets the rest by what is measured. What was asked for last and the backup does not ask for is added to its demand
 //! and fades out (`TIME_CONSTANT_S`).
-#![allow(non_snake_case, reason = "a trailing _B names the frame a vector is written in, _N the newton")]
 
 use crate::allocation::RotorWrench;
 use crate::control::{ControlInput, ControlOutput, within};

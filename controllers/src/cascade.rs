@@ -8,7 +8,6 @@
 //!   to their rates of change, and by the kinematics of the z-y-x sequence to body rates (the inverse of thesis eq. 3.18).
 //! - Rate loop: α = Kp·e + ∫Ki·e dt − Kd·dω/dt with e the error of a body rate; torque = inertia · α. The
 //!   cross product of rate and angular momentum is left to the loops.
-#![allow(non_snake_case, reason = "a trailing _B names the frame a vector is written in, _N the newton")]
 
 use crate::airframe::HoverModel;
 use crate::allocation::RotorWrench;
@@ -25,6 +24,19 @@ use nalgebra::Vector3;
 use std::path::Path;
 
 /// The law at one period: all that does not change during a run.
+///
+/// ```
+/// use bus::messages::{SetPoint, StateEstimate};
+/// use controllers::{cascade::CascadeLaw, controller::Controller, law_inputs::SetPointInputs};
+///
+/// let vehicle = concat!(env!("CARGO_MANIFEST_DIR"), "/../vehicles/hummingbird.toml");
+/// let parameters = serde_json::json!({ "vehicle": vehicle });
+/// let mut cascade = bus::Harness::<Controller<CascadeLaw>>::from_json(&parameters).unwrap();
+/// let (set_point, estimate) = (SetPoint { roll: 0.1, ..Default::default() }, StateEstimate::default());
+/// let inputs = || SetPointInputs { set_point: &set_point, estimate: &estimate, attitude: None };
+/// let status = (0..50).map(|_| cascade.step(inputs()).unwrap().status.unwrap()).last().unwrap();
+/// assert!(status.torque.x > 0.0, "N*m about body x, towards the roll that is asked for: {status:?}");
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CascadeLaw {
     /// Gains and limits.

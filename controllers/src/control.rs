@@ -1,8 +1,4 @@
 //! What a control law reads and answers at a tick.
-#![allow(
-    non_snake_case,
-    reason = "a trailing _W or _B names the frame a vector is written in, _N the newton"
-)]
 
 use crate::allocation::RotorWrench;
 use crate::set_points::SetPoint;

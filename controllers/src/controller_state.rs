@@ -2,7 +2,6 @@
 //!
 //! It holds what means the same to all laws, and room for the law's own state, which only a law with the same type of
 //! state reads.
-#![allow(non_snake_case, reason = "_N names the newton")]
 
 use crate::allocation::RotorWrench;
 use crate::control::Integrals;

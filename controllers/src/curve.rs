@@ -6,7 +6,6 @@
 //! are continuous, at rest and on the move. The derivatives of the position by time follow from those by phase with the
 //! formula of Faà di Bruno (M. Abramowitz and I. A. Stegun, "Handbook of Mathematical Functions", 24.1.2): nothing is
 //! differenced.
-#![allow(non_snake_case, reason = "a trailing _W names the frame a vector is written in")]
 
 use nalgebra::Vector3;
 use std::f64::consts::TAU;
@@ -60,7 +59,6 @@ pub struct PhaseClock {
 impl Shape {
     /// The greatest speed, m/s, at a phase rate of 1 rad/s. The figure eight has it where it crosses itself:
     /// |dr/dθ|² = a²·(cos² θ + cos² 2θ).
-    #[must_use]
     pub fn speed_max_m_rad(&self) -> f64 {
         match *self {
             Self::Circle { radius_m } => radius_m.abs(),
@@ -95,7 +93,6 @@ fn sine_derivatives(multiple: f64, phase_rad: f64) -> Derivatives {
 
 impl PhaseClock {
     /// The clock that covers `phase_rad` at `rate_rad_s` with ramps of `ramp_s`; `None` where the ramps alone cover more.
-    #[must_use]
     pub fn covering(phase_rad: f64, rate_rad_s: f64, ramp_s: f64) -> Option<Self> {
         // A ramp covers half of what cruising covers in its time, since the rise is symmetric.
         let duration_s = phase_rad / rate_rad_s + ramp_s;
@@ -103,7 +100,6 @@ impl PhaseClock {
     }
 
     /// The phase and its first four derivatives `time_s` after the start.
-    #[must_use]
     pub fn at(&self, time_s: f64) -> Derivatives {
         let time_s = time_s.clamp(0.0, self.duration_s);
         let left_s = self.duration_s - time_s;
@@ -138,7 +134,6 @@ impl PhaseClock {
 
 /// The polynomial that rises from 0 to 1 over 0…1 with four vanishing derivatives at both ends, and its first three
 /// derivatives.
-#[must_use]
 pub fn smooth_step(t: f64) -> [f64; 4] {
     let left = 1.0 - t;
     [
@@ -151,7 +146,6 @@ pub fn smooth_step(t: f64) -> [f64; 4] {
 
 impl Curve {
     /// The point and its derivatives `time_s` after the start.
-    #[must_use]
     pub fn at(&self, time_s: f64) -> Path {
         let phase = self.clock.at(time_s);
         let by_phase = self.shape.by_phase(phase[0]);

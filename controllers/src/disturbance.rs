@@ -5,7 +5,6 @@
 //! means at the estimated attitude. Both of its poles lie at ω. Where the model holds, d̂ stays zero however the vehicle
 //! is steered, so it takes nothing from the margins of the loop that it serves; held against the disturbance it does
 //! an integrator's work without one's overshoot.
-#![allow(non_snake_case, reason = "a trailing _W names the frame a vector is written in")]
 
 use crate::control::MotionEstimate;
 use diagnostics::unit::ACCELERATION;
@@ -69,7 +68,6 @@ impl Observer {
 
 impl ObserverState {
     /// An observer that begins at this motion, without a disturbance.
-    #[must_use]
     pub fn at(motion: &MotionEstimate) -> Self {
         Self { answer: [0.0; 3], velocity_foreseen: motion.velocity_W_m_s.into() }
     }

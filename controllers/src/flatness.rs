@@ -6,7 +6,6 @@
 //! body x lies in the vertical plane of the heading, x_B ∥ y_C × z_B with y_C level and left of the heading, as in
 //! M. Faessler, A. Franchi and D. Scaramuzza, "Differential flatness of quadrotor dynamics subject to rotor drag",
 //! RA-L 2018. The yaw's own acceleration is taken as zero.
-#![allow(non_snake_case, reason = "a trailing _W or _B names the frame a vector is written in")]
 
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
 
@@ -37,7 +36,6 @@ pub struct Target {
 }
 
 /// The attitude at which body z points along `thrust_W` with the heading `yaw_rad`. `thrust_W` must point upwards.
-#[must_use]
 pub fn target(thrust_W: &Moving, yaw_rad: f64, yaw_rate_rad_s: f64) -> Target {
     let z = thrust_W.direction();
     let x = left_of_heading(yaw_rad, yaw_rate_rad_s).cross(&z).direction();
@@ -70,7 +68,6 @@ fn left_of_heading(yaw_rad: f64, rate_rad_s: f64) -> Moving {
 impl Moving {
     /// The thrust for each unit of mass that makes this acceleration against gravity. It points up by at least
     /// [`RISE_MIN_M_S2`].
-    #[must_use]
     pub fn against(mut self, gravity_m_s2: f64) -> Self {
         self.value.z = (self.value.z + gravity_m_s2).max(RISE_MIN_M_S2);
         self

@@ -3,10 +3,6 @@
 //!
 //! A predecessor may be a broken law, so nothing of its state is gone on from that this vehicle could not have: neither
 //! numbers that are none nor wrenches that its rotors cannot make.
-#![allow(
-    non_snake_case,
-    reason = "a trailing _W or _B names the frame a vector is written in, _N or _m names a unit"
-)]
 
 use crate::airframe::ControlledVehicle;
 use crate::allocation::{Allocation, RotorWrench, THRUST_RESERVE};

@@ -218,9 +218,9 @@ mod tests {
         let text = CascadeGains::BUILT_IN.replace("[command_filter]", "[filter]");
         let text = text.replace("damping_ratio", "damping").replace("rate_feed_forward", "feed_forward");
         let error = parse(&text, "my.toml", CascadeGains::read).unwrap_err().to_string();
-        let told = ["missing key `command_filter`", "missing key `attitude.rate_feed_forward`"];
+        let missing = ["missing key `command_filter`", "missing key `attitude.rate_feed_forward`"];
         let unknown = ["unknown key `filter`", "unknown key `attitude.feed_forward`"];
-        assert!(told.iter().chain(&unknown).all(|fault| error.contains(fault)), "{error}");
+        assert!(missing.iter().chain(&unknown).all(|fault| error.contains(fault)), "{error}");
         assert_eq!(error.lines().count(), 4, "one line for each: {error}");
     }
 }

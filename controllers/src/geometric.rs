@@ -15,10 +15,6 @@
 //! Ω_c and its rate follow from the first two derivatives of t, which hold the reference's jerk and snap and those of
 //! the errors: the paper leaves open where the errors of acceleration and jerk come from; here they are what the
 //! thrust that the rotors are foreseen to make (`motor_lag`) means at the estimated attitude and rates, and d̂.
-#![allow(
-    non_snake_case,
-    reason = "a trailing _W or _B names the frame a vector is written in, _N the newton"
-)]
 
 use crate::airframe::ControlledVehicle;
 use crate::allocation::RotorWrench;
@@ -38,6 +34,20 @@ use nalgebra::Vector3;
 use std::path::Path;
 
 /// The law at one period: all that does not change during a run.
+///
+/// ```
+/// use bus::messages::{Reference, StateEstimate};
+/// use controllers::{controller::Controller, geometric::GeometricLaw, law_inputs::ReferenceInputs};
+///
+/// let vehicle = concat!(env!("CARGO_MANIFEST_DIR"), "/../vehicles/hummingbird.toml");
+/// let parameters = serde_json::json!({ "vehicle": vehicle });
+/// let mut law = bus::Harness::<Controller<GeometricLaw>>::from_json(&parameters).unwrap();
+/// let reference = Reference { position: [0.0, 0.0, 1.0].into(), ..Default::default() };
+/// let estimate = StateEstimate { position: [0.0, 0.0, 1.0].into(), ..Default::default() };
+/// let inputs = ReferenceInputs { reference: &reference, estimate: &estimate, attitude: None };
+/// let thrust_N = law.step(inputs).unwrap().status.unwrap().thrust;
+/// assert!((thrust_N - 0.48 * 9.81).abs() < 1e-3, "on its reference it carries its weight: {thrust_N} N");
+/// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct GeometricLaw {
     gains: GeometricGains,

@@ -1,5 +1,4 @@
 //! What laws read from the bus.
-#![allow(non_snake_case, reason = "a trailing _W or _B names the frame a vector is written in")]
 
 use crate::control::{ControlInput, MotionEstimate};
 use crate::set_points::SetPoint;

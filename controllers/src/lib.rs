@@ -23,6 +23,10 @@
 //! - [`pilot`], [`trajectory_node`], [`player`]: the components that controllers follow; [`flight_log`]: a measured flight
 //!   as CSV with a column map.
 #![forbid(unsafe_code)]
+#![allow(
+    non_snake_case,
+    reason = "a trailing _W or _B names the frame that a vector is written in, _WB a rotation between the two, _N a unit"
+)]
 
 // First: modules behind it see its macro without importing it.
 #[macro_use]

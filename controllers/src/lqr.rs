@@ -5,10 +5,6 @@
 //! disturbance need by `flatness` (attitude, rates, wrench), u_d the wrench that the motors, which lag by 2ζ/ω_n, have to be
 //! asked for to make it. Position and velocity are compared in axes that turn with the vehicle's heading, attitude and
 //! rates in the axes of x_d, so that any yaw and any tilt of the reference is a hover to the regulator.
-#![allow(
-    non_snake_case,
-    reason = "a trailing _W or _B names the frame a vector is written in, _N the newton"
-)]
 
 use crate::airframe::ControlledVehicle;
 use crate::allocation::RotorWrench;
@@ -30,6 +26,20 @@ use nalgebra::{Rotation3, SMatrix, SVector, Vector3};
 use std::path::Path;
 
 /// The law at one period: all that does not change during a run.
+///
+/// ```
+/// use bus::messages::{Reference, StateEstimate};
+/// use controllers::{controller::Controller, lqr::LqrLaw, law_inputs::ReferenceInputs};
+///
+/// let vehicle = concat!(env!("CARGO_MANIFEST_DIR"), "/../vehicles/hummingbird.toml");
+/// let parameters = serde_json::json!({ "vehicle": vehicle });
+/// let mut law = bus::Harness::<Controller<LqrLaw>>::from_json(&parameters).unwrap();
+/// let reference = Reference { position: [0.0, 0.0, 1.0].into(), ..Default::default() };
+/// let estimate = StateEstimate { position: [0.0, 0.0, 1.0].into(), ..Default::default() };
+/// let inputs = ReferenceInputs { reference: &reference, estimate: &estimate, attitude: None };
+/// let thrust_N = law.step(inputs).unwrap().status.unwrap().thrust;
+/// assert!((thrust_N - 0.48 * 9.81).abs() < 1e-3, "on its reference it carries its weight: {thrust_N} N");
+/// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct LqrLaw {
     gains: LqrGains,

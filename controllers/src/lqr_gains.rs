@@ -1,5 +1,4 @@
 //! The weights of the `lqr` controller: `controllers/gains/lqr.toml` and files like it.
-#![allow(non_snake_case, reason = "_N names the newton")]
 
 use crate::disturbance::Observer;
 use diagnostics::unit::{ANGLE, Dimension, LENGTH, SPEED, TORQUE, VELOCITY};

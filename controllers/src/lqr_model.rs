@@ -42,7 +42,6 @@ pub struct Step {
 }
 
 /// The step of `vehicle` over `period_s`; `None` where its inertia has no inverse.
-#[must_use]
 pub fn step(vehicle: &Vehicle, period_s: f64) -> Option<Step> {
     let inverse_inertia = vehicle.inertia_kg_m2.try_inverse()?;
     let (lag, lag_input) = motor_lag::continuous(&vehicle.motor);
@@ -72,7 +71,6 @@ pub fn step(vehicle: &Vehicle, period_s: f64) -> Option<Step> {
 }
 
 /// The weights of states and inputs: inverse squares of the stated deviations; the wrench made costs nothing.
-#[must_use]
 pub fn weights(gains: &LqrGains) -> (SMatrix<f64, STATES, STATES>, SMatrix<f64, INPUTS, INPUTS>) {
     let (tilt, tilt_rate, torque) = (gains.tilt_rad, gains.tilt_rate_rad_s, gains.tilt_torque_N_m);
     let mut states = [f64::INFINITY; STATES];

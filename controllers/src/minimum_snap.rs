@@ -10,7 +10,6 @@
     clippy::disallowed_types,
     reason = "a system that is factorised, and no product: see the decision on numbers"
 )]
-#![allow(non_snake_case, reason = "a trailing _W names the frame a vector is written in")]
 
 use crate::curve::Path;
 use nalgebra::{DMatrix, SMatrix, Vector3};
@@ -39,7 +38,6 @@ struct Leg {
 impl MinimumSnap {
     /// The path through `waypoints_W_m`, at least two, with `spans_s` between them; `None` where the equations have no
     /// accurate solution, because the spans differ by too much.
-    #[must_use]
     pub fn new(waypoints_W_m: &[Vector3<f64>], spans_s: &[f64]) -> Option<Self> {
         let (matrix, right) = equations(waypoints_W_m, spans_s);
         let solution = matrix.clone().lu().solve(&right)?;
@@ -58,13 +56,11 @@ impl MinimumSnap {
     }
 
     /// How long the whole takes, s.
-    #[must_use]
     pub fn duration_s(&self) -> f64 {
         self.legs.iter().map(|leg| leg.span_s).sum()
     }
 
     /// The point and its derivatives `time_s` after the start, a time within the path.
-    #[must_use]
     pub fn at(&self, time_s: f64) -> Path {
         let next = self.legs.partition_point(|leg| leg.start_s <= time_s);
         self.legs[next.saturating_sub(1)].at(time_s)
@@ -73,9 +69,9 @@ impl MinimumSnap {
 
 impl Leg {
     fn at(&self, time_s: f64) -> Path {
-        let own_time = ((time_s - self.start_s) / self.span_s).clamp(0.0, 1.0);
+        let leg_time = ((time_s - self.start_s) / self.span_s).clamp(0.0, 1.0);
         std::array::from_fn(|order| {
-            let row = powers(own_time, order) / self.span_s.powi(order as i32);
+            let row = powers(leg_time, order) / self.span_s.powi(order as i32);
             (row * self.coefficients_W).transpose()
         })
     }
@@ -131,7 +127,6 @@ impl System {
 
 /// Times between waypoints at this mean speed: those of a point that gains speed evenly over the first quarter of the
 /// time along the straight lines, keeps it, and loses it over the last.
-#[must_use]
 pub fn spans_at_mean_speed(waypoints_W_m: &[Vector3<f64>], mean_speed_m_s: f64) -> Vec<f64> {
     let lengths_m: Vec<f64> = waypoints_W_m.windows(2).map(|ends| (ends[1] - ends[0]).norm()).collect();
     let total_m: f64 = lengths_m.iter().sum();

@@ -7,7 +7,6 @@
 //! u = w + [ω_f²·(v − w) − 2ζ_f·ω_f·w′ + 2ζ·ω_n·w′]/ω_n² makes w follow the wanted v as a motor of ω_f and ζ_f would:
 //! the poles of the lag are placed anew (K. J. Åström and R. M. Murray, "Feedback Systems", section 7.2, state
 //! feedback). The foreseen w follows what the allocation could make of the demand, so saturation winds nothing up.
-#![allow(non_snake_case, reason = "a trailing _B names the frame a vector is written in, _N the newton")]
 
 use crate::allocation::RotorWrench;
 use diagnostics::unit::PURE_NUMBER;
@@ -45,7 +44,6 @@ pub struct Made {
 
 impl MotorLag {
     /// The lag of motors that behave as `model`, over steps of `period_s`.
-    #[must_use]
     pub fn new(model: MotorModel, period_s: f64) -> Self {
         let (dynamics_1_s, input_1_s) = continuous(&model);
         let mut held = Matrix3::zeros();
@@ -61,7 +59,6 @@ impl MotorLag {
     }
 
     /// What the rotors make one period after `made` under the demand `asked`.
-    #[must_use]
     pub fn advance(&self, made: &Made, asked: &RotorWrench) -> Made {
         let step = |value: f64, rate: f64, asked: f64| {
             let next = self.transition * Vector2::new(value, rate) + self.input * asked;
@@ -77,7 +74,6 @@ impl MotorLag {
     }
 
     /// The demand with which the rotors go towards `wanted` as motors of `target` would.
-    #[must_use]
     pub fn hurried(&self, target: &LagTarget, made: &Made, wanted: &RotorWrench) -> RotorWrench {
         let (now, rate) = (&made.wrench, &made.rate);
         let hurry = |now: f64, rate: f64, wanted: f64| self.hurry(target, now, rate, wanted);
@@ -89,7 +85,6 @@ impl MotorLag {
     }
 
     /// How far a demand that rises evenly is ahead of what is made, s: 2ζ/ω_n, or τ.
-    #[must_use]
     pub fn delay_s(&self) -> f64 {
         match self.model {
             MotorModel::SecondOrder { natural_frequency_rad_s: wn, damping_ratio: zn } => 2.0 * zn / wn,
@@ -101,8 +96,8 @@ impl MotorLag {
         let (wf, zf) = (target.natural_frequency_rad_s, target.damping_ratio);
         match self.model {
             MotorModel::SecondOrder { natural_frequency_rad_s: wn, damping_ratio: zn } => {
-                let (brake, own_brake) = (2.0 * zf * wf * rate, 2.0 * zn * wn * rate);
-                now + (wf * wf * (wanted - now) - brake + own_brake) / (wn * wn)
+                let (brake, motor_brake) = (2.0 * zf * wf * rate, 2.0 * zn * wn * rate);
+                now + (wf * wf * (wanted - now) - brake + motor_brake) / (wn * wn)
             }
             // One pole, placed where the pair's slow behaviour is: a lag of 2ζ_f/ω_f.
             MotorModel::FirstOrder { time_constant_s } => {
@@ -114,7 +109,6 @@ impl MotorLag {
 
 /// Rate of change of (w, w′) from itself and from the demand. A lag of first order has no w′ of its own: the second
 /// state then only fades.
-#[must_use]
 pub fn continuous(model: &MotorModel) -> (Matrix2<f64>, Vector2<f64>) {
     match *model {
         MotorModel::SecondOrder { natural_frequency_rad_s: wn, damping_ratio: zeta } => {
@@ -128,7 +122,6 @@ pub fn continuous(model: &MotorModel) -> (Matrix2<f64>, Vector2<f64>) {
 
 impl Made {
     /// Rotors that have settled at `wrench`.
-    #[must_use]
     pub fn settled(wrench: RotorWrench) -> Self {
         Self { wrench, rate: RotorWrench::default() }
     }

@@ -1,10 +1,6 @@
 //! The altitude and attitude PID of the thesis (§3.2): set point and measurement to a wrench.
 //!
 //! Frames: world z up; body x forward, y left, z up; roll, pitch and yaw in the aerospace ZYX sequence.
-#![allow(
-    non_snake_case,
-    reason = "a trailing _W or _B names the frame a vector is written in, _N the newton"
-)]
 
 use crate::airframe::HoverModel;
 use crate::allocation::RotorWrench;
@@ -22,6 +18,19 @@ use serde::Deserialize;
 use std::path::{Path, PathBuf};
 
 /// The law at one period: all that does not change during a run.
+///
+/// ```
+/// use controllers::airframe::ControlledVehicle;
+/// use controllers::control::{HoverMotion, Integrals, MotionEstimate};
+/// use controllers::{pid::PidLaw, pid_gains::PidGains, set_points::SetPoint};
+///
+/// let vehicle = concat!(env!("CARGO_MANIFEST_DIR"), "/../vehicles/hummingbird.toml");
+/// let craft = ControlledVehicle::load(vehicle.as_ref()).unwrap();
+/// let law = PidLaw { gains: PidGains::default(), vehicle: craft.hover_model(), period_s: 1e-3 };
+/// let asked = SetPoint { yaw_rad: 0.1, ..SetPoint::default() };
+/// let wrench = law.wrench(&mut Integrals::default(), &asked, &HoverMotion::of(&MotionEstimate::default()));
+/// assert!(wrench.torque_B_N_m.z > 0.0, "N*m about body z, towards the yaw that is asked for");
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PidLaw {
     /// Gains and limits.

@@ -43,6 +43,17 @@ pub struct Outputs {
 }
 
 /// What the pilot asks for over time.
+///
+/// ```
+/// use controllers::pilot::Pilot;
+/// use serde_json::json;
+///
+/// let step = json!({ "kind": "step", "channel": "altitude", "at_s": 0.002, "to": 1.5, "unit": "m" });
+/// let parameters = json!({ "initial_altitude_m": 1.0, "set_points": [step] });
+/// let mut pilot = bus::Harness::<Pilot>::from_json(&parameters).unwrap();
+/// let asked_m = [0, 1, 2].map(|_| pilot.step(()).unwrap().set_point.altitude);
+/// assert_eq!(asked_m, [1.0, 1.0, 1.5]);
+/// ```
 #[derive(Debug)]
 pub struct Pilot {
     schedule: Schedule,
@@ -138,11 +149,11 @@ mod tests {
             serde_json::json!({"initial_altitude_m": -100_000.0}),
             serde_json::json!({"initial_altitude_m": 1.0, "set_points": [step]}),
         ] {
-            let words = Registration::of::<Pilot>()
+            let message = Registration::of::<Pilot>()
                 .check(&parameters, &NodeContext::new("node", &[]))
                 .unwrap_err()
                 .to_string();
-            assert!(words.contains("-20 000 m to 20 000 m") && words.contains("00000 m"), "{words}");
+            assert!(message.contains("-20 000 m to 20 000 m") && message.contains("00000 m"), "{message}");
         }
     }
 

@@ -2,10 +2,6 @@
 //!
 //! The law is stepped at its own period on motions that any flight meets. What it asks for has to be a number; what
 //! the vehicle then does is not looked at: that is flying.
-#![allow(
-    non_snake_case,
-    reason = "a trailing _W or _B names the frame a vector is written in, _N the newton"
-)]
 
 use crate::airframe::ControlledVehicle;
 use crate::bumpless::BumplessTransfer;
@@ -116,7 +112,6 @@ fn fly<L: Law>(
 
 impl ControlOutput {
     /// The first of the numbers asked for that is not finite, for a message.
-    #[must_use]
     pub fn not_finite(&self) -> Option<String> {
         let (wrench, set) = (&self.wrench, &self.set_point);
         let asked: [(&str, &[f64]); 5] = [

@@ -8,7 +8,6 @@
 //!
 //! The sizes are in the types: products of matrices whose sizes are found at run time are computed with whatever
 //! instructions the processor has, and differ in the last digits from one to another.
-#![allow(non_snake_case, reason = "A, B, Q, R, X, G, H and W are the equation's letters")]
 
 use nalgebra::{Const, DimMin, SMatrix, ToTypenum};
 
@@ -30,7 +29,6 @@ pub struct Regulator<const N: usize, const M: usize> {
 
 /// The regulator of x ← A·x + B·u with the cost Σ xᵀQx + uᵀRu; `None` where the equation has no solution that
 /// stabilises the system, or none that can be computed.
-#[must_use]
 pub fn regulator<const N: usize, const M: usize>(
     A: &SMatrix<f64, N, N>,
     B: &SMatrix<f64, N, M>,

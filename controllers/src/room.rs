@@ -30,7 +30,7 @@ impl Room {
     /// The distances from the walls at -x and -y as the beams tell them, where the vehicle begins.
     #[must_use]
     pub fn begun_m(&self, walls: &WallEstimate) -> [f64; 2] {
-        std::array::from_fn(|axis| match self.told_m(axis, walls) {
+        std::array::from_fn(|axis| match self.beam_places_m(axis, walls) {
             [Some(a_m), Some(b_m)] if (a_m - b_m).abs() < AGREEMENT_M => 0.5 * (a_m + b_m),
             [Some(a_m), _] | [None, Some(a_m)] => a_m,
             [None, None] => 0.5 * self.size_m[axis],
@@ -42,8 +42,8 @@ impl Room {
     pub fn moved_m(&self, before_m: &[f64; 2], walls: &WallEstimate, period_s: f64) -> [f64; 2] {
         std::array::from_fn(|axis| {
             let carried_m = before_m[axis] + walls.velocity[axis] * period_s;
-            let told_m = self.believed_m(axis, carried_m, walls);
-            told_m.map_or(carried_m, |told_m| carried_m + (told_m - carried_m) * (period_s / FOLLOWING_S))
+            let place_m = self.believed_m(axis, carried_m, walls);
+            place_m.map_or(carried_m, |place_m| carried_m + (place_m - carried_m) * (period_s / FOLLOWING_S))
         })
     }
 
@@ -55,18 +55,18 @@ impl Room {
     }
 
     fn believed_m(&self, axis: usize, carried_m: f64, walls: &WallEstimate) -> Option<f64> {
-        let told = self.told_m(axis, walls);
-        if let [Some(a_m), Some(b_m)] = told
+        let places = self.beam_places_m(axis, walls);
+        if let [Some(a_m), Some(b_m)] = places
             && (a_m - b_m).abs() < AGREEMENT_M
         {
             return Some(0.5 * (a_m + b_m));
         }
-        let near = told.into_iter().flatten().filter(|told_m| (told_m - carried_m).abs() < GATE_M);
+        let near = places.into_iter().flatten().filter(|place_m| (place_m - carried_m).abs() < GATE_M);
         near.min_by(|a_m, b_m| (a_m - carried_m).abs().total_cmp(&(b_m - carried_m).abs()))
     }
 
     /// The place on an axis by the beam forwards along it, and by the one backwards.
-    fn told_m(&self, axis: usize, walls: &WallEstimate) -> [Option<f64>; 2] {
+    fn beam_places_m(&self, axis: usize, walls: &WallEstimate) -> [Option<f64>; 2] {
         let seen = |beam: usize| (walls.in_sight[beam] != 0).then_some(walls.distance[beam]);
         [seen(2 * axis).map(|distance_m| self.size_m[axis] - distance_m), seen(2 * axis + 1)]
     }

@@ -27,7 +27,6 @@ pub struct SetPoint {
 impl SetPoint {
     /// A height and the angles of an attitude, body to world.
     #[must_use]
-    #[allow(non_snake_case, reason = "_WB names the frames that an attitude leads between")]
     pub fn held(altitude_m: f64, attitude_WB: &UnitQuaternion<f64>) -> Self {
         let (roll_rad, pitch_rad, yaw_rad) = attitude_WB.euler_angles();
         Self { altitude_m, roll_rad, pitch_rad, yaw_rad }
@@ -61,6 +60,15 @@ pub struct SetPointEntry {
 }
 
 /// A schedule compiled for one tick rate.
+///
+/// ```
+/// use controllers::set_points::{Schedule, SetPoint, SetPointEntry};
+///
+/// let entry = r#"{ "kind": "ramp", "channel": "yaw", "at_s": 1.0, "over_s": 2.0, "to": 90.0, "unit": "deg" }"#;
+/// let entry: SetPointEntry = serde_json::from_str(entry).unwrap();
+/// let schedule = Schedule::new(&[entry], &SetPoint::default(), 1000).unwrap();
+/// assert_eq!(schedule.at(2000).yaw_rad, 45.0_f64.to_radians(), "half of the way after half of the time");
+/// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct Schedule {
     channels: [ChannelPlan; 4],
@@ -193,7 +201,11 @@ impl Reader<'_> {
             "ramp" => plan.legs.push(self.leg(si_per_unit, &["to", "over_s"])?),
             "doublet" => plan.doublets.push(self.doublet(si_per_unit)?),
             other => {
-                return Err(ParameterError::value("kind", "\"step\", \"ramp\" or \"doublet\"", quoted(other)));
+                return Err(ParameterError::value(
+                    "kind",
+                    "\"step\", \"ramp\" or \"doublet\"",
+                    quoted(other),
+                ));
             }
         }
         Ok(())
@@ -353,18 +365,30 @@ mod tests {
     fn errors_name_the_entry_the_key_what_may_stand_there_and_what_does() {
         let good = r#"{kind="step", channel="roll", at_s=0.0, to=1.0, unit="deg"}"#;
         let cases = [
-            (r#"{kind="jump", channel="roll", at_s=0.0, to=1.0, unit="deg"}"#, "`kind` must be \"step\""),
+            (
+                r#"{kind="jump", channel="roll", at_s=0.0, to=1.0, unit="deg"}"#,
+                "`set_points.1.kind` must be \"step\"",
+            ),
             (r#"{kind="step", channel="rol", at_s=0.0, to=1.0, unit="deg"}"#, "found \"rol\""),
-            (r#"{kind="step", channel="roll", at_s=0.0, to=1.0, unit="m"}"#, "`unit` must be \"rad\" or"),
-            (r#"{kind="step", channel="roll", at_s=0.0, unit="deg"}"#, "`to` must be a finite number"),
-            (r#"{kind="step", channel="roll", at_s=-1.0, to=1.0, unit="deg"}"#, "`at_s` must be"),
+            (
+                r#"{kind="step", channel="roll", at_s=0.0, to=1.0, unit="m"}"#,
+                "`set_points.1.unit` must be \"rad\" or",
+            ),
+            (
+                r#"{kind="step", channel="roll", at_s=0.0, unit="deg"}"#,
+                "`set_points.1.to` must be a finite number",
+            ),
+            (
+                r#"{kind="step", channel="roll", at_s=-1.0, to=1.0, unit="deg"}"#,
+                "`set_points.1.at_s` must be",
+            ),
             (
                 r#"{kind="doublet", channel="roll", at_s=0.0, to=1.0, unit="deg"}"#,
-                "`to` must be left out of a doublet, found 1",
+                "`set_points.1.to` must be left out of a doublet, found 1",
             ),
             (
                 r#"{kind="ramp", channel="roll", at_s=0.0, over_s=0.0, to=1.0, unit="deg"}"#,
-                "`over_s` must be a time greater than zero, found 0",
+                "`set_points.1.over_s` must be a time greater than zero, found 0",
             ),
         ];
         for (entry, expected) in cases {

@@ -1,10 +1,9 @@
 //! A trajectory: segments one after another, each from rest to rest, as a function of time.
-#![allow(non_snake_case, reason = "a trailing _W names the frame a vector is written in")]
 
 use crate::curve::{Curve, Path, PhaseClock, Shape, smooth_step};
 use crate::minimum_snap::{MinimumSnap, spans_at_mean_speed};
 use bus::messages::Reference;
-use diagnostics::parameter::{ParameterError, all, finite, positive};
+use diagnostics::parameter::{ParameterError, all, finite, positive, refuse};
 use nalgebra::Vector3;
 use serde::Deserialize;
 use std::f64::consts::TAU;
@@ -109,6 +108,18 @@ pub struct Point {
 }
 
 /// Segments one after another; at rest in the last one's end from then on.
+///
+/// ```
+/// use controllers::trajectory::{Start, Trajectory};
+/// use nalgebra::Vector3;
+/// use serde_json::json;
+///
+/// let start = Start { position_W_m: Vector3::z(), yaw_rad: 0.0 };
+/// let path = json!({ "kind": "minimum-snap", "waypoints_m": [[1.0, 0.0, 1.5]], "times_s": [2.0] });
+/// let trajectory = Trajectory::read(&[path], start).unwrap();
+/// assert_eq!(trajectory.duration_s(), 2.0);
+/// assert!((trajectory.at(2.0).path_W[0] - Vector3::new(1.0, 0.0, 1.5)).norm() < 1e-9, "m in the world");
+/// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct Trajectory {
     segments: Vec<Segment>,
@@ -180,10 +191,7 @@ impl Trajectory {
         self.segments.iter().enumerate().try_for_each(|(index, segment)| {
             let times = (0..=LOOKS).map(|look| segment.duration_s * f64::from(look) / f64::from(LOOKS));
             times.map(|since_s| segment.at(segment.start_s + since_s)).try_for_each(|point| {
-                point.require_flyable().map_err(|asked| {
-                    ParameterError::conflict("", format_args!("it asks for {asked}"))
-                        .within(&format!("segments.{index}"))
-                })
+                point.require_flyable().map_err(|error| error.within(&format!("segments.{index}")))
             })
         })
     }
@@ -239,22 +247,21 @@ impl From<&Reference> for Point {
 }
 
 impl Point {
-    fn require_flyable(&self) -> Result<(), String> {
+    fn require_flyable(&self) -> Result<(), ParameterError> {
         for (asked, (most, unit)) in self.path_W.iter().zip(ASKED_MAX) {
             let length = asked.norm();
-            if length.is_nan() || length > most {
-                return Err(format!("{length:.4e} where at most {most:e} {unit}"));
-            }
+            refuse(length.is_nan() || length > most, "", || {
+                format!("it asks for {length:.4e} where at most {most:e} {unit}")
+            })?;
         }
         let rate_rad_s = self.yaw_rate_rad_s;
         let holds = self.path_W.iter().all(|asked| asked.iter().all(|number| number.is_finite()));
-        if holds && rate_rad_s.abs() <= YAW_RATE_MAX_RAD_S {
-            return Ok(());
-        }
-        Err(format!(
-            "a yaw rate of {rate_rad_s:.4e} rad/s, or derivatives that are no numbers; expected at most \
-             {YAW_RATE_MAX_RAD_S} rad/s"
-        ))
+        refuse(!holds || rate_rad_s.is_nan() || rate_rad_s.abs() > YAW_RATE_MAX_RAD_S, "", || {
+            format!(
+                "it asks for a yaw rate of {rate_rad_s:.4e} rad/s, or derivatives that are no numbers; expected at most \
+                 {YAW_RATE_MAX_RAD_S} rad/s"
+            )
+        })
     }
 }
 

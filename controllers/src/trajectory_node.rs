@@ -1,5 +1,4 @@
 //! The trajectory node: publishes the points of a trajectory, with the derivatives that controllers feed forward.
-#![allow(non_snake_case, reason = "a trailing _W names the frame a vector is written in")]
 
 use crate::trajectory::{Start, Trajectory};
 use bus::OutputPorts;
@@ -42,6 +41,17 @@ pub struct Outputs {
 }
 
 /// The component `trajectory`.
+///
+/// ```
+/// use controllers::trajectory_node::TrajectoryNode;
+/// use serde_json::json;
+///
+/// let circle = json!({ "kind": "circle", "radius_m": 2.0, "speed_m_s": 2.0, "laps": 2, "ramp_s": 2.0 });
+/// let parameters = json!({ "initial_position_m": [0.0, 0.0, 1.0], "segments": [circle] });
+/// let mut trajectory = bus::Harness::<TrajectoryNode>::from_json(&parameters).unwrap();
+/// let reference = trajectory.step(()).unwrap().reference;
+/// assert_eq!((reference.position.z, reference.velocity.x), (1.0, 0.0), "it starts from rest");
+/// ```
 #[derive(Debug)]
 pub struct TrajectoryNode(Trajectory);
 

@@ -6,8 +6,6 @@
 //! along its y. So θ = atan(a_x / g), positive for nose down, and φ = −atan(a_y·cos θ / g).
 //! The integral and a_ff are the guidance's; a law without guidance has none, as the thesis's.
 
-#![allow(non_snake_case, reason = "a trailing _W or _B names the frame a vector is written in")]
-
 use crate::airframe::HoverModel;
 use crate::allocation::RotorWrench;
 use crate::cascade::{CascadeLaw, CascadeState};
@@ -197,6 +195,19 @@ fn at_speed(cascade: CascadeState, velocity_m_s: &[f64; 2], measured: &HoverMoti
 }
 
 /// The controller `velocity`: a reference's velocity, or a constant one.
+///
+/// ```
+/// use bus::messages::StateEstimate;
+/// use controllers::{controller::Controller, law_inputs::VelocityInputs, velocity::VelocityLaw};
+///
+/// let vehicle = concat!(env!("CARGO_MANIFEST_DIR"), "/../vehicles/hummingbird.toml");
+/// let parameters = serde_json::json!({ "vehicle": vehicle, "altitude_m": 1.0, "velocity_m_s": [1.0, 0.0] });
+/// let mut velocity = bus::Harness::<Controller<VelocityLaw>>::from_json(&parameters).unwrap();
+/// let estimate = StateEstimate { position: [0.0, 0.0, 1.0].into(), ..Default::default() };
+/// let inputs = || VelocityInputs { estimate: &estimate, attitude: None, reference: None };
+/// let status = (0..50).map(|_| velocity.step(inputs()).unwrap().status.unwrap()).last().unwrap();
+/// assert!(status.attitude_set_point[1] > 0.0, "rad: it pitches nose down to fly ahead: {status:?}");
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct VelocityLaw {
     /// The loops.

@@ -74,6 +74,19 @@ pub struct Shared {
 }
 
 /// The law.
+///
+/// ```
+/// use bus::messages::{AttitudeEstimate, WallEstimate};
+/// use controllers::{controller::Controller, law_inputs::WallInputs, wall_follow::WallFollowLaw};
+///
+/// let vehicle = concat!(env!("CARGO_MANIFEST_DIR"), "/../vehicles/hummingbird.toml");
+/// let parameters = serde_json::json!({ "vehicle": vehicle, "altitude_m": 1.0, "mode": "constant" });
+/// let mut law = bus::Harness::<Controller<WallFollowLaw>>::from_json(&parameters).unwrap();
+/// let walls = WallEstimate { distance: [5.0; 4], in_sight: [1; 4], height: 1.0, ..Default::default() };
+/// let inputs = WallInputs { walls: &walls, attitude: &AttitudeEstimate::default() };
+/// let status = law.step(inputs).unwrap().status.unwrap();
+/// assert!(status.state == 1 && status.velocity_set_point[0] > 0.0, "m/s to the first wall: {status:?}");
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct WallFollowLaw {
     /// Gains of the guidance.

@@ -51,6 +51,18 @@ gains! {
 }
 
 /// The law.
+///
+/// ```
+/// use bus::messages::{AttitudeEstimate, WallEstimate};
+/// use controllers::{controller::Controller, law_inputs::WallInputs, wall_stop::{HOLDING, WallStopLaw}};
+///
+/// let vehicle = concat!(env!("CARGO_MANIFEST_DIR"), "/../vehicles/hummingbird.toml");
+/// let parameters = serde_json::json!({ "vehicle": vehicle, "altitude_m": 1.0 });
+/// let mut law = bus::Harness::<Controller<WallStopLaw>>::from_json(&parameters).unwrap();
+/// let walls = WallEstimate { distance: [3.0; 4], in_sight: [1; 4], height: 1.0, ..Default::default() };
+/// let inputs = WallInputs { walls: &walls, attitude: &AttitudeEstimate::default() };
+/// assert_eq!(law.step(inputs).unwrap().status.unwrap().state, HOLDING, "it rests 3 m before the wall");
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct WallStopLaw {
     /// Gains of the guidance.

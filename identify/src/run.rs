@@ -309,7 +309,7 @@ fn accepted_effects(
         alike.dedup_by_key(|kind| kind.name);
         let experiment = alike.first().map(|other| {
             let own = selection.accepted[own[0]].kind;
-            own.told_from(other).unwrap_or(OTHER_FLIGHTS).to_owned()
+            own.experiment_against(other).unwrap_or(OTHER_FLIGHTS).to_owned()
         });
         let held_out = BeforeAfter {
             before: size(problem, without.validation_cost()),

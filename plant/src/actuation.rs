@@ -1,8 +1,4 @@
 //! What acts on an airframe over a tick.
-#![allow(
-    non_snake_case,
-    reason = "a trailing _W names the frame a vector is written in; units stand last: _V, _A"
-)]
 
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};

@@ -20,7 +20,6 @@
 //! assert_eq!(actuation, effects.actuation);
 //! # Ok::<(), vehicles::VehicleError>(())
 //! ```
-#![allow(non_snake_case, reason = "a trailing _B names the frame a vector is written in, N the newton")]
 
 use crate::actuation::{Actuation, Battery};
 use crate::airframe_state::{AirframeState, DelayLine, EffectState};
@@ -32,6 +31,17 @@ use nalgebra::Vector3;
 use vehicles::{EffectEntry, Vehicle, VehicleError};
 
 /// A vehicle as the backends fly it: immutable.
+///
+/// ```
+/// use plant::Airframe;
+/// use plant::effects::find;
+///
+/// let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../vehicles/hummingbird.toml");
+/// let vehicle = vehicles::Vehicle::load(path.as_ref()).unwrap();
+/// let heavier = find("mass-error").unwrap().nominal();
+/// let airframe = Airframe::with_effects(vehicle.clone(), vec![heavier]);
+/// assert!(airframe.vehicle().mass_kg != vehicle.mass_kg, "the vehicle as it flies, not as it is declared");
+/// ```
 #[derive(Debug, Clone)]
 pub struct Airframe {
     vehicle: Vehicle,

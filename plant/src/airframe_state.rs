@@ -57,22 +57,12 @@ pub(crate) struct DelayLine {
 
 impl DelayLine {
     /// A line that holds commands for up to `ticks`.
-    #[allow(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "a delay is bounded and not negative"
-    )]
     pub(crate) fn new(ticks: f64) -> Self {
         Self { ring: vec![[0.0; 4]; ticks.ceil() as usize + 2], newest: 0, is_empty: true }
     }
 
     /// Takes the commands of this tick and gives those of `ticks` before, linear between two ticks. The first
     /// commands count as held since ever. More ticks than the line was made for count as as many as it holds.
-    #[allow(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "a delay is bounded and not negative"
-    )]
     pub(crate) fn pass(&mut self, commands: &[f64; 4], ticks: f64) -> [f64; 4] {
         if self.is_empty {
             self.ring.fill(*commands);

@@ -1,5 +1,4 @@
 //! What a vehicle must be to fly at all, looked at before a run: `check` refuses what cannot, and tells what is odd.
-#![allow(non_snake_case, reason = "units stand last in names, and the newton is N")]
 
 use crate::airframe::Airframe;
 use crate::backend::Backend;
@@ -39,7 +38,7 @@ pub(crate) fn check_steps(
     run: &NodeContext<'_>,
 ) -> Result<(), ParameterError> {
     let product = fastest_pole_rad_s(&airframe.vehicle().motor) * span_s;
-    let told = |limit: f64, beyond: &str| {
+    let message = |limit: f64, beyond: &str| {
         format!(
             "`vehicle` \"{}\" has motors whose fastest pole, {:.4} rad/s, times a step of {span_s} s is {product:.4}, \
              expected below {limit}; raise `substeps` or run.rate_hz, or correct `[motor]` of the file: beyond it the \
@@ -48,9 +47,9 @@ pub(crate) fn check_steps(
             product / span_s
         )
     };
-    refuse(product > POLE_STEPS_MAX, "vehicle", || told(POLE_STEPS_MAX, "integration diverges"))?;
+    refuse(product > POLE_STEPS_MAX, "vehicle", || message(POLE_STEPS_MAX, "integration diverges"))?;
     if product > POLE_STEPS_ODD {
-        run.warn("vehicle", told(POLE_STEPS_ODD, "motion is coarse"));
+        run.warn("vehicle", message(POLE_STEPS_ODD, "motion is coarse"));
     }
     Ok(())
 }
@@ -82,7 +81,7 @@ pub(crate) fn check_lift(
     }
     let ratio = most_N / weight_N;
     let on_earth = most_N / (vehicle.mass_kg * GRAVITY_M_S2);
-    let told = |what: String| {
+    let message = |what: String| {
         format!(
             "`vehicle` \"{}\" {what}: its rotors lift {least_N:.4} N to {most_N:.4} N and it weighs {weight_N:.4} N, a \
              thrust to weight of {ratio:.4}; look at {}",
@@ -90,20 +89,22 @@ pub(crate) fn check_lift(
             places(vehicle, path)
         )
     };
-    refuse(ratio < 1.0, "vehicle", || told("cannot fly, expected a thrust to weight of 1 or more".into()))?;
+    refuse(ratio < 1.0, "vehicle", || {
+        message("cannot fly, expected a thrust to weight of 1 or more".into())
+    })?;
     refuse(on_earth > LIFT_MAX, "vehicle", || {
-        told(format!("is no vehicle that flies, expected a thrust to weight on Earth below {LIFT_MAX}"))
+        message(format!("is no vehicle that flies, expected a thrust to weight on Earth below {LIFT_MAX}"))
     })?;
     refuse(least_N > weight_N, "command.speed_at_min", || {
-        told("cannot come down, expected less lift than weight at `command.speed_at_min`".into())
+        message("cannot come down, expected less lift than weight at `command.speed_at_min`".into())
     })?;
     if ratio < LIFT_ODD {
         let odd = format!("can hardly climb or tilt, below a thrust to weight of {LIFT_ODD}");
-        run.warn("vehicle", told(odd));
+        run.warn("vehicle", message(odd));
     } else if on_earth > LIFT_HIGH {
         let odd =
             format!("is stronger than any that flies, above a thrust to weight on Earth of {LIFT_HIGH}");
-        run.warn("vehicle", told(odd));
+        run.warn("vehicle", message(odd));
     }
     Ok(())
 }
@@ -205,19 +206,19 @@ mod tests {
         // On an asteroid the rotors are as strong as on Earth.
         let off = |it: &mut Vehicle| it.command.speed_at_min_rad_s = 0.0;
         assert_eq!(lift(|it| (off(it), it.gravity_m_s2 = 0.005).1), (Ok(()), vec![]));
-        let words = lift(|it| it.mass_kg = 480.0).0.unwrap_err().to_string();
+        let message = lift(|it| it.mass_kg = 480.0).0.unwrap_err().to_string();
         assert!(
-            words.contains("thrust to weight of 0.0048") && words.contains("weighs 4708.8000 N"),
-            "{words}"
+            message.contains("thrust to weight of 0.0048") && message.contains("weighs 4708.8000 N"),
+            "{message}"
         );
-        assert!(words.contains("hummingbird.toml:21: `body.mass`"), "{words}");
+        assert!(message.contains("hummingbird.toml:21: `body.mass`"), "{message}");
         // 4.785 as declared.
         let (outcome, warnings) = lift(|it| it.mass_kg *= 4.5);
         assert!(outcome.is_ok() && warnings[0].message.contains("can hardly climb"), "{warnings:?}");
         let (outcome, warnings) = lift(|it| it.mass_kg /= 20.0);
         assert!(outcome.is_err() && warnings.is_empty(), "at 1075 rpm it still rises");
-        let words = outcome.unwrap_err().to_string();
-        assert!(words.contains("cannot come down"), "{words}");
+        let message = outcome.unwrap_err().to_string();
+        assert!(message.contains("cannot come down"), "{message}");
         let slow = |it: &mut Vehicle| it.command.speed_at_min_rad_s = 0.0;
         let strong = |factor: f64| lift(|it| (slow(it), it.mass_kg /= factor).1);
         assert!(strong(20.0).1[0].message.contains("stronger than any"));
@@ -234,7 +235,7 @@ mod tests {
         assert_eq!(steps(1e-3), (Ok(()), vec![]));
         assert!(steps(0.1).1[0].message.contains("raise `substeps`"));
         let words = steps(0.2).0.unwrap_err().to_string();
-        assert!(words.contains("15.0756 rad/s") && words.contains("expected below 2.5"), "{words}");
+        assert!(message.contains("15.0756 rad/s") && message.contains("expected below 2.5"), "{message}");
     }
 
     #[test]
@@ -262,6 +263,6 @@ mod tests {
         };
         assert_eq!(rehearsed(|_| {}), Ok(()));
         let words = rehearsed(|it| it.thrust_coefficient = 1e306).unwrap_err().to_string();
-        assert!(words.contains("that is no number after"), "{words}");
+        assert!(message.contains("that is no number after"), "{message}");
     }
 }

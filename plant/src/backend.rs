@@ -1,5 +1,4 @@
 //! What a plant can do, whichever physics moves it.
-#![allow(non_snake_case, reason = "a trailing _W names the frame a vector is written in, N the newton")]
 
 use crate::actuation::Battery;
 use crate::newton_euler::Accelerations;

@@ -11,6 +11,22 @@ use crate::state::{RigidBody, State};
 const NAME: &str = "newton-euler";
 
 /// A vehicle in free flight: the model, the state that it moves, and the state of its effects.
+///
+/// ```
+/// use nalgebra::Vector3;
+/// use plant::{Airframe, Backend, FreeFlight, NewtonEuler, RigidBody};
+///
+/// let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../vehicles/hummingbird.toml");
+/// let vehicle = vehicles::Vehicle::load(path.as_ref()).unwrap();
+/// let hover = vehicle.hover_command();
+/// let airframe = Airframe::new(vehicle);
+/// let effects = airframe.initial_state(1, "plant", 1e-3);
+/// let body = RigidBody::level_at(Vector3::new(0.0, 0.0, 1.0));
+/// let mut flight = FreeFlight::new(NewtonEuler::flying(airframe, 1), body, effects);
+/// flight.settle_rotors(&[hover; 4]);
+/// flight.step(&[hover; 4], 1e-3, &[]);
+/// assert!((flight.state().body.position_W_m.z - 1.0).abs() < 1e-9);
+/// ```
 #[derive(Debug, Clone)]
 pub struct FreeFlight {
     model: NewtonEuler,

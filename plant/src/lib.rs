@@ -34,6 +34,10 @@
 //! # Ok::<(), vehicles::VehicleError>(())
 //! ```
 #![forbid(unsafe_code)]
+#![allow(
+    non_snake_case,
+    reason = "a trailing _W or _B names the frame that a vector is written in, _WB a rotation between the two, _N or _V a unit"
+)]
 
 mod actuation;
 mod airframe;

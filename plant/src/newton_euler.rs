@@ -4,7 +4,6 @@
 //! Euler: J w' = tau - w x J w, in the body frame (thesis eq. 3.17).
 //! Attitude: q' = 1/2 q (0, w), a quaternion, where thesis eq. 3.18 is singular at a pitch of 90 degrees.
 //! All of it and the motors are integrated together by the classic fourth-order Runge-Kutta scheme.
-#![allow(non_snake_case, reason = "a trailing _W or _B names the frame a vector is written in")]
 
 use nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};
 use vehicles::Vehicle;

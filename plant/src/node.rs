@@ -3,7 +3,6 @@
 //! At tick k it moves the state from k − 1 to k under the command stamped k − 1, then publishes it. With a
 //! `measured` input it is set to the measured state at the start of each window, after publishing: what it
 //! publishes at that tick is the end of the window before.
-#![allow(non_snake_case, reason = "a trailing _W names the frame a vector is written in")]
 
 use crate::airworthy;
 use crate::backend::Backend;
@@ -31,6 +30,19 @@ pub struct Inputs<'a> {
 }
 
 /// The plant: its vehicle, and what moves it.
+///
+/// ```
+/// use bus::messages::MotorCommand;
+/// use plant::node::{Inputs, Plant};
+///
+/// let vehicle = concat!(env!("CARGO_MANIFEST_DIR"), "/../vehicles/hummingbird.toml");
+/// let parameters = serde_json::json!({ "vehicle": vehicle, "initial_position_m": [0.0, 0.0, 1.0] });
+/// let mut plant = bus::Harness::<Plant>::from_json(&parameters).unwrap();
+/// let command = MotorCommand::default();
+/// let inputs = || Inputs { command: &command, measured: None, traffic: None };
+/// let state = (0..=100).map(|_| plant.step(inputs()).unwrap().state).last().unwrap();
+/// assert!(state.position.z < 1.0 && state.velocity.z < 0.0, "with its rotors off it falls: {state:?}");
+/// ```
 pub struct Plant {
     vehicle: Vehicle,
     substeps: u32,
@@ -88,9 +100,9 @@ impl Plant {
     fn fly(&mut self, context: &StepContext<'_>, inputs: &Inputs<'_>) -> Result<(), StepError> {
         let number = u64::from(context.tick());
         let before_ns = context.time_ns() / number * (number - 1);
-        let own_W_m = self.backend.state().body.position_W_m;
+        let position_W_m = self.backend.state().body.position_W_m;
         let seen =
-            inputs.traffic.map(|traffic| self.others.seen(traffic, &own_W_m, before_ns)).transpose()?;
+            inputs.traffic.map(|traffic| self.others.seen(traffic, &position_W_m, before_ns)).transpose()?;
         self.backend.step(&inputs.command.command, self.dt_s, seen.unwrap_or_default());
         Ok(())
     }

@@ -1,5 +1,4 @@
-//! Which vehicles of the traffic are others: all but the one that is where this plant's own vehicle is.
-#![allow(non_snake_case, reason = "a trailing _W names the frame a vector is written in")]
+//! Which vehicles of the traffic are others: all but the one that is where this plant's vehicle is.
 
 use crate::backend::{Neighbour, TRAFFIC_MAX};
 use bus::messages::{Time, Traffic};
@@ -9,16 +8,28 @@ use nalgebra::Vector3;
 #[derive(Debug, Default)]
 pub(crate) struct Others {
     /// This vehicle's place in the traffic, known from the first sample on.
-    own: Option<usize>,
+    self_index: Option<usize>,
     neighbours: Vec<Neighbour>,
+}
+
+/// Traffic in which this vehicle cannot be told from the others.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub(crate) enum OthersError {
+    #[error(
+        "none of the {count} vehicles of the first traffic is at {position_W_m:?}, where this one is; the traffic must \
+         read this plant's state, without a delay and at every tick"
+    )]
+    Absent { count: usize, position_W_m: Vector3<f64> },
+    #[error("the vehicles {first} and {second} of the traffic start at one place")]
+    OnePlace { first: usize, second: usize },
 }
 
 impl Others {
     pub(crate) fn new() -> Self {
-        Self { own: None, neighbours: Vec::with_capacity(TRAFFIC_MAX) }
+        Self { self_index: None, neighbours: Vec::with_capacity(TRAFFIC_MAX) }
     }
 
-    /// The other vehicles at `now_ns`, when this one is at `own_W_m`. A sample that is older is carried on at its
+    /// The other vehicles at `now_ns`, when this one is at `position_W_m`. A sample that is older is carried on at its
     /// velocities.
     ///
     /// # Errors
@@ -26,40 +37,32 @@ impl Others {
     pub(crate) fn seen(
         &mut self,
         traffic: &Traffic,
-        own_W_m: &Vector3<f64>,
+        position_W_m: &Vector3<f64>,
         now_ns: u64,
-    ) -> Result<&[Neighbour], String> {
+    ) -> Result<&[Neighbour], OthersError> {
         let count = (traffic.count as usize).min(TRAFFIC_MAX);
-        let own = match self.own {
-            Some(own) => own,
-            None => *self.own.insert(place(traffic, count, own_W_m)?),
+        let index = match self.self_index {
+            Some(index) => index,
+            None => *self.self_index.insert(place(traffic, count, position_W_m)?),
         };
         let age_s = now_ns.saturating_sub(ns(traffic.stamp)) as f64 * 1e-9;
         self.neighbours.clear();
         self.neighbours.extend(
-            (0..count).filter(|number| *number != own).map(|number| neighbour(traffic, number, age_s)),
+            (0..count).filter(|number| *number != index).map(|number| neighbour(traffic, number, age_s)),
         );
         Ok(&self.neighbours)
     }
 }
 
 /// The one that is exactly where this vehicle is: the traffic copies what the plants publish.
-fn place(traffic: &Traffic, count: usize, own_W_m: &Vector3<f64>) -> Result<usize, String> {
-    let is_own = |number: &usize| Vector3::from(<[f64; 3]>::from(traffic.position[*number])) == *own_W_m;
-    let mut own = (0..count).filter(is_own);
-    let number = own.next().ok_or_else(|| {
-        format!(
-            "none of the {count} vehicles of the first traffic is at {own_W_m:?}, where this one is; the \
-             traffic must read this plant's state, without a delay and at every tick"
-        )
-    })?;
-    match own.next() {
-        None => Ok(number),
-        Some(second) => Err(format!("the vehicles {number} and {second} of the traffic start at one place")),
-    }
+fn place(traffic: &Traffic, count: usize, position_W_m: &Vector3<f64>) -> Result<usize, OthersError> {
+    let is_here =
+        |number: &usize| Vector3::from(<[f64; 3]>::from(traffic.position[*number])) == *position_W_m;
+    let mut here = (0..count).filter(is_here);
+    let first = here.next().ok_or(OthersError::Absent { count, position_W_m: *position_W_m })?;
+    here.next().map_or(Ok(first), |second| Err(OthersError::OnePlace { first, second }))
 }
 
-#[allow(clippy::cast_possible_truncation, reason = "at most TRAFFIC_MAX")]
 fn neighbour(traffic: &Traffic, number: usize, age_s: f64) -> Neighbour {
     let vector = |v| Vector3::from(<[f64; 3]>::from(v));
     let velocity_W_m_s = vector(traffic.velocity[number]);
@@ -67,7 +70,6 @@ fn neighbour(traffic: &Traffic, number: usize, age_s: f64) -> Neighbour {
     Neighbour { number: number as u32, position_W_m, velocity_W_m_s }
 }
 
-#[allow(clippy::cast_sign_loss, reason = "simulation time begins at 0")]
 fn ns(time: Time) -> u64 {
     time.sec as u64 * 1_000_000_000 + u64::from(time.nanosec)
 }
@@ -89,8 +91,8 @@ mod tests {
     fn the_vehicle_itself_is_left_out_and_the_others_keep_their_numbers() {
         let mut others = Others::new();
         let traffic = traffic(&[[0.0; 3], [1.0, 2.0, 3.0], [4.0; 3]]);
-        let own_W_m = Vector3::new(1.0, 2.0, 3.0);
-        let seen = others.seen(&traffic, &own_W_m, 0).unwrap();
+        let position_W_m = Vector3::new(1.0, 2.0, 3.0);
+        let seen = others.seen(&traffic, &position_W_m, 0).unwrap();
         assert_eq!(seen.iter().map(|neighbour| neighbour.number).collect::<Vec<_>>(), [0, 2]);
         // Known by then: it need not be found again.
         let seen = others.seen(&traffic, &Vector3::zeros(), 500_000_000).unwrap();

@@ -1,5 +1,4 @@
 //! What manifests say of a plant, and the backend that follows.
-#![allow(non_snake_case, reason = "a trailing _W names the frame a vector is written in")]
 
 use crate::airframe::Airframe;
 use crate::airframe_state::AirframeState;
@@ -67,11 +66,6 @@ fn one() -> u32 {
 }
 
 /// The ticks between two settings to what is measured.
-#[allow(
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    reason = "checked to be positive and short"
-)]
 fn window_ticks(window_s: f64, tick_s: f64) -> Result<u32, ParameterError> {
     let ticks = (window_s / tick_s).round();
     let is_whole = (window_s / tick_s - ticks).abs() < 1e-6 && (1.0..=f64::from(u32::MAX)).contains(&ticks);

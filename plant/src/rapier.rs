@@ -12,7 +12,6 @@
 //! | [`hull`] | how much room a vehicle takes |
 //! | `contacts` | when contacts begin and end |
 //! | `rig` | test rigs as joints |
-#![allow(non_snake_case, reason = "a trailing _W or _B names the frame a vector is written in")]
 
 mod body;
 mod contacts;
@@ -44,6 +43,21 @@ const ON_THE_GROUND_M: f64 = 1e-3;
 const AT_REST_M_S: f64 = 0.01;
 
 /// A vehicle in a scene.
+///
+/// ```
+/// use nalgebra::Vector3;
+/// use plant::{Airframe, Backend, NewtonEuler, Rapier, RigidBody};
+///
+/// let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../vehicles/hummingbird.toml");
+/// let vehicle = vehicles::Vehicle::load(path.as_ref()).unwrap();
+/// let airframe = Airframe::new(vehicle);
+/// let effects = airframe.initial_state(1, "plant", 1e-3);
+/// let scene = scenes::Scene::default();
+/// let body = RigidBody::level_at(Vector3::zeros());
+/// let mut flight = Rapier::new(NewtonEuler::flying(airframe, 1), effects, &scene, &body, 1.0);
+/// (0..10).for_each(|_| flight.step(&[0.0; 4], 1e-3, &[]));
+/// assert_eq!((flight.contact().object, flight.contact().crashed), (1, false), "it stands on the ground");
+/// ```
 pub struct Rapier {
     model: NewtonEuler,
     hull: Hull,

@@ -1,5 +1,4 @@
 //! Turning vectors by quaternions that are not quite of length 1, as those inside of an integration step.
-#![allow(non_snake_case, reason = "a trailing _W or _B names the frame a vector is written in")]
 
 use nalgebra::{Quaternion, Vector3};
 

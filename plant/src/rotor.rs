@@ -6,7 +6,6 @@
 //! momentum relative to the body, Euler's equation for body and rotors together gives the body two more torques:
 //! -h' about z (spin-up reaction, which the thesis leaves out) and -w_B x (h z) = h (-q, p, 0), which is thesis
 //! eq. 3.11.
-#![allow(non_snake_case, reason = "a trailing _B names the frame a vector is written in, N the newton")]
 
 use nalgebra::Vector3;
 use std::ops::AddAssign;

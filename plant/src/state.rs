@@ -1,5 +1,4 @@
 //! The state that the integrator moves: one rigid body and four rotors, in SI units.
-#![allow(non_snake_case, reason = "a trailing _W or _B names the frame a vector is written in")]
 
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};

@@ -10,6 +10,15 @@ use diagnostics::ParameterError;
 use serde::Deserialize;
 
 /// Gathers the states of the plants of a run.
+///
+/// ```
+/// use bus::context::NodeContext;
+/// use plant::traffic::Traffic;
+///
+/// let context = NodeContext::new("traffic", &["one", "two"]);
+/// let parameters = serde_json::from_str("{}").unwrap();
+/// assert!(bus::Harness::<Traffic>::in_context(parameters, &context).is_ok(), "up to 16 vehicles");
+/// ```
 #[derive(Debug)]
 pub struct Traffic;
 

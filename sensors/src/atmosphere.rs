@@ -2,7 +2,6 @@
 //!
 //! Below 11 km the temperature falls linearly, and hydrostatic balance of an ideal gas gives
 //! p = p₀ (1 − L h / T₀)^(g M / (R L)) (ISO 2533:1975, "Standard Atmosphere", §2.7).
-#![allow(non_snake_case, reason = "a trailing _Pa and _K name units")]
 
 /// Pressure at sea level, Pa (ISO 2533).
 pub const SEA_LEVEL_PRESSURE_PA: f64 = 101_325.0;
@@ -14,13 +13,11 @@ const LAPSE_K_M: f64 = 6.5e-3;
 const EXPONENT: f64 = 9.806_65 * 0.028_964_4 / (8.314_32 * LAPSE_K_M);
 
 /// The pressure, Pa, `height_m` above where it is `ground_pressure_Pa`; zero above 44 km, where the formula ends.
-#[must_use]
 pub fn pressure_Pa(height_m: f64, ground_pressure_Pa: f64) -> f64 {
     ground_pressure_Pa * libm::pow((1.0 - LAPSE_K_M * height_m / TEMPERATURE_K).max(0.0), EXPONENT)
 }
 
 /// The height, m, above where the pressure is `reference_pressure_Pa`, at which it is `pressure_Pa`.
-#[must_use]
 pub fn height_m(pressure_Pa: f64, reference_pressure_Pa: f64) -> f64 {
     TEMPERATURE_K / LAPSE_K_M * (1.0 - libm::pow(pressure_Pa / reference_pressure_Pa, EXPONENT.recip()))
 }

@@ -4,7 +4,6 @@
 //! noise, in steps of the part's resolution and cut off at its range; the bias walks at random, as weather and
 //! temperature move it. The altitude follows from the reading and a reference pressure. `crate::channel` says
 //! when it measures, how measurements are delayed and lost.
-#![allow(non_snake_case, reason = "a trailing _Pa names the pascal")]
 
 use crate::atmosphere::{SEA_LEVEL_PRESSURE_PA, height_m, pressure_Pa};
 use crate::channel::{Chance, ChannelState, QUEUE, Tick};
@@ -30,6 +29,17 @@ parameters! {
     /// after the other, so that a reading is 16 ms old and 50 a second are possible. Bias walk: the data sheet states
     /// ±1 mbar a year, which is nothing in a flight; 0.2 Pa/√s, 1.5 Pa (13 cm) in a minute, stands for weather and
     /// warming (tuned, no source). The bias starts at zero: an autopilot nulls its altitude before take-off.
+    ///
+    /// ```
+    /// use bus::messages::PlantState;
+    /// use sensors::barometer::BarometerParams;
+    /// use sensors::sensing::{Sensing, TruthInputs};
+    ///
+    /// let mut barometer = bus::Harness::<Sensing<BarometerParams>>::new(BarometerParams::default()).unwrap();
+    /// let state = PlantState { position: [0.0, 0.0, 100.0].into(), ..Default::default() };
+    /// let read = (0..=16).map(|_| barometer.step(TruthInputs { state: &state }).unwrap().barometer).last().unwrap();
+    /// assert!((read.altitude - 100.0).abs() < 1.0, "after its delay of 16 ms it tells the height: {read:?}");
+    /// ```
     #[derive(Copy)]
     pub struct BarometerParams timed { rate_hz: 50.0, delay_ms: 16.0 } {
         /// True pressure at the world's origin, Pa.

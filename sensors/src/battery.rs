@@ -4,7 +4,6 @@
 //! of it: the measured current counted from `initial_charge` on. `crate::channel` says when it measures, how
 //! measurements are delayed and lost; the count goes on through losses. Where the truth is not valid, since the plant
 //! has no model of its battery, nothing is measured and `valid` is 0.
-#![allow(non_snake_case, reason = "trailing _V, _A and _Ah name units")]
 
 use crate::channel::{Chance, ChannelState, QUEUE, Tick};
 use crate::parameters::within;
@@ -22,6 +21,18 @@ parameters! {
     /// Its data sheet (SBOS547): 1.25 mV a count of voltage, 2.5 µV a count of shunt voltage, which is 1.25 mA; 1.1 ms
     /// for each of the two conversions. It states no noise: one count of each, no source. The rate is 10 Hz, tuned, no
     /// source. The capacity is the Hummingbird's (thesis, Table 2.1: 2100 mAh).
+    ///
+    /// ```
+    /// use bus::messages::Battery;
+    /// use sensors::battery::{BatteryInputs, BatteryParams};
+    /// use sensors::sensing::Sensing;
+    ///
+    /// let parameters = BatteryParams { delay_ms: 0.0, ..BatteryParams::default() };
+    /// let mut monitor = bus::Harness::<Sensing<BatteryParams>>::new(parameters).unwrap();
+    /// let battery = Battery { voltage: 11.1, current: 8.0, valid: 1, ..Default::default() };
+    /// let read = monitor.step(BatteryInputs { battery: &battery }).unwrap().measured;
+    /// assert!((read.voltage - 11.1).abs() < 0.01 && (read.current - 8.0).abs() < 0.01, "{read:?}");
+    /// ```
     #[derive(Copy)]
     pub struct BatteryParams timed { rate_hz: 10.0, delay_ms: 2.2 } {
         /// Standard deviation of a voltage, V.

@@ -269,7 +269,6 @@ impl Channel {
 }
 
 /// The place of measurement `number` in the queue.
-#[allow(clippy::cast_possible_truncation, reason = "it is below the length of the queue")]
 fn place(number: u64) -> usize {
     (number % QUEUE as u64) as usize
 }
@@ -279,11 +278,6 @@ fn before(number: u64) -> usize {
     place(number.wrapping_sub(1))
 }
 
-#[allow(
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    reason = "checked to be positive and short"
-)]
 fn nanoseconds(seconds: f64) -> u64 {
     (seconds * 1e9).round() as u64
 }

@@ -1,6 +1,5 @@
 //! The clearance node: how far a vehicle truly is from what stands in the scene. It is no sensor: a judge reads it,
 //! and plots; controllers have no port for it.
-#![allow(non_snake_case, reason = "a trailing _W names the frame a vector is written in")]
 
 use crate::sensing::TruthInputs;
 use bus::component::{Component, Info, StepError};
@@ -63,6 +62,19 @@ pub struct Outputs {
 }
 
 /// The component `clearance`.
+///
+/// ```
+/// use bus::messages::PlantState;
+/// use sensors::clearance::ClearanceJudge;
+/// use sensors::sensing::TruthInputs;
+///
+/// let scene = concat!(env!("CARGO_MANIFEST_DIR"), "/../scenes/room.toml");
+/// let parameters = serde_json::json!({ "scene": scene });
+/// let mut judge = bus::Harness::<ClearanceJudge>::from_json(&parameters).unwrap();
+/// let state = PlantState { position: [0.0, 0.0, 1.0].into(), ..Default::default() };
+/// let clearance = judge.step(TruthInputs { state: &state }).unwrap().clearance;
+/// assert!(clearance.nearest > 0.0 && clearance.nearest <= clearance.wall[0], "{clearance:?}");
+/// ```
 #[derive(Debug)]
 pub struct ClearanceJudge {
     caster: RayCaster,

@@ -19,10 +19,6 @@
 //! *Rates.* The gyroscope gives body rates p, q, r; the angles' own rates follow from them by eq. 3.18,
 //! singular at ±90° of pitch. A unit quaternion is propagated instead, which is the same to first order
 //! in dt and has no singularity; the blend happens in roll and pitch and leaves yaw to the gyroscope.
-#![allow(
-    non_snake_case,
-    reason = "a trailing _W or _B names the frame a vector is written in, _N the newton"
-)]
 
 use crate::imu_model::ImuReading;
 use diagnostics::parameter::{ParameterError, not_negative, positive};
@@ -74,6 +70,21 @@ pub fn tilt_rad(specific_force_B: &Vector3<f64>) -> (f64, f64) {
 }
 
 /// The filter at one sample period: all that does not change during a run.
+///
+/// ```
+/// use nalgebra::Vector3;
+/// use sensors::complementary::{Complementary, ComplementaryParams, ComplementaryState};
+/// use sensors::imu_model::ImuReading;
+///
+/// let filter = Complementary::with_period(ComplementaryParams::default(), 1e-3).unwrap();
+/// let mut state = ComplementaryState::default();
+/// let rolling = ImuReading {
+///     specific_force_B_m_s2: Vector3::new(0.0, 0.0, 9.81),
+///     angular_velocity_B_rad_s: Vector3::new(0.5, 0.0, 0.0),
+/// };
+/// let roll_rad = (0..=100).map(|_| filter.update(&mut state, &rolling).roll_rad).last().unwrap();
+/// assert!((roll_rad - 0.05).abs() < 1e-3, "0.5 rad/s for 0.1 s: {roll_rad} rad");
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Complementary {
     params: ComplementaryParams,

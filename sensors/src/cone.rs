@@ -5,7 +5,6 @@
 //! No direction in a cone of half angle h is further than 0.42 h from a ray, so a wall whose normal lies in the
 //! cone is seen at most 0.09 h² of its distance too far: 0.07 % at 5°. Vehicles are spheres, whose distance to a cone is
 //! known without rays.
-#![allow(non_snake_case, reason = "a trailing _W or _B names the frame a vector is written in")]
 
 use nalgebra::{Rotation3, Unit, UnitQuaternion, Vector3};
 use scenes::RayCaster;
@@ -24,7 +23,6 @@ pub struct Cone {
 
 impl Cone {
     /// The cone of `half_angle_rad` about `axis_B`, which is one of the body's axes or the opposite of one.
-    #[must_use]
     pub fn new(axis_B: Unit<Vector3<f64>>, half_angle_rad: f64) -> Self {
         // The next of the body's axes: square to this one.
         let across_B = Unit::new_unchecked(Vector3::new(axis_B.z, axis_B.x, axis_B.y));
@@ -40,7 +38,6 @@ impl Cone {
 
     /// How far it is from `from_W_m`, with the body at `attitude_WB`, to the nearest thing of the scene in the
     /// cone, at most `reach_m`.
-    #[must_use]
     pub fn scene_distance_m(
         &self,
         scene: &RayCaster,
@@ -56,7 +53,6 @@ impl Cone {
 
     /// How far it is to the nearest point in the cone of a sphere of `radius_m` whose centre is at `centre_B_m`
     /// from the cone's tip; 0 from inside of it.
-    #[must_use]
     pub fn sphere_distance_m(&self, centre_B_m: &Vector3<f64>, radius_m: f64) -> Option<f64> {
         let centre_m = centre_B_m.norm();
         if centre_m <= radius_m {

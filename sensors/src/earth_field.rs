@@ -1,5 +1,4 @@
 //! The earth's magnetic field in the world, whose x axis points to geographic north where magnetometers are used.
-#![allow(non_snake_case, reason = "a trailing _W names the frame a vector is written in, _T the tesla")]
 
 use nalgebra::Vector3;
 
@@ -23,7 +22,6 @@ impl Default for EarthField {
 
 impl EarthField {
     /// The field in the world: x north, y west, z up. An eastern declination turns it clockwise seen from above.
-    #[must_use]
     pub fn vector_W_T(&self) -> Vector3<f64> {
         let (down, level) = libm::sincos(self.inclination_deg.to_radians());
         let (east, north) = libm::sincos(self.declination_deg.to_radians());

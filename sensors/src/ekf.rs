@@ -2,11 +2,11 @@
 
 pub mod filter;
 pub mod history;
-pub mod motion;
-pub mod observation;
+mod motion;
+mod observation;
 pub mod params;
-pub mod start;
-pub mod transition;
+mod start;
+mod transition;
 
 use crate::wire::{attitude, vector, vector_message};
 use bus::component::{Component, Info, StepError};

@@ -4,7 +4,6 @@
 //! clocks and the ionosphere, which move the position slowly: a first-order Gauss–Markov process, stationary from
 //! the first measurement on, d' = e^(−Δt/τ) d + σ √(1 − e^(−2Δt/τ)) n (Gelb, "Applied Optimal Estimation", MIT
 //! Press 1974, §3.6). `crate::channel` says when it measures, how measurements are delayed and lost.
-#![allow(non_snake_case, reason = "a trailing _W names the frame a vector is written in")]
 
 use crate::channel::{Chance, ChannelState, QUEUE, Tick};
 use crate::noise::standard_normal;
@@ -25,6 +24,18 @@ parameters! {
     /// It has no vertical figures: 1.5 times the horizontal ones, the usual ratio of the dilutions of precision. Nearly
     /// all of the position's error is drift. Its time constant (300 s), the white part (0.3 m) and the delay (80 ms)
     /// are tuned, no source.
+    ///
+    /// ```
+    /// use bus::messages::PlantState;
+    /// use sensors::gps::GpsParams;
+    /// use sensors::sensing::{Sensing, TruthInputs};
+    ///
+    /// let parameters = GpsParams { delay_ms: 0.0, ..GpsParams::default() };
+    /// let mut gps = bus::Harness::<Sensing<GpsParams>>::new(parameters).unwrap();
+    /// let state = PlantState { velocity: [3.0, 0.0, 0.0].into(), ..Default::default() };
+    /// let fix = gps.step(TruthInputs { state: &state }).unwrap().gps;
+    /// assert!(fix.valid == 1 && (fix.velocity.x - 3.0).abs() < 0.5, "{fix:?}");
+    /// ```
     #[derive(Copy)]
     pub struct GpsParams timed { rate_hz: 10.0, delay_ms: 80.0 } {
         /// Standard deviation of the position's white noise along each axis, m.

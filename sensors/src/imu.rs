@@ -2,7 +2,6 @@
 //!
 //! It reads at each of its periods. `crate::channel` says how readings are delayed and lost; a lost one repeats the
 //! one before.
-#![allow(non_snake_case, reason = "a trailing _B names the frame a vector is written in")]
 
 use crate::channel::{Channel, ChannelState, QUEUE};
 use crate::imu_model::{ImuModel, ImuModelState, ImuParams, ImuReading};
@@ -73,6 +72,18 @@ pub struct Outputs {
 }
 
 /// An inertial measurement unit.
+///
+/// ```
+/// use bus::messages::PlantState;
+/// use sensors::imu::ImuSensor;
+/// use sensors::imu_model::ImuParams;
+/// use sensors::sensing::TruthInputs;
+///
+/// let mut imu = bus::Harness::<ImuSensor>::new(ImuParams::default()).unwrap();
+/// let at_rest = PlantState { specific_force: [0.0, 0.0, 9.81].into(), ..Default::default() };
+/// let reading = imu.step(TruthInputs { state: &at_rest }).unwrap().imu;
+/// assert!((reading.specific_force.z - 9.81).abs() < 1.0, "m/s^2 in body axes: {reading:?}");
+/// ```
 #[derive(Debug)]
 pub struct ImuSensor {
     model: ImuModel,

@@ -2,10 +2,6 @@
 //!
 //! Reading = truth + bias + white noise, cut off at the range of the part; see [`crate::noise`]. The
 //! axes are those of the body (x forward, y left, z up) and the part sits at the centre of mass.
-#![allow(
-    non_snake_case,
-    reason = "a trailing _W or _B names the frame a vector is written in, _N the newton"
-)]
 
 use crate::channel::Timing;
 use crate::noise::{BiasWalk, WhiteNoise};
@@ -90,6 +86,21 @@ impl From<&Imu> for ImuReading {
 }
 
 /// The IMU at one sample rate: all that does not change during a run.
+///
+/// ```
+/// use nalgebra::Vector3;
+/// use sensors::imu_model::{ImuModel, ImuParams, ImuReading};
+///
+/// let model = ImuModel::new(ImuParams::perfect(), 1000.0).unwrap();
+/// let mut state = model.initial_state(1, "imu");
+/// let truth = ImuReading {
+///     specific_force_B_m_s2: Vector3::new(0.0, 0.0, 9.81),
+///     angular_velocity_B_rad_s: Vector3::new(100.0, 0.0, 0.0),
+/// };
+/// let reading = model.read(&mut state, &truth);
+/// assert_eq!(reading.specific_force_B_m_s2, truth.specific_force_B_m_s2);
+/// assert!((reading.angular_velocity_B_rad_s.x - 1000.0_f64.to_radians()).abs() < 1e-9, "cut off at its range");
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ImuModel {
     params: ImuParams,

@@ -17,6 +17,10 @@
 //! - `steps`: what is left of a value at a resolution; `wire`: the vectors of messages as those of nalgebra.
 //! - `testing`: what the tests of sensors share.
 #![forbid(unsafe_code)]
+#![allow(
+    non_snake_case,
+    reason = "a trailing _W or _B names the frame that a vector is written in, _WB a rotation between the two, _T or _Pa a unit"
+)]
 
 // First: modules behind it see its macro without importing it.
 #[macro_use]

@@ -2,7 +2,6 @@
 //!
 //! Reading = soft-iron scale · field in body axes + hard iron + white noise, in steps of the part's resolution and
 //! cut off at its range. `crate::channel` says when it measures, how measurements are delayed and lost.
-#![allow(non_snake_case, reason = "a trailing _W or _B names the frame a vector is written in, _T the tesla")]
 
 use crate::channel::{ChannelState, QUEUE, Tick};
 use crate::earth_field::EarthField;
@@ -23,6 +22,18 @@ parameters! {
     ///
     /// Its data sheet (900405): noise floor 2 mG, 1090 counts per gauss in its default range of ±1.3 gauss, up to
     /// 160 Hz in single measurements of 6 ms each. The default field is that of [`EarthField`].
+    ///
+    /// ```
+    /// use bus::messages::PlantState;
+    /// use sensors::magnetometer::MagnetometerParams;
+    /// use sensors::sensing::{Sensing, TruthInputs};
+    ///
+    /// let parameters = MagnetometerParams { delay_ms: 0.0, noise_T: 0.0, ..MagnetometerParams::default() };
+    /// let mut magnetometer = bus::Harness::<Sensing<MagnetometerParams>>::new(parameters).unwrap();
+    /// let level = PlantState::default();
+    /// let field = magnetometer.step(TruthInputs { state: &level }).unwrap().magnetometer.field;
+    /// assert!(field.x > 0.0 && field.z < 0.0, "in Europe it points north and down: {field:?}");
+    /// ```
     #[derive(Copy)]
     pub struct MagnetometerParams timed { rate_hz: 100.0, delay_ms: 6.0 } {
         /// Magnetic flux density of the earth's field, T.

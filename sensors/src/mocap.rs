@@ -2,7 +2,6 @@
 //!
 //! Reading = truth + bias + white noise, the attitude's as a rotation in body axes. `crate::channel` says when
 //! it measures, how measurements are delayed and lost.
-#![allow(non_snake_case, reason = "a trailing _W or _B names the frame a vector is written in")]
 
 use crate::channel::{ChannelState, QUEUE, Tick};
 use crate::noise::standard_normal;
@@ -23,6 +22,18 @@ parameters! {
     /// markers 0.3 m apart is about 0.1°. *Rate and delay*: such systems stream at 100 Hz and more; 10 ms are one
     /// frame of exposure and solving, as the network adds little (tuned, no source). Losses are off: they depend on
     /// the room.
+    ///
+    /// ```
+    /// use bus::messages::PlantState;
+    /// use sensors::mocap::MocapParams;
+    /// use sensors::sensing::{Sensing, TruthInputs};
+    ///
+    /// let parameters = MocapParams { delay_ms: 0.0, ..MocapParams::default() };
+    /// let mut cameras = bus::Harness::<Sensing<MocapParams>>::new(parameters).unwrap();
+    /// let state = PlantState { position: [1.0, 2.0, 3.0].into(), ..Default::default() };
+    /// let seen = cameras.step(TruthInputs { state: &state }).unwrap().mocap;
+    /// assert!((seen.position.y - 2.0).abs() < 0.01, "{seen:?}");
+    /// ```
     #[derive(Copy)]
     pub struct MocapParams timed { rate_hz: 100.0, delay_ms: 10.0 } {
         /// Standard deviation of each axis of a position, m.

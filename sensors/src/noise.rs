@@ -73,7 +73,6 @@ pub(crate) fn standard_normal(random: &mut Stream) -> Vector3<f64> {
 }
 
 /// How far a random stream has been drawn, in words of 32 bits: the low and the high half of the count.
-#[allow(clippy::cast_possible_truncation, reason = "the halves of the count are taken apart")]
 pub(crate) fn drawn_words(random: &Stream) -> [u64; 2] {
     let words = random.get_word_pos();
     [words as u64, (words >> 64) as u64]

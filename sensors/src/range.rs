@@ -7,7 +7,6 @@
 //!
 //! The beams fire together and do not hear each other. An echo comes back from every surface in the cone at any
 //! angle of incidence; a real beam that grazes a smooth floor or wall hears none.
-#![allow(non_snake_case, reason = "a trailing _W or _B names the frame a vector is written in")]
 
 use crate::channel::{Chance, ChannelState, QUEUE, Tick};
 use crate::cone::Cone;
@@ -38,6 +37,19 @@ parameters! {
     /// source. *Half angle*: it draws the beam as a shape that changes with target and distance; 5° is tuned, no
     /// source. The vehicle's radius is that of the Hummingbird: half of the 0.34 m between rotor axes (thesis,
     /// Table 2.1) and the radius of its 8 inch propellers (thesis, §2.1).
+    ///
+    /// ```
+    /// use bus::messages::PlantState;
+    /// use sensors::range::{RangeFinders, RangeInputs, RangeParams};
+    /// use sensors::sensing::Sensing;
+    ///
+    /// let scene = concat!(env!("CARGO_MANIFEST_DIR"), "/../scenes/room.toml");
+    /// let parameters = RangeParams { scene: Some(scene.into()), delay_ms: 0.0, ..RangeParams::default() };
+    /// let mut range = bus::Harness::<Sensing<RangeFinders>>::new(parameters).unwrap();
+    /// let state = PlantState { position: [0.0, 0.0, 1.5].into(), ..Default::default() };
+    /// let ranges = range.step(RangeInputs { state: &state, traffic: None }).unwrap().ranges;
+    /// assert!((ranges.distance[4] - 1.5).abs() < 0.1, "the last beam looks down: {ranges:?}");
+    /// ```
     pub struct RangeParams timed { rate_hz: 10.0, delay_ms: 50.0 } {
         /// Scene file; there is no default.
         scene: Option<PathBuf> = None,
@@ -58,7 +70,7 @@ parameters! {
         /// Which of the vehicles in the traffic is this one, numbered from 0; where absent, it is one that is nearer
         /// than 1 cm.
         #[serde(rename = "self")]
-        own_index: Option<u32> = None,
+        self_index: Option<u32> = None,
     }
 }
 
@@ -91,14 +103,14 @@ impl RangeFinders {
         position_W_m: Vector3<f64>,
         attitude_WB: UnitQuaternion<f64>,
     ) -> impl Iterator<Item = Vector3<f64>> {
-        let own_index = self.params.own_index;
+        let self_index = self.params.self_index;
         let positions = traffic.into_iter().flat_map(|traffic| {
             let count = (traffic.count as usize).min(traffic.position.len());
             traffic.position[..count].iter().zip(0..)
         });
         let from_here = positions.map(move |(other, index)| (vector(*other) - position_W_m, index));
-        let others = from_here.filter(move |(away_W_m, index)| match own_index {
-            Some(own_index) => *index != own_index,
+        let others = from_here.filter(move |(away_W_m, index)| match self_index {
+            Some(self_index) => *index != self_index,
             None => away_W_m.norm() >= SELF_MAX_M,
         });
         others.map(move |(away_W_m, _)| attitude_WB.inverse_transform_vector(&away_W_m))
@@ -346,7 +358,7 @@ mod tests {
     fn the_own_one_can_be_named() {
         let truth = at([1.0, 2.0, 1.5], 0.0, 0.0, 0.0);
         let traffic = traffic(&[[3.0, 2.0, 1.5], [1.0, 2.4, 1.5]]);
-        let params = RangeParams { own_index: Some(0), ..perfect() };
+        let params = RangeParams { self_index: Some(0), ..perfect() };
         let ranges = read(params, &truth, Some(&traffic));
         // The vehicle ahead is this one as it was; the other is nearer than the sensors read.
         assert_near(ranges.distance, [4.0, 6.0, 0.20, 7.0, 1.5]);

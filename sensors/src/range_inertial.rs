@@ -1,7 +1,6 @@
 //! The range-inertial node: velocity, height and walls from range finders, an IMU and an attitude.
-#![allow(non_snake_case, reason = "a trailing _W or _B names the frame a vector is written in")]
 
-pub mod axis;
+mod axis;
 pub mod filter;
 pub mod params;
 

@@ -19,6 +19,18 @@ parameters! {
     /// *Resolution*: telemetry of electronic speed controllers (KISS, BLHeli_32) counts hundreds of electrical revolutions
     /// a minute; with 7 pole pairs, usual for motors of this size, these are 14.3 rpm, 1.5 rad/s. *Noise* and *rate* are
     /// tuned, no source: one count, 200 Hz. *Delay* is off: the count is timed where it is made.
+    ///
+    /// ```
+    /// use bus::messages::PlantState;
+    /// use sensors::rpm::RpmParams;
+    /// use sensors::sensing::{Sensing, TruthInputs};
+    ///
+    /// let parameters = RpmParams { half_reading_rotor: 2, ..RpmParams::default() };
+    /// let mut rpm = bus::Harness::<Sensing<RpmParams>>::new(parameters).unwrap();
+    /// let state = PlantState { rotor_speed: [400.0; 4], ..Default::default() };
+    /// let [first, second, ..] = rpm.step(TruthInputs { state: &state }).unwrap().speeds.rotor_speed;
+    /// assert!((first - 400.0).abs() < 10.0 && (second - 200.0).abs() < 10.0, "rad/s: {first}, {second}");
+    /// ```
     #[derive(Copy)]
     pub struct RpmParams timed { rate_hz: 200.0, delay_ms: 0.0 } {
         /// Standard deviation of a speed, rad/s.

@@ -1,5 +1,4 @@
 //! The vectors and quaternions of messages as those of nalgebra, and back.
-#![allow(non_snake_case, reason = "a trailing _WB names the frames that an attitude leads between")]
 
 use bus::messages::{Quaternion, Vector3};
 

@@ -1,5 +1,4 @@
 //! The law `level`: holds height and attitude by proportional-derivative control, with nothing to remember.
-#![allow(non_snake_case, reason = "a trailing _B names the frame a vector is written in, _N the newton")]
 
 use crate::airframe::HoverModel;
 use crate::allocation::RotorWrench;

@@ -2,6 +2,7 @@
 //!
 //! A file of a walk-through names its neighbours as it does in its folder. The names `bus` and `crate::…` lead to this
 //! crate, which passes on what the crates have, and the new file beside it.
+#![allow(non_snake_case, reason = "as in the crates whose files these are: _B names a frame, _N the newton")]
 
 // The new message stands among the messages of `bus`, so `bus` is this crate with the messages and one more.
 extern crate bus as real_bus;

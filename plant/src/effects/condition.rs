@@ -1,5 +1,4 @@
 //! What the functions of effects are functions of: how the vehicle moves through which air, how high.
-#![allow(non_snake_case, reason = "a trailing _W or _B names the frame a vector is written in, N the newton")]
 
 use crate::rotation::rotated_back;
 use crate::rotor;
@@ -8,6 +7,20 @@ use nalgebra::Vector3;
 use vehicles::Vehicle;
 
 /// A vehicle at an instant: what forces depend on.
+///
+/// ```
+/// use nalgebra::Vector3;
+/// use plant::effects::FlightCondition;
+/// use plant::{RigidBody, RotorState, State};
+///
+/// let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../vehicles/hummingbird.toml");
+/// let vehicle = vehicles::Vehicle::load(path.as_ref()).unwrap();
+/// let body = RigidBody::level_at(Vector3::new(0.0, 0.0, 2.0));
+/// let state = State { body, rotors: [RotorState::steady(400.0); 4] };
+/// let headwind_W_m_s = Vector3::new(-3.0, 0.0, 0.0);
+/// let condition = FlightCondition::new(&vehicle, &state, &headwind_W_m_s);
+/// assert_eq!((condition.airspeed_B_m_s.x, condition.height_m), (3.0, 2.0));
+/// ```
 #[derive(Debug, Clone)]
 pub struct FlightCondition<'v> {
     /// The vehicle as it flies.

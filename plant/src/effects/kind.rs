@@ -182,6 +182,14 @@ pub struct Confounder {
 }
 
 /// An effect with its parameters.
+///
+/// ```
+/// use plant::effects::find;
+///
+/// let wind = find("wind").unwrap();
+/// let breeze = wind.with(|parameter| if parameter.name == "x" { 3.0 } else { 0.0 });
+/// assert_eq!((breeze.kind.name, breeze.values[0], wind.parameters[0].unit()), ("wind", 3.0, "m/s"));
+/// ```
 #[derive(Debug, Clone, Copy)]
 pub struct Effect {
     /// What it is.
@@ -267,9 +275,9 @@ impl EffectKind {
 
     /// The experiment that tells it from `other`, if the two look alike.
     #[must_use]
-    pub fn told_from(&self, other: &Self) -> Option<&'static str> {
-        let found = |own: &Self, other: &Self| {
-            own.confounded_with.iter().find(|pair| pair.effect == other).map(|pair| pair.experiment)
+    pub fn experiment_against(&self, other: &Self) -> Option<&'static str> {
+        let found = |one: &Self, other: &Self| {
+            one.confounded_with.iter().find(|pair| pair.effect == other).map(|pair| pair.experiment)
         };
         found(self, other).or_else(|| found(other, self))
     }

@@ -83,7 +83,7 @@ fn fitted(kind: &EffectKind) -> String {
 
 /// The effects that look like `kind`, and the experiments that tell them apart.
 fn confounders(kind: &EffectKind) -> impl Iterator<Item = (&'static str, &'static str)> {
-    CATALOGUE.iter().filter_map(|other| Some((other.name, kind.told_from(other)?)))
+    CATALOGUE.iter().filter_map(|other| Some((other.name, kind.experiment_against(other)?)))
 }
 
 fn row(page: &mut String, spec: &ParameterSpec) {

@@ -2,7 +2,6 @@
 //! them. Here alone, too, rapier's vectors (glam) and ours (nalgebra) become each other.
 //!
 //! Rapier keeps the angular velocity in the world frame; [`RigidBody`] has it in the body frame.
-#![allow(non_snake_case, reason = "a trailing _W or _B names the frame a vector is written in")]
 
 use crate::state::RigidBody;
 use nalgebra::{Quaternion, Rotation3, UnitQuaternion, Vector3};

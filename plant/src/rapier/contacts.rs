@@ -1,5 +1,4 @@
 //! What the vehicle touches: when a contact begins and ends, how fast it was met, whether that was a crash.
-#![allow(non_snake_case, reason = "a trailing _W names the frame a vector is written in, N the newton")]
 
 use crate::backend::ContactReport;
 use crate::state::RigidBody;
@@ -151,7 +150,6 @@ impl Contacts {
         ContactReport {
             force_W_N: first.map_or(Vector3::zeros(), |_| *force_W_N),
             impact_speed_m_s: self.impact_speed_m_s,
-            #[allow(clippy::cast_possible_truncation, reason = "far fewer things than 2^32")]
             count: self.touches.len() as u32,
             object: first.map_or(0, |touch| touch.object),
             began: self.began,

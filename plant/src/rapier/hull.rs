@@ -3,7 +3,6 @@
 //! Vehicle files give the rotors' places, but neither propellers nor feet. Those of the Hummingbird are scaled
 //! with the length of the arms; for a Crazyflie 2.1 that gives propellers of 2.7 cm instead of 2.3 cm. Where an
 //! effect moves the centre of mass, the frame stays as it is: all of it moves the other way, seen from there.
-#![allow(non_snake_case, reason = "a trailing _B names the frame a vector is written in")]
 
 use crate::airframe::{Airframe, amid_rotors_B_m};
 use nalgebra::Vector3;

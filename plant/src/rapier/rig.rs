@@ -7,7 +7,6 @@
 //! The tilt limit is a cone, as of a rod end, and the same at any yaw: a limit on Euler angles would not be. It
 //! is a rope from a point on world z above the bearing to the point as far above it on body z: for a tilt t and
 //! a lever l the distance of the two is 2 l sin(t / 2), so a longest distance is a largest tilt.
-#![allow(non_snake_case, reason = "a trailing _W or _B names the frame a vector is written in, N the newton")]
 
 use super::body::to_rapier;
 use crate::state::RigidBody;

@@ -2,7 +2,6 @@
 //! how rapier is set up to solve what they do to each other.
 //!
 //! Gravity is part of the push that [`super::Rapier`] gives the vehicle, so rapier's own is zero.
-#![allow(non_snake_case, reason = "a trailing _W or _B names the frame a vector is written in")]
 
 use super::body::{self, from_rapier, to_rapier};
 use super::contacts::Sighting;
@@ -159,11 +158,12 @@ impl World {
 
     /// Whether all that has a handle is there, and the joints are as many.
     fn has_bodies_of(&self, other: &Self) -> bool {
-        let (own, handles, bodies) = (&self.handles, &other.handles, &other.physics.bodies);
+        let (expected, handles, bodies) = (&self.handles, &other.handles, &other.physics.bodies);
         let moving = [handles.vehicle].into_iter().chain(handles.slider).chain(handles.neighbours.clone());
-        (own.vehicle, own.slider, own.hull) == (handles.vehicle, handles.slider, handles.hull)
+        (expected.vehicle, expected.slider, expected.hull) == (handles.vehicle, handles.slider, handles.hull)
             && moving.into_iter().all(|handle| bodies.get(handle).is_some())
-            && bodies.len() - handles.neighbours.len() == self.physics.bodies.len() - own.neighbours.len()
+            && bodies.len() - handles.neighbours.len()
+                == self.physics.bodies.len() - expected.neighbours.len()
             && other.physics.impulse_joints.len() == self.physics.impulse_joints.len()
     }
 
@@ -172,10 +172,10 @@ impl World {
     fn has_colliders_of(&self, other: &Self) -> bool {
         let count = |world: &Self| world.physics.colliders.len() - world.handles.neighbours.len();
         let mut lasting =
-            self.physics.colliders.iter().filter(|(_, own)| own.user_data < FIRST_NEIGHBOUR.into());
+            self.physics.colliders.iter().filter(|(_, shape)| shape.user_data < FIRST_NEIGHBOUR.into());
         count(self) == count(other)
-            && lasting.all(|(handle, own)| {
-                other.physics.colliders.get(handle).is_some_and(|other| is_same(own, other))
+            && lasting.all(|(handle, shape)| {
+                other.physics.colliders.get(handle).is_some_and(|other| is_same(shape, other))
             })
     }
 
@@ -196,9 +196,9 @@ impl World {
 
     /// Everything near the vehicle, as the last step found it.
     pub(super) fn sightings(&self) -> impl Iterator<Item = Sighting> + '_ {
-        let own_parts = self.handles.hull.iter().enumerate();
-        own_parts.flat_map(move |(place, own)| {
-            let pairs = self.physics.narrow_phase.contact_pairs_with(*own);
+        let parts = self.handles.hull.iter().enumerate();
+        parts.flat_map(move |(place, part)| {
+            let pairs = self.physics.narrow_phase.contact_pairs_with(*part);
             pairs.filter_map(move |pair| self.sighting(pair, 1 << place))
         })
     }
@@ -207,16 +207,15 @@ impl World {
         let (manifold, contact) = pair.find_deepest_contact()?;
         let (first, second) =
             (&self.physics.colliders[pair.collider1], &self.physics.colliders[pair.collider2]);
-        let own_is_first = self.handles.hull.contains(&pair.collider1);
-        let other = if own_is_first { second } else { first };
+        let vehicle_is_first = self.handles.hull.contains(&pair.collider1);
+        let other = if vehicle_is_first { second } else { first };
         let outwards_W = from_rapier(first.position().rotation * manifold.local_n1);
         let other_body = other.parent().map(|handle| &self.physics.bodies[handle]);
         Some(Sighting {
-            #[allow(clippy::cast_possible_truncation, reason = "written as u32 by `numbered`")]
             object: other.user_data as u32,
             part,
             point_W_m: from_rapier(first.position().transform_point(contact.local_p1)),
-            towards_vehicle_W: if own_is_first { -outwards_W } else { outwards_W },
+            towards_vehicle_W: if vehicle_is_first { -outwards_W } else { outwards_W },
             gap_m: contact.dist,
             impulse_N_s: pair.total_impulse_magnitude(),
             velocity_W_m_s: other_body.map_or(Vector3::zeros(), |body| from_rapier(body.linvel())),

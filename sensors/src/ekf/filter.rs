@@ -14,10 +14,6 @@
 //! *Outliers.* A measurement is refused if its normalised innovation squared is unlikely. Each refusal leaves the
 //! covariance growing, so a filter that is wrong comes to accept what it refused; after twenty refusals of a position in
 //! a row the filter takes itself for lost: it keeps its motion with hardly any confidence.
-#![allow(
-    non_snake_case,
-    reason = "a trailing _W or _B names the frame a vector is written in, _WB a rotation between the two"
-)]
 
 use super::history::{Newest, READINGS, Reading, Readings, Source, Waiting};
 use super::motion::Motion;
@@ -82,6 +78,21 @@ pub struct EkfState {
 }
 
 /// The filter at one sample period: all that does not change during a run.
+///
+/// ```
+/// use bus::Harness;
+/// use bus::context::NodeContext;
+/// use bus::messages::{Imu, Mocap};
+/// use sensors::ekf::{EkfInputs, filter::Ekf, params::EkfParams};
+///
+/// let context = NodeContext::new("ekf", &["imu", "mocap"]);
+/// let mut ekf = Harness::<Ekf>::in_context(EkfParams::default(), &context).unwrap();
+/// let imu = Imu { specific_force: [0.0, 0.0, 9.81].into(), ..Default::default() };
+/// let mocap = Mocap { position: [1.0, 2.0, 3.0].into(), valid: 1, ..Default::default() };
+/// let inputs = || EkfInputs { imu: &imu, gps: None, mocap: Some(&mocap), barometer: None, magnetometer: None };
+/// let estimate = (0..10).map(|_| ekf.step(inputs()).unwrap().estimate).last().unwrap();
+/// assert!((estimate.position.z - 3.0).abs() < 1e-2, "m in the world: {estimate:?}");
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Ekf {
     params: EkfParams,
@@ -94,11 +105,6 @@ impl Ekf {
     ///
     /// # Errors
     /// A parameter or the period is outside its range, or the period is too short for the delay.
-    #[allow(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "a delay is small, not negative"
-    )]
     pub fn with_period(params: EkfParams, period_s: f64) -> Result<Self, ParameterError> {
         params.validate()?;
         positive("period_s", period_s)?;

@@ -78,7 +78,6 @@ impl Readings {
     }
 
     /// Remembers the newest reading, one period after the last.
-    #[allow(clippy::cast_possible_truncation, reason = "single precision is meant")]
     pub fn push(&mut self, reading: &Reading) {
         let (force, rate) = (reading.specific_force, reading.angular_velocity);
         let values = [force.x, force.y, force.z, rate.x, rate.y, rate.z];

@@ -1,8 +1,4 @@
 //! The motion that the filter believes in, and how an IMU's readings carry it on.
-#![allow(
-    non_snake_case,
-    reason = "a trailing _W or _B names the frame a vector is written in, _WB a rotation between the two"
-)]
 
 use super::history::Reading;
 use super::transition::{

@@ -1,8 +1,4 @@
 //! What each sensor should measure, and how that depends on the filter's errors.
-#![allow(
-    non_snake_case,
-    reason = "a trailing _W or _B names the frame a vector is written in, _WB a rotation between the two, _T the tesla"
-)]
 
 use super::history::Measurement;
 use super::motion::Motion;
@@ -36,7 +32,6 @@ impl<const N: usize> Observation<N> {
 }
 
 /// Position and velocity; the position drifts.
-#[must_use]
 pub fn gps(motion: &Motion, measured: &Measurement, params: &EkfParams) -> Observation<6> {
     let [x, y, z, u, v, w, _] = measured.values;
     let position_W_m = Vector3::new(x, y, z) - vector(motion.position) - vector(motion.gps_drift);
@@ -49,7 +44,6 @@ pub fn gps(motion: &Motion, measured: &Measurement, params: &EkfParams) -> Obser
 }
 
 /// Position and attitude.
-#[must_use]
 pub fn mocap(motion: &Motion, measured: &Measurement, params: &EkfParams) -> Observation<6> {
     let [x, y, z, ..] = measured.values;
     let position_W_m = Vector3::new(x, y, z) - vector(motion.position);
@@ -62,14 +56,12 @@ pub fn mocap(motion: &Motion, measured: &Measurement, params: &EkfParams) -> Obs
 }
 
 /// The attitude in a measurement of motion capture.
-#[must_use]
 pub fn measured_attitude_WB(measured: &Measurement) -> UnitQuaternion<f64> {
     let [_, _, _, x, y, z, w] = measured.values;
     UnitQuaternion::from_quaternion(nalgebra::Quaternion::new(w, x, y, z))
 }
 
 /// Altitude, with a bias that walks.
-#[must_use]
 pub fn barometer(motion: &Motion, measured: &Measurement, params: &EkfParams) -> Observation<1> {
     let innovation_m = measured.values[0] - motion.position.z - motion.barometer_bias;
     let mut observation =
@@ -80,7 +72,6 @@ pub fn barometer(motion: &Motion, measured: &Measurement, params: &EkfParams) ->
 }
 
 /// The magnetic field in body axes: R_trueᵀ·m = Rᵀ·exp(−θ×)·m, nearly Rᵀ·(m + m × θ).
-#[must_use]
 pub fn magnetometer(motion: &Motion, measured: &Measurement, params: &EkfParams) -> Observation<3> {
     let [x, y, z, ..] = measured.values;
     let to_body = attitude(motion.attitude).inverse();

@@ -1,5 +1,4 @@
 //! The parameters of the extended Kalman filter.
-#![allow(non_snake_case, reason = "a trailing _T names the tesla")]
 
 use crate::earth_field::EarthField;
 use diagnostics::parameter::{ParameterError, finite, not_negative, positive, require};

@@ -2,10 +2,6 @@
 //!
 //! What a measurement says is taken for the motion with hardly any confidence, and the same measurement, used as
 //! any other, then gives it the confidence that it deserves.
-#![allow(
-    non_snake_case,
-    reason = "a trailing _W or _B names the frame a vector is written in, _WB a rotation between the two, _T the tesla"
-)]
 
 use super::history::{Measurement, Newest, Reading, Readings, Source};
 use super::motion::Motion;
@@ -39,7 +35,6 @@ pub struct Start {
 
 impl Start {
     /// At the position that is given, at rest.
-    #[must_use]
     pub fn given(position_m: [f64; 3], reading: &Reading, params: &EkfParams) -> Self {
         let yaw_rad = params.initial_yaw_deg.unwrap_or_default().to_radians();
         let motion = Motion { position: position_m.into(), ..upright(reading, yaw_rad) };
@@ -47,7 +42,6 @@ impl Start {
     }
 
     /// At the pose that motion capture has measured.
-    #[must_use]
     pub fn at_pose(pose: &Measurement, params: &EkfParams) -> Self {
         let [x, y, z, ..] = pose.values;
         let attitude = attitude_message(measured_attitude_WB(pose));
@@ -58,7 +52,6 @@ impl Start {
 
     /// At the position and with the velocity that GPS has measured; the yaw is the given one, that of the
     /// magnetic `field`, or zero.
-    #[must_use]
     pub fn at_fix(
         fix: &Measurement,
         field: Option<&Measurement>,
@@ -84,7 +77,6 @@ impl Start {
     }
 
     /// The covariance of the errors to begin with.
-    #[must_use]
     pub fn covariance(&self, params: &EkfParams) -> Covariance {
         let mut covariance = Covariance::zeros();
         let mut set = |from: usize, sigma: [f64; 3]| {
@@ -102,7 +94,6 @@ impl Start {
 }
 
 /// The covariance of a filter that has lost its way: hardly any confidence in its motion.
-#[must_use]
 pub fn lost_covariance(params: &EkfParams) -> Covariance {
     let lost = Start {
         motion: Motion::default(),
@@ -115,7 +106,6 @@ pub fn lost_covariance(params: &EkfParams) -> Covariance {
 }
 
 /// The reading and the motion to begin with, if a position is known.
-#[must_use]
 pub fn start(newest: &Newest, readings: &Readings, params: &EkfParams) -> Option<(Reading, Start)> {
     let measured = |sensor: Source| newest[sensor.index()].flatten();
     if let Some(position_m) = params.initial_position_m {

@@ -9,10 +9,6 @@
 //! matrix of this system is nilpotent: its transition from one time to another is made of a few integrals over
 //! the flown attitude and specific force, whatever the number of samples between. So the integrals are summed up
 //! at each sample, and the covariance is carried over only where it is needed.
-#![allow(
-    non_snake_case,
-    reason = "a trailing _W names the frame that a vector is written in, _WB a rotation between the two"
-)]
 
 use super::params::EkfParams;
 use crate::wire::{vector, vector_message};
@@ -78,13 +74,11 @@ impl Transition {
     }
 
     /// How long it spans, s.
-    #[must_use]
     pub fn time_s(&self) -> f64 {
         self.time
     }
 
     /// The covariance at the end of what the integrals span, from that at its beginning.
-    #[must_use]
     pub fn carry(&self, covariance: &Covariance, params: &EkfParams) -> Covariance {
         if self.time == 0.0 {
             return *covariance;

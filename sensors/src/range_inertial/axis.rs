@@ -49,7 +49,6 @@ pub enum Side {
 
 impl Side {
     /// The place in arrays of two.
-    #[must_use]
     pub fn index(self) -> usize {
         self as usize
     }
@@ -86,7 +85,6 @@ pub struct Inertia {
 
 impl Echo {
     /// The distance now, m.
-    #[must_use]
     pub fn now_m(&self) -> f64 {
         self.distance_m - self.side.sign() * self.moved_m
     }
@@ -94,7 +92,6 @@ impl Echo {
 
 impl Axis {
     /// An axis at rest with nothing in sight.
-    #[must_use]
     pub fn at_rest(velocity_sigma_m_s: f64, bias_sigma_m_s2: f64) -> Self {
         let mut covariance = Covariance::zeros();
         covariance[(VELOCITY, VELOCITY)] = velocity_sigma_m_s.powi(2);

@@ -13,7 +13,6 @@
 //! *Ranges.* A beam that meets a wall at the angle γ from its normal reads distance/cos γ; if the beam is a
 //! cone, some of it meets the wall up to half the opening angle nearer to the normal. A reading no shorter
 //! than the beam's way to the floor is not one of a wall.
-#![allow(non_snake_case, reason = "a trailing _W or _B names the frame a vector is written in")]
 
 use super::axis::{AHEAD, Axis, Echo, PATH, Side, VELOCITY};
 use super::params::RangeInertialParams;
@@ -112,6 +111,20 @@ pub struct Wall {
 }
 
 /// The estimator at one sample period: all that does not change during a run.
+///
+/// ```
+/// use bus::Harness;
+/// use bus::messages::{AttitudeEstimate, Imu, Ranges};
+/// use sensors::range_inertial::{RangeInertialInputs, filter::RangeInertial, params::RangeInertialParams};
+///
+/// let mut filter = Harness::<RangeInertial>::new(RangeInertialParams::default()).unwrap();
+/// let imu = Imu { specific_force: [0.0, 0.0, 9.81].into(), ..Default::default() };
+/// let attitude = AttitudeEstimate::default();
+/// let ranges = Ranges { distance: [2.0, 3.0, 2.0, 3.0, 1.0], valid: [1; 5], ..Default::default() };
+/// let inputs = || RangeInertialInputs { ranges: &ranges, imu: &imu, attitude: &attitude };
+/// let sent = (0..10).map(|_| filter.step(inputs()).unwrap()).last().unwrap();
+/// assert!((sent.walls.distance[0] - 2.0).abs() < 0.1, "m to the wall ahead: {:?}", sent.walls);
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RangeInertial {
     params: RangeInertialParams,
@@ -359,7 +372,6 @@ impl RangeInertialState {
     }
 
     /// Where the vehicle was `samples` samples ago, if that is remembered.
-    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "rounded, and not negative")]
     fn past(&self, samples: f64) -> Option<Past> {
         let back = samples.round() as u64;
         let is_known = back < self.samples.min(PAST as u64);

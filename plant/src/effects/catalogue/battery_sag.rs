@@ -1,5 +1,4 @@
 //! Sagging voltage.
-#![allow(non_snake_case, reason = "units stand last in names: _V, _A")]
 
 use super::{mass_error, thrust_scale};
 use crate::actuation::Battery;

@@ -1,5 +1,4 @@
 //! The tip path plane tilts away from the wind.
-#![allow(non_snake_case, reason = "a trailing _B names the frame a vector is written in, N the newton")]
 
 use super::rotor_drag;
 use crate::effects::condition::FlightCondition;

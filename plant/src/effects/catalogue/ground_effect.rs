@@ -1,5 +1,4 @@
 //! More thrust near the ground.
-#![allow(non_snake_case, reason = "units stand last in names, N is the newton")]
 
 use super::{mass_error, thrust_scale};
 use crate::effects::condition::FlightCondition;

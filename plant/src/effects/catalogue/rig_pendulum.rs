@@ -1,5 +1,4 @@
 //! A body that swings about a bearing beside its centre of mass.
-#![allow(non_snake_case, reason = "a trailing _B names the frame a vector is written in, N the newton")]
 
 use crate::effects::condition::FlightCondition;
 use crate::effects::kind::{Action, EffectKind, Quantity, Values};

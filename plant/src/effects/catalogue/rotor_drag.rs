@@ -1,5 +1,4 @@
 //! Drag of the rotors, linear in the speed of the air.
-#![allow(non_snake_case, reason = "a trailing _B names the frame a vector is written in, N the newton")]
 
 use crate::effects::condition::FlightCondition;
 use crate::effects::kind::{Action, EffectKind, Quantity, Values};

@@ -1,5 +1,4 @@
 //! Rotors that give less than they should.
-#![allow(non_snake_case, reason = "units stand last in names, N is the newton")]
 
 use crate::effects::condition::FlightCondition;
 use crate::effects::kind::{Action, EffectKind, FitAs, Values};

@@ -1,5 +1,4 @@
 //! The air resists a turn about the vertical axis.
-#![allow(non_snake_case, reason = "a trailing _B names the frame a vector is written in")]
 
 use crate::effects::condition::FlightCondition;
 use crate::effects::kind::{Action, EffectKind, Quantity, Values};
