@@ -14,7 +14,7 @@ use crate::noise::{drawn_words, set_drawn_words};
 use bus::Message;
 use bus::context::NodeContext;
 use bus::random::{Stream, stream, uniform};
-use diagnostics::parameter::{ParameterError, not_negative, positive, require};
+use diagnostics::parameter::{ParameterError, not_negative, positive, refuse, require};
 
 /// Steps of a node between two measurements below which it tells that they are not evenly spaced: a fifth of the interval.
 /// Tuned, no source.
@@ -65,17 +65,14 @@ impl Timing {
     pub fn check(&self, run: &NodeContext<'_>) -> Result<(), ParameterError> {
         self.validate()?;
         let (rate_hz, node_hz) = (self.rate_hz, run.period_s().recip());
-        if !is_in_time(rate_hz, run.period_s()) {
-            return Err(ParameterError::conflict(
-                "rate_hz",
-                format!(
-                    "`rate_hz` is {rate_hz} Hz, expected at most {node_hz} Hz, at which its node computes (run.rate_hz = \
+        refuse(rate_hz * run.period_s() > 1.0 + 1e-9, "rate_hz", || {
+            format!(
+                "`rate_hz` is {rate_hz} Hz, expected at most {node_hz} Hz, at which its node computes (run.rate_hz = \
                  {}, period_ticks = {}); raise run.rate_hz, or lower `period_ticks` or `rate_hz`",
-                    run.rate_hz(),
-                    run.period_ticks
-                ),
-            ));
-        }
+                run.rate_hz(),
+                run.period_ticks
+            )
+        })?;
         let share = node_hz / rate_hz;
         // Off by up to a step of the node: at 60 Hz of 1 kHz a sixteenth of the interval, which cameras have as well.
         if share < UNEVEN_SHARE && (share - share.round()).abs() > 1e-6 * share {
@@ -85,21 +82,11 @@ impl Timing {
             ));
         }
         if self.delay_ms * 1e-3 >= run.duration_s() {
-            run.warn_behind_end(
-                "delay_ms",
-                format!(
-                    "`delay_ms` is {} ms, as long as the run: no measurement arrives before its end",
-                    self.delay_ms
-                ),
-            );
+            let message = "as long as the run: no measurement arrives before its end";
+            run.warn_behind_end("delay_ms", format!("`delay_ms` is {} ms, {message}", self.delay_ms));
         }
         Ok(())
     }
-}
-
-/// Whether a node that computes every `period_s` can measure `rate_hz` times a second.
-fn is_in_time(rate_hz: f64, period_s: f64) -> bool {
-    rate_hz * period_s <= 1.0 + 1e-9
 }
 
 /// The chances with which losses begin and last.
@@ -192,20 +179,10 @@ impl Channel {
     ///
     /// # Errors
     /// As [`Timing::check`].
-    pub fn in_context(timing: &Timing, context: &NodeContext<'_>) -> Result<Self, ParameterError> {
+    pub fn new(timing: &Timing, context: &NodeContext<'_>) -> Result<Self, ParameterError> {
         timing.check(context)?;
-        Self::new(timing, context.period_s(), context.seed, context.name)
-    }
-
-    /// The channel of node `node`, which computes every `period_s`, in a run seeded with `run_seed`.
-    ///
-    /// # Errors
-    /// A parameter is outside its range, or the sensor measures more often than the node computes.
-    pub fn new(timing: &Timing, period_s: f64, run_seed: u64, node: &str) -> Result<Self, ParameterError> {
-        timing.validate()?;
-        let expected = "at most the rate at which the node computes; lower its `period_ticks` or `rate_hz`";
-        require("rate_hz", timing.rate_hz, is_in_time(timing.rate_hz, period_s), expected)?;
-        let (noise, mut loss) = (stream(run_seed, node), stream(run_seed, node));
+        let random = || stream(context.seed, context.name);
+        let (noise, mut loss) = (random(), random());
         loss.set_stream(1);
         let (interval_ns, delay_ns) =
             (nanoseconds(timing.rate_hz.recip()), nanoseconds(timing.delay_ms * 1e-3));
@@ -293,9 +270,14 @@ mod tests {
         Timing { rate_hz: 10.0, delay_ms: 0.0, dropout: 0.0, dropout_mean_s: 0.0 }
     }
 
+    fn channel(timing: &Timing, period_ticks: u64, seed: u64, node: &str) -> Result<Channel, ParameterError> {
+        let period_ticks = u32::try_from(period_ticks).unwrap();
+        Channel::new(timing, &NodeContext::new(node, &[]).timed(TICK_NS, period_ticks, 10_000).seeded(seed))
+    }
+
     /// The times at which measurements were made, tick by tick as they arrive; 0 is sent until the first.
     fn arrivals(timing: &Timing, period_ticks: u64, ticks: u64) -> Vec<(u64, u64)> {
-        let mut channel = Channel::new(timing, period_ticks as f64 * 1e-3, 1, "gps").unwrap();
+        let mut channel = channel(timing, period_ticks, 1, "gps").unwrap();
         let (mut state, mut queue) = (ChannelState::default(), [u64::MAX; QUEUE]);
         (0..ticks)
             .step_by(usize::try_from(period_ticks).unwrap())
@@ -356,7 +338,7 @@ mod tests {
 
     #[test]
     fn a_channel_that_starts_late_measures_once_and_then_at_its_rate() {
-        let mut channel = Channel::new(&timing(), 1e-3, 1, "gps").unwrap();
+        let mut channel = channel(&timing(), 1, 1, "gps").unwrap();
         let (mut state, mut queue) = (ChannelState::default(), [(); QUEUE]);
         let mut count = 0;
         for tick in 5031..5331 {
@@ -366,7 +348,7 @@ mod tests {
     }
 
     fn lost(timing: &Timing, count: usize) -> Vec<bool> {
-        let mut channel = Channel::new(timing, 1e-3, 3, "mocap").unwrap();
+        let mut channel = channel(timing, 1, 3, "mocap").unwrap();
         let (mut state, mut queue) = (ChannelState::default(), [false; QUEUE]);
         let interval_ns = channel.interval_ns;
         (0..count as u64)
@@ -397,7 +379,7 @@ mod tests {
     #[test]
     fn losses_do_not_reshuffle_the_noise() {
         let noise = |dropout: f64| {
-            let mut channel = Channel::new(&Timing { dropout, ..timing() }, 1e-3, 3, "gps").unwrap();
+            let mut channel = channel(&Timing { dropout, ..timing() }, 1, 3, "gps").unwrap();
             let (mut state, mut queue) = (ChannelState::default(), [0; QUEUE]);
             let measure = |_: &u64, chance: &mut Chance<'_>| {
                 chance.is_lost(0);
@@ -414,12 +396,12 @@ mod tests {
         let measure = |_: &u64, chance: &mut Chance<'_>| {
             if chance.is_lost(0) { 0 } else { chance.noise.next_u64() }
         };
-        let mut first = Channel::new(&timing, 1e-3, 3, "gps").unwrap();
+        let mut first = channel(&timing, 1, 3, "gps").unwrap();
         let (mut state, mut queue) = (ChannelState::default(), [1; QUEUE]);
         for tick in 0..333 {
             first.at(tick * TICK_NS).measure(&mut state, &mut queue, measure);
         }
-        let mut second = Channel::new(&timing, 1e-3, 3, "gps").unwrap();
+        let mut second = channel(&timing, 1, 3, "gps").unwrap();
         let (mut handed_state, mut handed_queue) = (state, queue);
         for tick in 333..1000 {
             let expected = first.at(tick * TICK_NS).measure(&mut state, &mut queue, measure);
@@ -448,7 +430,7 @@ mod tests {
             let error = refused(timing);
             assert!(error.starts_with(&format!("`{key}` must be ")), "{error}");
         }
-        let error = Channel::new(&timing(), 0.2, 1, "gps").unwrap_err().to_string();
+        let error = channel(&timing(), 200, 1, "gps").unwrap_err().to_string();
         assert!(error.contains("`rate_hz`") && error.contains("`period_ticks`"), "{error}");
     }
 }

@@ -102,7 +102,7 @@ impl Component for ImuSensor {
     fn new(params: ImuParams, context: &NodeContext<'_>) -> Result<Self, ParameterError> {
         let rate_hz = context.period_s().recip();
         let model = ImuModel::new(params, rate_hz)?;
-        let channel = Channel::in_context(&params.timing(rate_hz), context)?;
+        let channel = Channel::new(&params.timing(rate_hz), context)?;
         let model_state = model.initial_state(context.seed, context.name);
         Ok(Self { model, channel, model_state })
     }

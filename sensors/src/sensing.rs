@@ -71,7 +71,7 @@ impl<S: Sensor> Component for Sensing<S> {
 
     fn new(parameters: S::Parameters, context: &NodeContext<'_>) -> Result<Self, ParameterError> {
         parameters.validate()?;
-        let channel = Channel::in_context(&parameters.timing(), context)?;
+        let channel = Channel::new(&parameters.timing(), context)?;
         Ok(Self { sensor: S::new(parameters)?, channel })
     }
 
