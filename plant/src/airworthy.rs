@@ -234,7 +234,7 @@ mod tests {
         };
         assert_eq!(steps(1e-3), (Ok(()), vec![]));
         assert!(steps(0.1).1[0].message.contains("raise `substeps`"));
-        let words = steps(0.2).0.unwrap_err().to_string();
+        let message = steps(0.2).0.unwrap_err().to_string();
         assert!(message.contains("15.0756 rad/s") && message.contains("expected below 2.5"), "{message}");
     }
 
@@ -262,7 +262,7 @@ mod tests {
             rehearse(&mut backend, &vehicle, 1, 1e-3)
         };
         assert_eq!(rehearsed(|_| {}), Ok(()));
-        let words = rehearsed(|it| it.thrust_coefficient = 1e306).unwrap_err().to_string();
+        let message = rehearsed(|it| it.thrust_coefficient = 1e306).unwrap_err().to_string();
         assert!(message.contains("that is no number after"), "{message}");
     }
 }
