@@ -93,7 +93,7 @@ fn a_run_is_followed_steered_and_stopped_from_another_thread() {
     assert!(matches!(swapped, Answer::Done { .. }), "{swapped:?}");
     assert!(outcome.was_stopped && outcome.ticks > 20);
     assert_eq!(progress, outcome.ticks);
-    assert!(outcome.successions[0].take_over_tick.is_some(), "{:?}", outcome.successions);
+    assert!(outcome.replacements[0].take_over_tick.is_some(), "{:?}", outcome.replacements);
 }
 
 #[test]

@@ -96,7 +96,7 @@ impl Summary {
         let ticks_per_s = f64::from(outcome.ticks) / outcome.host_s.max(1e-9);
         let held = pass.iter().all(|verdict| verdict.passed) && compare.iter().all(|errors| errors.passed);
         let steps = steps.into_iter().chain(std::iter::repeat_with(Vec::new));
-        let successions = outcome.successions.into_iter().zip(steps);
+        let successions = outcome.replacements.into_iter().zip(steps);
         let successions: Vec<_> = successions.map(|(report, steps)| Succession { report, steps }).collect();
         let processes = outcome.processes.into_iter();
         Self {

@@ -36,8 +36,8 @@ impl Descendants {
         Self { run_dir: run_dir.to_owned(), before: children(), was_reaper }
     }
 
-    /// Whether a child was left by this run. Where the launcher had children before, those may leave some too: then only
-    /// who says that it is of this run is.
+    /// Whether a child was left by this run. Where the launcher had children before, those may leave some too: then
+    /// only a process that carries this run in its environment is.
     fn is_of_this_run(&self, child: Pid) -> bool {
         match run_dir_of(child) {
             Some(run_dir) => !self.is_of_another_run(&run_dir),
@@ -45,10 +45,10 @@ impl Descendants {
         }
     }
 
-    /// Takes note of children that have ended, but for `own`, which somebody waits for.
-    pub fn reap(&self, own: &[u32]) {
-        let is_own = |child: &Pid| own.contains(&child.as_raw_nonzero().get().cast_unsigned());
-        for child in self.left().into_iter().filter(|child| !is_own(child)) {
+    /// Takes note of children that have ended, but for those in `known`, which are waited for elsewhere.
+    pub fn reap(&self, known: &[u32]) {
+        let is_known = |child: &Pid| known.contains(&child.as_raw_nonzero().get().cast_unsigned());
+        for child in self.left().into_iter().filter(|child| !is_known(child)) {
             let _ = waitpid(Some(child), WaitOptions::NOHANG);
         }
     }

@@ -62,13 +62,13 @@ pub struct Waited {
 }
 
 impl Flight {
-    /// Opens what the processes of `plan` noted in `run_dir`; `successions` says who took over from whom. The
+    /// Opens what the processes of `plan` noted in `run_dir`; `replacements` says which instance took over from which. The
     /// files may be removed while this lives.
     ///
     /// # Errors
     /// If a file cannot be read or does not hold what it should.
-    pub fn open(plan: &Plan, run_dir: &Path, ticks: u32, successions: &[Report]) -> Result<Self, BusError> {
-        let nodes = (0..plan.nodes.len()).map(|node| eras(plan, run_dir, node, successions));
+    pub fn open(plan: &Plan, run_dir: &Path, ticks: u32, replacements: &[Report]) -> Result<Self, BusError> {
+        let nodes = (0..plan.nodes.len()).map(|node| eras(plan, run_dir, node, replacements));
         let mut publishers = vec![Publisher::default(); plan.topics.len()];
         for (node, plan) in plan.nodes.iter().enumerate() {
             for (output, plan) in plan.outputs.iter().enumerate() {
@@ -104,7 +104,7 @@ impl Flight {
         &self.plan.topics[topic].name
     }
 
-    /// Who sends `topic`.
+    /// The node and output that send `topic`.
     pub fn publisher(&self, topic: usize) -> Publisher {
         self.publishers[topic]
     }
@@ -159,7 +159,7 @@ impl Flight {
 
     /// What the computation `times` of `node` waited for last. `None` where that was not noted.
     pub fn waited(&self, node: usize, times: &TickTimes<'_>) -> Option<Waited> {
-        let own = times.began_ns.map(|ready_ns| Waited { cause: Cause::Itself, ready_ns });
+        let itself = times.began_ns.map(|ready_ns| Waited { cause: Cause::Itself, ready_ns });
         let granted = self.grant(times.tick)?.granted_ns;
         let mut last = Waited { cause: Cause::Grant, ready_ns: granted };
         for input in self.inputs(node, times.tick) {
@@ -169,7 +169,7 @@ impl Flight {
                 last = Waited { cause: Cause::Sample { topic: input.topic, tick }, ready_ns };
             }
         }
-        Some(own.filter(|own| own.ready_ns >= last.ready_ns).unwrap_or(last))
+        Some(itself.filter(|waited| waited.ready_ns >= last.ready_ns).unwrap_or(last))
     }
 
     /// The topics that close a feedback loop: read with a delay by a node that the publisher depends on.
@@ -216,9 +216,9 @@ impl Flight {
 }
 
 /// The processes that were `node` one after the other.
-fn eras(plan: &Plan, run_dir: &Path, node: usize, successions: &[Report]) -> Result<Vec<Era>, BusError> {
+fn eras(plan: &Plan, run_dir: &Path, node: usize, replacements: &[Report]) -> Result<Vec<Era>, BusError> {
     let first = (0, 0, &plan.nodes[node].inputs);
-    let next = successions.iter().filter(|report| report.process == plan.nodes[node].name);
+    let next = replacements.iter().filter(|report| report.process == plan.nodes[node].name);
     let next = next.filter_map(|report| Some((report.generation, report.take_over_tick?, &report.inputs)));
     let era = |(generation, first_tick, inputs): (u32, u32, &Vec<InputPlan>)| {
         let noted = TickReader::open(run_dir, plan, node, generation)?;

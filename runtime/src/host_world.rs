@@ -21,6 +21,7 @@ use bus::lockstep::SupervisorView;
 use bus::membership::Membership;
 use bus::plan::{InputPlan, NodePlan, Plan};
 use std::collections::BTreeMap;
+use std::collections::btree_map::Entry;
 use std::os::unix::net::UnixDatagram;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -56,11 +57,11 @@ impl HostWorld<'_> {
     /// the name is not in it.
     fn notify_socket(&mut self, name: &str, index: usize) -> Result<PathBuf> {
         let path = self.run_dir.join(format!("{index}.notify"));
-        if !self.sockets.contains_key(&index) {
+        if let Entry::Vacant(place) = self.sockets.entry(index) {
             let socket = UnixDatagram::bind(&path)
                 .with_context(|| format!("process `{name}`: cannot open the socket {}", path.display()))?;
             socket.set_nonblocking(true).context("cannot read a socket without waiting")?;
-            self.sockets.insert(index, socket);
+            place.insert(socket);
         }
         Ok(path)
     }

@@ -35,8 +35,8 @@ pub struct Outcome {
     pub missed_deadlines: u32,
     /// Per process: name, processor share of one core, deadlines at which it was late.
     pub processes: Vec<(String, f64, u32)>,
-    /// What became of those who were to succeed.
-    pub successions: Vec<Report>,
+    /// What became of backups.
+    pub replacements: Vec<Report>,
     /// The host times that the processes noted, in a run that is profiled.
     pub flight: Option<Flight>,
 }
@@ -152,9 +152,9 @@ impl<'a> Launcher<'a> {
         let mut supervisor = Supervisor::new(graph, world, &self.stop, &mut self.on);
         supervisor.fly(manifest.content.run.start_order_seed)?;
         let mut outcome = outcome(plan, &control, &supervisor);
-        outcome.successions = supervisor.overseer.replacements.into_reports();
+        outcome.replacements = supervisor.overseer.replacements.into_reports();
         if plan.profile {
-            outcome.flight = Some(Flight::open(plan, dir, outcome.ticks, &outcome.successions)?);
+            outcome.flight = Some(Flight::open(plan, dir, outcome.ticks, &outcome.replacements)?);
         }
         Ok(outcome)
     }
@@ -222,7 +222,7 @@ fn outcome(plan: &Plan, control: &SupervisorView, supervisor: &Supervisor<'_, Ho
         host_s,
         missed_deadlines: control.missed_deadlines(),
         processes: std::iter::once(clock).chain(nodes).collect(),
-        successions: Vec::new(),
+        replacements: Vec::new(),
         flight: None,
     }
 }

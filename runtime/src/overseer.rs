@@ -28,11 +28,11 @@ pub struct Overseer<'a> {
     plan: &'a Plan,
     /// Where the run stands.
     pub state: State,
-    /// Who replaces whom.
+    /// Its backups and replacements.
     pub replacements: Replacements<'a>,
     /// What the user should know, since it was told last.
     pub notes: Vec<String>,
-    /// Whether somebody is on the way to the place of a process that died: the run may stand still meanwhile.
+    /// Whether a dead process is being replaced: the run may stand still meanwhile.
     pub has_answered: bool,
 }
 
@@ -70,7 +70,7 @@ impl<'a> Overseer<'a> {
         }
     }
 
-    /// Tells the state machine what happened; an abort is left to the caller, who knows the words.
+    /// Tells the state machine what happened; an abort is left to the caller, which can say why.
     pub fn tell(&mut self, event: Event) -> Action {
         let (state, action) = self.state.after(event);
         self.state = state;
@@ -121,7 +121,7 @@ impl<'a> Overseer<'a> {
                 }
                 Ok(true)
             }
-            InstanceRole::Primary => self.settle_active(node, generation, death),
+            InstanceRole::Primary => self.settle_primary(node, generation, death),
         }
     }
 
@@ -156,7 +156,7 @@ impl<'a> Overseer<'a> {
         Ok(())
     }
 
-    fn settle_active(&mut self, node: usize, generation: u32, death: &Death) -> Result<bool, Abort> {
+    fn settle_primary(&mut self, node: usize, generation: u32, death: &Death) -> Result<bool, Abort> {
         if self.replacements.is_vacant(node) {
             return Ok(true);
         }
@@ -237,7 +237,7 @@ impl<'a> Overseer<'a> {
     /// Takes a backup out of the run that was to join at a tick which the run has passed.
     ///
     /// # Errors
-    /// If nobody else can go on.
+    /// If no other instance of its node can go on.
     pub fn note_too_late(&mut self) -> Result<(), Abort> {
         match self.replacements.too_late() {
             Some(node) => self.refuse(node, "the run had passed the tick at which it was to join".to_owned()),
@@ -246,7 +246,7 @@ impl<'a> Overseer<'a> {
     }
 }
 
-/// The topics on which nothing came any more once the process of `node` had ended, in words.
+/// The topics on which nothing more came after the process of `node` had ended, as a part of a message.
 fn silent_topics(node: &NodePlan, plan: &Plan) -> String {
     let topics: Vec<_> = node.outputs.iter().map(|output| plan.topics[output.topic].name.as_str()).collect();
     if topics.is_empty() { String::new() } else { format!("; nothing more came on {}", topics.join(", ")) }

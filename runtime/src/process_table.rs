@@ -14,8 +14,8 @@ pub fn all() -> impl Iterator<Item = Pid> {
 
 /// The children of this process.
 pub fn children() -> Vec<Pid> {
-    let own = rustix::process::getpid();
-    all().filter(|&process| parent_of(process) == Some(own)).collect()
+    let this = rustix::process::getpid();
+    all().filter(|&process| parent_of(process) == Some(this)).collect()
 }
 
 /// The processes above a process, its parent first.

@@ -1,4 +1,4 @@
-//! Who replaces whom: backups are started, join, shadow the primary, take over and see it retire.
+//! Replacements: backups are started, join, shadow the primary, take over, and outlive it.
 //!
 //! A pure state machine: what it sees of the run is a `View`, what it wants done are `Command`s.
 //! Each node has at most one backup at a time, which goes through the stages below. A change of the run is a new
@@ -33,7 +33,7 @@ pub(crate) enum Stage {
     Announced,
     /// It computes every tick; its samples are a shadow's until the take-over.
     Shadowing,
-    /// Its samples count. The predecessor stays until everybody has read its last ones.
+    /// Its samples count. The predecessor stays until every reader has taken its last ones.
     Retiring,
 }
 
@@ -69,7 +69,7 @@ struct Backup {
     /// Host time at which its process was started, and since when the run waits for it: for the report.
     spawned: Duration,
     held_since: Option<Duration>,
-    /// The generation that it has succeeded.
+    /// The generation that it has replaced.
     retired: Option<u32>,
     report: Report,
 }
@@ -81,7 +81,7 @@ struct Node {
     backup: Option<Backup>,
     /// The highest generation that was started.
     newest_generation: u32,
-    /// Whether the active process is dead and its place not taken yet.
+    /// Whether the primary is dead and not replaced yet.
     is_vacant: bool,
 }
 
@@ -174,7 +174,7 @@ impl<'a> Replacements<'a> {
         }
     }
 
-    /// What follows the end of the active process of `node` by the manifest.
+    /// The program of the primary of `node`, which says what follows its end.
     pub(crate) fn program(&self, node: usize) -> &Program {
         &self.nodes[node].program
     }
@@ -246,7 +246,7 @@ impl<'a> Replacements<'a> {
             Stage::Joining => self.view.is_ready(slot, Phase::Running),
             Stage::Announced => self.all_agree(),
             // It may have completed the tick as a shadow before it was promoted there: the membership that says so is
-            // replaced only when everybody has read it.
+            // replaced only when every instance has acknowledged it.
             Stage::Shadowing => self.has_flown(node) && self.all_agree(),
             Stage::Retiring => self.has_retired(node, backup),
         };
@@ -271,7 +271,7 @@ impl<'a> Replacements<'a> {
         self.nodes[node].backup.as_ref().map(|backup| backup.stage)
     }
 
-    /// One change at a time: the one before must be agreed with, and nobody else may be on the way in.
+    /// One change at a time: the one before must be acknowledged, and no backup of another node may be joining.
     pub(crate) fn may_change(&self, node: usize) -> bool {
         let others = self.nodes.iter().enumerate().filter(|&(other, _)| other != node);
         let mut joining = others.filter_map(|(_, nodes)| nodes.backup.as_ref());
@@ -280,8 +280,8 @@ impl<'a> Replacements<'a> {
             && self.all_agree()
     }
 
-    /// Whether the dead active process of `node` can be replaced now: whoever is on the way in, its own backup
-    /// included, comes to the end of that or is refused first.
+    /// Whether the dead primary of `node` can be replaced now: a backup that is joining, its own included, has joined or is
+    /// refused first.
     pub(crate) fn may_replace(&self, node: usize) -> bool {
         let backup = self.nodes[node].backup.as_ref();
         let is_joining =
@@ -294,12 +294,12 @@ impl<'a> Replacements<'a> {
         self.view.free(node, generation, self.slot(node, generation));
     }
 
-    /// Whether the active process of `node` is dead and somebody is on the way to its place.
+    /// Whether the primary of `node` is dead and being replaced.
     pub(crate) fn is_vacant(&self, node: usize) -> bool {
         self.nodes[node].is_vacant
     }
 
-    /// Takes the backup of `node` out of the run; the active process flies on.
+    /// Takes the backup of `node` out of the run; the primary goes on.
     pub(crate) fn refuse(&mut self, node: usize, reason: String) {
         let Some(mut backup) = self.nodes[node].backup.take() else { return };
         self.view.kill(node, backup.generation);

@@ -38,7 +38,7 @@ pub struct Failure {
     pub policy: OnExit,
     /// Whether a restart leads somewhere.
     pub is_possible: bool,
-    /// How it ended, with its last words.
+    /// How it ended, with the last lines that it wrote.
     pub message: String,
 }
 
@@ -67,7 +67,7 @@ impl<'a, B: Body> Sidecars<'a, B> {
         Ok(())
     }
 
-    /// Hears who is ready and looks who has ended; kills those that do not get ready in their time.
+    /// Hears which are ready and looks which have ended; kills those that do not get ready in their time.
     ///
     /// # Errors
     /// If a process cannot be watched.
@@ -104,7 +104,7 @@ impl<'a, B: Body> Sidecars<'a, B> {
         self.all.iter().all(|sidecar| sidecar.was_ready)
     }
 
-    /// The next one that has failed and of which nobody has drawn the consequences; it counts as settled then.
+    /// The next one that has failed and is not settled; it counts as settled then.
     pub fn next_failure(&mut self, now: Duration) -> Option<Failure> {
         let has_failed = |sidecar: &Sidecar<'_, B>| !sidecar.process.is_settled && sidecar.has_failed();
         let index = self.all.iter().position(has_failed)?;
@@ -120,7 +120,7 @@ impl<'a, B: Body> Sidecars<'a, B> {
         })
     }
 
-    /// The run goes on without sidecar `index`: nobody waits for it.
+    /// The run goes on without sidecar `index`, and does not wait for it.
     pub fn forget(&mut self, index: usize) {
         self.all[index].was_ready = true;
     }

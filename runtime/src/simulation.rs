@@ -14,34 +14,46 @@ mod clock;
 mod faults;
 mod node;
 mod outside;
+mod paths;
 mod settings;
 mod sim;
 
 use crate::event::RunEvent;
 use crate::supervision::Supervisor;
 use crate::supervisor::State;
-use faults::{HARMFUL, HARMLESS};
+use faults::{Fault, HARMFUL, HARMLESS};
 use outside::SimWorld;
 use sim::{Bug, Draw, Log, Sim};
 use std::cell::RefCell;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::rc::Rc;
 
-const SEEDS: u64 = 3000;
+const SEEDS: u64 = 6000;
 /// Within as many seeds a planted bug is found.
 const SEEDS_OF_BUG: u64 = 300;
 /// Lines of the log of a run that fails.
 const LINES: usize = 60;
 
-/// The whole life of a run, with a log if there is to be one; how it ended.
-fn live(seed: u64, bug: Option<Bug>, log: &Log) -> State {
-    let mut draw = Draw::new(seed);
-    let graph = settings::graph(&mut draw);
-    // Each run meets some faults and not others; every other run only such as do not end it.
+/// How a run ended, and why backups were refused.
+struct Life {
+    state: State,
+    refused: Vec<String>,
+}
+
+/// The faults that a run of `seed` meets: some and not others, and every other run only such as do not end it.
+fn drawn_faults(seed: u64, draw: &mut Draw) -> BTreeSet<Fault> {
     let harmful = if seed.is_multiple_of(2) { &HARMFUL[..] } else { &[] };
     let all = HARMLESS.iter().chain(harmful).copied();
-    let faults = all.filter(|_| draw.one_in(2)).collect();
+    all.filter(|_| draw.one_in(2)).collect()
+}
+
+/// The whole life of a run that meets `faults`, or those of its seed; with a log if there is to be one.
+fn live(seed: u64, faults: Option<&[Fault]>, bug: Option<Bug>, log: &Log) -> Life {
+    let mut draw = Draw::new(seed);
+    let graph = settings::graph(&mut draw);
+    let drawn = drawn_faults(seed, &mut draw);
+    let faults = faults.map_or(drawn, |faults| faults.iter().copied().collect());
     let sim = Rc::new(RefCell::new(Sim { bug, log: log.clone(), ..Sim::new(&graph.plan, draw, faults) }));
     let stop = sim.borrow().stop.clone();
     let mut ticks = 0;
@@ -54,17 +66,20 @@ fn live(seed: u64, bug: Option<Bug>, log: &Log) -> State {
     };
     let mut supervisor = Supervisor::new(&graph, SimWorld(sim.clone()), &stop, &mut listener);
     let flown = supervisor.fly(None);
-    let state = supervisor.overseer.state;
+    let state = if flown.is_err() { State::Failed } else { supervisor.overseer.state };
+    let reports = &supervisor.overseer.replacements.reports;
+    let refused = reports.iter().filter_map(|report| report.refused.clone()).collect();
     drop(supervisor);
     let sim = sim.borrow();
     sim.note(|_| format!("{state:?} {flown:?}"));
     sim.check_end(flown.as_ref().err());
-    if flown.is_err() { State::Failed } else { state }
+    Life { state, refused }
 }
 
-/// As [`live`]; of a run that breaks a rule, what it broke.
+/// How a run ended; the error is the rule that it broke.
 fn try_live(seed: u64, bug: Option<Bug>, log: &Log) -> Result<State, String> {
-    catch_unwind(AssertUnwindSafe(|| live(seed, bug, log))).map_err(|panic| {
+    let lived = catch_unwind(AssertUnwindSafe(|| live(seed, None, bug, log).state));
+    lived.map_err(|panic| {
         let text = panic.downcast_ref::<String>().map(String::as_str);
         text.or_else(|| panic.downcast_ref::<&str>().copied()).unwrap_or_default().to_owned()
     })
@@ -82,9 +97,9 @@ fn whatever_happens_a_run_ends_and_every_sample_has_one_writer() {
         match try_live(seed, None, &None) {
             Ok(state) => *ends.entry(format!("{state:?}")).or_insert(0) += 1,
             Err(broken) => {
-                let log = Some(Rc::default());
-                let _ = try_live(seed, None, &log);
-                let lines = log.unwrap_or_default().take();
+                let lines = Rc::default();
+                let _ = try_live(seed, None, &Some(Rc::clone(&lines)));
+                let lines = lines.take();
                 panic!(
                     "seed {seed}: {broken}\n{}\nseed {seed}: {broken}\nrepeat it with `SIMULATED_SEED={seed} \
                      SIMULATED_RUNS=1 cargo test -p hummingbus-runtime --lib simulation`",
@@ -117,4 +132,15 @@ fn bugs_that_are_planted_are_found() {
         println!("{bug:?} is found by seed {seed}: {broken}");
         assert!(broken.contains(breaks), "{bug:?}, seed {seed}: {broken}");
     }
+}
+
+#[test]
+fn a_backup_whose_plan_cannot_be_written_is_refused_and_the_run_goes_on() {
+    let mut refused = 0;
+    for seed in 0..300 {
+        let life = live(seed, Some(&[Fault::StoreBackup, Fault::Swap]), None, &None);
+        assert_eq!(life.state, State::Stopped, "seed {seed}");
+        refused += life.refused.iter().filter(|reason| reason.starts_with("cannot write backup-")).count();
+    }
+    assert!(refused > 20, "{refused}");
 }

@@ -109,7 +109,7 @@ impl<W: World> Standstill<'_, W> {
         }
     }
 
-    /// Who has not come as far as the others, and what it waits for.
+    /// Which processes have not come as far as the others, and what they wait for, as a message.
     pub fn describe(&self, straggler: Option<Straggler>, stood: Duration) -> String {
         let view = &self.replacements.view;
         let names = |phase| {
@@ -133,7 +133,7 @@ impl<W: World> Standstill<'_, W> {
         format!("the run stood still for {:.1} s: {waiting}", stood.as_secs_f64())
     }
 
-    /// Who is awake and does not come on, and which topics the others sleep for.
+    /// Which instances are awake and do not come on, and which topics the others sleep for.
     fn describe_stuck(&self) -> String {
         let (plan, view) = (self.plan, &self.replacements.view);
         let slot = |&(node, generation): &(usize, u32)| plan.slot(node, generation);

@@ -101,7 +101,7 @@ impl<'a, W: World> Supervisor<'a, W> {
         }
     }
 
-    /// Starts everybody, in an order that `start_order_seed` says, and watches until all have ended. Whatever goes wrong,
+    /// Starts all processes, in the order of `start_order_seed`, and watches until they have ended. Whatever goes wrong,
     /// those that live may leave in order: the recorder finishes its file.
     ///
     /// # Errors
@@ -178,7 +178,7 @@ impl<'a, W: World> Supervisor<'a, W> {
         }
         let ended = self.overseer.note_too_late();
         self.follow(ended)?;
-        // Before it too: what is held now must stay held while somebody joins.
+        // Before `advance` too: what is held now must stay held while a backup joins.
         self.see();
         self.world.write(SegmentWrite::JoinTick(self.join_tick()));
         self.see();
@@ -272,7 +272,7 @@ impl<'a, W: World> Supervisor<'a, W> {
         slots.map(|slot| self.world.spent(slot)).fold(self.spent[node], sum)
     }
 
-    /// Takes note of the end of orphans, which would otherwise stay in the table of processes for the whole run.
+    /// Reaps orphans that have ended: they would stay in the table of processes for the whole run.
     fn reap(&mut self) {
         if self.clock.since(self.timing.reaped) >= REAP_PERIOD {
             self.timing.reaped = self.clock.now();
@@ -290,7 +290,7 @@ impl<'a, W: World> Supervisor<'a, W> {
         }
     }
 
-    /// Tells the state machine what happened.
+    /// Tells the state machine what happened, and does what follows.
     fn tell(&mut self, event: Event) -> Result<Action> {
         let action = self.overseer.tell(event);
         self.carry_out()?;

@@ -140,7 +140,7 @@ pub struct View {
 }
 
 impl View {
-    /// What `control` shows of the run of `plan`; who lives, and the time, is for others to say.
+    /// What `control` shows of the run of `plan`; the living instances and the times are left out.
     pub fn of(plan: &Plan, control: &LiveView) -> Self {
         let phase = |slot| {
             let phases = [Phase::Running, Phase::Connecting];
@@ -246,7 +246,7 @@ impl View {
         self.slots[slot].done.min(self.end_tick)
     }
 
-    /// Commands that nobody answers the end of an instance.
+    /// Commands that the end of an instance is not answered.
     pub fn settle(&mut self, node: usize, generation: u32) {
         self.commands.push(Command::Settle { node, generation });
     }

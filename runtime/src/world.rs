@@ -1,5 +1,4 @@
-//! What a supervisor needs of the world outside it: the control segment, processes, files, the host's clock, and those who
-//! ask for swaps. `host_world.rs` is the real one; the simulation draws another from a seed.
+//! What a supervisor needs of the world outside it: the control segment, processes, files, the host's clock, and requests. `host_world.rs` is the real one; the simulation draws another from a seed.
 
 use crate::ctl::protocol::{Answer, Request};
 use crate::host::End;
@@ -43,7 +42,7 @@ pub trait World {
     fn start(&mut self, name: &str, role: Role, program: Option<&Program>) -> Result<Self::Body>;
     /// Whether sidecar `index` has said that it is ready since this was asked last.
     fn hears_ready(&mut self, index: usize) -> bool;
-    /// Takes note of the end of orphans, but for the processes `known`, which somebody waits for.
+    /// Takes note of the end of orphans, but for the processes `known`, which are waited for elsewhere.
     fn reap(&self, known: &[u32]);
 
     /// Writes what a backup of `node` reads about itself.

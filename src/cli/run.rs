@@ -119,7 +119,7 @@ pub fn run(
     let profile = flight.as_ref().map(|flight| Profile::of(flight, outcome.missed_deadlines));
     let mut judgement = Judgement::default();
     if let Some(recording) = &recording {
-        judgement.steps = shadow::steps(recording, &graph.plan, &outcome.successions)?;
+        judgement.steps = shadow::steps(recording, &graph.plan, &outcome.replacements)?;
         judgement.shadows = shadow::differences(recording)?;
         // A run that was stopped has not flown what the conditions speak of.
         if !outcome.was_stopped {

@@ -8,7 +8,7 @@ use std::time::Duration;
 
 impl Replacements<'_> {
     /// The backup on which the run waits, because it has not joined yet: node, generation, stage and when that
-    /// began. One that is early for its tick, or prepares while the run flies, keeps nobody waiting.
+    /// began. One that is early for its tick, or prepares while the run flies, holds nothing up.
     pub(crate) fn joining(&self) -> Option<(usize, u32, Stage, Duration)> {
         let backups = self.nodes.iter().enumerate();
         let awaited = backups.filter_map(|(node, nodes)| {
@@ -25,7 +25,7 @@ impl Replacements<'_> {
         awaited.max_by_key(|&(.., stage, _)| stage > Stage::Starting)
     }
 
-    /// The tick at which the clock must wait for somebody to join; `u32::MAX` if nobody is awaited.
+    /// The tick at which the clock must wait for a backup to join; `u32::MAX` if none is awaited.
     pub(crate) fn hold_tick(&self) -> u32 {
         let backups = self.nodes.iter().filter_map(|nodes| {
             let backup = nodes.backup.as_ref().filter(|c| c.stage < Stage::Shadowing)?;
@@ -36,7 +36,7 @@ impl Replacements<'_> {
             }
         });
         let pending = self.pending.iter().filter_map(|pending| match pending.join {
-            // Who took a dead process's place comes first, even if the run passes the tick.
+            // The replacement of a dead process comes first, even if the run passes the tick.
             Join::At(_) if self.is_recovering(pending.spec.node) => None,
             Join::At(tick) => Some(tick),
             Join::Next { .. } | Join::AtOnce => None,
@@ -91,9 +91,9 @@ impl Replacements<'_> {
     pub(super) fn start_backup(&mut self, pending: Pending) {
         let node = pending.spec.node;
         // A backup that failed leaves its generation unused, and its slot is the primary's other one.
-        let active = self.membership.nodes[node].primary.generation;
+        let primary = self.membership.nodes[node].primary.generation;
         let next = self.nodes[node].newest_generation + 1;
-        let is_other_slot = self.slot(node, next) != self.slot(node, active);
+        let is_other_slot = self.slot(node, next) != self.slot(node, primary);
         let generation = if is_other_slot { next } else { next + 1 };
         let name = self.plan.nodes[node].name.clone();
         self.view.clear_slot(self.slot(node, generation));
@@ -126,7 +126,7 @@ impl Replacements<'_> {
         });
     }
 
-    /// The process of the backup of `node` could not be started. Where nobody else can go on, that is an error.
+    /// The process of the backup of `node` could not be started. Where no other instance can go on, that is an error.
     pub(crate) fn note_not_started(
         &mut self,
         node: usize,
@@ -195,7 +195,7 @@ impl Replacements<'_> {
     pub(super) fn let_join(&mut self, node: usize) {
         let Some(backup) = &mut self.nodes[node].backup else { return };
         let (plan, view) = (self.plan, &mut self.view);
-        let active = plan.slot(node, self.membership.nodes[node].primary.generation);
+        let primary = plan.slot(node, self.membership.nodes[node].primary.generation);
         let spec = &backup.pending.spec;
         let outputs = &spec.plan.outputs;
         let (join_tick, take_over_tick) = match backup.pending.join {
@@ -207,7 +207,7 @@ impl Replacements<'_> {
                     .and_then(|ticks| tick.checked_add(ticks.max(1))?.checked_next_multiple_of(stride));
                 (tick, take_over.unwrap_or(u32::MAX))
             }
-            Join::AtOnce => (view.slots[active].done, view.slots[active].done),
+            Join::AtOnce => (view.slots[primary].done, view.slots[primary].done),
         };
         let shadows = backup.pending.join != Join::AtOnce;
         let membership = &mut self.membership.nodes[node];
@@ -234,7 +234,7 @@ impl Replacements<'_> {
         view.set_slot_state(slot, SlotState::Joining);
     }
 
-    /// The backup has connected: everybody connects to it.
+    /// The backup has connected: every instance connects to it.
     pub(super) fn announce(&mut self, node: usize) {
         self.view.set_epoch(self.membership.epoch);
         if let Some(backup) = &mut self.nodes[node].backup {

@@ -1,4 +1,4 @@
-//! What became of backups, for those who read about a run.
+//! What became of the backups of a run.
 
 use bus::plan::InputPlan;
 use serde::Serialize;
@@ -7,11 +7,11 @@ use serde::Serialize;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Purpose {
-    /// It shadows the active process for a while, then takes over.
+    /// It shadows the primary for a while, then takes over.
     Swap,
-    /// It shadows the active process, and takes over when that dies.
+    /// It shadows the primary, and takes over when that dies.
     Standby,
-    /// It shadows the active process and never flies.
+    /// It shadows the primary and never takes over.
     Shadow,
     /// It takes the place of a process that died.
     Restart,

@@ -15,7 +15,7 @@ impl Replacements<'_> {
         })
     }
 
-    /// A process that everybody has read the last samples of and that does not leave: node and generation.
+    /// A process whose last samples are read and which does not leave: node and generation.
     pub(crate) fn lingering(&self) -> Option<(usize, u32)> {
         self.nodes.iter().enumerate().find_map(|(node, nodes)| {
             let backup = nodes.backup.as_ref().filter(|backup| backup.stage == Stage::Retiring)?;
@@ -39,7 +39,7 @@ impl Replacements<'_> {
         is_shadowing && outputs.into_iter().any(has_sent)
     }
 
-    /// Its first tick is done, or lost with it: from now on it is the active one.
+    /// Its first tick is done, or lost with it: from now on it is the primary.
     pub(crate) fn commit(&mut self, node: usize) {
         let membership = &mut self.membership.nodes[node];
         let take_over_tick = membership.take_over_tick;
@@ -55,11 +55,11 @@ impl Replacements<'_> {
             backup.retired = Some(retired);
             backup.stage = Stage::Retiring;
         }
-        // Every node knows already: this is for those who look at the run from outside.
+        // Every node follows it already: this is for programs that look at the run from outside.
         self.view.store(&self.membership);
     }
 
-    /// The process has ended: if it is a predecessor that did not come to leave by itself, nobody waits for it.
+    /// The process has ended: if it is a predecessor that did not leave by itself, it is waited for no longer.
     pub(crate) fn note_end_of_retired(&mut self, node: usize, generation: u32) {
         let backup = self.nodes[node].backup.as_ref();
         if backup.is_some_and(|backup| backup.retired == Some(generation)) {
@@ -68,7 +68,7 @@ impl Replacements<'_> {
         }
     }
 
-    /// Whether the predecessor has left and everybody has read its last samples.
+    /// Whether the predecessor has left and its last samples are read.
     pub(super) fn has_retired(&self, node: usize, backup: &Backup) -> bool {
         if backup.retired.is_some_and(|retired| self.view.lives(node, retired)) {
             return false;
@@ -76,7 +76,7 @@ impl Replacements<'_> {
         self.is_read(backup)
     }
 
-    /// Whether everybody has read the last samples of the process that `backup` has succeeded.
+    /// Whether every instance has read the last samples of the process that `backup` has replaced.
     pub(super) fn is_read(&self, backup: &Backup) -> bool {
         let longest = self.plan.nodes.iter().map(|node| node.period_ticks).max().unwrap_or(1);
         let taken = backup.report.take_over_tick.unwrap_or_default().saturating_add(longest + 1);
@@ -93,7 +93,7 @@ impl Replacements<'_> {
         let on_exit = self.nodes[node].program.on_exit;
         self.nodes[node].program = Program { on_exit, ..backup.pending.spec.program.clone() };
         if on_exit == OnExit::Standby {
-            // Who was promoted gets a standby of its own, as soon as a tick boundary comes.
+            // A promoted standby gets one of its own at the next tick boundary.
             let pending = Pending {
                 spec: backup.pending.spec,
                 purpose: Purpose::Standby,
@@ -106,8 +106,8 @@ impl Replacements<'_> {
         self.reports.push(backup.report);
     }
 
-    /// The active process of `node` has died while its predecessor retired: that is over now. Nothing more comes
-    /// from the predecessor, and who has not read its last samples yet holds them.
+    /// The primary of `node` has died while its predecessor retired: that is over now. Nothing more comes from the
+    /// predecessor, and readers that have not taken its last samples yet hold them.
     pub(crate) fn close_early(&mut self, node: usize) {
         let Some(backup) = self.nodes[node].backup.as_ref().filter(|c| c.stage == Stage::Retiring) else {
             return;
@@ -118,36 +118,37 @@ impl Replacements<'_> {
         self.close(node);
     }
 
-    /// Whether the backup of `node` can take the place of the active process at once. One that was never to be
-    /// listened to cannot.
+    /// Whether the backup of `node` can take the place of the primary at once. One that only shadows
+    /// cannot.
     pub(crate) fn can_promote(&self, node: usize) -> bool {
         self.nodes[node].backup.as_ref().is_some_and(|backup| {
             backup.stage == Stage::Shadowing && backup.pending.purpose != Purpose::Shadow
         })
     }
 
-    /// Whether the active process of `node` has completed a tick since it joined: a restart leads somewhere.
+    /// Whether the primary of `node` has completed a tick since it joined: a restart leads somewhere.
     pub(crate) fn has_come_on(&self, node: usize) -> bool {
-        let active = &self.membership.nodes[node].primary;
-        active.generation == 0 || self.view.slots[self.slot(node, active.generation)].done > active.join_tick
+        let primary = &self.membership.nodes[node].primary;
+        primary.generation == 0
+            || self.view.slots[self.slot(node, primary.generation)].done > primary.join_tick
     }
 
-    /// The active process of `node` is dead: the backup takes its place at the tick it did not complete.
+    /// The primary of `node` is dead: the backup takes its place at the tick it did not complete.
     pub(crate) fn promote(&mut self, node: usize) {
-        let active = self.slot(node, self.membership.nodes[node].primary.generation);
+        let primary = self.slot(node, self.membership.nodes[node].primary.generation);
         let view = &self.view;
         let membership = &mut self.membership.nodes[node];
-        membership.take_over_tick = view.slots[active].done;
+        membership.take_over_tick = view.slots[primary].done;
         let outputs = membership.primary.plan.outputs.iter();
         membership.take_over_ticks = outputs.map(|output| view.sent[output.topic]).collect();
         self.membership.epoch += 1;
         self.view.store(&self.membership);
-        self.view.set_slot_state(active, SlotState::Empty);
+        self.view.set_slot_state(primary, SlotState::Empty);
         self.view.set_epoch(self.membership.epoch);
         self.nodes[node].is_vacant = true;
     }
 
-    /// The active process of `node` is dead: another one of its kind is started in its place.
+    /// The primary of `node` is dead: another one of its kind is started in its place.
     pub(crate) fn restart(&mut self, node: usize) {
         let spec = BackupSpec {
             node,

@@ -40,7 +40,7 @@ enum SwapRefused {
     BetweenPeriods { process: String, stride: u32, period: u32 },
 }
 
-/// What became of a swap, for whoever asked for it.
+/// The answer to a swap that has come to its end.
 fn answer(report: &Report) -> Answer {
     match (&report.refused, report.take_over_tick) {
         (Some(reason), _) => Answer::refused(reason.clone()),
