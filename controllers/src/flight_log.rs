@@ -4,7 +4,7 @@ use bus::messages::Quaternion;
 use diagnostics::unit::{COUNT, Dimension, LENGTH, PURE_NUMBER, SPEED, TIME, VELOCITY};
 use serde::Deserialize;
 use std::path::{Path, PathBuf};
-use vehicles::quotes::StrayQuote;
+use vehicles::table::{self, Table, TableError};
 
 /// Which columns of a file hold a quantity, and in which unit.
 #[derive(Clone, Debug, Deserialize)]
@@ -74,25 +74,25 @@ pub struct FlightLog {
 #[derive(Debug, thiserror::Error)]
 pub enum FlightLogError {
     /// The file cannot be opened.
-    #[error(
-        "the flight {path} cannot be read: {reason}. Give its path with --set process.<player>.data=PATH"
-    )]
+    #[error("the flight {path} cannot be read: {cause}. Give its path with --set process.<player>.data=PATH")]
     File {
         /// The file.
         path: PathBuf,
         /// Why.
-        reason: String,
+        #[source]
+        cause: std::io::Error,
     },
-    /// A quotation mark makes one cell of what are many.
-    #[error("the flight {path}, {stray}")]
-    Quote {
+    /// It is no table.
+    #[error("the flight {path}: {cause}")]
+    Table {
         /// The file.
         path: PathBuf,
-        /// Where it stands, and what to do.
-        stray: StrayQuote,
+        /// Where, and what to do.
+        #[source]
+        cause: TableError,
     },
     /// A column of the map is not in the file.
-    #[error("the flight {path} has no column `{column}` (the map's `{quantity}`); it has {known}")]
+    #[error("the flight {path} has no column `{column}` (the map's `{quantity}`); it has {}", known.join(", "))]
     MissingColumn {
         /// The file.
         path: PathBuf,
@@ -101,17 +101,17 @@ pub enum FlightLogError {
         /// What the map reads from it.
         quantity: &'static str,
         /// The columns there are.
-        known: String,
+        known: Vec<String>,
     },
     /// The map states a unit that the quantity cannot have.
-    #[error("`{quantity}` has the unit `{found}`, expected {expected}")]
+    #[error("`{quantity}` has the unit `{found}`, expected {}", expected.names(" or "))]
     Unit {
         /// The quantity.
         quantity: &'static str,
         /// The unit stated.
         found: String,
-        /// The units it can have.
-        expected: String,
+        /// The dimension whose units it can have.
+        expected: Dimension,
     },
     /// A cell is not a number.
     #[error("the flight {path}, line {line}, column `{column}`: {found:?} is not {expected}")]
@@ -127,25 +127,35 @@ pub enum FlightLogError {
         /// What may stand there.
         expected: &'static str,
     },
-    /// Time does not grow, or there is too little of it.
-    #[error("the flight {path}: {reason}")]
+    /// A row has another number of cells than the header, as with decimal commas.
+    #[error("the flight {path}, line {line}: expected {expected} cells as in the header, found {found}")]
+    Cells {
+        /// The file.
+        path: PathBuf,
+        /// The line, counted from 1.
+        line: u64,
+        /// How many the header has.
+        expected: usize,
+        /// How many the row has.
+        found: usize,
+    },
+    /// There is no time that passes.
+    #[error("the flight {path}: it has {rows} rows of data, expected at least 2")]
+    TooShort {
+        /// The file.
+        path: PathBuf,
+        /// Rows below the header.
+        rows: usize,
+    },
+    /// Time does not grow.
+    #[error("the flight {path}: time does not grow from line {line} to the next")]
     Time {
         /// The file.
         path: PathBuf,
-        /// What is wrong.
-        reason: String,
+        /// The line, counted from 1.
+        line: u64,
     },
 }
-
-/// The dimension of each quantity.
-const DIMENSIONS: [(&str, Dimension); 6] = [
-    ("time", TIME),
-    ("command", COUNT),
-    ("position", LENGTH),
-    ("velocity", VELOCITY),
-    ("attitude", PURE_NUMBER),
-    ("angular_velocity", SPEED),
-];
 
 impl FlightLog {
     /// Reads the flight at `path`.
@@ -153,23 +163,29 @@ impl FlightLog {
     /// # Errors
     /// If the file, a column or a unit is missing, or a cell is not a number.
     pub fn load(path: &Path, map: &ColumnMap) -> Result<Self, FlightLogError> {
-        let refused = |reason: String| FlightLogError::File { path: path.into(), reason };
-        let bytes = vehicles::text::read_log(path).map_err(|error| refused(error.to_string()))?;
-        vehicles::quotes::check(&bytes, b',')
-            .map_err(|stray| FlightLogError::Quote { path: path.into(), stray })?;
-        let file_error = |error: csv::Error| refused(error.to_string());
-        let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(&bytes[..]);
-        let headers = reader.headers().map_err(file_error)?.clone();
-        let source = Source { path, headers };
-        let picks = Picks::new(&source, map)?;
-        let mut rows = Vec::new();
-        for record in reader.records() {
-            rows.push(picks.row(&source, &record.map_err(file_error)?)?);
-        }
-        let start_s = rows.first().map_or(0.0, |row: &Row| row.time_s);
-        rows.iter_mut().for_each(|row| row.time_s -= start_s);
-        require_growing_time(path, &rows)?;
-        Ok(Self { rows })
+        let bytes = vehicles::text::read_log(path)
+            .map_err(|cause| FlightLogError::File { path: path.into(), cause })?;
+        let table =
+            Table::parse(&bytes).map_err(|cause| FlightLogError::Table { path: path.into(), cause })?;
+        let source = Source { path, table };
+        let mut time_s = source.values("time", TIME, &map.time)?;
+        let start_s = time_s.first().map_or(0.0, |first| first[0]);
+        time_s.iter_mut().for_each(|time_s| time_s[0] -= start_s);
+        let command = source.values("command", COUNT, &map.command)?;
+        let position_m = source.values("position", LENGTH, &map.position)?;
+        let velocity_m_s = source.values("velocity", VELOCITY, &map.velocity)?;
+        let attitude = source.values("attitude", PURE_NUMBER, &map.attitude)?;
+        let rates_rad_s = source.values("angular_velocity", SPEED, &map.angular_velocity)?;
+        source.check(&time_s, &attitude, &map.attitude.columns[3])?;
+        let row = |index: usize| Row {
+            time_s: time_s[index][0],
+            command: command[index],
+            position_m: position_m[index],
+            velocity_m_s: velocity_m_s[index],
+            attitude: attitude[index],
+            angular_velocity_rad_s: rates_rad_s[index],
+        };
+        Ok(Self { rows: (0..time_s.len()).map(row).collect() })
     }
 
     /// Length of the flight.
@@ -214,18 +230,6 @@ impl Row {
     }
 }
 
-fn require_growing_time(path: &Path, rows: &[Row]) -> Result<(), FlightLogError> {
-    let time_error = |reason| FlightLogError::Time { path: path.into(), reason };
-    if rows.len() < 2 {
-        return Err(time_error(format!("it has {} rows of data, expected at least 2", rows.len())));
-    }
-    match rows.windows(2).position(|pair| pair[1].time_s <= pair[0].time_s) {
-        // The header is line 1 and the first row line 2.
-        Some(index) => Err(time_error(format!("time does not grow from line {} to the next", index + 2))),
-        None => Ok(()),
-    }
-}
-
 fn blend<const N: usize>(a: &[f64; N], b: &[f64; N], part: f64) -> [f64; N] {
     std::array::from_fn(|i| a[i] + (b[i] - a[i]) * part)
 }
@@ -239,114 +243,88 @@ fn blend_attitude(a: &[f64; 4], b: &[f64; 4], part: f64) -> [f64; 4] {
     mixed.map(|x| x / norm)
 }
 
-struct Source<'a> {
-    path: &'a Path,
-    headers: csv::StringRecord,
-}
-
-/// Columns found in the header, with the factor to SI.
-struct Pick<const N: usize> {
-    indices: [usize; N],
-    factor: f64,
-}
-
-impl<const N: usize> Pick<N> {
-    fn new(source: &Source<'_>, quantity: &'static str, map: &Columns<N>) -> Result<Self, FlightLogError> {
-        let mut indices = [0; N];
-        for (index, column) in indices.iter_mut().zip(&map.columns) {
-            *index = source.headers.iter().position(|header| header == column).ok_or_else(|| {
-                FlightLogError::MissingColumn {
-                    path: source.path.into(),
-                    column: column.clone(),
-                    quantity,
-                    known: source.headers.iter().collect::<Vec<_>>().join(", "),
-                }
-            })?;
-        }
-        Ok(Self { indices, factor: factor(quantity, &map.unit)? })
-    }
-
-    fn values(&self, source: &Source<'_>, record: &csv::StringRecord) -> Result<[f64; N], FlightLogError> {
-        let mut values = [0.0; N];
-        for (value, &index) in values.iter_mut().zip(&self.indices) {
-            let text = record.get(index).unwrap_or_default();
-            *value = match text.parse::<f64>() {
-                Ok(number) if !number.is_finite() => {
-                    return Err(source.cell(record, index, "a finite number"));
-                }
-                Ok(number) if (number * self.factor).abs() <= CELL_MAX => number * self.factor,
-                Ok(_) => {
-                    return Err(source.cell(record, index, "at most 1e12 in SI, which no flight exceeds"));
-                }
-                Err(_) => return Err(source.cell(record, index, "a finite number")),
-            };
-        }
-        Ok(values)
-    }
-}
-
 /// No flight has more of anything, in SI: seconds since 1970 are 2e9, counts go to 4.3e9.
 const CELL_MAX: f64 = 1e12;
 
 /// A quaternion this short has no direction left; logs write 1, or 0 where there is none.
 const NORM_MIN: f64 = 1e-3;
 
+struct Source<'a> {
+    path: &'a Path,
+    table: Table,
+}
+
 impl Source<'_> {
-    fn cell(&self, record: &csv::StringRecord, index: usize, expected: &'static str) -> FlightLogError {
-        FlightLogError::Cell {
-            path: self.path.into(),
-            line: record.position().map_or(0, csv::Position::line),
-            column: self.headers.get(index).unwrap_or_default().to_owned(),
-            found: record.get(index).unwrap_or_default().to_owned(),
-            expected,
+    /// The samples of a quantity in SI, row by row.
+    fn values<const N: usize>(
+        &self,
+        quantity: &'static str,
+        dimension: Dimension,
+        map: &Columns<N>,
+    ) -> Result<Vec<[f64; N]>, FlightLogError> {
+        let mut indices = [0; N];
+        for (index, column) in indices.iter_mut().zip(&map.columns) {
+            *index = self.table.column(column).ok_or_else(|| FlightLogError::MissingColumn {
+                path: self.path.into(),
+                column: column.clone(),
+                quantity,
+                known: self.table.headers.clone(),
+            })?;
         }
+        let factor = dimension.factor(&map.unit).ok_or_else(|| FlightLogError::Unit {
+            quantity,
+            found: map.unit.clone(),
+            expected: dimension,
+        })?;
+        let sample = |row: &table::Row| -> Result<[f64; N], FlightLogError> {
+            let mut values = [0.0; N];
+            for ((value, index), column) in values.iter_mut().zip(indices).zip(&map.columns) {
+                *value = number(row.cell(index), factor)
+                    .map_err(|expected| self.cell(row, column, row.cell(index), expected))?;
+            }
+            Ok(values)
+        };
+        self.table.rows.iter().map(sample).collect()
+    }
+
+    /// Refuses rows of another length, times that do not grow, and quaternions without a direction.
+    fn check(
+        &self,
+        time_s: &[[f64; 1]],
+        attitude: &[[f64; 4]],
+        last_part: &str,
+    ) -> Result<(), FlightLogError> {
+        let (path, rows) = (self.path.to_owned(), &self.table.rows);
+        if rows.len() < 2 {
+            return Err(FlightLogError::TooShort { path, rows: rows.len() });
+        }
+        let expected = self.table.headers.len();
+        if let Some(row) = rows.iter().find(|row| row.cells.len() != expected) {
+            return Err(FlightLogError::Cells { path, line: row.line, expected, found: row.cells.len() });
+        }
+        let is_zero = |q: &[f64; 4]| q.iter().map(|x| x * x).sum::<f64>() < NORM_MIN * NORM_MIN;
+        if let Some(index) = attitude.iter().position(is_zero) {
+            let (found, expected) =
+                (attitude[index][3].to_string(), "part of an attitude: the quaternion is 0");
+            return Err(self.cell(&rows[index], last_part, &found, expected));
+        }
+        match time_s.windows(2).position(|pair| pair[1] <= pair[0]) {
+            Some(index) => Err(FlightLogError::Time { path, line: rows[index].line }),
+            None => Ok(()),
+        }
+    }
+
+    fn cell(&self, row: &table::Row, column: &str, found: &str, expected: &'static str) -> FlightLogError {
+        let (path, column, found) = (self.path.to_owned(), column.to_owned(), found.to_owned());
+        FlightLogError::Cell { path, line: row.line, column, found, expected }
     }
 }
 
-fn factor(quantity: &'static str, unit: &str) -> Result<f64, FlightLogError> {
-    let found = DIMENSIONS.iter().find(|(name, _)| *name == quantity);
-    found.and_then(|(_, dimension)| dimension.factor(unit)).ok_or_else(|| FlightLogError::Unit {
-        quantity,
-        found: unit.to_owned(),
-        expected: found.map(|(_, dimension)| dimension.names(" or ")).unwrap_or_default(),
-    })
-}
-
-struct Picks {
-    time: Pick<1>,
-    command: Pick<4>,
-    position: Pick<3>,
-    velocity: Pick<3>,
-    attitude: Pick<4>,
-    angular_velocity: Pick<3>,
-}
-
-impl Picks {
-    fn new(source: &Source<'_>, map: &ColumnMap) -> Result<Self, FlightLogError> {
-        Ok(Self {
-            time: Pick::new(source, "time", &map.time)?,
-            command: Pick::new(source, "command", &map.command)?,
-            position: Pick::new(source, "position", &map.position)?,
-            velocity: Pick::new(source, "velocity", &map.velocity)?,
-            attitude: Pick::new(source, "attitude", &map.attitude)?,
-            angular_velocity: Pick::new(source, "angular_velocity", &map.angular_velocity)?,
-        })
-    }
-
-    fn row(&self, source: &Source<'_>, record: &csv::StringRecord) -> Result<Row, FlightLogError> {
-        let [time_s] = self.time.values(source, record)?;
-        let attitude = self.attitude.values(source, record)?;
-        if attitude.iter().map(|x| x * x).sum::<f64>() < NORM_MIN * NORM_MIN {
-            let expected = "part of an attitude: the quaternion is 0";
-            return Err(source.cell(record, self.attitude.indices[3], expected));
-        }
-        Ok(Row {
-            time_s,
-            command: self.command.values(source, record)?,
-            position_m: self.position.values(source, record)?,
-            velocity_m_s: self.velocity.values(source, record)?,
-            attitude,
-            angular_velocity_rad_s: self.angular_velocity.values(source, record)?,
-        })
+/// The number in a cell times `factor`, or what was expected there.
+fn number(cell: &str, factor: f64) -> Result<f64, &'static str> {
+    match cell.parse::<f64>() {
+        Ok(number) if number.is_finite() && (number * factor).abs() <= CELL_MAX => Ok(number * factor),
+        Ok(number) if number.is_finite() => Err("at most 1e12 in SI, which no flight exceeds"),
+        _ => Err("a finite number"),
     }
 }

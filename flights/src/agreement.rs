@@ -87,7 +87,6 @@ impl Pairs {
         let logged = dot(&self.logged, &self.logged);
         let derived = dot(&self.derived, &self.derived);
         let both = dot(&self.logged, &self.derived);
-        #[allow(clippy::cast_precision_loss, reason = "counts of samples")]
         let count = self.derived.len() as f64;
         let says_something =
             self.derived.len() >= PAIRS_MIN && (derived / count).sqrt() > quiet && logged > 0.0;
@@ -124,7 +123,6 @@ pub struct Agreement {
 fn mean(channel: &Channel<3>, from_s: f64, to_s: f64) -> Option<Vector3<f64>> {
     let index = |time_s: f64| channel.time_s.partition_point(|sample_s| *sample_s <= time_s);
     let samples = channel.values.get(index(from_s)..index(to_s)).filter(|samples| !samples.is_empty())?;
-    #[allow(clippy::cast_precision_loss, reason = "a count of samples")]
     let count = samples.len() as f64;
     Some(samples.iter().map(|sample| Vector3::from(*sample)).sum::<Vector3<f64>>() / count)
 }

@@ -65,7 +65,31 @@ pub enum Number {
     Double,
 }
 
+/// The types of numbers: as ULog names them, by the characters of Python's `struct` that mean them.
+const NUMBERS: [(&str, &str, Number); 10] = [
+    ("int8_t", "b", Number::Signed(1)),
+    ("uint8_t bool char", "B ?", Number::Unsigned(1)),
+    ("int16_t", "h", Number::Signed(2)),
+    ("uint16_t", "H", Number::Unsigned(2)),
+    ("int32_t", "i l", Number::Signed(4)),
+    ("uint32_t", "I L", Number::Unsigned(4)),
+    ("int64_t", "q", Number::Signed(8)),
+    ("uint64_t", "Q", Number::Unsigned(8)),
+    ("float", "f", Number::Float),
+    ("double", "d", Number::Double),
+];
+
 impl Number {
+    /// The type that a ULog calls `name`.
+    pub fn of_ulog(name: &str) -> Option<Self> {
+        NUMBERS.iter().find(|known| known.0.split(' ').any(|known| known == name)).map(|known| known.2)
+    }
+
+    /// The type that a character of Python's `struct` means.
+    pub fn of_struct(character: &str) -> Option<Self> {
+        NUMBERS.iter().find(|known| known.1.split(' ').any(|known| known == character)).map(|known| known.2)
+    }
+
     /// How many bytes it takes.
     pub fn size(self) -> usize {
         match self {
@@ -76,7 +100,6 @@ impl Number {
     }
 
     /// The number at the start of `bytes`; NaN where they are too few.
-    #[allow(clippy::cast_precision_loss, reason = "measured values need no more than a double")]
     pub fn read(self, bytes: &[u8]) -> f64 {
         let Some(bytes) = bytes.get(..self.size()) else { return f64::NAN };
         let mut wide = [0; 8];

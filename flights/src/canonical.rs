@@ -1,13 +1,12 @@
 //! A flight as one table on one time base, in SI: a CSV file that every tool reads, the `player` node among them.
 
-use std::fmt::Write as _;
 use std::path::Path;
 
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 
 use crate::clean::{GAP_PERIODS, gaps};
 use crate::error::FlightsError;
-use crate::flight::{Channel, Flight};
+use crate::flight::{Channel, Flight, period_s};
 use crate::frame::{from_wxyz, to_wxyz};
 
 /// How the columns of the file are to be read, as the `columns` table of a player in a manifest.
@@ -43,7 +42,7 @@ pub struct Canonical {
 pub fn write_csv(flight: &Flight, path: &Path) -> Result<Canonical, FlightsError> {
     let (canonical, text) = csv(flight)?;
     std::fs::write(path, text)
-        .map_err(|error| FlightsError::Write { path: path.to_owned(), reason: error.to_string() })?;
+        .map_err(|cause| FlightsError::Write { path: path.to_owned(), cause })?;
     Ok(canonical)
 }
 
@@ -58,13 +57,7 @@ pub fn csv(flight: &Flight) -> Result<(Canonical, String), FlightsError> {
         if flight.attitude.is_empty() { &flight.angular_velocity.time_s } else { &flight.attitude.time_s };
     let times: Vec<f64> = base.iter().copied().filter(|time_s| !table.is_in_gap(*time_s)).collect();
     if times.is_empty() {
-        return Err(FlightsError::TooLittle {
-            flight: flight.name.clone(),
-            reason:
-                "no attitude or angular velocity at a time at which its other channels have samples; map one \
-                     of them, or use `assume = \"hover\"`"
-                    .to_owned(),
-        });
+        return Err(FlightsError::NoRows { flight: flight.name.clone() });
     }
     if times.len() < base.len() {
         notes.push(format!(
@@ -112,17 +105,13 @@ impl<'a> Table<'a> {
         ];
         notes
             .extend(missing.iter().filter(|(is_missing, _)| *is_missing).map(|(_, text)| (*text).to_owned()));
-        let mut table = Self { flight, velocity, angular_velocity, gaps: Vec::new() };
-        table.find_gaps();
-        table
-    }
-
-    fn find_gaps(&mut self) {
-        let mut found = without(&self.flight.position);
-        found.extend(without(&self.velocity));
-        found.extend(without(&self.flight.attitude));
-        found.extend(without(&self.angular_velocity));
-        self.gaps = joined(found);
+        let gaps = [
+            without(&flight.position.time_s),
+            without(&velocity.time_s),
+            without(&flight.attitude.time_s),
+            without(&angular_velocity.time_s),
+        ];
+        Self { flight, gaps: joined(gaps.concat()), velocity, angular_velocity }
     }
 
     fn is_in_gap(&self, time_s: f64) -> bool {
@@ -141,11 +130,7 @@ impl<'a> Table<'a> {
             &linear(&self.angular_velocity, time_s),
         ]
         .concat();
-        let mut row = String::new();
-        for (index, number) in numbers.iter().enumerate() {
-            let _ = write!(row, "{}{number}", if index == 0 { "" } else { "," });
-        }
-        row + "\n"
+        numbers.iter().map(f64::to_string).collect::<Vec<_>>().join(",") + "\n"
     }
 }
 
@@ -165,13 +150,13 @@ fn joined(mut gaps: Vec<(f64, f64)>) -> Vec<(f64, f64)> {
 }
 
 /// The times at which a channel has no samples: its gaps, and all before and after it but for five periods.
-fn without<const N: usize>(channel: &Channel<N>) -> Vec<(f64, f64)> {
-    let (Some((first_s, last_s)), Some(period_s)) = (channel.span_s(), channel.period_s()) else {
+fn without(time_s: &[f64]) -> Vec<(f64, f64)> {
+    let (Some(first_s), Some(last_s), Some(period_s)) = (time_s.first(), time_s.last(), period_s(time_s)) else {
         return Vec::new();
     };
     let slack_s = GAP_PERIODS * period_s;
     let ends = [(f64::NEG_INFINITY, first_s - slack_s), (last_s + slack_s, f64::INFINITY)];
-    gaps(channel).into_iter().chain(ends).collect()
+    gaps(time_s).into_iter().chain(ends).collect()
 }
 
 /// The samples around `time_s` and how far it lies between them; at the ends the nearest sample twice.
@@ -208,8 +193,7 @@ fn attitude(channel: &Channel<4>, time_s: f64) -> [f64; 4] {
 /// The derivative at every sample: that of the quadratic nearest to the changes to its neighbours, none of them
 /// behind a gap. `change(from, to)` is the change from one sample to another.
 fn derivative(times: &[f64], change: impl Fn(usize, usize) -> Vector3<f64>) -> Channel<3> {
-    let channel = Channel { time_s: times.to_vec(), values: vec![[0.0; 0]; times.len()] };
-    let limit_s = GAP_PERIODS * channel.period_s().unwrap_or(f64::INFINITY);
+    let limit_s = GAP_PERIODS * period_s(times).unwrap_or(f64::INFINITY);
     let joined = |a: usize| times[a + 1] - times[a] <= limit_s;
     let slope = |at: usize| {
         let mut from = at;

@@ -3,6 +3,7 @@
 use vehicles::Vehicle;
 
 use crate::declaration::{Entry, Frame};
+use crate::error::{LogError, Spot};
 use crate::flight::Channel;
 use crate::frame;
 use crate::log::{Log, Samples};
@@ -21,7 +22,7 @@ pub fn read<const N: usize>(
     entry: &Entry,
     vehicle: &Vehicle,
     is_trusted: bool,
-) -> Result<Read<N>, String> {
+) -> Result<Read<N>, LogError> {
     let layout = Layout::of(quantity, entry, vehicle)?;
     let samples = signed_samples(log, entry.topic.as_deref(), layout.names)?;
     if !is_trusted {
@@ -32,7 +33,7 @@ pub fn read<const N: usize>(
 }
 
 /// Reads the yaw of an attitude that is level by assumption, in rad; `None` where the entry has none.
-pub fn read_yaw(log: &dyn Log, entry: &Entry) -> Result<Option<Read<1>>, String> {
+pub fn read_yaw(log: &dyn Log, entry: &Entry) -> Result<Option<Read<1>>, LogError> {
     let Some(yaw) = &entry.yaw else { return Ok(None) };
     let factor = factor(ANGLE, entry.unit.as_deref())?;
     let samples = signed_samples(log, entry.topic.as_deref(), std::slice::from_ref(yaw))?;
@@ -43,7 +44,7 @@ pub fn read_yaw(log: &dyn Log, entry: &Entry) -> Result<Option<Read<1>>, String>
 }
 
 /// The samples of `names`; a name with `-` in front is read negated.
-fn signed_samples(log: &dyn Log, topic: Option<&str>, names: &[String]) -> Result<Samples, String> {
+fn signed_samples(log: &dyn Log, topic: Option<&str>, names: &[String]) -> Result<Samples, LogError> {
     let plain: Vec<String> = names.iter().map(|name| name.trim_start_matches('-').to_owned()).collect();
     let mut samples = log.samples(topic, &plain)?;
     let signs: Vec<f64> = names.iter().map(|name| if name.starts_with('-') { -1.0 } else { 1.0 }).collect();
@@ -65,7 +66,7 @@ struct Layout<'a> {
 }
 
 impl<'a> Layout<'a> {
-    fn of(quantity: Quantity, entry: &'a Entry, vehicle: &Vehicle) -> Result<Self, String> {
+    fn of(quantity: Quantity, entry: &'a Entry, vehicle: &Vehicle) -> Result<Self, LogError> {
         let frame = entry.frame.unwrap_or_default();
         let (names, euler) = named(quantity, entry)?;
         let (factor, offset) = match (quantity, entry.unit.as_deref()) {
@@ -81,30 +82,23 @@ impl<'a> Layout<'a> {
     }
 
     /// Roll and pitch in rad come to more than a turn, and not in a bad sample or two, only if they are in degrees.
-    fn check_angles(&self, rows: &[Vec<f64>]) -> Result<(), String> {
+    fn check_angles(&self, rows: &[Vec<f64>]) -> Result<(), LogError> {
         const BAD: f64 = 0.02;
         let tilts = rows.iter().flat_map(|row| row.iter().take(2)).filter(|angle| angle.is_finite());
         let mut sizes: Vec<f64> = tilts.map(|angle| angle.abs()).collect();
         sizes.sort_by(f64::total_cmp);
-        #[allow(
-            clippy::cast_possible_truncation,
-            clippy::cast_sign_loss,
-            clippy::cast_precision_loss,
-            reason = "a part of a count"
-        )]
         let largest = sizes.get(((1.0 - BAD) * sizes.len() as f64) as usize).copied().unwrap_or(0.0);
         let is_in_rad = self.euler && self.factor > 0.5;
         let is_plausible = !is_in_rad || largest <= std::f64::consts::TAU;
         is_plausible.then_some(()).ok_or_else(|| {
-            format!(
-                "declared in rad, its roll or pitch goes to {largest:.1}, more than a turn; `unit = \"deg\"` would fit; \
-                 correct it, or set `trust_units = true`"
-            )
+            let found = format!("up to {largest:.1}, more than a turn");
+            let advice = "`unit = \"deg\"` would fit; correct it, or set `trust_units = true`";
+            LogError::unexpected(Spot::Whole, "roll and pitch in rad", found, advice)
         })
     }
 
     /// A sample in SI units and our frames.
-    fn convert<const N: usize>(&self, row: &[f64]) -> Result<[f64; N], String> {
+    fn convert<const N: usize>(&self, row: &[f64]) -> Result<[f64; N], LogError> {
         let scaled: Vec<f64> = row.iter().map(|number| number * self.factor + self.offset).collect();
         let turned: Vec<f64> = match (self.quantity, &scaled[..]) {
             (Quantity::Position | Quantity::Velocity, &[x, y, z]) => {
@@ -119,37 +113,43 @@ impl<'a> Layout<'a> {
             (Quantity::Attitude, &[x, y, z, w]) => frame::attitude(self.frame, [w, x, y, z]).into(),
             _ => scaled,
         };
-        turned.try_into().map_err(|row: Vec<f64>| format!("a sample has {} numbers, expected {N}", row.len()))
+        turned.try_into().map_err(|row: Vec<f64>| {
+            let (expected, found) = (format!("{N} numbers in a sample"), row.len().to_string());
+            LogError::unexpected(Spot::Whole, expected, found, "correct the names in `channels`")
+        })
     }
 }
 
 /// The names that `entry` gives for a sample of `quantity`, and whether they are Euler angles.
-fn named(quantity: Quantity, entry: &Entry) -> Result<(&[String], bool), String> {
-    if quantity != Quantity::Attitude && (entry.euler.is_some() || entry.yaw.is_some()) {
-        return Err("only `attitude` can have `euler` or `yaw`; remove it".to_owned());
-    }
+fn named(quantity: Quantity, entry: &Entry) -> Result<(&[String], bool), LogError> {
+    let refused = |key, expected: &str, found: &str, advice| {
+        Err(LogError::unexpected(Spot::Key(key), expected, found, advice))
+    };
+    let is_attitude = quantity == Quantity::Attitude;
     let (key, names, size) = match (&entry.columns, &entry.euler) {
-        (Some(_), Some(_)) => return Err("it has both `columns` and `euler`; remove one".to_owned()),
+        (_, Some(_)) if !is_attitude => return refused("euler", "`attitude` alone to have it", "it", "remove it"),
+        _ if entry.yaw.is_some() && !is_attitude => {
+            return refused("yaw", "`attitude` alone to have it", "it", "remove it");
+        }
+        (Some(_), Some(_)) => return refused("euler", "this or `columns`", "both", "remove one"),
         (None, Some(euler)) => ("euler", euler, 3),
         (Some(columns), None) => ("columns", columns, quantity.size()),
         (None, None) if entry.yaw.is_some() => {
-            return Err("a `yaw` alone is no attitude; add `assume = \"hover\"` to the flight".to_owned());
+            let advice = "add `assume = \"hover\"` to the flight";
+            return refused("columns", "an attitude", "a `yaw` alone", advice);
         }
-        (None, None) => return Err("no `columns` (or `fields`); add them".to_owned()),
+        (None, None) => return refused("columns", "this or `fields`", "neither", "add them"),
     };
     if names.len() == size {
         Ok((names, entry.euler.is_some()))
     } else {
-        Err(format!("`{key}` has {} names, expected {size}; correct it", names.len()))
+        refused(key, &format!("{size} names"), &names.len().to_string(), "correct it")
     }
 }
 
-fn factor(dimension: Dimension, unit: Option<&str>) -> Result<f64, String> {
-    let expected = dimension.names(" or ");
-    match unit {
-        None => Err(format!("no `unit`, expected {expected}; add it")),
-        Some(unit) => dimension
-            .factor(unit)
-            .ok_or_else(|| format!("`unit` is \"{unit}\", expected {expected}; correct it")),
-    }
+fn factor(dimension: Dimension, unit: Option<&str>) -> Result<f64, LogError> {
+    unit.and_then(|unit| dimension.factor(unit)).ok_or_else(|| {
+        let found = unit.map_or("none".to_owned(), |unit| format!("\"{unit}\""));
+        LogError::unexpected(Spot::Key("unit"), dimension.names(" or "), found, "correct it")
+    })
 }

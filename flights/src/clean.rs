@@ -1,6 +1,7 @@
 //! Cleaning of a channel: what is left out, counted and said.
 
-use crate::flight::Channel;
+use crate::error::{LogError, Spot};
+use crate::flight::{Channel, median, period_s};
 use crate::quantity::Quantity;
 
 /// A gap is a step longer than this many median periods.
@@ -18,34 +19,24 @@ pub fn clean<const N: usize>(
     quantity: Quantity,
     channel: Channel<N>,
     notes: &mut Vec<String>,
-) -> Result<Channel<N>, String> {
+) -> Result<Channel<N>, LogError> {
     let total = channel.time_s.len();
     let channel = finite(quantity, channel, notes);
     let channel = growing(quantity, channel, notes);
     let channel = if quantity == Quantity::Command { channel } else { unheld(quantity, channel, notes) };
     if channel.is_empty() {
-        return Err(format!(
-            "none of its {total} samples can be used ({}); check the names in `channels`",
-            notes.last().map_or("the log has none", String::as_str)
-        ));
+        let why = notes.last().map_or("the log has none", String::as_str);
+        let (expected, found) = ("samples that can be used", format!("none of {total} ({why})"));
+        return Err(LogError::unexpected(Spot::Whole, expected, found, "check the names in `channels`"));
     }
     Ok(channel)
-}
-
-/// The samples for which `keep` holds, given their index.
-fn keep<const N: usize>(channel: &Channel<N>, keep: impl Fn(usize) -> bool) -> Channel<N> {
-    let kept = || (0..channel.time_s.len()).filter(|&index| keep(index));
-    Channel {
-        time_s: kept().map(|index| channel.time_s[index]).collect(),
-        values: kept().map(|index| channel.values[index]).collect(),
-    }
 }
 
 fn finite<const N: usize>(quantity: Quantity, channel: Channel<N>, notes: &mut Vec<String>) -> Channel<N> {
     let is_finite = |index: usize| {
         channel.time_s[index].is_finite() && channel.values[index].iter().all(|number| number.is_finite())
     };
-    let kept = keep(&channel, is_finite);
+    let kept = channel.kept(is_finite);
     say_dropped(quantity, &channel, &kept, "have no finite number", notes);
     kept
 }
@@ -69,7 +60,7 @@ fn growing<const N: usize>(quantity: Quantity, channel: Channel<N>, notes: &mut 
         return channel;
     }
     let is_kept = longest_growing(&channel.time_s);
-    let kept = keep(&channel, |index| is_kept[index]);
+    let kept = channel.kept(|index| is_kept[index]);
     say_dropped(quantity, &channel, &kept, "have a time that does not grow", notes);
     kept
 }
@@ -103,33 +94,32 @@ fn unheld<const N: usize>(quantity: Quantity, channel: Channel<N>, notes: &mut V
     let is_new = |index: usize| index == 0 || channel.values[index] != channel.values[index - 1];
     let starts: Vec<usize> = (0..channel.values.len()).filter(|&index| is_new(index)).collect();
     let long = starts.windows(2).filter(|pair| pair[1] - pair[0] > 1).count();
-    #[allow(clippy::cast_precision_loss, reason = "counts of samples")]
     let systematic = starts.len() > 2 && long as f64 >= HELD_SHARE * starts.len() as f64;
     if !systematic {
         return channel;
     }
-    let kept = keep(&channel, is_new);
+    let kept = channel.kept(is_new);
     say_dropped(quantity, &channel, &kept, "repeat the one before (a held value)", notes);
     kept
 }
 
 /// Says where a channel has no samples for long.
-pub fn say_gaps<const N: usize>(quantity: Quantity, channel: &Channel<N>, notes: &mut Vec<String>) {
-    let gaps = gaps(channel);
+pub fn say_gaps(quantity: Quantity, time_s: &[f64], notes: &mut Vec<String>) {
+    let gaps = gaps(time_s);
     let Some(longest) = gaps.iter().map(|(from, to)| to - from).max_by(f64::total_cmp) else { return };
     let first = gaps.first().map_or(0.0, |gap| gap.0);
     notes.push(format!(
         "{quantity}: {} gaps of more than {GAP_PERIODS} periods ({:.4} s), the longest of {longest:.3} s; the first \
          begins at {first:.3} s",
         gaps.len(),
-        channel.period_s().unwrap_or_default(),
+        period_s(time_s).unwrap_or_default(),
     ));
 }
 
-/// The gaps of a channel: the times of the samples before and after each.
-pub fn gaps<const N: usize>(channel: &Channel<N>) -> Vec<(f64, f64)> {
-    let limit_s = GAP_PERIODS * channel.period_s().unwrap_or(f64::INFINITY);
-    let steps = channel.time_s.windows(2).map(|pair| (pair[0], pair[1]));
+/// The gaps between samples: the times of the samples before and after each.
+pub fn gaps(time_s: &[f64]) -> Vec<(f64, f64)> {
+    let limit_s = GAP_PERIODS * period_s(time_s).unwrap_or(f64::INFINITY);
+    let steps = time_s.windows(2).map(|pair| (pair[0], pair[1]));
     steps.filter(|(from, to)| to - from > limit_s).collect()
 }
 
@@ -137,18 +127,15 @@ pub fn gaps<const N: usize>(channel: &Channel<N>) -> Vec<(f64, f64)> {
 ///
 /// # Errors
 /// If most have another length.
-pub fn unit_quaternions(channel: Channel<4>, notes: &mut Vec<String>) -> Result<Channel<4>, String> {
+pub fn unit_quaternions(channel: Channel<4>, notes: &mut Vec<String>) -> Result<Channel<4>, LogError> {
     let norm = |q: &[f64; 4]| q.iter().map(|part| part * part).sum::<f64>().sqrt();
     let is_unit = |index: usize| (norm(&channel.values[index]) - 1.0).abs() <= NORM_TOLERANCE;
-    let mut kept = keep(&channel, is_unit);
+    let mut kept = channel.kept(is_unit);
     if 2 * kept.time_s.len() < channel.time_s.len() {
-        let mut norms: Vec<f64> = channel.values.iter().map(norm).collect();
-        norms.sort_by(f64::total_cmp);
-        return Err(format!(
-            "the quaternions have a median length of {:.4}, expected 1; name the columns of x, y, z and w, or use \
-             `euler` for angles",
-            norms[norms.len() / 2]
-        ));
+        let length = median(channel.values.iter().map(norm)).unwrap_or(f64::NAN);
+        let (expected, found) = ("quaternions of length 1", format!("a median length of {length:.4}"));
+        let advice = "name the columns of x, y, z and w, or use `euler` for angles";
+        return Err(LogError::unexpected(Spot::Whole, expected, found, advice));
     }
     say_dropped(Quantity::Attitude, &channel, &kept, "are no quaternion of length one", notes);
     let mut before = [1.0, 0.0, 0.0, 0.0];
@@ -207,7 +194,7 @@ mod tests {
     fn gaps_are_said() {
         let mut notes = Vec::new();
         let times: Vec<_> = (0..20).map(|k| (f64::from(if k < 10 { k } else { k + 30 }), 0.0)).collect();
-        say_gaps(Quantity::Position, &channel(&times), &mut notes);
+        say_gaps(Quantity::Position, &channel(&times).time_s, &mut notes);
         assert!(notes[0].contains("1 gaps") && notes[0].contains("31.000 s"), "{notes:?}");
     }
 

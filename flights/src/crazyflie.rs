@@ -7,7 +7,11 @@
 use std::collections::BTreeMap;
 
 use crate::bytes::{Cursor, Number};
-use crate::log::{Log, Samples, known};
+use crate::error::{LogError, Spot};
+use crate::log::{Log, Samples};
+
+/// What to do about a log that is cut or damaged.
+const COPY_AGAIN: &str = "it is damaged or was not closed: copy the log from the card again";
 
 /// A log, with the places of its records.
 pub struct CrazyflieLog {
@@ -32,17 +36,19 @@ struct Variable {
 
 impl CrazyflieLog {
     /// Checks and reads a log's bytes.
-    pub fn parse(bytes: Vec<u8>) -> Result<Self, String> {
+    pub fn parse(bytes: Vec<u8>) -> Result<Self, LogError> {
         check_crc(&bytes)?;
         let end = bytes.len() - 4;
         let mut cursor = Cursor { bytes: &bytes[..end], at: 1 };
         let mut events = header(&mut cursor)?;
         while cursor.at < end {
             let from = cursor.at;
-            let cut = || format!("the record at byte {from} is cut; copy the log from the card again");
+            let cut =
+                || LogError::unexpected(Spot::Byte(from), "a record", "one that is cut", COPY_AGAIN);
             let id = cursor.u16().ok_or_else(cut)?;
             let event = events.get_mut(&id).ok_or_else(|| {
-                format!("the record at byte {from} has the event {id}, which the header does not declare")
+                let (expected, found) = ("an event that the header declares", format!("the event {id}"));
+                LogError::unexpected(Spot::Byte(from), expected, found, COPY_AGAIN)
             })?;
             let time_us = cursor.u64().ok_or_else(cut)?;
             event.records.push((time_us, cursor.skip(event.size).ok_or_else(cut)?.start));
@@ -51,21 +57,19 @@ impl CrazyflieLog {
     }
 
     /// The event named `topic`, or the first that has all `names`.
-    fn event(&self, topic: Option<&str>, names: &[String]) -> Result<&Event, String> {
+    fn event(&self, topic: Option<&str>, names: &[String]) -> Result<&Event, LogError> {
         let has_all = |event: &&Event| names.iter().all(|name| event.offset_of(name).is_some());
         let found = match topic {
             Some(topic) => self.events.values().find(|event| event.name == topic),
             None => self.events.values().find(has_all),
         };
         found.filter(has_all).ok_or_else(|| {
-            let events = self.events.values().map(|event| {
-                format!("event {}: {}", event.name, known(event.variables.iter().map(|v| v.name.as_str())))
-            });
-            let events = events.collect::<Vec<_>>().join("; ");
-            format!(
-                "no event has all of {}; it has {events}; correct the names in `channels`",
-                names.join(", ")
-            )
+            let names_of = |event: &Event| {
+                let names = event.variables.iter().map(|variable| variable.name.as_str());
+                format!("{} of {}", names.collect::<Vec<_>>().join(" "), event.name)
+            };
+            let known = self.events.values().map(names_of);
+            LogError::missing("event with all of", &names.join(" "), known, "the names in `channels`")
         })
     }
 }
@@ -78,52 +82,42 @@ impl Event {
 }
 
 impl Log for CrazyflieLog {
-    fn samples(&self, topic: Option<&str>, names: &[String]) -> Result<Samples, String> {
+    fn samples(&self, topic: Option<&str>, names: &[String]) -> Result<Samples, LogError> {
         let event = self.event(topic, names)?;
         let places: Vec<_> = names.iter().filter_map(|name| event.offset_of(name)).collect();
         let row = |at: usize| {
             places.iter().map(|(number, offset)| number.read(&self.bytes[at + offset..])).collect()
         };
-        #[allow(clippy::cast_precision_loss, reason = "microseconds since the vehicle was switched on")]
-        let time_s = event.records.iter().map(|(time_us, _)| *time_us as f64 * 1e-6).collect();
         Ok(Samples {
-            time_s,
+            time_s: event.records.iter().map(|(time_us, _)| *time_us as f64 * 1e-6).collect(),
             rows: event.records.iter().map(|(_, at)| row(*at)).collect(),
             notes: Vec::new(),
         })
     }
 }
 
-fn check_crc(bytes: &[u8]) -> Result<(), String> {
+fn check_crc(bytes: &[u8]) -> Result<(), LogError> {
     if bytes.first() != Some(&0xBC) {
-        return Err("it is no Crazyflie log, which begins with the byte 0xBC; check `format`".to_owned());
+        let expected = "the byte 0xBC at its begin";
+        return Err(LogError::unexpected(Spot::Whole, expected, "no Crazyflie log", "check `format`"));
     }
+    let damaged = |expected: &str, found| LogError::unexpected(Spot::Whole, expected, found, COPY_AGAIN);
     let Some((content, &stored)) = bytes.split_last_chunk::<4>() else {
-        return Err("it is shorter than its checksum; copy the log from the card again".to_owned());
+        return Err(damaged("a checksum at its end", format!("{} bytes", bytes.len())));
     };
-    let (stored, found) = (u32::from_le_bytes(stored), crc32(content));
-    if stored == found {
+    let (stored, computed) = (u32::from_le_bytes(stored), crc32fast::hash(content));
+    if stored == computed {
         return Ok(());
     }
-    Err(format!(
-        "its checksum is {stored:08x}, that of its content {found:08x}: it is damaged or was not closed; copy the log \
-         from the card again"
-    ))
+    Err(damaged(&format!("the checksum {stored:08x} that is stored"), format!("content of {computed:08x}")))
 }
 
-/// CRC-32 as in Ethernet and zip.
-fn crc32(bytes: &[u8]) -> u32 {
-    let bit = |crc: u32, _| if crc & 1 == 1 { (crc >> 1) ^ 0xEDB8_8320 } else { crc >> 1 };
-    !bytes.iter().fold(!0, |crc, byte| (0..8).fold(crc ^ u32::from(*byte), bit))
-}
-
-fn header(cursor: &mut Cursor<'_>) -> Result<BTreeMap<u16, Event>, String> {
-    let cut = || "its header is cut; copy the log from the card again".to_owned();
+fn header(cursor: &mut Cursor<'_>) -> Result<BTreeMap<u16, Event>, LogError> {
+    let cut = || LogError::unexpected(Spot::Whole, "a whole header", "one that is cut", COPY_AGAIN);
     let version = cursor.u16().ok_or_else(cut)?;
     if version != 2 {
-        return Err(format!(
-            "it is a Crazyflie log of version {version}, expected 2; log with newer firmware"
-        ));
+        let (expected, found) = ("a log of version 2", format!("version {version}"));
+        return Err(LogError::unexpected(Spot::Whole, expected, found, "log with newer firmware"));
     }
     let count = cursor.u16().ok_or_else(cut)?;
     let mut events = BTreeMap::new();
@@ -141,13 +135,12 @@ fn header(cursor: &mut Cursor<'_>) -> Result<BTreeMap<u16, Event>, String> {
 
 impl Event {
     /// Adds a variable declared as `name(c)`.
-    fn add(&mut self, declared: &str) -> Result<(), String> {
+    fn add(&mut self, declared: &str) -> Result<(), LogError> {
         let parts = declared.strip_suffix(')').and_then(|declared| declared.rsplit_once('('));
-        let known = parts.and_then(|(name, kind)| Some((name, number(kind)?)));
+        let known = parts.and_then(|(name, kind)| Some((name, Number::of_struct(kind)?)));
         let (name, number) = known.ok_or_else(|| {
-            format!(
-                "its header declares the variable {declared:?}, expected `name(c)` with c one of bBhHiIlLqQfd"
-            )
+            let expected = "variables as `name(c)` with c one of bBhHiIlLqQfd";
+            LogError::unexpected(Spot::Named("event", self.name.clone()), expected, declared, COPY_AGAIN)
         })?;
         self.variables.push(Variable { name: name.to_owned(), number, offset: self.size });
         self.size += number.size();
@@ -155,27 +148,10 @@ impl Event {
     }
 }
 
-/// The type of a character of Python's `struct`.
-fn number(kind: &str) -> Option<Number> {
-    Some(match kind {
-        "b" => Number::Signed(1),
-        "B" | "?" => Number::Unsigned(1),
-        "h" => Number::Signed(2),
-        "H" => Number::Unsigned(2),
-        "i" | "l" => Number::Signed(4),
-        "I" | "L" => Number::Unsigned(4),
-        "q" => Number::Signed(8),
-        "Q" => Number::Unsigned(8),
-        "f" => Number::Float,
-        "d" => Number::Double,
-        _ => return None,
-    })
-}
-
 #[cfg(test)]
 mod tests {
     #[test]
     fn the_checksum_is_that_of_zip() {
-        assert_eq!(super::crc32(b"123456789"), 0xCBF4_3926);
+        assert_eq!(crc32fast::hash(b"123456789"), 0xCBF4_3926);
     }
 }

@@ -1,13 +1,26 @@
 //! What can be wrong with a flights file or with a log that it names.
 
+use std::io;
 use std::path::PathBuf;
 
 use diagnostics::Place;
 use vehicles::VehicleError;
+use vehicles::table::TableError;
 
 use crate::plausible::Finding;
+use crate::quantity::Quantity;
+use crate::span::Sparse;
 
 /// Why flights cannot be used: which file, where, what was expected and found, and what to do.
+///
+/// ```
+/// use flights::{FlightSet, FlightsError};
+///
+/// let text = "vehicle = \"v.toml\"\n[[flight]]\nname = \"a\"\nfile = \"a.csv\"\nrole = \"fit\"\nto_s = -1.0\n";
+/// let vehicle = |_: &std::path::Path| Ok(include_bytes!("../../vehicles/hummingbird.toml").to_vec());
+/// let error = FlightSet::parse("flights.toml".as_ref(), text.to_owned(), &vehicle).unwrap_err();
+/// assert!(matches!(&error, FlightsError::BadValue { key, .. } if key == "flight[0].to_s"));
+/// ```
 #[derive(Debug, thiserror::Error)]
 pub enum FlightsError {
     /// The flights file cannot be read at all.
@@ -17,7 +30,7 @@ pub enum FlightsError {
         file: String,
         /// What the operating system said.
         #[source]
-        cause: std::io::Error,
+        cause: io::Error,
     },
     /// The text is not TOML, or has a key or a type that no flights file has.
     #[error("{place}: {message}; correct this line (docs/flights.md has the format)")]
@@ -51,7 +64,7 @@ pub enum FlightsError {
         cause: Box<VehicleError>,
     },
     /// A log cannot be read, or does not have what the flights file asks of it.
-    #[error("{place}: flight `{flight}`, log {file}: {reason}")]
+    #[error("{place}: flight `{flight}`, log {}: {}{cause}", file.display(), named(*channel))]
     Log {
         /// The line of the flights file that asks.
         place: Place,
@@ -59,13 +72,17 @@ pub enum FlightsError {
         flight: String,
         /// The log.
         file: PathBuf,
+        /// The channel, where it is about one.
+        channel: Option<Quantity>,
         /// What is wrong and what to do.
-        reason: String,
+        #[source]
+        cause: LogError,
     },
     /// Measured values contradict their declared units, frames or order.
     #[error(
-        "{place}: flight `{flight}`, log {file}: the values contradict what the file declares:{}\n  \
+        "{place}: flight `{flight}`, log {}: the values contradict what the file declares:{}\n  \
          correct the unit, frame or order, or set `trust_units = true` for this flight",
+        file.display(),
         list(findings)
     )]
     Implausible {
@@ -94,21 +111,142 @@ pub enum FlightsError {
         reason: String,
     },
     /// A canonical file cannot be written.
-    #[error("{path}: cannot write this file: {reason}; check the folder and the space left")]
+    #[error("{}: cannot write this file: {cause}; check the folder and the space left", path.display())]
     Write {
         /// The file.
         path: PathBuf,
         /// Why.
-        reason: String,
+        #[source]
+        cause: io::Error,
     },
-    /// A flight has too little for what is asked of it.
-    #[error("flight `{flight}`: {reason}")]
-    TooLittle {
+    /// A flight has no time at which a row of a table could stand.
+    #[error(
+        "flight `{flight}`: no attitude or angular velocity at a time at which its other channels have samples; map one \
+         of them, or use `assume = \"hover\"`"
+    )]
+    NoRows {
         /// The flight's name.
         flight: String,
-        /// What is missing and what to do.
-        reason: String,
     },
+    /// More than one of these.
+    #[error("{}", all.iter().map(ToString::to_string).collect::<Vec<_>>().join("\n"))]
+    Several {
+        /// All, in the order of the file.
+        all: Vec<FlightsError>,
+    },
+}
+
+impl FlightsError {
+    /// Nothing, or all `errors` as one.
+    pub(crate) fn gather(errors: Vec<Self>) -> Result<(), Self> {
+        Self::gather_with(Ok(()), errors)
+    }
+
+    /// What `result` has, if there are no `errors` besides; else all of them as one, the one of `result` last.
+    pub(crate) fn gather_with<T>(result: Result<T, Self>, mut errors: Vec<Self>) -> Result<T, Self> {
+        match result {
+            Ok(value) if errors.is_empty() => Ok(value),
+            Err(error) if errors.is_empty() => Err(error),
+            result => {
+                errors.extend(result.err());
+                Err(if errors.len() == 1 { errors.remove(0) } else { Self::Several { all: errors } })
+            }
+        }
+    }
+}
+
+/// What is wrong with a log, or with what is asked of it.
+#[derive(Debug, thiserror::Error)]
+pub enum LogError {
+    /// The file cannot be read at all.
+    #[error("cannot read it: {0}; check the path and its variables")]
+    Unreadable(#[source] io::Error),
+    /// It is no table.
+    #[error(transparent)]
+    Table(#[from] TableError),
+    /// It has nothing of a name.
+    #[error("no {kind} `{name}`; it has {}; correct {key}", shortened(known))]
+    Missing {
+        /// What was looked for: a column, a topic.
+        kind: &'static str,
+        /// Its name.
+        name: String,
+        /// The names there are.
+        known: Vec<String>,
+        /// The key of the flights file that says the name.
+        key: &'static str,
+    },
+    /// Something else than expected.
+    #[error("{at}expected {expected}, found {found}; {advice}")]
+    Unexpected {
+        /// Where.
+        at: Spot,
+        /// What would be accepted.
+        expected: String,
+        /// What is there.
+        found: String,
+        /// What to do.
+        advice: &'static str,
+    },
+    /// Samples that are too far apart for a flight.
+    #[error(transparent)]
+    Sparse(#[from] Sparse),
+}
+
+/// Where in a log, or in what the flights file says of it.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Spot {
+    /// The whole log or channel.
+    Whole,
+    /// An offset in bytes.
+    Byte(usize),
+    /// A topic, a message, a format, by its name.
+    Named(&'static str, String),
+    /// A key of the channel.
+    Key(&'static str),
+}
+
+impl std::fmt::Display for Spot {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Whole => Ok(()),
+            Self::Byte(offset) => write!(f, "byte {offset}: "),
+            Self::Named(kind, name) => write!(f, "{kind} `{name}`: "),
+            Self::Key(key) => write!(f, "`{key}`: "),
+        }
+    }
+}
+
+impl LogError {
+    pub(crate) fn unexpected(
+        at: Spot,
+        expected: impl Into<String>,
+        found: impl Into<String>,
+        advice: &'static str,
+    ) -> Self {
+        Self::Unexpected { at, expected: expected.into(), found: found.into(), advice }
+    }
+
+    pub(crate) fn missing<N: ToString>(
+        kind: &'static str,
+        name: &str,
+        known: impl IntoIterator<Item = N>,
+        key: &'static str,
+    ) -> Self {
+        let known = known.into_iter().map(|name| name.to_string()).collect();
+        Self::Missing { kind, name: name.to_owned(), known, key }
+    }
+}
+
+/// The names there are; shortened where they are many.
+fn shortened(names: &[String]) -> String {
+    const SHOWN: usize = 60;
+    let rest = if names.len() > SHOWN { format!(" and {} more", names.len() - SHOWN) } else { String::new() };
+    format!("{}{rest}", names[..names.len().min(SHOWN)].join(", "))
+}
+
+fn named(channel: Option<Quantity>) -> String {
+    channel.map_or(String::new(), |channel| format!("`{channel}`: "))
 }
 
 fn list(findings: &[Finding]) -> String {

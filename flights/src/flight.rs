@@ -5,6 +5,8 @@
 
 use std::path::PathBuf;
 
+use crate::quantity::Quantity;
+
 /// What a flight is for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Deserialize, serde::Serialize)]
 #[serde(rename_all = "kebab-case")]
@@ -73,8 +75,89 @@ impl<const N: usize> Channel<N> {
     /// The median time between two samples; `None` with fewer than two.
     #[must_use]
     pub fn period_s(&self) -> Option<f64> {
-        median(self.time_s.windows(2).map(|pair| pair[1] - pair[0]))
+        period_s(&self.time_s)
     }
+
+    /// The samples for which `is_kept` holds of their index.
+    pub(crate) fn kept(&self, is_kept: impl Fn(usize) -> bool) -> Self {
+        let kept = || (0..self.time_s.len()).filter(|index| is_kept(*index));
+        Self {
+            time_s: kept().map(|index| self.time_s[index]).collect(),
+            values: kept().map(|index| self.values[index]).collect(),
+        }
+    }
+}
+
+/// A channel whatever the size of its samples.
+pub(crate) trait AnyChannel {
+    fn time_s(&mut self) -> &mut Vec<f64>;
+    /// Leaves the samples for which `is_kept` holds of their index.
+    fn keep(&mut self, is_kept: &dyn Fn(usize) -> bool);
+}
+
+impl<const N: usize> AnyChannel for Channel<N> {
+    fn time_s(&mut self) -> &mut Vec<f64> {
+        &mut self.time_s
+    }
+
+    fn keep(&mut self, is_kept: &dyn Fn(usize) -> bool) {
+        *self = self.kept(is_kept);
+    }
+}
+
+impl Flight {
+    /// A flight without samples.
+    #[must_use]
+    pub fn new(name: impl Into<String>, file: impl Into<PathBuf>, role: Role) -> Self {
+        Self {
+            name: name.into(),
+            file: file.into(),
+            role,
+            command: Channel::default(),
+            rotor_speed: Channel::default(),
+            position: Channel::default(),
+            velocity: Channel::default(),
+            attitude: Channel::default(),
+            angular_velocity: Channel::default(),
+            specific_force: Channel::default(),
+            battery_voltage: Channel::default(),
+            assumed: Vec::new(),
+            notes: Vec::new(),
+        }
+    }
+
+    /// The times of the samples of all channels, in the order of [`Quantity::CHANNELS`].
+    pub(crate) fn times(&self) -> [(Quantity, &[f64]); 8] {
+        [
+            (Quantity::Command, &self.command.time_s),
+            (Quantity::RotorSpeed, &self.rotor_speed.time_s),
+            (Quantity::Position, &self.position.time_s),
+            (Quantity::Velocity, &self.velocity.time_s),
+            (Quantity::Attitude, &self.attitude.time_s),
+            (Quantity::AngularVelocity, &self.angular_velocity.time_s),
+            (Quantity::SpecificForce, &self.specific_force.time_s),
+            (Quantity::BatteryVoltage, &self.battery_voltage.time_s),
+        ]
+    }
+
+    /// The same channels to be changed.
+    pub(crate) fn channels_mut(&mut self) -> [(Quantity, &mut dyn AnyChannel); 8] {
+        [
+            (Quantity::Command, &mut self.command),
+            (Quantity::RotorSpeed, &mut self.rotor_speed),
+            (Quantity::Position, &mut self.position),
+            (Quantity::Velocity, &mut self.velocity),
+            (Quantity::Attitude, &mut self.attitude),
+            (Quantity::AngularVelocity, &mut self.angular_velocity),
+            (Quantity::SpecificForce, &mut self.specific_force),
+            (Quantity::BatteryVoltage, &mut self.battery_voltage),
+        ]
+    }
+}
+
+/// The median step of times; `None` with fewer than two.
+pub(crate) fn period_s(time_s: &[f64]) -> Option<f64> {
+    median(time_s.windows(2).map(|pair| pair[1] - pair[0]))
 }
 
 /// The median, of two in the middle the greater one, so that it is one of the numbers; `None` of nothing.

@@ -5,12 +5,13 @@ use std::path::Path;
 use crate::crazyflie::CrazyflieLog;
 use crate::csv_log::CsvLog;
 use crate::declaration::{Entry, Format};
+use crate::error::LogError;
 use crate::log::Log;
 use crate::mcap_log::McapLog;
 use crate::ulog::Ulog;
 
 /// The log with these bytes.
-pub fn parse(bytes: Vec<u8>, format: Format, time: Option<&Entry>) -> Result<Box<dyn Log>, String> {
+pub fn parse(bytes: Vec<u8>, format: Format, time: Option<&Entry>) -> Result<Box<dyn Log>, LogError> {
     match format {
         Format::Csv => Ok(Box::new(CsvLog::parse(&bytes, time)?)),
         Format::Crazyflie => Ok(Box::new(CrazyflieLog::parse(bytes)?)),

@@ -22,22 +22,19 @@ pub struct Clash {
     pub reason: String,
 }
 
-/// Finds the first test flight that is not held out; `parts` are the parts of the logs that the flights are.
-pub fn check(flights: &[Flight], parts: &[Part]) -> Result<(), Clash> {
+/// The test flights that are not held out, each with the first flight that it is not held out from; `parts` are the parts
+/// of the logs that the flights are.
+pub fn clashes(flights: &[Flight], parts: &[Part]) -> Vec<Clash> {
     let of_role = |role| (0..flights.len()).filter(move |index| flights[*index].role == role);
-    for test in of_role(Role::Test) {
-        for fit in of_role(Role::Fit) {
-            let pair = [fit, test].map(|index| (&flights[index], &parts[index]));
-            let reason = match same_file(&pair[0].0.file, &pair[1].0.file) {
-                Some(how) => same_part(pair, how),
-                None => same_samples(pair),
-            };
-            if let Some(reason) = reason {
-                return Err(Clash { fit, test, reason });
-            }
-        }
-    }
-    Ok(())
+    let clash = |fit: usize, test: usize| {
+        let pair = [fit, test].map(|index| (&flights[index], &parts[index]));
+        let reason = match same_file(&pair[0].0.file, &pair[1].0.file) {
+            Some(how) => same_part(pair, how),
+            None => same_samples(pair),
+        };
+        reason.map(|reason| Clash { fit, test, reason })
+    };
+    of_role(Role::Test).filter_map(|test| of_role(Role::Fit).find_map(|fit| clash(fit, test))).collect()
 }
 
 /// Whether both, of one log, have some of its time in common. Their samples need not be compared then: a course that comes

@@ -60,11 +60,7 @@ fn without_jumps<const N: usize>(
         let last = (jump.from + REACH).min(is_kept.len() - 1);
         is_kept[(jump.from + 1).saturating_sub(REACH)..=last].fill(false);
     }
-    let kept = || (0..is_kept.len()).filter(|index| is_kept[*index]);
-    Channel {
-        time_s: kept().map(|index| channel.time_s[index]).collect(),
-        values: kept().map(|index| channel.values[index]).collect(),
-    }
+    channel.kept(|index| is_kept[index])
 }
 
 /// From one sample to the next.

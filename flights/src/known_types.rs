@@ -1,6 +1,7 @@
 //! Messages whose fields, units and frames need not be said.
 
 use crate::declaration::{ChannelMap, Entry, Format, Frame};
+use crate::error::{LogError, Spot};
 use crate::log::Log;
 use crate::quantity::Quantity;
 
@@ -92,17 +93,17 @@ impl Known {
 ///
 /// # Errors
 /// If the entry names a topic alone and its type is not known to hold the quantity.
-pub fn complete(log: &dyn Log, quantity: Quantity, entry: &Entry) -> Result<Entry, String> {
+pub fn complete(log: &dyn Log, quantity: Quantity, entry: &Entry) -> Result<Entry, LogError> {
     let named = entry.columns.is_some() || entry.euler.is_some() || entry.yaw.is_some();
     let (false, Some(topic)) = (named, entry.topic.as_deref()) else { return Ok(entry.clone()) };
     let topics = log.topics();
     let Some((_, kind)) = topics.iter().find(|(name, _)| name == topic) else {
-        let known = crate::log::known(topics.iter().map(|(name, _)| name.as_str()));
-        return Err(format!("no topic `{topic}`; it has {known}; correct `topic`"));
+        return Err(LogError::missing("topic", topic, topics.iter().map(|(name, _)| name), "`topic`"));
     };
     let known = KNOWN.iter().find(|known| known.kind == kind && known.quantity == quantity);
     let known = known.ok_or_else(|| {
-        format!("messages of the type {kind} are not known to hold it; add `fields` and `unit`")
+        let found = format!("the type {kind}");
+        LogError::unexpected(Spot::Key("topic"), "a type known to hold it", found, "add `fields` and `unit`")
     })?;
     let default = known.entry(topic);
     Ok(Entry { unit: entry.unit.clone().or(default.unit), frame: entry.frame.or(default.frame), ..default })

@@ -1,5 +1,7 @@
 //! A log, whatever its format: samples of numbers by name.
 
+use crate::error::LogError;
+
 /// Samples of some numbers as the log has them: any origin of time, any unit.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Samples {
@@ -13,8 +15,8 @@ pub struct Samples {
 
 /// What every format can do.
 pub trait Log {
-    /// The samples of `names` on `topic`. An error says what is missing, what there is, and what to do.
-    fn samples(&self, topic: Option<&str>, names: &[String]) -> Result<Samples, String>;
+    /// The samples of `names` on `topic`.
+    fn samples(&self, topic: Option<&str>, names: &[String]) -> Result<Samples, LogError>;
 
     /// The line of the row whose time is nearest to `time_s`, where the format has lines.
     fn line(&self, _time_s: f64) -> Option<u64> {
@@ -25,12 +27,4 @@ pub trait Log {
     fn topics(&self) -> Vec<(String, String)> {
         Vec::new()
     }
-}
-
-/// The names there are, for an error; shortened where they are many.
-pub fn known<'a>(names: impl Iterator<Item = &'a str>) -> String {
-    const SHOWN: usize = 60;
-    let names: Vec<_> = names.collect();
-    let rest = if names.len() > SHOWN { format!(" and {} more", names.len() - SHOWN) } else { String::new() };
-    format!("{}{rest}", names[..names.len().min(SHOWN)].join(", "))
 }

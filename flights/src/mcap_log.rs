@@ -5,7 +5,8 @@ use std::collections::BTreeMap;
 use recorder::definition::{Definition, Leaf};
 use recorder::reader::Messages;
 
-use crate::log::{Log, Samples, known};
+use crate::error::{LogError, Spot};
+use crate::log::{Log, Samples};
 
 /// A log, with what its topics are.
 pub struct McapLog {
@@ -18,13 +19,13 @@ pub struct McapLog {
 
 struct Topic {
     kind: String,
-    /// The parsed definition, or why there is none.
+    /// The parsed definition, or what there is instead.
     definition: Result<Definition, String>,
 }
 
 impl McapLog {
     /// Reads a log's bytes. One that is cut or damaged is read up to there, which its notes say.
-    pub fn parse(bytes: Vec<u8>) -> Result<Self, String> {
+    pub fn parse(bytes: Vec<u8>) -> Result<Self, LogError> {
         let mut log = Self { bytes, topics: BTreeMap::new(), start_ns: 0, notes: Vec::new() };
         let mut topics = BTreeMap::new();
         let mut start_ns = None;
@@ -32,9 +33,9 @@ impl McapLog {
             let message = match message {
                 Ok(message) => message,
                 Err(error) if count == 0 => {
-                    return Err(format!(
-                        "it cannot be read as MCAP: {error}; check `format` and its compression"
-                    ));
+                    let found = format!("one that cannot be read as MCAP: {error}");
+                    let advice = "check `format` and its compression";
+                    return Err(LogError::unexpected(Spot::Whole, "an MCAP file", found, advice));
                 }
                 Err(error) => {
                     log.notes.push(format!("the log is cut or damaged after {count} messages: {error}"));
@@ -45,39 +46,42 @@ impl McapLog {
             topics.entry(message.channel.topic.clone()).or_insert_with(|| Topic::of(&message.channel));
         }
         log.topics = topics;
-        log.start_ns = start_ns.ok_or("it has no messages; record the flight again")?.into();
+        let none = || LogError::unexpected(Spot::Whole, "messages", "none", "record the flight again");
+        log.start_ns = start_ns.ok_or_else(none)?.into();
         Ok(log)
     }
 
-    fn topic(&self, topic: Option<&str>) -> Result<(&str, &Topic, &Definition), String> {
-        let name = topic.ok_or("no `topic`, which an MCAP file needs; add it")?;
-        let (name, topic) = self.topics.get_key_value(name).ok_or_else(|| {
-            let known = known(self.topics.keys().map(String::as_str));
-            format!("no topic `{name}`; it has {known}; correct `topic`")
+    fn topic(&self, topic: Option<&str>) -> Result<(&str, &Topic, &Definition), LogError> {
+        let none = || LogError::unexpected(Spot::Key("topic"), "a topic of the MCAP file", "none", "add it");
+        let name = topic.ok_or_else(none)?;
+        let (name, topic) = self
+            .topics
+            .get_key_value(name)
+            .ok_or_else(|| LogError::missing("topic", name, self.topics.keys(), "`topic`"))?;
+        let definition = topic.definition.as_ref().map_err(|found| {
+            let at = Spot::Named("topic", name.clone());
+            LogError::unexpected(at, "CDR with a ros2msg schema", found, "record it so, or name another topic")
         })?;
-        Ok((name, topic, topic.definition.as_ref().map_err(|reason| format!("topic `{name}`: {reason}"))?))
+        Ok((name, topic, definition))
     }
 }
 
 impl Topic {
     fn of(channel: &mcap::Channel<'_>) -> Self {
         let Some(schema) = &channel.schema else {
-            return Self { kind: String::new(), definition: Err("it has no schema".to_owned()) };
+            return Self { kind: String::new(), definition: Err("no schema".to_owned()) };
         };
         let definition = if schema.encoding == "ros2msg" && channel.message_encoding == "cdr" {
             Definition::parse(&schema.name, &String::from_utf8_lossy(&schema.data))
         } else {
-            Err(format!(
-                "its messages are {} with a {} schema, expected cdr with ros2msg",
-                channel.message_encoding, schema.encoding
-            ))
+            Err(format!("{} with a {} schema", channel.message_encoding, schema.encoding))
         };
         Self { kind: schema.name.clone(), definition }
     }
 }
 
 impl Log for McapLog {
-    fn samples(&self, topic: Option<&str>, names: &[String]) -> Result<Samples, String> {
+    fn samples(&self, topic: Option<&str>, names: &[String]) -> Result<Samples, LogError> {
         let (name, topic, definition) = self.topic(topic)?;
         let mut samples = Samples { notes: self.notes.clone(), ..Samples::default() };
         let mut stamped = 0_usize;
@@ -86,15 +90,16 @@ impl Log for McapLog {
                 continue;
             }
             let decoded = definition.decode(&little_endian(&message.data));
-            let leaves =
-                decoded.map_err(|reason| format!("a message of `{name}` ({}): {reason}", topic.kind))?;
+            let leaves = decoded.map_err(|found| {
+                let (at, expected) = (Spot::Named("topic", name.to_owned()), format!("messages of type {}", topic.kind));
+                LogError::unexpected(at, expected, found, "the log is damaged, or its schema is another's")
+            })?;
             // A stamp of zero was not set, unless the log begins at zero too: the first tick of a simulation.
             let stamp_ns = stamp_ns(&leaves).filter(|ns| *ns > 0 || message.log_time == 0);
             stamped += usize::from(stamp_ns.is_some());
             let time_ns = stamp_ns.unwrap_or_else(|| message.log_time.into()) - self.start_ns;
-            #[allow(clippy::cast_precision_loss, reason = "nanoseconds since the log's start")]
             samples.time_s.push(time_ns as f64 * 1e-9);
-            samples.rows.push(row(&leaves, name, names)?);
+            samples.rows.push(row(&leaves, names)?);
         }
         samples.notes.push(match stamped {
             0 => "time is the log's own, as the messages have no stamp".to_owned(),
@@ -138,12 +143,12 @@ fn stamp_ns(leaves: &[Leaf]) -> Option<i128> {
 }
 
 /// The numbers of a message; NaN where a sensor of ours says that the sample was lost.
-fn row(leaves: &[Leaf], topic: &str, names: &[String]) -> Result<Vec<f64>, String> {
+fn row(leaves: &[Leaf], names: &[String]) -> Result<Vec<f64>, LogError> {
     let lost = number(leaves, "measured_ns").is_some() && number(leaves, "valid") == Some(0.0);
     let find = |name: &String| {
-        let found = number(leaves, name).ok_or_else(|| {
-            let known = known(leaves.iter().map(|leaf| leaf.path.as_str()));
-            format!("a message of `{topic}` has no number `{name}`; it has {known}; correct `fields`")
+        let found = number(leaves, name);
+        let found = found.ok_or_else(|| {
+            LogError::missing("field", name, leaves.iter().map(|leaf| &leaf.path), "`fields`")
         })?;
         Ok(if lost { f64::NAN } else { found })
     };

@@ -10,15 +10,15 @@ use crate::channels;
 use crate::clean;
 use crate::declaration::{Assumption, ChannelMap, Entry, FlightEntry, Format};
 use crate::document::{Bad, Document};
-use crate::error::FlightsError;
-use crate::flight::{Channel, Flight};
+use crate::error::{FlightsError, LogError, Spot};
+use crate::flight::{AnyChannel, Channel, Flight};
 use crate::frame;
 use crate::jumps;
 use crate::known_types;
 use crate::log::Log;
 use crate::plausible::{self, Finding};
 use crate::quantity::Quantity;
-use crate::span;
+use crate::span::{self, Moment, Sparse};
 
 /// Times are differences of decimal fractions since 1970: a sample on the edge of the part belongs to it.
 const SLACK_S: f64 = 1e-6;
@@ -56,8 +56,10 @@ pub struct Reading<'a> {
 
 impl Reading<'_> {
     /// Reads the flight from `log`; says which part of the log's own time it is, too.
+    ///
+    /// # Errors
+    /// Those of all channels at once.
     pub fn flight(mut self, log: &dyn Log) -> Result<(Flight, Part), FlightsError> {
-        self.check_delays()?;
         let mut taken = Vec::new();
         if self.channels.is_empty() {
             (self.channels, taken) = known_types::defaults(log, self.format);
@@ -68,53 +70,54 @@ impl Reading<'_> {
             let of_time = plausible::judge_time(&flight, self.vehicle, &self.channels);
             self.settle(&mut flight, of_time.into_iter().collect())?;
         }
-        let yaw = self.yaw(log)?;
+        let mut yaw = self.yaw(log)?;
         let origin_s = self.origin_s(&flight, yaw.as_ref())?;
         self.to_flight_time(&mut flight, origin_s);
         self.check_span(&flight, log, origin_s)?;
         let part = self.part(&flight, origin_s);
-        self.assume(&mut flight, yaw.map(|yaw| self.shift(Quantity::Attitude, yaw, origin_s)))?;
+        yaw.iter_mut().for_each(|yaw| self.shift(Quantity::Attitude, &mut yaw.time_s, origin_s));
+        self.assume(&mut flight, yaw)?;
         jumps::leave_out(&mut flight);
-        self.say_gaps(&mut flight);
+        say_gaps(&mut flight);
         self.check_something_is_left(&flight)?;
-        self.judge(&mut flight)?;
+        let findings = plausible::judge(&flight, self.vehicle, &self.channels);
+        self.settle(&mut flight, findings)?;
         flight.notes = merged(&flight.notes);
         Ok((flight, part))
     }
 
     fn read_channels(&self, log: &dyn Log) -> Result<Flight, FlightsError> {
-        let mut notes = Vec::new();
-        let notes = &mut notes;
-        let attitude = self.channel(log, Quantity::Attitude, notes)?;
-        let attitude = clean::unit_quaternions(attitude, notes)
-            .map_err(|reason| self.channel_error(Quantity::Attitude, reason))?;
-        Ok(Flight {
-            name: self.entry.name.get_ref().clone(),
-            file: self.file.to_owned(),
-            role: self.entry.role,
-            command: self.channel(log, Quantity::Command, notes)?,
-            rotor_speed: self.channel(log, Quantity::RotorSpeed, notes)?,
-            position: self.channel(log, Quantity::Position, notes)?,
-            velocity: self.channel(log, Quantity::Velocity, notes)?,
-            attitude,
-            angular_velocity: self.channel(log, Quantity::AngularVelocity, notes)?,
-            specific_force: self.channel(log, Quantity::SpecificForce, notes)?,
-            battery_voltage: self.channel(log, Quantity::BatteryVoltage, notes)?,
-            assumed: Vec::new(),
-            notes: std::mem::take(notes),
-        })
+        let mut flight = Flight::new(self.entry.name.get_ref(), self.file, self.entry.role);
+        let (mut notes, mut errors) = (Vec::new(), Vec::new());
+        let said = (&mut notes, &mut errors);
+        flight.attitude = self.channel(log, Quantity::Attitude, said.0, said.1);
+        match clean::unit_quaternions(std::mem::take(&mut flight.attitude), said.0) {
+            Ok(attitude) => flight.attitude = attitude,
+            Err(cause) => said.1.push(self.channel_error(Quantity::Attitude, cause)),
+        }
+        flight.command = self.channel(log, Quantity::Command, said.0, said.1);
+        flight.rotor_speed = self.channel(log, Quantity::RotorSpeed, said.0, said.1);
+        flight.position = self.channel(log, Quantity::Position, said.0, said.1);
+        flight.velocity = self.channel(log, Quantity::Velocity, said.0, said.1);
+        flight.angular_velocity = self.channel(log, Quantity::AngularVelocity, said.0, said.1);
+        flight.specific_force = self.channel(log, Quantity::SpecificForce, said.0, said.1);
+        flight.battery_voltage = self.channel(log, Quantity::BatteryVoltage, said.0, said.1);
+        FlightsError::gather(errors)?;
+        flight.notes = notes;
+        Ok(flight)
     }
 
-    /// A channel on the log's clock; empty where the flight does not declare it.
+    /// A channel on the log's clock; empty where the flight does not declare it, or where it cannot be read.
     fn channel<const N: usize>(
         &self,
         log: &dyn Log,
         quantity: Quantity,
         notes: &mut Vec<String>,
-    ) -> Result<Channel<N>, FlightsError> {
-        let Some(entry) = self.declared(quantity) else { return Ok(Channel::default()) };
+        errors: &mut Vec<FlightsError>,
+    ) -> Channel<N> {
+        let Some(entry) = self.declared(quantity) else { return Channel::default() };
         if self.entry.assume.is_some() && entry.yaw.is_some() {
-            return Ok(Channel::default());
+            return Channel::default();
         }
         let complete = known_types::complete(log, quantity, entry);
         let read = complete
@@ -123,7 +126,10 @@ impl Reading<'_> {
             notes.extend(said.into_iter().map(|said| format!("{quantity}: {said}")));
             clean::clean(quantity, channel, notes)
         });
-        cleaned.map_err(|reason| self.channel_error(quantity, reason))
+        cleaned.unwrap_or_else(|cause| {
+            errors.push(self.channel_error(quantity, cause));
+            Channel::default()
+        })
     }
 
     fn declared(&self, quantity: Quantity) -> Option<&Entry> {
@@ -140,92 +146,71 @@ impl Reading<'_> {
             Some((channel, _)) => clean::clean(Quantity::Attitude, channel, &mut Vec::new())
                 .map(|cleaned| Some(unwrapped(cleaned))),
         });
-        read.map_err(|reason| self.channel_error(Quantity::Attitude, reason))
+        read.map_err(|cause| self.channel_error(Quantity::Attitude, cause))
     }
 
     /// The log's first sample.
     fn origin_s(&self, flight: &Flight, yaw: Option<&Channel<1>>) -> Result<f64, FlightsError> {
-        let firsts = spans(flight).into_iter().chain([yaw.and_then(Channel::span_s)]).flatten();
-        firsts.map(|(first, _)| first).min_by(f64::total_cmp).ok_or_else(|| {
-            let reason = "no channel is declared; name its columns, topics or variables in `channels`";
-            self.log_error(&self.at, reason.to_owned())
+        let times = flight.times().into_iter().map(|(_, time_s)| time_s);
+        let firsts = times.chain(yaw.map(|yaw| &yaw.time_s[..])).filter_map(<[f64]>::first).copied();
+        firsts.min_by(f64::total_cmp).ok_or_else(|| {
+            let advice = "name its columns, topics or variables in `channels`";
+            let cause = LogError::unexpected(Spot::Key("channels"), "a channel", "none", advice);
+            self.log_error(&self.at, None, cause)
         })
     }
 
     /// Puts all channels on the flight's clock and cuts them to its part.
     fn to_flight_time(&self, flight: &mut Flight, origin_s: f64) {
-        let take = std::mem::take::<Channel<4>>;
-        flight.command =
-            self.held_from_start(self.shift(Quantity::Command, take(&mut flight.command), origin_s));
-        flight.rotor_speed = self.cut(Quantity::RotorSpeed, take(&mut flight.rotor_speed), origin_s);
-        flight.attitude = self.cut(Quantity::Attitude, take(&mut flight.attitude), origin_s);
-        let take = std::mem::take::<Channel<3>>;
-        flight.position = self.cut(Quantity::Position, take(&mut flight.position), origin_s);
-        flight.velocity = self.cut(Quantity::Velocity, take(&mut flight.velocity), origin_s);
-        flight.angular_velocity =
-            self.cut(Quantity::AngularVelocity, take(&mut flight.angular_velocity), origin_s);
-        flight.specific_force = self.cut(Quantity::SpecificForce, take(&mut flight.specific_force), origin_s);
-        let voltage = std::mem::take(&mut flight.battery_voltage);
-        flight.battery_voltage = self.cut(Quantity::BatteryVoltage, voltage, origin_s);
-    }
-
-    /// Moves a channel from the log's clock to the flight's, and to when its samples were true.
-    fn shift<const N: usize>(
-        &self,
-        quantity: Quantity,
-        mut channel: Channel<N>,
-        origin_s: f64,
-    ) -> Channel<N> {
-        let delay_s = self.entry.delay_s.get(&quantity).map_or(0.0, |delay_s| *delay_s.get_ref());
-        channel.time_s.iter_mut().for_each(|time_s| *time_s = *time_s - origin_s - self.start_s() - delay_s);
-        channel
-    }
-
-    fn cut<const N: usize>(&self, quantity: Quantity, channel: Channel<N>, origin_s: f64) -> Channel<N> {
-        self.window(self.shift(quantity, channel, origin_s))
-    }
-
-    /// The samples within the flight's part.
-    fn window<const N: usize>(&self, channel: Channel<N>) -> Channel<N> {
-        let length_s = self.length_s() + SLACK_S;
-        let samples = channel.time_s.into_iter().zip(channel.values);
-        let inside = samples.filter(|(time_s, _)| (-SLACK_S..=length_s).contains(time_s));
-        let (time_s, values): (Vec<f64>, Vec<[f64; N]>) = inside.unzip();
-        // Of the samples that the slack lets in before the start, the last stands at the start.
-        let early = time_s.partition_point(|time_s| *time_s <= 0.0).saturating_sub(1);
-        let mut kept = Channel { time_s: time_s[early..].to_vec(), values: values[early..].to_vec() };
-        kept.time_s.iter_mut().take(1).for_each(|first_s| *first_s = first_s.max(0.0));
-        kept
-    }
-
-    /// The commands within the flight's part; the one that holds at its start begins there.
-    fn held_from_start(&self, mut command: Channel<4>) -> Channel<4> {
-        let after = command.time_s.partition_point(|time_s| *time_s <= 0.0);
-        if let Some(holding) = after.checked_sub(1) {
-            command.time_s[holding] = 0.0;
+        for (quantity, channel) in flight.channels_mut() {
+            let time_s = channel.time_s();
+            self.shift(quantity, time_s, origin_s);
+            let holding = time_s.partition_point(|time_s| *time_s <= 0.0).checked_sub(1);
+            if let Some(holding) = holding.filter(|_| quantity == Quantity::Command) {
+                // The command that holds at the start begins there.
+                time_s[holding] = 0.0;
+            }
+            self.cut(channel);
         }
-        self.window(command)
+    }
+
+    /// Moves times from the log's clock to the flight's, and to when the samples were true.
+    fn shift(&self, quantity: Quantity, time_s: &mut [f64], origin_s: f64) {
+        let delay_s = self.entry.delay_s.get(&quantity).map_or(0.0, |delay_s| *delay_s.get_ref());
+        time_s.iter_mut().for_each(|time_s| *time_s = *time_s - origin_s - self.start_s() - delay_s);
+    }
+
+    /// Leaves the samples within the flight's part.
+    fn cut(&self, channel: &mut dyn AnyChannel) {
+        let part = -SLACK_S..=self.length_s() + SLACK_S;
+        let times = channel.time_s().clone();
+        // Of the samples that the slack lets in before the start, the last stands at the start.
+        let early = times.iter().rposition(|time_s| *time_s <= 0.0).unwrap_or(0);
+        channel.keep(&|index| index >= early && part.contains(&times[index]));
+        channel.time_s().iter_mut().take(1).for_each(|first_s| *first_s = first_s.max(0.0));
     }
 
     /// Refuses samples that are too far apart, before anything is computed over their time.
     fn check_span(&self, flight: &Flight, log: &dyn Log, origin_s: f64) -> Result<(), FlightsError> {
-        let Some(sparse) = span::sparse(flight, span::SPACING_MAX_S) else { return Ok(()) };
-        let place = |time_s: f64| {
-            let of_log_s = time_s + self.start_s();
-            let line = log.line(of_log_s + origin_s).map_or(String::new(), |line| format!("line {line}, "));
-            format!("{line}{of_log_s} s from the log's first sample")
-        };
-        Err(self.log_error(&self.declaration_of(Quantity::Time), sparse.words(place)))
+        flight.check_span(span::SPACING_MAX_S).map_err(|sparse| {
+            let gap = sparse.gap.map(|moment| {
+                let time_s = moment.time_s + self.start_s();
+                Moment { time_s, is_in_log: true, line: log.line(time_s + origin_s) }
+            });
+            let at = self.declaration_of(Quantity::Time);
+            self.log_error(&at, None, LogError::Sparse(Sparse { gap, ..sparse }))
+        })
     }
 
     /// The part of the log that the flight's samples come from.
     fn part(&self, flight: &Flight, origin_s: f64) -> Part {
-        let spans = || spans(flight).into_iter().flatten();
+        let times = || flight.times().into_iter().map(|(_, time_s)| time_s);
+        let (firsts, lasts) = (times().filter_map(<[f64]>::first), times().filter_map(<[f64]>::last));
         Part {
             origin_s,
             start_s: self.start_s(),
-            from_s: self.start_s() + spans().map(|span| span.0).fold(f64::INFINITY, f64::min),
-            to_s: self.start_s() + spans().map(|span| span.1).fold(f64::NEG_INFINITY, f64::max),
+            from_s: self.start_s() + firsts.copied().fold(f64::INFINITY, f64::min),
+            to_s: self.start_s() + lasts.copied().fold(f64::NEG_INFINITY, f64::max),
         }
     }
 
@@ -255,7 +240,7 @@ impl Reading<'_> {
             let values = time_s.iter().map(level).collect();
             let kept = Channel { time_s: time_s.clone(), values };
             flight.attitude = clean::unit_quaternions(kept, &mut flight.notes)
-                .map_err(|reason| self.channel_error(Quantity::Attitude, reason))?;
+                .map_err(|cause| self.channel_error(Quantity::Attitude, cause))?;
             let yaw = if yaw.is_some() { "with the yaw logged" } else { "with yaw 0" };
             flight.assumed.push(format!("attitude: level, {yaw} (assume = \"hover\")"));
         }
@@ -267,36 +252,16 @@ impl Reading<'_> {
         Ok(())
     }
 
-    fn say_gaps(&self, flight: &mut Flight) {
-        let mut notes = std::mem::take(&mut flight.notes);
-        clean::say_gaps(Quantity::Command, &flight.command, &mut notes);
-        clean::say_gaps(Quantity::RotorSpeed, &flight.rotor_speed, &mut notes);
-        clean::say_gaps(Quantity::Position, &flight.position, &mut notes);
-        clean::say_gaps(Quantity::Velocity, &flight.velocity, &mut notes);
-        clean::say_gaps(Quantity::Attitude, &flight.attitude, &mut notes);
-        clean::say_gaps(Quantity::AngularVelocity, &flight.angular_velocity, &mut notes);
-        clean::say_gaps(Quantity::SpecificForce, &flight.specific_force, &mut notes);
-        // Not of the battery: its coarse and slow readings repeat, and left out they look like gaps.
-        flight.notes = notes;
-    }
-
     fn check_something_is_left(&self, flight: &Flight) -> Result<(), FlightsError> {
-        for (quantity, span) in Quantity::CHANNELS.into_iter().zip(spans(flight)) {
-            if span.is_none() && self.declared(quantity).is_some() {
-                let reason = format!(
-                    "no sample lies in the flight's part from {} s on; correct `from_s` and `to_s`",
-                    self.start_s()
-                );
-                return Err(self.channel_error(quantity, reason));
-            }
-        }
-        Ok(())
-    }
-
-    /// Compares the values with physics.
-    fn judge(&self, flight: &mut Flight) -> Result<(), FlightsError> {
-        let findings = plausible::judge(flight, self.vehicle, &self.channels);
-        self.settle(flight, findings)
+        let is_lost = |(quantity, time_s): &(Quantity, &[f64])| {
+            time_s.is_empty() && self.declared(*quantity).is_some()
+        };
+        let lost = flight.times().into_iter().filter(is_lost).map(|(quantity, _)| {
+            let expected = format!("samples in the flight's part from {} s on", self.start_s());
+            let (found, advice) = ("no sample lies there", "correct `from_s` and `to_s`");
+            self.channel_error(quantity, LogError::unexpected(Spot::Whole, expected, found, advice))
+        });
+        FlightsError::gather(lost.collect())
     }
 
     /// Notes what is not clear, or is to be trusted; the rest is an error.
@@ -315,20 +280,8 @@ impl Reading<'_> {
         })
     }
 
-    fn check_delays(&self) -> Result<(), FlightsError> {
-        for (quantity, delay_s) in &self.entry.delay_s {
-            let number = *delay_s.get_ref();
-            if *quantity == Quantity::Time || !number.is_finite() {
-                let expected = "a finite number of seconds for a channel other than time";
-                let bad = Bad { expected, found: &number.to_string(), advice: "correct it" };
-                return Err(self.document.bad(&delay_s.span(), &format!("flight.delay_s.{quantity}"), bad));
-            }
-        }
-        Ok(())
-    }
-
-    fn channel_error(&self, quantity: Quantity, reason: String) -> FlightsError {
-        self.log_error(&self.declaration_of(quantity), format!("`{quantity}`: {reason}"))
+    fn channel_error(&self, quantity: Quantity, cause: LogError) -> FlightsError {
+        self.log_error(&self.declaration_of(quantity), Some(quantity), cause)
     }
 
     /// Where a channel is declared; the flight, for one that was taken by default and stands nowhere in the file.
@@ -337,28 +290,21 @@ impl Reading<'_> {
         declared.unwrap_or(self.at.clone())
     }
 
-    fn log_error(&self, at: &Range<usize>, reason: String) -> FlightsError {
-        FlightsError::Log {
-            place: self.document.place(at),
-            flight: self.entry.name.get_ref().clone(),
-            file: self.file.to_owned(),
-            reason,
-        }
+    fn log_error(&self, at: &Range<usize>, channel: Option<Quantity>, cause: LogError) -> FlightsError {
+        let (flight, file) = (self.entry.name.get_ref().clone(), self.file.to_owned());
+        FlightsError::Log { place: self.document.place(at), flight, file, channel, cause }
     }
 }
 
-/// First and last times of all channels, in the order of [`Quantity::CHANNELS`].
-fn spans(flight: &Flight) -> [Option<(f64, f64)>; 8] {
-    [
-        flight.command.span_s(),
-        flight.rotor_speed.span_s(),
-        flight.position.span_s(),
-        flight.velocity.span_s(),
-        flight.attitude.span_s(),
-        flight.angular_velocity.span_s(),
-        flight.specific_force.span_s(),
-        flight.battery_voltage.span_s(),
-    ]
+fn say_gaps(flight: &mut Flight) {
+    let mut notes = std::mem::take(&mut flight.notes);
+    for (quantity, time_s) in flight.times() {
+        // Not of the battery: its coarse and slow readings repeat, and left out they look like gaps.
+        if quantity != Quantity::BatteryVoltage {
+            clean::say_gaps(quantity, time_s, &mut notes);
+        }
+    }
+    flight.notes = notes;
 }
 
 /// What several channels have in common is said once.
@@ -367,16 +313,16 @@ fn merged(notes: &[String]) -> Vec<String> {
     for note in notes {
         let of_channel = note
             .split_once(": ")
-            .filter(|(name, _)| Quantity::CHANNELS.iter().any(|own| own.name() == *name));
-        let (channel, words) = of_channel.map_or((None, note.as_str()), |(name, words)| (Some(name), words));
-        match said.iter_mut().find(|own| own.1 == words && !own.0.is_empty()) {
-            Some(own) => own.0.extend(channel),
-            None => said.push((channel.into_iter().collect(), words)),
+            .filter(|(name, _)| Quantity::CHANNELS.iter().any(|channel| channel.name() == *name));
+        let (channel, text) = of_channel.map_or((None, note.as_str()), |(name, text)| (Some(name), text));
+        match said.iter_mut().find(|other| other.1 == text && !other.0.is_empty()) {
+            Some(same) => same.0.extend(channel),
+            None => said.push((channel.into_iter().collect(), text)),
         }
     }
-    let line = |(channels, words): &(Vec<&str>, &str)| match channels[..] {
-        [] => (*words).to_owned(),
-        _ => format!("{}: {words}", channels.join(", ")),
+    let line = |(channels, text): &(Vec<&str>, &str)| match channels[..] {
+        [] => (*text).to_owned(),
+        _ => format!("{}: {text}", channels.join(", ")),
     };
     said.iter().map(line).collect()
 }

@@ -1,16 +1,18 @@
 //! Reads a flights file and all the logs that it names.
 
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 use toml::Spanned;
 use vehicles::{Vehicle, VehicleError};
 
-use crate::declaration::{ChannelMap, Declaration, FlightEntry};
+use crate::declaration::{Declaration, FlightEntry};
 use crate::document::{Bad, Document};
-use crate::error::FlightsError;
+use crate::error::{FlightsError, LogError};
 use crate::flight::Flight;
 use crate::formats;
 use crate::held_out;
+use crate::quantity::Quantity;
 use crate::reading::{Part, Reading};
 
 /// The flights of a flights file, in its order.
@@ -41,26 +43,34 @@ impl FlightSet {
     pub fn parse(path: &Path, text: String, read: &ReadFile<'_>) -> Result<Self, FlightsError> {
         let document = Document::new(path, text);
         let declaration: Declaration = document.parse()?;
-        let vehicle_path = document.resolve("vehicle", &declaration.vehicle)?;
-        let vehicle = vehicle(&vehicle_path, read).map_err(|cause| FlightsError::Vehicle {
-            place: document.place(&declaration.vehicle.span()),
-            cause: Box::new(cause),
-        })?;
-        check_names(&document, &declaration.flight)?;
+        let errors = check_keys(&document, &declaration.flight);
+        let vehicle = document.resolve("vehicle", &declaration.vehicle).and_then(|path| {
+            let place = document.place(&declaration.vehicle.span());
+            let vehicle = vehicle(&path, read);
+            let vehicle =
+                vehicle.map_err(|cause| FlightsError::Vehicle { place, cause: Box::new(cause) })?;
+            Ok((path, vehicle))
+        });
+        let (vehicle_path, vehicle) = FlightsError::gather_with(vehicle, errors)?;
         let context = Context { document: &document, declaration: &declaration, vehicle: &vehicle, read };
-        let mut parts = Vec::new();
-        let mut flights = Vec::new();
+        let (mut flights, mut parts, mut errors) = (Vec::new(), Vec::new(), Vec::new());
         for (index, entry) in declaration.flight.iter().enumerate() {
-            let (flight, part) = context.flight(index, entry)?;
-            flights.push(flight);
-            parts.push(part);
+            match context.flight(index, entry) {
+                Ok((flight, part)) => {
+                    flights.push(flight);
+                    parts.push(part);
+                }
+                Err(error) => errors.push(error),
+            }
         }
-        held_out::check(&flights, &parts).map_err(|clash| FlightsError::NotHeldOut {
+        FlightsError::gather(errors)?;
+        let clashes = held_out::clashes(&flights, &parts).into_iter().map(|clash| FlightsError::NotHeldOut {
             place: document.place(&declaration.flight[clash.test].get_ref().file.span()),
             test: flights[clash.test].name.clone(),
             fit: flights[clash.fit].name.clone(),
             reason: clash.reason,
-        })?;
+        });
+        FlightsError::gather(clashes.collect())?;
         Ok(Self { vehicle: vehicle_path, flights })
     }
 }
@@ -79,25 +89,48 @@ fn vehicle(path: &Path, read: &ReadFile<'_>) -> Result<Vehicle, VehicleError> {
     }
 }
 
-/// Refuses a file without flights and a name that two flights have.
-fn check_names(document: &Document, flights: &[Spanned<FlightEntry>]) -> Result<(), FlightsError> {
+/// What is wrong with the values of keys, before any log is read.
+fn check_keys(document: &Document, flights: &[Spanned<FlightEntry>]) -> Vec<FlightsError> {
+    let mut errors = Vec::new();
     if flights.is_empty() {
         let advice = "add a `[[flight]]` with name, file and role";
-        return Err(document.bad(
-            &(0..0),
-            "flight",
-            Bad { expected: "at least one flight", found: "none", advice },
-        ));
+        let bad = Bad { expected: "at least one flight", found: "none", advice };
+        errors.push(document.bad(&(0..0), "flight", bad));
     }
     for (index, entry) in flights.iter().enumerate() {
-        let name = &entry.get_ref().name;
+        let (entry, key) = (entry.get_ref(), |name: &str| format!("flight[{index}].{name}"));
+        let name = &entry.name;
         if flights[..index].iter().any(|other| other.get_ref().name.get_ref() == name.get_ref()) {
             let found = format!("\"{}\" a second time", name.get_ref());
             let bad = Bad { expected: "a name of its own", found: &found, advice: "give another" };
-            return Err(document.bad(&name.span(), &format!("flight[{index}].name"), bad));
+            errors.push(document.bad(&name.span(), &key("name"), bad));
+        }
+        if let Some((bound, at, found)) = bad_window(entry) {
+            let expected = "0 <= from_s < to_s, in seconds from the log's first sample";
+            let bad = Bad { expected, found: &found.to_string(), advice: "correct it" };
+            errors.push(document.bad(&at, &key(bound), bad));
+        }
+        for (quantity, delay_s) in &entry.delay_s {
+            let number = *delay_s.get_ref();
+            if *quantity == Quantity::Time || !number.is_finite() {
+                let expected = "a finite number of seconds for a channel other than time";
+                let bad = Bad { expected, found: &number.to_string(), advice: "correct it" };
+                errors.push(document.bad(&delay_s.span(), &key(&format!("delay_s.{quantity}")), bad));
+            }
         }
     }
-    Ok(())
+    errors
+}
+
+/// The bound of a flight's part that cannot be meant, where it stands, and its value.
+fn bad_window(entry: &FlightEntry) -> Option<(&'static str, Range<usize>, f64)> {
+    let from_s = entry.from_s.as_ref().map_or(0.0, |from_s| *from_s.get_ref());
+    let to_s = entry.to_s.as_ref().map_or(f64::INFINITY, |to_s| *to_s.get_ref());
+    match (&entry.from_s, &entry.to_s) {
+        (Some(from), _) if !(from_s >= 0.0 && from_s.is_finite()) => Some(("from_s", from.span(), from_s)),
+        (_, Some(to)) if to_s.is_nan() || to_s <= from_s => Some(("to_s", to.span(), to_s)),
+        _ => None,
+    }
 }
 
 struct Context<'a> {
@@ -111,21 +144,21 @@ impl Context<'_> {
     /// Reads the flight `index` of the file.
     fn flight(&self, index: usize, spanned: &Spanned<FlightEntry>) -> Result<(Flight, Part), FlightsError> {
         let entry = spanned.get_ref();
-        let key = |name: &str| format!("flight[{index}].{name}");
-        self.check_window(entry, &key)?;
-        let file = self.document.resolve(&key("file"), &entry.file)?;
-        let broken = |reason| FlightsError::Log {
+        let file = self.document.resolve(&format!("flight[{index}].file"), &entry.file)?;
+        let broken = |cause| FlightsError::Log {
             place: self.document.place(&entry.file.span()),
             flight: entry.name.get_ref().clone(),
             file: file.clone(),
-            reason,
+            channel: None,
+            cause,
         };
-        let channels = self.channels(entry);
-        let bytes = (self.read)(&file)
-            .map_err(|error| broken(format!("cannot read it: {error}; check the path and its variables")))?;
+        // Those of the file, overridden by those of the flight.
+        let mut channels = self.declaration.channels.clone();
+        channels.extend(entry.channels.clone());
+        let bytes = (self.read)(&file).map_err(|error| broken(LogError::Unreadable(error)))?;
         let format =
             entry.format.or(self.declaration.format).unwrap_or_else(|| formats::guess(&file, &bytes));
-        let time = channels.get(&crate::Quantity::Time).map(Spanned::get_ref);
+        let time = channels.get(&Quantity::Time).map(Spanned::get_ref);
         let log = formats::parse(bytes, format, time).map_err(broken)?;
         Reading {
             document: self.document,
@@ -137,25 +170,5 @@ impl Context<'_> {
             channels,
         }
         .flight(log.as_ref())
-    }
-
-    /// The channels of the file, overridden by those of the flight.
-    fn channels(&self, entry: &FlightEntry) -> ChannelMap {
-        let mut channels = self.declaration.channels.clone();
-        channels.extend(entry.channels.clone());
-        channels
-    }
-
-    fn check_window(&self, entry: &FlightEntry, key: &dyn Fn(&str) -> String) -> Result<(), FlightsError> {
-        let from_s = entry.from_s.as_ref().map_or(0.0, |from_s| *from_s.get_ref());
-        let to_s = entry.to_s.as_ref().map_or(f64::INFINITY, |to_s| *to_s.get_ref());
-        let (name, at, found) = match (&entry.from_s, &entry.to_s) {
-            (Some(from), _) if !(from_s >= 0.0 && from_s.is_finite()) => ("from_s", from.span(), from_s),
-            (_, Some(to)) if to_s.is_nan() || to_s <= from_s => ("to_s", to.span(), to_s),
-            _ => return Ok(()),
-        };
-        let expected = "0 <= from_s < to_s, in seconds from the log's first sample";
-        let bad = Bad { expected, found: &found.to_string(), advice: "correct it" };
-        Err(self.document.bad(&at, &key(name), bad))
     }
 }

@@ -78,7 +78,6 @@ impl<const N: usize> Steps<N> {
 }
 
 fn spread<const N: usize>(channel: &Channel<N>, axis: usize) -> f64 {
-    #[allow(clippy::cast_precision_loss, reason = "a count of samples")]
     let count = channel.values.len().max(1) as f64;
     let of_axis = || channel.values.iter().map(|value| value[axis]);
     let mean = of_axis().sum::<f64>() / count;
@@ -100,7 +99,6 @@ struct Telling<const N: usize> {
 }
 
 impl<const N: usize> Telling<N> {
-    #[allow(clippy::cast_possible_truncation, reason = "a saturated number is one that repeats")]
     fn of(channel: &Channel<N>, steps: &[f64; N]) -> Self {
         let key = |value: &[f64; N]| {
             std::array::from_fn(|axis| {
@@ -164,7 +162,6 @@ fn agreeing<const N: usize>(
             same.push(second.time_s[*index]);
         }
     }
-    #[allow(clippy::cast_precision_loss, reason = "counts of samples")]
     let is_twin = same.len() >= COMMON_MIN && same.len() as f64 >= SHARE_MIN * compared as f64;
     let from_s = same.iter().copied().fold(f64::INFINITY, f64::min);
     let to_s = same.iter().copied().fold(f64::NEG_INFINITY, f64::max);

@@ -7,7 +7,8 @@ use std::collections::BTreeMap;
 use std::ops::Range;
 
 use crate::bytes::{Cursor, Number};
-use crate::log::{Log, Samples, known};
+use crate::error::{LogError, Spot};
+use crate::log::{Log, Samples};
 
 /// The bytes before the first message.
 const HEADER_BYTES: usize = 16;
@@ -48,9 +49,10 @@ struct Leaf {
 
 impl Ulog {
     /// Reads a log's bytes.
-    pub fn parse(bytes: Vec<u8>) -> Result<Self, String> {
+    pub fn parse(bytes: Vec<u8>) -> Result<Self, LogError> {
         if !bytes.starts_with(b"ULog\x01\x12\x35") || bytes.len() < HEADER_BYTES {
-            return Err("it is no ULog, which begins with `ULog` and 01 12 35; check `format`".to_owned());
+            let expected = "`ULog` and the bytes 01 12 35 at its begin";
+            return Err(LogError::unexpected(Spot::Whole, expected, "no ULog", "check `format`"));
         }
         let mut log = Self { bytes, formats: BTreeMap::new(), topics: BTreeMap::new(), notes: Vec::new() };
         let mut dropouts_ms = Vec::new();
@@ -129,23 +131,18 @@ impl Ulog {
         }
     }
 
-    fn topic(&self, topic: Option<&str>) -> Result<&Topic, String> {
+    fn topic(&self, topic: Option<&str>) -> Result<&Topic, LogError> {
         let logged = || self.topics.values().filter(|topic| !topic.data.is_empty());
-        let name = topic.ok_or("no `topic`, which names the message of a ULog; add it")?;
+        let name = topic.ok_or_else(|| {
+            LogError::unexpected(Spot::Key("topic"), "the name of a message of the ULog", "none", "add it")
+        })?;
         logged().find(|topic| topic.name == name).ok_or_else(|| {
-            let known = known(logged().map(|topic| topic.name.as_str()));
-            format!("no data of the message `{name}`; it has {known}; correct `topic`")
+            LogError::missing("topic", name, logged().map(|topic| &topic.name), "`topic`")
         })
     }
 
-    /// The numbers of a message, those of formats in it by their path.
-    fn leaves(&self, format: &str) -> Result<Vec<Leaf>, String> {
-        let mut leaves = Vec::new();
-        self.add_leaves(format, "", 0, &mut leaves, DEPTH_MAX)?;
-        Ok(leaves)
-    }
-
-    /// Adds the numbers of `format` from the byte `offset` on; returns the byte behind them.
+    /// Adds the numbers of `format` from the byte `offset` on, those of formats in it by their path; returns the byte behind
+    /// them.
     fn add_leaves(
         &self,
         format: &str,
@@ -153,21 +150,22 @@ impl Ulog {
         mut offset: usize,
         leaves: &mut Vec<Leaf>,
         depth: usize,
-    ) -> Result<usize, String> {
+    ) -> Result<usize, LogError> {
+        let broken = |found: &str| {
+            let (at, expected) = (Spot::Named("format", format.to_owned()), "fields of a message");
+            LogError::unexpected(at, expected, found, "the log is damaged: copy it again")
+        };
         let fields = self.formats.get(format).filter(|_| depth > 0);
-        let fields = fields.ok_or_else(|| format!("its format `{format}` is missing or stands in itself"))?;
+        let fields = fields.ok_or_else(|| broken("none, or the format in itself"))?;
         for field in fields {
             if field.name.len() > NAME_BYTES_MAX {
-                let length = field.name.len();
-                return Err(format!(
-                    "its format `{format}` has a field name of {length} bytes, expected a few"
-                ));
+                return Err(broken(&format!("a field name of {} bytes", field.name.len())));
             }
             for index in 0..field.length.unwrap_or(1) {
                 let index = if field.length.is_some() { format!("[{index}]") } else { String::new() };
                 let path = format!("{prefix}{}{index}", field.name);
                 let before = offset;
-                offset = match number(&field.kind) {
+                offset = match Number::of_ulog(&field.kind) {
                     Some(number) => {
                         leaves.push(Leaf { path, number, offset });
                         offset + number.size()
@@ -175,7 +173,7 @@ impl Ulog {
                     None => self.add_leaves(&field.kind, &format!("{path}."), offset, leaves, depth - 1)?,
                 };
                 if offset > MESSAGE_BYTES_MAX || offset == before {
-                    return Err(format!("its format `{format}` is empty or longer than any message"));
+                    return Err(broken("a field that is empty, or fields longer than any message"));
                 }
             }
         }
@@ -184,40 +182,33 @@ impl Ulog {
 }
 
 impl Log for Ulog {
-    fn samples(&self, topic: Option<&str>, names: &[String]) -> Result<Samples, String> {
+    fn samples(&self, topic: Option<&str>, names: &[String]) -> Result<Samples, LogError> {
         let topic = self.topic(topic)?;
-        let leaves = self.leaves(&topic.format)?;
+        let mut leaves = Vec::new();
+        self.add_leaves(&topic.format, "", 0, &mut leaves, DEPTH_MAX)?;
         let leaf = |name: &str| leaves.iter().find(|leaf| leaf.path == name);
         let find = |name: &String| {
             leaf(name).ok_or_else(|| {
-                let known = known(leaves.iter().map(|leaf| leaf.path.as_str()));
-                format!("`{}` has no field `{name}`; it has {known}; correct `fields`", topic.name)
+                LogError::missing("field", name, leaves.iter().map(|leaf| &leaf.path), "`fields`")
             })
         };
         let wanted = names.iter().map(find).collect::<Result<Vec<_>, _>>()?;
         let stamps = [leaf("timestamp_sample"), leaf("timestamp")];
         let number = |place: &Range<usize>, leaf: &Leaf| {
-            self.bytes
-                .get(place.start + leaf.offset..place.end)
-                .map_or(f64::NAN, |bytes| leaf.number.read(bytes))
+            let bytes = self.bytes.get(place.start + leaf.offset..place.end);
+            bytes.map_or(f64::NAN, |bytes| leaf.number.read(bytes))
         };
         let time_s = |place| {
-            let stamps = stamps.iter().flatten().map(|leaf| number(place, leaf));
-            stamps.into_iter().find(|stamp_us| *stamp_us > 0.0).map_or(f64::NAN, |stamp_us| stamp_us * 1e-6)
+            let mut stamps = stamps.iter().flatten().map(|leaf| number(place, leaf));
+            stamps.find(|stamp_us| *stamp_us > 0.0).map_or(f64::NAN, |stamp_us| stamp_us * 1e-6)
         };
+        let row = |place| wanted.iter().map(|leaf| number(place, leaf)).collect();
         let mut notes = self.notes.clone();
         if stamps[0].is_some() {
             notes.push("time is `timestamp_sample`, when it was measured".to_owned());
         }
-        Ok(Samples {
-            time_s: topic.data.iter().map(time_s).collect(),
-            rows: topic
-                .data
-                .iter()
-                .map(|place| wanted.iter().map(|leaf| number(place, leaf)).collect())
-                .collect(),
-            notes,
-        })
+        let time_s = topic.data.iter().map(time_s).collect();
+        Ok(Samples { time_s, rows: topic.data.iter().map(row).collect(), notes })
     }
 
     fn topics(&self) -> Vec<(String, String)> {
@@ -234,20 +225,4 @@ fn field(declared: &str) -> Option<Field> {
         None => (kind, None),
     };
     Some(Field { kind: kind.to_owned(), length, name: name.to_owned() })
-}
-
-fn number(kind: &str) -> Option<Number> {
-    Some(match kind {
-        "int8_t" => Number::Signed(1),
-        "uint8_t" | "bool" | "char" => Number::Unsigned(1),
-        "int16_t" => Number::Signed(2),
-        "uint16_t" => Number::Unsigned(2),
-        "int32_t" => Number::Signed(4),
-        "uint32_t" => Number::Unsigned(4),
-        "int64_t" => Number::Signed(8),
-        "uint64_t" => Number::Unsigned(8),
-        "float" => Number::Float,
-        "double" => Number::Double,
-        _ => return None,
-    })
 }

@@ -254,7 +254,7 @@ fn wrong_files_are_refused_with_line_and_advice() {
     );
     said(refused(&CHANNELS.replace("position", "positon"), ""), &["flights.toml:5:", "positon", "position"]);
     said(refused(&CHANNELS.replace("time =", "# time ="), ""), &["no channel `time`", "add `time"]);
-    said(refused(&CHANNELS.replace("[\"px\", \"py\", ", "["), ""), &["has 1 names, expected 3"]);
+    said(refused(&CHANNELS.replace("[\"px\", \"py\", ", "["), ""), &["`columns`: expected 3 names, found 1"]);
     said(refused(CHANNELS, "from_s = 3\nto_s = 2"), &["flights.toml:", "`flight[0].to_s`", "found 2"]);
     said(refused(CHANNELS, "from_s = 300"), &["no sample lies", "300", "from_s"]);
     said(refused(CHANNELS, "format = \"ulog\""), &["no ULog", "check `format`"]);

@@ -18,7 +18,7 @@ use crate::sensing::SensorErrors;
 use crate::trim;
 use crate::whiteness::whiteness;
 use flights::state::StateQuantity;
-use flights::{Flight, FlightSet, Role};
+use flights::{Flight, FlightSet, Role, Sparse};
 use plant::effects::{Effect, EffectKind, entry};
 use std::collections::BTreeMap;
 use vehicles::{Vehicle, VehicleError};
@@ -47,12 +47,13 @@ pub enum IdentifyError {
     #[error(transparent)]
     Vehicle(#[from] VehicleError),
     /// A flight whose samples are too far apart.
-    #[error("flight `{flight}` cannot be identified on: {reason}")]
+    #[error("flight `{flight}` cannot be identified on: {cause}")]
     Sparse {
         /// Its name.
         flight: String,
         /// What is wrong, and what to do.
-        reason: String,
+        #[source]
+        cause: Sparse,
     },
     /// A role that no flight has.
     #[error(
@@ -182,9 +183,9 @@ pub fn problem<'f>(
         let (prepared, note) = match flight.check_span(SPACING_MAX_S) {
             Ok(()) => (Prepared::new(flight, box_s(flight), is_flying), None),
             // One flight that cannot be used leaves the others.
-            Err(reason) => {
-                let note = format!("not used: {reason}");
-                too_sparse.push((flight.role, IdentifyError::Sparse { flight: flight.name.clone(), reason }));
+            Err(cause) => {
+                let note = format!("not used: {cause}");
+                too_sparse.push((flight.role, IdentifyError::Sparse { flight: flight.name.clone(), cause }));
                 (None, Some(note))
             }
         };

@@ -10,6 +10,7 @@
 //! | `file` | which keys a vehicle file has, and what is physical |
 //! | [`reader`] | walks the TOML tree with positions, refuses what it does not know; scene files and gains files use it too |
 //! | [`quotes`] | quotation marks in CSV files of measurements, whose rows are lines |
+//! | [`table`] | tables of measurements in CSV, for every log that has this format |
 //! | [`text`] | files that people write, read with an end to it |
 //! | [`variables`] | variables of the environment within paths |
 //! | [`error`] | what can be wrong with a file, said for people |
@@ -30,6 +31,7 @@ mod file;
 pub mod provenance;
 pub mod quotes;
 pub mod reader;
+pub mod table;
 pub mod text;
 pub mod variables;
 pub mod vehicle;

@@ -2,27 +2,20 @@
 //!
 //! CSV lets a cell in quotation marks go on over line ends and delimiters. So a single stray mark makes one cell of all
 //! rows up to the next mark or the end of the file, and a reader finds nothing wrong. No logger writes a cell of several
-//! lines: a cell that begins with a mark has to end with one, on its line.
+//! lines: a cell that begins with a mark has to end with one, on its line. The crate `csv` takes any such cell.
 
 /// A quotation mark that would swallow what follows it.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[error(
+    "line {line}, cell {cell}: expected a cell on one line, found a quotation mark (\") that opens one and has none \
+     before the next delimiter that closes it, so that what follows would be read as its text; remove the mark, \
+     or close it"
+)]
 pub struct StrayQuote {
     /// The line, from 1.
     pub line: u64,
     /// The cell of the line, from 1.
     pub cell: u64,
-}
-
-impl std::fmt::Display for StrayQuote {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let Self { line, cell } = self;
-        write!(
-            f,
-            "line {line}, cell {cell}: expected a cell on one line, found a quotation mark (\") that opens one and has none \
-             before the next delimiter that closes it, so that what follows would be read as its text; remove the mark, \
-             or close it"
-        )
-    }
 }
 
 /// Refuses the first cell that begins with a quotation mark and does not end with one on its line.

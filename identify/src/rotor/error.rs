@@ -2,6 +2,7 @@
 
 use diagnostics::Place;
 use vehicles::VehicleError;
+use vehicles::table::TableError;
 
 /// Why a rotor could not be identified.
 #[derive(Debug, thiserror::Error)]
@@ -38,13 +39,48 @@ pub enum RotorError {
     /// The vehicle file that the rest is taken from is not usable.
     #[error(transparent)]
     Vehicle(#[from] VehicleError),
-    /// A log does not hold what the stand file says.
-    #[error("{file}: {reason}")]
-    Log {
+    /// A log is no table.
+    #[error("{file}: {cause}")]
+    Table {
         /// The log.
         file: String,
-        /// What is wrong, and what to do.
-        reason: String,
+        /// Where, and what to do.
+        #[source]
+        cause: TableError,
+    },
+    /// A log does not have a column that the stand file names.
+    #[error("{file}: no column `{column}`; it has {}; correct the name", known.join(", "))]
+    NoColumn {
+        /// The log.
+        file: String,
+        /// The column.
+        column: String,
+        /// The columns there are.
+        known: Vec<String>,
+    },
+    /// A row without a time, or one before that of the row above.
+    #[error("{file}: line {line}: column `{column}` {found}; check its unit, or cut the log")]
+    Time {
+        /// The log.
+        file: String,
+        /// The line, from 1.
+        line: u64,
+        /// The column.
+        column: String,
+        /// What is wrong with it.
+        found: &'static str,
+    },
+    /// Rows that are too few, or too far apart to show a step.
+    #[error("{file}: expected {expected}, found {found}; {advice}")]
+    Rows {
+        /// The log.
+        file: String,
+        /// What is needed.
+        expected: String,
+        /// What there is.
+        found: String,
+        /// What to do.
+        advice: &'static str,
     },
     /// A log to test on holds rows that are fitted on.
     #[error(

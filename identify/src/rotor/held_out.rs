@@ -6,7 +6,7 @@ use flights::{Channel, Comparison, same_file, twin};
 
 use super::error::RotorError;
 use super::stand::{Column, DynamicLog, Role, Stand, StaticLog};
-use super::table::Table;
+use super::table::LogTable;
 
 /// Refuses a stand whose logs to test on hold rows that are fitted on. What is fitted on static logs is tested on static
 /// ones, and so with dynamic ones.
@@ -57,7 +57,7 @@ fn once(
 }
 
 fn of_static(log: &StaticLog) -> Result<Channel<3>, RotorError> {
-    let table = Table::read(&log.file)?;
+    let table = LogTable::read(&log.file)?;
     let speed = table.column(&log.speed.column, log.speed.speed())?;
     let optional = |column: &Option<Column>| match column {
         Some(column) => table.column(&column.column, column.raw()),
@@ -69,7 +69,7 @@ fn of_static(log: &StaticLog) -> Result<Channel<3>, RotorError> {
 }
 
 fn of_dynamic(log: &DynamicLog) -> Result<Channel<3>, RotorError> {
-    let table = Table::read(&log.file)?;
+    let table = LogTable::read(&log.file)?;
     let speed = table.column(&log.speed.column, log.speed.speed())?;
     let command = table.column(&log.command.column, log.command.raw())?;
     let time_s = table.times(&log.time.column, log.time.time())?;

@@ -8,7 +8,7 @@ use super::coefficient::{Coefficient, PLATEAUS_MIN, Point};
 use super::error::RotorError;
 use super::plateau::{self, Plateaus, REST_RAD_S, median, without_outliers};
 use super::stand::{Column, Scale, Stand, StaticLog, held_out, short_name};
-use super::table::Table;
+use super::table::LogTable;
 use crate::statistics::mean;
 
 /// Density of air for the check of plausibility, in kg/m^3 (15 degrees C at sea level, ISO 2533).
@@ -82,7 +82,7 @@ pub fn fitted(stand: &Stand) -> Result<Option<Statics>, RotorError> {
 struct Log<'s> {
     declared: &'s StaticLog,
     name: String,
-    table: Table,
+    table: LogTable,
     kept: Vec<usize>,
     speed: Vec<f64>,
     plateaus: Plateaus,
@@ -90,7 +90,7 @@ struct Log<'s> {
 
 impl<'s> Log<'s> {
     fn read(declared: &'s StaticLog, findings: &mut Vec<String>) -> Result<Self, RotorError> {
-        let table = Table::read(&declared.file)?;
+        let table = LogTable::read(&declared.file)?;
         let name = short_name(&declared.file);
         let time_s = table.times(&declared.time.column, declared.time.time())?;
         let speed = table.column(&declared.speed.column, declared.speed.speed())?;

@@ -5,7 +5,7 @@ use serde::Serialize;
 use super::error::RotorError;
 use super::plateau::{self, REST_RAD_S, median, spread};
 use super::stand::{Clock, DynamicLog, held_out, short_name};
-use super::table::Table;
+use super::table::LogTable;
 
 /// A step has to be this many times as high as the speed's noise.
 const HEIGHT_SIGMAS_MIN: f64 = 3.0;
@@ -109,7 +109,7 @@ struct LeftOut {
 
 impl<'s> Log<'s> {
     fn read(declared: &'s DynamicLog) -> Result<Self, RotorError> {
-        let table = Table::read(&declared.file)?;
+        let table = LogTable::read(&declared.file)?;
         let name = short_name(&declared.file);
         let time_s = table.times(&declared.time.column, declared.time.time())?;
         let speed = table.column(&declared.speed.column, declared.speed.speed())?;
@@ -118,9 +118,11 @@ impl<'s> Log<'s> {
             (0..time_s.len()).filter(|row| speed[*row].is_finite() && command[*row].is_finite()).collect();
         let pick = |values: &[f64]| kept.iter().map(|row| values[*row]).collect::<Vec<f64>>();
         let (time_s, speed, command) = (pick(&time_s), pick(&speed), pick(&command));
-        let period_s = period(&time_s).ok_or_else(|| RotorError::Log {
+        let period_s = period(&time_s).ok_or_else(|| RotorError::Rows {
             file: name.clone(),
-            reason: "expected rows with time, speed and command, found too few; check the columns".to_owned(),
+            expected: "rows with time, speed and command".to_owned(),
+            found: "too few".to_owned(),
+            advice: "check the columns",
         })?;
         let log = Self { declared, name, time_s, speed, command, period_s };
         log.check_rate()?;
@@ -133,12 +135,14 @@ impl<'s> Log<'s> {
         if self.rows(before_s) >= ROWS_BEFORE_MIN && self.rows(after_s) >= ROWS_AFTER_MIN {
             return Ok(());
         }
-        let reason = format!(
-            "expected at least {ROWS_BEFORE_MIN} row in the {before_s} s before a step and {ROWS_AFTER_MIN} in the {after_s} s \
-             after, found one in {} s; correct the unit of `time`, or raise `before_s` and `after_s`",
-            self.period_s
-        );
-        Err(RotorError::Log { file: self.name.clone(), reason })
+        Err(RotorError::Rows {
+            file: self.name.clone(),
+            expected: format!(
+                "at least {ROWS_BEFORE_MIN} row in the {before_s} s before a step and {ROWS_AFTER_MIN} in the {after_s} s after"
+            ),
+            found: format!("one in {} s", self.period_s),
+            advice: "correct the unit of `time`, or raise `before_s` and `after_s`",
+        })
     }
 
     /// Whether the command of `row` is another than before.

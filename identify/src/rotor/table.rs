@@ -2,6 +2,8 @@
 
 use std::path::Path;
 
+use vehicles::table::Table;
+
 use super::error::RotorError;
 use super::stand::{Scale, short_name};
 
@@ -9,53 +11,47 @@ use super::stand::{Scale, short_name};
 const DAY_S: f64 = 86_400.0;
 
 /// The cells of a log.
-pub struct Table {
+pub struct LogTable {
     file: String,
-    headers: Vec<String>,
-    rows: Vec<csv::StringRecord>,
+    table: Table,
 }
 
-impl Table {
+impl LogTable {
     /// Reads the log at `path`.
     pub fn read(path: &Path) -> Result<Self, RotorError> {
         let bytes = vehicles::text::read_log(path)
             .map_err(|cause| RotorError::Unreadable { file: path.display().to_string(), cause })?;
-        let text = String::from_utf8_lossy(&bytes);
-        // Programs for other systems put a byte order mark before the first name.
-        let text = text.trim_start_matches('\u{feff}');
         let file = short_name(path);
-        vehicles::quotes::check(text.as_bytes(), b',')
-            .map_err(|stray| RotorError::Log { file: file.clone(), reason: stray.to_string() })?;
-        let mut reader =
-            csv::ReaderBuilder::new().trim(csv::Trim::All).flexible(true).from_reader(text.as_bytes());
-        let broken = |error: csv::Error| RotorError::Log {
-            file: file.clone(),
-            reason: format!("not a CSV file: {error}; check the path"),
-        };
-        let headers = reader.headers().map_err(broken)?.iter().map(str::to_owned).collect();
-        let rows = reader.records().collect::<Result<Vec<_>, _>>().map_err(broken)?;
-        Ok(Self { file, headers, rows })
+        match Table::parse(&bytes) {
+            Ok(table) => Ok(Self { file, table }),
+            Err(cause) => Err(RotorError::Table { file, cause }),
+        }
     }
 
-    /// The numbers of the column `name` in SI; NaN where a cell has none.
+    /// The numbers of a column in SI; NaN where a cell has none.
     pub fn column(&self, name: &str, scale: Scale) -> Result<Vec<f64>, RotorError> {
-        let index = self.headers.iter().position(|header| header == name).ok_or_else(|| RotorError::Log {
+        let index = self.table.column(name).ok_or_else(|| RotorError::NoColumn {
             file: self.file.clone(),
-            reason: format!("no column `{name}`; it has {}; correct the name", self.headers.join(", ")),
+            column: name.to_owned(),
+            known: self.table.headers.clone(),
         })?;
-        let cells = self.rows.iter().map(|row| row.get(index).unwrap_or_default());
         Ok(match scale {
-            Scale::Factor(factor) => cells.map(|cell| cell.parse().unwrap_or(f64::NAN) * factor).collect(),
-            Scale::WallClock => unwrapped(cells.map(|cell| seconds_of_day(cell).unwrap_or(f64::NAN))),
+            Scale::Factor(factor) => self.table.numbers(index).map(|number| number * factor).collect(),
+            Scale::WallClock => {
+                let cells = self.table.rows.iter().map(|row| row.cell(index));
+                unwrapped(cells.map(|cell| seconds_of_day(cell).unwrap_or(f64::NAN)))
+            }
         })
     }
 
     /// The numbers of a time column; every row needs one, and none may go back.
     pub fn times(&self, name: &str, scale: Scale) -> Result<Vec<f64>, RotorError> {
         let time_s = self.column(name, scale)?;
-        let fault = |row: usize, what: &str| RotorError::Log {
+        let fault = |row: usize, found: &'static str| RotorError::Time {
             file: self.file.clone(),
-            reason: format!("row {}: column `{name}` {what}; check its unit, or cut the log", row + 2),
+            line: self.table.rows[row].line,
+            column: name.to_owned(),
+            found,
         };
         if let Some(row) = time_s.iter().position(|time| !time.is_finite()) {
             return Err(fault(row, "has no time"));
