@@ -41,8 +41,7 @@ pub struct Canonical {
 /// If the flight has neither attitude nor angular velocity, or the file cannot be written.
 pub fn write_csv(flight: &Flight, path: &Path) -> Result<Canonical, FlightsError> {
     let (canonical, text) = csv(flight)?;
-    std::fs::write(path, text)
-        .map_err(|cause| FlightsError::Write { path: path.to_owned(), cause })?;
+    std::fs::write(path, text).map_err(|cause| FlightsError::Write { path: path.to_owned(), cause })?;
     Ok(canonical)
 }
 
@@ -151,7 +150,8 @@ fn joined(mut gaps: Vec<(f64, f64)>) -> Vec<(f64, f64)> {
 
 /// The times at which a channel has no samples: its gaps, and all before and after it but for five periods.
 fn without(time_s: &[f64]) -> Vec<(f64, f64)> {
-    let (Some(first_s), Some(last_s), Some(period_s)) = (time_s.first(), time_s.last(), period_s(time_s)) else {
+    let (Some(first_s), Some(last_s), Some(period_s)) = (time_s.first(), time_s.last(), period_s(time_s))
+    else {
         return Vec::new();
     };
     let slack_s = GAP_PERIODS * period_s;

@@ -127,7 +127,9 @@ fn named(quantity: Quantity, entry: &Entry) -> Result<(&[String], bool), LogErro
     };
     let is_attitude = quantity == Quantity::Attitude;
     let (key, names, size) = match (&entry.columns, &entry.euler) {
-        (_, Some(_)) if !is_attitude => return refused("euler", "`attitude` alone to have it", "it", "remove it"),
+        (_, Some(_)) if !is_attitude => {
+            return refused("euler", "`attitude` alone to have it", "it", "remove it");
+        }
         _ if entry.yaw.is_some() && !is_attitude => {
             return refused("yaw", "`attitude` alone to have it", "it", "remove it");
         }

@@ -43,8 +43,7 @@ impl CrazyflieLog {
         let mut events = header(&mut cursor)?;
         while cursor.at < end {
             let from = cursor.at;
-            let cut =
-                || LogError::unexpected(Spot::Byte(from), "a record", "one that is cut", COPY_AGAIN);
+            let cut = || LogError::unexpected(Spot::Byte(from), "a record", "one that is cut", COPY_AGAIN);
             let id = cursor.u16().ok_or_else(cut)?;
             let event = events.get_mut(&id).ok_or_else(|| {
                 let (expected, found) = ("an event that the header declares", format!("the event {id}"));

@@ -1,9 +1,11 @@
 //! The text of a flights file with its name: places for messages, and the paths written in it.
 
+use std::fmt::Display;
 use std::ops::Range;
 use std::path::{Component, Path, PathBuf};
 
-use diagnostics::Place;
+use diagnostics::{Diagnostic, ParameterError, Place};
+use serde::de::DeserializeOwned;
 use toml::Spanned;
 
 use crate::error::FlightsError;
@@ -21,10 +23,11 @@ impl Document {
     }
 
     /// The text as a `T`; refuses keys that `T` does not have.
-    pub fn parse<T: serde::de::DeserializeOwned>(&self) -> Result<T, FlightsError> {
-        toml::from_str(&self.text).map_err(|error| FlightsError::Syntax {
-            place: self.place(&error.span().unwrap_or_default()),
-            message: error.message().trim().replace('\n', ", "),
+    pub fn parse<T: DeserializeOwned>(&self) -> Result<T, FlightsError> {
+        let read = diagnostics::read_toml(&self.path.display().to_string(), &self.text);
+        read.map_err(|error| {
+            let help = if error.help.is_empty() { "docs/flights.md has the format" } else { &error.help };
+            FlightsError::File(error.clone().help(help))
         })
     }
 
@@ -34,14 +37,16 @@ impl Document {
     }
 
     /// A value that cannot be meant.
-    pub fn bad(&self, span: &Range<usize>, key: &str, texts: Bad<'_>) -> FlightsError {
-        FlightsError::BadValue {
-            place: self.place(span),
-            key: key.to_owned(),
-            expected: texts.expected,
-            found: texts.found.to_owned(),
-            advice: texts.advice,
-        }
+    pub fn bad(
+        &self,
+        span: &Range<usize>,
+        key: impl Into<String>,
+        expected: &str,
+        found: impl Display,
+        advice: &str,
+    ) -> FlightsError {
+        let error = ParameterError::value(key, expected, found);
+        FlightsError::File(Diagnostic::at(self.place(span), error).help(advice))
     }
 
     /// A path as written: `${NAME:-default}` is the environment's NAME, and a relative path starts at the folder
@@ -50,7 +55,7 @@ impl Document {
         let expanded = vehicles::variables::expand(written.get_ref(), |name| std::env::var(name).ok())
             .map_err(|found| {
                 let advice = "set the variable, or give a default: ${NAME:-path}";
-                self.bad(&written.span(), key, Bad { expected: "a path", found: &found, advice })
+                self.bad(&written.span(), key, "a path", found, advice)
             })?;
         Ok(tidy(&self.path.parent().unwrap_or(Path::new("")).join(expanded)))
     }
@@ -72,14 +77,4 @@ fn tidy(path: &Path) -> PathBuf {
         (Ok(a), Ok(b)) if a == b => short,
         _ => path.to_owned(),
     }
-}
-
-/// What a value should have been, what it is, and what to do.
-pub struct Bad<'a> {
-    /// What would be accepted.
-    pub expected: &'static str,
-    /// What the file says.
-    pub found: &'a str,
-    /// What to do.
-    pub advice: &'static str,
 }

@@ -3,7 +3,7 @@
 use std::io;
 use std::path::PathBuf;
 
-use diagnostics::Place;
+use diagnostics::{Diagnostic, Place};
 use vehicles::VehicleError;
 use vehicles::table::TableError;
 
@@ -19,41 +19,13 @@ use crate::span::Sparse;
 /// let text = "vehicle = \"v.toml\"\n[[flight]]\nname = \"a\"\nfile = \"a.csv\"\nrole = \"fit\"\nto_s = -1.0\n";
 /// let vehicle = |_: &std::path::Path| Ok(include_bytes!("../../vehicles/hummingbird.toml").to_vec());
 /// let error = FlightSet::parse("flights.toml".as_ref(), text.to_owned(), &vehicle).unwrap_err();
-/// assert!(matches!(&error, FlightsError::BadValue { key, .. } if key == "flight[0].to_s"));
+/// assert!(matches!(&error, FlightsError::File(fault) if fault.key() == "flight[0].to_s"));
 /// ```
 #[derive(Debug, thiserror::Error)]
 pub enum FlightsError {
-    /// The flights file cannot be read at all.
-    #[error("{file}: cannot read this file: {cause}; check the path and that it is UTF-8 text")]
-    Unreadable {
-        /// The path as given.
-        file: String,
-        /// What the operating system said.
-        #[source]
-        cause: io::Error,
-    },
-    /// The text is not TOML, or has a key or a type that no flights file has.
-    #[error("{place}: {message}; correct this line (docs/flights.md has the format)")]
-    Syntax {
-        /// Where the parser stopped.
-        place: Place,
-        /// What the parser said.
-        message: String,
-    },
-    /// A key holds something that cannot be meant.
-    #[error("{place}: `{key}`: expected {expected}, found {found}; {advice}")]
-    BadValue {
-        /// Where the value stands.
-        place: Place,
-        /// The whole dotted key.
-        key: String,
-        /// What would be accepted.
-        expected: &'static str,
-        /// What the file says.
-        found: String,
-        /// What to do.
-        advice: &'static str,
-    },
+    /// The flights file cannot be read, is no TOML, or has a key or a value that cannot be meant.
+    #[error(transparent)]
+    File(#[from] Diagnostic),
     /// The vehicle file is not usable.
     #[error("{place}: `vehicle`: {cause}")]
     Vehicle {

@@ -60,7 +60,12 @@ impl McapLog {
             .ok_or_else(|| LogError::missing("topic", name, self.topics.keys(), "`topic`"))?;
         let definition = topic.definition.as_ref().map_err(|found| {
             let at = Spot::Named("topic", name.clone());
-            LogError::unexpected(at, "CDR with a ros2msg schema", found, "record it so, or name another topic")
+            LogError::unexpected(
+                at,
+                "CDR with a ros2msg schema",
+                found,
+                "record it so, or name another topic",
+            )
         })?;
         Ok((name, topic, definition))
     }
@@ -91,7 +96,8 @@ impl Log for McapLog {
             }
             let decoded = definition.decode(&little_endian(&message.data));
             let leaves = decoded.map_err(|found| {
-                let (at, expected) = (Spot::Named("topic", name.to_owned()), format!("messages of type {}", topic.kind));
+                let (at, expected) =
+                    (Spot::Named("topic", name.to_owned()), format!("messages of type {}", topic.kind));
                 LogError::unexpected(at, expected, found, "the log is damaged, or its schema is another's")
             })?;
             // A stamp of zero was not set, unless the log begins at zero too: the first tick of a simulation.

@@ -9,7 +9,7 @@ use vehicles::Vehicle;
 use crate::channels;
 use crate::clean;
 use crate::declaration::{Assumption, ChannelMap, Entry, FlightEntry, Format};
-use crate::document::{Bad, Document};
+use crate::document::Document;
 use crate::error::{FlightsError, LogError, Spot};
 use crate::flight::{AnyChannel, Channel, Flight};
 use crate::frame;
@@ -228,10 +228,10 @@ impl Reading<'_> {
         let Assumption::Hover = assume.get_ref();
         let missing = flight.attitude.is_empty() || flight.angular_velocity.is_empty();
         if flight.command.is_empty() || !missing {
-            let expected = "a log with commands, and without attitude or angular velocity";
+            let expected = "of a log with commands, and without attitude or angular velocity";
             let found = if missing { "no commands" } else { "a log that has both" };
-            let bad = Bad { expected, found, advice: "map `command`, or remove `assume`" };
-            return Err(self.document.bad(&assume.span(), "flight.assume", bad));
+            let advice = "map `command`, or remove `assume`";
+            return Err(self.document.bad(&assume.span(), "flight.assume", expected, found, advice));
         }
         let time_s = &flight.command.time_s;
         if flight.attitude.is_empty() {
@@ -253,9 +253,8 @@ impl Reading<'_> {
     }
 
     fn check_something_is_left(&self, flight: &Flight) -> Result<(), FlightsError> {
-        let is_lost = |(quantity, time_s): &(Quantity, &[f64])| {
-            time_s.is_empty() && self.declared(*quantity).is_some()
-        };
+        let is_lost =
+            |(quantity, time_s): &(Quantity, &[f64])| time_s.is_empty() && self.declared(*quantity).is_some();
         let lost = flight.times().into_iter().filter(is_lost).map(|(quantity, _)| {
             let expected = format!("samples in the flight's part from {} s on", self.start_s());
             let (found, advice) = ("no sample lies there", "correct `from_s` and `to_s`");

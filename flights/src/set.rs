@@ -3,11 +3,12 @@
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
+use diagnostics::Diagnostic;
 use toml::Spanned;
 use vehicles::{Vehicle, VehicleError};
 
 use crate::declaration::{Declaration, FlightEntry};
-use crate::document::{Bad, Document};
+use crate::document::Document;
 use crate::error::{FlightsError, LogError};
 use crate::flight::Flight;
 use crate::formats;
@@ -31,7 +32,7 @@ impl FlightSet {
     /// As [`FlightSet::parse`], and if a file cannot be read.
     pub fn load(path: &Path) -> Result<Self, FlightsError> {
         let text = vehicles::text::read(path)
-            .map_err(|cause| FlightsError::Unreadable { file: path.display().to_string(), cause })?;
+            .map_err(|cause| Diagnostic::unreadable(path.display().to_string(), &cause))?;
         Self::parse(path, text, &vehicles::text::read_log)
     }
 
@@ -47,8 +48,7 @@ impl FlightSet {
         let vehicle = document.resolve("vehicle", &declaration.vehicle).and_then(|path| {
             let place = document.place(&declaration.vehicle.span());
             let vehicle = vehicle(&path, read);
-            let vehicle =
-                vehicle.map_err(|cause| FlightsError::Vehicle { place, cause: Box::new(cause) })?;
+            let vehicle = vehicle.map_err(|cause| FlightsError::Vehicle { place, cause: Box::new(cause) })?;
             Ok((path, vehicle))
         });
         let (vehicle_path, vehicle) = FlightsError::gather_with(vehicle, errors)?;
@@ -94,28 +94,31 @@ fn check_keys(document: &Document, flights: &[Spanned<FlightEntry>]) -> Vec<Flig
     let mut errors = Vec::new();
     if flights.is_empty() {
         let advice = "add a `[[flight]]` with name, file and role";
-        let bad = Bad { expected: "at least one flight", found: "none", advice };
-        errors.push(document.bad(&(0..0), "flight", bad));
+        errors.push(document.bad(&(0..0), "flight", "at least one flight", "none", advice));
     }
     for (index, entry) in flights.iter().enumerate() {
         let (entry, key) = (entry.get_ref(), |name: &str| format!("flight[{index}].{name}"));
         let name = &entry.name;
         if flights[..index].iter().any(|other| other.get_ref().name.get_ref() == name.get_ref()) {
             let found = format!("\"{}\" a second time", name.get_ref());
-            let bad = Bad { expected: "a name of its own", found: &found, advice: "give another" };
-            errors.push(document.bad(&name.span(), &key("name"), bad));
+            errors.push(document.bad(
+                &name.span(),
+                key("name"),
+                "the name of one flight",
+                found,
+                "give another",
+            ));
         }
         if let Some((bound, at, found)) = bad_window(entry) {
             let expected = "0 <= from_s < to_s, in seconds from the log's first sample";
-            let bad = Bad { expected, found: &found.to_string(), advice: "correct it" };
-            errors.push(document.bad(&at, &key(bound), bad));
+            errors.push(document.bad(&at, key(bound), expected, found, "correct it"));
         }
         for (quantity, delay_s) in &entry.delay_s {
             let number = *delay_s.get_ref();
             if *quantity == Quantity::Time || !number.is_finite() {
                 let expected = "a finite number of seconds for a channel other than time";
-                let bad = Bad { expected, found: &number.to_string(), advice: "correct it" };
-                errors.push(document.bad(&delay_s.span(), &key(&format!("delay_s.{quantity}")), bad));
+                let key = key(&format!("delay_s.{quantity}"));
+                errors.push(document.bad(&delay_s.span(), key, expected, number, "correct it"));
             }
         }
     }

@@ -136,9 +136,9 @@ impl Ulog {
         let name = topic.ok_or_else(|| {
             LogError::unexpected(Spot::Key("topic"), "the name of a message of the ULog", "none", "add it")
         })?;
-        logged().find(|topic| topic.name == name).ok_or_else(|| {
-            LogError::missing("topic", name, logged().map(|topic| &topic.name), "`topic`")
-        })
+        logged()
+            .find(|topic| topic.name == name)
+            .ok_or_else(|| LogError::missing("topic", name, logged().map(|topic| &topic.name), "`topic`"))
     }
 
     /// Adds the numbers of `format` from the byte `offset` on, those of formats in it by their path; returns the byte behind

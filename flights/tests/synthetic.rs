@@ -261,7 +261,7 @@ fn wrong_files_are_refused_with_line_and_advice() {
     said(refused(CHANNELS, "format = \"crazyflie\""), &["no Crazyflie log", "check `format`"]);
     said(refused(CHANNELS, "format = \"mcap\""), &["cannot be read as MCAP", "check `format`"]);
     said(refused(CHANNELS, "assume = \"hover\""), &["flight.assume", "has both"]);
-    said(refused(CHANNELS, "extra = 1"), &["unknown field `extra`"]);
+    said(refused(CHANNELS, "extra = 1"), &["extra`", "unknown key"]);
 }
 
 #[test]

@@ -313,7 +313,7 @@ fn mistakes_are_said_with_what_to_do() {
         stand.run().unwrap_err().to_string()
     };
     assert!(error("").contains("at least one log"), "{}", error(""));
-    assert!(error("extra = 1").contains("unknown field `extra`"), "{}", error("extra = 1"));
+    assert!(error("extra = 1").contains("unknown key `extra`"), "{}", error("extra = 1"));
     let unit = error(&STATIC.replace("\"N*m\"", "\"gf\""));
     assert!(unit.contains("static.torque.unit") && unit.contains("found gf"), "{unit}");
     let column = error(&STATIC.replace("column = \"thrust\"", "column = \"Thrust\""));

@@ -1,41 +1,15 @@
 //! What can be wrong with a stand file, its logs, or the folder of the results.
 
-use diagnostics::Place;
+use diagnostics::Diagnostic;
 use vehicles::VehicleError;
 use vehicles::table::TableError;
 
 /// Why a rotor could not be identified.
 #[derive(Debug, thiserror::Error)]
 pub enum RotorError {
-    /// A file could not be read at all.
-    #[error("{file}: cannot read this file: {cause}; check the path")]
-    Unreadable {
-        /// The path.
-        file: String,
-        /// What the operating system said.
-        #[source]
-        cause: std::io::Error,
-    },
-    /// The stand file is not TOML, or has a key or a type that no stand file has.
-    #[error("{place}: {message}; correct this line (docs/rotor-stand.md has the format)")]
-    Syntax {
-        /// Where the parser stopped.
-        place: Place,
-        /// What the parser said.
-        message: String,
-    },
-    /// A key of the stand file holds something that cannot be meant.
-    #[error("{file}: `{key}`: expected {expected}, found {found}; correct this value")]
-    BadValue {
-        /// The stand file.
-        file: String,
-        /// The dotted key.
-        key: String,
-        /// What would be accepted.
-        expected: String,
-        /// What the file says.
-        found: String,
-    },
+    /// A file cannot be read, is no TOML, or has a key or a value that cannot be meant.
+    #[error(transparent)]
+    File(#[from] Diagnostic),
     /// The vehicle file that the rest is taken from is not usable.
     #[error(transparent)]
     Vehicle(#[from] VehicleError),

@@ -2,8 +2,9 @@
 
 use std::path::{Path, PathBuf};
 
-use diagnostics::Place;
+use diagnostics::parameter::{positive, require};
 use diagnostics::unit::{Dimension, FORCE, RATIO, SPEED, TIME, TORQUE};
+use diagnostics::{Diagnostic, ParameterError};
 use serde::Deserialize;
 use vehicles::Vehicle;
 use vehicles::variables::expand;
@@ -167,17 +168,14 @@ impl Stand {
     /// Reads and checks the stand file at `path`.
     pub fn read(path: &Path) -> Result<Self, RotorError> {
         let name = path.display().to_string();
-        let text = vehicles::text::read(path)
-            .map_err(|cause| RotorError::Unreadable { file: name.clone(), cause })?;
-        let file: File = toml::from_str(&text).map_err(|error| RotorError::Syntax {
-            place: Place::of(&name, &text, &error.span().unwrap_or(0..0)),
-            message: error.message().trim().replace('\n', ", "),
-        })?;
-        let check = Check { file: &name };
-        check.all(&file)?;
+        let text =
+            vehicles::text::read(path).map_err(|cause| Diagnostic::unreadable(name.as_str(), &cause))?;
+        let file: File = diagnostics::read_toml(&name, &text)?;
+        let in_file = |error: ParameterError| Diagnostic::in_file(name.as_str(), error);
+        Diagnostic::gather(file.checks().into_iter().map(|check| check.map_err(in_file)))?;
         let folder = path.parent().unwrap_or(Path::new(""));
         let resolve =
-            |key: &str, written: &Path| check.expanded(key, written).map(|expanded| folder.join(expanded));
+            |key: &str, written: &Path| expanded(key, written).map(|path| folder.join(path)).map_err(in_file);
         let mut stand = Stand {
             name: file.name,
             diameter_m: file.propeller_diameter_m,
@@ -239,83 +237,63 @@ impl Column {
     }
 }
 
-/// Checks the values of a stand file.
-struct Check<'f> {
-    file: &'f str,
+type Check = Result<(), ParameterError>;
+
+impl File {
+    /// What each value came to.
+    fn checks(&self) -> Vec<Check> {
+        let logs = self.statics.len() + self.dynamics.len();
+        let mut checks = vec![require("static, dynamic", "none", logs > 0, "at least one log")];
+        checks.extend(self.propeller_diameter_m.map(|diameter| positive("propeller_diameter_m", diameter)));
+        for log in &self.statics {
+            let has_one = log.thrust.is_some() || log.torque.is_some();
+            checks.extend([
+                share("static.held_out", log.held_out),
+                positive("static.settle_s", log.settle_s),
+                positive("static.steady", log.steady),
+                time_unit("static.time", &log.time),
+                unit("static.speed", &log.speed, SPEED),
+                require("static", "neither", has_one, "a `thrust` or a `torque`"),
+            ]);
+            checks.extend(log.thrust.as_ref().map(|column| unit("static.thrust", column, FORCE)));
+            checks.extend(log.torque.as_ref().map(|column| unit("static.torque", column, TORQUE)));
+        }
+        for log in &self.dynamics {
+            checks.extend([
+                share("dynamic.held_out", log.held_out),
+                positive("dynamic.before_s", log.before_s),
+                positive("dynamic.after_s", log.after_s),
+                time_unit("dynamic.time", &log.time),
+                unit("dynamic.speed", &log.speed, SPEED),
+                unit("dynamic.command", &log.command, RATIO),
+            ]);
+        }
+        checks
+    }
 }
 
-impl Check<'_> {
-    fn all(&self, file: &File) -> Result<(), RotorError> {
-        let logs = file.statics.len() + file.dynamics.len();
-        self.require(logs > 0, "static, dynamic", "at least one log", "none")?;
-        if let Some(diameter) = file.propeller_diameter_m {
-            self.positive("propeller_diameter_m", diameter)?;
-        }
-        file.statics.iter().try_for_each(|log| self.static_log(log))?;
-        file.dynamics.iter().try_for_each(|log| self.dynamic_log(log))
-    }
+fn time_unit(key: &str, column: &Column) -> Check {
+    let expected = format!("\"wall clock\" (YYYY-MM-DD HH:MM:SS:mmm) or {}", TIME.describe());
+    let is_known = column.time() == Scale::WallClock || TIME.factor(&column.unit).is_some();
+    require(&format!("{key}.unit"), &column.unit, is_known, expected)
+}
 
-    fn static_log(&self, log: &StaticLog) -> Result<(), RotorError> {
-        self.share("static.held_out", log.held_out)?;
-        self.positive("static.settle_s", log.settle_s)?;
-        self.positive("static.steady", log.steady)?;
-        self.time("static.time", &log.time)?;
-        self.unit("static.speed", &log.speed, SPEED)?;
-        let has_one = log.thrust.is_some() || log.torque.is_some();
-        self.require(has_one, "static", "a `thrust` or a `torque`", "neither")?;
-        log.thrust.iter().try_for_each(|column| self.unit("static.thrust", column, FORCE))?;
-        log.torque.iter().try_for_each(|column| self.unit("static.torque", column, TORQUE))
-    }
+fn unit(key: &str, column: &Column, dimension: Dimension) -> Check {
+    positive(&format!("{key}.pole_pairs"), column.pole_pairs)?;
+    let is_known = dimension.factor(&column.unit).is_some();
+    require(&format!("{key}.unit"), &column.unit, is_known, dimension.describe())
+}
 
-    fn dynamic_log(&self, log: &DynamicLog) -> Result<(), RotorError> {
-        self.share("dynamic.held_out", log.held_out)?;
-        self.positive("dynamic.before_s", log.before_s)?;
-        self.positive("dynamic.after_s", log.after_s)?;
-        self.time("dynamic.time", &log.time)?;
-        self.unit("dynamic.speed", &log.speed, SPEED)?;
-        self.unit("dynamic.command", &log.command, RATIO)
-    }
+fn share(key: &str, share: f64) -> Check {
+    require(key, share, (0.0..1.0).contains(&share), "a share from 0 to below 1")
+}
 
-    fn time(&self, key: &str, column: &Column) -> Result<(), RotorError> {
-        let expected = format!("\"wall clock\" (YYYY-MM-DD HH:MM:SS:mmm) or {}", TIME.describe());
-        let holds = column.time() == Scale::WallClock || TIME.factor(&column.unit).is_some();
-        self.require(holds, &format!("{key}.unit"), &expected, &column.unit)
-    }
-
-    fn unit(&self, key: &str, column: &Column, dimension: Dimension) -> Result<(), RotorError> {
-        self.positive(&format!("{key}.pole_pairs"), column.pole_pairs)?;
-        let holds = dimension.factor(&column.unit).is_some();
-        self.require(holds, &format!("{key}.unit"), &dimension.describe(), &column.unit)
-    }
-
-    fn share(&self, key: &str, share: f64) -> Result<(), RotorError> {
-        self.require((0.0..1.0).contains(&share), key, "a share from 0 to below 1", &share.to_string())
-    }
-
-    fn positive(&self, key: &str, number: f64) -> Result<(), RotorError> {
-        let holds = number > 0.0 && number.is_finite();
-        self.require(holds, key, "a number above 0", &number.to_string())
-    }
-
-    fn require(&self, holds: bool, key: &str, expected: &str, found: &str) -> Result<(), RotorError> {
-        if holds {
-            return Ok(());
-        }
-        let (key, expected, found) = (key.to_owned(), expected.to_owned(), found.to_owned());
-        Err(RotorError::BadValue { file: self.file.to_owned(), key, expected, found })
-    }
-
-    /// The path with `${NAME}` and `${NAME:-default}` replaced by the environment's, as in manifests.
-    fn expanded(&self, key: &str, written: &Path) -> Result<String, RotorError> {
-        expand(&written.to_string_lossy(), |name| std::env::var(name).ok()).map_err(|found| {
-            RotorError::BadValue {
-                file: self.file.to_owned(),
-                key: key.to_owned(),
-                expected: "a path whose variables are set or have a default, as in ${NAME:-path}".to_owned(),
-                found,
-            }
-        })
-    }
+/// The path with `${NAME}` and `${NAME:-default}` replaced by the environment's, as in manifests.
+fn expanded(key: &str, written: &Path) -> Result<String, ParameterError> {
+    expand(&written.to_string_lossy(), |name| std::env::var(name).ok()).map_err(|found| {
+        let expected = "a path whose variables are set or have a default, as in ${NAME:-path}";
+        ParameterError::value(key, expected, found)
+    })
 }
 
 /// Which of `count` segments are held out: spread evenly, so that a share of them is, and the first is not.

@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use diagnostics::Diagnostic;
 use vehicles::table::Table;
 
 use super::error::RotorError;
@@ -19,8 +20,9 @@ pub struct LogTable {
 impl LogTable {
     /// Reads the log at `path`.
     pub fn read(path: &Path) -> Result<Self, RotorError> {
-        let bytes = vehicles::text::read_log(path)
-            .map_err(|cause| RotorError::Unreadable { file: path.display().to_string(), cause })?;
+        let bytes = vehicles::text::read_log(path).map_err(|cause| {
+            Diagnostic::unreadable(path.display().to_string(), &cause).help("check the path")
+        })?;
         let file = short_name(path);
         match Table::parse(&bytes) {
             Ok(table) => Ok(Self { file, table }),
