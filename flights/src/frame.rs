@@ -8,7 +8,6 @@ use nalgebra::{Matrix3, Quaternion, Rotation3, UnitQuaternion, Vector3};
 use crate::declaration::Frame;
 
 /// A vector of the world.
-#[must_use]
 pub fn world(frame: Frame, [x, y, z]: [f64; 3]) -> [f64; 3] {
     match frame {
         Frame::FluEnu => [x, y, z],
@@ -17,7 +16,6 @@ pub fn world(frame: Frame, [x, y, z]: [f64; 3]) -> [f64; 3] {
 }
 
 /// A vector of the body.
-#[must_use]
 pub fn body(frame: Frame, [x, y, z]: [f64; 3]) -> [f64; 3] {
     match frame {
         Frame::FluEnu => [x, y, z],
@@ -26,7 +24,6 @@ pub fn body(frame: Frame, [x, y, z]: [f64; 3]) -> [f64; 3] {
 }
 
 /// An attitude, body to world, given and returned in the order w, x, y, z.
-#[must_use]
 pub fn attitude(frame: Frame, wxyz: [f64; 4]) -> [f64; 4] {
     match frame {
         Frame::FluEnu => wxyz,
@@ -38,19 +35,16 @@ pub fn attitude(frame: Frame, wxyz: [f64; 4]) -> [f64; 4] {
 }
 
 /// The attitude of roll, pitch and yaw in radians, z-y-x sequence, in the order w, x, y, z.
-#[must_use]
 pub fn euler([roll, pitch, yaw]: [f64; 3]) -> [f64; 4] {
     to_wxyz(UnitQuaternion::from_euler_angles(roll, pitch, yaw).into_inner())
 }
 
 /// A quaternion of the order w, x, y, z.
-#[must_use]
 pub fn from_wxyz([w, x, y, z]: [f64; 4]) -> Quaternion<f64> {
     Quaternion::new(w, x, y, z)
 }
 
 /// The order w, x, y, z of a quaternion.
-#[must_use]
 pub fn to_wxyz(q: Quaternion<f64>) -> [f64; 4] {
     [q.w, q.i, q.j, q.k]
 }

@@ -75,7 +75,6 @@ pub struct Finding {
 }
 
 /// Compares the channels of a flight with each other, with gravity and with the vehicle.
-#[must_use]
 pub fn judge(flight: &Flight, vehicle: &Vehicle, channels: &ChannelMap) -> Vec<Finding> {
     let judge = Judge { flight, vehicle, channels };
     let findings = [
@@ -94,7 +93,6 @@ pub fn judge(flight: &Flight, vehicle: &Vehicle, channels: &ChannelMap) -> Vec<F
 /// Compares the times of a CSV file, before anything is cut off, with those of logs of flights: wrong are samples that come
 /// as no logger's do over a time that no vehicle flies, where both are right in another unit. A first row of zeros, which
 /// some loggers write before their clock runs, hides no wrong unit.
-#[must_use]
 pub fn judge_time(flight: &Flight, vehicle: &Vehicle, channels: &ChannelMap) -> Option<Finding> {
     channels.get(&Quantity::Time)?;
     let judge = Judge { flight, vehicle, channels };

@@ -15,14 +15,12 @@ pub struct Candidate {
 
 impl Candidate {
     /// Whether it is what most trims are: a torque that is the same whatever the thrust.
-    #[must_use]
     pub fn is_trim(&self) -> bool {
         self.kind.steady_state && self.kind.turns_steadily
     }
 }
 
 /// The parameters of candidates.
-#[must_use]
 pub fn free_parameters(candidates: &[Candidate]) -> Vec<usize> {
     candidates.iter().flat_map(|candidate| candidate.free.clone()).collect()
 }
@@ -37,7 +35,6 @@ pub struct Unidentifiable {
 }
 
 /// The candidates that `flights` can show, and those that they cannot.
-#[must_use]
 pub fn candidates(parameters: &Parameters, flights: &[&Prepared]) -> (Vec<Candidate>, Vec<Unidentifiable>) {
     let (mut seen, mut unidentifiable) = (Vec::new(), Vec::new());
     for kind in parameters.effects() {

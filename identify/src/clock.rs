@@ -13,19 +13,12 @@ pub struct Clock {
 
 impl Clock {
     /// The instants from `start_s` to `end_s`.
-    #[allow(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "a flight is short and forwards"
-    )]
-    #[must_use]
     pub fn spanning(start_s: f64, end_s: f64, step_s: f64) -> Self {
         let steps = ((end_s - start_s) / step_s + 1e-9).floor().max(0.0);
         Self { start_s, step_s, count: steps as usize + 1 }
     }
 
     /// Instant `index`.
-    #[must_use]
     pub fn at(&self, index: usize) -> f64 {
         self.start_s + index as f64 * self.step_s
     }

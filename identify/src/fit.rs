@@ -55,19 +55,16 @@ pub struct FitResult {
 
 impl FitResult {
     /// Sum of the squares of the validation data.
-    #[must_use]
     pub fn validation_cost(&self) -> f64 {
         self.validation_costs.iter().sum()
     }
 
     /// Sum of the squares of the estimation data.
-    #[must_use]
     pub fn estimation_cost(&self) -> f64 {
         self.estimation_costs.iter().sum()
     }
 
     /// Standard error of a parameter; `None` where it was held.
-    #[must_use]
     pub fn standard_error(&self, parameter: usize) -> Option<f64> {
         let at = self.free.iter().position(|own| *own == parameter)?;
         Some(self.covariance[(at, at)].max(0.0).sqrt())
@@ -80,7 +77,6 @@ impl FitResult {
     /// asymptotics of clustered data give (Bester, Conley and Hansen, J. Econometrics 165, 2011), what Cameron and
     /// Miller (J. Human Resources 50(2), 2015, section VI) recommend, and what goes with the jackknife's standard errors
     /// (MacKinnon, Nielsen and Webb, J. Econometrics 232(2), 2023), which already pay for the parameters.
-    #[must_use]
     pub fn t_quantile(&self, probability: f64) -> f64 {
         student_quantile(probability, (self.estimation_costs.len() as f64 - 1.0).max(1.0))
     }
@@ -88,7 +84,6 @@ impl FitResult {
 
 impl Problem<'_> {
     /// Fits the parameters `free`, starting from `start`.
-    #[must_use]
     pub fn fitted(&self, start: &[f64], free: &[usize]) -> FitResult {
         let mut values = start.to_vec();
         let mut blocks = self.blocks(&self.estimation, &values, free);
@@ -145,7 +140,6 @@ impl Problem<'_> {
 
     /// The Gauss-Newton step within the bounds: a parameter that would leave them stops there, and the others are
     /// fitted to that.
-    #[must_use]
     pub fn step(&self, blocks: &[Block], values: &[f64], free: &[usize]) -> DVector<f64> {
         let total = normal::sum(blocks);
         let mut held: Vec<Option<f64>> = vec![None; free.len()];
@@ -170,7 +164,6 @@ impl Problem<'_> {
     }
 
     /// The values after a step, within their bounds.
-    #[must_use]
     pub fn moved(&self, values: &[f64], free: &[usize], step: &DVector<f64>) -> Vec<f64> {
         let mut next = values.to_vec();
         for (parameter, step) in free.iter().zip(step.iter()) {
@@ -181,7 +174,6 @@ impl Problem<'_> {
     }
 
     /// The normal equations of all blocks of `flights`.
-    #[must_use]
     pub fn blocks(&self, flights: &[Prepared], values: &[f64], free: &[usize]) -> Vec<Block> {
         flights.iter().flat_map(|flight| self.blocks_of(flight, values, free)).collect()
     }
@@ -201,14 +193,12 @@ impl Problem<'_> {
     }
 
     /// The normal equations of the blocks of one flight.
-    #[must_use]
     pub fn blocks_of(&self, flight: &Prepared, values: &[f64], free: &[usize]) -> Vec<Block> {
         let (residual, columns) = self.linearised(flight, values, free);
         self.flight_blocks(flight, &residual, &columns)
     }
 
     /// The weighted sums of squares of all blocks of `flights`.
-    #[must_use]
     pub fn costs(&self, flights: &[Prepared], values: &[f64]) -> Vec<f64> {
         self.blocks(flights, values, &[]).iter().map(|block| block.cost).collect()
     }
@@ -233,7 +223,6 @@ impl Problem<'_> {
     }
 
     /// The weights of the rows of one knot.
-    #[must_use]
     pub fn row_weights(&self, flight: &Prepared) -> Vec<f64> {
         let component = |equation: &Equation, axis: usize| {
             self.weights.get(&(equation.name(), axis)).copied().unwrap_or(0.0)
@@ -245,7 +234,6 @@ impl Problem<'_> {
     }
 
     /// First knot of each block, and the one behind its last.
-    #[must_use]
     pub fn block_knots(&self, flight: &Prepared) -> Vec<(usize, usize)> {
         let knots = &flight.layout.knots;
         let block_of = |knot: usize| (flight.layout.clock.at(knot) / self.block_s).floor();
@@ -325,13 +313,11 @@ impl Problem<'_> {
     /// The cost that `fitted` leaves on the estimation data, in units of what all candidates together would leave by the
     /// linearised equations: those by which the weights were set. Delays, lags and the battery are far from linear and do
     /// not count.
-    #[must_use]
     pub fn left(&self, fitted: &FitResult) -> f64 {
         fitted.estimation_cost() / self.rows(&self.estimation) as f64
     }
 
     /// How many rows of `flights` count, at least one.
-    #[must_use]
     pub fn rows(&self, flights: &[Prepared]) -> usize {
         let of = |flight: &Prepared| {
             flight.layout.knots.len()
@@ -341,7 +327,6 @@ impl Problem<'_> {
     }
 
     /// The shortest delay that the grids can tell from none.
-    #[must_use]
     pub fn least_delay_s(&self) -> f64 {
         let flights = self.estimation.iter().chain(&self.validation);
         0.5 * flights.map(|flight| flight.layout.clock.step_s).fold(0.0, f64::max)

@@ -1,25 +1,25 @@
 //! Closing the loop: what real flights show that the declared model lacks.
 //!
 //! Measurement and model are put into the same equations of motion, seen through the same smooth window
-//! (`window`, [`prepared`], [`model`]); what is left is regressed on the candidates' effects ([`fit`]), and judged on
+//! (`window`, `prepared`, `model`); what is left is regressed on the candidates' effects (`fit`), and judged on
 //! flights that nothing was fitted on (`select`).
 //!
 //! | room | what it holds |
 //! |---|---|
 //! | [`run`] | the whole way, from flights to a report |
-//! | [`clock`], `track` | measured channels on a grid of instants |
+//! | `clock`, `track` | measured channels on a grid of instants |
 //! | `window` | the window, and differences that lose nothing |
-//! | [`prepared`], `rows` | a flight, the equations that it allows, and their rows |
-//! | [`model`] | the model's side of the equations |
-//! | [`parameter`], [`sensor_effects`] | what may be changed of the model; sensors' errors as effects beside the plant's |
+//! | `prepared`, `rows` | a flight, the equations that it allows, and their rows |
+//! | `model` | the model's side of the equations |
+//! | `parameter`, `sensor_effects` | what may be changed of the model; sensors' errors as effects beside the plant's |
 //! | `candidate` | which effects these flights can show |
-//! | `normal`, [`fit`] | least squares over blocks of time: an estimation problem and its result |
+//! | `normal`, `fit` | least squares over blocks of time: an estimation problem and its result |
 //! | `select` | the stepwise search for the effects that the flights ask for |
 //! | `align`, `faults`, `trim` | clocks, sensors and trims, before anything is fitted |
-//! | [`sensing`] | the sensors' delays and biases, and a flight without them |
+//! | `sensing` | the sensors' delays and biases, and a flight without them |
 //! | `whiteness`, `noise`, [`statistics`] | what is left, and what noise alone would leave |
-//! | [`predict`] | prediction over horizons |
-//! | [`regressor`] | what residuals are looked at against |
+//! | `predict` | prediction over horizons |
+//! | `regressor` | what residuals are looked at against |
 //! | [`report`], [`vehicle_file`] | what is written down |
 //! | [`rotor`] | the rotor from a thrust stand |
 //!
@@ -36,26 +36,42 @@
 
 mod align;
 mod candidate;
-pub mod clock;
+mod clock;
 mod faults;
-pub mod fit;
-pub mod model;
+mod fit;
+mod model;
 mod noise;
 mod normal;
-pub mod parameter;
-pub mod predict;
-pub mod prepared;
-pub mod regressor;
+mod parameter;
+mod predict;
+mod prepared;
+mod regressor;
 pub mod report;
 pub mod rotor;
 mod rows;
 pub mod run;
 mod select;
-pub mod sensing;
-pub mod sensor_effects;
+mod sensing;
+mod sensor_effects;
 pub mod statistics;
 mod track;
 mod trim;
 pub mod vehicle_file;
 mod whiteness;
 mod window;
+
+pub use clock::Lateness;
+pub use prepared::Equation;
+pub use regressor::Regressor;
+pub use sensing::SensorErrors;
+
+/// What tests look at between the steps of an identification.
+#[doc(hidden)]
+pub mod steps {
+    pub use crate::fit::Problem;
+    pub use crate::parameter::{Parameter, Parameters};
+    pub use crate::predict::Measured;
+    pub use crate::sensor_effects::{
+        ACCELEROMETER_BIAS, GYROSCOPE_BIAS, POSE_DELAY, SENSOR_BIAS, SENSOR_DELAY,
+    };
+}

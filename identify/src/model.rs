@@ -33,13 +33,11 @@ pub struct Model {
 
 impl Model {
     /// The vehicle under these values.
-    #[must_use]
     pub fn airframe(&self, values: &[f64]) -> Airframe {
         Airframe::with_effects(self.vehicle.clone(), self.parameters.effects_under(values))
     }
 
     /// The measured channels of `flight` under these values.
-    #[must_use]
     pub fn tracks(&self, flight: &Prepared, values: &[f64]) -> Tracks {
         let errors = SensorErrors::of(&self.parameters, values);
         flight.tracks(errors.pose_delay_s, errors.inertial_delay_s)
@@ -47,7 +45,6 @@ impl Model {
 
     /// The rotors of `flight` under these values. Where speeds were measured, the difference to what follows from the
     /// commands is smoothed before it is believed: the noise of a sensor, differentiated, would pass for spin-up.
-    #[must_use]
     pub fn rotors(&self, flight: &Prepared, values: &[f64]) -> Rotors {
         if flight.flight.command.is_empty() {
             let flown = measured_rotors(flight);
@@ -62,7 +59,6 @@ impl Model {
     }
 
     /// Measurement less model, for each knot each equation's components.
-    #[must_use]
     pub fn residual(&self, flight: &Prepared, tracks: &Tracks, rotors: &Rotors, values: &[f64]) -> Vec<f64> {
         let sides = self.sides(flight, tracks, rotors, values);
         let errors = SensorErrors::of(&self.parameters, values);
@@ -130,7 +126,6 @@ impl Model {
     }
 
     /// The residual under `values`, and its derivative by each parameter of `free`: one column each.
-    #[must_use]
     pub fn linearised(&self, flight: &Prepared, values: &[f64], free: &[usize]) -> (Vec<f64>, Vec<Vec<f64>>) {
         let tracks = self.tracks(flight, values);
         let rotors = self.rotors(flight, values);
@@ -162,7 +157,6 @@ impl Model {
     }
 
     /// The residual under `values`.
-    #[must_use]
     pub fn residual_under(&self, flight: &Prepared, values: &[f64]) -> Vec<f64> {
         self.residual(flight, &self.tracks(flight, values), &self.rotors(flight, values), values)
     }
@@ -183,7 +177,6 @@ fn air(airframe: &Airframe, step_s: f64) -> Actuation {
 }
 
 /// The rotors that follow from the commands: simulated in fine steps, averaged over one step about each instant.
-#[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a few steps")]
 fn spun(airframe: &Airframe, flight: &Prepared) -> Vec<[RotorState; 4]> {
     let clock = &flight.layout.clock;
     let parts = (clock.step_s / MOTOR_STEP_S - 1e-9).ceil().max(1.0) as usize;

@@ -7,7 +7,6 @@ use std::collections::BTreeMap;
 /// Standard deviation of the white noise of a channel, mean over its axes: third differences leave little of a smooth
 /// course, and of white noise 20 times its variance (von Neumann 1941 has it for first differences). A channel that
 /// was interpolated looks quieter than its sensor is.
-#[must_use]
 pub fn deviation<const N: usize>(channel: &Channel<N>) -> Option<f64> {
     let third = |w: &[[f64; N]], i: usize| w[3][i] - 3.0 * w[2][i] + 3.0 * w[1][i] - w[0][i];
     let squares: f64 = channel.values.windows(4).flat_map(|w| (0..N).map(move |i| third(w, i).powi(2))).sum();
@@ -16,7 +15,6 @@ pub fn deviation<const N: usize>(channel: &Channel<N>) -> Option<f64> {
 }
 
 /// The noise of each channel that was measured, over the validation data, with its unit.
-#[must_use]
 pub fn floor(problem: &Problem) -> BTreeMap<&'static str, (f64, &'static str)> {
     let mut floor = BTreeMap::new();
     let mut add = |name: &'static str, unit: &'static str, own: &dyn Fn(&Flight) -> Option<f64>| {
@@ -58,7 +56,6 @@ fn of_slope(period_s: f64) -> f64 {
 
 /// The error per channel that a perfect model has over `horizon_s` by noise alone: that of the start, carried on, and
 /// that of the end. Each is the length of a vector of three axes; attitude in deg as in predictions.
-#[must_use]
 pub fn prediction_floor(
     floor: &BTreeMap<&'static str, (f64, &'static str)>,
     horizon_s: f64,

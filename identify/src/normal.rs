@@ -22,7 +22,6 @@ pub struct Block {
 
 impl Block {
     /// An empty block for so many parameters.
-    #[must_use]
     pub fn zero(parameters: usize) -> Self {
         Self { gram: DMatrix::zeros(parameters, parameters), gradient: DVector::zeros(parameters), cost: 0.0 }
     }
@@ -44,7 +43,6 @@ impl Block {
     }
 
     /// The part of it for these parameters.
-    #[must_use]
     pub fn of(&self, free: &[usize]) -> Self {
         let size = free.len();
         Self {
@@ -55,21 +53,18 @@ impl Block {
     }
 
     /// The equations about the point that a step leads to.
-    #[must_use]
     pub fn after(&self, step: &DVector<f64>) -> Self {
         let gradient = &self.gradient + &self.gram * step;
         Self { gram: self.gram.clone(), gradient, cost: self.cost_after(step) }
     }
 
     /// The sum of squares after a step.
-    #[must_use]
     pub fn cost_after(&self, step: &DVector<f64>) -> f64 {
         self.cost + 2.0 * self.gradient.dot(step) + step.dot(&(&self.gram * step))
     }
 }
 
 /// The sum of blocks.
-#[must_use]
 pub fn sum(blocks: &[Block]) -> Block {
     let size = blocks.first().map_or(0, |block| block.gradient.len());
     blocks.iter().fold(Block::zero(size), |mut sum, block| {
@@ -85,7 +80,6 @@ pub fn sum(blocks: &[Block]) -> Block {
 const RANK_TOLERANCE: f64 = 1e-9;
 
 /// The pseudo-inverse of a normal matrix, computed with columns scaled to length one.
-#[must_use]
 pub fn inverse(gram: &DMatrix<f64>) -> DMatrix<f64> {
     let size = gram.nrows();
     if size == 0 {
@@ -113,7 +107,6 @@ pub fn inverse(gram: &DMatrix<f64>) -> DMatrix<f64> {
 /// blocks. Each block is left out in turn and the others are solved again (one linear step); what the solutions scatter,
 /// times the number of blocks, is the variance (CV3 of MacKinnon, Nielsen and Webb, J. Econometrics 232(2), 2023). A
 /// sandwich of the same blocks is too short where a few violent ones hold most of the evidence.
-#[must_use]
 pub fn covariance(blocks: &[Block]) -> DMatrix<f64> {
     let total = sum(blocks);
     let size = total.gradient.len();

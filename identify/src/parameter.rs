@@ -37,7 +37,6 @@ pub struct Parameters {
 impl Parameters {
     /// The parameters of all candidates for `vehicle`, which has the effects `declared`. Parameters without a neutral
     /// value are not fitted: they are those of `declared`, or fit the vehicle's size.
-    #[must_use]
     pub fn of(vehicle: &Vehicle, declared: &[Effect]) -> Self {
         let as_declared = |kind: &&'static EffectKind| {
             let own = declared.iter().find(|effect| effect.kind == *kind).copied();
@@ -54,13 +53,11 @@ impl Parameters {
     }
 
     /// The values of the baseline model.
-    #[must_use]
     pub fn baseline(&self) -> Vec<f64> {
         self.all.iter().map(|parameter| parameter.baseline).collect()
     }
 
     /// The candidate effects, in the order of the catalogue, those of sensors last.
-    #[must_use]
     pub fn effects(&self) -> Vec<&'static EffectKind> {
         let mut kinds: Vec<&'static EffectKind> = self.all.iter().map(|parameter| parameter.kind).collect();
         kinds.dedup();
@@ -68,13 +65,11 @@ impl Parameters {
     }
 
     /// The numbers of the parameters of `effect`, by its name.
-    #[must_use]
     pub fn of_name(&self, effect: &str) -> Vec<usize> {
         (0..self.all.len()).filter(|i| self.all[*i].kind.name == effect).collect()
     }
 
     /// The values that the fitted parameters of `kind` have among `values`.
-    #[must_use]
     pub fn values_of(&self, kind: &EffectKind, values: &[f64]) -> Values {
         let mut own = Values::default();
         let pairs = self.all.iter().zip(values).filter(|(parameter, _)| parameter.kind == kind);
@@ -84,7 +79,6 @@ impl Parameters {
 
     /// The plant's effects under `values`, in the order of the catalogue: those that were declared and those whose
     /// values are not the baseline's.
-    #[must_use]
     pub fn effects_under(&self, values: &[f64]) -> Vec<Effect> {
         let mut effects = self.baseline.clone();
         let mut is_in: Vec<bool> =
@@ -103,7 +97,6 @@ impl Parameters {
 
 impl Parameter {
     /// What files say of it.
-    #[must_use]
     pub fn spec(&self) -> &'static ParameterSpec {
         &self.kind.parameters[self.index]
     }

@@ -3,11 +3,11 @@
 #![allow(non_snake_case, reason = "a trailing _W or _B names the frame a vector is written in")]
 
 use crate::clock::Clock;
-use crate::prepared::{Held, SETTLE_S};
+use crate::prepared::{Held, SETTLE_S, attitudes};
 use crate::track::{Track, valid_about};
 use flights::Flight;
 use flights::state::{StateQuantity, VehicleState, WindowEndErrors};
-use nalgebra::{Quaternion, UnitQuaternion, Vector3};
+use nalgebra::{UnitQuaternion, Vector3};
 use plant::{Airframe, Backend, FreeFlight, NewtonEuler, RigidBody};
 use std::collections::BTreeMap;
 
@@ -15,7 +15,6 @@ use std::collections::BTreeMap;
 const TICK_S: f64 = 0.001;
 
 /// Windows that begin earlier do not count.
-#[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a few hundred")]
 const SETTLE_TICKS: usize = (SETTLE_S / TICK_S) as usize;
 
 /// The measured states of a flight, tick by tick.
@@ -34,7 +33,6 @@ pub type Trace = Vec<(f64, RigidBody, RigidBody)>;
 
 impl Measured {
     /// The states of `flight`; `None` where it has no commands, or no motion.
-    #[must_use]
     pub fn of(flight: &Flight) -> Option<Self> {
         let span = if flight.attitude.is_empty() {
             &flight.angular_velocity.time_s
@@ -52,7 +50,7 @@ impl Measured {
         } else {
             Track::sampled(&flight.velocity, 0.0, &clock).values
         };
-        let quaternions: Vec<UnitQuaternion<f64>> = attitude.values.iter().map(unit).collect();
+        let quaternions = attitudes(&attitude);
         let rates = if flight.angular_velocity.is_empty() {
             turning(&quaternions, reach(flight.attitude.period_s()))
         } else {
@@ -80,8 +78,6 @@ impl Measured {
     }
 
     /// Errors of `airframe` at the ends of windows of `horizon_s`, and the flight itself at every `every` ticks.
-    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a horizon is short")]
-    #[must_use]
     pub fn predicted(
         &self,
         flight: &Flight,
@@ -132,14 +128,8 @@ fn state(body: &RigidBody) -> VehicleState {
 const SLOWEST_S: f64 = 0.5;
 
 /// Ticks to both sides of a derivative: three samples.
-#[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a period is short")]
 fn reach(period_s: Option<f64>) -> usize {
     ((3.0 * period_s.unwrap_or(0.0).min(SLOWEST_S) / TICK_S).round() as usize).max(1)
-}
-
-fn unit([w, x, y, z]: &[f64; 4]) -> UnitQuaternion<f64> {
-    let raw = Quaternion::new(*w, *x, *y, *z);
-    if raw.norm() > 1e-6 { UnitQuaternion::new_normalize(raw) } else { UnitQuaternion::identity() }
 }
 
 fn turning(attitude: &[UnitQuaternion<f64>], reach: usize) -> Vec<[f64; 3]> {

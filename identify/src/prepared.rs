@@ -24,13 +24,11 @@ pub enum Equation {
 
 impl Equation {
     /// How many components it has.
-    #[must_use]
     pub fn size(self) -> usize {
         if self == Equation::RotorSpeed { 4 } else { 3 }
     }
 
     /// What reports call it.
-    #[must_use]
     pub fn name(self) -> &'static str {
         match self {
             Equation::SpecificForce => "specific_force",
@@ -42,7 +40,6 @@ impl Equation {
     }
 
     /// The unit of its residual.
-    #[must_use]
     pub fn unit(self) -> &'static str {
         match self {
             Equation::SpecificForce | Equation::Acceleration => "m/s^2",
@@ -148,7 +145,6 @@ impl<'f> Prepared<'f> {
     /// The flight on its grid; `is_flying` tells from motor commands (`true`) or rotor speeds (`false`) whether the
     /// vehicle is in the air; `None` where it has nothing to compare: no commands and no rotor speeds, no motion, or
     /// less than three windows of it.
-    #[must_use]
     pub fn new(
         flight: &'f Flight,
         box_s: Option<f64>,
@@ -170,13 +166,11 @@ impl<'f> Prepared<'f> {
     }
 
     /// Whether its attitude or its rates were assumed instead of measured.
-    #[must_use]
     pub fn is_assumed(&self) -> bool {
         !self.flight.assumed.is_empty()
     }
 
     /// Whether the vehicle moves further than any rig lets it.
-    #[must_use]
     pub fn moves_freely(&self) -> bool {
         let positions = &self.flight.position.values;
         (0..2).any(|axis| {
@@ -186,20 +180,17 @@ impl<'f> Prepared<'f> {
     }
 
     /// Rows of one knot.
-    #[must_use]
     pub fn width(&self) -> usize {
         self.layout.equations.iter().map(|equation| equation.size()).sum()
     }
 
     /// Where the rows of `equation` start within a knot.
-    #[must_use]
     pub fn offset_of(&self, equation: Equation) -> Option<usize> {
         let at = self.layout.equations.iter().position(|own| *own == equation)?;
         Some(self.layout.equations[..at].iter().map(|equation| equation.size()).sum())
     }
 
     /// What was measured, with the pose late by `pose_s` and the inertial unit by `imu_s`.
-    #[must_use]
     pub fn tracks(&self, pose_s: f64, imu_s: f64) -> Tracks {
         let (flight, clock) = (self.flight, &self.layout.clock);
         let position_s = pose_s + self.late.position_s;
@@ -247,7 +238,6 @@ impl<'f> Prepared<'f> {
 
     /// The acceleration in W by position or velocity alone, seen through the windows: three components for each knot;
     /// `None` where that is not logged, or not compared.
-    #[must_use]
     pub fn translation_rows(&self, translation: Translation) -> Option<Vec<f64>> {
         self.offset_of(Equation::Acceleration).filter(|_| !self.is_assumed())?;
         let channel = translation.channel(self.flight);
@@ -257,7 +247,6 @@ impl<'f> Prepared<'f> {
     }
 
     /// The same by accelerometer and attitude, late by `force_s` and `attitude_s`.
-    #[must_use]
     pub fn inertial_rows(
         &self,
         translation: Translation,
@@ -376,7 +365,6 @@ pub struct Held<'c> {
 
 impl<'c> Held<'c> {
     /// From its beginning.
-    #[must_use]
     pub fn new(channel: &'c Channel<4>) -> Self {
         Self { channel, next: 0 }
     }
@@ -465,7 +453,8 @@ fn slowest_period_s(flight: &Flight) -> Option<f64> {
     periods.into_iter().flatten().reduce(f64::max)
 }
 
-fn attitudes(track: &Track<4>) -> Vec<UnitQuaternion<f64>> {
+/// The attitudes of quaternions that were interpolated, and so are not of length one.
+pub fn attitudes(track: &Track<4>) -> Vec<UnitQuaternion<f64>> {
     let unit = |[w, x, y, z]: &[f64; 4]| {
         let raw = Quaternion::new(*w, *x, *y, *z);
         if raw.norm() > 1e-6 { UnitQuaternion::new_normalize(raw) } else { UnitQuaternion::identity() }

@@ -21,7 +21,6 @@ type Named<'a> = (&'static str, &'static str, &'a dyn Fn(usize) -> f64);
 
 /// The quantities that residuals are looked at against, as far as `flight` has them: those that never change are left
 /// out.
-#[must_use]
 pub fn regressors(model: &Model, flight: &Prepared, values: &[f64]) -> Vec<Regressor> {
     let tracks = model.tracks(flight, values);
     let rotors = model.rotors(flight, values).flown;

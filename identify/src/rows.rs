@@ -3,7 +3,6 @@
 use crate::prepared::{Equation, Prepared};
 
 /// One component of an equation over the knots.
-#[must_use]
 pub fn column(flight: &Prepared, rows: &[f64], equation: Equation, axis: usize) -> Vec<f64> {
     let Some(offset) = flight.offset_of(equation) else { return Vec::new() };
     rows[offset + axis..].iter().step_by(flight.width()).copied().collect()

@@ -77,7 +77,6 @@ pub struct Round {
 
 impl Round {
     /// What was taken.
-    #[must_use]
     pub fn taken(&self) -> Option<&Judged> {
         self.taken.map(|at| &self.judged[at])
     }
@@ -98,7 +97,6 @@ pub struct Selection {
 
 impl Selection {
     /// Chance of as much gain without the accepted `effect`, in the round that took the best part of it.
-    #[must_use]
     pub fn p_value(&self, effect: &str) -> f64 {
         let taken = self.rounds.iter().filter_map(Round::taken);
         taken.filter(|own| own.candidate.kind.name == effect).map(|own| own.p_value).fold(1.0, f64::min)
@@ -349,7 +347,6 @@ fn best(judged: &[Judged]) -> Option<usize> {
 }
 
 /// Whether `fitted` is worse on the validation data than `other`, beyond chance.
-#[must_use]
 pub fn is_worse(fitted: &FitResult, other: &FitResult) -> bool {
     p_value(&fitted.validation_costs, &other.validation_costs) < CONFOUNDED_LEVEL
 }
@@ -411,7 +408,6 @@ impl Screen {
 
 /// For an accepted candidate: the effects that would do as well in its place, of those that were anywhere near it when
 /// it was taken.
-#[must_use]
 pub fn confounded(problem: &Problem, selection: &Selection, at: usize) -> Vec<&'static EffectKind> {
     let own = &selection.accepted[at];
     let mut others = selection.accepted.clone();

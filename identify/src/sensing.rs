@@ -23,7 +23,6 @@ pub struct SensorErrors {
 
 impl SensorErrors {
     /// Those of `values`.
-    #[must_use]
     pub fn of(parameters: &Parameters, values: &[f64]) -> Self {
         let [pose_delay_s, ..] = parameters.values_of(&POSE_DELAY, values);
         let [inertial_delay_s, ..] = parameters.values_of(&IMU_DELAY, values);
@@ -40,14 +39,12 @@ impl SensorErrors {
     }
 
     /// What turns a vector of the vehicle's B into the frame that the attitude sensor takes for it.
-    #[must_use]
     pub fn mounting(&self) -> UnitQuaternion<f64> {
         let [x, y] = self.attitude_bias_rad;
         UnitQuaternion::from_scaled_axis(-Vector3::new(x, y, 0.0))
     }
 
     /// `flight` without these errors, and without what it is `late` by besides.
-    #[must_use]
     pub fn taken_off(&self, flight: &Flight, late: &Lateness) -> Flight {
         let mut flight = flight.clone();
         earlier(&mut flight.position, self.pose_delay_s + late.position_s);

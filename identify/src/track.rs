@@ -20,7 +20,6 @@ pub struct Track<const N: usize> {
 
 impl<const N: usize> Track<N> {
     /// The channel on the grid. A sample stamped t is taken as true at t - `delay_s`.
-    #[must_use]
     pub fn sampled(channel: &Channel<N>, delay_s: f64, clock: &Clock) -> Self {
         let Some(period_s) = channel.period_s() else {
             return Self { values: vec![[0.0; N]; clock.count], valid: vec![false; clock.count] };
@@ -33,7 +32,6 @@ impl<const N: usize> Track<N> {
     }
 
     /// The mean over `reach` instants to both sides.
-    #[must_use]
     pub fn smoothed(&self, reach: usize) -> Vec<[f64; N]> {
         let count = self.values.len();
         (0..count)
@@ -50,7 +48,6 @@ impl<const N: usize> Track<N> {
 
     /// The rate of change, by a straight line through `reach` instants to both sides; at the ends, that of the
     /// nearest instant that has as many.
-    #[must_use]
     pub fn slope(&self, reach: usize, step_s: f64) -> Vec<[f64; N]> {
         let count = self.values.len();
         if count <= 2 * reach {
@@ -67,7 +64,6 @@ impl<const N: usize> Track<N> {
 }
 
 /// Whether all within `reach` instants to both sides are valid, so far as there are any.
-#[must_use]
 pub fn valid_about(valid: &[bool], reach: usize) -> Vec<bool> {
     let mut bad = vec![0_usize];
     for is_valid in valid {

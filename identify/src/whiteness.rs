@@ -30,7 +30,6 @@ pub struct Whiteness {
 }
 
 /// The whiteness of every equation under `values`, over the validation data.
-#[must_use]
 pub fn whiteness(problem: &Problem, values: &[f64]) -> BTreeMap<&'static str, Whiteness> {
     let mut columns: BTreeMap<&'static str, Vec<(Equation, Vec<f64>)>> = BTreeMap::new();
     for flight in &problem.validation {

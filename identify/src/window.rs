@@ -14,7 +14,6 @@ pub struct Window(Vec<f64>);
 
 impl Window {
     /// A cubic B-spline of four boxes of `box_steps` grid steps each; its sum is 1.
-    #[must_use]
     pub fn b_spline(box_steps: usize) -> Self {
         let unit = vec![1.0 / box_steps as f64; box_steps];
         let mut weights = vec![1.0];
@@ -25,19 +24,16 @@ impl Window {
     }
 
     /// This window behind a symmetric stencil of three.
-    #[must_use]
     pub fn behind(&self, stencil: [f64; 3]) -> Self {
         Self(folded(&self.0, &stencil))
     }
 
     /// How many instants it reaches to both sides of its knot.
-    #[must_use]
     pub fn reach(&self) -> usize {
         self.0.len() / 2
     }
 
     /// The weighted sum of `values` around `knot`.
-    #[must_use]
     pub fn over<const N: usize>(&self, values: &[[f64; N]], knot: usize) -> [f64; N] {
         let mut sum = [0.0; N];
         let first = knot - self.reach();
@@ -51,14 +47,12 @@ impl Window {
 }
 
 /// The stencil of a second difference of values at `step_s`.
-#[must_use]
 pub fn second_difference(step_s: f64) -> [f64; 3] {
     let part = 1.0 / (step_s * step_s);
     [part, -2.0 * part, part]
 }
 
 /// The stencil of a central difference of values at `step_s`. The order is that of a convolution's.
-#[must_use]
 pub fn central_difference(step_s: f64) -> [f64; 3] {
     let part = 0.5 / step_s;
     [-part, 0.0, part]

@@ -5,10 +5,9 @@ use serde::Serialize;
 use super::command_map::CommandLine;
 use super::error::RotorError;
 use super::lag::{self, Fit, Match, ONSET_ROWS_MAX};
-use super::plateau::median;
+use super::plateau::{median, range};
 use super::response::Lag;
-use super::score::LEVEL;
-use super::score::Score;
+use super::score::{LEVEL, Score};
 use super::stand::{Clock, Stand};
 use super::step::{self, Hold, Step};
 use crate::statistics::{Bootstrap, Estimate, MeanInterval, block_bootstrap_mean, jackknife};
@@ -257,12 +256,13 @@ fn more_findings(dynamics: &Dynamics, steps: &[Step], first: Lag) -> Vec<String>
     let matches: Vec<Match> = steps.iter().map(|step| matched(step, first)).collect();
     let onsets: Vec<f64> = matches.iter().map(|found| 1e3 * found.onset_s).collect();
     let clamped = matches.iter().filter(|found| found.is_clamped).count();
+    let (earliest, latest) = range(&onsets);
     let mut findings = vec![format!(
         "commands took effect {:.1} ms from the row that shows them first (median; {:.1} to {:.1} ms), {clamped} of {} \
          at the end of the {ONSET_ROWS_MAX} row that is allowed",
         median(&onsets),
-        onsets.iter().copied().fold(f64::INFINITY, f64::min),
-        onsets.iter().copied().fold(f64::NEG_INFINITY, f64::max),
+        earliest,
+        latest,
         onsets.len()
     )];
     let directions = dynamics.rising_s.zip(dynamics.falling_s);

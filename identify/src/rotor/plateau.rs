@@ -10,6 +10,8 @@ const OUTLIER_SIGMAS: f64 = 6.0;
 const MAD_TO_SIGMA: f64 = 1.4826;
 /// Rows before and after a row that its running median looks at.
 const MEDIAN_REACH: usize = 2;
+/// Equal readings in a row that are suspicious.
+const STUCK_READINGS: usize = 5;
 /// Below this a rotor stands still.
 pub const REST_RAD_S: f64 = 1.0;
 
@@ -95,9 +97,20 @@ pub fn median(values: &[f64]) -> f64 {
     Data::new(values.to_vec()).median()
 }
 
+/// What to say of a log whose speeds repeat themselves.
+pub fn stuck_finding(log: &str, speed: &[f64]) -> Option<String> {
+    let (stuck, top) = stuck(speed, STUCK_READINGS);
+    (stuck > 0).then(|| {
+        format!(
+            "{log}: {stuck} speeds stand in runs of {STUCK_READINGS} or more equal readings ({top} of them at the largest \
+             reading: saturation if many): the sensor repeats itself"
+        )
+    })
+}
+
 /// How many readings stand in runs of at least `shortest` equal ones while the rotor turns, and how many of these
 /// are the largest reading of all.
-pub fn stuck(values: &[f64], shortest: usize) -> (usize, usize) {
+fn stuck(values: &[f64], shortest: usize) -> (usize, usize) {
     let largest = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
     let runs = values.chunk_by(|a, b| a == b).filter(|run| run.len() >= shortest && run[0] > REST_RAD_S);
     runs.fold((0, 0), |(all, top), run| {

@@ -45,9 +45,8 @@ impl fmt::Display for RotorReport {
         if let Some(dynamics) = &self.dynamics {
             write_dynamics(f, dynamics)?;
         }
-        let findings = |own: &[String]| own.to_vec();
-        let statics = self.statics.iter().flat_map(|statics| findings(&statics.findings));
-        let dynamics = self.dynamics.iter().flat_map(|dynamics| findings(&dynamics.findings));
+        let statics = self.statics.iter().flat_map(|statics| &statics.findings);
+        let dynamics = self.dynamics.iter().flat_map(|dynamics| &dynamics.findings);
         writeln!(f, "about the data")?;
         statics.chain(dynamics).try_for_each(|finding| writeln!(f, "  - {finding}"))
     }

@@ -13,8 +13,6 @@ use crate::statistics::mean;
 
 /// Density of air for the check of plausibility, in kg/m^3 (15 degrees C at sea level, ISO 2533).
 const AIR_KG_M3: f64 = 1.225;
-/// Equal readings in a row that are suspicious.
-const STUCK_READINGS: usize = 5;
 
 /// What the static logs say.
 #[derive(Debug, Clone, Serialize)]
@@ -73,9 +71,9 @@ pub fn fitted(stand: &Stand) -> Result<Option<Statics>, RotorError> {
     let plausibility =
         stand.diameter_m.and_then(|diameter| Plausibility::of(diameter, thrust.as_ref(), torque.as_ref()));
     findings.extend(plausibility.iter().filter_map(Plausibility::finding));
-    let slowest = speeds.iter().copied().fold(f64::INFINITY, f64::min);
-    let fastest = speeds.iter().copied().fold(0.0, f64::max);
-    Ok(Some(Statics { thrust, torque, plausibility, speeds_rad_s: (slowest, fastest), findings }))
+    let (slowest, fastest) = plateau::range(&speeds);
+    let speeds_rad_s = (slowest, fastest.max(0.0));
+    Ok(Some(Statics { thrust, torque, plausibility, speeds_rad_s, findings }))
 }
 
 /// A static log, its rows with a speed.
@@ -117,14 +115,7 @@ impl<'s> Log<'s> {
             self.declared.settle_s,
             self.speed.len() - steady,
         ));
-        let (stuck, top) = plateau::stuck(&self.speed, STUCK_READINGS);
-        if stuck > 0 {
-            findings.push(format!(
-                "{}: {stuck} speeds stand in runs of {STUCK_READINGS} or more equal readings ({top} of them at \
-                 the largest reading: saturation if many): the sensor repeats itself",
-                self.name
-            ));
-        }
+        findings.extend(plateau::stuck_finding(&self.name, &self.speed));
     }
 
     /// Mean speed and rows of each plateau on which the rotor turns.

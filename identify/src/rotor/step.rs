@@ -17,8 +17,6 @@ const LOST_ROWS: f64 = 1.5;
 const ROWS_BEFORE_MIN: usize = 1;
 /// Rows after it: the last third of them is where it ends.
 const ROWS_AFTER_MIN: usize = 3;
-/// Equal readings in a row that are suspicious.
-const STUCK_READINGS: usize = 5;
 
 /// One step of the command and the speed around it.
 #[derive(Debug, Clone, PartialEq)]
@@ -222,13 +220,7 @@ impl<'s> Log<'s> {
             findings
                 .push(format!("{name}: the speed went against the command: {list}: the supply or a limit"));
         }
-        let (stuck, top) = plateau::stuck(&self.speed, STUCK_READINGS);
-        if stuck > 0 {
-            findings.push(format!(
-                "{name}: {stuck} speeds stand in runs of {STUCK_READINGS} or more equal readings ({top} of them at \
-                 the largest reading: saturation if many): the sensor repeats itself"
-            ));
-        }
+        findings.extend(plateau::stuck_finding(name, &self.speed));
         findings.push(format!("{name}: {}", self.stamps()));
         findings
     }

@@ -3,14 +3,12 @@
 
 use super::{Plan, Sensors, fly, vehicle_file};
 use flights::{Flight, FlightSet, Role};
-use identify::clock::Lateness;
-use identify::fit::Problem;
-use identify::parameter::Parameters;
-use identify::predict::Measured;
 use identify::report::Report;
 use identify::run::{HORIZONS_S, identify, problem};
-use identify::sensing::SensorErrors;
-use identify::sensor_effects::{ACCELEROMETER_BIAS, GYROSCOPE_BIAS, POSE_DELAY, SENSOR_BIAS, SENSOR_DELAY};
+use identify::steps::{
+    ACCELEROMETER_BIAS, GYROSCOPE_BIAS, Measured, POSE_DELAY, Parameters, Problem, SENSOR_BIAS, SENSOR_DELAY,
+};
+use identify::{Lateness, SensorErrors};
 use plant::effects::{Effect, entry, find};
 use vehicles::Vehicle;
 
@@ -182,7 +180,7 @@ impl Case {
     /// The true values of all parameters.
     pub fn true_values(&self, parameters: &Parameters) -> Vec<f64> {
         let sensors = &self.plan.sensors;
-        let value = |own: &identify::parameter::Parameter| {
+        let value = |own: &identify::steps::Parameter| {
             if *own.kind == POSE_DELAY {
                 sensors.pose_delay_s
             } else if *own.kind == ACCELEROMETER_BIAS {

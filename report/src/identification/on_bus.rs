@@ -3,9 +3,9 @@
 use crate::validate::Validation;
 use anyhow::Result;
 use flights::{Flight, FlightSet};
+use identify::SensorErrors;
 use identify::report::{FlightReport, Report};
 use identify::run::Outcome;
-use identify::sensing::SensorErrors;
 use serde_json::{Value, json};
 use std::path::Path;
 

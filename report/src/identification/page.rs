@@ -3,10 +3,9 @@
 //! It is drawn by `page.js` with plotly.js ([`crate::page`]).
 
 use crate::page::{PLOTLY_BASIC, Page};
-use identify::prepared::Equation;
-use identify::regressor::Regressor;
 use identify::run::{Outcome, Picture};
 use identify::statistics::{autocorrelation, cross_correlation, white_noise_bound};
+use identify::{Equation, Regressor};
 use serde_json::{Value, json};
 use std::collections::BTreeSet;
 
@@ -203,11 +202,9 @@ fn digits(value: f64) -> Value {
 mod tests {
     use super::{breaks, evenly, extremes, lagged, page};
     use flights::Role;
-    use identify::prepared::Equation;
-    use identify::regressor::Regressor;
     use identify::report::{BeforeAfter, FlightReport, Report};
     use identify::run::{Outcome, Picture};
-    use identify::sensing::SensorErrors;
+    use identify::{Equation, Regressor, SensorErrors};
     use std::collections::BTreeMap;
 
     #[test]
