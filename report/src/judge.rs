@@ -9,7 +9,15 @@ use runtime::manifest::{Comparison, Content, PassCondition, Statistic};
 use serde::Serialize;
 use std::fmt;
 
-/// A pass condition and how it came out.
+/// A pass condition and how it came out; its text is a line of the summary.
+///
+/// ```
+/// use report::judge::Verdict;
+/// let (name, unit) = ("altitude".to_owned(), "m".to_owned());
+/// let values = vec![1.49, 1.51];
+/// let verdict = Verdict { name, values, unit, min: Some(1.4), max: Some(1.6), passed: true };
+/// assert_eq!(verdict.to_string(), "  ok     altitude: 1.4900 … 1.5100 m (1.4 … 1.6)");
+/// ```
 #[derive(Debug, Serialize)]
 pub struct Verdict {
     /// What the condition means.
@@ -26,7 +34,21 @@ pub struct Verdict {
     pub passed: bool,
 }
 
-/// RMS errors of a simulated state at the ends of windows.
+/// RMS errors of a simulated state at the ends of windows; its text is a line of the summary.
+///
+/// ```
+/// use report::judge::WindowErrors;
+/// let errors = WindowErrors {
+///     simulated: "/plant/state".to_owned(),
+///     window_s: 0.5,
+///     windows: 8,
+///     position_rms_m: 0.012,
+///     velocity_rms_m_s: 0.1,
+///     attitude_rms_deg: 2.5,
+///     passed: false,
+/// };
+/// assert!(errors.to_string().ends_with("position 0.0120 m, velocity 0.1000 m/s, attitude 2.500 deg  FAILED"));
+/// ```
 #[derive(Debug, Serialize)]
 pub struct WindowErrors {
     /// Topic of the simulated state.
@@ -49,7 +71,7 @@ pub struct WindowErrors {
 ///
 /// # Errors
 /// If a topic or field is not in the recording, or a unit does not fit.
-pub fn verdicts(content: &Content, recording: &Recording) -> Result<Vec<Verdict>> {
+pub(crate) fn verdicts(content: &Content, recording: &Recording) -> Result<Vec<Verdict>> {
     let conditions = || content.pass.iter().map(toml::Spanned::get_ref);
     let wanted: Vec<_> = conditions().map(|pass| wanted(pass, recording)).collect::<Result<_>>()?;
     let fields: Vec<_> =
@@ -215,7 +237,7 @@ impl fmt::Display for WindowErrors {
 ///
 /// # Errors
 /// If a topic is not in the recording or holds no state.
-pub fn window_errors(content: &Content, recording: &Recording) -> Result<Vec<WindowErrors>> {
+pub(crate) fn window_errors(content: &Content, recording: &Recording) -> Result<Vec<WindowErrors>> {
     content.compare.iter().map(|compare| compare_states(compare.get_ref(), recording)).collect()
 }
 

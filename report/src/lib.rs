@@ -3,7 +3,7 @@
 //! | room | what it holds |
 //! |---|---|
 //! | [`judge`] | pass conditions and comparisons, evaluated on a recording |
-//! | [`shadow`] | what a shadow asked for otherwise than the process it shadowed |
+//! | [`shadow`] | how outputs went on at take-overs, and what shadows asked for otherwise |
 //! | [`summary`] | all that there is to say about a run, as text and as JSON |
 //! | [`plot`] | curves over time and paths in space, as a page, PNG or SVG |
 //! | [`profile`] | where the host time of ticks goes |

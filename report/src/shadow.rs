@@ -1,17 +1,26 @@
-//! What a shadow would have done otherwise: its samples against those of the process it shadows.
+//! What backups did: how outputs went on at a take-over, and how a shadow's samples differ from those of the process
+//! that it shadows.
 
 use anyhow::{Result, bail};
 use bus::plan::Plan;
 use recorder::node::SHADOW_PREFIX;
 use recorder::reader::Recording;
+use runtime::replacement::{Purpose, Report};
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::fmt;
 
-use runtime::replacement::Report;
-
 /// The difference between a field of a shadow topic and the same field of the topic itself, over all ticks
-/// that have both.
+/// that have both; its text is a line of the summary.
+///
+/// ```
+/// use report::shadow::Difference;
+/// let [topic, field, unit] = ["/pid/command", "command[0]", "1"].map(str::to_owned);
+/// let (mean, rms, max, max_tick, active_deviation) = (-0.5, 1.0, 3.0, 17, 10.0);
+/// let difference =
+///     Difference { topic, field, unit, samples: 100, mean, rms, max, max_tick, active_deviation };
+/// assert!(difference.to_string().contains("rms 1.0000 1, mean -0.5000, max 3.0000 at tick 17"));
+/// ```
 #[derive(Clone, Debug, Serialize)]
 pub struct Difference {
     /// The topic.
@@ -35,7 +44,53 @@ pub struct Difference {
     pub active_deviation: f64,
 }
 
+/// What there is to say about a backup.
+///
+/// ```
+/// use report::shadow::Succession;
+/// use runtime::replacement::{Purpose, Report};
+/// let report = Report {
+///     process: "controller".to_owned(),
+///     generation: 1,
+///     purpose: Purpose::Swap,
+///     is_planned: true,
+///     request: None,
+///     join_tick: Some(41),
+///     take_over_tick: Some(50),
+///     hand_over: Some("state"),
+///     start_ms: 12.0,
+///     hold_ms: 0.4,
+///     refused: None,
+///     inputs: Vec::new(),
+/// };
+/// let text = Succession { report, steps: Vec::new() }.to_string();
+/// assert!(text.starts_with("  swap of `controller`: shadowed from tick 41, flew from 50, handed over: state"));
+/// ```
+#[derive(Debug, Serialize)]
+pub struct Succession {
+    /// What became of it.
+    #[serde(flatten)]
+    pub report: Report,
+    /// How the outputs went on at its take-over.
+    pub steps: Vec<Step>,
+}
+
+impl Succession {
+    /// Whether it was planned and did not come about, which fails the run.
+    pub(crate) fn has_failed(&self) -> bool {
+        self.report.is_planned && self.report.refused.is_some()
+    }
+}
+
 /// How an output went on at a take-over.
+///
+/// ```
+/// use report::shadow::Step;
+/// let [topic, field, unit] = ["/pid/command", "command[0]", "1"].map(str::to_owned);
+/// let step = Step { topic, field, unit, step: 0.25, step_before: 0.125, law_difference: None };
+/// let text = "    /pid/command command[0]: step 0.2500 1 at the take-over, 0.1250 one sample earlier";
+/// assert_eq!(step.to_string(), text);
+/// ```
 #[derive(Clone, Debug, Serialize)]
 pub struct Step {
     /// The topic.
@@ -59,7 +114,7 @@ type Values = BTreeMap<(String, String), (String, BTreeMap<u32, f64>)>;
 ///
 /// # Errors
 /// If the recording is damaged.
-pub fn differences(recording: &Recording) -> Result<Vec<Difference>> {
+pub(crate) fn differences(recording: &Recording) -> Result<Vec<Difference>> {
     let shadowed = recording.topics().keys().filter_map(|topic| topic.strip_prefix(SHADOW_PREFIX));
     let shadowed: Vec<String> = shadowed.map(str::to_owned).collect();
     let values = values(recording, &shadowed)?;
@@ -71,7 +126,19 @@ pub fn differences(recording: &Recording) -> Result<Vec<Difference>> {
     Ok(shadows.collect())
 }
 
-/// The differences of all shadow topics of `recording`, in words.
+/// The differences of all shadow topics of `recording`, as text.
+///
+/// ```
+/// # use bus::{Message, announcement::Announcement, messages::PlantState};
+/// # let folder = tempfile::tempdir()?;
+/// # let path = folder.path().join("plain.mcap");
+/// # let mut writer = recorder::writer::RecordingWriter::create(&path)?;
+/// # writer.add_channel("/plant/state", &Announcement::of(PlantState::SCHEMA))?;
+/// # writer.finish()?;
+/// let recording = recorder::reader::Recording::open(&path)?;
+/// assert!(report::shadow::report(&recording).unwrap_err().to_string().contains("has no shadow"));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 ///
 /// # Errors
 /// If the recording is damaged, or has no shadow.
@@ -115,24 +182,25 @@ fn difference(
     })
 }
 
-/// The steps of all outputs at the take-overs of `reports`, by report.
+/// Adds the steps of all outputs at the take-overs.
 ///
 /// # Errors
 /// If the recording is damaged.
-pub fn steps(recording: &Recording, plan: &Plan, reports: &[Report]) -> Result<Vec<Vec<Step>>> {
+pub(crate) fn add_steps(recording: &Recording, plan: &Plan, successions: &mut [Succession]) -> Result<()> {
     let outputs = |report: &Report| {
         let node = plan.nodes.iter().find(|node| node.name == report.process);
         let topics = node.into_iter().flat_map(|node| &node.outputs);
         topics.map(|output| plan.topics[output.topic].name.clone()).collect::<Vec<_>>()
     };
-    let taken_over = reports.iter().filter(|report| report.take_over_tick.is_some());
-    let topics: Vec<String> = taken_over.flat_map(outputs).collect();
-    let values = values(recording, &topics)?;
-    let step = |report: &Report| match report.take_over_tick {
-        Some(tick) => outputs(report).iter().filter_map(|topic| step_at(&values, topic, tick)).collect(),
-        None => Vec::new(),
-    };
-    Ok(reports.iter().map(step).collect())
+    let has_flown = |succession: &&Succession| succession.report.take_over_tick.is_some();
+    let topics = successions.iter().filter(has_flown).flat_map(|succession| outputs(&succession.report));
+    let values = values(recording, &topics.collect::<Vec<_>>())?;
+    for Succession { report, steps } in successions {
+        if let Some(tick) = report.take_over_tick {
+            *steps = outputs(report).iter().filter_map(|topic| step_at(&values, topic, tick)).collect();
+        }
+    }
+    Ok(())
 }
 
 /// The field of `topic` with the greatest step at `tick`.
@@ -202,5 +270,39 @@ impl fmt::Display for Step {
             Some(difference) => write!(f, "; the new law asked for {difference:.4} otherwise there"),
             None => Ok(()),
         }
+    }
+}
+
+impl fmt::Display for Succession {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let report = &self.report;
+        let purpose = match report.purpose {
+            Purpose::Swap => "swap",
+            Purpose::Standby => "standby",
+            Purpose::Shadow => "shadow",
+            Purpose::Restart => "restart",
+        };
+        write!(f, "  {purpose} of `{}`", report.process)?;
+        match (report.join_tick, report.take_over_tick, report.purpose) {
+            (_, Some(take_over), Purpose::Restart) => write!(f, " at tick {take_over}")?,
+            (Some(join), Some(take_over), _) => {
+                write!(f, ": shadowed from tick {join}, flew from {take_over}")?
+            }
+            (Some(join), None, _) => write!(f, ": shadowed from tick {join}")?,
+            (None, ..) => {}
+        }
+        if let (Some(_), Some(hand_over)) = (report.take_over_tick, report.hand_over) {
+            write!(f, ", handed over: {hand_over}")?;
+        }
+        if report.join_tick.is_some() {
+            let (start_ms, hold_ms) = (report.start_ms, report.hold_ms);
+            write!(f, " (started in {start_ms:.1} ms, held the clock for {hold_ms:.1} ms)")?;
+        }
+        if let Some(reason) = &report.refused {
+            // Its last words stand below how it ended.
+            let lines: Vec<&str> = reason.lines().map(str::trim).take(3).collect();
+            write!(f, ": REFUSED: {}", lines.join("; "))?;
+        }
+        self.steps.iter().try_for_each(|step| write!(f, "\n{step}"))
     }
 }

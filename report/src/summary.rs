@@ -1,10 +1,13 @@
 //! The summary of a run: for people, and as JSON for programs.
 
-use crate::judge::{Verdict, WindowErrors};
-use crate::shadow::{Difference, Step};
+use crate::judge::{self, Verdict, WindowErrors};
+use crate::shadow::{self, Difference, Succession};
+use anyhow::Result;
+use bus::plan::Plan;
+use recorder::reader::Recording;
 use runtime::launcher::Outcome;
+use runtime::manifest::Content;
 use runtime::problem::Problem;
-use runtime::replacement::{Purpose, Report};
 use serde::Serialize;
 use std::fmt;
 use std::path::PathBuf;
@@ -12,7 +15,7 @@ use std::path::PathBuf;
 /// Successions that the text shows.
 const SUCCESSIONS_SHOWN: usize = 5;
 
-/// What there is to say about a run.
+/// What there is to say about a run: its text is for people, its JSON for programs.
 #[derive(Debug, Serialize)]
 pub struct Summary {
     /// Name of the manifest.
@@ -49,30 +52,14 @@ pub struct Summary {
     pub warnings: Vec<Problem>,
 }
 
-/// What there is to say about a backup.
-#[derive(Debug, Serialize)]
-pub struct Succession {
-    /// What became of it.
-    #[serde(flatten)]
-    pub report: Report,
-    /// How the outputs went on at its take-over.
-    pub steps: Vec<Step>,
-}
-
-/// What was judged on the recording.
-#[derive(Debug, Default)]
-pub struct Judgement {
-    /// Pass conditions.
-    pub pass: Vec<Verdict>,
-    /// Comparisons with measured states.
-    pub compare: Vec<WindowErrors>,
-    /// The steps at the take-overs, by succession.
-    pub steps: Vec<Vec<Step>>,
-    /// Differences of shadows.
-    pub shadows: Vec<Difference>,
-}
-
 /// What there is to say about a process.
+///
+/// ```
+/// use report::summary::ProcessSummary;
+/// let plant = ProcessSummary { name: "plant".to_owned(), cpu_share: 0.25, late: 0 };
+/// assert_eq!(serde_json::to_value(plant)?["cpu_share"], 0.25);
+/// # Ok::<(), serde_json::Error>(())
+/// ```
 #[derive(Debug, Serialize)]
 pub struct ProcessSummary {
     /// Name.
@@ -84,24 +71,33 @@ pub struct ProcessSummary {
 }
 
 impl Summary {
-    /// The summary of `outcome`.
-    pub fn new(
-        manifest: String,
-        outcome: Outcome,
-        tick_s: f64,
-        recording: Option<PathBuf>,
-        judgement: Judgement,
-    ) -> Self {
-        let Judgement { pass, compare, steps, shadows } = judgement;
+    /// The summary of `outcome`, with nothing judged yet, of a run of `manifest` with ticks of `tick_s`.
+    ///
+    /// ```
+    /// use report::summary::Summary;
+    /// use runtime::launcher::Outcome;
+    /// let outcome = Outcome {
+    ///     ticks: 2000,
+    ///     was_stopped: false,
+    ///     host_s: 0.5,
+    ///     missed_deadlines: 0,
+    ///     processes: vec![("plant".to_owned(), 0.25, 0)],
+    ///     replacements: Vec::new(),
+    ///     flight: None,
+    /// };
+    /// let summary = Summary::new("hover".to_owned(), outcome, 1e-3);
+    /// assert_eq!((summary.passed, summary.real_time_factor), (true, 4.0));
+    /// assert!(summary.to_string().starts_with("hover: 2000 ticks (2.000 s) in 0.500 s: 4000 ticks/s"));
+    /// ```
+    pub fn new(manifest: String, outcome: Outcome, tick_s: f64) -> Self {
         let ticks_per_s = f64::from(outcome.ticks) / outcome.host_s.max(1e-9);
-        let held = pass.iter().all(|verdict| verdict.passed) && compare.iter().all(|errors| errors.passed);
-        let steps = steps.into_iter().chain(std::iter::repeat_with(Vec::new));
-        let successions = outcome.replacements.into_iter().zip(steps);
-        let successions: Vec<_> = successions.map(|(report, steps)| Succession { report, steps }).collect();
+        let successions = outcome.replacements.into_iter();
+        let successions: Vec<_> =
+            successions.map(|report| Succession { report, steps: Vec::new() }).collect();
         let processes = outcome.processes.into_iter();
         Self {
             manifest,
-            passed: held && !successions.iter().any(Succession::has_failed) && !outcome.was_stopped,
+            passed: !outcome.was_stopped && !successions.iter().any(Succession::has_failed),
             ticks: outcome.ticks,
             simulated_s: f64::from(outcome.ticks) * tick_s,
             host_s: outcome.host_s,
@@ -112,13 +108,31 @@ impl Summary {
             processes: processes
                 .map(|(name, cpu_share, late)| ProcessSummary { name, cpu_share, late })
                 .collect(),
-            recording,
-            pass,
-            compare,
+            recording: None,
+            pass: Vec::new(),
+            compare: Vec::new(),
             successions,
-            shadows,
+            shadows: Vec::new(),
             warnings: Vec::new(),
         }
+    }
+
+    /// Judges the `recording` of the run: its shadows, its replacements, and the conditions in `content`, of which a run
+    /// that was stopped has not flown what they speak of.
+    ///
+    /// # Errors
+    /// If the recording is damaged, or lacks what a condition judges.
+    pub fn judge(&mut self, recording: &Recording, plan: &Plan, content: &Content) -> Result<()> {
+        shadow::add_steps(recording, plan, &mut self.successions)?;
+        self.shadows = shadow::differences(recording)?;
+        if !self.stopped_early {
+            self.pass = judge::verdicts(content, recording)?;
+            self.compare = judge::window_errors(content, recording)?;
+        }
+        let held = self.pass.iter().all(|verdict| verdict.passed);
+        self.passed &= held && self.compare.iter().all(|errors| errors.passed);
+        self.recording = Some(recording.path().to_owned());
+        Ok(())
     }
 
     /// The replacements as text; those that were refused are never left out.
@@ -135,13 +149,6 @@ impl Summary {
             0 => Ok(()),
             more => writeln!(f, "  … and {more} more; --json has them all"),
         }
-    }
-}
-
-impl Succession {
-    /// Whether it was planned and did not come about, which fails the run.
-    fn has_failed(&self) -> bool {
-        self.report.is_planned && self.report.refused.is_some()
     }
 }
 
@@ -174,39 +181,5 @@ impl fmt::Display for Summary {
             (false, 1) => write!(f, "FAILED: a backup was refused"),
             (false, _) => write!(f, "FAILED: {refused} backups were refused"),
         }
-    }
-}
-
-impl fmt::Display for Succession {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let report = &self.report;
-        let purpose = match report.purpose {
-            Purpose::Swap => "swap",
-            Purpose::Standby => "standby",
-            Purpose::Shadow => "shadow",
-            Purpose::Restart => "restart",
-        };
-        write!(f, "  {purpose} of `{}`", report.process)?;
-        match (report.join_tick, report.take_over_tick, report.purpose) {
-            (_, Some(take_over), Purpose::Restart) => write!(f, " at tick {take_over}")?,
-            (Some(join), Some(take_over), _) => {
-                write!(f, ": shadowed from tick {join}, flew from {take_over}")?
-            }
-            (Some(join), None, _) => write!(f, ": shadowed from tick {join}")?,
-            (None, ..) => {}
-        }
-        if let (Some(_), Some(hand_over)) = (report.take_over_tick, report.hand_over) {
-            write!(f, ", handed over: {hand_over}")?;
-        }
-        if report.join_tick.is_some() {
-            let (start_ms, hold_ms) = (report.start_ms, report.hold_ms);
-            write!(f, " (started in {start_ms:.1} ms, held the clock for {hold_ms:.1} ms)")?;
-        }
-        if let Some(reason) = &report.refused {
-            // Its last words stand below how it ended.
-            let lines: Vec<&str> = reason.lines().map(str::trim).take(3).collect();
-            write!(f, ": REFUSED: {}", lines.join("; "))?;
-        }
-        self.steps.iter().try_for_each(|step| write!(f, "\n{step}"))
     }
 }

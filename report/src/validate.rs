@@ -27,6 +27,22 @@ use std::path::Path;
 use vehicles::Vehicle;
 
 /// How flights are flown again.
+///
+/// ```
+/// use report::validate::{Errors, Validation};
+/// use runtime::event::StopToken;
+/// use std::path::Path;
+///
+/// /// How well two vehicle files meet the flights, with the components that a program offers.
+/// fn compare(components: runtime::registry::Registry) -> anyhow::Result<Errors> {
+///     let flights = flights::FlightSet::load(Path::new("flights.toml"))?;
+///     let validation = Validation { components, stop: &StopToken::default(), keep: None };
+///     let vehicles = [Path::new("declared.toml"), Path::new("fitted.toml")];
+///     validation.errors(&vehicles, &flights, &mut |line| println!("{line}"))
+/// }
+///
+/// assert!(compare(runtime::registry::Registry::new(&[])).is_err(), "there are no such files");
+/// ```
 #[derive(Clone, Copy, Debug)]
 pub struct Validation<'a> {
     /// The components that a run may have; a player, a plant and a recorder are needed.

@@ -8,8 +8,7 @@ use anyhow::{Context, Error, Result, anyhow, bail};
 use clap::Args;
 use hummingbus::COMPONENTS;
 use report::profile::Profile;
-use report::summary::{Judgement, Summary};
-use report::{judge, shadow};
+use report::summary::Summary;
 use runtime::graph::{self, Graph, backup_of};
 use runtime::host::Host;
 use runtime::launcher::Launcher;
@@ -117,18 +116,10 @@ pub fn run(
         flown.or_else(|error| Err(broken(&manifest, &error, outputs.left(), arguments.json)?))?;
     let flight = outcome.flight.take();
     let profile = flight.as_ref().map(|flight| Profile::of(flight, outcome.missed_deadlines));
-    let mut judgement = Judgement::default();
+    let mut summary = Summary::new(manifest.name(), outcome, graph.plan.tick_s());
     if let Some(recording) = &recording {
-        judgement.steps = shadow::steps(recording, &graph.plan, &outcome.replacements)?;
-        judgement.shadows = shadow::differences(recording)?;
-        // A run that was stopped has not flown what the conditions speak of.
-        if !outcome.was_stopped {
-            judgement.pass = judge::verdicts(&manifest.content, recording)?;
-            judgement.compare = judge::window_errors(&manifest.content, recording)?;
-        }
+        summary.judge(recording, &graph.plan, &manifest.content)?;
     }
-    let tick_s = graph.plan.tick_s();
-    let mut summary = Summary::new(manifest.name(), outcome, tick_s, recording.map(|_| path), judgement);
     summary.warnings = graph.warnings;
     let mut text =
         if arguments.json { json_text(&summary, profile.as_ref(), &files)? } else { summary.to_string() };

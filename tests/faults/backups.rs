@@ -30,10 +30,10 @@ fn swap(victim: &str, more: &str) -> String {
 }
 
 /// Requires that the backup was refused with these words and that the flight was the undisturbed one.
-fn require_refused(ended: &Ended, victim: &str, words: &[&str], recording: &str, reference: &str) {
+fn require_refused(ended: &Ended, victim: &str, message: &[&str], recording: &str, reference: &str) {
     assert_eq!(ended.code, Some(1), "{ended}");
     ended.says(&[&format!("the backup of `{victim}` was refused: "), &format!("`{victim}` flies on")]);
-    ended.says(words);
+    ended.says(message);
     let succession = &ended.json()["successions"][0];
     let refused = succession["refused"].as_str().unwrap_or_else(|| panic!("not refused: {ended}"));
     assert!(refused.contains(&format!("process `{victim}.1` ")), "{ended}");
@@ -53,7 +53,7 @@ fn a_backup_that_fails_from_the_inside_is_refused_with_its_last_words() {
         (Fault::NeverJoins, &["was killed by the watchdog: it did not join within 3000 ms"]),
         (Fault::OtherLayout, &["layout mismatch on topic /saboteur/report", "climb", "altitude"]),
     ];
-    for (fault, words) in ending.into_iter().chain(others) {
+    for (fault, message) in ending.into_iter().chain(others) {
         let place = Place::new();
         let fault = format!(
             "with.environment = {{ {FAULT_VARIABLE} = \"{fault:?}\", {TICK_VARIABLE} = \"{}\" }}\n",
@@ -62,7 +62,7 @@ fn a_backup_that_fails_from_the_inside_is_refused_with_its_last_words() {
         let (manifest, recording) =
             (write_manifest(&place, &swap("saboteur", &fault)), place.path("flight.mcap"));
         let ended = place.call(&["run", &manifest, "--record", &recording, "--json"]);
-        require_refused(&ended, "saboteur", words, &recording, &reference);
+        require_refused(&ended, "saboteur", message, &recording, &reference);
     }
 }
 
@@ -101,9 +101,9 @@ fn a_backup_that_waits_for_its_tick_is_not_late() {
     let place = Place::new();
     let manifest = write_manifest(&place, &format!("[run]\npace = 1.0\n{}", swap("controller", "")));
     // Its tick comes three watchdogs after its start.
-    let words = ["--set", "swap.0.at_tick=3990", "--set", "swap.0.with.watchdog_ms_host=1000"];
+    let args = ["--set", "swap.0.at_tick=3990", "--set", "swap.0.with.watchdog_ms_host=1000"];
     let ended = place
-        .call(&[&["run", &manifest, "--record", &place.path("flight.mcap"), "--json"], &words[..]].concat());
+        .call(&[&["run", &manifest, "--record", &place.path("flight.mcap"), "--json"], &args[..]].concat());
     assert_eq!(ended.json()["successions"][0]["take_over_tick"], 3990, "{ended}");
 }
 
@@ -242,7 +242,7 @@ fn require_replaced(case: &Case, stage: Stage, ended: &Ended, recording: &str, p
     assert!(!is_refused || stage < Stage::Shadowing, "{ended}");
     assert_eq!(ended.code, Some(i32::from(is_refused)), "{ended}");
     ended.says(&[&format!("process `{}", case.victim)]);
-    let replaces = ["is restarted at tick", "takes over at tick"].map(|words| ended.error.contains(words));
+    let replaces = ["is restarted at tick", "takes over at tick"].map(|text| ended.error.contains(text));
     assert!(replaces.contains(&true), "{ended}");
     assert!(messages(recording) == messages(plain), "other messages: {ended}");
 }
@@ -271,7 +271,7 @@ fn deliver(case: &Case, place: &Place, launch: &Launch<'_>, watched: &Watched) -
     let backup = watched.plan.slot(node, 1);
     let pid = |target| match target {
         Target::Active => {
-            place.process_of_generation(case.victim, watched.roster(place, node).primary.generation)
+            place.process_of_generation(case.victim, watched.instances(place, node).primary.generation)
         }
         Target::BackupSpec => place.process_of_generation(case.victim, 1),
         Target::Other(process) => process.pid(place, launch),

@@ -135,23 +135,23 @@ impl Watched {
     }
 
     /// Who is in the slots of `node` now, once everybody has been told of them.
-    pub fn roster(&self, place: &Place, node: usize) -> NodeInstances {
-        self.look("no roster", || {
+    pub fn instances(&self, place: &Place, node: usize) -> NodeInstances {
+        self.look("no membership", || {
             let run_dir = place.run_dirs().into_iter().next()?;
             let epoch = self.control.epoch();
-            let mut roster = if epoch == 0 {
+            let mut membership = if epoch == 0 {
                 Membership::first(&self.plan)
             } else {
                 Membership::load(&run_dir, epoch).ok()?
             };
-            Some(roster.nodes.swap_remove(node))
+            Some(membership.nodes.swap_remove(node))
         })
     }
 
     /// Waits until the backup of `node` computes beside it; returns its generation.
     pub fn await_shadow(&self, place: &Place, node: usize) -> u32 {
         self.look("no backup has joined", || {
-            let generation = self.roster(place, node).backup?.generation;
+            let generation = self.instances(place, node).backup?.generation;
             let state = self.control.slot_state(self.plan.slot(node, generation));
             (state == SlotState::Taken).then_some(generation)
         })
@@ -159,7 +159,7 @@ impl Watched {
 
     /// Waits until the process `generation` of `node` flies.
     pub fn await_active(&self, place: &Place, node: usize, generation: u32) {
-        let is_active = || (self.roster(place, node).primary.generation == generation).then_some(());
+        let is_active = || (self.instances(place, node).primary.generation == generation).then_some(());
         self.look("the backup has not taken over", is_active);
     }
 

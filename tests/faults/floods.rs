@@ -48,12 +48,12 @@ fn what_a_terminal_would_obey_is_escaped() {
     assert!(!ended.error.contains('\u{1b}'), "{ended}");
 }
 
-/// Exit code of `hummingbus` with `words`, with nowhere to write to.
-fn code_without_output(words: &[&str]) -> Option<i32> {
+/// Exit code of `hummingbus` with `args`, with nowhere to write to.
+fn code_without_output(args: &[&str]) -> Option<i32> {
     let full = || Stdio::from(File::options().write(true).open("/dev/full").unwrap());
     let place = Place::new();
     let mut command = Command::new(HUMMINGBUS);
-    place.mark(&mut command).args(words).stdin(Stdio::null()).stdout(full()).stderr(full());
+    place.mark(&mut command).args(args).stdin(Stdio::null()).stdout(full()).stderr(full());
     command.status().unwrap().code()
 }
 

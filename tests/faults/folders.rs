@@ -6,20 +6,20 @@ use std::os::unix::ffi::{OsStrExt, OsStringExt};
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-/// `hummingbus` with `words` and its temporary files in `folder`.
-fn hummingbus(place: &Place, folder: &OsStr, words: &[&str]) -> Command {
+/// `hummingbus` with `args` and its temporary files in `folder`.
+fn hummingbus(place: &Place, folder: &OsStr, args: &[&str]) -> Command {
     let mut variable = OsString::from("TMPDIR=");
     variable.push(folder);
     let mut command = Command::new("env");
-    command.arg(variable).arg(HUMMINGBUS).args(words).current_dir(place.path(""));
+    command.arg(variable).arg(HUMMINGBUS).args(args).current_dir(place.path(""));
     command
 }
 
 fn fly(place: &Place, folder: &OsStr) -> Ended {
     let (manifest, recording) =
         (crate::support::repository("manifests/hover.toml"), place.path("flown.mcap"));
-    let words = ["run", &manifest, "--record", &recording, "--set", "run.duration_s=0.02"];
-    let launch = place.launch(hummingbus(place, folder, &words));
+    let args = ["run", &manifest, "--record", &recording, "--set", "run.duration_s=0.02"];
+    let launch = place.launch(hummingbus(place, folder, &args));
     let id = launch.id();
     let ended = launch.end();
     let left = run_dirs(id, folder);
@@ -125,12 +125,12 @@ fn a_run_whose_directory_is_elsewhere_is_found_steered_and_watched() {
     std::fs::create_dir(&folder).unwrap();
     let (manifest, recording) =
         (crate::support::repository("manifests/hover.toml"), place.path("flown.mcap"));
-    let words = ["run", &manifest, "--record", &recording, "--pace", "realtime"];
-    let command = hummingbus(&place, &folder, &words);
+    let args = ["run", &manifest, "--record", &recording, "--pace", "realtime"];
+    let command = hummingbus(&place, &folder, &args);
     let launch = place.launch(command);
     let run_id = run_id(&launch);
     let ask =
-        |words: &[&str]| place.start(&[words, &["--run", &run_id]].concat()).end_among_others().with_code(0);
+        |args: &[&str]| place.start(&[args, &["--run", &run_id]].concat()).end_among_others().with_code(0);
     ask(&["ctl", "pause"]).prints(&["paused at tick"]);
     ask(&["top", "--once"]).prints(&["hover.toml", "paused"]);
     ask(&["ctl", "stop"]);

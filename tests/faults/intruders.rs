@@ -23,9 +23,9 @@ fn intrude_on_flight(kind: &str, node: Option<&str>, name: &str) {
     for tick in [0, 700, 2100] {
         assert_eq!(watched.hold_at(tick), tick);
         let Output { status, stderr, .. } = intrude(&place, kind, node);
-        let words = String::from_utf8_lossy(&stderr);
-        assert_eq!(status.code(), Some(2), "{words}");
-        assert!(words.contains(&format!("the run has a process `{name}` already")), "{words}");
+        let message = String::from_utf8_lossy(&stderr);
+        assert_eq!(status.code(), Some(2), "{message}");
+        assert!(message.contains(&format!("the run has a process `{name}` already")), "{message}");
         assert_eq!(watched.control.held_at(), Some(tick), "the intruder moved the run");
     }
     watched.control.set_hold_tick(u32::MAX);
@@ -59,9 +59,9 @@ fn a_process_that_the_plan_does_not_know_is_refused() {
     let watched = Watched::attach(&place);
     watched.hold_at(100);
     let Output { status, stderr, .. } = intrude(&place, "imu", Some("imu2"));
-    let words = String::from_utf8_lossy(&stderr);
-    assert_eq!(status.code(), Some(2), "{words}");
-    assert!(words.contains("the run has no node named `imu2`; it has "), "{words}");
+    let message = String::from_utf8_lossy(&stderr);
+    assert_eq!(status.code(), Some(2), "{message}");
+    assert!(message.contains("the run has no node named `imu2`; it has "), "{message}");
     watched.control.set_hold_tick(u32::MAX);
     launch.end().with_code(0);
 }

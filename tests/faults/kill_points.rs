@@ -145,12 +145,12 @@ fn strike(case: &Case, reference: &str) -> u32 {
     require_bounded_loss(case, &watched, sent_before, recorded)
 }
 
-fn start<'a>(case: &Case, place: &'a Place, words: &[&str]) -> Launch<'a> {
+fn start<'a>(case: &Case, place: &'a Place, args: &[&str]) -> Launch<'a> {
     match case.blow {
-        Blow::Signal(_) => place.start(words),
+        Blow::Signal(_) => place.start(args),
         Blow::Fault(fault) => {
             let (fault, tick) = (format!("{fault:?}"), case.tick().to_string());
-            place.start_with(words, &[(FAULT_VARIABLE, &fault), (TICK_VARIABLE, &tick)])
+            place.start_with(args, &[(FAULT_VARIABLE, &fault), (TICK_VARIABLE, &tick)])
         }
     }
 }

@@ -15,8 +15,8 @@ fn fly(place: &Place, on_exit: &str, period: u32, recording: &str, fails: bool) 
     let manifest = write_manifest(place, &tables);
     let fault = format!("{:?}", Fault::BehindTheEnd);
     let variables = [(FAULT_VARIABLE, fault.as_str())];
-    let words = ["run", &manifest, "--record", recording, "--set", DURATION];
-    place.start_with(&words, if fails { &variables } else { &[] }).end()
+    let args = ["run", &manifest, "--record", recording, "--set", DURATION];
+    place.start_with(&args, if fails { &variables } else { &[] }).end()
 }
 
 /// Flies undisturbed and with a death behind the end; requires exit code 0, the reason, and the same messages.

@@ -11,9 +11,9 @@ const ROOMS_KIB: [u32; 24] = [
     4096, 8192,
 ];
 
-/// A command that runs `shell`, of which "$@" is `hummingbus` with `words`, where /dev/shm has `room_kib`; `None` where
+/// A command that runs `shell`, of which "$@" is `hummingbus` with `args`, where /dev/shm has `room_kib`; `None` where
 /// this system allows no file system of one's own.
-fn with_room(room_kib: u32, shell: &str, words: &[&str]) -> Option<Command> {
+fn with_room(room_kib: u32, shell: &str, args: &[&str]) -> Option<Command> {
     let mount = format!("mount -t tmpfs -o size={room_kib}k none /dev/shm");
     let unshare = |script: &str| {
         let mut command = Command::new("unshare");
@@ -25,15 +25,15 @@ fn with_room(room_kib: u32, shell: &str, words: &[&str]) -> Option<Command> {
         return None;
     }
     let mut command = unshare(&format!("{mount} || exit 9; {shell}"));
-    command.arg(HUMMINGBUS).args(words);
+    command.arg(HUMMINGBUS).args(args);
     Some(command)
 }
 
 fn short_run(place: &Place, record: &str) -> [String; 6] {
-    let words = ["run", &repository("manifests/hover.toml"), "--record", &place.path(record), "--set"];
-    let mut words = words.map(str::to_owned).to_vec();
-    words.push("run.duration_s=0.1".to_owned());
-    words.try_into().unwrap()
+    let args = ["run", &repository("manifests/hover.toml"), "--record", &place.path(record), "--set"];
+    let mut args = args.map(str::to_owned).to_vec();
+    args.push("run.duration_s=0.1".to_owned());
+    args.try_into().unwrap()
 }
 
 #[test]
@@ -42,9 +42,9 @@ fn with_any_room_in_shared_memory_a_run_flies_or_is_refused_in_words() {
     for room_kib in ROOMS_KIB {
         let place = Place::new();
         let left = place.path("left");
-        let words = short_run(&place, "flown.mcap");
+        let args = short_run(&place, "flown.mcap");
         let shell = format!("\"$@\"; code=$?; ls -A /dev/shm >'{left}'; exit $code");
-        let Some(command) = with_room(room_kib, &shell, &words.each_ref().map(String::as_str)) else {
+        let Some(command) = with_room(room_kib, &shell, &args.each_ref().map(String::as_str)) else {
             return;
         };
         let ended = place.launch(command).end();
@@ -52,8 +52,8 @@ fn with_any_room_in_shared_memory_a_run_flies_or_is_refused_in_words() {
         assert_eq!(left, "", "with {room_kib} KiB: {ended}");
         if ended.code == Some(2) {
             refused += 1;
-            let words = ["no room for", "shared memory was full", "No space left on device"];
-            assert!(words.iter().any(|words| ended.error.contains(words)), "with {room_kib} KiB: {ended}");
+            let expected = ["no room for", "shared memory was full", "No space left on device"];
+            assert!(expected.iter().any(|text| ended.error.contains(text)), "with {room_kib} KiB: {ended}");
             assert!(ended.error.contains("/dev/shm"), "with {room_kib} KiB: {ended}");
         } else {
             flown += 1;
@@ -72,8 +72,8 @@ fn fly_into_full_memory(place: &Place, strike: impl FnOnce(&Place)) -> Option<En
         "\"$@\" & run=$!; until [ -e '{go}' ]; do sleep 0.01; done
          dd if=/dev/zero of=/dev/shm/filler bs=4k 2>/dev/null; touch '{full}'; wait $run"
     );
-    let words = ["run", &path, "--record", &place.path("flight.mcap"), "--pace", "realtime"];
-    let launch = place.launch(with_room(8192, &shell, &words)?);
+    let args = ["run", &path, "--record", &place.path("flight.mcap"), "--pace", "realtime"];
+    let launch = place.launch(with_room(8192, &shell, &args)?);
     // Its control segment lies in a /dev/shm that is not ours: the recording tells that it flies.
     let partial = partial(&place.path("flight.mcap"));
     poll("no recording", || std::fs::metadata(&partial).ok().filter(|file| file.len() > 0));
@@ -117,16 +117,16 @@ fn under_any_limit_on_the_size_of_files_a_run_flies_or_is_refused_in_words() {
     // Blocks of 512 bytes.
     for limit in [8, 16, 32, 64, 128, 256, 512, 1024, 4096, 65536] {
         let place = Place::new();
-        let words = short_run(&place, "flown.mcap");
+        let args = short_run(&place, "flown.mcap");
         let mut command = Command::new("sh");
-        command.args(["-c", &format!("ulimit -f {limit}; exec \"$@\""), "sh", HUMMINGBUS]).args(&words);
+        command.args(["-c", &format!("ulimit -f {limit}; exec \"$@\""), "sh", HUMMINGBUS]).args(&args);
         let ended = place.launch(command).end();
         if limit == 65536 {
             ended.flown();
         } else if ended.code == Some(2) {
             refused += 1;
-            let words = ["ulimit -f", "File too large"];
-            assert!(words.iter().any(|words| ended.error.contains(words)), "limit {limit}: {ended}");
+            let expected = ["ulimit -f", "File too large"];
+            assert!(expected.iter().any(|text| ended.error.contains(text)), "limit {limit}: {ended}");
         } else {
             ended.flown();
         }

@@ -11,9 +11,9 @@ fn start<'a>(place: &'a Place, script: &str, more: &str, settings: &[&str]) -> L
     );
     let manifest = write_manifest(place, &sidecar);
     let recording = place.path("flight.mcap");
-    let mut words = vec!["run", &manifest, "--record", &recording, "--set", "run.duration_s=0.5"];
-    settings.iter().for_each(|setting| words.extend(["--set", setting]));
-    place.start(&words)
+    let mut args = vec!["run", &manifest, "--record", &recording, "--set", "run.duration_s=0.5"];
+    settings.iter().for_each(|setting| args.extend(["--set", setting]));
+    place.start(&args)
 }
 
 fn fly(script: &str, more: &str, settings: &[&str]) -> Ended {

@@ -43,11 +43,11 @@ fn start_watched<'a>(place: &'a Place, fault: Option<Fault>) -> Launch<'a> {
     let path = place.write("flight.toml", manifest());
     let settings = NODES.map(|node| format!("process.{node}.watchdog_ms_host={WATCHDOG_MS}"));
     let recording = place.path("flight.mcap");
-    let mut words = vec!["run", &path, "--record", &recording];
-    settings.iter().for_each(|setting| words.extend(["--set", setting]));
+    let mut args = vec!["run", &path, "--record", &recording];
+    settings.iter().for_each(|setting| args.extend(["--set", setting]));
     let fault = fault.map(|fault| format!("{fault:?}"));
     let variables: Vec<_> = fault.iter().map(|fault| (FAULT_VARIABLE, fault.as_str())).collect();
-    place.start_with(&words, &variables)
+    place.start_with(&args, &variables)
 }
 
 #[test]

@@ -11,9 +11,9 @@ fn fly_slowly(pace: &str) -> Value {
     let path = place.write("flight.toml", manifest());
     let fly = |name: &str, pace: &str, variables: &[(&str, &str)]| {
         let recording = place.path(name);
-        let words =
+        let args =
             ["run", &path, "--record", &recording, "--set", "run.duration_s=0.3", "--json", "--pace", pace];
-        let summary = place.start_with(&words, variables).end().with_code(0).json();
+        let summary = place.start_with(&args, variables).end().with_code(0).json();
         (summary, std::fs::read(recording).unwrap())
     };
     let (_, undisturbed) = fly("undisturbed.mcap", "free", &[]);

@@ -7,8 +7,8 @@ use rustix::process::{Pid, Signal, kill_process, test_kill_process};
 
 /// A saboteur whose shell starts `detached` first, which writes its process number to a file.
 fn write_stray(place: &Place, detached: &str) -> String {
-    let words = saboteur::command().map(|word| format!("'{word}'")).join(" ");
-    let script = format!("{detached} exec {words}");
+    let args = saboteur::command().map(|word| format!("'{word}'")).join(" ");
+    let script = format!("{detached} exec {args}");
     let tables = format!(
         "[process.saboteur]\ncommand = [\"sh\", \"-c\", {script:?}]\nworking_directory = {:?}\n",
         place.path("")

@@ -116,8 +116,8 @@ fn panic_again_and_again(policy: Policy) -> Ended {
     let place = Place::new();
     let (manifest, recording) = (write_manifest(&place, &policy.tables()), place.path("flight.mcap"));
     let fault = format!("{:?}", Fault::Panic);
-    let words = ["run", &manifest, "--record", &recording, "--json"];
-    let launch = place.start_with(&words, &[(FAULT_VARIABLE, &fault), (TICK_VARIABLE, "700")]);
+    let args = ["run", &manifest, "--record", &recording, "--json"];
+    let launch = place.start_with(&args, &[(FAULT_VARIABLE, &fault), (TICK_VARIABLE, "700")]);
     let ended = launch.end().with_code(2);
     let reference = Reference::fly_with(&policy.tables());
     require_prefix(&place, policy, &partial(&recording), &reference.path());
@@ -149,8 +149,8 @@ fn a_process_that_dies_at_the_same_tick_again_is_not_restarted_for_ever() {
 fn a_process_that_dies_before_the_run_flies_is_not_restarted() {
     let place = Place::new();
     let manifest = write_manifest(&place, &Policy::Restart.tables());
-    let words = ["run", &manifest, "--record", &place.path("flight.mcap")];
-    let ended = place.call(&[&words[..], &["--set", "process.saboteur.command=[\"false\"]"]].concat());
+    let args = ["run", &manifest, "--record", &place.path("flight.mcap")];
+    let ended = place.call(&[&args[..], &["--set", "process.saboteur.command=[\"false\"]"]].concat());
     ended.with_code(2).says(&["process `saboteur` ended with exit code 1", "the run did not fly yet"]);
 }
 
@@ -201,13 +201,13 @@ fn strike(case: &Case, reference: &str) {
 
 fn start<'a>(case: &Case, place: &'a Place, manifest: &str, recording: &str) -> Launch<'a> {
     let watchdog = format!("process.{}.watchdog_ms_host={WATCHDOG_MS_HOST}", case.victim);
-    let mut words = vec!["run", manifest, "--record", recording, "--json"];
+    let mut args = vec!["run", manifest, "--record", recording, "--json"];
     if matches!(case.blow, Blow::Signal(Signal::STOP) | Blow::Fault(Fault::Hang)) {
-        words.extend(["--set", &watchdog]);
+        args.extend(["--set", &watchdog]);
     }
-    let Blow::Fault(fault) = case.blow else { return place.start(&words) };
+    let Blow::Fault(fault) = case.blow else { return place.start(&args) };
     let (fault, tick) = (format!("{fault:?}"), case.tick().to_string());
-    place.start_with(&words, &[(FAULT_VARIABLE, &fault), (TICK_VARIABLE, &tick), (GENERATIONS_VARIABLE, "1")])
+    place.start_with(&args, &[(FAULT_VARIABLE, &fault), (TICK_VARIABLE, &tick), (GENERATIONS_VARIABLE, "1")])
 }
 
 fn deliver(case: &Case, place: &Place, watched: &Watched) {
@@ -250,7 +250,7 @@ fn ready(case: &Case, place: &Place, watched: &Watched, name: &str) -> rustix::p
     if case.policy == Policy::Standby {
         watched.await_shadow(place, node);
     }
-    place.process_of_generation(name, watched.roster(place, node).primary.generation)
+    place.process_of_generation(name, watched.instances(place, node).primary.generation)
 }
 
 /// Requires that the run says who ended how and who took the place, and when.

@@ -127,10 +127,10 @@ fn another_user_who_tries_at_every_moment_opens_no_file_of_a_run() {
         let racer = scope.spawn(|| race(&prefix, Path::new(&folder), &is_over));
         for _ in 0..RACED_RUNS {
             let recording = place.path("raced.mcap");
-            let words = ["run", &manifest, "--record", &recording, "--set", "run.duration_s=0.01"];
+            let args = ["run", &manifest, "--record", &recording, "--set", "run.duration_s=0.01"];
             // A umask that takes nothing away must not open anything.
             let mut command = Command::new("sh");
-            command.args(["-c", "umask 0; exec \"$@\"", "sh", crate::support::HUMMINGBUS]).args(words);
+            command.args(["-c", "umask 0; exec \"$@\"", "sh", crate::support::HUMMINGBUS]).args(args);
             let launch = place.launch(command);
             *prefix.lock().unwrap() = format!("/dev/shm/hb_{:x}-", launch.id());
             launch.end().flown();

@@ -89,8 +89,8 @@ impl Identified {
         fs::write(file("heavy.toml"), heavy()).unwrap();
         fs::write(file("flights.toml"), FLIGHTS).unwrap();
         let (flights, out) = (file("flights.toml"), file("out"));
-        let words = ["identify".as_ref(), flights.as_os_str(), "--out".as_ref(), out.as_os_str()];
-        hummingbus(&[&words[..], &["--no-bus".as_ref(), "--json".as_ref()]].concat());
+        let args = ["identify".as_ref(), flights.as_os_str(), "--out".as_ref(), out.as_os_str()];
+        hummingbus(&[&args[..], &["--no-bus".as_ref(), "--json".as_ref()]].concat());
         Self { page: out.join("report.html"), folder }
     }
 }

@@ -118,8 +118,8 @@ fn a_browser_draws_the_room_and_the_paths_in_it_and_the_vehicle_that_is_chosen()
 fn a_browser_that_lacks_what_a_reader_needs_is_named_with_it() {
     let Some(readers) = readers() else { return };
     let flight = Laps::of(&["h1"]);
-    let words = [flight.page.as_os_str(), "needs-webgl".as_ref(), "no-webgl".as_ref()];
-    let output = reader_of_a_page(&readers, "read_plot.mjs", &words);
+    let args = [flight.page.as_os_str(), "needs-webgl".as_ref(), "no-webgl".as_ref()];
+    let output = reader_of_a_page(&readers, "read_plot.mjs", &args);
     let message = String::from_utf8_lossy(&output.stderr);
     assert!(!output.status.success(), "{message}");
     for word in ["needs WebGL 2", "Chrome", "started as /", "chrome://gpu"] {
@@ -156,12 +156,12 @@ fn the_view_for_rerun_holds_the_scene_the_path_and_the_vehicle() {
 }
 
 /// Runs Python with the packages of the readers; what it prints.
-fn python(readers: &Path, words: &[&OsStr]) -> String {
+fn python(readers: &Path, args: &[&OsStr]) -> String {
     let mut command = Command::new(readers.join("venv/bin/python"));
     // Rerun sends usage data, except where CI is set; strictly, what it cannot log is an error.
-    command.args(words).env("CI", "true").env("RERUN_STRICT", "1").env("PYTHONDONTWRITEBYTECODE", "1");
+    command.args(args).env("CI", "true").env("RERUN_STRICT", "1").env("PYTHONDONTWRITEBYTECODE", "1");
     let Output { status, stdout, stderr } = command.output().unwrap();
-    assert!(status.success(), "{words:?}: {}", String::from_utf8_lossy(&stderr));
+    assert!(status.success(), "{args:?}: {}", String::from_utf8_lossy(&stderr));
     String::from_utf8_lossy(&stdout).into_owned()
 }
 

@@ -120,9 +120,9 @@ impl Profiled {
         let file = |name: &str| folder.path().join(name);
         let (manifest, trace, page) = (file("hover.toml"), file("trace.json"), file("page.html"));
         fs::write(&manifest, manifest_text()).unwrap();
-        let words = ["profile".as_ref(), manifest.as_os_str(), "--pace".as_ref(), "4".as_ref()];
+        let args = ["profile".as_ref(), manifest.as_os_str(), "--pace".as_ref(), "4".as_ref()];
         let files = ["--trace".as_ref(), trace.as_os_str(), "--html".as_ref(), page.as_os_str()];
-        hummingbus(&[words, files].concat());
+        hummingbus(&[args, files].concat());
         Self { folder, trace, page }
     }
 }

@@ -31,8 +31,8 @@ fn crash(place: &Place) -> String {
     run_id
 }
 
-fn clean(place: &Place, words: &[&str]) -> Value {
-    place.start(&[&["clean", "--json"], words].concat()).end_among_others().with_code(0).json()
+fn clean(place: &Place, args: &[&str]) -> Value {
+    place.start(&[&["clean", "--json"], args].concat()).end_among_others().with_code(0).json()
 }
 
 fn remains_of<'a>(report: &'a Value, run_id: &str) -> Option<&'a Value> {
@@ -174,10 +174,10 @@ fn runs_that_start_and_end_while_others_clean_are_not_disturbed() {
         let _end = SetOnDrop(&is_over);
         for _ in 0..2 {
             scope.spawn(|| {
-                let words = ["clean", "--json"];
+                let args = ["clean", "--json"];
                 while !is_over.load(Ordering::Relaxed) {
                     let report = Command::new(env!("CARGO_BIN_EXE_hummingbus"))
-                        .args(words)
+                        .args(args)
                         .env("TMPDIR", &temporary)
                         .output()
                         .unwrap();
@@ -219,7 +219,7 @@ fn a_run_that_a_process_of_a_dead_run_started_flies_on() {
     let _alone = alone();
     let (place, outer, inner) = (Place::new(), Place::new(), Place::new());
     let hover = repository("manifests/hover.toml");
-    let words = [
+    let args = [
         "run",
         &hover,
         "--record",
@@ -229,13 +229,13 @@ fn a_run_that_a_process_of_a_dead_run_started_flies_on() {
         "--set",
         "run.duration_s=8",
     ];
-    let words: Vec<String> = [&[env!("CARGO_BIN_EXE_hummingbus")], &words[..]]
+    let args: Vec<String> = [&[env!("CARGO_BIN_EXE_hummingbus")], &args[..]]
         .concat()
         .iter()
         .map(|word| format!("'{word}'"))
         .collect();
     // Detached as a daemon is; what it says goes where the outer run has its sidecar write.
-    let command = format!("setsid --fork env TMPDIR='{}' {}; sleep 1000", inner.path("tmp"), words.join(" "));
+    let command = format!("setsid --fork env TMPDIR='{}' {}; sleep 1000", inner.path("tmp"), args.join(" "));
     let sidecar = format!("\n[process.nested]\nlockstep = false\ncommand = [\"sh\", \"-c\", {command:?}]\n");
     let manifest = outer.write("outer.toml", format!("include = [{hover:?}]\n{sidecar}"));
     let launch =
@@ -310,12 +310,12 @@ impl Drop for Strange {
 
 /// Requires that no command stops at what is strange, and that what it points to is kept.
 fn require_unmoved(place: &Place, target: &Path) {
-    for words in [
+    for args in [
         &["ctl", "status", "--run", "0-0"][..],
         &["swap", "imu", "--run", "0-0"],
         &["top", "--once", "--run", "0-0"],
     ] {
-        place.start(words).end_among_others().with_code(2).says(&["is alive"]);
+        place.start(args).end_among_others().with_code(2).says(&["is alive"]);
     }
     let report = clean(place, &[]);
     assert!(target.join("kept").exists(), "{report:#}");

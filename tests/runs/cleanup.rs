@@ -10,8 +10,8 @@ use std::time::Duration;
 /// Flies hover.toml, very long, and sends `signal` to the launcher after 500 ticks.
 fn stop_with(place: &Place, signal: Signal, more: &[&str]) -> (Ended, String) {
     let (manifest, recording) = (repository("manifests/hover.toml"), place.path("stopped.mcap"));
-    let words = ["run", &manifest, "--record", &recording, "--set", "run.duration_s=4000000"];
-    let mut launch = place.start(&[&words, more].concat());
+    let args = ["run", &manifest, "--record", &recording, "--set", "run.duration_s=4000000"];
+    let mut launch = place.start(&[&args, more].concat());
     launch.await_ticks(500);
     launch.signal(signal);
     (launch.end(), recording)
@@ -69,8 +69,8 @@ fn sigterm_to_a_node_stops_the_run_at_a_tick_as_well() {
     let place = Place::new();
     for node in ["recorder", "plant", "pilot"] {
         let (manifest, recording) = (repository("manifests/hover.toml"), place.path("stopped.mcap"));
-        let words = ["run", &manifest, "--record", &recording, "--pace", "realtime", "--json"];
-        let mut launch = place.start(&words);
+        let args = ["run", &manifest, "--record", &recording, "--pace", "realtime", "--json"];
+        let mut launch = place.start(&args);
         launch.await_ticks(300);
         kill_process(place.process_of(node), Signal::TERM).unwrap();
         let ticks = launch.end().with_code(1).json()["ticks"].as_u64().unwrap();
@@ -82,8 +82,8 @@ fn sigterm_to_a_node_stops_the_run_at_a_tick_as_well() {
 fn sigterm_to_every_process_at_once_leaves_a_whole_recording() {
     let place = Place::new();
     let (manifest, recording) = (repository("manifests/hover.toml"), place.path("stopped.mcap"));
-    let words = ["run", &manifest, "--record", &recording, "--pace", "realtime", "--json"];
-    let mut launch = place.start(&words);
+    let args = ["run", &manifest, "--record", &recording, "--pace", "realtime", "--json"];
+    let mut launch = place.start(&args);
     launch.await_ticks(300);
     // The first to hear of it may have ended the run before the last is told.
     for (pid, _) in place.processes() {
@@ -185,12 +185,12 @@ fn no_process_outlives_a_launcher_killed_at_any_moment_of_the_start() {
 fn what_a_killed_launcher_left_does_not_hinder_the_next_run() {
     let place = Place::new();
     let (manifest, recording) = (repository("manifests/hover.toml"), place.path("killed.mcap"));
-    let words = ["run", &manifest, "--record", &recording];
-    let mut launch = place.start(&[&words[..], &["--pace", "realtime"]].concat());
+    let args = ["run", &manifest, "--record", &recording];
+    let mut launch = place.start(&[&args[..], &["--pace", "realtime"]].concat());
     launch.await_ticks(200);
     launch.kill();
     place.await_no_process();
-    place.start(&words).end_among_others().with_code(0);
+    place.start(&args).end_among_others().with_code(0);
 }
 
 #[test]

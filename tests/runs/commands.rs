@@ -26,16 +26,16 @@ fn a_run_whose_conditions_hold_passes() {
 fn a_condition_that_does_not_hold_fails_the_run() {
     let place = Place::new();
     // Without the step the vehicle stays at 1 m.
-    let words = ["--set", "process.pilot.parameters.set_points=[]", "--set", "run.duration_s=6"];
-    let ended = place.call(&[&["run", &hover(), "--record", &place.path("a.mcap")][..], &words].concat());
+    let args = ["--set", "process.pilot.parameters.set_points=[]", "--set", "run.duration_s=6"];
+    let ended = place.call(&[&["run", &hover(), "--record", &place.path("a.mcap")][..], &args].concat());
     ended.with_code(1).prints(&["FAILED altitude within 2 % of 1.5 m", "(1.47 … 1.53)", "\nFAILED\n"]);
 }
 
 #[test]
 fn a_condition_on_a_span_that_was_not_flown_fails() {
     let place = Place::new();
-    let words = ["run", &hover(), "--record", &place.path("a.mcap"), "--set", "run.duration_s=3"];
-    place.call(&words).with_code(1).prints(&["no samples"]);
+    let args = ["run", &hover(), "--record", &place.path("a.mcap"), "--set", "run.duration_s=3"];
+    place.call(&args).with_code(1).prints(&["no samples"]);
 }
 
 /// The keys of an object.
@@ -67,8 +67,8 @@ fn the_json_summary_holds_what_the_text_says() {
 #[test]
 fn a_failed_run_in_json_says_which_condition() {
     let place = Place::new();
-    let words = ["run", &hover(), "--record", &place.path("a.mcap"), "--json", "--set", "run.duration_s=3"];
-    let summary = place.call(&words).with_code(1).json();
+    let args = ["run", &hover(), "--record", &place.path("a.mcap"), "--json", "--set", "run.duration_s=3"];
+    let summary = place.call(&args).with_code(1).json();
     assert_eq!(summary["passed"], false);
     assert_eq!(summary["pass"][0]["passed"], false);
     assert!(summary["pass"][0]["name"].as_str().unwrap().starts_with("altitude"));
@@ -77,8 +77,8 @@ fn a_failed_run_in_json_says_which_condition() {
 #[test]
 fn a_paced_run_takes_at_least_its_simulated_time() {
     let place = Place::new();
-    let words = ["run", &hover(), "--record", &place.path("a.mcap"), "--json", "--pace", "2"];
-    let summary = place.call(&[&words[..], &["--set", "run.duration_s=1"]].concat()).with_code(1).json();
+    let args = ["run", &hover(), "--record", &place.path("a.mcap"), "--json", "--pace", "2"];
+    let summary = place.call(&[&args[..], &["--set", "run.duration_s=1"]].concat()).with_code(1).json();
     // The last tick's deadline lies one tick before the end.
     assert!(summary["host_s"].as_f64().unwrap() >= 0.999 / 2.0, "{summary}");
 }
@@ -129,8 +129,8 @@ fn schema_prints_every_message_with_units_frames_and_hash() {
     let state = section(&ended.output, "hummingbus_msgs/msg/PlantState (");
     for (field, unit, frame) in [("position.x", "m", "world"), ("angular_velocity.z", "rad/s", "body")] {
         let row = state.lines().find(|line| line.contains(field)).unwrap();
-        let words: Vec<_> = row.split_whitespace().collect();
-        assert_eq!(words[1..], ["float64", field, unit, frame]);
+        let cells: Vec<_> = row.split_whitespace().collect();
+        assert_eq!(cells[1..], ["float64", field, unit, frame]);
     }
     ended.prints(&["geometry_msgs/msg/PoseStamped", "tf2_msgs/msg/TFMessage"]);
 }
@@ -241,6 +241,6 @@ fn the_example_controller_flies_its_manifest_from_its_own_binary() {
     assert!(controller.exists(), "{} is not built: cargo build --examples", controller.display());
     let manifest = repository("manifests/custom-controller.toml");
     let command = format!("process.controller.command=[{:?}]", controller.display().to_string());
-    let words = ["run", &manifest, "--record", &place.path("custom.mcap"), "--set", &command];
-    place.call(&words).with_code(0).prints(&["ok     altitude within 2 %", "passed"]);
+    let args = ["run", &manifest, "--record", &place.path("custom.mcap"), "--set", &command];
+    place.call(&args).with_code(0).prints(&["ok     altitude within 2 %", "passed"]);
 }

@@ -11,8 +11,8 @@ const PROCESSES: [&str; 7] = ["controller", "ekf", "imu", "mocap", "pilot", "pla
 fn hover(place: &Place, duration_s: u32, more: &[&str]) -> String {
     let (manifest, recording) = (repository("manifests/hover.toml"), place.path("hover.mcap"));
     let duration = format!("run.duration_s={duration_s}");
-    let words = ["run", &manifest, "--record", &recording, "--set", &duration];
-    place.call(&[&words, more].concat()).flown();
+    let args = ["run", &manifest, "--record", &recording, "--set", &duration];
+    place.call(&[&args, more].concat()).flown();
     recording
 }
 
@@ -36,8 +36,8 @@ fn set_each(key: &str, value: impl Fn(usize) -> String) -> Vec<String> {
     PROCESSES.iter().enumerate().map(set).collect()
 }
 
-fn borrowed(words: &[String]) -> Vec<&str> {
-    words.iter().map(String::as_str).collect()
+fn borrowed(args: &[String]) -> Vec<&str> {
+    args.iter().map(String::as_str).collect()
 }
 
 #[test]

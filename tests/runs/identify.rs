@@ -4,10 +4,10 @@ use crate::support::{Place, repository};
 use serde_json::Value;
 use std::process::Command;
 
-/// Flies courses of `kind` with `words` for `scripts/make_flights`; returns the flights file.
-fn make_flights(place: &Place, words: &[&str]) -> String {
+/// Flies courses of `kind` with `args` for `scripts/make_flights`; returns the flights file.
+fn make_flights(place: &Place, args: &[&str]) -> String {
     let mut command = Command::new("python3");
-    command.args([&repository("scripts/make_flights"), &place.path("flights")]).args(words);
+    command.args([&repository("scripts/make_flights"), &place.path("flights")]).args(args);
     command.args(["--program", env!("CARGO_BIN_EXE_hummingbus"), "--fit", "1", "--test", "2"]);
     let output = place.mark(&mut command).output().unwrap();
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
@@ -83,10 +83,10 @@ fn a_flight_that_is_fitted_on_is_no_test_flight_for_identify_and_validate() {
                  [[flight]]\nname = \"second\"\nfile = {other:?}\nrole = \"test\"\n"
             ),
         );
-        let words =
+        let args =
             ["flights.toml:12:8", "`second` with role \"test\"", "`first` with role \"fit\"", how, "from_s"];
-        place.call(&["identify", &flights, "--out", &out]).with_code(2).says(&words);
-        place.call(&["validate", &vehicle, &flights]).with_code(2).says(&words);
+        place.call(&["identify", &flights, "--out", &out]).with_code(2).says(&args);
+        place.call(&["validate", &vehicle, &flights]).with_code(2).says(&args);
     }
     assert!(!std::path::Path::new(&out).exists(), "a refusal writes nothing");
 }

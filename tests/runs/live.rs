@@ -14,24 +14,24 @@ use std::time::Duration;
 fn take_off<'a>(place: &'a Place, name: &str, pace: &str, duration_s: u32) -> Launch<'a> {
     let (manifest, recording) = (repository("manifests/hover.toml"), place.path(name));
     let duration = format!("run.duration_s={duration_s}");
-    let words = ["run", &manifest, "--record", &recording, "--pace", pace, "--set", &duration, "--json"];
-    let mut launch = place.start(&words);
+    let args = ["run", &manifest, "--record", &recording, "--pace", pace, "--set", &duration, "--json"];
+    let mut launch = place.start(&args);
     launch.await_ticks(100);
     launch
 }
 
-/// `hummingbus VERB --run ID` and `words`, for the run that is up in `place`.
-fn call(place: &Place, verb: &str, words: &[&str]) -> Ended {
-    place.start(&[&[verb, "--run", &place.run_id()], words].concat()).end_among_others()
+/// `hummingbus VERB --run ID` and `args`, for the run that is up in `place`.
+fn call(place: &Place, verb: &str, args: &[&str]) -> Ended {
+    place.start(&[&[verb, "--run", &place.run_id()], args].concat()).end_among_others()
 }
 
-fn ctl(place: &Place, words: &[&str]) -> Value {
-    call(place, "ctl", &[words, &["--json"]].concat()).with_code(0).json()
+fn ctl(place: &Place, args: &[&str]) -> Value {
+    call(place, "ctl", &[args, &["--json"]].concat()).with_code(0).json()
 }
 
-/// The tick after `hummingbus ctl` with `words`.
-fn tick_after(place: &Place, words: &[&str]) -> u64 {
-    ctl(place, words)["tick"].as_u64().unwrap()
+/// The tick after `hummingbus ctl` with `args`.
+fn tick_after(place: &Place, args: &[&str]) -> u64 {
+    ctl(place, args)["tick"].as_u64().unwrap()
 }
 
 fn state(place: &Place) -> (String, u64) {
@@ -62,8 +62,8 @@ fn pausing_stepping_and_pacing_change_no_byte_of_a_recording() {
     ctl(&place, &["pace", "free"]);
     flight.end().flown();
     let undisturbed = place.path("undisturbed.mcap");
-    let words = ["run", &repository("manifests/hover.toml"), "--record", &undisturbed];
-    place.call(&[&words[..], &["--set", "run.duration_s=3"]].concat()).flown();
+    let args = ["run", &repository("manifests/hover.toml"), "--record", &undisturbed];
+    place.call(&[&args[..], &["--set", "run.duration_s=3"]].concat()).flown();
     require_same(&std::fs::read(undisturbed).unwrap(), &place.path("steered.mcap"));
 }
 

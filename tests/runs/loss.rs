@@ -21,8 +21,8 @@ fn require_complete(ticks: u32, more: &[&str]) {
     let place = Place::new();
     let (manifest, recording) = (repository("manifests/hover.toml"), place.path("hover.mcap"));
     let duration = format!("run.duration_s={}", f64::from(ticks) * 1e-3);
-    let words = ["run", &manifest, "--record", &recording, "--set", &duration];
-    place.call(&[&words, more].concat()).flown();
+    let args = ["run", &manifest, "--record", &recording, "--set", &duration];
+    place.call(&[&args, more].concat()).flown();
     let topics = topics(&recording);
     assert_eq!(topics.keys().collect::<Vec<_>>(), RATES.map(|(topic, _)| topic));
     for (topic, every_ticks) in RATES {

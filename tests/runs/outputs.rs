@@ -111,9 +111,9 @@ fn of_many_runs_that_start_at_once_exactly_one_flies() {
         if round % 2 == 1 {
             fs::copy(place.path("flown.mcap"), place.path("flown.partial.mcap")).unwrap();
         }
-        let words = ["run", &hover, "--record", &place.path("flown.mcap"), "--pace", "realtime"];
-        let words = [&words[..], &["--set", "run.duration_s=4000000"]].concat();
-        let mut launches: Vec<Launch<'_>> = (0..12).map(|_| place.start(&words)).collect();
+        let args = ["run", &hover, "--record", &place.path("flown.mcap"), "--pace", "realtime"];
+        let args = [&args[..], &["--set", "run.duration_s=4000000"]].concat();
+        let mut launches: Vec<Launch<'_>> = (0..12).map(|_| place.start(&args)).collect();
         let mut refused = Vec::new();
         poll("more than one run flies", || {
             let ended = launches.iter_mut().position(Launch::has_ended)?;
@@ -144,8 +144,8 @@ fn a_second_run_to_the_log_of_a_live_one_is_refused() {
     fs::hard_link(place.path("imu.log"), place.path("same.log")).unwrap();
     let same = format!("process.imu.log={}", place.path("same.log"));
     for log in [&log, &same] {
-        let words = ["run", &hover, "--record", &place.path("second.mcap"), "--set", log];
-        let second = place.start(&words).end_among_others();
+        let args = ["run", &hover, "--record", &place.path("second.mcap"), "--set", log];
+        let second = place.start(&args).end_among_others();
         require_named(&second, &first, &run_id, "--set process.imu.log=PATH");
     }
     first.signal(Signal::INT);
@@ -265,7 +265,7 @@ fn a_link_to_a_pipe_is_refused_and_left_alone_whoever_writes() {
         link
     };
     let log = format!("process.source.log={}", link("l.log"));
-    for words in [
+    for args in [
         vec!["run", &path, "--record", &link("l.mcap")],
         vec!["run", &path, "--set", &log],
         vec!["profile", &path, "--html", &link("l.html")],
@@ -274,9 +274,9 @@ fn a_link_to_a_pipe_is_refused_and_left_alone_whoever_writes() {
         vec!["plot", &recording, "--png", &link("l.png")],
         vec!["plot", &recording, "--out", &link("page.html")],
     ] {
-        let ended = place.call(&words).with_code(2);
+        let ended = place.call(&args).with_code(2);
         ended.says(&["it exists and is not a regular file; name another file"]);
-        let named = words[3].rsplit('=').next().unwrap();
+        let named = args[3].rsplit('=').next().unwrap();
         assert!(fs::symlink_metadata(named).unwrap().is_symlink(), "{named}: the link is gone");
         assert!(is_pipe(named) && is_pipe(&pipe), "{named}: the pipe is gone");
     }
@@ -299,22 +299,22 @@ fn a_link_to_a_recording_is_written_through() {
     }
 }
 
-/// Runs `words`, whose output is `file`, over somebody's own file, an empty one, and what it has itself written.
-fn require_own_kind(place: &Place, words: &[&str], file: &str) {
+/// Runs `args`, whose output is `file`, over somebody's own file, an empty one, and what it has itself written.
+fn require_own_kind(place: &Place, args: &[&str], file: &str) {
     fs::write(file, "somebody's own").unwrap();
-    let ended = place.call(words).with_code(2);
+    let ended = place.call(args).with_code(2);
     ended.says(&[file, "of hummingbus, and would be lost; name another file"]);
     assert_eq!(fs::read_to_string(file).unwrap(), "somebody's own", "{ended}");
     fs::write(file, "").unwrap();
-    place.call(words).with_code(0);
+    place.call(args).with_code(0);
     let first = fs::read(file).unwrap();
     assert!(first.len() > 40, "{file} is empty");
-    place.call(words).with_code(0);
+    place.call(args).with_code(0);
     assert!(!fs::read(file).unwrap().is_empty());
     // Not that of another kind either.
     let other = if file.ends_with(".svg") { "page.html" } else { "laps.svg" };
     fs::copy(place.path(other), file).unwrap();
-    place.call(words).with_code(2).says(&[file, "would be lost"]);
+    place.call(args).with_code(2).says(&[file, "would be lost"]);
 }
 
 #[test]
@@ -327,7 +327,7 @@ fn nothing_is_replaced_but_a_file_of_the_same_kind() {
         .with_code(0);
     let file = |name: &str| place.path(name);
     let log = format!("process.source.log={}", file("a.log"));
-    for (words, name) in [
+    for (args, name) in [
         (vec!["run", &path, "--record", &file("a.mcap")], "a.mcap"),
         (vec!["run", &path, "--set", &log], "a.log"),
         (vec!["profile", &path, "--html", &file("a.html")], "a.html"),
@@ -336,7 +336,7 @@ fn nothing_is_replaced_but_a_file_of_the_same_kind() {
         (vec!["plot", &recording, "--png", &file("a.png")], "a.png"),
         (vec!["plot", &recording, "--out", &file("b.html")], "b.html"),
     ] {
-        require_own_kind(&place, &words, &file(name));
+        require_own_kind(&place, &args, &file(name));
     }
     // A broken run's name is somebody's own.
     fs::write(file("c.partial.mcap"), "somebody's own").unwrap();
@@ -371,19 +371,19 @@ fn no_file_that_a_run_reads_is_written_to() {
     let own = place.write("data.mcap", "");
     let reads = format!("process.source.data={own}");
     let log = |file: &str| format!("process.source.log={file}");
-    for (words, input) in [
+    for (args, input) in [
         (["--record", &empty, "--json"], &empty),
         (["--set", &log(&empty), "--json"], &empty),
         (["--set", &log(&place.path("hard.toml")), "--json"], &empty),
         (["--record", &own, &format!("--set={reads}")], &own),
     ] {
-        let ended = place.call(&[&["run", &path][..], &words].concat()).with_code(2);
+        let ended = place.call(&[&["run", &path][..], &args].concat()).with_code(2);
         ended.says(&["the run reads it, as", input, "name another file"]);
     }
     let left = place.write("own.partial.mcap", "");
     let reads = format!("process.source.data={left}");
-    for words in [["--set", &log(&left)], ["--set", &reads]] {
-        let ended = place.call(&[&["run", &path, "--record", &place.path("own.mcap")], &words[..]].concat());
+    for args in [["--set", &log(&left)], ["--set", &reads]] {
+        let ended = place.call(&[&["run", &path, "--record", &place.path("own.mcap")], &args[..]].concat());
         ended.with_code(2).says(&[&left, "the recording until it is complete"]);
     }
     for file in [&path, &vehicle] {
@@ -408,8 +408,8 @@ fn two_outputs_of_one_command_are_two_files() {
     let ended = place.call(&["profile", &path, "--record", &recording, "--html", &recording]).with_code(2);
     ended.says(&["the page", "the recording", "give each a file of its own"]);
     place.call(&["run", &path, "--record", &recording]).with_code(0);
-    let words = ["plot", &recording, "--plot", "/source/note:tick", "--svg", &page, "--out", &page];
-    place.call(&words).with_code(2).says(&["is named twice"]);
+    let args = ["plot", &recording, "--plot", "/source/note:tick", "--svg", &page, "--out", &page];
+    place.call(&args).with_code(2).says(&["is named twice"]);
     let before = fs::read(&recording).unwrap();
     place.call(&["profile", &path, "--record", &place.path("b.mcap"), "--html", &recording]).with_code(2);
     assert!(fs::read(&recording).unwrap() == before, "a page has replaced a recording");
@@ -455,14 +455,14 @@ fn what_is_written_has_the_mode_of_the_umask() {
 fn who_reads_a_page_or_a_recording_keeps_it_whole_while_it_is_replaced() {
     let place = Place::new();
     let (path, recording) = (short(&place), place.path("short.mcap"));
-    let words = ["plot", &recording, "--plot", "/source/note:tick"];
+    let args = ["plot", &recording, "--plot", "/source/note:tick"];
     let node = |path: &str| fs::metadata(path).unwrap().ino();
     place.call(&["run", &path]).with_code(0);
-    place.call(&words).with_code(0);
+    place.call(&args).with_code(0);
     let (held, page) = (open(&recording), File::open(place.path("short.html")).unwrap());
     let (bytes, length) = (held.bytes().to_vec(), page.metadata().unwrap().len());
     place.call(&["run", &path]).with_code(0);
-    place.call(&words).with_code(0);
+    place.call(&args).with_code(0);
     assert_ne!(page.metadata().unwrap().ino(), node(&place.path("short.html")), "it was written over");
     assert!(held.bytes() == bytes && page.metadata().unwrap().len() == length);
 }
@@ -497,13 +497,13 @@ fn validate_keeps_in_a_folder_of_its_own_and_replaces_its_own_files_alone() {
     let vehicle = repository("vehicles/hummingbird.toml");
     let (log, kept) = (level_flight(&place, "level.csv"), place.path("kept"));
     let set = flights(&place, &vehicle, &[("level", &log)]);
-    let words = ["validate", &vehicle, &set, "--keep", &kept];
-    place.call(&words).with_code(0);
-    place.call(&words).with_code(0);
+    let args = ["validate", &vehicle, &set, "--keep", &kept];
+    place.call(&args).with_code(0);
+    place.call(&args).with_code(0);
     assert_eq!(names(&place.path("kept/level")), ["flight.csv", "flight.mcap", "manifest.toml"]);
     let folder = File::open(place.path("kept/level")).unwrap();
     flock(&folder, FlockOperation::LockExclusive).unwrap();
-    place.call(&words).with_code(2).says(&["another hummingbus writes to it now"]);
+    place.call(&args).with_code(2).says(&["another hummingbus writes to it now"]);
     // Not by closing it: a process that another test starts at this moment may have it open too.
     flock(&folder, FlockOperation::Unlock).unwrap();
     // A flight that was kept is read again: it is not to be replaced by what comes of it.

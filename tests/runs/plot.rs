@@ -18,10 +18,10 @@ fn described(ended: Ended) -> Value {
     ended.with_code(0).json()
 }
 
-/// Requires that a command was refused with these words.
+/// Requires that a command was refused with this message.
 #[track_caller]
-fn refused(ended: Ended, words: &str) {
-    ended.with_code(2).says(&[words]);
+fn refused(ended: Ended, message: &str) {
+    ended.with_code(2).says(&[message]);
 }
 
 /// What a page draws, as it holds it.
@@ -89,8 +89,8 @@ fn one_vehicle_of_several_is_chosen() {
         (1, &json!("h2"))
     );
     assert_eq!(shown["trails"].as_array().unwrap().len(), 2);
-    let words = "the recording has no vehicle `h3`; it has h1, h2";
-    refused(place.call(&["plot", &recording, "--vehicle", "h3"]), words);
+    let message = "the recording has no vehicle `h3`; it has h1, h2";
+    refused(place.call(&["plot", &recording, "--vehicle", "h3"]), message);
 }
 
 #[test]
@@ -125,10 +125,10 @@ fn a_span_of_time_is_chosen_its_ends_included() {
     assert_eq!(shown["span_s"], json!([10.0, 10.5]));
     let curve = &shown["panels"][0]["axes"][0]["curves"][0];
     assert_eq!((&curve["samples"], &curve["points"]), (&json!(51), &json!(51)));
-    let words = "there is nothing to plot from 60 s: the recording spans 0.000 s to 59.990 s";
-    refused(place.call(&["plot", &recording, "--from", "60"]), words);
-    let words = "--from 5 --to 5: the end must be after the start";
-    refused(place.call(&["plot", &recording, "--from", "5", "--to", "5"]), words);
+    let message = "there is nothing to plot from 60 s: the recording spans 0.000 s to 59.990 s";
+    refused(place.call(&["plot", &recording, "--from", "60"]), message);
+    let message = "--from 5 --to 5: the end must be after the start";
+    refused(place.call(&["plot", &recording, "--from", "5", "--to", "5"]), message);
 }
 
 #[test]
@@ -141,14 +141,14 @@ fn chosen_fields_share_axes_where_they_share_a_unit() {
         "--plot",
         "/plant/state:rotor_speed[0],rotor_speed[3]",
     ];
-    let words = [&["plot", &recording, "--json"][..], &plots].concat();
-    let shown = described(place.call(&words));
+    let args = [&["plot", &recording, "--json"][..], &plots].concat();
+    let shown = described(place.call(&args));
     let axes = shown["panels"][0]["axes"].as_array().unwrap();
     assert_eq!(curves(&axes[0]), [["z", "position.z", "flown"], ["z set point", "altitude", "asked"]]);
     assert_eq!((&axes[0]["label"], &axes[0]["unit"]), (&json!("position.z, altitude"), &json!("m")));
     assert_eq!(curves(&axes[1]).len(), 2);
-    let words = "/plant/state:position.z in m, /plant/state:attitude.roll in deg";
-    refused(place.call(&["plot", &recording, "--plot", "/plant/state:position.z,attitude.roll"]), words);
+    let message = "/plant/state:position.z in m, /plant/state:attitude.roll in deg";
+    refused(place.call(&["plot", &recording, "--plot", "/plant/state:position.z,attitude.roll"]), message);
 }
 
 #[test]
@@ -171,8 +171,8 @@ fn what_is_not_there_is_refused_with_what_is() {
         (&["--svg", &recording], "laps.mcap is the recording itself: name another file"),
         (&["--png", &place.path("tmp")], "cannot create"),
     ];
-    for (words, reason) in cases {
-        refused(place.call(&[&["plot", &recording][..], words].concat()), reason);
+    for (args, reason) in cases {
+        refused(place.call(&[&["plot", &recording][..], args].concat()), reason);
     }
     assert!(!Path::new(&place.path("laps.html")).exists(), "a refused plot wrote its page");
 }
@@ -181,8 +181,8 @@ fn what_is_not_there_is_refused_with_what_is() {
 fn a_recording_without_a_vehicle_is_plotted_by_its_fields_only() {
     let place = Place::new();
     let recording = laps(&place, &[]);
-    let words = "name fields with --plot TOPIC:FIELD; the topics are none";
-    refused(place.call(&["plot", &recording]), words);
+    let message = "name fields with --plot TOPIC:FIELD; the topics are none";
+    refused(place.call(&["plot", &recording]), message);
 }
 
 #[test]
@@ -202,8 +202,8 @@ fn pictures_have_their_size_their_letters_and_their_dashes_and_are_the_same_twic
         "--title",
         "Laps & walls",
     ];
-    let words = [&["plot", &recording, "--png", &a, "--out", &b, "--svg", &svg][..], &views].concat();
-    place.call(&words).with_code(0);
+    let args = [&["plot", &recording, "--png", &a, "--out", &b, "--svg", &svg][..], &views].concat();
+    place.call(&args).with_code(0);
     let (a, b) = (fs::read(a).unwrap(), fs::read(b).unwrap());
     assert!(a.starts_with(b"\x89PNG\r\n\x1a\n") && a.len() > 100_000);
     assert!(a == b, "two pictures of one recording differ");
@@ -211,7 +211,7 @@ fn pictures_have_their_size_their_letters_and_their_dashes_and_are_the_same_twic
     assert_eq!(u32::from_be_bytes(a[16..20].try_into().unwrap()), 1500);
     let svg = fs::read_to_string(svg).unwrap();
     assert!(svg.starts_with("<svg width=\"1000\" height=\"") && svg.trim_end().ends_with("</svg>"));
-    for words in [
+    for text in [
         "Laps &amp; walls",
         "Attitude",
         "angle [deg]",
@@ -220,7 +220,7 @@ fn pictures_have_their_size_their_letters_and_their_dashes_and_are_the_same_twic
         "Path from above",
         "x [m]",
     ] {
-        assert!(svg.contains(words), "{words} is missing");
+        assert!(svg.contains(text), "{text} is missing");
     }
     // Three angles of one lap that was asked for are one dash after the other; each is a line of its own.
     assert!(svg.matches("<polyline").count() > 200);

@@ -36,7 +36,7 @@ fn every_shipped_manifest_flies_the_same_on_an_older_processor() {
     let flights = flights.map(|name| repository(&format!("manifests/identify/{name}.toml")));
     let differ = |path: String| {
         let place = Place::new();
-        difference(&place, &words(&place, &path))
+        difference(&place, &args(&place, &path))
     };
     let wrong: Vec<String> = shipped().into_iter().chain(flights).filter_map(differ).collect();
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
@@ -51,9 +51,9 @@ fn every_effect_is_the_same_on_an_older_processor() {
     let text = format!("base = {base:?}\nname = \"every effect\"\n\n{effects}");
     let vehicle = format!("process.plant.vehicle={}", place.write("every-effect.toml", text));
     for manifest in ["manifests/hover.toml", "manifests/hover-rapier.toml"] {
-        let mut words = words(&place, &repository(manifest));
-        words.extend(["--set".to_owned(), vehicle.clone()]);
-        assert_eq!(difference(&place, &words), None);
+        let mut args = args(&place, &repository(manifest));
+        args.extend(["--set".to_owned(), vehicle.clone()]);
+        assert_eq!(difference(&place, &args), None);
     }
 }
 
@@ -69,28 +69,28 @@ fn effect_table(kind: &EffectKind) -> String {
 }
 
 /// The words that fly the manifest at `path` for [`TICKS`], or to its end where that is earlier.
-fn words(place: &Place, path: &str) -> Vec<String> {
+fn args(place: &Place, path: &str) -> Vec<String> {
     let settings = settings(place, path).into_iter().flat_map(|setting| ["--set".to_owned(), setting]);
-    let mut words: Vec<String> = ["run".to_owned(), path.to_owned()].into_iter().chain(settings).collect();
+    let mut args: Vec<String> = ["run".to_owned(), path.to_owned()].into_iter().chain(settings).collect();
     let check: Vec<&str> =
-        ["check", "--json"].into_iter().chain(words[1..].iter().map(String::as_str)).collect();
+        ["check", "--json"].into_iter().chain(args[1..].iter().map(String::as_str)).collect();
     let graph = place.call(&check).with_code(0).json();
     let of_its_own = OTHERS.iter().find(|(name, _)| path.ends_with(&format!("/{name}.toml")));
     let most = of_its_own.map_or(TICKS, |(_, ticks)| *ticks);
     if graph["duration_ticks"].as_u64().unwrap() > most.into() {
-        words.extend(["--set".into(), format!("run.duration_s={}", f64::from(most) / 1000.0)]);
+        args.extend(["--set".into(), format!("run.duration_s={}", f64::from(most) / 1000.0)]);
     }
-    words
+    args
 }
 
-/// Flies `words` both ways, side by side: where the recordings differ, and which nodes call functions of the C library.
-fn difference(place: &Place, words: &[String]) -> Option<String> {
+/// Flies `args` both ways, side by side: where the recordings differ, and which nodes call functions of the C library.
+fn difference(place: &Place, args: &[String]) -> Option<String> {
     let [here, older, calls] = ["here.mcap", "older.mcap", "calls"].map(|name| place.path(name));
     let witness = witness(place);
     let watched = [OLDER, ("LD_PRELOAD", &witness), (CALLS, &calls)];
     let start = |recording: &str, variables: &[(&str, &str)]| {
-        let words = words.iter().map(String::as_str).chain(["--record", recording]);
-        place.start_with(&words.collect::<Vec<_>>(), variables)
+        let args = args.iter().map(String::as_str).chain(["--record", recording]);
+        place.start_with(&args.collect::<Vec<_>>(), variables)
     };
     for launch in [start(&here, &[]), start(&older, &watched)] {
         launch.end_among_others().flown();
@@ -103,7 +103,7 @@ fn difference(place: &Place, words: &[String]) -> Option<String> {
     (!is_same || !called.is_empty()).then(|| {
         let differ = first_difference(&open(&here), &open(&older)).unwrap();
         let differ = differ.map_or("no message differs".to_owned(), |differ| differ.to_string());
-        format!("{words:?}: {differ}; functions of the C library, and who calls them: {called:?}")
+        format!("{args:?}: {differ}; functions of the C library, and who calls them: {called:?}")
     })
 }
 

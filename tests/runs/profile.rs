@@ -15,8 +15,8 @@ const COLUMNS: usize = 100;
 /// Profiles hover.toml; the recording is `hover.mcap`.
 fn hover(place: &Place, more: &[&str]) -> Ended {
     let (manifest, recording) = (repository("manifests/hover.toml"), place.path("hover.mcap"));
-    let words = ["profile", &manifest, "--record", &recording, "--set", DURATION];
-    place.call(&[&words, more].concat()).flown()
+    let args = ["profile", &manifest, "--record", &recording, "--set", DURATION];
+    place.call(&[&args, more].concat()).flown()
 }
 
 /// The entry of `list` whose `key` is `value`.
@@ -35,8 +35,8 @@ fn period_ticks(node: &str) -> u32 {
 fn a_profiled_run_records_the_same_file() {
     let (plain, profiled) = (Place::new(), Place::new());
     let recording = plain.path("hover.mcap");
-    let words = ["run", &repository("manifests/hover.toml"), "--record", &recording, "--set", DURATION];
-    plain.call(&words).flown();
+    let args = ["run", &repository("manifests/hover.toml"), "--record", &recording, "--set", DURATION];
+    plain.call(&args).flown();
     let (trace, page) = (profiled.path("trace.json"), profiled.path("page.html"));
     let summary = hover(&profiled, &["--trace", &trace, "--html", &page, "--json"]).json();
     assert_eq!(summary["profile"]["files"], serde_json::json!({ "trace": trace, "html": page }));
@@ -141,11 +141,11 @@ fn the_tables_fit_a_terminal_and_follow_the_summary() {
 fn the_exit_code_is_that_of_a_run() {
     let place = Place::new();
     let hover = repository("manifests/hover.toml");
-    let words = ["profile", &hover, "--record", &place.path("a.mcap")];
-    place.call(&words).with_code(0).prints(&["\npassed\n"]);
-    place.call(&[&words[..], &["--set", DURATION]].concat()).with_code(1).prints(&["\nFAILED\n"]);
+    let args = ["profile", &hover, "--record", &place.path("a.mcap")];
+    place.call(&args).with_code(0).prints(&["\npassed\n"]);
+    place.call(&[&args[..], &["--set", DURATION]].concat()).with_code(1).prints(&["\nFAILED\n"]);
     let nowhere = place.path("nowhere/page.html");
-    let ended = place.call(&[&words[..], &["--html", &nowhere]].concat()).with_code(2);
+    let ended = place.call(&[&args[..], &["--html", &nowhere]].concat()).with_code(2);
     ended.says(&["cannot create", &nowhere]);
 }
 
@@ -153,9 +153,9 @@ fn the_exit_code_is_that_of_a_run() {
 fn a_run_that_is_stopped_is_profiled_up_to_there() {
     let place = Place::new();
     let hover = repository("manifests/hover.toml");
-    let words = ["profile", &hover, "--record", &place.path("a.mcap"), "--json"];
+    let args = ["profile", &hover, "--record", &place.path("a.mcap"), "--json"];
     let mut launch =
-        place.start(&[&words[..], &["--pace", "realtime", "--set", "run.duration_s=60"]].concat());
+        place.start(&[&args[..], &["--pace", "realtime", "--set", "run.duration_s=60"]].concat());
     launch.await_ticks(50);
     launch.signal(Signal::INT);
     let summary = launch.end().with_code(1).json();
@@ -179,8 +179,8 @@ fn a_run_whose_manifest_asks_for_a_profile_writes_page_and_trace_beside_its_reco
     assert!(!slices(&trace, "plant").is_empty());
     assert!(topics(&recording) == topics(&plain), "the messages differ");
     // As a flag it is not even in the manifest that is attached.
-    let words = ["run", &hover, "--record", &recording, "--set", DURATION, "--set", "run.profile=true"];
-    place.call(&words).flown();
+    let args = ["run", &hover, "--record", &recording, "--set", DURATION, "--set", "run.profile=true"];
+    place.call(&args).flown();
     require_same(&std::fs::read(plain).unwrap(), &recording);
 }
 

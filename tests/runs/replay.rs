@@ -29,8 +29,8 @@ pub fn data() -> Option<String> {
 /// Replays the flight; returns the summary and the recording.
 fn replay(place: &Place, data: &str) -> (Value, String) {
     let (manifest, recording) = (repository(MANIFEST), place.path("replay.mcap"));
-    let words = ["run", &manifest, "--record", &recording, "--json"];
-    let summary = place.start_with(&words, &[("HUMMINGBUS_DATA", data)]).end().with_code(0).json();
+    let args = ["run", &manifest, "--record", &recording, "--json"];
+    let summary = place.start_with(&args, &[("HUMMINGBUS_DATA", data)]).end().with_code(0).json();
     (summary, recording)
 }
 
@@ -130,8 +130,8 @@ fn a_flight_that_ends_before_the_run_is_refused() {
     let place = Place::new();
     let (manifest, recording) = (repository(MANIFEST), place.path("a.mcap"));
     let data = format!("process.player.data={}", place.write("flight.csv", flight()));
-    let words = ["run", &manifest, "--record", &recording, "--set", &data];
-    let ended = place.call(&[&words[..], &["--set", "process.player.parameters.from_s=0.5"]].concat());
+    let args = ["run", &manifest, "--record", &recording, "--set", &data];
+    let ended = place.call(&[&args[..], &["--set", "process.player.parameters.from_s=0.5"]].concat());
     let ended = ended.with_code(2);
     // Before it starts, not at the tick at which it would have to stop.
     ended.says(&["process `player`", "ends 0.500 s after `from_s`", "last tick lies at 16.000 s"]);

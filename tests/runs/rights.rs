@@ -5,7 +5,7 @@ use std::process::Command;
 
 /// A launch of `hummingbus` without the right to lock memory and to have a priority. `None` where this system
 /// does not let go of rights: then nothing is shown, and the test says so.
-fn without_rights(place: &Place, words: &[&str]) -> Option<Ended> {
+fn without_rights(place: &Place, args: &[&str]) -> Option<Ended> {
     let command = |program: &str| {
         let limits = ["--memlock=65536:65536", "--rtprio=0:0"];
         // To a superuser limits are nothing: the capabilities have to go.
@@ -24,7 +24,7 @@ fn without_rights(place: &Place, words: &[&str]) -> Option<Ended> {
         return None;
     }
     let mut command = command(HUMMINGBUS);
-    command.args(words);
+    command.args(args);
     Some(place.launch(command).end())
 }
 

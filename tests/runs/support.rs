@@ -59,15 +59,15 @@ impl Place {
         self.folder.path().join("tmp")
     }
 
-    /// Starts `hummingbus` with `words`.
-    pub fn start(&self, words: &[&str]) -> Launch<'_> {
-        self.start_with(words, &[])
+    /// Starts `hummingbus` with `args`.
+    pub fn start(&self, args: &[&str]) -> Launch<'_> {
+        self.start_with(args, &[])
     }
 
-    /// Starts `hummingbus` with `words` and more environment variables.
-    pub fn start_with(&self, words: &[&str], variables: &[(&str, &str)]) -> Launch<'_> {
+    /// Starts `hummingbus` with `args` and more environment variables.
+    pub fn start_with(&self, args: &[&str], variables: &[(&str, &str)]) -> Launch<'_> {
         let mut command = Command::new(HUMMINGBUS);
-        command.args(words).envs(variables.iter().copied());
+        command.args(args).envs(variables.iter().copied());
         self.launch(command)
     }
 
@@ -83,8 +83,8 @@ impl Place {
             .spawn()
             .unwrap();
         self.launchers.borrow_mut().push(child.id());
-        let words: Vec<_> = command.get_args().map(|word| word.to_string_lossy()).collect();
-        Launch { place: self, child, words: words.join(" "), output, error, status: None }
+        let args: Vec<_> = command.get_args().map(|word| word.to_string_lossy()).collect();
+        Launch { place: self, child, args: args.join(" "), output, error, status: None }
     }
 
     /// Gives `command` the environment of this test, by which its processes are known.
@@ -92,9 +92,9 @@ impl Place {
         command.env("TMPDIR", self.temporary()).env("RUST_BACKTRACE", "0").env_remove("HUMMINGBUS_DATA")
     }
 
-    /// Runs `hummingbus` with `words` to its end; it must leave nothing behind.
-    pub fn call(&self, words: &[&str]) -> Ended {
-        self.start(words).end()
+    /// Runs `hummingbus` with `args` to its end; it must leave nothing behind.
+    pub fn call(&self, args: &[&str]) -> Ended {
+        self.start(args).end()
     }
 
     /// The processes launched from this folder that live: their ids, with the names of their nodes.
@@ -123,8 +123,8 @@ impl Place {
     /// The process of the clock service, once it has come up.
     pub fn clock(&self) -> Pid {
         let is_clock = |pid: &Pid| {
-            let words = fs::read(format!("/proc/{}/cmdline", pid.as_raw_nonzero())).unwrap_or_default();
-            words.ends_with(b"\0node\0clock\0")
+            let args = fs::read(format!("/proc/{}/cmdline", pid.as_raw_nonzero())).unwrap_or_default();
+            args.ends_with(b"\0node\0clock\0")
         };
         poll("no clock service", || self.processes().into_iter().map(|(pid, _)| pid).find(is_clock))
     }
@@ -208,7 +208,7 @@ pub fn poll<T>(what: &str, mut look: impl FnMut() -> Option<T>) -> T {
 pub struct Launch<'a> {
     place: &'a Place,
     child: Child,
-    words: String,
+    args: String,
     output: tempfile::TempPath,
     error: tempfile::TempPath,
     status: Option<ExitStatus>,
@@ -326,13 +326,13 @@ impl Launch<'_> {
             code: status.code(),
             output: fs::read_to_string(&self.output).unwrap(),
             error: fs::read_to_string(&self.error).unwrap(),
-            words: self.words.clone(),
+            args: self.args.clone(),
         }
     }
 
     fn said(&self) -> String {
         let read = |path: &Path| fs::read_to_string(path).unwrap_or_default();
-        format!("hummingbus {}\n{}{}", self.words, read(&self.output), read(&self.error))
+        format!("hummingbus {}\n{}{}", self.args, read(&self.output), read(&self.error))
     }
 }
 
@@ -351,7 +351,7 @@ pub struct Ended {
     pub code: Option<i32>,
     pub output: String,
     pub error: String,
-    words: String,
+    args: String,
 }
 
 impl Ended {
@@ -396,7 +396,7 @@ impl Ended {
 
 impl std::fmt::Display for Ended {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        write!(f, "hummingbus {}\nexit code {:?}\n{}{}", self.words, self.code, self.output, self.error)
+        write!(f, "hummingbus {}\nexit code {:?}\n{}{}", self.args, self.code, self.output, self.error)
     }
 }
 

@@ -72,9 +72,9 @@ fn two_runs_with_the_same_swap_are_the_same_file() {
     let manifest = hover_with(&place, "swap.toml", &format!("{SWAP}{GAINS}"));
     let [a, b] = ["a.mcap", "b.mcap"].map(|name| place.path(name));
     fly(&place, &manifest, &a).flown();
-    let words =
+    let args =
         ["run", &manifest, "--record", &b, "--json", "--window", "3", "--set", "run.start_order_seed=5"];
-    place.call(&words).flown();
+    place.call(&args).flown();
     assert!(fs::read(a).unwrap() == fs::read(b).unwrap(), "the files differ");
 }
 
@@ -127,8 +127,8 @@ fn a_controller_can_be_tried_as_a_shadow_without_a_change_of_the_manifest() {
     let manifest = hover_with(&place, "plain.toml", "");
     let with = GAINS.trim_start_matches("with.");
     let recording = place.path("shadow.mcap");
-    let words = ["shadow", &manifest, "--process", "controller", "--with", with, "--record", &recording];
-    let ended = place.call(&words);
+    let args = ["shadow", &manifest, "--process", "controller", "--with", with, "--record", &recording];
+    let ended = place.call(&args);
     assert!(ended.is_quiet(), "{ended}");
     ended.prints(&["/controller/command command[0]", "1500 samples"]);
     place.call(&["shadow", &manifest, "--process", "recorder"]).with_code(2).says(&["recorder"]);
@@ -141,8 +141,8 @@ fn a_process_of_a_live_run_is_swapped() {
     let mut launch = place.start(&["run", &manifest, "--record", &recording, "--json"]);
     launch.hold_at(300);
     let run = place.run_id();
-    let words = ["swap", "controller", "--with", "kind = \"pid\"", "--shadow-ticks", "20", "--run", &run];
-    let swap = place.start(&words);
+    let args = ["swap", "controller", "--with", "kind = \"pid\"", "--shadow-ticks", "20", "--run", &run];
+    let swap = place.start(&args);
     // The run is held: the backup joins at the tick at which it stands.
     launch.await_slot("controller", 1);
     let refused = place.start(&["swap", "recorder", "--run", &run]).end_among_others().with_code(2);
@@ -172,9 +172,9 @@ fn a_live_swap_that_cannot_be_is_refused_and_the_run_flies_on() {
         ),
         (&["--shadow-ticks", "4294967295"], "4294967295 ticks"),
     ];
-    for (words, reason) in cases {
-        let words = [&["swap", "controller", "--run", &run], words].concat();
-        place.start(&words).end_among_others().with_code(2).says(&[reason]);
+    for (args, reason) in cases {
+        let args = [&["swap", "controller", "--run", &run], args].concat();
+        place.start(&args).end_among_others().with_code(2).says(&[reason]);
     }
     launch.release();
     let ended = launch.end().with_code(1);

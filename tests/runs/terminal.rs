@@ -21,8 +21,8 @@ pub struct Terminal {
 }
 
 impl Terminal {
-    /// Starts `hummingbus` with `words` in a new terminal.
-    pub fn start(place: &Place, words: &[&str]) -> Self {
+    /// Starts `hummingbus` with `args` in a new terminal.
+    pub fn start(place: &Place, args: &[&str]) -> Self {
         let keyboard = openpt(OpenptFlags::RDWR | OpenptFlags::NOCTTY | OpenptFlags::CLOEXEC).unwrap();
         grantpt(&keyboard).unwrap();
         unlockpt(&keyboard).unwrap();
@@ -31,7 +31,7 @@ impl Terminal {
         let path = ptsname(&keyboard, Vec::new()).unwrap().into_string().unwrap();
         let inside = File::options().read(true).write(true).open(path).unwrap();
         let mut command = Command::new(env!("CARGO_BIN_EXE_hummingbus"));
-        place.mark(&mut command).args(words).env("TERM", "xterm-256color");
+        place.mark(&mut command).args(args).env("TERM", "xterm-256color");
         let share = || Stdio::from(OwnedFd::from(inside.try_clone().unwrap()));
         let child = command.stdin(share()).stdout(share()).stderr(share()).spawn().unwrap();
         let screen = Arc::new(Mutex::new(vt100::Parser::new(ROWS, COLUMNS, 0)));

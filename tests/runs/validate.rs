@@ -30,8 +30,8 @@ fn flown(place: &Place, manifest: &str, settings: &[&str], channels: &str) -> St
         "process.imu.parameters.gyroscope_bias_walk_rad_s2_sqrt_hz=0.0",
     ];
     let settings = still.iter().chain(settings).flat_map(|setting| ["--set", setting]);
-    let words = ["run", &path, "--json", "--record", &recording].into_iter().chain(settings);
-    place.call(&words.collect::<Vec<_>>()).flown();
+    let args = ["run", &path, "--json", "--record", &recording].into_iter().chain(settings);
+    place.call(&args.collect::<Vec<_>>()).flown();
     let vehicle = repository("vehicles/hummingbird.toml");
     let command = "command = { topic = \"/controller/command\" }\n";
     place.write(

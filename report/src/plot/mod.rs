@@ -62,6 +62,33 @@ pub enum Format {
 impl Drawing {
     /// Reads from `recording` what `request` asks for; `read` hears how many messages are read, now and then.
     ///
+    /// ```
+    /// use report::plot::{Drawing, Format, Request};
+    /// # use bus::{Message, announcement::Announcement, messages::PlantState};
+    /// # let folder = tempfile::tempdir()?;
+    /// # let path = folder.path().join("fall.mcap");
+    /// # let mut writer = recorder::writer::RecordingWriter::create(&path)?;
+    /// # let channel = writer.add_channel("/plant/state", &Announcement::of(PlantState::SCHEMA))?;
+    /// # for tick in 0..100_u32 {
+    /// #     let mut state = PlantState::default();
+    /// #     state.position.z = 10.0 - 5.0 * (f64::from(tick) * 0.01).powi(2);
+    /// #     let cdr = [&[0, 1, 0, 0], bytemuck::bytes_of(&state)].concat();
+    /// #     writer.write(channel, tick, u64::from(tick) * 10_000_000, &cdr)?;
+    /// #     writer.end_tick()?;
+    /// # }
+    /// # writer.finish()?;
+    /// let recording = recorder::reader::Recording::open(&path)?;
+    /// let plots = vec!["/plant/state:position.z".to_owned()];
+    /// let request = Request { plots, title: Some("A fall".to_owned()), ..Request::default() };
+    ///
+    /// let drawing = Drawing::of(&recording, &request, &mut |_messages_read| ())?;
+    ///
+    /// let axes = &drawing.json()["panels"][0]["axes"][0];
+    /// assert_eq!((&axes["unit"], &axes["curves"][0]["samples"]), (&"m".into(), &100.into()));
+    /// assert!(drawing.file(Format::Svg)?.starts_with(b"<svg"));
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    ///
     /// # Errors
     /// If something that was asked for is not in the recording.
     pub fn of(recording: &Recording, request: &Request, read: &mut dyn FnMut(u64)) -> Result<Self> {

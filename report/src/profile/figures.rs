@@ -7,7 +7,18 @@ use super::path::CriticalPath;
 use runtime::flight::Flight;
 use serde::Serialize;
 
-/// Where the host time of a run went.
+/// Where the host time of a run went; its text is a table for each part.
+///
+/// ```
+/// use report::profile::Profile;
+/// use runtime::launcher::Outcome;
+///
+/// /// What there is to say about a run that was profiled.
+/// fn text(outcome: &Outcome) -> Option<String> {
+///     let flight = outcome.flight.as_ref()?;
+///     Some(Profile::of(flight, outcome.missed_deadlines).to_string())
+/// }
+/// ```
 #[derive(Debug, Serialize)]
 pub struct Profile {
     /// Ticks of the run.

@@ -37,11 +37,11 @@ function drawTimeline(slow) {
   const described = ([, part, tick, , , whole, cause]) =>
     `tick ${tick}, ${data.parts[part]}: ${microseconds(whole)} µs` + (cause ? `<br>for ${cause}` : "");
   const bars = data.parts.map((part, index) => {
-    const own = slow.bars.filter((bar) => bar[1] === index);
+    const shown = slow.bars.filter((bar) => bar[1] === index);
     return {
       type: "bar", orientation: "h", name: part, marker: { color: COLOURS[part] },
-      y: own.map(([node]) => nodes[node]), base: own.map((bar) => bar[3]), x: own.map((bar) => bar[4]),
-      customdata: own.map(described), hovertemplate: "%{y}<br>%{customdata}<extra></extra>",
+      y: shown.map(([node]) => nodes[node]), base: shown.map((bar) => bar[3]), x: shown.map((bar) => bar[4]),
+      customdata: shown.map(described), hovertemplate: "%{y}<br>%{customdata}<extra></extra>",
     };
   });
   // A hop belongs to the node that is reached by it.

@@ -6,7 +6,19 @@ use flights::state::StateQuantity;
 use serde_json::{Map, Value, json};
 use std::fmt;
 
-/// The errors of one or two vehicles on all flights.
+/// The errors of one or two vehicles on all flights; its text is a table.
+///
+/// ```
+/// use flights::{Role, state::StateQuantity};
+/// use report::validate::{ChannelErrors, Errors, FlightErrors, HorizonErrors};
+/// let channels = vec![ChannelErrors { quantity: StateQuantity::Position, rms: vec![0.5, 0.25] }];
+/// assert_eq!(channels[0].ratio(), Some(0.5));
+/// let horizons = vec![HorizonErrors { horizon_ms: 500, windows: 7, left_out: 0, channels }];
+/// let flights = vec![FlightErrors { name: "loop".to_owned(), role: Role::Test, horizons }];
+/// let errors = Errors { vehicles: vec!["old".to_owned(), "new".to_owned()], flights };
+/// assert_eq!(errors.json()["flights"]["loop"]["horizons"]["0.5"]["position"]["new"], 0.25);
+/// assert!(errors.to_string().starts_with("flight  role  horizon"));
+/// ```
 #[derive(Debug)]
 pub struct Errors {
     /// What the vehicles are called.
