@@ -117,7 +117,8 @@ pub struct Wall {
 /// use bus::messages::{AttitudeEstimate, Imu, Ranges};
 /// use sensors::range_inertial::{RangeInertialInputs, filter::RangeInertial, params::RangeInertialParams};
 ///
-/// let mut filter = Harness::<RangeInertial>::new(RangeInertialParams::default()).unwrap();
+/// let parameters = RangeInertialParams { initial_height_m: 1.0, ..RangeInertialParams::default() };
+/// let mut filter = Harness::<RangeInertial>::new(parameters).unwrap();
 /// let imu = Imu { specific_force: [0.0, 0.0, 9.81].into(), ..Default::default() };
 /// let attitude = AttitudeEstimate::default();
 /// let ranges = Ranges { distance: [2.0, 3.0, 2.0, 3.0, 1.0], valid: [1; 5], ..Default::default() };
