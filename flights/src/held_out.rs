@@ -18,7 +18,7 @@ pub struct Clash {
     pub fit: usize,
     /// That of the flight with role `test`.
     pub test: usize,
-    /// What they have in common, in words.
+    /// What they have in common, as text.
     pub reason: String,
 }
 
@@ -60,7 +60,7 @@ fn same_part([(fit, fit_part), (test, test_part)]: [(&Flight, &Part); 2], how: &
     })
 }
 
-/// Whether two paths lead to one file, or to files with the same bytes; how, in words.
+/// Whether two paths lead to one file, or to files with the same bytes; how, as text.
 #[must_use]
 pub fn same_file(a: &Path, b: &Path) -> Option<&'static str> {
     let (of_a, of_b) = (std::fs::metadata(a).ok(), std::fs::metadata(b).ok());

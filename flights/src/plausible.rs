@@ -39,7 +39,7 @@ const AGAINST: f64 = 0.3;
 const CLEARLY: f64 = 0.3;
 /// And two that are nearer than this cannot be told apart.
 const ALIKE: f64 = 0.1;
-/// What would make it good, in words and in numbers.
+/// What would make it good, as text and in numbers.
 type Mistake<T> = (&'static str, fn(T) -> T);
 /// What is mistaken about the Euler angles roll and pitch.
 const ANGLE_MISTAKES: [Mistake<(f64, f64)>; 5] = [
@@ -70,7 +70,7 @@ pub struct Finding {
     pub fits: Option<String>,
     /// Whether the mismatch is clear; otherwise it is only worth a note.
     pub clear: bool,
-    /// All this in words, with numbers.
+    /// All this as text, with numbers.
     pub message: String,
 }
 
@@ -282,31 +282,34 @@ impl Judge<'_> {
         let agreement = |attitude: &Channel<4>, position: &Channel<3>| {
             let pairs = Pairs::leaning(attitude, position, self.vehicle.gravity_m_s2, LEANING_WINDOW_S);
             let agreement = pairs.agreement(QUIET_ACCELERATION_M_S2);
-            agreement.filter(|_| self.flight.assumed.is_empty()).map(|own| own.correlation)
+            agreement.filter(|_| self.flight.assumed.is_empty()).map(|agreement| agreement.correlation)
         };
         let declared = agreement(attitude, position).filter(|correlation| *correlation < SAME)?;
         let is_euler = self.channels.get(&Quantity::Attitude)?.get_ref().euler.is_some();
         let of_angles = ANGLE_MISTAKES.iter().filter(|_| is_euler);
         let of_angles =
-            of_angles.map(|(words, change)| (*words, agreement(&with_angles(attitude, *change), position)));
-        let of_position = POSITION_MISTAKES.iter().map(|(words, change)| {
-            let values = position.values.iter().map(|own| change(*own)).collect();
+            of_angles.map(|(advice, change)| (*advice, agreement(&with_angles(attitude, *change), position)));
+        let of_position = POSITION_MISTAKES.iter().map(|(advice, change)| {
+            let values = position.values.iter().map(|position| change(*position)).collect();
             let changed = Channel { time_s: position.time_s.clone(), values };
-            (*words, agreement(attitude, &changed))
+            (*advice, agreement(attitude, &changed))
         });
-        let tried: Vec<(&str, f64)> =
-            of_angles.chain(of_position).filter_map(|(words, own)| Some((words, own?))).collect();
-        let best = tried.iter().map(|own| own.1).fold(-1.0, f64::max);
+        let tried: Vec<(&str, f64)> = of_angles
+            .chain(of_position)
+            .filter_map(|(advice, correlation)| Some((advice, correlation?)))
+            .collect();
+        let best = tried.iter().map(|(_, correlation)| *correlation).fold(-1.0, f64::max);
         // With little yaw a pose tells not which of its halves is turned round.
-        let alike = tried.iter().filter(|own| own.1 > SAME && own.1 > best - ALIKE);
-        let words = alike.map(|own| own.0).collect::<Vec<_>>().join(", or ");
+        let alike =
+            tried.iter().filter(|(_, correlation)| *correlation > SAME && *correlation > best - ALIKE);
+        let advice = alike.map(|(advice, _)| *advice).collect::<Vec<_>>().join(", or ");
         let what = format!(
             "the position's acceleration has a correlation of {declared:.2} with how the vehicle leans; at best {best:.2}, \
              with axes named otherwise"
         );
         let quantity = if is_euler { Quantity::Attitude } else { Quantity::Position };
         let is_clear = best > SAME && best > declared + CLEARLY;
-        let finding = finding(quantity, best.signum(), is_clear.then_some(words), &what);
+        let finding = finding(quantity, best.signum(), is_clear.then_some(advice), &what);
         (is_clear || declared < AGAINST).then_some(finding)
     }
 
@@ -316,7 +319,7 @@ impl Judge<'_> {
         entry.euler.as_ref()?;
         let of = |name: &str| ANGLE.factor(name);
         let declared = entry.unit.as_deref()?;
-        let (name, other) = ANGLE.units.iter().find(|own| own.0 != declared)?;
+        let (name, other) = ANGLE.units.iter().find(|unit| unit.0 != declared)?;
         let off = libm::log(other / of(declared)? / factor).abs();
         (off < libm::log(LEANING_TOLERANCE)).then(|| format!("`unit = \"{name}\"` of `attitude`"))
     }
@@ -405,7 +408,7 @@ impl Judge<'_> {
             return None;
         }
         let fits = self.unit_that_fits(quantity, factor, tolerance);
-        // The caller of `gravity` has its own words where no unit fits.
+        // The caller of `gravity` has another text where no unit fits.
         if fits.is_none() && quantity == Quantity::SpecificForce {
             return None;
         }

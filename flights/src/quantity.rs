@@ -9,6 +9,13 @@ use diagnostics::unit::{
 use serde::Deserialize;
 
 /// A quantity, under the name it has in a flights file.
+///
+/// ```
+/// use flights::Quantity;
+///
+/// let rates = Quantity::AngularVelocity;
+/// assert_eq!((rates.name(), rates.size(), rates.dimension().factor("rad/s")), ("angular_velocity", 3, Some(1.0)));
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Quantity {
@@ -53,43 +60,33 @@ impl Quantity {
     /// The name in a flights file.
     #[must_use]
     pub fn name(self) -> &'static str {
-        match self {
-            Self::Time => "time",
-            Self::Command => "command",
-            Self::RotorSpeed => "rotor_speed",
-            Self::Position => "position",
-            Self::Velocity => "velocity",
-            Self::Attitude => "attitude",
-            Self::AngularVelocity => "angular_velocity",
-            Self::SpecificForce => "specific_force",
-            Self::BatteryVoltage => "battery_voltage",
-        }
+        self.facts().0
     }
 
     /// How many numbers a sample has.
     #[must_use]
     pub fn size(self) -> usize {
-        match self {
-            Self::Time | Self::BatteryVoltage => 1,
-            Self::Position | Self::Velocity | Self::AngularVelocity | Self::SpecificForce => 3,
-            Self::Command | Self::RotorSpeed | Self::Attitude => 4,
-        }
+        self.facts().1
     }
 
     /// The dimension whose units it may be declared in. Of commands that are a share of the range, the factor is that
     /// to a fraction.
     #[must_use]
     pub fn dimension(self) -> Dimension {
+        self.facts().2
+    }
+
+    fn facts(self) -> (&'static str, usize, Dimension) {
         match self {
-            Self::Time => TIME,
-            Self::Command => COMMAND,
-            Self::RotorSpeed => ROTOR_SPEED,
-            Self::Position => LENGTH,
-            Self::Velocity => VELOCITY,
-            Self::Attitude => PURE_NUMBER,
-            Self::AngularVelocity => ANGULAR_VELOCITY,
-            Self::SpecificForce => ACCELERATION,
-            Self::BatteryVoltage => VOLTAGE,
+            Self::Time => ("time", 1, TIME),
+            Self::Command => ("command", 4, COMMAND),
+            Self::RotorSpeed => ("rotor_speed", 4, ROTOR_SPEED),
+            Self::Position => ("position", 3, LENGTH),
+            Self::Velocity => ("velocity", 3, VELOCITY),
+            Self::Attitude => ("attitude", 4, PURE_NUMBER),
+            Self::AngularVelocity => ("angular_velocity", 3, ANGULAR_VELOCITY),
+            Self::SpecificForce => ("specific_force", 3, ACCELERATION),
+            Self::BatteryVoltage => ("battery_voltage", 1, VOLTAGE),
         }
     }
 }

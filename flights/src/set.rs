@@ -17,6 +17,25 @@ use crate::quantity::Quantity;
 use crate::reading::{Part, Reading};
 
 /// The flights of a flights file, in its order.
+///
+/// ```
+/// use flights::FlightSet;
+/// use std::path::Path;
+///
+/// let text = r#"
+///     vehicle = "v.toml"
+///     channels.time = { columns = ["t"], unit = "ms" }
+///     channels.position = { columns = ["x", "y", "z"], unit = "m" }
+///     flight = [{ name = "up", file = "up.csv", role = "fit", trust_units = true }]
+/// "#;
+/// let read = |path: &Path| {
+///     let vehicle = include_bytes!("../../vehicles/hummingbird.toml").to_vec();
+///     Ok(if path.ends_with("v.toml") { vehicle } else { b"t,x,y,z\n500,0,0,1\n600,0,0,1.1\n".to_vec() })
+/// };
+/// let set = FlightSet::parse("flights.toml".as_ref(), text.to_owned(), &read)?;
+/// assert_eq!(set.flights[0].position.values[1], [0.0, 0.0, 1.1]);
+/// # Ok::<(), flights::FlightsError>(())
+/// ```
 #[derive(Debug, Clone)]
 pub struct FlightSet {
     /// The vehicle file.

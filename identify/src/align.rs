@@ -195,7 +195,7 @@ impl Clocks {
 /// is sure is taken off. Says what was found for each flight of `fit` and then of `test`.
 pub fn align(problem: &mut Problem) -> Vec<(String, Offsets)> {
     let weights = std::mem::replace(&mut problem.weights, kinematic_weights());
-    let flights: Vec<&Prepared> = problem.estimation.iter().chain(&problem.validation).collect();
+    let flights: Vec<&Prepared> = problem.flights().collect();
     let clocks: Vec<Clocks> = flights.par_iter().map(|flight| Clocks::of(problem, flight)).collect();
     problem.weights = weights;
     let of_fit: Vec<Found> =

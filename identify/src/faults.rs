@@ -19,7 +19,7 @@ pub struct Fault {
     pub channel: String,
     /// `stuck-sensor`, `scaled-sensor` or `rotor-off-command`.
     pub kind: &'static str,
-    /// The finding in words, with numbers.
+    /// The finding as text, with numbers.
     pub finding: String,
     /// What was done about it.
     pub consequence: &'static str,
@@ -87,7 +87,7 @@ fn suspicion(problem: &Problem, rotor: usize) -> Option<Suspicion> {
 fn speeds(problem: &Problem) -> Option<Vec<([f64; 4], [f64; 4])>> {
     let declared = problem.model.parameters.baseline();
     let mut pairs = Vec::new();
-    for flight in problem.estimation.iter().chain(&problem.validation) {
+    for flight in problem.flights() {
         let Some(offset) = flight.offset_of(Equation::RotorSpeed) else { continue };
         let rows = problem.model.tracks(flight, &declared).rows;
         let rotors = problem.model.rotors(flight, &declared);

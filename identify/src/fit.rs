@@ -82,7 +82,12 @@ impl FitResult {
     }
 }
 
-impl Problem<'_> {
+impl<'f> Problem<'f> {
+    /// All flights, those that are fitted on first.
+    pub fn flights(&self) -> impl Iterator<Item = &Prepared<'f>> {
+        self.estimation.iter().chain(&self.validation)
+    }
+
     /// Fits the parameters `free`, starting from `start`.
     pub fn fitted(&self, start: &[f64], free: &[usize]) -> FitResult {
         let mut values = start.to_vec();
@@ -328,7 +333,6 @@ impl Problem<'_> {
 
     /// The shortest delay that the grids can tell from none.
     pub fn least_delay_s(&self) -> f64 {
-        let flights = self.estimation.iter().chain(&self.validation);
-        0.5 * flights.map(|flight| flight.layout.clock.step_s).fold(0.0, f64::max)
+        0.5 * self.flights().map(|flight| flight.layout.clock.step_s).fold(0.0, f64::max)
     }
 }

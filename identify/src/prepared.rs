@@ -24,27 +24,30 @@ pub enum Equation {
 
 impl Equation {
     /// How many components it has.
+    #[must_use]
     pub fn size(self) -> usize {
         if self == Equation::RotorSpeed { 4 } else { 3 }
     }
 
     /// What reports call it.
+    #[must_use]
     pub fn name(self) -> &'static str {
-        match self {
-            Equation::SpecificForce => "specific_force",
-            Equation::Acceleration => "acceleration",
-            Equation::AngularAcceleration => "angular_acceleration",
-            Equation::Gyroscope => "gyroscope",
-            Equation::RotorSpeed => "rotor_speed",
-        }
+        self.name_and_unit().0
     }
 
     /// The unit of its residual.
+    #[must_use]
     pub fn unit(self) -> &'static str {
+        self.name_and_unit().1
+    }
+
+    fn name_and_unit(self) -> (&'static str, &'static str) {
         match self {
-            Equation::SpecificForce | Equation::Acceleration => "m/s^2",
-            Equation::AngularAcceleration => "rad/s^2",
-            Equation::Gyroscope | Equation::RotorSpeed => "rad/s",
+            Equation::SpecificForce => ("specific_force", "m/s^2"),
+            Equation::Acceleration => ("acceleration", "m/s^2"),
+            Equation::AngularAcceleration => ("angular_acceleration", "rad/s^2"),
+            Equation::Gyroscope => ("gyroscope", "rad/s"),
+            Equation::RotorSpeed => ("rotor_speed", "rad/s"),
         }
     }
 }
@@ -273,18 +276,14 @@ impl<'f> Prepared<'f> {
         self.late = late;
         let (flight, clock) = (self.flight, &self.layout.clock);
         let reach = self.reach();
-        let mut require = |is_valid: Vec<bool>| {
+        let moved = [
+            sampled_if_late(&flight.attitude, late.attitude_s, clock),
+            sampled_if_late(&flight.position, late.position_s, clock),
+            sampled_if_late(&flight.velocity, late.velocity_s, clock),
+        ];
+        for is_valid in moved.into_iter().flatten() {
             let about = valid_about(&is_valid, reach);
             self.layout.knots.retain(|knot| about[*knot]);
-        };
-        if late.attitude_s != 0.0 {
-            require(Track::sampled(&flight.attitude, late.attitude_s, clock).valid);
-        }
-        if late.position_s != 0.0 && !flight.position.is_empty() {
-            require(Track::sampled(&flight.position, late.position_s, clock).valid);
-        }
-        if late.velocity_s != 0.0 && !flight.velocity.is_empty() {
-            require(Track::sampled(&flight.velocity, late.velocity_s, clock).valid);
         }
     }
 
@@ -313,21 +312,14 @@ impl<'f> Prepared<'f> {
         let (flight, clock) = (self.flight, &self.layout.clock);
         let mut valid = vec![true; clock.count];
         let mut require = |other: Vec<bool>| valid.iter_mut().zip(other).for_each(|(all, one)| *all &= one);
-        if uses_pose(flight) && !flight.position.is_empty() {
-            require(sampled_about(&flight.position, clock, gap_margin_s));
-        }
-        if uses_pose(flight) && flight.position.is_empty() && !flight.velocity.is_empty() {
-            require(sampled_about(&flight.velocity, clock, gap_margin_s));
-        }
-        if !flight.attitude.is_empty() {
-            require(sampled_about(&flight.attitude, clock, gap_margin_s));
-        }
-        if !flight.angular_velocity.is_empty() {
-            require(sampled_about(&flight.angular_velocity, clock, gap_margin_s));
-        }
-        if !flight.specific_force.is_empty() {
-            require(sampled_about(&flight.specific_force, clock, gap_margin_s));
-        }
+        let about = [
+            sampled_about(&flight.position, uses_pose(flight), clock, gap_margin_s),
+            sampled_about(&flight.velocity, of_velocity(flight), clock, gap_margin_s),
+            sampled_about(&flight.attitude, true, clock, gap_margin_s),
+            sampled_about(&flight.angular_velocity, true, clock, gap_margin_s),
+            sampled_about(&flight.specific_force, true, clock, gap_margin_s),
+        ];
+        about.into_iter().flatten().for_each(&mut require);
         if !flight.rotor_speed.is_empty() {
             require(Track::sampled(&flight.rotor_speed, 0.0, clock).valid);
         }
@@ -343,8 +335,22 @@ impl<'f> Prepared<'f> {
     }
 }
 
-/// Whether a channel was sampled at each instant, and at `gap_margin_s` before and after it; not at its ends.
-fn sampled_about<const N: usize>(channel: &Channel<N>, clock: &Clock, gap_margin_s: f64) -> Vec<bool> {
+/// Whether a channel was sampled at each instant if it is `late_s` late; `None` where it is not, or was not logged.
+fn sampled_if_late<const N: usize>(channel: &Channel<N>, late_s: f64, clock: &Clock) -> Option<Vec<bool>> {
+    (late_s != 0.0 && !channel.is_empty()).then(|| Track::sampled(channel, late_s, clock).valid)
+}
+
+/// Whether a channel was sampled at each instant, and at `gap_margin_s` before and after it; not at its ends. `None` where
+/// it is not compared, or was not logged.
+fn sampled_about<const N: usize>(
+    channel: &Channel<N>,
+    is_compared: bool,
+    clock: &Clock,
+    gap_margin_s: f64,
+) -> Option<Vec<bool>> {
+    if !is_compared || channel.is_empty() {
+        return None;
+    }
     let mut valid = Track::sampled(channel, 0.0, clock).valid;
     for delay_s in [-gap_margin_s, gap_margin_s] {
         let trial = Track::sampled(channel, delay_s, clock).valid;
@@ -353,7 +359,7 @@ fn sampled_about<const N: usize>(channel: &Channel<N>, clock: &Clock, gap_margin
     let (first_s, last_s) = channel.span_s().unwrap_or_default();
     let inside = first_s + END_MARGIN_S..=last_s - END_MARGIN_S;
     valid.iter_mut().enumerate().for_each(|(index, own)| *own &= inside.contains(&clock.at(index)));
-    valid
+    Some(valid)
 }
 
 /// A channel whose samples hold until the next.

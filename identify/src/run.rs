@@ -115,7 +115,7 @@ pub fn identify(set: &FlightSet, progress: &mut dyn FnMut(&str)) -> Result<Outco
     let (mut problem, flight_reports) = problem(&vehicle, &declared, set)?;
     let offsets = align(&mut problem);
     let faults = faults::find(&mut problem);
-    let all: Vec<&Prepared> = problem.estimation.iter().chain(&problem.validation).collect();
+    let all: Vec<&Prepared> = problem.flights().collect();
     let (open, unidentifiable) = candidates(&problem.model.parameters, &all);
     progress("trims");
     let trims = trim::compare(&mut problem, &open);
@@ -150,15 +150,10 @@ pub fn identify(set: &FlightSet, progress: &mut dyn FnMut(&str)) -> Result<Outco
         test_blocks: selection.after.validation_costs.len(),
     };
     let effects = problem.model.parameters.effects_under(values);
-    let flown = problem.estimation.iter().chain(&problem.validation);
+    let name = |flight: &Prepared| flight.flight.name.clone();
+    let late = problem.flights().map(|flight| (name(flight), flight.late)).collect();
     let regressors =
-        flown.map(|own| (own.flight.name.clone(), regressors(&problem.model, own, values))).collect();
-    let late = problem
-        .estimation
-        .iter()
-        .chain(&problem.validation)
-        .map(|own| (own.flight.name.clone(), own.late))
-        .collect();
+        problem.flights().map(|flight| (name(flight), regressors(&problem.model, flight, values))).collect();
     Ok(Outcome { pictures: pictures(&problem, &selection), regressors, effects, late, sensor_errors, report })
 }
 
@@ -366,9 +361,8 @@ fn predictions(
     let declared = problem.model.parameters.baseline();
     let mut predictions = Vec::new();
     for flight in &set.flights {
-        let all = problem.estimation.iter().chain(&problem.validation);
-        let own = all.clone().find(|own| own.flight.name == flight.name);
-        let late = own.map_or(Lateness::default(), |own| own.late);
+        let prepared = problem.flights().find(|prepared| prepared.flight.name == flight.name);
+        let late = prepared.map_or(Lateness::default(), |prepared| prepared.late);
         let aligned = SensorErrors::default().taken_off(flight, &late);
         let corrected = sensor_errors.taken_off(flight, &late);
         let (Some(before), Some(after)) = (Measured::of(&aligned), Measured::of(&corrected)) else {
@@ -426,7 +420,7 @@ fn unexplained(
 
 fn pictures(problem: &Problem, selection: &Selection) -> Vec<Picture> {
     let mut pictures = Vec::new();
-    for flight in problem.estimation.iter().chain(&problem.validation) {
+    for flight in problem.flights() {
         let before = problem.model.residual_under(flight, &selection.before.values);
         let after = problem.model.residual_under(flight, &selection.after.values);
         let measured = problem.model.tracks(flight, &selection.after.values).rows;

@@ -30,7 +30,7 @@ pub struct Trim {
 /// The trims of all flights where they differ, after what a shift of the centre of mass that all share explains; then
 /// the problem compares without them. Empty where the flights agree.
 pub fn compare(problem: &mut Problem, open: &[Candidate]) -> Vec<Trim> {
-    if problem.estimation.iter().chain(&problem.validation).any(Prepared::is_assumed) {
+    if problem.flights().any(Prepared::is_assumed) {
         // Their means are all there is.
         return Vec::new();
     }
@@ -45,7 +45,7 @@ pub fn compare(problem: &mut Problem, open: &[Candidate]) -> Vec<Trim> {
             shared = fitted;
         }
     }
-    let flights = problem.estimation.iter().chain(&problem.validation);
+    let flights = problem.flights();
     let found: Vec<(Trim, f64)> =
         flights.filter_map(|flight| of_flight(problem, flight, &shared.values)).collect();
     let differ = (0..3).any(|axis| {

@@ -93,6 +93,6 @@ fn number(value: f64, unit: &str, source: &str, uncertainty: &str) -> String {
 fn said(uncertainty: &Uncertainty) -> String {
     match uncertainty {
         Uncertainty::OneSigma(value) => format!("{value:?}"),
-        Uncertainty::Said(words) => format!("{words:?}"),
+        Uncertainty::Said(text) => format!("{text:?}"),
     }
 }

@@ -194,8 +194,8 @@ impl Progress {
         Self(bar)
     }
 
-    fn say(&self, words: &str) {
-        self.0.set_message(words.to_owned());
+    fn say(&self, text: &str) {
+        self.0.set_message(text.to_owned());
     }
 
     fn finish(&self) {

@@ -13,7 +13,7 @@ use super::error::RotorError;
 
 /// A stand file, read.
 pub struct Stand {
-    /// What was measured, in words.
+    /// What was measured, as text.
     pub name: String,
     /// Diameter of the propeller in m, if the file says it.
     pub diameter_m: Option<f64>,

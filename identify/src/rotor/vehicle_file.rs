@@ -43,7 +43,7 @@ fn taken(vehicle: Option<&VehicleFile>, table: &str, name: &str, unit: &str, val
     let source = provenance.map_or("", |own| own.source.as_str());
     let uncertainty = match provenance.map(|own| &own.uncertainty) {
         Some(Uncertainty::OneSigma(sigma)) => format!("{sigma:e}"),
-        Some(Uncertainty::Said(words)) => toml::Value::from(words.as_str()).to_string(),
+        Some(Uncertainty::Said(text)) => toml::Value::from(text.as_str()).to_string(),
         None => "\"not stated\"".to_owned(),
     };
     parameter(name, value, unit, &format!("taken over from {}: {source}", file.name), &uncertainty)

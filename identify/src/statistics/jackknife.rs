@@ -22,6 +22,15 @@ pub struct Estimate {
 /// it is the cluster-robust covariance CV3, the one of its kind that stays honest with few blocks of unequal weight
 /// (MacKinnon, Nielsen and Webb, "Cluster-robust inference: a guide to empirical practice", J. Econometrics 2023).
 /// Infinite with fewer than two blocks.
+///
+/// ```
+/// use identify::statistics::jackknife;
+///
+/// // The mean of 1, 2 and 6, and those without one of them.
+/// let mean = jackknife(3.0, &[4.0, 3.5, 1.5], 0.95);
+/// assert!((mean.sigma - (7.0_f64 / 3.0).sqrt()).abs() < 1e-12);
+/// assert!(mean.low < 0.0 && mean.high > 6.0);
+/// ```
 #[must_use]
 pub fn jackknife(value: f64, without_one: &[f64], level: f64) -> Estimate {
     let blocks = without_one.len() as f64;
