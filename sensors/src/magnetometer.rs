@@ -21,7 +21,7 @@ parameters! {
     /// What a magnetometer makes of the earth's field; the defaults are a Honeywell HMC5883L.
     ///
     /// Its data sheet (900405): noise floor 2 mG, 1090 counts per gauss in its default range of ±1.3 gauss, up to
-    /// 160 Hz in single measurements of 6 ms each. The default field is that of [`EarthField`].
+    /// 160 Hz in single measurements of 6 ms each. The default field is that of Krailling near Munich.
     ///
     /// ```
     /// use bus::messages::PlantState;

@@ -1,4 +1,4 @@
-//! A sensor as a component: it measures what its inputs hold, and a [`Channel`] says when, and what becomes of it.
+//! A sensor as a component: it measures what its inputs hold, and a channel says when, and what becomes of it.
 
 use crate::channel::{Channel, Tick};
 use crate::parameters::Parameters;
