@@ -139,7 +139,7 @@ mod tests {
     use vehicles::Vehicle;
 
     fn hummingbird(change: impl Fn(&mut Vehicle)) -> ControlledVehicle {
-        let text = include_str!("../../vehicles/hummingbird.toml");
+        let text = vehicles::reference::HUMMINGBIRD;
         let mut vehicle = Vehicle::parse(text, "hummingbird.toml").unwrap();
         change(&mut vehicle);
         ControlledVehicle::new(vehicle).unwrap()

@@ -55,7 +55,7 @@ struct Setup {
 }
 
 fn vehicle() -> Vehicle {
-    Vehicle::parse(include_str!("../../vehicles/hummingbird.toml"), "hummingbird.toml").unwrap()
+    Vehicle::parse(vehicles::reference::HUMMINGBIRD, "hummingbird.toml").unwrap()
 }
 
 fn schedule() -> Schedule {

@@ -44,7 +44,7 @@ struct Loop {
 }
 
 fn vehicle() -> Vehicle {
-    Vehicle::parse(include_str!("../../vehicles/hummingbird.toml"), "hummingbird.toml").unwrap()
+    Vehicle::parse(vehicles::reference::HUMMINGBIRD, "hummingbird.toml").unwrap()
 }
 
 impl Loop {

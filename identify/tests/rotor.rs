@@ -265,7 +265,7 @@ fn an_electrical_speed_is_divided_or_found_out() {
 
 /// A vehicle file whose tables are replaced by those of `tables`.
 fn merged(tables: &str) -> String {
-    let base = include_str!("../../vehicles/hummingbird.toml");
+    let base = vehicles::reference::HUMMINGBIRD;
     let mut file: toml::Table = base.parse().unwrap();
     let tables: toml::Table = tables.parse().unwrap();
     file.extend(tables);
@@ -300,7 +300,7 @@ fn what_a_stand_does_not_tell_is_taken_over() {
     stand.write("static.csv", &static_log(&mut Draws::new(6), 1.0));
     stand.run().unwrap();
     let vehicle = vehicles::Vehicle::parse(&merged(&stand.text("rotor.toml")), "merged.toml").unwrap();
-    let base = vehicles::Vehicle::parse(include_str!("../../vehicles/hummingbird.toml"), "").unwrap();
+    let base = vehicles::Vehicle::parse(vehicles::reference::HUMMINGBIRD, "").unwrap();
     assert_eq!((vehicle.motor, vehicle.command), (base.motor, base.command));
 }
 

@@ -8,9 +8,9 @@
 //!
 //! ```
 //! # use plant::{Airframe, RigidBody, RotorState, State};
-//! # let text = include_str!("../../vehicles/hummingbird.toml");
+//! # let text = vehicles::reference::HUMMINGBIRD;
 //! # let vehicle = vehicles::Vehicle::parse(text, "hummingbird.toml")?;
-//! # let scene = scenes::Scene::parse(include_str!("../../scenes/ground.toml"), "ground.toml")?;
+//! # let scene = scenes::Scene::parse(scenes::reference::GROUND, "ground.toml")?;
 //! let airframe = Airframe::from_files(vehicle, &scene.effects)?;
 //! let (seed, dt_s) = (7, 0.001);
 //! let mut effects = airframe.initial_state(seed, "plant", dt_s);

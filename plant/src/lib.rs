@@ -25,7 +25,7 @@
 //! use nalgebra::Vector3;
 //! use plant::{NewtonEuler, RigidBody};
 //!
-//! let text = include_str!("../../vehicles/hummingbird.toml");
+//! let text = vehicles::reference::HUMMINGBIRD;
 //! let model = NewtonEuler::new(vehicles::Vehicle::parse(text, "hummingbird.toml")?, 1);
 //! let hover = model.vehicle().hover_command();
 //! let mut state = model.start(RigidBody::level_at(Vector3::new(0.0, 0.0, 1.0)), hover);

@@ -95,7 +95,7 @@ mod tests {
     use crate::{Airframe, FreeFlight, NewtonEuler, RigidBody};
 
     fn published(effects: &[&str]) -> Battery {
-        let text = include_str!("../../vehicles/hummingbird.toml");
+        let text = vehicles::reference::HUMMINGBIRD;
         let vehicle = vehicles::Vehicle::parse(text, "hummingbird.toml").unwrap();
         let effects = effects.iter().map(|name| crate::effects::find(name).unwrap().nominal()).collect();
         let airframe = Airframe::with_effects(vehicle, effects);

@@ -64,7 +64,7 @@ fn free_flight_takes_no_memory() {
 /// assertions it also checks itself. None of these places is ours, and the number does not grow with time.
 #[test]
 fn rapier_takes_memory_a_few_times_a_tick_whatever_is_touched() {
-    let room = include_str!("../../scenes/room.toml");
+    let room = scenes::reference::ROOM;
     let hover = hummingbird().hover_command();
     let other =
         Neighbour { number: 1, position_W_m: Vector3::new(0.3, 0.0, 1.0), velocity_W_m_s: Vector3::zeros() };
@@ -72,7 +72,7 @@ fn rapier_takes_memory_a_few_times_a_tick_whatever_is_touched() {
         ("flying", taken(&mut rapier(room, Vector3::z()), hover, &[])),
         ("standing", taken(&mut rapier(room, Vector3::zeros()), 1.0, &[])),
         ("among traffic", taken(&mut rapier(room, Vector3::z()), hover, &[other])),
-        ("rig A", taken(&mut rapier(include_str!("../../scenes/rig-sliding.toml"), Vector3::z()), 1.0, &[])),
+        ("rig A", taken(&mut rapier(scenes::reference::RIG_SLIDING, Vector3::z()), 1.0, &[])),
     ];
     println!("in 1000 ticks: {counts:?}");
     // What was counted with debug assertions, 3000, 5000, 5249 and 4000, and a tenth more.

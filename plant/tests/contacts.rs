@@ -18,7 +18,7 @@ fn plant(scene: &Scene, body: &RigidBody) -> Rapier {
 }
 
 fn room() -> Scene {
-    Scene::parse(include_str!("../../scenes/room.toml"), "room.toml").unwrap()
+    Scene::parse(scenes::reference::ROOM, "room.toml").unwrap()
 }
 
 fn fly(plant: &mut Rapier, commands: &[f64; 4], ticks: usize) -> Vec<ContactReport> {

@@ -8,8 +8,8 @@ use nalgebra::{UnitQuaternion, Vector3};
 use plant::{Airframe, Backend, NewtonEuler, Rapier, RigidBody};
 use scenes::{Rig, Scene};
 
-const SLIDING: &str = include_str!("../../scenes/rig-sliding.toml");
-const FIXED: &str = include_str!("../../scenes/rig-fixed.toml");
+const SLIDING: &str = scenes::reference::RIG_SLIDING;
+const FIXED: &str = scenes::reference::RIG_FIXED;
 
 fn scene(text: &str) -> Scene {
     Scene::parse(text, "rig.toml").unwrap()

@@ -43,9 +43,9 @@ fn situations() -> [FlightCondition; 4] {
         angular_velocity_B_rad_s: Vector3::new(3.0, -4.0, 2.0),
     };
     let at_rest = RigidBody::level_at(Vector3::zeros());
-    let room = include_str!("../../scenes/room.toml");
-    let sliding = include_str!("../../scenes/rig-sliding.toml");
-    let fixed = include_str!("../../scenes/rig-fixed.toml");
+    let room = scenes::reference::ROOM;
+    let sliding = scenes::reference::RIG_SLIDING;
+    let fixed = scenes::reference::RIG_FIXED;
     let falling = |_| [1.0; 4];
     [
         FlightCondition {
@@ -187,7 +187,7 @@ fn a_snapshot_of_another_scene_is_refused_and_changes_nothing() {
         &RigidBody::level_at(Vector3::zeros()),
         1.0,
     );
-    let moved = include_str!("../../scenes/room.toml").replacen("5.05", "5.06", 1);
+    let moved = scenes::reference::ROOM.replacen("5.05", "5.06", 1);
     let moved = common::rapier(
         NewtonEuler::new(hummingbird(), 1),
         &Scene::parse(&moved, "moved.toml").unwrap(),

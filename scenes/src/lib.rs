@@ -7,10 +7,11 @@
 //! | [`scene`] | the immutable [`Scene`] that plants and range finders use |
 //! | [`ray`] | the distance from a point along a direction to what is met first |
 //! | [`rig`] | the test rigs that a vehicle hangs from |
+//! | [`mod@reference`] | the scene files of this crate, as text |
 //! | `file` | which keys a scene file has |
 //!
 //! ```
-//! let scene = scenes::Scene::parse(include_str!("../room.toml"), "room.toml")?;
+//! let scene = scenes::Scene::parse(scenes::reference::ROOM, "room.toml")?;
 //! assert_eq!(scene.boxes.len(), 4);
 //! # Ok::<(), vehicles::VehicleError>(())
 //! ```
@@ -18,6 +19,7 @@
 
 mod file;
 pub mod ray;
+pub mod reference;
 pub mod rig;
 pub mod scene;
 

@@ -61,7 +61,7 @@ mod tests {
     use super::*;
 
     fn room() -> RayCaster {
-        RayCaster::new(&Scene::parse(include_str!("../room.toml"), "room.toml").unwrap())
+        RayCaster::new(&Scene::parse(crate::reference::ROOM, "room.toml").unwrap())
     }
 
     #[test]

@@ -151,7 +151,7 @@ mod tests {
     use super::*;
 
     fn judge() -> ClearanceJudge {
-        let scene = Scene::parse(include_str!("../../scenes/room.toml"), "room.toml").unwrap();
+        let scene = Scene::parse(scenes::reference::ROOM, "room.toml").unwrap();
         ClearanceJudge { caster: RayCaster::new(&scene), keep_m: 3.0, corner_m: 0.75 }
     }
 

@@ -78,7 +78,7 @@ mod tests {
     }
 
     fn room() -> RayCaster {
-        RayCaster::new(&Scene::parse(include_str!("../../scenes/room.toml"), "room.toml").unwrap())
+        RayCaster::new(&Scene::parse(scenes::reference::ROOM, "room.toml").unwrap())
     }
 
     #[test]

@@ -36,7 +36,7 @@ pub fn record(path: &Path, vehicles: &[&str], scene: Option<&str>) {
     if let Some(scene) = scene {
         // As the launcher attaches it: behind a manifest and a vehicle, which are no scenes.
         writer.attach("laps.toml", b"[run]\nduration_s = 60.0\n").unwrap();
-        writer.attach("hummingbird.toml", include_bytes!("../../vehicles/hummingbird.toml")).unwrap();
+        writer.attach("hummingbird.toml", vehicles::reference::HUMMINGBIRD.as_bytes()).unwrap();
         writer.attach("room.toml", scene.as_bytes()).unwrap();
     }
     writer.finish().unwrap();

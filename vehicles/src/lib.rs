@@ -13,11 +13,11 @@
 //! | [`table`] | tables of measurements in CSV, for every log that has this format |
 //! | [`text`] | files that people write, read with an end to it |
 //! | [`variables`] | variables of the environment within paths |
+//! | [`mod@reference`] | the vehicle files of this crate, as text |
 //! | [`error`] | what can be wrong with a file, said for people |
 //!
 //! ```
-//! let text = include_str!("../hummingbird.toml");
-//! let vehicle = vehicles::Vehicle::parse(text, "hummingbird.toml")?;
+//! let vehicle = vehicles::Vehicle::parse(vehicles::reference::HUMMINGBIRD, "hummingbird.toml")?;
 //! assert_eq!(vehicle.mass_kg, 0.480);
 //! # Ok::<(), vehicles::VehicleError>(())
 //! ```
@@ -31,6 +31,7 @@ mod file;
 pub mod provenance;
 pub mod quotes;
 pub mod reader;
+pub mod reference;
 pub mod table;
 pub mod text;
 pub mod variables;

@@ -59,6 +59,6 @@ mod tests {
     #[test]
     fn a_file_is_read_to_its_end() {
         let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("hummingbird.toml");
-        assert_eq!(super::read(&path).unwrap(), include_str!("../hummingbird.toml"));
+        assert_eq!(super::read(&path).unwrap(), crate::reference::HUMMINGBIRD);
     }
 }

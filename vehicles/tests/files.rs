@@ -4,10 +4,8 @@
 use std::f64::consts::PI;
 use std::path::Path;
 
+use vehicles::reference::{CRAZYFLIE, HUMMINGBIRD};
 use vehicles::{MotorModel, Uncertainty, Vehicle, VehicleError};
-
-const HUMMINGBIRD: &str = include_str!("../hummingbird.toml");
-const CRAZYFLIE: &str = include_str!("../crazyflie-2.1.toml");
 
 const MASS_LINE: &str = r#"mass = { value = 0.480, unit = "kg", source = "thesis Table 2.1: take-off weight with the 2100 mAh battery", uncertainty = "not stated" }"#;
 

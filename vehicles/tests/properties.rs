@@ -5,8 +5,8 @@ use toml::{Table, Value};
 use vehicles::{Uncertainty, Vehicle, VehicleError};
 
 const FILES: [&str; 3] = [
-    include_str!("../hummingbird.toml"),
-    include_str!("../crazyflie-2.1.toml"),
+    vehicles::reference::HUMMINGBIRD,
+    vehicles::reference::CRAZYFLIE,
     concat!(
         include_str!("../hummingbird.toml"),
         r#"

@@ -22,7 +22,7 @@ use vehicles::Vehicle;
 pub const PERIOD_S: f64 = 1e-3;
 
 pub fn vehicle() -> Vehicle {
-    Vehicle::parse(include_str!("../../../vehicles/hummingbird.toml"), "hummingbird.toml").unwrap()
+    Vehicle::parse(vehicles::reference::HUMMINGBIRD, "hummingbird.toml").unwrap()
 }
 
 /// The Hummingbird as the laws know it.

@@ -26,7 +26,7 @@ pub const PERIOD_NS: u64 = 1_000_000;
 pub const REACH_M: f64 = 7.65;
 
 pub fn vehicle() -> Vehicle {
-    Vehicle::parse(include_str!("../../../vehicles/hummingbird.toml"), "hummingbird.toml").unwrap()
+    Vehicle::parse(vehicles::reference::HUMMINGBIRD, "hummingbird.toml").unwrap()
 }
 
 pub fn believed() -> ControlledVehicle {

@@ -92,7 +92,7 @@ mod tests {
     /// Principal moments that a body may have, about axes turned in many ways.
     #[test]
     fn rapier_has_the_inertia_of_the_vehicle() {
-        let text = include_str!("../../../vehicles/hummingbird.toml");
+        let text = vehicles::reference::HUMMINGBIRD;
         let mut vehicle = Vehicle::parse(text, "hummingbird.toml").unwrap();
         let moments = Matrix3::from_diagonal(&Vector3::new(5.6e-3, 4.1e-3, 8.1e-3));
         for turn in 0..100 {

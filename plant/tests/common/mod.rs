@@ -10,8 +10,7 @@ use vehicles::Vehicle;
 /// The tick of the whole project, 1 kHz.
 pub const TICK_S: f64 = 1e-3;
 
-pub const HUMMINGBIRD: &str = include_str!("../../../vehicles/hummingbird.toml");
-pub const CRAZYFLIE: &str = include_str!("../../../vehicles/crazyflie-2.1.toml");
+pub use vehicles::reference::{CRAZYFLIE, HUMMINGBIRD};
 
 const C_T: &str = "value = 7.6184e-8";
 const C_Q: &str = "value = 2.6839e-9";

@@ -1,0 +1,16 @@
+//! The scene files that this crate brings, as text: for examples and tests, which then need no file.
+//!
+//! ```
+//! let scene = scenes::Scene::parse(scenes::reference::ROOM, "room.toml")?;
+//! assert_eq!(scene.boxes.len(), 4);
+//! # Ok::<(), vehicles::VehicleError>(())
+//! ```
+
+/// Nothing but the ground, with its contact.
+pub const GROUND: &str = include_str!("../ground.toml");
+/// Four walls and the ground.
+pub const ROOM: &str = include_str!("../room.toml");
+/// A vehicle on a rig that holds its position.
+pub const RIG_FIXED: &str = include_str!("../rig-fixed.toml");
+/// A vehicle on a rig that slides.
+pub const RIG_SLIDING: &str = include_str!("../rig-sliding.toml");
