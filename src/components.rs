@@ -6,6 +6,12 @@ use runtime::registry::Registry;
 use sensors::sensing::Sensing;
 
 /// Every component that this package brings, in alphabetical order.
+///
+/// ```
+/// let imu = hummingbus::COMPONENTS.find("imu").unwrap();
+/// assert_eq!(imu.outputs[0].schema.type_name, "hummingbus_msgs/msg/Imu");
+/// assert!(imu.parameters().contains(&"gyroscope_range_rad_s"));
+/// ```
 pub const COMPONENTS: Registry = Registry::new(&[
     Registration::of::<sensors::complementary::Complementary>(),
     Registration::of::<Sensing<sensors::barometer::BarometerParams>>(),

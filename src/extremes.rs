@@ -140,8 +140,8 @@ fn judged(outcome: Result<(), String>, new: &Value, case: &str) -> Outcome {
             assert!(new.as_float().is_none_or(f64::is_finite), "{case} is accepted");
             Outcome::Accepted
         }
-        Err(words) => {
-            assert!(words.contains(".toml:"), "{case} is refused without a place: {words}");
+        Err(message) => {
+            assert!(message.contains(".toml:"), "{case} is refused without a place: {message}");
             Outcome::Refused
         }
     }
@@ -149,7 +149,7 @@ fn judged(outcome: Result<(), String>, new: &Value, case: &str) -> Outcome {
 
 /// Some of the cases of a long list: every `stride`-th, or all with HUMMINGBUS_EXTREMES=all.
 fn stride(some: usize) -> usize {
-    if std::env::var("HUMMINGBUS_EXTREMES").is_ok_and(|which| which == "all") { 1 } else { some }
+    if std::env::var("HUMMINGBUS_EXTREMES").is_ok_and(|chosen| chosen == "all") { 1 } else { some }
 }
 
 #[test]
@@ -234,7 +234,9 @@ fn no_number_of_shipped_gains_brings_a_law_down() {
         let (_, refused) = try_all(&folder, &file, stride(2), || {
             kind.check(&parameters, &NodeContext::new("node", &[]))
                 .map_err(|error| error.to_string())
-                .map_err(|words| if words.contains(".toml:") { words } else { format!("{file}: {words}") })
+                .map_err(
+                    |message| if message.contains(".toml:") { message } else { format!("{file}: {message}") },
+                )
         });
         assert!(refused > 10, "only {refused} refusals of {name}");
     }
@@ -246,8 +248,8 @@ fn what_is_shipped_has_no_warnings() {
     for sub in ["manifests", "manifests/identify"] {
         for (name, _) in files(sub) {
             if let Ok(graph) = Folder::check(&folder.path(&format!("{sub}/{name}")), &[]) {
-                let words: Vec<String> = graph.warnings.iter().map(ToString::to_string).collect();
-                assert_eq!(words, Vec::<String>::new(), "{name}");
+                let messages: Vec<String> = graph.warnings.iter().map(ToString::to_string).collect();
+                assert_eq!(messages, Vec::<String>::new(), "{name}");
                 checked += 1;
             }
         }

@@ -3,6 +3,7 @@
 use crate::announcement::Announcement;
 use crate::component::{Component, Info, Role, State, StepError, Transfer};
 use crate::context::{NodeContext, StepContext};
+use crate::parameter_names;
 use crate::ports::{InputPorts, InputSamples, Inputs, OutputPorts, OutputSamples, PortSpec};
 use crate::schema::Schema;
 use diagnostics::ParameterError;
@@ -23,6 +24,7 @@ pub struct Registration {
     pub outputs: &'static [PortSpec],
     /// What happens to its state when another process takes its place.
     pub transfer: Transfer,
+    parameters: fn() -> &'static [&'static str],
     check: fn(&Value, &NodeContext<'_>) -> Result<(), ParameterError>,
     pub(crate) make: Make,
 }
@@ -42,9 +44,16 @@ impl Registration {
             inputs: <C::Inputs<'static> as InputPorts<'static>>::DECLARED,
             outputs: C::Outputs::DECLARED,
             transfer: C::State::TRANSFER,
+            parameters: parameter_names::of::<C::Parameters>,
             check: |parameters, context| make::<C>(parameters, context)?.rehearse(context),
             make: |parameters, context| Ok(Box::new(make::<C>(parameters, context)?)),
         }
+    }
+
+    /// The names of its parameters.
+    #[must_use]
+    pub fn parameters(&self) -> &'static [&'static str] {
+        (self.parameters)()
     }
 
     /// Checks `parameters` and the files that they name for a node, without running it.

@@ -68,9 +68,13 @@ pub(crate) struct Transport {
     new_ports: RefCell<Vec<String>>,
 }
 
+/// Has iceoryx2 print errors only, in all of this process: for a program that is hummingbus's own.
+pub fn limit_transport_log() {
+    set_log_level(LogLevel::Error);
+}
+
 /// The configuration of the run `run_id`, whose directory is `run_dir`; the error is iceoryx2's.
 fn config(run_dir: &Path, run_id: &str) -> Result<Config, String> {
-    set_log_level(LogLevel::Error);
     let root = run_dir.join("iceoryx2");
     let mut config = Config::default();
     config.global.set_root_path(
@@ -109,6 +113,9 @@ impl Transport {
     pub(crate) fn new(run_dir: &Path, run_id: &str, node_name: &str) -> Result<Self, BusError> {
         let fail =
             |reason: String| transport_error(node_name, "joining the shared memory of the run", reason);
+        if !crate::hosted::is_hosted() {
+            limit_transport_log();
+        }
         let config = config(run_dir, run_id).map_err(fail)?;
         let what = format!("node `{node_name}` in shared memory");
         reserve::require_free(&what, PORT_MARGIN_BYTES)?;

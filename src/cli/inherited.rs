@@ -14,9 +14,9 @@ pub fn forget() {
     if VARIABLES.iter().all(|variable| std::env::var_os(variable).is_none()) {
         return;
     }
-    let mut words = std::env::args_os();
+    let mut args = std::env::args_os();
     let mut command = Command::new("/proc/self/exe");
-    command.arg0(words.next().unwrap_or_else(|| "hummingbus".into())).args(words);
+    command.arg0(args.next().unwrap_or_else(|| "hummingbus".into())).args(args);
     for variable in VARIABLES {
         command.env_remove(variable);
     }

@@ -17,7 +17,6 @@ pub fn stop_token() -> Result<StopToken> {
     let token = StopToken::new();
     let seen = token.clone();
     ctrlc::set_handler(move || seen.stop()).context("cannot handle Ctrl-C")?;
-    bus::process::survive_file_limit();
     // A run that a node of another run starts has them blocked.
     bus::process::hear_stop_signals();
     Ok(TOKEN.get_or_init(|| token).clone())

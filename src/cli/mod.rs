@@ -3,6 +3,7 @@
 mod cat;
 mod check;
 mod clean;
+mod components;
 mod diff;
 mod files;
 mod identify;
@@ -23,13 +24,16 @@ mod validate;
 
 use anyhow::Result;
 use clap::{Parser, Subcommand};
-use output::{say, words};
+use output::{message, say};
 use std::process::ExitCode;
 use table::commands;
 
 /// A vehicle simulation as independent processes in deterministic lockstep.
 #[derive(Parser)]
-#[command(version, about, after_help = "Example: hummingbus run manifests/hover.toml")]
+#[command(
+    version,
+    after_help = "Example: hummingbus run manifests/hover.toml\n\n`hummingbus COMMAND --help` tells what a command takes."
+)]
 struct Cli {
     #[command(subcommand)]
     command: Command,
@@ -65,6 +69,9 @@ commands! {
     /// Print every message's fields, units, frames and layout hash.
     #[command(after_help = "Example: hummingbus schema --json")]
     Schema(schema::SchemaArguments) => schema::schema;
+    /// Print every component: its ports, its parameters, the state that it hands over.
+    #[command(after_help = "Example: hummingbus components --json")]
+    Components(components::ComponentsArguments) => components::components;
     /// Find what measured flights show that the declared vehicle lacks; or fit a rotor to a thrust stand.
     #[command(after_help = identify::HELP)]
     Identify(identify::IdentifyArguments) => identify::run;
@@ -93,12 +100,14 @@ pub fn main() -> ExitCode {
     let command = Cli::parse().command;
     if !matches!(command, Command::Node(_)) {
         inherited::forget();
+        bus::process::survive_file_limit();
+        bus::limit_transport_log();
     }
     match command.run() {
         Ok(true) => ExitCode::SUCCESS,
         Ok(false) => ExitCode::FAILURE,
         Err(error) => {
-            say(&format!("error: {}", words(&error)));
+            say(&format!("error: {}", message(&error)));
             ExitCode::from(2)
         }
     }

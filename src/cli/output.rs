@@ -25,7 +25,7 @@ pub fn say(text: &str) {
 }
 
 /// What went wrong and why; a cause that the text holds already is not said twice.
-pub fn words(error: &anyhow::Error) -> String {
+pub fn message(error: &anyhow::Error) -> String {
     error.chain().skip(1).map(ToString::to_string).fold(error.to_string(), |text, cause| {
         if text.contains(&cause) { text } else { format!("{text}: {cause}") }
     })

@@ -1,7 +1,7 @@
 //! The command `run` and its kin: check a manifest, fly it, judge its recording, say what came of it.
 
 use super::interrupts::stop_token;
-use super::output::{print_text, print_warnings, words};
+use super::output::{message, print_text, print_warnings};
 use super::profile::Files;
 use super::progress::Bar;
 use anyhow::{Context, Error, Result, anyhow, bail};
@@ -136,7 +136,7 @@ pub fn run(
 /// What there is to say about a run that was refused or broke, with what is `left` of its recording; printed as JSON too
 /// where that is asked for.
 fn broken(manifest: &Manifest, error: &Error, left: Option<&Path>, is_json: bool) -> Result<Error> {
-    let mut text = words(error);
+    let mut text = message(error);
     if let Some(path) = left {
         text += &format!("\nWhat was recorded until then is in {}", path.display());
     }

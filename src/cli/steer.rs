@@ -104,17 +104,17 @@ pub fn swap(arguments: &SwapArguments) -> Result<bool> {
     ask(arguments.run.as_deref(), &request, arguments.json).map(|()| true)
 }
 
-/// The TOML text that `words` are, or that the file of this name holds.
-pub fn description(words: &str) -> Result<String> {
-    let is_file = !words.is_empty() && (Path::new(words).is_file() || !words.contains('='));
+/// The TOML text that `given` is, or that the file of this name holds.
+pub fn description(given: &str) -> Result<String> {
+    let is_file = !given.is_empty() && (Path::new(given).is_file() || !given.contains('='));
     let text = if is_file {
-        std::fs::read_to_string(words).with_context(|| {
-            format!("--with: cannot read {words}, and it is no TOML text such as kind=\"pid\"")
+        std::fs::read_to_string(given).with_context(|| {
+            format!("--with: cannot read {given}, and it is no TOML text such as kind=\"pid\"")
         })?
     } else {
-        words.to_owned()
+        given.to_owned()
     };
-    let place = if is_file { words } else { "its text" };
+    let place = if is_file { given } else { "its text" };
     text.parse::<toml::Table>().with_context(|| format!("--with: {place} is no TOML"))?;
     Ok(text)
 }
@@ -142,8 +142,8 @@ mod tests {
         std::fs::write(file.path(), "kind = 'pid'\n").unwrap();
         assert_eq!(description(file.path().to_str().unwrap()).unwrap(), "kind = 'pid'\n");
         assert_eq!(description("kind='pid'").unwrap(), "kind='pid'");
-        let words = |text| format!("{:#}", description(text).unwrap_err());
-        assert!(words("kind='").contains("its text is no TOML"), "{}", words("kind='"));
-        assert!(words("nowhere.toml").contains("cannot read nowhere.toml"));
+        let message = |text| format!("{:#}", description(text).unwrap_err());
+        assert!(message("kind='").contains("its text is no TOML"), "{}", message("kind='"));
+        assert!(message("nowhere.toml").contains("cannot read nowhere.toml"));
     }
 }

@@ -4,6 +4,7 @@ use crate::refusals::good;
 use crate::support::{Place, repository};
 use std::collections::BTreeSet;
 use std::fs;
+use std::path::Path;
 
 /// The words of a Markdown file that stand in backticks.
 fn quoted(file: &str) -> Vec<String> {
@@ -17,8 +18,90 @@ fn every_path_that_the_architecture_names_exists() {
     let paths: Vec<String> = quoted("docs/architecture.md").into_iter().filter(is_path).collect();
     assert!(paths.len() > 30, "found only {paths:?}");
     for path in paths {
-        assert!(std::path::Path::new(&repository(&path)).exists(), "docs/architecture.md names {path}");
+        assert!(Path::new(&repository(&path)).exists(), "docs/architecture.md names {path}");
     }
+}
+
+/// The pages of the documentation, by their paths in the repository.
+fn pages() -> Vec<String> {
+    let within = |folder: &'static str| {
+        let names = fs::read_dir(repository(folder)).unwrap().map(|entry| entry.unwrap().file_name());
+        names.map(move |name| format!("{folder}/{}", name.to_string_lossy()))
+    };
+    let pages = within("docs").chain(within("docs/decisions")).filter(|page| page.ends_with(".md"));
+    pages.chain(["README.md", "CONTRIBUTING.md", "CHANGELOG.md"].map(str::to_owned)).collect()
+}
+
+/// Whether `path` names a file of the repository: one that is stored, in one of its folders.
+fn is_stored(path: &str) -> bool {
+    let is_made = [".mcap", ".html"].iter().any(|extension| path.ends_with(extension));
+    let is_form = path.contains(|c: char| c.is_whitespace() || "*<>=${}…:".contains(c));
+    let folder = path.split('/').next().unwrap();
+    !is_made
+        && !is_form
+        && !path.contains("NAME")
+        && path.contains('.')
+        && Path::new(&repository(folder)).is_dir()
+}
+
+#[test]
+fn every_path_that_a_page_names_exists() {
+    let mut count = 0;
+    for page in pages() {
+        let named = quoted(&page).into_iter().map(|word| word.trim_matches('"').to_owned());
+        for path in named.filter(|word| word.contains('/') && !word.starts_with('/')) {
+            // Paths in manifests start at their folder.
+            let path = path.strip_prefix("../").unwrap_or(&path);
+            if is_stored(path) {
+                count += 1;
+                assert!(Path::new(&repository(path)).exists(), "{page} names {path}");
+            }
+        }
+    }
+    assert!(count > 100, "found only {count}");
+}
+
+/// The anchors of a page's headings, as GitHub makes them.
+fn anchors(page: &str) -> Vec<String> {
+    let text = fs::read_to_string(page).unwrap();
+    let headings = text.lines().filter(|line| line.starts_with('#'));
+    let anchor = |heading: &str| -> String {
+        let kept = heading.trim_start_matches('#').trim().to_lowercase();
+        kept.chars().filter(|&c| c.is_alphanumeric() || " -_".contains(c)).collect()
+    };
+    headings.map(|heading| anchor(heading).replace(' ', "-")).collect()
+}
+
+#[test]
+fn every_link_of_a_page_leads_somewhere() {
+    let mut count = 0;
+    for page in pages() {
+        let text = fs::read_to_string(repository(&page)).unwrap();
+        // What stands in backticks is no link.
+        let prose: String = text.split('`').step_by(2).collect();
+        for link in prose.split("](").skip(1).map(|rest| rest.split(')').next().unwrap()) {
+            if link.starts_with("http") {
+                continue;
+            }
+            let (file, anchor) = link.split_once('#').unwrap_or((link, ""));
+            let file = match file {
+                "" => repository(&page).into(),
+                _ => Path::new(&repository(&page)).with_file_name(file),
+            };
+            assert!(file.exists(), "{page}: {link}");
+            let is_there = anchor.is_empty() || anchors(&file.to_string_lossy()).iter().any(|a| a == anchor);
+            assert!(is_there, "{page}: {link}: no such heading");
+            count += 1;
+        }
+    }
+    assert!(count > 100, "found only {count}");
+}
+
+#[test]
+fn the_page_of_components_is_what_they_declare() {
+    let page = fs::read_to_string(repository("docs/components.md")).unwrap();
+    let printed = Place::new().call(&["components"]).with_code(0).output;
+    assert!(page == printed, "write it anew: hummingbus components >docs/components.md");
 }
 
 /// The names of the workspace's libraries that the crate in `folder` depends on.

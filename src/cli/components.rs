@@ -1,0 +1,111 @@
+//! The command `components`.
+
+use super::output::print_text;
+use anyhow::Result;
+use bus::Registration;
+use bus::component::{Role, Transfer};
+use bus::ports::{Inputs, PortSpec};
+use bus::schema::Schema;
+use clap::Args;
+use hummingbus::COMPONENTS;
+use serde_json::{Value, json};
+
+/// What stands above the table.
+const HEAD: &str = "# Components
+What a node can be, as the components declare it themselves: `hummingbus components >docs/components.md` writes this page.
+What the parameters mean is in [manifest.md](manifest.md#built-in-kinds); their names end with their units. What the messages
+hold, `hummingbus schema` prints. A port in brackets may be left out. What a component hands over is its state, with which
+another instance goes on ([hot-swap.md](hot-swap.md)).
+";
+
+/// What `components` takes.
+#[derive(Args)]
+pub struct ComponentsArguments {
+    /// Print JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+/// Prints every component with its ports, its parameters and the state that it hands over.
+///
+/// # Errors
+/// If it cannot be printed.
+pub fn components(arguments: &ComponentsArguments) -> Result<bool> {
+    let text = if arguments.json {
+        serde_json::to_string_pretty(&COMPONENTS.iter().map(json).collect::<Vec<_>>())?
+    } else {
+        markdown()
+    };
+    print_text(&text).map(|()| true)
+}
+
+fn markdown() -> String {
+    let rows: String = COMPONENTS.iter().map(row).collect();
+    format!("{HEAD}\n| component | reads | sends | parameters | hands over |\n|---|---|---|---|---|\n{rows}")
+}
+
+fn row(component: &Registration) -> String {
+    let Registration { name, summary, .. } = component;
+    let inputs = match component.inputs {
+        Inputs::Ports(ports) => listed(ports.iter().map(port)),
+        Inputs::Many(schema) => format!("any number of {}", type_name(schema)),
+        Inputs::Any => "any topics".to_owned(),
+    };
+    let outputs = listed(component.outputs.iter().map(port));
+    let parameters = listed(parameters(component).iter().map(|name| format!("`{name}`")));
+    let state = match component.transfer {
+        Transfer::Message(schema) => type_name(schema),
+        Transfer::Nothing => "–",
+        Transfer::Internal => "cannot be replaced",
+    };
+    format!("| **`{name}`**: {summary} | {inputs} | {outputs} | {parameters} | {state} |\n")
+}
+
+fn json(component: &Registration) -> Value {
+    let ports = |ports: &[PortSpec]| -> Vec<Value> { ports.iter().map(port_json).collect() };
+    let inputs = match component.inputs {
+        Inputs::Ports(declared) => json!(ports(declared)),
+        Inputs::Many(schema) => json!({ "any_number_of": schema.type_name }),
+        Inputs::Any => json!("any"),
+    };
+    let state = match component.transfer {
+        Transfer::Message(schema) => json!(schema.type_name),
+        Transfer::Nothing => json!("none"),
+        Transfer::Internal => json!("internal"),
+    };
+    json!({
+        "name": component.name,
+        "summary": component.summary,
+        "inputs": inputs,
+        "outputs": ports(component.outputs),
+        "parameters": parameters(component),
+        "state": state,
+    })
+}
+
+/// What a manifest may give it: the launcher gives a recorder its own.
+fn parameters(component: &Registration) -> &'static [&'static str] {
+    match component.role {
+        Role::Compute => component.parameters(),
+        Role::Record => &[],
+    }
+}
+
+fn port_json(port: &PortSpec) -> Value {
+    json!({ "name": port.name, "message": port.schema.type_name, "required": port.required, "doc": port.doc })
+}
+
+fn port(port: &PortSpec) -> String {
+    let text = format!("`{}`: {}", port.name, type_name(port.schema));
+    if port.required { text } else { format!("({text})") }
+}
+
+/// A message's name without its package.
+fn type_name(schema: &Schema) -> &'static str {
+    schema.type_name.rsplit('/').next().unwrap_or(schema.type_name)
+}
+
+fn listed(items: impl Iterator<Item = String>) -> String {
+    let text = items.collect::<Vec<_>>().join("<br>");
+    if text.is_empty() { "–".to_owned() } else { text }
+}
