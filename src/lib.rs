@@ -43,8 +43,8 @@ mod properties;
 
 pub use check::{Checked, check, check_text};
 pub use components::COMPONENTS;
+pub use runtime::ctl::Remote;
 pub use runtime::ctl::protocol::{Answer, Request};
-pub use runtime::ctl::server::Remote;
 pub use runtime::event::{Progress, RunEvent, StopToken};
 pub use runtime::host::Host;
 pub use runtime::launcher::{Launcher, Outcome};
@@ -58,6 +58,11 @@ use std::path::Path;
 ///
 /// # Errors
 /// All problems, each with its place and what to do.
+///
+/// ```
+/// let problem = hummingbus::load("nowhere.toml").unwrap_err();
+/// assert!(problem.to_string().contains("nowhere.toml"));
+/// ```
 pub fn load(path: impl AsRef<Path>) -> Result<Manifest, Problem> {
     Manifest::load(path.as_ref(), &[], COMPONENTS)
 }

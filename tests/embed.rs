@@ -108,7 +108,7 @@ fn what_threads_cannot_have_is_refused_in_words() {
         ("process.imu.log", "/tmp/never.log".into()),
         ("run.lock_memory", true.into()),
     ] {
-        let (words, name) = (refused(key, value), key.rsplit('.').next().unwrap());
-        assert!(words.contains(name) && words.contains("needs a process of its own"), "{words}");
+        let (message, name) = (refused(key, value), key.rsplit('.').next().unwrap());
+        assert!(message.contains(name) && message.contains("needs a process of its own"), "{message}");
     }
 }

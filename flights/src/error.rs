@@ -17,7 +17,7 @@ use crate::span::Sparse;
 /// use flights::{FlightSet, FlightsError};
 ///
 /// let text = "vehicle = \"v.toml\"\n[[flight]]\nname = \"a\"\nfile = \"a.csv\"\nrole = \"fit\"\nto_s = -1.0\n";
-/// let vehicle = |_: &std::path::Path| Ok(include_bytes!("../../vehicles/hummingbird.toml").to_vec());
+/// let vehicle = |_: &std::path::Path| Ok(vehicles::reference::HUMMINGBIRD.as_bytes().to_vec());
 /// let error = FlightSet::parse("flights.toml".as_ref(), text.to_owned(), &vehicle).unwrap_err();
 /// assert!(matches!(&error, FlightsError::File(fault) if fault.key() == "flight[0].to_s"));
 /// ```

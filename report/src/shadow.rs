@@ -5,7 +5,7 @@ use anyhow::{Result, bail};
 use bus::plan::Plan;
 use recorder::node::SHADOW_PREFIX;
 use recorder::reader::Recording;
-use runtime::replacement::{Purpose, Report};
+use runtime::launcher::{Purpose, Report};
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::fmt;
@@ -48,7 +48,7 @@ pub struct Difference {
 ///
 /// ```
 /// use report::shadow::Succession;
-/// use runtime::replacement::{Purpose, Report};
+/// use runtime::launcher::{Purpose, Report};
 /// let report = Report {
 ///     process: "controller".to_owned(),
 ///     generation: 1,

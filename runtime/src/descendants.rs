@@ -4,45 +4,77 @@
 //! child, however it was detached. So the launcher has only to end its children until there are none left.
 
 use crate::process_table::{children, run_dir_of};
-use crate::run_dir::run_of_dir;
 use crate::watch_clock::WatchClock;
+use anyhow::{Result, bail};
 use bus::host_time::monotonic_ns;
 use rustix::process::{
     Pid, Signal, WaitOptions, child_subreaper, kill_process, set_child_subreaper, waitpid,
 };
-use std::path::{Path, PathBuf};
+use std::sync::{RwLock, RwLockReadGuard, RwLockWriteGuard, TryLockError};
 use std::time::Duration;
 
 /// How long a process may take to end when it is asked to, and then to be gone once it was killed.
 const GRACE: Duration = Duration::from_secs(1);
 const POLL: Duration = Duration::from_millis(2);
 
+/// The place of a run among those of its process: an orphan does not say whose it is, so a run that adopts orphans flies
+/// alone.
+#[derive(Debug)]
+pub struct Place {
+    _alone: Option<RwLockWriteGuard<'static, ()>>,
+    _beside: Option<RwLockReadGuard<'static, ()>>,
+}
+
+impl Place {
+    /// Takes a place, alone for a run that adopts orphans.
+    ///
+    /// # Errors
+    /// If the runs that fly leave none.
+    pub fn take(adopts_orphans: bool) -> Result<Self> {
+        static RUNS: RwLock<()> = RwLock::new(());
+        let alone = adopts_orphans.then(|| settled(RUNS.try_write())).flatten();
+        let beside = (!adopts_orphans).then(|| settled(RUNS.try_read())).flatten();
+        if alone.is_none() && beside.is_none() {
+            bail!(
+                "a run that adopts orphans (Launcher::adopting_orphans) has to be the only one of its process, which \
+                 could not tell whose an orphan is: fly the runs one after another, or without adopting orphans"
+            );
+        }
+        Ok(Self { _alone: alone, _beside: beside })
+    }
+}
+
+/// What was locked, also where a run panicked that had it: there is nothing that it could have left half done.
+fn settled<G>(attempt: Result<G, TryLockError<G>>) -> Option<G> {
+    match attempt {
+        Ok(guard) => Some(guard),
+        Err(TryLockError::Poisoned(guard)) => Some(guard.into_inner()),
+        Err(TryLockError::WouldBlock) => None,
+    }
+}
+
 /// The descendants of a run's processes; dropping it ends those that still live. To be dropped when the processes of
 /// the run have ended.
 #[derive(Debug)]
 pub struct Descendants {
-    run_dir: PathBuf,
     /// Children that this process had before the run.
     before: Vec<Pid>,
     was_reaper: bool,
 }
 
 impl Descendants {
-    /// Has this process inherit what the processes of the run in `run_dir` leave behind.
-    pub fn of_run(run_dir: &Path) -> Self {
+    /// Has this process inherit what the processes of its run leave behind.
+    pub fn of_run(_: &Place) -> Self {
         let was_reaper = child_subreaper().is_ok_and(|reaper| reaper.is_some());
         // Refused by no system that has it; one that has not leaves the processes' own groups to be killed.
         let _ = set_child_subreaper(Some(rustix::process::getpid()));
-        Self { run_dir: run_dir.to_owned(), before: children(), was_reaper }
+        Self { before: children(), was_reaper }
     }
 
     /// Whether a child was left by this run. Where the launcher had children before, those may leave some too: then
     /// only a process that carries this run in its environment is.
     fn is_of_this_run(&self, child: Pid) -> bool {
-        match run_dir_of(child) {
-            Some(run_dir) => !self.is_of_another_run(&run_dir),
-            None => self.before.is_empty(),
-        }
+        self.before.is_empty() || run_dir_of(child).is_some()
     }
 
     /// Takes note of children that have ended, but for those in `known`, which are waited for elsewhere.
@@ -53,14 +85,7 @@ impl Descendants {
         }
     }
 
-    /// Whether `run_dir` is that of another run of this very process.
-    fn is_of_another_run(&self, run_dir: &Path) -> bool {
-        let run = run_dir.file_name().and_then(|name| name.to_str()).and_then(run_of_dir);
-        let launcher = run.and_then(|run| run.split_once('-')).map(|(launcher, _)| launcher);
-        run_dir != self.run_dir && launcher == Some(format!("{:x}", std::process::id()).as_str())
-    }
-
-    /// The children of this process that came with the run, and are not of another run of this process.
+    /// The children of this process that came with the run.
     fn left(&self) -> Vec<Pid> {
         let came = children().into_iter().filter(|child| !self.before.contains(child));
         came.filter(|&child| self.is_of_this_run(child)).collect()
@@ -95,5 +120,26 @@ impl Drop for Descendants {
         if !self.was_reaper {
             let _ = set_child_subreaper(None);
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Place;
+
+    #[test]
+    fn a_run_that_adopts_orphans_is_the_only_one_of_its_process() {
+        let refused = |adopts| Place::take(adopts).unwrap_err().to_string();
+        let (first, second) = (Place::take(false).unwrap(), Place::take(false).unwrap());
+        assert!(refused(true).contains("the only one of its process"));
+        drop((first, second));
+        let alone = Place::take(true).unwrap();
+        assert!(refused(true) == refused(false) && refused(false).contains("one after another"));
+        drop(alone);
+        let panicked = std::panic::catch_unwind(|| {
+            let _alone = Place::take(true).unwrap();
+            panic!("amid a run");
+        });
+        assert!(panicked.is_err() && Place::take(false).is_ok() && Place::take(true).is_ok());
     }
 }

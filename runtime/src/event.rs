@@ -4,6 +4,17 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// What happens in a run, for whoever follows it.
+///
+/// ```
+/// use runtime::event::{Progress, RunEvent};
+/// let mut farthest_s = 0.0;
+/// let mut listener = |event: RunEvent<'_>| match event {
+///     RunEvent::Note(text) => eprintln!("{text}"),
+///     RunEvent::Progress(now) => farthest_s = f64::from(now.ticks) * now.tick_s,
+/// };
+/// listener(RunEvent::Progress(Progress { ticks: 500, duration_ticks: 1000, tick_s: 1e-3, host_s: 0.1 }));
+/// assert_eq!(farthest_s, 0.5);
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum RunEvent<'a> {
     /// Something that the user should know while the run goes on, in words.
@@ -13,6 +24,13 @@ pub enum RunEvent<'a> {
 }
 
 /// How far a run has come.
+///
+/// ```
+/// # use runtime::event::Progress;
+/// let now = Progress { ticks: 250, duration_ticks: 1000, tick_s: 1e-3, host_s: 0.05 };
+/// let faster_than_real_time = f64::from(now.ticks) * now.tick_s / now.host_s;
+/// assert!((faster_than_real_time - 5.0).abs() < 1e-9);
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Progress {
     /// Ticks that every node has completed.

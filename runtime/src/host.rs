@@ -13,13 +13,23 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::JoinHandle;
 use std::time::Duration;
 
-/// How long a thread may take to notice that it is to end.
-const GRACE: Duration = Duration::from_secs(2);
+/// How long threads may take to notice that they are to end.
+pub(crate) const GRACE: Duration = Duration::from_secs(2);
 const POLL: Duration = Duration::from_millis(1);
 /// As much as the main thread of a process has.
 const STACK_BYTES: usize = 8 << 20;
 
 /// Where the instances of a run's nodes live.
+///
+/// Nodes on threads meet the faults of processes: one that panics or returns an error ends the run with its message, or is
+/// replaced where its manifest says so. One that hangs is given up by its watchdog: it cannot be killed, so its thread is
+/// left behind and ends, having sent nothing more, when it next waits.
+///
+/// ```
+/// use runtime::host::Host;
+/// let of_another_binary = Host::Exe("target/release/hummingbus".into());
+/// assert_ne!(of_another_binary, Host::this_binary());
+/// ```
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Host {
     /// Each component is a process that executes this binary with the arguments `node KIND`.
@@ -62,7 +72,7 @@ impl Host {
 
 /// How an instance ended.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub enum End {
+pub(crate) enum End {
     /// It returned, as a process with this exit code.
     Exited(i32),
     /// A signal killed its process.
@@ -104,7 +114,7 @@ impl From<ExitStatus> for End {
 
 /// What runs: a process or a thread.
 #[derive(Debug)]
-pub enum Body {
+pub(crate) enum Body {
     /// A process.
     Process(Child),
     /// A thread.
@@ -113,7 +123,7 @@ pub enum Body {
 
 /// An instance on a thread.
 #[derive(Debug)]
-pub struct Thread {
+pub(crate) struct Thread {
     handle: Option<JoinHandle<Result<(), BusError>>>,
     is_cancelled: Arc<AtomicBool>,
     control: Arc<SupervisorView>,
@@ -153,21 +163,25 @@ impl Thread {
         })
     }
 
-    /// A thread that computes without an end cannot be ended: it is left behind.
-    fn cancel(&mut self) -> End {
+    /// Has it end at its next wait, which returns at once.
+    fn cancel(&self) {
         self.is_cancelled.store(true, Ordering::SeqCst);
         self.control.set_epoch(self.control.epoch());
-        let mut waited = Duration::ZERO;
-        while waited < GRACE {
+    }
+
+    /// Waits for the end of a cancelled thread for as long as there is patience. One that computes without an end
+    /// cannot be ended: it is left behind, and sends nothing any more.
+    fn join(&mut self, patience: &mut Duration) -> End {
+        loop {
             match self.end() {
                 Some(End::Failed(message)) => return End::Failed(message),
                 Some(_) => return End::Cancelled,
+                None if patience.is_zero() => return End::Cancelled,
                 None => {}
             }
             std::thread::sleep(POLL);
-            waited += POLL;
+            *patience = patience.saturating_sub(POLL);
         }
-        End::Cancelled
     }
 }
 
@@ -180,15 +194,26 @@ impl Body {
         }
     }
 
-    /// Ends it, and for a process its whole group, since a command may have started processes of its own.
-    pub fn kill(&mut self) -> Option<End> {
+    /// Asks a thread to end. A process is not asked.
+    pub fn cancel(&self) {
+        if let Self::Thread(thread) = self {
+            thread.cancel();
+        }
+    }
+
+    /// Ends it, and for a process its whole group, since a command may have started processes of its own. `patience` is
+    /// how long a thread may take, and what it took is taken from it.
+    pub fn kill(&mut self, patience: &mut Duration) -> Option<End> {
         match self {
             Self::Process(child) => {
                 bus::process::kill_group(child.id());
                 let _ = child.kill();
                 child.wait().ok().map(End::from)
             }
-            Self::Thread(thread) => Some(thread.cancel()),
+            Self::Thread(thread) => {
+                thread.cancel();
+                Some(thread.join(patience))
+            }
         }
     }
 

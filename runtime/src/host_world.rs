@@ -1,8 +1,8 @@
 //! The world of a real run: the control segment in shared memory, processes or threads of the host, and the run directory.
 
+use crate::ctl::Reply;
 use crate::ctl::control::ControlServer;
 use crate::ctl::protocol::{Answer, Request};
-use crate::ctl::server::Reply;
 use crate::descendants::Descendants;
 use crate::graph::backup_of;
 use crate::host::{self, End, Host, Thread};
@@ -202,8 +202,12 @@ impl Body for HostBody {
         self.body.end()
     }
 
-    fn kill(&mut self) -> Option<End> {
-        self.body.kill()
+    fn cancel(&self) {
+        self.body.cancel();
+    }
+
+    fn kill(&mut self, patience: &mut Duration) -> Option<End> {
+        self.body.kill(patience)
     }
 
     fn last_lines(&self) -> Vec<String> {

@@ -1,8 +1,8 @@
 //! Launches runs: from a checked manifest to the outcome of its run.
 
 use crate::ctl::control::ControlServer;
-use crate::ctl::server::{self, Remote};
-use crate::descendants::Descendants;
+use crate::ctl::{Asked, Remote};
+use crate::descendants::{Descendants, Place};
 use crate::event::{RunEvent, StopToken};
 use crate::flight::Flight;
 use crate::graph::Graph;
@@ -10,7 +10,7 @@ use crate::host::Host;
 use crate::host_world::HostWorld;
 use crate::manifest::Manifest;
 use crate::outputs::Outputs;
-use crate::replacement::Report;
+pub use crate::replacement::{Purpose, Report};
 use crate::run_dir::RunDir;
 use crate::supervision::Supervisor;
 use anyhow::{Context, Result, bail};
@@ -22,7 +22,7 @@ use std::path::Path;
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, channel};
 
-/// What is known about a run when it is over.
+/// What is known about a run when it is over: what [`Launcher::fly`] returns, whose example asserts on it.
 #[derive(Debug)]
 pub struct Outcome {
     /// Ticks that every node completed.
@@ -43,13 +43,65 @@ pub struct Outcome {
 
 /// Launches a run. By itself it takes no signal of this process and changes nothing else of it either: several runs may
 /// fly in one process, also at the same time.
+///
+/// ```
+/// use bus::component::{Component, Info, StepError};
+/// use bus::context::{NodeContext, StepContext};
+/// use bus::messages::MotorCommand;
+/// use bus::{ParameterError, Registration};
+/// use runtime::event::RunEvent;
+/// use runtime::{host::Host, launcher::Launcher, manifest::ManifestBuilder, registry::Registry};
+///
+/// #[derive(bus::OutputPorts)]
+/// struct Outputs {
+///     command: MotorCommand,
+/// }
+/// struct Constant;
+/// impl Component for Constant {
+///     const INFO: Info = Info::new("constant", "sends one command for ever");
+///     type Parameters = std::collections::BTreeMap<String, f64>;
+///     type Inputs<'a> = ();
+///     type Outputs = Outputs;
+///     type State = ();
+///     fn new(_: Self::Parameters, _: &NodeContext<'_>) -> Result<Self, ParameterError> {
+///         Ok(Self)
+///     }
+///     fn initial(&self) {}
+///     fn step(&mut self, _: &StepContext<'_>, (): (), (): &mut ()) -> Result<Outputs, StepError> {
+///         Ok(Outputs { command: MotorCommand { command: [76.5; 4], ..Default::default() } })
+///     }
+/// }
+/// const COMPONENTS: Registry = Registry::new(&[
+///     Registration::of::<Constant>(),
+///     Registration::of::<recorder::node::Recorder>(),
+/// ]);
+///
+/// let folder = tempfile::tempdir()?;
+/// let manifest = ManifestBuilder::new()
+///     .set("run.rate_hz", 1000)
+///     .set("run.duration_s", 0.05)
+///     .set("process.source.kind", "constant")
+///     .set("process.recorder.kind", "recorder")
+///     .build(&folder.path().join("constant.toml"), COMPONENTS)?;
+/// let mut farthest = 0;
+/// let launcher = Launcher::new(Host::InProcess).followed_by(|event| {
+///     if let RunEvent::Progress(now) = event {
+///         farthest = now.ticks;
+///     }
+/// });
+/// let (outcome, recording) = launcher.fly(&manifest, &folder.path().join("constant.mcap"))?;
+/// assert_eq!((outcome.ticks, farthest), (50, 50));
+/// let commands = recording.unwrap().series(&[("/source/command", "command[0]")])?;
+/// assert!(commands[0].value.iter().all(|&count| count == 76.5));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub struct Launcher<'a> {
     host: Host,
     stop: StopToken,
     adopts_orphans: bool,
     on: Box<dyn FnMut(RunEvent<'_>) + 'a>,
     remote: Remote,
-    requests: Receiver<server::Asked>,
+    requests: Receiver<Asked>,
 }
 
 impl<'a> Launcher<'a> {
@@ -82,8 +134,9 @@ impl<'a> Launcher<'a> {
     }
 
     /// What the nodes' processes start themselves is ended with the run, however it was detached: this process becomes
-    /// the parent of orphans (`PR_SET_CHILD_SUBREAPER`) while the run flies. For a process that flies one run at a time and starts no other
-    /// children meanwhile: those would be ended with the run.
+    /// the parent of orphans (`PR_SET_CHILD_SUBREAPER`) while the run flies. For a process that starts no other children
+    /// meanwhile: those would be ended with the run. While such a run flies the process flies no other, and the launch
+    /// of one is refused.
     #[must_use]
     pub fn adopting_orphans(mut self) -> Self {
         self.adopts_orphans = true;
@@ -121,6 +174,7 @@ impl<'a> Launcher<'a> {
         outputs: &mut Outputs,
     ) -> Result<Outcome> {
         require_host(&self.host, manifest, graph)?;
+        let place = Place::take(self.adopts_orphans)?;
         let run_dir = RunDir::create(&manifest.path)?;
         // Before anything is touched that an earlier run left.
         bus::room::require(&graph.plan, &manifest.registry().messages())?;
@@ -138,7 +192,7 @@ impl<'a> Launcher<'a> {
         let control = Arc::new(SupervisorView::create(&graph.plan)?);
         let (plan, dir) = (&graph.plan, run_dir.path());
         // Dropped behind the supervisor, which ends the processes.
-        let descendants = self.adopts_orphans.then(|| Descendants::of_run(dir));
+        let descendants = self.adopts_orphans.then(|| Descendants::of_run(&place));
         let world = HostWorld {
             host: self.host,
             manifest,

@@ -1,11 +1,13 @@
 //! Checks manifests, and launches the runs that they describe: starts the processes, watches over them, and takes
 //! everything down again.
 
+mod claimed_file;
 pub mod clean;
 pub mod ctl;
 mod descendants;
 pub mod describe;
 pub mod event;
+mod file_lock;
 pub mod flight;
 pub mod graph;
 pub mod host;
@@ -22,7 +24,7 @@ mod process_table;
 mod processes;
 pub mod program;
 pub mod registry;
-pub mod replacement;
+mod replacement;
 mod role;
 pub mod run_dir;
 mod sidecars;

@@ -37,6 +37,17 @@ use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
 /// A manifest with the texts it was read from.
+///
+/// ```
+/// use runtime::{manifest::Manifest, registry::Registry};
+/// let text = "[run]\nduration_s = 2.0".to_owned();
+/// let manifest = Manifest::parse(text, "hover.toml".as_ref(), &[], Registry::default())?;
+/// assert_eq!(manifest.name(), "hover");
+///
+/// let problem = manifest.set("run.duration_s", "long").unwrap_err();
+/// assert!(problem.to_string().contains("--set"), "{problem}");
+/// # Ok::<(), runtime::problem::Problem>(())
+/// ```
 #[derive(Debug)]
 pub struct Manifest {
     /// The file.

@@ -2,9 +2,10 @@
 //!
 //! A second run that would write to one of them is refused at its start, and is told who does.
 
+use crate::claimed_file::{LogClaim, Partial, partial_path};
 use crate::graph::Graph;
 use crate::manifest::Manifest;
-use crate::output_file::{self, Kind, LOG, LogClaim, Partial, RECORDING, is_same};
+use crate::output_file::{self, Kind, LOG, RECORDING, is_same};
 use crate::program::Program;
 use crate::run_dir::{self, RunDir};
 use anyhow::{Context, Result, bail};
@@ -81,7 +82,7 @@ impl Outputs {
     ///
     /// # Errors
     /// If another run writes to one of them; the error names it.
-    pub fn claim(&mut self, run_dir: &RunDir) -> Result<()> {
+    pub(crate) fn claim(&mut self, run_dir: &RunDir) -> Result<()> {
         if let Some(recording) = &self.recording {
             let partial = recording.claimed(Partial::claim)?;
             if partial.path().to_str().is_none() {
@@ -146,7 +147,7 @@ impl Outputs {
 impl Output {
     /// The file that this recording is while the run flies.
     fn until_complete(&self) -> Result<Self> {
-        let path = output_file::partial_path(&output_file::real_path(&self.path)?)?;
+        let path = partial_path(&output_file::real_path(&self.path)?)?;
         let what = "the recording until it is complete".to_owned();
         Ok(Self { what, path, kind: self.kind, advice: self.advice.clone() })
     }

@@ -102,8 +102,8 @@ fn feedback_loops(plan: &Plan) -> Vec<Option<usize>> {
     let mut number = 0;
     for node in 0..count {
         if reaches[node][node] && loops[node].is_none() {
-            let members = (0..count).filter(|&other| reaches[node][other] && reaches[other][node]);
-            members.for_each(|member| loops[member] = Some(number));
+            let nodes = (0..count).filter(|&other| reaches[node][other] && reaches[other][node]);
+            nodes.for_each(|node| loops[node] = Some(number));
             number += 1;
         }
     }

@@ -7,6 +7,13 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 /// A problem at a place in a file, and what else is wrong.
+///
+/// ```
+/// use runtime::{manifest::Manifest, registry::Registry};
+/// let text = "[run]\nduration = 2.0".to_owned();
+/// let problem = Manifest::parse(text, "hover.toml".as_ref(), &[], Registry::default()).unwrap_err();
+/// assert!(problem.to_string().starts_with("hover.toml:2:1: unknown field `duration`"), "{problem}");
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct Problem {
     file: PathBuf,

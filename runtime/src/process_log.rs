@@ -103,7 +103,7 @@ mod tests {
     use super::{KEPT_BYTES, LINE_CHARS, LINES, bound, last_words, printable};
     use std::io::Write as _;
 
-    fn words_of(log: &[u8]) -> Vec<String> {
+    fn lines_of(log: &[u8]) -> Vec<String> {
         let mut file = tempfile::NamedTempFile::new().unwrap();
         file.write_all(log).unwrap();
         last_words(file.path())
@@ -112,24 +112,24 @@ mod tests {
     #[test]
     fn the_last_lines_are_shown_and_a_panic_from_its_message_on() {
         let numbered: String = (0..100).map(|n| format!("line {n}\n")).collect();
-        let words = words_of(numbered.as_bytes());
+        let lines = lines_of(numbered.as_bytes());
         assert_eq!(
-            (words.len(), words[0].as_str(), words[LINES - 1].as_str()),
+            (lines.len(), lines[0].as_str(), lines[LINES - 1].as_str()),
             (LINES, "line 80", "line 99")
         );
         let panic = format!("thread 'main' panicked at src/x.rs:1:1:\nthe propeller came off\n{numbered}");
-        assert_eq!(words_of(panic.as_bytes())[1], "the propeller came off");
-        assert!(words_of(b"").is_empty() && words_of(b"\n\n").is_empty());
+        assert_eq!(lines_of(panic.as_bytes())[1], "the propeller came off");
+        assert!(lines_of(b"").is_empty() && lines_of(b"\n\n").is_empty());
         assert!(last_words("/nowhere/log".as_ref()).is_empty());
         assert!(last_words("/dev/zero".as_ref()).is_empty(), "a device has no end");
     }
 
     #[test]
     fn a_line_without_end_is_cut() {
-        let words = words_of(&vec![b'x'; 5_000_000]);
-        assert_eq!(words.len(), 1);
-        assert!(words[0].chars().count() < LINE_CHARS + 50, "{}", words[0]);
-        assert!(words[0].contains("characters left out"));
+        let lines = lines_of(&vec![b'x'; 5_000_000]);
+        assert_eq!(lines.len(), 1);
+        assert!(lines[0].chars().count() < LINE_CHARS + 50, "{}", lines[0]);
+        assert!(lines[0].contains("characters left out"));
     }
 
     #[test]
@@ -137,8 +137,8 @@ mod tests {
         let mut flood = b"panicked at the very start\n".to_vec();
         flood.extend(b"noise noise noise noise\n".repeat(100_000));
         flood.extend(b"the last line\n");
-        let words = words_of(&flood);
-        assert_eq!((words.len(), words[LINES - 1].as_str()), (LINES, "the last line"));
+        let lines = lines_of(&flood);
+        assert_eq!((lines.len(), lines[LINES - 1].as_str()), (LINES, "the last line"));
     }
 
     #[test]

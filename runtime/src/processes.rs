@@ -1,6 +1,6 @@
 //! The processes of a run: watched, and taken down.
 
-use crate::host::End;
+use crate::host::{self, End};
 use crate::role::Role;
 use crate::view::SegmentWrite;
 use crate::watch_clock::WatchClock;
@@ -94,7 +94,10 @@ impl<B: Body> Processes<B> {
 
 impl<B: Body> Drop for Processes<B> {
     fn drop(&mut self) {
-        self.running.iter_mut().for_each(Process::kill);
+        // All are asked before one is waited for: those that hang share one patience.
+        self.running.iter().for_each(|process| process.body.cancel());
+        let mut patience = host::GRACE;
+        self.running.iter_mut().for_each(|process| process.kill_within(&mut patience));
     }
 }
 
@@ -118,8 +121,12 @@ impl<B: Body> Process<B> {
 
     /// Kills the process and its group, and waits for its end.
     pub fn kill(&mut self) {
+        self.kill_within(&mut host::GRACE.clone());
+    }
+
+    fn kill_within(&mut self, patience: &mut Duration) {
         if self.end.is_none() {
-            self.end = self.body.kill();
+            self.end = self.body.kill(patience);
         }
     }
 

@@ -5,6 +5,14 @@ use bus::schema::Schema;
 use std::collections::BTreeMap;
 
 /// The components that a manifest may name: whoever checks or launches one says which there are.
+///
+/// ```
+/// use bus::Registration;
+/// use runtime::registry::Registry;
+/// const COMPONENTS: Registry = Registry::new(&[Registration::of::<recorder::node::Recorder>()]);
+/// assert_eq!(COMPONENTS.names(), "recorder");
+/// assert!(COMPONENTS.find("recorder").is_some() && COMPONENTS.find("imu").is_none());
+/// ```
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Registry(&'static [Registration]);
 

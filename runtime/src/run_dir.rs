@@ -4,12 +4,12 @@
 //! is a file in /dev/shm that the launcher holds locked for its life. The kernel gives the lock back when the
 //! launcher dies, however it dies: so who can have the lock knows that the run is dead.
 
+use crate::file_lock;
 use anyhow::{Context, Result, bail};
-pub use bus::names::SHARED_MEMORY;
+pub(crate) use bus::names::SHARED_MEMORY;
 use bus::names::shm_prefix;
 use bus::process::user_id;
 use bus::user_file;
-use rustix::fs::{FlockOperation, flock};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
 use std::ffi::OsStr;
@@ -43,7 +43,7 @@ impl Entry {
     }
 
     /// What stands in the file of the entry of run `run_id`; `None` for anything else.
-    pub fn read(run_id: &str, file: &File) -> Option<Self> {
+    pub(crate) fn read(run_id: &str, file: &File) -> Option<Self> {
         let mut text = String::new();
         file.take(ENTRY_BYTES_MAX).read_to_string(&mut text).ok()?;
         let entry: Self = serde_json::from_str(&text).ok()?;
@@ -53,7 +53,7 @@ impl Entry {
 
 /// The folders in which runs have their directories: that for temporary files, or else the first of the others that is
 /// there. `TMPDIR` may be a path that iceoryx2 does not take.
-pub fn folders() -> Vec<PathBuf> {
+pub(crate) fn folders() -> Vec<PathBuf> {
     let own = std::env::var_os("TMPDIR").filter(|path| !path.is_empty()).map(PathBuf::from);
     let session = std::env::var_os("XDG_RUNTIME_DIR").map(PathBuf::from).filter(|path| path.is_absolute());
     let all = own.into_iter().chain(["/tmp".into()]).chain(session).chain([SHARED_MEMORY.into()]);
@@ -81,7 +81,7 @@ fn may_create(path: &Path) -> bool {
 
 /// Where a run keeps its files; dropping it removes them, the run's shared memory, and its entry.
 #[derive(Debug)]
-pub struct RunDir {
+pub(crate) struct RunDir {
     entry: Entry,
     /// The entry and the directory, locked until the process ends.
     _locks: [File; 2],
@@ -173,13 +173,13 @@ fn dir_name(run_id: &str) -> String {
 }
 
 /// The run whose directory has this name; `None` for anything else, and for runs of other users.
-pub fn run_of_dir(name: &str) -> Option<&str> {
+pub(crate) fn run_of_dir(name: &str) -> Option<&str> {
     let run_id = name.strip_prefix("hummingbus-")?.strip_prefix(&user_id().to_string())?;
     run_id.strip_prefix('-').filter(|run_id| is_run_id(run_id))
 }
 
 /// The run to which a shared-memory file of this name belongs; `None` for anything else.
-pub fn run_of_shared_memory(name: &str) -> Option<&str> {
+pub(crate) fn run_of_shared_memory(name: &str) -> Option<&str> {
     name.strip_prefix("hb_")?.split_once('_').map(|(run_id, _)| run_id).filter(|run_id| is_run_id(run_id))
 }
 
@@ -189,28 +189,28 @@ fn is_run_id(text: &str) -> bool {
 }
 
 /// Where the entry of run `run_id` lies.
-pub fn entry_path(run_id: &str) -> PathBuf {
+pub(crate) fn entry_path(run_id: &str) -> PathBuf {
     Path::new(SHARED_MEMORY).join(format!("{}run", shm_prefix(run_id)))
 }
 
 /// Whether this is a path to a directory of the name that run `run_id` gives its own.
-pub fn is_run_dir_of(path: &Path, run_id: &str) -> bool {
+pub(crate) fn is_run_dir_of(path: &Path, run_id: &str) -> bool {
     path.is_absolute() && path.file_name().and_then(OsStr::to_str).and_then(run_of_dir) == Some(run_id)
 }
 
 /// Whether there is a directory of this user, and no link to one.
-pub fn is_own_run_dir(path: &Path) -> bool {
+pub(crate) fn is_own_run_dir(path: &Path) -> bool {
     let found = path.symlink_metadata();
     found.is_ok_and(|found| found.is_dir() && found.uid() == user_id())
 }
 
 /// Whether there is something of this user that is no folder: runs have none in shared memory.
-pub fn is_own_name(path: &Path) -> bool {
+pub(crate) fn is_own_name(path: &Path) -> bool {
     path.symlink_metadata().is_ok_and(|found| !found.is_dir() && found.uid() == user_id())
 }
 
 /// Every shared-memory file of run `run_id` but its entry.
-pub fn shared_memory_of(run_id: &str) -> Vec<PathBuf> {
+pub(crate) fn shared_memory_of(run_id: &str) -> Vec<PathBuf> {
     let (prefix, entry) = (shm_prefix(run_id), entry_path(run_id));
     let files = std::fs::read_dir(SHARED_MEMORY).into_iter().flatten().flatten();
     let belongs = |file: &std::fs::DirEntry| file.file_name().to_string_lossy().starts_with(&prefix);
@@ -235,7 +235,7 @@ fn register(entry: &Entry) -> Result<Option<File>> {
 
 fn lock_and_write(mut file: File, text: &[u8]) -> std::io::Result<Option<File>> {
     // Waits while `clean` has the lock.
-    rustix::io::retry_on_intr(|| flock(&file, FlockOperation::LockExclusive))?;
+    file_lock::exclusive(&file)?;
     if file.metadata()?.nlink() == 0 {
         return Ok(None);
     }
@@ -253,7 +253,7 @@ fn create_locked(run_dir: &Path) -> std::io::Result<File> {
     let opened = std::fs::set_permissions(run_dir, std::fs::Permissions::from_mode(0o700))
         .and_then(|()| user_file::open_folder(run_dir));
     let locked = opened.and_then(|directory| {
-        rustix::io::retry_on_intr(|| flock(&directory, FlockOperation::LockExclusive))?;
+        file_lock::exclusive(&directory)?;
         Ok(directory)
     });
     if locked.is_err() {
@@ -264,31 +264,29 @@ fn create_locked(run_dir: &Path) -> std::io::Result<File> {
 
 /// Whether the launcher that locked `entry` lives. Asking does not disturb others who ask.
 fn is_locked(entry: &File) -> bool {
-    let is_free = rustix::io::retry_on_intr(|| flock(entry, FlockOperation::NonBlockingLockShared)).is_ok();
+    let is_free = file_lock::try_shared(entry).unwrap_or(false);
     if is_free {
-        let _ = flock(entry, FlockOperation::Unlock);
+        let _ = entry.unlock();
     }
     !is_free
 }
 
 /// A claim on what a dead run left. While it is held, no launcher can take up the run's entry.
 #[derive(Debug)]
-pub struct Claim {
+pub(crate) struct Claim {
     _locks: Vec<File>,
 }
 
 /// Claims what run `run_id` left, with those of `run_dirs` that there are; `None` if it is alive.
 ///
 /// Without an entry nobody lives on this side of /dev/shm: it is made before everything else, and removed after.
-pub fn try_claim(run_id: &str, run_dirs: &BTreeSet<PathBuf>) -> Option<Claim> {
+pub(crate) fn try_claim(run_id: &str, run_dirs: &BTreeSet<PathBuf>) -> Option<Claim> {
     let (mut locks, entry) = (Vec::new(), entry_path(run_id));
     let opened = std::iter::once(open_own(&entry, user_file::open(&entry, false)));
     let opened = opened.chain(run_dirs.iter().map(|path| open_own(path, user_file::open_folder(path))));
     for file in opened {
         if let Some(file) = file.ok()? {
-            let taken = rustix::io::retry_on_intr(|| flock(&file, FlockOperation::NonBlockingLockShared));
-            taken.ok()?;
-            locks.push(file);
+            file_lock::try_shared(&file).ok()?.then(|| locks.push(file))?;
         }
     }
     Some(Claim { _locks: locks })
@@ -309,6 +307,15 @@ fn is_own_file(path: &Path) -> bool {
 }
 
 /// A run that was alive when it was found.
+///
+/// ```
+/// use runtime::run_dir::{find_live, live_runs};
+/// for run in live_runs() {
+///     println!("{} flies {}", run.entry.run_id, run.entry.manifest.display());
+/// }
+/// // No run is called so.
+/// assert!(find_live(Some("0-0")).is_err());
+/// ```
 #[derive(Debug)]
 pub struct LiveRun {
     /// What it says of itself.

@@ -1,6 +1,6 @@
 //! Starting one process of a run.
 
-use crate::output_file::append_to_log;
+use crate::claimed_file::append_to_log;
 use crate::program::{Executable, Program};
 use crate::role::Role;
 use anyhow::{Context, Result};
@@ -39,9 +39,9 @@ pub fn start(
 ) -> Result<(Child, PathBuf)> {
     let mut command = match &program.executable {
         Executable::Component(registration) => component(exe, registration.name),
-        Executable::Command(words) => {
-            let mut command = Command::new(&words[0]);
-            command.args(&words[1..]);
+        Executable::Command(args) => {
+            let mut command = Command::new(&args[0]);
+            command.args(&args[1..]);
             command
         }
     };

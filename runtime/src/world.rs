@@ -78,8 +78,11 @@ pub trait Body {
     /// # Errors
     /// If it cannot be watched.
     fn end(&mut self) -> Result<Option<End>>;
-    /// Kills it and its group, and waits for its end.
-    fn kill(&mut self) -> Option<End>;
+    /// Asks a thread to end; a process is not asked.
+    fn cancel(&self) {}
+    /// Kills it and its group, and waits for its end. `patience` is how long a thread may take, and what it took is taken
+    /// from it.
+    fn kill(&mut self, patience: &mut Duration) -> Option<End>;
     /// The last lines that it wrote.
     fn last_lines(&self) -> Vec<String>;
     /// Keeps its log from filling the file system of the run directory. A log that the manifest names is its user's.

@@ -1,7 +1,6 @@
 //! What dead runs left is removed, and nothing of live ones, wherever their temporary files lie.
 
 use crate::support::{Launch, Place, poll, repository};
-use rustix::fs::{FlockOperation, flock};
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
@@ -124,7 +123,7 @@ fn a_run_directory_that_its_launcher_has_locked_is_kept() {
     let run_dir = place.path(&format!("tmp/hummingbus-{}-fffffff-2", bus::process::user_id()));
     std::fs::create_dir(&run_dir).unwrap();
     let lock = std::fs::File::open(&run_dir).unwrap();
-    flock(&lock, FlockOperation::LockExclusive).unwrap();
+    lock.lock().unwrap();
     assert!(is_live(&clean(&place, &[]), "fffffff-2"));
     assert!(Path::new(&run_dir).exists());
     drop(lock);

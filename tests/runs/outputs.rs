@@ -4,7 +4,6 @@ use crate::laps;
 use crate::nodes::{manifest, sender, table};
 use crate::recordings::{open, rows};
 use crate::support::{Ended, HUMMINGBUS, Launch, Place, partial, poll, repository};
-use rustix::fs::{FlockOperation, flock};
 use rustix::process::{Signal, kill_process};
 use std::fs::{self, File};
 use std::os::unix::fs::{FileTypeExt, MetadataExt, PermissionsExt, symlink};
@@ -502,10 +501,10 @@ fn validate_keeps_in_a_folder_of_its_own_and_replaces_its_own_files_alone() {
     place.call(&args).with_code(0);
     assert_eq!(names(&place.path("kept/level")), ["flight.csv", "flight.mcap", "manifest.toml"]);
     let folder = File::open(place.path("kept/level")).unwrap();
-    flock(&folder, FlockOperation::LockExclusive).unwrap();
+    folder.lock().unwrap();
     place.call(&args).with_code(2).says(&["another hummingbus writes to it now"]);
     // Not by closing it: a process that another test starts at this moment may have it open too.
-    flock(&folder, FlockOperation::Unlock).unwrap();
+    folder.unlock().unwrap();
     // A flight that was kept is read again: it is not to be replaced by what comes of it.
     let kept_flight = place.path("kept/level/flight.csv");
     let again = flights(&place, &vehicle, &[("level", &kept_flight)]);

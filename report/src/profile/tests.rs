@@ -11,7 +11,7 @@ use super::times::Times;
 use bus::plan::{InputPlan, NodePlan, OutputPlan, Pace, Plan, TopicPlan, Wait};
 use bus::profile::{GrantWriter, TickWriter};
 use runtime::flight::{Cause, Flight};
-use runtime::replacement::{Purpose, Report};
+use runtime::launcher::{Purpose, Report};
 use serde_json::Value;
 
 const PLANT: usize = 0;

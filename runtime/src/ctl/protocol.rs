@@ -8,7 +8,14 @@ use serde::{Deserialize, Serialize};
 /// The name of the socket in the run directory.
 pub const SOCKET: &str = "ctl.sock";
 
-/// What can be asked of a run.
+/// What can be asked of a run. On the socket each is a line of JSON.
+///
+/// ```
+/// use runtime::ctl::protocol::Request;
+/// let line = serde_json::to_string(&Request::Step { ticks: 7 })?;
+/// assert_eq!(line, r#"{"request":"step","ticks":7}"#);
+/// # Ok::<(), serde_json::Error>(())
+/// ```
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[serde(tag = "request", rename_all = "kebab-case", deny_unknown_fields)]
 pub enum Request {
@@ -43,7 +50,15 @@ pub enum Request {
     },
 }
 
-/// What a run answers.
+/// What a run answers. On the socket each is a line of JSON.
+///
+/// ```
+/// use runtime::ctl::protocol::Answer;
+/// let answer: Answer = serde_json::from_str(r#"{"answer":"done","text":"paused at tick 5","tick":5}"#)?;
+/// let Answer::Done { tick, .. } = answer else { panic!("{answer:?}") };
+/// assert_eq!(tick, 5);
+/// # Ok::<(), serde_json::Error>(())
+/// ```
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[serde(tag = "answer", rename_all = "kebab-case")]
 pub enum Answer {

@@ -2,13 +2,14 @@
 
 use crate::ctl::protocol::{Answer, Request, SOCKET};
 use anyhow::{Context, Result};
-use std::fs::File;
 use std::io::{BufRead, BufReader, Write};
+use std::net::Shutdown;
 use std::os::unix::net::{UnixListener, UnixStream};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, Sender, channel};
+use std::thread::JoinHandle;
 use std::time::Duration;
 
 /// How long a client that does not read may hold the launcher up.
@@ -16,12 +17,20 @@ const WRITE_TIMEOUT: Duration = Duration::from_millis(100);
 /// Between two attempts to let a client in.
 const PAUSE: Duration = Duration::from_millis(100);
 
-/// The open socket of a run; dropping it closes it.
+/// The open socket of a run; dropping it closes it, and ends the threads that serve it.
 pub struct Server {
     requests: Receiver<Asked>,
-    folder: File,
-    is_closed: Arc<AtomicBool>,
+    listener: Arc<Listener>,
+    thread: Option<JoinHandle<()>>,
 }
+
+struct Listener {
+    socket: UnixListener,
+    is_closed: AtomicBool,
+}
+
+/// A client, and the thread that reads what it asks.
+type Client = (UnixStream, JoinHandle<()>);
 
 /// A request, and where its answer goes.
 pub type Asked = (Request, Reply);
@@ -70,29 +79,11 @@ impl Server {
     /// If the socket cannot be made.
     pub fn start(run_dir: &Path, remote: Remote, requests: Receiver<Asked>) -> Result<Self> {
         let folder = bus::user_file::open_folder(run_dir).context("cannot open the run directory")?;
-        let listener = UnixListener::bind(socket_path(&folder)).context("cannot open the control socket")?;
-        let is_closed = Arc::new(AtomicBool::new(false));
-        let flag = is_closed.clone();
-        // Those that serve a client end when it leaves.
-        std::thread::spawn(move || {
-            for stream in listener.incoming() {
-                if flag.load(Ordering::SeqCst) {
-                    return;
-                }
-                let Ok(stream) = stream else {
-                    // Out of file descriptors, most likely: clients wait until there are some again.
-                    std::thread::sleep(PAUSE);
-                    continue;
-                };
-                // Nobody else gets through the run directory; root does everywhere.
-                if !is_own_user(&stream) {
-                    continue;
-                }
-                let sender = remote.0.clone();
-                std::thread::spawn(move || read_requests(&stream, &sender));
-            }
-        });
-        Ok(Self { requests, folder, is_closed })
+        let socket = UnixListener::bind(socket_path(&folder)).context("cannot open the control socket")?;
+        let listener = Arc::new(Listener { socket, is_closed: AtomicBool::new(false) });
+        let accepting = listener.clone();
+        let thread = thread().spawn(move || accepting.serve(&remote)).context("cannot start a thread")?;
+        Ok(Self { requests, listener, thread: Some(thread) })
     }
 
     /// The next request, if one has come.
@@ -126,11 +117,50 @@ fn read_requests(stream: &UnixStream, sender: &Sender<Asked>) {
     }
 }
 
+impl Listener {
+    /// Lets clients in until the socket is closed, and then has those that are there leave.
+    fn serve(&self, remote: &Remote) {
+        let mut clients: Vec<Client> = Vec::new();
+        for stream in self.socket.incoming() {
+            if self.is_closed.load(Ordering::SeqCst) {
+                break;
+            }
+            clients.retain(|(_, thread)| !thread.is_finished());
+            match stream.and_then(|stream| client(stream, remote)) {
+                Ok(client) => clients.extend(client),
+                // Out of file descriptors, most likely: clients wait until there are some again.
+                Err(_) => std::thread::sleep(PAUSE),
+            }
+        }
+        for (stream, thread) in clients {
+            // It reads what was asked before, and then the end; answers still get through.
+            let _ = stream.shutdown(Shutdown::Read);
+            let _ = thread.join();
+        }
+    }
+}
+
+/// Has a thread read what the client at the other end of `stream` asks.
+fn client(stream: UnixStream, remote: &Remote) -> std::io::Result<Option<Client>> {
+    // Nobody else gets through the run directory; root does everywhere.
+    if !is_own_user(&stream) {
+        return Ok(None);
+    }
+    let (requests, sender) = (stream.try_clone()?, remote.0.clone());
+    let thread = thread().spawn(move || read_requests(&requests, &sender))?;
+    Ok(Some((stream, thread)))
+}
+
+fn thread() -> std::thread::Builder {
+    std::thread::Builder::new().name("control".to_owned())
+}
+
 impl Drop for Server {
     fn drop(&mut self) {
-        self.is_closed.store(true, Ordering::SeqCst);
-        // The listener waits for somebody: this one has it look.
-        let _ = UnixStream::connect(socket_path(&self.folder));
+        self.listener.is_closed.store(true, Ordering::SeqCst);
+        // Who waits for a client returns with an error.
+        let _ = rustix::net::shutdown(&self.listener.socket, rustix::net::Shutdown::Both);
+        self.thread.take().map(JoinHandle::join);
     }
 }
 
@@ -156,5 +186,45 @@ impl Reply {
 impl Drop for Reply {
     fn drop(&mut self) {
         self.answer(&ended());
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Remote, Server, socket_path};
+    use bus::user_file::open_folder;
+    use std::io::Read as _;
+    use std::os::unix::net::UnixStream;
+    use std::sync::mpsc::channel;
+
+    fn threads() -> usize {
+        let tasks = std::fs::read_dir("/proc/self/task").unwrap().flatten();
+        let names = tasks.filter_map(|task| std::fs::read_to_string(task.path().join("comm")).ok());
+        names.filter(|name| name.trim() == "control").count()
+    }
+
+    #[test]
+    fn a_socket_that_closes_ends_its_threads_whatever_its_clients_do() {
+        let folder = tempfile::tempdir().unwrap();
+        let (sender, requests) = channel();
+        let server = Server::start(folder.path(), Remote::new(sender), requests).unwrap();
+        let connect = || {
+            let opened = open_folder(folder.path()).unwrap();
+            UnixStream::connect(socket_path(&opened))
+        };
+        let mut clients: Vec<_> = (0..3).map(|_| connect().unwrap()).collect();
+        // One that says nothing, one that has gone, and one that is served.
+        drop(clients.pop());
+        std::io::Write::write_all(&mut clients[0], b"{\"request\":\"status\"}\n").unwrap();
+        while server.poll().is_none() {
+            std::thread::yield_now();
+        }
+        assert!(threads() > 0);
+        drop(server);
+        assert_eq!(threads(), 0);
+        let mut rest = String::new();
+        clients[0].read_to_string(&mut rest).unwrap();
+        assert!(rest.contains("the run ended first"), "{rest}");
+        assert!(connect().is_err());
     }
 }

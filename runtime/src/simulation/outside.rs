@@ -191,7 +191,7 @@ impl Body for SimBody {
         Ok(self.sim.borrow().instances[self.index].end.clone())
     }
 
-    fn kill(&mut self) -> Option<End> {
+    fn kill(&mut self, _: &mut Duration) -> Option<End> {
         let sim = &mut *self.sim.borrow_mut();
         sim.note(|sim| format!("kill {:?}", sim.instances[self.index]));
         if sim.bug == Some(Bug::KillMisses) && !sim.segment.is_aborted {

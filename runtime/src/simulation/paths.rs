@@ -1,7 +1,7 @@
 //! Runs that write to one path: who begins, writes, ends or dies when is drawn from a seed; the files are real ones.
 
 use super::sim::Draw;
-use crate::output_file::{LogClaim, Partial};
+use crate::claimed_file::{LogClaim, Partial};
 use recorder::writer::START;
 use std::collections::BTreeSet;
 use std::fs;

@@ -1,0 +1,322 @@
+//! Recordings and logs that one run at a time writes: claimed before it begins, locked while it writes.
+
+use crate::file_lock;
+use crate::output_file::{LOG, LOG_START, RECORDING, check};
+use anyhow::{Context, Result, bail};
+use rustix::fs::OFlags;
+use std::fs::{File, Metadata, OpenOptions};
+use std::io::{self, ErrorKind, Write as _};
+use std::os::unix::fs::{FileExt as _, MetadataExt as _, OpenOptionsExt as _};
+use std::path::{Path, PathBuf};
+
+/// What stands in the name of a recording in front of its extension while it is not complete.
+const PARTIAL: &str = ".partial";
+
+/// What came of trying to lock a file.
+enum Attempt {
+    Locked(File),
+    /// Somebody else holds it.
+    Held,
+    /// It was removed or renamed before it was locked.
+    Gone,
+}
+
+fn try_lock(file: File, path: &Path) -> io::Result<Attempt> {
+    Ok(match file_lock::try_exclusive(&file)? {
+        true if is_at(&file, path) => Attempt::Locked(file),
+        true => Attempt::Gone,
+        false => Attempt::Held,
+    })
+}
+
+/// Whether `file` is what lies at `path`.
+fn is_at(file: &File, path: &Path) -> bool {
+    let identity = |file: Metadata| (file.dev(), file.ino());
+    let found = std::fs::symlink_metadata(path).map(identity);
+    matches!((file.metadata().map(identity), found), (Ok(opened), Ok(found)) if opened == found)
+}
+
+fn open_options() -> OpenOptions {
+    let mut options = OpenOptions::new();
+    // Neither follows a link that was put there meanwhile nor waits for the other end of a pipe.
+    let flags = OFlags::NOFOLLOW | OFlags::NONBLOCK;
+    options.read(true).write(true).custom_flags(flags.bits().cast_signed());
+    options
+}
+
+/// A recording that is being written, under another name beside its place, and locked; dropping it leaves what was
+/// written there, or nothing where nothing was.
+#[derive(Debug)]
+pub struct Partial {
+    real: PathBuf,
+    path: PathBuf,
+    file: File,
+    kept: Option<PathBuf>,
+}
+
+impl Partial {
+    /// Claims the place `path` of a recording; `None` where somebody else writes there.
+    ///
+    /// What a broken run left there gets another name, and is never lost.
+    ///
+    /// # Errors
+    /// If something is in the way that must not be replaced, or the folder cannot be written to.
+    pub fn claim(path: &Path) -> Result<Option<Self>> {
+        let real = check(path, &RECORDING)?;
+        let partial = partial_path(&real)?;
+        check(&partial, &RECORDING)?;
+        let cannot = || format!("cannot create the recording {}", partial.display());
+        let claimed = claim_new(&partial).with_context(cannot)?;
+        Ok(claimed.map(|(file, kept)| Self { real, path: partial, file, kept }))
+    }
+
+    /// Where it is written.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Where what a broken run left lies now, if there was something.
+    pub fn kept(&self) -> Option<&Path> {
+        self.kept.as_deref()
+    }
+
+    /// Whether it still lies where it is written.
+    pub fn is_there(&self) -> bool {
+        is_at(&self.file, &self.path)
+    }
+
+    /// The file, whatever its name.
+    pub fn file(&self) -> &File {
+        &self.file
+    }
+
+    /// Whether something was written.
+    pub fn is_empty(&self) -> bool {
+        self.file.metadata().is_ok_and(|file| file.len() == 0)
+    }
+
+    /// Puts the file in its place.
+    ///
+    /// # Errors
+    /// If something came there during the run that must not be replaced, or the file was taken away.
+    pub fn finish(&self) -> Result<()> {
+        let cannot = || format!("cannot put {} in the place of {}", self.path.display(), self.real.display());
+        check(&self.real, &RECORDING)?;
+        if !is_at(&self.file, &self.path) {
+            bail!("{}: somebody removed or replaced it during the run", cannot());
+        }
+        std::fs::rename(&self.path, &self.real).with_context(cannot)
+    }
+}
+
+impl Drop for Partial {
+    fn drop(&mut self) {
+        if self.is_empty() && is_at(&self.file, &self.path) {
+            let _ = std::fs::remove_file(&self.path);
+        }
+    }
+}
+
+/// `hover.partial.mcap` for `hover.mcap`: where the recording is written that `real` is to be.
+///
+/// # Errors
+/// If `real` itself has such a name.
+pub fn partial_path(real: &Path) -> Result<PathBuf> {
+    let (stem, extension) = (real.file_stem().unwrap_or_default(), real.extension());
+    let is_partial = |name: &std::ffi::OsStr| name.as_encoded_bytes().ends_with(PARTIAL.as_bytes());
+    if is_partial(stem) || real.file_name().is_some_and(is_partial) {
+        bail!(
+            "cannot create the recording {}: such a name is that of what a broken run leaves; name another file",
+            real.display()
+        );
+    }
+    let mut name = stem.to_owned();
+    name.push(PARTIAL);
+    if let Some(extension) = extension {
+        name.push(".");
+        name.push(extension);
+    }
+    Ok(real.with_file_name(name))
+}
+
+/// A new file at `path`, locked, and where what lay there before is kept; `None` where somebody else has one there.
+///
+/// Of any number of processes that try at once exactly one gets it: only who has locked what lies there removes it, and
+/// who has created it and then finds it locked or gone has lost it to another.
+fn claim_new(path: &Path) -> io::Result<Option<(File, Option<PathBuf>)>> {
+    let mut kept = None;
+    loop {
+        let old = match open_options().open(path) {
+            Ok(old) => try_lock(old, path)?,
+            Err(error) if error.kind() == ErrorKind::NotFound => Attempt::Gone,
+            Err(error) => return Err(error),
+        };
+        match old {
+            Attempt::Held => return Ok(None),
+            Attempt::Gone => {}
+            // Locked until its name is gone: nobody removes a backup instead.
+            Attempt::Locked(old) => {
+                if let Some(message) = RECORDING.objection(&old)? {
+                    return Err(io::Error::other(message));
+                }
+                kept = keep_aside(&old, path)?.or(kept);
+            }
+        }
+        match open_options().create_new(true).open(path) {
+            Ok(new) => match try_lock(new, path)? {
+                Attempt::Locked(new) => return Ok(Some((new, kept))),
+                Attempt::Held => return Ok(None),
+                Attempt::Gone => {}
+            },
+            Err(error) if error.kind() == ErrorKind::AlreadyExists => {}
+            Err(error) => return Err(error),
+        }
+    }
+}
+
+/// Gives the locked recording `old` at `path` the first free name of `NAME-2.mcap`, `NAME-3.mcap`, …; one that is empty
+/// is removed.
+fn keep_aside(old: &File, path: &Path) -> io::Result<Option<PathBuf>> {
+    if old.metadata()?.len() == 0 {
+        return std::fs::remove_file(path).map(|()| None);
+    }
+    for number in 2_u32.. {
+        let mut name = path.file_stem().unwrap_or_default().to_owned();
+        name.push(format!("-{number}"));
+        if let Some(extension) = path.extension() {
+            name.push(".");
+            name.push(extension);
+        }
+        let aside = path.with_file_name(name);
+        // A second name first, which is never given to two files: no moment has none.
+        match std::fs::hard_link(path, &aside) {
+            Ok(()) => return std::fs::remove_file(path).map(|()| Some(aside)),
+            Err(error) if error.kind() == ErrorKind::AlreadyExists => {}
+            // Not every file system has second names.
+            Err(_) if !aside.exists() => return std::fs::rename(path, &aside).map(|()| Some(aside)),
+            Err(_) => {}
+        }
+    }
+    Err(io::Error::other("no name is free"))
+}
+
+/// A log that this run alone writes to, while this lives.
+#[derive(Debug)]
+pub struct LogClaim {
+    file: File,
+    path: PathBuf,
+    is_new: bool,
+}
+
+impl LogClaim {
+    /// Claims the log at `path`, which keeps what it holds for now; `None` where another run writes to it.
+    ///
+    /// # Errors
+    /// If something is there that must not be replaced, or the file cannot be created.
+    pub fn claim(path: &Path) -> Result<Option<Self>> {
+        let real = check(path, &LOG)?;
+        let cannot = || format!("cannot create the log {}", path.display());
+        loop {
+            let is_new = !real.exists();
+            let file = open_options().create(true).truncate(false).open(&real).with_context(cannot)?;
+            match try_lock(file, &real).with_context(cannot)? {
+                Attempt::Held => return Ok(None),
+                Attempt::Gone => {}
+                Attempt::Locked(file) => {
+                    if let Some(message) = LOG.objection(&file).with_context(cannot)? {
+                        bail!("{}: {message}", cannot());
+                    }
+                    return Ok(Some(Self { file, path: real, is_new }));
+                }
+            }
+        }
+    }
+
+    /// Removes what an earlier run wrote.
+    ///
+    /// # Errors
+    /// If it cannot be written to.
+    pub fn begin(&mut self) -> Result<()> {
+        self.is_new = false;
+        self.file
+            .set_len(0)
+            .and_then(|()| self.file.write_all_at(LOG_START.as_bytes(), 0))
+            .with_context(|| format!("cannot write the log {}", self.path.display()))
+    }
+}
+
+impl Drop for LogClaim {
+    fn drop(&mut self) {
+        if self.is_new && is_at(&self.file, &self.path) {
+            let _ = std::fs::remove_file(&self.path);
+        }
+    }
+}
+
+/// Opens the log at `path` to write at its end, one that was claimed or one that a backup brings with it.
+///
+/// # Errors
+/// If something else is there.
+pub fn append_to_log(path: &Path) -> Result<File> {
+    let cannot = || format!("cannot open the log {}", path.display());
+    let real = check(path, &LOG)?;
+    let flags = OFlags::NOFOLLOW.bits().cast_signed();
+    let options = OpenOptions::new().create(true).append(true).custom_flags(flags).clone();
+    let mut file = options.open(real).with_context(cannot)?;
+    if file.metadata().with_context(cannot)?.len() == 0 {
+        file.write_all(LOG_START.as_bytes()).with_context(cannot)?;
+    }
+    Ok(file)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Partial, partial_path};
+    use std::io::Write as _;
+    use std::path::Path;
+    use std::sync::atomic::{AtomicU32, Ordering};
+
+    /// Locks of one process exclude each other as those of two do: they belong to open files.
+    #[test]
+    fn a_place_is_claimed_by_one_at_a_time_whatever_the_others_leave() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("flown.mcap");
+        let holders = AtomicU32::new(0);
+        // It ends in order, breaks, or does not begin.
+        let claim_once = |end: u32| {
+            let partial = loop {
+                match Partial::claim(&path).unwrap() {
+                    Some(partial) => break partial,
+                    None => std::thread::yield_now(),
+                }
+            };
+            assert_eq!(holders.fetch_add(1, Ordering::SeqCst), 0, "two hold one place");
+            let mut file = partial.file();
+            if end != 0 {
+                file.write_all(recorder::writer::START).unwrap();
+            }
+            assert_eq!(holders.fetch_sub(1, Ordering::SeqCst), 1);
+            if end == 1 {
+                partial.finish().unwrap();
+            }
+        };
+        std::thread::scope(|scope| {
+            for thread in 0..4 {
+                let claim_once = &claim_once;
+                drop(scope.spawn(move || (0..300).for_each(|round| claim_once((thread + round) % 3))));
+            }
+        });
+        assert!(path.exists());
+    }
+
+    #[test]
+    fn recordings_of_different_names_are_written_under_different_names() {
+        let partial = |name: &str| partial_path(Path::new(name)).map(|path| path.display().to_string());
+        assert_eq!(partial("/a/hover.mcap").unwrap(), "/a/hover.partial.mcap");
+        assert_eq!(partial("/a/hover").unwrap(), "/a/hover.partial");
+        assert_eq!(partial("/a/hover.2.mcap").unwrap(), "/a/hover.2.partial.mcap");
+        for taken in ["/a/hover.partial.mcap", "/a/hover.partial"] {
+            assert!(partial(taken).unwrap_err().to_string().contains("what a broken run leaves"));
+        }
+    }
+}

@@ -1,0 +1,50 @@
+//! Locks on files: the kernel gives a lock back when the process that holds it dies, however it dies.
+
+use rustix::io::Errno;
+use std::fs::{File, TryLockError};
+use std::io::{self, ErrorKind};
+
+/// What to do where two runs could not be kept apart.
+const NO_LOCKS: &str = "the file system cannot lock files (flock), as some network file systems cannot; write to a local \
+                        folder and move the file afterwards";
+
+/// Locks `file` for this process alone; false where another process holds a lock on it.
+///
+/// # Errors
+/// If the file system has no locks.
+pub fn try_exclusive(file: &File) -> io::Result<bool> {
+    is_taken(file.try_lock())
+}
+
+/// Locks `file` against those who want it alone; false where one of them has it.
+///
+/// # Errors
+/// If the file system has no locks.
+pub fn try_shared(file: &File) -> io::Result<bool> {
+    is_taken(file.try_lock_shared())
+}
+
+/// Locks `file` for this process alone, and waits for others to give it back.
+///
+/// # Errors
+/// If the file system has no locks.
+pub fn exclusive(file: &File) -> io::Result<()> {
+    loop {
+        match file.lock() {
+            Err(error) if error.kind() == ErrorKind::Interrupted => {}
+            locked => return locked,
+        }
+    }
+}
+
+fn is_taken(attempt: Result<(), TryLockError>) -> io::Result<bool> {
+    match attempt {
+        Ok(()) => Ok(true),
+        Err(TryLockError::WouldBlock) => Ok(false),
+        Err(TryLockError::Error(error)) => {
+            let has_none =
+                matches!(Errno::from_io_error(&error), Some(Errno::NOSYS | Errno::NOLCK | Errno::OPNOTSUPP));
+            Err(if has_none { io::Error::other(NO_LOCKS) } else { error })
+        }
+    }
+}

@@ -1,0 +1,373 @@
+//! Faults of components on threads of this very process: whatever happens, the run ends, its error says why, and it
+//! leaves neither threads nor shared memory nor its directory.
+//!
+//! One test at a time: each counts what this process has left.
+
+use bus::component::{Component, Info, StepError};
+use bus::context::{NodeContext, StepContext};
+use bus::messages::MotorCommand;
+use bus::{InputPorts, OutputPorts, ParameterError, Registration};
+use hummingbus::{Answer, Host, Launcher, Manifest, ManifestBuilder, Progress, Request, RunEvent, StopToken};
+use runtime::registry::Registry;
+use std::path::Path;
+use std::sync::atomic::{AtomicBool, Ordering::SeqCst};
+use std::sync::{Mutex, PoisonError};
+use std::time::Duration;
+
+/// Counts its ticks, and does at one of them what it is told.
+struct Source(Parameters);
+
+#[derive(Clone, serde::Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Parameters {
+    fault: String,
+    #[serde(default)]
+    at_tick: u32,
+}
+
+#[derive(OutputPorts)]
+struct Outputs {
+    command: MotorCommand,
+}
+
+/// Whether a fault is still to come: a process that is started again does not meet it again.
+static IS_ARMED: AtomicBool = AtomicBool::new(false);
+/// Whether those that hang may go on.
+static IS_RELEASED: AtomicBool = AtomicBool::new(false);
+
+fn hang() {
+    while !IS_RELEASED.load(SeqCst) {
+        std::thread::sleep(Duration::from_millis(1));
+    }
+}
+
+impl Component for Source {
+    const INFO: Info = Info::new("source", "counts its ticks");
+    type Parameters = Parameters;
+    type Inputs<'a> = ();
+    type Outputs = Outputs;
+    type State = MotorCommand;
+
+    fn new(parameters: Parameters, _: &NodeContext<'_>) -> Result<Self, ParameterError> {
+        Ok(Self(parameters))
+    }
+
+    fn initial(&self) -> MotorCommand {
+        MotorCommand::default()
+    }
+
+    fn step(
+        &mut self,
+        context: &StepContext<'_>,
+        (): (),
+        state: &mut MotorCommand,
+    ) -> Result<Outputs, StepError> {
+        let is_due = self.0.fault != "none" && context.tick() == self.0.at_tick;
+        if is_due && IS_ARMED.swap(false, SeqCst) {
+            match self.0.fault.as_str() {
+                "panic" => panic!("the propeller came off"),
+                "error" => return Err("the gyroscope is stuck".into()),
+                "hang" => hang(),
+                other => unreachable!("{other}"),
+            }
+        }
+        state.command[0] += 1.0;
+        Ok(Outputs { command: *state })
+    }
+}
+
+/// Reads commands, and hangs behind a tick if it is told to.
+struct Sink(Parameters);
+
+#[derive(InputPorts)]
+struct Inputs<'a> {
+    command: &'a MotorCommand,
+}
+
+impl Component for Sink {
+    const INFO: Info = Info::new("sink", "reads commands");
+    type Parameters = Parameters;
+    type Inputs<'a> = Inputs<'a>;
+    type Outputs = ();
+    type State = ();
+
+    fn new(parameters: Parameters, _: &NodeContext<'_>) -> Result<Self, ParameterError> {
+        Ok(Self(parameters))
+    }
+
+    fn initial(&self) {}
+
+    fn step(&mut self, context: &StepContext<'_>, inputs: Inputs<'_>, (): &mut ()) -> Result<(), StepError> {
+        if self.0.fault == "hang" && context.tick() == self.0.at_tick {
+            hang();
+        }
+        let expected = f64::from(context.tick() + 1);
+        if inputs.command.command[0] == expected { Ok(()) } else { Err("a tick was skipped".into()) }
+    }
+}
+
+const COMPONENTS: Registry = Registry::new(&[
+    Registration::of::<Source>(),
+    Registration::of::<Sink>(),
+    Registration::of::<recorder::node::Recorder>(),
+]);
+
+/// What the threads of a run are called.
+const THREADS: [&str; 5] = ["clock", "source", "sink", "recorder", "control"];
+
+/// Two nodes and a recorder for `ticks` ticks; `fault` strikes the source at tick 50.
+fn plan(ticks: u32, fault: &str) -> ManifestBuilder {
+    ManifestBuilder::new()
+        .set("run.rate_hz", 1000)
+        .set("run.duration_s", f64::from(ticks) * 1e-3)
+        .set("process.source.kind", "source")
+        .set("process.source.parameters.fault", fault)
+        .set("process.source.parameters.at_tick", 50)
+        .set("process.sink.kind", "sink")
+        .set("process.sink.inputs.command", "/source/command")
+        .set("process.sink.parameters.fault", "none")
+        .set("process.recorder.kind", "recorder")
+}
+
+fn build(plan: &ManifestBuilder, folder: &Path) -> Manifest {
+    plan.build(&folder.join("faults.toml"), COMPONENTS).unwrap()
+}
+
+/// Flies `plan` with an armed fault; the counts that were recorded, or the error as text.
+fn flown(plan: &ManifestBuilder, folder: &Path) -> Result<Vec<f64>, String> {
+    flown_by(Launcher::new(Host::InProcess), plan, folder, "a.mcap")
+}
+
+fn flown_by(
+    launcher: Launcher<'_>,
+    plan: &ManifestBuilder,
+    folder: &Path,
+    name: &str,
+) -> Result<Vec<f64>, String> {
+    IS_ARMED.store(true, SeqCst);
+    let (_, recording) =
+        launcher.fly(&build(plan, folder), &folder.join(name)).map_err(|error| format!("{error:#}"))?;
+    let series = recording.unwrap().series(&[("/source/command", "command[0]")]).unwrap();
+    Ok(series[0].value.clone())
+}
+
+/// 1, 2, … `ticks`: no tick was skipped or computed twice.
+fn counted(ticks: u32) -> Vec<f64> {
+    (1..=ticks).map(f64::from).collect()
+}
+
+/// The names of the threads of runs in this process.
+fn threads() -> Vec<String> {
+    let tasks = std::fs::read_dir("/proc/self/task").unwrap().flatten();
+    let names = tasks.filter_map(|task| std::fs::read_to_string(task.path().join("comm")).ok());
+    names.map(|name| name.trim().to_owned()).filter(|name| THREADS.contains(&name.as_str())).collect()
+}
+
+/// What runs of this process have left in shared memory, and among temporary files.
+fn files() -> Vec<String> {
+    let pid = std::process::id();
+    let of_runs = [format!("hb_{pid:x}-"), format!("hummingbus-{}-{pid:x}-", bus::process::user_id())];
+    let folders = ["/dev/shm".into(), std::env::temp_dir()].map(std::fs::read_dir);
+    let names = folders.into_iter().flatten().flatten().flatten();
+    let names = names.map(|entry| entry.file_name().to_string_lossy().into_owned());
+    names.filter(|name| of_runs.iter().any(|start| name.starts_with(start))).collect()
+}
+
+/// Runs `test`, alone in this process, and requires that its runs left nothing.
+fn alone(test: impl FnOnce(&Path)) {
+    static ALONE: Mutex<()> = Mutex::new(());
+    let _alone = ALONE.lock().unwrap_or_else(PoisonError::into_inner);
+    let folder = tempfile::tempdir().unwrap();
+    IS_RELEASED.store(false, SeqCst);
+    test(folder.path());
+    assert_eq!(threads(), [""; 0]);
+    assert_eq!(files(), [""; 0]);
+}
+
+/// Lets those that hang go on, and waits for their end.
+fn release() {
+    IS_RELEASED.store(true, SeqCst);
+    while !threads().is_empty() {
+        std::thread::sleep(Duration::from_millis(1));
+    }
+}
+
+#[test]
+fn a_component_that_panics_ends_the_run_with_its_message() {
+    alone(|folder| {
+        let message = flown(&plan(1000, "panic"), folder).unwrap_err();
+        assert!(
+            message.contains("process `source` failed: it panicked: the propeller came off"),
+            "{message}"
+        );
+        assert!(message.contains("aborted at tick 50") && message.contains("/source/command"), "{message}");
+    });
+}
+
+#[test]
+fn a_component_that_returns_an_error_ends_the_run_with_it() {
+    alone(|folder| {
+        let message = flown(&plan(1000, "error"), folder).unwrap_err();
+        assert!(
+            message.contains("process `source` failed") && message.contains("gyroscope is stuck"),
+            "{message}"
+        );
+        assert!(message.contains("aborted at tick 50"), "{message}");
+        // What was recorded until then is whole.
+        assert!(recorder::reader::Recording::open(&folder.join("a.partial.mcap")).is_ok());
+    });
+}
+
+#[test]
+fn those_that_hang_are_left_behind_by_their_watchdog_and_nothing_else_is() {
+    alone(|folder| {
+        let plan = plan(1000, "hang")
+            .set("process.source.watchdog_ms_host", 200)
+            .set("process.sink.watchdog_ms_host", 200)
+            .set("process.sink.parameters.fault", "hang")
+            .set("process.sink.parameters.at_tick", 49);
+        let message = flown(&plan, folder).unwrap_err();
+        assert!(message.contains("was killed by the watchdog: the run stood still"), "{message}");
+        let mut left = threads();
+        left.sort();
+        assert_eq!(left, ["sink", "source"], "the others have ended");
+        assert_eq!(files(), [""; 0], "their run has signed off");
+        release();
+    });
+}
+
+#[test]
+fn a_run_whose_listener_panics_is_taken_down() {
+    alone(|folder| {
+        let give_up = |event: RunEvent<'_>| match event {
+            RunEvent::Progress(Progress { ticks, .. }) if ticks > 100 => panic!("the listener gave up"),
+            _ => {}
+        };
+        let launcher = Launcher::new(Host::InProcess).followed_by(give_up);
+        let manifest = build(&plan(1_000_000, "none"), folder);
+        let path = folder.join("a.mcap");
+        let flown = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| launcher.fly(&manifest, &path)));
+        assert_eq!(flown.unwrap_err().downcast_ref(), Some(&"the listener gave up"));
+    });
+}
+
+#[test]
+fn a_run_that_is_interrupted_twice_is_aborted() {
+    alone(|folder| {
+        let stop = StopToken::new();
+        let interrupt = |event: RunEvent<'_>| match event {
+            RunEvent::Progress(Progress { ticks, .. }) if ticks > 100 => {
+                stop.stop();
+                stop.stop();
+            }
+            _ => {}
+        };
+        let launcher = Launcher::new(Host::InProcess).stopped_by(&stop).followed_by(interrupt);
+        let message = flown_by(launcher, &plan(1_000_000, "none"), folder, "a.mcap").unwrap_err();
+        assert!(message.contains("interrupted twice: the run was aborted at tick"), "{message}");
+    });
+}
+
+#[test]
+fn a_standby_is_promoted_whatever_ended_the_thread_before_it() {
+    for fault in ["panic", "error"] {
+        alone(|folder| {
+            let plan = plan(400, fault)
+                .set("process.source.on_exit", "standby")
+                .set("process.source.standby.parameters.fault", "none");
+            assert_eq!(flown(&plan, folder).unwrap(), counted(400), "{fault}");
+        });
+    }
+}
+
+#[test]
+fn a_thread_is_restarted_with_the_state_of_the_one_that_ended() {
+    for fault in ["panic", "error"] {
+        alone(|folder| {
+            let plan = plan(400, fault).set("process.source.on_exit", "restart");
+            assert_eq!(flown(&plan, folder).unwrap(), counted(400), "{fault}");
+        });
+    }
+}
+
+/// The thread that hung is left behind; once it goes on, it sends nothing any more.
+#[test]
+fn a_thread_that_hangs_is_replaced_and_sends_nothing_once_it_goes_on() {
+    for on_exit in ["restart", "standby"] {
+        alone(|folder| {
+            let mut plan = plan(3000, "hang")
+                .set("run.pace", 10.0)
+                .set("process.source.watchdog_ms_host", 200)
+                .set("process.source.on_exit", on_exit);
+            if on_exit == "standby" {
+                plan = plan.set("process.source.standby.parameters.fault", "none");
+            }
+            let release_it = |event: RunEvent<'_>| match event {
+                RunEvent::Progress(Progress { ticks, .. }) if ticks > 100 => IS_RELEASED.store(true, SeqCst),
+                _ => {}
+            };
+            let launcher = Launcher::new(Host::InProcess).followed_by(release_it);
+            assert_eq!(flown_by(launcher, &plan, folder, "a.mcap").unwrap(), counted(3000), "{on_exit}");
+            release();
+        });
+    }
+}
+
+#[test]
+fn a_hot_swap_hands_the_state_over() {
+    alone(|folder| {
+        let swap = toml::toml! { process = "source"
+        at_tick = 200
+        shadow_ticks = 20 };
+        assert_eq!(flown(&plan(400, "none").add("swap", swap), folder).unwrap(), counted(400));
+    });
+}
+
+#[test]
+fn a_swap_for_what_fails_is_refused_and_the_run_flies_on() {
+    alone(|folder| {
+        let stop = StopToken::new();
+        let launcher = Launcher::new(Host::InProcess).stopped_by(&stop);
+        let remote = launcher.remote();
+        let counts = std::thread::scope(|scope| {
+            scope.spawn(|| {
+                let with = "parameters.fault = 'panic'\nparameters.at_tick = 50_000".to_owned();
+                let swap = Request::Swap {
+                    process: "source".to_owned(),
+                    with,
+                    shadow_ticks: Some(100),
+                    at_tick: Some(50_050),
+                };
+                assert!(matches!(remote.ask(Request::Pause), Answer::Done { .. }));
+                let refused = std::thread::scope(|scope| {
+                    let asked = scope.spawn(|| remote.ask(swap));
+                    assert!(matches!(remote.ask(Request::Resume), Answer::Done { .. }));
+                    asked.join().unwrap()
+                });
+                let Answer::Refused { reason } = refused else { panic!("{refused:?}") };
+                assert!(reason.contains("the propeller came off"), "{reason}");
+                stop.stop();
+            });
+            flown_by(launcher, &plan(10_000_000, "none"), folder, "a.mcap").unwrap()
+        });
+        assert_eq!(counts, counted(u32::try_from(counts.len()).unwrap()));
+        assert!(counts.len() > 50_000);
+    });
+}
+
+#[test]
+fn of_two_runs_at_once_one_fails_and_the_other_does_not_notice() {
+    alone(|folder| {
+        let (sound, broken) = (plan(2000, "none"), plan(2000, "panic"));
+        std::thread::scope(|scope| {
+            let sound =
+                scope.spawn(|| flown_by(Launcher::new(Host::InProcess), &sound, folder, "sound.mcap"));
+            for _ in 0..3 {
+                let message =
+                    flown_by(Launcher::new(Host::InProcess), &broken, folder, "broken.mcap").unwrap_err();
+                assert!(message.contains("the propeller came off"), "{message}");
+            }
+            assert_eq!(sound.join().unwrap().unwrap(), counted(2000));
+        });
+    });
+}
