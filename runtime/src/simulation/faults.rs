@@ -128,6 +128,16 @@ impl Sim {
         self.quiet_since = Some(self.now);
     }
 
+    /// A watchdog expires only where something hangs: a death is answered before.
+    pub(super) fn check_watchdogs(&self, text: &str) {
+        let expires = ["killed by the watchdog", "stood still"].iter().any(|words| text.contains(words));
+        let hangs = [Hang, NeverReady].map(|fault| format!("{fault:?}"));
+        assert!(
+            !expires || self.excuses.iter().any(|excuse| hangs.contains(excuse)),
+            "a watchdog expired though nothing hangs: {text}"
+        );
+    }
+
     /// What a run must keep to when its supervisor has come to its end and is gone.
     pub(super) fn check_end(&self, aborted: Option<&anyhow::Error>) {
         let left = self.living().map(|instance| (instance.role, instance.doing));
@@ -138,6 +148,7 @@ impl Sim {
                 !self.excuses.is_empty(),
                 "it was aborted though nothing happened that may end it: {error}"
             );
+            self.check_watchdogs(&error.to_string());
             return;
         }
         let end = self.segment.end_tick;
