@@ -28,7 +28,7 @@ const HALF_WINDOW: usize = 3;
 pub struct Canonical {
     /// How many rows.
     pub rows: usize,
-    /// [`COLUMNS`].
+    /// How they are to be read, as the `columns` table of a player in a manifest.
     pub columns: String,
     /// What was derived, filled in or left out.
     pub notes: Vec<String>,
