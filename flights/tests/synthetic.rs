@@ -265,6 +265,15 @@ fn wrong_files_are_refused_with_line_and_advice() {
 }
 
 #[test]
+fn all_faults_are_told_at_once() {
+    let channels = CHANNELS.replace("\"px\"", "\"qq\"").replace("\"wx\"", "\"rr\"");
+    let text = refused(&channels, "");
+    assert!(text.contains("no column `qq`") && text.contains("no column `rr`"), "{text}");
+    let text = refused(CHANNELS, "from_s = 3\nto_s = 2\ndelay_s = { position = inf }");
+    assert!(text.contains("`flight[0].to_s`") && text.contains("`flight[0].delay_s.position`"), "{text}");
+}
+
+#[test]
 fn bad_cells_and_times_are_counted() {
     let place = Place::new();
     let mut lines: Vec<String> = Motion::default().csv().lines().map(str::to_owned).collect();

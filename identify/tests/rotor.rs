@@ -313,6 +313,8 @@ fn mistakes_are_said_with_what_to_do() {
         stand.run().unwrap_err().to_string()
     };
     assert!(error("").contains("at least one log"), "{}", error(""));
+    let both = error(&STATIC.replace("held_out = 0.3", "held_out = 2.0\nsettle_s = -1.0"));
+    assert!(both.contains("`static.held_out`") && both.contains("`static.settle_s`"), "{both}");
     assert!(error("extra = 1").contains("unknown key `extra`"), "{}", error("extra = 1"));
     let unit = error(&STATIC.replace("\"N*m\"", "\"gf\""));
     assert!(unit.contains("static.torque.unit") && unit.contains("found gf"), "{unit}");
