@@ -35,7 +35,7 @@ fn a_backup_in_a_live_run_that_cannot_be_is_refused_with_its_place() {
     let message = refused("contorller", "");
     assert!(message.starts_with("--with:1:1: there is no process `contorller`"), "{message}");
     let message = refused("controller", "wait = \"spin\"\nknid = 3");
-    assert!(message.starts_with("--with:2:1: unknown field `knid`"), "{message}");
+    assert!(message.starts_with("--with:2:1: unknown key `knid`"), "{message}");
     assert!(refused("controller", "parameters.gain = 3").contains("--with:1:12: process `controller`"));
     assert!(refused("controller", "x = ").starts_with("--with:1:"));
     assert!(refused("recorder", "").contains("its file would be torn"));

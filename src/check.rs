@@ -1,10 +1,10 @@
 //! Checks manifests without running them, for the command line and for other programs: editors, tests, fuzzers.
 
 use crate::COMPONENTS;
+use diagnostics::Diagnostic;
 use runtime::describe;
 use runtime::graph::Graph;
 use runtime::manifest::Manifest;
-use runtime::problem::Problem;
 use std::fmt;
 use std::path::Path;
 
@@ -17,7 +17,7 @@ pub struct Checked {
 impl Checked {
     /// What is odd in it, and no error.
     #[must_use]
-    pub fn warnings(&self) -> &[Problem] {
+    pub fn warnings(&self) -> &[Diagnostic] {
         &self.graph.warnings
     }
 
@@ -47,9 +47,9 @@ impl fmt::Display for Checked {
 ///
 /// let problem = hummingbus::check(hover, &["run.rate_hz=7".to_owned()]).unwrap_err();
 /// assert!(problem.to_string().contains("choose a divisor"));
-/// # Ok::<(), hummingbus::Problem>(())
+/// # Ok::<(), hummingbus::Diagnostic>(())
 /// ```
-pub fn check(path: &Path, overrides: &[String]) -> Result<Checked, Problem> {
+pub fn check(path: &Path, overrides: &[String]) -> Result<Checked, Diagnostic> {
     checked(&Manifest::load(path, overrides, COMPONENTS)?)
 }
 
@@ -61,13 +61,13 @@ pub fn check(path: &Path, overrides: &[String]) -> Result<Checked, Problem> {
 /// ```
 /// # use std::path::Path;
 /// let problem = hummingbus::check_text("[run]\nduration = 1.0", Path::new("new.toml"), &[]).unwrap_err();
-/// assert!(problem.to_string().starts_with("new.toml:2:1: unknown field `duration`"));
+/// assert!(problem.to_string().starts_with("new.toml:2:1: unknown key `run.duration`"));
 /// assert!(problem.to_string().contains("did you mean `duration_s`?"));
 /// ```
-pub fn check_text(text: &str, path: &Path, overrides: &[String]) -> Result<Checked, Problem> {
+pub fn check_text(text: &str, path: &Path, overrides: &[String]) -> Result<Checked, Diagnostic> {
     checked(&Manifest::parse(text.to_owned(), path, overrides, COMPONENTS)?)
 }
 
-fn checked(manifest: &Manifest) -> Result<Checked, Problem> {
+fn checked(manifest: &Manifest) -> Result<Checked, Diagnostic> {
     Graph::build(manifest).map(|graph| Checked { graph })
 }

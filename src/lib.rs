@@ -43,13 +43,13 @@ mod properties;
 
 pub use check::{Checked, check, check_text};
 pub use components::COMPONENTS;
+pub use diagnostics::Diagnostic;
 pub use runtime::ctl::Remote;
 pub use runtime::ctl::protocol::{Answer, Request};
 pub use runtime::event::{Progress, RunEvent, StopToken};
 pub use runtime::host::Host;
 pub use runtime::launcher::{Launcher, Outcome};
 pub use runtime::manifest::{Manifest, ManifestBuilder};
-pub use runtime::problem::Problem;
 pub use {bus, controllers, flights, identify, plant, recorder, report, runtime, scenes, sensors, vehicles};
 
 use std::path::Path;
@@ -63,6 +63,6 @@ use std::path::Path;
 /// let problem = hummingbus::load("nowhere.toml").unwrap_err();
 /// assert!(problem.to_string().contains("nowhere.toml"));
 /// ```
-pub fn load(path: impl AsRef<Path>) -> Result<Manifest, Problem> {
+pub fn load(path: impl AsRef<Path>) -> Result<Manifest, Diagnostic> {
     Manifest::load(path.as_ref(), &[], COMPONENTS)
 }

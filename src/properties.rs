@@ -1,12 +1,12 @@
 //! What holds for any manifest: it is accepted or refused with words, and never brings the program down.
 
 use crate::COMPONENTS;
+use diagnostics::Diagnostic;
 use proptest::prelude::*;
 use proptest::sample::select;
 use proptest::test_runner::{RngSeed, TestRunner};
 use runtime::graph::Graph;
 use runtime::manifest::Manifest;
-use runtime::problem::Problem;
 use std::path::{Path, PathBuf};
 
 const SHIPPED: [&str; 7] =
@@ -82,7 +82,7 @@ impl Folder {
     }
 
     /// Checks `text` as a manifest beside the others.
-    fn check(&self, text: &[u8], settings: &[String]) -> Result<(Manifest, Graph), Problem> {
+    fn check(&self, text: &[u8], settings: &[String]) -> Result<(Manifest, Graph), Diagnostic> {
         let path = self.0.path().join("manifests/under-test.toml");
         std::fs::write(&path, text).unwrap();
         let manifest = Manifest::load(&path, settings, COMPONENTS)?;

@@ -26,7 +26,7 @@ mod read;
 pub mod unit;
 
 pub use diagnostic::{Diagnostic, Severity};
-pub use nearest::nearest;
+pub use nearest::{did_you_mean, nearest};
 pub use parameter::ParameterError;
 pub use place::Place;
 pub use read::{Misread, parse_toml, read, read_toml, read_tree};

@@ -105,12 +105,21 @@ impl Misread {
         self.span.clone().unwrap_or(0..0)
     }
 
-    fn at(self, span: Option<Range<usize>>) -> Self {
-        Self { span: self.span.or(span), ..self }
+    /// The same in a text that begins at byte `base` of a longer one.
+    #[must_use]
+    pub fn shifted(self, base: usize) -> Self {
+        let span = self.span();
+        Self { span: Some(base + span.start..base + span.end), ..self }
     }
 
-    fn within(self, table: &str) -> Self {
+    /// The same of what stands in the table `table`.
+    #[must_use]
+    pub fn within(self, table: &str) -> Self {
         Self { error: self.error.within(table), ..self }
+    }
+
+    fn at(self, span: Option<Range<usize>>) -> Self {
+        Self { span: self.span.or(span), ..self }
     }
 }
 
@@ -304,13 +313,61 @@ impl<'v> de::MapAccess<'v> for Entries<'v> {
     fn next_key_seed<K: DeserializeSeed<'v>>(&mut self, seed: K) -> Result<Option<K::Value>, Misread> {
         let Some(entry) = self.rest.next() else { return Ok(None) };
         let entry = self.open.insert(entry);
-        let key = seed.deserialize(BorrowedStrDeserializer::new(entry.key));
-        key.map(Some).map_err(|misread: Misread| misread.at(entry.key_span.clone()))
+        let key = seed.deserialize(Key { text: entry.key, span: entry.key_span.clone() });
+        key.map(Some).map_err(|misread| misread.at(entry.key_span.clone()))
     }
 
     fn next_value_seed<S: DeserializeSeed<'v>>(&mut self, seed: S) -> Result<S::Value, Misread> {
         let entry = self.open.take().expect("the key of an entry is read before its value");
         seed.deserialize(entry.value).map_err(|misread| misread.within(entry.key))
+    }
+}
+
+/// A key on its way into a type.
+struct Key<'v> {
+    text: &'v str,
+    span: Option<Range<usize>>,
+}
+
+impl<'de> Deserializer<'de> for Key<'de> {
+    type Error = Misread;
+
+    fn deserialize_any<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, Misread> {
+        visitor.visit_borrowed_str(self.text)
+    }
+
+    fn deserialize_newtype_struct<V: Visitor<'de>>(
+        self,
+        _: &'static str,
+        visitor: V,
+    ) -> Result<V::Value, Misread> {
+        visitor.visit_newtype_struct(self)
+    }
+
+    fn deserialize_struct<V: Visitor<'de>>(
+        self,
+        name: &'static str,
+        _: &'static [&'static str],
+        visitor: V,
+    ) -> Result<V::Value, Misread> {
+        match self.span {
+            Some(span) if is_spanned(name) => visitor.visit_map(SpannedDeserializer::new(self.text, span)),
+            _ => visitor.visit_borrowed_str(self.text),
+        }
+    }
+
+    fn deserialize_enum<V: Visitor<'de>>(
+        self,
+        name: &'static str,
+        variants: &'static [&'static str],
+        visitor: V,
+    ) -> Result<V::Value, Misread> {
+        BorrowedStrDeserializer::new(self.text).deserialize_enum(name, variants, visitor)
+    }
+
+    forward_to_deserialize_any! {
+        bool i8 i16 i32 i64 u8 u16 u32 u64 f32 f64 char str string bytes byte_buf option unit unit_struct seq tuple
+        tuple_struct map identifier ignored_any
     }
 }
 
@@ -401,6 +458,14 @@ mod tests {
     fn an_unknown_key_may_contain_a_dot() {
         let (place, error) = refused("[[a]]\n'b.c' = 1");
         assert_eq!((place.as_str(), error.as_str()), ("2:1", "unknown key `a.0.b.c`, expected `radius_m`"));
+    }
+
+    #[test]
+    fn keys_and_values_know_their_places() {
+        type Places = BTreeMap<toml::Spanned<String>, Option<toml::Spanned<u8>>>;
+        let places = read_toml::<Places>("a.toml", "a = 1").unwrap();
+        let (key, value) = places.first_key_value().unwrap();
+        assert_eq!((key.span(), value.as_ref().unwrap().span()), (0..1, 4..5));
     }
 
     #[test]

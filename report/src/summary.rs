@@ -4,10 +4,10 @@ use crate::judge::{self, Verdict, WindowErrors};
 use crate::shadow::{self, Difference, Succession};
 use anyhow::Result;
 use bus::plan::Plan;
+use diagnostics::Diagnostic;
 use recorder::reader::Recording;
 use runtime::launcher::Outcome;
 use runtime::manifest::Content;
-use runtime::problem::Problem;
 use serde::Serialize;
 use std::fmt;
 use std::path::PathBuf;
@@ -49,7 +49,7 @@ pub struct Summary {
     /// What shadows asked for otherwise than those they shadowed.
     pub shadows: Vec<Difference>,
     /// What `check` found odd; told before the flight.
-    pub warnings: Vec<Problem>,
+    pub warnings: Vec<Diagnostic>,
 }
 
 /// What there is to say about a process.

@@ -23,9 +23,9 @@ pub use backups::backup_of;
 
 use crate::manifest::Manifest;
 use crate::placement;
-use crate::problem::Problem;
 use crate::program::{BackupSpec, Program};
 use bus::plan::Plan;
+use diagnostics::Diagnostic;
 use parameters::{Notes, RunLength};
 use std::path::PathBuf;
 use toml::Spanned;
@@ -51,7 +51,7 @@ pub struct Graph {
     /// The vehicle, scene and gains files the processes name, each once.
     pub models: Vec<PathBuf>,
     /// What is odd and flies all the same; `check` and `run` tell it.
-    pub warnings: Vec<Problem>,
+    pub warnings: Vec<Diagnostic>,
 }
 
 impl Graph {
@@ -59,33 +59,33 @@ impl Graph {
     ///
     /// # Errors
     /// What is wrong with it, each with its place; what a fault hides from sight is not told beside it.
-    pub fn build(manifest: &Manifest) -> Result<Self, Problem> {
-        let members = processes::members(manifest)?;
+    pub fn build(manifest: &Manifest) -> Result<Self, Diagnostic> {
+        let declared_nodes = processes::declared_nodes(manifest)?;
         let sidecars = processes::sidecars(manifest)?;
         processes::require_own_logs(manifest)?;
-        let wiring = wire(manifest, &members, None)?;
+        let wiring = wire(manifest, &declared_nodes, None)?;
         let mut plan = plan(manifest, wiring)?;
         let clock_cpu = manifest.content.run.clock_cpu.as_ref();
         processes::require_core(manifest, clock_cpu, "clock_cpu")?;
         placement::place(&mut plan, clock_cpu.map(|cpu| *cpu.get_ref()));
         let mut notes = Notes::default();
-        periods::check(manifest, &members, &plan, &mut notes)?;
+        periods::check(manifest, &declared_nodes, &plan, &mut notes)?;
         let length = RunLength::of(&plan);
-        Problem::gather(members.iter().zip(&mut plan.nodes).map(|(member, node)| {
-            parameters::set(manifest, member, node, length, &mut notes)?;
-            processes::require_replaceable(manifest, member, node)
+        Diagnostic::gather(declared_nodes.iter().zip(&mut plan.nodes).map(|(declared, node)| {
+            parameters::set(manifest, declared, node, length, &mut notes)?;
+            processes::require_replaceable(manifest, declared, node)
         }))?;
-        recorders::require_one_recorder(manifest, &members)?;
-        recorders::require_whole_recording(manifest, &members, &plan.nodes)?;
-        let backups = backups::all(manifest, &plan, &members, &mut notes)?;
-        let programs: Vec<Program> = members.into_iter().map(|member| member.program).collect();
+        recorders::require_one_recorder(manifest, &declared_nodes)?;
+        recorders::require_whole_recording(manifest, &declared_nodes, &plan.nodes)?;
+        let backups = backups::all(manifest, &plan, &declared_nodes, &mut notes)?;
+        let programs: Vec<Program> = declared_nodes.into_iter().map(|declared| declared.program).collect();
         evaluations::check(manifest, &plan, &programs, &mut notes)?;
         let (models, warnings) = notes.into_parts(manifest);
         Ok(Self { plan, programs, backups, sidecars, models, warnings })
     }
 }
 
-fn plan(manifest: &Manifest, wiring: Wiring) -> Result<Plan, Problem> {
+fn plan(manifest: &Manifest, wiring: Wiring) -> Result<Plan, Diagnostic> {
     let run = &manifest.content.run;
     let rate_hz = *run.rate_hz.get_ref();
     if !(1..=RATE_HZ_MAX).contains(&rate_hz) || 1_000_000_000 % rate_hz != 0 {

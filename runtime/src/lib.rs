@@ -18,7 +18,6 @@ pub mod output_file;
 pub mod outputs;
 mod overseer;
 mod placement;
-pub mod problem;
 mod process_log;
 mod process_table;
 mod processes;

@@ -27,10 +27,10 @@ pub use content::{
     SwapSetting,
 };
 
-use crate::problem::Problem;
 use crate::registry::Registry;
-use serde::Deserialize;
-use sources::{Origin, Sources, refused};
+use diagnostics::Diagnostic;
+use diagnostics::{ParameterError, read_tree};
+use sources::{Origin, Sources};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use toml::Spanned;
@@ -65,21 +65,21 @@ impl Manifest {
     /// Reads the manifest at `path` with what it includes, and applies `overrides` (`key.path=value`).
     ///
     /// # Errors
-    /// A [`Problem`] that names the place.
-    pub fn load(path: &Path, overrides: &[String], registry: Registry) -> Result<Self, Problem> {
+    /// A [`Diagnostic`] that names the place.
+    pub fn load(path: &Path, overrides: &[String], registry: Registry) -> Result<Self, Diagnostic> {
         Self::parse(include::text(path)?, path, overrides, registry)
     }
 
     /// The same for `text` that stands, or is to stand, at `path`.
     ///
     /// # Errors
-    /// A [`Problem`] that names the place.
+    /// A [`Diagnostic`] that names the place.
     pub fn parse(
         text: String,
         path: &Path,
         overrides: &[String],
         registry: Registry,
-    ) -> Result<Self, Problem> {
+    ) -> Result<Self, Diagnostic> {
         let mut sources = include::read(path, text, registry)?;
         overrides.iter().for_each(|text| sources.add(Origin::Override, text.clone()));
         Self::of(path.to_owned(), sources)
@@ -88,14 +88,14 @@ impl Manifest {
     /// This manifest with another value at `key`, such as `process.controller.parameters.gains.altitude_p`.
     ///
     /// # Errors
-    /// A [`Problem`] if there is no such key, or the value does not fit it.
-    pub fn set(self, key: &str, value: impl Into<toml::Value>) -> Result<Self, Problem> {
+    /// A [`Diagnostic`] if there is no such key, or the value does not fit it.
+    pub fn set(self, key: &str, value: impl Into<toml::Value>) -> Result<Self, Diagnostic> {
         let mut sources = self.sources;
         sources.add(Origin::Override, format!("{key}={}", value.into()));
         Self::of(self.path, sources)
     }
 
-    fn of(path: PathBuf, sources: Sources) -> Result<Self, Problem> {
+    fn of(path: PathBuf, sources: Sources) -> Result<Self, Diagnostic> {
         let tree = whole_tree(&sources)?;
         let content = content(&sources, tree)?;
         let (included, recorded_text) = (sources.included(), recorded::text(&sources)?);
@@ -116,15 +116,15 @@ impl Manifest {
     pub fn problem(
         &self,
         span: &Range<usize>,
-        message: impl Into<String>,
+        error: impl Into<ParameterError>,
         help: impl Into<String>,
-    ) -> Problem {
-        self.sources.problem(span, message, help)
+    ) -> Diagnostic {
+        self.sources.problem(span, error, help)
     }
 
     /// A path written in the manifest: `${NAME:-default}` is the environment's NAME, and a relative path
     /// starts at the folder of the file it is written in.
-    pub fn resolve(&self, written: &Spanned<String>) -> Result<PathBuf, Problem> {
+    pub fn resolve(&self, written: &Spanned<String>) -> Result<PathBuf, Diagnostic> {
         self.sources.resolve(written)
     }
 
@@ -142,8 +142,8 @@ impl Manifest {
     /// `with_text`: the manifest that its places refer to, and the whole process.
     ///
     /// # Errors
-    /// A [`Problem`] that names the place in the manifest or in `with_text`.
-    pub fn succeed(&self, process: &str, with_text: &str) -> Result<(Self, Spanned<Process>), Problem> {
+    /// A [`Diagnostic`] that names the place in the manifest or in `with_text`.
+    pub fn succeed(&self, process: &str, with_text: &str) -> Result<(Self, Spanned<Process>), Diagnostic> {
         let mut sources = self.sources.clone();
         sources.add(Origin::Argument("--with"), with_text.to_owned());
         let tree = whole_tree(&sources)?;
@@ -152,8 +152,7 @@ impl Manifest {
         finite::require(&with, "", &sources)?;
         let whole = succession::whole(&sources, &tree, &Spanned::new(span.clone(), process.into()), with)?;
         let whole = Spanned::new(span.clone(), DeValue::Table(whole));
-        let whole = Process::deserialize(toml::de::ValueDeserializer::from(whole))
-            .map_err(|error| refused(&sources, &error))?;
+        let whole = read_tree::<Process>(&whole).map_err(|misread| sources.refused(misread))?;
         let content = content(&sources, tree)?;
         let (path, included) = (self.path.clone(), self.included.clone());
         let recorded_text = self.recorded_text.clone();
@@ -165,22 +164,22 @@ impl Manifest {
 ///
 /// # Errors
 /// Where it cannot be read: what is wrong there, and with each process.
-fn content(sources: &Sources, tree: DeTable<'_>) -> Result<Content, Problem> {
-    let whole = Spanned::new(0..0, tree.clone());
-    Content::deserialize(toml::Deserializer::from(whole)).map_err(|error| {
-        let first = refused(sources, &error);
-        let processes = tree::table(&tree, "process").into_iter().flat_map(|table| table.values());
-        let others = processes.filter_map(|process| {
-            let process = toml::de::ValueDeserializer::from(process.clone());
-            Process::deserialize(process).err().map(|error| refused(sources, &error))
+fn content(sources: &Sources, tree: DeTable<'_>) -> Result<Content, Diagnostic> {
+    let whole = Spanned::new(0..0, DeValue::Table(tree));
+    read_tree(&whole).map_err(|first| {
+        let processes = whole.get_ref().get("process").and_then(|processes| processes.get_ref().as_table());
+        let others = processes.into_iter().flatten().filter_map(|(name, process)| {
+            let misread = read_tree::<Process>(process).err()?;
+            let misread = misread.within(&format!("process.{}", name.get_ref()));
+            (misread.span() != first.span()).then(|| sources.refused(misread))
         });
-        let others: Vec<Problem> = others.filter(|other| *other != first).collect();
-        first.and(others)
+        let others: Vec<Diagnostic> = others.collect();
+        sources.refused(first).and(others)
     })
 }
 
 /// Everything that the sources say, with sets expanded and backups made whole.
-fn whole_tree(sources: &Sources) -> Result<DeTable<'_>, Problem> {
+fn whole_tree(sources: &Sources) -> Result<DeTable<'_>, Diagnostic> {
     // In every file, also where another one's number takes the place of what is none.
     sources.files().try_for_each(|file| finite::require(&sources.table(file)?, "", sources))?;
     let mut tree = include::merged(sources)?;

@@ -1,7 +1,7 @@
 //! Standard output and standard error.
 
 use anyhow::{Context, Result};
-use runtime::problem::Problem;
+use diagnostics::Diagnostic;
 
 /// Prints to standard output.
 pub fn print_text(text: &str) -> Result<()> {
@@ -24,14 +24,20 @@ pub fn say(text: &str) {
     let _ = writeln!(std::io::stderr(), "{text}");
 }
 
-/// What went wrong and why; a cause that the text holds already is not said twice.
+/// What went wrong and why, with the lines of files that are to blame; a cause that the text holds already is not said
+/// twice.
 pub fn message(error: &anyhow::Error) -> String {
-    error.chain().skip(1).map(ToString::to_string).fold(error.to_string(), |text, cause| {
-        if text.contains(&cause) { text } else { format!("{text}: {cause}") }
+    let first = error.chain().next().map_or(String::new(), |first| format!("{first:#}"));
+    error.chain().skip(1).fold(first, |text, cause| {
+        if text.contains(&cause.to_string()) || text.contains(&format!("{cause:#}")) {
+            text
+        } else {
+            format!("{text}: {cause:#}")
+        }
     })
 }
 
 /// Tells people of what is odd, on standard error.
-pub fn print_warnings(warnings: &[Problem]) {
-    warnings.iter().for_each(|warning| say(&format!("warning: {warning}")));
+pub fn print_warnings(warnings: &[Diagnostic]) {
+    warnings.iter().for_each(|warning| say(&format!("{}: {warning:#}", warning.severity)));
 }

@@ -97,7 +97,7 @@ fn a_swap_whose_times_say_too_little_or_too_much() {
     marked("at_tick = 50\nshadow_ticks = 9\nrepeat = §2").says(&["`repeat` without `every_ticks`"]);
     marked("at_tick = 50\nshadow_ticks = 9\nevery_ticks = §2").says(&["`every_ticks` without `repeat`"]);
     marked("at_tick = 50\nshadow_ticks = 9\nevery_ticks = 2\nrepeat = §0").says(&["`repeat` is 0"]);
-    marked("§at_tik = 50").says(&["unknown field `at_tik`", "did you mean `at_tick`?"]);
+    marked("§at_tik = 50").says(&["unknown key `swap.0.at_tik`", "did you mean `at_tick`?"]);
 }
 
 #[test]
@@ -141,14 +141,14 @@ fn a_backup_that_would_not_fit_the_graph() {
     };
     swap("§period_ticks = 2").says(&["a backup cannot have another `period_ticks`"]);
     swap("§outputs.command.topic = \"/x\"").says(&["a backup cannot have another `outputs`"]);
-    swap("§knid = \"pid\"").says(&["unknown field `knid`"]);
+    swap("§knid = \"pid\"").says(&["unknown key `swap.0.with.knid`"]);
     swap("kind = §\"pdi\"").says(&["there is no kind `pdi`"]);
     let inputs = "inputs.set_point = \"/pilot/set_point\"\n";
     let ended = swap(&format!("{inputs}inputs.§estimate = \"/plant/stat\""));
     ended.says(&["input `estimate` of `controller`: nobody publishes /plant/stat"]);
     let ended = swap("parameters.§gain = 3");
     ended.says(&["process `controller`", "unknown key `gain`"]);
-    swap("parameters = §3").says(&["invalid type"]);
+    swap("parameters = §3").says(&["with.parameters` must be a map, found integer `3`"]);
     let at_swap = |with: &str| {
         let head = "\n§[[swap]]\nprocess = \"controller\"\nat_tick = 50\nshadow_ticks = 9\n";
         refused_with(&format!("{head}[swap.with]\n{with}\n"))

@@ -147,7 +147,7 @@ fn an_error_in_an_included_file_names_that_file() {
     let path = place.write("top.toml", "# A line more.\ninclude = [\"base.toml\"]\n");
     let line = good().lines().position(|line| line == "kind = \"imu\"").unwrap() + 1;
     let ended = place.call(&["check", &path]).with_code(2);
-    let start = format!("error: {base}:{line}:1: unknown field `knid`");
+    let start = format!("error: {base}:{line}:1: unknown key `process.imu.knid`");
     assert!(ended.error.starts_with(&start), "expected {start}\n{ended}");
     place.write("base.toml", "[run\n");
     let ended = place.call(&["check", &path]).with_code(2);
@@ -250,13 +250,13 @@ fn a_vehicle_that_is_not_well_formed() {
     vehicle("name = \"a\"\nset = §\"pari\"").says(&["there is no set `pari`", "did you mean `pair`?"]);
     vehicle("name = §\"A\"\nset = \"pair\"").says(&["`A` cannot name a vehicle", "lower-case"]);
     vehicle("name = \"a\"\nset = \"pair\"\ncount = §0").says(&["`count` is 0", "1 to 256"]);
-    vehicle("name = \"a\"\nset = \"pair\"\n§cuont = 2").says(&["unknown field `cuont`", "`count`?"]);
+    vehicle("name = \"a\"\nset = \"pair\"\n§cuont = 2").says(&["unknown key `cuont`", "`count`?"]);
     let ended = vehicle("name = \"a\"\nset = \"pair\"\nprocess.§sorce.wait = \"spin\"");
     ended.says(&["the vehicle's set has no process `sorce`", "did you mean `source`?"]);
     let twice = "name = \"a1\"\nset = \"pair\"\n[[vehicle]]\nname = §\"a\"\nset = \"pair\"\ncount = 2";
     vehicle(twice).says(&["a vehicle `a1` is there twice"]);
     let ended = refused_text(&(fleet("") + "[set.pair]\n§proces = {}\n"));
-    ended.says(&["unknown field `proces`"]);
+    ended.says(&["unknown key `proces`"]);
 }
 
 #[test]

@@ -128,8 +128,9 @@ fn text_that_is_not_toml() {
 
 #[test]
 fn an_unknown_key() {
-    refused("kind = \"imu\"", "§knid = \"imu\"").says(&["unknown field `knid`", "did you mean `kind`?"]);
-    refused("window_ticks", "§windwo_ticks").says(&["unknown field `windwo_ticks`", "`window_ticks`?"]);
+    refused("kind = \"imu\"", "§knid = \"imu\"")
+        .says(&["unknown key `process.imu.knid`", "did you mean `kind`?"]);
+    refused("window_ticks", "§windwo_ticks").says(&["unknown key `run.windwo_ticks`", "`window_ticks`?"]);
 }
 
 #[test]

@@ -116,13 +116,13 @@ fn an_override_that_is_none() {
     let set = |text: &str| refused_setting(&manifest, &[text]);
     set("run.seed").says(&["--set run.seed: expected KEY=VALUE", "run.seed=3"]);
     set("run.seed.low=1").says(&["--set run.seed.low=1", "`seed` is not a table"]);
-    set("run.seeed=1").says(&["unknown field `seeed`", "did you mean `seed`?"]);
+    set("run.seeed=1").says(&["unknown key `run.seeed`", "did you mean `seed`?"]);
     set("run.seed=one").says(&["\"one\""]);
     set("process.plnat.cpu=1").says(&["there is no process `plnat`", "did you mean `plant`?"]);
     set("process.h1/plant.cpu=1").says(&["there is no process `h1/plant`"]);
     set("=1").says(&["expected keys with dots between them"]);
     set("pass.9.max=1").says(&["`pass` is a list of 4, and `9` is none of them", "numbered from 0"]);
-    set("include=[]").says(&["unknown field `include`"]);
+    set("include=[]").says(&["unknown key `include`"]);
 }
 
 /// Writes the good manifest with another vehicle into `place`: the Hummingbird with `from` replaced by `to`.

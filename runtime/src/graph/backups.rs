@@ -2,14 +2,14 @@
 
 use super::parameters;
 use super::parameters::{Notes, RunLength};
-use super::processes::{Member, irreplaceable, members, program};
+use super::processes::{DeclaredNode, declared_nodes, irreplaceable, program};
 use super::wiring::wire;
 use crate::manifest::{Manifest, OutputSetting, Process, SwapSetting};
-use crate::problem::Problem;
 use crate::program::{BackupSpec, Executable, Program};
 use crate::replacement::take_over_stride;
 use bus::Registration;
 use bus::plan::{INPUTS_RESERVED, NodePlan, Plan};
+use diagnostics::Diagnostic;
 use std::collections::BTreeMap;
 use std::ops::Range;
 use toml::Spanned;
@@ -24,7 +24,7 @@ const SETTLE_TICKS: u64 = 2;
 struct Run<'m> {
     manifest: &'m Manifest,
     plan: &'m Plan,
-    members: &'m [Member<'m>],
+    declared_nodes: &'m [DeclaredNode<'m>],
 }
 
 /// A backup and the place that asks for it.
@@ -40,13 +40,13 @@ struct Placed {
 pub fn all(
     manifest: &Manifest,
     plan: &Plan,
-    members: &[Member<'_>],
+    declared_nodes: &[DeclaredNode<'_>],
     notes: &mut Notes,
-) -> Result<Vec<BackupSpec>, Problem> {
-    let run = Run { manifest, plan, members };
+) -> Result<Vec<BackupSpec>, Diagnostic> {
+    let run = Run { manifest, plan, declared_nodes };
     let mut placed = Vec::new();
-    for (node, member) in members.iter().enumerate() {
-        if let Some(standby) = &member.process.standby {
+    for (node, declared) in declared_nodes.iter().enumerate() {
+        if let Some(standby) = &declared.process.standby {
             let (plan, program) = run.resolve(node, standby.get_ref(), &standby.span(), notes)?;
             placed.push(Placed { backup: lasting(node, true, plan, program), span: standby.span() });
         }
@@ -81,10 +81,10 @@ pub fn backup_of(
     plan: &Plan,
     process: &str,
     with_text: &str,
-) -> Result<BackupSpec, Problem> {
+) -> Result<BackupSpec, Diagnostic> {
     let (manifest, whole) = manifest.succeed(process, with_text)?;
-    let members = members(&manifest)?;
-    let run = Run { manifest: &manifest, plan, members: &members };
+    let declared_nodes = declared_nodes(&manifest)?;
+    let run = Run { manifest: &manifest, plan, declared_nodes: &declared_nodes };
     let node = run.node(&Spanned::new(whole.span(), process.to_owned()))?;
     let (plan, program) = run.resolve(node, whole.get_ref(), &whole.span(), &mut Notes::default())?;
     Ok(lasting(node, false, plan, program))
@@ -97,13 +97,14 @@ fn lasting(node: usize, is_standby: bool, plan: NodePlan, program: Program) -> B
 
 impl Run<'_> {
     /// The node named `process`, if another process can go on in its place.
-    fn node(&self, process: &Spanned<String>) -> Result<usize, Problem> {
+    fn node(&self, process: &Spanned<String>) -> Result<usize, Diagnostic> {
         let name = process.get_ref();
         let at = |message: String, help: &str| Err(self.manifest.problem(&process.span(), message, help));
-        let Some(node) = self.members.iter().position(|member| member.name.get_ref() == name) else {
+        let Some(node) = self.declared_nodes.iter().position(|declared| declared.name.get_ref() == name)
+        else {
             return at(format!("`{name}` takes no part in the ticks"), "only a node can be succeeded");
         };
-        match irreplaceable(&self.members[node], &self.plan.nodes[node]) {
+        match irreplaceable(&self.declared_nodes[node], &self.plan.nodes[node]) {
             Some(reason) => at(format!("`{name}` cannot be succeeded: {reason}"), "name another process"),
             None => Ok(node),
         }
@@ -116,18 +117,18 @@ impl Run<'_> {
         whole: &Process,
         span: &Range<usize>,
         notes: &mut Notes,
-    ) -> Result<(NodePlan, Program), Problem> {
+    ) -> Result<(NodePlan, Program), Diagnostic> {
         let name = Spanned::new(span.clone(), self.plan.nodes[node].name.clone());
         let program = program(self.manifest, &name, whole)?;
         if let Executable::Component(kind) = &program.executable {
             self.require_same_outputs(node, kind, span)?;
         }
         let process = Process { outputs: self.outputs(node, span), ..whole.clone() };
-        let mut members = self.members.to_vec();
-        members[node] = Member { name: &name, process: &process, program };
-        let mut wiring = wire(self.manifest, &members, Some(node))?;
+        let mut declared_nodes = self.declared_nodes.to_vec();
+        declared_nodes[node] = DeclaredNode { name: &name, process: &process, program };
+        let mut wiring = wire(self.manifest, &declared_nodes, Some(node))?;
         let mut plan = wiring.nodes.swap_remove(node);
-        parameters::set(self.manifest, &members[node], &mut plan, RunLength::of(self.plan), notes)?;
+        parameters::set(self.manifest, &declared_nodes[node], &mut plan, RunLength::of(self.plan), notes)?;
         self.require_room(node, &plan, span)?;
         for input in &mut plan.inputs {
             // The same topics, but perhaps in another order.
@@ -137,7 +138,7 @@ impl Run<'_> {
         let present = &self.plan.nodes[node];
         plan.outputs.clone_from(&present.outputs);
         plan.cpu = plan.cpu.or(present.cpu);
-        Ok((plan, members.swap_remove(node).program))
+        Ok((plan, declared_nodes.swap_remove(node).program))
     }
 
     /// The outputs of `node` as they are, written out.
@@ -160,7 +161,7 @@ impl Run<'_> {
         node: usize,
         kind: &Registration,
         span: &Range<usize>,
-    ) -> Result<(), Problem> {
+    ) -> Result<(), Diagnostic> {
         let present: Vec<(&str, &str)> = self.plan.nodes[node]
             .outputs
             .iter()
@@ -186,7 +187,7 @@ impl Run<'_> {
         Err(self.manifest.problem(span, message, "a backup publishes the same messages on the same ports"))
     }
 
-    fn require_room(&self, node: usize, plan: &NodePlan, span: &Range<usize>) -> Result<(), Problem> {
+    fn require_room(&self, node: usize, plan: &NodePlan, span: &Range<usize>) -> Result<(), Diagnostic> {
         let (found, most) = (plan.inputs.len(), self.plan.nodes[node].inputs_max());
         if found <= most {
             return Ok(());
@@ -197,7 +198,7 @@ impl Run<'_> {
     }
 
     /// When a swap's backups join and take over.
-    fn times(&self, node: usize, swap: &Spanned<SwapSetting>) -> Result<Vec<(u32, u32)>, Problem> {
+    fn times(&self, node: usize, swap: &Spanned<SwapSetting>) -> Result<Vec<(u32, u32)>, Diagnostic> {
         let setting = swap.get_ref();
         let (at_tick, span) = self.at_tick(swap)?;
         let repeat = self.repeat(swap)?;
@@ -239,7 +240,7 @@ impl Run<'_> {
     }
 
     /// The first tick at which a swap takes over, and its place.
-    fn at_tick(&self, swap: &Spanned<SwapSetting>) -> Result<(u32, Range<usize>), Problem> {
+    fn at_tick(&self, swap: &Spanned<SwapSetting>) -> Result<(u32, Range<usize>), Diagnostic> {
         let at = |span: Range<usize>, message: &str, help: &str| self.manifest.problem(&span, message, help);
         if swap.get_ref().shadow_ticks == 0 {
             let help = "a backup computes at least one tick beside the process it succeeds";
@@ -264,7 +265,7 @@ impl Run<'_> {
         }
     }
 
-    fn repeat(&self, swap: &Spanned<SwapSetting>) -> Result<u32, Problem> {
+    fn repeat(&self, swap: &Spanned<SwapSetting>) -> Result<u32, Diagnostic> {
         let at =
             |span: Range<usize>, message: String, help: &str| self.manifest.problem(&span, message, help);
         match (&swap.get_ref().repeat, &swap.get_ref().every_ticks) {
@@ -284,7 +285,7 @@ impl Run<'_> {
     }
 
     /// Refuses a backup that joins while another one of the same node is there; `placed` is in order.
-    fn require_one_at_a_time(&self, placed: &[Placed]) -> Result<(), Problem> {
+    fn require_one_at_a_time(&self, placed: &[Placed]) -> Result<(), Diagnostic> {
         let longest = self.plan.nodes.iter().map(|node| node.period_ticks).max().unwrap_or(1);
         let gap = SETTLE_TICKS + 2 * u64::from(longest);
         let mut before: BTreeMap<usize, &Placed> = BTreeMap::new();

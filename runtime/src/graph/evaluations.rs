@@ -2,10 +2,10 @@
 
 use super::parameters::Notes;
 use crate::manifest::{Comparison, Manifest, PassCondition, Statistic};
-use crate::problem::Problem;
 use crate::program::Program;
 use bus::plan::{NodePlan, Plan};
-use diagnostics::nearest;
+use diagnostics::Diagnostic;
+use diagnostics::did_you_mean;
 use toml::Spanned;
 
 /// Checks that what is evaluated after the run will be recorded, and that its fields and units exist.
@@ -14,15 +14,15 @@ pub fn check(
     plan: &Plan,
     programs: &[Program],
     notes: &mut Notes,
-) -> Result<(), Problem> {
+) -> Result<(), Diagnostic> {
     check_recorded(manifest, plan, programs)?;
     let content = &manifest.content;
-    Problem::gather(content.compare.iter().map(|compare| check_window(manifest, plan, compare)))?;
+    Diagnostic::gather(content.compare.iter().map(|compare| check_window(manifest, plan, compare)))?;
     let conditions = content.pass.iter().map(|pass| {
         check_field(manifest, plan, pass)?;
         check_span(manifest, plan, pass, notes)
     });
-    Problem::gather(conditions).map(drop)
+    Diagnostic::gather(conditions).map(drop)
 }
 
 /// Refuses a span in which nothing can be judged; tells one that the run ends in. Where the run was cut short by other
@@ -32,7 +32,7 @@ fn check_span(
     plan: &Plan,
     pass: &Spanned<PassCondition>,
     notes: &mut Notes,
-) -> Result<(), Problem> {
+) -> Result<(), Diagnostic> {
     let PassCondition { name, topic, from_s, to_s, .. } = pass.get_ref();
     let at = |message: String, help: &str| {
         manifest.problem(&pass.span(), format!("pass condition `{name}`: {message}"), help)
@@ -82,24 +82,37 @@ fn first_sample_s(from_s: f64, period_ticks: u32, tick_ns: u64) -> (f64, f64) {
     (number * period_s, period_s)
 }
 
+/// Limits that nothing can hold.
+#[derive(Debug, thiserror::Error)]
+enum Impossible {
+    #[error("`min` is {min} and `max` is {max}")]
+    Empty { min: f64, max: f64 },
+    #[error("`max` is {max}")]
+    Below { max: f64, what: &'static str, least: f64 },
+}
+
+impl Impossible {
+    fn help(&self) -> String {
+        match self {
+            Self::Empty { .. } => "nothing lies between: exchange them".to_owned(),
+            Self::Below { what, least, .. } => format!("{what} is never below {least}"),
+        }
+    }
+}
+
 /// Refuses limits that nothing can hold.
 fn check_limits(
     min: Option<f64>,
     max: Option<f64>,
-    least: Option<(f64, &str)>,
-) -> Result<(), (String, String)> {
+    least: Option<(f64, &'static str)>,
+) -> Result<(), Impossible> {
     if let (Some(min), Some(max)) = (min, max)
         && min > max
     {
-        return Err((
-            format!("`min` is {min} and `max` is {max}"),
-            "nothing lies between: exchange them".into(),
-        ));
+        return Err(Impossible::Empty { min, max });
     }
     match (least, max) {
-        (Some((least, what)), Some(max)) if max < least => {
-            Err((format!("`max` is {max}"), format!("{what} is never below {least}")))
-        }
+        (Some((least, what)), Some(max)) if max < least => Err(Impossible::Below { max, what, least }),
         _ => Ok(()),
     }
 }
@@ -116,7 +129,7 @@ fn reset_window_s(plan: &Plan, topic: &str) -> Option<f64> {
     plan.nodes.iter().find(publishes)?.parameters.get("window_s")?.as_f64()
 }
 
-fn check_window(manifest: &Manifest, plan: &Plan, compare: &Spanned<Comparison>) -> Result<(), Problem> {
+fn check_window(manifest: &Manifest, plan: &Plan, compare: &Spanned<Comparison>) -> Result<(), Diagnostic> {
     let window_s = compare.get_ref().window_s;
     let duration_s = f64::from(plan.duration_ticks) * plan.tick_s();
     let limits = compare.get_ref();
@@ -159,7 +172,7 @@ fn check_window(manifest: &Manifest, plan: &Plan, compare: &Spanned<Comparison>)
     ))
 }
 
-fn check_field(manifest: &Manifest, plan: &Plan, pass: &Spanned<PassCondition>) -> Result<(), Problem> {
+fn check_field(manifest: &Manifest, plan: &Plan, pass: &Spanned<PassCondition>) -> Result<(), Diagnostic> {
     let condition = pass.get_ref();
     let at = |message: String, help: &str| {
         manifest.problem(&pass.span(), format!("pass condition `{}`: {message}", condition.name), help)
@@ -171,11 +184,11 @@ fn check_field(manifest: &Manifest, plan: &Plan, pass: &Spanned<PassCondition>) 
         unit_of(manifest, plan, topic, field).map_err(|error| at(error, "name one of these fields"))
     };
     let limits =
-        |min, max, least| check_limits(min, max, least).map_err(|(message, help)| at(message, &help));
+        |min, max, least| check_limits(min, max, least).map_err(|error| at(error.to_string(), &error.help()));
     limits(condition.min, condition.max, least(condition))?;
     if let Some(gate) = &condition.gate {
         check_limits(gate.min, gate.max, None)
-            .map_err(|(message, help)| at(format!("`while`: {message}"), &help))?;
+            .map_err(|error| at(format!("`while`: {error}"), &error.help()))?;
     }
     let Some(own) = unit(&condition.topic, &condition.field)? else { return Ok(()) };
     diagnostics::convert(&own, &condition.unit)
@@ -210,7 +223,7 @@ fn judged_topics(pass: &PassCondition) -> Vec<&String> {
     std::iter::once(&pass.topic).chain(others.into_iter().flatten()).collect()
 }
 
-fn check_recorded(manifest: &Manifest, plan: &Plan, programs: &[Program]) -> Result<(), Problem> {
+fn check_recorded(manifest: &Manifest, plan: &Plan, programs: &[Program]) -> Result<(), Diagnostic> {
     let content = &manifest.content;
     let passes = content.pass.iter().map(|pass| (pass.span(), judged_topics(pass.get_ref())));
     let compares = content
@@ -220,9 +233,8 @@ fn check_recorded(manifest: &Manifest, plan: &Plan, programs: &[Program]) -> Res
     for (span, topics) in passes.chain(compares) {
         for topic in topics {
             if !plan.topics.iter().any(|known| known.name == *topic) {
-                let known: Vec<&str> = plan.topics.iter().map(|topic| topic.name.as_str()).collect();
-                let list = format!("the topics are {}", known.join(", "));
-                let help = nearest(topic, known).map_or(list, |near| format!("did you mean {near}?"));
+                let known = plan.topics.iter().map(|topic| topic.name.as_str());
+                let help = did_you_mean(topic, known, "the topics are");
                 return Err(manifest.problem(&span, format!("nobody publishes {topic}"), help));
             }
             let recorders = plan.nodes.iter().zip(programs).filter(|(_, program)| program.is_recorder());

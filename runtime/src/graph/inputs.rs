@@ -1,27 +1,27 @@
 //! Inputs: who reads which topic, how late, and in which order a node waits for them.
 
 use super::outputs::{Published, require_known_ports};
-use super::processes::Member;
+use super::processes::DeclaredNode;
 use crate::manifest::{InputSetting, Manifest};
 use crate::placement;
-use crate::problem::Problem;
 use crate::program::{Executable, Program};
 use bus::Registration;
 use bus::plan::{InputPlan, NodePlan, TopicPlan};
 use bus::ports::{Inputs, PortSpec};
-use diagnostics::nearest;
+use diagnostics::Diagnostic;
+use diagnostics::did_you_mean;
 use toml::Spanned;
 
-/// The inputs of `member`, wired to `topics`.
+/// The inputs of `declared`, wired to `topics`.
 ///
 /// # Errors
 /// A port or topic that is not there, or does not fit.
 pub fn inputs(
     manifest: &Manifest,
-    member: &Member<'_>,
+    declared: &DeclaredNode<'_>,
     topics: &[TopicPlan],
-) -> Result<Vec<InputPlan>, Problem> {
-    let Member { name, process, program } = member;
+) -> Result<Vec<InputPlan>, Diagnostic> {
+    let DeclaredNode { name, process, program } = declared;
     if let Executable::Component(Registration { inputs: Inputs::Any, .. }) = &program.executable
         && process.inputs.is_empty()
     {
@@ -58,23 +58,22 @@ pub fn inputs(
         let help = format!("name topics of {} under inputs, such as inputs.h1 = \"/…\"", schema.type_name);
         return Err(manifest.problem(&name.span(), message, help));
     }
-    process.inputs.iter().map(|(port, setting)| input(manifest, member, port, setting, topics)).collect()
+    process.inputs.iter().map(|(port, setting)| input(manifest, declared, port, setting, topics)).collect()
 }
 
 fn input(
     manifest: &Manifest,
-    member: &Member<'_>,
+    declared: &DeclaredNode<'_>,
     port: &Spanned<String>,
     setting: &InputSetting,
     topics: &[TopicPlan],
-) -> Result<InputPlan, Problem> {
-    let Member { name, program, .. } = member;
+) -> Result<InputPlan, Diagnostic> {
+    let DeclaredNode { name, program, .. } = declared;
     let at = |message: String, help: String| manifest.problem(&port.span(), message, help);
     let who = format!("input `{}` of `{}`", port.get_ref(), name.get_ref());
     let Some(topic) = topics.iter().position(|topic| topic.name == setting.topic) else {
-        let known: Vec<&str> = topics.iter().map(|topic| topic.name.as_str()).collect();
-        let list = format!("the topics are {}", known.join(", "));
-        let help = nearest(&setting.topic, known).map_or(list, |near| format!("did you mean {near}?"));
+        let known = topics.iter().map(|topic| topic.name.as_str());
+        let help = did_you_mean(&setting.topic, known, "the topics are");
         return Err(at(format!("{who}: nobody publishes {}", setting.topic), help));
     };
     if let Some(expected) = expected_type(program, port.get_ref()) {
@@ -127,18 +126,18 @@ fn expected_type(program: &Program, port: &str) -> Option<&'static str> {
 /// Refuses a cycle of edges without delay: at its first tick every node of it would wait for another.
 pub fn require_no_cycle(
     manifest: &Manifest,
-    members: &[Member<'_>],
+    declared_nodes: &[DeclaredNode<'_>],
     nodes: &[NodePlan],
     published: &[Published],
     changed: Option<usize>,
-) -> Result<(), Problem> {
+) -> Result<(), Diagnostic> {
     let Some(cycle) = placement::zero_delay_cycle(nodes, |topic| published[topic].node) else {
         return Ok(());
     };
     let path: Vec<&str> =
-        cycle.iter().chain(cycle.first()).map(|&node| members[node].name.get_ref().as_str()).collect();
+        cycle.iter().chain(cycle.first()).map(|&node| declared_nodes[node].name.get_ref().as_str()).collect();
     Err(manifest.problem(
-        &members[changed.filter(|node| cycle.contains(node)).unwrap_or(cycle[0])].name.span(),
+        &declared_nodes[changed.filter(|node| cycle.contains(node)).unwrap_or(cycle[0])].name.span(),
         format!("a cycle without delay: {}", path.join(" → ")),
         "give one input of the cycle delay_ticks = 1 and an initial value, usually the plant's command",
     ))

@@ -1,13 +1,13 @@
 //! Outputs: which topics a run has, of which type, from whom and how often.
 
-use super::processes::{Member, period_ticks};
+use super::processes::{DeclaredNode, period_ticks};
 use crate::manifest::{Manifest, OutputSetting, Process};
-use crate::problem::Problem;
 use crate::program::Executable;
 use bus::plan::{OutputPlan, TopicPlan};
 use bus::ports::PortSpec;
 use bus::schema::Schema;
-use diagnostics::nearest;
+use diagnostics::Diagnostic;
+use diagnostics::did_you_mean;
 use std::ops::Range;
 use toml::Spanned;
 
@@ -21,21 +21,24 @@ pub struct Published {
     span: Range<usize>,
 }
 
-/// All outputs of `members`, each with its topic; two on one topic are refused.
-pub fn publish_all(manifest: &Manifest, members: &[Member<'_>]) -> Result<Vec<Published>, Problem> {
+/// All outputs of `declared_nodes`, each with its topic; two on one topic are refused.
+pub fn publish_all(
+    manifest: &Manifest,
+    declared_nodes: &[DeclaredNode<'_>],
+) -> Result<Vec<Published>, Diagnostic> {
     let mut all: Vec<Published> = Vec::new();
-    for (node, member) in members.iter().enumerate() {
-        for output in published_by(manifest, node, member)? {
+    for (node, declared) in declared_nodes.iter().enumerate() {
+        for output in published_by(manifest, node, declared)? {
             if let Some(other) = all.iter().find(|other| other.topic.name == output.topic.name) {
                 let message = format!(
                     "two publishers on topic {}: `{}` and `{}`",
                     output.topic.name,
-                    members[other.node].name.get_ref(),
-                    member.name.get_ref()
+                    declared_nodes[other.node].name.get_ref(),
+                    declared.name.get_ref()
                 );
                 let help = format!(
                     "give one of them another topic: [process.{}.outputs] {} = {{ topic = \"/…\" }}",
-                    member.name.get_ref(),
+                    declared.name.get_ref(),
                     output.port
                 );
                 return Err(manifest.problem(&output.span, message, help));
@@ -46,8 +49,12 @@ pub fn publish_all(manifest: &Manifest, members: &[Member<'_>]) -> Result<Vec<Pu
     Ok(all)
 }
 
-fn published_by(manifest: &Manifest, node: usize, member: &Member<'_>) -> Result<Vec<Published>, Problem> {
-    let Member { name, process, program } = member;
+fn published_by(
+    manifest: &Manifest,
+    node: usize,
+    declared: &DeclaredNode<'_>,
+) -> Result<Vec<Published>, Diagnostic> {
+    let DeclaredNode { name, process, program } = declared;
     let period = period_ticks(manifest, process)?;
     let declared: Vec<(&str, Option<&'static Schema>)> = match &program.executable {
         Executable::Component(kind) => {
@@ -89,7 +96,7 @@ fn type_name(
     port: &str,
     schema: Option<&'static Schema>,
     setting: Option<&OutputSetting>,
-) -> Result<String, Problem> {
+) -> Result<String, Diagnostic> {
     let stated = setting.and_then(|setting| setting.type_name.as_deref());
     match (schema, stated) {
         (Some(schema), None) => Ok(schema.type_name.to_owned()),
@@ -114,7 +121,7 @@ fn output_period(
     port: &str,
     node_period: u32,
     setting: Option<&OutputSetting>,
-) -> Result<u32, Problem> {
+) -> Result<u32, Diagnostic> {
     match setting.and_then(|setting| setting.every_ticks) {
         None => Ok(node_period),
         Some(every) if every > 0 && every.is_multiple_of(node_period) => Ok(every),
@@ -126,7 +133,7 @@ fn output_period(
     }
 }
 
-fn require_topic_name(manifest: &Manifest, span: &Range<usize>, topic: &str) -> Result<(), Problem> {
+fn require_topic_name(manifest: &Manifest, span: &Range<usize>, topic: &str) -> Result<(), Diagnostic> {
     let fits = |c: char| c.is_ascii_alphanumeric() || "/_-".contains(c);
     if topic.starts_with('/') && topic.len() > 1 && topic.len() <= 200 && topic.chars().all(fits) {
         return Ok(());
@@ -141,19 +148,13 @@ pub fn require_known_ports(
     process: &Spanned<String>,
     ports: &[PortSpec],
     used: impl Iterator<Item = (impl AsRef<str>, Range<usize>)>,
-) -> Result<(), Problem> {
+) -> Result<(), Diagnostic> {
     for (name, span) in used {
         let name = name.as_ref();
         if ports.iter().all(|port| port.name != name) {
-            let known: Vec<&str> = ports.iter().map(|port| port.name).collect();
+            let known = ports.iter().map(|port| port.name);
             let message = format!("process `{}` has no {direction} `{name}`", process.get_ref());
-            let list = if known.is_empty() {
-                "it has none".to_owned()
-            } else {
-                format!("it has {}", known.join(", "))
-            };
-            let help = nearest(name, known).map_or(list, |near| format!("did you mean `{near}`?"));
-            return Err(manifest.problem(&span, message, help));
+            return Err(manifest.problem(&span, message, did_you_mean(name, known, "it has")));
         }
     }
     Ok(())

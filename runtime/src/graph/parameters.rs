@@ -1,14 +1,13 @@
 //! Parameters: what each node reads about itself, checked by its kind.
 
-use super::processes::Member;
+use super::processes::DeclaredNode;
 use super::ranges;
 use crate::manifest::{Manifest, Process};
-use crate::problem::Problem;
 use crate::program::Executable;
 use bus::context::NodeContext;
 use bus::plan::{NodePlan, Plan};
+use diagnostics::Diagnostic;
 use diagnostics::ParameterError;
-use diagnostics::nearest;
 use std::collections::BTreeMap;
 use std::ops::Range;
 use std::path::PathBuf;
@@ -21,7 +20,7 @@ pub struct Notes {
     /// The vehicle, scene and gains files that the processes name, each once.
     pub models: Vec<PathBuf>,
     /// What is odd and flies all the same.
-    pub warnings: Vec<Problem>,
+    pub warnings: Vec<Diagnostic>,
     /// Whether something was left out of the warnings because the run was cut short.
     has_cut: bool,
 }
@@ -36,7 +35,7 @@ impl Notes {
     }
 
     /// The warnings, with one about all that a run that was cut short leaves out.
-    pub fn into_parts(mut self, manifest: &Manifest) -> (Vec<PathBuf>, Vec<Problem>) {
+    pub fn into_parts(mut self, manifest: &Manifest) -> (Vec<PathBuf>, Vec<Diagnostic>) {
         if self.has_cut {
             let duration = &manifest.content.run.duration_s;
             let message = format!(
@@ -46,7 +45,7 @@ impl Notes {
             let help = "set points do not act; a condition without a sample does not pass";
             self.warnings.push(manifest.problem(&duration.span(), message, help));
         }
-        (self.models, self.warnings)
+        (self.models, self.warnings.into_iter().map(Diagnostic::warning).collect())
     }
 }
 
@@ -65,19 +64,19 @@ impl RunLength {
     }
 }
 
-/// Gives `node` the parameters of `member`, files resolved, checked for a run of that length where its kind is built
+/// Gives `node` the parameters of `declared`, files resolved, checked for a run of that length where its kind is built
 /// in; notes its vehicle file, what that is based on, its scene and its gains file, and what is odd.
 ///
 /// # Errors
 /// A file or a parameter that is refused.
 pub fn set(
     manifest: &Manifest,
-    member: &Member<'_>,
+    declared: &DeclaredNode<'_>,
     node: &mut NodePlan,
     run: RunLength,
     notes: &mut Notes,
-) -> Result<(), Problem> {
-    let Member { name, process, program } = member;
+) -> Result<(), Diagnostic> {
+    let DeclaredNode { name, process, program } = declared;
     let mut parameters: BTreeMap<&str, serde_json::Value> =
         process.parameters.iter().map(|(key, value)| (key.get_ref().as_str(), value.clone())).collect();
     for (key, file) in files(process) {
@@ -107,11 +106,11 @@ pub fn set(
             .naming(&outputs)
             .timed(run.tick_ns, node.period_ticks, run.duration_ticks)
             .seeded(run.seed);
-        kind.check(&parameters, &context).map_err(|error| refused(manifest, member, &error))?;
+        kind.check(&parameters, &context).map_err(|error| refused(manifest, declared, &error))?;
         for warning in context.into_warnings() {
-            let at = place(member, &warning.key);
+            let at = place(declared, &warning.key);
             if !(warning.is_behind_end && notes.is_cut(manifest, &at)) {
-                notes.warnings.push(problem(manifest, member, &at, &warning.message, String::new()));
+                notes.warnings.push(problem(manifest, declared, &at, &warning.message, String::new()));
             }
         }
     }
@@ -139,7 +138,7 @@ fn files(process: &Process) -> [(&'static str, &Option<Spanned<String>>); 4] {
 }
 
 /// A recorder's file and attachments come from the launcher.
-fn require_none(manifest: &Manifest, process: &Process) -> Result<(), Problem> {
+fn require_none(manifest: &Manifest, process: &Process) -> Result<(), Diagnostic> {
     match process.parameters.keys().next() {
         None => Ok(()),
         Some(key) => Err(manifest.problem(
@@ -151,38 +150,33 @@ fn require_none(manifest: &Manifest, process: &Process) -> Result<(), Problem> {
 }
 
 /// A refused parameter, at its place.
-fn refused(manifest: &Manifest, member: &Member<'_>, error: &ParameterError) -> Problem {
-    let (name, key) = (member.name.get_ref(), error.key());
+fn refused(manifest: &Manifest, declared: &DeclaredNode<'_>, error: &ParameterError) -> Diagnostic {
+    let (name, key) = (declared.name.get_ref(), error.key());
     let help = match error {
-        ParameterError::Missing { .. } if files(member.process).iter().any(|(file, _)| *file == key) => {
+        ParameterError::Missing { .. } if files(declared.process).iter().any(|(file, _)| *file == key) => {
             format!("add {key} = \"PATH\" to [process.{name}]")
         }
         ParameterError::Missing { .. } => format!("add {key} = … to [process.{name}.parameters]"),
-        ParameterError::Unknown { known, .. } => {
-            let last = key.rsplit('.').next().unwrap_or(key);
-            let near = nearest(last, known.iter().map(String::as_str));
-            near.map_or(String::new(), |near| format!("did you mean `{near}`?"))
-        }
-        ParameterError::Value { .. } | ParameterError::Conflict { .. } => String::new(),
+        _ => error.meant().map_or(String::new(), |near| format!("did you mean `{near}`?")),
     };
-    problem(manifest, member, &place(member, key), &error.to_string(), help)
+    problem(manifest, declared, &place(declared, key), &error.to_string(), help)
 }
 
 fn problem(
     manifest: &Manifest,
-    member: &Member<'_>,
+    declared: &DeclaredNode<'_>,
     at: &Range<usize>,
     message: &str,
     help: String,
-) -> Problem {
-    manifest.problem(at, format!("process `{}`: {message}", member.name.get_ref()), help)
+) -> Diagnostic {
+    manifest.problem(at, format!("process `{}`: {message}", declared.name.get_ref()), help)
 }
 
 /// Where the dotted `key` stands: by its first name, which is a parameter or a file; else the place of the process.
-fn place(member: &Member<'_>, key: &str) -> Range<usize> {
+fn place(declared: &DeclaredNode<'_>, key: &str) -> Range<usize> {
     let first = key.split('.').next().unwrap_or(key);
-    let parameter = member.process.parameters.keys().find(|key| key.get_ref() == first).map(Spanned::span);
-    let file = files(member.process).into_iter().find(|(key, _)| *key == first);
+    let parameter = declared.process.parameters.keys().find(|key| key.get_ref() == first).map(Spanned::span);
+    let file = files(declared.process).into_iter().find(|(key, _)| *key == first);
     let file = file.and_then(|(_, file)| file.as_ref()).map(Spanned::span);
-    parameter.or(file).unwrap_or_else(|| member.name.span())
+    parameter.or(file).unwrap_or_else(|| declared.name.span())
 }

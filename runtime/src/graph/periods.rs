@@ -1,10 +1,10 @@
 //! Periods against the length of the run: what would overflow the count of ticks, and what computes only once.
 
 use super::parameters::Notes;
-use super::processes::Member;
+use super::processes::DeclaredNode;
 use crate::manifest::Manifest;
-use crate::problem::Problem;
 use bus::plan::Plan;
+use diagnostics::Diagnostic;
 use std::ops::Range;
 
 /// Refuses periods with which the tick behind the last cannot be counted, and tells those as long as the run.
@@ -13,14 +13,14 @@ use std::ops::Range;
 /// The process or output, and its period.
 pub fn check(
     manifest: &Manifest,
-    members: &[Member<'_>],
+    declared_nodes: &[DeclaredNode<'_>],
     plan: &Plan,
     notes: &mut Notes,
-) -> Result<(), Problem> {
+) -> Result<(), Diagnostic> {
     let end = plan.duration_ticks;
-    for (member, node) in members.iter().zip(&plan.nodes) {
-        let name = &member.name;
-        let written = member.process.period_ticks.as_ref();
+    for (declared, node) in declared_nodes.iter().zip(&plan.nodes) {
+        let name = &declared.name;
+        let written = declared.process.period_ticks.as_ref();
         let span = written.map_or_else(|| name.span(), toml::Spanned::span);
         let who = format!("`period_ticks` of `{}`", name.get_ref());
         note(manifest, &span, checked(manifest, &span, &who, node.period_ticks, end)?, notes);
@@ -29,7 +29,7 @@ pub fn check(
             if every == node.period_ticks {
                 continue;
             }
-            let port = member.process.outputs.keys().find(|port| *port.get_ref() == output.port);
+            let port = declared.process.outputs.keys().find(|port| *port.get_ref() == output.port);
             let span = port.unwrap_or(name).span();
             let who = format!("`every_ticks` of the output `{}` of `{}`", output.port, name.get_ref());
             note(manifest, &span, checked(manifest, &span, &who, every, end)?, notes);
@@ -38,7 +38,7 @@ pub fn check(
     Ok(())
 }
 
-fn note(manifest: &Manifest, span: &Range<usize>, warning: Option<Problem>, notes: &mut Notes) {
+fn note(manifest: &Manifest, span: &Range<usize>, warning: Option<Diagnostic>, notes: &mut Notes) {
     if let Some(warning) = warning
         && !notes.is_cut(manifest, span)
     {
@@ -52,7 +52,7 @@ fn checked(
     who: &str,
     ticks: u32,
     end: u32,
-) -> Result<Option<Problem>, Problem> {
+) -> Result<Option<Diagnostic>, Diagnostic> {
     if end.checked_add(ticks).is_none_or(|behind| behind >= u32::MAX - 1) {
         let message = format!("{who} is {ticks}, and the run has {end} ticks");
         return Err(manifest.problem(

@@ -2,7 +2,6 @@
 
 use crate::manifest::{Manifest, Process};
 use crate::output_file;
-use crate::problem::Problem;
 use crate::program::{Executable, OnExit, Program, Readiness};
 use bus::GENERATION_VARIABLE;
 use bus::NODE_VARIABLE;
@@ -10,7 +9,8 @@ use bus::Registration;
 use bus::component::Transfer;
 use bus::plan::NodePlan;
 use bus::process::{LAUNCHER_VARIABLE, RUN_VARIABLE};
-use diagnostics::nearest;
+use diagnostics::Diagnostic;
+use diagnostics::{did_you_mean, nearest};
 use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::Read as _;
@@ -21,7 +21,7 @@ use toml::Spanned;
 
 /// A process that takes part in the ticks, on its way into the plan.
 #[derive(Clone)]
-pub struct Member<'m> {
+pub struct DeclaredNode<'m> {
     /// Its name.
     pub name: &'m Spanned<String>,
     /// What the manifest says of it.
@@ -34,31 +34,32 @@ pub struct Member<'m> {
 ///
 /// # Errors
 /// If there is none, or one cannot be started.
-pub fn members(manifest: &Manifest) -> Result<Vec<Member<'_>>, Problem> {
-    let members = manifest.content.process.iter().filter(|(_, process)| takes_part(process));
-    let member = |(name, process)| {
+pub fn declared_nodes(manifest: &Manifest) -> Result<Vec<DeclaredNode<'_>>, Diagnostic> {
+    let declared_nodes = manifest.content.process.iter().filter(|(_, process)| takes_part(process));
+    let declared = |(name, process)| {
         require_no_sidecar(manifest, name, process)?;
-        Ok(Member { name, process, program: program(manifest, name, process)? })
+        Ok(DeclaredNode { name, process, program: program(manifest, name, process)? })
     };
-    let members = Problem::gather(members.map(member))?;
-    if members.is_empty() {
-        return Err(Problem::in_file(&manifest.path, "there is no process", "add [process.<name>] tables"));
+    let declared_nodes = Diagnostic::gather(declared_nodes.map(declared))?;
+    if declared_nodes.is_empty() {
+        let file = manifest.path.display().to_string();
+        return Err(Diagnostic::in_file(file, "there is no process").help("add [process.<name>] tables"));
     }
-    Ok(members)
+    Ok(declared_nodes)
 }
 
 /// The processes that do not, by name.
 ///
 /// # Errors
 /// If one says what only a node can, or cannot be started.
-pub fn sidecars(manifest: &Manifest) -> Result<Vec<(String, Program)>, Problem> {
+pub fn sidecars(manifest: &Manifest) -> Result<Vec<(String, Program)>, Diagnostic> {
     let sidecars = manifest.content.process.iter().filter(|(_, process)| !takes_part(process));
     let sidecar = |(name, process): (&Spanned<String>, &Process)| {
         require_no_node(manifest, name, process)?;
         require_no_standby(manifest, name, process)?;
         Ok((name.get_ref().clone(), program(manifest, name, process)?))
     };
-    Problem::gather(sidecars.map(sidecar))
+    Diagnostic::gather(sidecars.map(sidecar))
 }
 
 fn takes_part(process: &Process) -> bool {
@@ -66,7 +67,7 @@ fn takes_part(process: &Process) -> bool {
 }
 
 /// A sidecar has no ports and no place in the ticks.
-fn require_no_node(manifest: &Manifest, name: &Spanned<String>, process: &Process) -> Result<(), Problem> {
+fn require_no_node(manifest: &Manifest, name: &Spanned<String>, process: &Process) -> Result<(), Diagnostic> {
     let first_key = |key: Option<&Spanned<String>>| key.map(Spanned::span);
     let stated = [
         ("kind", process.kind.as_ref().map(Spanned::span)),
@@ -92,7 +93,11 @@ fn require_no_node(manifest: &Manifest, name: &Spanned<String>, process: &Proces
 }
 
 /// A sidecar keeps no state of the run that a standby could go on from.
-fn require_no_standby(manifest: &Manifest, name: &Spanned<String>, process: &Process) -> Result<(), Problem> {
+fn require_no_standby(
+    manifest: &Manifest,
+    name: &Spanned<String>,
+    process: &Process,
+) -> Result<(), Diagnostic> {
     match process.on_exit.as_ref().filter(|on_exit| *on_exit.get_ref() == OnExit::Standby) {
         None => Ok(()),
         Some(on_exit) => Err(manifest.problem(
@@ -107,7 +112,11 @@ fn require_no_standby(manifest: &Manifest, name: &Spanned<String>, process: &Pro
 }
 
 /// What only a sidecar may say.
-fn require_no_sidecar(manifest: &Manifest, name: &Spanned<String>, process: &Process) -> Result<(), Problem> {
+fn require_no_sidecar(
+    manifest: &Manifest,
+    name: &Spanned<String>,
+    process: &Process,
+) -> Result<(), Diagnostic> {
     if let Some(ready) = &process.ready {
         let message = format!("`ready` of `{}`, which takes part in the ticks", name.get_ref());
         let help = "leave it out: a node is ready when it has joined; sidecars (lockstep = false) may say so";
@@ -127,7 +136,11 @@ fn require_no_sidecar(manifest: &Manifest, name: &Spanned<String>, process: &Pro
 ///
 /// # Errors
 /// If it cannot be started here.
-pub fn program(manifest: &Manifest, name: &Spanned<String>, process: &Process) -> Result<Program, Problem> {
+pub fn program(
+    manifest: &Manifest,
+    name: &Spanned<String>,
+    process: &Process,
+) -> Result<Program, Diagnostic> {
     require_name(manifest, name)?;
     require_environment(manifest, process)?;
     require_core(manifest, process.cpu.as_ref(), "cpu")?;
@@ -144,11 +157,14 @@ pub fn program(manifest: &Manifest, name: &Spanned<String>, process: &Process) -
     })
 }
 
-fn executable(manifest: &Manifest, name: &Spanned<String>, process: &Process) -> Result<Executable, Problem> {
+fn executable(
+    manifest: &Manifest,
+    name: &Spanned<String>,
+    process: &Process,
+) -> Result<Executable, Diagnostic> {
     match (&process.kind, &process.command) {
         (Some(kind), None) => {
-            let known: Vec<_> = manifest.registry().iter().map(|kind| kind.name).collect();
-            let help = match nearest(kind.get_ref(), known) {
+            let help = match nearest(kind.get_ref(), manifest.registry().iter().map(|kind| kind.name)) {
                 Some(near) => format!("did you mean `{near}`? The kinds are {}", manifest.registry().names()),
                 None => format!("the kinds are {}", manifest.registry().names()),
             };
@@ -170,7 +186,7 @@ fn executable(manifest: &Manifest, name: &Spanned<String>, process: &Process) ->
 }
 
 /// A process that nothing says what it is: most likely a name in a `--set` that is no process's.
-fn nameless(manifest: &Manifest, name: &Spanned<String>) -> Problem {
+fn nameless(manifest: &Manifest, name: &Spanned<String>) -> Diagnostic {
     let found = name.get_ref();
     if !manifest.is_override(&name.span()) {
         let message = format!("process `{found}` needs either `kind` or `command`");
@@ -181,9 +197,7 @@ fn nameless(manifest: &Manifest, name: &Spanned<String>) -> Problem {
         );
     }
     let others = manifest.content.process.keys().map(|name| name.get_ref().as_str());
-    let known: Vec<&str> = others.filter(|name| name != found).collect();
-    let list = format!("the processes are {}", known.join(", "));
-    let help = nearest(found, known).map_or(list, |near| format!("did you mean `{near}`?"));
+    let help = did_you_mean(found, others.filter(|name| name != found), "the processes are");
     manifest.problem(&name.span(), format!("there is no process `{found}`"), help)
 }
 
@@ -193,7 +207,7 @@ fn command(
     name: &Spanned<String>,
     process: &Process,
     command: &Spanned<Vec<String>>,
-) -> Result<Vec<String>, Problem> {
+) -> Result<Vec<String>, Diagnostic> {
     let refused = |message: &str, help: &str| manifest.problem(&command.span(), message, help);
     let Some((word, arguments)) = command.get_ref().split_first() else {
         return Err(refused("`command` is empty", "name an executable and its arguments"));
@@ -254,7 +268,7 @@ fn is_executable(path: &Path) -> bool {
 }
 
 /// Each part of a name: the process's own, or a vehicle's and the process's in its set.
-fn require_name(manifest: &Manifest, name: &Spanned<String>) -> Result<(), Problem> {
+fn require_name(manifest: &Manifest, name: &Spanned<String>) -> Result<(), Diagnostic> {
     let text = name.get_ref();
     let fits = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '-' || c == '_';
     if text != "clock" && text.split('/').all(|part| !part.is_empty() && part.chars().all(fits)) {
@@ -271,7 +285,7 @@ fn require_name(manifest: &Manifest, name: &Spanned<String>) -> Result<(), Probl
 ///
 /// # Errors
 /// If it is 0.
-pub fn period_ticks(manifest: &Manifest, process: &Process) -> Result<u32, Problem> {
+pub fn period_ticks(manifest: &Manifest, process: &Process) -> Result<u32, Diagnostic> {
     match &process.period_ticks {
         None => Ok(1),
         Some(period) if *period.get_ref() >= 1 => Ok(*period.get_ref()),
@@ -281,7 +295,7 @@ pub fn period_ticks(manifest: &Manifest, process: &Process) -> Result<u32, Probl
     }
 }
 
-fn require_environment(manifest: &Manifest, process: &Process) -> Result<(), Problem> {
+fn require_environment(manifest: &Manifest, process: &Process) -> Result<(), Diagnostic> {
     for (name, value) in &process.environment {
         let text = name.get_ref();
         if [GENERATION_VARIABLE, LAUNCHER_VARIABLE, NODE_VARIABLE, RUN_VARIABLE].contains(&text.as_str()) {
@@ -300,7 +314,7 @@ fn require_environment(manifest: &Manifest, process: &Process) -> Result<(), Pro
 ///
 /// # Errors
 /// With the cores there are.
-pub fn require_core(manifest: &Manifest, cpu: Option<&Spanned<usize>>, key: &str) -> Result<(), Problem> {
+pub fn require_core(manifest: &Manifest, cpu: Option<&Spanned<usize>>, key: &str) -> Result<(), Diagnostic> {
     let (Some(cpu), allowed) = (cpu, bus::process::allowed_cores()) else { return Ok(()) };
     if allowed.is_empty() || allowed.contains(cpu.get_ref()) {
         return Ok(());
@@ -316,7 +330,7 @@ fn within(
     value: Option<&Spanned<i32>>,
     min: i32,
     max: i32,
-) -> Result<Option<i32>, Problem> {
+) -> Result<Option<i32>, Diagnostic> {
     match value {
         Some(value) if !(min..=max).contains(value.get_ref()) => Err(manifest.problem(
             &value.span(),
@@ -327,7 +341,7 @@ fn within(
     }
 }
 
-fn watchdog(manifest: &Manifest, process: &Process) -> Result<Duration, Problem> {
+fn watchdog(manifest: &Manifest, process: &Process) -> Result<Duration, Diagnostic> {
     match &process.watchdog_ms_host {
         None => Ok(crate::program::WATCHDOG),
         Some(limit) if *limit.get_ref() >= 1 => Ok(Duration::from_millis(*limit.get_ref())),
@@ -339,7 +353,7 @@ fn watchdog(manifest: &Manifest, process: &Process) -> Result<Duration, Problem>
     }
 }
 
-fn working_directory(manifest: &Manifest, process: &Process) -> Result<Option<PathBuf>, Problem> {
+fn working_directory(manifest: &Manifest, process: &Process) -> Result<Option<PathBuf>, Diagnostic> {
     let Some(written) = &process.working_directory else { return Ok(None) };
     let path = manifest.resolve(written)?;
     if path.is_dir() {
@@ -349,7 +363,7 @@ fn working_directory(manifest: &Manifest, process: &Process) -> Result<Option<Pa
     Err(manifest.problem(&written.span(), message, "make it, or correct the path"))
 }
 
-fn log(manifest: &Manifest, process: &Process) -> Result<Option<PathBuf>, Problem> {
+fn log(manifest: &Manifest, process: &Process) -> Result<Option<PathBuf>, Diagnostic> {
     let Some(written) = &process.log else { return Ok(None) };
     let path = manifest.resolve(written)?;
     let at = |message: String, help: &str| Err(manifest.problem(&written.span(), message, help));
@@ -369,7 +383,7 @@ fn log(manifest: &Manifest, process: &Process) -> Result<Option<PathBuf>, Proble
 ///
 /// # Errors
 /// With both names.
-pub fn require_own_logs(manifest: &Manifest) -> Result<(), Problem> {
+pub fn require_own_logs(manifest: &Manifest) -> Result<(), Diagnostic> {
     let mut logs: BTreeMap<PathBuf, &str> = BTreeMap::new();
     for (name, process) in &manifest.content.process {
         let Some(written) = &process.log else { continue };
@@ -386,14 +400,19 @@ pub fn require_own_logs(manifest: &Manifest) -> Result<(), Problem> {
 ///
 /// # Errors
 /// With the reason.
-pub fn require_replaceable(manifest: &Manifest, member: &Member<'_>, node: &NodePlan) -> Result<(), Problem> {
-    let Some(on_exit) = member.process.on_exit.as_ref().filter(|kept| *kept.get_ref() != OnExit::Stop) else {
+pub fn require_replaceable(
+    manifest: &Manifest,
+    declared: &DeclaredNode<'_>,
+    node: &NodePlan,
+) -> Result<(), Diagnostic> {
+    let Some(on_exit) = declared.process.on_exit.as_ref().filter(|kept| *kept.get_ref() != OnExit::Stop)
+    else {
         return Ok(());
     };
-    match irreplaceable(member, node) {
+    match irreplaceable(declared, node) {
         None => Ok(()),
         Some(reason) => {
-            let message = format!("`on_exit` of `{}`: {reason}", member.name.get_ref());
+            let message = format!("`on_exit` of `{}`: {reason}", declared.name.get_ref());
             Err(manifest.problem(
                 &on_exit.span(),
                 message,
@@ -404,11 +423,11 @@ pub fn require_replaceable(manifest: &Manifest, member: &Member<'_>, node: &Node
 }
 
 /// Why another process cannot go on in the place of this one.
-pub fn irreplaceable(member: &Member<'_>, node: &NodePlan) -> Option<&'static str> {
+pub fn irreplaceable(declared: &DeclaredNode<'_>, node: &NodePlan) -> Option<&'static str> {
     let has_internal_state = |component: &Registration| matches!(component.transfer, Transfer::Internal);
-    if member.program.is_recorder() {
+    if declared.program.is_recorder() {
         Some("it is the recorder, and its file would be torn")
-    } else if member.program.component().is_some_and(has_internal_state) {
+    } else if declared.program.component().is_some_and(has_internal_state) {
         Some("its state is not transferred: another process would start anew")
     } else if node.outputs.is_empty() {
         Some("it has no outputs, so nothing could be transferred")

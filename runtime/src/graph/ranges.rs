@@ -2,7 +2,7 @@
 //! kind reads it. Kinds and files have narrower bounds where they know more.
 
 use crate::manifest::{Manifest, Process};
-use crate::problem::Problem;
+use diagnostics::{Diagnostic, ParameterError};
 use serde_json::Value;
 use toml::Spanned;
 
@@ -51,8 +51,8 @@ const LEAST: f64 = 1e-30;
 ///
 /// # Errors
 /// Its key, the bound and why.
-pub fn check(manifest: &Manifest, name: &Spanned<String>, process: &Process) -> Result<(), Problem> {
-    let refused = |at: &Spanned<String>, reason: String| {
+pub fn check(manifest: &Manifest, name: &Spanned<String>, process: &Process) -> Result<(), Diagnostic> {
+    let refused = |at: &Spanned<String>, reason: ParameterError| {
         let message = format!("process `{}`: {reason}", name.get_ref());
         manifest.problem(&at.span(), message, "correct the number or its unit: the key ends in the unit")
     };
@@ -64,11 +64,11 @@ pub fn check(manifest: &Manifest, name: &Spanned<String>, process: &Process) -> 
         let path = format!("inputs.{}.initial", port.get_ref());
         within(&path, "", initial).map_err(|reason| refused(port, reason))
     });
-    Problem::gather(parameters.chain(initial)).map(drop)
+    Diagnostic::gather(parameters.chain(initial)).map(drop)
 }
 
 /// Checks `value` at the dotted `path`; `key` is the last key on it that is a name.
-fn within(path: &str, key: &str, value: &Value) -> Result<(), String> {
+fn within(path: &str, key: &str, value: &Value) -> Result<(), ParameterError> {
     match value {
         Value::Object(table) => {
             table.iter().try_for_each(|(key, value)| within(&format!("{path}.{key}"), key, value))
@@ -82,16 +82,18 @@ fn within(path: &str, key: &str, value: &Value) -> Result<(), String> {
     }
 }
 
-fn number_within(path: &str, key: &str, number: f64) -> Result<(), String> {
+fn number_within(path: &str, key: &str, number: f64) -> Result<(), ParameterError> {
     // The last range fits any key.
     let Some(range) = RANGES.iter().find(|range| key.ends_with(range.end)) else { return Ok(()) };
     let Range { unit, most, why, .. } = range;
     let unit = if unit.is_empty() { String::new() } else { format!(" {unit}") };
     if number.abs() > *most {
-        return Err(format!("`{path}` is {number:e}{unit}, expected at most {most:e}{unit} in size: {why}"));
+        let message = format!("`{path}` is {number:e}{unit}, expected at most {most:e}{unit} in size: {why}");
+        return Err(ParameterError::conflict(path, message));
     }
     if number != 0.0 && number.abs() < LEAST {
-        return Err(format!("`{path}` is {number:e}{unit}, expected 0 or at least {LEAST:e}{unit} in size"));
+        let message = format!("`{path}` is {number:e}{unit}, expected 0 or at least {LEAST:e}{unit} in size");
+        return Err(ParameterError::conflict(path, message));
     }
     Ok(())
 }
@@ -103,7 +105,7 @@ mod tests {
 
     #[test]
     fn the_longest_end_of_a_key_counts() {
-        let refused = |key: &str, number: f64| within(key, key, &json!(number)).unwrap_err();
+        let refused = |key: &str, number: f64| within(key, key, &json!(number)).unwrap_err().to_string();
         assert!(refused("speed_m_s", 2e4).contains("expected at most 1e4 m/s in size"));
         assert!(refused("width_m", 2e7).contains("1e7 m"));
         assert!(refused("rate_rad_s", 1e6).contains("1e5 rad/s"));
@@ -118,7 +120,7 @@ mod tests {
     #[test]
     fn a_number_deep_in_a_table_is_named_by_its_whole_key() {
         let gains = json!({ "roll": { "proportional_1_s2": 16.0, "integral_1_s3": [0.0, -1e300] } });
-        let words = within("gains", "gains", &gains).unwrap_err();
+        let words = within("gains", "gains", &gains).unwrap_err().to_string();
         assert!(
             words.starts_with("`gains.roll.integral_1_s3.1` is -1e300 1/s^3, expected at most 1e9"),
             "{words}"

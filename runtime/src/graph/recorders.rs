@@ -1,14 +1,17 @@
 //! Recorders: one, and it takes every sample.
 
-use super::processes::Member;
+use super::processes::DeclaredNode;
 use crate::manifest::Manifest;
-use crate::problem::Problem;
 use bus::plan::NodePlan;
+use diagnostics::Diagnostic;
 
 /// A second recorder would write to the same file.
-pub fn require_one_recorder(manifest: &Manifest, members: &[Member<'_>]) -> Result<(), Problem> {
+pub fn require_one_recorder(
+    manifest: &Manifest,
+    declared_nodes: &[DeclaredNode<'_>],
+) -> Result<(), Diagnostic> {
     let mut recorders =
-        members.iter().filter(|member| member.program.is_recorder()).map(|member| member.name);
+        declared_nodes.iter().filter(|declared| declared.program.is_recorder()).map(|declared| declared.name);
     match (recorders.next(), recorders.next()) {
         (Some(first), Some(second)) => Err(manifest.problem(
             &second.span(),
@@ -22,11 +25,11 @@ pub fn require_one_recorder(manifest: &Manifest, members: &[Member<'_>]) -> Resu
 /// A recorder that ran less often, or looked back, would leave samples out.
 pub fn require_whole_recording(
     manifest: &Manifest,
-    members: &[Member<'_>],
+    declared_nodes: &[DeclaredNode<'_>],
     nodes: &[NodePlan],
-) -> Result<(), Problem> {
-    let recorders = members.iter().zip(nodes).filter(|(member, _)| member.program.is_recorder());
-    for (Member { name, .. }, node) in recorders {
+) -> Result<(), Diagnostic> {
+    let recorders = declared_nodes.iter().zip(nodes).filter(|(declared, _)| declared.program.is_recorder());
+    for (DeclaredNode { name, .. }, node) in recorders {
         if node.period_ticks != 1 || node.inputs.iter().any(|input| input.delay_ticks != 0) {
             return Err(manifest.problem(
                 &name.span(),

@@ -1,8 +1,8 @@
 //! A manifest that is built in code.
 
 use super::Manifest;
-use crate::problem::Problem;
 use crate::registry::Registry;
+use diagnostics::Diagnostic;
 use std::path::Path;
 use toml::{Table, Value};
 
@@ -60,8 +60,8 @@ impl ManifestBuilder {
     /// The manifest, as if it stood at `path`: relative paths in it start at the folder of that.
     ///
     /// # Errors
-    /// A [`Problem`] at its place in the printed manifest.
-    pub fn build(&self, path: &Path, registry: Registry) -> Result<Manifest, Problem> {
+    /// A [`Diagnostic`] at its place in the printed manifest.
+    pub fn build(&self, path: &Path, registry: Registry) -> Result<Manifest, Diagnostic> {
         Manifest::parse(self.to_string(), path, &[], registry)
     }
 }

@@ -1,7 +1,7 @@
 //! No number of a manifest is infinite or none: found where it stands, before anything makes a `null` of it.
 
 use super::sources::Sources;
-use crate::problem::Problem;
+use diagnostics::Diagnostic;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
@@ -9,12 +9,12 @@ use toml::de::{DeTable, DeValue};
 ///
 /// # Errors
 /// Its place and key.
-pub fn require(table: &DeTable<'_>, path: &str, sources: &Sources) -> Result<(), Problem> {
+pub fn require(table: &DeTable<'_>, path: &str, sources: &Sources) -> Result<(), Diagnostic> {
     let values = table.iter().map(|(key, value)| require_value(value, &joined(path, key.get_ref()), sources));
-    Problem::gather(values).map(drop)
+    Diagnostic::gather(values).map(drop)
 }
 
-fn require_value(value: &Spanned<DeValue<'_>>, path: &str, sources: &Sources) -> Result<(), Problem> {
+fn require_value(value: &Spanned<DeValue<'_>>, path: &str, sources: &Sources) -> Result<(), Diagnostic> {
     match value.get_ref() {
         DeValue::Table(table) => require(table, path, sources),
         DeValue::Array(array) => array

@@ -2,8 +2,8 @@
 
 use super::sources::{Origin, Sources};
 use super::tree;
-use crate::problem::Problem;
 use crate::registry::Registry;
+use diagnostics::Diagnostic;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use toml::Spanned;
@@ -18,9 +18,10 @@ pub const LISTS: [&str; 5] = ["compare", "pass", "shadow", "swap", "vehicle"];
 ///
 /// # Errors
 /// If it cannot be read.
-pub fn text(path: &Path) -> Result<String, Problem> {
+pub fn text(path: &Path) -> Result<String, Diagnostic> {
     vehicles::text::read(path).map_err(|error| {
-        Problem::in_file(path, format!("cannot be read: {error}"), "give the path of a manifest")
+        let file = path.display().to_string();
+        Diagnostic::in_file(file, format!("cannot be read: {error}")).help("give the path of a manifest")
     })
 }
 
@@ -28,7 +29,7 @@ pub fn text(path: &Path) -> Result<String, Problem> {
 ///
 /// # Errors
 /// A file that cannot be read or includes itself, at the place of the include.
-pub fn read(path: &Path, text: String, registry: Registry) -> Result<Sources, Problem> {
+pub fn read(path: &Path, text: String, registry: Registry) -> Result<Sources, Diagnostic> {
     let mut reader = Reader { sources: Sources::of(registry), read: Vec::new(), open: Vec::new() };
     reader.add(path, text)?;
     Ok(reader.sources)
@@ -43,7 +44,7 @@ struct Reader {
 }
 
 impl Reader {
-    fn add(&mut self, path: &Path, text: String) -> Result<(), Problem> {
+    fn add(&mut self, path: &Path, text: String) -> Result<(), Diagnostic> {
         let identity = path.canonicalize().unwrap_or_else(|_| path.to_owned());
         let index = self.sources.all().len();
         self.sources.add(Origin::File(path.to_owned()), text);
@@ -58,7 +59,7 @@ impl Reader {
         Ok(())
     }
 
-    fn include(&mut self, written: &Spanned<String>) -> Result<(), Problem> {
+    fn include(&mut self, written: &Spanned<String>) -> Result<(), Diagnostic> {
         let path = self.sources.path(written)?;
         let at = |message: String, help: &str| self.sources.problem(&written.span(), message, help);
         let identity = path.canonicalize().unwrap_or_else(|_| path.clone());
@@ -80,7 +81,7 @@ impl Reader {
 }
 
 /// The files that the text added last includes.
-fn includes(sources: &Sources) -> Result<Vec<Spanned<String>>, Problem> {
+fn includes(sources: &Sources) -> Result<Vec<Spanned<String>>, Diagnostic> {
     let table = sources.last_table()?;
     let Some(value) = table.get(KEY) else { return Ok(Vec::new()) };
     let refused = |span: Range<usize>| {
@@ -99,7 +100,7 @@ fn includes(sources: &Sources) -> Result<Vec<Spanned<String>>, Problem> {
 ///
 /// # Errors
 /// A text that is not TOML.
-pub fn merged(sources: &Sources) -> Result<DeTable<'_>, Problem> {
+pub fn merged(sources: &Sources) -> Result<DeTable<'_>, Diagnostic> {
     let mut all = DeTable::new();
     for &file in &sources.order {
         let mut table = sources.table(&sources.all()[file])?;
@@ -122,7 +123,7 @@ fn prepend_lists<'t>(table: &mut DeTable<'t>, below: &mut DeTable<'t>) {
 }
 
 /// How many elements of the list `list` the included files give.
-pub fn inherited(sources: &Sources, list: &str) -> Result<usize, Problem> {
+pub fn inherited(sources: &Sources, list: &str) -> Result<usize, Diagnostic> {
     let mut count = 0;
     for &file in sources.order.iter().filter(|&&file| file != 0) {
         let table = sources.table(&sources.all()[file])?;

@@ -2,8 +2,8 @@
 
 use super::sources::{Source, Sources};
 use super::tree;
-use crate::problem::Problem;
-use diagnostics::nearest;
+use diagnostics::Diagnostic;
+use diagnostics::did_you_mean;
 use std::borrow::Cow;
 use std::ops::Range;
 use toml::Spanned;
@@ -19,14 +19,32 @@ pub struct Override<'s> {
     value: Spanned<DeValue<'s>>,
 }
 
+/// Why a value has no place in the manifest.
+#[derive(Debug, thiserror::Error)]
+enum OverrideError {
+    #[error("`{0}` is not a table")]
+    NoTable(String),
+    #[error("`{list}` is a list of {len}, and `{key}` is none of them")]
+    NoElement { list: String, len: usize, key: String },
+}
+
+impl OverrideError {
+    fn help(&self) -> &'static str {
+        match self {
+            Self::NoTable(_) => "docs/manifest.md lists every key",
+            Self::NoElement { .. } => "its elements are numbered from 0",
+        }
+    }
+}
+
 /// All values given with `--set`, in their order.
-pub fn all(sources: &Sources) -> Result<Vec<Override<'_>>, Problem> {
+pub fn all(sources: &Sources) -> Result<Vec<Override<'_>>, Diagnostic> {
     sources.overrides().map(|source| Override::parse(source, sources)).collect()
 }
 
 impl<'s> Override<'s> {
     /// Reads a `--set`.
-    pub fn parse(source: &'s Source, sources: &Sources) -> Result<Self, Problem> {
+    pub fn parse(source: &'s Source, sources: &Sources) -> Result<Self, Diagnostic> {
         let refused = |message: &str| {
             let help = "write --set run.seed=3, for example";
             sources.problem(&(source.base..source.base), message, help)
@@ -50,11 +68,9 @@ impl<'s> Override<'s> {
     }
 
     /// Puts the value into `root`; tables that are missing on the way are made.
-    pub fn apply(self, root: &mut DeTable<'s>, sources: &Sources) -> Result<(), Problem> {
-        let at =
-            |span: Range<usize>, (message, help): (String, String)| sources.problem(&span, message, help);
+    pub fn apply(self, root: &mut DeTable<'s>, sources: &Sources) -> Result<(), Diagnostic> {
         if self.is_of_an_expanded_process() {
-            require_process(root, self.names()[1]).map_err(|words| at(self.keys[1].span(), words))?;
+            require_process(root, &self.keys[1], sources)?;
         }
         let Some((last, parents)) = self.keys.split_last() else { return Ok(()) };
         let mut whole = DeValue::Table(std::mem::take(root));
@@ -62,7 +78,7 @@ impl<'s> Override<'s> {
         if let DeValue::Table(table) = whole {
             *root = table;
         }
-        put.map_err(|words| at(last.span(), words))
+        put.map_err(|error| sources.problem(&last.span(), error.to_string(), error.help()))
     }
 }
 
@@ -86,23 +102,20 @@ fn value_of(text: &str, base: usize) -> Spanned<DeValue<'_>> {
         .unwrap_or_else(|| Spanned::new(base..base + text.len(), DeValue::String(Cow::Borrowed(text))))
 }
 
-fn require_process(root: &DeTable<'_>, name: &str) -> Result<(), (String, String)> {
-    let processes = tree::table(root, "process");
-    let known: Vec<&str> =
-        processes.into_iter().flat_map(|table| table.keys().map(|key| key.get_ref().as_ref())).collect();
-    if known.contains(&name) {
+fn require_process(root: &DeTable<'_>, name: &Spanned<&str>, sources: &Sources) -> Result<(), Diagnostic> {
+    let known = || tree::table(root, "process").into_iter().flat_map(tree::names);
+    if known().any(|known| known == *name.get_ref()) {
         return Ok(());
     }
-    let list = format!("the processes are {}", known.join(", "));
-    let help = nearest(name, known).map_or(list, |near| format!("did you mean `{near}`?"));
-    Err((format!("there is no process `{name}`"), help))
+    let help = did_you_mean(name.get_ref(), known(), "the processes are");
+    Err(sources.problem(&name.span(), format!("there is no process `{}`", name.get_ref()), help))
 }
 
 /// The value at `path` below `value`.
 fn descend<'v, 's>(
     mut value: &'v mut DeValue<'s>,
     path: &[Spanned<&'s str>],
-) -> Result<&'v mut DeValue<'s>, (String, String)> {
+) -> Result<&'v mut DeValue<'s>, OverrideError> {
     for (depth, key) in path.iter().enumerate() {
         let parent = depth.checked_sub(1).map_or("the manifest", |parent| path[parent].get_ref());
         value = match value {
@@ -130,7 +143,7 @@ fn put<'s>(
     inside: &mut DeValue<'s>,
     key: &Spanned<&'s str>,
     value: Spanned<DeValue<'s>>,
-) -> Result<(), (String, String)> {
+) -> Result<(), OverrideError> {
     match inside {
         DeValue::Table(table) => {
             let key = Spanned::new(key.span(), Cow::Borrowed(*key.get_ref()));
@@ -145,35 +158,32 @@ fn put<'s>(
     Ok(())
 }
 
-fn no_table(name: &str) -> (String, String) {
-    (format!("`{name}` is not a table"), "docs/manifest.md lists every key".to_owned())
+fn no_table(name: &str) -> OverrideError {
+    OverrideError::NoTable(name.to_owned())
 }
 
-fn index(key: &str, list: &str, len: usize) -> Result<usize, (String, String)> {
+fn index(key: &str, list: &str, len: usize) -> Result<usize, OverrideError> {
     match key.parse() {
         Ok(index) if index < len => Ok(index),
-        _ => Err((
-            format!("`{list}` is a list of {len}, and `{key}` is none of them"),
-            "its elements are numbered from 0".to_owned(),
-        )),
+        _ => Err(OverrideError::NoElement { list: list.to_owned(), len, key: key.to_owned() }),
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::super::sources::{Origin, Sources};
+    use diagnostics::Diagnostic;
     use serde::Deserialize as _;
     use toml::Spanned;
 
     /// What `text` says with `change` applied, or why not.
-    fn changed(text: &str, change: &str) -> Result<serde_json::Value, String> {
+    fn changed(text: &str, change: &str) -> Result<serde_json::Value, Diagnostic> {
         let mut sources = Sources::default();
         sources.add(Origin::File("a.toml".into()), text.to_owned());
         sources.add(Origin::Override, change.to_owned());
         let mut table = sources.table(&sources.all()[0]).unwrap();
-        let changes = super::all(&sources).map_err(|problem| problem.to_string())?;
-        for change in changes {
-            change.apply(&mut table, &sources).map_err(|problem| problem.to_string())?;
+        for change in super::all(&sources)? {
+            change.apply(&mut table, &sources)?;
         }
         Ok(serde_json::Value::deserialize(toml::Deserializer::from(Spanned::new(0..0, table))).unwrap())
     }
@@ -191,7 +201,7 @@ mod tests {
         let text = "[[swap]]\nat_tick = 1\n[[swap]]\nat_tick = 2";
         let found = changed(text, "swap.1.at_tick=5").unwrap();
         assert_eq!(found["swap"], serde_json::json!([{ "at_tick": 1 }, { "at_tick": 5 }]));
-        let error = changed(text, "swap.2.at_tick=5").unwrap_err();
+        let error = changed(text, "swap.2.at_tick=5").unwrap_err().to_string();
         assert!(error.contains("`swap` is a list of 2, and `2` is none of them"), "{error}");
         assert_eq!(changed("a = [1, 2]", "a.0=7").unwrap()["a"], serde_json::json!([7, 2]));
     }
@@ -204,7 +214,7 @@ mod tests {
             ("run..seed=1", "expected keys with dots"),
             ("process.h1/plant.cpu=1", "there is no process `h1/plant`"),
         ] {
-            let error = changed("run.seed = 1", change).unwrap_err();
+            let error = changed("run.seed = 1", change).unwrap_err().to_string();
             assert!(
                 error.starts_with(&format!("a.toml: --set {change}: ")) && error.contains(words),
                 "{error}"

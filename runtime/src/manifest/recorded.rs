@@ -4,7 +4,7 @@
 use super::include;
 use super::sources::Sources;
 use super::tree;
-use crate::problem::Problem;
+use diagnostics::Diagnostic;
 
 /// Keys of `[run]` that change how fast or where a run computes, never what: they stay out of the recording.
 const HOST_ONLY_KEYS: [&str; 7] =
@@ -25,7 +25,7 @@ const HOST_ONLY_PROCESS_KEYS: [&str; 8] = [
 ///
 /// # Errors
 /// If an included file is not TOML.
-pub fn text(sources: &Sources) -> Result<String, Problem> {
+pub fn text(sources: &Sources) -> Result<String, Diagnostic> {
     let original = &sources.all()[0].text;
     let simulated: Vec<&String> = sources.override_texts().filter(|text| !is_host_only(text)).collect();
     let Ok(mut document) = original.parse::<toml_edit::DocumentMut>() else { return Ok(original.clone()) };
@@ -58,7 +58,7 @@ fn is_host_only(text: &str) -> bool {
 }
 
 /// Writes an override into the text; false if its place is not in it.
-fn set(document: &mut toml_edit::DocumentMut, text: &str, sources: &Sources) -> Result<bool, Problem> {
+fn set(document: &mut toml_edit::DocumentMut, text: &str, sources: &Sources) -> Result<bool, Diagnostic> {
     let Some((path, value)) = text.split_once('=') else { return Ok(false) };
     let value = value.trim();
     // What counts as TOML is decided as when it is read.

@@ -4,17 +4,17 @@
 //! the topic `/plant/state` to `/h1/plant/state` where its own processes publish that, and leaves it alone
 //! where not.
 
-use super::sources::{Sources, refused};
-use super::tree;
-use crate::problem::Problem;
+use super::sources::Sources;
+use super::tree::{self, names};
 use crate::registry::Registry;
-use diagnostics::nearest;
+use diagnostics::Diagnostic;
+use diagnostics::{did_you_mean, read_tree};
 use serde::Deserialize;
 use serde::de::IgnoredAny;
 use std::borrow::Cow;
 use std::collections::BTreeMap;
 use toml::Spanned;
-use toml::de::{DeString, DeTable, DeValue, ValueDeserializer};
+use toml::de::{DeString, DeTable, DeValue};
 
 /// More would not fit on a machine, let alone on a page of `check`.
 const COUNT_MAX: u32 = 256;
@@ -43,7 +43,7 @@ struct Set {
 ///
 /// # Errors
 /// A set or vehicle that is not well formed, a set that is not there, a vehicle that is there twice.
-pub fn expand<'s>(root: &mut DeTable<'s>, sources: &Sources) -> Result<(), Problem> {
+pub fn expand<'s>(root: &mut DeTable<'s>, sources: &Sources) -> Result<(), Diagnostic> {
     let explicit = take_expanded(root);
     let sets = sets(root.remove("set"), sources)?;
     let mut expanded = DeTable::new();
@@ -75,7 +75,7 @@ fn take_expanded<'s>(root: &mut DeTable<'s>) -> Vec<(Spanned<DeString<'s>>, Span
 fn sets<'s>(
     value: Option<Spanned<DeValue<'s>>>,
     sources: &Sources,
-) -> Result<BTreeMap<String, DeTable<'s>>, Problem> {
+) -> Result<BTreeMap<String, DeTable<'s>>, Diagnostic> {
     let Some(value) = value else { return Ok(BTreeMap::new()) };
     let span = value.span();
     let DeValue::Table(table) = value.into_inner() else {
@@ -83,7 +83,7 @@ fn sets<'s>(
     };
     let mut sets = BTreeMap::new();
     for (name, set) in table {
-        Set::deserialize(ValueDeserializer::from(set.clone())).map_err(|error| refused(sources, &error))?;
+        read_tree::<Set>(&set).map_err(|misread| sources.refused(misread))?;
         if let DeValue::Table(mut set) = set.into_inner()
             && let Some(DeValue::Table(processes)) = set.remove("process").map(Spanned::into_inner)
         {
@@ -97,15 +97,14 @@ fn sets<'s>(
 fn vehicles<'s>(
     value: Option<Spanned<DeValue<'s>>>,
     sources: &Sources,
-) -> Result<Vec<(Vehicle, DeTable<'s>)>, Problem> {
+) -> Result<Vec<(Vehicle, DeTable<'s>)>, Diagnostic> {
     let Some(value) = value else { return Ok(Vec::new()) };
     let span = value.span();
     let DeValue::Array(array) = value.into_inner() else {
         return Err(sources.problem(&span, "`vehicle` is not a list", "write [[vehicle]]"));
     };
     let vehicle = |value: Spanned<DeValue<'s>>| {
-        let vehicle = Vehicle::deserialize(ValueDeserializer::from(value.clone()))
-            .map_err(|error| refused(sources, &error))?;
+        let vehicle = read_tree::<Vehicle>(&value).map_err(|misread| sources.refused(misread))?;
         let DeValue::Table(mut table) = value.into_inner() else { return Ok((vehicle, DeTable::new())) };
         let Some(differences) = table.remove("process") else { return Ok((vehicle, DeTable::new())) };
         let span = differences.span();
@@ -122,15 +121,11 @@ fn add_vehicle<'s>(
     (vehicle, differences): (Vehicle, DeTable<'s>),
     sets: &BTreeMap<String, DeTable<'s>>,
     sources: &Sources,
-) -> Result<(), Problem> {
+) -> Result<(), Diagnostic> {
     let Some(set) = sets.get(vehicle.set.get_ref()) else {
-        let known: Vec<&str> = sets.keys().map(String::as_str).collect();
-        let message = format!("there is no set `{}`", vehicle.set.get_ref());
-        return Err(sources.problem(
-            &vehicle.set.span(),
-            message,
-            did_you_mean(vehicle.set.get_ref(), &known),
-        ));
+        let name = vehicle.set.get_ref();
+        let help = did_you_mean(name, sets.keys().map(String::as_str), "there is");
+        return Err(sources.problem(&vehicle.set.span(), format!("there is no set `{name}`"), help));
     };
     let processes = differing(set, differences, sources)?;
     let topics: Vec<String> =
@@ -157,29 +152,24 @@ fn differing<'s>(
     set: &DeTable<'s>,
     differences: DeTable<'s>,
     sources: &Sources,
-) -> Result<DeTable<'s>, Problem> {
+) -> Result<DeTable<'s>, Diagnostic> {
     let mut processes = set.clone();
     for (name, _) in &differences {
         if !processes.contains_key(name.get_ref().as_ref()) {
-            let known: Vec<&str> = set.keys().map(|key| key.get_ref().as_ref()).collect();
             let message = format!("the vehicle's set has no process `{}`", name.get_ref());
-            return Err(sources.problem(&name.span(), message, did_you_mean(name.get_ref(), &known)));
+            return Err(sources.problem(
+                &name.span(),
+                message,
+                did_you_mean(name.get_ref(), names(set), "there is"),
+            ));
         }
     }
     tree::merge_processes(&mut processes, differences);
     Ok(processes)
 }
 
-fn did_you_mean(found: &str, known: &[&str]) -> String {
-    match nearest(found, known.iter().copied()) {
-        Some(near) => format!("did you mean `{near}`?"),
-        None if known.is_empty() => "there is none".to_owned(),
-        None => format!("there is {}", known.join(", ")),
-    }
-}
-
 /// The names of the vehicles: one, or `count` of them numbered from 1.
-fn instances(vehicle: &Vehicle, sources: &Sources) -> Result<Vec<String>, Problem> {
+fn instances(vehicle: &Vehicle, sources: &Sources) -> Result<Vec<String>, Diagnostic> {
     let name = vehicle.name.get_ref();
     let fits = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '-' || c == '_';
     if name.is_empty() || !name.chars().all(fits) {
@@ -256,16 +246,16 @@ fn adjust<'s>(
     name: &Spanned<DeString<'s>>,
     process: Spanned<DeValue<'s>>,
     sources: &Sources,
-) -> Result<(), Problem> {
+) -> Result<(), Diagnostic> {
     match (tree::table_mut(expanded, name.get_ref()), process.into_inner()) {
         (Some(below), DeValue::Table(above)) => {
             tree::merge_process(below, above);
             Ok(())
         }
         _ => {
-            let known: Vec<&str> = expanded.keys().map(|key| key.get_ref().as_ref()).collect();
             let message = format!("no vehicle makes a process `{}`", name.get_ref());
-            Err(sources.problem(&name.span(), message, did_you_mean(name.get_ref(), &known)))
+            let help = did_you_mean(name.get_ref(), names(expanded), "there is");
+            Err(sources.problem(&name.span(), message, help))
         }
     }
 }

@@ -1,9 +1,9 @@
 //! The texts a manifest is made of, laid end to end: one offset names a place in any of them.
 
 use super::tree;
-use crate::problem::Problem;
 use crate::registry::Registry;
-use diagnostics::nearest;
+use diagnostics::Diagnostic;
+use diagnostics::{Misread, ParameterError, Place};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use toml::Spanned;
@@ -68,14 +68,14 @@ impl Sources {
     }
 
     /// What the text that was added last says.
-    pub fn last_table(&self) -> Result<DeTable<'_>, Problem> {
+    pub fn last_table(&self) -> Result<DeTable<'_>, Diagnostic> {
         self.table(self.last())
     }
 
     /// What one of the texts says, with places among all.
-    pub fn table<'s>(&self, source: &'s Source) -> Result<DeTable<'s>, Problem> {
-        tree::parse(&source.text, source.base).map_err(|(span, message)| {
-            self.problem(&span, message, "docs/manifest.md shows how a manifest is written")
+    pub fn table<'s>(&self, source: &'s Source) -> Result<DeTable<'s>, Diagnostic> {
+        tree::parse(&source.text, source.base).map_err(|misread| {
+            self.problem(&misread.span(), misread.error, "docs/manifest.md shows how a manifest is written")
         })
     }
 
@@ -117,24 +117,36 @@ impl Sources {
     pub fn problem(
         &self,
         span: &Range<usize>,
-        message: impl Into<String>,
+        error: impl Into<ParameterError>,
         help: impl Into<String>,
-    ) -> Problem {
+    ) -> Diagnostic {
         let source = self.at(span.start);
         let span = span.start - source.base..span.end.max(span.start) - source.base;
-        match &source.origin {
-            Origin::File(path) => Problem::at(path, &source.text, &span, message, help),
-            Origin::Argument(name) => Problem::at(Path::new(name), &source.text, &span, message, help),
+        let file = match &source.origin {
+            Origin::File(path) => path.display().to_string(),
+            Origin::Argument(name) => (*name).to_owned(),
             Origin::Override => {
-                let message = format!("--set {}: {}", source.text, message.into());
-                Problem::in_file(self.file(), message, help)
+                let error: ParameterError = error.into();
+                let message = format!("--set {}: {error}", source.text);
+                let error = ParameterError::conflict(error.key(), message);
+                return Diagnostic::in_file(self.file().display().to_string(), error).help(help);
             }
-        }
+        };
+        Diagnostic::at(Place::of(file, &source.text, &span), error).help(help)
+    }
+
+    /// What could not be read, where it stands.
+    pub fn refused(&self, misread: Misread) -> Diagnostic {
+        let help = match misread.error.meant() {
+            Some(known) => format!("did you mean `{known}`?"),
+            None => "docs/manifest.md lists every key".to_owned(),
+        };
+        self.problem(&misread.span(), misread.error, help)
     }
 
     /// A path as written: `${NAME:-default}` is the environment's NAME, and a relative path starts at the
     /// folder of the file it is written in, or of the manifest where it was given as an argument.
-    pub fn path(&self, written: &Spanned<String>) -> Result<PathBuf, Problem> {
+    pub fn path(&self, written: &Spanned<String>) -> Result<PathBuf, Diagnostic> {
         let expanded = vehicles::variables::expand(written.get_ref(), |name| std::env::var(name).ok())
             .map_err(|message| {
                 let message = format!("the path is {message}");
@@ -144,7 +156,7 @@ impl Sources {
     }
 
     /// The same, from the root on.
-    pub fn resolve(&self, written: &Spanned<String>) -> Result<PathBuf, Problem> {
+    pub fn resolve(&self, written: &Spanned<String>) -> Result<PathBuf, Diagnostic> {
         let path = self.path(written)?;
         Ok(std::path::absolute(&path).unwrap_or(path))
     }
@@ -168,21 +180,6 @@ impl Sources {
 
     fn at(&self, offset: usize) -> &Source {
         &self.all[self.all.partition_point(|source| source.base <= offset).saturating_sub(1)]
-    }
-}
-
-/// The problem behind an error of the TOML reader.
-pub fn refused(sources: &Sources, error: &toml::de::Error) -> Problem {
-    let span = error.span().unwrap_or(0..0);
-    sources.problem(&span, error.message().trim(), help_for(error.message()))
-}
-
-fn help_for(message: &str) -> String {
-    let mut quoted = message.split('`').skip(1).step_by(2);
-    let found = quoted.next().unwrap_or_default();
-    match message.starts_with("unknown field").then(|| nearest(found, quoted)).flatten() {
-        Some(known) => format!("did you mean `{known}`?"),
-        None => "docs/manifest.md lists every key".to_owned(),
     }
 }
 

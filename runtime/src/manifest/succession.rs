@@ -2,8 +2,8 @@
 
 use super::sources::Sources;
 use super::tree;
-use crate::problem::Problem;
-use diagnostics::nearest;
+use diagnostics::Diagnostic;
+use diagnostics::did_you_mean;
 use std::ops::Range;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
@@ -15,7 +15,7 @@ const FIXED: [&str; 5] = ["lockstep", "on_exit", "outputs", "period_ticks", "sta
 ///
 /// # Errors
 /// A process that is not there, or a key in which a backup cannot differ.
-pub fn complete(root: &mut DeTable<'_>, sources: &Sources) -> Result<(), Problem> {
+pub fn complete(root: &mut DeTable<'_>, sources: &Sources) -> Result<(), Diagnostic> {
     for list in ["swap", "shadow"] {
         let Some(DeValue::Array(mut array)) = root.get(list).map(|value| value.get_ref().clone()) else {
             continue;
@@ -38,7 +38,7 @@ fn complete_item<'s>(
     span: Range<usize>,
     root: &DeTable<'s>,
     sources: &Sources,
-) -> Result<(), Problem> {
+) -> Result<(), Diagnostic> {
     let Some(name) = item.get("process").filter(|name| name.get_ref().is_str()) else { return Ok(()) };
     let process = Spanned::new(name.span(), name.get_ref().as_str().unwrap_or_default().to_owned());
     let with = match item.remove("with").map(|with| (with.span(), with.into_inner())) {
@@ -51,7 +51,7 @@ fn complete_item<'s>(
     Ok(())
 }
 
-fn complete_standbys(root: &mut DeTable<'_>, sources: &Sources) -> Result<(), Problem> {
+fn complete_standbys(root: &mut DeTable<'_>, sources: &Sources) -> Result<(), Diagnostic> {
     for (_, process) in tree::table_mut(root, "process").into_iter().flatten() {
         let DeValue::Table(process) = process.get_mut() else { continue };
         let is_standby = tree::string(process, "on_exit") == Some("standby");
@@ -73,7 +73,7 @@ fn complete_standbys(root: &mut DeTable<'_>, sources: &Sources) -> Result<(), Pr
     Ok(())
 }
 
-fn no_table(sources: &Sources, span: Range<usize>, key: &str) -> Problem {
+fn no_table(sources: &Sources, span: Range<usize>, key: &str) -> Diagnostic {
     let help = format!("write {key} = {{ parameters = {{ … }} }}, for example");
     sources.problem(&span, format!("`{key}` is not a table of keys of a process"), help)
 }
@@ -87,16 +87,13 @@ pub fn whole<'s>(
     root: &DeTable<'s>,
     name: &Spanned<String>,
     with: DeTable<'s>,
-) -> Result<DeTable<'s>, Problem> {
+) -> Result<DeTable<'s>, Diagnostic> {
     let processes = tree::table(root, "process");
     match processes.and_then(|processes| tree::table(processes, name.get_ref())) {
         Some(process) => differing(process, with, sources),
         None => {
-            let known =
-                processes.into_iter().flat_map(|table| table.keys()).map(|key| key.get_ref().as_ref());
-            let known: Vec<&str> = known.collect();
-            let list = format!("the processes are {}", known.join(", "));
-            let help = nearest(name.get_ref(), known).map_or(list, |near| format!("did you mean `{near}`?"));
+            let known = processes.into_iter().flat_map(tree::names);
+            let help = did_you_mean(name.get_ref(), known, "the processes are");
             Err(sources.problem(&name.span(), format!("there is no process `{}`", name.get_ref()), help))
         }
     }
@@ -106,7 +103,7 @@ fn differing<'s>(
     process: &DeTable<'s>,
     with: DeTable<'s>,
     sources: &Sources,
-) -> Result<DeTable<'s>, Problem> {
+) -> Result<DeTable<'s>, Diagnostic> {
     if let Some(key) = with.keys().find(|key| FIXED.contains(&key.get_ref().as_ref())) {
         let message = format!("a backup cannot have another `{}`", key.get_ref());
         let help = "what reads its topics must find them as they were; leave the key out";

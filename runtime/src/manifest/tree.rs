@@ -1,6 +1,6 @@
 //! Tables whose keys and values know their places, and how two of them become one.
 
-use std::ops::Range;
+use diagnostics::Misread;
 use toml::Spanned;
 use toml::de::{DeString, DeTable, DeValue};
 
@@ -12,12 +12,9 @@ const PARAMETERS: [&str; 5] = ["data", "gains", "parameters", "scene", "vehicle"
 /// What `text` says; its places start at `base`.
 ///
 /// # Errors
-/// The place and the message, where it is not TOML.
-pub fn parse(text: &str, base: usize) -> Result<DeTable<'_>, (Range<usize>, String)> {
-    let table = DeTable::parse(text).map_err(|error| {
-        let span = error.span().unwrap_or(0..0);
-        (base + span.start..base + span.end, error.message().trim().to_owned())
-    })?;
+/// Where it is not TOML, and why.
+pub fn parse(text: &str, base: usize) -> Result<DeTable<'_>, Misread> {
+    let table = diagnostics::parse_toml(text).map_err(|misread| misread.shifted(base))?;
     Ok(shifted_table(table.into_inner(), base))
 }
 
@@ -116,6 +113,11 @@ pub fn table_mut<'v, 't>(table: &'v mut DeTable<'t>, key: &str) -> Option<&'v mu
 /// The table at `key`, if there is one.
 pub fn table<'v, 't>(table: &'v DeTable<'t>, key: &str) -> Option<&'v DeTable<'t>> {
     table.get(key)?.get_ref().as_table()
+}
+
+/// The keys of `table`.
+pub fn names<'v>(table: &'v DeTable<'_>) -> impl Iterator<Item = &'v str> {
+    table.keys().map(|key| key.get_ref().as_ref())
 }
 
 /// The string at `key`, if there is one.
