@@ -7,13 +7,13 @@
 use diagnostics::ParameterError;
 use diagnostics::parameter::Bounds;
 use diagnostics::unit::{ANGLE, Dimension, SPEED};
+use diagnostics::{Diagnostic, Faults};
 use std::cell::RefCell;
 use std::collections::BTreeMap;
 use std::f64::consts::FRAC_PI_3;
 use std::path::Path;
 use std::rc::Rc;
 use vehicles::reader::{Document, Quantity, Section};
-use vehicles::{Faults, VehicleError};
 
 /// Declares gains as `name: type = reading` for each field, where `reading` is of the [`Table`] that the head names; after
 /// `built in "FILE"` those of the file in `controllers/gains` are the default.
@@ -77,7 +77,7 @@ pub(crate) type Reader<G> = fn(&Table<'_, '_>) -> G;
 pub(crate) fn load<G>(path: &Path, read: Reader<G>) -> Result<G, ParameterError> {
     let file = path.display().to_string();
     let text = vehicles::text::read(path);
-    let unreadable = |cause| VehicleError::Unreadable { file: file.clone(), cause };
+    let unreadable = |cause| Diagnostic::unreadable(&file, &cause);
     let gains = text.map_err(unreadable).and_then(|text| parse(&text, &file, read));
     gains.map_err(|error| ParameterError::conflict("gains", error))
 }
@@ -86,7 +86,7 @@ pub(crate) fn load<G>(path: &Path, read: Reader<G>) -> Result<G, ParameterError>
 ///
 /// # Errors
 /// All that is missing, unknown or no gain in the text.
-pub(crate) fn parse<G>(text: &str, file_name: &str, read: Reader<G>) -> Result<G, VehicleError> {
+pub(crate) fn parse<G>(text: &str, file_name: &str, read: Reader<G>) -> Result<G, Diagnostic> {
     let doc = Document::new(file_name, text);
     let tree = doc.tree()?;
     let root = Rc::new(Section::new(&doc, String::new(), 0..0, tree.get_ref()));
@@ -107,7 +107,7 @@ struct Opened<'d, 't> {
 }
 
 impl Opened<'_, '_> {
-    fn keep<T>(&self, read: Result<T, VehicleError>) -> Option<T> {
+    fn keep<T>(&self, read: Result<T, Diagnostic>) -> Option<T> {
         self.faults.borrow_mut().keep(read)
     }
 }
@@ -161,7 +161,7 @@ impl Table<'_, '_> {
         &self,
         key: &'static str,
         of: Dimension,
-        check: impl FnOnce(Quantity, &Document<'_>) -> Result<Quantity, VehicleError>,
+        check: impl FnOnce(Quantity, &Document<'_>) -> Result<Quantity, Diagnostic>,
     ) -> f64 {
         let (table, name) = match key.rsplit_once('.') {
             Some((path, name)) => (self.table(path), name),
@@ -217,10 +217,11 @@ mod tests {
     fn all_faults_of_a_file_are_told_at_once() {
         let text = CascadeGains::BUILT_IN.replace("[command_filter]", "[filter]");
         let text = text.replace("damping_ratio", "damping").replace("rate_feed_forward", "feed_forward");
-        let error = parse(&text, "my.toml", CascadeGains::read).unwrap_err().to_string();
+        let error = parse(&text, "my.toml", CascadeGains::read).unwrap_err();
+        let (count, error) = (error.all().count(), error.to_string());
         let missing = ["missing key `command_filter`", "missing key `attitude.rate_feed_forward`"];
         let unknown = ["unknown key `filter`", "unknown key `attitude.feed_forward`"];
         assert!(missing.iter().chain(&unknown).all(|fault| error.contains(fault)), "{error}");
-        assert_eq!(error.lines().count(), 4, "one line for each: {error}");
+        assert_eq!(count, 4, "one for each: {error}");
     }
 }

@@ -54,7 +54,7 @@ mod tests {
     #[test]
     fn what_is_wrong_with_a_file_is_named_with_its_place() {
         let cases = [
-            ("value = 9.0", "value = -9.0", "`position.proportional`: expected a number of 0 or above"),
+            ("value = 9.0", "value = -9.0", "`position.proportional` must be a finite number, 0 or more"),
             ("value = 50.0, unit = \"rad/s\"", "value = 0, unit = \"rad/s\"", "`motor.natural_frequency`"),
             ("value = 50.0, unit = \"rad/s\"", "value = 5000, unit = \"rad/s\"", "below 200 rad/s"),
             ("value = 6.0, unit = \"rad/s\"", "value = 5000, unit = \"rad/s\"", "`disturbance.bandwidth`"),

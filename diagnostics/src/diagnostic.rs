@@ -113,8 +113,9 @@ impl Diagnostic {
     }
 
     /// This and whatever else is wrong, each on its own.
-    pub fn all(&self) -> impl Iterator<Item = &Self> {
-        std::iter::once(self).chain(&self.others)
+    pub fn all(&self) -> impl Iterator<Item = Self> + '_ {
+        let alone = Self { others: Vec::new(), ..self.clone() };
+        std::iter::once(alone).chain(self.others.iter().cloned())
     }
 
     /// This, and `others` beside it.
@@ -142,6 +143,38 @@ impl Diagnostic {
         }
         let mut failed = failed.into_iter();
         failed.next().map_or(Ok(passed), |first| Err(first.and(failed)))
+    }
+}
+
+/// The faults of a file, gathered on the way so that one look shows all of them.
+///
+/// ```
+/// use diagnostics::{Diagnostic, Faults};
+///
+/// let mut faults = Faults::default();
+/// let name = faults.keep(Ok("bird"));
+/// let mass_kg = faults.keep::<f64>(Err(Diagnostic::in_file("a.toml", "no mass")));
+/// assert_eq!(faults.finish(name.zip(mass_kg)).unwrap_err().to_string(), "a.toml: no mass");
+/// ```
+#[derive(Debug, Default)]
+pub struct Faults(Vec<Diagnostic>);
+
+impl Faults {
+    /// What was read; none where it is faulty, which is kept.
+    pub fn keep<T>(&mut self, read: Result<T, Diagnostic>) -> Option<T> {
+        read.map_err(|fault| self.0.push(fault)).ok()
+    }
+
+    /// `value`, which is there unless there were faults.
+    ///
+    /// # Errors
+    /// The faults there were.
+    ///
+    /// # Panics
+    /// Where there is neither a value nor a fault.
+    pub fn finish<T>(self, value: Option<T>) -> Result<T, Diagnostic> {
+        Diagnostic::gather(self.0.into_iter().map(Err::<(), _>))?;
+        Ok(value.expect("what is not faulty was read"))
     }
 }
 

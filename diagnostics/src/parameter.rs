@@ -65,8 +65,8 @@ impl ParameterError {
 
     /// A parameter that there is not, but `known` ones in its place.
     #[must_use]
-    pub fn unknown(key: impl Into<String>, known: &[&str]) -> Self {
-        Self::Unknown { key: key.into(), known: known.iter().map(|&key| key.to_owned()).collect() }
+    pub fn unknown<'a>(key: impl Into<String>, known: impl IntoIterator<Item = &'a str>) -> Self {
+        Self::Unknown { key: key.into(), known: known.into_iter().map(str::to_owned).collect() }
     }
 
     /// What does not go together, of which `key` is to blame first; empty where none is.
@@ -108,6 +108,17 @@ impl ParameterError {
         nearest(written, known.iter().map(String::as_str))
     }
 
+    /// The same with `unit` behind the number that was found: for keys whose names do not hold it.
+    #[must_use]
+    pub fn in_unit(mut self, unit: &str) -> Self {
+        if let Self::Value { found, .. } = &mut self
+            && !found.ends_with(unit)
+        {
+            *found = format!("{found} {unit}");
+        }
+        self
+    }
+
     /// The same error of the parameter within the table `table`.
     #[must_use]
     pub fn within(mut self, table: &str) -> Self {
@@ -115,9 +126,15 @@ impl ParameterError {
         | Self::Missing { key, .. }
         | Self::Unknown { key, .. }
         | Self::Conflict { key, .. }) = &mut self;
+        let told = format!("`{key}`: ");
         *key = if key.is_empty() { table.to_owned() } else { format!("{table}.{key}") };
+        let whole = key.clone();
         if let Self::Conflict { message, .. } = &mut self {
-            *message = format!("`{table}`: {message}");
+            // A message that begins with its key is given the whole one.
+            *message = match message.strip_prefix(&told) {
+                Some(message) => format!("`{whole}`: {message}"),
+                None => format!("`{table}`: {message}"),
+            };
         }
         self
     }

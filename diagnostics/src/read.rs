@@ -319,7 +319,8 @@ impl<'v> de::MapAccess<'v> for Entries<'v> {
 
     fn next_value_seed<S: DeserializeSeed<'v>>(&mut self, seed: S) -> Result<S::Value, Misread> {
         let entry = self.open.take().expect("the key of an entry is read before its value");
-        seed.deserialize(entry.value).map_err(|misread| misread.within(entry.key))
+        let misread = |misread: Misread| misread.at(entry.value.span()).within(entry.key);
+        seed.deserialize(entry.value).map_err(misread)
     }
 }
 
@@ -379,7 +380,8 @@ impl<'v> de::SeqAccess<'v> for Items<'v> {
 
     fn next_element_seed<S: DeserializeSeed<'v>>(&mut self, seed: S) -> Result<Option<S::Value>, Misread> {
         let Some((index, item)) = self.0.next() else { return Ok(None) };
-        seed.deserialize(item).map(Some).map_err(|misread| misread.within(&index.to_string()))
+        let misread = |misread: Misread| misread.at(item.span()).within(&index.to_string());
+        seed.deserialize(item).map(Some).map_err(misread)
     }
 }
 
@@ -413,7 +415,7 @@ impl de::Error for Misread {
     }
 
     fn unknown_field(field: &str, expected: &'static [&'static str]) -> Self {
-        ParameterError::unknown(field, expected).into()
+        ParameterError::unknown(field, expected.iter().copied()).into()
     }
 
     fn missing_field(field: &'static str) -> Self {

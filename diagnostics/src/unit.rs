@@ -34,6 +34,12 @@ impl Dimension {
         self.units.iter().find(|(name, _)| *name == unit).map(|(_, factor)| *factor)
     }
 
+    /// The unit in the SI.
+    #[must_use]
+    pub fn si(&self) -> &'static str {
+        self.units[0].0
+    }
+
     /// "a unit of mass: kg, g", for messages.
     #[must_use]
     pub fn describe(&self) -> String {

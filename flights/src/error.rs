@@ -4,7 +4,6 @@ use std::io;
 use std::path::PathBuf;
 
 use diagnostics::{Diagnostic, Place};
-use vehicles::VehicleError;
 use vehicles::table::TableError;
 
 use crate::plausible::Finding;
@@ -33,7 +32,7 @@ pub enum FlightsError {
         place: Place,
         /// What is wrong with it.
         #[source]
-        cause: Box<VehicleError>,
+        cause: Box<Diagnostic>,
     },
     /// A log cannot be read, or does not have what the flights file asks of it.
     #[error("{place}: flight `{flight}`, log {}: {}{cause}", file.display(), named(*channel))]

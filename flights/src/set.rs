@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use diagnostics::Diagnostic;
 use toml::Spanned;
-use vehicles::{Vehicle, VehicleError};
+use vehicles::Vehicle;
 
 use crate::declaration::{Declaration, FlightEntry};
 use crate::document::Document;
@@ -97,14 +97,14 @@ impl FlightSet {
 /// What gives the bytes of a file.
 pub type ReadFile<'a> = dyn Fn(&Path) -> std::io::Result<Vec<u8>> + 'a;
 
-fn vehicle(path: &Path, read: &ReadFile<'_>) -> Result<Vehicle, VehicleError> {
+fn vehicle(path: &Path, read: &ReadFile<'_>) -> Result<Vehicle, Diagnostic> {
     let file = path.display().to_string();
     let as_text = |bytes| {
         String::from_utf8(bytes).map_err(|error| std::io::Error::new(std::io::ErrorKind::InvalidData, error))
     };
     match read(path).and_then(as_text) {
         Ok(text) => Vehicle::parse(&text, &file),
-        Err(cause) => Err(VehicleError::Unreadable { file, cause }),
+        Err(cause) => Err(Diagnostic::unreadable(file, &cause)),
     }
 }
 

@@ -17,11 +17,12 @@ use crate::select::{Selection, confounded, select};
 use crate::sensing::SensorErrors;
 use crate::trim;
 use crate::whiteness::whiteness;
+use diagnostics::Diagnostic;
 use flights::state::StateQuantity;
 use flights::{Flight, FlightSet, Role, Sparse};
 use plant::effects::{Effect, EffectKind, entry};
 use std::collections::BTreeMap;
-use vehicles::{Vehicle, VehicleError};
+use vehicles::Vehicle;
 
 /// Horizons of prediction.
 pub const HORIZONS_S: [f64; 3] = [0.1, 0.5, 1.0];
@@ -45,7 +46,7 @@ const OTHER_FLIGHTS: &str =
 pub enum IdentifyError {
     /// The vehicle file.
     #[error(transparent)]
-    Vehicle(#[from] VehicleError),
+    Vehicle(#[from] Diagnostic),
     /// A flight whose samples are too far apart.
     #[error("flight `{flight}` cannot be identified on: {cause}")]
     Sparse {

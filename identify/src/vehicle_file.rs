@@ -1,21 +1,22 @@
 //! The new vehicle file: the declared one with the effects that were accepted.
 
 use crate::report::{Estimate, Report};
+use diagnostics::Diagnostic;
 use plant::effects::Effect;
 use std::fmt::Write;
 use std::path::Path;
-use vehicles::{Uncertainty, Vehicle, VehicleError};
+use vehicles::{Uncertainty, Vehicle};
 
 /// The text of the new vehicle file: the declared file at `declared`, complete, with `effects` in place of its own.
 /// Parameters that were fitted carry their estimate, its interval and the flights that it comes from.
 ///
 /// # Errors
 /// If the declared file cannot be read again.
-pub fn text(declared: &Path, effects: &[Effect], report: &Report) -> Result<String, VehicleError> {
+pub fn text(declared: &Path, effects: &[Effect], report: &Report) -> Result<String, Diagnostic> {
     let vehicle = Vehicle::load(declared)?;
     let complete = Vehicle::base(declared).unwrap_or_else(|| declared.to_owned());
     let file = complete.display().to_string();
-    let unreadable = |cause| VehicleError::Unreadable { file: file.clone(), cause };
+    let unreadable = |cause| Diagnostic::unreadable(&file, &cause);
     let text = vehicles::text::read(&complete).map_err(unreadable)?;
     let mut document: toml_edit::DocumentMut =
         text.parse().map_err(|error| unreadable(std::io::Error::other(error)))?;

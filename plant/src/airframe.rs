@@ -18,7 +18,7 @@
 //! # let state = State { body, rotors: [RotorState::steady(400.0); 4] };
 //! let actuation = airframe.begin_tick(&mut effects, &state, &[76.5; 4], dt_s);
 //! assert_eq!(actuation, effects.actuation);
-//! # Ok::<(), vehicles::VehicleError>(())
+//! # Ok::<(), diagnostics::Diagnostic>(())
 //! ```
 
 use crate::actuation::{Actuation, Battery};
@@ -27,8 +27,9 @@ use crate::effects::{Action, Advance, Effect, FlightCondition, entry};
 use crate::motor;
 use crate::rotor::{self, Wrench};
 use crate::state::{RotorRates, RotorState, State};
+use diagnostics::Diagnostic;
 use nalgebra::Vector3;
-use vehicles::{EffectEntry, Vehicle, VehicleError};
+use vehicles::{EffectEntry, Vehicle};
 
 /// A vehicle as the backends fly it: immutable.
 ///
@@ -60,7 +61,7 @@ impl Airframe {
     ///
     /// # Errors
     /// What is wrong with an effect, and where.
-    pub fn from_files(vehicle: Vehicle, scene: &[EffectEntry]) -> Result<Self, VehicleError> {
+    pub fn from_files(vehicle: Vehicle, scene: &[EffectEntry]) -> Result<Self, Diagnostic> {
         let entries: Vec<_> = vehicle.effects.iter().chain(scene).cloned().collect();
         let airframe = Self::with_effects(vehicle, entry::resolve(&entries)?);
         entry::require(&airframe.vehicle, &airframe.effects, &entries)?;

@@ -31,7 +31,7 @@
 //! let mut state = model.start(RigidBody::level_at(Vector3::new(0.0, 0.0, 1.0)), hover);
 //! model.step(&mut state, &[hover; 4], 0.001);
 //! assert!((state.body.position_W_m.z - 1.0).abs() < 1e-9);
-//! # Ok::<(), vehicles::VehicleError>(())
+//! # Ok::<(), diagnostics::Diagnostic>(())
 //! ```
 #![forbid(unsafe_code)]
 #![allow(

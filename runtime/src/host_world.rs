@@ -7,7 +7,6 @@ use crate::descendants::Descendants;
 use crate::graph::backup_of;
 use crate::host::{self, End, Host, Thread};
 use crate::manifest::Manifest;
-use crate::problem::Problem;
 use crate::process_log;
 use crate::program::{BackupSpec, Program, Readiness};
 use crate::role::Role;
@@ -20,6 +19,7 @@ use bus::host_time::monotonic_ns;
 use bus::lockstep::SupervisorView;
 use bus::membership::Membership;
 use bus::plan::{InputPlan, NodePlan, Plan};
+use diagnostics::Diagnostic;
 use std::collections::BTreeMap;
 use std::collections::btree_map::Entry;
 use std::os::unix::net::UnixDatagram;
@@ -180,7 +180,7 @@ impl World for HostWorld<'_> {
         reply.send(answer);
     }
 
-    fn backup_of(&self, process: &str, with: &str) -> Result<BackupSpec, Problem> {
+    fn backup_of(&self, process: &str, with: &str) -> Result<BackupSpec, Diagnostic> {
         backup_of(self.manifest, self.plan, process, with)
     }
 }

@@ -2,7 +2,6 @@
 
 use crate::ctl::protocol::{Answer, Request};
 use crate::host::End;
-use crate::problem::Problem;
 use crate::program::{BackupSpec, Program};
 use crate::role::Role;
 use crate::view::{SegmentWrite, View};
@@ -10,6 +9,7 @@ use anyhow::Result;
 use bus::BusError;
 use bus::membership::Membership;
 use bus::plan::{InputPlan, NodePlan};
+use diagnostics::Diagnostic;
 use std::time::Duration;
 
 /// What is outside a supervisor.
@@ -66,7 +66,7 @@ pub trait World {
     ///
     /// # Errors
     /// If there is no such process, or that cannot replace it.
-    fn backup_of(&self, process: &str, with: &str) -> Result<BackupSpec, Problem>;
+    fn backup_of(&self, process: &str, with: &str) -> Result<BackupSpec, Diagnostic>;
 }
 
 /// A started process.

@@ -4,10 +4,10 @@ use crate::rig::{self, PLACE};
 use crate::scene::{Cuboid, Scene};
 use diagnostics::parameter::Bounds;
 use diagnostics::unit::{ANGLE, LENGTH};
+use diagnostics::{Diagnostic, Faults};
 use nalgebra::Vector3;
 use std::path::Path;
 use vehicles::reader::{Document, Section};
-use vehicles::{Faults, VehicleError};
 
 /// Lengths of a box.
 const SIZE: Bounds = Bounds {
@@ -25,11 +25,11 @@ impl Scene {
     ///
     /// # Errors
     /// What is wrong with the file, and where.
-    pub fn load(path: &Path) -> Result<Self, VehicleError> {
+    pub fn load(path: &Path) -> Result<Self, Diagnostic> {
         let file = path.display().to_string();
         match vehicles::text::read(path) {
             Ok(text) => Self::parse(&text, &file),
-            Err(cause) => Err(VehicleError::Unreadable { file, cause }),
+            Err(cause) => Err(Diagnostic::unreadable(file, &cause)),
         }
     }
 
@@ -37,20 +37,20 @@ impl Scene {
     ///
     /// # Errors
     /// What is wrong with the text, and where.
-    pub fn parse(text: &str, file_name: &str) -> Result<Self, VehicleError> {
+    pub fn parse(text: &str, file_name: &str) -> Result<Self, Diagnostic> {
         parse(text, file_name)
     }
 }
 
 /// Reads the whole file; see `scenes/room.toml` for the layout.
-fn parse(text: &str, file_name: &str) -> Result<Scene, VehicleError> {
+fn parse(text: &str, file_name: &str) -> Result<Scene, Diagnostic> {
     let doc = Document::new(file_name, text);
     let tree = doc.tree()?;
     let root = Section::new(&doc, String::new(), 0..0, tree.get_ref());
     let mut faults = Faults::default();
     let name = faults.keep(root.text("name"));
     let sections = if root.has("boxes") { root.sections("boxes")? } else { Vec::new() };
-    let boxes = faults.keep_all(sections.iter().map(one_box));
+    let boxes = faults.keep(Diagnostic::gather(sections.iter().map(one_box)));
     let rig = root.has("rig").then(|| faults.keep(root.section("rig").and_then(|rig| rig::parse(&rig))));
     let effects = faults.keep(vehicles::effects::read(&root));
     faults.keep(root.finish());
@@ -64,7 +64,7 @@ fn parse(text: &str, file_name: &str) -> Result<Scene, VehicleError> {
     faults.finish(scene)
 }
 
-fn one_box(section: &Section) -> Result<Cuboid, VehicleError> {
+fn one_box(section: &Section) -> Result<Cuboid, Diagnostic> {
     let name = section.text("name")?.to_owned();
     let centre = section.vector("centre", LENGTH, &PLACE)?;
     let size = section.vector("size", LENGTH, &SIZE)?;

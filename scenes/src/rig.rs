@@ -1,10 +1,10 @@
 //! A test rig: the vehicle hangs from a ball joint that limits its tilt, and that may slide up and down.
 #![allow(non_snake_case, reason = "a trailing _W or _B names the frame a vector is written in, N the newton")]
 
+use diagnostics::Diagnostic;
 use diagnostics::parameter::Bounds;
 use diagnostics::unit::{ANGLE, FORCE, LENGTH, LINEAR_DAMPING, MASS, ROTARY_DAMPING, TORQUE};
 use nalgebra::Vector3;
-use vehicles::VehicleError;
 use vehicles::reader::{Quantity, Section};
 
 /// The rod-end bearing of thesis section 5.2, and the tube that it hangs on.
@@ -63,7 +63,7 @@ const AMOUNT: Bounds = Bounds {
 };
 
 /// Reads the table `[rig]`; see `scenes/rig-sliding.toml`.
-pub(crate) fn parse(section: &Section) -> Result<Rig, VehicleError> {
+pub(crate) fn parse(section: &Section) -> Result<Rig, Diagnostic> {
     let doc = section.doc;
     let not_negative = |name, dimension| section.quantity(name, dimension)?.within(doc, &AMOUNT);
     let rig = Rig {
@@ -81,7 +81,7 @@ pub(crate) fn parse(section: &Section) -> Result<Rig, VehicleError> {
     Ok(rig)
 }
 
-fn tilt(section: &Section) -> Result<Quantity, VehicleError> {
+fn tilt(section: &Section) -> Result<Quantity, Diagnostic> {
     let tilt = section.quantity("tilt_max", ANGLE)?;
     let holds = tilt.si > 0.0 && tilt.si < std::f64::consts::PI;
     tilt.require(section.doc, holds, "an angle above 0 and below 180 deg")

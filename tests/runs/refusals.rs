@@ -169,7 +169,7 @@ fn an_unknown_port() {
 #[test]
 fn a_topic_that_nobody_publishes() {
     let ended = refused("inputs.imu = \"/imu/imu\"", "inputs.§imu = \"/imu/imi\"");
-    ended.says(&["input `imu` of `ekf`", "nobody publishes /imu/imi", "did you mean /imu/imu?"]);
+    ended.says(&["input `imu` of `ekf`", "nobody publishes /imu/imi", "did you mean `/imu/imu`?"]);
 }
 
 #[test]

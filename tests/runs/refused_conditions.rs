@@ -11,7 +11,7 @@ const PASS: &str = "[[pass]]\nname = \"low\"\ntopic = \"/plant/state\"\nfield = 
 fn a_condition_on_a_topic_that_nobody_publishes() {
     let pass = "name = \"high\"\ntopic = \"/plant/stat\"\nfield = \"position.z\"\nunit = \"m\"\nstatistic = \"max\"\nmin = 1\n";
     let ended = refused_with(&format!("\n§[[pass]]\n{pass}"));
-    ended.says(&["nobody publishes /plant/stat", "did you mean /plant/state?"]);
+    ended.says(&["nobody publishes /plant/stat", "did you mean `/plant/state`?"]);
     let compare = "simulated = \"/plant/state\"\nmeasured = \"/player/measured\"\nwindow_s = 0.1\n";
     refused_with(&format!("\n§[[compare]]\n{compare}")).says(&["nobody publishes /player/measured"]);
 }

@@ -74,7 +74,7 @@ fn a_run_of_no_length() {
     with("-1.0").says(&["`duration_s` is -1 s"]);
     with("nan").says(&["`run.duration_s` is nan, expected a finite number"]);
     with("1e9").says(&["`duration_s` is 1000000000 s"]);
-    with("\"long\"").says(&["expected f64"]);
+    with("\"long\"").says(&["`run.duration_s` must be f64, found string \"long\""]);
 }
 
 #[test]

@@ -3,10 +3,9 @@
 //! What an effect is, which parameters it has and in which units, is the business of the plant's catalogue
 //! (`plant::effects`): here any name will do.
 
-use crate::error::{Faults, VehicleError};
 use crate::provenance::Stated;
 use crate::reader::Section;
-use diagnostics::Place;
+use diagnostics::{Diagnostic, Place};
 
 /// One `[[effects]]` table.
 #[derive(Debug, Clone, PartialEq)]
@@ -27,23 +26,21 @@ pub struct EffectEntry {
 ///
 /// # Errors
 /// A table without a name, or with a key that is not a number with unit, source and uncertainty.
-pub fn read(root: &Section) -> Result<Vec<EffectEntry>, VehicleError> {
+pub fn read(root: &Section) -> Result<Vec<EffectEntry>, Diagnostic> {
     if !root.has("effects") {
         return Ok(Vec::new());
     }
-    let mut faults = Faults::default();
-    let effects = faults.keep_all(root.sections("effects")?.iter().map(one_effect));
-    faults.finish(effects)
+    Diagnostic::gather(root.sections("effects")?.iter().map(one_effect))
 }
 
-fn one_effect(section: &Section) -> Result<EffectEntry, VehicleError> {
+fn one_effect(section: &Section) -> Result<EffectEntry, Diagnostic> {
     let name = section.text("name")?.to_owned();
     let parameters = section.keys().filter(|key| *key != "name");
     Ok(EffectEntry {
         name,
         key: section.path.clone(),
-        place: section.doc.place(section.at.start),
-        name_place: section.doc.place(section.at_of("name").start),
+        place: section.doc.place(&section.at),
+        name_place: section.doc.place(&section.at_of("name")),
         parameters: parameters.map(|key| section.stated(key)).collect::<Result<_, _>>()?,
     })
 }

@@ -6,30 +6,30 @@ use std::path::{Path, PathBuf};
 use crate::bounds;
 use crate::command::CommandMap;
 use crate::effects;
-use crate::error::{Faults, VehicleError};
 use crate::provenance::Uncertainty;
 use crate::reader::{Document, Quantity, Section};
 use crate::vehicle::{MotorModel, Rotor, Spin, Vehicle};
 use diagnostics::unit::{
     ACCELERATION, INERTIA, LENGTH, MASS, PURE_NUMBER, SPEED, THRUST_COEFFICIENT, TIME, TORQUE_COEFFICIENT,
 };
+use diagnostics::{Diagnostic, Faults};
 
 /// How far a published tensor may miss the triangle inequality through rounding, relative to its size.
 const TRIANGLE_SLACK: f64 = 1e-9;
 
 impl Vehicle {
     /// Reads and checks a vehicle file.
-    pub fn load(path: &Path) -> Result<Self, VehicleError> {
+    pub fn load(path: &Path) -> Result<Self, Diagnostic> {
         let file = path.display().to_string();
         match crate::text::read(path) {
             Ok(text) => Self::parse(&text, &file),
-            Err(cause) => Err(VehicleError::Unreadable { file, cause }),
+            Err(cause) => Err(Diagnostic::unreadable(file, &cause)),
         }
     }
 
     /// Reads and checks the text of a vehicle file; `file_name` is for messages, and the path of its `base` is
     /// relative to it.
-    pub fn parse(text: &str, file_name: &str) -> Result<Self, VehicleError> {
+    pub fn parse(text: &str, file_name: &str) -> Result<Self, Diagnostic> {
         parse(text, file_name)
     }
 
@@ -43,7 +43,7 @@ impl Vehicle {
 
 /// Reads the whole file; see `vehicles/hummingbird.toml` for the layout. A file with a `base` has that file's
 /// vehicle, and its effects before its own.
-fn parse(text: &str, file_name: &str) -> Result<Vehicle, VehicleError> {
+fn parse(text: &str, file_name: &str) -> Result<Vehicle, Diagnostic> {
     let doc = Document::new(file_name, text);
     let tree = doc.tree()?;
     let root = Section::new(&doc, String::new(), 0..0, tree.get_ref());
@@ -58,7 +58,7 @@ fn beside(path: &Path, other: &str) -> PathBuf {
     path.parent().unwrap_or(Path::new("")).join(other)
 }
 
-fn on_base(root: &Section, path: &Path) -> Result<Vehicle, VehicleError> {
+fn on_base(root: &Section, path: &Path) -> Result<Vehicle, Diagnostic> {
     let (name, file) = (title(root)?, path.display().to_string());
     let more = effects::read(root)?;
     root.finish()?;
@@ -78,14 +78,14 @@ fn on_base(root: &Section, path: &Path) -> Result<Vehicle, VehicleError> {
     Ok(Vehicle { name, effects: [base.effects, more].concat(), ..base })
 }
 
-fn title(root: &Section) -> Result<String, VehicleError> {
+fn title(root: &Section) -> Result<String, Diagnostic> {
     if root.has("notes") {
         root.text("notes")?;
     }
     Ok(root.text("name")?.to_owned())
 }
 
-fn complete(doc: &Document, root: &Section) -> Result<Vehicle, VehicleError> {
+fn complete(doc: &Document, root: &Section) -> Result<Vehicle, Diagnostic> {
     let mut faults = Faults::default();
     let name = faults.keep(title(root));
     let body = faults.keep(root.section("body").and_then(|section| body(&section)));
@@ -116,7 +116,7 @@ fn complete(doc: &Document, root: &Section) -> Result<Vehicle, VehicleError> {
     faults.finish(vehicle)
 }
 
-fn body(section: &Section) -> Result<(f64, Matrix3<f64>, f64), VehicleError> {
+fn body(section: &Section) -> Result<(f64, Matrix3<f64>, f64), Diagnostic> {
     let mass = section.quantity("mass", MASS)?.positive(section.doc)?.within(section.doc, &bounds::MASS)?;
     let gravity = section.quantity("gravity", ACCELERATION)?.within(section.doc, &bounds::GRAVITY)?;
     let inertia = inertia(section)?;
@@ -125,7 +125,7 @@ fn body(section: &Section) -> Result<(f64, Matrix3<f64>, f64), VehicleError> {
 }
 
 /// The symmetric tensor J; `inertia_xy` and so on are the entries J_xy themselves, not their negatives.
-fn inertia(section: &Section) -> Result<Matrix3<f64>, VehicleError> {
+fn inertia(section: &Section) -> Result<Matrix3<f64>, Diagnostic> {
     let xx = moment(section, "inertia_xx")?;
     let yy = moment(section, "inertia_yy")?;
     let zz = moment(section, "inertia_zz")?;
@@ -142,11 +142,11 @@ fn inertia(section: &Section) -> Result<Matrix3<f64>, VehicleError> {
     Err(section.doc.bad(&xx.at, &section.key("inertia_xx, inertia_yy, inertia_zz"), expected, found))
 }
 
-fn moment(section: &Section, name: &'static str) -> Result<Quantity, VehicleError> {
+fn moment(section: &Section, name: &'static str) -> Result<Quantity, Diagnostic> {
     section.quantity(name, INERTIA)?.positive(section.doc)?.within(section.doc, &bounds::INERTIA)
 }
 
-fn product(section: &Section, name: &'static str) -> Result<f64, VehicleError> {
+fn product(section: &Section, name: &'static str) -> Result<f64, Diagnostic> {
     if !section.has(name) {
         return Ok(0.0);
     }
@@ -170,7 +170,7 @@ fn principal_moments(tensor: &Matrix3<f64>) -> Vector3<f64> {
     (tensor / scale).symmetric_eigenvalues() * scale
 }
 
-fn rotor(section: &Section) -> Result<[f64; 3], VehicleError> {
+fn rotor(section: &Section) -> Result<[f64; 3], Diagnostic> {
     let doc = section.doc;
     let thrust = section
         .quantity("thrust_coefficient", THRUST_COEFFICIENT)?
@@ -183,7 +183,7 @@ fn rotor(section: &Section) -> Result<[f64; 3], VehicleError> {
     Ok([thrust.si, torque.si, inertia.si])
 }
 
-fn layout(root: &Section) -> Result<[Rotor; 4], VehicleError> {
+fn layout(root: &Section) -> Result<[Rotor; 4], Diagnostic> {
     let sections = root.sections("rotors")?;
     let rotors = sections.iter().map(one_rotor).collect::<Result<Vec<_>, _>>()?;
     let count = rotors.len();
@@ -192,7 +192,7 @@ fn layout(root: &Section) -> Result<[Rotor; 4], VehicleError> {
     rotors.try_into().map_err(|_| root.doc.bad(&at, "rotors", "four rotors", format!("{count}")))
 }
 
-fn one_rotor(section: &Section) -> Result<Rotor, VehicleError> {
+fn one_rotor(section: &Section) -> Result<Rotor, Diagnostic> {
     let name = section.text("name")?.to_owned();
     let position_m = Vector3::from(section.vector("position", LENGTH, &bounds::HUB)?);
     let spin = spin(&section.section("spin")?)?;
@@ -201,7 +201,7 @@ fn one_rotor(section: &Section) -> Result<Rotor, VehicleError> {
 }
 
 /// A sense of rotation has a value and a source, but neither unit nor uncertainty.
-fn spin(section: &Section) -> Result<Spin, VehicleError> {
+fn spin(section: &Section) -> Result<Spin, Diagnostic> {
     let words = [("counter-clockwise", Spin::CounterClockwise), ("clockwise", Spin::Clockwise)];
     let spin = section.choice("value", &words)?;
     section.note("seen from above", section.text("source")?, Uncertainty::OneSigma(0.0));
@@ -215,7 +215,7 @@ enum Order {
     Second,
 }
 
-fn motor(section: &Section) -> Result<MotorModel, VehicleError> {
+fn motor(section: &Section) -> Result<MotorModel, Diagnostic> {
     let orders = [("first-order", Order::First), ("second-order", Order::Second)];
     let model = match section.choice("model", &orders)? {
         Order::First => first_order(section)?,
@@ -225,13 +225,13 @@ fn motor(section: &Section) -> Result<MotorModel, VehicleError> {
     Ok(model)
 }
 
-fn first_order(section: &Section) -> Result<MotorModel, VehicleError> {
+fn first_order(section: &Section) -> Result<MotorModel, Diagnostic> {
     let time_constant =
         section.quantity("time_constant", TIME)?.within(section.doc, &bounds::TIME_CONSTANT)?;
     Ok(MotorModel::FirstOrder { time_constant_s: time_constant.si })
 }
 
-fn second_order(section: &Section) -> Result<MotorModel, VehicleError> {
+fn second_order(section: &Section) -> Result<MotorModel, Diagnostic> {
     let frequency =
         section.quantity("natural_frequency", SPEED)?.within(section.doc, &bounds::NATURAL_FREQUENCY)?;
     let damping =
@@ -239,7 +239,7 @@ fn second_order(section: &Section) -> Result<MotorModel, VehicleError> {
     Ok(MotorModel::SecondOrder { natural_frequency_rad_s: frequency.si, damping_ratio: damping.si })
 }
 
-fn command(section: &Section) -> Result<CommandMap, VehicleError> {
+fn command(section: &Section) -> Result<CommandMap, Diagnostic> {
     let doc = section.doc;
     let min = section.quantity("min", PURE_NUMBER)?.within(doc, &bounds::COMMAND)?;
     let max = section.quantity("max", PURE_NUMBER)?.within(doc, &bounds::COMMAND)?;
@@ -259,7 +259,7 @@ fn command(section: &Section) -> Result<CommandMap, VehicleError> {
     })
 }
 
-fn off(section: &Section) -> Result<bool, VehicleError> {
+fn off(section: &Section) -> Result<bool, Diagnostic> {
     let value = section.flag("value")?;
     section.note("true or false", section.text("source")?, Uncertainty::OneSigma(0.0));
     section.finish()?;

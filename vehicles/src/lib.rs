@@ -14,19 +14,17 @@
 //! | [`text`] | files that people write, read with an end to it |
 //! | [`variables`] | variables of the environment within paths |
 //! | [`mod@reference`] | the vehicle files of this crate, as text |
-//! | [`error`] | what can be wrong with a file, said for people |
 //!
 //! ```
 //! let vehicle = vehicles::Vehicle::parse(vehicles::reference::HUMMINGBIRD, "hummingbird.toml")?;
 //! assert_eq!(vehicle.mass_kg, 0.480);
-//! # Ok::<(), vehicles::VehicleError>(())
+//! # Ok::<(), diagnostics::Diagnostic>(())
 //! ```
 #![forbid(unsafe_code)]
 
 mod bounds;
 pub mod command;
 pub mod effects;
-pub mod error;
 mod file;
 pub mod provenance;
 pub mod quotes;
@@ -39,7 +37,6 @@ pub mod vehicle;
 
 pub use command::CommandMap;
 pub use effects::EffectEntry;
-pub use error::{Faults, VehicleError};
 pub use file::is_rigid;
 pub use provenance::{Provenance, Stated, Uncertainty};
 pub use vehicle::{MotorModel, Rotor, Spin, Vehicle};

@@ -7,11 +7,10 @@ use std::ops::Range;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
-use crate::error::VehicleError;
 use crate::provenance::{Provenance, Stated, Uncertainty};
-use diagnostics::Place;
-use diagnostics::parameter::Bounds;
+use diagnostics::parameter::{Bounds, all, not_negative, positive};
 use diagnostics::unit::Dimension;
+use diagnostics::{Diagnostic, ParameterError, Place, parse_toml};
 
 /// The file being read: for positions, and to gather provenance on the way.
 pub struct Document<'t> {
@@ -28,16 +27,13 @@ impl<'t> Document<'t> {
     }
 
     /// Parses the text into its tree.
-    pub fn tree(&self) -> Result<Spanned<DeTable<'t>>, VehicleError> {
-        DeTable::parse(self.text).map_err(|error| VehicleError::Syntax {
-            place: self.place(error.span().map_or(0, |span| span.start)),
-            message: error.message().to_owned(),
-        })
+    pub fn tree(&self) -> Result<Spanned<DeTable<'t>>, Diagnostic> {
+        parse_toml(self.text).map_err(|misread| Diagnostic::at(self.place(&misread.span()), misread.error))
     }
 
-    /// The place of byte `offset`, for messages.
-    pub fn place(&self, offset: usize) -> Place {
-        Place::of(self.file, self.text, &(offset..offset))
+    /// The place of the bytes `span`, for messages.
+    pub fn place(&self, span: &Range<usize>) -> Place {
+        Place::of(self.file, self.text, span)
     }
 
     /// A value that cannot be meant.
@@ -47,13 +43,8 @@ impl<'t> Document<'t> {
         key: &str,
         expected: impl Into<String>,
         found: impl Into<String>,
-    ) -> VehicleError {
-        VehicleError::BadValue {
-            place: self.place(at.start),
-            key: key.to_owned(),
-            expected: expected.into(),
-            found: found.into(),
-        }
+    ) -> Diagnostic {
+        Diagnostic::at(self.place(at), ParameterError::value(key, expected, found.into()))
     }
 }
 
@@ -66,44 +57,44 @@ pub struct Quantity {
     pub key: String,
     /// Where the number stands, in bytes.
     pub at: Range<usize>,
+    unit: &'static str,
 }
 
 impl Quantity {
     /// Refuses the number unless `holds`.
-    pub fn require(self, doc: &Document, holds: bool, expected: &str) -> Result<Self, VehicleError> {
+    pub fn require(self, doc: &Document, holds: bool, expected: &str) -> Result<Self, Diagnostic> {
         if holds {
             Ok(self)
         } else {
-            Err(doc.bad(&self.at, &self.key, expected, format!("{} (in SI)", self.si)))
+            Err(doc.bad(&self.at, &self.key, expected, format!("{} {}", self.si, self.unit)))
         }
     }
 
     /// Refuses zero and less.
-    pub fn positive(self, doc: &Document) -> Result<Self, VehicleError> {
-        let holds = self.si > 0.0;
-        self.require(doc, holds, "a number above 0")
+    pub fn positive(self, doc: &Document) -> Result<Self, Diagnostic> {
+        self.pass(doc, positive)
     }
 
     /// Refuses what lies outside of `bounds`.
-    pub fn within(self, doc: &Document, bounds: &Bounds) -> Result<Self, VehicleError> {
-        if bounds.contains(self.si) { Ok(self) } else { Err(refuse(bounds, doc, &self)) }
+    pub fn within(self, doc: &Document, bounds: &Bounds) -> Result<Self, Diagnostic> {
+        self.pass(doc, |key, si| bounds.check(key, si))
     }
 
     /// Refuses less than zero.
-    pub fn not_negative(self, doc: &Document) -> Result<Self, VehicleError> {
-        let holds = self.si >= 0.0;
-        self.require(doc, holds, "a number of 0 or above")
+    pub fn not_negative(self, doc: &Document) -> Result<Self, Diagnostic> {
+        self.pass(doc, not_negative)
     }
-}
 
-fn refuse(bounds: &Bounds, doc: &Document, found: &Quantity) -> VehicleError {
-    let Bounds { min, max, unit, why } = bounds;
-    doc.bad(
-        &found.at,
-        &found.key,
-        format!("{min:?} to {max:?} {unit} ({why})"),
-        format!("{:?} {unit}", found.si),
-    )
+    fn pass(
+        self,
+        doc: &Document,
+        check: impl Fn(&str, f64) -> Result<(), ParameterError>,
+    ) -> Result<Self, Diagnostic> {
+        match check(&self.key, self.si) {
+            Ok(()) => Ok(self),
+            Err(error) => Err(Diagnostic::at(doc.place(&self.at), error.in_unit(self.unit))),
+        }
+    }
 }
 
 /// Whether a number describes what is there or was chosen by somebody.
@@ -142,12 +133,9 @@ impl<'d, 't> Section<'d, 't> {
         self.table.get(name)
     }
 
-    fn need(&self, name: &'d str, expected: &str) -> Result<&'d Spanned<DeValue<'t>>, VehicleError> {
-        self.find(name).ok_or_else(|| VehicleError::MissingKey {
-            place: self.doc.place(self.at.start),
-            key: self.key(name),
-            expected: expected.to_owned(),
-        })
+    fn need(&self, name: &'d str, expected: &str) -> Result<&'d Spanned<DeValue<'t>>, Diagnostic> {
+        let missing = || ParameterError::missing(self.key(name), expected);
+        self.find(name).ok_or_else(|| Diagnostic::at(self.doc.place(&self.at), missing()))
     }
 
     /// Whether the file has `name`.
@@ -156,7 +144,7 @@ impl<'d, 't> Section<'d, 't> {
     }
 
     /// A sub-table.
-    pub fn section(&self, name: &'d str) -> Result<Section<'d, 't>, VehicleError> {
+    pub fn section(&self, name: &'d str) -> Result<Section<'d, 't>, Diagnostic> {
         self.as_section(self.key(name), self.need(name, "a table")?)
     }
 
@@ -164,7 +152,7 @@ impl<'d, 't> Section<'d, 't> {
         &self,
         key: String,
         value: &'d Spanned<DeValue<'t>>,
-    ) -> Result<Section<'d, 't>, VehicleError> {
+    ) -> Result<Section<'d, 't>, Diagnostic> {
         match value.get_ref().as_table() {
             Some(table) => Ok(Section::new(self.doc, key, value.span(), table)),
             None => Err(self.wrong_type(&key, value, "a table")),
@@ -172,7 +160,7 @@ impl<'d, 't> Section<'d, 't> {
     }
 
     /// An array of tables.
-    pub fn sections(&self, name: &'d str) -> Result<Vec<Section<'d, 't>>, VehicleError> {
+    pub fn sections(&self, name: &'d str) -> Result<Vec<Section<'d, 't>>, Diagnostic> {
         let value = self.need(name, "an array of tables")?;
         let Some(array) = value.get_ref().as_array() else {
             return Err(self.wrong_type(&self.key(name), value, "an array of tables"));
@@ -187,7 +175,7 @@ impl<'d, 't> Section<'d, 't> {
     }
 
     /// A text, not empty.
-    pub fn text(&self, name: &'d str) -> Result<&'d str, VehicleError> {
+    pub fn text(&self, name: &'d str) -> Result<&'d str, Diagnostic> {
         let value = self.need(name, "a text")?;
         match value.get_ref().as_str() {
             Some(text) if !text.trim().is_empty() => Ok(text),
@@ -197,47 +185,42 @@ impl<'d, 't> Section<'d, 't> {
     }
 
     /// A text that has to be one of `choices`; returns what stands beside it.
-    pub fn choice<T: Copy>(&self, name: &'d str, choices: &[(&str, T)]) -> Result<T, VehicleError> {
+    pub fn choice<T: Copy>(&self, name: &'d str, choices: &[(&str, T)]) -> Result<T, Diagnostic> {
         let text = self.text(name)?;
-        if let Some((_, chosen)) = choices.iter().find(|(word, _)| *word == text) {
+        if let Some((_, chosen)) = choices.iter().find(|(name, _)| *name == text) {
             return Ok(*chosen);
         }
-        let words: Vec<_> = choices.iter().map(|(word, _)| format!("\"{word}\"")).collect();
+        let names: Vec<_> = choices.iter().map(|(name, _)| format!("\"{name}\"")).collect();
         Err(self.doc.bad(
             &self.at_of(name),
             &self.key(name),
-            format!("one of {}", words.join(", ")),
+            format!("one of {}", names.join(", ")),
             format!("\"{text}\""),
         ))
     }
 
     /// True or false.
-    pub fn flag(&self, name: &'d str) -> Result<bool, VehicleError> {
+    pub fn flag(&self, name: &'d str) -> Result<bool, Diagnostic> {
         let value = self.need(name, "true or false")?;
         value.get_ref().as_bool().ok_or_else(|| self.wrong_type(&self.key(name), value, "true or false"))
     }
 
     /// A parameter: a table with `value`, `unit`, `source` and `uncertainty`; the value in SI.
-    pub fn quantity(&self, name: &'d str, dimension: Dimension) -> Result<Quantity, VehicleError> {
+    pub fn quantity(&self, name: &'d str, dimension: Dimension) -> Result<Quantity, Diagnostic> {
         self.number_of(name, dimension, Origin::Known)
     }
 
     /// A number that somebody chose, such as a gain: as [`Self::quantity`], but it has an `uncertainty` only
     /// where the file says so.
-    pub fn chosen(&self, name: &'d str, dimension: Dimension) -> Result<Quantity, VehicleError> {
+    pub fn chosen(&self, name: &'d str, dimension: Dimension) -> Result<Quantity, Diagnostic> {
         self.number_of(name, dimension, Origin::Chosen)
     }
 
-    fn number_of(
-        &self,
-        name: &'d str,
-        dimension: Dimension,
-        origin: Origin,
-    ) -> Result<Quantity, VehicleError> {
+    fn number_of(&self, name: &'d str, dimension: Dimension, origin: Origin) -> Result<Quantity, Diagnostic> {
         let parameter = self.parameter(name)?;
         let value = parameter.need("value", "a number")?;
         let si = parameter.number("value", value)? * parameter.meta(dimension, origin)?;
-        let quantity = Quantity { si, key: parameter.path, at: value.span() };
+        let quantity = Quantity { si, key: parameter.path, at: value.span(), unit: dimension.si() };
         quantity.require(self.doc, si.is_finite(), "a number that is finite in SI")
     }
 
@@ -247,22 +230,19 @@ impl<'d, 't> Section<'d, 't> {
         name: &'d str,
         dimension: Dimension,
         bounds: &Bounds,
-    ) -> Result<[f64; 3], VehicleError> {
+    ) -> Result<[f64; 3], Diagnostic> {
         let parameter = self.parameter(name)?;
         let value = parameter.need("value", "an array of three numbers")?;
         let numbers = parameter.three(value)?;
         let factor = parameter.meta(dimension, Origin::Known)?;
         let numbers = numbers.map(|number| number * factor);
-        match numbers.iter().find(|number| !bounds.contains(**number)) {
-            None => Ok(numbers),
-            Some(&si) => {
-                Err(refuse(bounds, self.doc, &Quantity { si, key: parameter.path.clone(), at: value.span() }))
-            }
-        }
+        all(|key, si| bounds.check(key, si), &parameter.path, &numbers)
+            .map_err(|error| Diagnostic::at(self.doc.place(&value.span()), error))?;
+        Ok(numbers)
     }
 
     /// A parameter of which only the reader of the catalogue knows the dimension: as it is written.
-    pub fn stated(&self, name: &'d str) -> Result<Stated, VehicleError> {
+    pub fn stated(&self, name: &'d str) -> Result<Stated, Diagnostic> {
         let parameter = self.parameter(name)?;
         let value = parameter.need("value", "a number")?;
         let stated = Stated {
@@ -271,14 +251,14 @@ impl<'d, 't> Section<'d, 't> {
             unit: parameter.text("unit")?.to_owned(),
             source: parameter.text("source")?.to_owned(),
             uncertainty: parameter.uncertainty(1.0)?,
-            place: self.doc.place(value.span().start),
-            unit_place: self.doc.place(parameter.at_of("unit").start),
+            place: self.doc.place(&value.span()),
+            unit_place: self.doc.place(&parameter.at_of("unit")),
         };
         parameter.finish()?;
         Ok(stated)
     }
 
-    fn parameter(&self, name: &'d str) -> Result<Section<'d, 't>, VehicleError> {
+    fn parameter(&self, name: &'d str) -> Result<Section<'d, 't>, Diagnostic> {
         let expected = "a table with value, unit, source and uncertainty";
         let value = self.need(name, expected)?;
         if !value.get_ref().is_table() {
@@ -288,7 +268,7 @@ impl<'d, 't> Section<'d, 't> {
     }
 
     /// Checks unit, source and uncertainty of a parameter's table; notes them; gives the factor to SI.
-    fn meta(&self, dimension: Dimension, origin: Origin) -> Result<f64, VehicleError> {
+    fn meta(&self, dimension: Dimension, origin: Origin) -> Result<f64, Diagnostic> {
         let unit = self.text("unit")?;
         let factor = dimension.factor(unit).ok_or_else(|| {
             self.doc.bad(&self.at_of("unit"), &self.key("unit"), dimension.describe(), format!("\"{unit}\""))
@@ -306,14 +286,14 @@ impl<'d, 't> Section<'d, 't> {
     pub fn note(&self, unit: &str, source: &str, uncertainty: Uncertainty) {
         self.doc.provenance.borrow_mut().push(Provenance {
             key: self.path.clone(),
-            line: self.doc.place(self.at.start).line,
+            line: self.doc.place(&self.at).line,
             unit: unit.to_owned(),
             source: source.to_owned(),
             uncertainty,
         });
     }
 
-    fn uncertainty(&self, factor: f64) -> Result<Uncertainty, VehicleError> {
+    fn uncertainty(&self, factor: f64) -> Result<Uncertainty, Diagnostic> {
         let expected = "a number (one standard deviation, in the same unit) or a text such as \"not stated\"";
         let value = self.need("uncertainty", expected)?;
         if value.get_ref().is_str() {
@@ -326,7 +306,7 @@ impl<'d, 't> Section<'d, 't> {
         Ok(Uncertainty::OneSigma(sigma * factor))
     }
 
-    fn three(&self, value: &Spanned<DeValue<'t>>) -> Result<[f64; 3], VehicleError> {
+    fn three(&self, value: &Spanned<DeValue<'t>>) -> Result<[f64; 3], Diagnostic> {
         let found: Vec<_> = value.get_ref().as_array().into_iter().flat_map(|array| array.iter()).collect();
         let [x, y, z] = found[..] else {
             return Err(self.wrong_type(&self.key("value"), value, "an array of three numbers"));
@@ -335,7 +315,7 @@ impl<'d, 't> Section<'d, 't> {
     }
 
     /// A finite number, integer or not.
-    fn number(&self, name: &str, value: &Spanned<DeValue<'t>>) -> Result<f64, VehicleError> {
+    fn number(&self, name: &str, value: &Spanned<DeValue<'t>>) -> Result<f64, Diagnostic> {
         let expected = "a finite number";
         let number = match value.get_ref() {
             DeValue::Float(float) => float.as_str().parse().ok(),
@@ -349,7 +329,7 @@ impl<'d, 't> Section<'d, 't> {
         })
     }
 
-    fn wrong_type(&self, key: &str, value: &Spanned<DeValue<'t>>, expected: &str) -> VehicleError {
+    fn wrong_type(&self, key: &str, value: &Spanned<DeValue<'t>>, expected: &str) -> Diagnostic {
         self.doc.bad(&value.span(), key, expected, format!("a TOML {}", value.get_ref().type_str()))
     }
 
@@ -358,17 +338,16 @@ impl<'d, 't> Section<'d, 't> {
         self.table.get(name).map_or(self.at.clone(), Spanned::span)
     }
 
-    /// Refuses the first key in the file's order that nobody asked for.
-    pub fn finish(&self) -> Result<(), VehicleError> {
+    /// Refuses every key that nobody asked for, in the file's order.
+    pub fn finish(&self) -> Result<(), Diagnostic> {
         let asked = self.asked.borrow();
         let unknown = self.table.keys().filter(|key| !asked.contains(key.get_ref().as_ref()));
-        match unknown.min_by_key(|key| key.span().start) {
-            None => Ok(()),
-            Some(key) => Err(VehicleError::UnknownKey {
-                place: self.doc.place(key.span().start),
-                key: self.key(key.get_ref()),
-                expected: asked.iter().copied().collect::<Vec<_>>().join(", "),
-            }),
-        }
+        let mut unknown: Vec<_> = unknown.collect();
+        unknown.sort_by_key(|key| key.span().start);
+        Diagnostic::gather(unknown.into_iter().map(|key| {
+            let error = ParameterError::unknown(self.key(key.get_ref()), asked.iter().copied());
+            Err::<(), _>(Diagnostic::at(self.doc.place(&key.span()), error))
+        }))
+        .map(drop)
     }
 }

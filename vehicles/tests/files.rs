@@ -1,11 +1,12 @@
 //! The two vehicle files, and what every fault in a file is answered with.
 #![allow(non_snake_case, reason = "units stand last in names, and the newton is N")]
 
+use diagnostics::Diagnostic;
 use std::f64::consts::PI;
 use std::path::Path;
 
 use vehicles::reference::{CRAZYFLIE, HUMMINGBIRD};
-use vehicles::{MotorModel, Uncertainty, Vehicle, VehicleError};
+use vehicles::{MotorModel, Uncertainty, Vehicle};
 
 const MASS_LINE: &str = r#"mass = { value = 0.480, unit = "kg", source = "thesis Table 2.1: take-off weight with the 2100 mAh battery", uncertainty = "not stated" }"#;
 
@@ -18,7 +19,7 @@ fn line_of(needle: &str) -> usize {
     HUMMINGBIRD.lines().position(|line| line.contains(needle)).unwrap() + 1
 }
 
-fn refused(from: &str, to: &str) -> VehicleError {
+fn refused(from: &str, to: &str) -> Diagnostic {
     assert!(HUMMINGBIRD.contains(from), "the test looks for {from:?}, which the file does not hold");
     Vehicle::parse(&HUMMINGBIRD.replacen(from, to, 1), "bird.toml").expect_err("this file must be refused")
 }
@@ -126,7 +127,7 @@ fn an_unknown_key_is_named_with_its_place_and_the_known_ones() {
         MASS_LINE,
         &MASS_LINE.replace(" }", ", sigma = 1 }"),
         line,
-        &["unknown key `body.mass.sigma`", "source, uncertainty, unit, value"],
+        &["unknown key `body.mass.sigma`", "`source`, `uncertainty`, `unit`, `value`"],
     );
     assert_refused("name = \"Asc", "nmae = 3\nname = \"Asc", line_of("name = "), &["`nmae`"]);
 }
@@ -134,7 +135,7 @@ fn an_unknown_key_is_named_with_its_place_and_the_known_ones() {
 #[test]
 fn a_column_points_at_the_value() {
     let error = refused("unit = \"kg\"", "unit = \"lb\"");
-    let place = error.place().unwrap();
+    let place = error.place.unwrap();
     assert_eq!(place.column, MASS_LINE.find("\"kg\"").unwrap() + 1);
 }
 
@@ -186,7 +187,7 @@ fn a_wrong_type_is_named() {
 fn three_rotors_are_not_enough() {
     let cut = HUMMINGBIRD.rfind("[[rotors]]").unwrap();
     let message = Vehicle::parse(&HUMMINGBIRD[..cut], "bird.toml").unwrap_err().to_string();
-    assert!(message.contains("expected four rotors, found 3"), "{message}");
+    assert!(message.contains("must be four rotors, found 3"), "{message}");
 }
 
 #[test]
@@ -234,7 +235,7 @@ fn no_text_makes_the_reader_panic_and_what_it_accepts_is_physical() {
                 assert!(vehicle.inertia_kg_m2.try_inverse().is_some());
                 assert!(vehicle.command.max > vehicle.command.min);
             }
-            Err(error) => assert!(error.place().is_some_and(|place| place.line > 0)),
+            Err(error) => assert!(error.place.is_some_and(|place| place.line > 0)),
         }
     }
 }
@@ -245,7 +246,7 @@ fn several_faults_are_told_at_once_each_with_its_place() {
         HUMMINGBIRD.replacen("value = 0.480", "value = -1", 1).replacen("\"first-order\"", "\"none\"", 1);
     let text = text.replacen("\"second-order\"", "\"none\"", 1).replacen("spin", "spni", 1);
     let error = Vehicle::parse(&text, "bird.toml").unwrap_err();
-    let VehicleError::Several(faults) = &error else { panic!("{error}") };
+    let faults: Vec<Diagnostic> = error.all().collect();
     assert_eq!(faults.len(), 3, "{error}");
     for (fault, key) in faults.iter().zip(["`body.mass", "spin", "`motor.model`"]) {
         let message = fault.to_string();

@@ -1,8 +1,9 @@
 //! Whatever stands in a vehicle file: it is refused with file, line and key, or what it says is physical.
 
+use diagnostics::Diagnostic;
 use proptest::prelude::*;
 use toml::{Table, Value};
-use vehicles::{Uncertainty, Vehicle, VehicleError};
+use vehicles::{Uncertainty, Vehicle};
 
 const FILES: [&str; 3] = [
     vehicles::reference::HUMMINGBIRD,
@@ -86,7 +87,7 @@ fn require_physical(vehicle: &Vehicle) -> Result<(), TestCaseError> {
 }
 
 /// Refused with the place of a key, whose name or whose table's name is one of `keys`; or physical.
-fn require_answer(answer: Result<Vehicle, VehicleError>, keys: &[String]) -> Result<(), TestCaseError> {
+fn require_answer(answer: Result<Vehicle, Diagnostic>, keys: &[String]) -> Result<(), TestCaseError> {
     match answer {
         Ok(vehicle) => require_physical(&vehicle),
         Err(error) => {

@@ -1,18 +1,14 @@
 //! What can be wrong with a stand file, its logs, or the folder of the results.
 
 use diagnostics::Diagnostic;
-use vehicles::VehicleError;
 use vehicles::table::TableError;
 
 /// Why a rotor could not be identified.
 #[derive(Debug, thiserror::Error)]
 pub enum RotorError {
-    /// A file cannot be read, is no TOML, or has a key or a value that cannot be meant.
+    /// A file, also the vehicle's that the rest is taken from, cannot be read, is no TOML, or has a key or a value that cannot be meant.
     #[error(transparent)]
     File(#[from] Diagnostic),
-    /// The vehicle file that the rest is taken from is not usable.
-    #[error(transparent)]
-    Vehicle(#[from] VehicleError),
     /// A log is no table.
     #[error("{file}: {cause}")]
     Table {

@@ -2,14 +2,15 @@
 
 use super::catalogue::{CATALOGUE, find};
 use super::kind::{Effect, EffectKind, ParameterSpec, Values};
-use vehicles::{EffectEntry, Stated, Vehicle, VehicleError};
+use diagnostics::{Diagnostic, ParameterError};
+use vehicles::{EffectEntry, Stated, Vehicle};
 
 /// The effects of `entries`, in their order.
 ///
 /// # Errors
 /// An effect or parameter that the catalogue does not have, a unit of another dimension, a value out of bounds, a
 /// parameter that is missing, or an effect that stands twice.
-pub fn resolve<'e>(entries: impl IntoIterator<Item = &'e EffectEntry>) -> Result<Vec<Effect>, VehicleError> {
+pub fn resolve<'e>(entries: impl IntoIterator<Item = &'e EffectEntry>) -> Result<Vec<Effect>, Diagnostic> {
     let mut effects: Vec<Effect> = Vec::new();
     for entry in entries {
         let kind = kind(entry)?;
@@ -25,23 +26,20 @@ pub fn resolve<'e>(entries: impl IntoIterator<Item = &'e EffectEntry>) -> Result
     Ok(effects)
 }
 
-fn kind(entry: &EffectEntry) -> Result<&'static EffectKind, VehicleError> {
+fn kind(entry: &EffectEntry) -> Result<&'static EffectKind, Diagnostic> {
     find(&entry.name).ok_or_else(|| {
         let names = CATALOGUE.iter().map(|kind| kind.name).collect::<Vec<_>>().join(", ");
         bad_name(entry, &format!("one of {names}"), "no such effect")
     })
 }
 
-fn bad_name(entry: &EffectEntry, expected: &str, found: &str) -> VehicleError {
-    VehicleError::BadValue {
-        place: entry.name_place.clone(),
-        key: format!("{}.name", entry.key),
-        expected: expected.to_owned(),
-        found: format!("\"{}\", {found}", entry.name),
-    }
+fn bad_name(entry: &EffectEntry, expected: &str, found: &str) -> Diagnostic {
+    let found = format!("\"{}\", {found}", entry.name);
+    let error = ParameterError::value(format!("{}.name", entry.key), expected, found);
+    Diagnostic::at(entry.name_place.clone(), error)
 }
 
-fn values(kind: &'static EffectKind, entry: &EffectEntry) -> Result<Values, VehicleError> {
+fn values(kind: &'static EffectKind, entry: &EffectEntry) -> Result<Values, Diagnostic> {
     refuse_unknown(kind, entry)?;
     let mut values = Values::default();
     for (value, spec) in values.iter_mut().zip(kind.parameters) {
@@ -53,38 +51,28 @@ fn values(kind: &'static EffectKind, entry: &EffectEntry) -> Result<Values, Vehi
     Ok(values)
 }
 
-fn refuse_unknown(kind: &'static EffectKind, entry: &EffectEntry) -> Result<(), VehicleError> {
+fn refuse_unknown(kind: &'static EffectKind, entry: &EffectEntry) -> Result<(), Diagnostic> {
     let is_known = |stated: &&Stated| kind.parameters.iter().any(|spec| spec.name == stated.name);
     let Some(unknown) = entry.parameters.iter().find(|stated| !is_known(stated)) else { return Ok(()) };
-    let names: Vec<_> = kind.parameters.iter().map(|spec| spec.name).collect();
-    Err(VehicleError::UnknownKey {
-        place: unknown.place.clone(),
-        key: format!("{}.{}", entry.key, unknown.name),
-        expected: names.join(", "),
-    })
+    let key = format!("{}.{}", entry.key, unknown.name);
+    let error = ParameterError::unknown(key, kind.parameters.iter().map(|spec| spec.name));
+    Err(Diagnostic::at(unknown.place.clone(), error))
 }
 
-fn missing(spec: &ParameterSpec, entry: &EffectEntry) -> VehicleError {
-    VehicleError::MissingKey {
-        place: entry.place.clone(),
-        key: format!("{}.{}", entry.key, spec.name),
-        expected: format!(
-            "{} as a table with value, unit, source and uncertainty",
-            spec.dimension.describe()
-        ),
-    }
+fn missing(spec: &ParameterSpec, entry: &EffectEntry) -> Diagnostic {
+    let expected =
+        format!("{} as a table with value, unit, source and uncertainty", spec.dimension.describe());
+    let key = format!("{}.{}", entry.key, spec.name);
+    Diagnostic::at(entry.place.clone(), ParameterError::missing(key, expected))
 }
 
 /// The value in SI.
-fn within_bounds(spec: &ParameterSpec, stated: &Stated, entry: &EffectEntry) -> Result<f64, VehicleError> {
+fn within_bounds(spec: &ParameterSpec, stated: &Stated, entry: &EffectEntry) -> Result<f64, Diagnostic> {
     let key = format!("{}.{}", entry.key, spec.name);
     let Some(factor) = spec.dimension.factor(&stated.unit) else {
-        return Err(VehicleError::BadValue {
-            place: stated.unit_place.clone(),
-            key: format!("{key}.unit"),
-            expected: spec.dimension.describe(),
-            found: format!("\"{}\"", stated.unit),
-        });
+        let found = format!("\"{}\"", stated.unit);
+        let error = ParameterError::value(format!("{key}.unit"), spec.dimension.describe(), found);
+        return Err(Diagnostic::at(stated.unit_place.clone(), error));
     };
     let si = stated.value * factor;
     // A pure number's unit would read as another number.
@@ -92,12 +80,9 @@ fn within_bounds(spec: &ParameterSpec, stated: &Stated, entry: &EffectEntry) -> 
     if (spec.min..=spec.max).contains(&si) {
         return Ok(si);
     }
-    Err(VehicleError::BadValue {
-        place: stated.place.clone(),
-        key,
-        expected: format!("{} to {}{unit}", spec.min, spec.max),
-        found: format!("{} {}", stated.value, stated.unit),
-    })
+    let expected = format!("{} to {}{unit}", spec.min, spec.max);
+    let error = ParameterError::value(key, expected, format!("{} {}", stated.value, stated.unit));
+    Err(Diagnostic::at(stated.place.clone(), error))
 }
 
 /// Refuses `vehicle`, which has these effects, if one of them must not have made it what it is.
@@ -105,7 +90,7 @@ pub(crate) fn require(
     vehicle: &Vehicle,
     effects: &[Effect],
     entries: &[EffectEntry],
-) -> Result<(), VehicleError> {
+) -> Result<(), Diagnostic> {
     for (effect, entry) in effects.iter().zip(entries) {
         if let Some(Err(expected)) = effect.kind.require.map(|require| require(vehicle)) {
             return Err(bad_name(entry, expected, "which does not"));

@@ -2,6 +2,7 @@
 
 use crate::program::{OnExit, Readiness};
 use bus::plan::{Pace, Wait};
+use diagnostics::ParameterError;
 use serde::de::value::MapAccessDeserializer;
 use serde::de::{self, Deserializer, MapAccess, Visitor};
 use serde::{Deserialize, Serialize};
@@ -194,9 +195,9 @@ impl Default for PaceSetting {
 }
 
 impl std::str::FromStr for PaceSetting {
-    type Err = String;
+    type Err = ParameterError;
 
-    fn from_str(text: &str) -> Result<Self, String> {
+    fn from_str(text: &str) -> Result<Self, ParameterError> {
         match text {
             "free" => Ok(Self(Pace::Free)),
             "realtime" => Ok(Self(Pace::Factor(1.0))),
@@ -205,7 +206,8 @@ impl std::str::FromStr for PaceSetting {
                 _ => Err(format!(
                     "`{text}` is not a pace: expected free, realtime, or a factor from {FACTOR_MIN} to {FACTOR_MAX}, \
                      such as 0.5"
-                )),
+                )
+                .into()),
             },
         }
     }

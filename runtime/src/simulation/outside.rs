@@ -4,7 +4,6 @@ use super::faults::Fault;
 use super::sim::{Bug, Doing, Need, Sim};
 use crate::ctl::protocol::{Answer, Request};
 use crate::host::End;
-use crate::problem::Problem;
 use crate::program::{BackupSpec, Executable, Program};
 use crate::role::Role;
 use crate::view::{SegmentWrite, SlotView, View};
@@ -14,8 +13,8 @@ use bus::BusError;
 use bus::lockstep::SlotState;
 use bus::membership::Membership;
 use bus::plan::{InputPlan, NodePlan};
+use diagnostics::Diagnostic;
 use std::cell::RefCell;
-use std::path::Path;
 use std::rc::Rc;
 use std::time::Duration;
 
@@ -171,10 +170,10 @@ impl World for SimWorld {
         assert!(before.is_none(), "answered twice: {before:?}, {answer:?}");
     }
 
-    fn backup_of(&self, process: &str, _: &str) -> Result<BackupSpec, Problem> {
+    fn backup_of(&self, process: &str, _: &str) -> Result<BackupSpec, Diagnostic> {
         let sim = self.0.borrow();
         let node = sim.plan.nodes.iter().position(|node| node.name == process);
-        let node = node.ok_or_else(|| Problem::in_file(Path::new("m.toml"), "no such process", ""))?;
+        let node = node.ok_or_else(|| Diagnostic::in_file("m.toml", "no such process"))?;
         let program =
             Program { watchdog: super::settings::WATCHDOG, ..Program::of(Executable::Command(Vec::new())) };
         let plan = sim.plan.nodes[node].clone();

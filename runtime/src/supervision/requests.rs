@@ -2,11 +2,11 @@
 
 use super::Supervisor;
 use crate::ctl::protocol::{Answer, Request};
-use crate::problem::Problem;
 use crate::program::BackupSpec;
 use crate::replacement::{Report, take_over_stride};
 use crate::supervisor::State;
 use crate::world::World;
+use diagnostics::Diagnostic;
 use std::path::PathBuf;
 
 /// Ticks that a backup shadows where a request does not say.
@@ -16,7 +16,7 @@ const SHADOW_TICKS: u32 = 100;
 #[derive(Debug, thiserror::Error)]
 enum SwapRefused {
     #[error(transparent)]
-    Manifest(#[from] Problem),
+    Manifest(#[from] Diagnostic),
     #[error(
         "`log` = {}: a run claims its logs when it starts, and cannot claim another in flight; leave it out, or \
          write the swap into the manifest", .0.display()
