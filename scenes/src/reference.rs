@@ -3,7 +3,7 @@
 //! ```
 //! let scene = scenes::Scene::parse(scenes::reference::ROOM, "room.toml")?;
 //! assert_eq!(scene.boxes.len(), 4);
-//! # Ok::<(), vehicles::VehicleError>(())
+//! # Ok::<(), diagnostics::Diagnostic>(())
 //! ```
 
 /// Nothing but the ground, with its contact.

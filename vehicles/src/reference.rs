@@ -3,7 +3,7 @@
 //! ```
 //! let vehicle = vehicles::Vehicle::parse(vehicles::reference::HUMMINGBIRD, "hummingbird.toml")?;
 //! assert_eq!(vehicle.mass_kg, 0.480);
-//! # Ok::<(), vehicles::VehicleError>(())
+//! # Ok::<(), diagnostics::Diagnostic>(())
 //! ```
 
 /// The AscTec Hummingbird of the thesis.
