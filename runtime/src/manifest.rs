@@ -40,13 +40,13 @@ use toml::de::{DeTable, DeValue};
 ///
 /// ```
 /// use runtime::{manifest::Manifest, registry::Registry};
-/// let text = "[run]\nduration_s = 2.0".to_owned();
+/// let text = "[run]\nduration_s = 2.0\n[process.plant]\nkind = \"plant\"".to_owned();
 /// let manifest = Manifest::parse(text, "hover.toml".as_ref(), &[], Registry::default())?;
 /// assert_eq!(manifest.name(), "hover");
 ///
 /// let problem = manifest.set("run.duration_s", "long").unwrap_err();
 /// assert!(problem.to_string().contains("--set"), "{problem}");
-/// # Ok::<(), runtime::problem::Problem>(())
+/// # Ok::<(), diagnostics::Diagnostic>(())
 /// ```
 #[derive(Debug)]
 pub struct Manifest {

@@ -12,9 +12,9 @@ fn set_points_that_cannot_be_flown() {
         refused_text(&marked.replace(from, to))
     };
     let ended = with("unit = \"m\"", "unit = \"ft\"");
-    ended.says(&["process `pilot`: `set_points`: set point 0", "`unit` must be \"m\"", "found \"ft\""]);
-    with("\"altitude\"", "\"height\"").says(&["`channel` must be", "found \"height\""]);
-    with("to = 1.5, ", "").says(&["`to` must be a finite number in a step, found nothing"]);
+    ended.says(&["process `pilot`: `set_points.0.unit` must be \"m\"", "found \"ft\""]);
+    with("\"altitude\"", "\"height\"").says(&["`set_points.0.channel` must be", "found \"height\""]);
+    with("to = 1.5, ", "").says(&["`set_points.0.to` must be a finite number in a step, found nothing"]);
 }
 
 #[test]
