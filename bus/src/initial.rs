@@ -5,37 +5,69 @@ use crate::sample_memory::empty_sample;
 use crate::schema::{Kind, Primitive, Schema};
 use serde_json::Value;
 
+/// What does not fit the message, by its path.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum InitialError {
+    /// A value of another kind.
+    #[error("`{path}` is {found}, expected {expected}")]
+    Value {
+        /// The field, such as `position.z` or `command[2]`; empty for the whole message.
+        path: String,
+        /// What was given.
+        found: Value,
+        /// What is accepted.
+        expected: String,
+    },
+    /// A field that the message does not have.
+    #[error("there is no field `{path}`; the fields are {}", .known.join(", "))]
+    Unknown {
+        /// The field.
+        path: String,
+        /// Those that there are in its place.
+        known: Vec<&'static str>,
+    },
+    /// A field that has one value, always.
+    #[error("`{0}` is a constant")]
+    Constant(String),
+}
+
+impl InitialError {
+    fn value(path: &str, found: &Value, expected: impl Into<String>) -> Self {
+        Self::Value { path: path.to_owned(), found: found.clone(), expected: expected.into() }
+    }
+}
+
 /// A sample of `schema` whose fields have the values of `value` (a table) and are zero elsewhere.
 ///
 /// # Errors
 /// What does not fit: an unknown field, a value of another kind, an array of another length.
-pub fn sample(schema: &Schema, value: &Value) -> Result<Box<[u64]>, String> {
+pub fn sample(schema: &Schema, value: &Value) -> Result<Box<[u64]>, InitialError> {
     let mut words = empty_sample(schema.size);
     write_message(schema, value, &mut bytemuck::cast_slice_mut(&mut words)[BODY_START..], "")?;
     Ok(words)
 }
 
-fn write_message(schema: &Schema, value: &Value, bytes: &mut [u8], path: &str) -> Result<(), String> {
+fn write_message(schema: &Schema, value: &Value, bytes: &mut [u8], path: &str) -> Result<(), InitialError> {
     let Value::Object(fields) = value else {
-        return Err(format!("`{path}` is {value}, expected a table of fields"));
+        return Err(InitialError::value(path, value, "a table of fields"));
     };
     for (name, value) in fields {
         let path = if path.is_empty() { name.clone() } else { format!("{path}.{name}") };
         let field = schema.fields.iter().find(|field| field.name == name).ok_or_else(|| {
-            let known = schema.fields.iter().map(|field| field.name).collect::<Vec<_>>().join(", ");
-            format!("there is no field `{path}`; the fields are {known}")
+            let known = schema.fields.iter().map(|field| field.name).collect();
+            InitialError::Unknown { path: path.clone(), known }
         })?;
         write_value(&field.kind, value, &mut bytes[field.offset..], &path)?;
     }
     Ok(())
 }
 
-fn write_value(kind: &Kind, value: &Value, bytes: &mut [u8], path: &str) -> Result<(), String> {
+fn write_value(kind: &Kind, value: &Value, bytes: &mut [u8], path: &str) -> Result<(), InitialError> {
     match kind {
         Kind::Primitive(primitive) => write_number(*primitive, value, bytes, path),
         Kind::Message(schema) => write_message(schema, value, bytes, path),
         Kind::Array(element, length) => write_array(element, *length, value, bytes, path),
-        Kind::Text => Err(format!("`{path}` is a constant")),
+        Kind::Text => Err(InitialError::Constant(path.to_owned())),
     }
 }
 
@@ -45,7 +77,7 @@ fn write_array(
     value: &Value,
     bytes: &mut [u8],
     path: &str,
-) -> Result<(), String> {
+) -> Result<(), InitialError> {
     match value {
         Value::Array(values) if values.len() == length => {
             let size = size_of_kind(element);
@@ -53,21 +85,31 @@ fn write_array(
                 write_value(element, value, &mut bytes[index * size..], &format!("{path}[{index}]"))
             })
         }
-        _ => Err(format!("`{path}` is {value}, expected an array of {length}")),
+        _ => Err(InitialError::value(path, value, format!("an array of {length}"))),
     }
 }
 
-fn write_number(primitive: Primitive, value: &Value, bytes: &mut [u8], path: &str) -> Result<(), String> {
-    let float = || value.as_f64().ok_or_else(|| format!("`{path}` is {value}, expected a number"));
+fn write_number(
+    primitive: Primitive,
+    value: &Value,
+    bytes: &mut [u8],
+    path: &str,
+) -> Result<(), InitialError> {
+    let float = || value.as_f64().ok_or_else(|| InitialError::value(path, value, "a number"));
     macro_rules! integer {
         ($type:ty) => {{
             let number = value.as_i64().and_then(|number| <$type>::try_from(number).ok());
-            put(bytes, &number.ok_or_else(|| integer_error(primitive, value, path))?.to_le_bytes())
+            let expected = || format!("an integer in the range of {}", primitive.ros_name());
+            let number = number.ok_or_else(|| InitialError::value(path, value, expected()));
+            put(bytes, &number?.to_le_bytes())
         }};
     }
     match primitive {
         Primitive::F64 => put(bytes, &float()?.to_le_bytes()),
-        Primitive::F32 => put(bytes, &single(float()?, path)?.to_le_bytes()),
+        Primitive::F32 => put(
+            bytes,
+            &single(float()?).ok_or_else(|| InitialError::value(path, value, single_range()))?.to_le_bytes(),
+        ),
         Primitive::I64 => integer!(i64),
         Primitive::U64 => integer!(u64),
         Primitive::I32 => integer!(i32),
@@ -82,20 +124,17 @@ fn write_number(primitive: Primitive, value: &Value, bytes: &mut [u8], path: &st
 
 /// `number` in single precision, where it is a number too.
 #[allow(clippy::cast_possible_truncation, reason = "the field is single precision")]
-fn single(number: f64, path: &str) -> Result<f32, String> {
+fn single(number: f64) -> Option<f32> {
     let single = number as f32;
-    let words = || {
-        format!("`{path}` is {number}, expected a number within {:e} of 0: it is single precision", f32::MAX)
-    };
-    single.is_finite().then_some(single).ok_or_else(words)
+    single.is_finite().then_some(single)
+}
+
+fn single_range() -> String {
+    format!("a number within {:e} of 0: it is single precision", f32::MAX)
 }
 
 fn put(bytes: &mut [u8], number: &[u8]) {
     bytes[..number.len()].copy_from_slice(number);
-}
-
-fn integer_error(primitive: Primitive, value: &Value, path: &str) -> String {
-    format!("`{path}` is {value}, expected an integer in the range of {}", primitive.ros_name())
 }
 
 fn size_of_kind(kind: &Kind) -> usize {
@@ -129,14 +168,11 @@ mod tests {
 
     #[test]
     fn what_does_not_fit_is_named() {
-        let error = |value| sample(MotorCommand::SCHEMA, &value).unwrap_err();
+        let error = |value| sample(MotorCommand::SCHEMA, &value).unwrap_err().to_string();
         assert!(error(json!({"comand": 1})).contains("no field `comand`; the fields are stamp, command"));
         assert!(error(json!({"command": [1, 2]})).contains("expected an array of 4"));
-        assert_eq!(single(1.5, "range"), Ok(1.5));
-        assert!(
-            single(1e39, "range").unwrap_err().contains("`range` is 1"),
-            "an infinity in single precision"
-        );
+        assert_eq!(single(1.5), Some(1.5));
+        assert_eq!(single(1e39), None, "an infinity in single precision");
         assert!(error(json!({"stamp": {"nanosec": -1}})).contains("range of uint32"));
     }
 }

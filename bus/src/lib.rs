@@ -59,7 +59,7 @@ pub use node_harness::{NodeHarness, Sample};
 pub use registration::Registration;
 pub use run_process::run_process;
 pub use tick::Tick;
-pub use transport::{limit_transport_log, reap_dead, takes_run_dir};
+pub use transport::{IceoryxError, limit_transport_log, reap_dead, takes_run_dir};
 
 #[doc(hidden)]
 pub mod __private {

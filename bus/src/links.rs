@@ -52,7 +52,7 @@ impl Links {
             node: self.node.name.clone(),
             port: input.port.clone(),
             type_name: schema.type_name,
-            reason,
+            reason: reason.to_string(),
         })
     }
 

@@ -6,7 +6,7 @@ use crate::message::{cdr_bytes, message_bytes};
 use crate::messages::Time;
 use crate::plan::{InputPlan, OutputPlan, TopicPlan};
 use crate::schema::Schema;
-use crate::transport::{Loan, Received, Receiver, SampleHeader, Sender};
+use crate::transport::{IceoryxError, Loan, Received, Receiver, SampleHeader, Sender};
 use std::collections::VecDeque;
 
 /// The samples of a topic from one generation of its publisher.
@@ -19,6 +19,17 @@ pub(crate) struct Source {
     /// Whether what was received so far may be older than the next sample: the history that a subscriber gets
     /// which joins later.
     has_history: bool,
+}
+
+/// What was found where the next sample was due.
+#[derive(Debug, thiserror::Error)]
+enum Found {
+    #[error("nothing")]
+    Nothing,
+    #[error("{sequence} (of tick {tick})")]
+    Other { sequence: u64, tick: u64 },
+    #[error("{0}")]
+    Failure(#[from] IceoryxError),
 }
 
 impl Source {
@@ -34,8 +45,8 @@ impl Source {
         Self { generation, receiver, next_sequence, has_history: true }
     }
 
-    /// The next sample, if it is there; the error is what was found instead.
-    fn next(&mut self, period_ticks: u32) -> Result<Option<Received>, String> {
+    /// The next sample, if it is there.
+    fn next(&mut self, period_ticks: u32) -> Result<Option<Received>, Found> {
         loop {
             let Some(sample) = self.receiver.receive()? else { return Ok(None) };
             let header = sample.header();
@@ -46,7 +57,7 @@ impl Source {
             if header.sequence != self.next_sequence
                 || header.tick != header.sequence * u64::from(period_ticks)
             {
-                return Err(format!("{} (of tick {})", header.sequence, header.tick));
+                return Err(Found::Other { sequence: header.sequence, tick: header.tick });
             }
             self.next_sequence += 1;
             return Ok(Some(sample));
@@ -149,7 +160,7 @@ impl InPort {
         while self.active.next_sequence <= newest_sequence {
             let expected = self.active.next_sequence;
             let next = self.active.next(self.topic_period_ticks).transpose();
-            let next = next.unwrap_or_else(|| Err("nothing".to_owned()));
+            let next = next.unwrap_or_else(|| Err(Found::Nothing));
             self.current = Some(next.map_err(|found| self.gap(node, tick, expected, found))?);
             self.pass_take_over(newest_sequence);
         }
@@ -189,7 +200,7 @@ impl InPort {
 
     /// Receives what backups have sent so far, so that their queues cannot run full; the error is the
     /// sequence number that was due, and what was found.
-    fn take_shadow(&mut self, newest_sequence: u64) -> Result<(), (u64, String)> {
+    fn take_shadow(&mut self, newest_sequence: u64) -> Result<(), (u64, Found)> {
         for Backup { source, .. } in &mut self.backups {
             while source.next_sequence <= newest_sequence {
                 let expected = source.next_sequence;
@@ -202,7 +213,8 @@ impl InPort {
         Ok(())
     }
 
-    fn gap(&self, node: &str, tick: u32, expected: u64, found: String) -> BusError {
+    fn gap(&self, node: &str, tick: u32, expected: u64, found: Found) -> BusError {
+        let found = found.to_string();
         BusError::Gap { node: node.to_owned(), topic: self.topic_name.clone(), tick, expected, found }
     }
 
@@ -313,7 +325,7 @@ impl OutPort {
 
     /// Sees to it that a subscriber that joined gets the newest samples before the next one is sent.
     pub(crate) fn update_subscribers(&self, node: &str) -> Result<(), BusError> {
-        self.sender.update_subscribers().map_err(|reason| self.error("meeting subscribers", node, reason))
+        self.sender.update_subscribers().map_err(|reason| self.error("meeting subscribers", node, &reason))
     }
 
     /// Forgets what was written at a tick at which nothing was due.
@@ -324,7 +336,7 @@ impl OutPort {
     /// Takes the memory of the next sample.
     pub(crate) fn prepare(&mut self, node: &str) -> Result<(), BusError> {
         if self.loan.is_none() {
-            let loan = self.sender.loan().map_err(|reason| self.error("taking a sample", node, reason))?;
+            let loan = self.sender.loan().map_err(|reason| self.error("taking a sample", node, &reason))?;
             self.loan = Some(loan);
         }
         Ok(())
@@ -351,7 +363,7 @@ impl OutPort {
         }
         let sequence = u64::from(tick / self.period_ticks);
         let header = SampleHeader { tick: u64::from(tick), sequence, received_ns, done_ns, sent_ns };
-        loan.send(header).map_err(|reason| self.error("sending", node, reason))
+        loan.send(header).map_err(|reason| self.error("sending", node, &reason))
     }
 
     fn not_finite(&self, (offset, value): (usize, f64), tick: u32, time_ns: u64, node: &str) -> BusError {
@@ -365,9 +377,9 @@ impl OutPort {
         }
     }
 
-    fn error(&self, action: &str, node: &str, reason: String) -> BusError {
+    fn error(&self, action: &str, node: &str, reason: &IceoryxError) -> BusError {
         let action = format!("{action} on its output `{}`", self.port);
-        BusError::Transport { node: node.to_owned(), action, reason }
+        BusError::Transport { node: node.to_owned(), action, reason: reason.to_string() }
     }
 }
 

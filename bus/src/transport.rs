@@ -73,15 +73,27 @@ pub fn limit_transport_log() {
     set_log_level(LogLevel::Error);
 }
 
-/// The configuration of the run `run_id`, whose directory is `run_dir`; the error is iceoryx2's.
-fn config(run_dir: &Path, run_id: &str) -> Result<Config, String> {
+/// What iceoryx2 refused, by the name that it gives to it.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("{0}")]
+pub struct IceoryxError(String);
+
+impl IceoryxError {
+    /// iceoryx2 has an error type for every call.
+    fn of(error: impl std::fmt::Debug) -> Self {
+        Self(format!("{error:?}"))
+    }
+}
+
+/// The configuration of the run `run_id`, whose directory is `run_dir`.
+fn config(run_dir: &Path, run_id: &str) -> Result<Config, IceoryxError> {
     let root = run_dir.join("iceoryx2");
     let mut config = Config::default();
     config.global.set_root_path(
-        &IoxPath::new(root.as_os_str().as_encoded_bytes()).map_err(|error| format!("{root:?}: {error:?}"))?,
+        &IoxPath::new(root.as_os_str().as_encoded_bytes())
+            .map_err(|error| IceoryxError(format!("{root:?}: {error:?}")))?,
     );
-    config.global.prefix =
-        FileName::new(shm_prefix(run_id).as_bytes()).map_err(|error| format!("{error:?}"))?;
+    config.global.prefix = FileName::new(shm_prefix(run_id).as_bytes()).map_err(IceoryxError::of)?;
     // Dead processes are the launcher's business; looking for them here would only slow the start.
     config.global.node.cleanup_dead_nodes_on_creation = false;
     config.global.node.cleanup_dead_nodes_on_destruction = false;
@@ -92,27 +104,28 @@ fn config(run_dir: &Path, run_id: &str) -> Result<Config, String> {
 /// Gives back what dead processes of the run hold: their ports and their shared memory.
 ///
 /// # Errors
-/// iceoryx2's words.
-pub fn reap_dead(run_dir: &Path, run_id: &str) -> Result<(), String> {
+/// What iceoryx2 refuses.
+pub fn reap_dead(run_dir: &Path, run_id: &str) -> Result<(), IceoryxError> {
     let config = config(run_dir, run_id)?;
     let mut failure = None;
     iceoryx2::node::Node::<Service>::list(&config, |state| {
         if let NodeState::Dead(view) = state
             && let Err(error) = view.try_remove_stale_resources()
         {
-            failure = Some(format!("{error:?}"));
+            failure = Some(IceoryxError::of(error));
         }
         CallbackProgression::Continue
     })
-    .map_err(|error| format!("{error:?}"))?;
+    .map_err(IceoryxError::of)?;
     failure.map_or(Ok(()), Err)
 }
 
 impl Transport {
     /// Connects node `node_name` to the run `run_id`, whose directory is `run_dir`.
     pub(crate) fn new(run_dir: &Path, run_id: &str, node_name: &str) -> Result<Self, BusError> {
-        let fail =
-            |reason: String| transport_error(node_name, "joining the shared memory of the run", reason);
+        let fail = |reason: IceoryxError| {
+            transport_error(node_name, "joining the shared memory of the run", &reason)
+        };
         if !crate::hosted::is_hosted() {
             limit_transport_log();
         }
@@ -120,12 +133,12 @@ impl Transport {
         let what = format!("node `{node_name}` in shared memory");
         reserve::require_free(&what, PORT_MARGIN_BYTES)?;
         make_node_counter(&config, run_id)
-            .map_err(|error| fail(format!("cannot make the counter of its nodes: {error}")))?;
+            .map_err(|error| fail(IceoryxError(format!("cannot make the counter of its nodes: {error}"))))?;
         let node = NodeBuilder::new()
             .config(&config)
             .signal_handling_mode(SignalHandlingMode::Disabled)
             .create::<Service>()
-            .map_err(|error| fail(format!("{error:?}")))?;
+            .map_err(|error| fail(IceoryxError::of(error)))?;
         let (node_name, run_id) = (node_name.to_owned(), run_id.to_owned());
         Ok(Self { node, node_name, run_id, new_ports: RefCell::default() })
     }
@@ -133,10 +146,11 @@ impl Transport {
     /// The service of a topic's samples from one generation of its publisher. Each generation has its own:
     /// who reads the topic knows for each tick whose sample counts.
     fn service(&self, topic: &str, generation: u32, capacity: Capacity) -> Result<Factory, BusError> {
-        let fail =
-            |reason: String| transport_error(&self.node_name, &format!("opening topic {topic}"), reason);
-        let name =
-            ServiceName::new(&format!("{topic}@{generation}")).map_err(|error| fail(format!("{error:?}")))?;
+        let fail = |reason: IceoryxError| {
+            transport_error(&self.node_name, &format!("opening topic {topic}"), &reason)
+        };
+        let name = ServiceName::new(&format!("{topic}@{generation}"))
+            .map_err(|error| fail(IceoryxError::of(error)))?;
         self.node
             .service_builder(&name)
             .publish_subscribe::<[u64]>()
@@ -150,7 +164,7 @@ impl Transport {
             .max_subscribers(capacity.subscribers.max(1))
             .max_nodes(capacity.nodes)
             .open_or_create()
-            .map_err(|error| fail(format!("{error:?}")))
+            .map_err(|error| fail(IceoryxError::of(error)))
     }
 
     /// Creates the publisher of `topic`, whose messages have `size` bytes.
@@ -173,11 +187,8 @@ impl Transport {
             .backpressure_strategy(BackpressureStrategy::DiscardData)
             .create()
             .map_err(|error| {
-                transport_error(
-                    &self.node_name,
-                    &format!("publishing on topic {topic}"),
-                    format!("{error:?}"),
-                )
+                let action = format!("publishing on topic {topic}");
+                transport_error(&self.node_name, &action, &IceoryxError::of(error))
             })?;
         self.new_ports.borrow_mut().push(publisher.id().value().to_string());
         Ok(Sender { publisher, words: sample_words(size) })
@@ -198,11 +209,8 @@ impl Transport {
             .buffer_size(capacity.queued_samples)
             .create()
             .map_err(|error| {
-                transport_error(
-                    &self.node_name,
-                    &format!("subscribing to topic {topic}"),
-                    format!("{error:?}"),
-                )
+                let action = format!("subscribing to topic {topic}");
+                transport_error(&self.node_name, &action, &IceoryxError::of(error))
             })?;
         self.new_ports.borrow_mut().push(subscriber.id().value().to_string());
         Ok(Receiver { subscriber })
@@ -278,7 +286,8 @@ pub(crate) fn samples_bytes(size: usize, capacity: Capacity) -> u64 {
     (samples * (8 * sample_words(size) + size_of::<SampleHeader>())) as u64
 }
 
-fn transport_error(node: &str, action: &str, reason: String) -> BusError {
+fn transport_error(node: &str, action: &str, reason: &IceoryxError) -> BusError {
+    let reason = reason.to_string();
     BusError::Transport { node: node.to_owned(), action: action.to_owned(), reason }
 }
 
@@ -291,13 +300,13 @@ pub(crate) struct Sender {
 
 impl Sender {
     /// Meets the subscribers that have come, and hands them the history.
-    pub(crate) fn update_subscribers(&self) -> Result<(), String> {
-        self.publisher.update_connections().map_err(|error| format!("{error:?}"))
+    pub(crate) fn update_subscribers(&self) -> Result<(), IceoryxError> {
+        self.publisher.update_connections().map_err(IceoryxError::of)
     }
 
     /// Takes a sample to write into; it may hold the bytes of an earlier sample.
-    pub(crate) fn loan(&self) -> Result<Loan, String> {
-        let sample = self.publisher.loan_slice_uninit(self.words).map_err(|error| format!("{error:?}"))?;
+    pub(crate) fn loan(&self) -> Result<Loan, IceoryxError> {
+        let sample = self.publisher.loan_slice_uninit(self.words).map_err(IceoryxError::of)?;
         // SAFETY: shared memory starts zeroed and holds nothing but words, and every bit pattern is a u64.
         let mut sample = unsafe { sample.assume_init() };
         sample.payload_mut()[0] = ENCAPSULATION_WORD;
@@ -316,9 +325,9 @@ impl Loan {
         self.sample.payload_mut()
     }
 
-    pub(crate) fn send(mut self, header: SampleHeader) -> Result<(), String> {
+    pub(crate) fn send(mut self, header: SampleHeader) -> Result<(), IceoryxError> {
         *self.sample.user_header_mut() = header;
-        self.sample.send().map(|_| ()).map_err(|error| format!("{error:?}"))
+        self.sample.send().map(|_| ()).map_err(IceoryxError::of)
     }
 }
 
@@ -330,8 +339,8 @@ pub(crate) struct Receiver {
 
 impl Receiver {
     /// The oldest sample that was not received yet.
-    pub(crate) fn receive(&self) -> Result<Option<Received>, String> {
-        let sample = self.subscriber.receive().map_err(|error| format!("{error:?}"))?;
+    pub(crate) fn receive(&self) -> Result<Option<Received>, IceoryxError> {
+        let sample = self.subscriber.receive().map_err(IceoryxError::of)?;
         Ok(sample.map(|sample| Received { sample }))
     }
 }

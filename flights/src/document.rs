@@ -55,7 +55,7 @@ impl Document {
         let expanded = vehicles::variables::expand(written.get_ref(), |name| std::env::var(name).ok())
             .map_err(|found| {
                 let advice = "set the variable, or give a default: ${NAME:-path}";
-                self.bad(&written.span(), key, "a path", found, advice)
+                self.bad(&written.span(), key, "a path", found.to_string(), advice)
             })?;
         Ok(tidy(&self.path.parent().unwrap_or(Path::new("")).join(expanded)))
     }

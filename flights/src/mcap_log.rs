@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use recorder::definition::{Definition, Leaf};
+use recorder::definition::{Definition, DefinitionError, Leaf};
 use recorder::reader::Messages;
 
 use crate::error::{LogError, Spot};
@@ -20,7 +20,18 @@ pub struct McapLog {
 struct Topic {
     kind: String,
     /// The parsed definition, or what there is instead.
-    definition: Result<Definition, String>,
+    definition: Result<Definition, NoDefinition>,
+}
+
+/// Why a topic's messages cannot be read.
+#[derive(Debug, thiserror::Error)]
+enum NoDefinition {
+    #[error("no schema")]
+    Nothing,
+    #[error("{message} with a {schema} schema")]
+    Encoding { message: String, schema: String },
+    #[error(transparent)]
+    Text(#[from] DefinitionError),
 }
 
 impl McapLog {
@@ -63,7 +74,7 @@ impl McapLog {
             LogError::unexpected(
                 at,
                 "CDR with a ros2msg schema",
-                found,
+                found.to_string(),
                 "record it so, or name another topic",
             )
         })?;
@@ -74,12 +85,14 @@ impl McapLog {
 impl Topic {
     fn of(channel: &mcap::Channel<'_>) -> Self {
         let Some(schema) = &channel.schema else {
-            return Self { kind: String::new(), definition: Err("no schema".to_owned()) };
+            return Self { kind: String::new(), definition: Err(NoDefinition::Nothing) };
         };
         let definition = if schema.encoding == "ros2msg" && channel.message_encoding == "cdr" {
             Definition::parse(&schema.name, &String::from_utf8_lossy(&schema.data))
+                .map_err(NoDefinition::from)
         } else {
-            Err(format!("{} with a {} schema", channel.message_encoding, schema.encoding))
+            let (message, schema) = (channel.message_encoding.clone(), schema.encoding.clone());
+            Err(NoDefinition::Encoding { message, schema })
         };
         Self { kind: schema.name.clone(), definition }
     }
@@ -98,7 +111,12 @@ impl Log for McapLog {
             let leaves = decoded.map_err(|found| {
                 let (at, expected) =
                     (Spot::Named("topic", name.to_owned()), format!("messages of type {}", topic.kind));
-                LogError::unexpected(at, expected, found, "the log is damaged, or its schema is another's")
+                LogError::unexpected(
+                    at,
+                    expected,
+                    found.to_string(),
+                    "the log is damaged, or its schema is another's",
+                )
             })?;
             // A stamp of zero was not set, unless the log begins at zero too: the first tick of a simulation.
             let stamp_ns = stamp_ns(&leaves).filter(|ns| *ns > 0 || message.log_time == 0);

@@ -67,7 +67,8 @@ impl<'a> Bytes<'a> {
             let (kind, left) = (name(opcode), rest.len());
             self.damage(at, format!("a record ({kind}) says that it is {length} bytes long, {left} are left"))
         })?;
-        check(opcode, body).map_err(|reason| self.damage(at, reason))?;
+        check(opcode, body)
+            .map_err(|fault| self.damage(at, format!("a record ({}) {fault}", name(opcode))))?;
         Ok(Raw { opcode, body, end: at + HEAD_BYTES + body.len() })
     }
 
@@ -129,9 +130,25 @@ fn name(opcode: u8) -> &'static str {
     }
 }
 
+/// What is wrong with a record or a chunk, whose name stands before it.
+#[derive(Debug, thiserror::Error)]
+enum Fault {
+    #[error("says that {length} bytes follow, {left} are left in it")]
+    Length { length: u64, left: usize },
+    #[error("says that it unpacks to {0} bytes, expected at most {CHUNK_BYTES_MAX}")]
+    Large(u64),
+    #[error("is compressed by `{0}`, expected zstd or nothing; convert the file")]
+    Compression(String),
+    #[error("has the checksum {stored:08x}, its content {found:08x}")]
+    Checksum { stored: u32, found: u32 },
+    #[error("cannot be decompressed: {0}")]
+    Decompression(#[from] std::io::Error),
+    #[error("says that it unpacks to {stated} bytes, and unpacks to {found}")]
+    Size { stated: u64, found: usize },
+}
+
 /// Refuses a record with a length in it that goes beyond it.
-fn check(opcode: u8, body: &[u8]) -> Result<(), String> {
-    let refused = |reason: String| format!("a record ({}) {reason}", name(opcode));
+fn check(opcode: u8, body: &[u8]) -> Result<(), Fault> {
     let mut rest = body;
     for part in parts(opcode) {
         match part {
@@ -144,27 +161,25 @@ fn check(opcode: u8, body: &[u8]) -> Result<(), String> {
                 }
                 Ok(())
             }),
-        }
-        .map_err(refused)?;
+        }?;
     }
     Ok(())
 }
 
-fn take<'a>(rest: &mut &'a [u8], length: u64) -> Result<&'a [u8], String> {
+fn take<'a>(rest: &mut &'a [u8], length: u64) -> Result<&'a [u8], Fault> {
     let taken = usize::try_from(length).ok().and_then(|length| rest.split_at_checked(length));
-    let (taken, behind) =
-        taken.ok_or_else(|| format!("says that {length} bytes follow, {} are left in it", rest.len()))?;
+    let (taken, behind) = taken.ok_or(Fault::Length { length, left: rest.len() })?;
     *rest = behind;
     Ok(taken)
 }
 
 /// The number in the next `size` bytes, at most eight.
-fn number(rest: &mut &[u8], size: u64) -> Result<u64, String> {
+fn number(rest: &mut &[u8], size: u64) -> Result<u64, Fault> {
     let bytes = take(rest, size)?;
     Ok(bytes.iter().rev().fold(0, |number, byte| (number << 8) | u64::from(*byte)))
 }
 
-fn long32<'a>(rest: &mut &'a [u8]) -> Result<&'a [u8], String> {
+fn long32<'a>(rest: &mut &'a [u8]) -> Result<&'a [u8], Fault> {
     let length = number(rest, 4)?;
     take(rest, length)
 }
@@ -233,7 +248,7 @@ impl<'a> Messages<'a> {
                 if let Record::Chunk { header, data } = file.parsed(at, &raw)? {
                     let Cow::Borrowed(data) = data else { return Ok(Step::Other) };
                     let content = unpacked(&header, data)
-                        .map_err(|reason| file.damage(at, format!("a chunk {reason}")))?;
+                        .map_err(|fault| file.damage(at, format!("a chunk {fault}")))?;
                     self.chunk = Some(Chunk { content, at: 0, of: format!(" of the chunk at byte {at}") });
                 }
             }
@@ -303,39 +318,32 @@ fn magic(file: &Bytes<'_>, at: usize) -> Result<usize, Damage> {
 }
 
 /// The records of a chunk.
-fn unpacked<'a>(header: &ChunkHeader, data: &'a [u8]) -> Result<Cow<'a, [u8]>, String> {
+fn unpacked<'a>(header: &ChunkHeader, data: &'a [u8]) -> Result<Cow<'a, [u8]>, Fault> {
     let size = header.uncompressed_size;
     let content = match header.compression.as_str() {
         "" => Cow::Borrowed(data),
         "zstd" if size <= CHUNK_BYTES_MAX => Cow::Owned(decompressed(data, size)?),
-        "zstd" => {
-            return Err(format!("says that it unpacks to {size} bytes, expected at most {CHUNK_BYTES_MAX}"));
-        }
-        other => {
-            return Err(format!("is compressed by `{other}`, expected zstd or nothing; convert the file"));
-        }
+        "zstd" => return Err(Fault::Large(size)),
+        other => return Err(Fault::Compression(other.to_owned())),
     };
     let (stored, found) = (header.uncompressed_crc, crc32fast::hash(&content));
     if stored != 0 && stored != found {
-        return Err(format!("has the checksum {stored:08x}, its content {found:08x}"));
+        return Err(Fault::Checksum { stored, found });
     }
     Ok(content)
 }
 
 /// What `data` decompresses to, which is `size` bytes; the memory grows with what there is.
-fn decompressed(data: &[u8], size: u64) -> Result<Vec<u8>, String> {
-    let broken = |error: std::io::Error| format!("cannot be decompressed: {error}");
+fn decompressed(data: &[u8], size: u64) -> Result<Vec<u8>, Fault> {
     let mut content = Vec::new();
-    let mut decoder = zstd::Decoder::with_buffer(data).map_err(broken)?;
+    let mut decoder = zstd::Decoder::with_buffer(data)?;
     // A frame states how far it looks back, and the decoder takes as much: no further than the chunk is long.
-    decoder
-        .window_log_max(size.checked_ilog2().unwrap_or(0).saturating_add(1).max(WINDOW_LOG))
-        .map_err(broken)?;
-    let read = decoder.take(size).read_to_end(&mut content).map_err(broken)?;
+    decoder.window_log_max(size.checked_ilog2().unwrap_or(0).saturating_add(1).max(WINDOW_LOG))?;
+    let read = decoder.take(size).read_to_end(&mut content)?;
     if read as u64 == size {
         return Ok(content);
     }
-    Err(format!("says that it unpacks to {size} bytes, and unpacks to {read}"))
+    Err(Fault::Size { stated: size, found: read })
 }
 
 /// What the end of a complete file says about the rest.

@@ -2,6 +2,56 @@
 
 use std::collections::BTreeMap;
 
+/// A definition that is not understood.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum DefinitionError {
+    /// Behind a line of `=`, another definition begins with its name.
+    #[error("expected `MSG: …`, found {0:?}")]
+    Head(String),
+    /// A line without a type and a name.
+    #[error("not a field: {0:?}")]
+    Field(String),
+    /// What stands between the brackets of an array.
+    #[error("not an array length: {0:?}")]
+    Length(String),
+}
+
+/// Bytes that do not fit their definition.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum DecodeError {
+    /// The definition is not understood.
+    #[error(transparent)]
+    Definition(#[from] DefinitionError),
+    /// Another encoding.
+    #[error("it does not start with the header of little-endian CDR, 00 01 00 00")]
+    Header,
+    /// A value, by its path, for which there can be no bytes.
+    #[error("`{0}`: the definition names more values than the message has bytes")]
+    Values(String),
+    /// Names that would take memory without bound.
+    #[error("the paths of its values are longer than {PATH_BYTES_MAX} times the message")]
+    Paths,
+    /// A type that the definition names only.
+    #[error("type {0} is not defined")]
+    Undefined(String),
+    /// A type that holds itself, most likely.
+    #[error("type {0} stands more than {DEPTH_MAX} messages deep")]
+    Depth(String),
+    /// Bytes that are missing.
+    #[error("it ends at byte {end}, a value of {size} bytes is due at {at}")]
+    End {
+        /// The length of the body.
+        end: usize,
+        /// The bytes of the value.
+        size: usize,
+        /// Where it should be.
+        at: usize,
+    },
+    /// A string, by its length in bytes, that is longer than the rest of the message.
+    #[error("a string of {0} bytes does not fit")]
+    Text(usize),
+}
+
 /// A value of a leaf field.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Value {
@@ -80,7 +130,7 @@ impl Definition {
     ///
     /// # Errors
     /// The line that is not understood.
-    pub fn parse(name: &str, text: &str) -> Result<Self, String> {
+    pub fn parse(name: &str, text: &str) -> Result<Self, DefinitionError> {
         let mut own = (String::new(), name.split('/').next().unwrap_or_default(), Vec::new());
         let mut types = BTreeMap::new();
         let mut root = None;
@@ -91,10 +141,8 @@ impl Definition {
                 continue;
             }
             let head = lines.next().unwrap_or_default();
-            let next = head
-                .strip_prefix("MSG: ")
-                .ok_or_else(|| format!("expected `MSG: …`, found {head:?}"))?
-                .trim();
+            let next =
+                head.strip_prefix("MSG: ").ok_or_else(|| DefinitionError::Head(head.to_owned()))?.trim();
             let package = next.split('/').next().unwrap_or_default();
             let (name, _, fields) = std::mem::replace(&mut own, (two_part(next), package, Vec::new()));
             match root {
@@ -113,9 +161,9 @@ impl Definition {
     ///
     /// # Errors
     /// If the bytes do not fit the definition.
-    pub fn decode(&self, cdr: &[u8]) -> Result<Vec<Leaf>, String> {
+    pub fn decode(&self, cdr: &[u8]) -> Result<Vec<Leaf>, DecodeError> {
         let Some((&[0, 1, 0, 0], body)) = cdr.split_first_chunk::<4>() else {
-            return Err("it does not start with the header of little-endian CDR, 00 01 00 00".to_owned());
+            return Err(DecodeError::Header);
         };
         let mut walk = Walk {
             definition: self,
@@ -142,14 +190,14 @@ const PRIMITIVES: [&str; 15] = [
 ];
 
 /// The field in a line of a message of `package`, the unit from its comment; none where the line is a constant or empty.
-fn parse_field(line: &str, package: &str) -> Result<Option<Field>, String> {
+fn parse_field(line: &str, package: &str) -> Result<Option<Field>, DefinitionError> {
     let (code, comment) = line.split_once('#').unwrap_or((line, ""));
     let code = code.trim();
     if code.is_empty() {
         return Ok(None);
     }
     let (kind, rest) =
-        code.split_once(char::is_whitespace).ok_or_else(|| format!("not a field: {code:?}"))?;
+        code.split_once(char::is_whitespace).ok_or_else(|| DefinitionError::Field(code.to_owned()))?;
     if rest.contains('=') {
         return Ok(None);
     }
@@ -158,7 +206,7 @@ fn parse_field(line: &str, package: &str) -> Result<Option<Field>, String> {
         None => (kind, Repeat::One),
         Some((base, length)) if length.is_empty() || length.starts_with("<=") => (base, Repeat::Sequence),
         Some((base, length)) => {
-            let length = length.parse().map_err(|_| format!("not an array length: {length:?}"))?;
+            let length = length.parse().map_err(|_| DefinitionError::Length(length.to_owned()))?;
             (base, Repeat::Fixed(length))
         }
     };
@@ -197,7 +245,7 @@ struct Walk<'a> {
 }
 
 impl Walk<'_> {
-    fn message(&mut self, fields: &[Field], prefix: &str, unit: &str) -> Result<(), String> {
+    fn message(&mut self, fields: &[Field], prefix: &str, unit: &str) -> Result<(), DecodeError> {
         for field in fields {
             let unit = if field.unit.is_empty() { unit } else { &field.unit };
             let path =
@@ -215,13 +263,10 @@ impl Walk<'_> {
         Ok(())
     }
 
-    fn value(&mut self, base: &str, path: String, unit: &str) -> Result<(), String> {
-        self.values_left = self.values_left.checked_sub(1).ok_or_else(|| {
-            format!("`{path}`: the definition names more values than the message has bytes")
-        })?;
-        self.path_bytes_left = self.path_bytes_left.checked_sub(path.len()).ok_or_else(|| {
-            format!("the paths of its values are longer than {PATH_BYTES_MAX} times the message")
-        })?;
+    fn value(&mut self, base: &str, path: String, unit: &str) -> Result<(), DecodeError> {
+        self.values_left =
+            self.values_left.checked_sub(1).ok_or_else(|| DecodeError::Values(path.clone()))?;
+        self.path_bytes_left = self.path_bytes_left.checked_sub(path.len()).ok_or(DecodeError::Paths)?;
         let cdr = &mut self.cdr;
         let value = match base {
             "float64" => Value::Float(f64::from_le_bytes(cdr.take()?)),
@@ -238,9 +283,9 @@ impl Walk<'_> {
             _ => {
                 let definition = self.definition;
                 let fields =
-                    definition.types.get(base).ok_or_else(|| format!("type {base} is not defined"))?;
+                    definition.types.get(base).ok_or_else(|| DecodeError::Undefined(base.to_owned()))?;
                 if self.depth == DEPTH_MAX {
-                    return Err(format!("type {base} stands more than {DEPTH_MAX} messages deep"));
+                    return Err(DecodeError::Depth(base.to_owned()));
                 }
                 self.depth += 1;
                 let read = self.message(fields, &path, unit);
@@ -261,20 +306,18 @@ struct Cursor<'a> {
 
 impl Cursor<'_> {
     /// The next `N` bytes; XCDR1 aligns every primitive to its size, counted from the start of the body.
-    fn take<const N: usize>(&mut self) -> Result<[u8; N], String> {
+    fn take<const N: usize>(&mut self) -> Result<[u8; N], DecodeError> {
         let start = self.at.next_multiple_of(N);
         let bytes = self.body.get(start..start + N).and_then(|bytes| bytes.try_into().ok());
         self.at = start + N;
-        bytes.ok_or_else(|| {
-            format!("it ends at byte {}, a value of {N} bytes is due at {start}", self.body.len())
-        })
+        bytes.ok_or(DecodeError::End { end: self.body.len(), size: N, at: start })
     }
 
-    fn text(&mut self) -> Result<String, String> {
+    fn text(&mut self) -> Result<String, DecodeError> {
         let length = u32::from_le_bytes(self.take()?) as usize;
         let bytes = self.body.get(self.at..self.at + length);
         self.at += length;
-        let bytes = bytes.ok_or_else(|| format!("a string of {length} bytes does not fit"))?;
+        let bytes = bytes.ok_or(DecodeError::Text(length))?;
         Ok(String::from_utf8_lossy(bytes.strip_suffix(&[0]).unwrap_or(bytes)).into_owned())
     }
 }

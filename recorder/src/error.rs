@@ -1,5 +1,6 @@
 //! What can go wrong with a recording.
 
+use crate::definition::DecodeError;
 use std::path::PathBuf;
 use thiserror::Error;
 
@@ -43,7 +44,7 @@ pub enum RecordingError {
         /// The message type.
         type_name: String,
         /// What does not fit.
-        reason: String,
+        reason: DecodeError,
     },
     /// There is no such topic.
     #[error("the recording has no topic {topic}; it has {known}")]

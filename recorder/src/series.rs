@@ -3,7 +3,7 @@
 //! A quaternion has three fields more than the message: `roll`, `pitch` and `yaw` (z-y-x sequence, in
 //! radians), since that is how people judge an attitude.
 
-use crate::definition::{Definition, Leaf};
+use crate::definition::{DecodeError, Definition, Leaf};
 use crate::error::RecordingError;
 use crate::reader::Recording;
 use bus::schema::Schema;
@@ -98,6 +98,7 @@ pub fn unit_of(schema: &Schema, topic: &str, field: &str) -> Result<Option<Strin
     }
     let zeros = [&[0, 1, 0, 0][..], &vec![0; schema.size]].concat();
     let decoded = Definition::parse(schema.type_name, &schema.ros2_definition())
+        .map_err(DecodeError::from)
         .and_then(|parsed| parsed.decode(&zeros));
     let leaves = decoded.map_err(|reason| RecordingError::Decode {
         topic: topic.to_owned(),

@@ -246,8 +246,17 @@ impl Remains {
     }
 }
 
+/// A process that lives on.
+#[derive(Debug, thiserror::Error)]
+enum NotEnded {
+    #[error("cannot be killed: {0}")]
+    Kill(rustix::io::Errno),
+    #[error("still there {} s after it was killed", GRACE.as_secs())]
+    Alive,
+}
+
 /// Kills a process that carries a run directory, and waits until it is gone.
-fn end_process(process: i32, run_id: &str) -> Result<(), String> {
+fn end_process(process: i32, run_id: &str) -> Result<(), NotEnded> {
     let Some(process) = Pid::from_raw(process) else { return Ok(()) };
     // The handle stays with the process, whoever gets its number next; so what carries the run directory now
     // is what the signal goes to.
@@ -256,11 +265,11 @@ fn end_process(process: i32, run_id: &str) -> Result<(), String> {
     if run_dir_of(process).filter(is_of_run).is_none() {
         return Ok(());
     }
-    pidfd_send_signal(&handle, Signal::KILL).map_err(|error| format!("cannot be killed: {error}"))?;
+    pidfd_send_signal(&handle, Signal::KILL).map_err(NotEnded::Kill)?;
     let start = Instant::now();
     while run_dir_of(process).is_some() {
         if start.elapsed() > GRACE {
-            return Err(format!("still there {} s after it was killed", GRACE.as_secs()));
+            return Err(NotEnded::Alive);
         }
         std::thread::sleep(POLL);
     }

@@ -6,6 +6,7 @@ use crate::program::Program;
 use bus::plan::{NodePlan, Plan};
 use diagnostics::Diagnostic;
 use diagnostics::did_you_mean;
+use recorder::RecordingError;
 use toml::Spanned;
 
 /// Checks that what is evaluated after the run will be recorded, and that its fields and units exist.
@@ -181,7 +182,8 @@ fn check_field(manifest: &Manifest, plan: &Plan, pass: &Spanned<PassCondition>) 
         return Err(at("it has no limit, so it cannot fail".into(), "add `min`, `max`, or both"));
     }
     let unit = |topic: &str, field: &str| {
-        unit_of(manifest, plan, topic, field).map_err(|error| at(error, "name one of these fields"))
+        unit_of(manifest, plan, topic, field)
+            .map_err(|error| at(error.to_string(), "name one of these fields"))
     };
     let limits =
         |min, max, least| check_limits(min, max, least).map_err(|error| at(error.to_string(), &error.help()));
@@ -210,11 +212,16 @@ fn check_field(manifest: &Manifest, plan: &Plan, pass: &Spanned<PassCondition>) 
 
 /// The unit of a field; `None` for a user's own type, which only its publisher knows: it is checked when the run is
 /// judged.
-fn unit_of(manifest: &Manifest, plan: &Plan, topic: &str, field: &str) -> Result<Option<String>, String> {
+fn unit_of(
+    manifest: &Manifest,
+    plan: &Plan,
+    topic: &str,
+    field: &str,
+) -> Result<Option<String>, RecordingError> {
     let topic_plan = plan.topics.iter().find(|known| known.name == topic);
     let schema = topic_plan.and_then(|topic| manifest.registry().message(&topic.type_name));
     let Some(schema) = schema else { return Ok(None) };
-    recorder::series::unit_of(schema, topic, field).map_err(|error| error.to_string())
+    recorder::series::unit_of(schema, topic, field)
 }
 
 /// The topics that a condition reads.
