@@ -367,7 +367,7 @@ mod tests {
             Definition::parse(MotorCommand::SCHEMA.type_name, &MotorCommand::SCHEMA.ros2_definition())
                 .unwrap();
         let error = definition.decode(&cdr(&MotorCommand::default())[..20]).unwrap_err();
-        assert!(error.contains("a value of 8 bytes is due at 16"), "{error}");
+        assert!(error.to_string().contains("a value of 8 bytes is due at 16"), "{error}");
     }
 
     #[test]
