@@ -168,6 +168,7 @@ impl FlightLog {
         let table =
             Table::parse(&bytes).map_err(|cause| FlightLogError::Table { path: path.into(), cause })?;
         let source = Source { path, table };
+        source.check_rows()?;
         let mut time_s = source.values("time", TIME, &map.time)?;
         let start_s = time_s.first().map_or(0.0, |first| first[0]);
         time_s.iter_mut().for_each(|time_s| time_s[0] -= start_s);
@@ -176,7 +177,7 @@ impl FlightLog {
         let velocity_m_s = source.values("velocity", VELOCITY, &map.velocity)?;
         let attitude = source.values("attitude", PURE_NUMBER, &map.attitude)?;
         let rates_rad_s = source.values("angular_velocity", SPEED, &map.angular_velocity)?;
-        source.check(&time_s, &attitude, &map.attitude.columns[3])?;
+        source.check_values(&time_s, &attitude, &map.attitude.columns[3])?;
         let row = |index: usize| Row {
             time_s: time_s[index][0],
             command: command[index],
@@ -287,13 +288,8 @@ impl Source<'_> {
         self.table.rows.iter().map(sample).collect()
     }
 
-    /// Refuses rows of another length, times that do not grow, and quaternions without a direction.
-    fn check(
-        &self,
-        time_s: &[[f64; 1]],
-        attitude: &[[f64; 4]],
-        last_part: &str,
-    ) -> Result<(), FlightLogError> {
+    /// Refuses a file with too few rows, or with rows of another length than the header's.
+    fn check_rows(&self) -> Result<(), FlightLogError> {
         let (path, rows) = (self.path.to_owned(), &self.table.rows);
         if rows.len() < 2 {
             return Err(FlightLogError::TooShort { path, rows: rows.len() });
@@ -302,6 +298,17 @@ impl Source<'_> {
         if let Some(row) = rows.iter().find(|row| row.cells.len() != expected) {
             return Err(FlightLogError::Cells { path, line: row.line, expected, found: row.cells.len() });
         }
+        Ok(())
+    }
+
+    /// Refuses times that do not grow, and quaternions without a direction.
+    fn check_values(
+        &self,
+        time_s: &[[f64; 1]],
+        attitude: &[[f64; 4]],
+        last_part: &str,
+    ) -> Result<(), FlightLogError> {
+        let (path, rows) = (self.path.to_owned(), &self.table.rows);
         let is_zero = |q: &[f64; 4]| q.iter().map(|x| x * x).sum::<f64>() < NORM_MIN * NORM_MIN;
         if let Some(index) = attitude.iter().position(is_zero) {
             let (found, expected) =

@@ -125,7 +125,7 @@ pub(crate) struct Table<'d, 't> {
 pub(crate) const GAIN: Bounds = Bounds {
     min: 0.0,
     max: 1e9,
-    unit: "in SI",
+    unit: "",
     why: "a negative gain turns a loop against itself, and no run has ticks short enough for a larger one",
 };
 
@@ -133,7 +133,7 @@ pub(crate) const GAIN: Bounds = Bounds {
 const LIMIT: Bounds = Bounds {
     min: 1e-12,
     max: 1e12,
-    unit: "in SI",
+    unit: "",
     why: "a limit, a deviation or a time is above 0: less than 1e-12 of any unit lets nothing through, and from 1e12 \
           on squares and products of it are no figures of a vehicle",
 };

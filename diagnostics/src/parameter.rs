@@ -108,11 +108,13 @@ impl ParameterError {
         nearest(written, known.iter().map(String::as_str))
     }
 
-    /// The same with `unit` behind the number that was found: for keys whose names do not hold it.
+    /// The same with `unit` behind the number that was found, unless it stands there already: for keys whose names do
+    /// not hold it. The unit of pure numbers, `1`, would read as another number and is left out.
     #[must_use]
     pub fn in_unit(mut self, unit: &str) -> Self {
         if let Self::Value { found, .. } = &mut self
-            && !found.ends_with(unit)
+            && unit != "1"
+            && !found.ends_with(&format!(" {unit}"))
         {
             *found = format!("{found} {unit}");
         }
@@ -294,8 +296,9 @@ impl Bounds {
     /// It is not within.
     pub fn check(&self, key: &str, si: f64) -> Result<(), ParameterError> {
         let Self { min, max, unit, why } = self;
-        let found = format!("{si:?} {unit}");
-        require(key, found.trim_end(), self.contains(si), format!("{min:?} to {max:?} {unit} ({why})"))
+        let unit = if unit.is_empty() { String::new() } else { format!(" {unit}") };
+        let (expected, found) = (format!("{min:?} to {max:?}{unit} ({why})"), format!("{si:?}{unit}"));
+        require(key, found, self.contains(si), expected)
     }
 }
 
@@ -310,6 +313,18 @@ mod tests {
         }
         assert!(positive_up_to("a", f64::NAN, 1.0, "m").is_err());
         assert!(positive("a", 0.0).is_err() && not_negative("a", 0.0).is_ok());
+    }
+
+    #[test]
+    fn a_number_is_told_with_its_unit_once() {
+        let told = |error: Result<(), ParameterError>, unit| error.unwrap_err().in_unit(unit).to_string();
+        assert!(told(positive("ratio", -1.0), "1").ends_with("found -1"));
+        assert!(told(positive("mass", -1.0), "kg").ends_with("found -1 kg"));
+        let bounds = |unit| Bounds { min: 0.0, max: 1.0, unit, why: "it is so" };
+        assert!(told(bounds("kg").check("mass", 2.0), "kg").ends_with("found 2.0 kg"));
+        assert!(told(bounds("counts").check("command", 2.0), "1").ends_with("found 2.0 counts"));
+        let error = bounds("").check("gain", 2.0);
+        assert_eq!(told(error, "rad/s"), "`gain` must be 0.0 to 1.0 (it is so), found 2.0 rad/s");
     }
 
     #[test]

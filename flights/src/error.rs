@@ -1,5 +1,6 @@
 //! What can be wrong with a flights file or with a log that it names.
 
+use std::fmt::{self, Display as _};
 use std::io;
 use std::path::PathBuf;
 
@@ -18,7 +19,7 @@ use crate::span::Sparse;
 /// let text = "vehicle = \"v.toml\"\n[[flight]]\nname = \"a\"\nfile = \"a.csv\"\nrole = \"fit\"\nto_s = -1.0\n";
 /// let vehicle = |_: &std::path::Path| Ok(vehicles::reference::HUMMINGBIRD.as_bytes().to_vec());
 /// let error = FlightSet::parse("flights.toml".as_ref(), text.to_owned(), &vehicle).unwrap_err();
-/// assert!(matches!(&error, FlightsError::File(fault) if fault.key() == "flight[0].to_s"));
+/// assert!(matches!(&error, FlightsError::File(fault) if fault.key() == "flight.0.to_s"));
 /// ```
 #[derive(Debug, thiserror::Error)]
 pub enum FlightsError {
@@ -26,7 +27,7 @@ pub enum FlightsError {
     #[error(transparent)]
     File(#[from] Diagnostic),
     /// The vehicle file is not usable.
-    #[error("{place}: `vehicle`: {cause}")]
+    #[error(fmt = vehicle)]
     Vehicle {
         /// Where the flights file names it.
         place: Place,
@@ -100,11 +101,27 @@ pub enum FlightsError {
         flight: String,
     },
     /// More than one of these.
-    #[error("{}", all.iter().map(ToString::to_string).collect::<Vec<_>>().join("\n"))]
+    #[error(fmt = several)]
     Several {
         /// All, in the order of the file.
         all: Vec<FlightsError>,
     },
+}
+
+/// The form with lines of files, `{:#}`, is handed on.
+fn vehicle(place: &Place, cause: &Diagnostic, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+    write!(f, "{place}: `vehicle`: ")?;
+    cause.fmt(f)
+}
+
+/// As [`vehicle`].
+fn several(all: &[FlightsError], f: &mut fmt::Formatter<'_>) -> fmt::Result {
+    all.iter().enumerate().try_for_each(|(index, error)| {
+        if index > 0 {
+            writeln!(f)?;
+        }
+        error.fmt(f)
+    })
 }
 
 impl FlightsError {

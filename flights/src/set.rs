@@ -116,7 +116,7 @@ fn check_keys(document: &Document, flights: &[Spanned<FlightEntry>]) -> Vec<Flig
         errors.push(document.bad(&(0..0), "flight", "at least one flight", "none", advice));
     }
     for (index, entry) in flights.iter().enumerate() {
-        let (entry, key) = (entry.get_ref(), |name: &str| format!("flight[{index}].{name}"));
+        let (entry, key) = (entry.get_ref(), |name: &str| format!("flight.{index}.{name}"));
         let name = &entry.name;
         if flights[..index].iter().any(|other| other.get_ref().name.get_ref() == name.get_ref()) {
             let found = format!("\"{}\" a second time", name.get_ref());
@@ -166,7 +166,7 @@ impl Context<'_> {
     /// Reads the flight `index` of the file.
     fn flight(&self, index: usize, spanned: &Spanned<FlightEntry>) -> Result<(Flight, Part), FlightsError> {
         let entry = spanned.get_ref();
-        let file = self.document.resolve(&format!("flight[{index}].file"), &entry.file)?;
+        let file = self.document.resolve(&format!("flight.{index}.file"), &entry.file)?;
         let broken = |cause| FlightsError::Log {
             place: self.document.place(&entry.file.span()),
             flight: entry.name.get_ref().clone(),

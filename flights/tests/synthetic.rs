@@ -255,7 +255,7 @@ fn wrong_files_are_refused_with_line_and_advice() {
     said(refused(&CHANNELS.replace("position", "positon"), ""), &["flights.toml:5:", "positon", "position"]);
     said(refused(&CHANNELS.replace("time =", "# time ="), ""), &["no channel `time`", "add `time"]);
     said(refused(&CHANNELS.replace("[\"px\", \"py\", ", "["), ""), &["`columns`: expected 3 names, found 1"]);
-    said(refused(CHANNELS, "from_s = 3\nto_s = 2"), &["flights.toml:", "`flight[0].to_s`", "found 2"]);
+    said(refused(CHANNELS, "from_s = 3\nto_s = 2"), &["flights.toml:", "`flight.0.to_s`", "found 2"]);
     said(refused(CHANNELS, "from_s = 300"), &["no sample lies", "300", "from_s"]);
     said(refused(CHANNELS, "format = \"ulog\""), &["no ULog", "check `format`"]);
     said(refused(CHANNELS, "format = \"crazyflie\""), &["no Crazyflie log", "check `format`"]);
@@ -270,7 +270,7 @@ fn all_faults_are_told_at_once() {
     let text = refused(&channels, "");
     assert!(text.contains("no column `qq`") && text.contains("no column `rr`"), "{text}");
     let text = refused(CHANNELS, "from_s = 3\nto_s = 2\ndelay_s = { position = inf }");
-    assert!(text.contains("`flight[0].to_s`") && text.contains("`flight[0].delay_s.position`"), "{text}");
+    assert!(text.contains("`flight.0.to_s`") && text.contains("`flight.0.delay_s.position`"), "{text}");
 }
 
 #[test]

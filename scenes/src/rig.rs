@@ -58,7 +58,7 @@ const MOVING_MASS: Bounds = Bounds {
 const AMOUNT: Bounds = Bounds {
     min: 0.0,
     max: 1e6,
-    unit: "in SI",
+    unit: "",
     why: "no test rig travels so far or rubs so hard: the weight of 56 t, the heaviest with rotors, is 5.5e5 N",
 };
 

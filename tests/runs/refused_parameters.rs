@@ -147,7 +147,7 @@ fn a_vehicle_with_a_number_that_none_has_is_refused_with_its_file_line_and_key()
         ("{ value = 9.81,", "{ value = -9.81,", "body.gravity", "-9.81"),
         ("{ value = 0.480,", "{ value = 4.8e-300,", "body.mass", "4.8e-300"),
         ("{ value = 7.6184e-8,", "{ value = inf,", "rotor.thrust_coefficient", "inf"),
-        ("{ value = [0.17, 0, 0]", "{ value = [0.17, 1e200, 0]", "rotors[0].position", "1e200"),
+        ("{ value = [0.17, 0, 0]", "{ value = [0.17, 1e200, 0]", "rotors.0.position", "1e200"),
     ];
     for (from, to, key, found) in cases {
         let place = Place::new();

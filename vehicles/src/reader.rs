@@ -165,7 +165,7 @@ impl<'d, 't> Section<'d, 't> {
         let Some(array) = value.get_ref().as_array() else {
             return Err(self.wrong_type(&self.key(name), value, "an array of tables"));
         };
-        let key = |index| format!("{}[{index}]", self.key(name));
+        let key = |index| format!("{}.{index}", self.key(name));
         array.iter().enumerate().map(|(index, item)| self.as_section(key(index), item)).collect()
     }
 

@@ -86,7 +86,7 @@ fn every_file_in_the_folder_loads_from_disk() {
 fn an_uncertainty_is_kept_in_si_or_in_words() {
     let fly = Vehicle::parse(CRAZYFLIE, "").unwrap();
     let of = |key: &str| fly.provenance.iter().find(|p| p.key == key).unwrap().uncertainty.clone();
-    assert_eq!(of("rotors[0].position"), Uncertainty::OneSigma(0.0025));
+    assert_eq!(of("rotors.0.position"), Uncertainty::OneSigma(0.0025));
     assert_eq!(of("body.mass"), Uncertainty::Said("not stated".into()));
 }
 

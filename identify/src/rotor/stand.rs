@@ -245,28 +245,30 @@ impl File {
         let logs = self.statics.len() + self.dynamics.len();
         let mut checks = vec![require("static, dynamic", "none", logs > 0, "at least one log")];
         checks.extend(self.propeller_diameter_m.map(|diameter| positive("propeller_diameter_m", diameter)));
-        for log in &self.statics {
+        for (index, log) in self.statics.iter().enumerate() {
+            let key = |name: &str| format!("static.{index}.{name}");
             let has_one = log.thrust.is_some() || log.torque.is_some();
             checks.extend([
-                share("static.held_out", log.held_out),
-                positive("static.settle_s", log.settle_s),
-                positive("static.steady", log.steady),
-                time_unit("static.time", &log.time),
-                unit("static.speed", &log.speed, SPEED),
-                require("static", "neither", has_one, "a `thrust` or a `torque`"),
+                share(&key("held_out"), log.held_out),
+                positive(&key("settle_s"), log.settle_s),
+                positive(&key("steady"), log.steady),
+                time_unit(&key("time"), &log.time),
+                require(&format!("static.{index}"), "neither", has_one, "a `thrust` or a `torque`"),
             ]);
-            checks.extend(log.thrust.as_ref().map(|column| unit("static.thrust", column, FORCE)));
-            checks.extend(log.torque.as_ref().map(|column| unit("static.torque", column, TORQUE)));
+            checks.extend(unit(&key("speed"), &log.speed, SPEED));
+            checks.extend(log.thrust.iter().flat_map(|column| unit(&key("thrust"), column, FORCE)));
+            checks.extend(log.torque.iter().flat_map(|column| unit(&key("torque"), column, TORQUE)));
         }
-        for log in &self.dynamics {
+        for (index, log) in self.dynamics.iter().enumerate() {
+            let key = |name: &str| format!("dynamic.{index}.{name}");
             checks.extend([
-                share("dynamic.held_out", log.held_out),
-                positive("dynamic.before_s", log.before_s),
-                positive("dynamic.after_s", log.after_s),
-                time_unit("dynamic.time", &log.time),
-                unit("dynamic.speed", &log.speed, SPEED),
-                unit("dynamic.command", &log.command, RATIO),
+                share(&key("held_out"), log.held_out),
+                positive(&key("before_s"), log.before_s),
+                positive(&key("after_s"), log.after_s),
+                time_unit(&key("time"), &log.time),
             ]);
+            checks.extend(unit(&key("speed"), &log.speed, SPEED));
+            checks.extend(unit(&key("command"), &log.command, RATIO));
         }
         checks
     }
@@ -278,10 +280,12 @@ fn time_unit(key: &str, column: &Column) -> Check {
     require(&format!("{key}.unit"), &column.unit, is_known, expected)
 }
 
-fn unit(key: &str, column: &Column, dimension: Dimension) -> Check {
-    positive(&format!("{key}.pole_pairs"), column.pole_pairs)?;
+fn unit(key: &str, column: &Column, dimension: Dimension) -> [Check; 2] {
     let is_known = dimension.factor(&column.unit).is_some();
-    require(&format!("{key}.unit"), &column.unit, is_known, dimension.describe())
+    [
+        positive(&format!("{key}.pole_pairs"), column.pole_pairs),
+        require(&format!("{key}.unit"), &column.unit, is_known, dimension.describe()),
+    ]
 }
 
 fn share(key: &str, share: f64) -> Check {
