@@ -10,6 +10,8 @@ use std::sync::mpsc::Receiver;
 
 /// The hold tick of a run that is not to be held.
 const NEVER: u32 = u32::MAX;
+/// Requests that are served a look at most, for the supervisor has more to look after.
+const MAX_A_LOOK: usize = 16;
 
 /// Serves requests about a run, a look at a time.
 pub struct ControlServer<'a> {
@@ -52,10 +54,10 @@ impl<'a> ControlServer<'a> {
     /// Serves what has been asked since the last look; returns a request that is not about the clock, a swap.
     pub fn serve(&mut self) -> Option<Asked> {
         self.grant_wish();
-        loop {
+        for _ in 0..MAX_A_LOOK {
             let (request, reply) = self.server.poll()?;
             match request {
-                Request::Status => reply.send(&Answer::Status(Status::of(self.plan, self.control))),
+                Request::Status => drop(reply.send(&Answer::Status(Status::of(self.plan, self.control)))),
                 Request::Pause => self.pause(reply),
                 Request::Step { ticks } => self.begin_step(ticks.max(1), reply),
                 Request::Resume => self.resume(reply),
@@ -71,6 +73,7 @@ impl<'a> ControlServer<'a> {
             }
             self.grant_wish();
         }
+        None
     }
 
     fn has_ended(&self) -> bool {
@@ -85,9 +88,9 @@ impl<'a> ControlServer<'a> {
     fn overtake(&mut self) -> bool {
         let overtaken = self.wish.take();
         let is_overtaken = overtaken.is_some();
-        overtaken
-            .into_iter()
-            .for_each(|wish| wish.reply.send(&Answer::refused("a later request took its place")));
+        if let Some(wish) = overtaken {
+            wish.reply.send(&Answer::refused("a later request took its place"));
+        }
         is_overtaken
     }
 
@@ -142,7 +145,8 @@ impl<'a> ControlServer<'a> {
             let end = self.control.end_tick();
             let left = ticks_in_words(left);
             let reason = format!("paused at tick {tick}: only {left} left of a run that ends at tick {end}");
-            return reply.send(&Answer::refused(reason));
+            reply.send(&Answer::refused(reason));
+            return;
         }
         let target = tick + ticks;
         self.control.set_hold_tick(target);

@@ -11,6 +11,8 @@ use std::path::PathBuf;
 
 /// Ticks that a backup shadows where a request does not say.
 const SHADOW_TICKS: u32 = 100;
+/// Swaps that are taken a look at most, for the supervisor has more to look after.
+const MAX_SWAPS_A_LOOK: usize = 16;
 
 /// Why a swap is refused.
 #[derive(Debug, thiserror::Error)]
@@ -60,7 +62,8 @@ fn answer(report: &Report) -> Answer {
 impl<W: World> Supervisor<'_, W> {
     /// Serves what was asked of the run, and answers swaps that have come to their end.
     pub(super) fn serve_requests(&mut self) {
-        while let Some((request, reply)) = self.world.next_request() {
+        for _ in 0..MAX_SWAPS_A_LOOK {
+            let Some((request, reply)) = self.world.next_request() else { break };
             let Request::Swap { process, with, shadow_ticks, at_tick } = request else { continue };
             match self.request_swap(&process, &with, shadow_ticks, at_tick) {
                 Ok(request) => self.swaps.push((request, reply)),
