@@ -12,7 +12,7 @@ use runtime::registry::Registry;
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering::SeqCst};
 use std::sync::{Mutex, PoisonError};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 /// Counts its ticks, and does at one of them what it is told.
 struct Source(Parameters);
@@ -160,7 +160,23 @@ fn counted(ticks: u32) -> Vec<f64> {
 fn threads() -> Vec<String> {
     let tasks = std::fs::read_dir("/proc/self/task").unwrap().flatten();
     let names = tasks.filter_map(|task| std::fs::read_to_string(task.path().join("comm")).ok());
-    names.map(|name| name.trim().to_owned()).filter(|name| THREADS.contains(&name.as_str())).collect()
+    let names = names.map(|name| name.trim().to_owned());
+    let mut names: Vec<_> = names.filter(|name| THREADS.contains(&name.as_str())).collect();
+    names.sort();
+    names
+}
+
+/// Waits until the threads of runs are `expected`: one that was joined may stand there for a moment.
+fn await_threads(expected: &[&str], patience: Duration) {
+    let deadline = Instant::now() + patience;
+    while threads() != expected && Instant::now() < deadline {
+        std::thread::sleep(Duration::from_millis(1));
+    }
+}
+
+fn require_threads(expected: &[&str]) {
+    await_threads(expected, Duration::from_secs(1));
+    assert_eq!(threads(), expected);
 }
 
 /// What runs of this process have left in shared memory, and among temporary files.
@@ -179,16 +195,24 @@ fn alone(test: impl FnOnce(&Path)) {
     let _alone = ALONE.lock().unwrap_or_else(PoisonError::into_inner);
     let folder = tempfile::tempdir().unwrap();
     IS_RELEASED.store(false, SeqCst);
+    let _release = ReleaseOnDrop;
     test(folder.path());
-    assert_eq!(threads(), [""; 0]);
+    require_threads(&[]);
     assert_eq!(files(), [""; 0]);
 }
 
 /// Lets those that hang go on, and waits for their end.
 fn release() {
     IS_RELEASED.store(true, SeqCst);
-    while !threads().is_empty() {
-        std::thread::sleep(Duration::from_millis(1));
+    await_threads(&[], Duration::from_secs(10));
+}
+
+/// Releases those that hang also if a test panics, for the next one counts threads too.
+struct ReleaseOnDrop;
+
+impl Drop for ReleaseOnDrop {
+    fn drop(&mut self) {
+        release();
     }
 }
 
@@ -228,9 +252,8 @@ fn those_that_hang_are_left_behind_by_their_watchdog_and_nothing_else_is() {
             .set("process.sink.parameters.at_tick", 49);
         let message = flown(&plan, folder).unwrap_err();
         assert!(message.contains("was killed by the watchdog: the run stood still"), "{message}");
-        let mut left = threads();
-        left.sort();
-        assert_eq!(left, ["sink", "source"], "the others have ended");
+        // The others have ended.
+        require_threads(&["sink", "source"]);
         assert_eq!(files(), [""; 0], "their run has signed off");
         release();
     });
@@ -338,17 +361,22 @@ fn a_swap_for_what_fails_is_refused_and_the_run_flies_on() {
                     shadow_ticks: Some(100),
                     at_tick: Some(50_050),
                 };
-                assert!(matches!(remote.ask(Request::Pause), Answer::Done { .. }));
-                let refused = std::thread::scope(|scope| {
+                let paused = remote.ask(Request::Pause);
+                let (refused, resumed) = std::thread::scope(|scope| {
                     let asked = scope.spawn(|| remote.ask(swap));
-                    assert!(matches!(remote.ask(Request::Resume), Answer::Done { .. }));
-                    asked.join().unwrap()
+                    let resumed = remote.ask(Request::Resume);
+                    (asked.join().unwrap(), resumed)
                 });
+                // Before anything is required: a run that is not stopped takes its time.
+                stop.stop();
+                assert!(matches!(paused, Answer::Done { .. }), "{paused:?}");
+                assert!(matches!(resumed, Answer::Done { .. }), "{resumed:?}");
                 let Answer::Refused { reason } = refused else { panic!("{refused:?}") };
                 assert!(reason.contains("the propeller came off"), "{reason}");
-                stop.stop();
             });
-            flown_by(launcher, &plan(10_000_000, "none"), folder, "a.mcap").unwrap()
+            // Paced, so that the swap is asked for in time even if its thread starts late.
+            let plan = plan(10_000_000, "none").set("run.pace", 10.0);
+            flown_by(launcher, &plan, folder, "a.mcap").unwrap()
         });
         assert_eq!(counts, counted(u32::try_from(counts.len()).unwrap()));
         assert!(counts.len() > 50_000);
