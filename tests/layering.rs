@@ -173,8 +173,9 @@ impl Module {
 
     /// The paths that are named: those that are imported for this module, and those in its code.
     fn needed(&self) -> Vec<Names> {
-        let own = self.imports.iter().filter(|(name, _)| !self.reexported.contains(*name));
-        let mut needed: Vec<Names> = own.map(|(_, path)| path.clone()).chain(self.globs.clone()).collect();
+        let imports = self.imports.iter().filter(|(name, _)| !self.reexported.contains(*name));
+        let mut needed: Vec<Names> =
+            imports.map(|(_, path)| path.clone()).chain(self.globs.clone()).collect();
         let mut at = 0;
         while at < self.code.len() {
             let is_field = at > 0 && matches!(self.code[at - 1], Token::Dot);

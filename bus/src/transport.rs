@@ -395,8 +395,8 @@ mod tests {
         fn drop(&mut self) {
             let prefix = shm_prefix(&self.id);
             let files = std::fs::read_dir("/dev/shm").unwrap().flatten();
-            let own = files.filter(|file| file.file_name().to_string_lossy().starts_with(&prefix));
-            own.for_each(|file| drop(std::fs::remove_file(file.path())));
+            let ours = files.filter(|file| file.file_name().to_string_lossy().starts_with(&prefix));
+            ours.for_each(|file| drop(std::fs::remove_file(file.path())));
         }
     }
 
@@ -447,8 +447,8 @@ mod tests {
     fn files(run: &Run) -> Vec<(String, std::fs::Metadata)> {
         let entries = std::fs::read_dir("/dev/shm").unwrap().flatten();
         let named = entries.map(|entry| (entry.file_name().to_string_lossy().into_owned(), entry));
-        let own = named.filter(|(name, _)| name.starts_with(&shm_prefix(&run.id)));
-        own.map(|(name, entry)| (name, entry.metadata().unwrap())).collect()
+        let ours = named.filter(|(name, _)| name.starts_with(&shm_prefix(&run.id)));
+        ours.map(|(name, entry)| (name, entry.metadata().unwrap())).collect()
     }
 
     #[test]

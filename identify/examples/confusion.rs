@@ -43,9 +43,9 @@ fn print_tables(sets: &[Vec<&'static str>], noises: &[f64], first_seed: u64) {
     let only = std::env::args().nth(2);
     let is_wanted = |names: &[&str]| only.as_deref().is_none_or(|only| names.contains(&only));
     for (number, names) in sets.iter().enumerate().filter(|(_, names)| is_wanted(names)) {
-        let own = flown(names, noises, first_seed + 100 * number as u64);
-        print_matrix(&own, noises.len());
-        rows.extend(own.into_iter().filter_map(|own| Some((own.0, own.1, own.2, own.3?))));
+        let row = flown(names, noises, first_seed + 100 * number as u64);
+        print_matrix(&row, noises.len());
+        rows.extend(row.into_iter().filter_map(|row| Some((row.0, row.1, row.2, row.3?))));
     }
     print_failures(&rows);
     print_intervals(&rows);
@@ -89,33 +89,33 @@ fn print_matrix(rows: &[Flown], noises: usize) {
                 judged.true_gains.iter().map(|(_, gain)| format!("{:.0} %", 100.0 * gain)).collect();
             format!("{} ({})", verdict(judged), gains.join(", "))
         };
-        let own: Vec<String> = cells.iter().map(of).collect();
-        println!("| {} | {} | {} |", cells[0].0.join(" + "), cells[0].1, own.join(" | "));
+        let texts: Vec<String> = cells.iter().map(of).collect();
+        println!("| {} | {} | {} |", cells[0].0.join(" + "), cells[0].1, texts.join(" | "));
     }
 }
 
 fn print_failures(rows: &[Row]) {
     let count = |is: &dyn Fn(&Judgement) -> bool| rows.iter().filter(|row| is(&row.3)).count();
     let matter: usize =
-        rows.iter().map(|row| row.3.true_gains.iter().filter(|own| own.1 > 0.01).count()).sum();
+        rows.iter().map(|row| row.3.true_gains.iter().filter(|gain| gain.1 > 0.01).count()).sum();
     let missed: usize = rows.iter().map(|row| row.3.missed().len()).sum();
     println!(
         "\n{} cases; effects that matter {matter}, of them missed {missed}; cases with an invented effect {}, of them \
          swaps that the report itself names {}",
         rows.len(),
-        count(&|own| !own.invented().is_empty()),
-        count(&|own| own.is_declared_swap() && !own.invented().is_empty()),
+        count(&|judgement| !judgement.invented().is_empty()),
+        count(&|judgement| judgement.is_declared_swap() && !judgement.invented().is_empty()),
     );
-    for (names, strength, noise, own) in
+    for (names, strength, noise, judgement) in
         rows.iter().filter(|row| !row.3.missed().is_empty() || !row.3.invented().is_empty())
     {
         println!(
             "- {} x {strength}, noise x {noise}: named {:?}, missed {:?}, invented {:?}, confused with {:?}",
             names.join(" + "),
-            own.named,
-            own.missed(),
-            own.invented(),
-            own.confused_with
+            judgement.named,
+            judgement.missed(),
+            judgement.invented(),
+            judgement.confused_with
         );
     }
 }
@@ -129,7 +129,7 @@ fn print_intervals(rows: &[Row]) {
             *count = (count.0 + u32::from(*holds), count.1 + 1);
         }
     }
-    let all = counts.values().fold((0, 0), |sum, own| (sum.0 + own.0, sum.1 + own.1));
+    let all = counts.values().fold((0, 0), |sum, count| (sum.0 + count.0, sum.1 + count.1));
     println!(
         "\n95 % intervals that hold the truth: {} of {}\n\n| parameter | holds | of |\n|---|---|---|",
         all.0, all.1
@@ -147,12 +147,12 @@ fn print_floor(rows: &[Row]) {
         at(0.95),
         at(1.0)
     );
-    for (names, strength, noise, own) in rows.iter().filter(|row| row.3.of_floor > 1.2) {
+    for (names, strength, noise, judgement) in rows.iter().filter(|row| row.3.of_floor > 1.2) {
         println!(
             "- {} x {strength}, noise x {noise}: {:.3}, named {:?}",
             names.join(" + "),
-            own.of_floor,
-            own.named
+            judgement.of_floor,
+            judgement.named
         );
     }
 }
@@ -169,7 +169,7 @@ fn print_nulls() {
         let noise = NOISES[(seed % 3) as usize];
         (seed, noise, named_of_nothing(5000 + seed, noise))
     };
-    let found: Vec<_> = (0..NULLS).into_par_iter().map(one).filter(|own| !own.2.is_empty()).collect();
+    let found: Vec<_> = (0..NULLS).into_par_iter().map(one).filter(|null| !null.2.is_empty()).collect();
     println!("\nnull cases with a false effect: {} of {NULLS}", found.len());
     found.iter().for_each(|(seed, noise, named)| println!("- seed {seed}, noise x {noise}: {named:?}"));
 }

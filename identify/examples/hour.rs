@@ -14,7 +14,7 @@ use std::time::Instant;
 use vehicles::Vehicle;
 
 fn main() {
-    let minutes: f64 = std::env::args().nth(1).and_then(|own| own.parse().ok()).unwrap_or(60.0);
+    let minutes: f64 = std::env::args().nth(1).and_then(|text| text.parse().ok()).unwrap_or(60.0);
     let file = vehicle_file("hummingbird.toml");
     let vehicle = Vehicle::load(&file).expect("a vehicle file");
     let truth =
@@ -36,17 +36,17 @@ fn main() {
     .expect("flights to identify on");
     let total_s = start.elapsed().as_secs_f64();
     for (at, (name, from_s)) in
-        stages.iter().enumerate().filter(|(at, own)| *at == 0 || stages[at - 1].0 != own.0)
+        stages.iter().enumerate().filter(|(at, stage)| *at == 0 || stages[at - 1].0 != stage.0)
     {
-        let next = stages[at..].iter().find(|own| own.0 != *name).map_or(total_s, |own| own.1);
+        let next = stages[at..].iter().find(|stage| stage.0 != *name).map_or(total_s, |stage| stage.1);
         println!("| {name} | {:.1} s |", next - from_s);
     }
     println!("named in {total_s:.1} s:");
     for name in &outcome.report.verdict {
-        let own = &outcome.report.effects[name];
-        let gain = 1.0 - (own.held_out.after / own.held_out.before).powi(2);
+        let effect = &outcome.report.effects[name];
+        let gain = 1.0 - (effect.held_out.after / effect.held_out.before).powi(2);
         println!("| {name} | {:.2} % of the squares |", 100.0 * gain);
-        for (parameter, found) in &own.parameters {
+        for (parameter, found) in &effect.parameters {
             println!("| {parameter} | {:.4e} | {:.4e} to {:.4e} |", found.value, found.low, found.high);
         }
     }

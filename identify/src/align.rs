@@ -74,9 +74,9 @@ impl Found {
     fn mean(all: &[Found]) -> Found {
         let part = 1.0 / (all.len() as f64).max(1.0);
         Found {
-            late_s: part * all.iter().map(|own| own.late_s).sum::<f64>(),
-            deviation_s: part * all.iter().map(|own| own.deviation_s.powi(2)).sum::<f64>().sqrt(),
-            between_s: all.iter().map(|own| own.between_s).fold(0.0, f64::max),
+            late_s: part * all.iter().map(|shift| shift.late_s).sum::<f64>(),
+            deviation_s: part * all.iter().map(|shift| shift.deviation_s.powi(2)).sum::<f64>().sqrt(),
+            between_s: all.iter().map(|shift| shift.between_s).fold(0.0, f64::max),
         }
     }
 }
@@ -84,7 +84,8 @@ impl Found {
 /// The attitude's offset from the gyroscope.
 fn of_attitude(problem: &Problem, flight: &Prepared) -> Option<Found> {
     flight.offset_of(Equation::Gyroscope)?;
-    let parameter = problem.model.parameters.all.iter().position(|own| *own.kind == POSE_DELAY)?;
+    let parameter =
+        problem.model.parameters.all.iter().position(|parameter| *parameter.kind == POSE_DELAY)?;
     let mut values = problem.model.parameters.baseline();
     let between_s = BETWEEN_SAMPLES * flight.flight.attitude.period_s().unwrap_or(0.0);
     descended(between_s, |late_s| {
@@ -179,12 +180,12 @@ impl Clocks {
 
     /// What is taken off where `shared` is the attitudes' lateness that all flights share.
     fn taken_off(&self, shared: &Found, least_s: f64) -> Lateness {
-        let own = self.attitude.filter(|own| own.is_beyond(shared, least_s));
-        let attitude_s = own.map_or(0.0, |own| own.late_s - shared.late_s);
+        let shift = self.attitude.filter(|shift| shift.is_beyond(shared, least_s));
+        let attitude_s = shift.map_or(0.0, |shift| shift.late_s - shared.late_s);
         let of = |translation: Option<Found>| {
-            let apart =
-                translation.filter(|own| self.attitude.is_some_and(|other| own.is_beyond(&other, least_s)));
-            apart.map_or(attitude_s, |own| own.late_s - shared.late_s)
+            let apart = translation
+                .filter(|shift| self.attitude.is_some_and(|other| shift.is_beyond(&other, least_s)));
+            apart.map_or(attitude_s, |shift| shift.late_s - shared.late_s)
         };
         Lateness { attitude_s, position_s: of(self.position), velocity_s: of(self.velocity) }
     }
@@ -199,18 +200,18 @@ pub fn align(problem: &mut Problem) -> Vec<(String, Offsets)> {
     let clocks: Vec<Clocks> = flights.par_iter().map(|flight| Clocks::of(problem, flight)).collect();
     problem.weights = weights;
     let of_fit: Vec<Found> =
-        clocks[..problem.estimation.len()].iter().filter_map(|own| own.attitude).collect();
+        clocks[..problem.estimation.len()].iter().filter_map(|shift| shift.attitude).collect();
     let shared = Found::mean(&of_fit);
     let least_s = problem.least_delay_s() / 2.0;
     let mut offsets = Vec::new();
-    for (flight, own) in problem.estimation.iter_mut().chain(&mut problem.validation).zip(clocks) {
-        let late = own.taken_off(&shared, least_s);
+    for (flight, shift) in problem.estimation.iter_mut().chain(&mut problem.validation).zip(clocks) {
+        let late = shift.taken_off(&shared, least_s);
         flight.set_late(late);
         let offset = |found: Option<Found>, taken_off_s| found.map(|found| Offset::of(found, taken_off_s));
         let of_flight = [
-            ("attitude", offset(own.attitude, late.attitude_s)),
-            ("position", offset(own.position, late.position_s)),
-            ("velocity", offset(own.velocity, late.velocity_s)),
+            ("attitude", offset(shift.attitude, late.attitude_s)),
+            ("position", offset(shift.position, late.position_s)),
+            ("velocity", offset(shift.velocity, late.velocity_s)),
         ];
         offsets.push((flight.flight.name.clone(), Offsets::from(of_flight)));
     }

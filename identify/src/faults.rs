@@ -76,10 +76,13 @@ fn suspicion(problem: &Problem, rotor: usize) -> Option<Suspicion> {
     };
     let mut others: Vec<f64> = (0..4).filter(|other| *other != rotor).map(ratio).collect();
     others.sort_by(f64::total_cmp);
-    let own = ratio(rotor);
-    ((own / others[1] - 1.0).abs() > RATIO).then(|| Suspicion {
+    let ratio_here = ratio(rotor);
+    ((ratio_here / others[1] - 1.0).abs() > RATIO).then(|| Suspicion {
         kind: "scaled-sensor",
-        finding: format!("it reads {own:.3} of the commanded speed, the other rotors {:.3}", others[1]),
+        finding: format!(
+            "it reads {ratio_here:.3} of the commanded speed, the other rotors {:.3}",
+            others[1]
+        ),
     })
 }
 
@@ -124,10 +127,10 @@ fn flight_cost(problem: &Problem, flight: &Prepared, declared: &[f64]) -> f64 {
     for equation in flight.layout.equations.iter().filter(|equation| of_motion(equation)) {
         let Some(offset) = flight.offset_of(*equation) else { continue };
         for axis in 0..equation.size() {
-            let own = |rows: &[f64]| -> f64 {
+            let power = |rows: &[f64]| -> f64 {
                 rows[offset + axis..].iter().step_by(flight.width()).map(|row| row * row).sum()
             };
-            sum += own(&residual) / own(&measured).max(1e-12);
+            sum += power(&residual) / power(&measured).max(1e-12);
         }
     }
     sum

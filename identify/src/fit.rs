@@ -66,7 +66,7 @@ impl FitResult {
 
     /// Standard error of a parameter; `None` where it was held.
     pub fn standard_error(&self, parameter: usize) -> Option<f64> {
-        let at = self.free.iter().position(|own| *own == parameter)?;
+        let at = self.free.iter().position(|free| *free == parameter)?;
         Some(self.covariance[(at, at)].max(0.0).sqrt())
     }
 
@@ -153,10 +153,12 @@ impl<'f> Problem<'f> {
             step = held_step(&total, &held);
             let mut is_within = true;
             for (at, parameter) in free.iter().enumerate() {
-                let own = &self.model.parameters.all[*parameter];
+                let entry = &self.model.parameters.all[*parameter];
                 let wanted = values[*parameter] + step[at];
-                let bound = wanted.clamp(own.spec().min, own.spec().max);
-                if held[at].is_none() && (bound - wanted).abs() > 1e-12 * (own.spec().max - own.spec().min) {
+                let bound = wanted.clamp(entry.spec().min, entry.spec().max);
+                if held[at].is_none()
+                    && (bound - wanted).abs() > 1e-12 * (entry.spec().max - entry.spec().min)
+                {
                     held[at] = Some(bound - values[*parameter]);
                     is_within = false;
                 }
@@ -172,8 +174,8 @@ impl<'f> Problem<'f> {
     pub fn moved(&self, values: &[f64], free: &[usize], step: &DVector<f64>) -> Vec<f64> {
         let mut next = values.to_vec();
         for (parameter, step) in free.iter().zip(step.iter()) {
-            let own = &self.model.parameters.all[*parameter];
-            next[*parameter] = (next[*parameter] + step).clamp(own.spec().min, own.spec().max);
+            let entry = &self.model.parameters.all[*parameter];
+            next[*parameter] = (next[*parameter] + step).clamp(entry.spec().min, entry.spec().max);
         }
         next
     }
@@ -260,9 +262,9 @@ fn held_step(total: &Block, held: &[Option<f64>]) -> DVector<f64> {
     let free: Vec<usize> = (0..held.len()).filter(|at| held[*at].is_none()).collect();
     let mut step = DVector::from_fn(held.len(), |at, _| held[at].unwrap_or(0.0));
     let gradient = &total.gradient + &total.gram * &step;
-    let own = total.of(&free);
+    let equations = total.of(&free);
     let wanted = DVector::from_fn(free.len(), |i, _| gradient[free[i]]);
-    let solved = -(normal::inverse(&own.gram) * wanted);
+    let solved = -(normal::inverse(&equations.gram) * wanted);
     free.iter().zip(solved.iter()).for_each(|(at, solved)| step[*at] = *solved);
     step
 }
@@ -277,7 +279,8 @@ impl Problem<'_> {
         let mut all = base.free.clone();
         // Torques of an assumed attitude are zero, to which any scale of thrust or inertia could shrink the model's.
         let is_assumed = self.estimation.iter().any(Prepared::is_assumed);
-        let counts = |own: &&Candidate| own.kind.is_linear && (!is_assumed || own.is_trim());
+        let counts =
+            |candidate: &&Candidate| candidate.kind.is_linear && (!is_assumed || candidate.is_trim());
         for candidate in candidates.iter().filter(counts) {
             all.extend(candidate.free.iter().filter(|at| !base.free.contains(at)));
         }
@@ -299,8 +302,9 @@ impl Problem<'_> {
             let measured = self.model.tracks(flight, values).rows;
             let width = flight.width();
             let equations = flight.layout.equations.iter();
-            let names: Vec<_> =
-                equations.flat_map(|own| (0..own.size()).map(move |axis| (own.name(), axis))).collect();
+            let names: Vec<_> = equations
+                .flat_map(|equation| (0..equation.size()).map(move |axis| (equation.name(), axis)))
+                .collect();
             for (at, residual) in residual.iter().enumerate() {
                 let left = residual
                     + columns.iter().zip(step.iter()).map(|(column, step)| column[at] * step).sum::<f64>();

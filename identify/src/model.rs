@@ -131,12 +131,12 @@ impl Model {
         let rotors = self.rotors(flight, values);
         let residual = self.residual(flight, &tracks, &rotors, values);
         let column = |&parameter: &usize| {
-            let own = &self.parameters.all[parameter];
+            let entry = &self.parameters.all[parameter];
             let mut changed = values.to_vec();
-            let up = values[parameter] + own.step <= own.spec().max;
-            let step = if up { own.step } else { -own.step };
+            let up = values[parameter] + entry.step <= entry.spec().max;
+            let step = if up { entry.step } else { -entry.step };
             changed[parameter] += step;
-            let moved = match own.kind.stage {
+            let moved = match entry.kind.stage {
                 Stage::Sampling => {
                     // The derivative holds the sensor's noise as well: of a difference to one side it would be
                     // correlated with the residual's, and every delay would come out too long.
@@ -149,7 +149,7 @@ impl Model {
                 Stage::Rotors => self.residual(flight, &tracks, &self.rotors(flight, &changed), &changed),
                 Stage::Body => self.residual(flight, &tracks, &rotors, &changed),
             };
-            moved.iter().zip(&residual).map(|(moved, own)| (moved - own) / step).collect()
+            moved.iter().zip(&residual).map(|(moved, before)| (moved - before) / step).collect()
         };
         use rayon::prelude::*;
         let columns = free.par_iter().map(column).collect();

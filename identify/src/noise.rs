@@ -17,19 +17,20 @@ pub fn deviation<const N: usize>(channel: &Channel<N>) -> Option<f64> {
 /// The noise of each channel that was measured, over the validation data, with its unit.
 pub fn floor(problem: &Problem) -> BTreeMap<&'static str, (f64, &'static str)> {
     let mut floor = BTreeMap::new();
-    let mut add = |name: &'static str, unit: &'static str, own: &dyn Fn(&Flight) -> Option<f64>| {
-        let found: Vec<f64> = problem.validation.iter().filter_map(|flight| own(flight.flight)).collect();
+    let mut add = |name: &'static str, unit: &'static str, of_flight: &dyn Fn(&Flight) -> Option<f64>| {
+        let found: Vec<f64> =
+            problem.validation.iter().filter_map(|flight| of_flight(flight.flight)).collect();
         if !found.is_empty() {
-            let mean_square = found.iter().map(|own| own * own).sum::<f64>() / found.len() as f64;
+            let mean_square = found.iter().map(|x| x * x).sum::<f64>() / found.len() as f64;
             floor.insert(name, (mean_square.sqrt(), unit));
         }
     };
     add("position", "m", &|flight| deviation(&flight.position));
     add("velocity", "m/s", &|flight| velocity(flight));
     // A quaternion's component moves by half of the angle.
-    let measured = |flight: &Flight, own: Option<f64>| own.filter(|_| flight.assumed.is_empty());
+    let measured = |flight: &Flight, deviation: Option<f64>| deviation.filter(|_| flight.assumed.is_empty());
     add("attitude", "rad", &|flight| {
-        measured(flight, deviation(&flight.attitude).map(|own| own * 4.0 / 3.0_f64.sqrt()))
+        measured(flight, deviation(&flight.attitude).map(|x| x * 4.0 / 3.0_f64.sqrt()))
     });
     add("rates", "rad/s", &|flight| measured(flight, rates(flight)));
     add("specific_force", "m/s^2", &|flight| deviation(&flight.specific_force));
@@ -61,11 +62,11 @@ pub fn prediction_floor(
     horizon_s: f64,
     gravity_m_s2: f64,
 ) -> BTreeMap<&'static str, f64> {
-    let own = |name| floor.get(name).map_or(0.0, |(value, _)| *value);
-    let (position, velocity, rates) = (own("position"), own("velocity"), own("rates"));
-    let angle = own("attitude");
+    let floor_of = |name| floor.get(name).map_or(0.0, |(value, _)| *value);
+    let (position, velocity, rates) = (floor_of("position"), floor_of("velocity"), floor_of("rates"));
+    let angle = floor_of("attitude");
     let h = horizon_s;
-    let root = |squares: &[f64]| (3.0 * squares.iter().map(|own| own * own).sum::<f64>()).sqrt();
+    let root = |squares: &[f64]| (3.0 * squares.iter().map(|x| x * x).sum::<f64>()).sqrt();
     // Only tilt, two of three axes, turns gravity into acceleration.
     let tilt = (2.0_f64 / 3.0).sqrt() * gravity_m_s2;
     let position_now =

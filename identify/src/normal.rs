@@ -86,7 +86,7 @@ pub fn inverse(gram: &DMatrix<f64>) -> DMatrix<f64> {
         return gram.clone();
     }
     // Nothing can be told from equations with infinities in them.
-    if gram.iter().any(|own| !own.is_finite()) {
+    if gram.iter().any(|number| !number.is_finite()) {
         return DMatrix::zeros(size, size);
     }
     let lengths: Vec<f64> = (0..size).map(|i| gram[(i, i)].max(0.0).sqrt()).collect();

@@ -39,8 +39,8 @@ impl Parameters {
     /// value are not fitted: they are those of `declared`, or fit the vehicle's size.
     pub fn of(vehicle: &Vehicle, declared: &[Effect]) -> Self {
         let as_declared = |kind: &&'static EffectKind| {
-            let own = declared.iter().find(|effect| effect.kind == *kind).copied();
-            own.unwrap_or_else(|| kind.neutral_for(vehicle))
+            let effect = declared.iter().find(|effect| effect.kind == *kind).copied();
+            effect.unwrap_or_else(|| kind.neutral_for(vehicle))
         };
         let baseline: Vec<Effect> = CATALOGUE.iter().map(as_declared).collect();
         let of_sensors = SENSOR_EFFECTS.map(EffectKind::neutral);
@@ -71,10 +71,10 @@ impl Parameters {
 
     /// The values that the fitted parameters of `kind` have among `values`.
     pub fn values_of(&self, kind: &EffectKind, values: &[f64]) -> Values {
-        let mut own = Values::default();
+        let mut of_kind = Values::default();
         let pairs = self.all.iter().zip(values).filter(|(parameter, _)| parameter.kind == kind);
-        pairs.for_each(|(parameter, value)| own[parameter.index] = *value);
-        own
+        pairs.for_each(|(parameter, value)| of_kind[parameter.index] = *value);
+        of_kind
     }
 
     /// The plant's effects under `values`, in the order of the catalogue: those that were declared and those whose

@@ -65,7 +65,7 @@ impl Measured {
         let mut is_valid = vec![true; clock.count];
         let mut require = |is_there: bool, valid: &[bool], reach: usize| {
             if is_there {
-                is_valid.iter_mut().zip(valid_about(valid, reach)).for_each(|(all, own)| *all &= own);
+                is_valid.iter_mut().zip(valid_about(valid, reach)).for_each(|(all, about)| *all &= about);
             }
         };
         let of_position = if flight.velocity.is_empty() { reach(flight.position.period_s()) } else { 0 };
@@ -94,15 +94,15 @@ impl Measured {
         let (mut errors, mut trace) = (WindowEndErrors::default(), Vec::new());
         for tick in 1..self.clock.count {
             plant.step(&commands.at(self.clock.at(tick - 1)), TICK_S, &[]);
-            let (own, measured) = (&plant.state().body, &self.bodies[tick]);
+            let (body, measured) = (&plant.state().body, &self.bodies[tick]);
             if every > 0 && tick % every == 0 {
-                trace.push((self.clock.at(tick), *measured, *own));
+                trace.push((self.clock.at(tick), *measured, *body));
             }
             if tick % window == 0 {
                 if tick - window >= SETTLE_TICKS
                     && self.is_valid[tick - window..=tick].iter().all(|is_valid| *is_valid)
                 {
-                    errors.add(&state(own), &state(measured));
+                    errors.add(&state(body), &state(measured));
                 }
                 plant.set_body(measured);
             }

@@ -189,7 +189,7 @@ impl<'f> Prepared<'f> {
 
     /// Where the rows of `equation` start within a knot.
     pub fn offset_of(&self, equation: Equation) -> Option<usize> {
-        let at = self.layout.equations.iter().position(|own| *own == equation)?;
+        let at = self.layout.equations.iter().position(|known| *known == equation)?;
         Some(self.layout.equations[..at].iter().map(|equation| equation.size()).sum())
     }
 
@@ -329,7 +329,7 @@ impl<'f> Prepared<'f> {
             require((0..clock.count).map(|index| is_flying(&held.at(clock.at(index)), true)).collect());
         } else if !flight.rotor_speed.is_empty() {
             let speeds = Track::sampled(&flight.rotor_speed, 0.0, clock).values;
-            require(speeds.iter().map(|own| is_flying(own, false)).collect());
+            require(speeds.iter().map(|speeds| is_flying(speeds, false)).collect());
         }
         valid
     }
@@ -358,7 +358,10 @@ fn sampled_about<const N: usize>(
     }
     let (first_s, last_s) = channel.span_s().unwrap_or_default();
     let inside = first_s + END_MARGIN_S..=last_s - END_MARGIN_S;
-    valid.iter_mut().enumerate().for_each(|(index, own)| *own &= inside.contains(&clock.at(index)));
+    valid
+        .iter_mut()
+        .enumerate()
+        .for_each(|(index, valid_here)| *valid_here &= inside.contains(&clock.at(index)));
     Some(valid)
 }
 

@@ -47,5 +47,5 @@ pub fn regressors(model: &Model, flight: &Prepared, values: &[f64]) -> Vec<Regre
         unit,
         values: knots.iter().map(|at| of(*at)).collect(),
     });
-    sampled.filter(|own| own.values.iter().any(|value| *value != own.values[0])).collect()
+    sampled.filter(|row| row.values.iter().any(|value| *value != row.values[0])).collect()
 }

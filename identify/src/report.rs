@@ -168,8 +168,8 @@ impl Report {
         let mut notes: Vec<(&str, Vec<&str>)> = Vec::new();
         for flight in &self.flights {
             for note in flight.assumed.iter().chain(&flight.notes) {
-                match notes.iter_mut().find(|own| own.0 == note) {
-                    Some(own) => own.1.push(&flight.name),
+                match notes.iter_mut().find(|known| known.0 == note) {
+                    Some(known) => known.1.push(&flight.name),
                     None => notes.push((note, vec![&flight.name])),
                 }
             }
@@ -191,7 +191,7 @@ impl Report {
         }
         for (flight, offsets) in &self.time_offsets_s {
             let has_position =
-                |own: &FlightReport| own.name == *flight && own.equations.contains(&"acceleration");
+                |report: &FlightReport| report.name == *flight && report.equations.contains(&"acceleration");
             if self.flights.iter().any(has_position) && offsets.values().all(Option::is_none) {
                 writeln!(
                     f,
@@ -199,8 +199,9 @@ impl Report {
                 )?;
             }
             for (channel, offset) in offsets {
-                let Some(own) = offset.filter(|own| own.taken_off != 0.0) else { continue };
-                let [late_ms, off_ms] = [own.value, own.taken_off].map(|seconds| rounded(1e3 * seconds));
+                let Some(offset) = offset.filter(|offset| offset.taken_off != 0.0) else { continue };
+                let [late_ms, off_ms] =
+                    [offset.value, offset.taken_off].map(|seconds| rounded(1e3 * seconds));
                 writeln!(f, "clock: {channel} of {flight} is {late_ms} ms late; {off_ms} ms were taken off")?;
             }
         }
@@ -228,16 +229,17 @@ impl Report {
                 rounded(effect.held_out.before),
                 rounded(effect.held_out.after)
             )?;
-            for (parameter, own) in &effect.parameters {
-                let (value, low, high) = (rounded(own.value), rounded(own.low), rounded(own.high));
-                let doubt = match own {
+            for (parameter, estimate) in &effect.parameters {
+                let (value, low, high) =
+                    (rounded(estimate.value), rounded(estimate.low), rounded(estimate.high));
+                let doubt = match estimate {
                     Estimate { determined: false, .. } => "; not determined by these flights",
                     Estimate { at_bound: true, .. } => {
                         "; at its bound: more is asked for than this effect can be"
                     }
                     _ => "",
                 };
-                writeln!(f, "    {parameter} = {value} {}  (95 %: {low} ... {high}){doubt}", own.unit)?;
+                writeln!(f, "    {parameter} = {value} {}  (95 %: {low} ... {high}){doubt}", estimate.unit)?;
             }
             if !effect.confused_with.is_empty() {
                 writeln!(f, "    cannot be told from: {}", effect.confused_with.join(", "))?;
@@ -279,8 +281,8 @@ impl Report {
         for (flight, horizons) in &self.held_out {
             writeln!(f, "  {flight}")?;
             for (horizon, channels) in horizons {
-                let one = |(name, own): (&&str, &Change)| {
-                    format!("{name} {} -> {} {}", rounded(own.before), rounded(own.after), own.unit)
+                let one = |(name, change): (&&str, &Change)| {
+                    format!("{name} {} -> {} {}", rounded(change.before), rounded(change.after), change.unit)
                 };
                 writeln!(
                     f,
@@ -293,16 +295,16 @@ impl Report {
     }
 
     fn write_rest(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        for (name, own) in &self.unexplained {
-            let (rms, before) = (rounded(own.rms), rounded(own.before));
+        for (name, found) in &self.unexplained {
+            let (rms, before) = (rounded(found.rms), rounded(found.before));
             writeln!(
                 f,
                 "unexplained: {name}: {rms} {} are no noise and no candidate's (before: {before})",
-                own.unit
+                found.unit
             )?;
         }
-        for own in &self.not_identifiable {
-            writeln!(f, "not identifiable here: {} needs {}", own.effect, own.needs)?;
+        for effect in &self.not_identifiable {
+            writeln!(f, "not identifiable here: {} needs {}", effect.effect, effect.needs)?;
         }
         Ok(())
     }

@@ -25,9 +25,9 @@ fn on_means(flight: &Prepared, rows: &mut [f64], blocks: &[(usize, usize)], chan
     let width = flight.width();
     for (first, last) in blocks {
         for axis in 0..3 {
-            let own = || (first * width + offset + axis..last * width).step_by(width);
-            let mean = own().map(|at| rows[at]).sum::<f64>() / own().count().max(1) as f64;
-            own().for_each(|at| change(&mut rows[at], mean));
+            let column = || (first * width + offset + axis..last * width).step_by(width);
+            let mean = column().map(|at| rows[at]).sum::<f64>() / column().count().max(1) as f64;
+            column().for_each(|at| change(&mut rows[at], mean));
         }
     }
 }

@@ -170,7 +170,7 @@ pub fn problem<'f>(
     let parameters = Parameters::of(vehicle, declared);
     let least_rad_s = FLYING * vehicle.hover_speed_rad_s();
     let is_flying = |drive: &[f64; 4], is_command: bool| {
-        let speed = |own: &f64| if is_command { vehicle.command.speed(*own) } else { *own };
+        let speed = |number: &f64| if is_command { vehicle.command.speed(*number) } else { *number };
         drive.iter().map(speed).sum::<f64>() > 4.0 * least_rad_s
     };
     let (mut estimation, mut validation, mut reports) = (Vec::new(), Vec::new(), Vec::new());
@@ -194,9 +194,9 @@ pub fn problem<'f>(
             (None, _) => {}
         }
     }
-    for (role, own) in [("fit", &estimation), ("test", &validation)] {
-        if own.is_empty() {
-            let is_role = |(own, _): &(Role, IdentifyError)| (*own == Role::Fit) == (role == "fit");
+    for (role, flights) in [("fit", &estimation), ("test", &validation)] {
+        if flights.is_empty() {
+            let is_role = |(found, _): &(Role, IdentifyError)| (*found == Role::Fit) == (role == "fit");
             if let Some(index) = too_sparse.iter().position(is_role) {
                 return Err(too_sparse.swap_remove(index).1);
             }
@@ -236,9 +236,11 @@ fn flight_report(flight: &Flight, prepared: Option<&Prepared>) -> FlightReport {
         name: flight.name.clone(),
         role: flight.role,
         compared_s: prepared.map_or(0.0, compared_s),
-        window_s: prepared.map_or(0.0, |own| 4.0 * own.layout.box_steps as f64 * own.layout.clock.step_s),
-        equations: prepared
-            .map_or(Vec::new(), |own| own.layout.equations.iter().map(|own| own.name()).collect()),
+        window_s: prepared
+            .map_or(0.0, |prepared| 4.0 * prepared.layout.box_steps as f64 * prepared.layout.clock.step_s),
+        equations: prepared.map_or(Vec::new(), |prepared| {
+            prepared.layout.equations.iter().map(|equation| equation.name()).collect()
+        }),
         assumed: flight.assumed.clone(),
         notes: flight.notes.clone(),
     }
@@ -288,25 +290,25 @@ fn accepted_effects(
     effects: &mut BTreeMap<&'static str, EffectReport>,
 ) {
     for name in verdict(selection) {
-        let own: Vec<usize> =
+        let indices: Vec<usize> =
             (0..selection.accepted.len()).filter(|at| selection.accepted[*at].kind.name == name).collect();
         let others: Vec<Candidate> =
             selection.accepted.iter().filter(|candidate| candidate.kind.name != name).cloned().collect();
         let mut start = selection.after.values.clone();
         let mut parameters = BTreeMap::new();
-        for at in &own {
+        for at in &indices {
             let candidate = &selection.accepted[*at];
             parameters.extend(estimates(problem, &selection.after, &candidate.free));
             candidate.free.iter().for_each(|at| start[*at] = problem.model.parameters.all[*at].baseline);
         }
         let without = problem.fitted(&start, &free_parameters(&others));
         let mut alike: Vec<&'static EffectKind> =
-            own.iter().flat_map(|at| confounded(problem, selection, *at)).collect();
+            indices.iter().flat_map(|at| confounded(problem, selection, *at)).collect();
         alike.sort_by_key(|kind| kind.name);
         alike.dedup_by_key(|kind| kind.name);
         let experiment = alike.first().map(|other| {
-            let own = selection.accepted[own[0]].kind;
-            own.experiment_against(other).unwrap_or(OTHER_FLIGHTS).to_owned()
+            let kind = selection.accepted[indices[0]].kind;
+            kind.experiment_against(other).unwrap_or(OTHER_FLIGHTS).to_owned()
         });
         let held_out = BeforeAfter {
             before: size(problem, without.validation_cost()),
@@ -338,14 +340,14 @@ fn size(problem: &Problem, cost: f64) -> f64 {
 pub fn estimates(problem: &Problem, fitted: &FitResult, free: &[usize]) -> BTreeMap<&'static str, Estimate> {
     let quantile = fitted.t_quantile(0.975);
     let one = |at: &usize| {
-        let own = &problem.model.parameters.all[*at];
+        let entry = &problem.model.parameters.all[*at];
         let (value, half) =
             (fitted.values[*at], quantile * fitted.standard_error(*at).unwrap_or(f64::INFINITY));
-        let (low, high) = ((value - half).max(own.spec().min), (value + half).min(own.spec().max));
+        let (low, high) = ((value - half).max(entry.spec().min), (value + half).min(entry.spec().max));
         // Zero is where many effects begin, and no bound that data pushed against.
-        let at_bound = value != own.baseline && (value <= own.spec().min || value >= own.spec().max);
-        let determined = low > own.spec().min || high < own.spec().max;
-        (own.spec().name, Estimate { value, unit: own.spec().unit(), low, high, at_bound, determined })
+        let at_bound = value != entry.baseline && (value <= entry.spec().min || value >= entry.spec().max);
+        let determined = low > entry.spec().min || high < entry.spec().max;
+        (entry.spec().name, Estimate { value, unit: entry.spec().unit(), low, high, at_bound, determined })
     };
     free.iter().map(one).collect()
 }
@@ -383,7 +385,7 @@ fn of_role(
     role: Role,
 ) -> BTreeMap<String, BTreeMap<String, BTreeMap<&'static str, Change>>> {
     let mut flights: BTreeMap<String, BTreeMap<String, BTreeMap<&'static str, Change>>> = BTreeMap::new();
-    for (name, _, horizon_s, old, new) in predictions.iter().filter(|own| own.1 == role) {
+    for (name, _, horizon_s, old, new) in predictions.iter().filter(|row| row.1 == role) {
         let channels = StateQuantity::ALL.iter().filter_map(|quantity| {
             let (channel, unit) = (quantity.name(), quantity.unit());
             Some((channel, Change { before: *old.get(channel)?, after: *new.get(channel)?, unit }))
@@ -410,11 +412,11 @@ fn noise_report(
 fn unexplained(
     whiteness: &BeforeAfter<BTreeMap<&'static str, crate::whiteness::Whiteness>>,
 ) -> BTreeMap<&'static str, Unexplained> {
-    let one = |(name, own): (&&'static str, &crate::whiteness::Whiteness)| {
-        let noise = (own.rms * own.rms - own.persistent * own.persistent).max(0.0).sqrt();
-        let before = whiteness.before.get(name).map_or(0.0, |own| own.persistent);
-        let is_large = own.persistent > UNEXPLAINED * noise && own.p_value < 0.01;
-        is_large.then_some((*name, Unexplained { rms: own.persistent, unit: own.unit, before }))
+    let one = |(name, after): (&&'static str, &crate::whiteness::Whiteness)| {
+        let noise = (after.rms * after.rms - after.persistent * after.persistent).max(0.0).sqrt();
+        let before = whiteness.before.get(name).map_or(0.0, |before| before.persistent);
+        let is_large = after.persistent > UNEXPLAINED * noise && after.p_value < 0.01;
+        is_large.then_some((*name, Unexplained { rms: after.persistent, unit: after.unit, before }))
     };
     whiteness.after.iter().filter_map(one).collect()
 }

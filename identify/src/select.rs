@@ -99,7 +99,10 @@ impl Selection {
     /// Chance of as much gain without the accepted `effect`, in the round that took the best part of it.
     pub fn p_value(&self, effect: &str) -> f64 {
         let taken = self.rounds.iter().filter_map(Round::taken);
-        taken.filter(|own| own.candidate.kind.name == effect).map(|own| own.p_value).fold(1.0, f64::min)
+        taken
+            .filter(|judged| judged.candidate.kind.name == effect)
+            .map(|judged| judged.p_value)
+            .fold(1.0, f64::min)
     }
 }
 
@@ -115,7 +118,8 @@ pub fn select(problem: &mut Problem, candidates: &[Candidate], progress: &mut dy
     if problem.has_own_trims {
         let (base, of_trim) = (search.base.clone(), Candidate::is_trim);
         problem.has_own_trims = false;
-        let shifts: Vec<Candidate> = candidates.iter().filter(|own| of_trim(own)).cloned().collect();
+        let shifts: Vec<Candidate> =
+            candidates.iter().filter(|candidate| of_trim(candidate)).cloned().collect();
         search.run(problem, &shifts, progress);
         if !search.accepted.iter().any(of_trim) {
             problem.has_own_trims = true;
@@ -172,7 +176,8 @@ impl StepwiseSearch {
         }
         let mut firsts: Vec<&Judged> = last.judged.iter().collect();
         firsts.sort_by(|a, b| a.fitted.estimation_cost().total_cmp(&b.fitted.estimation_cost()));
-        let firsts: Vec<Candidate> = firsts.iter().take(FIRSTS).map(|own| own.candidate.clone()).collect();
+        let firsts: Vec<Candidate> =
+            firsts.iter().take(FIRSTS).map(|judged| judged.candidate.clone()).collect();
         let rate = FALSE_RATE / FIRSTS as f64;
         for first in firsts {
             let alone = fitted(problem, &self.base, &self.accepted, &first);
@@ -184,7 +189,7 @@ impl StepwiseSearch {
             let without_first = without(problem, &second.fitted, &both, self.accepted.len());
             let mut first_round = round(problem, &without_first, &with_second, candidates, rate);
             first_round.taken =
-                first_round.judged.iter().position(|own| own.candidate == first && own.is_accepted);
+                first_round.judged.iter().position(|judged| judged.candidate == first && judged.is_accepted);
             let is_gain = p_value(&self.base.validation_costs, &second.fitted.validation_costs) < rate;
             if is_gain && first_round.taken.is_some() {
                 self.rounds.extend([first_round, second_round]);
@@ -200,9 +205,9 @@ impl StepwiseSearch {
 /// The fit of `accepted` but that at `at`, from `base` on.
 fn without(problem: &Problem, base: &FitResult, accepted: &[Candidate], at: usize) -> FitResult {
     let mut others = accepted.to_vec();
-    let own = others.remove(at);
+    let dropped = others.remove(at);
     let mut start = base.values.clone();
-    own.free.iter().for_each(|at| start[*at] = problem.model.parameters.all[*at].baseline);
+    dropped.free.iter().for_each(|at| start[*at] = problem.model.parameters.all[*at].baseline);
     problem.fitted(&start, &free_parameters(&others))
 }
 
@@ -235,14 +240,14 @@ fn round(
 /// Has those of whom the linearised equations promise most fitted in earnest; a promise alone is not accepted.
 fn confirm(problem: &Problem, base: &FitResult, accepted: &[Candidate], all: &mut [Judged], level: f64) {
     let mut promises: Vec<&mut Judged> =
-        all.iter_mut().filter(|own| own.is_accepted && own.is_promise).collect();
+        all.iter_mut().filter(|judged| judged.is_accepted && judged.is_promise).collect();
     promises.sort_by(|a, b| b.gain.total_cmp(&a.gain));
-    promises.into_par_iter().enumerate().for_each(|(place, own)| {
+    promises.into_par_iter().enumerate().for_each(|(place, promise)| {
         if place < CONFIRMED {
-            let fitted = fitted(problem, base, accepted, &own.candidate);
-            *own = judged(problem, base, &own.candidate, fitted, level);
+            let fitted = fitted(problem, base, accepted, &promise.candidate);
+            *promise = judged(problem, base, &promise.candidate, fitted, level);
         } else {
-            own.is_accepted = false;
+            promise.is_accepted = false;
         }
     });
 }
@@ -276,9 +281,9 @@ fn judged(
 /// step, anything else at least [`LEAST_PART`] of what is plausible.
 fn is_seen(problem: &Problem, candidate: &Candidate, fitted: &FitResult) -> bool {
     candidate.free.iter().any(|at| {
-        let own = &problem.model.parameters.all[*at];
-        let least = if own.kind.is_delay { problem.least_delay_s() } else { LEAST_PART * own.scale };
-        (fitted.values[*at] - own.baseline).abs() > least
+        let entry = &problem.model.parameters.all[*at];
+        let least = if entry.kind.is_delay { problem.least_delay_s() } else { LEAST_PART * entry.scale };
+        (fitted.values[*at] - entry.baseline).abs() > least
     })
 }
 
@@ -287,8 +292,8 @@ fn is_seen(problem: &Problem, candidate: &Candidate, fitted: &FitResult) -> bool
 #[allow(clippy::float_cmp, reason = "values that stop at a bound are the bound")]
 fn is_beyond_bounds(problem: &Problem, candidate: &Candidate, fitted: &FitResult) -> bool {
     candidate.free.iter().all(|at| {
-        let (own, value) = (&problem.model.parameters.all[*at], fitted.values[*at]);
-        value == own.baseline || value == own.spec().min || value == own.spec().max
+        let (entry, value) = (&problem.model.parameters.all[*at], fitted.values[*at]);
+        value == entry.baseline || value == entry.spec().min || value == entry.spec().max
     })
 }
 
@@ -389,13 +394,13 @@ impl Screen {
     fn promised(&self, problem: &Problem, base: &FitResult, candidate: &Candidate) -> FitResult {
         let wanted: Vec<usize> = self.accepted.iter().chain(&candidate.free).copied().collect();
         let at: Vec<usize> =
-            wanted.iter().filter_map(|p| self.columns.iter().position(|own| own == p)).collect();
+            wanted.iter().filter_map(|p| self.columns.iter().position(|column| column == p)).collect();
         let of = |blocks: &[Block]| -> Vec<Block> { blocks.iter().map(|block| block.of(&at)).collect() };
         let (fit, test) = (of(&self.estimation), of(&self.validation));
         let step = problem.step(&fit, &base.values, &wanted);
         let after =
-            |blocks: &[Block]| -> Vec<f64> { blocks.iter().map(|own| own.cost_after(&step)).collect() };
-        let moved: Vec<Block> = fit.iter().map(|own| own.after(&step)).collect();
+            |blocks: &[Block]| -> Vec<f64> { blocks.iter().map(|block| block.cost_after(&step)).collect() };
+        let moved: Vec<Block> = fit.iter().map(|block| block.after(&step)).collect();
         FitResult {
             values: problem.moved(&base.values, &wanted, &step),
             covariance: normal::covariance(&moved),
@@ -409,24 +414,24 @@ impl Screen {
 /// For an accepted candidate: the effects that would do as well in its place, of those that were anywhere near it when
 /// it was taken.
 pub fn confounded(problem: &Problem, selection: &Selection, at: usize) -> Vec<&'static EffectKind> {
-    let own = &selection.accepted[at];
+    let candidate = &selection.accepted[at];
     let mut others = selection.accepted.clone();
     others.remove(at);
     let base = without(problem, &selection.after, &selection.accepted, at);
     let is_alike =
         |candidate: &&Candidate| !is_worse(&fitted(problem, &base, &others, candidate), &selection.after);
-    let near = near(selection, own);
+    let near = near(selection, candidate);
     near.par_iter().filter(|candidate| is_alike(candidate)).map(|candidate| candidate.kind).collect()
 }
 
-/// The candidates of other effects that gained at least [`NEAR`] of what `own` did in the round that took it.
-fn near<'s>(selection: &'s Selection, own: &Candidate) -> Vec<&'s Candidate> {
-    let took = |round: &&Round| round.taken().is_some_and(|taken| taken.candidate == *own);
+/// The candidates of other effects that gained at least [`NEAR`] of what `candidate` did in the round that took it.
+fn near<'s>(selection: &'s Selection, candidate: &Candidate) -> Vec<&'s Candidate> {
+    let took = |round: &&Round| round.taken().is_some_and(|taken| taken.candidate == *candidate);
     let Some(round) = selection.rounds.iter().find(took) else { return Vec::new() };
     let gain = round.taken().map_or(0.0, |taken| taken.gain);
     let is_near = |judged: &&Judged| {
         judged.gain > NEAR * gain
-            && judged.candidate.kind.name != own.kind.name
+            && judged.candidate.kind.name != candidate.kind.name
             && !selection.accepted.contains(&judged.candidate)
     };
     round.judged.iter().filter(is_near).map(|judged| &judged.candidate).collect()

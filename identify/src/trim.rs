@@ -37,7 +37,7 @@ pub fn compare(problem: &mut Problem, open: &[Candidate]) -> Vec<Trim> {
     let declared = problem.model.parameters.baseline();
     problem.weigh(&problem.fitted(&declared, &[]), open);
     let mut shared = problem.fitted(&declared, &[]);
-    let turning = |own: &&Candidate| own.kind.turns_steadily;
+    let turning = |candidate: &&Candidate| candidate.kind.turns_steadily;
     let turning: Vec<Candidate> = open.iter().filter(turning).cloned().collect();
     for of_effect in turning.chunk_by(|a, b| a.kind == b.kind) {
         let fitted = problem.fitted(&declared, &free_parameters(of_effect));
@@ -49,15 +49,15 @@ pub fn compare(problem: &mut Problem, open: &[Candidate]) -> Vec<Trim> {
     let found: Vec<(Trim, f64)> =
         flights.filter_map(|flight| of_flight(problem, flight, &shared.values)).collect();
     let differ = (0..3).any(|axis| {
-        let mean = found.iter().map(|(own, _)| own.angular_acceleration_rad_s2[axis]).sum::<f64>()
+        let mean = found.iter().map(|(trim, _)| trim.angular_acceleration_rad_s2[axis]).sum::<f64>()
             / found.len() as f64;
-        found.iter().any(|(own, spread)| {
-            let away = (own.angular_acceleration_rad_s2[axis] - mean).abs();
-            away > SURE * own.deviation_rad_s2[axis] && away > LARGE * spread
+        found.iter().any(|(trim, spread)| {
+            let away = (trim.angular_acceleration_rad_s2[axis] - mean).abs();
+            away > SURE * trim.deviation_rad_s2[axis] && away > LARGE * spread
         })
     });
     problem.has_own_trims = differ;
-    if differ { found.into_iter().map(|(own, _)| own).collect() } else { Vec::new() }
+    if differ { found.into_iter().map(|(trim, _)| trim).collect() } else { Vec::new() }
 }
 
 /// The trim of a flight and the spread of its angular acceleration.
@@ -75,14 +75,16 @@ fn of_flight(problem: &Problem, flight: &Prepared, values: &[f64]) -> Option<(Tr
             return None;
         }
         let mean = rows.iter().sum::<f64>() / rows.len() as f64;
-        let blocks: Vec<f64> =
-            rows.chunks(per_block).map(|own| own.iter().sum::<f64>() / own.len() as f64 - mean).collect();
+        let blocks: Vec<f64> = rows
+            .chunks(per_block)
+            .map(|block| block.iter().sum::<f64>() / block.len() as f64 - mean)
+            .collect();
         let count = blocks.len() as f64;
         means[axis] = mean;
         deviations[axis] =
-            (blocks.iter().map(|own| own * own).sum::<f64>() / (count * (count - 1.0).max(1.0))).sqrt();
+            (blocks.iter().map(|mean| mean * mean).sum::<f64>() / (count * (count - 1.0).max(1.0))).sqrt();
         spread =
-            spread.max((rows.iter().map(|own| (own - mean).powi(2)).sum::<f64>() / rows.len() as f64).sqrt());
+            spread.max((rows.iter().map(|row| (row - mean).powi(2)).sum::<f64>() / rows.len() as f64).sqrt());
     }
     let trim = Trim {
         flight: flight.flight.name.clone(),

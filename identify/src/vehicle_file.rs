@@ -38,15 +38,18 @@ const SCALED: &str = "typical of a vehicle of this size (`scale_to` of the effec
 fn entry(effect: &Effect, vehicle: &Vehicle, report: &Report) -> String {
     let name = effect.kind.name;
     let mut text = format!("\n[[effects]]\nname = {name:?}\n");
-    let fitted = report.effects.get(name).filter(|own| own.accepted);
-    let stated = vehicle.effects.iter().find(|own| own.name == name);
+    let fitted = report.effects.get(name).filter(|effect| effect.accepted);
+    let stated = vehicle.effects.iter().find(|effect| effect.name == name);
     for (index, spec) in effect.kind.parameters.iter().enumerate() {
         let value = effect.values[index];
-        let estimate = fitted.and_then(|own| own.parameters.get(spec.name));
-        let declared = stated.and_then(|own| own.parameters.iter().find(|own| own.name == spec.name));
+        let estimate = fitted.and_then(|effect| effect.parameters.get(spec.name));
+        let declared =
+            stated.and_then(|effect| effect.parameters.iter().find(|effect| effect.name == spec.name));
         let line = match (estimate, declared) {
             (Some(estimate), _) => of_estimate(estimate, &source(report)),
-            (None, Some(own)) => number(own.value, &own.unit, &own.source, &said(&own.uncertainty)),
+            (None, Some(declared)) => {
+                number(declared.value, &declared.unit, &declared.source, &said(&declared.uncertainty))
+            }
             (None, None) if spec.neutral == Some(value) => continue,
             (None, None) => number(
                 value,
@@ -63,8 +66,9 @@ fn entry(effect: &Effect, vehicle: &Vehicle, report: &Report) -> String {
 
 fn source(report: &Report) -> String {
     let of_role = |role| {
-        let own = report.flights.iter().filter(move |flight| flight.role == role && flight.compared_s > 0.0);
-        own.map(|flight| flight.name.as_str()).collect::<Vec<_>>().join(", ")
+        let flights =
+            report.flights.iter().filter(move |flight| flight.role == role && flight.compared_s > 0.0);
+        flights.map(|flight| flight.name.as_str()).collect::<Vec<_>>().join(", ")
     };
     format!(
         "hummingbus identify: fitted on {}; accepted for its gain on {}",
@@ -73,14 +77,15 @@ fn source(report: &Report) -> String {
     )
 }
 
-fn of_estimate(own: &Estimate, source: &str) -> String {
-    let doubt = match own {
+fn of_estimate(estimate: &Estimate, source: &str) -> String {
+    let doubt = match estimate {
         Estimate { determined: false, .. } => "not determined by these flights: ",
         Estimate { at_bound: true, .. } => "at its bound: ",
         _ => "",
     };
-    let interval = format!("\"{doubt}95 % interval {:e} to {:e} {}\"", own.low, own.high, own.unit);
-    number(own.value, own.unit, source, &interval)
+    let interval =
+        format!("\"{doubt}95 % interval {:e} to {:e} {}\"", estimate.low, estimate.high, estimate.unit);
+    number(estimate.value, estimate.unit, source, &interval)
 }
 
 fn number(value: f64, unit: &str, source: &str, uncertainty: &str) -> String {

@@ -48,16 +48,16 @@ fn of_equation(columns: &[(Equation, Vec<f64>)]) -> Whiteness {
     let (mut squares, mut count, mut common, mut beyond, mut lags, mut p_value) =
         (0.0, 0, 0.0, 0, 0, 1.0_f64);
     for (_, column) in columns {
-        squares += column.iter().map(|own| own * own).sum::<f64>();
+        squares += column.iter().map(|number| number * number).sum::<f64>();
         count += column.len();
         let pairs = column.iter().zip(column.iter().skip(APART));
         common += pairs.map(|(a, b)| a * b).sum::<f64>();
         let apart: Vec<f64> = column.iter().step_by(APART).copied().collect();
         let own_lags = LAGS.min(apart.len() / 4);
-        if own_lags >= 2 && apart.iter().any(|own| *own != 0.0) {
+        if own_lags >= 2 && apart.iter().any(|number| *number != 0.0) {
             let bound = white_noise_bound(apart.len(), 0.99);
             let correlations = autocorrelation(&apart, own_lags);
-            beyond += correlations[1..].iter().filter(|own| own.abs() > bound).count();
+            beyond += correlations[1..].iter().filter(|number| number.abs() > bound).count();
             lags += own_lags;
             p_value = p_value.min(ljung_box(&apart, own_lags).p_value);
         }

@@ -14,24 +14,28 @@ fn judged(mut case: Case) -> Judgement {
     case.judged()
 }
 
-fn require_right(what: &str, own: &Judgement) {
-    let told = format!("{what}: named {:?}, true gains {:?}", own.named, own.true_gains);
-    assert!(own.missed().is_empty(), "missed {:?}; {told}", own.missed());
-    assert!(own.invented().is_empty(), "invented {:?}; {told}", own.invented());
-    assert!(own.of_floor < 1.2, "prediction error {:.3} of the true model's; {told}", own.of_floor);
+fn require_right(what: &str, judgement: &Judgement) {
+    let told = format!("{what}: named {:?}, true gains {:?}", judgement.named, judgement.true_gains);
+    assert!(judgement.missed().is_empty(), "missed {:?}; {told}", judgement.missed());
+    assert!(judgement.invented().is_empty(), "invented {:?}; {told}", judgement.invented());
+    assert!(
+        judgement.of_floor < 1.2,
+        "prediction error {:.3} of the true model's; {told}",
+        judgement.of_floor
+    );
 }
 
 /// Every effect at its plausible strength, one test a third so that they run side by side.
 fn require_every(third: usize) {
-    let own: Vec<(usize, &str)> =
+    let numbered: Vec<(usize, &str)> =
         EFFECTS.into_iter().enumerate().filter(|(number, _)| number % 3 == third).collect();
-    let flown: Vec<(&str, Judgement)> = own
+    let flown: Vec<(&str, Judgement)> = numbered
         .into_par_iter()
         .map(|(number, name)| (name, judged(Case::of(&[name], 1.0, 700 + number as u64, DURATION_S))))
         .collect();
-    for (name, own) in &flown {
-        assert!(own.true_gains[0].1 > 0.01, "{name} should matter here: {:?}", own.true_gains);
-        require_right(name, own);
+    for (name, judgement) in &flown {
+        assert!(judgement.true_gains[0].1 > 0.01, "{name} should matter here: {:?}", judgement.true_gains);
+        require_right(name, judgement);
     }
 }
 
@@ -75,6 +79,6 @@ fn two_effects_that_hide_each_other_are_both_named() {
 fn where_the_declared_vehicle_is_true_hardly_anything_is_named() {
     let named = |seed: u64| judged(Case::null(900 + seed, DURATION_S)).named;
     let false_ones: Vec<Vec<&str>> =
-        (0..20).into_par_iter().map(named).filter(|own| !own.is_empty()).collect();
+        (0..20).into_par_iter().map(named).filter(|names| !names.is_empty()).collect();
     assert!(false_ones.len() <= 3, "{false_ones:?}");
 }

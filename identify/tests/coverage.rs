@@ -36,9 +36,10 @@ fn intervals_hold_the_truth_at_their_rate() {
     let all: Vec<(&str, bool)> =
         (0..CASES).into_par_iter().flat_map_iter(|seed| holds(3000 + seed)).collect();
     for name in ["coefficient", "error"] {
-        let own: Vec<bool> = all.iter().filter(|(own, _)| *own == name).map(|(_, holds)| *holds).collect();
-        let rate = own.iter().filter(|holds| **holds).count() as f64 / own.len() as f64;
-        println!("{name}: {rate} of {}", own.len());
-        assert!((0.90..=0.99).contains(&rate), "{name}: {rate} of {}", own.len());
+        let held: Vec<bool> =
+            all.iter().filter(|(effect, _)| *effect == name).map(|(_, holds)| *holds).collect();
+        let rate = held.iter().filter(|holds| **holds).count() as f64 / held.len() as f64;
+        println!("{name}: {rate} of {}", held.len());
+        assert!((0.90..=0.99).contains(&rate), "{name}: {rate} of {}", held.len());
     }
 }

@@ -88,7 +88,7 @@ fn rotor_speeds_alone_do_in_place_of_commands() {
     case.plan.sensors.has_rotor_speeds = true;
     let found = changed(&case, |flight| flight.command = Channel::default());
     require_named(&found, &["mass-error", "rotor-drag"]);
-    assert!(found.not_identifiable.iter().any(|own| own.effect == "command-delay"));
+    assert!(found.not_identifiable.iter().any(|missing| missing.effect == "command-delay"));
 }
 
 #[test]
@@ -98,7 +98,7 @@ fn an_inertial_unit_alone_shows_mass_and_says_what_it_cannot_show() {
         flight.attitude = Channel::default();
     });
     require_named(&found, &["mass-error"]);
-    let unseen: Vec<&str> = found.not_identifiable.iter().map(|own| own.effect).collect();
+    let unseen: Vec<&str> = found.not_identifiable.iter().map(|missing| missing.effect).collect();
     for effect in ["rotor-drag", "wind", "ground-effect"] {
         assert!(unseen.contains(&effect), "{unseen:?}");
     }
@@ -112,7 +112,7 @@ fn gaps_cost_time_and_nothing_else() {
         without_span(&mut flight.angular_velocity, 7.0, 7.3);
     });
     require_named(&found, &["mass-error", "rotor-drag"]);
-    assert!(found.flights.iter().all(|own| own.compared_s < DURATION_S - 0.9), "{found}");
+    assert!(found.flights.iter().all(|flight| flight.compared_s < DURATION_S - 0.9), "{found}");
 }
 
 /// What a reader leaves of a channel that was logged more often than it was sampled: samples at uneven times.
@@ -146,7 +146,7 @@ fn large_times_do_not_matter() {
         rounded(&mut flight.rotor_speed, SINCE_1970_S);
     });
     require_named(&later, &["mass-error", "rotor-drag"]);
-    let slowness = |own: &Report| own.effects["motor-lag"].parameters["slowness"].value;
+    let slowness = |report: &Report| report.effects["motor-lag"].parameters["slowness"].value;
     let (at_once, later) = (slowness(&report(&case.flights())), slowness(&later));
     assert!((at_once - later).abs() < 1e-4, "{at_once} {later}");
 }
@@ -203,7 +203,7 @@ fn differentiated(position: &Channel<3>) -> Channel<3> {
 #[test]
 fn without_a_gyroscope_there_is_no_clock_to_be_late_against() {
     let found = changed(&heavy_with_drag(25), |flight| flight.angular_velocity = Channel::default());
-    assert!(found.time_offsets_s.values().flat_map(|own| own.values()).all(Option::is_none));
+    assert!(found.time_offsets_s.values().flat_map(|channels| channels.values()).all(Option::is_none));
     require_named(&found, &["mass-error", "rotor-drag"]);
 }
 
@@ -214,7 +214,8 @@ fn require_fault(seed: u64, kind: &str, breaks: impl Fn(&mut f64)) {
     let found = changed(&case, |flight| {
         flight.rotor_speed.values.iter_mut().for_each(|speeds| breaks(&mut speeds[2]));
     });
-    let faults: Vec<(&str, &str)> = found.faults.iter().map(|own| (own.channel.as_str(), own.kind)).collect();
+    let faults: Vec<(&str, &str)> =
+        found.faults.iter().map(|fault| (fault.channel.as_str(), fault.kind)).collect();
     assert_eq!(faults, [("rotor_speed.3", kind)], "{found}");
     require_named(&found, &["mass-error", "rotor-drag"]);
 }
@@ -250,7 +251,7 @@ fn in_a_calm_hover_mass_and_thrust_are_told_to_be_alike() {
     let found = changed(&case, |flight| flight.angular_velocity = Channel::default());
     let [name] = found.verdict[..] else { panic!("{found}") };
     let both = ["mass-error", "thrust-scale"];
-    let other = both.into_iter().find(|own| *own != name).expect("two");
+    let other = both.into_iter().find(|one| *one != name).expect("two");
     assert!(both.contains(&name), "{found}");
     assert!(found.effects[name].confused_with.contains(&other), "{found}");
     let experiment = found.effects[name].experiment.clone().unwrap_or_default();
@@ -271,13 +272,13 @@ fn riddle() -> Case {
 
 #[test]
 fn the_riddle_of_the_late_rig_is_solved() {
-    let own = riddle().judged();
-    require_named(&own.report, &["bearing-friction", "command-delay", "rig-pendulum"]);
-    let delay = own.report.effects["command-delay"].parameters["delay"];
+    let riddle = riddle().judged();
+    require_named(&riddle.report, &["bearing-friction", "command-delay", "rig-pendulum"]);
+    let delay = riddle.report.effects["command-delay"].parameters["delay"];
     assert!((delay.value - 0.15).abs() < 0.01, "{delay:?}");
-    assert!(own.of_floor < 1.2, "{}", own.report);
-    for flight in own.report.held_out.values() {
-        assert!(flight["0.5"].values().all(|own| own.after < 0.3 * own.before), "{flight:?}");
+    assert!(riddle.of_floor < 1.2, "{}", riddle.report);
+    for flight in riddle.report.held_out.values() {
+        assert!(flight["0.5"].values().all(|change| change.after < 0.3 * change.before), "{flight:?}");
     }
 }
 
@@ -304,7 +305,7 @@ fn the_new_vehicle_file_is_complete_and_keeps_declared_effects() {
         plant::effects::entry::resolve(&vehicles::Vehicle::load(declared).unwrap().effects).unwrap();
     let text = identify::vehicle_file::text(declared, &effects, &report).unwrap();
     let read = vehicles::Vehicle::parse(&text, "anywhere.toml").unwrap();
-    let names: Vec<&str> = read.effects.iter().map(|own| own.name.as_str()).collect();
+    let names: Vec<&str> = read.effects.iter().map(|effect| effect.name.as_str()).collect();
     assert_eq!(names, ["rotor-drag", "parasitic-drag"], "{text}");
     assert!(!text.contains("base ="), "{text}");
 }

@@ -190,8 +190,9 @@ fn all_cases<T: Send>(case: impl Fn(u64) -> T + Sync) -> Vec<T> {
 }
 
 fn require_coverage(name: &str, truth: f64, estimates: impl Iterator<Item = Option<Estimate>>) {
-    let inside =
-        |estimate: Option<Estimate>| estimate.is_some_and(|own| own.low <= truth && truth <= own.high);
+    let inside = |estimate: Option<Estimate>| {
+        estimate.is_some_and(|estimate| estimate.low <= truth && truth <= estimate.high)
+    };
     let holds = estimates.filter(|estimate| inside(*estimate)).count() as f64 / CASES as f64;
     let _ =
         writeln!(std::io::stderr(), "{name}: the truth is inside in {:.1} % of {CASES} cases", 100.0 * holds);
@@ -202,17 +203,17 @@ fn require_coverage(name: &str, truth: f64, estimates: impl Iterator<Item = Opti
 fn coefficients_lie_in_their_intervals_at_their_rate() {
     let reports = all_cases(static_stand);
     let statics = || reports.iter().map(|report| report.statics.as_ref().unwrap());
-    require_coverage("c_T", C_T, statics().map(|own| own.thrust.as_ref().map(|thrust| thrust.value)));
-    require_coverage("c_Q", C_Q, statics().map(|own| own.torque.as_ref().map(|torque| torque.value)));
-    assert!(statics().all(|own| own.thrust.as_ref().unwrap().held_out.unwrap().r_squared > 0.99));
+    require_coverage("c_T", C_T, statics().map(|fit| fit.thrust.as_ref().map(|thrust| thrust.value)));
+    require_coverage("c_Q", C_Q, statics().map(|fit| fit.torque.as_ref().map(|torque| torque.value)));
+    assert!(statics().all(|fit| fit.thrust.as_ref().unwrap().held_out.unwrap().r_squared > 0.99));
 }
 
 #[test]
 fn a_first_order_motor_is_told_as_one() {
     let reports = all_cases(|seed| dynamic_stand(seed, Motor::first(0.04)));
     let dynamics = || reports.iter().map(|report| report.dynamics.as_ref().unwrap());
-    require_coverage("time constant", 0.04, dynamics().map(|own| own.first.time_constant_s));
-    let right = dynamics().filter(|own| own.comparison.preferred == Order::First).count();
+    require_coverage("time constant", 0.04, dynamics().map(|fit| fit.first.time_constant_s));
+    let right = dynamics().filter(|fit| fit.comparison.preferred == Order::First).count();
     assert!(right as u64 >= CASES * 95 / 100, "{right} of {CASES}");
 }
 
@@ -220,9 +221,9 @@ fn a_first_order_motor_is_told_as_one() {
 fn a_second_order_motor_is_told_as_one() {
     let reports = all_cases(|seed| dynamic_stand(seed, Motor::second(45.0, 0.8)));
     let dynamics = || reports.iter().map(|report| report.dynamics.as_ref().unwrap());
-    require_coverage("natural frequency", 45.0, dynamics().map(|own| own.second.natural_frequency_rad_s));
-    require_coverage("damping ratio", 0.8, dynamics().map(|own| own.second.damping_ratio));
-    let right = dynamics().filter(|own| own.comparison.preferred == Order::Second).count();
+    require_coverage("natural frequency", 45.0, dynamics().map(|fit| fit.second.natural_frequency_rad_s));
+    require_coverage("damping ratio", 0.8, dynamics().map(|fit| fit.second.damping_ratio));
+    let right = dynamics().filter(|fit| fit.comparison.preferred == Order::Second).count();
     assert!(right as u64 >= CASES * 95 / 100, "{right} of {CASES}");
 }
 
@@ -242,7 +243,7 @@ fn a_torque_of_the_other_sign_is_turned_and_said() {
     let statics = stand.run().unwrap().statics.unwrap();
     assert!((statics.torque.unwrap().value.value / C_Q - 1.0).abs() < 0.03);
     assert!(
-        statics.findings.iter().any(|own| own.contains("torque: it is negative")),
+        statics.findings.iter().any(|finding| finding.contains("torque: it is negative")),
         "{:?}",
         statics.findings
     );

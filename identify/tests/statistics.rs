@@ -54,12 +54,12 @@ fn answers(readers: &Path, question: &Value) -> Value {
 }
 
 /// Compares to 1e-9, relative where numbers are above 1.
-fn require_near(name: &str, own: &[f64], reference: &Value) {
+fn require_near(name: &str, found: &[f64], reference: &Value) {
     let reference: Vec<f64> = serde_json::from_value(reference.clone()).unwrap();
-    assert_eq!(own.len(), reference.len(), "{name}");
-    for (own, reference) in own.iter().zip(reference) {
-        let error = (own - reference).abs() / reference.abs().max(1.0);
-        assert!(error < 1e-9, "{name}: {own} against {reference}");
+    assert_eq!(found.len(), reference.len(), "{name}");
+    for (found, reference) in found.iter().zip(reference) {
+        let error = (found - reference).abs() / reference.abs().max(1.0);
+        assert!(error < 1e-9, "{name}: {found} against {reference}");
     }
 }
 

@@ -275,12 +275,12 @@ impl Backend for Rapier {
     }
 
     fn snapshot(&self) -> Result<Vec<u8>, SnapshotError> {
-        let own = Snapshot::of(NAME)
+        let snapshot = Snapshot::of(NAME)
             .with("state", &self.state)?
             .with("effects", &self.effects)?
             .with("reaction", &self.reaction)?
             .with("contacts", &self.contacts)?;
-        self.world.write(own)?.bytes()
+        self.world.write(snapshot)?.bytes()
     }
 
     fn restore(&mut self, snapshot: &[u8]) -> Result<(), SnapshotError> {

@@ -34,8 +34,8 @@ fn an_effects_name_is_a_text_in_its_own_file_only() {
     assert!(files.len() > 200, "{}", files.len());
     for kind in CATALOGUE {
         let name = format!("\"{}\"", kind.name);
-        let own = format!("plant/src/effects/catalogue/{}.rs", kind.name.replace('-', "_"));
+        let room = format!("plant/src/effects/catalogue/{}.rs", kind.name.replace('-', "_"));
         let holders: Vec<_> = files.iter().filter(|path| program(path).contains(&name)).collect();
-        assert!(holders.len() == 1 && holders[0].ends_with(&own), "{name} stands in {holders:?}");
+        assert!(holders.len() == 1 && holders[0].ends_with(&room), "{name} stands in {holders:?}");
     }
 }

@@ -196,11 +196,11 @@ fn a_snapshot_of_another_scene_is_refused_and_changes_nothing() {
     );
     let mut plants = [crash, sliding, fixed, ground, moved];
     let snapshots = plants.each_ref().map(|plant| plant.snapshot().unwrap());
-    for (own, plant) in plants.iter_mut().enumerate() {
+    for (index, plant) in plants.iter_mut().enumerate() {
         for (other, snapshot) in snapshots.iter().enumerate() {
             let restored = plant.restore(snapshot);
-            assert_eq!(restored.is_ok(), own == other, "{own} from {other}: {restored:?}");
-            assert_eq!(first_difference(&plant.snapshot().unwrap(), &snapshots[own]).unwrap(), None);
+            assert_eq!(restored.is_ok(), index == other, "{index} from {other}: {restored:?}");
+            assert_eq!(first_difference(&plant.snapshot().unwrap(), &snapshots[index]).unwrap(), None);
         }
         plant.step(&uneven(0), TICK_S, &[]);
     }

@@ -131,28 +131,28 @@ impl Definition {
     /// # Errors
     /// The line that is not understood.
     pub fn parse(name: &str, text: &str) -> Result<Self, DefinitionError> {
-        let mut own = (String::new(), name.split('/').next().unwrap_or_default(), Vec::new());
+        let mut current = (String::new(), name.split('/').next().unwrap_or_default(), Vec::new());
         let mut types = BTreeMap::new();
         let mut root = None;
         let mut lines = text.lines().map(str::trim_end);
         while let Some(line) = lines.next() {
             if !is_rule(line) {
-                own.2.extend(parse_field(line, own.1)?);
+                current.2.extend(parse_field(line, current.1)?);
                 continue;
             }
             let head = lines.next().unwrap_or_default();
             let next =
                 head.strip_prefix("MSG: ").ok_or_else(|| DefinitionError::Head(head.to_owned()))?.trim();
             let package = next.split('/').next().unwrap_or_default();
-            let (name, _, fields) = std::mem::replace(&mut own, (two_part(next), package, Vec::new()));
+            let (name, _, fields) = std::mem::replace(&mut current, (two_part(next), package, Vec::new()));
             match root {
                 None => root = Some(fields),
                 Some(_) => drop(types.insert(name, fields)),
             }
         }
         match root {
-            None => root = Some(own.2),
-            Some(_) => drop(types.insert(own.0, own.2)),
+            None => root = Some(current.2),
+            Some(_) => drop(types.insert(current.0, current.2)),
         }
         Ok(Self { root: root.unwrap_or_default(), types })
     }

@@ -184,7 +184,8 @@ impl Recording {
             return Ok(Vec::new());
         }
         let broken = |error| content(&self.path, &error);
-        let attachments = summary(&self.bytes).map_err(broken)?.map_or(Vec::new(), |own| own.attachments);
+        let attachments =
+            summary(&self.bytes).map_err(broken)?.map_or(Vec::new(), |summary| summary.attachments);
         attachments.iter().map(|index| attachment(&self.bytes, index).map_err(broken)).collect()
     }
 }

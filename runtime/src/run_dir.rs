@@ -54,9 +54,9 @@ impl Entry {
 /// The folders in which runs have their directories: that for temporary files, or else the first of the others that is
 /// there. `TMPDIR` may be a path that iceoryx2 does not take.
 pub(crate) fn folders() -> Vec<PathBuf> {
-    let own = std::env::var_os("TMPDIR").filter(|path| !path.is_empty()).map(PathBuf::from);
+    let stated = std::env::var_os("TMPDIR").filter(|path| !path.is_empty()).map(PathBuf::from);
     let session = std::env::var_os("XDG_RUNTIME_DIR").map(PathBuf::from).filter(|path| path.is_absolute());
-    let all = own.into_iter().chain(["/tmp".into()]).chain(session).chain([SHARED_MEMORY.into()]);
+    let all = stated.into_iter().chain(["/tmp".into()]).chain(session).chain([SHARED_MEMORY.into()]);
     all.filter_map(|path: PathBuf| std::path::absolute(path).ok()).collect()
 }
 

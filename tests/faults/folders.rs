@@ -32,8 +32,8 @@ fn run_dirs(launcher: u32, folder: &OsStr) -> Vec<PathBuf> {
     let prefix = format!("hummingbus-{}-{launcher:x}-", bus::process::user_id());
     let folders = [Path::new("/tmp"), Path::new("/dev/shm"), Path::new(folder)];
     let entries = folders.iter().filter_map(|folder| std::fs::read_dir(folder).ok()).flatten().flatten();
-    let own = entries.filter(|entry| entry.file_name().to_string_lossy().starts_with(&prefix));
-    own.map(|entry| entry.path()).collect()
+    let ours = entries.filter(|entry| entry.file_name().to_string_lossy().starts_with(&prefix));
+    ours.map(|entry| entry.path()).collect()
 }
 
 /// A folder below `place` whose path has `length` bytes.

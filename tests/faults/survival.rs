@@ -130,8 +130,8 @@ fn panic_again_and_again(policy: Policy) -> Ended {
 /// since nobody waits for those of a shadow.
 fn require_prefix(place: &Place, policy: Policy, recording: &str, reference: &str) {
     if policy == Policy::Standby {
-        let (own, whole) = (messages(recording), messages(reference));
-        assert!(own.len() < whole.len() && whole.starts_with(&own), "other messages");
+        let (kept, whole) = (messages(recording), messages(reference));
+        assert!(kept.len() < whole.len() && whole.starts_with(&kept), "other messages");
     } else {
         let diff = place.start(&["diff", recording, reference]).end_among_others().with_code(1);
         diff.prints(&["is a prefix of"]);

@@ -88,10 +88,10 @@ fn race(prefix: &Mutex<String>, folder: &Path, is_over: &AtomicBool) -> Race {
     while !is_over.load(Ordering::Relaxed) {
         let prefix = prefix.lock().unwrap().clone();
         let names = std::fs::read_dir("/dev/shm").unwrap().flatten().map(|entry| entry.path());
-        let own = names.filter(|path| path.to_string_lossy().starts_with(&prefix));
+        let ours = names.filter(|path| path.to_string_lossy().starts_with(&prefix));
         let run_dirs = std::fs::read_dir(folder).unwrap().flatten().map(|entry| entry.path());
         let inside = |path: std::path::PathBuf| [path.clone(), path.join("plan.json"), path.join("iceoryx2")];
-        for path in own.chain(run_dirs.flat_map(inside)) {
+        for path in ours.chain(run_dirs.flat_map(inside)) {
             for (reads, writes) in [(true, true), (true, false), (false, true)] {
                 match std::fs::OpenOptions::new().read(reads).write(writes).open(&path) {
                     Ok(_) => race.opened.push(path.display().to_string()),

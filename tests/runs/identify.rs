@@ -32,8 +32,8 @@ fn the_riddle_of_the_thesis_delay_and_rig_are_told_apart_and_measured() {
     assert_eq!(verdict, ["bearing-friction", "command-delay", "rig-pendulum"]);
     assert!((number(&report, "command-delay", "delay", "value") - 0.150).abs() < 0.010);
     let change = |flight: &str, horizon: &str, channel: &str| {
-        let own = &report["held_out"][flight][horizon][channel];
-        (own["before"].as_f64().unwrap(), own["after"].as_f64().unwrap())
+        let change = &report["held_out"][flight][horizon][channel];
+        (change["before"].as_f64().unwrap(), change["after"].as_f64().unwrap())
     };
     let (before, after) = change("rig-a-riddle-2", "1", "attitude");
     assert!(after < 0.02 * before, "attitude after 1 s: {before} to {after} deg");

@@ -367,14 +367,14 @@ fn no_file_that_a_run_reads_is_written_to() {
     let text = format!("include = [\"empty.toml\"]\n{}", manifest(50, &[sender("source", 1, "")]));
     let path = place.write("short.toml", &text);
     fs::hard_link(&empty, place.path("hard.toml")).unwrap();
-    let own = place.write("data.mcap", "");
-    let reads = format!("process.source.data={own}");
+    let ours = place.write("data.mcap", "");
+    let reads = format!("process.source.data={ours}");
     let log = |file: &str| format!("process.source.log={file}");
     for (args, input) in [
         (["--record", &empty, "--json"], &empty),
         (["--set", &log(&empty), "--json"], &empty),
         (["--set", &log(&place.path("hard.toml")), "--json"], &empty),
-        (["--record", &own, &format!("--set={reads}")], &own),
+        (["--record", &ours, &format!("--set={reads}")], &ours),
     ] {
         let ended = place.call(&[&["run", &path][..], &args].concat()).with_code(2);
         ended.says(&["the run reads it, as", input, "name another file"]);
@@ -391,7 +391,7 @@ fn no_file_that_a_run_reads_is_written_to() {
         ended.says(&["`log`: ", file, "no log of hummingbus"]);
         assert!(fs::read(file).unwrap() == before);
     }
-    assert!(fs::read(empty).unwrap().is_empty() && fs::read(own).unwrap().is_empty());
+    assert!(fs::read(empty).unwrap().is_empty() && fs::read(ours).unwrap().is_empty());
 }
 
 #[test]
@@ -513,12 +513,12 @@ fn validate_keeps_in_a_folder_of_its_own_and_replaces_its_own_files_alone() {
     for name in ["flight.csv", "manifest.toml", "flight.mcap"] {
         let set = flights(&place, &vehicle, &[("level", &log)]);
         let file = place.path(&format!("kept/level/{name}"));
-        let own = fs::read(&file).unwrap();
+        let ours = fs::read(&file).unwrap();
         fs::write(&file, "somebody's own").unwrap();
         let ended = place.call(&["validate", &vehicle, &set, "--keep", &kept]).with_code(2);
         ended.says(&[name, "would be lost; name another file"]);
         assert_eq!(fs::read_to_string(&file).unwrap(), "somebody's own");
-        fs::write(&file, own).unwrap();
+        fs::write(&file, ours).unwrap();
     }
     let two = flights(&place, &vehicle, &[("a b", &log), ("a/b", &log)]);
     let ended = place.call(&["validate", &vehicle, &two, "--keep", &kept]).with_code(2);
@@ -541,10 +541,10 @@ fn identify_replaces_its_own_files_alone_and_not_what_it_reads() {
         fs::remove_file(&file).unwrap();
     }
     // What was identified is declared now.
-    let own = place.write("out/vehicle.toml", format!("# Written by hummingbus identify.\n{declared}"));
-    let set = flights(&place, &own, &[("level", &log)]);
+    let ours = place.write("out/vehicle.toml", format!("# Written by hummingbus identify.\n{declared}"));
+    let set = flights(&place, &ours, &[("level", &log)]);
     let ended = place.call(&["identify", &set, "--out", &out, "--no-bus"]).with_code(2);
-    ended.says(&[&own, "would be replaced, and is read", "name another folder with --out"]);
+    ended.says(&[&ours, "would be replaced, and is read", "name another folder with --out"]);
 }
 
 #[test]

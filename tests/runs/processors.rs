@@ -59,10 +59,10 @@ fn every_effect_is_the_same_on_an_older_processor() {
 
 /// An effect with its plausible values, as a vehicle file has it.
 fn effect_table(kind: &EffectKind) -> String {
-    let value = |own: &ParameterSpec| {
-        let unit = own.dimension.units[0].0;
+    let value = |spec: &ParameterSpec| {
+        let unit = spec.dimension.units[0].0;
         let rest = format!("unit = {unit:?}, source = \"docs/effects.md\", uncertainty = \"not stated\"");
-        format!("{} = {{ value = {:?}, {rest} }}\n", own.name, own.nominal)
+        format!("{} = {{ value = {:?}, {rest} }}\n", spec.name, spec.nominal)
     };
     let values: String = kind.parameters.iter().map(value).collect();
     format!("[[effects]]\nname = {:?}\n{values}\n", kind.name)

@@ -55,8 +55,8 @@ fn rms(json: &Value, flight: &str, horizon: &str, channel: &str, vehicle: &str) 
 fn a_flight_is_met_by_the_vehicle_that_flew_it_and_not_by_a_heavier_one() {
     let place = Place::new();
     let flights = flown(&place, "excite", &[], ALL);
-    let (own, heavy) = (vehicle(&place, "own", ""), vehicle(&place, "heavy", &heavier(0.1)));
-    let json = place.call(&["validate", &own, &heavy, &flights, "--json"]).with_code(0).json();
+    let (vehicle_file, heavy) = (vehicle(&place, "own", ""), vehicle(&place, "heavy", &heavier(0.1)));
+    let json = place.call(&["validate", &vehicle_file, &heavy, &flights, "--json"]).with_code(0).json();
     // Timing is exact: what is left is that velocities are derived from positions.
     for (horizon, position_m) in [("0.1", 3e-4), ("0.5", 1e-3), ("1", 3e-3)] {
         assert!(rms(&json, "course", horizon, "position", "own") < position_m, "{json:#}");
@@ -77,9 +77,9 @@ fn a_flight_is_met_by_the_vehicle_that_flew_it_and_not_by_a_heavier_one() {
 fn the_table_sets_vehicles_side_by_side_and_progress_goes_to_standard_error() {
     let place = Place::new();
     let flights = flown(&place, "hover-gentle", &[], ALL);
-    let (own, heavy) = (vehicle(&place, "own", ""), vehicle(&place, "heavy", &heavier(0.1)));
+    let (vehicle_file, heavy) = (vehicle(&place, "own", ""), vehicle(&place, "heavy", &heavier(0.1)));
     let kept = place.path("kept");
-    let ended = place.call(&["validate", &own, &heavy, &flights, "--keep", &kept]).with_code(0);
+    let ended = place.call(&["validate", &vehicle_file, &heavy, &flights, "--keep", &kept]).with_code(0);
     ended.prints(&["own", "heavy", "ratio", "position, m", "rates, rad/s", "0.5 s"]);
     ended.says(&["course: 4.0 s flown in"]);
     // What was kept can be flown again.
@@ -105,10 +105,10 @@ fn windows_with_a_gap_are_not_counted_and_said() {
     let place = Place::new();
     let lossy = ["process.mocap.parameters.dropout=0.2", "process.mocap.parameters.dropout_mean_s=0.2"];
     let flights = flown(&place, "hover-gentle", &lossy, ALL);
-    let own = repository("vehicles/hummingbird.toml");
-    let ended = place.call(&["validate", &own, &flights]).with_code(0);
+    let vehicle_file = repository("vehicles/hummingbird.toml");
+    let ended = place.call(&["validate", &vehicle_file, &flights]).with_code(0);
     ended.prints(&["course: not counted, at the start or at gaps"]);
-    let json = place.call(&["validate", &own, &flights, "--json"]).with_code(0).json();
+    let json = place.call(&["validate", &vehicle_file, &flights, "--json"]).with_code(0).json();
     // The first five begin where the rotors' speeds are not known.
     assert!(json["flights"]["course"]["horizons"]["0.1"]["left_out"].as_u64().unwrap() > 5, "{json:#}");
 }
@@ -116,13 +116,15 @@ fn windows_with_a_gap_are_not_counted_and_said() {
 #[test]
 fn a_file_that_is_missing_is_named() {
     let place = Place::new();
-    let own = repository("vehicles/hummingbird.toml");
+    let vehicle_file = repository("vehicles/hummingbird.toml");
     let flights = place.write(
         "flights.toml",
-        format!("vehicle = {own:?}\n[[flight]]\nname = \"a\"\nfile = \"lost.mcap\"\nrole = \"fit\"\n"),
+        format!(
+            "vehicle = {vehicle_file:?}\n[[flight]]\nname = \"a\"\nfile = \"lost.mcap\"\nrole = \"fit\"\n"
+        ),
     );
-    place.call(&["validate", &own, &flights]).with_code(2).says(&["lost.mcap", "flights.toml"]);
-    place.call(&["validate", &own, &place.path("no.toml")]).with_code(2).says(&["no.toml"]);
+    place.call(&["validate", &vehicle_file, &flights]).with_code(2).says(&["lost.mcap", "flights.toml"]);
+    place.call(&["validate", &vehicle_file, &place.path("no.toml")]).with_code(2).says(&["no.toml"]);
     place.call(&["validate", &place.path("nobody.toml"), &flights]).with_code(2);
 }
 

@@ -177,9 +177,9 @@ fn time_constant(steps: &[&Step], clock_of: impl Fn(&Step) -> Clock) -> Option<E
 }
 
 fn direction(steps: &[Step], sign: f64) -> Option<Estimate> {
-    let own: Vec<&Step> = steps.iter().filter(|step| step.height * sign > 0.0).collect();
+    let alike: Vec<&Step> = steps.iter().filter(|step| step.height * sign > 0.0).collect();
     // Two steps give an interval without meaning.
-    if own.len() < STEPS_MIN { None } else { time_constant(&own, |step| step.clock) }
+    if alike.len() < STEPS_MIN { None } else { time_constant(&alike, |step| step.clock) }
 }
 
 fn other(clock: Clock) -> Clock {
@@ -236,8 +236,8 @@ fn compared(test: &[&Step], first: Lag, second: Lag, second_fit: &Fitted) -> Com
 }
 
 fn one_step(step: &Step) -> Option<OneStep> {
-    let own = lag::fit(&[step], Order::First, |step| step.clock)?.lag;
-    let found = matched(step, own);
+    let lag = lag::fit(&[step], Order::First, |step| step.clock)?.lag;
+    let found = matched(step, lag);
     let squares: f64 = found.errors.iter().map(|error| error * error).sum();
     Some(OneStep {
         file: step.file.clone(),
@@ -245,7 +245,7 @@ fn one_step(step: &Step) -> Option<OneStep> {
         to: step.to,
         is_test: step.is_test,
         height_rad_s: step.height,
-        time_constant_s: own.a1_s,
+        time_constant_s: lag.a1_s,
         onset_s: found.onset_s,
         rms_rad_s: (squares / found.errors.len() as f64).sqrt(),
     })

@@ -24,7 +24,7 @@ fn pairs<L>(
     // Each log is read once, however many it is held against.
     let mut fits: Vec<Option<Channel<3>>> = of_role(Role::Fit).map(|_| None).collect();
     for test in of_role(Role::Test) {
-        let mut own = None;
+        let mut of_test = None;
         for (fit, other) in of_role(Role::Fit).zip(&mut fits) {
             let refused = |reason: String| RotorError::NotHeldOut {
                 test: of(test).1.display().to_string(),
@@ -35,7 +35,7 @@ fn pairs<L>(
                 return Err(refused(format!("they are {how}")));
             }
             if let Comparison::Same(twin) =
-                twin(once(other, || samples(fit))?, once(&mut own, || samples(test))?)
+                twin(once(other, || samples(fit))?, once(&mut of_test, || samples(test))?)
             {
                 return Err(refused(format!("{} of {} rows are the same", twin.same, twin.compared)));
             }

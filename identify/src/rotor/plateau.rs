@@ -70,8 +70,8 @@ impl Extremes {
         while self.high.pop_back_if(|last| values[*last] <= values[row]).is_some() {}
         self.low.push_back(row);
         self.high.push_back(row);
-        while self.low.pop_front_if(|own| *own < first).is_some() {}
-        while self.high.pop_front_if(|own| *own < first).is_some() {}
+        while self.low.pop_front_if(|at| *at < first).is_some() {}
+        while self.high.pop_front_if(|at| *at < first).is_some() {}
         (values[self.low[0]], values[self.high[0]])
     }
 }

@@ -112,8 +112,8 @@ fn write_dynamics(f: &mut fmt::Formatter<'_>, dynamics: &Dynamics) -> fmt::Resul
 
 /// The time constants of single steps of a direction, smallest and largest.
 fn own_times(dynamics: &Dynamics, sign: f64) -> String {
-    let own = dynamics.steps.iter().filter(|step| step.height_rad_s * sign > 0.0);
-    let times: Vec<f64> = own.map(|step| 1e3 * step.time_constant_s).collect();
+    let alike = dynamics.steps.iter().filter(|step| step.height_rad_s * sign > 0.0);
+    let times: Vec<f64> = alike.map(|step| 1e3 * step.time_constant_s).collect();
     if times.is_empty() {
         return "no steps".to_owned();
     }

@@ -166,7 +166,12 @@ impl<'s> Log<'s> {
         }
         let is_test = held_out(points.len(), self.declared.role, self.declared.held_out);
         let of = |test: bool| {
-            points.iter().zip(&is_test).filter(|(_, own)| **own == test).map(|(point, _)| *point).collect()
+            points
+                .iter()
+                .zip(&is_test)
+                .filter(|(_, is_held_out)| **is_held_out == test)
+                .map(|(point, _)| *point)
+                .collect()
         };
         Ok(Some(Readings { fit: of(false), test: of(true) }))
     }

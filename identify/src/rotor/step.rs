@@ -168,8 +168,8 @@ impl<'s> Log<'s> {
         }
         let range = row - before..row + after;
         let speed = self.speed[range.clone()].to_vec();
-        let stamps_s: Vec<f64> = range.clone().map(|own| self.time_s[own] - self.time_s[row]).collect();
-        let rows_s: Vec<f64> = range.map(|own| (own as f64 - row as f64) * self.period_s).collect();
+        let stamps_s: Vec<f64> = range.clone().map(|at| self.time_s[at] - self.time_s[row]).collect();
+        let rows_s: Vec<f64> = range.map(|at| (at as f64 - row as f64) * self.period_s).collect();
         if self.declared.clock == Clock::Rows && has_lost_rows(&stamps_s, &rows_s, before, self.period_s) {
             left_out.lost_rows += 1;
             return None;

@@ -39,9 +39,9 @@ fn identified(name: &str, estimate: &Estimate, unit: &str, source: &str) -> Stri
 fn taken(vehicle: Option<&VehicleFile>, table: &str, name: &str, unit: &str, value: f64) -> String {
     let Some(file) = vehicle else { return format!("# {name}: the stand does not tell\n") };
     let key = format!("{table}.{name}");
-    let provenance = file.vehicle.provenance.iter().find(|own| own.key == key);
-    let source = provenance.map_or("", |own| own.source.as_str());
-    let uncertainty = match provenance.map(|own| &own.uncertainty) {
+    let provenance = file.vehicle.provenance.iter().find(|known| known.key == key);
+    let source = provenance.map_or("", |known| known.source.as_str());
+    let uncertainty = match provenance.map(|known| &known.uncertainty) {
         Some(Uncertainty::OneSigma(sigma)) => format!("{sigma:e}"),
         Some(Uncertainty::Said(text)) => toml::Value::from(text.as_str()).to_string(),
         None => "\"not stated\"".to_owned(),
@@ -61,8 +61,8 @@ fn rotor(report: &RotorReport, vehicle: Option<&VehicleFile>) -> String {
     let inertia = of(|vehicle| vehicle.rotor_inertia_kg_m2);
     [
         "[rotor]\n".to_owned(),
-        line("thrust_coefficient", "N/(rad/s)^2", "T = c_T w^2", thrust, of(|own| own.thrust_coefficient)),
-        line("torque_coefficient", "N*m/(rad/s)^2", "Q = c_Q w^2", torque, of(|own| own.torque_coefficient)),
+        line("thrust_coefficient", "N/(rad/s)^2", "T = c_T w^2", thrust, of(|fit| fit.thrust_coefficient)),
+        line("torque_coefficient", "N*m/(rad/s)^2", "Q = c_Q w^2", torque, of(|fit| fit.torque_coefficient)),
         taken(vehicle, "rotor", "inertia", "kg*m^2", inertia),
     ]
     .concat()
@@ -77,11 +77,11 @@ fn fitted_on(report: &RotorReport, law: &str, found: &Coefficient) -> String {
 fn motor(report: &RotorReport, vehicle: Option<&VehicleFile>) -> String {
     let Some(dynamics) = &report.dynamics else { return taken_motor(vehicle) };
     let source = format!("{}: {} steps of the command", report.name, dynamics.first.steps);
-    let own = match dynamics.comparison.preferred {
+    let order = match dynamics.comparison.preferred {
         Order::First => first_order(dynamics, &source),
         Order::Second => second_order(dynamics, &source),
     };
-    format!("[motor]\n# {}\n{own}", dynamics.comparison.reason)
+    format!("[motor]\n# {}\n{order}", dynamics.comparison.reason)
 }
 
 fn first_order(dynamics: &Dynamics, source: &str) -> String {
@@ -93,8 +93,8 @@ fn first_order(dynamics: &Dynamics, source: &str) -> String {
 fn second_order(dynamics: &Dynamics, source: &str) -> String {
     let frequency = dynamics.second.natural_frequency_rad_s.iter();
     let damping = dynamics.second.damping_ratio.iter();
-    let lines = frequency.map(|own| identified("natural_frequency", own, "rad/s", source));
-    let more = damping.map(|own| identified("damping_ratio", own, "1", source));
+    let lines = frequency.map(|known| identified("natural_frequency", known, "rad/s", source));
+    let more = damping.map(|known| identified("damping_ratio", known, "1", source));
     format!("model = \"second-order\"\n{}", lines.chain(more).collect::<String>())
 }
 

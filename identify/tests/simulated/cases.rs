@@ -91,7 +91,7 @@ impl Judgement {
 
     /// Effects that were named and are not true.
     pub fn invented(&self) -> Vec<&'static str> {
-        let is_true = |name: &str| self.true_gains.iter().any(|(own, _)| *own == name);
+        let is_true = |name: &str| self.true_gains.iter().any(|(gained, _)| *gained == name);
         self.named.iter().copied().filter(|name| !is_true(name)).collect()
     }
 
@@ -130,8 +130,8 @@ impl Case {
             match *name {
                 SENSOR_DELAY => case.plan.sensors.pose_delay_s = 0.02 * strength,
                 SENSOR_BIAS => {
-                    case.plan.sensors.accelerometer_bias_m_s2 = [0.2, -0.15, 0.3].map(|own| own * strength);
-                    case.plan.sensors.gyroscope_bias_rad_s = [0.02, -0.01, 0.015].map(|own| own * strength);
+                    case.plan.sensors.accelerometer_bias_m_s2 = [0.2, -0.15, 0.3].map(|x| x * strength);
+                    case.plan.sensors.gyroscope_bias_rad_s = [0.02, -0.01, 0.015].map(|x| x * strength);
                 }
                 _ => case.plan.truth.push(scaled(name, strength)),
             }
@@ -180,16 +180,16 @@ impl Case {
     /// The true values of all parameters.
     pub fn true_values(&self, parameters: &Parameters) -> Vec<f64> {
         let sensors = &self.plan.sensors;
-        let value = |own: &identify::steps::Parameter| {
-            if *own.kind == POSE_DELAY {
+        let value = |parameter: &identify::steps::Parameter| {
+            if *parameter.kind == POSE_DELAY {
                 sensors.pose_delay_s
-            } else if *own.kind == ACCELEROMETER_BIAS {
-                sensors.accelerometer_bias_m_s2[own.index]
-            } else if *own.kind == GYROSCOPE_BIAS {
-                sensors.gyroscope_bias_rad_s[own.index]
+            } else if *parameter.kind == ACCELEROMETER_BIAS {
+                sensors.accelerometer_bias_m_s2[parameter.index]
+            } else if *parameter.kind == GYROSCOPE_BIAS {
+                sensors.gyroscope_bias_rad_s[parameter.index]
             } else {
-                let effect = self.plan.truth.iter().find(|effect| effect.kind == own.kind);
-                effect.map_or(own.baseline, |effect| effect.values[own.index])
+                let effect = self.plan.truth.iter().find(|effect| effect.kind == parameter.kind);
+                effect.map_or(parameter.baseline, |effect| effect.values[parameter.index])
             }
         };
         parameters.all.iter().map(value).collect()
@@ -224,8 +224,8 @@ impl Case {
         let others: Vec<usize> = self
             .effects()
             .iter()
-            .filter(|own| **own != name)
-            .flat_map(|own| parameters.of_name(own))
+            .filter(|effect| **effect != name)
+            .flat_map(|effect| parameters.of_name(effect))
             .collect();
         let best: f64 = problem.costs(&problem.validation, values).iter().sum();
         1.0 - best / problem.fitted(&without, &others).validation_cost()
@@ -241,7 +241,7 @@ impl Case {
         for horizon_s in HORIZONS_S {
             let (truth, _) = measured.predicted(flight, problem.model.airframe(values), horizon_s, 0);
             let after = &report.held_out[&flight.name][&format!("{horizon_s}")];
-            worst = after.iter().map(|(channel, own)| own.after / truth[channel]).fold(worst, f64::max);
+            worst = after.iter().map(|(channel, change)| change.after / truth[channel]).fold(worst, f64::max);
         }
         worst
     }
@@ -250,7 +250,7 @@ impl Case {
 /// For each parameter of each effect that is true and was named: whether its interval holds the truth.
 fn intervals(parameters: &Parameters, values: &[f64], report: &Report) -> Vec<(String, bool)> {
     let mut found = Vec::new();
-    for (effect, own) in report.effects.iter().filter(|(_, own)| own.accepted) {
+    for (effect, named) in report.effects.iter().filter(|(_, named)| named.accepted) {
         let at = |name: &str| {
             parameters
                 .of_name(effect)
@@ -258,7 +258,7 @@ fn intervals(parameters: &Parameters, values: &[f64], report: &Report) -> Vec<(S
                 .find(|at| parameters.all[*at].spec().name == name)
                 .map(|at| values[at])
         };
-        for (name, estimate) in &own.parameters {
+        for (name, estimate) in &named.parameters {
             let truth = at(name).expect("a parameter of the effect");
             found.push((format!("{effect}.{name}"), estimate.low <= truth && truth <= estimate.high));
         }

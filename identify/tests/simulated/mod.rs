@@ -97,7 +97,7 @@ pub fn vehicle_file(name: &str) -> PathBuf {
 /// The effect `name` with these parameters, the others neutral or typical.
 pub fn effect(name: &str, parameters: &[(&str, f64)]) -> Effect {
     let kind = find(name).expect("a known effect");
-    let given = |name: &str| parameters.iter().find(|(own, _)| *own == name).map(|(_, value)| *value);
+    let given = |name: &str| parameters.iter().find(|(known, _)| *known == name).map(|(_, value)| *value);
     kind.with(|spec| given(spec.name).or(spec.neutral).unwrap_or(spec.nominal))
 }
 

@@ -40,11 +40,12 @@ pub fn fly_again(
                 let (horizon, channel) = (before_at.horizon(), old.quantity.name());
                 flights[&before.name][&horizon][channel] =
                     json!({ "before": old_rms, "after": new_rms, "unit": old.quantity.unit() });
-                let own = predicted(&outcome.report, &before.name, &horizon, channel);
-                let away = own
+                let predicted = predicted(&outcome.report, &before.name, &horizon, channel);
+                let away = predicted
                     .map(|(before, after)| (old_rms / before - 1.0).abs().max((new_rms / after - 1.0).abs()));
-                let own = away.map(|away| (away, format!("{channel} after {horizon} s of {}", before.name)));
-                let all = furthest.into_iter().chain(own).filter(|own| own.0.is_finite());
+                let furthest_here =
+                    away.map(|away| (away, format!("{channel} after {horizon} s of {}", before.name)));
+                let all = furthest.into_iter().chain(furthest_here).filter(|found| found.0.is_finite());
                 furthest = all.max_by(|a, b| a.0.total_cmp(&b.0));
             }
         }
@@ -55,8 +56,8 @@ pub fn fly_again(
 
 /// The report's own errors before and after.
 fn predicted(report: &Report, flight: &str, horizon: &str, channel: &str) -> Option<(f64, f64)> {
-    let own = report.held_out.get(flight).or_else(|| report.fitted.get(flight))?;
-    let change = own.get(horizon)?.get(channel)?;
+    let channels = report.held_out.get(flight).or_else(|| report.fitted.get(flight))?;
+    let change = channels.get(horizon)?.get(channel)?;
     Some((change.before, change.after))
 }
 
@@ -66,7 +67,8 @@ fn corrected(set: &FlightSet, outcome: &Outcome, errors: &SensorErrors) -> Fligh
         errors.taken_off(flight, &outcome.late.get(&flight.name).copied().unwrap_or_default())
     };
     let can_fly = |flight: &&Flight| {
-        let was_used = |own: &FlightReport| own.name == flight.name && own.compared_s > LEAST_REPLAY_S;
+        let was_used =
+            |report: &FlightReport| report.name == flight.name && report.compared_s > LEAST_REPLAY_S;
         !flight.command.is_empty()
             && !flight.attitude.is_empty()
             && outcome.report.flights.iter().any(was_used)

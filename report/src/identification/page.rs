@@ -32,7 +32,7 @@ pub fn page(outcome: &Outcome, flown: Option<&Value>) -> Vec<u8> {
 fn data(outcome: &Outcome, flown: Option<&Value>) -> Value {
     let components = outcome.pictures.iter().map(|picture| picture.measured.len()).sum();
     let budget = Budget { curve: share(CURVE_POINTS, components), cloud: share(CLOUD_POINTS, components) };
-    let flights = outcome.report.flights.iter().filter_map(|own| flight(outcome, &own.name, budget));
+    let flights = outcome.report.flights.iter().filter_map(|found| flight(outcome, &found.name, budget));
     json!({ "report": outcome.report, "bus": flown, "flights": flights.collect::<Vec<_>>() })
 }
 
@@ -49,12 +49,11 @@ fn share((most, all): (usize, usize), components: usize) -> usize {
 
 /// A flight's residuals, and what they are looked at against; `None` where nothing was compared.
 fn flight(outcome: &Outcome, name: &str, budget: Budget) -> Option<Value> {
-    let pictures: Vec<&Picture> = outcome.pictures.iter().filter(|own| own.flight == name).collect();
+    let pictures: Vec<&Picture> = outcome.pictures.iter().filter(|picture| picture.flight == name).collect();
     let first = pictures.first()?;
     let cloud = evenly(first.time_s.len(), budget.cloud);
     let regressors = outcome.regressors.get(name).map_or(&[][..], Vec::as_slice);
-    let input =
-        |own: &Regressor| json!({ "name": own.name, "unit": own.unit, "cloud": at(&own.values, &cloud) });
+    let input = |regressor: &Regressor| json!({ "name": regressor.name, "unit": regressor.unit, "cloud": at(&regressor.values, &cloud) });
     let equations: Vec<Value> =
         pictures.iter().map(|picture| equation(picture, regressors, budget.curve, &cloud)).collect();
     Some(json!({
@@ -101,7 +100,7 @@ fn component(
     } else {
         ["x", "y", "z"][axis].into()
     };
-    let inputs = std::iter::once(measured).chain(regressors.iter().map(|own| &own.values));
+    let inputs = std::iter::once(measured).chain(regressors.iter().map(|regressor| &regressor.values));
     let cross = |input: &Vec<f64>| json!({ "before": lagged(before, input), "after": lagged(after, input) });
     let windows = apart(before).len();
     json!({
@@ -163,8 +162,8 @@ fn extremes(series: &[&Vec<f64>], points: usize) -> Vec<usize> {
     for first in (0..count).step_by(stretch) {
         let all = first..(first + stretch).min(count);
         chosen.insert(first);
-        for own in series {
-            let by_value = |a: &usize, b: &usize| own[*a].total_cmp(&own[*b]);
+        for values in series {
+            let by_value = |a: &usize, b: &usize| values[*a].total_cmp(&values[*b]);
             chosen.extend(all.clone().min_by(by_value).into_iter().chain(all.clone().max_by(by_value)));
         }
     }

@@ -192,14 +192,14 @@ fn check_field(manifest: &Manifest, plan: &Plan, pass: &Spanned<PassCondition>) 
         check_limits(gate.min, gate.max, None)
             .map_err(|error| at(format!("`while`: {error}"), &error.help()))?;
     }
-    let Some(own) = unit(&condition.topic, &condition.field)? else { return Ok(()) };
-    diagnostics::convert(&own, &condition.unit)
+    let Some(unit_here) = unit(&condition.topic, &condition.field)? else { return Ok(()) };
+    diagnostics::convert(&unit_here, &condition.unit)
         .map_err(|error| at(error.to_string(), "state the limits in a unit of the field's quantity"))?;
     if let Some(minus) = &condition.minus
         && let Some(other) = unit(&minus.topic, &minus.field)?
-        && other != own
+        && other != unit_here
     {
-        return Err(at(format!("`minus` takes `{other}` off `{own}`"), "compare fields of one unit"));
+        return Err(at(format!("`minus` takes `{other}` off `{unit_here}`"), "compare fields of one unit"));
     }
     if let Some(gate) = &condition.gate {
         unit(&gate.topic, &gate.field)?;

@@ -256,8 +256,8 @@ fn is_text_without_interpreter(path: &Path) -> bool {
 
 /// The file behind a bare name, in the folders of the PATH that the process will have.
 fn in_path(process: &Process, word: &str) -> Option<String> {
-    let own = process.environment.iter().find(|(name, _)| name.get_ref() == "PATH");
-    let path = own.map(|(_, path)| path.into()).or_else(|| std::env::var_os("PATH"))?;
+    let stated = process.environment.iter().find(|(name, _)| name.get_ref() == "PATH");
+    let path = stated.map(|(_, path)| path.into()).or_else(|| std::env::var_os("PATH"))?;
     let mut files = std::env::split_paths(&path).map(|folder| folder.join(word));
     let found = files.find(|file| !word.is_empty() && is_executable(file))?;
     Some(std::path::absolute(&found).unwrap_or(found).to_string_lossy().into_owned())

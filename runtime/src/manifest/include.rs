@@ -114,11 +114,11 @@ pub fn merged(sources: &Sources) -> Result<DeTable<'_>, Diagnostic> {
 /// Puts the elements of the lists of `below` in front of those of `table`.
 fn prepend_lists<'t>(table: &mut DeTable<'t>, below: &mut DeTable<'t>) {
     for list in LISTS {
-        let Some(DeValue::Array(own)) = table.get_mut(list).map(Spanned::get_mut) else { continue };
+        let Some(DeValue::Array(here)) = table.get_mut(list).map(Spanned::get_mut) else { continue };
         let Some(DeValue::Array(inherited)) = below.get_mut(list).map(Spanned::get_mut) else { continue };
         let (first, then) =
-            (std::mem::replace(inherited, DeArray::new()), std::mem::replace(own, DeArray::new()));
-        *own = first.into_iter().chain(then).collect();
+            (std::mem::replace(inherited, DeArray::new()), std::mem::replace(here, DeArray::new()));
+        *here = first.into_iter().chain(then).collect();
     }
 }
 

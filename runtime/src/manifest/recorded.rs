@@ -69,8 +69,8 @@ fn set(document: &mut toml_edit::DocumentMut, text: &str, sources: &Sources) -> 
         && let (true, Ok(number)) = (include::LISTS.contains(&list.as_str()), index.parse::<usize>())
     {
         // The elements of included files come first.
-        let Some(own) = number.checked_sub(include::inherited(sources, list)?) else { return Ok(false) };
-        *index = own.to_string();
+        let Some(local) = number.checked_sub(include::inherited(sources, list)?) else { return Ok(false) };
+        *index = local.to_string();
     }
     // On a copy: a path that breaks off halfway must leave nothing behind.
     let mut changed = document.clone();

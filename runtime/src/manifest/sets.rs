@@ -211,13 +211,13 @@ fn published(
 
 /// Makes the topics in a process of a set those of the vehicle `name`; `local` are the ones it publishes.
 fn localise(process: &mut DeTable<'_>, name: &str, local: &[String]) {
-    let own = |topic: &str| format!("/{name}{topic}");
+    let absolute = |topic: &str| format!("/{name}{topic}");
     for (_, output) in tree::table_mut(process, "outputs").into_iter().flatten() {
         if let DeValue::Table(output) = output.get_mut() {
-            rename(output.get_mut("topic"), |topic| topic.starts_with('/').then(|| own(topic)));
+            rename(output.get_mut("topic"), |topic| topic.starts_with('/').then(|| absolute(topic)));
         }
     }
-    let rename_local = |topic: &str| local.iter().any(|local| local == topic).then(|| own(topic));
+    let rename_local = |topic: &str| local.iter().any(|local| local == topic).then(|| absolute(topic));
     localise_inputs(process, rename_local);
     if let Some(standby) = tree::table_mut(process, "standby") {
         localise_inputs(standby, rename_local);
