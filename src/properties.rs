@@ -225,8 +225,8 @@ fn any_text_is_accepted_or_refused() {
 
 #[test]
 fn any_words_are_accepted_or_refused() {
-    let words = prop::collection::vec(select(&WORDS[..]), 0..12);
-    for_any(300, words, |folder, words| folder.survives(words.join("\n").as_bytes(), &[]));
+    let given = prop::collection::vec(select(&WORDS[..]), 0..12);
+    for_any(300, given, |folder, words| folder.survives(words.join("\n").as_bytes(), &[]));
 }
 
 #[test]

@@ -38,8 +38,8 @@ pub fn hop_ns(cores: &[Option<usize>], laps: u32, spin: bool) -> Result<f64> {
 }
 
 /// A process of the ring: waits for its word to reach each lap, then passes the lap on.
-pub fn process(words: &[String]) -> Result<()> {
-    let [path, index, count, laps, core, wait] = words else { return Err("six arguments".into()) };
+pub fn process(args: &[String]) -> Result<()> {
+    let [path, index, count, laps, core, wait] = args else { return Err("six arguments".into()) };
     let (index, count, laps): (usize, usize, u32) = (index.parse()?, count.parse()?, laps.parse()?);
     if let Ok(core) = core.parse() {
         let mut set = CpuSet::new();

@@ -24,12 +24,12 @@ use report::Result;
 const HUMMINGBUS: &str = env!("CARGO_BIN_EXE_hummingbus");
 
 fn main() -> Result<()> {
-    let words: Vec<String> = std::env::args().skip(1).filter(|word| word != "--bench").collect();
-    match words.first().map(String::as_str) {
+    let args: Vec<String> = std::env::args().skip(1).filter(|word| word != "--bench").collect();
+    match args.first().map(String::as_str) {
         // This binary is also the processes it measures.
-        Some("floor-process") => floor::process(&words[1..]),
-        Some("relay-process") => relay::process(&words[1..]),
-        _ => parts(&words),
+        Some("floor-process") => floor::process(&args[1..]),
+        Some("relay-process") => relay::process(&args[1..]),
+        _ => parts(&args),
     }
 }
 

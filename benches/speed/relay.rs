@@ -58,8 +58,8 @@ struct Parameters {
 const LATENCY_NS_MAX: u64 = 10_000_000_000;
 
 /// Runs a relay whose payload has the size given as the only argument.
-pub fn process(words: &[String]) -> Result<()> {
-    let [bytes] = words else { return Err("one argument: the payload's size".into()) };
+pub fn process(args: &[String]) -> Result<()> {
+    let [bytes] = args else { return Err("one argument: the payload's size".into()) };
     run(bytes.parse()?)
 }
 

@@ -104,8 +104,8 @@ pub fn recording(channel: &str, seed: u64) -> String {
 }
 
 fn main() {
-    let mut words = std::env::args().skip(1);
-    let (channel, seed) = (words.next(), words.next().and_then(|seed| seed.parse().ok()));
+    let mut args = std::env::args().skip(1);
+    let (channel, seed) = (args.next(), args.next().and_then(|seed| seed.parse().ok()));
     match (channel.as_deref(), seed) {
         (Some(channel @ ("roll" | "pitch")), Some(seed)) => print!("{}", recording(channel, seed)),
         _ => {

@@ -267,8 +267,8 @@ fn a_stray_quotation_mark_is_refused_with_its_line_and_swallows_nothing() {
     let mut lines: Vec<String> = whole.lines().map(str::to_owned).collect();
     lines[101] = lines[101].replacen(',', ",\"", 1);
     for (text, line) in [(lines.join("\n"), "line 102, cell 2"), (lines.join("\r\n"), "line 102, cell 2")] {
-        let words = refused(CSV, text.as_bytes());
-        assert!(words.contains(line) && words.contains("remove the mark"), "{words}");
+        let message = refused(CSV, text.as_bytes());
+        assert!(message.contains(line) && message.contains("remove the mark"), "{message}");
     }
     // A second one closes the first, lines later.
     lines[150] = lines[150].replacen(',', "\",", 1);
@@ -295,15 +295,15 @@ fn stamps_further_apart_than_any_flight_are_refused_with_their_line() {
     let since_start = timed(|k| if k == 0 { 0.0 } else { 1e16 + 1e7 * f64::from(k) });
     let no_unit = timed(|k| 1e16 * f64::from(k));
     for text in [&since_start, &no_unit] {
-        let words = refused(CSV, text.as_bytes());
+        let message = refused(CSV, text.as_bytes());
         for part in
             ["200 samples lie over", "from line 2, 0 s", "to line 3, 10000", "correct the unit", "`from_s`"]
         {
-            assert!(words.contains(part), "`{part}` is not in: {words}");
+            assert!(message.contains(part), "`{part}` is not in: {message}");
         }
     }
-    let words = read_as(CSV, "", since_start.as_bytes()).unwrap_err().to_string();
-    assert!(words.contains("`unit = \"ns\"` would fit"), "{words}");
+    let message = read_as(CSV, "", since_start.as_bytes()).unwrap_err().to_string();
+    assert!(message.contains("`unit = \"ns\"` would fit"), "{message}");
     // A stamp far ahead at the end, where nothing behind it shows that it is wrong.
     let last = timed(|k| if k == 199 { 1e9 } else { 0.01 * f64::from(k) });
     assert!(refused(CSV, last.as_bytes()).contains("to line 201, 1000000000 s"));
@@ -315,8 +315,8 @@ fn stamps_further_apart_than_any_flight_are_refused_with_their_line() {
 fn a_wide_header_over_short_rows_costs_no_more_than_the_file() {
     let header: String = (0..20_000).map(|column| format!(",c{column}")).collect();
     let rows: String = (0..20_000).map(|row| format!("{}\n", 0.01 * f64::from(row))).collect();
-    let words = refused(CSV, format!("t{header}\n{rows}").as_bytes());
-    assert!(words.contains("no column"), "{words}");
+    let message = refused(CSV, format!("t{header}\n{rows}").as_bytes());
+    assert!(message.contains("no column"), "{message}");
 }
 
 #[test]

@@ -38,7 +38,7 @@ fn log(seed: u64) -> String {
     text
 }
 
-/// Reads two flights, each given as its log and further keys; the words of the refusal, if it is one.
+/// Reads two flights, each given as its log and further keys; the text of the refusal, if it is one.
 fn held_out(place: &Place, fit: (&str, &str), test: (&str, &str)) -> Result<(), String> {
     let vehicle = Path::new(env!("CARGO_MANIFEST_DIR")).join("../vehicles/hummingbird.toml");
     let flight = |name: &str, (file, keys): (&str, &str)| {
@@ -51,11 +51,11 @@ fn held_out(place: &Place, fit: (&str, &str), test: (&str, &str)) -> Result<(), 
 }
 
 fn refused(place: &Place, fit: (&str, &str), test: (&str, &str), parts: &[&str]) {
-    let words = held_out(place, fit, test).expect_err("it is not held out");
+    let message = held_out(place, fit, test).expect_err("it is not held out");
     for part in
         parts.iter().chain(&["flights.toml:15:8", "`the fit`", "`the test`", "by `from_s` and `to_s`"])
     {
-        assert!(words.contains(part), "`{part}` is not in: {words}");
+        assert!(message.contains(part), "`{part}` is not in: {message}");
     }
 }
 

@@ -166,10 +166,10 @@ fn a_pose_whose_axes_are_mistaken_is_found_without_a_gyroscope() {
     };
     let (angles, position) = (r#""roll", "pitch", "yaw""#, r#""px", "py", "pz""#);
     assert_eq!(read(&Motion::default(), &poses(angles, position), "").unwrap().notes, [""; 0]);
-    let fits = |angles: &str, position: &str, words: &str| {
+    let fits = |angles: &str, position: &str, advised: &str| {
         let found = findings(&Motion::default(), &poses(angles, position));
         let [(Quantity::Attitude, advice)] = &found[..] else { panic!("{angles} {position}: {found:?}") };
-        assert!(advice.split(", or ").any(|own| own == words), "{angles} {position}: {advice}");
+        assert!(advice.split(", or ").any(|own| own == advised), "{angles} {position}: {advice}");
     };
     fits(r#""roll", "-pitch", "yaw""#, position, "a `-` before the pitch");
     fits(r#""-roll", "-pitch", "yaw""#, position, "a `-` before roll and pitch");

@@ -327,7 +327,7 @@ fn mistakes_are_said_with_what_to_do() {
     assert!(path.contains("`static.file`"), "{path}");
 }
 
-/// A stand whose log `first` is fitted on and `second` tested on; the words of the refusal, if it is one.
+/// A stand whose log `first` is fitted on and `second` tested on; the text of the refusal, if it is one.
 fn held_out(table: &str, first: &str, second: &str) -> Result<(), String> {
     let name = if table == STATIC { "static" } else { "dynamic" };
     let test = table
@@ -357,9 +357,9 @@ fn a_log_to_test_on_that_is_fitted_on_is_refused() {
             .map(|(_, line)| line.to_owned() + "\n")
             .collect();
         for (second, how) in [(&first, "copies of the same bytes"), (&part, "rows are the same")] {
-            let words = held_out(table, &first, second).unwrap_err();
+            let message = held_out(table, &first, second).unwrap_err();
             for part in [how, "other.csv", "role \"test\"", "is not held out", "by `held_out`"] {
-                assert!(words.contains(part), "`{part}` is not in: {words}");
+                assert!(message.contains(part), "`{part}` is not in: {message}");
             }
         }
     }
@@ -379,8 +379,8 @@ fn stray_marks_and_stamps_of_any_size_in_stand_logs_end_in_words() {
     of_static(&log).unwrap();
     let mut lines: Vec<String> = log.lines().map(str::to_owned).collect();
     lines[101] = lines[101].replacen(',', ",\"", 1);
-    let words = of_static(&lines.join("\n")).unwrap_err();
-    assert!(words.contains("static.csv") && words.contains("line 102, cell 2"), "{words}");
+    let message = of_static(&lines.join("\n")).unwrap_err();
+    assert!(message.contains("static.csv") && message.contains("line 102, cell 2"), "{message}");
     let stamped = |stamp: &dyn Fn(f64) -> f64, log: &str| {
         let mut rows = log.lines();
         let mut text = rows.next().unwrap().to_owned() + "\n";
@@ -415,9 +415,9 @@ fn esc_test(stand: &str) -> Option<RotorReport> {
     Some(rotor::run(&path).unwrap().report)
 }
 
-/// Whether some finding of the report has `words`.
-fn says(report: &RotorReport, words: &str) -> bool {
-    report.to_string().contains(words)
+/// Whether some finding of the report has `text`.
+fn says(report: &RotorReport, text: &str) -> bool {
+    report.to_string().contains(text)
 }
 
 #[test]
@@ -439,10 +439,10 @@ fn esc_test_f40_has_plausible_figures_and_its_faults_are_named() {
     // Which clock is taken must not decide.
     let other = dynamics.other_clock_s.unwrap().value;
     assert!(time.low < other && other < time.high, "{report}");
-    for words in
+    for text in
         ["thrust: it grows as w^2.2", "are in transition", "tare of thrust", "rows are taken as evenly"]
     {
-        assert!(says(&report, words), "{words}: {report}");
+        assert!(says(&report, text), "{text}: {report}");
     }
 }
 

@@ -139,7 +139,7 @@ impl RecordingWriter {
 
 /// Opens the empty file at `path`, which is created if nothing is there.
 fn open_empty(path: &Path) -> std::io::Result<File> {
-    let refused = |words: &str| Err(std::io::Error::other(words));
+    let refused = |message: &str| Err(std::io::Error::other(message));
     match std::fs::symlink_metadata(path) {
         // To open a pipe or a device is to do something to it.
         Ok(old) if !old.is_file() => refused("it exists and is not a regular file"),

@@ -152,7 +152,7 @@ fn read(bytes: &[u8]) -> Result<Option<usize>, TestCaseError> {
     let _ = strict.as_ref().map(Recording::attachments);
     let salvaged = Recording::salvage(&path);
     if let (Err(strict), Err(salvaged)) = (&strict, &salvaged) {
-        let names_file = |words: &str| words.contains("any.mcap");
+        let names_file = |message: &str| message.contains("any.mcap");
         prop_assert!(
             names_file(&strict.to_string()) && names_file(&salvaged.to_string()),
             "{strict}; {salvaged}"
