@@ -1,16 +1,23 @@
 //! Whole runs, simulated: the supervisor of real runs in a world that is drawn from one seed.
 //!
-//! Drawn are what flies (restarts, standbys, swaps, shadows, sidecars), the order of all steps, also within a look of the
-//! supervisor, and what befalls it: deaths, hangs, pauses, jumps of the clock, starts and files that fail, lost and spurious
-//! wake-ups, swaps, stops, interrupts, holds and steps in flight (`faults`). After a while the storm is over, and the
-//! run must come to its end. Held on the way: one writer per topic and tick; no tick skipped; one change of membership at a
-//! time; no slot cleared while somebody is in it; a stop that is asked for comes; a watchdog expires only where something
-//! hangs, and a run is aborted only where something happened that may end it; nobody outlives the supervisor; a swap that was reported took place.
+//! What is drawn:
+//! - the run: restarts, standbys, swaps, shadows and sidecars
+//! - the order of all steps, also between the reads and writes of one pass of the supervisor
+//! - the faults: deaths, hangs, pauses, jumps of the clock, starts and files that fail, lost and spurious wake-ups
+//! - the requests of users: swaps, stops, interrupts, holds and single steps
 //!
-//! A seed that fails is flown again with a log, and the command that repeats it is printed. `SIMULATED_RUNS` says how many
-//! seeds are flown, and `SIMULATED_SEED` with which they begin.
+//! After a drawn number of steps no more faults occur, and the run must end. The rules that are checked on the way:
+//! - One instance writes each sample that counts, and no tick is skipped.
+//! - Memberships change one at a time; no slot is cleared while a process is in it.
+//! - A stop that was asked for takes effect, and a swap that was reported took place.
+//! - A watchdog expires only where a process hangs; a run is aborted only after a fault that may end it.
+//! - No process outlives the supervisor.
+//!
+//! A seed that fails is flown again with a log, and the command that repeats it is printed. `SIMULATED_RUNS` says how
+//! many seeds are flown, and `SIMULATED_SEED` with which they begin.
 
 mod clock;
+mod fault;
 mod faults;
 mod node;
 mod outside;
@@ -21,7 +28,7 @@ mod sim;
 use crate::event::RunEvent;
 use crate::supervision::Supervisor;
 use crate::supervisor::State;
-use faults::{Fault, HARMFUL, HARMLESS};
+use fault::{Fault, HARMFUL, HARMLESS};
 use outside::SimWorld;
 use sim::{Bug, Draw, Log, Sim};
 use std::cell::RefCell;
@@ -112,28 +119,32 @@ fn whatever_happens_a_run_ends_and_every_sample_has_one_writer() {
         }
     }
     println!("seeds {first} to {}: {ends:?}", first + seeds - 1);
-    // Runs come to their end, and runs are aborted because of what nobody can answer.
-    let share =
-        |state: State| f64::from(ends.get(&format!("{state:?}")).copied().unwrap_or(0)) / seeds as f64;
-    let shares = [State::Stopped, State::Failed].map(share);
-    assert!(shares.iter().all(|&share| share > 0.1) || seeds < 100, "{ends:?}");
+    // Measured on seeds 0 to 5999: 76 % are stopped and 24 % fail. The floors are three standard deviations of 1000
+    // seeds lower: faults must neither end nearly every run nor spare nearly every run.
+    for (state, floor) in [(State::Stopped, 0.72), (State::Failed, 0.20)] {
+        let runs = ends.get(&format!("{state:?}")).copied().unwrap_or(0);
+        assert!(seeds < 1000 || f64::from(runs) > floor * seeds as f64, "{state:?}: {ends:?}");
+    }
 }
 
-/// A rule that no bug breaks would be none.
+/// Each planted bug breaks the rule that is to find it: no other panic counts as found.
 #[test]
 fn bugs_that_are_planted_are_found() {
+    let expired = "a watchdog expired though nothing hangs";
+    let aborted = "it was aborted though nothing happened that may end it";
+    let outlived = "they outlive the supervisor";
     for (bug, breaks) in [
-        (Bug::AcknowledgesUnread, ""),
-        (Bug::AwaitsNobody, "has not acknowledged"),
-        (Bug::PromotesTwo, ""),
-        (Bug::LosesWakeUp, ""),
-        (Bug::ForgetsStop, "long after a stop"),
-        (Bug::KillMisses, ""),
+        (Bug::AcknowledgesUnread, &[" is due"][..]),
+        (Bug::AwaitsNobody, &["has not acknowledged"]),
+        (Bug::PromotesTwo, &[" is due"]),
+        (Bug::LosesWakeUp, &[expired, aborted]),
+        (Bug::ForgetsStop, &["long after a stop"]),
+        (Bug::KillMisses, &[outlived, "is cleared, and somebody is in it"]),
     ] {
         let found = (0..SEEDS_OF_BUG).find_map(|seed| Some((seed, try_live(seed, Some(bug), &None).err()?)));
         let (seed, broken) = found.unwrap_or_else(|| panic!("{bug:?} is not found in {SEEDS_OF_BUG} seeds"));
         println!("{bug:?} is found by seed {seed}: {broken}");
-        assert!(broken.contains(breaks), "{bug:?}, seed {seed}: {broken}");
+        assert!(breaks.iter().any(|&rule| broken.contains(rule)), "{bug:?}, seed {seed}: {broken}");
     }
 }
 

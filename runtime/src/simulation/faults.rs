@@ -1,65 +1,31 @@
 //! What befalls a simulated run: faults, and what its users ask for.
 
-use super::sim::{Doing, FOR_EVER, NEVER, Sim};
+use super::fault::Fault::{self, Death, Hang, Interrupt, Leap, NeverReady, Pause, Steer, Stop, Swap};
+use super::fault::HARMFUL;
+use super::sim::{Doing, FOR_EVER, NEVER, Need, Sim};
 use crate::ctl::protocol::Request;
 use crate::host::End;
 use crate::role::Role;
 use std::collections::BTreeSet;
 use std::time::Duration;
 
-/// Something that may happen at any step while the storm lasts.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub(super) enum Fault {
-    // A run goes on whatever of these happens.
-    /// A process stands still for a while.
-    Pause,
-    /// The host's clock jumps, or everybody was frozen.
-    Leap,
-    /// The supervisor does not hear of a change.
-    LostNotice,
-    /// Somebody wakes for nothing.
-    SpuriousWakeUp,
-    /// Somebody asks for a swap.
-    Swap,
-    /// Somebody pauses the run, steps it, or lets it go on.
-    Steer,
-    /// Somebody asks for a stop.
-    Stop,
-    /// The plan of a backup cannot be written.
-    StoreBackup,
-    // These may end it.
-    /// Somebody asks for a second stop.
-    Interrupt,
-    /// A process dies.
-    Death,
-    /// A process hangs for good.
-    Hang,
-    /// A sidecar does not get ready.
-    NeverReady,
-    /// A process cannot be started.
-    Start,
-    /// A membership cannot be written.
-    StoreMembership,
-}
-
-use Fault::{
-    Death, Hang, Interrupt, Leap, LostNotice, NeverReady, Pause, SpuriousWakeUp, Start, Steer, Stop,
-    StoreBackup, StoreMembership, Swap,
-};
-
-pub(super) const HARMLESS: [Fault; 8] =
-    [Pause, Leap, LostNotice, SpuriousWakeUp, Swap, Steer, Stop, StoreBackup];
-pub(super) const HARMFUL: [Fault; 6] = [Interrupt, Death, Hang, NeverReady, Start, StoreMembership];
-
 impl Sim {
     /// Whether `fault` is struck now, where it can be: once in so many times.
     pub(super) fn strikes(&mut self, fault: Fault, one_in: u64) -> bool {
-        let strikes = self.faults.contains(&fault) && self.draw.one_in(one_in);
+        let strikes = self.is_drawn(fault, one_in);
         if strikes && HARMFUL.contains(&fault) {
-            self.note(|_| format!("{fault:?}"));
-            self.excuses.push(format!("{fault:?}"));
+            self.excuse(fault);
         }
         strikes
+    }
+
+    fn is_drawn(&mut self, fault: Fault, one_in: u64) -> bool {
+        self.faults.contains(&fault) && self.draw.one_in(one_in)
+    }
+
+    fn excuse(&mut self, fault: Fault) {
+        self.note(|_| format!("{fault:?}"));
+        self.excuses.push(format!("{fault:?}"));
     }
 
     /// Strikes what is drawn for this step.
@@ -97,8 +63,12 @@ impl Sim {
             self.note(|sim| format!("{:?} dies", sim.instances[victim]));
             self.instances[victim].end = Some(End::Signalled(9));
             self.notify();
-        } else if self.strikes(Hang, 2000) {
+        } else if self.is_drawn(Hang, 2000) {
             self.note(|sim| format!("{:?} hangs", sim.instances[victim]));
+            // Nobody waits for a sidecar that is ready: its hang may not end the run.
+            if self.instances[victim].doing != Doing::Idle {
+                self.excuse(Hang);
+            }
             self.instances[victim].frozen_until = FOR_EVER;
         } else if self.strikes(Pause, 60) && self.instances[victim].frozen_until <= self.now {
             self.instances[victim].frozen_until = self.now + self.draw.micros(10_000);
@@ -117,7 +87,7 @@ impl Sim {
 
     pub(super) fn steer(&mut self, hold_tick: u32) {
         self.segment.hold_tick = hold_tick;
-        self.wake(super::sim::Need::Steering);
+        self.wake(Need::Steering);
     }
 
     /// Nothing more happens, and what was paused is let go: from now on, the run must come to its end.
@@ -130,7 +100,7 @@ impl Sim {
 
     /// A watchdog expires only where something hangs: a death is answered before.
     pub(super) fn check_watchdogs(&self, text: &str) {
-        let expires = ["killed by the watchdog", "stood still"].iter().any(|words| text.contains(words));
+        let expires = ["killed by the watchdog", "stood still"].iter().any(|message| text.contains(message));
         let hangs = [Hang, NeverReady].map(|fault| format!("{fault:?}"));
         assert!(
             !expires || self.excuses.iter().any(|excuse| hangs.contains(excuse)),

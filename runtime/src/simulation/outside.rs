@@ -1,10 +1,11 @@
 //! The simulated world as its supervisor meets it.
 
-use super::faults::Fault;
+use super::fault::Fault;
+use super::settings::WATCHDOG;
 use super::sim::{Bug, Doing, Need, Sim};
 use crate::ctl::protocol::{Answer, Request};
 use crate::host::End;
-use crate::program::{BackupSpec, Executable, Program};
+use crate::program::{BackupSpec, Executable, Program, Readiness};
 use crate::role::Role;
 use crate::view::{SegmentWrite, SlotView, View};
 use crate::world::{Body, World};
@@ -92,21 +93,22 @@ impl World for SimWorld {
     fn wait(&mut self, notices: u32, timeout: Duration) {
         let sim = &mut *self.0.borrow_mut();
         let deadline = sim.now + timeout;
-        sim.go_on_until(deadline, notices);
+        sim.run_until(deadline, notices);
     }
 
     fn spent(&self, _: usize) -> (u64, u32) {
         (0, 0)
     }
 
-    fn start(&mut self, name: &str, role: Role, _: Option<&Program>) -> Result<SimBody> {
+    fn start(&mut self, name: &str, role: Role, program: Option<&Program>) -> Result<SimBody> {
         let mut sim = self.0.borrow_mut();
         sim.preempt();
         sim.note(|_| format!("start {role:?}"));
         if sim.strikes(Fault::Start, 10) {
             bail!("process `{name}`: no more processes");
         }
-        Ok(SimBody { index: sim.start(role), sim: self.0.clone() })
+        let notifies = program.is_some_and(|program| program.ready == Readiness::Notify);
+        Ok(SimBody { index: sim.start(role, notifies), sim: self.0.clone() })
     }
 
     fn hears_ready(&mut self, index: usize) -> bool {
@@ -174,8 +176,7 @@ impl World for SimWorld {
         let sim = self.0.borrow();
         let node = sim.plan.nodes.iter().position(|node| node.name == process);
         let node = node.ok_or_else(|| Diagnostic::in_file("m.toml", "no such process"))?;
-        let program =
-            Program { watchdog: super::settings::WATCHDOG, ..Program::of(Executable::Command(Vec::new())) };
+        let program = Program { watchdog: WATCHDOG, ..Program::of(Executable::Command(Vec::new())) };
         let plan = sim.plan.nodes[node].clone();
         Ok(BackupSpec { node, join_tick: 0, take_over_tick: None, is_standby: false, program, plan })
     }

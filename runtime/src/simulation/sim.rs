@@ -1,6 +1,8 @@
-//! The memory of a simulated run, its instances, and the order in which they go on.
+//! The memory of a simulated run, its instances, and the order of their steps.
 
+use super::fault::Fault;
 use crate::ctl::protocol::{Answer, Request};
+use crate::event::StopToken;
 use crate::host::End;
 use crate::role::Role;
 use crate::view::{SlotView, View};
@@ -141,7 +143,7 @@ pub(super) struct Sim {
     pub(super) draw: Draw,
     pub(super) bug: Option<Bug>,
     /// The faults that are drawn; none once the storm is over.
-    pub(super) faults: BTreeSet<super::faults::Fault>,
+    pub(super) faults: BTreeSet<Fault>,
     pub(super) now: Duration,
     /// The control segment.
     pub(super) segment: View,
@@ -162,7 +164,7 @@ pub(super) struct Sim {
     pub(super) looks: u32,
     /// The look at which a stop was asked for.
     pub(super) stop_look: Option<u32>,
-    pub(super) stop: crate::event::StopToken,
+    pub(super) stop: StopToken,
     pub(super) log: Log,
     /// Steps so far, and with how many of them the storm is over; when that was.
     pub(super) steps: u32,
@@ -171,7 +173,7 @@ pub(super) struct Sim {
 }
 
 impl Sim {
-    pub(super) fn new(plan: &Plan, mut draw: Draw, faults: BTreeSet<super::faults::Fault>) -> Self {
+    pub(super) fn new(plan: &Plan, mut draw: Draw, faults: BTreeSet<Fault>) -> Self {
         let mut slots = vec![SlotView::EMPTY; 2 * NODES];
         slots[..NODES].iter_mut().for_each(|slot| slot.state = SlotState::Taken);
         let segment = View {
@@ -210,7 +212,7 @@ impl Sim {
             answers: Vec::new(),
             looks: 0,
             stop_look: None,
-            stop: crate::event::StopToken::new(),
+            stop: StopToken::new(),
             log: None,
             steps: 0,
             storm_steps: 500 + draw.below(2500) as u32,
@@ -227,13 +229,17 @@ impl Sim {
         }
     }
 
-    /// Starts an instance; returns its number.
-    pub(super) fn start(&mut self, role: Role) -> usize {
+    /// Starts an instance, which says that it is ready if it `notifies`; returns its number.
+    pub(super) fn start(&mut self, role: Role, notifies: bool) -> usize {
         let outputs = match role {
             Role::Node { node, .. } => self.plan.nodes[node].outputs.len(),
             Role::Clock | Role::Sidecar { .. } => 0,
         };
-        let doing = if role == Role::Clock { Doing::Gathering(Phase::Connecting) } else { Doing::Starting };
+        let doing = match role {
+            Role::Clock => Doing::Gathering(Phase::Connecting),
+            Role::Sidecar { .. } if !notifies => Doing::Idle,
+            Role::Node { .. } | Role::Sidecar { .. } => Doing::Starting,
+        };
         let start = self.draw.micros(1000);
         self.instances.push(Instance {
             role,
@@ -285,13 +291,13 @@ impl Sim {
 
     /// Tells the supervisor that there is something to look at.
     pub(super) fn notify(&mut self) {
-        if !self.strikes(super::faults::Fault::LostNotice, 3) {
+        if !self.strikes(Fault::LostNotice, 3) {
             self.notices += 1;
         }
     }
 
-    /// Everything goes on until `deadline`, or until there is a notice beyond `notices`.
-    pub(super) fn go_on_until(&mut self, deadline: Duration, notices: u32) {
+    /// Runs all instances until `deadline`, or until there is a notice beyond `notices`.
+    pub(super) fn run_until(&mut self, deadline: Duration, notices: u32) {
         while self.now < deadline && self.notices == notices {
             self.step(deadline);
         }
@@ -313,7 +319,7 @@ impl Sim {
             panic!("it does not end: {:?} {:?}", self.segment, self.living().collect::<Vec<_>>());
         }
         self.strike();
-        let spurious = self.strikes(super::faults::Fault::SpuriousWakeUp, 20);
+        let spurious = self.strikes(Fault::SpuriousWakeUp, 20);
         let is_awake = |sim: &Self, index: usize| {
             let instance = &sim.instances[index];
             let is_asleep = instance.sleep.is_some_and(|(_, until)| until > sim.now);
@@ -341,11 +347,10 @@ impl Sim {
     }
 
     fn step_sidecar(&mut self, index: usize) {
-        let is_late = self.strikes(super::faults::Fault::NeverReady, 2);
+        let says_ready =
+            self.instances[index].doing == Doing::Starting && !self.strikes(Fault::NeverReady, 2);
         let instance = &mut self.instances[index];
-        if instance.doing == Doing::Starting && !is_late {
-            instance.says_ready = true;
-        }
+        instance.says_ready |= says_ready;
         instance.doing = Doing::Idle;
         instance.sleep = Some((Need::Nothing, FOR_EVER));
     }

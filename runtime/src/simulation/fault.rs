@@ -1,0 +1,45 @@
+//! The faults that a simulated run may meet, and which of them may end it.
+
+/// Something that may happen at any step while the storm lasts.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) enum Fault {
+    // A run goes on whatever of these happens.
+    /// A process stands still for a while.
+    Pause,
+    /// The host's clock jumps, or everybody was frozen.
+    Leap,
+    /// The supervisor does not hear of a change.
+    LostNotice,
+    /// Somebody wakes for nothing.
+    SpuriousWakeUp,
+    /// Somebody asks for a swap.
+    Swap,
+    /// Somebody pauses the run, steps it, or lets it go on.
+    Steer,
+    /// Somebody asks for a stop.
+    Stop,
+    /// The plan of a backup cannot be written.
+    StoreBackup,
+    // These may end it.
+    /// Somebody asks for a second stop.
+    Interrupt,
+    /// A process dies.
+    Death,
+    /// A process hangs for good.
+    Hang,
+    /// A sidecar does not get ready.
+    NeverReady,
+    /// A process cannot be started.
+    Start,
+    /// A membership cannot be written.
+    StoreMembership,
+}
+
+use Fault::{
+    Death, Hang, Interrupt, Leap, LostNotice, NeverReady, Pause, SpuriousWakeUp, Start, Steer, Stop,
+    StoreBackup, StoreMembership, Swap,
+};
+
+pub(super) const HARMLESS: [Fault; 8] =
+    [Pause, Leap, LostNotice, SpuriousWakeUp, Swap, Steer, Stop, StoreBackup];
+pub(super) const HARMFUL: [Fault; 6] = [Interrupt, Death, Hang, NeverReady, Start, StoreMembership];
