@@ -13,7 +13,7 @@ const NO_LOCKS: &str = "the file system cannot lock files (flock), as some netwo
 /// # Errors
 /// If the file system has no locks.
 pub fn try_exclusive(file: &File) -> io::Result<bool> {
-    is_taken(file.try_lock())
+    lock(|| file.try_lock())
 }
 
 /// Locks `file` against those who want it alone; false where one of them has it.
@@ -21,7 +21,7 @@ pub fn try_exclusive(file: &File) -> io::Result<bool> {
 /// # Errors
 /// If the file system has no locks.
 pub fn try_shared(file: &File) -> io::Result<bool> {
-    is_taken(file.try_lock_shared())
+    lock(|| file.try_lock_shared())
 }
 
 /// Locks `file` for this process alone, and waits for others to give it back.
@@ -29,22 +29,22 @@ pub fn try_shared(file: &File) -> io::Result<bool> {
 /// # Errors
 /// If the file system has no locks.
 pub fn exclusive(file: &File) -> io::Result<()> {
-    loop {
-        match file.lock() {
-            Err(error) if error.kind() == ErrorKind::Interrupted => {}
-            locked => return locked,
-        }
-    }
+    lock(|| file.lock().map_err(TryLockError::Error)).map(|_| ())
 }
 
-fn is_taken(attempt: Result<(), TryLockError>) -> io::Result<bool> {
-    match attempt {
-        Ok(()) => Ok(true),
-        Err(TryLockError::WouldBlock) => Ok(false),
-        Err(TryLockError::Error(error)) => {
-            let has_none =
-                matches!(Errno::from_io_error(&error), Some(Errno::NOSYS | Errno::NOLCK | Errno::OPNOTSUPP));
-            Err(if has_none { io::Error::other(NO_LOCKS) } else { error })
+/// Attempts it again where a signal interrupts it; false where another process holds a lock.
+fn lock(attempt: impl Fn() -> Result<(), TryLockError>) -> io::Result<bool> {
+    loop {
+        match attempt() {
+            Ok(()) => return Ok(true),
+            Err(TryLockError::WouldBlock) => return Ok(false),
+            Err(TryLockError::Error(error)) if error.kind() == ErrorKind::Interrupted => {}
+            Err(TryLockError::Error(error)) => {
+                return Err(match Errno::from_io_error(&error) {
+                    Some(Errno::NOSYS | Errno::NOLCK | Errno::OPNOTSUPP) => io::Error::other(NO_LOCKS),
+                    _ => error,
+                });
+            }
         }
     }
 }

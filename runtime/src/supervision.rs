@@ -101,16 +101,16 @@ impl<'a, W: World> Supervisor<'a, W> {
         }
     }
 
-    /// Starts all processes, in the order of `start_order_seed`, and watches until they have ended. Whatever goes wrong,
-    /// those that live may leave in order: the recorder finishes its file.
+    /// Starts all processes, in the order of `start_order_seed`, and watches until they have ended. Whatever goes
+    /// wrong, those that live may leave in order: the recorder finishes its file.
     ///
     /// # Errors
-    /// What ended the run before its time, in words.
+    /// What ended the run before its time.
     pub fn fly(&mut self, start_order_seed: Option<u64>) -> Result<()> {
         let flown = self.start(start_order_seed).and_then(|()| self.watch());
         self.see();
         if flown.is_err() && !self.overseer.replacements.view.is_aborted {
-            self.processes.take_down(&mut self.world)?;
+            self.take_down();
         }
         if flown.is_ok() {
             self.tell_progress();
@@ -310,8 +310,15 @@ impl<'a, W: World> Supervisor<'a, W> {
     }
 
     fn abort<T>(&mut self, message: String) -> Result<T> {
-        self.processes.take_down(&mut self.world)?;
+        self.take_down();
         Err(anyhow!(message))
+    }
+
+    /// Ends all processes. A failure is only noted: the run's error stays what ended it.
+    fn take_down(&mut self) {
+        if let Err(error) = self.processes.take_down(&mut self.world) {
+            self.say(&format!("cannot end all processes: {error:#}"));
+        }
     }
 }
 
