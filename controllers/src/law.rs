@@ -69,7 +69,7 @@ pub struct Predecessor<'a, S> {
     pub wrench: RotorWrench,
     /// What its integrators asked for; `None` where only its last command is known.
     pub integrals: Option<Integrals>,
-    /// Its state, where that is of the same type as the backup's.
+    /// Its state, where that is of the same type as that of the law that takes over.
     pub state: Option<&'a S>,
 }
 

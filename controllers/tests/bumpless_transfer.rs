@@ -26,8 +26,8 @@ use controllers::wall_stop::{WallStopGains, WallStopLaw};
 use flight::{Loop, NOISY, PERIOD_S, ROOM, Senses, believed};
 use nalgebra::Vector3;
 
-/// The most that the demand changes from the last tick of a law to the first of its backup: about what the noise of
-/// the gyroscope and the steps of the range finders change from tick to tick under one law.
+/// The most that the demand changes from the last tick of a law to the first of the law that takes over: about what the
+/// noise of the gyroscope and the steps of the range finders change from tick to tick under one law.
 const THRUST_STEP_MAX_N: f64 = 0.05;
 const TORQUE_STEP_MAX_N_M: f64 = 5e-3;
 

@@ -16,9 +16,9 @@ use std::fmt;
 /// ```
 /// use report::shadow::Difference;
 /// let [topic, field, unit] = ["/pid/command", "command[0]", "1"].map(str::to_owned);
-/// let (mean, rms, max, max_tick, active_deviation) = (-0.5, 1.0, 3.0, 17, 10.0);
+/// let (mean, rms, max, max_tick, primary_deviation) = (-0.5, 1.0, 3.0, 17, 10.0);
 /// let difference =
-///     Difference { topic, field, unit, samples: 100, mean, rms, max, max_tick, active_deviation };
+///     Difference { topic, field, unit, samples: 100, mean, rms, max, max_tick, primary_deviation };
 /// assert!(difference.to_string().contains("rms 1.0000 1, mean -0.5000, max 3.0000 at tick 17"));
 /// ```
 #[derive(Clone, Debug, Serialize)]
@@ -31,23 +31,23 @@ pub struct Difference {
     pub unit: String,
     /// Ticks that have both.
     pub samples: usize,
-    /// Mean of shadow minus active.
+    /// Mean of shadow minus primary.
     pub mean: f64,
-    /// Root of the mean square of shadow minus active.
+    /// Root of the mean square of shadow minus primary.
     pub rms: f64,
     /// The greatest difference, without its sign.
     pub max: f64,
     /// The tick of the greatest difference.
     pub max_tick: u32,
-    /// Root mean square of the active process's values about their mean: what the difference is to be
-    /// measured by.
-    pub active_deviation: f64,
+    /// Root mean square of the primary's values about their mean: what the difference is to be measured by.
+    #[serde(rename = "active_deviation")]
+    pub primary_deviation: f64,
 }
 
 /// What there is to say about a backup.
 ///
 /// ```
-/// use report::shadow::Succession;
+/// use report::shadow::Replacement;
 /// use runtime::launcher::{Purpose, Report};
 /// let report = Report {
 ///     process: "controller".to_owned(),
@@ -63,11 +63,11 @@ pub struct Difference {
 ///     refused: None,
 ///     inputs: Vec::new(),
 /// };
-/// let text = Succession { report, steps: Vec::new() }.to_string();
+/// let text = Replacement { report, steps: Vec::new() }.to_string();
 /// assert!(text.starts_with("  swap of `controller`: shadowed from tick 41, flew from 50, handed over: state"));
 /// ```
 #[derive(Debug, Serialize)]
-pub struct Succession {
+pub struct Replacement {
     /// What became of it.
     #[serde(flatten)]
     pub report: Report,
@@ -75,7 +75,7 @@ pub struct Succession {
     pub steps: Vec<Step>,
 }
 
-impl Succession {
+impl Replacement {
     /// Whether it was planned and did not come about, which fails the run.
     pub(crate) fn has_failed(&self) -> bool {
         self.report.is_planned && self.report.refused.is_some()
@@ -120,8 +120,8 @@ pub(crate) fn differences(recording: &Recording) -> Result<Vec<Difference>> {
     let values = values(recording, &shadowed)?;
     let shadows = values.iter().filter_map(|((topic, field), (unit, shadow))| {
         let topic = topic.strip_prefix(SHADOW_PREFIX)?;
-        let (_, active) = values.get(&(topic.to_owned(), field.clone()))?;
-        difference(topic, field, unit, shadow, active)
+        let (_, primary) = values.get(&(topic.to_owned(), field.clone()))?;
+        difference(topic, field, unit, shadow, primary)
     });
     Ok(shadows.collect())
 }
@@ -158,27 +158,27 @@ fn difference(
     field: &str,
     unit: &str,
     shadow: &BTreeMap<u32, f64>,
-    active: &BTreeMap<u32, f64>,
+    primary: &BTreeMap<u32, f64>,
 ) -> Option<Difference> {
     let both: Vec<(u32, f64, f64)> =
-        shadow.iter().filter_map(|(tick, shadow)| Some((*tick, *shadow, *active.get(tick)?))).collect();
+        shadow.iter().filter_map(|(tick, shadow)| Some((*tick, *shadow, *primary.get(tick)?))).collect();
     let count = both.len() as f64;
     let mean = |value: &dyn Fn(&(u32, f64, f64)) -> f64| both.iter().map(value).sum::<f64>() / count;
-    let active_mean = mean(&|(_, _, active)| *active);
+    let primary_mean = mean(&|(_, _, primary)| *primary);
     let (max_tick, max) = both
         .iter()
-        .map(|(tick, shadow, active)| (*tick, (shadow - active).abs()))
+        .map(|(tick, shadow, primary)| (*tick, (shadow - primary).abs()))
         .max_by(|a, b| a.1.total_cmp(&b.1).then(b.0.cmp(&a.0)))?;
     Some(Difference {
         topic: topic.to_owned(),
         field: field.to_owned(),
         unit: unit.to_owned(),
         samples: both.len(),
-        mean: mean(&|(_, shadow, active)| shadow - active),
-        rms: mean(&|(_, shadow, active)| (shadow - active).powi(2)).sqrt(),
+        mean: mean(&|(_, shadow, primary)| shadow - primary),
+        rms: mean(&|(_, shadow, primary)| (shadow - primary).powi(2)).sqrt(),
         max,
         max_tick,
-        active_deviation: mean(&|(_, _, active)| (active - active_mean).powi(2)).sqrt(),
+        primary_deviation: mean(&|(_, _, primary)| (primary - primary_mean).powi(2)).sqrt(),
     })
 }
 
@@ -186,16 +186,16 @@ fn difference(
 ///
 /// # Errors
 /// If the recording is damaged.
-pub(crate) fn add_steps(recording: &Recording, plan: &Plan, successions: &mut [Succession]) -> Result<()> {
+pub(crate) fn add_steps(recording: &Recording, plan: &Plan, replacements: &mut [Replacement]) -> Result<()> {
     let outputs = |report: &Report| {
         let node = plan.nodes.iter().find(|node| node.name == report.process);
         let topics = node.into_iter().flat_map(|node| &node.outputs);
         topics.map(|output| plan.topics[output.topic].name.clone()).collect::<Vec<_>>()
     };
-    let has_flown = |succession: &&Succession| succession.report.take_over_tick.is_some();
-    let topics = successions.iter().filter(has_flown).flat_map(|succession| outputs(&succession.report));
+    let has_flown = |replacement: &&Replacement| replacement.report.take_over_tick.is_some();
+    let topics = replacements.iter().filter(has_flown).flat_map(|replacement| outputs(&replacement.report));
     let values = values(recording, &topics.collect::<Vec<_>>())?;
-    for Succession { report, steps } in successions {
+    for Replacement { report, steps } in replacements {
         if let Some(tick) = report.take_over_tick {
             *steps = outputs(report).iter().filter_map(|topic| step_at(&values, topic, tick)).collect();
         }
@@ -231,8 +231,8 @@ fn values(recording: &Recording, topics: &[String]) -> Result<Values> {
     let mut values = Values::new();
     for record in recording.messages() {
         let record = record?;
-        let active = record.topic.strip_prefix(SHADOW_PREFIX).unwrap_or(&record.topic);
-        if !topics.iter().any(|topic| topic == active) {
+        let primary = record.topic.strip_prefix(SHADOW_PREFIX).unwrap_or(&record.topic);
+        if !topics.iter().any(|topic| topic == primary) {
             continue;
         }
         for leaf in recording.decode(&record)? {
@@ -250,11 +250,11 @@ fn values(recording: &Recording, topics: &[String]) -> Result<Values> {
 
 impl fmt::Display for Difference {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { topic, field, unit, samples, mean, rms, max, max_tick, active_deviation } = self;
+        let Self { topic, field, unit, samples, mean, rms, max, max_tick, primary_deviation } = self;
         write!(
             f,
-            "  {topic} {field}: shadow − active: rms {rms:.4} {unit}, mean {mean:+.4}, max {max:.4} at tick {max_tick} \
-             ({samples} samples; the active deviates by {active_deviation:.4})"
+            "  {topic} {field}: shadow − primary: rms {rms:.4} {unit}, mean {mean:+.4}, max {max:.4} at tick {max_tick} \
+             ({samples} samples; the primary deviates by {primary_deviation:.4})"
         )
     }
 }
@@ -273,7 +273,7 @@ impl fmt::Display for Step {
     }
 }
 
-impl fmt::Display for Succession {
+impl fmt::Display for Replacement {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let report = &self.report;
         let purpose = match report.purpose {

@@ -1,7 +1,7 @@
 //! The summary of a run: for people, and as JSON for programs.
 
 use crate::judge::{self, Verdict, WindowErrors};
-use crate::shadow::{self, Difference, Succession};
+use crate::shadow::{self, Difference, Replacement};
 use anyhow::Result;
 use bus::plan::Plan;
 use diagnostics::Diagnostic;
@@ -12,8 +12,8 @@ use serde::Serialize;
 use std::fmt;
 use std::path::PathBuf;
 
-/// Successions that the text shows.
-const SUCCESSIONS_SHOWN: usize = 5;
+/// Replacements that the text shows.
+const REPLACEMENTS_SHOWN: usize = 5;
 
 /// What there is to say about a run: its text is for people, its JSON for programs.
 #[derive(Debug, Serialize)]
@@ -45,7 +45,8 @@ pub struct Summary {
     /// Comparisons with measured states.
     pub compare: Vec<WindowErrors>,
     /// Who joined the run, took over, or was refused.
-    pub successions: Vec<Succession>,
+    #[serde(rename = "successions")]
+    pub replacements: Vec<Replacement>,
     /// What shadows asked for otherwise than those they shadowed.
     pub shadows: Vec<Difference>,
     /// What `check` found odd; told before the flight.
@@ -91,13 +92,13 @@ impl Summary {
     /// ```
     pub fn new(manifest: String, outcome: Outcome, tick_s: f64) -> Self {
         let ticks_per_s = f64::from(outcome.ticks) / outcome.host_s.max(1e-9);
-        let successions = outcome.replacements.into_iter();
-        let successions: Vec<_> =
-            successions.map(|report| Succession { report, steps: Vec::new() }).collect();
+        let replacements = outcome.replacements.into_iter();
+        let replacements: Vec<_> =
+            replacements.map(|report| Replacement { report, steps: Vec::new() }).collect();
         let processes = outcome.processes.into_iter();
         Self {
             manifest,
-            passed: !outcome.was_stopped && !successions.iter().any(Succession::has_failed),
+            passed: !outcome.was_stopped && !replacements.iter().any(Replacement::has_failed),
             ticks: outcome.ticks,
             simulated_s: f64::from(outcome.ticks) * tick_s,
             host_s: outcome.host_s,
@@ -111,7 +112,7 @@ impl Summary {
             recording: None,
             pass: Vec::new(),
             compare: Vec::new(),
-            successions,
+            replacements,
             shadows: Vec::new(),
             warnings: Vec::new(),
         }
@@ -123,7 +124,7 @@ impl Summary {
     /// # Errors
     /// If the recording is damaged, or lacks what a condition judges.
     pub fn judge(&mut self, recording: &Recording, plan: &Plan, content: &Content) -> Result<()> {
-        shadow::add_steps(recording, plan, &mut self.successions)?;
+        shadow::add_steps(recording, plan, &mut self.replacements)?;
         self.shadows = shadow::differences(recording)?;
         if !self.stopped_early {
             self.pass = judge::verdicts(content, recording)?;
@@ -136,11 +137,11 @@ impl Summary {
     }
 
     /// The replacements as text; those that were refused are never left out.
-    fn write_successions(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+    fn write_replacements(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let mut left_out = 0;
-        for (index, succession) in self.successions.iter().enumerate() {
-            if index < SUCCESSIONS_SHOWN || succession.report.refused.is_some() {
-                writeln!(f, "{succession}")?;
+        for (index, replacement) in self.replacements.iter().enumerate() {
+            if index < REPLACEMENTS_SHOWN || replacement.report.refused.is_some() {
+                writeln!(f, "{replacement}")?;
             } else {
                 left_out += 1;
             }
@@ -167,14 +168,14 @@ impl fmt::Display for Summary {
         }
         let share = |process: &ProcessSummary| format!("{} {:.0} %", process.name, process.cpu_share * 100.0);
         writeln!(f, "  cpu: {}", self.processes.iter().map(share).collect::<Vec<_>>().join(", "))?;
-        self.write_successions(f)?;
+        self.write_replacements(f)?;
         self.shadows.iter().try_for_each(|difference| writeln!(f, "{difference}"))?;
         self.compare.iter().try_for_each(|errors| writeln!(f, "{errors}"))?;
         self.pass.iter().try_for_each(|verdict| writeln!(f, "{verdict}"))?;
         if let Some(recording) = &self.recording {
             writeln!(f, "  recording: {}", recording.display())?;
         }
-        let refused = self.successions.iter().filter(|succession| succession.has_failed()).count();
+        let refused = self.replacements.iter().filter(|replacement| replacement.has_failed()).count();
         match (self.passed, refused) {
             (true, _) => write!(f, "passed"),
             (false, 0) => write!(f, "FAILED"),

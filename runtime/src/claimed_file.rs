@@ -154,7 +154,7 @@ fn claim_new(path: &Path) -> io::Result<Option<(File, Option<PathBuf>)>> {
         match old {
             Attempt::Held => return Ok(None),
             Attempt::Gone => {}
-            // Locked until its name is gone: nobody removes a backup instead.
+            // Locked until its name is gone: nobody removes what came after it.
             Attempt::Locked(old) => {
                 if let Some(message) = RECORDING.objection(&old)? {
                     return Err(io::Error::other(message));

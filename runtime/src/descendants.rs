@@ -17,8 +17,8 @@ use std::time::Duration;
 const GRACE: Duration = Duration::from_secs(1);
 const POLL: Duration = Duration::from_millis(2);
 
-/// The place of a run among those of its process: an orphan does not say whose it is, so a run that adopts orphans flies
-/// alone.
+/// The place of a run among those of its process: an orphan does not say whose it is, so a run that adopts orphans
+/// flies alone.
 #[derive(Debug)]
 pub struct Place {
     _alone: Option<RwLockWriteGuard<'static, ()>>,

@@ -1,12 +1,12 @@
-//! A checked manifest in words and as JSON.
+//! A checked manifest as text and as JSON.
 
 use crate::graph::Graph;
 use crate::program::{BackupSpec, Executable, OnExit, Program, Readiness};
 use bus::plan::{Pace, Wait};
 use std::fmt::Write as _;
 
-/// Successions between the first and the last that are listed one by one.
-const SUCCESSIONS_SHOWN: usize = 4;
+/// Replacements between the first and the last that are listed one by one.
+const REPLACEMENTS_SHOWN: usize = 4;
 
 /// The graph of a run: nodes with their rates, edges with their delays.
 pub fn graph(graph: &Graph) -> String {
@@ -49,7 +49,7 @@ pub fn graph(graph: &Graph) -> String {
             let hz = rate_hz / f64::from(topic.period_ticks);
             let _ = writeln!(text, "  -> {:<12} {} [{}] {hz} Hz", output.port, topic.name, topic.type_name);
         }
-        text += &succession(graph, index);
+        text += &replacements(graph, index);
     }
     for (name, program) in &graph.sidecars {
         let ready = match program.ready {
@@ -69,12 +69,12 @@ pub fn graph(graph: &Graph) -> String {
 fn what(program: &Program) -> String {
     match &program.executable {
         Executable::Component(kind) => kind.name.to_owned(),
-        Executable::Command(words) => words.join(" "),
+        Executable::Command(args) => args.join(" "),
     }
 }
 
-/// Who shadows, succeeds or stands by for a node, and what follows its end.
-fn succession(graph: &Graph, node: usize) -> String {
+/// Who shadows, replaces or stands by for a node, and what follows its end.
+fn replacements(graph: &Graph, node: usize) -> String {
     let mut text = match graph.programs[node].on_exit {
         OnExit::Restart => "  if it ends, it is started again\n".to_owned(),
         OnExit::Stop | OnExit::Standby | OnExit::Ignore => String::new(),
@@ -92,7 +92,7 @@ fn succession(graph: &Graph, node: usize) -> String {
     });
     let lines: Vec<String> = lines.collect();
     match lines.as_slice() {
-        [first, between @ .., last] if between.len() > SUCCESSIONS_SHOWN => {
+        [first, between @ .., last] if between.len() > REPLACEMENTS_SHOWN => {
             text += &format!("{first}  and {} more times\n{last}", between.len());
         }
         lines => text += &lines.concat(),
@@ -100,7 +100,7 @@ fn succession(graph: &Graph, node: usize) -> String {
     text
 }
 
-/// The graph as JSON: the plan, with who succeeds whom and who takes no part.
+/// The graph as JSON: the plan, with who replaces whom and who takes no part.
 pub fn graph_json(graph: &Graph) -> String {
     let backup = |backup: &BackupSpec| {
         serde_json::json!({

@@ -17,7 +17,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum RunEvent<'a> {
-    /// Something that the user should know while the run goes on, in words.
+    /// A message that the user should see while the run goes on.
     Note(&'a str),
     /// How far the run has come; every few milliseconds.
     Progress(Progress),

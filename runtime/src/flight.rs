@@ -62,8 +62,8 @@ pub struct Waited {
 }
 
 impl Flight {
-    /// Opens what the processes of `plan` noted in `run_dir`; `replacements` says which instance took over from which. The
-    /// files may be removed while this lives.
+    /// Opens what the processes of `plan` noted in `run_dir`; `replacements` says which instance took over from which.
+    /// The files may be removed while this lives.
     ///
     /// # Errors
     /// If a file cannot be read or does not hold what it should.

@@ -21,9 +21,9 @@ const STACK_BYTES: usize = 8 << 20;
 
 /// Where the instances of a run's nodes live.
 ///
-/// Nodes on threads meet the faults of processes: one that panics or returns an error ends the run with its message, or is
-/// replaced where its manifest says so. One that hangs is given up by its watchdog: it cannot be killed, so its thread is
-/// left behind and ends, having sent nothing more, when it next waits.
+/// Nodes on threads meet the faults of processes: one that panics or returns an error ends the run with its message, or
+/// is replaced where its manifest says so. One that hangs is given up by its watchdog: it cannot be killed, so its
+/// thread is left behind and ends, having sent nothing more, when it next waits.
 ///
 /// ```
 /// use runtime::host::Host;
@@ -77,7 +77,7 @@ pub(crate) enum End {
     Exited(i32),
     /// A signal killed its process.
     Signalled(i32),
-    /// Its thread failed or panicked, in words.
+    /// Its thread failed or panicked, with this message.
     Failed(String),
     /// The launcher ended its thread.
     Cancelled,

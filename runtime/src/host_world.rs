@@ -1,4 +1,5 @@
-//! The world of a real run: the control segment in shared memory, processes or threads of the host, and the run directory.
+//! The world of a real run: the control segment in shared memory, processes or threads of the host, and the run
+//! directory.
 
 use crate::ctl::Reply;
 use crate::ctl::control::ControlServer;

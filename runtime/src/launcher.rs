@@ -134,9 +134,9 @@ impl<'a> Launcher<'a> {
     }
 
     /// What the nodes' processes start themselves is ended with the run, however it was detached: this process becomes
-    /// the parent of orphans (`PR_SET_CHILD_SUBREAPER`) while the run flies. For a process that starts no other children
-    /// meanwhile: those would be ended with the run. While such a run flies the process flies no other, and the launch
-    /// of one is refused.
+    /// the parent of orphans (`PR_SET_CHILD_SUBREAPER`) while the run flies. For a process that starts no other
+    /// children meanwhile: those would be ended with the run. While such a run flies the process flies no other, and
+    /// the launch of one is refused.
     #[must_use]
     pub fn adopting_orphans(mut self) -> Self {
         self.adopts_orphans = true;

@@ -5,7 +5,7 @@
 //! - `overrides`: the values given with `--set`
 //! - `tree`: tables with the places of their values, merged
 //! - `sets`: vehicles of process sets become processes
-//! - `succession`: a backup's differences become a whole process
+//! - `replacement`: a backup's differences become a whole process
 //! - `finite`: no number is infinite or none
 //! - `builder`: a manifest that is built in code
 //! - `content`: the types that the whole is read into
@@ -16,9 +16,9 @@ mod finite;
 mod include;
 mod overrides;
 mod recorded;
+mod replacement;
 mod sets;
 mod sources;
-mod succession;
 mod tree;
 
 pub use builder::ManifestBuilder;
@@ -150,7 +150,7 @@ impl Manifest {
         let with = sources.last_table()?;
         let span = sources.last_span();
         finite::require(&with, "", &sources)?;
-        let whole = succession::whole(&sources, &tree, &Spanned::new(span.clone(), process.into()), with)?;
+        let whole = replacement::whole(&sources, &tree, &Spanned::new(span.clone(), process.into()), with)?;
         let whole = Spanned::new(span.clone(), DeValue::Table(whole));
         let whole = read_tree::<Process>(&whole).map_err(|misread| sources.refused(misread))?;
         let content = content(&sources, tree)?;
@@ -188,7 +188,7 @@ fn whole_tree(sources: &Sources) -> Result<DeTable<'_>, Diagnostic> {
     early.into_iter().try_for_each(|change| change.apply(&mut tree, sources))?;
     sets::expand(&mut tree, sources)?;
     late.into_iter().try_for_each(|change| change.apply(&mut tree, sources))?;
-    succession::complete(&mut tree, sources)?;
+    replacement::complete(&mut tree, sources)?;
     finite::require(&tree, "", sources)?;
     Ok(tree)
 }

@@ -175,7 +175,7 @@ impl Output {
     }
 }
 
-/// The live run that writes to the file at `real`, in words.
+/// The live run that writes to the file at `real`, as text for a message.
 fn writer_of(real: &Path) -> Option<String> {
     let run = run_dir::live_runs().into_iter().find(|run| {
         let list = std::fs::read(run.entry.run_dir.join(LIST)).ok();

@@ -125,8 +125,8 @@ impl<'a> Overseer<'a> {
         }
     }
 
-    /// Whether a process had completed its last tick when it died, and need not be missed by its node's policy: all that
-    /// it had to send is sent, and there is nothing left that another could do in its place.
+    /// Whether a process had completed its last tick when it died, and need not be missed by its node's policy: all
+    /// that it had to send is sent, and there is nothing left that another could do in its place.
     fn has_died_behind_the_end(&self, node: usize, generation: u32) -> bool {
         self.replacements.view.phase == Phase::Running
             && self.replacements.program(node).on_exit != OnExit::Stop

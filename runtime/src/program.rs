@@ -110,7 +110,7 @@ pub struct BackupSpec {
     pub join_tick: u32,
     /// The tick from which on its outputs count; `None` for one that only shadows or stands by.
     pub take_over_tick: Option<u32>,
-    /// Whether it is promoted when the active process dies.
+    /// Whether it is promoted when the primary dies.
     pub is_standby: bool,
     /// What to start.
     pub program: Program,

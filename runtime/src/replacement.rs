@@ -196,7 +196,7 @@ impl<'a> Replacements<'a> {
 
     /// A living instance that has not acknowledged the newest membership yet: its node and generation.
     pub(crate) fn disagreeing(&self) -> Option<(usize, u32)> {
-        self.members().find(|&(node, generation)| {
+        self.instances().find(|&(node, generation)| {
             let slot = self.slot(node, generation);
             self.view.slots[slot].state == SlotState::Taken
                 && self.view.lives(node, generation)
@@ -205,8 +205,8 @@ impl<'a> Replacements<'a> {
         })
     }
 
-    /// Node and generation of every process that may compute.
-    pub(crate) fn members(&self) -> impl Iterator<Item = (usize, u32)> + '_ {
+    /// Node and generation of every instance that may compute.
+    pub(crate) fn instances(&self) -> impl Iterator<Item = (usize, u32)> + '_ {
         self.membership.nodes.iter().enumerate().flat_map(|(node, membership)| {
             let backup = self.nodes[node].backup.as_ref();
             // While it retires, the predecessor still reads.
@@ -241,7 +241,7 @@ impl<'a> Replacements<'a> {
         self.note_start(node);
         let Some(backup) = &self.nodes[node].backup else { return false };
         let slot = self.slot(node, backup.generation);
-        let goes_on = match backup.stage {
+        let can_advance = match backup.stage {
             Stage::Starting => self.is_prepared(backup) && self.is_at_join(backup) && self.may_change(node),
             Stage::Joining => self.view.is_ready(slot, Phase::Running),
             Stage::Announced => self.all_agree(),
@@ -250,7 +250,7 @@ impl<'a> Replacements<'a> {
             Stage::Shadowing => self.has_flown(node) && self.all_agree(),
             Stage::Retiring => self.has_retired(node, backup),
         };
-        if !goes_on {
+        if !can_advance {
             return false;
         }
         match backup.stage {
@@ -280,8 +280,8 @@ impl<'a> Replacements<'a> {
             && self.all_agree()
     }
 
-    /// Whether the dead primary of `node` can be replaced now: a backup that is joining, its own included, has joined or is
-    /// refused first.
+    /// Whether the dead primary of `node` can be replaced now: a backup that is joining, its own included, has joined
+    /// or is refused first.
     pub(crate) fn may_replace(&self, node: usize) -> bool {
         let backup = self.nodes[node].backup.as_ref();
         let is_joining =
@@ -357,8 +357,8 @@ impl<'a> Replacements<'a> {
     }
 }
 
-/// What the tick of a take-over must be a multiple of: so that the backup sends on every output at once, and who
-/// joins later finds its samples.
+/// What the tick of a take-over must be a multiple of: so that the backup sends on every output at once, and a
+/// process that joins later finds its samples.
 pub(crate) fn take_over_stride(plan: &Plan, node: usize) -> u32 {
     let periods = plan.nodes[node].outputs.iter().map(|output| plan.topics[output.topic].period_ticks);
     let multiple = |a: u32, b: u32| (1..=b).map(|k| a.saturating_mul(k)).find(|m| m % b == 0).unwrap_or(a);

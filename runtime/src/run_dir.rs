@@ -400,9 +400,9 @@ mod tests {
         let chosen = |names: &[&str], run_id| choose(runs(names), run_id).map(|run| run.entry.run_id);
         assert_eq!(chosen(&["1-a"], None).unwrap(), "1-a");
         assert_eq!(chosen(&["1-a", "2-b"], Some("2-b")).unwrap(), "2-b");
-        let words = |names: &[&str], run_id| chosen(names, run_id).unwrap_err().to_string();
-        assert!(words(&[], Some("1-a")).contains("no run of this user is alive"));
-        for text in [words(&["1-a", "2-b"], None), words(&["1-a", "2-b"], Some("3-c"))] {
+        let message = |names: &[&str], run_id| chosen(names, run_id).unwrap_err().to_string();
+        assert!(message(&[], Some("1-a")).contains("no run of this user is alive"));
+        for text in [message(&["1-a", "2-b"], None), message(&["1-a", "2-b"], Some("3-c"))] {
             assert!(text.contains("\n  1-a  /m.toml  (launcher 1)\n  2-b  /m.toml"), "{text}");
         }
     }

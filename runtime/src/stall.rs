@@ -70,14 +70,14 @@ impl<W: World> Standstill<'_, W> {
                 && view.lives(node, generation)
                 && self.can_compute(node, generation)
         };
-        let members = self.replacements.members().filter(stuck);
+        let instances = self.replacements.instances().filter(stuck);
         let slowest =
-            members.min_by_key(|&(node, generation)| view.slots[self.plan.slot(node, generation)].done);
+            instances.min_by_key(|&(node, generation)| view.slots[self.plan.slot(node, generation)].done);
         slowest.map(|(node, generation)| Straggler::Node(node, generation))
     }
 
-    /// Whether an instance has all it needs for its next tick: if it does not come on then, it is at fault itself. One
-    /// that sleeps does not count: nobody has come as far as it waits for, or it would have been woken. A recorder sleeps
+    /// Whether an instance has all it needs for its next tick: if it does not advance then, it is at fault itself. One
+    /// that sleeps does not count: what it waits for has not been sent, or it would have been woken. A recorder sleeps
     /// until samples have gathered that the tick alone does not need.
     fn can_compute(&self, node: usize, generation: u32) -> bool {
         let slot = self.plan.slot(node, generation);
@@ -141,7 +141,7 @@ impl<W: World> Standstill<'_, W> {
         let computes = |instance: &(usize, u32)| {
             view.slots[slot(instance)].state == SlotState::Taken && !view.has_completed(slot(instance))
         };
-        let instances: Vec<(usize, u32)> = self.replacements.members().filter(computes).collect();
+        let instances: Vec<(usize, u32)> = self.replacements.instances().filter(computes).collect();
         let name = |&(node, generation): &(usize, u32)| match generation {
             0 => format!("`{}`", plan.nodes[node].name),
             _ => format!("`{}.{generation}`", plan.nodes[node].name),

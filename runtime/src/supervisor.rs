@@ -67,7 +67,7 @@ pub enum Action {
     Restart,
     /// Have the standby take the place of the one that died.
     Promote,
-    /// Take the backup out of the run; the active process flies on.
+    /// Take the backup out of the run; the primary flies on.
     Refuse,
 }
 

@@ -1,4 +1,5 @@
-//! What a supervisor needs of the world outside it: the control segment, processes, files, the host's clock, and requests. `host_world.rs` is the real one; the simulation draws another from a seed.
+//! What a supervisor needs of the world outside it: the control segment, processes, files, the host's clock, and
+//! requests. `host_world.rs` is the real one; the simulation draws another from a seed.
 
 use crate::ctl::protocol::{Answer, Request};
 use crate::host::End;
@@ -80,8 +81,8 @@ pub trait Body {
     fn end(&mut self) -> Result<Option<End>>;
     /// Asks a thread to end; a process is not asked.
     fn cancel(&self) {}
-    /// Kills it and its group, and waits for its end. `patience` is how long a thread may take, and what it took is taken
-    /// from it.
+    /// Kills it and its group, and waits for its end. `patience` is how long a thread may take, and what it took is
+    /// taken from it.
     fn kill(&mut self, patience: &mut Duration) -> Option<End>;
     /// The last lines that it wrote.
     fn last_lines(&self) -> Vec<String>;

@@ -244,7 +244,7 @@ fn deliver(case: &Case, place: &Place, watched: &Watched) {
     watched.control.set_hold_tick(u32::MAX);
 }
 
-/// The active process of node `name`, once it can be replaced.
+/// The primary of node `name`, once it can be replaced.
 fn ready(case: &Case, place: &Place, watched: &Watched, name: &str) -> rustix::process::Pid {
     let node = watched.node(name).unwrap();
     if case.policy == Policy::Standby {

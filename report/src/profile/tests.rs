@@ -237,8 +237,8 @@ fn a_sample_that_was_there_before_the_grant_is_not_waited_for() {
     assert_eq!((waited.cause, waited.ready_ns), (Cause::Grant, 1500));
 }
 
-/// A succession of the controller that took over at `take_over_tick`, if it did.
-fn succession(generation: u32, take_over_tick: Option<u32>, inputs: &[InputPlan]) -> Report {
+/// A replacement of the controller that took over at `take_over_tick`, if it did.
+fn replacement(generation: u32, take_over_tick: Option<u32>, inputs: &[InputPlan]) -> Report {
     Report {
         process: "controller".to_owned(),
         generation,
@@ -275,8 +275,8 @@ fn ticks_of_shadows_do_not_count_and_a_backup_waits_for_its_own_inputs() {
     writer.grant_at(4, None, 1000);
     // It reads the state alone.
     let inputs = &plan.nodes[CONTROLLER].inputs[1..];
-    let successions = [succession(1, None, &[]), succession(2, Some(2), inputs)];
-    let flight = Flight::open(&plan, folder.path(), plan.duration_ticks, &successions).unwrap();
+    let replacements = [replacement(1, None, &[]), replacement(2, Some(2), inputs)];
+    let flight = Flight::open(&plan, folder.path(), plan.duration_ticks, &replacements).unwrap();
     let received = (0..4).map(|tick| flight.at(CONTROLLER, tick).unwrap().received_ns);
     assert_eq!(received.collect::<Vec<_>>(), [1400, 1800, 2100, 2205]);
     assert_eq!(flight.noted(), 4 + 2 + 4);
@@ -295,8 +295,8 @@ fn a_tick_that_was_sent_before_its_process_died_is_that_one_s() {
     dead.end(0, 1400, 1450, 1500);
     let mut next = TickWriter::create(folder.path(), &plan, CONTROLLER, 1, 0).unwrap();
     next.end(0, 1700, 1750, 1800);
-    let successions = [succession(1, Some(0), inputs)];
-    let flight = Flight::open(&plan, folder.path(), plan.duration_ticks, &successions).unwrap();
+    let replacements = [replacement(1, Some(0), inputs)];
+    let flight = Flight::open(&plan, folder.path(), plan.duration_ticks, &replacements).unwrap();
     assert_eq!(flight.sent_ns(COMMAND, 0), Some(1450));
 }
 

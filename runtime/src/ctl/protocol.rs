@@ -64,7 +64,7 @@ pub enum Request {
 pub enum Answer {
     /// What was asked has happened.
     Done {
-        /// What happened, in words.
+        /// What happened, as a message.
         text: String,
         /// Ticks that every process has completed.
         tick: u32,

@@ -174,8 +174,8 @@ impl Run<'_> {
             return Ok(());
         }
         let list = |outputs: Vec<(&str, &str)>| {
-            let words: Vec<String> = outputs.iter().map(|(port, of)| format!("`{port}` [{of}]")).collect();
-            if words.is_empty() { "nothing".to_owned() } else { words.join(", ") }
+            let ports: Vec<String> = outputs.iter().map(|(port, of)| format!("`{port}` [{of}]")).collect();
+            if ports.is_empty() { "nothing".to_owned() } else { ports.join(", ") }
         };
         let message = format!(
             "the kind `{}` publishes {}, but `{}`, which it would succeed, publishes {}",

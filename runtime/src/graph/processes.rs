@@ -201,7 +201,7 @@ fn nameless(manifest: &Manifest, name: &Spanned<String>) -> Diagnostic {
     manifest.problem(&name.span(), format!("there is no process `{found}`"), help)
 }
 
-/// The words of a command; the first becomes the path of a file that can be executed.
+/// The arguments of a command; the first becomes the path of a file that can be executed.
 fn command(
     manifest: &Manifest,
     name: &Spanned<String>,
@@ -245,8 +245,8 @@ fn command(
     Ok(std::iter::once(&path).chain(arguments).cloned().collect())
 }
 
-/// Whether no kernel can execute a file: it is text, and does not begin with `#!`. The C library would have a shell read
-/// it, whatever it is.
+/// Whether no kernel can execute a file: it is text, and does not begin with `#!`. The C library would have a shell
+/// read it, whatever it is.
 fn is_text_without_interpreter(path: &Path) -> bool {
     let mut start = Vec::new();
     let read = File::open(path).and_then(|file| file.take(256).read_to_end(&mut start));

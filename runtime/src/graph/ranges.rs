@@ -18,8 +18,8 @@ const fn range(end: &'static str, unit: &'static str, most: f64, why: &'static s
     Range { end, unit, most, why }
 }
 
-/// All are wide by intent, decades beyond what a source states: they keep products of a few numbers within what a double
-/// holds, and catch a wrong unit or a slipped digit of the exponent.
+/// All are wide by intent, decades beyond what a source states: they keep products of a few numbers within what a
+/// double holds, and catch a wrong unit or a slipped digit of the exponent.
 const RANGES: [Range; 21] = [
     range("_sqrt_hz", "its unit/sqrt(Hz)", 1e3, "no inertial sensor is that noisy: a phone's has 1e-2"),
     range("_sqrt_s", "its unit/sqrt(s)", 1e5, "a bias that walks like that leaves any range in a second"),
@@ -120,10 +120,10 @@ mod tests {
     #[test]
     fn a_number_deep_in_a_table_is_named_by_its_whole_key() {
         let gains = json!({ "roll": { "proportional_1_s2": 16.0, "integral_1_s3": [0.0, -1e300] } });
-        let words = within("gains", "gains", &gains).unwrap_err().to_string();
+        let error = within("gains", "gains", &gains).unwrap_err().to_string();
         assert!(
-            words.starts_with("`gains.roll.integral_1_s3.1` is -1e300 1/s^3, expected at most 1e9"),
-            "{words}"
+            error.starts_with("`gains.roll.integral_1_s3.1` is -1e300 1/s^3, expected at most 1e9"),
+            "{error}"
         );
         assert_eq!(within("gains", "gains", &json!({ "file": "1e300", "on": true })), Ok(()));
     }

@@ -6,8 +6,8 @@ use diagnostics::Diagnostic;
 use std::path::Path;
 use toml::{Table, Value};
 
-/// Builds a manifest key by key. What it says is checked when it is complete, as that of a file is; the recording of its
-/// run holds it as TOML, which is what it prints.
+/// Builds a manifest key by key. What it says is checked when it is complete, as that of a file is; the recording of
+/// its run holds it as TOML, which is what it prints.
 ///
 /// ```
 /// use runtime::manifest::ManifestBuilder;

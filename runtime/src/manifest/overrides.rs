@@ -62,7 +62,7 @@ impl<'s> Override<'s> {
         matches!(self.names().as_slice(), ["process", name, ..] if name.contains('/'))
     }
 
-    /// The path as words.
+    /// The keys of the path.
     fn names(&self) -> Vec<&'s str> {
         self.keys.iter().map(|key| *key.get_ref()).collect()
     }
@@ -82,16 +82,16 @@ impl<'s> Override<'s> {
     }
 }
 
-/// The words between the dots, with their places.
+/// The keys between the dots, with their places.
 fn keys(path: &str, base: usize) -> Vec<Spanned<&str>> {
     let mut start = base;
-    let key = |word: &str| {
-        let begin = start + (word.len() - word.trim_start().len());
-        start += word.len() + 1;
-        begin..begin + word.trim().len()
+    let key = |text: &str| {
+        let begin = start + (text.len() - text.trim_start().len());
+        start += text.len() + 1;
+        begin..begin + text.trim().len()
     };
     let spans: Vec<Range<usize>> = path.split('.').map(key).collect();
-    spans.into_iter().zip(path.split('.')).map(|(span, word)| Spanned::new(span, word.trim())).collect()
+    spans.into_iter().zip(path.split('.')).map(|(span, text)| Spanned::new(span, text.trim())).collect()
 }
 
 /// A value as TOML; what is none is a string: a path needs no quotes on the command line.
@@ -208,7 +208,7 @@ mod tests {
 
     #[test]
     fn what_is_no_path_of_tables_is_refused() {
-        for (change, words) in [
+        for (change, message) in [
             ("run", "expected KEY=VALUE"),
             ("run.seed.low=1", "`seed` is not a table"),
             ("run..seed=1", "expected keys with dots"),
@@ -216,7 +216,7 @@ mod tests {
         ] {
             let error = changed("run.seed = 1", change).unwrap_err().to_string();
             assert!(
-                error.starts_with(&format!("a.toml: --set {change}: ")) && error.contains(words),
+                error.starts_with(&format!("a.toml: --set {change}: ")) && error.contains(message),
                 "{error}"
             );
         }

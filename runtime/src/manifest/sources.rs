@@ -194,12 +194,12 @@ mod tests {
         sources.add(Origin::File("b.toml".into()), "y = 2\nz = 3".into());
         sources.add(Origin::Override, "x=4".into());
         let base = sources.all()[1].base;
-        let words = |offset: usize| sources.problem(&(offset..offset), "no", "").to_string();
-        assert_eq!(words(4), "a.toml:1:5: no");
+        let message = |offset: usize| sources.problem(&(offset..offset), "no", "").to_string();
+        assert_eq!(message(4), "a.toml:1:5: no");
         // Behind the last byte of the first text is not yet the second.
-        assert_eq!(words(6), "a.toml:2:1: no");
-        assert_eq!(words(base), "b.toml:1:1: no");
-        assert_eq!(words(base + 10), "b.toml:2:5: no");
-        assert_eq!(words(sources.last().base + 2), "a.toml: --set x=4: no");
+        assert_eq!(message(6), "a.toml:2:1: no");
+        assert_eq!(message(base), "b.toml:1:1: no");
+        assert_eq!(message(base + 10), "b.toml:2:5: no");
+        assert_eq!(message(sources.last().base + 2), "a.toml: --set x=4: no");
     }
 }
