@@ -194,7 +194,7 @@ mod tests {
         assert!(matches!(given("\"a/b.toml\"").unwrap(), GivenGains::File(path) if path.ends_with("b.toml")));
         assert!(matches!(given("{}").unwrap(), GivenGains::Table(gains) if gains == PidGains::default()));
         assert!(given("3").unwrap_err().to_string().contains("a table of gains or the path"));
-        assert!(given("{\"rol\": 1}").unwrap_err().to_string().contains("unknown key `rol`"));
+        assert!(given("{\"rol\": 1}").unwrap_err().to_string().contains("unknown field `rol`"));
         let error = GivenGains::File("no-such.toml".into()).gains().unwrap_err().to_string();
         assert!(error.contains("no-such.toml") && error.contains("cannot read"), "{error}");
     }

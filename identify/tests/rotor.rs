@@ -315,16 +315,16 @@ fn mistakes_are_said_with_what_to_do() {
     };
     assert!(error("").contains("at least one log"), "{}", error(""));
     let both = error(&STATIC.replace("held_out = 0.3", "held_out = 2.0\nsettle_s = -1.0"));
-    assert!(both.contains("`static.held_out`") && both.contains("`static.settle_s`"), "{both}");
+    assert!(both.contains("`static.0.held_out`") && both.contains("`static.0.settle_s`"), "{both}");
     assert!(error("extra = 1").contains("unknown key `extra`"), "{}", error("extra = 1"));
     let unit = error(&STATIC.replace("\"N*m\"", "\"gf\""));
-    assert!(unit.contains("static.torque.unit") && unit.contains("found gf"), "{unit}");
+    assert!(unit.contains("static.0.torque.unit") && unit.contains("found gf"), "{unit}");
     let column = error(&STATIC.replace("column = \"thrust\"", "column = \"Thrust\""));
     assert!(column.contains("no column `Thrust`; it has time, speed, thrust, torque"), "{column}");
     assert!(error(STATIC).contains("4 plateaus to fit on, found 0"), "{}", error(STATIC));
     assert!(error(DYNAMIC).contains("found"), "{}", error(DYNAMIC));
     let path = error(&STATIC.replace("static.csv", "${NOT_SET_ANYWHERE}/static.csv"));
-    assert!(path.contains("`static.file`"), "{path}");
+    assert!(path.contains("`static.0.file`"), "{path}");
 }
 
 /// A stand whose log `first` is fitted on and `second` tested on; the text of the refusal, if it is one.

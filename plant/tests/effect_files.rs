@@ -84,34 +84,30 @@ fn a_fault_in_an_effect_is_named_with_its_place() {
     assert_refused(
         &replaced("rotor-drag", "rotordrag"),
         3,
-        &["`effects[0].name`", "parasitic-drag", "rotordrag"],
+        &["`effects.0.name`", "parasitic-drag", "rotordrag"],
     );
-    assert_refused(
-        &replaced("coefficient", "factor"),
-        4,
-        &["unknown key `effects[0].factor`", "coefficient"],
-    );
-    assert_refused(&replaced("N*s^2/(m*rad)", "N"), 4, &["`effects[0].coefficient.unit`", "kg/rad", "\"N\""]);
-    assert_refused(&replaced("8e-5", "8e-2"), 4, &["`effects[0].coefficient`", "0 to 0.001", "0.08"]);
+    assert_refused(&replaced("coefficient", "factor"), 4, &["unknown key `effects.0.factor`", "coefficient"]);
+    assert_refused(&replaced("N*s^2/(m*rad)", "N"), 4, &["`effects.0.coefficient.unit`", "kg/rad", "\"N\""]);
+    assert_refused(&replaced("8e-5", "8e-2"), 4, &["`effects.0.coefficient`", "0 to 0.001", "0.08"]);
     assert_refused(&replaced("8e-5", "-1e-9"), 4, &["0 to 0.001"]);
     assert_refused(&replaced("8e-5", "nan"), 4, &["finite"]);
     assert_refused(
         &replaced(", uncertainty = \"exact\"", ""),
         4,
-        &["missing key `effects[0].coefficient.uncertainty`"],
+        &["missing key `effects.0.coefficient.uncertainty`"],
     );
     assert_refused(
         &replaced("coefficient = {", "coefficient = 1 # {"),
         4,
         &["a table with value, unit, source"],
     );
-    assert_refused("\n[[effects]]\n", 2, &["missing key `effects[0].name`"]);
+    assert_refused("\n[[effects]]\n", 2, &["missing key `effects.0.name`"]);
     assert_refused(
         "\n[[effects]]\nname = \"ground-effect\"\n",
         2,
-        &["missing key `effects[0].rotor_radius`", "length"],
+        &["missing key `effects.0.rotor_radius`", "length"],
     );
-    assert_refused(&format!("{DRAG}{DRAG}"), 7, &["`effects[1].name`", "each effect once", "rotor-drag"]);
+    assert_refused(&format!("{DRAG}{DRAG}"), 7, &["`effects.1.name`", "each effect once", "rotor-drag"]);
 }
 
 #[test]

@@ -12,7 +12,7 @@ use diagnostics::{Diagnostic, Place};
 pub struct EffectEntry {
     /// Which effect.
     pub name: String,
-    /// The dotted key of the table, such as `effects[0]`.
+    /// The dotted key of the table, such as `effects.0`.
     pub key: String,
     /// Where the table stands.
     pub place: Place,

@@ -183,11 +183,11 @@ impl Stand {
             statics: file.statics,
             dynamics: file.dynamics,
         };
-        for log in &mut stand.statics {
-            log.file = resolve("static.file", &log.file)?;
+        for (index, log) in stand.statics.iter_mut().enumerate() {
+            log.file = resolve(&format!("static.{index}.file"), &log.file)?;
         }
-        for log in &mut stand.dynamics {
-            log.file = resolve("dynamic.file", &log.file)?;
+        for (index, log) in stand.dynamics.iter_mut().enumerate() {
+            log.file = resolve(&format!("dynamic.{index}.file"), &log.file)?;
         }
         Ok(stand)
     }
