@@ -359,19 +359,5 @@ fn push<const N: usize>(channel: &mut Channel<N>, time_s: f64, value: [f64; N]) 
 
 /// A flight without any sample.
 pub fn empty() -> Flight {
-    Flight {
-        name: String::new(),
-        file: PathBuf::new(),
-        role: Role::Fit,
-        command: Channel::default(),
-        rotor_speed: Channel::default(),
-        position: Channel::default(),
-        velocity: Channel::default(),
-        attitude: Channel::default(),
-        angular_velocity: Channel::default(),
-        specific_force: Channel::default(),
-        battery_voltage: Channel::default(),
-        assumed: Vec::new(),
-        notes: Vec::new(),
-    }
+    Flight::new("", "", Role::Fit)
 }
