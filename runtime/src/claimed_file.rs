@@ -102,7 +102,7 @@ impl Partial {
     pub fn finish(&self) -> Result<()> {
         let cannot = || format!("cannot put {} in the place of {}", self.path.display(), self.real.display());
         check(&self.real, &RECORDING)?;
-        if !is_at(&self.file, &self.path) {
+        if !self.is_there() {
             bail!("{}: somebody removed or replaced it during the run", cannot());
         }
         std::fs::rename(&self.path, &self.real).with_context(cannot)
@@ -111,7 +111,7 @@ impl Partial {
 
 impl Drop for Partial {
     fn drop(&mut self) {
-        if self.is_empty() && is_at(&self.file, &self.path) {
+        if self.is_empty() && self.is_there() {
             let _ = std::fs::remove_file(&self.path);
         }
     }
@@ -122,21 +122,25 @@ impl Drop for Partial {
 /// # Errors
 /// If `real` itself has such a name.
 pub fn partial_path(real: &Path) -> Result<PathBuf> {
-    let (stem, extension) = (real.file_stem().unwrap_or_default(), real.extension());
     let is_partial = |name: &std::ffi::OsStr| name.as_encoded_bytes().ends_with(PARTIAL.as_bytes());
-    if is_partial(stem) || real.file_name().is_some_and(is_partial) {
+    if real.file_stem().is_some_and(is_partial) || real.file_name().is_some_and(is_partial) {
         bail!(
             "cannot create the recording {}: such a name is that of what a broken run leaves; name another file",
             real.display()
         );
     }
-    let mut name = stem.to_owned();
-    name.push(PARTIAL);
-    if let Some(extension) = extension {
+    Ok(with_suffix(real, PARTIAL))
+}
+
+/// `path` with `suffix` in its name, in front of the extension.
+fn with_suffix(path: &Path, suffix: &str) -> PathBuf {
+    let mut name = path.file_stem().unwrap_or_default().to_owned();
+    name.push(suffix);
+    if let Some(extension) = path.extension() {
         name.push(".");
         name.push(extension);
     }
-    Ok(real.with_file_name(name))
+    path.with_file_name(name)
 }
 
 /// A new file at `path`, locked, and where what lay there before is kept; `None` where somebody else has one there.
@@ -181,13 +185,7 @@ fn keep_aside(old: &File, path: &Path) -> io::Result<Option<PathBuf>> {
         return std::fs::remove_file(path).map(|()| None);
     }
     for number in 2_u32.. {
-        let mut name = path.file_stem().unwrap_or_default().to_owned();
-        name.push(format!("-{number}"));
-        if let Some(extension) = path.extension() {
-            name.push(".");
-            name.push(extension);
-        }
-        let aside = path.with_file_name(name);
+        let aside = with_suffix(path, &format!("-{number}"));
         // A second name first, which is never given to two files: no moment has none.
         match std::fs::hard_link(path, &aside) {
             Ok(()) => return std::fs::remove_file(path).map(|()| Some(aside)),

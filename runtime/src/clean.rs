@@ -10,7 +10,7 @@
 
 use crate::process_table::{ancestors, run_dir_of};
 use crate::run_dir::{
-    Claim, Entry, SHARED_MEMORY, entry_path, folders, is_own_name, is_own_run_dir, is_run_dir_of, live_runs,
+    Entry, SHARED_MEMORY, entry_path, folders, is_own_name, is_own_run_dir, is_run_dir_of, live_runs,
     run_of_dir, run_of_shared_memory, shared_memory_of, try_claim,
 };
 use anyhow::Result;
@@ -20,6 +20,7 @@ use indicatif::HumanBytes;
 use rustix::process::{Pid, PidfdFlags, Signal, pidfd_open, pidfd_send_signal};
 use serde::Serialize;
 use std::collections::{BTreeMap, BTreeSet};
+use std::fs::File;
 use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
@@ -83,7 +84,7 @@ pub fn clean(dry_run: bool) -> Result<Report> {
 
 /// Claims what a run left; `None` if it is alive. What a launcher was just starting when it was killed holds its locks,
 /// too, until it has begun as another program: that is waited for.
-fn claim(run_id: &str, run_dirs: &BTreeSet<PathBuf>) -> Option<Claim> {
+fn claim(run_id: &str, run_dirs: &BTreeSet<PathBuf>) -> Option<Vec<File>> {
     let start = Instant::now();
     loop {
         let claim = try_claim(run_id, run_dirs);

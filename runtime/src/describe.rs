@@ -2,7 +2,7 @@
 
 use crate::graph::Graph;
 use crate::program::{BackupSpec, Executable, OnExit, Program, Readiness};
-use bus::plan::{Pace, Wait};
+use bus::plan::Pace;
 use std::fmt::Write as _;
 
 /// Replacements between the first and the last that are listed one by one.
@@ -25,18 +25,10 @@ pub fn graph(graph: &Graph) -> String {
     );
     for (index, (node, program)) in plan.nodes.iter().zip(&graph.programs).enumerate() {
         let cpu = node.cpu.map_or(String::new(), |cpu| format!(", cpu {cpu}"));
-        let wait = match node.wait {
-            Wait::Block => "block",
-            Wait::Spin => "spin",
-            Wait::Adaptive => "adaptive",
-        };
-        let _ = writeln!(
-            text,
-            "\n{} ({}), {} Hz{cpu}, {wait}",
-            node.name,
-            what(program),
-            rate_hz / f64::from(node.period_ticks)
-        );
+        let (what, hz) = (what(program), rate_hz / f64::from(node.period_ticks));
+        let wait = serde_json::json!(node.wait);
+        let _ =
+            writeln!(text, "\n{} ({what}), {hz} Hz{cpu}, {}", node.name, wait.as_str().unwrap_or_default());
         for input in &node.inputs {
             let topic = &plan.topics[input.topic];
             let delay = if input.delay_ticks == 0 { "" } else { ", delayed by 1 tick" };
@@ -80,7 +72,7 @@ fn replacements(graph: &Graph, node: usize) -> String {
         OnExit::Stop | OnExit::Standby | OnExit::Ignore => String::new(),
     };
     let backups = graph.backups.iter().filter(|backup| backup.node == node);
-    let lines = backups.map(|backup| {
+    let line = |backup: &BackupSpec| {
         let (what, join_tick) = (what(&backup.program), backup.join_tick);
         match backup.take_over_tick {
             Some(tick) => {
@@ -89,8 +81,8 @@ fn replacements(graph: &Graph, node: usize) -> String {
             None if backup.is_standby => format!("  if it ends, {what} is promoted, which shadows it\n"),
             None => format!("  shadowed by {what}\n"),
         }
-    });
-    let lines: Vec<String> = lines.collect();
+    };
+    let lines: Vec<String> = backups.map(line).collect();
     match lines.as_slice() {
         [first, between @ .., last] if between.len() > REPLACEMENTS_SHOWN => {
             text += &format!("{first}  and {} more times\n{last}", between.len());

@@ -26,9 +26,8 @@ use crate::placement;
 use crate::program::{BackupSpec, Program};
 use bus::plan::Plan;
 use diagnostics::Diagnostic;
-use parameters::{Notes, RunLength};
+use parameters::Notes;
 use std::path::PathBuf;
-use toml::Spanned;
 use wiring::{Wiring, wire};
 
 /// Ticks that a fast node may be ahead of the slowest where the manifest does not say.
@@ -65,18 +64,18 @@ impl Graph {
         processes::require_own_logs(manifest)?;
         let wiring = wire(manifest, &declared_nodes, None)?;
         let mut plan = plan(manifest, wiring)?;
-        let clock_cpu = manifest.content.run.clock_cpu.as_ref();
+        let clock_cpu = &manifest.content.run.clock_cpu;
         processes::require_core(manifest, clock_cpu, "clock_cpu")?;
-        placement::place(&mut plan, clock_cpu.map(|cpu| *cpu.get_ref()));
+        placement::place(&mut plan, clock_cpu.as_ref().map(|cpu| *cpu.get_ref()));
         let mut notes = Notes::default();
         periods::check(manifest, &declared_nodes, &plan, &mut notes)?;
-        let length = RunLength::of(&plan);
-        Diagnostic::gather(declared_nodes.iter().zip(&mut plan.nodes).map(|(declared, node)| {
-            parameters::set(manifest, declared, node, length, &mut notes)?;
-            processes::require_replaceable(manifest, declared, node)
-        }))?;
-        recorders::require_one_recorder(manifest, &declared_nodes)?;
-        recorders::require_whole_recording(manifest, &declared_nodes, &plan.nodes)?;
+        let parameters =
+            Diagnostic::gather(declared_nodes.iter().zip(&plan.nodes).map(|(declared, node)| {
+                let parameters = parameters::of(manifest, declared, &plan, node.period_ticks, &mut notes)?;
+                processes::require_replaceable(manifest, declared, node).map(|()| parameters)
+            }))?;
+        plan.nodes.iter_mut().zip(parameters).for_each(|(node, parameters)| node.parameters = parameters);
+        recorders::check(manifest, &declared_nodes, &plan.nodes)?;
         let backups = backups::all(manifest, &plan, &declared_nodes, &mut notes)?;
         let programs: Vec<Program> = declared_nodes.into_iter().map(|declared| declared.program).collect();
         evaluations::check(manifest, &plan, &programs, &mut notes)?;
@@ -103,15 +102,8 @@ fn plan(manifest: &Manifest, wiring: Wiring) -> Result<Plan, Diagnostic> {
             "a run has between 1 and about 4 thousand million ticks",
         ));
     }
-    let window_ticks = run.window_ticks.as_ref().map_or(DEFAULT_WINDOW_TICKS, |window| *window.get_ref());
-    if !(1..=WINDOW_TICKS_MAX).contains(&window_ticks) {
-        let span = run.window_ticks.as_ref().map_or(0..0, Spanned::span);
-        return Err(manifest.problem(
-            &span,
-            format!("`window_ticks` is {window_ticks}"),
-            format!("a window has 1 to {WINDOW_TICKS_MAX} ticks"),
-        ));
-    }
+    let help = format!("a window has 1 to {WINDOW_TICKS_MAX} ticks");
+    let window_ticks = manifest.within("window_ticks", &run.window_ticks, 1..=WINDOW_TICKS_MAX, help)?;
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "checked above")]
     let duration_ticks = ticks.round() as u32;
     Ok(Plan {
@@ -119,7 +111,7 @@ fn plan(manifest: &Manifest, wiring: Wiring) -> Result<Plan, Diagnostic> {
         seed: run.seed,
         tick_ns: u64::from(1_000_000_000 / rate_hz),
         duration_ticks,
-        window_ticks,
+        window_ticks: window_ticks.unwrap_or(DEFAULT_WINDOW_TICKS),
         pace: run.pace.0,
         clock_cpu: None,
         profile: run.profile,

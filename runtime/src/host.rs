@@ -1,13 +1,13 @@
 //! Where the instances of a run's nodes live: in processes of their own, or on threads of this one.
 
 use crate::program::{Executable, Program};
-use anyhow::{Context, Result, bail};
+use anyhow::{Context, Result, anyhow};
 use bus::hosted::Hosted;
 use bus::lockstep::SupervisorView;
 use bus::{BusError, Join, Registration};
 use std::os::unix::process::ExitStatusExt;
 use std::path::PathBuf;
-use std::process::{Child, ExitStatus};
+use std::process::ExitStatus;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::JoinHandle;
@@ -62,12 +62,17 @@ impl Host {
         ];
         match asked.into_iter().find(|(_, is_asked)| *is_asked) {
             None => Ok(()),
-            Some((key, _)) => bail!(
-                "process `{name}`: `{key}` needs a process of its own, and the nodes of this run are threads; leave \
-                 it out, or give the launcher a binary to execute (Host::Exe)"
-            ),
+            Some((key, _)) => Err(needs_process(&format!("process `{name}`: `{key}`"))),
         }
     }
+}
+
+/// Why a run whose nodes are threads cannot have `what`.
+pub(crate) fn needs_process(what: &str) -> anyhow::Error {
+    anyhow!(
+        "{what} needs a process of its own, and the nodes of this run are threads; leave it out, or give the \
+         launcher a binary to execute (Host::Exe)"
+    )
 }
 
 /// How an instance ended.
@@ -112,15 +117,6 @@ impl From<ExitStatus> for End {
     }
 }
 
-/// What runs: a process or a thread.
-#[derive(Debug)]
-pub(crate) enum Body {
-    /// A process.
-    Process(Child),
-    /// A thread.
-    Thread(Thread),
-}
-
 /// An instance on a thread.
 #[derive(Debug)]
 pub(crate) struct Thread {
@@ -149,7 +145,8 @@ impl Thread {
         Ok(Self { handle: Some(handle), is_cancelled, control })
     }
 
-    fn end(&mut self) -> Option<End> {
+    /// How it ended, if it has.
+    pub fn end(&mut self) -> Option<End> {
         let handle = self.handle.take_if(|handle| handle.is_finished())?;
         Some(match handle.join() {
             Ok(Ok(()) | Err(BusError::Aborted)) => End::Exited(0),
@@ -164,14 +161,14 @@ impl Thread {
     }
 
     /// Has it end at its next wait, which returns at once.
-    fn cancel(&self) {
+    pub fn cancel(&self) {
         self.is_cancelled.store(true, Ordering::SeqCst);
         self.control.set_epoch(self.control.epoch());
     }
 
     /// Waits for the end of a cancelled thread for as long as there is patience. One that computes without an end
     /// cannot be ended: it is left behind, and sends nothing any more.
-    fn join(&mut self, patience: &mut Duration) -> End {
+    pub fn join(&mut self, patience: &mut Duration) -> End {
         loop {
             match self.end() {
                 Some(End::Failed(message)) => return End::Failed(message),
@@ -181,47 +178,6 @@ impl Thread {
             }
             std::thread::sleep(POLL);
             *patience = patience.saturating_sub(POLL);
-        }
-    }
-}
-
-impl Body {
-    /// How it ended, if it has.
-    pub fn end(&mut self) -> Result<Option<End>> {
-        match self {
-            Self::Process(child) => Ok(child.try_wait().context("cannot watch a process")?.map(End::from)),
-            Self::Thread(thread) => Ok(thread.end()),
-        }
-    }
-
-    /// Asks a thread to end. A process is not asked.
-    pub fn cancel(&self) {
-        if let Self::Thread(thread) = self {
-            thread.cancel();
-        }
-    }
-
-    /// Ends it, and for a process its whole group, since a command may have started processes of its own. `patience` is
-    /// how long a thread may take, and what it took is taken from it.
-    pub fn kill(&mut self, patience: &mut Duration) -> Option<End> {
-        match self {
-            Self::Process(child) => {
-                bus::process::kill_group(child.id());
-                let _ = child.kill();
-                child.wait().ok().map(End::from)
-            }
-            Self::Thread(thread) => {
-                thread.cancel();
-                Some(thread.join(patience))
-            }
-        }
-    }
-
-    /// The number of a process.
-    pub fn id(&self) -> Option<u32> {
-        match self {
-            Self::Process(child) => Some(child.id()),
-            Self::Thread(_) => None,
         }
     }
 }

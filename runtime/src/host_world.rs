@@ -6,7 +6,7 @@ use crate::ctl::control::ControlServer;
 use crate::ctl::protocol::{Answer, Request};
 use crate::descendants::Descendants;
 use crate::graph::backup_of;
-use crate::host::{self, End, Host, Thread};
+use crate::host::{End, Host, Thread};
 use crate::manifest::Manifest;
 use crate::process_log;
 use crate::program::{BackupSpec, Program, Readiness};
@@ -25,6 +25,7 @@ use std::collections::BTreeMap;
 use std::collections::btree_map::Entry;
 use std::os::unix::net::UnixDatagram;
 use std::path::{Path, PathBuf};
+use std::process::Child;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -118,20 +119,17 @@ impl World for HostWorld<'_> {
             _ => None,
         };
         let run_dir = self.run_dir;
-        let (body, log) = match (&self.host, program) {
-            (Host::Exe(exe), program) => {
-                let (child, log) = match program {
-                    None => spawn::start_clock(exe, run_dir)?,
-                    Some(program) => spawn::start(exe, run_dir, name, role, program, notify.as_deref())?,
-                };
-                (host::Body::Process(child), log)
+        let (body, log) = match &self.host {
+            Host::Exe(exe) => {
+                let (child, log) = spawn::start(exe, run_dir, name, role, program, notify.as_deref())?;
+                (Running::Process(child), log)
             }
-            (Host::InProcess, program) => {
+            Host::InProcess => {
                 program.map_or(Ok(()), |program| self.host.require(name, program))?;
                 let component = program.and_then(Program::component);
                 let (dir, control) = (run_dir.to_owned(), self.control.clone());
                 let thread = Thread::start(component, dir, name, role.generation(), control)?;
-                (host::Body::Thread(thread), PathBuf::new())
+                (Running::Thread(thread), PathBuf::new())
             }
         };
         Ok(HostBody { is_log_of_run: log.starts_with(run_dir), body, log })
@@ -189,26 +187,51 @@ impl World for HostWorld<'_> {
 /// A process or thread, and its log.
 #[derive(Debug)]
 pub struct HostBody {
-    body: host::Body,
+    body: Running,
     log: PathBuf,
     is_log_of_run: bool,
 }
 
+#[derive(Debug)]
+enum Running {
+    Process(Child),
+    Thread(Thread),
+}
+
 impl Body for HostBody {
     fn id(&self) -> Option<u32> {
-        self.body.id()
+        match &self.body {
+            Running::Process(child) => Some(child.id()),
+            Running::Thread(_) => None,
+        }
     }
 
     fn end(&mut self) -> Result<Option<End>> {
-        self.body.end()
+        match &mut self.body {
+            Running::Process(child) => Ok(child.try_wait().context("cannot watch a process")?.map(End::from)),
+            Running::Thread(thread) => Ok(thread.end()),
+        }
     }
 
     fn cancel(&self) {
-        self.body.cancel();
+        if let Running::Thread(thread) = &self.body {
+            thread.cancel();
+        }
     }
 
     fn kill(&mut self, patience: &mut Duration) -> Option<End> {
-        self.body.kill(patience)
+        match &mut self.body {
+            Running::Process(child) => {
+                // A command may have started processes of its own.
+                bus::process::kill_group(child.id());
+                let _ = child.kill();
+                child.wait().ok().map(End::from)
+            }
+            Running::Thread(thread) => {
+                thread.cancel();
+                Some(thread.join(patience))
+            }
+        }
     }
 
     fn last_lines(&self) -> Vec<String> {

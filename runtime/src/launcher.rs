@@ -6,14 +6,14 @@ use crate::descendants::{Descendants, Place};
 use crate::event::{RunEvent, StopToken};
 use crate::flight::Flight;
 use crate::graph::Graph;
-use crate::host::Host;
+use crate::host::{Host, needs_process};
 use crate::host_world::HostWorld;
 use crate::manifest::Manifest;
 use crate::outputs::Outputs;
 pub use crate::replacement::{Purpose, Report};
 use crate::run_dir::RunDir;
 use crate::supervision::Supervisor;
-use anyhow::{Context, Result, bail};
+use anyhow::{Context, Result};
 use bus::lockstep::SupervisorView;
 use bus::plan::Plan;
 use recorder::reader::Recording;
@@ -235,10 +235,7 @@ fn require_host(host: &Host, manifest: &Manifest, graph: &Graph) -> Result<()> {
     ];
     match asked.into_iter().flatten().next() {
         None => Ok(()),
-        Some(key) => bail!(
-            "{key} needs a process of its own, and the nodes of this run are threads; leave it out, or give the \
-             launcher a binary to execute (Host::Exe)"
-        ),
+        Some(key) => Err(needs_process(&key)),
     }
 }
 
@@ -247,11 +244,10 @@ fn prepare(manifest: &Manifest, graph: &mut Graph, recording: Option<&Path>, run
     let manifest_copy = run_dir.path().join("manifest.toml");
     std::fs::write(&manifest_copy, &manifest.recorded_text).context("cannot write the manifest's copy")?;
     let name = |path: &Path| path.file_name().unwrap_or_default().to_string_lossy().into_owned();
-    let mut attachments = vec![(name(&manifest.path), manifest_copy)];
-    attachments.extend(manifest.included.iter().map(|path| (name(path), path.clone())));
-    attachments.extend(graph.models.iter().map(|path| (name(path), path.clone())));
+    let attachment = |path: &Path, copy: &Path| serde_json::json!({ "name": name(path), "path": copy });
+    let files = manifest.included.iter().chain(&graph.models).map(|path| attachment(path, path));
     let attachments: Vec<_> =
-        attachments.iter().map(|(name, path)| serde_json::json!({ "name": name, "path": path })).collect();
+        std::iter::once(attachment(&manifest.path, &manifest_copy)).chain(files).collect();
     for (program, node) in graph.programs.iter().zip(&mut graph.plan.nodes) {
         if program.is_recorder() {
             node.parameters = serde_json::json!({ "path": recording, "attachments": attachments });

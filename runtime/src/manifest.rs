@@ -28,10 +28,10 @@ pub use content::{
 };
 
 use crate::registry::Registry;
-use diagnostics::Diagnostic;
-use diagnostics::{ParameterError, read_tree};
+use diagnostics::{Diagnostic, ParameterError, read_tree};
 use sources::{Origin, Sources};
-use std::ops::Range;
+use std::fmt::Display;
+use std::ops::{Range, RangeInclusive};
 use std::path::{Path, PathBuf};
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
@@ -120,6 +120,34 @@ impl Manifest {
         help: impl Into<String>,
     ) -> Diagnostic {
         self.sources.problem(span, error, help)
+    }
+
+    /// Refuses `value` where it is stated and does not fit.
+    pub(crate) fn require<T>(
+        &self,
+        value: &Option<Spanned<T>>,
+        fits: impl Fn(&T) -> bool,
+        message: impl Fn(&T) -> String,
+        help: impl Into<String>,
+    ) -> Result<(), Diagnostic> {
+        match value {
+            Some(value) if !fits(value.get_ref()) => {
+                Err(self.problem(&value.span(), message(value.get_ref()), help))
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// The number at `key`, where it is stated; refused where it is not within `range`.
+    pub(crate) fn within<N: Copy + PartialOrd + Display>(
+        &self,
+        key: &str,
+        value: &Option<Spanned<N>>,
+        range: RangeInclusive<N>,
+        help: impl Into<String>,
+    ) -> Result<Option<N>, Diagnostic> {
+        self.require(value, |number| range.contains(number), |number| format!("`{key}` is {number}"), help)?;
+        Ok(value.as_ref().map(|number| *number.get_ref()))
     }
 
     /// A path written in the manifest: `${NAME:-default}` is the environment's NAME, and a relative path

@@ -72,21 +72,6 @@ pub struct Program {
 }
 
 impl Program {
-    /// A process with nothing set but what it executes.
-    pub fn of(executable: Executable) -> Self {
-        Self {
-            executable,
-            environment: BTreeMap::new(),
-            working_directory: None,
-            nice: None,
-            realtime_priority: None,
-            on_exit: OnExit::Stop,
-            watchdog: WATCHDOG,
-            ready: Readiness::Started,
-            log: None,
-        }
-    }
-
     /// The component that this is, where the binary brings it.
     pub fn component(&self) -> Option<&'static Registration> {
         match self.executable {

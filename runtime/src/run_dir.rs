@@ -13,7 +13,7 @@ use bus::user_file;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
 use std::ffi::OsStr;
-use std::fs::File;
+use std::fs::{File, Metadata};
 use std::io::{Read as _, Write as _};
 use std::os::unix::fs::{DirBuilderExt, MetadataExt, OpenOptionsExt, PermissionsExt};
 use std::path::{Path, PathBuf};
@@ -64,10 +64,12 @@ pub(crate) fn folders() -> Vec<PathBuf> {
 /// another run that ends.
 fn new_run_dir(run_id: &str) -> Result<PathBuf> {
     let folders = folders();
-    let wanted = folders.first().map(|folder| folder.join(dir_name(run_id)));
-    let mut paths = folders.iter().map(|folder| folder.join(dir_name(run_id)));
-    let is_usable = |path: &PathBuf| Some(path) == wanted.as_ref() || may_create(path);
-    paths.find(|path| bus::takes_run_dir(path, run_id) && is_usable(path)).with_context(|| {
+    let mut paths = folders.iter().map(|folder| folder.join(dir_name(run_id))).enumerate();
+    // The folder that is wanted is taken: creating the directory says what is wrong with it.
+    let is_usable = |(index, path): &(usize, PathBuf)| {
+        bus::takes_run_dir(path, run_id) && (*index == 0 || may_create(path))
+    };
+    paths.find(is_usable).map(|(_, path)| path).with_context(|| {
         format!(
             "no folder for the run directory: none of {folders:?} is there, may be written to and is short"
         )
@@ -200,13 +202,17 @@ pub(crate) fn is_run_dir_of(path: &Path, run_id: &str) -> bool {
 
 /// Whether there is a directory of this user, and no link to one.
 pub(crate) fn is_own_run_dir(path: &Path) -> bool {
-    let found = path.symlink_metadata();
-    found.is_ok_and(|found| found.is_dir() && found.uid() == user_id())
+    own(path).is_some_and(|found| found.is_dir())
 }
 
 /// Whether there is something of this user that is no folder: runs have none in shared memory.
 pub(crate) fn is_own_name(path: &Path) -> bool {
-    path.symlink_metadata().is_ok_and(|found| !found.is_dir() && found.uid() == user_id())
+    own(path).is_some_and(|found| !found.is_dir())
+}
+
+/// What lies at `path` itself, no link followed, if it is this user's.
+fn own(path: &Path) -> Option<Metadata> {
+    path.symlink_metadata().ok().filter(|found| found.uid() == user_id())
 }
 
 /// Every shared-memory file of run `run_id` but its entry.
@@ -271,16 +277,11 @@ fn is_locked(entry: &File) -> bool {
     !is_free
 }
 
-/// A claim on what a dead run left. While it is held, no launcher can take up the run's entry.
-#[derive(Debug)]
-pub(crate) struct Claim {
-    _locks: Vec<File>,
-}
-
-/// Claims what run `run_id` left, with those of `run_dirs` that there are; `None` if it is alive.
+/// Claims what run `run_id` left, with those of `run_dirs` that there are, by locking them; `None` if it is
+/// alive. While the locks are held, no launcher can take up the run's entry.
 ///
 /// Without an entry nobody lives on this side of /dev/shm: it is made before everything else, and removed after.
-pub(crate) fn try_claim(run_id: &str, run_dirs: &BTreeSet<PathBuf>) -> Option<Claim> {
+pub(crate) fn try_claim(run_id: &str, run_dirs: &BTreeSet<PathBuf>) -> Option<Vec<File>> {
     let (mut locks, entry) = (Vec::new(), entry_path(run_id));
     let opened = std::iter::once(open_own(&entry, user_file::open(&entry, false)));
     let opened = opened.chain(run_dirs.iter().map(|path| open_own(path, user_file::open_folder(path))));
@@ -289,7 +290,7 @@ pub(crate) fn try_claim(run_id: &str, run_dirs: &BTreeSet<PathBuf>) -> Option<Cl
             file_lock::try_shared(&file).ok()?.then(|| locks.push(file))?;
         }
     }
-    Some(Claim { _locks: locks })
+    Some(locks)
 }
 
 /// What was opened at `path`; `None` for nothing, and for what no run of this user has made: no lock can be on it.
@@ -297,13 +298,9 @@ fn open_own(path: &Path, opened: std::io::Result<File>) -> std::io::Result<Optio
     match opened {
         Ok(file) => Ok(Some(file)),
         Err(error) if error.kind() == std::io::ErrorKind::NotFound => Ok(None),
-        Err(_) if !is_own_run_dir(path) && !is_own_file(path) => Ok(None),
+        Err(_) if !own(path).is_some_and(|found| found.is_dir() || found.is_file()) => Ok(None),
         Err(error) => Err(error),
     }
-}
-
-fn is_own_file(path: &Path) -> bool {
-    path.symlink_metadata().is_ok_and(|found| found.is_file() && found.uid() == user_id())
 }
 
 /// A run that was alive when it was found.

@@ -15,17 +15,8 @@ use std::process::{Child, Command, Stdio};
 /// The environment variable with the socket on which a sidecar says that it is ready (sd_notify(3)).
 const NOTIFY_VARIABLE: &str = "NOTIFY_SOCKET";
 
-/// The clock service.
-///
-/// # Errors
-/// If it cannot be started.
-pub fn start_clock(exe: &Path, run_dir: &Path) -> Result<(Child, PathBuf)> {
-    let mut command = component(exe, "clock");
-    bus::process::hold_stop_signals(&mut command);
-    spawn(command, "clock", Role::Clock, run_dir, None)
-}
-
-/// The process `name` of the run in `run_dir`, and the file that its output goes to.
+/// The process `name` of the run in `run_dir`, the clock service where there is no program, and the file that its output
+/// goes to.
 ///
 /// # Errors
 /// If it cannot be started, or the niceness or priority that it asks for is not allowed.
@@ -34,28 +25,13 @@ pub fn start(
     run_dir: &Path,
     name: &str,
     role: Role,
-    program: &Program,
+    program: Option<&Program>,
     notify: Option<&Path>,
 ) -> Result<(Child, PathBuf)> {
-    let mut command = match &program.executable {
-        Executable::Component(registration) => component(exe, registration.name),
-        Executable::Command(args) => {
-            let mut command = Command::new(&args[0]);
-            command.args(&args[1..]);
-            command
-        }
-    };
-    command.envs(&program.environment);
-    if let Some(folder) = &program.working_directory {
-        command.current_dir(folder);
-    }
+    let mut command = command(exe, program);
     match role {
         Role::Clock => {}
         Role::Node { generation, .. } => {
-            // A `command` may be a shell that starts others first, who would not hear these signals either.
-            if matches!(program.executable, Executable::Component(_)) {
-                bus::process::hold_stop_signals(&mut command);
-            }
             command.env(NODE_VARIABLE, name).env(GENERATION_VARIABLE, generation.to_string());
         }
         Role::Sidecar { .. } => {
@@ -65,44 +41,52 @@ pub fn start(
             bus::process::die_with_this_one(&mut command);
         }
     }
-    let (mut child, log) = spawn(command, name, role, run_dir, program.log.as_deref())?;
-    if let Err(error) = set_priority(&child, name, program) {
-        bus::process::kill_group(child.id());
-        let _ = child.wait();
-        return Err(error);
-    }
-    Ok((child, log))
-}
-
-/// The component named `name`, which the binary `exe` becomes with these arguments.
-fn component(exe: &Path, name: &str) -> Command {
-    let mut command = Command::new(exe);
-    command.arg0("hummingbus").args(["node", name]);
-    command
-}
-
-fn spawn(
-    mut command: Command,
-    name: &str,
-    role: Role,
-    run_dir: &Path,
-    log: Option<&Path>,
-) -> Result<(Child, PathBuf)> {
+    let log = program.and_then(|program| program.log.as_deref());
     let (file, path) = open_log(name, role, run_dir, log)?;
-    let output = file.try_clone().context("cannot share a log file")?;
     command
         .env(RUN_VARIABLE, run_dir)
         .env(LAUNCHER_VARIABLE, std::process::id().to_string())
         .stdin(Stdio::null())
-        .stdout(output)
+        .stdout(file.try_clone().context("cannot share a log file")?)
         .stderr(file)
         // A group of its own: Ctrl-C in the terminal reaches the launcher alone, which stops the run
         // at a tick boundary.
         .process_group(0);
-    let child = command.spawn().with_context(|| {
+    let mut child = command.spawn().with_context(|| {
         format!("process `{name}`: cannot start {}", command.get_program().to_string_lossy())
     })?;
+    if let Err(error) = program.map_or(Ok(()), |program| set_priority(&child, name, program)) {
+        bus::process::kill_group(child.id());
+        let _ = child.wait();
+        return Err(error);
+    }
     Ok((child, path))
+}
+
+/// What executes `program`: the binary `exe`, which becomes a component with these arguments, or a command.
+fn command(exe: &Path, program: Option<&Program>) -> Command {
+    let mut command = match program.map(|program| &program.executable) {
+        Some(Executable::Command(args)) => {
+            let mut command = Command::new(&args[0]);
+            command.args(&args[1..]);
+            command
+        }
+        Some(Executable::Component(_)) | None => {
+            let component = program.and_then(Program::component);
+            let mut command = Command::new(exe);
+            command.arg0("hummingbus").args(["node", component.map_or("clock", |component| component.name)]);
+            // A `command` may be a shell that starts others first, who would not hear these signals either.
+            bus::process::hold_stop_signals(&mut command);
+            command
+        }
+    };
+    if let Some(program) = program {
+        command.envs(&program.environment);
+        if let Some(folder) = &program.working_directory {
+            command.current_dir(folder);
+        }
+    }
+    command
 }
 
 /// Where a process's output goes: the file that the manifest names, to which a backup adds, or one in the

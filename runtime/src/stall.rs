@@ -8,25 +8,6 @@ use bus::lockstep::{Phase, SlotState};
 use bus::plan::{Pace, Plan};
 use std::time::Duration;
 
-/// A living process because of which the run stands still.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Straggler {
-    /// The clock service.
-    Clock,
-    /// A node's index, and the generation of its process.
-    Node(usize, u32),
-}
-
-impl Straggler {
-    /// The role of the process.
-    pub fn role(self) -> Role {
-        match self {
-            Self::Clock => Role::Clock,
-            Self::Node(node, generation) => Role::Node { node, generation },
-        }
-    }
-}
-
 /// A run that stands still.
 pub struct Standstill<'a, W: World> {
     /// Its plan.
@@ -41,12 +22,12 @@ pub struct Standstill<'a, W: World> {
 
 impl<W: World> Standstill<'_, W> {
     /// The living process that has all it needs and does not come on.
-    pub fn straggler(&self) -> Option<Straggler> {
+    pub fn straggler(&self) -> Option<Role> {
         let view = &self.replacements.view;
         match view.phase {
             Phase::Announcing => Some(self.not_ready(Phase::Connecting)),
             Phase::Connecting => Some(self.not_ready(Phase::Running)),
-            Phase::Running if view.awaits_clock => Some(Straggler::Clock),
+            Phase::Running if view.awaits_clock => Some(Role::Clock),
             Phase::Running if view.held_at.is_some() => None,
             Phase::Running if view.completed_ticks() >= view.end_tick => self.not_left(),
             Phase::Running => self.not_computing(),
@@ -54,15 +35,15 @@ impl<W: World> Standstill<'_, W> {
     }
 
     /// The first whose time is over of those that have not joined; the clock where all have.
-    fn not_ready(&self, phase: Phase) -> Straggler {
+    fn not_ready(&self, phase: Phase) -> Role {
         let view = &self.replacements.view;
         let late = (0..self.plan.nodes.len()).filter(|&node| !view.is_ready(node, phase));
         late.min_by_key(|&node| self.replacements.program_of(node, 0).watchdog)
-            .map_or(Straggler::Clock, |node| Straggler::Node(node, 0))
+            .map_or(Role::Clock, |node| Role::Node { node, generation: 0 })
     }
 
     /// The node that is furthest behind of those that have all they need.
-    fn not_computing(&self) -> Option<Straggler> {
+    fn not_computing(&self) -> Option<Role> {
         let view = &self.replacements.view;
         let stuck = |&(node, generation): &(usize, u32)| {
             let slot = self.plan.slot(node, generation);
@@ -73,7 +54,7 @@ impl<W: World> Standstill<'_, W> {
         let instances = self.replacements.instances().filter(stuck);
         let slowest =
             instances.min_by_key(|&(node, generation)| view.slots[self.plan.slot(node, generation)].done);
-        slowest.map(|(node, generation)| Straggler::Node(node, generation))
+        slowest.map(|(node, generation)| Role::Node { node, generation })
     }
 
     /// Whether an instance has all it needs for its next tick: if it does not advance then, it is at fault itself. One
@@ -88,14 +69,9 @@ impl<W: World> Standstill<'_, W> {
     }
 
     /// A process that has completed the run and has not ended: a node, or else the clock.
-    fn not_left(&self) -> Option<Straggler> {
+    fn not_left(&self) -> Option<Role> {
         let left = self.processes.running.iter().filter(|process| process.end.is_none());
-        let stragglers = left.filter_map(|process| match process.role {
-            Role::Node { node, generation } => Some(Straggler::Node(node, generation)),
-            Role::Clock => Some(Straggler::Clock),
-            Role::Sidecar { .. } => None,
-        });
-        stragglers.max_by_key(|straggler| matches!(straggler, Straggler::Node(..)))
+        left.map(|process| process.role).max_by_key(|role| matches!(role, Role::Node { .. }))
     }
 
     /// Host time in which a paced run must come forward: that of the slowest node's period.
@@ -110,14 +86,14 @@ impl<W: World> Standstill<'_, W> {
     }
 
     /// Which processes have not come as far as the others, and what they wait for, as a message.
-    pub fn describe(&self, straggler: Option<Straggler>, stood: Duration) -> String {
+    pub fn describe(&self, straggler: Option<Role>, stood: Duration) -> String {
         let view = &self.replacements.view;
         let names = |phase| {
             let late = self.plan.nodes.iter().enumerate().filter(|(index, _)| !view.is_ready(*index, phase));
             late.map(|(_, node)| format!("`{}`", node.name)).collect::<Vec<_>>().join(", ")
         };
         let waiting = match (view.phase, straggler) {
-            (Phase::Announcing | Phase::Connecting, Some(Straggler::Clock)) => {
+            (Phase::Announcing | Phase::Connecting, Some(Role::Clock)) => {
                 "every node has joined, and `clock` does not let them begin".to_owned()
             }
             (Phase::Announcing, _) => format!("waiting for {} to join", names(Phase::Connecting)),
@@ -125,7 +101,7 @@ impl<W: World> Standstill<'_, W> {
             (Phase::Running, _) if view.completed_ticks() >= view.end_tick => {
                 "every tick is completed, and it does not end".to_owned()
             }
-            (Phase::Running, Some(Straggler::Clock)) => {
+            (Phase::Running, Some(Role::Clock)) => {
                 format!("tick {} is not granted by `clock`", view.granted)
             }
             (Phase::Running, _) => self.describe_stuck(),

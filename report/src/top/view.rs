@@ -103,7 +103,7 @@ pub fn title(view: &View) -> [String; 2] {
     let missed = format!("{} deadlines missed", status.missed_deadlines);
     let manifest = Path::new(&view.manifest).file_name().unwrap_or_default().to_string_lossy();
     [
-        format!("{manifest}  run {}  {}", status.run_id, status.state.word()),
+        format!("{manifest}  run {}  {}", status.run_id, status.state),
         format!(
             "tick {} / {}  {:.3} s  {:.2} × real time  pace {}  {missed}",
             status.tick, status.end_tick, status.time_s, view.real_time_factor, status.pace

@@ -19,12 +19,7 @@ pub struct ControlServer<'a> {
     control: &'a SupervisorView,
     server: Server,
     /// What was asked for and has not happened yet: one thing at a time, the newest.
-    wish: Option<Wish>,
-}
-
-struct Wish {
-    goal: Goal,
-    reply: Reply,
+    wish: Option<(Goal, Reply)>,
 }
 
 enum Goal {
@@ -58,8 +53,8 @@ impl<'a> ControlServer<'a> {
             let (request, reply) = self.server.poll()?;
             match request {
                 Request::Status => drop(reply.send(&Answer::Status(Status::of(self.plan, self.control)))),
-                Request::Pause => self.pause(reply),
-                Request::Step { ticks } => self.begin_step(ticks.max(1), reply),
+                Request::Pause => self.wish(0, Goal::Pause, reply),
+                Request::Step { ticks } => self.wish(0, Goal::PauseToStep(ticks.max(1)), reply),
                 Request::Resume => self.resume(reply),
                 Request::Pace { pace } => {
                     self.control.set_pace(pace.0);
@@ -76,8 +71,8 @@ impl<'a> ControlServer<'a> {
         None
     }
 
-    fn has_ended(&self) -> bool {
-        self.control.completed_ticks() >= self.control.end_tick()
+    fn has_ended_at(&self, tick: u32) -> bool {
+        self.control.end_tick() == tick && self.control.completed_ticks() >= tick
     }
 
     fn answer(&self, reply: Reply, text: String) {
@@ -87,26 +82,13 @@ impl<'a> ControlServer<'a> {
     /// Tells who waits for something that a later request undoes; true if there was somebody.
     fn overtake(&mut self) -> bool {
         let overtaken = self.wish.take();
-        let is_overtaken = overtaken.is_some();
-        if let Some(wish) = overtaken {
-            wish.reply.send(&Answer::refused("a later request took its place"));
-        }
-        is_overtaken
+        overtaken.map(|(_, reply)| reply.send(&Answer::refused("a later request took its place"))).is_some()
     }
 
-    fn wish(&mut self, goal: Goal, reply: Reply) {
+    fn wish(&mut self, hold_tick: u32, goal: Goal, reply: Reply) {
+        self.control.set_hold_tick(hold_tick);
         self.overtake();
-        self.wish = Some(Wish { goal, reply });
-    }
-
-    fn pause(&mut self, reply: Reply) {
-        self.control.set_hold_tick(0);
-        self.wish(Goal::Pause, reply);
-    }
-
-    fn begin_step(&mut self, ticks: u32, reply: Reply) {
-        self.control.set_hold_tick(0);
-        self.wish(Goal::PauseToStep(ticks), reply);
+        self.wish = Some((goal, reply));
     }
 
     fn resume(&mut self, reply: Reply) {
@@ -123,18 +105,17 @@ impl<'a> ControlServer<'a> {
 
     /// Answers the wish if it has come true; goes on to its second half if the first is done.
     fn grant_wish(&mut self) {
-        let Some(wish) = self.wish.take() else { return };
-        let held_at = self.control.held_at();
-        match (wish.goal, held_at) {
-            (Goal::Pause, Some(tick)) => self.answer(wish.reply, format!("paused at tick {tick}")),
-            (Goal::PauseToStep(ticks), Some(tick)) => self.step(tick, ticks, wish.reply),
-            (Goal::Step { ticks, target }, _) if held_at == Some(target) => {
-                self.answer(wish.reply, format!("paused at tick {target}, {} on", ticks_in_words(ticks)));
+        let Some((goal, reply)) = self.wish.take() else { return };
+        match (goal, self.control.held_at()) {
+            (Goal::Pause, Some(tick)) => self.answer(reply, format!("paused at tick {tick}")),
+            (Goal::PauseToStep(ticks), Some(tick)) => self.step(tick, ticks, reply),
+            (Goal::Step { ticks, target }, held_at)
+                if held_at == Some(target) || self.has_ended_at(target) =>
+            {
+                let what = if held_at == Some(target) { "paused" } else { "ended" };
+                self.answer(reply, format!("{what} at tick {target}, {} on", ticks_in_words(ticks)));
             }
-            (Goal::Step { ticks, target }, _) if self.has_ended() && self.control.end_tick() == target => {
-                self.answer(wish.reply, format!("ended at tick {target}, {} on", ticks_in_words(ticks)));
-            }
-            (goal, _) => self.wish = Some(Wish { goal, reply: wish.reply }),
+            (goal, _) => self.wish = Some((goal, reply)),
         }
     }
 
@@ -149,8 +130,7 @@ impl<'a> ControlServer<'a> {
             return;
         }
         let target = tick + ticks;
-        self.control.set_hold_tick(target);
-        self.wish(Goal::Step { ticks, target }, reply);
+        self.wish(target, Goal::Step { ticks, target }, reply);
     }
 }
 

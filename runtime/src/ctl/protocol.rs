@@ -120,18 +120,11 @@ impl State {
             _ => Self::Pausing,
         }
     }
+}
 
-    /// The state as a word.
-    pub fn word(self) -> &'static str {
-        match self {
-            Self::Starting => "starting",
-            Self::Running => "running",
-            Self::Stepping => "stepping",
-            Self::Pausing => "pausing",
-            Self::Paused => "paused",
-            Self::Stopping => "stopping",
-            Self::Ended => "ended",
-        }
+impl std::fmt::Display for State {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        self.serialize(f)
     }
 }
 
@@ -173,7 +166,7 @@ impl Status {
 impl std::fmt::Display for Status {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let Self { run_id, state, tick, end_tick, time_s, pace, missed_deadlines } = self;
-        write!(f, "{run_id}: {} at tick {tick} of {end_tick} ({time_s:.3} s), pace {pace}", state.word())?;
+        write!(f, "{run_id}: {state} at tick {tick} of {end_tick} ({time_s:.3} s), pace {pace}")?;
         if *missed_deadlines > 0 { write!(f, ", {missed_deadlines} deadlines missed") } else { Ok(()) }
     }
 }

@@ -1,14 +1,14 @@
 //! Backups: processes that shadow a node, take over from it, or stand by for it.
 
-use super::parameters;
-use super::parameters::{Notes, RunLength};
+use super::parameters::{self, Notes};
 use super::processes::{DeclaredNode, declared_nodes, irreplaceable, program};
 use super::wiring::wire;
 use crate::manifest::{Manifest, OutputSetting, Process, SwapSetting};
-use crate::program::{BackupSpec, Executable, Program};
+use crate::program::{BackupSpec, Executable};
 use crate::replacement::take_over_stride;
 use bus::Registration;
 use bus::plan::{INPUTS_RESERVED, NodePlan, Plan};
+use bus::ports::PortSpec;
 use diagnostics::Diagnostic;
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -28,10 +28,7 @@ struct Run<'m> {
 }
 
 /// A backup and the place that asks for it.
-struct Placed {
-    backup: BackupSpec,
-    span: Range<usize>,
-}
+type Placed = (BackupSpec, Range<usize>);
 
 /// Every backup that the manifest asks for, in the order in which they join.
 ///
@@ -44,31 +41,27 @@ pub fn all(
     notes: &mut Notes,
 ) -> Result<Vec<BackupSpec>, Diagnostic> {
     let run = Run { manifest, plan, declared_nodes };
-    let mut placed = Vec::new();
+    let mut placed: Vec<Placed> = Vec::new();
     for (node, declared) in declared_nodes.iter().enumerate() {
         if let Some(standby) = &declared.process.standby {
-            let (plan, program) = run.resolve(node, standby.get_ref(), &standby.span(), notes)?;
-            placed.push(Placed { backup: lasting(node, true, plan, program), span: standby.span() });
+            let backup = run.resolve(node, standby.get_ref(), &standby.span(), notes)?;
+            placed.push((BackupSpec { is_standby: true, ..backup }, standby.span()));
         }
     }
     for shadow in &manifest.content.shadow {
         let node = run.node(&shadow.get_ref().process)?;
-        let (plan, program) = run.resolve(node, &shadow.get_ref().with, &shadow.span(), notes)?;
-        placed.push(Placed { backup: lasting(node, false, plan, program), span: shadow.span() });
+        placed.push((run.resolve(node, &shadow.get_ref().with, &shadow.span(), notes)?, shadow.span()));
     }
     for swap in &manifest.content.swap {
         let node = run.node(&swap.get_ref().process)?;
-        let (plan, program) = run.resolve(node, &swap.get_ref().with, &swap.span(), notes)?;
-        for (join_tick, at_tick) in run.times(node, swap)? {
-            let (plan, program) = (plan.clone(), program.clone());
-            let take_over_tick = Some(at_tick);
-            let backup = BackupSpec { node, join_tick, take_over_tick, is_standby: false, program, plan };
-            placed.push(Placed { backup, span: swap.span() });
-        }
+        let backup = run.resolve(node, &swap.get_ref().with, &swap.span(), notes)?;
+        placed.extend(run.times(node, swap)?.into_iter().map(|(join_tick, at_tick)| {
+            (BackupSpec { join_tick, take_over_tick: Some(at_tick), ..backup.clone() }, swap.span())
+        }));
     }
-    placed.sort_by_key(|placed| (placed.backup.join_tick, placed.backup.node));
+    placed.sort_by_key(|(backup, _)| (backup.join_tick, backup.node));
     run.require_one_at_a_time(&placed)?;
-    Ok(placed.into_iter().map(|placed| placed.backup).collect())
+    Ok(placed.into_iter().map(|(backup, _)| backup).collect())
 }
 
 /// The backup of `process` in a run of `manifest` by `plan` that is under way; `with_text` is TOML that says in what
@@ -86,13 +79,7 @@ pub fn backup_of(
     let declared_nodes = declared_nodes(&manifest)?;
     let run = Run { manifest: &manifest, plan, declared_nodes: &declared_nodes };
     let node = run.node(&Spanned::new(whole.span(), process.to_owned()))?;
-    let (plan, program) = run.resolve(node, whole.get_ref(), &whole.span(), &mut Notes::default())?;
-    Ok(lasting(node, false, plan, program))
-}
-
-/// A backup that computes from the first tick on and does not take over by the clock.
-fn lasting(node: usize, is_standby: bool, plan: NodePlan, program: Program) -> BackupSpec {
-    BackupSpec { node, join_tick: 0, take_over_tick: None, is_standby, program, plan }
+    run.resolve(node, whole.get_ref(), &whole.span(), &mut Notes::default())
 }
 
 impl Run<'_> {
@@ -110,14 +97,14 @@ impl Run<'_> {
         }
     }
 
-    /// What the backup `whole` of `node` reads about itself, and what to start.
+    /// The backup `whole` of `node`: it computes from the first tick on and does not take over by the clock.
     fn resolve(
         &self,
         node: usize,
         whole: &Process,
         span: &Range<usize>,
         notes: &mut Notes,
-    ) -> Result<(NodePlan, Program), Diagnostic> {
+    ) -> Result<BackupSpec, Diagnostic> {
         let name = Spanned::new(span.clone(), self.plan.nodes[node].name.clone());
         let program = program(self.manifest, &name, whole)?;
         if let Executable::Component(kind) = &program.executable {
@@ -128,7 +115,8 @@ impl Run<'_> {
         declared_nodes[node] = DeclaredNode { name: &name, process: &process, program };
         let mut wiring = wire(self.manifest, &declared_nodes, Some(node))?;
         let mut plan = wiring.nodes.swap_remove(node);
-        parameters::set(self.manifest, &declared_nodes[node], &mut plan, RunLength::of(self.plan), notes)?;
+        let declared = &declared_nodes[node];
+        plan.parameters = parameters::of(self.manifest, declared, self.plan, plan.period_ticks, notes)?;
         self.require_room(node, &plan, span)?;
         for input in &mut plan.inputs {
             // The same topics, but perhaps in another order.
@@ -138,7 +126,8 @@ impl Run<'_> {
         let present = &self.plan.nodes[node];
         plan.outputs.clone_from(&present.outputs);
         plan.cpu = plan.cpu.or(present.cpu);
-        Ok((plan, declared_nodes.swap_remove(node).program))
+        let program = declared_nodes.swap_remove(node).program;
+        Ok(BackupSpec { node, join_tick: 0, take_over_tick: None, is_standby: false, program, plan })
     }
 
     /// The outputs of `node` as they are, written out.
@@ -162,15 +151,14 @@ impl Run<'_> {
         kind: &Registration,
         span: &Range<usize>,
     ) -> Result<(), Diagnostic> {
-        let present: Vec<(&str, &str)> = self.plan.nodes[node]
-            .outputs
-            .iter()
+        let present = self.plan.nodes[node].outputs.iter();
+        let present: Vec<(&str, &str)> = present
             .map(|output| (output.port.as_str(), self.plan.topics[output.topic].type_name.as_str()))
             .collect();
-        let ports = kind.outputs.iter().map(|port| (port.name, port.schema.type_name, port.required));
-        let knows_all = present.iter().all(|output| ports.clone().any(|(port, of, _)| (port, of) == *output));
-        let adds_none = ports.clone().all(|(port, of, required)| !required || present.contains(&(port, of)));
-        if knows_all && adds_none {
+        let offered = |port: &PortSpec| (port.name, port.schema.type_name);
+        let knows = |output: &(&str, &str)| kind.outputs.iter().any(|port| offered(port) == *output);
+        let adds = |port: &PortSpec| port.required && !present.contains(&offered(port));
+        if present.iter().all(knows) && !kind.outputs.iter().any(adds) {
             return Ok(());
         }
         let list = |outputs: Vec<(&str, &str)>| {
@@ -180,7 +168,7 @@ impl Run<'_> {
         let message = format!(
             "the kind `{}` publishes {}, but `{}`, which it would succeed, publishes {}",
             kind.name,
-            list(ports.map(|(port, of, _)| (port, of)).collect()),
+            list(kind.outputs.iter().map(offered).collect()),
             self.plan.nodes[node].name,
             list(present),
         );
@@ -201,7 +189,7 @@ impl Run<'_> {
     fn times(&self, node: usize, swap: &Spanned<SwapSetting>) -> Result<Vec<(u32, u32)>, Diagnostic> {
         let setting = swap.get_ref();
         let (at_tick, span) = self.at_tick(swap)?;
-        let repeat = self.repeat(swap)?;
+        let repeat = self.repeat(setting)?;
         let every_ticks = setting.every_ticks.as_ref().map_or(0, |every| *every.get_ref());
         let at = |message: String, help: String| self.manifest.problem(&span, message, help);
         let last = u64::from(at_tick) + u64::from(repeat - 1) * u64::from(every_ticks);
@@ -217,23 +205,20 @@ impl Run<'_> {
             );
             return Err(at(message, "take over later, or lower `shadow_ticks`".to_owned()));
         };
-        let period = self.plan.nodes[node].period_ticks;
-        for (what, tick) in
-            [("takes over at", at_tick), ("joins at", join_tick), ("repeats after", every_ticks)]
-        {
-            if !tick.is_multiple_of(period) {
+        let (period, stride) = (self.plan.nodes[node].period_ticks, take_over_stride(self.plan, node));
+        let computes = (period, "computes", "");
+        let sends = (stride, "sends", ": a backup sends on every output at once");
+        for (what, tick, (of, does, why)) in [
+            ("takes over at", at_tick, computes),
+            ("joins at", join_tick, computes),
+            ("repeats after", every_ticks, computes),
+            ("takes over at", at_tick, sends),
+            ("repeats after", every_ticks, sends),
+        ] {
+            if !tick.is_multiple_of(of) {
                 let name = &self.plan.nodes[node].name;
-                let message = format!("it {what} tick {tick}, but `{name}` computes every {period} ticks");
-                return Err(at(message, format!("choose multiples of {period}")));
-            }
-        }
-        let stride = take_over_stride(self.plan, node);
-        for (what, tick) in [("takes over at", at_tick), ("repeats after", every_ticks)] {
-            if !tick.is_multiple_of(stride) {
-                let name = &self.plan.nodes[node].name;
-                let message = format!("it {what} tick {tick}, but `{name}` sends every {stride} ticks");
-                let help = format!("choose multiples of {stride}: a backup sends on every output at once");
-                return Err(at(message, help));
+                let message = format!("it {what} tick {tick}, but `{name}` {does} every {of} ticks");
+                return Err(at(message, format!("choose multiples of {of}{why}")));
             }
         }
         Ok((0..repeat).map(|n| (join_tick + n * every_ticks, at_tick + n * every_ticks)).collect())
@@ -265,21 +250,16 @@ impl Run<'_> {
         }
     }
 
-    fn repeat(&self, swap: &Spanned<SwapSetting>) -> Result<u32, Diagnostic> {
-        let at =
-            |span: Range<usize>, message: String, help: &str| self.manifest.problem(&span, message, help);
-        match (&swap.get_ref().repeat, &swap.get_ref().every_ticks) {
-            (None, None) => Ok(1),
-            (Some(repeat), Some(_)) if (1..=REPEAT_MAX).contains(repeat.get_ref()) => Ok(*repeat.get_ref()),
-            (Some(repeat), Some(_)) => {
-                let message = format!("`repeat` is {}", repeat.get_ref());
-                Err(at(repeat.span(), message, "a swap happens 1 to 100 000 times"))
-            }
-            (Some(repeat), None) => {
-                Err(at(repeat.span(), "`repeat` without `every_ticks`".into(), "add every_ticks = …"))
-            }
-            (None, Some(every)) => {
-                Err(at(every.span(), "`every_ticks` without `repeat`".into(), "add repeat = …"))
+    fn repeat(&self, swap: &SwapSetting) -> Result<u32, Diagnostic> {
+        let at = |key: &Spanned<u32>, message: &str, help: &str| {
+            Err(self.manifest.problem(&key.span(), message, help))
+        };
+        match (&swap.repeat, &swap.every_ticks) {
+            (Some(repeat), None) => at(repeat, "`repeat` without `every_ticks`", "add every_ticks = …"),
+            (None, Some(every)) => at(every, "`every_ticks` without `repeat`", "add repeat = …"),
+            _ => {
+                let help = "a swap happens 1 to 100 000 times";
+                Ok(self.manifest.within("repeat", &swap.repeat, 1..=REPEAT_MAX, help)?.unwrap_or(1))
             }
         }
     }
@@ -290,21 +270,21 @@ impl Run<'_> {
         let gap = SETTLE_TICKS + 2 * u64::from(longest);
         let mut before: BTreeMap<usize, &Placed> = BTreeMap::new();
         for next in placed {
-            let (node, join_tick) = (next.backup.node, next.backup.join_tick);
-            let Some(earlier) = before.insert(node, next) else { continue };
-            let name = &self.plan.nodes[node].name;
-            let at = |message: String, help: String| Err(self.manifest.problem(&next.span, message, help));
-            let Some(take_over) = earlier.backup.take_over_tick else {
-                let what = if earlier.backup.is_standby { "standby" } else { "shadow" };
+            let (BackupSpec { node, join_tick, .. }, span) = next;
+            let Some((earlier, _)) = before.insert(*node, next) else { continue };
+            let name = &self.plan.nodes[*node].name;
+            let at = |message: String, help: String| Err(self.manifest.problem(span, message, help));
+            let Some(take_over) = earlier.take_over_tick else {
+                let what = if earlier.is_standby { "standby" } else { "shadow" };
                 let message = format!("`{name}` has a {what} already, which is there until the end");
                 return at(message, "a process has one shadow at a time: leave one of them out".to_owned());
             };
-            if u64::from(join_tick) < u64::from(take_over) + gap {
+            let earliest = u64::from(take_over) + gap;
+            if u64::from(*join_tick) < earliest {
                 let message = format!(
                     "a backup of `{name}` would join at tick {join_tick}, too soon after the take-over at \
                      tick {take_over}"
                 );
-                let earliest = u64::from(take_over) + gap;
                 let help = format!(
                     "it can join at tick {earliest} or later; lower `shadow_ticks`, or take over later"
                 );

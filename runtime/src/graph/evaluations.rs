@@ -4,8 +4,7 @@ use super::parameters::Notes;
 use crate::manifest::{Comparison, Manifest, PassCondition, Statistic};
 use crate::program::Program;
 use bus::plan::{NodePlan, Plan};
-use diagnostics::Diagnostic;
-use diagnostics::did_you_mean;
+use diagnostics::{Diagnostic, did_you_mean};
 use recorder::RecordingError;
 use toml::Spanned;
 
@@ -83,44 +82,18 @@ fn first_sample_s(from_s: f64, period_ticks: u32, tick_ns: u64) -> (f64, f64) {
     (number * period_s, period_s)
 }
 
-/// Limits that nothing can hold.
-#[derive(Debug, thiserror::Error)]
-enum Impossible {
-    #[error("`min` is {min} and `max` is {max}")]
-    Empty { min: f64, max: f64 },
-    #[error("`max` is {max}")]
-    Below { max: f64, what: &'static str, least: f64 },
-}
-
-impl Impossible {
-    fn help(&self) -> String {
-        match self {
-            Self::Empty { .. } => "nothing lies between: exchange them".to_owned(),
-            Self::Below { what, least, .. } => format!("{what} is never below {least}"),
+/// Why nothing can hold limits of what is never below `least`, and what to do.
+fn impossible(min: Option<f64>, max: Option<f64>, least: Option<(f64, &str)>) -> Option<(String, String)> {
+    match (min, max, least) {
+        (Some(min), Some(max), _) if min > max => {
+            let help = "nothing lies between: exchange them".to_owned();
+            Some((format!("`min` is {min} and `max` is {max}"), help))
         }
+        (_, Some(max), Some((least, what))) if max < least => {
+            Some((format!("`max` is {max}"), format!("{what} is never below {least}")))
+        }
+        _ => None,
     }
-}
-
-/// Refuses limits that nothing can hold.
-fn check_limits(
-    min: Option<f64>,
-    max: Option<f64>,
-    least: Option<(f64, &'static str)>,
-) -> Result<(), Impossible> {
-    if let (Some(min), Some(max)) = (min, max)
-        && min > max
-    {
-        return Err(Impossible::Empty { min, max });
-    }
-    match (least, max) {
-        (Some((least, what)), Some(max)) if max < least => Err(Impossible::Below { max, what, least }),
-        _ => Ok(()),
-    }
-}
-
-/// The least that a condition's value can be, and why.
-fn least(condition: &PassCondition) -> Option<(f64, &'static str)> {
-    (condition.statistic == Statistic::Rms).then_some((0.0, "the root of a mean square"))
 }
 
 /// How often the publisher of `topic` is set to a measured state, if it is a plant that is.
@@ -131,46 +104,35 @@ fn reset_window_s(plan: &Plan, topic: &str) -> Option<f64> {
 }
 
 fn check_window(manifest: &Manifest, plan: &Plan, compare: &Spanned<Comparison>) -> Result<(), Diagnostic> {
-    let window_s = compare.get_ref().window_s;
-    let duration_s = f64::from(plan.duration_ticks) * plan.tick_s();
-    let limits = compare.get_ref();
-    if [limits.max_position_m, limits.max_velocity_m_s, limits.max_attitude_deg] == [None; 3] {
-        return Err(manifest.problem(
-            &compare.span(),
-            "the comparison has no limit, so it cannot fail",
-            "add max_position_m, max_velocity_m_s or max_attitude_deg",
-        ));
-    }
-    if let Some(set_s) = reset_window_s(plan, &limits.simulated).filter(|set_s| *set_s != window_s) {
-        return Err(manifest.problem(
-            &compare.span(),
-            format!(
-                "`window_s` is {window_s} s, but the plant behind {} is set every {set_s} s",
-                limits.simulated
-            ),
-            "give both the same length",
-        ));
-    }
-    let limits_and_keys = [
-        ("max_position_m", limits.max_position_m),
-        ("max_velocity_m_s", limits.max_velocity_m_s),
-        ("max_attitude_deg", limits.max_attitude_deg),
+    let at = |message: String, help: &str| Err(manifest.problem(&compare.span(), message, help));
+    let compare = compare.get_ref();
+    let (window_s, simulated) = (compare.window_s, &compare.simulated);
+    let limits = [
+        ("max_position_m", compare.max_position_m),
+        ("max_velocity_m_s", compare.max_velocity_m_s),
+        ("max_attitude_deg", compare.max_attitude_deg),
     ];
-    for (key, limit) in limits_and_keys {
-        if let Some(limit) = limit.filter(|limit| *limit < 0.0) {
-            let message = format!("`{key}` is {limit}");
-            return Err(manifest.problem(&compare.span(), message, "an RMS error is never below 0"));
-        }
+    let mut stated = limits.into_iter().filter_map(|(key, limit)| Some((key, limit?))).peekable();
+    if stated.peek().is_none() {
+        let help = "add max_position_m, max_velocity_m_s or max_attitude_deg";
+        return at("the comparison has no limit, so it cannot fail".to_owned(), help);
     }
+    if let Some(set_s) = reset_window_s(plan, simulated).filter(|set_s| *set_s != window_s) {
+        let message =
+            format!("`window_s` is {window_s} s, but the plant behind {simulated} is set every {set_s} s");
+        return at(message, "give both the same length");
+    }
+    if let Some((key, limit)) = stated.find(|(_, limit)| *limit < 0.0) {
+        return at(format!("`{key}` is {limit}"), "an RMS error is never below 0");
+    }
+    let duration_s = f64::from(plan.duration_ticks) * plan.tick_s();
     // The last tick lies one tick before the end.
     if window_s > 0.0 && window_s <= duration_s - plan.tick_s() + 1e-9 {
         return Ok(());
     }
-    Err(manifest.problem(
-        &compare.span(),
-        format!("`window_s` is {window_s} s: no window of that length ends within the run of {duration_s} s"),
-        "choose a window shorter than run.duration_s",
-    ))
+    let message =
+        format!("`window_s` is {window_s} s: no window of that length ends within the run of {duration_s} s");
+    at(message, "choose a window shorter than run.duration_s")
 }
 
 fn check_field(manifest: &Manifest, plan: &Plan, pass: &Spanned<PassCondition>) -> Result<(), Diagnostic> {
@@ -185,12 +147,14 @@ fn check_field(manifest: &Manifest, plan: &Plan, pass: &Spanned<PassCondition>) 
         unit_of(manifest, plan, topic, field)
             .map_err(|error| at(error.to_string(), "name one of these fields"))
     };
-    let limits =
-        |min, max, least| check_limits(min, max, least).map_err(|error| at(error.to_string(), &error.help()));
-    limits(condition.min, condition.max, least(condition))?;
-    if let Some(gate) = &condition.gate {
-        check_limits(gate.min, gate.max, None)
-            .map_err(|error| at(format!("`while`: {error}"), &error.help()))?;
+    let least = (condition.statistic == Statistic::Rms).then_some((0.0, "the root of a mean square"));
+    if let Some((message, help)) = impossible(condition.min, condition.max, least) {
+        return Err(at(message, &help));
+    }
+    if let Some((message, help)) =
+        condition.gate.as_ref().and_then(|gate| impossible(gate.min, gate.max, None))
+    {
+        return Err(at(format!("`while`: {message}"), &help));
     }
     let Some(unit_here) = unit(&condition.topic, &condition.field)? else { return Ok(()) };
     diagnostics::convert(&unit_here, &condition.unit)
@@ -233,22 +197,21 @@ fn judged_topics(pass: &PassCondition) -> Vec<&String> {
 fn check_recorded(manifest: &Manifest, plan: &Plan, programs: &[Program]) -> Result<(), Diagnostic> {
     let content = &manifest.content;
     let passes = content.pass.iter().map(|pass| (pass.span(), judged_topics(pass.get_ref())));
-    let compares = content
-        .compare
-        .iter()
-        .map(|compare| (compare.span(), vec![&compare.get_ref().simulated, &compare.get_ref().measured]));
+    let compares = content.compare.iter().map(|compare| {
+        let Comparison { simulated, measured, .. } = compare.get_ref();
+        (compare.span(), vec![simulated, measured])
+    });
+    let recorders = plan.nodes.iter().zip(programs).filter(|(_, program)| program.is_recorder());
+    let recorded: Vec<usize> =
+        recorders.flat_map(|(node, _)| &node.inputs).map(|input| input.topic).collect();
     for (span, topics) in passes.chain(compares) {
         for topic in topics {
-            if !plan.topics.iter().any(|known| known.name == *topic) {
+            let Some(index) = plan.topics.iter().position(|known| known.name == *topic) else {
                 let known = plan.topics.iter().map(|topic| topic.name.as_str());
                 let help = did_you_mean(topic, known, "the topics are");
                 return Err(manifest.problem(&span, format!("nobody publishes {topic}"), help));
-            }
-            let recorders = plan.nodes.iter().zip(programs).filter(|(_, program)| program.is_recorder());
-            let is_recorded = recorders
-                .flat_map(|(node, _)| &node.inputs)
-                .any(|input| plan.topics[input.topic].name == *topic);
-            if !is_recorded {
+            };
+            if !recorded.contains(&index) {
                 let help = "add a process with kind = \"recorder\" that takes it";
                 return Err(manifest.problem(&span, format!("{topic} is judged but not recorded"), help));
             }

@@ -2,14 +2,12 @@
 
 use super::outputs::{Published, require_known_ports};
 use super::processes::DeclaredNode;
-use crate::manifest::{InputSetting, Manifest};
+use crate::manifest::{InputSetting, Manifest, Process};
 use crate::placement;
-use crate::program::{Executable, Program};
-use bus::Registration;
+use crate::program::Program;
 use bus::plan::{InputPlan, NodePlan, TopicPlan};
 use bus::ports::{Inputs, PortSpec};
-use diagnostics::Diagnostic;
-use diagnostics::did_you_mean;
+use diagnostics::{Diagnostic, did_you_mean};
 use toml::Spanned;
 
 /// The inputs of `declared`, wired to `topics`.
@@ -22,43 +20,43 @@ pub fn inputs(
     topics: &[TopicPlan],
 ) -> Result<Vec<InputPlan>, Diagnostic> {
     let DeclaredNode { name, process, program } = declared;
-    if let Executable::Component(Registration { inputs: Inputs::Any, .. }) = &program.executable
-        && process.inputs.is_empty()
-    {
-        let all = topics.iter().enumerate();
-        let port = |(topic, plan): (usize, &TopicPlan)| InputPlan {
-            port: plan.name.clone(),
-            topic,
-            delay_ticks: 0,
-            initial: None,
-        };
-        return Ok(all.map(port).collect());
-    }
-    if let Executable::Component(Registration { inputs: Inputs::Ports(ports), .. }) = &program.executable {
-        let used = process.inputs.keys().map(|port| (port.get_ref(), port.span()));
-        require_known_ports(manifest, "input", name, ports, used)?;
-        let is_wired = |port: &PortSpec| process.inputs.keys().any(|wired| wired.get_ref() == port.name);
-        if let Some(missing) = ports.iter().find(|port| port.required && !is_wired(port)) {
-            return Err(manifest.problem(
-                &name.span(),
-                format!("process `{}` has no publisher for its input `{}`", name.get_ref(), missing.name),
-                format!(
-                    "add [process.{}.inputs] {} = \"/…\", a topic of {}",
-                    name.get_ref(),
-                    missing.name,
-                    missing.schema.type_name
-                ),
-            ));
+    match program.component().map(|kind| &kind.inputs) {
+        Some(Inputs::Any) if process.inputs.is_empty() => {
+            let port = |(topic, plan): (usize, &TopicPlan)| InputPlan {
+                port: plan.name.clone(),
+                topic,
+                delay_ticks: 0,
+                initial: None,
+            };
+            return Ok(topics.iter().enumerate().map(port).collect());
         }
-    }
-    if let Executable::Component(Registration { inputs: Inputs::Many(schema), .. }) = &program.executable
-        && process.inputs.is_empty()
-    {
-        let message = format!("process `{}` has no input", name.get_ref());
-        let help = format!("name topics of {} under inputs, such as inputs.h1 = \"/…\"", schema.type_name);
-        return Err(manifest.problem(&name.span(), message, help));
+        Some(Inputs::Many(schema)) if process.inputs.is_empty() => {
+            let message = format!("process `{}` has no input", name.get_ref());
+            let help =
+                format!("name topics of {} under inputs, such as inputs.h1 = \"/…\"", schema.type_name);
+            return Err(manifest.problem(&name.span(), message, help));
+        }
+        Some(Inputs::Ports(ports)) => require_ports(manifest, name, process, ports)?,
+        _ => {}
     }
     process.inputs.iter().map(|(port, setting)| input(manifest, declared, port, setting, topics)).collect()
+}
+
+/// Refuses inputs that are none of `ports`, and the lack of one that is required.
+fn require_ports(
+    manifest: &Manifest,
+    name: &Spanned<String>,
+    process: &Process,
+    ports: &[PortSpec],
+) -> Result<(), Diagnostic> {
+    let used = process.inputs.keys().map(|port| (port.get_ref(), port.span()));
+    require_known_ports(manifest, "input", name, ports, used)?;
+    let is_wired = |port: &PortSpec| process.inputs.keys().any(|wired| wired.get_ref() == port.name);
+    let Some(missing) = ports.iter().find(|port| port.required && !is_wired(port)) else { return Ok(()) };
+    let (process, input, type_name) = (name.get_ref(), missing.name, missing.schema.type_name);
+    let message = format!("process `{process}` has no publisher for its input `{input}`");
+    let help = format!("add [process.{process}.inputs] {input} = \"/…\", a topic of {type_name}");
+    Err(manifest.problem(&name.span(), message, help))
 }
 
 fn input(
@@ -83,20 +81,17 @@ fn input(
             return Err(at(format!("{who} reads {expected}, {} carries {found}", setting.topic), help));
         }
     }
-    match (setting.delay_ticks, &setting.initial) {
-        (0, None) | (1, Some(_)) => {}
-        (0, Some(_)) => {
-            return Err(at(format!("{who} has an initial value but no delay"), "add delay_ticks = 1".into()));
-        }
+    let refused = match (setting.delay_ticks, &setting.initial) {
+        (0, None) | (1, Some(_)) => None,
+        (0, Some(_)) => Some(("has an initial value but no delay".to_owned(), "add delay_ticks = 1")),
         (1, None) => {
-            return Err(at(
-                format!("{who} is delayed and has no initial value"),
-                "state what it reads at tick 0, such as initial = { command = [1, 1, 1, 1] }".into(),
-            ));
+            let help = "state what it reads at tick 0, such as initial = { command = [1, 1, 1, 1] }";
+            Some(("is delayed and has no initial value".to_owned(), help))
         }
-        (delay, _) => {
-            return Err(at(format!("{who} has delay_ticks = {delay}"), "a delay is 0 or 1 tick".into()));
-        }
+        (delay, _) => Some((format!("has delay_ticks = {delay}"), "a delay is 0 or 1 tick")),
+    };
+    if let Some((what, help)) = refused {
+        return Err(at(format!("{who} {what}"), help.to_owned()));
     }
     let schema = manifest.registry().message(&topics[topic].type_name);
     if let (Some(schema), Some(initial)) = (schema, &setting.initial) {
@@ -114,12 +109,12 @@ fn input(
 
 /// The type that a built-in node reads on `port`; none where it reads any.
 fn expected_type(program: &Program, port: &str) -> Option<&'static str> {
-    match &program.executable {
-        Executable::Component(Registration { inputs: Inputs::Ports(ports), .. }) => {
+    match program.component()?.inputs {
+        Inputs::Ports(ports) => {
             Some(ports.iter().find(|spec| spec.name == port).map_or("", |spec| spec.schema.type_name))
         }
-        Executable::Component(Registration { inputs: Inputs::Many(schema), .. }) => Some(schema.type_name),
-        _ => None,
+        Inputs::Many(schema) => Some(schema.type_name),
+        Inputs::Any => None,
     }
 }
 

@@ -6,8 +6,7 @@ use crate::program::Executable;
 use bus::plan::{OutputPlan, TopicPlan};
 use bus::ports::PortSpec;
 use bus::schema::Schema;
-use diagnostics::Diagnostic;
-use diagnostics::did_you_mean;
+use diagnostics::{Diagnostic, did_you_mean};
 use std::ops::Range;
 use toml::Spanned;
 
@@ -67,27 +66,22 @@ fn published_by(
             process.outputs.keys().map(|port| (port.get_ref().as_str(), None)).collect()
         }
     };
-    declared
-        .into_iter()
-        .map(|(port, schema)| {
-            let (span, setting) = setting(process, port).map_or((name.span(), None), |(s, o)| (s, Some(o)));
-            let type_name = type_name(manifest, &span, port, schema, setting)?;
-            let period_ticks = output_period(manifest, &span, port, period, setting)?;
-            let topic = setting.and_then(|setting| setting.topic.clone());
-            let topic = topic.unwrap_or_else(|| format!("/{}/{port}", name.get_ref()));
-            require_topic_name(manifest, &span, &topic)?;
-            let topic = TopicPlan { name: topic, type_name, period_ticks };
-            Ok(Published { node, port: port.to_owned(), span, topic })
-        })
-        .collect()
+    let published = declared.into_iter().map(|(port, schema)| {
+        let (span, setting) = setting(process, port).map_or((name.span(), None), |(s, o)| (s, Some(o)));
+        let type_name = type_name(manifest, &span, port, schema, setting)?;
+        let period_ticks = output_period(manifest, &span, port, period, setting)?;
+        let topic = setting.and_then(|setting| setting.topic.clone());
+        let topic = topic.unwrap_or_else(|| format!("/{}/{port}", name.get_ref()));
+        require_topic_name(manifest, &span, &topic)?;
+        let topic = TopicPlan { name: topic, type_name, period_ticks };
+        Ok(Published { node, port: port.to_owned(), span, topic })
+    });
+    published.collect()
 }
 
 fn setting<'a>(process: &'a Process, port: &str) -> Option<(Range<usize>, &'a OutputSetting)> {
-    process
-        .outputs
-        .iter()
-        .find(|(name, _)| name.get_ref() == port)
-        .map(|(name, setting)| (name.span(), setting))
+    let mut outputs = process.outputs.iter();
+    outputs.find(|(name, _)| name.get_ref() == port).map(|(name, setting)| (name.span(), setting))
 }
 
 fn type_name(
@@ -98,15 +92,12 @@ fn type_name(
     setting: Option<&OutputSetting>,
 ) -> Result<String, Diagnostic> {
     let stated = setting.and_then(|setting| setting.type_name.as_deref());
-    match (schema, stated) {
-        (Some(schema), None) => Ok(schema.type_name.to_owned()),
-        (Some(schema), Some(stated)) if schema.type_name == stated => Ok(stated.to_owned()),
-        (Some(schema), Some(stated)) => Err(manifest.problem(
-            span,
-            format!("output `{port}` is stated as {stated}, the kind publishes {}", schema.type_name),
-            "leave `type` out: a built-in kind knows it",
-        )),
-        (None, Some(stated)) => Ok(stated.to_owned()),
+    match (schema.map(|schema| schema.type_name), stated) {
+        (Some(known), Some(stated)) if known != stated => {
+            let message = format!("output `{port}` is stated as {stated}, the kind publishes {known}");
+            Err(manifest.problem(span, message, "leave `type` out: a built-in kind knows it"))
+        }
+        (Some(name), _) | (None, Some(name)) => Ok(name.to_owned()),
         (None, None) => Err(manifest.problem(
             span,
             format!("output `{port}` of a command has no `type`"),

@@ -1,13 +1,12 @@
 //! Parameters: what each node reads about itself, checked by its kind.
 
-use super::processes::DeclaredNode;
+use super::processes::{DeclaredNode, files};
 use super::ranges;
 use crate::manifest::{Manifest, Process};
 use crate::program::Executable;
 use bus::context::NodeContext;
-use bus::plan::{NodePlan, Plan};
-use diagnostics::Diagnostic;
-use diagnostics::ParameterError;
+use bus::plan::Plan;
+use diagnostics::{Diagnostic, ParameterError};
 use std::collections::BTreeMap;
 use std::ops::Range;
 use std::path::PathBuf;
@@ -49,50 +48,33 @@ impl Notes {
     }
 }
 
-/// What all nodes are told of a run: its seed, how long a tick is, and how many there are.
-#[derive(Clone, Copy, Debug)]
-pub struct RunLength {
-    seed: u64,
-    tick_ns: u64,
-    duration_ticks: u32,
-}
-
-impl RunLength {
-    /// Those of `plan`.
-    pub fn of(plan: &Plan) -> Self {
-        Self { seed: plan.seed, tick_ns: plan.tick_ns, duration_ticks: plan.duration_ticks }
-    }
-}
-
-/// Gives `node` the parameters of `declared`, files resolved, checked for a run of that length where its kind is built
-/// in; notes its vehicle file, what that is based on, its scene and its gains file, and what is odd.
+/// The parameters of `declared`, files resolved, checked for a node that computes every `period_ticks` of the run of
+/// `plan` where its kind is built in; notes its vehicle file, what that is based on, its scene and its gains file, and
+/// what is odd.
 ///
 /// # Errors
 /// A file or a parameter that is refused.
-pub fn set(
+pub fn of(
     manifest: &Manifest,
     declared: &DeclaredNode<'_>,
-    node: &mut NodePlan,
-    run: RunLength,
+    plan: &Plan,
+    period_ticks: u32,
     notes: &mut Notes,
-) -> Result<(), Diagnostic> {
+) -> Result<serde_json::Value, Diagnostic> {
     let DeclaredNode { name, process, program } = declared;
     let mut parameters: BTreeMap<&str, serde_json::Value> =
         process.parameters.iter().map(|(key, value)| (key.get_ref().as_str(), value.clone())).collect();
     for (key, file) in files(process) {
-        if let Some(file) = file {
-            if parameters.contains_key(key) {
-                let message =
-                    format!("`{}` has `{key}` twice: as a file, and in its parameters", name.get_ref());
-                return Err(manifest.problem(&file.span(), message, "leave one of them out"));
-            }
-            let path = manifest.resolve(file)?;
-            parameters.insert(key, path.to_string_lossy().into());
-            match key {
-                "data" => {}
-                "vehicle" => note([Some(path.clone()), Vehicle::base(&path)], &mut notes.models),
-                _ => note([Some(path), None], &mut notes.models),
-            }
+        let Some(file) = file else { continue };
+        let path = manifest.resolve(file)?;
+        if parameters.insert(key, path.to_string_lossy().into()).is_some() {
+            let message = format!("`{}` has `{key}` twice: as a file, and in its parameters", name.get_ref());
+            return Err(manifest.problem(&file.span(), message, "leave one of them out"));
+        }
+        match key {
+            "data" => {}
+            "vehicle" => note([Some(path.clone()), Vehicle::base(&path)], &mut notes.models),
+            _ => note([Some(path), None], &mut notes.models),
         }
     }
     let parameters = serde_json::to_value(parameters).unwrap_or_default();
@@ -104,8 +86,8 @@ pub fn set(
         let outputs: Vec<&str> = process.outputs.keys().map(|port| port.get_ref().as_str()).collect();
         let context = NodeContext::new(name.get_ref(), &inputs)
             .naming(&outputs)
-            .timed(run.tick_ns, node.period_ticks, run.duration_ticks)
-            .seeded(run.seed);
+            .timed(plan.tick_ns, period_ticks, plan.duration_ticks)
+            .seeded(plan.seed);
         kind.check(&parameters, &context).map_err(|error| refused(manifest, declared, &error))?;
         for warning in context.into_warnings() {
             let at = place(declared, &warning.key);
@@ -114,8 +96,7 @@ pub fn set(
             }
         }
     }
-    node.parameters = parameters;
-    Ok(())
+    Ok(parameters)
 }
 
 /// Notes files to be recorded, each once.
@@ -125,16 +106,6 @@ fn note(paths: [Option<PathBuf>; 2], models: &mut Vec<PathBuf>) {
             models.push(path);
         }
     }
-}
-
-/// The keys of a process that name a file which becomes a parameter.
-fn files(process: &Process) -> [(&'static str, &Option<Spanned<String>>); 4] {
-    [
-        ("vehicle", &process.vehicle),
-        ("scene", &process.scene),
-        ("gains", &process.gains),
-        ("data", &process.data),
-    ]
 }
 
 /// A recorder's file and attachments come from the launcher.

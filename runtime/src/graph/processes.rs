@@ -3,14 +3,11 @@
 use crate::manifest::{Manifest, Process};
 use crate::output_file;
 use crate::program::{Executable, OnExit, Program, Readiness};
-use bus::GENERATION_VARIABLE;
-use bus::NODE_VARIABLE;
-use bus::Registration;
 use bus::component::Transfer;
 use bus::plan::NodePlan;
 use bus::process::{LAUNCHER_VARIABLE, RUN_VARIABLE};
-use diagnostics::Diagnostic;
-use diagnostics::{did_you_mean, nearest};
+use bus::{GENERATION_VARIABLE, NODE_VARIABLE};
+use diagnostics::{Diagnostic, did_you_mean, nearest};
 use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::Read as _;
@@ -33,13 +30,13 @@ pub struct DeclaredNode<'m> {
 /// The processes that take part in the ticks, by name.
 ///
 /// # Errors
-/// If there is none, or one cannot be started.
+/// If there is none, or one says what only a sidecar can, or cannot be started.
 pub fn declared_nodes(manifest: &Manifest) -> Result<Vec<DeclaredNode<'_>>, Diagnostic> {
-    let declared_nodes = manifest.content.process.iter().filter(|(_, process)| takes_part(process));
     let declared = |(name, process)| {
         require_no_sidecar(manifest, name, process)?;
         Ok(DeclaredNode { name, process, program: program(manifest, name, process)? })
     };
+    let declared_nodes = manifest.content.process.iter().filter(|(_, process)| takes_part(process));
     let declared_nodes = Diagnostic::gather(declared_nodes.map(declared))?;
     if declared_nodes.is_empty() {
         let file = manifest.path.display().to_string();
@@ -54,61 +51,36 @@ pub fn declared_nodes(manifest: &Manifest) -> Result<Vec<DeclaredNode<'_>>, Diag
 /// If one says what only a node can, or cannot be started.
 pub fn sidecars(manifest: &Manifest) -> Result<Vec<(String, Program)>, Diagnostic> {
     let sidecars = manifest.content.process.iter().filter(|(_, process)| !takes_part(process));
-    let sidecar = |(name, process): (&Spanned<String>, &Process)| {
+    Diagnostic::gather(sidecars.map(|(name, process)| {
         require_no_node(manifest, name, process)?;
-        require_no_standby(manifest, name, process)?;
         Ok((name.get_ref().clone(), program(manifest, name, process)?))
-    };
-    Diagnostic::gather(sidecars.map(sidecar))
+    }))
 }
 
 fn takes_part(process: &Process) -> bool {
     process.lockstep.as_ref().is_none_or(|lockstep| *lockstep.get_ref())
 }
 
-/// A sidecar has no ports and no place in the ticks.
+/// A sidecar has no ports, no place in the ticks, and no state of the run that a standby could go on from.
 fn require_no_node(manifest: &Manifest, name: &Spanned<String>, process: &Process) -> Result<(), Diagnostic> {
-    let first_key = |key: Option<&Spanned<String>>| key.map(Spanned::span);
-    let stated = [
-        ("kind", process.kind.as_ref().map(Spanned::span)),
-        ("vehicle", process.vehicle.as_ref().map(Spanned::span)),
-        ("scene", process.scene.as_ref().map(Spanned::span)),
-        ("gains", process.gains.as_ref().map(Spanned::span)),
-        ("data", process.data.as_ref().map(Spanned::span)),
+    let who = format!("of `{}`, which has lockstep = false", name.get_ref());
+    let files = [("kind", &process.kind)].into_iter().chain(files(process));
+    let mut stated = files.map(|(key, file)| (key, file.as_ref().map(Spanned::span))).chain([
         ("period_ticks", process.period_ticks.as_ref().map(Spanned::span)),
         ("cpu", process.cpu.as_ref().map(Spanned::span)),
         ("wait", process.wait.map(|_| name.span())),
-        ("parameters", first_key(process.parameters.keys().next())),
-        ("inputs", first_key(process.inputs.keys().next())),
-        ("outputs", first_key(process.outputs.keys().next())),
-    ];
-    match stated.into_iter().find_map(|(key, span)| span.map(|span| (key, span))) {
-        None => Ok(()),
-        Some((key, span)) => Err(manifest.problem(
-            &span,
-            format!("`{key}` of `{}`, which has lockstep = false", name.get_ref()),
-            "a sidecar is a `command` that takes no part in the ticks; leave the key or `lockstep` out",
-        )),
+        ("parameters", process.parameters.keys().next().map(Spanned::span)),
+        ("inputs", process.inputs.keys().next().map(Spanned::span)),
+        ("outputs", process.outputs.keys().next().map(Spanned::span)),
+    ]);
+    if let Some((key, span)) = stated.find_map(|(key, span)| Some((key, span?))) {
+        let help =
+            "a sidecar is a `command` that takes no part in the ticks; leave the key or `lockstep` out";
+        return Err(manifest.problem(&span, format!("`{key}` {who}"), help));
     }
-}
-
-/// A sidecar keeps no state of the run that a standby could go on from.
-fn require_no_standby(
-    manifest: &Manifest,
-    name: &Spanned<String>,
-    process: &Process,
-) -> Result<(), Diagnostic> {
-    match process.on_exit.as_ref().filter(|on_exit| *on_exit.get_ref() == OnExit::Standby) {
-        None => Ok(()),
-        Some(on_exit) => Err(manifest.problem(
-            &on_exit.span(),
-            format!(
-                "`on_exit` of `{}`, which has lockstep = false: nothing can stand by for it",
-                name.get_ref()
-            ),
-            "stop (the default), restart or ignore",
-        )),
-    }
+    let message = |_: &OnExit| format!("`on_exit` {who}: nothing can stand by for it");
+    let help = "stop (the default), restart or ignore";
+    manifest.require(&process.on_exit, |on_exit| *on_exit != OnExit::Standby, message, help)
 }
 
 /// What only a sidecar may say.
@@ -117,19 +89,23 @@ fn require_no_sidecar(
     name: &Spanned<String>,
     process: &Process,
 ) -> Result<(), Diagnostic> {
-    if let Some(ready) = &process.ready {
-        let message = format!("`ready` of `{}`, which takes part in the ticks", name.get_ref());
-        let help = "leave it out: a node is ready when it has joined; sidecars (lockstep = false) may say so";
-        return Err(manifest.problem(&ready.span(), message, help));
-    }
-    match process.on_exit.as_ref().filter(|on_exit| *on_exit.get_ref() == OnExit::Ignore) {
-        None => Ok(()),
-        Some(on_exit) => Err(manifest.problem(
-            &on_exit.span(),
-            format!("`on_exit` of `{}`: no tick can be computed without a node", name.get_ref()),
-            "stop (the default), restart or standby; only sidecars (lockstep = false) can be ignored",
-        )),
-    }
+    let name = name.get_ref();
+    let message = |_: &Readiness| format!("`ready` of `{name}`, which takes part in the ticks");
+    let help = "leave it out: a node is ready when it has joined; sidecars (lockstep = false) may say so";
+    manifest.require(&process.ready, |_| false, message, help)?;
+    let message = |_: &OnExit| format!("`on_exit` of `{name}`: no tick can be computed without a node");
+    let help = "stop (the default), restart or standby; only sidecars (lockstep = false) can be ignored";
+    manifest.require(&process.on_exit, |on_exit| *on_exit != OnExit::Ignore, message, help)
+}
+
+/// The keys of a process that name a file which becomes a parameter.
+pub fn files(process: &Process) -> [(&'static str, &Option<Spanned<String>>); 4] {
+    [
+        ("vehicle", &process.vehicle),
+        ("scene", &process.scene),
+        ("gains", &process.gains),
+        ("data", &process.data),
+    ]
 }
 
 /// What `process` executes and how.
@@ -143,17 +119,20 @@ pub fn program(
 ) -> Result<Program, Diagnostic> {
     require_name(manifest, name)?;
     require_environment(manifest, process)?;
-    require_core(manifest, process.cpu.as_ref(), "cpu")?;
+    require_core(manifest, &process.cpu, "cpu")?;
+    let help = "no process computes in no time: give milliseconds of host time, such as 20000";
+    let watchdog = manifest.within("watchdog_ms_host", &process.watchdog_ms_host, 1..=u64::MAX, help)?;
+    let (nice, priority) = (&process.nice, &process.realtime_priority);
     Ok(Program {
+        executable: executable(manifest, name, process)?,
         environment: process.environment.iter().map(|(k, v)| (k.get_ref().clone(), v.clone())).collect(),
         working_directory: working_directory(manifest, process)?,
-        nice: within(manifest, "nice", process.nice.as_ref(), -20, 19)?,
-        realtime_priority: within(manifest, "realtime_priority", process.realtime_priority.as_ref(), 1, 99)?,
+        nice: manifest.within("nice", nice, -20..=19, "it goes from -20 to 19")?,
+        realtime_priority: manifest.within("realtime_priority", priority, 1..=99, "it goes from 1 to 99")?,
         on_exit: process.on_exit.as_ref().map_or(OnExit::Stop, |on_exit| *on_exit.get_ref()),
-        watchdog: watchdog(manifest, process)?,
+        watchdog: watchdog.map_or(crate::program::WATCHDOG, Duration::from_millis),
         ready: process.ready.as_ref().map_or(Readiness::Started, |ready| *ready.get_ref()),
         log: log(manifest, process)?,
-        ..Program::of(executable(manifest, name, process)?)
     })
 }
 
@@ -164,16 +143,14 @@ fn executable(
 ) -> Result<Executable, Diagnostic> {
     match (&process.kind, &process.command) {
         (Some(kind), None) => {
-            let help = match nearest(kind.get_ref(), manifest.registry().iter().map(|kind| kind.name)) {
-                Some(near) => format!("did you mean `{near}`? The kinds are {}", manifest.registry().names()),
-                None => format!("the kinds are {}", manifest.registry().names()),
-            };
-            let message = format!("there is no kind `{}`", kind.get_ref());
-            let kind = manifest
-                .registry()
-                .find(kind.get_ref())
-                .ok_or_else(|| manifest.problem(&kind.span(), message, help))?;
-            Ok(Executable::Component(kind))
+            let registry = manifest.registry();
+            let found = registry.find(kind.get_ref()).map(Executable::Component);
+            found.ok_or_else(|| {
+                let near = nearest(kind.get_ref(), registry.iter().map(|kind| kind.name));
+                let near = near.map_or("the".to_owned(), |near| format!("did you mean `{near}`? The"));
+                let message = format!("there is no kind `{}`", kind.get_ref());
+                manifest.problem(&kind.span(), message, format!("{near} kinds are {}", registry.names()))
+            })
         }
         (None, Some(command)) => self::command(manifest, name, process, command).map(Executable::Command),
         (Some(_), Some(command)) => Err(manifest.problem(
@@ -190,11 +167,8 @@ fn nameless(manifest: &Manifest, name: &Spanned<String>) -> Diagnostic {
     let found = name.get_ref();
     if !manifest.is_override(&name.span()) {
         let message = format!("process `{found}` needs either `kind` or `command`");
-        return manifest.problem(
-            &name.span(),
-            message,
-            format!("the kinds are {}", manifest.registry().names()),
-        );
+        let help = format!("the kinds are {}", manifest.registry().names());
+        return manifest.problem(&name.span(), message, help);
     }
     let others = manifest.content.process.keys().map(|name| name.get_ref().as_str());
     let help = did_you_mean(found, others.filter(|name| name != found), "the processes are");
@@ -216,33 +190,35 @@ fn command(
         return Err(refused("a word of `command` holds a NUL", "no program can be given one"));
     }
     let who = format!("process `{}`: cannot start", name.get_ref());
-    if !word.contains('/') {
-        let found = in_path(process, word).ok_or_else(|| {
+    let path = if word.contains('/') {
+        let path = manifest.resolve(&Spanned::new(command.span(), word.clone()))?;
+        if let Some((why, help)) = objection(&path) {
+            return Err(refused(&format!("{who} {}: {why}", path.display()), help));
+        }
+        path.to_string_lossy().into_owned()
+    } else {
+        in_path(process, word).ok_or_else(|| {
             let message = format!("{who} `{word}`: no folder of PATH holds such an executable");
             refused(&message, "install it, or give a path with a `/`, relative to the manifest")
-        })?;
-        return Ok(std::iter::once(&found).chain(arguments).cloned().collect());
-    }
-    let path = manifest.resolve(&Spanned::new(command.span(), word.clone()))?;
-    if !is_executable(&path) {
-        let (why, help) = match path.is_file() {
-            true => ("it is not executable", "make it so with chmod +x"),
-            false => {
-                ("there is no such file", "build it, or correct the path, which is relative to the manifest")
-            }
-        };
-        return Err(refused(&format!("{who} {}: {why}", path.display()), help));
-    }
-    if is_text_without_interpreter(&path) {
+        })?
+    };
+    Ok(std::iter::once(&path).chain(arguments).cloned().collect())
+}
+
+/// Why a file cannot be executed, and what to do.
+fn objection(path: &Path) -> Option<(&'static str, &'static str)> {
+    if !path.is_file() {
+        let help = "build it, or correct the path, which is relative to the manifest";
+        Some(("there is no such file", help))
+    } else if !is_executable(path) {
+        Some(("it is not executable", "make it so with chmod +x"))
+    } else if is_text_without_interpreter(path) {
         let help =
             "begin it with #! and its interpreter, or name that first, such as [\"python3\", \"script.py\"]";
-        return Err(refused(
-            &format!("{who} {}: it is text that names no interpreter", path.display()),
-            help,
-        ));
+        Some(("it is text that names no interpreter", help))
+    } else {
+        None
     }
-    let path = path.to_string_lossy().into_owned();
-    Ok(std::iter::once(&path).chain(arguments).cloned().collect())
 }
 
 /// Whether no kernel can execute a file: it is text, and does not begin with `#!`. The C library would have a shell
@@ -286,13 +262,9 @@ fn require_name(manifest: &Manifest, name: &Spanned<String>) -> Result<(), Diagn
 /// # Errors
 /// If it is 0.
 pub fn period_ticks(manifest: &Manifest, process: &Process) -> Result<u32, Diagnostic> {
-    match &process.period_ticks {
-        None => Ok(1),
-        Some(period) if *period.get_ref() >= 1 => Ok(*period.get_ref()),
-        Some(period) => {
-            Err(manifest.problem(&period.span(), "`period_ticks` is 0", "a node runs every 1 or more ticks"))
-        }
-    }
+    let help = "a node runs every 1 or more ticks";
+    let period = manifest.within("period_ticks", &process.period_ticks, 1..=u32::MAX, help)?;
+    Ok(period.unwrap_or(1))
 }
 
 fn require_environment(manifest: &Manifest, process: &Process) -> Result<(), Diagnostic> {
@@ -314,43 +286,12 @@ fn require_environment(manifest: &Manifest, process: &Process) -> Result<(), Dia
 ///
 /// # Errors
 /// With the cores there are.
-pub fn require_core(manifest: &Manifest, cpu: Option<&Spanned<usize>>, key: &str) -> Result<(), Diagnostic> {
-    let (Some(cpu), allowed) = (cpu, bus::process::allowed_cores()) else { return Ok(()) };
-    if allowed.is_empty() || allowed.contains(cpu.get_ref()) {
-        return Ok(());
-    }
+pub fn require_core(manifest: &Manifest, cpu: &Option<Spanned<usize>>, key: &str) -> Result<(), Diagnostic> {
+    let allowed = bus::process::allowed_cores();
     let list: Vec<String> = allowed.iter().map(ToString::to_string).collect();
-    let message = format!("`{key}` is {}, a core that is not allowed here", cpu.get_ref());
-    Err(manifest.problem(&cpu.span(), message, format!("the allowed cores are {}", list.join(", "))))
-}
-
-fn within(
-    manifest: &Manifest,
-    key: &str,
-    value: Option<&Spanned<i32>>,
-    min: i32,
-    max: i32,
-) -> Result<Option<i32>, Diagnostic> {
-    match value {
-        Some(value) if !(min..=max).contains(value.get_ref()) => Err(manifest.problem(
-            &value.span(),
-            format!("`{key}` is {}", value.get_ref()),
-            format!("it goes from {min} to {max}"),
-        )),
-        value => Ok(value.map(|value| *value.get_ref())),
-    }
-}
-
-fn watchdog(manifest: &Manifest, process: &Process) -> Result<Duration, Diagnostic> {
-    match &process.watchdog_ms_host {
-        None => Ok(crate::program::WATCHDOG),
-        Some(limit) if *limit.get_ref() >= 1 => Ok(Duration::from_millis(*limit.get_ref())),
-        Some(limit) => Err(manifest.problem(
-            &limit.span(),
-            "`watchdog_ms_host` is 0: no process computes in no time",
-            "give milliseconds of host time, such as 20000",
-        )),
-    }
+    let message = |cpu: &usize| format!("`{key}` is {cpu}, a core that is not allowed here");
+    let help = format!("the allowed cores are {}", list.join(", "));
+    manifest.require(cpu, |cpu| allowed.is_empty() || allowed.contains(cpu), message, help)
 }
 
 fn working_directory(manifest: &Manifest, process: &Process) -> Result<Option<PathBuf>, Diagnostic> {
@@ -405,29 +346,18 @@ pub fn require_replaceable(
     declared: &DeclaredNode<'_>,
     node: &NodePlan,
 ) -> Result<(), Diagnostic> {
-    let Some(on_exit) = declared.process.on_exit.as_ref().filter(|kept| *kept.get_ref() != OnExit::Stop)
-    else {
-        return Ok(());
-    };
-    match irreplaceable(declared, node) {
-        None => Ok(()),
-        Some(reason) => {
-            let message = format!("`on_exit` of `{}`: {reason}", declared.name.get_ref());
-            Err(manifest.problem(
-                &on_exit.span(),
-                message,
-                "leave it out: the run stops when the process does",
-            ))
-        }
-    }
+    let Some(reason) = irreplaceable(declared, node) else { return Ok(()) };
+    let message = |_: &OnExit| format!("`on_exit` of `{}`: {reason}", declared.name.get_ref());
+    let help = "leave it out: the run stops when the process does";
+    manifest.require(&declared.process.on_exit, |on_exit| *on_exit == OnExit::Stop, message, help)
 }
 
 /// Why another process cannot go on in the place of this one.
 pub fn irreplaceable(declared: &DeclaredNode<'_>, node: &NodePlan) -> Option<&'static str> {
-    let has_internal_state = |component: &Registration| matches!(component.transfer, Transfer::Internal);
+    let component = declared.program.component();
     if declared.program.is_recorder() {
         Some("it is the recorder, and its file would be torn")
-    } else if declared.program.component().is_some_and(has_internal_state) {
+    } else if component.is_some_and(|component| matches!(component.transfer, Transfer::Internal)) {
         Some("its state is not transferred: another process would start anew")
     } else if node.outputs.is_empty() {
         Some("it has no outputs, so nothing could be transferred")

@@ -122,11 +122,13 @@ pub struct Process {
 }
 
 /// An input: a topic, or a table with delay and initial value.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Deserialize)]
+#[serde(remote = "Self", deny_unknown_fields)]
 pub struct InputSetting {
     /// The topic.
     pub topic: String,
     /// 0 or 1.
+    #[serde(default)]
     pub delay_ticks: u32,
     /// Field values before the first sample.
     pub initial: Option<serde_json::Value>,
@@ -153,16 +155,8 @@ impl<'de> Visitor<'de> for InputVisitor {
     }
 
     fn visit_map<A: MapAccess<'de>>(self, map: A) -> Result<InputSetting, A::Error> {
-        #[derive(Deserialize)]
-        #[serde(deny_unknown_fields)]
-        struct Table {
-            topic: String,
-            #[serde(default)]
-            delay_ticks: u32,
-            initial: Option<serde_json::Value>,
-        }
-        let Table { topic, delay_ticks, initial } = Table::deserialize(MapAccessDeserializer::new(map))?;
-        Ok(InputSetting { topic, delay_ticks, initial })
+        // The derived one, of a table.
+        InputSetting::deserialize(MapAccessDeserializer::new(map))
     }
 }
 

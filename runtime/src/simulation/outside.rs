@@ -1,11 +1,11 @@
 //! The simulated world as its supervisor meets it.
 
 use super::fault::Fault;
-use super::settings::WATCHDOG;
+use super::settings;
 use super::sim::{Bug, Doing, Need, Sim};
 use crate::ctl::protocol::{Answer, Request};
 use crate::host::End;
-use crate::program::{BackupSpec, Executable, Program, Readiness};
+use crate::program::{BackupSpec, OnExit, Program, Readiness};
 use crate::role::Role;
 use crate::view::{SegmentWrite, SlotView, View};
 use crate::world::{Body, World};
@@ -176,7 +176,7 @@ impl World for SimWorld {
         let sim = self.0.borrow();
         let node = sim.plan.nodes.iter().position(|node| node.name == process);
         let node = node.ok_or_else(|| Diagnostic::in_file("m.toml", "no such process"))?;
-        let program = Program { watchdog: WATCHDOG, ..Program::of(Executable::Command(Vec::new())) };
+        let program = settings::program(OnExit::Stop);
         let plan = sim.plan.nodes[node].clone();
         Ok(BackupSpec { node, join_tick: 0, take_over_tick: None, is_standby: false, program, plan })
     }

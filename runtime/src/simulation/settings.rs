@@ -10,8 +10,19 @@ const TICKS: u32 = 60;
 /// Longer than everybody may be frozen for a while, and shorter than a run may take to end.
 pub(super) const WATCHDOG: Duration = Duration::from_millis(500);
 
-fn program(on_exit: OnExit) -> Program {
-    Program { on_exit, watchdog: WATCHDOG, ..Program::of(Executable::Command(Vec::new())) }
+/// A program that nobody starts.
+pub(super) fn program(on_exit: OnExit) -> Program {
+    Program {
+        executable: Executable::Command(Vec::new()),
+        environment: Default::default(),
+        working_directory: None,
+        nice: None,
+        realtime_priority: None,
+        on_exit,
+        watchdog: WATCHDOG,
+        ready: Readiness::Started,
+        log: None,
+    }
 }
 
 /// `a` and `b` read each other's samples; `c` reads both, their shadows too, as a recorder does.

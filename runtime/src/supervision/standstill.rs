@@ -4,7 +4,7 @@ use super::Supervisor;
 use crate::program::OnExit;
 use crate::replacement::Stage;
 use crate::role::Role;
-use crate::stall::{Standstill, Straggler};
+use crate::stall::Standstill;
 use crate::supervisor::Event;
 use crate::world::World;
 use anyhow::Result;
@@ -41,18 +41,18 @@ impl<W: World> Supervisor<'_, W> {
             return self.abort(format!("{text}; it was aborted"));
         };
         self.timing.last_change.1 = self.clock.now();
-        self.processes.kill(straggler.role(), Some(format!("was killed by the watchdog: {text}")));
+        self.processes.kill(straggler, Some(format!("was killed by the watchdog: {text}")));
         Ok(())
     }
 
     /// How long the run may stand still because of `straggler`: for the clock, and where nobody is to blame, as long as
     /// for the node that may take longest.
-    fn patience(&self, straggler: Option<Straggler>) -> Duration {
+    fn patience(&self, straggler: Option<Role>) -> Duration {
         match straggler {
-            Some(Straggler::Node(node, generation)) => {
+            Some(Role::Node { node, generation }) => {
                 self.overseer.replacements.program_of(node, generation).watchdog
             }
-            Some(Straggler::Clock) | None => {
+            Some(Role::Clock | Role::Sidecar { .. }) | None => {
                 self.graph.programs.iter().map(|program| program.watchdog).max().unwrap_or_default()
             }
         }
