@@ -223,7 +223,7 @@ impl ConnectedNode {
             let awaited = if self.links.lockstep.epoch() != self.epoch {
                 Await::Change
             } else if self.links.lockstep.end_tick() <= tick {
-                Await::End
+                self.await_predecessor(tick)
             } else if tick >= self.retirement_tick {
                 self.await_backup()
             } else {
@@ -311,6 +311,20 @@ impl ConnectedNode {
         }
     }
 
+    /// A shadow that has come to the end of the run waits for its predecessor to get there: until then that may die,
+    /// and the samples of its last ticks are then the shadow's.
+    fn await_predecessor(&self, tick: u32) -> Await {
+        let (links, lockstep) = (&self.links, &self.links.lockstep);
+        if links.generation == 0 || self.take_over_tick < tick {
+            return Await::End;
+        }
+        let is_over = || lockstep.is_aborted() || lockstep.epoch() != self.epoch;
+        match lockstep.wait(Need::OtherDone, tick, links.node.wait, is_over) {
+            Waited::Over if !lockstep.is_aborted() => Await::Change,
+            _ => Await::End,
+        }
+    }
+
     fn wait(&self, need: Need, count: u32, tick: u32) -> Await {
         let lockstep = &self.links.lockstep;
         let is_over = || lockstep.end_tick() <= tick || lockstep.epoch() != self.epoch;
@@ -321,12 +335,13 @@ impl ConnectedNode {
         }
     }
 
-    /// Stays until every process has taken the last samples of this process, where it leaves before the end.
-    fn await_readers(&self, tick: u32) -> Result<(), BusError> {
-        let (lockstep, plan) = (&self.links.lockstep, &self.links.plan);
-        let longest = plan.nodes.iter().map(|node| node.period_ticks).max().unwrap_or(1);
+    /// Stays until every process has taken the last samples of this process: also one that is started in the place of
+    /// a reader that has died meanwhile.
+    fn await_readers(&mut self, tick: u32) -> Result<(), BusError> {
+        let longest = self.links.plan.nodes.iter().map(|node| node.period_ticks).max().unwrap_or(1);
         let taken = tick.saturating_add(longest + 1);
         loop {
+            let lockstep = &self.links.lockstep;
             if lockstep.is_aborted() {
                 return Err(BusError::Aborted);
             }
@@ -334,8 +349,25 @@ impl ConnectedNode {
             if lockstep.computing().all(|slot| lockstep.done(slot) >= needed) {
                 return Ok(());
             }
-            std::thread::sleep(RETIREMENT_NAP);
+            let epoch = lockstep.epoch();
+            if epoch == self.epoch {
+                std::thread::sleep(RETIREMENT_NAP);
+                continue;
+            }
+            let membership = Membership::load(&self.links.run_dir, epoch)?;
+            self.connect_readers(&membership)?;
+            self.epoch = epoch;
+            self.links.lockstep.acknowledge(epoch);
         }
+    }
+
+    /// Sends to the readers that `membership` names from now on, and to new ones what was sent last.
+    fn connect_readers(&mut self, membership: &Membership) -> Result<(), BusError> {
+        for output in &mut self.outputs {
+            output.readers = self.links.readers(membership, output.topic);
+            output.update_subscribers(&self.links.node.name)?;
+        }
+        Ok(())
     }
 
     /// Makes the connections agree with `membership`; `tick` is the next that this node computes.
@@ -352,10 +384,9 @@ impl ConnectedNode {
         } else if instances.primary.generation == generation {
             self.retirement_tick = instances.backup.as_ref().map_or(u32::MAX, |_| instances.take_over_tick);
         }
-        for (index, output) in self.outputs.iter_mut().enumerate() {
-            output.readers = self.links.readers(membership, output.topic);
-            output.update_subscribers(&self.links.node.name)?;
-            if is_backup {
+        self.connect_readers(membership)?;
+        if is_backup {
+            for (index, output) in self.outputs.iter_mut().enumerate() {
                 self.links.promote(output, instances, index, tick);
             }
         }

@@ -200,7 +200,6 @@ impl<'a> Replacements<'a> {
             let slot = self.slot(node, generation);
             self.view.slots[slot].state == SlotState::Taken
                 && self.view.lives(node, generation)
-                && !self.view.has_completed(slot)
                 && self.view.slots[slot].acknowledged < self.view.epoch
         })
     }

@@ -8,6 +8,7 @@
 //!
 //! After a drawn number of steps no more faults occur, and the run must end. The rules that are checked on the way:
 //! - One instance writes each sample that counts, and no tick is skipped.
+//! - Whoever sends to an instance that joins knows it; no sample that it needs is lost.
 //! - Memberships change one at a time; no slot is cleared while a process is in it.
 //! - A stop that was asked for takes effect, and a swap that was reported took place.
 //! - A watchdog expires only where a process hangs; a run is aborted only after a fault that may end it.
@@ -135,7 +136,7 @@ fn bugs_that_are_planted_are_found() {
     let outlived = "they outlive the supervisor";
     for (bug, breaks) in [
         (Bug::AcknowledgesUnread, &[" is due"][..]),
-        (Bug::AwaitsNobody, &["has not acknowledged"]),
+        (Bug::AwaitsNobody, &["has not acknowledged", "joins unknown to"]),
         (Bug::PromotesTwo, &[" is due"]),
         (Bug::LosesWakeUp, &[expired, aborted]),
         (Bug::ForgetsStop, &["long after a stop"]),

@@ -236,7 +236,7 @@ pub fn words_of(fault: Fault) -> &'static [&'static str] {
     match fault {
         Fault::Error => &["ended with exit code 1", "the battery is empty", "failed at tick"],
         Fault::Panic => &["ended with exit code 101", "the propeller came off"],
-        Fault::ExitWith3 | Fault::BehindTheEnd => &["ended with exit code 3"],
+        Fault::ExitWith3 | Fault::LateExit | Fault::BehindTheEnd => &["ended with exit code 3"],
         Fault::ExitWith0 => &["ended with exit code 0 before the run did"],
         Fault::Unwritten => &["without writing its output `report`"],
         Fault::SlowStep | Fault::Hang | Fault::NeverJoins | Fault::OtherLayout => {

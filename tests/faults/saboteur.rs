@@ -38,6 +38,8 @@ pub enum Fault {
     Error,
     Panic,
     ExitWith3,
+    /// As the last of all: the others have completed the tick by then.
+    LateExit,
     ExitWith0,
     Unwritten,
     SlowStep,
@@ -54,8 +56,9 @@ impl Fault {
         [Self::Error, Self::Panic, Self::ExitWith3, Self::ExitWith0, Self::Unwritten];
 
     fn find(name: &str) -> Option<Self> {
-        let others = [Self::SlowStep, Self::Hang, Self::NeverJoins, Self::OtherLayout, Self::BehindTheEnd];
-        let mut all = Self::ENDING.into_iter().chain(others);
+        let others = [Self::SlowStep, Self::Hang, Self::NeverJoins, Self::OtherLayout];
+        let at_end = [Self::BehindTheEnd, Self::LateExit];
+        let mut all = Self::ENDING.into_iter().chain(others).chain(at_end);
         all.find(|fault| format!("{fault:?}") == name)
     }
 
@@ -64,6 +67,10 @@ impl Fault {
             Self::Error => Err("the battery is empty".to_owned()),
             Self::Panic => panic!("the propeller came off"),
             Self::ExitWith3 => std::process::exit(3),
+            Self::LateExit => {
+                std::thread::sleep(Duration::from_millis(300));
+                std::process::exit(3)
+            }
             Self::ExitWith0 => std::process::exit(0),
             Self::Hang => hang(),
             Self::Unwritten | Self::SlowStep | Self::NeverJoins | Self::OtherLayout | Self::BehindTheEnd => {

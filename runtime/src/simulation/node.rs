@@ -28,10 +28,14 @@ impl Sim {
                 self.instances[index].doing = Doing::Waiting;
             }
             Doing::Connected if !is_first && state == SlotState::Taken => {
+                self.check_publishers(index);
                 self.instances[index].doing = Doing::Waiting;
             }
             Doing::Waiting => self.await_tick(index),
             Doing::Sending { output, is_stored } => self.send(index, output, is_stored),
+            Doing::Leaving { .. } if self.instances[index].epoch != self.segment.epoch => {
+                self.turn(index, slot)
+            }
             Doing::Leaving { taken } => {
                 if self.slowest() >= taken.min(self.segment.end_tick) {
                     self.instances[index].end = Some(End::Exited(0));
@@ -72,6 +76,18 @@ impl Sim {
         }
         self.get_ready(slot, Phase::Running);
         self.instances[index].doing = Doing::Connected;
+    }
+
+    /// Whoever sends to an instance that joins must have connected to it: else its first samples are lost.
+    fn check_publishers(&self, index: usize) {
+        let (role, epoch) = (self.instances[index].role, self.instances[index].epoch);
+        let publishers = self.inputs(role).iter().map(|input| self.plan.publisher(input.topic));
+        let publishers: Vec<usize> = publishers.collect();
+        for other in self.living() {
+            let is_publisher = matches!(other.role, Role::Node { node, .. } if publishers.contains(&node));
+            let follows = other.epoch >= epoch || matches!(other.doing, Doing::Starting | Doing::Prepared);
+            assert!(!is_publisher || follows, "{:?} joins unknown to {:?}", role, other.role);
+        }
     }
 
     /// Makes the connections agree with the membership of `epoch`.
@@ -141,10 +157,14 @@ impl Sim {
     fn await_tick(&mut self, index: usize) {
         let (role, epoch) = (self.instances[index].role, self.segment.epoch);
         let (slot, tick) = (self.slot(role), self.instances[index].tick);
+        let is_shadow = role.generation() > 0 && tick <= self.instances[index].take_over_tick;
         if self.instances[index].epoch != epoch {
-            self.follow(index, epoch);
-            self.segment.slots[slot].acknowledged = epoch;
-            self.notify();
+            self.turn(index, slot);
+        } else if self.segment.end_tick <= tick
+            && is_shadow
+            && self.segment.slots[self.other(slot)].done < tick
+        {
+            self.sleep(index, Need::Other(slot), FOR_EVER);
         } else if self.segment.end_tick <= tick {
             self.leave(index, slot);
         } else if tick >= self.instances[index].retirement_tick {
@@ -161,6 +181,14 @@ impl Sim {
             self.wake(Need::Other(self.other(slot)));
             self.instances[index].doing = Doing::Sending { output: 0, is_stored: false };
         }
+    }
+
+    /// Turns to the newest membership.
+    fn turn(&mut self, index: usize, slot: usize) {
+        let epoch = self.segment.epoch;
+        self.follow(index, epoch);
+        self.segment.slots[slot].acknowledged = epoch;
+        self.notify();
     }
 
     fn other(&self, slot: usize) -> usize {
