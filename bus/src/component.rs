@@ -9,6 +9,11 @@ use diagnostics::ParameterError;
 use serde::de::DeserializeOwned;
 
 /// What goes wrong in a step, in words. Any error, and any text, becomes one by `?` or `into`.
+///
+/// ```
+/// let too_low: bus::component::StepError = "the battery is empty".into();
+/// assert_eq!(too_low.to_string(), "the battery is empty");
+/// ```
 pub type StepError = Box<dyn std::error::Error + Send + Sync>;
 
 /// Everything that runs at ticks: sensors, controllers, the plant, the recorder.
@@ -128,6 +133,13 @@ pub trait Component: Sized {
 }
 
 /// What is told of a component.
+///
+/// ```
+/// use bus::component::{Info, Role};
+///
+/// const LOGGER: Info = Info::new("logger", "writes what it reads to a file").recorder();
+/// assert_eq!((LOGGER.name, LOGGER.role), ("logger", Role::Record));
+/// ```
 #[derive(Clone, Copy, Debug)]
 pub struct Info {
     /// Name in manifests.
@@ -173,6 +185,17 @@ pub enum Transfer {
 }
 
 /// What a component remembers from tick to tick.
+///
+/// ```
+/// use bus::component::{Internal, State, Transfer};
+///
+/// fn transfer<S: State>() -> Transfer {
+///     S::TRANSFER
+/// }
+/// assert!(matches!(transfer::<bus::messages::SetPoint>(), Transfer::Message(_)));
+/// assert!(matches!(transfer::<()>(), Transfer::Nothing));
+/// assert!(matches!(transfer::<Internal>(), Transfer::Internal));
+/// ```
 pub trait State: bytemuck::Pod {
     /// What happens to it when another process takes the component's place.
     const TRANSFER: Transfer;

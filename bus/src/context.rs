@@ -4,6 +4,15 @@ use crate::ports::{InputSamples, OutputPorts, SampleSource};
 use std::cell::RefCell;
 
 /// What a component may know of its node and the run, and where it leaves its warnings.
+///
+/// ```
+/// let context = bus::context::NodeContext::new("imu", &["state"]).timed(1_000_000, 4, 30_000).seeded(7);
+/// assert!(context.has("state") && !context.has("wind"));
+/// assert_eq!((context.rate_hz(), context.period_s(), context.duration_s()), (1000, 0.004, 30.0));
+///
+/// context.warn("noise", "there is none");
+/// assert_eq!(context.into_warnings()[0].key, "noise");
+/// ```
 #[derive(Clone, Debug)]
 pub struct NodeContext<'a> {
     /// The node's name in the run.

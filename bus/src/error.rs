@@ -4,6 +4,13 @@ use std::path::PathBuf;
 use thiserror::Error;
 
 /// An error of the bus; its text names the node, the topic and what to do.
+///
+/// ```
+/// // A node that nobody launched says so, and what to do.
+/// let error = bus::Node::join().unwrap_err();
+/// assert!(matches!(error, bus::BusError::NotInARun { .. }));
+/// assert!(error.to_string().contains("hummingbus run MANIFEST"));
+/// ```
 #[derive(Error)]
 pub enum BusError {
     /// The process was not started by a launcher.

@@ -1,10 +1,16 @@
 //! The lockstep bus: messages, ports, the node loop and the clock service.
+//!
+//! Whoever writes a component needs [`Component`], its [contexts](context), [messages] or a [message of its
+//! own](Message), and [`run_process`]; whoever tests one, [`Harness`]. Modules without documentation serve launchers:
+//! they change without notice.
 
 // The derive names this crate `bus` also when it is used inside it.
 extern crate self as bus;
 
 pub mod announcement;
+#[doc(hidden)]
 pub mod claim;
+#[doc(hidden)]
 pub mod clock;
 pub mod component;
 mod connected;
@@ -13,16 +19,22 @@ pub mod error;
 mod finite;
 mod handles;
 mod harness;
+#[doc(hidden)]
 pub mod host_time;
+#[doc(hidden)]
 pub mod hosted;
+#[doc(hidden)]
 pub mod initial;
 mod join;
 mod json_file;
 mod links;
+#[doc(hidden)]
 pub mod lockstep;
+#[doc(hidden)]
 pub mod membership;
 pub mod message;
 pub mod messages;
+#[doc(hidden)]
 pub mod names;
 mod node;
 mod node_harness;
@@ -30,20 +42,26 @@ mod parameter_names;
 pub mod plan;
 mod port;
 pub mod ports;
+#[doc(hidden)]
 pub mod process;
+#[doc(hidden)]
 pub mod profile;
 pub mod random;
 mod registration;
 mod reserve;
+#[doc(hidden)]
 pub mod room;
 mod run_process;
 mod sample_memory;
 pub mod schema;
 mod shared_file;
+#[doc(hidden)]
 pub mod state_transfer;
+#[doc(hidden)]
 pub mod step_times;
 mod tick;
 mod transport;
+#[doc(hidden)]
 pub mod user_file;
 
 pub use bus_derive::{InputPorts, Message, OutputPorts};

@@ -1,6 +1,13 @@
 //! The messages of the built-in nodes, and the standard ROS 2 messages that 3-D views draw.
 //!
 //! Frames: `world` is z up; `body` is x forward, y left, z up, its origin in the centre of mass.
+//!
+//! ```
+//! use bus::messages::{PlantState, Vector3};
+//!
+//! let state = PlantState { position: Vector3 { z: 1.5, ..Vector3::default() }, ..PlantState::default() };
+//! assert_eq!(state.attitude.w, 1.0, "level by default");
+//! ```
 
 use crate::Message;
 use crate::schema::{FieldType, Kind};
@@ -15,6 +22,11 @@ pub use sensing::{
 };
 
 /// Simulation time as ROS 2 writes it. The bus fills it in when a sample is sent.
+///
+/// ```
+/// let time = bus::messages::Time::from_ns(1_500_000_000);
+/// assert_eq!((time.sec, time.nanosec), (1, 500_000_000));
+/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Message)]
 #[repr(C)]
 #[message(type_name = "builtin_interfaces/msg/Time")]
@@ -37,6 +49,11 @@ impl Time {
 }
 
 /// Three numbers along the axes of a frame.
+///
+/// ```
+/// let position = bus::messages::Vector3::from([1.0, 2.0, 3.0]);
+/// assert_eq!(position.z, 3.0);
+/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Message)]
 #[repr(C)]
 #[message(type_name = "hummingbus_msgs/msg/Vector3")]
@@ -65,6 +82,12 @@ impl From<Vector3> for [f64; 3] {
 }
 
 /// A unit quaternion, Hamilton convention, stored x, y, z, w; it rotates body vectors into the world.
+///
+/// ```
+/// // Level, and turned nowhere.
+/// let bus::messages::Quaternion { x, y, z, w } = Default::default();
+/// assert_eq!([x, y, z, w], [0.0, 0.0, 0.0, 1.0]);
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Message)]
 #[repr(C)]
 #[message(type_name = "hummingbus_msgs/msg/Quaternion")]

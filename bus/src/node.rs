@@ -22,7 +22,22 @@ use serde::de::DeserializeOwned;
 use std::fmt::Display;
 use std::path::PathBuf;
 
-/// A node that declares its ports.
+/// A node that declares its ports by name and runs a closure, where no [`Component`](crate::Component) will do: the whole
+/// of an executable that a manifest names as a `command`.
+///
+/// ```no_run
+/// use bus::messages::{PlantState, SetPoint};
+///
+/// fn main() -> Result<(), bus::BusError> {
+///     let mut node = bus::Node::join()?;
+///     let state = node.input::<PlantState>("state")?;
+///     let set_point = node.output::<SetPoint>("set_point")?;
+///     node.run(|tick| {
+///         let altitude = tick.get(state).position.z + 0.5;
+///         tick.write(set_point, SetPoint { altitude, ..Default::default() })
+///     })
+/// }
+/// ```
 #[derive(Debug)]
 pub struct Node {
     run_dir: PathBuf,
@@ -72,19 +87,6 @@ impl Node {
         f64::from(self.node.period_ticks) * self.plan.tick_s()
     }
 
-    /// Simulated time of one tick, in seconds.
-    #[must_use]
-    pub fn tick_s(&self) -> f64 {
-        self.plan.tick_s()
-    }
-
-    /// Ticks per simulated second.
-    #[must_use]
-    #[allow(clippy::cast_possible_truncation, reason = "a tick is at least a nanosecond")]
-    pub fn rate_hz(&self) -> u32 {
-        (1_000_000_000 / self.plan.tick_ns) as u32
-    }
-
     /// The seed of the run: with the node's name it makes the node's random stream (`bus::random`).
     #[must_use]
     pub fn seed(&self) -> u64 {
@@ -99,27 +101,9 @@ impl Node {
         diagnostics::read(&self.node.parameters).map_err(|error| self.error(format!("parameters: {error}")))
     }
 
-    pub(crate) fn raw_parameters(&self) -> &serde_json::Value {
-        &self.node.parameters
-    }
-
-    pub(crate) fn tick_ns(&self) -> u64 {
-        self.plan.tick_ns
-    }
-
-    pub(crate) fn period_ticks(&self) -> u32 {
-        self.node.period_ticks
-    }
-
-    pub(crate) fn duration_ticks(&self) -> u32 {
-        self.plan.duration_ticks
-    }
-
-    /// The wired inputs, and the outputs.
-    pub(crate) fn port_names(&self) -> (Vec<&str>, Vec<&str>) {
-        let NodePlan { inputs, outputs, .. } = &self.node;
-        let inputs = inputs.iter().map(|input| input.port.as_str()).collect();
-        (inputs, outputs.iter().map(|output| output.port.as_str()).collect())
+    /// The plan of the run, and the node's part in it.
+    pub(crate) fn plan(&self) -> (&Plan, &NodePlan) {
+        (&self.plan, &self.node)
     }
 
     /// Declares the ports of a component.

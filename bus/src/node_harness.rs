@@ -1,7 +1,7 @@
 //! A node of a plan, stepped without a run: what it reads is given to it as recorded bytes, and so is what it sends.
 
 use crate::component::StepError;
-use crate::context::{NodeContext, StepContext};
+use crate::context::StepContext;
 use crate::initial;
 use crate::message::{CDR_START, cdr_bytes};
 use crate::messages::Time;
@@ -48,7 +48,7 @@ impl NodeHarness {
     /// As [`Component::new`](crate::Component::new).
     pub fn new(component: &Registration, plan: &Plan, node: usize) -> Result<Self, ParameterError> {
         let node = &plan.nodes[node];
-        let made = make(component, plan, node)?;
+        let made = component.make_for(plan, node)?;
         let topic = |port: &PortSpec| {
             let output = node.outputs.iter().find(|output| output.port == port.name)?;
             Some((output.topic, plan.topics[output.topic].period_ticks))
@@ -112,16 +112,6 @@ impl std::fmt::Debug for NodeHarness {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.debug_struct("NodeHarness").field("state_bytes", &self.state_bytes).finish_non_exhaustive()
     }
-}
-
-fn make(component: &Registration, plan: &Plan, node: &NodePlan) -> Result<Box<dyn Stepper>, ParameterError> {
-    let inputs: Vec<&str> = node.inputs.iter().map(|input| input.port.as_str()).collect();
-    let outputs: Vec<&str> = node.outputs.iter().map(|output| output.port.as_str()).collect();
-    let context = NodeContext::new(&node.name, &inputs)
-        .naming(&outputs)
-        .timed(plan.tick_ns, node.period_ticks, plan.duration_ticks)
-        .seeded(plan.seed);
-    (component.make)(&node.parameters, &context)
 }
 
 /// The inputs of the node, in the order in which the component declares them.

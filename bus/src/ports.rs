@@ -6,6 +6,19 @@ use crate::schema::Schema;
 use std::marker::PhantomData;
 
 /// A port of a component.
+///
+/// ```
+/// use bus::messages::Imu;
+/// use bus::ports::OutputPorts;
+///
+/// #[derive(bus::OutputPorts)]
+/// struct Outputs {
+///     /// What the sensor measured.
+///     imu: Imu,
+/// }
+/// let [port] = Outputs::DECLARED else { panic!() };
+/// assert_eq!((port.name, port.doc, port.schema.type_name), ("imu", "What the sensor measured.", "hummingbus_msgs/msg/Imu"));
+/// ```
 #[derive(Clone, Copy, Debug)]
 pub struct PortSpec {
     /// Name in the component.
@@ -224,6 +237,17 @@ impl OutputPorts for () {
 }
 
 /// One or more inputs of one message, in the order of the names that the manifest gives them.
+///
+/// ```
+/// use bus::messages::PlantState;
+/// use bus::ports::{InputPorts, Inputs, Many};
+///
+/// /// The height of the highest of all vehicles that the manifest wires.
+/// fn highest_m(vehicles: &Many<'_, PlantState>) -> f64 {
+///     vehicles.iter().map(|state| state.position.z).fold(f64::MIN, f64::max)
+/// }
+/// assert!(matches!(<Many<'_, PlantState> as InputPorts<'_>>::DECLARED, Inputs::Many(_)));
+/// ```
 #[derive(Clone, Copy, Debug)]
 pub struct Many<'a, T> {
     samples: InputSamples<'a>,

@@ -11,6 +11,12 @@ use rand_chacha::ChaCha8Rng;
 use rand_core::{Rng, SeedableRng};
 
 /// The generator behind every node's noise.
+///
+/// ```
+/// let mut imu = bus::random::stream(7, "imu");
+/// let drawn: f64 = (0..1000).map(|_| bus::random::normal(&mut imu)).sum();
+/// assert!((drawn / 1000.0).abs() < 0.1, "the mean of 1000 draws is near 0");
+/// ```
 pub type Stream = ChaCha8Rng;
 
 /// The random stream of the node named `node` in a run whose seed is `run_seed`.

@@ -4,6 +4,7 @@ use crate::announcement::Announcement;
 use crate::component::{Component, Info, Role, State, StepError, Transfer};
 use crate::context::{NodeContext, StepContext};
 use crate::parameter_names;
+use crate::plan::{NodePlan, Plan};
 use crate::ports::{InputPorts, InputSamples, Inputs, OutputPorts, OutputSamples, PortSpec};
 use crate::schema::Schema;
 use diagnostics::ParameterError;
@@ -26,11 +27,10 @@ pub struct Registration {
     pub transfer: Transfer,
     parameters: fn() -> &'static [&'static str],
     check: fn(&Value, &NodeContext<'_>) -> Result<(), ParameterError>,
-    pub(crate) make: Make,
+    make: Make,
 }
 
-/// Makes a component.
-pub(crate) type Make = fn(&Value, &NodeContext<'_>) -> Result<Box<dyn Stepper>, ParameterError>;
+type Make = fn(&Value, &NodeContext<'_>) -> Result<Box<dyn Stepper>, ParameterError>;
 
 impl Registration {
     /// The component `C`.
@@ -62,6 +62,17 @@ impl Registration {
     /// What cannot be meant.
     pub fn check(&self, parameters: &Value, context: &NodeContext<'_>) -> Result<(), ParameterError> {
         (self.check)(parameters, context)
+    }
+
+    /// The component, made for `node` of `plan`.
+    pub(crate) fn make_for(&self, plan: &Plan, node: &NodePlan) -> Result<Box<dyn Stepper>, ParameterError> {
+        let inputs: Vec<&str> = node.inputs.iter().map(|input| input.port.as_str()).collect();
+        let outputs: Vec<&str> = node.outputs.iter().map(|output| output.port.as_str()).collect();
+        let context = NodeContext::new(&node.name, &inputs)
+            .naming(&outputs)
+            .timed(plan.tick_ns, node.period_ticks, plan.duration_ticks)
+            .seeded(plan.seed);
+        (self.make)(&node.parameters, &context)
     }
 
     /// Bytes of its state.

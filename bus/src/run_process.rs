@@ -3,14 +3,14 @@
 use crate::announcement::Announcement;
 use crate::component::{Component, StepError, Transfer};
 use crate::connected::ConnectedNode;
-use crate::context::{NodeContext, StepContext};
+use crate::context::StepContext;
 use crate::error::BusError;
 use crate::handles::Wiring;
 use crate::join::Join;
 use crate::node::Node;
 use crate::port::{InPort, OutPort};
 use crate::ports::{InputSamples, OutputSamples, SampleSink, SampleSource};
-use crate::registration::{Make, Registration, Stepper};
+use crate::registration::{Registration, Stepper};
 use crate::tick::Tick;
 
 /// Runs the component `C` as the node that the launcher started this process for: the whole `main` of an executable
@@ -30,7 +30,8 @@ impl Registration {
     pub fn run(&self, join: Join) -> Result<(), BusError> {
         let mut node = Node::open(join)?;
         let wiring = node.declare(self)?;
-        let mut component = made(self.make, &node)?;
+        let (plan, node_plan) = node.plan();
+        let mut component = self.make_for(plan, node_plan).map_err(|reason| node.error(reason))?;
         let name = node.name().to_owned();
         let failed =
             |error: StepError| BusError::Parameters { node: name.clone(), reason: error.to_string() };
@@ -62,16 +63,6 @@ impl Registration {
         let state = &mut bytemuck::cast_slice_mut(state)[..self.state_bytes()];
         connected.run(schema, state, |tick, state| step(component, wiring, tick, state))
     }
-}
-
-/// The component, made for the node.
-fn made(make: Make, node: &Node) -> Result<Box<dyn Stepper>, BusError> {
-    let (inputs, outputs) = node.port_names();
-    let context = NodeContext::new(node.name(), &inputs)
-        .naming(&outputs)
-        .timed(node.tick_ns(), node.period_ticks(), node.duration_ticks())
-        .seeded(node.seed());
-    make(node.raw_parameters(), &context).map_err(|reason| node.error(reason))
 }
 
 fn step(

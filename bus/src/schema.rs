@@ -98,6 +98,14 @@ pub struct Field {
 }
 
 /// A message's type, made by `#[derive(Message)]`.
+///
+/// ```
+/// use bus::Message;
+///
+/// let schema = bus::messages::SetPoint::SCHEMA;
+/// let altitude = schema.fields.iter().find(|field| field.name == "altitude").unwrap();
+/// assert_eq!((altitude.unit, altitude.frame, altitude.offset), ("m", "world", 8));
+/// ```
 #[derive(Debug)]
 pub struct Schema {
     /// Three-part ROS 2 name, `package/msg/Name`.
