@@ -1,6 +1,7 @@
 //! The thesis's first scenario (Figs 5.1–5.5) in a closed loop: hover from 1.0 to 1.5 m at 2 s, then a
 //! roll doublet of ±10° at 6 s, with a noisy IMU and the complementary filter between plant and law.
 
+use bus::messages::AttitudeEstimate;
 use controllers::airframe::ControlledVehicle;
 use controllers::control::{HoverMotion, Integrals};
 use controllers::pid::PidLaw;
@@ -8,7 +9,7 @@ use controllers::pid_gains::PidGains;
 use controllers::set_points::{Schedule, SetPoint, SetPointEntry};
 use nalgebra::Vector3;
 use plant::{NewtonEuler, RigidBody, State};
-use sensors::complementary::{AttitudeEstimate, Complementary, ComplementaryParams};
+use sensors::complementary::{Complementary, ComplementaryParams};
 use sensors::imu_model::{ImuModel, ImuParams, ImuReading};
 use vehicles::{MotorModel, Vehicle};
 
@@ -75,10 +76,10 @@ fn measurement(body: &RigidBody, estimate: &AttitudeEstimate) -> HoverMotion {
     HoverMotion {
         altitude_m: body.position_W_m.z,
         climb_rate_m_s: body.velocity_W_m_s.z,
-        roll_rad: estimate.roll_rad,
-        pitch_rad: estimate.pitch_rad,
-        yaw_rad: estimate.yaw_rad,
-        angular_velocity_B_rad_s: estimate.angular_velocity_B_rad_s,
+        roll_rad: estimate.roll,
+        pitch_rad: estimate.pitch,
+        yaw_rad: estimate.yaw,
+        angular_velocity_B_rad_s: <[f64; 3]>::from(estimate.angular_velocity).into(),
     }
 }
 

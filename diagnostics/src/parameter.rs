@@ -142,6 +142,12 @@ impl ParameterError {
     }
 }
 
+impl From<std::convert::Infallible> for ParameterError {
+    fn from(never: std::convert::Infallible) -> Self {
+        match never {}
+    }
+}
+
 /// A message without a key.
 impl From<String> for ParameterError {
     fn from(message: String) -> Self {

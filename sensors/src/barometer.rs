@@ -6,15 +6,14 @@
 //! when it measures, how measurements are delayed and lost.
 
 use crate::atmosphere::{SEA_LEVEL_PRESSURE_PA, height_m, pressure_Pa};
-use crate::channel::{Chance, ChannelState, QUEUE, Tick};
+use crate::channel::Chance;
 use crate::noise::BiasWalk;
 use crate::sensing::{Sensor, TruthInputs};
 use crate::steps::in_steps;
 use bus::component::Info;
 use bus::messages::Barometer;
 use bus::random::normal;
-use bus::{Message, OutputPorts};
-use diagnostics::parameter::{ParameterError, finite, not_negative, positive};
+use diagnostics::parameter::{finite, not_negative, positive};
 
 /// The least pressure that the part reads, Pa (MS5611-01BA03 data sheet: 10 mbar).
 const PRESSURE_MIN_PA: f64 = 1.0e3;
@@ -57,36 +56,12 @@ parameters! {
     }
 }
 
-impl BarometerParams {
-    /// What is read at `altitude_m`, Pa; the bias then walks one step on.
-    fn measure(&self, altitude_m: f64, bias_Pa: &mut f64, chance: &mut Chance<'_>) -> f64 {
-        let noise = normal(chance.noise);
-        let step = normal(chance.noise);
-        let read_Pa = pressure_Pa(altitude_m, self.ground_pressure_Pa) + *bias_Pa + self.noise_Pa * noise;
-        *bias_Pa += BiasWalk::new(self.bias_walk_Pa_sqrt_s, self.rate_hz).step_sigma() * step;
-        in_steps(read_Pa, self.resolution_Pa).clamp(PRESSURE_MIN_PA, PRESSURE_MAX_PA)
+sensor! {
+    pub struct BarometerState as "hummingbus_msgs/msg/BarometerState" sends barometer: Barometer {
+        /// The bias at the next measurement.
+        #[field(unit = "Pa")]
+        bias: f64,
     }
-}
-
-/// All that the sensor remembers.
-#[derive(Debug, Clone, Copy, Message)]
-#[repr(C)]
-#[message(type_name = "hummingbus_msgs/msg/BarometerState")]
-pub struct BarometerState {
-    /// What is under way.
-    channel: ChannelState,
-    /// The last measurements.
-    queue: [Barometer; QUEUE],
-    /// The bias at the next measurement.
-    #[field(unit = "Pa")]
-    bias: f64,
-}
-
-/// What the sensor sends.
-#[derive(Debug, OutputPorts)]
-pub struct Outputs {
-    /// The measurement that arrived last.
-    pub barometer: Barometer,
 }
 
 impl Sensor for BarometerParams {
@@ -96,27 +71,25 @@ impl Sensor for BarometerParams {
     type Outputs = Outputs;
     type State = BarometerState;
 
-    fn new(parameters: Self) -> Result<Self, ParameterError> {
-        Ok(parameters)
-    }
-
     fn initial(&self) -> BarometerState {
-        let queue = [Barometer::default(); QUEUE];
-        BarometerState { channel: ChannelState::default(), queue, bias: self.initial_bias_Pa }
+        BarometerState { bias: self.initial_bias_Pa, ..BarometerState::default() }
     }
 
-    fn sample(&self, tick: &mut Tick<'_>, state: &mut Self::State, inputs: Self::Inputs<'_>) -> Outputs {
-        let truth = inputs.state;
-        let BarometerState { channel: under_way, queue, bias } = state;
-        let barometer = tick.measure(under_way, queue, |last, chance| {
-            let pressure = self.measure(truth.position.z, bias, chance);
-            if chance.is_lost(0) {
-                return Barometer { valid: 0, ..*last };
-            }
-            let altitude = height_m(pressure, self.reference_pressure_Pa);
-            Barometer { measured_ns: chance.now_ns, pressure, altitude, valid: 1, ..Default::default() }
-        });
-        Outputs { barometer }
+    fn measure(
+        &self,
+        state: &mut BarometerState,
+        _: &Barometer,
+        chance: &mut Chance<'_>,
+        inputs: TruthInputs<'_>,
+    ) -> Option<Barometer> {
+        let noise = normal(chance.noise);
+        let step = normal(chance.noise);
+        let true_Pa = pressure_Pa(inputs.state.position.z, self.ground_pressure_Pa);
+        let read_Pa = true_Pa + state.bias + self.noise_Pa * noise;
+        state.bias += BiasWalk::new(self.bias_walk_Pa_sqrt_s, self.rate_hz).step_sigma() * step;
+        let pressure = in_steps(read_Pa, self.resolution_Pa).clamp(PRESSURE_MIN_PA, PRESSURE_MAX_PA);
+        let altitude = height_m(pressure, self.reference_pressure_Pa);
+        Some(Barometer { pressure, altitude, ..Default::default() })
     }
 }
 

@@ -5,15 +5,15 @@
 //! measurements are delayed and lost; the count goes on through losses. Where the truth is not valid, since the plant
 //! has no model of its battery, nothing is measured and `valid` is 0.
 
-use crate::channel::{Chance, ChannelState, QUEUE, Tick};
+use crate::channel::Chance;
 use crate::parameters::within;
 use crate::sensing::Sensor;
 use crate::steps::in_steps;
+use bus::InputPorts;
 use bus::component::Info;
 use bus::messages::Battery;
 use bus::random::normal;
-use bus::{InputPorts, Message, OutputPorts};
-use diagnostics::parameter::{ParameterError, finite, not_negative, positive};
+use diagnostics::parameter::{finite, not_negative, positive};
 
 parameters! {
     /// What a battery monitor makes of the truth; the defaults are a Texas Instruments INA226 with a shunt of 2 mΩ.
@@ -60,36 +60,15 @@ fn read(truth: f64, bias: f64, sigma: f64, step: f64, chance: &mut Chance<'_>) -
     in_steps(truth + bias + sigma * noise, step)
 }
 
-impl BatteryParams {
-    fn measure(&self, truth: &Battery, chance: &mut Chance<'_>) -> Battery {
-        let Self { voltage_bias_V, voltage_noise_V, voltage_resolution_V, .. } = *self;
-        let Self { current_bias_A, current_noise_A, current_resolution_A, .. } = *self;
-        let voltage = read(truth.voltage, voltage_bias_V, voltage_noise_V, voltage_resolution_V, chance);
-        let current = read(truth.current, current_bias_A, current_noise_A, current_resolution_A, chance);
-        Battery { voltage, current, ..Default::default() }
+sensor! {
+    pub struct BatteryMonitorState as "hummingbus_msgs/msg/BatteryMonitorState" sends measured: Battery {
+        /// The charge that is left.
+        #[field(unit = "1")]
+        charge: f64,
+        /// Until when it is counted; the end of time before the first measurement.
+        #[field(unit = "ns")]
+        counted_ns: u64,
     }
-
-    /// The fraction of the capacity that `current_A` draws in `elapsed_ns`.
-    fn drawn(&self, current_A: f64, elapsed_ns: u64) -> f64 {
-        current_A * elapsed_ns as f64 * 1e-9 / 3600.0 / self.capacity_Ah
-    }
-}
-
-/// All that the sensor remembers.
-#[derive(Debug, Clone, Copy, Message)]
-#[repr(C)]
-#[message(type_name = "hummingbus_msgs/msg/BatteryMonitorState")]
-pub struct BatteryMonitorState {
-    /// What is under way.
-    channel: ChannelState,
-    /// The last measurements.
-    queue: [Battery; QUEUE],
-    /// The charge that is left.
-    #[field(unit = "1")]
-    charge: f64,
-    /// Until when it is counted; the end of time before the first measurement.
-    #[field(unit = "ns")]
-    counted_ns: u64,
 }
 
 /// What the monitor reads.
@@ -97,13 +76,6 @@ pub struct BatteryMonitorState {
 pub struct BatteryInputs<'a> {
     /// The truth.
     pub battery: &'a Battery,
-}
-
-/// What the sensor sends.
-#[derive(Debug, OutputPorts)]
-pub struct Outputs {
-    /// The measurement that arrived last.
-    pub measured: Battery,
 }
 
 impl Sensor for BatteryParams {
@@ -116,32 +88,30 @@ impl Sensor for BatteryParams {
     type Outputs = Outputs;
     type State = BatteryMonitorState;
 
-    fn new(parameters: Self) -> Result<Self, ParameterError> {
-        Ok(parameters)
-    }
-
     fn initial(&self) -> BatteryMonitorState {
-        let (channel, queue) = (ChannelState::default(), [Battery::default(); QUEUE]);
-        BatteryMonitorState { channel, queue, charge: self.initial_charge, counted_ns: u64::MAX }
+        BatteryMonitorState { charge: self.initial_charge, counted_ns: u64::MAX, ..Default::default() }
     }
 
-    fn sample(&self, tick: &mut Tick<'_>, state: &mut Self::State, inputs: Self::Inputs<'_>) -> Outputs {
+    fn measure(
+        &self,
+        state: &mut BatteryMonitorState,
+        _: &Battery,
+        chance: &mut Chance<'_>,
+        inputs: BatteryInputs<'_>,
+    ) -> Option<Battery> {
         let truth = inputs.battery;
-        let BatteryMonitorState { channel: under_way, queue, charge, counted_ns } = state;
-        let measured = tick.measure(under_way, queue, |last, chance| {
-            if truth.valid == 0 {
-                return Battery { valid: 0, ..*last };
-            }
-            let measured = self.measure(truth, chance);
-            let elapsed_ns = chance.now_ns.saturating_sub(*counted_ns);
-            *charge = (*charge - self.drawn(measured.current, elapsed_ns)).clamp(0.0, 1.0);
-            *counted_ns = chance.now_ns;
-            if chance.is_lost(0) {
-                return Battery { valid: 0, ..*last };
-            }
-            Battery { measured_ns: chance.now_ns, charge: *charge, valid: 1, ..measured }
-        });
-        Outputs { measured }
+        if truth.valid == 0 {
+            return None;
+        }
+        let Self { voltage_bias_V, voltage_noise_V, voltage_resolution_V, .. } = *self;
+        let Self { current_bias_A, current_noise_A, current_resolution_A, .. } = *self;
+        let voltage = read(truth.voltage, voltage_bias_V, voltage_noise_V, voltage_resolution_V, chance);
+        let current = read(truth.current, current_bias_A, current_noise_A, current_resolution_A, chance);
+        let elapsed_ns = chance.now_ns.saturating_sub(state.counted_ns);
+        let drawn = current * elapsed_ns as f64 * 1e-9 / 3600.0 / self.capacity_Ah;
+        let charge = (state.charge - drawn).clamp(0.0, 1.0);
+        (state.charge, state.counted_ns) = (charge, chance.now_ns);
+        Some(Battery { voltage, current, charge, ..Default::default() })
     }
 }
 

@@ -151,6 +151,15 @@ pub struct Channel {
     loss: Stream,
 }
 
+/// What a sensor remembers, the measurements under way among it.
+pub trait Remembered {
+    /// What it sends.
+    type Measurement: Copy;
+
+    /// What is under way, and the last measurements, which start as what is sent until the first arrives.
+    fn under_way(&mut self) -> (&mut ChannelState, &mut [Self::Measurement; QUEUE]);
+}
+
 /// The chance in one measurement.
 #[derive(Debug)]
 pub struct Chance<'a> {
@@ -160,16 +169,17 @@ pub struct Chance<'a> {
     pub noise: &'a mut Stream,
     loss: &'a mut Stream,
     losses: Losses,
-    lost: &'a mut u32,
+    /// Which parts of the last measurement were lost, a bit for each.
+    lost: u32,
 }
 
 impl Chance<'_> {
     /// Whether part `part` of the measurement, numbered from 0, is lost; to be asked once for each.
     pub fn is_lost(&mut self, part: u32) -> bool {
-        let was_lost = *self.lost >> part & 1 == 1;
+        let was_lost = self.lost >> part & 1 == 1;
         let chance = if was_lost { self.losses.stay } else { self.losses.begin };
         let is_lost = uniform(self.loss) < chance;
-        *self.lost = *self.lost & !(1 << part) | u32::from(is_lost) << part;
+        self.lost = self.lost & !(1 << part) | u32::from(is_lost) << part;
         is_lost
     }
 }
@@ -189,59 +199,40 @@ impl Channel {
         Ok(Self { interval_ns, delay_ns, losses: Losses::new(timing), noise, loss })
     }
 
-    /// The channel at a tick of its node.
-    pub(crate) fn at(&mut self, now_ns: u64) -> Tick<'_> {
-        Tick { channel: self, now_ns }
-    }
-}
-
-/// A tick of a sensor's node.
-#[derive(Debug)]
-pub struct Tick<'a> {
-    channel: &'a mut Channel,
-    now_ns: u64,
-}
-
-impl Tick<'_> {
-    /// What has arrived last: an element of `queue`, which starts filled with what is sent until the first measurement
-    /// arrives. Where a measurement is due, `measure` makes it from the one before.
-    pub(crate) fn measure<M: Copy>(
+    /// What has arrived by `now_ns`, a tick of its node. Where a measurement is due, `measure` makes it from the one
+    /// before.
+    pub(crate) fn measure<S: Remembered>(
         &mut self,
-        state: &mut ChannelState,
-        queue: &mut [M; QUEUE],
-        measure: impl FnOnce(&M, &mut Chance<'_>) -> M,
-    ) -> M {
-        let (channel, now_ns) = (&mut *self.channel, self.now_ns);
-        if now_ns >= state.next_ns {
-            let last = queue[before(state.measured)];
-            queue[place(state.measured)] = channel.draw(state, now_ns, |chance| measure(&last, chance));
-            state.arrival_ns[place(state.measured)] = now_ns.saturating_add(channel.delay_ns);
-            state.measured += 1;
-            state.next_ns = (now_ns / channel.interval_ns + 1).saturating_mul(channel.interval_ns);
-        }
-        while state.arrived < state.measured && state.arrival_ns[place(state.arrived)] <= now_ns {
-            state.arrived += 1;
-        }
-        queue[before(state.arrived)]
-    }
-}
-
-impl Channel {
-    /// One measurement, the streams drawn from where `state` says and left there.
-    fn draw<M>(
-        &mut self,
-        state: &mut ChannelState,
         now_ns: u64,
-        measure: impl FnOnce(&mut Chance<'_>) -> M,
-    ) -> M {
-        set_drawn_words(&mut self.noise, state.noise_words);
-        set_drawn_words(&mut self.loss, state.loss_words);
-        let (noise, loss) = (&mut self.noise, &mut self.loss);
-        let lost = &mut state.lost;
-        let measurement = measure(&mut Chance { now_ns, noise, loss, losses: self.losses, lost });
-        state.noise_words = drawn_words(&self.noise);
-        state.loss_words = drawn_words(&self.loss);
-        measurement
+        state: &mut S,
+        measure: impl FnOnce(&mut S, &S::Measurement, &mut Chance<'_>) -> S::Measurement,
+    ) -> S::Measurement {
+        let (under_way, queue) = state.under_way();
+        if now_ns >= under_way.next_ns {
+            let last = queue[before(under_way.measured)];
+            set_drawn_words(&mut self.noise, under_way.noise_words);
+            set_drawn_words(&mut self.loss, under_way.loss_words);
+            let (noise, loss, lost) = (&mut self.noise, &mut self.loss, under_way.lost);
+            let mut chance = Chance { now_ns, noise, loss, losses: self.losses, lost };
+            let measurement = measure(state, &last, &mut chance);
+            let lost = chance.lost;
+            let (under_way, queue) = state.under_way();
+            let number = place(under_way.measured);
+            queue[number] = measurement;
+            under_way.lost = lost;
+            under_way.noise_words = drawn_words(&self.noise);
+            under_way.loss_words = drawn_words(&self.loss);
+            under_way.arrival_ns[number] = now_ns.saturating_add(self.delay_ns);
+            under_way.measured += 1;
+            under_way.next_ns = (now_ns / self.interval_ns + 1).saturating_mul(self.interval_ns);
+        }
+        let (under_way, queue) = state.under_way();
+        while under_way.arrived < under_way.measured
+            && under_way.arrival_ns[place(under_way.arrived)] <= now_ns
+        {
+            under_way.arrived += 1;
+        }
+        queue[before(under_way.arrived)]
     }
 }
 
@@ -266,6 +257,18 @@ mod tests {
 
     const TICK_NS: u64 = 1_000_000;
 
+    impl<M: Copy> Remembered for (ChannelState, [M; QUEUE]) {
+        type Measurement = M;
+
+        fn under_way(&mut self) -> (&mut ChannelState, &mut [M; QUEUE]) {
+            (&mut self.0, &mut self.1)
+        }
+    }
+
+    fn nothing_measured<M: Copy>(sent: M) -> (ChannelState, [M; QUEUE]) {
+        (ChannelState::default(), [sent; QUEUE])
+    }
+
     fn timing() -> Timing {
         Timing { rate_hz: 10.0, delay_ms: 0.0, dropout: 0.0, dropout_mean_s: 0.0 }
     }
@@ -278,12 +281,12 @@ mod tests {
     /// The times at which measurements were made, tick by tick as they arrive; 0 is sent until the first.
     fn arrivals(timing: &Timing, period_ticks: u64, ticks: u64) -> Vec<(u64, u64)> {
         let mut channel = channel(timing, period_ticks, 1, "gps").unwrap();
-        let (mut state, mut queue) = (ChannelState::default(), [u64::MAX; QUEUE]);
+        let mut state = nothing_measured(u64::MAX);
         (0..ticks)
             .step_by(usize::try_from(period_ticks).unwrap())
             .map(|tick| {
                 let now_ns = tick * TICK_NS;
-                (tick, channel.at(now_ns).measure(&mut state, &mut queue, |_, _| now_ns) / TICK_NS)
+                (tick, channel.measure(now_ns, &mut state, |_, _, _| now_ns) / TICK_NS)
             })
             .collect()
     }
@@ -339,22 +342,20 @@ mod tests {
     #[test]
     fn a_channel_that_starts_late_measures_once_and_then_at_its_rate() {
         let mut channel = channel(&timing(), 1, 1, "gps").unwrap();
-        let (mut state, mut queue) = (ChannelState::default(), [(); QUEUE]);
+        let mut state = nothing_measured(());
         let mut count = 0;
         for tick in 5031..5331 {
-            channel.at(tick * TICK_NS).measure(&mut state, &mut queue, |_, _| count += 1);
+            channel.measure(tick * TICK_NS, &mut state, |_, _, _| count += 1);
         }
         assert_eq!(count, 4);
     }
 
     fn lost(timing: &Timing, count: usize) -> Vec<bool> {
         let mut channel = channel(timing, 1, 3, "mocap").unwrap();
-        let (mut state, mut queue) = (ChannelState::default(), [false; QUEUE]);
+        let mut state = nothing_measured(false);
         let interval_ns = channel.interval_ns;
         (0..count as u64)
-            .map(|n| {
-                channel.at(n * interval_ns).measure(&mut state, &mut queue, |_, chance| chance.is_lost(0))
-            })
+            .map(|n| channel.measure(n * interval_ns, &mut state, |_, _, chance| chance.is_lost(0)))
             .collect()
     }
 
@@ -380,12 +381,12 @@ mod tests {
     fn losses_do_not_reshuffle_the_noise() {
         let noise = |dropout: f64| {
             let mut channel = channel(&Timing { dropout, ..timing() }, 1, 3, "gps").unwrap();
-            let (mut state, mut queue) = (ChannelState::default(), [0; QUEUE]);
-            let measure = |_: &u64, chance: &mut Chance<'_>| {
+            let mut state = nothing_measured(0);
+            let measure = |_: &mut _, _: &u64, chance: &mut Chance<'_>| {
                 chance.is_lost(0);
                 chance.noise.next_u64()
             };
-            [0, 1, 2].map(|n| channel.at(n * 100 * TICK_NS).measure(&mut state, &mut queue, measure))
+            [0, 1, 2].map(|n| channel.measure(n * 100 * TICK_NS, &mut state, measure))
         };
         assert_eq!(noise(0.0), noise(0.9));
     }
@@ -393,22 +394,22 @@ mod tests {
     #[test]
     fn a_state_that_is_handed_over_goes_on_as_the_one_it_was_taken_from() {
         let timing = Timing { rate_hz: 250.0, delay_ms: 50.0, dropout: 0.3, dropout_mean_s: 0.02 };
-        let measure = |_: &u64, chance: &mut Chance<'_>| {
+        let measure = |_: &mut _, _: &u64, chance: &mut Chance<'_>| {
             if chance.is_lost(0) { 0 } else { chance.noise.next_u64() }
         };
         let mut first = channel(&timing, 1, 3, "gps").unwrap();
-        let (mut state, mut queue) = (ChannelState::default(), [1; QUEUE]);
+        let mut state = nothing_measured(1);
         for tick in 0..333 {
-            first.at(tick * TICK_NS).measure(&mut state, &mut queue, measure);
+            first.measure(tick * TICK_NS, &mut state, measure);
         }
         let mut second = channel(&timing, 1, 3, "gps").unwrap();
-        let (mut handed_state, mut handed_queue) = (state, queue);
+        let mut handed = state;
         for tick in 333..1000 {
-            let expected = first.at(tick * TICK_NS).measure(&mut state, &mut queue, measure);
-            let found = second.at(tick * TICK_NS).measure(&mut handed_state, &mut handed_queue, measure);
+            let expected = first.measure(tick * TICK_NS, &mut state, measure);
+            let found = second.measure(tick * TICK_NS, &mut handed, measure);
             assert_eq!(found, expected, "at tick {tick}");
         }
-        assert_eq!(handed_state, state);
+        assert_eq!(handed, state);
     }
 
     #[test]

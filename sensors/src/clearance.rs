@@ -1,6 +1,7 @@
 //! The clearance node: how far a vehicle truly is from what stands in the scene. It is no sensor: a judge reads it,
 //! and plots; controllers have no port for it.
 
+use crate::cone::caster;
 use crate::sensing::TruthInputs;
 use bus::component::{Component, Info, StepError};
 use bus::context::{NodeContext, StepContext};
@@ -8,8 +9,7 @@ use bus::messages::{Clearance, Vector3 as VectorMessage};
 use bus::{Message, OutputPorts};
 use diagnostics::parameter::{ParameterError, not_negative};
 use nalgebra::Vector3;
-use scenes::{RayCaster, Scene};
-use serde::Deserialize;
+use scenes::RayCaster;
 use std::f64::consts::{PI, TAU};
 use std::path::PathBuf;
 
@@ -19,26 +19,16 @@ const REACH_M: f64 = 1000.0;
 /// Nearer to the world's origin than this no laps are counted, m.
 const MIDDLE_M: f64 = 0.5;
 
-/// Parameters of the clearance node.
-#[derive(Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Parameters {
-    /// Scene file.
-    scene: PathBuf,
-    /// The distance from the wall that is to be kept, m.
-    #[serde(default = "three_metres")]
-    keep_m: f64,
-    /// Along a side, the wall ahead and the wall behind are at least this much farther than `keep_m`, m.
-    #[serde(default = "three_quarters_of_a_metre")]
-    corner_m: f64,
-}
-
-fn three_metres() -> f64 {
-    3.0
-}
-
-fn three_quarters_of_a_metre() -> f64 {
-    0.75
+parameters! {
+    /// Parameters of the clearance node.
+    pub struct Parameters {
+        /// Scene file; there is no default.
+        scene: Option<PathBuf> = None,
+        /// The distance from the wall that is to be kept, m.
+        keep_m: f64 = 3.0 => not_negative,
+        /// Along a side, the wall ahead and the wall behind are at least this much farther than `keep_m`, m.
+        corner_m: f64 = 0.75 => not_negative,
+    }
 }
 
 /// All that the component remembers.
@@ -90,12 +80,9 @@ impl Component for ClearanceJudge {
     type State = ClearanceState;
 
     fn new(parameters: Parameters, _: &NodeContext<'_>) -> Result<Self, ParameterError> {
+        parameters.validate()?;
         let Parameters { scene, keep_m, corner_m } = parameters;
-        for (key, value) in [("keep_m", keep_m), ("corner_m", corner_m)] {
-            not_negative(key, value)?;
-        }
-        let scene = Scene::load(&scene).map_err(|error| ParameterError::conflict("scene", error))?;
-        Ok(Self { caster: RayCaster::new(&scene), keep_m, corner_m })
+        Ok(Self { caster: caster(scene.as_deref())?, keep_m, corner_m })
     }
 
     fn initial(&self) -> ClearanceState {
@@ -149,6 +136,7 @@ fn count_laps(state: &mut ClearanceState, position_W_m: &Vector3<f64>) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use scenes::Scene;
 
     fn judge() -> ClearanceJudge {
         let scene = Scene::parse(scenes::reference::ROOM, "room.toml").unwrap();

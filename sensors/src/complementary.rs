@@ -21,12 +21,14 @@
 //! in dt and has no singularity; the blend happens in roll and pitch and leaves yaw to the gyroscope.
 
 use crate::imu_model::ImuReading;
+use crate::wire::{attitude, attitude_message, vector, vector_message};
+use bus::component::{Component, Info, StepError};
+use bus::context::{NodeContext, StepContext};
+use bus::messages::{AttitudeEstimate, Imu, Quaternion, Vector3 as VectorMessage};
+use bus::{InputPorts, Message, OutputPorts};
 use diagnostics::parameter::{ParameterError, not_negative, positive};
 use nalgebra::{UnitQuaternion, Vector3};
 use std::f64::consts::{PI, TAU};
-
-/// The thesis's weight of the gyroscope, once a sample (§4.3).
-pub const THESIS_GYROSCOPE_WEIGHT: f64 = 0.98;
 
 /// Beyond this pitch (rad) roll and yaw are hard to tell apart, and the accelerometer is left out.
 const PITCH_BLEND_MAX_RAD: f64 = 1.4;
@@ -46,16 +48,8 @@ parameters! {
     }
 }
 
-/// The time constant (s) of a filter that weighs the gyroscope with `gyroscope_weight`, in (0, 1), once
-/// every `period_s`.
-#[must_use]
-pub fn time_constant_s(gyroscope_weight: f64, period_s: f64) -> f64 {
-    period_s * gyroscope_weight / (1.0 - gyroscope_weight)
-}
-
 /// The gyroscope's weight once every `period_s` in a filter of `time_constant_s`.
-#[must_use]
-pub fn gyroscope_weight(time_constant_s: f64, period_s: f64) -> f64 {
+fn gyroscope_weight(time_constant_s: f64, period_s: f64) -> f64 {
     time_constant_s / (time_constant_s + period_s)
 }
 
@@ -63,8 +57,7 @@ pub fn gyroscope_weight(time_constant_s: f64, period_s: f64) -> f64 {
 ///
 /// At rest the specific force is +g along world z, which in body axes is
 /// g·(−sin θ, sin φ·cos θ, cos φ·cos θ).
-#[must_use]
-pub fn tilt_rad(specific_force_B: &Vector3<f64>) -> (f64, f64) {
+pub(crate) fn tilt_rad(specific_force_B: &Vector3<f64>) -> (f64, f64) {
     let [x, y, z]: [f64; 3] = (*specific_force_B).into();
     (libm::atan2(y, z), libm::atan2(-x, libm::hypot(y, z)))
 }
@@ -82,7 +75,7 @@ pub fn tilt_rad(specific_force_B: &Vector3<f64>) -> (f64, f64) {
 ///     specific_force_B_m_s2: Vector3::new(0.0, 0.0, 9.81),
 ///     angular_velocity_B_rad_s: Vector3::new(0.5, 0.0, 0.0),
 /// };
-/// let roll_rad = (0..=100).map(|_| filter.update(&mut state, &rolling).roll_rad).last().unwrap();
+/// let roll_rad = (0..=100).map(|_| filter.update(&mut state, &rolling).roll).last().unwrap();
 /// assert!((roll_rad - 0.05).abs() < 1e-3, "0.5 rad/s for 0.1 s: {roll_rad} rad");
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -93,43 +86,23 @@ pub struct Complementary {
 }
 
 /// What the filter knows between two samples.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Message)]
+#[repr(C)]
+#[message(type_name = "hummingbus_msgs/msg/ComplementaryState")]
 pub struct ComplementaryState {
-    /// The estimated attitude at the last sample, rotating body axes into world axes.
-    pub attitude_WB: UnitQuaternion<f64>,
-    /// The last sample's angular rate, body axes, rad/s; none before the first sample.
-    pub last_angular_velocity_B_rad_s: Option<Vector3<f64>>,
+    /// The estimated attitude at the last sample, body to world.
+    #[field(frame = "world")]
+    pub attitude: Quaternion,
+    /// The last sample's angular rate; not a number before the first.
+    #[field(unit = "rad/s", frame = "body")]
+    pub last_angular_velocity: VectorMessage,
 }
 
-impl ComplementaryState {
-    /// The state before the first sample of a body at these angles (rad, aerospace ZYX sequence).
-    #[must_use]
-    pub fn at_attitude(roll_rad: f64, pitch_rad: f64, yaw_rad: f64) -> Self {
-        let attitude_WB = UnitQuaternion::from_euler_angles(roll_rad, pitch_rad, yaw_rad);
-        Self { attitude_WB, last_angular_velocity_B_rad_s: None }
+/// Before the first sample, level.
+impl Default for ComplementaryState {
+    fn default() -> Self {
+        Self { attitude: Quaternion::default(), last_angular_velocity: [f64::NAN; 3].into() }
     }
-
-    /// The state before the first sample of a body at rest that feels `specific_force_B` (body axes).
-    #[must_use]
-    pub fn at_rest(specific_force_B: &Vector3<f64>, yaw_rad: f64) -> Self {
-        let (roll_rad, pitch_rad) = tilt_rad(specific_force_B);
-        Self::at_attitude(roll_rad, pitch_rad, yaw_rad)
-    }
-}
-
-/// The estimate at one sample.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct AttitudeEstimate {
-    /// Angle about body x, right side down for positive, rad, −π to π.
-    pub roll_rad: f64,
-    /// Angle about body y, nose down for positive, rad, −π/2 to π/2.
-    pub pitch_rad: f64,
-    /// Angle about world z, counter-clockwise from above for positive, rad, −π to π.
-    pub yaw_rad: f64,
-    /// The gyroscope's reading of this sample, body axes, rad/s.
-    pub angular_velocity_B_rad_s: Vector3<f64>,
-    /// The attitude, rotating body axes into world axes.
-    pub attitude_WB: UnitQuaternion<f64>,
 }
 
 impl Complementary {
@@ -148,22 +121,23 @@ impl Complementary {
     ///
     /// The first reading does not turn the attitude: the state already holds that sample's attitude.
     pub fn update(&self, state: &mut ComplementaryState, reading: &ImuReading) -> AttitudeEstimate {
-        let rate_B_rad_s = reading.angular_velocity_B_rad_s;
-        let turned = self.propagate(state, rate_B_rad_s);
-        state.attitude_WB = self.blend(turned, &reading.specific_force_B_m_s2);
-        state.last_angular_velocity_B_rad_s = Some(rate_B_rad_s);
-        let (roll_rad, pitch_rad, yaw_rad) = state.attitude_WB.euler_angles();
-        let attitude_WB = state.attitude_WB;
-        AttitudeEstimate { roll_rad, pitch_rad, yaw_rad, angular_velocity_B_rad_s: rate_B_rad_s, attitude_WB }
+        let turned_WB = self.propagate(state, reading.angular_velocity_B_rad_s);
+        let attitude_WB = self.blend(turned_WB, &reading.specific_force_B_m_s2);
+        let angular_velocity = vector_message(reading.angular_velocity_B_rad_s);
+        let attitude = attitude_message(attitude_WB);
+        *state = ComplementaryState { attitude, last_angular_velocity: angular_velocity };
+        let (roll, pitch, yaw) = attitude_WB.euler_angles();
+        AttitudeEstimate { attitude, roll, pitch, yaw, angular_velocity, ..Default::default() }
     }
 
     /// The last attitude turned by the mean of the last and the present rate for one period.
     fn propagate(&self, state: &ComplementaryState, rate_B_rad_s: Vector3<f64>) -> UnitQuaternion<f64> {
-        let Some(last_angular_velocity_B_rad_s) = state.last_angular_velocity_B_rad_s else {
-            return state.attitude_WB;
-        };
-        let turn_B_rad = 0.5 * (last_angular_velocity_B_rad_s + rate_B_rad_s) * self.period_s;
-        let turned = state.attitude_WB * UnitQuaternion::from_scaled_axis(turn_B_rad);
+        let (before_WB, last_B_rad_s) = (attitude(state.attitude), vector(state.last_angular_velocity));
+        if last_B_rad_s.x.is_nan() {
+            return before_WB;
+        }
+        let turn_B_rad = 0.5 * (last_B_rad_s + rate_B_rad_s) * self.period_s;
+        let turned = before_WB * UnitQuaternion::from_scaled_axis(turn_B_rad);
         // Rounding would let the norm wander over a long run.
         UnitQuaternion::new_normalize(turned.into_inner())
     }
@@ -193,6 +167,45 @@ impl Complementary {
     }
 }
 
+/// What the filter reads.
+#[derive(Debug, InputPorts)]
+pub struct ImuInputs<'a> {
+    /// Readings of the inertial measurement unit.
+    pub imu: &'a Imu,
+}
+
+/// What the filter sends.
+#[derive(Debug, OutputPorts)]
+pub struct Outputs {
+    /// The attitude.
+    pub estimate: AttitudeEstimate,
+}
+
+impl Component for Complementary {
+    const INFO: Info = Info::new("attitude", "complementary filter: roll, pitch and yaw from an IMU");
+    type Parameters = ComplementaryParams;
+    type Inputs<'a> = ImuInputs<'a>;
+    type Outputs = Outputs;
+    type State = ComplementaryState;
+
+    fn new(params: ComplementaryParams, context: &NodeContext<'_>) -> Result<Self, ParameterError> {
+        Self::with_period(params, context.period_s())
+    }
+
+    fn initial(&self) -> ComplementaryState {
+        ComplementaryState::default()
+    }
+
+    fn step(
+        &mut self,
+        _: &StepContext<'_>,
+        inputs: ImuInputs<'_>,
+        state: &mut ComplementaryState,
+    ) -> Result<Outputs, StepError> {
+        Ok(Outputs { estimate: self.update(state, &ImuReading::from(inputs.imu)) })
+    }
+}
+
 /// `angle_rad` less whole turns, −π to π.
 fn wrap_rad(angle_rad: f64) -> f64 {
     (angle_rad + PI).rem_euclid(TAU) - PI
@@ -203,6 +216,20 @@ mod tests {
     use super::*;
 
     const PERIOD_S: f64 = 1e-3;
+
+    /// The thesis's weight of the gyroscope, once a sample (§4.3).
+    const THESIS_GYROSCOPE_WEIGHT: f64 = 0.98;
+
+    /// The time constant (s) of a filter that weighs the gyroscope so once every `period_s`.
+    fn time_constant_s(gyroscope_weight: f64, period_s: f64) -> f64 {
+        period_s * gyroscope_weight / (1.0 - gyroscope_weight)
+    }
+
+    /// Before the first sample of a body at these angles.
+    fn at_attitude(roll_rad: f64, pitch_rad: f64, yaw_rad: f64) -> ComplementaryState {
+        let attitude_WB = UnitQuaternion::from_euler_angles(roll_rad, pitch_rad, yaw_rad);
+        ComplementaryState { attitude: attitude_message(attitude_WB), ..Default::default() }
+    }
 
     fn filter(time_constant_s: f64) -> Complementary {
         let params = ComplementaryParams { time_constant_s, ..ComplementaryParams::default() };
@@ -229,13 +256,13 @@ mod tests {
     #[test]
     fn one_sample_is_the_formula_of_the_thesis() {
         let filter = filter(time_constant_s(THESIS_GYROSCOPE_WEIGHT, PERIOD_S));
-        let mut state = ComplementaryState::at_attitude(0.1, 0.0, 0.0);
+        let mut state = at_attitude(0.1, 0.0, 0.0);
         let rate_B = Vector3::new(0.5, 0.0, 0.0);
-        state.last_angular_velocity_B_rad_s = Some(rate_B);
+        state.last_angular_velocity = vector_message(rate_B);
         let force_B = at_rest(0.2, 0.0).specific_force_B_m_s2;
         let estimate = filter.update(&mut state, &reading(force_B, rate_B));
         let expected = 0.98 * (0.1 + 0.5 * PERIOD_S) + 0.02 * 0.2;
-        assert!((estimate.roll_rad - expected).abs() < 1e-12);
+        assert!((estimate.roll - expected).abs() < 1e-12);
     }
 
     #[test]
@@ -253,11 +280,11 @@ mod tests {
         let mut estimate = filter.update(&mut state, &at_rest(0.2, -0.1));
         (0..500).for_each(|_| estimate = filter.update(&mut state, &at_rest(0.2, -0.1)));
         let left = libm::exp(-1.0);
-        assert!((estimate.roll_rad - 0.2 * (1.0 - left)).abs() < 1e-3);
-        assert!((estimate.pitch_rad + 0.1 * (1.0 - left)).abs() < 1e-3);
+        assert!((estimate.roll - 0.2 * (1.0 - left)).abs() < 1e-3);
+        assert!((estimate.pitch + 0.1 * (1.0 - left)).abs() < 1e-3);
         (0..5000).for_each(|_| estimate = filter.update(&mut state, &at_rest(0.2, -0.1)));
-        assert!((estimate.roll_rad - 0.2).abs() < 1e-4 && (estimate.pitch_rad + 0.1).abs() < 1e-4);
-        assert!(estimate.yaw_rad.abs() < 1e-9);
+        assert!((estimate.roll - 0.2).abs() < 1e-4 && (estimate.pitch + 0.1).abs() < 1e-4);
+        assert!(estimate.yaw.abs() < 1e-9);
     }
 
     /// Eq. 3.18: the rates of the angles against the body rates, at an attitude where all terms count.
@@ -265,17 +292,17 @@ mod tests {
     fn the_angles_turn_by_the_euler_rates() {
         let (roll, pitch, yaw) = (0.5_f64, 0.6_f64, -1.0_f64);
         let [p, q, r] = [0.7, -0.4, 0.9];
-        let mut state = ComplementaryState::at_attitude(roll, pitch, yaw);
-        state.last_angular_velocity_B_rad_s = Some(Vector3::new(p, q, r));
+        let mut state = at_attitude(roll, pitch, yaw);
+        state.last_angular_velocity = [p, q, r].into();
         let fall = reading(Vector3::zeros(), Vector3::new(p, q, r));
         let estimate = filter(30.0).update(&mut state, &fall);
         let roll_rate = p + libm::tan(pitch) * (q * libm::sin(roll) + r * libm::cos(roll));
         let pitch_rate = q * libm::cos(roll) - r * libm::sin(roll);
         let yaw_rate = (q * libm::sin(roll) + r * libm::cos(roll)) / libm::cos(pitch);
         // The rates change within the step, by its square.
-        assert!((estimate.roll_rad - roll - roll_rate * PERIOD_S).abs() < 2e-6);
-        assert!((estimate.pitch_rad - pitch - pitch_rate * PERIOD_S).abs() < 2e-6);
-        assert!((estimate.yaw_rad - yaw - yaw_rate * PERIOD_S).abs() < 2e-6);
+        assert!((estimate.roll - roll - roll_rate * PERIOD_S).abs() < 2e-6);
+        assert!((estimate.pitch - pitch - pitch_rate * PERIOD_S).abs() < 2e-6);
+        assert!((estimate.yaw - yaw - yaw_rate * PERIOD_S).abs() < 2e-6);
     }
 
     #[test]
@@ -285,8 +312,9 @@ mod tests {
         let rate_B = Vector3::new(0.0, TAU, 0.0);
         let mut estimate = filter.update(&mut state, &reading(Vector3::zeros(), rate_B));
         (0..1000).for_each(|_| estimate = filter.update(&mut state, &reading(Vector3::zeros(), rate_B)));
-        assert!(estimate.attitude_WB.angle() < 1e-9);
-        assert!((estimate.attitude_WB.norm() - 1.0).abs() < 1e-12);
+        let attitude_WB = attitude(estimate.attitude);
+        assert!(attitude_WB.angle() < 1e-9);
+        assert!((attitude_WB.norm() - 1.0).abs() < 1e-12);
     }
 
     /// The reason for the default: powered flight without drag, 10° of roll held for 1 s.
@@ -294,11 +322,11 @@ mod tests {
     fn a_roll_held_in_flight_survives_our_time_constant_but_not_that_of_the_thesis() {
         let thrust_only = reading(Vector3::new(0.0, 0.0, 9.96), Vector3::zeros());
         let held_deg = |time_constant_s| {
-            let mut state = ComplementaryState::at_attitude(10.0_f64.to_radians(), 0.0, 0.0);
+            let mut state = at_attitude(10.0_f64.to_radians(), 0.0, 0.0);
             (0..1000).for_each(|_| {
                 filter(time_constant_s).update(&mut state, &thrust_only);
             });
-            state.attitude_WB.euler_angles().0.to_degrees()
+            attitude(state.attitude).euler_angles().0.to_degrees()
         };
         assert!(held_deg(ComplementaryParams::default().time_constant_s) > 9.6);
         assert!(held_deg(0.049) < 0.01);
@@ -309,7 +337,7 @@ mod tests {
         let mut state = ComplementaryState::default();
         let push = reading(Vector3::new(15.0, 0.0, 9.81), Vector3::zeros());
         let estimate = filter(0.1).update(&mut state, &push);
-        assert_eq!(estimate.pitch_rad, 0.0);
+        assert_eq!(estimate.pitch, 0.0);
     }
 
     #[test]

@@ -6,12 +6,24 @@
 //! cone is seen at most 0.09 h² of its distance too far: 0.07 % at 5°. Vehicles are spheres, whose distance to a cone is
 //! known without rays.
 
+use diagnostics::ParameterError;
 use nalgebra::{Rotation3, Unit, UnitQuaternion, Vector3};
-use scenes::RayCaster;
+use scenes::{RayCaster, Scene};
 use std::f64::consts::FRAC_PI_4;
+use std::path::Path;
 
 /// Rays of a cone: the axis, and eight in each of two rings.
 const RAYS: usize = 17;
+
+/// What stands in the scene of the file at `path`, the parameter `scene`.
+///
+/// # Errors
+/// There is none, or it is refused.
+pub fn caster(path: Option<&Path>) -> Result<RayCaster, ParameterError> {
+    let path = path.ok_or_else(|| ParameterError::missing("scene", ""))?;
+    let scene = Scene::load(path).map_err(|error| ParameterError::conflict("scene", error))?;
+    Ok(RayCaster::new(&scene))
+}
 
 /// A cone about a body axis.
 #[derive(Debug, Clone, PartialEq)]

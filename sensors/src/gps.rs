@@ -5,15 +5,14 @@
 //! the first measurement on, d' = e^(−Δt/τ) d + σ √(1 − e^(−2Δt/τ)) n (Gelb, "Applied Optimal Estimation", MIT
 //! Press 1974, §3.6). `crate::channel` says when it measures, how measurements are delayed and lost.
 
-use crate::channel::{Chance, ChannelState, QUEUE, Tick};
+use crate::channel::Chance;
 use crate::noise::standard_normal;
 use crate::sensing::{Sensor, TruthInputs};
 use crate::wire::{vector, vector_message};
 use bus::component::Info;
-use bus::messages::{Gps, PlantState};
+use bus::messages::Gps;
 use bus::random::Stream;
-use bus::{Message, OutputPorts};
-use diagnostics::parameter::{ParameterError, finite, not_negative, positive};
+use diagnostics::parameter::{finite, not_negative, positive};
 use nalgebra::Vector3;
 
 parameters! {
@@ -60,57 +59,14 @@ impl GpsParams {
         let kept = libm::exp(-(self.rate_hz * self.position_drift_time_s).recip());
         kept * drift_W_m + (1.0 - kept * kept).sqrt() * new_W_m
     }
+}
 
-    /// Position and velocity as they are read, with the drift that `drift` is left at.
-    fn measure(
-        &self,
-        truth: &PlantState,
-        drift: &mut bus::messages::Vector3,
-        chance: &mut Chance<'_>,
-    ) -> Gps {
-        let last_W_m = vector(*drift);
-        let drift_W_m = self.drift((!last_W_m.x.is_nan()).then_some(last_W_m), chance.noise);
-        *drift = vector_message(drift_W_m);
-        let noise = |sigma: [f64; 3], random: &mut Stream| {
-            Vector3::from(sigma).component_mul(&standard_normal(random))
-        };
-        let position_error_W_m =
-            Vector3::from(self.position_bias_m) + drift_W_m + noise(self.position_noise_m, chance.noise);
-        let velocity_error_W_m_s = noise(self.velocity_noise_m_s, chance.noise);
-        Gps {
-            position: vector_message(vector(truth.position) + position_error_W_m),
-            velocity: vector_message(vector(truth.velocity) + velocity_error_W_m_s),
-            ..Default::default()
-        }
+sensor! {
+    pub struct GpsState as "hummingbus_msgs/msg/GpsState" sends gps: Gps {
+        /// The drift at the last measurement; not a number before the first.
+        #[field(unit = "m", frame = "world")]
+        drift: bus::messages::Vector3,
     }
-}
-
-/// All that the sensor remembers.
-#[derive(Debug, Clone, Copy, Message)]
-#[repr(C)]
-#[message(type_name = "hummingbus_msgs/msg/GpsState")]
-pub struct GpsState {
-    /// What is under way.
-    channel: ChannelState,
-    /// The last measurements.
-    queue: [Gps; QUEUE],
-    /// The drift at the last measurement; not a number before the first.
-    #[field(unit = "m", frame = "world")]
-    drift: bus::messages::Vector3,
-}
-
-impl Default for GpsState {
-    fn default() -> Self {
-        let (channel, queue) = (ChannelState::default(), [Gps::default(); QUEUE]);
-        Self { channel, queue, drift: [f64::NAN; 3].into() }
-    }
-}
-
-/// What the sensor sends.
-#[derive(Debug, OutputPorts)]
-pub struct Outputs {
-    /// The measurement that arrived last.
-    pub gps: Gps,
 }
 
 impl Sensor for GpsParams {
@@ -121,25 +77,29 @@ impl Sensor for GpsParams {
     type Outputs = Outputs;
     type State = GpsState;
 
-    fn new(parameters: Self) -> Result<Self, ParameterError> {
-        Ok(parameters)
-    }
-
     fn initial(&self) -> GpsState {
-        GpsState::default()
+        GpsState { drift: [f64::NAN; 3].into(), ..GpsState::default() }
     }
 
-    fn sample(&self, tick: &mut Tick<'_>, state: &mut Self::State, inputs: Self::Inputs<'_>) -> Outputs {
-        let truth = inputs.state;
-        let GpsState { channel: under_way, queue, drift } = state;
-        let gps = tick.measure(under_way, queue, |last, chance| {
-            let measured = self.measure(truth, drift, chance);
-            if chance.is_lost(0) {
-                return Gps { valid: 0, ..*last };
-            }
-            Gps { measured_ns: chance.now_ns, valid: 1, ..measured }
-        });
-        Outputs { gps }
+    fn measure(
+        &self,
+        state: &mut GpsState,
+        _: &Gps,
+        chance: &mut Chance<'_>,
+        inputs: TruthInputs<'_>,
+    ) -> Option<Gps> {
+        let last_W_m = vector(state.drift);
+        let drift_W_m = self.drift((!last_W_m.x.is_nan()).then_some(last_W_m), chance.noise);
+        state.drift = vector_message(drift_W_m);
+        let mut noise = |sigma: [f64; 3]| Vector3::from(sigma).component_mul(&standard_normal(chance.noise));
+        let position_error_W_m =
+            Vector3::from(self.position_bias_m) + drift_W_m + noise(self.position_noise_m);
+        let velocity_error_W_m_s = noise(self.velocity_noise_m_s);
+        Some(Gps {
+            position: vector_message(vector(inputs.state.position) + position_error_W_m),
+            velocity: vector_message(vector(inputs.state.velocity) + velocity_error_W_m_s),
+            ..Default::default()
+        })
     }
 }
 
@@ -150,6 +110,7 @@ mod tests {
     use crate::testing::{TICK_NS, refusal, require_normal};
     use bus::Harness;
     use bus::context::NodeContext;
+    use bus::messages::PlantState;
 
     fn truth() -> PlantState {
         PlantState {

@@ -3,7 +3,7 @@
 //! It reads at each of its periods. `crate::channel` says how readings are delayed and lost; a lost one repeats the
 //! one before.
 
-use crate::channel::{Channel, ChannelState, QUEUE};
+use crate::channel::{Channel, ChannelState, QUEUE, Remembered};
 use crate::imu_model::{ImuModel, ImuModelState, ImuParams, ImuReading};
 use crate::noise::{drawn_words, set_drawn_words};
 use crate::sensing::TruthInputs;
@@ -17,7 +17,7 @@ use diagnostics::unit::STANDARD_GRAVITY_M_S2;
 
 /// All that the IMU remembers: its biases, how far its random stream was drawn, and the readings
 /// under way.
-#[derive(Debug, Clone, Copy, Message)]
+#[derive(Debug, Clone, Copy, Default, Message)]
 #[repr(C)]
 #[message(type_name = "hummingbus_msgs/msg/ImuState")]
 pub struct ImuState {
@@ -40,13 +40,7 @@ impl ImuState {
     /// Before the first reading: until it arrives, the IMU says that it rests level.
     fn new(model: &ImuModelState) -> Self {
         let at_rest = Imu { specific_force: [0.0, 0.0, STANDARD_GRAVITY_M_S2].into(), ..Default::default() };
-        let mut state = Self {
-            accelerometer_bias: Vector3::default(),
-            gyroscope_bias: Vector3::default(),
-            random_words: [0; 2],
-            channel: ChannelState::default(),
-            queue: [at_rest; QUEUE],
-        };
+        let mut state = Self { queue: [at_rest; QUEUE], ..Self::default() };
         state.store(model);
         state
     }
@@ -61,6 +55,14 @@ impl ImuState {
         model.accelerometer_bias_B_m_s2 = vector(self.accelerometer_bias);
         model.gyroscope_bias_B_rad_s = vector(self.gyroscope_bias);
         set_drawn_words(&mut model.random, self.random_words);
+    }
+}
+
+impl Remembered for ImuState {
+    type Measurement = Imu;
+
+    fn under_way(&mut self) -> (&mut ChannelState, &mut [Imu; QUEUE]) {
+        (&mut self.channel, &mut self.queue)
     }
 }
 
@@ -120,11 +122,14 @@ impl Component for ImuSensor {
         state.restore(&mut self.model_state);
         let reading = message(&self.model.read(&mut self.model_state, &truth(inputs.state)));
         state.store(&self.model_state);
-        let ImuState { channel, queue, .. } = state;
-        let imu = self
-            .channel
-            .at(context.time_ns())
-            .measure(channel, queue, |last, chance| if chance.is_lost(0) { *last } else { reading });
+        let imu =
+            self.channel.measure(
+                context.time_ns(),
+                state,
+                |_, last, chance| {
+                    if chance.is_lost(0) { *last } else { reading }
+                },
+            );
         Ok(Outputs { imu })
     }
 }

@@ -11,7 +11,7 @@
 //! - [`range`], `cone`: five range finders, and what their beams meet.
 //! - [`rpm`]: rotor speeds, and faults of their sensors; [`battery`]: voltage, current and charge.
 //! - [`clearance`]: true distances to the scene, for judging.
-//! - [`complementary`], `attitude`: attitude from an IMU's readings.
+//! - [`complementary`]: attitude from an IMU's readings.
 //! - [`ekf`]: position, velocity and attitude from an IMU, GPS or motion capture, barometer, magnetometer.
 //! - [`range_inertial`]: velocity, height and walls from range finders, an IMU and an attitude.
 //! - `steps`: what is left of a value at a resolution; `wire`: the vectors of messages as those of nalgebra.
@@ -22,12 +22,13 @@
     reason = "a trailing _W or _B names the frame that a vector is written in, _WB a rotation between the two, _T or _Pa a unit"
 )]
 
-// First: modules behind it see its macro without importing it.
+// First: modules behind them see their macros without importing them.
 #[macro_use]
 mod parameters;
+#[macro_use]
+pub mod sensing;
 
 mod atmosphere;
-mod attitude;
 pub mod barometer;
 pub mod battery;
 mod channel;
@@ -45,7 +46,6 @@ pub mod noise;
 pub mod range;
 pub mod range_inertial;
 pub mod rpm;
-pub mod sensing;
 mod steps;
 #[cfg(test)]
 mod testing;

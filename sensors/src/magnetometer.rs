@@ -3,8 +3,8 @@
 //! Reading = soft-iron scale · field in body axes + hard iron + white noise, in steps of the part's resolution and
 //! cut off at its range. `crate::channel` says when it measures, how measurements are delayed and lost.
 
-use crate::channel::{ChannelState, QUEUE, Tick};
-use crate::earth_field::EarthField;
+use crate::channel::Chance;
+use crate::earth_field;
 use crate::noise::standard_normal;
 use crate::parameters::within;
 use crate::sensing::{Sensor, TruthInputs};
@@ -12,10 +12,8 @@ use crate::steps::in_steps;
 use crate::wire::{attitude, vector_message};
 use bus::component::Info;
 use bus::messages::Magnetometer;
-use bus::random::Stream;
-use bus::{Message, OutputPorts};
-use diagnostics::parameter::{ParameterError, finite, not_negative, positive};
-use nalgebra::{UnitQuaternion, Vector3};
+use diagnostics::parameter::{finite, not_negative, positive};
+use nalgebra::Vector3;
 
 parameters! {
     /// What a magnetometer makes of the earth's field; the defaults are a Honeywell HMC5883L.
@@ -37,11 +35,11 @@ parameters! {
     #[derive(Copy)]
     pub struct MagnetometerParams timed { rate_hz: 100.0, delay_ms: 6.0 } {
         /// Magnetic flux density of the earth's field, T.
-        field_T: f64 = EarthField::default().field_T => not_negative,
+        field_T: f64 = earth_field::FIELD_T => not_negative,
         /// How far the earth's field points below the horizon, degrees.
-        inclination_deg: f64 = EarthField::default().inclination_deg => within(-90.0..=90.0, "from -90 to 90"),
+        inclination_deg: f64 = earth_field::INCLINATION_DEG => within(-90.0..=90.0, "from -90 to 90"),
         /// How far magnetic north lies east of the world's x axis, degrees.
-        declination_deg: f64 = EarthField::default().declination_deg => finite,
+        declination_deg: f64 = earth_field::DECLINATION_DEG => finite,
         /// Field of what is magnetised on the vehicle, body axes, T.
         hard_iron_T: [f64; 3] = [0.0; 3] => finite,
         /// What is left of the field along each body axis.
@@ -55,37 +53,8 @@ parameters! {
     }
 }
 
-impl MagnetometerParams {
-    fn field_W_T(&self) -> Vector3<f64> {
-        let Self { field_T, inclination_deg, declination_deg, .. } = *self;
-        EarthField { field_T, inclination_deg, declination_deg }.vector_W_T()
-    }
-
-    /// What is read on a body with `attitude_WB`, body axes, T.
-    fn measure(&self, attitude_WB: UnitQuaternion<f64>, random: &mut Stream) -> Vector3<f64> {
-        let field_B_T = attitude_WB.inverse_transform_vector(&self.field_W_T());
-        let through_B_T = field_B_T.component_mul(&Vector3::from(self.soft_iron_scale));
-        let read_B_T = through_B_T + Vector3::from(self.hard_iron_T) + self.noise_T * standard_normal(random);
-        read_B_T.map(|axis_T| in_steps(axis_T, self.resolution_T).clamp(-self.range_T, self.range_T))
-    }
-}
-
-/// All that the sensor remembers.
-#[derive(Debug, Clone, Copy, Default, Message)]
-#[repr(C)]
-#[message(type_name = "hummingbus_msgs/msg/MagnetometerState")]
-pub struct MagnetometerState {
-    /// What is under way.
-    channel: ChannelState,
-    /// The last measurements.
-    queue: [Magnetometer; QUEUE],
-}
-
-/// What the sensor sends.
-#[derive(Debug, OutputPorts)]
-pub struct Outputs {
-    /// The measurement that arrived last.
-    pub magnetometer: Magnetometer,
+sensor! {
+    pub struct MagnetometerState as "hummingbus_msgs/msg/MagnetometerState" sends magnetometer: Magnetometer {}
 }
 
 impl Sensor for MagnetometerParams {
@@ -96,24 +65,20 @@ impl Sensor for MagnetometerParams {
     type Outputs = Outputs;
     type State = MagnetometerState;
 
-    fn new(parameters: Self) -> Result<Self, ParameterError> {
-        Ok(parameters)
-    }
-
-    fn initial(&self) -> MagnetometerState {
-        MagnetometerState::default()
-    }
-
-    fn sample(&self, tick: &mut Tick<'_>, state: &mut Self::State, inputs: Self::Inputs<'_>) -> Outputs {
-        let truth = inputs.state;
-        let magnetometer = tick.measure(&mut state.channel, &mut state.queue, |last, chance| {
-            let field = vector_message(self.measure(attitude(truth.attitude), chance.noise));
-            if chance.is_lost(0) {
-                return Magnetometer { valid: 0, ..*last };
-            }
-            Magnetometer { measured_ns: chance.now_ns, field, valid: 1, ..Default::default() }
-        });
-        Outputs { magnetometer }
+    fn measure(
+        &self,
+        _: &mut MagnetometerState,
+        _: &Magnetometer,
+        chance: &mut Chance<'_>,
+        inputs: TruthInputs<'_>,
+    ) -> Option<Magnetometer> {
+        let field_W_T = earth_field::vector_W_T(self.field_T, self.inclination_deg, self.declination_deg);
+        let field_B_T = attitude(inputs.state.attitude).inverse_transform_vector(&field_W_T);
+        let through_B_T = field_B_T.component_mul(&Vector3::from(self.soft_iron_scale));
+        let noise_B_T = self.noise_T * standard_normal(chance.noise);
+        let read_B_T = through_B_T + Vector3::from(self.hard_iron_T) + noise_B_T;
+        let cut = |axis_T| in_steps(axis_T, self.resolution_T).clamp(-self.range_T, self.range_T);
+        Some(Magnetometer { field: vector_message(read_B_T.map(cut)), ..Default::default() })
     }
 }
 
@@ -124,6 +89,7 @@ mod tests {
     use crate::wire::{attitude_message, vector};
     use bus::Harness;
     use bus::messages::PlantState;
+    use nalgebra::UnitQuaternion;
 
     fn perfect() -> MagnetometerParams {
         MagnetometerParams { delay_ms: 0.0, noise_T: 0.0, resolution_T: 0.0, ..Default::default() }

@@ -3,15 +3,13 @@
 //! Reading = truth + bias + white noise, the attitude's as a rotation in body axes. `crate::channel` says when
 //! it measures, how measurements are delayed and lost.
 
-use crate::channel::{ChannelState, QUEUE, Tick};
+use crate::channel::Chance;
 use crate::noise::standard_normal;
 use crate::sensing::{Sensor, TruthInputs};
 use crate::wire::{attitude, attitude_message, vector, vector_message};
 use bus::component::Info;
 use bus::messages::Mocap;
-use bus::random::Stream;
-use bus::{Message, OutputPorts};
-use diagnostics::parameter::{ParameterError, finite, not_negative};
+use diagnostics::parameter::{finite, not_negative};
 use nalgebra::{UnitQuaternion, Vector3};
 
 parameters! {
@@ -47,39 +45,8 @@ parameters! {
     }
 }
 
-impl MocapParams {
-    /// What cameras make of a body at `position_W_m` with `attitude_WB`.
-    fn measure(
-        &self,
-        position_W_m: Vector3<f64>,
-        attitude_WB: UnitQuaternion<f64>,
-        random: &mut Stream,
-    ) -> (Vector3<f64>, UnitQuaternion<f64>) {
-        let position_error_W_m =
-            Vector3::from(self.position_bias_m) + self.position_noise_m * standard_normal(random);
-        let turn_B_deg =
-            Vector3::from(self.attitude_bias_deg) + self.attitude_noise_deg * standard_normal(random);
-        let turn = UnitQuaternion::from_scaled_axis(turn_B_deg.map(f64::to_radians));
-        (position_W_m + position_error_W_m, attitude_WB * turn)
-    }
-}
-
-/// All that the sensor remembers.
-#[derive(Debug, Clone, Copy, Default, Message)]
-#[repr(C)]
-#[message(type_name = "hummingbus_msgs/msg/MocapState")]
-pub struct MocapState {
-    /// What is under way.
-    channel: ChannelState,
-    /// The last measurements.
-    queue: [Mocap; QUEUE],
-}
-
-/// What the sensor sends.
-#[derive(Debug, OutputPorts)]
-pub struct Outputs {
-    /// The measurement that arrived last.
-    pub mocap: Mocap,
+sensor! {
+    pub struct MocapState as "hummingbus_msgs/msg/MocapState" sends mocap: Mocap {}
 }
 
 impl Sensor for MocapParams {
@@ -90,25 +57,22 @@ impl Sensor for MocapParams {
     type Outputs = Outputs;
     type State = MocapState;
 
-    fn new(parameters: Self) -> Result<Self, ParameterError> {
-        Ok(parameters)
-    }
-
-    fn initial(&self) -> MocapState {
-        MocapState::default()
-    }
-
-    fn sample(&self, tick: &mut Tick<'_>, state: &mut Self::State, inputs: Self::Inputs<'_>) -> Outputs {
+    fn measure(
+        &self,
+        _: &mut MocapState,
+        _: &Mocap,
+        chance: &mut Chance<'_>,
+        inputs: TruthInputs<'_>,
+    ) -> Option<Mocap> {
         let truth = inputs.state;
-        let mocap = tick.measure(&mut state.channel, &mut state.queue, |last, chance| {
-            let measured = self.measure(vector(truth.position), attitude(truth.attitude), chance.noise);
-            if chance.is_lost(0) {
-                return Mocap { valid: 0, ..*last };
-            }
-            let (position, attitude) = (vector_message(measured.0), attitude_message(measured.1));
-            Mocap { measured_ns: chance.now_ns, position, attitude, valid: 1, ..Default::default() }
-        });
-        Outputs { mocap }
+        let position_error_W_m =
+            Vector3::from(self.position_bias_m) + self.position_noise_m * standard_normal(chance.noise);
+        let turn_B_deg =
+            Vector3::from(self.attitude_bias_deg) + self.attitude_noise_deg * standard_normal(chance.noise);
+        let turn = UnitQuaternion::from_scaled_axis(turn_B_deg.map(f64::to_radians));
+        let position = vector_message(vector(truth.position) + position_error_W_m);
+        let attitude = attitude_message(attitude(truth.attitude) * turn);
+        Some(Mocap { position, attitude, ..Default::default() })
     }
 }
 

@@ -23,12 +23,6 @@ impl WhiteNoise {
         Self { sigma: density * rate_hz.sqrt() }
     }
 
-    /// The standard deviation of one sample, in the unit of the signal.
-    #[must_use]
-    pub fn sigma(&self) -> f64 {
-        self.sigma
-    }
-
     /// The next sample of the three axes, drawn in the order x, y, z.
     pub fn sample(&self, random: &mut Stream) -> Vector3<f64> {
         self.sigma * standard_normal(random)
@@ -52,8 +46,7 @@ impl BiasWalk {
     }
 
     /// The standard deviation of one step, in the unit of the signal.
-    #[must_use]
-    pub fn step_sigma(&self) -> f64 {
+    pub(crate) fn step_sigma(&self) -> f64 {
         self.step_sigma
     }
 

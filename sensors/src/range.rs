@@ -8,19 +8,19 @@
 //! The beams fire together and do not hear each other. An echo comes back from every surface in the cone at any
 //! angle of incidence; a real beam that grazes a smooth floor or wall hears none.
 
-use crate::channel::{Chance, ChannelState, QUEUE, Tick};
-use crate::cone::Cone;
+use crate::channel::{Chance, QUEUE};
+use crate::cone::{Cone, caster};
 use crate::parameters::within;
 use crate::sensing::Sensor;
 use crate::steps::in_steps;
 use crate::wire::{attitude, vector};
+use bus::InputPorts;
 use bus::component::Info;
 use bus::messages::{PlantState, Ranges, Traffic};
 use bus::random::normal;
-use bus::{InputPorts, Message, OutputPorts};
 use diagnostics::parameter::{ParameterError, finite, not_negative, positive, require};
 use nalgebra::{UnitQuaternion, Vector3};
-use scenes::{RayCaster, Scene};
+use scenes::RayCaster;
 use std::path::PathBuf;
 
 const BEAMS: usize = 5;
@@ -122,39 +122,10 @@ impl RangeFinders {
         let read_m = distance_m? + bias_m[beam] + noise_m * noise;
         Some(in_steps(read_m, resolution_m).clamp(nearest_m, reach_m))
     }
-
-    /// One measurement of all beams after `last`. The noise is drawn whether or not a beam meets anything, so
-    /// that what one of them sees does not reshuffle the others' noise.
-    fn measure(
-        &self,
-        last: &Ranges,
-        chance: &mut Chance<'_>,
-        truth: &PlantState,
-        traffic: Option<&Traffic>,
-    ) -> Ranges {
-        let mut ranges = *last;
-        for (beam, distance_m) in self.distances_m(truth, traffic).into_iter().enumerate() {
-            let noise = normal(chance.noise);
-            let read_m = self.reading_m(beam, distance_m, noise);
-            let is_lost = chance.is_lost(beam as u32);
-            ranges.valid[beam] = u32::from(read_m.is_some() && !is_lost);
-            if !is_lost {
-                ranges.distance[beam] = read_m.unwrap_or(self.params.reach_m);
-            }
-        }
-        ranges
-    }
 }
 
-/// All that the range finders remember.
-#[derive(Debug, Clone, Copy, Message)]
-#[repr(C)]
-#[message(type_name = "hummingbus_msgs/msg/RangeState")]
-pub struct RangeState {
-    /// What is under way.
-    channel: ChannelState,
-    /// The last measurements.
-    queue: [Ranges; QUEUE],
+sensor! {
+    pub struct RangeState as "hummingbus_msgs/msg/RangeState" sends ranges: Ranges {}
 }
 
 /// What the range finders read.
@@ -166,11 +137,18 @@ pub struct RangeInputs<'a> {
     pub traffic: Option<&'a Traffic>,
 }
 
-/// What the range finders send.
-#[derive(Debug, OutputPorts)]
-pub struct Outputs {
-    /// The measurements that arrived last.
-    pub ranges: Ranges,
+impl TryFrom<RangeParams> for RangeFinders {
+    type Error = ParameterError;
+
+    fn try_from(params: RangeParams) -> Result<Self, ParameterError> {
+        let nearest_is_good = (0.0..params.reach_m).contains(&params.nearest_m);
+        require("nearest_m", params.nearest_m, nearest_is_good, "zero or more and below `reach_m`")?;
+        let scene = caster(params.scene.as_deref())?;
+        let (x, y, z) = (Vector3::x_axis(), Vector3::y_axis(), Vector3::z_axis());
+        let half_angle_rad = params.half_angle_deg.to_radians();
+        let cones = [x, -x, y, -y, -z].map(|axis_B| Cone::new(axis_B, half_angle_rad));
+        Ok(Self { params, cones, scene })
+    }
 }
 
 impl Sensor for RangeFinders {
@@ -180,29 +158,32 @@ impl Sensor for RangeFinders {
     type Outputs = Outputs;
     type State = RangeState;
 
-    fn new(params: RangeParams) -> Result<Self, ParameterError> {
-        let nearest_is_good = (0.0..params.reach_m).contains(&params.nearest_m);
-        require("nearest_m", params.nearest_m, nearest_is_good, "zero or more and below `reach_m`")?;
-        let path = params.scene.as_ref().ok_or_else(|| ParameterError::missing("scene", ""))?;
-        let scene = Scene::load(path).map_err(|error| ParameterError::conflict("scene", error))?;
-        let (x, y, z) = (Vector3::x_axis(), Vector3::y_axis(), Vector3::z_axis());
-        let half_angle_rad = params.half_angle_deg.to_radians();
-        let cones = [x, -x, y, -y, -z].map(|axis_B| Cone::new(axis_B, half_angle_rad));
-        Ok(Self { params, cones, scene: RayCaster::new(&scene) })
-    }
-
     /// Until the first measurement arrives, nothing is met.
     fn initial(&self) -> RangeState {
         let nothing = Ranges { distance: [self.params.reach_m; BEAMS], ..Default::default() };
-        RangeState { channel: ChannelState::default(), queue: [nothing; QUEUE] }
+        RangeState { queue: [nothing; QUEUE], ..RangeState::default() }
     }
 
-    fn sample(&self, tick: &mut Tick<'_>, state: &mut Self::State, inputs: Self::Inputs<'_>) -> Outputs {
-        let ranges = tick.measure(&mut state.channel, &mut state.queue, |last, chance| Ranges {
-            measured_ns: chance.now_ns,
-            ..self.measure(last, chance, inputs.state, inputs.traffic)
-        });
-        Outputs { ranges }
+    /// The noise is drawn whether or not a beam meets anything, so that what one of them sees does not reshuffle the
+    /// others' noise.
+    fn measure(
+        &self,
+        _: &mut RangeState,
+        last: &Ranges,
+        chance: &mut Chance<'_>,
+        inputs: RangeInputs<'_>,
+    ) -> Option<Ranges> {
+        let mut ranges = *last;
+        for (beam, distance_m) in self.distances_m(inputs.state, inputs.traffic).into_iter().enumerate() {
+            let noise = normal(chance.noise);
+            let read_m = self.reading_m(beam, distance_m, noise);
+            let is_lost = chance.is_lost(beam as u32);
+            ranges.valid[beam] = u32::from(read_m.is_some() && !is_lost);
+            if !is_lost {
+                ranges.distance[beam] = read_m.unwrap_or(self.params.reach_m);
+            }
+        }
+        Some(ranges)
     }
 }
 

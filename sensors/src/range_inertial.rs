@@ -4,26 +4,13 @@ mod axis;
 pub mod filter;
 pub mod params;
 
-use crate::imu_model::ImuReading;
-use crate::wire::{attitude as rotation, vector_message};
+use bus::OutputPorts;
 use bus::component::{Component, Info, StepError};
 use bus::context::{NodeContext, StepContext};
-use bus::messages::{AttitudeEstimate, Imu, Ranges, StateEstimate, WallEstimate};
-use bus::{InputPorts, OutputPorts};
+use bus::messages::{StateEstimate, WallEstimate};
 use diagnostics::ParameterError;
-use filter::{RangeInertial, RangeInertialState};
+use filter::{RangeInertial, RangeInertialInputs, RangeInertialState};
 use params::RangeInertialParams;
-
-/// What the estimator reads.
-#[derive(Debug, InputPorts)]
-pub struct RangeInertialInputs<'a> {
-    /// Measurements of the range finders.
-    pub ranges: &'a Ranges,
-    /// Readings of the inertial measurement unit.
-    pub imu: &'a Imu,
-    /// The attitude.
-    pub attitude: &'a AttitudeEstimate,
-}
 
 /// What the estimator sends.
 #[derive(Debug, OutputPorts)]
@@ -58,52 +45,10 @@ impl Component for RangeInertial {
         inputs: RangeInertialInputs<'_>,
         state: &mut RangeInertialState,
     ) -> Result<Outputs, StepError> {
-        let (now_ns, attitude) = (context.time_ns(), inputs.attitude);
-        let measured = filter::Measured {
-            now_ns,
-            imu: ImuReading::from(inputs.imu),
-            attitude_WB: rotation(attitude.attitude),
-            ranges: inputs.ranges,
-        };
-        self.update(state, &measured);
-        Ok(Outputs {
-            walls: wall_estimate(self, state, attitude.yaw, now_ns),
-            estimate: state_estimate(self, state, attitude),
-        })
-    }
-}
-
-fn wall_estimate(
-    filter: &RangeInertial,
-    state: &RangeInertialState,
-    yaw_rad: f64,
-    now_ns: u64,
-) -> WallEstimate {
-    let walls = filter.walls(state, yaw_rad, now_ns);
-    WallEstimate {
-        distance: walls.map(|wall| wall.distance_m),
-        in_sight: walls.map(|wall| u32::from(wall.is_in_sight)),
-        velocity: state.velocity_heading_m_s(yaw_rad),
-        height: state.height_m(),
-        climb_rate: state.velocity_W_m_s().z,
-        ..Default::default()
-    }
-}
-
-fn state_estimate(
-    filter: &RangeInertial,
-    state: &RangeInertialState,
-    attitude: &AttitudeEstimate,
-) -> StateEstimate {
-    StateEstimate {
-        position: vector_message(state.position_W_m()),
-        velocity: vector_message(state.velocity_W_m_s()),
-        attitude: attitude.attitude,
-        angular_velocity: attitude.angular_velocity,
-        position_sigma: vector_message(state.position_sigma_W_m()),
-        velocity_sigma: vector_message(state.velocity_sigma_W_m_s()),
-        attitude_sigma: [filter.attitude_sigma_rad(); 3].into(),
-        ..Default::default()
+        let now_ns = context.time_ns();
+        self.update(state, now_ns, &inputs);
+        let walls = self.walls(state, inputs.attitude.yaw, now_ns);
+        Ok(Outputs { walls, estimate: self.motion(state, inputs.attitude) })
     }
 }
 

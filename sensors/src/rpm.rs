@@ -4,13 +4,12 @@
 //! measures, how measurements are delayed and lost. Two faults can be put in, to see whether they are taken for
 //! physics of the vehicle: a rotor whose reading is stuck, and one of which half is read.
 
-use crate::channel::{Chance, ChannelState, QUEUE, Tick};
+use crate::channel::Chance;
 use crate::sensing::{Sensor, TruthInputs};
 use crate::steps::in_steps;
 use bus::component::Info;
 use bus::messages::RotorSpeeds;
 use bus::random::normal;
-use bus::{Message, OutputPorts};
 use diagnostics::parameter::{ParameterError, not_negative, require};
 
 parameters! {
@@ -48,48 +47,15 @@ fn rotor(key: &str, number: f64) -> Result<(), ParameterError> {
     require(key, number, number <= 4.0, "the number of a rotor, 1 to 4, or 0 for none")
 }
 
-impl RpmParams {
-    /// What is read of `truth_rad_s`, after `before`, the reading before; none before the first.
-    fn read(&self, truth_rad_s: &[f64; 4], before: Option<[f64; 4]>, chance: &mut Chance<'_>) -> [f64; 4] {
-        std::array::from_fn(|rotor| {
-            // Drawn whatever the fault is: a fault reshuffles no noise.
-            let noise = normal(chance.noise);
-            match before {
-                Some(before) if rotor + 1 == self.stuck_rotor => before[rotor],
-                _ => self.count(truth_rad_s[rotor] + self.noise_rad_s * noise, rotor),
-            }
-        })
+sensor! {
+    pub struct RpmState as "hummingbus_msgs/msg/RpmState" sends speeds: RotorSpeeds {
+        /// What was read last, whether it was lost or not.
+        #[field(unit = "rad/s")]
+        read: [f64; 4],
+        /// 1 from the first reading on.
+        #[field(unit = "1")]
+        has_read: u64,
     }
-
-    /// The count that stands for a speed of rotor `rotor`.
-    fn count(&self, speed_rad_s: f64, rotor: usize) -> f64 {
-        let part = if rotor + 1 == self.half_reading_rotor { 0.5 } else { 1.0 };
-        in_steps(part * speed_rad_s.max(0.0), self.resolution_rad_s)
-    }
-}
-
-/// All that the sensor remembers.
-#[derive(Debug, Clone, Copy, Default, Message)]
-#[repr(C)]
-#[message(type_name = "hummingbus_msgs/msg/RpmState")]
-pub struct RpmState {
-    /// What is under way.
-    channel: ChannelState,
-    /// The last measurements.
-    queue: [RotorSpeeds; QUEUE],
-    /// What was read last, whether it was lost or not.
-    #[field(unit = "rad/s")]
-    read: [f64; 4],
-    /// 1 from the first reading on.
-    #[field(unit = "1")]
-    has_read: u64,
-}
-
-/// What the sensor sends.
-#[derive(Debug, OutputPorts)]
-pub struct Outputs {
-    /// The measurement that arrived last.
-    pub speeds: RotorSpeeds,
 }
 
 impl Sensor for RpmParams {
@@ -100,26 +66,24 @@ impl Sensor for RpmParams {
     type Outputs = Outputs;
     type State = RpmState;
 
-    fn new(parameters: Self) -> Result<Self, ParameterError> {
-        Ok(parameters)
-    }
-
-    fn initial(&self) -> RpmState {
-        RpmState::default()
-    }
-
-    fn sample(&self, tick: &mut Tick<'_>, state: &mut Self::State, inputs: Self::Inputs<'_>) -> Outputs {
-        let truth = inputs.state;
-        let RpmState { channel: under_way, queue, read, has_read } = state;
-        let speeds = tick.measure(under_way, queue, |last, chance| {
-            *read = self.read(&truth.rotor_speed, (*has_read == 1).then_some(*read), chance);
-            *has_read = 1;
-            if chance.is_lost(0) {
-                return RotorSpeeds { valid: 0, ..*last };
+    fn measure(
+        &self,
+        state: &mut RpmState,
+        _: &RotorSpeeds,
+        chance: &mut Chance<'_>,
+        inputs: TruthInputs<'_>,
+    ) -> Option<RotorSpeeds> {
+        for (rotor, truth_rad_s) in inputs.state.rotor_speed.into_iter().enumerate() {
+            // Drawn whatever the fault is: a fault reshuffles no noise.
+            let noise = normal(chance.noise);
+            if rotor + 1 != self.stuck_rotor || state.has_read == 0 {
+                let part = if rotor + 1 == self.half_reading_rotor { 0.5 } else { 1.0 };
+                let speed_rad_s = truth_rad_s + self.noise_rad_s * noise;
+                state.read[rotor] = in_steps(part * speed_rad_s.max(0.0), self.resolution_rad_s);
             }
-            RotorSpeeds { measured_ns: chance.now_ns, rotor_speed: *read, valid: 1, ..Default::default() }
-        });
-        Outputs { speeds }
+        }
+        state.has_read = 1;
+        Some(RotorSpeeds { rotor_speed: state.read, ..Default::default() })
     }
 }
 

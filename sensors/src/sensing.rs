@@ -1,16 +1,92 @@
 //! A sensor as a component: it measures what its inputs hold, and a channel says when, and what becomes of it.
 
-use crate::channel::{Channel, Tick};
+use crate::channel::{Chance, Channel, Remembered};
 use crate::parameters::Parameters;
 use bus::component::{Component, Info, StepError};
 use bus::context::{NodeContext, StepContext};
-use bus::messages::PlantState;
+use bus::messages::{Barometer, Battery, Gps, Magnetometer, Mocap, PlantState, Ranges, RotorSpeeds};
 use bus::ports::{InputPorts, OutputPorts};
 use bus::{InputPorts, Message};
 use diagnostics::ParameterError;
 
-/// A sensor: all of it that does not change during a run.
-pub trait Sensor: Sized {
+/// Declares what a sensor remembers, `type_name` on the bus, and what it sends: the message at the port that is named.
+macro_rules! sensor {
+    (
+        pub struct $State:ident as $type_name:literal sends $port:ident: $Message:ident {
+            $($(#[$field_meta:meta])* $field:ident: $type:ty,)*
+        }
+    ) => {
+        /// All that the sensor remembers.
+        #[derive(Debug, Clone, Copy, Default, bus::Message)]
+        #[repr(C)]
+        #[message(type_name = $type_name)]
+        pub struct $State {
+            /// What is under way.
+            channel: $crate::channel::ChannelState,
+            /// The last measurements.
+            queue: [$Message; $crate::channel::QUEUE],
+            $($(#[$field_meta])* $field: $type,)*
+        }
+
+        impl $crate::channel::Remembered for $State {
+            type Measurement = $Message;
+
+            fn under_way(
+                &mut self,
+            ) -> (&mut $crate::channel::ChannelState, &mut [$Message; $crate::channel::QUEUE]) {
+                (&mut self.channel, &mut self.queue)
+            }
+        }
+
+        /// What the sensor sends.
+        #[derive(Debug, bus::OutputPorts)]
+        pub struct Outputs {
+            /// The measurement that arrived last.
+            pub $port: $Message,
+        }
+
+        impl From<$Message> for Outputs {
+            fn from($port: $Message) -> Self {
+                Self { $port }
+            }
+        }
+    };
+}
+
+/// What sensors send.
+pub trait Measurement: Copy {
+    /// What is sent of what was `measured` after `last`, `None` where there was nothing to measure.
+    fn sent(measured: Option<Self>, last: &Self, chance: &mut Chance<'_>) -> Self;
+}
+
+/// Measurements that are lost as a whole: then the one before is sent again, not valid.
+macro_rules! lost_as_a_whole {
+    ($($Message:ident),*) => {$(
+        impl Measurement for $Message {
+            fn sent(measured: Option<Self>, last: &Self, chance: &mut Chance<'_>) -> Self {
+                match measured {
+                    Some(measured) if !chance.is_lost(0) => {
+                        Self { measured_ns: chance.now_ns, valid: 1, ..measured }
+                    }
+                    _ => Self { valid: 0, ..*last },
+                }
+            }
+        }
+    )*};
+}
+
+lost_as_a_whole!(Barometer, Battery, Gps, Magnetometer, Mocap, RotorSpeeds);
+
+/// Each beam is lost on its own.
+impl Measurement for Ranges {
+    fn sent(measured: Option<Self>, last: &Self, chance: &mut Chance<'_>) -> Self {
+        Self { measured_ns: chance.now_ns, ..measured.unwrap_or(*last) }
+    }
+}
+
+/// A sensor: all of it that does not change during a run. Its parameters, within their ranges, become it, unless they do
+/// not go together or name a file that is refused.
+pub trait Sensor: TryFrom<Self::Parameters, Error: Into<ParameterError>> {
     /// Its name in manifests, and what it does.
     const INFO: Info;
     /// What the manifest's `parameters` table holds.
@@ -18,23 +94,27 @@ pub trait Sensor: Sized {
     /// What it reads.
     type Inputs<'a>: InputPorts<'a>;
     /// What it sends.
-    type Outputs: OutputPorts;
+    type Outputs: OutputPorts + From<Sent<Self>>;
     /// All that it remembers from tick to tick.
-    type State: Message;
-
-    /// Makes the sensor of parameters that are within their ranges.
-    ///
-    /// # Errors
-    /// Parameters that do not go together, or a file that is refused.
-    fn new(parameters: Self::Parameters) -> Result<Self, ParameterError>;
+    type State: Message + Default + Remembered<Measurement: Measurement>;
 
     /// The state before the first tick.
-    fn initial(&self) -> Self::State;
+    fn initial(&self) -> Self::State {
+        Self::State::default()
+    }
 
-    /// What is sent at `tick`.
-    fn sample(&self, tick: &mut Tick<'_>, state: &mut Self::State, inputs: Self::Inputs<'_>)
-    -> Self::Outputs;
+    /// What it measures after `last`, at the times when it does; `None` where there is nothing to measure.
+    fn measure(
+        &self,
+        state: &mut Self::State,
+        last: &Sent<Self>,
+        chance: &mut Chance<'_>,
+        inputs: Self::Inputs<'_>,
+    ) -> Option<Sent<Self>>;
 }
+
+/// What a sensor sends.
+pub(crate) type Sent<S> = <<S as Sensor>::State as Remembered>::Measurement;
 
 /// What most sensors read.
 #[derive(Debug, InputPorts)]
@@ -72,7 +152,7 @@ impl<S: Sensor> Component for Sensing<S> {
     fn new(parameters: S::Parameters, context: &NodeContext<'_>) -> Result<Self, ParameterError> {
         parameters.validate()?;
         let channel = Channel::new(&parameters.timing(), context)?;
-        Ok(Self { sensor: S::new(parameters)?, channel })
+        Ok(Self { sensor: S::try_from(parameters).map_err(Into::into)?, channel })
     }
 
     fn initial(&self) -> S::State {
@@ -85,6 +165,10 @@ impl<S: Sensor> Component for Sensing<S> {
         inputs: S::Inputs<'_>,
         state: &mut S::State,
     ) -> Result<S::Outputs, StepError> {
-        Ok(self.sensor.sample(&mut self.channel.at(context.time_ns()), state, inputs))
+        let arrived = self.channel.measure(context.time_ns(), state, |state, last, chance| {
+            let measured = self.sensor.measure(state, last, chance, inputs);
+            Measurement::sent(measured, last, chance)
+        });
+        Ok(arrived.into())
     }
 }

@@ -6,7 +6,7 @@
 #![allow(dead_code, reason = "each test uses a part of it")]
 #![allow(non_snake_case, reason = "a trailing _W or _B names the frame a vector is written in")]
 
-use bus::messages::{Reference, WallEstimate};
+use bus::messages::{AttitudeEstimate, Reference, WallEstimate};
 use controllers::airframe::ControlledVehicle;
 use controllers::bumpless::BumplessTransfer;
 use controllers::control::{ControlInput, ControlOutput, MotionEstimate};
@@ -15,7 +15,7 @@ use controllers::law::Law;
 use controllers::set_points::SetPoint;
 use nalgebra::Vector3;
 use plant::{NewtonEuler, RigidBody, State};
-use sensors::complementary::{AttitudeEstimate, Complementary, ComplementaryParams, ComplementaryState};
+use sensors::complementary::{Complementary, ComplementaryParams, ComplementaryState};
 use sensors::imu_model::{ImuModel, ImuModelState, ImuParams, ImuReading};
 use vehicles::Vehicle;
 
@@ -189,11 +189,11 @@ impl Loop {
             position_W_m: self.state.body.position_W_m,
             velocity_W_m_s: self.state.body.velocity_W_m_s,
             attitude_WB: nalgebra::UnitQuaternion::from_euler_angles(
-                attitude.roll_rad,
-                attitude.pitch_rad,
-                attitude.yaw_rad,
+                attitude.roll,
+                attitude.pitch,
+                attitude.yaw,
             ),
-            angular_velocity_B_rad_s: attitude.angular_velocity_B_rad_s,
+            angular_velocity_B_rad_s: <[f64; 3]>::from(attitude.angular_velocity).into(),
         };
         let input = ControlInput { motion, set_point: self.set_point, reference: self.reference, walls };
         let transfer = BumplessTransfer::to::<L>(&self.believed.vehicle, PERIOD_S);

@@ -1,6 +1,6 @@
 //! The parameters of the extended Kalman filter.
 
-use crate::earth_field::EarthField;
+use crate::earth_field;
 use diagnostics::parameter::{ParameterError, finite, not_negative, positive, require};
 use nalgebra::Vector3;
 
@@ -42,11 +42,11 @@ parameters! {
         /// A magnetometer's constant error, body axes, which is taken off, T.
         magnetometer_hard_iron_T: [f64; 3] = [0.0; 3] => finite,
         /// Magnetic flux density of the earth's field, T.
-        field_T: f64 = EarthField::default().field_T => positive,
+        field_T: f64 = earth_field::FIELD_T => positive,
         /// How far it points below the horizon, degrees.
-        inclination_deg: f64 = EarthField::default().inclination_deg => below_vertical,
+        inclination_deg: f64 = earth_field::INCLINATION_DEG => below_vertical,
         /// How far magnetic north lies east of the world's x axis, degrees.
-        declination_deg: f64 = EarthField::default().declination_deg => finite,
+        declination_deg: f64 = earth_field::DECLINATION_DEG => finite,
         /// The position at the start, m; where absent, the first one measured.
         initial_position_m: Option<[f64; 3]> = None => finite,
         /// Its standard deviation, m, where it is given.
@@ -81,7 +81,6 @@ impl EkfParams {
     /// The earth's magnetic field in the world, T.
     #[must_use]
     pub fn field_W_T(&self) -> Vector3<f64> {
-        let Self { field_T, inclination_deg, declination_deg, .. } = *self;
-        EarthField { field_T, inclination_deg, declination_deg }.vector_W_T()
+        earth_field::vector_W_T(self.field_T, self.inclination_deg, self.declination_deg)
     }
 }

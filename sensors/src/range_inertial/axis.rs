@@ -1,5 +1,6 @@
 //! One axis of the range-inertial estimator: a Kalman filter over velocity, bias, path and two distances.
 
+use super::params::RangeInertialParams;
 use bus::Message;
 use nalgebra::{SMatrix, SVector};
 
@@ -74,15 +75,6 @@ pub struct Echo {
     pub moved_m: f64,
 }
 
-/// What the acceleration that is fed in is worth.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Inertia {
-    /// White noise of the acceleration, m/s²/√Hz.
-    pub noise_density_m_s2_sqrt_hz: f64,
-    /// Random walk of its bias, m/s³/√Hz.
-    pub bias_walk_m_s3_sqrt_hz: f64,
-}
-
 impl Echo {
     /// The distance now, m.
     pub fn now_m(&self) -> f64 {
@@ -105,7 +97,7 @@ impl Axis {
         &mut self,
         acceleration_m_s2: f64,
         bias_change_m_s2: f64,
-        inertia: &Inertia,
+        params: &RangeInertialParams,
         period_s: f64,
     ) {
         let gained_m_s = (acceleration_m_s2 - self.bias) * period_s;
@@ -115,19 +107,20 @@ impl Axis {
         self.path += moved_m;
         self.distance[Side::Ahead.index()] -= moved_m;
         self.distance[Side::Behind.index()] += moved_m;
-        self.spread(inertia, period_s);
+        self.spread(params, period_s);
     }
 
     /// The covariance after `period_s`, to first order in it.
-    fn spread(&mut self, inertia: &Inertia, period_s: f64) {
+    fn spread(&mut self, params: &RangeInertialParams, period_s: f64) {
         let mut transition = Covariance::identity();
         transition[(VELOCITY, BIAS)] = -period_s;
         transition[(PATH, VELOCITY)] = period_s;
         transition[(AHEAD, VELOCITY)] = -period_s;
         transition[(AHEAD + 1, VELOCITY)] = period_s;
         let mut covariance = transition * self.covariance() * transition.transpose();
-        covariance[(VELOCITY, VELOCITY)] += inertia.noise_density_m_s2_sqrt_hz.powi(2) * period_s;
-        covariance[(BIAS, BIAS)] += inertia.bias_walk_m_s3_sqrt_hz.powi(2) * period_s;
+        covariance[(VELOCITY, VELOCITY)] +=
+            params.accelerometer_noise_density_m_s2_sqrt_hz.powi(2) * period_s;
+        covariance[(BIAS, BIAS)] += params.acceleration_bias_walk_m_s3_sqrt_hz.powi(2) * period_s;
         self.covariance = flat(&covariance);
     }
 

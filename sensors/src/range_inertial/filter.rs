@@ -16,10 +16,11 @@
 
 use super::axis::{AHEAD, Axis, Echo, PATH, Side, VELOCITY};
 use super::params::RangeInertialParams;
-use crate::imu_model::ImuReading;
-use crate::wire::{attitude, attitude_message, vector, vector_message};
-use bus::Message;
-use bus::messages::{Quaternion, Ranges, Vector3 as Vector3Message};
+use crate::wire::{attitude, vector, vector_message};
+use bus::messages::{
+    AttitudeEstimate, Imu, Quaternion, Ranges, StateEstimate, Vector3 as Vector3Message, WallEstimate,
+};
+use bus::{InputPorts, Message};
 use diagnostics::parameter::{ParameterError, positive};
 use nalgebra::{UnitQuaternion, Vector3};
 
@@ -88,26 +89,15 @@ pub struct RangeInertialState {
     past: [Past; PAST],
 }
 
-/// What is known at a sample.
-#[derive(Clone, Copy, Debug)]
-pub struct Measured<'a> {
-    /// Simulation time, ns.
-    pub now_ns: u64,
-    /// What the IMU reads.
-    pub imu: ImuReading,
-    /// The estimated attitude.
-    pub attitude_WB: UnitQuaternion<f64>,
-    /// The newest ranges.
+/// What the estimator reads.
+#[derive(Debug, InputPorts)]
+pub struct RangeInertialInputs<'a> {
+    /// Measurements of the range finders.
     pub ranges: &'a Ranges,
-}
-
-/// A level distance.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Wall {
-    /// Distance along the heading's axis, m; the reach where nothing is in sight.
-    pub distance_m: f64,
-    /// Whether something is in sight.
-    pub is_in_sight: bool,
+    /// Readings of the inertial measurement unit.
+    pub imu: &'a Imu,
+    /// The attitude.
+    pub attitude: &'a AttitudeEstimate,
 }
 
 /// The estimator at one sample period: all that does not change during a run.
@@ -115,7 +105,8 @@ pub struct Wall {
 /// ```
 /// use bus::Harness;
 /// use bus::messages::{AttitudeEstimate, Imu, Ranges};
-/// use sensors::range_inertial::{RangeInertialInputs, filter::RangeInertial, params::RangeInertialParams};
+/// use sensors::range_inertial::filter::{RangeInertial, RangeInertialInputs};
+/// use sensors::range_inertial::params::RangeInertialParams;
 ///
 /// let parameters = RangeInertialParams { initial_height_m: 1.0, ..RangeInertialParams::default() };
 /// let mut filter = Harness::<RangeInertial>::new(parameters).unwrap();
@@ -169,24 +160,26 @@ impl RangeInertial {
         }
     }
 
-    /// Moves `state` on to the time of `inputs`, one period after the last.
-    pub fn update(&self, state: &mut RangeInertialState, inputs: &Measured<'_>) {
+    /// Moves `state` on to `now_ns`, the time of `inputs`, one period after the last.
+    pub fn update(&self, state: &mut RangeInertialState, now_ns: u64, inputs: &RangeInertialInputs<'_>) {
         self.predict(state, inputs);
-        state.remember(&inputs.attitude_WB);
-        if is_new(state, inputs.ranges) {
-            state.measured_ns = inputs.ranges.measured_ns;
-            self.correct(state, inputs);
+        state.remember(inputs.attitude.attitude);
+        let ranges = inputs.ranges;
+        // Each is used once.
+        if ranges.measured_ns != state.measured_ns && ranges.valid.contains(&1) {
+            state.measured_ns = ranges.measured_ns;
+            self.correct(state, now_ns, ranges);
         }
-        self.lose_sight(state, inputs.now_ns);
+        self.lose_sight(state, now_ns);
     }
 
-    fn predict(&self, state: &mut RangeInertialState, inputs: &Measured<'_>) {
-        let force_B = inputs.imu.specific_force_B_m_s2;
+    fn predict(&self, state: &mut RangeInertialState, inputs: &RangeInertialInputs<'_>) {
+        let force_B = vector(inputs.imu.specific_force);
         if !force_B.iter().all(|axis| axis.is_finite()) {
             return;
         }
         let gravity_W = Vector3::new(0.0, 0.0, self.params.gravity_m_s2);
-        let acceleration_W = inputs.attitude_WB * force_B - gravity_W;
+        let acceleration_W = attitude(inputs.attitude.attitude) * force_B - gravity_W;
         let last_W = if state.samples == 0 { acceleration_W } else { vector(state.acceleration) };
         state.acceleration = vector_message(acceleration_W);
         if state.samples == 0 {
@@ -195,7 +188,7 @@ impl RangeInertial {
         let mean_W = 0.5 * (last_W + acceleration_W);
         let lean_W = self.lean_m_s3(&mean_W, force_B.norm()) * self.period_s;
         for (index, axis) in state.axes.iter_mut().enumerate() {
-            axis.predict(mean_W[index], lean_W[index], &self.params.inertia(), self.period_s);
+            axis.predict(mean_W[index], lean_W[index], &self.params, self.period_s);
         }
     }
 
@@ -209,24 +202,24 @@ impl RangeInertial {
         -level_W / self.params.attitude_time_constant_s
     }
 
-    fn correct(&self, state: &mut RangeInertialState, inputs: &Measured<'_>) {
-        let age_ns = inputs.now_ns.saturating_sub(inputs.ranges.measured_ns);
+    fn correct(&self, state: &mut RangeInertialState, now_ns: u64, ranges: &Ranges) {
+        let age_ns = now_ns.saturating_sub(ranges.measured_ns);
         let age_s = age_ns as f64 * 1e-9;
         let Some(past) = state.past(age_s / self.period_s) else { return };
-        for (beam, &reading_m) in inputs.ranges.distance.iter().enumerate() {
-            let is_valid = inputs.ranges.valid[beam] == 1 && reading_m.is_finite();
+        for (beam, &reading_m) in ranges.distance.iter().enumerate() {
+            let is_valid = ranges.valid[beam] == 1 && reading_m.is_finite();
             let seen = is_valid.then(|| self.read(state, &past, beam, reading_m)).flatten();
             let Some((axis, side, distance_m, sigma_m)) = seen else { continue };
             let moved_m = state.axes[axis].path - vector(past.path)[axis];
             let echo = Echo { side, distance_m, sigma_m, age_s, moved_m };
             if beam != DOWN && self.is_obstacle(&state.axes[axis], &echo) {
                 state.obstacle[axis][side.index()] = echo.now_m();
-                state.obstacle_ns[axis][side.index()] = inputs.now_ns;
+                state.obstacle_ns[axis][side.index()] = now_ns;
                 continue;
             }
             state.axes[axis].correct(&echo, self.params.gate_sigma);
             if let Some(echo_ns) = state.echo_ns.get_mut(axis) {
-                echo_ns[side.index()] = inputs.now_ns;
+                echo_ns[side.index()] = now_ns;
             }
         }
     }
@@ -294,28 +287,46 @@ impl RangeInertial {
         }
     }
 
-    /// Standard deviation of the attitude that is fed in, rad.
+    /// What is around, in the order of `LEVEL_BEAMS` along the heading at `yaw_rad`; the reach where nothing is in sight.
     #[must_use]
-    pub fn attitude_sigma_rad(&self) -> f64 {
-        self.params.attitude_sigma_rad
-    }
-
-    /// What is around, in the order of `LEVEL_BEAMS` along the heading at `yaw_rad`.
-    #[must_use]
-    pub fn walls(&self, state: &RangeInertialState, yaw_rad: f64, now_ns: u64) -> [Wall; 4] {
-        LEVEL_BEAMS.map(|direction| {
-            let direction_W = turn(yaw_rad) * Vector3::from(direction);
+    pub fn walls(&self, state: &RangeInertialState, yaw_rad: f64, now_ns: u64) -> WallEstimate {
+        let heading = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), yaw_rad);
+        let seen = LEVEL_BEAMS.map(|direction| {
+            let direction_W = heading * Vector3::from(direction);
             let (axis, side) = facing(&direction_W);
-            let is_in_sight = state.axes[axis].in_sight[side.index()] == 1;
-            let nearest_m = self.in_front_m(state, axis, side, now_ns);
-            let along_m = nearest_m / direction_W[axis].abs();
-            let distance_m = if is_in_sight { along_m } else { self.params.reach_m };
-            Wall { distance_m, is_in_sight }
-        })
+            let along_m = self.in_front_m(state, axis, side, now_ns) / direction_W[axis].abs();
+            let in_sight = state.axes[axis].in_sight[side.index()];
+            (if in_sight == 1 { along_m } else { self.params.reach_m }, in_sight)
+        });
+        let velocity_W_m_s = state.velocity_W_m_s();
+        let velocity_m_s = heading.inverse() * velocity_W_m_s;
+        WallEstimate {
+            distance: seen.map(|(distance_m, _)| distance_m),
+            in_sight: seen.map(|(_, in_sight)| in_sight),
+            velocity: [velocity_m_s.x, velocity_m_s.y],
+            height: state.height_m(),
+            climb_rate: velocity_W_m_s.z,
+            ..Default::default()
+        }
     }
-}
 
-impl RangeInertial {
+    /// The motion, at the attitude that is fed in: level displacement since the start, and height above what is below.
+    #[must_use]
+    pub fn motion(&self, state: &RangeInertialState, attitude: &AttitudeEstimate) -> StateEstimate {
+        let [x, y, z] = &state.axes;
+        let height_sigma_m = z.sigma(AHEAD + Side::Behind.index());
+        StateEstimate {
+            position: [x.path, y.path, state.height_m()].into(),
+            velocity: vector_message(state.velocity_W_m_s()),
+            attitude: attitude.attitude,
+            angular_velocity: attitude.angular_velocity,
+            position_sigma: [x.sigma(PATH), y.sigma(PATH), height_sigma_m].into(),
+            velocity_sigma: state.axes.map(|axis| axis.sigma(VELOCITY)).into(),
+            attitude_sigma: [self.params.attitude_sigma_rad; 3].into(),
+            ..Default::default()
+        }
+    }
+
     /// The distance to what hides the wall, or to the wall.
     fn in_front_m(&self, state: &RangeInertialState, axis: usize, side: Side, now_ns: u64) -> f64 {
         let side = side.index();
@@ -333,41 +344,14 @@ impl RangeInertialState {
         Vector3::from(self.axes.map(|axis| axis.velocity))
     }
 
-    /// Velocity along the heading at `yaw_rad`, level axes, m/s.
-    #[must_use]
-    pub fn velocity_heading_m_s(&self, yaw_rad: f64) -> [f64; 2] {
-        let velocity = turn(yaw_rad).inverse() * self.velocity_W_m_s();
-        [velocity.x, velocity.y]
-    }
-
-    /// Level displacement since the start, and the height above what is below, m.
-    #[must_use]
-    pub fn position_W_m(&self) -> Vector3<f64> {
-        Vector3::new(self.axes[0].path, self.axes[1].path, self.height_m())
-    }
-
-    /// Standard deviation of the velocity, world axes, m/s.
-    #[must_use]
-    pub fn velocity_sigma_W_m_s(&self) -> Vector3<f64> {
-        Vector3::from(self.axes.map(|axis| axis.sigma(VELOCITY)))
-    }
-
-    /// Standard deviation of the position, world axes, m.
-    #[must_use]
-    pub fn position_sigma_W_m(&self) -> Vector3<f64> {
-        let height_m = self.axes[2].sigma(AHEAD + Side::Behind.index());
-        Vector3::new(self.axes[0].sigma(PATH), self.axes[1].sigma(PATH), height_m)
-    }
-
     /// Height above what is below, m.
     #[must_use]
     pub fn height_m(&self) -> f64 {
         self.axes[2].distance[Side::Behind.index()]
     }
 
-    fn remember(&mut self, attitude_WB: &UnitQuaternion<f64>) {
+    fn remember(&mut self, attitude: Quaternion) {
         let path = self.axes.map(|axis| axis.path).into();
-        let attitude = attitude_message(*attitude_WB);
         self.past[self.samples as usize % PAST] = Past { path, attitude };
         self.samples += 1;
     }
@@ -380,11 +364,6 @@ impl RangeInertialState {
     }
 }
 
-/// Whether `ranges` hold what was not used yet.
-fn is_new(state: &RangeInertialState, ranges: &Ranges) -> bool {
-    ranges.measured_ns != state.measured_ns && ranges.valid.contains(&1)
-}
-
 fn beam_B(beam: usize) -> Vector3<f64> {
     LEVEL_BEAMS.get(beam).map_or(-Vector3::z(), |&direction| Vector3::from(direction))
 }
@@ -393,8 +372,4 @@ fn beam_B(beam: usize) -> Vector3<f64> {
 fn facing(direction_W: &Vector3<f64>) -> (usize, Side) {
     let axis = usize::from(direction_W.x.abs() < direction_W.y.abs());
     (axis, if direction_W[axis] > 0.0 { Side::Ahead } else { Side::Behind })
-}
-
-fn turn(yaw_rad: f64) -> UnitQuaternion<f64> {
-    UnitQuaternion::from_axis_angle(&Vector3::z_axis(), yaw_rad)
 }

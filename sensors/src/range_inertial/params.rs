@@ -1,6 +1,5 @@
 //! The parameters of the range-inertial estimator.
 
-use super::axis::Inertia;
 use crate::parameters::within;
 use diagnostics::parameter::{ParameterError, not_negative, positive};
 
@@ -69,30 +68,5 @@ impl RangeInertialParams {
             positive("room_m", size_m - start_m)?;
         }
         Ok(())
-    }
-
-    /// What the level acceleration is worth.
-    #[must_use]
-    pub fn inertia(&self) -> Inertia {
-        Inertia {
-            noise_density_m_s2_sqrt_hz: self.accelerometer_noise_density_m_s2_sqrt_hz,
-            bias_walk_m_s3_sqrt_hz: self.acceleration_bias_walk_m_s3_sqrt_hz,
-        }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn of_a_room_and_the_place_in_it_the_one_that_is_missing_is_named() {
-        let refused = |room_m, start_in_room_m| {
-            let params = RangeInertialParams { room_m, start_in_room_m, ..Default::default() };
-            params.validate_room().unwrap_err().to_string()
-        };
-        let given = Some([4.0, 4.0]);
-        assert_eq!(refused(given, None), "`start_in_room_m` must be given where `room_m` is, found nothing");
-        assert_eq!(refused(None, given), "`room_m` must be given where `start_in_room_m` is, found nothing");
     }
 }
