@@ -1,6 +1,6 @@
 //! The vehicle as its controllers know it: its file, the allocation to its rotors, and what the loops need of both.
 
-use crate::allocation::{Allocation, AllocationError, RotorSet, THRUST_RESERVE};
+use crate::allocation::{Allocation, AllocationError, THRUST_RESERVE};
 use diagnostics::ParameterError;
 use nalgebra::Vector3;
 use std::path::Path;
@@ -30,7 +30,7 @@ impl ControlledVehicle {
     /// # Errors
     /// Four such rotors cannot be allocated to.
     pub fn new(vehicle: Vehicle) -> Result<Self, AllocationError> {
-        let allocation = Allocation::new(&RotorSet::from(&vehicle))?;
+        let allocation = Allocation::new(&vehicle)?;
         Ok(Self { vehicle, allocation })
     }
 

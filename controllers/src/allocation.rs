@@ -21,36 +21,6 @@ pub struct RotorWrench {
     pub torque_B_N_m: Vector3<f64>,
 }
 
-/// The rotors as the allocation has to know them.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct RotorSet {
-    /// Positions from the centre of mass, body axes, m.
-    pub positions_B_m: [Vector3<f64>; 4],
-    /// +1 for a rotor that turns counter-clockwise seen from above, −1 for clockwise.
-    pub spins: [f64; 4],
-    /// c_T, N/(rad/s)².
-    pub thrust_coefficient_N_s2_rad2: f64,
-    /// c_Q, N·m/(rad/s)².
-    pub torque_coefficient_N_m_s2_rad2: f64,
-    /// The least speed that the motors keep, rad/s.
-    pub speed_min_rad_s: f64,
-    /// The greatest speed that they reach, rad/s.
-    pub speed_max_rad_s: f64,
-}
-
-impl From<&Vehicle> for RotorSet {
-    fn from(vehicle: &Vehicle) -> Self {
-        Self {
-            positions_B_m: std::array::from_fn(|rotor| vehicle.rotors[rotor].position_m),
-            spins: std::array::from_fn(|rotor| vehicle.rotors[rotor].spin),
-            thrust_coefficient_N_s2_rad2: vehicle.thrust_coefficient,
-            torque_coefficient_N_m_s2_rad2: vehicle.torque_coefficient,
-            speed_min_rad_s: vehicle.command.speed_at_min_rad_s,
-            speed_max_rad_s: vehicle.command.speed_at_max_rad_s,
-        }
-    }
-}
-
 /// A set of rotors that cannot be allocated to.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum AllocationError {
@@ -117,16 +87,16 @@ impl Allocated {
 }
 
 impl Allocation {
-    /// The allocation to `rotors`.
+    /// The allocation to the rotors of `vehicle`.
     ///
     /// # Errors
     /// The effectiveness matrix is singular or the range of speeds is empty.
-    pub fn new(rotors: &RotorSet) -> Result<Self, AllocationError> {
-        let (min_rad_s, max_rad_s) = (rotors.speed_min_rad_s, rotors.speed_max_rad_s);
+    pub fn new(vehicle: &Vehicle) -> Result<Self, AllocationError> {
+        let (min_rad_s, max_rad_s) = (vehicle.command.speed_at_min_rad_s, vehicle.command.speed_at_max_rad_s);
         if !(0.0 <= min_rad_s && min_rad_s < max_rad_s && max_rad_s.is_finite()) {
             return Err(AllocationError::SpeedRange { min_rad_s, max_rad_s });
         }
-        let effectiveness = effectiveness(rotors);
+        let effectiveness = effectiveness(vehicle);
         let inverse = effectiveness.try_inverse().ok_or(AllocationError::Singular)?;
         // Overflow in the inverse, and rotors without thrust, would pass as numbers that are not finite.
         if !inverse.iter().all(|element| element.is_finite()) {
@@ -194,13 +164,12 @@ impl Allocation {
     }
 }
 
-fn effectiveness(rotors: &RotorSet) -> Matrix4<f64> {
-    let (c_t, c_q) = (rotors.thrust_coefficient_N_s2_rad2, rotors.torque_coefficient_N_m_s2_rad2);
-    let column = |rotor: usize| {
-        let position_B_m = rotors.positions_B_m[rotor];
-        Vector4::new(c_t, position_B_m.y * c_t, -position_B_m.x * c_t, -rotors.spins[rotor] * c_q)
-    };
-    Matrix4::from_columns(&[column(0), column(1), column(2), column(3)])
+fn effectiveness(vehicle: &Vehicle) -> Matrix4<f64> {
+    let (c_t, c_q) = (vehicle.thrust_coefficient, vehicle.torque_coefficient);
+    Matrix4::from_columns(&vehicle.rotors.each_ref().map(|rotor| {
+        let position_B_m = rotor.position_m;
+        Vector4::new(c_t, position_B_m.y * c_t, -position_B_m.x * c_t, -rotor.spin * c_q)
+    }))
 }
 
 #[cfg(test)]
@@ -209,22 +178,9 @@ mod tests {
 
     const RPM: f64 = std::f64::consts::TAU / 60.0;
 
-    /// The Hummingbird: front, left, rear, right; front and rear clockwise (thesis §2.1, §4.2, §5.3).
-    fn hummingbird() -> RotorSet {
-        let arm_m = 0.17;
-        RotorSet {
-            positions_B_m: [
-                Vector3::new(arm_m, 0.0, 0.0),
-                Vector3::new(0.0, arm_m, 0.0),
-                Vector3::new(-arm_m, 0.0, 0.0),
-                Vector3::new(0.0, -arm_m, 0.0),
-            ],
-            spins: [-1.0, 1.0, -1.0, 1.0],
-            thrust_coefficient_N_s2_rad2: 7.6184e-8 / (RPM * RPM),
-            torque_coefficient_N_m_s2_rad2: 2.6839e-9 / (RPM * RPM),
-            speed_min_rad_s: 1075.0 * RPM,
-            speed_max_rad_s: 8600.0 * RPM,
-        }
+    /// Front, right, rear, left; front and rear clockwise (thesis §2.1, §4.2, §5.3).
+    fn hummingbird() -> Vehicle {
+        Vehicle::parse(vehicles::reference::HUMMINGBIRD, "hummingbird.toml").unwrap()
     }
 
     fn allocation() -> Allocation {
@@ -259,11 +215,11 @@ mod tests {
     #[test]
     fn each_torque_speeds_up_the_rotors_that_make_it() {
         let speeds = |x, y, z| allocation().allocate(&wrench(4.7, x, y, z)).speeds_rad_s;
-        let [front, left, rear, right] = speeds(0.1, 0.0, 0.0);
+        let [front, right, rear, left] = speeds(0.1, 0.0, 0.0);
         assert!(left > right && (front - rear).abs() < 1e-9, "right side down");
-        let [front, left, rear, right] = speeds(0.0, 0.1, 0.0);
+        let [front, right, rear, left] = speeds(0.0, 0.1, 0.0);
         assert!(rear > front && (left - right).abs() < 1e-9, "nose down");
-        let [front, left, rear, right] = speeds(0.0, 0.0, 0.02);
+        let [front, right, rear, left] = speeds(0.0, 0.0, 0.02);
         assert!(front > left && rear > right, "the clockwise pair turns the body counter-clockwise");
     }
 
@@ -295,9 +251,9 @@ mod tests {
 
     #[test]
     fn speeds_stay_within_their_limits_whatever_is_asked() {
-        let rotors = hummingbird();
-        let within =
-            |speed: &f64| *speed >= rotors.speed_min_rad_s - 1e-9 && *speed <= rotors.speed_max_rad_s + 1e-9;
+        let command = hummingbird().command;
+        let (min_rad_s, max_rad_s) = (command.speed_at_min_rad_s, command.speed_at_max_rad_s);
+        let within = |speed: &f64| *speed >= min_rad_s - 1e-9 && *speed <= max_rad_s + 1e-9;
         let values = [-30.0, -0.3, 0.0, 0.05, 7.0, 40.0];
         for case in 0..values.len().pow(4) {
             let pick = |digit: u32| values[case / values.len().pow(digit) % values.len()];
@@ -319,12 +275,13 @@ mod tests {
 
     #[test]
     fn rotors_in_a_line_or_without_a_range_are_refused() {
-        let line = RotorSet {
-            positions_B_m: [Vector3::x(), Vector3::x(), -Vector3::x(), -Vector3::x()],
-            ..hummingbird()
-        };
+        let mut line = hummingbird();
+        for (rotor, x) in line.rotors.iter_mut().zip([1.0, 1.0, -1.0, -1.0]) {
+            rotor.position_m = Vector3::x() * x;
+        }
         assert_eq!(Allocation::new(&line), Err(AllocationError::Singular));
-        let empty = RotorSet { speed_min_rad_s: 900.0, speed_max_rad_s: 900.0, ..hummingbird() };
+        let mut empty = hummingbird();
+        (empty.command.speed_at_min_rad_s, empty.command.speed_at_max_rad_s) = (900.0, 900.0);
         assert!(matches!(Allocation::new(&empty), Err(AllocationError::SpeedRange { .. })));
     }
 }

@@ -80,16 +80,15 @@ impl BumplessTransfer {
                 integrals: (!state.is_new()).then_some(state.integrals),
                 state: (state.id.state == self.id.state).then(|| state.law_state()),
             };
-            let mut start = law.take_over(&from, input);
+            let (mut begun, last) = (law.start(Some(&from), input), law.last_wrench(Some(&wrench)));
             *state = ControllerState::default();
-            *state.law_state_mut() = start.state;
-            state.set_wrench(&start.wrench);
-            let asked = law.step(&mut start.state, &start.wrench, input).wrench;
+            *state.law_state_mut() = begun;
+            state.set_wrench(&last);
+            let asked = law.step(&mut begun, &last, input).wrench;
             self.keep_residual(state, &wrench, &asked);
         } else if state.is_new() {
-            let start = law.start(input);
-            *state.law_state_mut() = start.state;
-            state.set_wrench(&start.wrench);
+            *state.law_state_mut() = law.start(None, input);
+            state.set_wrench(&law.last_wrench(None));
         }
     }
 

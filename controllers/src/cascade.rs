@@ -15,7 +15,7 @@ use crate::altitude_loop::AltitudeLoop;
 use crate::angle::wrap_rad;
 use crate::cascade_gains::{CascadeGains, CommandFilter};
 use crate::control::{ControlInput, ControlOutput, HoverMotion, Integrals};
-use crate::law::{FileParameters, Law, LawContext, Predecessor, Start};
+use crate::law::{FileParameters, Law, LawContext, Predecessor};
 use crate::law_inputs::SetPointInputs;
 use crate::set_points::SetPoint;
 use bus::component::Info;
@@ -87,13 +87,8 @@ impl Law for CascadeLaw {
         self.gains.rate.iter().fold(0.0, |most, axis| axis.proportional_1_s.max(most))
     }
 
-    fn start(&self, input: &ControlInput) -> Start<CascadeState> {
-        Start { state: self.initial(&HoverMotion::of(&input.motion)), wrench: RotorWrench::default() }
-    }
-
-    fn take_over(&self, from: &Predecessor<'_, Self::State>, input: &ControlInput) -> Start<Self::State> {
-        let measured = HoverMotion::of(&input.motion);
-        Start { state: self.continued(from, input.set_point.altitude_m, &measured), wrench: from.wrench }
+    fn start(&self, from: Option<&Predecessor<'_, CascadeState>>, input: &ControlInput) -> CascadeState {
+        self.begun(from, input.set_point.altitude_m, &HoverMotion::of(&input.motion))
     }
 
     fn step(&self, state: &mut CascadeState, last: &RotorWrench, input: &ControlInput) -> ControlOutput {
@@ -128,30 +123,27 @@ impl CascadeLaw {
         }
     }
 
-    /// The state of a vehicle that no law has flown yet: commands as it lies, filters as it turns.
+    /// The state to begin with: the integrators of the law before, commands as the vehicle lies, filters as it turns.
     #[must_use]
-    pub fn initial(&self, measured: &HoverMotion) -> CascadeState {
-        let limit =
-            |angle_rad: f64| angle_rad.clamp(-self.gains.filter.tilt_max_rad, self.gains.filter.tilt_max_rad);
-        CascadeState {
-            attitude_command: [limit(measured.roll_rad), limit(measured.pitch_rad), measured.yaw_rad],
-            rate_filtered: measured.angular_velocity_B_rad_s.into(),
-            ..CascadeState::default()
-        }
-    }
-
-    /// The state that goes on from another law's: its integrators, and commands from where the vehicle is.
-    #[must_use]
-    pub fn continued<S>(
+    pub fn begun<S>(
         &self,
-        from: &Predecessor<'_, S>,
+        from: Option<&Predecessor<'_, S>>,
         altitude_set_m: f64,
         measured: &HoverMotion,
     ) -> CascadeState {
-        let gains = self.gains.rate.map(|axis| axis.integral_1_s2);
-        let max_rad_s2 = self.gains.integral_max_rad_s2;
-        let integrals = self.altitude_loop().continued(from, gains, max_rad_s2, altitude_set_m, measured);
-        CascadeState { integrals, ..self.initial(measured) }
+        let (gains, max_rad_s2) =
+            (self.gains.rate.map(|axis| axis.integral_1_s2), self.gains.integral_max_rad_s2);
+        let continued =
+            |from| self.altitude_loop().continued(from, gains, max_rad_s2, altitude_set_m, measured);
+        let tilt_max_rad = self.gains.filter.tilt_max_rad;
+        let [roll_rad, pitch_rad] = [measured.roll_rad, measured.pitch_rad]
+            .map(|angle_rad| angle_rad.clamp(-tilt_max_rad, tilt_max_rad));
+        CascadeState {
+            integrals: from.map(continued).unwrap_or_default(),
+            attitude_command: [roll_rad, pitch_rad, measured.yaw_rad],
+            rate_filtered: measured.angular_velocity_B_rad_s.into(),
+            ..CascadeState::default()
+        }
     }
 
     fn altitude_loop(&self) -> AltitudeLoop<'_> {
@@ -267,7 +259,7 @@ mod tests {
     const IN_FLIGHT: RotorWrench = RotorWrench { thrust_N: 5.0, torque_B_N_m: Vector3::new(0.0, 0.0, 0.0) };
 
     fn flying(measured: &HoverMotion) -> CascadeState {
-        law().initial(measured)
+        law().begun::<CascadeState>(None, 1.0, measured)
     }
 
     /// `seconds` of asking for `set_point` at a measurement that stays as it is.
@@ -361,7 +353,7 @@ mod tests {
         let wrench = RotorWrench { thrust_N: 5.2, torque_B_N_m: Vector3::new(1e-3, -2e-3, 1e-3) };
         let measured = HoverMotion { roll_rad: 0.05, yaw_rad: 1.0, ..level() };
         let before = Integrals { lift: 0.3, turn: [0.1, f64::NAN, 9.0] };
-        let state = law().continued(&after(wrench, Some(before)), 1.0, &measured);
+        let state = law().begun(Some(&after(wrench, Some(before))), 1.0, &measured);
         assert_eq!(state.integrals, Integrals { lift: 0.3, turn: [0.1, 0.0, 2.0] });
         assert_eq!(state.attitude_command, [0.05, 0.0, 1.0]);
     }
@@ -369,7 +361,7 @@ mod tests {
     #[test]
     fn a_backup_that_knows_only_the_last_command_asks_for_its_thrust() {
         let wrench = RotorWrench { thrust_N: 5.2, torque_B_N_m: Vector3::zeros() };
-        let mut state = law().continued(&after(wrench, None), 1.0, &level());
+        let mut state = law().begun(Some(&after(wrench, None)), 1.0, &level());
         let asked = law().demand(&mut state, &wrench, &hold(), &level()).wrench;
         assert!((asked.thrust_N - wrench.thrust_N).abs() < 1e-12, "{asked:?}");
     }

@@ -1,10 +1,11 @@
 //! A measured flight: rows of a CSV file, read by a column map that states every unit.
 
-use bus::messages::Quaternion;
+use diagnostics::ParameterError;
 use diagnostics::unit::{COUNT, Dimension, LENGTH, PURE_NUMBER, SPEED, TIME, VELOCITY};
 use serde::Deserialize;
-use std::path::{Path, PathBuf};
-use vehicles::table::{self, Table, TableError};
+use std::fmt::Display;
+use std::path::Path;
+use vehicles::table::{self, Table};
 
 /// Which columns of a file hold a quantity, and in which unit.
 #[derive(Clone, Debug, Deserialize)]
@@ -70,103 +71,17 @@ pub struct FlightLog {
     rows: Vec<Row>,
 }
 
-/// A flight that cannot be read; the text names file, row, column and unit.
-#[derive(Debug, thiserror::Error)]
-pub enum FlightLogError {
-    /// The file cannot be opened.
-    #[error("the flight {path} cannot be read: {cause}. Give its path with --set process.<player>.data=PATH")]
-    File {
-        /// The file.
-        path: PathBuf,
-        /// Why.
-        #[source]
-        cause: std::io::Error,
-    },
-    /// It is no table.
-    #[error("the flight {path}: {cause}")]
-    Table {
-        /// The file.
-        path: PathBuf,
-        /// Where, and what to do.
-        #[source]
-        cause: TableError,
-    },
-    /// A column of the map is not in the file.
-    #[error("the flight {path} has no column `{column}` (the map's `{quantity}`); it has {}", known.join(", "))]
-    MissingColumn {
-        /// The file.
-        path: PathBuf,
-        /// The column.
-        column: String,
-        /// What the map reads from it.
-        quantity: &'static str,
-        /// The columns there are.
-        known: Vec<String>,
-    },
-    /// The map states a unit that the quantity cannot have.
-    #[error("`{quantity}` has the unit `{found}`, expected {}", expected.names(" or "))]
-    Unit {
-        /// The quantity.
-        quantity: &'static str,
-        /// The unit stated.
-        found: String,
-        /// The dimension whose units it can have.
-        expected: Dimension,
-    },
-    /// A cell is not a number.
-    #[error("the flight {path}, line {line}, column `{column}`: {found:?} is not {expected}")]
-    Cell {
-        /// The file.
-        path: PathBuf,
-        /// The line, counted from 1.
-        line: u64,
-        /// The column.
-        column: String,
-        /// What stands there.
-        found: String,
-        /// What may stand there.
-        expected: &'static str,
-    },
-    /// A row has another number of cells than the header, as with decimal commas.
-    #[error("the flight {path}, line {line}: expected {expected} cells as in the header, found {found}")]
-    Cells {
-        /// The file.
-        path: PathBuf,
-        /// The line, counted from 1.
-        line: u64,
-        /// How many the header has.
-        expected: usize,
-        /// How many the row has.
-        found: usize,
-    },
-    /// There is no time that passes.
-    #[error("the flight {path}: it has {rows} rows of data, expected at least 2")]
-    TooShort {
-        /// The file.
-        path: PathBuf,
-        /// Rows below the header.
-        rows: usize,
-    },
-    /// Time does not grow.
-    #[error("the flight {path}: time does not grow from line {line} to the next")]
-    Time {
-        /// The file.
-        path: PathBuf,
-        /// The line, counted from 1.
-        line: u64,
-    },
-}
-
 impl FlightLog {
-    /// Reads the flight at `path`.
+    /// Reads the flight at `path`, the parameter `data`.
     ///
     /// # Errors
     /// If the file, a column or a unit is missing, or a cell is not a number.
-    pub fn load(path: &Path, map: &ColumnMap) -> Result<Self, FlightLogError> {
-        let bytes = vehicles::text::read_log(path)
-            .map_err(|cause| FlightLogError::File { path: path.into(), cause })?;
-        let table =
-            Table::parse(&bytes).map_err(|cause| FlightLogError::Table { path: path.into(), cause })?;
+    pub fn load(path: &Path, map: &ColumnMap) -> Result<Self, ParameterError> {
+        let bytes = vehicles::text::read_log(path).map_err(|cause| {
+            let hint = "Give its path with --set process.<player>.data=PATH";
+            refused(path, format_args!(" cannot be read: {cause}. {hint}"))
+        })?;
+        let table = Table::parse(&bytes).map_err(|cause| refused(path, format_args!(": {cause}")))?;
         let source = Source { path, table };
         source.check_rows()?;
         let mut time_s = source.values("time", TIME, &map.time)?;
@@ -222,15 +137,6 @@ impl FlightLog {
     }
 }
 
-impl Row {
-    /// The attitude as a message.
-    #[must_use]
-    pub fn quaternion(&self) -> Quaternion {
-        let [x, y, z, w] = self.attitude;
-        Quaternion { x, y, z, w }
-    }
-}
-
 fn blend<const N: usize>(a: &[f64; N], b: &[f64; N], part: f64) -> [f64; N] {
     std::array::from_fn(|i| a[i] + (b[i] - a[i]) * part)
 }
@@ -250,6 +156,11 @@ const CELL_MAX: f64 = 1e12;
 /// A quaternion this short has no direction left; logs write 1, or 0 where there is none.
 const NORM_MIN: f64 = 1e-3;
 
+/// What is wrong with the flight at `path`, behind its name.
+fn refused(path: &Path, fault: impl Display) -> ParameterError {
+    ParameterError::conflict("data", format_args!("the flight {}{fault}", path.display()))
+}
+
 struct Source<'a> {
     path: &'a Path,
     table: Table,
@@ -262,22 +173,22 @@ impl Source<'_> {
         quantity: &'static str,
         dimension: Dimension,
         map: &Columns<N>,
-    ) -> Result<Vec<[f64; N]>, FlightLogError> {
+    ) -> Result<Vec<[f64; N]>, ParameterError> {
         let mut indices = [0; N];
         for (index, column) in indices.iter_mut().zip(&map.columns) {
-            *index = self.table.column(column).ok_or_else(|| FlightLogError::MissingColumn {
-                path: self.path.into(),
-                column: column.clone(),
-                quantity,
-                known: self.table.headers.clone(),
+            *index = self.table.column(column).ok_or_else(|| {
+                let known = self.table.headers.join(", ");
+                let fault =
+                    format_args!(" has no column `{column}` (the map's `{quantity}`); it has {known}");
+                refused(self.path, fault)
             })?;
         }
-        let factor = dimension.factor(&map.unit).ok_or_else(|| FlightLogError::Unit {
-            quantity,
-            found: map.unit.clone(),
-            expected: dimension,
+        let factor = dimension.factor(&map.unit).ok_or_else(|| {
+            let (found, expected) = (&map.unit, dimension.names(" or "));
+            let message = format!("`{quantity}` has the unit `{found}`, expected {expected}");
+            ParameterError::conflict("data", message)
         })?;
-        let sample = |row: &table::Row| -> Result<[f64; N], FlightLogError> {
+        let sample = |row: &table::Row| -> Result<[f64; N], ParameterError> {
             let mut values = [0.0; N];
             for ((value, index), column) in values.iter_mut().zip(indices).zip(&map.columns) {
                 *value = number(row.cell(index), factor)
@@ -288,17 +199,17 @@ impl Source<'_> {
         self.table.rows.iter().map(sample).collect()
     }
 
-    /// Refuses a file with too few rows, or with rows of another length than the header's.
-    fn check_rows(&self) -> Result<(), FlightLogError> {
-        let (path, rows) = (self.path.to_owned(), &self.table.rows);
+    /// Refuses a file with too few rows, or with rows of another length than the header's, as with decimal commas.
+    fn check_rows(&self) -> Result<(), ParameterError> {
+        let (rows, expected) = (&self.table.rows, self.table.headers.len());
         if rows.len() < 2 {
-            return Err(FlightLogError::TooShort { path, rows: rows.len() });
+            let fault = format_args!(": it has {} rows of data, expected at least 2", rows.len());
+            return Err(refused(self.path, fault));
         }
-        let expected = self.table.headers.len();
-        if let Some(row) = rows.iter().find(|row| row.cells.len() != expected) {
-            return Err(FlightLogError::Cells { path, line: row.line, expected, found: row.cells.len() });
-        }
-        Ok(())
+        let Some(row) = rows.iter().find(|row| row.cells.len() != expected) else { return Ok(()) };
+        let (line, found) = (row.line, row.cells.len());
+        let fault = format_args!(", line {line}: expected {expected} cells as in the header, found {found}");
+        Err(refused(self.path, fault))
     }
 
     /// Refuses times that do not grow, and quaternions without a direction.
@@ -307,23 +218,22 @@ impl Source<'_> {
         time_s: &[[f64; 1]],
         attitude: &[[f64; 4]],
         last_part: &str,
-    ) -> Result<(), FlightLogError> {
-        let (path, rows) = (self.path.to_owned(), &self.table.rows);
+    ) -> Result<(), ParameterError> {
+        let rows = &self.table.rows;
         let is_zero = |q: &[f64; 4]| q.iter().map(|x| x * x).sum::<f64>() < NORM_MIN * NORM_MIN;
         if let Some(index) = attitude.iter().position(is_zero) {
             let (found, expected) =
                 (attitude[index][3].to_string(), "part of an attitude: the quaternion is 0");
             return Err(self.cell(&rows[index], last_part, &found, expected));
         }
-        match time_s.windows(2).position(|pair| pair[1] <= pair[0]) {
-            Some(index) => Err(FlightLogError::Time { path, line: rows[index].line }),
-            None => Ok(()),
-        }
+        let Some(index) = time_s.windows(2).position(|pair| pair[1] <= pair[0]) else { return Ok(()) };
+        let line = rows[index].line;
+        Err(refused(self.path, format_args!(": time does not grow from line {line} to the next")))
     }
 
-    fn cell(&self, row: &table::Row, column: &str, found: &str, expected: &'static str) -> FlightLogError {
-        let (path, column, found) = (self.path.to_owned(), column.to_owned(), found.to_owned());
-        FlightLogError::Cell { path, line: row.line, column, found, expected }
+    fn cell(&self, row: &table::Row, column: &str, found: &str, expected: &str) -> ParameterError {
+        let line = row.line;
+        refused(self.path, format_args!(", line {line}, column `{column}`: {found:?} is not {expected}"))
     }
 }
 

@@ -8,7 +8,7 @@ use crate::airframe::ControlledVehicle;
 use crate::allocation::{Allocation, RotorWrench, THRUST_RESERVE};
 use crate::control::{ControlInput, Integrals, within};
 use crate::disturbance::{Observer, ObserverState};
-use crate::law::{Predecessor, Start};
+use crate::law::Predecessor;
 use crate::motor_lag::{Made, MotorLag};
 use nalgebra::{Matrix3, Vector3};
 
@@ -114,41 +114,36 @@ impl Foresight {
         thrust_N.clamp(min_N, max_N)
     }
 
-    /// Before the first tick: the rotors carry the weight.
+    /// What is remembered before the first tick, where the rotors carry the weight, or after another law. They are taken
+    /// to make what it asked for where it did not foresee.
     #[must_use]
-    pub fn start(&self, input: &ControlInput) -> Start<ForesightState> {
-        started(&Made::settled(self.hover()), ObserverState::at(&input.motion))
+    pub fn start(
+        &self,
+        from: Option<&Predecessor<'_, ForesightState>>,
+        input: &ControlInput,
+    ) -> ForesightState {
+        let at_rest = ObserverState::at(&input.motion);
+        match from {
+            None => ForesightState::new(&Made::settled(self.hover()), at_rest),
+            Some(Predecessor { state: Some(before), .. }) => self.after_foresight(before, input),
+            Some(other) => {
+                // What the integrators of a law that does not foresee lift, the observer does from now on, and it alone:
+                // left beside it, they would be counted twice by the next law.
+                let before = other.integrals.unwrap_or_default();
+                let lift_m_s2 = within(before.lift, self.disturbance_max_m_s2);
+                let observer = ObserverState { answer: [0.0, 0.0, lift_m_s2], ..at_rest };
+                ForesightState::new(&Made::settled(self.possible(&other.wrench)), observer)
+            }
+        }
     }
 
-    /// After another law. The rotors are taken to make what it asked for where it did not foresee.
+    /// What the rotors are taken to have been asked for last, where another law asked for `before`.
     #[must_use]
-    pub fn take_over(
-        &self,
-        from: &Predecessor<'_, ForesightState>,
-        input: &ControlInput,
-    ) -> Start<ForesightState> {
-        let wrench = self.possible(&from.wrench);
-        let start = match from.state {
-            Some(before) => self.after_foresight(before, input),
-            None => self.after_other(from.integrals, &wrench, input),
-        };
-        Start { wrench, ..start }
+    pub fn last_wrench(&self, before: Option<&RotorWrench>) -> RotorWrench {
+        before.map_or_else(|| self.hover(), |before| self.possible(before))
     }
 
-    /// What the integrators of a law that does not foresee lift, the observer does from now on, and it alone: left
-    /// beside it, they would be counted twice by the next law.
-    fn after_other(
-        &self,
-        before: Option<Integrals>,
-        asked: &RotorWrench,
-        input: &ControlInput,
-    ) -> Start<ForesightState> {
-        let lift_m_s2 = before.map_or(0.0, |before| within(before.lift, self.disturbance_max_m_s2));
-        let observer = ObserverState { answer: [0.0, 0.0, lift_m_s2], ..ObserverState::at(&input.motion) };
-        started(&Made::settled(*asked), observer)
-    }
-
-    fn after_foresight(&self, before: &ForesightState, input: &ControlInput) -> Start<ForesightState> {
+    fn after_foresight(&self, before: &ForesightState, input: &ControlInput) -> ForesightState {
         let measured_W_m_s = input.motion.velocity_W_m_s;
         let missed_W_m_s = Vector3::from(before.observer.velocity_foreseen) - measured_W_m_s;
         let foreseen_W_m_s = measured_W_m_s + missed_W_m_s.map(|v| within(v, VELOCITY_MISSED_MAX_M_S));
@@ -156,7 +151,7 @@ impl Foresight {
             answer: before.observer.answer.map(|a| within(a, self.disturbance_max_m_s2)),
             velocity_foreseen: foreseen_W_m_s.into(),
         };
-        started(&self.possible_change(&before.made()), observer)
+        ForesightState::new(&self.possible_change(&before.made()), observer)
     }
 
     fn hover(&self) -> RotorWrench {
@@ -185,9 +180,4 @@ impl Foresight {
         };
         Made { wrench: now, rate }
     }
-}
-
-/// Rotors that were asked for what they make.
-fn started(made: &Made, observer: ObserverState) -> Start<ForesightState> {
-    Start { state: ForesightState::new(made, observer), wrench: made.wrench }
 }

@@ -23,7 +23,7 @@ use crate::disturbance::{Disturbance, ObserverState};
 use crate::flatness::{self, Moving, Target};
 use crate::foresight::{Foresight, ForesightState};
 use crate::geometric_gains::GeometricGains;
-use crate::law::{FileParameters, Law, LawContext, Predecessor, Start};
+use crate::law::{FileParameters, Law, LawContext, Predecessor};
 use crate::law_inputs::ReferenceInputs;
 use crate::motor_lag::Made;
 use crate::set_points::SetPoint;
@@ -54,14 +54,6 @@ pub struct GeometricLaw {
     foresight: Foresight,
 }
 
-/// How far the vehicle is off its reference, and what the reference does: in the world.
-struct Errors {
-    position_W_m: Vector3<f64>,
-    velocity_W_m_s: Vector3<f64>,
-    acceleration_W_m_s2: Vector3<f64>,
-    jerk_W_m_s3: Vector3<f64>,
-}
-
 /// How the model has the vehicle move, in the world.
 struct Push {
     acceleration_W_m_s2: Vector3<f64>,
@@ -86,8 +78,7 @@ impl GeometricLaw {
         let push = self.push(made, motion);
         let disturbance =
             self.gains.observer.step(observer, motion, &push.acceleration_W_m_s2, self.foresight.period_s);
-        let errors = errors(&push, &disturbance, reference, motion);
-        let thrust_W_m_s2 = self.thrust_vector(&disturbance, &errors, reference);
+        let thrust_W_m_s2 = self.thrust_vector(&push, &disturbance, motion, reference);
         let target = flatness::target(&thrust_W_m_s2, reference.yaw_rad, reference.yaw_rate_rad_s);
         let z_W = motion.attitude_WB * Vector3::z();
         let wanted = RotorWrench {
@@ -112,13 +103,26 @@ impl GeometricLaw {
     }
 
     /// Thrust for each unit of mass with two derivatives: t of the table above.
-    fn thrust_vector(&self, disturbance: &Disturbance, errors: &Errors, reference: &Point) -> Moving {
+    fn thrust_vector(
+        &self,
+        push: &Push,
+        disturbance: &Disturbance,
+        motion: &MotionEstimate,
+        reference: &Point,
+    ) -> Moving {
         let gains = &self.gains;
         let (kp, kv) = (gains.position_proportional_1_s2, gains.position_derivative_1_s);
-        let answer = -errors.position_W_m * kp - errors.velocity_W_m_s * kv - disturbance.acceleration_W_m_s2;
-        let answer_first =
-            -errors.velocity_W_m_s * kp - errors.acceleration_W_m_s2 * kv - disturbance.jerk_W_m_s3;
-        let answer_second = -errors.acceleration_W_m_s2 * kp - errors.jerk_W_m_s3 * kv;
+        let found_W = [
+            motion.position_W_m,
+            motion.velocity_W_m_s,
+            push.acceleration_W_m_s2 + disturbance.acceleration_W_m_s2,
+            push.jerk_W_m_s3 + disturbance.jerk_W_m_s3,
+        ];
+        // How far the vehicle is off its reference, and the first three derivatives of that.
+        let off_W: [Vector3<f64>; 4] = std::array::from_fn(|order| found_W[order] - reference.path_W[order]);
+        let answer = -off_W[0] * kp - off_W[1] * kv - disturbance.acceleration_W_m_s2;
+        let answer_first = -off_W[1] * kp - off_W[2] * kv - disturbance.jerk_W_m_s3;
+        let answer_second = -off_W[2] * kp - off_W[3] * kv;
         // What exceeds the limit is scaled down with its derivatives.
         let part = (gains.acceleration_max_m_s2 / answer.norm()).min(1.0);
         let ahead = |order: usize| reference.path_W[order] + reference.path_W[order - 1] * gains.drag_1_s;
@@ -173,12 +177,12 @@ impl Law for GeometricLaw {
         self.gains.attitude_derivative_1_s.max(self.gains.yaw_derivative_1_s)
     }
 
-    fn start(&self, input: &ControlInput) -> Start<ForesightState> {
-        self.foresight.start(input)
+    fn start(&self, from: Option<&Predecessor<'_, ForesightState>>, input: &ControlInput) -> ForesightState {
+        self.foresight.start(from, input)
     }
 
-    fn take_over(&self, from: &Predecessor<'_, Self::State>, input: &ControlInput) -> Start<Self::State> {
-        self.foresight.take_over(from, input)
+    fn last_wrench(&self, before: Option<&RotorWrench>) -> RotorWrench {
+        self.foresight.last_wrench(before)
     }
 
     fn step(&self, state: &mut ForesightState, last: &RotorWrench, input: &ControlInput) -> ControlOutput {
@@ -186,16 +190,5 @@ impl Law for GeometricLaw {
         let (wrench, target) = self.asked(&mut state.observer, &made, input);
         let set_point = SetPoint::held(input.reference.position.z, &target.attitude_WB);
         ControlOutput { wrench, integrals: state.integrals(), set_point, ..ControlOutput::default() }
-    }
-}
-
-fn errors(push: &Push, disturbance: &Disturbance, reference: &Point, motion: &MotionEstimate) -> Errors {
-    let acceleration_W_m_s2 = push.acceleration_W_m_s2 + disturbance.acceleration_W_m_s2;
-    let jerk_W_m_s3 = push.jerk_W_m_s3 + disturbance.jerk_W_m_s3;
-    Errors {
-        position_W_m: motion.position_W_m - reference.path_W[0],
-        velocity_W_m_s: motion.velocity_W_m_s - reference.path_W[1],
-        acceleration_W_m_s2: acceleration_W_m_s2 - reference.path_W[2],
-        jerk_W_m_s3: jerk_W_m_s3 - reference.path_W[3],
     }
 }

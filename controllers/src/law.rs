@@ -1,5 +1,4 @@
-//! What a control law is: how it is made, its inputs and state, how it begins, how it goes on after another law, its
-//! step.
+//! What a control law is: how it is made, its inputs and state, how it begins and goes on after another law, its step.
 
 use crate::airframe::ControlledVehicle;
 use crate::allocation::RotorWrench;
@@ -41,25 +40,19 @@ pub trait Law: Sized {
         0.0
     }
 
-    /// What it begins with before the first tick of a run.
-    fn start(&self, input: &ControlInput) -> Start<Self::State>;
+    /// What it begins with: before the first tick of a run, or after another law, `from`. It need not ask for the other's
+    /// last wrench, since [`crate::bumpless::BumplessTransfer`] makes up for the rest, and an integrator should not take
+    /// that up: it would keep amid a manoeuvre what is gone a moment later.
+    fn start(&self, from: Option<&Predecessor<'_, Self::State>>, input: &ControlInput) -> Self::State;
 
-    /// What it begins with after another law. It need not ask for the other's last wrench, since
-    /// [`crate::bumpless::BumplessTransfer`] makes up for the rest, and an integrator should not take that up: it would
-    /// keep amid a manoeuvre what is gone a moment later.
-    fn take_over(&self, from: &Predecessor<'_, Self::State>, input: &ControlInput) -> Start<Self::State>;
+    /// The wrench that the rotors are taken to have been asked for one period before it begins, where another law asked
+    /// for `before`.
+    fn last_wrench(&self, before: Option<&RotorWrench>) -> RotorWrench {
+        before.copied().unwrap_or_default()
+    }
 
     /// The demand now; advances the state by one period. `last` was asked for one period ago.
     fn step(&self, state: &mut Self::State, last: &RotorWrench, input: &ControlInput) -> ControlOutput;
-}
-
-/// What a law begins with.
-#[derive(Debug, Clone, Copy)]
-pub struct Start<S> {
-    /// Its state.
-    pub state: S,
-    /// The wrench that the rotors are taken to have been asked for one period ago.
-    pub wrench: RotorWrench,
 }
 
 /// What is known of the law that flew before.

@@ -20,7 +20,7 @@
 //! - [`controller_state`]: what is transferred from one law to another.
 //! - `rehearsal`: a law tried before a run, so that `check` finds numbers that do not go together.
 //! - `curve`, `minimum_snap`, [`trajectory`]: trajectories, with their derivatives.
-//! - [`pilot`], [`trajectory_node`], [`player`]: the components that controllers follow; [`flight_log`]: a measured flight
+//! - [`pilot`], [`trajectory_node`], [`player`]: the components that controllers follow; `flight_log`: a measured flight
 //!   as CSV with a column map.
 #![forbid(unsafe_code)]
 #![allow(
@@ -46,7 +46,7 @@ pub mod controller_state;
 mod curve;
 mod disturbance;
 mod flatness;
-pub mod flight_log;
+mod flight_log;
 pub mod foresight;
 pub mod geometric;
 pub mod geometric_gains;

@@ -12,7 +12,7 @@ use crate::control::{ControlInput, ControlOutput, MotionEstimate};
 use crate::disturbance::Disturbance;
 use crate::flatness::{self, Moving, Target};
 use crate::foresight::{Foresight, ForesightState};
-use crate::law::{FileParameters, Law, LawContext, Predecessor, Start};
+use crate::law::{FileParameters, Law, LawContext, Predecessor};
 use crate::law_inputs::ReferenceInputs;
 use crate::lqr_gains::LqrGains;
 use crate::lqr_model::{self, INPUTS, MADE, MADE_RATE, RATE, ROTATION, STATES, VELOCITY};
@@ -163,12 +163,12 @@ impl Law for LqrLaw {
         Self::for_craft(gains, context.craft, context.node.period_s())
     }
 
-    fn start(&self, input: &ControlInput) -> Start<ForesightState> {
-        self.foresight.start(input)
+    fn start(&self, from: Option<&Predecessor<'_, ForesightState>>, input: &ControlInput) -> ForesightState {
+        self.foresight.start(from, input)
     }
 
-    fn take_over(&self, from: &Predecessor<'_, Self::State>, input: &ControlInput) -> Start<Self::State> {
-        self.foresight.take_over(from, input)
+    fn last_wrench(&self, before: Option<&RotorWrench>) -> RotorWrench {
+        self.foresight.last_wrench(before)
     }
 
     fn step(&self, state: &mut ForesightState, last: &RotorWrench, input: &ControlInput) -> ControlOutput {

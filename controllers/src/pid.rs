@@ -7,14 +7,15 @@ use crate::allocation::RotorWrench;
 use crate::altitude_loop::{AltitudeLoop, LoopGains};
 use crate::angle::wrap_rad;
 use crate::control::{ControlInput, ControlOutput, HoverMotion, Integrals};
-use crate::law::{Law, LawContext, Predecessor, Start};
+use crate::law::{Law, LawContext, Predecessor};
 use crate::law_inputs::SetPointInputs;
-use crate::pid_gains::{GivenGains, PidGains};
+use crate::pid_gains::PidGains;
 use crate::set_points::SetPoint;
 use bus::component::Info;
 use diagnostics::ParameterError;
 use nalgebra::Vector3;
 use serde::Deserialize;
+use serde_json::Value;
 use std::path::{Path, PathBuf};
 
 /// The law at one period: all that does not change during a run.
@@ -56,9 +57,8 @@ pub struct PidState {
 pub struct Parameters {
     /// Vehicle file.
     vehicle: PathBuf,
-    /// Gains and limits.
-    #[serde(default)]
-    gains: GivenGains,
+    /// Gains and limits: a table, or the path of a gains file.
+    gains: Option<Value>,
 }
 
 impl Law for PidLaw {
@@ -73,7 +73,7 @@ impl Law for PidLaw {
     }
 
     fn new(parameters: &Self::Parameters, context: &LawContext<'_>) -> Result<Self, ParameterError> {
-        let gains = parameters.gains.gains()?;
+        let gains = PidGains::given(parameters.gains.as_ref())?;
         Ok(Self { gains, vehicle: context.craft.hover_model(), period_s: context.node.period_s() })
     }
 
@@ -82,13 +82,10 @@ impl Law for PidLaw {
         [gains.roll, gains.pitch, gains.yaw].iter().fold(0.0, |most, axis| axis.derivative_1_s.max(most))
     }
 
-    fn start(&self, _input: &ControlInput) -> Start<PidState> {
-        Start { state: PidState::default(), wrench: RotorWrench::default() }
-    }
-
-    fn take_over(&self, from: &Predecessor<'_, Self::State>, input: &ControlInput) -> Start<Self::State> {
-        let integrals = self.continued(from, input.set_point.altitude_m, &HoverMotion::of(&input.motion));
-        Start { state: PidState { integrals }, wrench: from.wrench }
+    fn start(&self, from: Option<&Predecessor<'_, PidState>>, input: &ControlInput) -> PidState {
+        let measured = HoverMotion::of(&input.motion);
+        let continued = |from| self.continued(from, input.set_point.altitude_m, &measured);
+        PidState { integrals: from.map(continued).unwrap_or_default() }
     }
 
     fn step(&self, state: &mut PidState, _last: &RotorWrench, input: &ControlInput) -> ControlOutput {

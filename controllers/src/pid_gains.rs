@@ -31,8 +31,7 @@ use crate::gains_file::{self, GAIN};
 use diagnostics::parameter::{ParameterError, require};
 use diagnostics::unit::{ACCELERATION, ANGULAR_ACCELERATION, VELOCITY};
 use serde::Deserialize;
-use serde::de::{MapAccess, Visitor, value::MapAccessDeserializer};
-use std::path::PathBuf;
+use serde_json::Value;
 
 /// The gains of the thesis.
 const THESIS: &str = include_str!("../gains/pid-thesis.toml");
@@ -40,7 +39,7 @@ const THESIS: &str = include_str!("../gains/pid-thesis.toml");
 gains! {
     /// Gains and limits of the four loops. A loop's table is given whole or left out.
     #[derive(Deserialize)]
-    #[serde(default, deny_unknown_fields)]
+    #[serde(default, deny_unknown_fields, expecting = "a table of gains or the path of a gains file")]
     pub struct PidGains of file, built in "pid.toml" {
         /// Altitude error (m) and rate of climb (m/s) to vertical acceleration (m/s²).
         altitude: LoopGains = LoopGains::read(&file.table("altitude")),
@@ -69,6 +68,21 @@ impl PidGains {
             .expect("a test reads the built-in gains")
     }
 
+    /// The gains that a manifest gives: the table `parameters.gains`, the path of a gains file, or those built in.
+    ///
+    /// # Errors
+    /// The file or a number is refused; the text names the key.
+    pub fn given(given: Option<&Value>) -> Result<Self, ParameterError> {
+        match given {
+            None => Ok(Self::default()),
+            Some(Value::String(path)) => Self::load(Some(path.as_ref())),
+            Some(table) => {
+                let gains = diagnostics::read(table).and_then(|gains: Self| gains.check().map(|()| gains));
+                gains.map_err(|error| error.within("gains"))
+            }
+        }
+    }
+
     /// What the altitude loop needs of these.
     #[must_use]
     pub fn altitude_gains(&self) -> AltitudeGains {
@@ -94,59 +108,6 @@ impl PidGains {
         let tilt_rad = self.tilt_command_max_rad;
         let is_good = tilt_rad > 0.0 && tilt_rad < std::f64::consts::FRAC_PI_3;
         require("tilt_command_max_rad", tilt_rad, is_good, "above 0 and below 1.0472 (60 deg)")
-    }
-}
-
-/// The gains as a manifest gives them: a table of parameters, or a gains file.
-#[derive(Debug, Clone)]
-pub enum GivenGains {
-    /// `parameters.gains = { … }`.
-    Table(PidGains),
-    /// `gains = "PATH"`.
-    File(PathBuf),
-}
-
-impl GivenGains {
-    /// The gains, checked.
-    ///
-    /// # Errors
-    /// The file or a number is refused; the text names the key.
-    pub fn gains(&self) -> Result<PidGains, ParameterError> {
-        match self {
-            GivenGains::Table(gains) => gains.check().map(|()| *gains).map_err(|error| error.within("gains")),
-            GivenGains::File(path) => PidGains::load(Some(path)),
-        }
-    }
-}
-
-impl Default for GivenGains {
-    fn default() -> Self {
-        GivenGains::Table(PidGains::default())
-    }
-}
-
-/// Not `#[serde(untagged)]`, whose errors do not name the key at fault.
-impl<'de> Deserialize<'de> for GivenGains {
-    fn deserialize<D: serde::Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        deserializer.deserialize_any(TableOrFile)
-    }
-}
-
-struct TableOrFile;
-
-impl<'de> Visitor<'de> for TableOrFile {
-    type Value = GivenGains;
-
-    fn expecting(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.write_str("a table of gains or the path of a gains file")
-    }
-
-    fn visit_str<E>(self, path: &str) -> Result<GivenGains, E> {
-        Ok(GivenGains::File(path.into()))
-    }
-
-    fn visit_map<A: MapAccess<'de>>(self, map: A) -> Result<GivenGains, A::Error> {
-        PidGains::deserialize(MapAccessDeserializer::new(map)).map(GivenGains::Table)
     }
 }
 
@@ -182,7 +143,10 @@ mod tests {
         assert!(error.contains("attitude.command_max") && error.contains("below 60"), "{error}");
         let error = refused("unit = \"deg\"", "unit = \"m\"");
         assert!(error.contains("\"rad\", \"deg\""), "{error}");
-        let table = |text| GivenGains::Table(toml::from_str(text).unwrap()).gains().unwrap_err().to_string();
+        let table = |text| {
+            let table: Value = toml::from_str(text).unwrap();
+            PidGains::given(Some(&table)).unwrap_err().to_string()
+        };
         let error = table("yaw = { proportional_1_s2 = 1, integral_1_s3 = -1, derivative_1_s = 1 }");
         assert!(error.contains("`gains.yaw.integral_1_s3`") && error.contains("found -1"), "{error}");
         assert!(table("tilt_command_max_rad = 2").contains("`gains.tilt_command_max_rad` must be"));
@@ -190,12 +154,13 @@ mod tests {
 
     #[test]
     fn a_table_or_a_path_is_taken_and_nothing_else() {
-        let given = |json| serde_json::from_str::<GivenGains>(json);
-        assert!(matches!(given("\"a/b.toml\"").unwrap(), GivenGains::File(path) if path.ends_with("b.toml")));
-        assert!(matches!(given("{}").unwrap(), GivenGains::Table(gains) if gains == PidGains::default()));
-        assert!(given("3").unwrap_err().to_string().contains("a table of gains or the path"));
-        assert!(given("{\"rol\": 1}").unwrap_err().to_string().contains("unknown field `rol`"));
-        let error = GivenGains::File("no-such.toml".into()).gains().unwrap_err().to_string();
+        let given = |json| PidGains::given(Some(&serde_json::from_str(json).unwrap()));
+        let thesis = concat!("\"", env!("CARGO_MANIFEST_DIR"), "/gains/pid-thesis.toml\"");
+        assert_eq!((given(thesis), given("{}")), (Ok(PidGains::thesis()), Ok(PidGains::default())));
+        let error = given("3").unwrap_err().to_string();
+        assert!(error.contains("`gains`") && error.contains("a table of gains or the path"), "{error}");
+        assert!(given("{\"rol\": 1}").unwrap_err().to_string().contains("unknown key `gains.rol`"));
+        let error = given("\"no-such.toml\"").unwrap_err().to_string();
         assert!(error.contains("no-such.toml") && error.contains("cannot read"), "{error}");
     }
 

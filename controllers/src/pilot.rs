@@ -77,8 +77,7 @@ impl Component for Pilot {
         })?;
         let initial = Values { altitude_m, ..Values::default() };
         let schedule = Schedule::new(&parameters.set_points, &initial, context.rate_hz())?;
-        let sticks = parameters.data.as_deref().map(Sticks::load).transpose();
-        let sticks = sticks.map_err(|error| ParameterError::conflict("data", error))?;
+        let sticks = parameters.data.as_deref().map(Sticks::load).transpose()?;
         let taken = |entry: &&SetPointEntry| sticks.as_ref().is_some_and(|it| it.has(&entry.channel));
         if let Some(SetPointEntry { channel, .. }) = parameters.set_points.iter().find(taken) {
             let message = format!(

@@ -4,7 +4,7 @@ use crate::flight_log::{ColumnMap, FlightLog, Row};
 use bus::OutputPorts;
 use bus::component::{Component, Info, StepError};
 use bus::context::{NodeContext, StepContext};
-use bus::messages::{MeasuredState, MotorCommand};
+use bus::messages::{MeasuredState, MotorCommand, Quaternion};
 use diagnostics::parameter::{ParameterError, refuse};
 use serde::Deserialize;
 use std::path::PathBuf;
@@ -23,8 +23,7 @@ pub struct Parameters {
 }
 
 fn load(parameters: &Parameters) -> Result<FlightLog, ParameterError> {
-    let log = FlightLog::load(&parameters.data, &parameters.columns);
-    let log = log.map_err(|error| ParameterError::conflict("data", error))?;
+    let log = FlightLog::load(&parameters.data, &parameters.columns)?;
     let (from_s, length_s) = (parameters.from_s, log.duration_s());
     refuse(!(0.0..length_s).contains(&from_s), "from_s", || {
         format!("`from_s` is {from_s} s, the flight lasts {length_s:.3} s")
@@ -98,10 +97,11 @@ impl Component for Player {
 }
 
 fn message(row: &Row) -> MeasuredState {
+    let [x, y, z, w] = row.attitude;
     MeasuredState {
         position: row.position_m.into(),
         velocity: row.velocity_m_s.into(),
-        attitude: row.quaternion(),
+        attitude: Quaternion { x, y, z, w },
         angular_velocity: row.angular_velocity_rad_s.into(),
         ..Default::default()
     }

@@ -7,6 +7,8 @@
 //! Hummingbird to 8° only: behind its motors' lag 9° take about 0.57 s (gains 16 and 6, linearised).
 
 use diagnostics::ParameterError;
+use diagnostics::parameter::require;
+use diagnostics::unit::{ANGLE, Dimension};
 use nalgebra::UnitQuaternion;
 use serde::Deserialize;
 use std::ops::RangeInclusive;
@@ -108,8 +110,28 @@ pub const ALTITUDES_EXPECTED: &str = "-20 000 m to 20 000 m: no rotorcraft has f
 /// Angles that a set point may ask for, rad: a hundred turns of yaw.
 const ANGLES_RAD: RangeInclusive<f64> = -628.4..=628.4;
 
+/// What may be asked for on a channel.
+struct Channel {
+    name: &'static str,
+    units: Dimension,
+    /// In SI.
+    range: RangeInclusive<f64>,
+    expected: &'static str,
+}
+
+const fn angle(name: &'static str) -> Channel {
+    Channel { name, units: ANGLE, range: ANGLES_RAD, expected: "an angle of at most a hundred turns" }
+}
+
+const METRES: Dimension = Dimension { name: "height", units: &[("m", 1.0)] };
+
 /// The channels in the order of [`Schedule::channels`].
-const CHANNELS: [&str; 4] = ["altitude", "roll", "pitch", "yaw"];
+static CHANNELS: [Channel; 4] = [
+    Channel { name: "altitude", units: METRES, range: ALTITUDES_M, expected: ALTITUDES_EXPECTED },
+    angle("roll"),
+    angle("pitch"),
+    angle("yaw"),
+];
 
 impl Schedule {
     /// The schedule that `entries` describe from `initial` on, at `tick_rate_hz` ticks a second.
@@ -193,82 +215,56 @@ struct Reader<'a> {
 
 impl Reader<'_> {
     fn add_to(&self, channels: &mut [ChannelPlan; 4]) -> Result<(), ParameterError> {
-        let channel = self.channel()?;
-        let plan = &mut channels[channel];
-        let si_per_unit = self.si_per_unit(channel)?;
-        match self.entry.kind.as_str() {
-            "step" => plan.legs.push(self.leg(si_per_unit, &["to"])?),
-            "ramp" => plan.legs.push(self.leg(si_per_unit, &["to", "over_s"])?),
-            "doublet" => plan.doublets.push(self.doublet(si_per_unit)?),
+        let SetPointEntry { kind, channel: name, unit, to, over_s, amplitude, duration_s, .. } = self.entry;
+        let found = CHANNELS.iter().zip(channels).find(|(channel, _)| channel.name == name);
+        let (channel, plan) = found.ok_or_else(|| {
+            let expected = "\"altitude\", \"roll\", \"pitch\" or \"yaw\"";
+            ParameterError::value("channel", expected, format_args!("\"{name}\""))
+        })?;
+        let si_per_unit = channel.units.factor(unit).ok_or_else(|| {
+            let expected = format!("{} on channel {name}", channel.units.names(" or "));
+            ParameterError::value("unit", expected, format_args!("\"{unit}\""))
+        })?;
+        match kind.as_str() {
+            "step" | "ramp" => {
+                let is_ramp = kind == "ramp";
+                self.require_only(if is_ramp { &["to", "over_s"] } else { &["to"] })?;
+                let to = self.value("to", *to, channel, si_per_unit)?;
+                let length_ticks = if is_ramp { self.length_ticks("over_s", *over_s)? } else { 0 };
+                plan.legs.push(Leg { start_tick: self.start_tick()?, length_ticks, from: to, to });
+            }
+            "doublet" => {
+                self.require_only(&["amplitude", "duration_s"])?;
+                let amplitude = self.value("amplitude", *amplitude, channel, si_per_unit)?;
+                let pulse_ticks = self.length_ticks("duration_s", *duration_s)?;
+                plan.doublets.push(Doublet { start_tick: self.start_tick()?, pulse_ticks, amplitude });
+            }
             other => {
-                return Err(ParameterError::value(
-                    "kind",
-                    "\"step\", \"ramp\" or \"doublet\"",
-                    quoted(other),
-                ));
+                let expected = "\"step\", \"ramp\" or \"doublet\"";
+                return Err(ParameterError::value("kind", expected, format_args!("\"{other}\"")));
             }
         }
         Ok(())
     }
 
-    /// A step, or where the entry has `over_s` a ramp.
-    fn leg(&self, si_per_unit: f64, keys: &[&str]) -> Result<Leg, ParameterError> {
-        self.require_only(keys)?;
-        let to = self.value("to", self.entry.to, si_per_unit)?;
-        let is_ramp = keys.contains(&"over_s");
-        let length_ticks = if is_ramp { self.length_ticks("over_s", self.entry.over_s)? } else { 0 };
-        Ok(Leg { start_tick: self.start_tick()?, length_ticks, from: to, to })
-    }
-
-    fn doublet(&self, si_per_unit: f64) -> Result<Doublet, ParameterError> {
-        self.require_only(&["amplitude", "duration_s"])?;
-        let amplitude = self.value("amplitude", self.entry.amplitude, si_per_unit)?;
-        let pulse_ticks = self.length_ticks("duration_s", self.entry.duration_s)?;
-        Ok(Doublet { start_tick: self.start_tick()?, pulse_ticks, amplitude })
-    }
-
-    fn channel(&self) -> Result<usize, ParameterError> {
-        let given = self.entry.channel.as_str();
-        CHANNELS.iter().position(|name| *name == given).ok_or_else(|| {
-            ParameterError::value("channel", "\"altitude\", \"roll\", \"pitch\" or \"yaw\"", quoted(given))
-        })
-    }
-
-    fn si_per_unit(&self, channel: usize) -> Result<f64, ParameterError> {
-        match (CHANNELS[channel], self.entry.unit.as_str()) {
-            ("altitude", "m") => Ok(1.0),
-            ("altitude", other) => {
-                Err(ParameterError::value("unit", "\"m\" on channel altitude", quoted(other)))
-            }
-            (_, "rad") => Ok(1.0),
-            (_, "deg") => Ok(1.0_f64.to_radians()),
-            (name, other) => Err(ParameterError::value(
-                "unit",
-                format!("\"rad\" or \"deg\" on channel {name}"),
-                quoted(other),
-            )),
-        }
-    }
-
     /// A value of the channel in SI, within what a vehicle can be asked for.
-    fn value(&self, key: &'static str, value: Option<f64>, si_per_unit: f64) -> Result<f64, ParameterError> {
+    fn value(
+        &self,
+        key: &'static str,
+        value: Option<f64>,
+        channel: &Channel,
+        si_per_unit: f64,
+    ) -> Result<f64, ParameterError> {
         let value = self.number(key, value)?;
-        let (range, expected) = match self.entry.channel.as_str() {
-            "altitude" => (ALTITUDES_M, ALTITUDES_EXPECTED),
-            _ => (ANGLES_RAD, "an angle of at most a hundred turns"),
-        };
-        match si_per_unit * value {
-            si if range.contains(&si) => Ok(si),
-            _ => Err(ParameterError::value(key, expected, format!("{value} {}", self.entry.unit))),
-        }
+        let si = si_per_unit * value;
+        let found = format_args!("{value} {}", self.entry.unit);
+        require(key, found, channel.range.contains(&si), channel.expected).map(|()| si)
     }
 
     /// The first tick that is not before `at_s`.
     fn start_tick(&self) -> Result<u64, ParameterError> {
         let at_s = self.entry.at_s;
-        if !(at_s.is_finite() && at_s >= 0.0) {
-            return Err(ParameterError::value("at_s", "a finite time, zero or more", at_s));
-        }
+        require("at_s", at_s, at_s.is_finite() && at_s >= 0.0, "a finite time, zero or more")?;
         // A time that is a tick's in decimal may come out just above it in binary.
         Ok((at_s * f64::from(self.tick_rate_hz) - 1e-6).ceil().max(0.0) as u64)
     }
@@ -276,19 +272,15 @@ impl Reader<'_> {
     /// A length of time as a whole number of ticks, at least one.
     fn length_ticks(&self, key: &'static str, value: Option<f64>) -> Result<u64, ParameterError> {
         let length_s = self.number(key, value)?;
-        if length_s <= 0.0 {
-            return Err(ParameterError::value(key, "a time greater than zero", length_s));
-        }
+        require(key, length_s, length_s > 0.0, "a time greater than zero")?;
         Ok((length_s * f64::from(self.tick_rate_hz)).round().max(1.0) as u64)
     }
 
     fn number(&self, key: &'static str, value: Option<f64>) -> Result<f64, ParameterError> {
-        let expected = format!("a finite number in a {}", self.entry.kind);
-        match value {
-            Some(number) if number.is_finite() => Ok(number),
-            Some(number) => Err(ParameterError::value(key, expected, number)),
-            None => Err(ParameterError::value(key, expected, "nothing")),
-        }
+        value.filter(|number| number.is_finite()).ok_or_else(|| {
+            let found = value.map_or("nothing".to_owned(), |number| number.to_string());
+            ParameterError::value(key, format!("a finite number in a {}", self.entry.kind), found)
+        })
     }
 
     /// Refuses numbers that the entry's kind does not have: all but those under `keys`.
@@ -301,10 +293,6 @@ impl Reader<'_> {
             None => Ok(()),
         }
     }
-}
-
-fn quoted(text: &str) -> String {
-    format!("\"{text}\"")
 }
 
 #[cfg(test)]

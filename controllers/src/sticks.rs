@@ -12,8 +12,9 @@
 
 use crate::angle::wrap_rad;
 use crate::set_points::SetPoint;
+use diagnostics::ParameterError;
+use std::fmt::Display;
 use std::path::Path;
-use vehicles::quotes::StrayQuote;
 
 /// A recording of sticks, at least one row.
 #[derive(Debug, Clone, PartialEq)]
@@ -34,43 +35,14 @@ struct Row {
     altitude_m: f64,
 }
 
-/// A recording that cannot be read.
-#[derive(Debug, thiserror::Error)]
-#[error("{file}{fault}")]
-pub struct SticksError {
-    /// The path as given.
-    pub file: String,
-    /// What is wrong with it, behind its name.
-    pub fault: SticksFault,
+/// What is wrong with the recording `file`, behind its name.
+fn refused(file: &str, fault: impl Display) -> ParameterError {
+    ParameterError::conflict("data", format_args!("{file}{fault}"))
 }
 
-/// What is wrong with a recording.
-#[derive(Debug, thiserror::Error)]
-pub enum SticksFault {
-    /// Not there, or not CSV.
-    #[error(": cannot read these sticks: {0}; check the path, and that it is a CSV file with a header")]
-    Unreadable(#[from] csv::Error),
-    /// A quotation mark makes one cell of what are many.
-    #[error(": {0}")]
-    Quote(StrayQuote),
-    /// A header that lacks a column or has one too many: these.
-    #[error(":1: expected the columns {EXPECTED}, found {0}")]
-    Columns(String),
-    /// A value that cannot be meant.
-    #[error(":{line}: column `{column}`: expected {expected}, found {found}")]
-    Value {
-        /// The line, from 1.
-        line: u64,
-        /// The column.
-        column: &'static str,
-        /// What may stand there.
-        expected: &'static str,
-        /// What does.
-        found: String,
-    },
-    /// No rows.
-    #[error(": expected at least one row of sticks, found none")]
-    Empty,
+fn unreadable(file: &str, cause: &csv::Error) -> ParameterError {
+    let hint = "check the path, and that it is a CSV file with a header";
+    refused(file, format_args!(": cannot read these sticks: {cause}; {hint}"))
 }
 
 const COLUMNS: [&str; 5] = ["time_s", "roll_deg", "pitch_deg", "yaw_rate_deg_s", "altitude_m"];
@@ -85,29 +57,35 @@ const MOST: [(f64, &str); 5] = [
 const EXPECTED: &str = "time_s, roll_deg, pitch_deg and, if recorded, yaw_rate_deg_s, altitude_m";
 
 impl Sticks {
-    /// The recording at `path`.
+    /// The recording at `path`, the parameter `data`.
     ///
     /// # Errors
     /// It cannot be read, or holds what no sticks can ask for.
-    pub fn load(path: &Path) -> Result<Self, SticksError> {
-        let bytes = vehicles::text::read_log(path).map_err(|cause| SticksFault::Unreadable(cause.into()));
-        let sticks = bytes.and_then(|bytes| Self::read(&bytes));
-        sticks.map_err(|fault| SticksError { file: path.display().to_string(), fault })
+    pub fn load(path: &Path) -> Result<Self, ParameterError> {
+        let file = path.display().to_string();
+        let bytes = vehicles::text::read_log(path).map_err(|cause| unreadable(&file, &cause.into()))?;
+        Self::read(&file, &bytes)
     }
 
-    fn read(bytes: &[u8]) -> Result<Self, SticksFault> {
-        vehicles::quotes::check(bytes, b',').map_err(SticksFault::Quote)?;
+    fn read(file: &str, bytes: &[u8]) -> Result<Self, ParameterError> {
+        vehicles::quotes::check(bytes, b',').map_err(|quote| refused(file, format_args!(": {quote}")))?;
         let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(bytes);
-        let places = Places::of(reader.headers()?)?;
+        let header = reader.headers().map_err(|cause| unreadable(file, &cause))?;
+        let places = COLUMNS.map(|column| header.iter().position(|name| name == column));
+        if places[..3].contains(&None) || places.iter().flatten().count() != header.len() {
+            let found = header.iter().collect::<Vec<_>>().join(", ");
+            return Err(refused(file, format_args!(":1: expected the columns {EXPECTED}, found {found}")));
+        }
+        let table = Table { file, places };
         let mut rows: Vec<Row> = Vec::new();
         for record in reader.records() {
-            let row = places.row(&record?, rows.last())?;
-            rows.push(row);
+            let record = record.map_err(|cause| unreadable(file, &cause))?;
+            rows.push(table.row(&record, rows.last())?);
         }
         if rows.is_empty() {
-            return Err(SticksFault::Empty);
+            return Err(refused(file, ": expected at least one row of sticks, found none"));
         }
-        Ok(Self { rows, has_yaw_rate: places.0[3].is_some(), has_altitude: places.0[4].is_some() })
+        Ok(Self { rows, has_yaw_rate: places[3].is_some(), has_altitude: places[4].is_some() })
     }
 
     /// Whether the recording has the set point's `channel`.
@@ -164,25 +142,18 @@ impl Row {
     }
 }
 
-/// Where in a row each of [`COLUMNS`] stands.
-struct Places([Option<usize>; 5]);
+/// The file, and where in a row each of [`COLUMNS`] stands.
+struct Table<'a> {
+    file: &'a str,
+    places: [Option<usize>; 5],
+}
 
-impl Places {
-    fn of(header: &csv::StringRecord) -> Result<Self, SticksFault> {
-        let places = COLUMNS.map(|column| header.iter().position(|name| name == column));
-        let known = places.iter().flatten().count();
-        if places[..3].iter().all(Option::is_some) && known == header.len() {
-            return Ok(Self(places));
-        }
-        Err(SticksFault::Columns(header.iter().collect::<Vec<_>>().join(", ")))
-    }
-
-    fn row(&self, record: &csv::StringRecord, before: Option<&Row>) -> Result<Row, SticksFault> {
+impl Table<'_> {
+    fn row(&self, record: &csv::StringRecord, before: Option<&Row>) -> Result<Row, ParameterError> {
         let number = |column: usize| self.number(record, column);
         let time_s = number(0)?;
         if before.is_some_and(|before| before.time_s >= time_s) {
-            let expected = "a time after the row before";
-            return Err(value_fault(record, 0, expected, time_s.to_string()));
+            return Err(self.value(record, 0, "a time after the row before", time_s));
         }
         let yaw_rate_rad_s = number(3)?.to_radians();
         Ok(Row {
@@ -196,35 +167,37 @@ impl Places {
     }
 
     /// The number in a column, 0 where the recording does not have it.
-    fn number(&self, record: &csv::StringRecord, column: usize) -> Result<f64, SticksFault> {
-        let Some(place) = self.0[column] else { return Ok(0.0) };
+    fn number(&self, record: &csv::StringRecord, column: usize) -> Result<f64, ParameterError> {
+        let Some(place) = self.places[column] else { return Ok(0.0) };
         let text = record.get(place).unwrap_or_default();
-        let number = text.parse().ok().filter(|number: &f64| number.is_finite());
         let (most, expected) = MOST[column];
-        let refused = |expected| value_fault(record, column, expected, format!("\"{text}\""));
-        match number.ok_or_else(|| refused("a finite number"))? {
-            number if number.abs() <= most => Ok(number),
-            _ => Err(refused(expected)),
-        }
+        let expected = match text.parse() {
+            Ok(number) if f64::abs(number) <= most => return Ok(number),
+            Ok(number) if number.is_finite() => expected,
+            _ => "a finite number",
+        };
+        Err(self.value(record, column, expected, format_args!("\"{text}\"")))
     }
-}
 
-fn value_fault(
-    record: &csv::StringRecord,
-    column: usize,
-    expected: &'static str,
-    found: String,
-) -> SticksFault {
-    let line = record.position().map_or(0, csv::Position::line);
-    SticksFault::Value { line, column: COLUMNS[column], expected, found }
+    fn value(
+        &self,
+        record: &csv::StringRecord,
+        column: usize,
+        expected: &str,
+        found: impl Display,
+    ) -> ParameterError {
+        let (line, column) = (record.position().map_or(0, csv::Position::line), COLUMNS[column]);
+        let fault = format_args!(":{line}: column `{column}`: expected {expected}, found {found}");
+        refused(self.file, fault)
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    fn sticks(text: &str) -> Result<Sticks, SticksError> {
-        Sticks::read(text.as_bytes()).map_err(|fault| SticksError { file: "s.csv".into(), fault })
+    fn sticks(text: &str) -> Result<Sticks, ParameterError> {
+        Sticks::read("s.csv", text.as_bytes())
     }
 
     fn beside() -> SetPoint {

@@ -3,7 +3,7 @@
 use crate::curve::{Curve, Path, PhaseClock, Shape, smooth_step};
 use crate::minimum_snap::{MinimumSnap, spans_at_mean_speed};
 use bus::messages::Reference;
-use diagnostics::parameter::{ParameterError, all, finite, positive, refuse};
+use diagnostics::parameter::{ParameterError, all, finite, positive, refuse, require};
 use nalgebra::Vector3;
 use serde::Deserialize;
 use std::f64::consts::TAU;
@@ -11,80 +11,46 @@ use std::f64::consts::TAU;
 /// The most waypoints of a segment: their equations are solved at once.
 const WAYPOINTS_MAX: usize = 64;
 
-/// A segment as it stands in the manifest. All begin at rest where the one before ended, and end at rest.
+/// A segment as it stands in the manifest. All begin at rest where the one before ended, and end at rest; the yaw at its
+/// end is the one before where it is absent.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
-#[serde(tag = "kind", rename_all = "kebab-case")]
-pub enum SegmentEntry {
-    /// Stays where it is.
-    Hover(HoverEntry),
-    /// Laps of a circle.
-    Circle(CircleEntry),
-    /// Laps of a figure eight.
-    FigureEight(FigureEightEntry),
-    /// A minimum-snap path through waypoints.
-    MinimumSnap(MinimumSnapEntry),
-}
-
-/// `{ kind = "hover", duration_s = 2.0, yaw_deg = 90.0 }`
-#[derive(Debug, Clone, PartialEq, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct HoverEntry {
-    /// How long, s.
-    pub duration_s: f64,
-    /// Yaw at its end, deg; as before where absent.
-    pub yaw_deg: Option<f64>,
-}
-
-/// `{ kind = "circle", radius_m = 2.0, speed_m_s = 2.0, laps = 2, ramp_s = 2.0 }`
-#[derive(Debug, Clone, PartialEq, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct CircleEntry {
-    /// Radius, m; negative for a circle to the right.
-    pub radius_m: f64,
-    /// Speed between the ramps, m/s.
-    pub speed_m_s: f64,
-    /// Laps.
-    pub laps: u32,
-    /// How long the speed rises, and falls at the end, s.
-    pub ramp_s: f64,
-    /// Direction in which it starts, deg counter-clockwise from the world's x.
-    #[serde(default)]
-    pub direction_deg: f64,
-    /// Yaw at its end, deg; as before where absent.
-    pub yaw_deg: Option<f64>,
-}
-
-/// `{ kind = "figure-eight", half_length_m = 2.0, speed_m_s = 3.0, laps = 3, ramp_s = 3.0 }`
-#[derive(Debug, Clone, PartialEq, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct FigureEightEntry {
-    /// From the middle to either end, m.
-    pub half_length_m: f64,
-    /// The greatest speed between the ramps, m/s: that in the middle.
-    pub speed_m_s: f64,
-    /// Laps.
-    pub laps: u32,
-    /// How long the speed rises, and falls at the end, s.
-    pub ramp_s: f64,
-    /// Direction of its length, deg counter-clockwise from the world's x.
-    #[serde(default)]
-    pub direction_deg: f64,
-    /// Yaw at its end, deg; as before where absent.
-    pub yaw_deg: Option<f64>,
-}
-
-/// `{ kind = "minimum-snap", waypoints_m = [[1.0, 0.0, 1.5], [2.0, 1.0, 1.0]], mean_speed_m_s = 1.5 }`
-#[derive(Debug, Clone, PartialEq, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct MinimumSnapEntry {
-    /// Waypoints in the world after the place where it begins, m.
-    pub waypoints_m: Vec<[f64; 3]>,
-    /// Time from each waypoint to the next, s.
-    pub times_s: Option<Vec<f64>>,
-    /// Or the mean speed along the straight lines between them, m/s.
-    pub mean_speed_m_s: Option<f64>,
-    /// Yaw at its end, deg; as before where absent.
-    pub yaw_deg: Option<f64>,
+#[serde(tag = "kind", rename_all = "kebab-case", deny_unknown_fields)]
+enum SegmentEntry {
+    /// Stays where it is: `{ kind = "hover", duration_s = 2.0, yaw_deg = 90.0 }`.
+    Hover { duration_s: f64, yaw_deg: Option<f64> },
+    /// Laps of a circle: `{ kind = "circle", radius_m = 2.0, speed_m_s = 2.0, laps = 2, ramp_s = 2.0 }`. The radius is
+    /// negative for a circle to the right, the speed that between the ramps, in which it rises and falls; the direction
+    /// is that in which it starts, counter-clockwise from the world's x.
+    Circle {
+        radius_m: f64,
+        speed_m_s: f64,
+        laps: u32,
+        ramp_s: f64,
+        #[serde(default)]
+        direction_deg: f64,
+        yaw_deg: Option<f64>,
+    },
+    /// Laps of a figure eight: `{ kind = "figure-eight", half_length_m = 2.0, speed_m_s = 3.0, laps = 3, ramp_s = 3.0 }`.
+    /// The half length is that from the middle to either end, the speed the greatest, in the middle, the direction that of
+    /// its length.
+    FigureEight {
+        half_length_m: f64,
+        speed_m_s: f64,
+        laps: u32,
+        ramp_s: f64,
+        #[serde(default)]
+        direction_deg: f64,
+        yaw_deg: Option<f64>,
+    },
+    /// A minimum-snap path through waypoints in the world after the place where it begins:
+    /// `{ kind = "minimum-snap", waypoints_m = [[1.0, 0.0, 1.5], [2.0, 1.0, 1.0]], mean_speed_m_s = 1.5 }`. The times are
+    /// those from each waypoint to the next, the mean speed that along the straight lines between them.
+    MinimumSnap {
+        waypoints_m: Vec<[f64; 3]>,
+        times_s: Option<Vec<f64>>,
+        mean_speed_m_s: Option<f64>,
+        yaw_deg: Option<f64>,
+    },
 }
 
 /// Where a trajectory starts.
@@ -157,15 +123,8 @@ impl Trajectory {
     }
 
     fn append(&mut self, entry: &SegmentEntry) -> Result<(), ParameterError> {
-        let way = entry.way(self.end.position_W_m)?;
+        let (way, duration_s) = entry.way(self.end.position_W_m)?;
         let yaw_end_rad = entry.yaw_end_rad(self.end.yaw_rad)?;
-        let duration_s = match entry {
-            SegmentEntry::Hover(hover) => {
-                positive("duration_s", hover.duration_s)?;
-                hover.duration_s
-            }
-            _ => way.duration_s(),
-        };
         let (start_s, yaw_start_rad) = (self.duration_s(), self.end.yaw_rad);
         self.end = Start { position_W_m: way.end(duration_s), yaw_rad: yaw_end_rad };
         self.segments.push(Segment { start_s, duration_s, way, yaw_start_rad, yaw_end_rad });
@@ -284,14 +243,6 @@ impl Segment {
 }
 
 impl Way {
-    fn duration_s(&self) -> f64 {
-        match self {
-            Self::Rest(_) => 0.0,
-            Self::Curve(curve) => curve.clock.duration_s,
-            Self::Snap(snap) => snap.duration_s(),
-        }
-    }
-
     fn end(&self, duration_s: f64) -> Vector3<f64> {
         match self {
             Self::Rest(position_W_m) => *position_W_m,
@@ -303,44 +254,44 @@ impl Way {
 }
 
 impl SegmentEntry {
-    fn way(&self, from_W_m: Vector3<f64>) -> Result<Way, ParameterError> {
-        match self {
-            Self::Hover(_) => Ok(Way::Rest(from_W_m)),
-            Self::Circle(circle) => circle.curve(from_W_m).map(Way::Curve),
-            Self::FigureEight(eight) => eight.curve(from_W_m).map(Way::Curve),
-            Self::MinimumSnap(snap) => snap.path(from_W_m).map(Way::Snap),
+    /// The way from a place, and how long it takes, s.
+    fn way(&self, from_W_m: Vector3<f64>) -> Result<(Way, f64), ParameterError> {
+        match *self {
+            Self::Hover { duration_s, .. } => {
+                positive("duration_s", duration_s)?;
+                Ok((Way::Rest(from_W_m), duration_s))
+            }
+            Self::Circle { radius_m, speed_m_s, laps, ramp_s, direction_deg, .. } => {
+                require("radius_m", radius_m, radius_m != 0.0, "a number other than 0")?;
+                finite("radius_m", radius_m)?;
+                Laps { speed_m_s, laps, ramp_s, direction_deg }.of(Shape::Circle { radius_m }, from_W_m)
+            }
+            Self::FigureEight { half_length_m, speed_m_s, laps, ramp_s, direction_deg, .. } => {
+                positive("half_length_m", half_length_m)?;
+                let shape = Shape::FigureEight { half_length_m };
+                Laps { speed_m_s, laps, ramp_s, direction_deg }.of(shape, from_W_m)
+            }
+            Self::MinimumSnap { ref waypoints_m, ref times_s, mean_speed_m_s, .. } => {
+                let waypoints_W_m = waypoints(from_W_m, waypoints_m)?;
+                let spans_s = spans_s(&waypoints_W_m, times_s.as_deref(), mean_speed_m_s)?;
+                let snap = MinimumSnap::new(&waypoints_W_m, &spans_s).ok_or_else(|| {
+                    let expected = "of like size, so that the path's equations can be solved";
+                    ParameterError::value("times_s", expected, format!("{spans_s:?}"))
+                })?;
+                let duration_s = snap.duration_s();
+                Ok((Way::Snap(snap), duration_s))
+            }
         }
     }
 
     fn yaw_end_rad(&self, before_rad: f64) -> Result<f64, ParameterError> {
-        let stated = match self {
-            Self::Hover(HoverEntry { yaw_deg, .. })
-            | Self::Circle(CircleEntry { yaw_deg, .. })
-            | Self::FigureEight(FigureEightEntry { yaw_deg, .. })
-            | Self::MinimumSnap(MinimumSnapEntry { yaw_deg, .. }) => yaw_deg,
-        };
-        let Some(yaw_deg) = stated else { return Ok(before_rad) };
-        finite("yaw_deg", *yaw_deg)?;
+        let (Self::Hover { yaw_deg, .. }
+        | Self::Circle { yaw_deg, .. }
+        | Self::FigureEight { yaw_deg, .. }
+        | Self::MinimumSnap { yaw_deg, .. }) = *self;
+        let Some(yaw_deg) = yaw_deg else { return Ok(before_rad) };
+        finite("yaw_deg", yaw_deg)?;
         Ok(yaw_deg.to_radians())
-    }
-}
-
-impl CircleEntry {
-    fn curve(&self, start_W_m: Vector3<f64>) -> Result<Curve, ParameterError> {
-        if self.radius_m == 0.0 {
-            return Err(ParameterError::value("radius_m", "a number other than 0", self.radius_m));
-        }
-        finite("radius_m", self.radius_m)?;
-        let Self { radius_m, speed_m_s, laps, ramp_s, direction_deg, .. } = *self;
-        Laps { speed_m_s, laps, ramp_s, direction_deg }.of(Shape::Circle { radius_m }, start_W_m)
-    }
-}
-
-impl FigureEightEntry {
-    fn curve(&self, start_W_m: Vector3<f64>) -> Result<Curve, ParameterError> {
-        positive("half_length_m", self.half_length_m)?;
-        let Self { half_length_m, speed_m_s, laps, ramp_s, direction_deg, .. } = *self;
-        Laps { speed_m_s, laps, ramp_s, direction_deg }.of(Shape::FigureEight { half_length_m }, start_W_m)
     }
 }
 
@@ -353,7 +304,7 @@ struct Laps {
 }
 
 impl Laps {
-    fn of(&self, shape: Shape, start_W_m: Vector3<f64>) -> Result<Curve, ParameterError> {
+    fn of(&self, shape: Shape, start_W_m: Vector3<f64>) -> Result<(Way, f64), ParameterError> {
         positive("speed_m_s", self.speed_m_s)?;
         positive("ramp_s", self.ramp_s)?;
         finite("direction_deg", self.direction_deg)?;
@@ -365,58 +316,45 @@ impl Laps {
                 format!("at least {}, in which the ramps find room", (rate_rad_s * ramp_s / TAU).ceil());
             ParameterError::value("laps", expected, self.laps)
         })?;
-        Ok(Curve { shape, start_W_m, direction_rad, clock })
+        Ok((Way::Curve(Curve { shape, start_W_m, direction_rad, clock }), clock.duration_s))
     }
 }
 
-impl MinimumSnapEntry {
-    fn path(&self, from_W_m: Vector3<f64>) -> Result<MinimumSnap, ParameterError> {
-        let count = self.waypoints_m.len();
-        if !(1..=WAYPOINTS_MAX).contains(&count) {
-            return Err(ParameterError::value(
-                "waypoints_m",
-                format!("a list of 1 to {WAYPOINTS_MAX} points"),
-                count,
-            ));
-        }
-        let mut waypoints_W_m = vec![from_W_m];
-        for point in &self.waypoints_m {
-            all(finite, "waypoints_m", point)?;
-            waypoints_W_m.push(Vector3::from(*point));
-        }
-        let spans_s = self.spans_s(&waypoints_W_m)?;
-        MinimumSnap::new(&waypoints_W_m, &spans_s).ok_or_else(|| {
-            let expected = "of like size, so that the path's equations can be solved";
-            ParameterError::value("times_s", expected, format!("{spans_s:?}"))
-        })
-    }
+/// The waypoints of a path, where it begins before them.
+fn waypoints(from_W_m: Vector3<f64>, waypoints_m: &[[f64; 3]]) -> Result<Vec<Vector3<f64>>, ParameterError> {
+    let count = waypoints_m.len();
+    let expected = format!("a list of 1 to {WAYPOINTS_MAX} points");
+    require("waypoints_m", count, (1..=WAYPOINTS_MAX).contains(&count), expected)?;
+    all(finite, "waypoints_m", waypoints_m.as_flattened())?;
+    Ok([from_W_m].into_iter().chain(waypoints_m.iter().map(|point| Vector3::from(*point))).collect())
+}
 
-    fn spans_s(&self, waypoints_W_m: &[Vector3<f64>]) -> Result<Vec<f64>, ParameterError> {
-        match (&self.times_s, self.mean_speed_m_s) {
-            (Some(times_s), None) if times_s.len() == self.waypoints_m.len() => {
-                all(positive, "times_s", times_s)?;
-                Ok(times_s.clone())
+/// The times from each of these points to the next, s: as given, or those at a mean speed.
+fn spans_s(
+    waypoints_W_m: &[Vector3<f64>],
+    times_s: Option<&[f64]>,
+    mean_speed_m_s: Option<f64>,
+) -> Result<Vec<f64>, ParameterError> {
+    let count = waypoints_W_m.len() - 1;
+    match (times_s, mean_speed_m_s) {
+        (Some(times_s), None) => {
+            let expected = format!("one time for each of the {count} waypoints");
+            require("times_s", times_s.len(), times_s.len() == count, expected)?;
+            all(positive, "times_s", times_s)?;
+            Ok(times_s.to_owned())
+        }
+        (None, Some(speed_m_s)) => {
+            if let Some(index) = waypoints_W_m.windows(2).position(|ends| ends[0] == ends[1]) {
+                let expected = "points that differ from the one before, or use times_s";
+                let found = format!("point {index} where it was already");
+                return Err(ParameterError::value("waypoints_m", expected, found));
             }
-            (Some(times_s), None) => {
-                let expected = format!("one time for each of the {} waypoints", self.waypoints_m.len());
-                Err(ParameterError::value("times_s", expected, times_s.len()))
-            }
-            (None, Some(speed_m_s)) => {
-                if let Some(index) = waypoints_W_m.windows(2).position(|ends| ends[0] == ends[1]) {
-                    let expected = "points that differ from the one before, or use times_s";
-                    return Err(ParameterError::value(
-                        "waypoints_m",
-                        expected,
-                        format!("point {index} where it was already"),
-                    ));
-                }
-                positive("mean_speed_m_s", speed_m_s)?;
-                Ok(spans_at_mean_speed(waypoints_W_m, speed_m_s))
-            }
-            _ => Err(ParameterError::conflict(
-                "times_s",
-                "give either `times_s` or `mean_speed_m_s`, and not both",
-            )),
+            positive("mean_speed_m_s", speed_m_s)?;
+            Ok(spans_at_mean_speed(waypoints_W_m, speed_m_s))
+        }
+        _ => {
+            let message = "give either `times_s` or `mean_speed_m_s`, and not both";
+            Err(ParameterError::conflict("times_s", message))
         }
     }
 }

@@ -12,7 +12,7 @@ use crate::cascade::{CascadeLaw, CascadeState};
 use crate::cascade_gains::CascadeGains;
 use crate::control::{ControlInput, ControlOutput, HoverMotion};
 use crate::gains_file::Table;
-use crate::law::{Law, LawContext, Predecessor, Start};
+use crate::law::{Law, LawContext, Predecessor};
 use crate::law_inputs::VelocityInputs;
 use crate::set_points::SetPoint;
 use bus::component::Info;
@@ -131,21 +131,20 @@ impl VelocityLoop {
         ControlOutput { velocity_m_s: asked.velocity_m_s, ..output }
     }
 
-    /// The state of a vehicle that no law has flown yet.
+    /// The state to begin with, after another law or as the first, at the height and speed where the vehicle is.
     #[must_use]
-    pub fn initial(&self, velocity_m_s: &[f64; 2], measured: &HoverMotion) -> VelocityState {
-        at_speed(self.cascade.initial(measured), velocity_m_s, measured)
-    }
-
-    /// The state that goes on from another law's, at the height and speed where the vehicle is.
-    #[must_use]
-    pub fn continued<S>(
+    pub fn begun<S>(
         &self,
-        from: &Predecessor<'_, S>,
+        from: Option<&Predecessor<'_, S>>,
         velocity_m_s: &[f64; 2],
         measured: &HoverMotion,
     ) -> VelocityState {
-        at_speed(self.cascade.continued(from, measured.altitude_m, measured), velocity_m_s, measured)
+        VelocityState {
+            cascade: self.cascade.begun(from, measured.altitude_m, measured),
+            velocity_filtered: *velocity_m_s,
+            velocity_command: *velocity_m_s,
+            altitude_command: measured.altitude_m,
+        }
     }
 
     /// `before` moved towards `asked`: at once where that is slower, no faster than the limit where it gathers
@@ -181,16 +180,6 @@ impl VelocityLoop {
         let gravity_m_s2 = self.cascade.vehicle.gravity_m_s2;
         let pitch_rad = libm::atan(acceleration_m_s2[0] / gravity_m_s2);
         (-libm::atan(acceleration_m_s2[1] * libm::cos(pitch_rad) / gravity_m_s2), pitch_rad)
-    }
-}
-
-/// The loops' state where the vehicle is, at the speed that it has.
-fn at_speed(cascade: CascadeState, velocity_m_s: &[f64; 2], measured: &HoverMotion) -> VelocityState {
-    VelocityState {
-        cascade,
-        velocity_filtered: *velocity_m_s,
-        velocity_command: *velocity_m_s,
-        altitude_command: measured.altitude_m,
     }
 }
 
@@ -298,16 +287,9 @@ impl Law for VelocityLaw {
         self.velocity.cascade.rate_gain_1_s()
     }
 
-    fn start(&self, input: &ControlInput) -> Start<VelocityState> {
+    fn start(&self, from: Option<&Predecessor<'_, VelocityState>>, input: &ControlInput) -> VelocityState {
         let measured = HoverMotion::of(&input.motion);
-        let state = self.velocity.initial(&velocity_m_s(input, &measured), &measured);
-        Start { state, wrench: RotorWrench::default() }
-    }
-
-    fn take_over(&self, from: &Predecessor<'_, Self::State>, input: &ControlInput) -> Start<Self::State> {
-        let measured = HoverMotion::of(&input.motion);
-        let state = self.velocity.continued(from, &velocity_m_s(input, &measured), &measured);
-        Start { state, wrench: from.wrench }
+        self.velocity.begun(from, &velocity_m_s(input, &measured), &measured)
     }
 
     fn step(&self, state: &mut VelocityState, last: &RotorWrench, input: &ControlInput) -> ControlOutput {

@@ -19,7 +19,7 @@
 use crate::allocation::RotorWrench;
 use crate::approach::Approach;
 use crate::control::{ControlInput, ControlOutput, HoverMotion};
-use crate::law::{Law, LawContext, Predecessor, Start};
+use crate::law::{Law, LawContext, Predecessor};
 use crate::law_inputs::WallInputs;
 use crate::room::Room;
 use crate::velocity::{LoopsGains, VelocityLoop, VelocitySetPoint, VelocityState};
@@ -295,17 +295,22 @@ impl Law for WallFollowLaw {
         self.velocity.cascade.rate_gain_1_s()
     }
 
-    fn start(&self, input: &ControlInput) -> Start<WallFollowState> {
-        let velocity = self.velocity.initial(&input.walls.velocity, &HoverMotion::by_ranges(input));
-        let start_m = self.shared.and_then(|shared| shared.start_m);
-        Start { state: self.initial(velocity, start_m, &input.walls), wrench: RotorWrench::default() }
-    }
-
-    fn take_over(&self, from: &Predecessor<'_, Self::State>, input: &ControlInput) -> Start<Self::State> {
-        let measured = HoverMotion::by_ranges(input);
-        let velocity = self.velocity.continued(from, &input.walls.velocity, &measured);
+    fn start(
+        &self,
+        from: Option<&Predecessor<'_, WallFollowState>>,
+        input: &ControlInput,
+    ) -> WallFollowState {
         // A backup in flight goes on from where it is, not from where the run began.
-        Start { state: self.initial(velocity, None, &input.walls), wrench: from.wrench }
+        let place_m = |shared: Shared| {
+            let start_m = shared.start_m.filter(|_| from.is_none());
+            start_m.unwrap_or_else(|| shared.room.begun_m(&input.walls))
+        };
+        WallFollowState {
+            velocity: self.velocity.begun(from, &input.walls.velocity, &HoverMotion::by_ranges(input)),
+            room_position: self.shared.map_or([0.0; 2], place_m),
+            phase: self.start_state,
+            ..WallFollowState::default()
+        }
     }
 
     fn step(&self, state: &mut WallFollowState, last: &RotorWrench, input: &ControlInput) -> ControlOutput {
@@ -324,21 +329,6 @@ impl Law for WallFollowLaw {
 }
 
 impl WallFollowLaw {
-    fn initial(
-        &self,
-        velocity: VelocityState,
-        start_m: Option<[f64; 2]>,
-        walls: &WallEstimate,
-    ) -> WallFollowState {
-        let place_m = |shared: Shared| start_m.unwrap_or_else(|| shared.room.begun_m(walls));
-        WallFollowState {
-            velocity,
-            room_position: self.shared.map_or([0.0; 2], place_m),
-            phase: self.start_state,
-            ..WallFollowState::default()
-        }
-    }
-
     /// Distances of the walls at +x, −x, +y, −y: by the room's size where that is known, else what the beams see.
     fn wall_distances_m(&self, state: &mut WallFollowState, walls: &WallEstimate) -> [f64; 4] {
         let Some(Shared { room, .. }) = self.shared else { return walls.distance };

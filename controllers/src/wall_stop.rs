@@ -10,7 +10,7 @@
 use crate::allocation::RotorWrench;
 use crate::approach::Approach;
 use crate::control::{ControlInput, ControlOutput, HoverMotion};
-use crate::law::{Law, LawContext, Predecessor, Start};
+use crate::law::{Law, LawContext, Predecessor};
 use crate::law_inputs::WallInputs;
 use crate::velocity::{LoopsGains, VelocityLoop, VelocitySetPoint, VelocityState};
 use bus::component::Info;
@@ -164,15 +164,10 @@ impl Law for WallStopLaw {
         self.velocity.cascade.rate_gain_1_s()
     }
 
-    fn start(&self, input: &ControlInput) -> Start<WallStopState> {
-        let velocity = self.velocity.initial(&input.walls.velocity, &HoverMotion::by_ranges(input));
-        Start { state: WallStopState { velocity, ..Default::default() }, wrench: RotorWrench::default() }
-    }
-
-    fn take_over(&self, from: &Predecessor<'_, Self::State>, input: &ControlInput) -> Start<Self::State> {
+    fn start(&self, from: Option<&Predecessor<'_, WallStopState>>, input: &ControlInput) -> WallStopState {
         let measured = HoverMotion::by_ranges(input);
-        let velocity = self.velocity.continued(from, &input.walls.velocity, &measured);
-        Start { state: WallStopState { velocity, ..Default::default() }, wrench: from.wrench }
+        let velocity = self.velocity.begun(from, &input.walls.velocity, &measured);
+        WallStopState { velocity, ..WallStopState::default() }
     }
 
     fn step(&self, state: &mut WallStopState, last: &RotorWrench, input: &ControlInput) -> ControlOutput {

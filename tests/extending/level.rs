@@ -3,7 +3,7 @@
 use crate::airframe::HoverModel;
 use crate::allocation::RotorWrench;
 use crate::control::{ControlInput, ControlOutput, HoverMotion};
-use crate::law::{Law, LawContext, Predecessor, Start};
+use crate::law::{Law, LawContext, Predecessor};
 use crate::law_inputs::SetPointInputs;
 use bus::component::Info;
 use bus::messages::Time;
@@ -58,12 +58,8 @@ impl Law for LevelLaw {
         2.0 * self.bandwidth_rad_s
     }
 
-    fn start(&self, _: &ControlInput) -> Start<LevelState> {
-        Start { state: LevelState::default(), wrench: RotorWrench::default() }
-    }
-
-    fn take_over(&self, from: &Predecessor<'_, Self::State>, _: &ControlInput) -> Start<Self::State> {
-        Start { state: LevelState::default(), wrench: from.wrench }
+    fn start(&self, _: Option<&Predecessor<'_, LevelState>>, _: &ControlInput) -> LevelState {
+        LevelState::default()
     }
 
     fn step(&self, _: &mut LevelState, _: &RotorWrench, input: &ControlInput) -> ControlOutput {

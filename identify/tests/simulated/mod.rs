@@ -4,7 +4,7 @@
 #![allow(dead_code, reason = "each test binary uses a part of it")]
 
 use bus::random::Stream;
-use controllers::allocation::{Allocation, RotorSet, RotorWrench};
+use controllers::allocation::{Allocation, RotorWrench};
 use flights::{Channel, Flight, Role};
 use nalgebra::{UnitQuaternion, Vector3};
 use plant::effects::{Effect, find};
@@ -164,7 +164,7 @@ pub fn fly(declared: &Vehicle, plan: &Plan, role: Role) -> Flight {
     let sticks = Sticks::of(plan);
     let start = RigidBody::level_at(course.at(0.0).0[0]);
     let mut plant = FreeFlight::new(NewtonEuler::flying(airframe, 1), start, effects);
-    let allocation = Allocation::new(&RotorSet::from(declared)).expect("a quadrotor");
+    let allocation = Allocation::new(declared).expect("a quadrotor");
     let mut commands = [declared.hover_command(); 4];
     plant.settle_rotors(&commands);
     let slow_rad_s = [declared.hover_speed_rad_s(); 4];
