@@ -123,7 +123,13 @@ impl Airframe {
         let delayed = effects.commands.pass(commands, self.delay_s() / dt_s);
         let mut actuation = self.commanded(&delayed);
         for (effect, effect_state) in self.effects.iter().zip(&mut effects.effects) {
-            self.advance(effect, effect_state, state, &mut actuation, dt_s);
+            for action in effect.kind.actions {
+                if let Action::Tick(tick) = action {
+                    let condition = FlightCondition::new(&self.vehicle, state, &actuation.air_velocity_W_m_s);
+                    let (actuation, state) = (&mut actuation, &mut *effect_state);
+                    tick(&effect.values, &mut Advance { condition, actuation, state, dt_s });
+                }
+            }
         }
         effects.actuation = actuation;
         actuation
@@ -204,23 +210,6 @@ impl Airframe {
             _ => 0.0,
         };
         actions(&self.effects).map(delay).sum()
-    }
-
-    /// Advances one effect's state by a tick, and has it change the actuation.
-    fn advance(
-        &self,
-        effect: &Effect,
-        effect_state: &mut EffectState,
-        state: &State,
-        actuation: &mut Actuation,
-        dt_s: f64,
-    ) {
-        for action in effect.kind.actions {
-            if let Action::Tick(tick) = action {
-                let condition = FlightCondition::new(&self.vehicle, state, &actuation.air_velocity_W_m_s);
-                tick(&effect.values, &mut Advance { condition, actuation, state: effect_state, dt_s });
-            }
-        }
     }
 }
 

@@ -73,8 +73,10 @@ pub(crate) fn check_lift(
     path: &Path,
     run: &NodeContext<'_>,
 ) -> Result<(), ParameterError> {
-    let (least_N, most_N) =
-        (lift_N(vehicle, least_speed_rad_s(vehicle)), lift_N(vehicle, vehicle.command.speed_at_max_rad_s));
+    let map = &vehicle.command;
+    // A motor that a command of 0 switches off turns as slowly as one likes.
+    let least_rad_s = if map.zero_is_off { 0.0 } else { map.speed_at_min_rad_s };
+    let (least_N, most_N) = (lift_N(vehicle, least_rad_s), lift_N(vehicle, map.speed_at_max_rad_s));
     let weight_N = vehicle.mass_kg * vehicle.gravity_m_s2;
     if weight_N == 0.0 {
         return Ok(());
@@ -111,11 +113,6 @@ pub(crate) fn check_lift(
 
 fn lift_N(vehicle: &Vehicle, speed_rad_s: f64) -> f64 {
     vehicle.rotors.len() as f64 * vehicle.thrust_coefficient * speed_rad_s * speed_rad_s
-}
-
-/// A motor that a command of 0 switches off turns as slowly as one likes.
-fn least_speed_rad_s(vehicle: &Vehicle) -> f64 {
-    if vehicle.command.zero_is_off { 0.0 } else { vehicle.command.speed_at_min_rad_s }
 }
 
 /// The keys that lift and weight come from, with their lines.
@@ -172,10 +169,8 @@ fn first_not_finite(backend: &dyn Backend) -> Option<&'static str> {
         ("an attitude", body.attitude_WB.coords.as_slice()),
         ("a rotor speed", &speeds_rad_s),
     ];
-    found
-        .into_iter()
-        .find(|(_, numbers)| numbers.iter().any(|number| !number.is_finite()))
-        .map(|(what, _)| what)
+    let mut found = found.into_iter();
+    found.find_map(|(what, numbers)| numbers.iter().any(|number| !number.is_finite()).then_some(what))
 }
 
 #[cfg(test)]

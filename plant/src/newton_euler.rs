@@ -99,7 +99,12 @@ impl NewtonEuler {
 
     /// Specific force and angular acceleration at `state`, with what acts over the tick that ends there.
     pub fn accelerations_under(&self, actuation: &Actuation, state: &State) -> Accelerations {
-        let wrench = self.airframe.wrench(actuation, state, &state.rotors.map(shown_rates));
+        // Those that a rotor state itself shows, where no target is at hand.
+        let shown_rates = state.rotors.map(|RotorState { acceleration_rad_s2, .. }| RotorRates {
+            acceleration_rad_s2,
+            jerk_rad_s3: 0.0,
+        });
+        let wrench = self.airframe.wrench(actuation, state, &shown_rates);
         Accelerations {
             specific_force_B_m_s2: wrench.force_B_N / self.vehicle().mass_kg,
             angular_acceleration_B_rad_s2: self.angular_acceleration(state, &wrench.torque_B_N_m),
@@ -124,7 +129,8 @@ impl NewtonEuler {
         Rates {
             velocity_W_m_s: state.body.velocity_W_m_s,
             acceleration_W_m_s2: self.gravity_W_m_s2 + force_W_N / self.vehicle().mass_kg,
-            attitude_WB_per_s: quaternion_rate(attitude_WB, &state.body.angular_velocity_B_rad_s),
+            // 1/2 q (0, w), with w in the body frame.
+            attitude_WB_per_s: attitude_WB * Quaternion::from_imag(state.body.angular_velocity_B_rad_s * 0.5),
             angular_acceleration_B_rad_s2: self.angular_acceleration(state, &wrench.torque_B_N_m),
             rotors,
         }
@@ -135,14 +141,4 @@ impl NewtonEuler {
         let w = &state.body.angular_velocity_B_rad_s;
         self.inverse_inertia * (torque_B_N_m - w.cross(&(self.vehicle().inertia_kg_m2 * w)))
     }
-}
-
-/// The rates that a rotor state itself shows, where no target is at hand.
-fn shown_rates(rotor: RotorState) -> RotorRates {
-    RotorRates { acceleration_rad_s2: rotor.acceleration_rad_s2, jerk_rad_s3: 0.0 }
-}
-
-/// 1/2 q (0, w), with w in the body frame.
-fn quaternion_rate(attitude_WB: &Quaternion<f64>, w_B_rad_s: &Vector3<f64>) -> Quaternion<f64> {
-    attitude_WB * Quaternion::from_imag(w_B_rad_s * 0.5)
 }

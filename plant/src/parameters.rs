@@ -65,50 +65,9 @@ fn one() -> u32 {
     1
 }
 
-/// The ticks between two settings to what is measured.
-fn window_ticks(window_s: f64, tick_s: f64) -> Result<u32, ParameterError> {
-    let ticks = (window_s / tick_s).round();
-    let is_whole = (window_s / tick_s - ticks).abs() < 1e-6 && (1.0..=f64::from(u32::MAX)).contains(&ticks);
-    refuse(!is_whole, "window_s", || {
-        format!(
-            "`window_s` is {window_s} s, which is not a whole number of ticks of {tick_s} s, at least one"
-        )
-    })?;
-    Ok(ticks as u32)
-}
-
 impl Parameters {
     /// Refuses what cannot be meant.
     fn check(&self, run: &NodeContext<'_>) -> Result<(), ParameterError> {
-        self.check_numbers()?;
-        self.check_ports(run)?;
-        // A plant that ran less often would apply a command before it was computed.
-        let ticks = run.period_ticks;
-        refuse(ticks != 1, "period_ticks", || {
-            format!("`period_ticks` is {ticks}, expected 1: a plant runs at every tick; leave it out")
-        })
-    }
-
-    /// Refuses what cannot fly.
-    fn check_flight(
-        &self,
-        airframe: &Airframe,
-        scene: &Scene,
-        run: &NodeContext<'_>,
-    ) -> Result<(), ParameterError> {
-        airworthy::check_steps(airframe, run.tick_s() / f64::from(self.substeps), run)?;
-        if scene.rig.is_none() && self.window_s.is_none() {
-            airworthy::check_lift(airframe.vehicle(), &self.vehicle, run)?;
-        }
-        Ok(())
-    }
-
-    /// Ticks of `tick_s` between two settings to what is measured; longer than any run without.
-    pub(crate) fn window_ticks(&self, tick_s: f64) -> Result<u32, ParameterError> {
-        self.window_s.map_or(Ok(u32::MAX), |window_s| window_ticks(window_s, tick_s))
-    }
-
-    fn check_numbers(&self) -> Result<(), ParameterError> {
         all(finite, "initial_position_m", &self.initial_position_m)?;
         all(finite, "initial_velocity_m_s", &self.initial_velocity_m_s)?;
         finite("initial_yaw_deg", self.initial_yaw_deg)?;
@@ -117,35 +76,47 @@ impl Parameters {
         self.window_s.map_or(Ok(()), |window_s| positive("window_s", window_s))?;
         self.crash_speed_m_s.map_or(Ok(()), |speed_m_s| positive("crash_speed_m_s", speed_m_s))?;
         let flies_freely = self.backend == BackendName::NewtonEuler;
-        refuse(
-            self.crash_speed_m_s.is_some() && flies_freely,
-            "crash_speed_m_s",
-            || "`crash_speed_m_s` needs `backend` = \"rapier\": free flight touches nothing",
-        )
+        let (is_measured, has_window) = (run.has("measured"), self.window_s.is_some());
+        let conflicts = [
+            (
+                flies_freely && self.crash_speed_m_s.is_some(),
+                "crash_speed_m_s",
+                "`crash_speed_m_s` needs `backend` = \"rapier\": free flight touches nothing",
+            ),
+            (
+                flies_freely && run.has("traffic"),
+                "backend",
+                "the input `traffic` needs `backend` = \"rapier\": free flight meets nobody",
+            ),
+            (
+                flies_freely && run.has("contact"),
+                "backend",
+                "the output `contact` needs `backend` = \"rapier\": free flight touches nothing, and would report a \
+                 flight through a wall as one without contact",
+            ),
+            (is_measured && !has_window, "window_s", "the input `measured` needs the parameter `window_s`"),
+            (!is_measured && has_window, "window_s", "the parameter `window_s` needs the input `measured`"),
+        ];
+        conflicts.into_iter().try_for_each(|(is_wrong, key, message)| refuse(is_wrong, key, || message))?;
+        // A plant that ran less often would apply a command before it was computed.
+        let ticks = run.period_ticks;
+        refuse(ticks != 1, "period_ticks", || {
+            format!("`period_ticks` is {ticks}, expected 1: a plant runs at every tick; leave it out")
+        })
     }
 
-    fn check_ports(&self, run: &NodeContext<'_>) -> Result<(), ParameterError> {
-        let needs_rapier = |port| run.has(port) && self.backend == BackendName::NewtonEuler;
-        refuse(
-            needs_rapier("traffic"),
-            "backend",
-            || "the input `traffic` needs `backend` = \"rapier\": free flight meets nobody",
-        )?;
-        refuse(needs_rapier("contact"), "backend", || {
-            "the output `contact` needs `backend` = \"rapier\": free flight touches nothing, and would report a flight \
-             through a wall as one without contact"
+    /// Ticks of `tick_s` between two settings to what is measured; longer than any run without.
+    pub(crate) fn window_ticks(&self, tick_s: f64) -> Result<u32, ParameterError> {
+        let Some(window_s) = self.window_s else { return Ok(u32::MAX) };
+        let ticks = (window_s / tick_s).round();
+        let is_whole =
+            (window_s / tick_s - ticks).abs() < 1e-6 && (1.0..=f64::from(u32::MAX)).contains(&ticks);
+        refuse(!is_whole, "window_s", || {
+            format!(
+                "`window_s` is {window_s} s, which is not a whole number of ticks of {tick_s} s, at least one"
+            )
         })?;
-        let (is_measured, has_window) = (run.has("measured"), self.window_s.is_some());
-        refuse(
-            is_measured && !has_window,
-            "window_s",
-            || "the input `measured` needs the parameter `window_s`",
-        )?;
-        refuse(
-            !is_measured && has_window,
-            "window_s",
-            || "the parameter `window_s` needs the input `measured`",
-        )
+        Ok(ticks as u32)
     }
 
     /// The vehicle, and the backend that flies it, as it is at tick 0; the effects draw their random numbers by the
@@ -160,7 +131,10 @@ impl Parameters {
         self.check(run)?;
         let (airframe, scene) = self.airframe()?;
         // Before the backend, which a vehicle that is none might not survive.
-        self.check_flight(&airframe, &scene, run)?;
+        airworthy::check_steps(&airframe, run.tick_s() / f64::from(self.substeps), run)?;
+        if scene.rig.is_none() && self.window_s.is_none() {
+            airworthy::check_lift(airframe.vehicle(), &self.vehicle, run)?;
+        }
         let vehicle = airframe.vehicle().clone();
         let effects = airframe.initial_state(run.seed, run.name, run.tick_s());
         let model = NewtonEuler::flying(airframe, self.substeps);
@@ -193,13 +167,12 @@ impl Parameters {
 
     /// The vehicle as it flies, and what stands around it.
     fn airframe(&self) -> Result<(Airframe, Scene), ParameterError> {
-        let vehicle =
-            Vehicle::load(&self.vehicle).map_err(|error| ParameterError::conflict("vehicle", error))?;
+        let refused = |error| ParameterError::conflict("vehicle", error);
+        let vehicle = Vehicle::load(&self.vehicle).map_err(refused)?;
         let scene = self.scene.as_deref().map_or_else(|| Ok(Scene::default()), Scene::load);
         let scene = scene.map_err(|error| ParameterError::conflict("scene", error))?;
         refuse_double_rig(&vehicle, &scene)?;
-        let airframe = Airframe::from_files(vehicle, &scene.effects);
-        Ok((airframe.map_err(|error| ParameterError::conflict("vehicle", error))?, scene))
+        Ok((Airframe::from_files(vehicle, &scene.effects).map_err(refused)?, scene))
     }
 
     /// Refuses a start inside of a box, unless a measured flight says where the vehicle starts.
@@ -217,14 +190,9 @@ impl Parameters {
     }
 
     fn start(&self) -> RigidBody {
-        RigidBody {
-            velocity_W_m_s: self.initial_velocity_m_s.into(),
-            attitude_WB: UnitQuaternion::from_axis_angle(
-                &Vector3::z_axis(),
-                self.initial_yaw_deg.to_radians(),
-            ),
-            ..RigidBody::level_at(self.initial_position_m.into())
-        }
+        let (velocity_W_m_s, yaw_rad) = (self.initial_velocity_m_s.into(), self.initial_yaw_deg.to_radians());
+        let attitude_WB = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), yaw_rad);
+        RigidBody { velocity_W_m_s, attitude_WB, ..RigidBody::level_at(self.initial_position_m.into()) }
     }
 }
 

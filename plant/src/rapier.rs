@@ -19,8 +19,7 @@ pub mod hull;
 mod rig;
 mod world;
 
-use crate::actuation::Actuation;
-use crate::actuation::Battery;
+use crate::actuation::{Actuation, Battery};
 use crate::airframe_state::AirframeState;
 use crate::backend::{Backend, ContactReport, Neighbour, TRAFFIC_MAX};
 use crate::newton_euler::{Accelerations, NewtonEuler};
@@ -141,7 +140,9 @@ impl Rapier {
     /// Pushes the rig's slider, and returns the torque of the bearing's friction on the vehicle.
     fn rig_friction(&mut self, span_s: f64) -> Vector3<f64> {
         let Some(rig) = &self.rig else { return Vector3::zeros() };
-        self.world.push_slider(rig, self.model.vehicle().gravity_m_s2, span_s);
+        if let Some(slider) = self.world.slider() {
+            rig::push_slider(slider, rig, self.model.vehicle().gravity_m_s2, span_s);
+        }
         rig::bearing_torque_W_N_m(rig, &spin_W_rad_s(&self.state.body), self.inertia_min_kg_m2, span_s)
     }
 
@@ -203,15 +204,8 @@ impl Rapier {
         self.contacts.place(None, 0);
         let arm_W_m = body.attitude_WB * rig.mount_B_m;
         let speed_m_s = body.velocity_W_m_s.z + spin_W_rad_s(&body).cross(&arm_W_m).z;
-        self.world.set_slider(&bearing_W_m, speed_m_s);
-    }
-
-    /// All that free flight does not explain is the contacts' doing; in a rig, where the bearing pushes too, it is
-    /// what they push along their normals, friction left out.
-    fn contact_force_W_N(&self) -> Vector3<f64> {
-        match self.rig {
-            Some(_) => self.reaction.normal_W_N,
-            None => self.reaction.acceleration_W_m_s2 * self.model.vehicle().mass_kg,
+        if let Some(slider) = self.world.slider() {
+            rig::place(slider, &bearing_W_m, speed_m_s);
         }
     }
 }
@@ -247,7 +241,7 @@ impl Backend for Rapier {
         self.reaction = Reaction {
             acceleration_W_m_s2: change_W_m_s / dt_s,
             angular_acceleration_W_rad_s2: change_W_rad_s / dt_s,
-            normal_W_N: self.contacts.normal_impulse_W_N_s() / dt_s,
+            normal_W_N: self.contacts.normal_impulse_W_N_s / dt_s,
         };
     }
 
@@ -267,7 +261,12 @@ impl Backend for Rapier {
     }
 
     fn contact(&self) -> ContactReport {
-        self.contacts.report(&self.contact_force_W_N())
+        // All that free flight does not explain is the contacts' doing; in a rig, where the bearing pushes too, it is what
+        // they push along their normals, friction left out.
+        self.contacts.report(&match self.rig {
+            Some(_) => self.reaction.normal_W_N,
+            None => self.reaction.acceleration_W_m_s2 * self.model.vehicle().mass_kg,
+        })
     }
 
     fn battery(&self) -> Option<Battery> {

@@ -64,20 +64,14 @@ pub(crate) fn wrench(
         // r x (0, 0, T): thrust on the left (+y) rolls positive, thrust in front pitches nose up (negative).
         torque_B_N_m.x += place.position_m.y * thrust_N;
         torque_B_N_m.y -= place.position_m.x * thrust_N;
-        torque_B_N_m.z -= place.spin * reaction_N_m(vehicle, rotor, rate);
+        // The motor pushes against the air's drag and the rotor's own inertia.
+        let reaction_N_m = drag_torque_N_m(vehicle, rotor.speed_rad_s)
+            + vehicle.rotor_inertia_kg_m2 * rate.acceleration_rad_s2;
+        torque_B_N_m.z -= place.spin * reaction_N_m;
         momentum_N_m_s += place.spin * vehicle.rotor_inertia_kg_m2 * rotor.speed_rad_s;
     }
-    torque_B_N_m += gyroscopic_torque_N_m(momentum_N_m_s, angular_velocity_B_rad_s);
-    Wrench { force_B_N: Vector3::new(0.0, 0.0, lift_N), torque_B_N_m }
-}
-
-/// What the motor has to push against: the air's drag and the rotor's own inertia.
-fn reaction_N_m(vehicle: &Vehicle, rotor: &RotorState, rate: &RotorRates) -> f64 {
-    drag_torque_N_m(vehicle, rotor.speed_rad_s) + vehicle.rotor_inertia_kg_m2 * rate.acceleration_rad_s2
-}
-
-/// -w x (h z), thesis eq. 3.11.
-fn gyroscopic_torque_N_m(momentum_N_m_s: f64, angular_velocity_B_rad_s: &Vector3<f64>) -> Vector3<f64> {
+    // -w x (h z), thesis eq. 3.11.
     let w = angular_velocity_B_rad_s;
-    Vector3::new(-momentum_N_m_s * w.y, momentum_N_m_s * w.x, 0.0)
+    torque_B_N_m += Vector3::new(-momentum_N_m_s * w.y, momentum_N_m_s * w.x, 0.0);
+    Wrench { force_B_N: Vector3::new(0.0, 0.0, lift_N), torque_B_N_m }
 }

@@ -44,9 +44,7 @@ impl RigidBody {
             angular_velocity_B_rad_s: Vector3::zeros(),
         }
     }
-}
 
-impl RigidBody {
     /// Whether pose and motion are numbers.
     pub fn is_finite(&self) -> bool {
         let vectors = [&self.position_W_m, &self.velocity_W_m_s, &self.angular_velocity_B_rad_s];

@@ -6,7 +6,7 @@ use bus::component::{Component, Info, StepError};
 use bus::context::{NodeContext, StepContext};
 use bus::messages::{PlantState, Traffic as Gathered};
 use bus::ports::Many;
-use diagnostics::ParameterError;
+use diagnostics::parameter::{ParameterError, refuse};
 use serde::Deserialize;
 
 /// Gathers the states of the plants of a run.
@@ -42,13 +42,11 @@ impl Component for Traffic {
     type State = ();
 
     fn new(Parameters {}: Parameters, context: &NodeContext<'_>) -> Result<Self, ParameterError> {
-        match context.inputs.len() {
-            0..=TRAFFIC_MAX => Ok(Self),
-            count => Err(ParameterError::conflict(
-                "",
-                format!("{count} inputs, expected at most {TRAFFIC_MAX} vehicles"),
-            )),
-        }
+        let count = context.inputs.len();
+        refuse(count > TRAFFIC_MAX, "", || {
+            format!("{count} inputs, expected at most {TRAFFIC_MAX} vehicles")
+        })?;
+        Ok(Self)
     }
 
     fn initial(&self) {}
@@ -61,8 +59,7 @@ impl Component for Traffic {
     ) -> Result<Outputs, StepError> {
         let mut traffic = Gathered::default();
         for (number, state) in states.iter().enumerate() {
-            traffic.position[number] = state.position;
-            traffic.velocity[number] = state.velocity;
+            (traffic.position[number], traffic.velocity[number]) = (state.position, state.velocity);
             traffic.count += 1;
         }
         Ok(Outputs { traffic })

@@ -15,11 +15,8 @@ pub fn resolve<'e>(entries: impl IntoIterator<Item = &'e EffectEntry>) -> Result
     for entry in entries {
         let kind = kind(entry)?;
         if effects.iter().any(|effect| effect.kind == kind) {
-            return Err(bad_name(
-                entry,
-                "each effect once, vehicle and scene file together",
-                "it a second time",
-            ));
+            let expected = "each effect once, vehicle and scene file together";
+            return Err(bad_name(entry, expected, "it a second time"));
         }
         effects.push(Effect { kind, values: values(kind, entry)? });
     }

@@ -56,9 +56,11 @@ fn section(page: &mut String, kind: &EffectKind) {
     let _ = writeln!(page, "- **Source:** {}.", kind.source);
     let _ = writeln!(page, "- **Holds for:** {}.", kind.validity);
     let _ = writeln!(page, "- **Fitted:** {}.", fitted(kind));
-    confounders(kind).for_each(|(other, experiment)| {
-        let _ = writeln!(page, "- **Told from [`{other}`](#{other}):** {experiment}.");
-    });
+    for other in CATALOGUE {
+        if let Some(experiment) = kind.experiment_against(other) {
+            let _ = writeln!(page, "- **Told from [`{0}`](#{0}):** {experiment}.", other.name);
+        }
+    }
     page.push('\n');
     page.push_str(
         "| parameter | meaning | units | min | max | neutral | nominal | source of the nominal value |\n",
@@ -79,11 +81,6 @@ fn fitted(kind: &EffectKind) -> String {
     };
     let needs: Vec<_> = kind.needs.iter().filter_map(|need| need.describe().split(':').next()).collect();
     if needs.is_empty() { part.to_owned() } else { format!("{part}; needs {}", needs.join("; ")) }
-}
-
-/// The effects that look like `kind`, and the experiments that tell them apart.
-fn confounders(kind: &EffectKind) -> impl Iterator<Item = (&'static str, &'static str)> {
-    CATALOGUE.iter().filter_map(|other| Some((other.name, kind.experiment_against(other)?)))
 }
 
 fn row(page: &mut String, spec: &ParameterSpec) {

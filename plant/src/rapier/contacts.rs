@@ -57,7 +57,7 @@ impl Touch {
 }
 
 /// The contacts from tick to tick, the longest-lasting first.
-#[derive(Debug, Clone, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, Serialize, Deserialize)]
 pub(super) struct Contacts {
     touches: Vec<Touch>,
     began: u32,
@@ -67,31 +67,19 @@ pub(super) struct Contacts {
     /// Whether that was in this tick.
     is_impact_new: bool,
     /// What the contacts pushed with along their normals since the tick began.
-    normal_impulse_W_N_s: Vector3<f64>,
+    pub(super) normal_impulse_W_N_s: Vector3<f64>,
 }
 
 impl Contacts {
     /// No contact so far, among at most `objects` things.
     pub(super) fn new(objects: usize) -> Self {
-        Self {
-            touches: Vec::with_capacity(objects),
-            began: 0,
-            crashed: false,
-            impact_speed_m_s: 0.0,
-            is_impact_new: false,
-            normal_impulse_W_N_s: Vector3::zeros(),
-        }
+        Self { touches: Vec::with_capacity(objects), ..Self::default() }
     }
 
     /// A tick begins.
     pub(super) fn begin_tick(&mut self) {
         self.normal_impulse_W_N_s = Vector3::zeros();
         self.is_impact_new = false;
-    }
-
-    /// What the contacts pushed with along their normals since the tick began.
-    pub(super) fn normal_impulse_W_N_s(&self) -> Vector3<f64> {
-        self.normal_impulse_W_N_s
     }
 
     /// Starts anew with `parts` of the vehicle at rest on `object`, or free. What it stands on at first did not

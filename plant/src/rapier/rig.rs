@@ -12,8 +12,8 @@ use super::body::to_rapier;
 use crate::state::RigidBody;
 use nalgebra::Vector3;
 use rapier3d_f64::dynamics::{
-    GenericJointBuilder, JointAxesMask, JointAxis, LockedAxes, MassProperties, RigidBodyBuilder,
-    RigidBodyHandle, RopeJointBuilder, SphericalJointBuilder,
+    GenericJointBuilder, JointAxesMask, JointAxis, LockedAxes, MassProperties, RigidBody as Slider,
+    RigidBodyBuilder, RigidBodyHandle, RopeJointBuilder, SphericalJointBuilder,
 };
 use rapier3d_f64::math::Vector;
 use rapier3d_f64::pipeline::PhysicsWorld;
@@ -74,26 +74,13 @@ pub(super) fn holds(rig: &Rig, body: &RigidBody, lift_N: f64, gravity_m_s2: f64)
 }
 
 /// Puts the slider at `bearing_W_m`, moving with the vehicle's mount.
-pub(super) fn place(
-    physics: &mut PhysicsWorld,
-    slider: RigidBodyHandle,
-    bearing_W_m: &Vector3<f64>,
-    speed_m_s: f64,
-) {
-    let slider = &mut physics.bodies[slider];
+pub(super) fn place(slider: &mut Slider, bearing_W_m: &Vector3<f64>, speed_m_s: f64) {
     slider.set_translation(to_rapier(bearing_W_m), true);
     slider.set_linvel(Vector::Z * speed_m_s, true);
 }
 
 /// Weight and friction of the slider over a step of `span_s`.
-pub(super) fn push_slider(
-    physics: &mut PhysicsWorld,
-    slider: RigidBodyHandle,
-    rig: &Rig,
-    gravity_m_s2: f64,
-    span_s: f64,
-) {
-    let slider = &mut physics.bodies[slider];
+pub(super) fn push_slider(slider: &mut Slider, rig: &Rig, gravity_m_s2: f64, span_s: f64) {
     let speed_m_s = slider.linvel().z;
     let dry_and_viscous_N = rig.slide_friction_N + rig.slide_damping_N_s_m * speed_m_s.abs();
     let stopping_N = rig.moving_mass_kg * speed_m_s.abs() / span_s;

@@ -11,7 +11,9 @@ use crate::backend::Neighbour;
 use crate::snapshot::{Snapshot, SnapshotError};
 use crate::state::RigidBody;
 use nalgebra::{Unit, Vector3};
-use rapier3d_f64::dynamics::{FrictionModel, IntegrationParameters, RigidBodyBuilder, RigidBodyHandle};
+use rapier3d_f64::dynamics::{
+    FrictionModel, IntegrationParameters, RigidBody as Owner, RigidBodyBuilder, RigidBodyHandle,
+};
 use rapier3d_f64::geometry::{Collider, ColliderBuilder, ColliderHandle, ContactPair};
 use rapier3d_f64::math::Vector;
 use rapier3d_f64::parry::query::intersection_test;
@@ -84,18 +86,9 @@ impl World {
         body::write(&mut self.physics.bodies[self.handles.vehicle], body);
     }
 
-    /// Puts the rig's slider, if it has one, where the bearing is.
-    pub(super) fn set_slider(&mut self, bearing_W_m: &Vector3<f64>, speed_m_s: f64) {
-        if let Some(slider) = self.handles.slider {
-            rig::place(&mut self.physics, slider, bearing_W_m, speed_m_s);
-        }
-    }
-
-    /// Puts weight and friction on the rig's slider, if it has one, for the next step of `span_s`.
-    pub(super) fn push_slider(&mut self, rig: &Rig, gravity_m_s2: f64, span_s: f64) {
-        if let Some(slider) = self.handles.slider {
-            rig::push_slider(&mut self.physics, slider, rig, gravity_m_s2, span_s);
-        }
+    /// The rig's slider, if it has one.
+    pub(super) fn slider(&mut self) -> Option<&mut Owner> {
+        self.handles.slider.map(|slider| &mut self.physics.bodies[slider])
     }
 
     /// One step of `span_s` with this force and torque on the vehicle.

@@ -26,17 +26,17 @@ pub static EFFECT: EffectKind = EffectKind {
     ..EffectKind::PLAIN
 };
 
+/// Where each nominal value is from.
+const STRAPPED: &str = "tuned, no source: a battery that is not strapped in the middle";
+
 effect_parameters! {
     struct Parameters {
         /// d_x: how far the centre of mass is in front of the declared one
-        x: LENGTH, min: -0.1, max: 0.1, neutral: Some(0.0), nominal: 0.005,
-            source: "tuned, no source: a battery that is not strapped in the middle";
+        x: LENGTH, min: -0.1, max: 0.1, neutral: Some(0.0), nominal: 0.005, source: STRAPPED;
         /// d_y: how far it is left of it
-        y: LENGTH, min: -0.1, max: 0.1, neutral: Some(0.0), nominal: 0.005,
-            source: "tuned, no source: a battery that is not strapped in the middle";
+        y: LENGTH, min: -0.1, max: 0.1, neutral: Some(0.0), nominal: 0.005, source: STRAPPED;
         /// d_z: how far it is above it
-        z: LENGTH, min: -0.1, max: 0.1, neutral: Some(0.0), nominal: 0.005,
-            source: "tuned, no source: a battery that is not strapped in the middle";
+        z: LENGTH, min: -0.1, max: 0.1, neutral: Some(0.0), nominal: 0.005, source: STRAPPED;
     }
 }
 

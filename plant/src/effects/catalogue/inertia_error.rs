@@ -18,17 +18,17 @@ pub static EFFECT: EffectKind = EffectKind {
     ..EffectKind::PLAIN
 };
 
+/// Where each nominal value is from.
+const PUBLISHED: &str = "tuned, no source: published Hummingbirds differ by 50 %";
+
 effect_parameters! {
     struct Parameters {
         /// e_xx: relative deviation about body x
-        error_xx: RATIO, min: -0.5, max: 1.0, neutral: Some(0.0), nominal: 0.1,
-            source: "tuned, no source: published Hummingbirds differ by 50 %";
+        error_xx: RATIO, min: -0.5, max: 1.0, neutral: Some(0.0), nominal: 0.1, source: PUBLISHED;
         /// e_yy: relative deviation about body y
-        error_yy: RATIO, min: -0.5, max: 1.0, neutral: Some(0.0), nominal: 0.1,
-            source: "tuned, no source: published Hummingbirds differ by 50 %";
+        error_yy: RATIO, min: -0.5, max: 1.0, neutral: Some(0.0), nominal: 0.1, source: PUBLISHED;
         /// e_zz: relative deviation about body z
-        error_zz: RATIO, min: -0.5, max: 1.0, neutral: Some(0.0), nominal: 0.1,
-            source: "tuned, no source: published Hummingbirds differ by 50 %";
+        error_zz: RATIO, min: -0.5, max: 1.0, neutral: Some(0.0), nominal: 0.1, source: PUBLISHED;
     }
 }
 
@@ -40,10 +40,7 @@ fn stretch(values: &Values, vehicle: &mut Vehicle) {
 }
 
 fn require_rigid(vehicle: &Vehicle) -> Result<(), &'static str> {
-    match vehicles::is_rigid(&vehicle.inertia_kg_m2) {
-        true => Ok(()),
-        false => {
-            Err("deviations that leave no principal moment of inertia larger than the sum of the other two")
-        }
-    }
+    let expected =
+        "deviations that leave no principal moment of inertia larger than the sum of the other two";
+    if vehicles::is_rigid(&vehicle.inertia_kg_m2) { Ok(()) } else { Err(expected) }
 }

@@ -17,20 +17,19 @@ pub static EFFECT: EffectKind = EffectKind {
     ..EffectKind::PLAIN
 };
 
+/// Where each nominal value is from.
+const CHIPPED: &str = "tuned, no source: a chipped propeller";
+
 effect_parameters! {
     struct Parameters {
         /// l_1: part of the thrust that the first rotor of the vehicle file lacks
-        loss_1: RATIO, min: 0.0, max: 1.0, neutral: Some(0.0), nominal: 0.1,
-            source: "tuned, no source: a chipped propeller";
+        loss_1: RATIO, min: 0.0, max: 1.0, neutral: Some(0.0), nominal: 0.1, source: CHIPPED;
         /// l_2: the same of the second rotor
-        loss_2: RATIO, min: 0.0, max: 1.0, neutral: Some(0.0), nominal: 0.1,
-            source: "tuned, no source: a chipped propeller";
+        loss_2: RATIO, min: 0.0, max: 1.0, neutral: Some(0.0), nominal: 0.1, source: CHIPPED;
         /// l_3: the same of the third rotor
-        loss_3: RATIO, min: 0.0, max: 1.0, neutral: Some(0.0), nominal: 0.1,
-            source: "tuned, no source: a chipped propeller";
+        loss_3: RATIO, min: 0.0, max: 1.0, neutral: Some(0.0), nominal: 0.1, source: CHIPPED;
         /// l_4: the same of the fourth rotor
-        loss_4: RATIO, min: 0.0, max: 1.0, neutral: Some(0.0), nominal: 0.1,
-            source: "tuned, no source: a chipped propeller";
+        loss_4: RATIO, min: 0.0, max: 1.0, neutral: Some(0.0), nominal: 0.1, source: CHIPPED;
     }
 }
 

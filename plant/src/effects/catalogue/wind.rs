@@ -17,17 +17,17 @@ pub static EFFECT: EffectKind = EffectKind {
     ..EffectKind::PLAIN
 };
 
+/// Where each nominal value is from.
+const BREEZE: &str = "a light breeze: 3 m/s is Beaufort 2";
+
 effect_parameters! {
     struct Parameters {
         /// velocity of the air along x of the world
-        x: WIND_VELOCITY, min: -30.0, max: 30.0, neutral: Some(0.0), nominal: 3.0,
-            source: "a light breeze: 3 m/s is Beaufort 2";
+        x: WIND_VELOCITY, min: -30.0, max: 30.0, neutral: Some(0.0), nominal: 3.0, source: BREEZE;
         /// velocity of the air along y of the world
-        y: WIND_VELOCITY, min: -30.0, max: 30.0, neutral: Some(0.0), nominal: 1.0,
-            source: "a light breeze: 3 m/s is Beaufort 2";
+        y: WIND_VELOCITY, min: -30.0, max: 30.0, neutral: Some(0.0), nominal: 1.0, source: BREEZE;
         /// velocity of the air along z of the world
-        z: WIND_VELOCITY, min: -30.0, max: 30.0, neutral: Some(0.0), nominal: 0.2,
-            source: "a light breeze: 3 m/s is Beaufort 2";
+        z: WIND_VELOCITY, min: -30.0, max: 30.0, neutral: Some(0.0), nominal: 0.2, source: BREEZE;
     }
 }
 
