@@ -33,7 +33,7 @@ use toml::de::{DeString, DeTable, DeValue};
 /// assert_eq!((error.key(), error.to_string().as_str()), ("rol", "unknown key `rol`, expected `roll`"));
 /// ```
 pub fn read<P: DeserializeOwned>(parameters: &Value) -> Result<P, ParameterError> {
-    P::deserialize(Tree::Json(parameters)).map_err(|misread| misread.error)
+    P::deserialize(Tree::of_json(parameters)).map_err(|misread| misread.error)
 }
 
 /// Reads the TOML `text` of `file` as a `T`.
@@ -86,7 +86,7 @@ pub fn parse_toml(text: &str) -> Result<Spanned<DeTable<'_>>, Misread> {
 /// assert_eq!((misread.error.key(), misread.span()), ("radius_m", 21..25));
 /// ```
 pub fn read_tree<T: DeserializeOwned>(tree: &Spanned<DeValue<'_>>) -> Result<T, Misread> {
-    T::deserialize(Tree::Toml(tree))
+    T::deserialize(Tree::of_toml(tree))
 }
 
 /// What is not as the type to be read has it.
@@ -123,94 +123,10 @@ impl Misread {
     }
 }
 
-/// A value on its way into a type.
-#[derive(Clone, Copy)]
-enum Tree<'v> {
-    Json(&'v Value),
-    Toml(&'v Spanned<DeValue<'v>>),
-}
-
-/// A value in a table, with its key.
-struct Entry<'v> {
-    key: &'v str,
-    key_span: Option<Range<usize>>,
-    value: Tree<'v>,
-}
-
-impl<'v> Tree<'v> {
-    fn span(self) -> Option<Range<usize>> {
-        match self {
-            Self::Json(_) => None,
-            Self::Toml(value) => Some(value.span()),
-        }
-    }
-
-    fn of_toml_entry((key, value): (&'v Spanned<DeString<'v>>, &'v Spanned<DeValue<'v>>)) -> Entry<'v> {
-        Entry { key: key.get_ref(), key_span: Some(key.span()), value: Self::Toml(value) }
-    }
-
-    fn of_json_entry((key, value): (&'v String, &'v Value)) -> Entry<'v> {
-        Entry { key, key_span: None, value: Self::Json(value) }
-    }
-
-    fn shape(self) -> Shape<'v> {
-        match self {
-            Self::Json(value) => match value {
-                Value::Null => Shape::Null,
-                Value::Bool(flag) => Shape::Bool(*flag),
-                Value::Number(number) => match (number.as_u64(), number.as_i64()) {
-                    (Some(number), _) => Shape::Unsigned(number),
-                    (None, Some(number)) => Shape::Signed(number),
-                    (None, None) => Shape::Float(number.as_f64().unwrap_or(f64::NAN)),
-                },
-                Value::String(text) => Shape::Text(text),
-                Value::Array(items) => Shape::List(items.iter().map(Self::Json).collect()),
-                Value::Object(table) => Shape::Table(table.iter().map(Self::of_json_entry).collect()),
-            },
-            Self::Toml(value) => match value.get_ref() {
-                DeValue::Boolean(flag) => Shape::Bool(*flag),
-                DeValue::Integer(number) => {
-                    let (digits, radix) = (number.as_str(), number.radix());
-                    match (u64::from_str_radix(digits, radix), i64::from_str_radix(digits, radix)) {
-                        (Ok(number), _) => Shape::Unsigned(number),
-                        (Err(_), Ok(number)) => Shape::Signed(number),
-                        (Err(_), Err(_)) => Shape::Other("an integer of more than 64 bits"),
-                    }
-                }
-                DeValue::Float(number) => {
-                    number.as_str().parse().map_or(Shape::Other("a number that is none"), Shape::Float)
-                }
-                DeValue::String(text) => Shape::Text(text),
-                DeValue::Datetime(_) => Shape::Other("a date or time"),
-                DeValue::Array(items) => Shape::List(items.iter().map(Self::Toml).collect()),
-                DeValue::Table(table) => Shape::Table(table.iter().map(Self::of_toml_entry).collect()),
-            },
-        }
-    }
-
-    fn visit<V: Visitor<'v>>(self, visitor: V) -> Result<V::Value, Misread> {
-        match self.shape() {
-            Shape::Null => visitor.visit_unit(),
-            Shape::Bool(flag) => visitor.visit_bool(flag),
-            Shape::Unsigned(number) => visitor.visit_u64(number),
-            Shape::Signed(number) => visitor.visit_i64(number),
-            Shape::Float(number) => visitor.visit_f64(number),
-            Shape::Text(text) => visitor.visit_borrowed_str(text),
-            Shape::Other(what) => Err(de::Error::invalid_type(Unexpected::Other(what), &visitor)),
-            Shape::Table(entries) => visitor.visit_map(Entries::of(entries)),
-            Shape::List(items) => {
-                let count = items.len();
-                let mut items = Items(items.into_iter().enumerate());
-                let value = visitor.visit_seq(&mut items)?;
-                match items.0.len() {
-                    0 => Ok(value),
-                    left => {
-                        Err(de::Error::invalid_length(count, &format!("a list of {}", count - left).as_str()))
-                    }
-                }
-            }
-        }
-    }
+/// A value on its way into a type, and where it stands.
+struct Tree<'v> {
+    shape: Shape<'v>,
+    span: Option<Range<usize>>,
 }
 
 /// What a value is, in either language.
@@ -227,16 +143,89 @@ enum Shape<'v> {
     Table(Vec<Entry<'v>>),
 }
 
+/// A value in a table, with its key and where that stands.
+type Entry<'v> = (&'v str, Option<Range<usize>>, Tree<'v>);
+
+impl<'v> Tree<'v> {
+    fn of_json(value: &'v Value) -> Self {
+        let entry = |(key, value): (&'v String, &'v Value)| (key.as_str(), None, Self::of_json(value));
+        let shape = match value {
+            Value::Null => Shape::Null,
+            Value::Bool(flag) => Shape::Bool(*flag),
+            Value::Number(number) => match (number.as_u64(), number.as_i64()) {
+                (Some(number), _) => Shape::Unsigned(number),
+                (None, Some(number)) => Shape::Signed(number),
+                (None, None) => Shape::Float(number.as_f64().unwrap_or(f64::NAN)),
+            },
+            Value::String(text) => Shape::Text(text),
+            Value::Array(items) => Shape::List(items.iter().map(Self::of_json).collect()),
+            Value::Object(table) => Shape::Table(table.iter().map(entry).collect()),
+        };
+        Self { shape, span: None }
+    }
+
+    fn of_toml(value: &'v Spanned<DeValue<'v>>) -> Self {
+        let entry = |(key, value): (&'v Spanned<DeString<'v>>, _)| {
+            (key.get_ref().as_ref(), Some(key.span()), Self::of_toml(value))
+        };
+        let shape = match value.get_ref() {
+            DeValue::Boolean(flag) => Shape::Bool(*flag),
+            DeValue::Integer(number) => {
+                let (digits, radix) = (number.as_str(), number.radix());
+                match (u64::from_str_radix(digits, radix), i64::from_str_radix(digits, radix)) {
+                    (Ok(number), _) => Shape::Unsigned(number),
+                    (Err(_), Ok(number)) => Shape::Signed(number),
+                    (Err(_), Err(_)) => Shape::Other("an integer of more than 64 bits"),
+                }
+            }
+            DeValue::Float(number) => {
+                number.as_str().parse().map_or(Shape::Other("a number that is none"), Shape::Float)
+            }
+            DeValue::String(text) => Shape::Text(text),
+            DeValue::Datetime(_) => Shape::Other("a date or time"),
+            DeValue::Array(items) => Shape::List(items.iter().map(Self::of_toml).collect()),
+            DeValue::Table(table) => Shape::Table(table.iter().map(entry).collect()),
+        };
+        Self { shape, span: Some(value.span()) }
+    }
+}
+
+impl<'v> Shape<'v> {
+    fn visit<V: Visitor<'v>>(self, visitor: V) -> Result<V::Value, Misread> {
+        match self {
+            Self::Null => visitor.visit_unit(),
+            Self::Bool(flag) => visitor.visit_bool(flag),
+            Self::Unsigned(number) => visitor.visit_u64(number),
+            Self::Signed(number) => visitor.visit_i64(number),
+            Self::Float(number) => visitor.visit_f64(number),
+            Self::Text(text) => visitor.visit_borrowed_str(text),
+            Self::Other(what) => Err(de::Error::invalid_type(Unexpected::Other(what), &visitor)),
+            Self::Table(entries) => visitor.visit_map(Entries::of(entries)),
+            Self::List(items) => {
+                let count = items.len();
+                let mut items = Items(items.into_iter().enumerate());
+                let value = visitor.visit_seq(&mut items)?;
+                match items.0.len() {
+                    0 => Ok(value),
+                    left => {
+                        Err(de::Error::invalid_length(count, &format!("a list of {}", count - left).as_str()))
+                    }
+                }
+            }
+        }
+    }
+}
+
 impl<'de> Deserializer<'de> for Tree<'de> {
     type Error = Misread;
 
     fn deserialize_any<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, Misread> {
-        self.visit(visitor).map_err(|misread| misread.at(self.span()))
+        self.shape.visit(visitor).map_err(|misread| misread.at(self.span))
     }
 
     fn deserialize_option<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, Misread> {
-        match self {
-            Self::Json(Value::Null) => visitor.visit_none(),
+        match self.shape {
+            Shape::Null => visitor.visit_none(),
             _ => visitor.visit_some(self),
         }
     }
@@ -246,7 +235,8 @@ impl<'de> Deserializer<'de> for Tree<'de> {
         _: &'static str,
         visitor: V,
     ) -> Result<V::Value, Misread> {
-        visitor.visit_newtype_struct(self).map_err(|misread| misread.at(self.span()))
+        let span = self.span.clone();
+        visitor.visit_newtype_struct(self).map_err(|misread| misread.at(span))
     }
 
     fn deserialize_struct<V: Visitor<'de>>(
@@ -256,7 +246,8 @@ impl<'de> Deserializer<'de> for Tree<'de> {
         visitor: V,
     ) -> Result<V::Value, Misread> {
         if is_spanned(name) {
-            return visitor.visit_map(SpannedDeserializer::new(self, self.span().unwrap_or(0..0)));
+            let span = self.span.clone().unwrap_or(0..0);
+            return visitor.visit_map(SpannedDeserializer::new(self, span));
         }
         self.deserialize_any(visitor)
     }
@@ -267,7 +258,7 @@ impl<'de> Deserializer<'de> for Tree<'de> {
         variants: &'static [&'static str],
         visitor: V,
     ) -> Result<V::Value, Misread> {
-        match self.shape() {
+        match self.shape {
             Shape::Text(variant) => {
                 BorrowedStrDeserializer::new(variant).deserialize_enum(name, variants, visitor)
             }
@@ -275,9 +266,9 @@ impl<'de> Deserializer<'de> for Tree<'de> {
                 MapAccessDeserializer::new(Entries::of(entries)).deserialize_enum(name, variants, visitor)
             }
             Shape::Table(_) => Err(de::Error::custom("expected a table with one key, the variant's name")),
-            _ => self.visit(visitor),
+            shape => shape.visit(visitor),
         }
-        .map_err(|misread: Misread| misread.at(self.span()))
+        .map_err(|misread: Misread| misread.at(self.span))
     }
 
     forward_to_deserialize_any! {
@@ -298,7 +289,7 @@ impl<'v> IntoDeserializer<'v, Misread> for Tree<'v> {
 struct Entries<'v> {
     rest: std::vec::IntoIter<Entry<'v>>,
     /// The one whose key is read and whose value is not.
-    open: Option<Entry<'v>>,
+    open: Option<(&'v str, Tree<'v>)>,
 }
 
 impl<'v> Entries<'v> {
@@ -311,64 +302,16 @@ impl<'v> de::MapAccess<'v> for Entries<'v> {
     type Error = Misread;
 
     fn next_key_seed<K: DeserializeSeed<'v>>(&mut self, seed: K) -> Result<Option<K::Value>, Misread> {
-        let Some(entry) = self.rest.next() else { return Ok(None) };
-        let entry = self.open.insert(entry);
-        let key = seed.deserialize(Key { text: entry.key, span: entry.key_span.clone() });
-        key.map(Some).map_err(|misread| misread.at(entry.key_span.clone()))
+        let Some((key, span, value)) = self.rest.next() else { return Ok(None) };
+        self.open = Some((key, value));
+        let read = seed.deserialize(Tree { shape: Shape::Text(key), span: span.clone() });
+        read.map(Some).map_err(|misread| misread.at(span))
     }
 
     fn next_value_seed<S: DeserializeSeed<'v>>(&mut self, seed: S) -> Result<S::Value, Misread> {
-        let entry = self.open.take().expect("the key of an entry is read before its value");
-        let misread = |misread: Misread| misread.at(entry.value.span()).within(entry.key);
-        seed.deserialize(entry.value).map_err(misread)
-    }
-}
-
-/// A key on its way into a type.
-struct Key<'v> {
-    text: &'v str,
-    span: Option<Range<usize>>,
-}
-
-impl<'de> Deserializer<'de> for Key<'de> {
-    type Error = Misread;
-
-    fn deserialize_any<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, Misread> {
-        visitor.visit_borrowed_str(self.text)
-    }
-
-    fn deserialize_newtype_struct<V: Visitor<'de>>(
-        self,
-        _: &'static str,
-        visitor: V,
-    ) -> Result<V::Value, Misread> {
-        visitor.visit_newtype_struct(self)
-    }
-
-    fn deserialize_struct<V: Visitor<'de>>(
-        self,
-        name: &'static str,
-        _: &'static [&'static str],
-        visitor: V,
-    ) -> Result<V::Value, Misread> {
-        match self.span {
-            Some(span) if is_spanned(name) => visitor.visit_map(SpannedDeserializer::new(self.text, span)),
-            _ => visitor.visit_borrowed_str(self.text),
-        }
-    }
-
-    fn deserialize_enum<V: Visitor<'de>>(
-        self,
-        name: &'static str,
-        variants: &'static [&'static str],
-        visitor: V,
-    ) -> Result<V::Value, Misread> {
-        BorrowedStrDeserializer::new(self.text).deserialize_enum(name, variants, visitor)
-    }
-
-    forward_to_deserialize_any! {
-        bool i8 i16 i32 i64 u8 u16 u32 u64 f32 f64 char str string bytes byte_buf option unit unit_struct seq tuple
-        tuple_struct map identifier ignored_any
+        let (key, value) = self.open.take().expect("the key of an entry is read before its value");
+        let span = value.span.clone();
+        seed.deserialize(value).map_err(|misread| misread.at(span).within(key))
     }
 }
 
@@ -380,8 +323,8 @@ impl<'v> de::SeqAccess<'v> for Items<'v> {
 
     fn next_element_seed<S: DeserializeSeed<'v>>(&mut self, seed: S) -> Result<Option<S::Value>, Misread> {
         let Some((index, item)) = self.0.next() else { return Ok(None) };
-        let misread = |misread: Misread| misread.at(item.span()).within(&index.to_string());
-        seed.deserialize(item).map(Some).map_err(misread)
+        let span = item.span.clone();
+        seed.deserialize(item).map(Some).map_err(|misread| misread.at(span).within(&index.to_string()))
     }
 }
 
@@ -402,7 +345,7 @@ impl de::Error for Misread {
     }
 
     fn invalid_value(found: Unexpected<'_>, expected: &dyn de::Expected) -> Self {
-        ParameterError::value("", expected.to_string(), found).into()
+        Self::invalid_type(found, expected)
     }
 
     fn invalid_length(length: usize, expected: &dyn de::Expected) -> Self {

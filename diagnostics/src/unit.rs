@@ -28,6 +28,11 @@ pub struct Dimension {
 }
 
 impl Dimension {
+    /// The dimension called `name`, whose first unit is that of the SI.
+    pub const fn of(name: &'static str, units: &'static [(&'static str, f64)]) -> Self {
+        Self { name, units }
+    }
+
     /// The factor that takes `unit` to SI, if this dimension has it.
     #[must_use]
     pub fn factor(&self, unit: &str) -> Option<f64> {
@@ -55,162 +60,140 @@ impl Dimension {
 }
 
 /// Masses.
-pub const MASS: Dimension = Dimension { name: "mass", units: &[("kg", 1.0), ("g", 1e-3)] };
+pub const MASS: Dimension = Dimension::of("mass", &[("kg", 1.0), ("g", 1e-3)]);
 
 /// Lengths.
-pub const LENGTH: Dimension = Dimension { name: "length", units: &[("m", 1.0), ("cm", 1e-2), ("mm", 1e-3)] };
+pub const LENGTH: Dimension = Dimension::of("length", &[("m", 1.0), ("cm", 1e-2), ("mm", 1e-3)]);
 
 /// Times.
-pub const TIME: Dimension =
-    Dimension { name: "time", units: &[("s", 1.0), ("ms", 1e-3), ("us", 1e-6), ("ns", 1e-9)] };
+pub const TIME: Dimension = Dimension::of("time", &[("s", 1.0), ("ms", 1e-3), ("us", 1e-6), ("ns", 1e-9)]);
 
 /// Accelerations.
-pub const ACCELERATION: Dimension = Dimension {
-    name: "acceleration",
-    units: &[("m/s^2", 1.0), ("g", STANDARD_GRAVITY_M_S2), ("mg", 1e-3 * STANDARD_GRAVITY_M_S2)],
-};
+pub const ACCELERATION: Dimension = Dimension::of(
+    "acceleration",
+    &[("m/s^2", 1.0), ("g", STANDARD_GRAVITY_M_S2), ("mg", 1e-3 * STANDARD_GRAVITY_M_S2)],
+);
 
 /// Rates of change of accelerations.
-pub const JERK: Dimension = Dimension { name: "jerk", units: &[("m/s^3", 1.0)] };
+pub const JERK: Dimension = Dimension::of("jerk", &[("m/s^3", 1.0)]);
 
 /// Angles.
-pub const ANGLE: Dimension = Dimension { name: "angle", units: &[("rad", 1.0), ("deg", PI / 180.0)] };
+pub const ANGLE: Dimension = Dimension::of("angle", &[("rad", 1.0), ("deg", PI / 180.0)]);
 
 /// Moments of inertia.
 pub const INERTIA: Dimension =
-    Dimension { name: "moment of inertia", units: &[("kg*m^2", 1.0), ("g*m^2", 1e-3), ("g*mm^2", 1e-9)] };
+    Dimension::of("moment of inertia", &[("kg*m^2", 1.0), ("g*m^2", 1e-3), ("g*mm^2", 1e-9)]);
 
 /// Rotation speeds.
 pub const SPEED: Dimension =
-    Dimension { name: "rotation speed", units: &[("rad/s", 1.0), ("rpm", RPM), ("deg/s", PI / 180.0)] };
+    Dimension::of("rotation speed", &[("rad/s", 1.0), ("rpm", RPM), ("deg/s", PI / 180.0)]);
 
 /// Rotation speeds as logs of rotors have them.
 pub const ROTOR_SPEED: Dimension =
-    Dimension { name: "rotor speed", units: &[("rad/s", 1.0), ("rpm", RPM), ("Hz", 2.0 * PI)] };
+    Dimension::of("rotor speed", &[("rad/s", 1.0), ("rpm", RPM), ("Hz", 2.0 * PI)]);
 
 /// Rotation speeds as logs of gyroscopes have them.
 pub const ANGULAR_VELOCITY: Dimension =
-    Dimension { name: "angular velocity", units: &[("rad/s", 1.0), ("deg/s", PI / 180.0), ("mrad/s", 1e-3)] };
+    Dimension::of("angular velocity", &[("rad/s", 1.0), ("deg/s", PI / 180.0), ("mrad/s", 1e-3)]);
 
 /// Angular accelerations.
 pub const ANGULAR_ACCELERATION: Dimension =
-    Dimension { name: "angular acceleration", units: &[("rad/s^2", 1.0), ("deg/s^2", PI / 180.0)] };
+    Dimension::of("angular acceleration", &[("rad/s^2", 1.0), ("deg/s^2", PI / 180.0)]);
 
 /// Gains from a quantity to its rate of change.
-pub const PER_SECOND: Dimension = Dimension { name: "gain per time", units: &[("1/s", 1.0)] };
+pub const PER_SECOND: Dimension = Dimension::of("gain per time", &[("1/s", 1.0)]);
 
 /// Gains from a quantity to its second rate of change.
-pub const PER_SECOND_2: Dimension = Dimension { name: "gain per time squared", units: &[("1/s^2", 1.0)] };
+pub const PER_SECOND_2: Dimension = Dimension::of("gain per time squared", &[("1/s^2", 1.0)]);
 
 /// Gains from a quantity to its third rate of change.
-pub const PER_SECOND_3: Dimension = Dimension { name: "gain per time cubed", units: &[("1/s^3", 1.0)] };
+pub const PER_SECOND_3: Dimension = Dimension::of("gain per time cubed", &[("1/s^3", 1.0)]);
 
 /// Thrust coefficients.
-pub const THRUST_COEFFICIENT: Dimension = Dimension {
-    name: "thrust per rotation speed squared",
-    units: &[("N/(rad/s)^2", 1.0), ("N/rpm^2", 1.0 / (RPM * RPM))],
-};
+pub const THRUST_COEFFICIENT: Dimension = Dimension::of(
+    "thrust per rotation speed squared",
+    &[("N/(rad/s)^2", 1.0), ("N/rpm^2", 1.0 / (RPM * RPM))],
+);
 
 /// Torque coefficients.
-pub const TORQUE_COEFFICIENT: Dimension = Dimension {
-    name: "torque per rotation speed squared",
-    units: &[("N*m/(rad/s)^2", 1.0), ("N*m/rpm^2", 1.0 / (RPM * RPM))],
-};
+pub const TORQUE_COEFFICIENT: Dimension = Dimension::of(
+    "torque per rotation speed squared",
+    &[("N*m/(rad/s)^2", 1.0), ("N*m/rpm^2", 1.0 / (RPM * RPM))],
+);
 
 /// Pure numbers.
-pub const PURE_NUMBER: Dimension = Dimension { name: "a pure number", units: &[("1", 1.0)] };
+pub const PURE_NUMBER: Dimension = Dimension::of("a pure number", &[("1", 1.0)]);
 
 /// Parts of a whole, and relative deviations.
-pub const RATIO: Dimension = Dimension { name: "a ratio", units: &[("1", 1.0), ("%", 1e-2)] };
+pub const RATIO: Dimension = Dimension::of("a ratio", &[("1", 1.0), ("%", 1e-2)]);
 
 /// Velocities.
-pub const VELOCITY: Dimension =
-    Dimension { name: "velocity", units: &[("m/s", 1.0), ("cm/s", 1e-2), ("mm/s", 1e-3)] };
+pub const VELOCITY: Dimension = Dimension::of("velocity", &[("m/s", 1.0), ("cm/s", 1e-2), ("mm/s", 1e-3)]);
 
 /// Velocities of the air, which weather services give in knots. No log of a vehicle is in them: there they would only be
 /// one more unit that a wrong scale could be taken for.
-pub const WIND_VELOCITY: Dimension =
-    Dimension { name: "velocity", units: &[("m/s", 1.0), ("knot", 1852.0 / 3600.0)] };
+pub const WIND_VELOCITY: Dimension = Dimension::of("velocity", &[("m/s", 1.0), ("knot", 1852.0 / 3600.0)]);
 
 /// Forces; the gram-force by standard gravity.
 pub const FORCE: Dimension =
-    Dimension { name: "force", units: &[("N", 1.0), ("gf", 9.806_65e-3), ("kgf", STANDARD_GRAVITY_M_S2)] };
+    Dimension::of("force", &[("N", 1.0), ("gf", 9.806_65e-3), ("kgf", STANDARD_GRAVITY_M_S2)]);
 
 /// Forces against a motion.
-pub const LINEAR_DAMPING: Dimension = Dimension { name: "force per speed", units: &[("N*s/m", 1.0)] };
+pub const LINEAR_DAMPING: Dimension = Dimension::of("force per speed", &[("N*s/m", 1.0)]);
 
 /// Torques.
-pub const TORQUE: Dimension = Dimension { name: "torque", units: &[("N*m", 1.0), ("N*mm", 1e-3)] };
+pub const TORQUE: Dimension = Dimension::of("torque", &[("N*m", 1.0), ("N*mm", 1e-3)]);
 
 /// Torques against a rotation.
 pub const ROTARY_DAMPING: Dimension =
-    Dimension { name: "torque per rotation speed", units: &[("N*m*s/rad", 1.0), ("N*m*s", 1.0)] };
+    Dimension::of("torque per rotation speed", &[("N*m*s/rad", 1.0), ("N*m*s", 1.0)]);
 
 /// Torques against a deflection.
-pub const ROTARY_STIFFNESS: Dimension = Dimension { name: "torque per angle", units: &[("N*m/rad", 1.0)] };
+pub const ROTARY_STIFFNESS: Dimension = Dimension::of("torque per angle", &[("N*m/rad", 1.0)]);
 
 /// Masses times their distances from a point.
-pub const STATIC_MOMENT: Dimension =
-    Dimension { name: "static moment", units: &[("kg*m", 1.0), ("g*m", 1e-3)] };
+pub const STATIC_MOMENT: Dimension = Dimension::of("static moment", &[("kg*m", 1.0), ("g*m", 1e-3)]);
 
 /// Forces linear in a rotor's speed and in that of the air.
-pub const ROTOR_DRAG: Dimension = Dimension {
-    name: "force per rotation speed and velocity",
-    units: &[("N*s^2/(m*rad)", 1.0), ("kg/rad", 1.0)],
-};
+pub const ROTOR_DRAG: Dimension =
+    Dimension::of("force per rotation speed and velocity", &[("N*s^2/(m*rad)", 1.0), ("kg/rad", 1.0)]);
 
 /// Forces quadratic in the speed of the air.
 pub const DYNAMIC_DRAG: Dimension =
-    Dimension { name: "force per velocity squared", units: &[("N*s^2/m^2", 1.0), ("kg/m", 1.0)] };
+    Dimension::of("force per velocity squared", &[("N*s^2/m^2", 1.0), ("kg/m", 1.0)]);
 
 /// Angles linear in the speed of the air.
-pub const TILT: Dimension =
-    Dimension { name: "angle per velocity", units: &[("rad*s/m", 1.0), ("deg*s/m", PI / 180.0)] };
+pub const TILT: Dimension = Dimension::of("angle per velocity", &[("rad*s/m", 1.0), ("deg*s/m", PI / 180.0)]);
 
 /// Voltages.
-pub const VOLTAGE: Dimension = Dimension { name: "voltage", units: &[("V", 1.0), ("mV", 1e-3)] };
+pub const VOLTAGE: Dimension = Dimension::of("voltage", &[("V", 1.0), ("mV", 1e-3)]);
 
 /// Electrical resistances.
-pub const RESISTANCE: Dimension =
-    Dimension { name: "electrical resistance", units: &[("ohm", 1.0), ("mohm", 1e-3)] };
+pub const RESISTANCE: Dimension = Dimension::of("electrical resistance", &[("ohm", 1.0), ("mohm", 1e-3)]);
 
 /// Electrical charges.
 pub const CHARGE: Dimension =
-    Dimension { name: "electrical charge", units: &[("C", 1.0), ("A*h", 3600.0), ("mA*h", 3.6)] };
+    Dimension::of("electrical charge", &[("C", 1.0), ("A*h", 3600.0), ("mA*h", 3.6)]);
 
 /// Electrical currents.
-pub const CURRENT: Dimension = Dimension { name: "current", units: &[("A", 1.0), ("mA", 1e-3)] };
+pub const CURRENT: Dimension = Dimension::of("current", &[("A", 1.0), ("mA", 1e-3)]);
 
 /// Magnetic flux densities.
-pub const FLUX_DENSITY: Dimension = Dimension { name: "magnetic flux density", units: &[("T", 1.0)] };
+pub const FLUX_DENSITY: Dimension = Dimension::of("magnetic flux density", &[("T", 1.0)]);
 
 /// Pressures.
-pub const PRESSURE: Dimension = Dimension { name: "pressure", units: &[("Pa", 1.0), ("hPa", 100.0)] };
+pub const PRESSURE: Dimension = Dimension::of("pressure", &[("Pa", 1.0), ("hPa", 100.0)]);
 
 /// Raw commands.
-pub const COUNT: Dimension = Dimension { name: "count", units: &[("count", 1.0)] };
+pub const COUNT: Dimension = Dimension::of("count", &[("count", 1.0)]);
 
 /// Raw commands, or shares of their range.
-pub const COMMAND: Dimension =
-    Dimension { name: "command", units: &[("count", 1.0), ("fraction", 1.0), ("%", 1e-2)] };
+pub const COMMAND: Dimension = Dimension::of("command", &[("count", 1.0), ("fraction", 1.0), ("%", 1e-2)]);
 
 /// The dimensions of what a message can hold: a field of any of these can be judged and drawn in its other units.
-const OF_MESSAGES: [Dimension; 15] = [
-    LENGTH,
-    ANGLE,
-    SPEED,
-    VELOCITY,
-    ACCELERATION,
-    JERK,
-    FORCE,
-    TORQUE,
-    VOLTAGE,
-    CURRENT,
-    FLUX_DENSITY,
-    PRESSURE,
-    TIME,
-    PURE_NUMBER,
-    COUNT,
+const OF_MESSAGES: [&[Dimension]; 2] = [
+    &[LENGTH, ANGLE, SPEED, VELOCITY, ACCELERATION, JERK, FORCE, TORQUE],
+    &[TIME, VOLTAGE, CURRENT, FLUX_DENSITY, PRESSURE, PURE_NUMBER, COUNT],
 ];
 
 /// Why a number cannot be converted from one unit to another.
@@ -247,12 +230,10 @@ pub fn convert(from: &str, to: &str) -> Result<f64, ConversionError> {
     if from == to {
         return Ok(1.0);
     }
-    let Some((dimension, factor)) =
-        OF_MESSAGES.iter().find_map(|dimension| Some((dimension, dimension.factor(from)?)))
-    else {
-        return Err(ConversionError::UnknownUnit { from: from.to_owned(), to: to.to_owned() });
-    };
-    let other = || ConversionError::OtherDimension { to: to.to_owned(), dimension: *dimension };
+    let known = OF_MESSAGES.into_iter().flatten().find_map(|of| Some((*of, of.factor(from)?)));
+    let unknown = || ConversionError::UnknownUnit { from: from.to_owned(), to: to.to_owned() };
+    let (dimension, factor) = known.ok_or_else(unknown)?;
+    let other = || ConversionError::OtherDimension { to: to.to_owned(), dimension };
     Ok(factor / dimension.factor(to).ok_or_else(other)?)
 }
 

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use recorder::definition::{Definition, DefinitionError, Leaf};
+use recorder::definition::{Definition, DefinitionError, Leaf, number};
 use recorder::reader::Messages;
 
 use crate::error::{LogError, Spot};
@@ -147,10 +147,6 @@ fn little_endian(cdr: &[u8]) -> Vec<u8> {
         options.iter_mut().take(2).for_each(|option| *option = 0);
     }
     plain
-}
-
-fn number(leaves: &[Leaf], path: &str) -> Option<f64> {
-    leaves.iter().find(|leaf| leaf.path == path)?.value.as_f64()
 }
 
 /// When the message was measured: by our own sensors' `measured_ns`, else by its header's or its own stamp.

@@ -29,12 +29,6 @@ pub struct Damage {
     reason: String,
 }
 
-impl Damage {
-    fn new(place: String, reason: impl ToString) -> Self {
-        Self { place, reason: reason.to_string() }
-    }
-}
-
 /// Some bytes of a file, with the word for their places.
 struct Bytes<'a> {
     bytes: &'a [u8],
@@ -52,7 +46,7 @@ struct Raw<'a> {
 
 impl<'a> Bytes<'a> {
     fn damage(&self, at: usize, reason: impl ToString) -> Damage {
-        Damage::new(format!("byte {at}{}", self.of), reason)
+        Damage { place: format!("byte {at}{}", self.of), reason: reason.to_string() }
     }
 
     /// The record that begins at `at`.
@@ -63,25 +57,24 @@ impl<'a> Bytes<'a> {
             return Err(self.damage(at, reason));
         };
         let length = u64::from_le_bytes(*length);
+        let ((kind, parts), left) = (kind(opcode), rest.len());
         let body = usize::try_from(length).ok().and_then(|length| rest.get(..length)).ok_or_else(|| {
-            let (kind, left) = (name(opcode), rest.len());
             self.damage(at, format!("a record ({kind}) says that it is {length} bytes long, {left} are left"))
         })?;
-        check(opcode, body)
-            .map_err(|fault| self.damage(at, format!("a record ({}) {fault}", name(opcode))))?;
+        check(parts, body).map_err(|fault| self.damage(at, format!("a record ({kind}) {fault}")))?;
         Ok(Raw { opcode, body, end: at + HEAD_BYTES + body.len() })
     }
 
     fn parsed<'b>(&self, at: usize, raw: &Raw<'b>) -> Result<Record<'b>, Damage> {
         parse_record(raw.opcode, raw.body)
-            .map_err(|error| self.damage(at, format!("a record ({}): {error}", name(raw.opcode))))
+            .map_err(|error| self.damage(at, format!("a record ({}): {error}", kind(raw.opcode).0)))
     }
 }
 
 /// A part of a record's body.
 enum Part {
     /// So many bytes.
-    Fixed(usize),
+    Fixed(u64),
     /// A length in 32 bits and as many bytes: a text or a table of numbers.
     Long32,
     /// A length in 64 bits and as many bytes.
@@ -90,43 +83,26 @@ enum Part {
     Texts,
 }
 
-/// What the body of a record holds; behind that, and in records of other kinds, may stand anything.
-fn parts(opcode: u8) -> &'static [Part] {
+/// What a record is called, and what its body holds; behind that, and in records of other kinds, may stand anything.
+fn kind(opcode: u8) -> (&'static str, &'static [Part]) {
     use Part::{Fixed, Long32, Long64, Texts};
     match opcode {
-        op::HEADER => &[Long32, Long32],
-        op::SCHEMA => &[Fixed(2), Long32, Long32, Long32],
-        op::CHANNEL => &[Fixed(4), Long32, Long32, Texts],
-        op::CHUNK => &[Fixed(28), Long32, Long64],
-        op::MESSAGE_INDEX => &[Fixed(2), Long32],
-        op::CHUNK_INDEX => &[Fixed(32), Long32, Fixed(8), Long32, Fixed(16)],
-        op::ATTACHMENT => &[Fixed(16), Long32, Long32, Long64, Fixed(4)],
-        op::ATTACHMENT_INDEX => &[Fixed(40), Long32, Long32],
-        op::STATISTICS => &[Fixed(42), Long32],
-        op::METADATA => &[Long32, Texts],
-        op::METADATA_INDEX => &[Fixed(16), Long32],
-        _ => &[],
-    }
-}
-
-fn name(opcode: u8) -> &'static str {
-    match opcode {
-        op::HEADER => "header",
-        op::FOOTER => "footer",
-        op::SCHEMA => "schema",
-        op::CHANNEL => "channel",
-        op::MESSAGE => "message",
-        op::CHUNK => "chunk",
-        op::MESSAGE_INDEX => "message index",
-        op::CHUNK_INDEX => "chunk index",
-        op::ATTACHMENT => "attachment",
-        op::ATTACHMENT_INDEX => "attachment index",
-        op::STATISTICS => "statistics",
-        op::METADATA => "metadata",
-        op::METADATA_INDEX => "metadata index",
-        op::SUMMARY_OFFSET => "summary offset",
-        op::DATA_END => "end of data",
-        _ => "of a kind that is not known",
+        op::HEADER => ("header", &[Long32, Long32]),
+        op::FOOTER => ("footer", &[]),
+        op::SCHEMA => ("schema", &[Fixed(2), Long32, Long32, Long32]),
+        op::CHANNEL => ("channel", &[Fixed(4), Long32, Long32, Texts]),
+        op::MESSAGE => ("message", &[]),
+        op::CHUNK => ("chunk", &[Fixed(28), Long32, Long64]),
+        op::MESSAGE_INDEX => ("message index", &[Fixed(2), Long32]),
+        op::CHUNK_INDEX => ("chunk index", &[Fixed(32), Long32, Fixed(8), Long32, Fixed(16)]),
+        op::ATTACHMENT => ("attachment", &[Fixed(16), Long32, Long32, Long64, Fixed(4)]),
+        op::ATTACHMENT_INDEX => ("attachment index", &[Fixed(40), Long32, Long32]),
+        op::STATISTICS => ("statistics", &[Fixed(42), Long32]),
+        op::METADATA => ("metadata", &[Long32, Texts]),
+        op::METADATA_INDEX => ("metadata index", &[Fixed(16), Long32]),
+        op::SUMMARY_OFFSET => ("summary offset", &[]),
+        op::DATA_END => ("end of data", &[]),
+        _ => ("of a kind that is not known", &[]),
     }
 }
 
@@ -148,20 +124,16 @@ enum Fault {
 }
 
 /// Refuses a record with a length in it that goes beyond it.
-fn check(opcode: u8, body: &[u8]) -> Result<(), Fault> {
-    let mut rest = body;
-    for part in parts(opcode) {
-        match part {
-            Part::Fixed(length) => take(&mut rest, *length as u64).map(|_| ()),
-            Part::Long32 => long32(&mut rest).map(|_| ()),
-            Part::Long64 => number(&mut rest, 8).and_then(|length| take(&mut rest, length)).map(|_| ()),
-            Part::Texts => long32(&mut rest).and_then(|mut texts| {
-                while !texts.is_empty() {
-                    long32(&mut texts)?;
-                }
-                Ok(())
-            }),
-        }?;
+fn check(parts: &[Part], mut body: &[u8]) -> Result<(), Fault> {
+    for part in parts {
+        let mut texts = match part {
+            Part::Fixed(length) => take(&mut body, *length)?,
+            Part::Long32 | Part::Texts => long32(&mut body)?,
+            Part::Long64 => number(&mut body, 8).and_then(|length| take(&mut body, length))?,
+        };
+        while matches!(part, Part::Texts) && !texts.is_empty() {
+            long32(&mut texts)?;
+        }
     }
     Ok(())
 }
@@ -290,12 +262,10 @@ fn linked(
         Record::Schema { header, data } => channels.add_schema(header, Cow::Owned(data.into_owned())),
         Record::Channel(channel) => channels.add_channel(channel),
         Record::Message { header, data } => {
-            let channel = channels.get(header.channel_id).ok_or_else(|| {
-                bytes.damage(
-                    at,
-                    format!("a message of the channel {}, which no record declares", header.channel_id),
-                )
-            })?;
+            let id = header.channel_id;
+            let unknown =
+                || bytes.damage(at, format!("a message of the channel {id}, which no record declares"));
+            let channel = channels.get(id).ok_or_else(unknown)?;
             let data = Cow::Owned(data.into_owned());
             let (log_time, publish_time) = (header.log_time, header.publish_time);
             let message = Message { channel, sequence: header.sequence, log_time, publish_time, data };
@@ -346,10 +316,12 @@ fn decompressed(data: &[u8], size: u64) -> Result<Vec<u8>, Fault> {
     Err(Fault::Size { stated: size, found: read })
 }
 
+/// Channels by their number, each with the number of its messages.
+pub(crate) type Channels = BTreeMap<u16, (Arc<Channel<'static>>, u64)>;
+
 /// What the end of a complete file says about the rest.
 pub(crate) struct Summary {
-    /// The channels by their number, each with the number of its messages.
-    pub channels: BTreeMap<u16, (Arc<Channel<'static>>, u64)>,
+    pub channels: Channels,
     /// Where the attachments are.
     pub attachments: Vec<AttachmentIndex>,
 }

@@ -86,6 +86,12 @@ impl std::fmt::Display for Value {
     }
 }
 
+/// The number at `path` among `leaves`.
+#[must_use]
+pub fn number(leaves: &[Leaf], path: &str) -> Option<f64> {
+    leaves.iter().find(|leaf| leaf.path == path)?.value.as_f64()
+}
+
 /// A leaf field of a message.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Leaf {
@@ -131,30 +137,23 @@ impl Definition {
     /// # Errors
     /// The line that is not understood.
     pub fn parse(name: &str, text: &str) -> Result<Self, DefinitionError> {
-        let mut current = (String::new(), name.split('/').next().unwrap_or_default(), Vec::new());
-        let mut types = BTreeMap::new();
-        let mut root = None;
+        // Of each message its name, in two parts and as it is written, and its fields; the first is the root.
+        let mut messages = vec![(String::new(), name, Vec::new())];
         let mut lines = text.lines().map(str::trim_end);
         while let Some(line) = lines.next() {
+            let (_, name, fields) = messages.last_mut().expect("there is the root");
             if !is_rule(line) {
-                current.2.extend(parse_field(line, current.1)?);
+                fields.extend(parse_field(line, name.split('/').next().unwrap_or_default())?);
                 continue;
             }
             let head = lines.next().unwrap_or_default();
             let next =
                 head.strip_prefix("MSG: ").ok_or_else(|| DefinitionError::Head(head.to_owned()))?.trim();
-            let package = next.split('/').next().unwrap_or_default();
-            let (name, _, fields) = std::mem::replace(&mut current, (two_part(next), package, Vec::new()));
-            match root {
-                None => root = Some(fields),
-                Some(_) => drop(types.insert(name, fields)),
-            }
+            messages.push((two_part(next), next, Vec::new()));
         }
-        match root {
-            None => root = Some(current.2),
-            Some(_) => drop(types.insert(current.0, current.2)),
-        }
-        Ok(Self { root: root.unwrap_or_default(), types })
+        let mut messages = messages.into_iter().map(|(name, _, fields)| (name, fields));
+        let root = messages.next().map_or(Vec::new(), |(_, fields)| fields);
+        Ok(Self { root, types: messages.collect() })
     }
 
     /// Decodes a message: its encapsulation header and body.

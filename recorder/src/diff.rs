@@ -8,28 +8,17 @@ use std::path::PathBuf;
 /// The first difference of two recordings.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Difference {
-    /// A field of a message.
-    Field {
-        /// Tick.
-        tick: u32,
-        /// Topic.
-        topic: String,
-        /// Field path.
-        field: String,
-        /// Value in the first recording.
-        a: String,
-        /// Value in the second recording.
-        b: String,
-    },
-    /// A message is in one recording only.
+    /// A message, or a field of it.
     Message {
         /// Tick.
         tick: u32,
         /// Topic.
         topic: String,
-        /// What is in its place in the first recording.
+        /// Field path; `None` where the whole message is in one recording only.
+        field: Option<String>,
+        /// What is there in the first recording.
         a: String,
-        /// What is in its place in the second recording.
+        /// What is there in the second recording.
         b: String,
     },
     /// All messages of one recording are the first ones of the other, which goes on.
@@ -48,10 +37,10 @@ pub enum Difference {
 impl fmt::Display for Difference {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Field { tick, topic, field, a, b } => {
-                write!(f, "tick {tick}, topic {topic}, field {field}: {a} against {b}")
+            Self::Message { tick, topic, field, a, b } => {
+                let field = field.as_ref().map_or(String::new(), |field| format!(", field {field}"));
+                write!(f, "tick {tick}, topic {topic}{field}: {a} against {b}")
             }
-            Self::Message { tick, topic, a, b } => write!(f, "tick {tick}, topic {topic}: {a} against {b}"),
             Self::Prefix { shorter, last_tick, longer } => {
                 write!(f, "{} is a prefix of {}: ", shorter.display(), longer.display())?;
                 match last_tick {
@@ -74,24 +63,29 @@ pub fn first_difference(a: &Recording, b: &Recording) -> Result<Option<Differenc
     if a.bytes() == b.bytes() {
         return Ok(None);
     }
+    let prefix = |shorter: &Recording, last_tick, longer: &Recording| {
+        Ok(Difference::Prefix {
+            shorter: shorter.path().to_owned(),
+            last_tick,
+            longer: longer.path().to_owned(),
+        })
+    };
     let (mut left, mut right) = (a.messages(), b.messages());
     let mut last_tick = None;
     loop {
-        match (left.next().transpose()?, right.next().transpose()?) {
-            (None, None) => return container_difference(a, b).map(Some),
-            (Some(x), Some(y)) if same_message(&x, &y) => last_tick = Some(x.tick),
-            (None, Some(_)) => return Ok(Some(prefix(a, last_tick, b))),
-            (Some(_), None) => return Ok(Some(prefix(b, last_tick, a))),
-            (Some(x), Some(y)) if (x.tick, &x.topic) == (y.tick, &y.topic) => {
-                return Ok(Some(field_difference(a, b, &x, &y)?));
+        return match (left.next().transpose()?, right.next().transpose()?) {
+            (None, None) => container_difference(a, b),
+            (Some(x), Some(y)) if same_message(&x, &y) => {
+                last_tick = Some(x.tick);
+                continue;
             }
-            (Some(x), Some(y)) => return Ok(Some(message_difference(&x, &y))),
+            (None, Some(_)) => prefix(a, last_tick, b),
+            (Some(_), None) => prefix(b, last_tick, a),
+            (Some(x), Some(y)) if (x.tick, &x.topic) == (y.tick, &y.topic) => field_difference(a, b, &x, &y),
+            (Some(x), Some(y)) => Ok(message_difference(&x, &y)),
         }
+        .map(Some);
     }
-}
-
-fn prefix(shorter: &Recording, last_tick: Option<u32>, longer: &Recording) -> Difference {
-    Difference::Prefix { shorter: shorter.path().to_owned(), last_tick, longer: longer.path().to_owned() }
 }
 
 fn same_message(x: &Record, y: &Record) -> bool {
@@ -104,13 +98,9 @@ fn field_difference(
     x: &Record,
     y: &Record,
 ) -> Result<Difference, RecordingError> {
-    let difference = |field: &str, a, b| Difference::Field {
-        tick: x.tick,
-        topic: x.topic.clone(),
-        field: field.to_owned(),
-        a,
-        b,
-    };
+    let (tick, topic) = (x.tick, x.topic.clone());
+    let difference =
+        |field: &str, a, b| Difference::Message { tick, topic, field: Some(field.to_owned()), a, b };
     if x.time_ns != y.time_ns {
         return Ok(difference("(log time in ns)", x.time_ns.to_string(), y.time_ns.to_string()));
     }
@@ -131,7 +121,8 @@ fn field_difference(
 fn message_difference(x: &Record, y: &Record) -> Difference {
     let describe = |record: &Record| format!("a message of {} at tick {}", record.topic, record.tick);
     let earlier = if (x.tick, &x.topic) <= (y.tick, &y.topic) { x } else { y };
-    Difference::Message { tick: earlier.tick, topic: earlier.topic.clone(), a: describe(x), b: describe(y) }
+    let (tick, topic) = (earlier.tick, earlier.topic.clone());
+    Difference::Message { tick, topic, field: None, a: describe(x), b: describe(y) }
 }
 
 fn container_difference(a: &Recording, b: &Recording) -> Result<Difference, RecordingError> {

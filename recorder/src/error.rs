@@ -1,7 +1,7 @@
 //! What can go wrong with a recording.
 
-use crate::definition::DecodeError;
-use std::path::PathBuf;
+use crate::definition::{DecodeError, Leaf};
+use std::path::{Path, PathBuf};
 use thiserror::Error;
 
 /// An error about a recording; its text names the file and what to do.
@@ -64,4 +64,23 @@ pub enum RecordingError {
         /// The fields there are.
         known: String,
     },
+}
+
+impl RecordingError {
+    /// What the system refused when `action` was tried on the file at `path`.
+    pub(crate) fn file(action: &'static str, path: &Path) -> impl FnOnce(std::io::Error) -> Self {
+        move |source| Self::File { action, path: path.to_owned(), source }
+    }
+
+    /// The file at `path` is not as a complete MCAP file is.
+    pub(crate) fn content(path: &Path, reason: impl ToString) -> Self {
+        Self::Content { path: path.to_owned(), reason: reason.to_string() }
+    }
+
+    /// There is no `field` among the `leaves` of `topic`.
+    #[must_use]
+    pub fn unknown_field(topic: &str, field: &str, leaves: &[Leaf]) -> Self {
+        let known = leaves.iter().map(|leaf| leaf.path.as_str()).collect::<Vec<_>>().join(", ");
+        Self::UnknownField { topic: topic.to_owned(), field: field.to_owned(), known }
+    }
 }

@@ -113,22 +113,15 @@ impl Recording {
     fn begin(parameters: &Parameters, topics: &[(&str, &Announcement)]) -> Result<Self, RecordingError> {
         let mut writer = RecordingWriter::create(&parameters.path)?;
         for file in &parameters.attachments {
-            let text = std::fs::read(&file.path).map_err(|source| RecordingError::File {
-                action: "attach to",
-                path: file.path.clone(),
-                source,
-            })?;
+            let text = std::fs::read(&file.path).map_err(RecordingError::file("attach to", &file.path))?;
             writer.attach(&file.name, &text)?;
         }
-        let mut topic = |&(name, announcement): &(&str, &Announcement)| {
-            Ok(Topic {
-                channel: writer.add_channel(name, announcement)?,
-                shadow_channel: None,
-                shadow_name: format!("{SHADOW_PREFIX}{name}"),
-                announcement: announcement.clone(),
-            })
+        let topic = |&(name, announcement): &(&str, &Announcement)| {
+            let (channel, shadow_name) =
+                (writer.add_channel(name, announcement)?, format!("{SHADOW_PREFIX}{name}"));
+            Ok(Topic { channel, shadow_channel: None, shadow_name, announcement: announcement.clone() })
         };
-        let topics = topics.iter().map(&mut topic).collect::<Result<_, RecordingError>>()?;
+        let topics = topics.iter().map(topic).collect::<Result<_, RecordingError>>()?;
         Ok(Self { writer, topics })
     }
 

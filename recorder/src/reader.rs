@@ -2,15 +2,13 @@
 
 pub use crate::container::{Damage, Messages};
 
-use crate::container::{attachment, summary};
+use crate::container::{Channels, attachment, summary};
 use crate::definition::{Definition, Leaf};
 use crate::error::RecordingError;
-use mcap::Channel;
 use memmap2::Mmap;
 use std::collections::BTreeMap;
 use std::fs::File;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 
 /// A message of a recording.
 #[derive(Debug)]
@@ -71,7 +69,7 @@ impl Recording {
     /// # Errors
     /// If the file cannot be read or is not a complete MCAP file.
     pub fn open(path: &Path) -> Result<Self, RecordingError> {
-        Self::of_bytes(map(path)?, path)
+        Self::of_file(&File::open(path).map_err(RecordingError::file("open", path))?, path)
     }
 
     /// The complete recording in `file`, which is called `path` in messages.
@@ -79,15 +77,10 @@ impl Recording {
     /// # Errors
     /// As [`Recording::open`].
     pub fn of_file(file: &File, path: &Path) -> Result<Self, RecordingError> {
-        Self::of_bytes(map_file(file, path)?, path)
-    }
-
-    fn of_bytes(bytes: Mmap, path: &Path) -> Result<Self, RecordingError> {
-        let summary = summary(&bytes).map_err(|error| content(path, &error))?.ok_or_else(|| {
-            RecordingError::Content { path: path.to_owned(), reason: "it has no summary section".to_owned() }
-        })?;
-        let channels = summary.channels.values().map(|(channel, count)| (channel, *count));
-        let topics = topics(channels, path)?;
+        let bytes = map(file, path)?;
+        let summary = summary(&bytes).map_err(|damage| RecordingError::content(path, damage))?;
+        let missing = || RecordingError::content(path, "it has no summary section");
+        let topics = topics(&summary.ok_or_else(missing)?.channels, path)?;
         Ok(Self { path: path.to_owned(), bytes, topics, cut: None })
     }
 
@@ -97,18 +90,19 @@ impl Recording {
     /// # Errors
     /// If the file cannot be read or is no MCAP file.
     pub fn salvage(path: &Path) -> Result<Self, RecordingError> {
-        let bytes = map(path)?;
+        let file = File::open(path).map_err(RecordingError::file("open", path))?;
+        let bytes = map(&file, path)?;
         if !bytes.starts_with(mcap::MAGIC) || bytes.ends_with(mcap::MAGIC) && bytes.len() > mcap::MAGIC.len()
         {
-            return Self::open(path);
+            return Self::of_file(&file, path);
         }
-        let mut channels = BTreeMap::new();
+        let mut channels = Channels::new();
         let mut last_tick = None;
         for message in Messages::new(&bytes).map_while(Result::ok) {
             last_tick = Some(message.sequence);
             channels.entry(message.channel.id).or_insert((message.channel, 0)).1 += 1;
         }
-        let topics = topics(channels.values().map(|(channel, count)| (channel, *count)), path)?;
+        let topics = topics(&channels, path)?;
         Ok(Self { path: path.to_owned(), bytes, topics, cut: Some(Cut { last_tick }) })
     }
 
@@ -152,7 +146,7 @@ impl Recording {
     pub fn messages(&self) -> impl Iterator<Item = Result<Record, RecordingError>> {
         let messages = Messages::new(&self.bytes);
         messages.take_while(|message| message.is_ok() || self.cut.is_none()).map(|message| {
-            let message = message.map_err(|error| content(&self.path, &error))?;
+            let message = message.map_err(|damage| RecordingError::content(&self.path, damage))?;
             Ok(Record {
                 tick: message.sequence,
                 time_ns: message.log_time,
@@ -183,43 +177,28 @@ impl Recording {
         if self.cut.is_some() {
             return Ok(Vec::new());
         }
-        let broken = |error| content(&self.path, &error);
-        let attachments =
-            summary(&self.bytes).map_err(broken)?.map_or(Vec::new(), |summary| summary.attachments);
-        attachments.iter().map(|index| attachment(&self.bytes, index).map_err(broken)).collect()
+        let broken = |damage| RecordingError::content(&self.path, damage);
+        let summary = summary(&self.bytes).map_err(broken)?;
+        let attachments = summary.iter().flat_map(|summary| &summary.attachments);
+        attachments.map(|index| attachment(&self.bytes, index).map_err(broken)).collect()
     }
 }
 
-fn map(path: &Path) -> Result<Mmap, RecordingError> {
-    let fail = |source| RecordingError::File { action: "open", path: path.to_owned(), source };
-    map_file(&File::open(path).map_err(fail)?, path)
-}
-
-fn map_file(file: &File, path: &Path) -> Result<Mmap, RecordingError> {
-    let fail = |source| RecordingError::File { action: "open", path: path.to_owned(), source };
+fn map(file: &File, path: &Path) -> Result<Mmap, RecordingError> {
     // SAFETY: the mapping is read only, and no program of ours truncates a recording: it puts another file in
     // its place. Another program that truncates it meanwhile ends this one with SIGBUS.
-    unsafe { Mmap::map(file) }.map_err(fail)
+    unsafe { Mmap::map(file) }.map_err(RecordingError::file("open", path))
 }
 
 /// The topics of `channels`, each given with the number of its messages.
-fn topics<'a>(
-    channels: impl Iterator<Item = (&'a Arc<Channel<'static>>, u64)>,
-    path: &Path,
-) -> Result<BTreeMap<String, Topic>, RecordingError> {
-    channels
-        .filter_map(|(channel, count)| channel.schema.as_ref().map(|schema| (channel, schema, count)))
-        .map(|(channel, schema, message_count)| {
-            let definition = Definition::parse(&schema.name, &String::from_utf8_lossy(&schema.data))
-                .map_err(|reason| RecordingError::Content {
-                    path: path.to_owned(),
-                    reason: format!("schema {}: {reason}", schema.name),
-                })?;
-            Ok((channel.topic.clone(), Topic { type_name: schema.name.clone(), definition, message_count }))
-        })
-        .collect()
-}
-
-fn content(path: &Path, error: &Damage) -> RecordingError {
-    RecordingError::Content { path: path.to_owned(), reason: error.to_string() }
+fn topics(channels: &Channels, path: &Path) -> Result<BTreeMap<String, Topic>, RecordingError> {
+    let mut topics = BTreeMap::new();
+    for (channel, message_count) in channels.values() {
+        let Some(schema) = &channel.schema else { continue };
+        let definition = Definition::parse(&schema.name, &String::from_utf8_lossy(&schema.data))
+            .map_err(|reason| RecordingError::content(path, format!("schema {}: {reason}", schema.name)))?;
+        let (type_name, message_count) = (schema.name.clone(), *message_count);
+        topics.insert(channel.topic.clone(), Topic { type_name, definition, message_count });
+    }
+    Ok(topics)
 }

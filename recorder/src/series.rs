@@ -3,7 +3,7 @@
 //! A quaternion has three fields more than the message: `roll`, `pitch` and `yaw` (z-y-x sequence, in
 //! radians), since that is how people judge an attitude.
 
-use crate::definition::{DecodeError, Definition, Leaf};
+use crate::definition::{DecodeError, Definition, Leaf, number};
 use crate::error::RecordingError;
 use crate::reader::Recording;
 use bus::schema::Schema;
@@ -45,8 +45,8 @@ impl Recording {
             }
             let leaves = self.decode(&record)?;
             for (series, field) in series.iter_mut().zip(fields).filter(|(_, field)| wanted(field)) {
-                let (value, unit) =
-                    value(&leaves, field.1).ok_or_else(|| unknown(&record.topic, field.1, &leaves))?;
+                let unknown = || RecordingError::unknown_field(&record.topic, field.1, &leaves);
+                let (value, unit) = value(&leaves, field.1).ok_or_else(unknown)?;
                 series.time_ns.push(record.time_ns);
                 series.value.push(value);
                 unit.clone_into(&mut series.unit);
@@ -54,9 +54,7 @@ impl Recording {
         }
         Ok(series)
     }
-}
 
-impl Recording {
     /// The unit of `field` on `topic`; `None` where it is a vector with the parts `x`, `y` and `z`.
     ///
     /// # Errors
@@ -75,15 +73,11 @@ impl Recording {
 
 /// The unit of a field among `leaves`; `None` for a vector.
 fn unit(leaves: &[Leaf], topic: &str, field: &str) -> Result<Option<String>, RecordingError> {
-    let has = |name: String| leaves.iter().any(|leaf| leaf.path == name);
+    let has = |part: &str| number(leaves, &format!("{field}.{part}")).is_some();
     match value(leaves, field) {
         Some((_, unit)) => Ok(Some(unit.to_owned())),
-        None if ["x", "y", "z"].iter().all(|axis| has(format!("{field}.{axis}")))
-            && !has(format!("{field}.w")) =>
-        {
-            Ok(None)
-        }
-        None => Err(unknown(topic, field, leaves)),
+        None if ["x", "y", "z"].into_iter().all(has) && !has("w") => Ok(None),
+        None => Err(RecordingError::unknown_field(topic, field, leaves)),
     }
 }
 
@@ -111,36 +105,27 @@ pub fn unit_of(schema: &Schema, topic: &str, field: &str) -> Result<Option<Strin
     }
 }
 
-fn unknown(topic: &str, field: &str, leaves: &[Leaf]) -> RecordingError {
-    RecordingError::UnknownField {
-        topic: topic.to_owned(),
-        field: field.to_owned(),
-        known: leaves.iter().map(|leaf| leaf.path.as_str()).collect::<Vec<_>>().join(", "),
-    }
-}
+/// The angles that a quaternion has as fields.
+pub const ANGLES: [&str; 3] = ["roll", "pitch", "yaw"];
 
-fn value<'a>(leaves: &'a [Leaf], field: &str) -> Option<(f64, &'a str)> {
+/// The number at `field` among `leaves` and its unit; that may be an angle of a quaternion.
+#[must_use]
+pub fn value<'a>(leaves: &'a [Leaf], field: &str) -> Option<(f64, &'a str)> {
     if let Some(leaf) = leaves.iter().find(|leaf| leaf.path == field) {
         return Some((leaf.value.as_f64()?, &leaf.unit));
     }
     let (quaternion, angle) = field.rsplit_once('.')?;
+    let angle = ANGLES.iter().position(|name| *name == angle)?;
     let part = |name: &str| {
-        let path = format!("{quaternion}.{name}");
-        leaves.iter().find(|leaf| leaf.path == path)?.value.as_f64()
+        let is_part =
+            |path: &str| path.strip_prefix(quaternion).and_then(|rest| rest.strip_prefix('.')) == Some(name);
+        leaves.iter().find(|leaf| is_part(&leaf.path))?.value.as_f64()
     };
-    let [roll, pitch, yaw] = roll_pitch_yaw([part("x")?, part("y")?, part("z")?, part("w")?]);
-    let angle = match angle {
-        "roll" => roll,
-        "pitch" => pitch,
-        "yaw" => yaw,
-        _ => return None,
-    };
-    Some((angle, "rad"))
+    Some((roll_pitch_yaw([part("x")?, part("y")?, part("z")?, part("w")?])[angle], "rad"))
 }
 
 /// The angles of a quaternion, stored x, y, z, w, in the sequence z-y-x, in radians; roll and yaw from -π to π.
-#[must_use]
-pub fn roll_pitch_yaw([x, y, z, w]: [f64; 4]) -> [f64; 3] {
+fn roll_pitch_yaw([x, y, z, w]: [f64; 4]) -> [f64; 3] {
     [
         libm::atan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y)),
         libm::asin((2.0 * (w * y - z * x)).clamp(-1.0, 1.0)),

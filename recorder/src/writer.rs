@@ -40,8 +40,7 @@ impl RecordingWriter {
     /// # Errors
     /// If the file cannot be created or written, or something else is there.
     pub fn create(path: &Path) -> Result<Self, RecordingError> {
-        let fail = |source| RecordingError::File { action: "create", path: path.to_owned(), source };
-        let file = open_empty(path).map_err(fail)?;
+        let file = open_empty(path).map_err(RecordingError::file("create", path))?;
         let mcap = WriteOptions::new()
             .profile("ros2")
             .library("hummingbus")
@@ -129,11 +128,7 @@ impl RecordingWriter {
     pub fn finish(mut self) -> Result<(), RecordingError> {
         self.mcap.finish().map(|_| ()).map_err(|error| write_error(&self.path, &error))?;
         let mut file = self.mcap.into_inner();
-        std::io::Write::flush(&mut file).map_err(|source| RecordingError::File {
-            action: "write",
-            path: self.path,
-            source,
-        })
+        std::io::Write::flush(&mut file).map_err(RecordingError::file("write", &self.path))
     }
 }
 

@@ -1,7 +1,7 @@
 //! The judgement of a run: its pass conditions and comparisons, evaluated on the recording.
 
 use crate::states::{FIELDS_OF_POSE, errors_at, tracks};
-use anyhow::{Result, bail};
+use anyhow::{Result, anyhow, bail};
 use flights::state::StateQuantity;
 use recorder::reader::Recording;
 use recorder::series::Series;
@@ -79,14 +79,14 @@ pub(crate) fn verdicts(content: &Content, recording: &Recording) -> Result<Vec<V
     if fields.is_empty() {
         return Ok(Vec::new());
     }
-    let mut series = recording.series(&fields)?.into_iter();
-    conditions()
-        .zip(&wanted)
-        .map(|(pass, wanted)| {
-            let series: Vec<Series> = series.by_ref().take(wanted.len()).collect();
-            verdict(pass, &series)
-        })
-        .collect()
+    let series = recording.series(&fields)?;
+    let mut rest = &series[..];
+    let verdicts = conditions().zip(&wanted).map(|(pass, wanted)| {
+        let (series, behind) = rest.split_at(wanted.len());
+        rest = behind;
+        verdict(pass, series)
+    });
+    verdicts.collect()
 }
 
 /// The parts of a vector field; of any other, the field itself.
@@ -124,10 +124,8 @@ fn verdict(pass: &PassCondition, series: &[Series]) -> Result<Verdict> {
     };
     let (judged, taken) =
         signals.split_at(if pass.minus.is_some() { signals.len() / 2 } else { signals.len() });
-    let factor = match diagnostics::convert(&judged[0].unit, &pass.unit) {
-        Ok(factor) => factor,
-        Err(error) => bail!("pass condition `{}`: {error}", pass.name),
-    };
+    let factor = diagnostics::convert(&judged[0].unit, &pass.unit)
+        .map_err(|error| anyhow!("pass condition `{}`: {error}", pass.name))?;
     let is_open = |time_ns: u64| {
         gate.is_none_or(|(gate, series)| {
             held(series, time_ns).is_some_and(|value| within(value, gate.min, gate.max))
@@ -140,14 +138,8 @@ fn verdict(pass: &PassCondition, series: &[Series]) -> Result<Verdict> {
     let values = statistic(pass.statistic, samples);
     // A span without samples fails: what was never measured did not pass.
     let passed = !values.is_empty() && values.iter().all(|value| within(*value, pass.min, pass.max));
-    Ok(Verdict {
-        name: pass.name.clone(),
-        values,
-        unit: pass.unit.clone(),
-        min: pass.min,
-        max: pass.max,
-        passed,
-    })
+    let (name, unit) = (pass.name.clone(), pass.unit.clone());
+    Ok(Verdict { name, values, unit, min: pass.min, max: pass.max, passed })
 }
 
 /// Whether `value` is a number between the limits that there are.
@@ -186,22 +178,19 @@ fn span(series: &Series, from_s: f64, to_s: Option<f64>) -> impl Iterator<Item =
 
 fn statistic(statistic: Statistic, samples: impl Iterator<Item = f64>) -> Vec<f64> {
     let samples: Vec<f64> = samples.collect();
-    if samples.is_empty() {
-        return Vec::new();
-    }
-    let count = samples.len() as f64;
+    let Some(&last) = samples.last() else { return Vec::new() };
+    let mean = |value: fn(&f64) -> f64| samples.iter().map(value).sum::<f64>() / samples.len() as f64;
     // NaN must fail a condition, so it wins over every number here, unlike with f64::min.
     let extreme = |pick: fn(f64, f64) -> f64| {
-        samples.iter().copied().reduce(|a, b| if a.is_nan() || b.is_nan() { f64::NAN } else { pick(a, b) })
+        samples.iter().fold(last, |a, b| if a.is_nan() || b.is_nan() { f64::NAN } else { pick(a, *b) })
     };
-    let (smallest, largest) = (extreme(f64::min), extreme(f64::max));
     match statistic {
-        Statistic::Every => smallest.into_iter().chain(largest).collect(),
-        Statistic::Min => smallest.into_iter().collect(),
-        Statistic::Max => largest.into_iter().collect(),
-        Statistic::Mean => vec![samples.iter().sum::<f64>() / count],
-        Statistic::Rms => vec![(samples.iter().map(|x| x * x).sum::<f64>() / count).sqrt()],
-        Statistic::Last => samples.last().copied().into_iter().collect(),
+        Statistic::Every => vec![extreme(f64::min), extreme(f64::max)],
+        Statistic::Min => vec![extreme(f64::min)],
+        Statistic::Max => vec![extreme(f64::max)],
+        Statistic::Mean => vec![mean(|value| *value)],
+        Statistic::Rms => vec![mean(|value| value * value).sqrt()],
+        Statistic::Last => vec![last],
     }
 }
 
@@ -242,7 +231,7 @@ pub(crate) fn window_errors(content: &Content, recording: &Recording) -> Result<
 }
 
 fn compare_states(compare: &Comparison, recording: &Recording) -> Result<WindowErrors> {
-    let topics = [compare.simulated.as_str(), compare.measured.as_str()];
+    let topics = [compare.simulated.clone(), compare.measured.clone()];
     let tracks = tracks(recording, &topics, FIELDS_OF_POSE)?;
     let [simulated, measured] = &tracks[..] else { unreachable!("a track for each topic") };
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a positive time of a run")]
@@ -250,19 +239,14 @@ fn compare_states(compare: &Comparison, recording: &Recording) -> Result<WindowE
     let is_end = |time_ns: &&u64| **time_ns > 0 && window_ns > 0 && time_ns.is_multiple_of(window_ns);
     let errors = errors_at(simulated, measured, simulated.time_ns().iter().filter(is_end).copied());
     if errors.windows() == 0 {
-        bail!(
-            "{} and {} have no common sample at the end of a window of {} s",
-            compare.simulated,
-            compare.measured,
-            compare.window_s
-        );
+        let Comparison { simulated, measured, window_s, .. } = compare;
+        bail!("{simulated} and {measured} have no common sample at the end of a window of {window_s} s");
     }
     let [position_rms_m, velocity_rms_m_s, attitude_rms_deg, _] =
         StateQuantity::ALL.map(|quantity| errors.rms(quantity));
-    let holds = |value: f64, max: Option<f64>| max.is_none_or(|max| value <= max);
-    let passed = holds(position_rms_m, compare.max_position_m)
-        && holds(velocity_rms_m_s, compare.max_velocity_m_s)
-        && holds(attitude_rms_deg, compare.max_attitude_deg);
+    let passed = within(position_rms_m, None, compare.max_position_m)
+        && within(velocity_rms_m_s, None, compare.max_velocity_m_s)
+        && within(attitude_rms_deg, None, compare.max_attitude_deg);
     Ok(WindowErrors {
         simulated: compare.simulated.clone(),
         window_s: compare.window_s,

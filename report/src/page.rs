@@ -14,41 +14,18 @@ pub(crate) const PLOTLY_BASIC: &str = include_str!("page/plotly-basic.min.js");
 /// plotly.js with lines, and lines and bodies in space.
 pub(crate) const PLOTLY_3D: &str = include_str!("page/plotly-gl3d.min.js");
 
-const TEMPLATE: &str = include_str!("page/page.html");
-const STYLE: &str = include_str!("page/page.css");
-const KIT: &str = include_str!("page/kit.js");
-
-/// A page that is not yet filled in.
-pub(crate) struct Page {
-    /// Headings, texts, and the places of tables and plots.
-    pub body: &'static str,
-    /// A bundle of plotly.js.
-    pub plotly: &'static str,
-    /// The script that draws the data, with what `kit.js` offers.
-    pub script: &'static str,
-}
-
-impl Page {
-    /// The page with `data`.
-    pub fn with(&self, data: &Value) -> Vec<u8> {
+/// The page with this `body` of headings, texts and the places of tables and plots, on which `script` draws `data` with a
+/// bundle of plotly.js and what `kit.js` offers.
+pub(crate) fn page(body: &str, plotly: &str, script: &str, data: &Value) -> Vec<u8> {
+    format!(
+        include_str!("page/page.html"),
+        style = include_str!("page/page.css"),
+        body = body,
+        plotly = plotly,
         // No name in the data can end the element that holds it.
-        let data = data.to_string().replace('<', "\\u003c");
-        let parts = [
-            ("{{style}}", STYLE),
-            ("{{body}}", self.body),
-            ("{{plotly}}", self.plotly),
-            ("{{data}}", &data),
-            ("{{kit}}", KIT),
-            ("{{script}}", self.script),
-        ];
-        let (mut page, mut rest) = (String::new(), TEMPLATE);
-        for (mark, text) in parts {
-            let (before, after) = rest.split_once(mark).unwrap_or((rest, ""));
-            page += before;
-            page += text;
-            rest = after;
-        }
-        page += rest;
-        page.into_bytes()
-    }
+        data = data.to_string().replace('<', "\\u003c"),
+        kit = include_str!("page/kit.js"),
+        script = script,
+    )
+    .into_bytes()
 }

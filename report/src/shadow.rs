@@ -116,8 +116,7 @@ type Values = BTreeMap<(String, String), (String, BTreeMap<u32, f64>)>;
 /// If the recording is damaged.
 pub(crate) fn differences(recording: &Recording) -> Result<Vec<Difference>> {
     let shadowed = recording.topics().keys().filter_map(|topic| topic.strip_prefix(SHADOW_PREFIX));
-    let shadowed: Vec<String> = shadowed.map(str::to_owned).collect();
-    let values = values(recording, &shadowed)?;
+    let values = values(recording, &shadowed.collect::<Vec<_>>())?;
     let shadows = values.iter().filter_map(|((topic, field), (unit, shadow))| {
         let topic = topic.strip_prefix(SHADOW_PREFIX)?;
         let (_, primary) = values.get(&(topic.to_owned(), field.clone()))?;
@@ -160,25 +159,26 @@ fn difference(
     shadow: &BTreeMap<u32, f64>,
     primary: &BTreeMap<u32, f64>,
 ) -> Option<Difference> {
-    let both: Vec<(u32, f64, f64)> =
-        shadow.iter().filter_map(|(tick, shadow)| Some((*tick, *shadow, *primary.get(tick)?))).collect();
-    let count = both.len() as f64;
-    let mean = |value: &dyn Fn(&(u32, f64, f64)) -> f64| both.iter().map(value).sum::<f64>() / count;
-    let primary_mean = mean(&|(_, _, primary)| *primary);
-    let (max_tick, max) = both
-        .iter()
-        .map(|(tick, shadow, primary)| (*tick, (shadow - primary).abs()))
-        .max_by(|a, b| a.1.total_cmp(&b.1).then(b.0.cmp(&a.0)))?;
+    let both =
+        |(tick, shadow): (&u32, &f64)| primary.get(tick).map(|primary| (*tick, shadow - primary, *primary));
+    let both: Vec<(u32, f64, f64)> = shadow.iter().filter_map(both).collect();
+    let mean = |value: &dyn Fn(f64, f64) -> f64| {
+        both.iter().map(|(_, difference, primary)| value(*difference, *primary)).sum::<f64>()
+            / both.len() as f64
+    };
+    let primary_mean = mean(&|_, primary| primary);
+    let sizes = both.iter().map(|(tick, difference, _)| (*tick, difference.abs()));
+    let (max_tick, max) = sizes.max_by(|a, b| a.1.total_cmp(&b.1).then(b.0.cmp(&a.0)))?;
     Some(Difference {
         topic: topic.to_owned(),
         field: field.to_owned(),
         unit: unit.to_owned(),
         samples: both.len(),
-        mean: mean(&|(_, shadow, primary)| shadow - primary),
-        rms: mean(&|(_, shadow, primary)| (shadow - primary).powi(2)).sqrt(),
+        mean: mean(&|difference, _| difference),
+        rms: mean(&|difference, _| difference.powi(2)).sqrt(),
         max,
         max_tick,
-        primary_deviation: mean(&|(_, _, primary)| (primary - primary_mean).powi(2)).sqrt(),
+        primary_deviation: mean(&|_, primary| (primary - primary_mean).powi(2)).sqrt(),
     })
 }
 
@@ -190,15 +190,14 @@ pub(crate) fn add_steps(recording: &Recording, plan: &Plan, replacements: &mut [
     let outputs = |report: &Report| {
         let node = plan.nodes.iter().find(|node| node.name == report.process);
         let topics = node.into_iter().flat_map(|node| &node.outputs);
-        topics.map(|output| plan.topics[output.topic].name.clone()).collect::<Vec<_>>()
+        topics.map(|output| plan.topics[output.topic].name.as_str())
     };
-    let has_flown = |replacement: &&Replacement| replacement.report.take_over_tick.is_some();
-    let topics = replacements.iter().filter(has_flown).flat_map(|replacement| outputs(&replacement.report));
+    let flown = replacements.iter().map(|replacement| &replacement.report);
+    let topics = flown.filter(|report| report.take_over_tick.is_some()).flat_map(outputs);
     let values = values(recording, &topics.collect::<Vec<_>>())?;
     for Replacement { report, steps } in replacements {
-        if let Some(tick) = report.take_over_tick {
-            *steps = outputs(report).iter().filter_map(|topic| step_at(&values, topic, tick)).collect();
-        }
+        let Some(tick) = report.take_over_tick else { continue };
+        *steps = outputs(report).filter_map(|topic| step_at(&values, topic, tick)).collect();
     }
     Ok(())
 }
@@ -212,27 +211,22 @@ fn step_at(values: &Values, topic: &str, tick: u32) -> Option<Step> {
         let (&last_tick, &last) = earlier.next()?;
         let before = earlier.next().map_or(last, |(_, &value)| value);
         let shadow = values.get(&(format!("{SHADOW_PREFIX}{topic}"), field.clone()));
-        let law_difference =
-            shadow.and_then(|(_, shadow)| shadow.get(&last_tick)).map(|shadow| (shadow - last).abs());
-        Some(Step {
-            topic: topic.to_owned(),
-            field: field.clone(),
-            unit: unit.clone(),
-            step: (first - last).abs(),
-            step_before: (last - before).abs(),
-            law_difference,
-        })
+        let shadow = shadow.and_then(|(_, shadow)| shadow.get(&last_tick));
+        let law_difference = shadow.map(|shadow| (shadow - last).abs());
+        let (step, step_before) = ((first - last).abs(), (last - before).abs());
+        let (topic, field, unit) = (topic.to_owned(), field.clone(), unit.clone());
+        Some(Step { topic, field, unit, step, step_before, law_difference })
     });
     steps.max_by(|a, b| a.step.total_cmp(&b.step))
 }
 
 /// The numbers of `topics` and of their shadows.
-fn values(recording: &Recording, topics: &[String]) -> Result<Values> {
+fn values(recording: &Recording, topics: &[&str]) -> Result<Values> {
     let mut values = Values::new();
     for record in recording.messages() {
         let record = record?;
         let primary = record.topic.strip_prefix(SHADOW_PREFIX).unwrap_or(&record.topic);
-        if !topics.iter().any(|topic| topic == primary) {
+        if !topics.contains(&primary) {
             continue;
         }
         for leaf in recording.decode(&record)? {
@@ -283,13 +277,11 @@ impl fmt::Display for Replacement {
             Purpose::Restart => "restart",
         };
         write!(f, "  {purpose} of `{}`", report.process)?;
-        match (report.join_tick, report.take_over_tick, report.purpose) {
-            (_, Some(take_over), Purpose::Restart) => write!(f, " at tick {take_over}")?,
-            (Some(join), Some(take_over), _) => {
-                write!(f, ": shadowed from tick {join}, flew from {take_over}")?
-            }
-            (Some(join), None, _) => write!(f, ": shadowed from tick {join}")?,
-            (None, ..) => {}
+        match (report.join_tick, report.take_over_tick) {
+            (_, Some(tick)) if report.purpose == Purpose::Restart => write!(f, " at tick {tick}")?,
+            (Some(join), Some(tick)) => write!(f, ": shadowed from tick {join}, flew from {tick}")?,
+            (Some(join), None) => write!(f, ": shadowed from tick {join}")?,
+            (None, _) => {}
         }
         if let (Some(_), Some(hand_over)) = (report.take_over_tick, report.hand_over) {
             write!(f, ", handed over: {hand_over}")?;

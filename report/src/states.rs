@@ -5,27 +5,18 @@ use flights::state::{VehicleState, WindowEndErrors};
 use recorder::reader::Recording;
 use recorder::series::Series;
 
-/// The fields of a state, simulated or measured.
-const FIELDS: [&str; 13] = [
-    "position.x",
-    "position.y",
-    "position.z",
-    "velocity.x",
-    "velocity.y",
-    "velocity.z",
-    "attitude.x",
-    "attitude.y",
-    "attitude.z",
-    "attitude.w",
-    "angular_velocity.x",
-    "angular_velocity.y",
-    "angular_velocity.z",
+/// The vectors of a state, simulated or measured, and their parts.
+const VECTORS: [(&str, &[&str]); 4] = [
+    ("position", &["x", "y", "z"]),
+    ("velocity", &["x", "y", "z"]),
+    ("attitude", &["x", "y", "z", "w"]),
+    ("angular_velocity", &["x", "y", "z"]),
 ];
 
 /// Fields of a state without its rates.
 pub(crate) const FIELDS_OF_POSE: usize = 10;
 /// All fields of a state.
-pub(crate) const FIELDS_OF_STATE: usize = FIELDS.len();
+pub(crate) const FIELDS_OF_STATE: usize = 13;
 
 /// The states of one topic over time.
 pub(crate) struct Track {
@@ -70,9 +61,12 @@ pub(crate) fn errors_at(
 ///
 /// # Errors
 /// If a topic is not in the recording or holds no state.
-pub(crate) fn tracks(recording: &Recording, topics: &[&str], fields: usize) -> Result<Vec<Track>> {
-    let wanted: Vec<(&str, &str)> =
-        topics.iter().flat_map(|topic| FIELDS[..fields].iter().map(|field| (*topic, *field))).collect();
+pub(crate) fn tracks(recording: &Recording, topics: &[String], fields: usize) -> Result<Vec<Track>> {
+    let names =
+        VECTORS.iter().flat_map(|(vector, parts)| parts.iter().map(move |part| format!("{vector}.{part}")));
+    let names: Vec<String> = names.take(fields).collect();
+    let wanted = topics.iter().flat_map(|topic| names.iter().map(|name| (topic.as_str(), name.as_str())));
+    let wanted: Vec<(&str, &str)> = wanted.collect();
     let mut series = recording.series(&wanted)?.into_iter();
     Ok(topics.iter().map(|_| Track { fields: series.by_ref().take(fields).collect() }).collect())
 }

@@ -92,10 +92,9 @@ impl Summary {
     /// ```
     pub fn new(manifest: String, outcome: Outcome, tick_s: f64) -> Self {
         let ticks_per_s = f64::from(outcome.ticks) / outcome.host_s.max(1e-9);
-        let replacements = outcome.replacements.into_iter();
-        let replacements: Vec<_> =
-            replacements.map(|report| Replacement { report, steps: Vec::new() }).collect();
-        let processes = outcome.processes.into_iter();
+        let replacement = |report| Replacement { report, steps: Vec::new() };
+        let replacements: Vec<_> = outcome.replacements.into_iter().map(replacement).collect();
+        let process = |(name, cpu_share, late)| ProcessSummary { name, cpu_share, late };
         Self {
             manifest,
             passed: !outcome.was_stopped && !replacements.iter().any(Replacement::has_failed),
@@ -106,9 +105,7 @@ impl Summary {
             real_time_factor: ticks_per_s * tick_s,
             stopped_early: outcome.was_stopped,
             missed_deadlines: outcome.missed_deadlines,
-            processes: processes
-                .map(|(name, cpu_share, late)| ProcessSummary { name, cpu_share, late })
-                .collect(),
+            processes: outcome.processes.into_iter().map(process).collect(),
             recording: None,
             pass: Vec::new(),
             compare: Vec::new(),
@@ -138,15 +135,12 @@ impl Summary {
 
     /// The replacements as text; those that were refused are never left out.
     fn write_replacements(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let mut left_out = 0;
-        for (index, replacement) in self.replacements.iter().enumerate() {
-            if index < REPLACEMENTS_SHOWN || replacement.report.refused.is_some() {
-                writeln!(f, "{replacement}")?;
-            } else {
-                left_out += 1;
-            }
-        }
-        match left_out {
+        let all = self.replacements.iter().enumerate();
+        let is_shown =
+            |(index, it): &(usize, &Replacement)| *index < REPLACEMENTS_SHOWN || it.report.refused.is_some();
+        let (shown, left_out): (Vec<_>, Vec<_>) = all.partition(is_shown);
+        shown.iter().try_for_each(|(_, replacement)| writeln!(f, "{replacement}"))?;
+        match left_out.len() {
             0 => Ok(()),
             more => writeln!(f, "  … and {more} more; --json has them all"),
         }

@@ -7,7 +7,10 @@
 use proc_macro::TokenStream;
 use proc_macro2::TokenStream as Tokens;
 use quote::quote;
-use syn::{Attribute, Data, DeriveInput, Error, Field, Fields, LitStr, Result, Type, parse_macro_input};
+use syn::{
+    Attribute, Data, DataStruct, DeriveInput, Error, Expr, ExprLit, Field, Fields, Lit, LitStr, Result, Type,
+    parse_macro_input,
+};
 
 /// Derives `bus::Message` for a `repr(C)` struct without padding.
 ///
@@ -16,22 +19,26 @@ use syn::{Attribute, Data, DeriveInput, Error, Field, Fields, LitStr, Result, Ty
 /// "world")]`; an empty unit means "that of the field that holds this message".
 #[proc_macro_derive(Message, attributes(message, field))]
 pub fn derive_message(input: TokenStream) -> TokenStream {
-    let input = parse_macro_input!(input as DeriveInput);
-    expand(&input).unwrap_or_else(Error::into_compile_error).into()
+    expanded(&parse_macro_input!(input), expand)
+}
+
+fn expanded(input: &DeriveInput, expand: fn(&DeriveInput) -> Result<Tokens>) -> TokenStream {
+    expand(input).unwrap_or_else(Error::into_compile_error).into()
 }
 
 fn expand(input: &DeriveInput) -> Result<Tokens> {
     require_repr_c(input)?;
-    if !input.generics.params.is_empty() {
-        return Err(Error::new_spanned(&input.generics, "a message has one layout: it cannot be generic"));
-    }
-    let options = MessageOptions::parse(input)?;
+    require_no_generics(input, "a message has one layout: it cannot be generic")?;
+    let [type_name, definition] = options(&input.attrs, "message", ["type_name", "definition"])?;
+    let missing = || Error::new_spanned(&input.ident, "add #[message(type_name = \"package/msg/Name\")]");
+    let type_name = type_name.ok_or_else(missing)?;
+    require_ros_type_name(&type_name)?;
     let fields = named_fields(input)?;
     let name = &input.ident;
     let types: Vec<&Type> = fields.iter().map(|field| &field.ty).collect();
     let schemas = fields.iter().map(|field| field_schema(input, field)).collect::<Result<Vec<_>>>()?;
-    let (type_name, doc) = (&options.type_name, doc_text(&input.attrs));
-    let definition = match &options.definition {
+    let doc = doc_text(&input.attrs);
+    let definition = match definition {
         Some(text) => quote!(::core::option::Option::Some(#text)),
         None => quote!(::core::option::Option::None),
     };
@@ -66,57 +73,43 @@ fn expand(input: &DeriveInput) -> Result<Tokens> {
 /// Derives `bus::ports::InputPorts` for a struct `Name<'a>` whose fields are `&'a T` and `Option<&'a T>`.
 #[proc_macro_derive(InputPorts)]
 pub fn derive_input_ports(input: TokenStream) -> TokenStream {
-    let input = parse_macro_input!(input as DeriveInput);
-    expand_inputs(&input).unwrap_or_else(Error::into_compile_error).into()
+    expanded(&parse_macro_input!(input), expand_inputs)
 }
 
 /// Derives `bus::ports::OutputPorts` for a struct whose fields are `T` and `Option<T>`.
 #[proc_macro_derive(OutputPorts)]
 pub fn derive_output_ports(input: TokenStream) -> TokenStream {
-    let input = parse_macro_input!(input as DeriveInput);
-    expand_outputs(&input).unwrap_or_else(Error::into_compile_error).into()
+    expanded(&parse_macro_input!(input), expand_outputs)
 }
 
 fn expand_inputs(input: &DeriveInput) -> Result<Tokens> {
-    let Some(lifetime) = input.generics.lifetimes().next().filter(|_| input.generics.params.len() == 1)
-    else {
-        return Err(Error::new_spanned(
-            &input.ident,
-            "inputs are a struct with one lifetime, that of the samples",
-        ));
-    };
+    let lifetime = input.generics.lifetimes().next().filter(|_| input.generics.params.len() == 1);
+    let wrong =
+        || Error::new_spanned(&input.ident, "inputs are a struct with one lifetime, that of the samples");
+    let lifetime = lifetime.ok_or_else(wrong)?;
     let (name, lifetime) = (&input.ident, &lifetime.lifetime);
     let fields = named_fields(input)?;
     let specs = fields.iter().map(|field| port_spec(field, &quote!(::bus::ports::InputPort<#lifetime>)));
-    let reads = fields
-        .iter()
-        .enumerate()
-        .map(|(port, Field { ident, .. })| quote!(#ident: ::bus::ports::InputPort::read(samples, #port)));
+    let names = fields.iter().map(|field| &field.ident);
+    let ports = 0..fields.len();
     Ok(quote! {
         impl<#lifetime> ::bus::ports::InputPorts<#lifetime> for #name<#lifetime> {
             const DECLARED: ::bus::ports::Inputs = ::bus::ports::Inputs::Ports(&[#(#specs),*]);
 
             fn read(samples: ::bus::ports::InputSamples<#lifetime>) -> Self {
-                Self { #(#reads),* }
+                Self { #(#names: ::bus::ports::InputPort::read(samples, #ports)),* }
             }
         }
     })
 }
 
 fn expand_outputs(input: &DeriveInput) -> Result<Tokens> {
-    if !input.generics.params.is_empty() {
-        return Err(Error::new_spanned(&input.generics, "outputs are sent by value: they cannot be generic"));
-    }
+    require_no_generics(input, "outputs are sent by value: they cannot be generic")?;
     let name = &input.ident;
     let fields = named_fields(input)?;
     let specs = fields.iter().map(|field| port_spec(field, &quote!(::bus::ports::OutputPort)));
-    let writes = fields.iter().enumerate().map(
-        |(port, Field { ident, .. })| quote!(::bus::ports::OutputPort::write(self.#ident, samples, #port)?;),
-    );
-    let reads = fields
-        .iter()
-        .enumerate()
-        .map(|(port, Field { ident, .. })| quote!(#ident: ::bus::ports::OutputPort::read(samples, #port)?));
+    let names: Vec<_> = fields.iter().map(|field| &field.ident).collect();
+    let ports: Vec<usize> = (0..fields.len()).collect();
     Ok(quote! {
         impl ::bus::ports::OutputPorts for #name {
             const DECLARED: &'static [::bus::ports::PortSpec] = &[#(#specs),*];
@@ -125,12 +118,14 @@ fn expand_outputs(input: &DeriveInput) -> Result<Tokens> {
                 self,
                 samples: &mut ::bus::ports::OutputSamples<'_>,
             ) -> ::core::result::Result<(), ::bus::BusError> {
-                #(#writes)*
+                #(::bus::ports::OutputPort::write(self.#names, samples, #ports)?;)*
                 ::core::result::Result::Ok(())
             }
 
             fn read(samples: ::bus::ports::InputSamples<'_>) -> ::core::option::Option<Self> {
-                ::core::option::Option::Some(Self { #(#reads),* })
+                ::core::option::Option::Some(Self {
+                    #(#names: ::bus::ports::OutputPort::read(samples, #ports)?),*
+                })
             }
         }
     })
@@ -150,34 +145,22 @@ fn port_spec(field: &Field, port: &Tokens) -> Tokens {
     }
 }
 
-/// The options of `#[message(…)]`.
-struct MessageOptions {
-    type_name: LitStr,
-    definition: Option<LitStr>,
+fn require_no_generics(input: &DeriveInput, why: &str) -> Result<()> {
+    if input.generics.params.is_empty() { Ok(()) } else { Err(Error::new_spanned(&input.generics, why)) }
 }
 
-impl MessageOptions {
-    fn parse(input: &DeriveInput) -> Result<Self> {
-        let (mut type_name, mut definition) = (None, None);
-        for attribute in input.attrs.iter().filter(|attribute| attribute.path().is_ident("message")) {
-            attribute.parse_nested_meta(|meta| {
-                let slot = if meta.path.is_ident("type_name") {
-                    &mut type_name
-                } else if meta.path.is_ident("definition") {
-                    &mut definition
-                } else {
-                    return Err(meta.error("expected `type_name` or `definition`"));
-                };
-                *slot = Some(meta.value()?.parse()?);
-                Ok(())
-            })?;
-        }
-        let type_name: LitStr = type_name.ok_or_else(|| {
-            Error::new_spanned(&input.ident, "add #[message(type_name = \"package/msg/Name\")]")
+/// The texts that the attributes `#[attribute(…)]` give for `keys`.
+fn options(attributes: &[Attribute], attribute: &str, keys: [&str; 2]) -> Result<[Option<LitStr>; 2]> {
+    let mut texts = [None, None];
+    for attribute in attributes.iter().filter(|found| found.path().is_ident(attribute)) {
+        attribute.parse_nested_meta(|meta| {
+            let expected = || meta.error(format_args!("expected `{}` or `{}`", keys[0], keys[1]));
+            let key = keys.iter().position(|key| meta.path.is_ident(key)).ok_or_else(expected)?;
+            texts[key] = Some(meta.value()?.parse()?);
+            Ok(())
         })?;
-        require_ros_type_name(&type_name)?;
-        Ok(Self { type_name, definition })
     }
+    Ok(texts)
 }
 
 fn require_ros_type_name(type_name: &LitStr) -> Result<()> {
@@ -207,10 +190,9 @@ fn require_repr_c(input: &DeriveInput) -> Result<()> {
 
 fn named_fields(input: &DeriveInput) -> Result<&syn::punctuated::Punctuated<Field, syn::Token![,]>> {
     match &input.data {
-        Data::Struct(data) => match &data.fields {
-            Fields::Named(fields) if !fields.named.is_empty() => Ok(&fields.named),
-            _ => Err(Error::new_spanned(&input.ident, "expected a struct with named fields")),
-        },
+        Data::Struct(DataStruct { fields: Fields::Named(fields), .. }) if !fields.named.is_empty() => {
+            Ok(&fields.named)
+        }
         _ => Err(Error::new_spanned(&input.ident, "expected a struct with named fields")),
     }
 }
@@ -225,11 +207,11 @@ fn field_schema(input: &DeriveInput, field: &Field) -> Result<Tokens> {
             "a field name matches ^[a-z](_?[a-z0-9]+)*$ (ROS 2 tools refuse others)",
         ));
     }
-    let (unit, frame) = unit_and_frame(field)?;
+    let [unit, frame] = options(&field.attrs, "field", ["unit", "frame"])?;
     if unit.is_none() && is_float(&field.ty) {
         return Err(Error::new_spanned(field, "state the unit: #[field(unit = \"m/s\")]"));
     }
-    let (unit, frame) = (unit.unwrap_or_default(), frame.unwrap_or_default());
+    let [unit, frame] = [unit, frame].map(|text| text.map_or(String::new(), |text| text.value()));
     let (ty, doc) = (&field.ty, doc_text(&field.attrs));
     Ok(quote! {
         ::bus::schema::Field {
@@ -241,24 +223,6 @@ fn field_schema(input: &DeriveInput, field: &Field) -> Result<Tokens> {
             kind: <#ty as ::bus::schema::FieldType>::KIND,
         }
     })
-}
-
-fn unit_and_frame(field: &Field) -> Result<(Option<String>, Option<String>)> {
-    let (mut unit, mut frame) = (None, None);
-    for attribute in field.attrs.iter().filter(|attribute| attribute.path().is_ident("field")) {
-        attribute.parse_nested_meta(|meta| {
-            let slot = if meta.path.is_ident("unit") {
-                &mut unit
-            } else if meta.path.is_ident("frame") {
-                &mut frame
-            } else {
-                return Err(meta.error("expected `unit` or `frame`"));
-            };
-            *slot = Some(meta.value()?.parse::<LitStr>()?.value());
-            Ok(())
-        })?;
-    }
-    Ok((unit, frame))
 }
 
 /// Whether `ty` is `f32`, `f64`, or an array of either.
@@ -280,14 +244,10 @@ fn is_field_name(name: &str) -> bool {
 
 /// The doc comment of an item as one line.
 fn doc_text(attributes: &[Attribute]) -> String {
-    let lines =
-        attributes.iter().filter(|attribute| attribute.path().is_ident("doc")).filter_map(|attribute| {
-            match &attribute.meta.require_name_value().ok()?.value {
-                syn::Expr::Lit(syn::ExprLit { lit: syn::Lit::Str(text), .. }) => {
-                    Some(text.value().trim().to_owned())
-                }
-                _ => None,
-            }
-        });
+    let text = |attribute: &Attribute| match &attribute.meta.require_name_value().ok()?.value {
+        Expr::Lit(ExprLit { lit: Lit::Str(text), .. }) => Some(text.value().trim().to_owned()),
+        _ => None,
+    };
+    let lines = attributes.iter().filter(|attribute| attribute.path().is_ident("doc")).filter_map(text);
     lines.take_while(|line| !line.is_empty()).collect::<Vec<_>>().join(" ")
 }

@@ -34,20 +34,20 @@ pub fn fly_again(
     let mut flights = json!({});
     let mut furthest: Option<(f64, String)> = None;
     for (before, after) in before.flights.iter().zip(&after.flights) {
-        for (before_at, after_at) in before.horizons.iter().zip(&after.horizons) {
-            for (old, new) in before_at.channels.iter().zip(&after_at.channels) {
-                let (old_rms, new_rms) = (old.rms[0], new.rms[0]);
-                let (horizon, channel) = (before_at.horizon(), old.quantity.name());
-                flights[&before.name][&horizon][channel] =
-                    json!({ "before": old_rms, "after": new_rms, "unit": old.quantity.unit() });
-                let predicted = predicted(&outcome.report, &before.name, &horizon, channel);
-                let away = predicted
-                    .map(|(before, after)| (old_rms / before - 1.0).abs().max((new_rms / after - 1.0).abs()));
-                let furthest_here =
-                    away.map(|away| (away, format!("{channel} after {horizon} s of {}", before.name)));
-                let all = furthest.into_iter().chain(furthest_here).filter(|found| found.0.is_finite());
-                furthest = all.max_by(|a, b| a.0.total_cmp(&b.0));
-            }
+        let horizons = before.horizons.iter().zip(&after.horizons);
+        let channels = horizons.flat_map(|(old, new)| {
+            old.channels.iter().zip(&new.channels).map(|(old_channel, new)| (old.horizon(), old_channel, new))
+        });
+        for (horizon, old, new) in channels {
+            let (old_rms, new_rms, channel) = (old.rms[0], new.rms[0], old.quantity.name());
+            flights[&before.name][&horizon][channel] =
+                json!({ "before": old_rms, "after": new_rms, "unit": old.quantity.unit() });
+            let predicted = predicted(&outcome.report, &before.name, &horizon, channel);
+            let away = predicted
+                .map(|(before, after)| (old_rms / before - 1.0).abs().max((new_rms / after - 1.0).abs()))
+                .map(|away| (away, format!("{channel} after {horizon} s of {}", before.name)));
+            let all = furthest.into_iter().chain(away).filter(|found| found.0.is_finite());
+            furthest = all.max_by(|a, b| a.0.total_cmp(&b.0));
         }
     }
     let (away, at) = furthest.unzip();

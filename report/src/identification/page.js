@@ -26,8 +26,8 @@ const accepted = report.verdict.map((name) => [name, report.effects[name]]).filt
 
 const doubt = ({ determined, at_bound }) => (!determined ? ", not determined by these flights" : at_bound ? ", at its bound" : "");
 
-const estimateText = (name, own) =>
-  `${words(name)} = ${withUnit(own.value, own.unit)} (95 %: ${number(own.low)} to ${number(own.high)}${doubt(own)})`;
+const estimateText = ([name, estimate]) => `${spaced(name)} = ${withUnit(estimate.value, estimate.unit)} ` +
+  `(95 %: ${number(estimate.low)} to ${number(estimate.high)}${doubt(estimate)})`;
 
 function verdictText() {
   if (report.verdict.length) return `The flights ask for ${report.verdict.join(", ")}.`;
@@ -41,14 +41,14 @@ function drawSummary() {
   title(`${report.vehicle.split(/[\\/]/).pop().replace(/\.toml$/, "")}: what flights show beyond the declared model`);
   element("verdict").textContent = verdictText();
   for (const [name, effect] of accepted) {
-    const estimates = Object.entries(effect.parameters).map(([parameter, own]) => estimateText(parameter, own));
+    const estimates = Object.entries(effect.parameters).map(estimateText);
     const rivals = effect.confused_with.length ? `; cannot be told from ${effect.confused_with.join(", ")} here` : "";
     addItem("findings", `${name}: ${estimates.join("; ")}${rivals}.`);
   }
   for (const fault of report.faults) addItem("findings", `Fault, ${fault.channel} (${fault.kind}): ${fault.finding}; ${fault.consequence}.`);
   if (report.trims.length) addItem("findings", "The flights differ in trim; their mean torques were left out.");
   for (const [name, { rms, before, unit }] of Object.entries(report.unexplained)) {
-    addItem("findings", `Unexplained, ${words(name)}: ${withUnit(rms, unit)} are neither noise nor any ` +
+    addItem("findings", `Unexplained, ${spaced(name)}: ${withUnit(rms, unit)} are neither noise nor any ` +
       `effect's (${withUnit(before, unit)} with the declared model).`);
   }
   for (const { effect, needs } of report.not_identifiable) addItem("findings", `Cannot be seen here: ${effect}. It needs ${needs}.`);
@@ -56,11 +56,11 @@ function drawSummary() {
 
 function drawFlights() {
   fillTable("flights", [left("flight"), left("used to"), "compared [s]", "windows [s]", left("equations")], report.flights.map((flight) =>
-    [left(flight.name), left(flight.role), flight.compared_s.toFixed(1), flight.window_s.toFixed(3), long(list(flight.equations.map(words)))]));
+    [left(flight.name), left(flight.role), flight.compared_s.toFixed(1), flight.window_s.toFixed(3), long(list(flight.equations.map(spaced)))]));
   // What the reader noticed; what holds for several flights is said once.
   const flightsOf = new Map();
   for (const { name, assumed, notes } of report.flights) {
-    for (const note of [...assumed.map((own) => `assumed: ${own}`), ...notes]) flightsOf.set(note, [...(flightsOf.get(note) ?? []), name]);
+    for (const note of [...assumed.map((what) => `assumed: ${what}`), ...notes]) flightsOf.set(note, [...(flightsOf.get(note) ?? []), name]);
   }
   for (const [note, names] of flightsOf) {
     const of = names.length === report.flights.length && names.length > 1 ? "all flights" : names.join(", ");
@@ -86,7 +86,7 @@ function drawFaults() {
   fillPart("faults", ["channel", "kind", "finding", "consequence"].map(left), report.faults.map((fault) =>
     [left(fault.channel), left(fault.kind), long(fault.finding), long(fault.consequence)]));
   fillPart("trims", [left("flight"), "roll", "pitch", "yaw"], report.trims.map((trim) => [left(trim.flight),
-    ...trim.angular_acceleration_rad_s2.map((own, axis) => `${number(own)} ± ${trim.deviation_rad_s2[axis].toPrecision(2)}`)]));
+    ...trim.angular_acceleration_rad_s2.map((torque, axis) => `${number(torque)} ± ${trim.deviation_rad_s2[axis].toPrecision(2)}`)]));
 }
 
 // One row per parameter; the effect stands in the first.
@@ -95,7 +95,7 @@ function effectRows([name, effect]) {
   const figures = [number(before), number(after), change(before, after), chance(effect.chance), long(list(effect.confused_with))];
   const judged = effect.accepted ? "yes" : effect.linearised ? "no, linearised" : "no";
   const rows = Object.entries(effect.parameters).map(([parameter, { value, unit, low, high }], index) => {
-    const label = left([words(parameter), shownUnit(unit) && `[${shownUnit(unit)}]`].join(" "));
+    const label = left([spaced(parameter), shownUnit(unit) && `[${shownUnit(unit)}]`].join(" "));
     return [left(index ? "" : judged), label, number(value), `${number(low)} to ${number(high)}`, ...(index ? [] : figures)];
   });
   if (effect.experiment) rows.push([left(""), long(`To tell it from ${effect.confused_with[0]}: ${effect.experiment}.`, 8)]);
@@ -113,15 +113,15 @@ const horizons = (flights) => [...new Set(Object.values(flights).flatMap(Object.
 const floorOf = (channel, horizon) => report.noise_floor[channel]?.prediction[horizon];
 
 function fillErrors(id, flights) {
-  const rows = (flight, own) => horizons({ own }).flatMap((horizon) => CHANNELS.filter((name) => own[horizon][name]).map((channel) => {
-    const { before, after, unit } = own[horizon][channel];
+  const rows = (flight, errors) => horizons({ errors }).flatMap((horizon) => CHANNELS.filter((name) => errors[horizon][name]).map((channel) => {
+    const { before, after, unit } = errors[horizon][channel];
     const flown = data.bus?.flights[flight]?.[horizon]?.[channel];
     return [horizon, left(channel), number(before), number(after), left(shownUnit(unit)), change(before, after),
       number(floorOf(channel, horizon)), ...(data.bus ? [number(flown?.before), number(flown?.after)] : [])];
   }));
   const onBus = data.bus ? ["declared, on the bus", "new, on the bus"] : [];
   fillTable(id, [left("flight"), "horizon [s]", left("channel"), "declared", "new", left("unit"), "change", "by noise alone", ...onBus],
-    Object.entries(flights).flatMap(([flight, own]) => grouped(flight, rows(flight, own))));
+    Object.entries(flights).flatMap(([flight, errors]) => grouped(flight, rows(flight, errors))));
 }
 
 // The errors of one channel at one horizon, flight by flight; a line where noise alone would put them.
@@ -129,9 +129,9 @@ function drawBars(channel, horizon, rows) {
   const unit = shownUnit(rows[0][1][horizon][channel].unit);
   const bars = MODELS.map((model) => ({
     type: "bar", name: NAMES[model], marker: { color: COLOURS[model] },
-    x: rows.map(([flight]) => flight), y: rows.map(([, own]) => own[horizon][channel][model]),
+    x: rows.map(([flight]) => flight), y: rows.map(([, errors]) => errors[horizon][channel][model]),
     // Beside a great error a small one is no bar to be seen.
-    text: rows.map(([, own]) => number(own[horizon][channel][model], 3)), textposition: "outside", cliponaxis: false,
+    text: rows.map(([, errors]) => number(errors[horizon][channel][model], 3)), textposition: "outside", cliponaxis: false,
     hovertemplate: `%{x}<br>${NAMES[model]}: %{y:.4~g} ${unit}<extra></extra>`,
   }));
   const floor = floorOf(channel, horizon);
@@ -145,7 +145,7 @@ function drawErrors() {
   addLegend("errors-legend", [[COLOURS.before, "declared"], [COLOURS.after, "new"], [COLOURS.noise, "what noise alone makes (dotted)"]]);
   for (const channel of CHANNELS) {
     for (const horizon of horizons(report.held_out)) {
-      const rows = Object.entries(report.held_out).filter(([, own]) => own[horizon]?.[channel]);
+      const rows = Object.entries(report.held_out).filter(([, errors]) => errors[horizon]?.[channel]);
       if (rows.length) drawBars(channel, horizon, rows);
     }
   }
@@ -155,10 +155,10 @@ function drawErrors() {
 
 function drawNoise() {
   const ahead = horizons(report.held_out);
-  const units = Object.fromEntries(Object.values(report.held_out).flatMap(Object.values).flatMap(Object.entries).map(([channel, own]) => [channel, own.unit]));
+  const units = Object.fromEntries(Object.values(report.held_out).flatMap(Object.values).flatMap(Object.entries).map(([channel, { unit }]) => [channel, unit]));
   fillTable("noise", [left("channel"), "deviation", left("unit"), ...ahead.map((horizon) => `error after ${horizon} s`), left("unit")],
     Object.entries(report.noise_floor).map(([channel, { value, unit, prediction }]) =>
-      [left(words(channel)), number(value), left(shownUnit(unit)), ...ahead.map((horizon) => number(prediction[horizon])), left(shownUnit(units[channel] ?? ""))]));
+      [left(spaced(channel)), number(value), left(shownUnit(unit)), ...ahead.map((horizon) => number(prediction[horizon])), left(shownUnit(units[channel] ?? ""))]));
 }
 
 function drawWhiteness() {
@@ -166,7 +166,7 @@ function drawWhiteness() {
     [left(NAMES[model]), number(rms), number(persistent), left(shownUnit(unit)), `${(100 * beyond_bound).toFixed(0)} %`, chance(p_value)];
   fillTable("whiteness", [left("equation"), left("model"), "RMS", "common to neighbours", left("unit"), "beyond bound", "p"],
     Object.keys(report.whiteness.before).flatMap((name) =>
-      grouped(words(name), MODELS.map((model) => cells(model, report.whiteness[model][name])))));
+      grouped(spaced(name), MODELS.map((model) => cells(model, report.whiteness[model][name])))));
 }
 
 // What is chosen: a flight, an equation of it, a component of that, and what it is looked at against.
@@ -177,7 +177,7 @@ function chosen() {
   const measured = { name: `measured ${equation.name}`, unit: equation.unit, cloud: component.cloud.measured };
   const inputs = [measured, ...flight.inputs];
   const at = Math.min(element("input").value, inputs.length - 1);
-  const windowS = report.flights.find((own) => own.name === flight.name).window_s;
+  const windowS = report.flights.find(({ name }) => name === flight.name).window_s;
   return { equation, component, unit: shownUnit(equation.unit), input: inputs[at], cross: component.cross[at], windowS };
 }
 
@@ -187,7 +187,7 @@ const redraw = (id, traces, ...axes) => Plotly.react(id, traces, layout(...axes)
 const broken = (values, breaks) => values.flatMap((value, at) => (breaks.includes(at) ? [null, value] : [value]));
 
 function line(curve, key, values, width) {
-  const [x, y] = [curve.time, values].map((own) => broken(own, curve.breaks));
+  const [x, y] = [curve.time, values].map((numbers) => broken(numbers, curve.breaks));
   return { mode: "lines", name: NAMES[key] ?? key, x, y, line: { color: COLOURS[key], width }, hovertemplate: "%{x:.3f} s: %{y:.4~g}" };
 }
 
@@ -196,7 +196,7 @@ function cloud(x, y, key, hovertemplate) {
 }
 
 // What a model says: the measured less its residual.
-const predicted = (own, model) => own.measured.map((value, at) => value - own[model][at]);
+const predicted = (curve, model) => curve.measured.map((value, at) => value - curve[model][at]);
 
 function drawOverTime({ equation, component: { name, curve }, unit }) {
   const label = `${equation.name}, ${name}`;
@@ -206,11 +206,11 @@ function drawOverTime({ equation, component: { name, curve }, unit }) {
   redraw("sides", sides, `Measured and model: ${label}`, "time in s", unit);
 }
 
-function drawClouds({ component: { cloud: own }, unit, input }) {
-  const against = MODELS.map((model) => cloud(input.cloud, own[model], model, "%{x:.4~g}: %{y:.4~g}"));
+function drawClouds({ component: { cloud: points }, unit, input }) {
+  const against = MODELS.map((model) => cloud(input.cloud, points[model], model, "%{x:.4~g}: %{y:.4~g}"));
   redraw("against", against, "Residual against an input", `${input.name} in ${shownUnit(input.unit)}`, `residual in ${unit}`);
-  const agreement = MODELS.map((model) => cloud(predicted(own, model), own.measured, model, "model %{x:.4~g}, measured %{y:.4~g}"));
-  const same = { mode: "lines", x: ends(own.measured), y: ends(own.measured), line: { color: COLOURS.noise, width: 1 }, hoverinfo: "skip" };
+  const agreement = MODELS.map((model) => cloud(predicted(points, model), points.measured, model, "model %{x:.4~g}, measured %{y:.4~g}"));
+  const same = { mode: "lines", x: ends(points.measured), y: ends(points.measured), line: { color: COLOURS.noise, width: 1 }, hoverinfo: "skip" };
   redraw("agreement", [same, ...agreement], "Measured against model", `model in ${unit}`, `measured in ${unit}`);
 }
 
@@ -245,7 +245,7 @@ function drawCorrelations({ component: { auto, bounds }, input, cross, windowS }
 }
 
 function describe({ component: { rms, auto, bounds }, unit, windowS }) {
-  const [before, after] = MODELS.map((model) => beyondZero(auto)[model].filter((own) => Math.abs(own) > bounds["99"]).length);
+  const [before, after] = MODELS.map((model) => beyondZero(auto)[model].filter((value) => Math.abs(value) > bounds["99"]).length);
   element("size").textContent = `RMS ${number(rms[0])} ${unit} with the declared model, ${number(rms[1])} ${unit} with the new one ` +
     `(${change(...rms)}). Autocorrelations beyond the 99 % bound: ${before} and ${after} of ${auto.before.length - 1}, ` +
     `in windows of ${windowS.toFixed(3)} s.`;

@@ -2,15 +2,12 @@
 //!
 //! It is drawn by `page.js` with plotly.js ([`crate::page`]).
 
-use crate::page::{PLOTLY_BASIC, Page};
+use crate::page::PLOTLY_BASIC;
 use identify::run::{Outcome, Picture};
 use identify::statistics::{autocorrelation, cross_correlation, white_noise_bound};
 use identify::{Equation, Regressor};
 use serde_json::{Value, json};
 use std::collections::BTreeSet;
-
-const PAGE: Page =
-    Page { body: include_str!("page.html"), plotly: PLOTLY_BASIC, script: include_str!("page.js") };
 
 /// Windows of neighbouring knots overlap; those of every fourth do not.
 const APART: usize = 4;
@@ -26,52 +23,40 @@ const POINTS_MIN: usize = 300;
 /// The page of `outcome`; `flown` is what came of it on the bus, as in the report's `bus`, where it was flown.
 #[must_use]
 pub fn page(outcome: &Outcome, flown: Option<&Value>) -> Vec<u8> {
-    PAGE.with(&data(outcome, flown))
+    crate::page::page(include_str!("page.html"), PLOTLY_BASIC, include_str!("page.js"), &data(outcome, flown))
 }
 
 fn data(outcome: &Outcome, flown: Option<&Value>) -> Value {
-    let components = outcome.pictures.iter().map(|picture| picture.measured.len()).sum();
-    let budget = Budget { curve: share(CURVE_POINTS, components), cloud: share(CLOUD_POINTS, components) };
-    let flights = outcome.report.flights.iter().filter_map(|found| flight(outcome, &found.name, budget));
+    let components: usize = outcome.pictures.iter().map(|picture| picture.measured.len()).sum();
+    let share = |(most, all): (usize, usize)| (all / components.max(1)).clamp(POINTS_MIN, most);
+    let points = [share(CURVE_POINTS), share(CLOUD_POINTS)];
+    let flights = outcome.report.flights.iter().filter_map(|found| flight(outcome, &found.name, points));
     json!({ "report": outcome.report, "bus": flown, "flights": flights.collect::<Vec<_>>() })
 }
 
-/// How many points a component has.
-#[derive(Clone, Copy)]
-struct Budget {
-    curve: usize,
-    cloud: usize,
-}
-
-fn share((most, all): (usize, usize), components: usize) -> usize {
-    (all / components.max(1)).clamp(POINTS_MIN, most)
-}
-
 /// A flight's residuals, and what they are looked at against; `None` where nothing was compared.
-fn flight(outcome: &Outcome, name: &str, budget: Budget) -> Option<Value> {
+/// Curves and clouds have up to so many points.
+fn flight(outcome: &Outcome, name: &str, [curve, cloud]: [usize; 2]) -> Option<Value> {
     let pictures: Vec<&Picture> = outcome.pictures.iter().filter(|picture| picture.flight == name).collect();
     let first = pictures.first()?;
-    let cloud = evenly(first.time_s.len(), budget.cloud);
+    let cloud = evenly(first.time_s.len(), cloud);
     let regressors = outcome.regressors.get(name).map_or(&[][..], Vec::as_slice);
-    let input = |regressor: &Regressor| json!({ "name": regressor.name, "unit": regressor.unit, "cloud": at(&regressor.values, &cloud) });
-    let equations: Vec<Value> =
-        pictures.iter().map(|picture| equation(picture, regressors, budget.curve, &cloud)).collect();
+    let input = |of: &Regressor| json!({ "name": of.name, "unit": of.unit, "cloud": at(&of.values, &cloud) });
+    let equation = |picture: &&Picture| {
+        let axes = 0..picture.measured.len();
+        let components = axes.map(|axis| component(picture, axis, regressors, curve, &cloud));
+        json!({
+            "name": title(picture.equation),
+            "unit": picture.equation.unit(),
+            "components": components.collect::<Vec<_>>(),
+        })
+    };
     Some(json!({
         "name": name,
         "role": first.role,
         "inputs": regressors.iter().map(input).collect::<Vec<_>>(),
-        "equations": equations,
+        "equations": pictures.iter().map(equation).collect::<Vec<_>>(),
     }))
-}
-
-fn equation(picture: &Picture, regressors: &[Regressor], points: usize, cloud: &[usize]) -> Value {
-    let components =
-        (0..picture.measured.len()).map(|axis| component(picture, axis, regressors, points, cloud));
-    json!({
-        "name": title(picture.equation),
-        "unit": picture.equation.unit(),
-        "components": components.collect::<Vec<_>>(),
-    })
 }
 
 fn title(equation: Equation) -> &'static str {
@@ -95,10 +80,9 @@ fn component(
     let (measured, before, after) = (&picture.measured[axis], &picture.before[axis], &picture.after[axis]);
     let chosen = extremes(&[measured, before, after], points);
     let breaks = breaks(&picture.time_s, &chosen);
-    let name = if picture.equation == Equation::RotorSpeed {
-        format!("rotor {}", axis + 1)
-    } else {
-        ["x", "y", "z"][axis].into()
+    let name = match picture.equation {
+        Equation::RotorSpeed => format!("rotor {}", axis + 1),
+        _ => ["x", "y", "z"][axis].to_owned(),
     };
     let inputs = std::iter::once(measured).chain(regressors.iter().map(|regressor| &regressor.values));
     let cross = |input: &Vec<f64>| json!({ "before": lagged(before, input), "after": lagged(after, input) });
@@ -188,13 +172,9 @@ fn short(values: &[f64]) -> Vec<Value> {
     values.iter().map(|value| digits(*value)).collect()
 }
 
-/// Five digits: finer than any plot. What is no number is none.
+/// Five digits: finer than any plot. What is no number is null.
 fn digits(value: f64) -> Value {
-    if value.is_finite() {
-        json!(format!("{value:.4e}").parse::<f64>().unwrap_or(value))
-    } else {
-        Value::Null
-    }
+    format!("{value:.4e}").parse::<f64>().map_or(Value::Null, Value::from)
 }
 
 #[cfg(test)]

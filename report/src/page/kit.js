@@ -10,7 +10,7 @@ const SMALL = { ...CONFIG, displayModeBar: false };
 const AXIS = { exponentformat: "none", automargin: true, gridcolor: "#e6e6e6", zerolinecolor: "#999" };
 
 const element = (id) => document.getElementById(id);
-const words = (name) => name.replaceAll("_", " ");
+const spaced = (name) => name.replaceAll("_", " ");
 const list = (items) => items.join(", ") || "–";
 
 function add(parent, tag, properties = {}) {
@@ -38,7 +38,7 @@ function number(value, digits = 4) {
 }
 
 // A cell is text, or made by `left` or `long`.
-const left = (text) => ({ text, className: "words" });
+const left = (text) => ({ text, className: "left" });
 const long = (text, colSpan = 1) => ({ text, className: "long", colSpan });
 
 // Fills the table with headings and rows, each its cells or {cells, className}.

@@ -3,15 +3,12 @@
 use crate::plot::field::Channel;
 use crate::plot::thin::{Curve, Trail};
 use anyhow::{Context, Result, bail};
-use recorder::reader::Recording;
+use recorder::reader::{Recording, Topic};
 use serde::Serialize;
 use std::collections::BTreeSet;
 
 /// Points of a path in space.
 const TRAIL_POINTS_MAX: usize = 2000;
-
-/// What was read for one [`Ask`]: its channels with their curves; none where no message was in the span.
-pub type Curves = Vec<(Channel, Curve)>;
 
 /// What a curve stands for; it decides how its line looks.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
@@ -67,39 +64,31 @@ impl Role {
 /// is drawn: mostly the others ask for the same. They are those in which the thesis shows a flight (its Figs 5.1–5.5),
 /// and the distances that its wall following uses.
 const FIGURES: [(&str, &str, &[Row]); 7] = [
-    (
-        "Attitude",
-        "angle",
-        &[
-            (&["PlantState", "MeasuredState", "AttitudeEstimate", "StateEstimate"], &["attitude"]),
-            (&["ControlStatus"], &["attitude_set_point"]),
-            (&["SetPoint"], &["roll", "pitch", "yaw"]),
-            (&["Reference"], &["yaw"]),
-        ],
-    ),
-    (
-        "Body rates",
-        "angular velocity in the body",
-        &[(&["PlantState", "MeasuredState", "AttitudeEstimate", "StateEstimate"], &["angular_velocity"])],
-    ),
+    ("Attitude", "angle", ATTITUDE),
+    ("Body rates", "angular velocity in the body", &[(&TURNING, &["angular_velocity"])]),
     ("Velocity", "velocity in the world", &[(&MOVING, &["velocity"])]),
-    (
-        "Position",
-        "position in the world",
-        &[
-            (&MOVING, &["position"]),
-            (&["ControlStatus"], &["altitude_set_point"]),
-            (&["SetPoint"], &["altitude"]),
-        ],
-    ),
+    ("Position", "position in the world", POSITION),
     ("Distances", "distance", &[(&["Ranges", "WallEstimate"], &["distance"])]),
     ("Motor command", "command", &[(&["MotorCommand"], &["command"])]),
     ("Rotor speed", "rotor speed", &[(&["PlantState"], &["rotor_speed"])]),
+];
+const ATTITUDE: &[Row] = &[
+    (&TURNING, &["attitude"]),
+    (&["ControlStatus"], &["attitude_set_point"]),
+    (&["SetPoint"], &["roll", "pitch", "yaw"]),
+    (&["Reference"], &["yaw"]),
+];
+const POSITION: &[Row] = &[
+    (&MOVING, &["position"]),
+    (&["ControlStatus"], &["altitude_set_point"]),
+    (&["SetPoint"], &["altitude"]),
 ];
 
 /// Message types, and fields of theirs.
 type Row = (&'static [&'static str], &'static [&'static str]);
 
+/// The types of what turns, which have an attitude and an angular velocity.
+const TURNING: [&str; 4] = ["PlantState", "MeasuredState", "AttitudeEstimate", "StateEstimate"];
 /// The types of what moves, which have a field `position`; the first two make a vehicle.
 const MOVING: [&str; 4] = ["PlantState", "MeasuredState", "StateEstimate", "Reference"];
 
@@ -112,11 +101,14 @@ pub struct Ask {
     pub field: String,
     /// What it stands for.
     pub role: Role,
+    /// What was read of it: its channels with their curves; none where no message was in the span.
+    pub curves: Vec<(Channel, Curve)>,
 }
 
 impl Ask {
     fn new(topic: &str, field: &str, type_name: &str) -> Self {
-        Self { topic: topic.to_owned(), field: field.to_owned(), role: Role::of(type_name, field) }
+        let role = Role::of(type_name, field);
+        Self { topic: topic.to_owned(), field: field.to_owned(), role, curves: Vec::new() }
     }
 
     /// The vehicle whose topic it is; empty where it has no name.
@@ -134,8 +126,8 @@ pub struct Wanted {
     pub title: &'static str,
     /// What the vertical axis shows; empty where the fields say it.
     pub label: &'static str,
-    /// What is drawn, with what was read of it.
-    pub asks: Vec<(Ask, Curves)>,
+    /// What is drawn.
+    pub asks: Vec<Ask>,
 }
 
 /// All that is drawn, and what was read of it.
@@ -208,15 +200,11 @@ fn is_of_shadow(topic: &str) -> bool {
 
 /// The vehicles by name, `h2` before `h10`.
 fn vehicles(recording: &Recording) -> Vec<String> {
-    let topics = recording.topics().iter();
-    let makes_one = |type_name: &str| MOVING[..2].contains(&short_name(type_name));
-    let states = topics.filter(|(name, topic)| makes_one(&topic.type_name) && !is_of_shadow(name));
+    let makes_one = |topic: &Topic| MOVING[..2].contains(&short_name(&topic.type_name));
+    let states = recording.topics().iter().filter(|(name, topic)| makes_one(topic) && !is_of_shadow(name));
     let names: BTreeSet<_> = states.map(|(name, _)| (prefix(name).len(), prefix(name))).collect();
-    let mut names: Vec<_> = names.into_iter().map(|(_, name)| name.to_owned()).collect();
-    if names.is_empty() {
-        names.push(String::new());
-    }
-    names
+    let no_name = names.is_empty().then(String::new);
+    names.into_iter().map(|(_, name)| name.to_owned()).chain(no_name).collect()
 }
 
 /// Whether a topic is one of `vehicle`'s, or of no vehicle and so of all.
@@ -229,43 +217,30 @@ fn belongs(topic: &str, vehicle: &str, vehicles: &[String]) -> bool {
 }
 
 fn default_axes(recording: &Recording, vehicle: &str, vehicles: &[String]) -> Vec<Wanted> {
-    let topics: Vec<(&str, &str)> = recording
-        .topics()
-        .iter()
-        .filter(|(name, _)| belongs(name, vehicle, vehicles))
-        .map(|(name, topic)| (name.as_str(), topic.type_name.as_str()))
-        .collect();
-    let axes = FIGURES.map(|(title, label, rows)| Wanted {
-        vehicle: vehicle.to_owned(),
-        title,
-        label,
-        asks: default_asks(rows, &topics),
+    let topics = || recording.topics().iter().filter(|(name, _)| belongs(name, vehicle, vehicles));
+    let axes = FIGURES.map(|(title, label, rows)| {
+        let mut asks: Vec<Ask> = Vec::new();
+        for (wanted, fields) in
+            rows.iter().flat_map(|(types, fields)| types.iter().map(move |name| (name, fields)))
+        {
+            let of_type = topics().filter(|(_, topic)| short_name(&topic.type_name) == *wanted);
+            let more = of_type
+                .flat_map(|(name, topic)| fields.iter().map(|field| Ask::new(name, field, &topic.type_name)));
+            let is_asked = asks.iter().any(|ask| ask.role == Role::Asked);
+            asks.extend(more.filter(|ask| !is_asked || ask.role != Role::Asked));
+        }
+        Wanted { vehicle: vehicle.to_owned(), title, label, asks }
     });
     axes.into_iter().filter(|axes| !axes.asks.is_empty()).collect()
 }
 
-/// What a figure with these rows draws of these topics, given with their types.
-fn default_asks(rows: &[Row], topics: &[(&str, &str)]) -> Vec<(Ask, Curves)> {
-    let mut asks: Vec<(Ask, Curves)> = Vec::new();
-    let rows = rows.iter().flat_map(|(types, fields)| types.iter().map(move |name| (name, fields)));
-    for (wanted, fields) in rows {
-        let of_type = topics.iter().filter(|(_, type_name)| short_name(type_name) == *wanted);
-        let more = of_type
-            .flat_map(|(topic, type_name)| fields.iter().map(|field| Ask::new(topic, field, type_name)));
-        let is_asked = asks.iter().any(|(ask, _)| ask.role == Role::Asked);
-        let more = more.filter(|ask| !is_asked || ask.role != Role::Asked);
-        asks.extend(more.map(|ask| (ask, Curves::new())));
-    }
-    asks
-}
-
 fn trails(recording: &Recording, is_shown: impl Fn(&str) -> bool) -> Vec<(Ask, Trail)> {
-    let moving = recording.topics().iter().filter(|(name, topic)| {
-        MOVING.contains(&short_name(&topic.type_name)) && is_shown(name) && topic.message_count > 0
-    });
-    moving
-        .map(|(name, topic)| (Ask::new(name, "position", &topic.type_name), Trail::new(TRAIL_POINTS_MAX)))
-        .collect()
+    let moves = |topic: &Topic| MOVING.contains(&short_name(&topic.type_name)) && topic.message_count > 0;
+    let moving = recording.topics().iter().filter(|(name, topic)| moves(topic) && is_shown(name));
+    let trail = |(name, topic): (&String, &Topic)| {
+        (Ask::new(name, "position", &topic.type_name), Trail::new(TRAIL_POINTS_MAX))
+    };
+    moving.map(trail).collect()
 }
 
 /// The axes that `TOPIC:FIELD,TOPIC:FIELD…` names; a field without a topic is of the topic before.
@@ -273,18 +248,15 @@ fn named(recording: &Recording, plot: &str) -> Result<Wanted> {
     let mut last_topic = None;
     let mut asks = Vec::new();
     for part in plot.split(',').map(str::trim) {
-        let (topic, field) = match (part.split_once(':'), last_topic) {
-            (Some((topic, field)), _) => (topic, field),
-            (None, Some(topic)) => (topic, part),
-            (None, None) => {
-                bail!("--plot {plot}: `{part}` is not TOPIC:FIELD, such as /plant/state:position.z")
-            }
+        let named = part.split_once(':').or_else(|| last_topic.map(|topic| (topic, part)));
+        let Some((topic, field)) = named else {
+            bail!("--plot {plot}: `{part}` is not TOPIC:FIELD, such as /plant/state:position.z");
         };
         if field.is_empty() {
             bail!("--plot {plot}: `{part}` names no field");
         }
         let found = recording.topic(topic).with_context(|| format!("--plot {plot}"))?;
-        asks.push((Ask::new(topic, field, &found.type_name), Curves::new()));
+        asks.push(Ask::new(topic, field, &found.type_name));
         last_topic = Some(topic);
     }
     Ok(Wanted { vehicle: String::new(), title: "", label: "", asks })

@@ -24,11 +24,13 @@ pub enum View {
 pub const TIME_LABEL: &str = "simulated time [s]";
 
 /// All that a file shows; its text says how much that is.
-#[derive(Debug)]
+#[derive(Debug, Serialize)]
 pub struct Drawing {
+    #[serde(skip)]
     pub(super) title: String,
     pub(super) recording: String,
     pub(super) span_s: [f64; 2],
+    #[serde(skip)]
     pub(super) views: Vec<View>,
     pub(super) panels: Vec<Panel>,
     pub(super) trails: Vec<Trail>,
@@ -39,13 +41,7 @@ impl Drawing {
     /// What is drawn: names, units and numbers of points.
     #[must_use]
     pub fn json(&self) -> Value {
-        json!({
-            "recording": self.recording,
-            "span_s": self.span_s,
-            "panels": self.panels,
-            "trails": self.trails,
-            "solids": self.solids,
-        })
+        json!(self)
     }
 
     /// The views that were asked for, or else those of `usual` that there is something for.

@@ -1,11 +1,8 @@
 //! The numbers that a field of a message is drawn as, and the units that people read them in.
 
-use recorder::definition::Leaf;
-use recorder::series::roll_pitch_yaw;
+use recorder::definition::{Leaf, number};
+use recorder::series::{ANGLES, value};
 use std::f64::consts::{PI, TAU};
-
-/// The angles that a quaternion is drawn as.
-const ANGLES: [&str; 3] = ["roll", "pitch", "yaw"];
 
 /// One number of a message, over time.
 #[derive(Clone, Debug)]
@@ -14,47 +11,23 @@ pub struct Channel {
     pub path: String,
     /// Unit that it is drawn in.
     pub unit: String,
-    source: Source,
     factor: f64,
     continued: Option<Continued>,
-}
-
-/// Where the number is among the leaves of a message.
-#[derive(Clone, Copy, Debug)]
-enum Source {
-    Leaf(usize),
-    /// Part of [`ANGLES`] of the quaternion in these leaves.
-    Angle([usize; 4], usize),
 }
 
 /// The channels of `field` in a message with these leaves: one for a number, three angles for a quaternion, and one
 /// for each number of anything else. `None` where there is no such field.
 pub fn channels(leaves: &[Leaf], field: &str) -> Option<Vec<Channel>> {
-    let find = |path: &str| leaves.iter().position(|leaf| leaf.path == path && leaf.value.as_f64().is_some());
-    if let Some(index) = find(field) {
-        return Some(vec![Channel::new(field, &leaves[index].unit, Source::Leaf(index))]);
+    if let Some((_, unit)) = value(leaves, field) {
+        return Some(vec![Channel::new(field, unit)]);
     }
-    let quaternion = |path: &str| {
-        let parts = ["x", "y", "z", "w"].map(|part| find(&format!("{path}.{part}")));
-        let [Some(x), Some(y), Some(z), Some(w)] = parts else { return None };
-        Some([x, y, z, w])
-    };
-    let angle = |path: &str, parts, angle: usize| {
-        Channel::new(&format!("{path}.{}", ANGLES[angle]), "rad", Source::Angle(parts, angle))
-    };
-    if let Some(parts) = quaternion(field) {
-        return Some((0..3).map(|index| angle(field, parts, index)).collect());
-    }
-    if let Some((path, last)) = field.rsplit_once('.') {
-        let index = ANGLES.iter().position(|angle| *angle == last);
-        if let (Some(index), Some(parts)) = (index, quaternion(path)) {
-            return Some(vec![angle(path, parts, index)]);
-        }
+    let angles = ANGLES.map(|angle| format!("{field}.{angle}"));
+    if number(leaves, &format!("{field}.w")).is_some() && value(leaves, &angles[0]).is_some() {
+        return Some(angles.iter().map(|angle| Channel::new(angle, "rad")).collect());
     }
     let inside = |leaf: &Leaf| leaf.path.strip_prefix(field).is_some_and(|rest| rest.starts_with(['.', '[']));
-    let numbers = leaves.iter().enumerate().filter(|(_, leaf)| inside(leaf) && leaf.value.as_f64().is_some());
-    let channels = numbers.map(|(index, leaf)| Channel::new(&leaf.path, &leaf.unit, Source::Leaf(index)));
-    let channels: Vec<_> = channels.collect();
+    let numbers = leaves.iter().filter(|leaf| inside(leaf) && leaf.value.as_f64().is_some());
+    let channels: Vec<_> = numbers.map(|leaf| Channel::new(&leaf.path, &leaf.unit)).collect();
     (!channels.is_empty()).then_some(channels)
 }
 
@@ -70,27 +43,20 @@ fn shown_unit<'a>(path: &str, unit: &'a str) -> &'a str {
 }
 
 impl Channel {
-    fn new(path: &str, unit: &str, source: Source) -> Self {
+    fn new(path: &str, unit: &str) -> Self {
         let shown = shown_unit(path, unit);
-        let is_angle = unit == "rad";
         Self {
             path: path.to_owned(),
             unit: shown.to_owned(),
-            source,
             // No unit becomes the unit 1, which changes no number.
             factor: diagnostics::convert(unit, shown).unwrap_or(1.0),
-            continued: is_angle.then(Continued::default),
+            continued: (unit == "rad").then(Continued::default),
         }
     }
 
     /// The number in a message with these leaves, in the unit that is shown; NaN where the message has it not.
     pub fn value(&mut self, leaves: &[Leaf]) -> f64 {
-        let number =
-            |index: usize| leaves.get(index).and_then(|leaf| leaf.value.as_f64()).unwrap_or(f64::NAN);
-        let value = match self.source {
-            Source::Leaf(index) => number(index),
-            Source::Angle(parts, angle) => roll_pitch_yaw(parts.map(number))[angle],
-        };
+        let value = value(leaves, &self.path).map_or(f64::NAN, |(value, _)| value);
         self.continued.as_mut().map_or(value, |continued| continued.next(value)) * self.factor
     }
 }

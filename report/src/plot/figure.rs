@@ -1,6 +1,6 @@
 //! What is drawn, ready for any kind of file: axes with named, coloured curves of one unit, and paths in space.
 
-use crate::plot::choice::{Ask, Curves, Role, Wanted};
+use crate::plot::choice::{Ask, Role, Wanted};
 use crate::plot::thin;
 use anyhow::{Result, bail};
 use serde::{Serialize, Serializer};
@@ -77,13 +77,12 @@ fn count<T, S: Serializer>(points: &[T], serializer: S) -> std::result::Result<S
 /// # Errors
 /// If the curves of one set of axes have different units.
 pub fn panels(wanted: &[Wanted]) -> Result<Vec<Panel>> {
-    let mut panels: Vec<Panel> = Vec::new();
-    for wanted in wanted {
-        let axes = axes(wanted)?;
-        match panels.last_mut() {
-            _ if axes.curves.is_empty() => {}
-            Some(panel) if panel.vehicle == wanted.vehicle => panel.axes.push(axes),
-            _ => panels.push(Panel { vehicle: wanted.vehicle.clone(), axes: vec![axes] }),
+    let mut panels = Vec::new();
+    for of_vehicle in wanted.chunk_by(|a, b| a.vehicle == b.vehicle) {
+        let mut axes = of_vehicle.iter().map(axes).collect::<Result<Vec<_>>>()?;
+        axes.retain(|axes| !axes.curves.is_empty());
+        if !axes.is_empty() {
+            panels.push(Panel { vehicle: of_vehicle[0].vehicle.clone(), axes });
         }
     }
     Ok(panels)
@@ -91,7 +90,7 @@ pub fn panels(wanted: &[Wanted]) -> Result<Vec<Panel>> {
 
 fn axes(wanted: &Wanted) -> Result<Axes> {
     let unit = unit(&wanted.asks)?;
-    let curves = wanted.asks.iter().flat_map(|(ask, curves)| curves.iter().map(move |curve| (ask, curve)));
+    let curves = wanted.asks.iter().flat_map(|ask| ask.curves.iter().map(move |curve| (ask, curve)));
     let curves = curves.map(|(ask, (channel, curve))| Curve {
         name: String::new(),
         topic: ask.topic.clone(),
@@ -105,19 +104,18 @@ fn axes(wanted: &Wanted) -> Result<Axes> {
     curves.sort_by_key(|curve| curve.role);
     name(&mut curves);
     colour(&mut curves);
-    let fields = distinct(wanted.asks.iter().map(|(ask, _)| ask.field.as_str())).join(", ");
+    let fields = distinct(wanted.asks.iter().map(|ask| ask.field.as_str())).join(", ");
     let or_fields = |text: &str| if text.is_empty() { fields.clone() } else { text.to_owned() };
     Ok(Axes { title: or_fields(wanted.title), label: or_fields(wanted.label), unit, curves })
 }
 
 /// The one unit of all curves.
-fn unit(asks: &[(Ask, Curves)]) -> Result<String> {
-    let units_of = |curves: &'_ Curves| distinct(curves.iter().map(|(channel, _)| channel.unit.clone()));
-    let units = distinct(asks.iter().flat_map(|(_, curves)| units_of(curves)));
+fn unit(asks: &[Ask]) -> Result<String> {
+    let units_of = |ask: &Ask| distinct(ask.curves.iter().map(|(channel, _)| channel.unit.clone()));
+    let units = distinct(asks.iter().flat_map(units_of));
     if units.len() > 1 {
-        let asks = asks
-            .iter()
-            .map(|(ask, curves)| format!("{}:{} in {}", ask.topic, ask.field, units_of(curves).join(", ")));
+        let asks =
+            asks.iter().map(|ask| format!("{}:{} in {}", ask.topic, ask.field, units_of(ask).join(", ")));
         bail!(
             "one set of axes has one unit, but it was asked for {}: give each unit a --plot of its own",
             asks.collect::<Vec<_>>().join(", ")

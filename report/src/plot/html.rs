@@ -2,19 +2,16 @@
 //!
 //! It is drawn by `page.js` with plotly.js ([`crate::page`]).
 
-use crate::page::{PLOTLY_3D, Page};
+use crate::page::PLOTLY_3D;
 use crate::plot::drawing::{Drawing, TIME_LABEL, View};
 use crate::plot::figure::{Axes, Curve, Trail};
 use crate::plot::scene::{EDGES, Solid};
 use serde::Serialize;
 use serde_json::{Value, json};
 
-const PAGE: Page =
-    Page { body: include_str!("page.html"), plotly: PLOTLY_3D, script: include_str!("page.js") };
-
 /// The page.
 pub fn page(drawing: &Drawing) -> Vec<u8> {
-    PAGE.with(&data(drawing))
+    crate::page::page(include_str!("page.html"), PLOTLY_3D, include_str!("page.js"), &data(drawing))
 }
 
 /// What the page's script draws: the drawing with its points.
@@ -64,9 +61,6 @@ fn solid(solid: &Solid) -> Value {
 fn short(value: f64) -> Value {
     #[allow(clippy::cast_possible_truncation, reason = "that is the purpose")]
     let single = value as f32;
-    if !single.is_finite() {
-        return Value::Null;
-    }
     // By way of its text, since a 64-bit float with the same value has many more digits.
-    json!(single.to_string().parse::<f64>().unwrap_or(value))
+    single.to_string().parse::<f64>().map_or(Value::Null, Value::from)
 }

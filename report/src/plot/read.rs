@@ -1,11 +1,11 @@
 //! The one pass over a recording that takes out everything that is drawn.
 
-use crate::plot::choice::{Ask, Choice, Curves};
+use crate::plot::choice::{Ask, Choice};
 use crate::plot::field;
 use crate::plot::thin::{Curve, Trail};
 use anyhow::{Result, bail};
 use recorder::RecordingError;
-use recorder::definition::Leaf;
+use recorder::definition::{Leaf, number};
 use recorder::reader::Recording;
 use std::collections::BTreeMap;
 
@@ -35,7 +35,7 @@ impl Span {
 }
 
 /// What a topic is read for.
-type Uses<'a> = (Vec<(&'a Ask, &'a mut Curves)>, Vec<&'a mut Trail>);
+type Uses<'a> = (Vec<&'a mut Ask>, Vec<&'a mut Trail>);
 
 /// Reads what `choice` asks for in `span`; returns the first and the last time of it, in seconds. `progress` hears the
 /// number of messages read, now and then.
@@ -60,15 +60,21 @@ pub fn read(
         }
         let time_s = record.time_ns as f64 * 1e-9;
         widen(&mut whole_s, time_s);
-        let uses = uses.get_mut(record.topic.as_str()).filter(|_| span.holds(time_s));
+        let uses = uses.get_mut(&record.topic).filter(|_| span.holds(time_s));
         let Some((asks, trails)) = uses else { continue };
         let leaves = recording.decode(&record)?;
         widen(&mut read_s, time_s);
-        for (ask, curves) in asks {
-            if curves.is_empty() {
-                **curves = channels(ask, &leaves, bins, is_named)?;
+        for ask in asks {
+            if ask.curves.is_empty() {
+                let channels = field::channels(&leaves, &ask.field);
+                if channels.is_none() && is_named {
+                    return Err(RecordingError::unknown_field(&ask.topic, &ask.field, &leaves).into());
+                }
+                // The first message shows which numbers the field has.
+                let channels = channels.into_iter().flatten();
+                ask.curves = channels.map(|channel| (channel, Curve::new(bins))).collect();
             }
-            curves.iter_mut().for_each(|(channel, curve)| curve.push(time_s, channel.value(&leaves)));
+            ask.curves.iter_mut().for_each(|(channel, curve)| curve.push(time_s, channel.value(&leaves)));
         }
         trails.iter_mut().for_each(|trail| trail.push(position(&leaves)));
     }
@@ -76,34 +82,20 @@ pub fn read(
     Ok(read_s)
 }
 
-fn uses(choice: &mut Choice) -> BTreeMap<&str, Uses<'_>> {
-    let mut uses: BTreeMap<&str, Uses<'_>> = BTreeMap::new();
-    for (ask, curves) in choice.axes.iter_mut().flat_map(|axes| &mut axes.asks) {
-        uses.entry(&ask.topic).or_default().0.push((ask, curves));
+fn uses(choice: &mut Choice) -> BTreeMap<String, Uses<'_>> {
+    let mut uses: BTreeMap<String, Uses<'_>> = BTreeMap::new();
+    for ask in choice.axes.iter_mut().flat_map(|axes| &mut axes.asks) {
+        uses.entry(ask.topic.clone()).or_default().0.push(ask);
     }
     for (ask, trail) in &mut choice.trails {
-        uses.entry(&ask.topic).or_default().1.push(trail);
+        uses.entry(ask.topic.clone()).or_default().1.push(trail);
     }
     uses
 }
 
-/// The channels of an ask: its first message shows which numbers the field has.
-fn channels(ask: &Ask, leaves: &[Leaf], bins: usize, is_named: bool) -> Result<Curves, RecordingError> {
-    match field::channels(leaves, &ask.field) {
-        Some(channels) => Ok(channels.into_iter().map(|channel| (channel, Curve::new(bins))).collect()),
-        None if is_named => Err(RecordingError::UnknownField {
-            topic: ask.topic.clone(),
-            field: ask.field.clone(),
-            known: leaves.iter().map(|leaf| leaf.path.as_str()).collect::<Vec<_>>().join(", "),
-        }),
-        None => Ok(Curves::new()),
-    }
-}
-
 fn position(leaves: &[Leaf]) -> [f64; 3] {
-    let number =
-        |path: &str| leaves.iter().find(|leaf| leaf.path == path).and_then(|leaf| leaf.value.as_f64());
-    ["position.x", "position.y", "position.z"].map(|path| number(path).unwrap_or(f64::NAN))
+    let paths = ["position.x", "position.y", "position.z"];
+    paths.map(|path| number(leaves, path).unwrap_or(f64::NAN))
 }
 
 fn widen(span_s: &mut [f64; 2], time_s: f64) {
@@ -112,8 +104,8 @@ fn widen(span_s: &mut [f64; 2], time_s: f64) {
 
 fn require_samples(choice: &Choice, span: Span, read_s: [f64; 2], whole_s: [f64; 2]) -> Result<()> {
     let mut asks = choice.axes.iter().flat_map(|axes| &axes.asks);
-    let what = match asks.find(|(_, curves)| choice.is_named && curves.is_empty()) {
-        Some((ask, _)) => format!("{} has no sample", ask.topic),
+    let what = match asks.find(|ask| choice.is_named && ask.curves.is_empty()) {
+        Some(ask) => format!("{} has no sample", ask.topic),
         None if read_s[0] > read_s[1] => "there is nothing to plot".to_owned(),
         None => return Ok(()),
     };

@@ -40,10 +40,14 @@ fn with_room(ends: Range<f64>) -> Range<f64> {
     if ends.start > ends.end {
         return -0.5 * EXTENT_MIN_M..0.5 * EXTENT_MIN_M;
     }
-    let missing = (EXTENT_MIN_M - (ends.end - ends.start)).max(0.0);
-    let room = 0.04 * (ends.end - ends.start) + missing / 2.0;
-    // Nothing is below the ground.
-    if ends.start == 0.0 { 0.0..ends.end + 2.0 * room } else { ends.start - room..ends.end + room }
+    let missing = (EXTENT_MIN_M - length(&ends)).max(0.0);
+    let room = 0.04 * length(&ends) + missing / 2.0;
+    widened(&ends, 2.0 * room)
+}
+
+/// A range that is longer by `more`; nothing is below the ground.
+fn widened(ends: &Range<f64>, more: f64) -> Range<f64> {
+    if ends.start == 0.0 { 0.0..ends.end + more } else { ends.start - more / 2.0..ends.end + more / 2.0 }
 }
 
 fn length(ends: &Range<f64>) -> f64 {
@@ -133,15 +137,7 @@ const AXES: [&str; 3] = ["x", "y", "z"];
 fn equal([across, up]: [Range<f64>; 2], [width, height]: [u32; 2]) -> [Range<f64>; 2] {
     let (width, height) = (f64::from(width), f64::from(height));
     let metre = (width / length(&across)).min(height / length(&up));
-    let widened = |ends: Range<f64>, size: f64| {
-        let missing = size / metre - length(&ends);
-        if ends.start == 0.0 {
-            0.0..ends.end + missing
-        } else {
-            ends.start - missing / 2.0..ends.end + missing / 2.0
-        }
-    };
-    [widened(across, width), widened(up, height)]
+    [(across, width), (up, height)].map(|(ends, size)| widened(&ends, size / metre - length(&ends)))
 }
 
 /// A point of the world as plotters takes it: its y axis points up, and its z axis to the viewer.

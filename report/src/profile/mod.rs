@@ -24,22 +24,3 @@ mod trace;
 
 pub use figures::Profile;
 pub use trace::START as TRACE_START;
-
-use runtime::flight::Flight;
-use std::io::{self, Write};
-
-impl Profile {
-    /// Writes a timeline that ui.perfetto.dev opens; returns which ticks it holds, in words.
-    ///
-    /// # Errors
-    /// If `out` fails.
-    pub fn write_trace(&self, flight: &Flight, out: &mut impl Write) -> io::Result<String> {
-        trace::write(flight, &self.critical_path, out)
-    }
-
-    /// A page with histograms and the slowest ticks of run `run`.
-    #[must_use]
-    pub fn page(&self, run: &str, flight: &Flight) -> Vec<u8> {
-        page::page(run, flight, self)
-    }
-}

@@ -1,6 +1,7 @@
 //! The deadlines of a paced run.
 
 use crate::profile::times::Times;
+use bus::profile::TickTimes;
 use runtime::flight::Flight;
 use serde::Serialize;
 
@@ -37,15 +38,14 @@ impl Pacing {
             jitter.add(grant.granted_ns.saturating_sub(deadline_ns));
             late_grants += u64::from(is_after_next(flight, grant.first_tick, grant.granted_ns));
         }
-        let overruns = (0..flight.plan.nodes.len())
-            .map(|node| Overruns { name: flight.node_name(node).to_owned(), ticks: overruns(flight, node) });
+        let nodes = flight.plan.nodes.iter().enumerate();
+        let overruns = nodes.map(|(node, plan)| {
+            let late = |times: &TickTimes<'_>| is_after_next(flight, times.tick, times.ended_ns);
+            Overruns { name: plan.name.clone(), ticks: flight.ticks_of(node).filter(late).count() }
+        });
         let overruns = overruns.collect();
         (!jitter.is_empty()).then_some(Self { jitter, late_grants, missed_deadlines, overruns })
     }
-}
-
-fn overruns(flight: &Flight, node: usize) -> usize {
-    flight.ticks_of(node).filter(|times| is_after_next(flight, times.tick, times.ended_ns)).count()
 }
 
 /// Whether host time `ns` lies after the deadline of the tick after `tick`.

@@ -2,16 +2,13 @@
 //!
 //! It is drawn by `page.js` with plotly.js ([`crate::page`]).
 
-use crate::page::{PLOTLY_BASIC, Page};
+use crate::page::{self, PLOTLY_BASIC};
 use crate::profile::figures::Profile;
 use crate::profile::latency::{PARTS, cause_name, parts};
 use crate::profile::path::{Path, name};
 use crate::profile::times::Times;
 use runtime::flight::Flight;
 use serde_json::{Value, json};
-
-const PAGE: Page =
-    Page { body: include_str!("page.html"), plotly: PLOTLY_BASIC, script: include_str!("page.js") };
 
 /// Slowest ticks on the page.
 const SLOWEST_TICKS: usize = 20;
@@ -24,9 +21,13 @@ const COURSE_POINTS: usize = 2000;
 /// Bins per decade of the histograms.
 const BINS_PER_DECADE: f64 = 20.0;
 
-/// The page of run `run`.
-pub fn page(run: &str, flight: &Flight, profile: &Profile) -> Vec<u8> {
-    PAGE.with(&data(run, flight, profile))
+impl Profile {
+    /// A page with histograms and the slowest ticks of run `run`.
+    #[must_use]
+    pub fn page(&self, run: &str, flight: &Flight) -> Vec<u8> {
+        let data = data(run, flight, self);
+        page::page(include_str!("page.html"), PLOTLY_BASIC, include_str!("page.js"), &data)
+    }
 }
 
 fn data(run: &str, flight: &Flight, profile: &Profile) -> Value {

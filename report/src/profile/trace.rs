@@ -1,7 +1,7 @@
 //! A timeline in the Trace Event Format (JSON), which ui.perfetto.dev and chrome://tracing open.
 
+use crate::profile::figures::Profile;
 use crate::profile::latency::{PARTS, cause_name, parts};
-use crate::profile::path::CriticalPath;
 use bus::profile::{Grant, TickTimes};
 use runtime::flight::{Cause, Flight};
 use serde_json::{Value, json};
@@ -20,30 +20,21 @@ const CLOCK: usize = 1;
 /// How every trace begins: `otherData` is where the format has room for who wrote it.
 pub const START: &str = r#"{"otherData":{"writer":"hummingbus"},"#;
 
-/// Writes the trace; returns which ticks it holds, in words.
-pub fn write(flight: &Flight, path: &CriticalPath, out: &mut impl Write) -> io::Result<String> {
-    let ticks = Ticks::of(flight, path);
-    let origin_ns = origin_ns(flight, &ticks.all);
-    Trace { flight, ticks: &ticks.all, origin_ns, flows: 0, separator: "", out }.write()?;
-    Ok(format!("the first {} ticks and around the {} slowest", ticks.first, ticks.slowest))
-}
-
-struct Ticks {
-    all: BTreeSet<u32>,
-    first: u32,
-    slowest: usize,
-}
-
-impl Ticks {
-    fn of(flight: &Flight, path: &CriticalPath) -> Self {
-        let nodes = flight.plan.nodes.len().max(1);
-        let room = COMPUTATIONS_MAX / nodes;
-        let slowest = path.slowest(SLOWEST_TICKS.min(room / 6));
+impl Profile {
+    /// Writes a timeline that ui.perfetto.dev opens; returns which ticks it holds, in words.
+    ///
+    /// # Errors
+    /// If `out` fails.
+    pub fn write_trace(&self, flight: &Flight, out: &mut impl Write) -> io::Result<String> {
+        let room = COMPUTATIONS_MAX / flight.plan.nodes.len().max(1);
+        let slowest = self.critical_path.slowest(SLOWEST_TICKS.min(room / 6));
         let room = u32::try_from(room - 3 * slowest.len()).unwrap_or(u32::MAX);
         let first = FIRST_TICKS.min(room).min(flight.ticks);
         let around = slowest.iter().flat_map(|&tick| tick.saturating_sub(1)..=tick.saturating_add(1));
-        let all = (0..first).chain(around.filter(|&tick| tick < flight.ticks)).collect();
-        Self { all, first, slowest: slowest.len() }
+        let ticks = (0..first).chain(around.filter(|&tick| tick < flight.ticks)).collect();
+        let origin_ns = origin_ns(flight, &ticks);
+        Trace { flight, ticks: &ticks, origin_ns, flows: 0, separator: "", out }.write()?;
+        Ok(format!("the first {first} ticks and around the {} slowest", slowest.len()))
     }
 }
 
@@ -83,12 +74,10 @@ impl<W: Write> Trace<'_, W> {
     fn name(&mut self, process: usize, name: &str) -> io::Result<()> {
         let named = json!({ "name": name });
         let order = json!({ "sort_index": process });
-        for (key, value) in
-            [("process_name", &named), ("process_sort_index", &order), ("thread_name", &named)]
-        {
-            self.event(&json!({ "ph": "M", "name": key, "pid": process, "tid": 1, "args": value }))?;
-        }
-        Ok(())
+        let all = [("process_name", &named), ("process_sort_index", &order), ("thread_name", &named)];
+        all.into_iter().try_for_each(|(key, value)| {
+            self.event(&json!({ "ph": "M", "name": key, "pid": process, "tid": 1, "args": value }))
+        })
     }
 
     fn write_grants(&mut self) -> io::Result<()> {
@@ -102,10 +91,8 @@ impl<W: Write> Trace<'_, W> {
                 let start_ns = deadline_ns.max(free_from_ns);
                 self.slice(CLOCK, &name, [start_ns, grant.granted_ns], &json!({ "late_us": late_us }))?;
             } else {
-                let at_us = self.us(grant.granted_ns);
-                self.event(
-                    &json!({ "ph": "i", "s": "p", "name": name, "pid": CLOCK, "tid": 1, "ts": at_us }),
-                )?;
+                let ts = self.us(grant.granted_ns);
+                self.event(&json!({ "ph": "i", "s": "p", "name": name, "pid": CLOCK, "tid": 1, "ts": ts }))?;
             }
             free_from_ns = grant.granted_ns;
         }

@@ -1,7 +1,7 @@
 //! What the keys do: requests to the run, sent beside the drawing, since an answer may take long.
 
 use bus::plan::Pace;
-use ratatui::crossterm::event::{Event, KeyCode, KeyEvent, KeyModifiers};
+use ratatui::crossterm::event::{Event, KeyCode, KeyModifiers};
 use runtime::ctl::client;
 use runtime::ctl::protocol::{Answer, Request, State, Status};
 use runtime::manifest::PaceSetting;
@@ -22,16 +22,6 @@ pub struct Keys {
     pub scroll: usize,
     /// Whether the user has left.
     pub has_left: bool,
-}
-
-/// What a key asks for.
-enum Action {
-    Ask(Request),
-    Tell(&'static str),
-    AskToStop,
-    Scroll(isize),
-    Leave,
-    Nothing,
 }
 
 impl Keys {
@@ -62,17 +52,42 @@ impl Keys {
                 return self.ask(Request::Stop);
             }
         }
-        match action(*key, status) {
-            Action::Ask(request) => self.ask(request),
-            Action::Tell(text) => text.clone_into(&mut self.notice),
-            Action::AskToStop => {
+        let is_paused = matches!(status.state, State::Paused | State::Pausing);
+        match key.code {
+            KeyCode::Char('c') if key.modifiers.contains(KeyModifiers::CONTROL) => self.has_left = true,
+            _ if key.modifiers.contains(KeyModifiers::CONTROL) => {}
+            KeyCode::Char('q') | KeyCode::Esc => self.has_left = true,
+            KeyCode::Up => self.scroll = self.scroll.saturating_sub(1),
+            KeyCode::Down => self.scroll = self.scroll.saturating_add(1),
+            KeyCode::Char(_) if status.state == State::Ended => self.tell("the run has ended; q leaves"),
+            KeyCode::Char(' ') => self.ask(if is_paused { Request::Resume } else { Request::Pause }),
+            KeyCode::Char('s') => self.ask(Request::Step { ticks: 1 }),
+            KeyCode::Char('S') => self.ask(Request::Step { ticks: 100 }),
+            KeyCode::Char('f') => self.pace(Pace::Free),
+            KeyCode::Char('r') => self.pace(Pace::Factor(1.0)),
+            KeyCode::Char('+' | '=') => match status.pace.0 {
+                Pace::Factor(factor) => self.pace(Pace::Factor(factor * 2.0)),
+                Pace::Free => self.tell("it runs free, as fast as it can; r paces it"),
+            },
+            KeyCode::Char('-') => match status.pace.0 {
+                Pace::Factor(factor) => self.pace(Pace::Factor(factor * 0.5)),
+                // A free run goes as fast as it can: slower is real time.
+                Pace::Free => self.pace(Pace::Factor(1.0)),
+            },
+            KeyCode::Char('x') => {
                 self.asks_to_stop = true;
-                STOP_QUESTION.clone_into(&mut self.notice);
+                self.tell(STOP_QUESTION);
             }
-            Action::Scroll(rows) => self.scroll = self.scroll.saturating_add_signed(rows),
-            Action::Leave => self.has_left = true,
-            Action::Nothing => {}
+            _ => {}
         }
+    }
+
+    fn tell(&mut self, text: &str) {
+        text.clone_into(&mut self.notice);
+    }
+
+    fn pace(&self, pace: Pace) {
+        self.ask(Request::Pace { pace: PaceSetting(pace) });
     }
 
     /// Asks the run in a thread, so that the next key can overtake a long step.
@@ -87,42 +102,5 @@ impl Keys {
             };
             let _ = sender.send(text);
         });
-    }
-}
-
-fn action(key: KeyEvent, status: &Status) -> Action {
-    if key.modifiers.contains(KeyModifiers::CONTROL) {
-        return if key.code == KeyCode::Char('c') { Action::Leave } else { Action::Nothing };
-    }
-    match key.code {
-        KeyCode::Char('q') | KeyCode::Esc => Action::Leave,
-        KeyCode::Up => Action::Scroll(-1),
-        KeyCode::Down => Action::Scroll(1),
-        KeyCode::Char(_) if status.state == State::Ended => Action::Tell("the run has ended; q leaves"),
-        KeyCode::Char(' ') => Action::Ask(match status.state {
-            State::Paused | State::Pausing => Request::Resume,
-            _ => Request::Pause,
-        }),
-        KeyCode::Char('s') => Action::Ask(Request::Step { ticks: 1 }),
-        KeyCode::Char('S') => Action::Ask(Request::Step { ticks: 100 }),
-        KeyCode::Char('f') => Action::Ask(Request::Pace { pace: PaceSetting(Pace::Free) }),
-        KeyCode::Char('r') => pace(1.0),
-        KeyCode::Char('+' | '=') => speed(status.pace.0, 2.0),
-        KeyCode::Char('-') => speed(status.pace.0, 0.5),
-        KeyCode::Char('x') => Action::AskToStop,
-        _ => Action::Nothing,
-    }
-}
-
-fn pace(factor: f64) -> Action {
-    Action::Ask(Request::Pace { pace: PaceSetting(Pace::Factor(factor)) })
-}
-
-/// A free run goes as fast as it can: slower is real time.
-fn speed(now: Pace, times: f64) -> Action {
-    match now {
-        Pace::Factor(factor) => pace(factor * times),
-        Pace::Free if times < 1.0 => pace(1.0),
-        Pace::Free => Action::Tell("it runs free, as fast as it can; r paces it"),
     }
 }

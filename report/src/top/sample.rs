@@ -2,6 +2,7 @@
 
 use crate::top::view::{ProcessRow, TopicRow, View};
 use anyhow::{Context, Result};
+use bus::BusError;
 use bus::host_time::monotonic_ns;
 use bus::lockstep::{LiveView, Phase};
 use bus::membership::{Membership, NodeInstances};
@@ -40,19 +41,17 @@ impl Source {
     /// # Errors
     /// If it ends before it has one.
     pub fn open(run: &Arc<LiveRun>) -> Result<Self> {
+        let open = || {
+            let plan = Plan::load(&run.entry.run_dir)?;
+            Ok::<_, BusError>(Self { control: LiveView::open(&plan)?, plan, run: run.clone() })
+        };
         let start = Instant::now();
-        loop {
-            let plan = Plan::load(&run.entry.run_dir);
-            match plan.and_then(|plan| Ok((LiveView::open(&plan)?, plan))) {
-                Ok((control, plan)) => {
-                    return Ok(Self { plan, run: run.clone(), control });
-                }
-                Err(_) if run.is_live() && start.elapsed() < START => std::thread::sleep(POLL),
-                Err(error) => {
-                    return Err(error).with_context(|| format!("run {} has ended", run.entry.run_id));
-                }
-            }
+        let mut source = open();
+        while source.is_err() && run.is_live() && start.elapsed() < START {
+            std::thread::sleep(POLL);
+            source = open();
         }
+        source.with_context(|| format!("run {} has ended", run.entry.run_id))
     }
 
     /// What the run shows now.
@@ -156,59 +155,42 @@ fn process(
     tick: u32,
     state: impl FnOnce() -> String,
 ) -> (ProcessRow, Option<u64>) {
-    let kernel = process.and_then(KernelView::of);
-    let trouble = kernel.as_ref().and_then(KernelView::trouble);
+    let stat = process.and_then(|process| std::fs::read_to_string(format!("/proc/{process}/stat")).ok());
+    let (trouble, cpu_ticks) = stat.and_then(|line| kernel_view(&line)).unzip();
     let row = ProcessRow {
         name: name.to_owned(),
         process,
-        state: trouble.map_or_else(state, str::to_owned),
+        state: trouble.flatten().map_or_else(state, str::to_owned),
         tick,
         cpu_share: None,
         step_p50_us: None,
         step_p99_us: None,
         late: 0,
     };
-    (row, kernel.map(|kernel| kernel.cpu_ticks))
+    (row, cpu_ticks)
 }
 
-/// What the kernel says about a process.
-struct KernelView {
-    state: char,
-    cpu_ticks: u64,
-}
-
-impl KernelView {
-    fn of(process: u32) -> Option<Self> {
-        Self::parse(&std::fs::read_to_string(format!("/proc/{process}/stat")).ok()?)
-    }
-
-    /// Reads the line of /proc/PID/stat: the name in brackets may hold anything, brackets and spaces too.
-    fn parse(line: &str) -> Option<Self> {
-        let mut fields = line.rsplit_once(')')?.1.split_whitespace();
-        let state = fields.next()?.chars().next()?;
-        let mut times = fields.skip(10).map(|field| field.parse::<u64>().ok());
-        Some(Self { state, cpu_ticks: times.next()?? + times.next()?? })
-    }
-
-    /// What keeps a process from computing, if the kernel knows of it.
-    fn trouble(&self) -> Option<&'static str> {
-        match self.state {
-            'T' | 't' => Some("STOPPED by a signal"),
-            'Z' | 'X' => Some("ended"),
-            _ => None,
-        }
-    }
+/// What keeps a process from computing, and its processor time, from the line of /proc/PID/stat: the name in brackets may
+/// hold anything, brackets and spaces too.
+fn kernel_view(line: &str) -> Option<(Option<&'static str>, u64)> {
+    let mut fields = line.rsplit_once(')')?.1.split_whitespace();
+    let trouble = match fields.next()? {
+        "T" | "t" => Some("STOPPED by a signal"),
+        "Z" | "X" => Some("ended"),
+        _ => None,
+    };
+    let mut times = fields.skip(10).map(|field| field.parse::<u64>().ok());
+    Some((trouble, times.next()?? + times.next()??))
 }
 
 #[cfg(test)]
 mod tests {
-    use super::KernelView;
+    use super::kernel_view;
 
     #[test]
     fn the_line_of_a_process_is_read_whatever_its_name() {
         let line = "7 (a) b) T 1 7 7 0 -1 4194304 100 0 0 0 12 30 0 0 20 0 1 0 5 1 1 18446744073709551615\n";
-        let view = KernelView::parse(line).unwrap();
-        assert_eq!((view.cpu_ticks, view.trouble()), (42, Some("STOPPED by a signal")));
-        assert!(KernelView::parse("7 (a) T 1").is_none());
+        assert_eq!(kernel_view(line), Some((Some("STOPPED by a signal"), 42)));
+        assert_eq!(kernel_view("7 (a) T 1"), None);
     }
 }

@@ -107,13 +107,11 @@ impl Errors {
         let ratio = (self.vehicles.len() == 2).then(|| "ratio".to_owned());
         let headings: Vec<String> = first.into_iter().chain(self.vehicles.clone()).chain(ratio).collect();
         let is_number = (0..headings.len()).map(|column| !matches!(column, 0 | 1 | 4)).collect();
-        let mut rows = Vec::new();
-        for flight in &self.flights {
-            for horizon in &flight.horizons {
-                rows.extend(horizon.channels.iter().map(|channel| row(flight, horizon, channel)));
-            }
-        }
-        Cells { headings, is_number, rows }
+        let horizons =
+            self.flights.iter().flat_map(|flight| flight.horizons.iter().map(move |at| (flight, at)));
+        let rows = horizons
+            .flat_map(|(flight, horizon)| horizon.channels.iter().map(move |of| row(flight, horizon, of)));
+        Cells { headings, is_number, rows: rows.collect() }
     }
 }
 
@@ -124,9 +122,8 @@ impl fmt::Display for Errors {
         for flight in &self.flights {
             let horizons = flight.horizons.iter().filter(|horizon| horizon.left_out > 0);
             let counts = horizons.map(|horizon| format!("{} of {} s", horizon.left_out, horizon.horizon()));
-            let counts = counts.collect::<Vec<_>>().join(", ");
+            let (name, counts) = (&flight.name, counts.collect::<Vec<_>>().join(", "));
             if !counts.is_empty() {
-                let name = &flight.name;
                 writeln!(f, "{name}: not counted, at the start or at gaps in what was measured: {counts}")?;
             }
         }

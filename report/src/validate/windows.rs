@@ -25,10 +25,11 @@ pub fn flight_errors(
     recording: &Recording,
     vehicles: usize,
 ) -> Result<FlightErrors> {
-    let plants = HORIZONS_MS.map(|horizon_ms| (0..vehicles).map(move |vehicle| plant(vehicle, horizon_ms)));
-    let simulated = plants.into_iter().flatten().map(|plant| format!("/{plant}/state"));
+    let state = |vehicle, horizon_ms| format!("/{}/state", plant(vehicle, horizon_ms));
+    let simulated = HORIZONS_MS
+        .into_iter()
+        .flat_map(|horizon_ms| (0..vehicles).map(move |number| state(number, horizon_ms)));
     let topics: Vec<String> = std::iter::once(MEASURED.to_owned()).chain(simulated).collect();
-    let topics: Vec<&str> = topics.iter().map(String::as_str).collect();
     let tracks = tracks(recording, &topics, FIELDS_OF_STATE)?;
     let Some((measured, simulated)) = tracks.split_first() else { anyhow::bail!("nothing was recorded") };
     let horizons = HORIZONS_MS
