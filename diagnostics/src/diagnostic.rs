@@ -101,6 +101,13 @@ impl Diagnostic {
     }
 
     /// The same as a warning.
+    ///
+    /// ```
+    /// use diagnostics::{Diagnostic, Severity};
+    ///
+    /// let odd = Diagnostic::in_file("a.toml", "no rotors").warning();
+    /// assert_eq!((odd.severity, odd.severity.to_string().as_str()), (Severity::Warning, "warning"));
+    /// ```
     #[must_use]
     pub fn warning(self) -> Self {
         Self { severity: Severity::Warning, ..self }

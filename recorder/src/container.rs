@@ -158,6 +158,14 @@ fn long32<'a>(rest: &mut &'a [u8]) -> Result<&'a [u8], Fault> {
 
 /// The messages of an MCAP file, whoever wrote it. A damaged chunk is an error in front of any of its messages; nothing
 /// follows an error. The memory taken is that of one chunk, as far as it was written.
+///
+/// ```
+/// let mut messages = recorder::reader::Messages::new(b"PK\x03\x04, as archives begin");
+/// let damage = messages.next().unwrap().unwrap_err();
+/// assert!(damage.to_string().starts_with("byte 0: expected the magic bytes of MCAP"));
+/// assert!(messages.next().is_none());
+/// ```
+#[derive(Default)]
 pub struct Messages<'a> {
     bytes: &'a [u8],
     at: usize,
@@ -175,28 +183,15 @@ struct Chunk<'a> {
     of: String,
 }
 
-/// What comes next.
-enum Step {
-    Message(Message<'static>),
-    Other,
-    End,
-}
-
 impl<'a> Messages<'a> {
     /// The messages of a file with these bytes.
     #[must_use]
     pub fn new(bytes: &'a [u8]) -> Self {
-        Self {
-            bytes,
-            at: 0,
-            chunk: None,
-            channels: ChannelAccumulator::default(),
-            is_behind_data: false,
-            is_done: false,
-        }
+        Self { bytes, ..Self::default() }
     }
 
-    fn step(&mut self) -> Result<Step, Damage> {
+    /// The next message, if the next record is one.
+    fn step(&mut self) -> Result<Option<Message<'static>>, Damage> {
         if let Some(chunk) = &mut self.chunk {
             if chunk.at < chunk.content.len() {
                 let bytes = Bytes { bytes: &chunk.content, of: &chunk.of };
@@ -209,16 +204,16 @@ impl<'a> Messages<'a> {
         let (file, at) = (Bytes { bytes: self.bytes, of: "" }, self.at);
         if at == 0 {
             self.at = magic(&file, 0)?;
-            return Ok(Step::Other);
+            return Ok(None);
         }
         let raw = file.record(at)?;
         self.at = raw.end;
         match raw.opcode {
-            op::FOOTER => return magic(&file, raw.end).map(|_| Step::End),
+            op::FOOTER => self.is_done = magic(&file, raw.end).map(|_| true)?,
             op::DATA_END => self.is_behind_data = true,
             op::CHUNK if !self.is_behind_data => {
                 if let Record::Chunk { header, data } = file.parsed(at, &raw)? {
-                    let Cow::Borrowed(data) = data else { return Ok(Step::Other) };
+                    let Cow::Borrowed(data) = data else { return Ok(None) };
                     let content = unpacked(&header, data)
                         .map_err(|fault| file.damage(at, format!("a chunk {fault}")))?;
                     self.chunk = Some(Chunk { content, at: 0, of: format!(" of the chunk at byte {at}") });
@@ -228,7 +223,7 @@ impl<'a> Messages<'a> {
             // The summary repeats schemas and channels, and need not be held against them.
             _ => file.parsed(at, &raw).map(|_| ())?,
         }
-        Ok(Step::Other)
+        Ok(None)
     }
 }
 
@@ -237,14 +232,10 @@ impl Iterator for Messages<'_> {
 
     fn next(&mut self) -> Option<Self::Item> {
         while !self.is_done {
-            match self.step() {
-                Ok(Step::Message(message)) => return Some(Ok(message)),
-                Ok(Step::Other) => {}
-                Ok(Step::End) => self.is_done = true,
-                Err(damage) => {
-                    self.is_done = true;
-                    return Some(Err(damage));
-                }
+            let step = self.step();
+            self.is_done |= step.is_err();
+            if let Some(next) = step.transpose() {
+                return Some(next);
             }
         }
         None
@@ -257,7 +248,7 @@ fn linked(
     bytes: &Bytes<'_>,
     at: usize,
     raw: &Raw<'_>,
-) -> Result<Step, Damage> {
+) -> Result<Option<Message<'static>>, Damage> {
     match bytes.parsed(at, raw)? {
         Record::Schema { header, data } => channels.add_schema(header, Cow::Owned(data.into_owned())),
         Record::Channel(channel) => channels.add_channel(channel),
@@ -268,13 +259,12 @@ fn linked(
             let channel = channels.get(id).ok_or_else(unknown)?;
             let data = Cow::Owned(data.into_owned());
             let (log_time, publish_time) = (header.log_time, header.publish_time);
-            let message = Message { channel, sequence: header.sequence, log_time, publish_time, data };
-            return Ok(Step::Message(message));
+            return Ok(Some(Message { channel, sequence: header.sequence, log_time, publish_time, data }));
         }
         _ => Ok(()),
     }
     .map_err(|error| bytes.damage(at, error))?;
-    Ok(Step::Other)
+    Ok(None)
 }
 
 /// The byte behind the magic bytes at `at`.

@@ -124,6 +124,19 @@ const DEPTH_MAX: usize = 64;
 const PATH_BYTES_MAX: usize = 1024;
 
 /// A parsed definition.
+///
+/// ```
+/// use recorder::definition::{Definition, Value};
+///
+/// let definition = Definition::parse("a_msgs/msg/Range", "float32 range  # [m]\nstring name\n")?;
+/// let leaves = definition.decode(&[0, 1, 0, 0, 0, 0, 192, 63, 2, 0, 0, 0, b'a', 0])?;
+/// assert_eq!((leaves[0].path.as_str(), leaves[0].unit.as_str()), ("range", "m"));
+/// assert_eq!((&leaves[0].value, &leaves[1].value), (&Value::Float(1.5), &Value::Text("a".to_owned())));
+///
+/// let error = Definition::parse("a_msgs/msg/Range", "float32").unwrap_err();
+/// assert_eq!(error.to_string(), "not a field: \"float32\"");
+/// # Ok::<(), recorder::definition::DecodeError>(())
+/// ```
 #[derive(Clone, Debug)]
 pub struct Definition {
     root: Vec<Field>,

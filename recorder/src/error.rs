@@ -5,6 +5,11 @@ use std::path::{Path, PathBuf};
 use thiserror::Error;
 
 /// An error about a recording; its text names the file and what to do.
+///
+/// ```
+/// let error = recorder::reader::Recording::open("no/such.mcap".as_ref()).unwrap_err();
+/// assert!(error.to_string().starts_with("cannot open the recording no/such.mcap: "));
+/// ```
 #[derive(Debug, Error)]
 pub enum RecordingError {
     /// The file cannot be opened, created or written.

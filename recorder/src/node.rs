@@ -14,6 +14,13 @@ use std::path::PathBuf;
 const FLUSH_PERIOD_S: f64 = 1.0;
 
 /// Parameters of the recorder.
+///
+/// ```
+/// let parameters = serde_json::json!({ "path": "hover.mcap" });
+/// let parameters: recorder::node::Parameters = diagnostics::read(&parameters)?;
+/// assert!(parameters.attachments.is_empty());
+/// # Ok::<(), diagnostics::ParameterError>(())
+/// ```
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Parameters {

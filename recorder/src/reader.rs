@@ -57,6 +57,21 @@ pub struct Recording {
 }
 
 /// How a recording ends whose writer did not finish it.
+///
+/// ```
+/// # use bus::{Message, announcement::Announcement, messages::SetPoint};
+/// # let folder = tempfile::tempdir()?;
+/// # let path = folder.path().join("cut.mcap");
+/// # let cdr = [&[0, 1, 0, 0], bytemuck::bytes_of(&SetPoint::default())].concat();
+/// let mut writer = recorder::writer::RecordingWriter::create(&path)?;
+/// let channel = writer.add_channel("/pilot/set_point", &Announcement::of(SetPoint::SCHEMA))?;
+/// writer.write(channel, 7, 7_000_000, &cdr)?;
+/// writer.flush()?;
+/// // Its writer is still at work, or was killed.
+/// let recording = recorder::reader::Recording::salvage(&path)?;
+/// assert_eq!(recording.cut().map(|cut| cut.last_tick), Some(Some(7)));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Cut {
     /// Tick of the last message that is whole; `None` where none is.

@@ -55,28 +55,27 @@ impl Recording {
         Ok(series)
     }
 
-    /// The unit of `field` on `topic`; `None` where it is a vector with the parts `x`, `y` and `z`.
+    /// The numbers that `field` on `topic` is: itself, or the parts `x`, `y` and `z` of a vector.
     ///
     /// # Errors
     /// If there is no such topic, or neither such a field nor such a vector.
-    pub fn unit_of(&self, topic: &str, field: &str) -> Result<Option<String>, RecordingError> {
+    pub fn parts(&self, topic: &str, field: &str) -> Result<Vec<String>, RecordingError> {
         self.topic(topic)?;
-        let Some(record) = self.messages().find(|record| record.as_ref().map_or(true, |r| r.topic == topic))
-        else {
-            return Ok(Some(String::new()));
-        };
-        let record = record?;
-        let leaves = self.decode(&record)?;
-        unit(&leaves, topic, field)
+        match self.messages().find(|record| record.as_ref().map_or(true, |record| record.topic == topic)) {
+            Some(record) => parts(&self.decode(&record?)?, topic, field),
+            None => Ok(vec![field.to_owned()]),
+        }
     }
 }
 
-/// The unit of a field among `leaves`; `None` for a vector.
-fn unit(leaves: &[Leaf], topic: &str, field: &str) -> Result<Option<String>, RecordingError> {
-    let has = |part: &str| number(leaves, &format!("{field}.{part}")).is_some();
+fn parts(leaves: &[Leaf], topic: &str, field: &str) -> Result<Vec<String>, RecordingError> {
+    let vector = ["x", "y", "z"].map(|axis| format!("{field}.{axis}"));
+    let is_number = |path: &str| number(leaves, path).is_some();
     match value(leaves, field) {
-        Some((_, unit)) => Ok(Some(unit.to_owned())),
-        None if ["x", "y", "z"].into_iter().all(has) && !has("w") => Ok(None),
+        Some(_) => Ok(vec![field.to_owned()]),
+        None if vector.iter().all(|part| is_number(part)) && !is_number(&format!("{field}.w")) => {
+            Ok(vector.into())
+        }
         None => Err(RecordingError::unknown_field(topic, field, leaves)),
     }
 }
@@ -99,10 +98,8 @@ pub fn unit_of(schema: &Schema, topic: &str, field: &str) -> Result<Option<Strin
         type_name: schema.type_name.to_owned(),
         reason,
     })?;
-    match unit(&leaves, topic, field)? {
-        Some(unit) => Ok(Some(unit)),
-        None => Ok(value(&leaves, &format!("{field}.x")).map(|(_, unit)| unit.to_owned())),
-    }
+    let parts = parts(&leaves, topic, field)?;
+    Ok(value(&leaves, &parts[0]).map(|(_, unit)| unit.to_owned()))
 }
 
 /// The angles that a quaternion has as fields.

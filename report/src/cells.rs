@@ -10,6 +10,14 @@ pub(crate) struct Cells {
     pub rows: Vec<Vec<String>>,
 }
 
+impl Cells {
+    /// A table of which the first `texts` columns hold text, and the others numbers.
+    pub fn new(headings: &[&str], texts: usize, rows: Vec<Vec<String>>) -> Self {
+        let is_number = (0..headings.len()).map(|column| column >= texts).collect();
+        Self { headings: headings.iter().map(|heading| (*heading).to_owned()).collect(), is_number, rows }
+    }
+}
+
 impl fmt::Display for Cells {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let rows = || std::iter::once(&self.headings).chain(&self.rows);

@@ -3,6 +3,7 @@
 use crate::states::{FIELDS_OF_POSE, errors_at, tracks};
 use anyhow::{Result, anyhow, bail};
 use flights::state::StateQuantity;
+use recorder::RecordingError;
 use recorder::reader::Recording;
 use recorder::series::Series;
 use runtime::manifest::{Comparison, Content, PassCondition, Statistic};
@@ -89,20 +90,15 @@ pub(crate) fn verdicts(content: &Content, recording: &Recording) -> Result<Vec<V
     verdicts.collect()
 }
 
-/// The parts of a vector field; of any other, the field itself.
-fn parts(topic: &str, field: &str, recording: &Recording) -> Result<Vec<(String, String)>> {
-    let fields = match recording.unit_of(topic, field)? {
-        Some(_) => vec![field.to_owned()],
-        None => ["x", "y", "z"].map(|axis| format!("{field}.{axis}")).into(),
-    };
-    Ok(fields.into_iter().map(|field| (topic.to_owned(), field)).collect())
-}
-
 /// All series that a condition needs: the judged field's parts, those that are taken off, the gate's.
 fn wanted(pass: &PassCondition, recording: &Recording) -> Result<Vec<(String, String)>> {
-    let mut wanted = parts(&pass.topic, &pass.field, recording)?;
+    let parts = |topic: &String, field: &str| {
+        let parts = recording.parts(topic, field)?.into_iter();
+        Ok::<_, RecordingError>(parts.map(|part| (topic.clone(), part)).collect::<Vec<_>>())
+    };
+    let mut wanted = parts(&pass.topic, &pass.field)?;
     if let Some(minus) = &pass.minus {
-        let other = parts(&minus.topic, &minus.field, recording)?;
+        let other = parts(&minus.topic, &minus.field)?;
         if other.len() != wanted.len() {
             bail!(
                 "pass condition `{}`: `minus` takes a vector off a number, or a number off a vector",

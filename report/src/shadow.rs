@@ -107,8 +107,10 @@ pub struct Step {
     pub law_difference: Option<f64>,
 }
 
-/// Numbers by topic, field and tick.
-type Values = BTreeMap<(String, String), (String, BTreeMap<u32, f64>)>;
+/// Numbers by tick.
+type Series = BTreeMap<u32, f64>;
+/// The series of topics and fields, with their units.
+type Values = BTreeMap<(String, String), (String, Series)>;
 
 /// The differences of all shadow topics of `recording`.
 ///
@@ -120,7 +122,7 @@ pub(crate) fn differences(recording: &Recording) -> Result<Vec<Difference>> {
     let shadows = values.iter().filter_map(|((topic, field), (unit, shadow))| {
         let topic = topic.strip_prefix(SHADOW_PREFIX)?;
         let (_, primary) = values.get(&(topic.to_owned(), field.clone()))?;
-        difference(topic, field, unit, shadow, primary)
+        difference([topic, field, unit], shadow, primary)
     });
     Ok(shadows.collect())
 }
@@ -152,13 +154,8 @@ pub fn report(recording: &Recording) -> Result<String> {
     Ok(differences.iter().map(|difference| format!("{difference}\n")).collect())
 }
 
-fn difference(
-    topic: &str,
-    field: &str,
-    unit: &str,
-    shadow: &BTreeMap<u32, f64>,
-    primary: &BTreeMap<u32, f64>,
-) -> Option<Difference> {
+/// The difference of two series of the same topic, field and unit, given by their ticks.
+fn difference(names: [&str; 3], shadow: &Series, primary: &Series) -> Option<Difference> {
     let both =
         |(tick, shadow): (&u32, &f64)| primary.get(tick).map(|primary| (*tick, shadow - primary, *primary));
     let both: Vec<(u32, f64, f64)> = shadow.iter().filter_map(both).collect();
@@ -169,10 +166,11 @@ fn difference(
     let primary_mean = mean(&|_, primary| primary);
     let sizes = both.iter().map(|(tick, difference, _)| (*tick, difference.abs()));
     let (max_tick, max) = sizes.max_by(|a, b| a.1.total_cmp(&b.1).then(b.0.cmp(&a.0)))?;
+    let [topic, field, unit] = names.map(str::to_owned);
     Some(Difference {
-        topic: topic.to_owned(),
-        field: field.to_owned(),
-        unit: unit.to_owned(),
+        topic,
+        field,
+        unit,
         samples: both.len(),
         mean: mean(&|difference, _| difference),
         rms: mean(&|difference, _| difference.powi(2)).sqrt(),

@@ -14,7 +14,6 @@ mod rows;
 mod windows;
 
 pub use errors::{ChannelErrors, Errors, FlightErrors, HorizonErrors};
-pub use replay::HORIZONS_MS;
 
 use anyhow::{Context, Result, bail};
 use flights::{Flight, FlightSet};

@@ -8,14 +8,15 @@ use serde::{Serialize, Serializer};
 /// Distinguishable also without colour vision (Okabe and Ito).
 const COLOURS: [&str; 7] = ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#000000"];
 
-/// A line over time.
+/// A line over time or in space.
 #[derive(Clone, Debug, Serialize)]
-pub struct Curve {
+pub struct Line<P> {
     /// Name in the legend.
     pub name: String,
     /// Topic.
     pub topic: String,
-    /// Field path.
+    /// Field path of a line over time.
+    #[serde(skip_serializing_if = "String::is_empty")]
     pub field: String,
     /// What it stands for.
     pub role: Role,
@@ -23,10 +24,15 @@ pub struct Curve {
     pub colour: &'static str,
     /// Samples in the recording.
     pub samples: u64,
-    /// Times in seconds and values; JSON has their number.
+    /// The points; JSON has their number.
     #[serde(serialize_with = "count")]
-    pub points: Vec<(f64, f64)>,
+    pub points: Vec<P>,
 }
+
+/// A line over time: times in seconds and values.
+pub type Curve = Line<(f64, f64)>;
+/// A path in space, by positions in metres.
+pub type Trail = Line<[f64; 3]>;
 
 /// A set of axes over time.
 #[derive(Clone, Debug, Serialize)]
@@ -50,22 +56,11 @@ pub struct Panel {
     pub axes: Vec<Axes>,
 }
 
-/// A path in space.
-#[derive(Clone, Debug, Serialize)]
-pub struct Trail {
-    /// Name in the legend.
-    pub name: String,
-    /// Topic.
-    pub topic: String,
-    /// What it stands for.
-    pub role: Role,
-    /// Colour, as HTML writes it.
-    pub colour: &'static str,
-    /// Samples in the recording.
-    pub samples: u64,
-    /// Positions in metres; JSON has their number.
-    #[serde(serialize_with = "count")]
-    pub points: Vec<[f64; 3]>,
+/// The lines in the order in which they are drawn, those on top last.
+pub fn in_layers<P>(lines: &[Line<P>]) -> Vec<&Line<P>> {
+    let mut lines: Vec<&Line<P>> = lines.iter().collect();
+    lines.sort_by_key(|line| line.role.layer());
+    lines
 }
 
 fn count<T, S: Serializer>(points: &[T], serializer: S) -> std::result::Result<S::Ok, S::Error> {
@@ -198,6 +193,7 @@ pub fn trails(read: &[(Ask, thin::Trail)]) -> Vec<Trail> {
             Trail {
                 name: trail_name(ask.vehicle(), ask.role),
                 topic: ask.topic.clone(),
+                field: String::new(),
                 role: ask.role,
                 colour: COLOURS[index % COLOURS.len()],
                 samples: trail.samples,

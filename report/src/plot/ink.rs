@@ -1,6 +1,7 @@
 //! Lines, letters, flat axes and legends of pictures, in plotters' units.
 
 use crate::plot::choice::Role;
+use crate::plot::figure::Line;
 use anyhow::Result;
 use plotters::coord::types::RangedCoordf64;
 use plotters::coord::{CoordTranslate, Shift};
@@ -55,12 +56,13 @@ pub struct Look {
 }
 
 impl Look {
-    /// That of a line with a role; what is beside the flown one is darker, to be told from it.
-    pub fn new(colour: &str, role: Role) -> Self {
-        let colour = rgb(colour);
+    /// That of a line; what is beside the flown one is darker, to be told from it.
+    pub fn of<P>(line: &Line<P>) -> Self {
+        let colour = rgb(line.colour);
         let darker = RGBColor(colour.0 / 2, colour.1 / 2, colour.2 / 2);
-        let (colour, width) = if role == Role::Flown { (colour, FLOWN_WIDTH) } else { (darker, THIN_WIDTH) };
-        Self { colour, width, is_dashed: role == Role::Asked }
+        let is_flown = line.role == Role::Flown;
+        let (colour, width) = if is_flown { (colour, FLOWN_WIDTH) } else { (darker, THIN_WIDTH) };
+        Self { colour, width, is_dashed: line.role == Role::Asked }
     }
 
     /// As plotters wants it.
@@ -96,21 +98,17 @@ where
 
 /// Draws a legend, `width` pixels wide, at the right side of an area; returns what is left of it. Beside the curves it
 /// hides none.
-pub fn draw_legend<'a, 'n>(
-    area: &Area<'a>,
-    width: u32,
-    entries: impl Iterator<Item = (&'n str, Look)>,
-) -> Result<Area<'a>> {
+pub fn draw_legend<'a, P>(area: &Area<'a>, width: u32, lines: &[Line<P>]) -> Result<Area<'a>> {
     let (plots, legend) = area.split_horizontally(px(WIDTH - width));
     let anchor = Pos::new(HPos::Left, VPos::Center);
-    for (row, (name, look)) in (0..).zip(entries) {
-        let y = at(36 + row * LEGEND_ROW);
+    for (row, line) in (0..).zip(lines) {
+        let (look, y) = (Look::of(line), at(36 + row * LEGEND_ROW));
         let dashes: &[(u32, u32)] =
             if look.is_dashed { &[(10, 18), (22, 30), (34, 36)] } else { &[(10, 36)] };
         for (from, to) in dashes {
             legend.draw(&PathElement::new([(at(*from), y), (at(*to), y)], look.style()))?;
         }
-        legend.draw(&Text::new(name, (at(44), y), letters(LABEL_SIZE).pos(anchor)))?;
+        legend.draw(&Text::new(line.name.as_str(), (at(44), y), letters(LABEL_SIZE).pos(anchor)))?;
     }
     Ok(plots)
 }

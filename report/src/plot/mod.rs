@@ -33,6 +33,13 @@ pub use picture::{PNG_MARK, SVG_MARK};
 pub use read::Span;
 
 /// What is drawn of a recording.
+///
+/// ```
+/// use report::plot::{Request, Span, View};
+/// let span = Span { from_s: 1.0, to_s: Some(3.0) };
+/// let request = Request { views: vec![View::Top], span, ..Request::default() };
+/// assert!(request.plots.is_empty() && request.vehicle.is_none(), "every vehicle, with what its topics suggest");
+/// ```
 #[derive(Clone, Debug, Default)]
 pub struct Request {
     /// Axes over time, each as `TOPIC:FIELD[,TOPIC:FIELD…]`; what the types of the topics suggest where empty.

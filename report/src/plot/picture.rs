@@ -5,7 +5,7 @@
 //! signs, with `pyftsubset --layout-features=kern --no-hinting`.
 
 use crate::plot::drawing::{Drawing, TIME_LABEL, View};
-use crate::plot::figure::{Axes, Curve, Panel};
+use crate::plot::figure::{Axes, Panel, in_layers};
 use crate::plot::ink::{Area, Flat, LEGEND_ROW, Look, WIDTH, at, draw_legend, draw_line, letters, px};
 use crate::plot::{space, thin};
 use anyhow::{Context, Result, bail};
@@ -117,9 +117,7 @@ pub fn png(svg: &str) -> Result<Vec<u8>> {
 
 /// Draws axes over time, with numbers below where there is `room` for them.
 fn draw_axes(area: &Area<'_>, axes: &Axes, span_s: [f64; 2], legend: u32, room: u32) -> Result<()> {
-    let look = |curve: &Curve| Look::new(curve.colour, curve.role);
-    let entries = axes.curves.iter().map(|curve| (curve.name.as_str(), look(curve)));
-    let area = draw_legend(area, legend, entries)?.margin(0, px(8), 0, 0);
+    let area = draw_legend(area, legend, &axes.curves)?.margin(0, px(8), 0, 0);
     let [from_s, to_s] = span_s;
     let values = axes.curves.iter().flat_map(|curve| &curve.points).map(|(_, value)| *value);
     let time = if room > 0 { TIME_LABEL } else { "" };
@@ -131,12 +129,10 @@ fn draw_axes(area: &Area<'_>, axes: &Axes, span_s: [f64; 2], legend: u32, room: 
         margins: [78, 0, room + 8],
     };
     let mut chart = flat.draw(&area)?;
-    let mut curves: Vec<&Curve> = axes.curves.iter().collect();
-    curves.sort_by_key(|curve| curve.role.layer());
-    for curve in curves {
+    for curve in in_layers(&axes.curves) {
         // The stretches between gaps.
         for stretch in thinned(&curve.points).split(|(_, value)| !value.is_finite()) {
-            draw_line(&mut chart, stretch.iter().copied(), look(curve))?;
+            draw_line(&mut chart, stretch.iter().copied(), Look::of(curve))?;
         }
     }
     Ok(())

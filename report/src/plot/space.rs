@@ -1,7 +1,7 @@
 //! Views of the paths in space, with the scene: from above, from the side, and in three dimensions.
 
 use crate::plot::drawing::{Drawing, View};
-use crate::plot::figure::Trail;
+use crate::plot::figure::in_layers;
 use crate::plot::ink::{
     Area, Flat, GRID, HEAD_SIZE, LABEL_SIZE, Look, at, draw_legend, draw_line, letters, number, px,
 };
@@ -77,9 +77,7 @@ pub fn height(drawing: &Drawing, view: View, width: u32) -> u32 {
 /// # Errors
 /// If plotters cannot.
 pub fn draw(area: &Area<'_>, drawing: &Drawing, legend: u32, view: View) -> Result<()> {
-    let names = drawing.trails.iter().map(|trail| trail.name.as_str());
-    let looks = drawing.trails.iter().map(|trail| Look::new(trail.colour, trail.role));
-    let plots = draw_legend(area, legend, names.zip(looks))?;
+    let plots = draw_legend(area, legend, &drawing.trails)?;
     if view == View::Path { draw_path(&plots, drawing) } else { draw_flat(&plots, drawing, view) }
 }
 
@@ -114,10 +112,8 @@ fn draw_trails<'a, T: CoordTranslate>(
 where
     T::From: Clone + 'static,
 {
-    let mut trails: Vec<&Trail> = drawing.trails.iter().collect();
-    trails.sort_by_key(|trail| trail.role.layer());
-    for trail in trails {
-        let look = Look::new(trail.colour, trail.role);
+    for trail in in_layers(&drawing.trails) {
+        let look = Look::of(trail);
         let finite = trail.points.iter().filter(|point| point.iter().all(|value| value.is_finite()));
         let places = finite.map(|point| place(*point));
         draw_line(chart, places.clone(), look)?;

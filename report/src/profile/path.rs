@@ -43,7 +43,7 @@ pub struct Stretch {
     pub end_ns: u64,
 }
 
-/// The critical path of one tick; its stretches follow each other without a gap.
+/// The critical path of one tick; its stretches, two at least, follow each other without a gap.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Path(pub Vec<Stretch>);
 
@@ -76,8 +76,7 @@ impl Path {
 
     /// Host time at which it starts and ends.
     pub fn span_ns(&self) -> (u64, u64) {
-        let start_ns = self.0.first().map_or(0, |first| first.start_ns);
-        (start_ns, self.0.last().map_or(start_ns, |last| last.end_ns))
+        (self.0[0].start_ns, self.0[self.0.len() - 1].end_ns)
     }
 
     /// How long it is.

@@ -64,14 +64,9 @@ fn age(age: &Age) -> [Row<'_>; 2] {
 }
 
 fn table<'a>(title: &str, rows: impl Iterator<Item = Row<'a>>) -> Cells {
-    let quantiles = ["count", "p50", "p90", "p99", "p99.9", "max"];
     // All tables have the same columns, unless names are long.
     let row = |(name, times): Row<'a>| std::iter::once(format!("{name:<51}")).chain(numbers(times)).collect();
-    Cells {
-        headings: [title].iter().chain(&quantiles).map(|title| (*title).to_owned()).collect(),
-        is_number: (0..=quantiles.len()).map(|column| column > 0).collect(),
-        rows: rows.map(row).collect(),
-    }
+    Cells::new(&[title, "count", "p50", "p90", "p99", "p99.9", "max"], 1, rows.map(row).collect())
 }
 
 /// How many times there are, and their quantiles in µs where there are any; with room for ten milliseconds.

@@ -157,17 +157,8 @@ fn process(
 ) -> (ProcessRow, Option<u64>) {
     let stat = process.and_then(|process| std::fs::read_to_string(format!("/proc/{process}/stat")).ok());
     let (trouble, cpu_ticks) = stat.and_then(|line| kernel_view(&line)).unzip();
-    let row = ProcessRow {
-        name: name.to_owned(),
-        process,
-        state: trouble.flatten().map_or_else(state, str::to_owned),
-        tick,
-        cpu_share: None,
-        step_p50_us: None,
-        step_p99_us: None,
-        late: 0,
-    };
-    (row, cpu_ticks)
+    let state = trouble.flatten().map_or_else(state, str::to_owned);
+    (ProcessRow { name: name.to_owned(), process, state, tick, ..ProcessRow::default() }, cpu_ticks)
 }
 
 /// What keeps a process from computing, and its processor time, from the line of /proc/PID/stat: the name in brackets may

@@ -6,7 +6,19 @@ use serde::Serialize;
 use std::fmt;
 use std::path::Path;
 
-/// A run as it is shown.
+/// A run as it is shown; its text is a table of its processes and one of its topics.
+///
+/// ```
+/// use bus::plan::Pace;
+/// use report::top::View;
+/// use runtime::ctl::protocol::{State, Status};
+/// use runtime::manifest::PaceSetting;
+/// let (run_id, state, pace) = ("1f-2e".to_owned(), State::Paused, PaceSetting(Pace::Free));
+/// let status = Status { run_id, state, tick: 5, end_tick: 10, time_s: 0.005, pace, missed_deadlines: 0 };
+/// let (manifest, processes, topics) = ("hover.toml".to_owned(), Vec::new(), Vec::new());
+/// let view = View { manifest, status, span_s: 0.5, real_time_factor: 0.0, processes, topics };
+/// assert!(view.to_string().starts_with("hover.toml  run 1f-2e  paused\ntick 5 / 10  0.005 s"));
+/// ```
 #[derive(Clone, Debug, Serialize)]
 pub struct View {
     /// The manifest that it flies.
@@ -25,7 +37,7 @@ pub struct View {
 }
 
 /// A process as it is shown.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Default, Serialize)]
 pub struct ProcessRow {
     /// Name.
     pub name: String,
@@ -62,11 +74,8 @@ pub struct TopicRow {
 
 /// The table of the processes.
 pub fn processes(view: &View) -> Cells {
-    Cells {
-        headings: ["process", "state", "tick", "CPU %", "p50 µs", "p99 µs", "late"].map(str::to_owned).into(),
-        is_number: vec![false, false, true, true, true, true, true],
-        rows: view.processes.iter().map(process).collect(),
-    }
+    let headings = ["process", "state", "tick", "CPU %", "p50 µs", "p99 µs", "late"];
+    Cells::new(&headings, 2, view.processes.iter().map(process).collect())
 }
 
 fn process(row: &ProcessRow) -> Vec<String> {
@@ -85,11 +94,8 @@ fn process(row: &ProcessRow) -> Vec<String> {
 
 /// The table of the topics.
 pub fn topics(view: &View) -> Cells {
-    Cells {
-        headings: ["topic", "publisher", "rate Hz", "samples", "lost"].map(str::to_owned).into(),
-        is_number: vec![false, false, true, true, true],
-        rows: view.topics.iter().map(topic).collect(),
-    }
+    let headings = ["topic", "publisher", "rate Hz", "samples", "lost"];
+    Cells::new(&headings, 2, view.topics.iter().map(topic).collect())
 }
 
 fn topic(row: &TopicRow) -> Vec<String> {

@@ -74,7 +74,8 @@ impl Replay {
         }
         let (canonical, text) = flights::csv(&rows::with_rows_at_commands(flight))?;
         output_file::write(&data, &CSV, |out| out.write_all(text.as_bytes()))?;
-        let (start_s, end_s) = rows::span_s(&data)?;
+        let (start_s, end_s) =
+            rows::span_s(&text).with_context(|| format!("{} has no rows", data.display()))?;
         let ticks = ticks(end_s - start_s)?;
         let initial = command_at(flight, start_s).context("it has no motor commands")?;
         let manifest = manifest(ticks, &canonical.columns, initial, vehicles)?;

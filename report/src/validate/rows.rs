@@ -1,8 +1,6 @@
 //! The rows that the player reads: at every sample of the attitude, and at every command, so that each acts when it did.
 
-use anyhow::{Context, Result};
 use flights::{Channel, Flight};
-use std::path::Path;
 
 /// Times that differ by less are the same row, in seconds.
 const SAME_S: f64 = 1e-7;
@@ -45,15 +43,12 @@ fn between(from: &[f64; 4], to: &[f64; 4], part: f64) -> [f64; 4] {
     mixed.map(|number| number / norm)
 }
 
-/// The times of the first and the last row of the file at `path`.
-///
-/// # Errors
-/// If the file cannot be read or has no rows.
-pub fn span_s(path: &Path) -> Result<(f64, f64)> {
-    let text = std::fs::read_to_string(path).with_context(|| format!("cannot read {}", path.display()))?;
+/// The times of the first and the last row of a flight's `csv`; `None` where it has no rows.
+pub fn span_s(csv: &str) -> Option<(f64, f64)> {
     let time_s = |line: &str| line.split(',').next()?.parse::<f64>().ok();
-    let rows = || text.lines().skip(1).filter_map(time_s);
-    rows().next().zip(rows().last()).with_context(|| format!("{} has no rows", path.display()))
+    let mut rows = csv.lines().skip(1).filter_map(time_s);
+    let first_s = rows.next()?;
+    Some((first_s, rows.last().unwrap_or(first_s)))
 }
 
 #[cfg(test)]
