@@ -6,25 +6,6 @@ use serde::ser::{Serialize, SerializeStruct, Serializer};
 use std::fmt;
 use std::io;
 
-/// Whether what was written can be used.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub enum Severity {
-    /// It cannot.
-    #[default]
-    Error,
-    /// It can, but is odd.
-    Warning,
-}
-
-impl fmt::Display for Severity {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::Error => "error",
-            Self::Warning => "warning",
-        })
-    }
-}
-
 /// What is wrong at a place in a file, and what else is.
 ///
 /// ```
@@ -58,8 +39,6 @@ impl fmt::Display for Severity {
 /// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct Diagnostic {
-    /// Whether it can be used all the same.
-    pub severity: Severity,
     /// The file's name as it was given to the reader; empty where it is about none.
     pub file: String,
     /// Where in the file; none where it is about the whole.
@@ -77,8 +56,8 @@ impl Diagnostic {
     #[must_use]
     pub fn in_file(file: impl Into<String>, error: impl Into<ParameterError>) -> Self {
         let error = error.into();
-        let (severity, help) = (Severity::Error, error.help());
-        Self { severity, file: file.into(), place: None, error, help, others: Vec::new() }
+        let help = error.help();
+        Self { file: file.into(), place: None, error, help, others: Vec::new() }
     }
 
     /// What is wrong at `place`.
@@ -98,19 +77,6 @@ impl Diagnostic {
     #[must_use]
     pub fn help(self, help: impl Into<String>) -> Self {
         Self { help: help.into(), ..self }
-    }
-
-    /// The same as a warning.
-    ///
-    /// ```
-    /// use diagnostics::{Diagnostic, Severity};
-    ///
-    /// let odd = Diagnostic::in_file("a.toml", "no rotors").warning();
-    /// assert_eq!((odd.severity, odd.severity.to_string().as_str()), (Severity::Warning, "warning"));
-    /// ```
-    #[must_use]
-    pub fn warning(self) -> Self {
-        Self { severity: Severity::Warning, ..self }
     }
 
     /// The dotted key that is to blame; empty where none is in particular.

@@ -25,7 +25,7 @@ mod place;
 mod read;
 pub mod unit;
 
-pub use diagnostic::{Diagnostic, Faults, Severity};
+pub use diagnostic::{Diagnostic, Faults};
 pub use nearest::{did_you_mean, nearest};
 pub use parameter::ParameterError;
 pub use place::Place;

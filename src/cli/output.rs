@@ -39,5 +39,5 @@ pub fn message(error: &anyhow::Error) -> String {
 
 /// Tells people of what is odd, on standard error.
 pub fn print_warnings(warnings: &[Diagnostic]) {
-    warnings.iter().for_each(|warning| say(&format!("{}: {warning}", warning.severity)));
+    warnings.iter().for_each(|warning| say(&format!("warning: {warning}")));
 }

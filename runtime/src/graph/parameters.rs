@@ -44,7 +44,7 @@ impl Notes {
             let help = "set points do not act; a condition without a sample does not pass";
             self.warnings.push(manifest.problem(&duration.span(), message, help));
         }
-        (self.models, self.warnings.into_iter().map(Diagnostic::warning).collect())
+        (self.models, self.warnings)
     }
 }
 
