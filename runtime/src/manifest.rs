@@ -27,6 +27,8 @@ pub use content::{
     SwapSetting,
 };
 
+pub(crate) use sets::is_name;
+
 use crate::registry::Registry;
 use diagnostics::{Diagnostic, ParameterError, read_tree};
 use sources::{Origin, Sources};

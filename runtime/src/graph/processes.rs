@@ -1,6 +1,6 @@
 //! Processes: what each executes, and how it runs on the host.
 
-use crate::manifest::{Manifest, Process};
+use crate::manifest::{Manifest, Process, is_name};
 use crate::output_file;
 use crate::program::{Executable, OnExit, Program, Readiness};
 use bus::component::Transfer;
@@ -246,8 +246,7 @@ fn is_executable(path: &Path) -> bool {
 /// Each part of a name: the process's own, or a vehicle's and the process's in its set.
 fn require_name(manifest: &Manifest, name: &Spanned<String>) -> Result<(), Diagnostic> {
     let text = name.get_ref();
-    let fits = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '-' || c == '_';
-    if text != "clock" && text.split('/').all(|part| !part.is_empty() && part.chars().all(fits)) {
+    if text != "clock" && text.split('/').all(is_name) {
         return Ok(());
     }
     Err(manifest.problem(

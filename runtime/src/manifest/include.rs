@@ -46,7 +46,7 @@ struct Reader {
 impl Reader {
     fn add(&mut self, path: &Path, text: String) -> Result<(), Diagnostic> {
         let identity = path.canonicalize().unwrap_or_else(|_| path.to_owned());
-        let index = self.sources.all().len();
+        let index = self.sources.all.len();
         self.sources.add(Origin::File(path.to_owned()), text);
         let includes = includes(&self.sources)?;
         self.read.push(identity.clone());
@@ -103,7 +103,7 @@ fn includes(sources: &Sources) -> Result<Vec<Spanned<String>>, Diagnostic> {
 pub fn merged(sources: &Sources) -> Result<DeTable<'_>, Diagnostic> {
     let mut all = DeTable::new();
     for &file in &sources.order {
-        let mut table = sources.table(&sources.all()[file])?;
+        let mut table = sources.table(&sources.all[file])?;
         table.remove(KEY);
         prepend_lists(&mut table, &mut all);
         tree::merge_manifests(&mut all, table);
@@ -116,8 +116,7 @@ fn prepend_lists<'t>(table: &mut DeTable<'t>, below: &mut DeTable<'t>) {
     for list in LISTS {
         let Some(DeValue::Array(here)) = table.get_mut(list).map(Spanned::get_mut) else { continue };
         let Some(DeValue::Array(inherited)) = below.get_mut(list).map(Spanned::get_mut) else { continue };
-        let (first, then) =
-            (std::mem::replace(inherited, DeArray::new()), std::mem::replace(here, DeArray::new()));
+        let [first, then] = [inherited, &mut *here].map(|list| std::mem::replace(list, DeArray::new()));
         *here = first.into_iter().chain(then).collect();
     }
 }
@@ -126,7 +125,7 @@ fn prepend_lists<'t>(table: &mut DeTable<'t>, below: &mut DeTable<'t>) {
 pub fn inherited(sources: &Sources, list: &str) -> Result<usize, Diagnostic> {
     let mut count = 0;
     for &file in sources.order.iter().filter(|&&file| file != 0) {
-        let table = sources.table(&sources.all()[file])?;
+        let table = sources.table(&sources.all[file])?;
         count += table.get(list).and_then(|value| value.get_ref().as_array()).map_or(0, |array| array.len());
     }
     Ok(count)

@@ -2,10 +2,8 @@
 
 use super::sources::{Source, Sources};
 use super::tree;
-use diagnostics::Diagnostic;
-use diagnostics::did_you_mean;
+use diagnostics::{Diagnostic, did_you_mean};
 use std::borrow::Cow;
-use std::ops::Range;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
@@ -74,7 +72,7 @@ impl<'s> Override<'s> {
         }
         let Some((last, parents)) = self.keys.split_last() else { return Ok(()) };
         let mut whole = DeValue::Table(std::mem::take(root));
-        let put = descend(&mut whole, parents).and_then(|inside| put(inside, last, self.value));
+        let put = put(&mut whole, parents, last, self.value);
         if let DeValue::Table(table) = whole {
             *root = table;
         }
@@ -85,13 +83,12 @@ impl<'s> Override<'s> {
 /// The keys between the dots, with their places.
 fn keys(path: &str, base: usize) -> Vec<Spanned<&str>> {
     let mut start = base;
-    let key = |text: &str| {
-        let begin = start + (text.len() - text.trim_start().len());
+    let key = |text| {
+        let begin = start + (str::len(text) - text.trim_start().len());
         start += text.len() + 1;
-        begin..begin + text.trim().len()
+        Spanned::new(begin..begin + text.trim().len(), text.trim())
     };
-    let spans: Vec<Range<usize>> = path.split('.').map(key).collect();
-    spans.into_iter().zip(path.split('.')).map(|(span, text)| Spanned::new(span, text.trim())).collect()
+    path.split('.').map(key).collect()
 }
 
 /// A value as TOML; what is none is a string: a path needs no quotes on the command line.
@@ -111,61 +108,46 @@ fn require_process(root: &DeTable<'_>, name: &Spanned<&str>, sources: &Sources) 
     Err(sources.problem(&name.span(), format!("there is no process `{}`", name.get_ref()), help))
 }
 
-/// The value at `path` below `value`.
-fn descend<'v, 's>(
-    mut value: &'v mut DeValue<'s>,
-    path: &[Spanned<&'s str>],
-) -> Result<&'v mut DeValue<'s>, OverrideError> {
-    for (depth, key) in path.iter().enumerate() {
-        let parent = depth.checked_sub(1).map_or("the manifest", |parent| path[parent].get_ref());
-        value = match value {
-            DeValue::Table(table) => {
-                if !table.contains_key(*key.get_ref()) {
-                    let empty = Spanned::new(key.span(), DeValue::Table(DeTable::new()));
-                    table.insert(Spanned::new(key.span(), Cow::Borrowed(*key.get_ref())), empty);
-                }
-                table.get_mut(*key.get_ref()).map(Spanned::get_mut).ok_or_else(|| no_table(parent))?
-            }
-            DeValue::Array(array) => {
-                let index = index(key.get_ref(), parent, array.len())?;
-                array.as_mut()[index].get_mut()
-            }
-            _ => return Err(no_table(parent)),
-        };
-    }
-    match (&*value, path.last()) {
-        (DeValue::Table(_) | DeValue::Array(_), _) => Ok(value),
-        (_, last) => Err(no_table(last.map_or("the manifest", |key| key.get_ref()))),
-    }
-}
-
+/// Puts `value` at `key` of what lies at `path` below `inside`.
 fn put<'s>(
-    inside: &mut DeValue<'s>,
+    mut inside: &mut DeValue<'s>,
+    path: &[Spanned<&'s str>],
     key: &Spanned<&'s str>,
     value: Spanned<DeValue<'s>>,
 ) -> Result<(), OverrideError> {
-    match inside {
-        DeValue::Table(table) => {
-            let key = Spanned::new(key.span(), Cow::Borrowed(*key.get_ref()));
-            tree::replace(table, key, value);
-        }
-        DeValue::Array(array) => {
-            let index = index(key.get_ref(), "the list", array.len())?;
-            array.as_mut()[index] = value;
-        }
-        _ => return Err(no_table(key.get_ref())),
+    let mut name = "the manifest";
+    for key in path {
+        inside = slot(inside, name, key)?.get_mut();
+        name = key.get_ref();
     }
+    if let DeValue::Table(table) = inside {
+        // With the value comes the place of its key.
+        table.remove(*key.get_ref());
+    }
+    *slot(inside, name, key)? = value;
     Ok(())
 }
 
-fn no_table(name: &str) -> OverrideError {
-    OverrideError::NoTable(name.to_owned())
-}
-
-fn index(key: &str, list: &str, len: usize) -> Result<usize, OverrideError> {
-    match key.parse() {
-        Ok(index) if index < len => Ok(index),
-        _ => Err(OverrideError::NoElement { list: list.to_owned(), len, key: key.to_owned() }),
+/// What lies at `key` of `inside`, which is called `name`; a table where there is nothing.
+fn slot<'v, 's>(
+    inside: &'v mut DeValue<'s>,
+    name: &str,
+    key: &Spanned<&'s str>,
+) -> Result<&'v mut Spanned<DeValue<'s>>, OverrideError> {
+    let (span, key) = (key.span(), *key.get_ref());
+    match inside {
+        DeValue::Table(table) => {
+            let empty = || Spanned::new(span.clone(), DeValue::Table(DeTable::new()));
+            Ok(table.entry(Spanned::new(span.clone(), Cow::Borrowed(key))).or_insert_with(empty))
+        }
+        DeValue::Array(array) => match key.parse::<usize>() {
+            Ok(index) if index < array.len() => Ok(&mut array.as_mut()[index]),
+            _ => {
+                let (list, key) = (name.to_owned(), key.to_owned());
+                Err(OverrideError::NoElement { list, len: array.len(), key })
+            }
+        },
+        _ => Err(OverrideError::NoTable(name.to_owned())),
     }
 }
 
@@ -181,7 +163,7 @@ mod tests {
         let mut sources = Sources::default();
         sources.add(Origin::File("a.toml".into()), text.to_owned());
         sources.add(Origin::Override, change.to_owned());
-        let mut table = sources.table(&sources.all()[0]).unwrap();
+        let mut table = sources.table(&sources.all[0]).unwrap();
         for change in super::all(&sources)? {
             change.apply(&mut table, &sources)?;
         }

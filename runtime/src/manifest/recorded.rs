@@ -5,6 +5,7 @@ use super::include;
 use super::sources::Sources;
 use super::tree;
 use diagnostics::Diagnostic;
+use toml_edit::{Item, Table};
 
 /// Keys of `[run]` that change how fast or where a run computes, never what: they stay out of the recording.
 const HOST_ONLY_KEYS: [&str; 7] =
@@ -26,8 +27,9 @@ const HOST_ONLY_PROCESS_KEYS: [&str; 8] = [
 /// # Errors
 /// If an included file is not TOML.
 pub fn text(sources: &Sources) -> Result<String, Diagnostic> {
-    let original = &sources.all()[0].text;
-    let simulated: Vec<&String> = sources.override_texts().filter(|text| !is_host_only(text)).collect();
+    let original = &sources.all[0].text;
+    let simulated: Vec<&String> =
+        sources.overrides().map(|source| &source.text).filter(|text| !is_host_only(text)).collect();
     let Ok(mut document) = original.parse::<toml_edit::DocumentMut>() else { return Ok(original.clone()) };
     if simulated.is_empty() {
         return Ok(original.clone());
@@ -81,62 +83,34 @@ fn set(document: &mut toml_edit::DocumentMut, text: &str, sources: &Sources) -> 
     Ok(is_put)
 }
 
-fn put(item: &mut toml_edit::Item, keys: &[String], value: toml_edit::Value) -> Option<()> {
-    let (key, rest) = keys.split_first()?;
-    match item {
-        toml_edit::Item::ArrayOfTables(tables) => {
-            let table = tables.get_mut(key.parse().ok()?)?;
-            put_in_table(table, rest, value)
-        }
-        toml_edit::Item::Value(toml_edit::Value::Array(array)) => put_in_array(array, key, rest, value),
-        _ => put_in_table(item.as_table_like_mut()?, keys, value),
-    }
-}
-
-fn put_in_table(
-    table: &mut dyn toml_edit::TableLike,
-    keys: &[String],
-    value: toml_edit::Value,
-) -> Option<()> {
-    match keys {
-        [] => None,
-        [last] => {
-            let mut value = value;
-            if let Some(old) = table.get(last).and_then(toml_edit::Item::as_value) {
-                // With it stays the comment behind it.
-                *value.decor_mut() = old.decor().clone();
-            }
-            table.insert(last, toml_edit::Item::Value(value));
-            Some(())
-        }
-        [first, rest @ ..] => {
-            let is_list = rest[0].parse::<usize>().is_ok();
-            if is_list && table.get(first).is_none() {
-                return None;
-            }
-            let empty = || toml_edit::Item::Table(toml_edit::Table::new());
-            put(table.entry(first).or_insert_with(empty), rest, value)
-        }
-    }
-}
-
-fn put_in_array(
-    array: &mut toml_edit::Array,
-    key: &str,
-    rest: &[String],
-    value: toml_edit::Value,
-) -> Option<()> {
-    let index = key.parse().ok()?;
-    if rest.is_empty() {
+fn put(item: &mut Item, keys: &[String], mut value: toml_edit::Value) -> Option<()> {
+    let (last, path) = keys.split_last()?;
+    let inside = keys.iter().skip(1).zip(path).try_fold(item, |item, (next, key)| {
+        // What is missing on the way is a table; a list that is missing has no elements.
+        let empty = || if next.parse::<usize>().is_ok() { Item::None } else { Item::Table(Table::new()) };
+        slot(item, key, empty).filter(|found| !found.is_none())
+    })?;
+    if let Some(array) = inside.as_array_mut() {
+        let index = last.parse().ok()?;
         array.get(index)?;
         array.replace(index, value);
         return Some(());
     }
-    match array.get_mut(index)? {
-        toml_edit::Value::InlineTable(table) => put_in_table(table, rest, value),
-        toml_edit::Value::Array(inner) => put_in_array(inner, rest.first()?, &rest[1..], value),
-        _ => None,
+    let table = inside.as_table_like_mut()?;
+    if let Some(old) = table.get(last).and_then(Item::as_value) {
+        // With it stays the comment behind it.
+        *value.decor_mut() = old.decor().clone();
     }
+    table.insert(last, Item::Value(value));
+    Some(())
+}
+
+/// What lies at `key` of a list or a table; `empty` where the table has nothing there.
+fn slot<'i>(inside: &'i mut Item, key: &str, empty: impl FnOnce() -> Item) -> Option<&'i mut Item> {
+    if inside.is_array() || inside.is_array_of_tables() {
+        return inside.get_mut(key.parse::<usize>().ok()?);
+    }
+    Some(inside.as_table_like_mut()?.entry(key).or_insert_with(empty))
 }
 
 #[cfg(test)]

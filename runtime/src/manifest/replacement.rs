@@ -2,8 +2,7 @@
 
 use super::sources::Sources;
 use super::tree;
-use diagnostics::Diagnostic;
-use diagnostics::did_you_mean;
+use diagnostics::{Diagnostic, did_you_mean};
 use std::ops::Range;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
@@ -17,18 +16,16 @@ const FIXED: [&str; 5] = ["lockstep", "on_exit", "outputs", "period_ticks", "sta
 /// A process that is not there, or a key in which a backup cannot differ.
 pub fn complete(root: &mut DeTable<'_>, sources: &Sources) -> Result<(), Diagnostic> {
     for list in ["swap", "shadow"] {
-        let Some(DeValue::Array(mut array)) = root.get(list).map(|value| value.get_ref().clone()) else {
-            continue;
-        };
-        for item in array.iter_mut() {
-            let span = item.span();
-            if let DeValue::Table(item) = item.get_mut() {
-                complete_item(item, span, root, sources)?;
+        let Some((key, mut value)) = root.remove_entry(list) else { continue };
+        if let DeValue::Array(array) = value.get_mut() {
+            for item in array.iter_mut() {
+                let span = item.span();
+                if let DeValue::Table(item) = item.get_mut() {
+                    complete_item(item, span, root, sources)?;
+                }
             }
         }
-        if let Some(value) = root.get_mut(list) {
-            *value.get_mut() = DeValue::Array(array);
-        }
+        root.insert(key, value);
     }
     complete_standbys(root, sources)
 }
@@ -41,14 +38,17 @@ fn complete_item<'s>(
 ) -> Result<(), Diagnostic> {
     let Some(name) = item.get("process").filter(|name| name.get_ref().is_str()) else { return Ok(()) };
     let process = Spanned::new(name.span(), name.get_ref().as_str().unwrap_or_default().to_owned());
-    let with = match item.remove("with").map(|with| (with.span(), with.into_inner())) {
-        None => DeTable::new(),
-        Some((_, DeValue::Table(with))) => with,
-        Some((span, _)) => return Err(no_table(sources, span, "with")),
-    };
-    let whole = whole(sources, root, &process, with)?;
+    let whole = whole(sources, root, &process, taken(item, "with", sources)?)?;
     item.insert(Spanned::new(span.clone(), "with".into()), Spanned::new(span, DeValue::Table(whole)));
     Ok(())
+}
+
+/// What a backup has otherwise.
+fn taken<'s>(table: &mut DeTable<'s>, key: &str, sources: &Sources) -> Result<DeTable<'s>, Diagnostic> {
+    tree::take_table(table, key).map_err(|span| {
+        let help = format!("write {key} = {{ parameters = {{ … }} }}, for example");
+        sources.problem(&span, format!("`{key}` is not a table of keys of a process"), help)
+    })
 }
 
 fn complete_standbys(root: &mut DeTable<'_>, sources: &Sources) -> Result<(), Diagnostic> {
@@ -56,26 +56,17 @@ fn complete_standbys(root: &mut DeTable<'_>, sources: &Sources) -> Result<(), Di
         let DeValue::Table(process) = process.get_mut() else { continue };
         let is_standby = tree::string(process, "on_exit") == Some("standby");
         let place = process.get(if is_standby { "on_exit" } else { "standby" }).map(Spanned::span);
-        let differences = match process.remove("standby").map(|value| (value.span(), value.into_inner())) {
-            None => DeTable::new(),
-            Some((_, DeValue::Table(table))) => table,
-            Some((span, _)) => return Err(no_table(sources, span, "standby")),
-        };
+        let differences = taken(process, "standby", sources)?;
         let Some(span) = place else { continue };
         if !is_standby {
             let help = "add on_exit = \"standby\"";
             return Err(sources.problem(&span, "`standby` is described, but nothing stands by", help));
         }
         let whole = differing(process, differences, sources)?;
-        process
-            .insert(Spanned::new(span.clone(), "standby".into()), Spanned::new(span, DeValue::Table(whole)));
+        let key = Spanned::new(span.clone(), "standby".into());
+        process.insert(key, Spanned::new(span, DeValue::Table(whole)));
     }
     Ok(())
-}
-
-fn no_table(sources: &Sources, span: Range<usize>, key: &str) -> Diagnostic {
-    let help = format!("write {key} = {{ parameters = {{ … }} }}, for example");
-    sources.problem(&span, format!("`{key}` is not a table of keys of a process"), help)
 }
 
 /// The process `name` of `root` as its backup is, which differs by `with`.

@@ -45,7 +45,7 @@ struct Set {
 /// A set or vehicle that is not well formed, a set that is not there, a vehicle that is there twice.
 pub fn expand<'s>(root: &mut DeTable<'s>, sources: &Sources) -> Result<(), Diagnostic> {
     let explicit = take_expanded(root);
-    let sets = sets(root.remove("set"), sources)?;
+    let sets = sets(root, sources)?;
     let mut expanded = DeTable::new();
     for vehicle in vehicles(root.remove("vehicle"), sources)? {
         add_vehicle(&mut expanded, vehicle, &sets, sources)?;
@@ -72,15 +72,9 @@ fn take_expanded<'s>(root: &mut DeTable<'s>) -> Vec<(Spanned<DeString<'s>>, Span
     expanded.filter_map(|name| processes.remove_entry(name.as_str())).collect()
 }
 
-fn sets<'s>(
-    value: Option<Spanned<DeValue<'s>>>,
-    sources: &Sources,
-) -> Result<BTreeMap<String, DeTable<'s>>, Diagnostic> {
-    let Some(value) = value else { return Ok(BTreeMap::new()) };
-    let span = value.span();
-    let DeValue::Table(table) = value.into_inner() else {
-        return Err(sources.problem(&span, "`set` is not a table", "write [set.NAME.process.PROCESS]"));
-    };
+fn sets<'s>(root: &mut DeTable<'s>, sources: &Sources) -> Result<BTreeMap<String, DeTable<'s>>, Diagnostic> {
+    let table = tree::take_table(root, "set")
+        .map_err(|span| sources.problem(&span, "`set` is not a table", "write [set.NAME.process.PROCESS]"))?;
     let mut sets = BTreeMap::new();
     for (name, set) in table {
         read_tree::<Set>(&set).map_err(|misread| sources.refused(misread))?;
@@ -106,12 +100,10 @@ fn vehicles<'s>(
     let vehicle = |value: Spanned<DeValue<'s>>| {
         let vehicle = read_tree::<Vehicle>(&value).map_err(|misread| sources.refused(misread))?;
         let DeValue::Table(mut table) = value.into_inner() else { return Ok((vehicle, DeTable::new())) };
-        let Some(differences) = table.remove("process") else { return Ok((vehicle, DeTable::new())) };
-        let span = differences.span();
-        match differences.into_inner() {
-            DeValue::Table(differences) => Ok((vehicle, differences)),
-            _ => Err(sources.problem(&span, "`process` is not a table", "write process.PROCESS.KEY = …")),
-        }
+        let differences = tree::take_table(&mut table, "process").map_err(|span| {
+            sources.problem(&span, "`process` is not a table", "write process.PROCESS.KEY = …")
+        })?;
+        Ok((vehicle, differences))
     };
     array.into_iter().map(vehicle).collect()
 }
@@ -157,11 +149,8 @@ fn differing<'s>(
     for (name, _) in &differences {
         if !processes.contains_key(name.get_ref().as_ref()) {
             let message = format!("the vehicle's set has no process `{}`", name.get_ref());
-            return Err(sources.problem(
-                &name.span(),
-                message,
-                did_you_mean(name.get_ref(), names(set), "there is"),
-            ));
+            let help = did_you_mean(name.get_ref(), names(set), "there is");
+            return Err(sources.problem(&name.span(), message, help));
         }
     }
     tree::merge_processes(&mut processes, differences);
@@ -171,21 +160,23 @@ fn differing<'s>(
 /// The names of the vehicles: one, or `count` of them numbered from 1.
 fn instances(vehicle: &Vehicle, sources: &Sources) -> Result<Vec<String>, Diagnostic> {
     let name = vehicle.name.get_ref();
-    let fits = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '-' || c == '_';
-    if name.is_empty() || !name.chars().all(fits) {
+    if !is_name(name) {
         let help = "use lower-case letters, digits, `-` and `_`";
         return Err(sources.problem(&vehicle.name.span(), format!("`{name}` cannot name a vehicle"), help));
     }
     let Some(count) = &vehicle.count else { return Ok(vec![name.clone()]) };
     if !(1..=COUNT_MAX).contains(count.get_ref()) {
         let message = format!("`count` is {}", count.get_ref());
-        return Err(sources.problem(
-            &count.span(),
-            message,
-            format!("a run has 1 to {COUNT_MAX} of a vehicle"),
-        ));
+        let help = format!("a run has 1 to {COUNT_MAX} of a vehicle");
+        return Err(sources.problem(&count.span(), message, help));
     }
     Ok((1..=*count.get_ref()).map(|number| format!("{name}{number}")).collect())
+}
+
+/// Whether a process or a vehicle may be called so.
+pub fn is_name(text: &str) -> bool {
+    let fits = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '-' || c == '_';
+    !text.is_empty() && text.chars().all(fits)
 }
 
 /// The local topics that a process of a set publishes.

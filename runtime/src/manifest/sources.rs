@@ -2,8 +2,7 @@
 
 use super::tree;
 use crate::registry::Registry;
-use diagnostics::Diagnostic;
-use diagnostics::{Misread, ParameterError, Place};
+use diagnostics::{Diagnostic, Misread, ParameterError, Place};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use toml::Spanned;
@@ -28,10 +27,21 @@ pub struct Source {
     pub base: usize,
 }
 
+impl Source {
+    /// The file that it is.
+    fn path(&self) -> Option<&Path> {
+        match &self.origin {
+            Origin::File(path) => Some(path),
+            Origin::Override | Origin::Argument(_) => None,
+        }
+    }
+}
+
 /// All texts; the first is the manifest's own file.
 #[derive(Clone, Debug, Default)]
 pub struct Sources {
-    all: Vec<Source>,
+    /// The texts.
+    pub all: Vec<Source>,
     /// The files in the order in which they are merged: what is included goes before what includes it.
     pub order: Vec<usize>,
     /// The components that they may name.
@@ -49,11 +59,6 @@ impl Sources {
         // One more than the text is long: its very end is a place of its own.
         let base = self.all.last().map_or(0, |last| last.base + last.text.len() + 1);
         self.all.push(Source { origin, text, base });
-    }
-
-    /// The texts.
-    pub fn all(&self) -> &[Source] {
-        &self.all
     }
 
     /// The text that was added last.
@@ -81,26 +86,17 @@ impl Sources {
 
     /// The texts that are files.
     pub fn files(&self) -> impl Iterator<Item = &Source> {
-        self.all.iter().filter(|source| matches!(source.origin, Origin::File(_)))
+        self.all.iter().filter(|source| source.path().is_some())
     }
 
     /// The files beside the manifest's own.
     pub fn included(&self) -> Vec<PathBuf> {
-        let file = |source: &Source| match &source.origin {
-            Origin::File(path) => Some(path.clone()),
-            Origin::Override | Origin::Argument(_) => None,
-        };
-        self.all.iter().skip(1).filter_map(file).collect()
+        self.all.iter().skip(1).filter_map(Source::path).map(Path::to_owned).collect()
     }
 
     /// The values given with `--set`.
     pub fn overrides(&self) -> impl Iterator<Item = &Source> {
         self.all.iter().filter(|source| matches!(source.origin, Origin::Override))
-    }
-
-    /// Their texts.
-    pub fn override_texts(&self) -> impl Iterator<Item = &String> {
-        self.overrides().map(|source| &source.text)
     }
 
     /// Whether the place `offset` lies in a `--set`.
@@ -163,19 +159,12 @@ impl Sources {
 
     /// The folder at which a relative path written at `offset` starts.
     fn folder(&self, offset: usize) -> &Path {
-        let file = match &self.at(offset).origin {
-            Origin::File(path) => path,
-            Origin::Override | Origin::Argument(_) => self.file(),
-        };
-        file.parent().unwrap_or(Path::new(""))
+        self.at(offset).path().unwrap_or(self.file()).parent().unwrap_or(Path::new(""))
     }
 
     /// The manifest's own file.
     fn file(&self) -> &Path {
-        match &self.all[0].origin {
-            Origin::File(path) => path,
-            Origin::Override | Origin::Argument(_) => Path::new(""),
-        }
+        self.all[0].path().unwrap_or(Path::new(""))
     }
 
     fn at(&self, offset: usize) -> &Source {
@@ -193,7 +182,7 @@ mod tests {
         sources.add(Origin::File("a.toml".into()), "x = 1\n".into());
         sources.add(Origin::File("b.toml".into()), "y = 2\nz = 3".into());
         sources.add(Origin::Override, "x=4".into());
-        let base = sources.all()[1].base;
+        let base = sources.all[1].base;
         let message = |offset: usize| sources.problem(&(offset..offset), "no", "").to_string();
         assert_eq!(message(4), "a.toml:1:5: no");
         // Behind the last byte of the first text is not yet the second.

@@ -1,6 +1,7 @@
 //! Tables whose keys and values know their places, and how two of them become one.
 
 use diagnostics::Misread;
+use std::ops::Range;
 use toml::Spanned;
 use toml::de::{DeString, DeTable, DeValue};
 
@@ -113,6 +114,18 @@ pub fn table_mut<'v, 't>(table: &'v mut DeTable<'t>, key: &str) -> Option<&'v mu
 /// The table at `key`, if there is one.
 pub fn table<'v, 't>(table: &'v DeTable<'t>, key: &str) -> Option<&'v DeTable<'t>> {
     table.get(key)?.get_ref().as_table()
+}
+
+/// Takes the table at `key` out of `table`; an empty one where there is none.
+///
+/// # Errors
+/// The place of what is no table.
+pub fn take_table<'t>(table: &mut DeTable<'t>, key: &str) -> Result<DeTable<'t>, Range<usize>> {
+    match table.remove(key).map(|value| (value.span(), value.into_inner())) {
+        None => Ok(DeTable::new()),
+        Some((_, DeValue::Table(taken))) => Ok(taken),
+        Some((span, _)) => Err(span),
+    }
 }
 
 /// The keys of `table`.
