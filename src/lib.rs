@@ -41,12 +41,13 @@ mod extremes;
 #[cfg(test)]
 mod properties;
 
-pub use check::{Checked, check, check_text};
+pub use check::{check, check_text};
 pub use components::COMPONENTS;
 pub use diagnostics::Diagnostic;
 pub use runtime::ctl::Remote;
 pub use runtime::ctl::protocol::{Answer, Request};
 pub use runtime::event::{Progress, RunEvent, StopToken};
+pub use runtime::graph::Graph;
 pub use runtime::host::Host;
 pub use runtime::launcher::{Launcher, Outcome};
 pub use runtime::manifest::{Manifest, ManifestBuilder};

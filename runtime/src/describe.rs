@@ -3,59 +3,60 @@
 use crate::graph::Graph;
 use crate::program::{BackupSpec, Executable, OnExit, Program, Readiness};
 use bus::plan::Pace;
-use std::fmt::Write as _;
+use std::fmt;
 
 /// Replacements between the first and the last that are listed one by one.
 const REPLACEMENTS_SHOWN: usize = 4;
 
 /// The graph of a run: nodes with their rates, edges with their delays.
-pub fn graph(graph: &Graph) -> String {
-    let plan = &graph.plan;
-    let rate_hz = 1e9 / plan.tick_ns as f64;
-    let pace = match plan.pace {
-        Pace::Free => "free".to_owned(),
-        Pace::Factor(factor) => format!("{factor} × real time"),
-    };
-    let mut text = format!(
-        "{} ticks at {rate_hz} Hz ({} s), pace {pace}, window {} ticks, seed {}\n",
-        plan.duration_ticks,
-        f64::from(plan.duration_ticks) * plan.tick_s(),
-        plan.window_ticks,
-        plan.seed
-    );
-    for (index, (node, program)) in plan.nodes.iter().zip(&graph.programs).enumerate() {
-        let cpu = node.cpu.map_or(String::new(), |cpu| format!(", cpu {cpu}"));
-        let (what, hz) = (what(program), rate_hz / f64::from(node.period_ticks));
-        let wait = serde_json::json!(node.wait);
-        let _ =
-            writeln!(text, "\n{} ({what}), {hz} Hz{cpu}, {}", node.name, wait.as_str().unwrap_or_default());
-        for input in &node.inputs {
-            let topic = &plan.topics[input.topic];
-            let delay = if input.delay_ticks == 0 { "" } else { ", delayed by 1 tick" };
-            // A recorder's ports are called like their topics.
-            let port = if input.port == topic.name { "" } else { &input.port };
-            let _ = writeln!(text, "  <- {port:<12} {} [{}]{delay}", topic.name, topic.type_name);
-        }
-        for output in &node.outputs {
-            let topic = &plan.topics[output.topic];
-            let hz = rate_hz / f64::from(topic.period_ticks);
-            let _ = writeln!(text, "  -> {:<12} {} [{}] {hz} Hz", output.port, topic.name, topic.type_name);
-        }
-        text += &replacements(graph, index);
-    }
-    for (name, program) in &graph.sidecars {
-        let ready = match program.ready {
-            Readiness::Started => "",
-            Readiness::Notify => "; tick 0 waits until it says that it is ready",
+impl fmt::Display for Graph {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let plan = &self.plan;
+        let rate_hz = 1e9 / plan.tick_ns as f64;
+        let pace = match plan.pace {
+            Pace::Free => "free".to_owned(),
+            Pace::Factor(factor) => format!("{factor} × real time"),
         };
-        let end = match program.on_exit {
-            OnExit::Restart => "; if it ends with an error, it is started again",
-            OnExit::Ignore => "; if it ends with an error, the run goes on",
-            OnExit::Stop | OnExit::Standby => "; if it ends with an error, so does the run",
-        };
-        let _ = writeln!(text, "\n{name} ({}), takes no part in the ticks{ready}{end}", what(program));
+        writeln!(
+            f,
+            "{} ticks at {rate_hz} Hz ({} s), pace {pace}, window {} ticks, seed {}",
+            plan.duration_ticks,
+            f64::from(plan.duration_ticks) * plan.tick_s(),
+            plan.window_ticks,
+            plan.seed
+        )?;
+        for (index, (node, program)) in plan.nodes.iter().zip(&self.programs).enumerate() {
+            let cpu = node.cpu.map_or(String::new(), |cpu| format!(", cpu {cpu}"));
+            let (what, hz) = (what(program), rate_hz / f64::from(node.period_ticks));
+            let wait = serde_json::json!(node.wait);
+            writeln!(f, "\n{} ({what}), {hz} Hz{cpu}, {}", node.name, wait.as_str().unwrap_or_default())?;
+            for input in &node.inputs {
+                let topic = &plan.topics[input.topic];
+                let delay = if input.delay_ticks == 0 { "" } else { ", delayed by 1 tick" };
+                // A recorder's ports are called like their topics.
+                let port = if input.port == topic.name { "" } else { &input.port };
+                writeln!(f, "  <- {port:<12} {} [{}]{delay}", topic.name, topic.type_name)?;
+            }
+            for output in &node.outputs {
+                let topic = &plan.topics[output.topic];
+                let hz = rate_hz / f64::from(topic.period_ticks);
+                writeln!(f, "  -> {:<12} {} [{}] {hz} Hz", output.port, topic.name, topic.type_name)?;
+            }
+            f.write_str(&replacements(self, index))?;
+        }
+        self.sidecars.iter().try_for_each(|(name, program)| {
+            let ready = match program.ready {
+                Readiness::Started => "",
+                Readiness::Notify => "; tick 0 waits until it says that it is ready",
+            };
+            let end = match program.on_exit {
+                OnExit::Restart => "; if it ends with an error, it is started again",
+                OnExit::Ignore => "; if it ends with an error, the run goes on",
+                OnExit::Stop | OnExit::Standby => "; if it ends with an error, so does the run",
+            };
+            writeln!(f, "\n{name} ({}), takes no part in the ticks{ready}{end}", what(program))
+        })
     }
-    text
 }
 
 fn what(program: &Program) -> String {
@@ -92,24 +93,26 @@ fn replacements(graph: &Graph, node: usize) -> String {
     text
 }
 
-/// The graph as JSON: the plan, with who replaces whom and who takes no part.
-pub fn graph_json(graph: &Graph) -> String {
-    let backup = |backup: &BackupSpec| {
-        serde_json::json!({
-            "process": graph.plan.nodes[backup.node].name,
-            "what": what(&backup.program),
-            "join_tick": backup.join_tick,
-            "take_over_tick": backup.take_over_tick,
-            "is_standby": backup.is_standby,
-            "plan": backup.plan,
-        })
-    };
-    let mut value = serde_json::to_value(&graph.plan).unwrap_or_default();
-    for (index, program) in graph.programs.iter().enumerate() {
-        value["nodes"][index]["what"] = what(program).into();
+impl Graph {
+    /// It as JSON: the plan, with who replaces whom and who takes no part.
+    pub fn json(&self) -> String {
+        let backup = |backup: &BackupSpec| {
+            serde_json::json!({
+                "process": self.plan.nodes[backup.node].name,
+                "what": what(&backup.program),
+                "join_tick": backup.join_tick,
+                "take_over_tick": backup.take_over_tick,
+                "is_standby": backup.is_standby,
+                "plan": backup.plan,
+            })
+        };
+        let mut value = serde_json::to_value(&self.plan).unwrap_or_default();
+        for (index, program) in self.programs.iter().enumerate() {
+            value["nodes"][index]["what"] = what(program).into();
+        }
+        value["backups"] = self.backups.iter().map(backup).collect();
+        value["warnings"] = serde_json::to_value(&self.warnings).unwrap_or_default();
+        value["sidecars"] = self.sidecars.iter().map(|(name, _)| name.clone()).collect();
+        serde_json::to_string_pretty(&value).unwrap_or_default()
     }
-    value["backups"] = graph.backups.iter().map(backup).collect();
-    value["warnings"] = serde_json::to_value(&graph.warnings).unwrap_or_default();
-    value["sidecars"] = graph.sidecars.iter().map(|(name, _)| name.clone()).collect();
-    serde_json::to_string_pretty(&value).unwrap_or_default()
 }

@@ -5,7 +5,7 @@ mod claimed_file;
 pub mod clean;
 pub mod ctl;
 mod descendants;
-pub mod describe;
+mod describe;
 pub mod event;
 mod file_lock;
 pub mod flight;

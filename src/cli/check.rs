@@ -24,7 +24,7 @@ pub struct CheckArguments {
 /// What is wrong with it.
 pub fn check(arguments: &CheckArguments) -> Result<bool> {
     let checked = hummingbus::check(&arguments.manifest, &arguments.set)?;
-    print_warnings(checked.warnings());
+    print_warnings(&checked.warnings);
     print_text(&if arguments.json { checked.json() } else { checked.to_string() })?;
     Ok(true)
 }

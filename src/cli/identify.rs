@@ -3,13 +3,13 @@
 use super::files::PAGE;
 use super::interrupts::stop_token;
 use super::output::print_text;
+use super::progress;
 use anyhow::{Context, Result, bail};
 use clap::{Args, Subcommand};
 use flights::FlightSet;
 use hummingbus::COMPONENTS;
 use identify::report::Report;
 use identify::vehicle_file;
-use indicatif::{ProgressBar, ProgressStyle};
 use report::identification;
 use report::validate::Validation;
 use runtime::output_file::{self, Kind, Mark, is_same};
@@ -85,36 +85,32 @@ pub fn run(arguments: &IdentifyArguments) -> Result<bool> {
 
 fn rotor(stand: &Path, out: &Path, is_json: bool) -> Result<bool> {
     let found = identify::rotor::run(stand)?;
-    let (report, _lock) =
-        (found.report, claim(out, &[("rotor.toml", &TABLES), ("rotor.json", &REPORT)], &[stand])?);
-    for (name, kind, text) in
-        [("rotor.toml", &TABLES, found.tables), ("rotor.json", &REPORT, found.figures + "\n")]
-    {
-        output_file::write(&out.join(name), kind, |out| out.write_all(text.as_bytes()))?;
-    }
-    let text = if is_json { serde_json::to_string_pretty(&report)? } else { report.to_string() };
-    print_text(&text)?;
+    let _lock = claim(out, &[("rotor.toml", &TABLES), ("rotor.json", &REPORT)], &[stand])?;
+    write(out, "rotor.toml", &TABLES, &found.tables)?;
+    write(out, "rotor.json", &REPORT, &(found.figures + "\n"))?;
+    let report = found.report;
+    print_text(&if is_json { serde_json::to_string_pretty(&report)? } else { report.to_string() })?;
     Ok(true)
 }
 
 fn flights_of(arguments: &IdentifyArguments, file: &Path, out: &Path) -> Result<bool> {
-    let progress = Progress::new(arguments.json);
-    progress.say("reading flights");
+    let bar = progress::bar("{spinner} {elapsed:>4}  {msg}", arguments.json);
+    bar.enable_steady_tick(Duration::from_millis(100));
+    let say = |text: &str| bar.set_message(text.to_owned());
+    say("reading flights");
     let set = FlightSet::load(file)?;
     let base = Vehicle::base(&set.vehicle);
     let inputs: Vec<&Path> =
         [Some(file), Some(&set.vehicle), base.as_deref()].into_iter().flatten().collect();
     let files = [("vehicle.toml", &VEHICLE), ("report.html", &PAGE), ("report.json", &REPORT)];
     let _lock = claim(out, &files, &inputs)?;
-    let outcome = identify::run::identify(&set, &mut |step| progress.say(step))?;
+    let outcome = identify::run::identify(&set, &mut |step| say(step))?;
     let vehicle = out.join("vehicle.toml");
     let text = vehicle_file::text(&set.vehicle, &outcome.effects, &outcome.report)?;
-    output_file::write(&vehicle, &VEHICLE, |out| out.write_all(text.as_bytes()))?;
+    write(out, "vehicle.toml", &VEHICLE, &text)?;
     // All is written before anything is flown, so that a run that fails loses nothing.
-    let write_page = |flown: Option<&Value>| {
-        let path = out.join("report.html");
-        output_file::write(&path, &PAGE, |out| out.write_all(&identification::page(&outcome, flown)))
-    };
+    let write_page =
+        |flown: Option<&Value>| write(out, "report.html", &PAGE, identification::page(&outcome, flown));
     write_page(None)?;
     let mut report = serde_json::to_value(&outcome.report)?;
     write_json(out, &report)?;
@@ -122,13 +118,13 @@ fn flights_of(arguments: &IdentifyArguments, file: &Path, out: &Path) -> Result<
         None
     } else {
         let how = Validation { components: COMPONENTS, stop: &stop_token()?, keep: None };
-        let mut tell = |line: &str| progress.say(&format!("on the bus: {line}"));
+        let mut tell = |line: &str| say(&format!("on the bus: {line}"));
         identification::fly_again(&set, &vehicle, &outcome, &how, &mut tell)?
     };
     if flown.is_some() {
         write_page(flown.as_ref())?;
     }
-    progress.finish();
+    bar.finish_and_clear();
     report["bus"] = flown.clone().unwrap_or(Value::Null);
     write_json(out, &report)?;
     let report = serde_json::to_string_pretty(&report)?;
@@ -159,8 +155,11 @@ fn claim(out: &Path, files: &[(&str, &Kind)], inputs: &[&Path]) -> Result<File> 
 fn write_json(out: &Path, report: &Value) -> Result<()> {
     let mut all = serde_json::Map::from_iter([("writer".to_owned(), json!("hummingbus"))]);
     all.extend(report.as_object().cloned().unwrap_or_default());
-    let text = serde_json::to_string_pretty(&all)?;
-    output_file::write(&out.join("report.json"), &REPORT, |out| out.write_all(text.as_bytes()))
+    write(out, "report.json", &REPORT, serde_json::to_string_pretty(&all)?)
+}
+
+fn write(out: &Path, name: &str, kind: &Kind, content: impl AsRef<[u8]>) -> Result<()> {
+    output_file::write(&out.join(name), kind, |file| file.write_all(content.as_ref()))
 }
 
 fn summary(report: &Report, flown: Option<&Value>, out: &Path) -> String {
@@ -177,28 +176,4 @@ fn summary(report: &Report, flown: Option<&Value>, out: &Path) -> String {
     let files =
         ["report.html", "report.json", "vehicle.toml"].map(|name| out.join(name).display().to_string());
     text + &format!("\nwritten: {}", files.join(", "))
-}
-
-/// A line on the terminal that says what is being done.
-struct Progress(ProgressBar);
-
-impl Progress {
-    fn new(is_quiet: bool) -> Self {
-        if is_quiet {
-            return Self(ProgressBar::hidden());
-        }
-        let bar = ProgressBar::new_spinner();
-        let style = ProgressStyle::with_template("{spinner} {elapsed:>4}  {msg}");
-        bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_spinner()));
-        bar.enable_steady_tick(Duration::from_millis(100));
-        Self(bar)
-    }
-
-    fn say(&self, text: &str) {
-        self.0.set_message(text.to_owned());
-    }
-
-    fn finish(&self) {
-        self.0.finish_and_clear();
-    }
 }

@@ -2,9 +2,10 @@
 
 use super::files::{PAGE, open_recording};
 use super::output::print_text;
+use super::progress;
 use anyhow::{Context, Result, bail};
 use clap::{Args, ValueEnum};
-use indicatif::{ProgressBar, ProgressStyle};
+use indicatif::ProgressBar;
 use recorder::reader::Recording;
 use report::plot::{Drawing, Format, PNG_MARK, Request, SVG_MARK, Span, View};
 use runtime::output_file::{self, Kind, Mark, is_same};
@@ -122,10 +123,8 @@ fn span(arguments: &PlotArguments) -> Result<Span> {
 
 /// The files to write; checked before the recording is read for them.
 fn outputs(arguments: &PlotArguments) -> Result<Vec<(Format, PathBuf)>> {
-    let mut files = Vec::new();
-    for path in &arguments.out {
-        files.push((format_of(path)?, path.clone()));
-    }
+    let out = arguments.out.iter().map(|path| Ok((format_of(path)?, path.clone())));
+    let mut files: Vec<_> = out.collect::<Result<_>>()?;
     files.extend(arguments.png.iter().map(|path| (Format::Png, path.clone())));
     files.extend(arguments.svg.iter().map(|path| (Format::Svg, path.clone())));
     if files.is_empty() {
@@ -163,11 +162,9 @@ fn kind(format: Format) -> &'static Kind {
 /// A bar that is seen where reading takes long.
 fn bar(recording: &Recording) -> ProgressBar {
     let messages = recording.topics().values().map(|topic| topic.message_count).sum();
-    if messages < MESSAGES_QUICK {
-        return ProgressBar::hidden();
-    }
-    let style = ProgressStyle::with_template("{bar:30} {percent} % read  {eta} left");
-    ProgressBar::new(messages).with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()))
+    let bar = progress::bar("{bar:30} {percent} % read  {eta} left", messages < MESSAGES_QUICK);
+    bar.set_length(messages);
+    bar
 }
 
 fn as_json(drawing: &Drawing, files: &[(Format, PathBuf)]) -> Result<String> {

@@ -3,7 +3,7 @@
 use super::interrupts::stop_token;
 use super::output::{message, print_text, print_warnings};
 use super::profile::Files;
-use super::progress::Bar;
+use super::progress::{self, RUN};
 use anyhow::{Context, Error, Result, anyhow, bail};
 use clap::Args;
 use hummingbus::COMPONENTS;
@@ -103,13 +103,13 @@ pub fn run(
     let files = files.unwrap_or_else(|| Files::beside(&path));
     let pages = if graph.plan.profile { files.outputs() } else { Vec::new() };
     let mut outputs = Outputs::of(&manifest, &graph, &path, pages)?;
-    let bar = Bar::new(arguments.json);
+    let bar = progress::bar(RUN, arguments.json);
     let launcher = Launcher::new(Host::this_binary())
         .stopped_by(&stop)
         .adopting_orphans()
-        .followed_by(|event| bar.show(event));
+        .followed_by(|event| progress::show(&bar, event));
     let flown = launcher.launch(&manifest, &mut graph, &mut outputs).and_then(|outcome| {
-        bar.finish();
+        progress::finish(&bar);
         Ok((outcome, outputs.finish()?))
     });
     let (mut outcome, recording) =
