@@ -160,9 +160,7 @@ fn claim_new(path: &Path) -> io::Result<Option<(File, Option<PathBuf>)>> {
             Attempt::Gone => {}
             // Locked until its name is gone: nobody removes what came after it.
             Attempt::Locked(old) => {
-                if let Some(message) = RECORDING.objection(&old)? {
-                    return Err(io::Error::other(message));
-                }
+                RECORDING.require(&old)?;
                 kept = keep_aside(&old, path)?.or(kept);
             }
         }
@@ -221,9 +219,7 @@ impl LogClaim {
                 Attempt::Held => return Ok(None),
                 Attempt::Gone => {}
                 Attempt::Locked(file) => {
-                    if let Some(message) = LOG.objection(&file).with_context(cannot)? {
-                        bail!("{}: {message}", cannot());
-                    }
+                    LOG.require(&file).with_context(cannot)?;
                     return Ok(Some(Self { file, path: real, is_new }));
                 }
             }

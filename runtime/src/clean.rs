@@ -13,7 +13,7 @@ use crate::run_dir::{
     Entry, SHARED_MEMORY, entry_path, folders, is_own_name, is_own_run_dir, is_run_dir_of, live_runs,
     run_of_dir, run_of_shared_memory, shared_memory_of, try_claim,
 };
-use anyhow::Result;
+use anyhow::{Result, anyhow, bail};
 use bus::process::user_id;
 use bus::user_file;
 use indicatif::HumanBytes;
@@ -71,7 +71,7 @@ pub fn clean(dry_run: bool) -> Result<Report> {
             report.live.push(run_id);
             continue;
         };
-        let mut remains = look_at(run_id, &traces);
+        let mut remains = look_at(run_id, traces);
         if !dry_run {
             remains.remove();
         }
@@ -105,8 +105,8 @@ fn launcher_is_there(run_id: &str) -> bool {
 #[derive(Default)]
 struct Traces {
     run_dirs: BTreeSet<PathBuf>,
-    processes: Vec<Pid>,
-    spared: Vec<Pid>,
+    processes: Vec<i32>,
+    spared: Vec<i32>,
 }
 
 fn find_traces() -> Result<BTreeMap<String, Traces>> {
@@ -128,7 +128,7 @@ fn find_traces() -> Result<BTreeMap<String, Traces>> {
         if let Some(run_id) = name_of(&run_dir).and_then(run_of_dir).map(str::to_owned) {
             let traces = found.entry(run_id).or_default();
             traces.run_dirs.extend(Some(run_dir).filter(|run_dir| run_dir.is_absolute()));
-            if holds_file { &mut traces.processes } else { &mut traces.spared }.push(process);
+            if holds_file { &mut traces.processes } else { &mut traces.spared }.push(number(process));
         }
     }
     Ok(found)
@@ -204,14 +204,13 @@ fn holds_file_of(process: Pid, run_dir: &Path) -> bool {
     targets.any(|target| resolved.as_ref().is_some_and(|run_dir| target.starts_with(run_dir)))
 }
 
-fn look_at(run_id: String, traces: &Traces) -> Remains {
-    let run_dirs = traces.run_dirs.iter().filter(|path| is_own_run_dir(path)).cloned();
+fn look_at(run_id: String, traces: Traces) -> Remains {
+    let Traces { run_dirs, processes, spared } = traces;
+    let run_dirs = run_dirs.into_iter().filter(|path| is_own_run_dir(path));
     // The entry last, as it goes when a run ends by itself.
     let entry = Some(entry_path(&run_id)).filter(|path| is_own_name(path));
     let paths: Vec<PathBuf> = run_dirs.chain(shared_memory_of(&run_id)).chain(entry).collect();
     let bytes = paths.iter().map(|path| bytes_below(path)).sum();
-    let [processes, spared] =
-        [&traces.processes, &traces.spared].map(|all| all.iter().copied().map(number).collect());
     Remains { run_id, processes, spared, paths, bytes, failures: Vec::new() }
 }
 
@@ -247,17 +246,8 @@ impl Remains {
     }
 }
 
-/// A process that lives on.
-#[derive(Debug, thiserror::Error)]
-enum NotEnded {
-    #[error("cannot be killed: {0}")]
-    Kill(rustix::io::Errno),
-    #[error("still there {} s after it was killed", GRACE.as_secs())]
-    Alive,
-}
-
 /// Kills a process that carries a run directory, and waits until it is gone.
-fn end_process(process: i32, run_id: &str) -> Result<(), NotEnded> {
+fn end_process(process: i32, run_id: &str) -> Result<()> {
     let Some(process) = Pid::from_raw(process) else { return Ok(()) };
     // The handle stays with the process, whoever gets its number next; so what carries the run directory now
     // is what the signal goes to.
@@ -266,11 +256,11 @@ fn end_process(process: i32, run_id: &str) -> Result<(), NotEnded> {
     if run_dir_of(process).filter(is_of_run).is_none() {
         return Ok(());
     }
-    pidfd_send_signal(&handle, Signal::KILL).map_err(NotEnded::Kill)?;
+    pidfd_send_signal(&handle, Signal::KILL).map_err(|error| anyhow!("cannot be killed: {error}"))?;
     let start = Instant::now();
     while run_dir_of(process).is_some() {
         if start.elapsed() > GRACE {
-            return Err(NotEnded::Alive);
+            bail!("still there {} s after it was killed", GRACE.as_secs());
         }
         std::thread::sleep(POLL);
     }

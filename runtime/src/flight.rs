@@ -15,7 +15,8 @@ pub struct Flight {
     pub ticks: u32,
     nodes: Vec<Vec<Era>>,
     grants: GrantReader,
-    publishers: Vec<Publisher>,
+    /// The nodes that send the topics.
+    publishers: Vec<usize>,
 }
 
 /// The time in which one process was a node: its samples counted.
@@ -25,15 +26,6 @@ struct Era {
     first_tick: u32,
     inputs: Vec<InputPlan>,
     noted: TickReader,
-}
-
-/// Who sends a topic.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Publisher {
-    /// The node.
-    pub node: usize,
-    /// Its output.
-    pub output: usize,
 }
 
 /// What a computation had to wait for last.
@@ -69,18 +61,12 @@ impl Flight {
     /// If a file cannot be read or does not hold what it should.
     pub fn open(plan: &Plan, run_dir: &Path, ticks: u32, replacements: &[Report]) -> Result<Self, BusError> {
         let nodes = (0..plan.nodes.len()).map(|node| eras(plan, run_dir, node, replacements));
-        let mut publishers = vec![Publisher::default(); plan.topics.len()];
-        for (node, plan) in plan.nodes.iter().enumerate() {
-            for (output, plan) in plan.outputs.iter().enumerate() {
-                publishers[plan.topic] = Publisher { node, output };
-            }
-        }
         Ok(Self {
             plan: plan.clone(),
             ticks,
             nodes: nodes.collect::<Result<_, _>>()?,
             grants: GrantReader::open(run_dir)?,
-            publishers,
+            publishers: (0..plan.topics.len()).map(|topic| plan.publisher(topic)).collect(),
         })
     }
 
@@ -104,8 +90,8 @@ impl Flight {
         &self.plan.topics[topic].name
     }
 
-    /// The node and output that send `topic`.
-    pub fn publisher(&self, topic: usize) -> Publisher {
+    /// The node that sends `topic`.
+    pub fn publisher(&self, topic: usize) -> usize {
         self.publishers[topic]
     }
 
@@ -142,9 +128,9 @@ impl Flight {
 
     /// Host time at which the sample of `topic` stamped `tick` was sent.
     pub fn sent_ns(&self, topic: usize, tick: u32) -> Option<u64> {
-        let publisher = self.publishers[topic];
-        let times = self.at(publisher.node, tick)?;
-        times.sent_ns.get(publisher.output).copied().filter(|&ns| ns > 0)
+        let node = self.publishers[topic];
+        let output = self.plan.nodes[node].outputs.iter().position(|output| output.topic == topic)?;
+        self.at(node, tick)?.sent_ns.get(output).copied().filter(|&ns| ns > 0)
     }
 
     /// The grants, in their order.
@@ -176,7 +162,7 @@ impl Flight {
     pub fn closing_topics(&self) -> Vec<usize> {
         let closes = |&topic: &usize| {
             let mut readers = self.readers_of(topic, |delay_ticks| delay_ticks > 0);
-            readers.any(|reader| self.reaches(reader, self.publishers[topic].node))
+            readers.any(|reader| self.reaches(reader, self.publishers[topic]))
         };
         (0..self.plan.topics.len()).filter(closes).collect()
     }
@@ -208,7 +194,7 @@ impl Flight {
         for (node, eras) in nodes.iter_mut().zip(&self.nodes) {
             node.inputs = eras.iter().flat_map(|era| era.inputs.clone()).collect();
         }
-        let depths = crate::placement::depths(&nodes, |topic| self.publishers[topic].node);
+        let depths = crate::placement::depths(&nodes, |topic| self.publishers[topic]);
         let mut order: Vec<usize> = (0..self.plan.nodes.len()).collect();
         order.sort_by_key(|&node| depths[node]);
         order

@@ -60,7 +60,7 @@ pub struct Manifest {
     pub recorded_text: String,
     /// What it says.
     pub content: Content,
-    sources: Sources,
+    pub(crate) sources: Sources,
 }
 
 impl Manifest {
@@ -156,16 +156,6 @@ impl Manifest {
     /// starts at the folder of the file it is written in.
     pub fn resolve(&self, written: &Spanned<String>) -> Result<PathBuf, Diagnostic> {
         self.sources.resolve(written)
-    }
-
-    /// Whether what stands at `span` was given with `--set`.
-    pub fn is_override(&self, span: &Range<usize>) -> bool {
-        self.sources.is_override(span.start)
-    }
-
-    /// Whether what stands at the two places was written in one file, or given in one `--set`.
-    pub fn is_one_text(&self, a: &Range<usize>, b: &Range<usize>) -> bool {
-        self.sources.is_one_text(a.start, b.start)
     }
 
     /// This manifest with one more `[[swap]]`-like backup of `process`, whose differences are the TOML

@@ -23,7 +23,7 @@ const LINKS_MAX: usize = 40;
 ///
 /// std::fs::write(&path, "a letter")?;
 /// let error = output_file::write(&path, &PAGE, |out| out.write_all(b"")).unwrap_err();
-/// assert!(error.to_string().contains("no page of hummingbus, and would be lost"));
+/// assert!(format!("{error:#}").contains("no page of hummingbus, and would be lost"));
 ///
 /// std::fs::write(&path, "<!-- hummingbus --> of yesterday")?;
 /// output_file::write(&path, &PAGE, |out| out.write_all(b"<!-- hummingbus --> of today"))?;
@@ -62,18 +62,20 @@ impl Kind {
         }
     }
 
-    /// Why `file` must not be replaced; `None` if it may: it is empty, or of this kind.
-    pub(crate) fn objection(&self, file: &File) -> io::Result<Option<String>> {
+    /// Refuses a `file` that must not be replaced: that is neither empty nor of this kind.
+    pub(crate) fn require(&self, file: &File) -> io::Result<()> {
         if !file.metadata()?.is_file() {
-            return Ok(Some(NOT_REGULAR.to_owned()));
+            return Err(io::Error::other(NOT_REGULAR));
         }
         let mut start = [0; START_BYTES];
         let length = read_start(file, &mut start)?;
-        let message = || {
-            let name = self.name;
-            format!("it is a file that is no {name} of hummingbus, and would be lost; name another file")
-        };
-        Ok((!self.is_start(&start[..length])).then(message))
+        if self.is_start(&start[..length]) {
+            return Ok(());
+        }
+        let name = self.name;
+        let message =
+            format!("it is a file that is no {name} of hummingbus, and would be lost; name another file");
+        Err(io::Error::other(message))
     }
 }
 
@@ -133,12 +135,10 @@ pub fn check(path: &Path, kind: &Kind) -> Result<PathBuf> {
         bail!("{}: it is where this command prints; name another file", cannot());
     }
     if old.len() > 0 {
-        match File::open(path).and_then(|file| kind.objection(&file)) {
-            Ok(None) => {}
-            Ok(Some(message)) => bail!("{}: {message}", cannot()),
+        match File::open(path).and_then(|file| kind.require(&file)) {
             // Another run has just put it in its place, or removed it.
             Err(error) if error.kind() == ErrorKind::NotFound => {}
-            Err(error) => return Err(error).with_context(cannot),
+            required => required.with_context(cannot)?,
         }
     }
     real_path(path)

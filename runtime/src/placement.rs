@@ -4,15 +4,8 @@ use bus::plan::{NodePlan, Plan};
 
 /// A cycle of edges without delay, as node indices in the direction of the data.
 pub fn zero_delay_cycle(nodes: &[NodePlan], publisher: impl Fn(usize) -> usize) -> Option<Vec<usize>> {
-    let mut state = vec![Visit::New; nodes.len()];
-    (0..nodes.len()).find_map(|node| visit(nodes, &publisher, node, &mut state, &mut Vec::new()))
-}
-
-#[derive(Clone, Copy, PartialEq)]
-enum Visit {
-    New,
-    OnPath,
-    Done,
+    let mut is_visited = vec![false; nodes.len()];
+    (0..nodes.len()).find_map(|node| visit(nodes, &publisher, node, &mut is_visited, &mut Vec::new()))
 }
 
 /// Walks from consumer to publisher; a node met twice on one path closes a cycle.
@@ -20,23 +13,19 @@ fn visit(
     nodes: &[NodePlan],
     publisher: &impl Fn(usize) -> usize,
     node: usize,
-    state: &mut [Visit],
+    is_visited: &mut [bool],
     path: &mut Vec<usize>,
 ) -> Option<Vec<usize>> {
-    match state[node] {
-        Visit::Done => return None,
-        Visit::OnPath => {
-            let start = path.iter().position(|&other| other == node)?;
-            return Some(path[start..].iter().rev().copied().collect());
-        }
-        Visit::New => {}
+    if let Some(start) = path.iter().position(|&other| other == node) {
+        return Some(path[start..].iter().rev().copied().collect());
     }
-    state[node] = Visit::OnPath;
+    if std::mem::replace(&mut is_visited[node], true) {
+        return None;
+    }
     path.push(node);
     let sources = nodes[node].inputs.iter().filter(|input| input.delay_ticks == 0).map(|input| input.topic);
-    let cycle = sources.map(publisher).find_map(|source| visit(nodes, publisher, source, state, path));
+    let cycle = sources.map(publisher).find_map(|source| visit(nodes, publisher, source, is_visited, path));
     path.pop();
-    state[node] = Visit::Done;
     cycle
 }
 
@@ -82,13 +71,9 @@ pub fn place(plan: &mut Plan, clock_cpu: Option<usize>) {
 /// For each node the number of the feedback loop it is in: nodes that reach each other, delays included.
 fn feedback_loops(plan: &Plan) -> Vec<Option<usize>> {
     let count = plan.nodes.len();
-    let mut publisher = vec![0; plan.topics.len()];
-    for (index, node) in plan.nodes.iter().enumerate() {
-        node.outputs.iter().for_each(|output| publisher[output.topic] = index);
-    }
     let mut reaches = vec![vec![false; count]; count];
     for (index, node) in plan.nodes.iter().enumerate() {
-        node.inputs.iter().for_each(|input| reaches[publisher[input.topic]][index] = true);
+        node.inputs.iter().for_each(|input| reaches[plan.publisher(input.topic)][index] = true);
     }
     for via in 0..count {
         for from in 0..count {

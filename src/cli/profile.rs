@@ -2,6 +2,7 @@
 
 use super::files::PAGE;
 use anyhow::Result;
+use clap::Args;
 use report::profile::{Profile, TRACE_START};
 use runtime::flight::Flight;
 use runtime::output_file::{self, Kind, Mark};
@@ -13,12 +14,14 @@ use std::path::{Path, PathBuf};
 const TRACE: Kind = Kind { name: "trace", mark: Mark::Start(TRACE_START.as_bytes()) };
 
 /// Files to write beside what is printed.
-#[derive(Clone, Debug, Default, Serialize)]
+#[derive(Args, Clone, Serialize)]
 pub struct Files {
-    /// A timeline for Perfetto.
-    pub trace: Option<PathBuf>,
-    /// A page with histograms and the slowest ticks.
-    pub html: Option<PathBuf>,
+    /// Write a timeline that ui.perfetto.dev opens.
+    #[arg(long, value_name = "FILE")]
+    trace: Option<PathBuf>,
+    /// Write a page with histograms and the slowest ticks.
+    #[arg(long, value_name = "FILE")]
+    html: Option<PathBuf>,
 }
 
 impl Files {

@@ -44,12 +44,8 @@ pub struct RunArguments {
 pub struct ProfileArguments {
     #[command(flatten)]
     run: RunArguments,
-    /// Write a timeline that ui.perfetto.dev opens.
-    #[arg(long, value_name = "FILE")]
-    trace: Option<PathBuf>,
-    /// Write a page with histograms and the slowest ticks.
-    #[arg(long, value_name = "FILE")]
-    html: Option<PathBuf>,
+    #[command(flatten)]
+    files: Files,
 }
 
 /// The command `run`.
@@ -65,8 +61,7 @@ pub fn fly(arguments: &RunArguments) -> Result<bool> {
 /// # Errors
 /// As [`run`].
 pub fn profile(arguments: &ProfileArguments) -> Result<bool> {
-    let files = Files { trace: arguments.trace.clone(), html: arguments.html.clone() };
-    run(&arguments.run, Some(files), None)
+    run(&arguments.run, Some(arguments.files.clone()), None)
 }
 
 /// Flies a manifest, profiled where `files` are given, with an `extra_shadow` (a process, and TOML with what the shadow

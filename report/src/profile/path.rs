@@ -65,7 +65,7 @@ impl Path {
             stretches.push(Stretch { place, start_ns, end_ns: received_ns });
             match waited.cause {
                 Cause::Sample { topic, tick: stamp } if stamp == tick => {
-                    (node, end_ns) = (flight.publisher(topic).node, start_ns);
+                    (node, end_ns) = (flight.publisher(topic), start_ns);
                 }
                 _ => break,
             }
@@ -93,7 +93,7 @@ fn last(flight: &Flight, closing: &[usize], tick: u32) -> Option<(usize, u64)> {
         let ends = nodes.filter_map(|node| flight.at(node, tick).map(|times| (node, times.ended_ns)));
         return ends.max_by_key(|&(_, ended_ns)| ended_ns);
     }
-    let sent = |&topic: &usize| Some((flight.publisher(topic).node, flight.sent_ns(topic, tick)?));
+    let sent = |&topic: &usize| Some((flight.publisher(topic), flight.sent_ns(topic, tick)?));
     closing.iter().filter_map(sent).max_by_key(|&(_, sent_ns)| sent_ns)
 }
 

@@ -128,7 +128,7 @@ impl<W: Write> Trace<'_, W> {
             return Ok(());
         };
         self.flows += 1;
-        let sender = self.flight.publisher(topic).node;
+        let sender = self.flight.publisher(topic);
         for (phase, node, ns) in [("s", sender, sent_ns), ("f", reader, received_ns)] {
             self.event(&json!({
                 "ph": phase, "bp": "e", "cat": "hop", "name": self.flight.topic_name(topic), "id": self.flows,

@@ -67,70 +67,56 @@ fn published_by(
         }
     };
     let published = declared.into_iter().map(|(port, schema)| {
-        let (span, setting) = setting(process, port).map_or((name.span(), None), |(s, o)| (s, Some(o)));
-        let type_name = type_name(manifest, &span, port, schema, setting)?;
-        let period_ticks = output_period(manifest, &span, port, period, setting)?;
-        let topic = setting.and_then(|setting| setting.topic.clone());
-        let topic = topic.unwrap_or_else(|| format!("/{}/{port}", name.get_ref()));
-        require_topic_name(manifest, &span, &topic)?;
-        let topic = TopicPlan { name: topic, type_name, period_ticks };
+        let (topic, span) = topic(manifest, name, period, port, schema, setting(process, port))?;
         Ok(Published { node, port: port.to_owned(), span, topic })
     });
     published.collect()
 }
 
-fn setting<'a>(process: &'a Process, port: &str) -> Option<(Range<usize>, &'a OutputSetting)> {
-    let mut outputs = process.outputs.iter();
-    outputs.find(|(name, _)| name.get_ref() == port).map(|(name, setting)| (name.span(), setting))
+type Stated<'a> = (&'a Spanned<String>, &'a OutputSetting);
+
+fn setting<'a>(process: &'a Process, port: &str) -> Option<Stated<'a>> {
+    process.outputs.iter().find(|(name, _)| name.get_ref() == port)
 }
 
-fn type_name(
+/// The topic of the output `port` of a node that computes every `period` ticks, and the place that says so.
+fn topic(
     manifest: &Manifest,
-    span: &Range<usize>,
+    node: &Spanned<String>,
+    period: u32,
     port: &str,
     schema: Option<&'static Schema>,
-    setting: Option<&OutputSetting>,
-) -> Result<String, Diagnostic> {
-    let stated = setting.and_then(|setting| setting.type_name.as_deref());
-    match (schema.map(|schema| schema.type_name), stated) {
+    stated: Option<Stated<'_>>,
+) -> Result<(TopicPlan, Range<usize>), Diagnostic> {
+    let span = stated.map_or_else(|| node.span(), |(name, _)| name.span());
+    let at = |message: String, help: &str| Err(manifest.problem(&span, message, help));
+    let OutputSetting { topic, every_ticks, type_name } =
+        stated.map(|(_, setting)| setting.clone()).unwrap_or_default();
+    let type_name = match (schema.map(|schema| schema.type_name), type_name) {
         (Some(known), Some(stated)) if known != stated => {
             let message = format!("output `{port}` is stated as {stated}, the kind publishes {known}");
-            Err(manifest.problem(span, message, "leave `type` out: a built-in kind knows it"))
+            return at(message, "leave `type` out: a built-in kind knows it");
         }
-        (Some(name), _) | (None, Some(name)) => Ok(name.to_owned()),
-        (None, None) => Err(manifest.problem(
-            span,
-            format!("output `{port}` of a command has no `type`"),
-            "add type = \"hummingbus_msgs/msg/MotorCommand\", for example; `hummingbus schema` lists the types",
-        )),
+        (Some(known), _) => known.to_owned(),
+        (None, Some(stated)) => stated,
+        (None, None) => {
+            let help = "add type = \"hummingbus_msgs/msg/MotorCommand\", for example; `hummingbus schema` lists the types";
+            return at(format!("output `{port}` of a command has no `type`"), help);
+        }
+    };
+    let period_ticks = every_ticks.unwrap_or(period);
+    if period_ticks == 0 || !period_ticks.is_multiple_of(period) {
+        let message =
+            format!("output `{port}` is due every {period_ticks} ticks, its process runs every {period}");
+        return at(message, "`every_ticks` must be a multiple of the process's `period_ticks`");
     }
-}
-
-fn output_period(
-    manifest: &Manifest,
-    span: &Range<usize>,
-    port: &str,
-    node_period: u32,
-    setting: Option<&OutputSetting>,
-) -> Result<u32, Diagnostic> {
-    match setting.and_then(|setting| setting.every_ticks) {
-        None => Ok(node_period),
-        Some(every) if every > 0 && every.is_multiple_of(node_period) => Ok(every),
-        Some(every) => Err(manifest.problem(
-            span,
-            format!("output `{port}` is due every {every} ticks, its process runs every {node_period}"),
-            "`every_ticks` must be a multiple of the process's `period_ticks`",
-        )),
-    }
-}
-
-fn require_topic_name(manifest: &Manifest, span: &Range<usize>, topic: &str) -> Result<(), Diagnostic> {
+    let name = topic.unwrap_or_else(|| format!("/{}/{port}", node.get_ref()));
     let fits = |c: char| c.is_ascii_alphanumeric() || "/_-".contains(c);
-    if topic.starts_with('/') && topic.len() > 1 && topic.len() <= 200 && topic.chars().all(fits) {
-        return Ok(());
+    if !(name.starts_with('/') && (2..=200).contains(&name.len()) && name.chars().all(fits)) {
+        let help = "a topic starts with `/` and has letters, digits, `_`, `-` and `/`";
+        return at(format!("`{name}` cannot name a topic"), help);
     }
-    let help = "a topic starts with `/` and has letters, digits, `_`, `-` and `/`";
-    Err(manifest.problem(span, format!("`{topic}` cannot name a topic"), help))
+    Ok((TopicPlan { name, type_name, period_ticks }, span))
 }
 
 pub fn require_known_ports(

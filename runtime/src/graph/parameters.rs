@@ -28,7 +28,7 @@ impl Notes {
     /// Whether what stands at `span` lies behind the end only because `--set`, or a file that includes that one, says
     /// how long the run is: then somebody looks at the start of it, and is told so once.
     pub fn is_cut(&mut self, manifest: &Manifest, span: &Range<usize>) -> bool {
-        let is_cut = !manifest.is_one_text(span, &manifest.content.run.duration_s.span());
+        let is_cut = !manifest.sources.is_one_text(span.start, manifest.content.run.duration_s.span().start);
         self.has_cut |= is_cut;
         is_cut
     }

@@ -165,7 +165,7 @@ fn executable(
 /// A process that nothing says what it is: most likely a name in a `--set` that is no process's.
 fn nameless(manifest: &Manifest, name: &Spanned<String>) -> Diagnostic {
     let found = name.get_ref();
-    if !manifest.is_override(&name.span()) {
+    if !manifest.sources.is_override(name.span().start) {
         let message = format!("process `{found}` needs either `kind` or `command`");
         let help = format!("the kinds are {}", manifest.registry().names());
         return manifest.problem(&name.span(), message, help);

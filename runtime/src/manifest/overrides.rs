@@ -17,23 +17,8 @@ pub struct Override<'s> {
     value: Spanned<DeValue<'s>>,
 }
 
-/// Why a value has no place in the manifest.
-#[derive(Debug, thiserror::Error)]
-enum OverrideError {
-    #[error("`{0}` is not a table")]
-    NoTable(String),
-    #[error("`{list}` is a list of {len}, and `{key}` is none of them")]
-    NoElement { list: String, len: usize, key: String },
-}
-
-impl OverrideError {
-    fn help(&self) -> &'static str {
-        match self {
-            Self::NoTable(_) => "docs/manifest.md lists every key",
-            Self::NoElement { .. } => "its elements are numbered from 0",
-        }
-    }
-}
+/// Why a value has no place in the manifest, and what to do.
+type Misplaced = (String, &'static str);
 
 /// All values given with `--set`, in their order.
 pub fn all(sources: &Sources) -> Result<Vec<Override<'_>>, Diagnostic> {
@@ -76,7 +61,7 @@ impl<'s> Override<'s> {
         if let DeValue::Table(table) = whole {
             *root = table;
         }
-        put.map_err(|error| sources.problem(&last.span(), error.to_string(), error.help()))
+        put.map_err(|(message, help)| sources.problem(&last.span(), message, help))
     }
 }
 
@@ -114,7 +99,7 @@ fn put<'s>(
     path: &[Spanned<&'s str>],
     key: &Spanned<&'s str>,
     value: Spanned<DeValue<'s>>,
-) -> Result<(), OverrideError> {
+) -> Result<(), Misplaced> {
     let mut name = "the manifest";
     for key in path {
         inside = slot(inside, name, key)?.get_mut();
@@ -133,7 +118,7 @@ fn slot<'v, 's>(
     inside: &'v mut DeValue<'s>,
     name: &str,
     key: &Spanned<&'s str>,
-) -> Result<&'v mut Spanned<DeValue<'s>>, OverrideError> {
+) -> Result<&'v mut Spanned<DeValue<'s>>, Misplaced> {
     let (span, key) = (key.span(), *key.get_ref());
     match inside {
         DeValue::Table(table) => {
@@ -143,11 +128,11 @@ fn slot<'v, 's>(
         DeValue::Array(array) => match key.parse::<usize>() {
             Ok(index) if index < array.len() => Ok(&mut array.as_mut()[index]),
             _ => {
-                let (list, key) = (name.to_owned(), key.to_owned());
-                Err(OverrideError::NoElement { list, len: array.len(), key })
+                let message = format!("`{name}` is a list of {}, and `{key}` is none of them", array.len());
+                Err((message, "its elements are numbered from 0"))
             }
         },
-        _ => Err(OverrideError::NoTable(name.to_owned())),
+        _ => Err((format!("`{name}` is not a table"), "docs/manifest.md lists every key")),
     }
 }
 

@@ -5,42 +5,14 @@ use crate::ctl::protocol::{Answer, Request};
 use crate::program::BackupSpec;
 use crate::replacement::{Report, take_over_stride};
 use crate::supervisor::State;
+use crate::view::View;
 use crate::world::World;
-use diagnostics::Diagnostic;
-use std::path::PathBuf;
+use anyhow::{Result, bail};
 
 /// Ticks that a backup shadows where a request does not say.
 const SHADOW_TICKS: u32 = 100;
 /// Swaps that are taken a look at most, for the supervisor has more to look after.
 const MAX_SWAPS_A_LOOK: usize = 16;
-
-/// Why a swap is refused.
-#[derive(Debug, thiserror::Error)]
-enum SwapRefused {
-    #[error(transparent)]
-    Manifest(#[from] Diagnostic),
-    #[error(
-        "`log` = {}: a run claims its logs when it starts, and cannot claim another in flight; leave it out, or \
-         write the swap into the manifest", .0.display()
-    )]
-    UnclaimedLog(PathBuf),
-    #[error("the run does not fly: `{0}` cannot be swapped now")]
-    NotRunning(String),
-    #[error("`{0}` has a backup, a standby or a shadow already; one at a time")]
-    HasBackup(String),
-    #[error("shadowing for {shadow_ticks} ticks is not within the run's {end} ticks")]
-    ShadowsTooLong { shadow_ticks: u32, end: u32 },
-    #[error(
-        "tick {tick} less {shadow_ticks} ticks of shadowing is not ahead of the run, which has granted {granted} of \
-         {end} ticks"
-    )]
-    NotAhead { tick: u32, shadow_ticks: u32, granted: u32, end: u32 },
-    #[error(
-        "`{process}` sends every {stride} and computes every {period} ticks: let it take over at a multiple of the \
-         first and join at one of the second"
-    )]
-    BetweenPeriods { process: String, stride: u32, period: u32 },
-}
 
 /// The answer to a swap that has come to its end.
 fn answer(report: &Report) -> Answer {
@@ -86,20 +58,20 @@ impl<W: World> Supervisor<'_, W> {
         with: &str,
         shadow_ticks: Option<u32>,
         at_tick: Option<u32>,
-    ) -> Result<u32, SwapRefused> {
+    ) -> Result<u32> {
         let backup = self.world.backup_of(process, with)?;
         self.require_claimed_log(&backup)?;
         if self.overseer.state != State::Running {
-            return Err(SwapRefused::NotRunning(process.to_owned()));
+            bail!("the run does not fly: `{process}` cannot be swapped now");
         }
         if self.overseer.replacements.is_busy(backup.node) {
-            return Err(SwapRefused::HasBackup(process.to_owned()));
+            bail!("`{process}` has a backup, a standby or a shadow already; one at a time");
         }
         self.see();
         let end = self.overseer.replacements.view.end_tick;
         let shadow_ticks = shadow_ticks.unwrap_or(SHADOW_TICKS);
         if shadow_ticks == 0 || shadow_ticks >= end {
-            return Err(SwapRefused::ShadowsTooLong { shadow_ticks, end });
+            bail!("shadowing for {shadow_ticks} ticks is not within the run's {end} ticks");
         }
         if let Some(tick) = at_tick {
             self.require_joinable(process, &backup, shadow_ticks, tick)?;
@@ -116,27 +88,36 @@ impl<W: World> Supervisor<'_, W> {
         backup: &BackupSpec,
         shadow_ticks: u32,
         tick: u32,
-    ) -> Result<(), SwapRefused> {
-        let (granted, end) =
-            (self.overseer.replacements.view.granted, self.overseer.replacements.view.end_tick);
+    ) -> Result<()> {
+        let View { granted, end_tick: end, .. } = self.overseer.replacements.view;
         let join = tick.saturating_sub(shadow_ticks);
         if join <= granted || tick >= end {
-            return Err(SwapRefused::NotAhead { tick, shadow_ticks, granted, end });
+            bail!(
+                "tick {tick} less {shadow_ticks} ticks of shadowing is not ahead of the run, which has granted \
+                 {granted} of {end} ticks"
+            );
         }
         let (period, stride) = (backup.plan.period_ticks, take_over_stride(self.plan, backup.node));
         if !tick.is_multiple_of(stride) || !join.is_multiple_of(period) {
-            return Err(SwapRefused::BetweenPeriods { process: process.to_owned(), stride, period });
+            bail!(
+                "`{process}` sends every {stride} and computes every {period} ticks: let it take over at a multiple \
+                 of the first and join at one of the second"
+            );
         }
         Ok(())
     }
 
     /// Refuses a log of its own to a backup that was asked for in flight: this run has not claimed the file.
-    fn require_claimed_log(&self, backup: &BackupSpec) -> Result<(), SwapRefused> {
+    fn require_claimed_log(&self, backup: &BackupSpec) -> Result<()> {
         let planned = self.graph.backups.iter().filter(|other| other.node == backup.node);
         let mut known = planned.map(|other| &other.program).chain([&self.graph.programs[backup.node]]);
         match &backup.program.log {
             Some(log) if !known.any(|program| program.log.as_ref() == Some(log)) => {
-                Err(SwapRefused::UnclaimedLog(log.clone()))
+                bail!(
+                    "`log` = {}: a run claims its logs when it starts, and cannot claim another in flight; leave it \
+                     out, or write the swap into the manifest",
+                    log.display()
+                )
             }
             _ => Ok(()),
         }
