@@ -32,6 +32,12 @@ const BEGINNING: Duration = Duration::from_secs(1);
 const POLL: Duration = Duration::from_millis(2);
 
 /// What there was to clean.
+///
+/// ```
+/// let report = runtime::clean::clean(true)?;
+/// assert!(report.is_done() && report.to_string().ends_with("kept"));
+/// # Ok::<(), anyhow::Error>(())
+/// ```
 #[derive(Debug, Serialize)]
 pub struct Report {
     /// Whether everything was left as it was.
@@ -148,7 +154,7 @@ fn own_files(folder: &Path) -> Vec<PathBuf> {
 /// This user's processes that carry a run directory, and whether they hold a file of it; except this one and those that
 /// see another /dev/shm.
 fn processes_of_runs() -> Result<Vec<(Pid, PathBuf, bool)>> {
-    let (own_mounts, kin) = (mounts_of(Path::new("/proc/self")), Kin::of_live_launchers());
+    let (own_mounts, is_kin) = (mounts_of(Path::new("/proc/self")), kin_of_live_launchers());
     let entries = std::fs::read_dir("/proc")?.flatten();
     let process = |entry: std::fs::DirEntry| {
         let id =
@@ -156,7 +162,7 @@ fn processes_of_runs() -> Result<Vec<(Pid, PathBuf, bool)>> {
         let process = Pid::from_raw(id)?;
         let is_own = entry.metadata().is_ok_and(|file| file.uid() == user_id());
         (is_own && mounts_of(&entry.path()) == own_mounts).then_some(())?;
-        let run_dir = run_dir_of(process).filter(|_| !kin.has(process))?;
+        let run_dir = run_dir_of(process).filter(|_| !is_kin(process))?;
         let holds_file = holds_file_of(process, &run_dir);
         Some((process, run_dir, holds_file))
     };
@@ -168,25 +174,14 @@ fn mounts_of(process: &Path) -> Option<PathBuf> {
     std::fs::read_link(process.join("ns/mnt")).ok()
 }
 
-/// The live launchers, and the processes above them.
-struct Kin {
-    launchers: BTreeSet<i32>,
-    above: BTreeSet<i32>,
-}
-
-impl Kin {
-    fn of_live_launchers() -> Self {
-        let launchers: BTreeSet<i32> =
-            live_runs().iter().map(|run| run.entry.launcher.cast_signed()).collect();
-        let above =
-            launchers.iter().copied().filter_map(Pid::from_raw).flat_map(ancestors).map(number).collect();
-        Self { launchers, above }
-    }
-
-    /// Whether a process is a live launcher, or above or below one.
-    fn has(&self, process: Pid) -> bool {
+/// Whether a process is a live launcher, or above or below one.
+fn kin_of_live_launchers() -> impl Fn(Pid) -> bool {
+    let launchers: BTreeSet<i32> = live_runs().iter().map(|run| run.entry.launcher.cast_signed()).collect();
+    let above = launchers.iter().copied().filter_map(Pid::from_raw).flat_map(ancestors).map(number);
+    let above: BTreeSet<i32> = above.collect();
+    move |process| {
         let mut line = std::iter::once(process).chain(ancestors(process)).map(number);
-        self.above.contains(&number(process)) || line.any(|id| self.launchers.contains(&id))
+        above.contains(&number(process)) || line.any(|id| launchers.contains(&id))
     }
 }
 

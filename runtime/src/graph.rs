@@ -19,11 +19,11 @@ mod ranges;
 mod recorders;
 mod wiring;
 
+pub use crate::program::{BackupSpec, Program};
 pub use backups::backup_of;
 
 use crate::manifest::Manifest;
 use crate::placement;
-use crate::program::{BackupSpec, Program};
 use bus::plan::Plan;
 use diagnostics::Diagnostic;
 use parameters::Notes;
@@ -36,7 +36,19 @@ const DEFAULT_WINDOW_TICKS: u32 = 64;
 pub const WINDOW_TICKS_MAX: u32 = 4096;
 const RATE_HZ_MAX: u32 = 1_000_000;
 
-/// A checked manifest.
+/// A checked manifest. Its text says which nodes run how often, and what they read and send.
+///
+/// ```
+/// use bus::Registration;
+/// use runtime::{graph::Graph, manifest::ManifestBuilder, registry::Registry};
+/// const COMPONENTS: Registry = Registry::new(&[Registration::of::<recorder::node::Recorder>()]);
+/// let recorder = ManifestBuilder::new().set("process.recorder.kind", "recorder");
+/// let manifest = recorder.set("run.duration_s", 2.0).build("a.toml".as_ref(), COMPONENTS)?;
+/// let graph = Graph::build(&manifest)?;
+/// assert_eq!(graph.plan.duration_ticks, 2000);
+/// assert!(graph.to_string().starts_with("2000 ticks at 1000 Hz (2 s), pace free"));
+/// # Ok::<(), diagnostics::Diagnostic>(())
+/// ```
 #[derive(Debug)]
 pub struct Graph {
     /// What the processes of the run read.
@@ -46,9 +58,9 @@ pub struct Graph {
     /// Who stands by or takes over, in the order in which they join.
     pub backups: Vec<BackupSpec>,
     /// Processes that take no part in the ticks: their names and what to start.
-    pub sidecars: Vec<(String, Program)>,
+    pub(crate) sidecars: Vec<(String, Program)>,
     /// The vehicle, scene and gains files the processes name, each once.
-    pub models: Vec<PathBuf>,
+    pub(crate) models: Vec<PathBuf>,
     /// What is odd and flies all the same; `check` and `run` tell it.
     pub warnings: Vec<Diagnostic>,
 }
@@ -88,19 +100,14 @@ fn plan(manifest: &Manifest, wiring: Wiring) -> Result<Plan, Diagnostic> {
     let run = &manifest.content.run;
     let rate_hz = *run.rate_hz.get_ref();
     if !(1..=RATE_HZ_MAX).contains(&rate_hz) || 1_000_000_000 % rate_hz != 0 {
-        return Err(manifest.problem(
-            &run.rate_hz.span(),
-            format!("`rate_hz` is {rate_hz}"),
-            "a tick must be a whole number of nanoseconds: choose a divisor of 1 000 000 000 such as 250, 500, 1000",
-        ));
+        let help = "a tick must be a whole number of nanoseconds: choose a divisor of 1 000 000 000 such as 250, 500, 1000";
+        return Err(manifest.problem(&run.rate_hz.span(), format!("`rate_hz` is {rate_hz}"), help));
     }
     let ticks = run.duration_s.get_ref() * f64::from(rate_hz);
     if !(ticks >= 1.0 && ticks <= f64::from(u32::MAX - 2 * WINDOW_TICKS_MAX)) {
-        return Err(manifest.problem(
-            &run.duration_s.span(),
-            format!("`duration_s` is {} s, which is {ticks} ticks", run.duration_s.get_ref()),
-            "a run has between 1 and about 4 thousand million ticks",
-        ));
+        let message = format!("`duration_s` is {} s, which is {ticks} ticks", run.duration_s.get_ref());
+        let help = "a run has between 1 and about 4 thousand million ticks";
+        return Err(manifest.problem(&run.duration_s.span(), message, help));
     }
     let help = format!("a window has 1 to {WINDOW_TICKS_MAX} ticks");
     let window_ticks = manifest.within("window_ticks", &run.window_ticks, 1..=WINDOW_TICKS_MAX, help)?;

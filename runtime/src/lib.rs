@@ -21,7 +21,7 @@ mod placement;
 mod process_log;
 mod process_table;
 mod processes;
-pub mod program;
+mod program;
 pub mod registry;
 mod replacement;
 mod role;
@@ -42,6 +42,11 @@ use registry::Registry;
 
 /// Is the component `name` of the run that started this process; the clock for `clock`. A program that hands the
 /// arguments `node KIND` of its command line on to this may be a [`host::Host::Exe`].
+///
+/// ```
+/// let error = runtime::node("imu", runtime::registry::Registry::default()).unwrap_err();
+/// assert!(error.to_string().starts_with("no kind `imu`"));
+/// ```
 ///
 /// # Errors
 /// If there is no such component, or it fails.

@@ -22,10 +22,8 @@ mod sources;
 mod tree;
 
 pub use builder::ManifestBuilder;
-pub use content::{
-    Comparison, Content, InputSetting, OutputSetting, PaceSetting, PassCondition, Process, Statistic,
-    SwapSetting,
-};
+pub use content::{Comparison, Content, PaceSetting, PassCondition, Statistic};
+pub(crate) use content::{InputSetting, OutputSetting, Process, SwapSetting};
 
 pub(crate) use sets::is_name;
 
@@ -55,7 +53,7 @@ pub struct Manifest {
     /// The file.
     pub path: PathBuf,
     /// The files it includes, each once.
-    pub included: Vec<PathBuf>,
+    pub(crate) included: Vec<PathBuf>,
     /// The file's text that goes into the recording: with every `--set` but those of host-only keys.
     pub recorded_text: String,
     /// What it says.
@@ -110,12 +108,12 @@ impl Manifest {
     }
 
     /// The components that it may name.
-    pub fn registry(&self) -> Registry {
+    pub(crate) fn registry(&self) -> Registry {
         self.sources.registry
     }
 
     /// A problem at `span` of this manifest.
-    pub fn problem(
+    pub(crate) fn problem(
         &self,
         span: &Range<usize>,
         error: impl Into<ParameterError>,
@@ -163,7 +161,11 @@ impl Manifest {
     ///
     /// # Errors
     /// A [`Diagnostic`] that names the place in the manifest or in `with_text`.
-    pub fn succeed(&self, process: &str, with_text: &str) -> Result<(Self, Spanned<Process>), Diagnostic> {
+    pub(crate) fn succeed(
+        &self,
+        process: &str,
+        with_text: &str,
+    ) -> Result<(Self, Spanned<Process>), Diagnostic> {
         let mut sources = self.sources.clone();
         sources.add(Origin::Argument("--with"), with_text.to_owned());
         let tree = whole_tree(&sources)?;

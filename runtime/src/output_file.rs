@@ -4,12 +4,12 @@
 use crate::file_lock;
 use anyhow::{Context, Result, bail};
 use std::fs::{File, Metadata, Permissions};
-use std::io::{self, BufWriter, ErrorKind, Write as _};
-use std::os::unix::fs::{FileExt as _, MetadataExt as _, PermissionsExt as _};
+use std::io::{self, BufWriter, ErrorKind, Read as _, Write as _};
+use std::os::unix::fs::{MetadataExt as _, PermissionsExt as _};
 use std::path::{Path, PathBuf};
 
 /// Bytes at the start of a file within which its kind is looked for.
-const START_BYTES: usize = 512;
+const START_BYTES: u64 = 512;
 /// Symbolic links that are followed, as many as the kernel follows.
 const LINKS_MAX: usize = 40;
 /// A kind of file that hummingbus writes, and how one is known that it has written: no other file is replaced.
@@ -48,11 +48,11 @@ pub enum Mark {
 }
 
 /// The recording of a run.
-pub const RECORDING: Kind = Kind { name: "recording", mark: Mark::Start(recorder::writer::START) };
+pub(crate) const RECORDING: Kind = Kind { name: "recording", mark: Mark::Start(recorder::writer::START) };
 /// What a process says.
-pub const LOG: Kind = Kind { name: "log", mark: Mark::Start(LOG_START.as_bytes()) };
+pub(crate) const LOG: Kind = Kind { name: "log", mark: Mark::Start(LOG_START.as_bytes()) };
 /// The first line of a log that a manifest names.
-pub const LOG_START: &str = "# What a process of a run said. Written by hummingbus.\n";
+pub(crate) const LOG_START: &str = "# What a process of a run said. Written by hummingbus.\n";
 
 impl Kind {
     fn is_start(&self, start: &[u8]) -> bool {
@@ -67,9 +67,9 @@ impl Kind {
         if !file.metadata()?.is_file() {
             return Err(io::Error::other(NOT_REGULAR));
         }
-        let mut start = [0; START_BYTES];
-        let length = read_start(file, &mut start)?;
-        if self.is_start(&start[..length]) {
+        let mut start = Vec::new();
+        file.take(START_BYTES).read_to_end(&mut start)?;
+        if self.is_start(&start) {
             return Ok(());
         }
         let name = self.name;
@@ -81,23 +81,11 @@ impl Kind {
 
 const NOT_REGULAR: &str = "it exists and is not a regular file; name another file";
 
-fn read_start(file: &File, start: &mut [u8]) -> io::Result<usize> {
-    let mut length = 0;
-    loop {
-        match file.read_at(&mut start[length..], length as u64) {
-            Ok(0) => return Ok(length),
-            Ok(more) => length += more,
-            Err(error) if error.kind() == ErrorKind::Interrupted => {}
-            Err(error) => return Err(error),
-        }
-    }
-}
-
 /// The file that `path` names. Links are followed, so that all spellings of one file become one path.
 ///
 /// # Errors
 /// If its folder is not there.
-pub fn real_path(path: &Path) -> Result<PathBuf> {
+pub(crate) fn real_path(path: &Path) -> Result<PathBuf> {
     let cannot = || format!("cannot create {}", path.display());
     let mut real = std::path::absolute(path).with_context(cannot)?;
     for _ in 0..LINKS_MAX {

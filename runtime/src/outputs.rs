@@ -34,6 +34,22 @@ pub struct Output {
 }
 
 /// The files that a run writes.
+///
+/// ```
+/// # use bus::Registration;
+/// # use runtime::{graph::Graph, manifest::ManifestBuilder, registry::Registry};
+/// use runtime::outputs::Outputs;
+/// # const COMPONENTS: Registry = Registry::new(&[Registration::of::<recorder::node::Recorder>()]);
+/// # let folder = tempfile::tempdir()?;
+/// # let recorder = ManifestBuilder::new().set("process.recorder.kind", "recorder").set("run.duration_s", 2.0);
+/// # let manifest = recorder.build(&folder.path().join("a.toml"), COMPONENTS)?;
+/// # let graph = Graph::build(&manifest)?;
+/// let path = folder.path().join("a.mcap");
+/// assert!(Outputs::of(&manifest, &graph, &path, Vec::new()).is_ok());
+/// std::fs::write(&path, "a letter")?;
+/// assert!(Outputs::of(&manifest, &graph, &path, Vec::new()).is_err(), "it would be lost");
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Debug)]
 pub struct Outputs {
     recording: Option<Output>,
@@ -107,12 +123,12 @@ impl Outputs {
     }
 
     /// Where what an earlier run left unfinished lies now, if there was something.
-    pub fn kept(&self) -> Option<&Path> {
+    pub(crate) fn kept(&self) -> Option<&Path> {
         self.partial.as_ref().and_then(Partial::kept)
     }
 
     /// Where the recorder writes.
-    pub fn partial(&self) -> Option<&Path> {
+    pub(crate) fn partial(&self) -> Option<&Path> {
         self.partial.as_ref().map(Partial::path)
     }
 

@@ -80,6 +80,12 @@ impl<'a> Overseer<'a> {
         action
     }
 
+    /// The run ends: nothing can answer what has happened.
+    fn fail(&mut self, message: String) -> Abort {
+        self.tell(Event::Died { policy: OnExit::Stop, is_possible: false });
+        Abort(message)
+    }
+
     /// Draws the consequences of a death; false if that must wait.
     ///
     /// # Errors
@@ -87,8 +93,7 @@ impl<'a> Overseer<'a> {
     pub fn settle(&mut self, death: &Death) -> Result<bool, Abort> {
         let Role::Node { node, generation } = death.role else {
             let ticks = self.replacements.view.completed_ticks();
-            self.tell(Event::Died { policy: OnExit::Stop, is_possible: false });
-            return Err(Abort(format!("{}\nThe run was aborted at tick {ticks}", death.message)));
+            return Err(self.fail(format!("{}\nThe run was aborted at tick {ticks}", death.message)));
         };
         if self.replacements.has_taken_over(node) {
             if !self.replacements.all_agree() {
@@ -147,8 +152,7 @@ impl<'a> Overseer<'a> {
         self.replacements.refuse(node, reason.clone());
         if vacant {
             let ticks = self.replacements.view.completed_ticks();
-            self.tell(Event::Died { policy: OnExit::Stop, is_possible: false });
-            return Err(Abort(format!(
+            return Err(self.fail(format!(
                 "{reason}\nThe run was aborted at tick {ticks}: it came in the place of a process that had died, \
                  and completed no tick"
             )));

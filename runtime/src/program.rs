@@ -98,7 +98,7 @@ pub struct BackupSpec {
     /// Whether it is promoted when the primary dies.
     pub is_standby: bool,
     /// What to start.
-    pub program: Program,
+    pub(crate) program: Program,
     /// What it reads about itself: the node's own plan with the backup's parameters and inputs.
     pub plan: NodePlan,
 }

@@ -98,23 +98,22 @@ impl RunDir {
         let manifest = std::path::absolute(manifest)?;
         let (entry, registered) = loop {
             let entry = Entry::new(&manifest)?;
-            if let Some(file) =
-                register(&entry).with_context(|| format!("cannot register in {SHARED_MEMORY}"))?
-            {
+            let registered =
+                register(&entry).with_context(|| format!("cannot register in {SHARED_MEMORY}"))?;
+            if let Some(file) = registered {
                 break (entry, file);
             }
         };
-        match create_locked(&entry.run_dir) {
-            Ok(directory) => Ok(Self { entry, _locks: [registered, directory] }),
-            Err(error) => {
-                let _ = std::fs::remove_file(entry_path(&entry.run_id));
-                Err(error).with_context(|| format!(
+        let directory = create_locked(&entry.run_dir)
+            .inspect_err(|_| drop(std::fs::remove_file(entry_path(&entry.run_id))))
+            .with_context(|| {
+                format!(
                     "cannot create the run directory {}; set TMPDIR to a folder that is there and that this user may \
                      write to, or leave it out",
                     entry.run_dir.display()
-                ))
-            }
-        }
+                )
+            })?;
+        Ok(Self { entry, _locks: [registered, directory] })
     }
 
     /// The directory.
@@ -140,6 +139,15 @@ impl Drop for RunDir {
 
 /// A folder for a command that flies several runs, one after another; dropping it removes it. It is named and locked as
 /// a run directory is, so that `clean` removes it once its process is dead, and not before.
+///
+/// ```
+/// let scratch = runtime::run_dir::Scratch::create()?;
+/// let path = scratch.path().to_owned();
+/// assert!(path.is_dir());
+/// drop(scratch);
+/// assert!(!path.exists());
+/// # Ok::<(), anyhow::Error>(())
+/// ```
 #[derive(Debug)]
 pub struct Scratch {
     path: PathBuf,
@@ -232,11 +240,7 @@ fn register(entry: &Entry) -> Result<Option<File>> {
     let path = entry_path(&entry.run_id);
     let text = serde_json::to_vec(entry)?;
     let file = options.open(&path)?;
-    let registered = lock_and_write(file, &text);
-    if registered.is_err() {
-        let _ = std::fs::remove_file(path);
-    }
-    Ok(registered?)
+    Ok(lock_and_write(file, &text).inspect_err(|_| drop(std::fs::remove_file(path)))?)
 }
 
 fn lock_and_write(mut file: File, text: &[u8]) -> std::io::Result<Option<File>> {
@@ -258,14 +262,9 @@ fn create_locked(run_dir: &Path) -> std::io::Result<File> {
     // Whatever the umask takes away.
     let opened = std::fs::set_permissions(run_dir, std::fs::Permissions::from_mode(0o700))
         .and_then(|()| user_file::open_folder(run_dir));
-    let locked = opened.and_then(|directory| {
-        file_lock::exclusive(&directory)?;
-        Ok(directory)
-    });
-    if locked.is_err() {
-        let _ = std::fs::remove_dir(run_dir);
-    }
-    locked
+    opened
+        .and_then(|directory| file_lock::exclusive(&directory).map(|()| directory))
+        .inspect_err(|_| drop(std::fs::remove_dir(run_dir)))
 }
 
 /// Whether the launcher that locked `entry` lives. Asking does not disturb others who ask.
@@ -306,12 +305,10 @@ fn open_own(path: &Path, opened: std::io::Result<File>) -> std::io::Result<Optio
 /// A run that was alive when it was found.
 ///
 /// ```
-/// use runtime::run_dir::{find_live, live_runs};
-/// for run in live_runs() {
+/// if let Ok(run) = runtime::run_dir::find_live(None) {
 ///     println!("{} flies {}", run.entry.run_id, run.entry.manifest.display());
 /// }
-/// // No run is called so.
-/// assert!(find_live(Some("0-0")).is_err());
+/// assert!(runtime::run_dir::find_live(Some("0-0")).is_err(), "no run is called so");
 /// ```
 #[derive(Debug)]
 pub struct LiveRun {
@@ -328,7 +325,7 @@ impl LiveRun {
 }
 
 /// The live runs of this user, oldest first where process numbers do not wrap.
-pub fn live_runs() -> Vec<LiveRun> {
+pub(crate) fn live_runs() -> Vec<LiveRun> {
     let files = std::fs::read_dir(SHARED_MEMORY).into_iter().flatten().flatten();
     let mut runs: Vec<LiveRun> = files.filter_map(|file| live_run(&file.path())).collect();
     runs.sort_by(|a, b| a.entry.run_id.cmp(&b.entry.run_id));

@@ -118,9 +118,8 @@ impl<W: World> Standstill<'_, W> {
             view.slots[slot(instance)].state == SlotState::Taken && !view.has_completed(slot(instance))
         };
         let instances: Vec<(usize, u32)> = self.replacements.instances().filter(computes).collect();
-        let name = |&(node, generation): &(usize, u32)| match generation {
-            0 => format!("`{}`", plan.nodes[node].name),
-            _ => format!("`{}.{generation}`", plan.nodes[node].name),
+        let name = |&(node, generation): &(usize, u32)| {
+            format!("`{}`", bus::names::process_name(&plan.nodes[node].name, generation))
         };
         let can_compute = |&&(node, generation): &&(usize, u32)| self.can_compute(node, generation);
         let mut stuck: Vec<&(usize, u32)> = instances.iter().filter(can_compute).collect();

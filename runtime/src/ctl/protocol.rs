@@ -6,7 +6,7 @@ use bus::plan::Plan;
 use serde::{Deserialize, Serialize};
 
 /// The name of the socket in the run directory.
-pub const SOCKET: &str = "ctl.sock";
+pub(crate) const SOCKET: &str = "ctl.sock";
 
 /// What can be asked of a run. On the socket each is a line of JSON.
 ///
@@ -86,6 +86,10 @@ impl Answer {
 }
 
 /// What a run is doing.
+///
+/// ```
+/// assert_eq!(runtime::ctl::protocol::State::Paused.to_string(), "paused");
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum State {
@@ -129,6 +133,13 @@ impl std::fmt::Display for State {
 }
 
 /// How far a run has come.
+///
+/// ```
+/// let text = r#"{"run_id":"1-a","state":"paused","tick":500,"end_tick":1000,"time_s":0.5,"pace":"free","missed_deadlines":0}"#;
+/// let status: runtime::ctl::protocol::Status = serde_json::from_str(text)?;
+/// assert_eq!(status.to_string(), "1-a: paused at tick 500 of 1000 (0.500 s), pace free");
+/// # Ok::<(), serde_json::Error>(())
+/// ```
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Status {
     /// The run's name.

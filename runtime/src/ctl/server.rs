@@ -53,6 +53,16 @@ enum Place {
 }
 
 /// Steers a run from another thread of its launcher's process.
+///
+/// ```
+/// use runtime::ctl::protocol::{Answer, Request};
+/// use runtime::{host::Host, launcher::Launcher};
+/// let launcher = Launcher::new(Host::InProcess);
+/// let remote = launcher.remote();
+/// drop(launcher);
+/// let Answer::Refused { reason } = remote.ask(Request::Pause) else { panic!("it flies") };
+/// assert_eq!(reason, "the run ended first");
+/// ```
 #[derive(Clone, Debug)]
 pub struct Remote(Sender<Asked>);
 

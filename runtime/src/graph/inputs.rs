@@ -131,11 +131,11 @@ pub fn require_no_cycle(
     };
     let path: Vec<&str> =
         cycle.iter().chain(cycle.first()).map(|&node| declared_nodes[node].name.get_ref().as_str()).collect();
-    Err(manifest.problem(
-        &declared_nodes[changed.filter(|node| cycle.contains(node)).unwrap_or(cycle[0])].name.span(),
-        format!("a cycle without delay: {}", path.join(" → ")),
-        "give one input of the cycle delay_ticks = 1 and an initial value, usually the plant's command",
-    ))
+    let blamed = &declared_nodes[changed.filter(|node| cycle.contains(node)).unwrap_or(cycle[0])];
+    let message = format!("a cycle without delay: {}", path.join(" → "));
+    let help =
+        "give one input of the cycle delay_ticks = 1 and an initial value, usually the plant's command";
+    Err(manifest.problem(&blamed.name.span(), message, help))
 }
 
 /// Puts each node's inputs in the order in which they are waited for: the one that arrives last first.

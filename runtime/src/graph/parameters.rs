@@ -110,14 +110,10 @@ fn note(paths: [Option<PathBuf>; 2], models: &mut Vec<PathBuf>) {
 
 /// A recorder's file and attachments come from the launcher.
 fn require_none(manifest: &Manifest, process: &Process) -> Result<(), Diagnostic> {
-    match process.parameters.keys().next() {
-        None => Ok(()),
-        Some(key) => Err(manifest.problem(
-            &key.span(),
-            format!("a recorder has no parameter `{}`", key.get_ref()),
-            "name the file with run.record or --record, and the topics with inputs",
-        )),
-    }
+    let Some(key) = process.parameters.keys().next() else { return Ok(()) };
+    let message = format!("a recorder has no parameter `{}`", key.get_ref());
+    let help = "name the file with run.record or --record, and the topics with inputs";
+    Err(manifest.problem(&key.span(), message, help))
 }
 
 /// A refused parameter, at its place.

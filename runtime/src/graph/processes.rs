@@ -153,11 +153,10 @@ fn executable(
             })
         }
         (None, Some(command)) => self::command(manifest, name, process, command).map(Executable::Command),
-        (Some(_), Some(command)) => Err(manifest.problem(
-            &command.span(),
-            format!("process `{}` has both `kind` and `command`", name.get_ref()),
-            "leave one of them out",
-        )),
+        (Some(_), Some(command)) => {
+            let message = format!("process `{}` has both `kind` and `command`", name.get_ref());
+            Err(manifest.problem(&command.span(), message, "leave one of them out"))
+        }
         (None, None) => Err(nameless(manifest, name)),
     }
 }
@@ -249,11 +248,8 @@ fn require_name(manifest: &Manifest, name: &Spanned<String>) -> Result<(), Diagn
     if text != "clock" && text.split('/').all(is_name) {
         return Ok(());
     }
-    Err(manifest.problem(
-        &name.span(),
-        format!("`{text}` cannot name a process"),
-        "use lower-case letters, digits, `-` and `_`; `clock` is taken by the clock service",
-    ))
+    let help = "use lower-case letters, digits, `-` and `_`; `clock` is taken by the clock service";
+    Err(manifest.problem(&name.span(), format!("`{text}` cannot name a process"), help))
 }
 
 /// Ticks between two computations of `process`.

@@ -17,7 +17,7 @@ pub struct Content {
     /// Settings of the whole run.
     pub run: Run,
     /// The processes by name.
-    pub process: BTreeMap<Spanned<String>, Process>,
+    pub(crate) process: BTreeMap<Spanned<String>, Process>,
     /// Conditions on the recording, evaluated after the run.
     #[serde(default)]
     pub pass: Vec<Spanned<PassCondition>>,
@@ -26,10 +26,10 @@ pub struct Content {
     pub compare: Vec<Spanned<Comparison>>,
     /// Processes that take over from others in flight.
     #[serde(default)]
-    pub swap: Vec<Spanned<SwapSetting>>,
+    pub(crate) swap: Vec<Spanned<SwapSetting>>,
     /// Processes that run beside others and are not listened to.
     #[serde(default)]
-    pub shadow: Vec<Spanned<ShadowSetting>>,
+    pub(crate) shadow: Vec<Spanned<ShadowSetting>>,
 }
 
 /// Settings of the whole run.
@@ -174,6 +174,13 @@ pub struct OutputSetting {
 }
 
 /// Pacing as written: `free`, `realtime`, or a factor.
+///
+/// ```
+/// use runtime::manifest::PaceSetting;
+/// assert_eq!("1.0".parse::<PaceSetting>()?.to_string(), "realtime");
+/// assert!("fast".parse::<PaceSetting>().unwrap_err().to_string().contains("expected free, realtime, or a factor"));
+/// # Ok::<(), diagnostics::ParameterError>(())
+/// ```
 #[derive(Clone, Copy, Debug)]
 pub struct PaceSetting(pub Pace);
 
@@ -252,6 +259,14 @@ pub enum Statistic {
 }
 
 /// A condition on a field of a topic over a span of simulated time.
+///
+/// ```
+/// use runtime::manifest::{PassCondition, Statistic};
+/// let text = "name = 'steady'\ntopic = '/plant/state'\nfield = 'position.z'\nunit = 'm'\nstatistic = 'rms'\nmax = 0.1";
+/// let pass: PassCondition = toml::from_str(text)?;
+/// assert_eq!((pass.statistic, pass.from_s, pass.max), (Statistic::Rms, 0.0, Some(0.1)));
+/// # Ok::<(), toml::de::Error>(())
+/// ```
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct PassCondition {
@@ -306,6 +321,14 @@ pub struct Gate {
 }
 
 /// A comparison of a simulated state with a measured one at the end of windows of equal length.
+///
+/// ```
+/// use runtime::manifest::Comparison;
+/// let text = "simulated = '/plant/state'\nmeasured = '/player/state'\nwindow_s = 0.5\nmax_position_m = 0.1";
+/// let comparison: Comparison = toml::from_str(text)?;
+/// assert_eq!((comparison.max_position_m, comparison.max_attitude_deg), (Some(0.1), None));
+/// # Ok::<(), toml::de::Error>(())
+/// ```
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Comparison {
