@@ -49,9 +49,12 @@ fn open_options() -> OpenOptions {
 #[derive(Debug)]
 pub struct Partial {
     real: PathBuf,
-    path: PathBuf,
-    file: File,
-    kept: Option<PathBuf>,
+    /// Where it is written.
+    pub path: PathBuf,
+    /// The file, whatever its name.
+    pub file: File,
+    /// Where what a broken run left lies now, if there was something.
+    pub kept: Option<PathBuf>,
 }
 
 impl Partial {
@@ -70,24 +73,9 @@ impl Partial {
         Ok(claimed.map(|(file, kept)| Self { real, path: partial, file, kept }))
     }
 
-    /// Where it is written.
-    pub fn path(&self) -> &Path {
-        &self.path
-    }
-
-    /// Where what a broken run left lies now, if there was something.
-    pub fn kept(&self) -> Option<&Path> {
-        self.kept.as_deref()
-    }
-
     /// Whether it still lies where it is written.
     pub fn is_there(&self) -> bool {
         is_at(&self.file, &self.path)
-    }
-
-    /// The file, whatever its name.
-    pub fn file(&self) -> &File {
-        &self.file
     }
 
     /// Whether something was written.
@@ -285,7 +273,7 @@ mod tests {
                 }
             };
             assert_eq!(holders.fetch_add(1, Ordering::SeqCst), 0, "two hold one place");
-            let mut file = partial.file();
+            let mut file = &partial.file;
             if end != 0 {
                 file.write_all(recorder::writer::START).unwrap();
             }

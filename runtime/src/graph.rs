@@ -74,7 +74,7 @@ impl Graph {
         let declared_nodes = processes::declared_nodes(manifest)?;
         let sidecars = processes::sidecars(manifest)?;
         processes::require_own_logs(manifest)?;
-        let wiring = wire(manifest, &declared_nodes, None)?;
+        let wiring = wire(&declared_nodes, None)?;
         let mut plan = plan(manifest, wiring)?;
         let clock_cpu = &manifest.content.run.clock_cpu;
         processes::require_core(manifest, clock_cpu, "clock_cpu")?;
@@ -83,11 +83,11 @@ impl Graph {
         periods::check(manifest, &declared_nodes, &plan, &mut notes)?;
         let parameters =
             Diagnostic::gather(declared_nodes.iter().zip(&plan.nodes).map(|(declared, node)| {
-                let parameters = parameters::of(manifest, declared, &plan, node.period_ticks, &mut notes)?;
-                processes::require_replaceable(manifest, declared, node).map(|()| parameters)
+                let parameters = parameters::of(declared, &plan, node.period_ticks, &mut notes)?;
+                processes::require_replaceable(declared, node).map(|()| parameters)
             }))?;
         plan.nodes.iter_mut().zip(parameters).for_each(|(node, parameters)| node.parameters = parameters);
-        recorders::check(manifest, &declared_nodes, &plan.nodes)?;
+        recorders::check(&declared_nodes, &plan.nodes)?;
         let backups = backups::all(manifest, &plan, &declared_nodes, &mut notes)?;
         let programs: Vec<Program> = declared_nodes.into_iter().map(|declared| declared.program).collect();
         evaluations::check(manifest, &plan, &programs, &mut notes)?;

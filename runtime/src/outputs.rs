@@ -101,8 +101,8 @@ impl Outputs {
     pub(crate) fn claim(&mut self, run_dir: &RunDir) -> Result<()> {
         if let Some(recording) = &self.recording {
             let partial = recording.claimed(Partial::claim)?;
-            if partial.path().to_str().is_none() {
-                bail!("cannot record to {}: its name is not UTF-8", partial.path().display());
+            if partial.path.to_str().is_none() {
+                bail!("cannot record to {}: its name is not UTF-8", partial.path.display());
             }
             self.partial = Some(partial);
         }
@@ -124,12 +124,12 @@ impl Outputs {
 
     /// Where what an earlier run left unfinished lies now, if there was something.
     pub(crate) fn kept(&self) -> Option<&Path> {
-        self.partial.as_ref().and_then(Partial::kept)
+        self.partial.as_ref()?.kept.as_deref()
     }
 
     /// Where the recorder writes.
     pub(crate) fn partial(&self) -> Option<&Path> {
-        self.partial.as_ref().map(Partial::path)
+        self.partial.as_ref().map(|partial| &*partial.path)
     }
 
     /// Puts the recording of a run that has ended in order in its place; returns it, read from the file that this run
@@ -139,7 +139,7 @@ impl Outputs {
     /// If it is not complete, or something must not be replaced: then it stays where it was written.
     pub fn finish(&mut self) -> Result<Option<Recording>> {
         let (Some(partial), Some(recording)) = (&self.partial, &self.recording) else { return Ok(None) };
-        let flown = Recording::of_file(partial.file(), &recording.path)?;
+        let flown = Recording::of_file(&partial.file, &recording.path)?;
         partial.finish()?;
         self.partial = None;
         Ok(Some(flown))
@@ -149,14 +149,15 @@ impl Outputs {
     /// removed.
     pub fn left(&mut self) -> Option<&Path> {
         let is_blank = |partial: &&Partial| {
-            let whole = Recording::of_file(partial.file(), partial.path());
+            let whole = Recording::of_file(&partial.file, &partial.path);
             partial.is_there() && whole.is_ok_and(|recording| recording.messages().next().is_none())
         };
         if let Some(blank) = self.partial.as_ref().filter(is_blank) {
-            let _ = std::fs::remove_file(blank.path());
+            let _ = std::fs::remove_file(&blank.path);
             self.partial = None;
         }
-        self.partial.as_ref().filter(|partial| !partial.is_empty() && partial.is_there()).map(Partial::path)
+        let partial = self.partial.as_ref().filter(|partial| !partial.is_empty() && partial.is_there());
+        partial.map(|partial| &*partial.path)
     }
 }
 

@@ -6,16 +6,12 @@ use std::ffi::OsStr;
 use std::os::unix::ffi::OsStrExt;
 use std::path::PathBuf;
 
-/// All processes of the machine.
-pub fn all() -> impl Iterator<Item = Pid> {
-    let entries = std::fs::read_dir("/proc").into_iter().flatten().flatten();
-    entries.filter_map(|entry| entry.file_name().to_str()?.parse().ok().and_then(Pid::from_raw))
-}
-
 /// The children of this process.
 pub fn children() -> Vec<Pid> {
     let this = rustix::process::getpid();
-    all().filter(|&process| parent_of(process) == Some(this)).collect()
+    let entries = std::fs::read_dir("/proc").into_iter().flatten().flatten();
+    let all = entries.filter_map(|entry| entry.file_name().to_str()?.parse().ok().and_then(Pid::from_raw));
+    all.filter(|&process| parent_of(process) == Some(this)).collect()
 }
 
 /// The processes above a process, its parent first.

@@ -19,7 +19,6 @@ pub struct Sidecars<'a, B: Body> {
 struct Sidecar<'a, B: Body> {
     program: &'a Program,
     process: Process<B>,
-    generation: u32,
     is_ready: bool,
     /// Whether the first tick need not wait for it any more.
     was_ready: bool,
@@ -62,8 +61,7 @@ impl<'a, B: Body> Sidecars<'a, B> {
         let role = Role::Sidecar { index: self.all.len(), generation: 0 };
         let process = Process::new(name, role, world.start(name, role, Some(program))?);
         let is_ready = program.ready == Readiness::Started;
-        let was_ready = is_ready;
-        self.all.push(Sidecar { program, process, generation: 0, is_ready, was_ready, started: now });
+        self.all.push(Sidecar { program, process, is_ready, was_ready: is_ready, started: now });
         Ok(())
     }
 
@@ -115,7 +113,7 @@ impl<'a, B: Body> Sidecars<'a, B> {
             index,
             name: sidecar.process.name.clone(),
             policy: sidecar.program.on_exit,
-            is_possible: sidecar.generation == 0 || lived >= LIFE_MIN,
+            is_possible: sidecar.process.role.generation() == 0 || lived >= LIFE_MIN,
             message: sidecar.process.post_mortem(),
         })
     }
@@ -131,11 +129,10 @@ impl<'a, B: Body> Sidecars<'a, B> {
     /// If it cannot be started.
     pub fn restart(&mut self, world: &mut impl World<Body = B>, now: Duration, index: usize) -> Result<()> {
         let sidecar = &mut self.all[index];
-        sidecar.generation += 1;
         sidecar.started = now;
         sidecar.is_ready = sidecar.program.ready == Readiness::Started;
         sidecar.process.body.remove_log();
-        let role = Role::Sidecar { index, generation: sidecar.generation };
+        let role = Role::Sidecar { index, generation: sidecar.process.role.generation() + 1 };
         let name = sidecar.process.name.clone();
         let body = world.start(&name, role, Some(sidecar.program))?;
         sidecar.process = Process::new(&name, role, body);

@@ -164,8 +164,7 @@ impl<'a, W: World> Supervisor<'a, W> {
         self.clock.look(self.world.now());
         self.processes.look()?;
         self.sidecars.look(&mut self.world, self.clock.now())?;
-        self.bound_logs();
-        self.reap();
+        self.tidy();
         self.see();
         self.settle_ends()?;
         self.settle_sidecars()?;
@@ -272,21 +271,21 @@ impl<'a, W: World> Supervisor<'a, W> {
         slots.map(|slot| self.world.spent(slot)).fold(self.spent[node], sum)
     }
 
-    /// Reaps orphans that have ended: they would stay in the table of processes for the whole run.
-    fn reap(&mut self) {
-        if self.clock.since(self.timing.reaped) >= REAP_PERIOD {
-            self.timing.reaped = self.clock.now();
-            let bodies = self.processes.running.iter().map(|process| &process.body);
-            let known: Vec<u32> = bodies.chain(self.sidecars.bodies()).filter_map(Body::id).collect();
-            self.world.reap(&known);
+    /// Bounds the lengths of logs, and reaps orphans that have ended: they would stay in the table of processes for the
+    /// whole run.
+    fn tidy(&mut self) {
+        let now = self.clock.now();
+        let bodies = || {
+            let processes = self.processes.running.iter().map(|process| &process.body);
+            processes.chain(self.sidecars.bodies())
+        };
+        if now.saturating_sub(self.timing.logs_bounded) >= LOG_PERIOD {
+            self.timing.logs_bounded = now;
+            bodies().for_each(Body::bound_log);
         }
-    }
-
-    fn bound_logs(&mut self) {
-        if self.clock.since(self.timing.logs_bounded) >= LOG_PERIOD {
-            self.timing.logs_bounded = self.clock.now();
-            let bodies = self.processes.running.iter().map(|process| &process.body);
-            bodies.chain(self.sidecars.bodies()).for_each(Body::bound_log);
+        if now.saturating_sub(self.timing.reaped) >= REAP_PERIOD {
+            self.timing.reaped = now;
+            self.world.reap(&bodies().filter_map(Body::id).collect::<Vec<u32>>());
         }
     }
 

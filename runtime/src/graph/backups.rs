@@ -112,11 +112,12 @@ impl Run<'_> {
         }
         let process = Process { outputs: self.outputs(node, span), ..whole.clone() };
         let mut declared_nodes = self.declared_nodes.to_vec();
-        declared_nodes[node] = DeclaredNode { name: &name, process: &process, program };
-        let mut wiring = wire(self.manifest, &declared_nodes, Some(node))?;
+        declared_nodes[node] =
+            DeclaredNode { manifest: self.manifest, name: &name, process: &process, program };
+        let mut wiring = wire(&declared_nodes, Some(node))?;
         let mut plan = wiring.nodes.swap_remove(node);
         let declared = &declared_nodes[node];
-        plan.parameters = parameters::of(self.manifest, declared, self.plan, plan.period_ticks, notes)?;
+        plan.parameters = parameters::of(declared, self.plan, plan.period_ticks, notes)?;
         self.require_room(node, &plan, span)?;
         for input in &mut plan.inputs {
             // The same topics, but perhaps in another order.

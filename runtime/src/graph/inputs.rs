@@ -2,7 +2,7 @@
 
 use super::outputs::{Published, require_known_ports};
 use super::processes::DeclaredNode;
-use crate::manifest::{InputSetting, Manifest, Process};
+use crate::manifest::InputSetting;
 use crate::placement;
 use crate::program::Program;
 use bus::plan::{InputPlan, NodePlan, TopicPlan};
@@ -14,12 +14,8 @@ use toml::Spanned;
 ///
 /// # Errors
 /// A port or topic that is not there, or does not fit.
-pub fn inputs(
-    manifest: &Manifest,
-    declared: &DeclaredNode<'_>,
-    topics: &[TopicPlan],
-) -> Result<Vec<InputPlan>, Diagnostic> {
-    let DeclaredNode { name, process, program } = declared;
+pub fn inputs(declared: &DeclaredNode<'_>, topics: &[TopicPlan]) -> Result<Vec<InputPlan>, Diagnostic> {
+    let DeclaredNode { manifest, name, process, program } = declared;
     match program.component().map(|kind| &kind.inputs) {
         Some(Inputs::Any) if process.inputs.is_empty() => {
             let port = |(topic, plan): (usize, &TopicPlan)| InputPlan {
@@ -36,21 +32,16 @@ pub fn inputs(
                 format!("name topics of {} under inputs, such as inputs.h1 = \"/…\"", schema.type_name);
             return Err(manifest.problem(&name.span(), message, help));
         }
-        Some(Inputs::Ports(ports)) => require_ports(manifest, name, process, ports)?,
+        Some(Inputs::Ports(ports)) => require_ports(declared, ports)?,
         _ => {}
     }
-    process.inputs.iter().map(|(port, setting)| input(manifest, declared, port, setting, topics)).collect()
+    process.inputs.iter().map(|(port, setting)| input(declared, port, setting, topics)).collect()
 }
 
 /// Refuses inputs that are none of `ports`, and the lack of one that is required.
-fn require_ports(
-    manifest: &Manifest,
-    name: &Spanned<String>,
-    process: &Process,
-    ports: &[PortSpec],
-) -> Result<(), Diagnostic> {
-    let used = process.inputs.keys().map(|port| (port.get_ref(), port.span()));
-    require_known_ports(manifest, "input", name, ports, used)?;
+fn require_ports(declared: &DeclaredNode<'_>, ports: &[PortSpec]) -> Result<(), Diagnostic> {
+    let DeclaredNode { manifest, name, process, .. } = declared;
+    require_known_ports(declared, "input", ports, &process.inputs)?;
     let is_wired = |port: &PortSpec| process.inputs.keys().any(|wired| wired.get_ref() == port.name);
     let Some(missing) = ports.iter().find(|port| port.required && !is_wired(port)) else { return Ok(()) };
     let (process, input, type_name) = (name.get_ref(), missing.name, missing.schema.type_name);
@@ -60,13 +51,12 @@ fn require_ports(
 }
 
 fn input(
-    manifest: &Manifest,
     declared: &DeclaredNode<'_>,
     port: &Spanned<String>,
     setting: &InputSetting,
     topics: &[TopicPlan],
 ) -> Result<InputPlan, Diagnostic> {
-    let DeclaredNode { name, program, .. } = declared;
+    let DeclaredNode { manifest, name, program, .. } = declared;
     let at = |message: String, help: String| manifest.problem(&port.span(), message, help);
     let who = format!("input `{}` of `{}`", port.get_ref(), name.get_ref());
     let Some(topic) = topics.iter().position(|topic| topic.name == setting.topic) else {
@@ -120,7 +110,6 @@ fn expected_type(program: &Program, port: &str) -> Option<&'static str> {
 
 /// Refuses a cycle of edges without delay: at its first tick every node of it would wait for another.
 pub fn require_no_cycle(
-    manifest: &Manifest,
     declared_nodes: &[DeclaredNode<'_>],
     nodes: &[NodePlan],
     published: &[Published],
@@ -135,7 +124,7 @@ pub fn require_no_cycle(
     let message = format!("a cycle without delay: {}", path.join(" → "));
     let help =
         "give one input of the cycle delay_ticks = 1 and an initial value, usually the plant's command";
-    Err(manifest.problem(&blamed.name.span(), message, help))
+    Err(blamed.manifest.problem(&blamed.name.span(), message, help))
 }
 
 /// Puts each node's inputs in the order in which they are waited for: the one that arrives last first.

@@ -7,6 +7,7 @@ use bus::plan::{OutputPlan, TopicPlan};
 use bus::ports::PortSpec;
 use bus::schema::Schema;
 use diagnostics::{Diagnostic, did_you_mean};
+use std::collections::BTreeMap;
 use std::ops::Range;
 use toml::Spanned;
 
@@ -21,26 +22,18 @@ pub struct Published {
 }
 
 /// All outputs of `declared_nodes`, each with its topic; two on one topic are refused.
-pub fn publish_all(
-    manifest: &Manifest,
-    declared_nodes: &[DeclaredNode<'_>],
-) -> Result<Vec<Published>, Diagnostic> {
+pub fn publish_all(declared_nodes: &[DeclaredNode<'_>]) -> Result<Vec<Published>, Diagnostic> {
     let mut all: Vec<Published> = Vec::new();
     for (node, declared) in declared_nodes.iter().enumerate() {
-        for output in published_by(manifest, node, declared)? {
-            if let Some(other) = all.iter().find(|other| other.topic.name == output.topic.name) {
-                let message = format!(
-                    "two publishers on topic {}: `{}` and `{}`",
-                    output.topic.name,
-                    declared_nodes[other.node].name.get_ref(),
-                    declared.name.get_ref()
-                );
+        for output in published_by(node, declared)? {
+            let (topic, port, name) = (&output.topic.name, &output.port, declared.name.get_ref());
+            if let Some(other) = all.iter().find(|other| other.topic.name == *topic) {
+                let other = declared_nodes[other.node].name.get_ref();
+                let message = format!("two publishers on topic {topic}: `{other}` and `{name}`");
                 let help = format!(
-                    "give one of them another topic: [process.{}.outputs] {} = {{ topic = \"/…\" }}",
-                    declared.name.get_ref(),
-                    output.port
+                    "give one of them another topic: [process.{name}.outputs] {port} = {{ topic = \"/…\" }}"
                 );
-                return Err(manifest.problem(&output.span, message, help));
+                return Err(declared.manifest.problem(&output.span, message, help));
             }
             all.push(output);
         }
@@ -48,17 +41,12 @@ pub fn publish_all(
     Ok(all)
 }
 
-fn published_by(
-    manifest: &Manifest,
-    node: usize,
-    declared: &DeclaredNode<'_>,
-) -> Result<Vec<Published>, Diagnostic> {
-    let DeclaredNode { name, process, program } = declared;
+fn published_by(node: usize, declared: &DeclaredNode<'_>) -> Result<Vec<Published>, Diagnostic> {
+    let DeclaredNode { manifest, name, process, program } = declared;
     let period = period_ticks(manifest, process)?;
-    let declared: Vec<(&str, Option<&'static Schema>)> = match &program.executable {
+    let outputs: Vec<(&str, Option<&'static Schema>)> = match &program.executable {
         Executable::Component(kind) => {
-            let names = process.outputs.keys().map(|port| (port.get_ref().as_str(), port.span()));
-            require_known_ports(manifest, "output", name, kind.outputs, names)?;
+            require_known_ports(declared, "output", kind.outputs, &process.outputs)?;
             let is_on = |port: &&PortSpec| port.required || setting(process, port.name).is_some();
             kind.outputs.iter().filter(is_on).map(|port| (port.name, Some(port.schema))).collect()
         }
@@ -66,7 +54,7 @@ fn published_by(
             process.outputs.keys().map(|port| (port.get_ref().as_str(), None)).collect()
         }
     };
-    let published = declared.into_iter().map(|(port, schema)| {
+    let published = outputs.into_iter().map(|(port, schema)| {
         let (topic, span) = topic(manifest, name, period, port, schema, setting(process, port))?;
         Ok(Published { node, port: port.to_owned(), span, topic })
     });
@@ -119,22 +107,18 @@ fn topic(
     Ok((TopicPlan { name, type_name, period_ticks }, span))
 }
 
-pub fn require_known_ports(
-    manifest: &Manifest,
+/// Refuses ports in use that are none of `ports`.
+pub fn require_known_ports<T>(
+    declared: &DeclaredNode<'_>,
     direction: &str,
-    process: &Spanned<String>,
     ports: &[PortSpec],
-    used: impl Iterator<Item = (impl AsRef<str>, Range<usize>)>,
+    used: &BTreeMap<Spanned<String>, T>,
 ) -> Result<(), Diagnostic> {
-    for (name, span) in used {
-        let name = name.as_ref();
-        if ports.iter().all(|port| port.name != name) {
-            let known = ports.iter().map(|port| port.name);
-            let message = format!("process `{}` has no {direction} `{name}`", process.get_ref());
-            return Err(manifest.problem(&span, message, did_you_mean(name, known, "it has")));
-        }
-    }
-    Ok(())
+    let is_unknown = |name: &&Spanned<String>| ports.iter().all(|port| port.name != name.get_ref());
+    let Some(unknown) = used.keys().find(is_unknown) else { return Ok(()) };
+    let help = did_you_mean(unknown.get_ref(), ports.iter().map(|port| port.name), "it has");
+    let message = format!("process `{}` has no {direction} `{}`", declared.name.get_ref(), unknown.get_ref());
+    Err(declared.manifest.problem(&unknown.span(), message, help))
 }
 
 /// The outputs of node `node`.

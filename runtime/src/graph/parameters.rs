@@ -55,13 +55,12 @@ impl Notes {
 /// # Errors
 /// A file or a parameter that is refused.
 pub fn of(
-    manifest: &Manifest,
     declared: &DeclaredNode<'_>,
     plan: &Plan,
     period_ticks: u32,
     notes: &mut Notes,
 ) -> Result<serde_json::Value, Diagnostic> {
-    let DeclaredNode { name, process, program } = declared;
+    let DeclaredNode { manifest, name, process, program } = declared;
     let mut parameters: BTreeMap<&str, serde_json::Value> =
         process.parameters.iter().map(|(key, value)| (key.get_ref().as_str(), value.clone())).collect();
     for (key, file) in files(process) {
@@ -88,11 +87,11 @@ pub fn of(
             .naming(&outputs)
             .timed(plan.tick_ns, period_ticks, plan.duration_ticks)
             .seeded(plan.seed);
-        kind.check(&parameters, &context).map_err(|error| refused(manifest, declared, &error))?;
+        kind.check(&parameters, &context).map_err(|error| refused(declared, &error))?;
         for warning in context.into_warnings() {
             let at = place(declared, &warning.key);
             if !(warning.is_behind_end && notes.is_cut(manifest, &at)) {
-                notes.warnings.push(problem(manifest, declared, &at, &warning.message, String::new()));
+                notes.warnings.push(problem(declared, &at, &warning.message, String::new()));
             }
         }
     }
@@ -117,7 +116,7 @@ fn require_none(manifest: &Manifest, process: &Process) -> Result<(), Diagnostic
 }
 
 /// A refused parameter, at its place.
-fn refused(manifest: &Manifest, declared: &DeclaredNode<'_>, error: &ParameterError) -> Diagnostic {
+fn refused(declared: &DeclaredNode<'_>, error: &ParameterError) -> Diagnostic {
     let (name, key) = (declared.name.get_ref(), error.key());
     let help = match error {
         ParameterError::Missing { .. } if files(declared.process).iter().any(|(file, _)| *file == key) => {
@@ -126,17 +125,11 @@ fn refused(manifest: &Manifest, declared: &DeclaredNode<'_>, error: &ParameterEr
         ParameterError::Missing { .. } => format!("add {key} = … to [process.{name}.parameters]"),
         _ => error.meant().map_or(String::new(), |near| format!("did you mean `{near}`?")),
     };
-    problem(manifest, declared, &place(declared, key), &error.to_string(), help)
+    problem(declared, &place(declared, key), &error.to_string(), help)
 }
 
-fn problem(
-    manifest: &Manifest,
-    declared: &DeclaredNode<'_>,
-    at: &Range<usize>,
-    message: &str,
-    help: String,
-) -> Diagnostic {
-    manifest.problem(at, format!("process `{}`: {message}", declared.name.get_ref()), help)
+fn problem(declared: &DeclaredNode<'_>, at: &Range<usize>, message: &str, help: String) -> Diagnostic {
+    declared.manifest.problem(at, format!("process `{}`: {message}", declared.name.get_ref()), help)
 }
 
 /// Where the dotted `key` stands: by its first name, which is a parameter or a file; else the place of the process.

@@ -19,6 +19,8 @@ use toml::Spanned;
 /// A process that takes part in the ticks, on its way into the plan.
 #[derive(Clone)]
 pub struct DeclaredNode<'m> {
+    /// The manifest that declares it.
+    pub manifest: &'m Manifest,
     /// Its name.
     pub name: &'m Spanned<String>,
     /// What the manifest says of it.
@@ -34,7 +36,7 @@ pub struct DeclaredNode<'m> {
 pub fn declared_nodes(manifest: &Manifest) -> Result<Vec<DeclaredNode<'_>>, Diagnostic> {
     let declared = |(name, process)| {
         require_no_sidecar(manifest, name, process)?;
-        Ok(DeclaredNode { name, process, program: program(manifest, name, process)? })
+        Ok(DeclaredNode { manifest, name, process, program: program(manifest, name, process)? })
     };
     let declared_nodes = manifest.content.process.iter().filter(|(_, process)| takes_part(process));
     let declared_nodes = Diagnostic::gather(declared_nodes.map(declared))?;
@@ -336,15 +338,11 @@ pub fn require_own_logs(manifest: &Manifest) -> Result<(), Diagnostic> {
 ///
 /// # Errors
 /// With the reason.
-pub fn require_replaceable(
-    manifest: &Manifest,
-    declared: &DeclaredNode<'_>,
-    node: &NodePlan,
-) -> Result<(), Diagnostic> {
+pub fn require_replaceable(declared: &DeclaredNode<'_>, node: &NodePlan) -> Result<(), Diagnostic> {
     let Some(reason) = irreplaceable(declared, node) else { return Ok(()) };
     let message = |_: &OnExit| format!("`on_exit` of `{}`: {reason}", declared.name.get_ref());
     let help = "leave it out: the run stops when the process does";
-    manifest.require(&declared.process.on_exit, |on_exit| *on_exit == OnExit::Stop, message, help)
+    declared.manifest.require(&declared.process.on_exit, |on_exit| *on_exit == OnExit::Stop, message, help)
 }
 
 /// Why another process cannot go on in the place of this one.

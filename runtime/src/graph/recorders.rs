@@ -1,20 +1,15 @@
 //! Recorders: one, and it takes every sample.
 
 use super::processes::DeclaredNode;
-use crate::manifest::Manifest;
 use bus::plan::NodePlan;
 use diagnostics::Diagnostic;
 
 /// Refuses a second recorder, which would write to the same file, and one that ran less often, or looked back: it would
 /// leave samples out.
-pub fn check(
-    manifest: &Manifest,
-    declared_nodes: &[DeclaredNode<'_>],
-    nodes: &[NodePlan],
-) -> Result<(), Diagnostic> {
+pub fn check(declared_nodes: &[DeclaredNode<'_>], nodes: &[NodePlan]) -> Result<(), Diagnostic> {
     let recorders = declared_nodes.iter().zip(nodes).filter(|(declared, _)| declared.program.is_recorder());
     let mut first = None;
-    for (DeclaredNode { name, .. }, node) in recorders {
+    for (DeclaredNode { manifest, name, .. }, node) in recorders {
         let at = |message: String, help: &str| Err(manifest.problem(&name.span(), message, help));
         let who = name.get_ref();
         if let Some(first) = first.replace(who) {

@@ -2,7 +2,6 @@
 
 use super::processes::{self, DeclaredNode};
 use super::{inputs, outputs};
-use crate::manifest::Manifest;
 use crate::program::OnExit;
 use bus::plan::{NodePlan, TopicPlan};
 use diagnostics::Diagnostic;
@@ -20,27 +19,23 @@ pub struct Wiring {
 ///
 /// # Errors
 /// What is wrong with a port, and a cycle without a delay.
-pub fn wire(
-    manifest: &Manifest,
-    declared_nodes: &[DeclaredNode<'_>],
-    changed: Option<usize>,
-) -> Result<Wiring, Diagnostic> {
-    let published = outputs::publish_all(manifest, declared_nodes)?;
+pub fn wire(declared_nodes: &[DeclaredNode<'_>], changed: Option<usize>) -> Result<Wiring, Diagnostic> {
+    let published = outputs::publish_all(declared_nodes)?;
     let topics: Vec<TopicPlan> = published.iter().map(|output| output.topic.clone()).collect();
     let mut nodes = Diagnostic::gather(declared_nodes.iter().enumerate().map(|(index, declared)| {
         let process = declared.process;
         Ok(NodePlan {
             name: declared.name.get_ref().clone(),
-            period_ticks: processes::period_ticks(manifest, process)?,
+            period_ticks: processes::period_ticks(declared.manifest, process)?,
             wait: process.wait.unwrap_or_default(),
             cpu: process.cpu.as_ref().map(|cpu| *cpu.get_ref()),
-            inputs: inputs::inputs(manifest, declared, &topics)?,
+            inputs: inputs::inputs(declared, &topics)?,
             outputs: outputs::outputs(&published, index),
             parameters: serde_json::Value::Null,
             restarts: declared.program.on_exit == OnExit::Restart,
         })
     }))?;
-    inputs::require_no_cycle(manifest, declared_nodes, &nodes, &published, changed)?;
+    inputs::require_no_cycle(declared_nodes, &nodes, &published, changed)?;
     inputs::order_inputs(&mut nodes, &published);
     Ok(Wiring { topics, nodes })
 }

@@ -48,7 +48,7 @@ fn live(seed: u64) {
             (1, Some(mut run)) => {
                 let mut chunk = if run.content.is_none() { START.to_vec() } else { Vec::new() };
                 chunk.extend([step.to_le_bytes().as_slice(), &seed.to_le_bytes()].concat());
-                run.recording.file().write_all(&chunk).unwrap();
+                (&run.recording.file).write_all(&chunk).unwrap();
                 run.content.get_or_insert_default().extend(chunk);
                 flying = Some(run);
             }
