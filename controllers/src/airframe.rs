@@ -7,6 +7,15 @@ use std::path::Path;
 use vehicles::Vehicle;
 
 /// A vehicle, and how its rotors are reached.
+///
+/// ```
+/// use controllers::airframe::ControlledVehicle;
+///
+/// let vehicle = vehicles::Vehicle::parse(vehicles::reference::HUMMINGBIRD, "hummingbird.toml").unwrap();
+/// let model = ControlledVehicle::new(vehicle).unwrap().hover_model();
+/// let weight_N = model.mass_kg * model.gravity_m_s2;
+/// assert!(model.thrust_min_N < weight_N && weight_N < model.thrust_max_N, "it hovers amid its range");
+/// ```
 #[derive(Debug, Clone)]
 pub struct ControlledVehicle {
     /// The vehicle.

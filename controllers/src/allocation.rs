@@ -10,7 +10,7 @@ use vehicles::Vehicle;
 
 /// The fraction of the thrust range to keep free at either end for roll and pitch, see
 /// [`Allocation::thrust_range_N`]. Tuned, no source: it leaves 0.09 N·m on the Hummingbird.
-pub const THRUST_RESERVE: f64 = 0.05;
+pub(crate) const THRUST_RESERVE: f64 = 0.05;
 
 /// A thrust along body z and a torque about the centre of mass in body axes.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]

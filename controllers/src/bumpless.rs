@@ -24,6 +24,20 @@ const ACCELERATION_MAX_M_S2: f64 = 3.0;
 const ACCELERATION_MAX_RAD_S2: f64 = 10.0;
 
 /// The transfer to one law on one vehicle.
+///
+/// ```
+/// use controllers::airframe::ControlledVehicle;
+/// use controllers::{bumpless::BumplessTransfer, control::ControlInput, controller_state::ControllerState};
+/// use controllers::{pid::PidLaw, pid_gains::PidGains};
+///
+/// let vehicle = vehicles::Vehicle::parse(vehicles::reference::HUMMINGBIRD, "hummingbird.toml").unwrap();
+/// let craft = ControlledVehicle::new(vehicle).unwrap();
+/// let law = PidLaw { gains: PidGains::default(), vehicle: craft.hover_model(), period_s: 1e-3 };
+/// let mut state = ControllerState::default();
+/// let transfer = BumplessTransfer::to::<PidLaw>(&craft.vehicle, 1e-3);
+/// let asked = transfer.step(&law, &mut state, &ControlInput::default(), None).wrench;
+/// assert_eq!(state.thrust, asked.thrust_N, "what was asked for is there for the next law");
+/// ```
 #[derive(Debug, Clone, Copy)]
 pub struct BumplessTransfer {
     id: LawId,

@@ -64,6 +64,16 @@ pub struct Integrals {
 }
 
 /// The motion as the loops about hover see it: height, climb, the three angles and the body rates.
+///
+/// ```
+/// use controllers::control::{HoverMotion, MotionEstimate};
+/// use nalgebra::{UnitQuaternion, Vector3};
+///
+/// let attitude_WB = UnitQuaternion::from_euler_angles(0.0, 0.2, 1.0);
+/// let motion = MotionEstimate { position_W_m: Vector3::z(), attitude_WB, ..MotionEstimate::default() };
+/// let found = HoverMotion::of(&motion);
+/// assert!(found.altitude_m == 1.0 && (found.pitch_rad - 0.2).abs() < 1e-12 && (found.yaw_rad - 1.0).abs() < 1e-12);
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct HoverMotion {
     /// Height, m.
@@ -96,8 +106,7 @@ impl HoverMotion {
     }
 
     /// The same with height and climb by the beam downwards.
-    #[must_use]
-    pub fn by_ranges(input: &ControlInput) -> Self {
+    pub(crate) fn by_ranges(input: &ControlInput) -> Self {
         Self {
             altitude_m: input.walls.height,
             climb_rate_m_s: input.walls.climb_rate,

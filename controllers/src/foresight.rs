@@ -60,15 +60,14 @@ impl ForesightState {
     }
 
     /// What the observer lifts, as an integrator of another law would.
-    #[must_use]
-    pub fn integrals(&self) -> Integrals {
+    pub(crate) fn integrals(&self) -> Integrals {
         Integrals { lift: self.observer.answer[2], turn: [0.0; 3] }
     }
 }
 
 /// What is foreseen of a vehicle at one period.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Foresight {
+pub(crate) struct Foresight {
     /// What the rotors can make.
     allocation: Allocation,
     /// How fast they can.

@@ -38,6 +38,13 @@ const THESIS: &str = include_str!("../gains/pid-thesis.toml");
 
 gains! {
     /// Gains and limits of the four loops. A loop's table is given whole or left out.
+    ///
+    /// ```
+    /// use controllers::pid_gains::PidGains;
+    ///
+    /// let (ours, thesis) = (PidGains::default(), PidGains::thesis());
+    /// assert_eq!((ours.roll.proportional_1_s2, thesis.roll.proportional_1_s2), (16.0, 25.0));
+    /// ```
     #[derive(Deserialize)]
     #[serde(default, deny_unknown_fields, expecting = "a table of gains or the path of a gains file")]
     pub struct PidGains of file, built in "pid.toml" {
@@ -72,7 +79,7 @@ impl PidGains {
     ///
     /// # Errors
     /// The file or a number is refused; the text names the key.
-    pub fn given(given: Option<&Value>) -> Result<Self, ParameterError> {
+    pub(crate) fn given(given: Option<&Value>) -> Result<Self, ParameterError> {
         match given {
             None => Ok(Self::default()),
             Some(Value::String(path)) => Self::load(Some(path.as_ref())),
@@ -84,8 +91,7 @@ impl PidGains {
     }
 
     /// What the altitude loop needs of these.
-    #[must_use]
-    pub fn altitude_gains(&self) -> AltitudeGains {
+    pub(crate) fn altitude_gains(&self) -> AltitudeGains {
         AltitudeGains {
             loop_gains: self.altitude,
             integral_climb_max_m_s: self.altitude_integral_climb_max_m_s,

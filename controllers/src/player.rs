@@ -56,6 +56,13 @@ pub struct Outputs {
 }
 
 /// A recorded flight that is played.
+///
+/// ```
+/// use controllers::player::Player;
+///
+/// let error = bus::Harness::<Player>::from_json(&serde_json::json!({ "data": "flight.csv" })).unwrap_err();
+/// assert!(error.to_string().contains("columns"), "it has to know which columns hold what: {error}");
+/// ```
 #[derive(Debug)]
 pub struct Player {
     log: FlightLog,

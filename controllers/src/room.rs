@@ -20,6 +20,13 @@ const AGREEMENT_M: f64 = 0.15;
 const FOLLOWING_S: f64 = 0.25;
 
 /// A room, empty but for vehicles, with its walls across the heading's axes.
+///
+/// ```
+/// use controllers::room::Room;
+///
+/// let room = Room { size_m: [10.0, 8.0] };
+/// assert_eq!(room.distances_m(&[7.0, 3.0]), [3.0, 7.0, 5.0, 3.0], "to the walls at +x, -x, +y, -y");
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Room {
     /// Distance between the walls along the heading's x, and along its y, m.

@@ -28,8 +28,7 @@ pub struct SetPoint {
 
 impl SetPoint {
     /// A height and the angles of an attitude, body to world.
-    #[must_use]
-    pub fn held(altitude_m: f64, attitude_WB: &UnitQuaternion<f64>) -> Self {
+    pub(crate) fn held(altitude_m: f64, attitude_WB: &UnitQuaternion<f64>) -> Self {
         let (roll_rad, pitch_rad, yaw_rad) = attitude_WB.euler_angles();
         Self { altitude_m, roll_rad, pitch_rad, yaw_rad }
     }
@@ -104,9 +103,9 @@ struct Doublet {
 
 /// Heights in the world that a set point may ask for, m: the record of all rotorcraft is 12 442 m (SA 315B Lama, FAI,
 /// 1972), and the world's origin may lie as far above.
-pub const ALTITUDES_M: RangeInclusive<f64> = -20_000.0..=20_000.0;
+pub(crate) const ALTITUDES_M: RangeInclusive<f64> = -20_000.0..=20_000.0;
 /// The same for messages.
-pub const ALTITUDES_EXPECTED: &str = "-20 000 m to 20 000 m: no rotorcraft has flown above 12 442 m";
+pub(crate) const ALTITUDES_EXPECTED: &str = "-20 000 m to 20 000 m: no rotorcraft has flown above 12 442 m";
 /// Angles that a set point may ask for, rad: a hundred turns of yaw.
 const ANGLES_RAD: RangeInclusive<f64> = -628.4..=628.4;
 

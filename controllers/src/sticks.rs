@@ -17,6 +17,16 @@ use std::fmt::Display;
 use std::path::Path;
 
 /// A recording of sticks, at least one row.
+///
+/// ```
+/// use controllers::{set_points::SetPoint, sticks::Sticks};
+///
+/// let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../manifests/sticks/roll.csv");
+/// let sticks = Sticks::load(path.as_ref()).unwrap();
+/// let beside = SetPoint { altitude_m: 1.5, ..SetPoint::default() };
+/// assert!(sticks.has("roll") && !sticks.has("altitude"));
+/// assert_eq!(sticks.at(0.0, &beside).altitude_m, 1.5, "the recording does not say");
+/// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct Sticks {
     rows: Vec<Row>,

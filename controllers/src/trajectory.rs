@@ -138,7 +138,7 @@ impl Trajectory {
     }
 
     /// When each segment begins, s.
-    pub fn starts_s(&self) -> impl Iterator<Item = f64> {
+    pub(crate) fn starts_s(&self) -> impl Iterator<Item = f64> {
         self.segments.iter().map(|segment| segment.start_s)
     }
 
@@ -146,7 +146,7 @@ impl Trajectory {
     ///
     /// # Errors
     /// Which segment asks for how much, and where.
-    pub fn require_flyable(&self) -> Result<(), ParameterError> {
+    pub(crate) fn require_flyable(&self) -> Result<(), ParameterError> {
         self.segments.iter().enumerate().try_for_each(|(index, segment)| {
             let times = (0..=LOOKS).map(|look| segment.duration_s * f64::from(look) / f64::from(LOOKS));
             times.map(|since_s| segment.at(segment.start_s + since_s)).try_for_each(|point| {

@@ -149,8 +149,7 @@ impl VelocityLoop {
 
     /// `before` moved towards `asked`: at once where that is slower, no faster than the limit where it gathers
     /// speed.
-    #[must_use]
-    pub fn gathered_m_s(&self, before_m_s: f64, asked_m_s: f64) -> f64 {
+    pub(crate) fn gathered_m_s(&self, before_m_s: f64, asked_m_s: f64) -> f64 {
         let step_m_s = self.gains.command_acceleration_max_m_s2 * self.cascade.period_s;
         // Gathering speed is measured from standstill where the direction turns round.
         let same_way_m_s = if before_m_s * asked_m_s > 0.0 { before_m_s.abs() } else { 0.0 };

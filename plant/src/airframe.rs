@@ -88,8 +88,7 @@ impl Airframe {
     }
 
     /// How far the effects have moved the frame, seen from the centre of mass, from where it is declared.
-    #[must_use]
-    pub fn frame_shift_B_m(&self) -> &Vector3<f64> {
+    pub(crate) fn frame_shift_B_m(&self) -> &Vector3<f64> {
         &self.frame_shift_B_m
     }
 

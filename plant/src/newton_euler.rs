@@ -14,6 +14,17 @@ use crate::rotation::rotated;
 use crate::state::{Rates, RigidBody, RotorRates, RotorState, State};
 
 /// The model: immutable, while the [`State`] it moves belongs to the caller.
+///
+/// ```
+/// use nalgebra::Vector3;
+/// use plant::{NewtonEuler, RigidBody};
+///
+/// let vehicle = vehicles::Vehicle::parse(vehicles::reference::HUMMINGBIRD, "hummingbird.toml").unwrap();
+/// let (model, hover) = (NewtonEuler::new(vehicle.clone(), 1), vehicle.hover_command());
+/// let state = model.start(RigidBody::level_at(Vector3::z()), hover);
+/// let felt_m_s2 = model.accelerations(&state).specific_force_B_m_s2.z;
+/// assert!((felt_m_s2 - 9.81).abs() < 1e-9, "in hover the rotors carry the weight: {felt_m_s2}");
+/// ```
 #[derive(Debug, Clone)]
 pub struct NewtonEuler {
     airframe: Airframe,

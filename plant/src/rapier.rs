@@ -114,8 +114,7 @@ impl Rapier {
     }
 
     /// The number of the scene's box that the vehicle is inside of, if any.
-    #[must_use]
-    pub fn box_around(&self) -> Option<usize> {
+    pub(crate) fn box_around(&self) -> Option<usize> {
         self.world.box_around(&self.state.body)
     }
 

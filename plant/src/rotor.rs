@@ -14,6 +14,14 @@ use vehicles::Vehicle;
 use crate::state::{RotorRates, RotorState};
 
 /// A force and a torque about the centre of mass, both written in the body frame.
+///
+/// ```
+/// use nalgebra::Vector3;
+/// use plant::Wrench;
+///
+/// let on_the_left = Wrench::at(&Vector3::new(0.0, 0.2, 0.0), Vector3::new(0.0, 0.0, 5.0));
+/// assert_eq!(on_the_left.torque_B_N_m, Vector3::new(1.0, 0.0, 0.0), "it rolls positive");
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Wrench {
     /// Force.
@@ -44,7 +52,7 @@ pub fn thrust_N(vehicle: &Vehicle, speed_rad_s: f64) -> f64 {
 }
 
 /// Drag torque c_Q w |w| that the air puts on a rotor against its own sense, in N*m (thesis eq. 3.2).
-pub fn drag_torque_N_m(vehicle: &Vehicle, speed_rad_s: f64) -> f64 {
+pub(crate) fn drag_torque_N_m(vehicle: &Vehicle, speed_rad_s: f64) -> f64 {
     vehicle.torque_coefficient * speed_rad_s * speed_rad_s.abs()
 }
 

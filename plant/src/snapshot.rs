@@ -98,6 +98,20 @@ impl Snapshot {
 ///
 /// # Errors
 /// If one of them is no snapshot.
+///
+/// ```
+/// use plant::{Airframe, Backend, FreeFlight, NewtonEuler, RigidBody, snapshot::first_difference};
+///
+/// let vehicle = vehicles::Vehicle::parse(vehicles::reference::HUMMINGBIRD, "hummingbird.toml").unwrap();
+/// let airframe = Airframe::new(vehicle);
+/// let effects = airframe.initial_state(1, "plant", 1e-3);
+/// let body = RigidBody::level_at(nalgebra::Vector3::z());
+/// let mut flight = FreeFlight::new(NewtonEuler::flying(airframe, 1), body, effects);
+/// let before = flight.snapshot()?;
+/// flight.step(&[0.0; 4], 1e-3, &[]);
+/// assert_eq!(first_difference(&before, &flight.snapshot()?)?.as_deref(), Some("state"));
+/// # Ok::<(), plant::snapshot::SnapshotError>(())
+/// ```
 pub fn first_difference(a: &[u8], b: &[u8]) -> Result<Option<String>, SnapshotError> {
     let read = |bytes| postcard::from_bytes::<Snapshot>(bytes).map_err(SnapshotError::Unreadable);
     let (a, b) = (read(a)?, read(b)?);

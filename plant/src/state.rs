@@ -4,6 +4,15 @@ use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
 
 /// Pose and motion of the body frame B (x forward, y left, z up) in the world frame W (z up).
+///
+/// ```
+/// use nalgebra::Vector3;
+/// use plant::RigidBody;
+///
+/// let body = RigidBody::level_at(Vector3::z());
+/// assert_eq!(body.attitude_WB * Vector3::x(), Vector3::x(), "it faces along the world's x");
+/// assert!(body.velocity_W_m_s.norm() == 0.0 && body.is_finite());
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct RigidBody {
     /// The centre of mass, in W.

@@ -8,6 +8,14 @@ use bus::random::{Stream, normal};
 use nalgebra::Vector3;
 
 /// White noise on each of three axes, independent between axes and between samples.
+///
+/// ```
+/// use sensors::noise::WhiteNoise;
+///
+/// let mut random = bus::random::stream(1, "imu");
+/// let (quiet, noisy) = (WhiteNoise::new(0.0, 1000.0), WhiteNoise::new(2e-3, 1000.0));
+/// assert!(quiet.sample(&mut random).norm() == 0.0 && noisy.sample(&mut random).norm() > 0.0);
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct WhiteNoise {
     sigma: f64,
@@ -31,7 +39,7 @@ impl WhiteNoise {
 
 /// The steps of a bias on three axes that walks at random.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct BiasWalk {
+pub(crate) struct BiasWalk {
     step_sigma: f64,
 }
 

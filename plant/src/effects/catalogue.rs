@@ -46,6 +46,13 @@ pub static CATALOGUE: &[&EffectKind] = &[
 ];
 
 /// The effect that files call `name`.
+///
+/// ```
+/// use plant::effects::find;
+///
+/// assert_eq!(find("wind").unwrap().parameters.len(), 3);
+/// assert!(find("windy").is_none());
+/// ```
 #[must_use]
 pub fn find(name: &str) -> Option<&'static EffectKind> {
     CATALOGUE.iter().copied().find(|kind| kind.name == name)

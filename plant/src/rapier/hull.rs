@@ -22,6 +22,14 @@ const HUMMINGBIRD_FOOT_OUT_M: f64 = 0.05;
 const HUMMINGBIRD_FOOT_RADIUS_M: f64 = 0.01;
 
 /// The shape of a vehicle, from its centre of mass, in the body frame.
+///
+/// ```
+/// use plant::{Airframe, rapier::hull::Hull};
+///
+/// let vehicle = vehicles::Vehicle::parse(vehicles::reference::HUMMINGBIRD, "hummingbird.toml").unwrap();
+/// let hull = Hull::of(&Airframe::new(vehicle));
+/// assert!((hull.stand_m() - 0.06).abs() < 1e-12 && (hull.disc_radius_m - 0.2716).abs() < 1e-12, "{hull:?}");
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Hull {
     /// Radius of the disc around all propellers; its axis is body z.

@@ -317,8 +317,7 @@ impl EkfState {
     }
 
     /// The newest reading.
-    #[must_use]
-    pub fn newest_reading(&self) -> Reading {
+    pub(crate) fn newest_reading(&self) -> Reading {
         self.readings.newest().unwrap_or_default()
     }
 

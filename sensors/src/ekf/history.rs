@@ -4,9 +4,9 @@ use bus::Message;
 use bus::messages::Vector3;
 
 /// How many readings are remembered.
-pub const READINGS: usize = 256;
+pub(crate) const READINGS: usize = 256;
 /// How many measurements can wait.
-pub const WAITING: usize = 48;
+pub(crate) const WAITING: usize = 48;
 
 /// A reading of the IMU.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Message)]
@@ -26,8 +26,7 @@ pub struct Reading {
 
 impl Reading {
     /// The reading at `time_ns` on the line from this one to `next`.
-    #[must_use]
-    pub fn toward(&self, next: &Self, time_ns: u64) -> Self {
+    pub(crate) fn toward(&self, next: &Self, time_ns: u64) -> Self {
         let part = (time_ns - self.time_ns) as f64 / (next.time_ns - self.time_ns) as f64;
         let mix = |a: Vector3, b: Vector3| Vector3 {
             x: a.x + part * (b.x - a.x),
@@ -56,7 +55,7 @@ impl Reading {
 #[derive(Clone, Copy, Debug, PartialEq, Message)]
 #[repr(C)]
 #[message(type_name = "hummingbus_msgs/msg/EkfReadings")]
-pub struct Readings {
+pub(crate) struct Readings {
     /// Readings so far; number n is at the place n modulo the number of places.
     count: u64,
     /// When the newest was read.
@@ -151,13 +150,19 @@ impl Source {
     }
 
     /// Whether it tells the whole position.
-    #[must_use]
-    pub fn tells_position(self) -> bool {
+    pub(crate) fn tells_position(self) -> bool {
         matches!(self, Self::Gps | Self::Mocap)
     }
 }
 
 /// A measurement, of whatever sensor.
+///
+/// ```
+/// use sensors::ekf::history::{Measurement, Source};
+///
+/// let altitude = Measurement::new(Source::Barometer, 16_000_000, &[1.5]);
+/// assert_eq!((altitude.sensor(), altitude.values[0]), (Source::Barometer, 1.5));
+/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Message)]
 #[repr(C)]
 #[message(type_name = "hummingbus_msgs/msg/EkfMeasurement")]
@@ -200,7 +205,7 @@ pub type Newest = [Option<Option<Measurement>>; 4];
 #[derive(Clone, Copy, Debug, PartialEq, Message)]
 #[repr(C)]
 #[message(type_name = "hummingbus_msgs/msg/EkfWaiting")]
-pub struct Waiting {
+pub(crate) struct Waiting {
     count: u64,
     queue: [Measurement; WAITING],
 }

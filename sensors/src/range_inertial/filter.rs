@@ -30,7 +30,7 @@ const LEVEL_BEAMS: [[f64; 3]; 4] = [[1.0, 0.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 1.0
 const DOWN: usize = 4;
 
 /// How many samples the filter can look back.
-pub const PAST: usize = 128;
+const PAST: usize = 128;
 
 /// No range was ever measured then.
 const NEVER: u64 = u64::MAX;
