@@ -2,7 +2,7 @@
 
 use crate::file_lock;
 use crate::output_file::{LOG, LOG_START, RECORDING, check};
-use anyhow::{Context, Result, bail};
+use anyhow::{Context, Result, anyhow, bail};
 use rustix::fs::OFlags;
 use std::fs::{File, Metadata, OpenOptions};
 use std::io::{self, ErrorKind, Write as _};
@@ -207,7 +207,7 @@ impl LogClaim {
                 Attempt::Held => return Ok(None),
                 Attempt::Gone => {}
                 Attempt::Locked(file) => {
-                    LOG.require(&file).with_context(cannot)?;
+                    LOG.require(&file).map_err(|error| anyhow!("{}: {error}", cannot()))?;
                     return Ok(Some(Self { file, path: real, is_new }));
                 }
             }

@@ -30,7 +30,6 @@ mod sidecars;
 #[cfg(test)]
 mod simulation;
 mod spawn;
-mod stall;
 mod supervision;
 mod supervisor;
 mod view;

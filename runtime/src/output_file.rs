@@ -2,7 +2,7 @@
 //! and only once it is whole.
 
 use crate::file_lock;
-use anyhow::{Context, Result, bail};
+use anyhow::{Context, Result, anyhow, bail};
 use std::fs::{File, Metadata, Permissions};
 use std::io::{self, BufWriter, ErrorKind, Read as _, Write as _};
 use std::os::unix::fs::{MetadataExt as _, PermissionsExt as _};
@@ -23,7 +23,7 @@ const LINKS_MAX: usize = 40;
 ///
 /// std::fs::write(&path, "a letter")?;
 /// let error = output_file::write(&path, &PAGE, |out| out.write_all(b"")).unwrap_err();
-/// assert!(format!("{error:#}").contains("no page of hummingbus, and would be lost"));
+/// assert!(error.to_string().contains("no page of hummingbus, and would be lost"));
 ///
 /// std::fs::write(&path, "<!-- hummingbus --> of yesterday")?;
 /// output_file::write(&path, &PAGE, |out| out.write_all(b"<!-- hummingbus --> of today"))?;
@@ -126,7 +126,7 @@ pub fn check(path: &Path, kind: &Kind) -> Result<PathBuf> {
         match File::open(path).and_then(|file| kind.require(&file)) {
             // Another run has just put it in its place, or removed it.
             Err(error) if error.kind() == ErrorKind::NotFound => {}
-            required => required.with_context(cannot)?,
+            required => required.map_err(|error| anyhow!("{}: {error}", cannot()))?,
         }
     }
     real_path(path)

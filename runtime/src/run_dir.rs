@@ -363,10 +363,10 @@ fn choose(mut runs: Vec<LiveRun>, run_id: Option<&str>) -> Result<LiveRun> {
 }
 
 fn listed(runs: &[LiveRun]) -> String {
-    let line = |Entry { run_id, manifest, launcher, .. }: &Entry| {
+    let line = |LiveRun { entry: Entry { run_id, manifest, launcher, .. }, .. }: &LiveRun| {
         format!("\n  {run_id}  {}  (launcher {launcher})", manifest.display())
     };
-    runs.iter().map(|run| line(&run.entry)).collect()
+    runs.iter().map(line).collect()
 }
 
 #[cfg(test)]

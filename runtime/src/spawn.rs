@@ -3,7 +3,7 @@
 use crate::claimed_file::append_to_log;
 use crate::program::{Executable, Program};
 use crate::role::Role;
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, anyhow};
 use bus::process::{LAUNCHER_VARIABLE, RUN_VARIABLE};
 use bus::{GENERATION_VARIABLE, NODE_VARIABLE};
 use std::fs::{File, OpenOptions};
@@ -105,19 +105,19 @@ fn open_log(name: &str, role: Role, run_dir: &Path, log: Option<&Path>) -> Resul
 
 /// Gives a started process its niceness and its priority.
 fn set_priority(child: &Child, name: &str, program: &Program) -> Result<()> {
-    if let Some(nice) = program.nice {
-        bus::process::set_nice(child.id(), nice).map_err(|error| refused(name, "nice", nice, "-e", error))?;
-    }
-    if let Some(priority) = program.realtime_priority {
-        bus::process::set_fifo(child.id(), priority)
-            .map_err(|error| refused(name, "realtime_priority", priority, "-r", error))?;
+    type Set = fn(u32, i32) -> io::Result<()>;
+    let settings: [(_, _, _, Set); 2] = [
+        ("nice", program.nice, "-e", bus::process::set_nice),
+        ("realtime_priority", program.realtime_priority, "-r", bus::process::set_fifo),
+    ];
+    for (key, value, limit, set) in settings {
+        let Some(value) = value else { continue };
+        set(child.id(), value).map_err(|error| {
+            anyhow!(
+                "process `{name}`: `{key} = {value}` is refused: {error}. It needs the capability CAP_SYS_NICE, or a \
+                 limit that allows it (`ulimit {limit}`); or leave the key out"
+            )
+        })?;
     }
     Ok(())
-}
-
-fn refused(name: &str, key: &str, value: i32, limit: &str, error: io::Error) -> anyhow::Error {
-    anyhow::anyhow!(
-        "process `{name}`: `{key} = {value}` is refused: {error}. It needs the capability CAP_SYS_NICE, or a \
-         limit that allows it (`ulimit {limit}`); or leave the key out"
-    )
 }

@@ -3,10 +3,12 @@
 //! - `requests`: swaps that are asked for in flight
 //! - `ends`: what follows when processes and sidecars end
 //! - `standstill`: runs that stand still, and backups that do not join
+//! - `straggler`: because of whom a run stands still
 
 mod ends;
 mod requests;
 mod standstill;
+mod straggler;
 
 use crate::event::{Progress, RunEvent, StopToken};
 use crate::graph::Graph;

@@ -7,7 +7,7 @@ use crate::program::Executable;
 use bus::context::NodeContext;
 use bus::plan::Plan;
 use diagnostics::{Diagnostic, ParameterError};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 use std::path::PathBuf;
 use toml::Spanned;
@@ -16,7 +16,7 @@ use vehicles::Vehicle;
 /// What is noted on the way from a manifest to a plan.
 #[derive(Debug, Default)]
 pub struct Notes {
-    /// The vehicle, scene and gains files that the processes name, each once.
+    /// The vehicle, scene and gains files that the processes name.
     pub models: Vec<PathBuf>,
     /// What is odd and flies all the same.
     pub warnings: Vec<Diagnostic>,
@@ -44,6 +44,8 @@ impl Notes {
             let help = "set points do not act; a condition without a sample does not pass";
             self.warnings.push(manifest.problem(&duration.span(), message, help));
         }
+        let mut noted = BTreeSet::new();
+        self.models.retain(|path| noted.insert(path.clone()));
         (self.models, self.warnings)
     }
 }
@@ -72,8 +74,11 @@ pub fn of(
         }
         match key {
             "data" => {}
-            "vehicle" => note([Some(path.clone()), Vehicle::base(&path)], &mut notes.models),
-            _ => note([Some(path), None], &mut notes.models),
+            "vehicle" => {
+                let base = Vehicle::base(&path);
+                notes.models.extend(std::iter::once(path).chain(base));
+            }
+            _ => notes.models.push(path),
         }
     }
     let parameters = serde_json::to_value(parameters).unwrap_or_default();
@@ -96,15 +101,6 @@ pub fn of(
         }
     }
     Ok(parameters)
-}
-
-/// Notes files to be recorded, each once.
-fn note(paths: [Option<PathBuf>; 2], models: &mut Vec<PathBuf>) {
-    for path in paths.into_iter().flatten() {
-        if !models.contains(&path) {
-            models.push(path);
-        }
-    }
 }
 
 /// A recorder's file and attachments come from the launcher.

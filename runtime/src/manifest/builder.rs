@@ -32,15 +32,13 @@ impl ManifestBuilder {
     pub fn set(mut self, key: &str, value: impl Into<Value>) -> Self {
         let mut path: Vec<&str> = key.split('.').collect();
         let last = path.pop().unwrap_or_default();
-        let mut table = &mut self.0;
-        for part in path {
-            let entry = table.entry(part).or_insert_with(|| Value::Table(Table::new()));
-            if !entry.is_table() {
-                *entry = Value::Table(Table::new());
+        let table = path.into_iter().fold(&mut self.0, |table, part| {
+            let below = table.entry(part).or_insert_with(|| Value::Table(Table::new()));
+            if !below.is_table() {
+                *below = Value::Table(Table::new());
             }
-            let Value::Table(below) = entry else { unreachable!("made one above") };
-            table = below;
-        }
+            below.as_table_mut().expect("made one above")
+        });
         table.insert(last.to_owned(), value.into());
         self
     }

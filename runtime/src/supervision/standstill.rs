@@ -4,7 +4,6 @@ use super::Supervisor;
 use crate::program::OnExit;
 use crate::replacement::Stage;
 use crate::role::Role;
-use crate::stall::Standstill;
 use crate::supervisor::Event;
 use crate::world::World;
 use anyhow::Result;
@@ -28,14 +27,11 @@ impl<W: World> Supervisor<'_, W> {
             return Ok(());
         }
         let stood = self.clock.since(self.timing.last_change.1);
-        let replacements = &self.overseer.replacements;
-        let (plan, world, processes) = (self.plan, &self.world, &self.processes);
-        let standstill = Standstill { plan, world, replacements, processes };
-        let straggler = standstill.straggler();
-        if stood <= self.patience(straggler).max(2 * standstill.deadline()) {
+        let straggler = self.straggler();
+        if stood <= self.patience(straggler).max(2 * self.deadline()) {
             return Ok(());
         }
-        let text = standstill.describe(straggler, stood);
+        let text = self.describe_standstill(straggler, stood);
         let Some(straggler) = straggler else {
             self.tell(Event::Died { policy: OnExit::Stop, is_possible: false })?;
             return self.abort(format!("{text}; it was aborted"));

@@ -1,29 +1,16 @@
 //! A run that stands still: because of whom, and what the others wait for.
 
-use crate::processes::Processes;
-use crate::replacement::Replacements;
+use super::Supervisor;
 use crate::role::Role;
 use crate::world::World;
 use bus::lockstep::{Phase, SlotState};
-use bus::plan::{Pace, Plan};
+use bus::plan::Pace;
 use std::time::Duration;
 
-/// A run that stands still.
-pub struct Standstill<'a, W: World> {
-    /// Its plan.
-    pub plan: &'a Plan,
-    /// What is outside the supervisor.
-    pub world: &'a W,
-    /// Its instances, and what is seen of them.
-    pub replacements: &'a Replacements<'a>,
-    /// Its processes.
-    pub processes: &'a Processes<W::Body>,
-}
-
-impl<W: World> Standstill<'_, W> {
+impl<W: World> Supervisor<'_, W> {
     /// The living process that has all it needs and does not come on.
-    pub fn straggler(&self) -> Option<Role> {
-        let view = &self.replacements.view;
+    pub(super) fn straggler(&self) -> Option<Role> {
+        let view = &self.overseer.replacements.view;
         match view.phase {
             Phase::Announcing => Some(self.not_ready(Phase::Connecting)),
             Phase::Connecting => Some(self.not_ready(Phase::Running)),
@@ -36,22 +23,22 @@ impl<W: World> Standstill<'_, W> {
 
     /// The first whose time is over of those that have not joined; the clock where all have.
     fn not_ready(&self, phase: Phase) -> Role {
-        let view = &self.replacements.view;
+        let view = &self.overseer.replacements.view;
         let late = (0..self.plan.nodes.len()).filter(|&node| !view.is_ready(node, phase));
-        late.min_by_key(|&node| self.replacements.program_of(node, 0).watchdog)
+        late.min_by_key(|&node| self.overseer.replacements.program_of(node, 0).watchdog)
             .map_or(Role::Clock, |node| Role::Node { node, generation: 0 })
     }
 
     /// The node that is furthest behind of those that have all they need.
     fn not_computing(&self) -> Option<Role> {
-        let view = &self.replacements.view;
+        let view = &self.overseer.replacements.view;
         let stuck = |&(node, generation): &(usize, u32)| {
             let slot = self.plan.slot(node, generation);
             view.slots[slot].state == SlotState::Taken
                 && view.lives(node, generation)
                 && self.can_compute(node, generation)
         };
-        let instances = self.replacements.instances().filter(stuck);
+        let instances = self.overseer.replacements.instances().filter(stuck);
         let slowest =
             instances.min_by_key(|&(node, generation)| view.slots[self.plan.slot(node, generation)].done);
         slowest.map(|(node, generation)| Role::Node { node, generation })
@@ -62,7 +49,8 @@ impl<W: World> Standstill<'_, W> {
     /// until samples have gathered that the tick alone does not need.
     fn can_compute(&self, node: usize, generation: u32) -> bool {
         let slot = self.plan.slot(node, generation);
-        let (view, inputs) = (&self.replacements.view, self.replacements.inputs(node, generation));
+        let (view, inputs) =
+            (&self.overseer.replacements.view, self.overseer.replacements.inputs(node, generation));
         view.has_needs(slot, inputs)
             && self.world.awaited_topic(slot, inputs).is_none()
             && !view.slots[slot].awaits_other
@@ -75,9 +63,9 @@ impl<W: World> Standstill<'_, W> {
     }
 
     /// Host time in which a paced run must come forward: that of the slowest node's period.
-    pub fn deadline(&self) -> Duration {
+    pub(super) fn deadline(&self) -> Duration {
         let period_ticks = self.plan.nodes.iter().map(|node| node.period_ticks).max().unwrap_or(1);
-        match self.replacements.view.pace {
+        match self.overseer.replacements.view.pace {
             Pace::Free => Duration::ZERO,
             Pace::Factor(factor) => {
                 Duration::from_secs_f64((f64::from(period_ticks) * self.plan.tick_s() / factor).min(1e6))
@@ -86,8 +74,8 @@ impl<W: World> Standstill<'_, W> {
     }
 
     /// Which processes have not come as far as the others, and what they wait for, as a message.
-    pub fn describe(&self, straggler: Option<Role>, stood: Duration) -> String {
-        let view = &self.replacements.view;
+    pub(super) fn describe_standstill(&self, straggler: Option<Role>, stood: Duration) -> String {
+        let view = &self.overseer.replacements.view;
         let names = |phase| {
             let late = self.plan.nodes.iter().enumerate().filter(|(index, _)| !view.is_ready(*index, phase));
             late.map(|(_, node)| format!("`{}`", node.name)).collect::<Vec<_>>().join(", ")
@@ -111,13 +99,13 @@ impl<W: World> Standstill<'_, W> {
 
     /// Which instances are awake and do not come on, and which topics the others sleep for.
     fn describe_stuck(&self) -> String {
-        let (plan, view) = (self.plan, &self.replacements.view);
+        let (plan, view) = (self.plan, &self.overseer.replacements.view);
         let slot = |&(node, generation): &(usize, u32)| plan.slot(node, generation);
         let done = |instance: &(usize, u32)| view.slots[slot(instance)].done;
         let computes = |instance: &(usize, u32)| {
             view.slots[slot(instance)].state == SlotState::Taken && !view.has_completed(slot(instance))
         };
-        let instances: Vec<(usize, u32)> = self.replacements.instances().filter(computes).collect();
+        let instances: Vec<(usize, u32)> = self.overseer.replacements.instances().filter(computes).collect();
         let name = |&(node, generation): &(usize, u32)| {
             format!("`{}`", bus::names::process_name(&plan.nodes[node].name, generation))
         };
@@ -129,7 +117,7 @@ impl<W: World> Standstill<'_, W> {
         }
         let tick = stuck.iter().map(|instance| view.completed_by(slot(instance))).min().unwrap_or(0);
         let waiting = instances.iter().filter_map(|instance| {
-            let inputs = self.replacements.inputs(instance.0, instance.1);
+            let inputs = self.overseer.replacements.inputs(instance.0, instance.1);
             let topic = self.world.awaited_topic(slot(instance), inputs)?;
             Some(format!("; {} waits for {}", name(instance), plan.topics[topic].name))
         });
