@@ -107,15 +107,9 @@ impl Diagnostic {
     /// # Errors
     /// Those of all checks as one, so that one look shows every fault.
     pub fn gather<T>(checks: impl IntoIterator<Item = Result<T, Self>>) -> Result<Vec<T>, Self> {
-        let (mut passed, mut failed) = (Vec::new(), Vec::new());
-        for check in checks {
-            match check {
-                Ok(value) => passed.push(value),
-                Err(error) => failed.push(error),
-            }
-        }
-        let mut failed = failed.into_iter();
-        failed.next().map_or(Ok(passed), |first| Err(first.and(failed)))
+        let mut faults = Faults::default();
+        let passed = checks.into_iter().filter_map(|check| faults.keep(check)).collect();
+        faults.finish(Some(passed))
     }
 }
 
@@ -146,8 +140,11 @@ impl Faults {
     /// # Panics
     /// Where there is neither a value nor a fault.
     pub fn finish<T>(self, value: Option<T>) -> Result<T, Diagnostic> {
-        Diagnostic::gather(self.0.into_iter().map(Err::<(), _>))?;
-        Ok(value.expect("what is not faulty was read"))
+        let mut faults = self.0.into_iter();
+        match faults.next() {
+            Some(first) => Err(first.and(faults)),
+            None => Ok(value.expect("what is not faulty was read")),
+        }
     }
 }
 

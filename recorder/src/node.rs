@@ -124,8 +124,8 @@ impl Recording {
             writer.attach(&file.name, &text)?;
         }
         let topic = |&(name, announcement): &(&str, &Announcement)| {
-            let (channel, shadow_name) =
-                (writer.add_channel(name, announcement)?, format!("{SHADOW_PREFIX}{name}"));
+            let shadow_name = format!("{SHADOW_PREFIX}{name}");
+            let channel = writer.add_channel(name, announcement)?;
             Ok(Topic { channel, shadow_channel: None, shadow_name, announcement: announcement.clone() })
         };
         let topics = topics.iter().map(topic).collect::<Result<_, RecordingError>>()?;

@@ -100,10 +100,8 @@ fn wanted(pass: &PassCondition, recording: &Recording) -> Result<Vec<(String, St
     if let Some(minus) = &pass.minus {
         let other = parts(&minus.topic, &minus.field)?;
         if other.len() != wanted.len() {
-            bail!(
-                "pass condition `{}`: `minus` takes a vector off a number, or a number off a vector",
-                pass.name
-            );
+            let name = &pass.name;
+            bail!("pass condition `{name}`: `minus` takes a vector off a number, or a number off a vector");
         }
         wanted.extend(other);
     }
@@ -114,12 +112,9 @@ fn wanted(pass: &PassCondition, recording: &Recording) -> Result<Vec<(String, St
 }
 
 fn verdict(pass: &PassCondition, series: &[Series]) -> Result<Verdict> {
-    let (gate, signals) = match &pass.gate {
-        Some(gate) => series.split_last().map_or((None, series), |(last, rest)| (Some((gate, last)), rest)),
-        None => (None, series),
-    };
-    let (judged, taken) =
-        signals.split_at(if pass.minus.is_some() { signals.len() / 2 } else { signals.len() });
+    let (signals, gates) = series.split_at(series.len() - usize::from(pass.gate.is_some()));
+    let gate = pass.gate.as_ref().zip(gates.first());
+    let (judged, taken) = signals.split_at(signals.len() / if pass.minus.is_some() { 2 } else { 1 });
     let factor = diagnostics::convert(&judged[0].unit, &pass.unit)
         .map_err(|error| anyhow!("pass condition `{}`: {error}", pass.name))?;
     let is_open = |time_ns: u64| {

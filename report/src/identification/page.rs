@@ -34,8 +34,8 @@ fn data(outcome: &Outcome, flown: Option<&Value>) -> Value {
     json!({ "report": outcome.report, "bus": flown, "flights": flights.collect::<Vec<_>>() })
 }
 
-/// A flight's residuals, and what they are looked at against; `None` where nothing was compared.
-/// Curves and clouds have up to so many points.
+/// A flight's residuals, and what they are looked at against, as curves and clouds of up to so many points; `None` where
+/// nothing was compared.
 fn flight(outcome: &Outcome, name: &str, [curve, cloud]: [usize; 2]) -> Option<Value> {
     let pictures: Vec<&Picture> = outcome.pictures.iter().filter(|picture| picture.flight == name).collect();
     let first = pictures.first()?;
@@ -79,13 +79,12 @@ fn component(
 ) -> Value {
     let (measured, before, after) = (&picture.measured[axis], &picture.before[axis], &picture.after[axis]);
     let chosen = extremes(&[measured, before, after], points);
-    let breaks = breaks(&picture.time_s, &chosen);
     let name = match picture.equation {
         Equation::RotorSpeed => format!("rotor {}", axis + 1),
         _ => ["x", "y", "z"][axis].to_owned(),
     };
     let inputs = std::iter::once(measured).chain(regressors.iter().map(|regressor| &regressor.values));
-    let cross = |input: &Vec<f64>| json!({ "before": lagged(before, input), "after": lagged(after, input) });
+    let both = |of: &dyn Fn(&[f64]) -> Vec<Value>| json!({ "before": of(before), "after": of(after) });
     let windows = apart(before).len();
     json!({
         "name": name,
@@ -93,15 +92,12 @@ fn component(
         "curve": {
             "time": chosen.iter().map(|at| (picture.time_s[*at] * 1e4).round() / 1e4).collect::<Vec<_>>(),
             "measured": at(measured, &chosen), "before": at(before, &chosen), "after": at(after, &chosen),
-            "breaks": breaks,
+            "breaks": breaks(&picture.time_s, &chosen),
         },
         "cloud": { "measured": at(measured, cloud), "before": at(before, cloud), "after": at(after, cloud) },
         "bounds": { "95": white_noise_bound(windows, 0.95), "99": white_noise_bound(windows, 0.99) },
-        "auto": {
-            "before": short(&autocorrelation(&apart(before), lags(windows))),
-            "after": short(&autocorrelation(&apart(after), lags(windows))),
-        },
-        "cross": inputs.map(cross).collect::<Vec<_>>(),
+        "auto": both(&|residual| short(&autocorrelation(&apart(residual), lags(windows)))),
+        "cross": inputs.map(|input| both(&|residual| lagged(residual, input))).collect::<Vec<_>>(),
     })
 }
 
@@ -158,9 +154,8 @@ fn extremes(series: &[&Vec<f64>], points: usize) -> Vec<usize> {
 fn breaks(time_s: &[f64], chosen: &[usize]) -> Vec<usize> {
     let ways = || time_s.windows(2).map(|pair| pair[1] - pair[0]);
     let limit_s = 1.5 * ways().fold(f64::INFINITY, f64::min);
-    let gaps: Vec<usize> =
-        ways().enumerate().filter(|(_, way)| *way > limit_s).map(|(at, _)| at + 1).collect();
-    let after = gaps.iter().map(|gap| chosen.partition_point(|at| at < gap));
+    let gaps = ways().enumerate().filter(|(_, way)| *way > limit_s);
+    let after = gaps.map(|(before, _)| chosen.partition_point(|at| *at <= before));
     after.filter(|at| *at < chosen.len()).collect::<BTreeSet<_>>().into_iter().collect()
 }
 

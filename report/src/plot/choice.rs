@@ -163,11 +163,10 @@ impl Choice {
         let is_shown = |topic: &str| shown.iter().any(|vehicle| belongs(topic, vehicle, &vehicles));
         let choice = Self { axes, trails: trails(recording, is_shown), is_named: !plots.is_empty() };
         if choice.axes.is_empty() && choice.trails.is_empty() {
-            let topics: Vec<_> = recording.topics().keys().cloned().collect();
+            let topics = listed(&recording.topics().keys().cloned().collect::<Vec<_>>());
             bail!(
                 "no topic of the recording is of a type that is plotted by itself: name fields with --plot \
-                 TOPIC:FIELD; the topics are {}",
-                listed(&topics)
+                 TOPIC:FIELD; the topics are {topics}"
             );
         }
         Ok(choice)
@@ -220,9 +219,8 @@ fn default_axes(recording: &Recording, vehicle: &str, vehicles: &[String]) -> Ve
     let topics = || recording.topics().iter().filter(|(name, _)| belongs(name, vehicle, vehicles));
     let axes = FIGURES.map(|(title, label, rows)| {
         let mut asks: Vec<Ask> = Vec::new();
-        for (wanted, fields) in
-            rows.iter().flat_map(|(types, fields)| types.iter().map(move |name| (name, fields)))
-        {
+        let rows = rows.iter().flat_map(|(types, fields)| types.iter().map(move |name| (name, fields)));
+        for (wanted, fields) in rows {
             let of_type = topics().filter(|(_, topic)| short_name(&topic.type_name) == *wanted);
             let more = of_type
                 .flat_map(|(name, topic)| fields.iter().map(|field| Ask::new(name, field, &topic.type_name)));

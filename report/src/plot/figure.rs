@@ -109,11 +109,10 @@ fn unit(asks: &[Ask]) -> Result<String> {
     let units_of = |ask: &Ask| distinct(ask.curves.iter().map(|(channel, _)| channel.unit.clone()));
     let units = distinct(asks.iter().flat_map(units_of));
     if units.len() > 1 {
-        let asks =
-            asks.iter().map(|ask| format!("{}:{} in {}", ask.topic, ask.field, units_of(ask).join(", ")));
+        let told = |ask: &Ask| format!("{}:{} in {}", ask.topic, ask.field, units_of(ask).join(", "));
+        let asks = asks.iter().map(told).collect::<Vec<_>>().join(", ");
         bail!(
-            "one set of axes has one unit, but it was asked for {}: give each unit a --plot of its own",
-            asks.collect::<Vec<_>>().join(", ")
+            "one set of axes has one unit, but it was asked for {asks}: give each unit a --plot of its own"
         );
     }
     Ok(units.into_iter().next().unwrap_or_default())
@@ -187,20 +186,19 @@ fn colour(curves: &mut [Curve]) {
 pub fn trails(read: &[(Ask, thin::Trail)]) -> Vec<Trail> {
     let drawn = || read.iter().filter(|(_, trail)| trail.samples > 0);
     let vehicles = distinct(drawn().map(|(ask, _)| ask.vehicle()));
-    let mut trails: Vec<Trail> = drawn()
-        .map(|(ask, trail)| {
-            let index = vehicles.iter().position(|vehicle| *vehicle == ask.vehicle()).unwrap_or_default();
-            Trail {
-                name: trail_name(ask.vehicle(), ask.role),
-                topic: ask.topic.clone(),
-                field: String::new(),
-                role: ask.role,
-                colour: COLOURS[index % COLOURS.len()],
-                samples: trail.samples,
-                points: trail.points(),
-            }
-        })
-        .collect();
+    let drawn = drawn().map(|(ask, trail)| {
+        let index = vehicles.iter().position(|vehicle| *vehicle == ask.vehicle()).unwrap_or_default();
+        Trail {
+            name: trail_name(ask.vehicle(), ask.role),
+            topic: ask.topic.clone(),
+            field: String::new(),
+            role: ask.role,
+            colour: COLOURS[index % COLOURS.len()],
+            samples: trail.samples,
+            points: trail.points(),
+        }
+    });
+    let mut trails: Vec<Trail> = drawn.collect();
     trails.sort_by_key(|trail| trail.role);
     trails
 }

@@ -48,14 +48,9 @@ pub fn ages(flight: &Flight) -> Vec<Age> {
     let commands = closing.into_iter().zip(found);
     let ages = commands.flat_map(|(command, sources)| {
         let sources = sources.into_iter().enumerate().filter(|(_, (_, host))| !host.is_empty());
-        sources.map(move |(source, (simulated, host))| Age {
-            source: name(source),
-            command: name(command),
-            simulated,
-            host,
-        })
+        sources.map(move |(source, times)| (name(source), name(command), times))
     });
-    ages.collect()
+    ages.map(|(source, command, (simulated, host))| Age { source, command, simulated, host }).collect()
 }
 
 /// A stamp for each topic, where there is one.

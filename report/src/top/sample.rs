@@ -119,7 +119,7 @@ impl Source {
             _ => "grants ticks",
         };
         let (id, tick) = (self.control.clock_process(), self.control.completed_ticks());
-        let (row, cpu_ticks) = process("clock", id, tick, || state.to_owned());
+        let (row, cpu_ticks) = process("clock", id, tick, state.to_owned());
         (row, (cpu_ticks, None))
     }
 
@@ -127,7 +127,7 @@ impl Source {
         let slot = self.plan.slot(node, instances.primary.generation);
         let (id, tick) = (self.control.process(slot), self.control.completed_by(slot));
         let name = &self.plan.nodes[node].name;
-        let (mut row, cpu_ticks) = process(name, id, tick, || self.node_state(slot, instances));
+        let (mut row, cpu_ticks) = process(name, id, tick, self.node_state(slot, instances));
         row.late = self.control.late_count(slot);
         (row, (cpu_ticks, Some(self.control.step_times(slot))))
     }
@@ -149,15 +149,10 @@ impl Source {
 }
 
 /// A process and its processor time; `state` is what it does if nothing keeps it from computing.
-fn process(
-    name: &str,
-    process: Option<u32>,
-    tick: u32,
-    state: impl FnOnce() -> String,
-) -> (ProcessRow, Option<u64>) {
+fn process(name: &str, process: Option<u32>, tick: u32, state: String) -> (ProcessRow, Option<u64>) {
     let stat = process.and_then(|process| std::fs::read_to_string(format!("/proc/{process}/stat")).ok());
     let (trouble, cpu_ticks) = stat.and_then(|line| kernel_view(&line)).unzip();
-    let state = trouble.flatten().map_or_else(state, str::to_owned);
+    let state = trouble.flatten().map_or(state, str::to_owned);
     (ProcessRow { name: name.to_owned(), process, state, tick, ..ProcessRow::default() }, cpu_ticks)
 }
 

@@ -10,22 +10,9 @@ use ratatui::widgets::{Cell, Row, Table, Widget};
 use runtime::ctl::protocol::State;
 
 const KEYS: &str = "space pause  s step  S 100  + - speed  f free  r realtime  x stop  q leave";
-const PROCESS_WIDTHS: [Constraint; 7] = [
-    Constraint::Fill(3),
-    Constraint::Fill(7),
-    Constraint::Length(9),
-    Constraint::Length(5),
-    Constraint::Length(7),
-    Constraint::Length(7),
-    Constraint::Length(5),
-];
-const TOPIC_WIDTHS: [Constraint; 5] = [
-    Constraint::Fill(2),
-    Constraint::Fill(1),
-    Constraint::Length(9),
-    Constraint::Length(10),
-    Constraint::Length(5),
-];
+/// How wide the columns are: those of numbers in characters, those of text as shares of what is left.
+const PROCESS_WIDTHS: [u16; 7] = [3, 7, 9, 5, 7, 7, 5];
+const TOPIC_WIDTHS: [u16; 5] = [2, 1, 9, 10, 5];
 
 /// A view on its way to the screen.
 pub struct Screen<'a> {
@@ -77,7 +64,11 @@ fn title_style(state: State) -> Style {
     Style::new().fg(color).bold()
 }
 
-fn table(cells: &Cells, widths: &[Constraint], scroll: usize, height: u16) -> Table<'static> {
+fn table(cells: &Cells, widths: &[u16], scroll: usize, height: u16) -> Table<'static> {
+    let widths = widths.iter().zip(&cells.is_number).map(|(width, is_number)| match is_number {
+        true => Constraint::Length(*width),
+        false => Constraint::Fill(*width),
+    });
     let row = |texts: &Vec<String>| {
         let aligned = |(text, is_number): (&String, &bool)| {
             let line = Line::raw(text.clone());

@@ -132,10 +132,7 @@ impl fmt::Display for Errors {
 }
 
 fn row(flight: &FlightErrors, horizon: &HorizonErrors, channel: &ChannelErrors) -> Vec<String> {
-    let role = match flight.role {
-        Role::Fit => "fit",
-        Role::Test => "test",
-    };
+    let role = if flight.role == Role::Fit { "fit" } else { "test" };
     let mut row = vec![
         flight.name.clone(),
         role.to_owned(),
