@@ -3,7 +3,7 @@
 use crate::disturbance::Observer;
 use diagnostics::unit::{ANGLE, Dimension, LENGTH, SPEED, TORQUE, VELOCITY};
 
-const FORCE: Dimension = Dimension { name: "force", units: &[("N", 1.0)] };
+const FORCE: Dimension = Dimension::of("force", &[("N", 1.0)]);
 
 gains! {
     /// Deviations that are worth one unit of cost each, and limits.

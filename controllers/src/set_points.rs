@@ -122,7 +122,7 @@ const fn angle(name: &'static str) -> Channel {
     Channel { name, units: ANGLE, range: ANGLES_RAD, expected: "an angle of at most a hundred turns" }
 }
 
-const METRES: Dimension = Dimension { name: "height", units: &[("m", 1.0)] };
+const METRES: Dimension = Dimension::of("height", &[("m", 1.0)]);
 
 /// The channels in the order of [`Schedule::channels`].
 static CHANNELS: [Channel; 4] = [

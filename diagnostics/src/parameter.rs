@@ -291,8 +291,7 @@ pub struct Bounds {
 
 impl Bounds {
     /// Whether `si` lies within, both ends included; no NaN does.
-    #[must_use]
-    pub fn contains(&self, si: f64) -> bool {
+    fn contains(&self, si: f64) -> bool {
         (self.min..=self.max).contains(&si)
     }
 

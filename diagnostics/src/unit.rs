@@ -22,7 +22,7 @@ pub const STANDARD_GRAVITY_M_S2: f64 = 9.806_65;
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Dimension {
     /// Name for messages.
-    pub name: &'static str,
+    name: &'static str,
     /// Unit as written in files, and the factor to SI. The first is the SI unit itself.
     pub units: &'static [(&'static str, f64)],
 }

@@ -28,8 +28,7 @@ pub struct Record {
 pub struct Topic {
     /// Three-part type name.
     pub type_name: String,
-    /// The parsed definition.
-    pub definition: Definition,
+    definition: Definition,
     /// Messages recorded on it.
     pub message_count: u64,
 }
@@ -134,8 +133,7 @@ impl Recording {
     }
 
     /// The whole file.
-    #[must_use]
-    pub fn bytes(&self) -> &[u8] {
+    pub(crate) fn bytes(&self) -> &[u8] {
         &self.bytes
     }
 

@@ -1,6 +1,6 @@
 //! The judgement of a run: its pass conditions and comparisons, evaluated on the recording.
 
-use crate::states::{FIELDS_OF_POSE, errors_at, tracks};
+use crate::states::{FIELDS_OF_POSE, tracks};
 use anyhow::{Result, anyhow, bail};
 use flights::state::StateQuantity;
 use recorder::RecordingError;
@@ -228,7 +228,7 @@ fn compare_states(compare: &Comparison, recording: &Recording) -> Result<WindowE
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a positive time of a run")]
     let window_ns = (compare.window_s * 1e9).round() as u64;
     let is_end = |time_ns: &&u64| **time_ns > 0 && window_ns > 0 && time_ns.is_multiple_of(window_ns);
-    let errors = errors_at(simulated, measured, simulated.time_ns().iter().filter(is_end).copied());
+    let errors = simulated.errors(measured, simulated.time_ns().iter().filter(is_end).copied());
     if errors.windows() == 0 {
         let Comparison { simulated, measured, window_s, .. } = compare;
         bail!("{simulated} and {measured} have no common sample at the end of a window of {window_s} s");

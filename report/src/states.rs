@@ -29,8 +29,16 @@ impl Track {
         &self.fields[0].time_ns
     }
 
+    /// The errors against `measured` states at `times_ns`, where both have a state.
+    pub fn errors(&self, measured: &Self, times_ns: impl Iterator<Item = u64>) -> WindowEndErrors {
+        let mut errors = WindowEndErrors::default();
+        let both = times_ns.filter_map(|time_ns| self.at(time_ns).zip(measured.at(time_ns)));
+        both.for_each(|(simulated, measured)| errors.add(&simulated, &measured));
+        errors
+    }
+
     /// The state stamped `time_ns`; fields that were not read are 0.
-    pub fn at(&self, time_ns: u64) -> Option<VehicleState> {
+    fn at(&self, time_ns: u64) -> Option<VehicleState> {
         let index = self.time_ns().binary_search(&time_ns).ok()?;
         let field = |field: usize| self.fields.get(field).map_or(0.0, |series| series.value[index]);
         Some(VehicleState {
@@ -40,21 +48,6 @@ impl Track {
             angular_velocity_B_rad_s: std::array::from_fn(|axis| field(10 + axis)),
         })
     }
-}
-
-/// The errors of simulated states against measured ones at `times_ns`, where both have a state.
-pub(crate) fn errors_at(
-    simulated: &Track,
-    measured: &Track,
-    times_ns: impl Iterator<Item = u64>,
-) -> WindowEndErrors {
-    let mut errors = WindowEndErrors::default();
-    for time_ns in times_ns {
-        if let (Some(simulated), Some(measured)) = (simulated.at(time_ns), measured.at(time_ns)) {
-            errors.add(&simulated, &measured);
-        }
-    }
-    errors
 }
 
 /// The first `fields` fields of the states of all `topics`, read in one pass.

@@ -45,7 +45,7 @@ impl Drawing {
     }
 
     /// The views that were asked for, or else those of `usual` that there is something for.
-    pub fn views_or(&self, usual: &[View]) -> Vec<View> {
+    pub(super) fn views_or(&self, usual: &[View]) -> Vec<View> {
         let has_some =
             |view: &View| if *view == View::Time { !self.panels.is_empty() } else { !self.trails.is_empty() };
         if self.views.is_empty() {

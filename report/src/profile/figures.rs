@@ -21,12 +21,11 @@ use serde::Serialize;
 /// ```
 #[derive(Debug, Serialize)]
 pub struct Profile {
-    /// Ticks of the run.
-    pub ticks: u32,
+    ticks: u32,
     /// Computations whose times were noted, over all nodes.
-    pub noted: usize,
+    noted: usize,
     /// Computations that were not noted because there were too many.
-    pub left_out: u64,
+    pub(super) left_out: u64,
     pub(super) nodes: Vec<NodeLatency>,
     pub(super) transport: Vec<Transport>,
     pub(super) age: Vec<Age>,

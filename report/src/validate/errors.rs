@@ -70,8 +70,7 @@ impl ChannelErrors {
 
 impl HorizonErrors {
     /// The horizon as it is written: `0.5`.
-    #[must_use]
-    pub fn horizon(&self) -> String {
+    pub(crate) fn horizon(&self) -> String {
         (f64::from(self.horizon_ms) * 1e-3).to_string()
     }
 

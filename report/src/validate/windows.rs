@@ -2,7 +2,7 @@
 
 use super::errors::{ChannelErrors, FlightErrors, HorizonErrors};
 use super::replay::{HORIZONS_MS, MEASURED, Replay, plant};
-use crate::states::{FIELDS_OF_STATE, Track, errors_at, tracks};
+use crate::states::{FIELDS_OF_STATE, Track, tracks};
 use anyhow::Result;
 use flights::state::{StateQuantity, WindowEndErrors};
 use flights::{Channel, Flight};
@@ -58,7 +58,7 @@ fn horizon_errors(
         begin_ns >= SETTLE_NS && !begun.checked_sub(1).is_some_and(|last| from_s < gaps[last].1)
     };
     let counted: Vec<u64> = ends.iter().copied().filter(|end_ns| is_whole(*end_ns)).collect();
-    let errors = simulated.iter().map(|track| errors_at(track, measured, counted.iter().copied()));
+    let errors = simulated.iter().map(|track| track.errors(measured, counted.iter().copied()));
     let errors: Vec<WindowEndErrors> = errors.collect();
     let channel = |quantity: StateQuantity| ChannelErrors {
         quantity,
