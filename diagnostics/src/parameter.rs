@@ -25,7 +25,7 @@ pub enum ParameterError {
         found: String,
     },
     /// A parameter that is needed and not given.
-    #[error("missing key `{key}`{}", after_comma(.expected))]
+    #[error("missing key `{key}`{}{expected}", if .expected.is_empty() { "" } else { ", expected " })]
     Missing {
         /// The dotted key.
         key: String,
@@ -160,10 +160,6 @@ impl From<&str> for ParameterError {
     fn from(message: &str) -> Self {
         Self::conflict("", message)
     }
-}
-
-fn after_comma(expected: &str) -> String {
-    if expected.is_empty() { String::new() } else { format!(", expected {expected}") }
 }
 
 fn list(names: &[String]) -> String {

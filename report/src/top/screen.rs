@@ -65,10 +65,10 @@ fn title_style(state: State) -> Style {
 }
 
 fn table(cells: &Cells, widths: &[u16], scroll: usize, height: u16) -> Table<'static> {
-    let widths = widths.iter().zip(&cells.is_number).map(|(width, is_number)| match is_number {
-        true => Constraint::Length(*width),
-        false => Constraint::Fill(*width),
-    });
+    let width = |(width, is_number): (&u16, &bool)| {
+        if *is_number { Constraint::Length(*width) } else { Constraint::Fill(*width) }
+    };
+    let widths = widths.iter().zip(&cells.is_number).map(width);
     let row = |texts: &Vec<String>| {
         let aligned = |(text, is_number): (&String, &bool)| {
             let line = Line::raw(text.clone());
