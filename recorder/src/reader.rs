@@ -133,7 +133,8 @@ impl Recording {
     }
 
     /// The whole file.
-    pub(crate) fn bytes(&self) -> &[u8] {
+    #[must_use]
+    pub fn bytes(&self) -> &[u8] {
         &self.bytes
     }
 
