@@ -33,9 +33,8 @@ impl Solid {
             return [0, 1, 2, 3, 0].map(|index| seen[index]).to_vec();
         }
         // From the side a box is upright, so it is seen as a rectangle.
-        let x = seen.map(|(x, _)| x);
-        let (left, right) =
-            (x.into_iter().fold(f64::INFINITY, f64::min), x.into_iter().fold(f64::NEG_INFINITY, f64::max));
+        let left = seen.iter().fold(f64::INFINITY, |left, (x, _)| left.min(*x));
+        let right = seen.iter().fold(f64::NEG_INFINITY, |right, (x, _)| right.max(*x));
         let (low, high) = (seen[0].1, seen[4].1);
         vec![(left, low), (right, low), (right, high), (left, high), (left, low)]
     }
@@ -50,15 +49,11 @@ pub const EDGES: [[usize; 2]; 12] =
 /// # Errors
 /// If the recording is damaged.
 pub fn scene_of(recording: &Recording) -> Result<Vec<Solid>, RecordingError> {
-    let attachments = recording.attachments()?;
     // An attachment does not say what it is, but no manifest and no vehicle file can be read as a scene.
-    let scene = |(name, bytes): &(String, Vec<u8>)| {
-        std::str::from_utf8(bytes).ok().and_then(|text| Scene::parse(text, name).ok())
-    };
-    Ok(attachments
-        .iter()
-        .find_map(scene)
-        .map_or(Vec::new(), |scene| scene.boxes.iter().map(Solid::of).collect()))
+    let scene =
+        |(name, bytes): (String, Vec<u8>)| Scene::parse(std::str::from_utf8(&bytes).ok()?, &name).ok();
+    let scene = recording.attachments()?.into_iter().find_map(scene);
+    Ok(scene.iter().flat_map(|scene| &scene.boxes).map(Solid::of).collect())
 }
 
 #[cfg(test)]

@@ -44,7 +44,6 @@ fn data(run: &str, flight: &Flight, profile: &Profile) -> Value {
         "bins_per_decade": BINS_PER_DECADE,
         "parts": PARTS,
         "nodes": nodes.collect::<Vec<_>>(),
-        "tick_time": histogram("tick", &profile.critical_path.tick_time),
         "jitter": jitter,
         "course": course(profile, flight.plan.tick_s()),
         "slowest": slowest(flight, profile),
