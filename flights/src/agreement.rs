@@ -1,9 +1,9 @@
 //! How two measurements of the same vector agree, whatever their units: one logged, one derived from another channel.
 
-use nalgebra::{UnitQuaternion, Vector3};
+use nalgebra::Vector3;
 
 use crate::flight::Channel;
-use crate::frame::from_wxyz;
+use crate::frame::rotation;
 
 /// Fewer pairs say nothing.
 const PAIRS_MIN: usize = 20;
@@ -20,7 +20,7 @@ pub struct Pairs {
 impl Pairs {
     /// The angular velocity against the attitude's change over windows of `window_s`.
     pub fn rates(attitude: &Channel<4>, angular_velocity: &Channel<3>, window_s: f64) -> Self {
-        let q = |index: usize| UnitQuaternion::from_quaternion(from_wxyz(attitude.values[index]));
+        let q = |index: usize| rotation(attitude.values[index]);
         let change = |from: usize, to: usize| Some((q(from).inverse() * q(to)).scaled_axis());
         Self::over_windows(&attitude.time_s, angular_velocity, window_s, change)
     }
@@ -35,7 +35,7 @@ impl Pairs {
     /// over windows of `window_s`.
     pub fn leaning(attitude: &Channel<4>, position: &Channel<3>, gravity_m_s2: f64, window_s: f64) -> Self {
         let lean = |wxyz: &[f64; 4]| {
-            let up = UnitQuaternion::from_quaternion(from_wxyz(*wxyz)) * Vector3::z();
+            let up = rotation(*wxyz) * Vector3::z();
             // Beyond 60 degrees the vehicle does not hold its height by leaning.
             let part = gravity_m_s2 / up.z.max(0.5);
             [part * up.x, part * up.y, 0.0]

@@ -2,12 +2,12 @@
 
 use std::path::Path;
 
-use nalgebra::{Matrix3, UnitQuaternion, Vector3};
+use nalgebra::{Matrix3, Vector3};
 
 use crate::clean::{GAP_PERIODS, gaps};
 use crate::error::FlightsError;
 use crate::flight::{Channel, Flight, period_s};
-use crate::frame::{from_wxyz, to_wxyz};
+use crate::frame::{rotation, to_wxyz};
 
 /// How the columns of the file are to be read, as the `columns` table of a player in a manifest.
 pub const COLUMNS: &str = r#"time = { columns = ["t"], unit = "s" }
@@ -28,8 +28,6 @@ const HALF_WINDOW: usize = 3;
 pub struct Canonical {
     /// How many rows.
     pub rows: usize,
-    /// How they are to be read, as the `columns` table of a player in a manifest.
-    pub columns: String,
     /// What was derived, filled in or left out.
     pub notes: Vec<String>,
 }
@@ -46,6 +44,16 @@ pub fn write_csv(flight: &Flight, path: &Path) -> Result<Canonical, FlightsError
 }
 
 /// The text that [`write_csv`] writes.
+///
+/// ```
+/// use flights::{Channel, Flight, HEADER, Role};
+///
+/// let mut flight = Flight::new("still", "log.csv", Role::Fit);
+/// flight.attitude = Channel { time_s: vec![0.0, 0.1], values: vec![[1.0, 0.0, 0.0, 0.0]; 2] };
+/// let (written, text) = flights::csv(&flight)?;
+/// assert!(written.rows == 2 && text.starts_with(HEADER));
+/// # Ok::<(), flights::FlightsError>(())
+/// ```
 ///
 /// # Errors
 /// If the flight has neither attitude nor angular velocity.
@@ -66,7 +74,7 @@ pub fn csv(flight: &Flight) -> Result<(Canonical, String), FlightsError> {
         ));
     }
     let text = times.iter().fold(HEADER.to_owned(), |text, time_s| text + &table.row(*time_s));
-    Ok((Canonical { rows: times.len(), columns: COLUMNS.to_owned(), notes }, text))
+    Ok((Canonical { rows: times.len(), notes }, text))
 }
 
 /// The channels from which rows are made.
@@ -82,14 +90,13 @@ impl<'a> Table<'a> {
     fn of(flight: &'a Flight, notes: &mut Vec<String>) -> Self {
         let mut velocity = flight.velocity.clone();
         if velocity.is_empty() && !flight.position.is_empty() {
-            velocity = derivative(&flight.position.time_s, |from, to| {
-                Vector3::from(flight.position.values[to]) - Vector3::from(flight.position.values[from])
-            });
+            let p = |index: usize| Vector3::from(flight.position.values[index]);
+            velocity = derivative(&flight.position.time_s, |from, to| p(to) - p(from));
             notes.push("velocity: derived from the position by local quadratics over 7 samples".to_owned());
         }
         let mut angular_velocity = flight.angular_velocity.clone();
         if angular_velocity.is_empty() {
-            let q = |index: usize| UnitQuaternion::from_quaternion(from_wxyz(flight.attitude.values[index]));
+            let q = |index: usize| rotation(flight.attitude.values[index]);
             angular_velocity =
                 derivative(&flight.attitude.time_s, |from, to| (q(from).inverse() * q(to)).scaled_axis());
             notes.push(
@@ -102,14 +109,11 @@ impl<'a> Table<'a> {
             (velocity.is_empty(), "velocity: not logged, filled with 0"),
             (flight.attitude.is_empty(), "attitude: not logged, filled with the identity"),
         ];
-        notes
-            .extend(missing.iter().filter(|(is_missing, _)| *is_missing).map(|(_, text)| (*text).to_owned()));
-        let gaps = [
-            without(&flight.position.time_s),
-            without(&velocity.time_s),
-            without(&flight.attitude.time_s),
-            without(&angular_velocity.time_s),
-        ];
+        let missing = missing.into_iter().filter(|(is_missing, _)| *is_missing);
+        notes.extend(missing.map(|(_, text)| text.to_owned()));
+        let (position, attitude) = (&flight.position.time_s, &flight.attitude.time_s);
+        let gaps =
+            [position, &velocity.time_s, attitude, &angular_velocity.time_s].map(|time_s| without(time_s));
         Self { flight, gaps: joined(gaps.concat()), velocity, angular_velocity }
     }
 
@@ -185,7 +189,7 @@ fn held(channel: &Channel<4>, time_s: f64) -> [f64; 4] {
 /// In the order w, x, y, z.
 fn attitude(channel: &Channel<4>, time_s: f64) -> [f64; 4] {
     around(channel, time_s).map_or([1.0, 0.0, 0.0, 0.0], |(from, to, part)| {
-        let [a, b] = [from, to].map(|wxyz| UnitQuaternion::from_quaternion(from_wxyz(wxyz)));
+        let [a, b] = [from, to].map(rotation);
         to_wxyz(a.try_slerp(&b, part, 1e-12).unwrap_or(a).into_inner())
     })
 }
@@ -221,15 +225,12 @@ fn quadratic_slope(points: impl Iterator<Item = (f64, Vector3<f64>)> + Clone) ->
         normal += powers * powers.transpose();
         right += powers * value.transpose();
     }
-    let enough = points.clone().count() > 2;
-    match normal.try_inverse().filter(|_| enough) {
-        Some(inverse) => (inverse * right).row(1).transpose() / scale,
-        None => {
-            let ends = points.clone().next().zip(points.last());
-            let rise = |((t0, v0), (t1, v1)): ((f64, Vector3<f64>), (f64, Vector3<f64>))| (t1 - t0, v1 - v0);
-            let (run, rise) = ends.map_or((0.0, Vector3::zeros()), rise);
-            if run > 0.0 { rise / run } else { Vector3::zeros() }
-        }
+    if let Some(inverse) = normal.try_inverse().filter(|_| points.clone().count() > 2) {
+        return (inverse * right).row(1).transpose() / scale;
+    }
+    match points.clone().next().zip(points.last()) {
+        Some(((t0, v0), (t1, v1))) if t1 > t0 => (v1 - v0) / (t1 - t0),
+        _ => Vector3::zeros(),
     }
 }
 

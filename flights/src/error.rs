@@ -144,6 +144,14 @@ impl FlightsError {
 }
 
 /// What is wrong with a log, or with what is asked of it.
+///
+/// ```
+/// use flights::{LogError, Spot};
+///
+/// let (expected, found) = ("a whole header".to_owned(), "one that is cut".to_owned());
+/// let error = LogError::Unexpected { at: Spot::Byte(7), expected, found, advice: "copy it again" };
+/// assert_eq!(error.to_string(), "byte 7: expected a whole header, found one that is cut; copy it again");
+/// ```
 #[derive(Debug, thiserror::Error)]
 pub enum LogError {
     /// The file cannot be read at all.

@@ -18,6 +18,13 @@ pub enum Role {
 }
 
 /// Samples of one quantity.
+///
+/// ```
+/// use flights::Channel;
+///
+/// let voltage = Channel { time_s: vec![0.0, 0.5, 1.5], values: vec![[11.9], [11.8], [11.8]] };
+/// assert_eq!((voltage.span_s(), voltage.period_s()), (Some((0.0, 1.5)), Some(1.0)));
+/// ```
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Channel<const N: usize> {
     /// When each sample was taken, in seconds; strictly growing.

@@ -24,12 +24,11 @@ pub fn body(frame: Frame, [x, y, z]: [f64; 3]) -> [f64; 3] {
 }
 
 /// An attitude, body to world, given and returned in the order w, x, y, z.
-pub fn attitude(frame: Frame, wxyz: [f64; 4]) -> [f64; 4] {
+pub fn attitude(frame: Frame, [w, x, y, z]: [f64; 4]) -> [f64; 4] {
     match frame {
-        Frame::FluEnu => wxyz,
+        Frame::FluEnu => [w, x, y, z],
         Frame::FrdNed => {
-            let q = enu_ned().into_inner() * from_wxyz(wxyz) * frd_flu().into_inner();
-            to_wxyz(q)
+            to_wxyz(enu_ned().into_inner() * Quaternion::new(w, x, y, z) * frd_flu().into_inner())
         }
     }
 }
@@ -39,9 +38,9 @@ pub fn euler([roll, pitch, yaw]: [f64; 3]) -> [f64; 4] {
     to_wxyz(UnitQuaternion::from_euler_angles(roll, pitch, yaw).into_inner())
 }
 
-/// A quaternion of the order w, x, y, z.
-pub fn from_wxyz([w, x, y, z]: [f64; 4]) -> Quaternion<f64> {
-    Quaternion::new(w, x, y, z)
+/// The rotation of a quaternion in the order w, x, y, z.
+pub fn rotation([w, x, y, z]: [f64; 4]) -> UnitQuaternion<f64> {
+    UnitQuaternion::from_quaternion(Quaternion::new(w, x, y, z))
 }
 
 /// The order w, x, y, z of a quaternion.
@@ -65,7 +64,7 @@ mod tests {
     use super::*;
 
     fn rotate(wxyz: [f64; 4], v: [f64; 3]) -> [f64; 3] {
-        (UnitQuaternion::from_quaternion(from_wxyz(wxyz)) * Vector3::from(v)).into()
+        (rotation(wxyz) * Vector3::from(v)).into()
     }
 
     fn near(a: [f64; 3], b: [f64; 3]) {

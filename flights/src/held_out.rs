@@ -61,6 +61,11 @@ fn same_part([(fit, fit_part), (test, test_part)]: [(&Flight, &Part); 2], how: &
 }
 
 /// Whether two paths lead to one file, or to files with the same bytes; how, as text.
+///
+/// ```
+/// let (here, there) = ("Cargo.toml".as_ref(), "src/../Cargo.toml".as_ref());
+/// assert_eq!(flights::same_file(here, there), Some("the same file"));
+/// ```
 #[must_use]
 pub fn same_file(a: &Path, b: &Path) -> Option<&'static str> {
     let (of_a, of_b) = (std::fs::metadata(a).ok(), std::fs::metadata(b).ok());

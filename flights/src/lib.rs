@@ -44,7 +44,7 @@ pub mod state;
 mod twin;
 mod ulog;
 
-pub use canonical::{Canonical, HEADER, csv, write_csv};
+pub use canonical::{COLUMNS, Canonical, HEADER, csv, write_csv};
 pub use error::{FlightsError, LogError, Spot};
 pub use flight::{Channel, Flight, Role};
 pub use held_out::same_file;

@@ -2,11 +2,12 @@
 //!
 //! A mismatch is clear where a known factor, frame or order explains it; otherwise it is only worth a note.
 
-use nalgebra::{UnitQuaternion, Vector3};
+use nalgebra::Vector3;
+use toml::Spanned;
 use vehicles::Vehicle;
 
 use crate::agreement::{Agreement, Pairs};
-use crate::declaration::{ChannelMap, Frame};
+use crate::declaration::{ChannelMap, Entry, Frame};
 use crate::flight::{Channel, Flight, median};
 use crate::frame;
 use crate::quantity::{FRACTION, PERCENT, Quantity};
@@ -64,12 +65,8 @@ const VOLTAGE_RANGE_V: (f64, f64) = (2.0, 62.0);
 pub struct Finding {
     /// The channel.
     pub channel: Quantity,
-    /// How many times too large its values are; negative for a wrong sign.
-    pub factor: f64,
-    /// The unit, frame or order that would fit.
+    /// The unit, frame or order that would fit, if the mismatch is clear; otherwise it is only worth a note.
     pub fits: Option<String>,
-    /// Whether the mismatch is clear; otherwise it is only worth a note.
-    pub clear: bool,
     /// All this as text, with numbers.
     pub message: String,
 }
@@ -94,8 +91,8 @@ pub fn judge(flight: &Flight, vehicle: &Vehicle, channels: &ChannelMap) -> Vec<F
 /// as no logger's do over a time that no vehicle flies, where both are right in another unit. A first row of zeros, which
 /// some loggers write before their clock runs, hides no wrong unit.
 pub fn judge_time(flight: &Flight, vehicle: &Vehicle, channels: &ChannelMap) -> Option<Finding> {
-    channels.get(&Quantity::Time)?;
     let judge = Judge { flight, vehicle, channels };
+    judge.declared(Quantity::Time)?;
     let times =
         [&flight.attitude.time_s, &flight.command.time_s].into_iter().find(|times| !times.is_empty())?;
     judge.time(times).or_else(|| judge.time(&times[1..]))
@@ -119,13 +116,11 @@ impl Judge<'_> {
             let scale = other / factor;
             !is_wrong(scale * period_s, PERIOD_RANGE_S) && !is_wrong(scale * span_s, SPAN_RANGE_S)
         };
-        let (unit, other) = quantity.dimension().units.iter().find(fits)?;
-        let what = format!(
-            "declared in {}, its samples are {period_s} s apart, over {span_s} s",
-            self.unit(quantity)
-        );
+        let (unit, _) = quantity.dimension().units.iter().find(fits)?;
+        let declared = self.unit(quantity);
+        let what = format!("declared in {declared}, its samples are {period_s} s apart, over {span_s} s");
         (is_wrong(period_s, PERIOD_RANGE_S) && is_wrong(span_s, SPAN_RANGE_S))
-            .then(|| finding(quantity, factor / other, Some(format!("`unit = \"{unit}\"`")), &what))
+            .then(|| finding(quantity, Some(of_unit(unit)), &what))
     }
 
     /// The specific force is gravity's in the median, and up.
@@ -136,16 +131,16 @@ impl Judge<'_> {
         let up = median(forces.iter().map(|f| f[2]))?;
         let factor = norm / self.vehicle.gravity_m_s2;
         let what = format!("its median magnitude is {norm:.4} m/s^2, {factor:.4} times gravity");
-        if let Some(finding) = self.by_unit(quantity, factor, 1.25, &what) {
-            return Some(finding);
+        let by_unit = self.by_unit(quantity, factor, 1.25, &what).filter(|finding| finding.fits.is_some());
+        if by_unit.is_some() {
+            return by_unit;
         }
         if up < -0.7 * norm {
-            let fits = self.other_frame(quantity);
             let what = format!("its median along z is {up:.3} m/s^2, but up is positive in our body");
-            return Some(finding(quantity, -1.0, Some(fits), &what));
+            return Some(finding(quantity, Some(self.other_frame(quantity)), &what));
         }
         let hint = if factor < 0.5 { "; gravity may have been taken off" } else { "" };
-        (!(0.6..1.6).contains(&factor)).then(|| finding(quantity, factor, None, &format!("{what}{hint}")))
+        (!(0.6..1.6).contains(&factor)).then(|| finding(quantity, None, &format!("{what}{hint}")))
     }
 
     /// The vehicle flies upright.
@@ -156,12 +151,12 @@ impl Judge<'_> {
         let fits = (reordered > 0.8).then(|| {
             format!("the order w, x, y, z ({reordered:.2}): name the columns in the order x, y, z, w")
         });
-        (up < 0.3).then(|| finding(Quantity::Attitude, -1.0, fits, &what))
+        (up < 0.3).then(|| finding(Quantity::Attitude, fits, &what))
     }
 
     /// The attitude as it would be if the columns named x, y, z, w held w, x, y, z; `None` in other frames.
     fn w_first(&self) -> Option<Channel<4>> {
-        let entry = self.channels.get(&Quantity::Attitude)?.get_ref();
+        let entry = self.declared(Quantity::Attitude)?;
         let plain = entry.frame.unwrap_or_default() == Frame::FluEnu && entry.columns.is_some();
         plain.then(|| Channel {
             time_s: self.flight.attitude.time_s.clone(),
@@ -181,7 +176,7 @@ impl Judge<'_> {
             let what = format!("it is {:.4} times the derivative of the attitude", agreement.slope);
             if let Some(angles) = self.angles_that_fit(agreement.slope) {
                 let unit = self.unit_that_fits(quantity, agreement.slope, DERIVATIVE_TOLERANCE);
-                return Some(finding(quantity, agreement.slope, either(unit, Some(angles)), &what));
+                return Some(finding(quantity, either(unit, Some(angles)), &what));
             }
             return self
                 .by_unit(quantity, agreement.slope, DERIVATIVE_TOLERANCE, &what)
@@ -196,7 +191,7 @@ impl Judge<'_> {
                 agreement.correlation, better.correlation
             );
             let fits = "the order w, x, y, z: name the columns in the order x, y, z, w".to_owned();
-            return Some(finding(Quantity::Attitude, agreement.slope, Some(fits), &what));
+            return Some(finding(Quantity::Attitude, Some(fits), &what));
         }
         let signs = pairs.signs();
         let signed =
@@ -213,7 +208,7 @@ impl Judge<'_> {
             [x, y, z] if x > 0.0 && y < 0.0 && z < 0.0 => self.other_frame(quantity),
             _ => "the axes, or angles of the attitude, with a `-` before the name".to_owned(),
         });
-        Some(finding(quantity, agreement.slope, fits, &what))
+        Some(finding(quantity, fits, &what))
     }
 
     /// The velocity is the position's derivative.
@@ -246,7 +241,7 @@ impl Judge<'_> {
             agreement.correlation,
             if fits.is_some() { "" } else { "; it may be in the body, or late" }
         );
-        Some(finding(quantity, agreement.slope, fits, &what))
+        Some(finding(quantity, fits, &what))
     }
 
     /// The position accelerates as the vehicle leans.
@@ -270,10 +265,9 @@ impl Judge<'_> {
         if pairs.agreement(QUIET_ACCELERATION_M_S2).is_none() {
             // Also what hangs on a rig leans and hardly moves.
             let hint = unit.map_or(String::new(), |unit| format!("; on a rig, or in another unit ({unit})"));
-            return Some(finding(quantity, factor, None, &(what + &hint)));
+            return Some(finding(quantity, None, &(what + &hint)));
         }
-        let fits = either(unit, self.angles_that_fit(factor));
-        Some(finding(quantity, factor, fits, &what))
+        Some(finding(quantity, either(unit, self.angles_that_fit(factor)), &what))
     }
 
     /// The position accelerates to where the vehicle leans.
@@ -285,19 +279,16 @@ impl Judge<'_> {
             agreement.filter(|_| self.flight.assumed.is_empty()).map(|agreement| agreement.correlation)
         };
         let declared = agreement(attitude, position).filter(|correlation| *correlation < SAME)?;
-        let is_euler = self.channels.get(&Quantity::Attitude)?.get_ref().euler.is_some();
-        let of_angles = ANGLE_MISTAKES.iter().filter(|_| is_euler);
-        let of_angles =
-            of_angles.map(|(advice, change)| (*advice, agreement(&with_angles(attitude, *change), position)));
-        let of_position = POSITION_MISTAKES.iter().map(|(advice, change)| {
+        let is_euler = self.declared(Quantity::Attitude)?.euler.is_some();
+        let of_angles = ANGLE_MISTAKES.iter().filter(|_| is_euler).filter_map(|(advice, change)| {
+            Some((*advice, agreement(&with_angles(attitude, *change), position)?))
+        });
+        let of_position = POSITION_MISTAKES.iter().filter_map(|(advice, change)| {
             let values = position.values.iter().map(|position| change(*position)).collect();
             let changed = Channel { time_s: position.time_s.clone(), values };
-            (*advice, agreement(attitude, &changed))
+            Some((*advice, agreement(attitude, &changed)?))
         });
-        let tried: Vec<(&str, f64)> = of_angles
-            .chain(of_position)
-            .filter_map(|(advice, correlation)| Some((advice, correlation?)))
-            .collect();
+        let tried: Vec<(&str, f64)> = of_angles.chain(of_position).collect();
         let best = tried.iter().map(|(_, correlation)| *correlation).fold(-1.0, f64::max);
         // With little yaw a pose tells not which of its halves is turned round.
         let alike =
@@ -309,19 +300,17 @@ impl Judge<'_> {
         );
         let quantity = if is_euler { Quantity::Attitude } else { Quantity::Position };
         let is_clear = best > SAME && best > declared + CLEARLY;
-        let finding = finding(quantity, best.signum(), is_clear.then_some(advice), &what);
-        (is_clear || declared < AGAINST).then_some(finding)
+        (is_clear || declared < AGAINST).then(|| finding(quantity, is_clear.then_some(advice), &what))
     }
 
     /// The unit of Euler angles in which a vehicle that leans or turns `factor` times too little would not.
     fn angles_that_fit(&self, factor: f64) -> Option<String> {
-        let entry = self.channels.get(&Quantity::Attitude)?.get_ref();
+        let entry = self.declared(Quantity::Attitude)?;
         entry.euler.as_ref()?;
-        let of = |name: &str| ANGLE.factor(name);
         let declared = entry.unit.as_deref()?;
         let (name, other) = ANGLE.units.iter().find(|unit| unit.0 != declared)?;
-        let off = libm::log(other / of(declared)? / factor).abs();
-        (off < libm::log(LEANING_TOLERANCE)).then(|| format!("`unit = \"{name}\"` of `attitude`"))
+        let off = libm::log(other / ANGLE.factor(declared)? / factor).abs();
+        (off < libm::log(LEANING_TOLERANCE)).then(|| format!("{} of `attitude`", of_unit(name)))
     }
 
     /// How much smaller a position can be than its true one, if its unit is declared too large.
@@ -338,7 +327,7 @@ impl Judge<'_> {
         let speed = median(pairs.derived.iter().map(|velocity| velocity.norm()))?;
         let what = format!("its median speed is {speed:.1} m/s");
         let fits = self.units_within(quantity, speed, (0.0, SPEED_MAX_M_S));
-        (speed > SPEED_MAX_M_S).then(|| finding(quantity, speed, fits, &what))
+        (speed > SPEED_MAX_M_S).then(|| finding(quantity, fits, &what))
     }
 
     /// The commands lie in the vehicle's range.
@@ -353,20 +342,20 @@ impl Judge<'_> {
             map.max,
             self.vehicle.hover_command()
         );
-        let share = match (self.unit(quantity), high) {
-            ("count", high) if high <= 1.001 && map.max > 50.0 => Some((FRACTION, 1.0 / map.max)),
-            ("count", high) if high <= 100.1 && map.max > 1000.0 => Some((PERCENT, 100.0 / map.max)),
-            (FRACTION | PERCENT, high) if high > 20.0 * map.max => Some(("count", high / map.max)),
+        let share = match self.unit(quantity) {
+            "count" if high <= 1.001 && map.max > 50.0 => Some(FRACTION),
+            "count" if high <= 100.1 && map.max > 1000.0 => Some(PERCENT),
+            FRACTION | PERCENT if high > 20.0 * map.max => Some("count"),
             _ => None,
         };
         // A motor at rest is zero whatever the smallest command, and then no command says anything.
-        if let Some((unit, factor)) = share.filter(|_| high > 0.0) {
-            return Some(finding(quantity, factor, Some(format!("`unit = \"{unit}\"`")), &what));
+        if let Some(unit) = share.filter(|_| high > 0.0) {
+            return Some(finding(quantity, Some(of_unit(unit)), &what));
         }
         let outside = high > map.max + tolerance || low < (map.min - tolerance).min(0.0);
         let far = high > 1.5 * map.max + tolerance;
         let fits = far.then(|| "a vehicle file with their range in its `[command]`".to_owned());
-        (outside || high < map.min).then(|| finding(quantity, high / map.max, fits, &what))
+        (outside || high < map.min).then(|| finding(quantity, fits, &what))
     }
 
     /// The rotors turn about as fast as hover needs.
@@ -381,7 +370,7 @@ impl Judge<'_> {
             return None;
         }
         let by_unit = self.by_unit(Quantity::RotorSpeed, factor, 1.6, &what);
-        by_unit.filter(|finding| finding.clear || !(0.5..2.0).contains(&factor))
+        by_unit.filter(|finding| finding.fits.is_some() || !(0.5..2.0).contains(&factor))
     }
 
     /// The voltage is one that batteries have.
@@ -391,15 +380,15 @@ impl Judge<'_> {
         let (low, high) = VOLTAGE_RANGE_V;
         let what = format!("its median is {volts} V, batteries have {low} to {high} V");
         let fits = self.units_within(quantity, volts, VOLTAGE_RANGE_V);
-        (!(low..high).contains(&volts)).then(|| finding(quantity, volts / 4.0, fits, &what))
+        (!(low..high).contains(&volts)).then(|| finding(quantity, fits, &what))
     }
 
     /// The unit in which the values would lie in `range`.
     fn units_within(&self, quantity: Quantity, value: f64, range: (f64, f64)) -> Option<String> {
         let raw = value / self.factor(quantity);
-        let others = quantity.dimension().units.iter().filter(|(name, _)| *name != self.unit(quantity));
-        let mut fitting = others.filter(|(_, factor)| (range.0..range.1).contains(&(raw * factor)));
-        fitting.next_back().map(|(name, _)| format!("`unit = \"{name}\"`"))
+        let mut others = self.other_units(quantity);
+        let fits = |(_, factor): &&(&str, f64)| (range.0..range.1).contains(&(raw * factor));
+        others.rfind(fits).map(|(name, _)| of_unit(name))
     }
 
     /// A finding for values `factor` times too large: clear if another unit explains it within `tolerance`.
@@ -408,25 +397,32 @@ impl Judge<'_> {
             return None;
         }
         let fits = self.unit_that_fits(quantity, factor, tolerance);
-        // The caller of `gravity` has another text where no unit fits.
-        if fits.is_none() && quantity == Quantity::SpecificForce {
-            return None;
-        }
-        Some(finding(quantity, factor, fits, &format!("declared in {}, {what}", self.unit(quantity))))
+        Some(finding(quantity, fits, &format!("declared in {}, {what}", self.unit(quantity))))
     }
 
     /// The unit in which values would be right that are now `factor` times too large.
     fn unit_that_fits(&self, quantity: Quantity, factor: f64, tolerance: f64) -> Option<String> {
         let declared = self.factor(quantity);
         let off = |other: f64| libm::log((factor * other / declared).abs()).abs();
-        let others = quantity.dimension().units.iter().filter(|(name, _)| *name != self.unit(quantity));
-        let best = others.min_by(|a, b| off(a.1).total_cmp(&off(b.1)))?;
-        (off(best.1) < libm::log(tolerance)).then(|| format!("`unit = \"{}\"`", best.0))
+        let best = self.other_units(quantity).min_by(|a, b| off(a.1).total_cmp(&off(b.1)))?;
+        (off(best.1) < libm::log(tolerance)).then(|| of_unit(best.0))
+    }
+
+    /// The units that it is not declared in.
+    fn other_units(
+        &self,
+        quantity: Quantity,
+    ) -> impl DoubleEndedIterator<Item = &'static (&'static str, f64)> {
+        quantity.dimension().units.iter().filter(move |(name, _)| *name != self.unit(quantity))
+    }
+
+    fn declared(&self, quantity: Quantity) -> Option<&Entry> {
+        self.channels.get(&quantity).map(Spanned::get_ref)
     }
 
     /// The declared unit; SI where the flights file leaves it to the type of message.
     fn unit(&self, quantity: Quantity) -> &str {
-        let declared = self.channels.get(&quantity).and_then(|entry| entry.get_ref().unit.as_deref());
+        let declared = self.declared(quantity).and_then(|entry| entry.unit.as_deref());
         declared.unwrap_or(quantity.dimension().units[0].0)
     }
 
@@ -435,7 +431,7 @@ impl Judge<'_> {
     }
 
     fn other_frame(&self, quantity: Quantity) -> String {
-        let frame = self.channels.get(&quantity).and_then(|entry| entry.get_ref().frame);
+        let frame = self.declared(quantity).and_then(|entry| entry.frame);
         let other = if frame == Some(Frame::FrdNed) { "flu-enu" } else { "frd-ned" };
         format!("`frame = \"{other}\"`")
     }
@@ -444,7 +440,7 @@ impl Judge<'_> {
 /// The attitude with roll and pitch changed.
 fn with_angles(attitude: &Channel<4>, change: fn((f64, f64)) -> (f64, f64)) -> Channel<4> {
     let changed = |wxyz: &[f64; 4]| {
-        let (roll, pitch, yaw) = UnitQuaternion::from_quaternion(frame::from_wxyz(*wxyz)).euler_angles();
+        let (roll, pitch, yaw) = frame::rotation(*wxyz).euler_angles();
         let (roll, pitch) = change((roll, pitch));
         frame::euler([roll, pitch, yaw])
     };
@@ -459,10 +455,13 @@ fn either(here: Option<String>, there: Option<String>) -> Option<String> {
     }
 }
 
-/// A finding; clear if something would fit.
-fn finding(channel: Quantity, factor: f64, fits: Option<String>, what: &str) -> Finding {
+fn of_unit(name: &str) -> String {
+    format!("`unit = \"{name}\"`")
+}
+
+fn finding(channel: Quantity, fits: Option<String>, what: &str) -> Finding {
     let advice = fits.as_ref().map_or(String::new(), |fits| format!("; {fits} would fit"));
-    Finding { channel, factor, clear: fits.is_some(), message: format!("`{channel}`: {what}{advice}"), fits }
+    Finding { channel, message: format!("`{channel}`: {what}{advice}"), fits }
 }
 
 /// A note where a vector follows its derived twin but loosely.
@@ -471,20 +470,14 @@ fn late(channel: Quantity, agreement: Agreement) -> Option<Finding> {
         "it follows the derivative with a correlation of {:.2} only: noisy, or one is late (`delay_s`)",
         agreement.correlation
     );
-    (agreement.correlation < IN_TIME).then(|| finding(channel, agreement.slope, None, &what))
+    (agreement.correlation < IN_TIME).then(|| finding(channel, None, &what))
 }
 
 /// The median of how far the body's z axis points up, from -1 to 1.
 fn z_up(attitude: &Channel<4>) -> Option<f64> {
-    median(attitude.values.iter().map(|wxyz| {
-        let q = UnitQuaternion::from_quaternion(frame::from_wxyz(*wxyz));
-        (q * Vector3::z()).z
-    }))
+    median(attitude.values.iter().map(|wxyz| (frame::rotation(*wxyz) * Vector3::z()).z))
 }
 
 fn range(numbers: impl Iterator<Item = f64>) -> Option<(f64, f64)> {
-    numbers.fold(None, |range, number| match range {
-        None => Some((number, number)),
-        Some((low, high)) => Some((number.min(low), number.max(high))),
-    })
+    numbers.map(|number| (number, number)).reduce(|a, b| (b.0.min(a.0), b.1.max(a.1)))
 }

@@ -265,7 +265,8 @@ impl Reading<'_> {
 
     /// Notes what is not clear, or is to be trusted; the rest is an error.
     fn settle(&self, flight: &mut Flight, findings: Vec<Finding>) -> Result<(), FlightsError> {
-        let (clear, vague): (Vec<_>, Vec<_>) = findings.into_iter().partition(|finding| finding.clear);
+        let (clear, vague): (Vec<_>, Vec<_>) =
+            findings.into_iter().partition(|finding| finding.fits.is_some());
         flight.notes.extend(vague.into_iter().map(|finding| finding.message));
         if self.entry.trust_units || clear.is_empty() {
             flight.notes.extend(clear.into_iter().map(|finding| finding.message));

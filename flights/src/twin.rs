@@ -43,6 +43,15 @@ pub enum Comparison {
 }
 
 /// Compares two channels.
+///
+/// ```
+/// use flights::{Channel, Comparison, twin};
+///
+/// let values: Vec<[f64; 1]> = (0..100).map(|k| [f64::from(k * 7919 % 1009)]).collect();
+/// let first = Channel { time_s: (0..100).map(f64::from).collect(), values };
+/// let later = Channel { time_s: first.time_s.iter().map(|time_s| time_s + 60.0).collect(), ..first.clone() };
+/// assert!(matches!(twin(&first, &later), Comparison::Same(twin) if twin.in_second_s == (60.0, 159.0)));
+/// ```
 #[must_use]
 pub fn twin<const N: usize>(first: &Channel<N>, second: &Channel<N>) -> Comparison {
     let steps = Steps::of(first, second);

@@ -5,6 +5,8 @@
 
 use crate::fit::Problem;
 use crate::prepared::{Equation, Prepared};
+use crate::rows::column;
+use crate::statistics::deviation;
 use serde::Serialize;
 
 /// A speed whose spread is below this part of the expected is stuck.
@@ -65,15 +67,13 @@ fn suspicion(problem: &Problem, rotor: usize) -> Option<Suspicion> {
         pairs.iter().map(|pair| (pair.0[rotor], pair.1[rotor])).unzip()
     };
     let (measured, expected) = of(rotor);
-    let (spread, wanted) = (spread(&measured), spread(&expected));
+    let (spread, wanted) = (deviation(&measured), deviation(&expected));
     if spread < STUCK * wanted {
         let finding = format!("it spreads by {spread:.2} rad/s where its command asks for {wanted:.2} rad/s");
         return Some(Suspicion { kind: "stuck-sensor", finding });
     }
-    let ratio = |rotor: usize| {
-        let (measured, expected) = of(rotor);
-        measured.iter().sum::<f64>() / expected.iter().sum::<f64>()
-    };
+    let total = |speeds: Vec<f64>| speeds.iter().sum::<f64>();
+    let ratio = |rotor: usize| total(of(rotor).0) / total(of(rotor).1);
     let mut others: Vec<f64> = (0..4).filter(|other| *other != rotor).map(ratio).collect();
     others.sort_by(f64::total_cmp);
     let ratio_here = ratio(rotor);
@@ -102,11 +102,6 @@ fn speeds(problem: &Problem) -> Option<Vec<([f64; 4], [f64; 4])>> {
     (!pairs.is_empty()).then_some(pairs)
 }
 
-fn spread(values: &[f64]) -> f64 {
-    let mean = values.iter().sum::<f64>() / values.len() as f64;
-    (values.iter().map(|value| (value - mean).powi(2)).sum::<f64>() / values.len() as f64).sqrt()
-}
-
 fn distrust(problem: &mut Problem, rotor: usize, is_distrusted: bool) {
     for flight in problem.estimation.iter_mut().chain(&mut problem.validation) {
         flight.distrusted[rotor] = is_distrusted;
@@ -125,10 +120,9 @@ fn flight_cost(problem: &Problem, flight: &Prepared, declared: &[f64]) -> f64 {
     let of_motion = |equation: &Equation| !matches!(equation, Equation::RotorSpeed | Equation::Gyroscope);
     let mut sum = 0.0;
     for equation in flight.layout.equations.iter().filter(|equation| of_motion(equation)) {
-        let Some(offset) = flight.offset_of(*equation) else { continue };
         for axis in 0..equation.size() {
             let power = |rows: &[f64]| -> f64 {
-                rows[offset + axis..].iter().step_by(flight.width()).map(|row| row * row).sum()
+                column(flight, rows, *equation, axis).iter().map(|row| row * row).sum()
             };
             sum += power(&residual) / power(&measured).max(1e-12);
         }

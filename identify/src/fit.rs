@@ -7,7 +7,7 @@
 use crate::candidate::Candidate;
 use crate::model::Model;
 use crate::normal::{self, Block};
-use crate::prepared::{Equation, Prepared};
+use crate::prepared::Prepared;
 use crate::rows::{keep_means, take_off_means};
 use crate::statistics::student_quantile;
 use nalgebra::{DMatrix, DVector};
@@ -155,10 +155,8 @@ impl<'f> Problem<'f> {
             for (at, parameter) in free.iter().enumerate() {
                 let entry = &self.model.parameters.all[*parameter];
                 let wanted = values[*parameter] + step[at];
-                let bound = wanted.clamp(entry.spec().min, entry.spec().max);
-                if held[at].is_none()
-                    && (bound - wanted).abs() > 1e-12 * (entry.spec().max - entry.spec().min)
-                {
+                let (bound, range) = (entry.bounded(wanted), entry.spec().max - entry.spec().min);
+                if held[at].is_none() && (bound - wanted).abs() > 1e-12 * range {
                     held[at] = Some(bound - values[*parameter]);
                     is_within = false;
                 }
@@ -174,8 +172,7 @@ impl<'f> Problem<'f> {
     pub fn moved(&self, values: &[f64], free: &[usize], step: &DVector<f64>) -> Vec<f64> {
         let mut next = values.to_vec();
         for (parameter, step) in free.iter().zip(step.iter()) {
-            let entry = &self.model.parameters.all[*parameter];
-            next[*parameter] = (next[*parameter] + step).clamp(entry.spec().min, entry.spec().max);
+            next[*parameter] = self.model.parameters.all[*parameter].bounded(next[*parameter] + step);
         }
         next
     }
@@ -199,19 +196,15 @@ impl<'f> Problem<'f> {
         (residual, columns)
     }
 
-    /// The normal equations of the blocks of one flight.
-    pub fn blocks_of(&self, flight: &Prepared, values: &[f64], free: &[usize]) -> Vec<Block> {
-        let (residual, columns) = self.linearised(flight, values, free);
-        self.flight_blocks(flight, &residual, &columns)
-    }
-
     /// The weighted sums of squares of all blocks of `flights`.
     pub fn costs(&self, flights: &[Prepared], values: &[f64]) -> Vec<f64> {
         self.blocks(flights, values, &[]).iter().map(|block| block.cost).collect()
     }
 
-    fn flight_blocks(&self, flight: &Prepared, residual: &[f64], columns: &[Vec<f64>]) -> Vec<Block> {
+    /// The normal equations of the blocks of one flight.
+    pub fn blocks_of(&self, flight: &Prepared, values: &[f64], free: &[usize]) -> Vec<Block> {
         use rayon::prelude::*;
+        let (residual, columns) = self.linearised(flight, values, free);
         let (width, weights) = (flight.width(), self.row_weights(flight));
         let of_knots = |knots: &(usize, usize)| {
             let mut block = Block::zero(columns.len());
@@ -219,7 +212,7 @@ impl<'f> Problem<'f> {
             for at in knots.0 * width..knots.1 * width {
                 let weight = weights[at % width];
                 if weight > 0.0 {
-                    row.iter_mut().zip(columns).for_each(|(row, column)| *row = column[at]);
+                    row.iter_mut().zip(&columns).for_each(|(row, column)| *row = column[at]);
                     block.add(residual[at], &row, weight);
                 }
             }
@@ -230,14 +223,9 @@ impl<'f> Problem<'f> {
     }
 
     /// The weights of the rows of one knot.
-    pub fn row_weights(&self, flight: &Prepared) -> Vec<f64> {
-        let component = |equation: &Equation, axis: usize| {
-            self.weights.get(&(equation.name(), axis)).copied().unwrap_or(0.0)
-        };
-        let equations = flight.layout.equations.iter();
-        equations
-            .flat_map(|equation| (0..equation.size()).map(move |axis| component(equation, axis)))
-            .collect()
+    fn row_weights(&self, flight: &Prepared) -> Vec<f64> {
+        let weight = |component| self.weights.get(&component).copied().unwrap_or(0.0);
+        components(flight).map(weight).collect()
     }
 
     /// First knot of each block, and the one behind its last.
@@ -257,14 +245,18 @@ impl<'f> Problem<'f> {
     }
 }
 
+/// What the rows of one knot are: equations by name, each with its axes.
+fn components(flight: &Prepared) -> impl Iterator<Item = (&'static str, usize)> {
+    let equations = flight.layout.equations.iter();
+    equations.flat_map(|equation| (0..equation.size()).map(|axis| (equation.name(), axis)))
+}
+
 /// The step of the parameters that are not held, while the others go where they are held.
 fn held_step(total: &Block, held: &[Option<f64>]) -> DVector<f64> {
     let free: Vec<usize> = (0..held.len()).filter(|at| held[*at].is_none()).collect();
     let mut step = DVector::from_fn(held.len(), |at, _| held[at].unwrap_or(0.0));
-    let gradient = &total.gradient + &total.gram * &step;
-    let equations = total.of(&free);
-    let wanted = DVector::from_fn(free.len(), |i, _| gradient[free[i]]);
-    let solved = -(normal::inverse(&equations.gram) * wanted);
+    let equations = total.after(&step).of(&free);
+    let solved = -(normal::inverse(&equations.gram) * equations.gradient);
     free.iter().zip(solved.iter()).for_each(|(at, solved)| step[*at] = *solved);
     step
 }
@@ -300,15 +292,11 @@ impl Problem<'_> {
         for flight in &self.estimation {
             let (residual, columns) = self.linearised(flight, values, free);
             let measured = self.model.tracks(flight, values).rows;
-            let width = flight.width();
-            let equations = flight.layout.equations.iter();
-            let names: Vec<_> = equations
-                .flat_map(|equation| (0..equation.size()).map(move |axis| (equation.name(), axis)))
-                .collect();
+            let names: Vec<_> = components(flight).collect();
             for (at, residual) in residual.iter().enumerate() {
                 let left = residual
                     + columns.iter().zip(step.iter()).map(|(column, step)| column[at] * step).sum::<f64>();
-                let sum = sums.entry(names[at % width]).or_default();
+                let sum = sums.entry(names[at % names.len()]).or_default();
                 *sum = (sum.0 + left * left, sum.1 + measured[at] * measured[at], sum.2 + 1.0);
             }
         }

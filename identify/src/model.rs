@@ -2,7 +2,7 @@
 #![allow(non_snake_case, reason = "a trailing _W or _B names the frame a vector is written in")]
 
 use crate::parameter::Parameters;
-use crate::prepared::{Equation, Held, Prepared, Tracks};
+use crate::prepared::{BOX_STEPS, Equation, Held, Prepared, Tracks};
 use crate::sensing::SensorErrors;
 use crate::track::Track;
 use nalgebra::Vector3;
@@ -70,18 +70,13 @@ impl Model {
             for (equation, (_, window)) in flight.layout.equations.iter().zip(&flight.layout.windows) {
                 match equation {
                     Equation::SpecificForce => {
-                        let force = window.over(&sides.force_B, knot);
-                        take(&std::array::from_fn::<_, 3, _>(|axis| {
-                            force[axis] + errors.accelerometer_bias_m_s2[axis]
-                        }));
+                        let force = Vector3::from(window.over(&sides.force_B, knot));
+                        take((force + Vector3::from(errors.accelerometer_bias_m_s2)).as_slice());
                     }
                     Equation::Acceleration => take(&window.over(&sides.acceleration_W, knot)),
                     Equation::AngularAcceleration => take(&window.over(&sides.angular_B, knot)),
                     Equation::Gyroscope => take(&errors.gyroscope_bias_rad_s),
-                    Equation::RotorSpeed => {
-                        let speeds = window.over(&rotors.commanded, knot);
-                        take(&speeds);
-                    }
+                    Equation::RotorSpeed => take(&window.over(&rotors.commanded, knot)),
                 }
             }
         }
@@ -219,7 +214,7 @@ fn correct(flight: &Prepared, commanded: &[[f64; 4]], rotors: &mut [[RotorState;
     for (difference, commanded) in difference.values.iter_mut().zip(commanded) {
         *difference = std::array::from_fn(|i| difference[i] - commanded[i]);
     }
-    let smooth = difference.smoothed(flight.layout.box_steps);
+    let smooth = difference.smoothed(BOX_STEPS);
     for (rotors, more) in rotors.iter_mut().zip(&smooth) {
         for i in (0..4).filter(|i| !flight.distrusted[*i]) {
             rotors[i].speed_rad_s += more[i];
@@ -230,7 +225,7 @@ fn correct(flight: &Prepared, commanded: &[[f64; 4]], rotors: &mut [[RotorState;
 fn measured_rotors(flight: &Prepared) -> Vec<[RotorState; 4]> {
     let clock = &flight.layout.clock;
     let track = Track::sampled(&flight.flight.rotor_speed, 0.0, clock);
-    let slopes = track.slope(flight.layout.box_steps, clock.step_s);
+    let slopes = track.slope(BOX_STEPS, clock.step_s);
     let rotor = |speed_rad_s, acceleration_rad_s2| RotorState { speed_rad_s, acceleration_rad_s2 };
     let rotors = track.values.iter().zip(&slopes);
     rotors.map(|(speed, slope)| std::array::from_fn(|i| rotor(speed[i], slope[i]))).collect()

@@ -14,9 +14,12 @@ pub fn deviation<const N: usize>(channel: &Channel<N>) -> Option<f64> {
     (count > 0.0).then(|| (squares / count / 20.0).sqrt())
 }
 
-/// The noise of each channel that was measured, over the validation data, with its unit.
-pub fn floor(problem: &Problem) -> BTreeMap<&'static str, (f64, &'static str)> {
-    let mut floor = BTreeMap::new();
+/// The noise of channels, with its unit.
+pub type Floor = BTreeMap<&'static str, (f64, &'static str)>;
+
+/// The noise of each channel that was measured, over the validation data.
+pub fn floor(problem: &Problem) -> Floor {
+    let mut floor = Floor::new();
     let mut add = |name: &'static str, unit: &'static str, of_flight: &dyn Fn(&Flight) -> Option<f64>| {
         let found: Vec<f64> =
             problem.validation.iter().filter_map(|flight| of_flight(flight.flight)).collect();
@@ -57,11 +60,7 @@ fn of_slope(period_s: f64) -> f64 {
 
 /// The error per channel that a perfect model has over `horizon_s` by noise alone: that of the start, carried on, and
 /// that of the end. Each is the length of a vector of three axes; attitude in deg as in predictions.
-pub fn prediction_floor(
-    floor: &BTreeMap<&'static str, (f64, &'static str)>,
-    horizon_s: f64,
-    gravity_m_s2: f64,
-) -> BTreeMap<&'static str, f64> {
+pub fn prediction_floor(floor: &Floor, horizon_s: f64, gravity_m_s2: f64) -> BTreeMap<&'static str, f64> {
     let floor_of = |name| floor.get(name).map_or(0.0, |(value, _)| *value);
     let (position, velocity, rates) = (floor_of("position"), floor_of("velocity"), floor_of("rates"));
     let angle = floor_of("attitude");

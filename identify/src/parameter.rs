@@ -100,6 +100,11 @@ impl Parameter {
     pub fn spec(&self) -> &'static ParameterSpec {
         &self.kind.parameters[self.index]
     }
+
+    /// The value within its bounds that is nearest to `wanted`.
+    pub fn bounded(&self, wanted: f64) -> f64 {
+        wanted.clamp(self.spec().min, self.spec().max)
+    }
 }
 
 /// The grid cannot see less.

@@ -28,33 +28,28 @@ pub struct Measured {
 /// Root mean squares at the ends of windows, by channel.
 pub type Errors = BTreeMap<&'static str, f64>;
 
-/// Measured and predicted states at some ticks, for pictures: time in s, then the states.
-pub type Trace = Vec<(f64, RigidBody, RigidBody)>;
-
 impl Measured {
     /// The states of `flight`; `None` where it has no commands, or no motion.
     pub fn of(flight: &Flight) -> Option<Self> {
-        let span = if flight.attitude.is_empty() {
-            &flight.angular_velocity.time_s
-        } else {
-            &flight.attitude.time_s
-        };
-        let (first, last) = (span.first()?, span.last()?);
+        let (first_s, last_s) = flight.attitude.span_s().or(flight.angular_velocity.span_s())?;
         let (start_s, end_s) = flight.command.span_s()?;
-        let clock = Clock::spanning(first.max(start_s), last.min(end_s) - 0.01, TICK_S);
+        let clock = Clock::spanning(first_s.max(start_s), last_s.min(end_s) - 0.01, TICK_S);
         let position = Track::sampled(&flight.position, 0.0, &clock);
         let attitude = Track::sampled(&flight.attitude, 0.0, &clock);
         let gyroscope = Track::sampled(&flight.angular_velocity, 0.0, &clock);
-        let velocity = if flight.velocity.is_empty() {
-            position.slope(reach(flight.position.period_s()), TICK_S)
+        // What was not measured is derived from samples to both sides.
+        let (velocity, of_position) = if flight.velocity.is_empty() {
+            let reach = reach(flight.position.period_s());
+            (position.slope(reach, TICK_S), reach)
         } else {
-            Track::sampled(&flight.velocity, 0.0, &clock).values
+            (Track::sampled(&flight.velocity, 0.0, &clock).values, 0)
         };
         let quaternions = attitudes(&attitude);
-        let rates = if flight.angular_velocity.is_empty() {
-            turning(&quaternions, reach(flight.attitude.period_s()))
+        let (rates, of_attitude) = if flight.angular_velocity.is_empty() {
+            let reach = reach(flight.attitude.period_s());
+            (turning(&quaternions, reach), reach)
         } else {
-            gyroscope.values.clone()
+            (gyroscope.values.clone(), 0)
         };
         let body = |i: usize| RigidBody {
             position_W_m: position.values[i].into(),
@@ -68,36 +63,24 @@ impl Measured {
                 is_valid.iter_mut().zip(valid_about(valid, reach)).for_each(|(all, about)| *all &= about);
             }
         };
-        let of_position = if flight.velocity.is_empty() { reach(flight.position.period_s()) } else { 0 };
-        let of_attitude =
-            if flight.angular_velocity.is_empty() { reach(flight.attitude.period_s()) } else { 0 };
         require(!flight.position.is_empty(), &position.valid, of_position);
         require(!flight.attitude.is_empty(), &attitude.valid, of_attitude);
         require(!flight.angular_velocity.is_empty(), &gyroscope.valid, 0);
         Some(Self { bodies: (0..clock.count).map(body).collect(), clock, is_valid })
     }
 
-    /// Errors of `airframe` at the ends of windows of `horizon_s`, and the flight itself at every `every` ticks.
-    pub fn predicted(
-        &self,
-        flight: &Flight,
-        airframe: Airframe,
-        horizon_s: f64,
-        every: usize,
-    ) -> (Errors, Trace) {
+    /// Errors of `airframe` at the ends of windows of `horizon_s`.
+    pub fn predicted(&self, flight: &Flight, airframe: Airframe, horizon_s: f64) -> Errors {
         let window = (horizon_s / TICK_S).round() as usize;
         let memory = airframe.initial_state(0, "predict", TICK_S);
         let mut commands = Held::new(&flight.command);
         let first = commands.at(self.clock.start_s);
         let mut plant = FreeFlight::new(NewtonEuler::flying(airframe, 1), self.bodies[0], memory);
         plant.settle_rotors(&first);
-        let (mut errors, mut trace) = (WindowEndErrors::default(), Vec::new());
+        let mut errors = WindowEndErrors::default();
         for tick in 1..self.clock.count {
             plant.step(&commands.at(self.clock.at(tick - 1)), TICK_S, &[]);
             let (body, measured) = (&plant.state().body, &self.bodies[tick]);
-            if every > 0 && tick % every == 0 {
-                trace.push((self.clock.at(tick), *measured, *body));
-            }
             if tick % window == 0 {
                 if tick - window >= SETTLE_TICKS
                     && self.is_valid[tick - window..=tick].iter().all(|is_valid| *is_valid)
@@ -108,10 +91,10 @@ impl Measured {
             }
         }
         if errors.windows() == 0 {
-            return (Errors::new(), trace);
+            return Errors::new();
         }
         let measured = StateQuantity::ALL.into_iter().filter(|quantity| quantity.is_measured(flight));
-        (measured.map(|quantity| (quantity.name(), errors.rms(quantity))).collect(), trace)
+        measured.map(|quantity| (quantity.name(), errors.rms(quantity))).collect()
     }
 }
 

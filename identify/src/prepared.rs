@@ -8,6 +8,13 @@ use flights::{Channel, Flight};
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 
 /// An equation that measurement and model are both put into.
+///
+/// ```
+/// use identify::Equation;
+///
+/// let force = Equation::SpecificForce;
+/// assert_eq!((force.name(), force.unit(), force.size()), ("specific_force", "m/s^2", 3));
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Equation {
     /// What the accelerometer reads, in B: forces.
@@ -70,8 +77,8 @@ impl Translation {
     }
 
     /// Measured side and model side.
-    fn windows(self, box_steps: usize, step_s: f64) -> (Window, Window) {
-        let plain = Window::b_spline(box_steps);
+    fn windows(self, step_s: f64) -> (Window, Window) {
+        let plain = Window::b_spline(BOX_STEPS);
         match self {
             Translation::Position => (plain.behind(second_difference(step_s)), plain.behind(NUMEROV)),
             Translation::Velocity => (plain.behind(central_difference(step_s)), plain.behind(SIMPSON)),
@@ -84,8 +91,6 @@ impl Translation {
 pub struct Layout {
     /// The grid.
     pub clock: Clock,
-    /// Grid steps in a box of the window, which is also the way from knot to knot.
-    pub box_steps: usize,
     /// Middles of the windows that are compared.
     pub knots: Vec<usize>,
     /// The equations, in the order of their rows.
@@ -108,6 +113,9 @@ pub struct Tracks {
     /// The measured side of every row: for each knot, each equation's components.
     pub rows: Vec<f64>,
 }
+
+/// Grid steps in a box of the window, which is also the way from knot to knot.
+pub const BOX_STEPS: usize = 5;
 
 /// How fast the rotors turn where a log begins, and what was commanded before, is not known: they count from then on.
 pub const SETTLE_S: f64 = 0.5;
@@ -137,13 +145,6 @@ pub struct Prepared<'f> {
     pub distrusted: [bool; 4],
 }
 
-/// The grid for flights whose slowest compared channel has this period: at 100 Hz windows of 0.12 s.
-fn steps_s(period_s: f64) -> (f64, usize) {
-    let box_s = (3.0 * period_s).max(0.02);
-    let box_steps = 5;
-    (box_s / box_steps as f64, box_steps)
-}
-
 impl<'f> Prepared<'f> {
     /// The flight on its grid; `is_flying` tells from motor commands (`true`) or rotor speeds (`false`) whether the
     /// vehicle is in the air; `None` where it has nothing to compare: no commands and no rotor speeds, no motion, or
@@ -155,14 +156,15 @@ impl<'f> Prepared<'f> {
     ) -> Option<Self> {
         let equations = equations(flight);
         let (start_s, end_s) = common_span(flight, &equations)?;
-        let (step_s, box_steps) = match box_s {
-            Some(box_s) => (box_s / 5.0, 5),
-            None => steps_s(slowest_period_s(flight)?),
+        let box_s = match box_s {
+            Some(box_s) => box_s,
+            // At 100 Hz windows of 0.12 s.
+            None => (3.0 * slowest_period_s(flight)?).max(0.02),
         };
+        let step_s = box_s / BOX_STEPS as f64;
         let clock = Clock::spanning(start_s, end_s, step_s);
-        let windows =
-            equations.iter().map(|equation| windows(*equation, flight, box_steps, step_s)).collect();
-        let layout = Layout { clock, box_steps, knots: Vec::new(), equations, windows };
+        let windows = equations.iter().map(|equation| windows(*equation, flight, step_s)).collect();
+        let layout = Layout { clock, knots: Vec::new(), equations, windows };
         let mut prepared = Self { flight, layout, late: Lateness::default(), distrusted: [false; 4] };
         prepared.layout.knots = prepared.knots(&is_flying);
         (prepared.layout.knots.len() >= 3).then_some(prepared)
@@ -200,7 +202,7 @@ impl<'f> Prepared<'f> {
         let position = Track::sampled(&flight.position, position_s, clock);
         let velocity_track = Track::sampled(&flight.velocity, pose_s + self.late.velocity_s, clock);
         let velocity = if flight.velocity.is_empty() {
-            position.slope(self.layout.box_steps, clock.step_s)
+            position.slope(BOX_STEPS, clock.step_s)
         } else {
             velocity_track.values.clone()
         };
@@ -210,23 +212,19 @@ impl<'f> Prepared<'f> {
         let force = Track::sampled(&flight.specific_force, imu_s, clock);
         let speeds = Track::sampled(&flight.rotor_speed, 0.0, clock);
         let rates = if flight.angular_velocity.is_empty() {
-            Track { values: turning.clone(), valid: Vec::new() }.smoothed(self.layout.box_steps / 2)
+            Track { values: turning.clone(), valid: Vec::new() }.smoothed(BOX_STEPS / 2)
         } else {
             gyroscope.values.clone()
         };
+        let translation = if flight.position.is_empty() { &velocity_track } else { &position };
+        let rotation = if flight.angular_velocity.is_empty() { &turning } else { &gyroscope.values };
         let mut rows = Vec::with_capacity(self.layout.knots.len() * self.width());
         for &knot in &self.layout.knots {
             for (equation, (measured, model)) in self.layout.equations.iter().zip(&self.layout.windows) {
                 match equation {
                     Equation::SpecificForce => rows.extend(measured.over(&force.values, knot)),
-                    Equation::Acceleration if flight.position.is_empty() => {
-                        rows.extend(measured.over(&velocity_track.values, knot));
-                    }
-                    Equation::Acceleration => rows.extend(measured.over(&position.values, knot)),
-                    Equation::AngularAcceleration if flight.angular_velocity.is_empty() => {
-                        rows.extend(measured.over(&turning, knot));
-                    }
-                    Equation::AngularAcceleration => rows.extend(measured.over(&gyroscope.values, knot)),
+                    Equation::Acceleration => rows.extend(measured.over(&translation.values, knot)),
+                    Equation::AngularAcceleration => rows.extend(measured.over(rotation, knot)),
                     Equation::Gyroscope => {
                         let (gyro, turned) =
                             (model.over(&gyroscope.values, knot), measured.over(&turning, knot));
@@ -244,7 +242,7 @@ impl<'f> Prepared<'f> {
     pub fn translation_rows(&self, translation: Translation) -> Option<Vec<f64>> {
         self.offset_of(Equation::Acceleration).filter(|_| !self.is_assumed())?;
         let channel = translation.channel(self.flight);
-        let (measured, _) = self.translation_windows(translation);
+        let (measured, _) = translation.windows(self.layout.clock.step_s);
         let values = || Track::sampled(channel, 0.0, &self.layout.clock).values;
         (!channel.is_empty()).then(|| self.rows_over(&measured, &values()))
     }
@@ -264,11 +262,7 @@ impl<'f> Prepared<'f> {
             (attitude_WB * Vector3::from(*force_B) - gravity_m_s2 * Vector3::z()).into()
         };
         let acceleration_W: Vec<[f64; 3]> = attitude_WB.iter().zip(&force_B.values).map(turned).collect();
-        self.rows_over(&self.translation_windows(translation).1, &acceleration_W)
-    }
-
-    fn translation_windows(&self, translation: Translation) -> (Window, Window) {
-        translation.windows(self.layout.box_steps, self.layout.clock.step_s)
+        self.rows_over(&translation.windows(clock.step_s).1, &acceleration_W)
     }
 
     /// Takes its pose as `late`, and leaves out the knots about which it was not sampled then.
@@ -305,7 +299,7 @@ impl<'f> Prepared<'f> {
     fn knots_within(&self, valid: &[bool]) -> Vec<usize> {
         let reach = self.reach();
         let (about, last) = (valid_about(valid, reach), valid.len().saturating_sub(reach + 1));
-        (reach..last).step_by(self.layout.box_steps).filter(|knot| about[*knot]).collect()
+        (reach..last).step_by(BOX_STEPS).filter(|knot| about[*knot]).collect()
     }
 
     fn valid(&self, is_flying: &impl Fn(&[f64; 4], bool) -> bool, gap_margin_s: f64) -> Vec<bool> {
@@ -358,10 +352,8 @@ fn sampled_about<const N: usize>(
     }
     let (first_s, last_s) = channel.span_s().unwrap_or_default();
     let inside = first_s + END_MARGIN_S..=last_s - END_MARGIN_S;
-    valid
-        .iter_mut()
-        .enumerate()
-        .for_each(|(index, valid_here)| *valid_here &= inside.contains(&clock.at(index)));
+    let at_instants = valid.iter_mut().enumerate();
+    at_instants.for_each(|(index, is_valid)| *is_valid &= inside.contains(&clock.at(index)));
     Some(valid)
 }
 
@@ -414,15 +406,13 @@ fn equations(flight: &Flight) -> Vec<Equation> {
     all.into_iter().filter(|(_, is_there)| *is_there).map(|(equation, _)| equation).collect()
 }
 
-fn windows(equation: Equation, flight: &Flight, box_steps: usize, step_s: f64) -> (Window, Window) {
-    let plain = Window::b_spline(box_steps);
+fn windows(equation: Equation, flight: &Flight, step_s: f64) -> (Window, Window) {
+    let plain = Window::b_spline(BOX_STEPS);
     let central = central_difference(step_s);
     match equation {
         Equation::SpecificForce | Equation::RotorSpeed => (plain.clone(), plain),
-        Equation::Acceleration if flight.position.is_empty() => {
-            Translation::Velocity.windows(box_steps, step_s)
-        }
-        Equation::Acceleration => Translation::Position.windows(box_steps, step_s),
+        Equation::Acceleration if flight.position.is_empty() => Translation::Velocity.windows(step_s),
+        Equation::Acceleration => Translation::Position.windows(step_s),
         Equation::AngularAcceleration if flight.angular_velocity.is_empty() => {
             (plain.behind(central), plain.behind(SIMPSON).behind(SIMPSON))
         }
@@ -476,13 +466,9 @@ fn turning(attitude: &[UnitQuaternion<f64>], step_s: f64) -> Vec<[f64; 3]> {
     let count = attitude.len();
     let between =
         |i: usize| -> Vector3<f64> { (attitude[i].inverse() * attitude[i + 1]).scaled_axis() / step_s };
-    (0..count)
-        .map(|i| {
-            if count < 3 {
-                return [0.0; 3];
-            }
-            let i = i.clamp(1, count - 2);
-            ((between(i - 1) + between(i)) / 2.0).into()
-        })
-        .collect()
+    if count < 3 {
+        return vec![[0.0; 3]; count];
+    }
+    let about = |i: usize| ((between(i - 1) + between(i)) / 2.0).into();
+    (0..count).map(|i| about(i.clamp(1, count - 2))).collect()
 }

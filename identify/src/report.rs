@@ -30,9 +30,9 @@ pub struct Report {
     /// The trims of the flights where they differ between flights: constant torques that no one vehicle explains.
     pub trims: Vec<Trim>,
     /// Prediction errors of the validation data: flight, horizon in s, channel.
-    pub held_out: BTreeMap<String, BTreeMap<String, BTreeMap<&'static str, Change>>>,
+    pub held_out: Changes,
     /// The same of the estimation data.
-    pub fitted: BTreeMap<String, BTreeMap<String, BTreeMap<&'static str, Change>>>,
+    pub fitted: Changes,
     /// White noise of each channel, and the prediction error that it alone makes at each horizon.
     pub noise_floor: BTreeMap<&'static str, Noise>,
     /// What no candidate explains: the size of the part of the residual that is not noise, by equation.
@@ -53,6 +53,9 @@ pub struct BeforeAfter<T> {
     /// With the accepted effects.
     pub after: T,
 }
+
+/// Prediction errors by flight, horizon in s and channel.
+pub type Changes = BTreeMap<String, BTreeMap<String, BTreeMap<&'static str, Change>>>;
 
 /// A prediction error before and after.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -158,8 +161,7 @@ const ENOUGH_BLOCKS: usize = 12;
 
 impl Report {
     /// Whether the verdict is empty only because the validation data are short.
-    #[must_use]
-    pub fn is_undecided(&self) -> bool {
+    fn is_undecided(&self) -> bool {
         self.verdict.is_empty() && self.test_blocks < ENOUGH_BLOCKS
     }
 
@@ -193,15 +195,12 @@ impl Report {
             let has_position =
                 |report: &FlightReport| report.name == *flight && report.equations.contains(&"acceleration");
             if self.flights.iter().any(has_position) && offsets.values().all(Option::is_none) {
-                writeln!(
-                    f,
-                    "clock: {flight}: nothing to compare the pose with; log gyroscope and accelerometer"
-                )?;
+                let advice = "nothing to compare the pose with; log gyroscope and accelerometer";
+                writeln!(f, "clock: {flight}: {advice}")?;
             }
             for (channel, offset) in offsets {
                 let Some(offset) = offset.filter(|offset| offset.taken_off != 0.0) else { continue };
-                let [late_ms, off_ms] =
-                    [offset.value, offset.taken_off].map(|seconds| rounded(1e3 * seconds));
+                let [late_ms, off_ms] = [offset.value, offset.taken_off].map(|time_s| rounded(1e3 * time_s));
                 writeln!(f, "clock: {channel} of {flight} is {late_ms} ms late; {off_ms} ms were taken off")?;
             }
         }
@@ -223,15 +222,10 @@ impl Report {
         }
         for name in &self.verdict {
             let Some(effect) = self.effects.get(name) else { continue };
-            writeln!(
-                f,
-                "  {name}: held-out residual {} without it, {} with all",
-                rounded(effect.held_out.before),
-                rounded(effect.held_out.after)
-            )?;
+            let [without, with] = [effect.held_out.before, effect.held_out.after].map(rounded);
+            writeln!(f, "  {name}: held-out residual {without} without it, {with} with all")?;
             for (parameter, estimate) in &effect.parameters {
-                let (value, low, high) =
-                    (rounded(estimate.value), rounded(estimate.low), rounded(estimate.high));
+                let [value, low, high] = [estimate.value, estimate.low, estimate.high].map(rounded);
                 let doubt = match estimate {
                     Estimate { determined: false, .. } => "; not determined by these flights",
                     Estimate { at_bound: true, .. } => {
@@ -248,24 +242,16 @@ impl Report {
                 writeln!(f, "    to tell them apart: {experiment}")?;
             }
         }
-        for fault in &self.faults {
-            writeln!(
-                f,
-                "fault: {} ({}): {}; {}",
-                fault.channel, fault.kind, fault.finding, fault.consequence
-            )?;
-        }
-        Ok(())
+        self.faults.iter().try_for_each(|Fault { channel, kind, finding, consequence }| {
+            writeln!(f, "fault: {channel} ({kind}): {finding}; {consequence}")
+        })
     }
 
     fn write_trims(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        if self.trims.is_empty() {
-            return Ok(());
+        if !self.trims.is_empty() {
+            let why = "the flights differ in trim, so their mean torques were left out";
+            writeln!(f, "\n{why} (rad/s^2 beyond the model):")?;
         }
-        writeln!(
-            f,
-            "\nthe flights differ in trim, so their mean torques were left out (rad/s^2 beyond the model):"
-        )?;
         for trim in &self.trims {
             let [x, y, z] = trim.angular_acceleration_rad_s2.map(rounded);
             writeln!(f, "  {:28} roll {x}  pitch {y}  yaw {z}", trim.flight)?;
@@ -274,39 +260,33 @@ impl Report {
     }
 
     fn write_errors(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        if self.held_out.is_empty() {
-            return Ok(());
+        if !self.held_out.is_empty() {
+            writeln!(f, "\nprediction errors on flights that nothing was fitted on (RMS, declared -> new):")?;
         }
-        writeln!(f, "\nprediction errors on flights that nothing was fitted on (RMS, declared -> new):")?;
         for (flight, horizons) in &self.held_out {
             writeln!(f, "  {flight}")?;
             for (horizon, channels) in horizons {
-                let one = |(name, change): (&&str, &Change)| {
-                    format!("{name} {} -> {} {}", rounded(change.before), rounded(change.after), change.unit)
+                let one = |(name, Change { before, after, unit }): (&&str, &Change)| {
+                    format!("{name} {} -> {} {unit}", rounded(*before), rounded(*after))
                 };
-                writeln!(
-                    f,
-                    "    {horizon:>4} s  {}",
-                    channels.iter().map(one).collect::<Vec<_>>().join("   ")
-                )?;
+                let errors = channels.iter().map(one).collect::<Vec<_>>().join("   ");
+                writeln!(f, "    {horizon:>4} s  {errors}")?;
             }
         }
         Ok(())
     }
 
     fn write_rest(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        for (name, found) in &self.unexplained {
-            let (rms, before) = (rounded(found.rms), rounded(found.before));
+        for (name, Unexplained { rms, unit, before }) in &self.unexplained {
+            let [rms, before] = [*rms, *before].map(rounded);
             writeln!(
                 f,
-                "unexplained: {name}: {rms} {} are no noise and no candidate's (before: {before})",
-                found.unit
+                "unexplained: {name}: {rms} {unit} are no noise and no candidate's (before: {before})"
             )?;
         }
-        for effect in &self.not_identifiable {
-            writeln!(f, "not identifiable here: {} needs {}", effect.effect, effect.needs)?;
-        }
-        Ok(())
+        self.not_identifiable.iter().try_for_each(|Unidentifiable { effect, needs }| {
+            writeln!(f, "not identifiable here: {effect} needs {needs}")
+        })
     }
 }
 

@@ -59,9 +59,8 @@ pub fn run(path: &Path) -> Result<Found, RotorError> {
     let stand = stand::Stand::read(path)?;
     held_out::check(&stand)?;
     let vehicle = stand.vehicle_file()?;
-    let statics = statics::fitted(&stand)?;
-    let dynamics = dynamics::fitted(&stand)?;
-    let report = RotorReport::new(&stand, statics, dynamics);
+    let (statics, dynamics) = (statics::fitted(&stand)?, dynamics::fitted(&stand)?);
+    let report = RotorReport { name: stand.name, statics, dynamics };
     let tables = vehicle_file::text(&report, vehicle.as_ref());
     let figures = report.json()?;
     Ok(Found { report, tables, figures })

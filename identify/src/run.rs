@@ -6,17 +6,19 @@ use crate::clock::Lateness;
 use crate::faults;
 use crate::fit::{FitResult, Problem, Weights};
 use crate::model::Model;
-use crate::noise;
+use crate::noise::{self, Floor};
 use crate::parameter::Parameters;
 use crate::predict::{Errors, Measured};
-use crate::prepared::{Equation, Prepared, SETTLE_S};
+use crate::prepared::{BOX_STEPS, Equation, Prepared, SETTLE_S};
 use crate::regressor::{Regressor, regressors};
-use crate::report::{BeforeAfter, Change, EffectReport, Estimate, FlightReport, Noise, Report, Unexplained};
+use crate::report::{
+    BeforeAfter, Change, Changes, EffectReport, Estimate, FlightReport, Noise, Report, Unexplained,
+};
 use crate::rows::column;
 use crate::select::{Selection, confounded, select};
 use crate::sensing::SensorErrors;
 use crate::trim;
-use crate::whiteness::whiteness;
+use crate::whiteness::{Whiteness, whiteness};
 use diagnostics::Diagnostic;
 use flights::state::StateQuantity;
 use flights::{Flight, FlightSet, Role, Sparse};
@@ -42,6 +44,13 @@ const OTHER_FLIGHTS: &str =
     "fly manoeuvres in which the two differ: other speeds, rates, heights or loads than in these flights";
 
 /// Why flights cannot be identified on.
+///
+/// ```
+/// let vehicle = "../vehicles/hummingbird.toml".into();
+/// let set = flights::FlightSet { vehicle, flights: Vec::new() };
+/// let error = identify::run::identify(&set, &mut |_| ()).unwrap_err();
+/// assert!(error.to_string().starts_with("no flight with role \"fit\" can be used; there is none."));
+/// ```
 #[derive(Debug, thiserror::Error)]
 pub enum IdentifyError {
     /// The vehicle file.
@@ -194,23 +203,10 @@ pub fn problem<'f>(
             (None, _) => {}
         }
     }
-    for (role, flights) in [("fit", &estimation), ("test", &validation)] {
+    for (role, flights) in [(Role::Fit, &estimation), (Role::Test, &validation)] {
         if flights.is_empty() {
-            let is_role = |(found, _): &(Role, IdentifyError)| (*found == Role::Fit) == (role == "fit");
-            if let Some(index) = too_sparse.iter().position(is_role) {
-                return Err(too_sparse.swap_remove(index).1);
-            }
-            let there = set.flights.iter().filter(|flight| (flight.role == Role::Fit) == (role == "fit"));
-            let names: Vec<&str> = there.map(|flight| flight.name.as_str()).collect();
-            let reason = match names[..] {
-                [] => "there is none".to_owned(),
-                _ => format!(
-                    "{} have no stretch in which commands and motion were logged together in flight, besides the \
-                     first {SETTLE_S} s and the last moments",
-                    names.join(", ")
-                ),
-            };
-            return Err(IdentifyError::NoFlight { role, reason });
+            let sparse = too_sparse.into_iter().find(|(found, _)| *found == role);
+            return Err(sparse.map_or_else(|| no_flight(set, role), |(_, error)| error));
         }
     }
     let total_s: f64 = estimation.iter().map(compared_s).sum();
@@ -218,6 +214,20 @@ pub fn problem<'f>(
     let model = Model { vehicle: vehicle.clone(), parameters };
     let weights = Weights::new();
     Ok((Problem { model, estimation, validation, weights, block_s, has_own_trims: false }, reports))
+}
+
+fn no_flight(set: &FlightSet, role: Role) -> IdentifyError {
+    let there = set.flights.iter().filter(|flight| flight.role == role);
+    let names: Vec<&str> = there.map(|flight| flight.name.as_str()).collect();
+    let reason = match names[..] {
+        [] => "there is none".to_owned(),
+        _ => format!(
+            "{} have no stretch in which commands and motion were logged together in flight, besides the first \
+             {SETTLE_S} s and the last moments",
+            names.join(", ")
+        ),
+    };
+    IdentifyError::NoFlight { role: if role == Role::Fit { "fit" } else { "test" }, reason }
 }
 
 fn box_s(flight: &Flight) -> Option<f64> {
@@ -228,19 +238,21 @@ fn box_s(flight: &Flight) -> Option<f64> {
 
 fn compared_s(flight: &Prepared) -> f64 {
     let layout = &flight.layout;
-    layout.knots.len() as f64 * layout.box_steps as f64 * layout.clock.step_s
+    layout.knots.len() as f64 * BOX_STEPS as f64 * layout.clock.step_s
 }
 
 fn flight_report(flight: &Flight, prepared: Option<&Prepared>) -> FlightReport {
+    let layout = prepared.map(|prepared| &prepared.layout);
     FlightReport {
         name: flight.name.clone(),
         role: flight.role,
         compared_s: prepared.map_or(0.0, compared_s),
-        window_s: prepared
-            .map_or(0.0, |prepared| 4.0 * prepared.layout.box_steps as f64 * prepared.layout.clock.step_s),
-        equations: prepared.map_or(Vec::new(), |prepared| {
-            prepared.layout.equations.iter().map(|equation| equation.name()).collect()
-        }),
+        window_s: layout.map_or(0.0, |layout| 4.0 * BOX_STEPS as f64 * layout.clock.step_s),
+        equations: layout
+            .iter()
+            .flat_map(|layout| &layout.equations)
+            .map(|equation| equation.name())
+            .collect(),
         assumed: flight.assumed.clone(),
         notes: flight.notes.clone(),
     }
@@ -310,23 +322,19 @@ fn accepted_effects(
             let kind = selection.accepted[indices[0]].kind;
             kind.experiment_against(other).unwrap_or(OTHER_FLIGHTS).to_owned()
         });
-        let held_out = BeforeAfter {
-            before: size(problem, without.validation_cost()),
-            after: size(problem, selection.after.validation_cost()),
-        };
-        let chance = selection.p_value(name);
-        effects.insert(
-            name,
-            EffectReport {
-                accepted: true,
-                linearised: false,
-                parameters,
-                held_out,
-                chance,
-                confused_with: alike.iter().map(|kind| kind.name).collect(),
-                experiment,
+        let report = EffectReport {
+            accepted: true,
+            linearised: false,
+            parameters,
+            held_out: BeforeAfter {
+                before: size(problem, without.validation_cost()),
+                after: size(problem, selection.after.validation_cost()),
             },
-        );
+            chance: selection.p_value(name),
+            confused_with: alike.iter().map(|kind| kind.name).collect(),
+            experiment,
+        };
+        effects.insert(name, report);
     }
 }
 
@@ -372,19 +380,16 @@ fn predictions(
             continue;
         };
         for horizon_s in HORIZONS_S {
-            let (old, _) = before.predicted(&aligned, problem.model.airframe(&declared), horizon_s, 0);
-            let (new, _) = after.predicted(&corrected, problem.model.airframe(values), horizon_s, 0);
+            let old = before.predicted(&aligned, problem.model.airframe(&declared), horizon_s);
+            let new = after.predicted(&corrected, problem.model.airframe(values), horizon_s);
             predictions.push((flight.name.clone(), flight.role, horizon_s, old, new));
         }
     }
     predictions
 }
 
-fn of_role(
-    predictions: &[Prediction],
-    role: Role,
-) -> BTreeMap<String, BTreeMap<String, BTreeMap<&'static str, Change>>> {
-    let mut flights: BTreeMap<String, BTreeMap<String, BTreeMap<&'static str, Change>>> = BTreeMap::new();
+fn of_role(predictions: &[Prediction], role: Role) -> Changes {
+    let mut flights = Changes::new();
     for (name, _, horizon_s, old, new) in predictions.iter().filter(|row| row.1 == role) {
         let channels = StateQuantity::ALL.iter().filter_map(|quantity| {
             let (channel, unit) = (quantity.name(), quantity.unit());
@@ -395,24 +400,22 @@ fn of_role(
     flights
 }
 
-fn noise_report(
-    floor: &BTreeMap<&'static str, (f64, &'static str)>,
-    gravity_m_s2: f64,
-) -> BTreeMap<&'static str, Noise> {
-    let at = |name: &str, horizon_s: f64| {
-        noise::prediction_floor(floor, horizon_s, gravity_m_s2).get(name).copied()
+fn noise_report(floor: &Floor, gravity_m_s2: f64) -> BTreeMap<&'static str, Noise> {
+    let at = |name: &str, horizon_s: &f64| {
+        let of_all = noise::prediction_floor(floor, *horizon_s, gravity_m_s2);
+        Some((horizon_s.to_string(), *of_all.get(name)?))
     };
     let one = |(name, (value, unit)): (&&'static str, &(f64, &'static str))| {
-        let prediction = HORIZONS_S.iter().filter_map(|h| Some((format!("{h}"), at(name, *h)?))).collect();
+        let prediction = HORIZONS_S.iter().filter_map(|horizon_s| at(name, horizon_s)).collect();
         (*name, Noise { value: *value, unit, prediction })
     };
     floor.iter().map(one).collect()
 }
 
 fn unexplained(
-    whiteness: &BeforeAfter<BTreeMap<&'static str, crate::whiteness::Whiteness>>,
+    whiteness: &BeforeAfter<BTreeMap<&'static str, Whiteness>>,
 ) -> BTreeMap<&'static str, Unexplained> {
-    let one = |(name, after): (&&'static str, &crate::whiteness::Whiteness)| {
+    let one = |(name, after): (&&'static str, &Whiteness)| {
         let noise = (after.rms * after.rms - after.persistent * after.persistent).max(0.0).sqrt();
         let before = whiteness.before.get(name).map_or(0.0, |before| before.persistent);
         let is_large = after.persistent > UNEXPLAINED * noise && after.p_value < 0.01;

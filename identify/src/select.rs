@@ -26,11 +26,11 @@ use rayon::prelude::*;
 
 /// A smaller part of the squared error does not matter, however certain it is: what the comparison itself leaves at
 /// its joints is of the order of a tenth of it.
-pub const LEAST_GAIN: f64 = 0.002;
+const LEAST_GAIN: f64 = 0.002;
 /// A smaller part of a plausible value is none worth naming.
 const LEAST_PART: f64 = 0.01;
 /// Chance of a false acceptance in a round.
-pub const FALSE_RATE: f64 = 0.05;
+const FALSE_RATE: f64 = 0.05;
 /// Two candidates whose difference is within this one-sided level cannot be told apart.
 const CONFOUNDED_LEVEL: f64 = 0.05;
 /// Resamples of a bootstrap: enough for the level of one among thirty candidates, tried beside four others.
@@ -174,18 +174,18 @@ impl StepwiseSearch {
         if problem.left(&self.base) < MUCH_LEFT {
             return false;
         }
-        let mut firsts: Vec<&Judged> = last.judged.iter().collect();
+        let mut firsts = last.judged.clone();
         firsts.sort_by(|a, b| a.fitted.estimation_cost().total_cmp(&b.fitted.estimation_cost()));
-        let firsts: Vec<Candidate> =
-            firsts.iter().take(FIRSTS).map(|judged| judged.candidate.clone()).collect();
+        firsts.truncate(FIRSTS);
         let rate = FALSE_RATE / FIRSTS as f64;
-        for first in firsts {
+        let with = |accepted: &[Candidate], one: &Candidate| [accepted, std::slice::from_ref(one)].concat();
+        for Judged { candidate: first, .. } in firsts {
             let alone = fitted(problem, &self.base, &self.accepted, &first);
-            let with_first = [&self.accepted[..], std::slice::from_ref(&first)].concat();
+            let with_first = with(&self.accepted, &first);
             let second_round = round(problem, &alone, &with_first, candidates, rate);
             let Some(second) = second_round.taken().cloned() else { continue };
-            let with_second = [&self.accepted[..], std::slice::from_ref(&second.candidate)].concat();
-            let both = [&with_first[..], std::slice::from_ref(&second.candidate)].concat();
+            let with_second = with(&self.accepted, &second.candidate);
+            let both = with(&with_first, &second.candidate);
             let without_first = without(problem, &second.fitted, &both, self.accepted.len());
             let mut first_round = round(problem, &without_first, &with_second, candidates, rate);
             first_round.taken =
@@ -267,14 +267,8 @@ fn judged(
         && gain > LEAST_GAIN * base.validation_cost()
         && is_seen(problem, candidate, &fitted)
         && !is_beyond_bounds(problem, candidate, &fitted);
-    Judged {
-        candidate: candidate.clone(),
-        gain: gain / base.validation_cost(),
-        p_value,
-        is_accepted,
-        is_promise: false,
-        fitted,
-    }
+    let (candidate, gain) = (candidate.clone(), gain / base.validation_cost());
+    Judged { candidate, fitted, gain, p_value, is_accepted, is_promise: false }
 }
 
 /// Whether one of its parameters is large enough to be more than an artefact of the grid: a delay of more than half a
@@ -302,7 +296,7 @@ fn fitted(problem: &Problem, base: &FitResult, accepted: &[Candidate], candidate
     let mut all = free_parameters(accepted);
     all.extend(&candidate.free);
     let mut start = base.values.clone();
-    let mut least = base.estimation_costs.iter().sum::<f64>();
+    let mut least = base.estimation_cost();
     for values in candidate.kind.guesses {
         let mut tried = base.values.clone();
         candidate.free.iter().zip(*values).for_each(|(at, value)| tried[*at] = *value);
@@ -352,7 +346,7 @@ fn best(judged: &[Judged]) -> Option<usize> {
 }
 
 /// Whether `fitted` is worse on the validation data than `other`, beyond chance.
-pub fn is_worse(fitted: &FitResult, other: &FitResult) -> bool {
+fn is_worse(fitted: &FitResult, other: &FitResult) -> bool {
     p_value(&fitted.validation_costs, &other.validation_costs) < CONFOUNDED_LEVEL
 }
 

@@ -7,6 +7,16 @@ use flights::{Channel, Flight};
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 
 /// Lateness and biases of sensors.
+///
+/// ```
+/// use flights::{Channel, Flight, Role};
+/// use identify::{Lateness, SensorErrors};
+///
+/// let mut flight = Flight::new("late", "log.csv", Role::Fit);
+/// flight.position = Channel { time_s: vec![1.0, 1.5], values: vec![[0.0; 3]; 2] };
+/// let errors = SensorErrors { pose_delay_s: 0.25, ..SensorErrors::default() };
+/// assert_eq!(errors.taken_off(&flight, &Lateness::default()).position.time_s, [0.75, 1.25]);
+/// ```
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct SensorErrors {
     /// Lateness of position, velocity and attitude in s that all flights share.

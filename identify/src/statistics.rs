@@ -16,6 +16,7 @@ mod ljung_box;
 mod quantile;
 
 pub use bootstrap::{Bootstrap, MeanInterval, block_bootstrap_mean};
+pub(crate) use correlation::deviation;
 pub use correlation::{autocorrelation, cross_correlation, mean, white_noise_bound};
 pub use jackknife::{Estimate, jackknife};
 pub use ljung_box::{LjungBox, ljung_box};

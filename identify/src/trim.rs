@@ -7,8 +7,9 @@
 
 use crate::candidate::{Candidate, free_parameters};
 use crate::fit::Problem;
-use crate::prepared::{Equation, Prepared};
+use crate::prepared::{BOX_STEPS, Equation, Prepared};
 use crate::rows::column;
+use crate::statistics::{deviation, mean};
 use serde::Serialize;
 
 /// Trims differ beyond so many standard deviations.
@@ -64,9 +65,8 @@ pub fn compare(problem: &mut Problem, open: &[Candidate]) -> Vec<Trim> {
 fn of_flight(problem: &Problem, flight: &Prepared, values: &[f64]) -> Option<(Trim, f64)> {
     flight.offset_of(Equation::AngularAcceleration)?;
     let residual = problem.model.residual_under(flight, values);
-    let per_block = ((problem.block_s / (flight.layout.box_steps as f64 * flight.layout.clock.step_s)).ceil()
-        as usize)
-        .max(1);
+    let knot_s = BOX_STEPS as f64 * flight.layout.clock.step_s;
+    let per_block = ((problem.block_s / knot_s).ceil() as usize).max(1);
     let (mut means, mut deviations, mut spread) = ([0.0; 3], [0.0; 3], 0.0_f64);
     for axis in 0..3 {
         let rows = column(flight, &residual, Equation::AngularAcceleration, axis);
@@ -74,17 +74,11 @@ fn of_flight(problem: &Problem, flight: &Prepared, values: &[f64]) -> Option<(Tr
         if rows.len() < 5 * per_block {
             return None;
         }
-        let mean = rows.iter().sum::<f64>() / rows.len() as f64;
-        let blocks: Vec<f64> = rows
-            .chunks(per_block)
-            .map(|block| block.iter().sum::<f64>() / block.len() as f64 - mean)
-            .collect();
-        let count = blocks.len() as f64;
-        means[axis] = mean;
-        deviations[axis] =
-            (blocks.iter().map(|mean| mean * mean).sum::<f64>() / (count * (count - 1.0).max(1.0))).sqrt();
-        spread =
-            spread.max((rows.iter().map(|row| (row - mean).powi(2)).sum::<f64>() / rows.len() as f64).sqrt());
+        means[axis] = mean(&rows);
+        let squares = rows.chunks(per_block).map(|block| (mean(block) - means[axis]).powi(2));
+        let count = squares.len() as f64;
+        deviations[axis] = (squares.sum::<f64>() / (count * (count - 1.0).max(1.0))).sqrt();
+        spread = spread.max(deviation(&rows));
     }
     let trim = Trim {
         flight: flight.flight.name.clone(),

@@ -8,6 +8,15 @@ use parry3d_f64::query::{PointQuery, Ray, RayCast};
 use parry3d_f64::shape::Cuboid as Shape;
 
 /// A scene prepared for ray casts. A cast allocates nothing.
+///
+/// ```
+/// use nalgebra::Vector3;
+///
+/// let room = scenes::Scene::parse(scenes::reference::ROOM, "room.toml")?;
+/// let rays = scenes::RayCaster::new(&room);
+/// assert_eq!(rays.distance_m(&Vector3::new(0.0, 0.0, 1.5), &-Vector3::z(), 10.0), Some(1.5));
+/// # Ok::<(), diagnostics::Diagnostic>(())
+/// ```
 #[derive(Debug, Clone)]
 pub struct RayCaster {
     boxes: Vec<(Shape, Pose)>,

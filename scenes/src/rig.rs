@@ -8,6 +8,12 @@ use nalgebra::Vector3;
 use vehicles::reader::{Quantity, Section};
 
 /// The rod-end bearing of thesis section 5.2, and the tube that it hangs on.
+///
+/// ```
+/// let scene = scenes::Scene::parse(scenes::reference::RIG_FIXED, "rig-fixed.toml")?;
+/// assert_eq!(scene.rig.unwrap().heave_m, 0.0);
+/// # Ok::<(), diagnostics::Diagnostic>(())
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Rig {
     /// Centre of the bearing at the lower end of its travel.

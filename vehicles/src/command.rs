@@ -2,6 +2,17 @@
 
 /// Linear map with saturation at both ends. The fields satisfy `min < max` and
 /// `0 <= speed_at_min_rad_s < speed_at_max_rad_s` when they come from a vehicle file.
+///
+/// ```
+/// let map = vehicles::CommandMap {
+///     min: 0.0,
+///     max: 200.0,
+///     speed_at_min_rad_s: 100.0,
+///     speed_at_max_rad_s: 900.0,
+///     zero_is_off: true,
+/// };
+/// assert_eq!((map.speed(100.0), map.command(500.0), map.speed(0.0)), (500.0, 100.0, 0.0));
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CommandMap {
     /// Smallest command, in raw counts.

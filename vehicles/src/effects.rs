@@ -8,6 +8,16 @@ use crate::reader::Section;
 use diagnostics::{Diagnostic, Place};
 
 /// One `[[effects]]` table.
+///
+/// ```
+/// use vehicles::reader::{Document, Section};
+///
+/// let doc = Document::new("a.toml", "[[effects]]\nname = 'wind'");
+/// let tree = doc.tree()?;
+/// let read = vehicles::effects::read(&Section::new(&doc, String::new(), 0..0, tree.get_ref()))?;
+/// assert_eq!((read[0].name.as_str(), read[0].key.as_str()), ("wind", "effects.0"));
+/// # Ok::<(), diagnostics::Diagnostic>(())
+/// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct EffectEntry {
     /// Which effect.

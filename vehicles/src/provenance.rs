@@ -12,6 +12,13 @@ pub enum Uncertainty {
 }
 
 /// One parameter as the file gave it.
+///
+/// ```
+/// let vehicle = vehicles::Vehicle::parse(vehicles::reference::HUMMINGBIRD, "hummingbird.toml")?;
+/// let mass = vehicle.provenance.iter().find(|known| known.key == "body.mass").unwrap();
+/// assert!(mass.unit == "kg" && !mass.source.is_empty());
+/// # Ok::<(), diagnostics::Diagnostic>(())
+/// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct Provenance {
     /// Dotted key, such as `body.mass`.

@@ -20,6 +20,12 @@ pub struct StrayQuote {
 
 /// Refuses the first cell that begins with a quotation mark and does not end with one on its line.
 ///
+/// ```
+/// use vehicles::quotes::{StrayQuote, check};
+///
+/// assert_eq!(check(b"t,a\n1,\"2\n", b','), Err(StrayQuote { line: 2, cell: 2 }));
+/// ```
+///
 /// # Errors
 /// Where it stands.
 pub fn check(text: &[u8], delimiter: u8) -> Result<(), StrayQuote> {

@@ -105,6 +105,17 @@ enum Origin {
 }
 
 /// One table of the file; remembers which keys were asked for.
+///
+/// ```
+/// use vehicles::reader::{Document, Section};
+///
+/// let doc = Document::new("a.toml", "name = 'a'\nnaem = 'b'");
+/// let tree = doc.tree()?;
+/// let root = Section::new(&doc, String::new(), 0..0, tree.get_ref());
+/// assert_eq!(root.text("name")?, "a");
+/// assert_eq!(root.finish().unwrap_err().key(), "naem");
+/// # Ok::<(), diagnostics::Diagnostic>(())
+/// ```
 pub struct Section<'d, 't> {
     /// The file.
     pub doc: &'d Document<'t>,

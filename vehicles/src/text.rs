@@ -10,6 +10,11 @@ pub const BYTES_MAX: u64 = 16 << 20;
 
 /// The text of the file at `path`.
 ///
+/// ```
+/// let refused = vehicles::text::read("/dev/zero".as_ref()).unwrap_err();
+/// assert_eq!(refused.to_string(), "it is not a regular file");
+/// ```
+///
 /// # Errors
 /// If the file cannot be read, is not UTF-8, or is longer than [`BYTES_MAX`].
 pub fn read(path: &Path) -> Result<String> {

@@ -18,6 +18,12 @@ pub enum VariableError {
 
 /// Replaces `${NAME}` and `${NAME:-default}` in `text` by what `variable` says.
 ///
+/// ```
+/// let text = vehicles::variables::expand("${LOGS:-../logs}/a.csv", |_| None)?;
+/// assert_eq!(text, "../logs/a.csv");
+/// # Ok::<(), vehicles::variables::VariableError>(())
+/// ```
+///
 /// # Errors
 /// A variable that is not set and has no default, or one without its closing bracket.
 pub fn expand(text: &str, variable: impl Fn(&str) -> Option<String>) -> Result<String, VariableError> {

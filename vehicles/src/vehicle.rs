@@ -9,6 +9,16 @@ use crate::effects::EffectEntry;
 use crate::provenance::Provenance;
 
 /// A quadrotor, in SI units.
+///
+/// ```
+/// use vehicles::{MotorModel, Vehicle};
+///
+/// let vehicle = Vehicle::parse(vehicles::reference::HUMMINGBIRD, "hummingbird.toml")?;
+/// assert!((400.0..600.0).contains(&vehicle.hover_speed_rad_s()));
+/// assert!(vehicle.rotors.iter().map(|rotor| rotor.spin).sum::<f64>() == 0.0);
+/// assert!(matches!(vehicle.motor, MotorModel::SecondOrder { damping_ratio, .. } if damping_ratio > 0.0));
+/// # Ok::<(), diagnostics::Diagnostic>(())
+/// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct Vehicle {
     /// What the vehicle is called.

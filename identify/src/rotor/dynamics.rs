@@ -9,8 +9,8 @@ use super::plateau::{median, range};
 use super::response::Lag;
 use super::score::{LEVEL, Score};
 use super::stand::{Clock, Stand};
-use super::step::{self, Hold, Step};
-use crate::statistics::{Bootstrap, Estimate, MeanInterval, block_bootstrap_mean, jackknife};
+use super::step::{Cut, Hold, Step};
+use crate::statistics::{Bootstrap, Estimate, MeanInterval, block_bootstrap_mean, jackknife, mean};
 
 pub use super::lag::Order;
 
@@ -74,7 +74,7 @@ pub struct Comparison {
     /// The second only if its error is smaller beyond the interval, since it has a parameter more.
     pub preferred: Order,
     /// Why.
-    pub reason: String,
+    pub reason: &'static str,
 }
 
 /// A step by itself, as a motor of first order.
@@ -103,38 +103,27 @@ pub fn fitted(stand: &Stand) -> Result<Option<Dynamics>, RotorError> {
     if stand.dynamics.is_empty() {
         return Ok(None);
     }
-    let cuts = stand.dynamics.iter().map(step::cut).collect::<Result<Vec<_>, _>>()?;
-    let zero_is_off = cuts.iter().any(|cut| cut.zero_is_off);
-    let (mut steps, mut holds, mut findings) = (Vec::new(), Vec::new(), Vec::new());
-    for cut in cuts {
-        steps.extend(cut.steps);
-        holds.extend(cut.holds);
-        findings.extend(cut.findings);
-    }
+    let mut cut = Cut::default();
+    stand.dynamics.iter().try_for_each(|log| cut.add(log))?;
+    let Cut { steps, holds, zero_is_off, findings } = cut;
     let fit: Vec<&Step> = steps.iter().filter(|step| !step.is_test).collect();
     if fit.len() < STEPS_MIN {
-        return Err(RotorError::TooLittle {
-            what: "motor".to_owned(),
-            expected: format!("{STEPS_MIN} steps of the command to fit on"),
-            found: fit.len().to_string(),
-            advice: "log more steps, or lower `before_s`, `after_s` or `held_out`".to_owned(),
-        });
+        let expected = format!("{STEPS_MIN} steps of the command to fit on");
+        let advice = "log more steps, or lower `before_s`, `after_s` or `held_out`";
+        return Err(RotorError::too_little("motor", expected, fit.len(), advice));
     }
     let test: Vec<&Step> = steps.iter().filter(|step| step.is_test).collect();
     let (first, first_lag) = motor(Order::First, &fit, &test)?;
     let (second, second_lag) = motor(Order::Second, &fit, &test)?;
-    let comparison = compared(&test, first_lag, second_lag, &second);
-    let command = CommandLine::fitted(&holds, zero_is_off);
-    let one_steps: Vec<OneStep> = steps.iter().filter_map(one_step).collect();
     let mut dynamics = Dynamics {
+        comparison: compared(&test, first_lag, second_lag, &second),
         first,
         second,
-        comparison,
         rising_s: direction(&steps, 1.0),
         falling_s: direction(&steps, -1.0),
         other_clock_s: time_constant(&fit, |step| other(step.clock)),
-        command,
-        steps: one_steps,
+        command: CommandLine::fitted(&holds, zero_is_off),
+        steps: steps.iter().filter_map(one_step).collect(),
         holds,
         findings,
     };
@@ -144,11 +133,9 @@ pub fn fitted(stand: &Stand) -> Result<Option<Dynamics>, RotorError> {
 
 /// A motor of an order with its scores.
 fn motor(order: Order, fit: &[&Step], test: &[&Step]) -> Result<(Fitted, Lag), RotorError> {
-    let found = lag::fit(fit, order, |step| step.clock).ok_or_else(|| RotorError::TooLittle {
-        what: "motor".to_owned(),
-        expected: "steps that tell the motor's parameters".to_owned(),
-        found: "none".to_owned(),
-        advice: "check the columns of speed and command".to_owned(),
+    let found = lag::fit(fit, order, |step| step.clock).ok_or_else(|| {
+        let expected = "steps that tell the motor's parameters";
+        RotorError::too_little("motor", expected, "none", "check the columns of speed and command")
     })?;
     let is_second = order == Order::Second && found.lag.a2_s2 > 0.0;
     let natural = is_second.then(|| estimate(&found, Lag::natural_frequency_rad_s)).flatten();
@@ -194,7 +181,7 @@ fn matched(step: &Step, lag: Lag) -> Match {
 fn score(steps: &[&Step], lag: Lag) -> Option<Score> {
     let mut pairs = Vec::new();
     for step in steps {
-        let mean = step.speed.iter().sum::<f64>() / step.speed.len() as f64;
+        let mean = mean(&step.speed);
         let errors = matched(step, lag).errors;
         pairs.extend(
             errors.iter().zip(&step.speed).map(|(error, speed)| (speed - mean + error, speed - mean)),
@@ -203,36 +190,27 @@ fn score(steps: &[&Step], lag: Lag) -> Option<Score> {
     Score::of(&pairs).map(|score| Score { segments: steps.len(), ..score })
 }
 
-/// The mean square error of a step, relative to the square of its height.
-fn relative_square(step: &Step, lag: Lag) -> f64 {
-    let errors = matched(step, lag).errors;
-    errors.iter().map(|error| (error / step.height).powi(2)).sum::<f64>() / errors.len() as f64
-}
-
 fn compared(test: &[&Step], first: Lag, second: Lag, second_fit: &Fitted) -> Comparison {
-    let answer = |first_minus_second, preferred, reason: &str| Comparison {
-        first_minus_second,
-        preferred,
-        reason: reason.to_owned(),
-    };
-    if test.is_empty() {
-        return answer(None, Order::First, "no step was held out to judge on: the simpler motor");
-    }
-    let gains: Vec<f64> =
-        test.iter().map(|step| relative_square(step, first) - relative_square(step, second)).collect();
+    let error = |step: &Step, lag| lag::relative_square(step, &matched(step, lag).errors);
+    let gains: Vec<f64> = test.iter().map(|step| error(step, first) - error(step, second)).collect();
     // Steps are seconds apart: each is a block of its own.
     let how = Bootstrap { block: 1, resamples: RESAMPLES, seed: SEED, level: LEVEL };
-    let interval = block_bootstrap_mean(&gains, &how);
-    if second_fit.damping_ratio.is_none() {
-        let reason =
-            "the second coefficient of the second order cannot be told from 0: it is the first order";
-        return answer(Some(interval), Order::First, reason);
-    }
-    if interval.low > 0.0 && test.len() > 1 {
-        return answer(Some(interval), Order::Second, "its held-out error is smaller beyond the interval");
-    }
-    let reason = "the second order's held-out error is not smaller beyond the interval: the simpler motor";
-    answer(Some(interval), Order::First, reason)
+    let first_minus_second = (!test.is_empty()).then(|| block_bootstrap_mean(&gains, &how));
+    let (preferred, reason) = match first_minus_second {
+        None => (Order::First, "no step was held out to judge on: the simpler motor"),
+        Some(_) if second_fit.damping_ratio.is_none() => (
+            Order::First,
+            "the second coefficient of the second order cannot be told from 0: it is the first order",
+        ),
+        Some(interval) if interval.low > 0.0 && test.len() > 1 => {
+            (Order::Second, "its held-out error is smaller beyond the interval")
+        }
+        Some(_) => (
+            Order::First,
+            "the second order's held-out error is not smaller beyond the interval: the simpler motor",
+        ),
+    };
+    Comparison { first_minus_second, preferred, reason }
 }
 
 fn one_step(step: &Step) -> Option<OneStep> {
@@ -258,11 +236,9 @@ fn more_findings(dynamics: &Dynamics, steps: &[Step], first: Lag) -> Vec<String>
     let clamped = matches.iter().filter(|found| found.is_clamped).count();
     let (earliest, latest) = range(&onsets);
     let mut findings = vec![format!(
-        "commands took effect {:.1} ms from the row that shows them first (median; {:.1} to {:.1} ms), {clamped} of {} \
-         at the end of the {ONSET_ROWS_MAX} row that is allowed",
+        "commands took effect {:.1} ms from the row that shows them first (median; {earliest:.1} to {latest:.1} ms), \
+         {clamped} of {} at the end of the {ONSET_ROWS_MAX} row that is allowed",
         median(&onsets),
-        earliest,
-        latest,
         onsets.len()
     )];
     let directions = dynamics.rising_s.zip(dynamics.falling_s);

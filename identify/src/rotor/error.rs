@@ -4,6 +4,13 @@ use diagnostics::Diagnostic;
 use vehicles::table::TableError;
 
 /// Why a rotor could not be identified.
+///
+/// ```
+/// use identify::rotor::RotorError;
+///
+/// let error = identify::rotor::run("nowhere.toml".as_ref()).unwrap_err();
+/// assert!(matches!(&error, RotorError::File(_)) && error.to_string().contains("nowhere.toml"));
+/// ```
 #[derive(Debug, thiserror::Error)]
 pub enum RotorError {
     /// A file, also the vehicle's that the rest is taken from, cannot be read, is no TOML, or has a key or a value that cannot be meant.
@@ -40,18 +47,6 @@ pub enum RotorError {
         /// What is wrong with it.
         found: &'static str,
     },
-    /// Rows that are too few, or too far apart to show a step.
-    #[error("{file}: expected {expected}, found {found}; {advice}")]
-    Rows {
-        /// The log.
-        file: String,
-        /// What is needed.
-        expected: String,
-        /// What there is.
-        found: String,
-        /// What to do.
-        advice: &'static str,
-    },
     /// A log to test on holds rows that are fitted on.
     #[error(
         "{test}: this log with role \"test\" is not held out from {fit} with role \"fit\": {reason}; give another log, or hold \
@@ -65,19 +60,30 @@ pub enum RotorError {
         /// What they have in common.
         reason: String,
     },
-    /// There is too little to fit.
+    /// There is too little to fit, or a log's rows are too few or too far apart to show a step.
     #[error("{what}: expected {expected}, found {found}; {advice}")]
     TooLittle {
-        /// What was to be fitted.
+        /// What was to be fitted, or the log.
         what: String,
         /// What is needed.
         expected: String,
         /// What there is.
         found: String,
         /// What to do.
-        advice: String,
+        advice: &'static str,
     },
     /// The figures could not be written as JSON.
     #[error("cannot write the figures as JSON: {0}")]
     Json(#[from] serde_json::Error),
+}
+
+impl RotorError {
+    pub(super) fn too_little(
+        what: impl Into<String>,
+        expected: impl Into<String>,
+        found: impl ToString,
+        advice: &'static str,
+    ) -> Self {
+        Self::TooLittle { what: what.into(), expected: expected.into(), found: found.to_string(), advice }
+    }
 }

@@ -1,90 +1,76 @@
 //! Whether the logs to test on are held out: none is a log that is fitted on, a copy of one, or a part of one.
 
-use std::path::PathBuf;
+use std::path::Path;
 
-use flights::{Channel, Comparison, same_file, twin};
+use diagnostics::unit::SPEED;
+use flights::{Channel, Comparison, Role, same_file, twin};
 
 use super::error::RotorError;
-use super::stand::{Column, DynamicLog, Role, Stand, StaticLog};
+use super::stand::{Column, Stand};
 use super::table::LogTable;
+
+/// A log with the columns that tell its rows from another's, each with the factor of its numbers.
+struct Log<'s> {
+    role: Role,
+    file: &'s Path,
+    time: &'s Column,
+    columns: [Option<(&'s Column, f64)>; 3],
+}
 
 /// Refuses a stand whose logs to test on hold rows that are fitted on. What is fitted on static logs is tested on static
 /// ones, and so with dynamic ones.
 pub fn check(stand: &Stand) -> Result<(), RotorError> {
-    pairs(&stand.statics, |log| (log.role, &log.file), of_static)?;
-    pairs(&stand.dynamics, |log| (log.role, &log.file), of_dynamic)
+    let speed = |column| Some((column, Column::factor(column, SPEED)));
+    let statics = stand.statics.iter().map(|log| {
+        let [thrust, torque] =
+            [&log.thrust, &log.torque].map(|force| force.as_ref().map(|force| (force, 1.0)));
+        Log { role: log.role, file: &log.file, time: &log.time, columns: [speed(&log.speed), thrust, torque] }
+    });
+    check_pairs(statics)?;
+    check_pairs(stand.dynamics.iter().map(|log| {
+        let columns = [speed(&log.speed), Some((&log.command, 1.0)), None];
+        Log { role: log.role, file: &log.file, time: &log.time, columns }
+    }))
 }
 
-fn pairs<L>(
-    logs: &[L],
-    of: impl Fn(&L) -> (Role, &PathBuf) + Copy,
-    samples: impl Fn(&L) -> Result<Channel<3>, RotorError>,
-) -> Result<(), RotorError> {
-    let of_role = |role| logs.iter().filter(move |log| of(log).0 == role);
+fn check_pairs<'s>(logs: impl Iterator<Item = Log<'s>>) -> Result<(), RotorError> {
+    let (tests, fits): (Vec<_>, Vec<_>) = logs.partition(|log| log.role == Role::Test);
+    if tests.is_empty() {
+        return Ok(());
+    }
     // Each log is read once, however many it is held against.
-    let mut fits: Vec<Option<Channel<3>>> = of_role(Role::Fit).map(|_| None).collect();
-    for test in of_role(Role::Test) {
-        let mut of_test = None;
-        for (fit, other) in of_role(Role::Fit).zip(&mut fits) {
-            let refused = |reason: String| RotorError::NotHeldOut {
-                test: of(test).1.display().to_string(),
-                fit: of(fit).1.display().to_string(),
-                reason,
+    let of_fits = fits.iter().map(Log::rows).collect::<Result<Vec<_>, _>>()?;
+    for test in tests {
+        let of_test = test.rows()?;
+        for (fit, of_fit) in fits.iter().zip(&of_fits) {
+            let reason = match (same_file(fit.file, test.file), twin(of_fit, &of_test)) {
+                (Some(how), _) => format!("they are {how}"),
+                (None, Comparison::Same(twin)) => {
+                    format!("{} of {} rows are the same", twin.same, twin.compared)
+                }
+                (None, Comparison::Other | Comparison::Unknown) => continue,
             };
-            if let Some(how) = same_file(of(fit).1, of(test).1) {
-                return Err(refused(format!("they are {how}")));
-            }
-            if let Comparison::Same(twin) =
-                twin(once(other, || samples(fit))?, once(&mut of_test, || samples(test))?)
-            {
-                return Err(refused(format!("{} of {} rows are the same", twin.same, twin.compared)));
-            }
+            let [test, fit] = [test.file, fit.file].map(|file| file.display().to_string());
+            return Err(RotorError::NotHeldOut { test, fit, reason });
         }
     }
     Ok(())
 }
 
-/// What `slot` holds, read into it if nothing was.
-fn once(
-    slot: &mut Option<Channel<3>>,
-    read: impl FnOnce() -> Result<Channel<3>, RotorError>,
-) -> Result<&Channel<3>, RotorError> {
-    let channel = match slot.take() {
-        Some(channel) => channel,
-        None => read()?,
-    };
-    Ok(slot.insert(channel))
-}
-
-fn of_static(log: &StaticLog) -> Result<Channel<3>, RotorError> {
-    let table = LogTable::read(&log.file)?;
-    let speed = table.column(&log.speed.column, log.speed.speed())?;
-    let optional = |column: &Option<Column>| match column {
-        Some(column) => table.column(&column.column, column.raw()),
-        None => Ok(vec![0.0; speed.len()]),
-    };
-    let (thrust, torque) = (optional(&log.thrust)?, optional(&log.torque)?);
-    let time_s = table.times(&log.time.column, log.time.time())?;
-    Ok(rows(&time_s, [&speed, &thrust, &torque]))
-}
-
-fn of_dynamic(log: &DynamicLog) -> Result<Channel<3>, RotorError> {
-    let table = LogTable::read(&log.file)?;
-    let speed = table.column(&log.speed.column, log.speed.speed())?;
-    let command = table.column(&log.command.column, log.command.raw())?;
-    let time_s = table.times(&log.time.column, log.time.time())?;
-    Ok(rows(&time_s, [&speed, &command, &vec![0.0; time_s.len()]]))
-}
-
-/// The rows in which all columns have a number.
-fn rows(time_s: &[f64], columns: [&Vec<f64>; 3]) -> Channel<3> {
-    let mut channel = Channel::default();
-    for (row, time_s) in time_s.iter().enumerate() {
-        let value = columns.map(|column| column[row]);
-        if value.iter().all(|number| number.is_finite()) {
-            channel.time_s.push(*time_s);
-            channel.values.push(value);
-        }
+impl Log<'_> {
+    /// The rows in which all columns have a number; one that the log does not have is zero.
+    fn rows(&self) -> Result<Channel<3>, RotorError> {
+        let table = LogTable::read(self.file)?;
+        let time_s = table.times(self.time)?;
+        let read = |column: Option<(&Column, f64)>| match column {
+            Some((column, factor)) => table.column(column, factor),
+            None => Ok(vec![0.0; time_s.len()]),
+        };
+        let [a, b, c] = self.columns;
+        let columns = [read(a)?, read(b)?, read(c)?];
+        let rows = time_s.iter().enumerate();
+        let rows = rows.map(|(row, time_s)| (*time_s, columns.each_ref().map(|column| column[row])));
+        let (time_s, values) = rows.filter(|(_, row)| row.iter().all(|number| number.is_finite())).unzip();
+        Ok(Channel { time_s, values })
     }
-    channel
 }

@@ -12,6 +12,7 @@ use nalgebra::{Matrix2, Vector2};
 use super::response::Lag;
 use super::stand::Clock;
 use super::step::Step;
+use crate::statistics::mean;
 
 /// Iterations at most; a dozen are usual.
 const ITERATIONS_MAX: usize = 60;
@@ -80,7 +81,7 @@ pub fn fit(steps: &[&Step], order: Order, clock_of: impl Fn(&Step) -> Clock) -> 
     let rough = |lag: Lag| -> f64 {
         steps
             .iter()
-            .map(|step| relative_square(step, &Line::of(step, times(step, clock_of(step)), lag, 0.0)))
+            .map(|step| relative_square(step, &Line::of(step, times(step, clock_of(step)), lag, 0.0).errors))
             .sum()
     };
     let first = starts(order).map(|lag| (lag, rough(lag))).min_by(|a, b| a.1.total_cmp(&b.1));
@@ -110,9 +111,8 @@ pub fn fit(steps: &[&Step], order: Order, clock_of: impl Fn(&Step) -> Clock) -> 
 pub fn matched(step: &Step, time_s: &[f64], lag: Lag) -> Match {
     let bound = ONSET_ROWS_MAX * step.period_s;
     let onset_s = best_onset(step, time_s, lag);
-    let line = Line::of(step, time_s, lag, onset_s);
     let is_clamped = bound - onset_s.abs() < 1e-3 * bound;
-    Match { onset_s, is_clamped, errors: line.errors }
+    Match { onset_s, is_clamped, errors: Line::of(step, time_s, lag, onset_s).errors }
 }
 
 /// The motors that a fit may start from.
@@ -137,9 +137,7 @@ struct Line {
 impl Line {
     fn of(step: &Step, time_s: &[f64], lag: Lag, onset_s: f64) -> Self {
         let unit: Vec<f64> = time_s.iter().map(|time| lag.step(time - onset_s)).collect();
-        let n = unit.len() as f64;
-        let mean_unit = unit.iter().sum::<f64>() / n;
-        let mean_speed = step.speed.iter().sum::<f64>() / n;
+        let (mean_unit, mean_speed) = (mean(&unit), mean(&step.speed));
         let pairs =
             || unit.iter().zip(&step.speed).map(|(unit, speed)| (unit - mean_unit, speed - mean_speed));
         let height = pairs().map(|(unit, speed)| unit * speed).sum::<f64>()
@@ -149,9 +147,9 @@ impl Line {
     }
 }
 
-/// The mean square error of a step, relative to its height.
-fn relative_square(step: &Step, line: &Line) -> f64 {
-    line.errors.iter().map(|error| (error / step.height).powi(2)).sum::<f64>() / line.errors.len() as f64
+/// The mean square of a step's `errors`, relative to its height.
+pub fn relative_square(step: &Step, errors: &[f64]) -> f64 {
+    errors.iter().map(|error| (error / step.height).powi(2)).sum::<f64>() / errors.len() as f64
 }
 
 /// The onset with the smallest error: the best of a few, refined by the golden section.
@@ -159,7 +157,7 @@ fn best_onset(step: &Step, time_s: &[f64], lag: Lag) -> f64 {
     const COARSE: i32 = 4;
     const REFINEMENTS: usize = 12;
     let bound = ONSET_ROWS_MAX * step.period_s;
-    let cost = |onset: f64| relative_square(step, &Line::of(step, time_s, lag, onset));
+    let cost = |onset: f64| relative_square(step, &Line::of(step, time_s, lag, onset).errors);
     let grid = (-COARSE..=COARSE).map(|index| bound * f64::from(index) / f64::from(COARSE));
     let coarse = grid.map(|onset| (onset, cost(onset))).min_by(|a, b| a.1.total_cmp(&b.1));
     let best = coarse.map_or(0.0, |(onset, _)| onset);
@@ -188,15 +186,14 @@ fn normal(step: &Step, time_s: &[f64], lag: Lag, order: Order) -> Normal {
     let unit_at =
         |lag: Lag, onset: f64| -> Vec<f64> { time_s.iter().map(|time| lag.step(time - onset)).collect() };
     let Line { unit, errors, height } = Line::of(step, time_s, lag, found.onset_s);
-    let slope = |up: Vec<f64>, down: Vec<f64>, width: f64| -> Vec<f64> {
+    // From the motor and the onset of `down` to those of `up`, which are `width` apart.
+    let slope = |up: (Lag, f64), down: (Lag, f64), width: f64| -> Vec<f64> {
+        let (up, down) = (unit_at(up.0, up.1), unit_at(down.0, down.1));
         up.iter().zip(&down).map(|(up, down)| height * (up - down) / (width * step.height)).collect()
     };
-    let onset_width = 1e-3 * step.period_s;
-    let by_onset = slope(
-        unit_at(lag, found.onset_s + onset_width),
-        unit_at(lag, found.onset_s - onset_width),
-        2.0 * onset_width,
-    );
+    let at = found.onset_s;
+    let aside_s = 1e-3 * step.period_s;
+    let by_onset = slope((lag, at + aside_s), (lag, at - aside_s), 2.0 * aside_s);
     let mut basis: Vec<Vec<f64>> = Vec::new();
     push_orthogonal(&mut basis, vec![1.0; unit.len()]);
     push_orthogonal(&mut basis, unit);
@@ -204,18 +201,11 @@ fn normal(step: &Step, time_s: &[f64], lag: Lag, order: Order) -> Normal {
         push_orthogonal(&mut basis, by_onset);
     }
     let widths = [1e-4 * lag.a1_s, 1e-4 * lag.a1_s * lag.a1_s];
-    let by_a1 = slope(
-        unit_at(Lag { a1_s: lag.a1_s + widths[0], ..lag }, found.onset_s),
-        unit_at(Lag { a1_s: lag.a1_s - widths[0], ..lag }, found.onset_s),
-        2.0 * widths[0],
-    );
+    let with_a1 = |a1_s: f64| (Lag { a1_s, ..lag }, at);
+    let by_a1 = slope(with_a1(lag.a1_s + widths[0]), with_a1(lag.a1_s - widths[0]), 2.0 * widths[0]);
     let by_a2 = match order {
         Order::First => vec![0.0; time_s.len()],
-        Order::Second => slope(
-            unit_at(Lag { a2_s2: lag.a2_s2 + widths[1], ..lag }, found.onset_s),
-            unit_at(lag, found.onset_s),
-            widths[1],
-        ),
+        Order::Second => slope((Lag { a2_s2: lag.a2_s2 + widths[1], ..lag }, at), (lag, at), widths[1]),
     };
     let residuals: Vec<f64> = errors.iter().map(|error| -error / step.height).collect();
     assembled([without_basis(by_a1, &basis), without_basis(by_a2, &basis)], &residuals)

@@ -8,7 +8,7 @@ use super::coefficient::Coefficient;
 use super::dynamics::{Dynamics, Fitted, Order};
 use super::error::RotorError;
 use super::plateau;
-use super::stand::Stand;
+use super::score::Score;
 use super::statics::Statics;
 use crate::statistics::Estimate;
 
@@ -24,12 +24,8 @@ pub struct RotorReport {
 }
 
 impl RotorReport {
-    pub(super) fn new(stand: &Stand, statics: Option<Statics>, dynamics: Option<Dynamics>) -> Self {
-        Self { name: stand.name.clone(), statics, dynamics }
-    }
-
     /// All figures as JSON, behind who wrote them; an end of an interval that is not known is `null`.
-    pub fn json(&self) -> Result<String, RotorError> {
+    pub(super) fn json(&self) -> Result<String, RotorError> {
         let mut all = serde_json::Map::from_iter([("writer".to_owned(), "hummingbus".into())]);
         all.extend(serde_json::to_value(self)?.as_object().cloned().unwrap_or_default());
         Ok(serde_json::to_string_pretty(&all)?)
@@ -61,11 +57,8 @@ fn write_statics(f: &mut fmt::Formatter<'_>, statics: &Statics) -> fmt::Result {
         }
     }
     if let Some(check) = &statics.plausibility {
-        write!(f, "  thrust number {:.3}", check.thrust_number)?;
-        match check.figure_of_merit {
-            Some(merit) => writeln!(f, ", figure of merit {merit:.2}")?,
-            None => writeln!(f)?,
-        }
+        let merit = check.figure_of_merit.map(|merit| format!(", figure of merit {merit:.2}"));
+        writeln!(f, "  thrust number {:.3}{}", check.thrust_number, merit.unwrap_or_default())?;
     }
     Ok(())
 }
@@ -78,14 +71,20 @@ fn write_coefficient(
 ) -> fmt::Result {
     let Estimate { value, low, high, .. } = coefficient.value;
     write!(f, "  {name} = {value:.4e} {unit}/(rad/s)^2 ({low:.4e} to {high:.4e})")?;
-    write!(f, ", {} plateaus; ", coefficient.plateaus)?;
-    match &coefficient.held_out {
-        Some(score) => writeln!(
-            f,
-            "held out {}: RMS {:.2e} {unit}, R^2 {:.4}",
-            score.segments, score.rms, score.r_squared
-        ),
-        None => writeln!(f, "none held out"),
+    write!(f, ", {} plateaus", coefficient.plateaus)?;
+    write_held_out(f, coefficient.held_out, |rms| format!("{rms:.2e} {unit}"))
+}
+
+fn write_held_out(
+    f: &mut fmt::Formatter<'_>,
+    score: Option<Score>,
+    size: impl Fn(f64) -> String,
+) -> fmt::Result {
+    match score {
+        Some(Score { rms, r_squared, segments }) => {
+            writeln!(f, "; held out {segments}: RMS {}, R^2 {r_squared:.4}", size(rms))
+        }
+        None => writeln!(f, "; none held out"),
     }
 }
 
@@ -141,12 +140,5 @@ fn write_motor(f: &mut fmt::Formatter<'_>, motor: &Fitted) -> fmt::Result {
         _ => write!(f, "  second order: its parameters cannot be told")?,
     }
     write!(f, ", {} steps", motor.steps)?;
-    match &motor.held_out {
-        Some(score) => writeln!(
-            f,
-            "; held out {}: RMS {:.2} rad/s, R^2 {:.4}",
-            score.segments, score.rms, score.r_squared
-        ),
-        None => writeln!(f, "; none held out"),
-    }
+    write_held_out(f, motor.held_out, |rms| format!("{rms:.2} rad/s"))
 }

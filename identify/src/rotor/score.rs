@@ -6,6 +6,13 @@ use serde::Serialize;
 pub const LEVEL: f64 = 0.95;
 
 /// Errors of predictions.
+///
+/// ```
+/// use identify::rotor::Score;
+///
+/// let score = Score::of(&[(1.0, 2.0), (5.0, 4.0)]).unwrap();
+/// assert_eq!((score.rms, score.r_squared, score.segments), (1.0, 0.0, 2));
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Score {
     /// Root of the mean square error, in the unit of what is predicted.

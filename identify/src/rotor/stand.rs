@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use diagnostics::parameter::{positive, require};
 use diagnostics::unit::{Dimension, FORCE, RATIO, SPEED, TIME, TORQUE};
 use diagnostics::{Diagnostic, ParameterError};
+use flights::Role;
 use serde::Deserialize;
 use vehicles::Vehicle;
 use vehicles::variables::expand;
@@ -12,16 +13,21 @@ use vehicles::variables::expand;
 use super::error::RotorError;
 
 /// A stand file, read.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Stand {
     /// What was measured, as text.
     pub name: String,
     /// Diameter of the propeller in m, if the file says it.
+    #[serde(rename = "propeller_diameter_m")]
     pub diameter_m: Option<f64>,
+    vehicle: Option<PathBuf>,
     /// Logs of thrust and torque at steady speeds.
+    #[serde(default, rename = "static")]
     pub statics: Vec<StaticLog>,
     /// Logs of steps of the command.
+    #[serde(default, rename = "dynamic")]
     pub dynamics: Vec<DynamicLog>,
-    vehicle: Option<PathBuf>,
 }
 
 /// The vehicle file that the rest is taken over from.
@@ -30,28 +36,6 @@ pub struct VehicleFile {
     pub name: String,
     /// The vehicle.
     pub vehicle: Vehicle,
-}
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct File {
-    name: String,
-    propeller_diameter_m: Option<f64>,
-    vehicle: Option<String>,
-    #[serde(default, rename = "static")]
-    statics: Vec<StaticLog>,
-    #[serde(default, rename = "dynamic")]
-    dynamics: Vec<DynamicLog>,
-}
-
-/// What a log is for.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, serde::Serialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Role {
-    /// Parameters are fitted on it.
-    Fit,
-    /// Errors are judged on it, and nothing is fitted.
-    Test,
 }
 
 /// A log of thrust and torque.
@@ -136,15 +120,6 @@ pub struct Column {
     pub pole_pairs: f64,
 }
 
-/// How the cells of a column become SI.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Scale {
-    /// By a factor.
-    Factor(f64),
-    /// By reading `YYYY-MM-DD HH:MM:SS:mmm`.
-    WallClock,
-}
-
 fn fit() -> Role {
     Role::Fit
 }
@@ -170,24 +145,16 @@ impl Stand {
         let name = path.display().to_string();
         let text =
             vehicles::text::read(path).map_err(|cause| Diagnostic::unreadable(name.as_str(), &cause))?;
-        let file: File = diagnostics::read_toml(&name, &text)?;
+        let mut stand: Self = diagnostics::read_toml(&name, &text)?;
         let in_file = |error: ParameterError| Diagnostic::in_file(name.as_str(), error);
-        Diagnostic::gather(file.checks().into_iter().map(|check| check.map_err(in_file)))?;
+        Diagnostic::gather(stand.checks().into_iter().map(|check| check.map_err(in_file)))?;
         let folder = path.parent().unwrap_or(Path::new(""));
-        let resolve =
-            |key: &str, written: &Path| expanded(key, written).map(|path| folder.join(path)).map_err(in_file);
-        let mut stand = Stand {
-            name: file.name,
-            diameter_m: file.propeller_diameter_m,
-            vehicle: file.vehicle.map(|written| resolve("vehicle", Path::new(&written))).transpose()?,
-            statics: file.statics,
-            dynamics: file.dynamics,
-        };
-        for (index, log) in stand.statics.iter_mut().enumerate() {
-            log.file = resolve(&format!("static.{index}.file"), &log.file)?;
-        }
-        for (index, log) in stand.dynamics.iter_mut().enumerate() {
-            log.file = resolve(&format!("dynamic.{index}.file"), &log.file)?;
+        let statics = stand.statics.iter_mut().map(|log| &mut log.file).enumerate();
+        let dynamics = stand.dynamics.iter_mut().map(|log| &mut log.file).enumerate();
+        let files = statics.map(|(index, file)| (format!("static.{index}.file"), file));
+        let files = files.chain(dynamics.map(|(index, file)| (format!("dynamic.{index}.file"), file)));
+        for (key, file) in stand.vehicle.iter_mut().map(|file| ("vehicle".to_owned(), file)).chain(files) {
+            *file = folder.join(expanded(&key, file).map_err(in_file)?);
         }
         Ok(stand)
     }
@@ -205,46 +172,26 @@ pub fn short_name(path: &Path) -> String {
     path.file_name().unwrap_or(path.as_os_str()).to_string_lossy().into_owned()
 }
 
-/// What the cells of a speed, thrust or torque mean; known to be right after [`Stand::read`].
 impl Column {
-    /// To seconds.
-    pub fn time(&self) -> Scale {
-        if self.unit == "wall clock" { Scale::WallClock } else { self.scale(TIME) }
+    /// Whether its cells are times as `YYYY-MM-DD HH:MM:SS:mmm`.
+    pub fn is_wall_clock(&self) -> bool {
+        self.unit == "wall clock"
     }
 
-    /// To rad/s of the rotor.
-    pub fn speed(&self) -> Scale {
-        self.scale(SPEED)
-    }
-
-    /// To N.
-    pub fn thrust(&self) -> Scale {
-        self.scale(FORCE)
-    }
-
-    /// To N*m.
-    pub fn torque(&self) -> Scale {
-        self.scale(TORQUE)
-    }
-
-    /// Raw: a command keeps its unit.
-    pub fn raw(&self) -> Scale {
-        Scale::Factor(1.0)
-    }
-
-    fn scale(&self, dimension: Dimension) -> Scale {
-        Scale::Factor(dimension.factor(&self.unit).unwrap_or(f64::NAN) / self.pole_pairs)
+    /// What takes its cells to SI, a speed to that of the rotor; known to be right after [`Stand::read`].
+    pub fn factor(&self, dimension: Dimension) -> f64 {
+        dimension.factor(&self.unit).unwrap_or(f64::NAN) / self.pole_pairs
     }
 }
 
 type Check = Result<(), ParameterError>;
 
-impl File {
+impl Stand {
     /// What each value came to.
     fn checks(&self) -> Vec<Check> {
         let logs = self.statics.len() + self.dynamics.len();
         let mut checks = vec![require("static, dynamic", "none", logs > 0, "at least one log")];
-        checks.extend(self.propeller_diameter_m.map(|diameter| positive("propeller_diameter_m", diameter)));
+        checks.extend(self.diameter_m.map(|diameter| positive("propeller_diameter_m", diameter)));
         for (index, log) in self.statics.iter().enumerate() {
             let key = |name: &str| format!("static.{index}.{name}");
             let has_one = log.thrust.is_some() || log.torque.is_some();
@@ -276,7 +223,7 @@ impl File {
 
 fn time_unit(key: &str, column: &Column) -> Check {
     let expected = format!("\"wall clock\" (YYYY-MM-DD HH:MM:SS:mmm) or {}", TIME.describe());
-    let is_known = column.time() == Scale::WallClock || TIME.factor(&column.unit).is_some();
+    let is_known = column.is_wall_clock() || TIME.factor(&column.unit).is_some();
     require(&format!("{key}.unit"), &column.unit, is_known, expected)
 }
 

@@ -2,12 +2,14 @@
 
 use std::f64::consts::PI;
 
+use diagnostics::Dimension;
+use diagnostics::unit::{self, SPEED};
 use serde::Serialize;
 
 use super::coefficient::{Coefficient, PLATEAUS_MIN, Point};
 use super::error::RotorError;
 use super::plateau::{self, Plateaus, REST_RAD_S, median, without_outliers};
-use super::stand::{Column, Scale, Stand, StaticLog, held_out, short_name};
+use super::stand::{Column, Stand, StaticLog, held_out, short_name};
 use super::table::LogTable;
 use crate::statistics::mean;
 
@@ -38,24 +40,21 @@ pub struct Plausibility {
     pub figure_of_merit: Option<f64>,
 }
 
-/// A quantity of a log: its plateaus and what was noticed.
-struct Readings {
-    fit: Vec<Point>,
-    test: Vec<Point>,
-}
+/// The plateaus of a quantity of a log, and whether each is held out.
+type Readings = Vec<(Point, bool)>;
 
 /// A quantity of the stand, for texts and for its columns.
 struct Quantity {
     name: &'static str,
     unit: &'static str,
-    column: fn(&StaticLog) -> Option<&Column>,
-    scale: fn(&Column) -> Scale,
+    column: fn(&StaticLog) -> &Option<Column>,
+    dimension: Dimension,
 }
 
 const THRUST: Quantity =
-    Quantity { name: "thrust", unit: "N", column: |log| log.thrust.as_ref(), scale: Column::thrust };
+    Quantity { name: "thrust", unit: "N", column: |log| &log.thrust, dimension: unit::FORCE };
 const TORQUE: Quantity =
-    Quantity { name: "torque", unit: "N*m", column: |log| log.torque.as_ref(), scale: Column::torque };
+    Quantity { name: "torque", unit: "N*m", column: |log| &log.torque, dimension: unit::TORQUE };
 
 /// Fits the static logs of a stand; `None` if it has none.
 pub fn fitted(stand: &Stand) -> Result<Option<Statics>, RotorError> {
@@ -90,8 +89,8 @@ impl<'s> Log<'s> {
     fn read(declared: &'s StaticLog, findings: &mut Vec<String>) -> Result<Self, RotorError> {
         let table = LogTable::read(&declared.file)?;
         let name = short_name(&declared.file);
-        let time_s = table.times(&declared.time.column, declared.time.time())?;
-        let speed = table.column(&declared.speed.column, declared.speed.speed())?;
+        let time_s = table.times(&declared.time)?;
+        let speed = table.column(&declared.speed, declared.speed.factor(SPEED))?;
         let kept: Vec<usize> = (0..speed.len()).filter(|row| speed[*row].is_finite()).collect();
         let time_s: Vec<f64> = kept.iter().map(|row| time_s[*row]).collect();
         let speed: Vec<f64> = kept.iter().map(|row| speed[*row]).collect();
@@ -143,7 +142,7 @@ impl<'s> Log<'s> {
         findings: &mut Vec<String>,
     ) -> Result<Option<Readings>, RotorError> {
         let Some(column) = (quantity.column)(self.declared) else { return Ok(None) };
-        let values = self.table.column(&column.column, (quantity.scale)(column))?;
+        let values = self.table.column(column, column.factor(quantity.dimension))?;
         let read = |rows: &[usize]| -> Vec<f64> {
             rows.iter().map(|row| values[self.kept[*row]]).filter(|value| value.is_finite()).collect()
         };
@@ -165,15 +164,7 @@ impl<'s> Log<'s> {
             ));
         }
         let is_test = held_out(points.len(), self.declared.role, self.declared.held_out);
-        let of = |test: bool| {
-            points
-                .iter()
-                .zip(&is_test)
-                .filter(|(_, is_held_out)| **is_held_out == test)
-                .map(|(point, _)| *point)
-                .collect()
-        };
-        Ok(Some(Readings { fit: of(false), test: of(true) }))
+        Ok(Some(points.into_iter().zip(is_test).collect()))
     }
 
     /// What the stand reads at rest before the run. What it reads after it only tells how far it drifts: by then a
@@ -212,29 +203,27 @@ fn coefficient(
     logs: &[Log],
     findings: &mut Vec<String>,
 ) -> Result<Option<Coefficient>, RotorError> {
-    let (mut fit, mut test) = (Vec::new(), Vec::new());
-    let mut is_there = false;
+    let mut readings: Option<Readings> = None;
     for log in logs {
-        if let Some(readings) = log.readings(quantity, findings)? {
-            is_there = true;
-            fit.extend(readings.fit);
-            test.extend(readings.test);
+        if let Some(more) = log.readings(quantity, findings)? {
+            readings.get_or_insert_default().extend(more);
         }
     }
-    if !is_there {
-        return Ok(None);
-    }
+    let Some(readings) = readings else { return Ok(None) };
+    let of_role = |is_wanted: bool| {
+        let of_role = readings.iter().filter(|(_, is_test)| *is_test == is_wanted);
+        of_role.map(|(point, _)| *point).collect::<Vec<_>>()
+    };
+    let (mut fit, mut test) = (of_role(false), of_role(true));
     let total: f64 = fit.iter().map(|point| point.force).sum();
     if total < 0.0 {
         findings.push(format!("{}: it is negative while the rotor turns: its sign is turned", quantity.name));
         fit.iter_mut().chain(&mut test).for_each(|point| point.force = -point.force);
     }
-    let found = fit.len();
-    let coefficient = Coefficient::fitted(&fit, &test).ok_or_else(|| RotorError::TooLittle {
-        what: quantity.name.to_owned(),
-        expected: format!("{PLATEAUS_MIN} plateaus to fit on"),
-        found: found.to_string(),
-        advice: "log more steady speeds, or lower `settle_s` or `held_out`".to_owned(),
+    let coefficient = Coefficient::fitted(&fit, &test).ok_or_else(|| {
+        let expected = format!("{PLATEAUS_MIN} plateaus to fit on");
+        let advice = "log more steady speeds, or lower `settle_s` or `held_out`";
+        RotorError::too_little(quantity.name, expected, fit.len(), advice)
     })?;
     findings.extend(law(quantity, &coefficient));
     Ok(Some(coefficient))

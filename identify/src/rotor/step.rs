@@ -1,5 +1,6 @@
 //! Steps of the command, cut out of a log.
 
+use diagnostics::unit::SPEED;
 use serde::Serialize;
 
 use super::error::RotorError;
@@ -54,7 +55,8 @@ pub struct Hold {
     pub is_test: bool,
 }
 
-/// What a log of steps holds.
+/// What logs of steps hold.
+#[derive(Default)]
 pub struct Cut {
     /// Its usable steps.
     pub steps: Vec<Step>,
@@ -76,23 +78,28 @@ struct Log<'s> {
     period_s: f64,
 }
 
-/// Cuts the steps out of a log.
-pub fn cut(declared: &DynamicLog) -> Result<Cut, RotorError> {
-    let log = Log::read(declared)?;
-    let mut left_out = LeftOut::default();
-    let changes: Vec<usize> = (1..log.speed.len()).filter(|row| log.changes(*row)).collect();
-    let mut steps = Vec::new();
-    for (index, row) in changes.iter().enumerate() {
-        let since = if index == 0 { 0 } else { changes[index - 1] };
-        let until = changes.get(index + 1).copied().unwrap_or(log.speed.len());
-        steps.extend(log.step(since, *row, until, &mut left_out));
+impl Cut {
+    /// Cuts the steps out of a log.
+    pub fn add(&mut self, declared: &DynamicLog) -> Result<(), RotorError> {
+        let log = Log::read(declared)?;
+        let mut left_out = LeftOut::default();
+        let changes: Vec<usize> = (1..log.speed.len()).filter(|row| log.changes(*row)).collect();
+        // Each with where the command is held since, and until when.
+        let rows = [&[0], &changes[..], &[log.speed.len()]].concat();
+        let steps = rows.windows(3).filter_map(|rows| log.step(rows[0], rows[1], rows[2], &mut left_out));
+        let mut steps: Vec<Step> = steps.collect();
+        let is_test = held_out(steps.len(), declared.role, declared.held_out);
+        steps.iter_mut().zip(is_test).for_each(|(step, test)| step.is_test = test);
+        self.findings.extend(log.findings(changes.len(), steps.len(), &left_out));
+        self.zero_is_off |= log
+            .command
+            .iter()
+            .zip(&log.speed)
+            .any(|(command, speed)| *command <= 0.0 && speed.abs() < REST_RAD_S);
+        self.steps.extend(steps);
+        self.holds.extend(log.holds(&rows));
+        Ok(())
     }
-    let is_test = held_out(steps.len(), declared.role, declared.held_out);
-    steps.iter_mut().zip(is_test).for_each(|(step, test)| step.is_test = test);
-    let findings = log.findings(changes.len(), steps.len(), &left_out);
-    let at_zero = |row: &usize| log.command[*row] <= 0.0 && log.speed[*row].abs() < REST_RAD_S;
-    let zero_is_off = (0..log.speed.len()).any(|row| at_zero(&row));
-    Ok(Cut { steps, holds: log.holds(&changes), zero_is_off, findings })
 }
 
 /// Changes of the command that are no usable steps, by reason.
@@ -109,18 +116,16 @@ impl<'s> Log<'s> {
     fn read(declared: &'s DynamicLog) -> Result<Self, RotorError> {
         let table = LogTable::read(&declared.file)?;
         let name = short_name(&declared.file);
-        let time_s = table.times(&declared.time.column, declared.time.time())?;
-        let speed = table.column(&declared.speed.column, declared.speed.speed())?;
-        let command = table.column(&declared.command.column, declared.command.raw())?;
+        let time_s = table.times(&declared.time)?;
+        let speed = table.column(&declared.speed, declared.speed.factor(SPEED))?;
+        let command = table.column(&declared.command, 1.0)?;
         let kept: Vec<usize> =
             (0..time_s.len()).filter(|row| speed[*row].is_finite() && command[*row].is_finite()).collect();
         let pick = |values: &[f64]| kept.iter().map(|row| values[*row]).collect::<Vec<f64>>();
         let (time_s, speed, command) = (pick(&time_s), pick(&speed), pick(&command));
-        let period_s = period(&time_s).ok_or_else(|| RotorError::Rows {
-            file: name.clone(),
-            expected: "rows with time, speed and command".to_owned(),
-            found: "too few".to_owned(),
-            advice: "check the columns",
+        let period_s = period(&time_s).ok_or_else(|| {
+            let expected = "rows with time, speed and command";
+            RotorError::too_little(&name, expected, "too few", "check the columns")
         })?;
         let log = Self { declared, name, time_s, speed, command, period_s };
         log.check_rate()?;
@@ -133,14 +138,11 @@ impl<'s> Log<'s> {
         if self.rows(before_s) >= ROWS_BEFORE_MIN && self.rows(after_s) >= ROWS_AFTER_MIN {
             return Ok(());
         }
-        Err(RotorError::Rows {
-            file: self.name.clone(),
-            expected: format!(
-                "at least {ROWS_BEFORE_MIN} row in the {before_s} s before a step and {ROWS_AFTER_MIN} in the {after_s} s after"
-            ),
-            found: format!("one in {} s", self.period_s),
-            advice: "correct the unit of `time`, or raise `before_s` and `after_s`",
-        })
+        let expected = format!(
+            "at least {ROWS_BEFORE_MIN} row in the {before_s} s before a step and {ROWS_AFTER_MIN} in the {after_s} s after"
+        );
+        let advice = "correct the unit of `time`, or raise `before_s` and `after_s`";
+        Err(RotorError::too_little(&self.name, expected, format!("one in {} s", self.period_s), advice))
     }
 
     /// Whether the command of `row` is another than before.
@@ -187,21 +189,17 @@ impl<'s> Log<'s> {
         Some(Step { file, from, to, is_test: false, period_s, rows_s, stamps_s, clock, speed, height })
     }
 
-    /// The steady speeds of commands that were held for longer than a step is looked at.
+    /// The steady speeds of commands that were held from a change to the next for longer than a step is looked at; the
+    /// log's ends are changes.
     fn holds(&self, changes: &[usize]) -> Vec<Hold> {
         let settle = self.rows(self.declared.after_s);
         let shortest = settle + self.rows(self.declared.before_s);
-        let starts = [0].into_iter().chain(changes.iter().copied());
-        let ends = changes.iter().copied().chain([self.speed.len()]);
-        let mut holds: Vec<Hold> = starts
-            .zip(ends)
-            .filter(|(start, end)| self.command[*start] > 0.0 && *end >= *start + shortest)
-            .map(|(start, end)| Hold {
-                command: self.command[start],
-                speed_rad_s: median(&self.speed[start + settle..end]),
-                is_test: false,
-            })
-            .collect();
+        let hold = |rows: &[usize]| {
+            let (command, steady) = (self.command[rows[0]], rows[0] + settle..rows[1]);
+            let is_held = command > 0.0 && rows[1] >= rows[0] + shortest;
+            is_held.then(|| Hold { command, speed_rad_s: median(&self.speed[steady]), is_test: false })
+        };
+        let mut holds: Vec<Hold> = changes.windows(2).filter_map(hold).collect();
         let is_test = held_out(holds.len(), self.declared.role, self.declared.held_out);
         holds.iter_mut().zip(is_test).for_each(|(hold, test)| hold.is_test = test);
         holds

@@ -3,10 +3,11 @@
 use std::path::Path;
 
 use diagnostics::Diagnostic;
+use diagnostics::unit::TIME;
 use vehicles::table::Table;
 
 use super::error::RotorError;
-use super::stand::{Scale, short_name};
+use super::stand::{Column, short_name};
 
 /// Seconds of a day; a wall clock begins anew after them.
 const DAY_S: f64 = 86_400.0;
@@ -30,29 +31,32 @@ impl LogTable {
         }
     }
 
-    /// The numbers of a column in SI; NaN where a cell has none.
-    pub fn column(&self, name: &str, scale: Scale) -> Result<Vec<f64>, RotorError> {
-        let index = self.table.column(name).ok_or_else(|| RotorError::NoColumn {
+    fn index(&self, column: &Column) -> Result<usize, RotorError> {
+        self.table.column(&column.column).ok_or_else(|| RotorError::NoColumn {
             file: self.file.clone(),
-            column: name.to_owned(),
+            column: column.column.clone(),
             known: self.table.headers.clone(),
-        })?;
-        Ok(match scale {
-            Scale::Factor(factor) => self.table.numbers(index).map(|number| number * factor).collect(),
-            Scale::WallClock => {
-                let cells = self.table.rows.iter().map(|row| row.cell(index));
-                unwrapped(cells.map(|cell| seconds_of_day(cell).unwrap_or(f64::NAN)))
-            }
         })
     }
 
-    /// The numbers of a time column; every row needs one, and none may go back.
-    pub fn times(&self, name: &str, scale: Scale) -> Result<Vec<f64>, RotorError> {
-        let time_s = self.column(name, scale)?;
+    /// The numbers of a column, each times `factor`; NaN where a cell has none.
+    pub fn column(&self, column: &Column, factor: f64) -> Result<Vec<f64>, RotorError> {
+        Ok(self.table.numbers(self.index(column)?).map(|number| number * factor).collect())
+    }
+
+    /// The numbers of a time column in s; every row needs one, and none may go back.
+    pub fn times(&self, column: &Column) -> Result<Vec<f64>, RotorError> {
+        let time_s = if column.is_wall_clock() {
+            let index = self.index(column)?;
+            let cells = self.table.rows.iter().map(|row| row.cell(index));
+            unwrapped(cells.map(|cell| seconds_of_day(cell).unwrap_or(f64::NAN)))
+        } else {
+            self.column(column, column.factor(TIME))?
+        };
         let fault = |row: usize, found: &'static str| RotorError::Time {
             file: self.file.clone(),
             line: self.table.rows[row].line,
-            column: name.to_owned(),
+            column: column.column.clone(),
             found,
         };
         if let Some(row) = time_s.iter().position(|time| !time.is_finite()) {

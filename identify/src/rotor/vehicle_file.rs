@@ -7,6 +7,7 @@ use super::command_map::CommandLine;
 use super::dynamics::{Dynamics, Order};
 use super::report::RotorReport;
 use super::stand::VehicleFile;
+use super::statics::Statics;
 use crate::statistics::Estimate;
 
 /// The text of `rotor.toml`. What the stand does not tell comes from `vehicle`, and is left out without one.
@@ -50,20 +51,19 @@ fn taken(vehicle: Option<&VehicleFile>, table: &str, name: &str, unit: &str, val
 }
 
 fn rotor(report: &RotorReport, vehicle: Option<&VehicleFile>) -> String {
-    let statics = report.statics.as_ref();
     let of = |value: fn(&vehicles::Vehicle) -> f64| vehicle.map_or(f64::NAN, |file| value(&file.vehicle));
     let line = |name: &str, unit: &str, law: &str, found: Option<&Coefficient>, other: f64| match found {
         Some(found) => identified(name, &found.value, unit, &fitted_on(report, law, found)),
         None => taken(vehicle, "rotor", name, unit, other),
     };
-    let thrust = statics.and_then(|statics| statics.thrust.as_ref());
-    let torque = statics.and_then(|statics| statics.torque.as_ref());
-    let inertia = of(|vehicle| vehicle.rotor_inertia_kg_m2);
+    let found =
+        |of: fn(&Statics) -> &Option<Coefficient>| report.statics.as_ref().and_then(|all| of(all).as_ref());
+    let (thrust, torque) = (found(|all| &all.thrust), found(|all| &all.torque));
     [
         "[rotor]\n".to_owned(),
         line("thrust_coefficient", "N/(rad/s)^2", "T = c_T w^2", thrust, of(|fit| fit.thrust_coefficient)),
         line("torque_coefficient", "N*m/(rad/s)^2", "Q = c_Q w^2", torque, of(|fit| fit.torque_coefficient)),
-        taken(vehicle, "rotor", "inertia", "kg*m^2", inertia),
+        taken(vehicle, "rotor", "inertia", "kg*m^2", of(|vehicle| vehicle.rotor_inertia_kg_m2)),
     ]
     .concat()
 }
@@ -75,87 +75,76 @@ fn fitted_on(report: &RotorReport, law: &str, found: &Coefficient) -> String {
 }
 
 fn motor(report: &RotorReport, vehicle: Option<&VehicleFile>) -> String {
-    let Some(dynamics) = &report.dynamics else { return taken_motor(vehicle) };
-    let source = format!("{}: {} steps of the command", report.name, dynamics.first.steps);
-    let order = match dynamics.comparison.preferred {
-        Order::First => first_order(dynamics, &source),
-        Order::Second => second_order(dynamics, &source),
-    };
-    format!("[motor]\n# {}\n{order}", dynamics.comparison.reason)
-}
-
-fn first_order(dynamics: &Dynamics, source: &str) -> String {
-    let time = dynamics.first.time_constant_s.iter();
-    let line = time.map(|time| identified("time_constant", time, "s", source)).collect::<String>();
-    format!("model = \"first-order\"\n{line}")
-}
-
-fn second_order(dynamics: &Dynamics, source: &str) -> String {
-    let frequency = dynamics.second.natural_frequency_rad_s.iter();
-    let damping = dynamics.second.damping_ratio.iter();
-    let lines = frequency.map(|known| identified("natural_frequency", known, "rad/s", source));
-    let more = damping.map(|known| identified("damping_ratio", known, "1", source));
-    format!("model = \"second-order\"\n{}", lines.chain(more).collect::<String>())
-}
-
-fn taken_motor(vehicle: Option<&VehicleFile>) -> String {
+    if let Some(Dynamics { first, second, comparison, .. }) = &report.dynamics {
+        let source = format!("{}: {} steps of the command", report.name, first.steps);
+        let line = |name: &str, unit: &str, found: Option<Estimate>| {
+            found.map_or(String::new(), |found| identified(name, &found, unit, &source))
+        };
+        let order = match comparison.preferred {
+            Order::First => first_order(line("time_constant", "s", first.time_constant_s)),
+            Order::Second => second_order(
+                line("natural_frequency", "rad/s", second.natural_frequency_rad_s),
+                line("damping_ratio", "1", second.damping_ratio),
+            ),
+        };
+        return format!("[motor]\n# {}\n{order}", comparison.reason);
+    }
     let Some(file) = vehicle else { return "# [motor]: the stand does not tell\n".to_owned() };
     let line = |name: &str, unit: &str, value: f64| taken(vehicle, "motor", name, unit, value);
-    match file.vehicle.motor {
+    let order = match file.vehicle.motor {
         MotorModel::FirstOrder { time_constant_s } => {
-            format!("[motor]\nmodel = \"first-order\"\n{}", line("time_constant", "s", time_constant_s))
+            first_order(line("time_constant", "s", time_constant_s))
         }
-        MotorModel::SecondOrder { natural_frequency_rad_s, damping_ratio } => format!(
-            "[motor]\nmodel = \"second-order\"\n{}{}",
+        MotorModel::SecondOrder { natural_frequency_rad_s, damping_ratio } => second_order(
             line("natural_frequency", "rad/s", natural_frequency_rad_s),
-            line("damping_ratio", "1", damping_ratio)
+            line("damping_ratio", "1", damping_ratio),
         ),
-    }
+    };
+    format!("[motor]\n{order}")
+}
+
+fn first_order(time_constant: String) -> String {
+    format!("model = \"first-order\"\n{time_constant}")
+}
+
+fn second_order(natural_frequency: String, damping_ratio: String) -> String {
+    format!("model = \"second-order\"\n{natural_frequency}{damping_ratio}")
 }
 
 fn command(report: &RotorReport, vehicle: Option<&VehicleFile>) -> String {
-    let found = report.dynamics.as_ref().and_then(|dynamics| dynamics.command.as_ref());
-    match (found, vehicle) {
-        (Some(found), _) => identified_command(report, found),
-        (None, Some(file)) => taken_command(file),
-        (None, None) => "# [command]: the stand does not tell\n".to_owned(),
-    }
+    let (lines, zero_is_off, source) =
+        match (report.dynamics.as_ref().map(|dynamics| &dynamics.command), vehicle) {
+            (Some(Some(found)), _) => {
+                let lines = identified_command(&report.name, found);
+                (lines, found.zero_is_off.then_some(true), format!("{}: it stood still at 0", report.name))
+            }
+            (_, Some(file)) => {
+                let map = &file.vehicle.command;
+                let line = |name: &str, unit: &str, value: f64| taken(vehicle, "command", name, unit, value);
+                let lines = [
+                    line("min", "1", map.min),
+                    line("max", "1", map.max),
+                    line("speed_at_min", "rad/s", map.speed_at_min_rad_s),
+                    line("speed_at_max", "rad/s", map.speed_at_max_rad_s),
+                ];
+                (lines, Some(map.zero_is_off), format!("taken over from {}", file.name))
+            }
+            (_, None) => return "# [command]: the stand does not tell\n".to_owned(),
+        };
+    let source = toml::Value::from(source);
+    let off = zero_is_off.map(|is_off| format!("zero_is_off = {{ value = {is_off}, source = {source} }}\n"));
+    format!("[command]\n{}{}", lines.concat(), off.unwrap_or_default())
 }
 
-fn identified_command(report: &RotorReport, found: &CommandLine) -> String {
-    let ends =
-        format!("{}: the smallest and the largest command that was held, in the log's unit", report.name);
-    let line = format!("{}: line through the steady speeds", report.name);
+fn identified_command(name: &str, found: &CommandLine) -> [String; 4] {
+    let ends = format!("{name}: the smallest and the largest command that was held, in the log's unit");
+    let line = format!("{name}: line through the steady speeds");
     // A line can leave the axis below; a vehicle file has no negative speed.
     let low = Estimate { value: found.speed_at_min_rad_s.value.max(0.0), ..found.speed_at_min_rad_s };
-    let source = toml::Value::from(format!("{}: it stood still at 0", report.name));
-    let off = if found.zero_is_off {
-        format!("zero_is_off = {{ value = true, source = {source} }}\n")
-    } else {
-        String::new()
-    };
     [
-        "[command]\n".to_owned(),
         parameter("min", found.min, "1", &ends, "0"),
         parameter("max", found.max, "1", &ends, "0"),
         identified("speed_at_min", &low, "rad/s", &line),
         identified("speed_at_max", &found.speed_at_max_rad_s, "rad/s", &line),
-        off,
     ]
-    .concat()
-}
-
-fn taken_command(file: &VehicleFile) -> String {
-    let map = &file.vehicle.command;
-    let line = |name: &str, unit: &str, value: f64| taken(Some(file), "command", name, unit, value);
-    let source = toml::Value::from(format!("taken over from {}", file.name));
-    [
-        "[command]\n".to_owned(),
-        line("min", "1", map.min),
-        line("max", "1", map.max),
-        line("speed_at_min", "rad/s", map.speed_at_min_rad_s),
-        line("speed_at_max", "rad/s", map.speed_at_max_rad_s),
-        format!("zero_is_off = {{ value = {}, source = {source} }}\n", map.zero_is_off),
-    ]
-    .concat()
 }

@@ -36,6 +36,14 @@ pub struct MeanInterval {
 /// Künsch, "The jackknife and the bootstrap for general stationary observations", Annals of Statistics 17 (1989).
 /// NaN where there are no samples.
 ///
+/// ```
+/// use identify::statistics::{Bootstrap, block_bootstrap_mean};
+///
+/// let how = Bootstrap { block: 1, resamples: 1000, seed: 1, level: 0.95 };
+/// let found = block_bootstrap_mean(&[1.0, 2.0, 3.0], &how);
+/// assert!(found.mean == 2.0 && found.low < 2.0 && found.high > 2.0);
+/// ```
+///
 /// # Panics
 ///
 /// If `how.block` or `how.resamples` is 0.

@@ -7,6 +7,12 @@ use super::quantile::normal_quantile;
 /// r_k = sum_t (x_t - m)(x_{t+k} - m) / sum_t (x_t - m)^2: the biased estimate of Box, Jenkins, Reinsel and Ljung,
 /// "Time Series Analysis" (2015), eq. 2.1.11, as statsmodels' `acf(adjusted=False)`. Lags past the end give 0, a
 /// constant `x` gives NaN.
+///
+/// ```
+/// use identify::statistics::autocorrelation;
+///
+/// assert_eq!(autocorrelation(&[1.0, -1.0, 1.0, -1.0], 2), [1.0, -0.75, 0.5]);
+/// ```
 #[must_use]
 pub fn autocorrelation(x: &[f64], max_lag: usize) -> Vec<f64> {
     cross_correlation(x, x, max_lag)
@@ -44,6 +50,12 @@ fn centred(x: &[f64]) -> Vec<f64> {
 /// The sum of products as far as both have samples.
 fn product(x: &[f64], y: &[f64]) -> f64 {
     x.iter().zip(y).map(|(x, y)| x * y).sum()
+}
+
+/// The standard deviation over all of them; NaN of nothing.
+pub(crate) fn deviation(values: &[f64]) -> f64 {
+    let centred = centred(values);
+    (product(&centred, &centred) / values.len() as f64).sqrt()
 }
 
 /// The mean; NaN of nothing.

@@ -17,6 +17,13 @@ pub struct LjungBox {
 /// Q = n (n + 2) sum_k r_k^2 / (n - k), chi-square with `lags` degrees of freedom for white noise: Ljung and Box,
 /// "On a measure of lack of fit in time series models", Biometrika 65 (1978). No degrees of freedom are taken off
 /// for parameters that were fitted before.
+///
+/// ```
+/// use identify::statistics::ljung_box;
+///
+/// let swings: Vec<f64> = (0..100).map(|k| if k % 2 == 0 { 1.0 } else { -1.0 }).collect();
+/// assert!(ljung_box(&swings, 5).p_value < 1e-6, "by no means white");
+/// ```
 #[must_use]
 pub fn ljung_box(x: &[f64], lags: usize) -> LjungBox {
     let n = x.len() as f64;

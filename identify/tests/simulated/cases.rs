@@ -239,7 +239,7 @@ impl Case {
         let measured = Measured::of(flight).expect("motion");
         let mut worst = 0.0_f64;
         for horizon_s in HORIZONS_S {
-            let (truth, _) = measured.predicted(flight, problem.model.airframe(values), horizon_s, 0);
+            let truth = measured.predicted(flight, problem.model.airframe(values), horizon_s);
             let after = &report.held_out[&flight.name][&format!("{horizon_s}")];
             worst = after.iter().map(|(channel, change)| change.after / truth[channel]).fold(worst, f64::max);
         }

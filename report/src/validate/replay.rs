@@ -72,13 +72,13 @@ impl Replay {
         for output in [data.clone(), folder.join(MANIFEST), folder.join(RECORDING)] {
             require_no_input(&output, flight, vehicles)?;
         }
-        let (canonical, text) = flights::csv(&rows::with_rows_at_commands(flight))?;
+        let (_, text) = flights::csv(&rows::with_rows_at_commands(flight))?;
         output_file::write(&data, &CSV, |out| out.write_all(text.as_bytes()))?;
         let (start_s, end_s) =
             rows::span_s(&text).with_context(|| format!("{} has no rows", data.display()))?;
         let ticks = ticks(end_s - start_s)?;
         let initial = command_at(flight, start_s).context("it has no motor commands")?;
-        let manifest = manifest(ticks, &canonical.columns, initial, vehicles)?;
+        let manifest = manifest(ticks, flights::COLUMNS, initial, vehicles)?;
         // For whoever keeps the folder, and flies it once more.
         output_file::write(&folder.join(MANIFEST), &WRITTEN, |out| {
             write!(out, "{MANIFEST_START}\n\n{manifest}")
