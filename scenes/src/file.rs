@@ -33,43 +33,32 @@ impl Scene {
         }
     }
 
-    /// Reads and checks the text of a scene file; `file_name` is for messages only.
+    /// Reads and checks the text of a scene file, whose layout `scenes/room.toml` shows; `file_name` is for messages only.
     ///
     /// # Errors
     /// What is wrong with the text, and where.
     pub fn parse(text: &str, file_name: &str) -> Result<Self, Diagnostic> {
-        parse(text, file_name)
+        let doc = Document::new(file_name, text);
+        let tree = doc.tree()?;
+        let root = Section::new(&doc, String::new(), 0..0, tree.get_ref());
+        let mut faults = Faults::default();
+        let name = faults.keep(root.text("name").map(str::to_owned));
+        let sections = root.sections_if_any("boxes")?;
+        let boxes = faults.keep(Diagnostic::gather(sections.iter().map(one_box)));
+        let rig = root.has("rig").then(|| faults.keep(root.section("rig").and_then(|rig| rig::parse(&rig))));
+        let effects = faults.keep(vehicles::effects::read(&root));
+        faults.keep(root.finish());
+        let scene = name.zip(boxes).zip(effects);
+        let rig = rig.flatten();
+        faults.finish(scene.map(|((name, boxes), effects)| Self { name, boxes, rig, effects }))
     }
-}
-
-/// Reads the whole file; see `scenes/room.toml` for the layout.
-fn parse(text: &str, file_name: &str) -> Result<Scene, Diagnostic> {
-    let doc = Document::new(file_name, text);
-    let tree = doc.tree()?;
-    let root = Section::new(&doc, String::new(), 0..0, tree.get_ref());
-    let mut faults = Faults::default();
-    let name = faults.keep(root.text("name"));
-    let sections = if root.has("boxes") { root.sections("boxes")? } else { Vec::new() };
-    let boxes = faults.keep(Diagnostic::gather(sections.iter().map(one_box)));
-    let rig = root.has("rig").then(|| faults.keep(root.section("rig").and_then(|rig| rig::parse(&rig))));
-    let effects = faults.keep(vehicles::effects::read(&root));
-    faults.keep(root.finish());
-    let scene = name.zip(boxes).zip(effects);
-    let scene = scene.map(|((name, boxes), effects)| Scene {
-        name: name.to_owned(),
-        boxes,
-        rig: rig.flatten(),
-        effects,
-    });
-    faults.finish(scene)
 }
 
 fn one_box(section: &Section) -> Result<Cuboid, Diagnostic> {
     let name = section.text("name")?.to_owned();
     let centre = section.vector("centre", LENGTH, &PLACE)?;
     let size = section.vector("size", LENGTH, &SIZE)?;
-    let yaw_rad =
-        if section.has("yaw") { section.quantity("yaw", ANGLE)?.within(section.doc, &YAW)?.si } else { 0.0 };
+    let yaw_rad = if section.has("yaw") { section.bounded("yaw", ANGLE, &YAW)? } else { 0.0 };
     section.finish()?;
     Ok(Cuboid { name, centre_W_m: centre.into(), half_extents_m: Vector3::from(size) / 2.0, yaw_rad })
 }

@@ -5,7 +5,7 @@ use diagnostics::Diagnostic;
 use diagnostics::parameter::Bounds;
 use diagnostics::unit::{ANGLE, FORCE, LENGTH, LINEAR_DAMPING, MASS, ROTARY_DAMPING, TORQUE};
 use nalgebra::Vector3;
-use vehicles::reader::{Quantity, Section};
+use vehicles::reader::Section;
 
 /// The rod-end bearing of thesis section 5.2, and the tube that it hangs on.
 ///
@@ -70,25 +70,23 @@ const AMOUNT: Bounds = Bounds {
 
 /// Reads the table `[rig]`; see `scenes/rig-sliding.toml`.
 pub(crate) fn parse(section: &Section) -> Result<Rig, Diagnostic> {
-    let doc = section.doc;
-    let not_negative = |name, dimension| section.quantity(name, dimension)?.within(doc, &AMOUNT);
+    let amount = |name, dimension| section.bounded(name, dimension, &AMOUNT);
+    let tilt_max = || {
+        let tilt = section.quantity("tilt_max", ANGLE)?;
+        let holds = tilt.si > 0.0 && tilt.si < std::f64::consts::PI;
+        tilt.require(section.doc, holds, "an angle above 0 and below 180 deg")
+    };
     let rig = Rig {
         bearing_W_m: section.vector("bearing", LENGTH, &PLACE)?.into(),
         mount_B_m: section.vector("mount", LENGTH, &MOUNT)?.into(),
-        tilt_max_rad: tilt(section)?.si,
-        heave_m: not_negative("heave", LENGTH)?.si,
-        moving_mass_kg: section.quantity("moving_mass", MASS)?.within(doc, &MOVING_MASS)?.si,
-        bearing_friction_N_m: not_negative("bearing_friction", TORQUE)?.si,
-        bearing_damping_N_m_s: not_negative("bearing_damping", ROTARY_DAMPING)?.si,
-        slide_friction_N: not_negative("slide_friction", FORCE)?.si,
-        slide_damping_N_s_m: not_negative("slide_damping", LINEAR_DAMPING)?.si,
+        tilt_max_rad: tilt_max()?.si,
+        heave_m: amount("heave", LENGTH)?,
+        moving_mass_kg: section.bounded("moving_mass", MASS, &MOVING_MASS)?,
+        bearing_friction_N_m: amount("bearing_friction", TORQUE)?,
+        bearing_damping_N_m_s: amount("bearing_damping", ROTARY_DAMPING)?,
+        slide_friction_N: amount("slide_friction", FORCE)?,
+        slide_damping_N_s_m: amount("slide_damping", LINEAR_DAMPING)?,
     };
     section.finish()?;
     Ok(rig)
-}
-
-fn tilt(section: &Section) -> Result<Quantity, Diagnostic> {
-    let tilt = section.quantity("tilt_max", ANGLE)?;
-    let holds = tilt.si > 0.0 && tilt.si < std::f64::consts::PI;
-    tilt.require(section.doc, holds, "an angle above 0 and below 180 deg")
 }

@@ -37,10 +37,7 @@ pub struct EffectEntry {
 /// # Errors
 /// A table without a name, or with a key that is not a number with unit, source and uncertainty.
 pub fn read(root: &Section) -> Result<Vec<EffectEntry>, Diagnostic> {
-    if !root.has("effects") {
-        return Ok(Vec::new());
-    }
-    Diagnostic::gather(root.sections("effects")?.iter().map(one_effect))
+    Diagnostic::gather(root.sections_if_any("effects")?.iter().map(one_effect))
 }
 
 fn one_effect(section: &Section) -> Result<EffectEntry, Diagnostic> {

@@ -8,7 +8,7 @@ use crate::command::CommandMap;
 use crate::effects;
 use crate::provenance::Uncertainty;
 use crate::reader::{Document, Quantity, Section};
-use crate::vehicle::{MotorModel, Rotor, Spin, Vehicle};
+use crate::vehicle::{MotorModel, Rotor, Vehicle};
 use diagnostics::unit::{
     ACCELERATION, INERTIA, LENGTH, MASS, PURE_NUMBER, SPEED, THRUST_COEFFICIENT, TIME, TORQUE_COEFFICIENT,
 };
@@ -27,10 +27,17 @@ impl Vehicle {
         }
     }
 
-    /// Reads and checks the text of a vehicle file; `file_name` is for messages, and the path of its `base` is
-    /// relative to it.
+    /// Reads and checks the text of a vehicle file, whose layout `vehicles/hummingbird.toml` shows; `file_name` is for
+    /// messages, and the path of its `base` is relative to it. A file with a `base` has that file's vehicle, and its effects
+    /// before its own.
     pub fn parse(text: &str, file_name: &str) -> Result<Self, Diagnostic> {
-        parse(text, file_name)
+        let doc = Document::new(file_name, text);
+        let tree = doc.tree()?;
+        let root = Section::new(&doc, String::new(), 0..0, tree.get_ref());
+        if root.has("base") {
+            return on_base(&root, &beside(Path::new(file_name), root.text("base")?));
+        }
+        complete(&doc, &root)
     }
 
     /// The file that the vehicle file at `path` adds effects to, if it names one.
@@ -39,18 +46,6 @@ impl Vehicle {
         let table: toml::Table = text.parse().ok()?;
         Some(beside(path, table.get("base")?.as_str()?))
     }
-}
-
-/// Reads the whole file; see `vehicles/hummingbird.toml` for the layout. A file with a `base` has that file's
-/// vehicle, and its effects before its own.
-fn parse(text: &str, file_name: &str) -> Result<Vehicle, Diagnostic> {
-    let doc = Document::new(file_name, text);
-    let tree = doc.tree()?;
-    let root = Section::new(&doc, String::new(), 0..0, tree.get_ref());
-    if root.has("base") {
-        return on_base(&root, &beside(Path::new(file_name), root.text("base")?));
-    }
-    complete(&doc, &root)
 }
 
 /// The path that a file at `path` calls `other`.
@@ -118,10 +113,10 @@ fn complete(doc: &Document, root: &Section) -> Result<Vehicle, Diagnostic> {
 
 fn body(section: &Section) -> Result<(f64, Matrix3<f64>, f64), Diagnostic> {
     let mass = section.quantity("mass", MASS)?.positive(section.doc)?.within(section.doc, &bounds::MASS)?;
-    let gravity = section.quantity("gravity", ACCELERATION)?.within(section.doc, &bounds::GRAVITY)?;
+    let gravity_m_s2 = section.bounded("gravity", ACCELERATION, &bounds::GRAVITY)?;
     let inertia = inertia(section)?;
     section.finish()?;
-    Ok((mass.si, inertia, gravity.si))
+    Ok((mass.si, inertia, gravity_m_s2))
 }
 
 /// The symmetric tensor J; `inertia_xy` and so on are the entries J_xy themselves, not their negatives.
@@ -147,10 +142,7 @@ fn moment(section: &Section, name: &'static str) -> Result<Quantity, Diagnostic>
 }
 
 fn product(section: &Section, name: &'static str) -> Result<f64, Diagnostic> {
-    if !section.has(name) {
-        return Ok(0.0);
-    }
-    Ok(section.quantity(name, INERTIA)?.within(section.doc, &bounds::INERTIA_PRODUCT)?.si)
+    if section.has(name) { section.bounded(name, INERTIA, &bounds::INERTIA_PRODUCT) } else { Ok(0.0) }
 }
 
 /// Whether a rigid body can have this tensor of inertia.
@@ -171,16 +163,13 @@ fn principal_moments(tensor: &Matrix3<f64>) -> Vector3<f64> {
 }
 
 fn rotor(section: &Section) -> Result<[f64; 3], Diagnostic> {
-    let doc = section.doc;
-    let thrust = section
-        .quantity("thrust_coefficient", THRUST_COEFFICIENT)?
-        .within(doc, &bounds::THRUST_COEFFICIENT)?;
-    let torque = section
-        .quantity("torque_coefficient", TORQUE_COEFFICIENT)?
-        .within(doc, &bounds::TORQUE_COEFFICIENT)?;
-    let inertia = section.quantity("inertia", INERTIA)?.within(doc, &bounds::ROTOR_INERTIA)?;
+    let numbers = [
+        section.bounded("thrust_coefficient", THRUST_COEFFICIENT, &bounds::THRUST_COEFFICIENT)?,
+        section.bounded("torque_coefficient", TORQUE_COEFFICIENT, &bounds::TORQUE_COEFFICIENT)?,
+        section.bounded("inertia", INERTIA, &bounds::ROTOR_INERTIA)?,
+    ];
     section.finish()?;
-    Ok([thrust.si, torque.si, inertia.si])
+    Ok(numbers)
 }
 
 fn layout(root: &Section) -> Result<[Rotor; 4], Diagnostic> {
@@ -197,46 +186,30 @@ fn one_rotor(section: &Section) -> Result<Rotor, Diagnostic> {
     let position_m = Vector3::from(section.vector("position", LENGTH, &bounds::HUB)?);
     let spin = spin(&section.section("spin")?)?;
     section.finish()?;
-    Ok(Rotor { name, position_m, spin: spin.sign() })
+    Ok(Rotor { name, position_m, spin })
 }
 
 /// A sense of rotation has a value and a source, but neither unit nor uncertainty.
-fn spin(section: &Section) -> Result<Spin, Diagnostic> {
-    let words = [("counter-clockwise", Spin::CounterClockwise), ("clockwise", Spin::Clockwise)];
-    let spin = section.choice("value", &words)?;
+fn spin(section: &Section) -> Result<f64, Diagnostic> {
+    let spin = section.choice("value", &[("counter-clockwise", 1.0), ("clockwise", -1.0)])?;
     section.note("seen from above", section.text("source")?, Uncertainty::OneSigma(0.0));
     section.finish()?;
     Ok(spin)
 }
 
-#[derive(Clone, Copy)]
-enum Order {
-    First,
-    Second,
-}
-
 fn motor(section: &Section) -> Result<MotorModel, Diagnostic> {
-    let orders = [("first-order", Order::First), ("second-order", Order::Second)];
-    let model = match section.choice("model", &orders)? {
-        Order::First => first_order(section)?,
-        Order::Second => second_order(section)?,
+    let is_first = section.choice("model", &[("first-order", true), ("second-order", false)])?;
+    let number = |name, dimension, bounds: &_| section.bounded(name, dimension, bounds);
+    let model = if is_first {
+        MotorModel::FirstOrder { time_constant_s: number("time_constant", TIME, &bounds::TIME_CONSTANT)? }
+    } else {
+        MotorModel::SecondOrder {
+            natural_frequency_rad_s: number("natural_frequency", SPEED, &bounds::NATURAL_FREQUENCY)?,
+            damping_ratio: number("damping_ratio", PURE_NUMBER, &bounds::DAMPING_RATIO)?,
+        }
     };
     section.finish()?;
     Ok(model)
-}
-
-fn first_order(section: &Section) -> Result<MotorModel, Diagnostic> {
-    let time_constant =
-        section.quantity("time_constant", TIME)?.within(section.doc, &bounds::TIME_CONSTANT)?;
-    Ok(MotorModel::FirstOrder { time_constant_s: time_constant.si })
-}
-
-fn second_order(section: &Section) -> Result<MotorModel, Diagnostic> {
-    let frequency =
-        section.quantity("natural_frequency", SPEED)?.within(section.doc, &bounds::NATURAL_FREQUENCY)?;
-    let damping =
-        section.quantity("damping_ratio", PURE_NUMBER)?.within(section.doc, &bounds::DAMPING_RATIO)?;
-    Ok(MotorModel::SecondOrder { natural_frequency_rad_s: frequency.si, damping_ratio: damping.si })
 }
 
 fn command(section: &Section) -> Result<CommandMap, Diagnostic> {

@@ -39,4 +39,4 @@ pub use command::CommandMap;
 pub use effects::EffectEntry;
 pub use file::is_rigid;
 pub use provenance::{Provenance, Stated, Uncertainty};
-pub use vehicle::{MotorModel, Rotor, Spin, Vehicle};
+pub use vehicle::{MotorModel, Rotor, Vehicle};

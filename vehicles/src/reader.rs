@@ -156,18 +156,24 @@ impl<'d, 't> Section<'d, 't> {
 
     /// A sub-table.
     pub fn section(&self, name: &'d str) -> Result<Section<'d, 't>, Diagnostic> {
-        self.as_section(self.key(name), self.need(name, "a table")?)
+        self.as_section(self.key(name), self.need(name, "a table")?, "a table")
     }
 
     fn as_section(
         &self,
         key: String,
         value: &'d Spanned<DeValue<'t>>,
+        expected: &str,
     ) -> Result<Section<'d, 't>, Diagnostic> {
         match value.get_ref().as_table() {
             Some(table) => Ok(Section::new(self.doc, key, value.span(), table)),
-            None => Err(self.wrong_type(&key, value, "a table")),
+            None => Err(self.wrong_type(&key, value, expected)),
         }
+    }
+
+    /// An array of tables; none where the file does not have `name`.
+    pub fn sections_if_any(&self, name: &'d str) -> Result<Vec<Section<'d, 't>>, Diagnostic> {
+        if self.has(name) { self.sections(name) } else { Ok(Vec::new()) }
     }
 
     /// An array of tables.
@@ -177,11 +183,11 @@ impl<'d, 't> Section<'d, 't> {
             return Err(self.wrong_type(&self.key(name), value, "an array of tables"));
         };
         let key = |index| format!("{}.{index}", self.key(name));
-        array.iter().enumerate().map(|(index, item)| self.as_section(key(index), item)).collect()
+        array.iter().enumerate().map(|(index, item)| self.as_section(key(index), item, "a table")).collect()
     }
 
     /// The names of all keys, in alphabetical order.
-    pub fn keys(&self) -> impl Iterator<Item = &'d str> {
+    pub(crate) fn keys(&self) -> impl Iterator<Item = &'d str> {
         self.table.keys().map(|key| key.get_ref().as_ref())
     }
 
@@ -196,22 +202,18 @@ impl<'d, 't> Section<'d, 't> {
     }
 
     /// A text that has to be one of `choices`; returns what stands beside it.
-    pub fn choice<T: Copy>(&self, name: &'d str, choices: &[(&str, T)]) -> Result<T, Diagnostic> {
+    pub(crate) fn choice<T: Copy>(&self, name: &'d str, choices: &[(&str, T)]) -> Result<T, Diagnostic> {
         let text = self.text(name)?;
         if let Some((_, chosen)) = choices.iter().find(|(name, _)| *name == text) {
             return Ok(*chosen);
         }
         let names: Vec<_> = choices.iter().map(|(name, _)| format!("\"{name}\"")).collect();
-        Err(self.doc.bad(
-            &self.at_of(name),
-            &self.key(name),
-            format!("one of {}", names.join(", ")),
-            format!("\"{text}\""),
-        ))
+        let expected = format!("one of {}", names.join(", "));
+        Err(self.doc.bad(&self.at_of(name), &self.key(name), expected, format!("\"{text}\"")))
     }
 
     /// True or false.
-    pub fn flag(&self, name: &'d str) -> Result<bool, Diagnostic> {
+    pub(crate) fn flag(&self, name: &'d str) -> Result<bool, Diagnostic> {
         let value = self.need(name, "true or false")?;
         value.get_ref().as_bool().ok_or_else(|| self.wrong_type(&self.key(name), value, "true or false"))
     }
@@ -219,6 +221,11 @@ impl<'d, 't> Section<'d, 't> {
     /// A parameter: a table with `value`, `unit`, `source` and `uncertainty`; the value in SI.
     pub fn quantity(&self, name: &'d str, dimension: Dimension) -> Result<Quantity, Diagnostic> {
         self.number_of(name, dimension, Origin::Known)
+    }
+
+    /// A parameter within `bounds`, in SI.
+    pub fn bounded(&self, name: &'d str, dimension: Dimension, bounds: &Bounds) -> Result<f64, Diagnostic> {
+        Ok(self.quantity(name, dimension)?.within(self.doc, bounds)?.si)
     }
 
     /// A number that somebody chose, such as a gain: as [`Self::quantity`], but it has an `uncertainty` only
@@ -253,7 +260,7 @@ impl<'d, 't> Section<'d, 't> {
     }
 
     /// A parameter of which only the reader of the catalogue knows the dimension: as it is written.
-    pub fn stated(&self, name: &'d str) -> Result<Stated, Diagnostic> {
+    pub(crate) fn stated(&self, name: &'d str) -> Result<Stated, Diagnostic> {
         let parameter = self.parameter(name)?;
         let value = parameter.need("value", "a number")?;
         let stated = Stated {
@@ -271,11 +278,7 @@ impl<'d, 't> Section<'d, 't> {
 
     fn parameter(&self, name: &'d str) -> Result<Section<'d, 't>, Diagnostic> {
         let expected = "a table with value, unit, source and uncertainty";
-        let value = self.need(name, expected)?;
-        if !value.get_ref().is_table() {
-            return Err(self.wrong_type(&self.key(name), value, expected));
-        }
-        self.as_section(self.key(name), value)
+        self.as_section(self.key(name), self.need(name, expected)?, expected)
     }
 
     /// Checks unit, source and uncertainty of a parameter's table; notes them; gives the factor to SI.
@@ -294,7 +297,7 @@ impl<'d, 't> Section<'d, 't> {
     }
 
     /// Remembers where a parameter came from.
-    pub fn note(&self, unit: &str, source: &str, uncertainty: Uncertainty) {
+    pub(crate) fn note(&self, unit: &str, source: &str, uncertainty: Uncertainty) {
         self.doc.provenance.borrow_mut().push(Provenance {
             key: self.path.clone(),
             line: self.doc.place(&self.at).line,
@@ -345,7 +348,7 @@ impl<'d, 't> Section<'d, 't> {
     }
 
     /// Where the value of `name` stands, in bytes; the table itself where it has none.
-    pub fn at_of(&self, name: &str) -> Range<usize> {
+    pub(crate) fn at_of(&self, name: &str) -> Range<usize> {
         self.table.get(name).map_or(self.at.clone(), Spanned::span)
     }
 

@@ -59,25 +59,6 @@ pub struct Rotor {
     pub spin: f64,
 }
 
-/// A sense of rotation seen from above, as files write it.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Spin {
-    /// Angular velocity along +z of the body.
-    CounterClockwise,
-    /// Angular velocity along -z of the body.
-    Clockwise,
-}
-
-impl Spin {
-    /// +1 counter-clockwise, -1 clockwise.
-    pub fn sign(self) -> f64 {
-        match self {
-            Spin::CounterClockwise => 1.0,
-            Spin::Clockwise => -1.0,
-        }
-    }
-}
-
 /// How the rotor speed follows the commanded speed. Both have unit gain at rest: the thesis's gain of
 /// 3.5 (section 4.2) has no unit and does not map a speed onto the same speed.
 #[derive(Debug, Clone, Copy, PartialEq)]
