@@ -67,3 +67,8 @@ use std::path::Path;
 pub fn load(path: impl AsRef<Path>) -> Result<Manifest, Diagnostic> {
     Manifest::load(path.as_ref(), &[], COMPONENTS)
 }
+
+/// What the README shows compiles.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;
