@@ -347,6 +347,8 @@ impl ConnectedNode {
             }
             let needed = taken.min(lockstep.end_tick());
             if lockstep.computing().all(|slot| lockstep.done(slot) >= needed) {
+                // No later change concerns this process, however long its program goes on.
+                lockstep.acknowledge(u32::MAX);
                 return Ok(());
             }
             let epoch = lockstep.epoch();

@@ -6,7 +6,7 @@ use crate::state::State;
 use bus::context::NodeContext;
 use diagnostics::parameter::{ParameterError, refuse};
 use std::path::Path;
-use vehicles::{MotorModel, Vehicle};
+use vehicles::{CommandMap, MotorModel, Vehicle};
 
 /// Below this thrust to weight a vehicle hovers and has next to nothing left to climb, tilt or brake with: 1.2 is what
 /// is left to a tilt of 34°. Tuned, no source; multirotors are built with 2 and more.
@@ -74,9 +74,7 @@ pub(crate) fn check_lift(
     run: &NodeContext<'_>,
 ) -> Result<(), ParameterError> {
     let map = &vehicle.command;
-    // A motor that a command of 0 switches off turns as slowly as one likes.
-    let least_rad_s = if map.zero_is_off { 0.0 } else { map.speed_at_min_rad_s };
-    let (least_N, most_N) = (lift_N(vehicle, least_rad_s), lift_N(vehicle, map.speed_at_max_rad_s));
+    let (least_N, most_N) = (lift_N(vehicle, least_rad_s(map)), lift_N(vehicle, map.speed_at_max_rad_s));
     let weight_N = vehicle.mass_kg * vehicle.gravity_m_s2;
     if weight_N == 0.0 {
         return Ok(());
@@ -109,6 +107,11 @@ pub(crate) fn check_lift(
         run.warn("vehicle", message(odd));
     }
     Ok(())
+}
+
+/// A motor that a command of 0 switches off turns as slowly as one likes.
+fn least_rad_s(map: &CommandMap) -> f64 {
+    if map.zero_is_off { 0.0 } else { map.speed_at_min_rad_s }
 }
 
 fn lift_N(vehicle: &Vehicle, speed_rad_s: f64) -> f64 {

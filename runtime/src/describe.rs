@@ -94,7 +94,7 @@ fn replacements(graph: &Graph, node: usize) -> String {
 }
 
 impl Graph {
-    /// It as JSON: the plan, with who replaces whom and who takes no part.
+    /// The graph as JSON: the plan, with who replaces whom and who takes no part.
     pub fn json(&self) -> String {
         let backup = |backup: &BackupSpec| {
             serde_json::json!({

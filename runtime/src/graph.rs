@@ -19,11 +19,13 @@ mod ranges;
 mod recorders;
 mod wiring;
 
-pub use crate::program::{BackupSpec, Program};
+pub use crate::program::BackupSpec;
+use crate::program::Program;
 pub use backups::backup_of;
 
 use crate::manifest::Manifest;
 use crate::placement;
+use bus::Registration;
 use bus::plan::Plan;
 use diagnostics::Diagnostic;
 use parameters::Notes;
@@ -54,7 +56,7 @@ pub struct Graph {
     /// What the processes of the run read.
     pub plan: Plan,
     /// What to start, in the order of the plan's nodes.
-    pub programs: Vec<Program>,
+    pub(crate) programs: Vec<Program>,
     /// Who stands by or takes over, in the order in which they join.
     pub backups: Vec<BackupSpec>,
     /// Processes that take no part in the ticks: their names and what to start.
@@ -66,6 +68,11 @@ pub struct Graph {
 }
 
 impl Graph {
+    /// The component that each node is, where it is one of the registry.
+    pub fn components(&self) -> impl Iterator<Item = Option<&'static Registration>> {
+        self.programs.iter().map(Program::component)
+    }
+
     /// Checks `manifest` and resolves it.
     ///
     /// # Errors

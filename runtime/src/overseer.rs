@@ -151,7 +151,7 @@ impl<'a> Overseer<'a> {
         }
         self.replacements.refuse(node, reason.clone());
         if vacant {
-            let ticks = self.replacements.view.completed_ticks();
+            let ticks = self.replacements.completed_by_primary(node);
             return Err(self.fail(format!(
                 "{reason}\nThe run was aborted at tick {ticks}: it came in the place of a process that had died, \
                  and completed no tick"

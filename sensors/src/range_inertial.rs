@@ -65,6 +65,9 @@ mod tests {
             (json!({ "half_angle_deg": 90.0 }), "`half_angle_deg`"),
             (json!({ "initial_height_m": -1.0 }), "`initial_height_m`"),
             (json!({ "dead_zone_m": 0.2 }), "`dead_zone_m`"),
+            (json!({ "room_m": [4.0, 4.0] }), "`start_in_room_m` must be given where `room_m` is"),
+            (json!({ "start_in_room_m": [4.0, 4.0] }), "`room_m` must be given where `start_in_room_m` is"),
+            (json!({ "room_m": [4.0, 4.0], "start_in_room_m": [2.0, 5.0] }), "`room_m`"),
         ] {
             let error = Harness::<RangeInertial>::from_json(&parameters).unwrap_err().to_string();
             assert!(error.contains(key), "{error}");

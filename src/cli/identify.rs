@@ -95,7 +95,9 @@ fn rotor(stand: &Path, out: &Path, is_json: bool) -> Result<bool> {
 
 fn flights_of(arguments: &IdentifyArguments, file: &Path, out: &Path) -> Result<bool> {
     let bar = progress::bar("{spinner} {elapsed:>4}  {msg}", arguments.json);
-    bar.enable_steady_tick(Duration::from_millis(100));
+    if !arguments.json {
+        bar.enable_steady_tick(Duration::from_millis(100));
+    }
     let say = |text: &str| bar.set_message(text.to_owned());
     say("reading flights");
     let set = FlightSet::load(file)?;

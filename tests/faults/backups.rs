@@ -113,7 +113,7 @@ enum Target {
     /// The process that flies.
     Active,
     /// The one that is to succeed it, or has.
-    BackupSpec,
+    Backup,
     /// A process that has no backup.
     Other(Process),
 }
@@ -148,7 +148,7 @@ impl Case {
         let others = [Process::Node("recorder"), Process::Clock, Process::Launcher];
         let target = match below(5) {
             0 | 1 => Target::Active,
-            2 | 3 => Target::BackupSpec,
+            2 | 3 => Target::Backup,
             _ => Target::Other(others[below(3) as usize]),
         };
         let tick = match below(4) {
@@ -162,9 +162,9 @@ impl Case {
             _ => Moment::Flight(tick),
         };
         let signal = match (target, below(5)) {
-            (Target::BackupSpec, 0) => Signal::STOP,
+            (Target::Backup, 0) => Signal::STOP,
             // A stopped process dies of nothing less than SIGKILL.
-            (Target::Active | Target::BackupSpec, 1) if moment != Moment::Joining => Signal::USR1,
+            (Target::Active | Target::Backup, 1) if moment != Moment::Joining => Signal::USR1,
             _ => Signal::KILL,
         };
         Self { victim: VICTIMS[number % VICTIMS.len()], restarts: below(2) == 0, target, moment, signal }
@@ -217,7 +217,7 @@ fn strike(case: &Case, plain: &str, swapped: &str) {
     let ended = end(&place, launch, case.target == Target::Other(Process::Launcher));
     match case.target {
         Target::Other(other) => require_stopped(case, other.name(), &ended),
-        Target::BackupSpec if stage < Stage::Between => {
+        Target::Backup if stage < Stage::Between => {
             let how = match case.signal {
                 Signal::STOP => "was killed by the watchdog".to_owned(),
                 signal => format!("was killed by {}", signal_name(signal)),
@@ -273,7 +273,7 @@ fn deliver(case: &Case, place: &Place, launch: &Launch<'_>, watched: &Watched) -
         Target::Active => {
             place.process_of_generation(case.victim, watched.instances(place, node).primary.generation)
         }
-        Target::BackupSpec => place.process_of_generation(case.victim, 1),
+        Target::Backup => place.process_of_generation(case.victim, 1),
         Target::Other(process) => process.pid(place, launch),
     };
     match case.moment {
@@ -311,12 +311,12 @@ fn deliver(case: &Case, place: &Place, launch: &Launch<'_>, watched: &Watched) -
         Moment::Joining => {
             assert_eq!(watched.hold_at(EARLY_TICK), EARLY_TICK);
             watched.await_ready(backup, Phase::Connecting);
-            let joining = pid(Target::BackupSpec);
+            let joining = pid(Target::Backup);
             kill_process(joining, Signal::STOP).unwrap();
             watched.control.set_hold_tick(u32::MAX);
             watched.await_slot(backup, SlotState::Joining);
             hit(case, watched, pid(case.target));
-            if case.target != Target::BackupSpec {
+            if case.target != Target::Backup {
                 // The launcher may have ended it by now.
                 let _ = kill_process(joining, Signal::CONT);
             }

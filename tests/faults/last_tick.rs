@@ -1,12 +1,11 @@
 //! Processes that die in their last tick, or behind it, when all that they had to send is sent.
 
 use crate::flight::{messages, write_manifest};
-use crate::saboteur::{FAULT_VARIABLE, Fault, GENERATIONS_VARIABLE, TICK_VARIABLE};
+use crate::saboteur::{FAULT_VARIABLE, Fault, GENERATIONS_VARIABLE, MARK_VARIABLE, TICK_VARIABLE};
 use crate::support::{Ended, Place};
 
 /// Ticks of these runs: no multiple of the longer periods.
 const DURATION: &str = "run.duration_s=0.73";
-const LAST_TICK: &str = "729";
 const BEHIND_THE_END: (&str, &str) = (FAULT_VARIABLE, "BehindTheEnd");
 
 /// Flies with a saboteur that sends every `period` ticks, and that fails as these `variables` tell it to.
@@ -38,10 +37,16 @@ fn a_process_under_restart_that_dies_behind_its_last_tick_is_not_missed() {
 #[test]
 fn a_process_that_dies_in_its_last_tick_is_replaced_when_all_others_have_completed_theirs() {
     let late = format!("{:?}", Fault::LateExit);
-    let variables = [(FAULT_VARIABLE, &*late), (TICK_VARIABLE, LAST_TICK), (GENERATIONS_VARIABLE, "1")];
-    // The standby has computed the tick as a shadow; a process that is started anew reads it from the plant.
-    require_no_trace("standby", 1, &variables, "The standby of `saboteur` takes over at tick 729");
-    require_no_trace("restart", 1, &variables, "`saboteur` is restarted at tick 729");
+    for (period, last_tick) in [(1, "729"), (4, "728"), (20, "720")] {
+        let place = Place::new();
+        let mark = place.path("shadow");
+        let all = [(FAULT_VARIABLE, &*late), (TICK_VARIABLE, last_tick), (GENERATIONS_VARIABLE, "1")];
+        // The standby has computed the tick as a shadow; a process that is started anew reads it from the plant.
+        let follows = format!("The standby of `saboteur` takes over at tick {last_tick}");
+        require_no_trace("standby", period, &[&all[..], &[(MARK_VARIABLE, &mark)]].concat(), &follows);
+        let follows = format!("`saboteur` is restarted at tick {last_tick}");
+        require_no_trace("restart", period, &all, &follows);
+    }
 }
 
 #[test]

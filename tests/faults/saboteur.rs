@@ -2,11 +2,14 @@
 
 use bus::messages::{PlantState, Time};
 use bus::{BusError, Message, NODE_VARIABLE, Node};
+use std::path::Path;
 use std::time::Duration;
 
 /// The environment variables that tell the saboteur what to do, and when.
 pub const FAULT_VARIABLE: &str = "HUMMINGBUS_TEST_FAULT";
 pub const TICK_VARIABLE: &str = "HUMMINGBUS_TEST_FAULT_TICK";
+/// The file that another instance makes when it computes the tick of a [`Fault::LateExit`].
+pub const MARK_VARIABLE: &str = "HUMMINGBUS_TEST_FAULT_MARK";
 /// How many processes of the node fail, from the first on; all where it is not said.
 pub const GENERATIONS_VARIABLE: &str = "HUMMINGBUS_TEST_FAULT_GENERATIONS";
 
@@ -38,7 +41,7 @@ pub enum Fault {
     Error,
     Panic,
     ExitWith3,
-    /// As the last of all: the others have completed the tick by then.
+    /// As the last of all: the others have completed the tick by then, another instance of its node included.
     LateExit,
     ExitWith0,
     Unwritten,
@@ -68,6 +71,12 @@ impl Fault {
             Self::Panic => panic!("the propeller came off"),
             Self::ExitWith3 => std::process::exit(3),
             Self::LateExit => {
+                let is_awaited =
+                    || std::env::var_os(MARK_VARIABLE).is_some_and(|mark| !Path::new(&mark).exists());
+                while is_awaited() {
+                    std::thread::sleep(Duration::from_millis(1));
+                }
+                // From the mark to the end of the other's part are a sample and a store.
                 std::thread::sleep(Duration::from_millis(300));
                 std::process::exit(3)
             }
@@ -144,6 +153,9 @@ fn run() -> Result<(), BusError> {
             fault.filter(|&fault| fault != Fault::BehindTheEnd && tick.number() == at_tick)
         {
             return fault.strike();
+        }
+        if let Some(mark) = std::env::var_os(MARK_VARIABLE).filter(|_| tick.number() == at_tick) {
+            std::fs::write(mark, "").map_err(|error| error.to_string())?;
         }
         let report = Report { altitude: tick.get(input).position.z, ..Report::default() };
         tick.write(output, report).map_err(|error| error.to_string())

@@ -136,10 +136,11 @@ fn every_component_steps_as_its_process_did_and_goes_on_from_a_state_byte_for_by
     let graph = Graph::build(&Manifest::load(Path::new(&manifest), &[], COMPONENTS).unwrap()).unwrap();
     // Its conditions look behind the end of this shorter run.
     place.call(&["run", &manifest, "--record", &recording]).with_code(1);
+    let components: Vec<_> = graph.components().collect();
     let recorded = Recorded::open(&recording, graph.plan);
     let mut stepped = Vec::new();
-    for (node, program) in graph.programs.iter().enumerate() {
-        let component = program.component().unwrap();
+    for (node, component) in components.into_iter().enumerate() {
+        let component = component.unwrap();
         if component.role == Role::Compute {
             require_same(&recorded, component, node);
         }

@@ -29,10 +29,7 @@ fn expanded(input: &DeriveInput, expand: fn(&DeriveInput) -> Result<Tokens>) -> 
 fn expand(input: &DeriveInput) -> Result<Tokens> {
     require_repr_c(input)?;
     require_no_generics(input, "a message has one layout: it cannot be generic")?;
-    let [type_name, definition] = options(&input.attrs, "message", ["type_name", "definition"])?;
-    let missing = || Error::new_spanned(&input.ident, "add #[message(type_name = \"package/msg/Name\")]");
-    let type_name = type_name.ok_or_else(missing)?;
-    require_ros_type_name(&type_name)?;
+    let (type_name, definition) = message_options(input)?;
     let fields = named_fields(input)?;
     let name = &input.ident;
     let types: Vec<&Type> = fields.iter().map(|field| &field.ty).collect();
@@ -68,6 +65,15 @@ fn expand(input: &DeriveInput) -> Result<Tokens> {
             };
         }
     })
+}
+
+/// The ROS 2 name of a message, and its definition where it is stated.
+fn message_options(input: &DeriveInput) -> Result<(LitStr, Option<LitStr>)> {
+    let [type_name, definition] = options(&input.attrs, "message", ["type_name", "definition"])?;
+    let missing = || Error::new_spanned(&input.ident, "add #[message(type_name = \"package/msg/Name\")]");
+    let type_name = type_name.ok_or_else(missing)?;
+    require_ros_type_name(&type_name)?;
+    Ok((type_name, definition))
 }
 
 /// Derives `bus::ports::InputPorts` for a struct `Name<'a>` whose fields are `&'a T` and `Option<&'a T>`.

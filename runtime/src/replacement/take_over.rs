@@ -126,6 +126,11 @@ impl Replacements<'_> {
         })
     }
 
+    /// Ticks that the primary of `node` has completed, dead or alive.
+    pub(crate) fn completed_by_primary(&self, node: usize) -> u32 {
+        self.view.completed_by(self.slot(node, self.membership.nodes[node].primary.generation))
+    }
+
     /// Whether the primary of `node` has completed a tick since it joined: a restart leads somewhere.
     pub(crate) fn has_come_on(&self, node: usize) -> bool {
         let primary = &self.membership.nodes[node].primary;

@@ -38,11 +38,16 @@ impl Sim {
             }
             Doing::Leaving { taken } => {
                 if self.slowest() >= taken.min(self.segment.end_tick) {
-                    self.instances[index].end = Some(End::Exited(0));
+                    self.segment.slots[slot].acknowledged = NEVER;
+                    self.notify();
+                    self.instances[index].doing = Doing::Left;
+                    let rest = self.draw.micros(20_000);
+                    self.sleep(index, Need::Nothing, rest);
                 } else {
                     self.sleep(index, Need::Nothing, RETIREMENT_NAP);
                 }
             }
+            Doing::Left => self.instances[index].end = Some(End::Exited(0)),
             _ => self.sleep(index, Need::State, STATE_NAP),
         }
     }
@@ -85,7 +90,8 @@ impl Sim {
         let publishers: Vec<usize> = publishers.collect();
         for other in self.living() {
             let is_publisher = matches!(other.role, Role::Node { node, .. } if publishers.contains(&node));
-            let follows = other.epoch >= epoch || matches!(other.doing, Doing::Starting | Doing::Prepared);
+            let follows = other.epoch >= epoch
+                || matches!(other.doing, Doing::Starting | Doing::Prepared | Doing::Left);
             assert!(!is_publisher || follows, "{:?} joins unknown to {:?}", role, other.role);
         }
     }

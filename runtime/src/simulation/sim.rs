@@ -103,6 +103,8 @@ pub(super) enum Doing {
     Leaving {
         taken: u32,
     },
+    /// It follows the run no more, and its program goes on for a while.
+    Left,
     /// The clock waits until everybody is ready for a phase.
     Gathering(Phase),
     /// The clock waits until these ticks are completed.

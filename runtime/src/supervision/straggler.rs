@@ -58,7 +58,9 @@ impl<W: World> Supervisor<'_, W> {
 
     /// A process that has completed the run and has not ended: a node, or else the clock.
     fn not_left(&self) -> Option<Role> {
-        let left = self.processes.running.iter().filter(|process| process.end.is_none());
+        let is_awaited = |role: Role| !matches!(role, Role::Sidecar { .. });
+        let left =
+            self.processes.running.iter().filter(|process| process.end.is_none() && is_awaited(process.role));
         left.map(|process| process.role).max_by_key(|role| matches!(role, Role::Node { .. }))
     }
 
