@@ -29,6 +29,7 @@ pub const COMPONENTS: Registry = Registry::new(&[
     Registration::of::<controllers::pilot::Pilot>(),
     Registration::of::<plant::node::Plant>(),
     Registration::of::<controllers::player::Player>(),
+    Registration::of::<controllers::position_hold::PositionHold>(),
     Registration::of::<Sensing<sensors::range::RangeFinders>>(),
     Registration::of::<sensors::range_inertial::filter::RangeInertial>(),
     Registration::of::<recorder::node::Recorder>(),
@@ -37,5 +38,7 @@ pub const COMPONENTS: Registry = Registry::new(&[
     Registration::of::<controllers::trajectory_node::TrajectoryNode>(),
     Registration::of::<Controller<controllers::velocity::VelocityLaw>>(),
     Registration::of::<Controller<controllers::wall_follow::WallFollowLaw>>(),
+    Registration::of::<Controller<controllers::wall_follow_thesis::WallFollowThesisLaw>>(),
     Registration::of::<Controller<controllers::wall_stop::WallStopLaw>>(),
+    Registration::of::<Controller<controllers::wall_stop_thesis::WallStopThesisLaw>>(),
 ]);

@@ -206,7 +206,8 @@ fn no_number_of_a_shipped_scene_brings_the_plant_down() {
 #[test]
 fn no_number_of_shipped_gains_brings_a_law_down() {
     use controllers::controller::Controller;
-    use controllers::{cascade, geometric, lqr, pid, velocity, wall_follow, wall_stop};
+    use controllers::{cascade, geometric, lqr, pid, velocity};
+    use controllers::{wall_follow, wall_follow_thesis, wall_stop, wall_stop_thesis};
     let folder = Folder::new();
     let kinds = [
         ("pid", Registration::of::<Controller<pid::PidLaw>>()),
@@ -215,6 +216,8 @@ fn no_number_of_shipped_gains_brings_a_law_down() {
         ("velocity", Registration::of::<Controller<velocity::VelocityLaw>>()),
         ("wall-stop", Registration::of::<Controller<wall_stop::WallStopLaw>>()),
         ("wall-follow", Registration::of::<Controller<wall_follow::WallFollowLaw>>()),
+        ("wall-stop-thesis", Registration::of::<Controller<wall_stop_thesis::WallStopThesisLaw>>()),
+        ("wall-follow-thesis", Registration::of::<Controller<wall_follow_thesis::WallFollowThesisLaw>>()),
         ("lqr", Registration::of::<Controller<lqr::LqrLaw>>()),
         ("geometric", Registration::of::<Controller<geometric::GeometricLaw>>()),
     ];
@@ -224,10 +227,10 @@ fn no_number_of_shipped_gains_brings_a_law_down() {
             "vehicle": folder.path("vehicles/hummingbird.toml"),
             "gains": folder.path(&file),
         });
-        if ["velocity", "wall-stop", "wall-follow"].contains(&kind.name) {
+        if kind.name == "velocity" || kind.name.starts_with("wall-") {
             parameters["altitude_m"] = 1.5.into();
         }
-        if kind.name == "wall-follow" {
+        if kind.name.starts_with("wall-follow") {
             parameters["mode"] = "constant".into();
         }
         assert_eq!(kind.check(&parameters, &NodeContext::new("node", &[])), Ok(()));

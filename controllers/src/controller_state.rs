@@ -12,7 +12,7 @@ use bus::Message;
 const WORDS_MAX: usize = 32;
 
 /// The most bytes of a law's name.
-const NAME_MAX: usize = 16;
+const NAME_MAX: usize = 24;
 
 /// Which law a state belongs to; zero before the first tick.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Message)]

@@ -10,8 +10,10 @@
 //! - [`pid`]: altitude and attitude PID.
 //! - [`cascade`]: command filter, attitude loop, rate loop: the inner loops of all that follows.
 //! - [`velocity`]: velocity PD around the cascade; `approach`: how fast to come near a wall.
-//! - [`wall_stop`], [`wall_follow`]: guidance by range finders, around the velocity PD; [`room`]: where the walls must be
-//!   although other vehicles stand in the beams.
+//! - [`wall_stop`], [`wall_follow`]: guidance by range finders, around the velocity PD; `legs`: the states along the walls;
+//!   [`room`]: where the walls must be although other vehicles stand in the beams.
+//! - [`wall_stop_thesis`], [`wall_follow_thesis`]: the same as the thesis tells it; `free_flight`: its tilt by distance.
+//! - [`position_hold`]: holds the place between the pilot's commands, around a law about hover.
 //! - `flatness`: the attitude and rates that a trajectory needs; `motor_lag`: what the rotors make of a demand, foreseen,
 //!   and a demand that hurries them; `disturbance`: the acceleration that the model does not explain, observed;
 //!   [`foresight`]: what the laws that foresee remember.
@@ -48,10 +50,12 @@ mod disturbance;
 mod flatness;
 mod flight_log;
 pub mod foresight;
+mod free_flight;
 pub mod geometric;
 pub mod geometric_gains;
 pub mod law;
 pub mod law_inputs;
+mod legs;
 pub mod lqr;
 pub mod lqr_gains;
 mod lqr_model;
@@ -61,6 +65,7 @@ pub mod pid;
 pub mod pid_gains;
 pub mod pilot;
 pub mod player;
+pub mod position_hold;
 mod rehearsal;
 mod riccati;
 pub mod room;
@@ -70,4 +75,6 @@ pub mod trajectory;
 pub mod trajectory_node;
 pub mod velocity;
 pub mod wall_follow;
+pub mod wall_follow_thesis;
 pub mod wall_stop;
+pub mod wall_stop_thesis;

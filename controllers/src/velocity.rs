@@ -118,13 +118,34 @@ impl VelocityLoop {
         velocity_m_s: &[f64; 2],
         measured: &HoverMotion,
     ) -> ControlOutput {
-        let acceleration_m_s2 =
-            std::array::from_fn(|axis| self.acceleration_m_s2(state, asked, axis, velocity_m_s[axis]));
+        let acceleration_m_s2 = self.accelerations_m_s2(state, asked, velocity_m_s);
+        self.accelerate(state, last, asked, &acceleration_m_s2, measured)
+    }
+
+    /// What the PD on both axes asks for; advances its filters by one period.
+    pub(crate) fn accelerations_m_s2(
+        &self,
+        state: &mut VelocityState,
+        asked: &VelocitySetPoint,
+        velocity_m_s: &[f64; 2],
+    ) -> [f64; 2] {
+        std::array::from_fn(|axis| self.acceleration_m_s2(state, asked, axis, velocity_m_s[axis]))
+    }
+
+    /// The demand that accelerates so along the heading's axes, at the height and yaw of `asked`.
+    pub(crate) fn accelerate(
+        &self,
+        state: &mut VelocityState,
+        last: &RotorWrench,
+        asked: &VelocitySetPoint,
+        acceleration_m_s2: &[f64; 2],
+        measured: &HoverMotion,
+    ) -> ControlOutput {
         state.velocity_command = asked.velocity_m_s;
         let climb_max_m = self.gains.climb_max_m_s * self.cascade.period_s;
         state.altitude_command +=
             (asked.altitude_m - state.altitude_command).clamp(-climb_max_m, climb_max_m);
-        let (roll_rad, pitch_rad) = self.tilt_rad(&acceleration_m_s2);
+        let (roll_rad, pitch_rad) = tilt_rad(acceleration_m_s2, self.cascade.vehicle.gravity_m_s2);
         let set_point =
             SetPoint { altitude_m: state.altitude_command, roll_rad, pitch_rad, yaw_rad: asked.yaw_rad };
         let output = self.cascade.demand(&mut state.cascade, last, &set_point, measured);
@@ -173,13 +194,12 @@ impl VelocityLoop {
         let max_m_s2 = self.gains.acceleration_max_m_s2;
         asked_m_s2.clamp(-max_m_s2, max_m_s2)
     }
+}
 
-    /// Roll and pitch that accelerate so at constant height.
-    fn tilt_rad(&self, acceleration_m_s2: &[f64; 2]) -> (f64, f64) {
-        let gravity_m_s2 = self.cascade.vehicle.gravity_m_s2;
-        let pitch_rad = libm::atan(acceleration_m_s2[0] / gravity_m_s2);
-        (-libm::atan(acceleration_m_s2[1] * libm::cos(pitch_rad) / gravity_m_s2), pitch_rad)
-    }
+/// Roll and pitch that accelerate so along the heading's axes at constant height.
+pub(crate) fn tilt_rad(acceleration_m_s2: &[f64; 2], gravity_m_s2: f64) -> (f64, f64) {
+    let pitch_rad = libm::atan(acceleration_m_s2[0] / gravity_m_s2);
+    (-libm::atan(acceleration_m_s2[1] * libm::cos(pitch_rad) / gravity_m_s2), pitch_rad)
 }
 
 /// The controller `velocity`: a reference's velocity, or a constant one.
@@ -308,7 +328,7 @@ fn velocity_m_s(input: &ControlInput, measured: &HoverMotion) -> [f64; 2] {
 }
 
 /// A level vector of the world along the axes of a heading.
-fn along_heading([x, y]: [f64; 2], yaw_rad: f64) -> [f64; 2] {
+pub(crate) fn along_heading([x, y]: [f64; 2], yaw_rad: f64) -> [f64; 2] {
     let (sin, cos) = libm::sincos(yaw_rad);
     [cos * x + sin * y, cos * y - sin * x]
 }
@@ -332,9 +352,9 @@ mod tests {
 
     #[test]
     fn forward_is_nose_down_and_left_is_right_side_up() {
-        let (roll_rad, pitch_rad) = velocity().tilt_rad(&[1.0, 0.0]);
+        let (roll_rad, pitch_rad) = tilt_rad(&[1.0, 0.0], 9.81);
         assert!(pitch_rad > 0.0 && roll_rad == 0.0);
-        let (roll_rad, pitch_rad) = velocity().tilt_rad(&[0.0, 1.0]);
+        let (roll_rad, pitch_rad) = tilt_rad(&[0.0, 1.0], 9.81);
         assert!(roll_rad < 0.0 && pitch_rad == 0.0);
     }
 
@@ -342,7 +362,7 @@ mod tests {
     #[test]
     fn the_tilt_makes_the_acceleration_on_both_axes_at_once() {
         let asked_m_s2 = [1.5, -2.0];
-        let (roll_rad, pitch_rad) = velocity().tilt_rad(&asked_m_s2);
+        let (roll_rad, pitch_rad) = tilt_rad(&asked_m_s2, 9.81);
         let up_B = nalgebra::UnitQuaternion::from_euler_angles(roll_rad, pitch_rad, 0.0) * Vector3::z();
         let made_m_s2 = up_B * (9.81 / up_B.z);
         assert!((made_m_s2.x - asked_m_s2[0]).abs() < 1e-12 && (made_m_s2.y - asked_m_s2[1]).abs() < 1e-12);

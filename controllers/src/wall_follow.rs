@@ -1,12 +1,10 @@
-//! Guidance along the walls of a room (thesis §5.5, Figs 5.36 and 5.46), around velocity PD and cascade.
+//! Guidance along the walls of a room, around velocity PD and cascade: ours, in the thesis's five states (`legs`).
+//! `wall_follow_thesis` has the thesis's own (§5.5, Figs 5.36 and 5.46); docs/walls.md flies both.
 //!
-//! Five states: 1 along the heading's +x from the middle to the first wall, then 2 along −y, 3 along −x, 4 along
-//! +y, 5 along +x, then 2 again: clockwise seen from above, with the wall to the left. A lap is complete where
-//! 5 gives way to 2. A state gives way to the next where the wall ahead is as near as the wall that is followed
-//! is to be.
+//! A state gives way to the next where the wall ahead is as near as the wall that is followed is to be.
 //!
 //! - Mode *varying*: the velocity ahead shrinks with the distance to the wall ahead, and with it the tilt; the
-//!   velocity across is held at zero. Nothing holds the distance to the wall beside, as in the thesis.
+//!   velocity across is held at zero. Nothing holds the distance to the wall beside.
 //! - Mode *constant*: the velocity across is the `Approach` curve over the error of the distance to the wall
 //!   beside, and the velocity ahead is what is left of the constant speed, √(v² − v_across²). The next state
 //!   begins where the curve's velocity towards the wall ahead, which is then the one beside, equals the speed.
@@ -21,6 +19,7 @@ use crate::approach::Approach;
 use crate::control::{ControlInput, ControlOutput, HoverMotion};
 use crate::law::{Law, LawContext, Predecessor};
 use crate::law_inputs::WallInputs;
+use crate::legs::{self, Beam, Leg};
 use crate::room::Room;
 use crate::velocity::{LoopsGains, VelocityLoop, VelocitySetPoint, VelocityState};
 use bus::component::Info;
@@ -107,45 +106,6 @@ pub struct WallFollowLaw {
     pub start_state: u32,
     /// For a room that is shared.
     pub shared: Option<Shared>,
-}
-
-/// One of the four beams: 0 is +x, 1 is −x, 2 is +y, 3 is −y of the heading.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-struct Beam(usize);
-
-impl Beam {
-    fn axis(self) -> usize {
-        self.0 / 2
-    }
-
-    fn sign(self) -> f64 {
-        if self.0.is_multiple_of(2) { 1.0 } else { -1.0 }
-    }
-}
-
-/// Where a state flies.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-struct Leg {
-    ahead: Beam,
-    beside: Option<Beam>,
-}
-
-impl Leg {
-    fn of(state: u32) -> Self {
-        let (ahead, beside) = match state {
-            2 => (3, Some(0)),
-            3 => (1, Some(3)),
-            4 => (2, Some(1)),
-            5 => (0, Some(2)),
-            _ => (0, None),
-        };
-        Self { ahead: Beam(ahead), beside: beside.map(Beam) }
-    }
-
-    /// The axis across the flight.
-    fn across(self) -> usize {
-        1 - self.ahead.axis()
-    }
 }
 
 /// All that the law remembers.
@@ -346,8 +306,7 @@ impl WallFollowLaw {
         if distances_m[ahead.0] > corner_m {
             return;
         }
-        state.laps += u32::from(state.phase == 5);
-        state.phase = if state.phase == 5 { 2 } else { state.phase + 1 };
+        (state.phase, state.laps) = legs::next(state.phase, state.laps);
     }
 
     /// Ahead by the distance still to go, nothing across.
@@ -427,17 +386,6 @@ impl WallFollowLaw {
 mod tests {
     use super::*;
     use crate::gains_file::parse;
-
-    #[test]
-    fn the_wall_is_on_the_left_in_every_state_and_was_ahead_in_the_one_before() {
-        for state in 2..=5 {
-            let (leg, before) = (Leg::of(state), Leg::of(if state == 2 { 5 } else { state - 1 }));
-            let beside = leg.beside.unwrap();
-            assert_eq!(beside, before.ahead, "state {state}");
-            assert_eq!(leg.across(), beside.axis());
-        }
-        assert_eq!(Leg::of(1), Leg { beside: None, ..Leg::of(5) });
-    }
 
     #[test]
     fn impossible_gains_are_refused_with_their_key() {

@@ -1,9 +1,13 @@
-//! Guidance to a stop before a wall (thesis §5.5, Figs 5.30–5.34), around velocity PD and cascade.
+//! Guidance to a stop before a wall along a velocity curve, around velocity PD and cascade: ours. `wall_stop_thesis` has
+//! the thesis's (§5.5, Figs 5.30–5.34), where the pitch is a function of the distance; docs/walls.md flies both.
 //!
 //! It flies along the heading's +x. The velocity command is the cruising speed, or the `Approach` curve over
-//! the distance still to go where that is slower, so that the pitch command shrinks with the distance as the
-//! thesis says; the curve's own acceleration is fed forward. The velocity along y is held at zero. Once it has
-//! arrived, an integrator over the distance takes up what a tilted attitude estimate leaves.
+//! the distance still to go where that is slower; the curve's own acceleration is fed forward. So it pitches up at once
+//! where the curve begins, and then by as much as the curve's deceleration takes. Once it has arrived, an integrator
+//! over the distance takes up what a tilted attitude estimate leaves.
+//!
+//! Along y it holds its place by the integral of the estimated velocity, as well as that is known: well with a wall
+//! beside in sight, and not at all in the open, where the ranges tell nothing about it.
 //!
 //! It knows the wall by the range finders' estimate alone, and its height by the beam downwards.
 
@@ -15,7 +19,7 @@ use crate::law_inputs::WallInputs;
 use crate::velocity::{LoopsGains, VelocityLoop, VelocitySetPoint, VelocityState};
 use bus::component::Info;
 use diagnostics::parameter::{ParameterError, finite, positive, positive_up_to};
-use diagnostics::unit::{ACCELERATION, LENGTH, PER_SECOND_3, VELOCITY};
+use diagnostics::unit::{ACCELERATION, LENGTH, PER_SECOND, PER_SECOND_3, VELOCITY};
 use serde::Deserialize;
 use std::path::{Path, PathBuf};
 
@@ -35,7 +39,7 @@ gains! {
     pub struct WallStopGains of file, built in "wall-stop.toml" {
         /// From the distance still to go to a velocity.
         approach: Approach = Approach::read(&file.table("approach")),
-        /// Back from a wall that is too near no faster than this, m/s.
+        /// Back from a wall that is too near, and back along it, no faster than this, m/s.
         retreat_max_m_s: f64 = file.limit("approach.retreat_max", VELOCITY),
         /// Error of distance (m) held for one second to acceleration (m/s²), 1/s³.
         integral_1_s3: f64 = file.gain("hold.integral", PER_SECOND_3),
@@ -45,6 +49,8 @@ gains! {
         holding_distance_m: f64 = file.limit("hold.distance", LENGTH),
         /// below this speed, m/s.
         holding_speed_m_s: f64 = file.limit("hold.speed", VELOCITY),
+        /// Displacement along y (m) to a velocity back (m/s), 1/s.
+        aside_1_s: f64 = file.gain("hold.aside", PER_SECOND),
         /// The loops inside.
         loops: LoopsGains = LoopsGains::read(file),
     }
@@ -89,6 +95,9 @@ pub struct WallStopState {
     /// Acceleration that the integrator over the distance asks for.
     #[field(unit = "m/s^2")]
     pub integral: f64,
+    /// Displacement along the heading's y, by the estimated velocity.
+    #[field(unit = "m")]
+    pub aside: f64,
     /// [`CRUISING`], [`BRAKING`] or [`HOLDING`].
     #[field(unit = "1")]
     pub phase: u32,
@@ -175,6 +184,7 @@ impl Law for WallStopLaw {
         let speed_m_s = input.walls.velocity[0];
         state.phase = self.phase(state.phase, to_go_m, speed_m_s);
         self.integrate(state, to_go_m);
+        state.aside += input.walls.velocity[1] * self.velocity.cascade.period_s;
         let asked = self.asked(state, to_go_m, speed_m_s);
         let measured = HoverMotion::by_ranges(input);
         let output =
@@ -215,8 +225,10 @@ impl WallStopLaw {
         let is_on_curve = command_m_s == near_m_s && state.phase != HOLDING;
         let braking_m_s2 =
             if is_on_curve { self.gains.approach.acceleration_m_s2(to_go_m, speed_m_s) } else { 0.0 };
+        let back_max_m_s = self.gains.retreat_max_m_s;
+        let back_m_s = (-self.gains.aside_1_s * state.aside).clamp(-back_max_m_s, back_max_m_s);
         VelocitySetPoint {
-            velocity_m_s: [command_m_s, 0.0],
+            velocity_m_s: [command_m_s, back_m_s],
             feed_forward_m_s2: [braking_m_s2, 0.0],
             integral_m_s2: [state.integral, 0.0],
             altitude_m: self.altitude_m,

@@ -22,7 +22,9 @@ use controllers::pid::PidLaw;
 use controllers::pid_gains::PidGains;
 use controllers::velocity::{LoopsGains, VelocityLaw, VelocityLoop, VelocitySetPoint};
 use controllers::wall_follow::{Mode, WallFollowGains, WallFollowLaw};
+use controllers::wall_follow_thesis::{Ahead, WallFollowThesisGains, WallFollowThesisLaw};
 use controllers::wall_stop::{WallStopGains, WallStopLaw};
+use controllers::wall_stop_thesis::{WallStopThesisGains, WallStopThesisLaw};
 use flight::{Loop, NOISY, PERIOD_S, ROOM, Senses, believed};
 use nalgebra::Vector3;
 
@@ -37,6 +39,8 @@ enum Law {
     Velocity(VelocityLaw),
     WallStop(WallStopLaw),
     WallFollow(WallFollowLaw),
+    WallStopThesis(WallStopThesisLaw),
+    WallFollowThesis(WallFollowThesisLaw),
 }
 
 impl Law {
@@ -47,11 +51,13 @@ impl Law {
             Law::Velocity(law) => flight.step(law),
             Law::WallStop(law) => flight.step(law),
             Law::WallFollow(law) => flight.step(law),
+            Law::WallStopThesis(law) => flight.step(law),
+            Law::WallFollowThesis(law) => flight.step(law),
         }
     }
 }
 
-fn laws() -> [(&'static str, Law); 5] {
+fn laws() -> [(&'static str, Law); 7] {
     let vehicle = believed().hover_model();
     let velocity = VelocityLoop::new(&LoopsGains::default(), vehicle, PERIOD_S);
     let held = VelocitySetPoint { altitude_m: 1.5, ..VelocitySetPoint::default() };
@@ -74,16 +80,35 @@ fn laws() -> [(&'static str, Law); 5] {
         start_state: 1,
         shared: None,
     };
+    let stop_thesis = WallStopThesisLaw {
+        gains: WallStopThesisGains::default(),
+        velocity,
+        pitch_rad: 0.02,
+        distance_m: 3.0,
+        altitude_m: 1.5,
+        heading_rad: 0.0,
+    };
+    let follow_thesis = WallFollowThesisLaw {
+        gains: WallFollowThesisGains::default(),
+        velocity,
+        ahead: Ahead::Tilt(0.03),
+        distance_m: 3.0,
+        altitude_m: 1.5,
+        heading_rad: 0.0,
+        start_state: 1,
+    };
     [
         ("pid", Law::Pid(PidLaw { gains: PidGains::default(), vehicle, period_s: PERIOD_S })),
         ("cascade", Law::Cascade(CascadeLaw { gains: CascadeGains::default(), vehicle, period_s: PERIOD_S })),
         ("velocity", Law::Velocity(VelocityLaw { velocity, constant: Some(held) })),
         ("wall-stop", Law::WallStop(stop)),
         ("wall-follow", Law::WallFollow(follow)),
+        ("wall-stop-thesis", Law::WallStopThesis(stop_thesis)),
+        ("wall-follow-thesis", Law::WallFollowThesis(follow_thesis)),
     ]
 }
 
-/// Before the wall at +x, 3 m away, so that all laws but `wall-follow` hover.
+/// Before the wall at +x, 3 m away, so that all laws but those that follow walls hover.
 fn hovering(law: &Law) -> (Loop, ControlOutput) {
     let mut flight = Loop::new(Vector3::new(2.0, 0.0, 1.5), Senses::new(1, ROOM, NOISY));
     let mut output = ControlOutput::default();

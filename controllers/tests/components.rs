@@ -6,9 +6,12 @@ use controllers::cascade::CascadeLaw;
 use controllers::controller::Controller;
 use controllers::pid::PidLaw;
 use controllers::pilot::Pilot;
+use controllers::position_hold::PositionHold;
 use controllers::velocity::VelocityLaw;
 use controllers::wall_follow::WallFollowLaw;
+use controllers::wall_follow_thesis::WallFollowThesisLaw;
 use controllers::wall_stop::WallStopLaw;
+use controllers::wall_stop_thesis::WallStopThesisLaw;
 use serde_json::{Value, json};
 
 const VEHICLE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../vehicles/hummingbird.toml");
@@ -17,8 +20,8 @@ fn gains(name: &str) -> String {
     format!("{}/gains/{name}.toml", env!("CARGO_MANIFEST_DIR"))
 }
 
-/// Each component with parameters that it accepts.
-fn accepted() -> [(Registration, Value); 6] {
+/// Each component with parameters that it accepts, those without gains last.
+fn accepted() -> [(Registration, Value); 9] {
     [
         (Registration::of::<Controller<PidLaw>>(), json!({ "vehicle": VEHICLE })),
         (Registration::of::<Controller<CascadeLaw>>(), json!({ "vehicle": VEHICLE })),
@@ -28,7 +31,16 @@ fn accepted() -> [(Registration, Value); 6] {
             Registration::of::<Controller<WallFollowLaw>>(),
             json!({ "vehicle": VEHICLE, "altitude_m": 1.5, "mode": "constant" }),
         ),
+        (
+            Registration::of::<Controller<WallStopThesisLaw>>(),
+            json!({ "vehicle": VEHICLE, "altitude_m": 1.5 }),
+        ),
+        (
+            Registration::of::<Controller<WallFollowThesisLaw>>(),
+            json!({ "vehicle": VEHICLE, "altitude_m": 1.5, "mode": "varying" }),
+        ),
         (Registration::of::<Pilot>(), json!({ "initial_altitude_m": 1.0 })),
+        (Registration::of::<PositionHold>(), json!({})),
     ]
 }
 
@@ -43,7 +55,7 @@ fn with(parameters: &Value, key: &str, value: Value) -> Value {
 fn every_kind_flies_with_its_own_gains_file() {
     for (kind, parameters) in accepted() {
         kind.check(&parameters, &NodeContext::new("node", &[])).unwrap();
-        if kind.name != "pilot" {
+        if !["pilot", "position-hold"].contains(&kind.name) {
             kind.check(&with(&parameters, "gains", json!(gains(kind.name))), &NodeContext::new("node", &[]))
                 .unwrap();
         }
@@ -55,7 +67,7 @@ fn every_kind_flies_with_its_own_gains_file() {
 
 #[test]
 fn the_gains_file_of_another_law_is_refused_by_name_and_place() {
-    for (kind, parameters) in accepted().into_iter().take(5) {
+    for (kind, parameters) in accepted().into_iter().take(7) {
         let other = if kind.name == "cascade" { "pid" } else { "cascade" };
         let outcome =
             kind.check(&with(&parameters, "gains", json!(gains(other))), &NodeContext::new("node", &[]));
@@ -73,7 +85,17 @@ fn the_gains_file_of_another_law_is_refused_by_name_and_place() {
 
 #[test]
 fn impossible_parameters_are_refused_by_their_key() {
-    let [_, _, (velocity, fly), (wall_stop, stop), (wall_follow, follow), (pilot, hold)] = accepted();
+    let [
+        _,
+        _,
+        (velocity, fly),
+        (wall_stop, stop),
+        (wall_follow, follow),
+        by_pitch,
+        by_tilt,
+        (pilot, hold),
+        _,
+    ] = accepted();
     let room = with(&follow, "room_m", json!([10.0, 10.0]));
     let cases = [
         (velocity, with(&fly, "velocity_m_s", json!([1.0])), "velocity_m_s"),
@@ -94,6 +116,11 @@ fn impossible_parameters_are_refused_by_their_key() {
         (wall_follow, with(&follow, "room_m", json!([10.0, 5.0])), "room_m"),
         (wall_follow, with(&room, "mode", json!("varying")), "room_m"),
         (wall_follow, with(&room, "start_in_room_m", json!([1.0, 11.0])), "start_in_room_m"),
+        (by_pitch.0, with(&by_pitch.1, "pitch_deg", json!(0.0)), "pitch_deg"),
+        (by_pitch.0, with(&by_pitch.1, "cruise_speed_m_s", json!(1.0)), "cruise_speed_m_s"),
+        (by_tilt.0, with(&by_tilt.1, "tilt_deg", json!(45.0)), "tilt_deg"),
+        (by_tilt.0, with(&by_tilt.1, "speed_m_s", json!(0.5)), "`speed_m_s` has a meaning only in the mode"),
+        (by_tilt.0, with(&by_tilt.1, "start_state", json!(0)), "start_state"),
         (pilot, with(&hold, "data", json!("no-such.csv")), "no-such.csv"),
     ];
     for (kind, parameters, key) in cases {

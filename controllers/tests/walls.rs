@@ -4,10 +4,13 @@
 
 mod flight;
 
+use controllers::law::Law;
 use controllers::room::Room;
 use controllers::velocity::VelocityLoop;
 use controllers::wall_follow::{Mode, Shared, WallFollowGains, WallFollowLaw};
+use controllers::wall_follow_thesis::{Ahead, WallFollowThesisGains, WallFollowThesisLaw};
 use controllers::wall_stop::{HOLDING, WallStopGains, WallStopLaw};
+use controllers::wall_stop_thesis::{STOPPING, WallStopThesisGains, WallStopThesisLaw};
 use flight::{Loop, NOISY, PERIOD_S, ROOM, Senses, believed, vehicle};
 use nalgebra::Vector3;
 use vehicles::{MotorModel, Vehicle};
@@ -42,36 +45,43 @@ fn wall_follow(mode: Mode, speed_m_s: f64) -> WallFollowLaw {
 }
 
 /// How a flight to a wall went.
+#[derive(Default)]
 struct Stop {
     nearest_m: f64,
     /// Of the last five seconds.
     worst_error_m: f64,
     fastest_m_s: f64,
+    /// The greatest speed then, whatever its direction.
+    last_speed_m_s: f64,
+    /// How far it ever was from where it began, along the wall.
+    aside_m: f64,
     state: u32,
     altitude_error_m: f64,
 }
 
-/// Flies towards a wall that is `away_m` away, for `seconds`.
-fn stop(law: &WallStopLaw, seed: u64, away_m: f64, seconds: u64) -> Stop {
-    stop_of(vehicle(), law, seed, away_m, seconds)
+/// Flies towards a wall that is `away_m` away, to stop `distance_m` before it, for `seconds`.
+fn stop<L: Law>(law: &L, distance_m: f64, seed: u64, away_m: f64, seconds: u64) -> Stop {
+    stop_of(vehicle(), law, distance_m, seed, away_m, seconds)
 }
 
-fn stop_of(flown: Vehicle, law: &WallStopLaw, seed: u64, away_m: f64, seconds: u64) -> Stop {
-    let walls = [away_m, f64::INFINITY, f64::INFINITY, f64::INFINITY];
+/// In a hall of 10 m, whose side walls tell the speed along the wall ahead.
+fn stop_of<L: Law>(flown: Vehicle, law: &L, distance_m: f64, seed: u64, away_m: f64, seconds: u64) -> Stop {
+    let walls = [away_m, f64::INFINITY, 5.0, 5.0];
     let mut flight = Loop::of(flown, Vector3::new(0.0, 0.0, 1.5), Senses::new(seed, walls, NOISY));
-    let (mut nearest_m, mut worst_error_m, mut fastest_m_s) = (f64::INFINITY, 0.0_f64, 0.0_f64);
-    let mut altitude_error_m = 0.0_f64;
+    let mut stop = Stop { nearest_m: f64::INFINITY, ..Stop::default() };
     for tick in 0..1000 * seconds {
         flight.step(law);
-        let distance_m = away_m - flight.position().x;
-        nearest_m = nearest_m.min(distance_m);
-        fastest_m_s = fastest_m_s.max(flight.state.body.velocity_W_m_s.x);
-        altitude_error_m = altitude_error_m.max((flight.position().z - 1.5).abs());
+        let (at, velocity) = (flight.position(), flight.state.body.velocity_W_m_s);
+        stop.nearest_m = stop.nearest_m.min(away_m - at.x);
+        stop.fastest_m_s = stop.fastest_m_s.max(velocity.x);
+        stop.altitude_error_m = stop.altitude_error_m.max((at.z - 1.5).abs());
+        stop.aside_m = stop.aside_m.max(at.y.abs());
         if tick >= 1000 * (seconds - 5) {
-            worst_error_m = worst_error_m.max((distance_m - law.distance_m).abs());
+            stop.worst_error_m = stop.worst_error_m.max((away_m - at.x - distance_m).abs());
+            stop.last_speed_m_s = stop.last_speed_m_s.max(velocity.norm());
         }
     }
-    Stop { nearest_m, worst_error_m, fastest_m_s, state: flight.output.phase, altitude_error_m }
+    Stop { state: flight.output.phase, ..stop }
 }
 
 #[test]
@@ -79,25 +89,56 @@ fn it_stops_at_three_metres_and_never_nearer_than_2_8_whatever_the_speed_and_see
     for cruise_m_s in [0.5, 1.0, 2.0] {
         for seed in SEEDS {
             let away_m = 12.0;
-            let stop = stop(&wall_stop(cruise_m_s, 3.0), seed, away_m, 20 + (9.0 / cruise_m_s) as u64);
+            let stop = stop(&wall_stop(cruise_m_s, 3.0), 3.0, seed, away_m, 20 + (9.0 / cruise_m_s) as u64);
             println!(
                 "{cruise_m_s} m/s, seed {seed}: nearest {:.3} m, at the end within {:.3} m, fastest {:.2} m/s, \
-                 height within {:.3} m",
-                stop.nearest_m, stop.worst_error_m, stop.fastest_m_s, stop.altitude_error_m
+                 height within {:.3} m, at the end {:.3} m/s, aside by {:.3} m",
+                stop.nearest_m,
+                stop.worst_error_m,
+                stop.fastest_m_s,
+                stop.altitude_error_m,
+                stop.last_speed_m_s,
+                stop.aside_m
             );
             assert!(stop.nearest_m > 2.85, "nearest {}", stop.nearest_m);
             assert!(stop.worst_error_m < 0.05, "at the end off by {}", stop.worst_error_m);
             assert!((stop.fastest_m_s - cruise_m_s).abs() < 0.1 * cruise_m_s + 0.2, "{}", stop.fastest_m_s);
             assert_eq!(stop.state, HOLDING);
             assert!(stop.altitude_error_m < 0.1, "{}", stop.altitude_error_m);
+            assert!(stop.last_speed_m_s < 0.1, "at the end {} m/s", stop.last_speed_m_s);
+            assert!(stop.aside_m < 0.5, "aside by {} m", stop.aside_m);
         }
+    }
+}
+
+/// Without an integrator: by a pitch that is nothing but a function of the distance, and the PD.
+#[test]
+fn the_thesis_s_law_flies_past_three_metres_and_returns_to_stand_there() {
+    let gains = WallStopThesisGains::default();
+    let law = WallStopThesisLaw {
+        velocity: VelocityLoop::new(&gains.loops, believed().hover_model(), PERIOD_S),
+        gains,
+        pitch_rad: 0.02,
+        distance_m: 3.0,
+        altitude_m: 1.5,
+        heading_rad: 0.0,
+    };
+    for seed in SEEDS {
+        let stop = stop(&law, 3.0, seed, 8.0, 25);
+        println!(
+            "seed {seed}: fastest {:.2} m/s, nearest {:.2} m, at the end within {:.3} m and {:.3} m/s, aside by {:.3} m",
+            stop.fastest_m_s, stop.nearest_m, stop.worst_error_m, stop.last_speed_m_s, stop.aside_m
+        );
+        assert!(stop.fastest_m_s > 0.8 && (2.0..2.8).contains(&stop.nearest_m), "{}", stop.nearest_m);
+        assert!(stop.worst_error_m < 0.1 && stop.last_speed_m_s < 0.1 && stop.aside_m < 0.5);
+        assert_eq!(stop.state, STOPPING);
     }
 }
 
 #[test]
 fn it_stops_at_another_distance_and_from_within_the_room() {
     for (distance_m, away_m) in [(2.0, 5.0), (4.0, 5.0), (3.0, 5.0), (3.0, 2.5)] {
-        let stop = stop(&wall_stop(1.0, distance_m), 1, away_m, 20);
+        let stop = stop(&wall_stop(1.0, distance_m), distance_m, 1, away_m, 20);
         println!("{distance_m} m from {away_m} m: nearest {:.3}, {:.3}", stop.nearest_m, stop.worst_error_m);
         assert!(stop.worst_error_m < 0.05, "{distance_m} m: off by {}", stop.worst_error_m);
         assert!(stop.nearest_m > distance_m.min(away_m) - 0.2);
@@ -205,6 +246,46 @@ fn two_laps_at_constant_speed_keep_three_metres_along_the_sides() {
     }
 }
 
+/// One lap by each of the thesis's modes: how far from the walls along the sides, least and most.
+#[test]
+fn the_thesis_s_varying_mode_keeps_no_distance_and_its_constant_mode_nearly_three_metres() {
+    let gains = WallFollowThesisGains::default();
+    let sides_m = |ahead: Ahead| {
+        let law = WallFollowThesisLaw {
+            velocity: VelocityLoop::new(&gains.loops, believed().hover_model(), PERIOD_S),
+            gains,
+            ahead,
+            distance_m: 3.0,
+            altitude_m: 1.5,
+            heading_rad: 0.0,
+            start_state: 1,
+        };
+        let mut flight = Loop::new(Vector3::new(0.0, 0.0, 1.5), Senses::new(1, ROOM, NOISY));
+        let (mut least_m, mut most_m, mut steps) = (f64::INFINITY, 0.0_f64, 0);
+        while flight.output.laps < 1 && flight.time_s() < 100.0 {
+            let before = flight.output.velocity_m_s;
+            flight.step(&law);
+            steps += u32::from(flight.output.velocity_m_s != before);
+            let at = flight.position();
+            if flight.output.phase > 1 && at.x.abs().min(at.y.abs()) < 1.0 {
+                (least_m, most_m) = (least_m.min(clearance_m(&at)), most_m.max(clearance_m(&at)));
+            }
+        }
+        println!("{ahead:?}: {least_m:.2} … {most_m:.2} m, {steps} steps, {:.0} s", flight.time_s());
+        assert_eq!(flight.output.laps, 1);
+        (least_m, most_m, steps)
+    };
+    let (varying_m, _, no_steps) = sides_m(Ahead::Tilt(0.035));
+    let (constant_m, most_m, steps) = sides_m(Ahead::Velocity(0.5));
+    assert!(varying_m < 2.4, "it flies past 3 m by what it takes to stop: {varying_m}");
+    assert!(constant_m > 2.4 && most_m < 3.1, "{constant_m} … {most_m}");
+    assert_eq!(
+        (no_steps, steps),
+        (0, 6),
+        "its velocity commands change with the states 1 to 5 and 2, and not between"
+    );
+}
+
 /// Vehicles that differ from the file that the law believes in.
 fn others() -> [(&'static str, Vehicle); 3] {
     let heavier = Vehicle { mass_kg: 1.05 * vehicle().mass_kg, ..vehicle() };
@@ -216,7 +297,7 @@ fn others() -> [(&'static str, Vehicle); 3] {
 #[test]
 fn vehicles_that_differ_from_their_file_stop_and_follow_as_well() {
     for (name, flown) in others() {
-        let stop = stop_of(flown.clone(), &wall_stop(2.0, 3.0), 1, 12.0, 25);
+        let stop = stop_of(flown.clone(), &wall_stop(2.0, 3.0), 3.0, 1, 12.0, 25);
         println!("{name}: nearest {:.3} m, at the end within {:.3} m", stop.nearest_m, stop.worst_error_m);
         assert!(stop.nearest_m > 2.8 && stop.worst_error_m < 0.05, "{name}");
         let laps = two_laps_of(flown, &wall_follow(Mode::Constant, 0.7), 1);

@@ -182,6 +182,7 @@ fn statistic(statistic: Statistic, samples: impl Iterator<Item = f64>) -> Vec<f6
         Statistic::Mean => vec![mean(|value| *value)],
         Statistic::Rms => vec![mean(|value| value * value).sqrt()],
         Statistic::Last => vec![last],
+        Statistic::Span => vec![extreme(f64::max) - extreme(f64::min)],
     }
 }
 
@@ -297,5 +298,7 @@ mod tests {
         assert!(statistic(Statistic::Max, [1.0, f64::NAN, 2.0].into_iter())[0].is_nan());
         assert_eq!(statistic(Statistic::Every, [3.0, 1.0].into_iter()), [1.0, 3.0]);
         assert!(statistic(Statistic::Every, std::iter::empty()).is_empty());
+        assert_eq!(statistic(Statistic::Span, [3.0, -1.0, 2.0].into_iter()), [4.0]);
+        assert!(statistic(Statistic::Span, [1.0, f64::NAN].into_iter())[0].is_nan());
     }
 }

@@ -83,7 +83,7 @@ fn estimate(flight: &[Truth], room: Room, seed: u64, mut judge: impl FnMut(&Run)
         filter.update(
             &mut state,
             now_ns,
-            &RangeInertialInputs { ranges: &sent, imu: &imu, attitude: &attitude },
+            &RangeInertialInputs { ranges: &sent, imu: &imu, attitude: &attitude, gps: None },
         );
         let yaw_rad = attitude.yaw;
         let walls = filter.walls(&state, yaw_rad, now_ns);

@@ -35,9 +35,11 @@ fn manifest(place: &Place) -> String {
          [process.range]\ninputs.traffic = \"/traffic/traffic\"\n\
          [process.traffic]\nkind = \"traffic\"\ninputs.one = \"/plant/state\"\n\
          [process.clearance]\nkind = \"clearance\"\nscene = {room:?}\ninputs.state = \"/plant/state\"\n\
+         [process.hold]\nkind = \"position-hold\"\n\
+         inputs = {{ set_point = \"/pilot/set_point\", {estimate} }}\n\
          [process.attitude]\nkind = \"attitude\"\ninputs.imu = \"/imu/imu\"\n\
          [process.odometry]\nkind = \"range-inertial\"\n\
-         inputs = {{ ranges = \"/range/ranges\", imu = \"/imu/imu\", attitude = \"/attitude/estimate\" }}\n\
+         inputs = {{ ranges = \"/range/ranges\", imu = \"/imu/imu\", attitude = \"/attitude/estimate\", gps = \"/gps/gps\" }}\n\
          parameters = {{ initial_height_m = 1.0 }}\n\
          [process.trajectory]\nkind = \"trajectory\"\n\
          parameters = {{ initial_position_m = [0.0, 0.0, 1.0] }}\n\
@@ -58,6 +60,8 @@ fn manifest(place: &Place) -> String {
         ("velocity", estimate, "altitude_m = 1.2"),
         ("wall-stop", walls, "altitude_m = 1.2"),
         ("wall-follow", walls, "altitude_m = 1.2, mode = \"constant\""),
+        ("wall-stop-thesis", walls, "altitude_m = 1.2"),
+        ("wall-follow-thesis", walls, "altitude_m = 1.2, mode = \"varying\""),
     ] {
         text += &law(kind, inputs, parameters);
     }

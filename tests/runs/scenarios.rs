@@ -61,15 +61,15 @@ fn sticks_in_both_rigs() {
 }
 
 #[test]
-fn stops_before_a_wall_from_three_speeds() {
-    for manifest in ["wall-stop-slow", "wall-stop", "wall-stop-fast"] {
+fn stops_before_a_wall_by_our_law_and_the_thesis_s_and_with_gps_in_the_open() {
+    for manifest in ["wall-stop", "wall-stop-thesis", "wall-stop-open-gps"] {
         fly(manifest);
     }
 }
 
 #[test]
-fn follows_the_walls_at_varying_speed() {
-    fly("wall-follow-varying");
+fn follows_the_walls_at_varying_speed_by_the_thesis_s_law() {
+    fly("wall-follow-varying-thesis");
 }
 
 #[test]
@@ -112,13 +112,21 @@ fn no_controller_is_told_the_truth() {
         "hover",
         "hover-rapier",
         "take-off",
+        "take-off-attitude",
         "rig-a",
         "rig-b",
         "wall-stop-slow",
         "wall-stop",
         "wall-stop-fast",
+        "wall-stop-thesis-slow",
+        "wall-stop-thesis",
+        "wall-stop-thesis-fast",
+        "wall-stop-open",
+        "wall-stop-open-gps",
         "wall-follow-varying",
         "wall-follow-constant",
+        "wall-follow-varying-thesis",
+        "wall-follow-constant-thesis",
         "ten-vehicles",
         "figure-eight",
         "swap-laws",
@@ -136,7 +144,17 @@ fn no_controller_is_told_the_truth() {
 /// Of the wall scenarios the controllers know range finders, IMU and attitude alone.
 #[test]
 fn the_wall_scenarios_know_range_finders_and_imu_alone() {
-    for manifest in ["wall-stop", "wall-follow-varying", "wall-follow-constant", "ten-vehicles"] {
+    let manifests = [
+        "wall-stop",
+        "wall-stop-thesis",
+        "wall-stop-open",
+        "wall-follow-varying",
+        "wall-follow-constant",
+        "wall-follow-varying-thesis",
+        "wall-follow-constant-thesis",
+        "ten-vehicles",
+    ];
+    for manifest in manifests {
         let path = repository(&format!("manifests/{manifest}.toml"));
         let graph = Place::new().call(&["check", &path, "--json"]).with_code(0).json();
         let kinds: BTreeSet<_> = nodes(&graph).map(kind).collect();

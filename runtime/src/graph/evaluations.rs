@@ -147,7 +147,11 @@ fn check_field(manifest: &Manifest, plan: &Plan, pass: &Spanned<PassCondition>) 
         unit_of(manifest, plan, topic, field)
             .map_err(|error| at(error.to_string(), "name one of these fields"))
     };
-    let least = (condition.statistic == Statistic::Rms).then_some((0.0, "the root of a mean square"));
+    let least = match condition.statistic {
+        Statistic::Rms => Some((0.0, "the root of a mean square")),
+        Statistic::Span => Some((0.0, "the largest sample less the smallest")),
+        _ => None,
+    };
     if let Some((message, help)) = impossible(condition.min, condition.max, least) {
         return Err(at(message, &help));
     }

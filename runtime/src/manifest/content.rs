@@ -256,6 +256,8 @@ pub enum Statistic {
     Rms,
     /// The last sample.
     Last,
+    /// The largest sample less the smallest: how far a vehicle slid.
+    Span,
 }
 
 /// A condition on a field of a topic over a span of simulated time.

@@ -136,7 +136,27 @@ impl Axis {
         if self.in_sight[side] == 0 || innovation_m.powi(2) > gate_sigma.powi(2) * variance {
             return self.begin(echo.side, now_m, echo.sigma_m);
         }
-        self.add(&(cross * (innovation_m / variance)));
+        self.take_up(&cross, innovation_m, variance);
+    }
+
+    /// Corrects the axis by a velocity that was measured `age_s` ago with `sigma_m_s`, and was then `innovation_m_s` more
+    /// than believed. One that is no number is left out.
+    pub fn correct_velocity(&mut self, innovation_m_s: f64, sigma_m_s: f64, age_s: f64) {
+        if !innovation_m_s.is_finite() {
+            return;
+        }
+        // What the bias did to the velocity since then was not in it yet.
+        let mut observation = Mean::zeros();
+        observation[VELOCITY] = 1.0;
+        observation[BIAS] = age_s;
+        let cross = self.covariance() * observation;
+        let variance = observation.dot(&cross) + sigma_m_s.powi(2);
+        self.take_up(&cross, innovation_m_s, variance);
+    }
+
+    /// The Kalman update by an innovation of `variance`, whose covariance with the states is `cross`.
+    fn take_up(&mut self, cross: &Mean, innovation: f64, variance: f64) {
+        self.add(&(cross * (innovation / variance)));
         let covariance = self.covariance() - cross * cross.transpose() / variance;
         self.covariance = flat(&covariance);
     }

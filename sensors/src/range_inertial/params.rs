@@ -41,6 +41,9 @@ parameters! {
         initial_acceleration_bias_sigma_m_s2: f64 = 0.02 => not_negative,
         /// Standard deviation of the velocity at the start, which is taken for zero, m/s. Default 0.01.
         initial_velocity_sigma_m_s: f64 = 0.01 => not_negative,
+        /// Standard deviation of a level velocity of the input `gps` along each axis, m/s. Default 0.074, as of the kind
+        /// `gps`.
+        gps_velocity_sigma_m_s: f64 = 0.074 => positive,
         /// Height at the start, m. Default 0.0.
         initial_height_m: f64 = 0.0 => not_negative,
         /// Size of the room along the world's x and y, m, where it is shared with other vehicles: an echo that is not
