@@ -27,9 +27,9 @@ use serde::Deserialize;
 #[derive(Debug, Clone, Copy, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Parameters {
-    /// Kx: from the error of the place (m) to a velocity (m/s), 1/s. Default 0.35.
+    /// Kx: from the error of the place (m) to a velocity (m/s), 1/s. Default 0.45.
     position_1_s: f64,
-    /// Kv: from the error of that velocity (m/s) to an acceleration (m/s²), 1/s. Default 1.2.
+    /// Kv: from the error of that velocity (m/s) to an acceleration (m/s²), 1/s. Default 1.5.
     velocity_1_s: f64,
     /// It returns to its place no faster than this, m/s. Default 1.0.
     speed_max_m_s: f64,
@@ -42,8 +42,8 @@ pub struct Parameters {
 impl Default for Parameters {
     fn default() -> Self {
         Self {
-            position_1_s: 0.35,
-            velocity_1_s: 1.2,
+            position_1_s: 0.45,
+            velocity_1_s: 1.5,
             speed_max_m_s: 1.0,
             tilt_max_deg: 10.0,
             lock_speed_m_s: 0.1,
