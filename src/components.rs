@@ -22,6 +22,7 @@ pub const COMPONENTS: Registry = Registry::new(&[
     Registration::of::<Controller<controllers::geometric::GeometricLaw>>(),
     Registration::of::<Sensing<sensors::gps::GpsParams>>(),
     Registration::of::<sensors::imu::ImuSensor>(),
+    Registration::of::<sensors::link::Link>(),
     Registration::of::<Controller<controllers::lqr::LqrLaw>>(),
     Registration::of::<Sensing<sensors::magnetometer::MagnetometerParams>>(),
     Registration::of::<Sensing<sensors::mocap::MocapParams>>(),

@@ -19,6 +19,8 @@ pub struct Announcement {
     pub layout: String,
     /// The ROS 2 definition, for recordings.
     pub definition: String,
+    /// Where a message holds its stamp, if it has one.
+    pub stamp_offset: Option<usize>,
 }
 
 impl Announcement {
@@ -31,6 +33,7 @@ impl Announcement {
             layout_hash: schema.layout_hash(),
             layout: schema.layout(),
             definition: schema.ros2_definition(),
+            stamp_offset: schema.stamp_offset(),
         }
     }
 

@@ -7,12 +7,13 @@ use crate::host_time::{monotonic_ns, process_cpu_ns};
 use crate::links::Links;
 use crate::lockstep::{Need, Phase, SlotState, TransferOutcome, Waited};
 use crate::membership::Membership;
-use crate::plan::InputPlan;
+use crate::plan::{InputPlan, NodePlan};
 use crate::port::{InPort, OutPort, Source};
 use crate::profile::TickWriter;
 use crate::schema::Schema;
 use crate::state_transfer::StateRing;
 use crate::tick::Tick;
+use crate::timing::{Due, Timing};
 use std::fmt::Display;
 use std::time::Duration;
 
@@ -37,6 +38,9 @@ pub(crate) struct ConnectedNode {
     first_tick: u32,
     epoch: u32,
     profile: Option<TickWriter>,
+    timing: Option<Timing>,
+    /// Words of the component's state; those of `timing` are behind them.
+    state_words: usize,
     // The transport last: the ports give back what they hold while it stands.
     links: Links,
 }
@@ -74,8 +78,13 @@ impl ConnectedNode {
             first_tick,
             epoch: membership.epoch,
             profile: None,
+            timing: Timing::of(&links.plan, &links.node),
+            state_words: 0,
             links,
         };
+        if node.timing.is_some() {
+            node.outputs.iter_mut().for_each(OutPort::set_timed);
+        }
         node.connect_inputs(declared, membership)?;
         node.follow(membership, first_tick)?;
         node.links.transport.reserve()?;
@@ -133,12 +142,29 @@ impl ConnectedNode {
         mut step: impl FnMut(&mut Tick<'_>, &mut [u8]) -> Result<(), E>,
     ) -> Result<(), BusError> {
         self.open_predecessor(schema)?;
+        let more_words = self.timing_words(self.timing.is_some());
         if let Some(schema) = schema {
             let links = &self.links;
             let (dir, plan) = (&links.run_dir, &links.plan);
-            self.published_state = Some(StateRing::create(dir, plan, links.index, links.generation, schema)?);
+            self.published_state =
+                Some(StateRing::create(dir, plan, links.index, links.generation, schema, more_words)?);
         }
-        self.fly(state, |tick, state| step(tick, state).map_err(|error| error.to_string()))
+        let mut step =
+            |tick: &mut Tick<'_>, state: &mut [u8]| step(tick, state).map_err(|error| error.to_string());
+        if more_words == 0 {
+            return self.fly(state, step);
+        }
+        let bytes = state.len();
+        self.state_words = bytes.div_ceil(8);
+        let mut words = vec![0_u64; self.state_words + more_words];
+        let whole: &mut [u8] = bytemuck::cast_slice_mut(&mut words);
+        whole[..bytes].copy_from_slice(state);
+        self.fly(whole, |tick, whole| step(tick, &mut whole[..bytes]))
+    }
+
+    /// Words behind the state of a process of this node whose steps take time, or do not.
+    fn timing_words(&self, is_timed: bool) -> usize {
+        if is_timed { Timing::words(&self.outputs) } else { 0 }
     }
 
     /// Opens the state of the process that this one succeeds, or else what it sends.
@@ -149,8 +175,13 @@ impl ConnectedNode {
         }
         let generation = Membership::load(&links.run_dir, self.epoch)?.nodes[links.index].primary.generation;
         if let Some(schema) = state {
-            self.predecessor_state =
-                StateRing::open(&links.run_dir, &links.plan, links.index, generation, schema)?;
+            let (dir, plan, index) = (&links.run_dir, &links.plan, links.index);
+            let is_timed = match generation {
+                0 => plan.nodes[index].computing_time.is_some(),
+                _ => NodePlan::load_backup(dir, index, generation)?.computing_time.is_some(),
+            };
+            let more_words = self.timing_words(is_timed);
+            self.predecessor_state = StateRing::open(dir, plan, index, generation, schema, more_words)?;
         }
         if self.predecessor_state.is_some() {
             links.lockstep.set_transfer(TransferOutcome::State);
@@ -415,13 +446,35 @@ impl ConnectedNode {
         let takes_over = links.generation > 0 && tick == self.take_over_tick;
         let predecessor = if takes_over { self.predecessor.as_slice() } else { &[] };
         let (inputs, outputs) = (&self.inputs, &mut self.outputs);
-        let mut view = Tick { tick, time_ns, node, inputs, outputs, predecessor };
-        step(&mut view, state).map_err(|reason| BusError::Step {
-            node: node.clone(),
-            tick,
-            time_s: time_ns as f64 * 1e-9,
-            reason,
-        })?;
+        let mut step = |state: &mut [u8], outputs: &mut [OutPort]| {
+            let mut view = Tick { tick, time_ns, node, inputs, outputs, predecessor };
+            let time_s = time_ns as f64 * 1e-9;
+            step(&mut view, state).map_err(|reason| BusError::Step {
+                node: node.clone(),
+                tick,
+                time_s,
+                reason,
+            })
+        };
+        match &mut self.timing {
+            None => step(state, outputs)?,
+            Some(timing) => {
+                let (state, words) = state.split_at_mut(8 * self.state_words);
+                let words = bytemuck::cast_slice_mut(words);
+                let counts = tick >= self.take_over_tick;
+                match timing.begin(tick, words, outputs) {
+                    Due::Step => {
+                        step(state, outputs)?;
+                        if timing.end(tick, words, outputs, node)? && counts {
+                            links.lockstep.count_overrun();
+                        }
+                    }
+                    Due::Skipped if counts => links.lockstep.count_skipped_step(),
+                    Due::Skipped => {}
+                }
+                Timing::write(tick, words, outputs, node)?;
+            }
+        }
         if crate::hosted::is_cancelled() {
             // Another instance may have been told to go on in its place by now.
             return Err(BusError::Aborted);

@@ -23,6 +23,8 @@ pub struct NodeContext<'a> {
     pub inputs: &'a [&'a str],
     /// The outputs that the manifest names.
     pub outputs: &'a [&'a str],
+    /// What the wired inputs carry, as far as a check of the manifest knows it; a run tells it when it has connected.
+    pub messages: &'a [InputMessage<'a>],
     /// Nanoseconds a tick.
     pub tick_ns: u64,
     /// Ticks between two computations of the node.
@@ -30,6 +32,17 @@ pub struct NodeContext<'a> {
     /// Length of the run.
     pub duration_ticks: u32,
     warnings: RefCell<Vec<Warning>>,
+}
+
+/// What an input carries.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct InputMessage<'a> {
+    /// The input.
+    pub port: &'a str,
+    /// Bytes of a message.
+    pub bytes: usize,
+    /// Ticks between two messages.
+    pub period_ticks: u32,
 }
 
 /// What is odd about a node in its run.
@@ -49,13 +62,20 @@ impl<'a> NodeContext<'a> {
     pub fn new(name: &'a str, inputs: &'a [&'a str]) -> Self {
         let (seed, tick_ns, period_ticks, duration_ticks) = (1, 1_000_000, 1, 3_600_000);
         let (outputs, warnings) = (&[] as &[_], RefCell::default());
-        Self { name, seed, inputs, outputs, tick_ns, period_ticks, duration_ticks, warnings }
+        let messages = &[] as &[_];
+        Self { name, seed, inputs, outputs, messages, tick_ns, period_ticks, duration_ticks, warnings }
     }
 
     /// The same node where the manifest names these `outputs`.
     #[must_use]
     pub fn naming(self, outputs: &'a [&'a str]) -> Self {
         Self { outputs, ..self }
+    }
+
+    /// The same node where its inputs carry `messages`.
+    #[must_use]
+    pub fn reading(self, messages: &'a [InputMessage<'a>]) -> Self {
+        Self { messages, ..self }
     }
 
     /// The same node where it computes every `period_ticks` ticks of `tick_ns`, in a run of `duration_ticks`.

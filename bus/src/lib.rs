@@ -13,6 +13,7 @@ pub mod claim;
 #[doc(hidden)]
 pub mod clock;
 pub mod component;
+pub mod computing_time;
 mod connected;
 pub mod context;
 pub mod error;
@@ -60,6 +61,7 @@ pub mod state_transfer;
 #[doc(hidden)]
 pub mod step_times;
 mod tick;
+mod timing;
 mod transport;
 #[doc(hidden)]
 pub mod user_file;
@@ -74,7 +76,7 @@ pub use join::{GENERATION_VARIABLE, Join, NODE_VARIABLE};
 pub use message::Message;
 pub use node::Node;
 pub use node_harness::{NodeHarness, Sample};
-pub use registration::Registration;
+pub use registration::{Registration, message_of};
 pub use run_process::run_process;
 pub use tick::Tick;
 pub use transport::{IceoryxError, limit_transport_log, reap_dead, takes_run_dir};

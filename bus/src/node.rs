@@ -14,7 +14,7 @@ use crate::names::process_name;
 use crate::plan::{NodePlan, Pace, Plan};
 use crate::port::OutPort;
 use crate::ports::{Inputs, PortSpec};
-use crate::registration::Registration;
+use crate::registration::{Registration, message_of};
 use crate::schema::Schema;
 use crate::tick::Tick;
 use crate::transport::Transport;
@@ -47,9 +47,17 @@ pub struct Node {
     node: NodePlan,
     /// The message type of each input, in the plan's order; `None` until declared.
     inputs: Vec<Option<Declared>>,
-    outputs: Vec<Option<&'static Schema>>,
+    outputs: Vec<Option<DeclaredOutput>>,
     /// What was wrong with a declaration that does not return errors; connecting does.
     fault: Option<BusError>,
+}
+
+/// What a node sends on an output.
+#[derive(Clone, Copy, Debug)]
+struct DeclaredOutput {
+    schema: &'static Schema,
+    /// Whether its samples are others' messages, which keep their stamps.
+    is_forwarded: bool,
 }
 
 impl Node {
@@ -110,7 +118,14 @@ impl Node {
     ///
     /// # Errors
     /// If the manifest does not wire a port that must be, or states another message type.
-    pub(crate) fn declare(&mut self, component: &Registration) -> Result<Wiring, BusError> {
+    pub(crate) fn declare(
+        &mut self,
+        component: &Registration,
+        components: &'static [Registration],
+    ) -> Result<Wiring, BusError> {
+        if let Inputs::Forwarded { .. } = component.inputs {
+            return self.declare_forwarded(component, components);
+        }
         let inputs = match component.inputs {
             Inputs::Ports(ports) => {
                 ports.iter().map(|port| self.declare_port(port)).collect::<Result<_, _>>()?
@@ -121,12 +136,37 @@ impl Node {
             Inputs::Any => self.declare_all(Declared::Raw, |node, index| {
                 node.plan.topics[node.node.inputs[index].topic].name.clone()
             }),
+            Inputs::Forwarded { .. } => Vec::new(),
         };
-        let mut outputs = Vec::new();
-        for port in component.outputs {
+        Ok(Wiring { inputs, outputs: self.declare_outputs(component)? })
+    }
+
+    fn declare_outputs(&mut self, component: &Registration) -> Result<Vec<Option<usize>>, BusError> {
+        let declare = |port: &PortSpec| {
             let is_named = self.node.outputs.iter().any(|output| output.port == port.name);
             let is_there = port.required || is_named;
-            outputs.push(is_there.then(|| self.declare_output(port.name, port.schema)).transpose()?);
+            is_there.then(|| self.declare_output(port.name, port.schema, false)).transpose()
+        };
+        component.outputs.iter().map(declare).collect()
+    }
+
+    /// Declares every input with the message of its topic, and an output for each behind those of `component`.
+    fn declare_forwarded(
+        &mut self,
+        component: &Registration,
+        components: &'static [Registration],
+    ) -> Result<Wiring, BusError> {
+        let mut indices: Vec<usize> = (0..self.inputs.len()).collect();
+        indices.sort_by_key(|&index| self.node.inputs[index].port.clone());
+        let (mut inputs, mut outputs) = (Vec::new(), self.declare_outputs(component)?);
+        for index in indices {
+            let input = self.node.inputs[index].clone();
+            let type_name = &self.plan.topics[input.topic].type_name;
+            let schema = message_of(components, type_name)
+                .ok_or_else(|| self.error(format!("no component of this program knows {type_name}")))?;
+            self.declare_input(index, Declared::Typed(schema))?;
+            inputs.push(Some(index));
+            outputs.push(Some(self.declare_output(&input.port, schema, true)?));
         }
         Ok(Wiring { inputs, outputs })
     }
@@ -238,11 +278,16 @@ impl Node {
     /// # Errors
     /// If the manifest does not name it, or states another message type, or the node declared it before.
     pub fn output<T: Message>(&mut self, port: &str) -> Result<Output<T>, BusError> {
-        let index = self.declare_output(port, T::SCHEMA)?;
+        let index = self.declare_output(port, T::SCHEMA, false)?;
         Ok(Output::new(index))
     }
 
-    fn declare_output(&mut self, port: &str, schema: &'static Schema) -> Result<usize, BusError> {
+    fn declare_output(
+        &mut self,
+        port: &str,
+        schema: &'static Schema,
+        is_forwarded: bool,
+    ) -> Result<usize, BusError> {
         let outputs = &self.node.outputs;
         let index =
             outputs.iter().position(|output| output.port == port).ok_or_else(|| BusError::UnwiredPort {
@@ -262,9 +307,9 @@ impl Node {
             });
         }
         if let Some(before) = self.outputs[index] {
-            return Err(self.declared_twice("output", port, before.type_name, schema.type_name));
+            return Err(self.declared_twice("output", port, before.schema.type_name, schema.type_name));
         }
-        self.outputs[index] = Some(schema);
+        self.outputs[index] = Some(DeclaredOutput { schema, is_forwarded });
         Ok(index)
     }
 
@@ -329,12 +374,13 @@ impl Node {
     fn connect_outputs(&self, transport: &Transport) -> Result<Vec<OutPort>, BusError> {
         let ports = self.node.outputs.iter().zip(self.outputs.iter().flatten());
         ports
-            .map(|(output, schema)| {
+            .map(|(output, &DeclaredOutput { schema, is_forwarded })| {
                 let topic = &self.plan.topics[output.topic];
                 self.announce(output.topic, schema)?;
                 let capacity = self.plan.capacity(output.topic);
                 let sender = transport.publisher(&topic.name, self.generation, schema.size, capacity)?;
-                Ok(OutPort::new(output, topic, schema, sender))
+                let port = OutPort::new(output, topic, schema, sender);
+                Ok(if is_forwarded { port.keeping_stamps() } else { port })
             })
             .collect()
     }

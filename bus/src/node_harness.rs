@@ -1,13 +1,14 @@
 //! A node of a plan, stepped without a run: what it reads is given to it as recorded bytes, and so is what it sends.
 
+use crate::announcement::Announcement;
 use crate::component::StepError;
 use crate::context::StepContext;
 use crate::initial;
 use crate::message::{CDR_START, cdr_bytes};
 use crate::messages::Time;
-use crate::plan::{NodePlan, Plan};
-use crate::ports::{InputSamples, Inputs, OutputSamples, PortSpec};
-use crate::registration::{Registration, Stepper};
+use crate::plan::{InputPlan, NodePlan, Plan};
+use crate::ports::{InputSamples, Inputs, OutputSamples};
+use crate::registration::{Registration, Stepper, message_of};
 use crate::sample_memory::SampleMemory;
 use crate::schema::Schema;
 use diagnostics::ParameterError;
@@ -34,6 +35,7 @@ struct InputWire {
 /// An output, wired or not.
 struct OutputWire {
     schema: &'static Schema,
+    is_forwarded: bool,
     /// Topic and its period.
     topic: Option<(usize, u32)>,
 }
@@ -42,25 +44,35 @@ struct OutputWire {
 pub type Sample = (usize, Vec<u8>);
 
 impl NodeHarness {
-    /// Node number `node` of `plan`, which is one of `component`.
+    /// Node number `node` of `plan`, which is one of `component`; what it forwards are messages of `components`.
     ///
     /// # Errors
     /// As [`Component::new`](crate::Component::new).
-    pub fn new(component: &Registration, plan: &Plan, node: usize) -> Result<Self, ParameterError> {
+    pub fn new(
+        component: &Registration,
+        components: &'static [Registration],
+        plan: &Plan,
+        node: usize,
+    ) -> Result<Self, ParameterError> {
         let node = &plan.nodes[node];
-        let made = component.make_for(plan, node)?;
-        let topic = |port: &PortSpec| {
-            let output = node.outputs.iter().find(|output| output.port == port.name)?;
-            Some((output.topic, plan.topics[output.topic].period_ticks))
+        let mut made = component.make_for(plan, node)?;
+        let wire = |name: &str, schema: &'static Schema, is_forwarded: bool| {
+            let output = node.outputs.iter().find(|output| output.port == name);
+            let topic = output.map(|output| (output.topic, plan.topics[output.topic].period_ticks));
+            OutputWire { schema, is_forwarded, topic }
         };
-        let outputs =
-            component.outputs.iter().map(|port| OutputWire { schema: port.schema, topic: topic(port) });
+        let forwarded = forwarded(component, components, plan, node)?;
+        let declared = component.outputs.iter().map(|port| wire(port.name, port.schema, false));
+        let outputs = declared.chain(forwarded.iter().map(|(name, schema)| wire(name, schema, true)));
+        if !forwarded.is_empty() {
+            connect(&mut *made, &forwarded)?;
+        }
         Ok(Self {
             state: made.initial(),
             state_bytes: component.state_bytes(),
             component: made,
             tick_ns: plan.tick_ns,
-            inputs: inputs(component, node)?,
+            inputs: inputs(component, node, &forwarded)?,
             outputs: outputs.collect(),
         })
     }
@@ -102,6 +114,7 @@ impl NodeHarness {
         let due = self.outputs.iter().zip(sent.samples).filter_map(|(wire, words)| {
             let (topic, period_ticks) = wire.topic?;
             let words = words.filter(|_| tick.is_multiple_of(period_ticks))?;
+            let time_ns = (!wire.is_forwarded).then_some(time_ns);
             Some((topic, stamped(words, wire.schema, time_ns)))
         });
         Ok(due.collect())
@@ -114,8 +127,41 @@ impl std::fmt::Debug for NodeHarness {
     }
 }
 
+/// A name and the message that is forwarded under it.
+type Forwarded<'a> = (&'a str, &'static Schema);
+
+/// What a node forwards, by name.
+fn forwarded<'a>(
+    component: &Registration,
+    components: &'static [Registration],
+    plan: &Plan,
+    node: &'a NodePlan,
+) -> Result<Vec<Forwarded<'a>>, ParameterError> {
+    let Inputs::Forwarded { .. } = component.inputs else { return Ok(Vec::new()) };
+    let of = |input: &'a InputPlan| {
+        let type_name = &plan.topics[input.topic].type_name;
+        let schema = message_of(components, type_name);
+        let unknown = || ParameterError::conflict(&input.port, format!("nobody knows {type_name}"));
+        Ok((input.port.as_str(), schema.ok_or_else(unknown)?))
+    };
+    let mut all = node.inputs.iter().map(of).collect::<Result<Vec<_>, ParameterError>>()?;
+    all.sort_unstable_by_key(|(name, _)| *name);
+    Ok(all)
+}
+
+/// Tells a component what it forwards.
+fn connect(component: &mut dyn Stepper, forwarded: &[Forwarded<'_>]) -> Result<(), ParameterError> {
+    let all: Vec<_> = forwarded.iter().map(|(name, schema)| (*name, Announcement::of(schema))).collect();
+    let all: Vec<_> = all.iter().map(|(name, announcement)| (*name, announcement)).collect();
+    component.connected(&all).map_err(|reason| ParameterError::conflict("", reason))
+}
+
 /// The inputs of the node, in the order in which the component declares them.
-fn inputs(component: &Registration, node: &NodePlan) -> Result<Vec<Option<InputWire>>, ParameterError> {
+fn inputs(
+    component: &Registration,
+    node: &NodePlan,
+    forwarded: &[Forwarded<'_>],
+) -> Result<Vec<Option<InputWire>>, ParameterError> {
     let wire = |name: &str, schema: &Schema| {
         let Some(input) = node.inputs.iter().find(|input| input.port == name) else { return Ok(None) };
         let initial = input.initial.as_ref().map(|value| initial::sample(schema, value)).transpose();
@@ -129,6 +175,7 @@ fn inputs(component: &Registration, node: &NodePlan) -> Result<Vec<Option<InputW
             names.sort_unstable();
             names.into_iter().map(|name| wire(name, schema)).collect()
         }
+        Inputs::Forwarded { .. } => forwarded.iter().map(|&(name, schema)| wire(name, schema)).collect(),
         Inputs::Any => {
             Err(ParameterError::conflict("", "what takes any messages learns their types from a run"))
         }
@@ -142,9 +189,9 @@ fn words_of(cdr: &[u8]) -> Box<[u64]> {
     words
 }
 
-/// The CDR bytes of a sample, stamped as the bus stamps it.
-fn stamped(mut words: Box<[u64]>, schema: &Schema, time_ns: u64) -> Vec<u8> {
-    if let Some(offset) = schema.stamp_offset() {
+/// The CDR bytes of a sample, stamped as the bus stamps it where it stamps it at all.
+fn stamped(mut words: Box<[u64]>, schema: &Schema, time_ns: Option<u64>) -> Vec<u8> {
+    if let (Some(offset), Some(time_ns)) = (schema.stamp_offset(), time_ns) {
         let body: &mut [u8] = bytemuck::cast_slice_mut(&mut words[1..]);
         body[offset..offset + size_of::<Time>()].copy_from_slice(bytemuck::bytes_of(&Time::from_ns(time_ns)));
     }

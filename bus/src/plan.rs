@@ -1,5 +1,6 @@
 //! The resolved plan of a run: what the launcher writes and every process of the run reads.
 
+use crate::computing_time::ComputingTime;
 use crate::error::BusError;
 use crate::json_file;
 use serde::{Deserialize, Serialize};
@@ -100,6 +101,9 @@ pub struct NodePlan {
     /// Whether another process is started in its place when it dies: its publishers then keep enough history.
     #[serde(default)]
     pub restarts: bool,
+    /// How long its steps take, where that is simulated.
+    #[serde(default)]
+    pub computing_time: Option<ComputingTime>,
 }
 
 impl NodePlan {
@@ -266,7 +270,8 @@ impl NodePlan {
     pub(crate) fn for_test(name: &str, inputs: Vec<InputPlan>, outputs: Vec<OutputPlan>) -> Self {
         let (wait, parameters) = (Wait::Block, serde_json::Value::Null);
         let (name, restarts) = (name.to_owned(), false);
-        Self { name, period_ticks: 1, wait, cpu: None, inputs, outputs, parameters, restarts }
+        let computing_time = None;
+        Self { name, period_ticks: 1, wait, cpu: None, inputs, outputs, parameters, restarts, computing_time }
     }
 }
 

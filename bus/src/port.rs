@@ -2,7 +2,7 @@
 
 use crate::error::BusError;
 use crate::finite::{Floats, field_at};
-use crate::message::{cdr_bytes, message_bytes};
+use crate::message::{cdr_bytes, message_bytes, sample_words};
 use crate::messages::Time;
 use crate::plan::{InputPlan, OutputPlan, TopicPlan};
 use crate::schema::Schema;
@@ -270,6 +270,8 @@ pub(crate) struct OutPort {
     schema: &'static Schema,
     floats: Floats,
     stamp_offset: Option<usize>,
+    /// Whether a sample is taken at ticks at which none is sent: its node's steps take time, and send later.
+    is_timed: bool,
     pub(crate) topic: usize,
     pub(crate) period_ticks: u32,
     /// The tick from which on the samples count; before it they are a shadow's.
@@ -296,6 +298,7 @@ impl OutPort {
             schema,
             floats: Floats::of(schema),
             stamp_offset: schema.stamp_offset(),
+            is_timed: false,
             topic: output.topic,
             period_ticks: topic.period_ticks,
             counts_from: 0,
@@ -304,8 +307,44 @@ impl OutPort {
         }
     }
 
+    /// The same port, whose samples are others' messages and keep the stamps of their senders.
+    pub(crate) fn keeping_stamps(self) -> Self {
+        Self { stamp_offset: None, ..self }
+    }
+
+    /// Has the port take a sample at every step.
+    pub(crate) fn set_timed(&mut self) {
+        self.is_timed = true;
+    }
+
+    /// Words of a sample.
+    pub(crate) fn sample_words(&self) -> usize {
+        sample_words(self.schema.size)
+    }
+
     pub(crate) fn is_due(&self, tick: u32) -> bool {
         tick.is_multiple_of(self.period_ticks)
+    }
+
+    /// Whether a step at `tick` writes a sample.
+    pub(crate) fn takes(&self, tick: u32) -> bool {
+        self.is_timed || self.is_due(tick)
+    }
+
+    /// What the step at `tick` wrote.
+    ///
+    /// # Errors
+    /// If it left an output unwritten that was due.
+    pub(crate) fn written(&mut self, tick: u32, node: &str) -> Result<Option<&[u64]>, BusError> {
+        if !self.is_written && self.is_due(tick) {
+            return Err(self.unwritten(node, tick));
+        }
+        let loan = self.loan.as_mut().filter(|_| self.is_written);
+        Ok(loan.map(|loan| &*loan.words()))
+    }
+
+    fn unwritten(&self, node: &str, tick: u32) -> BusError {
+        BusError::UnwrittenOutput { node: node.to_owned(), port: self.port.clone(), tick }
     }
 
     /// Whether a sample is sent at `tick`.
@@ -352,7 +391,7 @@ impl OutPort {
         node: &str,
     ) -> Result<(), BusError> {
         let Some(mut loan) = self.loan.take().filter(|_| self.is_written) else {
-            return Err(BusError::UnwrittenOutput { node: node.to_owned(), port: self.port.clone(), tick });
+            return Err(self.unwritten(node, tick));
         };
         self.is_written = false;
         if let Some(found) = self.floats.first_not_finite(message_bytes(loan.words(), self.schema.size)) {

@@ -40,6 +40,12 @@ pub enum Inputs {
     Many(&'static Schema),
     /// Any topics; all of the run where the manifest names none.
     Any,
+    /// One or more of any message without text, under names that the manifest chooses, each a tick late; the component
+    /// has an output of the same name and message for each.
+    Forwarded {
+        /// Bytes that a message may have.
+        bytes_max: usize,
+    },
 }
 
 /// The inputs of a component at one tick; implement it with `#[derive(bus::InputPorts)]`.
@@ -129,13 +135,27 @@ impl<'a> InputSamples<'a> {
     }
 }
 
-/// Where the samples of a step are written, by the numbers of its ports.
+/// Where the samples of a step are written, by the numbers of its ports: the declared ones first, then those of
+/// [`Inputs::Forwarded`] in the order of their names.
 pub struct OutputSamples<'a>(pub(crate) &'a mut dyn SampleSink);
 
 /// Where samples go: the bus, or whoever steps a component without it.
 pub(crate) trait SampleSink {
     /// The words of a port's sample; `None` where that is not wired or not due.
     fn words(&mut self, port: usize) -> Result<Option<&mut [u64]>, BusError>;
+}
+
+impl OutputSamples<'_> {
+    /// Writes a message as bytes to port `port`, where that is wired and due.
+    ///
+    /// # Errors
+    /// If shared memory cannot be had.
+    pub fn write_bytes(&mut self, port: usize, message: &[u8]) -> Result<(), BusError> {
+        if let Some(words) = self.0.words(port)? {
+            bytemuck::cast_slice_mut(&mut words[1..])[..message.len()].copy_from_slice(message);
+        }
+        Ok(())
+    }
 }
 
 impl std::fmt::Debug for OutputSamples<'_> {
@@ -295,3 +315,28 @@ impl<'a> InputPorts<'a> for AnyInputs<'a> {
         Self(samples)
     }
 }
+
+/// The inputs of a component that forwards messages as bytes, in the order of their names; what it makes of them it sends
+/// on outputs of the same names ([`OutputSamples::write_bytes`]), and a message keeps the stamp of its first sender.
+#[derive(Clone, Copy, Debug)]
+pub struct ForwardedInputs<'a>(InputSamples<'a>);
+
+impl<'a> ForwardedInputs<'a> {
+    /// The newest sample of input `input` as bytes, up to seven zeros behind the message: at tick 0 the initial value.
+    #[must_use]
+    pub fn newest(&self, input: usize) -> &'a [u8] {
+        self.0.0.words(input).map_or(&[], |words| bytemuck::cast_slice(&words[1..]))
+    }
+}
+
+impl<'a> InputPorts<'a> for ForwardedInputs<'a> {
+    /// Room for every message but tables of many vehicles.
+    const DECLARED: Inputs = Inputs::Forwarded { bytes_max: FORWARDED_BYTES_MAX };
+
+    fn read(samples: InputSamples<'a>) -> Self {
+        Self(samples)
+    }
+}
+
+/// Bytes that a forwarded message has at most.
+pub const FORWARDED_BYTES_MAX: usize = 192;

@@ -88,10 +88,16 @@ impl Registration {
         let (inputs, one) = match self.inputs {
             Inputs::Ports(ports) => (ports, None),
             Inputs::Many(schema) => (&[] as &[_], Some(schema)),
-            Inputs::Any => (&[] as &[_], None),
+            Inputs::Any | Inputs::Forwarded { .. } => (&[] as &[_], None),
         };
         inputs.iter().chain(self.outputs).map(|port| port.schema).chain(one)
     }
+}
+
+/// The message called `type_name` among those of `components`.
+#[must_use]
+pub fn message_of(components: &'static [Registration], type_name: &str) -> Option<&'static Schema> {
+    components.iter().flat_map(Registration::messages).find(|schema| schema.type_name == type_name)
 }
 
 fn make<C: Component>(parameters: &Value, context: &NodeContext<'_>) -> Result<C, ParameterError> {

@@ -19,17 +19,18 @@ use crate::tick::Tick;
 /// # Errors
 /// If the process was not started by a launcher, the manifest and the component do not fit, or as the component says.
 pub fn run_process<C: Component + 'static>() -> Result<(), BusError> {
-    Registration::of::<C>().run(Join::from_environment()?)
+    Registration::of::<C>().run(Join::from_environment()?, &[])
 }
 
 impl Registration {
     /// Runs the component as the node that `join` names, until the run ends or another process has taken its place.
+    /// `components` are those of the program: what a component forwards are messages of theirs.
     ///
     /// # Errors
     /// If the manifest and the component do not fit, a step fails, or the run is aborted.
-    pub fn run(&self, join: Join) -> Result<(), BusError> {
+    pub fn run(&self, join: Join, components: &'static [Registration]) -> Result<(), BusError> {
         let mut node = Node::open(join)?;
-        let wiring = node.declare(self)?;
+        let wiring = node.declare(self, components)?;
         let (plan, node_plan) = node.plan();
         let mut component = self.make_for(plan, node_plan).map_err(|reason| node.error(reason))?;
         let name = node.name().to_owned();
@@ -125,7 +126,7 @@ struct Loans<'a> {
 impl SampleSink for Loans<'_> {
     fn words(&mut self, port: usize) -> Result<Option<&mut [u64]>, BusError> {
         match self.wiring[port].and_then(|index| self.ports.get_mut(index)) {
-            Some(output) if output.is_due(self.tick) => output.words(self.node).map(Some),
+            Some(output) if output.takes(self.tick) => output.words(self.node).map(Some),
             Some(_) | None => Ok(None),
         }
     }

@@ -26,17 +26,20 @@ pub(crate) struct StateRing {
 }
 
 impl StateRing {
-    /// Creates the ring of generation `generation` of node `node`, whose state is `schema`, and announces it.
+    /// Creates the ring of generation `generation` of node `node`, whose state is `schema` with `more_words` of the bus
+    /// behind it, and announces it.
     pub(crate) fn create(
         run_dir: &Path,
         plan: &Plan,
         node: usize,
         generation: u32,
         schema: &Schema,
+        more_words: usize,
     ) -> Result<Self, BusError> {
-        let map = shared_file::create(&ring_path(plan, node, generation), ring_bytes(plan, schema))?;
+        let state_words = schema.size.div_ceil(8) + more_words;
+        let map = shared_file::create(&ring_path(plan, node, generation), ring_bytes(plan, state_words))?;
         Announcement::of(schema).store(&announcement_path(run_dir, node, generation))?;
-        Ok(Self::of(plan, schema, map))
+        Ok(Self { map, entries: entries(plan), state_words })
     }
 
     /// Opens the ring of a process that flies; `None` where it states no state, or one of another type.
@@ -46,18 +49,16 @@ impl StateRing {
         node: usize,
         generation: u32,
         schema: &Schema,
+        more_words: usize,
     ) -> Result<Option<Self>, BusError> {
         let announced = announcement_path(run_dir, node, generation);
         if !announced.exists() || Announcement::load(&announced)?.layout_hash != schema.layout_hash() {
             return Ok(None);
         }
         let path = ring_path(plan, node, generation);
-        let map = shared_file::open(&path, ring_bytes(plan, schema), "the states of a process")?;
-        Ok(Some(Self::of(plan, schema, map)))
-    }
-
-    fn of(plan: &Plan, schema: &Schema, map: MmapRaw) -> Self {
-        Self { map, entries: entries(plan), state_words: schema.size.div_ceil(8) }
+        let state_words = schema.size.div_ceil(8) + more_words;
+        let map = shared_file::open(&path, ring_bytes(plan, state_words), "the states of a process")?;
+        Ok(Some(Self { map, entries: entries(plan), state_words }))
     }
 
     /// Publishes `state` as that at the start of `tick`.
@@ -113,8 +114,8 @@ fn entries(plan: &Plan) -> usize {
     (plan.window_ticks + longest + 2) as usize
 }
 
-fn ring_bytes(plan: &Plan, schema: &Schema) -> usize {
-    entries(plan) * (TICK_BYTES + schema.size.div_ceil(8) * 8)
+fn ring_bytes(plan: &Plan, state_words: usize) -> usize {
+    entries(plan) * (TICK_BYTES + state_words * 8)
 }
 
 fn ring_path(plan: &Plan, node: usize, generation: u32) -> PathBuf {

@@ -61,7 +61,7 @@ impl Tick<'_> {
     /// # Errors
     /// If shared memory cannot be had.
     pub fn write<T: Message>(&mut self, output: Output<T>, message: T) -> Result<(), BusError> {
-        if self.is_due(output) {
+        if self.outputs[output.index].takes(self.tick) {
             *self.in_place(output)? = message;
         }
         Ok(())

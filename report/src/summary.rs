@@ -38,6 +38,8 @@ pub struct Summary {
     pub missed_deadlines: u32,
     /// The processes.
     pub processes: Vec<ProcessSummary>,
+    /// Processes whose steps take simulated time.
+    pub computing_times: Vec<OverrunSummary>,
     /// The recording.
     pub recording: Option<PathBuf>,
     /// Pass conditions.
@@ -71,6 +73,30 @@ pub struct ProcessSummary {
     pub late: u32,
 }
 
+/// What became of the steps of a process whose computing time is simulated; its text is a line of the summary.
+///
+/// ```
+/// use report::summary::OverrunSummary;
+/// let controller = OverrunSummary { name: "controller".to_owned(), overruns: 2, skipped_steps: 9 };
+/// assert_eq!(controller.to_string(), "  computing time of `controller`: 2 steps overran, 9 were skipped");
+/// ```
+#[derive(Debug, Serialize)]
+pub struct OverrunSummary {
+    /// Name of the process.
+    pub name: String,
+    /// Steps that were not done when the next was due.
+    pub overruns: u32,
+    /// Steps that were skipped therefore.
+    pub skipped_steps: u32,
+}
+
+impl fmt::Display for OverrunSummary {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { name, overruns, skipped_steps } = self;
+        write!(f, "  computing time of `{name}`: {overruns} steps overran, {skipped_steps} were skipped")
+    }
+}
+
 impl Summary {
     /// The summary of `outcome`, with nothing judged yet, of a run of `manifest` with ticks of `tick_s`.
     ///
@@ -83,6 +109,7 @@ impl Summary {
     ///     host_s: 0.5,
     ///     missed_deadlines: 0,
     ///     processes: vec![("plant".to_owned(), 0.25, 0)],
+    ///     overruns: Vec::new(),
     ///     replacements: Vec::new(),
     ///     flight: None,
     /// };
@@ -95,6 +122,7 @@ impl Summary {
         let replacement = |report| Replacement { report, steps: Vec::new() };
         let replacements: Vec<_> = outcome.replacements.into_iter().map(replacement).collect();
         let process = |(name, cpu_share, late)| ProcessSummary { name, cpu_share, late };
+        let overruns = |(name, overruns, skipped_steps)| OverrunSummary { name, overruns, skipped_steps };
         Self {
             manifest,
             passed: !outcome.was_stopped && !replacements.iter().any(Replacement::has_failed),
@@ -106,6 +134,7 @@ impl Summary {
             stopped_early: outcome.was_stopped,
             missed_deadlines: outcome.missed_deadlines,
             processes: outcome.processes.into_iter().map(process).collect(),
+            computing_times: outcome.overruns.into_iter().map(overruns).collect(),
             recording: None,
             pass: Vec::new(),
             compare: Vec::new(),
@@ -162,6 +191,7 @@ impl fmt::Display for Summary {
         }
         let share = |process: &ProcessSummary| format!("{} {:.0} %", process.name, process.cpu_share * 100.0);
         writeln!(f, "  cpu: {}", self.processes.iter().map(share).collect::<Vec<_>>().join(", "))?;
+        self.computing_times.iter().try_for_each(|overruns| writeln!(f, "{overruns}"))?;
         self.write_replacements(f)?;
         self.shadows.iter().try_for_each(|difference| writeln!(f, "{difference}"))?;
         self.compare.iter().try_for_each(|errors| writeln!(f, "{errors}"))?;

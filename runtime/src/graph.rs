@@ -2,6 +2,7 @@
 //!
 //! - `processes`: what each process executes, and how it runs on the host
 //! - `outputs`, `inputs`, `wiring`: topics and edges
+//! - `computing_time`: how long steps take
 //! - `parameters`, `recorders`: what each node is given
 //! - `periods`: nodes and outputs that compute once or never count on
 //! - `ranges`: ranges of numbers by their units
@@ -9,6 +10,7 @@
 //! - `backups`: who shadows, takes over or stands by
 
 mod backups;
+mod computing_time;
 mod evaluations;
 mod inputs;
 mod outputs;

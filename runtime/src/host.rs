@@ -126,20 +126,19 @@ pub(crate) struct Thread {
 }
 
 impl Thread {
-    /// Starts `component` as instance `generation` of `node`; the clock where there is no component.
+    /// Starts `component`, one of `components`, as the instance that `join` names; the clock where there is no component.
     pub fn start(
         component: Option<&'static Registration>,
-        run_dir: PathBuf,
-        node: &str,
-        generation: u32,
+        components: &'static [Registration],
+        join: Join,
         control: Arc<SupervisorView>,
     ) -> Result<Self> {
         let is_cancelled = Arc::new(AtomicBool::new(false));
-        let join = Join { run_dir, node: node.to_owned(), generation };
-        let hosted = Hosted { join: join.clone(), is_cancelled: is_cancelled.clone() };
-        let thread = std::thread::Builder::new().name(node.to_owned()).stack_size(STACK_BYTES);
+        let (node, hosted) =
+            (join.node.clone(), Hosted { join: join.clone(), is_cancelled: is_cancelled.clone() });
+        let thread = std::thread::Builder::new().name(node.clone()).stack_size(STACK_BYTES);
         let handle = thread.spawn(move || {
-            hosted.run(|| component.map_or_else(bus::clock::run, |component| component.run(join)))
+            hosted.run(|| component.map_or_else(bus::clock::run, |component| component.run(join, components)))
         });
         let handle = handle.with_context(|| format!("process `{node}`: cannot start a thread"))?;
         Ok(Self { handle: Some(handle), is_cancelled, control })

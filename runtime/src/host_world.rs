@@ -13,13 +13,13 @@ use crate::program::{BackupSpec, Program, Readiness};
 use crate::role::Role;
 use crate::spawn;
 use crate::view::{SegmentWrite, View};
-use crate::world::{Body, World};
+use crate::world::{Body, Spent, World};
 use anyhow::{Context, Result};
-use bus::BusError;
 use bus::host_time::monotonic_ns;
 use bus::lockstep::SupervisorView;
 use bus::membership::Membership;
 use bus::plan::{InputPlan, NodePlan, Plan};
+use bus::{BusError, Join};
 use diagnostics::Diagnostic;
 use std::collections::BTreeMap;
 use std::collections::btree_map::Entry;
@@ -107,8 +107,10 @@ impl World for HostWorld<'_> {
         self.control.wait_for_notice(notices, timeout);
     }
 
-    fn spent(&self, slot: usize) -> (u64, u32) {
-        (self.control.cpu_ns(slot), self.control.late_count(slot))
+    fn spent(&self, slot: usize) -> Spent {
+        let [overruns, skipped_steps] = self.control.overruns(slot);
+        let (cpu_ns, late) = (self.control.cpu_ns(slot), self.control.late_count(slot));
+        Spent { cpu_ns, late, overruns, skipped_steps }
     }
 
     fn start(&mut self, name: &str, role: Role, program: Option<&Program>) -> Result<HostBody> {
@@ -127,8 +129,10 @@ impl World for HostWorld<'_> {
             Host::InProcess => {
                 program.map_or(Ok(()), |program| self.host.require(name, program))?;
                 let component = program.and_then(Program::component);
-                let (dir, control) = (run_dir.to_owned(), self.control.clone());
-                let thread = Thread::start(component, dir, name, role.generation(), control)?;
+                let components = self.manifest.registry().components();
+                let (run_dir, node) = (run_dir.to_owned(), name.to_owned());
+                let join = Join { run_dir, node, generation: role.generation() };
+                let thread = Thread::start(component, components, join, self.control.clone())?;
                 (Running::Thread(thread), PathBuf::new())
             }
         };

@@ -13,6 +13,7 @@ use crate::outputs::Outputs;
 pub use crate::replacement::{Purpose, Report};
 use crate::run_dir::RunDir;
 use crate::supervision::Supervisor;
+use crate::world::Spent;
 use anyhow::{Context, Result};
 use bus::lockstep::SupervisorView;
 use bus::plan::Plan;
@@ -35,6 +36,9 @@ pub struct Outcome {
     pub missed_deadlines: u32,
     /// Per process: name, processor share of one core, deadlines at which it was late.
     pub processes: Vec<(String, f64, u32)>,
+    /// Per process whose steps take simulated time: name, steps that took longer than to its next due tick, and due ticks
+    /// without a step.
+    pub overruns: Vec<(String, u32, u32)>,
     /// What became of backups.
     pub replacements: Vec<Report>,
     /// The host times that the processes noted, in a run that is profiled.
@@ -263,8 +267,13 @@ fn outcome(plan: &Plan, control: &SupervisorView, supervisor: &Supervisor<'_, Ho
     let clock = ("clock".to_owned(), share(control.clock_cpu_ns()), 0);
     let nodes = plan.nodes.iter().enumerate();
     let nodes = nodes.map(|(index, node)| {
-        let (cpu_ns, late) = supervisor.spent_by(index);
+        let Spent { cpu_ns, late, .. } = supervisor.spent_by(index);
         (node.name.clone(), share(cpu_ns), late)
+    });
+    let timed = plan.nodes.iter().enumerate().filter(|(_, node)| node.computing_time.is_some());
+    let overruns = timed.map(|(index, node)| {
+        let Spent { overruns, skipped_steps, .. } = supervisor.spent_by(index);
+        (node.name.clone(), overruns, skipped_steps)
     });
     Outcome {
         ticks: control.completed_ticks(),
@@ -272,6 +281,7 @@ fn outcome(plan: &Plan, control: &SupervisorView, supervisor: &Supervisor<'_, Ho
         host_s,
         missed_deadlines: control.missed_deadlines(),
         processes: std::iter::once(clock).chain(nodes).collect(),
+        overruns: overruns.collect(),
         replacements: Vec::new(),
         flight: None,
     }

@@ -52,7 +52,9 @@ use registry::Registry;
 pub fn node(name: &str, registry: Registry) -> anyhow::Result<()> {
     let ended = match (name, registry.find(name)) {
         ("clock", _) => bus::clock::run(),
-        (_, Some(component)) => Join::from_environment().and_then(|join| component.run(join)),
+        (_, Some(component)) => {
+            Join::from_environment().and_then(|join| component.run(join, registry.components()))
+        }
         (_, None) => anyhow::bail!("no kind `{name}`; there are {}", registry.names()),
     };
     match ended {

@@ -23,7 +23,7 @@ mod tree;
 
 pub use builder::ManifestBuilder;
 pub use content::{Comparison, Content, PaceSetting, PassCondition, Statistic};
-pub(crate) use content::{InputSetting, OutputSetting, Process, SwapSetting};
+pub(crate) use content::{ComputingTimeSetting, InputSetting, OutputSetting, Process, SwapSetting};
 
 pub(crate) use sets::is_name;
 

@@ -23,6 +23,12 @@ impl Registry {
         Self(components)
     }
 
+    /// All components, as a node of a run is given them.
+    #[must_use]
+    pub const fn components(&self) -> &'static [Registration] {
+        self.0
+    }
+
     /// All components.
     pub fn iter(&self) -> impl Iterator<Item = &'static Registration> {
         self.0.iter()
@@ -51,6 +57,6 @@ impl Registry {
     /// The message whose type is called `type_name`.
     #[must_use]
     pub fn message(&self, type_name: &str) -> Option<&'static Schema> {
-        self.iter().flat_map(Registration::messages).find(|schema| schema.type_name == type_name)
+        bus::message_of(self.0, type_name)
     }
 }

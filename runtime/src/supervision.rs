@@ -21,7 +21,7 @@ use crate::sidecars::Sidecars;
 use crate::supervisor::{Action, Event, State};
 use crate::view::{Command, SegmentWrite};
 use crate::watch_clock::WatchClock;
-use crate::world::{Body, World};
+use crate::world::{Body, Spent, World};
 use anyhow::{Result, anyhow};
 use bus::plan::{Plan, SLOTS_PER_NODE};
 use std::time::Duration;
@@ -56,7 +56,7 @@ pub struct Supervisor<'a, W: World> {
     world: W,
     clock: WatchClock,
     /// Per node: processor time in nanoseconds, and deadlines missed, of the instances that have left.
-    spent: Vec<(u64, u32)>,
+    spent: Vec<Spent>,
     /// Swaps that were asked for and have not come to their end: the request, and where its answer goes.
     swaps: Vec<(u32, W::Reply)>,
     requests: u32,
@@ -93,7 +93,7 @@ impl<'a, W: World> Supervisor<'a, W> {
             sidecars: Sidecars::new(),
             clock: WatchClock::new(world.now()),
             world,
-            spent: vec![(0, 0); plan.nodes.len()],
+            spent: vec![Spent::default(); plan.nodes.len()],
             swaps: Vec::new(),
             requests: 0,
             stop,
@@ -259,7 +259,7 @@ impl<'a, W: World> Supervisor<'a, W> {
 
     /// Removes what a process that has ended left behind, and frees its slot.
     fn free(&mut self, node: usize, generation: u32, slot: usize) {
-        self.spent[node] = sum(self.spent[node], self.world.spent(slot));
+        self.spent[node] = self.spent[node].plus(self.world.spent(slot));
         self.world.write(SegmentWrite::Clear(slot));
         let process = self.processes.of(node, generation);
         let end = process.and_then(|process| process.end.as_ref());
@@ -267,10 +267,10 @@ impl<'a, W: World> Supervisor<'a, W> {
         self.processes.forget(node, generation);
     }
 
-    /// Processor time in nanoseconds, and deadlines missed, of all instances of `node`.
-    pub fn spent_by(&self, node: usize) -> (u64, u32) {
+    /// What all instances of `node` have spent.
+    pub fn spent_by(&self, node: usize) -> Spent {
         let slots = (0..SLOTS_PER_NODE).map(|slot| slot * self.plan.nodes.len() + node);
-        slots.map(|slot| self.world.spent(slot)).fold(self.spent[node], sum)
+        slots.map(|slot| self.world.spent(slot)).fold(self.spent[node], Spent::plus)
     }
 
     /// Bounds the lengths of logs, and reaps orphans that have ended: they would stay in the table of processes for the
@@ -321,8 +321,4 @@ impl<'a, W: World> Supervisor<'a, W> {
             self.say(&format!("cannot end all processes: {error:#}"));
         }
     }
-}
-
-fn sum(a: (u64, u32), b: (u64, u32)) -> (u64, u32) {
-    (a.0 + b.0, a.1 + b.1)
 }

@@ -13,6 +13,31 @@ use bus::plan::{InputPlan, NodePlan};
 use diagnostics::Diagnostic;
 use std::time::Duration;
 
+/// What an instance of a node has spent.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Spent {
+    /// Processor time.
+    pub cpu_ns: u64,
+    /// Deadlines at which it was late.
+    pub late: u32,
+    /// Steps that took longer, in simulated time, than to its next due tick.
+    pub overruns: u32,
+    /// Due ticks without a step.
+    pub skipped_steps: u32,
+}
+
+impl Spent {
+    /// The sum of two.
+    pub fn plus(self, other: Self) -> Self {
+        Self {
+            cpu_ns: self.cpu_ns + other.cpu_ns,
+            late: self.late + other.late,
+            overruns: self.overruns + other.overruns,
+            skipped_steps: self.skipped_steps + other.skipped_steps,
+        }
+    }
+}
+
 /// What is outside a supervisor.
 pub trait World {
     /// A started process.
@@ -33,8 +58,8 @@ pub trait World {
     fn notices(&self) -> u32;
     /// Sleeps until there is something to look at since `notices`, at most `timeout`.
     fn wait(&mut self, notices: u32, timeout: Duration);
-    /// Processor time in nanoseconds, and deadlines missed, of the instance in `slot`.
-    fn spent(&self, slot: usize) -> (u64, u32);
+    /// What the instance in `slot` has spent.
+    fn spent(&self, slot: usize) -> Spent;
 
     /// Starts a process; the clock where there is no program.
     ///

@@ -14,6 +14,7 @@
 //! - [`complementary`]: attitude from an IMU's readings.
 //! - [`ekf`]: position, velocity and attitude from an IMU, GPS or motion capture, barometer, magnetometer.
 //! - [`range_inertial`]: velocity, height and walls from range finders, an IMU and an attitude.
+//! - [`link`], `line`: a data link, and the line that its streams share.
 //! - `steps`: what is left of a value at a resolution; `wire`: the vectors of messages as those of nalgebra.
 //! - `testing`: what the tests of sensors share.
 #![forbid(unsafe_code)]
@@ -40,6 +41,8 @@ pub mod ekf;
 pub mod gps;
 pub mod imu;
 pub mod imu_model;
+mod line;
+pub mod link;
 pub mod magnetometer;
 pub mod mocap;
 pub mod noise;

@@ -50,8 +50,11 @@ fn row(component: &Registration) -> String {
         Inputs::Ports(ports) => listed(ports.iter().map(port)),
         Inputs::Many(schema) => format!("any number of {}", type_name(schema)),
         Inputs::Any => "any topics".to_owned(),
+        Inputs::Forwarded { bytes_max } => format!("any topics of at most {bytes_max} bytes"),
     };
-    let outputs = listed(component.outputs.iter().map(port));
+    let forwarded = matches!(component.inputs, Inputs::Forwarded { .. });
+    let forwarded = forwarded.then(|| "each input's topic".to_owned());
+    let outputs = listed(component.outputs.iter().map(port).chain(forwarded));
     let parameters = listed(parameters(component).iter().map(|name| format!("`{name}`")));
     let state = match component.transfer {
         Transfer::Message(schema) => type_name(schema),
@@ -67,6 +70,7 @@ fn json(component: &Registration) -> Value {
         Inputs::Ports(declared) => json!(ports(declared)),
         Inputs::Many(schema) => json!({ "any_number_of": schema.type_name }),
         Inputs::Any => json!("any"),
+        Inputs::Forwarded { bytes_max } => json!({ "forwarded_bytes_max": bytes_max }),
     };
     let state = match component.transfer {
         Transfer::Message(schema) => json!(schema.type_name),

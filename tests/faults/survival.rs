@@ -5,7 +5,7 @@ use crate::campaign;
 use crate::flight::{Reference, Watched, messages, records, write_manifest};
 use crate::kill_points::{Blow, EDGES, GUARD_TICKS, Moment, signal_name, words_of};
 use crate::saboteur::{FAULT_VARIABLE, Fault, GENERATIONS_VARIABLE, TICK_VARIABLE};
-use crate::support::{Ended, Launch, Place, partial};
+use crate::support::{Ended, Launch, Place, partial, repository};
 use rand_core::Rng;
 use rustix::process::{Signal, kill_process};
 use serde_json::Value;
@@ -287,5 +287,22 @@ fn require_replaced(case: &Case, ended: &Ended) {
             let ticks = flew.iter().filter(|succession| of_victim(succession));
             assert!(ticks.map(|succession| &succession["take_over_tick"]).any(|tick| *tick == case.tick()));
         }
+    }
+}
+
+/// The thesis's two processors: where the law of one dies or hangs, the other's simpler one flies on; the manifest's own
+/// conditions say how.
+#[test]
+fn a_simpler_law_stands_by_for_one_that_dies_or_hangs() {
+    for (signal, tick) in [(Signal::KILL, 4321), (Signal::STOP, 7890)] {
+        let place = Place::new();
+        let manifest = repository("manifests/llp-hlp.toml");
+        let mut launch = place.start(&["run", &manifest, "--record", &place.path("flight.mcap")]);
+        launch.hold_at(tick);
+        kill_process(place.process_of_generation("controller", 0), signal).unwrap();
+        launch.release();
+        let ended = launch.end().with_code(0);
+        ended.says(&[&format!("The standby of `controller` takes over at tick {tick}")]);
+        ended.prints(&["ok     no jump of tilt"]);
     }
 }

@@ -33,6 +33,10 @@ fn manifest(place: &Place) -> String {
         "include = [{include:?}]\n[run]\nduration_s = {}\n\
          [process.plant]\noutputs.pose = {{}}\noutputs.tf = {{}}\n\
          [process.range]\ninputs.traffic = \"/traffic/traffic\"\n\
+         [process.link]\nkind = \"link\"\n\
+         inputs.gps = {{ topic = \"/gps/gps\", delay_ticks = 1, initial = {{}} }}\n\
+         inputs.state = {{ topic = \"/plant/state\", delay_ticks = 1, initial = {{}} }}\n\
+         parameters = {{ loss = 0.2, jitter_ms = 5.0 }}\nparameters.streams.state = {{ rate_hz = 25.0 }}\n\
          [process.traffic]\nkind = \"traffic\"\ninputs.one = \"/plant/state\"\n\
          [process.clearance]\nkind = \"clearance\"\nscene = {room:?}\ninputs.state = \"/plant/state\"\n\
          [process.hold]\nkind = \"position-hold\"\n\
@@ -118,7 +122,7 @@ impl Recorded {
 
 /// A node stepped from the first tick to the last, and another that goes on from its state amid the run.
 fn require_same(recorded: &Recorded, component: &Registration, node: usize) {
-    let make = || NodeHarness::new(component, &recorded.plan, node).unwrap();
+    let make = || NodeHarness::new(component, COMPONENTS.components(), &recorded.plan, node).unwrap();
     let plan = &recorded.plan.nodes[node];
     let (mut first, mut second) = (make(), make());
     let has_internal_state = matches!(component.transfer, Transfer::Internal);

@@ -105,6 +105,17 @@ fn four_laws_take_over_from_each_other() {
     fly("swap-laws");
 }
 
+#[test]
+fn over_a_serial_radio_good_and_bad() {
+    fly("ground-station");
+    fly("ground-station-radio");
+}
+
+#[test]
+fn by_controllers_whose_steps_take_time() {
+    fly("computing-time");
+}
+
 /// Every way from the plant's truth to a controller leads through a sensor.
 #[test]
 fn no_controller_is_told_the_truth() {
@@ -130,6 +141,9 @@ fn no_controller_is_told_the_truth() {
         "ten-vehicles",
         "figure-eight",
         "swap-laws",
+        "ground-station",
+        "llp-hlp",
+        "computing-time",
     ];
     for manifest in manifests {
         let path = repository(&format!("manifests/{manifest}.toml"));

@@ -110,6 +110,10 @@ cells! {
         late: AtomicU32,
         /// Its process; 0 before it has connected.
         process: AtomicU32,
+        /// Steps whose simulated computing time went beyond the next due tick.
+        overruns: AtomicU32,
+        /// Due ticks at which it still computed, and so did not step.
+        skipped_steps: AtomicU32,
         /// Processor time that it used between its first and its last tick.
         cpu_ns: AtomicU64,
         /// Waiter: it waits for the grant.

@@ -195,6 +195,14 @@ impl LiveView {
         self.segment.slots()[slot].late.load(Relaxed)
     }
 
+    /// Steps of the process in `slot` that took longer, in simulated time, than to its next due tick, and due ticks
+    /// without a step.
+    #[must_use]
+    pub fn overruns(&self, slot: usize) -> [u32; 2] {
+        let cell = &self.segment.slots()[slot];
+        [&cell.overruns, &cell.skipped_steps].map(|count| count.load(Relaxed))
+    }
+
     /// Processor time that the process in `slot` used between tick 0 and its last tick, in nanoseconds.
     #[must_use]
     pub fn cpu_ns(&self, slot: usize) -> u64 {

@@ -142,6 +142,16 @@ impl NodeView {
         count.store(count.load(Relaxed).wrapping_add(1), Relaxed);
     }
 
+    /// Counts a step that is under way beyond the next due tick.
+    pub(crate) fn count_overrun(&self) {
+        self.segment.slots()[self.slot].overruns.fetch_add(1, Relaxed);
+    }
+
+    /// Counts a due tick without a step.
+    pub(crate) fn count_skipped_step(&self) {
+        self.segment.slots()[self.slot].skipped_steps.fetch_add(1, Relaxed);
+    }
+
     /// Counts a gap that this process found in `topic`; it ends the run.
     pub(crate) fn count_gap(&self, topic: usize) {
         self.segment.topics()[topic].gaps.fetch_add(1, Relaxed);

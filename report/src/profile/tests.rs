@@ -37,6 +37,7 @@ fn node(name: &str, period_ticks: u32, inputs: &[(usize, u32)], output: usize) -
         outputs: vec![OutputPlan { port: "out".to_owned(), topic: output }],
         parameters: Value::Null,
         restarts: false,
+        computing_time: None,
     }
 }
 

@@ -8,7 +8,7 @@ use crate::program::{BackupSpec, Executable};
 use crate::replacement::take_over_stride;
 use bus::Registration;
 use bus::plan::{INPUTS_RESERVED, NodePlan, Plan};
-use bus::ports::PortSpec;
+use bus::ports::{Inputs, PortSpec};
 use diagnostics::Diagnostic;
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -108,7 +108,7 @@ impl Run<'_> {
         let name = Spanned::new(span.clone(), self.plan.nodes[node].name.clone());
         let program = program(self.manifest, &name, whole)?;
         if let Executable::Component(kind) = &program.executable {
-            self.require_same_outputs(node, kind, span)?;
+            self.require_same_outputs(node, kind, whole, span)?;
         }
         let process = Process { outputs: self.outputs(node, span), ..whole.clone() };
         let mut declared_nodes = self.declared_nodes.to_vec();
@@ -150,16 +150,24 @@ impl Run<'_> {
         &self,
         node: usize,
         kind: &Registration,
+        whole: &Process,
         span: &Range<usize>,
     ) -> Result<(), Diagnostic> {
+        let forwards = matches!(kind.inputs, Inputs::Forwarded { .. });
+        let forwarded: Vec<&str> =
+            whole.inputs.keys().filter(|_| forwards).map(|port| port.get_ref().as_str()).collect();
         let present = self.plan.nodes[node].outputs.iter();
         let present: Vec<(&str, &str)> = present
             .map(|output| (output.port.as_str(), self.plan.topics[output.topic].type_name.as_str()))
             .collect();
         let offered = |port: &PortSpec| (port.name, port.schema.type_name);
-        let knows = |output: &(&str, &str)| kind.outputs.iter().any(|port| offered(port) == *output);
+        let knows = |output: &(&str, &str)| {
+            kind.outputs.iter().any(|port| offered(port) == *output) || forwarded.contains(&output.0)
+        };
         let adds = |port: &PortSpec| port.required && !present.contains(&offered(port));
-        if present.iter().all(knows) && !kind.outputs.iter().any(adds) {
+        let adds_forwarded = |name: &&str| present.iter().all(|(port, _)| port != name);
+        let adds_any = kind.outputs.iter().any(adds) || forwarded.iter().any(adds_forwarded);
+        if present.iter().all(knows) && !adds_any {
             return Ok(());
         }
         let list = |outputs: Vec<(&str, &str)>| {

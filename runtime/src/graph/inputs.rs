@@ -41,7 +41,7 @@ pub fn inputs(declared: &DeclaredNode<'_>, topics: &[TopicPlan]) -> Result<Vec<I
 /// Refuses inputs that are none of `ports`, and the lack of one that is required.
 fn require_ports(declared: &DeclaredNode<'_>, ports: &[PortSpec]) -> Result<(), Diagnostic> {
     let DeclaredNode { manifest, name, process, .. } = declared;
-    require_known_ports(declared, "input", ports, &process.inputs)?;
+    require_known_ports(declared, "input", ports.iter().map(|port| port.name), &process.inputs)?;
     let is_wired = |port: &PortSpec| process.inputs.keys().any(|wired| wired.get_ref() == port.name);
     let Some(missing) = ports.iter().find(|port| port.required && !is_wired(port)) else { return Ok(()) };
     let (process, input, type_name) = (name.get_ref(), missing.name, missing.schema.type_name);
@@ -80,6 +80,15 @@ fn input(
         }
         (delay, _) => Some((format!("has delay_ticks = {delay}"), "a delay is 0 or 1 tick")),
     };
+    let is_forwarded =
+        program.component().is_some_and(|kind| matches!(kind.inputs, Inputs::Forwarded { .. }));
+    let refused = if is_forwarded && setting.delay_ticks == 0 {
+        let help = "write { topic = …, delay_ticks = 1, initial = { … } }: nothing is forwarded in no time, and until the \
+                    first message has come the output is the initial value";
+        Some(("is forwarded and has no delay".to_owned(), help))
+    } else {
+        refused
+    };
     if let Some((what, help)) = refused {
         return Err(at(format!("{who} {what}"), help.to_owned()));
     }
@@ -104,7 +113,7 @@ fn expected_type(program: &Program, port: &str) -> Option<&'static str> {
             Some(ports.iter().find(|spec| spec.name == port).map_or("", |spec| spec.schema.type_name))
         }
         Inputs::Many(schema) => Some(schema.type_name),
-        Inputs::Any => None,
+        Inputs::Any | Inputs::Forwarded { .. } => None,
     }
 }
 

@@ -3,8 +3,9 @@
 use super::processes::{DeclaredNode, period_ticks};
 use crate::manifest::{Manifest, OutputSetting, Process};
 use crate::program::Executable;
+use bus::Registration;
 use bus::plan::{OutputPlan, TopicPlan};
-use bus::ports::PortSpec;
+use bus::ports::{Inputs, PortSpec};
 use bus::schema::Schema;
 use diagnostics::{Diagnostic, did_you_mean};
 use std::collections::BTreeMap;
@@ -17,6 +18,8 @@ pub struct Published {
     pub node: usize,
     /// What it becomes in the plan.
     pub topic: TopicPlan,
+    /// The topic whose messages it forwards, if it does: theirs is its type.
+    forwards: Option<String>,
     port: String,
     span: Range<usize>,
 }
@@ -38,27 +41,130 @@ pub fn publish_all(declared_nodes: &[DeclaredNode<'_>]) -> Result<Vec<Published>
             all.push(output);
         }
     }
+    resolve_forwarded(declared_nodes, &mut all)?;
     Ok(all)
+}
+
+/// Gives the outputs that forward a topic its type.
+fn resolve_forwarded(declared_nodes: &[DeclaredNode<'_>], all: &mut [Published]) -> Result<(), Diagnostic> {
+    // What is forwarded may be forwarded already: each pass knows one sender more.
+    for _ in 0..all.len() {
+        for index in 0..all.len() {
+            let Some(forwards) = &all[index].forwards else { continue };
+            let source =
+                all.iter().find(|output| output.topic.name == *forwards && output.forwards.is_none());
+            let Some(type_name) = source.map(|source| source.topic.type_name.clone()) else { continue };
+            let output = &mut all[index];
+            let declared = &declared_nodes[output.node];
+            require_forwardable(declared, output, &type_name)?;
+            output.topic.type_name = type_name;
+            output.forwards = None;
+        }
+    }
+    let Some(unknown) = all.iter().find(|output| output.forwards.is_some()) else { return Ok(()) };
+    let forwards = unknown.forwards.as_deref().unwrap_or_default();
+    let declared = &declared_nodes[unknown.node];
+    let who = format!("input `{}` of `{}`", unknown.port, declared.name.get_ref());
+    let is_published = all.iter().any(|output| output.topic.name == forwards);
+    let (message, help) = if is_published {
+        (
+            format!("{who}: {forwards} is forwarded in a circle"),
+            "wire a topic that a process makes itself".to_owned(),
+        )
+    } else {
+        let known = all.iter().map(|output| output.topic.name.as_str());
+        (format!("{who}: nobody publishes {forwards}"), did_you_mean(forwards, known, "the topics are"))
+    };
+    Err(declared.manifest.problem(&unknown.span, message, help))
+}
+
+/// Refuses to forward what the process cannot carry, or under another type.
+fn require_forwardable(
+    declared: &DeclaredNode<'_>,
+    output: &Published,
+    type_name: &str,
+) -> Result<(), Diagnostic> {
+    let Published { port, topic, span, .. } = output;
+    let who = format!("output `{port}` of `{}`", declared.name.get_ref());
+    let at = |message: String, help: &str| Err(declared.manifest.problem(span, message, help));
+    if !topic.type_name.is_empty() && topic.type_name != type_name {
+        let message =
+            format!("{who} is stated as {}, its input `{port}` carries {type_name}", topic.type_name);
+        return at(message, "leave `type` out: an output that forwards a topic has its type");
+    }
+    let Some(schema) = declared.manifest.registry().message(type_name) else {
+        let message = format!("{who} forwards {type_name}, which no built-in kind knows");
+        return at(message, "wire a topic of a message that `hummingbus schema` lists");
+    };
+    let Some(Inputs::Forwarded { bytes_max }) = declared.program.component().map(|kind| kind.inputs) else {
+        return Ok(());
+    };
+    if schema.has_text() || schema.size > bytes_max {
+        let why =
+            if schema.has_text() { "has text".to_owned() } else { format!("has {} bytes", schema.size) };
+        let message = format!("{who} forwards {type_name}, which {why}");
+        return at(message, &format!("wire a topic of a message of numbers with at most {bytes_max} bytes"));
+    }
+    Ok(())
 }
 
 fn published_by(node: usize, declared: &DeclaredNode<'_>) -> Result<Vec<Published>, Diagnostic> {
     let DeclaredNode { manifest, name, process, program } = declared;
     let period = period_ticks(manifest, process)?;
-    let outputs: Vec<(&str, Option<&'static Schema>)> = match &program.executable {
+    let outputs: Vec<(&str, Carries)> = match &program.executable {
         Executable::Component(kind) => {
-            require_known_ports(declared, "output", kind.outputs, &process.outputs)?;
+            let forwarded = forwarded_ports(declared, kind)?;
+            let names =
+                kind.outputs.iter().map(|port| port.name).chain(forwarded.iter().map(|(port, _)| *port));
+            require_known_ports(declared, "output", names, &process.outputs)?;
             let is_on = |port: &&PortSpec| port.required || setting(process, port.name).is_some();
-            kind.outputs.iter().filter(is_on).map(|port| (port.name, Some(port.schema))).collect()
+            let own = kind.outputs.iter().filter(is_on);
+            let own = own.map(|port| (port.name, Carries::Known(port.schema)));
+            own.chain(forwarded.into_iter().map(|(port, topic)| (port, Carries::Forwarded(topic)))).collect()
         }
         Executable::Command(_) => {
-            process.outputs.keys().map(|port| (port.get_ref().as_str(), None)).collect()
+            process.outputs.keys().map(|port| (port.get_ref().as_str(), Carries::Stated)).collect()
         }
     };
-    let published = outputs.into_iter().map(|(port, schema)| {
-        let (topic, span) = topic(manifest, name, period, port, schema, setting(process, port))?;
-        Ok(Published { node, port: port.to_owned(), span, topic })
+    let published = outputs.into_iter().map(|(port, carries)| {
+        let forwards = if let Carries::Forwarded(topic) = &carries { Some(topic.clone()) } else { None };
+        let (topic, span) = topic(manifest, name, period, port, &carries, setting(process, port))?;
+        Ok(Published { node, port: port.to_owned(), span, topic, forwards })
     });
     published.collect()
+}
+
+/// What tells the type of an output.
+enum Carries {
+    /// The kind.
+    Known(&'static Schema),
+    /// The topic that is forwarded.
+    Forwarded(String),
+    /// The manifest.
+    Stated,
+}
+
+/// The inputs of a kind that forwards them, and their topics.
+fn forwarded_ports<'a>(
+    declared: &DeclaredNode<'a>,
+    kind: &Registration,
+) -> Result<Vec<(&'a str, String)>, Diagnostic> {
+    let Inputs::Forwarded { .. } = kind.inputs else { return Ok(Vec::new()) };
+    let DeclaredNode { manifest, name, process, .. } = declared;
+    if process.inputs.is_empty() {
+        let message = format!("process `{}` has no input", name.get_ref());
+        let help = "name what it forwards under inputs, such as inputs.set_point = { topic = \"/pilot/set_point\", \
+                    delay_ticks = 1, initial = {} }";
+        return Err(manifest.problem(&name.span(), message, help));
+    }
+    if let Some(port) =
+        process.inputs.keys().find(|port| kind.outputs.iter().any(|own| own.name == port.get_ref()))
+    {
+        let message =
+            format!("input `{}` of `{}` is called like an output of its own", port.get_ref(), name.get_ref());
+        return Err(manifest.problem(&port.span(), message, "call it otherwise: its output has its name"));
+    }
+    Ok(process.inputs.iter().map(|(port, input)| (port.get_ref().as_str(), input.topic.clone())).collect())
 }
 
 type Stated<'a> = (&'a Spanned<String>, &'a OutputSetting);
@@ -73,21 +179,24 @@ fn topic(
     node: &Spanned<String>,
     period: u32,
     port: &str,
-    schema: Option<&'static Schema>,
+    carries: &Carries,
     stated: Option<Stated<'_>>,
 ) -> Result<(TopicPlan, Range<usize>), Diagnostic> {
     let span = stated.map_or_else(|| node.span(), |(name, _)| name.span());
     let at = |message: String, help: &str| Err(manifest.problem(&span, message, help));
     let OutputSetting { topic, every_ticks, type_name } =
         stated.map(|(_, setting)| setting.clone()).unwrap_or_default();
-    let type_name = match (schema.map(|schema| schema.type_name), type_name) {
-        (Some(known), Some(stated)) if known != stated => {
+    let type_name = match (carries, type_name) {
+        (Carries::Known(schema), Some(stated)) if schema.type_name != stated => {
+            let known = schema.type_name;
             let message = format!("output `{port}` is stated as {stated}, the kind publishes {known}");
             return at(message, "leave `type` out: a built-in kind knows it");
         }
-        (Some(known), _) => known.to_owned(),
-        (None, Some(stated)) => stated,
-        (None, None) => {
+        (Carries::Known(schema), _) => schema.type_name.to_owned(),
+        // Nothing yet: it follows from the topic.
+        (Carries::Forwarded(_), stated) => stated.unwrap_or_default(),
+        (Carries::Stated, Some(stated)) => stated,
+        (Carries::Stated, None) => {
             let help = "add type = \"hummingbus_msgs/msg/MotorCommand\", for example; `hummingbus schema` lists the types";
             return at(format!("output `{port}` of a command has no `type`"), help);
         }
@@ -108,15 +217,15 @@ fn topic(
 }
 
 /// Refuses ports in use that are none of `ports`.
-pub fn require_known_ports<T>(
+pub fn require_known_ports<'n, T>(
     declared: &DeclaredNode<'_>,
     direction: &str,
-    ports: &[PortSpec],
+    ports: impl Iterator<Item = &'n str> + Clone,
     used: &BTreeMap<Spanned<String>, T>,
 ) -> Result<(), Diagnostic> {
-    let is_unknown = |name: &&Spanned<String>| ports.iter().all(|port| port.name != name.get_ref());
+    let is_unknown = |name: &&Spanned<String>| ports.clone().all(|port| port != name.get_ref());
     let Some(unknown) = used.keys().find(is_unknown) else { return Ok(()) };
-    let help = did_you_mean(unknown.get_ref(), ports.iter().map(|port| port.name), "it has");
+    let help = did_you_mean(unknown.get_ref(), ports, "it has");
     let message = format!("process `{}` has no {direction} `{}`", declared.name.get_ref(), unknown.get_ref());
     Err(declared.manifest.problem(&unknown.span(), message, help))
 }

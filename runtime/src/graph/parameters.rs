@@ -2,9 +2,9 @@
 
 use super::processes::{DeclaredNode, files};
 use super::ranges;
-use crate::manifest::{Manifest, Process};
+use crate::manifest::{InputSetting, Manifest, Process};
 use crate::program::Executable;
-use bus::context::NodeContext;
+use bus::context::{InputMessage, NodeContext};
 use bus::plan::Plan;
 use diagnostics::{Diagnostic, ParameterError};
 use std::collections::{BTreeMap, BTreeSet};
@@ -88,8 +88,10 @@ pub fn of(
         ranges::check(manifest, name, process)?;
         let inputs: Vec<&str> = process.inputs.keys().map(|port| port.get_ref().as_str()).collect();
         let outputs: Vec<&str> = process.outputs.keys().map(|port| port.get_ref().as_str()).collect();
+        let messages = messages(declared, plan);
         let context = NodeContext::new(name.get_ref(), &inputs)
             .naming(&outputs)
+            .reading(&messages)
             .timed(plan.tick_ns, period_ticks, plan.duration_ticks)
             .seeded(plan.seed);
         kind.check(&parameters, &context).map_err(|error| refused(declared, &error))?;
@@ -101,6 +103,16 @@ pub fn of(
         }
     }
     Ok(parameters)
+}
+
+/// What the inputs of `declared` carry, as far as the registry knows it.
+fn messages<'a>(declared: &DeclaredNode<'a>, plan: &Plan) -> Vec<InputMessage<'a>> {
+    let of = |(port, input): (&'a Spanned<String>, &InputSetting)| {
+        let topic = plan.topics.iter().find(|topic| topic.name == input.topic)?;
+        let schema = declared.manifest.registry().message(&topic.type_name)?;
+        Some(InputMessage { port: port.get_ref(), bytes: schema.size, period_ticks: topic.period_ticks })
+    };
+    declared.process.inputs.iter().filter_map(of).collect()
 }
 
 /// A recorder's file and attachments come from the launcher.

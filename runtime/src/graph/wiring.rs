@@ -1,7 +1,7 @@
 //! All nodes of a run, wired to each other.
 
 use super::processes::{self, DeclaredNode};
-use super::{inputs, outputs};
+use super::{computing_time, inputs, outputs};
 use crate::program::OnExit;
 use bus::plan::{NodePlan, TopicPlan};
 use diagnostics::Diagnostic;
@@ -33,6 +33,7 @@ pub fn wire(declared_nodes: &[DeclaredNode<'_>], changed: Option<usize>) -> Resu
             outputs: outputs::outputs(&published, index),
             parameters: serde_json::Value::Null,
             restarts: declared.program.on_exit == OnExit::Restart,
+            computing_time: computing_time::of(declared)?,
         })
     }))?;
     inputs::require_no_cycle(declared_nodes, &nodes, &published, changed)?;

@@ -110,6 +110,8 @@ pub struct Process {
     pub watchdog_ms_host: Option<Spanned<u64>>,
     /// Where its standard output and error go, relative to the manifest.
     pub log: Option<Spanned<String>>,
+    /// How long its steps take on the processor that it stands for.
+    pub computing_time: Option<Spanned<ComputingTimeSetting>>,
     /// The node's own parameters.
     #[serde(default)]
     pub parameters: BTreeMap<Spanned<String>, serde_json::Value>,
@@ -119,6 +121,40 @@ pub struct Process {
     /// What it sends, by output port; built-in nodes need it only to change something.
     #[serde(default)]
     pub outputs: BTreeMap<Spanned<String>, OutputSetting>,
+}
+
+/// The computing time of a process's steps, as written.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(tag = "distribution", rename_all = "kebab-case", deny_unknown_fields)]
+pub enum ComputingTimeSetting {
+    /// Always the same.
+    Constant {
+        /// That time, ms.
+        ms: f64,
+    },
+    /// Evenly between two times.
+    Uniform {
+        /// The shortest, ms.
+        min_ms: f64,
+        /// The longest, ms.
+        max_ms: f64,
+    },
+    /// Lognormal.
+    Lognormal {
+        /// The median, ms.
+        median_ms: f64,
+        /// Standard deviation of the natural logarithm.
+        sigma: f64,
+    },
+    /// As in a file: what `profile --json` printed, or times in µs.
+    Measured {
+        /// The file, relative to the manifest.
+        file: String,
+        /// The process of the profile; the one of this name where absent.
+        process: Option<String>,
+        /// What the times are multiplied by.
+        scale: Option<f64>,
+    },
 }
 
 /// An input: a topic, or a table with delay and initial value.

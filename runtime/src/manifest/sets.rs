@@ -7,6 +7,7 @@
 use super::sources::Sources;
 use super::tree::{self, names};
 use crate::registry::Registry;
+use bus::ports::Inputs;
 use diagnostics::Diagnostic;
 use diagnostics::{did_you_mean, read_tree};
 use serde::Deserialize;
@@ -190,6 +191,9 @@ fn published(
     let stated =
         outputs.into_iter().flat_map(|outputs| outputs.keys().map(|port| port.get_ref().to_string()));
     let kind = tree::string(process, "kind").and_then(|kind| registry.find(kind));
+    let forwards = kind.is_some_and(|kind| matches!(kind.inputs, Inputs::Forwarded { .. }));
+    let forwarded = tree::table(process, "inputs").filter(|_| forwards);
+    let forwarded = forwarded.into_iter().flat_map(tree::names).map(str::to_owned);
     let built_in = kind.into_iter().flat_map(|kind| kind.outputs);
     let required = built_in.filter(|port| port.required).map(|port| port.name.to_owned());
     let topic = |port: String| {
@@ -197,7 +201,7 @@ fn published(
         let stated = setting.and_then(|setting| tree::string(setting, "topic")).map(str::to_owned);
         stated.unwrap_or_else(|| format!("/{}/{port}", name.get_ref()))
     };
-    stated.chain(required).map(topic).collect()
+    stated.chain(required).chain(forwarded).map(topic).collect()
 }
 
 /// Makes the topics in a process of a set those of the vehicle `name`; `local` are the ones it publishes.

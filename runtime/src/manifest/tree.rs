@@ -8,7 +8,7 @@ use toml::de::{DeString, DeTable, DeValue};
 /// Keys that say what a process is: naming one anew leaves nothing of the other.
 const IDENTITY: [&str; 2] = ["kind", "command"];
 /// Keys that mean something only to what the process is.
-const PARAMETERS: [&str; 5] = ["data", "gains", "parameters", "scene", "vehicle"];
+const PARAMETERS: [&str; 6] = ["computing_time", "data", "gains", "parameters", "scene", "vehicle"];
 
 /// What `text` says; its places start at `base`.
 ///
@@ -143,6 +143,16 @@ fn forget_identity(process: &mut DeTable<'_>, over: &DeTable<'_>) {
     let is_changed = |key: &str| over.contains_key(key) && !is_same(process.get(key), over.get(key));
     if IDENTITY.iter().any(|key| is_changed(key)) {
         IDENTITY.iter().chain(&PARAMETERS).for_each(|key| drop(process.remove(*key)));
+    }
+    forget_distribution(process, over);
+}
+
+/// Removes a computing time if `over` states one of another distribution, whose numbers are others.
+fn forget_distribution(process: &mut DeTable<'_>, over: &DeTable<'_>) {
+    let of =
+        |process: &DeTable<'_>| string(table(process, "computing_time")?, "distribution").map(str::to_owned);
+    if of(over).is_some() && of(over) != of(process) {
+        process.remove("computing_time");
     }
 }
 

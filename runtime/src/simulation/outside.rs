@@ -8,7 +8,7 @@ use crate::host::End;
 use crate::program::{BackupSpec, OnExit, Program, Readiness};
 use crate::role::Role;
 use crate::view::{SegmentWrite, SlotView, View};
-use crate::world::{Body, World};
+use crate::world::{Body, Spent, World};
 use anyhow::{Result, bail};
 use bus::BusError;
 use bus::lockstep::SlotState;
@@ -96,8 +96,8 @@ impl World for SimWorld {
         sim.run_until(deadline, notices);
     }
 
-    fn spent(&self, _: usize) -> (u64, u32) {
-        (0, 0)
+    fn spent(&self, _: usize) -> Spent {
+        Spent::default()
     }
 
     fn start(&mut self, name: &str, role: Role, program: Option<&Program>) -> Result<SimBody> {

@@ -48,6 +48,7 @@ fn plan(draw: &mut Draw) -> Plan {
         outputs: outputs.iter().map(|&topic| OutputPlan { port: "out".to_owned(), topic }).collect(),
         parameters: serde_json::Value::Null,
         restarts: true,
+        computing_time: None,
     };
     Plan {
         run_id: "0-0".to_owned(),

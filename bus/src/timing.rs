@@ -1,0 +1,123 @@
+//! A node whose steps take simulated time: what it computes is sent when it is done, and steps that are due meanwhile are
+//! skipped.
+//!
+//! What is under way is kept in words behind the component's state, so that whoever takes the node's place goes on with
+//! it: the tick at which it is done, then for each output the sample that is sent and the one that is to follow.
+
+use crate::computing_time::ComputingTime;
+use crate::error::BusError;
+use crate::plan::{NodePlan, Plan};
+use crate::port::OutPort;
+use crate::random::{Stream, stream};
+
+/// Words in front of the samples.
+const HEAD_WORDS: usize = 2;
+/// The tick at which what is under way is done, plus one; 0 where nothing is.
+const DONE: usize = 0;
+/// 1 from the first sample on.
+const HAS_SENT: usize = 1;
+/// Words of the random stream that belong to a tick, as a power of two: more than any distribution draws.
+const TICK_WORDS_LOG2: u32 = 8;
+
+/// The simulated computing time of a node.
+#[derive(Debug)]
+pub(crate) struct Timing {
+    time: ComputingTime,
+    random: Stream,
+    tick_ns: u64,
+    period_ticks: u32,
+}
+
+/// What becomes of a due tick.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Due {
+    /// It is computed.
+    Step,
+    /// The step before is under way: nothing is read and nothing computed.
+    Skipped,
+}
+
+impl Timing {
+    /// That of `node`, if its steps take time.
+    pub(crate) fn of(plan: &Plan, node: &NodePlan) -> Option<Self> {
+        let time = node.computing_time.clone()?;
+        // No node has a space in its name: the stream is nobody else's.
+        let random = stream(plan.seed, &format!("{} computing time", node.name));
+        Some(Self { time, random, tick_ns: plan.tick_ns, period_ticks: node.period_ticks })
+    }
+
+    /// Words that a node with `outputs` needs behind its state.
+    pub(crate) fn words(outputs: &[OutPort]) -> usize {
+        HEAD_WORDS + 2 * outputs.iter().map(OutPort::sample_words).sum::<usize>()
+    }
+
+    /// Has what is done by `tick` be what is sent, and tells whether the node steps.
+    pub(crate) fn begin(&self, tick: u32, words: &mut [u64], outputs: &[OutPort]) -> Due {
+        match words[DONE] {
+            0 => Due::Step,
+            done if done > u64::from(tick) + 1 => Due::Skipped,
+            _ => {
+                words[DONE] = 0;
+                let mut rest = &mut words[HEAD_WORDS..];
+                for output in outputs {
+                    let [sent, next] = next_samples(&mut rest, output);
+                    sent.copy_from_slice(next);
+                }
+                Due::Step
+            }
+        }
+    }
+
+    /// Takes what the step at `tick` wrote, to be sent when it is done; true where that is beyond the next due tick. The
+    /// first step of all is done at once: before it there is nothing that could be sent.
+    pub(crate) fn end(
+        &mut self,
+        tick: u32,
+        words: &mut [u64],
+        outputs: &mut [OutPort],
+        node: &str,
+    ) -> Result<bool, BusError> {
+        self.random.set_word_pos(u128::from(tick) << TICK_WORDS_LOG2);
+        let drawn = self.time.ticks(&mut self.random, self.tick_ns);
+        let ticks = if words[HAS_SENT] == 0 { 0 } else { drawn };
+        words[HAS_SENT] = 1;
+        words[DONE] = if ticks == 0 { 0 } else { u64::from(tick) + u64::from(ticks) + 1 };
+        let mut rest = &mut words[HEAD_WORDS..];
+        for output in outputs {
+            let [sent, next] = next_samples(&mut rest, output);
+            if let Some(written) = output.written(tick, node)? {
+                next.copy_from_slice(written);
+            }
+            if ticks == 0 {
+                sent.copy_from_slice(next);
+            }
+        }
+        Ok(ticks > self.period_ticks)
+    }
+
+    /// Writes the samples that are due at `tick`.
+    pub(crate) fn write(
+        tick: u32,
+        words: &mut [u64],
+        outputs: &mut [OutPort],
+        node: &str,
+    ) -> Result<(), BusError> {
+        let mut rest = &mut words[HEAD_WORDS..];
+        for output in outputs {
+            let [sent, _] = next_samples(&mut rest, output);
+            if output.is_due(tick) {
+                output.words(node)?.copy_from_slice(sent);
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Of the samples in `rest` those of `output`: the one that is sent, and the one that follows it.
+fn next_samples<'a>(rest: &mut &'a mut [u64], output: &OutPort) -> [&'a mut [u64]; 2] {
+    let length = output.sample_words();
+    let (both, behind) = std::mem::take(rest).split_at_mut(2 * length);
+    *rest = behind;
+    let (sent, next) = both.split_at_mut(length);
+    [sent, next]
+}

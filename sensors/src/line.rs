@@ -1,0 +1,387 @@
+//! A serial line with a radio at its end: a queue, a wire that carries so many bits a second, and a way on which messages
+//! take time and are lost.
+//!
+//! Time is counted in whole nanoseconds, and within a busy stretch of the wire in bits since its start, so that no rounding
+//! adds up: after any time the wire has carried as many bits as its rate says. A message is whole: it waits until the wire
+//! is free, is sent without a break, and arrives behind those that were sent before it. What becomes of the n-th message
+//! that is sent depends on the seed, the node's name and n alone.
+
+use bus::Message;
+use bus::ports::FORWARDED_BYTES_MAX;
+use bus::random::{Stream, uniform};
+
+/// Streams that share a line at most.
+pub const STREAMS: usize = 16;
+/// Messages that wait or are under way at most.
+pub const PARCELS: usize = 64;
+
+/// What a [`Parcel`] is.
+const FREE: u32 = 0;
+const QUEUED: u32 = 1;
+const UNDER_WAY: u32 = 2;
+
+const NS_PER_S: u128 = 1_000_000_000;
+
+/// A message that waits or is under way.
+#[derive(Clone, Copy, Debug, Message)]
+#[repr(C)]
+#[message(type_name = "hummingbus_msgs/msg/LinkParcel")]
+pub struct Parcel {
+    /// Its place among those that were queued.
+    #[field(unit = "1")]
+    number: u64,
+    /// When it was queued.
+    #[field(unit = "ns")]
+    queued_ns: u64,
+    /// When it arrives, once it is under way.
+    #[field(unit = "ns")]
+    arrival_ns: u64,
+    /// Its stream.
+    #[field(unit = "1")]
+    stream: u32,
+    /// Its length on the wire.
+    #[field(unit = "1")]
+    wire_bytes: u32,
+    /// 0: the place is free; 1: it waits; 2: it is under way.
+    #[field(unit = "1")]
+    stage: u32,
+    /// 1 where it is lost on the way.
+    #[field(unit = "1")]
+    is_lost: u32,
+    /// The message.
+    #[field(unit = "1")]
+    message: [u8; FORWARDED_BYTES_MAX],
+}
+
+/// What a line remembers.
+#[derive(Clone, Copy, Debug, Message)]
+#[repr(C)]
+#[message(type_name = "hummingbus_msgs/msg/LineState")]
+pub struct LineState {
+    /// The messages that wait or are under way, in any order.
+    parcels: [Parcel; PARCELS],
+    /// The newest message of each stream that has arrived.
+    #[field(unit = "1")]
+    pub(crate) newest: [[u8; FORWARDED_BYTES_MAX]; STREAMS],
+    /// What has happened so far.
+    pub(crate) counts: LineCounts,
+    /// Messages queued so far.
+    #[field(unit = "1")]
+    queued: u64,
+    /// When the wire began to be busy without a break.
+    #[field(unit = "ns")]
+    busy_since_ns: u64,
+    /// Bits that it carries from then on.
+    #[field(unit = "1")]
+    busy_bits: u64,
+    /// When it is free again.
+    #[field(unit = "ns")]
+    free_ns: u64,
+    /// When the message that was sent last arrives: the next does not overtake it.
+    #[field(unit = "ns")]
+    last_arrival_ns: u64,
+}
+
+/// What a line has carried.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Message)]
+#[repr(C)]
+#[message(type_name = "hummingbus_msgs/msg/LineCounts")]
+pub struct LineCounts {
+    /// Bytes of the messages whose sending has begun.
+    #[field(unit = "1")]
+    pub begun_bytes: u64,
+    /// Those messages.
+    #[field(unit = "1")]
+    pub begun: u64,
+    /// Messages that have arrived, by stream.
+    #[field(unit = "1")]
+    pub arrived: [u32; STREAMS],
+    /// Messages that were lost on the way, by stream; counted when they would have arrived.
+    #[field(unit = "1")]
+    pub lost: [u32; STREAMS],
+    /// Messages for which the queue had no room, by stream.
+    #[field(unit = "1")]
+    pub dropped: [u32; STREAMS],
+    /// How long the message that arrived last had taken since it was queued.
+    #[field(unit = "ns")]
+    pub delay_ns: u64,
+}
+
+impl Default for LineState {
+    /// Nothing waits, nothing was sent.
+    fn default() -> Self {
+        bytemuck::Zeroable::zeroed()
+    }
+}
+
+/// What a line is.
+#[derive(Debug)]
+pub struct Line {
+    /// Bits a second.
+    pub bits_s: u64,
+    /// Bits that a byte takes.
+    pub bits_per_byte: u64,
+    /// Bytes that may wait.
+    pub queue_bytes: u32,
+    /// Time from the last bit of a message to its arrival.
+    pub latency_ns: u64,
+    /// What is added to it at most, evenly drawn.
+    pub jitter_ns: u64,
+    /// The fraction of messages that are lost.
+    pub loss: f64,
+    /// Which stream goes first: the higher number.
+    pub priorities: Vec<u32>,
+    /// The random stream that fates are drawn from.
+    pub random: Stream,
+}
+
+impl Line {
+    /// Queues a message of `stream` at `at_ns`, which takes `wire_bytes` on the wire; where there is no room for it, it is
+    /// dropped whole.
+    pub fn queue(&self, state: &mut LineState, stream: usize, message: &[u8], wire_bytes: u32, at_ns: u64) {
+        let fits = state.waiting().0 + wire_bytes <= self.queue_bytes;
+        let number = state.queued;
+        let Some(place) = state.parcels.iter_mut().find(|parcel| parcel.stage == FREE && fits) else {
+            state.counts.dropped[stream] += 1;
+            return;
+        };
+        // At most STREAMS.
+        #[allow(clippy::cast_possible_truncation)]
+        let stream = stream as u32;
+        *place = Parcel {
+            number,
+            queued_ns: at_ns,
+            stream,
+            wire_bytes,
+            stage: QUEUED,
+            ..bytemuck::Zeroable::zeroed()
+        };
+        place.message[..message.len()].copy_from_slice(message);
+        state.queued += 1;
+    }
+
+    /// Sends what waits, up to `until_ns`.
+    pub fn send(&mut self, state: &mut LineState, until_ns: u64) {
+        while let Some((index, start_ns)) = self.next(state).filter(|(_, start_ns)| *start_ns < until_ns) {
+            if start_ns > state.free_ns {
+                (state.busy_since_ns, state.busy_bits) = (start_ns, 0);
+            }
+            let (delay_ns, is_lost) = self.fate(state.counts.begun);
+            let parcel = &mut state.parcels[index];
+            state.busy_bits += u64::from(parcel.wire_bytes) * self.bits_per_byte;
+            state.free_ns = state.busy_since_ns + self.duration_ns(state.busy_bits);
+            state.last_arrival_ns = state.last_arrival_ns.max(state.free_ns + delay_ns);
+            parcel.arrival_ns = state.last_arrival_ns;
+            (parcel.stage, parcel.is_lost) = (UNDER_WAY, u32::from(is_lost));
+            state.counts.begun += 1;
+            state.counts.begun_bytes += u64::from(parcel.wire_bytes);
+        }
+    }
+
+    /// The message that is sent next, and when: of those that wait when the wire is free the one of the highest priority,
+    /// of these the one that came first.
+    fn next(&self, state: &LineState) -> Option<(usize, u64)> {
+        let queued = || state.parcels.iter().enumerate().filter(|(_, parcel)| parcel.stage == QUEUED);
+        let start_ns = queued().map(|(_, parcel)| parcel.queued_ns).min()?.max(state.free_ns);
+        let waits = queued().filter(|(_, parcel)| parcel.queued_ns <= start_ns);
+        let priority = |parcel: &Parcel| self.priorities[parcel.stream as usize];
+        let first = waits.min_by_key(|(_, parcel)| (u32::MAX - priority(parcel), parcel.number));
+        first.map(|(index, _)| (index, start_ns))
+    }
+
+    /// How long the message that is sent as number `number` travels behind its last bit, and whether it is lost.
+    fn fate(&mut self, number: u64) -> (u64, bool) {
+        // Two draws of two words of 32 bits each.
+        self.random.set_word_pos(u128::from(number) * 4);
+        let is_lost = uniform(&mut self.random) < self.loss;
+        let jitter_ns = uniform(&mut self.random) * self.jitter_ns as f64;
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "at most the jitter")]
+        let jitter_ns = jitter_ns as u64;
+        (self.latency_ns + jitter_ns, is_lost)
+    }
+
+    /// Time that the wire takes for `bits`, rounded up.
+    #[allow(clippy::cast_possible_truncation, reason = "a busy stretch is shorter than 500 years")]
+    fn duration_ns(&self, bits: u64) -> u64 {
+        (u128::from(bits) * NS_PER_S).div_ceil(u128::from(self.bits_s)) as u64
+    }
+
+    /// Takes out what has arrived by `now_ns`.
+    pub fn arrive(state: &mut LineState, now_ns: u64) {
+        let arrived = |parcel: &&mut Parcel| parcel.stage == UNDER_WAY && parcel.arrival_ns <= now_ns;
+        // In the order of arrival, of a stream the newest stays.
+        while let Some(parcel) =
+            state.parcels.iter_mut().filter(arrived).min_by_key(|parcel| (parcel.arrival_ns, parcel.number))
+        {
+            parcel.stage = FREE;
+            let stream = parcel.stream as usize;
+            if parcel.is_lost == 1 {
+                state.counts.lost[stream] += 1;
+                continue;
+            }
+            state.newest[stream] = parcel.message;
+            state.counts.arrived[stream] += 1;
+            state.counts.delay_ns = parcel.arrival_ns - parcel.queued_ns;
+        }
+    }
+
+    /// Whole bytes that the wire has carried by `now_ns`.
+    #[allow(clippy::cast_possible_truncation, reason = "fewer bits than have begun")]
+    pub fn sent_bytes(&self, state: &LineState, now_ns: u64) -> u64 {
+        let ahead_ns = u128::from(state.free_ns.saturating_sub(now_ns));
+        let ahead_bits = (ahead_ns * u128::from(self.bits_s)).div_ceil(NS_PER_S) as u64;
+        (state.counts.begun_bytes * self.bits_per_byte).saturating_sub(ahead_bits) / self.bits_per_byte
+    }
+}
+
+impl LineState {
+    /// Bytes and messages that wait.
+    pub fn waiting(&self) -> (u32, u32) {
+        let queued = self.parcels.iter().filter(|parcel| parcel.stage == QUEUED);
+        queued.fold((0, 0), |(bytes, count), parcel| (bytes + parcel.wire_bytes, count + 1))
+    }
+
+    /// Messages that are under way.
+    pub fn under_way(&self) -> u32 {
+        self.parcels.iter().map(|parcel| u32::from(parcel.stage == UNDER_WAY)).sum()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Line, LineState};
+    use bus::random::stream;
+
+    const MS: u64 = 1_000_000;
+
+    fn line(seed: u64) -> Line {
+        Line {
+            bits_s: 57_600,
+            bits_per_byte: 10,
+            queue_bytes: 202,
+            latency_ns: 0,
+            jitter_ns: 0,
+            loss: 0.0,
+            priorities: vec![0; 3],
+            random: stream(seed, "link"),
+        }
+    }
+
+    /// Offers a message of 35 bytes each `every_ms` for `length_ms`, and lets all arrive.
+    fn carry(line: &mut Line, every_ms: u64, length_ms: u64) -> LineState {
+        let mut state = LineState::default();
+        for ms in 0..length_ms {
+            if ms % every_ms == 0 {
+                line.queue(&mut state, 0, &[1; 24], 35, ms * MS);
+            }
+            line.send(&mut state, (ms + 1) * MS);
+            Line::arrive(&mut state, (ms + 1) * MS);
+        }
+        state
+    }
+
+    #[test]
+    fn a_full_line_carries_its_rate_to_the_byte() {
+        for (seconds, bits_s) in [(1, 57_600), (7, 57_600), (60, 57_600), (10, 9600), (3, 115_200), (60, 333)]
+        {
+            let mut line = Line { bits_s, ..line(1) };
+            let state = carry(&mut line, 1, seconds * 1000);
+            // The first message is there at time 0, and the queue is never empty again; 0.1 bytes are no byte.
+            assert_eq!(line.sent_bytes(&state, seconds * 1000 * MS), seconds * bits_s / 10, "{bits_s} bit/s");
+        }
+    }
+
+    #[test]
+    fn a_message_takes_as_long_as_its_bytes_and_the_latency() {
+        let mut line = Line { latency_ns: 5 * MS, ..line(1) };
+        let state = carry(&mut line, 100, 1000);
+        // 350 bits at 57 600 bit/s take 6.0763 ms.
+        assert_eq!((state.counts.arrived[0], state.counts.delay_ns), (10, 11_076_389));
+        assert_eq!(state.waiting(), (0, 0));
+    }
+
+    #[test]
+    fn losses_are_as_frequent_as_stated_within_what_chance_allows() {
+        let (count, loss) = (400.0, 0.2_f64);
+        let deviation = (count * loss * (1.0 - loss)).sqrt();
+        let lost: Vec<f64> = (0..200)
+            .map(|seed| {
+                let state = carry(&mut Line { loss, ..line(seed) }, 10, 4000);
+                assert_eq!(state.counts.lost[0] + state.counts.arrived[0], 400);
+                f64::from(state.counts.lost[0])
+            })
+            .collect();
+        // Beyond 4 standard deviations lies one seed of 16 000, beyond 4 of their mean one set of seeds of as many.
+        assert!(lost.iter().all(|lost| (lost - count * loss).abs() < 4.0 * deviation), "{lost:?}");
+        let mean = lost.iter().sum::<f64>() / 200.0;
+        assert!((mean - count * loss).abs() < 4.0 * deviation / 200_f64.sqrt(), "{mean}");
+    }
+
+    #[test]
+    fn what_finds_no_room_is_dropped_and_counted() {
+        let (mut line, mut state) = (line(1), LineState::default());
+        for _ in 0..7 {
+            line.queue(&mut state, 1, &[1; 24], 35, 0);
+        }
+        // 5 × 35 bytes are 175; a sixth would be 210.
+        assert_eq!((state.counts.dropped[1], state.waiting()), (2, (175, 5)));
+        line.send(&mut state, 1);
+        assert_eq!((state.under_way(), state.waiting()), (1, (140, 4)));
+        line.queue(&mut state, 1, &[1; 24], 62, 0);
+        assert_eq!(state.waiting(), (202, 5));
+    }
+
+    #[test]
+    fn the_higher_priority_goes_first_and_interrupts_nothing() {
+        let mut line = Line { priorities: vec![0, 9, 0], ..line(1) };
+        let mut state = LineState::default();
+        for (stream, at_ns) in [(0, 0), (0, 0), (1, MS), (2, MS)] {
+            line.queue(&mut state, stream, &[7], 12, at_ns);
+        }
+        let mut order = Vec::new();
+        for ms in 1..=10 {
+            line.send(&mut state, ms * MS);
+            let before = state.counts.arrived;
+            Line::arrive(&mut state, ms * MS);
+            order.extend((0..3).filter(|&stream| state.counts.arrived[stream] > before[stream]));
+        }
+        assert_eq!(order, [0, 1, 0, 2]);
+    }
+
+    #[test]
+    fn messages_keep_their_order_whatever_the_jitter() {
+        let mut line = Line { bits_s: 1_000_000, jitter_ns: 50 * MS, ..line(3) };
+        let (mut state, mut newest, mut delays) = (LineState::default(), 0, Vec::new());
+        for ms in 0..250_u64 {
+            let message = u8::try_from(ms).unwrap();
+            line.queue(&mut state, 0, &[message], 12, ms * MS);
+            line.send(&mut state, (ms + 1) * MS);
+            Line::arrive(&mut state, (ms + 1) * MS);
+            assert!(state.newest[0][0] >= newest);
+            newest = state.newest[0][0];
+            delays.push(state.counts.delay_ns);
+        }
+        assert!(
+            delays.iter().max().unwrap() > &(40 * MS) && delays[200..].iter().min().unwrap() < &(50 * MS)
+        );
+    }
+
+    #[test]
+    fn a_line_goes_on_from_its_state_byte_for_byte() {
+        let make = || Line { jitter_ns: 20 * MS, loss: 0.3, ..line(5) };
+        let (mut first, mut second) = (make(), make());
+        let mut states = [LineState::default(), LineState::default()];
+        for ms in 0..2000_u64 {
+            for (line, state) in [&mut first, &mut second].into_iter().zip(&mut states) {
+                line.queue(state, (ms % 3) as usize, &ms.to_le_bytes(), 13 + (ms % 7) as u32, ms * MS);
+                line.send(state, (ms + 1) * MS);
+                Line::arrive(state, (ms + 1) * MS);
+            }
+            if ms == 777 {
+                second = make();
+                states[1] = states[0];
+            }
+        }
+        assert!(bytemuck::bytes_of(&states[0]) == bytemuck::bytes_of(&states[1]));
+    }
+}

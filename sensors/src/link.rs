@@ -1,0 +1,416 @@
+//! A data link: messages of any type, carried as a serial radio carries them.
+//!
+//! Each input is a *stream*: what its topic carries comes out on the output of the same name, later, less often, and not
+//! all of it. The streams share one `line`. A message that comes out is the sender's own, stamp included: a consumer
+//! tells a new one by its stamp, and its age by that too. Until the first has come, the output is the input's initial value.
+//!
+//! A message that is sent at tick k is queued at the time of that tick, and is out at the first tick of the link at which
+//! it has arrived. The link itself adds nothing to that: its inputs are a tick late because no message arrives in the tick
+//! in which it is sent.
+
+use crate::line::{Line, LineState, STREAMS};
+use bus::announcement::Announcement;
+use bus::component::{Component, Info, StepError};
+use bus::context::{NodeContext, StepContext};
+use bus::messages::Time;
+use bus::ports::{
+    FORWARDED_BYTES_MAX, ForwardedInputs, InputSamples, OutputPort, OutputPorts, OutputSamples, PortSpec,
+};
+use bus::random::stream;
+use bus::{BusError, Message};
+use diagnostics::ParameterError;
+use diagnostics::parameter::{not_negative, positive_up_to, refuse, require};
+use serde::Deserialize;
+use std::collections::BTreeMap;
+
+/// 57 600 baud, as the thesis sets the XBee modules of its Hummingbird (§2.2).
+const BAUD: f64 = 57_600.0;
+/// 8 data bits, a start bit and a stop bit, no parity (thesis §2.2).
+const BITS_PER_BYTE: u32 = 10;
+/// What AscTec's serial protocol puts around a message: `>*>`, two bytes of length, one of type, two of checksum, `<#<`
+/// (`ASCTEC_PACKET_OVERHEAD_BYTES` of the `asctec` driver for ROS by Kushleyev and Michael, University of Pennsylvania).
+const OVERHEAD_BYTES: u32 = 11;
+/// What an XBee of the 802.15.4 series buffers of its serial input (Digi, "XBee/XBee-PRO RF Modules 802.15.4 Product
+/// Manual", "DI buffer").
+const QUEUE_BYTES: u32 = 202;
+/// Faster is no serial line, and the bits of a run are to stay countable.
+const BAUD_MAX: f64 = 1e9;
+
+/// Parameters of a link.
+///
+/// ```
+/// let parameters = serde_json::json!({ "loss": 0.1, "streams": { "set_point": { "bytes": 24, "rate_hz": 50.0 } } });
+/// let parameters: sensors::link::Parameters = diagnostics::read(&parameters)?;
+/// assert_eq!(parameters.baud, 57_600.0);
+/// # Ok::<(), diagnostics::ParameterError>(())
+/// ```
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Parameters {
+    /// Bits a second on the wire.
+    #[serde(default = "baud")]
+    pub baud: f64,
+    /// Bits that a byte takes, with start and stop bits.
+    #[serde(default = "bits_per_byte")]
+    pub bits_per_byte: u32,
+    /// Bytes that each message takes beside its own.
+    #[serde(default = "overhead_bytes")]
+    pub overhead_bytes: u32,
+    /// Bytes that may wait for the wire, the overhead included.
+    #[serde(default = "queue_bytes")]
+    pub queue_bytes: u32,
+    /// Time from a message's last bit to its arrival, ms.
+    #[serde(default)]
+    pub latency_ms: f64,
+    /// What is added to that at most, evenly drawn for each message, ms.
+    #[serde(default)]
+    pub jitter_ms: f64,
+    /// Fraction of the messages that are lost on the way.
+    #[serde(default)]
+    pub loss: f64,
+    /// What differs of a stream, by the name of its input.
+    #[serde(default)]
+    pub streams: BTreeMap<String, StreamParameters>,
+}
+
+fn baud() -> f64 {
+    BAUD
+}
+
+fn bits_per_byte() -> u32 {
+    BITS_PER_BYTE
+}
+
+fn overhead_bytes() -> u32 {
+    OVERHEAD_BYTES
+}
+
+fn queue_bytes() -> u32 {
+    QUEUE_BYTES
+}
+
+/// Parameters of a stream.
+#[derive(Clone, Debug, Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct StreamParameters {
+    /// Bytes of a message on the wire, without the overhead: as many as in memory where absent.
+    bytes: Option<u32>,
+    /// Messages a second that are sent at most; each that is new where absent.
+    rate_hz: Option<f64>,
+    /// Which stream goes first where several wait: the higher number.
+    #[serde(default)]
+    priority: u32,
+}
+
+/// What a link says of itself, from its first tick on; arrays by the names of the streams.
+///
+/// ```
+/// let statistics = sensors::link::LinkStatistics::default();
+/// assert_eq!((statistics.sent_bytes, statistics.arrived), (0, 0));
+/// ```
+#[derive(Clone, Copy, Debug, Default, Message)]
+#[repr(C)]
+#[message(type_name = "hummingbus_msgs/msg/LinkStatistics")]
+pub struct LinkStatistics {
+    /// Simulation time.
+    pub stamp: Time,
+    /// Whole bytes that the wire has carried.
+    #[field(unit = "1")]
+    pub sent_bytes: u64,
+    /// Bytes that wait for the wire.
+    #[field(unit = "1")]
+    pub queued_bytes: u32,
+    /// Messages that wait for the wire.
+    #[field(unit = "1")]
+    pub queued: u32,
+    /// How long the message that arrived last had taken since it was queued.
+    #[field(unit = "s")]
+    pub delay: f64,
+    /// Messages that are on the wire or behind it.
+    #[field(unit = "1")]
+    pub under_way: u32,
+    /// Messages that have arrived.
+    #[field(unit = "1")]
+    pub arrived: u32,
+    /// Messages that were lost on the way; counted when they would have arrived.
+    #[field(unit = "1")]
+    pub lost: u32,
+    /// Messages that were dropped because the queue was full.
+    #[field(unit = "1")]
+    pub dropped: u32,
+    /// Messages that have arrived, by stream.
+    #[field(unit = "1")]
+    pub stream_arrived: [u32; STREAMS],
+    /// Messages that were lost on the way, by stream.
+    #[field(unit = "1")]
+    pub stream_lost: [u32; STREAMS],
+    /// Messages that were dropped because the queue was full, by stream.
+    #[field(unit = "1")]
+    pub stream_dropped: [u32; STREAMS],
+}
+
+/// What a link remembers.
+#[derive(Clone, Copy, Debug, Message)]
+#[repr(C)]
+#[message(type_name = "hummingbus_msgs/msg/LinkState")]
+pub struct LinkState {
+    line: LineState,
+    /// The stamp of the message that was taken last from each input; all bits set before the first.
+    #[field(unit = "1")]
+    taken_stamp: [u64; STREAMS],
+    /// The period of its rate in which it was taken; all bits set before the first.
+    #[field(unit = "1")]
+    taken_period: [u64; STREAMS],
+}
+
+/// What a link sends: its statistics, and the newest message of each stream.
+#[derive(Debug)]
+pub struct Outputs {
+    statistics: LinkStatistics,
+    sizes: [usize; STREAMS],
+    streams: usize,
+    newest: [[u8; FORWARDED_BYTES_MAX]; STREAMS],
+}
+
+impl OutputPorts for Outputs {
+    const DECLARED: &'static [PortSpec] = &[PortSpec {
+        name: "statistics",
+        doc: "What the link has carried, lost and dropped.",
+        schema: <LinkStatistics as Message>::SCHEMA,
+        required: true,
+    }];
+
+    fn write(self, samples: &mut OutputSamples<'_>) -> Result<(), BusError> {
+        self.statistics.write(samples, 0)?;
+        let messages = self.newest.iter().zip(self.sizes).take(self.streams).enumerate();
+        for (stream, (message, size)) in messages {
+            samples.write_bytes(1 + stream, &message[..size])?;
+        }
+        Ok(())
+    }
+
+    /// A link has nothing to go on from but its state.
+    fn read(_: InputSamples<'_>) -> Option<Self> {
+        None
+    }
+}
+
+/// A stream of a link.
+#[derive(Debug)]
+struct LinkStream {
+    parameters: StreamParameters,
+    /// Bytes of a message in memory, and where its stamp is: known once the link is connected.
+    size: usize,
+    stamp_offset: Option<usize>,
+}
+
+/// A data link.
+#[derive(Debug)]
+pub struct Link {
+    line: Line,
+    overhead_bytes: u32,
+    tick_ns: u64,
+    /// By the names of the inputs.
+    streams: Vec<LinkStream>,
+}
+
+impl Component for Link {
+    const INFO: Info =
+        Info::new("link", "carries topics as a serial radio does: by its rate, late, with losses");
+    type Parameters = Parameters;
+    type Inputs<'a> = ForwardedInputs<'a>;
+    type Outputs = Outputs;
+    type State = LinkState;
+
+    fn new(parameters: Parameters, context: &NodeContext<'_>) -> Result<Self, ParameterError> {
+        parameters.validate()?;
+        let mut names = context.inputs.to_vec();
+        names.sort_unstable();
+        let (count, most) = (names.len(), STREAMS);
+        refuse(count > most, "", || format!("it has {count} inputs, expected at most {most}"))?;
+        if let Some(unknown) = parameters.streams.keys().find(|name| !names.contains(&name.as_str())) {
+            return Err(ParameterError::unknown(format!("streams.{unknown}"), names));
+        }
+        let streams = names.iter().map(|name| LinkStream::new(name, &parameters, context));
+        let streams = streams.collect::<Result<Vec<_>, _>>()?;
+        parameters.check_load(context)?;
+        let line =
+            parameters.line(context, streams.iter().map(|stream| stream.parameters.priority).collect());
+        Ok(Self { line, overhead_bytes: parameters.overhead_bytes, tick_ns: context.tick_ns, streams })
+    }
+
+    fn initial(&self) -> LinkState {
+        let (taken_stamp, taken_period) = ([u64::MAX; STREAMS], [u64::MAX; STREAMS]);
+        LinkState { line: LineState::default(), taken_stamp, taken_period }
+    }
+
+    fn connected(&mut self, topics: &[(&str, &Announcement)]) -> Result<(), StepError> {
+        for (stream, (_, announcement)) in self.streams.iter_mut().zip(topics) {
+            (stream.size, stream.stamp_offset) = (announcement.size, announcement.stamp_offset);
+        }
+        Ok(())
+    }
+
+    fn step(
+        &mut self,
+        context: &StepContext<'_>,
+        inputs: ForwardedInputs<'_>,
+        state: &mut LinkState,
+    ) -> Result<Outputs, StepError> {
+        let now_ns = context.time_ns();
+        if context.tick() == 0 {
+            // What the inputs hold is no message yet.
+            for (stream, newest) in state.line.newest.iter_mut().enumerate().take(self.streams.len()) {
+                let size = self.streams[stream].size;
+                newest[..size].copy_from_slice(&inputs.newest(stream)[..size]);
+            }
+        } else {
+            let sent_ns = now_ns - self.tick_ns;
+            self.line.send(&mut state.line, sent_ns);
+            self.take(inputs, state, sent_ns);
+        }
+        self.line.send(&mut state.line, now_ns);
+        Line::arrive(&mut state.line, now_ns);
+        Ok(self.outputs(&state.line, now_ns))
+    }
+}
+
+impl Link {
+    /// Queues the messages that are new and due.
+    fn take(&self, inputs: ForwardedInputs<'_>, state: &mut LinkState, sent_ns: u64) {
+        for (index, stream) in self.streams.iter().enumerate() {
+            let message = &inputs.newest(index)[..stream.size];
+            let (stamp, period) = (stream.stamp(message), stream.period(sent_ns));
+            let is_new = stamp.is_none_or(|stamp| stamp != state.taken_stamp[index]);
+            let is_due = period.is_none_or(|period| period != state.taken_period[index]);
+            if is_new && is_due {
+                state.taken_stamp[index] = stamp.unwrap_or(u64::MAX);
+                state.taken_period[index] = period.unwrap_or(u64::MAX);
+                let wire_bytes = stream.wire_bytes(self.overhead_bytes);
+                self.line.queue(&mut state.line, index, message, wire_bytes, sent_ns);
+            }
+        }
+    }
+
+    fn outputs(&self, line: &LineState, now_ns: u64) -> Outputs {
+        let counts = &line.counts;
+        let (queued_bytes, queued) = line.waiting();
+        let statistics = LinkStatistics {
+            sent_bytes: self.line.sent_bytes(line, now_ns),
+            queued_bytes,
+            queued,
+            under_way: line.under_way(),
+            delay: counts.delay_ns as f64 * 1e-9,
+            arrived: counts.arrived.iter().sum(),
+            lost: counts.lost.iter().sum(),
+            dropped: counts.dropped.iter().sum(),
+            stream_arrived: counts.arrived,
+            stream_lost: counts.lost,
+            stream_dropped: counts.dropped,
+            ..LinkStatistics::default()
+        };
+        let mut sizes = [0; STREAMS];
+        sizes.iter_mut().zip(&self.streams).for_each(|(size, stream)| *size = stream.size);
+        Outputs { statistics, sizes, streams: self.streams.len(), newest: line.newest }
+    }
+}
+
+impl LinkStream {
+    fn new(name: &str, parameters: &Parameters, context: &NodeContext<'_>) -> Result<Self, ParameterError> {
+        let parameters = parameters.streams.get(name).cloned().unwrap_or_default();
+        let key = |of: &str| format!("streams.{name}.{of}");
+        if let Some(bytes) = parameters.bytes {
+            require(&key("bytes"), bytes, (1..=65_535).contains(&bytes), "from 1 to 65535")?;
+        }
+        if let Some(rate_hz) = parameters.rate_hz {
+            let most = context.period_s().recip();
+            positive_up_to(&key("rate_hz"), rate_hz, most, "Hz, the rate of the link's own steps")?;
+        }
+        Ok(Self { parameters, size: 0, stamp_offset: None })
+    }
+
+    /// Bytes of a message on the wire.
+    #[allow(clippy::cast_possible_truncation, reason = "a message is far shorter than 4 GiB")]
+    fn wire_bytes(&self, overhead_bytes: u32) -> u32 {
+        self.parameters.bytes.unwrap_or(self.size as u32) + overhead_bytes
+    }
+
+    /// The stamp of `message`, as one number.
+    fn stamp(&self, message: &[u8]) -> Option<u64> {
+        let offset = self.stamp_offset?;
+        message[offset..offset + size_of::<Time>()].try_into().ok().map(u64::from_le_bytes)
+    }
+
+    /// The period of the stream's rate in which `time_ns` is, if it has a rate.
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a count of messages")]
+    fn period(&self, time_ns: u64) -> Option<u64> {
+        // A time that is a period's start is in it, however its product was rounded.
+        self.parameters.rate_hz.map(|rate_hz| (time_ns as f64 * rate_hz * 1e-9 + 1e-9) as u64)
+    }
+}
+
+impl Parameters {
+    fn validate(&self) -> Result<(), ParameterError> {
+        let is_good = self.baud.fract() == 0.0 && (1.0..=BAUD_MAX).contains(&self.baud);
+        require("baud", self.baud, is_good, format!("a whole number from 1 to {BAUD_MAX}"))?;
+        let bits = self.bits_per_byte;
+        require(
+            "bits_per_byte",
+            bits,
+            (8..=16).contains(&bits),
+            "from 8 to 16: 8 data bits, start, parity, stop",
+        )?;
+        require("overhead_bytes", self.overhead_bytes, self.overhead_bytes <= 1024, "at most 1024")?;
+        require("queue_bytes", self.queue_bytes, self.queue_bytes <= 1 << 20, "at most 1048576")?;
+        for (key, ms) in [("latency_ms", self.latency_ms), ("jitter_ms", self.jitter_ms)] {
+            not_negative(key, ms)?;
+            require(key, ms, ms <= 60_000.0, "at most 60 000 ms")?;
+        }
+        require("loss", self.loss, (0.0..=1.0).contains(&self.loss), "a fraction from 0 to 1")
+    }
+
+    /// Refuses a stream whose messages never fit into the queue, and tells streams that together exceed the line.
+    fn check_load(&self, context: &NodeContext<'_>) -> Result<(), ParameterError> {
+        let mut offered_bytes_s = 0.0;
+        for message in context.messages {
+            let stream = self.streams.get(message.port);
+            let own = stream.and_then(|stream| stream.bytes).map_or(message.bytes, |bytes| bytes as usize);
+            let bytes = own + self.overhead_bytes as usize;
+            refuse(bytes > self.queue_bytes as usize, "queue_bytes", || {
+                let (port, queue) = (message.port, self.queue_bytes);
+                format!(
+                    "`queue_bytes` is {queue}, and a message of `{port}` takes {bytes} bytes: it would never be sent"
+                )
+            })?;
+            let sent_hz =
+                (f64::from(message.period_ticks.max(context.period_ticks)) * context.tick_s()).recip();
+            let rate_hz =
+                stream.and_then(|stream| stream.rate_hz).map_or(sent_hz, |rate_hz| rate_hz.min(sent_hz));
+            offered_bytes_s += rate_hz * bytes as f64;
+        }
+        let carried_bytes_s = self.baud / f64::from(self.bits_per_byte);
+        if offered_bytes_s > carried_bytes_s * (1.0 + 1e-9) {
+            context.warn("baud", format!(
+                "its streams offer {offered_bytes_s:.0} bytes/s, overhead included, and {} baud carry {carried_bytes_s:.0}: \
+                 messages will wait and be dropped",
+                self.baud
+            ));
+        }
+        Ok(())
+    }
+
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "validated before")]
+    fn line(&self, context: &NodeContext<'_>, priorities: Vec<u32>) -> Line {
+        let ns = |ms: f64| (ms * 1e6).round() as u64;
+        Line {
+            bits_s: self.baud as u64,
+            bits_per_byte: u64::from(self.bits_per_byte),
+            queue_bytes: self.queue_bytes,
+            latency_ns: ns(self.latency_ms),
+            jitter_ns: ns(self.jitter_ms),
+            loss: self.loss,
+            priorities,
+            random: stream(context.seed, context.name),
+        }
+    }
+}
