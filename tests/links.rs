@@ -85,7 +85,8 @@ fn a_link_repeats_itself_and_a_swap_in_flight_loses_nothing_that_is_under_way() 
     require_same(&alone, &swapped);
     // Else nothing was tried: telemetry was lost, and some was under way at the swap.
     let statistics = &alone["/down/statistics"];
-    let word = |tick: usize, at: usize| u32::from_le_bytes(statistics[tick].1[4 + at..8 + at].try_into().unwrap());
+    let word =
+        |tick: usize, at: usize| u32::from_le_bytes(statistics[tick].1[4 + at..8 + at].try_into().unwrap());
     let [under_way, lost] = [word(800, 32), word(1499, 40)];
     assert!(under_way >= 2 && lost > 20, "{under_way} {lost}");
 }
@@ -93,14 +94,17 @@ fn a_link_repeats_itself_and_a_swap_in_flight_loses_nothing_that_is_under_way() 
 #[test]
 fn what_a_link_cannot_carry_is_told_by_the_check() {
     let refused = |more: &str, parts: &[&str]| {
-        let told = load("ground-station.toml", more).and_then(|manifest| hummingbus::Graph::build(&manifest).map(drop));
+        let told = load("ground-station.toml", more)
+            .and_then(|manifest| hummingbus::Graph::build(&manifest).map(drop));
         let told = told.unwrap_err().to_string();
         parts.iter().for_each(|part| assert!(told.contains(part), "{part:?} is not in {told}"));
     };
     let input = |of: &str| format!("[process.up]\ninputs.set_point = {of}\n");
     refused(
         &input("{ topic = \"/mocap/mocap\", delay_ticks = 1, initial = {} }"),
-        &["`set_point` of `controller` reads hummingbus_msgs/msg/SetPoint, /up/set_point carries hummingbus_msgs/msg/Mocap"],
+        &[
+            "`set_point` of `controller` reads hummingbus_msgs/msg/SetPoint, /up/set_point carries hummingbus_msgs/msg/Mocap",
+        ],
     );
     refused(&input("{ topic = \"/pilot/set_point\", delay_ticks = 0 }"), &["is forwarded and has no delay"]);
     let circle = "[process.up]\ninputs.other = { topic = \"/up/other\", delay_ticks = 1, initial = {} }\n";
@@ -110,7 +114,10 @@ fn what_a_link_cannot_carry_is_told_by_the_check() {
     let text = "[process.up]\ninputs.pose = { topic = \"/plant/pose\", delay_ticks = 1, initial = {} }\n";
     refused(text, &["forwards geometry_msgs/msg/PoseStamped, which has text"]);
     let stated = "[process.up]\noutputs.set_point = { type = \"hummingbus_msgs/msg/Imu\" }\n";
-    refused(stated, &["stated as hummingbus_msgs/msg/Imu, its input `set_point` carries hummingbus_msgs/msg/SetPoint"]);
+    refused(
+        stated,
+        &["stated as hummingbus_msgs/msg/Imu, its input `set_point` carries hummingbus_msgs/msg/SetPoint"],
+    );
     refused("[process.up]\nparameters.streams.setpoint = {}\n", &["streams.setpoint", "set_point"]);
     let long = "[process.down]\nparameters.queue_bytes = 50\n";
     refused(long, &["a message of `estimate` takes 55 bytes", "never be sent"]);
@@ -137,7 +144,8 @@ const CONTROLLER: &str = "[process.controller]\ncomputing_time";
 fn a_step_that_takes_five_ticks_is_sent_five_ticks_later_and_four_are_skipped() {
     let (instant, none) = fly("hover.toml", "");
     assert!(none.is_empty());
-    let (slow, overruns) = fly("hover.toml", &format!("{CONTROLLER} = {{ distribution = \"constant\", ms = 5.0 }}\n"));
+    let (slow, overruns) =
+        fly("hover.toml", &format!("{CONTROLLER} = {{ distribution = \"constant\", ms = 5.0 }}\n"));
     // The first step is done at once; from then on one in five is computed.
     assert_eq!(overruns, [("controller".to_owned(), 300, 1199)]);
     let command = |topics: &Topics, tick: usize| topics["/controller/command"][tick].1[12..].to_vec();
@@ -146,7 +154,8 @@ fn a_step_that_takes_five_ticks_is_sent_five_ticks_later_and_four_are_skipped() 
     (1..6).for_each(|tick| assert_eq!(command(&slow, tick), command(&instant, 0), "tick {tick}"));
     for tick in (6..1500).step_by(5) {
         let end = (tick + 5).min(1500);
-        (tick..end).for_each(|same| assert_eq!(command(&slow, same), command(&slow, tick), "ticks {tick}, {same}"));
+        (tick..end)
+            .for_each(|same| assert_eq!(command(&slow, same), command(&slow, tick), "ticks {tick}, {same}"));
         if tick >= 11 {
             assert_ne!(command(&slow, tick), command(&slow, tick - 1), "tick {tick}");
         }
@@ -181,7 +190,8 @@ fn a_process_that_takes_no_time_sends_what_it_would_without_the_key() {
     require_same(&instant, &timed);
     assert_eq!(overruns, [("controller".to_owned(), 0, 0)]);
     // Such a process and one without the key take over from each other.
-    let to_none = format!("{none}{}[swap.with.computing_time]\ndistribution = \"constant\"\nms = 0.0\n", swap("imu"));
+    let to_none =
+        format!("{none}{}[swap.with.computing_time]\ndistribution = \"constant\"\nms = 0.0\n", swap("imu"));
     require_same(&instant, &fly("hover.toml", &to_none).0);
 }
 
@@ -193,9 +203,18 @@ fn a_computing_time_that_none_is_is_told() {
         let told = told.unwrap_err().to_string();
         parts.iter().for_each(|part| assert!(told.contains(part), "{part:?} is not in {told}"));
     };
-    refused("{ distribution = \"constant\", ms = -1.0 }", &["`computing_time` of `controller`", "`ms` must be from 0", "found -1"]);
-    refused("{ distribution = \"uniform\", min_ms = 2.0, max_ms = 1.0 }", &["`max_ms` must be at least `min_ms`, 2", "found 1"]);
-    refused("{ distribution = \"lognormal\", median_ms = 1.0, sigma = 9.0 }", &["`sigma` must be at most 3", "found 9"]);
+    refused(
+        "{ distribution = \"constant\", ms = -1.0 }",
+        &["`computing_time` of `controller`", "`ms` must be from 0", "found -1"],
+    );
+    refused(
+        "{ distribution = \"uniform\", min_ms = 2.0, max_ms = 1.0 }",
+        &["`max_ms` must be at least `min_ms`, 2", "found 1"],
+    );
+    refused(
+        "{ distribution = \"lognormal\", median_ms = 1.0, sigma = 9.0 }",
+        &["`sigma` must be at most 3", "found 9"],
+    );
     refused("{ distribution = \"measured\", file = \"nowhere.json\" }", &["nowhere.json", "No such file"]);
     refused("{ distribution = \"gamma\" }", &["gamma"]);
     refused("{ ms = 1.0 }", &["distribution"]);
