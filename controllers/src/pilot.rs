@@ -21,6 +21,9 @@ pub struct Parameters {
     set_points: Vec<SetPointEntry>,
     /// A recording of sticks, whose channels the schedule leaves alone.
     data: Option<PathBuf>,
+    /// Time in the recording at which tick 0 lies; below 0 its sticks act that much later than it says.
+    #[serde(default)]
+    from_s: f64,
 }
 
 /// Warns of set points that the run ends before.
@@ -58,6 +61,8 @@ pub struct Outputs {
 pub struct Pilot {
     schedule: Schedule,
     sticks: Option<Sticks>,
+    /// Time in the sticks' recording at which tick 0 lies.
+    from_s: f64,
 }
 
 impl Component for Pilot {
@@ -85,8 +90,14 @@ impl Component for Pilot {
             );
             return Err(ParameterError::conflict("set_points", message));
         }
+        let from_s = parameters.from_s;
+        refuse(from_s != 0.0 && sticks.is_none(), "from_s", || {
+            format!(
+                "`from_s` is {from_s} s, in no recording: it moves the sticks in `data`, not the schedule"
+            )
+        })?;
         warn_of_late(&parameters.set_points, context);
-        Ok(Self { schedule, sticks })
+        Ok(Self { schedule, sticks, from_s })
     }
 
     fn initial(&self) {}
@@ -107,7 +118,7 @@ impl Component for Pilot {
 impl Pilot {
     fn at(&self, tick: u64, time_s: f64) -> Values {
         let scheduled = self.schedule.at(tick);
-        self.sticks.as_ref().map_or(scheduled, |sticks| sticks.at(time_s, &scheduled))
+        self.sticks.as_ref().map_or(scheduled, |sticks| sticks.at(self.from_s + time_s, &scheduled))
     }
 }
 
@@ -128,6 +139,21 @@ mod tests {
         let pilot = pilot(&format!("set_points = [{climb}]")).unwrap();
         assert_eq!((pilot.at(0, 0.0).altitude_m, pilot.at(3000, 3.0).altitude_m), (1.5, 2.0));
         assert!((0..30).any(|at_s| pilot.at(0, f64::from(at_s)).roll_rad != 0.0));
+    }
+
+    #[test]
+    fn sticks_act_as_much_later_as_tick_0_lies_before_their_recording() {
+        let (prompt, late) = (pilot("").unwrap(), pilot("from_s = -0.15").unwrap());
+        let moving_s = (0..300).map(|tenth| f64::from(tenth) / 10.0);
+        for at_s in moving_s {
+            let (there, here) = (prompt.at(0, at_s).roll_rad, late.at(0, at_s + 0.15).roll_rad);
+            assert!((there - here).abs() < 1e-9, "at {at_s}");
+        }
+        assert_ne!(prompt.at(0, 5.0), late.at(0, 5.0));
+        let parameters = serde_json::json!({"initial_altitude_m": 1.0, "from_s": -0.15});
+        let refused =
+            Registration::of::<Pilot>().check(&parameters, &NodeContext::new("node", &[])).unwrap_err();
+        assert!(refused.to_string().contains("`from_s` is -0.15 s, in no recording"), "{refused}");
     }
 
     #[test]

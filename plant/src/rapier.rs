@@ -202,9 +202,9 @@ impl Rapier {
         self.state.body = body;
         self.contacts.place(None, 0);
         let arm_W_m = body.attitude_WB * rig.mount_B_m;
-        let speed_m_s = body.velocity_W_m_s.z + spin_W_rad_s(&body).cross(&arm_W_m).z;
+        let velocity_W_m_s = body.velocity_W_m_s + spin_W_rad_s(&body).cross(&arm_W_m);
         if let Some(slider) = self.world.slider() {
-            rig::place(slider, &bearing_W_m, speed_m_s);
+            rig::place(slider, rig, &bearing_W_m, &velocity_W_m_s);
         }
     }
 }

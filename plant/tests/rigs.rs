@@ -201,6 +201,47 @@ fn it_swings_about_the_bearing_as_a_pendulum_does() {
 }
 
 #[test]
+fn a_bearing_that_sways_moves_aside_with_the_thrust_and_no_further_than_it_may() {
+    let mut scene = frictionless(SLIDING);
+    let rig = scene.rig.as_mut().unwrap();
+    (rig.sway_m, rig.moving_mass_kg) = (0.2, 0.01);
+    let rig = *rig;
+    let lean = |tick| if tick < 150 { [76.5, 77.5, 76.5, 75.5] } else { [76.5, 75.5, 76.5, 77.5] };
+    let mut plant = hanging(&scene, 0.0);
+    let mut most_m = 0.0_f64;
+    for tick in 0..4_000 {
+        plant.step(&lean(tick % 300), TICK_S, &[]);
+        let off_m = bearing_W_m(&plant, &rig).xy();
+        // The end stop acts where it is passed, here by a vehicle that comes flying.
+        assert!(off_m.amax() < rig.sway_m + 5e-3, "tick {tick}: {off_m:?}");
+        most_m = most_m.max(off_m.amax());
+    }
+    assert!(most_m > 0.19, "it sways, or this shows nothing: {most_m}");
+}
+
+#[test]
+fn while_it_may_sway_it_turns_and_moves_aside_as_in_free_flight() {
+    let mut scene = frictionless(SLIDING);
+    let rig = scene.rig.as_mut().unwrap();
+    (rig.sway_m, rig.heave_m, rig.moving_mass_kg) = (100.0, 100.0, 1e-3);
+    let start = RigidBody::level_at(Vector3::new(0.0, 0.0, 2.0));
+    let flown = |scene: &Scene| {
+        let mut plant = common::rapier(NewtonEuler::new(hummingbird(), 1), scene, &start, 1.0);
+        plant.settle_rotors(&[78.0; 4]);
+        for tick in 0..600 {
+            let lean = if tick % 200 < 100 { 2.0 } else { -2.0 };
+            plant.step(&[78.0 + lean, 78.0 + lean, 78.0 - lean, 78.0 - lean], TICK_S, &[]);
+        }
+        // Aside only: what hangs with it, a gram, weighs.
+        (tilt_deg(&plant), (plant.state().body.position_W_m - start.position_W_m).xy())
+    };
+    let ((hung_deg, hung_m), (free_deg, free_m)) = (flown(&scene), flown(&Scene::default()));
+    assert!(free_deg > 5.0 && free_m.norm() > 0.03, "it leans and moves: {free_deg} deg, {free_m:?}");
+    assert!((hung_deg - free_deg).abs() < 0.02 * free_deg, "{hung_deg} deg, free {free_deg} deg");
+    assert!((hung_m - free_m).norm() < 0.02 * free_m.norm(), "{hung_m:?}, free {free_m:?}");
+}
+
+#[test]
 fn friction_takes_energy_and_brings_it_to_rest() {
     for text in [SLIDING, FIXED] {
         let mut plant = swinging(&scene(text));

@@ -1,12 +1,13 @@
 //! The judgement of a run: its pass conditions and comparisons, evaluated on the recording.
 
+use crate::response::{NoResponse, Response};
 use crate::states::{FIELDS_OF_POSE, tracks};
 use anyhow::{Result, anyhow, bail};
 use flights::state::StateQuantity;
 use recorder::RecordingError;
 use recorder::reader::Recording;
 use recorder::series::Series;
-use runtime::manifest::{Comparison, Content, PassCondition, Statistic};
+use runtime::manifest::{Comparison, Content, PassCondition, Reference, Statistic};
 use serde::Serialize;
 use std::fmt;
 
@@ -16,7 +17,7 @@ use std::fmt;
 /// use report::judge::Verdict;
 /// let (name, unit) = ("altitude".to_owned(), "m".to_owned());
 /// let values = vec![1.49, 1.51];
-/// let verdict = Verdict { name, values, unit, min: Some(1.4), max: Some(1.6), passed: true };
+/// let verdict = Verdict { name, values, unit, min: Some(1.4), max: Some(1.6), passed: true, why: None };
 /// assert_eq!(verdict.to_string(), "  ok     altitude: 1.4900 … 1.5100 m (1.4 … 1.6)");
 /// ```
 #[derive(Debug, Serialize)]
@@ -33,6 +34,9 @@ pub struct Verdict {
     pub max: Option<f64>,
     /// Whether it held.
     pub passed: bool,
+    /// Why there are no values, where more is to say than that there were no samples.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub why: Option<String>,
 }
 
 /// RMS errors of a simulated state at the ends of windows; its text is a line of the summary.
@@ -90,7 +94,7 @@ pub(crate) fn verdicts(content: &Content, recording: &Recording) -> Result<Vec<V
     verdicts.collect()
 }
 
-/// All series that a condition needs: the judged field's parts, those that are taken off, the gate's.
+/// All series that a condition needs: the judged field's parts, those that are taken off, the reference's, the gate's.
 fn wanted(pass: &PassCondition, recording: &Recording) -> Result<Vec<(String, String)>> {
     let parts = |topic: &String, field: &str| {
         let parts = recording.parts(topic, field)?.into_iter();
@@ -105,6 +109,16 @@ fn wanted(pass: &PassCondition, recording: &Recording) -> Result<Vec<(String, St
         }
         wanted.extend(other);
     }
+    if let Some(reference) = &pass.reference {
+        let other = parts(&reference.topic, &reference.field)?;
+        if wanted.len() + other.len() != 2 {
+            bail!(
+                "pass condition `{}`: a lag or a gain is of one number behind another, not of vectors",
+                pass.name
+            );
+        }
+        wanted.extend(other);
+    }
     if let Some(gate) = &pass.gate {
         wanted.push((gate.topic.clone(), gate.field.clone()));
     }
@@ -112,11 +126,74 @@ fn wanted(pass: &PassCondition, recording: &Recording) -> Result<Vec<(String, St
 }
 
 fn verdict(pass: &PassCondition, series: &[Series]) -> Result<Verdict> {
+    let found = match &pass.reference {
+        Some(reference) => response(pass, reference, &series[0], &series[1])?,
+        None => Ok(judged_values(pass, series)?),
+    };
+    let (values, why) = match found {
+        Ok(values) => (values, None),
+        Err(why) => (Vec::new(), Some(why.to_string())),
+    };
+    // A span without samples fails: what was never measured did not pass.
+    let passed = !values.is_empty() && values.iter().all(|value| within(*value, pass.min, pass.max));
+    let (name, unit) = (pass.name.clone(), pass.unit.clone());
+    Ok(Verdict { name, values, unit, min: pass.min, max: pass.max, passed, why })
+}
+
+/// From the unit of what `pass` judges, of a field in `field_unit`, to that of its limits.
+fn factor(pass: &PassCondition, field_unit: &str) -> Result<f64> {
+    diagnostics::convert(pass.statistic.unit(field_unit), &pass.unit)
+        .map_err(|error| anyhow!("pass condition `{}`: {error}", pass.name))
+}
+
+/// Lag or gain of `field` behind `signal`, of which the newest sample counts.
+fn response(
+    pass: &PassCondition,
+    reference: &Reference,
+    field: &Series,
+    signal: &Series,
+) -> Result<Result<Vec<f64>, NoResponse>> {
+    if field.unit != signal.unit {
+        let (name, Reference { topic, field: path, .. }) = (&pass.name, reference);
+        let (unit, other) = (&field.unit, &signal.unit);
+        bail!(
+            "pass condition `{name}`: the field is in `{unit}`, its reference, `{path}` of {topic}, in `{other}`"
+        );
+    }
+    let factor = factor(pass, &field.unit)?;
+    let known = span(field, pass.from_s, pass.to_s)
+        .filter_map(|(index, time_ns)| Some((field.value[index], held(signal, time_ns)?)));
+    let (values, references): (Vec<f64>, Vec<f64>) = known.unzip();
+    let Some(step_s) = step_s(field) else { return Ok(Err(NoResponse::TooShort)) };
+    let found = Response::of(&values, &references, samples(reference.within_s / step_s));
+    let value = |found: Response| match pass.statistic {
+        Statistic::Lag => found.lag_samples as f64 * step_s,
+        _ => found.gain,
+    };
+    Ok(found.map(|found| vec![value(found) * factor]))
+}
+
+/// Time between two samples.
+fn step_s(series: &Series) -> Option<f64> {
+    let [first, second, ..] = series.time_ns[..] else { return None };
+    Some((second - first) as f64 * 1e-9)
+}
+
+#[allow(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "a number of samples, cut off where absurd"
+)]
+fn samples(count: f64) -> usize {
+    count.round() as usize
+}
+
+/// The values that `pass` compares with its limits.
+fn judged_values(pass: &PassCondition, series: &[Series]) -> Result<Vec<f64>> {
     let (signals, gates) = series.split_at(series.len() - usize::from(pass.gate.is_some()));
     let gate = pass.gate.as_ref().zip(gates.first());
     let (judged, taken) = signals.split_at(signals.len() / if pass.minus.is_some() { 2 } else { 1 });
-    let factor = diagnostics::convert(&judged[0].unit, &pass.unit)
-        .map_err(|error| anyhow!("pass condition `{}`: {error}", pass.name))?;
+    let factor = factor(pass, &judged[0].unit)?;
     let is_open = |time_ns: u64| {
         gate.is_none_or(|(gate, series)| {
             held(series, time_ns).is_some_and(|value| within(value, gate.min, gate.max))
@@ -126,11 +203,7 @@ fn verdict(pass: &PassCondition, series: &[Series]) -> Result<Verdict> {
         .filter(|(_, time_ns)| is_open(*time_ns))
         .filter_map(|(index, time_ns)| difference(judged, taken, index, time_ns))
         .map(|value| value * factor);
-    let values = statistic(pass.statistic, samples);
-    // A span without samples fails: what was never measured did not pass.
-    let passed = !values.is_empty() && values.iter().all(|value| within(*value, pass.min, pass.max));
-    let (name, unit) = (pass.name.clone(), pass.unit.clone());
-    Ok(Verdict { name, values, unit, min: pass.min, max: pass.max, passed })
+    Ok(statistic(pass.statistic, samples))
 }
 
 /// Whether `value` is a number between the limits that there are.
@@ -183,13 +256,17 @@ fn statistic(statistic: Statistic, samples: impl Iterator<Item = f64>) -> Vec<f6
         Statistic::Rms => vec![mean(|value| value * value).sqrt()],
         Statistic::Last => vec![last],
         Statistic::Span => vec![extreme(f64::max) - extreme(f64::min)],
+        Statistic::Lag | Statistic::Gain => {
+            unreachable!("of a reference, without which the manifest is refused")
+        }
     }
 }
 
 impl fmt::Display for Verdict {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let values: Vec<String> = self.values.iter().map(|value| format!("{value:.4}")).collect();
-        let values = if values.is_empty() { "no samples".to_owned() } else { values.join(" … ") };
+        let nothing = || self.why.clone().map_or("no samples".to_owned(), |why| format!("no value: {why};"));
+        let values = if values.is_empty() { nothing() } else { values.join(" … ") };
         let limit = match (self.min, self.max) {
             (Some(min), Some(max)) => format!("{min} … {max}"),
             (Some(min), None) => format!("at least {min}"),
@@ -285,6 +362,57 @@ mod tests {
         let verdict = verdict(&gated, &[judged, series("1", &[0.0, 1.0, 2.0])]).unwrap();
         assert_eq!(verdict.values, [8.0, 10.0]);
         assert!(verdict.passed);
+    }
+
+    /// The condition on the lag or gain of `/a` behind `/b`, in `unit`.
+    fn response(statistic: &str, unit: &str, more: &str) -> PassCondition {
+        let text = format!(
+            "name = \"c\"\ntopic = \"/a\"\nfield = \"p\"\nunit = \"{unit}\"\nstatistic = \"{statistic}\"\nmin = -2500.0\n\
+             reference = {{ topic = \"/b\", field = \"p\", within_s = 4.0 }}\n{more}"
+        );
+        toml::from_str(&text).unwrap()
+    }
+
+    /// A pulse of 1 among 20 samples, around the sample `at`.
+    fn pulse(at: i32) -> Vec<f64> {
+        (0..20).map(|index| f64::from(3 - i32::min((index - at).abs(), 3))).collect()
+    }
+
+    #[test]
+    fn lag_and_gain_are_told_in_the_unit_of_the_limits() {
+        let doubled: Vec<f64> = pulse(7).iter().map(|value| value * 2.0).collect();
+        for (reference_at, lag_s) in [(5, 2.0), (7, 0.0), (10, -3.0)] {
+            let both = [series("m", &doubled), series("m", &pulse(reference_at))];
+            assert_eq!(verdict(&response("lag", "s", ""), &both).unwrap().values, [lag_s]);
+            let lag = verdict(&response("lag", "ms", ""), &both).unwrap();
+            assert_eq!((lag.values[0], lag.passed), (lag_s * 1000.0, lag_s > -2.5));
+            assert!((verdict(&response("gain", "1", ""), &both).unwrap().values[0] - 2.0).abs() < 1e-12);
+        }
+    }
+
+    #[test]
+    fn the_span_is_that_of_the_field_and_a_slower_reference_is_held() {
+        let lag = response("lag", "s", "from_s = 1.0\nto_s = 18.0");
+        let slow = pulse(6).into_iter().step_by(2).collect::<Vec<_>>();
+        let mut slow = series("m", &slow);
+        slow.time_ns.iter_mut().for_each(|time_ns| *time_ns *= 2);
+        assert_eq!(verdict(&lag, &[series("m", &pulse(9)), slow]).unwrap().values, [2.0]);
+    }
+
+    #[test]
+    fn a_lag_that_nothing_tells_fails_and_says_why() {
+        let constant = [series("m", &pulse(9)), series("m", &[1.0; 20])];
+        let verdict_of = |both: &[Series]| verdict(&response("lag", "s", ""), both);
+        let judged = verdict_of(&constant).unwrap();
+        assert!(!judged.passed && judged.values.is_empty());
+        let text = judged.to_string();
+        assert!(text.contains("FAILED c: no value: the reference is constant"), "{text}");
+        let other = [series("m", &pulse(9)), series("rad", &pulse(9))];
+        let error = verdict_of(&other).unwrap_err().to_string();
+        assert!(
+            error.contains("`c`") && error.contains("`m`") && error.contains("`p` of /b, in `rad`"),
+            "{error}"
+        );
     }
 
     #[test]

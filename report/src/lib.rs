@@ -3,6 +3,7 @@
 //! | room | what it holds |
 //! |---|---|
 //! | [`judge`] | pass conditions and comparisons, evaluated on a recording |
+//! | `response` | lag and gain of a signal behind another |
 //! | [`shadow`] | how outputs went on at take-overs, and what shadows asked for otherwise |
 //! | [`summary`] | all that there is to say about a run, as text and as JSON |
 //! | [`plot`] | curves over time and paths in space, as a page, PNG or SVG |
@@ -21,6 +22,7 @@ pub mod judge;
 pub mod page;
 pub mod plot;
 pub mod profile;
+mod response;
 pub mod shadow;
 mod states;
 pub mod summary;

@@ -22,7 +22,7 @@ mod sources;
 mod tree;
 
 pub use builder::ManifestBuilder;
-pub use content::{Comparison, Content, PaceSetting, PassCondition, Statistic};
+pub use content::{Comparison, Content, PaceSetting, PassCondition, Reference, Statistic};
 pub(crate) use content::{ComputingTimeSetting, InputSetting, OutputSetting, Process, SwapSetting};
 
 pub(crate) use sets::is_name;

@@ -24,6 +24,8 @@ pub struct Rig {
     pub tilt_max_rad: f64,
     /// How far the bearing travels up; 0 where it does not.
     pub heave_m: f64,
+    /// How far the bearing may move from its line along either horizontal axis of the world; 0 where it may not.
+    pub sway_m: f64,
     /// Mass that travels with the bearing, beside the vehicle.
     pub moving_mass_kg: f64,
     /// Torque of the bearing's dry friction, against any rotation.
@@ -81,6 +83,7 @@ pub(crate) fn parse(section: &Section) -> Result<Rig, Diagnostic> {
         mount_B_m: section.vector("mount", LENGTH, &MOUNT)?.into(),
         tilt_max_rad: tilt_max()?.si,
         heave_m: amount("heave", LENGTH)?,
+        sway_m: if section.has("sway") { amount("sway", LENGTH)? } else { 0.0 },
         moving_mass_kg: section.bounded("moving_mass", MASS, &MOVING_MASS)?,
         bearing_friction_N_m: amount("bearing_friction", TORQUE)?,
         bearing_damping_N_m_s: amount("bearing_damping", ROTARY_DAMPING)?,

@@ -25,6 +25,26 @@ fn a_condition_on_a_field_or_in_a_unit_that_is_none() {
 }
 
 #[test]
+fn a_lag_or_gain_without_a_reference_that_it_can_have() {
+    let with = |keys: &str| {
+        let lag = PASS.replace("\"max\"", "\"lag\"").replace("unit = \"m\"", "unit = \"ms\"");
+        refused_with(&format!("\n§{lag}{keys}"))
+    };
+    let reference = |rest: &str| format!("reference = {{ topic = \"/plant/state\", {rest} }}\n");
+    let height = reference("field = \"position.z\"");
+    with("").says(&["pass condition `low`", "`lag` has no `reference`", "add what it is measured against"]);
+    with(&reference("field = \"position.q\"")).says(&["`position.q`", "position.z"]);
+    with(&reference("field = \"attitude.roll\"")).says(&["the field is in `m`, its `reference` in `rad`"]);
+    with(&reference("field = \"position.z\", within_s = 0.0")).says(&["`within_s` of `reference` is 0 s"]);
+    with(&height.replace("state", "stat")).says(&["nobody publishes /plant/stat", "did you mean"]);
+    let minus = height.replace("reference", "minus");
+    with(&format!("{height}{minus}")).says(&["the statistic `lag` cannot have `minus`", "from_s and to_s"]);
+    refused_with(&format!("\n§{PASS}{height}")).says(&["`reference` is there", "`lag` and `gain`"]);
+    let metres = PASS.replace("\"max\"", "\"lag\"");
+    refused_with(&format!("\n§{metres}{height}")).says(&["`m` is not a unit of time"]);
+}
+
+#[test]
 fn a_condition_without_a_recorder() {
     let ended = refused("[process.recorder]\nkind = \"recorder\"\n", &format!("§{PASS}"));
     ended.says(&["/plant/state is judged but not recorded", "kind = \"recorder\""]);

@@ -61,6 +61,21 @@ fn sticks_in_both_rigs() {
 }
 
 #[test]
+fn rotors_hover_faster_where_they_lift_what_hangs_in_the_rig() {
+    fly("rig-hover");
+}
+
+/// Of each the conditions in its first seconds, roll and pitch; `scripts/rig_delay` flies them whole.
+#[test]
+fn a_delay_beside_the_loop_shows_as_it_is_and_one_inside_is_not_flyable() {
+    for name in ["print-b", "imu"] {
+        let (place, manifest) = (Place::new(), repository(&format!("manifests/rig-delay/{name}.toml")));
+        let recording = place.path("flight.mcap");
+        place.call(&["run", &manifest, "--record", &recording, "--set", "run.duration_s=7"]).with_code(0);
+    }
+}
+
+#[test]
 fn stops_before_a_wall_by_our_law_and_the_thesis_s_and_with_gps_in_the_open() {
     for manifest in ["wall-stop", "wall-stop-thesis", "wall-stop-open-gps"] {
         fly(manifest);
@@ -126,6 +141,14 @@ fn no_controller_is_told_the_truth() {
         "take-off-attitude",
         "rig-a",
         "rig-b",
+        "rig-hover",
+        "rig-delay/nothing",
+        "rig-delay/command",
+        "rig-delay/imu",
+        "rig-delay/sticks",
+        "rig-delay/log",
+        "rig-delay/print-a",
+        "rig-delay/print-b",
         "wall-stop-slow",
         "wall-stop",
         "wall-stop-fast",

@@ -1,7 +1,8 @@
 //! A test rig as rapier's joints: a slider on the vertical, and a bearing that the vehicle hangs from.
 //!
 //! The slider is a body that can only move up and down (rapier takes its other directions out of the equations, so
-//! that no link without mass makes them stiff). A ball joint ties the vehicle's mount to it and leaves all three
+//! that no link without mass makes them stiff), and sideways where the rig sways: level within a square, as the lower
+//! end of a long tube does for small angles, with no friction and nothing that leads it back. A ball joint ties the vehicle's mount to it and leaves all three
 //! rotations free; where the rig does not heave, to a point of the world.
 //!
 //! The tilt limit is a cone, as of a rod end, and the same at any yaw: a limit on Euler angles would not be. It
@@ -26,14 +27,14 @@ const LEVER_M: f64 = 0.1;
 /// A bearing that starts lower than this above the lower end of its travel is there: tuned, no source.
 const LOWER_END_M: f64 = 1e-6;
 
-/// Builds `rig` around `vehicle`; returns the slider where it heaves.
+/// Builds `rig` around `vehicle`; returns the slider where it heaves or sways.
 pub(super) fn build(
     physics: &mut PhysicsWorld,
     vehicle: RigidBodyHandle,
     rig: &Rig,
 ) -> Option<RigidBodyHandle> {
     let foot = physics.insert_body(RigidBodyBuilder::fixed().translation(to_rapier(&rig.bearing_W_m)));
-    let slider = (rig.heave_m > 0.0).then(|| slider(physics, foot, rig));
+    let slider = (rig.heave_m > 0.0 || rig.sway_m > 0.0).then(|| slider(physics, foot, rig));
     let above = slider.unwrap_or(foot);
     let (mount, lever) = (to_rapier(&rig.mount_B_m), Vector::Z * LEVER_M);
     physics.insert_impulse_joint(above, vehicle, SphericalJointBuilder::new().local_anchor2(mount));
@@ -43,16 +44,22 @@ pub(super) fn build(
 }
 
 fn slider(physics: &mut PhysicsWorld, foot: RigidBodyHandle, rig: &Rig) -> RigidBodyHandle {
-    let only_up =
-        LockedAxes::ROTATION_LOCKED | LockedAxes::TRANSLATION_LOCKED_X | LockedAxes::TRANSLATION_LOCKED_Y;
+    let on_its_line = LockedAxes::TRANSLATION_LOCKED_X | LockedAxes::TRANSLATION_LOCKED_Y;
+    let sways = rig.sway_m > 0.0;
+    let locked = LockedAxes::ROTATION_LOCKED | if sways { LockedAxes::empty() } else { on_its_line };
     let mass = MassProperties::new(Vector::ZERO, rig.moving_mass_kg, Vector::ZERO);
     let slider = RigidBodyBuilder::dynamic()
         .translation(to_rapier(&rig.bearing_W_m))
         .additional_mass_properties(mass)
-        .locked_axes(only_up)
+        .locked_axes(locked)
         .can_sleep(false);
     let slider = physics.insert_body(slider);
-    let travel = GenericJointBuilder::new(JointAxesMask::empty()).limits(JointAxis::LinZ, [0.0, rig.heave_m]);
+    let mut travel =
+        GenericJointBuilder::new(JointAxesMask::empty()).limits(JointAxis::LinZ, [0.0, rig.heave_m]);
+    if sways {
+        let side = [-rig.sway_m, rig.sway_m];
+        travel = travel.limits(JointAxis::LinX, side).limits(JointAxis::LinY, side);
+    }
     physics.insert_impulse_joint(foot, slider, travel.build());
     slider
 }
@@ -73,10 +80,16 @@ pub(super) fn holds(rig: &Rig, body: &RigidBody, lift_N: f64, gravity_m_s2: f64)
     rig.heave_m == 0.0 || (raised_m < LOWER_END_M && lift_N < needed_N)
 }
 
-/// Puts the slider at `bearing_W_m`, moving with the vehicle's mount.
-pub(super) fn place(slider: &mut Slider, bearing_W_m: &Vector3<f64>, speed_m_s: f64) {
+/// Puts the slider at `bearing_W_m`, moving with the vehicle's mount where it can.
+pub(super) fn place(
+    slider: &mut Slider,
+    rig: &Rig,
+    bearing_W_m: &Vector3<f64>,
+    velocity_W_m_s: &Vector3<f64>,
+) {
     slider.set_translation(to_rapier(bearing_W_m), true);
-    slider.set_linvel(Vector::Z * speed_m_s, true);
+    let freedom = if rig.sway_m > 0.0 { Vector::ONE } else { Vector::Z };
+    slider.set_linvel(freedom * to_rapier(velocity_W_m_s), true);
 }
 
 /// Weight and friction of the slider over a step of `span_s`.

@@ -160,14 +160,27 @@ fn check_field(manifest: &Manifest, plan: &Plan, pass: &Spanned<PassCondition>) 
     {
         return Err(at(format!("`while`: {message}"), &help));
     }
+    if let Some((message, help)) = unfit_reference(condition) {
+        return Err(at(message, help));
+    }
     let Some(unit_here) = unit(&condition.topic, &condition.field)? else { return Ok(()) };
-    diagnostics::convert(&unit_here, &condition.unit)
+    diagnostics::convert(condition.statistic.unit(&unit_here), &condition.unit)
         .map_err(|error| at(error.to_string(), "state the limits in a unit of the field's quantity"))?;
     if let Some(minus) = &condition.minus
         && let Some(other) = unit(&minus.topic, &minus.field)?
         && other != unit_here
     {
         return Err(at(format!("`minus` takes `{other}` off `{unit_here}`"), "compare fields of one unit"));
+    }
+    if let Some(reference) = &condition.reference
+        && let Some(other) = unit(&reference.topic, &reference.field)?
+        && other != unit_here
+    {
+        let message = format!("the field is in `{unit_here}`, its `reference` in `{other}`");
+        return Err(at(
+            message,
+            "compare fields of one unit, such as an angle with the angle that is asked for",
+        ));
     }
     if let Some(gate) = &condition.gate {
         unit(&gate.topic, &gate.field)?;
@@ -176,6 +189,38 @@ fn check_field(manifest: &Manifest, plan: &Plan, pass: &Spanned<PassCondition>) 
         }
     }
     Ok(())
+}
+
+/// Why a condition's `reference` does not fit its statistic, and what to do.
+fn unfit_reference(condition: &PassCondition) -> Option<(String, &'static str)> {
+    let name = match condition.statistic {
+        Statistic::Gain => "gain",
+        _ => "lag",
+    };
+    let Some(reference) = &condition.reference else {
+        let help =
+            "add what it is measured against: reference = { topic = \"/pilot/set_point\", field = \"roll\" }";
+        let is_of_response = condition.statistic.is_of_response();
+        return is_of_response.then(|| (format!("the statistic `{name}` has no `reference`"), help));
+    };
+    let beside = [("minus", condition.minus.is_some()), ("while", condition.gate.is_some())];
+    if !condition.statistic.is_of_response() {
+        return Some((
+            "`reference` is there".to_owned(),
+            "only the statistics `lag` and `gain` have one: leave it out",
+        ));
+    }
+    if let Some((key, _)) = beside.into_iter().find(|(_, is_there)| *is_there) {
+        let help = "a lag is looked for in two whole signals: leave the key out, and narrow the span with from_s and to_s";
+        return Some((format!("the statistic `{name}` cannot have `{key}`"), help));
+    }
+    let within_s = reference.within_s;
+    (within_s <= 0.0).then(|| {
+        (
+            format!("`within_s` of `reference` is {within_s} s"),
+            "it is the largest lag that is looked for: some time above 0",
+        )
+    })
 }
 
 /// The unit of a field; `None` for a user's own type, which only its publisher knows: it is checked when the run is
@@ -194,7 +239,11 @@ fn unit_of(
 
 /// The topics that a condition reads.
 fn judged_topics(pass: &PassCondition) -> Vec<&String> {
-    let others = [pass.minus.as_ref().map(|minus| &minus.topic), pass.gate.as_ref().map(|gate| &gate.topic)];
+    let others = [
+        pass.minus.as_ref().map(|minus| &minus.topic),
+        pass.reference.as_ref().map(|reference| &reference.topic),
+        pass.gate.as_ref().map(|gate| &gate.topic),
+    ];
     std::iter::once(&pass.topic).chain(others.into_iter().flatten()).collect()
 }
 

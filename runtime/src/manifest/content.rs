@@ -294,6 +294,33 @@ pub enum Statistic {
     Last,
     /// The largest sample less the smallest: how far a vehicle slid.
     Span,
+    /// How long the field comes behind a reference: where their normalized cross-correlation is largest.
+    Lag,
+    /// How many times the reference the field is, shifted by that lag: the slope of the line of least squares.
+    Gain,
+}
+
+impl Statistic {
+    /// Whether it compares the field with a reference.
+    #[must_use]
+    pub fn is_of_response(self) -> bool {
+        matches!(self, Self::Lag | Self::Gain)
+    }
+
+    /// The unit of its values, of a field in `field_unit`.
+    ///
+    /// ```
+    /// use runtime::manifest::Statistic;
+    /// assert_eq!([Statistic::Rms, Statistic::Lag, Statistic::Gain].map(|it| it.unit("rad")), ["rad", "s", "1"]);
+    /// ```
+    #[must_use]
+    pub fn unit(self, field_unit: &str) -> &str {
+        match self {
+            Self::Lag => "s",
+            Self::Gain => "1",
+            _ => field_unit,
+        }
+    }
 }
 
 /// A condition on a field of a topic over a span of simulated time.
@@ -316,6 +343,8 @@ pub struct PassCondition {
     pub field: String,
     /// What is taken off first, sample by sample.
     pub minus: Option<Signal>,
+    /// What a lag or a gain is measured against.
+    pub reference: Option<Reference>,
     /// Unit of the limits.
     pub unit: String,
     /// Start of the span; the start of the run where absent.
@@ -342,6 +371,23 @@ pub struct Signal {
     pub topic: String,
     /// Field.
     pub field: String,
+}
+
+/// A signal that another follows, or leads.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Reference {
+    /// Topic.
+    pub topic: String,
+    /// Field.
+    pub field: String,
+    /// The lag is looked for from this much ahead of the reference to this much behind it, s.
+    #[serde(default = "default_within_s")]
+    pub within_s: f64,
+}
+
+fn default_within_s() -> f64 {
+    1.0
 }
 
 /// Limits of a signal, in its own unit, within which a condition judges.
