@@ -143,10 +143,6 @@ fn check_field(manifest: &Manifest, plan: &Plan, pass: &Spanned<PassCondition>) 
     if condition.min.is_none() && condition.max.is_none() {
         return Err(at("it has no limit, so it cannot fail".into(), "add `min`, `max`, or both"));
     }
-    let unit = |topic: &str, field: &str| {
-        unit_of(manifest, plan, topic, field)
-            .map_err(|error| at(error.to_string(), "name one of these fields"))
-    };
     let least = match condition.statistic {
         Statistic::Rms => Some((0.0, "the root of a mean square")),
         Statistic::Span => Some((0.0, "the largest sample less the smallest")),
@@ -163,6 +159,22 @@ fn check_field(manifest: &Manifest, plan: &Plan, pass: &Spanned<PassCondition>) 
     if let Some((message, help)) = unfit_reference(condition) {
         return Err(at(message, help));
     }
+    if condition.gate.as_ref().is_some_and(|gate| gate.min.is_none() && gate.max.is_none()) {
+        return Err(at("`while` has no limit".into(), "add `min`, `max`, or both to it"));
+    }
+    check_units(manifest, plan, pass)
+}
+
+/// Refuses fields that are not there, and units that do not fit each other.
+fn check_units(manifest: &Manifest, plan: &Plan, pass: &Spanned<PassCondition>) -> Result<(), Diagnostic> {
+    let condition = pass.get_ref();
+    let at = |message: String, help: &str| {
+        manifest.problem(&pass.span(), format!("pass condition `{}`: {message}", condition.name), help)
+    };
+    let unit = |topic: &str, field: &str| {
+        unit_of(manifest, plan, topic, field)
+            .map_err(|error| at(error.to_string(), "name one of these fields"))
+    };
     let Some(unit_here) = unit(&condition.topic, &condition.field)? else { return Ok(()) };
     diagnostics::convert(condition.statistic.unit(&unit_here), &condition.unit)
         .map_err(|error| at(error.to_string(), "state the limits in a unit of the field's quantity"))?;
@@ -177,16 +189,10 @@ fn check_field(manifest: &Manifest, plan: &Plan, pass: &Spanned<PassCondition>) 
         && other != unit_here
     {
         let message = format!("the field is in `{unit_here}`, its `reference` in `{other}`");
-        return Err(at(
-            message,
-            "compare fields of one unit, such as an angle with the angle that is asked for",
-        ));
+        return Err(at(message, "compare fields of one unit, as an angle with the one asked for"));
     }
     if let Some(gate) = &condition.gate {
         unit(&gate.topic, &gate.field)?;
-        if gate.min.is_none() && gate.max.is_none() {
-            return Err(at("`while` has no limit".into(), "add `min`, `max`, or both to it"));
-        }
     }
     Ok(())
 }
