@@ -145,8 +145,7 @@ impl Line {
             state.counts.dropped[stream] += 1;
             return;
         };
-        // At most STREAMS.
-        #[allow(clippy::cast_possible_truncation)]
+        #[allow(clippy::cast_possible_truncation, reason = "at most STREAMS")]
         let stream = stream as u32;
         *place = Parcel {
             number,

@@ -374,8 +374,9 @@ impl Parameters {
         let mut offered_bytes_s = 0.0;
         for message in context.messages {
             let stream = self.streams.get(message.port);
-            let own = stream.and_then(|stream| stream.bytes).map_or(message.bytes, |bytes| bytes as usize);
-            let bytes = own + self.overhead_bytes as usize;
+            let message_bytes =
+                stream.and_then(|stream| stream.bytes).map_or(message.bytes, |bytes| bytes as usize);
+            let bytes = message_bytes + self.overhead_bytes as usize;
             refuse(bytes > self.queue_bytes as usize, "queue_bytes", || {
                 let (port, queue) = (message.port, self.queue_bytes);
                 format!(

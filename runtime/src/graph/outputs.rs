@@ -118,9 +118,11 @@ fn published_by(node: usize, declared: &DeclaredNode<'_>) -> Result<Vec<Publishe
                 kind.outputs.iter().map(|port| port.name).chain(forwarded.iter().map(|(port, _)| *port));
             require_known_ports(declared, "output", names, &process.outputs)?;
             let is_on = |port: &&PortSpec| port.required || setting(process, port.name).is_some();
-            let own = kind.outputs.iter().filter(is_on);
-            let own = own.map(|port| (port.name, Carries::Known(port.schema)));
-            own.chain(forwarded.into_iter().map(|(port, topic)| (port, Carries::Forwarded(topic)))).collect()
+            let declared_ports = kind.outputs.iter().filter(is_on);
+            let known = declared_ports.map(|port| (port.name, Carries::Known(port.schema)));
+            known
+                .chain(forwarded.into_iter().map(|(port, topic)| (port, Carries::Forwarded(topic))))
+                .collect()
         }
         Executable::Command(_) => {
             process.outputs.keys().map(|port| (port.get_ref().as_str(), Carries::Stated)).collect()
@@ -158,7 +160,7 @@ fn forwarded_ports<'a>(
         return Err(manifest.problem(&name.span(), message, help));
     }
     if let Some(port) =
-        process.inputs.keys().find(|port| kind.outputs.iter().any(|own| own.name == port.get_ref()))
+        process.inputs.keys().find(|port| kind.outputs.iter().any(|output| output.name == port.get_ref()))
     {
         let message =
             format!("input `{}` of `{}` is called like an output of its own", port.get_ref(), name.get_ref());
