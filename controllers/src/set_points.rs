@@ -3,8 +3,8 @@
 //! A step or a ramp leads a channel to a new value, which it keeps; a doublet is added on top and leaves
 //! nothing behind. The thesis's "10 degree roll doublet in 1 sec" (§5.1) does not say what the second
 //! covers; here a doublet is `+amplitude` for `duration_s`, then `−amplitude` for `duration_s`, then
-//! nothing, so that one of 1 s lasts 2 s as a whole. Pulses of half a second would bring the
-//! Hummingbird to 8° only: behind its motors' lag 9° take about 0.57 s (gains 16 and 6, linearised).
+//! nothing, so that one of 1 s lasts 2 s as a whole. Pulses of half a second bring the Hummingbird to
+//! 9.1° and −8.8° only, behind its motors' lag (gains 16 and 6); with the thesis's 25 and 6, to 14.2° and −17.9°.
 
 use diagnostics::ParameterError;
 use diagnostics::parameter::require;

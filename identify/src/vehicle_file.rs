@@ -20,6 +20,9 @@ pub fn text(declared: &Path, effects: &[Effect], report: &Report) -> Result<Stri
     let text = vehicles::text::read(&complete).map_err(unreadable)?;
     let mut document: toml_edit::DocumentMut =
         text.parse().map_err(|error| unreadable(std::io::Error::other(error)))?;
+    if complete != declared {
+        replace_tables(&mut document, &vehicles::text::read(declared).map_err(unreadable)?);
+    }
     document.remove("effects");
     document["name"] = toml_edit::value(format!("{}, identified", vehicle.name));
     let mut text = format!(
@@ -29,6 +32,15 @@ pub fn text(declared: &Path, effects: &[Effect], report: &Report) -> Result<Stri
         text += &entry(effect, &vehicle, report);
     }
     Ok(text)
+}
+
+/// Puts the tables of a file on a base, whose text is `upper`, in place of those of its base.
+fn replace_tables(document: &mut toml_edit::DocumentMut, upper: &str) {
+    // It has been read as a vehicle file, so it is TOML.
+    let Ok(upper) = upper.parse::<toml_edit::DocumentMut>() else { return };
+    for (key, item) in upper.iter().filter(|(_, item)| item.is_table() || item.is_array_of_tables()) {
+        document[key] = item.clone();
+    }
 }
 
 /// Where a value comes from that is nominal for a vehicle of this size, and not of the Hummingbird.

@@ -1,11 +1,9 @@
 //! What a vehicle must be to fly at all, looked at before a run: `check` refuses what cannot, and tells what is odd.
 
-use crate::airframe::Airframe;
 use crate::backend::Backend;
 use crate::state::State;
 use bus::context::NodeContext;
 use diagnostics::parameter::{ParameterError, refuse};
-use std::path::Path;
 use vehicles::{CommandMap, MotorModel, Vehicle};
 
 /// Below this thrust to weight a vehicle hovers and has next to nothing left to climb, tilt or brake with: 1.2 is what
@@ -33,17 +31,17 @@ const REHEARSAL_STEPS: u32 = 300;
 /// # Errors
 /// The lag, the step, and what to do.
 pub(crate) fn check_steps(
-    airframe: &Airframe,
+    vehicle: &Vehicle,
     span_s: f64,
     run: &NodeContext<'_>,
 ) -> Result<(), ParameterError> {
-    let product = fastest_pole_rad_s(&airframe.vehicle().motor) * span_s;
+    let product = fastest_pole_rad_s(&vehicle.motor) * span_s;
     let message = |limit: f64, beyond: &str| {
         format!(
             "`vehicle` \"{}\" has motors whose fastest pole, {:.4} rad/s, times a step of {span_s} s is {product:.4}, \
              expected below {limit}; raise `substeps` or run.rate_hz, or correct `[motor]` of the file: beyond it the \
              {beyond}",
-            airframe.vehicle().name,
+            vehicle.name,
             product / span_s
         )
     };
@@ -64,15 +62,11 @@ fn fastest_pole_rad_s(motor: &MotorModel) -> f64 {
     }
 }
 
-/// Refuses a vehicle, of the file at `path`, that its rotors cannot carry, or cannot let down.
+/// Refuses a vehicle that its rotors cannot carry, or cannot let down.
 ///
 /// # Errors
 /// Both forces, and the keys that they come from.
-pub(crate) fn check_lift(
-    vehicle: &Vehicle,
-    path: &Path,
-    run: &NodeContext<'_>,
-) -> Result<(), ParameterError> {
+pub(crate) fn check_lift(vehicle: &Vehicle, run: &NodeContext<'_>) -> Result<(), ParameterError> {
     let map = &vehicle.command;
     let (least_N, most_N) = (lift_N(vehicle, least_rad_s(map)), lift_N(vehicle, map.speed_at_max_rad_s));
     let weight_N = vehicle.mass_kg * vehicle.gravity_m_s2;
@@ -86,7 +80,7 @@ pub(crate) fn check_lift(
             "`vehicle` \"{}\" {what}: its rotors lift {least_N:.4} N to {most_N:.4} N and it weighs {weight_N:.4} N, a \
              thrust to weight of {ratio:.4}; look at {}",
             vehicle.name,
-            places(vehicle, path)
+            places(vehicle)
         )
     };
     refuse(ratio < 1.0, "vehicle", || {
@@ -119,12 +113,11 @@ fn lift_N(vehicle: &Vehicle, speed_rad_s: f64) -> f64 {
 }
 
 /// The keys that lift and weight come from, with their lines.
-fn places(vehicle: &Vehicle, path: &Path) -> String {
-    let file = Vehicle::base(path).unwrap_or_else(|| path.to_owned());
+fn places(vehicle: &Vehicle) -> String {
     let keys = ["body.mass", "body.gravity", "rotor.thrust_coefficient", "command.speed_at_max"];
     let stated = vehicle.provenance.iter().filter(|number| keys.contains(&number.key.as_str()));
     let places: Vec<String> =
-        stated.map(|number| format!("{}:{}: `{}`", file.display(), number.line, number.key)).collect();
+        stated.map(|number| format!("{}:{}: `{}`", number.file, number.line, number.key)).collect();
     places.join(", ")
 }
 
@@ -179,7 +172,7 @@ fn first_not_finite(backend: &dyn Backend) -> Option<&'static str> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{FreeFlight, NewtonEuler, RigidBody};
+    use crate::{Airframe, FreeFlight, NewtonEuler, RigidBody};
     use bus::context::Warning;
     use nalgebra::Vector3;
 
@@ -193,7 +186,7 @@ mod tests {
 
     fn lift(change: impl Fn(&mut Vehicle)) -> (Result<(), ParameterError>, Vec<Warning>) {
         let run = NodeContext::new("node", &[]);
-        let outcome = check_lift(&hummingbird(change), PATH.as_ref(), &run);
+        let outcome = check_lift(&hummingbird(change), &run);
         (outcome, run.into_warnings())
     }
 
@@ -227,7 +220,7 @@ mod tests {
     fn motors_that_a_step_cannot_follow_are_refused_with_both() {
         let steps = |span_s: f64| {
             let run = NodeContext::new("node", &[]);
-            let outcome = check_steps(&Airframe::new(hummingbird(|_| {})), span_s, &run);
+            let outcome = check_steps(&hummingbird(|_| {}), span_s, &run);
             (outcome, run.into_warnings())
         };
         assert_eq!(steps(1e-3), (Ok(()), vec![]));

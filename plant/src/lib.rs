@@ -19,6 +19,7 @@
 //! | `parameters` | what manifests say of a plant, and the backend that follows |
 //! | `others` | which vehicles of the traffic are others |
 //! | `output` | what a plant publishes |
+//! | [`propeller_stand`] | one rotor alone, bolted down |
 //! | [`traffic`] | the node that tells all plants of a run where the others are |
 //!
 //! ```
@@ -52,6 +53,7 @@ pub mod node;
 mod others;
 mod output;
 mod parameters;
+pub mod propeller_stand;
 pub mod rapier;
 mod rotation;
 pub mod rotor;

@@ -131,9 +131,9 @@ impl Parameters {
         self.check(run)?;
         let (airframe, scene) = self.airframe()?;
         // Before the backend, which a vehicle that is none might not survive.
-        airworthy::check_steps(&airframe, run.tick_s() / f64::from(self.substeps), run)?;
+        airworthy::check_steps(airframe.vehicle(), run.tick_s() / f64::from(self.substeps), run)?;
         if scene.rig.is_none() && self.window_s.is_none() {
-            airworthy::check_lift(airframe.vehicle(), &self.vehicle, run)?;
+            airworthy::check_lift(airframe.vehicle(), run)?;
         }
         let vehicle = airframe.vehicle().clone();
         let effects = airframe.initial_state(run.seed, run.name, run.tick_s());

@@ -9,7 +9,7 @@
 
 use nalgebra::Vector3;
 use std::ops::AddAssign;
-use vehicles::Vehicle;
+use vehicles::{Rotor, Vehicle};
 
 use crate::state::{RotorRates, RotorState};
 
@@ -51,9 +51,9 @@ pub fn thrust_N(vehicle: &Vehicle, speed_rad_s: f64) -> f64 {
     vehicle.thrust_coefficient * speed_rad_s * speed_rad_s.abs()
 }
 
-/// Drag torque c_Q w |w| that the air puts on a rotor against its own sense, in N*m (thesis eq. 3.2).
-pub(crate) fn drag_torque_N_m(vehicle: &Vehicle, speed_rad_s: f64) -> f64 {
-    vehicle.torque_coefficient * speed_rad_s * speed_rad_s.abs()
+/// Drag torque c_Q w |w| that the air puts on `rotor` against its own sense, in N*m (thesis eq. 3.2).
+pub(crate) fn drag_torque_N_m(vehicle: &Vehicle, rotor: &Rotor, speed_rad_s: f64) -> f64 {
+    vehicle.torque_coefficient * speed_rad_s * speed_rad_s.abs() * rotor.torque_scale
 }
 
 /// The wrench of all four rotors with these thrusts on a body that turns with `angular_velocity_B_rad_s`. Rotors are summed in the
@@ -73,7 +73,7 @@ pub(crate) fn wrench(
         torque_B_N_m.x += place.position_m.y * thrust_N;
         torque_B_N_m.y -= place.position_m.x * thrust_N;
         // The motor pushes against the air's drag and the rotor's own inertia.
-        let reaction_N_m = drag_torque_N_m(vehicle, rotor.speed_rad_s)
+        let reaction_N_m = drag_torque_N_m(vehicle, place, rotor.speed_rad_s)
             + vehicle.rotor_inertia_kg_m2 * rate.acceleration_rad_s2;
         torque_B_N_m.z -= place.spin * reaction_N_m;
         momentum_N_m_s += place.spin * vehicle.rotor_inertia_kg_m2 * rotor.speed_rad_s;

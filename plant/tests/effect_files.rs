@@ -131,7 +131,7 @@ fn an_inertia_that_no_body_has_is_refused() {
 fn a_base_gives_the_vehicle_and_the_file_its_effects() {
     let path = Path::new("../vehicles/hummingbird-drag.toml");
     let with_drag = Vehicle::load(path).unwrap();
-    let declared = Vehicle::parse(HUMMINGBIRD, "").unwrap();
+    let declared = Vehicle::load(Path::new("../vehicles/hummingbird.toml")).unwrap();
     assert_eq!(Vehicle { name: declared.name.clone(), effects: Vec::new(), ..with_drag.clone() }, declared);
     assert_eq!(with_drag.name, "AscTec Hummingbird with drag");
     let airframe = Airframe::from_files(with_drag, &[]).unwrap();
@@ -157,6 +157,29 @@ fn a_base_that_is_not_there_or_has_a_base_itself_is_refused() {
         nested.starts_with("../vehicles/hummingbird-drag.toml:") && nested.contains("`base`"),
         "{nested}"
     );
-    let more = Vehicle::parse("name = \"x\"\nbase = \"hummingbird.toml\"\n[body]\n", "../vehicles/x.toml");
-    assert!(more.unwrap_err().to_string().contains("unknown key `body`"));
+    let more = Vehicle::parse("name = \"x\"\nbase = \"hummingbird.toml\"\n[bdoy]\n", "../vehicles/x.toml");
+    assert!(more.unwrap_err().to_string().contains("unknown key `bdoy`"));
+}
+
+#[test]
+fn a_table_of_a_file_replaces_that_of_its_base_whole() {
+    let declared = Vehicle::load(Path::new("../vehicles/hummingbird.toml")).unwrap();
+    let head = "name = \"x\"\nbase = \"hummingbird.toml\"\n";
+    let of = |tables: &str| Vehicle::parse(&format!("{head}{tables}"), "../vehicles/x.toml");
+    let motor = "[motor]\nmodel = \"first-order\"\n\
+                 time_constant = { value = 50, unit = \"ms\", source = \"test\", uncertainty = 0 }\n";
+    let quick = of(motor).unwrap();
+    assert_eq!(quick.motor, vehicles::MotorModel::FirstOrder { time_constant_s: 0.05 });
+    let place = |vehicle: &Vehicle, key: &str| {
+        let number = vehicle.provenance.iter().find(|number| number.key == key);
+        number.map(|number| (number.file.clone(), number.line))
+    };
+    assert_eq!(place(&quick, "motor.time_constant"), Some(("../vehicles/x.toml".into(), 5)));
+    assert_eq!(place(&quick, "motor.natural_frequency"), None, "the base's motor is gone whole");
+    assert_eq!(place(&quick, "body.mass"), place(&declared, "body.mass"));
+    let Vehicle { motor, provenance, name, .. } = declared.clone();
+    assert_eq!(Vehicle { motor, provenance, name, ..quick }, declared);
+    let error =
+        of("[body]\nmass = { value = 1, unit = \"kg\", source = \"test\", uncertainty = 0 }\n").unwrap_err();
+    assert!(error.to_string().contains("missing key `body.gravity`"), "{error}");
 }

@@ -21,6 +21,7 @@
 //! in dt and has no singularity; the blend happens in roll and pitch and leaves yaw to the gyroscope.
 
 use crate::imu_model::ImuReading;
+use crate::parameters::within;
 use crate::wire::{attitude, attitude_message, vector, vector_message};
 use bus::component::{Component, Info, StepError};
 use bus::context::{NodeContext, StepContext};
@@ -40,6 +41,9 @@ parameters! {
         /// Time constant with which roll and pitch follow the accelerometer, s. Default 30 (tuned, no
         /// source, see the head of this file); the thesis's 0.98 at 1 kHz is 0.049 s.
         time_constant_s: f64 = 30.0 => positive,
+        /// In place of the time constant: the gyroscope's weight once a sample, as the thesis's 0.98 (§4.3) is
+        /// printed. The filter then depends on its period: see the head of this file. Default: none.
+        gyroscope_weight: Option<f64> = None => within(f64::EPSILON..1.0, "above 0 and below 1"),
         /// The accelerometer is left out while the size of what it reads differs from gravity by more than
         /// this fraction: then it surely measures more than gravity. Default 0.2 (tuned, no source).
         gravity_tolerance: f64 = 0.2 => not_negative,
@@ -113,7 +117,8 @@ impl Complementary {
     pub fn with_period(params: ComplementaryParams, period_s: f64) -> Result<Self, ParameterError> {
         params.validate()?;
         positive("period_s", period_s)?;
-        let accelerometer_weight = 1.0 - gyroscope_weight(params.time_constant_s, period_s);
+        let of_time_constant = || gyroscope_weight(params.time_constant_s, period_s);
+        let accelerometer_weight = 1.0 - params.gyroscope_weight.unwrap_or_else(of_time_constant);
         Ok(Self { params, accelerometer_weight, period_s })
     }
 
@@ -263,6 +268,23 @@ mod tests {
         let estimate = filter.update(&mut state, &reading(force_B, rate_B));
         let expected = 0.98 * (0.1 + 0.5 * PERIOD_S) + 0.02 * 0.2;
         assert!((estimate.roll - expected).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_weight_is_taken_as_it_is_whatever_the_period() {
+        let weighed = |gyroscope_weight| ComplementaryParams { gyroscope_weight, ..Default::default() };
+        for period_s in [1e-3, 0.05] {
+            let printed =
+                Complementary::with_period(weighed(Some(THESIS_GYROSCOPE_WEIGHT)), period_s).unwrap();
+            let tau_s = time_constant_s(THESIS_GYROSCOPE_WEIGHT, period_s);
+            let params = ComplementaryParams { time_constant_s: tau_s, ..Default::default() };
+            let ours = Complementary::with_period(params, period_s).unwrap();
+            assert!((printed.accelerometer_weight - ours.accelerometer_weight).abs() < 1e-12, "{period_s} s");
+        }
+        for weight in [0.0, 1.0, -0.1, f64::NAN] {
+            let error = Complementary::with_period(weighed(Some(weight)), 1e-3).unwrap_err().to_string();
+            assert!(error.contains("`gyroscope_weight`") && error.contains("below 1"), "{error}");
+        }
     }
 
     #[test]

@@ -12,6 +12,7 @@
 //! - [`rpm`]: rotor speeds, and faults of their sensors; [`battery`]: voltage, current and charge.
 //! - [`clearance`]: true distances to the scene, for judging.
 //! - [`complementary`]: attitude from an IMU's readings.
+//! - [`ideal`]: the truth as an estimate, for comparisons.
 //! - [`ekf`]: position, velocity and attitude from an IMU, GPS or motion capture, barometer, magnetometer.
 //! - [`range_inertial`]: velocity, height and walls from range finders, an IMU and an attitude.
 //! - [`link`], `line`: a data link, and the line that its streams share.
@@ -39,6 +40,7 @@ mod cone;
 mod earth_field;
 pub mod ekf;
 pub mod gps;
+pub mod ideal;
 pub mod imu;
 pub mod imu_model;
 mod line;

@@ -41,6 +41,9 @@ fn manifest(place: &Place) -> String {
          [process.clearance]\nkind = \"clearance\"\nscene = {room:?}\ninputs.state = \"/plant/state\"\n\
          [process.hold]\nkind = \"position-hold\"\n\
          inputs = {{ set_point = \"/pilot/set_point\", {estimate} }}\n\
+         [process.ideal]\nkind = \"ideal\"\ninputs.state = \"/plant/state\"\n\
+         [process.stand]\nkind = \"propeller-stand\"\nvehicle = {vehicle:?}\n\
+         parameters.speeds = [{{ at_s = 0.1, to_rpm = 3900.0 }}]\n\
          [process.attitude]\nkind = \"attitude\"\ninputs.imu = \"/imu/imu\"\n\
          [process.odometry]\nkind = \"range-inertial\"\n\
          inputs = {{ ranges = \"/range/ranges\", imu = \"/imu/imu\", attitude = \"/attitude/estimate\", gps = \"/gps/gps\" }}\n\

@@ -201,3 +201,12 @@ fn the_examples_of_the_documentation_are_toml() {
         toml::from_str::<toml::Table>(example).unwrap_or_else(|error| panic!("{error}\n{example}"));
     }
 }
+
+#[test]
+fn every_kind_has_one_section_in_the_page_of_manifests() {
+    let page = fs::read_to_string(repository("docs/manifest.md")).unwrap();
+    for kind in hummingbus::COMPONENTS.iter().map(|component| component.name) {
+        let count = page.lines().filter(|line| *line == format!("### `{kind}`")).count();
+        assert_eq!(count, 1, "docs/manifest.md has {count} sections of `{kind}`");
+    }
+}

@@ -28,6 +28,7 @@
 //! - [`scenarios`]: the thesis's scenarios and those beyond
 //! - [`scenes`]: ground, walls, rigs and other vehicles
 
+mod as_printed;
 mod backups;
 mod clean;
 mod cleanup;

@@ -25,7 +25,7 @@ const MAY_KNOW: [&str; 12] = [
 ];
 
 /// The messages that hold it.
-const TRUTHS: [&str; 7] =
+pub const TRUTHS: [&str; 7] =
     ["Clearance", "Contact", "MeasuredState", "PlantState", "PoseStamped", "TFMessage", "Traffic"];
 
 /// Flies `name` with one seed, or with each of several; its own conditions decide.
@@ -211,7 +211,7 @@ fn kind(node: &Value) -> &str {
 }
 
 /// The kinds of the nodes that read messages of `types`.
-fn readers_of(graph: &Value, types: &[&str]) -> BTreeSet<String> {
+pub fn readers_of(graph: &Value, types: &[&str]) -> BTreeSet<String> {
     let type_of = |input: &Value| {
         let topic = &graph["topics"][usize::try_from(input["topic"].as_u64().unwrap()).unwrap()];
         topic["type_name"].as_str().unwrap().to_owned()

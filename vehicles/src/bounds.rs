@@ -28,6 +28,8 @@ pub const THRUST_COEFFICIENT: Bounds =
 /// Torque by rotor speed squared.
 pub const TORQUE_COEFFICIENT: Bounds =
     bounds(0.0, 1e6, "N*m/(rad/s)^2", "a rotor of 32 m that takes 17 MW at 132 rpm has 6.4e3");
+/// Drag torque of a rotor against that of its siblings.
+pub const TORQUE_SCALE: Bounds = bounds(0.5, 2.0, "", "the rotors of one vehicle are made alike");
 /// Moment of inertia of a rotor.
 pub const ROTOR_INERTIA: Bounds =
     bounds(0.0, 1e7, "kg*m^2", "eight blades of 375 kg and 16 m make 2.6e5 kg*m^2");

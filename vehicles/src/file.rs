@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use crate::bounds;
 use crate::command::CommandMap;
 use crate::effects;
-use crate::provenance::Uncertainty;
+use crate::provenance::{Provenance, Uncertainty};
 use crate::reader::{Document, Quantity, Section};
 use crate::vehicle::{MotorModel, Rotor, Vehicle};
 use diagnostics::unit::{
@@ -29,7 +29,8 @@ impl Vehicle {
 
     /// Reads and checks the text of a vehicle file, whose layout `vehicles/hummingbird.toml` shows; `file_name` is for
     /// messages, and the path of its `base` is relative to it. A file with a `base` has that file's vehicle, and its effects
-    /// before its own.
+    /// before its own; a table `[body]`, `[rotor]`, `[motor]`, `[command]` or the `[[rotors]]` of the file replace those of
+    /// its base whole.
     pub fn parse(text: &str, file_name: &str) -> Result<Self, Diagnostic> {
         let doc = Document::new(file_name, text);
         let tree = doc.tree()?;
@@ -40,7 +41,7 @@ impl Vehicle {
         complete(&doc, &root)
     }
 
-    /// The file that the vehicle file at `path` adds effects to, if it names one.
+    /// The file that the vehicle file at `path` adds effects to, or replaces tables of, if it names one.
     pub fn base(path: &Path) -> Option<PathBuf> {
         let text = crate::text::read(path).ok()?;
         let table: toml::Table = text.parse().ok()?;
@@ -56,6 +57,7 @@ fn beside(path: &Path, other: &str) -> PathBuf {
 fn on_base(root: &Section, path: &Path) -> Result<Vehicle, Diagnostic> {
     let (name, file) = (title(root)?, path.display().to_string());
     let more = effects::read(root)?;
+    let tables = Tables::read(root)?;
     root.finish()?;
     let text = crate::text::read(path).map_err(|cause| {
         let expected = "the path of a vehicle file, relative to this one";
@@ -70,7 +72,56 @@ fn on_base(root: &Section, path: &Path) -> Result<Vehicle, Diagnostic> {
         return Err(doc.bad(&lower.at_of("base"), "base", expected, "one that has a base itself"));
     }
     let base = complete(&doc, &lower)?;
-    Ok(Vehicle { name, effects: [base.effects, more].concat(), ..base })
+    let effects = [base.effects.clone(), more].concat();
+    Ok(tables.replacing(Vehicle { name, effects, ..base }, root.doc.provenance.take()))
+}
+
+/// The tables that a file on a base has of its own.
+struct Tables {
+    body: Option<(f64, Matrix3<f64>, f64)>,
+    rotor: Option<[f64; 3]>,
+    rotors: Option<[Rotor; 4]>,
+    motor: Option<MotorModel>,
+    command: Option<CommandMap>,
+}
+
+impl Tables {
+    fn read(root: &Section) -> Result<Self, Diagnostic> {
+        let table = |name: &'static str| root.has(name).then(|| root.section(name)).transpose();
+        Ok(Self {
+            body: table("body")?.map(|of| body(&of)).transpose()?,
+            rotor: table("rotor")?.map(|of| rotor(&of)).transpose()?,
+            rotors: root.has("rotors").then(|| layout(root)).transpose()?,
+            motor: table("motor")?.map(|of| motor(&of)).transpose()?,
+            command: table("command")?.map(|of| command(&of)).transpose()?,
+        })
+    }
+
+    /// The vehicle `base` with these tables, whose numbers come from `sources`.
+    fn replacing(self, mut base: Vehicle, sources: Vec<Provenance>) -> Vehicle {
+        let table = |number: &Provenance| number.key.split('.').next().map(str::to_owned);
+        base.provenance.retain(|lower| sources.iter().all(|upper| table(upper) != table(lower)));
+        base.provenance.extend(sources);
+        let (mass_kg, inertia_kg_m2, gravity_m_s2) =
+            self.body.unwrap_or((base.mass_kg, base.inertia_kg_m2, base.gravity_m_s2));
+        let [thrust_coefficient, torque_coefficient, rotor_inertia_kg_m2] = self.rotor.unwrap_or([
+            base.thrust_coefficient,
+            base.torque_coefficient,
+            base.rotor_inertia_kg_m2,
+        ]);
+        Vehicle {
+            mass_kg,
+            inertia_kg_m2,
+            gravity_m_s2,
+            thrust_coefficient,
+            torque_coefficient,
+            rotor_inertia_kg_m2,
+            rotors: self.rotors.unwrap_or(base.rotors),
+            motor: self.motor.unwrap_or(base.motor),
+            command: self.command.unwrap_or(base.command),
+            ..base
+        }
+    }
 }
 
 fn title(root: &Section) -> Result<String, Diagnostic> {
@@ -185,8 +236,13 @@ fn one_rotor(section: &Section) -> Result<Rotor, Diagnostic> {
     let name = section.text("name")?.to_owned();
     let position_m = Vector3::from(section.vector("position", LENGTH, &bounds::HUB)?);
     let spin = spin(&section.section("spin")?)?;
+    let torque_scale = if section.has("torque_scale") {
+        section.bounded("torque_scale", PURE_NUMBER, &bounds::TORQUE_SCALE)?
+    } else {
+        1.0
+    };
     section.finish()?;
-    Ok(Rotor { name, position_m, spin })
+    Ok(Rotor { name, position_m, spin, torque_scale })
 }
 
 /// A sense of rotation has a value and a source, but neither unit nor uncertainty.

@@ -23,6 +23,8 @@ pub enum Uncertainty {
 pub struct Provenance {
     /// Dotted key, such as `body.mass`.
     pub key: String,
+    /// The file, as it was named when it was read.
+    pub file: String,
     /// Line in the file, from 1.
     pub line: usize,
     /// The unit the file used (the source's own).

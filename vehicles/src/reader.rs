@@ -300,6 +300,7 @@ impl<'d, 't> Section<'d, 't> {
     pub(crate) fn note(&self, unit: &str, source: &str, uncertainty: Uncertainty) {
         self.doc.provenance.borrow_mut().push(Provenance {
             key: self.path.clone(),
+            file: self.doc.file.to_owned(),
             line: self.doc.place(&self.at).line,
             unit: unit.to_owned(),
             source: source.to_owned(),

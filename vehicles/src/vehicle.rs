@@ -57,6 +57,9 @@ pub struct Rotor {
     pub position_m: Vector3<f64>,
     /// Sense of rotation seen from above: +1 counter-clockwise, -1 clockwise.
     pub spin: f64,
+    /// This rotor's drag torque as a multiple of what c_Q makes of its speed: 1 unless the file says otherwise. Only the
+    /// physics knows it; controllers count on rotors that are alike.
+    pub torque_scale: f64,
 }
 
 /// How the rotor speed follows the commanded speed. Both have unit gain at rest: the thesis's gain of

@@ -83,7 +83,8 @@ fn battery(values: &Values, state: &EffectState, vehicle: &Vehicle, speeds_rad_s
 }
 
 fn shaft_power_W(vehicle: &Vehicle, speeds_rad_s: &[f64; 4]) -> f64 {
-    speeds_rad_s.iter().map(|speed| (rotor::drag_torque_N_m(vehicle, *speed) * speed).abs()).sum()
+    let each = vehicle.rotors.iter().zip(speeds_rad_s);
+    each.map(|(place, speed)| (rotor::drag_torque_N_m(vehicle, place, *speed) * speed).abs()).sum()
 }
 
 /// The smaller root of U I = P with U = U_oc - R I, in the form that holds for R = 0 too. Beyond the power that

@@ -1,0 +1,299 @@
+//! A thrust stand: one rotor of a vehicle, bolted down, and what a force and torque sensor under its motor reads.
+//!
+//! The thesis turns its propeller alone on a cube at 3900 rpm (Fig 4.4), and plots thrust and torque against the speed
+//! (Fig 4.3). Thrust and drag torque are those of [`rotor`](crate::rotor), the lag is that of the motor; of the vehicle
+//! file's effects none acts, as nothing flies.
+
+use crate::airworthy;
+use crate::motor;
+use crate::rotor::{drag_torque_N_m, thrust_N};
+use crate::state::RotorState;
+use bus::component::{Component, Info, StepError};
+use bus::context::{NodeContext, StepContext};
+use bus::messages::Time;
+use bus::{Message, OutputPorts};
+use diagnostics::parameter::{ParameterError, not_negative, refuse, require};
+use serde::Deserialize;
+use std::f64::consts::PI;
+use std::path::PathBuf;
+use vehicles::{CommandMap, Vehicle};
+
+/// Parameters of the stand.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Parameters {
+    /// Vehicle file.
+    vehicle: PathBuf,
+    /// Which of its rotors, from 1.
+    #[serde(default = "first")]
+    rotor: usize,
+    /// The commanded speed over time; 0 before the first.
+    speeds: Vec<SpeedEntry>,
+}
+
+fn first() -> usize {
+    1
+}
+
+/// Where the commanded speed goes, and when.
+#[derive(Debug, Clone, Copy, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SpeedEntry {
+    /// When it begins to change, s; not before the change ahead of it is over.
+    at_s: f64,
+    /// How long the change takes, s; 0 for a step.
+    #[serde(default)]
+    over_s: f64,
+    /// The speed that it leads to: 0, or one that the vehicle's motors can be asked for.
+    to_rpm: f64,
+}
+
+/// What the stand's sensors read.
+#[derive(Clone, Copy, Debug, Default, Message)]
+#[repr(C)]
+#[message(type_name = "hummingbus_msgs/msg/RotorLoad")]
+pub struct RotorLoad {
+    /// Simulation time.
+    pub stamp: Time,
+    /// The speed that the motor is asked for.
+    #[field(unit = "rad/s")]
+    pub rotor_speed_commanded: f64,
+    /// Speed of the rotor, positive in its own sense of rotation.
+    #[field(unit = "rad/s")]
+    pub rotor_speed: f64,
+    /// Thrust along the rotor's axis.
+    #[field(unit = "N")]
+    pub thrust: f64,
+    /// Torque of the air on the rotor, against its rotation.
+    #[field(unit = "N*m")]
+    pub drag_torque: f64,
+    /// Torque on what the motor is bolted to, about the axis that points up: the air's drag and what speeds the rotor up.
+    #[field(unit = "N*m", frame = "body")]
+    pub mount_torque: f64,
+}
+
+/// All that the component remembers.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Message)]
+#[repr(C)]
+#[message(type_name = "hummingbus_msgs/msg/PropellerStandState")]
+pub struct StandState {
+    /// Speed of the rotor.
+    #[field(unit = "rad/s")]
+    speed: f64,
+    /// Its rate of change.
+    #[field(unit = "rad/s^2")]
+    acceleration: f64,
+}
+
+/// What it sends.
+#[derive(Debug, OutputPorts)]
+pub struct Outputs {
+    /// Speed, thrust and torques.
+    pub load: RotorLoad,
+}
+
+/// The component `propeller-stand`.
+///
+/// ```
+/// use plant::propeller_stand::PropellerStand;
+/// use serde_json::json;
+///
+/// let vehicle = concat!(env!("CARGO_MANIFEST_DIR"), "/../vehicles/hummingbird.toml");
+/// let parameters = json!({ "vehicle": vehicle, "speeds": [{ "at_s": 0.0, "to_rpm": 3900.0 }] });
+/// let mut stand = bus::Harness::<PropellerStand>::from_json(&parameters).unwrap();
+/// let load = (0..=3000).map(|_| stand.step(()).unwrap().load).last().unwrap();
+/// assert!((load.thrust - 1.1588).abs() < 1e-3 && (load.drag_torque - 0.0408).abs() < 1e-4, "{load:?}");
+/// assert!(load.mount_torque > 0.0, "the clockwise front rotor turns its mount counter-clockwise: {load:?}");
+/// ```
+#[derive(Debug)]
+pub struct PropellerStand {
+    vehicle: Vehicle,
+    /// Its place among the vehicle's rotors.
+    rotor: usize,
+    profile: Vec<Leg>,
+    dt_s: f64,
+}
+
+/// A change of the commanded speed, in ticks.
+#[derive(Debug, Clone, Copy)]
+struct Leg {
+    start_tick: f64,
+    span_ticks: f64,
+    to_rad_s: f64,
+}
+
+impl Component for PropellerStand {
+    const INFO: Info =
+        Info::new("propeller-stand", "one rotor of a vehicle file on a thrust stand: speed, thrust, torque");
+    type Parameters = Parameters;
+    type Inputs<'a> = ();
+    type Outputs = Outputs;
+    type State = StandState;
+
+    fn new(parameters: Parameters, run: &NodeContext<'_>) -> Result<Self, ParameterError> {
+        let Parameters { vehicle, rotor, speeds } = parameters;
+        let vehicle = Vehicle::load(&vehicle).map_err(|error| ParameterError::conflict("vehicle", error))?;
+        let is_there = (1..=vehicle.rotors.len()).contains(&rotor);
+        require("rotor", rotor, is_there, "1 to 4, in the order of the vehicle file")?;
+        let ticks = run.period_ticks;
+        refuse(ticks != 1, "period_ticks", || {
+            format!("`period_ticks` is {ticks}, expected 1: a stand runs at every tick; leave it out")
+        })?;
+        let dt_s = run.tick_s();
+        airworthy::check_steps(&vehicle, dt_s, run)?;
+        let profile = profile(&speeds, &vehicle.command, dt_s)?;
+        Ok(Self { vehicle, rotor: rotor - 1, profile, dt_s })
+    }
+
+    fn initial(&self) -> StandState {
+        StandState::default()
+    }
+
+    fn step(
+        &mut self,
+        context: &StepContext<'_>,
+        (): (),
+        state: &mut StandState,
+    ) -> Result<Outputs, StepError> {
+        let tick = context.tick();
+        if let Some(before) = tick.checked_sub(1) {
+            let target_rad_s = self.commanded_rad_s(before);
+            let rotor = RotorState { speed_rad_s: state.speed, acceleration_rad_s2: state.acceleration };
+            let moved = motor::moved(&self.vehicle.motor, &rotor, target_rad_s, self.dt_s);
+            let moved = motor::settled(&self.vehicle.motor, &moved, target_rad_s);
+            *state = StandState { speed: moved.speed_rad_s, acceleration: moved.acceleration_rad_s2 };
+        }
+        Ok(Outputs { load: self.load(self.commanded_rad_s(tick), state) })
+    }
+}
+
+impl PropellerStand {
+    /// The speed that is asked for from `tick` to the next.
+    fn commanded_rad_s(&self, tick: u32) -> f64 {
+        self.profile.iter().fold(0.0, |from_rad_s, leg| {
+            let since_ticks = f64::from(tick) - leg.start_tick;
+            let share =
+                if since_ticks < leg.span_ticks { since_ticks.max(0.0) / leg.span_ticks } else { 1.0 };
+            if since_ticks < 0.0 { from_rad_s } else { from_rad_s * (1.0 - share) + leg.to_rad_s * share }
+        })
+    }
+
+    fn load(&self, rotor_speed_commanded: f64, rotor: &StandState) -> RotorLoad {
+        let place = &self.vehicle.rotors[self.rotor];
+        let drag_torque = drag_torque_N_m(&self.vehicle, place, rotor.speed);
+        let speeding_up_N_m = self.vehicle.rotor_inertia_kg_m2 * rotor.acceleration;
+        RotorLoad {
+            stamp: Time::default(),
+            rotor_speed_commanded,
+            rotor_speed: rotor.speed,
+            thrust: thrust_N(&self.vehicle, rotor.speed),
+            drag_torque,
+            mount_torque: -place.spin * (drag_torque + speeding_up_N_m),
+        }
+    }
+}
+
+/// The changes of speed in ticks of `dt_s`, in their order.
+fn profile(entries: &[SpeedEntry], map: &CommandMap, dt_s: f64) -> Result<Vec<Leg>, ParameterError> {
+    refuse(entries.is_empty(), "speeds", || "`speeds` is empty: the rotor would never turn")?;
+    let mut legs: Vec<Leg> = Vec::new();
+    for (index, entry) in entries.iter().enumerate() {
+        let leg = leg(entry, map, dt_s).map_err(|error| error.within(&format!("speeds.{index}")))?;
+        let is_behind = legs.last().is_none_or(|last| last.start_tick + last.span_ticks <= leg.start_tick);
+        require(&format!("speeds.{index}.at_s"), entry.at_s, is_behind, "when the change before is over")?;
+        legs.push(leg);
+    }
+    Ok(legs)
+}
+
+fn leg(entry: &SpeedEntry, map: &CommandMap, dt_s: f64) -> Result<Leg, ParameterError> {
+    not_negative("at_s", entry.at_s)?;
+    not_negative("over_s", entry.over_s)?;
+    let to_rad_s = entry.to_rpm * PI / 30.0;
+    // A millionth more, so that the ends of the range can be asked for although they were converted.
+    let [least, most] = [map.speed_at_min_rad_s * (1.0 - 1e-6), map.speed_at_max_rad_s * (1.0 + 1e-6)];
+    let [low_rpm, high_rpm] = [map.speed_at_min_rad_s, map.speed_at_max_rad_s].map(|speed| speed * 30.0 / PI);
+    let expected = format!("0, or {low_rpm:.0} to {high_rpm:.0} rpm, which the motors can be asked for");
+    let can_be_asked = to_rad_s == 0.0 || (least..=most).contains(&to_rad_s);
+    require("to_rpm", entry.to_rpm, can_be_asked, expected)?;
+    let ticks = |time_s: f64| (time_s / dt_s).round();
+    Ok(Leg { start_tick: ticks(entry.at_s), span_ticks: ticks(entry.over_s), to_rad_s })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use bus::Harness;
+    use serde_json::{Value, json};
+
+    fn parameters(rotor: usize, speeds: &Value) -> Value {
+        let vehicle = concat!(env!("CARGO_MANIFEST_DIR"), "/../vehicles/hummingbird.toml");
+        json!({ "vehicle": vehicle, "rotor": rotor, "speeds": speeds })
+    }
+
+    fn stand(rotor: usize, speeds: &Value) -> Harness<PropellerStand> {
+        Harness::from_json(&parameters(rotor, speeds)).unwrap()
+    }
+
+    fn refused(rotor: usize, speeds: &Value) -> String {
+        Harness::<PropellerStand>::from_json(&parameters(rotor, speeds)).map(|_| ()).unwrap_err().to_string()
+    }
+
+    #[test]
+    fn a_rotor_follows_its_command_with_the_motors_overshoot() {
+        let mut stand = stand(1, &json!([{ "at_s": 0.1, "to_rpm": 3900.0 }]));
+        let loads: Vec<RotorLoad> = (0..3000).map(|_| stand.step(()).unwrap().load).collect();
+        assert!(loads[..=100].iter().all(|load| load.rotor_speed == 0.0 && load.thrust == 0.0));
+        assert_eq!(
+            (loads[99].rotor_speed_commanded, loads[100].rotor_speed_commanded),
+            (0.0, 3900.0 * PI / 30.0)
+        );
+        // A second-order lag of damping 0.603 overshoots by exp(-pi zeta / sqrt(1 - zeta^2)), 9.3 %.
+        let most = loads.iter().map(|load| load.rotor_speed).fold(0.0, f64::max);
+        assert!((most / (3900.0 * PI / 30.0) - 1.0929).abs() < 1e-3, "{most}");
+    }
+
+    #[test]
+    fn its_mount_turns_against_it_and_feels_it_speed_up() {
+        let speeds = json!([{ "at_s": 0.0, "to_rpm": 3900.0 }]);
+        for (rotor, sign) in [(1, 1.0), (2, -1.0)] {
+            let mut stand = stand(rotor, &speeds);
+            let loads: Vec<RotorLoad> = (0..3000).map(|_| stand.step(()).unwrap().load).collect();
+            assert!((loads[2999].mount_torque - sign * loads[2999].drag_torque).abs() < 1e-9);
+            assert!(sign * loads[50].mount_torque > loads[50].drag_torque + 1e-3, "{:?}", loads[50]);
+        }
+    }
+
+    #[test]
+    fn a_ramp_leads_evenly_from_one_speed_to_the_next() {
+        let speeds =
+            json!([{ "at_s": 0.0, "to_rpm": 1075.0 }, { "at_s": 1.0, "over_s": 2.0, "to_rpm": 8600.0 }]);
+        let mut stand = stand(1, &speeds);
+        let rpm: Vec<f64> =
+            (0..4000).map(|_| stand.step(()).unwrap().load.rotor_speed_commanded * 30.0 / PI).collect();
+        for (tick, expected) in [(0, 1075.0), (1000, 1075.0), (2000, 4837.5), (3000, 8600.0), (3999, 8600.0)]
+        {
+            assert!((rpm[tick] - expected).abs() < 1e-6, "{expected} at {tick}: {}", rpm[tick]);
+        }
+    }
+
+    #[test]
+    fn another_instance_goes_on_from_its_state() {
+        let speeds = json!([{ "at_s": 0.0, "over_s": 0.05, "to_rpm": 3900.0 }]);
+        Harness::require_transfer(|| stand(1, &speeds), |_| ());
+    }
+
+    #[test]
+    fn what_cannot_be_asked_for_is_refused_with_its_key() {
+        let step = |rpm: f64| json!([{ "at_s": 0.0, "to_rpm": rpm }]);
+        for rpm in [1000.0, 8601.0, -3900.0] {
+            let error = refused(1, &step(rpm));
+            assert!(error.contains("`speeds.0.to_rpm`") && error.contains("1075 to 8600 rpm"), "{error}");
+        }
+        assert!(refused(5, &step(3900.0)).contains("`rotor`"));
+        assert!(refused(1, &json!([])).contains("`speeds`"));
+        let late =
+            json!([{ "at_s": 0.0, "over_s": 2.0, "to_rpm": 2000.0 }, { "at_s": 1.0, "to_rpm": 3000.0 }]);
+        assert!(refused(1, &late).contains("`speeds.1.at_s`"));
+    }
+}
