@@ -311,9 +311,10 @@ def draw_states():
         drawing.text(905, y, extra, "start")
 
     near = stop["approach"]
-    line(60, "wall-stop: ahead (§5.5)", "distance to the wall ahead", f"v = k e, further off √(2 a (e − a/2k²))\nk {said(near['slope'])}, a {said(near['deceleration'])}", "at most the cruising speed,\n0.8 m/s² to gather it".replace("0.8 m/s²", said(gains("velocity")["velocity"]["command_acceleration_max"])), "u asked; v = 0")
+    line(60, "wall-stop: ahead (§5.5)", "distance to the wall ahead", f"v = k e, further off √(2 a (e − a/2k²))\nk {said(near['slope'])}, a {said(near['deceleration'])}", "at most the cruising speed,\n0.8 m/s² to gather it".replace("0.8 m/s²", said(gains("velocity")["velocity"]["command_acceleration_max"])), "u asked")
     hold = stop["hold"]
     drawing.text(330, 112, f"Its acceleration −v dv/de is fed forward; holding, an integral of {said(hold['integral'])} over the error, within ±{said(hold['integral_max'])}, is added.", "small start")
+    drawing.text(330, 129, f"Along the wall it asks for v = −{said(hold['aside'])} times what it has slid, at most {said(near['retreat_max'])}.", "small start")
     varying = follow["varying"]
     line(190, "wall-follow, varying: each state's own direction (Figs 5.37, 5.38)", "distance to the wall ahead", f"v = k e, not below {said(varying['exit_speed'])}\nk {said(varying['slope'])}", "at most 1.5 m/s", "ahead; across = 0")
     constant = follow["constant"]
