@@ -56,6 +56,7 @@ impl Component for RangeInertial {
 mod tests {
     use super::*;
     use bus::Harness;
+    use bus::messages::{AttitudeEstimate, Gps, Imu, Ranges};
     use serde_json::json;
 
     #[test]
@@ -73,5 +74,27 @@ mod tests {
             assert!(error.contains(key), "{error}");
         }
         Harness::<RangeInertial>::from_json(&json!({})).unwrap();
+    }
+
+    #[test]
+    fn a_receiver_tells_the_velocity_where_no_wall_does_and_one_that_lost_its_fix_tells_nothing() {
+        let velocity_m_s = |valid: u32| {
+            let parameters = json!({ "initial_velocity_sigma_m_s": 0.5 });
+            let mut filter = Harness::<RangeInertial>::from_json(&parameters).unwrap();
+            let imu = Imu { specific_force: [0.0, 0.0, 9.81].into(), ..Default::default() };
+            let (ranges, attitude) = (Ranges::default(), AttitudeEstimate::default());
+            let sent = (0..100_u64).map(|tick| {
+                let measured_ns = tick * 1_000_000;
+                let gps = Gps { measured_ns, velocity: [0.0, 1.0, 9.0].into(), valid, ..Default::default() };
+                let inputs =
+                    RangeInertialInputs { ranges: &ranges, imu: &imu, attitude: &attitude, gps: Some(&gps) };
+                filter.step(inputs).unwrap().estimate.velocity
+            });
+            sent.last().unwrap()
+        };
+        let told = velocity_m_s(1);
+        assert!(told.x.abs() < 1e-9 && (told.y - 1.0).abs() < 0.01, "{told:?}");
+        assert!(told.z.abs() < 1e-9, "the climb is the ranges' and the accelerometer's: {told:?}");
+        assert_eq!(velocity_m_s(0).y, 0.0);
     }
 }
