@@ -201,11 +201,11 @@ mod tests {
     }
 
     fn step(hold: &mut Harness<PositionHold>, roll: f64, y_m: f64, v_m_s: f64, yaw_rad: f64) -> SetPoint {
-        let attitude = UnitQuaternion::from_euler_angles(0.0, 0.0, yaw_rad);
+        let q = UnitQuaternion::from_euler_angles(0.0, 0.0, yaw_rad);
         let estimate = StateEstimate {
             position: [0.0, y_m, 1.0].into(),
             velocity: [0.0, v_m_s, 0.0].into(),
-            attitude: <[f64; 4]>::from(attitude.coords).into(),
+            attitude: bus::messages::Quaternion { x: q.i, y: q.j, z: q.k, w: q.w },
             ..Default::default()
         };
         let set_point = SetPoint { altitude: 1.5, roll, ..Default::default() };

@@ -177,13 +177,13 @@ impl Law for WallStopThesisLaw {
             state.phase = STOPPING;
         }
         let (altitude_m, yaw_rad) = (self.altitude_m, self.heading_rad);
-        let standing = VelocitySetPoint { altitude_m, yaw_rad, ..VelocitySetPoint::default() };
+        let at_rest = VelocitySetPoint { altitude_m, yaw_rad, ..VelocitySetPoint::default() };
         let braking_m_s2 =
-            self.velocity.accelerations_m_s2(&mut state.velocity, &standing, &input.walls.velocity);
+            self.velocity.accelerations_m_s2(&mut state.velocity, &at_rest, &input.walls.velocity);
         let acceleration_m_s2 = [self.ahead_m_s2(state.phase, to_go_m, braking_m_s2[0]), braking_m_s2[1]];
         let measured = HoverMotion::by_ranges(input);
         let output =
-            self.velocity.accelerate(&mut state.velocity, last, &standing, &acceleration_m_s2, &measured);
+            self.velocity.accelerate(&mut state.velocity, last, &at_rest, &acceleration_m_s2, &measured);
         ControlOutput { phase: state.phase, ..output }
     }
 }
