@@ -227,9 +227,12 @@ impl Line {
     /// Whole bytes that the wire has carried by `now_ns`.
     #[allow(clippy::cast_possible_truncation, reason = "fewer bits than have begun")]
     pub fn sent_bytes(&self, state: &LineState, now_ns: u64) -> u64 {
-        let ahead_ns = u128::from(state.free_ns.saturating_sub(now_ns));
-        let ahead_bits = (ahead_ns * u128::from(self.bits_s)).div_ceil(NS_PER_S) as u64;
-        (state.counts.begun_bytes * self.bits_per_byte).saturating_sub(ahead_bits) / self.bits_per_byte
+        // Counted from the start of the busy stretch: its end is rounded to a nanosecond.
+        let busy_ns = u128::from(now_ns.saturating_sub(state.busy_since_ns));
+        let busy_bits =
+            (busy_ns * u128::from(self.bits_s) / NS_PER_S).min(u128::from(state.busy_bits)) as u64;
+        let earlier_bits = state.counts.begun_bytes * self.bits_per_byte - state.busy_bits;
+        (earlier_bits + busy_bits) / self.bits_per_byte
     }
 }
 
