@@ -241,7 +241,9 @@ fn no_number_of_shipped_gains_brings_a_law_down() {
                     |message| if message.contains(".toml:") { message } else { format!("{file}: {message}") },
                 )
         });
-        assert!(refused > 10, "only {refused} refusals of {name}");
+        // The files of the thesis's guidance hold one number or two.
+        let least = if kind.name.starts_with("wall-") && kind.name.ends_with("-thesis") { 2 } else { 10 };
+        assert!(refused > least, "only {refused} refusals of {name}");
     }
 }
 
