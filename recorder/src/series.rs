@@ -1,12 +1,14 @@
 //! One field of one topic over time.
 //!
-//! A quaternion has three fields more than the message: `roll`, `pitch` and `yaw` (z-y-x sequence, in
-//! radians), since that is how people judge an attitude.
+//! Some fields have parts more than the message, in which people judge a flight: a quaternion its angles `roll`,
+//! `pitch` and `yaw` (z-y-x sequence, in radians), and a `velocity` in the world beside an `attitude` its components
+//! `u`, `v` and `w` along the body's x, y and z.
 
 use crate::definition::{DecodeError, Definition, Leaf, number};
 use crate::error::RecordingError;
 use crate::reader::Recording;
 use bus::schema::Schema;
+use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 
 /// Samples of a field.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -105,20 +107,47 @@ pub fn unit_of(schema: &Schema, topic: &str, field: &str) -> Result<Option<Strin
 /// The angles that a quaternion has as fields.
 pub const ANGLES: [&str; 3] = ["roll", "pitch", "yaw"];
 
-/// The number at `field` among `leaves` and its unit; that may be an angle of a quaternion.
+/// The components along the body's axes that a velocity has as fields.
+const ALONG_BODY: [&str; 3] = ["u", "v", "w"];
+
+/// The number at `field` among `leaves` and its unit; that may be an angle of a quaternion, or a velocity along an axis
+/// of the body.
 #[must_use]
 pub fn value<'a>(leaves: &'a [Leaf], field: &str) -> Option<(f64, &'a str)> {
     if let Some(leaf) = leaves.iter().find(|leaf| leaf.path == field) {
         return Some((leaf.value.as_f64()?, &leaf.unit));
     }
-    let (quaternion, angle) = field.rsplit_once('.')?;
-    let angle = ANGLES.iter().position(|name| *name == angle)?;
-    let part = |name: &str| {
-        let is_part =
-            |path: &str| path.strip_prefix(quaternion).and_then(|rest| rest.strip_prefix('.')) == Some(name);
-        leaves.iter().find(|leaf| is_part(&leaf.path))?.value.as_f64()
+    let (whole, part) = field.rsplit_once('.')?;
+    let index_in = |names: [&str; 3]| names.iter().position(|name| *name == part);
+    if let Some(angle) = index_in(ANGLES) {
+        return Some((roll_pitch_yaw(quaternion(leaves, whole)?)[angle], "rad"));
+    }
+    let axis = index_in(ALONG_BODY)?;
+    let message = whole.strip_suffix("velocity").filter(|rest| rest.is_empty() || rest.ends_with('.'))?;
+    let attitude = quaternion(leaves, &format!("{message}attitude"))?;
+    let velocity = ["x", "y", "z"].map(|axis| part_of(leaves, whole, axis));
+    let [Some(x), Some(y), Some(z)] = velocity.map(|leaf| leaf.and_then(|leaf| leaf.value.as_f64())) else {
+        return None;
     };
-    Some((roll_pitch_yaw([part("x")?, part("y")?, part("z")?, part("w")?])[angle], "rad"))
+    Some((along_body([x, y, z], attitude)[axis], &velocity[axis]?.unit))
+}
+
+fn part_of<'a>(leaves: &'a [Leaf], whole: &str, part: &str) -> Option<&'a Leaf> {
+    let is_part = |path: &str| path.strip_prefix(whole).and_then(|rest| rest.strip_prefix('.')) == Some(part);
+    leaves.iter().find(|leaf| is_part(&leaf.path))
+}
+
+/// The quaternion at `path`, in the order x, y, z, w.
+fn quaternion(leaves: &[Leaf], path: &str) -> Option<[f64; 4]> {
+    let part = |name: &str| part_of(leaves, path, name)?.value.as_f64();
+    Some([part("x")?, part("y")?, part("z")?, part("w")?])
+}
+
+/// A vector in the world, along the axes of a body with this attitude: the quaternion, in the order x, y, z, w, turns the
+/// body's axes into the world's.
+fn along_body(vector: [f64; 3], [x, y, z, w]: [f64; 4]) -> [f64; 3] {
+    let to_world = UnitQuaternion::from_quaternion(Quaternion::new(w, x, y, z));
+    to_world.inverse_transform_vector(&Vector3::from(vector)).into()
 }
 
 /// The angles of a quaternion, stored x, y, z, w, in the sequence z-y-x, in radians; roll and yaw from -π to π.
@@ -128,4 +157,37 @@ fn roll_pitch_yaw([x, y, z, w]: [f64; 4]) -> [f64; 3] {
         libm::asin((2.0 * (w * y - z * x)).clamp(-1.0, 1.0)),
         libm::atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z)),
     ]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::value;
+    use crate::definition::{Definition, Leaf};
+    use bus::Message;
+    use bus::messages::{PlantState, Quaternion};
+
+    fn leaves<T: Message>(message: &T) -> Vec<Leaf> {
+        let cdr = [&[0, 1, 0, 0], bytemuck::bytes_of(message)].concat();
+        Definition::parse(T::SCHEMA.type_name, &T::SCHEMA.ros2_definition()).unwrap().decode(&cdr).unwrap()
+    }
+
+    /// Turned by 90° to the left, the body's x points along the world's y; then by 90° about it, its y points down.
+    #[test]
+    fn a_velocity_beside_an_attitude_has_components_along_the_body() {
+        let half = std::f64::consts::FRAC_1_SQRT_2;
+        let cases = [
+            (Quaternion { x: 0.0, y: 0.0, z: half, w: half }, [2.0, -1.0, 3.0]),
+            (Quaternion { x: -half, y: 0.0, z: 0.0, w: half }, [1.0, -3.0, 2.0]),
+            (Quaternion { x: 0.0, y: half, z: 0.0, w: half }, [-3.0, 2.0, 1.0]),
+        ];
+        for (attitude, expected) in cases {
+            let state = PlantState { attitude, velocity: [1.0, 2.0, 3.0].into(), ..PlantState::default() };
+            let found =
+                ["u", "v", "w"].map(|axis| value(&leaves(&state), &format!("velocity.{axis}")).unwrap().0);
+            assert!(found.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-12), "{found:?} {expected:?}");
+        }
+        let leaves = leaves(&PlantState::default());
+        assert_eq!(value(&leaves, "velocity.u").unwrap().1, "m/s");
+        assert!(value(&leaves, "angular_velocity.u").is_none() && value(&leaves, "position.u").is_none());
+    }
 }

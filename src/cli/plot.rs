@@ -35,6 +35,12 @@ pub struct PlotArguments {
     /// the types of the topics suggest.
     #[arg(long, value_name = "TOPIC:FIELD,…")]
     plot: Vec<String>,
+    /// Draw the curves against this number instead of time: TOPIC:FIELD.
+    #[arg(long, value_name = "TOPIC:FIELD")]
+    against: Option<String>,
+    /// Draw motor commands as throttle, in % of this many counts; the Hummingbird's full throttle is 200.
+    #[arg(long, value_name = "COUNTS")]
+    full_throttle: Option<f64>,
     /// Only this view; may be repeated. Left out: a page has all, a picture `time`.
     #[arg(long, value_enum)]
     figure: Vec<Figure>,
@@ -100,6 +106,8 @@ pub fn plot(arguments: &PlotArguments) -> Result<bool> {
         vehicle: arguments.vehicle.clone(),
         span: span(arguments)?,
         title: arguments.title.clone(),
+        full_throttle: full_throttle(arguments)?,
+        against: arguments.against.clone(),
     };
     let recording = open_recording(&arguments.recording)?;
     let bar = bar(&recording);
@@ -119,6 +127,15 @@ fn span(arguments: &PlotArguments) -> Result<Span> {
         bail!("--from {from_s} --to {}: the end must be after the start", to_s.unwrap_or(f64::NAN));
     }
     Ok(Span { from_s, to_s })
+}
+
+fn full_throttle(arguments: &PlotArguments) -> Result<Option<f64>> {
+    match arguments.full_throttle {
+        Some(counts) if !(counts.is_finite() && counts > 0.0) => {
+            bail!("--full-throttle {counts}: expected a number of counts above 0")
+        }
+        counts => Ok(counts),
+    }
 }
 
 /// The files to write; checked before the recording is read for them.

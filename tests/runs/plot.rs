@@ -151,11 +151,34 @@ fn chosen_fields_share_axes_where_they_share_a_unit() {
     refused(place.call(&["plot", &recording, "--plot", "/plant/state:position.z,attitude.roll"]), message);
 }
 
+/// The first vehicle flies round the origin with its nose ahead.
+#[test]
+fn a_velocity_is_drawn_along_the_body_and_against_another_number() {
+    let place = Place::new();
+    let recording = laps(&place, &[""]);
+    let body = "/plant/state:velocity.u,velocity.v,velocity.w";
+    let (against, path) = ("/plant/state:position.x", place.path("against.html"));
+    let args = ["plot", &recording, "--plot", body, "--against", against, "--out", &path, "--json"];
+    let shown = described(place.call(&args));
+    let axes = &shown["panels"][0]["axes"][0];
+    assert_eq!((&axes["title"], &axes["unit"]), (&json!("velocity u, v, w"), &json!("m/s")));
+    assert_eq!(curves(axes)[1], ["v", "velocity.v", "flown"]);
+    assert_eq!(shown["across"]["label"], "position.x [m]");
+    let drawn = page(&path);
+    let [x, y] = ["x", "y"].map(|axis| numbers(&drawn["panels"][0]["axes"][0]["curves"][0][axis]));
+    assert!(x.windows(2).any(|pair| pair[0] < pair[1]) && x.windows(2).any(|pair| pair[0] > pair[1]));
+    let ends = numbers(&drawn["across"]["range"]);
+    assert!(x.iter().all(|x| (ends[0] - 1e-4..=ends[1] + 1e-4).contains(x)) && x.len() == y.len());
+    let message =
+        "--against /plant/state:position is several numbers: name one of position.x, position.y, position.z";
+    refused(place.call(&["plot", &recording, "--against", "/plant/state:position"]), message);
+}
+
 #[test]
 fn what_is_not_there_is_refused_with_what_is() {
     let place = Place::new();
     let recording = laps(&place, &[""]);
-    let cases: [(&[&str], &str); 8] = [
+    let cases: [(&[&str], &str); 11] = [
         (
             &["--plot", "/plant/stat:position.z"],
             "the recording has no topic /plant/stat; it has /pilot/set_point, /planner/reference, /plant/state",
@@ -166,6 +189,9 @@ fn what_is_not_there_is_refused_with_what_is() {
         ),
         (&["--plot", "position.z"], "`position.z` is not TOPIC:FIELD"),
         (&["--plot", "/plant/state:"], "`/plant/state:` names no field"),
+        (&["--against", "position.x"], "--against position.x: it is not TOPIC:FIELD"),
+        (&["--against", "/plant/state:positio"], "topic /plant/state has no field `positio`; it has"),
+        (&["--full-throttle", "0"], "--full-throttle 0: expected a number of counts above 0"),
         (&["--out", "laps.pdf"], "--out laps.pdf: its name must end in .html, .png or .svg"),
         (&["--png", "/no/where.png"], "cannot create /no/where.png: there is no folder /no"),
         (&["--svg", &recording], "laps.mcap is the recording itself: name another file"),

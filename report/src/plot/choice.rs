@@ -1,7 +1,8 @@
 //! What is plotted: chosen with `--plot`, or by the types of the recording's topics.
 
+use crate::plot::Request;
 use crate::plot::field::Channel;
-use crate::plot::thin::{Curve, Trail};
+use crate::plot::thin::{Line, Trail};
 use anyhow::{Context, Result, bail};
 use recorder::reader::{Recording, Topic};
 use serde::Serialize;
@@ -102,7 +103,7 @@ pub struct Ask {
     /// What it stands for.
     pub role: Role,
     /// What was read of it: its channels with their curves; none where no message was in the span.
-    pub curves: Vec<(Channel, Curve)>,
+    pub curves: Vec<(Channel, Line)>,
 }
 
 impl Ask {
@@ -139,16 +140,18 @@ pub struct Choice {
     pub trails: Vec<(Ask, Trail)>,
     /// Whether people named the fields: then what is not there is an error.
     pub is_named: bool,
+    /// The number that the curves are drawn against instead of time.
+    pub against: Option<Ask>,
 }
 
 impl Choice {
-    /// What `plots` name, or else what the types of the topics suggest, of one vehicle or of all.
+    /// What the request's plots name, or else what the types of the topics suggest, of one vehicle or of all.
     ///
     /// # Errors
     /// If a topic or the vehicle is not there, or nothing is.
-    pub fn of(recording: &Recording, plots: &[String], vehicle: Option<&str>) -> Result<Self> {
-        let vehicles = vehicles(recording);
-        let shown = match vehicle {
+    pub fn of(recording: &Recording, request: &Request) -> Result<Self> {
+        let (vehicles, plots) = (vehicles(recording), &request.plots);
+        let shown = match request.vehicle.as_deref() {
             None => &vehicles[..],
             Some(name) => match vehicles.iter().position(|known| known == name) {
                 Some(index) => &vehicles[index..=index],
@@ -161,7 +164,9 @@ impl Choice {
             plots.iter().map(|plot| named(recording, plot)).collect::<Result<_>>()?
         };
         let is_shown = |topic: &str| shown.iter().any(|vehicle| belongs(topic, vehicle, &vehicles));
-        let choice = Self { axes, trails: trails(recording, is_shown), is_named: !plots.is_empty() };
+        let trails = trails(recording, is_shown);
+        let against = request.against.as_deref().map(|against| number_of(recording, against)).transpose()?;
+        let choice = Self { axes, trails, is_named: !plots.is_empty(), against };
         if choice.axes.is_empty() && choice.trails.is_empty() {
             let topics = listed(&recording.topics().keys().cloned().collect::<Vec<_>>());
             bail!(
@@ -239,6 +244,15 @@ fn trails(recording: &Recording, is_shown: impl Fn(&str) -> bool) -> Vec<(Ask, T
         (Ask::new(name, "position", &topic.type_name), Trail::new(TRAIL_POINTS_MAX))
     };
     moving.map(trail).collect()
+}
+
+/// What `--against` names: a topic and a number of it.
+fn number_of(recording: &Recording, against: &str) -> Result<Ask> {
+    let Some((topic, field)) = against.split_once(':') else {
+        bail!("--against {against}: it is not TOPIC:FIELD, such as /plant/state:rotor_speed[0]");
+    };
+    let found = recording.topic(topic).with_context(|| format!("--against {against}"))?;
+    Ok(Ask::new(topic, field, &found.type_name))
 }
 
 /// The axes that `TOPIC:FIELD,TOPIC:FIELD…` names; a field without a topic is of the topic before.

@@ -20,8 +20,18 @@ pub enum View {
     Side,
 }
 
-/// What the axis of time shows.
-pub const TIME_LABEL: &str = "simulated time [s]";
+/// The axis across: time, or what the curves are drawn against.
+#[derive(Clone, Debug, Serialize)]
+pub struct Across {
+    /// What it shows, with its unit.
+    pub label: String,
+    /// Its unit.
+    pub unit: String,
+    /// Its ends.
+    pub range: [f64; 2],
+    /// Whether that is time.
+    pub is_time: bool,
+}
 
 /// All that a file shows; its text says how much that is.
 #[derive(Debug, Serialize)]
@@ -30,6 +40,7 @@ pub struct Drawing {
     pub(super) title: String,
     pub(super) recording: String,
     pub(super) span_s: [f64; 2],
+    pub(super) across: Across,
     #[serde(skip)]
     pub(super) views: Vec<View>,
     pub(super) panels: Vec<Panel>,

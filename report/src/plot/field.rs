@@ -4,6 +4,9 @@ use recorder::definition::{Leaf, number};
 use recorder::series::{ANGLES, value};
 use std::f64::consts::{PI, TAU};
 
+/// The unit of motor commands.
+const COUNT: &str = "count";
+
 /// One number of a message, over time.
 #[derive(Clone, Debug)]
 pub struct Channel {
@@ -16,18 +19,23 @@ pub struct Channel {
 }
 
 /// The channels of `field` in a message with these leaves: one for a number, three angles for a quaternion, and one
-/// for each number of anything else. `None` where there is no such field.
-pub fn channels(leaves: &[Leaf], field: &str) -> Option<Vec<Channel>> {
+/// for each number of anything else. Counts are drawn in % of `full_throttle` counts where that is given. `None` where
+/// there is no such field.
+pub fn channels(leaves: &[Leaf], field: &str, full_throttle: Option<f64>) -> Option<Vec<Channel>> {
+    let channel = |path: &str, unit: &str| match full_throttle.filter(|_| unit == COUNT) {
+        Some(full) => Channel { unit: "%".to_owned(), factor: 100.0 / full, ..Channel::new(path, unit) },
+        None => Channel::new(path, unit),
+    };
     if let Some((_, unit)) = value(leaves, field) {
-        return Some(vec![Channel::new(field, unit)]);
+        return Some(vec![channel(field, unit)]);
     }
     let angles = ANGLES.map(|angle| format!("{field}.{angle}"));
     if number(leaves, &format!("{field}.w")).is_some() && value(leaves, &angles[0]).is_some() {
-        return Some(angles.iter().map(|angle| Channel::new(angle, "rad")).collect());
+        return Some(angles.iter().map(|angle| channel(angle, "rad")).collect());
     }
     let inside = |leaf: &Leaf| leaf.path.strip_prefix(field).is_some_and(|rest| rest.starts_with(['.', '[']));
     let numbers = leaves.iter().filter(|leaf| inside(leaf) && leaf.value.as_f64().is_some());
-    let channels: Vec<_> = numbers.map(|leaf| Channel::new(&leaf.path, &leaf.unit)).collect();
+    let channels: Vec<_> = numbers.map(|leaf| channel(&leaf.path, &leaf.unit)).collect();
     (!channels.is_empty()).then_some(channels)
 }
 
@@ -86,7 +94,7 @@ impl Continued {
 mod tests {
     use super::{Channel, Continued, channels};
     use bus::Message;
-    use bus::messages::{PlantState, PoseStamped, Quaternion};
+    use bus::messages::{MotorCommand, PlantState, PoseStamped, Quaternion};
     use recorder::definition::{Definition, Leaf};
 
     fn leaves<T: Message>(message: &T) -> Vec<Leaf> {
@@ -105,7 +113,7 @@ mod tests {
     #[test]
     fn vectors_arrays_and_quaternions_become_channels_in_the_units_that_people_read() {
         let leaves = leaves(&PlantState::default());
-        let found = |field: &str| described(channels(&leaves, field));
+        let found = |field: &str| described(channels(&leaves, field, None));
         let position = [("position.x", "m"), ("position.y", "m"), ("position.z", "m")];
         assert_eq!(found("position"), pairs(&position));
         let angles = [("attitude.roll", "deg"), ("attitude.pitch", "deg"), ("attitude.yaw", "deg")];
@@ -115,14 +123,16 @@ mod tests {
         assert_eq!(found("angular_velocity.x"), pairs(&[("angular_velocity.x", "deg/s")]));
         assert_eq!(found("rotor_speed[2]"), pairs(&[("rotor_speed[2]", "rpm")]));
         assert_eq!(found("rotor_speed").len(), 4);
-        assert!(channels(&leaves, "positio").is_none() && channels(&leaves, "rotor_speed[4]").is_none());
+        assert_eq!(found("velocity.u"), pairs(&[("velocity.u", "m/s")]));
+        let is_none = |field: &str| channels(&leaves, field, None).is_none();
+        assert!(is_none("positio") && is_none("rotor_speed[4]"));
     }
 
     #[test]
     fn text_is_no_channel() {
         let leaves = leaves(&PoseStamped::default());
-        assert!(channels(&leaves, "header.frame_id").is_none());
-        assert_eq!(channels(&leaves, "pose.orientation").unwrap().len(), 3);
+        assert!(channels(&leaves, "header.frame_id", None).is_none());
+        assert_eq!(channels(&leaves, "pose.orientation", None).unwrap().len(), 3);
     }
 
     #[test]
@@ -132,9 +142,20 @@ mod tests {
         let state =
             PlantState { attitude, rotor_speed: [100.0 * std::f64::consts::PI; 4], ..Default::default() };
         let leaves = leaves(&state);
-        let first = |field: &str| channels(&leaves, field).unwrap()[0].value(&leaves);
+        let first = |field: &str| channels(&leaves, field, None).unwrap()[0].value(&leaves);
         assert!((first("attitude.roll") - 90.0).abs() < 1e-9);
         assert!((first("rotor_speed") - 3000.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn a_motor_command_is_drawn_in_percent_of_full_throttle_where_that_is_known() {
+        let leaves = leaves(&MotorCommand { command: [76.5; 4], ..Default::default() });
+        let drawn = |full_throttle| {
+            let mut channels = channels(&leaves, "command", full_throttle).unwrap();
+            (channels[3].value(&leaves), channels[3].unit.clone())
+        };
+        assert_eq!(drawn(None), (76.5, "count".to_owned()));
+        assert_eq!(drawn(Some(200.0)), (38.25, "%".to_owned()));
     }
 
     #[test]

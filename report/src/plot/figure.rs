@@ -1,6 +1,7 @@
 //! What is drawn, ready for any kind of file: axes with named, coloured curves of one unit, and paths in space.
 
-use crate::plot::choice::{Ask, Role, Wanted};
+use crate::plot::choice::{Ask, Choice, Role, Wanted};
+use crate::plot::drawing::Across;
 use crate::plot::thin;
 use anyhow::{Result, bail};
 use serde::{Serialize, Serializer};
@@ -92,14 +93,14 @@ fn axes(wanted: &Wanted) -> Result<Axes> {
         field: channel.path.clone(),
         role: ask.role,
         colour: "",
-        samples: curve.samples,
+        samples: curve.samples(),
         points: curve.points(),
     });
     let mut curves: Vec<Curve> = curves.collect();
     curves.sort_by_key(|curve| curve.role);
     name(&mut curves);
     colour(&mut curves);
-    let fields = distinct(wanted.asks.iter().map(|ask| ask.field.as_str())).join(", ");
+    let fields = together(&distinct(wanted.asks.iter().map(|ask| ask.field.as_str())));
     let or_fields = |text: &str| if text.is_empty() { fields.clone() } else { text.to_owned() };
     Ok(Axes { title: or_fields(wanted.title), label: or_fields(wanted.label), unit, curves })
 }
@@ -126,6 +127,39 @@ fn distinct<T: PartialEq>(items: impl Iterator<Item = T>) -> Vec<T> {
         }
         seen
     })
+}
+
+/// The axis across all curves: the time that was read, or the span of what they are drawn against.
+///
+/// # Errors
+/// If that is not one number.
+pub fn across(choice: &Choice, span_s: [f64; 2]) -> Result<Across> {
+    let Some(ask) = &choice.against else {
+        let (label, unit) = ("simulated time [s]".to_owned(), "s".to_owned());
+        return Ok(Across { label, unit, range: span_s, is_time: true });
+    };
+    let [(channel, line)] = &ask.curves[..] else {
+        let parts =
+            ask.curves.iter().map(|(channel, _)| channel.path.as_str()).collect::<Vec<_>>().join(", ");
+        bail!("--against {}:{} is several numbers: name one of {parts}", ask.topic, ask.field);
+    };
+    let values = line.points().into_iter().map(|(_, value)| value).filter(|value| value.is_finite());
+    let range = values
+        .fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], value| [low.min(value), high.max(value)]);
+    let (label, unit) = (format!("{} [{}]", ask.field, channel.unit), channel.unit.clone());
+    Ok(Across { label, unit, range, is_time: false })
+}
+
+/// The names of fields; parts of one field with its name once.
+fn together(fields: &[&str]) -> String {
+    let parts: Option<Vec<_>> = fields.iter().map(|field| field.rsplit_once('.')).collect();
+    match parts.as_deref() {
+        Some([(whole, _), _, ..]) if parts.iter().flatten().all(|(other, _)| other == whole) => {
+            let parts: Vec<_> = parts.iter().flatten().map(|(_, part)| *part).collect();
+            format!("{whole} {}", parts.join(", "))
+        }
+        _ => fields.join(", "),
+    }
 }
 
 /// The last part of a field's path.
@@ -155,9 +189,9 @@ fn name(curves: &mut [Curve]) {
 fn component(field: &str) -> Option<usize> {
     let short = short(field);
     match short.strip_suffix("_set_point").unwrap_or(short) {
-        "x" | "roll" => Some(0),
-        "y" | "pitch" => Some(1),
-        "z" | "yaw" | "altitude" => Some(2),
+        "x" | "u" | "roll" => Some(0),
+        "y" | "v" | "pitch" => Some(1),
+        "z" | "w" | "yaw" | "altitude" => Some(2),
         last => last.rsplit_once('[')?.1.strip_suffix(']')?.parse().ok(),
     }
 }

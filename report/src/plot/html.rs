@@ -3,7 +3,7 @@
 //! It is drawn by `page.js` with plotly.js ([`crate::page`]).
 
 use crate::page::PLOTLY_3D;
-use crate::plot::drawing::{Drawing, TIME_LABEL, View};
+use crate::plot::drawing::{Drawing, View};
 use crate::plot::figure::{Axes, Curve, Trail};
 use crate::plot::scene::{EDGES, Solid};
 use serde::Serialize;
@@ -22,7 +22,7 @@ fn data(drawing: &Drawing) -> Value {
         "title": drawing.title,
         "recording": drawing.recording,
         "span_s": drawing.span_s,
-        "time_label": TIME_LABEL,
+        "across": drawing.across,
         "panels": panels.map(|panel| with(panel, [("axes", panel.axes.iter().map(axes).collect())])).collect::<Vec<_>>(),
         "views": views,
         "trails": drawing.trails.iter().map(trail).collect::<Vec<_>>(),

@@ -50,6 +50,11 @@ pub struct Request {
     pub vehicle: Option<String>,
     /// Simulated time that is drawn.
     pub span: Span,
+    /// Counts of a motor command at full throttle: commands are drawn in % of it then.
+    pub full_throttle: Option<f64>,
+    /// `TOPIC:FIELD`, a number: the curves are drawn against it instead of time, each sample against the last that came
+    /// before it or with it.
+    pub against: Option<String>,
     /// Title; the name of the recording's file where absent.
     pub title: Option<String>,
 }
@@ -99,13 +104,14 @@ impl Drawing {
     /// # Errors
     /// If something that was asked for is not in the recording.
     pub fn of(recording: &Recording, request: &Request, read: &mut dyn FnMut(u64)) -> Result<Self> {
-        let mut choice = Choice::of(recording, &request.plots, request.vehicle.as_deref())?;
-        let span_s = read::read(recording, &mut choice, request.span, read)?;
+        let mut choice = Choice::of(recording, request)?;
+        let span_s = read::read(recording, &mut choice, request, read)?;
         let name = recording.path().file_name().unwrap_or_default().to_string_lossy().into_owned();
         let drawing = Self {
             title: request.title.clone().unwrap_or_else(|| name.clone()),
             recording: name,
             span_s,
+            across: figure::across(&choice, span_s)?,
             views: request.views.clone(),
             panels: figure::panels(&choice.axes)?,
             trails: figure::trails(&choice.trails),

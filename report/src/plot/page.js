@@ -29,11 +29,11 @@ function look({ role, colour }) {
 function drawAxes(axes) {
   const traces = axes.curves.map((curve) => ({
     mode: "lines", name: curve.name, x: curve.x, y: curve.y, line: look(curve), zorder: LAYERS[curve.role],
-    hovertemplate: `%{x:.3f} s: %{y:.5~g} ${axes.unit}<br>${curve.topic} ${curve.field}<extra>${curve.name}</extra>`,
+    hovertemplate: `%{x:.3f} ${data.across.unit}: %{y:.5~g} ${axes.unit}<br>${curve.topic} ${curve.field}<extra>${curve.name}</extra>`,
   }));
-  return addPlot("time", "wide", traces, layout(axes.title, data.time_label, `${axes.label} [${axes.unit}]`, {
+  return addPlot("time", "wide", traces, layout(axes.title, data.across.label, `${axes.label} [${axes.unit}]`, {
     // A copy: plotly.js changes the one that it is given.
-    xaxis: { range: [...data.span_s], zeroline: false }, yaxis: { zeroline: false, automargin: false },
+    xaxis: { range: [...data.across.range], zeroline: false }, yaxis: { zeroline: false, automargin: false },
     margin: { l: 76, r: LEGEND_WIDTH, t: 36, b: 44, autoexpand: false }, legend: LEGEND, showlegend: true,
   }), CONFIG);
 }

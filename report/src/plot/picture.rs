@@ -4,7 +4,7 @@
 //! Regular 2.138 (Google, Apache License 2.0), changed by leaving out all but Latin, Greek and Cyrillic letters and
 //! signs, with `pyftsubset --layout-features=kern --no-hinting`.
 
-use crate::plot::drawing::{Drawing, TIME_LABEL, View};
+use crate::plot::drawing::{Across, Drawing, View};
 use crate::plot::figure::{Axes, Panel, in_layers};
 use crate::plot::ink::{Area, Flat, LEGEND_ROW, Look, WIDTH, at, draw_legend, draw_line, letters, px};
 use crate::plot::{space, thin};
@@ -71,7 +71,7 @@ pub fn svg(drawing: &Drawing) -> Result<String> {
             }
             for (index, shown) in axes.iter().enumerate() {
                 let room = if index + 1 == axes.len() { TIME_AXIS_HEIGHT } else { 0 };
-                draw_axes(&next(axes_height(shown) + room), shown, drawing.span_s, legend, room)?;
+                draw_axes(&next(axes_height(shown) + room), shown, &drawing.across, legend, room)?;
             }
         }
         sheet.present()?;
@@ -115,23 +115,24 @@ pub fn png(svg: &str) -> Result<Vec<u8>> {
     Ok(bytes)
 }
 
-/// Draws axes over time, with numbers below where there is `room` for them.
-fn draw_axes(area: &Area<'_>, axes: &Axes, span_s: [f64; 2], legend: u32, room: u32) -> Result<()> {
+/// Draws axes, with numbers below where there is `room` for them.
+fn draw_axes(area: &Area<'_>, axes: &Axes, across: &Across, legend: u32, room: u32) -> Result<()> {
     let area = draw_legend(area, legend, &axes.curves)?.margin(0, px(8), 0, 0);
-    let [from_s, to_s] = span_s;
+    let [from, to] = across.range;
     let values = axes.curves.iter().flat_map(|curve| &curve.points).map(|(_, value)| *value);
-    let time = if room > 0 { TIME_LABEL } else { "" };
+    let name = if room > 0 { across.label.clone() } else { String::new() };
     let flat = Flat {
         title: &axes.title,
-        names: [time.to_owned(), format!("{} [{}]", axes.label, axes.unit)],
-        ranges: [from_s..to_s.max(from_s + 1e-3), range(values)],
+        names: [name, format!("{} [{}]", axes.label, axes.unit)],
+        ranges: [from..to.max(from + 1e-3), range(values)],
         labels: [13, 6],
         margins: [78, 0, room + 8],
     };
     let mut chart = flat.draw(&area)?;
     for curve in in_layers(&axes.curves) {
         // The stretches between gaps.
-        for stretch in thinned(&curve.points).split(|(_, value)| !value.is_finite()) {
+        let points = if across.is_time { thinned(&curve.points) } else { curve.points.clone() };
+        for stretch in points.split(|(_, value)| !value.is_finite()) {
             draw_line(&mut chart, stretch.iter().copied(), Look::of(curve))?;
         }
     }

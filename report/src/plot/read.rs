@@ -1,8 +1,8 @@
 //! The one pass over a recording that takes out everything that is drawn.
 
 use crate::plot::choice::{Ask, Choice};
-use crate::plot::field;
-use crate::plot::thin::{Curve, Trail};
+use crate::plot::thin::{Curve, Line, Trail};
+use crate::plot::{Request, field};
 use anyhow::{Result, bail};
 use recorder::RecordingError;
 use recorder::definition::{Leaf, number};
@@ -13,6 +13,8 @@ use std::collections::BTreeMap;
 const POINTS_MAX: usize = 400_000;
 /// Bins of a curve: enough for a wide screen, and few enough for a small file.
 const BINS: std::ops::RangeInclusive<usize> = 100..=1000;
+/// Points of a curve against another field.
+const AGAINST_POINTS_MAX: usize = 4000;
 /// Messages between two reports of progress.
 const PROGRESS_EVERY: u64 = 4096;
 /// Channels that a field has, as a guess before the first message is there.
@@ -35,9 +37,26 @@ impl Span {
 }
 
 /// What a topic is read for.
-type Uses<'a> = (Vec<&'a mut Ask>, Vec<&'a mut Trail>);
+#[derive(Default)]
+struct Uses<'a> {
+    /// The number that all is drawn against is this topic's.
+    against: Option<&'a mut Ask>,
+    asks: Vec<&'a mut Ask>,
+    trails: Vec<&'a mut Trail>,
+}
 
-/// Reads what `choice` asks for in `span`; returns the first and the last time of it, in seconds. `progress` hears the
+/// How the numbers of a recording become points.
+struct Drawn<'a> {
+    /// Bins of a curve over time.
+    bins: usize,
+    request: &'a Request,
+    /// Whether people named the fields: then what is not there is an error.
+    is_named: bool,
+    /// What curves are drawn against, as it was last; not a number before it came.
+    against: f64,
+}
+
+/// Reads what `choice` and `request` ask for; returns the first and the last time of it, in seconds. `progress` hears the
 /// number of messages read, now and then.
 ///
 /// # Errors
@@ -45,12 +64,12 @@ type Uses<'a> = (Vec<&'a mut Ask>, Vec<&'a mut Trail>);
 pub fn read(
     recording: &Recording,
     choice: &mut Choice,
-    span: Span,
+    request: &Request,
     progress: &mut dyn FnMut(u64),
 ) -> Result<[f64; 2]> {
     let count: usize = choice.axes.iter().map(|axes| axes.asks.len()).sum();
     let bins = (POINTS_MAX / 4 / (CHANNELS_PER_ASK * count).max(1)).clamp(*BINS.start(), *BINS.end());
-    let is_named = choice.is_named;
+    let mut drawn = Drawn { bins, request, is_named: choice.is_named, against: f64::NAN };
     let mut uses = uses(choice);
     let [mut read_s, mut whole_s] = [[f64::INFINITY, f64::NEG_INFINITY]; 2];
     for (number, record) in (0_u64..).zip(recording.messages()) {
@@ -60,35 +79,67 @@ pub fn read(
         }
         let time_s = record.time_ns as f64 * 1e-9;
         widen(&mut whole_s, time_s);
-        let uses = uses.get_mut(&record.topic).filter(|_| span.holds(time_s));
-        let Some((asks, trails)) = uses else { continue };
+        let Some(uses) = uses.get_mut(&record.topic).filter(|_| request.span.holds(time_s)) else { continue };
         let leaves = recording.decode(&record)?;
         widen(&mut read_s, time_s);
-        for ask in asks {
-            if ask.curves.is_empty() {
-                let channels = field::channels(&leaves, &ask.field);
-                if channels.is_none() && is_named {
-                    return Err(RecordingError::unknown_field(&ask.topic, &ask.field, &leaves).into());
-                }
-                // The first message shows which numbers the field has.
-                let channels = channels.into_iter().flatten();
-                ask.curves = channels.map(|channel| (channel, Curve::new(bins))).collect();
-            }
-            ask.curves.iter_mut().for_each(|(channel, curve)| curve.push(time_s, channel.value(&leaves)));
-        }
-        trails.iter_mut().for_each(|trail| trail.push(position(&leaves)));
+        drawn.push(uses, time_s, &leaves)?;
     }
-    require_samples(choice, span, read_s, whole_s)?;
+    require_samples(choice, request.span, read_s, whole_s)?;
     Ok(read_s)
+}
+
+impl Drawn<'_> {
+    /// Takes what is wanted out of a message with these leaves.
+    fn push(&mut self, uses: &mut Uses<'_>, time_s: f64, leaves: &[Leaf]) -> Result<()> {
+        if let Some(ask) = &mut uses.against {
+            self.begin(ask, true, leaves)?;
+            // More than one is refused when all is read.
+            for (channel, line) in &mut ask.curves {
+                self.against = channel.value(leaves);
+                line.push(time_s, self.against);
+            }
+        }
+        let is_over_time = self.request.against.is_none();
+        let x = if is_over_time { time_s } else { self.against };
+        for ask in &mut uses.asks {
+            self.begin(ask, self.is_named, leaves)?;
+            if !x.is_nan() {
+                ask.curves.iter_mut().for_each(|(channel, line)| line.push(x, channel.value(leaves)));
+            }
+        }
+        uses.trails.iter_mut().for_each(|trail| trail.push(position(leaves)));
+        Ok(())
+    }
+
+    /// Before the first message: it shows which numbers the field has.
+    fn begin(&self, ask: &mut Ask, is_named: bool, leaves: &[Leaf]) -> Result<()> {
+        if !ask.curves.is_empty() {
+            return Ok(());
+        }
+        let channels = field::channels(leaves, &ask.field, self.request.full_throttle);
+        if channels.is_none() && is_named {
+            return Err(RecordingError::unknown_field(&ask.topic, &ask.field, leaves).into());
+        }
+        let line = || match self.request.against {
+            Some(_) => Line::Against(Trail::new(AGAINST_POINTS_MAX)),
+            None => Line::OverTime(Curve::new(self.bins)),
+        };
+        ask.curves = channels.into_iter().flatten().map(|channel| (channel, line())).collect();
+        Ok(())
+    }
 }
 
 fn uses(choice: &mut Choice) -> BTreeMap<String, Uses<'_>> {
     let mut uses: BTreeMap<String, Uses<'_>> = BTreeMap::new();
+    if let Some(ask) = &mut choice.against {
+        let topic = ask.topic.clone();
+        uses.entry(topic).or_default().against = Some(ask);
+    }
     for ask in choice.axes.iter_mut().flat_map(|axes| &mut axes.asks) {
-        uses.entry(ask.topic.clone()).or_default().0.push(ask);
+        uses.entry(ask.topic.clone()).or_default().asks.push(ask);
     }
     for (ask, trail) in &mut choice.trails {
-        uses.entry(ask.topic.clone()).or_default().1.push(trail);
+        uses.entry(ask.topic.clone()).or_default().trails.push(trail);
     }
     uses
 }
@@ -98,13 +149,17 @@ fn position(leaves: &[Leaf]) -> [f64; 3] {
     paths.map(|path| number(leaves, path).unwrap_or(f64::NAN))
 }
 
+fn is_empty(ask: &Ask) -> bool {
+    ask.curves.iter().all(|(_, line)| line.samples() == 0)
+}
+
 fn widen(span_s: &mut [f64; 2], time_s: f64) {
     *span_s = [span_s[0].min(time_s), span_s[1].max(time_s)];
 }
 
 fn require_samples(choice: &Choice, span: Span, read_s: [f64; 2], whole_s: [f64; 2]) -> Result<()> {
-    let mut asks = choice.axes.iter().flat_map(|axes| &axes.asks);
-    let what = match asks.find(|ask| choice.is_named && ask.curves.is_empty()) {
+    let named = choice.axes.iter().flat_map(|axes| &axes.asks).filter(|_| choice.is_named);
+    let what = match choice.against.iter().chain(named).find(|ask| is_empty(ask)) {
         Some(ask) => format!("{} has no sample", ask.topic),
         None if read_s[0] > read_s[1] => "there is nothing to plot".to_owned(),
         None => return Ok(()),

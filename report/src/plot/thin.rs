@@ -50,6 +50,41 @@ impl Curve {
     }
 }
 
+/// A curve over time, or against another field.
+#[derive(Clone, Debug)]
+pub enum Line {
+    /// Over time: it never turns back, so its bins keep all peaks.
+    OverTime(Curve),
+    /// Against a field that may go back and forth: evenly spaced samples.
+    Against(Trail),
+}
+
+impl Line {
+    /// Adds a sample.
+    pub fn push(&mut self, x: f64, y: f64) {
+        match self {
+            Self::OverTime(curve) => curve.push(x, y),
+            Self::Against(trail) => trail.push([x, y, 0.0]),
+        }
+    }
+
+    /// The points in the order of time.
+    pub fn points(&self) -> Vec<Sample> {
+        match self {
+            Self::OverTime(curve) => curve.points(),
+            Self::Against(trail) => trail.points().into_iter().map(|[x, y, _]| (x, y)).collect(),
+        }
+    }
+
+    /// Samples that were pushed.
+    pub fn samples(&self) -> u64 {
+        match self {
+            Self::OverTime(curve) => curve.samples,
+            Self::Against(trail) => trail.samples,
+        }
+    }
+}
+
 /// The bin of samples that follow each other.
 fn bin(samples: &[Sample]) -> Bin {
     let first = samples[0];
