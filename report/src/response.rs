@@ -37,7 +37,7 @@ pub(crate) enum NoResponse {
 impl Response {
     /// Of `field` to `reference`, sampled at the same times, looked for up to `reach` samples either way.
     pub(crate) fn of(field: &[f64], reference: &[f64], reach: usize) -> Result<Self, NoResponse> {
-        if field.len() < 2 * reach.max(1) {
+        if field.len() / 2 < reach.max(1) {
             return Err(NoResponse::TooShort);
         }
         let field = Sums::of(field).ok_or(NoResponse::ConstantField)?;

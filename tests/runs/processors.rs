@@ -1,4 +1,4 @@
-//! The same bytes on another processor: every shipped manifest is flown once more as if the processor had no fused
+//! The same bytes on another processor: the shipped manifests are flown once more as if the processor had no fused
 //! products, for which the C library has other versions of its functions; and no node calls any of those functions.
 
 use crate::manifests::{settings, shipped};
@@ -20,6 +20,19 @@ const TICKS: u32 = 5000;
 /// Those of other lengths: behind the last of three swaps; a swarm that takes long; a made-up flight of a second.
 const OTHERS: [(&str, u32); 3] = [("swap-laws", 10_000), ("ten-vehicles", 1000), ("replay-nanobench", 1001)];
 
+/// Those whose nodes are those of another one, which is flown: they differ from it in numbers or in a wire.
+const ALIKE: [&str; 9] = [
+    "wall-stop-slow",
+    "wall-stop-fast",
+    "wall-stop-open",
+    "wall-stop-thesis-slow",
+    "wall-stop-thesis-fast",
+    "wall-follow-varying",
+    "wall-follow-varying-thesis",
+    "take-off-attitude",
+    "rig-b",
+];
+
 /// Functions of the C library that a node may call, with the end of its name, since they change nothing: the number of
 /// halvings in nalgebra's matrix exponential, and a count in parry's tree of boxes (docs/decisions/009-numbers.md).
 const ALLOWED: [(&str, &str); 2] = [("log2", "controller"), ("log2", "plant")];
@@ -30,7 +43,7 @@ const CALLS: &str = "HUMMINGBUS_TEST_CALLS";
 const ASKED: &str = "HUMMINGBUS_TEST_C_LIBRARY";
 
 #[test]
-fn every_shipped_manifest_flies_the_same_on_an_older_processor() {
+fn what_is_shipped_flies_the_same_on_an_older_processor() {
     notice_where_nothing_is_older();
     let flights = ["excite", "hover-gentle", "low-passes", "rig-a-riddle"];
     let flights = flights.map(|name| repository(&format!("manifests/identify/{name}.toml")));
@@ -38,7 +51,9 @@ fn every_shipped_manifest_flies_the_same_on_an_older_processor() {
         let place = Place::new();
         difference(&place, &args(&place, &path))
     };
-    let wrong: Vec<String> = shipped().into_iter().chain(flights).filter_map(differ).collect();
+    let is_alike = |path: &String| ALIKE.iter().any(|name| path.ends_with(&format!("/{name}.toml")));
+    let others = shipped().into_iter().filter(|path| !is_alike(path));
+    let wrong: Vec<String> = others.chain(flights).filter_map(differ).collect();
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
 }
 

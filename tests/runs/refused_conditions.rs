@@ -35,7 +35,10 @@ fn a_lag_or_gain_without_a_reference_that_it_can_have() {
     with("").says(&["pass condition `low`", "`lag` has no `reference`", "add what it is measured against"]);
     with(&reference("field = \"position.q\"")).says(&["`position.q`", "position.z"]);
     with(&reference("field = \"attitude.roll\"")).says(&["the field is in `m`, its `reference` in `rad`"]);
-    with(&reference("field = \"position.z\", within_s = 0.0")).says(&["`within_s` of `reference` is 0 s"]);
+    for (within_s, said) in [("0.0", "0 s"), ("1e300", "1000000"), ("inf", "inf s"), ("nan", "NaN s")] {
+        let said = format!("`within_s` of `reference` is {said}");
+        with(&reference(&format!("field = \"position.z\", within_s = {within_s}"))).says(&[&said]);
+    }
     with(&height.replace("state", "stat")).says(&["nobody publishes /plant/stat", "did you mean"]);
     let minus = height.replace("reference", "minus");
     with(&format!("{height}{minus}")).says(&["the statistic `lag` cannot have `minus`", "from_s and to_s"]);

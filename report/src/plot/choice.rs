@@ -1,7 +1,7 @@
 //! What is plotted: chosen with `--plot`, or by the types of the recording's topics.
 
-use crate::plot::Request;
 use crate::plot::field::Channel;
+use crate::plot::request::Request;
 use crate::plot::thin::{Line, Trail};
 use anyhow::{Context, Result, bail};
 use recorder::reader::{Recording, Topic};

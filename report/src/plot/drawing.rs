@@ -1,37 +1,11 @@
 //! All that a file shows, whatever its format.
 
-use super::figure::{Panel, Trail};
+use super::figure::{Across, Panel, Trail};
+use super::request::View;
 use super::scene::Solid;
 use serde::Serialize;
 use serde_json::{Value, json};
 use std::fmt;
-
-/// A way to look at a recording.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "lowercase")]
-pub enum View {
-    /// Curves over time.
-    Time,
-    /// The paths in space, with the scene.
-    Path,
-    /// The paths from above.
-    Top,
-    /// The paths from the side.
-    Side,
-}
-
-/// The axis across: time, or what the curves are drawn against.
-#[derive(Clone, Debug, Serialize)]
-pub struct Across {
-    /// What it shows, with its unit.
-    pub label: String,
-    /// Its unit.
-    pub unit: String,
-    /// Its ends.
-    pub range: [f64; 2],
-    /// Whether that is time.
-    pub is_time: bool,
-}
 
 /// All that a file shows; its text says how much that is.
 #[derive(Debug, Serialize)]

@@ -1,7 +1,6 @@
 //! What is drawn, ready for any kind of file: axes with named, coloured curves of one unit, and paths in space.
 
 use crate::plot::choice::{Ask, Choice, Role, Wanted};
-use crate::plot::drawing::Across;
 use crate::plot::thin;
 use anyhow::{Result, bail};
 use serde::{Serialize, Serializer};
@@ -46,6 +45,19 @@ pub struct Axes {
     pub unit: String,
     /// The lines, those on top last.
     pub curves: Vec<Curve>,
+}
+
+/// The axis across: time, or what the curves are drawn against.
+#[derive(Clone, Debug, Serialize)]
+pub struct Across {
+    /// What it shows, with its unit.
+    pub label: String,
+    /// Its unit.
+    pub unit: String,
+    /// Its ends.
+    pub range: [f64; 2],
+    /// Whether that is time.
+    pub is_time: bool,
 }
 
 /// The axes of a vehicle.

@@ -3,8 +3,9 @@
 //! It is drawn by `page.js` with plotly.js ([`crate::page`]).
 
 use crate::page::PLOTLY_3D;
-use crate::plot::drawing::{Drawing, View};
+use crate::plot::drawing::Drawing;
 use crate::plot::figure::{Axes, Curve, Trail};
+use crate::plot::request::View;
 use crate::plot::scene::{EDGES, Solid};
 use serde::Serialize;
 use serde_json::{Value, json};

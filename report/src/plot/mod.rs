@@ -1,5 +1,6 @@
 //! Pictures of a recording: curves over time, and paths in space.
 //!
+//! - `request`: what people ask for
 //! - `choice`: what is plotted, by `--plot` or by the types of the topics
 //! - `field`: the numbers that a field is drawn as, in the units that people read
 //! - `read`: the one pass over the recording
@@ -19,6 +20,7 @@ mod html;
 mod ink;
 mod picture;
 mod read;
+mod request;
 mod scene;
 mod space;
 mod thin;
@@ -28,36 +30,9 @@ use choice::Choice;
 use recorder::reader::Recording;
 use serde::Serialize;
 
-pub use drawing::{Drawing, View};
+pub use drawing::Drawing;
 pub use picture::{PNG_MARK, SVG_MARK};
-pub use read::Span;
-
-/// What is drawn of a recording.
-///
-/// ```
-/// use report::plot::{Request, Span, View};
-/// let span = Span { from_s: 1.0, to_s: Some(3.0) };
-/// let request = Request { views: vec![View::Top], span, ..Request::default() };
-/// assert!(request.plots.is_empty() && request.vehicle.is_none(), "every vehicle, with what its topics suggest");
-/// ```
-#[derive(Clone, Debug, Default)]
-pub struct Request {
-    /// Axes over time, each as `TOPIC:FIELD[,TOPIC:FIELD…]`; what the types of the topics suggest where empty.
-    pub plots: Vec<String>,
-    /// Views; where empty, a page has all and a picture has curves over time.
-    pub views: Vec<View>,
-    /// The only vehicle; all where absent.
-    pub vehicle: Option<String>,
-    /// Simulated time that is drawn.
-    pub span: Span,
-    /// Counts of a motor command at full throttle: commands are drawn in % of it then.
-    pub full_throttle: Option<f64>,
-    /// `TOPIC:FIELD`, a number: the curves are drawn against it instead of time, each sample against the last that came
-    /// before it or with it.
-    pub against: Option<String>,
-    /// Title; the name of the recording's file where absent.
-    pub title: Option<String>,
-}
+pub use request::{Request, Span, View};
 
 /// A kind of file that shows a drawing.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]

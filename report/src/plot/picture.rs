@@ -4,9 +4,10 @@
 //! Regular 2.138 (Google, Apache License 2.0), changed by leaving out all but Latin, Greek and Cyrillic letters and
 //! signs, with `pyftsubset --layout-features=kern --no-hinting`.
 
-use crate::plot::drawing::{Across, Drawing, View};
-use crate::plot::figure::{Axes, Panel, in_layers};
+use crate::plot::drawing::Drawing;
+use crate::plot::figure::{Across, Axes, Panel, in_layers};
 use crate::plot::ink::{Area, Flat, LEGEND_ROW, Look, WIDTH, at, draw_legend, draw_line, letters, px};
+use crate::plot::request::View;
 use crate::plot::{space, thin};
 use anyhow::{Context, Result, bail};
 use plotters::prelude::*;
@@ -124,7 +125,7 @@ fn draw_axes(area: &Area<'_>, axes: &Axes, across: &Across, legend: u32, room: u
     let flat = Flat {
         title: &axes.title,
         names: [name, format!("{} [{}]", axes.label, axes.unit)],
-        ranges: [from..to.max(from + 1e-3), range(values)],
+        ranges: [from..to.max(from + least(from)), range(values)],
         labels: [13, 6],
         margins: [78, 0, room + 8],
     };
@@ -154,6 +155,11 @@ fn thinned(points: &[(f64, f64)]) -> Vec<(f64, f64)> {
     let mut curve = thin::Curve::new(BINS);
     points.iter().for_each(|(time_s, value)| curve.push(*time_s, *value));
     curve.points()
+}
+
+/// The least that an axis across spans: of one point there is nothing to see, but an axis must have a length.
+fn least(from: f64) -> f64 {
+    from.abs().max(1e-3) * 1e-6
 }
 
 /// A range that holds all values, with some room.

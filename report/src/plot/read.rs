@@ -1,8 +1,9 @@
 //! The one pass over a recording that takes out everything that is drawn.
 
 use crate::plot::choice::{Ask, Choice};
+use crate::plot::field;
+use crate::plot::request::{Request, Span};
 use crate::plot::thin::{Curve, Line, Trail};
-use crate::plot::{Request, field};
 use anyhow::{Result, bail};
 use recorder::RecordingError;
 use recorder::definition::{Leaf, number};
@@ -19,22 +20,6 @@ const AGAINST_POINTS_MAX: usize = 4000;
 const PROGRESS_EVERY: u64 = 4096;
 /// Channels that a field has, as a guess before the first message is there.
 const CHANNELS_PER_ASK: usize = 3;
-
-/// The span of simulated time that is drawn.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct Span {
-    /// First time in seconds.
-    pub from_s: f64,
-    /// Last time in seconds, if there is one.
-    pub to_s: Option<f64>,
-}
-
-impl Span {
-    /// Half a nanosecond of slack: limits in seconds are not exact in binary.
-    fn holds(self, time_s: f64) -> bool {
-        time_s >= self.from_s - 5e-10 && self.to_s.is_none_or(|to_s| time_s <= to_s + 5e-10)
-    }
-}
 
 /// What a topic is read for.
 #[derive(Default)]

@@ -1,10 +1,11 @@
 //! Views of the paths in space, with the scene: from above, from the side, and in three dimensions.
 
-use crate::plot::drawing::{Drawing, View};
+use crate::plot::drawing::Drawing;
 use crate::plot::figure::in_layers;
 use crate::plot::ink::{
     Area, Flat, GRID, HEAD_SIZE, LABEL_SIZE, Look, at, draw_legend, draw_line, letters, number, px,
 };
+use crate::plot::request::View;
 use anyhow::Result;
 use plotters::coord::CoordTranslate;
 use plotters::prelude::*;

@@ -74,6 +74,8 @@ fn check_span(
 
 /// Times in seconds are exact to half a nanosecond, as when the run is judged.
 const HALF_NS_S: f64 = 5e-10;
+/// The largest lag that can be looked for, s: the work grows with it. Own choice.
+const LAG_MAX_S: f64 = 60.0;
 
 /// The first sample at `from_s` or later of a topic that comes every `period_ticks`, and its period, in seconds.
 fn first_sample_s(from_s: f64, period_ticks: u32, tick_ns: u64) -> (f64, f64) {
@@ -221,10 +223,11 @@ fn unfit_reference(condition: &PassCondition) -> Option<(String, &'static str)> 
         return Some((format!("the statistic `{name}` cannot have `{key}`"), help));
     }
     let within_s = reference.within_s;
-    (within_s <= 0.0).then(|| {
+    let is_possible = within_s > 0.0 && within_s <= LAG_MAX_S;
+    (!is_possible).then(|| {
         (
             format!("`within_s` of `reference` is {within_s} s"),
-            "it is the largest lag that is looked for: some time above 0",
+            "it is the largest lag that is looked for: some time above 0, at most 60 s",
         )
     })
 }
