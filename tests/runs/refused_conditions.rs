@@ -35,7 +35,7 @@ fn a_lag_or_gain_without_a_reference_that_it_can_have() {
     with("").says(&["pass condition `low`", "`lag` has no `reference`", "add what it is measured against"]);
     with(&reference("field = \"position.q\"")).says(&["`position.q`", "position.z"]);
     with(&reference("field = \"attitude.roll\"")).says(&["the field is in `m`, its `reference` in `rad`"]);
-    for (within_s, said) in [("0.0", "0 s"), ("1e300", "1000000"), ("inf", "inf s"), ("nan", "NaN s")] {
+    for (within_s, said) in [("0.0", "0 s"), ("1e300", "1000000")] {
         let said = format!("`within_s` of `reference` is {said}");
         with(&reference(&format!("field = \"position.z\", within_s = {within_s}"))).says(&[&said]);
     }
