@@ -270,10 +270,11 @@ fn outcome(plan: &Plan, control: &SupervisorView, supervisor: &Supervisor<'_, Ho
         let Spent { cpu_ns, late, .. } = supervisor.spent_by(index);
         (node.name.clone(), share(cpu_ns), late)
     });
-    let timed = plan.nodes.iter().enumerate().filter(|(_, node)| node.computing_time.is_some());
-    let overruns = timed.map(|(index, node)| {
+    let overruns = plan.nodes.iter().enumerate().filter_map(|(index, node)| {
         let Spent { overruns, skipped_steps, .. } = supervisor.spent_by(index);
-        (node.name.clone(), overruns, skipped_steps)
+        // A process that took over may have a computing time where the first one has none.
+        let is_timed = node.computing_time.is_some() || overruns > 0 || skipped_steps > 0;
+        is_timed.then(|| (node.name.clone(), overruns, skipped_steps))
     });
     Outcome {
         ticks: control.completed_ticks(),

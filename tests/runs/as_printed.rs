@@ -38,7 +38,7 @@ fn the_truth_as_an_estimate_is_flown_by_what_the_thesis_prints_and_by_nothing_el
         assert!(expected.iter().all(|kind| told.contains(kind)) && told.len() == 3, "{name}: {told:?}");
     }
     let mut count = 0;
-    for folder in ["manifests", "manifests/sets", "manifests/identify"] {
+    for folder in ["manifests", "manifests/sets", "manifests/identify", "manifests/rig-delay"] {
         for entry in fs::read_dir(repository(folder)).unwrap().map(|entry| entry.unwrap().path()) {
             if entry.extension().is_some_and(|end| end == "toml") && !entry.ends_with("sets/printed.toml") {
                 count += 1;
