@@ -361,7 +361,7 @@ impl ConnectedNode {
         let is_over = || lockstep.end_tick() <= tick || lockstep.epoch() != self.epoch;
         match lockstep.wait(need, count, self.links.node.wait, is_over) {
             Waited::Reached => Await::Tick,
-            Waited::Over if lockstep.is_aborted() || lockstep.end_tick() <= tick => Await::End,
+            Waited::Over if lockstep.is_abandoned() || lockstep.end_tick() <= tick => Await::End,
             Waited::Over => Await::Change,
         }
     }

@@ -91,16 +91,23 @@ mod tests {
 
     #[test]
     fn an_abort_and_an_earlier_end_wake_everybody() {
-        with_views(|views, _| {
-            let Views { supervisor, clock, reader, .. } = views;
+        with_views(|views, readers| {
+            let Views { supervisor, clock, sender, reader } = views;
             std::thread::scope(|scope| {
                 let is_over = || reader.end_tick() <= 50;
                 let sleeper = scope.spawn(move || reader.wait(Need::Grant, 60, Wait::Block, is_over));
                 clock.set_end_tick(50);
                 assert_eq!(sleeper.join().unwrap(), Waited::Over);
-                let sleeper = scope.spawn(|| reader.wait(SAMPLES, 1, Wait::Block, || false));
+                let sends = scope.spawn(|| sender.wait(Need::Grant, 1, Wait::Block, || false));
                 supervisor.abort();
-                assert_eq!(sleeper.join().unwrap(), Waited::Over);
+                assert_eq!(sends.join().unwrap(), Waited::Over);
+            });
+            // Who only reads still takes what comes, until nothing more does.
+            std::thread::scope(|scope| {
+                let reads = scope.spawn(|| [1, 2].map(|n| reader.wait(SAMPLES, n, Wait::Block, || false)));
+                sender.samples_sent(0, 1, readers);
+                supervisor.note_drained();
+                assert_eq!(reads.join().unwrap(), [Waited::Reached, Waited::Over]);
             });
         });
     }

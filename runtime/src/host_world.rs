@@ -96,6 +96,7 @@ impl World for HostWorld<'_> {
             SegmentWrite::JoinTick(tick) => control.set_join_tick(tick),
             SegmentWrite::RequestStop => control.request_stop(),
             SegmentWrite::Abort => control.abort(),
+            SegmentWrite::Drained => control.note_drained(),
         }
     }
 

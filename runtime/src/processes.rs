@@ -78,11 +78,22 @@ impl<B: Body> Processes<B> {
         self.running.retain(|process| process.role != role || process.end.is_none());
     }
 
-    /// Aborts the run and gives the processes time to leave.
-    pub fn take_down(&mut self, world: &mut impl World) -> Result<()> {
+    /// Aborts the run and gives the processes time to leave: first those that send, then those of `readers`, the nodes
+    /// that only read and so record all that was sent.
+    pub fn take_down(&mut self, world: &mut impl World, readers: &[usize]) -> Result<()> {
+        let reads = |role: Role| matches!(role, Role::Node { node, .. } if readers.contains(&node));
         world.write(SegmentWrite::Abort);
+        self.await_ends(world, |role| !reads(role))?;
+        world.write(SegmentWrite::Drained);
+        self.await_ends(world, |_| true)
+    }
+
+    /// Waits until the processes of these roles have ended, for as long as there is patience.
+    fn await_ends(&mut self, world: &mut impl World, are_meant: impl Fn(Role) -> bool) -> Result<()> {
         let mut clock = WatchClock::new(world.now());
-        while !self.all_ended() && clock.now() < GRACE {
+        while clock.now() < GRACE
+            && self.running.iter().any(|process| process.end.is_none() && are_meant(process.role))
+        {
             let notices = world.notices();
             self.look()?;
             world.wait(notices, POLL);

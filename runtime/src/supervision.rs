@@ -317,7 +317,10 @@ impl<'a, W: World> Supervisor<'a, W> {
 
     /// Ends all processes. A failure is only noted: the run's error stays what ended it.
     fn take_down(&mut self) {
-        if let Err(error) = self.processes.take_down(&mut self.world) {
+        let nodes = self.plan.nodes.iter().enumerate();
+        let readers: Vec<_> =
+            nodes.filter(|(_, node)| node.outputs.is_empty()).map(|(node, _)| node).collect();
+        if let Err(error) = self.processes.take_down(&mut self.world, &readers) {
             self.say(&format!("cannot end all processes: {error:#}"));
         }
     }

@@ -67,8 +67,10 @@ pub enum SegmentWrite {
     JoinTick(u32),
     /// Have the clock end the run at the next tick boundary.
     RequestStop,
-    /// End the run at once: every wait returns.
+    /// End the run at once: every wait returns, but those of nodes without outputs.
     Abort,
+    /// Those that send have left: every wait returns.
+    Drained,
 }
 
 /// What is seen of a slot.

@@ -47,6 +47,20 @@ fn a_node_that_exits_is_named_with_its_code() {
 }
 
 #[test]
+fn what_a_starved_node_still_sends_after_a_failure_is_recorded() {
+    let place = Place::new();
+    let faulty = sender("faulty", 1, "parameters = { fault = \"exit-with3\", at_tick = 50 }");
+    // It wakes up when the source is dead and the run is aborted.
+    let relay = "inputs.input = \"/faulty/note\"\nparameters = { nap_ms = 500, at_tick = 1 }";
+    let path = place.write("starved.toml", manifest(5_000, &[faulty, sender("relay", 1, relay)]));
+    place.call(&["run", &path]).with_code(2).says(&["process `faulty` ended with exit code 3"]);
+    for (topic, messages) in topics(&partial(&place.path("starved.mcap"))) {
+        let ticks: Vec<_> = messages.iter().map(|message| message.tick).collect();
+        assert_eq!(ticks, (0..50).collect::<Vec<_>>(), "{topic}");
+    }
+}
+
+#[test]
 fn a_node_that_leaves_early_is_named_although_its_exit_code_is_0() {
     fly_with("exit-with0").says(&["`faulty`", "tick 50"]);
 }

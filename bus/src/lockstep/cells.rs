@@ -39,8 +39,8 @@ cells! {
         phase: AtomicU32,
         /// The tick at which the run ends.
         end_tick: AtomicU32,
-        /// 1 once every wait is to return.
-        is_aborted: AtomicU32,
+        /// 0 until the run is aborted, then an [`Abort`](super::states::Abort).
+        abort: AtomicU32,
         /// The number of the newest membership.
         epoch: AtomicU32,
     }

@@ -50,6 +50,7 @@ impl ClockView {
     /// Waits until the process in `slot` has completed `ticks` ticks, or `is_over` says that it never will.
     pub(crate) fn wait_done(&self, slot: usize, ticks: u32, is_over: impl Fn() -> bool) -> Waited {
         let cell = &self.segment.slots()[slot];
+        let is_over = || self.is_aborted() || is_over();
         wait::wait_for_count(&self.segment, &cell.done, ticks, &cell.done_waiter.word, Wait::Block, is_over)
     }
 

@@ -19,6 +19,7 @@ pub(crate) struct NodeView {
     /// The other slot of this node: its predecessor's or its backup's.
     other_slot: usize,
     first_input: usize,
+    has_outputs: bool,
 }
 
 /// A count that a process waits for.
@@ -48,7 +49,14 @@ impl NodeView {
     /// Opens the control segment of `plan` as generation `generation` of node `node`.
     pub(crate) fn open(plan: &Plan, node: usize, generation: u32) -> Result<Self, BusError> {
         let (slot, other_slot) = (plan.slot(node, generation), plan.slot(node, generation + 1));
-        Ok(Self { live: LiveView::open(plan)?, slot, other_slot, first_input: plan.first_input(slot) })
+        let has_outputs = !plan.nodes[node].outputs.is_empty();
+        Ok(Self {
+            live: LiveView::open(plan)?,
+            slot,
+            other_slot,
+            first_input: plan.first_input(slot),
+            has_outputs,
+        })
     }
 
     /// Notes that this process is ready for `phase`.
@@ -83,6 +91,12 @@ impl NodeView {
         self.segment.slots()[self.slot].transfer.store(transfer as u32, Release);
     }
 
+    /// Whether the run was aborted, and what this process waits for will not come. Nobody waits for a node without
+    /// outputs, so it stays until those that send have left: what they still send is not lost.
+    pub(crate) fn is_abandoned(&self) -> bool {
+        if self.has_outputs { self.is_aborted() } else { self.segment.is_drained() }
+    }
+
     /// Whether a process computes in the other slot of this node.
     pub(crate) fn other_computes(&self) -> bool {
         self.slot_state(self.other_slot) == SlotState::Taken
@@ -106,6 +120,7 @@ impl NodeView {
     /// Waits until the count of `need` reaches `count`, or `is_over` says that it never will.
     pub(crate) fn wait(&self, need: Need, count: u32, wait: Wait, is_over: impl Fn() -> bool) -> Waited {
         let (sequence, waiter) = self.sequence_and_waiter(need);
+        let is_over = || self.is_abandoned() || is_over();
         wait_for_count(&self.segment, sequence, count, waiter, wait, is_over)
     }
 

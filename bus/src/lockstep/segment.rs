@@ -1,6 +1,7 @@
 //! The control segment, mapped: the cells of a run, its topics, its slots and their inputs.
 
 use super::cells::{Head, InputCell, MAGIC, SlotCell, TopicCell};
+use super::states::Abort;
 use super::wake;
 use crate::error::BusError;
 use crate::hosted;
@@ -129,9 +130,14 @@ impl Segment {
         words.chain([&head.run.phase, &head.steering.changes]).for_each(wake::Word::wake);
     }
 
-    /// Whether every wait is to return: the run was aborted, or this instance is to end.
+    /// Whether the run was aborted, or this instance is to end: what is not there yet may never come.
     pub(super) fn is_aborted(&self) -> bool {
-        self.head().run.is_aborted.load(Acquire) != 0 || hosted::is_cancelled()
+        self.head().run.abort.load(Acquire) >= Abort::Told as u32 || hosted::is_cancelled()
+    }
+
+    /// Whether that is so, and those that send have left, too: what is not there yet never comes.
+    pub(super) fn is_drained(&self) -> bool {
+        self.head().run.abort.load(Acquire) >= Abort::Drained as u32 || hosted::is_cancelled()
     }
 
     /// Asks the clock to end the run at the next tick boundary.

@@ -14,6 +14,17 @@ pub enum Phase {
     Running = 2,
 }
 
+/// How far the end of an aborted run has come.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u32)]
+pub(super) enum Abort {
+    /// Nobody waits for what is not there yet, but for a node without outputs: those that send may still send what they
+    /// have the inputs of.
+    Told = 1,
+    /// Those that send have left: nothing more comes.
+    Drained = 2,
+}
+
 /// What a slot of a node holds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u32)]

@@ -2,7 +2,7 @@
 
 use super::live_view::LiveView;
 use super::segment::Segment;
-use super::states::{Phase, SlotState, TransferOutcome};
+use super::states::{Abort, Phase, SlotState, TransferOutcome};
 use super::wait::set_state;
 use super::wake::{self, AWAKE, NEVER, Word};
 use crate::error::BusError;
@@ -54,9 +54,18 @@ impl SupervisorView {
         Ok(Self { live: LiveView::open(plan)? })
     }
 
-    /// Ends the run at once: every wait returns.
+    /// Ends the run at once: every wait returns, but those of nodes without outputs, which take what is still sent.
     pub fn abort(&self) {
-        self.segment.head().run.is_aborted.store(1, Release);
+        self.end_at_once(Abort::Told);
+    }
+
+    /// Has every wait of an aborted run return: those that send have left.
+    pub fn note_drained(&self) {
+        self.end_at_once(Abort::Drained);
+    }
+
+    fn end_at_once(&self, abort: Abort) {
+        self.segment.head().run.abort.store(abort as u32, Release);
         self.segment.wake_everybody();
     }
 

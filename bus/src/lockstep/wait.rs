@@ -25,7 +25,6 @@ pub(super) fn wait_for_count(
     wait: Wait,
     is_over: impl Fn() -> bool,
 ) -> Waited {
-    let is_over = || segment.is_aborted() || is_over();
     let polls_until_ns = if wait == Wait::Adaptive { monotonic_ns() + ADAPTIVE_SPIN_NS } else { 0 };
     loop {
         if sequence.load(Acquire) >= count {
@@ -45,7 +44,7 @@ pub(super) fn wait_for_count(
         if polls {
             poll(sequence, count);
         } else {
-            wake::sleep(sequence, count, waiter, is_over);
+            wake::sleep(sequence, count, waiter, &is_over);
         }
     }
 }

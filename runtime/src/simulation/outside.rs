@@ -239,6 +239,10 @@ impl Sim {
                 self.segment.is_aborted = true;
                 self.wake_all();
             }
+            SegmentWrite::Drained => {
+                self.is_drained = true;
+                self.wake_all();
+            }
         }
     }
 

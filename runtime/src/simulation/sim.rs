@@ -149,6 +149,8 @@ pub(super) struct Sim {
     pub(super) now: Duration,
     /// The control segment.
     pub(super) segment: View,
+    /// Whether those that send have left an aborted run.
+    pub(super) is_drained: bool,
     pub(super) join_tick: u32,
     pub(super) shadow: Vec<u32>,
     pub(super) published: Vec<u32>,
@@ -202,6 +204,7 @@ impl Sim {
             faults,
             now: Duration::from_secs(1),
             segment,
+            is_drained: false,
             join_tick: NEVER,
             shadow: vec![0; plan.topics.len()],
             published: vec![0; 2 * NODES],
@@ -341,11 +344,18 @@ impl Sim {
         self.now += self.draw.micros(60);
         self.instances[index].sleep = None;
         match self.instances[index].role {
-            _ if self.segment.is_aborted => self.instances[index].end = Some(End::Exited(0)),
+            role if self.leaves(role) => self.instances[index].end = Some(End::Exited(0)),
             Role::Clock => self.step_clock(index),
             Role::Node { .. } => self.step_node(index),
             Role::Sidecar { .. } => self.step_sidecar(index),
         }
+    }
+
+    /// Whether whoever has this role finds that the run was aborted and that nothing more comes.
+    fn leaves(&self, role: Role) -> bool {
+        let reads_only = |node: usize| self.plan.nodes[node].outputs.is_empty();
+        let stays = matches!(role, Role::Node { node, .. } if reads_only(node)) && !self.is_drained;
+        self.segment.is_aborted && !stays
     }
 
     fn step_sidecar(&mut self, index: usize) {
