@@ -63,7 +63,8 @@ impl Component for Source {
         (): (),
         state: &mut MotorCommand,
     ) -> Result<Outputs, StepError> {
-        let is_due = self.0.fault != "none" && context.tick() == self.0.at_tick;
+        // A node whose steps take time may skip the tick itself.
+        let is_due = self.0.fault != "none" && context.tick() >= self.0.at_tick;
         if is_due && IS_ARMED.swap(false, SeqCst) {
             match self.0.fault.as_str() {
                 "panic" => panic!("the propeller came off"),
@@ -77,7 +78,7 @@ impl Component for Source {
     }
 }
 
-/// Reads commands, and hangs behind a tick if it is told to.
+/// Reads commands, and hangs behind a tick or heeds nothing if it is told to.
 struct Sink(Parameters);
 
 #[derive(InputPorts)]
@@ -103,7 +104,11 @@ impl Component for Sink {
             hang();
         }
         let expected = f64::from(context.tick() + 1);
-        if inputs.command.command[0] == expected { Ok(()) } else { Err("a tick was skipped".into()) }
+        if self.0.fault == "unheeding" || inputs.command.command[0] == expected {
+            Ok(())
+        } else {
+            Err("a tick was skipped".into())
+        }
     }
 }
 
@@ -310,6 +315,39 @@ fn a_thread_is_restarted_with_the_state_of_the_one_that_ended() {
         alone(|folder| {
             let plan = plan(400, fault).set("process.source.on_exit", "restart");
             assert_eq!(flown(&plan, folder).unwrap(), counted(400), "{fault}");
+        });
+    }
+}
+
+/// What is under way goes on in the thread that takes over, at whatever of the node's ticks the first one ended.
+#[test]
+fn a_computing_time_goes_on_in_a_restarted_thread_and_in_a_standby() {
+    let time = toml::toml! { distribution = "uniform"
+    min_ms = 0.1
+    max_ms = 9.0 };
+    for (period_ticks, on_exit) in [(1, "restart"), (1, "standby"), (4, "restart"), (4, "standby")] {
+        let timed = |fault: &str, at_tick: u32| {
+            let plan = plan(400, fault)
+                .set("process.source.computing_time", time.clone())
+                .set("process.source.period_ticks", period_ticks)
+                .set("process.source.on_exit", on_exit)
+                .set("process.source.parameters.at_tick", at_tick)
+                .set("process.sink.parameters.fault", "unheeding");
+            if on_exit == "standby" {
+                plan.set("process.source.standby.parameters.fault", "none")
+            } else {
+                plan
+            }
+        };
+        alone(|folder| {
+            let unhurt = flown(&timed("none", 0), folder).unwrap();
+            let steps = unhurt.last().copied().unwrap();
+            assert!((20.0..100.0).contains(&steps), "{steps} steps");
+            for at_tick in [1, 50, 51, 52, 53, 54, 55, 56, 200] {
+                let struck = flown(&timed("error", at_tick), folder).unwrap();
+                assert!(!IS_ARMED.load(SeqCst), "the fault struck");
+                assert_eq!(struck, unhurt, "{on_exit} at tick {at_tick}, every {period_ticks} ticks");
+            }
         });
     }
 }

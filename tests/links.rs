@@ -195,6 +195,33 @@ fn a_process_that_takes_no_time_sends_what_it_would_without_the_key() {
     require_same(&instant, &fly("hover.toml", &to_none).0);
 }
 
+/// A controller that takes 5 ms from the swap on, or up to it.
+#[test]
+fn what_takes_time_and_what_takes_none_take_over_from_each_other() {
+    let swap = swap("controller");
+    let constant = |ms: f64| format!("{{ distribution = \"constant\", ms = {ms:.1} }}\n");
+    let (instant, _) = fly("hover.toml", "");
+    let command = |topics: &Topics, tick: usize| topics["/controller/command"][tick].1[12..].to_vec();
+
+    let (slowed, counted) =
+        fly("hover.toml", &format!("{swap}with = {{ computing_time = {} }}\n", constant(5.0).trim()));
+    (0..800).for_each(|tick| assert_eq!(command(&slowed, tick), command(&instant, tick), "tick {tick}"));
+    let changes = |topics: &Topics, ticks: std::ops::Range<usize>| {
+        ticks.filter(|&tick| command(topics, tick) != command(topics, tick - 1)).count()
+    };
+    // 699 ticks, at one in five of which a step is done.
+    assert!((138..=140).contains(&changes(&slowed, 801..1500)), "{}", changes(&slowed, 801..1500));
+    // What it overran and skipped as the shadow of the other is not counted.
+    let [(_, overran, skipped)] = &counted[..] else { panic!("{counted:?}") };
+    assert!((139..=141).contains(overran) && (558..=561).contains(skipped), "{counted:?}");
+
+    let slow = format!("{CONTROLLER} = {}", constant(5.0));
+    let (hurried, _) =
+        fly("hover.toml", &format!("{slow}{swap}with = {{ computing_time = {} }}\n", constant(0.0).trim()));
+    assert!((158..=160).contains(&changes(&hurried, 1..800)), "{}", changes(&hurried, 1..800));
+    assert!(changes(&hurried, 810..1500) > 680, "{}", changes(&hurried, 810..1500));
+}
+
 #[test]
 fn a_computing_time_that_none_is_is_told() {
     let refused = |of: &str, parts: &[&str]| {

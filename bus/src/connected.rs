@@ -57,6 +57,7 @@ enum Await {
 }
 
 impl ConnectedNode {
+    /// Connects a node that has joined by `membership`.
     pub(crate) fn new(
         links: Links,
         declared: impl Iterator<Item = Declared>,
@@ -64,9 +65,22 @@ impl ConnectedNode {
         membership: &Membership,
     ) -> Result<Self, BusError> {
         let instance = membership.nodes[links.index].of(links.generation);
-        let instance = instance.expect("the membership by which a process joins names it");
-        let first_tick = instance.join_tick;
-        let mut node = Self {
+        let first_tick = instance.expect("the membership by which a process joins names it").join_tick;
+        let mut node = Self::unconnected(links, outputs, membership.epoch, first_tick);
+        if node.timing.is_some() {
+            node.outputs.iter_mut().for_each(OutPort::set_timed);
+        }
+        node.connect_inputs(declared, membership)?;
+        node.follow(membership, first_tick)?;
+        node.links.transport.reserve()?;
+        node.profile = node.links.tick_writer(first_tick)?;
+        node.links.lockstep.note_process();
+        node.links.lockstep.acknowledge(membership.epoch);
+        Ok(node)
+    }
+
+    fn unconnected(links: Links, outputs: Vec<OutPort>, epoch: u32, first_tick: u32) -> Self {
+        Self {
             inputs: Vec::new(),
             outputs,
             announcements: Vec::new(),
@@ -76,27 +90,12 @@ impl ConnectedNode {
             take_over_tick: 0,
             retirement_tick: u32::MAX,
             first_tick,
-            epoch: membership.epoch,
+            epoch,
             profile: None,
             timing: Timing::of(&links.plan, &links.node),
             state_words: 0,
             links,
-        };
-        if node.timing.is_some() {
-            node.outputs.iter_mut().for_each(OutPort::set_timed);
         }
-        node.connect_inputs(declared, membership)?;
-        node.follow(membership, first_tick)?;
-        node.links.transport.reserve()?;
-        if node.links.plan.profile {
-            let links = &node.links;
-            let (index, generation) = (links.index, links.generation);
-            node.profile =
-                Some(TickWriter::create(&links.run_dir, &links.plan, index, generation, first_tick)?);
-        }
-        node.links.lockstep.note_process();
-        node.links.lockstep.acknowledge(membership.epoch);
-        Ok(node)
     }
 
     fn connect_inputs(
@@ -433,46 +432,13 @@ impl ConnectedNode {
         state: &mut [u8],
         step: &mut impl FnMut(&mut Tick<'_>, &mut [u8]) -> Result<(), String>,
     ) -> Result<(), BusError> {
-        let links = &self.links;
-        let node = &links.node.name;
-        for input in &mut self.inputs {
-            input.take(tick, node).inspect_err(|_| links.lockstep.count_gap(input.topic))?;
-        }
-        for port in &mut self.predecessor {
-            port.take_available(tick, node)?;
-        }
+        self.take_inputs(tick)?;
         let received_ns = monotonic_ns();
-        let time_ns = u64::from(tick) * links.plan.tick_ns;
-        let takes_over = links.generation > 0 && tick == self.take_over_tick;
-        let predecessor = if takes_over { self.predecessor.as_slice() } else { &[] };
-        let (inputs, outputs) = (&self.inputs, &mut self.outputs);
-        let mut step = |state: &mut [u8], outputs: &mut [OutPort]| {
-            let mut view = Tick { tick, time_ns, node, inputs, outputs, predecessor };
-            let time_s = time_ns as f64 * 1e-9;
-            step(&mut view, state).map_err(|reason| BusError::Step {
-                node: node.clone(),
-                tick,
-                time_s,
-                reason,
-            })
-        };
-        match &mut self.timing {
-            None => step(state, outputs)?,
-            Some(timing) => {
-                let (state, words) = state.split_at_mut(8 * self.state_words);
-                let words = bytemuck::cast_slice_mut(words);
-                let counts = tick >= self.take_over_tick;
-                match timing.begin(tick, words, outputs) {
-                    Due::Step => {
-                        step(state, outputs)?;
-                        if timing.end(tick, words, outputs, node)? && counts {
-                            links.lockstep.count_overrun();
-                        }
-                    }
-                    Due::Skipped if counts => links.lockstep.count_skipped_step(),
-                    Due::Skipped => {}
-                }
-                Timing::write(tick, words, outputs, node)?;
+        match self.timing.take() {
+            None => self.step(tick, state, step)?,
+            Some(mut timing) => {
+                self.step_in_time(&mut timing, tick, state, step)?;
+                self.timing = Some(timing);
             }
         }
         if crate::hosted::is_cancelled() {
@@ -480,10 +446,10 @@ impl ConnectedNode {
             return Err(BusError::Aborted);
         }
         let done_ns = monotonic_ns();
-        links.lockstep.count_step(done_ns - received_ns);
+        self.links.lockstep.count_step(done_ns - received_ns);
         // Before anything is sent: whoever sees the sample can go on from the state after it.
         self.publish_state(tick + self.links.node.period_ticks, state);
-        self.send(tick, time_ns, received_ns, done_ns)?;
+        self.send(tick, received_ns, done_ns)?;
         if tick >= self.take_over_tick {
             // The predecessor leaves; nothing of it is read any more.
             self.predecessor.clear();
@@ -492,8 +458,60 @@ impl ConnectedNode {
         Ok(())
     }
 
-    fn send(&mut self, tick: u32, time_ns: u64, received_ns: u64, done_ns: u64) -> Result<(), BusError> {
+    fn take_inputs(&mut self, tick: u32) -> Result<(), BusError> {
         let (lockstep, node) = (&self.links.lockstep, &self.links.node.name);
+        for input in &mut self.inputs {
+            input.take(tick, node).inspect_err(|_| lockstep.count_gap(input.topic))?;
+        }
+        self.predecessor.iter_mut().try_for_each(|port| port.take_available(tick, node))
+    }
+
+    /// Computes the component's step, which writes what is due.
+    fn step(
+        &mut self,
+        tick: u32,
+        state: &mut [u8],
+        step: &mut impl FnMut(&mut Tick<'_>, &mut [u8]) -> Result<(), String>,
+    ) -> Result<(), BusError> {
+        let links = &self.links;
+        let (node, time_ns) = (&links.node.name, links.time_ns(tick));
+        let takes_over = links.generation > 0 && tick == self.take_over_tick;
+        let predecessor = if takes_over { self.predecessor.as_slice() } else { &[] };
+        let (inputs, outputs) = (self.inputs.as_slice(), self.outputs.as_mut_slice());
+        let mut view = Tick { tick, time_ns, node, inputs, outputs, predecessor };
+        let time_s = time_ns as f64 * 1e-9;
+        step(&mut view, state).map_err(|reason| BusError::Step { node: node.clone(), tick, time_s, reason })
+    }
+
+    /// Computes the step unless the one before is under way, and writes what is done by `tick`.
+    fn step_in_time(
+        &mut self,
+        timing: &mut Timing,
+        tick: u32,
+        state: &mut [u8],
+        step: &mut impl FnMut(&mut Tick<'_>, &mut [u8]) -> Result<(), String>,
+    ) -> Result<(), BusError> {
+        let (state, words) = state.split_at_mut(8 * self.state_words);
+        let words = bytemuck::cast_slice_mut(words);
+        // Until then they are its predecessor's to count.
+        let counts = tick >= self.take_over_tick;
+        match timing.begin(tick, words, &self.outputs) {
+            Due::Step => {
+                self.step(tick, state, step)?;
+                let overran = timing.end(tick, words, &mut self.outputs, &self.links.node.name)?;
+                if overran && counts {
+                    self.links.lockstep.count_overrun();
+                }
+            }
+            Due::Skipped if counts => self.links.lockstep.count_skipped_step(),
+            Due::Skipped => {}
+        }
+        Timing::write(tick, words, &mut self.outputs, &self.links.node.name)
+    }
+
+    fn send(&mut self, tick: u32, received_ns: u64, done_ns: u64) -> Result<(), BusError> {
+        let (lockstep, node) = (&self.links.lockstep, &self.links.node.name);
+        let time_ns = self.links.time_ns(tick);
         let mut sent_before = false;
         let is_sent = |(_, output): &(usize, &mut OutPort)| output.is_sent(tick);
         for (index, output) in self.outputs.iter_mut().enumerate().filter(is_sent) {

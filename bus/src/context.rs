@@ -35,6 +35,14 @@ pub struct NodeContext<'a> {
 }
 
 /// What an input carries.
+///
+/// ```
+/// use bus::context::{InputMessage, NodeContext};
+/// let inputs = ["estimate"];
+/// let messages = [InputMessage { port: "estimate", bytes: 96, period_ticks: 4 }];
+/// let context = NodeContext::new("down", &inputs).reading(&messages);
+/// assert_eq!(context.messages[0].bytes, 96);
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct InputMessage<'a> {
     /// The input.

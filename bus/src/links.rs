@@ -8,6 +8,7 @@ use crate::lockstep::NodeView;
 use crate::membership::{Membership, NodeInstances};
 use crate::plan::{InputPlan, NodePlan, Plan};
 use crate::port::{InPort, OutPort, Source};
+use crate::profile::TickWriter;
 use crate::transport::{Receiver, Transport};
 use std::path::PathBuf;
 
@@ -25,6 +26,18 @@ pub(crate) struct Links {
 }
 
 impl Links {
+    /// Simulation time at the start of `tick`, ns.
+    pub(crate) fn time_ns(&self, tick: u32) -> u64 {
+        u64::from(tick) * self.plan.tick_ns
+    }
+
+    /// What records the host times of the ticks from `first_tick` on, if the run is profiled.
+    pub(crate) fn tick_writer(&self, first_tick: u32) -> Result<Option<TickWriter>, BusError> {
+        let create =
+            || TickWriter::create(&self.run_dir, &self.plan, self.index, self.generation, first_tick);
+        self.plan.profile.then(create).transpose()
+    }
+
     pub(crate) fn subscriber(&self, topic: usize, generation: u32) -> Result<Receiver, BusError> {
         self.transport.subscriber(&self.plan.topics[topic].name, generation, self.plan.capacity(topic))
     }

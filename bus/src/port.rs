@@ -237,6 +237,11 @@ impl InPort {
         self.current.as_ref().map(Received::words)
     }
 
+    /// The tick at which the current sample was sent, if there is one.
+    pub(crate) fn sent_tick(&self) -> Option<u64> {
+        self.current.as_ref().map(|sample| sample.header().tick)
+    }
+
     pub(crate) fn host_times_ns(&self) -> [u64; 3] {
         let header = self.current.as_ref().map(|sample| *sample.header()).unwrap_or_default();
         [header.received_ns, header.done_ns, header.sent_ns]

@@ -115,6 +115,8 @@ pub(crate) trait SampleSource {
     fn count(&self) -> usize;
     /// The newest sample of a port; `None` where that is not wired.
     fn words(&self, port: usize) -> Option<&[u64]>;
+    /// The tick at which it was sent; `None` where none was.
+    fn sent_tick(&self, port: usize) -> Option<u64>;
     /// The CDR bytes of a port's sample, if it was sent at this tick.
     fn fresh(&self, port: usize) -> Option<&[u8]>;
     /// The same of the process that shadows the publisher.
@@ -318,6 +320,14 @@ impl<'a> InputPorts<'a> for AnyInputs<'a> {
 
 /// The inputs of a component that forwards messages as bytes, in the order of their names; what it makes of them it sends
 /// on outputs of the same names ([`OutputSamples::write_bytes`]), and a message keeps the stamp of its first sender.
+///
+/// ```
+/// use bus::ports::ForwardedInputs;
+/// /// The bytes of the first input's message, if that is a new one.
+/// fn first_new<'a>(inputs: &ForwardedInputs<'a>, last_tick: Option<u64>) -> Option<&'a [u8]> {
+///     (inputs.sent_tick(0) > last_tick).then(|| inputs.newest(0))
+/// }
+/// ```
 #[derive(Clone, Copy, Debug)]
 pub struct ForwardedInputs<'a>(InputSamples<'a>);
 
@@ -326,6 +336,12 @@ impl<'a> ForwardedInputs<'a> {
     #[must_use]
     pub fn newest(&self, input: usize) -> &'a [u8] {
         self.0.0.words(input).map_or(&[], |words| bytemuck::cast_slice(&words[1..]))
+    }
+
+    /// The tick at which that was sent; none for the initial value, and where a test steps the component.
+    #[must_use]
+    pub fn sent_tick(&self, input: usize) -> Option<u64> {
+        self.0.0.sent_tick(input)
     }
 }
 

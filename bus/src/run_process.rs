@@ -106,6 +106,10 @@ impl SampleSource for Received<'_> {
         self.port(port)?.newest()
     }
 
+    fn sent_tick(&self, port: usize) -> Option<u64> {
+        self.port(port)?.sent_tick()
+    }
+
     fn fresh(&self, port: usize) -> Option<&[u8]> {
         Some(self.port(port)?.fresh(self.tick)?.0)
     }

@@ -43,6 +43,10 @@ impl SampleSource for SampleMemory {
         self.samples[port].as_deref()
     }
 
+    fn sent_tick(&self, _: usize) -> Option<u64> {
+        None
+    }
+
     fn fresh(&self, _: usize) -> Option<&[u8]> {
         None
     }

@@ -121,3 +121,60 @@ fn next_samples<'a>(rest: &mut &'a mut [u64], output: &OutPort) -> [&'a mut [u64
     let (sent, next) = both.split_at_mut(length);
     [sent, next]
 }
+
+#[cfg(test)]
+mod tests {
+    use super::{Due, HEAD_WORDS, Timing};
+    use crate::computing_time::ComputingTime;
+    use crate::random::stream;
+
+    fn timing(time: ComputingTime, period_ticks: u32) -> Timing {
+        Timing { time, random: stream(1, "test"), tick_ns: 1_000_000, period_ticks }
+    }
+
+    /// At which due ticks below `end` a node without outputs steps, from `words` on, and which steps overrun.
+    fn steps(timing: &mut Timing, words: &mut [u64], due: std::ops::Range<u32>) -> (Vec<u32>, Vec<u32>) {
+        let (mut stepped, mut overran) = (Vec::new(), Vec::new());
+        for tick in due.step_by(timing.period_ticks as usize) {
+            if timing.begin(tick, words, &[]) == Due::Step {
+                stepped.push(tick);
+                if timing.end(tick, words, &mut [], "test").unwrap() {
+                    overran.push(tick);
+                }
+            }
+        }
+        (stepped, overran)
+    }
+
+    #[test]
+    fn a_step_of_as_many_ticks_as_the_period_is_done_in_time_and_one_more_skips_one() {
+        for (ms, period_ticks, stepped, overran) in [
+            (0.0, 1, vec![0, 1, 2, 3, 4], vec![]),
+            (1.0, 1, vec![0, 1, 2, 3, 4], vec![]),
+            (1.5, 1, vec![0, 1, 3, 5, 7], vec![1, 3, 5, 7]),
+            (4.0, 4, vec![0, 4, 8, 12, 16], vec![]),
+            (4.1, 4, vec![0, 4, 12, 20, 28], vec![4, 12, 20, 28]),
+            (13.0, 4, vec![0, 4, 20, 36, 52], vec![4, 20, 36, 52]),
+        ] {
+            let mut timing = timing(ComputingTime::Constant { us: ms * 1e3 }, period_ticks);
+            let (found, late) = steps(&mut timing, &mut [0; HEAD_WORDS], 0..stepped[4] + 1);
+            assert_eq!((found, late), (stepped, overran), "{ms} ms every {period_ticks} ticks");
+        }
+    }
+
+    #[test]
+    fn who_has_the_words_goes_on_as_their_owner_would() {
+        let time = || ComputingTime::Uniform { min_us: 100.0, max_us: 9000.0 };
+        for period_ticks in [1, 3] {
+            let mut alone = [0; HEAD_WORDS];
+            let (whole, late) = steps(&mut timing(time(), period_ticks), &mut alone, 0..3000);
+            assert!(late.len() > 200, "{}", late.len());
+            for end in [3, 300, 1500] {
+                let mut words = [0; HEAD_WORDS];
+                let (mut stepped, _) = steps(&mut timing(time(), period_ticks), &mut words, 0..end);
+                stepped.extend(steps(&mut timing(time(), period_ticks), &mut words, end..3000).0);
+                assert_eq!((&stepped, words), (&whole, alone), "from tick {end} on");
+            }
+        }
+    }
+}

@@ -2,7 +2,8 @@
 //! which hold an attitude and no place: whatever pushes the vehicle, they let it drift.
 //!
 //! Along each of the heading's level axes for itself, as autopilots' position modes do:
-//! - While the pilot asks for roll, or for pitch, that angle passes as it is.
+//! - While the pilot asks for roll, or for pitch, that angle passes as it is. Sticks at rest are never quite at zero: up
+//!   to `stick_dead_band_deg` counts as none.
 //! - When he lets go of it, the velocity along that axis is brought to zero, a = −Kv·v. Where it is below
 //!   `lock_speed_m_s`, the place is locked, and held from then on: a = Kv·(Kx·(place − position) − v).
 //!
@@ -15,7 +16,7 @@ use bus::component::{Component, Info, StepError};
 use bus::context::{NodeContext, StepContext};
 use bus::messages::{SetPoint, StateEstimate};
 use bus::{InputPorts, OutputPorts};
-use diagnostics::parameter::{ParameterError, positive, positive_up_to};
+use diagnostics::parameter::{ParameterError, not_negative, positive, positive_up_to};
 use diagnostics::unit::STANDARD_GRAVITY_M_S2;
 use nalgebra::{Quaternion, UnitQuaternion};
 use serde::Deserialize;
@@ -37,6 +38,9 @@ pub struct Parameters {
     tilt_max_deg: f64,
     /// Below this speed along an axis it locks the place, m/s. Default 0.1.
     lock_speed_m_s: f64,
+    /// Up to this tilt the pilot asks for none, degrees. Default 3: a tenth of the sticks' range (thesis §5.3), as PX4's
+    /// parameter `MPC_HOLD_DZ` has it.
+    stick_dead_band_deg: f64,
 }
 
 impl Default for Parameters {
@@ -47,6 +51,7 @@ impl Default for Parameters {
             speed_max_m_s: 1.0,
             tilt_max_deg: 10.0,
             lock_speed_m_s: 0.1,
+            stick_dead_band_deg: 3.0,
         }
     }
 }
@@ -102,6 +107,7 @@ pub struct PositionHold {
     speed_max_m_s: f64,
     acceleration_max_m_s2: f64,
     lock_speed_m_s: f64,
+    stick_dead_band_rad: f64,
 }
 
 /// The most that `tilt_max_deg` may be: the range of the sticks (thesis §5.3).
@@ -118,15 +124,24 @@ impl Component for PositionHold {
     type State = PositionHoldState;
 
     fn new(parameters: Parameters, _: &NodeContext<'_>) -> Result<Self, ParameterError> {
-        let Parameters { position_1_s, velocity_1_s, speed_max_m_s, tilt_max_deg, lock_speed_m_s } =
+        let Parameters { position_1_s, velocity_1_s, speed_max_m_s, tilt_max_deg, lock_speed_m_s, .. } =
             parameters;
+        let stick_dead_band_deg = parameters.stick_dead_band_deg;
         positive("position_1_s", position_1_s)?;
         positive("velocity_1_s", velocity_1_s)?;
         positive("speed_max_m_s", speed_max_m_s)?;
         positive_up_to("tilt_max_deg", tilt_max_deg, TILT_MAX_DEG, "deg")?;
         positive("lock_speed_m_s", lock_speed_m_s)?;
+        not_negative("stick_dead_band_deg", stick_dead_band_deg)?;
         let acceleration_max_m_s2 = STANDARD_GRAVITY_M_S2 * libm::tan(tilt_max_deg.to_radians());
-        Ok(Self { position_1_s, velocity_1_s, speed_max_m_s, acceleration_max_m_s2, lock_speed_m_s })
+        Ok(Self {
+            position_1_s,
+            velocity_1_s,
+            speed_max_m_s,
+            acceleration_max_m_s2,
+            lock_speed_m_s,
+            stick_dead_band_rad: stick_dead_band_deg.to_radians(),
+        })
     }
 
     fn initial(&self) -> PositionHoldState {
@@ -154,7 +169,8 @@ impl PositionHold {
         let position_m = [estimate.position.x, estimate.position.y];
         let velocity_m_s = along_heading([estimate.velocity.x, estimate.velocity.y], yaw_rad);
         // Pitch moves along the heading's x, roll along its y.
-        let is_free = [asked.pitch_rad == 0.0, asked.roll_rad == 0.0];
+        let is_free =
+            [asked.pitch_rad, asked.roll_rad].map(|asked_rad| asked_rad.abs() <= self.stick_dead_band_rad);
         let from_m: [f64; 2] = std::array::from_fn(|axis| state.place[axis] - position_m[axis]);
         let mut error_m = along_heading(from_m, yaw_rad);
         for axis in 0..2 {
@@ -225,6 +241,21 @@ mod tests {
     }
 
     #[test]
+    fn sticks_that_do_not_quite_come_back_to_the_middle_let_the_place_be_held() {
+        for (parameters, dead_band_deg) in
+            [(json!({}), 3.0_f64), (json!({ "stick_dead_band_deg": 0.0 }), 0.0)]
+        {
+            let mut hold = Harness::<PositionHold>::from_json(&parameters).unwrap();
+            let dead_band_rad = dead_band_deg.to_radians();
+            step(&mut hold, dead_band_rad, 1.0, 0.0, 0.0);
+            let pushed = step(&mut hold, -dead_band_rad, 1.3, 0.0, 0.0);
+            assert!(pushed.roll > 0.02, "it is held: {pushed:?}");
+            let asked_rad = dead_band_rad + 0.001;
+            assert_eq!(step(&mut hold, asked_rad, 1.3, 0.0, 0.0).roll, asked_rad, "it gives way");
+        }
+    }
+
+    #[test]
     fn turned_to_the_left_it_holds_the_same_place_by_pitch() {
         let mut hold = hold();
         step(&mut hold, 0.0, 0.0, 0.0, 0.0);
@@ -239,6 +270,7 @@ mod tests {
             (json!({ "position_1_s": 0.0 }), "position_1_s"),
             (json!({ "tilt_max_deg": 60.0 }), "tilt_max_deg"),
             (json!({ "lock_speed_m_s": -0.1 }), "lock_speed_m_s"),
+            (json!({ "stick_dead_band_deg": -1.0 }), "stick_dead_band_deg"),
             (json!({ "speed": 1.0 }), "speed"),
         ] {
             let error = Harness::<PositionHold>::from_json(&parameters).unwrap_err().to_string();

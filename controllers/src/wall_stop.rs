@@ -51,6 +51,8 @@ gains! {
         holding_speed_m_s: f64 = file.limit("hold.speed", VELOCITY),
         /// Displacement along y (m) to a velocity back (m/s), 1/s.
         aside_1_s: f64 = file.gain("hold.aside", PER_SECOND),
+        /// That displacement counts up to this, m.
+        aside_max_m: f64 = file.limit("hold.aside_max", LENGTH),
         /// The loops inside.
         loops: LoopsGains = LoopsGains::read(file),
     }
@@ -95,7 +97,7 @@ pub struct WallStopState {
     /// Acceleration that the integrator over the distance asks for.
     #[field(unit = "m/s^2")]
     pub integral: f64,
-    /// Displacement along the heading's y, by the estimated velocity.
+    /// Displacement along the heading's y, by the estimated velocity, up to a limit.
     #[field(unit = "m")]
     pub aside: f64,
     /// [`CRUISING`], [`BRAKING`] or [`HOLDING`].
@@ -184,7 +186,8 @@ impl Law for WallStopLaw {
         let speed_m_s = input.walls.velocity[0];
         state.phase = self.phase(state.phase, to_go_m, speed_m_s);
         self.integrate(state, to_go_m);
-        state.aside += input.walls.velocity[1] * self.velocity.cascade.period_s;
+        let aside_m = state.aside + input.walls.velocity[1] * self.velocity.cascade.period_s;
+        state.aside = aside_m.clamp(-self.gains.aside_max_m, self.gains.aside_max_m);
         let asked = self.asked(state, to_go_m, speed_m_s);
         let measured = HoverMotion::by_ranges(input);
         let output =
@@ -255,6 +258,30 @@ mod tests {
                 .to_string();
             assert!(error.contains(key), "{error}");
         }
+    }
+
+    /// Pushed aside for 10 s at 1 m/s, it flies back by no more than the limit.
+    #[test]
+    fn what_it_remembers_of_a_push_aside_has_a_limit() {
+        use crate::controller::Controller;
+        let vehicle = concat!(env!("CARGO_MANIFEST_DIR"), "/../vehicles/hummingbird.toml");
+        let parameters = serde_json::json!({ "vehicle": vehicle, "altitude_m": 1.0 });
+        let mut law = bus::Harness::<Controller<WallStopLaw>>::from_json(&parameters).unwrap();
+        let mut walls = bus::messages::WallEstimate {
+            distance: [3.0; 4],
+            in_sight: [1; 4],
+            height: 1.0,
+            ..Default::default()
+        };
+        let attitude = bus::messages::AttitudeEstimate::default();
+        let mut fly = |aside_m_s: f64, steps: u32| {
+            walls.velocity[1] = aside_m_s;
+            let inputs = || WallInputs { walls: &walls, attitude: &attitude };
+            let status = (0..steps).map(|_| law.step(inputs()).unwrap().status.unwrap());
+            status.last().unwrap().velocity_set_point[1]
+        };
+        assert_eq!(fly(1.0, 10_000), -0.3, "back at the most that it may");
+        assert!(fly(-1.0, 1000).abs() < 1e-9, "it was 1 m away by its own count, and is back");
     }
 
     #[test]

@@ -12,21 +12,21 @@ use bus::random::{Stream, uniform};
 
 /// Streams that share a line at most.
 pub const STREAMS: usize = 16;
-/// Messages that wait or are under way at most.
-pub const PARCELS: usize = 64;
+/// Packets that wait or are under way at most.
+pub const PACKETS: usize = 64;
 
-/// What a [`Parcel`] is.
+/// What a [`Packet`] is.
 const FREE: u32 = 0;
 const QUEUED: u32 = 1;
 const UNDER_WAY: u32 = 2;
 
 const NS_PER_S: u128 = 1_000_000_000;
 
-/// A message that waits or is under way.
+/// A message on the line, waiting or under way.
 #[derive(Clone, Copy, Debug, Message)]
 #[repr(C)]
-#[message(type_name = "hummingbus_msgs/msg/LinkParcel")]
-pub struct Parcel {
+#[message(type_name = "hummingbus_msgs/msg/LinkPacket")]
+pub struct Packet {
     /// Its place among those that were queued.
     #[field(unit = "1")]
     number: u64,
@@ -59,7 +59,7 @@ pub struct Parcel {
 #[message(type_name = "hummingbus_msgs/msg/LineState")]
 pub struct LineState {
     /// The messages that wait or are under way, in any order.
-    parcels: [Parcel; PARCELS],
+    packets: [Packet; PACKETS],
     /// The newest message of each stream that has arrived.
     #[field(unit = "1")]
     pub(crate) newest: [[u8; FORWARDED_BYTES_MAX]; STREAMS],
@@ -114,6 +114,14 @@ impl Default for LineState {
     }
 }
 
+/// More packets than a line has places for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[error(
+    "{PACKETS} messages wait or are under way, and a link holds no more: shorten its `latency_ms`, `jitter_ms` or \
+     `queue_bytes`, or send less often (`rate_hz`)"
+)]
+pub struct NoPlace;
+
 /// What a line is.
 #[derive(Debug)]
 pub struct Line {
@@ -136,18 +144,28 @@ pub struct Line {
 }
 
 impl Line {
-    /// Queues a message of `stream` at `at_ns`, which takes `wire_bytes` on the wire; where there is no room for it, it is
-    /// dropped whole.
-    pub fn queue(&self, state: &mut LineState, stream: usize, message: &[u8], wire_bytes: u32, at_ns: u64) {
-        let fits = state.waiting().0 + wire_bytes <= self.queue_bytes;
-        let number = state.queued;
-        let Some(place) = state.parcels.iter_mut().find(|parcel| parcel.stage == FREE && fits) else {
+    /// Queues a message of `stream` at `at_ns`, which takes `wire_bytes` on the wire; where the queue has no room for it, it
+    /// is dropped whole.
+    ///
+    /// # Errors
+    /// As many packets as the state has places for wait or are under way already.
+    pub fn queue(
+        &self,
+        state: &mut LineState,
+        stream: usize,
+        message: &[u8],
+        wire_bytes: u32,
+        at_ns: u64,
+    ) -> Result<(), NoPlace> {
+        if state.waiting().0 + wire_bytes > self.queue_bytes {
             state.counts.dropped[stream] += 1;
-            return;
-        };
+            return Ok(());
+        }
+        let number = state.queued;
+        let place = state.packets.iter_mut().find(|packet| packet.stage == FREE).ok_or(NoPlace)?;
         #[allow(clippy::cast_possible_truncation, reason = "at most STREAMS")]
         let stream = stream as u32;
-        *place = Parcel {
+        *place = Packet {
             number,
             queued_ns: at_ns,
             stream,
@@ -157,6 +175,7 @@ impl Line {
         };
         place.message[..message.len()].copy_from_slice(message);
         state.queued += 1;
+        Ok(())
     }
 
     /// Sends what waits, up to `until_ns`.
@@ -166,25 +185,25 @@ impl Line {
                 (state.busy_since_ns, state.busy_bits) = (start_ns, 0);
             }
             let (delay_ns, is_lost) = self.fate(state.counts.begun);
-            let parcel = &mut state.parcels[index];
-            state.busy_bits += u64::from(parcel.wire_bytes) * self.bits_per_byte;
+            let packet = &mut state.packets[index];
+            state.busy_bits += u64::from(packet.wire_bytes) * self.bits_per_byte;
             state.free_ns = state.busy_since_ns + self.duration_ns(state.busy_bits);
             state.last_arrival_ns = state.last_arrival_ns.max(state.free_ns + delay_ns);
-            parcel.arrival_ns = state.last_arrival_ns;
-            (parcel.stage, parcel.is_lost) = (UNDER_WAY, u32::from(is_lost));
+            packet.arrival_ns = state.last_arrival_ns;
+            (packet.stage, packet.is_lost) = (UNDER_WAY, u32::from(is_lost));
             state.counts.begun += 1;
-            state.counts.begun_bytes += u64::from(parcel.wire_bytes);
+            state.counts.begun_bytes += u64::from(packet.wire_bytes);
         }
     }
 
     /// The message that is sent next, and when: of those that wait when the wire is free the one of the highest priority,
     /// of these the one that came first.
     fn next(&self, state: &LineState) -> Option<(usize, u64)> {
-        let queued = || state.parcels.iter().enumerate().filter(|(_, parcel)| parcel.stage == QUEUED);
-        let start_ns = queued().map(|(_, parcel)| parcel.queued_ns).min()?.max(state.free_ns);
-        let waits = queued().filter(|(_, parcel)| parcel.queued_ns <= start_ns);
-        let priority = |parcel: &Parcel| self.priorities[parcel.stream as usize];
-        let first = waits.min_by_key(|(_, parcel)| (u32::MAX - priority(parcel), parcel.number));
+        let queued = || state.packets.iter().enumerate().filter(|(_, packet)| packet.stage == QUEUED);
+        let start_ns = queued().map(|(_, packet)| packet.queued_ns).min()?.max(state.free_ns);
+        let waits = queued().filter(|(_, packet)| packet.queued_ns <= start_ns);
+        let priority = |packet: &Packet| self.priorities[packet.stream as usize];
+        let first = waits.min_by_key(|(_, packet)| (u32::MAX - priority(packet), packet.number));
         first.map(|(index, _)| (index, start_ns))
     }
 
@@ -207,20 +226,20 @@ impl Line {
 
     /// Takes out what has arrived by `now_ns`.
     pub fn arrive(state: &mut LineState, now_ns: u64) {
-        let arrived = |parcel: &&mut Parcel| parcel.stage == UNDER_WAY && parcel.arrival_ns <= now_ns;
+        let arrived = |packet: &&mut Packet| packet.stage == UNDER_WAY && packet.arrival_ns <= now_ns;
         // In the order of arrival, of a stream the newest stays.
-        while let Some(parcel) =
-            state.parcels.iter_mut().filter(arrived).min_by_key(|parcel| (parcel.arrival_ns, parcel.number))
+        while let Some(packet) =
+            state.packets.iter_mut().filter(arrived).min_by_key(|packet| (packet.arrival_ns, packet.number))
         {
-            parcel.stage = FREE;
-            let stream = parcel.stream as usize;
-            if parcel.is_lost == 1 {
+            packet.stage = FREE;
+            let stream = packet.stream as usize;
+            if packet.is_lost == 1 {
                 state.counts.lost[stream] += 1;
                 continue;
             }
-            state.newest[stream] = parcel.message;
+            state.newest[stream] = packet.message;
             state.counts.arrived[stream] += 1;
-            state.counts.delay_ns = parcel.arrival_ns - parcel.queued_ns;
+            state.counts.delay_ns = packet.arrival_ns - packet.queued_ns;
         }
     }
 
@@ -239,19 +258,19 @@ impl Line {
 impl LineState {
     /// Bytes and messages that wait.
     pub fn waiting(&self) -> (u32, u32) {
-        let queued = self.parcels.iter().filter(|parcel| parcel.stage == QUEUED);
-        queued.fold((0, 0), |(bytes, count), parcel| (bytes + parcel.wire_bytes, count + 1))
+        let queued = self.packets.iter().filter(|packet| packet.stage == QUEUED);
+        queued.fold((0, 0), |(bytes, count), packet| (bytes + packet.wire_bytes, count + 1))
     }
 
     /// Messages that are under way.
     pub fn under_way(&self) -> u32 {
-        self.parcels.iter().map(|parcel| u32::from(parcel.stage == UNDER_WAY)).sum()
+        self.packets.iter().map(|packet| u32::from(packet.stage == UNDER_WAY)).sum()
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use super::{Line, LineState};
+    use super::{Line, LineState, NoPlace, PACKETS};
     use bus::random::stream;
 
     const MS: u64 = 1_000_000;
@@ -274,7 +293,7 @@ mod tests {
         let mut state = LineState::default();
         for ms in 0..length_ms {
             if ms % every_ms == 0 {
-                line.queue(&mut state, 0, &[1; 24], 35, ms * MS);
+                line.queue(&mut state, 0, &[1; 24], 35, ms * MS).unwrap();
             }
             line.send(&mut state, (ms + 1) * MS);
             Line::arrive(&mut state, (ms + 1) * MS);
@@ -323,14 +342,27 @@ mod tests {
     fn what_finds_no_room_is_dropped_and_counted() {
         let (mut line, mut state) = (line(1), LineState::default());
         for _ in 0..7 {
-            line.queue(&mut state, 1, &[1; 24], 35, 0);
+            line.queue(&mut state, 1, &[1; 24], 35, 0).unwrap();
         }
         // 5 × 35 bytes are 175; a sixth would be 210.
         assert_eq!((state.counts.dropped[1], state.waiting()), (2, (175, 5)));
         line.send(&mut state, 1);
         assert_eq!((state.under_way(), state.waiting()), (1, (140, 4)));
-        line.queue(&mut state, 1, &[1; 24], 62, 0);
+        line.queue(&mut state, 1, &[1; 24], 62, 0).unwrap();
         assert_eq!(state.waiting(), (202, 5));
+    }
+
+    #[test]
+    fn more_packets_than_there_are_places_for_are_an_error_and_not_a_full_queue() {
+        let mut line = Line { latency_ns: 10_000 * MS, bits_s: 1_000_000, ..line(1) };
+        let mut state = LineState::default();
+        for number in 0..PACKETS as u64 {
+            line.queue(&mut state, 0, &[1], 12, number * MS).unwrap();
+            line.send(&mut state, (number + 1) * MS);
+        }
+        assert_eq!((state.under_way(), state.waiting()), (PACKETS as u32, (0, 0)));
+        assert_eq!(line.queue(&mut state, 0, &[1], 12, 100 * MS), Err(NoPlace));
+        assert_eq!(state.counts.dropped[0], 0);
     }
 
     #[test]
@@ -338,7 +370,7 @@ mod tests {
         let mut line = Line { priorities: vec![0, 9, 0], ..line(1) };
         let mut state = LineState::default();
         for (stream, at_ns) in [(0, 0), (0, 0), (1, MS), (2, MS)] {
-            line.queue(&mut state, stream, &[7], 12, at_ns);
+            line.queue(&mut state, stream, &[7], 12, at_ns).unwrap();
         }
         let mut order = Vec::new();
         for ms in 1..=10 {
@@ -356,7 +388,7 @@ mod tests {
         let (mut state, mut newest, mut delays) = (LineState::default(), 0, Vec::new());
         for ms in 0..250_u64 {
             let message = u8::try_from(ms).unwrap();
-            line.queue(&mut state, 0, &[message], 12, ms * MS);
+            line.queue(&mut state, 0, &[message], 12, ms * MS).unwrap();
             line.send(&mut state, (ms + 1) * MS);
             Line::arrive(&mut state, (ms + 1) * MS);
             assert!(state.newest[0][0] >= newest);
@@ -375,7 +407,8 @@ mod tests {
         let mut states = [LineState::default(), LineState::default()];
         for ms in 0..2000_u64 {
             for (line, state) in [&mut first, &mut second].into_iter().zip(&mut states) {
-                line.queue(state, (ms % 3) as usize, &ms.to_le_bytes(), 13 + (ms % 7) as u32, ms * MS);
+                line.queue(state, (ms % 3) as usize, &ms.to_le_bytes(), 13 + (ms % 7) as u32, ms * MS)
+                    .unwrap();
                 line.send(state, (ms + 1) * MS);
                 Line::arrive(state, (ms + 1) * MS);
             }

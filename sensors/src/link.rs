@@ -2,13 +2,14 @@
 //!
 //! Each input is a *stream*: what its topic carries comes out on the output of the same name, later, less often, and not
 //! all of it. The streams share one `line`. A message that comes out is the sender's own, stamp included: a consumer
-//! tells a new one by its stamp, and its age by that too. Until the first has come, the output is the input's initial value.
+//! tells a new one by its stamp, and its age by that too. A message without a stamp is new whenever its topic's publisher
+//! sends. Until the first has come, the output is the input's initial value.
 //!
 //! A message that is sent at tick k is queued at the time of that tick, and is out at the first tick of the link at which
 //! it has arrived. The link itself adds nothing to that: its inputs are a tick late because no message arrives in the tick
 //! in which it is sent.
 
-use crate::line::{Line, LineState, STREAMS};
+use crate::line::{Line, LineState, NoPlace, PACKETS, STREAMS};
 use bus::announcement::Announcement;
 use bus::component::{Component, Info, StepError};
 use bus::context::{NodeContext, StepContext};
@@ -149,21 +150,33 @@ pub struct LinkStatistics {
     pub stream_dropped: [u32; STREAMS],
 }
 
-/// What a link remembers.
+/// What a link remembers: what it last took from each input, and what is on its line.
+///
+/// ```
+/// use bus::Message;
+/// // It is handed over to whoever takes the link's place, and so is a message.
+/// assert_eq!(sensors::link::LinkState::SCHEMA.type_name, "hummingbus_msgs/msg/LinkState");
+/// ```
 #[derive(Clone, Copy, Debug, Message)]
 #[repr(C)]
 #[message(type_name = "hummingbus_msgs/msg/LinkState")]
 pub struct LinkState {
     line: LineState,
-    /// The stamp of the message that was taken last from each input; all bits set before the first.
+    /// The mark of the message that was taken last from each input; all bits set before the first.
     #[field(unit = "1")]
-    taken_stamp: [u64; STREAMS],
+    taken_mark: [u64; STREAMS],
     /// The period of its rate in which it was taken; all bits set before the first.
     #[field(unit = "1")]
     taken_period: [u64; STREAMS],
 }
 
 /// What a link sends: its statistics, and the newest message of each stream.
+///
+/// ```
+/// use bus::ports::OutputPorts;
+/// // The other outputs are called like its inputs.
+/// assert_eq!(sensors::link::Outputs::DECLARED[0].name, "statistics");
+/// ```
 #[derive(Debug)]
 pub struct Outputs {
     statistics: LinkStatistics,
@@ -205,6 +218,21 @@ struct LinkStream {
 }
 
 /// A data link.
+///
+/// ```
+/// use bus::component::Component;
+/// use bus::context::{InputMessage, NodeContext};
+/// use sensors::link::Link;
+/// # use serde_json::json;
+/// let messages = [InputMessage { port: "estimate", bytes: 96, period_ticks: 1 }];
+/// let context = NodeContext::new("down", &["estimate"]).reading(&messages);
+/// Link::new(diagnostics::read(&json!({ "streams": { "estimate": { "rate_hz": 25.0 } } }))?, &context)?;
+/// assert!(context.warnings().is_empty());
+/// // 107 bytes a millisecond are more than 57 600 baud carry.
+/// Link::new(diagnostics::read(&json!({}))?, &context)?;
+/// assert!(context.warnings()[0].message.contains("messages will wait and be dropped"));
+/// # Ok::<(), diagnostics::ParameterError>(())
+/// ```
 #[derive(Debug)]
 pub struct Link {
     line: Line,
@@ -240,8 +268,8 @@ impl Component for Link {
     }
 
     fn initial(&self) -> LinkState {
-        let (taken_stamp, taken_period) = ([u64::MAX; STREAMS], [u64::MAX; STREAMS]);
-        LinkState { line: LineState::default(), taken_stamp, taken_period }
+        let (taken_mark, taken_period) = ([u64::MAX; STREAMS], [u64::MAX; STREAMS]);
+        LinkState { line: LineState::default(), taken_mark, taken_period }
     }
 
     fn connected(&mut self, topics: &[(&str, &Announcement)]) -> Result<(), StepError> {
@@ -267,7 +295,7 @@ impl Component for Link {
         } else {
             let sent_ns = now_ns - self.tick_ns;
             self.line.send(&mut state.line, sent_ns);
-            self.take(inputs, state, sent_ns);
+            self.take(inputs, state, sent_ns)?;
         }
         self.line.send(&mut state.line, now_ns);
         Line::arrive(&mut state.line, now_ns);
@@ -277,19 +305,21 @@ impl Component for Link {
 
 impl Link {
     /// Queues the messages that are new and due.
-    fn take(&self, inputs: ForwardedInputs<'_>, state: &mut LinkState, sent_ns: u64) {
+    fn take(&self, inputs: ForwardedInputs<'_>, state: &mut LinkState, sent_ns: u64) -> Result<(), NoPlace> {
         for (index, stream) in self.streams.iter().enumerate() {
             let message = &inputs.newest(index)[..stream.size];
-            let (stamp, period) = (stream.stamp(message), stream.period(sent_ns));
-            let is_new = stamp.is_none_or(|stamp| stamp != state.taken_stamp[index]);
+            let mark = stream.stamp(message).or_else(|| inputs.sent_tick(index));
+            let period = stream.period(sent_ns);
+            let is_new = mark.is_none_or(|mark| mark != state.taken_mark[index]);
             let is_due = period.is_none_or(|period| period != state.taken_period[index]);
             if is_new && is_due {
-                state.taken_stamp[index] = stamp.unwrap_or(u64::MAX);
+                state.taken_mark[index] = mark.unwrap_or(u64::MAX);
                 state.taken_period[index] = period.unwrap_or(u64::MAX);
                 let wire_bytes = stream.wire_bytes(self.overhead_bytes);
-                self.line.queue(&mut state.line, index, message, wire_bytes, sent_ns);
+                self.line.queue(&mut state.line, index, message, wire_bytes, sent_ns)?;
             }
         }
+        Ok(())
     }
 
     fn outputs(&self, line: &LineState, now_ns: u64) -> Outputs {
@@ -369,9 +399,10 @@ impl Parameters {
         require("loss", self.loss, (0.0..=1.0).contains(&self.loss), "a fraction from 0 to 1")
     }
 
-    /// Refuses a stream whose messages never fit into the queue, and tells streams that together exceed the line.
+    /// Refuses a stream whose messages never fit into the queue, and more messages under way than a link holds; tells
+    /// streams that together exceed the line.
     fn check_load(&self, context: &NodeContext<'_>) -> Result<(), ParameterError> {
-        let mut offered_bytes_s = 0.0;
+        let (mut offered_bytes_s, mut offered_hz) = (0.0, 0.0);
         for message in context.messages {
             let stream = self.streams.get(message.port);
             let message_bytes =
@@ -388,8 +419,17 @@ impl Parameters {
             let rate_hz =
                 stream.and_then(|stream| stream.rate_hz).map_or(sent_hz, |rate_hz| rate_hz.min(sent_hz));
             offered_bytes_s += rate_hz * bytes as f64;
+            offered_hz += rate_hz;
         }
         let carried_bytes_s = self.baud / f64::from(self.bits_per_byte);
+        let sent_hz = offered_hz * (carried_bytes_s / offered_bytes_s).min(1.0);
+        let under_way = sent_hz * (self.latency_ms + 0.5 * self.jitter_ms) * 1e-3;
+        refuse(under_way > PACKETS as f64, "latency_ms", || {
+            format!(
+                "{sent_hz:.0} messages are sent each second, so {under_way:.0} would be under way, and a link holds {PACKETS}: \
+                 shorten the latency, or send less often (`rate_hz`)"
+            )
+        })?;
         if offered_bytes_s > carried_bytes_s * (1.0 + 1e-9) {
             context.warn("baud", format!(
                 "its streams offer {offered_bytes_s:.0} bytes/s, overhead included, and {} baud carry {carried_bytes_s:.0}: \

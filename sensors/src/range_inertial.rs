@@ -2,6 +2,7 @@
 
 mod axis;
 pub mod filter;
+mod gains;
 pub mod params;
 
 use bus::OutputPorts;
@@ -46,7 +47,7 @@ impl Component for RangeInertial {
         state: &mut RangeInertialState,
     ) -> Result<Outputs, StepError> {
         let now_ns = context.time_ns();
-        self.update(state, now_ns, &inputs);
+        self.update(state, now_ns, &inputs)?;
         let walls = self.walls(state, inputs.attitude.yaw, now_ns);
         Ok(Outputs { walls, estimate: self.motion(state, inputs.attitude) })
     }
@@ -74,6 +75,59 @@ mod tests {
             assert!(error.contains(key), "{error}");
         }
         Harness::<RangeInertial>::from_json(&json!({})).unwrap();
+    }
+
+    /// At rest by the accelerometer, which is off by 0.2 m/s^2, ranges to nothing, and a receiver that tells `told` with
+    /// this delay every 100 ms: the velocity after 20 s, and the worst since 5 s.
+    fn with_late_receiver(delay_ms: u64, told: [f64; 2]) -> ([f64; 2], f64) {
+        let parameters =
+            json!({ "initial_velocity_sigma_m_s": 0.5, "initial_acceleration_bias_sigma_m_s2": 0.3 });
+        let mut filter = Harness::<RangeInertial>::from_json(&parameters).unwrap();
+        let imu = Imu { specific_force: [0.2, -0.2, 9.81].into(), ..Default::default() };
+        let (ranges, attitude) = (Ranges::default(), AttitudeEstimate::default());
+        let mut worst_m_s = 0.0_f64;
+        let mut last = [0.0; 2];
+        for tick in 0..20_000_u64 {
+            let measured_ms = (tick.saturating_sub(delay_ms)) / 100 * 100;
+            let gps = Gps {
+                measured_ns: measured_ms * 1_000_000,
+                velocity: [told[0], told[1], 0.0].into(),
+                valid: u32::from(tick >= delay_ms),
+                ..Default::default()
+            };
+            let inputs =
+                RangeInertialInputs { ranges: &ranges, imu: &imu, attitude: &attitude, gps: Some(&gps) };
+            let velocity = filter.step(inputs).unwrap().estimate.velocity;
+            last = [velocity.x, velocity.y];
+            if tick > 5_000 {
+                worst_m_s = worst_m_s.max((last[0] - told[0]).abs()).max((last[1] - told[1]).abs());
+            }
+        }
+        (last, worst_m_s)
+    }
+
+    #[test]
+    fn a_late_receiver_tells_the_velocity_as_well_as_a_prompt_one_and_corrects_once() {
+        for told in [[0.0, 0.0], [1.0, -2.0], [-0.5, 0.3]] {
+            for delay_ms in [0, 50, 120, 200, 500, 1200] {
+                let (last, worst_m_s) = with_late_receiver(delay_ms, told);
+                // A bias is held to be forgotten in time: 0.035 m/s^2 of this one are not believed, for as long as it is late.
+                let most_m_s = 0.045 + 0.035 * delay_ms as f64 * 1e-3;
+                assert!(worst_m_s < most_m_s, "{delay_ms} ms late: {last:?} for {told:?}, worst {worst_m_s}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_receiver_that_is_later_than_can_be_looked_back_ends_the_run_in_words() {
+        let mut filter = Harness::<RangeInertial>::from_json(&json!({})).unwrap();
+        let imu = Imu { specific_force: [0.0, 0.0, 9.81].into(), ..Default::default() };
+        let (ranges, attitude) = (Ranges::default(), AttitudeEstimate::default());
+        let gps = Gps { measured_ns: 500_000_000, valid: 1, ..Default::default() };
+        let inputs = |gps| RangeInertialInputs { ranges: &ranges, imu: &imu, attitude: &attitude, gps };
+        (0..2_500).for_each(|_| drop(filter.step(inputs(None)).unwrap()));
+        let error = filter.step(inputs(Some(&gps))).unwrap_err().to_string();
+        assert!(error.contains("`gps` was measured 2.000 s ago, and it looks back 1.27"), "{error}");
     }
 
     #[test]

@@ -57,53 +57,48 @@ fn input(
     topics: &[TopicPlan],
 ) -> Result<InputPlan, Diagnostic> {
     let DeclaredNode { manifest, name, program, .. } = declared;
-    let at = |message: String, help: String| manifest.problem(&port.span(), message, help);
     let who = format!("input `{}` of `{}`", port.get_ref(), name.get_ref());
+    let at = |what: String, help: String| manifest.problem(&port.span(), format!("{who}{what}"), help);
     let Some(topic) = topics.iter().position(|topic| topic.name == setting.topic) else {
         let known = topics.iter().map(|topic| topic.name.as_str());
         let help = did_you_mean(&setting.topic, known, "the topics are");
-        return Err(at(format!("{who}: nobody publishes {}", setting.topic), help));
+        return Err(at(format!(": nobody publishes {}", setting.topic), help));
     };
-    if let Some(expected) = expected_type(program, port.get_ref()) {
-        let found = &topics[topic].type_name;
-        if expected != found {
-            let help = format!("wire a topic of {expected}");
-            return Err(at(format!("{who} reads {expected}, {} carries {found}", setting.topic), help));
-        }
+    let found = &topics[topic].type_name;
+    if let Some(expected) = expected_type(program, port.get_ref()).filter(|expected| expected != found) {
+        let help = format!("wire a topic of {expected}");
+        return Err(at(format!(" reads {expected}, {} carries {found}", setting.topic), help));
     }
-    let refused = match (setting.delay_ticks, &setting.initial) {
-        (0, None) | (1, Some(_)) => None,
-        (0, Some(_)) => Some(("has an initial value but no delay".to_owned(), "add delay_ticks = 1")),
-        (1, None) => {
-            let help = "state what it reads at tick 0, such as initial = { command = [1, 1, 1, 1] }";
-            Some(("is delayed and has no initial value".to_owned(), help))
-        }
-        (delay, _) => Some((format!("has delay_ticks = {delay}"), "a delay is 0 or 1 tick")),
-    };
+    if let Some((what, help)) = bad_delay(program, setting) {
+        return Err(at(format!(" {what}"), help.to_owned()));
+    }
+    if let (Some(schema), Some(initial)) = (manifest.registry().message(found), &setting.initial) {
+        let told = bus::initial::sample(schema, initial);
+        told.map_err(|reason| at(format!(": initial value: {reason}"), format!("give fields of {found}")))?;
+    }
+    let (port, delay_ticks) = (port.get_ref().clone(), setting.delay_ticks);
+    Ok(InputPlan { port, topic, delay_ticks, initial: setting.initial.clone() })
+}
+
+/// What is wrong with the delay and the initial value of an input, and what helps.
+fn bad_delay(program: &Program, setting: &InputSetting) -> Option<(String, &'static str)> {
     let is_forwarded =
         program.component().is_some_and(|kind| matches!(kind.inputs, Inputs::Forwarded { .. }));
-    let refused = if is_forwarded && setting.delay_ticks == 0 {
-        let help = "write { topic = …, delay_ticks = 1, initial = { … } }: nothing is forwarded in no time, and until the \
-                    first message has come the output is the initial value";
-        Some(("is forwarded and has no delay".to_owned(), help))
-    } else {
-        refused
+    let (what, help) = match (setting.delay_ticks, &setting.initial) {
+        (0, _) if is_forwarded => (
+            "is forwarded and has no delay",
+            "write { topic = …, delay_ticks = 1, initial = { … } }: nothing is forwarded in no time, and until the first \
+             message has come the output is the initial value",
+        ),
+        (0, None) | (1, Some(_)) => return None,
+        (0, Some(_)) => ("has an initial value but no delay", "add delay_ticks = 1"),
+        (1, None) => (
+            "is delayed and has no initial value",
+            "state what it reads at tick 0, such as initial = { command = [1, 1, 1, 1] }",
+        ),
+        (delay, _) => return Some((format!("has delay_ticks = {delay}"), "a delay is 0 or 1 tick")),
     };
-    if let Some((what, help)) = refused {
-        return Err(at(format!("{who} {what}"), help.to_owned()));
-    }
-    let schema = manifest.registry().message(&topics[topic].type_name);
-    if let (Some(schema), Some(initial)) = (schema, &setting.initial) {
-        bus::initial::sample(schema, initial).map_err(|reason| {
-            at(format!("{who}: initial value: {reason}"), format!("give fields of {}", schema.type_name))
-        })?;
-    }
-    Ok(InputPlan {
-        port: port.get_ref().clone(),
-        topic,
-        delay_ticks: setting.delay_ticks,
-        initial: setting.initial.clone(),
-    })
+    Some((what.to_owned(), help))
 }
 
 /// The type that a built-in node reads on `port`; none where it reads any.

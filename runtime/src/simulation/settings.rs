@@ -28,28 +28,6 @@ pub(super) fn program(on_exit: OnExit) -> Program {
 /// `a` and `b` read each other's samples; `c` reads both, their shadows too, as a recorder does.
 fn plan(draw: &mut Draw) -> Plan {
     let period_ticks = 1 + draw.below(2) as u32;
-    let topic = |name: &str, period_ticks: u32| TopicPlan {
-        name: name.to_owned(),
-        type_name: "test".to_owned(),
-        period_ticks,
-    };
-    let input = |topic: usize, delay_ticks: u32| InputPlan {
-        port: topic.to_string(),
-        topic,
-        delay_ticks,
-        initial: None,
-    };
-    let node = |name: &str, period_ticks: u32, inputs: Vec<InputPlan>, outputs: &[usize]| NodePlan {
-        name: name.to_owned(),
-        period_ticks,
-        wait: Wait::Block,
-        cpu: None,
-        inputs,
-        outputs: outputs.iter().map(|&topic| OutputPlan { port: "out".to_owned(), topic }).collect(),
-        parameters: serde_json::Value::Null,
-        restarts: true,
-        computing_time: None,
-    };
     Plan {
         run_id: "0-0".to_owned(),
         seed: 0,
@@ -66,6 +44,28 @@ fn plan(draw: &mut Draw) -> Plan {
             node("b", period_ticks, vec![input(0, 0)], &[2]),
             node("c", 1, vec![input(0, 0), input(1, 0), input(2, 0)], &[]),
         ],
+    }
+}
+
+fn topic(name: &str, period_ticks: u32) -> TopicPlan {
+    TopicPlan { name: name.to_owned(), type_name: "test".to_owned(), period_ticks }
+}
+
+fn input(topic: usize, delay_ticks: u32) -> InputPlan {
+    InputPlan { port: topic.to_string(), topic, delay_ticks, initial: None }
+}
+
+fn node(name: &str, period_ticks: u32, inputs: Vec<InputPlan>, outputs: &[usize]) -> NodePlan {
+    NodePlan {
+        name: name.to_owned(),
+        period_ticks,
+        wait: Wait::Block,
+        cpu: None,
+        inputs,
+        outputs: outputs.iter().map(|&topic| OutputPlan { port: "out".to_owned(), topic }).collect(),
+        parameters: serde_json::Value::Null,
+        restarts: true,
+        computing_time: None,
     }
 }
 

@@ -139,13 +139,15 @@ impl Axis {
         self.take_up(&cross, innovation_m, variance);
     }
 
-    /// Corrects the axis by a velocity that was measured `age_s` ago with `sigma_m_s`, and was then `innovation_m_s` more
-    /// than believed. One that is no number is left out.
-    pub fn correct_velocity(&mut self, innovation_m_s: f64, sigma_m_s: f64, age_s: f64) {
+    /// Corrects the axis by a velocity that was measured `age_s` ago with `sigma_m_s`. `told_m_s` is that velocity and what
+    /// the accelerometer says was gained since: what the velocity is now, but for the bias. One that is no number is left
+    /// out.
+    pub fn correct_velocity(&mut self, told_m_s: f64, sigma_m_s: f64, age_s: f64) {
+        let innovation_m_s = told_m_s - (self.velocity + self.bias * age_s);
         if !innovation_m_s.is_finite() {
             return;
         }
-        // What the bias did to the velocity since then was not in it yet.
+        // What the bias did to the velocity since then is in what was gained.
         let mut observation = Mean::zeros();
         observation[VELOCITY] = 1.0;
         observation[BIAS] = age_s;

@@ -19,6 +19,7 @@
 //! minute. Where a receiver is wired, its level velocity is one more measurement of it; its position is left out.
 
 use super::axis::{AHEAD, Axis, Echo, PATH, Side, VELOCITY};
+use super::gains::{Gains, TooLongAgo};
 use super::params::RangeInertialParams;
 use crate::wire::{attitude, vector, vector_message};
 use bus::messages::{
@@ -33,8 +34,20 @@ const LEVEL_BEAMS: [[f64; 3]; 4] = [[1.0, 0.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 1.0
 /// The place of the beam that looks down.
 const DOWN: usize = 4;
 
-/// How many samples the filter can look back.
+/// How many samples the filter can look back for the place of an echo.
 const PAST: usize = 128;
+
+/// A measurement came too late to be of use.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+#[error(
+    "what came on its input `{input}` was measured {age_s:.3} s ago, and it looks back {longest_s:.3} s at most: shorten the \
+     sensor's delay, or compute the estimate less often"
+)]
+pub struct Late {
+    input: &'static str,
+    age_s: f64,
+    longest_s: f64,
+}
 
 /// No range was ever measured then.
 const NEVER: u64 = u64::MAX;
@@ -60,9 +73,6 @@ struct Past {
     /// Displacement since the start.
     #[field(unit = "m", frame = "world")]
     path: Vector3Message,
-    /// Velocity.
-    #[field(unit = "m/s", frame = "world")]
-    velocity: Vector3Message,
     /// Attitude, body to world.
     #[field(frame = "world")]
     attitude: Quaternion,
@@ -95,6 +105,8 @@ pub struct RangeInertialState {
     acceleration: Vector3Message,
     /// The axes of the world; the ground is behind the third.
     axes: [Axis; 3],
+    /// What the velocity gained.
+    gains: Gains,
     /// The last samples, sample k at the place k modulo the number of places.
     past: [Past; PAST],
 }
@@ -169,28 +181,38 @@ impl RangeInertial {
             obstacle_ns: [[0; 2]; 2],
             acceleration: Vector3Message::default(),
             axes,
+            gains: Gains::default(),
             past: [Past::default(); PAST],
         }
     }
 
     /// Moves `state` on to `now_ns`, the time of `inputs`, one period after the last.
-    pub fn update(&self, state: &mut RangeInertialState, now_ns: u64, inputs: &RangeInertialInputs<'_>) {
+    ///
+    /// # Errors
+    /// If ranges or a velocity were measured longer ago than the filter can look back.
+    pub fn update(
+        &self,
+        state: &mut RangeInertialState,
+        now_ns: u64,
+        inputs: &RangeInertialInputs<'_>,
+    ) -> Result<(), Late> {
         self.predict(state, inputs);
         state.remember(inputs.attitude.attitude);
         let ranges = inputs.ranges;
         // Each is used once.
         if ranges.measured_ns != state.measured_ns && ranges.valid.contains(&1) {
             state.measured_ns = ranges.measured_ns;
-            self.correct(state, now_ns, ranges);
+            self.correct(state, now_ns, ranges)?;
         }
         if let Some(gps) = inputs.gps
             && gps.valid == 1
             && gps.measured_ns != state.gps_measured_ns
         {
             state.gps_measured_ns = gps.measured_ns;
-            self.correct_velocity(state, now_ns, gps);
+            self.correct_velocity(state, now_ns, gps)?;
         }
         self.lose_sight(state, now_ns);
+        Ok(())
     }
 
     fn predict(&self, state: &mut RangeInertialState, inputs: &RangeInertialInputs<'_>) {
@@ -206,6 +228,7 @@ impl RangeInertial {
             return;
         }
         let mean_W = 0.5 * (last_W + acceleration_W);
+        state.gains.add(&(mean_W * self.period_s), self.period_s);
         let lean_W = self.lean_m_s3(&mean_W, force_B.norm()) * self.period_s;
         for (index, axis) in state.axes.iter_mut().enumerate() {
             axis.predict(mean_W[index], lean_W[index], &self.params, self.period_s);
@@ -222,10 +245,14 @@ impl RangeInertial {
         -level_W / self.params.attitude_time_constant_s
     }
 
-    fn correct(&self, state: &mut RangeInertialState, now_ns: u64, ranges: &Ranges) {
+    fn correct(&self, state: &mut RangeInertialState, now_ns: u64, ranges: &Ranges) -> Result<(), Late> {
         let age_ns = now_ns.saturating_sub(ranges.measured_ns);
         let age_s = age_ns as f64 * 1e-9;
-        let Some(past) = state.past(age_s / self.period_s) else { return };
+        let Some(past) = state.past(age_s / self.period_s) else {
+            let longest_s = (PAST - 1) as f64 * self.period_s;
+            let late = Late { input: "ranges", age_s, longest_s };
+            return if age_s > longest_s { Err(late) } else { Ok(()) };
+        };
         for (beam, &reading_m) in ranges.distance.iter().enumerate() {
             let is_valid = ranges.valid[beam] == 1 && reading_m.is_finite();
             let seen = is_valid.then(|| self.read(state, &past, beam, reading_m)).flatten();
@@ -242,16 +269,20 @@ impl RangeInertial {
                 echo_ns[side.index()] = now_ns;
             }
         }
+        Ok(())
     }
 
     /// Takes up the level velocity that a receiver measured some time ago.
-    fn correct_velocity(&self, state: &mut RangeInertialState, now_ns: u64, gps: &Gps) {
+    fn correct_velocity(&self, state: &mut RangeInertialState, now_ns: u64, gps: &Gps) -> Result<(), Late> {
         let age_s = now_ns.saturating_sub(gps.measured_ns) as f64 * 1e-9;
-        let Some(past) = state.past(age_s / self.period_s) else { return };
-        let innovation_m_s = vector(gps.velocity) - vector(past.velocity);
-        for (axis, innovation_m_s) in state.axes.iter_mut().zip(&innovation_m_s).take(2) {
-            axis.correct_velocity(*innovation_m_s, self.params.gps_velocity_sigma_m_s, age_s);
+        let gained = state.gains.since(age_s, self.period_s);
+        let gained = gained.map_err(|TooLongAgo(longest_s)| Late { input: "gps", age_s, longest_s })?;
+        let Some(gained_W_m_s) = gained else { return Ok(()) };
+        let told_m_s = vector(gps.velocity) + gained_W_m_s;
+        for (axis, told_m_s) in state.axes.iter_mut().zip(&told_m_s).take(2) {
+            axis.correct_velocity(*told_m_s, self.params.gps_velocity_sigma_m_s, age_s);
         }
+        Ok(())
     }
 
     /// Whether an echo, in a room of known size, is not that of the wall.
@@ -382,8 +413,7 @@ impl RangeInertialState {
 
     fn remember(&mut self, attitude: Quaternion) {
         let path = self.axes.map(|axis| axis.path).into();
-        let velocity = vector_message(self.velocity_W_m_s());
-        self.past[self.samples as usize % PAST] = Past { path, velocity, attitude };
+        self.past[self.samples as usize % PAST] = Past { path, attitude };
         self.samples += 1;
     }
 
