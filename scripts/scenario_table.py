@@ -16,7 +16,7 @@ def shown(verdict):
 
 def limits(verdict):
     sides = (("≥", verdict["min"]), ("≤", verdict["max"]))
-    parts = [f"{sign} {number(limit)}" for sign, limit in sides if limit is not None]
+    parts = [f"{sign} {number(limit)}" for sign, limit in sides if limit is not None] or ["told, in"]
     return f"{', '.join(parts)} {verdict['unit']}"
 
 
@@ -24,7 +24,8 @@ def main(name, folder, seeds):
     flights = []
     for seed in seeds.split():
         with open(f"{folder}/{name}-{seed}.json", encoding="utf-8") as summary:
-            flights.append(json.load(summary)["pass"])
+            told = json.load(summary)
+            flights.append(told["pass"] + told["measures"])
     for verdicts in zip(*flights, strict=True):
         columns = [name, verdicts[0]["name"], *map(shown, verdicts), limits(verdicts[0])]
         print(f"| {' | '.join(columns)} |")

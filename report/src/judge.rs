@@ -10,8 +10,9 @@ use recorder::series::Series;
 use runtime::manifest::{Comparison, Content, PassCondition, Reference, Statistic};
 use serde::Serialize;
 use std::fmt;
+use toml::Spanned;
 
-/// A pass condition and how it came out; its text is a line of the summary.
+/// A pass condition and how it came out, or a measure, which has no limits; its text is a line of the summary.
 ///
 /// ```
 /// use report::judge::Verdict;
@@ -72,12 +73,12 @@ pub struct WindowErrors {
     pub passed: bool,
 }
 
-/// Evaluates the pass conditions of `content` on `recording`.
+/// Evaluates `conditions`, the pass conditions or the measures of a manifest, on `recording`.
 ///
 /// # Errors
 /// If a topic or field is not in the recording, or a unit does not fit.
-pub(crate) fn verdicts(content: &Content, recording: &Recording) -> Result<Vec<Verdict>> {
-    let conditions = || content.pass.iter().map(toml::Spanned::get_ref);
+pub(crate) fn verdicts(conditions: &[Spanned<PassCondition>], recording: &Recording) -> Result<Vec<Verdict>> {
+    let conditions = || conditions.iter().map(Spanned::get_ref);
     let wanted: Vec<_> = conditions().map(|pass| wanted(pass, recording)).collect::<Result<_>>()?;
     let fields: Vec<_> =
         wanted.iter().flatten().map(|(topic, field)| (topic.as_str(), field.as_str())).collect();
@@ -105,17 +106,14 @@ fn wanted(pass: &PassCondition, recording: &Recording) -> Result<Vec<(String, St
         let other = parts(&minus.topic, &minus.field)?;
         if other.len() != wanted.len() {
             let name = &pass.name;
-            bail!("pass condition `{name}`: `minus` takes a vector off a number, or a number off a vector");
+            bail!("`{name}`: `minus` takes a vector off a number, or a number off a vector");
         }
         wanted.extend(other);
     }
     if let Some(reference) = &pass.reference {
         let other = parts(&reference.topic, &reference.field)?;
         if wanted.len() + other.len() != 2 {
-            bail!(
-                "pass condition `{}`: a lag or a gain is of one number behind another, not of vectors",
-                pass.name
-            );
+            bail!("`{}`: a lag or a gain is of one number behind another, not of vectors", pass.name);
         }
         wanted.extend(other);
     }
@@ -143,7 +141,7 @@ fn verdict(pass: &PassCondition, series: &[Series]) -> Result<Verdict> {
 /// From the unit of what `pass` judges, of a field in `field_unit`, to that of its limits.
 fn factor(pass: &PassCondition, field_unit: &str) -> Result<f64> {
     diagnostics::convert(pass.statistic.unit(field_unit), &pass.unit)
-        .map_err(|error| anyhow!("pass condition `{}`: {error}", pass.name))
+        .map_err(|error| anyhow!("`{}`: {error}", pass.name))
 }
 
 /// Lag or gain of `field` behind `signal`, of which the newest sample counts.
@@ -156,9 +154,7 @@ fn response(
     if field.unit != signal.unit {
         let (name, Reference { topic, field: path, .. }) = (&pass.name, reference);
         let (unit, other) = (&field.unit, &signal.unit);
-        bail!(
-            "pass condition `{name}`: the field is in `{unit}`, its reference, `{path}` of {topic}, in `{other}`"
-        );
+        bail!("`{name}`: the field is in `{unit}`, its reference, `{path}` of {topic}, in `{other}`");
     }
     let factor = factor(pass, &field.unit)?;
     let known = span(field, pass.from_s, pass.to_s)
@@ -267,11 +263,14 @@ impl fmt::Display for Verdict {
         let values: Vec<String> = self.values.iter().map(|value| format!("{value:.4}")).collect();
         let nothing = || self.why.clone().map_or("no samples".to_owned(), |why| format!("no value: {why};"));
         let values = if values.is_empty() { nothing() } else { values.join(" … ") };
+        if self.min.is_none() && self.max.is_none() {
+            return write!(f, "  told   {}: {values} {}", self.name, self.unit);
+        }
         let limit = match (self.min, self.max) {
             (Some(min), Some(max)) => format!("{min} … {max}"),
             (Some(min), None) => format!("at least {min}"),
             (None, Some(max)) => format!("at most {max}"),
-            (None, None) => "no limit".to_owned(),
+            (None, None) => unreachable!("told above"),
         };
         let mark = if self.passed { "ok    " } else { "FAILED" };
         write!(f, "  {mark} {}: {values} {} ({limit})", self.name, self.unit)

@@ -44,6 +44,8 @@ pub struct Summary {
     pub recording: Option<PathBuf>,
     /// Pass conditions.
     pub pass: Vec<Verdict>,
+    /// Numbers that are told and not judged.
+    pub measures: Vec<Verdict>,
     /// Comparisons with measured states.
     pub compare: Vec<WindowErrors>,
     /// Who joined the run, took over, or was refused.
@@ -137,6 +139,7 @@ impl Summary {
             computing_times: outcome.overruns.into_iter().map(overruns).collect(),
             recording: None,
             pass: Vec::new(),
+            measures: Vec::new(),
             compare: Vec::new(),
             replacements,
             shadows: Vec::new(),
@@ -153,7 +156,8 @@ impl Summary {
         shadow::add_steps(recording, plan, &mut self.replacements)?;
         self.shadows = shadow::differences(recording)?;
         if !self.stopped_early {
-            self.pass = judge::verdicts(content, recording)?;
+            self.pass = judge::verdicts(&content.pass, recording)?;
+            self.measures = judge::verdicts(&content.measure, recording)?;
             self.compare = judge::window_errors(content, recording)?;
         }
         let held = self.pass.iter().all(|verdict| verdict.passed);
@@ -195,7 +199,7 @@ impl fmt::Display for Summary {
         self.write_replacements(f)?;
         self.shadows.iter().try_for_each(|difference| writeln!(f, "{difference}"))?;
         self.compare.iter().try_for_each(|errors| writeln!(f, "{errors}"))?;
-        self.pass.iter().try_for_each(|verdict| writeln!(f, "{verdict}"))?;
+        self.pass.iter().chain(&self.measures).try_for_each(|verdict| writeln!(f, "{verdict}"))?;
         if let Some(recording) = &self.recording {
             writeln!(f, "  recording: {}", recording.display())?;
         }

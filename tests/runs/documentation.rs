@@ -170,6 +170,7 @@ fn the_documentation_has_every_key() {
         known_keys("kind = \"imu\"", "kind = \"imu\"\nunknown_key = 1"),
         known_keys("kind = \"imu\"", &within("imu", "outputs.imu")),
         known_keys(end, &list("pass")),
+        known_keys(end, &list("measure")),
         known_keys(end, &list("compare")),
         known_keys(end, &list("swap")),
         known_keys(end, &list("shadow")),

@@ -100,10 +100,11 @@ fn the_including_file_wins_then_the_later_include_and_lists_add_up() {
             "[[pass]]\nname = \"{name}\"\ntopic = \"/plant/state\"\nfield = \"position.z\"\nunit = \"m\"\nstatistic = \"max\"\nmax = 1.0\n"
         )
     };
-    place.write("base.toml", good() + &pass("base"));
+    let measure = |name: &str| pass(name).replace("[[pass]]", "[[measure]]").replace("max = 1.0\n", "");
+    place.write("base.toml", good() + &pass("base") + &measure("lowest"));
     let other =
         "include = [\"base.toml\"]\nrun.seed = 5\nprocess.imu.parameters.gyroscope_range_rad_s = 3.0\n";
-    place.write("other.toml", other.to_owned() + &pass("other"));
+    place.write("other.toml", other.to_owned() + &pass("other") + &measure("highest"));
     // The base is included by two: it lies below both, and its condition is judged once.
     let top = "include = [\"other.toml\", \"base.toml\"]\nrun.duration_s = 0.3\n";
     let path = place.write("top.toml", top.to_owned() + &pass("top"));
@@ -113,6 +114,12 @@ fn the_including_file_wins_then_the_later_include_and_lists_add_up() {
     let summary = place.call(&["run", &path, "--json"]).with_code(0).json();
     let names: Vec<&Value> = summary["pass"].as_array().unwrap().iter().map(|pass| &pass["name"]).collect();
     assert_eq!(names, ["base", "other", "top"]);
+    let measures = summary["measures"].as_array().unwrap();
+    let names: Vec<&Value> = measures.iter().map(|measure| &measure["name"]).collect();
+    assert_eq!(names, ["lowest", "highest"]);
+    let told = place.call(&["run", &path]).with_code(0).output;
+    let height = measures[0]["values"][0].as_f64().unwrap();
+    assert!(told.contains(&format!("  told   lowest: {height:.4} m\n")), "{told}");
 }
 
 #[test]

@@ -25,6 +25,17 @@ fn a_condition_on_a_field_or_in_a_unit_that_is_none() {
 }
 
 #[test]
+fn a_measure_that_has_a_limit_or_measures_nothing() {
+    let with = |from: &str, to: &str| {
+        let measure = PASS.replace("[[pass]]", "[[measure]]").replace("max = 1\n", "");
+        refused_with(&format!("\n§{}", measure.replace(from, to)))
+    };
+    with("name", "max = 1\nname").says(&["measure `low`: it has a limit", "write [[pass]]"]);
+    with("position.z", "position.q").says(&["measure `low`", "`position.q`", "position.z"]);
+    with("/plant/state", "/plant/stat").says(&["nobody publishes /plant/stat"]);
+}
+
+#[test]
 fn a_lag_or_gain_without_a_reference_that_it_can_have() {
     let with = |keys: &str| {
         let lag = PASS.replace("\"max\"", "\"lag\"").replace("unit = \"m\"", "unit = \"ms\"");

@@ -202,11 +202,11 @@ fn the_wall_scenarios_know_range_finders_and_imu_alone() {
 }
 
 /// The nodes of a graph and those that succeed them.
-fn nodes(graph: &Value) -> impl Iterator<Item = &Value> {
+pub fn nodes(graph: &Value) -> impl Iterator<Item = &Value> {
     graph["nodes"].as_array().unwrap().iter().chain(graph["backups"].as_array().unwrap())
 }
 
-fn kind(node: &Value) -> &str {
+pub fn kind(node: &Value) -> &str {
     node["what"].as_str().unwrap()
 }
 

@@ -19,10 +19,51 @@ pub fn check(
     let content = &manifest.content;
     Diagnostic::gather(content.compare.iter().map(|compare| check_window(manifest, plan, compare)))?;
     let conditions = content.pass.iter().map(|pass| {
+        check_limits(manifest, pass)?;
         check_field(manifest, plan, pass)?;
         check_span(manifest, plan, pass, notes)
     });
-    Diagnostic::gather(conditions).map(drop)
+    Diagnostic::gather(conditions)?;
+    let measures = content.measure.iter().map(|measure| {
+        check_no_limits(manifest, measure)?;
+        check_field(manifest, plan, measure)?;
+        check_span(manifest, plan, measure, notes)
+    });
+    Diagnostic::gather(measures).map(drop)
+}
+
+fn kind(condition: &PassCondition) -> &'static str {
+    if condition.min.is_none() && condition.max.is_none() { "measure" } else { "pass condition" }
+}
+
+fn check_no_limits(manifest: &Manifest, measure: &Spanned<PassCondition>) -> Result<(), Diagnostic> {
+    let PassCondition { name, min, max, .. } = measure.get_ref();
+    if min.is_none() && max.is_none() {
+        return Ok(());
+    }
+    let message = format!("measure `{name}`: it has a limit, and a measure is told, not judged");
+    Err(manifest.problem(&measure.span(), message, "leave `min` and `max` out, or write [[pass]]"))
+}
+
+/// Refuses a condition that cannot fail, or cannot hold.
+fn check_limits(manifest: &Manifest, pass: &Spanned<PassCondition>) -> Result<(), Diagnostic> {
+    let condition = pass.get_ref();
+    let at = |message: String, help: &str| {
+        manifest.problem(&pass.span(), format!("pass condition `{}`: {message}", condition.name), help)
+    };
+    if condition.min.is_none() && condition.max.is_none() {
+        let help = "add `min`, `max`, or both; what is only to be told is a [[measure]]";
+        return Err(at("it has no limit, so it cannot fail".into(), help));
+    }
+    let least = match condition.statistic {
+        Statistic::Rms => Some((0.0, "the root of a mean square")),
+        Statistic::Span => Some((0.0, "the largest sample less the smallest")),
+        _ => None,
+    };
+    match impossible(condition.min, condition.max, least) {
+        Some((message, help)) => Err(at(message, &help)),
+        None => Ok(()),
+    }
 }
 
 /// Refuses a span in which nothing can be judged; tells one that the run ends in. Where the run was cut short by other
@@ -35,7 +76,7 @@ fn check_span(
 ) -> Result<(), Diagnostic> {
     let PassCondition { name, topic, from_s, to_s, .. } = pass.get_ref();
     let at = |message: String, help: &str| {
-        manifest.problem(&pass.span(), format!("pass condition `{name}`: {message}"), help)
+        manifest.problem(&pass.span(), format!("{} `{name}`: {message}", kind(pass.get_ref())), help)
     };
     if *from_s < 0.0 {
         return Err(at(format!("`from_s` is {from_s} s"), "a run begins at 0 s"));
@@ -140,19 +181,8 @@ fn check_window(manifest: &Manifest, plan: &Plan, compare: &Spanned<Comparison>)
 fn check_field(manifest: &Manifest, plan: &Plan, pass: &Spanned<PassCondition>) -> Result<(), Diagnostic> {
     let condition = pass.get_ref();
     let at = |message: String, help: &str| {
-        manifest.problem(&pass.span(), format!("pass condition `{}`: {message}", condition.name), help)
+        manifest.problem(&pass.span(), format!("{} `{}`: {message}", kind(condition), condition.name), help)
     };
-    if condition.min.is_none() && condition.max.is_none() {
-        return Err(at("it has no limit, so it cannot fail".into(), "add `min`, `max`, or both"));
-    }
-    let least = match condition.statistic {
-        Statistic::Rms => Some((0.0, "the root of a mean square")),
-        Statistic::Span => Some((0.0, "the largest sample less the smallest")),
-        _ => None,
-    };
-    if let Some((message, help)) = impossible(condition.min, condition.max, least) {
-        return Err(at(message, &help));
-    }
     if let Some((message, help)) =
         condition.gate.as_ref().and_then(|gate| impossible(gate.min, gate.max, None))
     {
@@ -171,7 +201,7 @@ fn check_field(manifest: &Manifest, plan: &Plan, pass: &Spanned<PassCondition>) 
 fn check_units(manifest: &Manifest, plan: &Plan, pass: &Spanned<PassCondition>) -> Result<(), Diagnostic> {
     let condition = pass.get_ref();
     let at = |message: String, help: &str| {
-        manifest.problem(&pass.span(), format!("pass condition `{}`: {message}", condition.name), help)
+        manifest.problem(&pass.span(), format!("{} `{}`: {message}", kind(condition), condition.name), help)
     };
     let unit = |topic: &str, field: &str| {
         unit_of(manifest, plan, topic, field)
@@ -258,7 +288,8 @@ fn judged_topics(pass: &PassCondition) -> Vec<&String> {
 
 fn check_recorded(manifest: &Manifest, plan: &Plan, programs: &[Program]) -> Result<(), Diagnostic> {
     let content = &manifest.content;
-    let passes = content.pass.iter().map(|pass| (pass.span(), judged_topics(pass.get_ref())));
+    let passes = content.pass.iter().chain(&content.measure);
+    let passes = passes.map(|pass| (pass.span(), judged_topics(pass.get_ref())));
     let compares = content.compare.iter().map(|compare| {
         let Comparison { simulated, measured, .. } = compare.get_ref();
         (compare.span(), vec![simulated, measured])

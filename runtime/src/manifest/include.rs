@@ -12,7 +12,7 @@ use toml::de::{DeArray, DeTable, DeValue};
 /// The key that names the files to include.
 const KEY: &str = "include";
 /// Lists at the top level, to which each file adds.
-pub const LISTS: [&str; 5] = ["compare", "pass", "shadow", "swap", "vehicle"];
+pub const LISTS: [&str; 6] = ["compare", "measure", "pass", "shadow", "swap", "vehicle"];
 
 /// Reads the manifest's own file.
 ///
