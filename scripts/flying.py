@@ -6,7 +6,7 @@ import subprocess
 import sys
 
 ROOT = os.path.normpath(os.path.join(os.path.dirname(os.path.abspath(__file__)), ".."))
-# A run that broke, as by the watchdog on a host that is too busy to start it, is no verdict: it is tried again.
+# A run that the watchdog ended on a host that was too busy to start it is no verdict: it is tried again.
 TRIES = 3
 
 
@@ -30,4 +30,7 @@ def fly(manifest, recording, settings=(), more=()):
         flown = subprocess.run(command, capture_output=True, text=True, check=False)
         if flown.returncode in (0, 1):
             return json.loads(flown.stdout)
+        if "watchdog" not in flown.stderr:
+            break
+        print(f"{manifest}: {flown.stderr.strip()}; tried again", file=sys.stderr)
     raise Refused(f"{' '.join(command)}\n{flown.stderr.strip()}")

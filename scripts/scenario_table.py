@@ -16,7 +16,7 @@ def shown(verdict):
 
 def limits(verdict):
     sides = (("≥", verdict["min"]), ("≤", verdict["max"]))
-    parts = [f"{sign} {number(limit)}" for sign, limit in sides if limit is not None] or ["told, in"]
+    parts = [f"{sign} {number(limit)}" for sign, limit in sides if limit is not None] or ["none, in"]
     return f"{', '.join(parts)} {verdict['unit']}"
 
 

@@ -78,6 +78,31 @@ impl Component for Source {
     }
 }
 
+/// Remembers nothing, and goes on from what its predecessor sent last.
+#[derive(Default)]
+struct Heir(f64);
+
+impl Component for Heir {
+    const INFO: Info = Info::new("heir", "goes on from what its predecessor sent");
+    type Parameters = serde::de::IgnoredAny;
+    type Inputs<'a> = ();
+    type Outputs = Outputs;
+    type State = ();
+
+    fn new(_: serde::de::IgnoredAny, _: &NodeContext<'_>) -> Result<Self, ParameterError> {
+        Ok(Self::default())
+    }
+
+    fn initial(&self) {}
+
+    fn step(&mut self, context: &StepContext<'_>, (): (), (): &mut ()) -> Result<Outputs, StepError> {
+        if let Some(Outputs { command }) = context.predecessor() {
+            self.0 = 1000.0 + command.command[0];
+        }
+        Ok(Outputs { command: MotorCommand { command: [self.0; 4], ..MotorCommand::default() } })
+    }
+}
+
 /// Reads commands, and hangs behind a tick or heeds nothing if it is told to.
 struct Sink(Parameters);
 
@@ -114,6 +139,7 @@ impl Component for Sink {
 
 const COMPONENTS: Registry = Registry::new(&[
     Registration::of::<Source>(),
+    Registration::of::<Heir>(),
     Registration::of::<Sink>(),
     Registration::of::<recorder::node::Recorder>(),
 ]);
@@ -348,6 +374,31 @@ fn a_computing_time_goes_on_in_a_restarted_thread_and_in_a_standby() {
                 assert!(!IS_ARMED.load(SeqCst), "the fault struck");
                 assert_eq!(struck, unhurt, "{on_exit} at tick {at_tick}, every {period_ticks} ticks");
             }
+        });
+    }
+}
+
+/// Whatever the heir had under way as a shadow when it takes over.
+#[test]
+fn what_takes_over_from_last_outputs_has_them_however_long_its_steps_take() {
+    for at_tick in 200..208 {
+        alone(|folder| {
+            let swap = toml::toml! { process = "source"
+            shadow_ticks = 20
+            with = { kind = "heir", computing_time = { distribution = "constant", ms = 7.0 } } };
+            let mut swap = toml::Value::Table(swap);
+            swap.as_table_mut().unwrap().insert("at_tick".to_owned(), at_tick.into());
+            let plan =
+                plan(400, "none").set("swap", vec![swap]).set("process.sink.parameters.fault", "unheeding");
+            let commands = flown(&plan, folder).unwrap();
+            let (before, after) = commands.split_at(at_tick as usize);
+            assert_eq!(before, counted(at_tick));
+            let expected = 1000.0 + f64::from(at_tick);
+            assert!(
+                after.iter().all(|&command| command == expected),
+                "at tick {at_tick}: {:?}",
+                &after[..20]
+            );
         });
     }
 }

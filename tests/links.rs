@@ -68,7 +68,10 @@ fn a_message_comes_out_as_it_was_sent_when_its_bits_have_passed() {
         let taken = tick.checked_sub(7).map(|arrived| arrived / 20 * 20);
         match taken {
             // 1.0 m, as the manifest says, and the stamp of none.
-            None => assert_eq!((stamp_ms(cdr), &cdr[12..20]), (0, &1.0_f64.to_le_bytes()[..]), "tick {tick}"),
+            None => {
+                let stamp_s = i32::from_le_bytes(cdr[4..8].try_into().unwrap());
+                assert_eq!((stamp_s, &cdr[12..20]), (-1, &1.0_f64.to_le_bytes()[..]), "tick {tick}");
+            }
             Some(taken) => assert_eq!(cdr, &sent[taken as usize].1, "tick {tick}"),
         }
     }
@@ -89,6 +92,23 @@ fn a_link_repeats_itself_and_a_swap_in_flight_loses_nothing_that_is_under_way() 
         |tick: usize, at: usize| u32::from_le_bytes(statistics[tick].1[4 + at..8 + at].try_into().unwrap());
     let [under_way, lost] = [word(800, 32), word(1499, 40)];
     assert!(under_way >= 2 && lost > 20, "{under_way} {lost}");
+}
+
+/// Telemetry carries back what the link up has brought: its first message, too, and its initial value not.
+#[test]
+fn a_link_behind_a_link_takes_each_message_once() {
+    let (topics, _) = fly(
+        "ground-station.toml",
+        "[process.down.parameters]\nbaud = 115200.0\nstreams.set_point.rate_hz = 1000.0\n",
+    );
+    let (up, back) = (&topics["/up/set_point"], &topics["/down/set_point"]);
+    let mut seen: Vec<&[u8]> = back.iter().map(|(_, cdr)| cdr.as_slice()).collect();
+    let mut sent: Vec<&[u8]> = up.iter().map(|(_, cdr)| cdr.as_slice()).collect();
+    seen.dedup();
+    sent.dedup();
+    assert!(seen.len() > 60 && seen.len() <= sent.len(), "{} of {}", seen.len(), sent.len());
+    // The initial value of the link down, then the messages as the link up brought them, the first included.
+    assert_eq!(seen[1..], sent[1..seen.len()]);
 }
 
 #[test]
@@ -119,6 +139,11 @@ fn what_a_link_cannot_carry_is_told_by_the_check() {
         &["stated as hummingbus_msgs/msg/Imu, its input `set_point` carries hummingbus_msgs/msg/SetPoint"],
     );
     refused("[process.up]\nparameters.streams.setpoint = {}\n", &["streams.setpoint", "set_point"]);
+    refused("[process.up]\nperiod_ticks = 2\n", &["every 2 ticks", "would miss messages"]);
+    refused(
+        "[process.down]\nparameters.latency_ms = 400.0\n",
+        &["180 messages are sent each second, so 72 would be under way, and a link holds 64"],
+    );
     let long = "[process.down]\nparameters.queue_bytes = 50\n";
     refused(long, &["a message of `estimate` takes 55 bytes", "never be sent"]);
 }
@@ -223,7 +248,7 @@ fn what_takes_time_and_what_takes_none_take_over_from_each_other() {
 }
 
 #[test]
-fn a_computing_time_that_none_is_is_told() {
+fn an_invalid_computing_time_is_refused() {
     let refused = |of: &str, parts: &[&str]| {
         let told = load("hover.toml", &format!("{CONTROLLER} = {of}\n"));
         let told = told.and_then(|manifest| hummingbus::Graph::build(&manifest).map(drop));

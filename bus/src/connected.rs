@@ -492,7 +492,11 @@ impl ConnectedNode {
         step: &mut impl FnMut(&mut Tick<'_>, &mut [u8]) -> Result<(), String>,
     ) -> Result<(), BusError> {
         let (state, words) = state.split_at_mut(8 * self.state_words);
-        let words = bytemuck::cast_slice_mut(words);
+        let words: &mut [u64] = bytemuck::cast_slice_mut(words);
+        if tick == self.take_over_tick && !self.predecessor.is_empty() {
+            // It goes on from what its predecessor sent last, not from a step of its own as a shadow.
+            words.fill(0);
+        }
         // Until then they are its predecessor's to count.
         let counts = tick >= self.take_over_tick;
         match timing.begin(tick, words, &self.outputs) {

@@ -68,7 +68,7 @@ pub struct ContactReport {
     pub impact_speed_m_s: f64,
     /// Number of things touched.
     pub count: u32,
-    /// What is touched first: 0 nothing, 1 the ground, 2 + i the scene's box i, 1000 + i the other vehicle i.
+    /// What is touched first: 0 nothing, 1 the ground, 2 + i the scene's thing i, 1000 + i the other vehicle i.
     pub object: u32,
     /// Contacts that began since the start.
     pub began: u32,

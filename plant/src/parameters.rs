@@ -175,16 +175,16 @@ impl Parameters {
         Ok((Airframe::from_files(vehicle, &scene.effects).map_err(refused)?, scene))
     }
 
-    /// Refuses a start inside of a box, unless a measured flight says where the vehicle starts.
+    /// Refuses a start inside of a box or a mesh, unless a measured flight says where the vehicle starts.
     fn refuse_inside(&self, rapier: &Rapier, scene: &Scene) -> Result<(), ParameterError> {
-        let Some(cuboid) = rapier.box_around().and_then(|number| scene.boxes.get(number)) else {
+        let Some(name) = rapier.thing_around().and_then(|number| scene.name_of(number)) else {
             return Ok(());
         };
         refuse(self.window_s.is_none(), "initial_position_m", || {
             format!(
-                "`initial_position_m` is {:?}, where the vehicle is partly inside of the box \"{}\" of the scene; \
+                "`initial_position_m` is {:?}, where the vehicle is partly inside of \"{name}\" in the scene; \
                  move it out",
-                self.initial_position_m, cuboid.name
+                self.initial_position_m
             )
         })
     }

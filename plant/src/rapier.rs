@@ -103,7 +103,7 @@ impl Rapier {
             crash_speed_m_s,
             inertia_min_kg_m2: vehicle.inertia_kg_m2.symmetric_eigenvalues().min(),
             world: World::new(vehicle, &hull, scene, rig.as_ref(), body),
-            contacts: Contacts::new(1 + scene.boxes.len() + TRAFFIC_MAX),
+            contacts: Contacts::new(1 + scene.thing_count() + TRAFFIC_MAX),
             state: model.start(*body, 0.0),
             effects,
             reaction: Reaction::default(),
@@ -113,9 +113,9 @@ impl Rapier {
         rapier
     }
 
-    /// The number of the scene's box that the vehicle is inside of, if any.
-    pub(crate) fn box_around(&self) -> Option<usize> {
-        self.world.box_around(&self.state.body)
+    /// The number of the scene's box or mesh that the vehicle is partly inside of, if any.
+    pub(crate) fn thing_around(&self) -> Option<usize> {
+        self.world.thing_around(&self.state.body)
     }
 
     /// One step of `span_s`; returns by how much contacts and joints changed the velocities.

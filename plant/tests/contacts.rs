@@ -228,3 +228,69 @@ fn a_tumbling_fall_ends_on_the_ground_and_not_in_it() {
     assert!(plant.state().body.position_W_m.z < hull.disc_radius_m + 0.01, "it lies on the ground");
     assert!(plant.state().body.velocity_W_m_s.norm() < 1.0);
 }
+
+/// A table of 2 m by 2 m whose top is at 0.7 m, as a box or as a mesh.
+fn table(shape: &str) -> Scene {
+    let number = |value: &str| {
+        format!("{{ value = {value}, unit = \"m\", source = \"test\", uncertainty = \"exact\" }}")
+    };
+    let text = if shape == "box" {
+        format!(
+            "[[boxes]]\nname = \"table\"\ncentre = {}\nsize = {}\n",
+            number("[0, 0, 0.6]"),
+            number("[2, 2, 0.2]")
+        )
+    } else {
+        let place = format!("position = {}\nscale = {}\n", number("[0, 0, 0]"), number("1"));
+        format!("[[meshes]]\nname = \"table\"\nfile = \"table.obj\"\n{place}solid = \"{shape}\"\n")
+    };
+    let corners = ["-1 -1", "1 -1", "1 1", "-1 1"];
+    let corners = [0.5, 0.7].map(|z| corners.map(|xy| format!("v {xy} {z}\n")).concat()).concat();
+    let faces = "f 4 3 2 1\nf 5 6 7 8\nf 1 2 6 5\nf 2 3 7 6\nf 3 4 8 7\nf 4 1 5 8\n";
+    let read = |_: &std::path::Path| Ok(format!("{corners}{faces}").into_bytes());
+    Scene::parse_with(&format!("name = \"test\"\n{text}"), "test.toml", &read).unwrap()
+}
+
+#[test]
+fn a_vehicle_comes_to_rest_on_a_mesh_as_on_a_box() {
+    let start = RigidBody::level_at(Vector3::new(0.3, -0.2, 0.7 + stand_m() + 0.02));
+    let rest_m = ["box", "triangles", "convex"].map(|shape| {
+        let mut plant = plant(&table(shape), &start);
+        let last = *fly(&mut plant, &IDLE, 4_000).last().unwrap();
+        assert_eq!((last.object, last.count, last.crashed), (2, 1, false), "{shape}: {last:?}");
+        let body = plant.state().body;
+        assert!(body.velocity_W_m_s.norm() < 1e-3, "{shape}: {body:?}");
+        body.position_W_m.z
+    });
+    for (shape, height_m) in ["box", "triangles", "convex"].iter().zip(rest_m) {
+        assert!((height_m - 0.7 - stand_m()).abs() < 1e-3, "on a {shape} it stands {height_m} m high");
+    }
+}
+
+#[test]
+fn a_vehicle_does_not_pass_through_triangles_that_it_flies_against() {
+    // A wall without thickness at x = 1 m.
+    let number = "{ value = [1, 0, 0], unit = \"m\", source = \"test\", uncertainty = \"exact\" }";
+    let scale = "{ value = 1, unit = \"m\", source = \"test\", uncertainty = \"exact\" }";
+    let text = format!(
+        "name = \"test\"\n[[meshes]]\nname = \"wall\"\nfile = \"wall.obj\"\nposition = {number}\nscale = {scale}\nsolid = \"triangles\"\n"
+    );
+    let wall = "v 0 -5 0\nv 0 5 0\nv 0 5 5\nv 0 -5 5\nf 1 2 3\nf 1 3 4\n";
+    let scene = Scene::parse_with(&text, "test.toml", &|_| Ok(wall.as_bytes().to_vec())).unwrap();
+    for speed_m_s in [0.5, 2.0, 5.0, 10.0] {
+        let start = RigidBody {
+            velocity_W_m_s: Vector3::x() * speed_m_s,
+            ..RigidBody::level_at(Vector3::new(0.0, 0.0, 2.0))
+        };
+        let mut plant = plant(&scene, &start);
+        let hover = [76.5; 4];
+        plant.settle_rotors(&hover);
+        let reports = fly(&mut plant, &hover, 2_500);
+        let met = reports.iter().find(|report| report.count > 0);
+        let met = met.unwrap_or_else(|| panic!("{speed_m_s} m/s: the wall is met"));
+        assert_eq!((met.object, met.crashed), (2, speed_m_s > CRASH_SPEED_M_S), "{met:?}");
+        let reach_m = hull().disc_radius_m;
+        let x_m = plant.state().body.position_W_m.x;
+        assert!(x_m < 1.0 - 0.5 * reach_m, "{speed_m_s} m/s: it is at {x_m} m in the end");
+    }
+}

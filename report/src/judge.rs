@@ -260,21 +260,31 @@ fn statistic(statistic: Statistic, samples: impl Iterator<Item = f64>) -> Vec<f6
 
 impl fmt::Display for Verdict {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let values: Vec<String> = self.values.iter().map(|value| format!("{value:.4}")).collect();
-        let nothing = || self.why.clone().map_or("no samples".to_owned(), |why| format!("no value: {why};"));
+        let values: Vec<String> = self.values.iter().map(|value| shown(*value)).collect();
+        let nothing = || self.why.clone().map_or("no samples".to_owned(), |why| format!("no value: {why}"));
         let values = if values.is_empty() { nothing() } else { values.join(" … ") };
-        if self.min.is_none() && self.max.is_none() {
-            return write!(f, "  told   {}: {values} {}", self.name, self.unit);
-        }
+        let has_unit = self.unit != "1" && !self.values.is_empty();
+        let unit = if has_unit { format!(" {}", self.unit) } else { String::new() };
         let limit = match (self.min, self.max) {
             (Some(min), Some(max)) => format!("{min} … {max}"),
             (Some(min), None) => format!("at least {min}"),
             (None, Some(max)) => format!("at most {max}"),
-            (None, None) => unreachable!("told above"),
+            (None, None) => return write!(f, "  value  {}: {values}{unit}", self.name),
         };
         let mark = if self.passed { "ok    " } else { "FAILED" };
-        write!(f, "  {mark} {}: {values} {} ({limit})", self.name, self.unit)
+        write!(f, "  {mark} {}: {values}{unit} ({limit})", self.name)
     }
+}
+
+/// Four digits behind the point, or four that are not zero; what is whole without any.
+fn shown(value: f64) -> String {
+    if value.fract() == 0.0 && value.abs() < 1e15 {
+        return format!("{value:.0}");
+    }
+    let zeros = (-libm::log10(value.abs())).ceil().clamp(1.0, 12.0);
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "1 to 12")]
+    let digits = zeros as usize + 3;
+    format!("{value:.digits$}")
 }
 
 impl fmt::Display for WindowErrors {

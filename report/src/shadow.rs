@@ -10,15 +10,16 @@ use serde::Serialize;
 use std::collections::BTreeMap;
 use std::fmt;
 
-/// The difference between a field of a shadow topic and the same field of the topic itself, over all ticks
+/// The difference between a field of a shadow topic and the same field of the topic itself, over all ticks of one shadow
 /// that have both; its text is a line of the summary.
 ///
 /// ```
 /// use report::shadow::Difference;
 /// let [topic, field, unit] = ["/pid/command", "command[0]", "1"].map(str::to_owned);
 /// let (mean, rms, max, max_tick, primary_deviation) = (-0.5, 1.0, 3.0, 17, 10.0);
+/// let (from_tick, samples) = (0, 100);
 /// let difference =
-///     Difference { topic, field, unit, samples: 100, mean, rms, max, max_tick, primary_deviation };
+///     Difference { topic, field, unit, from_tick, samples, mean, rms, max, max_tick, primary_deviation };
 /// assert!(difference.to_string().contains("rms 1.0000 1, mean -0.5000, max 3.0000 at tick 17"));
 /// ```
 #[derive(Clone, Debug, Serialize)]
@@ -29,6 +30,8 @@ pub struct Difference {
     pub field: String,
     /// Its unit.
     pub unit: String,
+    /// The first tick that has both.
+    pub from_tick: u32,
     /// Ticks that have both.
     pub samples: usize,
     /// Mean of shadow minus primary.
@@ -112,19 +115,49 @@ type Series = BTreeMap<u32, f64>;
 /// The series of topics and fields, with their units.
 type Values = BTreeMap<(String, String), (String, Series)>;
 
-/// The differences of all shadow topics of `recording`.
+/// The ticks at which shadows joined, by topic.
+pub(crate) type Joins<'a> = BTreeMap<&'a str, Vec<u32>>;
+
+/// When the shadows of a run joined.
+pub(crate) fn joins<'a>(plan: &'a Plan, replacements: &[Replacement]) -> Joins<'a> {
+    let mut joins = Joins::new();
+    for report in replacements.iter().map(|replacement| &replacement.report) {
+        for topic in outputs(plan, report) {
+            joins.entry(topic).or_default().extend(report.join_tick);
+        }
+    }
+    joins.values_mut().for_each(|ticks| ticks.sort_unstable());
+    joins
+}
+
+/// The topics that the process of `report` publishes.
+fn outputs<'a>(plan: &'a Plan, report: &Report) -> impl Iterator<Item = &'a str> + use<'a> {
+    let node = plan.nodes.iter().find(|node| node.name == report.process);
+    let topics = node.into_iter().flat_map(|node| &node.outputs);
+    topics.map(|output| plan.topics[output.topic].name.as_str())
+}
+
+/// The differences of all shadow topics of `recording`, of each shadow for itself.
 ///
 /// # Errors
 /// If the recording is damaged.
-pub(crate) fn differences(recording: &Recording) -> Result<Vec<Difference>> {
+pub(crate) fn differences(recording: &Recording, joins: &Joins<'_>) -> Result<Vec<Difference>> {
     let shadowed = recording.topics().keys().filter_map(|topic| topic.strip_prefix(SHADOW_PREFIX));
     let values = values(recording, &shadowed.collect::<Vec<_>>())?;
-    let shadows = values.iter().filter_map(|((topic, field), (unit, shadow))| {
-        let topic = topic.strip_prefix(SHADOW_PREFIX)?;
-        let (_, primary) = values.get(&(topic.to_owned(), field.clone()))?;
-        difference([topic, field, unit], shadow, primary)
-    });
-    Ok(shadows.collect())
+    let mut all = Vec::new();
+    for ((topic, field), (unit, shadow)) in &values {
+        let Some(topic) = topic.strip_prefix(SHADOW_PREFIX) else { continue };
+        let Some((_, primary)) = values.get(&(topic.to_owned(), field.clone())) else { continue };
+        // What was sent before the second shadow joined is the first one's.
+        let later = joins.get(topic).into_iter().flatten().skip(1).copied();
+        let ends: Vec<u32> = later.chain([u32::MAX]).collect();
+        let starts = std::iter::once(0).chain(ends.iter().copied());
+        for (start, &end) in starts.zip(&ends) {
+            let of_one: Series = shadow.range(start..end).map(|(&tick, &value)| (tick, value)).collect();
+            all.extend(difference([topic, field, unit], &of_one, primary));
+        }
+    }
+    Ok(all)
 }
 
 /// The differences of all shadow topics of `recording`, as text.
@@ -144,7 +177,7 @@ pub(crate) fn differences(recording: &Recording) -> Result<Vec<Difference>> {
 /// # Errors
 /// If the recording is damaged, or has no shadow.
 pub fn report(recording: &Recording) -> Result<String> {
-    let differences = differences(recording)?;
+    let differences = differences(recording, &Joins::new())?;
     if differences.is_empty() {
         let path = recording.path().display();
         bail!(
@@ -171,6 +204,7 @@ fn difference(names: [&str; 3], shadow: &Series, primary: &Series) -> Option<Dif
         topic,
         field,
         unit,
+        from_tick: both.first()?.0,
         samples: both.len(),
         mean: mean(&|difference, _| difference),
         rms: mean(&|difference, _| difference.powi(2)).sqrt(),
@@ -185,17 +219,13 @@ fn difference(names: [&str; 3], shadow: &Series, primary: &Series) -> Option<Dif
 /// # Errors
 /// If the recording is damaged.
 pub(crate) fn add_steps(recording: &Recording, plan: &Plan, replacements: &mut [Replacement]) -> Result<()> {
-    let outputs = |report: &Report| {
-        let node = plan.nodes.iter().find(|node| node.name == report.process);
-        let topics = node.into_iter().flat_map(|node| &node.outputs);
-        topics.map(|output| plan.topics[output.topic].name.as_str())
-    };
     let flown = replacements.iter().map(|replacement| &replacement.report);
-    let topics = flown.filter(|report| report.take_over_tick.is_some()).flat_map(outputs);
+    let topics =
+        flown.filter(|report| report.take_over_tick.is_some()).flat_map(|report| outputs(plan, report));
     let values = values(recording, &topics.collect::<Vec<_>>())?;
     for Replacement { report, steps } in replacements {
         let Some(tick) = report.take_over_tick else { continue };
-        *steps = outputs(report).filter_map(|topic| step_at(&values, topic, tick)).collect();
+        *steps = outputs(plan, report).filter_map(|topic| step_at(&values, topic, tick)).collect();
     }
     Ok(())
 }
@@ -242,11 +272,12 @@ fn values(recording: &Recording, topics: &[&str]) -> Result<Values> {
 
 impl fmt::Display for Difference {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { topic, field, unit, samples, mean, rms, max, max_tick, primary_deviation } = self;
+        let Self { topic, field, unit, mean, rms, max, max_tick, primary_deviation, .. } = self;
+        let (samples, from_tick) = (self.samples, self.from_tick);
         write!(
             f,
             "  {topic} {field}: shadow − primary: rms {rms:.4} {unit}, mean {mean:+.4}, max {max:.4} at tick {max_tick} \
-             ({samples} samples; the primary deviates by {primary_deviation:.4})"
+             ({samples} samples from tick {from_tick} on; the primary deviates by {primary_deviation:.4})"
         )
     }
 }

@@ -44,7 +44,7 @@ pub struct Summary {
     pub recording: Option<PathBuf>,
     /// Pass conditions.
     pub pass: Vec<Verdict>,
-    /// Numbers that are told and not judged.
+    /// Numbers that are reported and not judged.
     pub measures: Vec<Verdict>,
     /// Comparisons with measured states.
     pub compare: Vec<WindowErrors>,
@@ -154,7 +154,7 @@ impl Summary {
     /// If the recording is damaged, or lacks what a condition judges.
     pub fn judge(&mut self, recording: &Recording, plan: &Plan, content: &Content) -> Result<()> {
         shadow::add_steps(recording, plan, &mut self.replacements)?;
-        self.shadows = shadow::differences(recording)?;
+        self.shadows = shadow::differences(recording, &shadow::joins(plan, &self.replacements))?;
         if !self.stopped_early {
             self.pass = judge::verdicts(&content.pass, recording)?;
             self.measures = judge::verdicts(&content.measure, recording)?;

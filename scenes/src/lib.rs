@@ -1,14 +1,16 @@
 //! Scene files: what stands around the vehicles; and what a ray meets there.
 //!
-//! The ground is the plane z = 0 of the world, solid below. Boxes stand still, turned about the vertical only.
+//! The ground is the plane z = 0 of the world, solid below. Boxes and meshes stand still, turned about the vertical only.
 //!
 //! | room | what it holds |
 //! |---|---|
 //! | [`scene`] | the immutable [`Scene`] that plants and range finders use |
+//! | [`mesh`] | things of any shape: triangles |
 //! | [`ray`] | the distance from a point along a direction to what is met first |
 //! | [`rig`] | the test rigs that a vehicle hangs from |
 //! | [`mod@reference`] | the scene files of this crate, as text |
 //! | `file` | which keys a scene file has |
+//! | `mesh_file` | triangles of OBJ, STL and glTF files |
 //!
 //! ```
 //! let scene = scenes::Scene::parse(scenes::reference::ROOM, "room.toml")?;
@@ -18,11 +20,14 @@
 #![forbid(unsafe_code)]
 
 mod file;
+pub mod mesh;
+mod mesh_file;
 pub mod ray;
 pub mod reference;
 pub mod rig;
 pub mod scene;
 
+pub use mesh::{Mesh, Solidity};
 pub use ray::RayCaster;
 pub use rig::Rig;
 pub use scene::{Cuboid, Scene};

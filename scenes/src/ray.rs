@@ -5,7 +5,7 @@ use crate::scene::{Cuboid, Scene};
 use nalgebra::Vector3;
 use parry3d_f64::math::{Pose, Vector};
 use parry3d_f64::query::{PointQuery, Ray, RayCast};
-use parry3d_f64::shape::Cuboid as Shape;
+use parry3d_f64::shape::{Cuboid as Shape, SharedShape};
 
 /// A scene prepared for ray casts. A cast allocates nothing.
 ///
@@ -20,6 +20,7 @@ use parry3d_f64::shape::Cuboid as Shape;
 #[derive(Debug, Clone)]
 pub struct RayCaster {
     boxes: Vec<(Shape, Pose)>,
+    meshes: Vec<SharedShape>,
 }
 
 impl RayCaster {
@@ -32,26 +33,31 @@ impl RayCaster {
             let pose = Pose::new(Vector::new(x, y, z), Vector::new(0.0, 0.0, cuboid.yaw_rad));
             (Shape::new(Vector::new(hx, hy, hz)), pose)
         };
-        Self { boxes: scene.boxes.iter().map(placed).collect() }
+        // A mesh that has no shape was refused when the scene was read.
+        let meshes = scene.meshes.iter().filter_map(|mesh| mesh.shape().ok()).collect();
+        Self { boxes: scene.boxes.iter().map(placed).collect(), meshes }
     }
 
-    /// How far it is from `from_W_m` along the unit vector `along_W` to the ground or a box, at most `max_m`;
-    /// `None` where nothing is met. From inside of a box or below the ground it is 0.
+    /// How far it is from `from_W_m` along the unit vector `along_W` to the ground, a box or a mesh, at most `max_m`;
+    /// `None` where nothing is met. From inside of a box or below the ground it is 0; a mesh of triangles has no inside.
     #[must_use]
     pub fn distance_m(&self, from_W_m: &Vector3<f64>, along_W: &Vector3<f64>, max_m: f64) -> Option<f64> {
         let vector = |v: &Vector3<f64>| Vector::new(v.x, v.y, v.z);
         let ray = Ray::new(vector(from_W_m), vector(along_W));
         let ground_m = ground_m(from_W_m, along_W).filter(|distance_m| *distance_m <= max_m);
         let boxes = self.boxes.iter().filter_map(|(shape, pose)| shape.cast_ray(pose, &ray, max_m, true));
-        boxes.chain(ground_m).reduce(f64::min)
+        let meshes = self.meshes.iter().filter_map(|shape| shape.cast_local_ray(&ray, max_m, true));
+        boxes.chain(meshes).chain(ground_m).reduce(f64::min)
     }
 
-    /// How far `point_W_m` is from the nearest box, the ground left out; 0 within a box, infinite without boxes.
+    /// How far `point_W_m` is from the nearest box or mesh, the ground left out; 0 within a box or a convex mesh,
+    /// infinite where there is neither.
     #[must_use]
     pub fn clearance_m(&self, point_W_m: &Vector3<f64>) -> f64 {
         let point = Vector::new(point_W_m.x, point_W_m.y, point_W_m.z);
         let distances = self.boxes.iter().map(|(shape, pose)| shape.distance_to_point(pose, point, true));
-        distances.fold(f64::INFINITY, f64::min)
+        let meshes = self.meshes.iter().map(|shape| shape.distance_to_local_point(point, true));
+        distances.chain(meshes).fold(f64::INFINITY, f64::min)
     }
 }
 

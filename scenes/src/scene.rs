@@ -1,6 +1,7 @@
 //! The scene as physics and sensors see it: SI numbers only, immutable once read.
 #![allow(non_snake_case, reason = "a trailing _W names the frame a vector is written in")]
 
+use crate::mesh::Mesh;
 use crate::rig::Rig;
 use nalgebra::Vector3;
 use vehicles::EffectEntry;
@@ -12,10 +13,33 @@ pub struct Scene {
     pub name: String,
     /// The boxes, in the file's order.
     pub boxes: Vec<Cuboid>,
+    /// Things of other shapes, in the file's order.
+    pub meshes: Vec<Mesh>,
     /// Effects on every vehicle in the scene, such as wind; they act after those of its own file.
     pub effects: Vec<EffectEntry>,
     /// What the vehicle hangs from, if anything.
     pub rig: Option<Rig>,
+}
+
+impl Scene {
+    /// What the thing with this number is called; boxes are counted first, then meshes.
+    ///
+    /// ```
+    /// let room = scenes::Scene::parse(scenes::reference::ROOM, "room.toml")?;
+    /// assert_eq!((room.name_of(0), room.name_of(4)), (Some("wall +x"), None));
+    /// # Ok::<(), diagnostics::Diagnostic>(())
+    /// ```
+    #[must_use]
+    pub fn name_of(&self, number: usize) -> Option<&str> {
+        let names = self.boxes.iter().map(|cuboid| &cuboid.name);
+        names.chain(self.meshes.iter().map(|mesh| &mesh.name)).nth(number).map(String::as_str)
+    }
+
+    /// How many things stand in the scene, the ground left out.
+    #[must_use]
+    pub fn thing_count(&self) -> usize {
+        self.boxes.len() + self.meshes.len()
+    }
 }
 
 /// A solid box that stands still.

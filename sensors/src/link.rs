@@ -3,7 +3,7 @@
 //! Each input is a *stream*: what its topic carries comes out on the output of the same name, later, less often, and not
 //! all of it. The streams share one `line`. A message that comes out is the sender's own, stamp included: a consumer
 //! tells a new one by its stamp, and its age by that too. A message without a stamp is new whenever its topic's publisher
-//! sends. Until the first has come, the output is the input's initial value.
+//! sends. Until the first has come, the output is the input's initial value with a stamp of -1 s.
 //!
 //! A message that is sent at tick k is queued at the time of that tick, and is out at the first tick of the link at which
 //! it has arrived. The link itself adds nothing to that: its inputs are a tick late because no message arrives in the tick
@@ -36,6 +36,10 @@ const OVERHEAD_BYTES: u32 = 11;
 const QUEUE_BYTES: u32 = 202;
 /// Faster is no serial line, and the bits of a run are to stay countable.
 const BAUD_MAX: f64 = 1e9;
+
+/// The stamp of an initial value: nothing was sent yet. Before the run, so that another link does not take it for a
+/// message.
+const NEVER: Time = Time { sec: -1, nanosec: 0 };
 
 /// Parameters of a link.
 ///
@@ -251,6 +255,12 @@ impl Component for Link {
     type State = LinkState;
 
     fn new(parameters: Parameters, context: &NodeContext<'_>) -> Result<Self, ParameterError> {
+        refuse(context.period_ticks != 1, "", || {
+            let ticks = context.period_ticks;
+            format!(
+                "it computes every {ticks} ticks, and would miss messages between: leave `period_ticks` out"
+            )
+        })?;
         parameters.validate()?;
         let mut names = context.inputs.to_vec();
         names.sort_unstable();
@@ -288,9 +298,9 @@ impl Component for Link {
         let now_ns = context.time_ns();
         if context.tick() == 0 {
             // What the inputs hold is no message yet.
-            for (stream, newest) in state.line.newest.iter_mut().enumerate().take(self.streams.len()) {
-                let size = self.streams[stream].size;
-                newest[..size].copy_from_slice(&inputs.newest(stream)[..size]);
+            for (index, (stream, newest)) in self.streams.iter().zip(&mut state.line.newest).enumerate() {
+                newest[..stream.size].copy_from_slice(&inputs.newest(index)[..stream.size]);
+                stream.mark_as_none(newest);
             }
         } else {
             let sent_ns = now_ns - self.tick_ns;
@@ -310,7 +320,7 @@ impl Link {
             let message = &inputs.newest(index)[..stream.size];
             let mark = stream.stamp(message).or_else(|| inputs.sent_tick(index));
             let period = stream.period(sent_ns);
-            let is_new = mark.is_none_or(|mark| mark != state.taken_mark[index]);
+            let is_new = !stream.is_none(message) && mark.is_none_or(|mark| mark != state.taken_mark[index]);
             let is_due = period.is_none_or(|period| period != state.taken_period[index]);
             if is_new && is_due {
                 state.taken_mark[index] = mark.unwrap_or(u64::MAX);
@@ -363,6 +373,18 @@ impl LinkStream {
     #[allow(clippy::cast_possible_truncation, reason = "a message is far shorter than 4 GiB")]
     fn wire_bytes(&self, overhead_bytes: u32) -> u32 {
         self.parameters.bytes.unwrap_or(self.size as u32) + overhead_bytes
+    }
+
+    /// Gives `message`, an initial value, the stamp of what was never sent.
+    fn mark_as_none(&self, message: &mut [u8]) {
+        if let Some(offset) = self.stamp_offset {
+            message[offset..offset + size_of::<Time>()].copy_from_slice(bytemuck::bytes_of(&NEVER));
+        }
+    }
+
+    /// Whether `message` is an initial value that another link repeats.
+    fn is_none(&self, message: &[u8]) -> bool {
+        self.stamp_offset.is_some_and(|offset| message[offset..].starts_with(bytemuck::bytes_of(&NEVER)))
     }
 
     /// The stamp of `message`, as one number.
@@ -422,8 +444,9 @@ impl Parameters {
             offered_hz += rate_hz;
         }
         let carried_bytes_s = self.baud / f64::from(self.bits_per_byte);
+        // Messages keep their order: where they are dense, each waits for the latest before it.
         let sent_hz = offered_hz * (carried_bytes_s / offered_bytes_s).min(1.0);
-        let under_way = sent_hz * (self.latency_ms + 0.5 * self.jitter_ms) * 1e-3;
+        let under_way = sent_hz * (self.latency_ms + self.jitter_ms) * 1e-3;
         refuse(under_way > PACKETS as f64, "latency_ms", || {
             format!(
                 "{sent_hz:.0} messages are sent each second, so {under_way:.0} would be under way, and a link holds {PACKETS}: \

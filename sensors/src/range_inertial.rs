@@ -125,7 +125,9 @@ mod tests {
         let (ranges, attitude) = (Ranges::default(), AttitudeEstimate::default());
         let gps = Gps { measured_ns: 500_000_000, valid: 1, ..Default::default() };
         let inputs = |gps| RangeInertialInputs { ranges: &ranges, imu: &imu, attitude: &attitude, gps };
-        (0..2_500).for_each(|_| drop(filter.step(inputs(None)).unwrap()));
+        for _ in 0..2_500 {
+            filter.step(inputs(None)).unwrap();
+        }
         let error = filter.step(inputs(Some(&gps))).unwrap_err().to_string();
         assert!(error.contains("`gps` was measured 2.000 s ago, and it looks back 1.27"), "{error}");
     }

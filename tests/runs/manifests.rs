@@ -119,7 +119,7 @@ fn the_including_file_wins_then_the_later_include_and_lists_add_up() {
     assert_eq!(names, ["lowest", "highest"]);
     let told = place.call(&["run", &path]).with_code(0).output;
     let height = measures[0]["values"][0].as_f64().unwrap();
-    assert!(told.contains(&format!("  told   lowest: {height:.4} m\n")), "{told}");
+    assert!(told.contains(&format!("  value  lowest: {height:.4} m\n")), "{told}");
 }
 
 #[test]

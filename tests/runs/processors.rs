@@ -21,21 +21,20 @@ const TICKS: u32 = 5000;
 const OTHERS: [(&str, u32); 3] = [("swap-laws", 10_000), ("ten-vehicles", 1000), ("replay-nanobench", 1001)];
 
 /// Those whose nodes are those of another one, which is flown: they differ from it in numbers or in a wire.
-const ALIKE: [&str; 9] = [
+const ALIKE: [&str; 7] = [
     "wall-stop-slow",
     "wall-stop-fast",
     "wall-stop-open",
     "wall-stop-thesis-slow",
     "wall-stop-thesis-fast",
-    "wall-follow-varying",
-    "wall-follow-varying-thesis",
     "take-off-attitude",
     "rig-b",
 ];
 
 /// Functions of the C library that a node may call, with the end of its name, since they change nothing: the number of
-/// halvings in nalgebra's matrix exponential, and a count in parry's tree of boxes (docs/decisions/009-numbers.md).
-const ALLOWED: [(&str, &str); 2] = [("log2", "controller"), ("log2", "plant")];
+/// halvings in nalgebra's matrix exponential, a count in parry's tree of boxes, and normals of a mesh's corners, which no contact reads
+/// (docs/decisions/009-numbers.md).
+const ALLOWED: [(&str, &str); 3] = [("log2", "controller"), ("log2", "plant"), ("acos", "plant")];
 
 /// Where the witness, `c_library.c`, writes which functions are called.
 const CALLS: &str = "HUMMINGBUS_TEST_CALLS";

@@ -52,6 +52,7 @@ fn hover_and_doublet_on_both_backends() {
 #[test]
 fn take_off_in_disturbed_air() {
     fly("take-off");
+    fly("take-off-attitude");
 }
 
 #[test]
@@ -68,7 +69,7 @@ fn rotors_hover_faster_where_they_lift_what_hangs_in_the_rig() {
 /// Of each the conditions in its first seconds, roll and pitch; `scripts/rig_delay` flies them whole.
 #[test]
 fn a_delay_beside_the_loop_shows_as_it_is_and_one_inside_is_not_flyable() {
-    for name in ["print-b", "imu"] {
+    for name in ["nothing", "print-b", "imu"] {
         let (place, manifest) = (Place::new(), repository(&format!("manifests/rig-delay/{name}.toml")));
         let recording = place.path("flight.mcap");
         place.call(&["run", &manifest, "--record", &recording, "--set", "run.duration_s=7"]).with_code(0);
@@ -76,20 +77,33 @@ fn a_delay_beside_the_loop_shows_as_it_is_and_one_inside_is_not_flyable() {
 }
 
 #[test]
-fn stops_before_a_wall_by_our_law_and_the_thesis_s_and_with_gps_in_the_open() {
-    for manifest in ["wall-stop", "wall-stop-thesis", "wall-stop-open-gps"] {
-        fly(manifest);
-    }
+fn stops_before_a_wall_by_our_law_at_three_speeds() {
+    ["wall-stop-slow", "wall-stop", "wall-stop-fast"].into_iter().for_each(fly);
 }
 
 #[test]
-fn follows_the_walls_at_varying_speed_by_the_thesis_s_law() {
-    fly("wall-follow-varying-thesis");
+fn stops_before_a_wall_by_the_thesis_s_law_at_three_speeds() {
+    ["wall-stop-thesis-slow", "wall-stop-thesis", "wall-stop-thesis-fast"].into_iter().for_each(fly);
+}
+
+#[test]
+fn stops_before_a_wall_in_the_open_and_stands_there_with_gps() {
+    ["wall-stop-open", "wall-stop-open-gps"].into_iter().for_each(fly);
+}
+
+#[test]
+fn follows_the_walls_at_varying_speed() {
+    ["wall-follow-varying", "wall-follow-varying-thesis"].into_iter().for_each(fly);
 }
 
 #[test]
 fn follows_the_walls_at_a_constant_distance() {
-    fly("wall-follow-constant");
+    ["wall-follow-constant", "wall-follow-constant-thesis"].into_iter().for_each(fly);
+}
+
+#[test]
+fn among_meshes_in_an_office_and_a_labyrinth() {
+    ["office", "labyrinth"].into_iter().for_each(fly);
 }
 
 /// Not for the two laps that the manifest asks for, which take a minute: for half a lap, and no contact.

@@ -202,7 +202,7 @@ impl<'d, 't> Section<'d, 't> {
     }
 
     /// A text that has to be one of `choices`; returns what stands beside it.
-    pub(crate) fn choice<T: Copy>(&self, name: &'d str, choices: &[(&str, T)]) -> Result<T, Diagnostic> {
+    pub fn choice<T: Copy>(&self, name: &'d str, choices: &[(&str, T)]) -> Result<T, Diagnostic> {
         let text = self.text(name)?;
         if let Some((_, chosen)) = choices.iter().find(|(name, _)| *name == text) {
             return Ok(*chosen);
@@ -349,7 +349,7 @@ impl<'d, 't> Section<'d, 't> {
     }
 
     /// Where the value of `name` stands, in bytes; the table itself where it has none.
-    pub(crate) fn at_of(&self, name: &str) -> Range<usize> {
+    pub fn at_of(&self, name: &str) -> Range<usize> {
         self.table.get(name).map_or(self.at.clone(), Spanned::span)
     }
 

@@ -185,7 +185,7 @@ pub struct Contact {
     /// Number of things touched: the ground, boxes, other vehicles.
     #[field(unit = "1")]
     pub count: u32,
-    /// What is touched first: 0 nothing, 1 the ground, 2 + i the scene's box i, 1000 + i the other vehicle i.
+    /// What is touched first: 0 nothing, 1 the ground, 2 + i the scene's thing i (boxes first, then meshes), 1000 + i the other vehicle i.
     #[field(unit = "1")]
     pub object: u32,
     /// Contacts that began since the run started, resting on the ground at the start left out.

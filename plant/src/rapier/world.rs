@@ -17,6 +17,7 @@ use rapier3d_f64::dynamics::{
 use rapier3d_f64::geometry::{Collider, ColliderBuilder, ColliderHandle, ContactPair};
 use rapier3d_f64::math::Vector;
 use rapier3d_f64::parry::query::intersection_test;
+use rapier3d_f64::parry::shape::TriMesh;
 use rapier3d_f64::pipeline::PhysicsWorld;
 use scenes::{Cuboid, Rig, Scene};
 use serde::{Deserialize, Serialize};
@@ -63,6 +64,12 @@ impl World {
         physics.insert_collider(solid(ColliderBuilder::halfspace(up), GROUND), None);
         for (cuboid, number) in scene.boxes.iter().zip(FIRST_BOX..) {
             physics.insert_collider(wall(cuboid, number), None);
+        }
+        for (mesh, number) in scene.meshes.iter().zip(FIRST_BOX + scene.boxes.len() as u32..) {
+            // One that has no shape was refused when the scene was read.
+            if let Ok(shape) = mesh.contact_shape() {
+                physics.insert_collider(solid(ColliderBuilder::new(shape), number), None);
+            }
         }
         let owner = physics.insert_body(body::owner(vehicle));
         body::write(&mut physics.bodies[owner], start);
@@ -172,8 +179,8 @@ impl World {
             })
     }
 
-    /// The number of the first of the scene's boxes that the vehicle, placed as `body`, is inside of.
-    pub(super) fn box_around(&self, body: &RigidBody) -> Option<usize> {
+    /// The number of the first of the scene's boxes and meshes that the vehicle, placed as `body`, is partly inside of.
+    pub(super) fn thing_around(&self, body: &RigidBody) -> Option<usize> {
         let pose = body::pose(body);
         let colliders = &self.physics.colliders;
         let parts = self.handles.hull.map(|handle| &colliders[handle]);
@@ -225,6 +232,12 @@ fn is_same(a: &Collider, b: &Collider) -> bool {
         && a.shape().as_cuboid() == b.shape().as_cuboid()
         && a.shape().as_ball() == b.shape().as_ball()
         && a.shape().as_cylinder() == b.shape().as_cylinder()
+        && a.shape().as_trimesh().map(TriMesh::vertices) == b.shape().as_trimesh().map(TriMesh::vertices)
+        && hull_points(a) == hull_points(b)
+}
+
+fn hull_points(collider: &Collider) -> Option<&[Vector]> {
+    collider.shape().as_convex_polyhedron().map(|hull| hull.points())
 }
 
 fn empty() -> PhysicsWorld {

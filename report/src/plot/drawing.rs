@@ -45,9 +45,9 @@ impl fmt::Display for Drawing {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let axes = self.panels.iter().flat_map(|panel| &panel.axes);
         let curves: usize = axes.clone().map(|axes| axes.curves.len()).sum();
-        let (axes, paths, boxes, [from_s, to_s]) =
+        let (axes, paths, things, [from_s, to_s]) =
             (axes.count(), self.trails.len(), self.solids.len(), self.span_s);
-        write!(f, "axes: {axes} with {curves} curves; paths: {paths}; boxes: {boxes}; ")?;
+        write!(f, "axes: {axes} with {curves} curves; paths: {paths}; things in the scene: {things}; ")?;
         write!(f, "from {from_s:.3} s to {to_s:.3} s")
     }
 }

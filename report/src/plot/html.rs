@@ -6,7 +6,7 @@ use crate::page::PLOTLY_3D;
 use crate::plot::drawing::Drawing;
 use crate::plot::figure::{Axes, Curve, Trail};
 use crate::plot::request::View;
-use crate::plot::scene::{EDGES, Solid};
+use crate::plot::scene::Solid;
 use serde::Serialize;
 use serde_json::{Value, json};
 
@@ -28,7 +28,6 @@ fn data(drawing: &Drawing) -> Value {
         "views": views,
         "trails": drawing.trails.iter().map(trail).collect::<Vec<_>>(),
         "solids": drawing.solids.iter().map(solid).collect::<Vec<_>>(),
-        "edges": EDGES,
     })
 }
 
@@ -55,7 +54,7 @@ fn trail(trail: &Trail) -> Value {
 }
 
 fn solid(solid: &Solid) -> Value {
-    with(solid, [("top", json!(solid.outline(0, 1))), ("side", json!(solid.outline(0, 2)))])
+    with(solid, [("top", json!(solid.outlines(0, 1))), ("side", json!(solid.outlines(0, 2)))])
 }
 
 /// A number as short as a float of 32 bits is written: finer than any plot. What is no number is a gap.

@@ -2,9 +2,6 @@
 
 const SPACE = config(["toImage", "zoom3d", "pan3d", "orbitRotation", "tableRotation", "resetCameraDefault3d"]);
 const SOLID = "#787878";
-// The faces of a box as triangles of its corners.
-const FACES = [[0, 1, 5, 4], [1, 2, 6, 5], [2, 3, 7, 6], [3, 0, 4, 7], [4, 5, 6, 7], [0, 3, 2, 1]]
-  .flatMap(([a, b, c, d]) => [[a, b, c], [a, c, d]]);
 // Which line lies upon which: an estimator's noise must not hide what was flown, nor this what was asked for.
 const LAYERS = { estimated: 1, measured: 1, flown: 2, asked: 3 };
 const LEGEND = { x: 1.01, y: 1, font: { size: 12 }, itemwidth: 30 };
@@ -57,8 +54,8 @@ function hasWebGl() {
 
 function solidTraces(solid) {
   const [x, y, z] = [0, 1, 2].map((axis) => column(solid.corners, axis));
-  const [i, j, k] = [0, 1, 2].map((corner) => column(FACES, corner));
-  const along = (axis) => data.edges.flatMap(([a, b]) => [solid.corners[a][axis], solid.corners[b][axis], null]);
+  const [i, j, k] = [0, 1, 2].map((corner) => column(solid.faces, corner));
+  const along = (axis) => solid.edges.flatMap(([a, b]) => [a[axis], b[axis], null]);
   return [
     { type: "mesh3d", name: solid.name, x, y, z, i, j, k, color: SOLID, opacity: 0.15, flatshading: true, hoverinfo: "name" },
     { type: "scatter3d", mode: "lines", name: `${solid.name} edges`, x: along(0), y: along(1), z: along(2), line: { color: SOLID, width: 2 }, showlegend: false, hoverinfo: "skip" },
@@ -98,9 +95,11 @@ function drawPath() {
 }
 
 function drawFlat(id, text, up) {
+  // With a gap between two lines.
+  const along = (lines, axis) => lines.flatMap((line) => [...column(line, axis), null]);
   const outlines = data.solids.map((solid) => ({
     type: "scatter", mode: "lines", fill: "toself", fillcolor: "rgba(120,120,120,0.3)", line: { color: SOLID, width: 1 },
-    name: solid.name, hoverinfo: "name", x: column(solid[id], 0), y: column(solid[id], 1),
+    name: solid.name, hoverinfo: "name", x: along(solid[id], 0), y: along(solid[id], 1),
   }));
   const paths = trails.flatMap((trail) => trailTraces("scatter", trail, { x: trail.x, y: trail[up] }));
   const axes = { xaxis: { zeroline: false }, yaxis: { zeroline: false, scaleanchor: "x", scaleratio: 1 } };

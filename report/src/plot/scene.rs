@@ -1,21 +1,49 @@
-//! The scene of a recording, as what stands in it is drawn: boxes by their corners.
+//! The scene of a recording, as what stands in it is drawn: boxes and meshes by their corners and edges.
 
 use recorder::RecordingError;
 use recorder::reader::Recording;
-use scenes::{Cuboid, Scene};
+use scenes::{Cuboid, Mesh, Scene};
 use serde::Serialize;
+use std::path::Path;
 
-/// A box that stands on or above the ground.
+/// A thing that stands on or above the ground, as it is drawn.
 #[derive(Clone, Debug, Serialize)]
 pub struct Solid {
     /// Name in the scene file.
     pub name: String,
-    /// Corners in metres: the lower four counter-clockwise from above, then the upper four above them.
-    pub corners: [[f64; 3]; 8],
+    /// Corners in metres, in the world. Of a box: the lower four counter-clockwise from above, then the upper four above
+    /// them.
+    pub corners: Vec<[f64; 3]>,
+    /// Triangles, as places in `corners`.
+    pub faces: Vec<[u32; 3]>,
+    /// The edges that are seen.
+    pub edges: Vec<[[f64; 3]; 2]>,
+    #[serde(skip)]
+    is_box: bool,
 }
 
+/// The edges of a box: pairs of [`Solid::corners`].
+const BOX_EDGES: [[usize; 2]; 12] =
+    [[0, 1], [1, 2], [2, 3], [3, 0], [4, 5], [5, 6], [6, 7], [7, 4], [0, 4], [1, 5], [2, 6], [3, 7]];
+
+/// The faces of a box as triangles of its corners.
+const BOX_FACES: [[u32; 3]; 12] = [
+    [0, 1, 5],
+    [0, 5, 4],
+    [1, 2, 6],
+    [1, 6, 5],
+    [2, 3, 7],
+    [2, 7, 6],
+    [3, 0, 4],
+    [3, 4, 7],
+    [4, 5, 6],
+    [4, 6, 7],
+    [0, 3, 2],
+    [0, 2, 1],
+];
+
 impl Solid {
-    fn of(cuboid: &Cuboid) -> Self {
+    fn of_box(cuboid: &Cuboid) -> Self {
         let ([x, y, z], [a, b, c]) = (cuboid.centre_W_m.into(), cuboid.half_extents_m.into());
         let (sin, cos) = libm::sincos(cuboid.yaw_rad);
         let corner = |index: usize| {
@@ -23,37 +51,53 @@ impl Solid {
             let up = if index < 4 { -c } else { c };
             [x + cos * ahead - sin * left, y + sin * ahead + cos * left, z + up]
         };
-        Self { name: cuboid.name.clone(), corners: std::array::from_fn(corner) }
+        let corners: Vec<_> = (0..8).map(corner).collect();
+        let edges = BOX_EDGES.map(|edge| edge.map(|corner| corners[corner])).to_vec();
+        Self { name: cuboid.name.clone(), corners, faces: BOX_FACES.to_vec(), edges, is_box: true }
     }
 
-    /// Its outline seen along an axis, as a closed line; `across` and `up` are the axes of the view.
-    pub fn outline(&self, across: usize, up: usize) -> Vec<(f64, f64)> {
-        let seen = self.corners.map(|corner| (corner[across], corner[up]));
+    fn of_mesh(mesh: &Mesh) -> Self {
+        let (corners, faces) = (mesh.corners_W_m.clone(), mesh.faces.clone());
+        Self { name: mesh.name.clone(), corners, faces, edges: mesh.edges(), is_box: false }
+    }
+
+    /// What is seen of it along an axis: the closed outline of a box, or the edges of a mesh. `across` and `up` are the axes
+    /// of the view.
+    pub fn outlines(&self, across: usize, up: usize) -> Vec<Vec<(f64, f64)>> {
+        let seen = |corner: &[f64; 3]| (corner[across], corner[up]);
+        if !self.is_box {
+            return self.edges.iter().map(|edge| edge.iter().map(seen).collect()).collect();
+        }
+        let seen: Vec<_> = self.corners.iter().map(seen).collect();
         if up == 1 {
-            return [0, 1, 2, 3, 0].map(|index| seen[index]).to_vec();
+            return vec![[0, 1, 2, 3, 0].map(|index| seen[index]).to_vec()];
         }
         // From the side a box is upright, so it is seen as a rectangle.
         let left = seen.iter().fold(f64::INFINITY, |left, (x, _)| left.min(*x));
         let right = seen.iter().fold(f64::NEG_INFINITY, |right, (x, _)| right.max(*x));
         let (low, high) = (seen[0].1, seen[4].1);
-        vec![(left, low), (right, low), (right, high), (left, high), (left, low)]
+        vec![vec![(left, low), (right, low), (right, high), (left, high), (left, low)]]
     }
 }
 
-/// The edges of a box: pairs of [`Solid::corners`].
-pub const EDGES: [[usize; 2]; 12] =
-    [[0, 1], [1, 2], [2, 3], [3, 0], [4, 5], [5, 6], [6, 7], [7, 4], [0, 4], [1, 5], [2, 6], [3, 7]];
-
-/// What stands in the scene of a recording, whose file is attached; nothing where it has none.
+/// What stands in the scene of a recording, whose file and meshes are attached; nothing where it has none.
 ///
 /// # Errors
 /// If the recording is damaged.
 pub fn scene_of(recording: &Recording) -> Result<Vec<Solid>, RecordingError> {
+    let attachments = recording.attachments()?;
+    // They are attached by their names alone.
+    let read = |path: &Path| {
+        let name = path.file_name().unwrap_or_default();
+        let found = attachments.iter().find(|(attached, _)| name == attached.as_str());
+        found.map(|(_, bytes)| bytes.clone()).ok_or_else(|| std::io::ErrorKind::NotFound.into())
+    };
     // An attachment does not say what it is, but no manifest and no vehicle file can be read as a scene.
-    let scene =
-        |(name, bytes): (String, Vec<u8>)| Scene::parse(std::str::from_utf8(&bytes).ok()?, &name).ok();
-    let scene = recording.attachments()?.into_iter().find_map(scene);
-    Ok(scene.iter().flat_map(|scene| &scene.boxes).map(Solid::of).collect())
+    let scene = |(name, bytes): &(String, Vec<u8>)| {
+        Scene::parse_with(std::str::from_utf8(bytes).ok()?, name, &read).ok()
+    };
+    let Some(scene) = attachments.iter().find_map(scene) else { return Ok(Vec::new()) };
+    Ok(scene.boxes.iter().map(Solid::of_box).chain(scene.meshes.iter().map(Solid::of_mesh)).collect())
 }
 
 #[cfg(test)]
@@ -72,14 +116,14 @@ mod tests {
 
     #[test]
     fn a_turned_box_has_its_corners_where_they_are() {
-        let solid = Solid::of(&Scene::parse(SCENE, "test.toml").unwrap().boxes[0]);
+        let solid = Solid::of_box(&Scene::parse(SCENE, "test.toml").unwrap().boxes[0]);
         let expected = [[2.0, 0.0, 0.0], [2.0, 4.0, 0.0], [0.0, 4.0, 0.0], [0.0, 0.0, 0.0]];
         for (index, [x, y, z]) in expected.into_iter().enumerate() {
             let (lower, upper) = (solid.corners[index], solid.corners[index + 4]);
             assert!((lower[0] - x).abs() + (lower[1] - y).abs() + (lower[2] - z).abs() < 1e-12, "{lower:?}");
             assert!((upper[2] - lower[2] - 1.0).abs() < 1e-12);
         }
-        let side = solid.outline(0, 2);
+        let side = &solid.outlines(0, 2)[0];
         assert!((side[0].0 - 0.0).abs() < 1e-12 && (side[1].0 - 2.0).abs() < 1e-12, "{side:?}");
         assert!((side[2].1 - 1.0).abs() < 1e-12);
     }

@@ -97,9 +97,13 @@ fn draw_flat(plots: &Area<'_>, drawing: &Drawing, view: View) -> Result<()> {
     };
     let mut chart = flat.draw(plots)?;
     for solid in &drawing.solids {
-        let outline = solid.outline(axes[0], axes[1]);
-        chart.draw_series([Polygon::new(outline.clone(), SOLID.mix(0.3))])?;
-        chart.draw_series([PathElement::new(outline, SOLID.stroke_width(px(1)))])?;
+        for outline in solid.outlines(axes[0], axes[1]) {
+            // An edge has no inside.
+            if outline.len() > 2 {
+                chart.draw_series([Polygon::new(outline.clone(), SOLID.mix(0.3))])?;
+            }
+            chart.draw_series([PathElement::new(outline, SOLID.stroke_width(px(1)))])?;
+        }
     }
     draw_trails(&mut chart, drawing, |point| (point[axes[0]], point[axes[1]]))
 }
@@ -172,8 +176,8 @@ fn draw_path(plots: &Area<'_>, drawing: &Drawing) -> Result<()> {
         chart.draw_series([EmptyElement::at(turned(place)) + text])?;
     }
     for solid in &drawing.solids {
-        for [a, b] in crate::plot::scene::EDGES {
-            let edge = [a, b].map(|corner| turned(solid.corners[corner]));
+        for edge in &solid.edges {
+            let edge = edge.map(turned);
             chart.draw_series([PathElement::new(edge.to_vec(), SOLID.mix(0.7).stroke_width(px(1)))])?;
         }
     }

@@ -27,7 +27,7 @@ const QUANTILES: [(f64, &str); 6] = [
 /// How long the steps of `declared` take, if its manifest says so.
 ///
 /// # Errors
-/// A time that none is, or a file that does not hold any.
+/// An invalid time, or a file that does not hold any.
 pub fn of(declared: &DeclaredNode<'_>) -> Result<Option<ComputingTime>, Diagnostic> {
     let DeclaredNode { manifest, name, process, .. } = declared;
     let Some(setting) = &process.computing_time else { return Ok(None) };

@@ -41,7 +41,7 @@ fn check_no_limits(manifest: &Manifest, measure: &Spanned<PassCondition>) -> Res
     if min.is_none() && max.is_none() {
         return Ok(());
     }
-    let message = format!("measure `{name}`: it has a limit, and a measure is told, not judged");
+    let message = format!("measure `{name}`: it has a limit, and a measure is reported, not judged");
     Err(manifest.problem(&measure.span(), message, "leave `min` and `max` out, or write [[pass]]"))
 }
 
@@ -52,7 +52,7 @@ fn check_limits(manifest: &Manifest, pass: &Spanned<PassCondition>) -> Result<()
         manifest.problem(&pass.span(), format!("pass condition `{}`: {message}", condition.name), help)
     };
     if condition.min.is_none() && condition.max.is_none() {
-        let help = "add `min`, `max`, or both; what is only to be told is a [[measure]]";
+        let help = "add `min`, `max`, or both; what is only to be reported is a [[measure]]";
         return Err(at("it has no limit, so it cannot fail".into(), help));
     }
     let least = match condition.statistic {

@@ -7,6 +7,7 @@ use crate::program::Executable;
 use bus::context::{InputMessage, NodeContext};
 use bus::plan::Plan;
 use diagnostics::{Diagnostic, ParameterError};
+use scenes::Scene;
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 use std::path::PathBuf;
@@ -77,6 +78,10 @@ pub fn of(
             "vehicle" => {
                 let base = Vehicle::base(&path);
                 notes.models.extend(std::iter::once(path).chain(base));
+            }
+            "scene" => {
+                let meshes = Scene::mesh_files(&path);
+                notes.models.extend(std::iter::once(path).chain(meshes));
             }
             _ => notes.models.push(path),
         }

@@ -21,7 +21,7 @@ pub struct Content {
     /// Conditions on the recording, evaluated after the run.
     #[serde(default)]
     pub pass: Vec<Spanned<PassCondition>>,
-    /// Numbers of the recording that are told after the run and not judged: conditions without limits.
+    /// Numbers of the recording that are reported after the run and not judged: conditions without limits.
     #[serde(default)]
     pub measure: Vec<Spanned<PassCondition>>,
     /// Simulated states compared with measured ones, evaluated after the run.
