@@ -231,10 +231,11 @@ struct LinkStream {
 /// let messages = [InputMessage { port: "estimate", bytes: 96, period_ticks: 1 }];
 /// let context = NodeContext::new("down", &["estimate"]).reading(&messages);
 /// Link::new(diagnostics::read(&json!({ "streams": { "estimate": { "rate_hz": 25.0 } } }))?, &context)?;
-/// assert!(context.warnings().is_empty());
 /// // 107 bytes a millisecond are more than 57 600 baud carry.
 /// Link::new(diagnostics::read(&json!({}))?, &context)?;
-/// assert!(context.warnings()[0].message.contains("messages will wait and be dropped"));
+/// let warnings = context.into_warnings();
+/// assert_eq!(warnings.len(), 1);
+/// assert!(warnings[0].message.contains("messages will wait and be dropped"));
 /// # Ok::<(), diagnostics::ParameterError>(())
 /// ```
 #[derive(Debug)]
