@@ -148,16 +148,20 @@ pub(crate) fn differences(recording: &Recording, joins: &Joins<'_>) -> Result<Ve
     for ((topic, field), (unit, shadow)) in &values {
         let Some(topic) = topic.strip_prefix(SHADOW_PREFIX) else { continue };
         let Some((_, primary)) = values.get(&(topic.to_owned(), field.clone())) else { continue };
-        // What was sent before the second shadow joined is the first one's.
-        let later = joins.get(topic).into_iter().flatten().skip(1).copied();
-        let ends: Vec<u32> = later.chain([u32::MAX]).collect();
-        let starts = std::iter::once(0).chain(ends.iter().copied());
-        for (start, &end) in starts.zip(&ends) {
-            let of_one: Series = shadow.range(start..end).map(|(&tick, &value)| (tick, value)).collect();
-            all.extend(difference([topic, field, unit], &of_one, primary));
-        }
+        let joined = joins.get(topic).map_or(&[][..], Vec::as_slice);
+        let of_each = by_shadow(shadow, joined);
+        all.extend(of_each.iter().filter_map(|shadow| difference([topic, field, unit], shadow, primary)));
     }
     Ok(all)
+}
+
+/// The samples of each of the shadows that joined at these ticks: what was sent before the second joined is the first one's.
+fn by_shadow(samples: &Series, joined: &[u32]) -> Vec<Series> {
+    let ends: Vec<u32> = joined.iter().skip(1).copied().chain([u32::MAX]).collect();
+    let starts = std::iter::once(0).chain(ends.iter().copied());
+    let of_one =
+        |(start, &end): (u32, &u32)| samples.range(start..end).map(|(&tick, &value)| (tick, value)).collect();
+    starts.zip(&ends).map(of_one).collect()
 }
 
 /// The differences of all shadow topics of `recording`, as text.
@@ -325,5 +329,27 @@ impl fmt::Display for Replacement {
             write!(f, ": REFUSED: {}", lines.join("; "))?;
         }
         self.steps.iter().try_for_each(|step| write!(f, "\n{step}"))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Series, by_shadow, difference};
+
+    #[test]
+    fn each_shadow_is_held_against_the_primary_of_its_own_time() {
+        // The first shadow is off by 100 up to tick 5 and takes over; its successor is off by 1 from tick 7 on.
+        let primary: Series = (0..10).map(|tick| (tick, f64::from(tick))).collect();
+        let off = |tick: u32| if tick < 5 { 100.0 } else { 1.0 };
+        let shadow = primary.iter().map(|(&tick, &value)| (tick, value + off(tick)));
+        let shadow: Series = shadow.filter(|(tick, _)| *tick != 5 && *tick != 6).collect();
+        let found = by_shadow(&shadow, &[0, 7]);
+        let told: Vec<_> = found
+            .iter()
+            .filter_map(|shadow| difference(["/pid/command", "command[0]", "1"], shadow, &primary))
+            .map(|found| (found.from_tick, found.samples, found.max))
+            .collect();
+        assert_eq!(told, [(0, 5, 100.0), (7, 3, 1.0)]);
+        assert_eq!(by_shadow(&shadow, &[]), [shadow]);
     }
 }

@@ -95,8 +95,12 @@ impl Mesh {
                 ));
             }
         }
+        // Cones from the first corner: parry's own volume comes with principal axes, and they with a `cos`.
+        let from_first = |corner: u32| corners[corner as usize] - corners[0];
+        let cones = faces.iter().map(|face| face.map(from_first)).map(|[a, b, c]| a.dot(b.cross(c)) / 6.0);
+        let volume_m3: f64 = cones.sum();
         SharedShape::convex_mesh(corners, &faces)
-            .filter(|body| body.mass_properties(1.0).mass() > FLAT * x * y.max(z) * z.max(x))
+            .filter(|_| volume_m3 > FLAT * x.max(y).max(z).powi(3))
             .ok_or_else(|| "it is flat or open: a convex mesh is closed and has an inside".to_owned())
     }
 

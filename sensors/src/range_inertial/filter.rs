@@ -376,8 +376,9 @@ impl RangeInertial {
     pub fn motion(&self, state: &RangeInertialState, attitude: &AttitudeEstimate) -> StateEstimate {
         let [x, y, z] = &state.axes;
         let height_sigma_m = z.sigma(AHEAD + Side::Behind.index());
+        let [start_x_m, start_y_m] = self.params.initial_level_position_m;
         StateEstimate {
-            position: [x.path, y.path, state.height_m()].into(),
+            position: [start_x_m + x.path, start_y_m + y.path, state.height_m()].into(),
             velocity: vector_message(state.velocity_W_m_s()),
             attitude: attitude.attitude,
             angular_velocity: attitude.angular_velocity,

@@ -1,7 +1,7 @@
 //! The parameters of the range-inertial estimator.
 
 use crate::parameters::within;
-use diagnostics::parameter::{ParameterError, not_negative, positive};
+use diagnostics::parameter::{ParameterError, finite, not_negative, positive};
 
 parameters! {
     /// What the range finders, the IMU and the attitude are worth, and where the vehicle starts.
@@ -44,6 +44,8 @@ parameters! {
         /// Standard deviation of a level velocity of the input `gps` along each axis, m/s. Default 0.074, as of the kind
         /// `gps`.
         gps_velocity_sigma_m_s: f64 = 0.074 => positive,
+        /// Where the vehicle starts, along the world's x and y, m: the estimate's position begins there. Default 0, 0.
+        initial_level_position_m: [f64; 2] = [0.0; 2] => finite,
         /// Height at the start, m. Default 0.0.
         initial_height_m: f64 = 0.0 => not_negative,
         /// Size of the room along the world's x and y, m, where it is shared with other vehicles: an echo that is not
