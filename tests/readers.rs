@@ -12,6 +12,8 @@ mod laps;
 mod plot;
 #[path = "readers/profile.rs"]
 mod profile;
+#[path = "readers/world.rs"]
+mod world;
 
 use std::ffi::OsStr;
 use std::fs;

@@ -23,23 +23,33 @@ pub fn report() -> Result<()> {
     println!(
         "\nphysics: ns, median (min … max) of {REPETITIONS} rounds of {STEPS}; and against a multiply-add"
     );
-    let room = Scene::load(&path("scenes/room.toml"))?;
-    let ground = Scene::load(&path("scenes/ground.toml"))?;
+    let load = |name| Scene::load(&path(name));
+    let (room, ground) = (load("scenes/room.toml")?, load("scenes/ground.toml")?);
     let caster = RayCaster::new(&room);
-    let mut rounds: [Vec<f64>; 5] = Default::default();
-    let (mut free, mut bare, mut walled) = (free_flight()?, rapier(&ground)?, rapier(&room)?);
+    let (rig_a, rig_b) = (load("scenes/rig-sliding.toml")?, load("scenes/rig-fixed.toml")?);
+    let (in_the_air, on_the_ground) = (Vector3::z(), Vector3::zeros());
+    // At 1075 rpm it stays where it stands; at hover it flies.
+    let mut steps = [
+        ("newton-euler", free_flight()?, in_the_air, 76.5),
+        ("rapier, ground", rapier(&ground)?, in_the_air, 76.5),
+        ("rapier, room", rapier(&room)?, in_the_air, 76.5),
+        ("rapier, standing on the ground", rapier(&ground)?, on_the_ground, 1.0),
+        ("rapier, rig A", rapier(&rig_a)?, in_the_air, 90.0),
+        ("rapier, rig B", rapier(&rig_b)?, in_the_air, 76.5),
+    ];
+    let mut rounds: [Vec<f64>; 8] = Default::default();
     for _ in 0..REPETITIONS {
         rounds[0].push(multiply_add_ns());
-        for (round, backend) in [(1, &mut free), (2, &mut bare), (3, &mut walled)] {
-            rounds[round].push(step_ns(&mut **backend));
+        for (round, (_, backend, start_m, command)) in (1..).zip(&mut steps) {
+            rounds[round].push(step_ns(&mut **backend, start_m, *command));
         }
-        rounds[4].push(cast_ns(&caster));
+        rounds[7].push(cast_ns(&caster));
     }
     let [unit, rest @ ..] = rounds;
-    let names = ["newton-euler", "rapier, ground", "rapier, room", "ray cast in the room"];
+    let names = steps.each_ref().map(|step| step.0).into_iter().chain(["ray cast in the room"]);
     let unit_ns = Spread::of(unit.clone()).median;
     println!("  multiply-add, each on the last   {}", Spread::of(unit));
-    for (name, ns) in names.iter().zip(rest) {
+    for (name, ns) in names.zip(rest) {
         let median = Spread::of(ns.clone()).median;
         println!("  {name:<32} {}  {:8.0} multiply-adds", Spread::of(ns), median / unit_ns);
     }
@@ -68,14 +78,14 @@ fn rapier(scene: &Scene) -> Result<Box<dyn Backend>> {
     Ok(Box::new(Rapier::new(model, memory, scene, &RigidBody::level_at(Vector3::z()), 1.0)))
 }
 
-/// A step of hover, set back to its start each second so that it stays where it is.
-fn step_ns(backend: &mut dyn Backend) -> f64 {
+/// A step under the same command on all rotors, set back to its start each second so that it stays where it is.
+fn step_ns(backend: &mut dyn Backend, start_m: &Vector3<f64>, command: f64) -> f64 {
     let start = Instant::now();
     for step in 0..STEPS {
         if step % 1000 == 0 {
-            backend.set_body(&RigidBody::level_at(Vector3::z()));
+            backend.set_body(&RigidBody::level_at(*start_m));
         }
-        backend.step(black_box(&[76.5; 4]), DT_S, &[]);
+        backend.step(black_box(&[command; 4]), DT_S, &[]);
     }
     black_box(backend.state());
     per_step_ns(start)

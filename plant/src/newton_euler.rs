@@ -73,6 +73,11 @@ impl NewtonEuler {
         self.substeps
     }
 
+    /// Takes a torque to the angular acceleration that it makes, both in the body frame.
+    pub(crate) fn inverse_inertia(&self) -> &Matrix3<f64> {
+        &self.inverse_inertia
+    }
+
     /// A rotor that has settled at a raw motor command.
     pub fn steady(&self, command: f64) -> RotorState {
         RotorState::steady(self.vehicle().command.speed(command))
@@ -124,10 +129,23 @@ impl NewtonEuler {
 
     /// One classic Runge-Kutta step of fourth order over the full state, in free flight.
     pub(crate) fn runge_kutta(&self, state: &State, actuation: &Actuation, span_s: f64) -> State {
-        let k1 = self.rates(state, actuation);
-        let k2 = self.rates(&state.moved(&k1, span_s / 2.0), actuation);
-        let k3 = self.rates(&state.moved(&k2, span_s / 2.0), actuation);
-        let k4 = self.rates(&state.moved(&k3, span_s), actuation);
+        self.runge_kutta_held(state, actuation, span_s, |_, rates| rates)
+    }
+
+    /// The same, with something that holds the body: it gets the state and the rates of free flight, and gives the
+    /// rates back that it leaves of them.
+    pub(crate) fn runge_kutta_held(
+        &self,
+        state: &State,
+        actuation: &Actuation,
+        span_s: f64,
+        hold: impl Fn(&State, Rates) -> Rates,
+    ) -> State {
+        let rates = |state: &State| hold(state, self.rates(state, actuation));
+        let k1 = rates(state);
+        let k2 = rates(&state.moved(&k1, span_s / 2.0));
+        let k3 = rates(&state.moved(&k2, span_s / 2.0));
+        let k4 = rates(&state.moved(&k3, span_s));
         let sum = k1.plus(&k2, 2.0).plus(&k3, 2.0).plus(&k4, 1.0);
         state.moved(&sum, span_s / 6.0)
     }

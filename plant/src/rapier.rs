@@ -1,25 +1,27 @@
 //! The backend `rapier`: the same forces as in free flight, in a world that can be touched.
 //!
-//! At every step the free flight over the step is computed first, by the integrator of [`NewtonEuler`]. Its
-//! change of velocity is then given to rapier as a force and a torque, and rapier moves the body and solves the
-//! contacts. So rapier's own integrator, which is of first order, adds an error to the position only, of the
-//! velocity's change times a fraction of the step (docs/decisions/008-two-backends.md).
+//! Rapier finds what is near; where nothing is, the vehicle moves exactly as with `newton-euler`. What touches, and the
+//! joints of a rig, are solved here, not by rapier's own solver (docs/decisions/008-two-backends.md says why).
 //!
 //! | room | what it holds |
 //! |---|---|
-//! | `body` | who owns pose and velocity; where glam meets nalgebra |
-//! | `world` | what stands and moves in rapier's world |
+//! | `body` | where glam meets nalgebra |
+//! | `world` | what stands and moves in rapier's world, and what of it is near |
 //! | [`hull`] | how much room a vehicle takes |
+//! | `solver` | the impulses of contacts, stops and joints |
+//! | `stepping` | a step that is cut at impacts |
 //! | `contacts` | when contacts begin and end |
-//! | `rig` | test rigs as joints |
+//! | `rig` | test rigs: joints and stops |
 
 mod body;
 mod contacts;
 pub mod hull;
 mod rig;
+mod solver;
+mod stepping;
 mod world;
 
-use crate::actuation::{Actuation, Battery};
+use crate::actuation::Battery;
 use crate::airframe_state::AirframeState;
 use crate::backend::{Backend, ContactReport, Neighbour, TRAFFIC_MAX};
 use crate::newton_euler::{Accelerations, NewtonEuler};
@@ -27,9 +29,11 @@ use crate::snapshot::{Snapshot, SnapshotError};
 use crate::state::{RigidBody, State};
 use contacts::Contacts;
 use hull::Hull;
-use nalgebra::Vector3;
+use nalgebra::{UnitQuaternion, Vector3};
+use rig::Slider;
 use scenes::{Rig, Scene};
 use serde::{Deserialize, Serialize};
+use stepping::{Held, Scratch};
 use world::World;
 
 /// What its snapshots are called.
@@ -67,8 +71,21 @@ pub struct Rapier {
     world: World,
     contacts: Contacts,
     state: State,
+    slider: Option<Slider>,
     effects: AirframeState,
     reaction: Reaction,
+    held: Held,
+    changed: Changed,
+    scratch: Scratch,
+    /// The other vehicles, moved on within a tick.
+    others: Vec<Neighbour>,
+}
+
+/// By how much contacts and joints changed the velocities since the tick began.
+#[derive(Debug, Clone, Copy, Default)]
+struct Changed {
+    velocity_W_m_s: Vector3<f64>,
+    spin_W_rad_s: Vector3<f64>,
 }
 
 /// What contacts and joints changed over the last tick, against free flight.
@@ -102,11 +119,16 @@ impl Rapier {
             rig,
             crash_speed_m_s,
             inertia_min_kg_m2: vehicle.inertia_kg_m2.symmetric_eigenvalues().min(),
-            world: World::new(vehicle, &hull, scene, rig.as_ref(), body),
+            world: World::new(&hull, scene),
             contacts: Contacts::new(1 + scene.thing_count() + TRAFFIC_MAX),
             state: model.start(*body, 0.0),
+            slider: None,
             effects,
             reaction: Reaction::default(),
+            held: Held::default(),
+            changed: Changed::default(),
+            scratch: Scratch::default(),
+            others: Vec::with_capacity(TRAFFIC_MAX),
             model,
         };
         rapier.set_body(body);
@@ -116,43 +138,6 @@ impl Rapier {
     /// The number of the scene's box or mesh that the vehicle is partly inside of, if any.
     pub(crate) fn thing_around(&self) -> Option<usize> {
         self.world.thing_around(&self.state.body)
-    }
-
-    /// One step of `span_s`; returns by how much contacts and joints changed the velocities.
-    fn substep(&mut self, actuation: &Actuation, span_s: f64) -> (Vector3<f64>, Vector3<f64>) {
-        let before = self.state.body;
-        let free = self.model.runge_kutta(&self.state, actuation, span_s);
-        if !free.body.is_finite() {
-            // The world would panic on it; what is published ends the run with the field that is no number.
-            self.state = free;
-            return (Vector3::zeros(), Vector3::zeros());
-        }
-        let (force_W_N, torque_W_N_m) = self.push(&free.body, span_s);
-        let friction_W_N_m = self.rig_friction(span_s);
-        self.world.step(&force_W_N, &(torque_W_N_m + friction_W_N_m), span_s);
-        self.contacts.note(&before, self.world.sightings(), self.crash_speed_m_s);
-        self.state = State { body: self.world.body(), rotors: free.rotors };
-        let after = &self.state.body;
-        (after.velocity_W_m_s - free.body.velocity_W_m_s, spin_W_rad_s(after) - spin_W_rad_s(&free.body))
-    }
-
-    /// Pushes the rig's slider, and returns the torque of the bearing's friction on the vehicle.
-    fn rig_friction(&mut self, span_s: f64) -> Vector3<f64> {
-        let Some(rig) = &self.rig else { return Vector3::zeros() };
-        if let Some(slider) = self.world.slider() {
-            rig::push_slider(slider, rig, self.model.vehicle().gravity_m_s2, span_s);
-        }
-        rig::bearing_torque_W_N_m(rig, &spin_W_rad_s(&self.state.body), self.inertia_min_kg_m2, span_s)
-    }
-
-    /// The constant force and torque that take the body's velocities to those of `free` over `span_s`.
-    fn push(&self, free: &RigidBody, span_s: f64) -> (Vector3<f64>, Vector3<f64>) {
-        let (vehicle, body) = (self.model.vehicle(), &self.state.body);
-        let turned_W_rad_s = spin_W_rad_s(free) - spin_W_rad_s(body);
-        let turned_B_rad_s = body.attitude_WB.inverse_transform_vector(&turned_W_rad_s);
-        let impulse_W_N_s = (free.velocity_W_m_s - body.velocity_W_m_s) * vehicle.mass_kg;
-        let turn_W_N_m_s = body.attitude_WB * (vehicle.inertia_kg_m2 * turned_B_rad_s);
-        (impulse_W_N_s / span_s, turn_W_N_m_s / span_s)
     }
 
     /// Has the vehicle stand on its feet where it is too low to fly.
@@ -198,14 +183,9 @@ impl Rapier {
 
     /// Moves the vehicle to hang from the rig's bearing.
     fn hang(&mut self, rig: &Rig) {
-        let (body, bearing_W_m) = rig::hung(rig, &self.state.body);
-        self.state.body = body;
+        self.state.body = rig::hung(rig, &self.state.body);
         self.contacts.place(None, 0);
-        let arm_W_m = body.attitude_WB * rig.mount_B_m;
-        let velocity_W_m_s = body.velocity_W_m_s + spin_W_rad_s(&body).cross(&arm_W_m);
-        if let Some(slider) = self.world.slider() {
-            rig::place(slider, rig, &bearing_W_m, &velocity_W_m_s);
-        }
+        self.slider = Slider::under(rig, &self.state.body);
     }
 }
 
@@ -229,17 +209,20 @@ impl Backend for Rapier {
         let actuation = self.model.airframe().begin_tick(&mut self.effects, &self.state, commands, dt_s);
         let span_s = dt_s / f64::from(self.model.substeps());
         self.contacts.begin_tick();
-        let (mut change_W_m_s, mut change_W_rad_s) = (Vector3::zeros(), Vector3::zeros());
-        for substep in 1..=self.model.substeps() {
-            self.world.move_neighbours(traffic, &self.hull, f64::from(substep) * span_s);
-            let (linear_W_m_s, angular_W_rad_s) = self.substep(&actuation, span_s);
-            change_W_m_s += linear_W_m_s;
-            change_W_rad_s += angular_W_rad_s;
+        self.changed = Changed::default();
+        let mut others = std::mem::take(&mut self.others);
+        others.clear();
+        others.extend_from_slice(traffic);
+        for _ in 0..self.model.substeps() {
+            self.substep(&actuation, span_s, &mut others);
         }
+        self.others = others;
+        let body = &mut self.state.body;
+        body.attitude_WB = UnitQuaternion::new_normalize(body.attitude_WB.into_inner());
         self.state.rotors = self.model.airframe().settled(&actuation, &self.state.rotors);
         self.reaction = Reaction {
-            acceleration_W_m_s2: change_W_m_s / dt_s,
-            angular_acceleration_W_rad_s2: change_W_rad_s / dt_s,
+            acceleration_W_m_s2: self.changed.velocity_W_m_s / dt_s,
+            angular_acceleration_W_rad_s2: self.changed.spin_W_rad_s / dt_s,
             normal_W_N: self.contacts.normal_impulse_W_N_s / dt_s,
         };
     }
@@ -255,7 +238,7 @@ impl Backend for Rapier {
             Some(rig) => self.hang(&rig),
             None => self.put_down(),
         }
-        self.world.set_body(&self.state.body);
+        self.held = Held::default();
         self.lean_on_support();
     }
 
@@ -273,21 +256,30 @@ impl Backend for Rapier {
     }
 
     fn snapshot(&self) -> Result<Vec<u8>, SnapshotError> {
-        let snapshot = Snapshot::of(NAME)
+        Snapshot::of(NAME)
             .with("state", &self.state)?
             .with("effects", &self.effects)?
             .with("reaction", &self.reaction)?
-            .with("contacts", &self.contacts)?;
-        self.world.write(snapshot)?.bytes()
+            .with("rig", &self.rig.map(|rig| (rig.bearing_W_m, rig.mount_B_m)))?
+            .with("slider", &self.slider)?
+            .with("held", &self.held)?
+            .with("contacts", &self.contacts)?
+            .with("world", &self.world.numbers())?
+            .bytes()
     }
 
     fn restore(&mut self, snapshot: &[u8]) -> Result<(), SnapshotError> {
         let snapshot = Snapshot::read(snapshot, NAME)?;
         let (state, reaction) = (snapshot.get("state")?, snapshot.get("reaction")?);
         let effects = snapshot.fitting("effects", |effects| self.effects.fits(effects))?;
-        let (contacts, world) = (snapshot.get("contacts")?, self.world.read(&snapshot)?);
+        let rig = self.rig.map(|rig| (rig.bearing_W_m, rig.mount_B_m));
+        snapshot.fitting("rig", |found: &Option<(Vector3<f64>, Vector3<f64>)>| *found == rig)?;
+        let slider = snapshot
+            .fitting("slider", |slider: &Option<Slider>| slider.is_some() == self.slider.is_some())?;
+        let (held, contacts) = (snapshot.get("held")?, snapshot.get("contacts")?);
+        snapshot.fitting("world", |numbers: &Vec<f64>| *numbers == self.world.numbers())?;
         (self.state, self.effects, self.reaction) = (state, effects, reaction);
-        (self.contacts, self.world) = (contacts, world);
+        (self.slider, self.held, self.contacts) = (slider, held, contacts);
         Ok(())
     }
 }

@@ -136,7 +136,9 @@ fn a_fall_is_met_at_its_speed_counted_once_and_a_crash_above_the_limit() {
             met = met.or(Some(plant.contact()).filter(|report| report.count > 0));
         }
         let met = met.expect("it falls onto the ground");
-        assert!((met.impact_speed_m_s - speed_before_m_s).abs() < 1e-9, "{met:?} {speed_before_m_s}");
+        // It is met within the tick, in which it gained a little more speed.
+        let gained_m_s = met.impact_speed_m_s - speed_before_m_s;
+        assert!((0.0..9.81e-3).contains(&gained_m_s), "{met:?} {speed_before_m_s}");
         assert_eq!((met.object, met.began, met.crashed), (1, 1, crashed), "{met:?}");
         assert!(plant.contact().began >= 1 && plant.contact().crashed == crashed);
         assert!((plant.state().body.position_W_m.z - stand_m()).abs() < 1e-3, "it comes to rest on its feet");

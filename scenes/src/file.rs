@@ -4,9 +4,9 @@
 use crate::mesh::{Mesh, Solidity};
 use crate::mesh_file::Format;
 use crate::rig::{self, PLACE};
-use crate::scene::{Cuboid, Scene};
+use crate::scene::{Cuboid, Scene, Surface};
 use diagnostics::parameter::Bounds;
-use diagnostics::unit::{ANGLE, LENGTH};
+use diagnostics::unit::{ANGLE, LENGTH, RATIO};
 use diagnostics::{Diagnostic, Faults};
 use nalgebra::{Rotation3, Vector3};
 use std::io::Result as IoResult;
@@ -30,6 +30,22 @@ const SCALE: Bounds = Bounds {
     max: 1e3,
     unit: "m",
     why: "a unit of a mesh file is a micrometre at least and a kilometre at most",
+};
+
+/// Coulomb's coefficient.
+const FRICTION: Bounds = Bounds {
+    min: 0.0,
+    max: 10.0,
+    unit: "",
+    why: "a coefficient of friction: 0 is ice without friction, rubber on concrete about 1",
+};
+
+/// Newton's coefficient.
+const RESTITUTION: Bounds = Bounds {
+    min: 0.0,
+    max: 1.0,
+    unit: "",
+    why: "the fraction of the speed of approach that a bounce leaves: 0 leaves none, 1 all of it",
 };
 
 /// Beyond these numbers of things a contact's number would be that of another vehicle.
@@ -71,19 +87,27 @@ impl Scene {
         let root = Section::new(&doc, String::new(), 0..0, tree.get_ref());
         let mut faults = Faults::default();
         let name = faults.keep(root.text("name").map(str::to_owned));
+        let surface = faults.keep(surface(&root, &Surface::default())).unwrap_or_default();
         let sections = root.sections_if_any("boxes")?;
-        let boxes = faults.keep(Diagnostic::gather(sections.iter().map(one_box)));
+        let boxes = sections.iter().map(|section| one_box(section, &surface));
+        let boxes = faults.keep(Diagnostic::gather(boxes));
         let sections = root.sections_if_any("meshes")?;
         let folder = Path::new(file_name).parent().unwrap_or(Path::new(""));
-        let meshes = sections.iter().map(|section| one_mesh(section, folder, read));
+        let meshes = sections.iter().map(|section| one_mesh(section, &surface, folder, read));
         let meshes = faults.keep(Diagnostic::gather(meshes));
         let rig = root.has("rig").then(|| faults.keep(root.section("rig").and_then(|rig| rig::parse(&rig))));
         let effects = faults.keep(vehicles::effects::read(&root));
         faults.keep(root.finish());
         let scene = name.zip(boxes).zip(meshes).zip(effects);
         let rig = rig.flatten();
-        let scene =
-            scene.map(|(((name, boxes), meshes), effects)| Self { name, boxes, meshes, rig, effects });
+        let scene = scene.map(|(((name, boxes), meshes), effects)| Self {
+            name,
+            boxes,
+            meshes,
+            rig,
+            effects,
+            surface,
+        });
         if let Some(scene) = scene.as_ref().filter(|scene| scene.thing_count() > THINGS_MAX) {
             let found = format!("{} boxes and meshes", scene.thing_count());
             return Err(doc.bad(&(0..0), "boxes", format!("at most {THINGS_MAX} of both together"), found));
@@ -104,6 +128,7 @@ impl Scene {
 
 fn one_mesh(
     section: &Section,
+    surface_around: &Surface,
     folder: &Path,
     read: &dyn Fn(&Path) -> IoResult<Vec<u8>>,
 ) -> Result<Mesh, Diagnostic> {
@@ -126,6 +151,7 @@ fn one_mesh(
     let scale_m = if is_in_metres { 1.0 } else { section.bounded("scale", LENGTH, &SCALE)? };
     let solidity =
         section.choice("solid", &[("triangles", Solidity::Triangles), ("convex", Solidity::Convex)])?;
+    let surface = surface(section, surface_around)?;
     section.finish()?;
     let bytes = read(&file).map_err(|error| refused(error.to_string()))?;
     let triangles = format.read(&bytes).map_err(refused)?;
@@ -133,16 +159,29 @@ fn one_mesh(
     let placed =
         |corner: [f64; 3]| (turn * Vector3::from(corner) * scale_m + Vector3::from(place_W_m)).into();
     let corners_W_m = triangles.corners.into_iter().map(placed).collect();
-    let mesh =
-        Mesh { name, file: file.clone(), corners_W_m, faces: triangles.faces, solidity }.without_lines();
+    let mesh = Mesh { name, file: file.clone(), corners_W_m, faces: triangles.faces, solidity, surface }
+        .without_lines();
     mesh.shape().map(|_| mesh).map_err(refused)
 }
 
-fn one_box(section: &Section) -> Result<Cuboid, Diagnostic> {
+/// What `section` says of its surface, and what `otherwise` says where it is silent.
+fn surface(section: &Section, otherwise: &Surface) -> Result<Surface, Diagnostic> {
+    let number = |name, bounds, otherwise| {
+        if section.has(name) { section.bounded(name, RATIO, bounds) } else { Ok(otherwise) }
+    };
+    Ok(Surface {
+        friction: number("friction", &FRICTION, otherwise.friction)?,
+        restitution: number("restitution", &RESTITUTION, otherwise.restitution)?,
+    })
+}
+
+fn one_box(section: &Section, surface_around: &Surface) -> Result<Cuboid, Diagnostic> {
     let name = section.text("name")?.to_owned();
     let centre = section.vector("centre", LENGTH, &PLACE)?;
     let size = section.vector("size", LENGTH, &SIZE)?;
     let yaw_rad = if section.has("yaw") { section.bounded("yaw", ANGLE, &YAW)? } else { 0.0 };
+    let surface = surface(section, surface_around)?;
     section.finish()?;
-    Ok(Cuboid { name, centre_W_m: centre.into(), half_extents_m: Vector3::from(size) / 2.0, yaw_rad })
+    let half_extents_m = Vector3::from(size) / 2.0;
+    Ok(Cuboid { name, centre_W_m: centre.into(), half_extents_m, yaw_rad, surface })
 }

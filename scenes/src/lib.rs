@@ -30,4 +30,4 @@ pub mod scene;
 pub use mesh::{Mesh, Solidity};
 pub use ray::RayCaster;
 pub use rig::Rig;
-pub use scene::{Cuboid, Scene};
+pub use scene::{Cuboid, Scene, Surface};

@@ -1,6 +1,7 @@
 //! Things of any shape: triangles in the world, as what a ray meets and a vehicle touches.
 #![allow(non_snake_case, reason = "a trailing _W names the frame a vector is written in")]
 
+use crate::scene::Surface;
 use parry3d_f64::math::Vector;
 use parry3d_f64::shape::{SharedShape, TriMesh, TriMeshFlags};
 use std::collections::BTreeMap;
@@ -40,6 +41,8 @@ pub struct Mesh {
     pub faces: Vec<[u32; 3]>,
     /// What of it is solid.
     pub solidity: Solidity,
+    /// How it answers to what touches it.
+    pub surface: Surface,
 }
 
 impl Mesh {

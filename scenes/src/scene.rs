@@ -19,6 +19,24 @@ pub struct Scene {
     pub effects: Vec<EffectEntry>,
     /// What the vehicle hangs from, if anything.
     pub rig: Option<Rig>,
+    /// How the ground, and all that has no surface of its own, answers to what touches it.
+    pub surface: Surface,
+}
+
+/// How something answers to what touches it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Surface {
+    /// Coulomb's coefficient of friction: the force along the surface is at most this times that across.
+    pub friction: f64,
+    /// Newton's coefficient of restitution: the fraction of the speed of approach that a bounce leaves.
+    pub restitution: f64,
+}
+
+impl Default for Surface {
+    /// That of a scene which does not say: tuned, no source.
+    fn default() -> Self {
+        Self { friction: 0.5, restitution: 0.2 }
+    }
 }
 
 impl Scene {
@@ -53,4 +71,6 @@ pub struct Cuboid {
     pub half_extents_m: Vector3<f64>,
     /// How far its x axis is turned from that of the world, counter-clockwise from above.
     pub yaw_rad: f64,
+    /// How it answers to what touches it.
+    pub surface: Surface,
 }

@@ -1,5 +1,6 @@
 //! What the vehicle touches: when a contact begins and ends, how fast it was met, whether that was a crash.
 
+use super::world::Near;
 use crate::backend::ContactReport;
 use crate::state::RigidBody;
 use nalgebra::Vector3;
@@ -9,20 +10,11 @@ use serde::{Deserialize, Serialize};
 /// Tuned, no source.
 const LIFT_M: f64 = 1e-3;
 
-/// Something near one of the vehicle's colliders after a step.
+/// Something near one of the vehicle's colliders, and what the two did to each other.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Sighting {
-    /// What it is, as `bus::messages::Contact` numbers it.
-    pub object: u32,
-    /// Which of the vehicle's colliders it is near: one bit of [`Touch::parts`].
-    pub part: u32,
-    /// Where the two are nearest to each other.
-    pub point_W_m: Vector3<f64>,
-    /// The contact's normal, which points from the object to the vehicle.
-    pub towards_vehicle_W: Vector3<f64>,
-    /// How far they are apart; negative where they overlap.
-    pub gap_m: f64,
-    /// What they pushed each other with over the step.
+    pub near: Near,
+    /// What they pushed each other with along the normal.
     pub impulse_N_s: f64,
     /// The object's velocity.
     pub velocity_W_m_s: Vector3<f64>,
@@ -48,10 +40,10 @@ struct Touch {
 
 impl Touch {
     fn see(&mut self, sighting: &Sighting) {
-        let is_near = sighting.gap_m < LIFT_M || sighting.pushes();
+        let is_near = sighting.near.gap_m < LIFT_M || sighting.pushes();
         self.seen |= is_near;
-        if sighting.pushes() || (is_near && self.parts & sighting.part != 0) {
-            self.parts_seen |= sighting.part;
+        if sighting.pushes() || (is_near && self.parts & sighting.near.part != 0) {
+            self.parts_seen |= sighting.near.part;
         }
     }
 }
@@ -99,14 +91,14 @@ impl Contacts {
     ) {
         self.touches.iter_mut().for_each(|touch| (touch.seen, touch.parts_seen) = (false, 0));
         for sighting in sightings {
-            self.normal_impulse_W_N_s += sighting.towards_vehicle_W * sighting.impulse_N_s;
+            self.normal_impulse_W_N_s += sighting.near.towards_vehicle_W * sighting.impulse_N_s;
             if sighting.pushes() {
                 let speed_m_s = approach_m_s(before, &sighting);
                 // A part that already touches may be slammed down as well.
                 self.crashed |= speed_m_s > crash_speed_m_s;
                 self.meet(&sighting, speed_m_s);
             }
-            let touching = self.touches.iter_mut().find(|touch| touch.object == sighting.object);
+            let touching = self.touches.iter_mut().find(|touch| touch.object == sighting.near.object);
             if let Some(touch) = touching {
                 touch.see(&sighting);
             }
@@ -120,13 +112,13 @@ impl Contacts {
 
     /// Notes what pushes a part of the vehicle, unless that part touched it before.
     fn meet(&mut self, sighting: &Sighting, speed_m_s: f64) {
-        let touching = self.touches.iter().find(|touch| touch.object == sighting.object);
-        if touching.is_some_and(|touch| touch.parts & sighting.part != 0) {
+        let touching = self.touches.iter().find(|touch| touch.object == sighting.near.object);
+        if touching.is_some_and(|touch| touch.parts & sighting.near.part != 0) {
             return;
         }
         if touching.is_none() {
             self.began += 1;
-            self.touches.push(Touch { object: sighting.object, parts: 0, parts_seen: 0, seen: true });
+            self.touches.push(Touch { object: sighting.near.object, parts: 0, parts_seen: 0, seen: true });
         }
         let fastest_m_s = if self.is_impact_new { self.impact_speed_m_s } else { 0.0 };
         (self.impact_speed_m_s, self.is_impact_new) = (speed_m_s.max(fastest_m_s), true);
@@ -149,7 +141,7 @@ impl Contacts {
 /// How fast the vehicle's point came nearer to the object.
 fn approach_m_s(before: &RigidBody, sighting: &Sighting) -> f64 {
     let angular_velocity_W_rad_s = before.attitude_WB * before.angular_velocity_B_rad_s;
-    let arm_W_m = sighting.point_W_m - before.position_W_m;
+    let arm_W_m = sighting.near.point_W_m - before.position_W_m;
     let velocity_W_m_s = before.velocity_W_m_s + angular_velocity_W_rad_s.cross(&arm_W_m);
-    (sighting.velocity_W_m_s - velocity_W_m_s).dot(&sighting.towards_vehicle_W).max(0.0)
+    (sighting.velocity_W_m_s - velocity_W_m_s).dot(&sighting.near.towards_vehicle_W).max(0.0)
 }

@@ -71,4 +71,12 @@ impl Hull {
     pub fn stand_m(&self) -> f64 {
         self.foot_radius_m - self.feet_B_m[0].z
     }
+
+    /// How far any point of it is from the centre of mass.
+    #[must_use]
+    pub fn reach_m(&self) -> f64 {
+        let rim_m = self.centre_B_m.norm() + self.disc_radius_m + self.disc_half_m;
+        let feet_m = self.feet_B_m.iter().map(|foot_B_m| foot_B_m.norm() + self.foot_radius_m);
+        feet_m.fold(rim_m, f64::max)
+    }
 }

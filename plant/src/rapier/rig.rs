@@ -1,110 +1,172 @@
-//! A test rig as rapier's joints: a slider on the vertical, and a bearing that the vehicle hangs from.
+//! A test rig: a slider on the vertical, and a bearing that the vehicle hangs from.
 //!
-//! The slider is a body that can only move up and down (rapier takes its other directions out of the equations, so
-//! that no link without mass makes them stiff), and sideways where the rig sways: level within a square, as the lower
-//! end of a long tube does for small angles, with no friction and nothing that leads it back. A ball joint ties the vehicle's mount to it and leaves all three
-//! rotations free; where the rig does not heave, to a point of the world.
+//! The slider only moves up and down, and sideways where the rig sways: level within a square, as the lower end of a
+//! long tube does for small angles, with no friction and nothing that leads it back. What hangs with the bearing is
+//! lumped in its centre, so that the slider is a point with a mass. A ball joint ties the vehicle's mount to it and
+//! leaves all three rotations free; where the rig neither heaves nor sways, to a point of the world.
 //!
-//! The tilt limit is a cone, as of a rod end, and the same at any yaw: a limit on Euler angles would not be. It
-//! is a rope from a point on world z above the bearing to the point as far above it on body z: for a tilt t and
-//! a lever l the distance of the two is 2 l sin(t / 2), so a longest distance is a largest tilt.
+//! The tilt limit is a cone, as of a rod end, and the same at any yaw: a limit on Euler angles would not be. All
+//! stops are inelastic: a rope, a rod end's collar, a tube in a tube.
 
-use super::body::to_rapier;
-use crate::state::RigidBody;
-use nalgebra::Vector3;
-use rapier3d_f64::dynamics::{
-    GenericJointBuilder, JointAxesMask, JointAxis, LockedAxes, MassProperties, RigidBody as Slider,
-    RigidBodyBuilder, RigidBodyHandle, RopeJointBuilder, SphericalJointBuilder,
-};
-use rapier3d_f64::math::Vector;
-use rapier3d_f64::pipeline::PhysicsWorld;
+use super::solver::{Ball, Body, Limit, Row};
+use crate::newton_euler::NewtonEuler;
+use crate::state::{Rates, RigidBody, State};
+use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 use scenes::Rig;
-
-/// Lever of the rope that limits the tilt: long against the solver's error in distance, short enough to keep its
-/// pull small. Tuned, no source.
-const LEVER_M: f64 = 0.1;
+use serde::{Deserialize, Serialize};
 
 /// A bearing that starts lower than this above the lower end of its travel is there: tuned, no source.
 const LOWER_END_M: f64 = 1e-6;
 
-/// Builds `rig` around `vehicle`; returns the slider where it heaves or sways.
-pub(super) fn build(
-    physics: &mut PhysicsWorld,
-    vehicle: RigidBodyHandle,
-    rig: &Rig,
-) -> Option<RigidBodyHandle> {
-    let foot = physics.insert_body(RigidBodyBuilder::fixed().translation(to_rapier(&rig.bearing_W_m)));
-    let slider = (rig.heave_m > 0.0 || rig.sway_m > 0.0).then(|| slider(physics, foot, rig));
-    let above = slider.unwrap_or(foot);
-    let (mount, lever) = (to_rapier(&rig.mount_B_m), Vector::Z * LEVER_M);
-    physics.insert_impulse_joint(above, vehicle, SphericalJointBuilder::new().local_anchor2(mount));
-    let rope = RopeJointBuilder::new(2.0 * LEVER_M * libm::sin(rig.tilt_max_rad / 2.0));
-    physics.insert_impulse_joint(above, vehicle, rope.local_anchor1(lever).local_anchor2(mount + lever));
-    slider
+/// What carries the bearing: where the bearing's centre is and how it moves.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub(super) struct Slider {
+    pub position_W_m: Vector3<f64>,
+    pub velocity_W_m_s: Vector3<f64>,
 }
 
-fn slider(physics: &mut PhysicsWorld, foot: RigidBodyHandle, rig: &Rig) -> RigidBodyHandle {
-    let on_its_line = LockedAxes::TRANSLATION_LOCKED_X | LockedAxes::TRANSLATION_LOCKED_Y;
-    let sways = rig.sway_m > 0.0;
-    let locked = LockedAxes::ROTATION_LOCKED | if sways { LockedAxes::empty() } else { on_its_line };
-    let mass = MassProperties::new(Vector::ZERO, rig.moving_mass_kg, Vector::ZERO);
-    let slider = RigidBodyBuilder::dynamic()
-        .translation(to_rapier(&rig.bearing_W_m))
-        .additional_mass_properties(mass)
-        .locked_axes(locked)
-        .can_sleep(false);
-    let slider = physics.insert_body(slider);
-    let mut travel =
-        GenericJointBuilder::new(JointAxesMask::empty()).limits(JointAxis::LinZ, [0.0, rig.heave_m]);
-    if sways {
-        let side = [-rig.sway_m, rig.sway_m];
-        travel = travel.limits(JointAxis::LinX, side).limits(JointAxis::LinY, side);
+impl Slider {
+    /// The slider of `rig` with this vehicle on it; none where nothing slides.
+    pub(super) fn under(rig: &Rig, vehicle: &RigidBody) -> Option<Self> {
+        let arm_W_m = vehicle.attitude_WB * rig.mount_B_m;
+        let spin_W_rad_s = vehicle.attitude_WB * vehicle.angular_velocity_B_rad_s;
+        let velocity_W_m_s = vehicle.velocity_W_m_s + spin_W_rad_s.cross(&arm_W_m);
+        let is_free = freedom(rig);
+        let off_W_m = vehicle.position_W_m + arm_W_m - rig.bearing_W_m;
+        (is_free.amax() > 0.0).then(|| Self {
+            position_W_m: rig.bearing_W_m + off_W_m.component_mul(&is_free),
+            velocity_W_m_s: velocity_W_m_s.component_mul(&is_free),
+        })
     }
-    physics.insert_impulse_joint(foot, slider, travel.build());
-    slider
+
+    /// As the solver sees it.
+    pub(super) fn body(&self, rig: &Rig) -> Body {
+        Body {
+            velocity_W_m_s: self.velocity_W_m_s,
+            inverse_mass_per_kg: freedom(rig) / rig.moving_mass_kg,
+            ..Body::default()
+        }
+    }
+
+    /// The impulse of its friction over a step of `span_s`, which at most stops it.
+    pub(super) fn friction_W_N_s(&self, rig: &Rig, span_s: f64) -> Vector3<f64> {
+        let speed_m_s = self.velocity_W_m_s.z;
+        let dry_and_viscous_N = rig.slide_friction_N + rig.slide_damping_N_s_m * speed_m_s.abs();
+        let stopping_N_s = rig.moving_mass_kg * speed_m_s.abs();
+        Vector3::z() * (-speed_m_s.signum() * (dry_and_viscous_N * span_s).min(stopping_N_s))
+    }
 }
 
-/// `body` moved so that it hangs from the bearing, as high as it was within the heave; and the bearing's place.
-pub(super) fn hung(rig: &Rig, body: &RigidBody) -> (RigidBody, Vector3<f64>) {
+/// For each axis of the world 1 where the slider moves along it, and 0 where it is held.
+fn freedom(rig: &Rig) -> Vector3<f64> {
+    let [aside, up] = [rig.sway_m, rig.heave_m].map(|way_m| if way_m > 0.0 { 1.0 } else { 0.0 });
+    Vector3::new(aside, aside, up)
+}
+
+/// Takes `rates` of free flight at `state` to those in the rig, by the force P of the bearing on the vehicle at its
+/// mount, at r from the centre of mass: the mount accelerates at a + α × r + ω × (ω × r), which is zero along an axis
+/// where the slider is held, and P is what moves and carries the slider along the others.
+pub(super) fn hold(rig: &Rig, model: &NewtonEuler, state: &State, rates: Rates) -> Rates {
+    let vehicle = model.vehicle();
+    // Within a step the quaternion is not kept at length 1.
+    let turn_WB = UnitQuaternion::new_normalize(state.body.attitude_WB.into_inner()).to_rotation_matrix();
+    let inverse_inertia_W = turn_WB * model.inverse_inertia() * turn_WB.transpose();
+    let [spin_W_rad_s, turning_W_rad_s2, arm_W_m] =
+        [state.body.angular_velocity_B_rad_s, rates.angular_acceleration_B_rad_s2, rig.mount_B_m]
+            .map(|vector_B| turn_WB * vector_B);
+    let lever_W = arm_W_m.cross_matrix();
+    let yields = Matrix3::identity() / vehicle.mass_kg - lever_W * inverse_inertia_W * lever_W;
+    let mount_W_m_s2 = rates.acceleration_W_m_s2
+        + turning_W_rad_s2.cross(&arm_W_m)
+        + spin_W_rad_s.cross(&spin_W_rad_s.cross(&arm_W_m));
+    let weight_W_N = Vector3::z() * (-rig.moving_mass_kg * vehicle.gravity_m_s2);
+    let freedom = freedom(rig);
+    // A row for each axis: yields P = -mount where it is held, (1 + m yields) P = weight - m mount where it is free.
+    let (mut rows, mut right) = (yields, -mount_W_m_s2);
+    for axis in (0..3).filter(|&axis| freedom[axis] > 0.0) {
+        rows.row_mut(axis).scale_mut(rig.moving_mass_kg);
+        rows[(axis, axis)] += 1.0;
+        right[axis] = weight_W_N[axis] - rig.moving_mass_kg * mount_W_m_s2[axis];
+    }
+    let force_W_N = rows.try_inverse().map_or(Vector3::zeros(), |inverse| inverse * right);
+    let turned_W_rad_s2 = inverse_inertia_W * arm_W_m.cross(&force_W_N);
+    Rates {
+        acceleration_W_m_s2: rates.acceleration_W_m_s2 + force_W_N / vehicle.mass_kg,
+        angular_acceleration_B_rad_s2: rates.angular_acceleration_B_rad_s2
+            + turn_WB.inverse_transform_vector(&turned_W_rad_s2),
+        ..rates
+    }
+}
+
+/// The ball joint between `bodies`: what carries the bearing, and the vehicle.
+pub(super) fn bearing(all: &[Body], bodies: [usize; 2], rig: &Rig, vehicle: &RigidBody) -> Ball {
+    Ball::new(all, bodies, [Vector3::zeros(), vehicle.attitude_WB * rig.mount_B_m])
+}
+
+/// How far the vehicle's mount is from the bearing's centre, at `bearing_W_m`.
+pub(super) fn off_W_m(rig: &Rig, vehicle: &RigidBody, bearing_W_m: &Vector3<f64>) -> Vector3<f64> {
+    vehicle.position_W_m + vehicle.attitude_WB * rig.mount_B_m - bearing_W_m
+}
+
+/// The rig's stops, after what `limits` holds: ends of the heave and the sway of `slider`, and the cone that `vehicle`
+/// tilts in. Each is given with its number among `all`.
+pub(super) fn stops(
+    all: &[Body],
+    rig: &Rig,
+    slider: Option<(usize, &Slider)>,
+    vehicle: (usize, &RigidBody),
+    limits: &mut Vec<Limit>,
+) {
+    if let Some((number, slider)) = slider {
+        let off_W_m = slider.position_W_m - rig.bearing_W_m;
+        let aside = |axis| (axis, -rig.sway_m, rig.sway_m);
+        let ways = [(Vector3::z(), 0.0, rig.heave_m), aside(Vector3::x()), aside(Vector3::y())];
+        for (axis, lower_m, upper_m) in ways.into_iter().filter(|(_, lower_m, upper_m)| upper_m > lower_m) {
+            let off_m = off_W_m.dot(&axis);
+            let row = |along| Row::at(all, [0, number], [Vector3::zeros(); 2], along);
+            limits.extend([stop(row(axis), off_m - lower_m), stop(row(-axis), upper_m - off_m)]);
+        }
+    }
+    limits.extend(cone(all, rig, vehicle));
+}
+
+/// The cone; `None` where the vehicle is so level that no direction leads to it.
+fn cone(all: &[Body], rig: &Rig, (number, vehicle): (usize, &RigidBody)) -> Option<Limit> {
+    let up_W = vehicle.attitude_WB * Vector3::z();
+    let across_W = Vector3::z().cross(&up_W);
+    let sine = across_W.norm();
+    let tilt_rad = libm::atan2(sine, up_W.z);
+    let axis_W = across_W.try_normalize(1e-9)?;
+    Some(stop(Row::about(all, [0, number], -axis_W), rig.tilt_max_rad - tilt_rad))
+}
+
+fn stop(normal: Row, gap: f64) -> Limit {
+    Limit { normal, gap, restitution: 0.0, friction: None, least: f64::NEG_INFINITY, impulse: 0.0 }
+}
+
+/// `body` moved so that it hangs from the bearing, as high as it was within the heave and as its slider lets it move; it
+/// turns as it did.
+pub(super) fn hung(rig: &Rig, body: &RigidBody) -> RigidBody {
     let arm_W_m = body.attitude_WB * rig.mount_B_m;
     let wanted_m = body.position_W_m.z + arm_W_m.z - rig.bearing_W_m.z;
     let bearing_W_m = rig.bearing_W_m + Vector3::z() * wanted_m.clamp(0.0, rig.heave_m);
-    (RigidBody { position_W_m: bearing_W_m - arm_W_m, ..*body }, bearing_W_m)
+    let turning_W_m_s = (body.attitude_WB * body.angular_velocity_B_rad_s).cross(&arm_W_m);
+    let mount_W_m_s = (body.velocity_W_m_s + turning_W_m_s).component_mul(&freedom(rig));
+    RigidBody { position_W_m: bearing_W_m - arm_W_m, velocity_W_m_s: mount_W_m_s - turning_W_m_s, ..*body }
 }
 
 /// Whether the rig keeps a vehicle at rest where it is: always where it does not heave, and at the lower end of its
 /// travel unless `lift_N`, the force on the vehicle beyond its weight, raises what hangs there.
 pub(super) fn holds(rig: &Rig, body: &RigidBody, lift_N: f64, gravity_m_s2: f64) -> bool {
-    let raised_m = (hung(rig, body).1 - rig.bearing_W_m).z;
+    let raised_m = off_W_m(rig, &hung(rig, body), &rig.bearing_W_m).z;
     let needed_N = rig.moving_mass_kg * gravity_m_s2 + rig.slide_friction_N;
     rig.heave_m == 0.0 || (raised_m < LOWER_END_M && lift_N < needed_N)
 }
 
-/// Puts the slider at `bearing_W_m`, moving with the vehicle's mount where it can.
-pub(super) fn place(
-    slider: &mut Slider,
-    rig: &Rig,
-    bearing_W_m: &Vector3<f64>,
-    velocity_W_m_s: &Vector3<f64>,
-) {
-    slider.set_translation(to_rapier(bearing_W_m), true);
-    let freedom = if rig.sway_m > 0.0 { Vector::ONE } else { Vector::Z };
-    slider.set_linvel(freedom * to_rapier(velocity_W_m_s), true);
-}
-
-/// Weight and friction of the slider over a step of `span_s`.
-pub(super) fn push_slider(slider: &mut Slider, rig: &Rig, gravity_m_s2: f64, span_s: f64) {
-    let speed_m_s = slider.linvel().z;
-    let dry_and_viscous_N = rig.slide_friction_N + rig.slide_damping_N_s_m * speed_m_s.abs();
-    let stopping_N = rig.moving_mass_kg * speed_m_s.abs() / span_s;
-    let friction_N = -speed_m_s.signum() * dry_and_viscous_N.min(stopping_N);
-    slider.reset_forces(true);
-    slider.add_force(Vector::Z * (friction_N - rig.moving_mass_kg * gravity_m_s2), true);
-}
-
-/// The torque of the bearing's friction on a vehicle that turns with `spin_W_rad_s`, over a step of `span_s`. At
-/// most it stops a body of the least moment of inertia, `inertia_kg_m2`: friction never turns a motion round.
-pub(super) fn bearing_torque_W_N_m(
+/// The angular impulse of the bearing's friction on a vehicle that turns with `spin_W_rad_s`, over a step of
+/// `span_s`. At most it stops a body of the least moment of inertia, `inertia_kg_m2`: friction never turns a motion
+/// round.
+pub(super) fn bearing_friction_W_N_m_s(
     rig: &Rig,
     spin_W_rad_s: &Vector3<f64>,
     inertia_kg_m2: f64,
@@ -115,6 +177,6 @@ pub(super) fn bearing_torque_W_N_m(
         return Vector3::zeros();
     }
     let dry_and_viscous_N_m = rig.bearing_friction_N_m + rig.bearing_damping_N_m_s * spin_rad_s;
-    let stopping_N_m = inertia_kg_m2 * spin_rad_s / span_s;
-    spin_W_rad_s * (-dry_and_viscous_N_m.min(stopping_N_m) / spin_rad_s)
+    let stopping_N_m_s = inertia_kg_m2 * spin_rad_s;
+    spin_W_rad_s * (-(dry_and_viscous_N_m * span_s).min(stopping_N_m_s) / spin_rad_s)
 }
