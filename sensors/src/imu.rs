@@ -5,6 +5,7 @@
 
 use crate::channel::{Channel, ChannelState, QUEUE, Remembered};
 use crate::imu_model::{ImuModel, ImuModelState, ImuParams, ImuReading};
+use crate::imu_part::{ImuMotion, ImuPart, ImuPartState};
 use crate::noise::{drawn_words, set_drawn_words};
 use crate::sensing::TruthInputs;
 use crate::wire::{vector, vector_message};
@@ -30,6 +31,21 @@ pub struct ImuState {
     /// Words of 32 bits drawn from the random stream: the low and the high half of the count.
     #[field(unit = "1")]
     random_words: [u64; 2],
+    /// Readings so far.
+    #[field(unit = "1")]
+    readings: u64,
+    /// The angle of each rotor, from where it started.
+    #[field(unit = "rad")]
+    rotor_angles: [f64; 4],
+    /// The true angular velocity at the last reading.
+    #[field(unit = "rad/s", frame = "body")]
+    last_angular_velocity: Vector3,
+    /// What has come through the accelerometer's low pass.
+    #[field(unit = "m/s^2", frame = "body")]
+    filtered_specific_force: Vector3,
+    /// What has come through the gyroscope's low pass.
+    #[field(unit = "rad/s", frame = "body")]
+    filtered_angular_velocity: Vector3,
     /// What is under way.
     channel: ChannelState,
     /// The last readings.
@@ -49,6 +65,26 @@ impl ImuState {
         self.accelerometer_bias = vector_message(model.accelerometer_bias_B_m_s2);
         self.gyroscope_bias = vector_message(model.gyroscope_bias_B_rad_s);
         self.random_words = drawn_words(&model.random);
+    }
+
+    fn part(&self) -> ImuPartState {
+        ImuPartState {
+            readings: self.readings,
+            rotor_angles_rad: self.rotor_angles,
+            last_B_rad_s: vector(self.last_angular_velocity),
+            filtered: ImuReading {
+                specific_force_B_m_s2: vector(self.filtered_specific_force),
+                angular_velocity_B_rad_s: vector(self.filtered_angular_velocity),
+            },
+        }
+    }
+
+    fn store_part(&mut self, part: &ImuPartState) {
+        self.readings = part.readings;
+        self.rotor_angles = part.rotor_angles_rad;
+        self.last_angular_velocity = vector_message(part.last_B_rad_s);
+        self.filtered_specific_force = vector_message(part.filtered.specific_force_B_m_s2);
+        self.filtered_angular_velocity = vector_message(part.filtered.angular_velocity_B_rad_s);
     }
 
     fn restore(&self, model: &mut ImuModelState) {
@@ -88,6 +124,7 @@ pub struct Outputs {
 /// ```
 #[derive(Debug)]
 pub struct ImuSensor {
+    part: ImuPart,
     model: ImuModel,
     channel: Channel,
     /// The model's state, drawn anew from the transferred one at each step; it holds the random stream.
@@ -95,7 +132,8 @@ pub struct ImuSensor {
 }
 
 impl Component for ImuSensor {
-    const INFO: Info = Info::new("imu", "accelerometer and gyroscope with noise and walking bias");
+    const INFO: Info =
+        Info::new("imu", "accelerometer and gyroscope: noise, walking bias, and the mechanics of the part");
     type Parameters = ImuParams;
     type Inputs<'a> = TruthInputs<'a>;
     type Outputs = Outputs;
@@ -104,9 +142,10 @@ impl Component for ImuSensor {
     fn new(params: ImuParams, context: &NodeContext<'_>) -> Result<Self, ParameterError> {
         let rate_hz = context.period_s().recip();
         let model = ImuModel::new(params, rate_hz)?;
+        let part = ImuPart::new(params, rate_hz);
         let channel = Channel::new(&params.timing(rate_hz), context)?;
         let model_state = model.initial_state(context.seed, context.name);
-        Ok(Self { model, channel, model_state })
+        Ok(Self { part, model, channel, model_state })
     }
 
     fn initial(&self) -> ImuState {
@@ -120,7 +159,11 @@ impl Component for ImuSensor {
         state: &mut ImuState,
     ) -> Result<Outputs, StepError> {
         state.restore(&mut self.model_state);
-        let reading = message(&self.model.read(&mut self.model_state, &truth(inputs.state)));
+        let mut part = state.part();
+        let felt = self.part.feel(&mut part, &motion(inputs.state, context.time_ns()));
+        let reading = self.part.in_steps(&self.model.read(&mut self.model_state, &felt));
+        let reading = message(&reading);
+        state.store_part(&part);
         state.store(&self.model_state);
         let imu =
             self.channel.measure(
@@ -139,6 +182,10 @@ fn truth(state: &PlantState) -> ImuReading {
         specific_force_B_m_s2: vector(state.specific_force),
         angular_velocity_B_rad_s: vector(state.angular_velocity),
     }
+}
+
+fn motion(state: &PlantState, time_ns: u64) -> ImuMotion {
+    ImuMotion { motion: truth(state), rotor_speeds_rad_s: state.rotor_speed, time_s: time_ns as f64 / 1e9 }
 }
 
 fn message(reading: &ImuReading) -> Imu {
@@ -220,6 +267,27 @@ mod tests {
         let params = ImuParams { delay_ms: 9.0, dropout: 0.1, dropout_mean_s: 0.02, ..ImuParams::default() };
         let truths: Vec<_> = (0..2000).map(truth_at).collect();
         Harness::require_transfer(|| imu(params), |tick| TruthInputs { state: &truths[tick as usize] });
+    }
+
+    #[test]
+    fn so_is_that_of_a_part_in_detail() {
+        let params = ImuParams {
+            position_m: [0.02, 0.01, 0.0],
+            gyroscope_bandwidth_hz: 40.0,
+            accelerometer_vibration_m: 1e-6,
+            warming_k: 20.0,
+            gyroscope_bias_drift_rad_s_k: [1e-3; 3],
+            gyroscope_resolution_rad_s: 1e-3,
+            ..ImuParams::default()
+        };
+        let truth_at = |tick| PlantState { rotor_speed: [400.0, 410.0, 390.0, 405.0], ..truth_at(tick) };
+        let truths: Vec<_> = (0..2000).map(truth_at).collect();
+        Harness::require_transfer(|| imu(params), |tick| TruthInputs { state: &truths[tick as usize] });
+        let mut imu = imu(params);
+        let readings = truths.iter().map(|state| imu.step(TruthInputs { state }).unwrap().imu);
+        let steps = readings.map(|imu| imu.angular_velocity.x / 1e-3).collect::<Vec<_>>();
+        assert!(steps.iter().all(|steps| (steps - steps.round()).abs() < 1e-9), "it is in steps");
+        assert!(steps.iter().any(|other| *other != steps[0]), "and it moves");
     }
 
     #[test]

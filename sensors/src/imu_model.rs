@@ -1,10 +1,12 @@
 //! The inertial measurement unit: specific force and angular rate in, a noisy reading out.
 //!
-//! Reading = truth + bias + white noise, cut off at the range of the part; see [`crate::noise`]. The
-//! axes are those of the body (x forward, y left, z up) and the part sits at the centre of mass.
+//! Reading = what is felt + bias + white noise, cut off at the range of the part; see [`crate::noise`]. The
+//! axes are those of the body (x forward, y left, z up); what is felt is the truth at the centre of mass unless
+//! [`crate::imu_part`] makes something else of it.
 
 use crate::channel::Timing;
 use crate::noise::{BiasWalk, WhiteNoise};
+use crate::parameters::within;
 use crate::wire::vector;
 use bus::messages::Imu;
 use bus::random::{Stream, stream};
@@ -38,6 +40,40 @@ parameters! {
         gyroscope_initial_bias_rad_s: [f64; 3] = [0.0; 3] => finite,
         /// The gyroscope reads no more than this on any axis, rad/s.
         gyroscope_range_rad_s: f64 = 1000.0_f64.to_radians() => positive,
+        /// Where the part sits, seen from the centre of mass, body axes, m.
+        position_m: [f64; 3] = [0.0; 3] => finite,
+        /// How the part is turned against the body, as a rotation vector, degrees.
+        misalignment_deg: [f64; 3] = [0.0; 3] => finite,
+        /// Errors of the accelerometer's scale, of each axis.
+        accelerometer_scale_error: [f64; 3] = [0.0; 3] => within(-0.5..=0.5, "-0.5 to 0.5"),
+        /// What the accelerometer's axes read of what is along others: x of y, x of z, y of x, y of z, z of x, z of y.
+        accelerometer_cross_axis: [f64; 6] = [0.0; 6] => within(-0.5..=0.5, "-0.5 to 0.5"),
+        /// Corner frequency of the accelerometer's low pass of first order, Hz; 0 where there is none.
+        accelerometer_bandwidth_hz: f64 = 0.0 => not_negative,
+        /// The accelerometer reads whole multiples of this, m/s²; 0 where it resolves all.
+        accelerometer_resolution_m_s2: f64 = 0.0 => not_negative,
+        /// How the accelerometer's bias drifts with temperature, of each axis, m/s²/K.
+        accelerometer_bias_drift_m_s2_k: [f64; 3] = [0.0; 3] => finite,
+        /// How far the unbalance of a rotor shakes the part, m.
+        accelerometer_vibration_m: f64 = 0.0 => not_negative,
+        /// Errors of the gyroscope's scale, of each axis.
+        gyroscope_scale_error: [f64; 3] = [0.0; 3] => within(-0.5..=0.5, "-0.5 to 0.5"),
+        /// What the gyroscope's axes read of turns about others, in the order of the accelerometer's.
+        gyroscope_cross_axis: [f64; 6] = [0.0; 6] => within(-0.5..=0.5, "-0.5 to 0.5"),
+        /// Corner frequency of the gyroscope's low pass of first order, Hz; 0 where there is none.
+        gyroscope_bandwidth_hz: f64 = 0.0 => not_negative,
+        /// The gyroscope reads whole multiples of this, rad/s; 0 where it resolves all.
+        gyroscope_resolution_rad_s: f64 = 0.0 => not_negative,
+        /// How the gyroscope's bias drifts with temperature, of each axis, rad/s/K.
+        gyroscope_bias_drift_rad_s_k: [f64; 3] = [0.0; 3] => finite,
+        /// What the gyroscope's axes read of the specific force along themselves, rad/s per m/s².
+        gyroscope_g_sensitivity_rad_s_m: [f64; 3] = [0.0; 3] => finite,
+        /// By what angle the unbalance of a rotor shakes the part, rad.
+        gyroscope_vibration_rad: f64 = 0.0 => not_negative,
+        /// How much the part warms up after it is switched on, at tick 0, K.
+        warming_k: f64 = 0.0 => finite,
+        /// The time constant of its warming up, s.
+        warming_time_s: f64 = 300.0 => positive,
         /// How long after it is made a reading arrives, ms.
         delay_ms: f64 = 0.0,
         /// The fraction of readings that are lost.
@@ -68,7 +104,7 @@ impl ImuParams {
 }
 
 /// One sample of an IMU, or the truth that it measures; vectors in body axes.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct ImuReading {
     /// Acceleration less gravity, m/s²; at rest and level it is +g along z.
     pub specific_force_B_m_s2: Vector3<f64>,

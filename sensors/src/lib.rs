@@ -4,7 +4,7 @@
 //! - [`sensing`]: sensors as components; `channel`: when they measure, and how measurements are delayed and lost.
 //! - `parameters`: tables of parameters, each with its default and bounds.
 //! - [`noise`]: white noise from its density, bias as a random walk.
-//! - [`imu_model`], [`imu`]: accelerometer and gyroscope.
+//! - [`imu`]: accelerometer and gyroscope; [`imu_model`]: their noise; [`imu_part`]: their mechanics.
 //! - [`gps`], [`mocap`]: position from satellites, position and attitude from cameras.
 //! - [`barometer`], `atmosphere`: air pressure, and how it falls with height.
 //! - [`magnetometer`], `earth_field`: the earth's magnetic field, at the vehicle and in the world.
@@ -43,6 +43,7 @@ pub mod gps;
 pub mod ideal;
 pub mod imu;
 pub mod imu_model;
+pub mod imu_part;
 mod line;
 pub mod link;
 pub mod magnetometer;

@@ -202,9 +202,9 @@ fn a_rate_at_which_a_sensor_cannot_measure_or_a_plant_cannot_move() {
         .write("slow.toml", text.replace("kind = \"mocap\"", "kind = \"mocap\"\nparameters.rate_hz = 5"));
     let ended = refused_args(&["check", &path], &path);
     ended.says(&["process `rpm`", "`rate_hz` is 200 Hz, expected at most 10 Hz", "run.rate_hz = 10"]);
-    let text = text.replace("rate_hz = 10", "rate_hz = 4").replace(sensor, "");
+    let text = text.replace("rate_hz = 10", "rate_hz = 2").replace(sensor, "");
     let path = place
-        .write("slow.toml", text.replace("kind = \"mocap\"", "kind = \"mocap\"\nparameters.rate_hz = 2"));
+        .write("slow.toml", text.replace("kind = \"mocap\"", "kind = \"mocap\"\nparameters.rate_hz = 1"));
     refused_args(&["check", &path], &path).says(&["process `plant`", "the integration diverges"]);
 }
 

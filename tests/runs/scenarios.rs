@@ -62,6 +62,11 @@ fn sticks_in_both_rigs() {
 }
 
 #[test]
+fn hovers_with_an_imu_in_detail() {
+    fly_with("imu-detail", &SEEDS);
+}
+
+#[test]
 fn rotors_hover_faster_where_they_lift_what_hangs_in_the_rig() {
     fly("rig-hover");
 }
