@@ -33,7 +33,7 @@ use nalgebra::{UnitQuaternion, Vector3};
 use rig::Slider;
 use scenes::{Rig, Scene};
 use serde::{Deserialize, Serialize};
-use stepping::{Held, Scratch};
+use stepping::{Changed, Held, Motion, Scratch};
 use world::World;
 
 /// What its snapshots are called.
@@ -62,30 +62,12 @@ const AT_REST_M_S: f64 = 0.01;
 /// assert_eq!((flight.contact().object, flight.contact().crashed), (1, false), "it stands on the ground");
 /// ```
 pub struct Rapier {
-    model: NewtonEuler,
     hull: Hull,
-    rig: Option<Rig>,
-    crash_speed_m_s: f64,
-    /// The least moment of inertia about any axis.
-    inertia_min_kg_m2: f64,
-    world: World,
-    contacts: Contacts,
-    state: State,
-    slider: Option<Slider>,
+    motion: Motion,
     effects: AirframeState,
     reaction: Reaction,
-    held: Held,
-    changed: Changed,
-    scratch: Scratch,
     /// The other vehicles, moved on within a tick.
     others: Vec<Neighbour>,
-}
-
-/// By how much contacts and joints changed the velocities since the tick began.
-#[derive(Debug, Clone, Copy, Default)]
-struct Changed {
-    velocity_W_m_s: Vector3<f64>,
-    spin_W_rad_s: Vector3<f64>,
 }
 
 /// What contacts and joints changed over the last tick, against free flight.
@@ -113,49 +95,46 @@ impl Rapier {
         let hull = Hull::of(model.airframe());
         // The mount is on the frame, and where it is seen from may have moved.
         let mount_shift_B_m = model.airframe().frame_shift_B_m();
-        let rig = scene.rig.map(|rig| Rig { mount_B_m: rig.mount_B_m + mount_shift_B_m, ..rig });
-        let mut rapier = Self {
-            hull,
-            rig,
+        let motion = Motion {
+            rig: scene.rig.map(|rig| Rig { mount_B_m: rig.mount_B_m + mount_shift_B_m, ..rig }),
             crash_speed_m_s,
             inertia_min_kg_m2: vehicle.inertia_kg_m2.symmetric_eigenvalues().min(),
             world: World::new(&hull, scene),
             contacts: Contacts::new(1 + scene.thing_count() + TRAFFIC_MAX),
             state: model.start(*body, 0.0),
             slider: None,
-            effects,
-            reaction: Reaction::default(),
             held: Held::default(),
             changed: Changed::default(),
             scratch: Scratch::default(),
-            others: Vec::with_capacity(TRAFFIC_MAX),
             model,
         };
+        let others = Vec::with_capacity(TRAFFIC_MAX);
+        let mut rapier = Self { hull, motion, effects, reaction: Reaction::default(), others };
         rapier.set_body(body);
         rapier
     }
 
     /// The number of the scene's box or mesh that the vehicle is partly inside of, if any.
     pub(crate) fn thing_around(&self) -> Option<usize> {
-        self.world.thing_around(&self.state.body)
+        self.motion.world.thing_around(&self.motion.state.body)
     }
 
     /// Has the vehicle stand on its feet where it is too low to fly.
     fn put_down(&mut self) {
         let stands = self.stands();
-        let height_m = &mut self.state.body.position_W_m.z;
+        let height_m = &mut self.motion.state.body.position_W_m.z;
         if stands {
             *height_m = height_m.max(self.hull.stand_m());
         }
-        self.contacts.place(stands.then_some(world::GROUND), world::FEET);
+        self.motion.contacts.place(stands.then_some(world::GROUND), world::FEET);
     }
 
     /// Before anything has moved, what carries a vehicle at rest is what takes its free acceleration away: so its
     /// accelerometer feels g from the first tick on.
     fn lean_on_support(&mut self) {
-        let free = self.model.accelerations_under(&self.effects.actuation, &self.state);
-        let body = &self.state.body;
-        let gravity_W_m_s2 = Vector3::z() * self.model.vehicle().gravity_m_s2;
+        let free = self.motion.model.accelerations_under(&self.effects.actuation, &self.motion.state);
+        let body = &self.motion.state.body;
+        let gravity_W_m_s2 = Vector3::z() * self.motion.model.vehicle().gravity_m_s2;
         let free_W_m_s2 = body.attitude_WB * free.specific_force_B_m_s2 - gravity_W_m_s2;
         let is_at_rest = body.velocity_W_m_s.norm() < AT_REST_M_S;
         self.reaction = Reaction::default();
@@ -166,37 +145,37 @@ impl Rapier {
 
     /// Whether ground or rig keep the vehicle from accelerating freely.
     fn is_carried(&self, free_W_m_s2: &Vector3<f64>) -> bool {
-        let vehicle = self.model.vehicle();
-        match &self.rig {
+        let vehicle = self.motion.model.vehicle();
+        match &self.motion.rig {
             Some(rig) => {
                 let lift_N = free_W_m_s2.z * vehicle.mass_kg;
-                rig::holds(rig, &self.state.body, lift_N, vehicle.gravity_m_s2)
+                rig::holds(rig, &self.motion.state.body, lift_N, vehicle.gravity_m_s2)
             }
             None => self.stands() && free_W_m_s2.z < 0.0,
         }
     }
 
     fn stands(&self) -> bool {
-        let upright = self.state.body.attitude_WB * Vector3::z();
-        self.state.body.position_W_m.z < self.hull.stand_m() + ON_THE_GROUND_M && upright.z > 0.999
+        let upright = self.motion.state.body.attitude_WB * Vector3::z();
+        self.motion.state.body.position_W_m.z < self.hull.stand_m() + ON_THE_GROUND_M && upright.z > 0.999
     }
 
     /// Moves the vehicle to hang from the rig's bearing.
     fn hang(&mut self, rig: &Rig) {
-        self.state.body = rig::hung(rig, &self.state.body);
-        self.contacts.place(None, 0);
-        self.slider = Slider::under(rig, &self.state.body);
+        self.motion.state.body = rig::hung(rig, &self.motion.state.body);
+        self.motion.contacts.place(None, 0);
+        self.motion.slider = Slider::under(rig, &self.motion.state.body);
     }
 }
 
 impl Backend for Rapier {
     fn state(&self) -> &State {
-        &self.state
+        &self.motion.state
     }
 
     fn accelerations(&self) -> Accelerations {
-        let free = self.model.accelerations_under(&self.effects.actuation, &self.state);
-        let in_body = |v_W: &Vector3<f64>| self.state.body.attitude_WB.inverse_transform_vector(v_W);
+        let free = self.motion.model.accelerations_under(&self.effects.actuation, &self.motion.state);
+        let in_body = |v_W: &Vector3<f64>| self.motion.state.body.attitude_WB.inverse_transform_vector(v_W);
         let Reaction { acceleration_W_m_s2, angular_acceleration_W_rad_s2, .. } = &self.reaction;
         Accelerations {
             specific_force_B_m_s2: free.specific_force_B_m_s2 + in_body(acceleration_W_m_s2),
@@ -206,65 +185,67 @@ impl Backend for Rapier {
     }
 
     fn step(&mut self, commands: &[f64; 4], dt_s: f64, traffic: &[Neighbour]) {
-        let actuation = self.model.airframe().begin_tick(&mut self.effects, &self.state, commands, dt_s);
-        let span_s = dt_s / f64::from(self.model.substeps());
-        self.contacts.begin_tick();
-        self.changed = Changed::default();
+        let actuation =
+            self.motion.model.airframe().begin_tick(&mut self.effects, &self.motion.state, commands, dt_s);
+        let span_s = dt_s / f64::from(self.motion.model.substeps());
+        self.motion.contacts.begin_tick();
+        self.motion.changed = Changed::default();
         let mut others = std::mem::take(&mut self.others);
         others.clear();
         others.extend_from_slice(traffic);
-        for _ in 0..self.model.substeps() {
-            self.substep(&actuation, span_s, &mut others);
+        for _ in 0..self.motion.model.substeps() {
+            self.motion.substep(&actuation, span_s, &mut others);
         }
         self.others = others;
-        let body = &mut self.state.body;
+        let body = &mut self.motion.state.body;
         body.attitude_WB = UnitQuaternion::new_normalize(body.attitude_WB.into_inner());
-        self.state.rotors = self.model.airframe().settled(&actuation, &self.state.rotors);
+        self.motion.state.rotors =
+            self.motion.model.airframe().settled(&actuation, &self.motion.state.rotors);
         self.reaction = Reaction {
-            acceleration_W_m_s2: self.changed.velocity_W_m_s / dt_s,
-            angular_acceleration_W_rad_s2: self.changed.spin_W_rad_s / dt_s,
-            normal_W_N: self.contacts.normal_impulse_W_N_s / dt_s,
+            acceleration_W_m_s2: self.motion.changed.velocity_W_m_s / dt_s,
+            angular_acceleration_W_rad_s2: self.motion.changed.spin_W_rad_s / dt_s,
+            normal_W_N: self.motion.contacts.normal_impulse_W_N_s / dt_s,
         };
     }
 
     fn settle_rotors(&mut self, commands: &[f64; 4]) {
-        self.state.rotors = commands.map(|command| self.model.steady(command));
+        self.motion.state.rotors = commands.map(|command| self.motion.model.steady(command));
         self.lean_on_support();
     }
 
     fn set_body(&mut self, body: &RigidBody) {
-        self.state.body = *body;
-        match self.rig {
+        self.motion.state.body = *body;
+        match self.motion.rig {
             Some(rig) => self.hang(&rig),
             None => self.put_down(),
         }
-        self.held = Held::default();
+        self.motion.held = Held::default();
         self.lean_on_support();
     }
 
     fn contact(&self) -> ContactReport {
         // All that free flight does not explain is the contacts' doing; in a rig, where the bearing pushes too, it is what
         // they push along their normals, friction left out.
-        self.contacts.report(&match self.rig {
+        self.motion.contacts.report(&match self.motion.rig {
             Some(_) => self.reaction.normal_W_N,
-            None => self.reaction.acceleration_W_m_s2 * self.model.vehicle().mass_kg,
+            None => self.reaction.acceleration_W_m_s2 * self.motion.model.vehicle().mass_kg,
         })
     }
 
     fn battery(&self) -> Option<Battery> {
-        self.model.airframe().battery(&self.effects, &self.state)
+        self.motion.model.airframe().battery(&self.effects, &self.motion.state)
     }
 
     fn snapshot(&self) -> Result<Vec<u8>, SnapshotError> {
         Snapshot::of(NAME)
-            .with("state", &self.state)?
+            .with("state", &self.motion.state)?
             .with("effects", &self.effects)?
             .with("reaction", &self.reaction)?
-            .with("rig", &self.rig.map(|rig| (rig.bearing_W_m, rig.mount_B_m)))?
-            .with("slider", &self.slider)?
-            .with("held", &self.held)?
-            .with("contacts", &self.contacts)?
-            .with("world", &self.world.numbers())?
+            .with("rig", &self.motion.rig.map(|rig| (rig.bearing_W_m, rig.mount_B_m)))?
+            .with("slider", &self.motion.slider)?
+            .with("held", &self.motion.held)?
+            .with("contacts", &self.motion.contacts)?
+            .with("world", &self.motion.world.numbers())?
             .bytes()
     }
 
@@ -272,18 +253,14 @@ impl Backend for Rapier {
         let snapshot = Snapshot::read(snapshot, NAME)?;
         let (state, reaction) = (snapshot.get("state")?, snapshot.get("reaction")?);
         let effects = snapshot.fitting("effects", |effects| self.effects.fits(effects))?;
-        let rig = self.rig.map(|rig| (rig.bearing_W_m, rig.mount_B_m));
+        let rig = self.motion.rig.map(|rig| (rig.bearing_W_m, rig.mount_B_m));
         snapshot.fitting("rig", |found: &Option<(Vector3<f64>, Vector3<f64>)>| *found == rig)?;
         let slider = snapshot
-            .fitting("slider", |slider: &Option<Slider>| slider.is_some() == self.slider.is_some())?;
+            .fitting("slider", |slider: &Option<Slider>| slider.is_some() == self.motion.slider.is_some())?;
         let (held, contacts) = (snapshot.get("held")?, snapshot.get("contacts")?);
-        snapshot.fitting("world", |numbers: &Vec<f64>| *numbers == self.world.numbers())?;
-        (self.state, self.effects, self.reaction) = (state, effects, reaction);
-        (self.slider, self.held, self.contacts) = (slider, held, contacts);
+        snapshot.fitting("world", |numbers: &Vec<f64>| *numbers == self.motion.world.numbers())?;
+        (self.motion.state, self.effects, self.reaction) = (state, effects, reaction);
+        (self.motion.slider, self.motion.held, self.motion.contacts) = (slider, held, contacts);
         Ok(())
     }
-}
-
-fn spin_W_rad_s(body: &RigidBody) -> Vector3<f64> {
-    body.attitude_WB * body.angular_velocity_B_rad_s
 }

@@ -54,6 +54,11 @@ impl RigidBody {
         }
     }
 
+    /// The angular velocity, written in W.
+    pub(crate) fn angular_velocity_W_rad_s(&self) -> Vector3<f64> {
+        self.attitude_WB * self.angular_velocity_B_rad_s
+    }
+
     /// Whether pose and motion are numbers.
     pub fn is_finite(&self) -> bool {
         let vectors = [&self.position_W_m, &self.velocity_W_m_s, &self.angular_velocity_B_rad_s];

@@ -4,7 +4,8 @@
 use crate::mesh::{Mesh, Solidity};
 use crate::mesh_file::Format;
 use crate::rig::{self, PLACE};
-use crate::scene::{Cuboid, Scene, Surface};
+use crate::scene::{Cuboid, Scene};
+use crate::surface::Surface;
 use diagnostics::parameter::Bounds;
 use diagnostics::unit::{ANGLE, LENGTH, RATIO};
 use diagnostics::{Diagnostic, Faults};

@@ -7,6 +7,7 @@
 //! | [`scene`] | the immutable [`Scene`] that plants and range finders use |
 //! | [`mesh`] | things of any shape: triangles |
 //! | [`ray`] | the distance from a point along a direction to what is met first |
+//! | [`surface`] | friction and restitution |
 //! | [`rig`] | the test rigs that a vehicle hangs from |
 //! | [`mod@reference`] | the scene files of this crate, as text |
 //! | `file` | which keys a scene file has |
@@ -26,8 +27,10 @@ pub mod ray;
 pub mod reference;
 pub mod rig;
 pub mod scene;
+pub mod surface;
 
 pub use mesh::{Mesh, Solidity};
 pub use ray::RayCaster;
 pub use rig::Rig;
-pub use scene::{Cuboid, Scene, Surface};
+pub use scene::{Cuboid, Scene};
+pub use surface::Surface;

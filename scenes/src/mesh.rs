@@ -1,7 +1,7 @@
 //! Things of any shape: triangles in the world, as what a ray meets and a vehicle touches.
 #![allow(non_snake_case, reason = "a trailing _W names the frame a vector is written in")]
 
-use crate::scene::Surface;
+use crate::surface::Surface;
 use parry3d_f64::math::Vector;
 use parry3d_f64::shape::{SharedShape, TriMesh, TriMeshFlags};
 use std::collections::BTreeMap;

@@ -3,6 +3,7 @@
 
 use crate::mesh::Mesh;
 use crate::rig::Rig;
+use crate::surface::Surface;
 use nalgebra::Vector3;
 use vehicles::EffectEntry;
 
@@ -21,22 +22,6 @@ pub struct Scene {
     pub rig: Option<Rig>,
     /// How the ground, and all that has no surface of its own, answers to what touches it.
     pub surface: Surface,
-}
-
-/// How something answers to what touches it.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Surface {
-    /// Coulomb's coefficient of friction: the force along the surface is at most this times that across.
-    pub friction: f64,
-    /// Newton's coefficient of restitution: the fraction of the speed of approach that a bounce leaves.
-    pub restitution: f64,
-}
-
-impl Default for Surface {
-    /// That of a scene which does not say: tuned, no source.
-    fn default() -> Self {
-        Self { friction: 0.5, restitution: 0.2 }
-    }
 }
 
 impl Scene {

@@ -6,15 +6,16 @@
 //! impulses of `solver`: they change the free step's velocities, and, as a constant force would, half of that
 //! change times the step is added to its pose.
 
-use super::contacts::Sighting;
+use super::contacts::{Contacts, Sighting};
 use super::rig::{self, Slider};
 use super::solver::{self, Ball, Body, Friction, Limit, Row};
-use super::world::Near;
-use super::{Rapier, spin_W_rad_s};
+use super::world::{Near, World};
 use crate::actuation::Actuation;
 use crate::backend::Neighbour;
+use crate::newton_euler::NewtonEuler;
 use crate::state::{RigidBody, State};
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
+use scenes::Rig;
 use serde::{Deserialize, Serialize};
 
 /// What is nearer than this touches: far below what anybody sees, far above rounding. Tuned, no source.
@@ -86,7 +87,31 @@ impl Free {
     }
 }
 
-impl Rapier {
+/// A vehicle that flies, touches things, or hangs in a rig.
+pub(super) struct Motion {
+    pub model: NewtonEuler,
+    pub rig: Option<Rig>,
+    pub world: World,
+    pub contacts: Contacts,
+    pub state: State,
+    pub slider: Option<Slider>,
+    /// An impact that is faster is a crash.
+    pub crash_speed_m_s: f64,
+    /// The least moment of inertia about any axis.
+    pub inertia_min_kg_m2: f64,
+    pub held: Held,
+    pub changed: Changed,
+    pub scratch: Scratch,
+}
+
+/// By how much contacts and joints changed the velocities since the tick began.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Changed {
+    pub velocity_W_m_s: Vector3<f64>,
+    pub spin_W_rad_s: Vector3<f64>,
+}
+
+impl Motion {
     /// One step of `span_s`; `others` are the other vehicles as they are at its start.
     pub(super) fn substep(&mut self, actuation: &Actuation, span_s: f64, others: &mut [Neighbour]) {
         let mut scratch = std::mem::take(&mut self.scratch);
@@ -140,7 +165,7 @@ impl Rapier {
             state,
             slider: Slider::under(rig, &state.body),
             held_W_m_s: state.body.velocity_W_m_s - unheld.velocity_W_m_s,
-            held_W_rad_s: spin_W_rad_s(&state.body) - spin_W_rad_s(&unheld),
+            held_W_rad_s: state.body.angular_velocity_W_rad_s() - unheld.angular_velocity_W_rad_s(),
         }
     }
 
@@ -191,7 +216,7 @@ impl Rapier {
         let turn_WB = vehicle.attitude_WB.to_rotation_matrix();
         let vehicle = Body {
             velocity_W_m_s: vehicle.velocity_W_m_s,
-            spin_W_rad_s: spin_W_rad_s(vehicle),
+            spin_W_rad_s: vehicle.angular_velocity_W_rad_s(),
             inverse_mass_per_kg: Vector3::repeat(1.0 / self.model.vehicle().mass_kg),
             inverse_inertia_W: turn_WB * self.model.inverse_inertia() * turn_WB.transpose(),
         };
@@ -280,7 +305,7 @@ impl Rapier {
     /// What the rig's friction turns the vehicle with and drives the slider with.
     fn rig_friction(&self, span_s: f64) -> [Vector3<f64>; 2] {
         let Some(rig) = &self.rig else { return [Vector3::zeros(); 2] };
-        let spin_W_rad_s = spin_W_rad_s(&self.state.body);
+        let spin_W_rad_s = self.state.body.angular_velocity_W_rad_s();
         let turn = rig::bearing_friction_W_N_m_s(rig, &spin_W_rad_s, self.inertia_min_kg_m2, span_s);
         let drive = self.slider.map_or(Vector3::zeros(), |slider| slider.friction_W_N_s(rig, span_s));
         [turn, drive]
@@ -328,7 +353,7 @@ impl Rapier {
         let mut body = free.state.body;
         let solved = &bodies[VEHICLE];
         let change_W_m_s = solved.velocity_W_m_s - body.velocity_W_m_s;
-        let change_W_rad_s = solved.spin_W_rad_s - spin_W_rad_s(&body);
+        let change_W_rad_s = solved.spin_W_rad_s - body.angular_velocity_W_rad_s();
         body.velocity_W_m_s = solved.velocity_W_m_s;
         shift(&mut body, &(change_W_m_s * (span_s / 2.0)), &(change_W_rad_s * (span_s / 2.0)));
         body.angular_velocity_B_rad_s = body.attitude_WB.inverse_transform_vector(&solved.spin_W_rad_s);
