@@ -1,5 +1,5 @@
 //! Flies the cases that docs/world.md compares with closed forms, MuJoCo and RotorPy, and prints them as one line of
-//! JSON: the vehicle, and for each case its states at every tenth tick. `scripts/world` reads it.
+//! JSON: the vehicle, and for each case its states at every tick. `scripts/world` reads it.
 //!
 //! A state is the time, position, velocity (world, m and m/s), attitude (quaternion, w first), angular velocity (body,
 //! rad/s), and the rotors' speeds and accelerations (rad/s, rad/s^2).
@@ -14,7 +14,7 @@ use vehicles::{MotorModel, Vehicle};
 
 const TICK_S: f64 = 1e-3;
 const HOVER_RAD_S: f64 = 411.6;
-/// What rotor speeds swing by in chirps: up to about 30 and about 100 degrees of tilt.
+/// What rotor speeds swing by in chirps: up to 66 and 178 degrees of tilt.
 const GENTLE_RAD_S: f64 = 15.0;
 const HARD_RAD_S: f64 = 250.0;
 

@@ -30,7 +30,6 @@ use crate::state::{RigidBody, State};
 use contacts::Contacts;
 use hull::Hull;
 use nalgebra::{UnitQuaternion, Vector3};
-use rig::Slider;
 use scenes::{Rig, Scene};
 use serde::{Deserialize, Serialize};
 use stepping::{Changed, Held, Motion, Scratch};
@@ -102,10 +101,9 @@ impl Rapier {
             world: World::new(&hull, scene),
             contacts: Contacts::new(1 + scene.thing_count() + TRAFFIC_MAX),
             state: model.start(*body, 0.0),
-            slider: None,
             held: Held::default(),
             changed: Changed::default(),
-            scratch: Scratch::default(),
+            scratch: Scratch::new(),
             model,
         };
         let others = Vec::with_capacity(TRAFFIC_MAX);
@@ -164,7 +162,6 @@ impl Rapier {
     fn hang(&mut self, rig: &Rig) {
         self.motion.state.body = rig::hung(rig, &self.motion.state.body);
         self.motion.contacts.place(None, 0);
-        self.motion.slider = Slider::under(rig, &self.motion.state.body);
     }
 }
 
@@ -219,7 +216,7 @@ impl Backend for Rapier {
             Some(rig) => self.hang(&rig),
             None => self.put_down(),
         }
-        self.motion.held = Held::default();
+        self.motion.held.clear();
         self.lean_on_support();
     }
 
@@ -241,8 +238,7 @@ impl Backend for Rapier {
             .with("state", &self.motion.state)?
             .with("effects", &self.effects)?
             .with("reaction", &self.reaction)?
-            .with("rig", &self.motion.rig.map(|rig| (rig.bearing_W_m, rig.mount_B_m)))?
-            .with("slider", &self.motion.slider)?
+            .with("rig", &self.motion.rig.as_ref().map(rig::numbers))?
             .with("held", &self.motion.held)?
             .with("contacts", &self.motion.contacts)?
             .with("world", &self.motion.world.numbers())?
@@ -253,14 +249,12 @@ impl Backend for Rapier {
         let snapshot = Snapshot::read(snapshot, NAME)?;
         let (state, reaction) = (snapshot.get("state")?, snapshot.get("reaction")?);
         let effects = snapshot.fitting("effects", |effects| self.effects.fits(effects))?;
-        let rig = self.motion.rig.map(|rig| (rig.bearing_W_m, rig.mount_B_m));
-        snapshot.fitting("rig", |found: &Option<(Vector3<f64>, Vector3<f64>)>| *found == rig)?;
-        let slider = snapshot
-            .fitting("slider", |slider: &Option<Slider>| slider.is_some() == self.motion.slider.is_some())?;
+        let rig = self.motion.rig.as_ref().map(rig::numbers);
+        snapshot.fitting("rig", |found: &Option<Vec<f64>>| *found == rig)?;
         let (held, contacts) = (snapshot.get("held")?, snapshot.get("contacts")?);
         snapshot.fitting("world", |numbers: &Vec<f64>| *numbers == self.motion.world.numbers())?;
         (self.motion.state, self.effects, self.reaction) = (state, effects, reaction);
-        (self.motion.slider, self.motion.held, self.motion.contacts) = (slider, held, contacts);
+        (self.motion.held, self.motion.contacts) = (held, contacts);
         Ok(())
     }
 }

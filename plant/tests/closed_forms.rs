@@ -142,7 +142,8 @@ fn down(slope_rad: f64, friction: f64) -> (f64, f64) {
     let start = RigidBody { attitude_WB, ..RigidBody::level_at(start_W_m) };
     let mut plant = plant(&slope(slope_rad, friction), &start);
     let body = (0..2_000).map(|_| tick(&mut plant)).last().unwrap();
-    assert!(body.attitude_WB.angle_to(&attitude_WB) < 1e-6, "it stays along the slope");
+    let turned_rad = body.attitude_WB.angle_to(&attitude_WB);
+    assert!(turned_rad < 1e-6, "{slope_rad}: it stays along the slope: {turned_rad}");
     let along = attitude_WB * Vector3::x();
     ((body.position_W_m - start_W_m).dot(&along), body.velocity_W_m_s.dot(&along))
 }

@@ -145,6 +145,25 @@ fn a_fall_is_met_at_its_speed_counted_once_and_a_crash_above_the_limit() {
     }
 }
 
+/// A bounce may begin and end between two ticks, a millimetre away from the ground again at the end.
+#[test]
+fn an_impact_is_told_also_where_it_is_over_within_a_tick() {
+    let surface = scenes::Surface { friction: 0.5, restitution: 0.9 };
+    let ground = Scene { surface, ..Scene::default() };
+    for height_um in 0..40 {
+        let start = RigidBody {
+            velocity_W_m_s: -Vector3::z() * 6.0,
+            ..RigidBody::level_at(Vector3::z() * (stand_m() + 0.02 + 3e-4 * f64::from(height_um)))
+        };
+        let mut plant = common::rapier(NewtonEuler::new(hummingbird(), 2), &ground, &start, CRASH_SPEED_M_S);
+        let reports = fly(&mut plant, &IDLE, 20);
+        let began = reports.iter().find(|report| report.began > 0).expect("it meets the ground");
+        assert_eq!((began.object, began.count), (1, 1), "{began:?}");
+        assert!(began.force_W_N.z > 1_000.0 && (began.impact_speed_m_s - 6.0).abs() < 0.1, "{began:?}");
+        assert_eq!(reports.last().map(|report| (report.count, report.began)), Some((0, 1)), "it is gone");
+    }
+}
+
 #[test]
 fn lift_off_ends_the_contact_and_leaves_none_counted() {
     let mut plant = plant(&Scene::default(), &RigidBody::level_at(Vector3::zeros()));

@@ -19,7 +19,7 @@ const SIZE: Bounds = Bounds {
     min: 1e-4,
     max: 1e6,
     unit: "m",
-    why: "three lengths above 0: contacts are resolved to 0.1 mm, and beyond 1000 km the ground is not flat",
+    why: "three lengths above 0: nothing that a vehicle meets is thinner, and beyond 1000 km the ground is not flat",
 };
 
 /// Ten turns.
@@ -170,10 +170,10 @@ fn surface(section: &Section, otherwise: &Surface) -> Result<Surface, Diagnostic
     let number = |name, bounds, otherwise| {
         if section.has(name) { section.bounded(name, RATIO, bounds) } else { Ok(otherwise) }
     };
-    Ok(Surface {
-        friction: number("friction", &FRICTION, otherwise.friction)?,
-        restitution: number("restitution", &RESTITUTION, otherwise.restitution)?,
-    })
+    // Both are read before either is refused: one that was not read would be told as unknown.
+    let friction = number("friction", &FRICTION, otherwise.friction);
+    let restitution = number("restitution", &RESTITUTION, otherwise.restitution);
+    Ok(Surface { friction: friction?, restitution: restitution? })
 }
 
 fn one_box(section: &Section, surface_around: &Surface) -> Result<Cuboid, Diagnostic> {

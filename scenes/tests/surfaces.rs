@@ -35,6 +35,9 @@ fn what_no_surface_has_is_refused_with_its_key() {
             assert!(error.contains(key) && error.contains(&value.to_string()), "{error}");
         }
     }
+    let both = ratio("friction", -0.1) + &ratio("restitution", 0.3);
+    let error = scene(&both, "").unwrap_err().to_string();
+    assert!(!error.contains("restitution"), "what is right is not told: {error}");
     let error = scene("friction = 0.5\n", "").unwrap_err().to_string();
     assert!(error.contains("friction"), "a number without unit and source: {error}");
 }

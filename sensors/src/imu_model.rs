@@ -41,9 +41,9 @@ parameters! {
         /// The gyroscope reads no more than this on any axis, rad/s.
         gyroscope_range_rad_s: f64 = 1000.0_f64.to_radians() => positive,
         /// Where the part sits, seen from the centre of mass, body axes, m.
-        position_m: [f64; 3] = [0.0; 3] => finite,
+        position_m: [f64; 3] = [0.0; 3] => within(-10.0..=10.0, "-10 to 10 m"),
         /// How the part is turned against the body, as a rotation vector, degrees.
-        misalignment_deg: [f64; 3] = [0.0; 3] => finite,
+        misalignment_deg: [f64; 3] = [0.0; 3] => within(-180.0..=180.0, "-180 to 180 deg"),
         /// Errors of the accelerometer's scale, of each axis.
         accelerometer_scale_error: [f64; 3] = [0.0; 3] => within(-0.5..=0.5, "-0.5 to 0.5"),
         /// What the accelerometer's axes read of what is along others: x of y, x of z, y of x, y of z, z of x, z of y.
@@ -53,9 +53,9 @@ parameters! {
         /// The accelerometer reads whole multiples of this, m/s²; 0 where it resolves all.
         accelerometer_resolution_m_s2: f64 = 0.0 => not_negative,
         /// How the accelerometer's bias drifts with temperature, of each axis, m/s²/K.
-        accelerometer_bias_drift_m_s2_k: [f64; 3] = [0.0; 3] => finite,
+        accelerometer_bias_drift_m_s2_k: [f64; 3] = [0.0; 3] => within(-1.0..=1.0, "-1 to 1 m/s^2/K"),
         /// How far the unbalance of a rotor shakes the part, m.
-        accelerometer_vibration_m: f64 = 0.0 => not_negative,
+        accelerometer_vibration_m: f64 = 0.0 => within(0.0..=1e-3, "0 to 1e-3 m"),
         /// Errors of the gyroscope's scale, of each axis.
         gyroscope_scale_error: [f64; 3] = [0.0; 3] => within(-0.5..=0.5, "-0.5 to 0.5"),
         /// What the gyroscope's axes read of turns about others, in the order of the accelerometer's.
@@ -65,13 +65,13 @@ parameters! {
         /// The gyroscope reads whole multiples of this, rad/s; 0 where it resolves all.
         gyroscope_resolution_rad_s: f64 = 0.0 => not_negative,
         /// How the gyroscope's bias drifts with temperature, of each axis, rad/s/K.
-        gyroscope_bias_drift_rad_s_k: [f64; 3] = [0.0; 3] => finite,
+        gyroscope_bias_drift_rad_s_k: [f64; 3] = [0.0; 3] => within(-0.1..=0.1, "-0.1 to 0.1 rad/s/K"),
         /// What the gyroscope's axes read of the specific force along themselves, rad/s per m/s².
-        gyroscope_g_sensitivity_rad_s_m: [f64; 3] = [0.0; 3] => finite,
+        gyroscope_g_sensitivity: [f64; 3] = [0.0; 3] => within(-0.1..=0.1, "-0.1 to 0.1 rad/s per m/s^2"),
         /// By what angle the unbalance of a rotor shakes the part, rad.
-        gyroscope_vibration_rad: f64 = 0.0 => not_negative,
+        gyroscope_vibration_rad: f64 = 0.0 => within(0.0..=0.01, "0 to 0.01 rad"),
         /// How much the part warms up after it is switched on, at tick 0, K.
-        warming_k: f64 = 0.0 => finite,
+        warming_k: f64 = 0.0 => within(-100.0..=100.0, "-100 to 100 K"),
         /// The time constant of its warming up, s.
         warming_time_s: f64 = 300.0 => positive,
         /// How long after it is made a reading arrives, ms.

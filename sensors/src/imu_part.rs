@@ -9,6 +9,9 @@ use crate::steps::in_steps;
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 use std::f64::consts::TAU;
 
+/// Where the rotors stand at the first reading: a golden angle apart, so that no two shake alike.
+const START_ANGLES_RAD: [f64; 4] = [0.0, 2.4, 4.8, 0.917];
+
 /// The part at one sample rate.
 ///
 /// ```
@@ -121,17 +124,22 @@ impl ImuPart {
         ImuReading { specific_force_B_m_s2: motion.specific_force_B_m_s2 + more_B_m_s2, ..*motion }
     }
 
-    /// Each rotor's unbalance shakes the part in a circle in the plane of the rotors, once a turn, and its two blades
+    /// Rotors turn in turns one way and the other. Each rotor's unbalance shakes the part in a circle in the plane of the rotors, once a turn, and its two blades
     /// along the axis, twice: with an amplitude d the acceleration is d Ω², and of an angle φ the rate φ Ω.
     fn shaken(&self, state: &mut ImuPartState, truth: &ImuMotion, motion: &ImuReading) -> ImuReading {
         let mut shaken = *motion;
-        for (angle_rad, speed_rad_s) in state.rotor_angles_rad.iter_mut().zip(truth.rotor_speeds_rad_s) {
+        if state.readings == 0 {
+            state.rotor_angles_rad = START_ANGLES_RAD;
+        }
+        let senses = [1.0, -1.0, 1.0, -1.0];
+        let rotors = state.rotor_angles_rad.iter_mut().zip(truth.rotor_speeds_rad_s).zip(senses);
+        for ((angle_rad, speed_rad_s), sense) in rotors {
             if state.readings > 0 {
                 let turned = (*angle_rad + speed_rad_s * self.period_s) / TAU;
                 *angle_rad = (turned - turned.floor()) * TAU;
             }
             let (sine, cosine) = libm::sincos(*angle_rad);
-            let along = Vector3::new(cosine, sine, cosine * cosine - sine * sine);
+            let along = Vector3::new(cosine, sense * sine, cosine * cosine - sine * sine);
             shaken.specific_force_B_m_s2 +=
                 along * (self.params.accelerometer_vibration_m * speed_rad_s * speed_rad_s);
             shaken.angular_velocity_B_rad_s += along * (self.params.gyroscope_vibration_rad * speed_rad_s);
@@ -144,7 +152,7 @@ impl ImuPart {
         let warmed_k = params.warming_k * -libm::expm1(-time_s / params.warming_time_s);
         let drift = |per_k: [f64; 3]| Vector3::from(per_k) * warmed_k;
         let force = self.force_axes * felt.specific_force_B_m_s2;
-        let pulled = Vector3::from(params.gyroscope_g_sensitivity_rad_s_m).component_mul(&force);
+        let pulled = Vector3::from(params.gyroscope_g_sensitivity).component_mul(&force);
         ImuReading {
             specific_force_B_m_s2: force + drift(params.accelerometer_bias_drift_m_s2_k),
             angular_velocity_B_rad_s: self.rate_axes * felt.angular_velocity_B_rad_s
@@ -153,18 +161,22 @@ impl ImuPart {
         }
     }
 
-    /// A reading in whole steps of the part's resolution.
+    /// A reading in whole steps of the part's resolution, within its range.
     #[must_use]
     pub fn in_steps(&self, reading: &ImuReading) -> ImuReading {
-        let rounded = |vector: Vector3<f64>, step: f64| vector.map(|axis| in_steps(axis, step));
+        let rounded = |vector: Vector3<f64>, step: f64, range: f64| {
+            vector.map(|axis| in_steps(axis, step).clamp(-range, range))
+        };
         ImuReading {
             specific_force_B_m_s2: rounded(
                 reading.specific_force_B_m_s2,
                 self.params.accelerometer_resolution_m_s2,
+                self.params.accelerometer_range_m_s2,
             ),
             angular_velocity_B_rad_s: rounded(
                 reading.angular_velocity_B_rad_s,
                 self.params.gyroscope_resolution_rad_s,
+                self.params.gyroscope_range_rad_s,
             ),
         }
     }
@@ -294,7 +306,7 @@ mod tests {
     #[test]
     fn acceleration_and_warmth_move_the_biases() {
         let params = ImuParams {
-            gyroscope_g_sensitivity_rad_s_m: [0.0, 0.0, 1e-3],
+            gyroscope_g_sensitivity: [0.0, 0.0, 1e-3],
             gyroscope_bias_drift_rad_s_k: [2e-3, 0.0, 0.0],
             accelerometer_bias_drift_m_s2_k: [0.0, 1e-2, 0.0],
             warming_k: 10.0,
@@ -316,6 +328,9 @@ mod tests {
             gyroscope_resolution_rad_s: 0.125,
             ..ImuParams::default()
         };
+        let small = ImuParams { accelerometer_range_m_s2: 9.6, ..params };
+        let reading = part(small).in_steps(&moving().motion);
+        assert_eq!(reading.specific_force_B_m_s2.z, 9.6, "no more than its range");
         let reading = part(params).in_steps(&moving().motion);
         assert_eq!(reading.specific_force_B_m_s2, Vector3::new(0.25, -0.25, 9.75));
         assert_eq!(reading.angular_velocity_B_rad_s, Vector3::new(0.125, -0.75, 0.0));

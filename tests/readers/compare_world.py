@@ -1,4 +1,4 @@
-"""Holds the motions that plant/examples/world_cases.rs flew against closed forms, MuJoCo, RotorPy and SciPy's DOP853.
+"""Holds the motions that examples/world_cases.rs flew against closed forms, MuJoCo, RotorPy and SciPy's DOP853.
 
     compare_world.py CASES.json          what MuJoCo and closed forms say
     compare_world.py CASES.json --all    DOP853 and RotorPy too, a minute more
@@ -259,7 +259,6 @@ def compare_rigs(told, cases):
             their_back = max(their_back, data.qpos[0])
     row("rig A, lower end met at 1.98 m/s: thrown back up", "m", back, closed=(0.0, 1e-6), mujoco=(their_back, 1e-4))
 
-    states = np.array(cases["rig B, cone"])
     for name, limit in (("rig B, cone", 0.01), ("rig B, swing", 2e-5)):
         states = np.array(cases[name])
         step_s = 2e-5 if name == "rig B, cone" else STEP_S

@@ -36,6 +36,8 @@ struct Touch {
     parts_seen: u32,
     /// Whether the last step still saw it.
     seen: bool,
+    /// Whether something of it was met since the tick began: so that what is met and left within a tick is told.
+    met: bool,
 }
 
 impl Touch {
@@ -72,13 +74,28 @@ impl Contacts {
     pub(super) fn begin_tick(&mut self) {
         self.normal_impulse_W_N_s = Vector3::zeros();
         self.is_impact_new = false;
+        self.touches.retain(|touch| touch.seen);
+        self.touches.iter_mut().for_each(|touch| touch.met = false);
+        self.forget_impact();
+    }
+
+    fn forget_impact(&mut self) {
+        if self.touches.is_empty() {
+            self.impact_speed_m_s = 0.0;
+        }
     }
 
     /// Starts anew with `parts` of the vehicle at rest on `object`, or free. What it stands on at first did not
     /// begin.
     pub(super) fn place(&mut self, object: Option<u32>, parts: u32) {
         self.touches.clear();
-        self.touches.extend(object.map(|object| Touch { object, parts, parts_seen: parts, seen: true }));
+        self.touches.extend(object.map(|object| Touch {
+            object,
+            parts,
+            parts_seen: parts,
+            seen: true,
+            met: false,
+        }));
         self.impact_speed_m_s = 0.0;
     }
 
@@ -104,10 +121,8 @@ impl Contacts {
             }
         }
         self.touches.iter_mut().for_each(|touch| touch.parts = touch.parts_seen);
-        self.touches.retain(|touch| touch.seen);
-        if self.touches.is_empty() {
-            self.impact_speed_m_s = 0.0;
-        }
+        self.touches.retain(|touch| touch.seen || touch.met);
+        self.forget_impact();
     }
 
     /// Notes what pushes a part of the vehicle, unless that part touched it before.
@@ -118,7 +133,8 @@ impl Contacts {
         }
         if touching.is_none() {
             self.began += 1;
-            self.touches.push(Touch { object: sighting.near.object, parts: 0, parts_seen: 0, seen: true });
+            let object = sighting.near.object;
+            self.touches.push(Touch { object, parts: 0, parts_seen: 0, seen: true, met: true });
         }
         let fastest_m_s = if self.is_impact_new { self.impact_speed_m_s } else { 0.0 };
         (self.impact_speed_m_s, self.is_impact_new) = (speed_m_s.max(fastest_m_s), true);

@@ -2,60 +2,24 @@
 //!
 //! The slider only moves up and down, and sideways where the rig sways: level within a square, as the lower end of a
 //! long tube does for small angles, with no friction and nothing that leads it back. What hangs with the bearing is
-//! lumped in its centre, so that the slider is a point with a mass. A ball joint ties the vehicle's mount to it and
-//! leaves all three rotations free; where the rig neither heaves nor sways, to a point of the world.
+//! lumped in its centre. A ball joint ties the vehicle's mount to it and leaves all three rotations free. So the slider
+//! has no state of its own: it is where the mount is, and its mass is one that the mount carries along the axes that
+//! are free, and that holds it along the others.
 //!
 //! The tilt limit is a cone, as of a rod end, and the same at any yaw: a limit on Euler angles would not be. All
 //! stops are inelastic: a rope, a rod end's collar, a tube in a tube.
 
-use super::solver::{Ball, Body, Limit, Row};
+use super::solver::{Body, Row, Unilateral, join, part};
 use crate::newton_euler::NewtonEuler;
 use crate::state::{Rates, RigidBody, State};
-use nalgebra::{Matrix3, UnitQuaternion, Vector3};
+use nalgebra::{Matrix3, Matrix3x6, Matrix6, UnitQuaternion, Vector3, Vector6};
 use scenes::Rig;
-use serde::{Deserialize, Serialize};
 
 /// A bearing that starts lower than this above the lower end of its travel is there: tuned, no source.
 const LOWER_END_M: f64 = 1e-6;
 
-/// What carries the bearing: where the bearing's centre is and how it moves.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub(super) struct Slider {
-    pub position_W_m: Vector3<f64>,
-    pub velocity_W_m_s: Vector3<f64>,
-}
-
-impl Slider {
-    /// The slider of `rig` with this vehicle on it; none where nothing slides.
-    pub(super) fn under(rig: &Rig, vehicle: &RigidBody) -> Option<Self> {
-        let arm_W_m = vehicle.attitude_WB * rig.mount_B_m;
-        let spin_W_rad_s = vehicle.attitude_WB * vehicle.angular_velocity_B_rad_s;
-        let velocity_W_m_s = vehicle.velocity_W_m_s + spin_W_rad_s.cross(&arm_W_m);
-        let is_free = freedom(rig);
-        let off_W_m = vehicle.position_W_m + arm_W_m - rig.bearing_W_m;
-        (is_free.amax() > 0.0).then(|| Self {
-            position_W_m: rig.bearing_W_m + off_W_m.component_mul(&is_free),
-            velocity_W_m_s: velocity_W_m_s.component_mul(&is_free),
-        })
-    }
-
-    /// As the solver sees it.
-    pub(super) fn body(&self, rig: &Rig) -> Body {
-        Body {
-            velocity_W_m_s: self.velocity_W_m_s,
-            inverse_mass_per_kg: freedom(rig) / rig.moving_mass_kg,
-            ..Body::default()
-        }
-    }
-
-    /// The impulse of its friction over a step of `span_s`, which at most stops it.
-    pub(super) fn friction_W_N_s(&self, rig: &Rig, span_s: f64) -> Vector3<f64> {
-        let speed_m_s = self.velocity_W_m_s.z;
-        let dry_and_viscous_N = rig.slide_friction_N + rig.slide_damping_N_s_m * speed_m_s.abs();
-        let stopping_N_s = rig.moving_mass_kg * speed_m_s.abs();
-        Vector3::z() * (-speed_m_s.signum() * (dry_and_viscous_N * span_s).min(stopping_N_s))
-    }
-}
+/// Where the gap to the cone is measured: at a lever of this length, so that it is one in metres. Tuned, no source.
+const LEVER_M: f64 = 0.1;
 
 /// For each axis of the world 1 where the slider moves along it, and 0 where it is held.
 fn freedom(rig: &Rig) -> Vector3<f64> {
@@ -98,50 +62,126 @@ pub(super) fn hold(rig: &Rig, model: &NewtonEuler, state: &State, rates: Rates) 
     }
 }
 
-/// The ball joint between `bodies`: what carries the bearing, and the vehicle.
-pub(super) fn bearing(all: &[Body], bodies: [usize; 2], rig: &Rig, vehicle: &RigidBody) -> Ball {
-    Ball::new(all, bodies, [Vector3::zeros(), vehicle.attitude_WB * rig.mount_B_m])
+/// The vehicle in the rig at one attitude, as impulses see it.
+pub(super) struct Mounted<'a> {
+    rig: &'a Rig,
+    /// Takes the vehicle's twist to the velocity of its mount.
+    mount: Matrix3x6<f64>,
+    /// The mobility of the vehicle alone.
+    free: Matrix6<f64>,
 }
 
-/// How far the vehicle's mount is from the bearing's centre, at `bearing_W_m`.
-pub(super) fn off_W_m(rig: &Rig, vehicle: &RigidBody, bearing_W_m: &Vector3<f64>) -> Vector3<f64> {
-    vehicle.position_W_m + vehicle.attitude_WB * rig.mount_B_m - bearing_W_m
-}
+impl<'a> Mounted<'a> {
+    /// `vehicle` in `rig`, with the mobility that it has in free flight.
+    pub(super) fn new(rig: &'a Rig, vehicle: &RigidBody, free: Matrix6<f64>) -> Self {
+        let arm_W_m = vehicle.attitude_WB * rig.mount_B_m;
+        let mut mount = Matrix3x6::zeros();
+        mount.fixed_columns_mut::<3>(0).copy_from(&Matrix3::identity());
+        mount.fixed_columns_mut::<3>(3).copy_from(&-arm_W_m.cross_matrix());
+        Self { rig, mount, free }
+    }
 
-/// The rig's stops, after what `limits` holds: ends of the heave and the sway of `slider`, and the cone that `vehicle`
-/// tilts in. Each is given with its number among `all`.
-pub(super) fn stops(
-    all: &[Body],
-    rig: &Rig,
-    slider: Option<(usize, &Slider)>,
-    vehicle: (usize, &RigidBody),
-    limits: &mut Vec<Limit>,
-) {
-    if let Some((number, slider)) = slider {
-        let off_W_m = slider.position_W_m - rig.bearing_W_m;
+    /// The mobility in the rig: what the slider's mass and its guides leave of that in free flight (the
+    /// Sherman-Morrison-Woodbury formula, with the inverse mass that the slider adds along each axis: 0 where it is held).
+    pub(super) fn mobility(&self) -> Matrix6<f64> {
+        let added = Matrix3::from_diagonal(&(freedom(self.rig) / self.rig.moving_mass_kg));
+        let answer = self.free * self.mount.transpose();
+        let inverse = (self.mount * answer + added).try_inverse().unwrap_or_else(Matrix3::zeros);
+        self.free - answer * inverse * answer.transpose()
+    }
+
+    /// The twist, or the shift, that takes `off_W`, of the mount, away along the axes along which the slider is held.
+    pub(super) fn back(&self, off_W: &Vector3<f64>) -> Vector6<f64> {
+        let freedom = freedom(self.rig);
+        let answer = self.free * self.mount.transpose();
+        let (mut rows, mut off_W) = (self.mount * answer, *off_W);
+        for axis in (0..3).filter(|&axis| freedom[axis] > 0.0) {
+            rows.row_mut(axis).fill(0.0);
+            rows.column_mut(axis).fill(0.0);
+            (rows[(axis, axis)], off_W[axis]) = (1.0, 0.0);
+        }
+        rows.try_inverse().map_or(Vector6::zeros(), |inverse| answer * (inverse * -off_W))
+    }
+
+    /// The velocity of the mount, m/s.
+    pub(super) fn mount_W_m_s(&self, twist: &Vector6<f64>) -> Vector3<f64> {
+        self.mount * twist
+    }
+
+    /// The kinetic energy of the slider, J, with the vehicle's twist; twice the mixed one of two twists where they differ.
+    pub(super) fn slider_energy_J(&self, one: &Vector6<f64>, other: &Vector6<f64>) -> f64 {
+        let free = freedom(self.rig);
+        0.5 * self.rig.moving_mass_kg * (self.mount * one).component_mul(&free).dot(&(self.mount * other))
+    }
+
+    /// The rig's stops, after what `constraints` holds: ends of the heave and the sway, and the cone that `vehicle`, with
+    /// the number `body` among `all`, tilts in.
+    pub(super) fn stops(
+        &self,
+        all: &[Body],
+        body: usize,
+        vehicle: &RigidBody,
+        constraints: &mut Vec<Unilateral>,
+    ) {
+        let rig = self.rig;
+        let off_W_m = off_W_m(rig, vehicle);
         let aside = |axis| (axis, -rig.sway_m, rig.sway_m);
         let ways = [(Vector3::z(), 0.0, rig.heave_m), aside(Vector3::x()), aside(Vector3::y())];
         for (axis, lower_m, upper_m) in ways.into_iter().filter(|(_, lower_m, upper_m)| upper_m > lower_m) {
             let off_m = off_W_m.dot(&axis);
-            let row = |along| Row::at(all, [0, number], [Vector3::zeros(); 2], along);
-            limits.extend([stop(row(axis), off_m - lower_m), stop(row(-axis), upper_m - off_m)]);
+            let row = |along: Vector3<f64>| Row::on(all, body, self.mount.transpose() * along);
+            constraints.extend([stop(row(axis), off_m - lower_m), stop(row(-axis), upper_m - off_m)]);
+        }
+        let up_W = vehicle.attitude_WB * Vector3::z();
+        let across_W = Vector3::z().cross(&up_W);
+        let tilt_rad = libm::atan2(across_W.norm(), up_W.z);
+        // Level, no direction leads to the cone.
+        if let Some(axis_W) = across_W.try_normalize(1e-9) {
+            let row = Row::on(all, body, join(&Vector3::zeros(), &(axis_W * -LEVER_M)));
+            constraints.push(stop(row, LEVER_M * (rig.tilt_max_rad - tilt_rad)));
         }
     }
-    limits.extend(cone(all, rig, vehicle));
+
+    /// The impulse of the rig's friction over a step of `span_s` on a vehicle with this twist. At most it stops the
+    /// slider's mass and a body of the least moment of inertia, `inertia_kg_m2`: friction never turns a motion round.
+    pub(super) fn friction(&self, twist: &Vector6<f64>, inertia_kg_m2: f64, span_s: f64) -> Vector6<f64> {
+        let rig = self.rig;
+        let speed_m_s = if rig.heave_m > 0.0 { self.mount_W_m_s(twist).z } else { 0.0 };
+        let slide_N_s = against(
+            speed_m_s.abs(),
+            (rig.slide_friction_N, rig.slide_damping_N_s_m),
+            rig.moving_mass_kg,
+            span_s,
+        );
+        let spin_W_rad_s = part(twist)[1];
+        let spin_rad_s = spin_W_rad_s.norm();
+        let bearing = (rig.bearing_friction_N_m, rig.bearing_damping_N_m_s);
+        let turn_N_m_s = against(spin_rad_s, bearing, inertia_kg_m2, span_s);
+        let about_W = spin_W_rad_s.try_normalize(0.0).unwrap_or_default();
+        let slide = self.mount.transpose() * (Vector3::z() * (-slide_N_s * speed_m_s.signum()));
+        slide + join(&Vector3::zeros(), &(about_W * -turn_N_m_s))
+    }
 }
 
-/// The cone; `None` where the vehicle is so level that no direction leads to it.
-fn cone(all: &[Body], rig: &Rig, (number, vehicle): (usize, &RigidBody)) -> Option<Limit> {
-    let up_W = vehicle.attitude_WB * Vector3::z();
-    let across_W = Vector3::z().cross(&up_W);
-    let sine = across_W.norm();
-    let tilt_rad = libm::atan2(sine, up_W.z);
-    let axis_W = across_W.try_normalize(1e-9)?;
-    Some(stop(Row::about(all, [0, number], -axis_W), rig.tilt_max_rad - tilt_rad))
+/// What dry and viscous friction take of a motion over a step; at most all that a body of this inertia has of it.
+fn against(rate: f64, (dry, viscous): (f64, f64), inertia: f64, span_s: f64) -> f64 {
+    ((dry + viscous * rate) * span_s).min(inertia * rate)
 }
 
-fn stop(normal: Row, gap: f64) -> Limit {
-    Limit { normal, gap, restitution: 0.0, friction: None, least: f64::NEG_INFINITY, impulse: 0.0 }
+/// Numbers that tell this rig from others: where it holds, and what hangs there.
+pub(super) fn numbers(rig: &Rig) -> Vec<f64> {
+    let places = rig.bearing_W_m.iter().chain(rig.mount_B_m.iter());
+    places.copied().chain([rig.heave_m, rig.sway_m, rig.tilt_max_rad, rig.moving_mass_kg]).collect()
+}
+
+/// How far the vehicle's mount is from the lower end of the bearing's travel.
+pub(super) fn off_W_m(rig: &Rig, vehicle: &RigidBody) -> Vector3<f64> {
+    vehicle.position_W_m + vehicle.attitude_WB * rig.mount_B_m - rig.bearing_W_m
+}
+
+fn stop(normal: Row, gap_m: f64) -> Unilateral {
+    let (bound_m_s, impulse_N_s) = (f64::NEG_INFINITY, 0.0);
+    Unilateral { normal, gap_m, restitution: 0.0, friction: None, bound_m_s, impulse_N_s }
 }
 
 /// `body` moved so that it hangs from the bearing, as high as it was within the heave and as its slider lets it move; it
@@ -158,25 +198,7 @@ pub(super) fn hung(rig: &Rig, body: &RigidBody) -> RigidBody {
 /// Whether the rig keeps a vehicle at rest where it is: always where it does not heave, and at the lower end of its
 /// travel unless `lift_N`, the force on the vehicle beyond its weight, raises what hangs there.
 pub(super) fn holds(rig: &Rig, body: &RigidBody, lift_N: f64, gravity_m_s2: f64) -> bool {
-    let raised_m = off_W_m(rig, &hung(rig, body), &rig.bearing_W_m).z;
+    let raised_m = off_W_m(rig, &hung(rig, body)).z;
     let needed_N = rig.moving_mass_kg * gravity_m_s2 + rig.slide_friction_N;
     rig.heave_m == 0.0 || (raised_m < LOWER_END_M && lift_N < needed_N)
-}
-
-/// The angular impulse of the bearing's friction on a vehicle that turns with `spin_W_rad_s`, over a step of
-/// `span_s`. At most it stops a body of the least moment of inertia, `inertia_kg_m2`: friction never turns a motion
-/// round.
-pub(super) fn bearing_friction_W_N_m_s(
-    rig: &Rig,
-    spin_W_rad_s: &Vector3<f64>,
-    inertia_kg_m2: f64,
-    span_s: f64,
-) -> Vector3<f64> {
-    let spin_rad_s = spin_W_rad_s.norm();
-    if spin_rad_s == 0.0 {
-        return Vector3::zeros();
-    }
-    let dry_and_viscous_N_m = rig.bearing_friction_N_m + rig.bearing_damping_N_m_s * spin_rad_s;
-    let stopping_N_m_s = inertia_kg_m2 * spin_rad_s;
-    spin_W_rad_s * (-(dry_and_viscous_N_m * span_s).min(stopping_N_m_s) / spin_rad_s)
 }

@@ -1,56 +1,60 @@
-//! The impulses that keep contacts, stops and joints.
+//! The impulses that unilateral constraints need: contacts and stops.
 //!
 //! Moreau's time stepping, at the level of velocities (J. J. Moreau, Unilateral contact and dry friction in finite
-//! freedom dynamics, 1988): a limit pushes only as far as its rate would otherwise be below what is asked of it
-//! (Signorini's condition; Newton's law of restitution gives what is asked), and friction pushes against the slip,
-//! at most μ times as hard as the normal (Coulomb's law). The impulses are found by projected Gauss-Seidel
-//! iteration (M. Jean, The non-smooth contact dynamics method, 1999) until nothing changes any more.
+//! freedom dynamics, 1988): a constraint pushes only as far as its rate would otherwise be below its bound
+//! (Signorini's condition), and friction pushes against the slip, at most μ times as hard as the normal (Coulomb's
+//! law). Found by projected Gauss-Seidel iteration over the constraints, until nothing changes any more. It relaxes the
+//! normal of a contact and then its friction, which is quick, but goes to and fro where friction is about 1 and the arm
+//! couples the two. Where that does not settle, each contact's own problem of three impulses is solved as a
+//! whole, stick or slip (block Gauss-Seidel: M. Jean, The non-smooth contact dynamics method, 1999).
 
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::{Matrix2, Matrix3, Matrix6, Vector2, Vector3, Vector6};
 
 /// Iterations end when none changes a velocity by more: far below what anybody measures, far above rounding.
 const SETTLED_M_S: f64 = 1e-11;
 
-/// Iterations end after this many: four feet that slide take about 60, bodies wedged between walls more. Tuned, no source.
-const ITERATIONS_MAX: usize = 400;
+/// Iterations that relax normal and friction of a contact one after the other: four feet that slide take about 60.
+/// Tuned, no source.
+const QUICK_ITERATIONS: usize = 400;
 
-/// A body as impulses see it. [`Body::default`] is one that nothing moves, such as the world.
+/// A rate that is this far below its bound after those does not come nearer. Tuned, no source.
+const TO_AND_FRO_M_S: f64 = 1e-4;
+
+/// Iterations after those, which solve a contact as a whole. Tuned, no source.
+const ITERATIONS_MAX: usize = 200;
+
+/// Steps towards the direction in which a contact slips, in one iteration. Tuned, no source.
+const SLIP_STEPS: usize = 20;
+
+/// A body as impulses see it, in the world frame. [`Body::default`] is one that nothing moves, such as the world.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub(super) struct Body {
-    pub velocity_W_m_s: Vector3<f64>,
-    pub spin_W_rad_s: Vector3<f64>,
-    /// 1 over the mass, along each axis of the world; 0 where the body is held.
-    pub inverse_mass_per_kg: Vector3<f64>,
-    pub inverse_inertia_W: Matrix3<f64>,
+    /// Of the centre of mass, m/s; then the angular velocity, rad/s.
+    pub twist: Vector6<f64>,
+    /// Takes an impulse at the centre of mass, N s, and an angular one, N m s, to the change of the twist.
+    pub mobility: Matrix6<f64>,
 }
 
-impl Body {
-    pub(super) fn push(&mut self, impulse_W_N_s: &Vector3<f64>, turn_W_N_m_s: &Vector3<f64>) {
-        self.velocity_W_m_s += self.inverse_mass_per_kg.component_mul(impulse_W_N_s);
-        self.spin_W_rad_s += self.inverse_inertia_W * turn_W_N_m_s;
-    }
+/// A twist, or an impulse with an angular one.
+pub(super) fn join(linear: &Vector3<f64>, angular: &Vector3<f64>) -> Vector6<f64> {
+    Vector6::new(linear.x, linear.y, linear.z, angular.x, angular.y, angular.z)
+}
 
-    /// The same at rest.
-    pub(super) fn still(&self) -> Self {
-        Self { velocity_W_m_s: Vector3::zeros(), spin_W_rad_s: Vector3::zeros(), ..*self }
-    }
-
-    fn velocity_at(&self, arm_W_m: &Vector3<f64>) -> Vector3<f64> {
-        self.velocity_W_m_s + self.spin_W_rad_s.cross(arm_W_m)
-    }
+/// The two parts of what [`join`] made.
+pub(super) fn part(joined: &Vector6<f64>) -> [Vector3<f64>; 2] {
+    [joined.fixed_rows::<3>(0).into_owned(), joined.fixed_rows::<3>(3).into_owned()]
 }
 
 /// One direction in which two bodies push each other: a positive impulse drives the second along it and the first
-/// the other way. Its rate is how fast the second leaves the first along it, in m/s, or in rad/s where it turns.
+/// the other way. Its rate is how fast the second leaves the first along it, in m/s.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Row {
     bodies: [usize; 2],
-    /// Along which the bodies push; zero where the row only turns them.
-    along_W: Vector3<f64>,
-    /// What a unit of impulse turns each body with.
-    turns_W: [Vector3<f64>; 2],
-    /// The mass, or the moment of inertia, that a change of the rate has to move.
-    mass: f64,
+    jacobian: [Vector6<f64>; 2],
+    /// What an impulse of 1 N s changes each body's twist by.
+    answer: [Vector6<f64>; 2],
+    /// What it changes the rate by, 1/kg.
+    inverse_mass_per_kg: f64,
 }
 
 impl Row {
@@ -59,198 +63,252 @@ impl Row {
         all: &[Body],
         bodies: [usize; 2],
         arms_W_m: [Vector3<f64>; 2],
-        along_W: Vector3<f64>,
+        along_W: &Vector3<f64>,
     ) -> Self {
-        Self::new(all, bodies, along_W, [arms_W_m[0].cross(&-along_W), arms_W_m[1].cross(&along_W)])
+        let [first, second] = arms_W_m.map(|arm_W_m| join(along_W, &arm_W_m.cross(along_W)));
+        Self::new(all, bodies, [-first, second])
     }
 
-    /// Between the angles of two bodies about an axis.
-    pub(super) fn about(all: &[Body], bodies: [usize; 2], axis_W: Vector3<f64>) -> Self {
-        Self::new(all, bodies, Vector3::zeros(), [-axis_W, axis_W])
+    /// On one body alone: its rate is the product of `jacobian` with the twist.
+    pub(super) fn on(all: &[Body], body: usize, jacobian: Vector6<f64>) -> Self {
+        Self::new(all, [0, body], [Vector6::zeros(), jacobian])
     }
 
-    fn new(all: &[Body], bodies: [usize; 2], along_W: Vector3<f64>, turns_W: [Vector3<f64>; 2]) -> Self {
-        let yields = |of: usize| {
-            let body = &all[bodies[of]];
-            let turned = turns_W[of].dot(&(body.inverse_inertia_W * turns_W[of]));
-            along_W.dot(&body.inverse_mass_per_kg.component_mul(&along_W)) + turned
-        };
-        let sum = yields(0) + yields(1);
-        Self { bodies, along_W, turns_W, mass: if sum > 0.0 { 1.0 / sum } else { 0.0 } }
+    fn new(all: &[Body], bodies: [usize; 2], jacobian: [Vector6<f64>; 2]) -> Self {
+        let answer = [0, 1].map(|of| all[bodies[of]].mobility * jacobian[of]);
+        let inverse_mass_per_kg = jacobian[0].dot(&answer[0]) + jacobian[1].dot(&answer[1]);
+        Self { bodies, jacobian, answer, inverse_mass_per_kg }
     }
 
     pub(super) fn rate(&self, all: &[Body]) -> f64 {
-        let [first, second] = self.bodies.map(|body| &all[body]);
-        self.along_W.dot(&(second.velocity_W_m_s - first.velocity_W_m_s))
-            + self.turns_W[0].dot(&first.spin_W_rad_s)
-            + self.turns_W[1].dot(&second.spin_W_rad_s)
+        let [first, second] = [0, 1].map(|of| self.jacobian[of].dot(&all[self.bodies[of]].twist));
+        first + second
     }
 
-    fn push(&self, all: &mut [Body], impulse: f64) {
-        let along_W = self.along_W * impulse;
-        all[self.bodies[0]].push(&-along_W, &(self.turns_W[0] * impulse));
-        all[self.bodies[1]].push(&along_W, &(self.turns_W[1] * impulse));
+    fn push(&self, all: &mut [Body], impulse_N_s: f64) {
+        for (body, answer) in self.bodies.iter().zip(&self.answer) {
+            all[*body].twist += answer * impulse_N_s;
+        }
     }
 
-    /// How much an impulse along this row changes the rate of `other`.
-    fn coupling(&self, all: &[Body], other: &Self) -> f64 {
-        let coupled = |of: usize| {
-            let body = &all[self.bodies[of]];
-            let turned = other.turns_W[of].dot(&(body.inverse_inertia_W * self.turns_W[of]));
-            other.along_W.dot(&body.inverse_mass_per_kg.component_mul(&self.along_W)) + turned
-        };
-        coupled(0) + coupled(1)
+    /// How much an impulse along this row changes the rate of `other`, between the same bodies.
+    fn coupling(&self, other: &Self) -> f64 {
+        other.jacobian[0].dot(&self.answer[0]) + other.jacobian[1].dot(&self.answer[1])
     }
 }
 
-/// What keeps two bodies from coming nearer than they may: a contact, or a stop.
+/// A unilateral constraint: what keeps two bodies from coming nearer than they may, a contact or a stop.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Limit {
+pub(super) struct Unilateral {
     /// Its rate is that of the gap.
     pub normal: Row,
-    /// How far the two may still come nearer, in m or rad.
-    pub gap: f64,
-    /// Fraction of the rate of approach that an impact leaves.
+    /// How far the two may still come nearer.
+    pub gap_m: f64,
+    /// Newton's coefficient: the fraction of the rate of approach that an impact leaves.
     pub restitution: f64,
     pub friction: Option<Friction>,
-    /// What the rate has to be at least.
-    pub least: f64,
+    /// What the rate has to be at least; minus infinity where the constraint is not asked.
+    pub bound_m_s: f64,
     /// What it pushed with.
-    pub impulse: f64,
+    pub impulse_N_s: f64,
 }
 
-/// Coulomb friction on a contact.
+/// Coulomb friction of a contact.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Friction {
     coefficient: f64,
     slips: [Row; 2],
-    /// What it pushed with, along the two.
-    impulses: [f64; 2],
-    /// The least mass that any slip of the contact moves.
-    mass: f64,
+    impulses_N_s: Vector2<f64>,
+    /// Which way it slips, where it does: a unit vector.
+    direction: Vector2<f64>,
+    /// The contact's Delassus matrix, which takes its impulses (normal, and along the two) to its rates; and its
+    /// inverse.
+    delassus_per_kg: Matrix3<f64>,
+    inverse_kg: Matrix3<f64>,
+    /// The largest eigenvalue of its part that takes friction to slip.
+    largest_per_kg: f64,
 }
 
 impl Friction {
-    /// Friction between the same bodies and points as those of a contact with this normal.
+    /// Friction between the same bodies and points as those of a contact with this `normal` along `normal_W`.
     pub(super) fn new(
         all: &[Body],
         bodies: [usize; 2],
         arms_W_m: [Vector3<f64>; 2],
-        normal_W: &Vector3<f64>,
+        (normal, normal_W): (&Row, &Vector3<f64>),
         coefficient: f64,
     ) -> Self {
-        let aside_W = normal_W.cross(&least_axis(normal_W)).normalize();
-        let slips = [aside_W, normal_W.cross(&aside_W)].map(|along| Row::at(all, bodies, arms_W_m, along));
-        let [a, b] = [&slips[0], &slips[1]].map(|row| row.coupling(all, row));
-        let c = slips[0].coupling(all, &slips[1]);
-        // The larger eigenvalue of the two by two matrix that takes impulses to slips.
-        let largest = 0.5 * (a + b) + (0.25 * (a - b) * (a - b) + c * c).sqrt();
-        Self { coefficient, slips, impulses: [0.0; 2], mass: if largest > 0.0 { 1.0 / largest } else { 0.0 } }
+        let aside_W = normal_W.cross(&Vector3::ith(normal_W.iamin(), 1.0)).normalize();
+        let slips = [aside_W, normal_W.cross(&aside_W)].map(|along| Row::at(all, bodies, arms_W_m, &along));
+        let rows = [normal, &slips[0], &slips[1]];
+        let delassus_per_kg = Matrix3::from_fn(|row, column| rows[column].coupling(rows[row]));
+        let [a, b, c] = [(1, 1), (2, 2), (1, 2)].map(|place| delassus_per_kg[place]);
+        Self {
+            largest_per_kg: 0.5 * (a + b) + (0.25 * (a - b) * (a - b) + c * c).sqrt(),
+            coefficient,
+            slips,
+            impulses_N_s: Vector2::zeros(),
+            direction: Vector2::zeros(),
+            delassus_per_kg,
+            inverse_kg: delassus_per_kg.try_inverse().unwrap_or_else(Matrix3::zeros),
+        }
     }
 
-    /// Begins with an impulse.
-    pub(super) fn take_up(&mut self, impulse_W_N_s: &Vector3<f64>) {
-        self.impulses = self.slips.map(|row| row.along_W.dot(impulse_W_N_s));
+    /// Warm starts with the impulse of a step before.
+    pub(super) fn warm_start(&mut self, impulse_W_N_s: &Vector3<f64>) {
+        let along = self.slips.each_ref().map(|row| row.jacobian[1].fixed_rows::<3>(0).dot(impulse_W_N_s));
+        self.impulses_N_s = along.into();
     }
 
+    /// What it pushes the second body with.
     pub(super) fn impulse_W_N_s(&self) -> Vector3<f64> {
-        self.slips[0].along_W * self.impulses[0] + self.slips[1].along_W * self.impulses[1]
+        let [first, second] =
+            self.slips.each_ref().map(|row| row.jacobian[1].fixed_rows::<3>(0).into_owned());
+        first * self.impulses_N_s.x + second * self.impulses_N_s.y
+    }
+
+    fn push(&self, all: &mut [Body], impulses_N_s: &Vector2<f64>) {
+        self.slips[0].push(all, impulses_N_s.x);
+        self.slips[1].push(all, impulses_N_s.y);
     }
 
     /// Steps against the slip, equally far along both axes: only so does the iteration end with a force that is
-    /// opposite to the slip, as Coulomb's law says, whatever the bodies' inertia. Returns the change of velocity.
-    fn relax(&mut self, all: &mut [Body], normal_impulse: f64) -> f64 {
-        let slip_m_s = [self.slips[0].rate(all), self.slips[1].rate(all)];
-        let wanted = [0, 1].map(|axis| self.impulses[axis] - self.mass * slip_m_s[axis]);
-        let (most, size) =
-            (self.coefficient * normal_impulse, (wanted[0] * wanted[0] + wanted[1] * wanted[1]).sqrt());
-        let scale = if size > most { most / size } else { 1.0 };
-        let changes = [0, 1].map(|axis| wanted[axis] * scale - self.impulses[axis]);
-        for (axis, change) in changes.into_iter().enumerate() {
-            self.slips[axis].push(all, change);
-            self.impulses[axis] += change;
+    /// opposite to the slip, whatever the bodies' inertia. Returns by how much that changed the slip at most.
+    fn relax(&mut self, all: &mut [Body], normal_N_s: f64) -> f64 {
+        let slip_m_s = Vector2::new(self.slips[0].rate(all), self.slips[1].rate(all));
+        let wanted_N_s = self.impulses_N_s - slip_m_s / self.largest_per_kg;
+        let (most_N_s, size_N_s) = (self.coefficient * normal_N_s, wanted_N_s.norm());
+        let scale = if size_N_s > most_N_s { most_N_s / size_N_s } else { 1.0 };
+        let change_N_s = wanted_N_s * scale - self.impulses_N_s;
+        self.push(all, &change_N_s);
+        self.impulses_N_s += change_N_s;
+        change_N_s.amax() * self.largest_per_kg
+    }
+
+    /// The contact's impulses that its rates need which would be `free_m_s` without them: none where they would part;
+    /// those that stick where friction allows; otherwise those that slip.
+    fn impulses_N_s(&mut self, free_m_s: &Vector3<f64>, bound_m_s: f64) -> Vector3<f64> {
+        if free_m_s.x >= bound_m_s {
+            return Vector3::zeros();
         }
-        per_mass(changes[0].abs().max(changes[1].abs()), self.mass)
-    }
-}
-
-/// The axis of the world that is farthest from `direction`, or one of them.
-fn least_axis(direction: &Vector3<f64>) -> Vector3<f64> {
-    Vector3::ith(direction.iamin(), 1.0)
-}
-
-/// A ball joint: a point of one body stays on a point of the other.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Ball {
-    bodies: [usize; 2],
-    arms_W_m: [Vector3<f64>; 2],
-    /// Takes a velocity to the impulse that makes it.
-    mass_W: Matrix3<f64>,
-    /// What the relative velocity of the points has to be.
-    pub wanted_W_m_s: Vector3<f64>,
-    pub impulse_W_N_s: Vector3<f64>,
-}
-
-impl Ball {
-    pub(super) fn new(all: &[Body], bodies: [usize; 2], arms_W_m: [Vector3<f64>; 2]) -> Self {
-        let yields = |of: usize| {
-            let body = &all[bodies[of]];
-            let lever = arms_W_m[of].cross_matrix();
-            Matrix3::from_diagonal(&body.inverse_mass_per_kg) - lever * body.inverse_inertia_W * lever
-        };
-        let mass_W = (yields(0) + yields(1)).try_inverse().unwrap_or_else(Matrix3::zeros);
-        Self { bodies, arms_W_m, mass_W, wanted_W_m_s: Vector3::zeros(), impulse_W_N_s: Vector3::zeros() }
-    }
-
-    fn push(&self, all: &mut [Body], impulse_W_N_s: &Vector3<f64>) {
-        let back_W_N_s = -impulse_W_N_s;
-        all[self.bodies[0]].push(&back_W_N_s, &self.arms_W_m[0].cross(&back_W_N_s));
-        all[self.bodies[1]].push(impulse_W_N_s, &self.arms_W_m[1].cross(impulse_W_N_s));
-    }
-
-    fn relax(&mut self, all: &mut [Body]) -> f64 {
-        let points = [0, 1].map(|of| all[self.bodies[of]].velocity_at(&self.arms_W_m[of]));
-        let off_W_m_s = self.wanted_W_m_s - (points[1] - points[0]);
-        let change_W_N_s = self.mass_W * off_W_m_s;
-        self.push(all, &change_W_N_s);
-        self.impulse_W_N_s += change_W_N_s;
-        off_W_m_s.amax()
-    }
-}
-
-/// Finds the impulses that `ball` and `limits` need, from those that they hold already, and gives them to the bodies.
-/// A limit whose least rate is minus infinity pushes nothing.
-pub(super) fn solve(all: &mut [Body], ball: &mut Option<Ball>, limits: &mut [Limit]) {
-    if let Some(ball) = ball {
-        ball.push(all, &ball.impulse_W_N_s);
-    }
-    for limit in limits.iter() {
-        limit.normal.push(all, limit.impulse);
-        let slips = limit.friction.iter().flat_map(|friction| friction.slips.iter().zip(friction.impulses));
-        slips.for_each(|(row, impulse)| row.push(all, impulse));
-    }
-    for _ in 0..ITERATIONS_MAX {
-        let mut change = ball.as_mut().map_or(0.0, |ball| ball.relax(all));
-        for limit in limits.iter_mut().filter(|limit| limit.least > f64::NEG_INFINITY) {
-            change = limit.relax(all).max(change);
+        let sticking = self.inverse_kg * (Vector3::x() * bound_m_s - free_m_s);
+        let most = self.coefficient * sticking.x;
+        let aside = sticking.yz().norm();
+        if sticking.x >= 0.0 && aside <= most {
+            return sticking;
         }
-        if change < SETTLED_M_S {
+        self.slipping_N_s(free_m_s, bound_m_s).unwrap_or_else(|| {
+            // Friction that would have to pull the two apart, as jammed chalk does (Painlevé): as near to sticking as
+            // it may.
+            let normal = sticking.x.max(0.0);
+            let share = if aside > 0.0 { (self.coefficient * normal / aside).min(1.0) } else { 0.0 };
+            Vector3::new(normal, sticking.y * share, sticking.z * share)
+        })
+    }
+
+    /// The impulses of a contact that slips: along its bound, and opposite to the slip that they leave, whose
+    /// direction is looked for from that of before.
+    fn slipping_N_s(&mut self, free_m_s: &Vector3<f64>, bound_m_s: f64) -> Option<Vector3<f64>> {
+        let aside_m_s = free_m_s.yz();
+        let to_sides = self.delassus_per_kg.fixed_view::<2, 1>(1, 0).into_owned();
+        let sides: Matrix2<f64> = self.delassus_per_kg.fixed_view::<2, 2>(1, 1).into_owned();
+        if self.direction == Vector2::zeros() {
+            self.direction = aside_m_s.try_normalize(0.0)?;
+        }
+        let mut normal_N_s = 0.0;
+        for _ in 0..SLIP_STEPS {
+            let pushed = self.direction * -self.coefficient;
+            let yields_per_kg = self.delassus_per_kg.m11 + to_sides.dot(&pushed);
+            if yields_per_kg <= 0.0 {
+                return None;
+            }
+            normal_N_s = (bound_m_s - free_m_s.x) / yields_per_kg;
+            let slip_m_s = aside_m_s + (to_sides + sides * pushed) * normal_N_s;
+            // Half way, so that it cannot go to and fro.
+            let Some(wanted) = slip_m_s.try_normalize(0.0) else { break };
+            let Some(next) = (self.direction + wanted).try_normalize(1e-6) else { break };
+            let is_found = (next - self.direction).amax() < 1e-15;
+            self.direction = next;
+            if is_found {
+                break;
+            }
+        }
+        let aside_N_s = self.direction * (-self.coefficient * normal_N_s);
+        Some(Vector3::new(normal_N_s, aside_N_s.x, aside_N_s.y))
+    }
+}
+
+/// Finds the impulses that `constraints` need, from those that they hold already, and gives them to the bodies. Returns
+/// by how much a rate stays below its bound at most: where two bounds contradict each other, no impulses do both.
+pub(super) fn solve(all: &mut [Body], constraints: &mut [Unilateral]) -> f64 {
+    for constraint in constraints.iter() {
+        constraint.normal.push(all, constraint.impulse_N_s);
+        if let Some(friction) = &constraint.friction {
+            friction.push(all, &friction.impulses_N_s);
+        }
+    }
+    iterate(all, constraints, QUICK_ITERATIONS, Unilateral::relax);
+    if unmet_m_s(all, constraints) > TO_AND_FRO_M_S {
+        iterate(all, constraints, ITERATIONS_MAX, Unilateral::relax_whole);
+    }
+    unmet_m_s(all, constraints)
+}
+
+fn iterate(
+    all: &mut [Body],
+    constraints: &mut [Unilateral],
+    most: usize,
+    relax: fn(&mut Unilateral, &mut [Body]) -> f64,
+) {
+    for _ in 0..most {
+        let asked = constraints.iter_mut().filter(|constraint| constraint.bound_m_s > f64::NEG_INFINITY);
+        if asked.map(|constraint| relax(constraint, all)).fold(0.0, f64::max) < SETTLED_M_S {
             break;
         }
     }
 }
 
-impl Limit {
-    fn relax(&mut self, all: &mut [Body]) -> f64 {
-        let wanted = self.impulse + self.normal.mass * (self.least - self.normal.rate(all));
-        let change = wanted.max(0.0) - self.impulse;
-        self.normal.push(all, change);
-        self.impulse += change;
-        let slipped = self.friction.as_mut().map_or(0.0, |friction| friction.relax(all, self.impulse));
-        per_mass(change.abs(), self.normal.mass).max(slipped)
-    }
+/// How far a rate is below its bound at most.
+fn unmet_m_s(all: &[Body], constraints: &[Unilateral]) -> f64 {
+    let asked = constraints.iter().filter(|constraint| constraint.bound_m_s > f64::NEG_INFINITY);
+    asked.map(|constraint| constraint.bound_m_s - constraint.normal.rate(all)).fold(0.0, f64::max)
 }
 
-fn per_mass(impulse: f64, mass: f64) -> f64 {
-    if mass > 0.0 { impulse / mass } else { 0.0 }
+impl Unilateral {
+    /// Relaxes the normal, and then friction; returns by how much that changed their rates.
+    fn relax(&mut self, all: &mut [Body]) -> f64 {
+        let slipped = |this: &mut Self, all: &mut [Body]| {
+            let impulse_N_s = this.impulse_N_s;
+            this.friction.as_mut().map_or(0.0, |friction| friction.relax(all, impulse_N_s))
+        };
+        let changed = self.relax_normal(all);
+        changed.max(slipped(self, all))
+    }
+
+    fn relax_normal(&mut self, all: &mut [Body]) -> f64 {
+        let inverse_mass_per_kg = self.normal.inverse_mass_per_kg;
+        if inverse_mass_per_kg <= 0.0 {
+            return 0.0;
+        }
+        let wanted_N_s = self.impulse_N_s + (self.bound_m_s - self.normal.rate(all)) / inverse_mass_per_kg;
+        let change_N_s = wanted_N_s.max(0.0) - self.impulse_N_s;
+        self.normal.push(all, change_N_s);
+        self.impulse_N_s += change_N_s;
+        change_N_s.abs() * inverse_mass_per_kg
+    }
+
+    /// Solves this one as a whole, with the others as they are; returns by how much that changed its rates.
+    fn relax_whole(&mut self, all: &mut [Body]) -> f64 {
+        let rate_m_s = self.normal.rate(all);
+        let Some(friction) = &mut self.friction else { return self.relax_normal(all) };
+        let held_N_s = Vector3::new(self.impulse_N_s, friction.impulses_N_s.x, friction.impulses_N_s.y);
+        let rates_m_s = Vector3::new(rate_m_s, friction.slips[0].rate(all), friction.slips[1].rate(all));
+        let free_m_s = rates_m_s - friction.delassus_per_kg * held_N_s;
+        let wanted_N_s = friction.impulses_N_s(&free_m_s, self.bound_m_s);
+        let change_N_s = wanted_N_s - held_N_s;
+        self.normal.push(all, change_N_s.x);
+        friction.push(all, &change_N_s.yz());
+        (self.impulse_N_s, friction.impulses_N_s) = (wanted_N_s.x, wanted_N_s.yz());
+        (friction.delassus_per_kg * change_N_s).amax()
+    }
 }

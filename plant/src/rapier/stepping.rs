@@ -7,23 +7,29 @@
 //! change times the step is added to its pose.
 
 use super::contacts::{Contacts, Sighting};
-use super::rig::{self, Slider};
-use super::solver::{self, Ball, Body, Friction, Limit, Row};
+use super::rig::{self, Mounted};
+use super::solver::{self, Body, Friction, Row, Unilateral, join, part};
 use super::world::{Near, World};
 use crate::actuation::Actuation;
 use crate::backend::Neighbour;
 use crate::newton_euler::NewtonEuler;
 use crate::state::{RigidBody, State};
-use nalgebra::{Quaternion, UnitQuaternion, Vector3};
+use nalgebra::{Matrix6, Quaternion, UnitQuaternion, Vector3, Vector6};
 use scenes::Rig;
 use serde::{Deserialize, Serialize};
 
 /// What is nearer than this touches: far below what anybody sees, far above rounding. Tuned, no source.
-const TOUCH: f64 = 1e-6;
+const TOUCH_M: f64 = 1e-6;
 
-/// What meets something slower than this, in m/s or rad/s, does not bounce: twice what gravity gives it in a tick.
-/// Tuned, no source.
-const SLOW: f64 = 0.02;
+/// Gaps that are not closed any further: what stands on several points stands on all of them. Tuned, no source.
+const LEVEL_M: f64 = 1e-9;
+
+/// Impulses are found where no rate stays this far below its bound. Tuned, no source.
+const FOUND_M_S: f64 = 1e-2;
+
+/// What meets something slower than gravity makes it in this many steps does not bounce: 2 cm/s at two steps of half a
+/// millisecond. Tuned, no source.
+const SLOW_STEPS: f64 = 4.0;
 
 /// A step is cut at this many impacts at most; those that follow are inelastic. Tuned, no source.
 const IMPACTS_MAX: usize = 24;
@@ -32,35 +38,50 @@ const IMPACTS_MAX: usize = 24;
 /// of air. Tuned, no source.
 const MARGIN_M: f64 = 2e-3;
 
-/// How far a step moves the vehicle out of what it is inside of, at most, in m or rad: a vehicle that was put
-/// inside of something comes out of it as fast as 1 m/s, and takes none of that speed along. Tuned, no source.
-const PUSHED_OUT_MAX: f64 = 1e-3;
+/// What is farther is not looked at, however fast the vehicle is: what moves this far in a step flies through things.
+/// Tuned, no source.
+const MARGIN_MAX_M: f64 = 2.0;
+
+/// How fast a vehicle that was put inside of something comes out of it; it takes none of that speed along. Tuned, no
+/// source.
+const PUSH_OUT_M_S: f64 = 1.0;
 
 /// Errors of a pose that are left as they are.
-const EXACT: f64 = 1e-12;
+const EXACT_M: f64 = 1e-12;
 
 /// The bodies by their numbers; other vehicles follow.
 const WORLD: usize = 0;
 const VEHICLE: usize = 1;
-const SLIDER: usize = 2;
+const FIRST_OTHER: usize = 2;
+
+/// As many constraints as a vehicle has in a corner among others, and as many again: more take memory.
+const CONSTRAINTS: usize = 64;
 
 /// What a step works with: kept, so that it takes no memory, and forgotten after it.
 #[derive(Default)]
 pub(super) struct Scratch {
     near: Vec<Near>,
     /// The contacts, in the order of `near`; then the stops.
-    limits: Vec<Limit>,
+    constraints: Vec<Unilateral>,
     /// The bodies at the step's start.
     now: Vec<Body>,
     /// The bodies at its end.
     then: Vec<Body>,
 }
 
-/// The impulses of the last step: where the next one begins to look for its own.
-#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+impl Scratch {
+    pub(super) fn new() -> Self {
+        let bodies = || Vec::with_capacity(FIRST_OTHER + crate::backend::TRAFFIC_MAX);
+        let (near, constraints) = (Vec::with_capacity(CONSTRAINTS), Vec::with_capacity(CONSTRAINTS));
+        Self { near, constraints, now: bodies(), then: bodies() }
+    }
+}
+
+/// The impulses of the last step, with which the next one warm starts its search.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(super) struct Held {
     contacts: Vec<HeldContact>,
-    bearing_W_N_s: Vector3<f64>,
+    stops_N_s: Vec<f64>,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -71,20 +92,24 @@ struct HeldContact {
     slip_W_N_s: Vector3<f64>,
 }
 
-/// Vehicle and slider at the end of a step without contacts and stops.
-struct Free {
-    state: State,
-    slider: Option<Slider>,
-    /// By how much the bearing changed the vehicle's velocities.
-    held_W_m_s: Vector3<f64>,
-    held_W_rad_s: Vector3<f64>,
+impl Default for Held {
+    fn default() -> Self {
+        Self { contacts: Vec::with_capacity(CONSTRAINTS), stops_N_s: Vec::with_capacity(CONSTRAINTS) }
+    }
 }
 
-impl Free {
-    /// Without a rig.
-    fn of(state: State) -> Self {
-        Self { state, slider: None, held_W_m_s: Vector3::zeros(), held_W_rad_s: Vector3::zeros() }
+impl Held {
+    pub(super) fn clear(&mut self) {
+        self.contacts.clear();
+        self.stops_N_s.clear();
     }
+}
+
+/// The end of a step without contacts and stops.
+struct Free {
+    state: State,
+    /// By how much the bearing changed the vehicle's twist.
+    held: Vector6<f64>,
 }
 
 /// A vehicle that flies, touches things, or hangs in a rig.
@@ -94,7 +119,6 @@ pub(super) struct Motion {
     pub world: World,
     pub contacts: Contacts,
     pub state: State,
-    pub slider: Option<Slider>,
     /// An impact that is faster is a crash.
     pub crash_speed_m_s: f64,
     /// The least moment of inertia about any axis.
@@ -126,52 +150,85 @@ impl Motion {
         span_s: f64,
         others: &mut [Neighbour],
     ) {
-        let mut left_s = span_s;
-        for impact in 0..=IMPACTS_MAX {
-            let free = self.free(actuation, left_s);
+        let slow_m_s = SLOW_STEPS * self.model.vehicle().gravity_m_s2 * span_s;
+        let mut free = self.free(actuation, span_s);
+        let uncut = free.state;
+        let (mut left_s, mut cuts, mut is_pushed) = (span_s, 0, false);
+        loop {
             if !free.state.body.is_finite() || self.is_clear(&free.state.body, left_s, others) {
                 // What is no number ends the run when it is published.
                 move_on(others, left_s);
-                return self.fly_freely(free.state);
+                self.fly_freely(free.state);
+                break;
             }
             self.look_around(scratch, &free, left_s, others);
-            match scratch.next_impact_s(left_s).filter(|_| impact < IMPACTS_MAX) {
+            match scratch.next_impact_s(left_s, slow_m_s).filter(|_| cuts < IMPACTS_MAX) {
                 None => {
                     move_on(others, left_s);
-                    return self.constrain(scratch, &free, left_s, f64::NEG_INFINITY);
+                    is_pushed |= self.constrain(scratch, &free, left_s, f64::NEG_INFINITY);
+                    break;
                 }
-                Some(0.0) => self.bounce(scratch),
+                Some(0.0) => {
+                    is_pushed = true;
+                    // One that does not come to an end would not the next time either.
+                    cuts = if self.impact(scratch, slow_m_s) { cuts + 1 } else { IMPACTS_MAX };
+                }
                 Some(after_s) => {
                     let free = self.free(actuation, after_s);
-                    self.bodies(&free.state.body, free.slider.as_ref(), others, &mut scratch.then);
+                    self.bodies(&free.state.body, others, &mut scratch.then);
                     // What is about to be met is not held back before.
-                    self.constrain(scratch, &free, after_s, -SLOW);
+                    is_pushed |= self.constrain(scratch, &free, after_s, -slow_m_s);
                     move_on(others, after_s);
-                    left_s -= after_s;
+                    (left_s, cuts) = (left_s - after_s, cuts + 1);
                 }
             }
+            free = self.free(actuation, left_s);
+        }
+        if !is_pushed && self.rig.is_none() {
+            // Cut for a gap that did not close after all: the flight is free, and its steps are those of free flight.
+            self.state = uncut;
         }
     }
 
     /// A step with nothing but the bearing that holds the vehicle.
     fn free(&self, actuation: &Actuation, span_s: f64) -> Free {
-        let Some(rig) = &self.rig else {
-            return Free::of(self.model.runge_kutta(&self.state, actuation, span_s));
-        };
+        let unheld = self.model.runge_kutta(&self.state, actuation, span_s);
+        let Some(rig) = &self.rig else { return Free { state: unheld, held: Vector6::zeros() } };
         let hold = |state: &State, rates| rig::hold(rig, &self.model, state, rates);
-        let state = self.model.runge_kutta_held(&self.state, actuation, span_s, hold);
-        let unheld = self.model.runge_kutta(&self.state, actuation, span_s).body;
-        Free {
-            state,
-            slider: Slider::under(rig, &state.body),
-            held_W_m_s: state.body.velocity_W_m_s - unheld.velocity_W_m_s,
-            held_W_rad_s: state.body.angular_velocity_W_rad_s() - unheld.angular_velocity_W_rad_s(),
+        let mut state = self.model.runge_kutta_held(&self.state, actuation, span_s, hold);
+        if let Some(mounted) = self.mounted(&state.body) {
+            let twist = twist(&state.body);
+            set_twist(&mut state.body, &(twist + mounted.back(&mounted.mount_W_m_s(&twist))));
         }
+        self.project(&mut state.body);
+        Free { held: twist(&state.body) - twist(&unheld.body), state }
+    }
+
+    /// The vehicle in its rig, if it has one.
+    fn mounted(&self, body: &RigidBody) -> Option<Mounted<'_>> {
+        let rig = self.rig.as_ref()?;
+        Some(Mounted::new(rig, body, self.mobility(body)))
+    }
+
+    /// The mobility in free flight.
+    fn mobility(&self, body: &RigidBody) -> Matrix6<f64> {
+        let turn_WB = body.attitude_WB.to_rotation_matrix();
+        let mut mobility = Matrix6::from_diagonal_element(1.0 / self.model.vehicle().mass_kg);
+        let turned = turn_WB * self.model.inverse_inertia() * turn_WB.transpose();
+        mobility.fixed_view_mut::<3, 3>(3, 3).copy_from(&turned);
+        mobility
+    }
+
+    /// Moves the mount back onto its line, from where the order of the step left it.
+    fn project(&self, body: &mut RigidBody) {
+        let Some((rig, mounted)) = self.rig.as_ref().zip(self.mounted(body)) else { return };
+        let off_W_m = rig::off_W_m(rig, body);
+        shift(body, &mounted.back(&off_W_m));
     }
 
     fn fly_freely(&mut self, free: State) {
         self.contacts.note(&self.state.body, std::iter::empty(), self.crash_speed_m_s);
-        self.held.contacts.clear();
+        self.held.clear();
         self.state = free;
     }
 
@@ -189,229 +246,277 @@ impl Motion {
         1.5 * span_s * fastest_m_s(&self.state.body).max(fastest_m_s(free))
     }
 
-    /// Finds what is near, and makes a limit of each point and each stop.
+    /// Finds what is near, and makes a constraint of each point and each stop.
     fn look_around(&mut self, scratch: &mut Scratch, free: &Free, span_s: f64, others: &[Neighbour]) {
-        let Scratch { near, limits, now, then } = scratch;
+        let Scratch { near, constraints, now, then } = scratch;
         let fastest_other_m_s = others.iter().map(|other| other.velocity_W_m_s.norm()).fold(0.0, f64::max);
-        let margin_m = MARGIN_M + self.way_m(&free.state.body, span_s) + span_s * fastest_other_m_s;
-        self.world.find_near(&self.state.body, others, margin_m, near);
-        self.bodies(&self.state.body, self.slider.as_ref(), others, now);
-        self.bodies(&free.state.body, free.slider.as_ref(), others, then);
-        limits.clear();
-        limits.extend(near.iter().map(|near| self.contact(now, near)));
-        if let Some(rig) = &self.rig {
-            let slider = self.slider.as_ref().map(|slider| (SLIDER, slider));
-            rig::stops(now, rig, slider, (VEHICLE, &self.state.body), limits);
+        let way_m = self.way_m(&free.state.body, span_s) + span_s * fastest_other_m_s;
+        self.world.find_near(&self.state.body, others, (MARGIN_M + way_m).min(MARGIN_MAX_M), near);
+        self.bodies(&self.state.body, others, now);
+        self.bodies(&free.state.body, others, then);
+        constraints.clear();
+        constraints.extend(near.iter().map(|near| self.contact(now, near)));
+        if let Some(mounted) = self.mounted(&self.state.body) {
+            mounted.stops(now, VEHICLE, &self.state.body, constraints);
         }
     }
 
-    /// The world, the vehicle, the slider and the others, as impulses see them.
-    fn bodies(
-        &self,
-        vehicle: &RigidBody,
-        slider: Option<&Slider>,
-        others: &[Neighbour],
-        bodies: &mut Vec<Body>,
-    ) {
-        let turn_WB = vehicle.attitude_WB.to_rotation_matrix();
-        let vehicle = Body {
-            velocity_W_m_s: vehicle.velocity_W_m_s,
-            spin_W_rad_s: vehicle.angular_velocity_W_rad_s(),
-            inverse_mass_per_kg: Vector3::repeat(1.0 / self.model.vehicle().mass_kg),
-            inverse_inertia_W: turn_WB * self.model.inverse_inertia() * turn_WB.transpose(),
-        };
-        let slider = slider.zip(self.rig.as_ref()).map(|(slider, rig)| slider.body(rig));
-        let others = others.iter();
-        let others = others.map(|other| Body { velocity_W_m_s: other.velocity_W_m_s, ..Body::default() });
+    /// The world, the vehicle and the others, as impulses see them.
+    fn bodies(&self, vehicle: &RigidBody, others: &[Neighbour], bodies: &mut Vec<Body>) {
+        let mounted = self.mounted(vehicle);
+        let mobility = mounted.map_or_else(|| self.mobility(vehicle), |mounted| mounted.mobility());
+        let others = others.iter().map(|other| Body {
+            // Others do not turn, and nothing moves them.
+            twist: join(&other.velocity_W_m_s, &Vector3::zeros()),
+            ..Body::default()
+        });
         bodies.clear();
-        bodies.extend([Body::default(), vehicle].into_iter().chain(slider).chain(others));
+        bodies.extend([Body::default(), Body { twist: twist(vehicle), mobility }].into_iter().chain(others));
     }
 
-    fn contact(&self, bodies: &[Body], near: &Near) -> Limit {
+    fn contact(&self, bodies: &[Body], near: &Near) -> Unilateral {
         let arm_W_m = near.point_W_m - self.state.body.position_W_m;
-        // Others do not turn.
-        let (pair, arms_W_m) = ([self.other(near), VEHICLE], [Vector3::zeros(), arm_W_m]);
+        let first = near.neighbour.map_or(WORLD, |number| FIRST_OTHER + number);
+        let (pair, arms_W_m) = ([first, VEHICLE], [Vector3::zeros(), arm_W_m]);
         let normal_W = near.towards_vehicle_W;
-        Limit {
-            normal: Row::at(bodies, pair, arms_W_m, normal_W),
-            gap: near.gap_m,
+        let normal = Row::at(bodies, pair, arms_W_m, &normal_W);
+        Unilateral {
+            friction: Some(Friction::new(bodies, pair, arms_W_m, (&normal, &normal_W), near.friction)),
+            normal,
+            gap_m: near.gap_m,
             restitution: near.restitution,
-            friction: Some(Friction::new(bodies, pair, arms_W_m, &normal_W, near.friction)),
-            least: f64::NEG_INFINITY,
-            impulse: 0.0,
+            bound_m_s: f64::NEG_INFINITY,
+            impulse_N_s: 0.0,
         }
     }
 
-    /// The body that something near belongs to.
-    fn other(&self, near: &Near) -> usize {
-        near.neighbour.map_or(WORLD, |number| self.first_other() + number)
-    }
-
-    fn first_other(&self) -> usize {
-        if self.slider.is_some() { SLIDER + 1 } else { SLIDER }
-    }
-
-    /// A step of `span_s` that ends as `free`, but for what limits and the bearing do; what comes nearer at a rate
-    /// below `ahead` and does not touch yet is no limit.
-    fn constrain(&mut self, scratch: &mut Scratch, free: &Free, span_s: f64, ahead: f64) {
-        for limit in &mut scratch.limits {
-            let is_ahead = limit.gap > TOUCH && limit.normal.rate(&scratch.now) < ahead;
-            limit.least = if is_ahead { f64::NEG_INFINITY } else { -limit.gap.max(0.0) / span_s };
+    /// A step of `span_s` that ends as `free`, but for what the constraints do; what comes nearer at a rate below
+    /// `ahead_m_s` and does not touch yet is none. Returns whether any pushed.
+    fn constrain(&mut self, scratch: &mut Scratch, free: &Free, span_s: f64, ahead_m_s: f64) -> bool {
+        for constraint in &mut scratch.constraints {
+            let rate_m_s = constraint.normal.rate(&scratch.now);
+            constraint.bound_m_s = match constraint.gap_m > TOUCH_M {
+                true if rate_m_s < ahead_m_s => f64::NEG_INFINITY,
+                // Over the step the gap changes by the mean of the rates at its ends.
+                true => (-2.0 * constraint.gap_m / span_s - rate_m_s).min(0.0),
+                false if constraint.gap_m > LEVEL_M => -constraint.gap_m / span_s,
+                // The same for all that touch: four feet cannot come down by four different ways.
+                false => 0.0,
+            };
         }
-        self.take_up(scratch);
-        let mut ball = self.bearing(&scratch.then, &free.state.body);
-        let [vehicle, slider] = self.rig_friction(span_s);
-        scratch.then[VEHICLE].push(&Vector3::zeros(), &vehicle);
-        if self.slider.is_some() {
-            scratch.then[SLIDER].push(&slider, &Vector3::zeros());
+        self.warm_start(scratch);
+        if let Some(mounted) = self.mounted(&free.state.body) {
+            let friction = mounted.friction(&twist(&self.state.body), self.inertia_min_kg_m2, span_s);
+            let vehicle = &mut scratch.then[VEHICLE];
+            vehicle.twist += vehicle.mobility * friction;
         }
-        solver::solve(&mut scratch.then, &mut ball, &mut scratch.limits);
+        let is_found = scratch.solve();
         self.note(scratch);
-        self.hold(scratch, ball.as_ref());
-        if ball.is_none() && scratch.limits.iter().all(|limit| limit.impulse == 0.0) {
+        self.hold(scratch, is_found);
+        let is_pushed = scratch.constraints.iter().any(|constraint| constraint.impulse_N_s > 0.0);
+        if !is_pushed && self.rig.is_none() {
             self.state = free.state;
-            return;
+            return false;
         }
-        self.move_on(free, &scratch.then, span_s);
-        self.correct_pose(scratch, ball, span_s);
+        self.take_over(free, &scratch.then[VEHICLE].twist, span_s);
+        self.push_out(scratch, span_s);
+        let mut body = self.state.body;
+        self.project(&mut body);
+        self.state.body = body;
+        is_pushed
     }
 
-    /// The impact of all that touch: Newton's law for those that meet, and none of the others comes nearer.
-    fn bounce(&mut self, scratch: &mut Scratch) {
-        for limit in &mut scratch.limits {
-            let rate = limit.normal.rate(&scratch.now);
-            limit.least = match limit.gap <= TOUCH {
+    /// The impact of all that touch, by Newton's law: what met at a rate leaves with the restitution's part of it, as far
+    /// as that makes no energy (Moreau). Returns whether its impulses were found.
+    fn impact(&mut self, scratch: &mut Scratch, slow_m_s: f64) -> bool {
+        for constraint in &mut scratch.constraints {
+            let rate_m_s = constraint.normal.rate(&scratch.now);
+            constraint.bound_m_s = match constraint.gap_m <= TOUCH_M {
                 false => f64::NEG_INFINITY,
-                true if rate < -SLOW => -limit.restitution * rate,
+                true if rate_m_s.abs() > slow_m_s => -constraint.restitution * rate_m_s,
                 true => 0.0,
             };
         }
         scratch.then.clone_from(&scratch.now);
-        let mut ball = self.bearing(&scratch.then, &self.state.body);
-        solver::solve(&mut scratch.then, &mut ball, &mut scratch.limits);
+        let is_found = scratch.solve();
         self.note(scratch);
-        let free = Free { slider: self.slider, ..Free::of(self.state) };
-        self.move_on(&free, &scratch.then, 0.0);
+        let bounced = scratch.then[VEHICLE].twist;
+        let after = self.without_gain(scratch, bounced);
+        self.take_over(&Free { state: self.state, held: Vector6::zeros() }, &after, 0.0);
+        is_found
     }
 
-    fn bearing(&self, bodies: &[Body], vehicle: &RigidBody) -> Option<Ball> {
-        let above = if self.slider.is_some() { SLIDER } else { WORLD };
-        let rig = self.rig.as_ref()?;
-        let mut ball = rig::bearing(bodies, [above, VEHICLE], rig, vehicle);
-        ball.impulse_W_N_s = self.held.bearing_W_N_s;
-        Some(ball)
+    /// The twist after an impact, between that of an inelastic one, which never makes energy, and `bounced`: Newton's law
+    /// makes some where friction and an arm couple (Kane and Levinson, Dynamics, 1985). Others that push do work on
+    /// the vehicle, and are left out of this.
+    fn without_gain(&self, scratch: &mut Scratch, bounced: Vector6<f64>) -> Vector6<f64> {
+        let before = scratch.now[VEHICLE].twist;
+        let start_J = self.energy_J(&before, &before);
+        let is_among_others = scratch.near.iter().any(|near| near.neighbour.is_some());
+        if is_among_others || self.energy_J(&bounced, &bounced) <= start_J {
+            return bounced;
+        }
+        for constraint in &mut scratch.constraints {
+            constraint.bound_m_s = constraint.bound_m_s.min(0.0);
+        }
+        scratch.forget();
+        scratch.then.clone_from(&scratch.now);
+        solver::solve(&mut scratch.then, &mut scratch.constraints);
+        let dull = scratch.then[VEHICLE].twist;
+        // The largest part s of the way to `bounced` at which the energy is that of before: a s^2 + 2 b s + c = 0.
+        let more = bounced - dull;
+        let (a, b) = (self.energy_J(&more, &more), self.energy_J(&dull, &more));
+        let c = self.energy_J(&dull, &dull) - start_J;
+        let root = (b * b - a * c).max(0.0).sqrt();
+        dull + more * ((root - b) / a).clamp(0.0, 1.0)
     }
 
-    /// What the rig's friction turns the vehicle with and drives the slider with.
-    fn rig_friction(&self, span_s: f64) -> [Vector3<f64>; 2] {
-        let Some(rig) = &self.rig else { return [Vector3::zeros(); 2] };
-        let spin_W_rad_s = self.state.body.angular_velocity_W_rad_s();
-        let turn = rig::bearing_friction_W_N_m_s(rig, &spin_W_rad_s, self.inertia_min_kg_m2, span_s);
-        let drive = self.slider.map_or(Vector3::zeros(), |slider| slider.friction_W_N_s(rig, span_s));
-        [turn, drive]
+    /// The kinetic energy with a twist; the mixed one of two where they differ.
+    fn energy_J(&self, one: &Vector6<f64>, other: &Vector6<f64>) -> f64 {
+        let (vehicle, body) = (self.model.vehicle(), &self.state.body);
+        let [[v, w], [other_v, other_w]] = [part(one), part(other)];
+        let in_body = |spin_W_rad_s: &Vector3<f64>| body.attitude_WB.inverse_transform_vector(spin_W_rad_s);
+        let spin_J = 0.5 * in_body(&w).dot(&(vehicle.inertia_kg_m2 * in_body(&other_w)));
+        let slider_J = self.mounted(body).map_or(0.0, |mounted| mounted.slider_energy_J(one, other));
+        0.5 * vehicle.mass_kg * v.dot(&other_v) + spin_J + slider_J
     }
 
-    /// Has the solver begin with the impulses of the step before.
-    fn take_up(&self, scratch: &mut Scratch) {
-        for (near, limit) in scratch.near.iter().zip(&mut scratch.limits) {
-            let same = |held: &&HeldContact| (held.object, held.part) == (near.object, near.part);
-            let Some(held) = self.held.contacts.iter().find(same).filter(|_| limit.least.is_finite()) else {
-                continue;
-            };
-            limit.impulse = held.impulse_N_s;
-            if let Some(friction) = &mut limit.friction {
-                friction.take_up(&held.slip_W_N_s);
+    /// Has the solver begin with the impulses of the step before: the first point of a part with the first of it then.
+    fn warm_start(&self, scratch: &mut Scratch) {
+        let Scratch { near, constraints, .. } = scratch;
+        let (contacts, stops) = constraints.split_at_mut(near.len());
+        for (number, (this, constraint)) in near.iter().zip(contacts).enumerate() {
+            // Points of one part follow each other, and there are few: a wrong guess costs iterations only.
+            let is_same = |object: u32, part: u32| (object, part) == (this.object, this.part);
+            let before = near[..number].iter().rev();
+            let place = before.take_while(|other| is_same(other.object, other.part)).count();
+            let held = self.held.contacts.iter().filter(|held| is_same(held.object, held.part)).nth(place);
+            let Some(held) = held.filter(|_| constraint.bound_m_s.is_finite()) else { continue };
+            constraint.impulse_N_s = held.impulse_N_s;
+            if let Some(friction) = &mut constraint.friction {
+                friction.warm_start(&held.slip_W_N_s);
+            }
+        }
+        for (constraint, held_N_s) in stops.iter_mut().zip(&self.held.stops_N_s) {
+            if constraint.bound_m_s.is_finite() {
+                constraint.impulse_N_s = *held_N_s;
             }
         }
     }
 
-    fn hold(&mut self, scratch: &Scratch, ball: Option<&Ball>) {
-        self.held.bearing_W_N_s = ball.map_or(Vector3::zeros(), |ball| ball.impulse_W_N_s);
-        let pushing = scratch.near.iter().zip(&scratch.limits).filter(|(_, limit)| limit.impulse > 0.0);
-        self.held.contacts.clear();
-        self.held.contacts.extend(pushing.map(|(near, limit)| HeldContact {
+    fn hold(&mut self, scratch: &Scratch, is_found: bool) {
+        self.held.clear();
+        if !is_found {
+            return;
+        }
+        let (contacts, stops) = scratch.constraints.split_at(scratch.near.len());
+        self.held.contacts.extend(scratch.near.iter().zip(contacts).map(|(near, contact)| HeldContact {
             object: near.object,
             part: near.part,
-            impulse_N_s: limit.impulse,
-            slip_W_N_s: limit.friction.map_or(Vector3::zeros(), |friction| friction.impulse_W_N_s()),
+            impulse_N_s: contact.impulse_N_s,
+            slip_W_N_s: contact.friction.map_or(Vector3::zeros(), |friction| friction.impulse_W_N_s()),
         }));
+        self.held.stops_N_s.extend(stops.iter().map(|stop| stop.impulse_N_s));
     }
 
     /// Tells the contacts what was found and what it pushed with.
     fn note(&mut self, scratch: &Scratch) {
-        let others = &scratch.now[self.first_other()..];
-        let sightings = scratch.near.iter().zip(&scratch.limits).map(|(near, limit)| Sighting {
+        let others = &scratch.now[FIRST_OTHER..];
+        let sightings = scratch.near.iter().zip(&scratch.constraints).map(|(near, contact)| Sighting {
             near: *near,
-            impulse_N_s: limit.impulse,
-            velocity_W_m_s: near.neighbour.map_or(Vector3::zeros(), |number| others[number].velocity_W_m_s),
+            impulse_N_s: contact.impulse_N_s,
+            velocity_W_m_s: near.neighbour.map_or(Vector3::zeros(), |number| part(&others[number].twist)[0]),
         });
         self.contacts.note(&self.state.body, sightings, self.crash_speed_m_s);
     }
 
-    /// Takes over the velocities of `bodies`, which impulses changed from those of `free` over a step of `span_s`.
-    fn move_on(&mut self, free: &Free, bodies: &[Body], span_s: f64) {
+    /// Ends a step of `span_s` with this twist, which impulses changed from that of `free`.
+    fn take_over(&mut self, free: &Free, after: &Vector6<f64>, span_s: f64) {
         let mut body = free.state.body;
-        let solved = &bodies[VEHICLE];
-        let change_W_m_s = solved.velocity_W_m_s - body.velocity_W_m_s;
-        let change_W_rad_s = solved.spin_W_rad_s - body.angular_velocity_W_rad_s();
-        body.velocity_W_m_s = solved.velocity_W_m_s;
-        shift(&mut body, &(change_W_m_s * (span_s / 2.0)), &(change_W_rad_s * (span_s / 2.0)));
-        body.angular_velocity_B_rad_s = body.attitude_WB.inverse_transform_vector(&solved.spin_W_rad_s);
+        let change = after - twist(&body);
+        shift(&mut body, &(change * (span_s / 2.0)));
+        set_twist(&mut body, after);
         self.state = State { body, rotors: free.state.rotors };
-        self.changed.velocity_W_m_s += change_W_m_s + free.held_W_m_s;
-        self.changed.spin_W_rad_s += change_W_rad_s + free.held_W_rad_s;
-        self.slider = free.slider.map(|slider| {
-            let velocity_W_m_s = bodies[SLIDER].velocity_W_m_s;
-            let change_W_m_s = velocity_W_m_s - slider.velocity_W_m_s;
-            let position_W_m = slider.position_W_m + change_W_m_s * (span_s / 2.0);
-            Slider { position_W_m, velocity_W_m_s }
-        });
+        let [velocity_W_m_s, spin_W_rad_s] = part(&(change + free.held));
+        self.changed.velocity_W_m_s += velocity_W_m_s;
+        self.changed.spin_W_rad_s += spin_W_rad_s;
     }
 
-    /// Moves the bodies out of each other and the mount into the bearing, as far as the step left an error of its
-    /// own order; no velocity is changed by that.
-    fn correct_pose(&mut self, scratch: &mut Scratch, mut ball: Option<Ball>, span_s: f64) {
+    /// Moves the vehicle out of what the order of the step left it inside of; no velocity is changed by that.
+    fn push_out(&mut self, scratch: &mut Scratch, span_s: f64) {
         let mut is_exact = true;
-        for limit in scratch.limits.iter_mut().filter(|limit| limit.least.is_finite()) {
-            let mean = (limit.normal.rate(&scratch.now) + limit.normal.rate(&scratch.then)) / 2.0;
-            let gap = limit.gap + mean * span_s;
-            is_exact &= gap > -EXACT;
-            (limit.least, limit.impulse, limit.friction) = ((-gap).min(PUSHED_OUT_MAX), 0.0, None);
-        }
-        if let (Some(ball), Some(rig)) = (&mut ball, &self.rig) {
-            let bearing_W_m = self.slider.map_or(rig.bearing_W_m, |slider| slider.position_W_m);
-            let off_W_m = rig::off_W_m(rig, &self.state.body, &bearing_W_m);
-            is_exact &= off_W_m.amax() < EXACT;
-            (ball.wanted_W_m_s, ball.impulse_W_N_s) = (-off_W_m, Vector3::zeros());
+        let asked = scratch.constraints.iter_mut().filter(|constraint| constraint.bound_m_s.is_finite());
+        for constraint in asked {
+            let rates_m_s = constraint.normal.rate(&scratch.now) + constraint.normal.rate(&scratch.then);
+            let gap_m = constraint.gap_m + rates_m_s / 2.0 * span_s;
+            is_exact &= gap_m > -EXACT_M;
+            // A shift over the step in place of a rate.
+            constraint.bound_m_s = (-gap_m).min(PUSH_OUT_M_S * span_s);
+            (constraint.impulse_N_s, constraint.friction) = (0.0, None);
         }
         if is_exact {
             return;
         }
-        scratch.then.iter_mut().for_each(|body| *body = body.still());
-        solver::solve(&mut scratch.then, &mut ball, &mut scratch.limits);
-        let moved = &scratch.then[VEHICLE];
-        shift(&mut self.state.body, &moved.velocity_W_m_s, &moved.spin_W_rad_s);
-        if let Some(slider) = &mut self.slider {
-            slider.position_W_m += scratch.then[SLIDER].velocity_W_m_s;
-        }
+        scratch.then.iter_mut().for_each(|body| body.twist = Vector6::zeros());
+        scratch.solve();
+        shift(&mut self.state.body, &scratch.then[VEHICLE].twist);
     }
 }
 
 impl Scratch {
-    /// How long after now the first gap closes, if any does in the free step of `span_s`; 0 where two that touch
-    /// meet now.
-    fn next_impact_s(&self, span_s: f64) -> Option<f64> {
-        let after_s = |limit: &Limit| {
-            let rate = limit.normal.rate(&self.now);
-            if rate >= -SLOW {
+    /// Finds the impulses and gives them to the bodies at the step's end. Where another vehicle would drive this one into
+    /// what stands, no impulses do both: the other is left out, and flies into it. Returns whether they were found.
+    fn solve(&mut self) -> bool {
+        let before = self.then[VEHICLE].twist;
+        let is_found = solver::solve(&mut self.then, &mut self.constraints) < FOUND_M_S;
+        if is_found || self.near.iter().all(|near| near.neighbour.is_none()) {
+            return is_found;
+        }
+        self.forget();
+        for (near, constraint) in self.near.iter().zip(&mut self.constraints) {
+            if near.neighbour.is_some() {
+                constraint.bound_m_s = f64::NEG_INFINITY;
+            }
+        }
+        self.then[VEHICLE].twist = before;
+        solver::solve(&mut self.then, &mut self.constraints) < FOUND_M_S
+    }
+
+    /// Takes all impulses away.
+    fn forget(&mut self) {
+        for constraint in &mut self.constraints {
+            constraint.impulse_N_s = 0.0;
+            if let Some(friction) = &mut constraint.friction {
+                friction.warm_start(&Vector3::zeros());
+            }
+        }
+    }
+
+    /// How long after now the first gap closes, if any does in the free step of `span_s`, at more than `slow_m_s`; 0
+    /// where two that touch meet now.
+    fn next_impact_s(&self, span_s: f64, slow_m_s: f64) -> Option<f64> {
+        let after_s = |constraint: &Unilateral| {
+            let rate_m_s = constraint.normal.rate(&self.now);
+            if rate_m_s >= -slow_m_s {
                 return None;
             }
-            let mean = (rate + limit.normal.rate(&self.then)) / 2.0;
-            let closes_s = if limit.gap <= TOUCH { 0.0 } else { (limit.gap - TOUCH / 2.0) / -mean };
+            let mean_m_s = (rate_m_s + constraint.normal.rate(&self.then)) / 2.0;
+            let gap_m = constraint.gap_m;
+            let closes_s = if gap_m <= TOUCH_M { 0.0 } else { (gap_m - TOUCH_M / 2.0) / -mean_m_s };
             (0.0..span_s).contains(&closes_s).then_some(closes_s)
         };
-        self.limits.iter().filter_map(after_s).min_by(f64::total_cmp)
+        self.constraints.iter().filter_map(after_s).min_by(f64::total_cmp)
     }
+}
+
+fn twist(body: &RigidBody) -> Vector6<f64> {
+    join(&body.velocity_W_m_s, &body.angular_velocity_W_rad_s())
+}
+
+fn set_twist(body: &mut RigidBody, twist: &Vector6<f64>) {
+    let [velocity_W_m_s, spin_W_rad_s] = part(twist);
+    body.velocity_W_m_s = velocity_W_m_s;
+    body.angular_velocity_B_rad_s = body.attitude_WB.inverse_transform_vector(&spin_W_rad_s);
 }
 
 /// Has the other vehicles fly on for `span_s`.
@@ -422,7 +527,8 @@ fn move_on(others: &mut [Neighbour], span_s: f64) {
 }
 
 /// Moves and turns a body by little.
-fn shift(body: &mut RigidBody, by_W_m: &Vector3<f64>, by_W_rad: &Vector3<f64>) {
+fn shift(body: &mut RigidBody, by: &Vector6<f64>) {
+    let [by_W_m, by_W_rad] = part(by);
     body.position_W_m += by_W_m;
     let turn = Quaternion::from_parts(1.0, by_W_rad / 2.0);
     body.attitude_WB = UnitQuaternion::new_normalize(turn * body.attitude_WB.into_inner());

@@ -135,12 +135,6 @@ impl World {
         for (place, part) in hull.iter().enumerate() {
             let part_pose = pose * *part.position();
             let around = part.shape().compute_aabb(&part_pose).loosened(margin_m);
-            for thing in things.iter().filter(|thing| thing.around.intersects(&around)) {
-                let collider = &thing.collider;
-                meet((collider, collider.position()), (part, &part_pose), margin_m, manifolds, |contact| {
-                    found.push(Near { part: 1 << place, ..contact });
-                });
-            }
             for (number, vehicle) in others.iter().enumerate() {
                 let there = Pose::from_translation(to_rapier(&vehicle.position_W_m)) * *other.position();
                 if other.shape().compute_aabb(&there).intersects(&around) {
@@ -149,6 +143,12 @@ impl World {
                         found.push(Near { part: 1 << place, object, neighbour: Some(number), ..contact });
                     });
                 }
+            }
+            for thing in things.iter().filter(|thing| thing.around.intersects(&around)) {
+                let collider = &thing.collider;
+                meet((collider, collider.position()), (part, &part_pose), margin_m, manifolds, |contact| {
+                    found.push(Near { part: 1 << place, ..contact });
+                });
             }
         }
     }
@@ -186,9 +186,12 @@ fn meet(
     if thing.shape().as_composite_shape().is_some() {
         manifolds.clear();
     } else {
-        // One is enough, and it keeps its memory.
+        // One is enough. Beside its points it would remember where the search before began.
         manifolds.truncate(1);
-        manifolds.iter_mut().for_each(Manifold::clear);
+        for manifold in manifolds.iter_mut() {
+            manifold.clear();
+            (manifold.local_n1, manifold.local_n2) = (Vector::ZERO, Vector::ZERO);
+        }
     }
     let (shape, part_shape) = (thing.shape(), part.shape());
     let found =
