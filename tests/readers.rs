@@ -62,9 +62,9 @@ fn check(script: &str) {
     std::io::stderr().write_all(&output.stdout).unwrap();
 
     let (topic, falsified) = if script == "read_container.py" {
-        ("/plant/pose", flight.falsified("/plant/pose", "tick", |tick| *tick = 1.into()))
+        ("/plant/pose", flight.falsified(script, "/plant/pose", "tick", |tick| *tick = 1.into()))
     } else {
-        ("/plant/state", flight.falsified("/plant/state", "position.z", one_bit_more))
+        ("/plant/state", flight.falsified(script, "/plant/state", "position.z", one_bit_more))
     };
     expect_failure(&flight.read(&readers, script, &falsified), topic);
     expect_failure(&flight.read(&readers, script, &flight.dir.path().join("empty.jsonl")), "");
@@ -140,7 +140,13 @@ impl Flight {
     }
 
     /// A copy of the lines in which `change` was applied to one message of `topic`.
-    fn falsified(&self, topic: &str, key: &str, change: impl Fn(&mut serde_json::Value)) -> PathBuf {
+    fn falsified(
+        &self,
+        script: &str,
+        topic: &str,
+        key: &str,
+        change: impl Fn(&mut serde_json::Value),
+    ) -> PathBuf {
         let text = fs::read_to_string(&self.lines).unwrap();
         let mut lines: Vec<_> = text.lines().map(str::to_owned).collect();
         let start = format!("{{\"topic\":\"{topic}\"");
@@ -149,7 +155,8 @@ impl Flight {
         let object = if key == "tick" { &mut message } else { &mut message["fields"] };
         change(&mut object[key]);
         *line = message.to_string();
-        let path = self.dir.path().join(format!("{key}.jsonl"));
+        // A file for each script: those of other tests are read at the same time.
+        let path = self.dir.path().join(format!("{script}-{key}.jsonl"));
         fs::write(&path, lines.join("\n")).unwrap();
         path
     }
