@@ -175,6 +175,9 @@ impl Friction {
     /// Steps against the slip, equally far along both axes: only so does the iteration end with a force that is
     /// opposite to the slip, whatever the bodies' inertia. Returns by how much that changed the slip at most.
     fn relax(&mut self, all: &mut [Body], normal_N_s: f64) -> f64 {
+        if self.largest_per_kg <= 0.0 {
+            return 0.0;
+        }
         let slip_m_s = Vector2::new(self.slips[0].rate(all), self.slips[1].rate(all));
         let wanted_N_s = self.impulses_N_s - slip_m_s / self.largest_per_kg;
         let (most_N_s, size_N_s) = (self.coefficient * normal_N_s, wanted_N_s.norm());
