@@ -17,8 +17,8 @@ mod sensing;
 
 pub use control::{ControlStatus, Reference};
 pub use sensing::{
-    Barometer, Battery, Clearance, Contact, Gps, Innovation, Magnetometer, Mocap, Ranges, RotorSpeeds,
-    StateEstimate, Traffic, WallEstimate,
+    Barometer, Battery, BodyStates, Clearance, Contact, Gps, Innovation, Magnetometer, Mocap, Ranges,
+    RotorSpeeds, StateEstimate, Traffic, WallEstimate,
 };
 
 /// Simulation time as ROS 2 writes it. The bus fills it in when a sample is sent.

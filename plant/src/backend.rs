@@ -28,6 +28,16 @@ pub trait Backend {
     /// What was touched over the last tick.
     fn contact(&self) -> ContactReport;
 
+    /// The free bodies of the scene, in its order: where they are and how they move.
+    fn bodies(&self) -> &[RigidBody] {
+        &[]
+    }
+
+    /// Their numbers, as [`ContactReport::object`] counts them.
+    fn body_objects(&self) -> &[u32] {
+        &[]
+    }
+
     /// The battery, if an effect models it.
     fn battery(&self) -> Option<Battery>;
 

@@ -11,7 +11,7 @@ use vehicles::Vehicle;
 use crate::actuation::Actuation;
 use crate::airframe::Airframe;
 use crate::rotation::rotated;
-use crate::state::{Rates, RigidBody, RotorRates, RotorState, State};
+use crate::state::{BodyRates, Rates, RigidBody, RotorRates, RotorState, State};
 
 /// The model: immutable, while the [`State`] it moves belongs to the caller.
 ///
@@ -150,19 +150,20 @@ impl NewtonEuler {
         state.moved(&sum, span_s / 6.0)
     }
 
-    fn rates(&self, state: &State, actuation: &Actuation) -> Rates {
+    /// Rates of free flight.
+    pub(crate) fn rates(&self, state: &State, actuation: &Actuation) -> Rates {
         let rotors = self.airframe.rotor_rates(actuation, state);
         let wrench = self.airframe.wrench(actuation, state, &rotors);
         let attitude_WB = state.body.attitude_WB.as_ref();
         let force_W_N = rotated(attitude_WB, &wrench.force_B_N);
-        Rates {
+        let body = BodyRates {
             velocity_W_m_s: state.body.velocity_W_m_s,
             acceleration_W_m_s2: self.gravity_W_m_s2 + force_W_N / self.vehicle().mass_kg,
             // 1/2 q (0, w), with w in the body frame.
             attitude_WB_per_s: attitude_WB * Quaternion::from_imag(state.body.angular_velocity_B_rad_s * 0.5),
             angular_acceleration_B_rad_s2: self.angular_acceleration(state, &wrench.torque_B_N_m),
-            rotors,
-        }
+        };
+        Rates { body, rotors }
     }
 
     /// J^-1 (tau - w x J w).

@@ -3,7 +3,8 @@
 use crate::backend::Backend;
 use bus::OutputPorts;
 use bus::messages::{
-    Battery, BodyTransform, Contact, Orientation, PlantState, Point, Pose, PoseStamped, Quaternion,
+    Battery, BodyStates, BodyTransform, Contact, Orientation, PlantState, Point, Pose, PoseStamped,
+    Quaternion,
 };
 use nalgebra::{UnitQuaternion, Vector3};
 
@@ -18,6 +19,8 @@ pub struct Outputs {
     pub tf: Option<BodyTransform>,
     /// What is touched; with the backend `rapier`.
     pub contact: Option<Contact>,
+    /// The scene's free bodies; with the backend `rapier`.
+    pub bodies: Option<BodyStates>,
     /// The battery, where an effect models it.
     pub battery: Option<Battery>,
 }
@@ -32,6 +35,7 @@ impl Outputs {
             pose: Some(PoseStamped { pose: Pose { position, orientation }, ..Default::default() }),
             tf: Some(BodyTransform::new(position, orientation)),
             contact: Some(contact(backend)),
+            bodies: Some(bodies(backend)),
             battery: Some(battery_message(backend, time_ns)),
         }
     }
@@ -74,6 +78,19 @@ fn contact(backend: &dyn Backend) -> Contact {
         crashed: report.crashed.into(),
         ..Default::default()
     }
+}
+
+fn bodies(backend: &dyn Backend) -> BodyStates {
+    let mut states = BodyStates { count: backend.bodies().len() as u32, ..Default::default() };
+    for (place, (body, object)) in backend.bodies().iter().zip(backend.body_objects()).enumerate() {
+        let [x, y, z, w] = body.attitude_WB.coords.into();
+        states.object[place] = *object;
+        states.position[place] = vector(&body.position_W_m);
+        states.attitude[place] = Quaternion { x, y, z, w };
+        states.velocity[place] = vector(&body.velocity_W_m_s);
+        states.angular_velocity[place] = vector(&body.angular_velocity_W_rad_s());
+    }
+    states
 }
 
 fn vector(v: &Vector3<f64>) -> bus::messages::Vector3 {

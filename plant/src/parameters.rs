@@ -66,6 +66,25 @@ fn two() -> u32 {
 }
 
 impl Parameters {
+    /// Refuses ports that do not go with the scene's free bodies.
+    fn refuse_ports(&self, scene: &Scene, run: &NodeContext<'_>) -> Result<(), ParameterError> {
+        let has_bodies = scene.bodies().next().is_some();
+        refuse(has_bodies && run.has("traffic"), "scene", || {
+            format!(
+                "`scene` \"{}\" holds free bodies, and the input `traffic` tells of other vehicles: each plant moves \
+                 bodies of its own, so they would be somewhere else for every vehicle; leave `traffic` out, or take their \
+                 `mass` away",
+                scene.name
+            )
+        })?;
+        refuse(!has_bodies && run.has("bodies"), "scene", || {
+            format!(
+                "the output `bodies` needs a scene in which something has a `mass`; \"{}\" has none",
+                scene.name
+            )
+        })
+    }
+
     /// Refuses what cannot be meant.
     fn check(&self, run: &NodeContext<'_>) -> Result<(), ParameterError> {
         all(finite, "initial_position_m", &self.initial_position_m)?;
@@ -130,6 +149,7 @@ impl Parameters {
     ) -> Result<(Vehicle, Box<dyn Backend>), ParameterError> {
         self.check(run)?;
         let (airframe, scene) = self.airframe()?;
+        self.refuse_ports(&scene, run)?;
         // Before the backend, which a vehicle that is none might not survive.
         airworthy::check_steps(airframe.vehicle(), run.tick_s() / f64::from(self.substeps), run)?;
         if scene.rig.is_none() && self.window_s.is_none() {
@@ -148,6 +168,14 @@ impl Parameters {
         scene: &Scene,
     ) -> Result<Box<dyn Backend>, ParameterError> {
         let flies_freely = self.backend == BackendName::NewtonEuler;
+        let has_bodies = scene.bodies().next().is_some() || !scene.joints.is_empty();
+        refuse(flies_freely && has_bodies, "scene", || {
+            let name = &scene.name;
+            format!(
+                "`scene` \"{name}\" holds free bodies, which need `backend` = \"rapier\": newton-euler moves the vehicle \
+                 alone"
+            )
+        })?;
         refuse(flies_freely && scene.rig.is_some(), "scene", || {
             let name = &scene.name;
             format!(
@@ -158,8 +186,9 @@ impl Parameters {
             BackendName::NewtonEuler => Ok(Box::new(FreeFlight::new(model, self.start(), effects))),
             BackendName::Rapier => {
                 let crash_speed_m_s = self.crash_speed_m_s.unwrap_or(CRASH_SPEED_M_S);
-                let rapier = Rapier::new(model, effects, scene, &self.start(), crash_speed_m_s);
+                let mut rapier = Rapier::new(model, effects, scene, &self.start(), crash_speed_m_s);
                 self.refuse_inside(&rapier, scene)?;
+                self.refuse_bodies(&mut rapier, scene)?;
                 Ok(Box::new(rapier))
             }
         }
@@ -185,6 +214,38 @@ impl Parameters {
                 "`initial_position_m` is {:?}, where the vehicle is partly inside of \"{name}\" in the scene; \
                  move it out",
                 self.initial_position_m
+            )
+        })
+    }
+
+    /// Refuses free bodies that start inside of something, and ropes that start longer than they are, unless a measured
+    /// flight says where the vehicle starts.
+    fn refuse_bodies(&self, rapier: &mut Rapier, scene: &Scene) -> Result<(), ParameterError> {
+        if self.window_s.is_some() {
+            return Ok(());
+        }
+        let name = |object: u32| match object {
+            0 => "the vehicle".to_owned(),
+            1 => "the ground".to_owned(),
+            _ => format!("\"{}\"", scene.name_of(object as usize - 2).unwrap_or_default()),
+        };
+        let overlap = rapier.overlap();
+        refuse(overlap.is_some(), "scene", || {
+            let [first, second] = overlap.unwrap_or_default().map(name);
+            format!(
+                "`scene` \"{}\" starts with {second} partly inside of {first}, with the vehicle at {:?}; move one of them \
+                 (what hangs from the vehicle is placed as seen from it)",
+                scene.name, self.initial_position_m
+            )
+        })?;
+        let stretched = rapier.overstretched();
+        refuse(stretched.is_some(), "scene", || {
+            let (joint, over_m) = stretched.unwrap_or_default();
+            let rope = scene.joints.get(joint).map_or("", |joint| &joint.name);
+            format!(
+                "`scene` \"{}\" starts with the ends of \"{rope}\" {over_m:.4} m farther apart than its `length`, with the \
+                 vehicle at {:?}; move an end, or give it more",
+                scene.name, self.initial_position_m
             )
         })
     }

@@ -5,9 +5,11 @@
 //!
 //! | room | what it holds |
 //! |---|---|
-//! | `body` | where glam meets nalgebra |
+//! | `body` | a rigid body as rapier and as impulses see it |
 //! | `world` | what stands and moves in rapier's world, and what of it is near |
 //! | [`hull`] | how much room a vehicle takes |
+//! | `free_bodies` | the free bodies of the scene, and a step without contacts |
+//! | `joints`, `joint_forces` | what ties them: rows of constraints, and the forces that keep them |
 //! | `solver` | the impulses of contacts, stops and joints |
 //! | `stepping` | a step that is cut at impacts |
 //! | `contacts` | when contacts begin and end |
@@ -15,7 +17,10 @@
 
 mod body;
 mod contacts;
+mod free_bodies;
 pub mod hull;
+mod joint_forces;
+mod joints;
 mod rig;
 mod solver;
 mod stepping;
@@ -28,6 +33,7 @@ use crate::newton_euler::{Accelerations, NewtonEuler};
 use crate::snapshot::{Snapshot, SnapshotError};
 use crate::state::{RigidBody, State};
 use contacts::Contacts;
+use free_bodies::FreeBodies;
 use hull::Hull;
 use nalgebra::{UnitQuaternion, Vector3};
 use scenes::{Rig, Scene};
@@ -94,11 +100,13 @@ impl Rapier {
         let hull = Hull::of(model.airframe());
         // The mount is on the frame, and where it is seen from may have moved.
         let mount_shift_B_m = model.airframe().frame_shift_B_m();
+        let free_bodies = FreeBodies::new(scene, &mount_shift_B_m);
         let motion = Motion {
             rig: scene.rig.map(|rig| Rig { mount_B_m: rig.mount_B_m + mount_shift_B_m, ..rig }),
             crash_speed_m_s,
             inertia_min_kg_m2: vehicle.inertia_kg_m2.symmetric_eigenvalues().min(),
-            world: World::new(&hull, scene),
+            world: World::new(&hull, scene, free_bodies.tied_pairs()),
+            free_bodies,
             contacts: Contacts::new(1 + scene.thing_count() + TRAFFIC_MAX),
             state: model.start(*body, 0.0),
             held: Held::default(),
@@ -115,6 +123,25 @@ impl Rapier {
     /// The number of the scene's box or mesh that the vehicle is partly inside of, if any.
     pub(crate) fn thing_around(&self) -> Option<usize> {
         self.motion.world.thing_around(&self.motion.state.body)
+    }
+
+    /// The numbers of the first two of the scene's bodies, things and the vehicle that start inside of each other, as
+    /// `bus::messages::Contact` counts them: 0 is the vehicle.
+    pub(crate) fn overlap(&mut self) -> Option<[u32; 2]> {
+        let Motion { world, free_bodies, state, .. } = &mut self.motion;
+        world.overlap(&state.body, &free_bodies.states)
+    }
+
+    /// The place of the first rope among the scene's joints that is longer than it may be, and by how much.
+    pub(crate) fn overstretched(&self) -> Option<(usize, f64)> {
+        self.motion.free_bodies.overstretched(&self.motion.state.body)
+    }
+
+    /// Numbers that tell this scene and vehicle from others.
+    fn numbers(&self) -> Vec<f64> {
+        let mut numbers = self.motion.world.numbers();
+        numbers.extend(self.motion.free_bodies.numbers());
+        numbers
     }
 
     /// Has the vehicle stand on its feet where it is too low to fly.
@@ -216,16 +243,26 @@ impl Backend for Rapier {
             Some(rig) => self.hang(&rig),
             None => self.put_down(),
         }
+        let vehicle = self.motion.state.body;
+        self.motion.free_bodies.hang_from(&vehicle);
         self.motion.held.clear();
         self.lean_on_support();
     }
 
+    fn bodies(&self) -> &[RigidBody] {
+        &self.motion.free_bodies.states
+    }
+
+    fn body_objects(&self) -> &[u32] {
+        &self.motion.free_bodies.objects
+    }
+
     fn contact(&self) -> ContactReport {
-        // All that free flight does not explain is the contacts' doing; in a rig, where the bearing pushes too, it is what
+        // All that free flight does not explain is the contacts' doing; in a rig and on joints, which push too, it is what
         // they push along their normals, friction left out.
-        self.motion.contacts.report(&match self.motion.rig {
-            Some(_) => self.reaction.normal_W_N,
-            None => self.reaction.acceleration_W_m_s2 * self.motion.model.vehicle().mass_kg,
+        self.motion.contacts.report(&match self.motion.is_held() {
+            true => self.reaction.normal_W_N,
+            false => self.reaction.acceleration_W_m_s2 * self.motion.model.vehicle().mass_kg,
         })
     }
 
@@ -241,7 +278,8 @@ impl Backend for Rapier {
             .with("rig", &self.motion.rig.as_ref().map(rig::numbers))?
             .with("held", &self.motion.held)?
             .with("contacts", &self.motion.contacts)?
-            .with("world", &self.motion.world.numbers())?
+            .with("bodies", &self.motion.free_bodies.states)?
+            .with("world", &self.numbers())?
             .bytes()
     }
 
@@ -252,9 +290,12 @@ impl Backend for Rapier {
         let rig = self.motion.rig.as_ref().map(rig::numbers);
         snapshot.fitting("rig", |found: &Option<Vec<f64>>| *found == rig)?;
         let (held, contacts) = (snapshot.get("held")?, snapshot.get("contacts")?);
-        snapshot.fitting("world", |numbers: &Vec<f64>| *numbers == self.motion.world.numbers())?;
+        snapshot.fitting("world", |numbers: &Vec<f64>| *numbers == self.numbers())?;
+        let states =
+            snapshot.fitting("bodies", |states: &Vec<RigidBody>| states.len() == self.bodies().len())?;
         (self.motion.state, self.effects, self.reaction) = (state, effects, reaction);
         (self.motion.held, self.motion.contacts) = (held, contacts);
+        self.motion.free_bodies.states = states;
         Ok(())
     }
 }

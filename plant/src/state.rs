@@ -77,11 +77,17 @@ impl RotorState {
 /// Rates of change of every component of a [`State`].
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Rates {
+    pub body: BodyRates,
+    pub rotors: [RotorRates; 4],
+}
+
+/// Rates of change of every component of a [`RigidBody`].
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct BodyRates {
     pub velocity_W_m_s: Vector3<f64>,
     pub acceleration_W_m_s2: Vector3<f64>,
     pub attitude_WB_per_s: Quaternion<f64>,
     pub angular_acceleration_B_rad_s2: Vector3<f64>,
-    pub rotors: [RotorRates; 4],
 }
 
 /// Rates of change of a [`RotorState`].
@@ -95,12 +101,21 @@ impl Rates {
     /// `self + factor * other`, the only arithmetic a Runge-Kutta step needs.
     pub fn plus(&self, other: &Rates, factor: f64) -> Rates {
         Rates {
+            body: self.body.plus(&other.body, factor),
+            rotors: std::array::from_fn(|i| self.rotors[i].plus(&other.rotors[i], factor)),
+        }
+    }
+}
+
+impl BodyRates {
+    /// As [`Rates::plus`].
+    pub fn plus(&self, other: &BodyRates, factor: f64) -> BodyRates {
+        BodyRates {
             velocity_W_m_s: self.velocity_W_m_s + other.velocity_W_m_s * factor,
             acceleration_W_m_s2: self.acceleration_W_m_s2 + other.acceleration_W_m_s2 * factor,
             attitude_WB_per_s: self.attitude_WB_per_s + other.attitude_WB_per_s * factor,
             angular_acceleration_B_rad_s2: self.angular_acceleration_B_rad_s2
                 + other.angular_acceleration_B_rad_s2 * factor,
-            rotors: std::array::from_fn(|i| self.rotors[i].plus(&other.rotors[i], factor)),
         }
     }
 }
@@ -115,20 +130,26 @@ impl RotorRates {
 }
 
 impl State {
-    /// This state moved along `rates` for `span_s`. The quaternion is left as long as it comes out: only a
-    /// finished step normalises it, so that the stages inside a step stay a smooth function of time.
+    /// This state moved along `rates` for `span_s`.
     pub(crate) fn moved(&self, rates: &Rates, span_s: f64) -> State {
-        let body = &self.body;
-        let attitude = body.attitude_WB.into_inner() + rates.attitude_WB_per_s * span_s;
         State {
-            body: RigidBody {
-                position_W_m: body.position_W_m + rates.velocity_W_m_s * span_s,
-                velocity_W_m_s: body.velocity_W_m_s + rates.acceleration_W_m_s2 * span_s,
-                attitude_WB: UnitQuaternion::new_unchecked(attitude),
-                angular_velocity_B_rad_s: body.angular_velocity_B_rad_s
-                    + rates.angular_acceleration_B_rad_s2 * span_s,
-            },
+            body: self.body.moved(&rates.body, span_s),
             rotors: std::array::from_fn(|i| self.rotors[i].moved(&rates.rotors[i], span_s)),
+        }
+    }
+}
+
+impl RigidBody {
+    /// This body moved along `rates` for `span_s`. The quaternion is left as long as it comes out: only a finished step
+    /// normalises it, so that the stages inside a step stay a smooth function of time.
+    pub(crate) fn moved(&self, rates: &BodyRates, span_s: f64) -> RigidBody {
+        let attitude = self.attitude_WB.into_inner() + rates.attitude_WB_per_s * span_s;
+        RigidBody {
+            position_W_m: self.position_W_m + rates.velocity_W_m_s * span_s,
+            velocity_W_m_s: self.velocity_W_m_s + rates.acceleration_W_m_s2 * span_s,
+            attitude_WB: UnitQuaternion::new_unchecked(attitude),
+            angular_velocity_B_rad_s: self.angular_velocity_B_rad_s
+                + rates.angular_acceleration_B_rad_s2 * span_s,
         }
     }
 }

@@ -1,10 +1,12 @@
 //! Which keys a scene file has, and in which dimension.
 #![allow(non_snake_case, reason = "a trailing _W names the frame a vector is written in")]
 
+use crate::body::{self, Keys};
+use crate::joint;
 use crate::mesh::{Mesh, Solidity};
 use crate::mesh_file::Format;
 use crate::rig::{self, PLACE};
-use crate::scene::{Cuboid, Scene};
+use crate::scene::{Ball, Cuboid, Scene};
 use crate::surface::Surface;
 use diagnostics::parameter::Bounds;
 use diagnostics::unit::{ANGLE, LENGTH, RATIO};
@@ -48,6 +50,13 @@ const RESTITUTION: Bounds = Bounds {
     unit: "",
     why: "the fraction of the speed of approach that a bounce leaves: 0 leaves none, 1 all of it",
 };
+
+/// The most free bodies of a scene: as many as a sample of their poses holds.
+pub const BODIES_MAX: usize = 16;
+
+/// A ball of a scene.
+const RADIUS: Bounds =
+    Bounds { min: 1e-4, max: 1e3, unit: "m", why: "above 0: nothing that a vehicle meets is thinner" };
 
 /// Beyond these numbers of things a contact's number would be that of another vehicle.
 const THINGS_MAX: usize = 900;
@@ -96,24 +105,52 @@ impl Scene {
         let folder = Path::new(file_name).parent().unwrap_or(Path::new(""));
         let meshes = sections.iter().map(|section| one_mesh(section, &surface, folder, read));
         let meshes = faults.keep(Diagnostic::gather(meshes));
+        let sections = root.sections_if_any("balls")?;
+        let balls = sections.iter().map(|section| one_ball(section, &surface));
+        let balls = faults.keep(Diagnostic::gather(balls));
         let rig = root.has("rig").then(|| faults.keep(root.section("rig").and_then(|rig| rig::parse(&rig))));
         let effects = faults.keep(vehicles::effects::read(&root));
+        let joints = root.sections_if_any("joints")?;
         faults.keep(root.finish());
-        let scene = name.zip(boxes).zip(meshes).zip(effects);
+        let things = name.zip(boxes).zip(meshes).zip(balls).zip(effects);
         let rig = rig.flatten();
-        let scene = scene.map(|(((name, boxes), meshes), effects)| Self {
+        let scene = things.map(|((((name, boxes), meshes), balls), effects)| Self {
             name,
             boxes,
             meshes,
+            balls,
             rig,
             effects,
             surface,
+            joints: Vec::new(),
         });
-        if let Some(scene) = scene.as_ref().filter(|scene| scene.thing_count() > THINGS_MAX) {
-            let found = format!("{} boxes and meshes", scene.thing_count());
-            return Err(doc.bad(&(0..0), "boxes", format!("at most {THINGS_MAX} of both together"), found));
+        // Joints name bodies: what is wrong with those comes first.
+        let mut scene = faults.finish(scene)?;
+        check_numbers(&doc, &scene)?;
+        scene.tie(&doc, &joints)?;
+        Ok(scene)
+    }
+
+    /// Reads the tables of `[[joints]]`, once all bodies are known.
+    fn tie(&mut self, doc: &Document, sections: &[Section]) -> Result<(), Diagnostic> {
+        let names: Vec<&str> = self.bodies().filter_map(|(number, _)| self.name_of(number)).collect();
+        let joints = sections.iter().map(|section| joint::parse(section, &names));
+        let joints = Diagnostic::gather(joints)?;
+        self.joints = joints;
+        if let Some(place) = self.joint_that_pins_the_vehicle() {
+            let expected = "a rope, where the world and the vehicle are tied together; a [rig] holds a vehicle otherwise";
+            return Err(doc.bad(
+                &sections[place].at_of("kind"),
+                &sections[place].key("kind"),
+                expected,
+                "another",
+            ));
         }
-        faults.finish(scene)
+        if let Some(first) = sections.first().filter(|_| self.rig.is_some() && self.is_vehicle_tied()) {
+            let (expected, found) = ("a [rig] or joints to the vehicle", "both".to_owned());
+            return Err(doc.bad(&first.at, &first.path, expected, found));
+        }
+        Ok(())
     }
 
     /// The mesh files that the scene file at `path` names; what is wrong with it is told where it is read.
@@ -124,6 +161,29 @@ impl Scene {
         let folder = path.parent().unwrap_or(Path::new(""));
         let files = meshes.into_iter().flatten().filter_map(|mesh| mesh.get("file")?.as_str());
         files.map(|file| folder.join(file)).collect()
+    }
+}
+
+/// Refuses more things or free bodies than there are numbers for, and two bodies of one name.
+fn check_numbers(doc: &Document, scene: &Scene) -> Result<(), Diagnostic> {
+    let refused = |expected: String, found| Err(doc.bad(&(0..0), "boxes", expected, found));
+    let (things, bodies) = (scene.thing_count(), scene.bodies().count());
+    if things > THINGS_MAX {
+        return refused(
+            format!("at most {THINGS_MAX} of all together"),
+            format!("{things} boxes, meshes and balls"),
+        );
+    }
+    if bodies > BODIES_MAX {
+        return refused(format!("at most {BODIES_MAX} with a `mass`"), format!("{bodies} free bodies"));
+    }
+    let mut names: Vec<_> = scene.bodies().filter_map(|(number, _)| scene.name_of(number)).collect();
+    names.sort_unstable();
+    match names.windows(2).find(|pair| pair[0] == pair[1]) {
+        Some(pair) => {
+            refused("a name of its own for each free body".to_owned(), format!("two \"{}\"", pair[0]))
+        }
+        None => Ok(()),
     }
 }
 
@@ -153,16 +213,29 @@ fn one_mesh(
     let solidity =
         section.choice("solid", &[("triangles", Solidity::Triangles), ("convex", Solidity::Convex)])?;
     let surface = surface(section, surface_around)?;
+    let keys = Keys::read(section)?;
     section.finish()?;
+    if keys.is_some() && solidity == Solidity::Triangles {
+        let expected = "\"convex\" of what has a `mass`: a shell has no inside that could weigh";
+        let (at, key) = (section.at_of("solid"), section.key("solid"));
+        return Err(section.doc.bad(&at, &key, expected, "\"triangles\""));
+    }
     let bytes = read(&file).map_err(|error| refused(error.to_string()))?;
     let triangles = format.read(&bytes).map_err(refused)?;
     let turn = Rotation3::from_axis_angle(&Vector3::z_axis(), yaw_rad);
     let placed =
         |corner: [f64; 3]| (turn * Vector3::from(corner) * scale_m + Vector3::from(place_W_m)).into();
     let corners_W_m = triangles.corners.into_iter().map(placed).collect();
-    let mesh = Mesh { name, file: file.clone(), corners_W_m, faces: triangles.faces, solidity, surface }
-        .without_lines();
-    mesh.shape().map(|_| mesh).map_err(refused)
+    let (file, body) = (file.clone(), None);
+    let mesh = Mesh { name, file, corners_W_m, faces: triangles.faces, solidity, surface, body };
+    let mut mesh = mesh.without_lines();
+    mesh.shape().map_err(refused)?;
+    mesh.body = keys.map(|keys| {
+        let (centre_W_m, spread_m2) = body::solid_moments(&mesh.corners_W_m, &mesh.faces);
+        // Along the file's axes, which are turned.
+        keys.body(turn.transpose() * spread_m2 * turn, centre_W_m, yaw_rad)
+    });
+    Ok(mesh)
 }
 
 /// What `section` says of its surface, and what `otherwise` says where it is silent.
@@ -182,7 +255,20 @@ fn one_box(section: &Section, surface_around: &Surface) -> Result<Cuboid, Diagno
     let size = section.vector("size", LENGTH, &SIZE)?;
     let yaw_rad = if section.has("yaw") { section.bounded("yaw", ANGLE, &YAW)? } else { 0.0 };
     let surface = surface(section, surface_around)?;
+    let keys = Keys::read(section)?;
     section.finish()?;
-    let half_extents_m = Vector3::from(size) / 2.0;
-    Ok(Cuboid { name, centre_W_m: centre.into(), half_extents_m, yaw_rad, surface })
+    let (centre_W_m, half_extents_m) = (Vector3::from(centre), Vector3::from(size) / 2.0);
+    let body = keys.map(|keys| keys.body(body::box_inertia_m2(&half_extents_m), centre_W_m, yaw_rad));
+    Ok(Cuboid { name, centre_W_m, half_extents_m, yaw_rad, surface, body })
+}
+
+fn one_ball(section: &Section, surface_around: &Surface) -> Result<Ball, Diagnostic> {
+    let name = section.text("name")?.to_owned();
+    let centre_W_m = Vector3::from(section.vector("centre", LENGTH, &PLACE)?);
+    let radius_m = section.bounded("radius", LENGTH, &RADIUS)?;
+    let surface = surface(section, surface_around)?;
+    let keys = Keys::read(section)?;
+    section.finish()?;
+    let body = keys.map(|keys| keys.body(body::ball_inertia_m2(radius_m), centre_W_m, 0.0));
+    Ok(Ball { name, centre_W_m, radius_m, surface, body })
 }

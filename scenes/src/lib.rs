@@ -1,11 +1,14 @@
 //! Scene files: what stands around the vehicles; and what a ray meets there.
 //!
-//! The ground is the plane z = 0 of the world, solid below. Boxes and meshes stand still, turned about the vertical only.
+//! The ground is the plane z = 0 of the world, solid below. Boxes, meshes and balls stand still, turned about the vertical
+//! only, or are free bodies that start so.
 //!
 //! | room | what it holds |
 //! |---|---|
 //! | [`scene`] | the immutable [`Scene`] that plants and range finders use |
 //! | [`mesh`] | things of any shape: triangles |
+//! | [`body`] | what makes a thing a free body: its mass, its inertia, how it starts |
+//! | [`joint`] | what ties free bodies to the world, to each other and to the vehicle |
 //! | [`ray`] | the distance from a point along a direction to what is met first |
 //! | [`surface`] | friction and restitution |
 //! | [`rig`] | the test rigs that a vehicle hangs from |
@@ -20,7 +23,9 @@
 //! ```
 #![forbid(unsafe_code)]
 
+pub mod body;
 mod file;
+pub mod joint;
 pub mod mesh;
 mod mesh_file;
 pub mod ray;
@@ -29,8 +34,11 @@ pub mod rig;
 pub mod scene;
 pub mod surface;
 
+pub use body::{BodyPose, FreeBody, Thing};
+pub use file::BODIES_MAX;
+pub use joint::{Axis, End, Freedom, Joint};
 pub use mesh::{Mesh, Solidity};
 pub use ray::RayCaster;
 pub use rig::Rig;
-pub use scene::{Cuboid, Scene};
+pub use scene::{Ball, Cuboid, Scene};
 pub use surface::Surface;

@@ -1,6 +1,7 @@
 //! Things of any shape: triangles in the world, as what a ray meets and a vehicle touches.
 #![allow(non_snake_case, reason = "a trailing _W names the frame a vector is written in")]
 
+use crate::body::FreeBody;
 use crate::surface::Surface;
 use parry3d_f64::math::Vector;
 use parry3d_f64::shape::{SharedShape, TriMesh, TriMeshFlags};
@@ -28,7 +29,7 @@ pub enum Solidity {
     Convex,
 }
 
-/// A thing that stands still, made of triangles.
+/// A thing made of triangles.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Mesh {
     /// What the scene file calls it, such as `desk`.
@@ -43,6 +44,8 @@ pub struct Mesh {
     pub solidity: Solidity,
     /// How it answers to what touches it.
     pub surface: Surface,
+    /// How it moves; nothing where it stands still.
+    pub body: Option<FreeBody>,
 }
 
 impl Mesh {

@@ -1,11 +1,12 @@
 //! The distance from a point along a direction to what is met first.
 #![allow(non_snake_case, reason = "a trailing _W names the frame a vector is written in")]
 
-use crate::scene::{Cuboid, Scene};
+use crate::body::{BodyPose, Thing};
+use crate::scene::Scene;
 use nalgebra::Vector3;
-use parry3d_f64::math::{Pose, Vector};
-use parry3d_f64::query::{PointQuery, Ray, RayCast};
-use parry3d_f64::shape::{Cuboid as Shape, SharedShape};
+use parry3d_f64::math::{Pose, Rotation, Vector};
+use parry3d_f64::query::Ray;
+use parry3d_f64::shape::SharedShape;
 
 /// A scene prepared for ray casts. A cast allocates nothing.
 ///
@@ -19,46 +20,106 @@ use parry3d_f64::shape::{Cuboid as Shape, SharedShape};
 /// ```
 #[derive(Debug, Clone)]
 pub struct RayCaster {
-    boxes: Vec<(Shape, Pose)>,
-    meshes: Vec<SharedShape>,
+    still: Vec<(SharedShape, Pose)>,
+    /// The free bodies' shapes, seen from their centres of mass.
+    bodies: Vec<(SharedShape, Pose)>,
+    /// Where the free bodies start.
+    starts: Vec<BodyPose>,
 }
 
 impl RayCaster {
     /// Prepares `scene`.
     #[must_use]
     pub fn new(scene: &Scene) -> Self {
-        let placed = |cuboid: &Cuboid| {
-            let [x, y, z]: [f64; 3] = cuboid.centre_W_m.into();
-            let [hx, hy, hz]: [f64; 3] = cuboid.half_extents_m.into();
-            let pose = Pose::new(Vector::new(x, y, z), Vector::new(0.0, 0.0, cuboid.yaw_rad));
-            (Shape::new(Vector::new(hx, hy, hz)), pose)
-        };
-        // A mesh that has no shape was refused when the scene was read.
-        let meshes = scene.meshes.iter().filter_map(|mesh| mesh.shape().ok()).collect();
-        Self { boxes: scene.boxes.iter().map(placed).collect(), meshes }
+        let (mut still, mut bodies, mut starts) = (Vec::new(), Vec::new(), Vec::new());
+        for thing in scene.things() {
+            // A mesh that has no shape was refused when the scene was read.
+            let Ok((shape, place)) = shape(&thing) else { continue };
+            match thing.body() {
+                None => still.push((shape, place)),
+                Some(body) => {
+                    bodies.push((shape, pose(&body.start()).inv_mul(&place)));
+                    starts.push(body.start());
+                }
+            }
+        }
+        Self { still, bodies, starts }
     }
 
-    /// How far it is from `from_W_m` along the unit vector `along_W` to the ground, a box or a mesh, at most `max_m`;
-    /// `None` where nothing is met. From inside of a box or below the ground it is 0; a mesh of triangles has no inside.
+    /// Whether something of it moves.
+    #[must_use]
+    pub fn has_bodies(&self) -> bool {
+        !self.bodies.is_empty()
+    }
+
+    /// How far it is from `from_W_m` along the unit vector `along_W` to the ground or a thing, at most `max_m`; `None`
+    /// where nothing is met. From inside of something solid or below the ground it is 0; a mesh of triangles has no
+    /// inside. Free bodies are where they start.
     #[must_use]
     pub fn distance_m(&self, from_W_m: &Vector3<f64>, along_W: &Vector3<f64>, max_m: f64) -> Option<f64> {
-        let vector = |v: &Vector3<f64>| Vector::new(v.x, v.y, v.z);
-        let ray = Ray::new(vector(from_W_m), vector(along_W));
-        let ground_m = ground_m(from_W_m, along_W).filter(|distance_m| *distance_m <= max_m);
-        let boxes = self.boxes.iter().filter_map(|(shape, pose)| shape.cast_ray(pose, &ray, max_m, true));
-        let meshes = self.meshes.iter().filter_map(|shape| shape.cast_local_ray(&ray, max_m, true));
-        boxes.chain(meshes).chain(ground_m).reduce(f64::min)
+        self.distance_among_m(&self.starts, from_W_m, along_W, max_m)
     }
 
-    /// How far `point_W_m` is from the nearest box or mesh, the ground left out; 0 within a box or a convex mesh,
-    /// infinite where there is neither.
+    /// As [`RayCaster::distance_m`], with the free bodies where `bodies` says, in the order of [`Scene::bodies`].
+    #[must_use]
+    pub fn distance_among_m(
+        &self,
+        bodies: &[BodyPose],
+        from_W_m: &Vector3<f64>,
+        along_W: &Vector3<f64>,
+        max_m: f64,
+    ) -> Option<f64> {
+        let ray = Ray::new(vector(from_W_m), vector(along_W));
+        let ground_m = ground_m(from_W_m, along_W).filter(|distance_m| *distance_m <= max_m);
+        let cast = |shape: &SharedShape, pose: &Pose| shape.cast_ray(pose, &ray, max_m, true);
+        let still = self.still.iter().filter_map(|(shape, pose)| cast(shape, pose));
+        let moving = self.among(bodies).filter_map(|(shape, pose)| cast(shape, &pose));
+        still.chain(moving).chain(ground_m).reduce(f64::min)
+    }
+
+    /// How far `point_W_m` is from the nearest thing, the ground left out; 0 within what is solid, infinite where there
+    /// is none. Free bodies are where they start.
     #[must_use]
     pub fn clearance_m(&self, point_W_m: &Vector3<f64>) -> f64 {
-        let point = Vector::new(point_W_m.x, point_W_m.y, point_W_m.z);
-        let distances = self.boxes.iter().map(|(shape, pose)| shape.distance_to_point(pose, point, true));
-        let meshes = self.meshes.iter().map(|shape| shape.distance_to_local_point(point, true));
-        distances.chain(meshes).fold(f64::INFINITY, f64::min)
+        self.clearance_among_m(&self.starts, point_W_m)
     }
+
+    /// As [`RayCaster::clearance_m`], with the free bodies where `bodies` says, in the order of [`Scene::bodies`].
+    #[must_use]
+    pub fn clearance_among_m(&self, bodies: &[BodyPose], point_W_m: &Vector3<f64>) -> f64 {
+        let point = vector(point_W_m);
+        let still = self.still.iter().map(|(shape, pose)| shape.distance_to_point(pose, point, true));
+        let moving = self.among(bodies).map(|(shape, pose)| shape.distance_to_point(&pose, point, true));
+        still.chain(moving).fold(f64::INFINITY, f64::min)
+    }
+
+    fn among(&self, bodies: &[BodyPose]) -> impl Iterator<Item = (&SharedShape, Pose)> {
+        self.bodies.iter().zip(bodies).map(|((shape, place), body)| (shape, pose(body) * *place))
+    }
+}
+
+/// The shape that rays meet, and where it is at the start.
+fn shape(thing: &Thing) -> Result<(SharedShape, Pose), String> {
+    Ok(match thing {
+        Thing::Mesh(mesh) => (mesh.shape()?, Pose::IDENTITY),
+        Thing::Ball(ball) => {
+            (SharedShape::ball(ball.radius_m), Pose::from_translation(vector(&ball.centre_W_m)))
+        }
+        Thing::Cuboid(cuboid) => {
+            let [x, y, z]: [f64; 3] = cuboid.half_extents_m.into();
+            let turn = Vector::new(0.0, 0.0, cuboid.yaw_rad);
+            (SharedShape::cuboid(x, y, z), Pose::new(vector(&cuboid.centre_W_m), turn))
+        }
+    })
+}
+
+fn pose(body: &BodyPose) -> Pose {
+    let [x, y, z, w] = body.attitude_W.coords.into();
+    Pose::from_parts(vector(&body.position_W_m), Rotation::from_xyzw(x, y, z, w))
+}
+
+fn vector(v: &Vector3<f64>) -> Vector {
+    Vector::new(v.x, v.y, v.z)
 }
 
 fn ground_m(from_W_m: &Vector3<f64>, along_W: &Vector3<f64>) -> Option<f64> {

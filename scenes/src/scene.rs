@@ -1,6 +1,8 @@
 //! The scene as physics and sensors see it: SI numbers only, immutable once read.
 #![allow(non_snake_case, reason = "a trailing _W names the frame a vector is written in")]
 
+use crate::body::{FreeBody, Thing};
+use crate::joint::Joint;
 use crate::mesh::Mesh;
 use crate::rig::Rig;
 use crate::surface::Surface;
@@ -16,6 +18,10 @@ pub struct Scene {
     pub boxes: Vec<Cuboid>,
     /// Things of other shapes, in the file's order.
     pub meshes: Vec<Mesh>,
+    /// The balls, in the file's order.
+    pub balls: Vec<Ball>,
+    /// What ties free bodies, in the file's order.
+    pub joints: Vec<Joint>,
     /// Effects on every vehicle in the scene, such as wind; they act after those of its own file.
     pub effects: Vec<EffectEntry>,
     /// What the vehicle hangs from, if anything.
@@ -25,7 +31,13 @@ pub struct Scene {
 }
 
 impl Scene {
-    /// What the thing with this number is called; boxes are counted first, then meshes.
+    /// All things, by their numbers: boxes first, then meshes, then balls.
+    pub fn things(&self) -> impl Iterator<Item = Thing<'_>> {
+        let boxes = self.boxes.iter().map(Thing::Cuboid);
+        boxes.chain(self.meshes.iter().map(Thing::Mesh)).chain(self.balls.iter().map(Thing::Ball))
+    }
+
+    /// What the thing with this number is called; boxes are counted first, then meshes, then balls.
     ///
     /// ```
     /// let room = scenes::Scene::parse(scenes::reference::ROOM, "room.toml")?;
@@ -34,18 +46,22 @@ impl Scene {
     /// ```
     #[must_use]
     pub fn name_of(&self, number: usize) -> Option<&str> {
-        let names = self.boxes.iter().map(|cuboid| &cuboid.name);
-        names.chain(self.meshes.iter().map(|mesh| &mesh.name)).nth(number).map(String::as_str)
+        self.things().nth(number).map(|thing| thing.name())
     }
 
     /// How many things stand in the scene, the ground left out.
     #[must_use]
     pub fn thing_count(&self) -> usize {
-        self.boxes.len() + self.meshes.len()
+        self.boxes.len() + self.meshes.len() + self.balls.len()
+    }
+
+    /// The free bodies, with their numbers among all things.
+    pub fn bodies(&self) -> impl Iterator<Item = (usize, &FreeBody)> {
+        self.things().enumerate().filter_map(|(number, thing)| Some((number, thing.body()?)))
     }
 }
 
-/// A solid box that stands still.
+/// A solid box.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Cuboid {
     /// What the file calls it, such as `wall +x`.
@@ -58,4 +74,21 @@ pub struct Cuboid {
     pub yaw_rad: f64,
     /// How it answers to what touches it.
     pub surface: Surface,
+    /// How it moves; nothing where it stands still.
+    pub body: Option<FreeBody>,
+}
+
+/// A solid ball.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Ball {
+    /// What the file calls it.
+    pub name: String,
+    /// Its centre, in the world.
+    pub centre_W_m: Vector3<f64>,
+    /// Its radius.
+    pub radius_m: f64,
+    /// How it answers to what touches it.
+    pub surface: Surface,
+    /// How it moves; nothing where it stands still.
+    pub body: Option<FreeBody>,
 }

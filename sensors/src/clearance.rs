@@ -1,15 +1,15 @@
 //! The clearance node: how far a vehicle truly is from what stands in the scene. It is no sensor: a judge reads it,
 //! and plots; controllers have no port for it.
 
-use crate::cone::caster;
-use crate::sensing::TruthInputs;
+use crate::cone::{caster, check_bodies};
+use crate::wire::body_poses;
 use bus::component::{Component, Info, StepError};
 use bus::context::{NodeContext, StepContext};
-use bus::messages::{Clearance, Vector3 as VectorMessage};
-use bus::{Message, OutputPorts};
+use bus::messages::{BodyStates, Clearance, PlantState, Vector3 as VectorMessage};
+use bus::{InputPorts, Message, OutputPorts};
 use diagnostics::parameter::{ParameterError, not_negative};
 use nalgebra::Vector3;
-use scenes::RayCaster;
+use scenes::{BodyPose, RayCaster};
 use std::f64::consts::{PI, TAU};
 use std::path::PathBuf;
 
@@ -44,6 +44,15 @@ pub struct ClearanceState {
     laps: f64,
 }
 
+/// What the component reads.
+#[derive(Debug, InputPorts)]
+pub struct Inputs<'a> {
+    /// The truth.
+    pub state: &'a PlantState,
+    /// Where the scene's free bodies are; for a scene that has some.
+    pub bodies: Option<&'a BodyStates>,
+}
+
 /// What the component sends.
 #[derive(Debug, OutputPorts)]
 pub struct Outputs {
@@ -55,14 +64,13 @@ pub struct Outputs {
 ///
 /// ```
 /// use bus::messages::PlantState;
-/// use sensors::clearance::ClearanceJudge;
-/// use sensors::sensing::TruthInputs;
+/// use sensors::clearance::{ClearanceJudge, Inputs};
 ///
 /// let scene = concat!(env!("CARGO_MANIFEST_DIR"), "/../scenes/room.toml");
 /// let parameters = serde_json::json!({ "scene": scene });
 /// let mut judge = bus::Harness::<ClearanceJudge>::from_json(&parameters).unwrap();
 /// let state = PlantState { position: [0.0, 0.0, 1.0].into(), ..Default::default() };
-/// let clearance = judge.step(TruthInputs { state: &state }).unwrap().clearance;
+/// let clearance = judge.step(Inputs { state: &state, bodies: None }).unwrap().clearance;
 /// assert!(clearance.nearest > 0.0 && clearance.nearest <= clearance.wall[0], "{clearance:?}");
 /// ```
 #[derive(Debug)]
@@ -75,14 +83,16 @@ pub struct ClearanceJudge {
 impl Component for ClearanceJudge {
     const INFO: Info = Info::new("clearance", "true distances to the scene, for judging and plots");
     type Parameters = Parameters;
-    type Inputs<'a> = TruthInputs<'a>;
+    type Inputs<'a> = Inputs<'a>;
     type Outputs = Outputs;
     type State = ClearanceState;
 
-    fn new(parameters: Parameters, _: &NodeContext<'_>) -> Result<Self, ParameterError> {
+    fn new(parameters: Parameters, context: &NodeContext<'_>) -> Result<Self, ParameterError> {
         parameters.validate()?;
         let Parameters { scene, keep_m, corner_m } = parameters;
-        Ok(Self { caster: caster(scene.as_deref())?, keep_m, corner_m })
+        let caster = caster(scene.as_deref())?;
+        check_bodies(&caster, context)?;
+        Ok(Self { caster, keep_m, corner_m })
     }
 
     fn initial(&self) -> ClearanceState {
@@ -92,23 +102,29 @@ impl Component for ClearanceJudge {
     fn step(
         &mut self,
         _: &StepContext<'_>,
-        inputs: TruthInputs<'_>,
+        inputs: Inputs<'_>,
         state: &mut ClearanceState,
     ) -> Result<Outputs, StepError> {
-        Ok(Outputs { clearance: self.clearance(state, &inputs.state.position) })
+        let (poses, count) = body_poses(inputs.bodies);
+        Ok(Outputs { clearance: self.clearance(state, &inputs.state.position, &poses[..count]) })
     }
 }
 
 impl ClearanceJudge {
-    fn clearance(&self, state: &mut ClearanceState, position: &VectorMessage) -> Clearance {
+    fn clearance(
+        &self,
+        state: &mut ClearanceState,
+        position: &VectorMessage,
+        bodies: &[BodyPose],
+    ) -> Clearance {
         let position_W_m = Vector3::new(position.x, position.y, position.z);
         let along = [Vector3::x(), -Vector3::x(), Vector3::y(), -Vector3::y()];
-        let wall =
-            along.map(|along_W| self.caster.distance_m(&position_W_m, &along_W, REACH_M).unwrap_or(REACH_M));
+        let distance_m = |along_W| self.caster.distance_among_m(bodies, &position_W_m, &along_W, REACH_M);
+        let wall = along.map(|along_W| distance_m(along_W).unwrap_or(REACH_M));
         let (x_m, y_m) = (wall[0].min(wall[1]), wall[2].min(wall[3]));
         count_laps(state, &position_W_m);
         Clearance {
-            nearest: self.caster.clearance_m(&position_W_m).min(REACH_M),
+            nearest: self.caster.clearance_among_m(bodies, &position_W_m).min(REACH_M),
             wall,
             side_error: x_m.min(y_m) - self.keep_m,
             laps: state.laps,
@@ -145,7 +161,7 @@ mod tests {
 
     fn at(x: f64, y: f64) -> Clearance {
         let mut state = ClearanceState { bearing: f64::NAN, laps: 0.0 };
-        judge().clearance(&mut state, &VectorMessage { x, y, z: 1.0 })
+        judge().clearance(&mut state, &VectorMessage { x, y, z: 1.0 }, &[])
     }
 
     #[test]
@@ -164,7 +180,7 @@ mod tests {
             let angle_rad = -TAU * f64::from(step) / 1000.0;
             let position =
                 VectorMessage { x: 2.0 * libm::cos(angle_rad), y: 2.0 * libm::sin(angle_rad), z: 1.0 };
-            judge().clearance(&mut state, &position);
+            judge().clearance(&mut state, &position, &[]);
         }
         assert!((state.laps - 2.0).abs() < 1e-9, "{}", state.laps);
     }

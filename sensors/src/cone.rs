@@ -6,9 +6,10 @@
 //! cone is seen at most 0.09 h² of its distance too far: 0.07 % at 5°. Vehicles are spheres, whose distance to a cone is
 //! known without rays.
 
-use diagnostics::ParameterError;
+use bus::context::NodeContext;
+use diagnostics::parameter::{ParameterError, refuse};
 use nalgebra::{Rotation3, Unit, UnitQuaternion, Vector3};
-use scenes::{RayCaster, Scene};
+use scenes::{BodyPose, RayCaster, Scene};
 use std::f64::consts::FRAC_PI_4;
 use std::path::Path;
 
@@ -23,6 +24,24 @@ pub fn caster(path: Option<&Path>) -> Result<RayCaster, ParameterError> {
     let path = path.ok_or_else(|| ParameterError::missing("scene", ""))?;
     let scene = Scene::load(path).map_err(|error| ParameterError::conflict("scene", error))?;
     Ok(RayCaster::new(&scene))
+}
+
+/// Refuses a scene with free bodies where the input `bodies` does not tell where they are, and that input elsewhere.
+///
+/// # Errors
+/// The two do not go together.
+pub fn check_bodies(scene: &RayCaster, run: &NodeContext<'_>) -> Result<(), ParameterError> {
+    let is_told = run.has("bodies");
+    refuse(
+        scene.has_bodies() && !is_told,
+        "scene",
+        || "the scene holds free bodies: wire the input `bodies`, the plant's output of that name, which tells where they are",
+    )?;
+    refuse(
+        !scene.has_bodies() && is_told,
+        "scene",
+        || "the input `bodies` needs a scene in which something has a `mass`: name the plant's scene, or leave it out",
+    )
 }
 
 /// A cone about a body axis.
@@ -49,17 +68,17 @@ impl Cone {
     }
 
     /// How far it is from `from_W_m`, with the body at `attitude_WB`, to the nearest thing of the scene in the
-    /// cone, at most `reach_m`.
+    /// cone, at most `reach_m`, with the scene's free bodies at `bodies`.
     pub fn scene_distance_m(
         &self,
-        scene: &RayCaster,
+        (scene, bodies): (&RayCaster, &[BodyPose]),
         from_W_m: &Vector3<f64>,
         attitude_WB: &UnitQuaternion<f64>,
         reach_m: f64,
     ) -> Option<f64> {
         let distances = self.rays_B.iter();
         distances
-            .filter_map(|ray_B| scene.distance_m(from_W_m, &(attitude_WB * ray_B), reach_m))
+            .filter_map(|ray_B| scene.distance_among_m(bodies, from_W_m, &(attitude_WB * ray_B), reach_m))
             .reduce(f64::min)
     }
 
@@ -125,7 +144,7 @@ mod tests {
         let from = Vector3::new(1.0, 0.0, 1.5);
         for yaw in [-0.1, -0.05, 0.0, 0.03, 0.1] {
             let attitude = UnitQuaternion::from_euler_angles(0.0, 0.0, yaw);
-            let found = forward().scene_distance_m(&room(), &from, &attitude, 7.65).unwrap();
+            let found = forward().scene_distance_m((&room(), &[]), &from, &attitude, 7.65).unwrap();
             assert!((4.0..4.0 * (1.0 + 0.09 * HALF_ANGLE_RAD.powi(2))).contains(&found), "{found} at {yaw}");
         }
     }
@@ -134,7 +153,7 @@ mod tests {
     fn a_wall_that_is_tilted_more_is_seen_along_the_edge_of_the_cone() {
         let from = Vector3::new(1.0, 0.0, 1.5);
         let attitude = UnitQuaternion::from_euler_angles(0.0, 0.0, 0.4);
-        let found = forward().scene_distance_m(&room(), &from, &attitude, 7.65).unwrap();
+        let found = forward().scene_distance_m((&room(), &[]), &from, &attitude, 7.65).unwrap();
         assert!((found - 4.0 / libm::cos(0.4_f64 - HALF_ANGLE_RAD)).abs() < 1e-9, "{found}");
     }
 
@@ -142,7 +161,8 @@ mod tests {
     fn the_nearest_in_the_cone_counts() {
         // The lower edge of the cone meets the floor before the axis meets the wall.
         let from = Vector3::new(0.0, 0.0, 0.2);
-        let found = forward().scene_distance_m(&room(), &from, &UnitQuaternion::identity(), 7.65).unwrap();
+        let found =
+            forward().scene_distance_m((&room(), &[]), &from, &UnitQuaternion::identity(), 7.65).unwrap();
         assert!((found - 0.2 / libm::sin(HALF_ANGLE_RAD)).abs() < 1e-9, "{found}");
     }
 

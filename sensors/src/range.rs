@@ -1,7 +1,7 @@
 //! The range node: five ultrasonic range finders along the body's +x, −x, +y, −y and −z axes.
 //!
 //! The beams tilt with the body. Each reads the nearest of what stands in its cone (`crate::cone`): the ground,
-//! the boxes of the scene and, with the input `traffic`, the other vehicles. Reading = distance + bias + white
+//! the things of the scene and, with the input `traffic`, the other vehicles. Reading = distance + bias + white
 //! noise, in steps of the part's resolution; each beam has its own noise and is lost on its own.
 //! `crate::channel` says when they measure, how measurements are delayed and lost.
 //!
@@ -9,14 +9,15 @@
 //! angle of incidence; a real beam that grazes a smooth floor or wall hears none.
 
 use crate::channel::{Chance, QUEUE};
-use crate::cone::{Cone, caster};
+use crate::cone::{Cone, caster, check_bodies};
 use crate::parameters::within;
 use crate::sensing::Sensor;
 use crate::steps::in_steps;
-use crate::wire::{attitude, vector};
+use crate::wire::{attitude, body_poses, vector};
 use bus::InputPorts;
 use bus::component::Info;
-use bus::messages::{PlantState, Ranges, Traffic};
+use bus::context::NodeContext;
+use bus::messages::{BodyStates, PlantState, Ranges, Traffic};
 use bus::random::normal;
 use diagnostics::parameter::{ParameterError, finite, not_negative, positive, require};
 use nalgebra::{UnitQuaternion, Vector3};
@@ -47,7 +48,7 @@ parameters! {
     /// let parameters = RangeParams { scene: Some(scene.into()), delay_ms: 0.0, ..RangeParams::default() };
     /// let mut range = bus::Harness::<Sensing<RangeFinders>>::new(parameters).unwrap();
     /// let state = PlantState { position: [0.0, 0.0, 1.5].into(), ..Default::default() };
-    /// let ranges = range.step(RangeInputs { state: &state, traffic: None }).unwrap().ranges;
+    /// let ranges = range.step(RangeInputs { state: &state, traffic: None, bodies: None }).unwrap().ranges;
     /// assert!((ranges.distance[4] - 1.5).abs() < 0.1, "the last beam looks down: {ranges:?}");
     /// ```
     pub struct RangeParams timed { rate_hz: 10.0, delay_ms: 50.0 } {
@@ -84,11 +85,14 @@ pub struct RangeFinders {
 
 impl RangeFinders {
     /// What each beam meets first, within its reach.
-    fn distances_m(&self, truth: &PlantState, traffic: Option<&Traffic>) -> [Option<f64>; BEAMS] {
+    fn distances_m(&self, inputs: &RangeInputs<'_>) -> [Option<f64>; BEAMS] {
+        let (truth, traffic) = (inputs.state, inputs.traffic);
+        let (poses, count) = body_poses(inputs.bodies);
         let (position_W_m, attitude_WB) = (vector(truth.position), attitude(truth.attitude));
         let reach_m = self.params.reach_m;
         self.cones.each_ref().map(|cone| {
-            let scene_m = cone.scene_distance_m(&self.scene, &position_W_m, &attitude_WB, reach_m);
+            let scene_m =
+                cone.scene_distance_m((&self.scene, &poses[..count]), &position_W_m, &attitude_WB, reach_m);
             let vehicles_m = self.others(traffic, position_W_m, attitude_WB);
             let vehicles_m = vehicles_m
                 .filter_map(|centre_B_m| cone.sphere_distance_m(&centre_B_m, self.params.vehicle_radius_m));
@@ -135,6 +139,8 @@ pub struct RangeInputs<'a> {
     pub state: &'a PlantState,
     /// Where all vehicles of the run are.
     pub traffic: Option<&'a Traffic>,
+    /// Where the scene's free bodies are; for a scene that has some.
+    pub bodies: Option<&'a BodyStates>,
 }
 
 impl TryFrom<RangeParams> for RangeFinders {
@@ -158,6 +164,10 @@ impl Sensor for RangeFinders {
     type Outputs = Outputs;
     type State = RangeState;
 
+    fn check(&self, run: &NodeContext<'_>) -> Result<(), ParameterError> {
+        check_bodies(&self.scene, run)
+    }
+
     /// Until the first measurement arrives, nothing is met.
     fn initial(&self) -> RangeState {
         let nothing = Ranges { distance: [self.params.reach_m; BEAMS], ..Default::default() };
@@ -174,7 +184,7 @@ impl Sensor for RangeFinders {
         inputs: RangeInputs<'_>,
     ) -> Option<Ranges> {
         let mut ranges = *last;
-        for (beam, distance_m) in self.distances_m(inputs.state, inputs.traffic).into_iter().enumerate() {
+        for (beam, distance_m) in self.distances_m(&inputs).into_iter().enumerate() {
             let noise = normal(chance.noise);
             let read_m = self.reading_m(beam, distance_m, noise);
             let is_lost = chance.is_lost(beam as u32);
@@ -225,7 +235,40 @@ mod tests {
         count: u64,
     ) -> Vec<Ranges> {
         let mut finders = harness::<RangeFinders>(in_room(params), 100);
-        (0..count).map(|_| finders.step(RangeInputs { state: truth, traffic }).unwrap().ranges).collect()
+        (0..count)
+            .map(|_| finders.step(RangeInputs { state: truth, traffic, bodies: None }).unwrap().ranges)
+            .collect()
+    }
+
+    #[test]
+    fn a_free_body_is_met_where_the_input_tells_it_is_and_needs_that_input() {
+        let scene = concat!(env!("CARGO_MANIFEST_DIR"), "/../scenes/slung-load.toml");
+        let params = RangeParams { scene: Some(scene.into()), ..perfect() };
+        let checked = |ports: &[&str]| {
+            let context = bus::context::NodeContext::new("range", ports);
+            Harness::<Sensing<RangeFinders>>::in_context(params.clone(), &context).map(|_| ())
+        };
+        let error = checked(&["state"]).unwrap_err().to_string();
+        assert!(error.contains("`bodies`") || error.contains("bodies"), "{error}");
+        let mut finders = Harness::<Sensing<RangeFinders>>::in_context(
+            params.clone(),
+            &bus::context::NodeContext::new("range", &["state", "bodies"]),
+        )
+        .unwrap();
+        // The load, 3 cm in radius, hangs 0.8 m below, and is 2 m ahead later.
+        let state = at([0.0, 0.0, 2.0], 0.0, 0.0, 0.0);
+        let mut bodies = BodyStates { count: 1, ..Default::default() };
+        let mut read = |position: [f64; 3]| {
+            bodies.position[0] = position.into();
+            let read = |_| {
+                let inputs = RangeInputs { state: &state, traffic: None, bodies: Some(&bodies) };
+                finders.step(inputs).unwrap().ranges.distance
+            };
+            (0..200).map(read).last().unwrap()
+        };
+        assert!((read([0.0, 0.0, 1.2])[4] - 0.77).abs() < 1e-9);
+        let ahead = read([2.0, 0.0, 2.0]);
+        assert!((ahead[0] - 1.97).abs() < 1e-9 && (ahead[4] - 2.0).abs() < 1e-9, "{ahead:?}");
     }
 
     #[track_caller]
@@ -365,7 +408,7 @@ mod tests {
         let params = || in_room(RangeParams { dropout: 0.2, delay_ms: 130.0, ..RangeParams::default() });
         let truth = |tick| at([1.0, f64::from(tick) * 1e-3, 1.5], 3.0, 4.0, f64::from(tick) * 0.1);
         let truths: Vec<_> = (0..2000).map(truth).collect();
-        let inputs = |tick| RangeInputs { state: &truths[tick as usize], traffic: None };
+        let inputs = |tick| RangeInputs { state: &truths[tick as usize], traffic: None, bodies: None };
         Harness::require_transfer(|| harness::<RangeFinders>(params(), 1), inputs);
     }
 

@@ -103,6 +103,14 @@ pub trait Sensor: TryFrom<Self::Parameters, Error: Into<ParameterError>> {
         Self::State::default()
     }
 
+    /// Refuses ports that do not go with its parameters.
+    ///
+    /// # Errors
+    /// Which, and what to do.
+    fn check(&self, _run: &NodeContext<'_>) -> Result<(), ParameterError> {
+        Ok(())
+    }
+
     /// What it measures after `last`, at the times when it does; `None` where there is nothing to measure.
     fn measure(
         &self,
@@ -152,7 +160,9 @@ impl<S: Sensor> Component for Sensing<S> {
     fn new(parameters: S::Parameters, context: &NodeContext<'_>) -> Result<Self, ParameterError> {
         parameters.validate()?;
         let channel = Channel::new(&parameters.timing(), context)?;
-        Ok(Self { sensor: S::try_from(parameters).map_err(Into::into)?, channel })
+        let sensor = S::try_from(parameters).map_err(Into::into)?;
+        sensor.check(context)?;
+        Ok(Self { sensor, channel })
     }
 
     fn initial(&self) -> S::State {

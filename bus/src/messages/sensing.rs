@@ -244,6 +244,36 @@ pub struct Traffic {
     pub velocity: [Vector3; 16],
 }
 
+/// Where the free bodies of a scene are, and how they move, in the order of the scene: those beyond `count` are zeros.
+#[derive(Clone, Copy, Debug, Default, Message)]
+#[repr(C)]
+#[message(type_name = "hummingbus_msgs/msg/BodyStates")]
+pub struct BodyStates {
+    /// Simulation time.
+    pub stamp: Time,
+    /// How many bodies there are.
+    #[field(unit = "1")]
+    pub count: u32,
+    /// Zero.
+    #[field(unit = "")]
+    pub pad0: u32,
+    /// Their numbers among the things of the scene, as `Contact` counts them: 2 + i of the thing i.
+    #[field(unit = "1")]
+    pub object: [u32; 16],
+    /// Positions of their centres of mass.
+    #[field(unit = "m", frame = "world")]
+    pub position: [Vector3; 16],
+    /// Attitudes, the body's own axes to the world's.
+    #[field(frame = "world")]
+    pub attitude: [Quaternion; 16],
+    /// Velocities of their centres of mass.
+    #[field(unit = "m/s", frame = "world")]
+    pub velocity: [Vector3; 16],
+    /// Angular velocities.
+    #[field(unit = "rad/s", frame = "world")]
+    pub angular_velocity: [Vector3; 16],
+}
+
 /// What an estimator believes of the vehicle's motion.
 #[derive(Clone, Copy, Debug, Default, Message)]
 #[repr(C)]

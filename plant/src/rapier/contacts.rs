@@ -108,7 +108,7 @@ impl Contacts {
     ) {
         self.touches.iter_mut().for_each(|touch| (touch.seen, touch.parts_seen) = (false, 0));
         for sighting in sightings {
-            self.normal_impulse_W_N_s += sighting.near.towards_vehicle_W * sighting.impulse_N_s;
+            self.normal_impulse_W_N_s += sighting.near.normal_W * sighting.impulse_N_s;
             if sighting.pushes() {
                 let speed_m_s = approach_m_s(before, &sighting);
                 // A part that already touches may be slammed down as well.
@@ -159,5 +159,5 @@ fn approach_m_s(before: &RigidBody, sighting: &Sighting) -> f64 {
     let angular_velocity_W_rad_s = before.attitude_WB * before.angular_velocity_B_rad_s;
     let arm_W_m = sighting.near.point_W_m - before.position_W_m;
     let velocity_W_m_s = before.velocity_W_m_s + angular_velocity_W_rad_s.cross(&arm_W_m);
-    (sighting.velocity_W_m_s - velocity_W_m_s).dot(&sighting.near.towards_vehicle_W).max(0.0)
+    (sighting.velocity_W_m_s - velocity_W_m_s).dot(&sighting.near.normal_W).max(0.0)
 }

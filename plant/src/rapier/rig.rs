@@ -9,9 +9,9 @@
 //! The tilt limit is a cone, as of a rod end, and the same at any yaw: a limit on Euler angles would not be. All
 //! stops are inelastic: a rope, a rod end's collar, a tube in a tube.
 
-use super::solver::{Body, Row, Unilateral, join, part};
+use super::solver::{Body, Row, Unilateral, join, part, stop};
 use crate::newton_euler::NewtonEuler;
-use crate::state::{Rates, RigidBody, State};
+use crate::state::{BodyRates, Rates, RigidBody, State};
 use nalgebra::{Matrix3, Matrix3x6, Matrix6, UnitQuaternion, Vector3, Vector6};
 use scenes::Rig;
 
@@ -36,11 +36,11 @@ pub(super) fn hold(rig: &Rig, model: &NewtonEuler, state: &State, rates: Rates) 
     let turn_WB = UnitQuaternion::new_normalize(state.body.attitude_WB.into_inner()).to_rotation_matrix();
     let inverse_inertia_W = turn_WB * model.inverse_inertia() * turn_WB.transpose();
     let [spin_W_rad_s, turning_W_rad_s2, arm_W_m] =
-        [state.body.angular_velocity_B_rad_s, rates.angular_acceleration_B_rad_s2, rig.mount_B_m]
+        [state.body.angular_velocity_B_rad_s, rates.body.angular_acceleration_B_rad_s2, rig.mount_B_m]
             .map(|vector_B| turn_WB * vector_B);
     let lever_W = arm_W_m.cross_matrix();
     let yields = Matrix3::identity() / vehicle.mass_kg - lever_W * inverse_inertia_W * lever_W;
-    let mount_W_m_s2 = rates.acceleration_W_m_s2
+    let mount_W_m_s2 = rates.body.acceleration_W_m_s2
         + turning_W_rad_s2.cross(&arm_W_m)
         + spin_W_rad_s.cross(&spin_W_rad_s.cross(&arm_W_m));
     let weight_W_N = Vector3::z() * (-rig.moving_mass_kg * vehicle.gravity_m_s2);
@@ -54,12 +54,13 @@ pub(super) fn hold(rig: &Rig, model: &NewtonEuler, state: &State, rates: Rates) 
     }
     let force_W_N = rows.try_inverse().map_or(Vector3::zeros(), |inverse| inverse * right);
     let turned_W_rad_s2 = inverse_inertia_W * arm_W_m.cross(&force_W_N);
-    Rates {
-        acceleration_W_m_s2: rates.acceleration_W_m_s2 + force_W_N / vehicle.mass_kg,
-        angular_acceleration_B_rad_s2: rates.angular_acceleration_B_rad_s2
+    let body = BodyRates {
+        acceleration_W_m_s2: rates.body.acceleration_W_m_s2 + force_W_N / vehicle.mass_kg,
+        angular_acceleration_B_rad_s2: rates.body.angular_acceleration_B_rad_s2
             + turn_WB.inverse_transform_vector(&turned_W_rad_s2),
-        ..rates
-    }
+        ..rates.body
+    };
+    Rates { body, ..rates }
 }
 
 /// The vehicle in the rig at one attitude, as impulses see it.
@@ -177,11 +178,6 @@ pub(super) fn numbers(rig: &Rig) -> Vec<f64> {
 /// How far the vehicle's mount is from the lower end of the bearing's travel.
 pub(super) fn off_W_m(rig: &Rig, vehicle: &RigidBody) -> Vector3<f64> {
     vehicle.position_W_m + vehicle.attitude_WB * rig.mount_B_m - rig.bearing_W_m
-}
-
-fn stop(normal: Row, gap_m: f64) -> Unilateral {
-    let (bound_m_s, impulse_N_s) = (f64::NEG_INFINITY, 0.0);
-    Unilateral { normal, gap_m, restitution: 0.0, friction: None, bound_m_s, impulse_N_s }
 }
 
 /// `body` moved so that it hangs from the bearing, as high as it was within the heave and as its slider lets it move; it

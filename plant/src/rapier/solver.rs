@@ -74,10 +74,16 @@ impl Row {
         Self::new(all, [0, body], [Vector6::zeros(), jacobian])
     }
 
-    fn new(all: &[Body], bodies: [usize; 2], jacobian: [Vector6<f64>; 2]) -> Self {
+    /// Its rate is the sum of the products of each `jacobian` with its body's twist.
+    pub(super) fn new(all: &[Body], bodies: [usize; 2], jacobian: [Vector6<f64>; 2]) -> Self {
         let answer = [0, 1].map(|of| all[bodies[of]].mobility * jacobian[of]);
         let inverse_mass_per_kg = jacobian[0].dot(&answer[0]) + jacobian[1].dot(&answer[1]);
         Self { bodies, jacobian, answer, inverse_mass_per_kg }
+    }
+
+    /// Whether it acts on the body with this number.
+    pub(super) fn is_on(&self, body: usize) -> bool {
+        self.bodies.contains(&body)
     }
 
     pub(super) fn rate(&self, all: &[Body]) -> f64 {
@@ -111,6 +117,49 @@ pub(super) struct Unilateral {
     pub bound_m_s: f64,
     /// What it pushed with.
     pub impulse_N_s: f64,
+}
+
+/// A stop: inelastic, and without friction.
+pub(super) fn stop(normal: Row, gap_m: f64) -> Unilateral {
+    let (bound_m_s, impulse_N_s) = (f64::NEG_INFINITY, 0.0);
+    Unilateral { normal, gap_m, restitution: 0.0, friction: None, bound_m_s, impulse_N_s }
+}
+
+/// A joint, which keeps the rates of up to six rows between two bodies at zero: they are solved as a whole.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Bilateral {
+    rows: [Row; 6],
+    count: usize,
+    /// Takes the rates of the rows to the impulses that end them; of the rows that there are.
+    inverse_kg: Matrix6<f64>,
+}
+
+impl Bilateral {
+    /// The joint with these rows, from one to six between the same two bodies; none where they contradict each other.
+    pub(super) fn new(rows: &[Row]) -> Option<Self> {
+        let first = *rows.first()?;
+        let mut all = [first; 6];
+        let count = rows.len().min(6);
+        all[..count].copy_from_slice(&rows[..count]);
+        let delassus_per_kg = Matrix6::from_fn(|row, column| match row.max(column) < count {
+            true => all[column].coupling(&all[row]),
+            false => f64::from(u8::from(row == column)),
+        });
+        Some(Self { rows: all, count, inverse_kg: delassus_per_kg.try_inverse()? })
+    }
+
+    /// Ends the rates of all rows; returns by how much that changed one at most.
+    fn relax(&self, all: &mut [Body]) -> f64 {
+        let mut rates_m_s = Vector6::zeros();
+        for (rate_m_s, row) in rates_m_s.iter_mut().zip(&self.rows[..self.count]) {
+            *rate_m_s = row.rate(all);
+        }
+        let impulses_N_s = self.inverse_kg * -rates_m_s;
+        for (impulse_N_s, row) in impulses_N_s.iter().zip(&self.rows[..self.count]) {
+            row.push(all, *impulse_N_s);
+        }
+        rates_m_s.amax()
+    }
 }
 
 /// Coulomb friction of a contact.
@@ -241,18 +290,19 @@ impl Friction {
     }
 }
 
-/// Finds the impulses that `constraints` need, from those that they hold already, and gives them to the bodies. Returns
-/// by how much a rate stays below its bound at most: where two bounds contradict each other, no impulses do both.
-pub(super) fn solve(all: &mut [Body], constraints: &mut [Unilateral]) -> f64 {
+/// Finds the impulses that `constraints` and `joints` need, from those that the former hold already, and gives them to the
+/// bodies. Returns by how much a rate stays below its bound at most: where two bounds contradict each other, no impulses do
+/// both.
+pub(super) fn solve(all: &mut [Body], constraints: &mut [Unilateral], joints: &[Bilateral]) -> f64 {
     for constraint in constraints.iter() {
         constraint.normal.push(all, constraint.impulse_N_s);
         if let Some(friction) = &constraint.friction {
             friction.push(all, &friction.impulses_N_s);
         }
     }
-    iterate(all, constraints, QUICK_ITERATIONS, Unilateral::relax);
+    iterate(all, constraints, joints, QUICK_ITERATIONS, Unilateral::relax);
     if unmet_m_s(all, constraints) > TO_AND_FRO_M_S {
-        iterate(all, constraints, ITERATIONS_MAX, Unilateral::relax_whole);
+        iterate(all, constraints, joints, ITERATIONS_MAX, Unilateral::relax_whole);
     }
     unmet_m_s(all, constraints)
 }
@@ -260,12 +310,15 @@ pub(super) fn solve(all: &mut [Body], constraints: &mut [Unilateral]) -> f64 {
 fn iterate(
     all: &mut [Body],
     constraints: &mut [Unilateral],
+    joints: &[Bilateral],
     most: usize,
     relax: fn(&mut Unilateral, &mut [Body]) -> f64,
 ) {
     for _ in 0..most {
         let asked = constraints.iter_mut().filter(|constraint| constraint.bound_m_s > f64::NEG_INFINITY);
-        if asked.map(|constraint| relax(constraint, all)).fold(0.0, f64::max) < SETTLED_M_S {
+        let changed_m_s = asked.map(|constraint| relax(constraint, all)).fold(0.0, f64::max);
+        let tied_m_s = joints.iter().map(|joint| joint.relax(all)).fold(0.0, f64::max);
+        if changed_m_s.max(tied_m_s) < SETTLED_M_S {
             break;
         }
     }

@@ -4,17 +4,21 @@
 //! near and no rig holds the vehicle, that is the step. Otherwise the step is cut at each impact, at the instant at
 //! which the gap closes: free flight up to it, then Newton's law of restitution. What touches already is held by the
 //! impulses of `solver`: they change the free step's velocities, and, as a constant force would, half of that
-//! change times the step is added to its pose.
+//! change times the step is added to its pose. Free bodies are moved and held the same way; what nothing pushes moves as in
+//! free flight.
 
+use super::body::{lay_out, mobility, set_twist, shift, twist};
 use super::contacts::{Contacts, Sighting};
+use super::free_bodies::{Carrier, FIRST_BODY, FreeBodies, VEHICLE, Work};
+use super::joints::Line;
 use super::rig::{self, Mounted};
-use super::solver::{self, Body, Friction, Row, Unilateral, join, part};
+use super::solver::{self, Bilateral, Body, Friction, Row, Unilateral, join, part};
 use super::world::{Near, World};
 use crate::actuation::Actuation;
 use crate::backend::Neighbour;
 use crate::newton_euler::NewtonEuler;
 use crate::state::{RigidBody, State};
-use nalgebra::{Matrix6, Quaternion, UnitQuaternion, Vector3, Vector6};
+use nalgebra::{Matrix6, Vector3, Vector6};
 use scenes::Rig;
 use serde::{Deserialize, Serialize};
 
@@ -49,11 +53,6 @@ const PUSH_OUT_M_S: f64 = 1.0;
 /// Errors of a pose that are left as they are.
 const EXACT_M: f64 = 1e-12;
 
-/// The bodies by their numbers; other vehicles follow.
-const WORLD: usize = 0;
-const VEHICLE: usize = 1;
-const FIRST_OTHER: usize = 2;
-
 /// As many constraints as a vehicle has in a corner among others, and as many again: more take memory.
 const CONSTRAINTS: usize = 64;
 
@@ -63,17 +62,26 @@ pub(super) struct Scratch {
     near: Vec<Near>,
     /// The contacts, in the order of `near`; then the stops.
     constraints: Vec<Unilateral>,
-    /// The bodies at the step's start.
+    /// The joints of free bodies; rows that a joint is made of.
+    joints: Vec<Bilateral>,
+    rows: Vec<Row>,
+    lines: Vec<Line>,
+    /// The world, the vehicle, free bodies and other vehicles at the step's start.
     now: Vec<Body>,
-    /// The bodies at its end.
+    /// The same at its end.
     then: Vec<Body>,
+    /// The same before something was tried.
+    before: Vec<Body>,
+    /// The same, where they are.
+    frames: Vec<RigidBody>,
+    free_bodies: Work,
 }
 
 impl Scratch {
     pub(super) fn new() -> Self {
-        let bodies = || Vec::with_capacity(FIRST_OTHER + crate::backend::TRAFFIC_MAX);
+        let bodies = || Vec::with_capacity(FIRST_BODY + crate::backend::TRAFFIC_MAX);
         let (near, constraints) = (Vec::with_capacity(CONSTRAINTS), Vec::with_capacity(CONSTRAINTS));
-        Self { near, constraints, now: bodies(), then: bodies() }
+        Self { near, constraints, now: bodies(), then: bodies(), before: bodies(), ..Self::default() }
     }
 }
 
@@ -87,6 +95,8 @@ pub(super) struct Held {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 struct HeldContact {
     object: u32,
+    /// The number of the body that touches it.
+    body: u32,
     part: u32,
     impulse_N_s: f64,
     slip_W_N_s: Vector3<f64>,
@@ -108,7 +118,7 @@ impl Held {
 /// The end of a step without contacts and stops.
 struct Free {
     state: State,
-    /// By how much the bearing changed the vehicle's twist.
+    /// By how much the bearing or joints changed the vehicle's twist.
     held: Vector6<f64>,
 }
 
@@ -117,6 +127,7 @@ pub(super) struct Motion {
     pub model: NewtonEuler,
     pub rig: Option<Rig>,
     pub world: World,
+    pub free_bodies: FreeBodies,
     pub contacts: Contacts,
     pub state: State,
     /// An impact that is faster is a crash.
@@ -151,7 +162,7 @@ impl Motion {
         others: &mut [Neighbour],
     ) {
         let slow_m_s = SLOW_STEPS * self.model.vehicle().gravity_m_s2 * span_s;
-        let mut free = self.free(actuation, span_s);
+        let mut free = self.free(&mut scratch.free_bodies, actuation, span_s);
         let uncut = free.state;
         let (mut left_s, mut cuts, mut is_pushed) = (span_s, 0, false);
         loop {
@@ -174,34 +185,47 @@ impl Motion {
                     cuts = if self.impact(scratch, slow_m_s) { cuts + 1 } else { IMPACTS_MAX };
                 }
                 Some(after_s) => {
-                    let free = self.free(actuation, after_s);
-                    self.bodies(&free.state.body, others, &mut scratch.then);
+                    let free = self.free(&mut scratch.free_bodies, actuation, after_s);
+                    self.bodies(&free.state.body, &scratch.free_bodies.free, others, &mut scratch.then);
                     // What is about to be met is not held back before.
                     is_pushed |= self.constrain(scratch, &free, after_s, -slow_m_s);
                     move_on(others, after_s);
                     (left_s, cuts) = (left_s - after_s, cuts + 1);
                 }
             }
-            free = self.free(actuation, left_s);
+            free = self.free(&mut scratch.free_bodies, actuation, left_s);
         }
-        if !is_pushed && self.rig.is_none() {
+        if !is_pushed && !self.is_held() {
             // Cut for a gap that did not close after all: the flight is free, and its steps are those of free flight.
             self.state = uncut;
         }
     }
 
-    /// A step with nothing but the bearing that holds the vehicle.
-    fn free(&self, actuation: &Actuation, span_s: f64) -> Free {
+    /// A step with nothing but the bearing and the joints; free bodies end in `work`.
+    fn free(&self, work: &mut Work, actuation: &Actuation, span_s: f64) -> Free {
         let unheld = self.model.runge_kutta(&self.state, actuation, span_s);
-        let Some(rig) = &self.rig else { return Free { state: unheld, held: Vector6::zeros() } };
-        let hold = |state: &State, rates| rig::hold(rig, &self.model, state, rates);
-        let mut state = self.model.runge_kutta_held(&self.state, actuation, span_s, hold);
+        let mut state = unheld;
+        if !self.free_bodies.is_empty() {
+            let carrier = Carrier { model: &self.model, rig: self.rig.as_ref(), actuation };
+            state = self.free_bodies.free_step(&carrier, &self.state, span_s, work);
+        } else if let Some(rig) = &self.rig {
+            let hold = |state: &State, rates| rig::hold(rig, &self.model, state, rates);
+            state = self.model.runge_kutta_held(&self.state, actuation, span_s, hold);
+        }
+        if !self.is_held() {
+            return Free { state: unheld, held: Vector6::zeros() };
+        }
         if let Some(mounted) = self.mounted(&state.body) {
             let twist = twist(&state.body);
             set_twist(&mut state.body, &(twist + mounted.back(&mounted.mount_W_m_s(&twist))));
         }
         self.project(&mut state.body);
         Free { held: twist(&state.body) - twist(&unheld.body), state }
+    }
+
+    /// Whether a rig or joints hold the vehicle.
+    pub(super) fn is_held(&self) -> bool {
+        self.rig.is_some() || self.free_bodies.is_vehicle_tied()
     }
 
     /// The vehicle in its rig, if it has one.
@@ -212,11 +236,7 @@ impl Motion {
 
     /// The mobility in free flight.
     fn mobility(&self, body: &RigidBody) -> Matrix6<f64> {
-        let turn_WB = body.attitude_WB.to_rotation_matrix();
-        let mut mobility = Matrix6::from_diagonal_element(1.0 / self.model.vehicle().mass_kg);
-        let turned = turn_WB * self.model.inverse_inertia() * turn_WB.transpose();
-        mobility.fixed_view_mut::<3, 3>(3, 3).copy_from(&turned);
-        mobility
+        mobility(body, self.model.vehicle().mass_kg, self.model.inverse_inertia())
     }
 
     /// Moves the mount back onto its line, from where the order of the step left it.
@@ -232,37 +252,55 @@ impl Motion {
         self.state = free;
     }
 
-    /// Whether nothing holds the vehicle and nothing is near on its way to `free`.
+    /// Whether nothing holds the vehicle, no body moves, and nothing is near on the way to `free`.
     fn is_clear(&self, free: &RigidBody, span_s: f64, others: &[Neighbour]) -> bool {
         let margin_m = MARGIN_M + self.way_m(free, span_s);
-        self.rig.is_none() && self.world.is_clear(&self.state.body.position_W_m, others, span_s, margin_m)
+        let is_alone = self.rig.is_none() && self.free_bodies.is_empty();
+        is_alone && self.world.is_clear(&self.state.body.position_W_m, others, span_s, margin_m)
     }
 
     /// How far any point of the vehicle gets over a step at most, with half of it to spare.
     fn way_m(&self, free: &RigidBody, span_s: f64) -> f64 {
-        let fastest_m_s = |body: &RigidBody| {
-            body.velocity_W_m_s.norm() + body.angular_velocity_B_rad_s.norm() * self.world.reach_m()
+        let reach_m = self.world.reach_m();
+        1.5 * span_s * fastest_m_s(&self.state.body, reach_m).max(fastest_m_s(free, reach_m))
+    }
+
+    /// The same of the free bodies.
+    fn bodies_way_m(&self, free: &[RigidBody], span_s: f64) -> f64 {
+        let reaches_m = self.world.body_reaches_m();
+        let both = self.free_bodies.states.iter().zip(free).zip(reaches_m);
+        let fastest = |((now, then), reach_m): ((&RigidBody, &RigidBody), f64)| {
+            fastest_m_s(now, reach_m).max(fastest_m_s(then, reach_m))
         };
-        1.5 * span_s * fastest_m_s(&self.state.body).max(fastest_m_s(free))
+        1.5 * span_s * both.map(fastest).fold(0.0, f64::max)
     }
 
     /// Finds what is near, and makes a constraint of each point and each stop.
     fn look_around(&mut self, scratch: &mut Scratch, free: &Free, span_s: f64, others: &[Neighbour]) {
-        let Scratch { near, constraints, now, then } = scratch;
+        let Scratch { near, constraints, now, then, frames, free_bodies: Work { free: ends, .. }, .. } =
+            scratch;
         let fastest_other_m_s = others.iter().map(|other| other.velocity_W_m_s.norm()).fold(0.0, f64::max);
         let way_m = self.way_m(&free.state.body, span_s) + span_s * fastest_other_m_s;
-        self.world.find_near(&self.state.body, others, (MARGIN_M + way_m).min(MARGIN_MAX_M), near);
-        self.bodies(&self.state.body, others, now);
-        self.bodies(&free.state.body, others, then);
+        let way_m = way_m + self.bodies_way_m(ends, span_s);
+        let margin_m = (MARGIN_M + way_m).min(MARGIN_MAX_M);
+        let states = &self.free_bodies.states;
+        self.world.find_near(&self.state.body, others, margin_m, near);
+        self.world.find_near_bodies(&self.state.body, states, margin_m, near);
+        self.bodies(&self.state.body, states, others, now);
+        self.bodies(&free.state.body, ends, others, then);
         constraints.clear();
         constraints.extend(near.iter().map(|near| self.contact(now, near)));
         if let Some(mounted) = self.mounted(&self.state.body) {
             mounted.stops(now, VEHICLE, &self.state.body, constraints);
         }
+        if !self.free_bodies.joints.is_empty() {
+            lay_out(&self.state.body, states, frames);
+            self.free_bodies.joints.iter().for_each(|joint| joint.stops(now, frames, constraints));
+        }
     }
 
-    /// The world, the vehicle and the others, as impulses see them.
-    fn bodies(&self, vehicle: &RigidBody, others: &[Neighbour], bodies: &mut Vec<Body>) {
+    /// The world, the vehicle, free bodies and the others, as impulses see them.
+    fn bodies(&self, vehicle: &RigidBody, free: &[RigidBody], others: &[Neighbour], bodies: &mut Vec<Body>) {
         let mounted = self.mounted(vehicle);
         let mobility = mounted.map_or_else(|| self.mobility(vehicle), |mounted| mounted.mobility());
         let others = others.iter().map(|other| Body {
@@ -271,14 +309,40 @@ impl Motion {
             ..Body::default()
         });
         bodies.clear();
-        bodies.extend([Body::default(), Body { twist: twist(vehicle), mobility }].into_iter().chain(others));
+        bodies.extend([Body::default(), Body { twist: twist(vehicle), mobility }]);
+        bodies.extend(self.free_bodies.as_bodies(free).chain(others));
+    }
+
+    /// The joints of free bodies, for impulses on `bodies`, which are `vehicle` and `free`.
+    fn tie(&self, scratch: &mut Scratch, vehicle: &RigidBody, is_end: bool) {
+        let Scratch { joints, rows, lines, now, then, frames, free_bodies, .. } = scratch;
+        joints.clear();
+        if self.free_bodies.joints.is_empty() {
+            return;
+        }
+        let (bodies, states) =
+            if is_end { (then, &free_bodies.free) } else { (now, &self.free_bodies.states) };
+        lay_out(vehicle, states, frames);
+        for joint in self.free_bodies.joints.iter().filter(|joint| !joint.is_rope()) {
+            lines.clear();
+            joint.lines(frames, lines);
+            rows.clear();
+            rows.extend(lines.iter().map(|line| Row::new(bodies, line.ends, line.jacobian)));
+            joints.extend(Bilateral::new(rows));
+        }
     }
 
     fn contact(&self, bodies: &[Body], near: &Near) -> Unilateral {
-        let arm_W_m = near.point_W_m - self.state.body.position_W_m;
-        let first = near.neighbour.map_or(WORLD, |number| FIRST_OTHER + number);
-        let (pair, arms_W_m) = ([first, VEHICLE], [Vector3::zeros(), arm_W_m]);
-        let normal_W = near.towards_vehicle_W;
+        let arm_W_m = |body: usize| match body {
+            VEHICLE => near.point_W_m - self.state.body.position_W_m,
+            _ => match self.free_bodies.states.get(body.wrapping_sub(FIRST_BODY)) {
+                Some(state) => near.point_W_m - state.position_W_m,
+                // The world stands still, and other vehicles do not turn.
+                None => Vector3::zeros(),
+            },
+        };
+        let (pair, arms_W_m) = (near.bodies, near.bodies.map(arm_W_m));
+        let normal_W = near.normal_W;
         let normal = Row::at(bodies, pair, arms_W_m, &normal_W);
         Unilateral {
             friction: Some(Friction::new(bodies, pair, arms_W_m, (&normal, &normal_W), near.friction)),
@@ -291,7 +355,7 @@ impl Motion {
     }
 
     /// A step of `span_s` that ends as `free`, but for what the constraints do; what comes nearer at a rate below
-    /// `ahead_m_s` and does not touch yet is none. Returns whether any pushed.
+    /// `ahead_m_s` and does not touch yet is none. Returns whether the vehicle was pushed.
     fn constrain(&mut self, scratch: &mut Scratch, free: &Free, span_s: f64, ahead_m_s: f64) -> bool {
         for constraint in &mut scratch.constraints {
             let rate_m_s = constraint.normal.rate(&scratch.now);
@@ -310,18 +374,28 @@ impl Motion {
             let vehicle = &mut scratch.then[VEHICLE];
             vehicle.twist += vehicle.mobility * friction;
         }
+        self.tie(scratch, &free.state.body, true);
         let is_found = scratch.solve();
         self.note(scratch);
         self.hold(scratch, is_found);
-        let is_pushed = scratch.constraints.iter().any(|constraint| constraint.impulse_N_s > 0.0);
-        if !is_pushed && self.rig.is_none() {
+        let pushes = |it: &Unilateral| it.impulse_N_s > 0.0 && it.normal.is_on(VEHICLE);
+        let is_pushed = scratch.constraints.iter().any(pushes);
+        let is_anything_pushed = scratch.constraints.iter().any(|it| it.impulse_N_s > 0.0);
+        if !is_anything_pushed && !self.is_held() {
             self.state = free.state;
+            self.free_bodies.states.clone_from(&scratch.free_bodies.free);
             return false;
         }
-        self.take_over(free, &scratch.then[VEHICLE].twist, span_s);
+        if is_pushed || self.is_held() {
+            self.take_over(free, &scratch.then[VEHICLE].twist, span_s);
+        } else {
+            self.state = free.state;
+        }
+        self.take_over_bodies(scratch, span_s);
         self.push_out(scratch, span_s);
         let mut body = self.state.body;
         self.project(&mut body);
+        self.free_bodies.project_rigid(&self.model, &mut body, &mut scratch.free_bodies);
         self.state.body = body;
         is_pushed
     }
@@ -338,47 +412,59 @@ impl Motion {
             };
         }
         scratch.then.clone_from(&scratch.now);
+        let vehicle = self.state.body;
+        self.tie(scratch, &vehicle, false);
         let is_found = scratch.solve();
         self.note(scratch);
-        let bounced = scratch.then[VEHICLE].twist;
-        let after = self.without_gain(scratch, bounced);
-        self.take_over(&Free { state: self.state, held: Vector6::zeros() }, &after, 0.0);
+        self.lose_gain(scratch);
+        let after = scratch.then[VEHICLE].twist;
+        scratch.free_bodies.free.clone_from(&self.free_bodies.states);
+        if after != scratch.now[VEHICLE].twist {
+            self.take_over(&Free { state: self.state, held: Vector6::zeros() }, &after, 0.0);
+        }
+        self.take_over_bodies(scratch, 0.0);
         is_found
     }
 
-    /// The twist after an impact, between that of an inelastic one, which never makes energy, and `bounced`: Newton's law
-    /// makes some where friction and an arm couple (Kane and Levinson, Dynamics, 1985). Others that push do work on
-    /// the vehicle, and are left out of this.
-    fn without_gain(&self, scratch: &mut Scratch, bounced: Vector6<f64>) -> Vector6<f64> {
-        let before = scratch.now[VEHICLE].twist;
-        let start_J = self.energy_J(&before, &before);
+    /// Leaves the twists after an impact between those of an inelastic one, which never makes energy, and those found:
+    /// Newton's law makes some where friction and an arm couple (Kane and Levinson, Dynamics, 1985). Others that push do
+    /// work on the vehicle, and are left out of this.
+    fn lose_gain(&self, scratch: &mut Scratch) {
+        let start_J = self.energy_J(&scratch.now, &scratch.now);
         let is_among_others = scratch.near.iter().any(|near| near.neighbour.is_some());
-        if is_among_others || self.energy_J(&bounced, &bounced) <= start_J {
-            return bounced;
+        if is_among_others || self.energy_J(&scratch.then, &scratch.then) <= start_J {
+            return;
         }
         for constraint in &mut scratch.constraints {
             constraint.bound_m_s = constraint.bound_m_s.min(0.0);
         }
         scratch.forget();
+        scratch.before.clone_from(&scratch.then);
         scratch.then.clone_from(&scratch.now);
-        solver::solve(&mut scratch.then, &mut scratch.constraints);
-        let dull = scratch.then[VEHICLE].twist;
-        // The largest part s of the way to `bounced` at which the energy is that of before: a s^2 + 2 b s + c = 0.
-        let more = bounced - dull;
-        let (a, b) = (self.energy_J(&more, &more), self.energy_J(&dull, &more));
-        let c = self.energy_J(&dull, &dull) - start_J;
-        let root = (b * b - a * c).max(0.0).sqrt();
-        dull + more * ((root - b) / a).clamp(0.0, 1.0)
+        solver::solve(&mut scratch.then, &mut scratch.constraints, &scratch.joints);
+        let (more, dull) = (&mut scratch.before, &mut scratch.then);
+        for (more, dull) in more.iter_mut().zip(&*dull) {
+            more.twist -= dull.twist;
+        }
+        // The largest part s of the way to what was found at which the energy is that of before: a s^2 + 2 b s + c = 0.
+        let (a, b) = (self.energy_J(more, more), self.energy_J(dull, more));
+        let c = self.energy_J(dull, dull) - start_J;
+        let part = (((b * b - a * c).max(0.0).sqrt() - b) / a).clamp(0.0, 1.0);
+        for (dull, more) in dull.iter_mut().zip(&*more) {
+            dull.twist += more.twist * part;
+        }
     }
 
-    /// The kinetic energy with a twist; the mixed one of two where they differ.
-    fn energy_J(&self, one: &Vector6<f64>, other: &Vector6<f64>) -> f64 {
+    /// The kinetic energy of the vehicle and the free bodies; the mixed one of two where they differ.
+    fn energy_J(&self, one: &[Body], other: &[Body]) -> f64 {
         let (vehicle, body) = (self.model.vehicle(), &self.state.body);
+        let bodies_J = self.free_bodies.energy_J(one, other);
+        let (one, other) = (&one[VEHICLE].twist, &other[VEHICLE].twist);
         let [[v, w], [other_v, other_w]] = [part(one), part(other)];
         let in_body = |spin_W_rad_s: &Vector3<f64>| body.attitude_WB.inverse_transform_vector(spin_W_rad_s);
         let spin_J = 0.5 * in_body(&w).dot(&(vehicle.inertia_kg_m2 * in_body(&other_w)));
         let slider_J = self.mounted(body).map_or(0.0, |mounted| mounted.slider_energy_J(one, other));
-        0.5 * vehicle.mass_kg * v.dot(&other_v) + spin_J + slider_J
+        0.5 * vehicle.mass_kg * v.dot(&other_v) + spin_J + slider_J + bodies_J
     }
 
     /// Has the solver begin with the impulses of the step before: the first point of a part with the first of it then.
@@ -387,10 +473,11 @@ impl Motion {
         let (contacts, stops) = constraints.split_at_mut(near.len());
         for (number, (this, constraint)) in near.iter().zip(contacts).enumerate() {
             // Points of one part follow each other, and there are few: a wrong guess costs iterations only.
-            let is_same = |object: u32, part: u32| (object, part) == (this.object, this.part);
+            let key = |near: &Near| (near.object, near.bodies[1] as u32, near.part);
             let before = near[..number].iter().rev();
-            let place = before.take_while(|other| is_same(other.object, other.part)).count();
-            let held = self.held.contacts.iter().filter(|held| is_same(held.object, held.part)).nth(place);
+            let place = before.take_while(|other| key(other) == key(this)).count();
+            let is_this = |held: &&HeldContact| (held.object, held.body, held.part) == key(this);
+            let held = self.held.contacts.iter().filter(is_this).nth(place);
             let Some(held) = held.filter(|_| constraint.bound_m_s.is_finite()) else { continue };
             constraint.impulse_N_s = held.impulse_N_s;
             if let Some(friction) = &mut constraint.friction {
@@ -412,6 +499,7 @@ impl Motion {
         let (contacts, stops) = scratch.constraints.split_at(scratch.near.len());
         self.held.contacts.extend(scratch.near.iter().zip(contacts).map(|(near, contact)| HeldContact {
             object: near.object,
+            body: near.bodies[1] as u32,
             part: near.part,
             impulse_N_s: contact.impulse_N_s,
             slip_W_N_s: contact.friction.map_or(Vector3::zeros(), |friction| friction.impulse_W_N_s()),
@@ -419,13 +507,18 @@ impl Motion {
         self.held.stops_N_s.extend(stops.iter().map(|stop| stop.impulse_N_s));
     }
 
-    /// Tells the contacts what was found and what it pushed with.
+    /// Tells the contacts what the vehicle touches and what it was pushed with.
     fn note(&mut self, scratch: &Scratch) {
-        let others = &scratch.now[FIRST_OTHER..];
-        let sightings = scratch.near.iter().zip(&scratch.constraints).map(|(near, contact)| Sighting {
-            near: *near,
-            impulse_N_s: contact.impulse_N_s,
-            velocity_W_m_s: near.neighbour.map_or(Vector3::zeros(), |number| part(&others[number].twist)[0]),
+        let both = scratch.near.iter().zip(&scratch.constraints);
+        let sightings = both.filter(|(near, _)| near.bodies[1] == VEHICLE).map(|(near, contact)| {
+            let [velocity_W_m_s, spin_W_rad_s] = part(&scratch.now[near.bodies[0]].twist);
+            let state = self.free_bodies.states.get(near.bodies[0].wrapping_sub(FIRST_BODY));
+            let arm_W_m = state.map_or(Vector3::zeros(), |state| near.point_W_m - state.position_W_m);
+            Sighting {
+                near: *near,
+                impulse_N_s: contact.impulse_N_s,
+                velocity_W_m_s: velocity_W_m_s + spin_W_rad_s.cross(&arm_W_m),
+            }
         });
         self.contacts.note(&self.state.body, sightings, self.crash_speed_m_s);
     }
@@ -442,7 +535,21 @@ impl Motion {
         self.changed.spin_W_rad_s += spin_W_rad_s;
     }
 
-    /// Moves the vehicle out of what the order of the step left it inside of; no velocity is changed by that.
+    /// The same of the free bodies, which impulses left with the twists of `scratch.then`.
+    fn take_over_bodies(&mut self, scratch: &Scratch, span_s: f64) {
+        let ends = scratch.free_bodies.free.iter().zip(&scratch.then[FIRST_BODY..]);
+        for (state, (free, after)) in self.free_bodies.states.iter_mut().zip(ends) {
+            let change = after.twist - twist(free);
+            *state = *free;
+            // What nothing pushed keeps its bits.
+            if change != Vector6::zeros() {
+                shift(state, &(change * (span_s / 2.0)));
+                set_twist(state, &after.twist);
+            }
+        }
+    }
+
+    /// Moves the vehicle and the bodies out of what the order of the step left it inside of; no velocity is changed by that.
     fn push_out(&mut self, scratch: &mut Scratch, span_s: f64) {
         let mut is_exact = true;
         let asked = scratch.constraints.iter_mut().filter(|constraint| constraint.bound_m_s.is_finite());
@@ -460,6 +567,11 @@ impl Motion {
         scratch.then.iter_mut().for_each(|body| body.twist = Vector6::zeros());
         scratch.solve();
         shift(&mut self.state.body, &scratch.then[VEHICLE].twist);
+        for (state, by) in self.free_bodies.states.iter_mut().zip(&scratch.then[FIRST_BODY..]) {
+            if by.twist != Vector6::zeros() {
+                shift(state, &by.twist);
+            }
+        }
     }
 }
 
@@ -467,9 +579,12 @@ impl Scratch {
     /// Finds the impulses and gives them to the bodies at the step's end. Where another vehicle would drive this one into
     /// what stands, no impulses do both: the other is left out, and flies into it. Returns whether they were found.
     fn solve(&mut self) -> bool {
-        let before = self.then[VEHICLE].twist;
-        let is_found = solver::solve(&mut self.then, &mut self.constraints) < FOUND_M_S;
-        if is_found || self.near.iter().all(|near| near.neighbour.is_none()) {
+        let is_among_others = self.near.iter().any(|near| near.neighbour.is_some());
+        if is_among_others {
+            self.before.clone_from(&self.then);
+        }
+        let is_found = solver::solve(&mut self.then, &mut self.constraints, &self.joints) < FOUND_M_S;
+        if is_found || !is_among_others {
             return is_found;
         }
         self.forget();
@@ -478,8 +593,8 @@ impl Scratch {
                 constraint.bound_m_s = f64::NEG_INFINITY;
             }
         }
-        self.then[VEHICLE].twist = before;
-        solver::solve(&mut self.then, &mut self.constraints) < FOUND_M_S
+        self.then.clone_from(&self.before);
+        solver::solve(&mut self.then, &mut self.constraints, &self.joints) < FOUND_M_S
     }
 
     /// Takes all impulses away.
@@ -509,14 +624,9 @@ impl Scratch {
     }
 }
 
-fn twist(body: &RigidBody) -> Vector6<f64> {
-    join(&body.velocity_W_m_s, &body.angular_velocity_W_rad_s())
-}
-
-fn set_twist(body: &mut RigidBody, twist: &Vector6<f64>) {
-    let [velocity_W_m_s, spin_W_rad_s] = part(twist);
-    body.velocity_W_m_s = velocity_W_m_s;
-    body.angular_velocity_B_rad_s = body.attitude_WB.inverse_transform_vector(&spin_W_rad_s);
+/// How fast the fastest point of a body is that reaches this far.
+fn fastest_m_s(body: &RigidBody, reach_m: f64) -> f64 {
+    body.velocity_W_m_s.norm() + body.angular_velocity_B_rad_s.norm() * reach_m
 }
 
 /// Has the other vehicles fly on for `span_s`.
@@ -524,12 +634,4 @@ fn move_on(others: &mut [Neighbour], span_s: f64) {
     for other in others {
         other.position_W_m += other.velocity_W_m_s * span_s;
     }
-}
-
-/// Moves and turns a body by little.
-fn shift(body: &mut RigidBody, by: &Vector6<f64>) {
-    let [by_W_m, by_W_rad] = part(by);
-    body.position_W_m += by_W_m;
-    let turn = Quaternion::from_parts(1.0, by_W_rad / 2.0);
-    body.attitude_WB = UnitQuaternion::new_normalize(turn * body.attitude_WB.into_inner());
 }

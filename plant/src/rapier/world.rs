@@ -4,6 +4,7 @@
 //! so that what is found depends on the poses alone.
 
 use super::body::{self, from_rapier, to_rapier};
+use super::free_bodies::{FIRST_BODY, FIRST_THING, VEHICLE, WORLD};
 use super::hull::Hull;
 use crate::backend::Neighbour;
 use crate::state::RigidBody;
@@ -14,23 +15,28 @@ use rapier3d_f64::parry::bounding_volume::{Aabb, BoundingVolume};
 use rapier3d_f64::parry::query::{
     ContactManifold, DefaultQueryDispatcher, PersistentQueryDispatcher, intersection_test,
 };
-use scenes::{Cuboid, Scene, Surface};
+use scenes::{Scene, Surface, Thing};
 use std::f64::consts::FRAC_PI_2;
 
 /// What a collider is, as `bus::messages::Contact` numbers it; the vehicle's own colliders are 0.
 pub(super) const GROUND: u32 = 1;
 /// The vehicle's feet, as [`Near::part`] numbers its colliders.
 pub(super) const FEET: u32 = 0b1111;
-const FIRST_BOX: u32 = 2;
 const FIRST_NEIGHBOUR: u32 = 1000;
+
+/// Free bodies that overlap more than this at the start are told: tuned, no source.
+const OVERLAP_M: f64 = 1e-4;
 
 /// Where two colliders are near each other, without what a solver of rapier's would keep there.
 type Manifold = ContactManifold<(), ()>;
 
 /// The vehicle and what is around it.
 pub(super) struct World {
-    /// The ground, then boxes and meshes.
-    things: Vec<Thing>,
+    /// The ground, then what stands still.
+    things: Vec<Still>,
+    bodies: Vec<Moving>,
+    /// Pairs of bodies that a joint keeps from touching each other.
+    tied: Vec<[usize; 2]>,
     /// The vehicle's feet and its disc, seen from its centre of mass.
     hull: [Collider; 5],
     /// Another vehicle, at the origin: all are taken to be alike.
@@ -40,24 +46,32 @@ pub(super) struct World {
     manifolds: Vec<Manifold>,
 }
 
-struct Thing {
+struct Still {
     collider: Collider,
     around: Aabb,
 }
 
-/// A point where the vehicle may touch something.
+/// A free body: its collider seen from its centre of mass.
+struct Moving {
+    collider: Collider,
+    reach_m: f64,
+}
+
+/// A point where the vehicle or a free body may touch something.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Near {
     /// What it is, as `bus::messages::Contact` numbers it.
     pub object: u32,
-    /// Which of the vehicle's colliders it is near: a bit for each.
+    /// The numbers of the two bodies: what it is, and what it is near.
+    pub bodies: [usize; 2],
+    /// Which of the vehicle's colliders it is near: a bit for each; 0 of a free body.
     pub part: u32,
     /// Which of the other vehicles it is, if any, counted as they were given.
     pub neighbour: Option<usize>,
     /// Where the two are nearest to each other.
     pub point_W_m: Vector3<f64>,
-    /// The normal, which points from the object to the vehicle.
-    pub towards_vehicle_W: Vector3<f64>,
+    /// The normal, which points from the first of the bodies to the second.
+    pub normal_W: Vector3<f64>,
     /// How far they are apart; negative where they overlap.
     pub gap_m: f64,
     pub friction: f64,
@@ -65,19 +79,14 @@ pub(super) struct Near {
 }
 
 impl World {
-    /// The world of `scene` with a vehicle in it.
-    pub(super) fn new(hull: &Hull, scene: &Scene) -> Self {
+    /// The world of `scene` with a vehicle in it; bodies that are `tied` do not touch each other.
+    pub(super) fn new(hull: &Hull, scene: &Scene, tied: Vec<[usize; 2]>) -> Self {
         let up = Unit::new_unchecked(Vector::Z);
         let ground = solid(ColliderBuilder::halfspace(up), GROUND, &scene.surface);
-        let boxes = scene.boxes.iter().zip(FIRST_BOX..).map(|(cuboid, number)| wall(cuboid, number));
-        let meshes = scene.meshes.iter().zip(FIRST_BOX + scene.boxes.len() as u32..);
-        let meshes = meshes.filter_map(|(mesh, number)| {
-            // One that has no shape was refused when the scene was read.
-            let shape = mesh.contact_shape().ok()?;
-            Some(solid(ColliderBuilder::new(shape), number, &mesh.surface))
-        });
-        let things = [ground].into_iter().chain(boxes).chain(meshes).map(|it| it.build());
-        let things = things.map(|collider| Thing { around: collider.compute_aabb(), collider });
+        let still = scene.things().zip(FIRST_THING..).filter(|(thing, _)| thing.body().is_none());
+        let still = still.filter_map(|(thing, number)| collider(&thing, number));
+        let still = [ground].into_iter().chain(still).map(|it| it.build());
+        let things = still.map(|collider| Still { around: collider.compute_aabb(), collider });
         let foot = |foot_B_m: Vector3<f64>| {
             let ball = ColliderBuilder::ball(hull.foot_radius_m).translation(to_rapier(&foot_B_m));
             solid(ball, 0, &scene.surface).build()
@@ -90,6 +99,12 @@ impl World {
             // Their centres of mass are not this one's.
             other: disc(&Vector3::zeros()),
             reach_m: hull.reach_m(),
+            bodies: scene
+                .things()
+                .zip(FIRST_THING..)
+                .filter_map(|(thing, number)| Moving::new(&thing, number))
+                .collect(),
+            tied,
             manifolds: Vec::new(),
         }
     }
@@ -110,7 +125,7 @@ impl World {
     ) -> bool {
         let room_m = self.reach_m + margin_m;
         let point = to_rapier(position_W_m);
-        let is_far_from = |it: &Thing| {
+        let is_far_from = |it: &Still| {
             (point.clamp(it.around.mins, it.around.maxs) - point).length_squared() > room_m * room_m
         };
         // As large as this one, and their centres of mass may be off their middles.
@@ -130,7 +145,8 @@ impl World {
         found: &mut Vec<Near>,
     ) {
         let pose = body::pose(body);
-        let Self { things, hull, other, manifolds, .. } = self;
+        let Self { things, hull, other, manifolds, bodies, .. } = self;
+        let first_other = FIRST_BODY + bodies.len();
         found.clear();
         for (place, part) in hull.iter().enumerate() {
             let part_pose = pose * *part.position();
@@ -140,7 +156,8 @@ impl World {
                 if other.shape().compute_aabb(&there).intersects(&around) {
                     meet((other, &there), (part, &part_pose), margin_m, manifolds, |contact| {
                         let object = FIRST_NEIGHBOUR + vehicle.number;
-                        found.push(Near { part: 1 << place, object, neighbour: Some(number), ..contact });
+                        let (neighbour, bodies) = (Some(number), [first_other + number, VEHICLE]);
+                        found.push(Near { part: 1 << place, object, neighbour, bodies, ..contact });
                     });
                 }
             }
@@ -153,10 +170,71 @@ impl World {
         }
     }
 
+    /// The same for points where free bodies, at `states`, may touch each other, the vehicle at `vehicle`, or what stands
+    /// still, after what is `found` already.
+    pub(super) fn find_near_bodies(
+        &mut self,
+        vehicle: &RigidBody,
+        states: &[RigidBody],
+        margin_m: f64,
+        found: &mut Vec<Near>,
+    ) {
+        let Self { things, hull, bodies, manifolds, tied, .. } = self;
+        let is_tied = |one: usize, other: usize| tied.contains(&[one.min(other), one.max(other)]);
+        let vehicle_pose = body::pose(vehicle);
+        for (number, (moving, state)) in bodies.iter().zip(states).enumerate() {
+            let this = FIRST_BODY + number;
+            let pose = body::pose(state);
+            let place = pose * *moving.collider.position();
+            let around = moving.collider.shape().compute_aabb(&place).loosened(margin_m);
+            for thing in things.iter().filter(|thing| thing.around.intersects(&around)) {
+                let collider = &thing.collider;
+                let pair = ((collider, collider.position()), (&moving.collider, &place));
+                meet(pair.0, pair.1, margin_m, manifolds, |contact| {
+                    found.push(pair_surface(Near { bodies: [WORLD, this], ..contact }, pair.1.0));
+                });
+            }
+            for (other, (collider, state)) in bodies.iter().zip(states).enumerate().take(number) {
+                let (collider, other) = (&collider.collider, FIRST_BODY + other);
+                let there = body::pose(state) * *collider.position();
+                let is_near = collider.shape().compute_aabb(&there).intersects(&around);
+                if is_near && !is_tied(other, this) {
+                    meet((collider, &there), (&moving.collider, &place), margin_m, manifolds, |contact| {
+                        found.push(pair_surface(Near { bodies: [other, this], ..contact }, &moving.collider));
+                    });
+                }
+            }
+            for (part, hull) in hull.iter().enumerate().filter(|_| !is_tied(VEHICLE, this)) {
+                let there = vehicle_pose * *hull.position();
+                if hull.shape().compute_aabb(&there).intersects(&around) {
+                    meet((&moving.collider, &place), (hull, &there), margin_m, manifolds, |contact| {
+                        found.push(Near { bodies: [this, VEHICLE], part: 1 << part, ..contact });
+                    });
+                }
+            }
+        }
+    }
+
+    /// The first two that overlap, as `bus::messages::Contact` numbers them: a free body with another, with what stands
+    /// still, or with the vehicle, 0.
+    pub(super) fn overlap(&mut self, vehicle: &RigidBody, states: &[RigidBody]) -> Option<[u32; 2]> {
+        let mut found = Vec::new();
+        self.find_near_bodies(vehicle, states, 0.0, &mut found);
+        let near = found.iter().find(|near| near.gap_m < -OVERLAP_M)?;
+        let second = self.bodies.get(near.bodies[1].wrapping_sub(FIRST_BODY));
+        Some([near.object, second.map_or(0, |body| body.collider.user_data as u32)])
+    }
+
+    /// How far any point of each free body is from its centre of mass at most.
+    pub(super) fn body_reaches_m(&self) -> impl Iterator<Item = f64> {
+        self.bodies.iter().map(|body| body.reach_m)
+    }
+
     /// Numbers that tell this scene and vehicle from others: places, surfaces, shapes.
     pub(super) fn numbers(&self) -> Vec<f64> {
         let things = self.things.iter().map(|thing| &thing.collider);
-        things.chain(&self.hull).flat_map(numbers).collect()
+        let bodies = self.bodies.iter().map(|body| &body.collider);
+        things.chain(bodies).chain(&self.hull).flat_map(numbers).collect()
     }
 
     /// The number of the first of the scene's boxes and meshes that the vehicle, placed as `body`, is partly inside of.
@@ -169,11 +247,11 @@ impl World {
         };
         let mut things = self.things.iter().skip(1).map(|thing| &thing.collider);
         let around = things.find(|thing| self.hull.iter().any(|part| meets(thing, part)))?;
-        usize::try_from(around.user_data.checked_sub(FIRST_BOX.into())?).ok()
+        usize::try_from(around.user_data.checked_sub(FIRST_THING.into())?).ok()
     }
 }
 
-/// Tells `note` of every point where the vehicle's part, second, is within `margin_m` of something, first.
+/// Tells `note` of every point where a part, second, is within `margin_m` of something, first.
 fn meet(
     thing: (&Collider, &Pose),
     part: (&Collider, &Pose),
@@ -199,16 +277,17 @@ fn meet(
     // Every shape of a scene and a hull can be asked.
     debug_assert!(found.is_ok(), "{:?} and {:?}", shape.shape_type(), part_shape.shape_type());
     for manifold in manifolds.iter() {
-        let towards_vehicle_W = from_rapier(thing_pose.rotation * manifold.local_n1);
+        let normal_W = from_rapier(thing_pose.rotation * manifold.local_n1);
         for point in manifold.points.iter().filter(|point| point.dist < margin_m) {
             let ends =
                 [thing_pose.transform_point(point.local_p1), part_pose.transform_point(point.local_p2)];
             note(Near {
                 object: thing.user_data as u32,
                 part: 0,
+                bodies: [WORLD, VEHICLE],
                 neighbour: None,
                 point_W_m: (from_rapier(ends[0]) + from_rapier(ends[1])) / 2.0,
-                towards_vehicle_W,
+                normal_W,
                 gap_m: point.dist,
                 friction: thing.friction(),
                 restitution: thing.restitution(),
@@ -240,10 +319,39 @@ fn solid(shape: ColliderBuilder, object: u32, surface: &Surface) -> ColliderBuil
     shape.friction(surface.friction).restitution(surface.restitution)
 }
 
-fn wall(cuboid: &Cuboid, object: u32) -> ColliderBuilder {
-    let [x, y, z]: [f64; 3] = cuboid.half_extents_m.into();
-    let shape = ColliderBuilder::cuboid(x, y, z).translation(to_rapier(&cuboid.centre_W_m));
-    solid(shape.rotation(Vector::Z * cuboid.yaw_rad), object, &cuboid.surface)
+/// The surface of two that have one each: the geometric mean of the frictions and the larger restitution, as Box2D has it.
+fn pair_surface(near: Near, second: &Collider) -> Near {
+    let friction = (near.friction * second.friction()).sqrt();
+    Near { friction, restitution: near.restitution.max(second.restitution()), ..near }
+}
+
+/// The thing as it stands at the start; none of a mesh without a shape, which was refused when the scene was read.
+fn collider(thing: &Thing, number: u32) -> Option<ColliderBuilder> {
+    Some(match thing {
+        Thing::Cuboid(cuboid) => {
+            let [x, y, z]: [f64; 3] = cuboid.half_extents_m.into();
+            let shape = ColliderBuilder::cuboid(x, y, z).translation(to_rapier(&cuboid.centre_W_m));
+            solid(shape.rotation(Vector::Z * cuboid.yaw_rad), number, &cuboid.surface)
+        }
+        Thing::Ball(ball) => {
+            let shape = ColliderBuilder::ball(ball.radius_m).translation(to_rapier(&ball.centre_W_m));
+            solid(shape, number, &ball.surface)
+        }
+        Thing::Mesh(mesh) => solid(ColliderBuilder::new(mesh.contact_shape().ok()?), number, &mesh.surface),
+    })
+}
+
+impl Moving {
+    fn new(thing: &Thing, number: u32) -> Option<Self> {
+        let start = thing.body()?.start();
+        let mut collider = collider(thing, number)?.build();
+        let centre = Pose::from_parts(to_rapier(&start.position_W_m), body::rotation(&start.attitude_W));
+        let place = centre.inv_mul(collider.position());
+        collider.set_position(place);
+        let around = collider.compute_aabb();
+        let reach_m = around.mins.abs().max(around.maxs.abs()).length();
+        Some(Self { collider, reach_m })
+    }
 }
 
 /// Rapier's cylinders lie along y.

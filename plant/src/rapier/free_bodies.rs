@@ -1,0 +1,373 @@
+//! The free bodies of a scene, and one step of them and the vehicle without contacts.
+//!
+//! All are integrated together by the classic Runge-Kutta scheme. At each of its stages the forces of the joints are those
+//! that keep their constraints (an index-1 DAE with its multipliers); what the order of the scheme leaves is projected away
+//! after the step, positions and velocities. A rope is a joint while it is taut and pulls.
+
+use super::body::{add_twist, lay_out, mobility, shift, twist};
+use super::joint_forces::JointForces;
+use super::joints::Joint;
+use super::rig;
+use super::solver::{Body, join, part};
+use crate::actuation::Actuation;
+use crate::newton_euler::NewtonEuler;
+use crate::state::{BodyRates, Rates, RigidBody, State};
+use nalgebra::{Matrix3, Matrix6, Quaternion, UnitQuaternion, Vector3, Vector6};
+use scenes::{End, FreeBody, Rig, Scene};
+
+/// The numbers of the bodies: first those that every scene has; others than free bodies follow these.
+pub(super) const WORLD: usize = 0;
+pub(super) const VEHICLE: usize = 1;
+pub(super) const FIRST_BODY: usize = 2;
+
+/// What contacts call the first thing of a scene.
+pub(super) const FIRST_THING: u32 = 2;
+
+/// A rope with no more slack than this is taut, as what is no farther apart touches.
+pub(super) const TAUT_M: f64 = 1e-6;
+
+/// A taut rope whose ends come nearer than this is not. Tuned, no source.
+const SLACKENING_M_S: f64 = 1e-9;
+
+/// Times that errors of the joints are projected away: each squares what is left.
+const PROJECTIONS: usize = 2;
+
+/// A free body as it is built.
+#[derive(Debug, Clone)]
+struct Build {
+    mass_kg: f64,
+    inertia: Matrix3<f64>,
+    inverse_inertia: Matrix3<f64>,
+    /// Where it starts: in the world, or seen from the vehicle that it hangs from.
+    start: RigidBody,
+    hangs: bool,
+}
+
+/// The free bodies of a scene and their joints.
+pub(super) struct FreeBodies {
+    builds: Vec<Build>,
+    pub joints: Vec<Joint>,
+    /// Whether a joint ties the vehicle.
+    is_vehicle_tied: bool,
+    /// From where the vehicle's file has its centre of mass to where it is; the other way round in `shift_B_m`.
+    shift_B_m: Vector3<f64>,
+    pub states: Vec<RigidBody>,
+    /// What contacts call them.
+    pub objects: Vec<u32>,
+}
+
+/// What a step of the bodies works with: kept, so that it takes no memory.
+#[derive(Default)]
+pub(super) struct Work {
+    /// The bodies at the end of the free step.
+    pub free: Vec<RigidBody>,
+    /// Which joints act: all but slack ropes.
+    acting: Vec<bool>,
+    stage: Vec<RigidBody>,
+    rates: [Vec<BodyRates>; 4],
+    accelerations: Vec<Vector6<f64>>,
+    forces: JointForces,
+}
+
+/// What the vehicle is, to the bodies that hang from it.
+pub(super) struct Carrier<'a> {
+    pub model: &'a NewtonEuler,
+    pub rig: Option<&'a Rig>,
+    pub actuation: &'a Actuation,
+}
+
+impl FreeBodies {
+    /// Those of `scene`, where its file puts them; `shift_B_m` is how far the vehicle's frame is from where its file has
+    /// it, seen from its centre of mass.
+    pub(super) fn new(scene: &Scene, shift_B_m: &Vector3<f64>) -> Self {
+        let hanging = scene.hanging();
+        let builds: Vec<_> =
+            scene.bodies().zip(&hanging).map(|((_, body), hangs)| Build::new(body, *hangs)).collect();
+        let still = RigidBody::level_at(Vector3::zeros());
+        let frames: Vec<_> =
+            [still, still].into_iter().chain(builds.iter().map(|build| build.start)).collect();
+        let number = |end| match end {
+            End::World => WORLD,
+            End::Vehicle => VEHICLE,
+            End::Body(place) => FIRST_BODY + place,
+        };
+        let joints = scene.joints.iter().map(|joint| {
+            let mut joint = Joint::new(joint, &frames, number);
+            joint.shift(VEHICLE, shift_B_m);
+            joint
+        });
+        Self {
+            joints: joints.collect(),
+            is_vehicle_tied: scene.is_vehicle_tied(),
+            shift_B_m: *shift_B_m,
+            objects: scene.bodies().map(|(number, _)| FIRST_THING + number as u32).collect(),
+            states: builds.iter().map(|build| build.start).collect(),
+            builds,
+        }
+    }
+
+    pub(super) fn is_empty(&self) -> bool {
+        self.builds.is_empty() && self.joints.is_empty()
+    }
+
+    /// Whether joints act on the vehicle.
+    pub(super) fn is_vehicle_tied(&self) -> bool {
+        self.is_vehicle_tied
+    }
+
+    /// Pairs of bodies, the smaller number first, that a joint other than a rope ties.
+    pub(super) fn tied_pairs(&self) -> Vec<[usize; 2]> {
+        let ties = self.joints.iter().filter(|joint| !joint.is_rope()).map(|joint| joint.ends);
+        ties.map(|[parent, child]| [parent.min(child), parent.max(child)]).collect()
+    }
+
+    /// Numbers that tell these bodies and joints from others.
+    pub(super) fn numbers(&self) -> Vec<f64> {
+        let builds =
+            self.builds.iter().flat_map(|build| build.inertia.iter().copied().chain([build.mass_kg]));
+        builds.chain(self.joints.iter().flat_map(Joint::numbers)).collect()
+    }
+
+    /// Puts those that hang from the vehicle where they start as seen from it, moving as it does.
+    pub(super) fn hang_from(&mut self, vehicle: &RigidBody) {
+        for (build, state) in self.builds.iter().zip(&mut self.states).filter(|(build, _)| build.hangs) {
+            let start = &build.start;
+            let arm_W_m = vehicle.attitude_WB * (self.shift_B_m + start.position_W_m);
+            let spin_W_rad_s = vehicle.angular_velocity_W_rad_s();
+            let attitude_WB = vehicle.attitude_WB * start.attitude_WB;
+            *state = RigidBody {
+                position_W_m: vehicle.position_W_m + arm_W_m,
+                velocity_W_m_s: vehicle.velocity_W_m_s
+                    + spin_W_rad_s.cross(&arm_W_m)
+                    + vehicle.attitude_WB * start.velocity_W_m_s,
+                attitude_WB,
+                angular_velocity_B_rad_s: start.angular_velocity_B_rad_s
+                    + attitude_WB.inverse_transform_vector(&spin_W_rad_s),
+            };
+        }
+    }
+
+    /// The first joint, a rope, that is longer than it may be with the vehicle here, and by how much.
+    pub(super) fn overstretched(&self, vehicle: &RigidBody) -> Option<(usize, f64)> {
+        let mut frames = Vec::new();
+        lay_out(vehicle, &self.states, &mut frames);
+        let over_m = |joint: &Joint| -joint.slack(&frames).map_or(0.0, |(slack_m, _)| slack_m);
+        self.joints.iter().map(over_m).enumerate().find(|(_, over_m)| *over_m > TAUT_M)
+    }
+
+    /// The bodies as impulses see them.
+    pub(super) fn as_bodies<'a>(&'a self, states: &'a [RigidBody]) -> impl Iterator<Item = Body> + 'a {
+        self.builds
+            .iter()
+            .zip(states)
+            .map(|(build, state)| Body { twist: twist(state), mobility: build.mobility(state) })
+    }
+
+    /// The kinetic energy of the bodies, J, where these are their twists; twice the mixed one where the two differ.
+    pub(super) fn energy_J(&self, one: &[Body], other: &[Body]) -> f64 {
+        let each = self.builds.iter().zip(&self.states).zip(FIRST_BODY..);
+        let energies = each.map(|((build, state), number)| {
+            build.energy_J(state, [&one[number].twist, &other[number].twist])
+        });
+        energies.sum()
+    }
+
+    /// A step of `span_s` of the vehicle at `vehicle` and all bodies, without contacts; those end in `work.free`.
+    pub(super) fn free_step(
+        &self,
+        carrier: &Carrier<'_>,
+        vehicle: &State,
+        span_s: f64,
+        work: &mut Work,
+    ) -> State {
+        self.find_taut(carrier, vehicle, work);
+        let mut ks: [Option<Rates>; 4] = [None; 4];
+        for (stage, share) in [0.0, 0.5, 0.5, 1.0].into_iter().enumerate() {
+            let before = stage.saturating_sub(1);
+            let state = match &ks[before] {
+                Some(rates) if stage > 0 => vehicle.moved(rates, share * span_s),
+                _ => *vehicle,
+            };
+            work.stage.clear();
+            for (number, body) in self.states.iter().enumerate() {
+                let moved =
+                    if stage == 0 { *body } else { body.moved(&work.rates[before][number], share * span_s) };
+                work.stage.push(moved);
+            }
+            ks[stage] = Some(self.rates(carrier, &state, stage, work));
+        }
+        let [Some(k1), Some(k2), Some(k3), Some(k4)] = &ks else { return *vehicle };
+        let sum = k1.plus(k2, 2.0).plus(k3, 2.0).plus(k4, 1.0);
+        work.free.clear();
+        for (number, body) in self.states.iter().enumerate() {
+            let [k1, k2, k3, k4] = work.rates.each_ref().map(|rates| rates[number]);
+            let sum = k1.plus(&k2, 2.0).plus(&k3, 2.0).plus(&k4, 1.0);
+            let mut moved = body.moved(&sum, span_s / 6.0);
+            moved.attitude_WB = UnitQuaternion::new_normalize(moved.attitude_WB.into_inner());
+            work.free.push(moved);
+        }
+        let mut end = vehicle.moved(&sum, span_s / 6.0);
+        if !self.joints.is_empty() {
+            let Work { free, acting, forces, .. } = work;
+            self.project(carrier.model, &mut end.body, free, (acting, forces));
+        }
+        end
+    }
+
+    /// Which ropes are joints in this step: those that are taut and would pull.
+    fn find_taut(&self, carrier: &Carrier<'_>, vehicle: &State, work: &mut Work) {
+        self.see(carrier.model, &vehicle.body, &self.states, &mut work.forces);
+        let Work { acting, forces, .. } = &mut *work;
+        let acts = |joint: &Joint| {
+            let slack = joint.slack(forces.frames());
+            slack.is_none_or(|(slack_m, leaves_m_s)| slack_m <= TAUT_M && leaves_m_s > -SLACKENING_M_S)
+        };
+        acting.clear();
+        acting.extend(self.joints.iter().map(acts));
+        // One rope less each time.
+        while self.joints.iter().zip(&work.acting).any(|(joint, acts)| joint.is_rope() && *acts) {
+            work.stage.clone_from(&self.states);
+            self.rates(carrier, vehicle, 0, work);
+            let ropes = work.forces.hardest_push(|joint| self.joints[joint].is_rope());
+            let Some(pushing) = ropes else { return };
+            work.acting[pushing] = false;
+        }
+    }
+
+    /// The rates of the vehicle at `state` and of the bodies at `work.stage`; the latter go into `work.rates[stage]`.
+    fn rates(&self, carrier: &Carrier<'_>, state: &State, stage: usize, work: &mut Work) -> Rates {
+        let mut rates = carrier.model.rates(state, carrier.actuation);
+        if let Some(rig) = carrier.rig {
+            rates = rig::hold(rig, carrier.model, state, rates);
+        }
+        let gravity_W_m_s2 = Vector3::z() * -carrier.model.vehicle().gravity_m_s2;
+        let Work { stage: bodies, rates: all, acting, forces, accelerations, .. } = work;
+        let out = &mut all[stage];
+        out.clear();
+        out.extend(self.builds.iter().zip(&*bodies).map(|(build, body)| build.rates(body, &gravity_W_m_s2)));
+        if self.joints.is_empty() {
+            return rates;
+        }
+        self.see(carrier.model, &state.body, bodies, forces);
+        let frames = forces.frames();
+        accelerations.clear();
+        accelerations.extend([Vector6::zeros(), accelerations_of(&frames[VEHICLE], &rates.body)]);
+        let bodies = out.iter().zip(&frames[FIRST_BODY..]);
+        accelerations.extend(bodies.map(|(rates, frame)| accelerations_of(frame, rates)));
+        forces.damp(&self.joints, accelerations);
+        forces.lay(&self.joints, acting);
+        forces.find(|line, _| -(line.bias + line.rate(|end| accelerations[end])));
+        forces.push(|end, by| accelerations[end] += by);
+        let frames = forces.frames();
+        take(&frames[VEHICLE], &accelerations[VEHICLE], &mut rates.body);
+        for (rates, number) in out.iter_mut().zip(FIRST_BODY..) {
+            take(&frames[number], &accelerations[number], rates);
+        }
+        rates
+    }
+
+    /// Lays out the frames and their mobilities.
+    fn see(&self, model: &NewtonEuler, vehicle: &RigidBody, bodies: &[RigidBody], forces: &mut JointForces) {
+        let mass_kg = model.vehicle().mass_kg;
+        let vehicle_mobility = |frame: &RigidBody| mobility(frame, mass_kg, model.inverse_inertia());
+        let build = |number: usize| &self.builds[number - FIRST_BODY];
+        forces.see(vehicle, bodies, |number, frame| match number {
+            WORLD => Matrix6::zeros(),
+            VEHICLE => vehicle_mobility(frame),
+            _ => build(number).mobility(frame),
+        });
+    }
+
+    /// Takes what is off in the joints away, from the vehicle and `bodies`: positions, and then velocities.
+    fn project(
+        &self,
+        model: &NewtonEuler,
+        vehicle: &mut RigidBody,
+        bodies: &mut [RigidBody],
+        (acting, forces): (&[bool], &mut JointForces),
+    ) {
+        for _ in 0..PROJECTIONS {
+            self.see(model, vehicle, bodies, forces);
+            forces.lay(&self.joints, acting);
+            forces.find(|line, _| -line.off);
+            forces.push(|end, by| match end {
+                WORLD => (),
+                VEHICLE => shift(vehicle, by),
+                _ => shift(&mut bodies[end - FIRST_BODY], by),
+            });
+        }
+        self.see(model, vehicle, bodies, forces);
+        forces.lay(&self.joints, acting);
+        forces.find(|line, frames| -line.rate(|end| twist(&frames[end])));
+        forces.push(|end, by| match end {
+            WORLD => (),
+            VEHICLE => add_twist(vehicle, by),
+            _ => add_twist(&mut bodies[end - FIRST_BODY], by),
+        });
+    }
+
+    /// The same after impulses acted on the vehicle and the bodies as they are now; ropes are left to the impulses.
+    pub(super) fn project_rigid(&mut self, model: &NewtonEuler, vehicle: &mut RigidBody, work: &mut Work) {
+        if self.joints.is_empty() {
+            return;
+        }
+        let Work { acting, forces, .. } = work;
+        acting.clear();
+        acting.extend(self.joints.iter().map(|joint| !joint.is_rope()));
+        let mut states = std::mem::take(&mut self.states);
+        self.project(model, vehicle, &mut states, (acting, forces));
+        self.states = states;
+    }
+}
+
+impl Build {
+    fn new(body: &FreeBody, hangs: bool) -> Self {
+        let attitude_WB = body.attitude_W;
+        let spin_W_rad_s = &body.angular_velocity_W_rad_s;
+        Self {
+            mass_kg: body.mass_kg,
+            inertia: body.inertia_kg_m2,
+            // That of a solid has an inverse; zero would only freeze the rotation.
+            inverse_inertia: body.inertia_kg_m2.try_inverse().unwrap_or_else(Matrix3::zeros),
+            start: RigidBody {
+                position_W_m: body.centre_W_m,
+                velocity_W_m_s: body.velocity_W_m_s,
+                attitude_WB,
+                angular_velocity_B_rad_s: attitude_WB.inverse_transform_vector(spin_W_rad_s),
+            },
+            hangs,
+        }
+    }
+
+    fn mobility(&self, state: &RigidBody) -> Matrix6<f64> {
+        mobility(state, self.mass_kg, &self.inverse_inertia)
+    }
+
+    /// Newton's and Euler's equations of a body that nothing but gravity acts on.
+    fn rates(&self, state: &RigidBody, gravity_W_m_s2: &Vector3<f64>) -> BodyRates {
+        let w = &state.angular_velocity_B_rad_s;
+        BodyRates {
+            velocity_W_m_s: state.velocity_W_m_s,
+            acceleration_W_m_s2: *gravity_W_m_s2,
+            attitude_WB_per_s: state.attitude_WB.as_ref() * Quaternion::from_imag(w * 0.5),
+            angular_acceleration_B_rad_s2: -(self.inverse_inertia * w.cross(&(self.inertia * w))),
+        }
+    }
+
+    fn energy_J(&self, state: &RigidBody, twists: [&Vector6<f64>; 2]) -> f64 {
+        let [[v, w], [other_v, other_w]] = twists.map(part);
+        let in_body = |spin_W_rad_s: &Vector3<f64>| state.attitude_WB.inverse_transform_vector(spin_W_rad_s);
+        0.5 * self.mass_kg * v.dot(&other_v) + 0.5 * in_body(&w).dot(&(self.inertia * in_body(&other_w)))
+    }
+}
+
+/// Linear and angular acceleration, in the world's axes.
+fn accelerations_of(frame: &RigidBody, rates: &BodyRates) -> Vector6<f64> {
+    join(&rates.acceleration_W_m_s2, &(frame.attitude_WB * rates.angular_acceleration_B_rad_s2))
+}
+
+fn take(frame: &RigidBody, accelerations: &Vector6<f64>, rates: &mut BodyRates) {
+    let [linear_W_m_s2, angular_W_rad_s2] = part(accelerations);
+    rates.acceleration_W_m_s2 = linear_W_m_s2;
+    rates.angular_acceleration_B_rad_s2 = frame.attitude_WB.inverse_transform_vector(&angular_W_rad_s2);
+}

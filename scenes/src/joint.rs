@@ -1,0 +1,248 @@
+//! Joints: what ties free bodies to the world, to each other and to the vehicle.
+#![allow(non_snake_case, reason = "a trailing _W names the frame a vector is written in")]
+
+use crate::rig::PLACE;
+use crate::scene::Scene;
+use diagnostics::Diagnostic;
+use diagnostics::parameter::Bounds;
+use diagnostics::unit::{ANGLE, LENGTH, LINEAR_DAMPING, PURE_NUMBER, ROTARY_DAMPING};
+use nalgebra::Vector3;
+use vehicles::reader::{Quantity, Section};
+
+/// What a joint ties.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum End {
+    /// The ground and all that stands still.
+    World,
+    /// The vehicle of the run.
+    Vehicle,
+    /// The free body with this place among [`Scene::bodies`].
+    Body(usize),
+}
+
+/// What a joint leaves free.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Freedom {
+    /// Nothing.
+    Fixed,
+    /// All rotations.
+    Ball,
+    /// The rotation about an axis, by an angle from 0 at the start.
+    Revolute(Axis),
+    /// The motion along an axis, by a way from 0 at the start.
+    Prismatic(Axis),
+    /// Everything, as far as the two anchors are not farther apart than this.
+    Rope {
+        /// The most that the anchors are apart.
+        length_m: f64,
+        /// The anchor on the child; that on the parent is the joint's.
+        end_W_m: Vector3<f64>,
+    },
+}
+
+/// An axis and how far a joint moves on it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Axis {
+    /// Its direction at the start, a unit vector.
+    pub along_W: Vector3<f64>,
+    /// The least and the most of the angle, rad, or the way, m; infinite where there is no stop.
+    pub limits: [f64; 2],
+}
+
+/// A joint between two of a scene.
+///
+/// ```
+/// use scenes::{End, Freedom};
+///
+/// let scene = scenes::Scene::parse(scenes::reference::SLUNG_LOAD, "slung-load.toml")?;
+/// let rope = &scene.joints[0];
+/// assert_eq!((rope.parent, rope.child), (End::Vehicle, End::Body(0)));
+/// assert!(matches!(rope.freedom, Freedom::Rope { length_m: 0.8, .. }), "{rope:?}");
+/// # Ok::<(), diagnostics::Diagnostic>(())
+/// ```
+#[derive(Debug, Clone, PartialEq)]
+pub struct Joint {
+    /// What the file calls it.
+    pub name: String,
+    /// What the axis and the angles are seen from.
+    pub parent: End,
+    /// What moves on it.
+    pub child: End,
+    /// Where the two meet at the start: in the world; or as seen from the vehicle, of what hangs from that.
+    pub anchor_W_m: Vector3<f64>,
+    /// What it leaves free.
+    pub freedom: Freedom,
+    /// Viscous friction of what is free: N m s of rotations, N s/m of a way.
+    pub damping: f64,
+}
+
+/// Two points nearer than a millimetre are one to a rope.
+const ROPE: Bounds = Bounds { min: 1e-3, max: 1e4, unit: "m", why: "a millimetre to 10 km" };
+
+const DAMPING: Bounds =
+    Bounds { min: 0.0, max: 1e6, unit: "", why: "zero or more: a joint that drives itself makes energy" };
+
+/// A limit of a prismatic joint.
+const WAY: Bounds = Bounds { min: -1e4, max: 1e4, unit: "m", why: "10 km to either side" };
+
+/// A limit of a revolute joint: within a turn angles are told without doubt.
+const TURN: Bounds =
+    Bounds { min: -3.1, max: 3.1, unit: "rad", why: "less than half a turn to either side, 177 deg" };
+
+/// What a kind is called, to be looked up.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Kind {
+    Fixed,
+    Ball,
+    Revolute,
+    Prismatic,
+    Rope,
+}
+
+const KINDS: [(&str, Kind); 5] = [
+    ("fixed", Kind::Fixed),
+    ("ball", Kind::Ball),
+    ("revolute", Kind::Revolute),
+    ("prismatic", Kind::Prismatic),
+    ("rope", Kind::Rope),
+];
+
+/// Reads a table of `[[joints]]` in a scene with these `bodies`; see `scenes/slung-load.toml`.
+pub(crate) fn parse(section: &Section, bodies: &[&str]) -> Result<Joint, Diagnostic> {
+    let name = section.text("name")?.to_owned();
+    let kind = section.choice("kind", &KINDS)?;
+    let parent = end(section, "parent", bodies)?;
+    let child = end(section, "child", bodies)?;
+    refuse_pair(section, parent, child)?;
+    let anchor_W_m = section.vector("anchor", LENGTH, &PLACE)?.into();
+    let freedom = match kind {
+        Kind::Fixed => Freedom::Fixed,
+        Kind::Ball => Freedom::Ball,
+        Kind::Revolute => Freedom::Revolute(axis(section, |name| section.quantity(name, ANGLE), &TURN)?),
+        Kind::Prismatic => Freedom::Prismatic(axis(section, |name| section.quantity(name, LENGTH), &WAY)?),
+        Kind::Rope => Freedom::Rope {
+            length_m: section.bounded("length", LENGTH, &ROPE)?,
+            end_W_m: section.vector("end", LENGTH, &PLACE)?.into(),
+        },
+    };
+    let damping = match (section.has("damping"), kind) {
+        (true, Kind::Ball | Kind::Revolute) => section.bounded("damping", ROTARY_DAMPING, &DAMPING)?,
+        (true, Kind::Prismatic) => section.bounded("damping", LINEAR_DAMPING, &DAMPING)?,
+        (true, Kind::Fixed | Kind::Rope) => {
+            let found = "a joint that has none to damp";
+            return Err(refused(section, "damping", "kind ball, revolute or prismatic", found));
+        }
+        (false, _) => 0.0,
+    };
+    section.finish()?;
+    Ok(Joint { name, parent, child, anchor_W_m, freedom, damping })
+}
+
+fn refused(section: &Section, key: &str, expected: &str, found: &str) -> Diagnostic {
+    section.doc.bad(&section.at_of(key), &section.key(key), expected, found)
+}
+
+fn end(section: &Section, key: &'static str, bodies: &[&str]) -> Result<End, Diagnostic> {
+    let text = section.text(key)?;
+    let body = bodies.iter().position(|name| *name == text).map(End::Body);
+    let fixed = [("world", End::World), ("vehicle", End::Vehicle)];
+    let fixed = fixed.into_iter().find_map(|(name, end)| (name == text).then_some(end));
+    body.or(fixed).ok_or_else(|| {
+        let names: Vec<_> = bodies.iter().map(|name| format!("\"{name}\"")).collect();
+        let expected = "\"world\", \"vehicle\", or a thing of this scene that has a `mass`";
+        let found = match &names[..] {
+            [] => format!("\"{text}\"; nothing has a `mass` here"),
+            names => format!("\"{text}\"; these have a `mass`: {}", names.join(", ")),
+        };
+        refused(section, key, expected, &found)
+    })
+}
+
+fn refuse_pair(section: &Section, parent: End, child: End) -> Result<(), Diagnostic> {
+    if child == End::World {
+        return Err(refused(
+            section,
+            "child",
+            "\"vehicle\" or a thing with a `mass`",
+            "\"world\": swap the two",
+        ));
+    }
+    if parent == child {
+        return Err(refused(section, "child", "another than `parent`", "the same"));
+    }
+    Ok(())
+}
+
+fn axis<'t>(
+    section: &Section<'_, 't>,
+    limit: impl Fn(&'static str) -> Result<Quantity, Diagnostic>,
+    bounds: &Bounds,
+) -> Result<Axis, Diagnostic> {
+    let unit = Bounds { min: -1e6, max: 1e6, unit: "1", why: "a direction: its length does not matter" };
+    let along_W = Vector3::from(section.vector("axis", PURE_NUMBER, &unit)?);
+    let along_W =
+        along_W.try_normalize(1e-6).ok_or_else(|| refused(section, "axis", "a direction", "three zeros"))?;
+    let stop = |name, otherwise: f64| match section.has(name) {
+        true => Ok(limit(name)?.within(section.doc, bounds)?.si),
+        false => Ok(otherwise),
+    };
+    let limits = [stop("lower", f64::NEG_INFINITY)?, stop("upper", f64::INFINITY)?];
+    let key = if limits[0] > 0.0 { "lower" } else { "upper" };
+    if limits[0] > 0.0 || limits[1] < 0.0 {
+        return Err(refused(
+            section,
+            key,
+            "`lower` at most 0 and `upper` at least 0: a joint starts at 0",
+            "beyond",
+        ));
+    }
+    Ok(Axis { along_W, limits })
+}
+
+impl Scene {
+    /// Which of [`Scene::bodies`] hang from the vehicle, by joints to it or to others that do; the world ties nothing
+    /// together.
+    #[must_use]
+    pub fn hanging(&self) -> Vec<bool> {
+        let mut hangs = vec![false; self.bodies().count()];
+        let is_in = |hangs: &[bool], end| match end {
+            End::World => false,
+            End::Vehicle => true,
+            End::Body(number) => hangs[number],
+        };
+        // A chain is as long as there are joints at most.
+        for _ in &self.joints {
+            for joint in &self.joints {
+                let (parent, child) = (is_in(&hangs, joint.parent), is_in(&hangs, joint.child));
+                for end in [joint.parent, joint.child] {
+                    if let (End::Body(number), true, true) =
+                        (end, parent || child, joint.parent != End::World)
+                    {
+                        hangs[number] = true;
+                    }
+                }
+            }
+        }
+        hangs
+    }
+
+    /// Whether a joint ties the vehicle.
+    #[must_use]
+    pub fn is_vehicle_tied(&self) -> bool {
+        self.joints.iter().any(|joint| [joint.parent, joint.child].contains(&End::Vehicle))
+    }
+
+    /// The first joint other than a rope that ties the vehicle, or what hangs from it, to the world.
+    pub(crate) fn joint_that_pins_the_vehicle(&self) -> Option<usize> {
+        let hangs = self.hanging();
+        self.joints.iter().position(|joint| {
+            let is_rope = matches!(joint.freedom, Freedom::Rope { .. });
+            let hangs = match joint.child {
+                End::World => false,
+                End::Vehicle => true,
+                End::Body(number) => hangs[number],
+            };
+            joint.parent == End::World && hangs && !is_rope
+        })
+    }
+}
