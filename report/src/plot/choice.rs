@@ -2,6 +2,7 @@
 
 use crate::plot::field::Channel;
 use crate::plot::request::Request;
+use crate::plot::scene;
 use crate::plot::thin::{Line, Trail};
 use anyhow::{Context, Result, bail};
 use recorder::reader::{Recording, Topic};
@@ -243,7 +244,17 @@ fn trails(recording: &Recording, is_shown: impl Fn(&str) -> bool) -> Vec<(Ask, T
     let trail = |(name, topic): (&String, &Topic)| {
         (Ask::new(name, "position", &topic.type_name), Trail::new(TRAIL_POINTS_MAX))
     };
-    moving.map(trail).collect()
+    let moving = moving.map(trail);
+    let bodies = |(name, topic): (&String, &Topic)| {
+        let is_theirs = short_name(&topic.type_name) == "BodyStates" && is_shown(name);
+        let names = if is_theirs { scene::body_names(recording) } else { Vec::new() };
+        let trail = |(number, body)| {
+            let ask = Ask::new(name, &format!("position[{number}]"), &topic.type_name);
+            (ask, Trail::new(TRAIL_POINTS_MAX).of_body(body))
+        };
+        names.into_iter().enumerate().map(trail).collect::<Vec<_>>()
+    };
+    moving.chain(recording.topics().iter().flat_map(bodies)).collect()
 }
 
 /// What `--against` names: a topic and a number of it.

@@ -235,7 +235,7 @@ pub fn trails(read: &[(Ask, thin::Trail)]) -> Vec<Trail> {
     let drawn = drawn().map(|(ask, trail)| {
         let index = vehicles.iter().position(|vehicle| *vehicle == ask.vehicle()).unwrap_or_default();
         Trail {
-            name: trail_name(ask.vehicle(), ask.role),
+            name: trail.body().map_or_else(|| trail_name(ask.vehicle(), ask.role), str::to_owned),
             topic: ask.topic.clone(),
             field: String::new(),
             role: ask.role,

@@ -27,7 +27,8 @@ struct Uses<'a> {
     /// The number that all is drawn against is this topic's.
     against: Option<&'a mut Ask>,
     asks: Vec<&'a mut Ask>,
-    trails: Vec<&'a mut Trail>,
+    /// Paths in space, each with the field that it is of.
+    trails: Vec<(&'a str, &'a mut Trail)>,
 }
 
 /// How the numbers of a recording become points.
@@ -92,7 +93,7 @@ impl Drawn<'_> {
                 ask.curves.iter_mut().for_each(|(channel, line)| line.push(x, channel.value(leaves)));
             }
         }
-        uses.trails.iter_mut().for_each(|trail| trail.push(position(leaves)));
+        uses.trails.iter_mut().for_each(|(field, trail)| trail.push(position(leaves, field)));
         Ok(())
     }
 
@@ -124,14 +125,13 @@ fn uses(choice: &mut Choice) -> BTreeMap<String, Uses<'_>> {
         uses.entry(ask.topic.clone()).or_default().asks.push(ask);
     }
     for (ask, trail) in &mut choice.trails {
-        uses.entry(ask.topic.clone()).or_default().trails.push(trail);
+        uses.entry(ask.topic.clone()).or_default().trails.push((&ask.field, trail));
     }
     uses
 }
 
-fn position(leaves: &[Leaf]) -> [f64; 3] {
-    let paths = ["position.x", "position.y", "position.z"];
-    paths.map(|path| number(leaves, path).unwrap_or(f64::NAN))
+fn position(leaves: &[Leaf], field: &str) -> [f64; 3] {
+    ["x", "y", "z"].map(|axis| number(leaves, &format!("{field}.{axis}")).unwrap_or(f64::NAN))
 }
 
 fn is_empty(ask: &Ask) -> bool {

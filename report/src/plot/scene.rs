@@ -1,9 +1,10 @@
-//! The scene of a recording, as what stands in it is drawn: boxes and meshes by their corners and edges.
+//! The scene of a recording, as what stands still in it is drawn: boxes, meshes and balls by their corners and edges.
 
 use recorder::RecordingError;
 use recorder::reader::Recording;
-use scenes::{Cuboid, Mesh, Scene};
+use scenes::{Ball, Cuboid, Mesh, Scene, Thing};
 use serde::Serialize;
+use std::f64::consts::{PI, TAU};
 use std::path::Path;
 
 /// A thing that stands on or above the ground, as it is drawn.
@@ -42,7 +43,45 @@ const BOX_FACES: [[u32; 3]; 12] = [
     [0, 2, 1],
 ];
 
+/// Corners around a ball as it is drawn, and rings of them between its poles.
+const AROUND: usize = 24;
+const RINGS: usize = 11;
+
 impl Solid {
+    fn of(thing: &Thing) -> Self {
+        match thing {
+            Thing::Cuboid(cuboid) => Self::of_box(cuboid),
+            Thing::Mesh(mesh) => Self::of_mesh(mesh),
+            Thing::Ball(ball) => Self::of_ball(ball),
+        }
+    }
+
+    /// A ball by rings of latitude; its equator and two meridians are seen.
+    fn of_ball(ball: &Ball) -> Self {
+        let on_ball = |ring: usize, place: usize| {
+            let (down, out) = libm::sincos(PI * (ring + 1) as f64 / (RINGS + 1) as f64 - PI / 2.0);
+            let (y, x) = libm::sincos(TAU * place as f64 / AROUND as f64);
+            let [a, b, c] = [x * out, y * out, -down].map(|part| part * ball.radius_m);
+            [ball.centre_W_m.x + a, ball.centre_W_m.y + b, ball.centre_W_m.z + c]
+        };
+        let corners: Vec<_> =
+            (0..RINGS).flat_map(|ring| (0..AROUND).map(move |place| on_ball(ring, place))).collect();
+        let quads = (0..RINGS - 1).flat_map(|ring| (0..AROUND).map(move |place| (ring, place)));
+        let number = |ring: usize, place: usize| (ring * AROUND + place % AROUND) as u32;
+        let faces = quads.flat_map(|(ring, place)| {
+            let [a, b] = [number(ring, place), number(ring, place + 1)];
+            let [c, d] = [number(ring + 1, place + 1), number(ring + 1, place)];
+            [[a, d, c], [a, c, b]]
+        });
+        let middle = RINGS / 2;
+        let equator = (0..AROUND).map(|place| [on_ball(middle, place), on_ball(middle, place + 1)]);
+        let meridian =
+            |place: usize| (0..RINGS - 1).map(move |ring| [on_ball(ring, place), on_ball(ring + 1, place)]);
+        let meridians = (0..4).flat_map(|quarter| meridian(quarter * AROUND / 4));
+        let edges = equator.chain(meridians).collect();
+        Self { name: ball.name.clone(), faces: faces.collect(), edges, corners, is_box: false }
+    }
+
     fn of_box(cuboid: &Cuboid) -> Self {
         let ([x, y, z], [a, b, c]) = (cuboid.centre_W_m.into(), cuboid.half_extents_m.into());
         let (sin, cos) = libm::sincos(cuboid.yaw_rad);
@@ -80,11 +119,23 @@ impl Solid {
     }
 }
 
-/// What stands in the scene of a recording, whose file and meshes are attached; nothing where it has none.
+/// What stands still in the scene of a recording, whose file and meshes are attached; nothing where it has none.
 ///
 /// # Errors
 /// If the recording is damaged.
 pub fn scene_of(recording: &Recording) -> Result<Vec<Solid>, RecordingError> {
+    let Some(scene) = read_scene(recording)? else { return Ok(Vec::new()) };
+    let still = scene.things().filter(|thing| thing.body().is_none());
+    Ok(still.map(|thing| Solid::of(&thing)).collect())
+}
+
+/// What the free bodies of a recording's scene are called; none where it has no scene that can be read.
+pub fn body_names(recording: &Recording) -> Vec<String> {
+    let Ok(Some(scene)) = read_scene(recording) else { return Vec::new() };
+    scene.bodies().filter_map(|(number, _)| scene.name_of(number)).map(str::to_owned).collect()
+}
+
+fn read_scene(recording: &Recording) -> Result<Option<Scene>, RecordingError> {
     let attachments = recording.attachments()?;
     // They are attached by their names alone.
     let read = |path: &Path| {
@@ -96,8 +147,7 @@ pub fn scene_of(recording: &Recording) -> Result<Vec<Solid>, RecordingError> {
     let scene = |(name, bytes): &(String, Vec<u8>)| {
         Scene::parse_with(std::str::from_utf8(bytes).ok()?, name, &read).ok()
     };
-    let Some(scene) = attachments.iter().find_map(scene) else { return Ok(Vec::new()) };
-    Ok(scene.boxes.iter().map(Solid::of_box).chain(scene.meshes.iter().map(Solid::of_mesh)).collect())
+    Ok(attachments.iter().find_map(scene))
 }
 
 #[cfg(test)]

@@ -109,12 +109,25 @@ pub struct Trail {
     every: u64,
     /// Samples that were pushed.
     pub samples: u64,
+    /// The free body that it is of, if it is of one.
+    body: Option<String>,
 }
 
 impl Trail {
     /// A path of up to `points_max` points.
     pub fn new(points_max: usize) -> Self {
-        Self { points: Vec::new(), last: None, points_max: points_max.max(2), every: 1, samples: 0 }
+        let points_max = points_max.max(2);
+        Self { points: Vec::new(), last: None, points_max, every: 1, samples: 0, body: None }
+    }
+
+    /// The same for a free body of this name.
+    pub fn of_body(self, name: String) -> Self {
+        Self { body: Some(name), ..self }
+    }
+
+    /// The free body that it is of, if it is of one.
+    pub fn body(&self) -> Option<&str> {
+        self.body.as_deref()
     }
 
     /// Adds a point.
