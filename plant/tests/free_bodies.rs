@@ -297,3 +297,87 @@ fn another_instance_goes_on_from_a_snapshot_to_the_same_bits() {
     let mut heavier = plant_at(&[parts[0].replace("0.1,", "0.2,"), parts[1].clone()], Vector3::z() * 0.3);
     assert!(heavier.restore(&first.snapshot().unwrap()).is_err(), "another mass is another world");
 }
+
+/// A room of 4 m with bodies of every shape, thrown about: nothing makes energy, and nothing gets out.
+mod thrown {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn numbers(most: f64) -> impl Strategy<Value = String> {
+        prop::array::uniform3(-most..most).prop_map(|numbers| format!("{numbers:?}"))
+    }
+
+    fn energy_J(scene: &Scene, plant: &Rapier) -> f64 {
+        let bodies = scene.bodies().zip(plant.bodies()).map(|((_, built), body)| {
+            let w = body.angular_velocity_B_rad_s;
+            0.5 * built.mass_kg * body.velocity_W_m_s.norm_squared()
+                + 0.5 * w.dot(&(built.inertia_kg_m2 * w))
+                + built.mass_kg * G_M_S2 * body.position_W_m.z
+        });
+        bodies.sum()
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig { cases: 12, failure_persistence: None, ..ProptestConfig::default() })]
+
+        #[test]
+        fn makes_no_energy_and_stays_in_the_room(
+            speeds in prop::array::uniform4(numbers(4.0)),
+            spins in prop::array::uniform4(numbers(8.0)),
+            friction in prop_oneof![Just(0.0), 0.1..1.0],
+            restitution in prop_oneof![Just(0.0), Just(1.0), 0.1..0.9],
+        ) {
+            let wall = |name: &str, centre: &str, size: &str| {
+                body("boxes", name, &[("centre", centre, "m"), ("size", size, "m")])
+            };
+            let thrown = |kind: &str, number: usize, more: &[(&str, &str, &str)]| {
+                let motion = [("velocity", &*speeds[number], "m/s"), ("angular_velocity", &*spins[number], "rad/s")];
+                body(kind, &format!("body {number}"), &[more, &motion].concat())
+            };
+            let surface = format!(
+                "friction = {}\nrestitution = {}\n",
+                given(&friction.to_string(), "1"),
+                given(&restitution.to_string(), "1")
+            );
+            let parts = [
+                surface,
+                wall("+x", "[2.5, 0, 5]", "[1, 6, 20]"),
+                wall("-x", "[-2.5, 0, 5]", "[1, 6, 20]"),
+                wall("+y", "[0, 2.5, 5]", "[6, 1, 20]"),
+                wall("-y", "[0, -2.5, 5]", "[6, 1, 20]"),
+                thrown("boxes", 0, &[("centre", "[0, 0, 0.4]", "m"), ("size", "[0.3, 0.2, 0.1]", "m"), ("mass", "1", "kg")]),
+                thrown("boxes", 1, &[("centre", "[0.8, 0, 0.5]", "m"), ("size", "[0.2, 0.2, 0.4]", "m"), ("mass", "0.3", "kg")]),
+                thrown("balls", 2, &[("centre", "[0, 0.8, 0.4]", "m"), ("radius", "0.1", "m"), ("mass", "2", "kg")]),
+                thrown("balls", 3, &[("centre", "[0, 1.2, 0.4]", "m"), ("radius", "0.08", "m"), ("mass", "0.2", "kg")]),
+                joint("ball", ["body 2", "body 3"], &[("anchor", "[0, 1, 0.4]", "m")]),
+            ];
+            let text = format!("name = \"test\"\n{}", parts.concat());
+            let scene = Scene::parse(&text, "test.toml").unwrap();
+            let mut plant = common::rapier(
+                NewtonEuler::new(hummingbird(), 2),
+                &scene,
+                &RigidBody::level_at(Vector3::new(100.0, 0.0, 50.0)),
+                1e9,
+            );
+            // The joint's constraint holds from the first step on.
+            tick(&mut plant);
+            let mut before_J = energy_J(&scene, &plant);
+            for at in 0..800 {
+                tick(&mut plant);
+                let after_J = energy_J(&scene, &plant);
+                prop_assert!(after_J < before_J + 5e-3 * (1.0 + before_J), "tick {at}: {before_J} J to {after_J} J");
+                before_J = before_J.min(after_J);
+                for found in plant.bodies() {
+                    prop_assert!(found.is_finite());
+                    let [x, y, z] = found.position_W_m.into();
+                    prop_assert!(x.abs() < 2.0 && y.abs() < 2.0 && z > 0.0, "tick {at}: {found:?}");
+                }
+                let [_, _, one, two] = plant.bodies() else { panic!("four bodies") };
+                let ends = [(one, 0.2), (two, -0.2)].map(|(found, arm_m)| {
+                    found.position_W_m + found.attitude_WB * Vector3::new(0.0, arm_m, 0.0)
+                });
+                prop_assert!((ends[0] - ends[1]).norm() < 1e-9, "tick {at}: the joint is apart: {ends:?}");
+            }
+        }
+    }
+}

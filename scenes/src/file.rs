@@ -166,7 +166,7 @@ impl Scene {
 
 /// Refuses more things or free bodies than there are numbers for, and two bodies of one name.
 fn check_numbers(doc: &Document, scene: &Scene) -> Result<(), Diagnostic> {
-    let refused = |expected: String, found| Err(doc.bad(&(0..0), "boxes", expected, found));
+    let refused = |expected: String, found| Err(doc.bad(&(0..0), "mass", expected, found));
     let (things, bodies) = (scene.thing_count(), scene.bodies().count());
     if things > THINGS_MAX {
         return refused(
@@ -176,6 +176,10 @@ fn check_numbers(doc: &Document, scene: &Scene) -> Result<(), Diagnostic> {
     }
     if bodies > BODIES_MAX {
         return refused(format!("at most {BODIES_MAX} with a `mass`"), format!("{bodies} free bodies"));
+    }
+    let taken = |name: &&str| ["world", "vehicle"].contains(name);
+    if let Some(name) = scene.bodies().filter_map(|(number, _)| scene.name_of(number)).find(taken) {
+        return refused("another name: joints mean something else by it".to_owned(), format!("\"{name}\""));
     }
     let mut names: Vec<_> = scene.bodies().filter_map(|(number, _)| scene.name_of(number)).collect();
     names.sort_unstable();

@@ -111,6 +111,11 @@ fn among_meshes_in_an_office_and_a_labyrinth() {
     ["office", "labyrinth"].into_iter().for_each(fly);
 }
 
+#[test]
+fn among_free_bodies_with_a_slung_load_and_in_a_workshop() {
+    ["slung-load", "workshop"].into_iter().for_each(fly);
+}
+
 /// Not for the two laps that the manifest asks for, which take a minute: for half a lap, and no contact.
 #[test]
 fn ten_vehicles_share_a_room() {

@@ -21,6 +21,48 @@ fn the_hover_is_flown_on_rapier_and_twice_it_is_the_same_file() {
 }
 
 #[test]
+fn a_load_that_is_carried_is_the_same_file_twice() {
+    let (place, manifest) = (Place::new(), repository("manifests/slung-load.toml"));
+    let [first, second] = ["first.mcap", "second.mcap"].map(|name| {
+        let path = place.path(name);
+        let cut = ["--set", "run.duration_s=3"];
+        place.call(&[&["run", &manifest, "--record", &path][..], &cut].concat());
+        path
+    });
+    place.call(&["diff", &first, &second]).with_code(0);
+}
+
+#[test]
+fn free_bodies_are_refused_where_nobody_could_say_where_they_are() {
+    let place = Place::new();
+    let with = |file: &str, more: &[&str]| {
+        let manifest = repository(&format!("manifests/{file}.toml"));
+        let ended = place.call(&[&["check", &manifest][..], more].concat());
+        (ended.code, ended.stderr)
+    };
+    let cases: [(&str, &[&str], &[&str]); 5] = [
+        (
+            "slung-load",
+            &["--set", "process.plant.parameters.backend=newton-euler"],
+            &["slung load", "rapier"],
+        ),
+        ("slung-load", &["--set", "process.plant.parameters.initial_position_m=[0,0,0]"], &[]),
+        (
+            "workshop",
+            &["--set", "process.plant.parameters.initial_position_m=[2.05,-0.1,1]"],
+            &["workshop", "door", "vehicle"],
+        ),
+        ("workshop", &["--set", "process.range.inputs={ state = '/plant/state' }"], &["range", "`bodies`"]),
+        ("hover-rapier", &["--set", "process.plant.outputs.bodies={}"], &["`bodies`", "mass"]),
+    ];
+    for (file, more, told) in cases {
+        let (code, stderr) = with(file, more);
+        assert_eq!(code == 0, told.is_empty(), "{file} {more:?}: {stderr}");
+        assert!(told.iter().all(|word| stderr.contains(word)), "{file} {more:?}: {stderr}");
+    }
+}
+
+#[test]
 fn two_vehicles_that_share_a_room_meet() {
     let place = Place::new();
     let vehicle = |name: &str, x_m: f64, speed_m_s: f64| {

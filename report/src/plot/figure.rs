@@ -228,12 +228,17 @@ fn colour(curves: &mut [Curve]) {
     }
 }
 
-/// The paths in space: those of one vehicle have one colour.
+/// The paths in space: those of one vehicle have one colour, and each free body has one.
 pub fn trails(read: &[(Ask, thin::Trail)]) -> Vec<Trail> {
     let drawn = || read.iter().filter(|(_, trail)| trail.samples > 0);
-    let vehicles = distinct(drawn().map(|(ask, _)| ask.vehicle()));
-    let drawn = drawn().map(|(ask, trail)| {
-        let index = vehicles.iter().position(|vehicle| *vehicle == ask.vehicle()).unwrap_or_default();
+    // A body may be called as a vehicle is.
+    let mover = |(ask, trail): &'_ (Ask, thin::Trail)| {
+        (trail.body().is_some(), trail.body().unwrap_or(ask.vehicle()).to_owned())
+    };
+    let movers = distinct(drawn().map(mover));
+    let drawn = drawn().map(|read| {
+        let (ask, trail) = read;
+        let index = movers.iter().position(|known| *known == mover(read)).unwrap_or_default();
         Trail {
             name: trail.body().map_or_else(|| trail_name(ask.vehicle(), ask.role), str::to_owned),
             topic: ask.topic.clone(),
