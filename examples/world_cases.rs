@@ -119,6 +119,65 @@ fn rig(text: &str) -> Scene {
     scene
 }
 
+/// What hangs in a chain from the vehicle: centre, size, mass, and the joint that it hangs by.
+const CHAIN: [(&str, [f64; 3], [f64; 3], f64, &str, [f64; 3]); 4] = [
+    ("a", [0.05, 0.02, -0.25], [0.1, 0.2, 0.3], 0.3, "ball", [0.0, 0.0, -0.08]),
+    ("b", [0.05, 0.1, -0.55], [0.2, 0.1, 0.2], 0.2, "revolute", [0.05, 0.05, -0.42]),
+    ("c", [0.1, 0.1, -0.8], [0.1, 0.1, 0.1], 0.15, "prismatic", [0.1, 0.1, -0.7]),
+    ("d", [0.2, 0.15, -0.85], [0.15, 0.05, 0.1], 0.1, "fixed", [0.15, 0.1, -0.8]),
+];
+/// The axis of its second and third joint.
+const CHAIN_AXIS: [f64; 3] = [0.6, 0.8, 0.0];
+
+fn chain() -> Scene {
+    let given = |value: &str, unit: &str| {
+        format!("{{ value = {value}, unit = \"{unit}\", source = \"case\", uncertainty = \"exact\" }}")
+    };
+    let mut text = "name = \"chain\"\n".to_owned();
+    let mut parent = "vehicle";
+    let mut joints = String::new();
+    for (name, centre, size, mass_kg, kind, anchor) in &CHAIN {
+        let numbers = [centre, size, anchor].map(|numbers| given(&format!("{numbers:?}"), "m"));
+        let [centre, size, anchor] = &numbers;
+        let mass = given(&mass_kg.to_string(), "kg");
+        text += &format!("[[boxes]]\nname = \"{name}\"\ncentre = {centre}\nsize = {size}\nmass = {mass}\n");
+        joints += &format!(
+            "[[joints]]\nname = \"{name}\"\nkind = \"{kind}\"\nparent = \"{parent}\"\nchild = \"{name}\"\nanchor = {anchor}\n"
+        );
+        if ["revolute", "prismatic"].contains(kind) {
+            joints += &format!("axis = {}\n", given(&format!("{CHAIN_AXIS:?}"), "1"));
+        }
+        parent = name;
+    }
+    scene(&(text + &joints))
+}
+
+/// The chain and the vehicle, which spin in free fall until two of them meet: the time, and position and attitude (w first) of each.
+fn falling_chain(vehicle: &Vehicle) -> Vec<Vec<f64>> {
+    let start = RigidBody {
+        angular_velocity_B_rad_s: Vector3::new(2.0, 1.0, 3.0),
+        ..RigidBody::level_at(Vector3::z() * 100.0)
+    };
+    let mut plant = rapier(vehicle, &chain(), &start);
+    let told = |tick: u32, plant: &Rapier| {
+        let mut numbers = vec![f64::from(tick) * TICK_S];
+        for body in [&plant.state().body].into_iter().chain(plant.bodies()) {
+            let attitude = body.attitude_WB.quaternion();
+            numbers.extend(body.position_W_m.iter());
+            numbers.extend([attitude.w, attitude.i, attitude.j, attitude.k]);
+        }
+        numbers
+    };
+    let mut states = vec![told(0, &plant)];
+    for tick in 1..=2_400 {
+        plant.step(&[0.0; 4], TICK_S, &[]);
+        if tick % 10 == 0 {
+            states.push(told(tick, &plant));
+        }
+    }
+    states
+}
+
 fn cases() -> Value {
     let (declared, body) = (hummingbird(), airless());
     let stand_m = Hull::of(&Airframe::new(body.clone())).stand_m();
@@ -164,6 +223,7 @@ fn cases() -> Value {
         "tip": dropped(&body, &table(), &RigidBody::level_at(Vector3::z() * (2.0 + stand_m)), 0.3),
         "rig A, lower end": dropped(&body, &sliding_rig, &hung(&sliding_rig, 0.2), 0.5),
         "rig B, swing": dropped(&body, &fixed_rig, &swinging, 10.0),
+        "chain": falling_chain(&body),
         "rig B, cone": dropped(&body, &fixed_rig, &hits_cone, 0.3),
     })
 }
@@ -207,6 +267,10 @@ pub fn told() -> Value {
         "disc": { "radius": hull.disc_radius_m, "half": hull.disc_half_m },
         "stand": hull.stand_m(),
         "rig": { "mount": rig.mount_B_m.z, "mass": rig.moving_mass_kg, "heave": rig.heave_m, "tilt": rig.tilt_max_rad, "bearing": rig.bearing_W_m.z },
+        "chain": CHAIN.map(|(name, centre, size, mass_kg, kind, anchor)| {
+            json!({ "name": name, "centre": centre, "size": size, "mass": mass_kg, "kind": kind, "anchor": anchor })
+        }),
+        "chain axis": CHAIN_AXIS,
         "targets": speeds(&commands[0]),
         "hard targets": speeds(&commands[1]),
         "cases": cases(),

@@ -284,6 +284,41 @@ def compare_rigs(told, cases):
     row("rig B: period of a swing of 0.5 rad", "s", period, closed=(closed, 5e-6))
 
 
+def compare_chain(told, cases):
+    """What hangs from the vehicle by a ball joint, a hinge, a slide and a fixed joint, all in free fall."""
+    axis = " ".join(str(number) for number in told["chain axis"])
+    kinds = {"ball": '<joint type="ball" pos="{0}"/>', "revolute": f'<joint type="hinge" axis="{axis}" pos="{{0}}"/>',
+             "prismatic": f'<joint type="slide" axis="{axis}" pos="{{0}}"/>', "fixed": ""}
+    inside, ends, above = "", "", np.zeros(3)
+    for link in told["chain"]:
+        centre, half = np.array(link["centre"]), np.array(link["size"]) / 2
+        anchor = " ".join(str(number) for number in np.array(link["anchor"]) - centre)
+        place = " ".join(str(number) for number in centre - above)
+        moments = link["mass"] / 3 * (sum(half**2) - half**2)
+        diagonal = " ".join(str(moment) for moment in moments)
+        inside += (f'<body name="{link["name"]}" pos="{place}">{kinds[link["kind"]].format(anchor)}'
+                   f'<inertial pos="0 0 0" mass="{link["mass"]}" diaginertia="{diagonal}"/>')
+        ends, above = ends + "</body>", centre
+    states = np.array(cases["chain"])
+    start = [0, *states[0][1:4], 0, 0, 0, 1, 0, 0, 0]
+    model, data = world(told, body(told, start, inside + ends), integrator="RK4")
+    data.qvel[3:6] = [2, 1, 3]
+    mujoco.mj_forward(model, data)
+    off, turned = 0.0, 0.0
+    for state in states[1:]:
+        for _ in range(100):
+            mujoco.mj_step(model, data)
+        for number in range(len(told["chain"]) + 1):
+            ours = state[1 + 7 * number:8 + 7 * number]
+            # MuJoCo leaves its bodies where they were in the step's last stage.
+            mujoco.mj_kinematics(model, data)
+            off = max(off, np.linalg.norm(ours[:3] - data.xpos[number + 1]))
+            turned = max(turned, angle_between(ours[3:], data.xquat[number + 1]))
+    what = "vehicle and a chain of four by a ball joint, a hinge, a slide and a fixed joint, 2.4 s of free fall"
+    apart(f"{what}: position", "m", mujoco=(off, 1e-9))
+    apart(f"{what}: attitude", "rad", mujoco=(turned, 1e-9))
+
+
 def compare_rotorpy(told, cases):
     from rotorpy.vehicles.multirotor import Multirotor
 
@@ -364,7 +399,7 @@ def main():
     comparisons = [compare_tumble, compare_plain_chirps]
     if arguments.all:
         comparisons += [compare_rotorpy, compare_dop853]
-    comparisons += [compare_bounces, compare_slide, compare_rest, compare_tip, compare_rigs]
+    comparisons += [compare_bounces, compare_slide, compare_rest, compare_tip, compare_rigs, compare_chain]
     for compare in comparisons:
         if arguments.only is None or compare.__name__ == f"compare_{arguments.only}":
             compare(told, told["cases"])
