@@ -6,6 +6,9 @@
 //! | `response` | lag and gain of a signal behind another |
 //! | [`shadow`] | how outputs went on at take-overs, and what shadows asked for otherwise |
 //! | [`summary`] | all that there is to say about a run, as text and as JSON |
+//! | [`airframe`] | the body of a vehicle: what is seen of it, and what of it touches |
+//! | [`attached`] | the vehicles whose files a recording has attached |
+//! | [`urdf`] | a vehicle as other tools show it |
 //! | [`plot`] | curves over time and paths in space, as a page, PNG or SVG |
 //! | [`profile`] | where the host time of ticks goes |
 //! | [`validate`] | measured flights flown again, and their errors at the ends of windows |
@@ -15,7 +18,10 @@
 //!
 //! Texts, JSON and bytes are returned: but for [`top::watch`], nothing here prints.
 #![forbid(unsafe_code)]
+#![allow(non_snake_case, reason = "a trailing _B or _W names the frame that a vector is written in")]
 
+pub mod airframe;
+pub mod attached;
 mod cells;
 pub mod identification;
 pub mod judge;
@@ -27,4 +33,5 @@ pub mod shadow;
 mod states;
 pub mod summary;
 pub mod top;
+pub mod urdf;
 pub mod validate;

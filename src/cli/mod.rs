@@ -20,6 +20,7 @@ mod shadow;
 mod steer;
 mod table;
 mod top;
+mod urdf;
 mod validate;
 
 use anyhow::Result;
@@ -66,6 +67,9 @@ commands! {
     /// Draw a recording: a page with curves over time and the paths in space, or pictures of them.
     #[command(after_help = plot::HELP)]
     Plot(plot::PlotArguments) => plot::plot;
+    /// Write a vehicle's body as URDF, which Foxglove, Rerun and RViz show: what is seen, mass and inertia, what touches.
+    #[command(after_help = urdf::HELP)]
+    Urdf(urdf::UrdfArguments) => urdf::urdf;
     /// Print every message's fields, units, frames and layout hash.
     #[command(after_help = "Example: hummingbus schema --json")]
     Schema(schema::SchemaArguments) => schema::schema;

@@ -1,6 +1,7 @@
 //! Which keys a vehicle file has, in which dimension, and what is physical.
 
 use nalgebra::{Matrix3, Vector3};
+use std::io;
 use std::path::{Path, PathBuf};
 
 use crate::bounds;
@@ -32,11 +33,32 @@ impl Vehicle {
     /// before its own; a table `[body]`, `[rotor]`, `[motor]`, `[command]` or the `[[rotors]]` of the file replace those of
     /// its base whole.
     pub fn parse(text: &str, file_name: &str) -> Result<Self, Diagnostic> {
+        Self::parse_with(text, file_name, &crate::text::read)
+    }
+
+    /// As [`Vehicle::parse`], with the text of the file's `base` from `read`, which takes its path: for files that are not on
+    /// the disk, as those that a recording has attached.
+    ///
+    /// # Errors
+    /// As [`Vehicle::parse`].
+    ///
+    /// ```
+    /// use vehicles::{Vehicle, reference::HUMMINGBIRD};
+    /// let text = "name = \"another\"\nbase = \"hummingbird.toml\"";
+    /// let vehicle = Vehicle::parse_with(text, "another.toml", &|_| Ok(HUMMINGBIRD.to_owned()))?;
+    /// assert_eq!((&*vehicle.name, vehicle.mass_kg), ("another", 0.48));
+    /// # Ok::<(), diagnostics::Diagnostic>(())
+    /// ```
+    pub fn parse_with(
+        text: &str,
+        file_name: &str,
+        read: &dyn Fn(&Path) -> io::Result<String>,
+    ) -> Result<Self, Diagnostic> {
         let doc = Document::new(file_name, text);
         let tree = doc.tree()?;
         let root = Section::new(&doc, String::new(), 0..0, tree.get_ref());
         if root.has("base") {
-            return on_base(&root, &beside(Path::new(file_name), root.text("base")?));
+            return on_base(&root, &beside(Path::new(file_name), root.text("base")?), read);
         }
         complete(&doc, &root)
     }
@@ -54,12 +76,16 @@ fn beside(path: &Path, other: &str) -> PathBuf {
     path.parent().unwrap_or(Path::new("")).join(other)
 }
 
-fn on_base(root: &Section, path: &Path) -> Result<Vehicle, Diagnostic> {
+fn on_base(
+    root: &Section,
+    path: &Path,
+    read: &dyn Fn(&Path) -> io::Result<String>,
+) -> Result<Vehicle, Diagnostic> {
     let (name, file) = (title(root)?, path.display().to_string());
     let more = effects::read(root)?;
     let tables = Tables::read(root)?;
     root.finish()?;
-    let text = crate::text::read(path).map_err(|cause| {
+    let text = read(path).map_err(|cause| {
         let expected = "the path of a vehicle file, relative to this one";
         root.doc.bad(&root.at_of("base"), "base", expected, format!("{file}: {cause}"))
     })?;

@@ -1,0 +1,165 @@
+//! The vehicle files that a recording has attached, and which of its vehicles flies which.
+
+use crate::airframe::Body;
+use plant::Airframe;
+use recorder::RecordingError;
+use recorder::reader::Recording;
+use std::io;
+use std::path::Path;
+use toml::{Table, Value};
+use vehicles::Vehicle;
+
+/// What a recording has attached: the manifest, and the files that it names.
+#[derive(Debug)]
+pub struct Attached {
+    /// The manifest with all that it includes.
+    manifest: Table,
+    /// Texts by file names.
+    files: Vec<(String, String)>,
+}
+
+impl Attached {
+    /// What is attached to a recording: nothing where it was cut off.
+    ///
+    /// # Errors
+    /// If the recording is damaged.
+    pub fn to(recording: &Recording) -> Result<Self, RecordingError> {
+        let files = recording.attachments()?.into_iter();
+        // Meshes are no text.
+        let files = files.filter_map(|(name, bytes)| Some((name, String::from_utf8(bytes).ok()?)));
+        Ok(Self::of(files.collect()))
+    }
+
+    fn of(files: Vec<(String, String)>) -> Self {
+        let tables = files.iter().filter_map(|(_, text)| text.parse().ok());
+        let is_of_manifest = |table: &Table| ["process", "set", "vehicle"].iter().any(|key| table.contains_key(*key));
+        let mut tables: Vec<Table> = tables.filter(is_of_manifest).collect();
+        // The manifest comes first, and what stands in it counts before what it includes.
+        tables.reverse();
+        let manifest = tables.into_iter().fold(Table::new(), |mut lower, upper| {
+            put(&mut lower, upper);
+            lower
+        });
+        Self { manifest, files }
+    }
+
+    /// The names of the vehicles; none where the manifest has but one, without a name.
+    #[must_use]
+    pub fn names(&self) -> Vec<&str> {
+        self.vehicles().filter_map(|vehicle| vehicle.get("name")?.as_str()).collect()
+    }
+
+    /// The body of the vehicle that is called `name`, empty where it has none; nothing where no file of it is attached.
+    #[must_use]
+    pub fn body(&self, name: &str) -> Option<Body> {
+        let vehicle = match self.file_of(name) {
+            Some(file) => self.vehicle(&file),
+            None => self.only_vehicle(),
+        };
+        Body::of(&Airframe::from_files(vehicle?, &[]).ok()?)
+    }
+
+    fn vehicles(&self) -> impl Iterator<Item = &Value> {
+        self.manifest.get("vehicle").and_then(Value::as_array).into_iter().flatten()
+    }
+
+    /// The vehicle file of the plant, by its name alone, as it is attached.
+    fn file_of(&self, name: &str) -> Option<String> {
+        let own = if name.is_empty() {
+            self.manifest.clone()
+        } else {
+            let is_it = |vehicle: &&Value| vehicle.get("name").and_then(Value::as_str) == Some(name);
+            let vehicle = self.vehicles().find(is_it)?.as_table()?;
+            let set = vehicle.get("set").and_then(Value::as_str);
+            let set = set.and_then(|set| self.manifest.get("set")?.get(set)?.as_table());
+            let mut own = set.cloned().unwrap_or_default();
+            put(&mut own, vehicle.clone());
+            own
+        };
+        let is_plant = |process: &&Value| process.get("kind").and_then(Value::as_str) == Some("plant");
+        let plant = own.get("process")?.as_table()?.values().find(is_plant)?;
+        let file = plant.get("vehicle").or_else(|| plant.get("parameters")?.get("vehicle"))?;
+        Some(Path::new(file.as_str()?).file_name()?.to_string_lossy().into_owned())
+    }
+
+    fn vehicle(&self, file: &str) -> Option<Vehicle> {
+        let text = |name: &str| self.files.iter().find(|(attached, _)| attached == name).map(|(_, text)| text);
+        // They are attached by their names alone.
+        let read = |path: &Path| {
+            let found = path.file_name().and_then(|name| text(&name.to_string_lossy()));
+            found.cloned().ok_or_else(|| io::ErrorKind::NotFound.into())
+        };
+        Vehicle::parse_with(text(file)?, file, &read).ok()
+    }
+
+    /// The one that is attached, where the manifest does not tell.
+    fn only_vehicle(&self) -> Option<Vehicle> {
+        let mut found = self.files.iter().filter_map(|(name, _)| self.vehicle(name));
+        found.next().filter(|_| found.next().is_none())
+    }
+}
+
+/// Puts what stands in `upper` over what stands in `lower`.
+fn put(lower: &mut Table, upper: Table) {
+    for (key, value) in upper {
+        match (lower.get_mut(&key), value) {
+            (Some(Value::Table(lower)), Value::Table(upper)) => put(lower, upper),
+            (_, value) => {
+                lower.insert(key, value);
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Attached;
+
+    fn attached(files: &[(&str, &str)]) -> Attached {
+        Attached::of(files.iter().map(|(name, text)| ((*name).to_owned(), (*text).to_owned())).collect())
+    }
+
+    const PLAIN: &str = vehicles::reference::HUMMINGBIRD;
+
+    fn named(name: &str) -> String {
+        format!("name = \"{name}\"\nbase = \"../files/hummingbird.toml\"\n")
+    }
+
+    #[test]
+    fn the_file_of_the_plant_counts_and_not_that_of_the_controller() {
+        let manifest = "[process.controller]\nkind = \"pid\"\nvehicle = \"x/hummingbird.toml\"\n\
+                        [process.plant]\nvehicle = \"x/dragging.toml\"\n";
+        let set = "[process.plant]\nkind = \"plant\"\nvehicle = \"y/hummingbird.toml\"\n";
+        let found = attached(&[
+            ("run.toml", manifest),
+            ("set.toml", set),
+            ("hummingbird.toml", PLAIN),
+            ("dragging.toml", &named("with drag")),
+        ]);
+        assert_eq!(found.body("").unwrap().name, "with drag");
+        assert!(found.names().is_empty());
+    }
+
+    #[test]
+    fn every_vehicle_has_the_file_of_its_set_or_its_own() {
+        let manifest = "[[vehicle]]\nname = \"h1\"\nset = \"bird\"\n\
+                        [[vehicle]]\nname = \"h2\"\nset = \"bird\"\nprocess.plant.vehicle = \"other.toml\"\n";
+        let set = "[set.bird.process.plant]\nkind = \"plant\"\nvehicle = \"hummingbird.toml\"\n";
+        let found = attached(&[
+            ("run.toml", manifest),
+            ("set.toml", set),
+            ("hummingbird.toml", PLAIN),
+            ("other.toml", &named("another")),
+        ]);
+        assert_eq!(found.names(), ["h1", "h2"]);
+        let names = ["h1", "h2"].map(|name| found.body(name).unwrap().name);
+        assert_eq!(names, ["AscTec Hummingbird", "another"]);
+        assert!(found.body("h3").is_none(), "two are attached, and none is told to be its");
+    }
+
+    #[test]
+    fn the_only_file_counts_where_the_manifest_does_not_tell() {
+        assert!(attached(&[("run.toml", "[run]\n"), ("hummingbird.toml", PLAIN)]).body("h1").is_some());
+        assert!(attached(&[("run.toml", "[run]\n")]).body("h1").is_none());
+    }
+}
