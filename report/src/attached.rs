@@ -4,6 +4,7 @@ use crate::airframe::Body;
 use plant::Airframe;
 use recorder::RecordingError;
 use recorder::reader::Recording;
+use std::collections::BTreeSet;
 use std::io;
 use std::path::Path;
 use toml::{Table, Value};
@@ -82,19 +83,25 @@ impl Attached {
         Some(Path::new(file.as_str()?).file_name()?.to_string_lossy().into_owned())
     }
 
+    /// The vehicle in the file that is attached as `file`: others, such as manifests, may have the same name.
     fn vehicle(&self, file: &str) -> Option<Vehicle> {
-        let text = |name: &str| self.files.iter().find(|(attached, _)| attached == name).map(|(_, text)| text);
         // They are attached by their names alone.
-        let read = |path: &Path| {
-            let found = path.file_name().and_then(|name| text(&name.to_string_lossy()));
-            found.cloned().ok_or_else(|| io::ErrorKind::NotFound.into())
+        let complete = |path: &Path| {
+            let name = path.file_name()?.to_str()?;
+            self.texts(name).find(|text| text.parse().is_ok_and(|table: Table| table.contains_key("rotors")))
         };
-        Vehicle::parse_with(text(file)?, file, &read).ok()
+        let read = |path: &Path| complete(path).map(str::to_owned).ok_or_else(|| io::ErrorKind::NotFound.into());
+        self.texts(file).find_map(|text| Vehicle::parse_with(text, file, &read).ok())
+    }
+
+    fn texts(&self, name: &str) -> impl Iterator<Item = &str> {
+        self.files.iter().filter(move |(attached, _)| attached == name).map(|(_, text)| &**text)
     }
 
     /// The one that is attached, where the manifest does not tell.
     fn only_vehicle(&self) -> Option<Vehicle> {
-        let mut found = self.files.iter().filter_map(|(name, _)| self.vehicle(name));
+        let names: BTreeSet<_> = self.files.iter().map(|(name, _)| name).collect();
+        let mut found = names.into_iter().filter_map(|name| self.vehicle(name));
         found.next().filter(|_| found.next().is_none())
     }
 }
