@@ -193,11 +193,9 @@ impl Size {
                 rotor.position_m - height_m / 2.0 * Vector3::z(),
             )
         };
-        let shape =
-            Shape::Cylinder { radius_m: *propeller_radius_m, length_m: PROPELLER_THICKNESS * arm_m };
+        let shape = Shape::Cylinder { radius_m: *propeller_radius_m, length_m: PROPELLER_THICKNESS * arm_m };
         let turns = if rotor.spin > 0.0 { Paint::CounterClockwise } else { Paint::Clockwise };
-        let propeller =
-            Part { paint: turns, ..Part::upright(&name("propeller"), shape, rotor.position_m) };
+        let propeller = Part { paint: turns, ..Part::upright(&name("propeller"), shape, rotor.position_m) };
         arm.map(|arm| Part { paint, ..arm }).into_iter().chain([motor, propeller]).collect()
     }
 
@@ -286,7 +284,10 @@ mod tests {
     fn the_front_and_the_senses_of_rotation_are_told_by_colours() {
         let body = body(|_| ()).unwrap();
         let paint = |name: &str| body.seen.iter().find(|part| part.name == name).unwrap().paint;
-        assert_eq!((paint("nose"), paint("front arm"), paint("front motor")), (Paint::Front, Paint::Front, Paint::Front));
+        assert_eq!(
+            (paint("nose"), paint("front arm"), paint("front motor")),
+            (Paint::Front, Paint::Front, Paint::Front)
+        );
         for name in ["left", "right", "rear"] {
             assert_eq!(paint(&format!("{name} arm")), Paint::Frame, "{name}");
         }
@@ -310,7 +311,8 @@ mod tests {
 
     #[test]
     fn a_vehicle_with_its_rotors_in_one_place_has_no_size() {
-        let none = body(|vehicle| vehicle.rotors.iter_mut().for_each(|rotor| rotor.position_m = Vector3::zeros()));
+        let none =
+            body(|vehicle| vehicle.rotors.iter_mut().for_each(|rotor| rotor.position_m = Vector3::zeros()));
         assert!(none.is_none());
     }
 

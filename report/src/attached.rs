@@ -33,7 +33,8 @@ impl Attached {
 
     fn of(files: Vec<(String, String)>) -> Self {
         let tables = files.iter().filter_map(|(_, text)| text.parse().ok());
-        let is_of_manifest = |table: &Table| ["process", "set", "vehicle"].iter().any(|key| table.contains_key(*key));
+        let is_of_manifest =
+            |table: &Table| ["process", "set", "vehicle"].iter().any(|key| table.contains_key(*key));
         let mut tables: Vec<Table> = tables.filter(is_of_manifest).collect();
         // The manifest comes first, and what stands in it counts before what it includes.
         tables.reverse();
@@ -90,7 +91,8 @@ impl Attached {
             let name = path.file_name()?.to_str()?;
             self.texts(name).find(|text| text.parse().is_ok_and(|table: Table| table.contains_key("rotors")))
         };
-        let read = |path: &Path| complete(path).map(str::to_owned).ok_or_else(|| io::ErrorKind::NotFound.into());
+        let read =
+            |path: &Path| complete(path).map(str::to_owned).ok_or_else(|| io::ErrorKind::NotFound.into());
         self.texts(file).find_map(|text| Vehicle::parse_with(text, file, &read).ok())
     }
 

@@ -39,7 +39,8 @@ pub fn text(body: &Body, frame: &str) -> String {
     let _ = writeln!(text, "  <link name=\"{}\">", escaped(frame));
     text += &inertial(body);
     for part in &body.seen {
-        let colour = COLOURS.iter().find(|(paint, _, _)| *paint == part.paint).map_or("", |(_, name, _)| name);
+        let colour =
+            COLOURS.iter().find(|(paint, _, _)| *paint == part.paint).map_or("", |(_, name, _)| name);
         text += &element("visual", part, &format!("<material name=\"{colour}\"/>"));
     }
     body.touching.iter().for_each(|part| text += &element("collision", part, ""));

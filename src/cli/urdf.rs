@@ -77,9 +77,15 @@ fn of_recording(path: &Path, name: Option<&str>) -> Result<Body> {
         Some(name) if !names.is_empty() && !names.contains(&name) => {
             bail!("the recording {path} has no vehicle `{name}`; it has {}", names.join(", "))
         }
-        None if names.len() > 1 => bail!("the recording {path} has {}: choose one with --vehicle", names.join(", ")),
+        None if names.len() > 1 => {
+            bail!("the recording {path} has {}: choose one with --vehicle", names.join(", "))
+        }
         name => name.or(names.first().copied()).unwrap_or_default(),
     };
-    let nothing = || format!("the recording {path} has no file of the vehicle attached that can be read: name the vehicle file");
+    let nothing = || {
+        format!(
+            "the recording {path} has no file of the vehicle attached that can be read: name the vehicle file"
+        )
+    };
     attached.body(name).with_context(nothing)
 }

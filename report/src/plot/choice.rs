@@ -3,7 +3,7 @@
 use crate::plot::field::Channel;
 use crate::plot::request::Request;
 use crate::plot::scene;
-use crate::plot::thin::{Line, Trail};
+use crate::plot::thin::{Line, Poses};
 use anyhow::{Context, Result, bail};
 use recorder::reader::{Recording, Topic};
 use serde::Serialize;
@@ -138,7 +138,7 @@ pub struct Choice {
     /// Axes over time, vehicle by vehicle.
     pub axes: Vec<Wanted>,
     /// Paths in space.
-    pub trails: Vec<(Ask, Trail)>,
+    pub trails: Vec<(Ask, Poses)>,
     /// Whether people named the fields: then what is not there is an error.
     pub is_named: bool,
     /// The number that the curves are drawn against instead of time.
@@ -238,11 +238,11 @@ fn default_axes(recording: &Recording, vehicle: &str, vehicles: &[String]) -> Ve
     axes.into_iter().filter(|axes| !axes.asks.is_empty()).collect()
 }
 
-fn trails(recording: &Recording, is_shown: impl Fn(&str) -> bool) -> Vec<(Ask, Trail)> {
+fn trails(recording: &Recording, is_shown: impl Fn(&str) -> bool) -> Vec<(Ask, Poses)> {
     let moves = |topic: &Topic| MOVING.contains(&short_name(&topic.type_name)) && topic.message_count > 0;
     let moving = recording.topics().iter().filter(|(name, topic)| moves(topic) && is_shown(name));
     let trail = |(name, topic): (&String, &Topic)| {
-        (Ask::new(name, "position", &topic.type_name), Trail::new(TRAIL_POINTS_MAX))
+        (Ask::new(name, "position", &topic.type_name), Poses::new(TRAIL_POINTS_MAX))
     };
     let moving = moving.map(trail);
     let bodies = |(name, topic): (&String, &Topic)| {
@@ -250,7 +250,7 @@ fn trails(recording: &Recording, is_shown: impl Fn(&str) -> bool) -> Vec<(Ask, T
         let names = if is_theirs { scene::body_names(recording) } else { Vec::new() };
         let trail = |(number, body)| {
             let ask = Ask::new(name, &format!("position[{number}]"), &topic.type_name);
-            (ask, Trail::new(TRAIL_POINTS_MAX).of_body(body))
+            (ask, Poses::new(TRAIL_POINTS_MAX).of_body(body))
         };
         names.into_iter().enumerate().map(trail).collect::<Vec<_>>()
     };

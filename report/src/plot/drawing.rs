@@ -1,6 +1,7 @@
 //! All that a file shows, whatever its format.
 
 use super::figure::{Across, Panel, Trail};
+use super::outline::Outline;
 use super::request::View;
 use super::scene::Solid;
 use serde::Serialize;
@@ -19,6 +20,7 @@ pub struct Drawing {
     pub(super) views: Vec<View>,
     pub(super) panels: Vec<Panel>,
     pub(super) trails: Vec<Trail>,
+    pub(super) airframes: Vec<Outline>,
     pub(super) solids: Vec<Solid>,
 }
 

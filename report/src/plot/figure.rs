@@ -229,10 +229,10 @@ fn colour(curves: &mut [Curve]) {
 }
 
 /// The paths in space: those of one vehicle have one colour, and each free body has one.
-pub fn trails(read: &[(Ask, thin::Trail)]) -> Vec<Trail> {
+pub fn trails(read: &[(Ask, thin::Poses)]) -> Vec<Trail> {
     let drawn = || read.iter().filter(|(_, trail)| trail.samples > 0);
     // A body may be called as a vehicle is.
-    let mover = |(ask, trail): &'_ (Ask, thin::Trail)| {
+    let mover = |(ask, trail): &'_ (Ask, thin::Poses)| {
         (trail.body().is_some(), trail.body().unwrap_or(ask.vehicle()).to_owned())
     };
     let movers = distinct(drawn().map(mover));
@@ -246,7 +246,7 @@ pub fn trails(read: &[(Ask, thin::Trail)]) -> Vec<Trail> {
             role: ask.role,
             colour: COLOURS[index % COLOURS.len()],
             samples: trail.samples,
-            points: trail.points(),
+            points: trail.points().into_iter().map(|[x, y, z, ..]| [x, y, z]).collect(),
         }
     });
     let mut trails: Vec<Trail> = drawn.collect();

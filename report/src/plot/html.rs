@@ -5,6 +5,7 @@
 use crate::page::PLOTLY_3D;
 use crate::plot::drawing::Drawing;
 use crate::plot::figure::{Axes, Curve, Trail};
+use crate::plot::outline::Outline;
 use crate::plot::request::View;
 use crate::plot::scene::Solid;
 use serde::Serialize;
@@ -27,6 +28,7 @@ fn data(drawing: &Drawing) -> Value {
         "panels": panels.map(|panel| with(panel, [("axes", panel.axes.iter().map(axes).collect())])).collect::<Vec<_>>(),
         "views": views,
         "trails": drawing.trails.iter().map(trail).collect::<Vec<_>>(),
+        "airframes": drawing.airframes.iter().map(airframe).collect::<Vec<_>>(),
         "solids": drawing.solids.iter().map(solid).collect::<Vec<_>>(),
     })
 }
@@ -51,6 +53,17 @@ fn curve(curve: &Curve) -> Value {
 fn trail(trail: &Trail) -> Value {
     let axis = |axis: usize| trail.points.iter().map(|point| short(point[axis])).collect();
     with(trail, [("x", axis(0)), ("y", axis(1)), ("z", axis(2))])
+}
+
+/// The lines of an airframe, one after another with a gap between two.
+fn airframe(airframe: &Outline) -> Value {
+    let axis = |axis: usize| {
+        let along = |line: &Vec<[f64; 3]>| -> Vec<Value> {
+            line.iter().map(|point| short(point[axis])).chain([Value::Null]).collect()
+        };
+        airframe.lines.iter().flat_map(along).collect()
+    };
+    with(airframe, [("x", axis(0)), ("y", axis(1)), ("z", axis(2))])
 }
 
 fn solid(solid: &Solid) -> Value {

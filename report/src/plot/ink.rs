@@ -71,7 +71,8 @@ impl Look {
     }
 }
 
-fn rgb(colour: &str) -> RGBColor {
+/// A colour that is written as HTML writes it.
+pub fn rgb(colour: &str) -> RGBColor {
     let part = |index: usize| colour.get(index..index + 2).and_then(|hex| u8::from_str_radix(hex, 16).ok());
     RGBColor(part(1).unwrap_or(0), part(3).unwrap_or(0), part(5).unwrap_or(0))
 }

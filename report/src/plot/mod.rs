@@ -7,6 +7,7 @@
 //! - `thin`: long curves as few points
 //! - `figure`: named and coloured curves on axes of one unit
 //! - `scene`: what stands around the vehicles
+//! - `outline`: the vehicles along their paths
 //! - `drawing`: all that a file shows
 //! - `html`: the page
 //! - `ink`: lines, letters and legends of pictures
@@ -18,6 +19,7 @@ mod field;
 mod figure;
 mod html;
 mod ink;
+mod outline;
 mod picture;
 mod read;
 mod request;
@@ -25,6 +27,7 @@ mod scene;
 mod space;
 mod thin;
 
+use crate::attached::Attached;
 use anyhow::{Result, bail};
 use choice::Choice;
 use recorder::reader::Recording;
@@ -82,6 +85,7 @@ impl Drawing {
         let mut choice = Choice::of(recording, request)?;
         let span_s = read::read(recording, &mut choice, request, read)?;
         let name = recording.path().file_name().unwrap_or_default().to_string_lossy().into_owned();
+        let trails = figure::trails(&choice.trails);
         let drawing = Self {
             title: request.title.clone().unwrap_or_else(|| name.clone()),
             recording: name,
@@ -89,7 +93,8 @@ impl Drawing {
             across: figure::across(&choice, span_s)?,
             views: request.views.clone(),
             panels: figure::panels(&choice.axes)?,
-            trails: figure::trails(&choice.trails),
+            airframes: outline::outlines(&choice.trails, &trails, &Attached::to(recording)?),
+            trails,
             solids: scene::scene_of(recording)?,
         };
         if drawing.trails.is_empty() && request.views.iter().any(|view| *view != View::Time) {

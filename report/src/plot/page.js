@@ -72,6 +72,14 @@ function trailTraces(type, trail, points) {
   ];
 }
 
+// The vehicle at some places of its path.
+function airframeTrace(type, airframe, points) {
+  return {
+    type, mode: "lines", name: airframe.name, ...points, line: { color: darker(airframe.colour), width: type === "scatter3d" ? 2 : 1 },
+    showlegend: false, hoverinfo: "name", connectgaps: false,
+  };
+}
+
 function ground() {
   const corners = data.solids.flatMap((solid) => solid.corners);
   const [[left, right], [near, far]] = ["x", "y"].map((axis, index) => {
@@ -86,9 +94,11 @@ function ground() {
 
 function drawPath() {
   const paths = trails.flatMap(({ x, y, z, ...trail }) => trailTraces("scatter3d", trail, { x, y, z }));
+  const airframes = data.airframes.map((airframe) =>
+    airframeTrace("scatter3d", airframe, { x: airframe.x, y: airframe.y, z: airframe.z }));
   const axis = (name) => ({ title: { text: `${name} [m]` }, exponentformat: "none", backgroundcolor: "#fff", gridcolor: "#ddd" });
   const camera = { eye: { x: 1.0, y: -1.8, z: 1.0 }, center: { x: 0, y: 0, z: -0.2 } };
-  return Plotly.newPlot("path", [ground(), ...data.solids.flatMap(solidTraces), ...paths], {
+  return Plotly.newPlot("path", [ground(), ...data.solids.flatMap(solidTraces), ...airframes, ...paths], {
     scene: { xaxis: axis("x"), yaxis: axis("y"), zaxis: axis("z"), aspectmode: "data", camera },
     margin: { l: 0, r: 0, t: 40, b: 0 }, legend: LEGEND, showlegend: true,
   }, SPACE);
@@ -102,8 +112,9 @@ function drawFlat(id, text, up) {
     name: solid.name, hoverinfo: "name", x: along(solid[id], 0), y: along(solid[id], 1),
   }));
   const paths = trails.flatMap((trail) => trailTraces("scatter", trail, { x: trail.x, y: trail[up] }));
+  const airframes = data.airframes.map((airframe) => airframeTrace("scatter", airframe, { x: airframe.x, y: airframe[up] }));
   const axes = { xaxis: { zeroline: false }, yaxis: { zeroline: false, scaleanchor: "x", scaleratio: 1 } };
-  return Plotly.newPlot(id, [...outlines, ...paths], layout(text, "x [m]", `${up} [m]`, axes), CONFIG);
+  return Plotly.newPlot(id, [...outlines, ...airframes, ...paths], layout(text, "x [m]", `${up} [m]`, axes), CONFIG);
 }
 
 const VIEWS = { path: drawPath, top: () => drawFlat("top", "From above", "y"), side: () => drawFlat("side", "From the side", "z") };

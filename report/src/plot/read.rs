@@ -3,7 +3,7 @@
 use crate::plot::choice::{Ask, Choice};
 use crate::plot::field;
 use crate::plot::request::{Request, Span};
-use crate::plot::thin::{Curve, Line, Trail};
+use crate::plot::thin::{Curve, Line, Poses, Trail};
 use anyhow::{Result, bail};
 use recorder::RecordingError;
 use recorder::definition::{Leaf, number};
@@ -28,7 +28,7 @@ struct Uses<'a> {
     against: Option<&'a mut Ask>,
     asks: Vec<&'a mut Ask>,
     /// Paths in space, each with the field that it is of.
-    trails: Vec<(&'a str, &'a mut Trail)>,
+    trails: Vec<(&'a str, &'a mut Poses)>,
 }
 
 /// How the numbers of a recording become points.
@@ -93,7 +93,7 @@ impl Drawn<'_> {
                 ask.curves.iter_mut().for_each(|(channel, line)| line.push(x, channel.value(leaves)));
             }
         }
-        uses.trails.iter_mut().for_each(|(field, trail)| trail.push(position(leaves, field)));
+        uses.trails.iter_mut().for_each(|(field, trail)| trail.push(pose(leaves, field)));
         Ok(())
     }
 
@@ -130,8 +130,13 @@ fn uses(choice: &mut Choice) -> BTreeMap<String, Uses<'_>> {
     uses
 }
 
-fn position(leaves: &[Leaf], field: &str) -> [f64; 3] {
-    ["x", "y", "z"].map(|axis| number(leaves, &format!("{field}.{axis}")).unwrap_or(f64::NAN))
+/// Position and attitude, of a body where `field` is the position of one; what the message lacks is not a number.
+fn pose(leaves: &[Leaf], field: &str) -> [f64; 7] {
+    let attitude = field.replacen("position", "attitude", 1);
+    let places = ["x", "y", "z"].map(|axis| format!("{field}.{axis}"));
+    let turns = ["x", "y", "z", "w"].map(|part| format!("{attitude}.{part}"));
+    let mut paths = places.iter().chain(&turns);
+    std::array::from_fn(|_| paths.next().and_then(|path| number(leaves, path)).unwrap_or(f64::NAN))
 }
 
 fn is_empty(ask: &Ask) -> bool {

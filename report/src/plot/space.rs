@@ -3,7 +3,7 @@
 use crate::plot::drawing::Drawing;
 use crate::plot::figure::in_layers;
 use crate::plot::ink::{
-    Area, Flat, GRID, HEAD_SIZE, LABEL_SIZE, Look, at, draw_legend, draw_line, letters, number, px,
+    Area, Flat, GRID, HEAD_SIZE, LABEL_SIZE, Look, at, draw_legend, draw_line, letters, number, px, rgb,
 };
 use crate::plot::request::View;
 use anyhow::Result;
@@ -27,7 +27,9 @@ const EXTENT_MIN_M: f64 = 1.0;
 fn extent(drawing: &Drawing) -> [Range<f64>; 3] {
     let points = drawing.trails.iter().flat_map(|trail| &trail.points);
     let corners = drawing.solids.iter().flat_map(|solid| &solid.corners);
-    let all = points.chain(corners).filter(|point| point.iter().all(|value| value.is_finite()));
+    let airframes = drawing.airframes.iter().flat_map(|airframe| airframe.lines.iter().flatten());
+    let all =
+        points.chain(corners).chain(airframes).filter(|point| point.iter().all(|value| value.is_finite()));
     let mut ends = [f64::INFINITY..f64::NEG_INFINITY, f64::INFINITY..f64::NEG_INFINITY, 0.0..0.0];
     for point in all {
         for (ends, value) in ends.iter_mut().zip(point) {
@@ -108,7 +110,7 @@ fn draw_flat(plots: &Area<'_>, drawing: &Drawing, view: View) -> Result<()> {
     draw_trails(&mut chart, drawing, |point| (point[axes[0]], point[axes[1]]))
 }
 
-/// Draws the paths and where they start, those on top last: an estimate must not hide what was flown.
+/// Draws the vehicles, the paths and where they start, those on top last: an estimate must not hide what was flown.
 fn draw_trails<'a, T: CoordTranslate>(
     chart: &mut ChartContext<'a, SVGBackend<'a>, T>,
     drawing: &Drawing,
@@ -117,6 +119,13 @@ fn draw_trails<'a, T: CoordTranslate>(
 where
     T::From: Clone + 'static,
 {
+    for airframe in &drawing.airframes {
+        let style = rgb(airframe.colour).mix(0.7).stroke_width(px(1));
+        let line = |line: &Vec<[f64; 3]>| {
+            PathElement::new(line.iter().map(|point| place(*point)).collect::<Vec<_>>(), style)
+        };
+        chart.draw_series(airframe.lines.iter().map(line))?;
+    }
     for trail in in_layers(&drawing.trails) {
         let look = Look::of(trail);
         let finite = trail.points.iter().filter(|point| point.iter().all(|value| value.is_finite()));

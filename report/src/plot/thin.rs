@@ -100,11 +100,14 @@ fn bin(samples: &[Sample]) -> Bin {
     bin
 }
 
-/// A path in space that keeps every n-th point, and the last.
+/// A path by positions in metres and, where the topic has them, attitudes: quaternions as x, y, z, w.
+pub type Poses = Trail<7>;
+
+/// A path of `N` numbers a point, three of them in space, that keeps every n-th point, and the last.
 #[derive(Clone, Debug)]
-pub struct Trail {
-    points: Vec<[f64; 3]>,
-    last: Option<[f64; 3]>,
+pub struct Trail<const N: usize = 3> {
+    points: Vec<[f64; N]>,
+    last: Option<[f64; N]>,
     points_max: usize,
     every: u64,
     /// Samples that were pushed.
@@ -113,7 +116,7 @@ pub struct Trail {
     body: Option<String>,
 }
 
-impl Trail {
+impl<const N: usize> Trail<N> {
     /// A path of up to `points_max` points.
     pub fn new(points_max: usize) -> Self {
         let points_max = points_max.max(2);
@@ -131,7 +134,7 @@ impl Trail {
     }
 
     /// Adds a point.
-    pub fn push(&mut self, point: [f64; 3]) {
+    pub fn push(&mut self, point: [f64; N]) {
         let is_full = self.points.len() + 1 >= self.points_max;
         if is_full && self.samples.is_multiple_of(self.every) {
             self.points = self.points.iter().step_by(2).copied().collect();
@@ -145,7 +148,7 @@ impl Trail {
     }
 
     /// The points in the order of time.
-    pub fn points(&self) -> Vec<[f64; 3]> {
+    pub fn points(&self) -> Vec<[f64; N]> {
         let last = self.last.filter(|last| self.points.last() != Some(last));
         self.points.iter().copied().chain(last).collect()
     }
