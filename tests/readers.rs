@@ -12,6 +12,8 @@ mod laps;
 mod plot;
 #[path = "readers/profile.rs"]
 mod profile;
+#[path = "readers/urdf.rs"]
+mod urdf;
 #[path = "readers/world.rs"]
 mod world;
 

@@ -63,9 +63,14 @@ fn require_axes(axes: &Value, title: &str, label: &str, [flown, estimated, asked
 fn require_space(seen: &Value) {
     let traces: Vec<&str> =
         seen["space"].as_array().unwrap().iter().map(|name| name.as_str().unwrap()).collect();
-    for expected in
-        ["mesh3d ground", "mesh3d wall +x", "mesh3d wall -y", "scatter3d h1", "scatter3d h2 set point"]
-    {
+    for expected in [
+        "mesh3d ground",
+        "mesh3d wall +x",
+        "mesh3d wall -y",
+        "scatter3d h1",
+        "scatter3d h2 set point",
+        "scatter3d AscTec Hummingbird",
+    ] {
         assert!(traces.contains(&expected), "{expected} is missing: {traces:?}");
     }
     let colours: Vec<[u64; 3]> = serde_json::from_value(seen["colours"].clone()).unwrap();
@@ -81,9 +86,9 @@ fn require_views(seen: &Value) {
     let labels: Vec<_> = views.iter().map(|view| (&view["x"], &view["y"])).collect();
     assert_eq!(labels, [(&json!("x [m]"), &json!("y [m]")), (&json!("x [m]"), &json!("z [m]"))]);
     for view in views {
-        // Four walls, and two vehicles with what was asked of them: a path and its start each.
-        assert_eq!(view["lines"].as_array().unwrap().len(), 4 + 2 * 4, "{view}");
-        assert!(view["drawn"].as_u64().unwrap() >= 12 && view["dashed"] == 2, "{view}");
+        // Four walls, and two vehicles with what was asked of them: a path and its start each, and their airframes.
+        assert_eq!(view["lines"].as_array().unwrap().len(), 4 + 2 * 4 + 2, "{view}");
+        assert!(view["drawn"].as_u64().unwrap() >= 14 && view["dashed"] == 2, "{view}");
         // A metre is as long on both axes.
         let metre: [f64; 2] = serde_json::from_value(view["metre"].clone()).unwrap();
         assert!((metre[0] / metre[1] - 1.0).abs() < 1e-3, "{metre:?}");
@@ -148,9 +153,13 @@ fn the_view_for_rerun_holds_the_scene_the_path_and_the_vehicle() {
     let rerun = ["-m", "rerun", "rrd"].map(OsStr::new);
     python(&readers, &[&rerun[..], &["verify".as_ref(), view.as_os_str()]].concat());
     let stats = python(&readers, &[&rerun[..], &["stats".as_ref(), view.as_os_str()]].concat());
-    for entity in
-        ["/scene: ", "/path: ", "/body: ", "/flown/attitude: ", "overrides/h1/plant/state/visualizers: "]
-    {
+    let part = |vehicle: &str, part: &str| format!("/airframe/{vehicle}/AscTec\\ Hummingbird/{part}: ");
+    let airframes = ["h1", "h2"].map(|vehicle| {
+        part(vehicle, "visual_geometries/h1_body/hub").replace("h1_body", &format!("{vehicle}_body"))
+    });
+    let plain = ["/scene: ", "/path/h1: ", "/path/h2: ", "/body/h1: ", "/motion/h2: ", "/flown/attitude: "];
+    let settings = ["overrides/h1/plant/state/visualizers: "];
+    for entity in plain.iter().chain(&settings).copied().chain(airframes.iter().map(String::as_str)) {
         assert!(stats.contains(entity), "{entity} is missing:\n{stats}");
     }
 }
@@ -160,6 +169,7 @@ fn python(readers: &Path, args: &[&OsStr]) -> String {
     let mut command = Command::new(readers.join("venv/bin/python"));
     // Rerun sends usage data, except where CI is set; strictly, what it cannot log is an error.
     command.args(args).env("CI", "true").env("RERUN_STRICT", "1").env("PYTHONDONTWRITEBYTECODE", "1");
+    command.env("HUMMINGBUS", crate::HUMMINGBUS);
     let Output { status, stdout, stderr } = command.output().unwrap();
     assert!(status.success(), "{args:?}: {}", String::from_utf8_lossy(&stderr));
     String::from_utf8_lossy(&stdout).into_owned()

@@ -21,6 +21,7 @@
 //! - [`outputs`]: what runs and other commands write, where something is there already
 //! - [`profile`]: where the host time of a run's ticks goes
 //! - [`laps`], [`plot`]: recordings that are written, and pictures of them
+//! - [`urdf`]: bodies of vehicles for other tools
 //! - [`rights`]: rights that a run lacks are named
 //! - [`sensors`]: sensors read what they should, and hand over what is under way
 //! - [`replay`]: the measured flight
@@ -64,4 +65,5 @@ mod sensors;
 mod support;
 mod swap;
 mod terminal;
+mod urdf;
 mod validate;

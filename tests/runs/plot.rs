@@ -77,6 +77,21 @@ fn what_the_topics_are_of_decides_what_is_plotted_and_how() {
     let trails: Vec<_> =
         shown["trails"].as_array().unwrap().iter().map(|trail| trail["name"].as_str().unwrap()).collect();
     assert_eq!(trails, ["h1", "h2", "h1 set point", "h2 set point"]);
+    // Each vehicle at the start and at the end of its three laps, and at some places between.
+    let airframes = shown["airframes"].as_array().unwrap();
+    let topics: Vec<_> = airframes.iter().map(|airframe| airframe["topic"].as_str().unwrap()).collect();
+    assert_eq!(topics, ["/h1/plant/state", "/h2/plant/state"]);
+    for airframe in airframes {
+        let places = airframe["places"].as_array().unwrap().len();
+        assert!((4..=10).contains(&places) && airframe["name"] == "AscTec Hummingbird", "{airframe}");
+    }
+    let drawn = &page(&place.path("laps.html"))["airframes"][0];
+    let (x, y) = (drawn["x"].as_array().unwrap(), drawn["y"].as_array().unwrap());
+    // The first line is an arm: from the start of the first lap, at (2, 0), to the front, along x.
+    assert!(x.len() > 4 * 100 && x[2].is_null(), "{}", x.len());
+    let start_m = [&x[0], &y[0], &x[1], &y[1]].map(|value| value.as_f64().unwrap());
+    assert!((start_m[0] - 2.0).abs() < 0.01 && (start_m[2] - start_m[0] - 0.17).abs() < 1e-3, "{start_m:?}");
+    assert!(start_m[1].abs() < 1e-3 && start_m[3].abs() < 1e-3, "{start_m:?}");
 }
 
 #[test]
