@@ -67,19 +67,19 @@ impl Attached {
 
     /// The vehicle file of the plant, by its name alone, as it is attached.
     fn file_of(&self, name: &str) -> Option<String> {
-        let own = if name.is_empty() {
+        let merged = if name.is_empty() {
             self.manifest.clone()
         } else {
             let is_it = |vehicle: &&Value| vehicle.get("name").and_then(Value::as_str) == Some(name);
             let vehicle = self.vehicles().find(is_it)?.as_table()?;
             let set = vehicle.get("set").and_then(Value::as_str);
             let set = set.and_then(|set| self.manifest.get("set")?.get(set)?.as_table());
-            let mut own = set.cloned().unwrap_or_default();
-            put(&mut own, vehicle.clone());
-            own
+            let mut merged = set.cloned().unwrap_or_default();
+            put(&mut merged, vehicle.clone());
+            merged
         };
         let is_plant = |process: &&Value| process.get("kind").and_then(Value::as_str) == Some("plant");
-        let plant = own.get("process")?.as_table()?.values().find(is_plant)?;
+        let plant = merged.get("process")?.as_table()?.values().find(is_plant)?;
         let file = plant.get("vehicle").or_else(|| plant.get("parameters")?.get("vehicle"))?;
         Some(Path::new(file.as_str()?).file_name()?.to_string_lossy().into_owned())
     }

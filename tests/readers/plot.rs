@@ -164,6 +164,29 @@ fn the_view_for_rerun_holds_the_scene_the_path_and_the_vehicle() {
     }
 }
 
+#[test]
+fn the_view_for_rerun_holds_the_meshes_of_the_scene() {
+    let Some(readers) = readers() else { return };
+    let folder = tempfile::tempdir().unwrap();
+    let (recording, view) = (folder.path().join("office.mcap"), folder.path().join("office.rrd"));
+    let mut run = Command::new(crate::HUMMINGBUS);
+    run.args(["run", &format!("{ROOT}/manifests/office.toml"), "--set", "run.duration_s=0.2", "--record"]);
+    // Whether it passes does not matter: it is cut short.
+    assert!(matches!(run.arg(&recording).output().unwrap().status.code(), Some(0 | 1)));
+    let script = Path::new(ROOT).join("scripts/rerun_view.py");
+    python(&readers, &[script.as_os_str(), recording.as_os_str(), view.as_os_str()]);
+    let stats = ["-m", "rerun", "rrd", "stats"].map(OsStr::new);
+    let stats = python(&readers, &[&stats[..], &[view.as_os_str()]].concat());
+    for entity in [
+        "/scene/desk: ",
+        "/scene/lamp: ",
+        "/scene/shelf\\ in\\ the\\ room: ",
+        "/visual_geometries/hb_body/nose: ",
+    ] {
+        assert!(stats.contains(entity), "{entity} is missing:\n{stats}");
+    }
+}
+
 /// Runs Python with the packages of the readers; what it prints.
 fn python(readers: &Path, args: &[&OsStr]) -> String {
     let mut command = Command::new(readers.join("venv/bin/python"));
