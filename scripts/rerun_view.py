@@ -42,7 +42,7 @@ PLOTS = {
 
 METRES = {"m": 1.0, "cm": 1e-2, "mm": 1e-3}
 MESHES = {".obj": "model/obj", ".stl": "model/stl", ".glb": "model/gltf-binary"}
-# Edges of the axes at a vehicle, in metres: shorter than the arms would hide nothing, longer show a small vehicle.
+# Length of the axes at a vehicle, in metres, so that one is seen from afar: tuned, no source.
 AXES_M = 0.3
 
 
