@@ -205,6 +205,11 @@ fn coefficients_lie_in_their_intervals_at_their_rate() {
     let statics = || reports.iter().map(|report| report.statics.as_ref().unwrap());
     require_coverage("c_T", C_T, statics().map(|fit| fit.thrust.as_ref().map(|thrust| thrust.value)));
     require_coverage("c_Q", C_Q, statics().map(|fit| fit.torque.as_ref().map(|torque| torque.value)));
+    let powers = || statics().flat_map(|fit| [&fit.thrust, &fit.torque]).flatten();
+    let truth_is_inside = powers().filter(|fit| fit.exponent.low <= 2.0 && 2.0 <= fit.exponent.high);
+    let holds = truth_is_inside.count() as f64 / powers().count() as f64;
+    let _ = writeln!(std::io::stderr(), "power of w: the truth is inside in {:.1} %", 100.0 * holds);
+    assert!((0.90..=0.99).contains(&holds), "power of w: {holds}");
     assert!(statics().all(|fit| fit.thrust.as_ref().unwrap().held_out.unwrap().r_squared > 0.99));
 }
 

@@ -15,6 +15,8 @@ pub struct Point {
     pub squared: f64,
     /// Mean thrust in N or torque in N*m.
     pub force: f64,
+    /// Which log it is of: its plateaus share a tare.
+    pub log: usize,
 }
 
 /// A coefficient, and how well the law fits.
@@ -22,7 +24,7 @@ pub struct Point {
 pub struct Coefficient {
     /// c, in N/(rad/s)^2 or N*m/(rad/s)^2.
     pub value: Estimate,
-    /// p of y ~ w^p: the law says 2. All plateaus share the tare, whose error is not in this interval.
+    /// p of y ~ w^p: the law says 2.
     pub exponent: Estimate,
     /// y at w = 0 of the line y = b + c w^2, which after the tare should be 0; in N or N*m.
     pub intercept: Estimate,
@@ -38,8 +40,9 @@ pub struct Coefficient {
 
 impl Coefficient {
     /// Least squares over plateaus, each one vote; `None` with too few. Intervals by leaving out one plateau after
-    /// the other, since readings of one plateau are correlated.
-    pub fn fitted(fit: &[Point], test: &[Point]) -> Option<Self> {
+    /// the other, since readings of one plateau are correlated, and by the standard error of each log's tare, in
+    /// `tare_sigmas`, which all of its plateaus share.
+    pub fn fitted(fit: &[Point], test: &[Point], tare_sigmas: &[f64]) -> Option<Self> {
         let speed = |point: &&Point| point.squared;
         let ratio = |point: &Point| point.force / point.squared;
         if fit.len() < PLATEAUS_MIN {
@@ -50,15 +53,28 @@ impl Coefficient {
         let c = slope_through_zero(fit);
         let pairs: Vec<_> = test.iter().map(|point| (c * point.squared, point.force)).collect();
         Some(Self {
-            value: jackknifed(fit, slope_through_zero),
-            exponent: jackknifed(fit, exponent),
-            intercept: jackknifed(fit, intercept),
+            value: estimated(fit, tare_sigmas, slope_through_zero),
+            exponent: estimated(fit, tare_sigmas, exponent),
+            intercept: estimated(fit, tare_sigmas, intercept),
             at_slowest: ratio(slowest),
             at_fastest: ratio(fastest),
             plateaus: fit.len(),
             held_out: Score::of(&pairs),
         })
     }
+}
+
+/// An estimate from plateaus with the interval of leaving out one after the other and of the tares.
+fn estimated(points: &[Point], tare_sigmas: &[f64], estimate: impl Fn(&[Point]) -> f64) -> Estimate {
+    let blocks = jackknifed(points, &estimate);
+    let with_tare = |(log, sigma): (usize, &f64)| {
+        let shift = |point: &Point| if point.log == log { *sigma } else { 0.0 };
+        let shifted: Vec<Point> =
+            points.iter().map(|point| Point { force: point.force + shift(point), ..*point }).collect();
+        estimate(&shifted) - blocks.value
+    };
+    let squares: f64 = tare_sigmas.iter().enumerate().map(with_tare).map(|change| change * change).sum();
+    blocks.with_error(squares.sqrt(), LEVEL)
 }
 
 /// An estimate from `points` with the interval of leaving out one after the other.

@@ -36,7 +36,7 @@ pub struct Dynamics {
     pub falling_s: Option<Estimate>,
     /// Time constant in s on the other clock than the stand file asks for.
     pub other_clock_s: Option<Estimate>,
-    /// The line from the command to the steady speed.
+    /// The line from the command to the steady speed; absent where the command is a speed itself.
     pub command: Option<CommandLine>,
     /// Every step that was used.
     pub steps: Vec<OneStep>,
@@ -82,7 +82,7 @@ pub struct Comparison {
 pub struct OneStep {
     /// The log.
     pub file: String,
-    /// The command before, in the log's unit.
+    /// The command before, in the log's unit; in rad/s where it is a speed.
     pub from: f64,
     /// The command after.
     pub to: f64,
@@ -127,7 +127,8 @@ pub fn fitted(stand: &Stand) -> Result<Option<Dynamics>, RotorError> {
         holds,
         findings,
     };
-    dynamics.findings.extend(more_findings(&dynamics, &steps, first_lag));
+    let preferred = if dynamics.comparison.preferred == Order::First { first_lag } else { second_lag };
+    dynamics.findings.extend(more_findings(&dynamics, &steps, preferred));
     Ok(Some(dynamics))
 }
 
@@ -229,10 +230,11 @@ fn one_step(step: &Step) -> Option<OneStep> {
     })
 }
 
-/// What the fits say about the data.
-fn more_findings(dynamics: &Dynamics, steps: &[Step], first: Lag) -> Vec<String> {
-    let matches: Vec<Match> = steps.iter().map(|step| matched(step, first)).collect();
-    let onsets: Vec<f64> = matches.iter().map(|found| 1e3 * found.onset_s).collect();
+/// What the fits say about the data; `preferred` is the motor of the order that is preferred.
+fn more_findings(dynamics: &Dynamics, steps: &[Step], preferred: Lag) -> Vec<String> {
+    let matches: Vec<Match> = steps.iter().map(|step| matched(step, preferred)).collect();
+    // In ms with one digit; 0 after a minus would read as a number.
+    let onsets: Vec<f64> = matches.iter().map(|found| (1e4 * found.onset_s).round() / 10.0 + 0.0).collect();
     let clamped = matches.iter().filter(|found| found.is_clamped).count();
     let (earliest, latest) = range(&onsets);
     let mut findings = vec![format!(

@@ -2,12 +2,17 @@
 
 use statrs::statistics::{Data, OrderStatistics};
 use std::collections::VecDeque;
+use std::f64::consts::PI;
 use std::ops::Range;
+
+use crate::statistics::{autocorrelation, white_noise_bound};
 
 /// A reading of a plateau is an outlier beyond this many robust standard deviations.
 const OUTLIER_SIGMAS: f64 = 6.0;
 /// The robust standard deviation of normal numbers over their median absolute deviation.
 const MAD_TO_SIGMA: f64 = 1.4826;
+/// By this share of a reading two that would be equal may differ, as they were rounded.
+const ROUNDING: f64 = 1e-9;
 /// Rows before and after a row that its running median looks at.
 const MEDIAN_REACH: usize = 2;
 /// Equal readings in a row that are suspicious.
@@ -76,12 +81,19 @@ impl Extremes {
     }
 }
 
-/// Splits `values` into those that belong together and the number of outliers among them.
-pub fn without_outliers(values: &[f64]) -> (Vec<f64>, usize) {
-    let middle = median(values);
-    let bound = OUTLIER_SIGMAS * spread(values);
-    let kept: Vec<f64> = values.iter().copied().filter(|value| (value - middle).abs() <= bound).collect();
-    let outliers = values.len() - kept.len();
+/// The rows of a plateau, each with a squared speed and a reading, without those whose reading is an outlier, and how many
+/// these are. What the speed explains is no outlier: within a plateau it may still settle.
+pub fn without_outliers(rows: Vec<(f64, f64)>) -> (Vec<(f64, f64)>, usize) {
+    let squares: Vec<f64> = rows.iter().map(|(squared, _)| *squared).collect();
+    let readings: Vec<f64> = rows.iter().map(|(_, reading)| *reading).collect();
+    let (square, middle) = (median(&squares), median(&readings));
+    let off: Vec<f64> = rows.iter().map(|(squared, reading)| reading - middle * squared / square).collect();
+    let (centre, scatter) = (median(&off), OUTLIER_SIGMAS * spread(&off));
+    let bound = scatter.max(ROUNDING * middle.abs());
+    let all = rows.len();
+    let kept = rows.into_iter().zip(off).filter(|(_, off)| (off - centre).abs() <= bound);
+    let kept: Vec<(f64, f64)> = kept.map(|(row, _)| row).collect();
+    let outliers = all - kept.len();
     (kept, outliers)
 }
 
@@ -90,6 +102,20 @@ pub fn spread(values: &[f64]) -> f64 {
     let middle = median(values);
     let deviations: Vec<f64> = values.iter().map(|value| (value - middle).abs()).collect();
     MAD_TO_SIGMA * median(&deviations)
+}
+
+/// The standard error of the median of readings that may remember each other: that of normal numbers, of which as many count
+/// as the autocorrelation leaves independent, summed up to where it cannot be told from 0 (Bartlett 1946; Sokal, "Monte Carlo
+/// methods in statistical mechanics", 1997, section 3).
+pub fn median_error(values: &[f64]) -> f64 {
+    let (n, scatter) = (values.len(), spread(values));
+    if scatter <= 0.0 || n < 2 {
+        return 0.0;
+    }
+    let noise = white_noise_bound(n, 0.95);
+    let remembered = autocorrelation(values, n - 1).into_iter().skip(1).take_while(|r| *r > noise);
+    let memory = 1.0 + 2.0 * remembered.sum::<f64>();
+    scatter * (0.5 * PI * memory / n as f64).sqrt()
 }
 
 /// The median; NaN of nothing.
@@ -154,6 +180,30 @@ mod tests {
             }
             assert_eq!(extremes.range(&values, first, row), range(&values[first..=row]));
         }
+    }
+
+    #[test]
+    fn what_the_speed_explains_is_no_outlier_even_without_noise() {
+        let settling = |row: i32| 400.0 + 8.0 * libm::exp(-0.1 * f64::from(row));
+        let mut rows: Vec<(f64, f64)> =
+            (0..200).map(|row| settling(row).powi(2)).map(|squared| (squared, 4e-6 * squared)).collect();
+        assert_eq!(without_outliers(rows.clone()), (rows.clone(), 0));
+        rows[70].1 *= 1.01;
+        let (kept, outliers) = without_outliers(rows.clone());
+        assert_eq!((kept.len(), outliers), (199, 1));
+        assert!(!kept.contains(&rows[70]));
+    }
+
+    #[test]
+    fn the_median_of_readings_that_remember_is_less_certain() {
+        let mut random = bus::random::stream(1, "stand");
+        let fresh: Vec<f64> = (0..400).map(|_| bus::random::normal(&mut random)).collect();
+        // That of the median of 400 normal numbers is 1.253 / 20.
+        assert!((median_error(&fresh) / 0.0627 - 1.0).abs() < 0.15, "{}", median_error(&fresh));
+        let held: Vec<f64> = fresh.iter().flat_map(|value| [*value; 4]).collect();
+        let ratio = median_error(&held) / median_error(&fresh);
+        assert!((ratio - 1.0).abs() < 0.15, "{ratio}: four equal readings are one");
+        assert_eq!(median_error(&[0.5; 100]), 0.0);
     }
 
     #[test]

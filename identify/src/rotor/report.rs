@@ -134,7 +134,7 @@ fn write_motor(f: &mut fmt::Formatter<'_>, motor: &Fitted) -> fmt::Result {
         (Some(time), ..) => write!(f, "  first order: {}", milliseconds(time))?,
         (None, Some(wn), Some(zeta)) => write!(
             f,
-            "  second order: w_n {:.1} rad/s ({:.1} to {:.1}), zeta {:.2} ({:.2} to {:.2})",
+            "  second order: w_n {:.2} rad/s ({:.2} to {:.2}), zeta {:.3} ({:.3} to {:.3})",
             wn.value, wn.low, wn.high, zeta.value, zeta.low, zeta.high
         )?,
         _ => write!(f, "  second order: its parameters cannot be told")?,

@@ -8,7 +8,7 @@ use serde::Serialize;
 
 use super::coefficient::{Coefficient, PLATEAUS_MIN, Point};
 use super::error::RotorError;
-use super::plateau::{self, Plateaus, REST_RAD_S, median, without_outliers};
+use super::plateau::{self, Plateaus, REST_RAD_S, median, median_error, without_outliers};
 use super::stand::{Column, Stand, StaticLog, held_out, short_name};
 use super::table::LogTable;
 use crate::statistics::mean;
@@ -135,26 +135,27 @@ impl<'s> Log<'s> {
         rows.iter().map(|row| self.speed[*row]).collect()
     }
 
-    /// The plateaus of a quantity, its tare taken off; `None` if the log does not have it.
+    /// The plateaus of a quantity of the stand's log `number`, its tare taken off, and the standard error of that; `None`
+    /// if the log does not have it.
     fn readings(
         &self,
+        number: usize,
         quantity: &Quantity,
         findings: &mut Vec<String>,
-    ) -> Result<Option<Readings>, RotorError> {
+    ) -> Result<Option<(Readings, f64)>, RotorError> {
         let Some(column) = (quantity.column)(self.declared) else { return Ok(None) };
         let values = self.table.column(column, column.factor(quantity.dimension))?;
-        let read = |rows: &[usize]| -> Vec<f64> {
-            rows.iter().map(|row| values[self.kept[*row]]).filter(|value| value.is_finite()).collect()
-        };
-        let tare = self.tare(quantity, read, findings);
+        let read = |row: &usize| Some(values[self.kept[*row]]).filter(|value| value.is_finite());
+        let (tare, tare_sigma) = self.tare(quantity, |rows| rows.iter().filter_map(read).collect(), findings);
         let mut outliers = 0;
         let mut points = Vec::new();
         for (_, rows) in self.turning() {
-            let (kept, left_out) = without_outliers(&read(&rows));
+            let of_row = |row: &usize| Some((self.speed[*row].powi(2), read(row)? - tare));
+            let (kept, left_out) = without_outliers(rows.iter().filter_map(of_row).collect());
             outliers += left_out;
-            let squares: Vec<f64> = self.speeds(&rows).iter().map(|speed| speed * speed).collect();
-            if !kept.is_empty() {
-                points.push(Point { squared: mean(&squares), force: mean(&kept) - tare });
+            let (squares, forces): (Vec<f64>, Vec<f64>) = kept.into_iter().unzip();
+            if !forces.is_empty() {
+                points.push(Point { squared: mean(&squares), force: mean(&forces), log: number });
             }
         }
         if outliers > 0 {
@@ -164,26 +165,26 @@ impl<'s> Log<'s> {
             ));
         }
         let is_test = held_out(points.len(), self.declared.role, self.declared.held_out);
-        Ok(Some(points.into_iter().zip(is_test).collect()))
+        Ok(Some((points.into_iter().zip(is_test).collect(), tare_sigma)))
     }
 
     /// What the stand reads at rest before the run. What it reads after it only tells how far it drifts: by then a
-    /// stand is warm, and somebody may be at it.
+    /// stand is warm, and somebody may be at it. With its standard error, which the readings' scatter tells.
     fn tare(
         &self,
         quantity: &Quantity,
         read: impl Fn(&[usize]) -> Vec<f64>,
         findings: &mut Vec<String>,
-    ) -> f64 {
+    ) -> (f64, f64) {
         let Quantity { name, unit, .. } = quantity;
         let plateaus = self.all_plateaus().into_iter();
         let at_rest = plateaus.filter(|(speed, _)| *speed <= REST_RAD_S).map(|(_, rows)| read(&rows));
         let rests: Vec<Vec<f64>> = at_rest.filter(|readings| !readings.is_empty()).collect();
         let (Some(first), Some(last)) = (rests.first(), rests.last()) else {
             findings.push(format!("{}: no {name} at rest was logged: no tare is taken off", self.name));
-            return 0.0;
+            return (0.0, 0.0);
         };
-        let tare = median(first);
+        let (tare, sigma) = (median(first), median_error(first));
         let (low, high) = plateau::range(last);
         let end = if rests.len() > 1 {
             format!(
@@ -192,8 +193,9 @@ impl<'s> Log<'s> {
         } else {
             String::new()
         };
-        findings.push(format!("{}: tare of {name}, taken off: {tare:.3e} {unit}{end}", self.name));
-        tare
+        let error = format!("{tare:.3e} {unit}, with a standard error of {sigma:.1e}");
+        findings.push(format!("{}: tare of {name}, taken off: {error}{end}", self.name));
+        (tare, sigma)
     }
 }
 
@@ -204,9 +206,11 @@ fn coefficient(
     findings: &mut Vec<String>,
 ) -> Result<Option<Coefficient>, RotorError> {
     let mut readings: Option<Readings> = None;
-    for log in logs {
-        if let Some(more) = log.readings(quantity, findings)? {
+    let mut tare_sigmas = vec![0.0; logs.len()];
+    for (number, log) in logs.iter().enumerate() {
+        if let Some((more, tare_sigma)) = log.readings(number, quantity, findings)? {
             readings.get_or_insert_default().extend(more);
+            tare_sigmas[number] = tare_sigma;
         }
     }
     let Some(readings) = readings else { return Ok(None) };
@@ -220,7 +224,7 @@ fn coefficient(
         findings.push(format!("{}: it is negative while the rotor turns: its sign is turned", quantity.name));
         fit.iter_mut().chain(&mut test).for_each(|point| point.force = -point.force);
     }
-    let coefficient = Coefficient::fitted(&fit, &test).ok_or_else(|| {
+    let coefficient = Coefficient::fitted(&fit, &test, &tare_sigmas).ok_or_else(|| {
         let expected = format!("{PLATEAUS_MIN} plateaus to fit on");
         let advice = "log more steady speeds, or lower `settle_s` or `held_out`";
         RotorError::too_little(quantity.name, expected, fit.len(), advice)

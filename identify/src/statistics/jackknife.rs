@@ -1,6 +1,6 @@
 //! The interval of any estimate, by leaving out one block after the other.
 
-use super::quantile::student_quantile;
+use super::quantile::{normal_quantile, student_quantile};
 
 /// An estimate with its uncertainty.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
@@ -13,6 +13,22 @@ pub struct Estimate {
     pub low: f64,
     /// Upper end of the interval.
     pub high: f64,
+}
+
+impl Estimate {
+    /// The estimate with an error more that no block shows, of standard deviation `sigma` and independent of what the
+    /// interval of `level` holds already: half widths add as squares do.
+    pub(crate) fn with_error(self, sigma: f64, level: f64) -> Self {
+        let more = sigma * normal_quantile(0.5 + 0.5 * level);
+        let wider = |width: f64| (width * width + more * more).sqrt();
+        if sigma > 0.0 {
+            let Self { value, low, high, .. } = self;
+            let sigma = (self.sigma * self.sigma + sigma * sigma).sqrt();
+            Self { value, sigma, low: value - wider(value - low), high: value + wider(high - value) }
+        } else {
+            self
+        }
+    }
 }
 
 /// The interval of `value` from the estimates that each leave out one of G blocks.
