@@ -3,7 +3,8 @@
 //! | room | what it holds |
 //! |---|---|
 //! | `stand` | the stand file: which logs, which columns, what is held out |
-//! | `table` | one log: its columns in SI |
+//! | `recorded` | fields of a recording over time |
+//! | `table` | one log, a table or a recording: its columns in SI |
 //! | `held_out` | whether logs to test on hold what is fitted on |
 //! | `plateau` | where a log stands still, and what it reads there |
 //! | `coefficient` | T = c_T w^2 and Q = c_Q w^2 from plateaus |
@@ -24,6 +25,7 @@ mod error;
 mod held_out;
 mod lag;
 mod plateau;
+mod recorded;
 mod report;
 mod response;
 mod score;

@@ -1,6 +1,7 @@
 //! What can be wrong with a stand file, its logs, or the folder of the results.
 
 use diagnostics::Diagnostic;
+use recorder::RecordingError;
 use vehicles::table::TableError;
 
 /// Why a rotor could not be identified.
@@ -25,6 +26,36 @@ pub enum RotorError {
         #[source]
         cause: TableError,
     },
+    /// A log that is to be a recording cannot be read as one.
+    #[error(transparent)]
+    Recording(#[from] RecordingError),
+    /// A recording does not have a topic or a field that the stand file names.
+    #[error("{file}: {cause}; correct {}", if matches!(cause, RecordingError::UnknownTopic { .. }) { "`topic`" } else { "`field`" })]
+    NoField {
+        /// The log.
+        file: String,
+        /// What there is in its place.
+        #[source]
+        cause: RecordingError,
+    },
+    /// A recording states another unit than the stand file.
+    #[error(
+        "{file}: the field `{field}` of {topic} is recorded in {recorded}, the stand file says {said}; correct `{key}.unit`"
+    )]
+    Unit {
+        /// The log.
+        file: String,
+        /// The topic.
+        topic: String,
+        /// The field.
+        field: String,
+        /// The unit that the recording states.
+        recorded: String,
+        /// The unit that the stand file states.
+        said: String,
+        /// The column's key in the stand file.
+        key: &'static str,
+    },
     /// A log does not have a column that the stand file names.
     #[error("{file}: no column `{column}`; it has {}; correct the name", known.join(", "))]
     NoColumn {
@@ -35,16 +66,14 @@ pub enum RotorError {
         /// The columns there are.
         known: Vec<String>,
     },
-    /// A row without a time, or one before that of the row above.
-    #[error("{file}: line {line}: column `{column}` {found}; check its unit, or cut the log")]
+    /// A row or a sample without a time, or with one before that of the last.
+    #[error("{file}: {place} {found}; check its unit, or cut the log")]
     Time {
         /// The log.
         file: String,
-        /// The line, from 1.
-        line: u64,
-        /// The column.
-        column: String,
-        /// What is wrong with it.
+        /// The line and the column of a table, or the sample of a recording.
+        place: String,
+        /// What is wrong with its time.
         found: &'static str,
     },
     /// A log to test on holds rows that are fitted on.

@@ -1,19 +1,16 @@
 //! Whether the logs to test on are held out: none is a log that is fitted on, a copy of one, or a part of one.
 
-use std::path::Path;
-
 use diagnostics::unit::SPEED;
 use flights::{Channel, Comparison, Role, same_file, twin};
 
 use super::error::RotorError;
-use super::stand::{Column, Stand};
+use super::stand::{Column, Source, Stand};
 use super::table::LogTable;
 
 /// A log with the columns that tell its rows from another's, each with the factor of its numbers.
 struct Log<'s> {
     role: Role,
-    file: &'s Path,
-    time: &'s Column,
+    source: Source<'s>,
     columns: [Option<(&'s Column, f64)>; 3],
 }
 
@@ -21,15 +18,14 @@ struct Log<'s> {
 /// ones, and so with dynamic ones.
 pub fn check(stand: &Stand) -> Result<(), RotorError> {
     let speed = |column| Some((column, Column::factor(column, SPEED)));
-    let statics = stand.statics.iter().map(|log| {
+    check_pairs(stand.statics.iter().map(|log| {
         let [thrust, torque] =
             [&log.thrust, &log.torque].map(|force| force.as_ref().map(|force| (force, 1.0)));
-        Log { role: log.role, file: &log.file, time: &log.time, columns: [speed(&log.speed), thrust, torque] }
-    });
-    check_pairs(statics)?;
+        Log { role: log.role, source: log.source(), columns: [speed(&log.speed), thrust, torque] }
+    }))?;
     check_pairs(stand.dynamics.iter().map(|log| {
-        let columns = [speed(&log.speed), Some((&log.command, 1.0)), None];
-        Log { role: log.role, file: &log.file, time: &log.time, columns }
+        let columns = [speed(&log.speed), Some((&log.command, log.command_factor())), None];
+        Log { role: log.role, source: log.source(), columns }
     }))
 }
 
@@ -43,14 +39,14 @@ fn check_pairs<'s>(logs: impl Iterator<Item = Log<'s>>) -> Result<(), RotorError
     for test in tests {
         let of_test = test.rows()?;
         for (fit, of_fit) in fits.iter().zip(&of_fits) {
-            let reason = match (same_file(fit.file, test.file), twin(of_fit, &of_test)) {
+            let reason = match (fit.same_file(&test), twin(of_fit, &of_test)) {
                 (Some(how), _) => format!("they are {how}"),
                 (None, Comparison::Same(twin)) => {
                     format!("{} of {} rows are the same", twin.same, twin.compared)
                 }
                 (None, Comparison::Other | Comparison::Unknown) => continue,
             };
-            let [test, fit] = [test.file, fit.file].map(|file| file.display().to_string());
+            let [test, fit] = [&test, fit].map(|log| log.source.file.display().to_string());
             return Err(RotorError::NotHeldOut { test, fit, reason });
         }
     }
@@ -58,10 +54,16 @@ fn check_pairs<'s>(logs: impl Iterator<Item = Log<'s>>) -> Result<(), RotorError
 }
 
 impl Log<'_> {
+    /// How the file of another log is this log's; two topics of a recording are two logs.
+    fn same_file(&self, other: &Self) -> Option<&'static str> {
+        let (one, other) = (&self.source, &other.source);
+        if one.topic == other.topic { same_file(one.file, other.file) } else { None }
+    }
+
     /// The rows in which all columns have a number; one that the log does not have is zero.
     fn rows(&self) -> Result<Channel<3>, RotorError> {
-        let table = LogTable::read(self.file)?;
-        let time_s = table.times(self.time)?;
+        let table = LogTable::read(&self.source)?;
+        let time_s = table.times();
         let read = |column: Option<(&Column, f64)>| match column {
             Some((column, factor)) => table.column(column, factor),
             None => Ok(vec![0.0; time_s.len()]),

@@ -44,6 +44,8 @@ pub struct VehicleFile {
 pub struct StaticLog {
     /// The log; made a path by [`Stand::read`].
     pub file: PathBuf,
+    /// Where the log is a recording: the topic whose fields are read.
+    pub topic: Option<String>,
     /// What it is for.
     #[serde(default = "fit")]
     pub role: Role,
@@ -56,8 +58,8 @@ pub struct StaticLog {
     /// By which part of itself the speed may change within that time.
     #[serde(default = "steady")]
     pub steady: f64,
-    /// Where the time stands.
-    pub time: Column,
+    /// Where the time stands; absent for a recording, whose samples have theirs.
+    pub time: Option<Column>,
     /// Where the speed stands.
     pub speed: Column,
     /// Where the thrust stands.
@@ -72,6 +74,8 @@ pub struct StaticLog {
 pub struct DynamicLog {
     /// The log; made a path by [`Stand::read`].
     pub file: PathBuf,
+    /// Where the log is a recording: the topic whose fields are read.
+    pub topic: Option<String>,
     /// What it is for.
     #[serde(default = "fit")]
     pub role: Role,
@@ -87,8 +91,8 @@ pub struct DynamicLog {
     /// How long after a step the speed is looked at; the command has to stay constant.
     #[serde(default = "after_s")]
     pub after_s: f64,
-    /// Where the time stands.
-    pub time: Column,
+    /// Where the time stands; absent for a recording, whose samples have theirs.
+    pub time: Option<Column>,
     /// Where the speed stands.
     pub speed: Column,
     /// Where the command stands.
@@ -107,17 +111,62 @@ pub enum Clock {
     Rows,
 }
 
-/// A column of a log.
+/// A column of a log: of a table, or a field of a recording's topic.
 #[derive(Debug, Clone, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Column {
-    /// Its name in the header.
-    pub column: String,
-    /// Its unit.
+    /// Its name in the header of a table.
+    column: Option<String>,
+    /// The path of the field in the messages of a recording's topic.
+    field: Option<String>,
+    /// Its unit; what a recording states has to be the same.
     pub unit: String,
     /// Pole pairs of the motor, for an electrical speed: the rotor's is this many times smaller.
     #[serde(default = "one")]
     pub pole_pairs: f64,
+}
+
+/// A log as it is read: its file, and all of it that is asked for.
+pub struct Source<'s> {
+    /// The log.
+    pub file: &'s Path,
+    /// Where it is a recording: the topic.
+    pub topic: Option<&'s str>,
+    /// Where the time of a table stands.
+    pub time: Option<&'s Column>,
+    /// The columns by their keys in the stand file.
+    pub columns: Vec<(&'static str, &'s Column)>,
+}
+
+impl StaticLog {
+    /// The log with all of its columns.
+    pub fn source(&self) -> Source<'_> {
+        let columns = [
+            ("speed", Some(&self.speed)),
+            ("thrust", self.thrust.as_ref()),
+            ("torque", self.torque.as_ref()),
+        ];
+        let columns = columns.into_iter().filter_map(|(key, column)| Some((key, column?))).collect();
+        Source { file: &self.file, topic: self.topic.as_deref(), time: self.time.as_ref(), columns }
+    }
+}
+
+impl DynamicLog {
+    /// The log with all of its columns.
+    pub fn source(&self) -> Source<'_> {
+        let columns = vec![("speed", &self.speed), ("command", &self.command)];
+        Source { file: &self.file, topic: self.topic.as_deref(), time: self.time.as_ref(), columns }
+    }
+
+    /// Whether the command is the speed that the rotor is asked for, and not the vehicle's own command.
+    pub fn is_commanded_in_speed(&self) -> bool {
+        SPEED.factor(&self.command.unit).is_some()
+    }
+
+    /// What takes a command that is a speed to rad/s; any other is kept as the log has it.
+    pub fn command_factor(&self) -> f64 {
+        if self.is_commanded_in_speed() { self.command.factor(SPEED) } else { 1.0 }
+    }
 }
 
 fn fit() -> Role {
@@ -173,6 +222,11 @@ pub fn short_name(path: &Path) -> String {
 }
 
 impl Column {
+    /// What it is called in its log; known to be there after [`Stand::read`].
+    pub fn name(&self) -> &str {
+        self.field.as_deref().or(self.column.as_deref()).unwrap_or_default()
+    }
+
     /// Whether its cells are times as `YYYY-MM-DD HH:MM:SS:mmm`.
     pub fn is_wall_clock(&self) -> bool {
         self.unit == "wall clock"
@@ -199,9 +253,9 @@ impl Stand {
                 share(&key("held_out"), log.held_out),
                 positive(&key("settle_s"), log.settle_s),
                 positive(&key("steady"), log.steady),
-                time_unit(&key("time"), &log.time),
                 require(&format!("static.{index}"), "neither", has_one, "a `thrust` or a `torque`"),
             ]);
+            checks.extend(names(&format!("static.{index}"), &log.source()));
             checks.extend(unit(&key("speed"), &log.speed, SPEED));
             checks.extend(log.thrust.iter().flat_map(|column| unit(&key("thrust"), column, FORCE)));
             checks.extend(log.torque.iter().flat_map(|column| unit(&key("torque"), column, TORQUE)));
@@ -212,19 +266,63 @@ impl Stand {
                 share(&key("held_out"), log.held_out),
                 positive(&key("before_s"), log.before_s),
                 positive(&key("after_s"), log.after_s),
-                time_unit(&key("time"), &log.time),
             ]);
+            checks.extend(names(&format!("dynamic.{index}"), &log.source()));
             checks.extend(unit(&key("speed"), &log.speed, SPEED));
-            checks.extend(unit(&key("command"), &log.command, RATIO));
+            checks.extend(command_unit(&key("command"), log));
         }
         checks
     }
 }
 
-fn time_unit(key: &str, column: &Column) -> Check {
+/// Whether time and columns are named as the log has them: the columns of a table, the fields of a recording.
+fn names(log: &str, source: &Source) -> Vec<Check> {
+    let time = match (source.topic, source.time) {
+        (None, Some(time)) => named(&format!("{log}.time"), time, None).and_then(|()| time_unit(log, time)),
+        (None, None) => {
+            Err(ParameterError::missing(format!("{log}.time"), "the column of the time, and its unit"))
+        }
+        (Some(_), None) => Ok(()),
+        (Some(_), Some(_)) => Err(ParameterError::conflict(
+            format!("{log}.time"),
+            format!("`{log}.time`: the samples of a recording have their times; leave it out"),
+        )),
+    };
+    let columns = source.columns.iter();
+    let columns = columns.map(|(key, column)| named(&format!("{log}.{key}"), column, source.topic));
+    std::iter::once(time).chain(columns).collect()
+}
+
+fn named(key: &str, column: &Column, topic: Option<&str>) -> Check {
+    let missing = |name: &str, what: String| Err(ParameterError::missing(format!("{key}.{name}"), what));
+    let misplaced = |name: &str, advice: &str| {
+        Err(ParameterError::conflict(format!("{key}.{name}"), format!("`{key}.{name}`: {advice}")))
+    };
+    match (topic, &column.column, &column.field) {
+        (Some(_), None, Some(_)) | (None, Some(_), None) => Ok(()),
+        (Some(_), Some(_), _) => misplaced("column", "a `topic` has fields: give `field` in its place"),
+        (None, _, Some(_)) => misplaced(
+            "field",
+            "a table has columns: give `column` in its place, or the `topic` of a recording",
+        ),
+        (Some(topic), None, None) => missing("field", format!("the name of a field of {topic}")),
+        (None, None, None) => missing("column", "the name of a column".to_owned()),
+    }
+}
+
+fn time_unit(log: &str, column: &Column) -> Check {
     let expected = format!("\"wall clock\" (YYYY-MM-DD HH:MM:SS:mmm) or {}", TIME.describe());
     let is_known = column.is_wall_clock() || TIME.factor(&column.unit).is_some();
-    require(&format!("{key}.unit"), &column.unit, is_known, expected)
+    require(&format!("{log}.time.unit"), &column.unit, is_known, expected)
+}
+
+fn command_unit(key: &str, log: &DynamicLog) -> [Check; 2] {
+    let expected = format!("{}, or {}", RATIO.names(", "), SPEED.describe());
+    let is_known = log.is_commanded_in_speed() || RATIO.factor(&log.command.unit).is_some();
+    [
+        positive(&format!("{key}.pole_pairs"), log.command.pole_pairs),
+        require(&format!("{key}.unit"), &log.command.unit, is_known, expected),
+    ]
 }
 
 fn unit(key: &str, column: &Column, dimension: Dimension) -> [Check; 2] {

@@ -87,9 +87,9 @@ struct Log<'s> {
 
 impl<'s> Log<'s> {
     fn read(declared: &'s StaticLog, findings: &mut Vec<String>) -> Result<Self, RotorError> {
-        let table = LogTable::read(&declared.file)?;
+        let table = LogTable::read(&declared.source())?;
         let name = short_name(&declared.file);
-        let time_s = table.times(&declared.time)?;
+        let time_s = table.times();
         let speed = table.column(&declared.speed, declared.speed.factor(SPEED))?;
         let kept: Vec<usize> = (0..speed.len()).filter(|row| speed[*row].is_finite()).collect();
         let time_s: Vec<f64> = kept.iter().map(|row| time_s[*row]).collect();

@@ -24,7 +24,7 @@ const ROWS_AFTER_MIN: usize = 3;
 pub struct Step {
     /// The log.
     pub file: String,
-    /// The command before, in the log's unit.
+    /// The command before, in the log's unit; in rad/s where it is a speed.
     pub from: f64,
     /// The command after.
     pub to: f64,
@@ -60,7 +60,7 @@ pub struct Hold {
 pub struct Cut {
     /// Its usable steps.
     pub steps: Vec<Step>,
-    /// The commands that were held long enough.
+    /// The commands that were held long enough; none of a log whose command is a speed.
     pub holds: Vec<Hold>,
     /// Whether the motor stands still at a command of 0.
     pub zero_is_off: bool,
@@ -91,13 +91,18 @@ impl Cut {
         let is_test = held_out(steps.len(), declared.role, declared.held_out);
         steps.iter_mut().zip(is_test).for_each(|(step, test)| step.is_test = test);
         self.findings.extend(log.findings(changes.len(), steps.len(), &left_out));
+        self.steps.extend(steps);
+        let holds = log.holds(&rows);
+        if declared.is_commanded_in_speed() {
+            self.findings.extend(speed_command_finding(&log.name, &holds));
+            return Ok(());
+        }
         self.zero_is_off |= log
             .command
             .iter()
             .zip(&log.speed)
             .any(|(command, speed)| *command <= 0.0 && speed.abs() < REST_RAD_S);
-        self.steps.extend(steps);
-        self.holds.extend(log.holds(&rows));
+        self.holds.extend(holds);
         Ok(())
     }
 }
@@ -114,15 +119,15 @@ struct LeftOut {
 
 impl<'s> Log<'s> {
     fn read(declared: &'s DynamicLog) -> Result<Self, RotorError> {
-        let table = LogTable::read(&declared.file)?;
+        let table = LogTable::read(&declared.source())?;
         let name = short_name(&declared.file);
-        let time_s = table.times(&declared.time)?;
+        let time_s = table.times();
         let speed = table.column(&declared.speed, declared.speed.factor(SPEED))?;
-        let command = table.column(&declared.command, 1.0)?;
+        let command = table.column(&declared.command, declared.command_factor())?;
         let kept: Vec<usize> =
             (0..time_s.len()).filter(|row| speed[*row].is_finite() && command[*row].is_finite()).collect();
         let pick = |values: &[f64]| kept.iter().map(|row| values[*row]).collect::<Vec<f64>>();
-        let (time_s, speed, command) = (pick(&time_s), pick(&speed), pick(&command));
+        let (time_s, speed, command) = (pick(time_s), pick(&speed), pick(&command));
         let period_s = period(&time_s).ok_or_else(|| {
             let expected = "rows with time, speed and command";
             RotorError::too_little(&name, expected, "too few", "check the columns")
@@ -240,6 +245,17 @@ impl<'s> Log<'s> {
             share(0.95)
         )
     }
+}
+
+/// What to say of a log whose command is the speed that is asked for.
+fn speed_command_finding(log: &str, holds: &[Hold]) -> Option<String> {
+    let misses = holds.iter().map(|hold| (hold.speed_rad_s - hold.command).abs());
+    let most = misses.reduce(f64::max)?;
+    Some(format!(
+        "{log}: the command is the speed that is asked for, which the {} held speeds miss by up to {most:.2e} rad/s; \
+         it does not tell the vehicle's own command, [command]",
+        holds.len()
+    ))
 }
 
 /// The distance of rows: the median over long stretches, which single gaps do not move.

@@ -1,4 +1,4 @@
-//! One log in CSV: its columns in SI.
+//! One log, a table in CSV or a recording: its columns in SI.
 
 use std::path::Path;
 
@@ -7,65 +7,113 @@ use diagnostics::unit::TIME;
 use vehicles::table::Table;
 
 use super::error::RotorError;
-use super::stand::{Column, short_name};
+use super::recorded::Recorded;
+use super::stand::{Column, Source, short_name};
 
 /// Seconds of a day; a wall clock begins anew after them.
 const DAY_S: f64 = 86_400.0;
+/// How a recording begins (MCAP's specification, "Magic").
+const RECORDING: &[u8] = b"\x89MCAP0\r\n";
 
-/// The cells of a log.
+/// The times and the numbers of a log.
 pub struct LogTable {
     file: String,
-    table: Table,
+    time_s: Vec<f64>,
+    content: Content,
+}
+
+/// What a log is made of.
+enum Content {
+    /// The cells of a table.
+    Table(Table),
+    /// Fields of a recording.
+    Recorded(Recorded),
 }
 
 impl LogTable {
-    /// Reads the log at `path`.
-    pub fn read(path: &Path) -> Result<Self, RotorError> {
-        let bytes = vehicles::text::read_log(path).map_err(|cause| {
-            Diagnostic::unreadable(path.display().to_string(), &cause).help("check the path")
-        })?;
-        let file = short_name(path);
-        match Table::parse(&bytes) {
-            Ok(table) => Ok(Self { file, table }),
-            Err(cause) => Err(RotorError::Table { file, cause }),
+    /// Reads a log. Every row has to have a time, and none may go back.
+    pub fn read(source: &Source) -> Result<Self, RotorError> {
+        let file = short_name(source.file);
+        if let Some(topic) = source.topic {
+            let recorded = Recorded::read(source.file, topic, &source.columns)?;
+            let time_s = recorded.time_s.clone();
+            let place = |row: usize| format!("sample {} of {topic}", row + 1);
+            check_times(&file, &time_s, place)?;
+            return Ok(Self { file, time_s, content: Content::Recorded(recorded) });
         }
+        let table = table(source.file, &file)?;
+        let Some(column) = source.time else { return Err(no_column(&file, "time", table.headers)) };
+        let time_s = times(&file, &table, column)?;
+        let place = |row: usize| format!("line {}: column `{}`", table.rows[row].line, column.name());
+        check_times(&file, &time_s, place)?;
+        Ok(Self { file, time_s, content: Content::Table(table) })
     }
 
-    fn index(&self, column: &Column) -> Result<usize, RotorError> {
-        self.table.column(&column.column).ok_or_else(|| RotorError::NoColumn {
-            file: self.file.clone(),
-            column: column.column.clone(),
-            known: self.table.headers.clone(),
-        })
+    /// The times of the rows in s.
+    pub fn times(&self) -> &[f64] {
+        &self.time_s
     }
 
-    /// The numbers of a column, each times `factor`; NaN where a cell has none.
+    /// The numbers of a column, each times `factor`; NaN where there is none.
     pub fn column(&self, column: &Column, factor: f64) -> Result<Vec<f64>, RotorError> {
-        Ok(self.table.numbers(self.index(column)?).map(|number| number * factor).collect())
+        match &self.content {
+            Content::Table(table) => numbers(&self.file, table, column, factor),
+            Content::Recorded(recorded) => match recorded.field(column.name()) {
+                Some(numbers) => Ok(numbers.iter().map(|number| number * factor).collect()),
+                None => Err(no_column(&self.file, column.name(), recorded.names())),
+            },
+        }
     }
+}
 
-    /// The numbers of a time column in s; every row needs one, and none may go back.
-    pub fn times(&self, column: &Column) -> Result<Vec<f64>, RotorError> {
-        let time_s = if column.is_wall_clock() {
-            let index = self.index(column)?;
-            let cells = self.table.rows.iter().map(|row| row.cell(index));
-            unwrapped(cells.map(|cell| seconds_of_day(cell).unwrap_or(f64::NAN)))
-        } else {
-            self.column(column, column.factor(TIME))?
-        };
-        let fault = |row: usize, found: &'static str| RotorError::Time {
-            file: self.file.clone(),
-            line: self.table.rows[row].line,
-            column: column.column.clone(),
-            found,
-        };
-        if let Some(row) = time_s.iter().position(|time| !time.is_finite()) {
-            return Err(fault(row, "has no time"));
-        }
-        match time_s.windows(2).position(|pair| pair[1] < pair[0]) {
-            Some(row) => Err(fault(row + 1, "goes back")),
-            None => Ok(time_s),
-        }
+fn table(path: &Path, file: &str) -> Result<Table, RotorError> {
+    let bytes = vehicles::text::read_log(path)
+        .map_err(|cause| Diagnostic::unreadable(path.display().to_string(), &cause).help("check the path"))?;
+    if bytes.starts_with(RECORDING) {
+        return Err(RotorError::too_little(
+            file,
+            "a table",
+            "a recording",
+            "give its `topic`, and a `field` for each `column`",
+        ));
+    }
+    Table::parse(&bytes).map_err(|cause| RotorError::Table { file: file.to_owned(), cause })
+}
+
+fn no_column(file: &str, column: &str, known: Vec<String>) -> RotorError {
+    RotorError::NoColumn { file: file.to_owned(), column: column.to_owned(), known }
+}
+
+fn index(file: &str, table: &Table, column: &Column) -> Result<usize, RotorError> {
+    let name = column.name();
+    table.column(name).ok_or_else(|| no_column(file, name, table.headers.clone()))
+}
+
+fn numbers(file: &str, table: &Table, column: &Column, factor: f64) -> Result<Vec<f64>, RotorError> {
+    Ok(table.numbers(index(file, table, column)?).map(|number| number * factor).collect())
+}
+
+/// The numbers of a time column in s; NaN where a cell has no time.
+fn times(file: &str, table: &Table, column: &Column) -> Result<Vec<f64>, RotorError> {
+    if !column.is_wall_clock() {
+        return numbers(file, table, column, column.factor(TIME));
+    }
+    let index = index(file, table, column)?;
+    let cells = table.rows.iter().map(|row| row.cell(index));
+    Ok(unwrapped(cells.map(|cell| seconds_of_day(cell).unwrap_or(f64::NAN))))
+}
+
+/// Refuses rows without a time, and times that go back; `place` tells where a row stands.
+fn check_times(file: &str, time_s: &[f64], place: impl Fn(usize) -> String) -> Result<(), RotorError> {
+    let fault = |row: usize, found: &'static str| {
+        Err(RotorError::Time { file: file.to_owned(), place: place(row), found })
+    };
+    if let Some(row) = time_s.iter().position(|time| !time.is_finite()) {
+        return fault(row, "has no time");
+    }
+    match time_s.windows(2).position(|pair| pair[1] < pair[0]) {
+        Some(row) => fault(row + 1, "goes back"),
+        None => Ok(()),
     }
 }
 
