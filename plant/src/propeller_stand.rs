@@ -2,7 +2,8 @@
 //!
 //! The thesis turns its propeller alone on a cube at 3900 rpm (Fig 4.4), and plots thrust and torque against the speed
 //! (Fig 4.3). Thrust and drag torque are those of [`rotor`](crate::rotor), the lag is that of the motor; of the vehicle
-//! file's effects none acts, as nothing flies.
+//! file's effects none acts, as nothing flies. The sensors read the truth, as the thesis states no error, or have white
+//! noise: of the force, of the torque, and of the speed.
 
 use crate::airworthy;
 use crate::motor;
@@ -11,12 +12,17 @@ use crate::state::RotorState;
 use bus::component::{Component, Info, StepError};
 use bus::context::{NodeContext, StepContext};
 use bus::messages::Time;
+use bus::random::{Stream, normal, stream};
 use bus::{Message, OutputPorts};
 use diagnostics::parameter::{ParameterError, not_negative, refuse, require};
 use serde::Deserialize;
 use std::f64::consts::PI;
 use std::path::PathBuf;
 use vehicles::{CommandMap, Vehicle};
+
+/// Words of 32 bits of the random stream that are set aside for a tick: its three normal draws take six, and some more one
+/// time in seventy.
+const WORDS_PER_TICK: u128 = 1 << 10;
 
 /// Parameters of the stand.
 #[derive(Debug, Deserialize)]
@@ -29,6 +35,15 @@ pub struct Parameters {
     rotor: usize,
     /// The commanded speed over time; 0 before the first.
     speeds: Vec<SpeedEntry>,
+    /// Standard deviation of a reading of the force, N.
+    #[serde(default)]
+    force_noise_N: f64,
+    /// Standard deviation of a reading of the torque, N·m; the drag torque is computed from that reading.
+    #[serde(default)]
+    torque_noise_N_m: f64,
+    /// Standard deviation of a reading of the speed, rad/s.
+    #[serde(default)]
+    speed_noise_rad_s: f64,
 }
 
 fn first() -> usize {
@@ -112,6 +127,24 @@ pub struct PropellerStand {
     rotor: usize,
     profile: Vec<Leg>,
     dt_s: f64,
+    noise: Noise,
+}
+
+/// White noise of the sensors. That of a tick follows from seed, name and tick, so that there is nothing to hand over.
+#[derive(Debug)]
+struct Noise {
+    /// Of the force, N, the torque, N·m, and the speed, rad/s.
+    sigmas: [f64; 3],
+    random: Stream,
+}
+
+impl Noise {
+    /// What is added to force, torque and speed at a tick. All are drawn always, so that one's noise does not reshuffle
+    /// the others'.
+    fn at(&mut self, tick: u32) -> [f64; 3] {
+        self.random.set_word_pos(u128::from(tick) * WORDS_PER_TICK);
+        self.sigmas.map(|sigma| sigma * normal(&mut self.random))
+    }
 }
 
 /// A change of the commanded speed, in ticks.
@@ -131,7 +164,13 @@ impl Component for PropellerStand {
     type State = StandState;
 
     fn new(parameters: Parameters, run: &NodeContext<'_>) -> Result<Self, ParameterError> {
-        let Parameters { vehicle, rotor, speeds } = parameters;
+        let Parameters { vehicle, rotor, speeds, force_noise_N, torque_noise_N_m, speed_noise_rad_s } =
+            parameters;
+        not_negative("force_noise_N", force_noise_N)?;
+        not_negative("torque_noise_N_m", torque_noise_N_m)?;
+        not_negative("speed_noise_rad_s", speed_noise_rad_s)?;
+        let sigmas = [force_noise_N, torque_noise_N_m, speed_noise_rad_s];
+        let noise = Noise { sigmas, random: stream(run.seed, run.name) };
         let vehicle = Vehicle::load(&vehicle).map_err(|error| ParameterError::conflict("vehicle", error))?;
         let is_there = (1..=vehicle.rotors.len()).contains(&rotor);
         require("rotor", rotor, is_there, "1 to 4, in the order of the vehicle file")?;
@@ -142,7 +181,7 @@ impl Component for PropellerStand {
         let dt_s = run.tick_s();
         airworthy::check_steps(&vehicle, dt_s, run)?;
         let profile = profile(&speeds, &vehicle.command, dt_s)?;
-        Ok(Self { vehicle, rotor: rotor - 1, profile, dt_s })
+        Ok(Self { vehicle, rotor: rotor - 1, profile, dt_s, noise })
     }
 
     fn initial(&self) -> StandState {
@@ -163,7 +202,8 @@ impl Component for PropellerStand {
             let moved = motor::settled(&self.vehicle.motor, &moved, target_rad_s);
             *state = StandState { speed: moved.speed_rad_s, acceleration: moved.acceleration_rad_s2 };
         }
-        Ok(Outputs { load: self.load(self.commanded_rad_s(tick), state) })
+        let truth = self.load(self.commanded_rad_s(tick), state);
+        Ok(Outputs { load: self.read(&truth, tick) })
     }
 }
 
@@ -189,6 +229,21 @@ impl PropellerStand {
             thrust: thrust_N(&self.vehicle, rotor.speed),
             drag_torque,
             mount_torque: -place.spin * (drag_torque + speeding_up_N_m),
+        }
+    }
+}
+
+impl PropellerStand {
+    /// What the sensors make of the truth at a tick.
+    fn read(&mut self, truth: &RotorLoad, tick: u32) -> RotorLoad {
+        let [force_N, torque_N_m, speed_rad_s] = self.noise.at(tick);
+        let against_spin = -self.vehicle.rotors[self.rotor].spin;
+        RotorLoad {
+            rotor_speed: truth.rotor_speed + speed_rad_s,
+            thrust: truth.thrust + force_N,
+            drag_torque: truth.drag_torque + against_spin * torque_N_m,
+            mount_torque: truth.mount_torque + torque_N_m,
+            ..*truth
         }
     }
 }
@@ -225,6 +280,13 @@ mod tests {
     use super::*;
     use bus::Harness;
     use serde_json::{Value, json};
+
+    /// Mean and standard deviation.
+    fn spread(values: &[f64]) -> (f64, f64) {
+        let n = values.len() as f64;
+        let mean = values.iter().sum::<f64>() / n;
+        (mean, (values.iter().map(|value| (value - mean).powi(2)).sum::<f64>() / n).sqrt())
+    }
 
     fn parameters(rotor: usize, speeds: &Value) -> Value {
         let vehicle = concat!(env!("CARGO_MANIFEST_DIR"), "/../vehicles/hummingbird.toml");
@@ -281,6 +343,62 @@ mod tests {
     fn another_instance_goes_on_from_its_state() {
         let speeds = json!([{ "at_s": 0.0, "over_s": 0.05, "to_rpm": 3900.0 }]);
         Harness::require_transfer(|| stand(1, &speeds), |_| ());
+    }
+
+    fn noisy(noise: &Value) -> Vec<RotorLoad> {
+        let mut parameters = parameters(1, &json!([{ "at_s": 0.0, "to_rpm": 3900.0 }]));
+        parameters.as_object_mut().unwrap().extend(noise.as_object().cloned().unwrap());
+        let mut stand = Harness::<PropellerStand>::from_json(&parameters).unwrap();
+        (0..12_000).map(|_| stand.step(()).unwrap().load).collect()
+    }
+
+    #[test]
+    fn the_sensors_have_their_own_noise_and_the_drag_is_the_torque_that_is_read() {
+        let truth = noisy(&json!({}));
+        let all = json!({ "force_noise_N": 0.02, "torque_noise_N_m": 3e-4, "speed_noise_rad_s": 0.5 });
+        let read = noisy(&all);
+        let off = |of: fn(&RotorLoad) -> f64| -> Vec<f64> {
+            read.iter().zip(&truth).map(|(read, truth)| of(read) - of(truth)).collect()
+        };
+        let errors: [(Vec<f64>, f64); 3] = [
+            (off(|load| load.thrust), 0.02),
+            (off(|load| load.mount_torque), 3e-4),
+            (off(|load| load.rotor_speed), 0.5),
+        ];
+        for (errors, sigma) in &errors {
+            let (mean, found) = spread(errors);
+            assert!(
+                mean.abs() < 0.05 * sigma && (found / sigma - 1.0).abs() < 0.03,
+                "{sigma}: {mean} {found}"
+            );
+            // White: of two ticks in a row nothing is common.
+            let product: f64 = errors.windows(2).map(|pair| pair[0] * pair[1]).sum();
+            assert!((product / errors.len() as f64).abs() < 0.05 * sigma * sigma);
+        }
+        // Rotor 1 turns clockwise: its mount feels the drag as it is.
+        let drags = off(|load| load.drag_torque);
+        assert!(drags.iter().zip(&errors[1].0).all(|(drag, mount)| (drag - mount).abs() < 1e-15));
+        let force_alone = noisy(&json!({ "force_noise_N": 0.02 }));
+        assert!(force_alone.iter().zip(&read).all(|(alone, read)| alone.thrust == read.thrust));
+        assert!(force_alone.iter().zip(&truth).all(|(alone, truth)| alone.rotor_speed == truth.rotor_speed));
+    }
+
+    #[test]
+    fn another_instance_goes_on_with_the_noise() {
+        let mut parameters = parameters(1, &json!([{ "at_s": 0.0, "to_rpm": 3900.0 }]));
+        parameters["force_noise_N"] = json!(0.02);
+        Harness::require_transfer(|| Harness::<PropellerStand>::from_json(&parameters).unwrap(), |_| ());
+    }
+
+    #[test]
+    fn noise_that_is_none_is_refused_with_its_key() {
+        for key in ["force_noise_N", "torque_noise_N_m", "speed_noise_rad_s"] {
+            let mut parameters = parameters(1, &json!([{ "at_s": 0.0, "to_rpm": 3900.0 }]));
+            parameters[key] = json!(-0.1);
+            let error =
+                Harness::<PropellerStand>::from_json(&parameters).map(|_| ()).unwrap_err().to_string();
+            assert!(error.contains(key) && error.contains("0 or more"), "{error}");
+        }
     }
 
     #[test]
