@@ -23,7 +23,9 @@ fn flown(manifest: &Manifest) -> [Vec<f64>; 2] {
 
 #[test]
 fn the_family_flies_as_its_conditions_say() {
-    for name in ["hover", "hover-estimated", "take-off", "propeller"] {
+    for name in
+        ["hover", "hover-estimated", "take-off", "propeller", "propeller-steps", "propeller-steps-noisy"]
+    {
         let (place, path) = (Place::new(), repository(&format!("manifests/thesis/{name}.toml")));
         let ended = place.call(&["run", &path, "--record", &place.path("flight.mcap")]);
         assert_eq!(ended.code, Some(0), "{ended}");

@@ -2,6 +2,7 @@
 
 use crate::support::{Place, repository};
 use serde_json::Value;
+use std::f64::consts::PI;
 use std::process::Command;
 
 /// Flies courses of `kind` with `args` for `scripts/make_flights`; returns the flights file.
@@ -87,6 +88,85 @@ fn a_flight_that_is_fitted_on_is_no_test_flight_for_identify_and_validate() {
             ["flights.toml:12:8", "`second` with role \"test\"", "`first` with role \"fit\"", how, "from_s"];
         place.call(&["identify", &flights, "--out", &out]).with_code(2).says(&args);
         place.call(&["validate", &vehicle, &flights]).with_code(2).says(&args);
+    }
+    assert!(!std::path::Path::new(&out).exists(), "a refusal writes nothing");
+}
+
+/// The report on the simulated stand `name`, which is run first.
+fn simulated_stand(place: &Place, name: &str) -> Value {
+    let (recording, out) = (place.path("stand.mcap"), place.path("rotor"));
+    let manifest = repository(&format!("manifests/thesis/{name}.toml"));
+    place.call(&["run", &manifest, "--record", &recording]).with_code(0);
+    let stand = repository(&format!("flights/stands/{name}.toml"));
+    let args = ["identify", "rotor", &stand, "--out", &out, "--json"];
+    place.start_with(&args, &[("HUMMINGBUS_STAND", &recording)]).end().with_code(0).json()
+}
+
+/// What the thesis prints (§4.2), in SI, with what came back: c_T, c_Q, natural frequency and damping.
+fn printed(report: &Value) -> [(f64, &Value); 4] {
+    let per_rpm2 = (30.0 / PI).powi(2);
+    let (statics, motor) = (&report["statics"], &report["dynamics"]["second"]);
+    [
+        (7.6184e-8 * per_rpm2, &statics["thrust"]["value"]),
+        (2.6839e-9 * per_rpm2, &statics["torque"]["value"]),
+        (1.0 / 0.0044_f64.sqrt(), &motor["natural_frequency_rad_s"]),
+        (0.08 / (2.0 * 0.0044_f64.sqrt()), &motor["damping_ratio"]),
+    ]
+}
+
+/// The thesis's rotor alone on a stand (Fig 4.4): fitted, it is the one that the vehicle file declares.
+#[test]
+fn the_simulated_stand_gives_the_constants_of_the_thesis() {
+    let place = Place::new();
+    let ideal = simulated_stand(&place, "propeller-steps");
+    for (truth, found) in printed(&ideal) {
+        // The plant's Runge-Kutta steps turn a motor of 15 rad/s by 4e-10 of itself; nothing else is in the way.
+        assert!((found["value"].as_f64().unwrap() / truth - 1.0).abs() < 1e-9, "{truth}: {found}");
+    }
+    assert_eq!(ideal["dynamics"]["comparison"]["preferred"], "second");
+    let tables = std::fs::read_to_string(place.path("rotor/rotor.toml")).unwrap();
+    let tables: toml::Table = tables.parse().unwrap();
+    assert_eq!(tables["motor"]["model"].as_str(), Some("second-order"));
+    assert_eq!(
+        tables["command"]["max"]["value"].as_float(),
+        Some(200.0),
+        "a commanded speed does not tell it"
+    );
+}
+
+#[test]
+fn a_stand_with_noise_gives_the_constants_within_its_intervals() {
+    let report = simulated_stand(&Place::new(), "propeller-steps-noisy");
+    for (truth, found) in printed(&report) {
+        let of = |key: &str| found[key].as_f64().unwrap();
+        assert!(of("low") < truth && truth < of("high"), "{truth}: {found}");
+        let width = (of("high") - of("low")) / truth;
+        assert!((1e-4..2e-2).contains(&width), "noise of the size of a real stand's: {found}");
+    }
+    let dynamics = &report["dynamics"];
+    assert_eq!(dynamics["comparison"]["preferred"], "second");
+    for (part, held_out) in [("statics", &report["statics"]["thrust"]), ("dynamics", &dynamics["second"])] {
+        assert!(held_out["held_out"]["r_squared"].as_f64().unwrap() > 0.999, "{part}: {held_out}");
+    }
+}
+
+#[test]
+fn a_stand_file_that_is_not_as_its_recording_is_refused_in_words() {
+    let place = Place::new();
+    let (recording, out) = (place.path("stand.mcap"), place.path("rotor"));
+    let manifest = repository("manifests/thesis/propeller-steps.toml");
+    place.call(&["run", &manifest, "--record", &recording, "--set", "run.duration_s=12.0"]);
+    let text = std::fs::read_to_string(repository("flights/stands/propeller-steps.toml")).unwrap();
+    let text = text.replace("../../vehicles/hummingbird.toml", &repository("vehicles/hummingbird.toml"));
+    for (from, to, said) in [
+        ("\"/stand/load\"", "\"/load\"", ["no topic /load", "/stand/load", "`topic`"]),
+        ("\"thrust\"", "\"lift\"", ["no field `lift`", "rotor_speed, thrust", "`field`"]),
+        ("\"N\"", "\"kgf\"", ["recorded in N", "says kgf", "`thrust.unit`"]),
+    ] {
+        let stand = place.write("stand.toml", text.replace(from, to));
+        let args = ["identify", "rotor", &stand, "--out", &out];
+        let ended = place.start_with(&args, &[("HUMMINGBUS_STAND", &recording)]).end();
+        ended.with_code(2).says(&[&["stand.mcap"][..], &said].concat());
     }
     assert!(!std::path::Path::new(&out).exists(), "a refusal writes nothing");
 }
