@@ -119,8 +119,11 @@ fn rig(text: &str) -> Scene {
     scene
 }
 
-/// What hangs in a chain from the vehicle: centre, size, mass, and the joint that it hangs by.
-const CHAIN: [(&str, [f64; 3], [f64; 3], f64, &str, [f64; 3]); 4] = [
+/// A box of a chain: name, centre, size, mass, and the joint that it hangs by with its anchor.
+type Link = (&'static str, [f64; 3], [f64; 3], f64, &'static str, [f64; 3]);
+
+/// What hangs in a chain from the vehicle.
+const CHAIN: [Link; 4] = [
     ("a", [0.05, 0.02, -0.25], [0.1, 0.2, 0.3], 0.3, "ball", [0.0, 0.0, -0.08]),
     ("b", [0.05, 0.1, -0.55], [0.2, 0.1, 0.2], 0.2, "revolute", [0.05, 0.05, -0.42]),
     ("c", [0.1, 0.1, -0.8], [0.1, 0.1, 0.1], 0.15, "prismatic", [0.1, 0.1, -0.7]),

@@ -100,7 +100,7 @@ impl Rapier {
         let hull = Hull::of(model.airframe());
         // The mount is on the frame, and where it is seen from may have moved.
         let mount_shift_B_m = model.airframe().frame_shift_B_m();
-        let free_bodies = FreeBodies::new(scene, &mount_shift_B_m);
+        let free_bodies = FreeBodies::new(scene, mount_shift_B_m);
         let motion = Motion {
             rig: scene.rig.map(|rig| Rig { mount_B_m: rig.mount_B_m + mount_shift_B_m, ..rig }),
             crash_speed_m_s,

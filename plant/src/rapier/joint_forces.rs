@@ -2,6 +2,11 @@
 //!
 //! With the Jacobian J of all rows and the bodies' mobility W they are the solution of (J W Jᵀ) λ = wanted, whose matrix is
 //! symmetric and positive definite. Forces over accelerations, and shifts over distances, are found the same way.
+#![allow(
+    clippy::disallowed_types,
+    reason = "how many rows there are is known at run time; a Cholesky decomposition and its solution go column by column, \
+              without a product of matrices whose kernel suits the processor"
+)]
 
 use super::body::lay_out;
 use super::joints::{Joint, Line};
