@@ -1,8 +1,6 @@
 //! Free bodies: things of a scene that move.
 #![allow(non_snake_case, reason = "a trailing _W names the frame a vector is written in")]
 
-use crate::mesh::Mesh;
-use crate::scene::{Ball, Cuboid};
 use diagnostics::Diagnostic;
 use diagnostics::parameter::Bounds;
 use diagnostics::unit::{ANGULAR_VELOCITY, MASS, VELOCITY};
@@ -137,39 +135,6 @@ pub(crate) fn solid_moments(corners_m: &[[f64; 3]], faces: &[[u32; 3]]) -> (Vect
     let off_m = first_moment / volume_m3;
     let spread_m2 = second_moment / volume_m3 - off_m * off_m.transpose();
     (first_m + off_m, Matrix3::from_diagonal_element(spread_m2.trace()) - spread_m2)
-}
-
-/// What a thing needs to be drawn and met where it is.
-#[derive(Debug, Clone, Copy)]
-pub enum Thing<'a> {
-    /// A box.
-    Cuboid(&'a Cuboid),
-    /// Triangles.
-    Mesh(&'a Mesh),
-    /// A ball.
-    Ball(&'a Ball),
-}
-
-impl<'a> Thing<'a> {
-    /// What the file calls it.
-    #[must_use]
-    pub fn name(&self) -> &'a str {
-        match self {
-            Self::Cuboid(cuboid) => &cuboid.name,
-            Self::Mesh(mesh) => &mesh.name,
-            Self::Ball(ball) => &ball.name,
-        }
-    }
-
-    /// How it moves, if it does.
-    #[must_use]
-    pub fn body(&self) -> Option<&'a FreeBody> {
-        match self {
-            Self::Cuboid(cuboid) => cuboid.body.as_ref(),
-            Self::Mesh(mesh) => mesh.body.as_ref(),
-            Self::Ball(ball) => ball.body.as_ref(),
-        }
-    }
 }
 
 #[cfg(test)]

@@ -9,6 +9,7 @@
 //! | [`mesh`] | things of any shape: triangles |
 //! | [`body`] | what makes a thing a free body: its mass, its inertia, how it starts |
 //! | [`joint`] | what ties free bodies to the world, to each other and to the vehicle |
+//! | `tied` | what hangs from what, by joints |
 //! | [`ray`] | the distance from a point along a direction to what is met first |
 //! | [`surface`] | friction and restitution |
 //! | [`rig`] | the test rigs that a vehicle hangs from |
@@ -33,12 +34,13 @@ pub mod reference;
 pub mod rig;
 pub mod scene;
 pub mod surface;
+mod tied;
 
-pub use body::{BodyPose, FreeBody, Thing};
+pub use body::{BodyPose, FreeBody};
 pub use file::BODIES_MAX;
 pub use joint::{Axis, End, Freedom, Joint};
 pub use mesh::{Mesh, Solidity};
 pub use ray::RayCaster;
 pub use rig::Rig;
-pub use scene::{Ball, Cuboid, Scene};
+pub use scene::{Ball, Cuboid, Scene, Thing};
 pub use surface::Surface;

@@ -1,8 +1,8 @@
 //! The distance from a point along a direction to what is met first.
 #![allow(non_snake_case, reason = "a trailing _W names the frame a vector is written in")]
 
-use crate::body::{BodyPose, Thing};
-use crate::scene::Scene;
+use crate::body::BodyPose;
+use crate::scene::{Scene, Thing};
 use nalgebra::Vector3;
 use parry3d_f64::math::{Pose, Rotation, Vector};
 use parry3d_f64::query::Ray;

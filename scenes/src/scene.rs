@@ -1,7 +1,7 @@
 //! The scene as physics and sensors see it: SI numbers only, immutable once read.
 #![allow(non_snake_case, reason = "a trailing _W names the frame a vector is written in")]
 
-use crate::body::{FreeBody, Thing};
+use crate::body::FreeBody;
 use crate::joint::Joint;
 use crate::mesh::Mesh;
 use crate::rig::Rig;
@@ -91,4 +91,37 @@ pub struct Ball {
     pub surface: Surface,
     /// How it moves; nothing where it stands still.
     pub body: Option<FreeBody>,
+}
+
+/// What a thing needs to be drawn and met where it is.
+#[derive(Debug, Clone, Copy)]
+pub enum Thing<'a> {
+    /// A box.
+    Cuboid(&'a Cuboid),
+    /// Triangles.
+    Mesh(&'a Mesh),
+    /// A ball.
+    Ball(&'a Ball),
+}
+
+impl<'a> Thing<'a> {
+    /// What the file calls it.
+    #[must_use]
+    pub fn name(&self) -> &'a str {
+        match self {
+            Self::Cuboid(cuboid) => &cuboid.name,
+            Self::Mesh(mesh) => &mesh.name,
+            Self::Ball(ball) => &ball.name,
+        }
+    }
+
+    /// How it moves, if it does.
+    #[must_use]
+    pub fn body(&self) -> Option<&'a FreeBody> {
+        match self {
+            Self::Cuboid(cuboid) => cuboid.body.as_ref(),
+            Self::Mesh(mesh) => mesh.body.as_ref(),
+            Self::Ball(ball) => ball.body.as_ref(),
+        }
+    }
 }

@@ -1,0 +1,52 @@
+//! What hangs from what: free bodies, by the joints of their scene.
+
+use crate::joint::{End, Freedom};
+use crate::scene::Scene;
+
+impl Scene {
+    /// Which of [`Scene::bodies`] hang from the vehicle, by joints to it or to others that do; the world ties nothing
+    /// together.
+    #[must_use]
+    pub fn hanging(&self) -> Vec<bool> {
+        let mut hangs = vec![false; self.bodies().count()];
+        let is_in = |hangs: &[bool], end| match end {
+            End::World => false,
+            End::Vehicle => true,
+            End::Body(number) => hangs[number],
+        };
+        // A chain is as long as there are joints at most.
+        for _ in &self.joints {
+            for joint in &self.joints {
+                let (parent, child) = (is_in(&hangs, joint.parent), is_in(&hangs, joint.child));
+                for end in [joint.parent, joint.child] {
+                    if let (End::Body(number), true, true) =
+                        (end, parent || child, joint.parent != End::World)
+                    {
+                        hangs[number] = true;
+                    }
+                }
+            }
+        }
+        hangs
+    }
+
+    /// Whether a joint ties the vehicle.
+    #[must_use]
+    pub fn is_vehicle_tied(&self) -> bool {
+        self.joints.iter().any(|joint| [joint.parent, joint.child].contains(&End::Vehicle))
+    }
+
+    /// The first joint other than a rope that ties the vehicle, or what hangs from it, to the world.
+    pub(crate) fn joint_that_pins_the_vehicle(&self) -> Option<usize> {
+        let hangs = self.hanging();
+        self.joints.iter().position(|joint| {
+            let is_rope = matches!(joint.freedom, Freedom::Rope { .. });
+            let hangs = match joint.child {
+                End::World => false,
+                End::Vehicle => true,
+                End::Body(number) => hangs[number],
+            };
+            joint.parent == End::World && hangs && !is_rope
+        })
+    }
+}
