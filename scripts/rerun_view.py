@@ -14,6 +14,7 @@ import subprocess
 import sys
 import tempfile
 import tomllib
+import types
 
 import rerun as rr
 import rerun.blueprint as rrb
@@ -58,7 +59,7 @@ def read(recording):
                 meshes[attachment.name] = attachment.data
                 continue
             table = tomllib.loads(attachment.data.decode())
-            if "boxes" in table or "meshes" in table:
+            if any(things in table for things in ("boxes", "meshes", "balls")):
                 scene = table
     return topics, scene, meshes
 
@@ -172,6 +173,45 @@ def log_mesh(mesh, files):
     rr.log(rr.new_entity_path(["scene", mesh["name"]]), rr.CoordinateFrame("map"), place, shape, static=True)
 
 
+def log_balls(balls):
+    shape = rr.Ellipsoids3D(
+        centers=[metres(ball["centre"]) for ball in balls],
+        half_sizes=[[metres(ball["radius"])] * 3 for ball in balls],
+        labels=[ball["name"] for ball in balls],
+        fill_mode="solid",
+    )
+    rr.log("balls", rr.CoordinateFrame("map"), shape, static=True)
+
+
+def log_bodies(scene, messages):
+    """Logs the free bodies of a scene, which move as `messages` say: in their order, boxes before meshes before balls."""
+    moving = [
+        (kind, thing) for kind in ("boxes", "meshes", "balls") for thing in scene.get(kind, []) if "mass" in thing
+    ]
+    for number, (kind, thing) in enumerate(moving):
+        frame, entity = f"body {thing['name']}", rr.new_entity_path(["bodies", thing["name"]])
+        if kind == "boxes":
+            half = [length / 2 for length in metres(thing["size"])]
+            shape = rr.Boxes3D(half_sizes=[half], labels=[thing["name"]], fill_mode="solid")
+        elif kind == "balls":
+            half = [metres(thing["radius"])] * 3
+            shape = rr.Ellipsoids3D(half_sizes=[half], labels=[thing["name"]], fill_mode="solid")
+        else:
+            # What moves is its centre of mass, which the file does not say: its axes are seen.
+            shape = rr.TransformAxes3D(AXES_M)
+        rr.log(entity, rr.CoordinateFrame(frame), shape, static=True)
+        states = [
+            types.SimpleNamespace(
+                log_time_ns=message.log_time_ns,
+                ros_msg=types.SimpleNamespace(
+                    position=message.ros_msg.position[number], attitude=message.ros_msg.attitude[number]
+                ),
+            )
+            for message in messages[::10]
+        ]
+        log_motion(rr.new_entity_path(["bodies", thing["name"], "motion"]), states, frame)
+
+
 def log_path(entity, states, colour):
     points = [[at.x, at.y, at.z] for at in (message.ros_msg.position for message in states)]
     # A point each 20 samples: more would only make the file larger.
@@ -240,10 +280,16 @@ def main(recording, out, shown=None):
         if vehicle == shown and states:
             topic = f"/{vehicle}/pilot/set_point" if vehicle else "/pilot/set_point"
             log_attitude(states, list(read_ros2_messages(recording, topics=[topic])))
-    if scene.get("boxes"):
-        log_boxes(scene["boxes"])
-    for mesh in scene.get("meshes", []):
+    still = {kind: [thing for thing in scene.get(kind, []) if "mass" not in thing] for kind in ("boxes", "meshes", "balls")}
+    if still["boxes"]:
+        log_boxes(still["boxes"])
+    if still["balls"]:
+        log_balls(still["balls"])
+    for mesh in still["meshes"]:
         log_mesh(mesh, meshes)
+    bodies = [topic for topic, name in topics.items() if name == "hummingbus_msgs/msg/BodyStates"]
+    if bodies:
+        log_bodies(scene, list(read_ros2_messages(recording, topics=bodies[:1])))
     prefix = f"/{shown}/" if shown else "/"
     plots = [plot(name, lines, prefix, topics) for name, lines in PLOTS.items()]
     plots.insert(1, rrb.TimeSeriesView(name="Attitude [deg]", contents=["/flown/attitude", "/asked/attitude"]))
