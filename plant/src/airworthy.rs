@@ -1,7 +1,7 @@
 //! What a vehicle must be to fly at all, looked at before a run: `check` refuses what cannot, and tells what is odd.
 
 use crate::backend::Backend;
-use crate::state::State;
+use crate::state::{RigidBody, State};
 use bus::context::NodeContext;
 use diagnostics::parameter::{ParameterError, refuse};
 use vehicles::{CommandMap, MotorModel, Vehicle};
@@ -19,7 +19,7 @@ const GRAVITY_M_S2: f64 = 9.806_65;
 /// The classic Runge-Kutta method of fourth order diverges where a pole times the step leaves a region that reaches to
 /// 2.785 on the real axis and 2.828 on the imaginary one (Hairer and Wanner, Solving Ordinary Differential Equations II,
 /// 1996, section IV.2); the circle of 2.5 about 0 lies within it on the left.
-const POLE_STEPS_MAX: f64 = 2.5;
+pub(crate) const POLE_STEPS_MAX: f64 = 2.5;
 /// A step as long as half a time constant errs by 0.02 % of the motion. Tuned, no source.
 const POLE_STEPS_ODD: f64 = 0.5;
 
@@ -165,6 +165,9 @@ fn first_not_finite(backend: &dyn Backend) -> Option<&'static str> {
         ("an attitude", body.attitude_WB.coords.as_slice()),
         ("a rotor speed", &speeds_rad_s),
     ];
+    if !backend.bodies().iter().all(RigidBody::is_finite) {
+        return Some("the motion of a free body");
+    }
     let mut found = found.into_iter();
     found.find_map(|(what, numbers)| numbers.iter().any(|number| !number.is_finite()).then_some(what))
 }
@@ -172,7 +175,7 @@ fn first_not_finite(backend: &dyn Backend) -> Option<&'static str> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{Airframe, FreeFlight, NewtonEuler, RigidBody};
+    use crate::{Airframe, FreeFlight, NewtonEuler};
     use bus::context::Warning;
     use nalgebra::Vector3;
 

@@ -89,6 +89,13 @@ impl Component for Plant {
             self.backend.settle_rotors(&inputs.command.command);
             self.set_body(measured);
         }
+        if let Some(number) = self.backend.bodies().iter().position(|body| !body.is_finite()) {
+            return Err(format!(
+                "the motion of the scene's free body {number}, counted from 0, is no number; look at the masses, speeds and \
+                 joints of the scene, or raise `substeps`"
+            )
+            .into());
+        }
         let outputs = Outputs::of(&*self.backend, context.time_ns());
         self.set_body(measured);
         Ok(outputs)

@@ -82,7 +82,9 @@ fn contact(backend: &dyn Backend) -> Contact {
 
 fn bodies(backend: &dyn Backend) -> BodyStates {
     let mut states = BodyStates { count: backend.bodies().len() as u32, ..Default::default() };
-    for (place, (body, object)) in backend.bodies().iter().zip(backend.body_objects()).enumerate() {
+    // A scene that was built in code may have more than a sample holds.
+    let places = 0..states.object.len();
+    for (place, (body, object)) in places.zip(backend.bodies().iter().zip(backend.body_objects())) {
         let [x, y, z, w] = body.attitude_WB.coords.into();
         states.object[place] = *object;
         states.position[place] = vector(&body.position_W_m);

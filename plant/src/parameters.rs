@@ -7,7 +7,7 @@ use crate::backend::Backend;
 use crate::effects::{self, Quantity};
 use crate::free_flight::FreeFlight;
 use crate::newton_euler::NewtonEuler;
-use crate::rapier::Rapier;
+use crate::rapier::{Misfit, Rapier};
 use crate::state::RigidBody;
 use bus::context::NodeContext;
 use diagnostics::parameter::{ParameterError, all, finite, positive, refuse, require};
@@ -158,7 +158,8 @@ impl Parameters {
         let vehicle = airframe.vehicle().clone();
         let effects = airframe.initial_state(run.seed, run.name, run.tick_s());
         let model = NewtonEuler::flying(airframe, self.substeps);
-        Ok((vehicle, self.fly(model, effects, &scene)?))
+        let dt_s = run.tick_s() / f64::from(self.substeps);
+        Ok((vehicle, self.fly(model, effects, &scene, dt_s)?))
     }
 
     fn fly(
@@ -166,13 +167,14 @@ impl Parameters {
         model: NewtonEuler,
         effects: AirframeState,
         scene: &Scene,
+        dt_s: f64,
     ) -> Result<Box<dyn Backend>, ParameterError> {
         let flies_freely = self.backend == BackendName::NewtonEuler;
         let has_bodies = scene.bodies().next().is_some() || !scene.joints.is_empty();
         refuse(flies_freely && has_bodies, "scene", || {
             let name = &scene.name;
             format!(
-                "`scene` \"{name}\" holds free bodies, which need `backend` = \"rapier\": newton-euler moves the vehicle \
+                "`scene` \"{name}\" holds free bodies or joints, which need `backend` = \"rapier\": newton-euler moves the vehicle \
                  alone"
             )
         })?;
@@ -188,7 +190,7 @@ impl Parameters {
                 let crash_speed_m_s = self.crash_speed_m_s.unwrap_or(CRASH_SPEED_M_S);
                 let mut rapier = Rapier::new(model, effects, scene, &self.start(), crash_speed_m_s);
                 self.refuse_inside(&rapier, scene)?;
-                self.refuse_bodies(&mut rapier, scene)?;
+                self.refuse_bodies(&mut rapier, scene, dt_s)?;
                 Ok(Box::new(rapier))
             }
         }
@@ -218,18 +220,16 @@ impl Parameters {
         })
     }
 
-    /// Refuses free bodies that start inside of something, and ropes that start longer than they are, unless a measured
-    /// flight says where the vehicle starts.
-    fn refuse_bodies(&self, rapier: &mut Rapier, scene: &Scene) -> Result<(), ParameterError> {
-        if self.window_s.is_some() {
-            return Ok(());
-        }
+    /// Refuses free bodies that start inside of something, and joints that do not fit; where a measured flight says where
+    /// the vehicle starts, only what it has no part in.
+    fn refuse_bodies(&self, rapier: &mut Rapier, scene: &Scene, dt_s: f64) -> Result<(), ParameterError> {
         let name = |object: u32| match object {
             0 => "the vehicle".to_owned(),
             1 => "the ground".to_owned(),
             _ => format!("\"{}\"", scene.name_of(object as usize - 2).unwrap_or_default()),
         };
-        let overlap = rapier.overlap();
+        let is_measured = self.window_s.is_some();
+        let overlap = rapier.overlap().filter(|both| !is_measured || !both.contains(&0));
         refuse(overlap.is_some(), "scene", || {
             let [first, second] = overlap.unwrap_or_default().map(name);
             format!(
@@ -238,16 +238,32 @@ impl Parameters {
                 scene.name, self.initial_position_m
             )
         })?;
-        let stretched = rapier.overstretched();
-        refuse(stretched.is_some(), "scene", || {
-            let (joint, over_m) = stretched.unwrap_or_default();
-            let rope = scene.joints.get(joint).map_or("", |joint| &joint.name);
-            format!(
-                "`scene` \"{}\" starts with the ends of \"{rope}\" {over_m:.4} m farther apart than its `length`, with the \
-                 vehicle at {:?}; move an end, or give it more",
-                scene.name, self.initial_position_m
-            )
-        })
+        let joint = |number: usize| scene.joints.get(number).map_or("", |joint| &joint.name);
+        let what = match rapier.misfit() {
+            Some(Misfit::Overstretched { joint: number, over_m }) if !is_measured => format!(
+                "starts with the ends of \"{}\" {over_m:.4} m farther apart than its `length`, with the vehicle at {:?}; \
+                 move an end, or give it more",
+                joint(number),
+                self.initial_position_m
+            ),
+            Some(Misfit::Parting { joint: number, rate }) => format!(
+                "starts with velocities that tear at \"{}\", by {rate:.4} m/s or rad/s; give its child the `velocity` and the \
+                 `angular_velocity` of one motion that the joint allows",
+                joint(number)
+            ),
+            // The pole times the step, as of a motor.
+            Some(Misfit::Damping { joint: number, per_s }) if per_s * dt_s > airworthy::POLE_STEPS_MAX => {
+                format!(
+                    "has a `damping` of \"{}\" that stops what it moves within {:.1e} s, which a step of {dt_s} s cannot follow; \
+                 give it less, at most {:.3} of that, or raise `substeps`",
+                    joint(number),
+                    per_s.recip(),
+                    airworthy::POLE_STEPS_MAX / (per_s * dt_s)
+                )
+            }
+            _ => return Ok(()),
+        };
+        Err(ParameterError::conflict("scene", format!("`scene` \"{}\" {what}", scene.name)))
     }
 
     fn start(&self) -> RigidBody {

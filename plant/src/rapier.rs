@@ -34,6 +34,7 @@ use crate::snapshot::{Snapshot, SnapshotError};
 use crate::state::{RigidBody, State};
 use contacts::Contacts;
 use free_bodies::FreeBodies;
+pub(crate) use free_bodies::Misfit;
 use hull::Hull;
 use nalgebra::{UnitQuaternion, Vector3};
 use scenes::{Rig, Scene};
@@ -106,9 +107,9 @@ impl Rapier {
             crash_speed_m_s,
             inertia_min_kg_m2: vehicle.inertia_kg_m2.symmetric_eigenvalues().min(),
             world: World::new(&hull, scene, free_bodies.tied_pairs()),
-            free_bodies,
             contacts: Contacts::new(1 + scene.thing_count() + TRAFFIC_MAX),
-            state: model.start(*body, 0.0),
+            state: model.start(free_bodies.carrier_at_start(), 0.0),
+            free_bodies,
             held: Held::default(),
             changed: Changed::default(),
             scratch: Scratch::new(),
@@ -132,9 +133,9 @@ impl Rapier {
         world.overlap(&state.body, &free_bodies.states)
     }
 
-    /// The place of the first rope among the scene's joints that is longer than it may be, and by how much.
-    pub(crate) fn overstretched(&self) -> Option<(usize, f64)> {
-        self.motion.free_bodies.overstretched(&self.motion.state.body)
+    /// What of the scene's joints cannot be meant, with the vehicle and the bodies where they are.
+    pub(crate) fn misfit(&self) -> Option<Misfit> {
+        self.motion.free_bodies.misfit(&self.motion.model, &self.motion.state.body)
     }
 
     /// Numbers that tell this scene and vehicle from others.
@@ -238,13 +239,14 @@ impl Backend for Rapier {
     }
 
     fn set_body(&mut self, body: &RigidBody) {
+        let before = self.motion.state.body;
         self.motion.state.body = *body;
         match self.motion.rig {
             Some(rig) => self.hang(&rig),
             None => self.put_down(),
         }
-        let vehicle = self.motion.state.body;
-        self.motion.free_bodies.hang_from(&vehicle);
+        let after = self.motion.state.body;
+        self.motion.free_bodies.carry(&before, &after);
         self.motion.held.clear();
         self.lean_on_support();
     }

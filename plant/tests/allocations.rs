@@ -80,3 +80,9 @@ fn only_the_search_for_contacts_takes_memory() {
         assert!(count <= most, "{name}: {count} times in 1000 ticks, expected {most} at most");
     }
 }
+
+#[test]
+fn what_hangs_on_a_rope_takes_memory_only_where_it_lies() {
+    let mut plant = rapier(scenes::reference::SLUNG_LOAD, Vector3::z() * 20.0);
+    assert_eq!(taken(&mut plant, hummingbird().hover_command() * 1.02, &[]), 0);
+}

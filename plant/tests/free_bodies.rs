@@ -101,7 +101,12 @@ fn a_hinge_turns_about_its_axis_alone_and_stops_at_its_limits() {
         ("angular_velocity", "[0, 0, 2]", "rad/s"),
         ("velocity", "[0, 1, 0]", "m/s"),
     ];
-    let limits = [("anchor", "[0, 0, 1.1]", "m"), ("axis", "[0, 0, 1]", "1"), ("upper", "60", "deg")];
+    let limits = [
+        ("anchor", "[0, 0, 1.1]", "m"),
+        ("axis", "[0, 0, 1]", "1"),
+        ("lower", "-90", "deg"),
+        ("upper", "60", "deg"),
+    ];
     let mut plant = plant(&[body("boxes", "door", &door), joint("revolute", ["world", "door"], &limits)]);
     for number in 1..=2_000_u32 {
         let found = tick(&mut plant);
@@ -164,7 +169,7 @@ fn a_rope_that_swings_keeps_its_energy_and_its_length() {
 }
 
 #[test]
-fn a_box_on_a_slope_of_friction_slides_as_coulomb_says_and_a_stack_stands() {
+fn a_box_slides_as_coulomb_says_and_a_stack_stands() {
     let boxed = |name: &str, z: &str| {
         let keys = [("centre", z, "m"), ("size", "[0.2, 0.2, 0.2]", "m"), ("mass", "1", "kg")];
         body("boxes", name, &keys)
@@ -204,6 +209,115 @@ fn balls_that_meet_head_on_pass_their_motion_on() {
         one.velocity_W_m_s.x.abs() < 1e-9 && (two.velocity_W_m_s.x - 2.0).abs() < 1e-9,
         "{one:?} {two:?}"
     );
+}
+
+#[test]
+fn a_load_that_the_ground_carries_in_part_leaves_the_rope_as_tight_as_the_rotors_pull() {
+    // Straight below the vehicle, the rope just taut, and the rotors lift 0.1 N more than the vehicle weighs.
+    let load = [("centre", "[0, 0, -0.63]", "m"), ("radius", "0.03", "m"), ("mass", "0.1", "kg")];
+    let rope = [("anchor", "[0, 0, 0]", "m"), ("end", "[0, 0, -0.6]", "m"), ("length", "0.6", "m")];
+    let parts = [body("balls", "load", &load), joint("rope", ["vehicle", "load"], &rope)];
+    let mut plant = plant_at(&parts, Vector3::z() * 0.66);
+    let vehicle = hummingbird();
+    let per_rotor_N = (vehicle.mass_kg * G_M_S2 + 0.1) / 4.0;
+    let command = vehicle.command.command((per_rotor_N / vehicle.thrust_coefficient).sqrt());
+    plant.settle_rotors(&[command; 4]);
+    for number in 0..1_000 {
+        plant.step(&[command; 4], TICK_S, &[]);
+        let (body, load) = (plant.state().body, plant.bodies()[0]);
+        assert!((load.position_W_m.z - 0.03).abs() < 1e-8, "tick {number}: {load:?}");
+        assert!((body.position_W_m.z - 0.66).abs() < 2e-6, "tick {number}: {body:?}");
+        // The rope takes the 0.1 N: what is felt is g.
+        let felt_m_s2 = plant.accelerations().specific_force_B_m_s2.z;
+        assert!(number < 5 || (felt_m_s2 - G_M_S2).abs() < 1e-6, "tick {number}: {felt_m_s2}");
+    }
+}
+
+#[test]
+fn what_happens_far_away_leaves_the_vehicles_flight_to_the_last_bit() {
+    let bouncing = [&BALL[..], &[("velocity", "[1, 0, 0]", "m/s")]].concat();
+    let mut plant = plant(&[body("balls", "ball", &bouncing) + "restitution = " + &given("0.9", "1") + "\n"]);
+    let model = NewtonEuler::new(hummingbird(), 2);
+    let effects = model.airframe().initial_state(0, "plant", TICK_S);
+    let mut free =
+        plant::FreeFlight::new(model, RigidBody::level_at(Vector3::new(100.0, 0.0, 50.0)), effects);
+    for _ in 0..3_000 {
+        let commands = [80.0, 80.5, 80.0, 79.5];
+        plant.step(&commands, TICK_S, &[]);
+        free.step(&commands, TICK_S, &[]);
+        assert_eq!(plant.state(), free.state());
+    }
+    assert!(plant.bodies()[0].position_W_m.z < 4.0, "it bounced");
+}
+
+#[test]
+fn two_that_fly_at_each_other_at_any_speed_meet() {
+    for speed_m_s in [3.0, 20.0, 120.0, 300.0] {
+        for off_m in [0.0, 0.013, 0.031, 0.047] {
+            let ball = |name: &str, sign: f64| {
+                let centre = format!("[{}, 0, 40]", -sign * (1.0 + off_m));
+                let velocity = format!("[{}, 0, 0]", sign * speed_m_s);
+                let keys = [
+                    ("centre", &*centre, "m"),
+                    ("radius", "0.02", "m"),
+                    BALL[2],
+                    ("velocity", &velocity, "m/s"),
+                ];
+                body("balls", name, &keys) + "restitution = " + &given("1", "1") + "\n"
+            };
+            let mut plant = plant(&[ball("left", 1.0), ball("right", -1.0)]);
+            after(&mut plant, 1.5 / speed_m_s);
+            let [left, right] = plant.bodies() else { panic!("two bodies") };
+            assert!(left.position_W_m.x < right.position_W_m.x, "{speed_m_s} m/s: {left:?} {right:?}");
+            assert!(
+                (left.velocity_W_m_s.x + speed_m_s).abs() < 1e-6 * speed_m_s,
+                "{speed_m_s} m/s: {left:?}"
+            );
+        }
+    }
+}
+
+#[test]
+fn a_ball_that_hits_the_vehicle_hands_its_motion_on_and_is_told() {
+    let ball = [
+        ("centre", "[-1, 0, 50]", "m"),
+        ("radius", "0.02", "m"),
+        ("mass", "0.05", "kg"),
+        ("velocity", "[3, 0, 0]", "m/s"),
+    ];
+    let mut plant = plant_at(&[body("balls", "ball", &ball)], Vector3::z() * 50.0);
+    let vehicle = hummingbird();
+    plant.settle_rotors(&[vehicle.hover_command(); 4]);
+    let mut most_N = 0.0_f64;
+    for number in 1..=300_u32 {
+        let ball = tick(&mut plant);
+        let body = plant.state().body;
+        let momentum = body.velocity_W_m_s * vehicle.mass_kg + ball.velocity_W_m_s * 0.05;
+        // Along the way of the ball nothing else pushes, while the vehicle is level.
+        if body.attitude_WB.angle() < 1e-6 {
+            assert!((momentum.x - 0.15).abs() < 1e-7, "tick {number}: {momentum:?}");
+        }
+        most_N = most_N.max(plant.contact().force_W_N.norm());
+    }
+    let contact = plant.contact();
+    assert_eq!((contact.began, contact.crashed), (1, false), "{contact:?}");
+    assert!(plant.state().body.velocity_W_m_s.x > 0.05, "{:?}", plant.state().body);
+    // At least its momentum in a tick.
+    assert!(most_N > 150.0, "{most_N} N");
+}
+
+#[test]
+fn a_vehicle_that_is_put_elsewhere_takes_along_what_hangs_from_it() {
+    let load = [("centre", "[0.5, 0, 0]", "m"), ("radius", "0.03", "m"), ("mass", "0.1", "kg")];
+    let rope = [("anchor", "[0, 0, 0]", "m"), ("end", "[0.5, 0, 0]", "m"), ("length", "0.6", "m")];
+    let parts = [body("balls", "load", &load), joint("rope", ["vehicle", "load"], &rope)];
+    let mut plant = plant_at(&parts, Vector3::z() * 50.0);
+    after(&mut plant, 1.0);
+    let arm_W_m = plant.bodies()[0].position_W_m - plant.state().body.position_W_m;
+    let elsewhere = RigidBody { position_W_m: Vector3::new(7.0, 8.0, 20.0), ..plant.state().body };
+    plant.set_body(&elsewhere);
+    let found_W_m = plant.bodies()[0].position_W_m - elsewhere.position_W_m;
+    assert!((found_W_m - arm_W_m).norm() < 1e-12, "{found_W_m:?}, not {arm_W_m:?}");
 }
 
 #[test]

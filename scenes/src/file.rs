@@ -2,7 +2,7 @@
 #![allow(non_snake_case, reason = "a trailing _W names the frame a vector is written in")]
 
 use crate::body::{self, Keys};
-use crate::joint;
+use crate::joint::{self, End};
 use crate::mesh::{Mesh, Solidity};
 use crate::mesh_file::Format;
 use crate::rig::{self, PLACE};
@@ -139,14 +139,16 @@ impl Scene {
         self.joints = joints;
         if let Some(place) = self.joint_that_pins_the_vehicle() {
             let expected = "a rope, where the world and the vehicle are tied together; a [rig] holds a vehicle otherwise";
+            let found = "another: its child is the vehicle, or hangs from it by other joints";
             return Err(doc.bad(
                 &sections[place].at_of("kind"),
                 &sections[place].key("kind"),
                 expected,
-                "another",
+                found,
             ));
         }
-        if let Some(first) = sections.first().filter(|_| self.rig.is_some() && self.is_vehicle_tied()) {
+        let tying = self.joints.iter().position(|joint| [joint.parent, joint.child].contains(&End::Vehicle));
+        if let Some(first) = tying.filter(|_| self.rig.is_some()).map(|place| &sections[place]) {
             let (expected, found) = ("a [rig] or joints to the vehicle", "both".to_owned());
             return Err(doc.bad(&first.at, &first.path, expected, found));
         }

@@ -195,5 +195,10 @@ fn axis<'t>(
             "beyond",
         ));
     }
+    let has_one = limits[0].is_finite() != limits[1].is_finite();
+    if has_one && bounds.unit == "rad" {
+        let expected = "both `lower` and `upper`, or neither: beyond half a turn nobody could say which side it came from";
+        return Err(refused(section, "axis", expected, "one of them"));
+    }
     Ok(Axis { along_W, limits })
 }

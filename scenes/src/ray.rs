@@ -93,7 +93,16 @@ impl RayCaster {
         still.chain(moving).fold(f64::INFINITY, f64::min)
     }
 
-    fn among(&self, bodies: &[BodyPose]) -> impl Iterator<Item = (&SharedShape, Pose)> {
+    /// Centre and radius of each ball, with the free bodies where `bodies` says: rays in a cone may pass a small one.
+    pub fn balls<'a>(&'a self, bodies: &'a [BodyPose]) -> impl Iterator<Item = (Vector3<f64>, f64)> + 'a {
+        let still = self.still.iter().map(|(shape, pose)| (shape, *pose));
+        still.chain(self.among(bodies)).filter_map(|(shape, pose)| {
+            let [x, y, z] = pose.translation.into();
+            Some((Vector3::new(x, y, z), shape.as_ball()?.radius))
+        })
+    }
+
+    fn among<'a>(&'a self, bodies: &'a [BodyPose]) -> impl Iterator<Item = (&'a SharedShape, Pose)> + 'a {
         self.bodies.iter().zip(bodies).map(|((shape, place), body)| (shape, pose(body) * *place))
     }
 }

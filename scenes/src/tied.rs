@@ -12,7 +12,7 @@ impl Scene {
         let is_in = |hangs: &[bool], end| match end {
             End::World => false,
             End::Vehicle => true,
-            End::Body(number) => hangs[number],
+            End::Body(number) => hangs.get(number).copied().unwrap_or_default(),
         };
         // A chain is as long as there are joints at most.
         for _ in &self.joints {
@@ -22,7 +22,9 @@ impl Scene {
                     if let (End::Body(number), true, true) =
                         (end, parent || child, joint.parent != End::World)
                     {
-                        hangs[number] = true;
+                        if let Some(hangs) = hangs.get_mut(number) {
+                            *hangs = true;
+                        }
                     }
                 }
             }
@@ -44,7 +46,7 @@ impl Scene {
             let hangs = match joint.child {
                 End::World => false,
                 End::Vehicle => true,
-                End::Body(number) => hangs[number],
+                End::Body(number) => hangs.get(number).copied().unwrap_or_default(),
             };
             joint.parent == End::World && hangs && !is_rope
         })

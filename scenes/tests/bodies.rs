@@ -111,6 +111,8 @@ fn what_no_joint_can_be_is_refused_with_its_key() {
     refused(&with(joint("revolute", "world", "load", &limits)), &["joints.0.lower", "starts at 0"]);
     let limits = axis("[0, 0, 1]") + &format!("upper = {}\n", given("200", "deg"));
     refused(&with(joint("revolute", "world", "load", &limits)), &["joints.0.upper"]);
+    let limits = axis("[0, 0, 1]") + &format!("upper = {}\n", given("60", "deg"));
+    refused(&with(joint("revolute", "world", "load", &limits)), &["joints.0.axis", "both", "lower"]);
     refused(&with(joint("ball", "world", "load", &axis("[0, 0, 1]"))), &["joints.0.axis"]);
     refused(&with(joint("rope", "world", "load", "")), &["joints.0.length"]);
     let damped = format!("damping = {}\n", given("1", "N*m*s/rad"));

@@ -93,10 +93,18 @@ impl RangeFinders {
         self.cones.each_ref().map(|cone| {
             let scene_m =
                 cone.scene_distance_m((&self.scene, &poses[..count]), &position_W_m, &attitude_WB, reach_m);
+            let balls_m = self.scene.balls(&poses[..count]).filter_map(|(centre_W_m, radius_m)| {
+                let centre_B_m = attitude_WB.inverse_transform_vector(&(centre_W_m - position_W_m));
+                cone.sphere_distance_m(&centre_B_m, radius_m)
+            });
             let vehicles_m = self.others(traffic, position_W_m, attitude_WB);
             let vehicles_m = vehicles_m
                 .filter_map(|centre_B_m| cone.sphere_distance_m(&centre_B_m, self.params.vehicle_radius_m));
-            vehicles_m.filter(|distance_m| *distance_m <= reach_m).chain(scene_m).reduce(f64::min)
+            vehicles_m
+                .chain(balls_m)
+                .filter(|distance_m| *distance_m <= reach_m)
+                .chain(scene_m)
+                .reduce(f64::min)
         })
     }
 
@@ -249,7 +257,7 @@ mod tests {
             Harness::<Sensing<RangeFinders>>::in_context(params.clone(), &context).map(|_| ())
         };
         let error = checked(&["state"]).unwrap_err().to_string();
-        assert!(error.contains("`bodies`") || error.contains("bodies"), "{error}");
+        assert!(error.contains("`bodies`"), "{error}");
         let mut finders = Harness::<Sensing<RangeFinders>>::in_context(
             params.clone(),
             &bus::context::NodeContext::new("range", &["state", "bodies"]),
@@ -267,6 +275,10 @@ mod tests {
             (0..200).map(read).last().unwrap()
         };
         assert!((read([0.0, 0.0, 1.2])[4] - 0.77).abs() < 1e-9);
+        let cone = Cone::new(Vector3::x_axis(), 5.0_f64.to_radians());
+        let aside_B_m = Vector3::new(3.0, 3.0 * libm::tan(2.0_f64.to_radians()), 0.05);
+        let ball_m = cone.sphere_distance_m(&aside_B_m, 0.02);
+        assert!(ball_m.is_some_and(|found_m| (found_m - aside_B_m.norm() + 0.02).abs() < 1e-9), "{ball_m:?}");
         let ahead = read([2.0, 0.0, 2.0]);
         assert!((ahead[0] - 1.97).abs() < 1e-9 && (ahead[4] - 2.0).abs() < 1e-9, "{ahead:?}");
     }

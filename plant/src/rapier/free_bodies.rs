@@ -4,7 +4,7 @@
 //! that keep their constraints (an index-1 DAE with its multipliers); what the order of the scheme leaves is projected away
 //! after the step, positions and velocities. A rope is a joint while it is taut and pulls.
 
-use super::body::{add_twist, lay_out, mobility, shift, twist};
+use super::body::{add_twist, mobility, shift, twist};
 use super::joint_forces::JointForces;
 use super::joints::Joint;
 use super::rig;
@@ -29,8 +29,11 @@ pub(super) const TAUT_M: f64 = 1e-6;
 /// A taut rope whose ends come nearer than this is not. Tuned, no source.
 const SLACKENING_M_S: f64 = 1e-9;
 
-/// Times that errors of the joints are projected away: each squares what is left.
+/// Times that errors of the joints' places are projected away: once would leave what is of second order. Tuned, no source.
 const PROJECTIONS: usize = 2;
+
+/// The weights of the classic Runge-Kutta scheme's stages.
+const WEIGHTS: [f64; 4] = [1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0];
 
 /// A free body as it is built.
 #[derive(Debug, Clone)]
@@ -63,6 +66,8 @@ pub(super) struct Work {
     pub free: Vec<RigidBody>,
     /// Which joints act: all but slack ropes.
     acting: Vec<bool>,
+    /// What each rope pulled with over the free step, N s; 0 of other joints.
+    pub pulls_N_s: Vec<f64>,
     stage: Vec<RigidBody>,
     rates: [Vec<BodyRates>; 4],
     accelerations: Vec<Vector6<f64>>,
@@ -75,6 +80,20 @@ pub(super) struct Carrier<'a> {
     pub rig: Option<&'a Rig>,
     pub actuation: &'a Actuation,
 }
+
+/// What a start or a joint cannot be.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum Misfit {
+    /// A rope is longer than it may be.
+    Overstretched { joint: usize, over_m: f64 },
+    /// What a joint ties moves apart, at a speed in m/s or rad/s.
+    Parting { joint: usize, rate: f64 },
+    /// The joint that is damped fastest, as a rate: it is for the step to tell whether that is too fast.
+    Damping { joint: usize, per_s: f64 },
+}
+
+/// Slower than this is rounding in a scene file, m/s or rad/s.
+const PARTING: f64 = 1e-6;
 
 impl FreeBodies {
     /// Those of `scene`, where its file puts them; `shift_B_m` is how far the vehicle's frame is from where its file has
@@ -91,7 +110,11 @@ impl FreeBodies {
             End::Vehicle => VEHICLE,
             End::Body(place) => FIRST_BODY + place,
         };
-        let joints = scene.joints.iter().map(|joint| {
+        // A scene that was built in code may name a body that is not there.
+        let is_there = |joint: &&scenes::Joint| {
+            [joint.parent, joint.child].into_iter().all(|end| number(end) < frames.len())
+        };
+        let joints = scene.joints.iter().filter(is_there).map(|joint| {
             let mut joint = Joint::new(joint, &frames, number);
             joint.shift(VEHICLE, shift_B_m);
             joint
@@ -123,36 +146,53 @@ impl FreeBodies {
 
     /// Numbers that tell these bodies and joints from others.
     pub(super) fn numbers(&self) -> Vec<f64> {
-        let builds =
-            self.builds.iter().flat_map(|build| build.inertia.iter().copied().chain([build.mass_kg]));
+        let builds = self.builds.iter().flat_map(|build| {
+            build.inertia.iter().copied().chain([build.mass_kg, f64::from(u8::from(build.hangs))])
+        });
         builds.chain(self.joints.iter().flat_map(Joint::numbers)).collect()
     }
 
-    /// Puts those that hang from the vehicle where they start as seen from it, moving as it does.
-    pub(super) fn hang_from(&mut self, vehicle: &RigidBody) {
-        for (build, state) in self.builds.iter().zip(&mut self.states).filter(|(build, _)| build.hangs) {
-            let start = &build.start;
-            let arm_W_m = vehicle.attitude_WB * (self.shift_B_m + start.position_W_m);
-            let spin_W_rad_s = vehicle.angular_velocity_W_rad_s();
-            let attitude_WB = vehicle.attitude_WB * start.attitude_WB;
+    /// Where the vehicle has to be for what hangs from it to be where its file puts it.
+    pub(super) fn carrier_at_start(&self) -> RigidBody {
+        RigidBody::level_at(-self.shift_B_m)
+    }
+
+    /// Moves those that hang from the vehicle along with it, as if all were one body: it was put from `before` to `after`.
+    pub(super) fn carry(&mut self, before: &RigidBody, after: &RigidBody) {
+        let turn = after.attitude_WB * before.attitude_WB.inverse();
+        let [spun_W_rad_s, spin_W_rad_s] = [before, after].map(RigidBody::angular_velocity_W_rad_s);
+        for (_, state) in self.builds.iter().zip(&mut self.states).filter(|(build, _)| build.hangs) {
+            let arm_W_m = state.position_W_m - before.position_W_m;
+            let own_W_m_s = state.velocity_W_m_s - before.velocity_W_m_s - spun_W_rad_s.cross(&arm_W_m);
+            let own_W_rad_s = state.angular_velocity_W_rad_s() - spun_W_rad_s;
+            let carried_W_m = turn * arm_W_m;
+            let attitude_WB = turn * state.attitude_WB;
             *state = RigidBody {
-                position_W_m: vehicle.position_W_m + arm_W_m,
-                velocity_W_m_s: vehicle.velocity_W_m_s
-                    + spin_W_rad_s.cross(&arm_W_m)
-                    + vehicle.attitude_WB * start.velocity_W_m_s,
-                attitude_WB,
-                angular_velocity_B_rad_s: start.angular_velocity_B_rad_s
-                    + attitude_WB.inverse_transform_vector(&spin_W_rad_s),
+                position_W_m: after.position_W_m + carried_W_m,
+                velocity_W_m_s: after.velocity_W_m_s + spin_W_rad_s.cross(&carried_W_m) + turn * own_W_m_s,
+                attitude_WB: UnitQuaternion::new_normalize(attitude_WB.into_inner()),
+                angular_velocity_B_rad_s: attitude_WB
+                    .inverse_transform_vector(&(spin_W_rad_s + turn * own_W_rad_s)),
             };
         }
     }
 
-    /// The first joint, a rope, that is longer than it may be with the vehicle here, and by how much.
-    pub(super) fn overstretched(&self, vehicle: &RigidBody) -> Option<(usize, f64)> {
-        let mut frames = Vec::new();
-        lay_out(vehicle, &self.states, &mut frames);
-        let over_m = |joint: &Joint| -joint.slack(&frames).map_or(0.0, |(slack_m, _)| slack_m);
-        self.joints.iter().map(over_m).enumerate().find(|(_, over_m)| *over_m > TAUT_M)
+    /// What of the joints cannot be meant, with the vehicle here: a place among them, and by how much.
+    pub(super) fn misfit(&self, model: &NewtonEuler, vehicle: &RigidBody) -> Option<Misfit> {
+        let mut forces = JointForces::default();
+        self.see(model, vehicle, &self.states, &mut forces);
+        let over_m = |joint: &Joint| -joint.slack(forces.frames()).map_or(0.0, |(slack_m, _)| slack_m);
+        let over_m = self.joints.iter().map(over_m).enumerate().find(|(_, over_m)| *over_m > TAUT_M);
+        if let Some((joint, over_m)) = over_m {
+            return Some(Misfit::Overstretched { joint, over_m });
+        }
+        let rigid: Vec<bool> = self.joints.iter().map(|joint| !joint.is_rope()).collect();
+        forces.lay(&self.joints, &rigid);
+        if let Some((joint, rate)) = forces.fastest_row().filter(|(_, rate)| *rate > PARTING) {
+            return Some(Misfit::Parting { joint, rate });
+        }
+        let (joint, per_s) = forces.fastest_damping(&self.joints)?;
+        Some(Misfit::Damping { joint, per_s })
     }
 
     /// The bodies as impulses see them.
@@ -181,6 +221,8 @@ impl FreeBodies {
         work: &mut Work,
     ) -> State {
         self.find_taut(carrier, vehicle, work);
+        work.pulls_N_s.clear();
+        work.pulls_N_s.resize(self.joints.len(), 0.0);
         let mut ks: [Option<Rates>; 4] = [None; 4];
         for (stage, share) in [0.0, 0.5, 0.5, 1.0].into_iter().enumerate() {
             let before = stage.saturating_sub(1);
@@ -195,6 +237,8 @@ impl FreeBodies {
                 work.stage.push(moved);
             }
             ks[stage] = Some(self.rates(carrier, &state, stage, work));
+            let Work { forces, pulls_N_s, .. } = &mut *work;
+            forces.add_pulls(WEIGHTS[stage] * span_s, &self.joints, pulls_N_s);
         }
         let [Some(k1), Some(k2), Some(k3), Some(k4)] = &ks else { return *vehicle };
         let sum = k1.plus(k2, 2.0).plus(k3, 2.0).plus(k4, 1.0);

@@ -1,23 +1,18 @@
 //! The impulses of all joints at once: those that take the rates of their rows to what is wanted.
 //!
 //! With the Jacobian J of all rows and the bodies' mobility W they are the solution of (J W Jᵀ) λ = wanted, whose matrix is
-//! symmetric and positive definite. Forces over accelerations, and shifts over distances, are found the same way.
-#![allow(
-    clippy::disallowed_types,
-    reason = "how many rows there are is known at run time; a Cholesky decomposition and its solution go column by column, \
-              without a product of matrices whose kernel suits the processor"
-)]
-
+//! symmetric and positive semidefinite. Forces over accelerations, and shifts over distances, are found the same way.
 use super::body::lay_out;
 use super::joints::{Joint, Line};
 use crate::state::RigidBody;
-use nalgebra::{Cholesky, DMatrix, DVector, Matrix6, Vector6};
+use nalgebra::{Matrix6, Vector6};
 
-/// What is added to the diagonal of the joints' matrix, over itself: joints that say one thing twice, as a closed chain in
-/// a plane does, share its force. Tuned, no source.
-const SHARED: f64 = 1e-12;
+/// A row of which the others leave less than this part says what they say already, as in a closed chain in a plane: it
+/// gets no force. Tuned, no source.
+const REDUNDANT: f64 = 1e-12;
 
 /// Joints and what they tie, as they are at one instant. Kept from step to step, so that it takes no memory.
+#[derive(Default)]
 pub(super) struct JointForces {
     /// The world, the vehicle and the bodies.
     frames: Vec<RigidBody>,
@@ -27,24 +22,10 @@ pub(super) struct JointForces {
     damped: Vec<(Line, f64)>,
     /// What the impulse of each row changes the twists of its ends by.
     answers: Vec<[Vector6<f64>; 2]>,
-    matrix: DMatrix<f64>,
-    impulses: DVector<f64>,
+    /// J W Jᵀ, row by row, and then its Cholesky factor in the lower triangle.
+    matrix: Vec<f64>,
+    impulses: Vec<f64>,
     scratch: Vec<Line>,
-}
-
-impl Default for JointForces {
-    fn default() -> Self {
-        Self {
-            frames: Vec::new(),
-            mobilities: Vec::new(),
-            lines: Vec::new(),
-            damped: Vec::new(),
-            answers: Vec::new(),
-            matrix: DMatrix::zeros(0, 0),
-            impulses: DVector::zeros(0),
-            scratch: Vec::new(),
-        }
-    }
 }
 
 impl JointForces {
@@ -82,29 +63,16 @@ impl JointForces {
     /// Finds the impulses that change the rate of each row by what is `wanted`.
     pub(super) fn find(&mut self, wanted: impl Fn(&Line, &[RigidBody]) -> f64) {
         let count = self.lines.len();
-        // Taken out, since solving takes it; a matrix of the same size takes no memory.
-        let mut matrix = std::mem::replace(&mut self.matrix, DMatrix::zeros(0, 0));
-        if matrix.nrows() != count {
-            matrix = DMatrix::zeros(count, count);
-            self.impulses = DVector::zeros(count);
-        }
+        let mut matrix = std::mem::take(&mut self.matrix);
+        matrix.clear();
         for row in 0..count {
-            for column in 0..=row {
-                let coupling = self.coupling(row, column);
-                matrix[(row, column)] = coupling;
-                matrix[(column, row)] = coupling;
-            }
-            matrix[(row, row)] *= 1.0 + SHARED;
-            self.impulses[row] = wanted(&self.lines[row].1, &self.frames);
+            matrix.extend((0..count).map(|column| self.coupling(row, column)));
         }
-        match Cholesky::new(matrix) {
-            Some(factors) => {
-                factors.solve_mut(&mut self.impulses);
-                self.matrix = factors.unpack_dirty();
-            }
-            // What is no number, which ends the run when it is published.
-            None => self.impulses.fill(0.0),
-        }
+        self.impulses.clear();
+        self.impulses.extend(self.lines.iter().map(|(_, line)| wanted(line, &self.frames)));
+        factorise(&mut matrix, count);
+        substitute(&matrix, &mut self.impulses);
+        self.matrix = matrix;
     }
 
     /// By how much an impulse of the row `column` changes the rate of the row `row`.
@@ -123,7 +91,7 @@ impl JointForces {
 
     /// Tells of each row's ends by how much its impulse changes them.
     pub(super) fn push(&self, mut change: impl FnMut(usize, &Vector6<f64>)) {
-        for (((_, line), answer), impulse) in self.lines.iter().zip(&self.answers).zip(self.impulses.iter()) {
+        for (((_, line), answer), impulse) in self.lines.iter().zip(&self.answers).zip(&self.impulses) {
             for (end, answer) in line.ends.iter().zip(answer) {
                 change(*end, &(answer * *impulse));
             }
@@ -137,6 +105,40 @@ impl JointForces {
         pushing.max_by(|(_, one), (_, other)| one.total_cmp(other)).map(|((joint, _), _)| *joint)
     }
 
+    /// Adds the force of each rope, times `weight`, to its place among `pulls`: how hard it pulls its ends together.
+    pub(super) fn add_pulls(&self, weight: f64, joints: &[Joint], pulls: &mut [f64]) {
+        for ((joint, _), impulse) in self.lines.iter().zip(&self.impulses) {
+            if joints[*joint].is_rope() {
+                pulls[*joint] -= weight * impulse;
+            }
+        }
+    }
+
+    /// The joint whose damping is the fastest against the inertia of what it moves, and its rate, 1/s.
+    pub(super) fn fastest_damping(&mut self, joints: &[Joint]) -> Option<(usize, f64)> {
+        let mut fastest: Option<(usize, f64)> = None;
+        for (number, joint) in joints.iter().enumerate() {
+            self.damped.clear();
+            joint.damped(&self.frames, &mut self.damped);
+            for (line, damping) in &self.damped {
+                let yields = [0, 1]
+                    .map(|at| line.jacobian[at].dot(&(self.mobilities[line.ends[at]] * line.jacobian[at])));
+                let rate = damping * (yields[0] + yields[1]);
+                if fastest.is_none_or(|(_, known)| rate > known) {
+                    fastest = Some((number, rate));
+                }
+            }
+        }
+        fastest
+    }
+
+    /// The joint whose rows move apart fastest, and how fast, m/s or rad/s.
+    pub(super) fn fastest_row(&self) -> Option<(usize, f64)> {
+        let rate = |line: &Line| line.rate(|end| super::body::twist(&self.frames[end])).abs();
+        let rows = self.lines.iter().map(|(joint, line)| (*joint, rate(line)));
+        rows.max_by(|(_, one), (_, other)| one.total_cmp(other))
+    }
+
     /// Adds what the damping of the joints does to the accelerations.
     pub(super) fn damp(&mut self, joints: &[Joint], accelerations: &mut [Vector6<f64>]) {
         let Self { frames, mobilities, damped, .. } = self;
@@ -148,5 +150,36 @@ impl JointForces {
                 accelerations[*end] += mobilities[*end] * jacobian * against;
             }
         }
+    }
+}
+
+/// The Cholesky factor L of a matrix of `count` rows, in the place of its lower triangle; a redundant row's diagonal is
+/// infinite.
+fn factorise(matrix: &mut [f64], count: usize) {
+    for row in 0..count {
+        let own = matrix[row * count + row];
+        for column in 0..=row {
+            let known: f64 =
+                (0..column).map(|at| matrix[row * count + at] * matrix[column * count + at]).sum();
+            let left = matrix[row * count + column] - known;
+            matrix[row * count + column] = match column == row {
+                false => left / matrix[column * count + column],
+                true if left <= REDUNDANT * own => f64::INFINITY,
+                true => left.sqrt(),
+            };
+        }
+    }
+}
+
+/// Solves L Lᵀ x = b; `solution` is b before.
+fn substitute(factor: &[f64], solution: &mut [f64]) {
+    let count = solution.len();
+    for row in 0..count {
+        let known: f64 = (0..row).map(|at| factor[row * count + at] * solution[at]).sum();
+        solution[row] = (solution[row] - known) / factor[row * count + row];
+    }
+    for row in (0..count).rev() {
+        let known: f64 = (row + 1..count).map(|at| factor[at * count + row] * solution[at]).sum();
+        solution[row] = (solution[row] - known) / factor[row * count + row];
     }
 }

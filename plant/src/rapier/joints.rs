@@ -112,7 +112,7 @@ impl Joint {
         }
     }
 
-    /// Whether it keeps the two from touching each other: all joints do but ropes.
+    /// Whether it is a rope: all others keep two bodies from touching each other.
     pub(super) fn is_rope(&self) -> bool {
         matches!(self.motion, Way::Rope { .. })
     }
@@ -128,7 +128,9 @@ impl Joint {
         let ends = self.ends.map(|end| end as f64);
         let anchors = self.anchors_m.map(<[f64; 3]>::from).concat();
         let more = [axis.x, axis.y, axis.z, limits[0], limits[1], self.damping];
-        ends.into_iter().chain(anchors).chain(more).chain([self.along.len() as f64, self.about.len() as f64])
+        let start = <[f64; 4]>::from(self.start.coords);
+        let held = [self.along.len() as f64, self.about.len() as f64];
+        ends.into_iter().chain(anchors).chain(more).chain(held).chain(start)
     }
 
     fn placed(&self, frames: &[RigidBody]) -> Placed {

@@ -91,7 +91,7 @@ impl Row {
         first + second
     }
 
-    fn push(&self, all: &mut [Body], impulse_N_s: f64) {
+    pub(super) fn push(&self, all: &mut [Body], impulse_N_s: f64) {
         for (body, answer) in self.bodies.iter().zip(&self.answer) {
             all[*body].twist += answer * impulse_N_s;
         }

@@ -74,6 +74,8 @@ pub(super) struct Scratch {
     before: Vec<Body>,
     /// The same, where they are.
     frames: Vec<RigidBody>,
+    /// Places of ropes among the constraints, and among the joints.
+    ropes: Vec<[usize; 2]>,
     free_bodies: Work,
 }
 
@@ -166,10 +168,12 @@ impl Motion {
         let uncut = free.state;
         let (mut left_s, mut cuts, mut is_pushed) = (span_s, 0, false);
         loop {
-            if !free.state.body.is_finite() || self.is_clear(&free.state.body, left_s, others) {
+            let is_finite =
+                free.state.body.is_finite() && scratch.free_bodies.free.iter().all(RigidBody::is_finite);
+            if !is_finite || self.is_clear(&free.state.body, left_s, others) {
                 // What is no number ends the run when it is published.
                 move_on(others, left_s);
-                self.fly_freely(free.state);
+                self.fly_freely(free.state, &scratch.free_bodies.free);
                 break;
             }
             self.look_around(scratch, &free, left_s, others);
@@ -180,9 +184,10 @@ impl Motion {
                     break;
                 }
                 Some(0.0) => {
-                    is_pushed = true;
+                    let before = twist(&self.state.body);
                     // One that does not come to an end would not the next time either.
                     cuts = if self.impact(scratch, slow_m_s) { cuts + 1 } else { IMPACTS_MAX };
+                    is_pushed |= twist(&self.state.body) != before;
                 }
                 Some(after_s) => {
                     let free = self.free(&mut scratch.free_bodies, actuation, after_s);
@@ -246,9 +251,10 @@ impl Motion {
         shift(body, &mounted.back(&off_W_m));
     }
 
-    fn fly_freely(&mut self, free: State) {
+    fn fly_freely(&mut self, free: State, bodies: &[RigidBody]) {
         self.contacts.note(&self.state.body, std::iter::empty(), self.crash_speed_m_s);
         self.held.clear();
+        self.free_bodies.states.copy_from_slice(bodies);
         self.state = free;
     }
 
@@ -277,11 +283,13 @@ impl Motion {
 
     /// Finds what is near, and makes a constraint of each point and each stop.
     fn look_around(&mut self, scratch: &mut Scratch, free: &Free, span_s: f64, others: &[Neighbour]) {
-        let Scratch { near, constraints, now, then, frames, free_bodies: Work { free: ends, .. }, .. } =
-            scratch;
+        let Scratch { near, constraints, now, then, frames, ropes, free_bodies, .. } = scratch;
+        let ends = &free_bodies.free;
         let fastest_other_m_s = others.iter().map(|other| other.velocity_W_m_s.norm()).fold(0.0, f64::max);
         let way_m = self.way_m(&free.state.body, span_s) + span_s * fastest_other_m_s;
-        let way_m = way_m + self.bodies_way_m(ends, span_s);
+        // Two that fly at each other.
+        let bodies_m = self.bodies_way_m(ends, span_s);
+        let way_m = (way_m + bodies_m).max(2.0 * bodies_m);
         let margin_m = (MARGIN_M + way_m).min(MARGIN_MAX_M);
         let states = &self.free_bodies.states;
         self.world.find_near(&self.state.body, others, margin_m, near);
@@ -295,7 +303,14 @@ impl Motion {
         }
         if !self.free_bodies.joints.is_empty() {
             lay_out(&self.state.body, states, frames);
-            self.free_bodies.joints.iter().for_each(|joint| joint.stops(now, frames, constraints));
+            ropes.clear();
+            for (number, joint) in self.free_bodies.joints.iter().enumerate() {
+                let first = constraints.len();
+                joint.stops(now, frames, constraints);
+                if joint.is_rope() && constraints.len() > first {
+                    ropes.push([first, number]);
+                }
+            }
         }
     }
 
@@ -375,6 +390,7 @@ impl Motion {
             vehicle.twist += vehicle.mobility * friction;
         }
         self.tie(scratch, &free.state.body, true);
+        scratch.let_ropes_yield();
         let is_found = scratch.solve();
         self.note(scratch);
         self.hold(scratch, is_found);
@@ -395,7 +411,11 @@ impl Motion {
         self.push_out(scratch, span_s);
         let mut body = self.state.body;
         self.project(&mut body);
+        let before = twist(&body);
         self.free_bodies.project_rigid(&self.model, &mut body, &mut scratch.free_bodies);
+        let [velocity_W_m_s, spin_W_rad_s] = part(&(twist(&body) - before));
+        self.changed.velocity_W_m_s += velocity_W_m_s;
+        self.changed.spin_W_rad_s += spin_W_rad_s;
         self.state.body = body;
         is_pushed
     }
@@ -449,7 +469,7 @@ impl Motion {
         // The largest part s of the way to what was found at which the energy is that of before: a s^2 + 2 b s + c = 0.
         let (a, b) = (self.energy_J(more, more), self.energy_J(dull, more));
         let c = self.energy_J(dull, dull) - start_J;
-        let part = (((b * b - a * c).max(0.0).sqrt() - b) / a).clamp(0.0, 1.0);
+        let part = if a > 0.0 { (((b * b - a * c).max(0.0).sqrt() - b) / a).clamp(0.0, 1.0) } else { 0.0 };
         for (dull, more) in dull.iter_mut().zip(&*more) {
             dull.twist += more.twist * part;
         }
@@ -595,6 +615,20 @@ impl Scratch {
         }
         self.then.clone_from(&self.before);
         solver::solve(&mut self.then, &mut self.constraints, &self.joints) < FOUND_M_S
+    }
+
+    /// Hands what ropes pulled with over the free step to their stops, which may pull less where contacts carry: so that the
+    /// ends part no faster than they did. Where nothing else pushes, that leaves all as it is.
+    fn let_ropes_yield(&mut self) {
+        for [constraint, joint] in &self.ropes {
+            let pull_N_s = self.free_bodies.pulls_N_s[*joint];
+            if pull_N_s > 0.0 {
+                let stop = &mut self.constraints[*constraint];
+                stop.bound_m_s = stop.normal.rate(&self.then);
+                stop.normal.push(&mut self.then, -pull_N_s);
+                stop.impulse_N_s = pull_N_s;
+            }
+        }
     }
 
     /// Takes all impulses away.
