@@ -283,7 +283,7 @@ fn a_ball_that_hits_the_vehicle_hands_its_motion_on_and_is_told() {
         ("centre", "[-1, 0, 50]", "m"),
         ("radius", "0.02", "m"),
         ("mass", "0.05", "kg"),
-        ("velocity", "[3, 0, 0]", "m/s"),
+        ("velocity", "[3, 0, 1.158]", "m/s"),
     ];
     let mut plant = plant_at(&[body("balls", "ball", &ball)], Vector3::z() * 50.0);
     let vehicle = hummingbird();
