@@ -166,6 +166,28 @@ mod tests {
     }
 
     #[test]
+    fn free_bodies_need_rapier_and_a_vehicle_of_their_own() {
+        let scene = "scenes/slung-load.toml";
+        let at = |x_m: f64| json!({ "initial_position_m": [x_m, 0.0, 0.06] });
+        assert_eq!(checked(scene, at(0.0), &["bodies"]), Ok(()));
+        for (more, ports, told) in [
+            (json!({ "backend": "newton-euler" }), &["command"][..], "free bodies"),
+            (json!({}), &["command", "traffic"], "`traffic`"),
+        ] {
+            let error = checked(scene, more, ports).unwrap_err().to_string();
+            assert!(error.contains("`scene`") && error.contains(told), "{error}");
+        }
+        let error = checked("scenes/ground.toml", json!({}), &["bodies"]).unwrap_err().to_string();
+        assert!(error.contains("`bodies`"), "{error}");
+        // In front of the drawer, which the vehicle's disc is in.
+        let error = checked("scenes/workshop.toml", at(0.25), &[]);
+        assert_eq!(error, Ok(()));
+        let inside = json!({ "initial_position_m": [0.25, 1.7, 0.1] });
+        let error = checked("scenes/workshop.toml", inside, &[]).unwrap_err().to_string();
+        assert!(error.contains("the vehicle") && error.contains("\"drawer\""), "{error}");
+    }
+
+    #[test]
     fn substeps_have_a_least_and_a_most() {
         let with = |substeps: u32| checked("scenes/ground.toml", json!({ "substeps": substeps }), &[]);
         assert_eq!((with(1), with(1000)), (Ok(()), Ok(())));

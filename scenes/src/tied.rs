@@ -16,16 +16,13 @@ impl Scene {
         };
         // A chain is as long as there are joints at most.
         for _ in &self.joints {
-            for joint in &self.joints {
-                let (parent, child) = (is_in(&hangs, joint.parent), is_in(&hangs, joint.child));
+            for joint in self.joints.iter().filter(|joint| joint.parent != End::World) {
+                if !is_in(&hangs, joint.parent) && !is_in(&hangs, joint.child) {
+                    continue;
+                }
                 for end in [joint.parent, joint.child] {
-                    if let (End::Body(number), true, true) =
-                        (end, parent || child, joint.parent != End::World)
-                    {
-                        if let Some(hangs) = hangs.get_mut(number) {
-                            *hangs = true;
-                        }
-                    }
+                    let End::Body(number) = end else { continue };
+                    hangs.iter_mut().skip(number).take(1).for_each(|hangs| *hangs = true);
                 }
             }
         }

@@ -157,14 +157,14 @@ impl JointForces {
 /// infinite.
 fn factorise(matrix: &mut [f64], count: usize) {
     for row in 0..count {
-        let own = matrix[row * count + row];
+        let diagonal = matrix[row * count + row];
         for column in 0..=row {
             let known: f64 =
                 (0..column).map(|at| matrix[row * count + at] * matrix[column * count + at]).sum();
             let left = matrix[row * count + column] - known;
             matrix[row * count + column] = match column == row {
                 false => left / matrix[column * count + column],
-                true if left <= REDUNDANT * own => f64::INFINITY,
+                true if left <= REDUNDANT * diagonal => f64::INFINITY,
                 true => left.sqrt(),
             };
         }
