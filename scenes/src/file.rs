@@ -136,6 +136,16 @@ impl Scene {
         let names: Vec<&str> = self.bodies().filter_map(|(number, _)| self.name_of(number)).collect();
         let joints = sections.iter().map(|section| joint::parse(section, &names));
         let joints = Diagnostic::gather(joints)?;
+        let is_twice = |place: &usize| joints[..*place].iter().any(|joint| joint.name == joints[*place].name);
+        if let Some(place) = (0..joints.len()).find(is_twice) {
+            let (expected, found) = ("a name of its own", format!("a second \"{}\"", joints[place].name));
+            return Err(doc.bad(
+                &sections[place].at_of("name"),
+                &sections[place].key("name"),
+                expected,
+                found,
+            ));
+        }
         self.joints = joints;
         if let Some(place) = self.joint_that_pins_the_vehicle() {
             let expected = "a rope, where the world and the vehicle are tied together; a [rig] holds a vehicle otherwise";
@@ -168,26 +178,35 @@ impl Scene {
 
 /// Refuses more things or free bodies than there are numbers for, and two bodies of one name.
 fn check_numbers(doc: &Document, scene: &Scene) -> Result<(), Diagnostic> {
-    let refused = |expected: String, found| Err(doc.bad(&(0..0), "mass", expected, found));
+    let refused = |key: &str, expected: String, found| Err(doc.bad(&(0..0), key, expected, found));
     let (things, bodies) = (scene.thing_count(), scene.bodies().count());
     if things > THINGS_MAX {
         return refused(
-            format!("at most {THINGS_MAX} of all together"),
+            "boxes",
+            format!("at most {THINGS_MAX}, with meshes and balls"),
             format!("{things} boxes, meshes and balls"),
         );
     }
     if bodies > BODIES_MAX {
-        return refused(format!("at most {BODIES_MAX} with a `mass`"), format!("{bodies} free bodies"));
+        return refused(
+            "mass",
+            format!("a key of at most {BODIES_MAX} things"),
+            format!("{bodies} free bodies"),
+        );
     }
     let taken = |name: &&str| ["world", "vehicle"].contains(name);
     if let Some(name) = scene.bodies().filter_map(|(number, _)| scene.name_of(number)).find(taken) {
-        return refused("another name: joints mean something else by it".to_owned(), format!("\"{name}\""));
+        return refused(
+            "name",
+            "another: joints mean something else by it".to_owned(),
+            format!("\"{name}\""),
+        );
     }
     let mut names: Vec<_> = scene.bodies().filter_map(|(number, _)| scene.name_of(number)).collect();
     names.sort_unstable();
     match names.windows(2).find(|pair| pair[0] == pair[1]) {
         Some(pair) => {
-            refused("a name of its own for each free body".to_owned(), format!("two \"{}\"", pair[0]))
+            refused("name", "one of its own for each free body".to_owned(), format!("two \"{}\"", pair[0]))
         }
         None => Ok(()),
     }

@@ -188,17 +188,20 @@ fn axis<'t>(
     let limits = [stop("lower", f64::NEG_INFINITY)?, stop("upper", f64::INFINITY)?];
     let key = if limits[0] > 0.0 { "lower" } else { "upper" };
     if limits[0] > 0.0 || limits[1] < 0.0 {
+        let found = format!("{} to {} {}", limits[0], limits[1], bounds.unit);
         return Err(refused(
             section,
             key,
-            "`lower` at most 0 and `upper` at least 0: a joint starts at 0",
-            "beyond",
+            "such that `lower` is at most 0 and `upper` at least 0: a joint starts at 0",
+            &found,
         ));
     }
     let has_one = limits[0].is_finite() != limits[1].is_finite();
     if has_one && bounds.unit == "rad" {
-        let expected = "both `lower` and `upper`, or neither: beyond half a turn nobody could say which side it came from";
-        return Err(refused(section, "axis", expected, "one of them"));
+        let given = if limits[0].is_finite() { "lower" } else { "upper" };
+        let expected =
+            "one of two limits: beyond half a turn nobody could say from which side a single one is met";
+        return Err(refused(section, given, expected, "it alone; give the other too, or neither"));
     }
     Ok(Axis { along_W, limits })
 }

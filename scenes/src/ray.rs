@@ -23,6 +23,7 @@ pub struct RayCaster {
     still: Vec<(SharedShape, Pose)>,
     /// The free bodies' shapes, seen from their centres of mass.
     bodies: Vec<(SharedShape, Pose)>,
+    objects: Vec<u32>,
     /// Where the free bodies start.
     starts: Vec<BodyPose>,
 }
@@ -43,7 +44,14 @@ impl RayCaster {
                 }
             }
         }
-        Self { still, bodies, starts }
+        let objects = scene.bodies().map(|(number, _)| 2 + number as u32).collect();
+        Self { still, bodies, objects, starts }
+    }
+
+    /// What contacts call its free bodies, in their order: 2 + i of the scene's thing i.
+    #[must_use]
+    pub fn body_objects(&self) -> &[u32] {
+        &self.objects
     }
 
     /// Whether something of it moves.

@@ -57,8 +57,8 @@ fn what_hangs_from_the_vehicle_is_found_along_chains_and_not_through_the_world()
         heavy("a"),
         heavy("b"),
         heavy("c"),
-        joint("ball", "b", "a", ""),
-        joint("ball", "vehicle", "b", ""),
+        joint("ball", "b", "a", "").replace("\"joint\"", "\"one\""),
+        joint("ball", "vehicle", "b", "").replace("\"joint\"", "\"two\""),
         joint("ball", "world", "c", ""),
     ];
     let scene = scene(&parts).unwrap();
@@ -112,12 +112,18 @@ fn what_no_joint_can_be_is_refused_with_its_key() {
     let limits = axis("[0, 0, 1]") + &format!("upper = {}\n", given("200", "deg"));
     refused(&with(joint("revolute", "world", "load", &limits)), &["joints.0.upper"]);
     let limits = axis("[0, 0, 1]") + &format!("upper = {}\n", given("60", "deg"));
-    refused(&with(joint("revolute", "world", "load", &limits)), &["joints.0.axis", "both", "lower"]);
+    refused(&with(joint("revolute", "world", "load", &limits)), &["joints.0.upper", "give the other"]);
     refused(&with(joint("ball", "world", "load", &axis("[0, 0, 1]"))), &["joints.0.axis"]);
     refused(&with(joint("rope", "world", "load", "")), &["joints.0.length"]);
     let damped = format!("damping = {}\n", given("1", "N*m*s/rad"));
     refused(&with(joint("fixed", "world", "load", &damped)), &["joints.0.damping"]);
     refused(&with(joint("ball", "world", "vehicle", "")), &["joints.0.kind", "rope"]);
-    let chain = [body(), joint("ball", "vehicle", "load", ""), joint("ball", "world", "load", "")];
+    let twice = [body(), joint("ball", "world", "load", ""), joint("ball", "world", "load", "")];
+    refused(&twice, &["joints.1.name", "second"]);
+    let chain = [
+        body(),
+        joint("ball", "vehicle", "load", ""),
+        joint("ball", "world", "load", "").replace("\"joint\"", "\"other\""),
+    ];
     refused(&chain, &["joints.1.kind", "rope"]);
 }

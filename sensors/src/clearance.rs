@@ -1,7 +1,7 @@
 //! The clearance node: how far a vehicle truly is from what stands in the scene. It is no sensor: a judge reads it,
 //! and plots; controllers have no port for it.
 
-use crate::cone::{caster, check_bodies};
+use crate::cone::{caster, check_bodies, check_told};
 use crate::wire::body_poses;
 use bus::component::{Component, Info, StepError};
 use bus::context::{NodeContext, StepContext};
@@ -105,6 +105,7 @@ impl Component for ClearanceJudge {
         inputs: Inputs<'_>,
         state: &mut ClearanceState,
     ) -> Result<Outputs, StepError> {
+        check_told(&self.caster, inputs.bodies)?;
         let (poses, count) = body_poses(inputs.bodies);
         Ok(Outputs { clearance: self.clearance(state, &inputs.state.position, &poses[..count]) })
     }

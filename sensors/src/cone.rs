@@ -6,7 +6,9 @@
 //! cone is seen at most 0.09 h² of its distance too far: 0.07 % at 5°. Vehicles are spheres, whose distance to a cone is
 //! known without rays, and so is that of balls.
 
+use bus::component::StepError;
 use bus::context::NodeContext;
+use bus::messages::BodyStates;
 use diagnostics::parameter::{ParameterError, refuse};
 use nalgebra::{Rotation3, Unit, UnitQuaternion, Vector3};
 use scenes::{BodyPose, RayCaster, Scene};
@@ -42,6 +44,24 @@ pub fn check_bodies(scene: &RayCaster, run: &NodeContext<'_>) -> Result<(), Para
         "scene",
         || "the input `bodies` needs a scene in which something has a `mass`: name the plant's scene, or leave it out",
     )
+}
+
+/// Refuses free bodies of another scene than this; a sample without any came before the plant's first.
+///
+/// # Errors
+/// They are others.
+pub fn check_told(scene: &RayCaster, told: Option<&BodyStates>) -> Result<(), StepError> {
+    let Some(told) = told.filter(|told| told.count > 0) else { return Ok(()) };
+    let count = (told.count as usize).min(told.object.len());
+    if told.object[..count] == *scene.body_objects() {
+        return Ok(());
+    }
+    Err(format!(
+        "the input `bodies` tells of the things {:?}, and those that move in the parameter `scene` are {:?}: name the plant's scene",
+        &told.object[..count],
+        scene.body_objects()
+    )
+    .into())
 }
 
 /// A cone about a body axis.

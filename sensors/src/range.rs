@@ -9,13 +9,13 @@
 //! angle of incidence; a real beam that grazes a smooth floor or wall hears none.
 
 use crate::channel::{Chance, QUEUE};
-use crate::cone::{Cone, caster, check_bodies};
+use crate::cone::{Cone, caster, check_bodies, check_told};
 use crate::parameters::within;
 use crate::sensing::Sensor;
 use crate::steps::in_steps;
 use crate::wire::{attitude, body_poses, vector};
 use bus::InputPorts;
-use bus::component::Info;
+use bus::component::{Info, StepError};
 use bus::context::NodeContext;
 use bus::messages::{BodyStates, PlantState, Ranges, Traffic};
 use bus::random::normal;
@@ -176,6 +176,10 @@ impl Sensor for RangeFinders {
         check_bodies(&self.scene, run)
     }
 
+    fn check_inputs(&self, inputs: &RangeInputs<'_>) -> Result<(), StepError> {
+        check_told(&self.scene, inputs.bodies)
+    }
+
     /// Until the first measurement arrives, nothing is met.
     fn initial(&self) -> RangeState {
         let nothing = Ranges { distance: [self.params.reach_m; BEAMS], ..Default::default() };
@@ -266,6 +270,10 @@ mod tests {
         // The load, 3 cm in radius, hangs 0.8 m below, and is 2 m ahead later.
         let state = at([0.0, 0.0, 2.0], 0.0, 0.0, 0.0);
         let mut bodies = BodyStates { count: 1, ..Default::default() };
+        let inputs = RangeInputs { state: &state, traffic: None, bodies: Some(&bodies) };
+        let error = finders.step(inputs).unwrap_err().to_string();
+        assert!(error.contains("the plant's scene"), "{error}");
+        bodies.object[0] = 2;
         let mut read = |position: [f64; 3]| {
             bodies.position[0] = position.into();
             let read = |_| {

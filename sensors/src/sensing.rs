@@ -111,6 +111,14 @@ pub trait Sensor: TryFrom<Self::Parameters, Error: Into<ParameterError>> {
         Ok(())
     }
 
+    /// Refuses inputs that do not go with its parameters.
+    ///
+    /// # Errors
+    /// Which, and what to do.
+    fn check_inputs(&self, _inputs: &Self::Inputs<'_>) -> Result<(), StepError> {
+        Ok(())
+    }
+
     /// What it measures after `last`, at the times when it does; `None` where there is nothing to measure.
     fn measure(
         &self,
@@ -175,6 +183,7 @@ impl<S: Sensor> Component for Sensing<S> {
         inputs: S::Inputs<'_>,
         state: &mut S::State,
     ) -> Result<S::Outputs, StepError> {
+        self.sensor.check_inputs(&inputs)?;
         let arrived = self.channel.measure(context.time_ns(), state, |state, last, chance| {
             let measured = self.sensor.measure(state, last, chance, inputs);
             Measurement::sent(measured, last, chance)

@@ -74,8 +74,9 @@ fn of_recording(path: &Path, name: Option<&str>) -> Result<Body> {
     let attached = Attached::to(&open_recording(path)?)?;
     let (names, path) = (attached.names(), path.display());
     let name = match name {
-        Some(name) if !names.is_empty() && !names.contains(&name) => {
-            bail!("the recording {path} has no vehicle `{name}`; it has {}", names.join(", "))
+        Some(name) if !names.contains(&name) => {
+            let known = if names.is_empty() { "one without a name".to_owned() } else { names.join(", ") };
+            bail!("the recording {path} has no vehicle `{name}`; it has {known}")
         }
         None if names.len() > 1 => {
             bail!("the recording {path} has {}: choose one with --vehicle", names.join(", "))
