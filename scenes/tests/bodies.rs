@@ -88,7 +88,7 @@ fn what_no_body_can_be_is_refused_with_its_key() {
     refused(&[mass("1e9")], &["balls.0.mass"]);
     let speed = format!("velocity = {}\n", given("[1, 0, 0]", "m/s"));
     refused(&[ball("load", &speed)], &["balls.0.velocity"]);
-    refused(&[heavy("load"), heavy("load")], &["a name of its own", "load"]);
+    refused(&[heavy("load"), heavy("load")], &["`name`", "one of its own", "load"]);
     refused(&[heavy("vehicle")], &["vehicle"]);
     refused(&[heavy("world")], &["world"]);
     let many: Vec<_> = (0..17).map(|number| heavy(&format!("body {number}"))).collect();
