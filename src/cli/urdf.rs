@@ -71,10 +71,16 @@ fn of_file(path: &Path) -> Result<Body> {
 }
 
 fn of_recording(path: &Path, name: Option<&str>) -> Result<Body> {
-    let attached = Attached::to(&open_recording(path)?)?;
+    let recording = open_recording(path)?;
+    let attached = Attached::to(&recording)?;
+    // Of one without a manifest the topics tell.
+    let has_topics = |name: &str| {
+        let prefix = format!("/{name}/");
+        recording.topics().keys().any(|topic| topic.starts_with(&prefix))
+    };
     let (names, path) = (attached.names(), path.display());
     let name = match name {
-        Some(name) if !names.contains(&name) => {
+        Some(name) if !names.contains(&name) && (!names.is_empty() || !has_topics(name)) => {
             let known = if names.is_empty() { "one without a name".to_owned() } else { names.join(", ") };
             bail!("the recording {path} has no vehicle `{name}`; it has {known}")
         }
