@@ -202,6 +202,7 @@ pub fn align(problem: &mut Problem) -> Vec<(String, Offsets)> {
     let of_fit: Vec<Found> =
         clocks[..problem.estimation.len()].iter().filter_map(|shift| shift.attitude).collect();
     let shared = Found::mean(&of_fit);
+    problem.shared_late_s = shared.late_s;
     let least_s = problem.least_delay_s() / 2.0;
     let mut offsets = Vec::new();
     for (flight, shift) in problem.estimation.iter_mut().chain(&mut problem.validation).zip(clocks) {

@@ -34,6 +34,8 @@ pub struct Problem<'f> {
     pub weights: Weights,
     /// Length of the blocks that count as independent.
     pub block_s: f64,
+    /// What the attitudes of all flights are late by according to the gyroscopes, in s: where a fit of their delay starts.
+    pub shared_late_s: f64,
     /// Whether each flight has a trim of its own: then the means of the angular accelerations do not count.
     pub has_own_trims: bool,
 }

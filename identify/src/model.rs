@@ -46,14 +46,15 @@ impl Model {
     /// The rotors of `flight` under these values. Where speeds were measured, the difference to what follows from the
     /// commands is smoothed before it is believed: the noise of a sensor, differentiated, would pass for spin-up.
     pub fn rotors(&self, flight: &Prepared, values: &[f64]) -> Rotors {
+        let pose_s = SensorErrors::of(&self.parameters, values).pose_delay_s;
         if flight.flight.command.is_empty() {
-            let flown = measured_rotors(flight);
+            let flown = measured_rotors(flight, pose_s);
             return Rotors { commanded: flown.iter().map(|rotors| rotors.map(speed)).collect(), flown };
         }
-        let mut flown = spun(&self.airframe(values), flight);
+        let mut flown = spun(&self.airframe(values), flight, pose_s);
         let commanded: Vec<[f64; 4]> = flown.iter().map(|rotors| rotors.map(speed)).collect();
         if !flight.flight.rotor_speed.is_empty() {
-            correct(flight, &commanded, &mut flown);
+            correct(flight, pose_s, &commanded, &mut flown);
         }
         Rotors { flown, commanded }
     }
@@ -137,8 +138,8 @@ impl Model {
                     // correlated with the residual's, and every delay would come out too long.
                     let mut back = values.to_vec();
                     back[parameter] -= step;
-                    let ahead = self.residual(flight, &self.tracks(flight, &changed), &rotors, &changed);
-                    let behind = self.residual(flight, &self.tracks(flight, &back), &rotors, &back);
+                    let (ahead, behind) =
+                        (self.residual_under(flight, &changed), self.residual_under(flight, &back));
                     return ahead.iter().zip(&behind).map(|(a, b)| (a - b) / (2.0 * step)).collect();
                 }
                 Stage::Rotors => self.residual(flight, &tracks, &self.rotors(flight, &changed), &changed),
@@ -172,13 +173,13 @@ fn air(airframe: &Airframe, step_s: f64) -> Actuation {
 }
 
 /// The rotors that follow from the commands: simulated in fine steps, averaged over one step about each instant.
-fn spun(airframe: &Airframe, flight: &Prepared) -> Vec<[RotorState; 4]> {
+fn spun(airframe: &Airframe, flight: &Prepared, pose_s: f64) -> Vec<[RotorState; 4]> {
     let clock = &flight.layout.clock;
     let parts = (clock.step_s / MOTOR_STEP_S - 1e-9).ceil().max(1.0) as usize;
     let step_s = clock.step_s / parts as f64;
     let mut commands = Held::new(&flight.flight.command);
     // Counted, not summed up: over half an hour a sum drifts past a sample, and the command would be a tick late.
-    let start_s = clock.at(0) - clock.step_s / 2.0;
+    let start_s = clock.at(0) - clock.step_s / 2.0 - pose_s;
     let at_s = |step: usize| start_s + step as f64 * step_s;
     let first = commands.at(start_s);
     let mut memory = airframe.initial_state(0, "identify", step_s);
@@ -188,7 +189,9 @@ fn spun(airframe: &Airframe, flight: &Prepared) -> Vec<[RotorState; 4]> {
     for index in 0..clock.count {
         let mut sum = [RotorState::default(); 4];
         for part in 0..parts {
-            let command = commands.at(at_s(index * parts + part));
+            let (from_s, to_s) = (at_s(index * parts + part), at_s(index * parts + part + 1));
+            // Where the grid does not lie on the commands' own, a step sees two of them.
+            let command = commands.mean(from_s, to_s);
             let actuation = airframe.begin_tick(&mut memory, &state, &command, step_s);
             let after = airframe.spun(&actuation, &state.rotors, step_s);
             let half = 0.5 / parts as f64;
@@ -209,8 +212,8 @@ fn speed(rotor: RotorState) -> f64 {
 
 /// Adds to rotors that follow from the commands by how much the measured ones turn faster. Their acceleration stays that
 /// of the commands: even of a smoothed measurement it would be noise for the most part.
-fn correct(flight: &Prepared, commanded: &[[f64; 4]], rotors: &mut [[RotorState; 4]]) {
-    let mut difference = Track::sampled(&flight.flight.rotor_speed, 0.0, &flight.layout.clock);
+fn correct(flight: &Prepared, pose_s: f64, commanded: &[[f64; 4]], rotors: &mut [[RotorState; 4]]) {
+    let mut difference = Track::sampled(&flight.flight.rotor_speed, -pose_s, &flight.layout.clock);
     for (difference, commanded) in difference.values.iter_mut().zip(commanded) {
         *difference = std::array::from_fn(|i| difference[i] - commanded[i]);
     }
@@ -222,9 +225,9 @@ fn correct(flight: &Prepared, commanded: &[[f64; 4]], rotors: &mut [[RotorState;
     }
 }
 
-fn measured_rotors(flight: &Prepared) -> Vec<[RotorState; 4]> {
+fn measured_rotors(flight: &Prepared, pose_s: f64) -> Vec<[RotorState; 4]> {
     let clock = &flight.layout.clock;
-    let track = Track::sampled(&flight.flight.rotor_speed, 0.0, clock);
+    let track = Track::sampled(&flight.flight.rotor_speed, -pose_s, clock);
     let slopes = track.slope(BOX_STEPS, clock.step_s);
     let rotor = |speed_rad_s, acceleration_rad_s2| RotorState { speed_rad_s, acceleration_rad_s2 };
     let rotors = track.values.iter().zip(&slopes);

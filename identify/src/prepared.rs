@@ -196,21 +196,25 @@ impl<'f> Prepared<'f> {
     }
 
     /// What was measured, with the pose late by `pose_s` and the inertial unit by `imu_s`.
+    ///
+    /// The instants are those of the pose's stamps, so that another delay of the pose moves all but the pose: how a slow
+    /// and noisy channel's samples lie on the grid decides how much noise their interpolation leaves, and a fit would
+    /// move them to where that is least.
     pub fn tracks(&self, pose_s: f64, imu_s: f64) -> Tracks {
         let (flight, clock) = (self.flight, &self.layout.clock);
-        let position_s = pose_s + self.late.position_s;
-        let position = Track::sampled(&flight.position, position_s, clock);
-        let velocity_track = Track::sampled(&flight.velocity, pose_s + self.late.velocity_s, clock);
+        let imu_s = imu_s - pose_s;
+        let position = Track::sampled(&flight.position, self.late.position_s, clock);
+        let velocity_track = Track::sampled(&flight.velocity, self.late.velocity_s, clock);
         let velocity = if flight.velocity.is_empty() {
             position.slope(BOX_STEPS, clock.step_s)
         } else {
             velocity_track.values.clone()
         };
-        let attitude = attitudes(&Track::sampled(&flight.attitude, pose_s + self.late.attitude_s, clock));
+        let attitude = attitudes(&Track::sampled(&flight.attitude, self.late.attitude_s, clock));
         let turning = turning(&attitude, clock.step_s);
         let gyroscope = Track::sampled(&flight.angular_velocity, imu_s, clock);
         let force = Track::sampled(&flight.specific_force, imu_s, clock);
-        let speeds = Track::sampled(&flight.rotor_speed, 0.0, clock);
+        let speeds = Track::sampled(&flight.rotor_speed, -pose_s, clock);
         let rates = if flight.angular_velocity.is_empty() {
             Track { values: turning.clone(), valid: Vec::new() }.smoothed(BOX_STEPS / 2)
         } else {
@@ -377,6 +381,27 @@ impl<'c> Held<'c> {
             self.next += 1;
         }
         self.channel.values[self.next.saturating_sub(1)]
+    }
+
+    /// The mean of what holds from `from_s` to `to_s`; times have to grow from call to call.
+    pub fn mean(&mut self, from_s: f64, to_s: f64) -> [f64; 4] {
+        let (mut at_s, mut sum) = (from_s, [0.0; 4]);
+        loop {
+            let value = self.at(at_s);
+            let end_s = self.channel.time_s.get(self.next).copied().unwrap_or(f64::INFINITY);
+            if end_s >= to_s - SLACK_S {
+                let part = (to_s - at_s) / (to_s - from_s);
+                // One that holds all the time is not rounded.
+                return if at_s == from_s {
+                    value
+                } else {
+                    std::array::from_fn(|i| sum[i] + part * value[i])
+                };
+            }
+            let part = (end_s - at_s) / (to_s - from_s);
+            sum.iter_mut().zip(value).for_each(|(sum, value)| *sum += part * value);
+            at_s = end_s;
+        }
     }
 }
 

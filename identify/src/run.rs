@@ -213,7 +213,9 @@ pub fn problem<'f>(
     let block_s = (total_s / 40.0).clamp(0.5, 2.0);
     let model = Model { vehicle: vehicle.clone(), parameters };
     let weights = Weights::new();
-    Ok((Problem { model, estimation, validation, weights, block_s, has_own_trims: false }, reports))
+    let problem =
+        Problem { model, estimation, validation, weights, block_s, shared_late_s: 0.0, has_own_trims: false };
+    Ok((problem, reports))
 }
 
 fn no_flight(set: &FlightSet, role: Role) -> IdentifyError {

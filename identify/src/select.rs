@@ -20,6 +20,7 @@
 use crate::candidate::{Candidate, free_parameters};
 use crate::fit::{FitResult, Problem};
 use crate::normal::{self, Block};
+use crate::sensor_effects::POSE_DELAY;
 use plant::effects::EffectKind;
 use rand_core::{Rng, SeedableRng};
 use rayon::prelude::*;
@@ -297,9 +298,11 @@ fn fitted(problem: &Problem, base: &FitResult, accepted: &[Candidate], candidate
     all.extend(&candidate.free);
     let mut start = base.values.clone();
     let mut least = base.estimation_cost();
-    for values in candidate.kind.guesses {
+    let by_clocks: &[f64] = &[problem.shared_late_s];
+    let more = (*candidate.kind == POSE_DELAY).then_some(by_clocks);
+    for values in candidate.kind.guesses.iter().copied().chain(more) {
         let mut tried = base.values.clone();
-        candidate.free.iter().zip(*values).for_each(|(at, value)| tried[*at] = *value);
+        candidate.free.iter().zip(values).for_each(|(at, value)| tried[*at] = *value);
         let cost = problem.costs(&problem.estimation, &tried).iter().sum::<f64>();
         // The parts of a product have no slope at zero, so some other start is taken in any case.
         if cost < least || (start == base.values && candidate.free.len() > 1) {
