@@ -69,6 +69,7 @@ impl<'a> Layout<'a> {
     fn of(quantity: Quantity, entry: &'a Entry, vehicle: &Vehicle) -> Result<Self, LogError> {
         let frame = entry.frame.unwrap_or_default();
         let (names, euler) = named(quantity, entry)?;
+        let pole_pairs = pole_pairs(quantity, entry)?;
         let (factor, offset) = match (quantity, entry.unit.as_deref()) {
             (Quantity::Attitude, unit) if euler => (factor(ANGLE, unit)?, 0.0),
             (Quantity::Attitude, None) => (1.0, 0.0),
@@ -76,7 +77,7 @@ impl<'a> Layout<'a> {
                 let range = vehicle.command.max - vehicle.command.min;
                 (factor(quantity.dimension(), Some(unit))? * range, vehicle.command.min)
             }
-            (_, unit) => (factor(quantity.dimension(), unit)?, 0.0),
+            (_, unit) => (factor(quantity.dimension(), unit)? / pole_pairs, 0.0),
         };
         Ok(Self { quantity, names, euler, factor, offset, frame })
     }
@@ -146,6 +147,18 @@ fn named(quantity: Quantity, entry: &Entry) -> Result<(&[String], bool), LogErro
         Ok((names, entry.euler.is_some()))
     } else {
         refused(key, &format!("{size} names"), &names.len().to_string(), "correct it")
+    }
+}
+
+/// How many times faster than the rotor its electrical field turns; 1 where the log has mechanical speeds.
+fn pole_pairs(quantity: Quantity, entry: &Entry) -> Result<f64, LogError> {
+    let at = Spot::Key("pole_pairs");
+    match entry.pole_pairs {
+        Some(_) if quantity != Quantity::RotorSpeed => {
+            Err(LogError::unexpected(at, "`rotor_speed` alone to have it", "it", "remove it"))
+        }
+        Some(0) => Err(LogError::unexpected(at, "half the number of a motor's magnets", "0", "correct it")),
+        pairs => Ok(f64::from(pairs.unwrap_or(1))),
     }
 }
 

@@ -95,6 +95,8 @@ pub struct Entry {
     pub unit: Option<String>,
     /// Frames of the numbers in the log.
     pub frame: Option<Frame>,
+    /// By what electrical rotor speeds are divided: half the number of a motor's magnets.
+    pub pole_pairs: Option<u32>,
 }
 
 /// The frames of a log's vectors and attitudes: those of the body, then those of the world.

@@ -106,7 +106,12 @@ pub fn complete(log: &dyn Log, quantity: Quantity, entry: &Entry) -> Result<Entr
         LogError::unexpected(Spot::Key("topic"), "a type known to hold it", found, "add `fields` and `unit`")
     })?;
     let default = known.entry(topic);
-    Ok(Entry { unit: entry.unit.clone().or(default.unit), frame: entry.frame.or(default.frame), ..default })
+    Ok(Entry {
+        unit: entry.unit.clone().or(default.unit),
+        frame: entry.frame.or(default.frame),
+        columns: default.columns,
+        ..entry.clone()
+    })
 }
 
 /// The channels of a log for which the flights file declares none: for each quantity the preferred type that

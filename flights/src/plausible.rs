@@ -57,6 +57,10 @@ const POSITION_MISTAKES: [Mistake<[f64; 3]>; 4] = [
     ("a `-` before y of the position", |[x, y, z]| [x, -y, z]),
     ("a `-` before x and y of the position", |[x, y, z]| [-x, -y, z]),
 ];
+/// What hover needs is known within this factor.
+const ROTOR_SPEED_TOLERANCE: f64 = 1.6;
+/// How many pole pairs motors of vehicles have.
+const POLE_PAIRS: std::ops::RangeInclusive<f64> = 2.0..=24.0;
 /// Voltages that a battery of a vehicle can have, from one cell to fourteen.
 const VOLTAGE_RANGE_V: (f64, f64) = (2.0, 62.0);
 
@@ -369,8 +373,36 @@ impl Judge<'_> {
         if !(hover.is_finite() && hover > 0.0) {
             return None;
         }
-        let by_unit = self.by_unit(Quantity::RotorSpeed, factor, 1.6, &what);
-        by_unit.filter(|finding| finding.fits.is_some() || !(0.5..2.0).contains(&factor))
+        let quantity = Quantity::RotorSpeed;
+        let found = self.by_unit(quantity, factor, ROTOR_SPEED_TOLERANCE, &what)?;
+        if let Some(mechanical) = self.mechanical(factor) {
+            return Some(finding(quantity, either(found.fits, Some(mechanical)), &what));
+        }
+        let is_near = (0.5..2.0).contains(&factor);
+        match found.fits {
+            None if is_near => None,
+            None => Some(finding(quantity, None, &format!("{what}{}", self.hint_of_poles(factor)))),
+            Some(_) => Some(found),
+        }
+    }
+
+    /// That the log has mechanical speeds, where they are divided by pole pairs and would be right without.
+    fn mechanical(&self, factor: f64) -> Option<String> {
+        let pairs = self.declared(Quantity::RotorSpeed)?.pole_pairs.filter(|pairs| *pairs > 1)?;
+        let is_near = libm::log(factor * f64::from(pairs)).abs() < libm::log(ROTOR_SPEED_TOLERANCE);
+        is_near.then(|| "mechanical speeds, without `pole_pairs`,".to_owned())
+    }
+
+    /// How many there are is known of the motor, and not from a hover that is known but roughly.
+    fn hint_of_poles(&self, factor: f64) -> String {
+        let declared = self.declared(Quantity::RotorSpeed).and_then(|entry| entry.pole_pairs).unwrap_or(1);
+        let pairs = factor * f64::from(declared);
+        if !POLE_PAIRS.contains(&pairs) {
+            return String::new();
+        }
+        format!(
+            "; electrical speeds need `pole_pairs`, half the number of a motor's magnets, here about {pairs:.0}"
+        )
     }
 
     /// The voltage is one that batteries have.

@@ -197,6 +197,35 @@ fn rotor_speeds_are_compared_with_hover() {
 }
 
 #[test]
+fn electrical_rotor_speeds_are_divided_by_the_pole_pairs() {
+    let vehicle = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../vehicles/hummingbird.toml");
+    let hover = vehicles::Vehicle::load(&vehicle).unwrap().hover_speed_rad_s();
+    let rpm = 60.0 / std::f64::consts::TAU;
+    let electrical = Motion { command_unit: 7.0 * hover / 101.5 * rpm, ..Motion::default() };
+    let channels = CHANNELS.replace("command =", "rotor_speed =").replace("\"count\"", "\"rpm\"");
+    let declared = |keys: &str| channels.replace("\"rpm\"", &format!("\"rpm\"{keys}"));
+    let flight = read(&electrical, &declared(", pole_pairs = 7"), "").unwrap();
+    assert!((flight.rotor_speed.values[0][0] / (hover * 100.0 / 101.5) - 1.0).abs() < 1e-9);
+    assert_eq!(flight.notes, [""; 0]);
+    let notes = read(&electrical, &channels, "").unwrap().notes;
+    assert!(
+        notes.len() == 1 && notes[0].contains("`pole_pairs`") && notes[0].contains("about 7"),
+        "{notes:?}"
+    );
+    let mechanical = Motion { command_unit: hover / 101.5 * rpm, ..Motion::default() };
+    let found = findings(&mechanical, &declared(", pole_pairs = 7"));
+    let [(Quantity::RotorSpeed, fits)] = &found[..] else { panic!("{found:?}") };
+    assert_eq!(fits, "`unit = \"rad/s\"` here or mechanical speeds, without `pole_pairs`,");
+    let zero = refused(&declared(", pole_pairs = 0"), "");
+    assert!(
+        zero.contains("flights.toml:4:") && zero.contains("`pole_pairs`") && zero.contains("magnets"),
+        "{zero}"
+    );
+    let of_rates = CHANNELS.replace("\"rad/s\"", "\"rad/s\", pole_pairs = 7");
+    assert!(refused(&of_rates, "").contains("expected `rotor_speed` alone"));
+}
+
+#[test]
 fn a_quaternion_with_w_first_or_the_wrong_way_is_found() {
     let w_first = CHANNELS.replace("\"qx\", \"qy\", \"qz\", \"qw\"", "\"qw\", \"qx\", \"qy\", \"qz\"");
     let found = findings(&Motion::default(), &w_first);
