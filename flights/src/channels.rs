@@ -1,7 +1,10 @@
 //! From the numbers of a log to a channel in SI units and our frames.
 
+use std::borrow::Cow;
+
 use vehicles::Vehicle;
 
+use crate::arrays;
 use crate::declaration::{Entry, Frame};
 use crate::error::{LogError, Spot};
 use crate::flight::Channel;
@@ -24,7 +27,7 @@ pub fn read<const N: usize>(
     is_trusted: bool,
 ) -> Result<Read<N>, LogError> {
     let layout = Layout::of(quantity, entry, vehicle)?;
-    let samples = signed_samples(log, entry.topic.as_deref(), layout.names)?;
+    let samples = signed_samples(log, entry.topic.as_deref(), &layout.names)?;
     if !is_trusted {
         layout.check_angles(&samples.rows)?;
     }
@@ -57,7 +60,7 @@ fn signed_samples(log: &dyn Log, topic: Option<&str>, names: &[String]) -> Resul
 /// Which numbers of the log make a sample, and how.
 struct Layout<'a> {
     quantity: Quantity,
-    names: &'a [String],
+    names: Cow<'a, [String]>,
     euler: bool,
     /// What a number is multiplied by, and what is added then.
     factor: f64,
@@ -121,8 +124,9 @@ impl<'a> Layout<'a> {
     }
 }
 
-/// The names that `entry` gives for a sample of `quantity`, and whether they are Euler angles.
-fn named(quantity: Quantity, entry: &Entry) -> Result<(&[String], bool), LogError> {
+/// The names that `entry` gives for a sample of `quantity`, those of its parts for an array, and whether they are Euler
+/// angles.
+fn named(quantity: Quantity, entry: &Entry) -> Result<(Cow<'_, [String]>, bool), LogError> {
     let refused = |key, expected: &str, found: &str, advice| {
         Err(LogError::unexpected(Spot::Key(key), expected, found, advice))
     };
@@ -143,11 +147,17 @@ fn named(quantity: Quantity, entry: &Entry) -> Result<(&[String], bool), LogErro
         }
         (None, None) => return refused("columns", "this or `fields`", "neither", "add them"),
     };
-    if names.len() == size {
-        Ok((names, entry.euler.is_some()))
-    } else {
-        refused(key, &format!("{size} names"), &names.len().to_string(), "correct it")
-    }
+    let names = match &names[..] {
+        // The array as a whole.
+        [array] if size > 1 => Cow::Owned(arrays::parts(array, size)),
+        names if names.len() == size => Cow::Borrowed(names),
+        names => {
+            let expected =
+                if size > 1 { format!("{size} names, or that of an array") } else { "1 name".to_owned() };
+            return refused(key, &expected, &names.len().to_string(), "correct it");
+        }
+    };
+    Ok((names, entry.euler.is_some()))
 }
 
 /// How many times faster than the rotor its electrical field turns; 1 where the log has mechanical speeds.

@@ -200,6 +200,13 @@ pub enum Spot {
     Named(&'static str, String),
     /// A key of the channel.
     Key(&'static str),
+    /// A cell of a table.
+    Cell {
+        /// Its line, from 1.
+        line: u64,
+        /// The name of its column.
+        column: String,
+    },
 }
 
 impl std::fmt::Display for Spot {
@@ -209,6 +216,7 @@ impl std::fmt::Display for Spot {
             Self::Byte(offset) => write!(f, "byte {offset}: "),
             Self::Named(kind, name) => write!(f, "{kind} `{name}`: "),
             Self::Key(key) => write!(f, "`{key}`: "),
+            Self::Cell { line, column } => write!(f, "line {line}, column `{column}`: "),
         }
     }
 }

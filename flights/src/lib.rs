@@ -7,7 +7,7 @@
 //! | `declaration`, `document` | what a flights file says, and where |
 //! | `quantity`, `frame` | units and frames |
 //! | `log` | what every log can do: samples of numbers by name |
-//! | `formats` | the formats of logs: `csv_log`, `mcap_log`, `ulog`, `crazyflie`, `bytes` |
+//! | `formats` | the formats of logs: `csv_log`, `mcap_log`, `ulog`, `crazyflie`, `bytes`, `arrays` |
 //! | `known_types` | messages whose fields and units need not be said |
 //! | `channels`, `clean`, `jumps`, `reading` | from a log's numbers to a flight |
 //! | `plausible`, `agreement` | values against physics |
@@ -18,6 +18,7 @@
 //! | `error` | what can be wrong |
 
 mod agreement;
+mod arrays;
 mod bytes;
 mod canonical;
 mod channels;

@@ -283,7 +283,14 @@ fn wrong_files_are_refused_with_line_and_advice() {
     );
     said(refused(&CHANNELS.replace("position", "positon"), ""), &["flights.toml:5:", "positon", "position"]);
     said(refused(&CHANNELS.replace("time =", "# time ="), ""), &["no channel `time`", "add `time"]);
-    said(refused(&CHANNELS.replace("[\"px\", \"py\", ", "["), ""), &["`columns`: expected 3 names, found 1"]);
+    said(
+        refused(&CHANNELS.replace("[\"px\", \"py\", ", "[\"py\", "), ""),
+        &["`columns`: expected 3 names, or that of an array, found 2"],
+    );
+    said(
+        refused(&CHANNELS.replace("[\"px\", \"py\", ", "["), ""),
+        &["line 2, column `pz`: expected an array", "found `1`", "name a column for each number"],
+    );
     said(refused(CHANNELS, "from_s = 3\nto_s = 2"), &["flights.toml:", "`flight.0.to_s`", "found 2"]);
     said(refused(CHANNELS, "from_s = 300"), &["no sample lies", "300", "from_s"]);
     said(refused(CHANNELS, "format = \"ulog\""), &["no ULog", "check `format`"]);
@@ -291,6 +298,70 @@ fn wrong_files_are_refused_with_line_and_advice() {
     said(refused(CHANNELS, "format = \"mcap\""), &["cannot be read as MCAP", "check `format`"]);
     said(refused(CHANNELS, "assume = \"hover\""), &["flight.assume", "has both"]);
     said(refused(CHANNELS, "extra = 1"), &["extra`", "unknown key"]);
+}
+
+/// The made-up flight with its position and attitude in arrays.
+fn with_arrays(delimiter: &str, position: &str, attitude: &str) -> String {
+    let row = |line: &str| {
+        let cells: Vec<&str> = line.split(',').collect();
+        let mut row = cells[..5].to_vec();
+        let position = position.replace("{}", &cells[5..8].join(", "));
+        let attitude = attitude.replace("{}", &cells[11..15].join(" "));
+        row.extend([position.as_str(), attitude.as_str(), cells[8]]);
+        row.join(delimiter) + "\n"
+    };
+    let header = ["t", "m1", "m2", "m3", "m4", "p", "q", "vx"].join(delimiter) + "\n";
+    header + &Motion::default().csv().lines().skip(1).map(row).collect::<String>()
+}
+
+const ARRAYS: &str = r#"
+time = { columns = ["t"], unit = "s" }
+command = { columns = ["m1", "m2", "m3", "m4"], unit = "count" }
+position = { columns = ["p[0]", "p[1]", "p[2]"], unit = "m" }
+attitude = { columns = ["q"] }
+"#;
+
+#[test]
+fn cells_may_hold_arrays() {
+    let plain = read(&Motion::default(), CHANNELS, "").unwrap();
+    let place = Place::new();
+    for (delimiter, position) in [(",", "\"[{}]\""), (";", "[{}]"), ("\t", "({})")] {
+        place.write("log.csv", with_arrays(delimiter, position, "[{}]").as_bytes());
+        for whole in [ARRAYS.to_owned(), ARRAYS.replace("\"p[0]\", \"p[1]\", \"p[2]\"", "\"p\"")] {
+            let flight = place.load("log.csv", &whole, "").unwrap();
+            assert_eq!((&flight.position, &flight.attitude), (&plain.position, &plain.attitude));
+            assert_eq!(flight.notes, [""; 0]);
+        }
+    }
+}
+
+#[test]
+fn wrong_arrays_are_refused_with_line_and_column() {
+    let place = Place::new();
+    let said = |text: &str, channels: &str, parts: &[&str]| {
+        place.write("log.csv", text.as_bytes());
+        let found = place.load("log.csv", channels, "").unwrap_err().to_string();
+        parts.iter().for_each(|part| assert!(found.contains(part), "`{part}` is not in: {found}"));
+    };
+    let good = with_arrays(";", "[{}]", "[{}]");
+    let mut lines: Vec<String> = good.lines().map(str::to_owned).collect();
+    let cut = lines[7].find(']').unwrap();
+    lines[7].remove(cut);
+    said(
+        &lines.join("\n"),
+        ARRAYS,
+        &["flights.toml:5:", "line 8, column `p`", "an array", "found `[", "correct"],
+    );
+    said(&good, &ARRAYS.replace("p[2]", "p[3]"), &["line 2, column `p`", "more than 3 numbers"]);
+    said(&good, &ARRAYS.replace("p[2]", "r[2]"), &["no column `r[2]`", "it has t, m1"]);
+    said(&with_arrays(",", "[{}]", "[{}]"), ARRAYS, &["line 2, column `p`", "in quotation marks"]);
+    // A cell without anything is a sample that is left out.
+    let mut lines: Vec<String> = good.lines().map(str::to_owned).collect();
+    let (from, to) = (lines[7].find('[').unwrap(), lines[7].find(']').unwrap());
+    lines[7].replace_range(from..=to, "");
+    place.write("log.csv", lines.join("\n").as_bytes());
+    let notes = place.load("log.csv", ARRAYS, "").unwrap().notes;
+    assert_eq!(notes, ["position: 1 of 1001 samples have no finite number; left out"]);
 }
 
 #[test]
