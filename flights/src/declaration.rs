@@ -28,9 +28,9 @@ pub struct Declaration {
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct FlightEntry {
-    /// What reports call it.
-    pub name: Spanned<String>,
-    /// The log, relative to the flights file.
+    /// What reports call it, or the begin of that for the logs of a pattern; else the log's name.
+    pub name: Option<Spanned<String>>,
+    /// The log, relative to the flights file, or a pattern of logs that become a flight each.
     pub file: Spanned<String>,
     /// What it is for.
     pub role: Role,

@@ -6,6 +6,7 @@
 //! | `set` | a flights file and all its logs |
 //! | `declaration`, `document` | what a flights file says, and where |
 //! | `quantity`, `frame` | units and frames |
+//! | `logs` | which logs flights are read from: names and patterns |
 //! | `log` | what every log can do: samples of numbers by name |
 //! | `formats` | the formats of logs: `csv_log`, `mcap_log`, `ulog`, `crazyflie`, `bytes`, `arrays` |
 //! | `known_types` | messages whose fields and units need not be said |
@@ -35,6 +36,7 @@ mod held_out;
 mod jumps;
 mod known_types;
 mod log;
+mod logs;
 mod mcap_log;
 mod plausible;
 mod quantity;

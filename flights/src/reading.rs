@@ -42,6 +42,8 @@ pub struct Reading<'a> {
     pub document: &'a Document,
     /// The declared vehicle.
     pub vehicle: &'a Vehicle,
+    /// What reports call the flight.
+    pub name: &'a str,
     /// The flight as declared.
     pub entry: &'a FlightEntry,
     /// Where that stands.
@@ -87,7 +89,7 @@ impl Reading<'_> {
     }
 
     fn read_channels(&self, log: &dyn Log) -> Result<Flight, FlightsError> {
-        let mut flight = Flight::new(self.entry.name.get_ref(), self.file, self.entry.role);
+        let mut flight = Flight::new(self.name, self.file, self.entry.role);
         let (mut notes, mut errors) = (Vec::new(), Vec::new());
         let said = (&mut notes, &mut errors);
         flight.attitude = self.channel(log, Quantity::Attitude, said.0, said.1);
@@ -291,7 +293,7 @@ impl Reading<'_> {
     }
 
     fn log_error(&self, at: &Range<usize>, channel: Option<Quantity>, cause: LogError) -> FlightsError {
-        let (flight, file) = (self.entry.name.get_ref().clone(), self.file.to_owned());
+        let (flight, file) = (self.name.to_owned(), self.file.to_owned());
         FlightsError::Log { place: self.document.place(at), flight, file, channel, cause }
     }
 }

@@ -1,5 +1,6 @@
 //! Reads a flights file and all the logs that it names.
 
+use std::collections::BTreeSet;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
@@ -13,6 +14,7 @@ use crate::error::{FlightsError, LogError};
 use crate::flight::Flight;
 use crate::formats;
 use crate::held_out;
+use crate::logs::{self, Log, Patterns};
 use crate::quantity::Quantity;
 use crate::reading::{Part, Reading};
 
@@ -52,18 +54,36 @@ impl FlightSet {
     pub fn load(path: &Path) -> Result<Self, FlightsError> {
         let text = vehicles::text::read(path)
             .map_err(|cause| Diagnostic::unreadable(path.display().to_string(), &cause))?;
-        Self::parse(path, text, &vehicles::text::read_log)
+        Self::read(path, text, &vehicles::text::read_log, Patterns::Find)
     }
 
-    /// Reads the flights file at `path` with this text; `read` gives the bytes of the vehicle file and of the logs.
+    /// Reads the flights file at `path` with this text; `read` gives the bytes of the vehicle file and of the logs. There are
+    /// no folders in which a pattern would find logs: it is a name as any other.
     ///
     /// # Errors
     /// If a key or a name in a log is wrong, values contradict their units, a test flight holds what parameters are
     /// fitted on, or `read` fails.
     pub fn parse(path: &Path, text: String, read: &ReadFile<'_>) -> Result<Self, FlightsError> {
+        Self::read(path, text, read, Patterns::Literal)
+    }
+
+    fn read(
+        path: &Path,
+        text: String,
+        read: &ReadFile<'_>,
+        patterns: Patterns,
+    ) -> Result<Self, FlightsError> {
         let document = Document::new(path, text);
         let declaration: Declaration = document.parse()?;
-        let errors = check_keys(&document, &declaration.flight);
+        let mut errors = check_keys(&document, &declaration.flight);
+        let mut logs = Vec::new();
+        for (index, entry) in declaration.flight.iter().enumerate() {
+            match logs::of_entry(&document, index, entry, patterns) {
+                Ok(found) => logs.extend(found),
+                Err(error) => errors.push(error),
+            }
+        }
+        errors.extend(check_names(&document, &logs));
         let vehicle = document.resolve("vehicle", &declaration.vehicle).and_then(|path| {
             let place = document.place(&declaration.vehicle.span());
             let vehicle = vehicle(&path, read);
@@ -73,8 +93,8 @@ impl FlightSet {
         let (vehicle_path, vehicle) = FlightsError::gather_with(vehicle, errors)?;
         let context = Context { document: &document, declaration: &declaration, vehicle: &vehicle, read };
         let (mut flights, mut parts, mut errors) = (Vec::new(), Vec::new(), Vec::new());
-        for (index, entry) in declaration.flight.iter().enumerate() {
-            match context.flight(index, entry) {
+        for log in &logs {
+            match context.flight(log) {
                 Ok((flight, part)) => {
                     flights.push(flight);
                     parts.push(part);
@@ -84,7 +104,7 @@ impl FlightSet {
         }
         FlightsError::gather(errors)?;
         let clashes = held_out::clashes(&flights, &parts).into_iter().map(|clash| FlightsError::NotHeldOut {
-            place: document.place(&declaration.flight[clash.test].get_ref().file.span()),
+            place: document.place(&logs[clash.test].entry.get_ref().file.span()),
             test: flights[clash.test].name.clone(),
             fit: flights[clash.fit].name.clone(),
             reason: clash.reason,
@@ -117,17 +137,6 @@ fn check_keys(document: &Document, flights: &[Spanned<FlightEntry>]) -> Vec<Flig
     }
     for (index, entry) in flights.iter().enumerate() {
         let (entry, key) = (entry.get_ref(), |name: &str| format!("flight.{index}.{name}"));
-        let name = &entry.name;
-        if flights[..index].iter().any(|other| other.get_ref().name.get_ref() == name.get_ref()) {
-            let found = format!("\"{}\" a second time", name.get_ref());
-            errors.push(document.bad(
-                &name.span(),
-                key("name"),
-                "the name of one flight",
-                found,
-                "give another",
-            ));
-        }
         if let Some((bound, at, found)) = bad_window(entry) {
             let expected = "0 <= from_s < to_s, in seconds from the log's first sample";
             errors.push(document.bad(&at, key(bound), expected, found, "correct it"));
@@ -142,6 +151,17 @@ fn check_keys(document: &Document, flights: &[Spanned<FlightEntry>]) -> Vec<Flig
         }
     }
     errors
+}
+
+/// Names that several flights have.
+fn check_names(document: &Document, logs: &[Log<'_>]) -> Vec<FlightsError> {
+    let mut names = BTreeSet::new();
+    let again = logs.iter().filter(|log| !names.insert(log.name.as_str()));
+    let refused = |log: &Log<'_>| {
+        let (key, found) = (format!("flight.{}.name", log.index), format!("\"{}\" a second time", log.name));
+        document.bad(&log.name_span(), key, "the name of one flight", found, "give another")
+    };
+    again.map(refused).collect()
 }
 
 /// The bound of a flight's part that cannot be meant, where it stands, and its value.
@@ -163,13 +183,12 @@ struct Context<'a> {
 }
 
 impl Context<'_> {
-    /// Reads the flight `index` of the file.
-    fn flight(&self, index: usize, spanned: &Spanned<FlightEntry>) -> Result<(Flight, Part), FlightsError> {
-        let entry = spanned.get_ref();
-        let file = self.document.resolve(&format!("flight.{index}.file"), &entry.file)?;
+    /// Reads a flight of the file.
+    fn flight(&self, declared: &Log<'_>) -> Result<(Flight, Part), FlightsError> {
+        let (entry, file) = (declared.entry.get_ref(), &declared.file);
         let broken = |cause| FlightsError::Log {
             place: self.document.place(&entry.file.span()),
-            flight: entry.name.get_ref().clone(),
+            flight: declared.name.clone(),
             file: file.clone(),
             channel: None,
             cause,
@@ -177,18 +196,18 @@ impl Context<'_> {
         // Those of the file, overridden by those of the flight.
         let mut channels = self.declaration.channels.clone();
         channels.extend(entry.channels.clone());
-        let bytes = (self.read)(&file).map_err(|error| broken(LogError::Unreadable(error)))?;
-        let format =
-            entry.format.or(self.declaration.format).unwrap_or_else(|| formats::guess(&file, &bytes));
+        let bytes = (self.read)(file).map_err(|error| broken(LogError::Unreadable(error)))?;
+        let format = entry.format.or(self.declaration.format).unwrap_or_else(|| formats::guess(file, &bytes));
         let time = channels.get(&Quantity::Time).map(Spanned::get_ref);
         let log = formats::parse(bytes, format, time).map_err(broken)?;
         Reading {
             document: self.document,
             vehicle: self.vehicle,
+            name: &declared.name,
             entry,
-            at: spanned.span(),
+            at: declared.entry.span(),
             format,
-            file: &file,
+            file,
             channels,
         }
         .flight(log.as_ref())

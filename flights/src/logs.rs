@@ -1,0 +1,116 @@
+//! The logs that flights are read from: the one that an entry names, or all that its pattern finds.
+
+use std::ops::Range;
+use std::path::{Component, Path, PathBuf};
+
+use glob::MatchOptions;
+use toml::Spanned;
+
+use crate::declaration::FlightEntry;
+use crate::document::Document;
+use crate::error::FlightsError;
+
+/// Hidden files are found by no `*`: some systems write one beside each file.
+const MATCHING: MatchOptions =
+    MatchOptions { case_sensitive: true, require_literal_separator: true, require_literal_leading_dot: true };
+
+/// A log that becomes a flight.
+pub struct Log<'a> {
+    /// What the flights file says of it.
+    pub entry: &'a Spanned<FlightEntry>,
+    /// Which entry that is, from 0.
+    pub index: usize,
+    /// What reports call the flight.
+    pub name: String,
+    /// The log.
+    pub file: PathBuf,
+}
+
+impl Log<'_> {
+    /// Where the name comes from.
+    pub fn name_span(&self) -> Range<usize> {
+        let entry = self.entry.get_ref();
+        entry.name.as_ref().map_or(entry.file.span(), Spanned::span)
+    }
+}
+
+/// Whether files are looked for, or a pattern is taken for a name.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Patterns {
+    /// In the folders of this machine.
+    Find,
+    /// Where there are no folders.
+    Literal,
+}
+
+/// The logs of the entry `index`, in the order of their paths.
+pub fn of_entry<'a>(
+    document: &Document,
+    index: usize,
+    entry: &'a Spanned<FlightEntry>,
+    patterns: Patterns,
+) -> Result<Vec<Log<'a>>, FlightsError> {
+    let (declared, key) = (entry.get_ref(), format!("flight.{index}.file"));
+    let file = document.resolve(&key, &declared.file)?;
+    let given = declared.name.as_ref().map(|name| name.get_ref().as_str());
+    if patterns == Patterns::Literal || !has_wildcard(&file) || file.exists() {
+        let name = given
+            .map_or_else(|| without_ending(Path::new(file.file_name().unwrap_or_default())), str::to_owned);
+        return Ok(vec![Log { entry, index, name, file }]);
+    }
+    let (folder, fixed) = fixed_folder(&file);
+    let found = find(&file).and_then(|found| match found[..] {
+        [] if folder.as_os_str().is_empty() || folder.is_dir() => Err("none".to_owned()),
+        [] => Err("no such folder".to_owned()),
+        _ => Ok(found),
+    });
+    let found = found.map_err(|found| {
+        let expected = format!("files as `{}` in the folder {}", declared.file.get_ref(), shown(&folder));
+        let advice = "correct the pattern, in which `*` is any part of a name and `?` a character of it";
+        document.bad(&declared.file.span(), key, &expected, found, advice)
+    })?;
+    let name = |file: &Path| {
+        let own = without_ending(&plain(file).components().skip(fixed).collect::<PathBuf>());
+        given.map_or(own.clone(), |given| format!("{given} {own}"))
+    };
+    Ok(found.into_iter().map(|file| Log { entry, index, name: name(&file), file }).collect())
+}
+
+fn has_wildcard(path: &Path) -> bool {
+    path.to_string_lossy().contains(['*', '?'])
+}
+
+/// The files that a pattern finds, sorted; else what was found instead.
+fn find(pattern: &Path) -> Result<Vec<PathBuf>, String> {
+    // Brackets stand in names of folders and logs, and so for themselves.
+    let text = pattern.to_string_lossy().replace('[', "[[]");
+    if text.contains("**") {
+        return Err("`**`, which would look through all folders".to_owned());
+    }
+    let paths =
+        glob::glob_with(&text, MATCHING).map_err(|error| format!("a pattern that is none: {error}"))?;
+    let mut found = paths.collect::<Result<Vec<_>, _>>().map_err(|error| error.to_string())?;
+    found.retain(|path| path.is_file());
+    found.sort();
+    Ok(found)
+}
+
+/// The folder in front of the first wildcard, and how many parts its path has.
+fn fixed_folder(pattern: &Path) -> (PathBuf, usize) {
+    let pattern = plain(pattern);
+    let fixed = pattern.components().take_while(|part| !has_wildcard(Path::new(part.as_os_str())));
+    (fixed.clone().collect(), fixed.count())
+}
+
+/// The path without `.` in it.
+fn plain(path: &Path) -> PathBuf {
+    path.components().filter(|part| *part != Component::CurDir).collect()
+}
+
+fn without_ending(path: &Path) -> String {
+    path.with_extension("").display().to_string()
+}
+
+fn shown(folder: &Path) -> String {
+    if folder.as_os_str().is_empty() { ".".to_owned() } else { folder.display().to_string() }
+}
