@@ -42,14 +42,25 @@ impl Pairs {
         };
         let values = attitude.values.iter().map(lean).collect();
         let leaning = Channel { time_s: attitude.time_s.clone(), values };
-        let (time_s, p) = (&position.time_s, |index: usize| Vector3::from(position.values[index]));
-        let velocity = |from: usize, to: usize| (p(to) - p(from)) / (time_s[to] - time_s[from]);
-        Self::over_windows(time_s, &leaning, window_s, |from, to| {
-            let middle_s = (time_s[from] + time_s[to]) / 2.0;
-            let middle = time_s.partition_point(|time| *time < middle_s);
-            let change = || 2.0 * (velocity(middle, to) - velocity(from, middle));
-            (from < middle && middle < to).then(change).map(|change| Vector3::new(change.x, change.y, 0.0))
+        Self::over_windows(&position.time_s, &leaning, window_s, |from, to| {
+            velocity_change(position, from, to).map(|change| Vector3::new(change.x, change.y, 0.0))
         })
+    }
+
+    /// An acceleration in the world against the velocity's change over windows of `window_s`, or against the position's
+    /// where there is no velocity.
+    pub fn accelerations(
+        acceleration: &Channel<3>,
+        velocity: &Channel<3>,
+        position: &Channel<3>,
+        window_s: f64,
+    ) -> Self {
+        if velocity.is_empty() {
+            let change = |from: usize, to: usize| velocity_change(position, from, to);
+            return Self::over_windows(&position.time_s, acceleration, window_s, change);
+        }
+        let v = |index: usize| Vector3::from(velocity.values[index]);
+        Self::over_windows(&velocity.time_s, acceleration, window_s, |from, to| Some(v(to) - v(from)))
     }
 
     fn over_windows(
@@ -78,6 +89,12 @@ impl Pairs {
     /// The same pairs, the logged vector turned by `turn`.
     pub fn turned(&self, turn: impl Fn(&Vector3<f64>) -> Vector3<f64>) -> Self {
         Self { logged: self.logged.iter().map(turn).collect(), derived: self.derived.clone() }
+    }
+
+    /// The root mean square of what the two differ by.
+    pub fn residual(&self) -> f64 {
+        let squares = self.logged.iter().zip(&self.derived).map(|(a, b)| (a - b).norm_squared());
+        (squares.sum::<f64>() / self.derived.len() as f64).sqrt()
     }
 
     /// How the pairs agree; `None` where there are few, or the derived vector is mostly below `quiet`.
@@ -117,6 +134,16 @@ pub struct Agreement {
     pub slope: f64,
     /// From -1 to 1.
     pub correlation: f64,
+}
+
+/// By how much the velocity changes from the middle of the first to that of the second half of a window, twice: as over the
+/// whole window.
+fn velocity_change(position: &Channel<3>, from: usize, to: usize) -> Option<Vector3<f64>> {
+    let (time_s, p) = (&position.time_s, |index: usize| Vector3::from(position.values[index]));
+    let velocity = |from: usize, to: usize| (p(to) - p(from)) / (time_s[to] - time_s[from]);
+    let middle_s = (time_s[from] + time_s[to]) / 2.0;
+    let middle = time_s.partition_point(|time| *time < middle_s);
+    (from < middle && middle < to).then(|| 2.0 * (velocity(middle, to) - velocity(from, middle)))
 }
 
 /// The mean of the samples after `from_s` up to `to_s`.

@@ -5,7 +5,7 @@ use std::borrow::Cow;
 use vehicles::Vehicle;
 
 use crate::arrays;
-use crate::declaration::{Entry, Frame};
+use crate::declaration::{Entry, Frame, Holds};
 use crate::error::{LogError, Spot};
 use crate::flight::Channel;
 use crate::frame;
@@ -66,6 +66,7 @@ struct Layout<'a> {
     factor: f64,
     offset: f64,
     frame: Frame,
+    holds: Holds,
 }
 
 impl<'a> Layout<'a> {
@@ -82,7 +83,8 @@ impl<'a> Layout<'a> {
             }
             (_, unit) => (factor(quantity.dimension(), unit)? / pole_pairs, 0.0),
         };
-        Ok(Self { quantity, names, euler, factor, offset, frame })
+        let holds = holds(quantity, entry)?;
+        Ok(Self { quantity, names, euler, factor, offset, frame, holds })
     }
 
     /// Roll and pitch in rad come to more than a turn, and not in a bad sample or two, only if they are in degrees.
@@ -108,9 +110,8 @@ impl<'a> Layout<'a> {
             (Quantity::Position | Quantity::Velocity, &[x, y, z]) => {
                 frame::world(self.frame, [x, y, z]).into()
             }
-            (Quantity::AngularVelocity | Quantity::SpecificForce, &[x, y, z]) => {
-                frame::body(self.frame, [x, y, z]).into()
-            }
+            (Quantity::AngularVelocity, &[x, y, z]) => frame::body(self.frame, [x, y, z]).into(),
+            (Quantity::SpecificForce, &[x, y, z]) => frame::force(self.frame, self.holds, [x, y, z]).into(),
             (Quantity::Attitude, &[roll, pitch, yaw]) if self.euler => {
                 frame::attitude(self.frame, frame::euler([roll, pitch, yaw])).into()
             }
@@ -158,6 +159,15 @@ fn named(quantity: Quantity, entry: &Entry) -> Result<(Cow<'_, [String]>, bool),
         }
     };
     Ok((names, entry.euler.is_some()))
+}
+
+/// What a specific force is made of.
+fn holds(quantity: Quantity, entry: &Entry) -> Result<Holds, LogError> {
+    if entry.holds.is_some() && quantity != Quantity::SpecificForce {
+        let (expected, advice) = ("`specific_force` alone to have it", "remove it");
+        return Err(LogError::unexpected(Spot::Key("holds"), expected, "it", advice));
+    }
+    Ok(entry.holds.unwrap_or_default())
 }
 
 /// How many times faster than the rotor its electrical field turns; 1 where the log has mechanical speeds.

@@ -41,7 +41,8 @@ fn finite<const N: usize>(quantity: Quantity, channel: Channel<N>, notes: &mut V
     kept
 }
 
-fn say_dropped<const N: usize>(
+/// Says how many samples were left out, and why.
+pub fn say_dropped<const N: usize>(
     quantity: Quantity,
     before: &Channel<N>,
     after: &Channel<N>,

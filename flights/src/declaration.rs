@@ -95,6 +95,8 @@ pub struct Entry {
     pub unit: Option<String>,
     /// Frames of the numbers in the log.
     pub frame: Option<Frame>,
+    /// What a `specific_force` is made of.
+    pub holds: Option<Holds>,
     /// By what electrical rotor speeds are divided: half the number of a motor's magnets.
     pub pole_pairs: Option<u32>,
 }
@@ -108,4 +110,45 @@ pub enum Frame {
     FluEnu,
     /// Body x forward, y right, z down; world x north, y east, z down.
     FrdNed,
+}
+
+/// What the numbers of a specific force are in the log.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Holds {
+    /// That itself, in the body: an accelerometer's reading.
+    #[default]
+    SpecificForce,
+    /// The acceleration along the axes of the body: 0 at rest, as gravity was taken off.
+    BodyAcceleration,
+    /// The acceleration along the axes of the world: 0 at rest.
+    WorldAcceleration,
+    /// The specific force along the axes of the world: +g up at rest.
+    WorldSpecificForce,
+}
+
+impl Holds {
+    /// All.
+    pub const ALL: [Self; 4] =
+        [Self::SpecificForce, Self::BodyAcceleration, Self::WorldAcceleration, Self::WorldSpecificForce];
+
+    /// The name in a flights file.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::SpecificForce => "specific-force",
+            Self::BodyAcceleration => "body-acceleration",
+            Self::WorldAcceleration => "world-acceleration",
+            Self::WorldSpecificForce => "world-specific-force",
+        }
+    }
+
+    /// Whether the axes are those of the world.
+    pub fn is_in_world(self) -> bool {
+        matches!(self, Self::WorldAcceleration | Self::WorldSpecificForce)
+    }
+
+    /// Whether gravity was taken off.
+    pub fn is_without_gravity(self) -> bool {
+        matches!(self, Self::BodyAcceleration | Self::WorldAcceleration)
+    }
 }

@@ -5,7 +5,7 @@
 
 use nalgebra::{Matrix3, Quaternion, Rotation3, UnitQuaternion, Vector3};
 
-use crate::declaration::Frame;
+use crate::declaration::{Frame, Holds};
 
 /// A vector of the world.
 pub fn world(frame: Frame, [x, y, z]: [f64; 3]) -> [f64; 3] {
@@ -21,6 +21,11 @@ pub fn body(frame: Frame, [x, y, z]: [f64; 3]) -> [f64; 3] {
         Frame::FluEnu => [x, y, z],
         Frame::FrdNed => [x, -y, -z],
     }
+}
+
+/// A specific force as the log holds it, in the world or in the body.
+pub fn force(frame: Frame, holds: Holds, vector: [f64; 3]) -> [f64; 3] {
+    if holds.is_in_world() { world(frame, vector) } else { body(frame, vector) }
 }
 
 /// An attitude, body to world, given and returned in the order w, x, y, z.

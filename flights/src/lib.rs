@@ -11,7 +11,8 @@
 //! | `formats` | the formats of logs: `csv_log`, `mcap_log`, `ulog`, `crazyflie`, `bytes`, `arrays` |
 //! | `known_types` | messages whose fields and units need not be said |
 //! | `channels`, `clean`, `jumps`, `reading` | from a log's numbers to a flight |
-//! | `plausible`, `agreement` | values against physics |
+//! | `specific_force` | specific force from what logs hold in its place |
+//! | `plausible`, `agreement`, `force_doubt` | values against physics |
 //! | `span` | times against the number of samples |
 //! | `held_out`, `twin` | whether test flights hold what parameters are fitted on: by file and time, by samples |
 //! | `state` | errors of a simulated state against the measured one |
@@ -30,6 +31,7 @@ mod declaration;
 mod document;
 mod error;
 mod flight;
+mod force_doubt;
 mod formats;
 mod frame;
 mod held_out;
@@ -43,6 +45,7 @@ mod quantity;
 mod reading;
 mod set;
 mod span;
+mod specific_force;
 pub mod state;
 mod twin;
 mod ulog;

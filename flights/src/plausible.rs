@@ -9,6 +9,7 @@ use vehicles::Vehicle;
 use crate::agreement::{Agreement, Pairs};
 use crate::declaration::{ChannelMap, Entry, Frame};
 use crate::flight::{Channel, Flight, median};
+use crate::force_doubt::{ForceDoubt, Kind};
 use crate::frame;
 use crate::quantity::{FRACTION, PERCENT, Quantity};
 use diagnostics::unit::ANGLE;
@@ -79,7 +80,7 @@ pub struct Finding {
 pub fn judge(flight: &Flight, vehicle: &Vehicle, channels: &ChannelMap) -> Vec<Finding> {
     let judge = Judge { flight, vehicle, channels };
     let findings = [
-        judge.gravity(),
+        judge.force().or_else(|| judge.gravity()),
         judge.upright(),
         judge.rates(),
         judge.velocity(),
@@ -127,6 +128,32 @@ impl Judge<'_> {
             .then(|| finding(quantity, Some(of_unit(unit)), &what))
     }
 
+    /// The specific force is one, and in the body, as the vehicle accelerates.
+    fn force(&self) -> Option<Finding> {
+        let quantity = Quantity::SpecificForce;
+        let force = ForceDoubt::of(self.flight, self.vehicle, self.declared(quantity)?)?;
+        let Some(doubt) = force.doubt() else { return self.acceleration(&force) };
+        let kinds: Vec<String> = doubt.fits.iter().map(|kind| of_kind(*kind, force.declared)).collect();
+        let what = format!(
+            "as {} it differs from the vehicle's acceleration by {:.2} m/s^2 (root mean square); read otherwise by {:.2}              m/s^2, with a correlation of {:.2}",
+            force.declared.holds.name(),
+            doubt.declared_m_s2,
+            doubt.residual_m_s2,
+            doubt.correlation
+        );
+        Some(finding(quantity, Some(kinds.join(" or ")), &what))
+    }
+
+    /// An acceleration without gravity, of which gravity tells no unit, is that of the vehicle.
+    fn acceleration(&self, force: &ForceDoubt<'_>) -> Option<Finding> {
+        if !force.declared.holds.is_without_gravity() {
+            return None;
+        }
+        let agreement = force.agreement().filter(|agreement| agreement.correlation > SAME)?;
+        let what = format!("it is {:.4} times the acceleration of the vehicle", agreement.slope);
+        self.by_unit(Quantity::SpecificForce, agreement.slope, LEANING_TOLERANCE, &what)
+    }
+
     /// The specific force is gravity's in the median, and up.
     fn gravity(&self) -> Option<Finding> {
         let quantity = Quantity::SpecificForce;
@@ -143,7 +170,7 @@ impl Judge<'_> {
             let what = format!("its median along z is {up:.3} m/s^2, but up is positive in our body");
             return Some(finding(quantity, Some(self.other_frame(quantity)), &what));
         }
-        let hint = if factor < 0.5 { "; gravity may have been taken off" } else { "" };
+        let hint = if factor < 0.5 { "; gravity may have been taken off (`holds`)" } else { "" };
         (!(0.6..1.6).contains(&factor)).then(|| finding(quantity, None, &format!("{what}{hint}")))
     }
 
@@ -485,6 +512,13 @@ fn either(here: Option<String>, there: Option<String>) -> Option<String> {
         (Some(here), Some(there)) => Some(format!("{here} here or {there}")),
         (here, there) => here.or(there),
     }
+}
+
+/// The keys that declare what a specific force is made of.
+fn of_kind(kind: Kind, declared: Kind) -> String {
+    let holds = format!("`holds = \"{}\"`", kind.holds.name());
+    let frame = if kind.frame == Frame::FrdNed { "frd-ned" } else { "flu-enu" };
+    if kind.frame == declared.frame { holds } else { format!("{holds} with `frame = \"{frame}\"`") }
 }
 
 fn of_unit(name: &str) -> String {

@@ -19,6 +19,7 @@ use crate::log::Log;
 use crate::plausible::{self, Finding};
 use crate::quantity::Quantity;
 use crate::span::{self, Moment, Sparse};
+use crate::specific_force::{self, Meaning};
 
 /// Times are differences of decimal fractions since 1970: a sample on the edge of the part belongs to it.
 const SLACK_S: f64 = 1e-6;
@@ -80,6 +81,7 @@ impl Reading<'_> {
         yaw.iter_mut().for_each(|yaw| self.shift(Quantity::Attitude, &mut yaw.time_s, origin_s));
         self.assume(&mut flight, yaw)?;
         jumps::leave_out(&mut flight);
+        self.turn_force(&mut flight)?;
         say_gaps(&mut flight);
         self.check_something_is_left(&flight)?;
         let findings = plausible::judge(&flight, self.vehicle, &self.channels);
@@ -251,6 +253,17 @@ impl Reading<'_> {
             flight.angular_velocity = Channel { time_s: time_s.clone(), values };
             flight.assumed.push("angular velocity: zero (assume = \"hover\")".to_owned());
         }
+        Ok(())
+    }
+
+    /// Makes a specific force of what the log holds in its place.
+    fn turn_force(&self, flight: &mut Flight) -> Result<(), FlightsError> {
+        let Some(entry) = self.declared(Quantity::SpecificForce) else { return Ok(()) };
+        let meaning =
+            Meaning { holds: entry.holds.unwrap_or_default(), gravity_m_s2: self.vehicle.gravity_m_s2 };
+        let turned =
+            specific_force::in_body(&flight.specific_force, &flight.attitude, meaning, &mut flight.notes);
+        flight.specific_force = turned.map_err(|cause| self.channel_error(Quantity::SpecificForce, cause))?;
         Ok(())
     }
 

@@ -97,7 +97,8 @@ impl Motion {
     /// The flight as a CSV file.
     pub fn csv(&self) -> String {
         let mut text =
-            "t,m1,m2,m3,m4,px,py,pz,vx,vy,vz,qx,qy,qz,qw,wx,wy,wz,fx,fy,fz,v,roll,pitch,yaw\n".to_owned();
+            "t,m1,m2,m3,m4,px,py,pz,vx,vy,vz,qx,qy,qz,qw,wx,wy,wz,fx,fy,fz,v,roll,pitch,yaw,ax,ay,az,sz\n"
+                .to_owned();
         for k in 0..=1000 {
             let time = 0.01 * f64::from(k);
             let numbers: Vec<String> = self.row(time).iter().map(f64::to_string).collect();
@@ -110,10 +111,11 @@ impl Motion {
         let (mut p, mut v) = (Self::position(time), Self::velocity(time));
         let (mut q, mut w) = (Self::attitude(time), Self::rate(time));
         let mut f = q.inverse() * Self::force(time);
+        let mut s = Self::force(time);
         if self.frd_ned {
             let ned_enu = Matrix3::new(0.0, 1.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, -1.0);
             let frd_flu = Matrix3::from_diagonal(&Vector3::new(1.0, -1.0, -1.0));
-            (p, v, w, f) = (ned_enu * p, ned_enu * v, frd_flu * w, frd_flu * f);
+            (p, v, w, f, s) = (ned_enu * p, ned_enu * v, frd_flu * w, frd_flu * f, ned_enu * s);
             let turned = ned_enu * q.to_rotation_matrix().matrix() * frd_flu.transpose();
             q = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(turned));
         }
@@ -121,6 +123,9 @@ impl Motion {
         let [roll, pitch, yaw] = [roll, pitch, yaw].map(|angle| angle * self.angle_unit);
         let (p, v) = (p * self.length_unit, v);
         let (w, f) = (w * self.rate_unit, f * self.force_unit);
+        // Without gravity, which is along z.
+        let a = Vector3::new(s.x, s.y, s.z - 9.81 * s.z.signum()) * self.force_unit;
+        let s = s * self.force_unit;
         let command = [100.0, 101.0, 102.0, 103.0].map(|command| command * self.command_unit);
         [
             &command[..],
@@ -129,7 +134,7 @@ impl Motion {
             q.coords.as_slice(),
             w.as_slice(),
             f.as_slice(),
-            &[11.1 - 0.01 * time, roll, pitch, yaw],
+            &[11.1 - 0.01 * time, roll, pitch, yaw, a.x, a.y, a.z, s.z],
         ]
         .concat()
     }
