@@ -135,7 +135,8 @@ impl Judge<'_> {
         let Some(doubt) = force.doubt() else { return self.acceleration(&force) };
         let kinds: Vec<String> = doubt.fits.iter().map(|kind| of_kind(*kind, force.declared)).collect();
         let what = format!(
-            "as {} it differs from the vehicle's acceleration by {:.2} m/s^2 (root mean square); read otherwise by {:.2}              m/s^2, with a correlation of {:.2}",
+            "as {} it differs from the vehicle's acceleration by {:.2} m/s^2 (root mean square); read otherwise by {:.2} \
+             m/s^2, with a correlation of {:.2}",
             force.declared.holds.name(),
             doubt.declared_m_s2,
             doubt.residual_m_s2,

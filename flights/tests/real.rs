@@ -3,7 +3,7 @@
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
-use flights::{Flight, FlightSet, Role};
+use flights::{Channel, Flight, FlightSet, Role};
 
 /// The folder of measured flights; says so where it is not given.
 fn data() -> Option<PathBuf> {
@@ -164,4 +164,91 @@ fn the_canonical_file_of_a_real_flight_has_a_row_for_each_attitude() {
     assert_eq!(written.rows, set.flights[0].attitude.time_s.len());
     let lines = std::fs::read_to_string(&path).unwrap().lines().count();
     assert_eq!(lines, written.rows + 1);
+}
+
+/// The log with the specific force along the axes of the world, less `gravity_g` up, in g.
+fn in_world(log: &str, gravity_g: f64) -> String {
+    let mut lines = log.lines();
+    let header = lines.next().unwrap();
+    let columns = |names: &[&str]| -> Vec<usize> {
+        let column = |name: &&str| header.split(',').position(|header| header == *name).unwrap();
+        names.iter().map(column).collect()
+    };
+    let attitude = columns(&["qw", "qx", "qy", "qz"]);
+    let force = columns(&["imu_acc_x", "imu_acc_y", "imu_acc_z"]);
+    let turned = lines.map(|line| {
+        let mut cells: Vec<String> = line.split(',').map(str::to_owned).collect();
+        let number = |column: &usize| cells[*column].parse::<f64>().unwrap_or(f64::NAN);
+        let q: Vec<f64> = attitude.iter().map(number).collect();
+        let f: Vec<f64> = force.iter().map(number).collect();
+        let q = nalgebra::UnitQuaternion::from_quaternion(nalgebra::Quaternion::new(q[0], q[1], q[2], q[3]));
+        let f = q * nalgebra::Vector3::new(f[0], f[1], f[2]) - gravity_g * nalgebra::Vector3::z();
+        force.iter().zip(f.iter()).for_each(|(column, number)| cells[*column] = number.to_string());
+        cells.join(",") + "\n"
+    });
+    format!("{header}\n{}", turned.collect::<String>())
+}
+
+/// Reads all logs of a folder with pose, and a specific force as declared.
+fn with_force(logs: &Path, columns: &str, keys: &str) -> Result<Vec<Flight>, String> {
+    let vehicle = Path::new(env!("CARGO_MANIFEST_DIR")).join("../vehicles/crazyflie-2.1.toml");
+    let text = format!(
+        "vehicle = \"{}\"\n[channels]\ntime = {{ columns = [\"t\"], unit = \"s\" }}\n\
+         position = {{ columns = [\"px\", \"py\", \"pz\"], unit = \"m\" }}\n\
+         attitude = {{ columns = [\"qx\", \"qy\", \"qz\", \"qw\"] }}\n\
+         specific_force = {{ columns = [{columns}], unit = \"g\"{keys} }}\n\
+         [[flight]]\nfile = \"{}/B*_rep*.csv\"\nrole = \"fit\"\n",
+        vehicle.display(),
+        logs.display()
+    );
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("flights.toml");
+    std::fs::write(&path, text).unwrap();
+    FlightSet::load(&path).map(|set| set.flights).map_err(|error| error.to_string())
+}
+
+const IMU: &str = r#""imu_acc_x", "imu_acc_y", "imu_acc_z""#;
+/// Of the firmware's estimator: along the axes of the world, without gravity.
+const ESTIMATE: &str = r#""est_stateEstimate_ax", "est_stateEstimate_ay", "est_stateEstimate_az""#;
+
+#[test]
+fn a_real_acceleration_in_the_world_is_refused_as_one() {
+    let Some(data) = data() else { return };
+    let logs = data.join("nanobench");
+    let plain = with_force(&logs, IMU, "").unwrap();
+    assert_eq!(plain.len(), 5);
+    let refused = |found: Result<Vec<Flight>, String>, holds: &str, least: usize| {
+        let found = found.unwrap_err();
+        assert!(found.matches(&format!("`holds = \"{holds}\"`")).count() >= least, "{found}");
+    };
+    refused(with_force(&logs, ESTIMATE, ""), "world-acceleration", 5);
+    let estimated = with_force(&logs, ESTIMATE, ", holds = \"world-acceleration\"").unwrap();
+    for (gravity_g, holds) in [(0.0, "world-specific-force"), (1.0, "world-acceleration")] {
+        let turned = tempfile::tempdir().unwrap();
+        for flight in &plain {
+            let log = std::fs::read_to_string(&flight.file).unwrap();
+            std::fs::write(turned.path().join(flight.file.file_name().unwrap()), in_world(&log, gravity_g))
+                .unwrap();
+        }
+        refused(with_force(turned.path(), IMU, ""), holds, 4);
+        let read = with_force(turned.path(), IMU, &format!(", holds = \"{holds}\"")).unwrap();
+        for ((plain, read), estimated) in plain.iter().zip(&read).zip(&estimated) {
+            // Standard gravity there, the vehicle file's here.
+            assert!(rms(&plain.specific_force, &read.specific_force) < 0.01, "{}", read.name);
+            // The estimator filters, by its own attitude.
+            let onboard = rms(&plain.specific_force, &estimated.specific_force);
+            assert!(onboard < 1.0, "{}: {onboard}", read.name);
+        }
+    }
+}
+
+/// The root mean square of what two channels at the same times differ by.
+fn rms(a: &Channel<3>, b: &Channel<3>) -> f64 {
+    let pairs = a.time_s.iter().zip(&a.values).filter_map(|(time_s, a)| {
+        let index = b.time_s.iter().position(|other_s| (other_s - time_s).abs() < 1e-6)?;
+        Some(a.iter().zip(&b.values[index]).map(|(a, b)| (a - b) * (a - b)).sum::<f64>())
+    });
+    let squares: Vec<f64> = pairs.collect();
+    assert!(squares.len() > 1000, "{}", squares.len());
+    (squares.iter().sum::<f64>() / squares.len() as f64).sqrt()
 }
