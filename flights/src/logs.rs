@@ -70,8 +70,8 @@ pub fn of_entry<'a>(
         document.bad(&declared.file.span(), key, &expected, found, advice)
     })?;
     let name = |file: &Path| {
-        let own = without_ending(&plain(file).components().skip(fixed).collect::<PathBuf>());
-        given.map_or(own.clone(), |given| format!("{given} {own}"))
+        let found = without_ending(&plain(file).components().skip(fixed).collect::<PathBuf>());
+        given.map_or(found.clone(), |given| format!("{given} {found}"))
     };
     Ok(found.into_iter().map(|file| Log { entry, index, name: name(&file), file }).collect())
 }
