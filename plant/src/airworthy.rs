@@ -4,7 +4,7 @@ use crate::backend::Backend;
 use crate::state::{RigidBody, State};
 use bus::context::NodeContext;
 use diagnostics::parameter::{ParameterError, refuse};
-use vehicles::{CommandMap, MotorModel, Vehicle};
+use vehicles::{CommandMap, MotorModel, Provenance, Vehicle};
 
 /// Below this thrust to weight a vehicle hovers and has next to nothing left to climb, tilt or brake with: 1.2 is what
 /// is left to a tilt of 34°. Tuned, no source; multirotors are built with 2 and more.
@@ -52,6 +52,16 @@ pub(crate) fn check_steps(
     Ok(())
 }
 
+/// Tells which numbers of the vehicle have no source.
+pub(crate) fn tell_unsourced(vehicle: &Vehicle, run: &NodeContext<'_>) {
+    let unsourced: Vec<_> = vehicle.provenance.iter().filter(|number| !number.has_source()).collect();
+    if !unsourced.is_empty() {
+        let (count, all) = (unsourced.len(), vehicle.provenance.len());
+        let message = format!("has no source for {count} of {all} numbers: {}", places(&unsourced));
+        run.warn("vehicle", format!("`vehicle` \"{}\" {message}", vehicle.name));
+    }
+}
+
 fn fastest_pole_rad_s(motor: &MotorModel) -> f64 {
     match *motor {
         MotorModel::FirstOrder { time_constant_s } => time_constant_s.recip(),
@@ -80,7 +90,7 @@ pub(crate) fn check_lift(vehicle: &Vehicle, run: &NodeContext<'_>) -> Result<(),
             "`vehicle` \"{}\" {what}: its rotors lift {least_N:.4} N to {most_N:.4} N and it weighs {weight_N:.4} N, a \
              thrust to weight of {ratio:.4}; look at {}",
             vehicle.name,
-            places(vehicle)
+            places_of_lift(vehicle)
         )
     };
     refuse(ratio < 1.0, "vehicle", || {
@@ -113,12 +123,15 @@ fn lift_N(vehicle: &Vehicle, speed_rad_s: f64) -> f64 {
 }
 
 /// The keys that lift and weight come from, with their lines.
-fn places(vehicle: &Vehicle) -> String {
+fn places_of_lift(vehicle: &Vehicle) -> String {
     let keys = ["body.mass", "body.gravity", "rotor.thrust_coefficient", "command.speed_at_max"];
     let stated = vehicle.provenance.iter().filter(|number| keys.contains(&number.key.as_str()));
-    let places: Vec<String> =
-        stated.map(|number| format!("{}:{}: `{}`", number.file, number.line, number.key)).collect();
-    places.join(", ")
+    places(&stated.collect::<Vec<_>>())
+}
+
+fn places(numbers: &[&Provenance]) -> String {
+    let place = |number: &&Provenance| format!("{}:{}: `{}`", number.file, number.line, number.key);
+    numbers.iter().map(place).collect::<Vec<_>>().join(", ")
 }
 
 /// Flies `backend` for a moment with rotors at their fastest, at hover and at their slowest: what overflows on the
@@ -217,6 +230,24 @@ mod tests {
         let strong = |factor: f64| lift(|it| (slow(it), it.mass_kg /= factor).1);
         assert!(strong(20.0).1[0].message.contains("stronger than any"));
         assert!(strong(1e4).0.unwrap_err().to_string().contains("no vehicle that flies"));
+    }
+
+    #[test]
+    fn numbers_without_a_source_are_told_with_their_lines() {
+        let told = |text: &str| {
+            let run = NodeContext::new("node", &[]);
+            tell_unsourced(&Vehicle::parse(text, "bird.toml").unwrap(), &run);
+            run.into_warnings().into_iter().map(|warning| warning.message).collect::<Vec<_>>()
+        };
+        let text = vehicles::reference::HUMMINGBIRD;
+        assert_eq!(told(text), [""; 0]);
+        let mass = text.lines().find(|line| line.starts_with("mass = ")).unwrap();
+        let messages = told(&text.replace(mass, r#"mass = { value = 0.5, unit = "kg", source = "none" }"#));
+        let [message] = &messages[..] else { panic!("{messages:?}") };
+        assert!(
+            message.contains("no source for 1 of ") && message.contains("bird.toml:21: `body.mass`"),
+            "{message}"
+        );
     }
 
     #[test]

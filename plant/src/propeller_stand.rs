@@ -179,6 +179,7 @@ impl Component for PropellerStand {
             format!("`period_ticks` is {ticks}, expected 1: a stand runs at every tick; leave it out")
         })?;
         let dt_s = run.tick_s();
+        airworthy::tell_unsourced(&vehicle, run);
         airworthy::check_steps(&vehicle, dt_s, run)?;
         let profile = profile(&speeds, &vehicle.command, dt_s)?;
         Ok(Self { vehicle, rotor: rotor - 1, profile, dt_s, noise })

@@ -274,7 +274,7 @@ fn one_rotor(section: &Section) -> Result<Rotor, Diagnostic> {
 /// A sense of rotation has a value and a source, but neither unit nor uncertainty.
 fn spin(section: &Section) -> Result<f64, Diagnostic> {
     let spin = section.choice("value", &[("counter-clockwise", 1.0), ("clockwise", -1.0)])?;
-    section.note("seen from above", section.text("source")?, Uncertainty::OneSigma(0.0));
+    section.note("seen from above", section.source()?, Uncertainty::OneSigma(0.0));
     section.finish()?;
     Ok(spin)
 }
@@ -316,7 +316,7 @@ fn command(section: &Section) -> Result<CommandMap, Diagnostic> {
 
 fn off(section: &Section) -> Result<bool, Diagnostic> {
     let value = section.flag("value")?;
-    section.note("true or false", section.text("source")?, Uncertainty::OneSigma(0.0));
+    section.note("true or false", section.source()?, Uncertainty::OneSigma(0.0));
     section.finish()?;
     Ok(value)
 }

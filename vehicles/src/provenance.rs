@@ -2,6 +2,9 @@
 
 use diagnostics::Place;
 
+/// What a file says as the source of a number that has none.
+pub const NO_SOURCE: &str = "none";
+
 /// How well a number is known.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Uncertainty {
@@ -33,6 +36,14 @@ pub struct Provenance {
     pub source: String,
     /// How well it is known.
     pub uncertainty: Uncertainty,
+}
+
+impl Provenance {
+    /// Whether the file cites a source; it says `source = "none"` where there is none.
+    #[must_use]
+    pub fn has_source(&self) -> bool {
+        self.source != NO_SOURCE
+    }
 }
 
 /// A number with everything that the file says of it.

@@ -7,7 +7,7 @@ use std::ops::Range;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
-use crate::provenance::{Provenance, Stated, Uncertainty};
+use crate::provenance::{NO_SOURCE, Provenance, Stated, Uncertainty};
 use diagnostics::parameter::{Bounds, all, not_negative, positive};
 use diagnostics::unit::Dimension;
 use diagnostics::{Diagnostic, ParameterError, Place, parse_toml};
@@ -267,7 +267,7 @@ impl<'d, 't> Section<'d, 't> {
             name: name.to_owned(),
             value: parameter.number("value", value)?,
             unit: parameter.text("unit")?.to_owned(),
-            source: parameter.text("source")?.to_owned(),
+            source: parameter.source()?.to_owned(),
             uncertainty: parameter.uncertainty(1.0)?,
             place: self.doc.place(&value.span()),
             unit_place: self.doc.place(&parameter.at_of("unit")),
@@ -291,7 +291,7 @@ impl<'d, 't> Section<'d, 't> {
             Origin::Chosen if !self.has("uncertainty") => Uncertainty::Said("chosen".to_owned()),
             _ => self.uncertainty(factor)?,
         };
-        self.note(unit, self.text("source")?, uncertainty);
+        self.note(unit, self.source()?, uncertainty);
         self.finish()?;
         Ok(factor)
     }
@@ -308,7 +308,17 @@ impl<'d, 't> Section<'d, 't> {
         });
     }
 
+    /// Where a number comes from.
+    pub(crate) fn source(&self) -> Result<&'d str, Diagnostic> {
+        self.need("source", "a text, or \"none\" for a number without a source")?;
+        self.text("source")
+    }
+
+    /// How well a number is known; of one without a source it need not be said.
     fn uncertainty(&self, factor: f64) -> Result<Uncertainty, Diagnostic> {
+        if self.source()? == NO_SOURCE && !self.has("uncertainty") {
+            return Ok(Uncertainty::Said("not stated".to_owned()));
+        }
         let expected = "a number (one standard deviation, in the same unit) or a text such as \"not stated\"";
         let value = self.need("uncertainty", expected)?;
         if value.get_ref().is_str() {

@@ -161,6 +161,23 @@ fn a_parameter_lacking_a_field_is_refused() {
 }
 
 #[test]
+fn a_number_without_a_source_says_so() {
+    let changed = HUMMINGBIRD.replace(MASS_LINE, r#"mass = { value = 0.5, unit = "kg", source = "none" }"#);
+    let bird = Vehicle::parse(&changed, "bird.toml").unwrap();
+    let mass = bird.provenance.iter().find(|number| number.key == "body.mass").unwrap();
+    assert_eq!((bird.mass_kg, mass.has_source()), (0.5, false));
+    assert_eq!(mass.uncertainty, Uncertainty::Said("not stated".to_owned()));
+    assert_eq!(bird.provenance.iter().filter(|number| !number.has_source()).count(), 1);
+    let without = r#"mass = { value = 0.5, unit = "kg" }"#;
+    assert_refused(
+        MASS_LINE,
+        without,
+        line_of("mass = "),
+        &["missing key `body.mass.source`", "or \"none\""],
+    );
+}
+
+#[test]
 fn a_number_that_is_not_physical_is_refused() {
     let mass = line_of("mass = ");
     assert_refused("value = 0.480", "value = -0.48", mass, &["body.mass", "above 0", "-0.48"]);
