@@ -7,7 +7,7 @@ use std::path::PathBuf;
 use diagnostics::{Diagnostic, Place};
 use vehicles::table::TableError;
 
-use crate::plausible::Finding;
+use crate::finding::Finding;
 use crate::quantity::Quantity;
 use crate::span::Sparse;
 

@@ -12,7 +12,7 @@
 //! | `known_types` | messages whose fields and units need not be said |
 //! | `channels`, `clean`, `jumps`, `reading` | from a log's numbers to a flight |
 //! | `specific_force` | specific force from what logs hold in its place |
-//! | `plausible`, `agreement`, `force_doubt` | values against physics |
+//! | `plausible`, `agreement`, `force_doubt`, `finding` | values against physics |
 //! | `span` | times against the number of samples |
 //! | `held_out`, `twin` | whether test flights hold what parameters are fitted on: by file and time, by samples |
 //! | `state` | errors of a simulated state against the measured one |
@@ -30,6 +30,7 @@ mod csv_log;
 mod declaration;
 mod document;
 mod error;
+mod finding;
 mod flight;
 mod force_doubt;
 mod formats;
@@ -52,9 +53,9 @@ mod ulog;
 
 pub use canonical::{COLUMNS, Canonical, HEADER, csv, write_csv};
 pub use error::{FlightsError, LogError, Spot};
+pub use finding::Finding;
 pub use flight::{Channel, Flight, Role};
 pub use held_out::same_file;
-pub use plausible::Finding;
 pub use quantity::Quantity;
 pub use set::{FlightSet, ReadFile};
 pub use span::{Moment, Sparse};

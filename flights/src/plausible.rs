@@ -8,6 +8,7 @@ use vehicles::Vehicle;
 
 use crate::agreement::{Agreement, Pairs};
 use crate::declaration::{ChannelMap, Entry, Frame};
+use crate::finding::Finding;
 use crate::flight::{Channel, Flight, median};
 use crate::force_doubt::{ForceDoubt, Kind};
 use crate::frame;
@@ -64,17 +65,6 @@ const ROTOR_SPEED_TOLERANCE: f64 = 1.6;
 const POLE_PAIRS: std::ops::RangeInclusive<f64> = 2.0..=24.0;
 /// Voltages that a battery of a vehicle can have, from one cell to fourteen.
 const VOLTAGE_RANGE_V: (f64, f64) = (2.0, 62.0);
-
-/// Values that contradict what the flights file declares.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Finding {
-    /// The channel.
-    pub channel: Quantity,
-    /// The unit, frame or order that would fit, if the mismatch is clear; otherwise it is only worth a note.
-    pub fits: Option<String>,
-    /// All this as text, with numbers.
-    pub message: String,
-}
 
 /// Compares the channels of a flight with each other, with gravity and with the vehicle.
 pub fn judge(flight: &Flight, vehicle: &Vehicle, channels: &ChannelMap) -> Vec<Finding> {
