@@ -16,6 +16,9 @@ use std::time::Duration;
 /// How long a process may take to end when it is asked to, and then to be gone once it was killed.
 const GRACE: Duration = Duration::from_secs(1);
 const POLL: Duration = Duration::from_millis(2);
+/// A look at the processes goes through them one after another: one whose parent ends meanwhile is seen as nobody's, and
+/// only the next look finds it. So many looks in a row that find nothing are believed.
+const EMPTY_LOOKS: u32 = 2;
 
 /// The place of a run among those of its process: an orphan does not say whose it is, so a run that adopts orphans
 /// flies alone.
@@ -97,10 +100,12 @@ impl Drop for Descendants {
         let now = || Duration::from_nanos(monotonic_ns());
         let mut clock = WatchClock::new(now());
         let mut asked: Vec<Pid> = Vec::new();
+        let mut empty_looks = 0;
         // Each that ends may leave children of its own, which are this process's then.
         while clock.now() < 2 * GRACE {
             let left = self.left();
-            if left.is_empty() {
+            empty_looks = if left.is_empty() { empty_looks + 1 } else { 0 };
+            if empty_looks == EMPTY_LOOKS {
                 break;
             }
             for child in left {
