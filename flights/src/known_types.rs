@@ -3,6 +3,7 @@
 use crate::declaration::{ChannelMap, Entry, Format, Frame};
 use crate::error::{LogError, Spot};
 use crate::log::Log;
+use crate::name::Name;
 use crate::quantity::Quantity;
 
 /// Where a type of message holds a quantity. In `fields`, `*` stands for x, y, z (and w) in turn, and `#` for the
@@ -75,9 +76,9 @@ impl Known {
         let name =
             |(index, part): (usize, &str)| self.fields.replace('*', part).replace('#', &index.to_string());
         let columns = if self.fields.contains(['*', '#']) {
-            parts.map(name).collect()
+            parts.map(name).map(|name| name.as_str().into()).collect()
         } else {
-            self.fields.split(' ').map(str::to_owned).collect()
+            self.fields.split(' ').map(Name::from).collect()
         };
         Entry {
             columns: Some(columns),
@@ -94,7 +95,7 @@ impl Known {
 /// # Errors
 /// If the entry names a topic alone and its type is not known to hold the quantity.
 pub fn complete(log: &dyn Log, quantity: Quantity, entry: &Entry) -> Result<Entry, LogError> {
-    let named = entry.columns.is_some() || entry.euler.is_some() || entry.yaw.is_some();
+    let named = entry.names().next().is_some();
     let (false, Some(topic)) = (named, entry.topic.as_deref()) else { return Ok(entry.clone()) };
     let topics = log.topics();
     let Some((_, kind)) = topics.iter().find(|(name, _)| name == topic) else {

@@ -10,9 +10,10 @@
 //! | `log` | what every log can do: samples of numbers by name |
 //! | `formats` | the formats of logs: `csv_log`, `mcap_log`, `ulog`, `crazyflie`, `bytes`, `arrays` |
 //! | `known_types` | messages whose fields and units need not be said |
+//! | `name`, `scaling`, `matrices`, `clock` | names of numbers, their factors, rotation matrices, clocks that start again |
 //! | `channels`, `clean`, `jumps`, `reading` | from a log's numbers to a flight |
 //! | `specific_force` | specific force from what logs hold in its place |
-//! | `plausible`, `agreement`, `force_doubt`, `finding` | values against physics |
+//! | `plausible`, `agreement`, `force_doubt`, `units`, `finding` | values against physics |
 //! | `span` | times against the number of samples |
 //! | `held_out`, `twin` | whether test flights hold what parameters are fitted on: by file and time, by samples |
 //! | `state` | errors of a simulated state against the measured one |
@@ -25,6 +26,7 @@ mod bytes;
 mod canonical;
 mod channels;
 mod clean;
+mod clock;
 mod crazyflie;
 mod csv_log;
 mod declaration;
@@ -40,16 +42,20 @@ mod jumps;
 mod known_types;
 mod log;
 mod logs;
+mod matrices;
 mod mcap_log;
+mod name;
 mod plausible;
 mod quantity;
 mod reading;
+mod scaling;
 mod set;
 mod span;
 mod specific_force;
 pub mod state;
 mod twin;
 mod ulog;
+mod units;
 
 pub use canonical::{COLUMNS, Canonical, HEADER, csv, write_csv};
 pub use error::{FlightsError, LogError, Spot};

@@ -7,8 +7,10 @@ use std::path::{Path, PathBuf};
 use diagnostics::Diagnostic;
 use toml::Spanned;
 use vehicles::Vehicle;
+use vehicles::table::Dialect;
 
-use crate::declaration::{Declaration, FlightEntry};
+use crate::csv_log::Form;
+use crate::declaration::{ChannelMap, Declaration, Entry, FlightEntry};
 use crate::document::Document;
 use crate::error::{FlightsError, LogError};
 use crate::flight::Flight;
@@ -16,7 +18,7 @@ use crate::formats;
 use crate::held_out;
 use crate::logs::{self, Log, Patterns};
 use crate::quantity::Quantity;
-use crate::reading::{Part, Reading};
+use crate::reading::{OtherLogs, Part, Reading};
 
 /// The flights of a flights file, in its order.
 ///
@@ -199,7 +201,10 @@ impl Context<'_> {
         let bytes = (self.read)(file).map_err(|error| broken(LogError::Unreadable(error)))?;
         let format = entry.format.or(self.declaration.format).unwrap_or_else(|| formats::guess(file, &bytes));
         let time = channels.get(&Quantity::Time).map(Spanned::get_ref);
-        let log = formats::parse(bytes, format, time).map_err(broken)?;
+        let of_log = channels.values().map(Spanned::get_ref).filter(|channel| channel.file.is_none());
+        let form = self.form(entry, time, of_log.collect());
+        let log = formats::parse(bytes, format, &form).map_err(broken)?;
+        let others = self.other_logs(declared, &channels)?;
         Reading {
             document: self.document,
             vehicle: self.vehicle,
@@ -209,7 +214,45 @@ impl Context<'_> {
             format,
             file,
             channels,
+            others,
         }
         .flight(log.as_ref())
+    }
+
+    /// The form of a CSV file of the flight.
+    fn form<'b>(
+        &'b self,
+        entry: &'b FlightEntry,
+        time: Option<&'b Entry>,
+        channels: Vec<&'b Entry>,
+    ) -> Form<'b> {
+        const PLAIN: Dialect = Dialect { header_line: None, header: None, delimiter: None, decimal: None };
+        let dialect = entry.csv.as_ref().or(self.declaration.csv.as_ref()).unwrap_or(&PLAIN);
+        Form { dialect, recording: entry.recording, time, channels }
+    }
+
+    /// The logs of the channels that are in another file than the flight's.
+    fn other_logs(&self, declared: &Log<'_>, channels: &ChannelMap) -> Result<OtherLogs, FlightsError> {
+        let entry = declared.entry.get_ref();
+        let of_flight = channels.get(&Quantity::Time).map(Spanned::get_ref);
+        let mut others = OtherLogs::new();
+        for (quantity, channel) in channels {
+            let (place, channel) = (channel.span(), channel.get_ref());
+            let Some(file) = &channel.file else { continue };
+            let path = self.document.resolve(&format!("channels.{quantity}.file"), file)?;
+            let broken = |cause| FlightsError::Log {
+                place: self.document.place(&place),
+                flight: declared.name.clone(),
+                file: path.clone(),
+                channel: Some(*quantity),
+                cause,
+            };
+            let bytes = (self.read)(&path).map_err(|error| broken(LogError::Unreadable(error)))?;
+            let format = formats::guess(&path, &bytes);
+            let form = self.form(entry, channel.time.as_deref().or(of_flight), vec![channel]);
+            let form = Form { recording: None, ..form };
+            others.insert(*quantity, formats::parse(bytes, format, &form).map_err(broken)?);
+        }
+        Ok(others)
     }
 }

@@ -2,6 +2,8 @@
 
 use std::fmt;
 
+use crate::encoding;
+
 /// A file that is not of the format that its reader expects.
 ///
 /// ```
@@ -119,11 +121,18 @@ const TEXTS: [Magic; 8] = [
     (b"<!doctype html", "a web page (HTML)", "download the file itself; the page may ask for a login"),
     (b"<html", "a web page (HTML)", "download the file itself; the page may ask for a login"),
     (b"<?xml", "XML", EXPORT),
-    (b"<robot", "a robot description (URDF)", EXPORT),
-    (b"<sdf", "a robot description (SDF)", EXPORT),
+    (b"<robot", ROBOTS[0].1, EXPORT),
+    (b"<sdf", ROBOTS[1].1, EXPORT),
     (b"{", "JSON", FROM_PANDAS),
     (b"[{", "JSON", FROM_PANDAS),
     (b"rosbag2_bagfile_information:", "the metadata of a ROS 2 bag", "name the .mcap file beside it"),
+];
+
+/// Elements of robot descriptions in XML.
+const ROBOTS: [(&[u8], &str); 3] = [
+    (b"<robot", "a robot description (URDF)"),
+    (b"<sdf", "a robot description (SDF)"),
+    (b"<mujoco", "a robot description (MJCF of MuJoCo)"),
 ];
 
 /// Number of bytes that are looked at for the kind of a file.
@@ -164,10 +173,23 @@ fn telemetry(first: &[u8]) -> Option<Foreign> {
 
 fn text(first: &[u8]) -> Option<Foreign> {
     let trimmed = first.strip_prefix(b"\xef\xbb\xbf").unwrap_or(first).trim_ascii_start();
-    let begins = |magic: &&Magic| {
-        trimmed.get(..magic.0.len()).is_some_and(|begin| begin.eq_ignore_ascii_case(magic.0))
-    };
+    let begins = |magic: &&Magic| begins_with(trimmed, magic.0);
+    if let Some(name) = robot(first).filter(|_| begins_with(trimmed, b"<?xml")) {
+        return Some(Foreign { name, advice: EXPORT });
+    }
     TEXTS.iter().find(begins).map(|magic| Foreign { name: magic.1, advice: magic.2 })
+}
+
+fn begins_with(text: &[u8], begin: &[u8]) -> bool {
+    text.get(..begin.len()).is_some_and(|found| found.eq_ignore_ascii_case(begin))
+}
+
+/// Returns the name of the robot description that a text begins, whatever stands above its first element.
+#[must_use]
+pub fn robot(text: &[u8]) -> Option<&'static str> {
+    let first = &text[..text.len().min(LOOKED_AT)];
+    let has = |element: &[u8]| first.windows(element.len()).any(|window| window == element);
+    ROBOTS.iter().find(|(element, _)| has(element)).map(|(_, name)| *name)
 }
 
 /// Bytes that are no text: only zeros, or too many control characters. UTF-16 is a text.
@@ -181,35 +203,8 @@ fn binary(bytes: &[u8]) -> Option<Foreign> {
         |byte: &&u8| byte.is_ascii_control() && !matches!(**byte, b'\t' | b'\n' | b'\r' | 0x0c | 0x1a);
     let control = first.iter().filter(is_control).count();
     let is_binary = control as f64 > CONTROL_SHARE * first.len() as f64;
-    (is_binary && utf16(bytes).is_none())
+    (is_binary && encoding::utf16(bytes).is_none())
         .then_some(Foreign { name: "binary, of an unknown format", advice: EXPORT })
-}
-
-/// Order of the two bytes of a character.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Utf16 {
-    /// The low byte first.
-    Little,
-    /// The high byte first.
-    Big,
-}
-
-/// The order of bytes of a text in UTF-16: by its mark, else by where the zeros of its ASCII characters are.
-#[must_use]
-pub fn utf16(bytes: &[u8]) -> Option<Utf16> {
-    const PAIRS_MIN: usize = 2;
-    match bytes {
-        [0xFF, 0xFE, ..] => return Some(Utf16::Little),
-        [0xFE, 0xFF, ..] => return Some(Utf16::Big),
-        _ => {}
-    }
-    let pairs = || bytes[..bytes.len().min(LOOKED_AT)].chunks_exact(2);
-    let is_text = |byte: u8| matches!(byte, b'\t' | b'\n' | b'\r' | b' '..=b'~');
-    let all = |holds: &dyn Fn(&[u8]) -> bool| pairs().count() >= PAIRS_MIN && pairs().all(holds);
-    if all(&|pair| pair[1] == 0 && is_text(pair[0])) {
-        return Some(Utf16::Little);
-    }
-    all(&|pair| pair[0] == 0 && is_text(pair[1])).then_some(Utf16::Big)
 }
 
 #[cfg(test)]
@@ -223,7 +218,7 @@ mod tests {
     #[test]
     fn formats_are_named_by_their_first_bytes_with_what_converts_them() {
         let tar = [vec![b'a'; 257], b"ustar\x0000".to_vec()].concat();
-        let cases: [(&[u8], &str, &str); 34] = [
+        let cases: [(&[u8], &str, &str); 35] = [
             (b"#ROSBAG V2.0\n", "a bag of ROS 1", "rosbags-convert"),
             (b"SQLite format 3\0", ".db3", "mcap convert"),
             (b"\xa3\x95\x80\x80YFMT", "ArduPilot", "mavlogdump.py"),
@@ -253,7 +248,8 @@ mod tests {
             (b"\x89MCAP0\r\n\x01", "MCAP", "flights file"),
             (b"\0\x05\x9f\0\0\0\0\0\xfd\x1c", "telemetry", "mavlogdump.py"),
             (b"  <!DOCTYPE HTML><html>", "web page", "download"),
-            (b"<?xml version=\"1.0\"?><robot>", "XML", "CSV"),
+            (b"<?xml version=\"1.0\"?><log>", "XML", "CSV"),
+            (b"<?xml version=\"1.0\"?>\n<!-- mine -->\n<robot>", "URDF", "CSV"),
             (b"\xef\xbb\xbf{\"t\": [0, 1]}", "JSON", "CSV"),
             (b"\x7fELF\x02", "program", "name the log"),
             (b"\x01\x02\x03\x04\x05\x06\x07\x08\x00\x01\x02", "unknown format", "CSV"),
@@ -290,8 +286,5 @@ mod tests {
         for bytes in texts {
             assert_eq!(of(bytes), None, "{bytes:?}");
         }
-        assert_eq!(utf16(texts[6]), Some(Utf16::Little));
-        assert_eq!(utf16(texts[7]), Some(Utf16::Big));
-        assert_eq!((utf16(b"t,x\n"), utf16(b"")), (None, None));
     }
 }

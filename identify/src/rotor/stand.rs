@@ -8,7 +8,9 @@ use diagnostics::{Diagnostic, ParameterError};
 use flights::Role;
 use serde::Deserialize;
 use vehicles::Vehicle;
+use vehicles::table::Dialect;
 use vehicles::variables::expand;
+use vehicles::wall_clock;
 
 use super::error::RotorError;
 
@@ -46,6 +48,9 @@ pub struct StaticLog {
     pub file: PathBuf,
     /// Where the log is a recording: the topic whose fields are read.
     pub topic: Option<String>,
+    /// Form of a CSV file that does not show it.
+    #[serde(default)]
+    pub csv: Dialect,
     /// What it is for.
     #[serde(default = "fit")]
     pub role: Role,
@@ -76,6 +81,9 @@ pub struct DynamicLog {
     pub file: PathBuf,
     /// Where the log is a recording: the topic whose fields are read.
     pub topic: Option<String>,
+    /// Form of a CSV file that does not show it.
+    #[serde(default)]
+    pub csv: Dialect,
     /// What it is for.
     #[serde(default = "fit")]
     pub role: Role,
@@ -132,6 +140,8 @@ pub struct Source<'s> {
     pub file: &'s Path,
     /// Where it is a recording: the topic.
     pub topic: Option<&'s str>,
+    /// Form of a table.
+    pub csv: &'s Dialect,
     /// Where the time of a table stands.
     pub time: Option<&'s Column>,
     /// The columns by their keys in the stand file.
@@ -147,7 +157,8 @@ impl StaticLog {
             ("torque", self.torque.as_ref()),
         ];
         let columns = columns.into_iter().filter_map(|(key, column)| Some((key, column?))).collect();
-        Source { file: &self.file, topic: self.topic.as_deref(), time: self.time.as_ref(), columns }
+        let topic = self.topic.as_deref();
+        Source { file: &self.file, topic, csv: &self.csv, time: self.time.as_ref(), columns }
     }
 }
 
@@ -155,7 +166,8 @@ impl DynamicLog {
     /// The log with all of its columns.
     pub fn source(&self) -> Source<'_> {
         let columns = vec![("speed", &self.speed), ("command", &self.command)];
-        Source { file: &self.file, topic: self.topic.as_deref(), time: self.time.as_ref(), columns }
+        let topic = self.topic.as_deref();
+        Source { file: &self.file, topic, csv: &self.csv, time: self.time.as_ref(), columns }
     }
 
     /// Whether the command is the speed that the rotor is asked for, and not the vehicle's own command.
@@ -229,7 +241,7 @@ impl Column {
 
     /// Whether its cells are times as `YYYY-MM-DD HH:MM:SS:mmm`.
     pub fn is_wall_clock(&self) -> bool {
-        self.unit == "wall clock"
+        self.unit == wall_clock::UNIT
     }
 
     /// What takes its cells to SI, a speed to that of the rotor; known to be right after [`Stand::read`].
