@@ -2,6 +2,7 @@
 
 use crate::flight::{Reference, manifest};
 use crate::saboteur::{AWAITED_VARIABLE, FAULT_VARIABLE, Fault, TICK_VARIABLE};
+use crate::skipped::skip;
 use crate::support::{Ended, HUMMINGBUS, Place, partial, poll, repository};
 use rustix::process::{Signal, kill_process};
 use std::process::Command;
@@ -22,7 +23,7 @@ fn with_room(room_kib: u32, shell: &str, args: &[&str]) -> Option<Command> {
         command
     };
     if !unshare(&mount).status().is_ok_and(|status| status.success()) {
-        println!("NOT SHOWN: no file system can be mounted here, so /dev/shm cannot be made small");
+        skip("no file system can be mounted here, so /dev/shm cannot be made small");
         return None;
     }
     let mut command = unshare(&format!("{mount} || exit 9; {shell}"));

@@ -1,5 +1,6 @@
 //! What dead runs left is removed, and nothing of live ones, wherever their temporary files lie.
 
+use crate::skipped::skip;
 use crate::support::{ENDLESS, Launch, Place, poll, repository};
 use rustix::process::Signal;
 use serde_json::Value;
@@ -341,7 +342,7 @@ fn names_of_runs_that_are_no_files_of_runs_hinder_nobody_and_lead_nowhere() {
     drop(strange);
     let strange = Strange::new(&target);
     if strange.0.iter().any(|path| std::os::unix::fs::lchown(path, Some(65534), None).is_err()) {
-        println!("NOT SHOWN for names of another user, which only root can give away");
+        skip("only root can give names to another user");
         return;
     }
     require_unmoved(&place, &target);

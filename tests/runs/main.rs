@@ -23,6 +23,7 @@
 //! - [`laps`], [`plot`]: recordings that are written, and pictures of them
 //! - [`urdf`]: bodies of vehicles for other tools
 //! - [`rights`]: rights that a run lacks are named
+//! - [`skipped`]: tests that cannot run here
 //! - [`sensors`]: sensors read what they should, and hand over what is under way
 //! - [`replay`]: the measured flight
 //! - [`validate`]: measured commands flown by vehicles side by side
@@ -61,6 +62,7 @@ mod rights;
 mod scenarios;
 mod scenes;
 mod sensors;
+mod skipped;
 #[allow(dead_code, reason = "shared with tests/faults")]
 mod support;
 mod swap;
