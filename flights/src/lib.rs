@@ -17,6 +17,7 @@
 //! | `held_out`, `twin` | whether test flights hold what parameters are fitted on: by file and time, by samples |
 //! | `state` | errors of a simulated state against the measured one |
 //! | `canonical` | a flight as one CSV table |
+//! | `played` | a flight as it is played, and the windows that a replay counts |
 //! | `error` | what can be wrong |
 
 mod agreement;
@@ -42,6 +43,7 @@ mod log;
 mod logs;
 mod mcap_log;
 mod plausible;
+mod played;
 mod quantity;
 mod reading;
 mod set;
@@ -51,11 +53,13 @@ pub mod state;
 mod twin;
 mod ulog;
 
-pub use canonical::{COLUMNS, Canonical, HEADER, csv, write_csv};
+pub use canonical::{COLUMNS, Canonical, HEADER, Row, csv, write_csv};
 pub use error::{FlightsError, LogError, Spot};
 pub use finding::Finding;
 pub use flight::{Channel, Flight, Role};
 pub use held_out::same_file;
+pub use jumps::{leave_out_jumps, position_jumps};
+pub use played::Played;
 pub use quantity::Quantity;
 pub use set::{FlightSet, ReadFile};
 pub use span::{Moment, Sparse};

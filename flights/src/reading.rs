@@ -81,7 +81,7 @@ impl Reading<'_> {
         let part = self.part(&flight, origin_s);
         yaw.iter_mut().for_each(|yaw| self.shift(Quantity::Attitude, &mut yaw.time_s, origin_s));
         self.assume(&mut flight, yaw)?;
-        jumps::leave_out(&mut flight);
+        jumps::leave_out_jumps(&mut flight);
         self.turn_force(&mut flight)?;
         say_gaps(&mut flight);
         self.check_something_is_left(&flight)?;
