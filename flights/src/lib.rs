@@ -8,7 +8,7 @@
 //! | `quantity`, `frame` | units and frames |
 //! | `logs` | which logs flights are read from: names and patterns |
 //! | `log` | what every log can do: samples of numbers by name |
-//! | `formats` | the formats of logs: `csv_log`, `mcap_log`, `ulog`, `crazyflie`, `bytes`, `arrays` |
+//! | `formats` | the formats of logs: `csv_log`, `mcap_log`, `ulog` (`ulog_messages`, `ulog_format`), `crazyflie`, `bytes`, `arrays` |
 //! | `known_types` | messages whose fields and units need not be said |
 //! | `channels`, `clean`, `jumps`, `reading` | from a log's numbers to a flight |
 //! | `specific_force` | specific force from what logs hold in its place |
@@ -52,6 +52,8 @@ mod specific_force;
 pub mod state;
 mod twin;
 mod ulog;
+mod ulog_format;
+mod ulog_messages;
 
 pub use canonical::{COLUMNS, Canonical, HEADER, Row, csv, write_csv};
 pub use error::{FlightsError, LogError, Spot};

@@ -68,6 +68,9 @@ impl Reading<'_> {
         if self.channels.is_empty() {
             (self.channels, taken) = known_types::defaults(log, self.format);
         }
+        let topics: Vec<&str> =
+            self.channels.values().filter_map(|entry| entry.get_ref().topic.as_deref()).collect();
+        log.check_clocks(&topics).map_err(|cause| self.log_error(&self.at, None, cause))?;
         let mut flight = self.read_channels(log)?;
         flight.notes.splice(0..0, taken);
         if self.format == Format::Csv {
