@@ -24,6 +24,7 @@
 //! - [`urdf`]: bodies of vehicles for other tools
 //! - [`rights`]: rights that a run lacks are named
 //! - [`sensors`]: sensors read what they should, and hand over what is under way
+//! - [`untrusted`]: names and contents of files that others made
 //! - [`replay`]: the measured flight
 //! - [`validate`]: measured commands flown by vehicles side by side
 //! - [`scenarios`]: the thesis's scenarios and those beyond
@@ -65,5 +66,6 @@ mod sensors;
 mod support;
 mod swap;
 mod terminal;
+mod untrusted;
 mod urdf;
 mod validate;
