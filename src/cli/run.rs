@@ -1,7 +1,7 @@
 //! The command `run` and its kin: check a manifest, fly it, judge its recording, say what came of it.
 
 use super::interrupts::stop_token;
-use super::output::{message, print_text, print_warnings};
+use super::output::{message, print_json, print_text, print_warnings};
 use super::profile::Files;
 use super::progress::{self, RUN};
 use anyhow::{Context, Error, Result, anyhow, bail};
@@ -14,7 +14,7 @@ use runtime::host::Host;
 use runtime::launcher::Launcher;
 use runtime::manifest::{Manifest, PaceSetting};
 use runtime::outputs::Outputs;
-use serde_json::json;
+use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 
 /// What `run` and its kin take.
@@ -116,15 +116,16 @@ pub fn run(
         summary.judge(recording, &graph.plan, &manifest.content)?;
     }
     summary.warnings = graph.warnings;
-    let mut text =
-        if arguments.json { json_text(&summary, profile.as_ref(), &files)? } else { summary.to_string() };
+    let mut text = summary.to_string();
     if let (Some(flight), Some(profile)) = (&flight, &profile) {
         let lines = files.write(&summary.manifest, flight, profile)?;
-        if !arguments.json {
-            text += &format!("\n\n{profile}\n{}", lines.join("\n"));
-        }
+        text += &format!("\n\n{profile}\n{}", lines.join("\n"));
     }
-    print_text(&text)?;
+    if arguments.json {
+        print_json(&as_json(&summary, profile.as_ref(), &files)?)?;
+    } else {
+        print_text(&text)?;
+    }
     Ok(summary.passed)
 }
 
@@ -143,19 +144,19 @@ fn broken(manifest: &Manifest, error: &Error, left: Option<&Path>, is_json: bool
             "recording": null,
             "partial_recording": left,
         });
-        print_text(&serde_json::to_string_pretty(&value)?)?;
+        print_json(&value)?;
     }
     Ok(anyhow!(text))
 }
 
 /// The summary as JSON, with the profile and its files in it.
-fn json_text(summary: &Summary, profile: Option<&Profile>, files: &Files) -> Result<String> {
+fn as_json(summary: &Summary, profile: Option<&Profile>, files: &Files) -> Result<Value> {
     let mut value = serde_json::to_value(summary)?;
     if let Some(profile) = profile {
         value["profile"] = serde_json::to_value(profile)?;
         value["profile"]["files"] = serde_json::to_value(files)?;
     }
-    Ok(serde_json::to_string_pretty(&value)?)
+    Ok(value)
 }
 
 /// Where the run is recorded: `--record`, the manifest's `record`, or beside the manifest.

@@ -25,6 +25,7 @@
 //! - [`rights`]: rights that a run lacks are named
 //! - [`skipped`]: tests that cannot run here
 //! - [`sensors`]: sensors read what they should, and hand over what is under way
+//! - [`untrusted`]: names and contents of files that others made
 //! - [`replay`]: the measured flight
 //! - [`validate`]: measured commands flown by vehicles side by side
 //! - [`scenarios`]: the thesis's scenarios and those beyond
@@ -67,5 +68,6 @@ mod skipped;
 mod support;
 mod swap;
 mod terminal;
+mod untrusted;
 mod urdf;
 mod validate;
