@@ -1,11 +1,11 @@
 //! Cleaning of a channel: what is left out, counted and said.
 
+use vehicles::gaps::GAP_PERIODS;
+
 use crate::error::{LogError, Spot};
 use crate::flight::{Channel, median, period_s};
 use crate::quantity::Quantity;
 
-/// A gap is a step longer than this many median periods.
-pub const GAP_PERIODS: f64 = 5.0;
 /// Repeats are systematic, a value held on a finer grid, if this share of the distinct values is repeated.
 const HELD_SHARE: f64 = 0.1;
 /// A quaternion whose length is further from one than this is no attitude.

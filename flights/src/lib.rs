@@ -17,6 +17,7 @@
 //! | `held_out`, `twin` | whether test flights hold what parameters are fitted on: by file and time, by samples |
 //! | `state` | errors of a simulated state against the measured one |
 //! | `canonical` | a flight as one CSV table |
+//! | `known` | stretches in which the commands determine the rotor speeds |
 //! | `played` | a flight as it is played, and the windows that a replay counts |
 //! | `error` | what can be wrong |
 
@@ -38,6 +39,7 @@ mod formats;
 mod frame;
 mod held_out;
 mod jumps;
+mod known;
 mod known_types;
 mod log;
 mod logs;
@@ -61,6 +63,7 @@ pub use finding::Finding;
 pub use flight::{Channel, Flight, Role};
 pub use held_out::same_file;
 pub use jumps::{leave_out_jumps, position_jumps};
+pub use known::{KnownRotors, SETTLE_S};
 pub use played::Played;
 pub use quantity::Quantity;
 pub use set::{FlightSet, ReadFile};

@@ -134,6 +134,8 @@ fn manifest(ticks: u32, columns: &str, initial: [f64; 4], vehicles: &[&Path]) ->
         .set("process.player.kind", "player")
         .set("process.player.data", DATA)
         .set("process.player.outputs.measured.every_ticks", every)
+        // Windows that touch a gap do not count.
+        .set("process.player.parameters.gaps", "hold")
         .set("process.player.parameters.columns", columns.parse::<toml::Table>()?)
         .set("process.recorder.kind", "recorder");
     for (number, vehicle) in vehicles.iter().enumerate() {
