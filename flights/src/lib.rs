@@ -8,7 +8,7 @@
 //! | `quantity`, `frame` | units and frames |
 //! | `logs` | which logs flights are read from: names and patterns |
 //! | `log` | what every log can do: samples of numbers by name |
-//! | `formats` | the formats of logs: `csv_log`, `mcap_log`, `ulog`, `crazyflie`, `bytes`, `arrays` |
+//! | `formats` | the formats of logs: `csv_log`, `mcap_log`, `ulog` (`ulog_messages`, `ulog_format`), `crazyflie`, `bytes`, `arrays` |
 //! | `known_types` | messages whose fields and units need not be said |
 //! | `channels`, `clean`, `jumps`, `reading` | from a log's numbers to a flight |
 //! | `specific_force` | specific force from what logs hold in its place |
@@ -17,6 +17,7 @@
 //! | `held_out`, `twin` | whether test flights hold what parameters are fitted on: by file and time, by samples |
 //! | `state` | errors of a simulated state against the measured one |
 //! | `canonical` | a flight as one CSV table |
+//! | `played` | a flight as it is played, and the windows that a replay counts |
 //! | `error` | what can be wrong |
 
 mod agreement;
@@ -42,6 +43,7 @@ mod log;
 mod logs;
 mod mcap_log;
 mod plausible;
+mod played;
 mod quantity;
 mod reading;
 mod set;
@@ -50,12 +52,16 @@ mod specific_force;
 pub mod state;
 mod twin;
 mod ulog;
+mod ulog_format;
+mod ulog_messages;
 
-pub use canonical::{COLUMNS, Canonical, HEADER, csv, write_csv};
+pub use canonical::{COLUMNS, Canonical, HEADER, Row, csv, write_csv};
 pub use error::{FlightsError, LogError, Spot};
 pub use finding::Finding;
 pub use flight::{Channel, Flight, Role};
 pub use held_out::same_file;
+pub use jumps::{leave_out_jumps, position_jumps};
+pub use played::Played;
 pub use quantity::Quantity;
 pub use set::{FlightSet, ReadFile};
 pub use span::{Moment, Sparse};

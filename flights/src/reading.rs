@@ -68,6 +68,9 @@ impl Reading<'_> {
         if self.channels.is_empty() {
             (self.channels, taken) = known_types::defaults(log, self.format);
         }
+        let topics: Vec<&str> =
+            self.channels.values().filter_map(|entry| entry.get_ref().topic.as_deref()).collect();
+        log.check_clocks(&topics).map_err(|cause| self.log_error(&self.at, None, cause))?;
         let mut flight = self.read_channels(log)?;
         flight.notes.splice(0..0, taken);
         if self.format == Format::Csv {
@@ -81,7 +84,7 @@ impl Reading<'_> {
         let part = self.part(&flight, origin_s);
         yaw.iter_mut().for_each(|yaw| self.shift(Quantity::Attitude, &mut yaw.time_s, origin_s));
         self.assume(&mut flight, yaw)?;
-        jumps::leave_out(&mut flight);
+        jumps::leave_out_jumps(&mut flight);
         self.turn_force(&mut flight)?;
         say_gaps(&mut flight);
         self.check_something_is_left(&flight)?;

@@ -256,7 +256,7 @@ fn an_array_that_a_ulog_claims_is_no_longer_than_a_message() {
     let mut log = log[..16].to_vec();
     log.extend(message(b'F', named.as_bytes()));
     log.extend(message(b'A', b"\0\x01\0sensor_combined"));
-    log.extend(message(b'D', &[1, 0, 0, 0]));
+    log.extend(message(b'D', &[&[1, 0][..], &[0; 60_008]].concat()));
     assert!(refused(ULOG, &log).contains("a field name of 60000 bytes"));
 }
 

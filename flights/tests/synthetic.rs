@@ -536,7 +536,7 @@ battery_voltage = { fields = ["pm.vbatMV"], unit = "mV" }
 "#;
 
 #[test]
-fn a_crazyflie_log_is_read_and_its_checksum_checked() {
+fn a_crazyflie_log_is_read() {
     let place = Place::new();
     let log = support::crazyflie_log(200);
     place.write("log00", &log);
@@ -545,16 +545,61 @@ fn a_crazyflie_log_is_read_and_its_checksum_checked() {
     assert!((flight.specific_force.values[0][2] - 9.80665).abs() < 1e-6);
     assert_eq!(flight.battery_voltage.values[0], [3.7]);
     assert!((flight.command.time_s[3] - 0.03).abs() < 1e-9);
-    let mut broken = log.clone();
-    broken[100] ^= 1;
-    place.write("log00", &broken);
-    let error = place.load("log00", CRAZYFLIE, "").unwrap_err().to_string();
-    assert!(error.contains("checksum") && error.contains("copy the log"), "{error}");
+}
+
+/// Reads `log` as a Crazyflie's, by its first bytes.
+fn crazyflie(log: &[u8]) -> Result<Flight, FlightsError> {
+    let place = Place::new();
+    place.write("log00", log);
+    place.load("log00", CRAZYFLIE, "trust_units = true")
+}
+
+#[test]
+fn a_crazyflie_log_is_read_as_far_as_it_goes() {
+    let log = support::crazyflie_log(200);
+    let record = 2 + 8 + 29;
+    let start = log.len() - 4 - 200 * record;
+    let said = |flight: &Flight, part: &str| {
+        assert!(flight.notes.iter().any(|note| note.contains(part)), "`{part}`: {:?}", flight.notes);
+    };
+    for (cut, records) in [(2, 200), (14, 199), (4 + record, 199), (4 + record + 1, 198), (700, 182)] {
+        let flight = crazyflie(&log[..log.len() - cut]).unwrap();
+        assert_eq!(flight.command.time_s.len(), records, "{cut}: {:?}", flight.notes);
+        said(&flight, &format!("cut or damaged; {records} records were read"));
+    }
+    // Cut, with a checksum that fits.
     let mut cut = log[..log.len() - 10].to_vec();
     cut.extend(crc32(&cut).to_le_bytes());
-    place.write("log00", &cut);
-    let error = place.load("log00", CRAZYFLIE, "").unwrap_err().to_string();
-    assert!(error.contains("is cut"), "{error}");
+    said(&crazyflie(&cut).unwrap(), "33 bytes of the log are no record");
+    // A wrong event, a wrong byte in a value, and bytes that are missing, all in the middle.
+    let mut broken = log.clone();
+    broken[start + 100 * record] = 7;
+    let flight = crazyflie(&broken).unwrap();
+    assert_eq!(flight.command.time_s.len(), 199);
+    said(&flight, "199 records were read, 43 bytes that are no record left out");
+    let mut broken = log.clone();
+    broken[start + 100 * record + 10] ^= 1;
+    said(&crazyflie(&broken).unwrap(), "200 records were read, 0 bytes");
+    let missing = [&log[..start + 100 * record + 20], &log[start + 120 * record + 7..]].concat();
+    let flight = crazyflie(&missing).unwrap();
+    assert!((178..=180).contains(&flight.command.time_s.len()), "{:?}", flight.notes);
+    // Nothing is left of it.
+    let error = crazyflie(&log[..start + 10]).unwrap_err().to_string();
+    assert!(error.contains("none of 0"), "{error}");
+    let error = crazyflie(&log[..start - 10]).unwrap_err().to_string();
+    assert!(error.contains("a whole header") && error.contains("copy the log"), "{error}");
+}
+
+#[test]
+fn a_crazyflie_log_of_another_version_is_named_without_its_format() {
+    for version in [1, 3] {
+        let mut log = support::crazyflie_log(20);
+        log[1] = version;
+        let error = crazyflie(&log).unwrap_err().to_string();
+        for part in ["a log of version 2", &format!("found version {version}"), "newer firmware"] {
+            assert!(error.contains(part), "`{part}` is not in: {error}");
+        }
+    }
 }
 
 const ULOG: &str = r#"

@@ -61,6 +61,7 @@ mod whiteness;
 mod window;
 
 pub use clock::Lateness;
+pub use faults::Fault;
 pub use prepared::Equation;
 pub use regressor::Regressor;
 pub use sensing::SensorErrors;

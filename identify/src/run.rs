@@ -1,9 +1,9 @@
 //! The whole way: from flights and the declared vehicle to a report.
 
-use crate::align::align;
+use crate::align::{Offsets, align};
 use crate::candidate::{Candidate, candidates, free_parameters};
 use crate::clock::Lateness;
-use crate::faults;
+use crate::faults::{self, Fault};
 use crate::fit::{FitResult, Problem, Weights};
 use crate::model::Model;
 use crate::noise::{self, Floor};
@@ -76,6 +76,15 @@ pub enum IdentifyError {
         /// Why.
         reason: String,
     },
+    /// Flights whose faulty channels leave too little.
+    #[error("{cause}. Not used because of faults: {faults}")]
+    Faulty {
+        /// The faults.
+        faults: String,
+        /// The consequence.
+        #[source]
+        cause: Box<IdentifyError>,
+    },
 }
 
 /// What was found, with what is needed to draw it.
@@ -93,6 +102,8 @@ pub struct Outcome {
     pub late: BTreeMap<String, Lateness>,
     /// Accepted delays and biases of sensors, for the same.
     pub sensor_errors: SensorErrors,
+    /// The flights without their faulty channels; `None` if no channel has a fault.
+    pub believed: Option<FlightSet>,
 }
 
 /// The residuals of one equation of one flight, before and after, and what was measured.
@@ -122,9 +133,9 @@ pub fn identify(set: &FlightSet, progress: &mut dyn FnMut(&str)) -> Result<Outco
     let vehicle = Vehicle::load(&set.vehicle)?;
     let declared = entry::resolve(&vehicle.effects)?;
     progress("preparing flights");
-    let (mut problem, flight_reports) = problem(&vehicle, &declared, set)?;
-    let offsets = align(&mut problem);
-    let faults = faults::find(&mut problem);
+    let (mut faults, believed) = faults::in_channels(&problem(&vehicle, &declared, set)?.0, set);
+    let set = believed.as_ref().unwrap_or(set);
+    let (mut problem, flight_reports, offsets) = aligned(&vehicle, &declared, set, &mut faults)?;
     let all: Vec<&Prepared> = problem.flights().collect();
     let (open, unidentifiable) = candidates(&problem.model.parameters, &all);
     progress("trims");
@@ -164,7 +175,43 @@ pub fn identify(set: &FlightSet, progress: &mut dyn FnMut(&str)) -> Result<Outco
     let late = problem.flights().map(|flight| (name(flight), flight.late)).collect();
     let regressors =
         problem.flights().map(|flight| (name(flight), regressors(&problem.model, flight, values))).collect();
-    Ok(Outcome { pictures: pictures(&problem, &selection), regressors, effects, late, sensor_errors, report })
+    let pictures = pictures(&problem, &selection);
+    drop(problem);
+    Ok(Outcome { pictures, regressors, effects, late, sensor_errors, report, believed })
+}
+
+/// The problem, its flights as reported, and their clock offsets.
+type Aligned<'f> = (Problem<'f>, Vec<FlightReport>, Vec<(String, Offsets)>);
+
+/// The flights of `set` with aligned clocks, without rotors and trims that have a fault; these join `faults`.
+fn aligned<'f>(
+    vehicle: &Vehicle,
+    declared: &[Effect],
+    set: &'f FlightSet,
+    faults: &mut Vec<Fault>,
+) -> Result<Aligned<'f>, IdentifyError> {
+    let (mut problem, reports) =
+        problem(vehicle, declared, set).map_err(|cause| without_faulty(faults, cause))?;
+    let offsets = align(&mut problem);
+    faults.extend(faults::of_rotors(&mut problem));
+    for (role, flights) in [(Role::Fit, &problem.estimation), (Role::Test, &problem.validation)] {
+        if flights.is_empty() {
+            return Err(without_faulty(faults, no_flight(set, role)));
+        }
+    }
+    Ok((problem, reports, offsets))
+}
+
+/// Finds the faults of the flights of `set` without fitting anything.
+///
+/// # Errors
+/// As [`identify`].
+pub fn faults(set: &FlightSet) -> Result<Vec<Fault>, IdentifyError> {
+    let vehicle = Vehicle::load(&set.vehicle)?;
+    let declared = entry::resolve(&vehicle.effects)?;
+    let (mut faults, believed) = faults::in_channels(&problem(&vehicle, &declared, set)?.0, set);
+    aligned(&vehicle, &declared, believed.as_ref().unwrap_or(set), &mut faults)?;
+    Ok(faults)
 }
 
 /// The flights on their grids, with the declared model.
@@ -216,6 +263,18 @@ pub fn problem<'f>(
     let problem =
         Problem { model, estimation, validation, weights, block_s, shared_late_s: 0.0, has_own_trims: false };
     Ok((problem, reports))
+}
+
+/// The error of a role whose flights have too little left besides their faults.
+fn without_faulty(faults: &[Fault], cause: IdentifyError) -> IdentifyError {
+    if faults.is_empty() {
+        return cause;
+    }
+    let one = |fault: &Fault| {
+        format!("`{}`, {}: {}; {}", fault.flight, fault.channel, fault.finding(), fault.advice)
+    };
+    let faults = faults.iter().map(one).collect::<Vec<_>>().join("; ");
+    IdentifyError::Faulty { faults, cause: Box::new(cause) }
 }
 
 fn no_flight(set: &FlightSet, role: Role) -> IdentifyError {

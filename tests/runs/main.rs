@@ -24,6 +24,7 @@
 //! - [`laps`], [`plot`]: recordings that are written, and pictures of them
 //! - [`urdf`]: bodies of vehicles for other tools
 //! - [`rights`]: rights that a run lacks are named
+//! - [`skipped`]: tests that cannot run here
 //! - [`sensors`]: sensors read what they should, and hand over what is under way
 //! - [`untrusted`]: names and contents of files that others made
 //! - [`replay`]: the measured flight
@@ -64,6 +65,7 @@ mod rights;
 mod scenarios;
 mod scenes;
 mod sensors;
+mod skipped;
 #[allow(dead_code, reason = "shared with tests/faults")]
 mod support;
 mod swap;

@@ -3,9 +3,8 @@
 //! The player plays the flight from its first moment on. For each vehicle and each length of window a plant flies the
 //! commands, set to the measured state at the start of each window; all in one run, so that all fly the same.
 
-use super::rows;
 use anyhow::{Context, Result, bail};
-use flights::Flight;
+use flights::{Flight, Played};
 use recorder::reader::Recording;
 use runtime::event::{RunEvent, StopToken};
 use runtime::host::Host;
@@ -46,8 +45,8 @@ pub struct Replay {
     /// Where its files are.
     pub folder: PathBuf,
     manifest: ManifestBuilder,
-    /// The moment of the flight at which tick 0 lies.
-    pub start_s: f64,
+    /// What the player plays; tick 0 lies at its first row.
+    pub played: Played,
     /// Ticks of the run.
     ticks: u32,
     /// Held so that no other command writes to the folder.
@@ -72,10 +71,9 @@ impl Replay {
         for output in [data.clone(), folder.join(MANIFEST), folder.join(RECORDING)] {
             require_no_input(&output, flight, vehicles)?;
         }
-        let (_, text) = flights::csv(&rows::with_rows_at_commands(flight))?;
-        output_file::write(&data, &CSV, |out| out.write_all(text.as_bytes()))?;
-        let (start_s, end_s) =
-            rows::span_s(&text).with_context(|| format!("{} has no rows", data.display()))?;
+        let played = Played::of(flight)?;
+        output_file::write(&data, &CSV, |out| out.write_all(played.csv().as_bytes()))?;
+        let (start_s, end_s) = played.span_s();
         let ticks = ticks(end_s - start_s)?;
         let initial = command_at(flight, start_s).context("it has no motor commands")?;
         let manifest = manifest(ticks, flights::COLUMNS, initial, vehicles)?;
@@ -83,7 +81,7 @@ impl Replay {
         output_file::write(&folder.join(MANIFEST), &WRITTEN, |out| {
             write!(out, "{MANIFEST_START}\n\n{manifest}")
         })?;
-        Ok(Self { folder, manifest, start_s, ticks, _lock: lock })
+        Ok(Self { folder, manifest, played, ticks, _lock: lock })
     }
 
     /// Flies; returns how long that took on the host, in seconds, and the recording.
