@@ -4,7 +4,7 @@ use super::files::PAGE;
 use super::interrupts::stop_token;
 use super::output::{print_json, print_text, readable};
 use super::progress;
-use anyhow::{Context, Result, bail};
+use anyhow::{Result, bail};
 use clap::{Args, Subcommand};
 use flights::FlightSet;
 use hummingbus::COMPONENTS;
@@ -142,7 +142,7 @@ fn flights_of(arguments: &IdentifyArguments, file: &Path, out: &Path) -> Result<
 /// # Errors
 /// If another command writes to it, or one of the files would replace something of another kind or one of `inputs`.
 fn claim(out: &Path, files: &[(&str, &Kind)], inputs: &[&Path]) -> Result<File> {
-    std::fs::create_dir_all(out).with_context(|| format!("cannot make the folder {}", out.display()))?;
+    output_file::make_folder(out)?;
     for (name, kind) in files {
         let path = out.join(name);
         output_file::check(&path, kind)?;

@@ -16,6 +16,7 @@
 //! - [`refusals`], [`refused_parameters`], [`refused_conditions`], [`refused_flights`]: manifests that are wrong
 //! - [`manifests`]: includes, sets, settings
 //! - [`backups`]: swaps, shadows and standbys in manifests
+//! - [`planted`]: links that another user has planted
 //! - [`processes`]: sidecars, and how a process runs on the host
 //! - [`commands`]: the other subcommands, exit codes and JSON
 //! - [`outputs`]: what runs and other commands write, where something is there already
@@ -49,6 +50,7 @@ mod loss;
 mod manifests;
 mod nodes;
 mod outputs;
+mod planted;
 mod plot;
 mod processes;
 mod processors;

@@ -65,7 +65,7 @@ impl Replay {
     /// A flight without commands or shorter than the shortest window, or a folder that cannot be written to.
     pub fn prepare(flight: &Flight, vehicles: &[&Path], folder: &Path) -> Result<Self> {
         let folder = std::path::absolute(folder)?.join(file_name(&flight.name));
-        std::fs::create_dir_all(&folder).with_context(|| format!("cannot create {}", folder.display()))?;
+        output_file::make_folder(&folder)?;
         let lock = output_file::lock_folder(&folder)?;
         let data = folder.join(DATA);
         for output in [data.clone(), folder.join(MANIFEST), folder.join(RECORDING)] {
