@@ -6,6 +6,7 @@ use bus::component::{Component, Info, StepError};
 use bus::context::{NodeContext, StepContext};
 use bus::messages::{MeasuredState, MotorCommand, Quaternion};
 use diagnostics::parameter::{ParameterError, refuse};
+use inputs::InputFiles;
 use serde::Deserialize;
 use std::path::PathBuf;
 
@@ -22,8 +23,8 @@ pub struct Parameters {
     columns: ColumnMap,
 }
 
-fn load(parameters: &Parameters) -> Result<FlightLog, ParameterError> {
-    let log = FlightLog::load(&parameters.data, &parameters.columns)?;
+fn load(parameters: &Parameters, files: &InputFiles) -> Result<FlightLog, ParameterError> {
+    let log = FlightLog::load(files, &parameters.data, &parameters.columns)?;
     let (from_s, length_s) = (parameters.from_s, log.duration_s());
     refuse(!(0.0..length_s).contains(&from_s), "from_s", || {
         format!("`from_s` is {from_s} s, the flight lasts {length_s:.3} s")
@@ -79,8 +80,8 @@ impl Component for Player {
     type Outputs = Outputs;
     type State = ();
 
-    fn new(parameters: Parameters, _: &NodeContext<'_>) -> Result<Self, ParameterError> {
-        Ok(Self { log: load(&parameters)?, from_s: parameters.from_s, hint: 0 })
+    fn new(parameters: Parameters, context: &NodeContext<'_>) -> Result<Self, ParameterError> {
+        Ok(Self { log: load(&parameters, &context.files)?, from_s: parameters.from_s, hint: 0 })
     }
 
     fn rehearse(self, context: &NodeContext<'_>) -> Result<(), ParameterError> {
