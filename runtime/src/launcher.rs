@@ -258,10 +258,10 @@ fn require_host(host: &Host, manifest: &Manifest, graph: &Graph) -> Result<()> {
 /// it includes, and the models.
 fn prepare(manifest: &Manifest, graph: &mut Graph, recording: Option<&Path>, run_dir: &RunDir) -> Result<()> {
     let (files, recorded) = (graph.files.listing_anew(), run_dir.path().join("manifest.toml"));
-    let own = (manifest.path.as_path(), manifest.recorded_text.as_str(), recorded.as_path());
+    let whole = (manifest.path.as_path(), manifest.recorded_text.as_str(), recorded.as_path());
     let texts = manifest.included().map(|(path, text)| (path, text, path));
     let mut attachments = Vec::new();
-    for (path, text, key) in std::iter::once(own).chain(texts) {
+    for (path, text, key) in std::iter::once(whole).chain(texts) {
         let key = PathBuf::from(key.to_string_lossy().into_owned());
         files.keep(&key, text.into());
         attachments.push(attachment(path, &key));
@@ -277,8 +277,8 @@ fn prepare(manifest: &Manifest, graph: &mut Graph, recording: Option<&Path>, run
             node.files = files.used();
         }
     }
-    let nodes = graph.plan.nodes.iter().chain(graph.backups.iter().map(|backup| &backup.plan));
-    Ok(nodes.map(|node| store_files(&files, run_dir.path(), node)).collect::<Result<(), _>>()?)
+    let mut nodes = graph.plan.nodes.iter().chain(graph.backups.iter().map(|backup| &backup.plan));
+    Ok(nodes.try_for_each(|node| store_files(&files, run_dir.path(), node))?)
 }
 
 /// What a recorder attaches under the name of `path`: the file `key` among those of the run.
