@@ -8,7 +8,9 @@ use crate::error::RecordingError;
 use memmap2::Mmap;
 use std::collections::BTreeMap;
 use std::fs::File;
+use std::ops::Deref;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 /// A message of a recording.
 #[derive(Debug)]
@@ -50,9 +52,29 @@ pub struct Topic {
 #[derive(Debug)]
 pub struct Recording {
     path: PathBuf,
-    bytes: Mmap,
+    bytes: Bytes,
     topics: BTreeMap<String, Topic>,
     cut: Option<Cut>,
+}
+
+/// The bytes of a recording.
+#[derive(Debug)]
+enum Bytes {
+    /// Those of the file, read as they are needed.
+    Mapped(Mmap),
+    /// Those that were read before.
+    Read(Arc<[u8]>),
+}
+
+impl Deref for Bytes {
+    type Target = [u8];
+
+    fn deref(&self) -> &[u8] {
+        match self {
+            Self::Mapped(map) => map,
+            Self::Read(bytes) => bytes,
+        }
+    }
 }
 
 /// How a recording ends whose writer did not finish it.
@@ -91,7 +113,18 @@ impl Recording {
     /// # Errors
     /// As [`Recording::open`].
     pub fn of_file(file: &File, path: &Path) -> Result<Self, RecordingError> {
-        let bytes = map(file, path)?;
+        Self::complete(Bytes::Mapped(map(file, path)?), path)
+    }
+
+    /// The complete recording that `bytes` are, which is called `path` in messages.
+    ///
+    /// # Errors
+    /// As [`Recording::open`].
+    pub fn of_bytes(bytes: Arc<[u8]>, path: &Path) -> Result<Self, RecordingError> {
+        Self::complete(Bytes::Read(bytes), path)
+    }
+
+    fn complete(bytes: Bytes, path: &Path) -> Result<Self, RecordingError> {
         let summary = summary(&bytes).map_err(|damage| RecordingError::content(path, damage))?;
         let missing = || RecordingError::content(path, "it has no summary section");
         let topics = topics(&summary.ok_or_else(missing)?.channels, path)?;
@@ -105,7 +138,7 @@ impl Recording {
     /// If the file cannot be read or is no MCAP file.
     pub fn salvage(path: &Path) -> Result<Self, RecordingError> {
         let file = File::open(path).map_err(RecordingError::file("open", path))?;
-        let bytes = map(&file, path)?;
+        let bytes = Bytes::Mapped(map(&file, path)?);
         if !bytes.starts_with(mcap::MAGIC) || bytes.ends_with(mcap::MAGIC) && bytes.len() > mcap::MAGIC.len()
         {
             return Self::of_file(&file, path);
