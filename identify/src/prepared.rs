@@ -503,7 +503,12 @@ fn windows(equation: Equation, flight: &Flight, step_s: f64) -> (Window, Window)
 
 /// The time in which all compared channels were sampled.
 fn common_span(flight: &Flight, equations: &[Equation]) -> Option<(f64, f64)> {
-    let drive = if flight.command.is_empty() { flight.rotor_speed.span_s() } else { flight.command.span_s() };
+    let drive = match flight.command.span_s() {
+        None => flight.rotor_speed.span_s(),
+        // The last command holds.
+        Some((first_s, _)) if flight.commands_on_change => Some((first_s, f64::INFINITY)),
+        span => span,
+    };
     let motion = [
         flight.position.span_s().filter(|_| equations.contains(&Equation::Acceleration)),
         flight.velocity.span_s().filter(|_| of_velocity(flight)),

@@ -42,8 +42,8 @@ pub enum Unusable {
     },
     /// Commands with gaps wherever the motion was measured.
     #[error(
-        "its commands have gaps: the rotor speeds are known {known}, and the motion was measured from {from_s:.3} s to \
-         {to_s:.3} s; if the log writes commands only on change, set `on_change = true` in the channel `command`"
+        "its commands and its motion were never logged together, besides gaps of the commands: the rotor speeds are known \
+         {known}, the motion was measured from {from_s:.3} s to {to_s:.3} s; if the log writes commands only on change, set `on_change = true` in the channel `command`"
     )]
     UnknownRotors {
         /// Stretches with known rotor speeds.

@@ -172,7 +172,7 @@ mod tests {
         std::fs::write(&path, declared.to_string()).unwrap();
         let effects = plant::effects::entry::resolve(&Vehicle::load(&path).unwrap().effects).unwrap();
 
-        let text = text(&path, &effects, &empty_report()).unwrap();
+        let text = text(&InputFiles::default(), &path, &effects, &empty_report()).unwrap();
 
         let read = Vehicle::parse(&text, "identified.toml").unwrap();
         let parameter = &read.effects[0].parameters[0];
