@@ -16,9 +16,13 @@
 //! | `rig` | test rigs: joints and stops |
 
 mod body;
+mod cholesky;
+mod cone;
 mod contacts;
+mod direct;
 mod free_bodies;
 pub mod hull;
+mod islands;
 mod joint_forces;
 mod joints;
 mod rig;

@@ -10,9 +10,10 @@
 use super::body::{lay_out, mobility, set_twist, shift, twist};
 use super::contacts::{Contacts, Sighting};
 use super::free_bodies::{Carrier, FIRST_BODY, FreeBodies, VEHICLE, Work};
+use super::islands::Islands;
 use super::joints::Line;
 use super::rig::{self, Mounted};
-use super::solver::{self, Bilateral, Body, Friction, Row, Unilateral, join, part};
+use super::solver::{Bilateral, Body, Friction, Row, Unilateral, join, part};
 use super::world::{Near, World};
 use crate::actuation::Actuation;
 use crate::backend::Neighbour;
@@ -77,6 +78,7 @@ pub(super) struct Scratch {
     /// Places of ropes among the constraints, and among the joints.
     ropes: Vec<[usize; 2]>,
     free_bodies: Work,
+    islands: Islands,
 }
 
 impl Scratch {
@@ -461,7 +463,7 @@ impl Motion {
         scratch.forget();
         scratch.before.clone_from(&scratch.then);
         scratch.then.clone_from(&scratch.now);
-        solver::solve(&mut scratch.then, &mut scratch.constraints, &scratch.joints);
+        scratch.find_impulses();
         let (more, dull) = (&mut scratch.before, &mut scratch.then);
         for (more, dull) in more.iter_mut().zip(&*dull) {
             more.twist -= dull.twist;
@@ -603,7 +605,7 @@ impl Scratch {
         if is_among_others {
             self.before.clone_from(&self.then);
         }
-        let is_found = solver::solve(&mut self.then, &mut self.constraints, &self.joints) < FOUND_M_S;
+        let is_found = self.find_impulses() < FOUND_M_S;
         if is_found || !is_among_others {
             return is_found;
         }
@@ -614,7 +616,12 @@ impl Scratch {
             }
         }
         self.then.clone_from(&self.before);
-        solver::solve(&mut self.then, &mut self.constraints, &self.joints) < FOUND_M_S
+        self.find_impulses() < FOUND_M_S
+    }
+
+    /// Finds the impulses for the bodies at the step's end; returns by how much a rate is off at most.
+    fn find_impulses(&mut self) -> f64 {
+        self.islands.solve(&mut self.then, &self.now, &mut self.constraints, &self.joints)
     }
 
     /// Hands what ropes pulled with over the free step to their stops, which may pull less where contacts carry: so that the
