@@ -4,7 +4,7 @@
 //! interior-point method scales both to the same point, by Nesterov and Todd's scaling (M. Andersen, J. Dahl, L. Vandenberghe,
 //! CVXOPT, 2013, "Nonnegative orthants and second-order cones").
 
-use nalgebra::{Matrix3, Vector2, Vector3};
+use nalgebra::{Vector2, Vector3};
 
 /// The unit element: the middle of the cone.
 pub(super) fn unit() -> Vector3<f64> {
@@ -42,11 +42,13 @@ pub(super) fn quotient(product: &Vector3<f64>, by: &Vector3<f64>) -> Vector3<f64
 
 /// The longest step from a point inside of the cone along `way` that stays in it; infinity where all do.
 pub(super) fn longest_step(point: &Vector3<f64>, way: &Vector3<f64>) -> f64 {
-    let (a, c) = (determinant(way), determinant(point));
-    let b = point.x * way.x - tail(point).dot(&tail(way));
-    let left = b * b - a * c;
-    let divisor = left.max(0.0).sqrt() - b;
-    if left < 0.0 || divisor <= 0.0 { f64::INFINITY } else { c / divisor }
+    // Seen from where the point is the unit element.
+    let size = determinant(point).sqrt();
+    let point = point / size;
+    let head = point.x * way.x - tail(&point).dot(&tail(way));
+    let side = tail(way) - tail(&point) * ((head + way.x) / (point.x + 1.0));
+    let sinks = side.norm() - head;
+    if sinks > 0.0 { size / sinks } else { f64::INFINITY }
 }
 
 /// The scaling W of a pair (z, s) inside of the cone: W z = W⁻¹ s.
@@ -86,18 +88,18 @@ impl Scaling {
         with_head(self.axis.x * x.x - along, &side) / self.size
     }
 
-    /// (W² + `more`)⁻¹, from the eigenvectors of W².
-    pub(super) fn inverse_square(&self, more: f64) -> Matrix3<f64> {
+    /// The eigenvectors of W², of length 1, and its eigenvalues.
+    pub(super) fn square(&self) -> ([Vector3<f64>; 3], [f64; 3]) {
         let reach = tail(&self.axis).norm();
         let along = if reach > 0.0 { tail(&self.axis) / reach } else { Vector2::x() };
         let (square, stretch) = (self.size * self.size, (self.axis.x + reach) * (self.axis.x + reach));
         let half = std::f64::consts::FRAC_1_SQRT_2;
         let ways = [
-            (square * stretch, with_head(half, &(along * half))),
-            (square / stretch, with_head(half, &(along * -half))),
-            (square, Vector3::new(0.0, -along.y, along.x)),
+            with_head(half, &(along * half)),
+            with_head(half, &(along * -half)),
+            Vector3::new(0.0, -along.y, along.x),
         ];
-        ways.iter().map(|(value, way)| way * way.transpose() / (value + more)).sum()
+        (ways, [square * stretch, square / stretch, square])
     }
 }
 
@@ -119,8 +121,11 @@ mod tests {
             assert!((one - other).amax() < 1e-12 * one.amax(), "{one} {other}");
             let back = scaling.divides(&scaling.times(&s));
             assert!((back - s).amax() < 1e-12 * s.amax(), "{back} {s}");
-            let solved = scaling.inverse_square(0.0) * scaling.times(&scaling.times(&z));
-            assert!((solved - z).amax() < 1e-9 * z.amax(), "{solved} {z}");
+            let (ways, values) = scaling.square();
+            let square: Vector3<f64> =
+                ways.iter().zip(values).map(|(way, value)| way * (value * way.dot(&z))).sum();
+            let twice = scaling.times(&scaling.times(&z));
+            assert!((square - twice).amax() < 1e-12 * square.amax(), "{square} {twice}");
         }
         assert!(Scaling::new(&Vector3::new(1.0, 1.0, 0.1), &unit()).is_none(), "outside");
     }

@@ -34,7 +34,16 @@ const SHORT_OF_SURFACE: f64 = 0.99;
 const PROXIMAL: f64 = 1e-11;
 
 /// What the residuals are to be below, against the greatest rate. Tuned, no source.
-const EXACT: f64 = 1e-13;
+const EXACT: f64 = 1e-12;
+
+/// What the shifts are to be exact to. Tuned, no source.
+const SHIFT_EXACT_M_S: f64 = 1e-9;
+
+/// Rounds from which the next shifts are told.
+const DEPTH: usize = 3;
+
+/// Part of a change that rounding may be. Tuned, no source.
+const REGULAR: f64 = 1e-9;
 
 /// The buffers of the solution.
 #[derive(Default)]
@@ -75,16 +84,15 @@ impl Line {
         }
     }
 
-    /// Adds `weight` times the product of this row with `other` to the lower triangle of the matrix.
-    fn add_product(&self, other: &Self, weight: f64, matrix: &mut [f64], count: usize) {
+    /// Adds `weight` times this row's square to the lower triangle of the matrix.
+    fn add_square(&self, weight: f64, matrix: &mut [f64], count: usize) {
         for (place, way) in self.places.iter().zip(&self.ways).filter(|(place, _)| **place != FIXED) {
-            let others = other.places.iter().zip(&other.ways);
+            let others = self.places.iter().zip(&self.ways);
             for (other_place, other_way) in others.filter(|(other, _)| *other <= place) {
                 for row in 0..6 {
-                    for column in 0..6 {
-                        matrix[(6 * place + row) * count + 6 * other_place + column] +=
-                            weight * way[row] * other_way[column];
-                    }
+                    let start = (6 * place + row) * count + 6 * other_place;
+                    let cells = matrix[start..start + 6].iter_mut();
+                    cells.zip(other_way.iter()).for_each(|(cell, other)| *cell += weight * way[row] * other);
                 }
             }
         }
@@ -109,16 +117,39 @@ struct Cone {
     /// The rate less the bound, without impulses; along the normal without the shift.
     free: Vector3<f64>,
     shift: f64,
+    history: History,
     z: Vector3<f64>,
     s: Vector3<f64>,
     /// By how much `s` is not what the twists make.
     off: Vector3<f64>,
     scaling: Scaling,
-    inverse: Matrix3<f64>,
+    /// The eigenvectors of the scaling's square, and the inverses of what it is in the matrix.
+    ways: [Vector3<f64>; 3],
+    weights: [f64; 3],
     scaled: Vector3<f64>,
     wanted: Vector3<f64>,
     step_z: Vector3<f64>,
     step_s: Vector3<f64>,
+}
+
+/// A shift in the last rounds, the newest first.
+#[derive(Debug, Clone, Copy, Default)]
+struct History {
+    shift: f64,
+    /// What it led to, less the shift.
+    off: f64,
+    /// By how much each round changed both.
+    by: [f64; DEPTH],
+    off_by: [f64; DEPTH],
+}
+
+impl History {
+    fn note(&mut self, shift: f64, off: f64) {
+        self.by.rotate_right(1);
+        self.off_by.rotate_right(1);
+        (self.by[0], self.off_by[0]) = (shift - self.shift, off - self.off);
+        (self.shift, self.off) = (shift, off);
+    }
 }
 
 impl Cone {
@@ -132,6 +163,17 @@ impl Cone {
         }
     }
 
+    /// What `wanted` is divided by the scaling's square.
+    fn weigh(&self, wanted: &Vector3<f64>) -> Vector3<f64> {
+        self.ways.iter().zip(self.weights).map(|(way, weight)| way * (weight * way.dot(wanted))).sum()
+    }
+
+    /// The row along `way` between its three rows.
+    fn line_along(&self, way: &Vector3<f64>) -> Line {
+        let along = |at: usize| (0..3).map(|row| self.lines[row].ways[at] * way[row]).sum();
+        Line { ways: [along(0), along(1)], ..self.lines[0] }
+    }
+
     /// How fast it slips with this change of the twists.
     fn slip(&self, change: &[f64]) -> f64 {
         (self.rates(change) + self.free).yz().norm()
@@ -139,58 +181,28 @@ impl Cone {
 }
 
 impl Direct {
-    /// Finds the impulses of the constraints that `is_asked` and of the joints between bodies that the former push, for
-    /// bodies that move as `all` without impulses and have the mobilities of `mobile`. Returns whether they were found.
+    /// Finds the impulses of an island, whose bodies are those that `is_in`: they move as `all` without impulses, and have
+    /// the mobilities of `mobile`.
     pub(super) fn solve(
         &mut self,
         all: &mut [Body],
         mobile: &[Body],
         constraints: &mut [Unilateral],
-        is_asked: impl Fn(&Unilateral) -> bool,
         joints: &[Bilateral],
-    ) -> bool {
-        self.place(mobile, constraints, &is_asked, joints);
-        self.lay(all, constraints, &is_asked, joints);
-        let is_found = self.find();
-        if is_found {
-            self.hand_out(all, constraints);
-        }
-        is_found
-    }
-
-    /// Gives a place to each body that one of the constraints moves, or a joint of such a body.
-    fn place(
-        &mut self,
-        mobile: &[Body],
-        constraints: &[Unilateral],
-        is_asked: impl Fn(&Unilateral) -> bool,
-        joints: &[Bilateral],
+        is_in: impl Fn(usize) -> bool,
     ) {
         self.places.clear();
-        self.places.resize(mobile.len(), FIXED);
         self.roots.clear();
-        let mut add = |places: &mut Vec<usize>, body: usize| {
-            if places[body] == FIXED && mobile[body].mobility != Matrix6::zeros() {
-                places[body] = self.roots.len();
-                self.roots.push(root(&mobile[body].mobility));
-            }
-        };
-        for constraint in constraints.iter().filter(|constraint| is_asked(constraint)) {
-            constraint.normal.bodies.iter().for_each(|body| add(&mut self.places, *body));
-        }
-        // Through chains of joints.
-        loop {
-            let before = self.places.iter().filter(|place| **place != FIXED).count();
-            for joint in joints {
-                let bodies = joint.rows[0].bodies;
-                if bodies.iter().any(|body| self.places[*body] != FIXED) {
-                    bodies.iter().for_each(|body| add(&mut self.places, *body));
-                }
-            }
-            if self.places.iter().filter(|place| **place != FIXED).count() == before {
-                break;
+        for (number, body) in mobile.iter().enumerate() {
+            let place = if is_in(number) { self.roots.len() } else { FIXED };
+            self.places.push(place);
+            if place != FIXED {
+                self.roots.push(root(&body.mobility));
             }
         }
+        self.lay(all, constraints, joints);
+        self.find();
+        self.hand_out(all, constraints);
     }
 
     fn line(&self, row: &Row, scale: f64) -> Line {
@@ -202,30 +214,22 @@ impl Direct {
         Line { places, ways: [way(0), way(1)] }
     }
 
-    fn lay(
-        &mut self,
-        all: &[Body],
-        constraints: &[Unilateral],
-        is_asked: impl Fn(&Unilateral) -> bool,
-        joints: &[Bilateral],
-    ) {
-        let mut cones = std::mem::take(&mut self.cones);
+    fn lay(&mut self, all: &[Body], constraints: &[Unilateral], joints: &[Bilateral]) {
+        let (mut cones, mut ties) = (std::mem::take(&mut self.cones), std::mem::take(&mut self.ties));
         cones.clear();
-        let asked = constraints.iter().enumerate().filter(|(_, constraint)| is_asked(constraint));
+        let asked = constraints.iter().enumerate().filter(|(_, it)| it.bound_m_s > f64::NEG_INFINITY);
         cones.extend(asked.filter_map(|(number, constraint)| self.cone(all, number, constraint)));
-        self.cones = cones;
-        let mut ties = std::mem::take(&mut self.ties);
         ties.clear();
         let rows = joints.iter().flat_map(|joint| &joint.rows[..joint.count]);
-        let rows = rows.filter(|row| row.bodies.iter().any(|body| self.places[*body] != FIXED));
-        ties.extend(rows.map(|row| {
-            let line = self.line(row, 1.0);
-            let scale = inverse_mass(&line).sqrt().recip();
-            Tie { line: self.line(row, scale), free: row.rate(all) * scale, impulse: 0.0 }
+        ties.extend(rows.filter_map(|row| {
+            let inverse_mass = inverse_mass(&self.line(row, 1.0));
+            let scale = if inverse_mass > 0.0 { inverse_mass.sqrt().recip() } else { return None };
+            Some(Tie { line: self.line(row, scale), free: row.rate(all) * scale, impulse: 0.0 })
         }));
-        self.ties = ties;
+        (self.cones, self.ties) = (cones, ties);
     }
 
+    /// The cone of a constraint; none where it moves no body of the island.
     fn cone(&self, all: &[Body], number: usize, constraint: &Unilateral) -> Option<Cone> {
         let normal = &constraint.normal;
         let friction = constraint.friction.as_ref().filter(|it| it.coefficient > FRICTIONLESS);
@@ -248,11 +252,13 @@ impl Direct {
             scale,
             free: rates.component_mul(&scale),
             shift: 0.0,
+            history: History::default(),
             z: zeros,
             s: zeros,
             off: zeros,
             scaling: Scaling::new(&cone::unit(), &cone::unit())?,
-            inverse: Matrix3::identity(),
+            ways: [zeros; 3],
+            weights: [0.0; 3],
             scaled: zeros,
             wanted: zeros,
             step_z: zeros,
@@ -260,51 +266,70 @@ impl Direct {
         })
     }
 
-    /// Finds shifts that are what they lead to.
-    fn find(&mut self) -> bool {
-        let mut before = f64::INFINITY;
-        for round in 0..SHIFTS_MAX {
-            let (is_found, steps) = self.find_shifted();
-            let scale = self.greatest();
-            let mut most = 0.0_f64;
+    /// Finds shifts that are what they lead to, by Anderson's acceleration (D. Anderson, Iterative procedures for nonlinear
+    /// integral equations, 1965).
+    fn find(&mut self) {
+        let (mut known, mut before_m_s) = (0, 0.0);
+        for _ in 0..SHIFTS_MAX {
+            let steps = self.find_shifted();
+            let mut most_m_s = 0.0_f64;
             for cone in &mut self.cones {
-                let slip = cone.slip(&self.change);
-                most = most.max((slip - cone.shift).abs());
-                cone.shift = slip;
+                let off = cone.slip(&self.change) - cone.shift;
+                most_m_s = most_m_s.max(off.abs() / cone.scale.y.max(f64::MIN_POSITIVE));
+                cone.history.note(cone.shift, off);
             }
-            if std::env::var("TRACE").is_ok() { eprintln!("round {round}: found {is_found} steps {steps} shift off {most:e} of {scale:e}"); }
-            if !is_found { return false; }
-            if most <= 1e-11 * scale { return true; }
-            before = most;
+            if steps >= STEPS_MAX || most_m_s <= SHIFT_EXACT_M_S {
+                return;
+            }
+            // What has led astray is forgotten.
+            known = if most_m_s < before_m_s { (known + 1).min(DEPTH) } else { 0 };
+            before_m_s = most_m_s;
+            self.change_shifts(known);
         }
-        let _ = before;
-        false
     }
 
+    /// The next shifts, from how they and what they lead to changed in the last `known` rounds.
+    fn change_shifts(&mut self, known: usize) {
+        let (mut products, mut right) = (Matrix3::<f64>::zeros(), Vector3::<f64>::zeros());
+        for history in self.cones.iter().map(|cone| &cone.history) {
+            for row in 0..known {
+                right[row] += history.off_by[row] * history.off;
+                (0..known).for_each(|at| products[(row, at)] += history.off_by[row] * history.off_by[at]);
+            }
+        }
+        // Changes in one direction tell nothing new.
+        let size = products.diagonal().max().max(f64::MIN_POSITIVE);
+        let regular = products / size + Matrix3::identity() * REGULAR;
+        let parts = regular.try_inverse().map_or(Vector3::zeros(), |inverse| inverse * (right / size));
+        for cone in &mut self.cones {
+            let history = &cone.history;
+            let back = (0..known).map(|at| parts[at] * (history.by[at] + history.off_by[at])).sum::<f64>();
+            cone.shift = (cone.shift + history.off - back).max(0.0);
+        }
+    }
+
+    /// The greatest of the rates and impulses.
     fn greatest(&self) -> f64 {
-        self.cones.iter().map(|cone| cone.free.amax()).fold(1e-9, f64::max)
+        let each = self.cones.iter().map(|cone| cone.free.amax().max(cone.z.x));
+        each.fold(f64::MIN_POSITIVE, f64::max)
     }
 
     /// The interior-point method for the shifts as they are.
-    fn find_shifted(&mut self) -> (bool, usize) {
+    fn find_shifted(&mut self) -> usize {
         let count = 6 * self.roots.len();
-        let scale = self.greatest();
         for buffer in [&mut self.change, &mut self.step, &mut self.off] {
             buffer.clear();
             buffer.resize(count, 0.0);
         }
-        for cone in &mut self.cones {
-            (cone.z, cone.s) = (cone::unit() * scale, cone::unit() * scale);
-        }
+        self.cones.iter_mut().for_each(|cone| cone.z = Vector3::zeros());
+        let start = cone::unit() * self.greatest();
+        self.cones.iter_mut().for_each(|cone| (cone.z, cone.s) = (start, start));
         self.ties.iter_mut().for_each(|tie| tie.impulse = 0.0);
         for steps in 0..STEPS_MAX {
             let (residual, gap) = self.residuals();
-            if std::env::var("TRACE").is_ok_and(|it| it == "2") { eprintln!("   step {steps}: residual {residual:e} gap {gap:e} scale {scale:e}"); }
-            if residual <= EXACT * scale * 10.0 && gap <= EXACT * EXACT * scale * scale {
-                return (true, steps);
-            }
-            if !self.scale() {
-                return (residual <= 1e-10 * scale && gap <= 1e-20 * scale * scale, steps);
+            let scale = EXACT * self.greatest();
+            if (residual <= scale && gap <= scale * scale) || !self.scale() {
+                return steps;
             }
             self.factorise(count);
             for cone in &mut self.cones {
@@ -314,10 +339,8 @@ impl Direct {
             let most = self.longest_step().min(1.0);
             let centring = (1.0 - most) * (1.0 - most) * (1.0 - most) * gap;
             for cone in &mut self.cones {
-                let bent = cone::product(
-                    &cone.scaling.divides(&cone.step_s),
-                    &cone.scaling.times(&cone.step_z),
-                );
+                let bent =
+                    cone::product(&cone.scaling.divides(&cone.step_s), &cone.scaling.times(&cone.step_z));
                 let wanted = cone::unit() * centring - bent - cone::product(&cone.scaled, &cone.scaled);
                 cone.wanted = cone::quotient(&wanted, &cone.scaled);
             }
@@ -325,7 +348,7 @@ impl Direct {
             let length = (SHORT_OF_SURFACE * self.longest_step()).min(1.0);
             self.advance(length);
         }
-        (false, STEPS_MAX)
+        STEPS_MAX
     }
 
     /// Residuals of the equations, and the mean gap of complementarity.
@@ -350,7 +373,8 @@ impl Direct {
             let Some(scaling) = Scaling::new(&cone.z, &cone.s) else { return false };
             cone.scaling = scaling;
             cone.scaled = scaling.times(&cone.z);
-            cone.inverse = scaling.inverse_square(PROXIMAL);
+            let (ways, values) = scaling.square();
+            (cone.ways, cone.weights) = (ways, values.map(|value| (value + PROXIMAL).recip()));
         }
         true
     }
@@ -362,14 +386,12 @@ impl Direct {
         matrix.resize(count * count, 0.0);
         (0..count).for_each(|at| matrix[at * count + at] = 1.0);
         for cone in &self.cones {
-            for (row, line) in cone.lines.iter().enumerate() {
-                for (column, other) in cone.lines.iter().enumerate() {
-                    line.add_product(other, cone.inverse[(row, column)], matrix, count);
-                }
+            for (way, weight) in cone.ways.iter().zip(cone.weights) {
+                cone.line_along(way).add_square(weight, matrix, count);
             }
         }
         for tie in &self.ties {
-            tie.line.add_product(&tie.line, PROXIMAL.recip(), matrix, count);
+            tie.line.add_square(PROXIMAL.recip(), matrix, count);
         }
         factorise(matrix, count, |left, _| left.max(1.0));
     }
@@ -379,7 +401,7 @@ impl Direct {
         self.step.clone_from(&self.off);
         for cone in &mut self.cones {
             cone.wanted = cone.scaling.times(&cone.wanted);
-            let push = cone.inverse * (cone.wanted - cone.off);
+            let push = cone.weigh(&(cone.wanted - cone.off));
             cone.push(&mut self.step, &push);
         }
         for tie in &self.ties {
@@ -389,7 +411,7 @@ impl Direct {
         substitute(&self.matrix, &mut self.step);
         for cone in &mut self.cones {
             let rates = cone.rates(&self.step);
-            cone.step_z = cone.inverse * (cone.wanted - cone.off - rates);
+            cone.step_z = cone.weigh(&(cone.wanted - cone.off - rates));
             cone.step_s = rates + cone.off + cone.step_z * PROXIMAL;
         }
     }

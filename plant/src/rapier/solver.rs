@@ -149,7 +149,7 @@ impl Bilateral {
     }
 
     /// How far a rate of its rows is off at most.
-    pub(super) fn residual_m_s(&self, all: &[Body]) -> f64 {
+    pub(super) fn off_m_s(&self, all: &[Body]) -> f64 {
         self.rows[..self.count].iter().map(|row| row.rate(all).abs()).fold(0.0, f64::max)
     }
 
@@ -301,9 +301,8 @@ impl Friction {
 }
 
 /// Finds the impulses that `constraints` and `joints` need, from those that the former hold already, and gives them to the
-/// bodies. Returns by how much a rate stays below its bound at most: where two bounds contradict each other, no impulses do
-/// both.
-pub(super) fn solve(all: &mut [Body], constraints: &mut [Unilateral], joints: &[Bilateral]) -> f64 {
+/// bodies. Where a light body carries a heavy one, or two bounds contradict each other, they are not found.
+pub(super) fn solve(all: &mut [Body], constraints: &mut [Unilateral], joints: &[Bilateral]) {
     for constraint in constraints.iter() {
         constraint.normal.push(all, constraint.impulse_N_s);
         if let Some(friction) = &constraint.friction {
@@ -314,7 +313,6 @@ pub(super) fn solve(all: &mut [Body], constraints: &mut [Unilateral], joints: &[
     if unmet_m_s(all, constraints) > TO_AND_FRO_M_S {
         iterate(all, constraints, joints, ITERATIONS_MAX, Unilateral::relax_whole);
     }
-    unmet_m_s(all, constraints)
 }
 
 fn iterate(
@@ -342,7 +340,7 @@ fn unmet_m_s(all: &[Body], constraints: &[Unilateral]) -> f64 {
 
 impl Unilateral {
     /// How far its rates are from what its impulses may leave: by how much a step towards that would change a rate.
-    pub(super) fn residual_m_s(&self, all: &[Body]) -> f64 {
+    pub(super) fn off_m_s(&self, all: &[Body]) -> f64 {
         let inverse_mass_per_kg = self.normal.inverse_mass_per_kg;
         if self.bound_m_s == f64::NEG_INFINITY || inverse_mass_per_kg <= 0.0 {
             return 0.0;
