@@ -143,7 +143,7 @@ fn a_tower_of_ten_with_the_heavy_ones_on_top_stands() {
     let cubes: Vec<_> = (0..10_u32)
         .map(|number| {
             // From 1 g to 10 kg.
-            let mass_kg = 1e-3 * 10.0_f64.powf(f64::from(number) * 4.0 / 9.0);
+            let mass_kg = 1e-3 * libm::pow(10.0, f64::from(number) * 4.0 / 9.0);
             let side_m = if number % 2 == 0 { 0.01 } else { -0.01 };
             cube(&format!("cube {number}"), mass_kg, [side_m, 0.0, 0.1 + 0.2 * f64::from(number)])
         })
@@ -173,12 +173,16 @@ fn the_vehicle_that_falls_on_a_light_box_is_not_thrown_away() {
 
 #[test]
 fn impulses_that_are_not_found_are_told_with_the_names_of_both() {
-    for (light, heavy) in [(1e-6, 1e5), (1e-6, 1e3), (1e-6, 10.0), (1e-3, 1e5)] { for friction in [0.0, 0.5, 1.0] {
-        let cubes = [cube("light", light, [0.0, 0.0, 0.1]), cube("heavy", heavy, [0.03, 0.02, 0.35])];
-        let mut stack = Stack::new(&cubes, friction, 2);
-        let gain = stack.most_gain_J(300);
-        println!("EXTREME {light} {heavy} {friction}: {gain:e} J, {:?}, {:?}", stack.plant.trouble(), stack.plant.bodies()[0].position_W_m);
-    }}
+    // 100 t on 1 mg: with numbers of 64 bits the impulse of one says nothing about the motion of the other.
+    let cubes = [cube("light", 1e-6, [0.0, 0.0, 0.1]), cube("heavy", 1e5, [0.03, 0.02, 0.35])];
+    let mut stack = Stack::new(&cubes, 0.5, 2);
+    assert_eq!(stack.plant.trouble(), None);
+    (0..300).for_each(|_| stack.tick());
+    let trouble = stack.plant.trouble().expect("no impulses are found");
+    assert!(
+        trouble.contains("\"light\"") && trouble.contains("m/s") && trouble.contains("substeps"),
+        "{trouble}"
+    );
 }
 
 mod drawn {
@@ -199,7 +203,7 @@ mod drawn {
             let mut heaviest_kg = 0.0_f64;
             let cubes: Vec<_> = parts.iter().enumerate().map(|(number, (exponent, x_m, y_m, gap_m))| {
                 height_m += gap_m;
-                let mass_kg = 0.1 * 10.0_f64.powf(*exponent);
+                let mass_kg = 0.1 * libm::pow(10.0, *exponent);
                 heaviest_kg = heaviest_kg.max(mass_kg);
                 let text = cube(&format!("cube {number}"), mass_kg, [*x_m, *y_m, height_m]);
                 height_m += 0.2 + 1e-6;

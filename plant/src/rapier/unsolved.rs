@@ -63,10 +63,15 @@ impl Unsolved {
             let [first, second] = objects.map(name);
             format!("between {first} and {second}")
         });
+        let found = match Outcome::is_met(self.off_m_s) {
+            true => format!("they made {:.1e} J of motion", self.gain_J),
+            false => {
+                format!("a rate is off by {:.1e} m/s, expected {OFF_MOST_M_S:.0e} m/s at most", self.off_m_s)
+            }
+        };
         format!(
-            "the contact impulses {place} were not found: a rate is off by {:.1e} m/s (expected {OFF_MOST_M_S:.0e} at most), and \
-             they made {:.1e} J; bring the masses of what touches closer together, or change `substeps`",
-            self.off_m_s, self.gain_J
+            "the contact impulses {place} were not found: {found}; bring the masses of what touches closer together, or \
+             change `substeps`"
         )
     }
 }
