@@ -16,6 +16,7 @@
 //! | `scratch`, `stepping` | a step that is cut at impacts, and what it works with |
 //! | `unsolved` | impulses that were not found |
 //! | `contacts` | when contacts begin and end |
+//! | `rim` | the line along which a disc touches an edge |
 //! | `rig` | test rigs: joints and stops |
 
 mod body;
@@ -29,6 +30,7 @@ mod islands;
 mod joint_forces;
 mod joints;
 mod rig;
+mod rim;
 mod scratch;
 mod solver;
 mod stepping;

@@ -98,29 +98,41 @@ fn falling(ratio: f64, off_m: [f64; 2], drop_m: f64) -> [String; 2] {
     [cube("light", 10.0 / ratio, [0.0, 0.0, 0.1]), heavy]
 }
 
-#[test]
-fn a_heavy_box_that_falls_on_a_light_one_is_never_faster_than_its_fall_and_makes_no_energy() {
-    println!("| mass ratio | friction 0 | friction 0.5 | friction 1 |");
-    for ratio in [1.0, 10.0, 30.0, 50.0, 100.0, 1_000.0, 10_000.0] {
-        let gains_J = [0.0, 0.5, 1.0].map(|friction| {
-            let mut stack = Stack::new(&falling(ratio, [0.03, 0.02], 0.4), friction, 2);
+/// The most energy that a tick adds, over drops from several heights at several steps and `offsets` places beside the middle.
+fn most_gain_J(ratio: f64, friction: f64, offsets: u32) -> f64 {
+    let mut most_J = f64::NEG_INFINITY;
+    for (sin, cos) in (0..offsets).map(|seed| libm::sincos(f64::from(3 * seed + 1))) {
+        for (substeps, drop_m) in [(1, 0.05), (1, 0.4), (2, 0.05), (2, 0.4), (5, 0.05), (5, 0.4)] {
+            let mut stack =
+                Stack::new(&falling(ratio, [0.06 * sin, 0.05 * cos * cos], drop_m), friction, substeps);
             let may_gain_J = stack.may_gain_J(10.0);
-            let gain_J = stack.most_gain_J(1_000);
-            assert!(gain_J < may_gain_J, "1:{ratio}, friction {friction}: {gain_J} J");
-            assert_eq!(stack.plant.trouble(), None);
-            let light_W_m = stack.plant.bodies()[0].position_W_m;
-            let aside_m = light_W_m.xy().norm();
-            assert!(aside_m < 5e-3, "1:{ratio}, friction {friction}: it is squeezed out by {aside_m} m");
-            gain_J
-        });
-        println!("| 1:{ratio} | {:.1e} J | {:.1e} J | {:.1e} J |", gains_J[0], gains_J[1], gains_J[2]);
+            let gain_J = stack.most_gain_J(500);
+            let what = format!("1:{ratio}, friction {friction}, {substeps} steps a tick, from {drop_m} m");
+            assert!(gain_J < may_gain_J, "{what}: {gain_J} J");
+            assert_eq!(stack.plant.trouble(), None, "{what}");
+            let aside_m = stack.plant.bodies()[0].position_W_m.xy().norm();
+            assert!(aside_m < 0.02, "{what}: it is squeezed out by {aside_m} m");
+            most_J = most_J.max(gain_J);
+        }
+    }
+    most_J
+}
+
+/// `STACKS` is the number of places beside the middle: the table of docs/world.md has ten.
+#[test]
+fn a_heavy_box_that_falls_on_a_light_one_makes_no_energy_and_does_not_squeeze_it_out() {
+    let offsets = std::env::var("STACKS").map_or(1, |text| text.parse().expect("STACKS is a number"));
+    println!("| mass ratio | no friction | friction 0.5 | friction 1 |\n|---|---|---|---|");
+    for ratio in [1.0, 10.0, 50.0, 100.0, 1_000.0, 10_000.0] {
+        let [none, half, one] = [0.0, 0.5, 1.0].map(|friction| most_gain_J(ratio, friction, offsets));
+        println!("| 1:{ratio} | {none:.1e} J | {half:.1e} J | {one:.1e} J |");
     }
 }
 
 #[test]
-fn more_substeps_and_other_heights_make_no_energy_either() {
-    for substeps in [1, 2, 5, 20] {
-        for drop_m in [0.01, 0.1, 0.4, 2.0] {
+fn many_substeps_and_far_falls_make_no_energy_either() {
+    for substeps in [1, 20] {
+        for drop_m in [0.01, 2.0] {
             let mut stack = Stack::new(&falling(100.0, [0.03, 0.02], drop_m), 0.5, substeps);
             let may_gain_J = stack.may_gain_J(10.0);
             let gain_J = stack.most_gain_J(900);
