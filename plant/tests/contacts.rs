@@ -353,6 +353,35 @@ fn a_rim_that_meets_a_vertical_edge_meets_it_along_a_line_and_does_not_pitch() {
 }
 
 #[test]
+fn a_box_that_hits_the_rim_with_a_vertical_edge_tips_neither() {
+    for (aside_m, yaw_deg) in [(0.05, 45.0), (-0.1, 30.0), (0.15, 60.0)] {
+        let mut scene = edge(1.0);
+        let number = |value: &str, unit: &str| {
+            format!("{{ value = {value}, unit = \"{unit}\", source = \"test\", uncertainty = \"exact\" }}")
+        };
+        let text = format!(
+            "name = \"thrown\"\n[[boxes]]\nname = \"box\"\ncentre = {}\nsize = {}\nyaw = {}\nmass = {}\nvelocity = {}\nfriction = {}\n",
+            number(&format!("[-1, {aside_m}, 3]"), "m"),
+            number("[0.2, 0.2, 0.4]", "m"),
+            number(&yaw_deg.to_string(), "deg"),
+            number("0.3", "kg"),
+            number("[2, 0, 0]", "m/s"),
+            number("0", "1"),
+        );
+        scene.boxes = Scene::parse(&text, "thrown.toml").unwrap_or_else(|error| panic!("{error}")).boxes;
+        let start = RigidBody::level_at(Vector3::z() * 3.0);
+        let mut plant = common::rapier(NewtonEuler::new(common::free_body(), 2), &scene, &start, 1e9);
+        fly(&mut plant, &[0.0; 4], 350);
+        let spins = [&plant.state().body, &plant.bodies()[0]]
+            .map(|body| body.attitude_WB * body.angular_velocity_B_rad_s);
+        assert!(plant.contact().began > 0, "they met");
+        for spin in spins {
+            assert!(spin.xy().norm() < 1e-6, "{aside_m} m aside: {spin:?}");
+        }
+    }
+}
+
+#[test]
 fn a_line_ends_where_the_edge_ends() {
     let (speed_m_s, below_m) = (2.0, 5e-3);
     let start = RigidBody {
