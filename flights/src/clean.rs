@@ -1,12 +1,12 @@
 //! Cleaning of a channel: what is left out, counted and said.
 
+use vehicles::gaps::GAP_PERIODS;
+
 use crate::error::{LogError, Spot};
 use crate::flight::{Channel, median, period_s};
 use crate::held;
 use crate::quantity::Quantity;
 
-/// A gap is a step longer than this many median periods.
-pub const GAP_PERIODS: f64 = 5.0;
 /// A quaternion whose length is further from one than this is no attitude.
 const NORM_TOLERANCE: f64 = 0.1;
 

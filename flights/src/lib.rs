@@ -17,6 +17,8 @@
 //! | `held_out`, `twin` | whether test flights hold what parameters are fitted on: by file and time, by samples |
 //! | `state` | errors of a simulated state against the measured one |
 //! | `canonical` | a flight as one CSV table |
+//! | `known` | stretches in which the commands determine the rotor speeds |
+//! | `played` | a flight as it is played, and the windows that a replay counts |
 //! | `error` | what can be wrong |
 
 mod agreement;
@@ -38,11 +40,13 @@ mod frame;
 mod held;
 mod held_out;
 mod jumps;
+mod known;
 mod known_types;
 mod log;
 mod logs;
 mod mcap_log;
 mod plausible;
+mod played;
 mod quantity;
 mod reading;
 mod set;
@@ -55,11 +59,14 @@ mod ulog;
 mod ulog_format;
 mod ulog_messages;
 
-pub use canonical::{COLUMNS, Canonical, HEADER, csv, write_csv};
+pub use canonical::{COLUMNS, Canonical, HEADER, Row, csv, write_csv};
 pub use error::{FlightsError, LogError, Spot};
 pub use finding::Finding;
 pub use flight::{Channel, Flight, Role};
 pub use held_out::same_file;
+pub use jumps::{leave_out_jumps, position_jumps};
+pub use known::{KnownRotors, SETTLE_S};
+pub use played::Played;
 pub use quantity::Quantity;
 pub use set::{FlightSet, ReadFile};
 pub use span::{Moment, Sparse};

@@ -1,19 +1,15 @@
 //! Flights of the repository's flights files, read from real logs in the folder that `HUMMINGBUS_DATA` names.
 
-use std::io::Write as _;
+#[path = "../../tests/runs/skipped.rs"]
+mod skipped;
+
 use std::path::{Path, PathBuf};
 
 use flights::{Channel, Flight, FlightSet, Role};
 
 /// The folder of measured flights; says so where it is not given.
 fn data() -> Option<PathBuf> {
-    let data = std::env::var_os("HUMMINGBUS_DATA").map(PathBuf::from);
-    if data.is_none() {
-        // Not `eprintln!`, which the test runner hides.
-        let notice = "skipped: HUMMINGBUS_DATA, the folder of measured flights, is not set";
-        let _ = writeln!(std::io::stderr(), "{notice}");
-    }
-    data
+    skipped::variable_or_skip("HUMMINGBUS_DATA", "the folder of measured flights").map(PathBuf::from)
 }
 
 fn load(name: &str) -> FlightSet {

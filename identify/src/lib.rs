@@ -56,14 +56,17 @@ mod sensor_effects;
 pub mod statistics;
 mod track;
 mod trim;
+mod unusable;
 pub mod vehicle_file;
 mod whiteness;
 mod window;
 
 pub use clock::Lateness;
+pub use faults::Fault;
 pub use prepared::Equation;
 pub use regressor::Regressor;
 pub use sensing::SensorErrors;
+pub use unusable::Unusable;
 
 /// What tests look at between the steps of an identification.
 #[doc(hidden)]

@@ -3,9 +3,11 @@
 
 use crate::clock::{Clock, Lateness};
 use crate::track::{Track, valid_about};
+use crate::unusable::Unusable;
 use crate::window::{NUMEROV, SIMPSON, Window, central_difference, second_difference};
-use flights::{Channel, Flight};
+use flights::{Channel, Flight, KnownRotors, SETTLE_S};
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
+use vehicles::{CommandMap, Vehicle};
 
 /// An equation that measurement and model are both put into.
 ///
@@ -117,9 +119,6 @@ pub struct Tracks {
 /// Grid steps in a box of the window, which is also the way from knot to knot.
 pub const BOX_STEPS: usize = 5;
 
-/// How fast the rotors turn where a log begins, and what was commanded before, is not known: they count from then on.
-pub const SETTLE_S: f64 = 0.5;
-
 /// Delays of sensors that are tried take samples from beside an instant: so much is left out at the ends of a flight.
 const END_MARGIN_S: f64 = 0.2;
 /// And so much about its gaps, where that leaves at least [`WORTH`] of the windows.
@@ -146,28 +145,53 @@ pub struct Prepared<'f> {
 }
 
 impl<'f> Prepared<'f> {
-    /// The flight on its grid; `is_flying` tells from motor commands (`true`) or rotor speeds (`false`) whether the
-    /// vehicle is in the air; `None` where it has nothing to compare: no commands and no rotor speeds, no motion, or
-    /// less than three windows of it.
-    pub fn new(
-        flight: &'f Flight,
-        box_s: Option<f64>,
-        is_flying: impl Fn(&[f64; 4], bool) -> bool,
-    ) -> Option<Self> {
+    /// The flight on its grid.
+    ///
+    /// # Errors
+    /// If the flight has less than three windows to compare: no drive, no motion, too little of both in flight.
+    pub fn new(flight: &'f Flight, box_s: Option<f64>, airborne: &Airborne) -> Result<Self, Unusable> {
         let equations = equations(flight);
-        let (start_s, end_s) = common_span(flight, &equations)?;
-        let box_s = match box_s {
-            Some(box_s) => box_s,
-            // At 100 Hz windows of 0.12 s.
-            None => (3.0 * slowest_period_s(flight)?).max(0.02),
-        };
+        if equations.iter().all(|equation| *equation == Equation::RotorSpeed) {
+            return Err(Unusable::of_channels(flight).unwrap_or(Unusable::NoMotion));
+        }
+        Unusable::of_channels(flight).map_or(Ok(()), Err)?;
+        let apart = || Unusable::Apart { spans: flight.spans() };
+        let (start_s, end_s) = common_span(flight, &equations).ok_or_else(apart)?;
+        // At 100 Hz windows of 0.12 s.
+        let box_s = box_s.unwrap_or_else(|| (3.0 * slowest_period_s(flight).unwrap_or(0.0)).max(0.02));
         let step_s = box_s / BOX_STEPS as f64;
         let clock = Clock::spanning(start_s, end_s, step_s);
         let windows = equations.iter().map(|equation| windows(*equation, flight, step_s)).collect();
         let layout = Layout { clock, knots: Vec::new(), equations, windows };
         let mut prepared = Self { flight, layout, late: Lateness::default(), distrusted: [false; 4] };
-        prepared.layout.knots = prepared.knots(&is_flying);
-        (prepared.layout.knots.len() >= 3).then_some(prepared)
+        prepared.layout.knots = prepared.knots(airborne);
+        if prepared.layout.knots.len() >= 3 { Ok(prepared) } else { Err(prepared.unusable(airborne)) }
+    }
+
+    /// The reason why less than three windows are left.
+    fn unusable(&self, airborne: &Airborne) -> Unusable {
+        let (flight, clock) = (self.flight, &self.layout.clock);
+        let (from_s, to_s) = (clock.at(0), clock.at(clock.count - 1));
+        let known = KnownRotors::of(flight);
+        if !known.stretches_s().iter().any(|stretch| stretch.0 < to_s && from_s < stretch.1) {
+            let stretches: Vec<String> = known
+                .stretches_s()
+                .iter()
+                .map(|(from_s, to_s)| format!("from {from_s:.3} s to {to_s:.3} s"))
+                .collect();
+            let known = if stretches.is_empty() { "nowhere".to_owned() } else { stretches.join(", ") };
+            return Unusable::UnknownRotors { known, from_s, to_s };
+        }
+        let fastest = airborne.speeds(flight, clock).into_iter().fold(0.0, f64::max);
+        if fastest <= airborne.least_rad_s {
+            return Unusable::of_speeds(flight, fastest, airborne.least_rad_s);
+        }
+        let box_s = BOX_STEPS as f64 * clock.step_s;
+        Unusable::Short {
+            left_s: box_s * self.layout.knots.len() as f64,
+            window_s: 4.0 * box_s,
+            common_s: to_s - from_s,
+        }
     }
 
     /// Whether its attitude or its rates were assumed instead of measured.
@@ -294,8 +318,8 @@ impl<'f> Prepared<'f> {
     }
 
     /// Middles of windows in which every compared channel was sampled and the motors were running.
-    fn knots(&self, is_flying: &impl Fn(&[f64; 4], bool) -> bool) -> Vec<usize> {
-        let of = |gap_margin_s: f64| self.knots_within(&self.valid(is_flying, gap_margin_s));
+    fn knots(&self, airborne: &Airborne) -> Vec<usize> {
+        let of = |gap_margin_s: f64| self.knots_within(&self.valid(airborne, gap_margin_s));
         let (wide, all) = (of(GAP_MARGIN_S), of(0.0));
         if wide.len() as f64 >= WORTH * all.len() as f64 { wide } else { all }
     }
@@ -306,7 +330,7 @@ impl<'f> Prepared<'f> {
         (reach..last).step_by(BOX_STEPS).filter(|knot| about[*knot]).collect()
     }
 
-    fn valid(&self, is_flying: &impl Fn(&[f64; 4], bool) -> bool, gap_margin_s: f64) -> Vec<bool> {
+    fn valid(&self, airborne: &Airborne, gap_margin_s: f64) -> Vec<bool> {
         let (flight, clock) = (self.flight, &self.layout.clock);
         let mut valid = vec![true; clock.count];
         let mut require = |other: Vec<bool>| valid.iter_mut().zip(other).for_each(|(all, one)| *all &= one);
@@ -322,14 +346,44 @@ impl<'f> Prepared<'f> {
             require(Track::sampled(&flight.rotor_speed, 0.0, clock).valid);
         }
         if !flight.command.is_empty() {
-            require((0..clock.count).map(|index| clock.at(index) - clock.at(0) >= SETTLE_S).collect());
-            let mut held = Held::new(&flight.command);
-            require((0..clock.count).map(|index| is_flying(&held.at(clock.at(index)), true)).collect());
-        } else if !flight.rotor_speed.is_empty() {
-            let speeds = Track::sampled(&flight.rotor_speed, 0.0, clock).values;
-            require(speeds.iter().map(|speeds| is_flying(speeds, false)).collect());
+            let known = KnownRotors::of(flight);
+            // The rotors are simulated from the first instant on.
+            let is_known = |at_s: f64| at_s - clock.at(0) >= SETTLE_S && known.hold(at_s, at_s);
+            require((0..clock.count).map(|index| is_known(clock.at(index))).collect());
         }
+        require(
+            airborne.speeds(flight, clock).into_iter().map(|speed| speed > airborne.least_rad_s).collect(),
+        );
         valid
+    }
+}
+
+/// A motor that turns below this part of the hover speed does not carry the vehicle.
+const FLYING: f64 = 0.5;
+
+/// The mean rotor speed above which a vehicle is in the air.
+#[derive(Debug, Clone, Copy)]
+pub struct Airborne {
+    command: CommandMap,
+    least_rad_s: f64,
+}
+
+impl Airborne {
+    /// That of `vehicle`.
+    pub fn of(vehicle: &Vehicle) -> Self {
+        Self { command: vehicle.command, least_rad_s: FLYING * vehicle.hover_speed_rad_s() }
+    }
+
+    /// Mean speeds of the rotors at the instants of `clock`, by commands or else as measured.
+    fn speeds(&self, flight: &Flight, clock: &Clock) -> Vec<f64> {
+        let mean = |speeds: [f64; 4]| speeds.iter().sum::<f64>() / 4.0;
+        if flight.command.is_empty() {
+            let measured = Track::sampled(&flight.rotor_speed, 0.0, clock).values;
+            return measured.into_iter().map(mean).collect();
+        }
+        let mut held = Held::new(&flight.command);
+        let commanded = |index| held.at(clock.at(index)).map(|command| self.command.speed(command));
+        (0..clock.count).map(commanded).map(mean).collect()
     }
 }
 
@@ -457,9 +511,6 @@ fn common_span(flight: &Flight, equations: &[Equation]) -> Option<(f64, f64)> {
         flight.angular_velocity.span_s(),
         flight.specific_force.span_s(),
     ];
-    if equations.iter().all(|equation| *equation == Equation::RotorSpeed) {
-        return None;
-    }
     let spans = motion.into_iter().flatten().chain([drive?]);
     Some(spans.fold((f64::MIN, f64::MAX), |(start, end), span| (start.max(span.0), end.min(span.1))))
         .filter(|(start, end)| end > start)

@@ -1,15 +1,15 @@
 //! The whole way: from flights and the declared vehicle to a report.
 
-use crate::align::align;
+use crate::align::{Offsets, align};
 use crate::candidate::{Candidate, candidates, free_parameters};
 use crate::clock::Lateness;
-use crate::faults;
+use crate::faults::{self, Fault};
 use crate::fit::{FitResult, Problem, Weights};
 use crate::model::Model;
 use crate::noise::{self, Floor};
 use crate::parameter::Parameters;
 use crate::predict::{Errors, Measured};
-use crate::prepared::{BOX_STEPS, Equation, Prepared, SETTLE_S};
+use crate::prepared::{Airborne, BOX_STEPS, Equation, Prepared};
 use crate::regressor::{Regressor, regressors};
 use crate::report::{
     BeforeAfter, Change, Changes, EffectReport, Estimate, FlightReport, Noise, Report, Unexplained,
@@ -21,15 +21,13 @@ use crate::trim;
 use crate::whiteness::{Whiteness, whiteness};
 use diagnostics::Diagnostic;
 use flights::state::StateQuantity;
-use flights::{Flight, FlightSet, Role, Sparse};
+use flights::{Flight, FlightSet, Role};
 use plant::effects::{Effect, EffectKind, entry};
 use std::collections::BTreeMap;
 use vehicles::Vehicle;
 
 /// Horizons of prediction.
 pub const HORIZONS_S: [f64; 3] = [0.1, 0.5, 1.0];
-/// A motor that turns below this part of the hover speed does not carry the vehicle.
-const FLYING: f64 = 0.5;
 /// Windows of flights without an inertial unit: twice a derivative of a position needs more of it.
 const POSE_BOX_S: f64 = 0.04;
 /// A residual is worth telling where its persistent part is beyond this part of its noise.
@@ -49,31 +47,19 @@ const OTHER_FLIGHTS: &str =
 /// let vehicle = "../vehicles/hummingbird.toml".into();
 /// let set = flights::FlightSet { vehicle, flights: Vec::new() };
 /// let error = identify::run::identify(&set, &mut |_| ()).unwrap_err();
-/// assert!(error.to_string().starts_with("no flight with role \"fit\" can be used; there is none."));
+/// assert!(error.to_string().starts_with("no flight with role \"fit\" can be used: there is none."));
 /// ```
 #[derive(Debug, thiserror::Error)]
 pub enum IdentifyError {
     /// The vehicle file.
     #[error(transparent)]
     Vehicle(#[from] Diagnostic),
-    /// A flight whose samples are too far apart.
-    #[error("flight `{flight}` cannot be identified on: {cause}")]
-    Sparse {
-        /// Its name.
-        flight: String,
-        /// What is wrong, and what to do.
-        #[source]
-        cause: Sparse,
-    },
     /// A role that no flight has.
-    #[error(
-        "no flight with role \"{role}\" can be used; {reason}. Add flights, or give one a part of another's time by \
-         `from_s` and `to_s`"
-    )]
+    #[error("no flight with role \"{role}\" can be used: {reason}")]
     NoFlight {
         /// The role.
         role: &'static str,
-        /// Why.
+        /// Reasons, flight by flight.
         reason: String,
     },
 }
@@ -93,6 +79,8 @@ pub struct Outcome {
     pub late: BTreeMap<String, Lateness>,
     /// Accepted delays and biases of sensors, for the same.
     pub sensor_errors: SensorErrors,
+    /// The flights without their faulty channels; `None` if no channel has a fault.
+    pub believed: Option<FlightSet>,
 }
 
 /// The residuals of one equation of one flight, before and after, and what was measured.
@@ -122,9 +110,9 @@ pub fn identify(set: &FlightSet, progress: &mut dyn FnMut(&str)) -> Result<Outco
     let vehicle = Vehicle::load(&set.vehicle)?;
     let declared = entry::resolve(&vehicle.effects)?;
     progress("preparing flights");
-    let (mut problem, flight_reports) = problem(&vehicle, &declared, set)?;
-    let offsets = align(&mut problem);
-    let faults = faults::find(&mut problem);
+    let (mut faults, believed) = faults::in_channels(&problem(&vehicle, &declared, set)?.0, set);
+    let set = believed.as_ref().unwrap_or(set);
+    let (mut problem, flight_reports, offsets) = aligned(&vehicle, &declared, set, &mut faults)?;
     let all: Vec<&Prepared> = problem.flights().collect();
     let (open, unidentifiable) = candidates(&problem.model.parameters, &all);
     progress("trims");
@@ -164,7 +152,43 @@ pub fn identify(set: &FlightSet, progress: &mut dyn FnMut(&str)) -> Result<Outco
     let late = problem.flights().map(|flight| (name(flight), flight.late)).collect();
     let regressors =
         problem.flights().map(|flight| (name(flight), regressors(&problem.model, flight, values))).collect();
-    Ok(Outcome { pictures: pictures(&problem, &selection), regressors, effects, late, sensor_errors, report })
+    let pictures = pictures(&problem, &selection);
+    drop(problem);
+    Ok(Outcome { pictures, regressors, effects, late, sensor_errors, report, believed })
+}
+
+/// The problem, its flights as reported, and their clock offsets.
+type Aligned<'f> = (Problem<'f>, Vec<FlightReport>, Vec<(String, Offsets)>);
+
+/// The flights of `set` with aligned clocks, without rotors and trims that have a fault; these join `faults`.
+fn aligned<'f>(
+    vehicle: &Vehicle,
+    declared: &[Effect],
+    set: &'f FlightSet,
+    faults: &mut Vec<Fault>,
+) -> Result<Aligned<'f>, IdentifyError> {
+    let (mut problem, reports) =
+        problem(vehicle, declared, set).map_err(|cause| faulty(faults, set).unwrap_or(cause))?;
+    let offsets = align(&mut problem);
+    faults.extend(faults::of_rotors(&mut problem));
+    for (role, flights) in [(Role::Fit, &problem.estimation), (Role::Test, &problem.validation)] {
+        if flights.is_empty() {
+            return Err(faulty(faults, set).unwrap_or_else(|| no_flight(role, &[])));
+        }
+    }
+    Ok((problem, reports, offsets))
+}
+
+/// Finds the faults of the flights of `set` without fitting anything.
+///
+/// # Errors
+/// As [`identify`].
+pub fn faults(set: &FlightSet) -> Result<Vec<Fault>, IdentifyError> {
+    let vehicle = Vehicle::load(&set.vehicle)?;
+    let declared = entry::resolve(&vehicle.effects)?;
+    let (mut faults, believed) = faults::in_channels(&problem(&vehicle, &declared, set)?.0, set);
+    aligned(&vehicle, &declared, believed.as_ref().unwrap_or(set), &mut faults)?;
+    Ok(faults)
 }
 
 /// The flights on their grids, with the declared model.
@@ -177,25 +201,20 @@ pub fn problem<'f>(
     set: &'f FlightSet,
 ) -> Result<(Problem<'f>, Vec<FlightReport>), IdentifyError> {
     let parameters = Parameters::of(vehicle, declared);
-    let least_rad_s = FLYING * vehicle.hover_speed_rad_s();
-    let is_flying = |drive: &[f64; 4], is_command: bool| {
-        let speed = |number: &f64| if is_command { vehicle.command.speed(*number) } else { *number };
-        drive.iter().map(speed).sum::<f64>() > 4.0 * least_rad_s
-    };
+    let airborne = Airborne::of(vehicle);
     let (mut estimation, mut validation, mut reports) = (Vec::new(), Vec::new(), Vec::new());
-    let mut too_sparse: Vec<(Role, IdentifyError)> = Vec::new();
+    let mut reasons = Vec::new();
     for flight in &set.flights {
-        let (prepared, note) = match flight.check_span(SPACING_MAX_S) {
-            Ok(()) => (Prepared::new(flight, box_s(flight), is_flying), None),
-            // One flight that cannot be used leaves the others.
-            Err(cause) => {
-                let note = format!("not used: {cause}");
-                too_sparse.push((flight.role, IdentifyError::Sparse { flight: flight.name.clone(), cause }));
-                (None, Some(note))
-            }
-        };
+        // A flight that cannot be used does not stop the others.
+        let prepared = flight
+            .check_span(SPACING_MAX_S)
+            .map_err(|cause| cause.to_string())
+            .and_then(|()| Prepared::new(flight, box_s(flight), &airborne).map_err(|cause| cause.to_string()))
+            .map_err(|reason| reasons.push((flight, reason)))
+            .ok();
         let mut report = flight_report(flight, prepared.as_ref());
-        report.notes.extend(note);
+        let reason = reasons.last().filter(|_| prepared.is_none());
+        report.notes.extend(reason.map(|(_, reason)| format!("not used: {reason}")));
         reports.push(report);
         match (prepared, flight.role) {
             (Some(prepared), Role::Fit) => estimation.push(prepared),
@@ -205,8 +224,7 @@ pub fn problem<'f>(
     }
     for (role, flights) in [(Role::Fit, &estimation), (Role::Test, &validation)] {
         if flights.is_empty() {
-            let sparse = too_sparse.into_iter().find(|(found, _)| *found == role);
-            return Err(sparse.map_or_else(|| no_flight(set, role), |(_, error)| error));
+            return Err(no_flight(role, &reasons));
         }
     }
     let total_s: f64 = estimation.iter().map(compared_s).sum();
@@ -218,18 +236,48 @@ pub fn problem<'f>(
     Ok((problem, reports))
 }
 
-fn no_flight(set: &FlightSet, role: Role) -> IdentifyError {
-    let there = set.flights.iter().filter(|flight| flight.role == role);
-    let names: Vec<&str> = there.map(|flight| flight.name.as_str()).collect();
-    let reason = match names[..] {
-        [] => "there is none".to_owned(),
-        _ => format!(
-            "{} have no stretch in which commands and motion were logged together in flight, besides the first \
-             {SETTLE_S} s and the last moments",
-            names.join(", ")
-        ),
+/// The error of a role that has no flight besides those with faults; `None` if none has one.
+fn faulty(faults: &[Fault], set: &FlightSet) -> Option<IdentifyError> {
+    let of_role = |role: Role| {
+        let names = set.flights.iter().filter(|flight| flight.role == role).map(|flight| &flight.name);
+        names.map(|name| faults.iter().filter(|fault| fault.flight == *name).collect()).collect()
     };
-    IdentifyError::NoFlight { role: if role == Role::Fit { "fit" } else { "test" }, reason }
+    let without: Vec<(Role, Vec<Vec<&Fault>>)> =
+        [Role::Fit, Role::Test].map(|role| (role, of_role(role))).into();
+    let (role, faults) =
+        without.into_iter().find(|(_, flights)| flights.iter().all(|faults| !faults.is_empty()))?;
+    let one = |fault: &&Fault| {
+        format!(
+            "fault of flight `{}`: {}: {}; {}",
+            fault.flight,
+            fault.channel,
+            fault.finding(),
+            fault.advice
+        )
+    };
+    let reason = faults.iter().flatten().map(one).collect::<Vec<_>>().join("; ");
+    Some(IdentifyError::NoFlight { role: name_of(role), reason })
+}
+
+fn name_of(role: Role) -> &'static str {
+    if role == Role::Fit { "fit" } else { "test" }
+}
+
+/// The error of `role`, none of whose flights can be used for these reasons.
+fn no_flight(role: Role, reasons: &[(&Flight, String)]) -> IdentifyError {
+    let one = |(flight, reason): &(&Flight, String)| {
+        let notes = if flight.notes.is_empty() {
+            String::new()
+        } else {
+            format!(" (notes: {})", flight.notes.join("; "))
+        };
+        format!("flight `{}`: {reason}{notes}", flight.name)
+    };
+    let of_role = reasons.iter().filter(|(flight, _)| flight.role == role).map(one);
+    let reason = of_role.collect::<Vec<_>>().join("\n  ");
+    let none = "there is none. Add flights, or give one a part of another's time by `from_s` and `to_s`";
+    let reason = if reason.is_empty() { none.to_owned() } else { reason };
+    IdentifyError::NoFlight { role: name_of(role), reason }
 }
 
 fn box_s(flight: &Flight) -> Option<f64> {
