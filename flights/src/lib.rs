@@ -10,9 +10,9 @@
 //! | `log` | what every log can do: samples of numbers by name |
 //! | `formats` | the formats of logs: `csv_log`, `mcap_log`, `ulog` (`ulog_messages`, `ulog_format`), `crazyflie`, `bytes`, `arrays` |
 //! | `known_types` | messages whose fields and units need not be said |
-//! | `channels`, `clean`, `jumps`, `reading` | from a log's numbers to a flight |
+//! | `channels`, `clean`, `held`, `jumps`, `reading` | from a log's numbers to a flight |
 //! | `specific_force` | specific force from what logs hold in its place |
-//! | `plausible`, `agreement`, `force_doubt`, `finding` | values against physics |
+//! | `plausible`, `agreement`, `force_doubt`, `still`, `finding` | values against physics |
 //! | `span` | times against the number of samples |
 //! | `held_out`, `twin` | whether test flights hold what parameters are fitted on: by file and time, by samples |
 //! | `state` | errors of a simulated state against the measured one |
@@ -37,6 +37,7 @@ mod flight;
 mod force_doubt;
 mod formats;
 mod frame;
+mod held;
 mod held_out;
 mod jumps;
 mod known;
@@ -53,6 +54,7 @@ mod set;
 mod span;
 mod specific_force;
 pub mod state;
+mod still;
 mod twin;
 mod ulog;
 mod ulog_format;

@@ -132,8 +132,14 @@ impl Reading<'_> {
             return Channel::default();
         }
         let complete = known_types::complete(log, quantity, entry);
-        let read = complete
-            .and_then(|entry| channels::read(log, quantity, &entry, self.vehicle, self.entry.trust_units));
+        let read = complete.and_then(|entry| {
+            let (mut channel, said) =
+                channels::read(log, quantity, &entry, self.vehicle, self.entry.trust_units)?;
+            if let Some(absent) = known_types::absent(log, quantity, &entry) {
+                channel = clean::without_absent(quantity, channel, &absent.messages, absent.fields, notes)?;
+            }
+            Ok((channel, said))
+        });
         let cleaned = read.and_then(|(channel, said)| {
             notes.extend(said.into_iter().map(|said| format!("{quantity}: {said}")));
             clean::clean(quantity, channel, notes)

@@ -211,3 +211,44 @@ fn chunks_compressed_by_lz4_are_read() {
     let message = place.load("log.mcap", CHANNELS, "").unwrap_err().to_string();
     assert!(message.contains("and unpacks to 100"), "{message}");
 }
+
+const POSE: &str = r#"
+attitude = { topic = "/imu" }
+angular_velocity = { topic = "/imu" }
+specific_force = { topic = "/imu" }
+"#;
+
+#[test]
+fn an_imu_without_an_attitude_has_none() {
+    assert_eq!(Bag::default().read(POSE, "").unwrap().attitude.time_s.len(), 400);
+    let none = Bag { covariances: |_| [-1.0, 0.0, 0.0], ..Bag::default() };
+    let message = none.refused(POSE, "");
+    for part in ["`attitude`", "`orientation_covariance[0]`", "none of 400", "name another topic"] {
+        assert!(message.contains(part), "`{part}` is not in: {message}");
+    }
+    // The same fields, named.
+    let fields = r#"attitude = { topic = "/imu", fields = ["orientation.x", "orientation.y", "orientation.z", "orientation.w"] }"#;
+    assert!(none.refused(fields, "").contains("orientation_covariance"));
+    // Nothing is declared: the rest is taken.
+    let flight = none.read("", "").unwrap();
+    assert_eq!((flight.attitude.time_s.len(), flight.angular_velocity.time_s.len()), (0, 400));
+    assert!(
+        flight.notes.iter().any(|note| note.contains("attitude: not taken from /imu")),
+        "{:?}",
+        flight.notes
+    );
+}
+
+#[test]
+fn messages_that_lack_a_quantity_are_left_out_and_counted() {
+    type Covariances = fn(u32) -> [f64; 3];
+    let cases: [(Covariances, &str); 3] = [
+        (|k| [if k < 50 { -1.0 } else { 0.0 }, 0.0, 0.0], "attitude: 50 of 400"),
+        (|k| [0.0, if k < 50 { -1.0 } else { 0.1 }, 0.0], "angular_velocity: 50 of 400"),
+        (|k| [0.0, 0.0, if k < 50 { -1.0 } else { 0.0 }], "specific_force: 50 of 400"),
+    ];
+    for (covariances, said) in cases {
+        let flight = Bag { covariances, ..Bag::default() }.read(POSE, "").unwrap();
+        assert!(flight.notes.iter().any(|note| note.contains(said)), "{said}: {:?}", flight.notes);
+    }
+}
