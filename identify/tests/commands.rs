@@ -2,7 +2,7 @@
 mod simulated;
 
 use flights::{Channel, Flight, FlightSet};
-use identify::report::Report;
+use identify::report::{Estimate, Report};
 use identify::run::identify;
 use simulated::cases::Case;
 
@@ -24,7 +24,7 @@ fn found(set: &FlightSet) -> Report {
 }
 
 fn refused(set: &FlightSet) -> String {
-    identify(set, &mut |_| ()).err().expect("flights that cannot be used").to_string()
+    identify(set, &mut |_| ()).expect_err("flights that cannot be used").to_string()
 }
 
 fn keep<const N: usize>(channel: &mut Channel<N>, is_kept: impl Fn(usize, f64) -> bool) {
@@ -162,4 +162,47 @@ fn a_reason_is_a_note_where_another_flight_can_be_used() {
         silent.notes.iter().any(|note| note.starts_with("not used: it has no command channel")),
         "{report}"
     );
+}
+
+/// A flight stack logs the commands of its controller at 10 Hz: slower than the motors follow.
+#[test]
+fn commands_slower_than_the_motors_determine_no_lag_delay_or_inertia() {
+    let mut case = heavy(20.0);
+    case.plan.sensors.pose_ticks = 10;
+    let set = changed(&case, |flight| keep(&mut flight.command, |at, _| at.is_multiple_of(100)));
+    let report = found(&set);
+    for effect in ["motor-lag", "command-delay", "inertia-error", "gyroscopic-torque"] {
+        assert!(!report.verdict.contains(&effect), "{report}");
+        assert!(report.not_identifiable.iter().any(|missing| missing.effect == effect), "{report}");
+        let open = |one: &Estimate| !one.determined && one.low < one.value.max(0.1) && one.high > one.value;
+        assert!(report.effects[effect].parameters.values().all(open), "{effect}: {report}");
+    }
+    let [named] = report.verdict[..] else { panic!("{report}") };
+    let is_mass = named == "mass-error" || report.effects[named].confused_with.contains(&"mass-error");
+    assert!(is_mass, "{report}");
+    let note = "logged every 0.100 s, expected at most 0.033 s, half of the motors' time constant of 0.066 s";
+    assert!(report.to_string().contains(note), "{report}");
+}
+
+/// Some of the commands of a controller at 500 Hz: they act late by half of the period, which is no effect.
+#[test]
+fn what_the_logging_of_commands_makes_is_not_named() {
+    for every in [5, 20] {
+        let set = changed(&heavy(20.0), |flight| keep(&mut flight.command, |at, _| at.is_multiple_of(every)));
+        let report = found(&set);
+        require_mass(&report);
+        let note = format!("which their logging every {:.4} s explains", 1e-3 * every as f64);
+        assert!(every == 5 || report.to_string().contains(&note), "{report}");
+    }
+}
+
+/// The interval of a delay holds the truth even if every fifth command was logged.
+#[test]
+fn the_interval_of_a_delay_holds_half_of_the_logging_period() {
+    let mut case = heavy(20.0);
+    case.plan.truth = vec![simulated::effect("command-delay", &[("delay", 0.02)])];
+    let set = changed(&case, |flight| keep(&mut flight.command, |at, _| at.is_multiple_of(5)));
+    let report = found(&set);
+    let delay = &report.effects["command-delay"].parameters["delay"];
+    assert!(delay.value < 0.02 && delay.low < 0.02 && delay.high > 0.02, "{report}");
 }

@@ -352,7 +352,7 @@ fn a_vehicle_file_with_reversed_spins_is_refused() {
     let folder = tempfile::tempdir().expect("a folder");
     let vehicle = folder.path().join("reversed.toml");
     std::fs::write(&vehicle, text.replace("\"ccw\"", "\"clockwise\"")).expect("a vehicle file");
-    let error = identify(&FlightSet { vehicle, ..set }, &mut |_| ()).err().expect("a refusal").to_string();
+    let error = identify(&FlightSet { vehicle, ..set }, &mut |_| ()).expect_err("a refusal").to_string();
     assert!(error.contains("role \"fit\"") && error.contains("with all spins reversed explains"), "{error}");
 }
 
