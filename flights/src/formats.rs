@@ -6,22 +6,31 @@ use vehicles::foreign;
 
 use crate::crazyflie::CrazyflieLog;
 use crate::csv_log::{CsvLog, Form};
-use crate::declaration::Format;
+use crate::declaration::{Clock, Format};
 use crate::error::{LogError, Spot};
 use crate::log::Log;
 use crate::mcap_log::McapLog;
 use crate::ulog::Ulog;
 
-/// The log with these bytes; `form` is that of a CSV file.
-pub fn parse(bytes: Vec<u8>, format: Format, form: &Form<'_>) -> Result<Box<dyn Log>, LogError> {
+/// The log with these bytes. `form` is that of a CSV file, and `clock` chooses one of two clocks.
+pub fn parse(
+    bytes: Vec<u8>,
+    format: Format,
+    form: &Form<'_>,
+    clock: Option<Clock>,
+) -> Result<Box<dyn Log>, LogError> {
     if form.recording.is_some() && format != Format::Csv {
         let expected = "a CSV file, of which alone one of several recordings is chosen";
         return Err(LogError::unexpected(Spot::Key("recording"), expected, "another format", "remove it"));
     }
+    if clock.is_some() && format != Format::Mcap {
+        let (expected, found) = ("a log in MCAP, which can have two clocks", "another format");
+        return Err(LogError::unexpected(Spot::Key("time"), expected, found, "remove the flight's `time`"));
+    }
     match format {
         Format::Csv => Ok(Box::new(CsvLog::parse(&bytes, form)?)),
         Format::Crazyflie => Ok(Box::new(CrazyflieLog::parse(bytes)?)),
-        Format::Mcap => Ok(Box::new(McapLog::parse(bytes)?)),
+        Format::Mcap => Ok(Box::new(McapLog::parse(bytes, clock)?)),
         Format::Ulog => Ok(Box::new(Ulog::parse(bytes)?)),
     }
 }

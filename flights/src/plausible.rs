@@ -12,6 +12,7 @@ use crate::flight::{Channel, Flight, median};
 use crate::force_doubt::{ForceDoubt, Kind};
 use crate::frame;
 use crate::quantity::{FRACTION, PERCENT, Quantity};
+use crate::still;
 use crate::units::{HUNDREDS, Units, finding, is_gross, of_hundreds, of_unit};
 use diagnostics::unit::{ANGLE, ROTOR_SPEED};
 
@@ -73,6 +74,7 @@ pub fn judge(flight: &Flight, vehicle: &Vehicle, channels: &ChannelMap) -> Vec<F
         judge.force().or_else(|| judge.gravity()),
         judge.upright(),
         judge.rates(),
+        judge.still(),
         judge.velocity(),
         judge.leaning().or_else(|| judge.axes()).or_else(|| judge.speed()),
         judge.commands(),
@@ -246,6 +248,19 @@ impl Judge<'_> {
         } else {
             "negate x, y and z of its columns"
         }
+    }
+
+    /// An attitude turns where the gyroscope does.
+    fn still(&self) -> Option<Finding> {
+        let still = still::turning(&self.flight.attitude, &self.flight.angular_velocity)?;
+        let what = format!(
+            "it stays the same from {:.3} s to {:.3} s, while the gyroscope turns by {:.1} degrees",
+            still.from_s,
+            still.to_s,
+            still.turned_rad.to_degrees()
+        );
+        let fits = "a part without that by `from_s` and `to_s`, or a flight without `attitude`,";
+        self.flight.assumed.is_empty().then(|| finding(Quantity::Attitude, Some(fits.to_owned()), &what))
     }
 
     /// The velocity is the position's derivative.

@@ -175,6 +175,11 @@ fn foreign_files_are_named_whatever_they_are_called() {
     place.write("log", &old);
     let refused =
         place.load("log", &CHANNELS.replace("time", "# time"), "").map_err(|error| error.to_string());
+    let plain = CHANNELS.replace("time", "# time");
+    for (key, extra) in [("`csv`", "csv = { header_line = 2 }"), ("`recording`", "recording = 1")] {
+        let refused = place.load("log", &plain, extra).map_err(|error| error.to_string());
+        says(key, refused, &[key, "a CSV file", "remove it"]);
+    }
     says("a Crazyflie's version 1", refused, &["version 1", "newer firmware"]);
 }
 

@@ -157,8 +157,21 @@ pub fn of(bytes: &[u8]) -> Option<Foreign> {
     if first.get(TAR.0..).is_some_and(|rest| rest.starts_with(TAR.1)) {
         return Some(Foreign { name: "an archive (tar)", advice: "unpack it: `tar xf FILE`" });
     }
-    let by_magic = MAGIC.iter().find(|magic| first.starts_with(magic.0)).map(named);
+    // A short word can be the name of a column.
+    let is_word = |magic: &Magic| magic.0.len() <= 4 && magic.0.is_ascii() && !has_control(magic.0);
+    let is_binary = has_control(first) || !first.is_ascii();
+    let is_meant = |magic: &&Magic| first.starts_with(magic.0) && (is_binary || !is_word(magic));
+    let by_magic = MAGIC.iter().find(is_meant).map(named);
     by_magic.or_else(|| telemetry(first)).or_else(|| text(first)).or_else(|| binary(bytes))
+}
+
+/// True for a control character that texts do not have.
+fn is_control(byte: u8) -> bool {
+    byte.is_ascii_control() && !matches!(byte, b'\t' | b'\n' | b'\r' | 0x0c | 0x1a)
+}
+
+fn has_control(bytes: &[u8]) -> bool {
+    bytes.iter().any(|byte| is_control(*byte))
 }
 
 /// MAVLink messages behind a time each, big-endian in microseconds since 1970, as ground stations write them.
@@ -199,9 +212,7 @@ fn binary(bytes: &[u8]) -> Option<Foreign> {
         let advice = "copy it again: it was not written to its end, or the card is damaged";
         return Some(Foreign { name: "a file of zeros", advice });
     }
-    let is_control =
-        |byte: &&u8| byte.is_ascii_control() && !matches!(**byte, b'\t' | b'\n' | b'\r' | 0x0c | 0x1a);
-    let control = first.iter().filter(is_control).count();
+    let control = first.iter().filter(|byte| is_control(**byte)).count();
     let is_binary = control as f64 > CONTROL_SHARE * first.len() as f64;
     (is_binary && encoding::utf16(bytes).is_none())
         .then_some(Foreign { name: "binary, of an unknown format", advice: EXPORT })
@@ -224,7 +235,7 @@ mod tests {
             (b"\xa3\x95\x80\x80YFMT", "ArduPilot", "mavlogdump.py"),
             (b"H Product:Blackbox flight data recorder by N", "Blackbox", "blackbox_decode"),
             (b"\x1f\x8b\x08\0", "gzip", "gunzip"),
-            (b"BZh91AY&SY", "bzip2", "bunzip2"),
+            (b"BZh91AY&SY\xf4\x02", "bzip2", "bunzip2"),
             (b"\xfd7zXZ\0", "xz", "unxz"),
             (b"\x28\xb5\x2f\xfd", "Zstandard", "unzstd"),
             (b"\x04\x22\x4d\x18", "LZ4", "unlz4"),
@@ -272,8 +283,9 @@ mod tests {
                 .flat_map(|unit| if big { unit.to_be_bytes() } else { unit.to_le_bytes() })
                 .collect()
         };
-        let texts: [&[u8]; 9] = [
+        let texts: [&[u8]; 10] = [
             b"t,x\n0,1\n",
+            b"PAR1,PAR2\n0,1\n",
             b"\xef\xbb\xbft;x\r\n0;1\r\n",
             b"# made by a logger\nt,x\n0,1\n",
             b"\"t\",\"x\"\n0,1\n",

@@ -7,6 +7,7 @@
 //! | [`provenance`] | where each number came from, kept for reports |
 //! | [`effects`] | the effects that a vehicle or scene file lists, as they are written |
 //! | `bounds` | what the numbers of a vehicle can be, and why |
+//! | [`gaps`] | gaps of logs whose samples hold until the next |
 //! | `file` | which keys a vehicle file has, and what is physical |
 //! | [`foreign`] | formats that are taken for another one, by their first bytes |
 //! | [`reader`] | walks the TOML tree with positions, refuses what it does not know; scene files and gains files use it too |
@@ -14,7 +15,6 @@
 //! | `dialect`, `layout`, `table_error` | delimiter, header and decimal mark of such a table: declared, found, wrong |
 //! | [`lines`], [`encoding`] | lines of texts of any system; UTF-16 |
 //! | [`table`] | tables of measurements in CSV, for every log that has this format |
-//! | [`text`] | files that people write, read with an end to it |
 //! | [`variables`] | variables of the environment within paths |
 //! | [`wall_clock`] | times of day in logs |
 //! | [`mod@reference`] | the vehicle files of this crate, as text |
@@ -33,6 +33,7 @@ pub mod effects;
 pub mod encoding;
 mod file;
 pub mod foreign;
+pub mod gaps;
 mod layout;
 pub mod lines;
 pub mod provenance;
@@ -41,7 +42,6 @@ pub mod reader;
 pub mod reference;
 pub mod table;
 mod table_error;
-pub mod text;
 pub mod variables;
 pub mod vehicle;
 pub mod wall_clock;

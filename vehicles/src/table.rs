@@ -140,6 +140,9 @@ impl Table {
 
     /// Number of cells behind those of the header; empty ones at the end do not count.
     fn extra_cells(&self, row: &Row) -> usize {
+        if row.cells.len() <= self.headers.len() {
+            return 0;
+        }
         let extra = row.cells.iter().skip(self.headers.len()).enumerate();
         extra.filter(|(_, cell)| !cell.is_empty()).last().map_or(0, |(place, _)| place + 1)
     }

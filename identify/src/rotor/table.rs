@@ -32,7 +32,7 @@ impl LogTable {
     pub fn read(source: &Source) -> Result<Self, RotorError> {
         let file = short_name(source.file);
         if let Some(topic) = source.topic {
-            let recorded = Recorded::read(source.file, topic, &source.columns)?;
+            let recorded = Recorded::read(source.files, source.file, topic, &source.columns)?;
             let time_s = recorded.time_s.clone();
             let place = |row: usize| format!("sample {} of {topic}", row + 1);
             check_times(&file, &time_s, place)?;
@@ -65,7 +65,9 @@ impl LogTable {
 
 fn table(source: &Source, file: &str) -> Result<Table, RotorError> {
     let path = source.file;
-    let bytes = vehicles::text::read_log(path)
+    let bytes = source
+        .files
+        .bytes(path)
         .map_err(|cause| Diagnostic::unreadable(path.display().to_string(), &cause).help("check the path"))?;
     if bytes.starts_with(RECORDING) {
         return Err(RotorError::too_little(
@@ -78,7 +80,7 @@ fn table(source: &Source, file: &str) -> Result<Table, RotorError> {
     let columns = source.columns.iter().map(|(_, column)| *column).chain(source.time);
     let names: Vec<&str> = columns.map(Column::name).collect();
     let read =
-        Table::parse(&bytes, &names, &source.csv).and_then(|table| table.check_lengths().map(|()| table));
+        Table::parse(&bytes, &names, source.csv).and_then(|table| table.check_lengths().map(|()| table));
     read.map_err(|cause| unusable(file, cause))
 }
 
