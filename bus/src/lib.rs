@@ -56,6 +56,9 @@ mod run_process;
 mod sample_memory;
 pub mod schema;
 mod shared_file;
+#[cfg(test)]
+#[path = "../../tests/runs/skipped.rs"]
+mod skipped;
 #[doc(hidden)]
 pub mod state_transfer;
 #[doc(hidden)]

@@ -6,6 +6,7 @@ use inputs::InputFiles;
 use serde::Deserialize;
 use std::fmt::Display;
 use std::path::Path;
+use vehicles::gaps;
 use vehicles::table::{self, Table};
 
 /// Which columns of a file hold a quantity, and in which unit.
@@ -109,6 +110,13 @@ impl FlightLog {
     #[must_use]
     pub fn duration_s(&self) -> f64 {
         self.rows.last().map_or(0.0, |row| row.time_s)
+    }
+
+    /// The first gap of the rows that overlaps the time from `from_s` to `to_s`.
+    #[must_use]
+    pub fn gap_within(&self, from_s: f64, to_s: f64) -> Option<(f64, f64)> {
+        let times: Vec<f64> = self.rows.iter().map(|row| row.time_s).collect();
+        gaps::of_held(&times).into_iter().find(|gap| gap.0 < to_s && from_s < gap.1)
     }
 
     /// The flight at `time_s` after its first row: commands as last set, measurements interpolated.

@@ -204,7 +204,8 @@ impl Context<'_> {
         let bytes = reader.read(file).map_err(|error| broken(LogError::Unreadable(error)))?;
         let format = entry.format.or(self.declaration.format).unwrap_or_else(|| formats::guess(file, &bytes));
         let time = channels.get(&Quantity::Time).map(Spanned::get_ref);
-        let log = formats::parse(bytes, format, time).map_err(broken)?;
+        let clock = entry.time.or(self.declaration.time);
+        let log = formats::parse(bytes, format, time, clock).map_err(broken)?;
         Reading {
             document: self.document,
             vehicle: self.vehicle,

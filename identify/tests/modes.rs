@@ -214,9 +214,10 @@ fn require_fault(seed: u64, kind: &str, breaks: impl Fn(&mut f64)) {
     let found = changed(&case, |flight| {
         flight.rotor_speed.values.iter_mut().for_each(|speeds| breaks(&mut speeds[2]));
     });
-    let faults: Vec<(&str, &str)> =
-        found.faults.iter().map(|fault| (fault.channel.as_str(), fault.kind)).collect();
-    assert_eq!(faults, [("rotor_speed.3", kind)], "{found}");
+    let faults: Vec<(&str, &str, &str)> =
+        found.faults.iter().map(|fault| (&fault.flight[..], &fault.channel[..], fault.kind)).collect();
+    let flights: Vec<&str> = found.flights.iter().map(|flight| &flight.name[..]).collect();
+    assert_eq!(faults, [0, 1].map(|at| (flights[at], "rotor_speed.3", kind)), "{found}");
     require_named(&found, &["mass-error", "rotor-drag"]);
 }
 

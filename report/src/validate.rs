@@ -4,13 +4,11 @@
 //! | room | what it holds |
 //! |---|---|
 //! | `replay` | one flight as a run: its files, its manifest, the flight itself |
-//! | `rows` | the rows that the player reads: at the times of the commands too |
 //! | `windows` | errors at the ends of the windows, read from the recording |
 //! | `mod@errors` | what came of it, as a table and as JSON |
 
 mod errors;
 mod replay;
-mod rows;
 mod windows;
 
 pub use errors::{ChannelErrors, Errors, FlightErrors, HorizonErrors};

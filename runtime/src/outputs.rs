@@ -153,7 +153,7 @@ impl Outputs {
             partial.is_there() && whole.is_ok_and(|recording| recording.messages().next().is_none())
         };
         if let Some(blank) = self.partial.as_ref().filter(is_blank) {
-            let _ = std::fs::remove_file(&blank.path);
+            blank.remove();
             self.partial = None;
         }
         let partial = self.partial.as_ref().filter(|partial| !partial.is_empty() && partial.is_there());

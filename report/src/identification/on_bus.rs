@@ -24,6 +24,7 @@ pub fn fly_again(
     how: &Validation<'_>,
     tell: &mut dyn FnMut(&str),
 ) -> Result<Option<Value>> {
+    let set = outcome.believed.as_ref().unwrap_or(set);
     let aligned = corrected(set, outcome, &SensorErrors::default());
     let corrected = corrected(set, outcome, &outcome.sensor_errors);
     if aligned.flights.is_empty() {

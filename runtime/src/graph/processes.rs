@@ -319,7 +319,7 @@ fn log(manifest: &Manifest, process: &Process) -> Result<Option<PathBuf>, Diagno
         return at(format!("`log`: the folder of {} is not there", path.display()), "make it");
     }
     match output_file::check(&path, &output_file::LOG) {
-        Ok(_) => Ok(Some(path)),
+        Ok(()) => Ok(Some(path)),
         Err(error) => at(format!("`log`: {error:#}"), ""),
     }
 }
