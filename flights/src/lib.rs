@@ -6,7 +6,7 @@
 //! | `set` | a flights file and all its logs |
 //! | `declaration`, `document` | what a flights file says, and where |
 //! | `quantity`, `frame` | units and frames |
-//! | `logs` | which logs flights are read from: names and patterns |
+//! | `logs`, `log_reader` | which logs flights are read from: names and patterns; each log is read once |
 //! | `log` | what every log can do: samples of numbers by name |
 //! | `formats` | the formats of logs: `csv_log`, `mcap_log`, `ulog` (`ulog_messages`, `ulog_format`), `crazyflie`, `dataflash`, `bytes`, `arrays` |
 //! | `known_types` | messages whose fields and units need not be said |
@@ -44,6 +44,7 @@ mod jumps;
 mod known;
 mod known_types;
 mod log;
+mod log_reader;
 mod logs;
 mod mcap_log;
 mod plausible;
@@ -67,8 +68,9 @@ pub use flight::{Channel, Flight, Role};
 pub use held_out::same_file;
 pub use jumps::{leave_out_jumps, position_jumps};
 pub use known::{KnownRotors, SETTLE_S};
+pub use log_reader::ReadFile;
 pub use played::Played;
 pub use quantity::Quantity;
-pub use set::{FlightSet, ReadFile};
+pub use set::FlightSet;
 pub use span::{Moment, Sparse};
 pub use twin::{Comparison, Twin, twin};

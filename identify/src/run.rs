@@ -1,15 +1,16 @@
 //! The whole way: from flights and the declared vehicle to a report.
 
 use crate::align::{Offsets, align};
-use crate::candidate::{Candidate, candidates, free_parameters};
+use crate::candidate::{Candidate, FAST_COMMANDS, Unidentifiable, candidates, free_parameters};
 use crate::clock::Lateness;
 use crate::faults::{self, Fault};
 use crate::fit::{FitResult, Problem, Weights};
+use crate::logging;
 use crate::model::Model;
 use crate::noise::{self, Floor};
-use crate::parameter::Parameters;
+use crate::parameter::{Parameter, Parameters};
 use crate::predict::{Errors, Measured};
-use crate::prepared::{Airborne, BOX_STEPS, Equation, Prepared};
+use crate::prepared::{BOX_STEPS, Equation, Prepared, Propulsion};
 use crate::regressor::{Regressor, regressors};
 use crate::report::{
     BeforeAfter, Change, Changes, EffectReport, Estimate, FlightReport, Noise, Report, Unexplained,
@@ -45,7 +46,7 @@ const OTHER_FLIGHTS: &str =
 ///
 /// ```
 /// let vehicle = "../vehicles/hummingbird.toml".into();
-/// let set = flights::FlightSet { vehicle, flights: Vec::new() };
+/// let set = flights::FlightSet { vehicle, flights: Vec::new(), files: Default::default() };
 /// let error = identify::run::identify(&set, &mut |_| ()).unwrap_err();
 /// assert!(error.to_string().starts_with("no flight with role \"fit\" can be used: there is none."));
 /// ```
@@ -107,12 +108,12 @@ pub struct Picture {
 /// # Errors
 /// If the vehicle file cannot be read, or no flight of a role can be used.
 pub fn identify(set: &FlightSet, progress: &mut dyn FnMut(&str)) -> Result<Outcome, IdentifyError> {
-    let vehicle = Vehicle::load(&set.vehicle)?;
+    let vehicle = Vehicle::load_from(&set.files, &set.vehicle)?;
     let declared = entry::resolve(&vehicle.effects)?;
     progress("preparing flights");
     let (mut faults, believed) = faults::in_channels(&problem(&vehicle, &declared, set)?.0, set);
     let set = believed.as_ref().unwrap_or(set);
-    let (mut problem, flight_reports, offsets) = aligned(&vehicle, &declared, set, &mut faults)?;
+    let (mut problem, mut flight_reports, offsets) = aligned(&vehicle, &declared, set, &mut faults)?;
     let all: Vec<&Prepared> = problem.flights().collect();
     let (open, unidentifiable) = candidates(&problem.model.parameters, &all);
     progress("trims");
@@ -121,6 +122,8 @@ pub fn identify(set: &FlightSet, progress: &mut dyn FnMut(&str)) -> Result<Outco
     progress("confounded effects");
     let mut effects = judged_effects(&problem, &selection);
     accepted_effects(&problem, &selection, &mut effects);
+    undetermined_effects(&problem, &selection, &unidentifiable, &mut effects);
+    note_logging(&problem, &selection, &mut flight_reports);
     progress("predictions");
     let values = &selection.after.values;
     let sensor_errors = SensorErrors::of(&problem.model.parameters, values);
@@ -133,7 +136,7 @@ pub fn identify(set: &FlightSet, progress: &mut dyn FnMut(&str)) -> Result<Outco
     let report = Report {
         vehicle: set.vehicle.display().to_string(),
         flights: flight_reports,
-        verdict: verdict(&selection),
+        verdict: verdict(&problem, &selection),
         effects,
         unexplained: unexplained(&whiteness),
         whiteness,
@@ -201,7 +204,7 @@ pub fn problem<'f>(
     set: &'f FlightSet,
 ) -> Result<(Problem<'f>, Vec<FlightReport>), IdentifyError> {
     let parameters = Parameters::of(vehicle, declared);
-    let airborne = Airborne::of(vehicle);
+    let propulsion = Propulsion::of(vehicle);
     let (mut estimation, mut validation, mut reports) = (Vec::new(), Vec::new(), Vec::new());
     let mut reasons = Vec::new();
     for flight in &set.flights {
@@ -209,11 +212,15 @@ pub fn problem<'f>(
         let prepared = flight
             .check_span(SPACING_MAX_S)
             .map_err(|cause| cause.to_string())
-            .and_then(|()| Prepared::new(flight, box_s(flight), &airborne).map_err(|cause| cause.to_string()))
+            .and_then(|()| {
+                Prepared::new(flight, box_s(flight), &propulsion).map_err(|cause| cause.to_string())
+            })
             .map_err(|reason| reasons.push((flight, reason)))
             .ok();
         let mut report = flight_report(flight, prepared.as_ref());
         let reason = reasons.last().filter(|_| prepared.is_none());
+        let slow = prepared.as_ref().and_then(|prepared| prepared.slow_period_s);
+        report.notes.extend(slow.map(|period_s| slow_note(period_s, &propulsion)));
         report.notes.extend(reason.map(|(_, reason)| format!("not used: {reason}")));
         reports.push(report);
         match (prepared, flight.role) {
@@ -257,6 +264,14 @@ fn faulty(faults: &[Fault], set: &FlightSet) -> Option<IdentifyError> {
     };
     let reason = faults.iter().flatten().map(one).collect::<Vec<_>>().join("; ");
     Some(IdentifyError::NoFlight { role: name_of(role), reason })
+}
+
+fn slow_note(period_s: f64, propulsion: &Propulsion) -> String {
+    let (most_s, motor_s) = (propulsion.longest_period_s(), propulsion.motor_s);
+    format!(
+        "command: logged every {period_s:.3} s, expected at most {most_s:.3} s, half of the motors' time constant of {motor_s:.3} s; motor lag, \
+         command delay, inertia and all torques cannot be determined, and are not compared; log commands or rotor speeds faster"
+    )
 }
 
 fn name_of(role: Role) -> &'static str {
@@ -308,14 +323,32 @@ fn flight_report(flight: &Flight, prepared: Option<&Prepared>) -> FlightReport {
     }
 }
 
-fn verdict(selection: &Selection) -> Vec<&'static str> {
+/// Names of the accepted effects, without those that the logging of the commands explains.
+fn verdict(problem: &Problem, selection: &Selection) -> Vec<&'static str> {
     let mut names = Vec::new();
-    for candidate in &selection.accepted {
+    for candidate in named(problem, selection) {
         if !names.contains(&candidate.kind.name) {
             names.push(candidate.kind.name);
         }
     }
     names
+}
+
+/// Accepted candidates that stand for effects.
+fn named<'s>(problem: &Problem, selection: &'s Selection) -> impl Iterator<Item = &'s Candidate> {
+    let is_logging =
+        |candidate: &&Candidate| logging::explained_lead_s(problem, candidate, &selection.after).is_some();
+    let named: Vec<&Candidate> =
+        selection.accepted.iter().filter(|candidate| !is_logging(candidate)).collect();
+    named.into_iter()
+}
+
+/// Notes the lateness of the commands that their logging explains.
+fn note_logging(problem: &Problem, selection: &Selection, reports: &mut [FlightReport]) {
+    let leads = selection.accepted.iter();
+    let leads = leads.filter_map(|candidate| logging::explained_lead_s(problem, candidate, &selection.after));
+    let Some(lead_s) = leads.reduce(f64::max) else { return };
+    reports.iter_mut().for_each(|report| report.notes.push(logging::note(problem, lead_s)));
 }
 
 /// The candidates as the last round that judged them left them.
@@ -351,7 +384,7 @@ fn accepted_effects(
     selection: &Selection,
     effects: &mut BTreeMap<&'static str, EffectReport>,
 ) {
-    for name in verdict(selection) {
+    for name in verdict(problem, selection) {
         let indices: Vec<usize> =
             (0..selection.accepted.len()).filter(|at| selection.accepted[*at].kind.name == name).collect();
         let others: Vec<Candidate> =
@@ -388,6 +421,34 @@ fn accepted_effects(
     }
 }
 
+/// Effects of slowly logged commands, with intervals that hold all that they can be.
+fn undetermined_effects(
+    problem: &Problem,
+    selection: &Selection,
+    unidentifiable: &[Unidentifiable],
+    effects: &mut BTreeMap<&'static str, EffectReport>,
+) {
+    let residual = size(problem, selection.after.validation_cost());
+    for missing in unidentifiable.iter().filter(|missing| missing.needs == FAST_COMMANDS) {
+        let of_effect = problem.model.parameters.all.iter().filter(|entry| entry.kind.name == missing.effect);
+        let open = |entry: &Parameter| {
+            let (spec, value) = (entry.spec(), entry.baseline);
+            let (unit, low, high) = (spec.unit(), spec.min, spec.max);
+            (spec.name, Estimate { value, unit, low, high, at_bound: false, determined: false })
+        };
+        let report = EffectReport {
+            accepted: false,
+            linearised: false,
+            parameters: of_effect.map(open).collect(),
+            held_out: BeforeAfter { before: residual, after: residual },
+            chance: 1.0,
+            confused_with: Vec::new(),
+            experiment: None,
+        };
+        effects.entry(missing.effect).or_insert(report);
+    }
+}
+
 /// The weighted root mean square of a sum of squares of the validation data.
 fn size(problem: &Problem, cost: f64) -> f64 {
     (cost / problem.rows(&problem.validation) as f64).sqrt()
@@ -401,7 +462,9 @@ pub fn estimates(problem: &Problem, fitted: &FitResult, free: &[usize]) -> BTree
         let entry = &problem.model.parameters.all[*at];
         let (value, half) =
             (fitted.values[*at], quantile * fitted.standard_error(*at).unwrap_or(f64::INFINITY));
-        let (low, high) = ((value - half).max(entry.spec().min), (value + half).min(entry.spec().max));
+        // Commands that were logged slowly make it come out too small, which no block of time shows.
+        let bias = logging::bias(problem, entry);
+        let (low, high) = ((value - half).max(entry.spec().min), (value + half + bias).min(entry.spec().max));
         // Zero is where many effects begin, and no bound that data pushed against.
         let at_bound = value != entry.baseline && (value <= entry.spec().min || value >= entry.spec().max);
         let determined = low > entry.spec().min || high < entry.spec().max;

@@ -23,6 +23,18 @@ pub enum Unusable {
     /// No channel of the motion.
     #[error("it has no motion; declare `attitude`, `angular_velocity` or `specific_force` in `channels`")]
     NoMotion,
+    /// Commands slower than the motors, and nothing to compare forces with.
+    #[error(
+        "its commands are logged every {period_s:.3} s, slower than the motors follow ({motor_s:.3} s), so that torques cannot \
+         be compared, and no channel shows forces; log commands or rotor speeds faster, or declare `position`, `velocity` or \
+         `specific_force`"
+    )]
+    SlowCommands {
+        /// Usual time between two commands.
+        period_s: f64,
+        /// Time constant of the motors.
+        motor_s: f64,
+    },
     /// A channel with too few samples.
     #[error("its `{channel}` has {samples} samples, expected at least 3")]
     FewSamples {
@@ -42,8 +54,8 @@ pub enum Unusable {
     },
     /// Commands with gaps wherever the motion was measured.
     #[error(
-        "its commands have gaps: the rotor speeds are known {known}, and the motion was measured from {from_s:.3} s to \
-         {to_s:.3} s; if the log writes commands only on change, set `on_change = true` in the channel `command`"
+        "its commands and its motion were never logged together, besides gaps of the commands: the rotor speeds are known \
+         {known}, the motion was measured from {from_s:.3} s to {to_s:.3} s; if the log writes commands only on change, set `on_change = true` in the channel `command`"
     )]
     UnknownRotors {
         /// Stretches with known rotor speeds.

@@ -2,7 +2,7 @@
 mod simulated;
 
 use flights::{Channel, Flight, FlightSet};
-use identify::report::Report;
+use identify::report::{Estimate, Report};
 use identify::run::identify;
 use simulated::cases::Case;
 
@@ -24,7 +24,7 @@ fn found(set: &FlightSet) -> Report {
 }
 
 fn refused(set: &FlightSet) -> String {
-    identify(set, &mut |_| ()).err().expect("flights that cannot be used").to_string()
+    identify(set, &mut |_| ()).expect_err("flights that cannot be used").to_string()
 }
 
 fn keep<const N: usize>(channel: &mut Channel<N>, is_kept: impl Fn(usize, f64) -> bool) {
@@ -70,7 +70,12 @@ fn commands_at_other_times_than_the_motion_are_refused() {
         flight.command.time_s.iter_mut().skip(1).for_each(|t| *t += 1000.0);
     });
     let error = refused(&early);
-    for part in ["role \"fit\"", "its commands have gaps", "known from 1000", "motion was measured from"] {
+    for part in [
+        "role \"fit\"",
+        "commands and its motion were never logged together",
+        "known from 1000",
+        "motion was measured from",
+    ] {
         assert!(error.contains(part), "no {part:?} in: {error}");
     }
     let late = changed(&heavy(8.0), |flight| flight.command.time_s.iter_mut().for_each(|t| *t += 1000.0));
@@ -87,13 +92,13 @@ fn commands_that_are_written_on_change_hold_until_the_next() {
     case.plan.is_calm = true;
     let written = |is_on_change: bool| {
         changed(&case, |flight| {
-            // A message when the command changes by more than 0.02 %.
+            // A message when the command changes by more than 1 %.
             let mut last: Option<[f64; 4]> = None;
             let values = flight.command.values.clone();
             let is_new: Vec<bool> = values
                 .iter()
                 .map(|value| {
-                    let far = |old: [f64; 4]| old.iter().zip(value).any(|(a, b)| (a - b).abs() > 2e-4 * a);
+                    let far = |old: [f64; 4]| old.iter().zip(value).any(|(a, b)| (a - b).abs() > 1e-2 * a);
                     let is_new = last.is_none_or(far);
                     last = if is_new { Some(*value) } else { last };
                     is_new
@@ -157,4 +162,47 @@ fn a_reason_is_a_note_where_another_flight_can_be_used() {
         silent.notes.iter().any(|note| note.starts_with("not used: it has no command channel")),
         "{report}"
     );
+}
+
+/// A flight stack logs the commands of its controller at 10 Hz: slower than the motors follow.
+#[test]
+fn commands_slower_than_the_motors_determine_no_lag_delay_or_inertia() {
+    let mut case = heavy(20.0);
+    case.plan.sensors.pose_ticks = 10;
+    let set = changed(&case, |flight| keep(&mut flight.command, |at, _| at.is_multiple_of(100)));
+    let report = found(&set);
+    for effect in ["motor-lag", "command-delay", "inertia-error", "gyroscopic-torque"] {
+        assert!(!report.verdict.contains(&effect), "{report}");
+        assert!(report.not_identifiable.iter().any(|missing| missing.effect == effect), "{report}");
+        let open = |one: &Estimate| !one.determined && one.low < one.value.max(0.1) && one.high > one.value;
+        assert!(report.effects[effect].parameters.values().all(open), "{effect}: {report}");
+    }
+    let [named] = report.verdict[..] else { panic!("{report}") };
+    let is_mass = named == "mass-error" || report.effects[named].confused_with.contains(&"mass-error");
+    assert!(is_mass, "{report}");
+    let note = "logged every 0.100 s, expected at most 0.033 s, half of the motors' time constant of 0.066 s";
+    assert!(report.to_string().contains(note), "{report}");
+}
+
+/// Some of the commands of a controller at 500 Hz: they act late by half of the period, which is no effect.
+#[test]
+fn what_the_logging_of_commands_makes_is_not_named() {
+    for every in [5, 20] {
+        let set = changed(&heavy(20.0), |flight| keep(&mut flight.command, |at, _| at.is_multiple_of(every)));
+        let report = found(&set);
+        require_mass(&report);
+        let note = format!("which their logging every {:.4} s explains", 1e-3 * every as f64);
+        assert!(every == 5 || report.to_string().contains(&note), "{report}");
+    }
+}
+
+/// The interval of a delay holds the truth even if every fifth command was logged.
+#[test]
+fn the_interval_of_a_delay_holds_half_of_the_logging_period() {
+    let mut case = heavy(20.0);
+    case.plan.truth = vec![simulated::effect("command-delay", &[("delay", 0.02)])];
+    let set = changed(&case, |flight| keep(&mut flight.command, |at, _| at.is_multiple_of(5)));
+    let report = found(&set);
+    let delay = &report.effects["command-delay"].parameters["delay"];
+    assert!(delay.value < 0.02 && delay.low < 0.02 && delay.high > 0.02, "{report}");
 }

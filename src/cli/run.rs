@@ -84,7 +84,7 @@ pub fn run(
     print_warnings(&graph.warnings);
     graph.plan.profile |= files.is_some();
     if let Some((process, with)) = extra_shadow {
-        let shadow = backup_of(&manifest, &graph.plan, process, with)?;
+        let shadow = backup_of(&manifest, &graph.plan, &graph.files, process, with)?;
         if graph.backups.iter().any(|other| other.node == shadow.node) {
             bail!("`{process}` has a backup, a standby or a shadow in this manifest already; one at a time");
         }

@@ -13,8 +13,7 @@
 //! | [`reader`] | walks the TOML tree with positions, refuses what it does not know; scene files and gains files use it too |
 //! | [`quotes`] | quotation marks in CSV files of measurements, whose rows are lines |
 //! | [`table`] | tables of measurements in CSV, for every log that has this format |
-//! | [`text`] | files that people write, read with an end to it |
-//! | [`variables`] | variables of the environment within paths |
+//! //! | [`variables`] | variables of the environment within paths |
 //! | [`mod@reference`] | the vehicle files of this crate, as text |
 //!
 //! ```
@@ -35,7 +34,6 @@ pub mod quotes;
 pub mod reader;
 pub mod reference;
 pub mod table;
-pub mod text;
 pub mod variables;
 pub mod vehicle;
 
