@@ -8,7 +8,7 @@
 //! | `quantity`, `frame` | units and frames |
 //! | `logs`, `log_reader` | which logs flights are read from: names and patterns; each log is read once |
 //! | `log` | what every log can do: samples of numbers by name |
-//! | `formats` | the formats of logs: `csv_log`, `mcap_log`, `ulog` (`ulog_messages`, `ulog_format`), `crazyflie`, `bytes`, `arrays` |
+//! | `formats` | the formats of logs: `csv_log`, `mcap_log`, `ulog` (`ulog_messages`, `ulog_format`), `crazyflie`, `dataflash`, `bytes`, `arrays` |
 //! | `known_types` | messages whose fields and units need not be said |
 //! | `channels`, `clean`, `held`, `jumps`, `reading` | from a log's numbers to a flight |
 //! | `specific_force` | specific force from what logs hold in its place |
@@ -29,6 +29,7 @@ mod channels;
 mod clean;
 mod crazyflie;
 mod csv_log;
+mod dataflash;
 mod declaration;
 mod document;
 mod error;
