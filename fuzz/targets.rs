@@ -63,7 +63,7 @@ pub fn manifest(bytes: &[u8]) -> bool {
     let path = repository().join("manifests/under-test.toml");
     let result = hummingbus::check_text(&text, &path, &overrides);
     let checked = said(result, "");
-    checked.is_some_and(|checked| !checked.json().is_empty() && !checked.to_string().is_empty())
+    checked.is_some_and(|checked| checked.json().is_object() && !checked.to_string().is_empty())
 }
 
 /// A vehicle file; one that is accepted is put into the hover.

@@ -3,8 +3,9 @@
 use std::path::Path;
 
 use nalgebra::{Matrix3, Vector3};
+use vehicles::gaps::{GAP_PERIODS, held_period_s, of_held};
 
-use crate::clean::{GAP_PERIODS, gaps};
+use crate::clean::gaps;
 use crate::error::FlightsError;
 use crate::flight::{Channel, Flight, period_s};
 use crate::frame::{rotation, to_wxyz};
@@ -21,7 +22,7 @@ angular_velocity = { columns = ["wx", "wy", "wz"], unit = "rad/s" }
 /// The first line of every such file.
 pub const HEADER: &str = "t,m1,m2,m3,m4,px,py,pz,vx,vy,vz,qx,qy,qz,qw,wx,wy,wz\n";
 /// Samples to either side of one at which a derivative is fitted.
-const HALF_WINDOW: usize = 3;
+pub const HALF_WINDOW: usize = 3;
 
 /// What was written.
 #[derive(Debug, Clone, PartialEq)]
@@ -43,6 +44,38 @@ pub fn write_csv(flight: &Flight, path: &Path) -> Result<Canonical, FlightsError
     Ok(canonical)
 }
 
+/// A row of the table, in SI.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Row {
+    /// Time of the flight.
+    pub time_s: f64,
+    /// Motor commands in effect.
+    pub command: [f64; 4],
+    /// Position in W.
+    pub position_m: [f64; 3],
+    /// Velocity in W.
+    pub velocity_m_s: [f64; 3],
+    /// Attitude quaternion x, y, z, w, body to world.
+    pub attitude: [f64; 4],
+    /// Angular velocity in B.
+    pub angular_velocity_rad_s: [f64; 3],
+}
+
+impl Row {
+    fn text(&self) -> String {
+        let numbers = [
+            &[self.time_s][..],
+            &self.command,
+            &self.position_m,
+            &self.velocity_m_s,
+            &self.attitude,
+            &self.angular_velocity_rad_s,
+        ]
+        .concat();
+        numbers.iter().map(f64::to_string).collect::<Vec<_>>().join(",") + "\n"
+    }
+}
+
 /// The text that [`write_csv`] writes.
 ///
 /// ```
@@ -58,13 +91,27 @@ pub fn write_csv(flight: &Flight, path: &Path) -> Result<Canonical, FlightsError
 /// # Errors
 /// If the flight has neither attitude nor angular velocity.
 pub fn csv(flight: &Flight) -> Result<(Canonical, String), FlightsError> {
+    let (canonical, rows) = rows(flight)?;
+    Ok((canonical, text(&rows)))
+}
+
+/// The rows as a CSV file.
+pub fn text(rows: &[Row]) -> String {
+    rows.iter().fold(HEADER.to_owned(), |text, row| text + &row.text())
+}
+
+/// The rows of the table.
+///
+/// # Errors
+/// If the flight has neither attitude nor angular velocity.
+pub fn rows(flight: &Flight) -> Result<(Canonical, Vec<Row>), FlightsError> {
     let mut notes = Vec::new();
     let table = Table::of(flight, &mut notes);
     let base =
         if flight.attitude.is_empty() { &flight.angular_velocity.time_s } else { &flight.attitude.time_s };
     let times: Vec<f64> = base.iter().copied().filter(|time_s| !table.is_in_gap(*time_s)).collect();
     if times.is_empty() {
-        return Err(FlightsError::NoRows { flight: flight.name.clone() });
+        return Err(FlightsError::NoRows { flight: flight.name.clone(), found: flight.spans() });
     }
     if times.len() < base.len() {
         notes.push(format!(
@@ -73,8 +120,8 @@ pub fn csv(flight: &Flight) -> Result<(Canonical, String), FlightsError> {
             base.len()
         ));
     }
-    let text = times.iter().fold(HEADER.to_owned(), |text, time_s| text + &table.row(*time_s));
-    Ok((Canonical { rows: times.len(), notes }, text))
+    let rows: Vec<Row> = times.iter().map(|time_s| table.row(*time_s)).collect();
+    Ok((Canonical { rows: rows.len(), notes }, rows))
 }
 
 /// The channels from which rows are made.
@@ -96,9 +143,7 @@ impl<'a> Table<'a> {
         }
         let mut angular_velocity = flight.angular_velocity.clone();
         if angular_velocity.is_empty() {
-            let q = |index: usize| rotation(flight.attitude.values[index]);
-            angular_velocity =
-                derivative(&flight.attitude.time_s, |from, to| (q(from).inverse() * q(to)).scaled_axis());
+            angular_velocity = turning(&flight.attitude);
             notes.push(
                 "angular velocity: derived from the attitude by local quadratics over 7 samples".to_owned(),
             );
@@ -114,7 +159,8 @@ impl<'a> Table<'a> {
         let (position, attitude) = (&flight.position.time_s, &flight.attitude.time_s);
         let gaps =
             [position, &velocity.time_s, attitude, &angular_velocity.time_s].map(|time_s| without(time_s));
-        Self { flight, gaps: joined(gaps.concat()), velocity, angular_velocity }
+        let gaps = [&gaps.concat()[..], &without_commands(flight)].concat();
+        Self { flight, gaps: joined(gaps), velocity, angular_velocity }
     }
 
     fn is_in_gap(&self, time_s: f64) -> bool {
@@ -122,18 +168,16 @@ impl<'a> Table<'a> {
         begun.checked_sub(1).is_some_and(|last| time_s < self.gaps[last].1)
     }
 
-    fn row(&self, time_s: f64) -> String {
+    fn row(&self, time_s: f64) -> Row {
         let [w, x, y, z] = attitude(&self.flight.attitude, time_s);
-        let numbers = [
-            &[time_s][..],
-            &held(&self.flight.command, time_s),
-            &linear(&self.flight.position, time_s),
-            &linear(&self.velocity, time_s),
-            &[x, y, z, w],
-            &linear(&self.angular_velocity, time_s),
-        ]
-        .concat();
-        numbers.iter().map(f64::to_string).collect::<Vec<_>>().join(",") + "\n"
+        Row {
+            time_s,
+            command: held(&self.flight.command, time_s),
+            position_m: linear(&self.flight.position, time_s),
+            velocity_m_s: linear(&self.velocity, time_s),
+            attitude: [x, y, z, w],
+            angular_velocity_rad_s: linear(&self.angular_velocity, time_s),
+        }
     }
 }
 
@@ -161,6 +205,19 @@ fn without(time_s: &[f64]) -> Vec<(f64, f64)> {
     let slack_s = GAP_PERIODS * period_s;
     let ends = [(f64::NEG_INFINITY, first_s - slack_s), (last_s + slack_s, f64::INFINITY)];
     gaps(time_s).into_iter().chain(ends).collect()
+}
+
+/// Times at which the command is not known: gaps of the commands, and all before the first and after the last but for five
+/// periods.
+fn without_commands(flight: &Flight) -> Vec<(f64, f64)> {
+    let time_s = &flight.command.time_s;
+    let Some((first_s, last_s)) = flight.command.span_s() else { return Vec::new() };
+    let before = (f64::NEG_INFINITY, first_s);
+    if flight.commands_on_change {
+        return vec![before];
+    }
+    let period_s = held_period_s(time_s).unwrap_or(0.0);
+    of_held(time_s).into_iter().chain([before, (last_s + GAP_PERIODS * period_s, f64::INFINITY)]).collect()
 }
 
 /// The samples around `time_s` and how far it lies between them; at the ends the nearest sample twice.
@@ -192,6 +249,12 @@ fn attitude(channel: &Channel<4>, time_s: f64) -> [f64; 4] {
         let [a, b] = [from, to].map(rotation);
         to_wxyz(a.try_slerp(&b, part, 1e-12).unwrap_or(a).into_inner())
     })
+}
+
+/// Angular velocity in B at every sample of an attitude.
+pub fn turning(attitude: &Channel<4>) -> Channel<3> {
+    let q = |index: usize| rotation(attitude.values[index]);
+    derivative(&attitude.time_s, |from, to| (q(from).inverse() * q(to)).scaled_axis())
 }
 
 /// The derivative at every sample: that of the quadratic nearest to the changes to its neighbours, none of them

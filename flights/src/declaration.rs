@@ -16,6 +16,8 @@ pub struct Declaration {
     pub vehicle: Spanned<String>,
     /// Format of the logs whose flight does not say it.
     pub format: Option<Format>,
+    /// Clock of the logs whose flight does not say it.
+    pub time: Option<Clock>,
     /// Channels of the logs; a flight's own come first.
     #[serde(default)]
     pub channels: ChannelMap,
@@ -36,6 +38,8 @@ pub struct FlightEntry {
     pub role: Role,
     /// Format of the log.
     pub format: Option<Format>,
+    /// Clock of the log, where it has two.
+    pub time: Option<Clock>,
     /// Start of the part that is used, in seconds from the log's first sample.
     pub from_s: Option<Spanned<f64>>,
     /// End of that part.
@@ -65,6 +69,16 @@ pub enum Format {
     Ulog,
     /// The log that a Crazyflie writes to its card, version 2.
     Crazyflie,
+}
+
+/// Clock of an MCAP file's messages.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Clock {
+    /// The time at which the message was logged.
+    Log,
+    /// The stamp in the message.
+    Stamp,
 }
 
 /// What stands in for an attitude and an angular velocity that were not logged.
@@ -97,6 +111,8 @@ pub struct Entry {
     pub frame: Option<Frame>,
     /// What a `specific_force` is made of.
     pub holds: Option<Holds>,
+    /// True if a log writes a `command` only when it changes.
+    pub on_change: Option<bool>,
     /// By what electrical rotor speeds are divided: half the number of a motor's magnets.
     pub pole_pairs: Option<u32>,
 }

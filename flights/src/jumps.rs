@@ -21,8 +21,11 @@ const POSITION: Limits = Limits { least: 0.05, acceleration: 50.0 };
 /// 30 g can do.
 const ATTITUDE: Limits = Limits { least: 0.0873, acceleration: 250.0 };
 
-/// Leaves out the samples about jumps of position and attitude, and says so.
-pub fn leave_out(flight: &mut Flight) {
+/// Note on jumps, after the channel's name.
+const NOTE: &str = "jumps as no vehicle moves";
+
+/// Leaves out the samples about jumps of position and attitude, and says so in the flight's notes.
+pub fn leave_out_jumps(flight: &mut Flight) {
     let notes = &mut flight.notes;
     flight.position =
         without_jumps(Quantity::Position, std::mem::take(&mut flight.position), &POSITION, notes);
@@ -30,6 +33,13 @@ pub fn leave_out(flight: &mut Flight) {
         let attitude = std::mem::take(&mut flight.attitude);
         flight.attitude = without_jumps(Quantity::Attitude, attitude, &ATTITUDE, notes);
     }
+}
+
+/// Note of `flight` on jumps of its position, without the channel's name.
+#[must_use]
+pub fn position_jumps(flight: &Flight) -> Option<&str> {
+    let of = |note: &'_ String| note.starts_with(&format!("{}: {NOTE}", Quantity::Position));
+    flight.notes.iter().find(|note| of(note))?.split_once(": ").map(|(_, found)| found)
 }
 
 fn without_jumps<const N: usize>(
@@ -51,9 +61,8 @@ fn without_jumps<const N: usize>(
         return channel;
     };
     notes.push(format!(
-        "{quantity}: jumps as no vehicle moves, first at {:.3} s, most at {:.3} s; the samples about are left out",
-        channel.time_s[first.from],
-        channel.time_s[greatest.from],
+        "{quantity}: {NOTE}, first at {:.3} s, most at {:.3} s; the samples about are left out",
+        channel.time_s[first.from], channel.time_s[greatest.from],
     ));
     let mut is_kept = vec![true; channel.time_s.len()];
     for jump in jumps {

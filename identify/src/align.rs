@@ -205,7 +205,7 @@ pub fn align(problem: &mut Problem) -> Vec<(String, Offsets)> {
     problem.shared_late_s = shared.late_s;
     let least_s = problem.least_delay_s() / 2.0;
     let mut offsets = Vec::new();
-    for (flight, shift) in problem.estimation.iter_mut().chain(&mut problem.validation).zip(clocks) {
+    for (flight, shift) in problem.flights_mut().zip(clocks) {
         let late = shift.taken_off(&shared, least_s);
         flight.set_late(late);
         let offset = |found: Option<Found>, taken_off_s| found.map(|found| Offset::of(found, taken_off_s));

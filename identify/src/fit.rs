@@ -90,6 +90,11 @@ impl<'f> Problem<'f> {
         self.estimation.iter().chain(&self.validation)
     }
 
+    /// The same flights, to be changed.
+    pub fn flights_mut(&mut self) -> impl Iterator<Item = &mut Prepared<'f>> {
+        self.estimation.iter_mut().chain(&mut self.validation)
+    }
+
     /// Fits the parameters `free`, starting from `start`.
     pub fn fitted(&self, start: &[f64], free: &[usize]) -> FitResult {
         let mut values = start.to_vec();

@@ -25,7 +25,7 @@ pub struct Report {
     /// Clocks of each flight: attitude, position and velocity against the inertial unit; `null` where it has not what
     /// that takes, or too little of it.
     pub time_offsets_s: BTreeMap<String, Offsets>,
-    /// Sensors and actuators that seem broken.
+    /// Faulty channels and actuators, flight by flight.
     pub faults: Vec<Fault>,
     /// The trims of the flights where they differ between flights: constant torques that no one vehicle explains.
     pub trims: Vec<Trim>,
@@ -242,8 +242,9 @@ impl Report {
                 writeln!(f, "    to tell them apart: {experiment}")?;
             }
         }
-        self.faults.iter().try_for_each(|Fault { channel, kind, finding, consequence }| {
-            writeln!(f, "fault: {channel} ({kind}): {finding}; {consequence}")
+        self.faults.iter().try_for_each(|fault| {
+            let Fault { flight, channel, kind, consequence, advice, .. } = fault;
+            writeln!(f, "fault: {flight}: {channel} ({kind}): {}; {consequence}; {advice}", fault.finding())
         })
     }
 

@@ -72,6 +72,8 @@ pub struct Plan {
     pub is_calm: bool,
     /// Ticks from one command to the next.
     pub control_ticks: usize,
+    /// Gains of the attitude's controller as multiples of a careful pilot's.
+    pub stiffness: f64,
 }
 
 impl Plan {
@@ -86,6 +88,7 @@ impl Plan {
             is_on_rig: false,
             is_calm: false,
             control_ticks: 2,
+            stiffness: 1.0,
         }
     }
 }
@@ -169,7 +172,14 @@ pub fn fly(declared: &Vehicle, plan: &Plan, role: Role) -> Flight {
     plant.settle_rotors(&commands);
     let slow_rad_s = [declared.hover_speed_rad_s(); 4];
     let period_s = plan.control_ticks as f64 * TICK_S;
-    let mut pilot = Pilot { allocation, slow_rad_s, leaned: Vector3::zeros(), sunk: 0.0, period_s };
+    let mut pilot = Pilot {
+        allocation,
+        slow_rad_s,
+        leaned: Vector3::zeros(),
+        sunk: 0.0,
+        period_s,
+        stiffness: plan.stiffness,
+    };
     let mut log = Log::new(plan);
     for tick in 0..(plan.duration_s / TICK_S) as usize {
         let time_s = tick as f64 * TICK_S;
@@ -240,6 +250,7 @@ struct Pilot {
     leaned: Vector3<f64>,
     sunk: f64,
     period_s: f64,
+    stiffness: f64,
 }
 
 /// What takes the motors' lag back: a lead over the slower part of it.
@@ -269,7 +280,9 @@ impl Pilot {
         let rotation = nalgebra::Rotation3::from_basis_unchecked(&[y.cross(&z), y, z]);
         let error = body.attitude_WB.inverse() * UnitQuaternion::from_rotation_matrix(&rotation);
         self.leaned += self.period_s * error.scaled_axis();
-        let gains = (Vector3::new(18.0, 18.0, 6.0), Vector3::new(6.0, 6.0, 4.0));
+        // A stiffer loop is damped alike.
+        let (spring, damper) = (self.stiffness, self.stiffness.sqrt());
+        let gains = (spring * Vector3::new(18.0, 18.0, 6.0), damper * Vector3::new(6.0, 6.0, 4.0));
         let turn = gains.0.component_mul(&error.scaled_axis())
             - gains.1.component_mul(&body.angular_velocity_B_rad_s)
             + 8.0 * self.leaned;

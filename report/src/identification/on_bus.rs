@@ -24,6 +24,7 @@ pub fn fly_again(
     how: &Validation<'_>,
     tell: &mut dyn FnMut(&str),
 ) -> Result<Option<Value>> {
+    let set = outcome.believed.as_ref().unwrap_or(set);
     let aligned = corrected(set, outcome, &SensorErrors::default());
     let corrected = corrected(set, outcome, &outcome.sensor_errors);
     if aligned.flights.is_empty() {
@@ -74,5 +75,5 @@ fn corrected(set: &FlightSet, outcome: &Outcome, errors: &SensorErrors) -> Fligh
             && outcome.report.flights.iter().any(was_used)
     };
     let flights = set.flights.iter().filter(can_fly).map(flight).collect();
-    FlightSet { vehicle: set.vehicle.clone(), flights }
+    FlightSet { vehicle: set.vehicle.clone(), flights, files: set.files.clone() }
 }

@@ -45,7 +45,7 @@ function drawSummary() {
     const rivals = effect.confused_with.length ? `; cannot be told from ${effect.confused_with.join(", ")} here` : "";
     addItem("findings", `${name}: ${estimates.join("; ")}${rivals}.`);
   }
-  for (const fault of report.faults) addItem("findings", `Fault, ${fault.channel} (${fault.kind}): ${fault.finding}; ${fault.consequence}.`);
+  for (const fault of report.faults) addItem("findings", `Fault of ${fault.flight}, ${fault.channel} (${fault.kind}): expected ${fault.expected}, found ${fault.found}; ${fault.consequence}; ${fault.advice}.`);
   if (report.trims.length) addItem("findings", "The flights differ in trim; their mean torques were left out.");
   for (const [name, { rms, before, unit }] of Object.entries(report.unexplained)) {
     addItem("findings", `Unexplained, ${spaced(name)}: ${withUnit(rms, unit)} are neither noise nor any ` +
@@ -83,8 +83,8 @@ function drawClocks() {
 }
 
 function drawFaults() {
-  fillPart("faults", ["channel", "kind", "finding", "consequence"].map(left), report.faults.map((fault) =>
-    [left(fault.channel), left(fault.kind), long(fault.finding), long(fault.consequence)]));
+  fillPart("faults", ["flight", "channel", "kind", "expected", "found", "consequence", "advice"].map(left), report.faults.map((fault) =>
+    [left(fault.flight), left(fault.channel), left(fault.kind), ...["expected", "found", "consequence", "advice"].map((key) => long(fault[key]))]));
   fillPart("trims", [left("flight"), "roll", "pitch", "yaw"], report.trims.map((trim) => [left(trim.flight),
     ...trim.angular_acceleration_rad_s2.map((torque, axis) => `${number(torque)} ± ${trim.deviation_rad_s2[axis].toPrecision(2)}`)]));
 }

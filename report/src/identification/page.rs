@@ -271,6 +271,7 @@ mod tests {
             pictures: FLIGHTS.into_iter().flat_map(of_flight).collect(),
             regressors: BTreeMap::from(regressors),
             sensor_errors: SensorErrors::default(),
+            believed: None,
         };
         let page = page(&outcome, None);
         assert!((4_000_000..8_000_000).contains(&page.len()), "{} bytes", page.len());

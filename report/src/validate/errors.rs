@@ -45,7 +45,7 @@ pub struct HorizonErrors {
     pub horizon_ms: u32,
     /// How many windows count.
     pub windows: usize,
-    /// How many do not, since a measured channel has a gap there or the rotors' speeds are not known yet.
+    /// How many do not, since a measured channel has a gap there or ends, or the rotors' speeds are not known yet.
     pub left_out: usize,
     /// The errors by channel; only channels that the flight tells of.
     pub channels: Vec<ChannelErrors>,
@@ -123,7 +123,10 @@ impl fmt::Display for Errors {
             let counts = horizons.map(|horizon| format!("{} of {} s", horizon.left_out, horizon.horizon()));
             let (name, counts) = (&flight.name, counts.collect::<Vec<_>>().join(", "));
             if !counts.is_empty() {
-                writeln!(f, "{name}: not counted, at the start or at gaps in what was measured: {counts}")?;
+                writeln!(
+                    f,
+                    "{name}: not counted, at the start, at gaps in what was measured or at its end: {counts}"
+                )?;
             }
         }
         Ok(())

@@ -3,9 +3,9 @@
 //! The player plays the flight from its first moment on. For each vehicle and each length of window a plant flies the
 //! commands, set to the measured state at the start of each window; all in one run, so that all fly the same.
 
-use super::rows;
 use anyhow::{Context, Result, bail};
-use flights::Flight;
+use flights::{Flight, Played};
+use inputs::InputFiles;
 use recorder::reader::Recording;
 use runtime::event::{RunEvent, StopToken};
 use runtime::host::Host;
@@ -46,8 +46,8 @@ pub struct Replay {
     /// Where its files are.
     pub folder: PathBuf,
     manifest: ManifestBuilder,
-    /// The moment of the flight at which tick 0 lies.
-    pub start_s: f64,
+    /// What the player plays; tick 0 lies at its first row.
+    pub played: Played,
     /// Ticks of the run.
     ticks: u32,
     /// Held so that no other command writes to the folder.
@@ -66,16 +66,15 @@ impl Replay {
     /// A flight without commands or shorter than the shortest window, or a folder that cannot be written to.
     pub fn prepare(flight: &Flight, vehicles: &[&Path], folder: &Path) -> Result<Self> {
         let folder = std::path::absolute(folder)?.join(file_name(&flight.name));
-        std::fs::create_dir_all(&folder).with_context(|| format!("cannot create {}", folder.display()))?;
+        output_file::make_folder(&folder)?;
         let lock = output_file::lock_folder(&folder)?;
         let data = folder.join(DATA);
         for output in [data.clone(), folder.join(MANIFEST), folder.join(RECORDING)] {
             require_no_input(&output, flight, vehicles)?;
         }
-        let (_, text) = flights::csv(&rows::with_rows_at_commands(flight))?;
-        output_file::write(&data, &CSV, |out| out.write_all(text.as_bytes()))?;
-        let (start_s, end_s) =
-            rows::span_s(&text).with_context(|| format!("{} has no rows", data.display()))?;
+        let played = Played::of(flight)?;
+        output_file::write(&data, &CSV, |out| out.write_all(played.csv().as_bytes()))?;
+        let (start_s, end_s) = played.span_s();
         let ticks = ticks(end_s - start_s)?;
         let initial = command_at(flight, start_s).context("it has no motor commands")?;
         let manifest = manifest(ticks, flights::COLUMNS, initial, vehicles)?;
@@ -83,10 +82,10 @@ impl Replay {
         output_file::write(&folder.join(MANIFEST), &WRITTEN, |out| {
             write!(out, "{MANIFEST_START}\n\n{manifest}")
         })?;
-        Ok(Self { folder, manifest, start_s, ticks, _lock: lock })
+        Ok(Self { folder, manifest, played, ticks, _lock: lock })
     }
 
-    /// Flies; returns how long that took on the host, in seconds, and the recording.
+    /// Flies the vehicles of `files`; returns how long that took on the host, in seconds, and the recording.
     ///
     /// # Errors
     /// As `hummingbus run`; a run that was stopped too.
@@ -94,11 +93,13 @@ impl Replay {
         &self,
         components: Registry,
         stop: &StopToken,
+        files: &InputFiles,
         tell: &mut dyn FnMut(&str),
     ) -> Result<(f64, Recording)> {
         let manifest = self.manifest.build(&self.folder.join(MANIFEST), components)?;
-        let launcher = Launcher::new(Host::this_binary()).stopped_by(stop).adopting_orphans();
-        let launcher = launcher.followed_by(|event| {
+        // What the run reads beside them is its own.
+        let launcher = Launcher::new(Host::this_binary()).reading(files.branch());
+        let launcher = launcher.stopped_by(stop).adopting_orphans().followed_by(|event| {
             if let RunEvent::Note(text) = event {
                 tell(text);
             }
@@ -136,6 +137,8 @@ fn manifest(ticks: u32, columns: &str, initial: [f64; 4], vehicles: &[&Path]) ->
         .set("process.player.kind", "player")
         .set("process.player.data", DATA)
         .set("process.player.outputs.measured.every_ticks", every)
+        // Windows that touch a gap do not count.
+        .set("process.player.parameters.gaps", "hold")
         .set("process.player.parameters.columns", columns.parse::<toml::Table>()?)
         .set("process.recorder.kind", "recorder");
     for (number, vehicle) in vehicles.iter().enumerate() {

@@ -4,16 +4,9 @@ use super::errors::{ChannelErrors, FlightErrors, HorizonErrors};
 use super::replay::{HORIZONS_MS, MEASURED, Replay, plant};
 use crate::states::{FIELDS_OF_STATE, Track, tracks};
 use anyhow::Result;
+use flights::Flight;
 use flights::state::{StateQuantity, WindowEndErrors};
-use flights::{Channel, Flight};
 use recorder::reader::Recording;
-
-/// A time without samples that is longer than this many periods of a channel is a gap.
-const GAP_PERIODS: f64 = 5.0;
-
-/// Windows that begin earlier do not count: the rotors' speeds at the start of a flight are not known, and take so
-/// long to follow the commands.
-const SETTLE_NS: u64 = 500_000_000;
 
 /// The errors of the flown `replay` of `flight` with `vehicles` vehicles, in its `recording`.
 ///
@@ -46,18 +39,15 @@ fn horizon_errors(
     measured: &Track,
     simulated: &[Track],
 ) -> HorizonErrors {
-    let gaps = gaps(flight);
     let window_ns = u64::from(horizon_ms) * 1_000_000;
     let last_ns = measured.time_ns().last().copied().unwrap_or(0);
     let ends: Vec<u64> = (1..=last_ns / window_ns).map(|number| number * window_ns).collect();
-    let is_whole = |end_ns: u64| {
-        let begin_ns = end_ns - window_ns;
-        let [from_s, to_s] = [begin_ns, end_ns].map(|ns| replay.start_s + ns as f64 * 1e-9);
-        // Of the gaps that begin before the window's end, the one that ends last.
-        let begun = gaps.partition_point(|gap| gap.0 < to_s);
-        begin_ns >= SETTLE_NS && !begun.checked_sub(1).is_some_and(|last| from_s < gaps[last].1)
+    let (start_s, _) = replay.played.span_s();
+    let counts = |end_ns: u64| {
+        let [from_s, to_s] = [end_ns - window_ns, end_ns].map(|ns| start_s + ns as f64 * 1e-9);
+        replay.played.counts(from_s, to_s)
     };
-    let counted: Vec<u64> = ends.iter().copied().filter(|end_ns| is_whole(*end_ns)).collect();
+    let counted: Vec<u64> = ends.iter().copied().filter(|end_ns| counts(*end_ns)).collect();
     let errors = simulated.iter().map(|track| track.errors(measured, counted.iter().copied()));
     let errors: Vec<WindowEndErrors> = errors.collect();
     let channel = |quantity: StateQuantity| ChannelErrors {
@@ -70,41 +60,5 @@ fn horizon_errors(
         windows: counted.len(),
         left_out: ends.len() - counted.len(),
         channels: quantities.map(channel).collect(),
-    }
-}
-
-/// The gaps of all measured channels of the state, in seconds of the flight, by when they begin; each with the end of the
-/// longest so far, as there can be as many as rows.
-fn gaps(flight: &Flight) -> Vec<(f64, f64)> {
-    let mut gaps = [&flight.position, &flight.velocity, &flight.angular_velocity].map(channel_gaps).concat();
-    if flight.assumed.is_empty() {
-        gaps.extend(channel_gaps(&flight.attitude));
-    }
-    gaps.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let mut last_s = f64::NEG_INFINITY;
-    for gap in &mut gaps {
-        last_s = last_s.max(gap.1);
-        gap.1 = last_s;
-    }
-    gaps
-}
-
-fn channel_gaps<const N: usize>(channel: &Channel<N>) -> Vec<(f64, f64)> {
-    let Some(period_s) = channel.period_s() else { return Vec::new() };
-    let is_gap = |pair: &&[f64]| pair[1] - pair[0] > GAP_PERIODS * period_s;
-    channel.time_s.windows(2).filter(is_gap).map(|pair| (pair[0], pair[1])).collect()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_gap_is_a_long_time_without_samples() {
-        let mut channel =
-            Channel::<3> { time_s: (0..100).map(|n| f64::from(n) * 0.01).collect(), values: Vec::new() };
-        assert_eq!(channel_gaps(&channel), []);
-        channel.time_s.retain(|time_s| !(0.4..0.455).contains(time_s));
-        assert_eq!(channel_gaps(&channel).len(), 1);
     }
 }

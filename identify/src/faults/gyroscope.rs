@@ -1,0 +1,45 @@
+//! Gyroscopes: frozen, and against the attitude scaled or mirrored on an axis.
+
+use super::evidence::Evidence;
+use super::fault::{Fault, Part, axis_name};
+use super::frozen::longest;
+use super::twin::is_off_scale;
+
+/// Shortest stretch of equal numbers that counts as frozen.
+const FROZEN_S: f64 = 0.5;
+const ADVICE: &str = "check columns, signs, axes and unit of `angular_velocity` for this flight";
+
+/// Fault of this flight's gyroscope, on the first faulty axis.
+pub fn find(evidence: &Evidence) -> Option<Fault> {
+    let channel = &evidence.flight.flight.angular_velocity;
+    if !evidence.flight.flight.assumed.is_empty() || channel.is_empty() {
+        return None;
+    }
+    let fault = |axis: usize, kind, expected: String, found| Fault {
+        flight: evidence.flight.flight.name.clone(),
+        channel: format!("angular_velocity.{}", axis_name(axis)),
+        kind,
+        expected,
+        found,
+        consequence: Part::Gyroscope.consequence(),
+        advice: ADVICE,
+    };
+    let frozen = |axis: usize| {
+        let stretch = longest(evidence.flight, channel, axis, FROZEN_S, |_| false)?;
+        Some(fault(axis, "frozen", "a number that changes in flight".into(), stretch.found()))
+    };
+    if let Some(fault) = (0..3).find_map(frozen) {
+        return Some(fault);
+    }
+    let twins = evidence.gyroscope()?;
+    let compared = |axis: usize| {
+        if let Some(correlation) = twins[axis].mirrored() {
+            let found = format!("its opposite (correlation {correlation:.2})");
+            return Some(fault(axis, "mirrored", "the rate at which the attitude turns".into(), found));
+        }
+        let scale = twins[axis].scale().filter(|scale| is_off_scale(*scale))?;
+        let found = format!("{scale:.3} of it");
+        Some(fault(axis, "scaled", "the rate at which the attitude turns".into(), found))
+    };
+    (0..3).find_map(compared)
+}
