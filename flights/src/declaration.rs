@@ -76,6 +76,8 @@ pub enum Format {
     Mcap,
     /// PX4's ULog.
     Ulog,
+    /// ArduPilot's dataflash log, `.BIN`.
+    Dataflash,
     /// The log that a Crazyflie writes to its card, version 2.
     Crazyflie,
 }

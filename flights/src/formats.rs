@@ -6,6 +6,7 @@ use vehicles::foreign;
 
 use crate::crazyflie::CrazyflieLog;
 use crate::csv_log::{CsvLog, Form};
+use crate::dataflash::Dataflash;
 use crate::declaration::{Clock, Format};
 use crate::error::{LogError, Spot};
 use crate::log::Log;
@@ -30,6 +31,7 @@ pub fn parse(
     match format {
         Format::Csv => Ok(Box::new(CsvLog::parse(&bytes, form)?)),
         Format::Crazyflie => Ok(Box::new(CrazyflieLog::parse(bytes)?)),
+        Format::Dataflash => Ok(Box::new(Dataflash::parse(bytes)?)),
         Format::Mcap => Ok(Box::new(McapLog::parse(bytes, clock)?)),
         Format::Ulog => Ok(Box::new(Ulog::parse(bytes)?)),
     }
@@ -41,6 +43,7 @@ pub fn guess(path: &Path, bytes: &[u8]) -> Format {
     match bytes {
         [0x89, b'M', b'C', b'A', b'P', b'0', b'\r', b'\n', ..] => Format::Mcap,
         [b'U', b'L', b'o', b'g', 1, 0x12, 0x35, _, ..] => Format::Ulog,
+        [0xA3, 0x95, 0x80, ..] => Format::Dataflash,
         // Of every version: its reader names those that it does not read.
         [0xBC, _, 0, _, _, _, _, _, ..] => Format::Crazyflie,
         // Its reader names what it is.

@@ -8,7 +8,7 @@
 //! | `quantity`, `frame` | units and frames |
 //! | `logs`, `log_reader` | which logs flights are read from: names and patterns; each log is read once |
 //! | `log` | what every log can do: samples of numbers by name |
-//! | `formats` | the formats of logs: `csv_log`, `mcap_log`, `ulog` (`ulog_messages`, `ulog_format`), `crazyflie`, `bytes`, `arrays` |
+//! | `formats` | the formats of logs: `csv_log`, `mcap_log`, `ulog` (`ulog_messages`, `ulog_format`), `crazyflie`, `dataflash`, `bytes`, `arrays` |
 //! | `known_types` | messages whose fields and units need not be said |
 //! | `name`, `scaling`, `matrices`, `clock` | names of numbers, their factors, rotation matrices, clocks that start again |
 //! | `channels`, `clean`, `held`, `jumps`, `reading` | from a log's numbers to a flight |
@@ -31,6 +31,7 @@ mod clean;
 mod clock;
 mod crazyflie;
 mod csv_log;
+mod dataflash;
 mod declaration;
 mod document;
 mod error;

@@ -8,7 +8,7 @@ use crate::encoding;
 ///
 /// ```
 /// let found = vehicles::foreign::of(b"\x1f\x8b\x08\x00...").unwrap();
-/// assert_eq!(found.to_string(), "it is compressed (gzip), which is not read; unpack it: `gunzip FILE`");
+/// assert_eq!(found.to_string(), "it is compressed (gzip), which is not read here; unpack it: `gunzip FILE`");
 /// assert!(vehicles::foreign::of(b"t,x\n0,1\n").is_none());
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -21,7 +21,7 @@ pub struct Foreign {
 
 impl fmt::Display for Foreign {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "it is {}, which is not read; {}", self.name, self.advice)
+        write!(f, "it is {}, which is not read here; {}", self.name, self.advice)
     }
 }
 
@@ -53,11 +53,7 @@ const MAGIC: [Magic; 33] = [
         "a database (SQLite; ROS 2 bags with the ending .db3 are such)",
         "make an MCAP file of the bag: `mcap convert FILE.db3 FILE.mcap`",
     ),
-    (
-        b"\xa3\x95",
-        "a DataFlash log (ArduPilot's .BIN)",
-        "write its messages as CSV: `mavlogdump.py --format csv --types RATE FILE.BIN > FILE.csv` (Python package pymavlink)",
-    ),
+    (b"\xa3\x95", "a dataflash log (ArduPilot's .BIN)", IN_FLIGHTS),
     (
         b"H Product:Blackbox flight data recorder",
         "a Blackbox log (Betaflight, INAV)",
@@ -232,7 +228,7 @@ mod tests {
         let cases: [(&[u8], &str, &str); 35] = [
             (b"#ROSBAG V2.0\n", "a bag of ROS 1", "rosbags-convert"),
             (b"SQLite format 3\0", ".db3", "mcap convert"),
-            (b"\xa3\x95\x80\x80YFMT", "ArduPilot", "mavlogdump.py"),
+            (b"\xa3\x95\x80\x80YFMT", "ArduPilot", "flights file"),
             (b"H Product:Blackbox flight data recorder by N", "Blackbox", "blackbox_decode"),
             (b"\x1f\x8b\x08\0", "gzip", "gunzip"),
             (b"BZh91AY&SY\xf4\x02", "bzip2", "bunzip2"),
