@@ -75,6 +75,7 @@ pub use diagnostics::ParameterError;
 pub use error::BusError;
 pub use handles::{Input, Output};
 pub use harness::Harness;
+pub use inputs::InputFiles;
 pub use join::{GENERATION_VARIABLE, Join, NODE_VARIABLE};
 pub use message::Message;
 pub use node::Node;

@@ -2,9 +2,11 @@
 
 use diagnostics::ParameterError;
 use diagnostics::unit::{COUNT, Dimension, LENGTH, PURE_NUMBER, SPEED, TIME, VELOCITY};
+use inputs::InputFiles;
 use serde::Deserialize;
 use std::fmt::Display;
 use std::path::Path;
+use vehicles::gaps;
 use vehicles::table::{self, Table};
 
 /// Which columns of a file hold a quantity, and in which unit.
@@ -72,12 +74,12 @@ pub struct FlightLog {
 }
 
 impl FlightLog {
-    /// Reads the flight at `path`, the parameter `data`.
+    /// Reads the flight at `path` among `files`, the parameter `data`.
     ///
     /// # Errors
     /// If the file, a column or a unit is missing, or a cell is not a number.
-    pub fn load(path: &Path, map: &ColumnMap) -> Result<Self, ParameterError> {
-        let bytes = vehicles::text::read_log(path).map_err(|cause| {
+    pub fn load(files: &InputFiles, path: &Path, map: &ColumnMap) -> Result<Self, ParameterError> {
+        let bytes = files.bytes(path).map_err(|cause| {
             let hint = "Give its path with --set process.<player>.data=PATH";
             refused(path, format_args!(" cannot be read: {cause}. {hint}"))
         })?;
@@ -108,6 +110,13 @@ impl FlightLog {
     #[must_use]
     pub fn duration_s(&self) -> f64 {
         self.rows.last().map_or(0.0, |row| row.time_s)
+    }
+
+    /// The first gap of the rows that overlaps the time from `from_s` to `to_s`.
+    #[must_use]
+    pub fn gap_within(&self, from_s: f64, to_s: f64) -> Option<(f64, f64)> {
+        let times: Vec<f64> = self.rows.iter().map(|row| row.time_s).collect();
+        gaps::of_held(&times).into_iter().find(|gap| gap.0 < to_s && from_s < gap.1)
     }
 
     /// The flight at `time_s` after its first row: commands as last set, measurements interpolated.

@@ -6,6 +6,7 @@ use bus::component::{Component, Info, StepError};
 use bus::context::{NodeContext, StepContext};
 use bus::messages::{MeasuredState, MotorCommand, Quaternion};
 use diagnostics::parameter::{ParameterError, refuse};
+use inputs::InputFiles;
 use serde::Deserialize;
 use std::path::PathBuf;
 
@@ -18,12 +19,26 @@ pub struct Parameters {
     /// Time in the flight, from its first row, at which tick 0 lies.
     #[serde(default)]
     from_s: f64,
-    /// Which columns hold what.
+    /// Columns of the quantities.
     columns: ColumnMap,
+    /// Treatment of gaps.
+    #[serde(default)]
+    gaps: Gaps,
 }
 
-fn load(parameters: &Parameters) -> Result<FlightLog, ParameterError> {
-    let log = FlightLog::load(&parameters.data, &parameters.columns)?;
+/// Treatment of gaps: times without rows, in which nobody knows the commands.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+enum Gaps {
+    /// A run that plays one is refused.
+    #[default]
+    Refuse,
+    /// The last command holds.
+    Hold,
+}
+
+fn load(parameters: &Parameters, files: &InputFiles) -> Result<FlightLog, ParameterError> {
+    let log = FlightLog::load(files, &parameters.data, &parameters.columns)?;
     let (from_s, length_s) = (parameters.from_s, log.duration_s());
     refuse(!(0.0..length_s).contains(&from_s), "from_s", || {
         format!("`from_s` is {from_s} s, the flight lasts {length_s:.3} s")
@@ -46,7 +61,19 @@ fn require_length(log: &FlightLog, from_s: f64, run: &NodeContext<'_>) -> Result
     })
 }
 
-/// What the player sends.
+/// Refuses a run that plays a gap.
+fn require_no_gap(log: &FlightLog, from_s: f64, run: &NodeContext<'_>) -> Result<(), ParameterError> {
+    let last_s = from_s + f64::from(run.duration_ticks) * run.tick_s();
+    let Some((begin_s, end_s)) = log.gap_within(from_s, last_s) else { return Ok(()) };
+    refuse(true, "gaps", || {
+        format!(
+            "the flight has no rows from {begin_s:.3} s to {end_s:.3} s after its first: nobody knows the commands there. Play \
+             a part without gaps by `from_s` and run.duration_s, or set `gaps = \"hold\"` to hold the last command"
+        )
+    })
+}
+
+/// Output ports of the player.
 #[derive(Debug, OutputPorts)]
 pub struct Outputs {
     /// The commands of the flight.
@@ -67,6 +94,7 @@ pub struct Outputs {
 pub struct Player {
     log: FlightLog,
     from_s: f64,
+    gaps: Gaps,
     /// The row that was played last.
     hint: usize,
 }
@@ -79,12 +107,14 @@ impl Component for Player {
     type Outputs = Outputs;
     type State = ();
 
-    fn new(parameters: Parameters, _: &NodeContext<'_>) -> Result<Self, ParameterError> {
-        Ok(Self { log: load(&parameters)?, from_s: parameters.from_s, hint: 0 })
+    fn new(parameters: Parameters, context: &NodeContext<'_>) -> Result<Self, ParameterError> {
+        let log = load(&parameters, &context.files)?;
+        Ok(Self { log, from_s: parameters.from_s, gaps: parameters.gaps, hint: 0 })
     }
 
     fn rehearse(self, context: &NodeContext<'_>) -> Result<(), ParameterError> {
-        require_length(&self.log, self.from_s, context)
+        require_length(&self.log, self.from_s, context)?;
+        if self.gaps == Gaps::Hold { Ok(()) } else { require_no_gap(&self.log, self.from_s, context) }
     }
 
     fn initial(&self) {}

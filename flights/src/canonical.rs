@@ -3,8 +3,9 @@
 use std::path::Path;
 
 use nalgebra::{Matrix3, Vector3};
+use vehicles::gaps::{GAP_PERIODS, held_period_s, of_held};
 
-use crate::clean::{GAP_PERIODS, gaps};
+use crate::clean::gaps;
 use crate::error::FlightsError;
 use crate::flight::{Channel, Flight, period_s};
 use crate::frame::{rotation, to_wxyz};
@@ -110,7 +111,7 @@ pub fn rows(flight: &Flight) -> Result<(Canonical, Vec<Row>), FlightsError> {
         if flight.attitude.is_empty() { &flight.angular_velocity.time_s } else { &flight.attitude.time_s };
     let times: Vec<f64> = base.iter().copied().filter(|time_s| !table.is_in_gap(*time_s)).collect();
     if times.is_empty() {
-        return Err(FlightsError::NoRows { flight: flight.name.clone() });
+        return Err(FlightsError::NoRows { flight: flight.name.clone(), found: flight.spans() });
     }
     if times.len() < base.len() {
         notes.push(format!(
@@ -158,7 +159,8 @@ impl<'a> Table<'a> {
         let (position, attitude) = (&flight.position.time_s, &flight.attitude.time_s);
         let gaps =
             [position, &velocity.time_s, attitude, &angular_velocity.time_s].map(|time_s| without(time_s));
-        Self { flight, gaps: joined(gaps.concat()), velocity, angular_velocity }
+        let gaps = [&gaps.concat()[..], &without_commands(flight)].concat();
+        Self { flight, gaps: joined(gaps), velocity, angular_velocity }
     }
 
     fn is_in_gap(&self, time_s: f64) -> bool {
@@ -203,6 +205,19 @@ fn without(time_s: &[f64]) -> Vec<(f64, f64)> {
     let slack_s = GAP_PERIODS * period_s;
     let ends = [(f64::NEG_INFINITY, first_s - slack_s), (last_s + slack_s, f64::INFINITY)];
     gaps(time_s).into_iter().chain(ends).collect()
+}
+
+/// Times at which the command is not known: gaps of the commands, and all before the first and after the last but for five
+/// periods.
+fn without_commands(flight: &Flight) -> Vec<(f64, f64)> {
+    let time_s = &flight.command.time_s;
+    let Some((first_s, last_s)) = flight.command.span_s() else { return Vec::new() };
+    let before = (f64::NEG_INFINITY, first_s);
+    if flight.commands_on_change {
+        return vec![before];
+    }
+    let period_s = held_period_s(time_s).unwrap_or(0.0);
+    of_held(time_s).into_iter().chain([before, (last_s + GAP_PERIODS * period_s, f64::INFINITY)]).collect()
 }
 
 /// The samples around `time_s` and how far it lies between them; at the ends the nearest sample twice.

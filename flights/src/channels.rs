@@ -74,6 +74,7 @@ impl<'a> Layout<'a> {
         let frame = entry.frame.unwrap_or_default();
         let (names, euler) = named(quantity, entry)?;
         let pole_pairs = pole_pairs(quantity, entry)?;
+        require_command_on_change(quantity, entry)?;
         let (factor, offset) = match (quantity, entry.unit.as_deref()) {
             (Quantity::Attitude, unit) if euler => (factor(ANGLE, unit)?, 0.0),
             (Quantity::Attitude, None) => (1.0, 0.0),
@@ -168,6 +169,14 @@ fn holds(quantity: Quantity, entry: &Entry) -> Result<Holds, LogError> {
         return Err(LogError::unexpected(Spot::Key("holds"), expected, "it", advice));
     }
     Ok(entry.holds.unwrap_or_default())
+}
+
+/// Refuses `on_change` of all but commands: other channels have a value between their samples.
+fn require_command_on_change(quantity: Quantity, entry: &Entry) -> Result<(), LogError> {
+    if entry.on_change.is_none() || quantity == Quantity::Command {
+        return Ok(());
+    }
+    Err(LogError::unexpected(Spot::Key("on_change"), "`command` alone to have it", "it", "remove it"))
 }
 
 /// How many times faster than the rotor its electrical field turns; 1 where the log has mechanical speeds.

@@ -111,6 +111,8 @@ pub struct Entry {
     pub frame: Option<Frame>,
     /// What a `specific_force` is made of.
     pub holds: Option<Holds>,
+    /// True if a log writes a `command` only when it changes.
+    pub on_change: Option<bool>,
     /// By what electrical rotor speeds are divided: half the number of a motor's magnets.
     pub pole_pairs: Option<u32>,
 }

@@ -93,12 +93,14 @@ pub enum FlightsError {
     },
     /// A flight has no time at which a row of a table could stand.
     #[error(
-        "flight `{flight}`: no attitude or angular velocity at a time at which its other channels have samples; map one \
-         of them, or use `assume = \"hover\"`"
+        "flight `{flight}`: expected an attitude or an angular velocity at a time at which all other channels have samples, \
+         found {found}; map the missing channel, or correct the clocks"
     )]
     NoRows {
         /// The flight's name.
         flight: String,
+        /// Its channels with their times.
+        found: String,
     },
     /// More than one of these.
     #[error(fmt = several)]

@@ -45,6 +45,8 @@ pub struct Flight {
     /// Raw motor commands, in the unit of the vehicle file's command map and in its order of rotors. A command
     /// holds until the next.
     pub command: Channel<4>,
+    /// True if the log writes commands only on change: then a time without commands is no gap.
+    pub commands_on_change: bool,
     /// Speeds of the rotors in rad/s, in the order of the commands.
     pub rotor_speed: Channel<4>,
     /// Position in W, in m.
@@ -121,6 +123,7 @@ impl Flight {
             file: file.into(),
             role,
             command: Channel::default(),
+            commands_on_change: false,
             rotor_speed: Channel::default(),
             position: Channel::default(),
             velocity: Channel::default(),
@@ -131,6 +134,17 @@ impl Flight {
             assumed: Vec::new(),
             notes: Vec::new(),
         }
+    }
+
+    /// Channels with the times of their first and last samples, as text.
+    #[must_use]
+    pub fn spans(&self) -> String {
+        let of = |(quantity, time_s): (Quantity, &[f64])| {
+            let (first_s, last_s) = (time_s.first()?, time_s.last()?);
+            Some(format!("{quantity} from {first_s:.3} s to {last_s:.3} s"))
+        };
+        let all: Vec<String> = self.times().into_iter().filter_map(of).collect();
+        if all.is_empty() { "no channel".to_owned() } else { all.join(", ") }
     }
 
     /// The times of the samples of all channels, in the order of [`Quantity::CHANNELS`].

@@ -1,6 +1,8 @@
-//! The formats of logs: which one a file has, and its reader.
+//! Formats of logs: the one that a file has, and its reader.
 
 use std::path::Path;
+
+use vehicles::foreign;
 
 use crate::crazyflie::CrazyflieLog;
 use crate::csv_log::CsvLog;
@@ -29,13 +31,16 @@ pub fn parse(
     }
 }
 
-/// The format of the log at `path` with these bytes: by the first of them, else by its name; CSV where neither says more.
+/// Returns the format of the log at `path` with these bytes: by the first of them, else by its name; CSV where neither says
+/// more, and for a format that has no reader.
 pub fn guess(path: &Path, bytes: &[u8]) -> Format {
     match bytes {
         [0x89, b'M', b'C', b'A', b'P', b'0', b'\r', b'\n', ..] => Format::Mcap,
         [b'U', b'L', b'o', b'g', 1, 0x12, 0x35, _, ..] => Format::Ulog,
-        // Of any version: text does not begin so.
-        [0xBC, _, 0, _, _, ..] => Format::Crazyflie,
+        // Of every version: its reader names those that it does not read.
+        [0xBC, _, 0, _, _, _, _, _, ..] => Format::Crazyflie,
+        // Its reader names what it is.
+        _ if foreign::of(bytes).is_some() => Format::Csv,
         _ => match path.extension().and_then(|extension| extension.to_str()) {
             Some("mcap") => Format::Mcap,
             Some("ulg" | "ulog") => Format::Ulog,

@@ -23,6 +23,33 @@ const fn px4(kind: &'static str, quantity: Quantity, fields: &'static str, unit:
     Known { kind, quantity, fields, unit, frame: Frame::FrdNed }
 }
 
+/// Fields of a type of message that say if it holds a quantity.
+struct Validity {
+    kind: &'static str,
+    quantity: Quantity,
+    /// Their names, divided by blanks.
+    fields: &'static str,
+    /// True if a field with this number says that the message does not.
+    is_absent: fn(f64) -> bool,
+}
+
+const fn covariance(quantity: Quantity, fields: &'static str) -> Validity {
+    Validity { kind: "sensor_msgs/msg/Imu", quantity, fields, is_absent: |first| first == -1.0 }
+}
+
+const fn flags(kind: &'static str, quantity: Quantity, fields: &'static str) -> Validity {
+    Validity { kind, quantity, fields, is_absent: |flag| flag == 0.0 }
+}
+
+/// By the comments of `sensor_msgs/Imu` and `vehicle_local_position`. Other ROS messages have no such rule.
+const VALIDITIES: &[Validity] = &[
+    covariance(Quantity::Attitude, "orientation_covariance[0]"),
+    covariance(Quantity::AngularVelocity, "angular_velocity_covariance[0]"),
+    covariance(Quantity::SpecificForce, "linear_acceleration_covariance[0]"),
+    flags("vehicle_local_position", Quantity::Position, "xy_valid z_valid"),
+    flags("vehicle_local_position", Quantity::Velocity, "v_xy_valid v_z_valid"),
+];
+
 /// In the order of preference where no channel is declared: sensors come before the truth of a simulation.
 const KNOWN: &[Known] = &[
     ours("hummingbus_msgs/msg/MotorCommand", Quantity::Command, "command[#]", "count"),
@@ -89,6 +116,34 @@ impl Known {
     }
 }
 
+/// Samples of a quantity that messages do not hold, although they have its fields.
+pub struct Absent {
+    /// For each message of the topic, true if it does not hold the quantity.
+    pub messages: Vec<bool>,
+    /// The fields that say so.
+    pub fields: &'static str,
+}
+
+/// The messages of the topic of `entry` that say that they do not hold the quantity; `None` if its type cannot say so, or other
+/// fields are declared than those of the type.
+pub fn absent(log: &dyn Log, quantity: Quantity, entry: &Entry) -> Option<Absent> {
+    let topic = entry.topic.as_deref()?;
+    let (_, kind) = log.topics().into_iter().find(|(name, _)| name == topic)?;
+    let validity =
+        VALIDITIES.iter().find(|validity| validity.kind == kind && validity.quantity == quantity)?;
+    let known = KNOWN.iter().find(|known| known.kind == kind && known.quantity == quantity)?.entry(topic);
+    let plain = |name: &String| name.trim_start_matches('-').to_owned();
+    let declared: Vec<String> = entry.columns.iter().flatten().map(plain).collect();
+    if !known.columns.iter().flatten().any(|name| declared.contains(name)) {
+        return None;
+    }
+    let fields: Vec<String> = validity.fields.split(' ').map(str::to_owned).collect();
+    // Older logs lack them.
+    let rows = log.samples(Some(topic), &fields).ok()?.rows;
+    let messages = rows.iter().map(|row| row.iter().any(|number| (validity.is_absent)(*number))).collect();
+    Some(Absent { messages, fields: validity.fields })
+}
+
 /// `entry` with what need not be said about a known type of message.
 ///
 /// # Errors
@@ -128,6 +183,12 @@ pub fn defaults(log: &dyn Log, format: Format) -> (ChannelMap, Vec<String>) {
                 topics.iter().filter(|(_, kind)| kind == known.kind).map(|(name, _)| name.as_str()).collect();
             match of_kind[..] {
                 [] => continue,
+                [topic] if holds_nothing(log, quantity, &known.entry(topic)) => {
+                    notes.push(format!(
+                        "{quantity}: not taken from {topic}, whose messages say that they have none"
+                    ));
+                    continue;
+                }
                 [topic] => {
                     notes.push(format!("{quantity}: taken from {topic}, as no channel is declared"));
                     channels.insert(quantity, toml::Spanned::new(0..0, known.entry(topic)));
@@ -141,4 +202,9 @@ pub fn defaults(log: &dyn Log, format: Format) -> (ChannelMap, Vec<String>) {
         }
     }
     (channels, notes)
+}
+
+/// True if no message of the topic holds the quantity.
+fn holds_nothing(log: &dyn Log, quantity: Quantity, entry: &Entry) -> bool {
+    absent(log, quantity, entry).is_some_and(|absent| !absent.messages.contains(&false))
 }

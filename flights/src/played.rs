@@ -3,13 +3,10 @@
 //! The bus and `identify` take both from here. Otherwise they would differ wherever a derivative is noisy or one-sided.
 
 use crate::canonical::{HALF_WINDOW, Row, rows, text, turning};
-use crate::clean::{self, GAP_PERIODS};
+use crate::clean;
 use crate::error::FlightsError;
 use crate::flight::{Channel, Flight};
-
-/// Windows that begin earlier do not count: how fast the rotors turn where a log begins is not known, and they take so long
-/// to follow the commands.
-const SETTLE_S: f64 = 0.5;
+use crate::known::{KnownRotors, SETTLE_S};
 
 /// Slack that puts a tick on its own row: times are sums of decimal fractions.
 const SLACK_S: f64 = 1e-9;
@@ -22,6 +19,7 @@ const SLACK_S: f64 = 1e-9;
 /// let mut flight = Flight::new("climb", "log.csv", Role::Test);
 /// let time_s: Vec<f64> = (0..200).map(|k| f64::from(k) * 0.01).collect();
 /// flight.attitude = Channel { values: vec![[1.0, 0.0, 0.0, 0.0]; 200], time_s: time_s.clone() };
+/// flight.command = Channel { values: vec![[40.0; 4]; 200], time_s: time_s.clone() };
 /// flight.position = Channel { values: time_s.iter().map(|t| [0.0, 0.0, *t]).collect(), time_s };
 /// let played = Played::of(&flight)?;
 /// assert!((played.at(1.005, &mut 0).velocity_m_s[2] - 1.0).abs() < 1e-9);
@@ -34,6 +32,8 @@ pub struct Played {
     rows: Vec<Row>,
     /// Bounds of the windows that count.
     counted_s: (f64, f64),
+    /// Stretches within which windows count.
+    known: KnownRotors,
     /// Gaps, which no window that counts touches, by their begin; each with the latest end so far.
     gaps: Vec<(f64, f64)>,
 }
@@ -45,7 +45,8 @@ impl Played {
     /// If the flight has neither attitude nor angular velocity.
     pub fn of(flight: &Flight) -> Result<Self, FlightsError> {
         let (_, rows) = rows(&with_rows_at_commands(flight))?;
-        Ok(Self { counted_s: counted_s(flight, rows[0].time_s), gaps: gaps(flight), rows })
+        let (counted_s, known) = (counted_s(flight, rows[0].time_s), KnownRotors::of(flight));
+        Ok(Self { counted_s, known, gaps: gaps(flight), rows })
     }
 
     /// The rows as a CSV file, as [`crate::csv`] writes it.
@@ -84,7 +85,7 @@ impl Played {
         }
     }
 
-    /// True if the window from `from_s` to `to_s` counts. These do not: windows that begin while the rotors settle, that
+    /// True if the window from `from_s` to `to_s` counts. These do not: windows in which the rotors are not known, that
     /// touch a gap of a measured channel, or that end at the last samples of the log, where a derivative is one-sided.
     #[must_use]
     pub fn counts(&self, from_s: f64, to_s: f64) -> bool {
@@ -92,7 +93,8 @@ impl Played {
         // Of the gaps that begin before the window's end, the one that ends last.
         let begun = self.gaps.partition_point(|gap| gap.0 < to_s - SLACK_S);
         let touches = begun.checked_sub(1).is_some_and(|last| from_s < self.gaps[last].1 - SLACK_S);
-        from_s >= first_s - SLACK_S && to_s <= last_s + SLACK_S && !touches
+        let is_inside = from_s >= first_s - SLACK_S && to_s <= last_s + SLACK_S;
+        is_inside && !touches && self.known.hold(from_s, to_s)
     }
 }
 
@@ -113,13 +115,8 @@ fn reaches(flight: &Flight) -> Vec<(&[f64], usize)> {
 
 /// Bounds of the windows that count, in a flight whose first row is at `start_s`.
 fn counted_s(flight: &Flight, start_s: f64) -> (f64, f64) {
-    let (mut first_s, mut last_s) = (start_s, f64::INFINITY);
-    if let Some((given_s, end_s)) = flight.command.span_s() {
-        first_s = first_s.max(given_s);
-        // The last command holds as long as others did.
-        last_s = end_s + GAP_PERIODS * flight.command.period_s().unwrap_or(0.0);
-    }
-    first_s += SETTLE_S;
+    // A replay begins with rotors that follow the first command.
+    let (mut first_s, mut last_s) = (start_s + SETTLE_S, f64::INFINITY);
     for (time_s, reach) in reaches(flight) {
         let end = (time_s.len() - 1).saturating_sub(reach);
         first_s = first_s.max(time_s[reach.min(time_s.len() - 1)]);
@@ -226,6 +223,7 @@ mod tests {
         let time_s: Vec<f64> = (0..300).map(|k| f64::from(k) * 0.01).collect();
         let kept: Vec<f64> = time_s.iter().copied().filter(|t| !(1.4..1.6).contains(t)).collect();
         flight.position = Channel { values: vec![[0.0; 3]; kept.len()], time_s: kept };
+        flight.command = Channel { values: vec![[40.0; 4]; 300], time_s: time_s.clone() };
         flight.attitude = Channel { values: vec![[1.0, 0.0, 0.0, 0.0]; 300], time_s };
         let played = Played::of(&flight).unwrap();
         for (from_s, to_s, counts) in [
@@ -244,5 +242,28 @@ mod tests {
         flight.velocity = Channel { values: vec![[0.0; 3]; 300], time_s: flight.attitude.time_s.clone() };
         flight.angular_velocity = flight.velocity.clone();
         assert!(Played::of(&flight).unwrap().counts(2.0, 2.99));
+    }
+
+    #[test]
+    fn windows_in_a_gap_of_the_commands_do_not_count() {
+        let mut flight = Flight::new("gap", "log.csv", crate::Role::Test);
+        let time_s: Vec<f64> = (0..600).map(|k| f64::from(k) * 0.01).collect();
+        flight.attitude = Channel { values: vec![[1.0, 0.0, 0.0, 0.0]; 600], time_s: time_s.clone() };
+        flight.angular_velocity = Channel { values: vec![[0.0; 3]; 600], time_s: time_s.clone() };
+        let given: Vec<f64> = time_s.into_iter().filter(|t| (1.0..2.0).contains(t) || *t > 4.0).collect();
+        flight.command = Channel { values: vec![[40.0; 4]; given.len()], time_s: given };
+        let played = Played::of(&flight).unwrap();
+        for (from_s, to_s, counts) in [
+            (0.5, 0.9, false),
+            (1.4, 1.8, false),
+            (1.5, 1.9, true),
+            (1.9, 2.1, false),
+            (2.5, 3.0, false),
+            (4.1, 4.6, false),
+            (4.6, 5.0, true),
+        ] {
+            assert_eq!(played.counts(from_s, to_s), counts, "{from_s} to {to_s}");
+        }
+        assert_eq!(played.span_s().0, 1.0, "nothing is played before the first command");
     }
 }

@@ -5,6 +5,7 @@ use std::path::Path;
 
 use toml::Spanned;
 use vehicles::Vehicle;
+use vehicles::gaps::{GAP_PERIODS, of_held};
 
 use crate::channels;
 use crate::clean;
@@ -15,6 +16,7 @@ use crate::finding::Finding;
 use crate::flight::{AnyChannel, Channel, Flight};
 use crate::frame;
 use crate::jumps;
+use crate::known::SETTLE_S;
 use crate::known_types;
 use crate::log::Log;
 use crate::plausible;
@@ -72,6 +74,8 @@ impl Reading<'_> {
             self.channels.values().filter_map(|entry| entry.get_ref().topic.as_deref()).collect();
         log.check_clocks(&topics).map_err(|cause| self.log_error(&self.at, None, cause))?;
         let mut flight = self.read_channels(log)?;
+        flight.commands_on_change =
+            self.declared(Quantity::Command).is_some_and(|entry| entry.on_change == Some(true));
         flight.notes.splice(0..0, taken);
         if self.format == Format::Csv {
             let of_time = plausible::judge_time(&flight, self.vehicle, &self.channels);
@@ -128,8 +132,14 @@ impl Reading<'_> {
             return Channel::default();
         }
         let complete = known_types::complete(log, quantity, entry);
-        let read = complete
-            .and_then(|entry| channels::read(log, quantity, &entry, self.vehicle, self.entry.trust_units));
+        let read = complete.and_then(|entry| {
+            let (mut channel, said) =
+                channels::read(log, quantity, &entry, self.vehicle, self.entry.trust_units)?;
+            if let Some(absent) = known_types::absent(log, quantity, &entry) {
+                channel = clean::without_absent(quantity, channel, &absent.messages, absent.fields, notes)?;
+            }
+            Ok((channel, said))
+        });
         let cleaned = read.and_then(|(channel, said)| {
             notes.extend(said.into_iter().map(|said| format!("{quantity}: {said}")));
             clean::clean(quantity, channel, notes)
@@ -170,13 +180,12 @@ impl Reading<'_> {
 
     /// Puts all channels on the flight's clock and cuts them to its part.
     fn to_flight_time(&self, flight: &mut Flight, origin_s: f64) {
+        let is_on_change = flight.commands_on_change;
         for (quantity, channel) in flight.channels_mut() {
             let time_s = channel.time_s();
             self.shift(quantity, time_s, origin_s);
-            let holding = time_s.partition_point(|time_s| *time_s <= 0.0).checked_sub(1);
-            if let Some(holding) = holding.filter(|_| quantity == Quantity::Command) {
-                // The command that holds at the start begins there.
-                time_s[holding] = 0.0;
+            if quantity == Quantity::Command {
+                begin_holding(time_s, is_on_change);
             }
             self.cut(channel);
         }
@@ -315,15 +324,42 @@ impl Reading<'_> {
     }
 }
 
+/// Moves the command that holds at the start, 0 s, to there; not if the start lies in a gap.
+fn begin_holding(time_s: &mut [f64], is_on_change: bool) {
+    let Some(holding) = time_s.partition_point(|time_s| *time_s <= 0.0).checked_sub(1) else { return };
+    let is_in_gap = of_held(time_s).into_iter().any(|(from_s, to_s)| from_s <= 0.0 && 0.0 < to_s);
+    let is_last = holding + 1 == time_s.len();
+    if is_on_change || !(is_in_gap || is_last) {
+        time_s[holding] = 0.0;
+    }
+}
+
 fn say_gaps(flight: &mut Flight) {
     let mut notes = std::mem::take(&mut flight.notes);
     for (quantity, time_s) in flight.times() {
-        // Not of the battery: its coarse and slow readings repeat, and left out they look like gaps.
-        if quantity != Quantity::BatteryVoltage {
-            clean::say_gaps(quantity, time_s, &mut notes);
+        match quantity {
+            // Coarse and slow readings repeat; without the repeats they look like gaps.
+            Quantity::BatteryVoltage => {}
+            Quantity::Command if flight.commands_on_change => {}
+            Quantity::Command => say_command_gaps(time_s, &mut notes),
+            _ => clean::say_gaps(quantity, time_s, &mut notes),
         }
     }
     flight.notes = notes;
+}
+
+/// Notes gaps of the commands and their consequence.
+fn say_command_gaps(time_s: &[f64], notes: &mut Vec<String>) {
+    let gaps = of_held(time_s);
+    let longest = gaps.iter().copied().max_by(|a, b| (a.1 - a.0).total_cmp(&(b.1 - b.0)));
+    let Some((from_s, to_s)) = longest else { return };
+    notes.push(format!(
+        "{}: gaps of more than {GAP_PERIODS} periods: {}, the longest from {from_s:.3} s to {to_s:.3} s; the rotor speeds \
+         are unknown there and {SETTLE_S} s behind, so nothing is compared; if the log writes commands only on change, set \
+         `on_change = true` in the channel `command`",
+        Quantity::Command,
+        gaps.len(),
+    ));
 }
 
 /// What several channels have in common is said once.

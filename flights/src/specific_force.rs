@@ -4,8 +4,9 @@
 //! f = R^T (a + g), where a is the acceleration in the world: R b where the log holds b along the axes of the body.
 
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
+use vehicles::gaps::GAP_PERIODS;
 
-use crate::clean::{GAP_PERIODS, say_dropped};
+use crate::clean::say_dropped;
 use crate::declaration::Holds;
 use crate::error::{LogError, Spot};
 use crate::flight::{Channel, period_s};

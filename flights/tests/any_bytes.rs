@@ -1,5 +1,7 @@
 //! Whatever bytes a log has, reading it ends, with a flight or with words, and takes memory by the size of the file.
 
+#[path = "support/lz4.rs"]
+mod lz4;
 #[allow(dead_code, reason = "other tests use the rest")]
 mod support;
 
@@ -217,6 +219,10 @@ fn thousands_of_changed_bags_end_in_words_or_in_a_flight() {
         let flights = mutated(MCAP, &whole, &LENGTHS, 2000, |_| {});
         assert!(flights > 100 && flights < 2000, "{flights} of 2000 gave a flight");
     }
+    let whole = lz4::chunks(&support::bag(10, None), |records| records);
+    let flights = mutated(MCAP, &whole, &LENGTHS, 2000, |_| {});
+    // It has no summary, and one chunk: hardly a change leaves it whole.
+    assert!(flights > 5 && flights < 2000, "{flights} of 2000 gave a flight");
 }
 
 #[test]

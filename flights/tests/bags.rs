@@ -1,5 +1,7 @@
 //! Bags of ROS 2 as robots write them: arrays that are empty at first, and messages of two clocks.
 
+#[path = "support/lz4.rs"]
+mod lz4;
 #[allow(dead_code, reason = "other tests use the rest")]
 mod support;
 
@@ -87,13 +89,13 @@ impl Bag {
         // The frame's name is empty: its end alone, and three bytes of padding.
         let mut body: Vec<u8> = [stamp[0], stamp[1], 1, 0].into_iter().flat_map(u32::to_le_bytes).collect();
         let t = 0.01 * f64::from(k);
-        let angle = 0.1 * (2.0 * t).sin();
+        let angle = 0.1 * libm::sin(2.0 * t);
         let [orientation, rate, acceleration] = (self.covariances)(k);
-        let numbers = [0.0, 0.0, (angle / 2.0).sin(), (angle / 2.0).cos()]
+        let numbers = [0.0, 0.0, libm::sin(angle / 2.0), libm::cos(angle / 2.0)]
             .into_iter()
             .chain([orientation])
             .chain([0.0; 8])
-            .chain([0.0, 0.0, 0.2 * (2.0 * t).cos()])
+            .chain([0.0, 0.0, 0.2 * libm::cos(2.0 * t)])
             .chain([rate])
             .chain([0.0; 8])
             .chain([0.001 * t, 0.0, 9.81])
@@ -187,4 +189,66 @@ fn a_clock_is_chosen_of_an_mcap_file_alone() {
     let channels = "specific_force = { topic = \"sensor_combined\" }";
     let message = place.load("log.ulg", channels, "time = \"log\"").unwrap_err().to_string();
     assert!(message.contains("`time`") && message.contains("MCAP"), "{message}");
+}
+
+#[test]
+fn chunks_compressed_by_lz4_are_read() {
+    let place = Place::new();
+    let plain = Bag::default().bytes();
+    let packed = lz4::chunks(&plain, |records| records);
+    assert!(packed.len() < plain.len());
+    place.write("log.mcap", &packed);
+    let flight = place.load("log.mcap", CHANNELS, "").unwrap_or_else(|error| panic!("{error}"));
+    let whole = Bag::default().read(CHANNELS, "").unwrap();
+    assert_eq!((flight.command, flight.angular_velocity), (whole.command, whole.angular_velocity));
+    // Content that is damaged, and a chunk that unpacks to less than its header says.
+    let mut damaged = packed.clone();
+    let middle = packed.len() / 2;
+    damaged[middle] ^= 0x55;
+    place.write("log.mcap", &damaged);
+    assert!(place.load("log.mcap", CHANNELS, "").map(|flight| flight.notes).is_err());
+    place.write("log.mcap", &lz4::chunks(&plain, |records| records[..100].to_vec()));
+    let message = place.load("log.mcap", CHANNELS, "").unwrap_err().to_string();
+    assert!(message.contains("and unpacks to 100"), "{message}");
+}
+
+const POSE: &str = r#"
+attitude = { topic = "/imu" }
+angular_velocity = { topic = "/imu" }
+specific_force = { topic = "/imu" }
+"#;
+
+#[test]
+fn an_imu_without_an_attitude_has_none() {
+    assert_eq!(Bag::default().read(POSE, "").unwrap().attitude.time_s.len(), 400);
+    let none = Bag { covariances: |_| [-1.0, 0.0, 0.0], ..Bag::default() };
+    let message = none.refused(POSE, "");
+    for part in ["`attitude`", "`orientation_covariance[0]`", "none of 400", "name another topic"] {
+        assert!(message.contains(part), "`{part}` is not in: {message}");
+    }
+    // The same fields, named.
+    let fields = r#"attitude = { topic = "/imu", fields = ["orientation.x", "orientation.y", "orientation.z", "orientation.w"] }"#;
+    assert!(none.refused(fields, "").contains("orientation_covariance"));
+    // Nothing is declared: the rest is taken.
+    let flight = none.read("", "").unwrap();
+    assert_eq!((flight.attitude.time_s.len(), flight.angular_velocity.time_s.len()), (0, 400));
+    assert!(
+        flight.notes.iter().any(|note| note.contains("attitude: not taken from /imu")),
+        "{:?}",
+        flight.notes
+    );
+}
+
+#[test]
+fn messages_that_lack_a_quantity_are_left_out_and_counted() {
+    type Covariances = fn(u32) -> [f64; 3];
+    let cases: [(Covariances, &str); 3] = [
+        (|k| [if k < 50 { -1.0 } else { 0.0 }, 0.0, 0.0], "attitude: 50 of 400"),
+        (|k| [0.0, if k < 50 { -1.0 } else { 0.1 }, 0.0], "angular_velocity: 50 of 400"),
+        (|k| [0.0, 0.0, if k < 50 { -1.0 } else { 0.0 }], "specific_force: 50 of 400"),
+    ];
+    for (covariances, said) in cases {
+        let flight = Bag { covariances, ..Bag::default() }.read(POSE, "").unwrap();
+        assert!(flight.notes.iter().any(|note| note.contains(said)), "{said}: {:?}", flight.notes);
+    }
 }

@@ -91,6 +91,56 @@ fn data_in_other_units_than_declared_are_found() {
     assert!(findings(&share, CHANNELS).contains(&(Quantity::Command, "`unit = \"fraction\"`".to_owned())));
 }
 
+/// The made-up flight in CSV, its columns from `first` on changed by `change`, which knows the row.
+fn changed(first: &str, count: usize, change: impl Fn(usize, &mut [f64])) -> String {
+    let whole = Motion::default().csv();
+    let mut lines = whole.lines();
+    let header = lines.next().unwrap();
+    let at = header.split(',').position(|name| name == first).unwrap();
+    let row = |(row, line): (usize, &str)| {
+        let mut cells: Vec<f64> = line.split(',').map(|cell| cell.parse().unwrap()).collect();
+        change(row, &mut cells[at..at + count]);
+        cells.iter().map(f64::to_string).collect::<Vec<_>>().join(",") + "\n"
+    };
+    header.to_owned() + "\n" + &lines.enumerate().map(row).collect::<String>()
+}
+
+fn read_text(text: &str) -> Result<Flight, FlightsError> {
+    let place = Place::new();
+    place.write("log.csv", text.as_bytes());
+    place.load("log.csv", CHANNELS, "")
+}
+
+#[test]
+fn a_gyroscope_in_whole_degrees_loses_no_sample() {
+    let degree = 1_f64.to_radians();
+    let coarse = changed("wx", 3, |_, rates| {
+        rates.iter_mut().for_each(|rate| *rate = (*rate / degree).round() * degree);
+    });
+    let flight = read_text(&coarse).unwrap();
+    let repeats = flight.angular_velocity.values.windows(2).filter(|pair| pair[0] == pair[1]).count();
+    assert!(repeats > 100, "{repeats}: the case is none");
+    assert_eq!((flight.angular_velocity.time_s.len(), &flight.notes[..]), (1001, &[][..]));
+}
+
+#[test]
+fn an_attitude_that_stays_while_the_gyroscope_turns_is_refused() {
+    let stays = |from: usize| {
+        changed("qx", 4, move |row, q| {
+            if row >= from {
+                q.copy_from_slice(&[0.0, 0.0, 0.0, 1.0]);
+            }
+        })
+    };
+    // Three samples behind the jump are left out.
+    for (text, from_s) in [(stays(0), "0.000 s"), (stays(400), "4.030 s")] {
+        let message = read_text(&text).unwrap_err().to_string();
+        let said =
+            format!("`attitude`: it stays the same from {from_s} to 10.000 s, while the gyroscope turns by");
+        assert!(message.contains(&said), "{message}");
+    }
+}
+
 #[test]
 fn a_position_alone_that_is_too_fast_is_found() {
     let channels = without("velocity").replace("attitude =", "# attitude =");

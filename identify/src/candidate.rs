@@ -2,7 +2,11 @@
 
 use crate::parameter::Parameters;
 use crate::prepared::{Equation, Prepared};
-use plant::effects::{EffectKind, FitAs, Quantity};
+use plant::effects::{EffectKind, FitAs, Quantity, find};
+
+/// Need of effects that show in torques, or in the time at which commands act.
+pub const FAST_COMMANDS: &str =
+    "motor commands, or rotor speeds, that are logged faster than the motors follow";
 
 /// An effect, or the part of one that makes sense alone: one weak rotor, the bias of one sensor.
 #[derive(Debug, Clone, PartialEq)]
@@ -50,12 +54,25 @@ pub fn candidates(parameters: &Parameters, flights: &[&Prepared]) -> (Vec<Candid
 
 /// What `flights` lack to show an effect.
 fn missing(kind: &EffectKind, flights: &[&Prepared]) -> Option<&'static str> {
+    let is_slow = flights.iter().any(|flight| flight.slow_period_s.is_some());
+    if is_slow && needs_fast_commands(kind) {
+        return Some(FAST_COMMANDS);
+    }
     // Only the means of forces and torques are true where the attitude was assumed.
     if !kind.steady_state && flights.iter().any(|flight| flight.is_assumed()) {
         return Some("attitude and angular velocity that were measured, not assumed");
     }
     let is_unmet = |need: &&Quantity| !flights.iter().any(|flight| has(flight, **need));
     kind.needs.iter().find(is_unmet).map(|need| need.describe())
+}
+
+/// True for effects that show in torques, or in the time at which commands act: commands that are logged slower than the
+/// motors follow show neither.
+fn needs_fast_commands(kind: &EffectKind) -> bool {
+    let of_drive = [find("motor-lag"), find("weak-rotor")];
+    kind.needs.contains(&Quantity::Torque)
+        || kind.is_delay
+        || of_drive.into_iter().flatten().any(|known| known == kind)
 }
 
 /// Whether a flight shows a quantity.

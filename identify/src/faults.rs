@@ -6,6 +6,7 @@
 //! | `fault` | a fault and its consequence |
 //! | `evidence`, `twin`, `frozen` | comparison of channels; frozen numbers |
 //! | `gyroscope`, `accelerometer`, `position`, `command` | faults of these channels |
+//! | `order` | commands and rotor speeds in another order, reversed spins |
 //! | `rotor_speed` | rotor speed sensors, and motors that do not follow their commands |
 //! | `trim` | trims beyond the torque of the rotors |
 
@@ -15,6 +16,7 @@ mod evidence;
 mod fault;
 mod frozen;
 mod gyroscope;
+mod order;
 mod position;
 mod rotor_speed;
 mod trim;
@@ -34,7 +36,7 @@ pub fn in_channels(problem: &Problem, set: &FlightSet) -> (Vec<Fault>, Option<Fl
         problem.flights().map(|flight| Evidence::of(&problem.model, flight)).collect();
     let mut found: Vec<(Fault, Part)> = Vec::new();
     // In this order: a faulty channel is no evidence against the next one.
-    for find in [of_gyroscopes, of_positions, of_accelerometers, of_drives] {
+    for find in [of_gyroscopes, of_positions, of_accelerometers, of_commands, of_rotor_speeds] {
         let of_flights = find(&flights);
         for (evidence, one) in flights.iter_mut().zip(of_flights) {
             evidence.doubted.extend(one.iter().map(|(_, part)| *part));
@@ -71,13 +73,16 @@ fn of_accelerometers(flights: &[Evidence]) -> Found {
     faults.map(|fault| Some((fault?, Part::Accelerometer))).collect()
 }
 
-fn of_drives(flights: &[Evidence]) -> Found {
-    let faults = command::find(flights).into_iter().zip(flights);
-    let one = |(fault, evidence): (Option<Fault>, &Evidence)| match fault {
-        Some(fault) => Some((fault, Part::Command)),
-        None => Some((rotor_speed::among_each_other(evidence.flight)?, Part::RotorSpeed)),
+fn of_commands(flights: &[Evidence]) -> Found {
+    command::find(flights).into_iter().map(|fault| Some((fault?, Part::Command))).collect()
+}
+
+fn of_rotor_speeds(flights: &[Evidence]) -> Found {
+    let one = |evidence: &Evidence| {
+        let ordered = || order::swapped(evidence, order::Drive::RotorSpeed);
+        Some((rotor_speed::among_each_other(evidence.flight).or_else(ordered)?, Part::RotorSpeed))
     };
-    faults.map(one).collect()
+    flights.iter().map(one).collect()
 }
 
 /// Returns the faults of rotors and of trims. Faulty rotor sensors are distrusted in `problem`; flights with an impossible

@@ -14,6 +14,7 @@
 //! | `parameter`, `sensor_effects` | what may be changed of the model; sensors' errors as effects beside the plant's |
 //! | `candidate` | which effects these flights can show |
 //! | `normal`, `fit` | least squares over blocks of time: an estimation problem and its result |
+//! | `logging` | timing errors that slowly logged commands make |
 //! | `select` | the stepwise search for the effects that the flights ask for |
 //! | `align`, `faults`, `trim` | clocks, sensors and trims, before anything is fitted |
 //! | `sensing` | the sensors' delays and biases, and a flight without them |
@@ -29,7 +30,7 @@
 //! let set = FlightSet::load("flights/nanobench.toml".as_ref())?;
 //! let outcome = identify::run::identify(&set, &mut |step| println!("{step}"))?;
 //! println!("{}", outcome.report);
-//! let vehicle_file = identify::vehicle_file::text(&set.vehicle, &outcome.effects, &outcome.report)?;
+//! let vehicle_file = identify::vehicle_file::text(&set.files, &set.vehicle, &outcome.effects, &outcome.report)?;
 //! # let _ = vehicle_file;
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
@@ -39,6 +40,7 @@ mod candidate;
 mod clock;
 mod faults;
 mod fit;
+mod logging;
 mod model;
 mod noise;
 mod normal;
@@ -56,6 +58,7 @@ mod sensor_effects;
 pub mod statistics;
 mod track;
 mod trim;
+mod unusable;
 pub mod vehicle_file;
 mod whiteness;
 mod window;
@@ -65,6 +68,7 @@ pub use faults::Fault;
 pub use prepared::Equation;
 pub use regressor::Regressor;
 pub use sensing::SensorErrors;
+pub use unusable::Unusable;
 
 /// What tests look at between the steps of an identification.
 #[doc(hidden)]

@@ -190,8 +190,12 @@ fn spun(airframe: &Airframe, flight: &Prepared, pose_s: f64) -> Vec<[RotorState;
         let mut sum = [RotorState::default(); 4];
         for part in 0..parts {
             let (from_s, to_s) = (at_s(index * parts + part), at_s(index * parts + part + 1));
-            // Where the grid does not lie on the commands' own, a step sees two of them.
-            let command = commands.mean(from_s, to_s);
+            let command = match flight.slow_period_s {
+                // Between two slow samples of the commands there were others; held, each would act half a period late.
+                Some(_) => commands.between(f64::midpoint(from_s, to_s)),
+                // Where the grid does not lie on the commands' own, a step sees two of them.
+                None => commands.mean(from_s, to_s),
+            };
             let actuation = airframe.begin_tick(&mut memory, &state, &command, step_s);
             let after = airframe.spun(&actuation, &state.rotors, step_s);
             let half = 0.5 / parts as f64;

@@ -3,9 +3,12 @@
 
 use crate::clock::{Clock, Lateness};
 use crate::track::{Track, valid_about};
+use crate::unusable::Unusable;
 use crate::window::{NUMEROV, SIMPSON, Window, central_difference, second_difference};
-use flights::{Channel, Flight};
+use flights::{Channel, Flight, KnownRotors, SETTLE_S};
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
+use vehicles::gaps::held_period_s;
+use vehicles::{CommandMap, MotorModel, Vehicle};
 
 /// An equation that measurement and model are both put into.
 ///
@@ -117,9 +120,6 @@ pub struct Tracks {
 /// Grid steps in a box of the window, which is also the way from knot to knot.
 pub const BOX_STEPS: usize = 5;
 
-/// How fast the rotors turn where a log begins, and what was commanded before, is not known: they count from then on.
-pub const SETTLE_S: f64 = 0.5;
-
 /// Delays of sensors that are tried take samples from beside an instant: so much is left out at the ends of a flight.
 const END_MARGIN_S: f64 = 0.2;
 /// And so much about its gaps, where that leaves at least [`WORTH`] of the windows.
@@ -143,31 +143,64 @@ pub struct Prepared<'f> {
     pub late: Lateness,
     /// Rotors whose measured speed is not believed.
     pub distrusted: [bool; 4],
+    /// The period of commands that are logged slower than the motors follow, without measured speeds.
+    pub slow_period_s: Option<f64>,
 }
 
 impl<'f> Prepared<'f> {
-    /// The flight on its grid; `is_flying` tells from motor commands (`true`) or rotor speeds (`false`) whether the
-    /// vehicle is in the air; `None` where it has nothing to compare: no commands and no rotor speeds, no motion, or
-    /// less than three windows of it.
-    pub fn new(
-        flight: &'f Flight,
-        box_s: Option<f64>,
-        is_flying: impl Fn(&[f64; 4], bool) -> bool,
-    ) -> Option<Self> {
-        let equations = equations(flight);
-        let (start_s, end_s) = common_span(flight, &equations)?;
-        let box_s = match box_s {
-            Some(box_s) => box_s,
-            // At 100 Hz windows of 0.12 s.
-            None => (3.0 * slowest_period_s(flight)?).max(0.02),
-        };
+    /// The flight on its grid.
+    ///
+    /// # Errors
+    /// If the flight has less than three windows to compare: no drive, no motion, too little of both in flight.
+    pub fn new(flight: &'f Flight, box_s: Option<f64>, propulsion: &Propulsion) -> Result<Self, Unusable> {
+        let slow_period_s = propulsion.slow_period_s(flight);
+        let equations = equations(flight, slow_period_s.is_some());
+        if equations.iter().all(|equation| *equation == Equation::RotorSpeed) {
+            let motor_s = propulsion.motor_s;
+            let slow = slow_period_s.map(|period_s| Unusable::SlowCommands { period_s, motor_s });
+            return Err(Unusable::of_channels(flight).or(slow).unwrap_or(Unusable::NoMotion));
+        }
+        Unusable::of_channels(flight).map_or(Ok(()), Err)?;
+        let apart = || Unusable::Apart { spans: flight.spans() };
+        let (start_s, end_s) = common_span(flight, &equations).ok_or_else(apart)?;
+        // At 100 Hz windows of 0.12 s.
+        let box_s = box_s.unwrap_or_else(|| (3.0 * slowest_period_s(flight).unwrap_or(0.0)).max(0.02));
+        // Windows over several commands: within one, nobody knows the others that were not logged.
+        let box_s = box_s.max(slow_period_s.unwrap_or(0.0));
         let step_s = box_s / BOX_STEPS as f64;
         let clock = Clock::spanning(start_s, end_s, step_s);
         let windows = equations.iter().map(|equation| windows(*equation, flight, step_s)).collect();
         let layout = Layout { clock, knots: Vec::new(), equations, windows };
-        let mut prepared = Self { flight, layout, late: Lateness::default(), distrusted: [false; 4] };
-        prepared.layout.knots = prepared.knots(&is_flying);
-        (prepared.layout.knots.len() >= 3).then_some(prepared)
+        let (late, distrusted) = (Lateness::default(), [false; 4]);
+        let mut prepared = Self { flight, layout, late, distrusted, slow_period_s };
+        prepared.layout.knots = prepared.knots(propulsion);
+        if prepared.layout.knots.len() >= 3 { Ok(prepared) } else { Err(prepared.unusable(propulsion)) }
+    }
+
+    /// The reason why less than three windows are left.
+    fn unusable(&self, propulsion: &Propulsion) -> Unusable {
+        let (flight, clock) = (self.flight, &self.layout.clock);
+        let (from_s, to_s) = (clock.at(0), clock.at(clock.count - 1));
+        let known = KnownRotors::of(flight);
+        if !known.stretches_s().iter().any(|stretch| stretch.0 < to_s && from_s < stretch.1) {
+            let stretches: Vec<String> = known
+                .stretches_s()
+                .iter()
+                .map(|(from_s, to_s)| format!("from {from_s:.3} s to {to_s:.3} s"))
+                .collect();
+            let known = if stretches.is_empty() { "nowhere".to_owned() } else { stretches.join(", ") };
+            return Unusable::UnknownRotors { known, from_s, to_s };
+        }
+        let fastest = propulsion.speeds(flight, clock).into_iter().fold(0.0, f64::max);
+        if fastest <= propulsion.least_rad_s {
+            return Unusable::of_speeds(flight, fastest, propulsion.least_rad_s);
+        }
+        let box_s = BOX_STEPS as f64 * clock.step_s;
+        Unusable::Short {
+            left_s: box_s * self.layout.knots.len() as f64,
+            window_s: 4.0 * box_s,
+            common_s: to_s - from_s,
+        }
     }
 
     /// Whether its attitude or its rates were assumed instead of measured.
@@ -294,8 +327,8 @@ impl<'f> Prepared<'f> {
     }
 
     /// Middles of windows in which every compared channel was sampled and the motors were running.
-    fn knots(&self, is_flying: &impl Fn(&[f64; 4], bool) -> bool) -> Vec<usize> {
-        let of = |gap_margin_s: f64| self.knots_within(&self.valid(is_flying, gap_margin_s));
+    fn knots(&self, propulsion: &Propulsion) -> Vec<usize> {
+        let of = |gap_margin_s: f64| self.knots_within(&self.valid(propulsion, gap_margin_s));
         let (wide, all) = (of(GAP_MARGIN_S), of(0.0));
         if wide.len() as f64 >= WORTH * all.len() as f64 { wide } else { all }
     }
@@ -306,7 +339,7 @@ impl<'f> Prepared<'f> {
         (reach..last).step_by(BOX_STEPS).filter(|knot| about[*knot]).collect()
     }
 
-    fn valid(&self, is_flying: &impl Fn(&[f64; 4], bool) -> bool, gap_margin_s: f64) -> Vec<bool> {
+    fn valid(&self, propulsion: &Propulsion, gap_margin_s: f64) -> Vec<bool> {
         let (flight, clock) = (self.flight, &self.layout.clock);
         let mut valid = vec![true; clock.count];
         let mut require = |other: Vec<bool>| valid.iter_mut().zip(other).for_each(|(all, one)| *all &= one);
@@ -322,14 +355,68 @@ impl<'f> Prepared<'f> {
             require(Track::sampled(&flight.rotor_speed, 0.0, clock).valid);
         }
         if !flight.command.is_empty() {
-            require((0..clock.count).map(|index| clock.at(index) - clock.at(0) >= SETTLE_S).collect());
-            let mut held = Held::new(&flight.command);
-            require((0..clock.count).map(|index| is_flying(&held.at(clock.at(index)), true)).collect());
-        } else if !flight.rotor_speed.is_empty() {
-            let speeds = Track::sampled(&flight.rotor_speed, 0.0, clock).values;
-            require(speeds.iter().map(|speeds| is_flying(speeds, false)).collect());
+            let known = KnownRotors::of(flight);
+            // The rotors are simulated from the first instant on.
+            let is_known = |at_s: f64| at_s - clock.at(0) >= SETTLE_S && known.hold(at_s, at_s);
+            require((0..clock.count).map(|index| is_known(clock.at(index))).collect());
         }
+        require(
+            propulsion
+                .speeds(flight, clock)
+                .into_iter()
+                .map(|speed| speed > propulsion.least_rad_s)
+                .collect(),
+        );
         valid
+    }
+}
+
+/// A motor that turns below this part of the hover speed does not carry the vehicle.
+const FLYING: f64 = 0.5;
+
+/// Facts of a vehicle's rotors by which flights are read.
+#[derive(Debug, Clone, Copy)]
+pub struct Propulsion {
+    command: CommandMap,
+    /// Mean speed of the rotors above which the vehicle is in the air.
+    least_rad_s: f64,
+    /// Time constant of the motors.
+    pub motor_s: f64,
+}
+
+impl Propulsion {
+    /// Facts of `vehicle`.
+    pub fn of(vehicle: &Vehicle) -> Self {
+        let motor_s = match vehicle.motor {
+            MotorModel::FirstOrder { time_constant_s } => time_constant_s,
+            MotorModel::SecondOrder { natural_frequency_rad_s, .. } => 1.0 / natural_frequency_rad_s,
+        };
+        Self { command: vehicle.command, least_rad_s: FLYING * vehicle.hover_speed_rad_s(), motor_s }
+    }
+
+    /// Longest period of commands that show how the motors follow: two samples within their time constant.
+    pub fn longest_period_s(&self) -> f64 {
+        self.motor_s / 2.0
+    }
+
+    /// The period of the commands of `flight`, if it is too long for the motors and no speeds were measured.
+    fn slow_period_s(&self, flight: &Flight) -> Option<f64> {
+        let is_known =
+            flight.commands_on_change || !flight.rotor_speed.is_empty() || !flight.assumed.is_empty();
+        held_period_s(&flight.command.time_s)
+            .filter(|period_s| !is_known && *period_s > self.longest_period_s())
+    }
+
+    /// Mean speeds of the rotors at the instants of `clock`, by commands or else as measured.
+    fn speeds(&self, flight: &Flight, clock: &Clock) -> Vec<f64> {
+        let mean = |speeds: [f64; 4]| speeds.iter().sum::<f64>() / 4.0;
+        if flight.command.is_empty() {
+            let measured = Track::sampled(&flight.rotor_speed, 0.0, clock).values;
+            return measured.into_iter().map(mean).collect();
+        }
+        let mut held = Held::new(&flight.command);
+        let commanded = |index| held.at(clock.at(index)).map(|command| self.command.speed(command));
+        (0..clock.count).map(commanded).map(mean).collect()
     }
 }
 
@@ -383,6 +470,18 @@ impl<'c> Held<'c> {
         self.channel.values[self.next.saturating_sub(1)]
     }
 
+    /// The commands at `at_s`, interpolated between the logged ones; times have to grow from call to call.
+    pub fn between(&mut self, at_s: f64) -> [f64; 4] {
+        let before = self.at(at_s);
+        let (Some(last), Some(next_s)) = (self.next.checked_sub(1), self.channel.time_s.get(self.next))
+        else {
+            return before;
+        };
+        let (last_s, after) = (self.channel.time_s[last], self.channel.values[self.next]);
+        let part = ((at_s - last_s) / (next_s - last_s)).clamp(0.0, 1.0);
+        std::array::from_fn(|i| before[i] + part * (after[i] - before[i]))
+    }
+
     /// The mean of what holds from `from_s` to `to_s`; times have to grow from call to call.
     pub fn mean(&mut self, from_s: f64, to_s: f64) -> [f64; 4] {
         let (mut at_s, mut sum) = (from_s, [0.0; 4]);
@@ -415,7 +514,7 @@ fn uses_pose(flight: &Flight) -> bool {
 }
 
 /// The equations that the channels of a flight allow.
-fn equations(flight: &Flight) -> Vec<Equation> {
+fn equations(flight: &Flight, is_slow: bool) -> Vec<Equation> {
     let has_position = !flight.position.is_empty() || !flight.velocity.is_empty();
     let (has_attitude, has_gyroscope) = (!flight.attitude.is_empty(), !flight.angular_velocity.is_empty());
     // An assumed attitude says nothing that a gyroscope could be held against.
@@ -424,7 +523,8 @@ fn equations(flight: &Flight) -> Vec<Equation> {
     let all = [
         (Equation::SpecificForce, !flight.specific_force.is_empty()),
         (Equation::Acceleration, has_position && has_attitude),
-        (Equation::AngularAcceleration, has_attitude || has_gyroscope),
+        // Torques follow commands that were not logged.
+        (Equation::AngularAcceleration, (has_attitude || has_gyroscope) && !is_slow),
         (Equation::Gyroscope, has_attitude && has_gyroscope && !is_assumed),
         (Equation::RotorSpeed, has_both_speeds),
     ];
@@ -449,7 +549,12 @@ fn windows(equation: Equation, flight: &Flight, step_s: f64) -> (Window, Window)
 
 /// The time in which all compared channels were sampled.
 fn common_span(flight: &Flight, equations: &[Equation]) -> Option<(f64, f64)> {
-    let drive = if flight.command.is_empty() { flight.rotor_speed.span_s() } else { flight.command.span_s() };
+    let drive = match flight.command.span_s() {
+        None => flight.rotor_speed.span_s(),
+        // The last command holds.
+        Some((first_s, _)) if flight.commands_on_change => Some((first_s, f64::INFINITY)),
+        span => span,
+    };
     let motion = [
         flight.position.span_s().filter(|_| equations.contains(&Equation::Acceleration)),
         flight.velocity.span_s().filter(|_| of_velocity(flight)),
@@ -457,9 +562,6 @@ fn common_span(flight: &Flight, equations: &[Equation]) -> Option<(f64, f64)> {
         flight.angular_velocity.span_s(),
         flight.specific_force.span_s(),
     ];
-    if equations.iter().all(|equation| *equation == Equation::RotorSpeed) {
-        return None;
-    }
     let spans = motion.into_iter().flatten().chain([drive?]);
     Some(spans.fold((f64::MIN, f64::MAX), |(start, end), span| (start.max(span.0), end.min(span.1))))
         .filter(|(start, end)| end > start)

@@ -19,6 +19,7 @@
 
 use crate::candidate::{Candidate, free_parameters};
 use crate::fit::{FitResult, Problem};
+use crate::logging;
 use crate::normal::{self, Block};
 use crate::sensor_effects::POSE_DELAY;
 use plant::effects::EffectKind;
@@ -267,6 +268,7 @@ fn judged(
         && t_value > fitted.t_quantile(1.0 - level / 2.0)
         && gain > LEAST_GAIN * base.validation_cost()
         && is_seen(problem, candidate, &fitted)
+        && !logging::explains(problem, candidate.kind, &candidate.free, &fitted)
         && !is_beyond_bounds(problem, candidate, &fitted);
     let (candidate, gain) = (candidate.clone(), gain / base.validation_cost());
     Judged { candidate, fitted, gain, p_value, is_accepted, is_promise: false }

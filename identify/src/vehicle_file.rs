@@ -2,25 +2,31 @@
 
 use crate::report::{Estimate, Report};
 use diagnostics::Diagnostic;
+use inputs::InputFiles;
 use plant::effects::Effect;
 use std::path::Path;
 use toml_edit::{ArrayOfTables, DocumentMut, InlineTable, Item, Table, Value, value};
 use vehicles::{Uncertainty, Vehicle};
 
-/// The text of the new vehicle file: the declared file at `declared`, complete, with `effects` in place of its own.
-/// Parameters that were fitted carry their estimate, its interval and the flights that it comes from.
+/// The text of the new vehicle file: the declared file at `declared` among `files`, complete, with `effects` in place of
+/// its own. Parameters that were fitted carry their estimate, its interval and the flights that it comes from.
 ///
 /// # Errors
-/// If the declared file cannot be read again.
-pub fn text(declared: &Path, effects: &[Effect], report: &Report) -> Result<String, Diagnostic> {
-    let vehicle = Vehicle::load(declared)?;
-    let complete = Vehicle::base(declared).unwrap_or_else(|| declared.to_owned());
+/// If the declared file is not among `files` and cannot be read.
+pub fn text(
+    files: &InputFiles,
+    declared: &Path,
+    effects: &[Effect],
+    report: &Report,
+) -> Result<String, Diagnostic> {
+    let vehicle = Vehicle::load_from(files, declared)?;
+    let complete = Vehicle::base(files, declared).unwrap_or_else(|| declared.to_owned());
     let file = complete.display().to_string();
     let unreadable = |cause| Diagnostic::unreadable(&file, &cause);
-    let text = vehicles::text::read(&complete).map_err(unreadable)?;
+    let text = files.text(&complete).map_err(unreadable)?;
     let mut document: DocumentMut = text.parse().map_err(|error| unreadable(std::io::Error::other(error)))?;
     if complete != declared {
-        replace_tables(&mut document, &vehicles::text::read(declared).map_err(unreadable)?);
+        replace_tables(&mut document, &files.text(declared).map_err(unreadable)?);
     }
     document.remove("effects");
     document["name"] = value(format!("{}, identified", vehicle.name));
@@ -166,7 +172,7 @@ mod tests {
         std::fs::write(&path, declared.to_string()).unwrap();
         let effects = plant::effects::entry::resolve(&Vehicle::load(&path).unwrap().effects).unwrap();
 
-        let text = text(&path, &effects, &empty_report()).unwrap();
+        let text = text(&InputFiles::default(), &path, &effects, &empty_report()).unwrap();
 
         let read = Vehicle::parse(&text, "identified.toml").unwrap();
         let parameter = &read.effects[0].parameters[0];

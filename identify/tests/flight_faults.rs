@@ -34,7 +34,7 @@ fn several(case: &Case) -> FlightSet {
         fly(&vehicle, &plan, if number + 1 == COUNT { Role::Test } else { Role::Fit })
     };
     let flights = (0..COUNT).into_par_iter().map(one).collect();
-    FlightSet { vehicle: simulated::vehicle_file(case.vehicle), flights }
+    FlightSet { vehicle: simulated::vehicle_file(case.vehicle), flights, files: Default::default() }
 }
 
 fn found(set: &FlightSet) -> Vec<Fault> {
@@ -308,6 +308,54 @@ fn commands_that_are_frozen_swapped_or_scaled() {
     }
 }
 
+/// Whatever the numbering of the logger: each order is found as the one that puts the columns right.
+#[test]
+fn every_order_of_the_motors_is_found() {
+    let orders = (0..256_usize).map(|code| [code / 64, code / 16 % 4, code / 4 % 4, code % 4]);
+    let others = orders.filter(|order| (0..4).all(|rotor| order.contains(&rotor))).skip(1);
+    let wrong: Vec<String> = others
+        .collect::<Vec<_>>()
+        .par_iter()
+        .filter_map(|order| {
+            let mut set = flown(false);
+            each(&mut set.flights[FAULTY].command, |commands| *commands = order.map(|at| commands[at]));
+            // Number `at` of the log belongs to the rotor that `order` took it from.
+            let put_right: [usize; 4] =
+                std::array::from_fn(|rotor| order.iter().position(|at| *at == rotor).unwrap());
+            let wanted = format!("the order {} of", put_right.map(|at| (at + 1).to_string()).join(", "));
+            let found = found(&set);
+            let is_right = found.len() == 1 && found[0].kind == "swapped" && found[0].found.contains(&wanted);
+            (!is_right).then(|| format!("{order:?}: {found:#?}"))
+        })
+        .collect();
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}
+
+/// Speeds that were measured in another order than commanded, and logged without commands.
+#[test]
+fn rotor_speeds_in_another_order() {
+    let breaks = |flight: &mut Flight| each(&mut flight.rotor_speed, |speeds| speeds.rotate_left(1));
+    require_broken(true, "rotor_speed.1+2+3+4", "swapped", breaks);
+    let mut set = flown(true);
+    set.flights.iter_mut().for_each(|flight| flight.command = Channel::default());
+    breaks(&mut set.flights[FAULTY]);
+    require(&set, "rotor_speed.1+2+3+4", "swapped");
+}
+
+/// Opposite spins in the vehicle file turn every yaw the other way: nothing is identified with them.
+#[test]
+fn a_vehicle_file_with_reversed_spins_is_refused() {
+    let set = flown(false);
+    let text = std::fs::read_to_string(&set.vehicle).expect("the vehicle file");
+    let text =
+        text.replace("\"counter-clockwise\"", "\"ccw\"").replace("\"clockwise\"", "\"counter-clockwise\"");
+    let folder = tempfile::tempdir().expect("a folder");
+    let vehicle = folder.path().join("reversed.toml");
+    std::fs::write(&vehicle, text.replace("\"ccw\"", "\"clockwise\"")).expect("a vehicle file");
+    let error = identify(&FlightSet { vehicle, ..set }, &mut |_| ()).expect_err("a refusal").to_string();
+    assert!(error.contains("role \"fit\"") && error.contains("with all spins reversed explains"), "{error}");
+}
+
 /// A vehicle that is held aside by more than its rotors can make, or commands of another vehicle.
 #[test]
 fn a_trim_that_no_rotors_hold() {
@@ -327,9 +375,13 @@ fn a_role_without_a_sound_flight_is_refused_with_the_fault() {
     let last = set.flights.len() - 1;
     each(&mut set.flights[last].command, |commands| commands.swap(0, 2));
     let error = faults(&set).unwrap_err().to_string();
-    for part in
-        ["role \"test\"", &set.flights[last].name, "command.1+3", "expected", "the order of the columns"]
-    {
+    for part in [
+        "role \"test\"",
+        &set.flights[last].name,
+        "command.1+3",
+        "expected",
+        "the order 3, 2, 1, 4 of the logged ones",
+    ] {
         assert!(error.contains(part), "no {part:?} in: {error}");
     }
 }

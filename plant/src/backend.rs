@@ -38,6 +38,11 @@ pub trait Backend {
         &[]
     }
 
+    /// What of the motion since the start cannot be trusted, in words; the run ends with it.
+    fn trouble(&self) -> Option<String> {
+        None
+    }
+
     /// The battery, if an effect models it.
     fn battery(&self) -> Option<Battery>;
 

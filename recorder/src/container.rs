@@ -11,7 +11,7 @@ use mcap::records::{self, AttachmentIndex, ChunkHeader, Record, SchemaHeader, op
 use mcap::{Channel, MAGIC, Message, parse_record};
 use std::borrow::Cow;
 use std::collections::{BTreeMap, BTreeSet};
-use std::io::Read as _;
+use std::io::Read;
 use std::sync::Arc;
 
 /// Larger chunks are refused: writers close theirs at some megabytes.
@@ -166,7 +166,7 @@ enum Fault {
     Name { what: &'static str, length: usize },
     #[error("{0}")]
     Contradiction(#[from] mcap::McapError),
-    #[error("is compressed by `{0}`, expected zstd or nothing; convert the file")]
+    #[error("is compressed by `{0}`, expected zstd, lz4 or nothing; convert the file")]
     Compression(String),
     #[error("has the checksum {stored:08x}, its content {found:08x}")]
     Checksum { stored: u32, found: u32 },
@@ -413,7 +413,8 @@ fn unpacked<'a>(header: &ChunkHeader, data: &'a [u8]) -> Result<Cow<'a, [u8]>, F
     let size = header.uncompressed_size;
     let content = match header.compression.as_str() {
         "" => Cow::Borrowed(data),
-        "zstd" => Cow::Owned(decompressed(data, size)?),
+        "zstd" => Cow::Owned(read_all(zstd_decoder(data, size)?, size)?),
+        "lz4" => Cow::Owned(read_all(lz4_flex::frame::FrameDecoder::new(data), size)?),
         other => return Err(Fault::Compression(other.to_owned())),
     };
     let (stored, found) = (header.uncompressed_crc, crc32fast::hash(&content));
@@ -423,12 +424,17 @@ fn unpacked<'a>(header: &ChunkHeader, data: &'a [u8]) -> Result<Cow<'a, [u8]>, F
     Ok(content)
 }
 
-/// What `data` decompresses to, which is `size` bytes; the memory grows with what there is.
-fn decompressed(data: &[u8], size: u64) -> Result<Vec<u8>, Fault> {
-    let mut content = Vec::new();
+/// The decoder of a chunk of `size` bytes.
+fn zstd_decoder(data: &[u8], size: u64) -> Result<impl Read, Fault> {
     let mut decoder = zstd::Decoder::with_buffer(data)?;
     // A frame states how far it looks back, and the decoder takes as much: no further than the chunk is long.
     decoder.window_log_max(size.checked_ilog2().unwrap_or(0).saturating_add(1).max(WINDOW_LOG))?;
+    Ok(decoder)
+}
+
+/// The content of a chunk, which is `size` bytes; the memory grows with what there is.
+fn read_all(decoder: impl Read, size: u64) -> Result<Vec<u8>, Fault> {
+    let mut content = Vec::new();
     let read = decoder.take(size).read_to_end(&mut content)?;
     if read as u64 == size {
         return Ok(content);

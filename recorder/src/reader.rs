@@ -9,6 +9,7 @@ use crate::source::Source;
 use std::collections::BTreeMap;
 use std::fs::File;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 /// A message of a recording.
 #[derive(Debug)]
@@ -50,11 +51,44 @@ pub struct Topic {
 #[derive(Debug)]
 pub struct Recording {
     path: PathBuf,
-    file: File,
-    /// Bytes of the file when it was opened; what is appended later does not belong to it.
-    length: usize,
+    content: Content,
     topics: BTreeMap<String, Topic>,
     cut: Option<Cut>,
+}
+
+/// The bytes of a recording.
+#[derive(Debug)]
+enum Content {
+    /// Those of a file, read as they are needed.
+    File {
+        file: File,
+        /// Bytes of the file when it was opened; what is appended later does not belong to it.
+        length: usize,
+    },
+    /// Those that were read before.
+    Read(Arc<[u8]>),
+}
+
+impl Content {
+    /// Another handle on `file`, with its present length.
+    fn of_file(file: &File, path: &Path) -> Result<Self, RecordingError> {
+        let opened = file.try_clone().and_then(|file| {
+            let found = file.metadata()?;
+            if !found.is_file() {
+                return Err(std::io::Error::other("it is not a regular file"));
+            }
+            let length = usize::try_from(found.len()).map_err(std::io::Error::other)?;
+            Ok(Self::File { file, length })
+        });
+        opened.map_err(RecordingError::file("open", path))
+    }
+
+    fn source(&self) -> Source<'_> {
+        match self {
+            Self::File { file, length } => Source::File { file, length: *length },
+            Self::Read(bytes) => Source::Memory(bytes),
+        }
+    }
 }
 
 /// How a recording ends whose writer did not finish it.
@@ -93,12 +127,23 @@ impl Recording {
     /// # Errors
     /// As [`Recording::open`].
     pub fn of_file(file: &File, path: &Path) -> Result<Self, RecordingError> {
-        let (file, length) = opened(file, path)?;
-        let source = Source::File { file: &file, length };
-        let summary = summary(source).map_err(|damage| RecordingError::content(path, damage))?;
+        let content = Content::of_file(file, path)?;
+        Self::complete(content, path)
+    }
+
+    /// The complete recording that `bytes` are, which is called `path` in messages.
+    ///
+    /// # Errors
+    /// As [`Recording::open`].
+    pub fn of_bytes(bytes: Arc<[u8]>, path: &Path) -> Result<Self, RecordingError> {
+        Self::complete(Content::Read(bytes), path)
+    }
+
+    fn complete(content: Content, path: &Path) -> Result<Self, RecordingError> {
+        let summary = summary(content.source()).map_err(|damage| RecordingError::content(path, damage))?;
         let missing = || RecordingError::content(path, "it has no summary section");
         let topics = topics(&summary.ok_or_else(missing)?.channels, path)?;
-        Ok(Self { path: path.to_owned(), file, length, topics, cut: None })
+        Ok(Self { path: path.to_owned(), content, topics, cut: None })
     }
 
     /// Opens the recording at `path`, or what is whole of it if its writer did not come to the end of the file:
@@ -108,14 +153,14 @@ impl Recording {
     /// If the file cannot be read or is no MCAP file.
     pub fn salvage(path: &Path) -> Result<Self, RecordingError> {
         let file = File::open(path).map_err(RecordingError::file("open", path))?;
-        let (file, length) = opened(&file, path)?;
-        let source = Source::File { file: &file, length };
+        let content = Content::of_file(&file, path)?;
+        let source = content.source();
         let is_magic = |at: usize| {
             let found = source.read(at, mcap::MAGIC.len());
             found.map(|found| *found == *mcap::MAGIC).map_err(RecordingError::file("read", path))
         };
         let magic = mcap::MAGIC.len();
-        if !is_magic(0)? || (length > magic && is_magic(length - magic)?) {
+        if !is_magic(0)? || (source.len() > magic && is_magic(source.len() - magic)?) {
             return Self::of_file(&file, path);
         }
         let mut channels = Channels::new();
@@ -130,7 +175,7 @@ impl Recording {
             channels.entry(message.channel.id).or_insert((message.channel, 0)).1 += 1;
         }
         let topics = topics(&channels, path)?;
-        Ok(Self { path: path.to_owned(), file, length, topics, cut: Some(Cut { last_tick }) })
+        Ok(Self { path: path.to_owned(), content, topics, cut: Some(Cut { last_tick }) })
     }
 
     /// How the file ends, where its writer did not finish it.
@@ -147,7 +192,7 @@ impl Recording {
 
     /// The bytes of the file.
     pub(crate) fn source(&self) -> Source<'_> {
-        Source::File { file: &self.file, length: self.length }
+        self.content.source()
     }
 
     /// The topics by name.
@@ -212,19 +257,6 @@ impl Recording {
         let attachments = summary.iter().flat_map(|summary| &summary.attachments);
         attachments.map(|index| attachment(self.source(), index).map_err(broken)).collect()
     }
-}
-
-/// Another handle on `file`, and its length.
-fn opened(file: &File, path: &Path) -> Result<(File, usize), RecordingError> {
-    let opened = file.try_clone().and_then(|file| {
-        let found = file.metadata()?;
-        if !found.is_file() {
-            return Err(std::io::Error::other("it is not a regular file"));
-        }
-        let length = usize::try_from(found.len()).map_err(std::io::Error::other)?;
-        Ok((file, length))
-    });
-    opened.map_err(RecordingError::file("open", path))
 }
 
 /// The topics of `channels`, each given with the number of its messages.

@@ -11,6 +11,7 @@ use crate::surface::Surface;
 use diagnostics::parameter::Bounds;
 use diagnostics::unit::{ANGLE, LENGTH, RATIO};
 use diagnostics::{Diagnostic, Faults};
+use inputs::InputFiles;
 use nalgebra::{Rotation3, Vector3};
 use std::io::Result as IoResult;
 use std::path::{Path, PathBuf};
@@ -62,14 +63,22 @@ const RADIUS: Bounds =
 const THINGS_MAX: usize = 900;
 
 impl Scene {
-    /// Reads and checks a scene file, and the meshes that it names.
+    /// Reads and checks a scene file, and the meshes that it names, from the disk.
     ///
     /// # Errors
     /// What is wrong with the file, and where.
     pub fn load(path: &Path) -> Result<Self, Diagnostic> {
+        Self::load_from(&InputFiles::default(), path)
+    }
+
+    /// Reads and checks a scene file of `files`, and the meshes that it names: a component takes those of its context.
+    ///
+    /// # Errors
+    /// What is wrong with the file or a mesh, and where.
+    pub fn load_from(files: &InputFiles, path: &Path) -> Result<Self, Diagnostic> {
         let file = path.display().to_string();
-        match vehicles::text::read(path) {
-            Ok(text) => Self::parse(&text, &file),
+        match files.text(path) {
+            Ok(text) => Self::parse_with(&text, &file, &|path| Ok(files.bytes(path)?.to_vec())),
             Err(cause) => Err(Diagnostic::unreadable(file, &cause)),
         }
     }
@@ -80,7 +89,7 @@ impl Scene {
     /// # Errors
     /// What is wrong with the text or a mesh, and where.
     pub fn parse(text: &str, file_name: &str) -> Result<Self, Diagnostic> {
-        Self::parse_with(text, file_name, &|path| vehicles::text::read_log(path))
+        Self::parse_with(text, file_name, &inputs::read_bytes)
     }
 
     /// As [`Scene::parse`], with the bytes of its meshes from `read`, which gets their paths.
@@ -167,12 +176,12 @@ impl Scene {
 
     /// The mesh files that the scene file at `path` names; what is wrong with it is told where it is read.
     #[must_use]
-    pub fn mesh_files(path: &Path) -> Vec<PathBuf> {
-        let table = vehicles::text::read(path).ok().and_then(|text| text.parse::<toml::Table>().ok());
+    pub fn mesh_files(files: &InputFiles, path: &Path) -> Vec<PathBuf> {
+        let table = files.text(path).ok().and_then(|text| text.parse::<toml::Table>().ok());
         let meshes = table.as_ref().and_then(|table| table.get("meshes")?.as_array());
         let folder = path.parent().unwrap_or(Path::new(""));
-        let files = meshes.into_iter().flatten().filter_map(|mesh| mesh.get("file")?.as_str());
-        files.map(|file| folder.join(file)).collect()
+        let names = meshes.into_iter().flatten().filter_map(|mesh| mesh.get("file")?.as_str());
+        names.map(|name| folder.join(name)).collect()
     }
 }
 

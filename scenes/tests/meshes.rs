@@ -226,7 +226,10 @@ fn a_mesh_file_that_is_not_there_is_named() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("labyrinth.toml");
     std::fs::write(&path, scene).unwrap();
-    assert_eq!(Scene::mesh_files(&path), [folder.path().join("meshes/labyrinth.stl")]);
+    assert_eq!(
+        Scene::mesh_files(&inputs::InputFiles::default(), &path),
+        [folder.path().join("meshes/labyrinth.stl")]
+    );
     let told = Scene::load(&path).unwrap_err().to_string();
     assert!(told.contains("labyrinth.stl") && told.contains("No such file"), "{told}");
 }

@@ -101,15 +101,17 @@ fn flights_of(arguments: &IdentifyArguments, file: &Path, out: &Path) -> Result<
     let say = |text: &str| bar.set_message(readable(text).into_owned());
     say("reading flights");
     let set = FlightSet::load(file)?;
-    let base = Vehicle::base(&set.vehicle);
+    let base = Vehicle::base(&set.files, &set.vehicle);
     let inputs: Vec<&Path> =
         [Some(file), Some(&set.vehicle), base.as_deref()].into_iter().flatten().collect();
     let files = [("vehicle.toml", &VEHICLE), ("report.html", &PAGE), ("report.json", &REPORT)];
     let _lock = claim(out, &files, &inputs)?;
     let outcome = identify::run::identify(&set, &mut |step| say(step))?;
     let vehicle = out.join("vehicle.toml");
-    let text = vehicle_file::text(&set.vehicle, &outcome.effects, &outcome.report)?;
+    let text = vehicle_file::text(&set.files, &set.vehicle, &outcome.effects, &outcome.report)?;
     write(out, "vehicle.toml", &VEHICLE, &text)?;
+    // It is flown as it was written.
+    set.files.keep(&vehicle, text.into_bytes());
     // All is written before anything is flown, so that a run that fails loses nothing.
     let write_page =
         |flown: Option<&Value>| write(out, "report.html", &PAGE, identification::page(&outcome, flown));

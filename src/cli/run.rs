@@ -84,7 +84,7 @@ pub fn run(
     print_warnings(&graph.warnings);
     graph.plan.profile |= files.is_some();
     if let Some((process, with)) = extra_shadow {
-        let shadow = backup_of(&manifest, &graph.plan, process, with)?;
+        let shadow = backup_of(&manifest, &graph.plan, &graph.files, process, with)?;
         if graph.backups.iter().any(|other| other.node == shadow.node) {
             bail!("`{process}` has a backup, a standby or a shadow in this manifest already; one at a time");
         }
@@ -121,12 +121,30 @@ pub fn run(
         let lines = files.write(&summary.manifest, flight, profile)?;
         text += &format!("\n\n{profile}\n{}", lines.join("\n"));
     }
+    if let Some(path) = &summary.recording {
+        text += &format!("\nto see it: {}", command("plot", path));
+    }
     if arguments.json {
         print_json(&as_json(&summary, profile.as_ref(), &files)?)?;
     } else {
         print_text(&text)?;
     }
     Ok(summary.passed)
+}
+
+/// A command line of this program that a shell understands: the program as it was called, a subcommand, and a file.
+fn command(subcommand: &str, path: &Path) -> String {
+    let program = std::env::args_os().next().map_or_else(|| PathBuf::from("hummingbus"), PathBuf::from);
+    let folder = std::env::current_dir().unwrap_or_default();
+    let path = path.strip_prefix(folder).unwrap_or(path);
+    format!("{} {subcommand} {}", quoted(&program), quoted(path))
+}
+
+/// A path as one word of a shell.
+fn quoted(path: &Path) -> String {
+    let text = path.to_string_lossy();
+    let is_plain = |c: char| c.is_alphanumeric() || "/._-+=:,@".contains(c);
+    if text.chars().all(is_plain) { text.into_owned() } else { format!("'{}'", text.replace('\'', "'\\''")) }
 }
 
 /// What there is to say about a run that was refused or broke, with what is `left` of its recording; printed as JSON too
@@ -167,4 +185,16 @@ fn recording_path(manifest: &Manifest, argument: Option<&Path>) -> Result<PathBu
         (None, None) => manifest.path.with_extension("mcap"),
     };
     std::path::absolute(&path).with_context(|| format!("{} is not a path", path.display()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::quoted;
+    use std::path::Path;
+
+    #[test]
+    fn a_path_is_one_word_of_a_shell() {
+        assert_eq!(quoted(Path::new("manifests/hover.mcap")), "manifests/hover.mcap");
+        assert_eq!(quoted(Path::new("my flights/a'b.mcap")), "'my flights/a'\\''b.mcap'");
+    }
 }

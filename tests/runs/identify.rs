@@ -214,10 +214,7 @@ fn what_cannot_be_identified_on_is_refused_in_words() {
     );
     place.call(&["identify", &flights, "--out", &out]).with_code(2).says(&["short"]);
     place.write("short.csv", hover(100, 1.0));
-    let slow = [
-        "flight `short` cannot be identified on",
-        "100 samples lie over 99 s, expected at least one in 0.5 s",
-    ];
+    let slow = ["flight `short`: its 100 samples lie over 99 s", "expected at least one in 0.5 s"];
     place.call(&["identify", &flights, "--out", &out]).with_code(2).says(&slow);
     place.call(&["identify", "rotor", &missing, "--out", &out]).with_code(2).says(&["nowhere.toml"]);
 }

@@ -32,6 +32,7 @@
 //! - [`validate`]: measured commands flown by vehicles side by side
 //! - [`scenarios`]: the thesis's scenarios and those beyond
 //! - [`scenes`]: ground, walls, rigs and other vehicles
+//! - [`inputs`]: files that are edited after they were read
 
 mod as_printed;
 mod backups;
@@ -45,6 +46,7 @@ mod determinism;
 mod documentation;
 mod failures;
 mod identify;
+mod inputs;
 mod laps;
 mod live;
 mod loss;

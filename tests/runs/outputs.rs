@@ -4,6 +4,7 @@ use crate::laps;
 use crate::nodes::{manifest, sender, table};
 use crate::recordings::{open, rows};
 use crate::support::{Ended, HUMMINGBUS, Launch, Place, partial, poll, repository};
+use recorder::reader::Recording;
 use rustix::process::{Signal, kill_process};
 use std::fs::{self, File};
 use std::os::unix::fs::{FileTypeExt, MetadataExt, PermissionsExt, symlink};
@@ -459,12 +460,16 @@ fn who_reads_a_page_or_a_recording_keeps_it_whole_while_it_is_replaced() {
     place.call(&["run", &path]).with_code(0);
     place.call(&args).with_code(0);
     let (held, page) = (open(&recording), File::open(place.path("short.html")).unwrap());
-    let messages = || held.messages().map(|message| message.unwrap().cdr).collect::<Vec<_>>();
-    let (before, length) = (messages(), page.metadata().unwrap().len());
+    let messages = |held: &Recording| -> Vec<_> {
+        held.messages()
+            .map(|record| record.map(|record| (record.topic, record.tick, record.cdr)).unwrap())
+            .collect()
+    };
+    let (flown, length) = (messages(&held), page.metadata().unwrap().len());
     place.call(&["run", &path]).with_code(0);
     place.call(&args).with_code(0);
     assert_ne!(page.metadata().unwrap().ino(), node(&place.path("short.html")), "it was written over");
-    assert!(messages() == before && page.metadata().unwrap().len() == length);
+    assert!(messages(&held) == flown && page.metadata().unwrap().len() == length);
 }
 
 // Folders that commands fill

@@ -84,6 +84,26 @@ fn a_column_map_without_a_unit_or_with_a_wrong_one() {
 }
 
 #[test]
+fn a_run_that_plays_a_gap() {
+    let without = |line: &(usize, &str)| !(40..60).contains(&line.0);
+    let lines = flight();
+    let holed: String =
+        lines.lines().enumerate().filter(without).map(|(_, line)| line.to_owned() + "\n").collect();
+    refused_replay(&holed, &FROM_THE_START).says(&[
+        "the flight has no rows from 0.380 s to 0.590 s",
+        "nobody knows the commands there",
+        "`from_s`",
+    ]);
+    for more in [
+        ["process.player.parameters.gaps=hold", "run.duration_s=1.001"],
+        ["process.player.parameters.from_s=0.59", "run.duration_s=0.4"],
+    ] {
+        let more = more.map(|setting| ["--set", setting]).concat();
+        replay(&Place::new(), &holed, &[&FROM_THE_START[..], &more].concat()).end().flown();
+    }
+}
+
+#[test]
 fn a_start_beyond_the_end_of_the_flight() {
     refused_replay(&flight(), &[]).says(&["`from_s` is 6 s, the flight lasts 1.000 s"]);
 }

@@ -59,7 +59,7 @@ fn a_full_folder_for_temporary_files_is_named() {
 #[test]
 fn under_any_limit_on_open_files_a_run_flies_or_is_refused_and_leaves_nothing() {
     let (mut flown, mut refused) = (0, 0);
-    for limit in (3..12).chain((12..64).step_by(4)).chain([256]) {
+    for limit in (4..12).chain((12..64).step_by(4)).chain([256]) {
         let place = Place::new();
         let (hover, recording) = (repository("manifests/hover.toml"), place.path("a.mcap"));
         let mut command = Command::new("sh");

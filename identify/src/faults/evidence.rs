@@ -6,6 +6,7 @@ use super::twin::Twin;
 use crate::model::Model;
 use crate::prepared::{BOX_STEPS, Equation, Prepared, Tracks};
 use crate::rows::column;
+use crate::track::Track;
 use nalgebra::{UnitQuaternion, Vector3};
 
 /// A flight's channels side by side.
@@ -20,6 +21,8 @@ pub struct Evidence<'p> {
     tracks: Tracks,
     /// Speeds that follow from the commands, on the grid.
     commanded: Vec<[f64; 4]>,
+    /// Measured speeds on the grid; zero where there are none.
+    measured: Vec<[f64; 4]>,
 }
 
 impl<'p> Evidence<'p> {
@@ -27,7 +30,9 @@ impl<'p> Evidence<'p> {
     pub fn of(model: &'p Model, flight: &'p Prepared<'p>) -> Self {
         let declared = model.parameters.baseline();
         let commanded = model.rotors(flight, &declared).commanded;
-        Self { flight, model, tracks: model.tracks(flight, &declared), commanded, doubted: Vec::new() }
+        let measured = Track::sampled(&flight.flight.rotor_speed, 0.0, &flight.layout.clock).values;
+        let tracks = model.tracks(flight, &declared);
+        Self { flight, model, tracks, commanded, measured, doubted: Vec::new() }
     }
 
     /// Time between two knots.
@@ -101,11 +106,12 @@ impl<'p> Evidence<'p> {
 
     /// Squared speeds that follow from the commands, about `knot` less `late` instants; `None` outside the grid.
     pub fn commanded_squares(&self, knot: usize, late: usize) -> Option<[f64; 4]> {
-        let reach = BOX_STEPS;
-        let middle = knot.checked_sub(late).filter(|middle| *middle >= reach)?;
-        let about = self.commanded.get(middle - reach..=middle + reach)?;
-        let sum = |rotor: usize| about.iter().map(|speeds| speeds[rotor] * speeds[rotor]).sum::<f64>();
-        Some(std::array::from_fn(|rotor| sum(rotor) / about.len() as f64))
+        squares_about(&self.commanded, knot, late)
+    }
+
+    /// Squared speeds as measured, like [`Self::commanded_squares`].
+    pub fn measured_squares(&self, knot: usize, late: usize) -> Option<[f64; 4]> {
+        squares_about(&self.measured, knot, late)
     }
 
     /// Commanded thrust about `knot`, divided by mass.
@@ -122,4 +128,12 @@ impl<'p> Evidence<'p> {
     fn attitudes(&self) -> impl Iterator<Item = UnitQuaternion<f64>> + '_ {
         self.flight.layout.knots.iter().map(|knot| self.tracks.attitude[*knot])
     }
+}
+
+/// Mean squares about `knot` less `late` instants; `None` outside the grid.
+fn squares_about(speeds: &[[f64; 4]], knot: usize, late: usize) -> Option<[f64; 4]> {
+    let middle = knot.checked_sub(late).filter(|middle| *middle >= BOX_STEPS)?;
+    let about = speeds.get(middle - BOX_STEPS..=middle + BOX_STEPS)?;
+    let sum = |rotor: usize| about.iter().map(|speeds| speeds[rotor] * speeds[rotor]).sum::<f64>();
+    Some(std::array::from_fn(|rotor| sum(rotor) / about.len() as f64))
 }

@@ -5,6 +5,7 @@
 
 use anyhow::{Context, Result, bail};
 use flights::{Flight, Played};
+use inputs::InputFiles;
 use recorder::reader::Recording;
 use runtime::event::{RunEvent, StopToken};
 use runtime::host::Host;
@@ -84,7 +85,7 @@ impl Replay {
         Ok(Self { folder, manifest, played, ticks, _lock: lock })
     }
 
-    /// Flies; returns how long that took on the host, in seconds, and the recording.
+    /// Flies the vehicles of `files`; returns how long that took on the host, in seconds, and the recording.
     ///
     /// # Errors
     /// As `hummingbus run`; a run that was stopped too.
@@ -92,11 +93,13 @@ impl Replay {
         &self,
         components: Registry,
         stop: &StopToken,
+        files: &InputFiles,
         tell: &mut dyn FnMut(&str),
     ) -> Result<(f64, Recording)> {
         let manifest = self.manifest.build(&self.folder.join(MANIFEST), components)?;
-        let launcher = Launcher::new(Host::this_binary()).stopped_by(stop).adopting_orphans();
-        let launcher = launcher.followed_by(|event| {
+        // What the run reads beside them is its own.
+        let launcher = Launcher::new(Host::this_binary()).reading(files.branch());
+        let launcher = launcher.stopped_by(stop).adopting_orphans().followed_by(|event| {
             if let RunEvent::Note(text) = event {
                 tell(text);
             }
@@ -134,6 +137,8 @@ fn manifest(ticks: u32, columns: &str, initial: [f64; 4], vehicles: &[&Path]) ->
         .set("process.player.kind", "player")
         .set("process.player.data", DATA)
         .set("process.player.outputs.measured.every_ticks", every)
+        // Windows that touch a gap do not count.
+        .set("process.player.parameters.gaps", "hold")
         .set("process.player.parameters.columns", columns.parse::<toml::Table>()?)
         .set("process.recorder.kind", "recorder");
     for (number, vehicle) in vehicles.iter().enumerate() {

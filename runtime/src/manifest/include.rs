@@ -4,6 +4,7 @@ use super::sources::{Origin, Sources};
 use super::tree;
 use crate::registry::Registry;
 use diagnostics::Diagnostic;
+use inputs::InputFiles;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use toml::Spanned;
@@ -21,7 +22,7 @@ pub const LISTS: [&str; 6] = ["compare", "measure", "pass", "shadow", "swap", "v
 /// # Errors
 /// If it cannot be read.
 pub fn text(path: &Path) -> Result<String, Diagnostic> {
-    vehicles::text::read(path).map_err(|error| {
+    InputFiles::default().text(path).map_err(|error| {
         let file = path.display().to_string();
         Diagnostic::in_file(file, format!("cannot be read: {error}")).help("give the path of a manifest")
     })
@@ -78,7 +79,7 @@ impl Reader {
             let message = format!("includes stand more than {DEPTH_MAX} files deep, with {}", path.display());
             return Err(at(message, "include the files side by side in one of them"));
         }
-        let text = vehicles::text::read(&path).map_err(|error| {
+        let text = InputFiles::default().text(&path).map_err(|error| {
             let message = format!("the included file {} cannot be read: {error}", path.display());
             at(message, "a path is relative to the file that includes it")
         })?;

@@ -1,0 +1,72 @@
+//! Timing errors that the logging of commands makes.
+//!
+//! A controller that sends more commands than the log has changes them between two logged ones. Held from sample to sample,
+//! the logged commands act late, by half of their period in the mean; the motors then seem faster than they are, and a
+//! delay shorter. Blocks of time do not show this.
+
+use crate::candidate::Candidate;
+use crate::fit::{FitResult, Problem};
+use crate::parameter::Parameter;
+use crate::sensor_effects::{IMU_DELAY, POSE_DELAY};
+use plant::effects::EffectKind;
+use vehicles::MotorModel;
+use vehicles::gaps::held_period_s;
+
+/// Name of the effect that changes the motors' lag.
+const MOTOR_LAG: &str = "motor-lag";
+
+/// Longest usual time between two commands, over all flights with commands.
+fn period_s(problem: &Problem) -> f64 {
+    let flights = problem.flights().map(|flight| flight.flight).filter(|flight| !flight.commands_on_change);
+    flights.filter_map(|flight| held_period_s(&flight.command.time_s)).fold(0.0, f64::max)
+}
+
+/// Time by which the rotor speeds follow slow changes of the commands.
+fn lag_s(motor: MotorModel) -> f64 {
+    match motor {
+        MotorModel::FirstOrder { time_constant_s } => time_constant_s,
+        MotorModel::SecondOrder { natural_frequency_rad_s, damping_ratio } => {
+            2.0 * damping_ratio / natural_frequency_rad_s
+        }
+    }
+}
+
+/// Lateness of the logged commands that was fitted as a lead of the sensors, in s: the logging explains leads up to a
+/// period. `None` if it does not explain `candidate`.
+pub fn explained_lead_s(problem: &Problem, candidate: &Candidate, fitted: &FitResult) -> Option<f64> {
+    let [parameter] = candidate.free[..] else { return None };
+    let lead_s = -fitted.values[parameter];
+    let is_sensor = *candidate.kind == POSE_DELAY || *candidate.kind == IMU_DELAY;
+    (is_sensor && lead_s > 0.0 && lead_s < period_s(problem)).then_some(lead_s)
+}
+
+/// Note on commands whose logging makes them late by `lead_s`.
+pub fn note(problem: &Problem, lead_s: f64) -> String {
+    format!(
+        "command: in the log, commands act {lead_s:.4} s late, which their logging every {:.4} s explains; no effect is named for \
+         it, and delays and lags are known up to half of that period; log every command",
+        period_s(problem)
+    )
+}
+
+/// True for motors that seem faster by less than one period of the logged commands.
+pub fn explains(problem: &Problem, kind: &EffectKind, free: &[usize], fitted: &FitResult) -> bool {
+    if kind.name != MOTOR_LAG {
+        return false;
+    }
+    let mut without = fitted.values.clone();
+    free.iter().for_each(|at| without[*at] = problem.model.parameters.all[*at].baseline);
+    let of = |values: &[f64]| lag_s(problem.model.airframe(values).vehicle().motor);
+    let change_s = of(&fitted.values) - of(&without);
+    change_s < 0.0 && -change_s < period_s(problem)
+}
+
+/// Amount by which the logging of the commands makes the estimate of a parameter too small at most, in its unit.
+pub fn bias(problem: &Problem, parameter: &Parameter) -> f64 {
+    let half_s = || period_s(problem) / 2.0;
+    match (parameter.kind, parameter.spec().name) {
+        (kind, _) if kind.is_delay => half_s(),
+        (kind, "slowness") if kind.name == MOTOR_LAG => half_s() / lag_s(problem.model.vehicle.motor),
+        _ => 0.0,
+    }
+}

@@ -1,0 +1,208 @@
+//! Commands that were not logged all the time, and flights whose commands or motion are missing.
+mod simulated;
+
+use flights::{Channel, Flight, FlightSet};
+use identify::report::{Estimate, Report};
+use identify::run::identify;
+use simulated::cases::Case;
+
+/// Flights of a vehicle that is 8 % heavier than declared.
+fn heavy(duration_s: f64) -> Case {
+    let mut case = Case::null(81, duration_s);
+    case.plan.truth = vec![simulated::effect("mass-error", &[("error", 0.08)])];
+    case
+}
+
+fn changed(case: &Case, change: impl Fn(&mut Flight)) -> FlightSet {
+    let mut set = case.flights();
+    set.flights.iter_mut().for_each(change);
+    set
+}
+
+fn found(set: &FlightSet) -> Report {
+    identify(set, &mut |_| ()).unwrap_or_else(|error| panic!("{error}")).report
+}
+
+fn refused(set: &FlightSet) -> String {
+    identify(set, &mut |_| ()).expect_err("flights that cannot be used").to_string()
+}
+
+fn keep<const N: usize>(channel: &mut Channel<N>, is_kept: impl Fn(usize, f64) -> bool) {
+    let kept: Vec<usize> = (0..channel.time_s.len()).filter(|at| is_kept(*at, channel.time_s[*at])).collect();
+    channel.time_s = kept.iter().map(|at| channel.time_s[*at]).collect();
+    channel.values = kept.iter().map(|at| channel.values[*at]).collect();
+}
+
+fn keep_all(flight: &mut Flight, is_kept: impl Fn(usize, f64) -> bool) {
+    keep(&mut flight.command, &is_kept);
+    keep(&mut flight.position, &is_kept);
+    keep(&mut flight.attitude, &is_kept);
+    keep(&mut flight.angular_velocity, &is_kept);
+    keep(&mut flight.specific_force, &is_kept);
+}
+
+#[track_caller]
+fn require_mass(report: &Report) {
+    assert_eq!(report.verdict, ["mass-error"], "{report}");
+    let error = &report.effects["mass-error"].parameters["error"];
+    assert!((0.05..0.11).contains(&error.value) && error.low < 0.08 && error.high > 0.08, "{report}");
+}
+
+#[test]
+fn a_gap_of_the_commands_is_not_compared() {
+    let report =
+        found(&changed(&heavy(20.0), |flight| keep(&mut flight.command, |_, t| !(7.0..11.0).contains(&t))));
+    require_mass(&report);
+    // The gap, the time in which the rotors settle behind it, and what is always left out.
+    assert!(report.flights.iter().all(|flight| (13.5..15.5).contains(&flight.compared_s)), "{report}");
+}
+
+#[test]
+fn drop_outs_of_all_channels_are_not_compared() {
+    let is_logged = |_: usize, t: f64| (t + 0.3) % 2.0 < 1.6;
+    require_mass(&found(&changed(&heavy(20.0), |flight| keep_all(flight, is_logged))));
+}
+
+/// The first message came before the clock did: commands long before the motion, then none.
+#[test]
+fn commands_at_other_times_than_the_motion_are_refused() {
+    let early = changed(&heavy(8.0), |flight| {
+        flight.command.time_s.iter_mut().skip(1).for_each(|t| *t += 1000.0);
+    });
+    let error = refused(&early);
+    for part in [
+        "role \"fit\"",
+        "commands and its motion were never logged together",
+        "known from 1000",
+        "motion was measured from",
+    ] {
+        assert!(error.contains(part), "no {part:?} in: {error}");
+    }
+    let late = changed(&heavy(8.0), |flight| flight.command.time_s.iter_mut().for_each(|t| *t += 1000.0));
+    let error = refused(&late);
+    for part in ["its channels lie at different times", "command from 1000", "attitude from 0"] {
+        assert!(error.contains(part), "no {part:?} in: {error}");
+    }
+}
+
+/// Held for half a second at a time and written once: a gap, unless the log says how it was written.
+#[test]
+fn commands_that_are_written_on_change_hold_until_the_next() {
+    let mut case = heavy(20.0);
+    case.plan.is_calm = true;
+    let written = |is_on_change: bool| {
+        changed(&case, |flight| {
+            // A message when the command changes by more than 1 %.
+            let mut last: Option<[f64; 4]> = None;
+            let values = flight.command.values.clone();
+            let is_new: Vec<bool> = values
+                .iter()
+                .map(|value| {
+                    let far = |old: [f64; 4]| old.iter().zip(value).any(|(a, b)| (a - b).abs() > 1e-2 * a);
+                    let is_new = last.is_none_or(far);
+                    last = if is_new { Some(*value) } else { last };
+                    is_new
+                })
+                .collect();
+            keep(&mut flight.command, |at, _| is_new[at]);
+            flight.commands_on_change = is_on_change;
+        })
+    };
+    let holding = found(&written(true));
+    let compared = |report: &Report| report.flights.iter().map(|flight| flight.compared_s).sum::<f64>();
+    assert!(compared(&holding) > 35.0, "{holding}");
+    let without_key = identify(&written(false), &mut |_| ()).map(|outcome| compared(&outcome.report));
+    assert!(without_key.as_ref().map_or(true, |compared_s| *compared_s < 25.0), "{without_key:?}");
+}
+
+#[test]
+fn a_flight_that_cannot_be_used_says_why() {
+    let case = heavy(8.0);
+    let cases: [(&str, fn(&mut Flight)); 6] = [
+        ("it has no command channel; declare `command`", |flight| flight.command = Channel::default()),
+        ("it has no motion; declare `attitude`", |flight| {
+            flight.attitude = Channel::default();
+            flight.angular_velocity = Channel::default();
+            flight.specific_force = Channel::default();
+        }),
+        ("its `attitude` has 2 samples, expected at least 3", |flight| {
+            keep(&mut flight.attitude, |at, _| at < 2)
+        }),
+        ("it stays on the ground", |flight| {
+            flight.command.values.iter_mut().for_each(|command| *command = command.map(|c| 0.1 * c));
+            flight.position.values.iter_mut().for_each(|position| *position = [0.0; 3]);
+            flight.angular_velocity.values.iter_mut().for_each(|rate| *rate = rate.map(|w| 1e-3 * w));
+        }),
+        ("though it moves; correct that map, or unit and columns of the channel `command`", |flight| {
+            flight.command.values.iter_mut().for_each(|command| *command = command.map(|c| 0.1 * c));
+        }),
+        ("can be compared, expected three windows", |flight| keep_all(flight, |_, t| t < 0.8)),
+    ];
+    for (reason, change) in cases {
+        let mut set = changed(&case, change);
+        set.flights[0].notes.push("command: 12 of 34 samples have no finite number; left out".to_owned());
+        let error = refused(&set);
+        let name = format!("flight `{}`: ", set.flights[0].name);
+        for part in ["role \"fit\"", &name, reason, "12 of 34 samples have no finite number"] {
+            assert!(error.contains(part), "no {part:?} in: {error}");
+        }
+    }
+}
+
+/// One flight that cannot be used leaves the others, and the report says why.
+#[test]
+fn a_reason_is_a_note_where_another_flight_can_be_used() {
+    let mut set = heavy(8.0).flights();
+    let mut other = set.flights[0].clone();
+    (other.name, other.command) = ("silent".to_owned(), Channel::default());
+    set.flights.push(other);
+    let report = found(&set);
+    let silent = report.flights.iter().find(|flight| flight.name == "silent").expect("its report");
+    assert!(
+        silent.notes.iter().any(|note| note.starts_with("not used: it has no command channel")),
+        "{report}"
+    );
+}
+
+/// A flight stack logs the commands of its controller at 10 Hz: slower than the motors follow.
+#[test]
+fn commands_slower_than_the_motors_determine_no_lag_delay_or_inertia() {
+    let mut case = heavy(20.0);
+    case.plan.sensors.pose_ticks = 10;
+    let set = changed(&case, |flight| keep(&mut flight.command, |at, _| at.is_multiple_of(100)));
+    let report = found(&set);
+    for effect in ["motor-lag", "command-delay", "inertia-error", "gyroscopic-torque"] {
+        assert!(!report.verdict.contains(&effect), "{report}");
+        assert!(report.not_identifiable.iter().any(|missing| missing.effect == effect), "{report}");
+        let open = |one: &Estimate| !one.determined && one.low < one.value.max(0.1) && one.high > one.value;
+        assert!(report.effects[effect].parameters.values().all(open), "{effect}: {report}");
+    }
+    let [named] = report.verdict[..] else { panic!("{report}") };
+    let is_mass = named == "mass-error" || report.effects[named].confused_with.contains(&"mass-error");
+    assert!(is_mass, "{report}");
+    let note = "logged every 0.100 s, expected at most 0.033 s, half of the motors' time constant of 0.066 s";
+    assert!(report.to_string().contains(note), "{report}");
+}
+
+/// Some of the commands of a controller at 500 Hz: they act late by half of the period, which is no effect.
+#[test]
+fn what_the_logging_of_commands_makes_is_not_named() {
+    for every in [5, 20] {
+        let set = changed(&heavy(20.0), |flight| keep(&mut flight.command, |at, _| at.is_multiple_of(every)));
+        let report = found(&set);
+        require_mass(&report);
+        let note = format!("which their logging every {:.4} s explains", 1e-3 * every as f64);
+        assert!(every == 5 || report.to_string().contains(&note), "{report}");
+    }
+}
+
+/// The interval of a delay holds the truth even if every fifth command was logged.
+#[test]
+fn the_interval_of_a_delay_holds_half_of_the_logging_period() {
+    let mut case = heavy(20.0);
+    case.plan.truth = vec![simulated::effect("command-delay", &[("delay", 0.02)])];
+    let set = changed(&case, |flight| keep(&mut flight.command, |at, _| at.is_multiple_of(5)));
+    let report = found(&set);
+    let delay = &report.effects["command-delay"].parameters["delay"];
+    assert!(delay.value < 0.02 && delay.low < 0.02 && delay.high > 0.02, "{report}");
+}
