@@ -62,6 +62,29 @@ pub(crate) fn tell_unsourced(vehicle: &Vehicle, run: &NodeContext<'_>) {
     }
 }
 
+/// Refuses rotors with more inertia than the vehicle that they are part of: the moments of a vehicle file include them, at
+/// rest.
+///
+/// # Errors
+/// Both moments, and the keys that they come from.
+pub(crate) fn check_rotor_inertia(vehicle: &Vehicle) -> Result<(), ParameterError> {
+    let (count, whole_kg_m2) = (vehicle.rotors.len() as f64, vehicle.inertia_kg_m2[(2, 2)]);
+    let rotors_kg_m2 = count * vehicle.rotor_inertia_kg_m2;
+    refuse(rotors_kg_m2 > whole_kg_m2, "vehicle", || {
+        let stated = vehicle.provenance.iter();
+        let stated =
+            stated.filter(|number| ["body.inertia_zz", "rotor.inertia"].contains(&number.key.as_str()));
+        format!(
+            "`vehicle` \"{}\" has {count} rotors of {:e} kg*m^2, expected at most {:e}: together they cannot have more than \
+             the whole vehicle about its vertical axis, {whole_kg_m2:e}, which includes them; look at {}",
+            vehicle.name,
+            vehicle.rotor_inertia_kg_m2,
+            whole_kg_m2 / count,
+            places(&stated.collect::<Vec<_>>())
+        )
+    })
+}
+
 fn fastest_pole_rad_s(motor: &MotorModel) -> f64 {
     match *motor {
         MotorModel::FirstOrder { time_constant_s } => time_constant_s.recip(),
@@ -230,6 +253,16 @@ mod tests {
         let strong = |factor: f64| lift(|it| (slow(it), it.mass_kg /= factor).1);
         assert!(strong(20.0).1[0].message.contains("stronger than any"));
         assert!(strong(1e4).0.unwrap_err().to_string().contains("no vehicle that flies"));
+    }
+
+    #[test]
+    fn rotors_are_part_of_the_vehicle() {
+        let checked = |inertia: f64| check_rotor_inertia(&hummingbird(|it| it.rotor_inertia_kg_m2 = inertia));
+        assert_eq!(checked(3.1e-5), Ok(()));
+        assert_eq!(checked(2.0e-3), Ok(()));
+        let message = checked(10.0).unwrap_err().to_string();
+        assert!(message.contains("has 4 rotors of 1e1 kg*m^2, expected at most 2.025e-3"), "{message}");
+        assert!(message.contains("`body.inertia_zz`") && message.contains("`rotor.inertia`"), "{message}");
     }
 
     #[test]

@@ -153,6 +153,7 @@ impl Parameters {
         self.refuse_ports(&scene, run)?;
         // Before the backend, which a vehicle that is none might not survive.
         airworthy::tell_unsourced(airframe.vehicle(), run);
+        airworthy::check_rotor_inertia(airframe.vehicle())?;
         airworthy::check_steps(airframe.vehicle(), run.tick_s() / f64::from(self.substeps), run)?;
         if scene.rig.is_none() && self.window_s.is_none() {
             airworthy::check_lift(airframe.vehicle(), run)?;

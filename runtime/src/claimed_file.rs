@@ -78,11 +78,24 @@ impl Partial {
     pub fn finish(&self) -> Result<()> {
         let cannot =
             || format!("cannot put {} in the place of {}", self.path.display(), self.real.path.display());
-        check(&self.real.path, &RECORDING)?;
         if !self.is_there() {
             bail!("{}: somebody removed or replaced it during the run", cannot());
         }
+        let current = self.current_path();
+        if current != self.path {
+            bail!(
+                "{}: its folder was renamed or moved during the run; the whole recording is {} now",
+                cannot(),
+                current.display()
+            );
+        }
+        check(&self.real.path, &RECORDING)?;
         self.location.rename(&self.real).with_context(cannot)
+    }
+
+    /// Where it lies by now.
+    pub fn current_path(&self) -> PathBuf {
+        self.location.current_path()
     }
 
     /// Removes it.

@@ -1,12 +1,12 @@
 //! Where the instances of a run's nodes live: in processes of their own, or on threads of this one.
 
 use crate::program::{Executable, Program};
-use anyhow::{Context, Result, anyhow};
+use anyhow::{Context, Result, anyhow, bail};
 use bus::hosted::Hosted;
 use bus::lockstep::SupervisorView;
 use bus::{BusError, Join, Registration};
 use std::os::unix::process::ExitStatusExt;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitStatus;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -45,6 +45,17 @@ impl Host {
     #[must_use]
     pub fn this_binary() -> Self {
         Self::Exe("/proc/self/exe".into())
+    }
+
+    /// Refuses a host on which the kernel does not tell of processes.
+    pub(crate) fn require_proc() -> Result<()> {
+        if Path::new("/proc/self/fd").is_dir() {
+            return Ok(());
+        }
+        bail!(
+            "/proc is not there, and a run needs it, to start its processes, to watch them and to be steered; mount it: \
+             mount -t proc proc /proc"
+        )
     }
 
     /// Refuses what `program`, the process `name`, asks for and cannot have here.

@@ -22,6 +22,8 @@ use bus::plan::{InputPlan, NodePlan, Plan};
 use bus::{BusError, Join};
 use diagnostics::Diagnostic;
 use inputs::InputFiles;
+use rustix::io::Errno;
+use rustix::process::{Pid, WaitId, WaitIdOptions, waitid};
 use std::collections::BTreeMap;
 use std::collections::btree_map::Entry;
 use std::os::unix::net::UnixDatagram;
@@ -220,6 +222,18 @@ enum Running {
     Thread(Thread),
 }
 
+/// Whether a process has exited. One that this process traces, as it does after PTRACE_TRACEME, is reported when it stops,
+/// too, and has not ended then.
+fn has_exited(child: &Child, options: WaitIdOptions) -> bool {
+    let options = options | WaitIdOptions::EXITED | WaitIdOptions::NOWAIT;
+    match waitid(WaitId::Pid(Pid::from_child(child)), options) {
+        Ok(Some(status)) => status.exited() || status.killed() || status.dumped(),
+        Ok(None) | Err(Errno::INTR) => false,
+        // Somebody else has waited for it: `wait` says what follows.
+        Err(_) => true,
+    }
+}
+
 impl Body for HostBody {
     fn id(&self) -> Option<u32> {
         match &self.body {
@@ -230,6 +244,7 @@ impl Body for HostBody {
 
     fn end(&mut self) -> Result<Option<End>> {
         match &mut self.body {
+            Running::Process(child) if !has_exited(child, WaitIdOptions::NOHANG) => Ok(None),
             Running::Process(child) => Ok(child.try_wait().context("cannot watch a process")?.map(End::from)),
             Running::Thread(thread) => Ok(thread.end()),
         }
@@ -247,6 +262,7 @@ impl Body for HostBody {
                 // A command may have started processes of its own.
                 bus::process::kill_group(child.id());
                 let _ = child.kill();
+                while !has_exited(child, WaitIdOptions::empty()) {}
                 child.wait().ok().map(End::from)
             }
             Running::Thread(thread) => {

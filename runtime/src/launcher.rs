@@ -187,26 +187,40 @@ impl<'a> Launcher<'a> {
         graph: &mut Graph,
         outputs: &mut Outputs,
     ) -> Result<Outcome> {
+        Host::require_proc()?;
         require_host(&self.host, manifest, graph)?;
         let place = Place::take(self.adopts_orphans)?;
         let run_dir = RunDir::create(&manifest.path)?;
+        let mut on = std::mem::replace(&mut self.on, Box::new(|_| {}));
+        let flown = self.launch_in(&run_dir, &place, manifest, graph, outputs, &mut *on);
+        let flown = flown.map_err(|error| run_dir.blame_room(error));
+        run_dir.remove().iter().for_each(|left| on(RunEvent::Note(left)));
+        flown
+    }
+
+    fn launch_in(
+        self,
+        run_dir: &RunDir,
+        place: &Place,
+        manifest: &Manifest,
+        graph: &mut Graph,
+        outputs: &mut Outputs,
+        on: &mut dyn FnMut(RunEvent<'_>),
+    ) -> Result<Outcome> {
         // Before anything is touched that an earlier run left.
         bus::room::require(&graph.plan, &manifest.registry().messages())?;
-        outputs.claim(&run_dir)?;
+        outputs.claim(run_dir)?;
         if let Some(kept) = outputs.kept() {
-            (self.on)(RunEvent::Note(&format!(
-                "what an earlier run left unfinished is kept as {}",
-                kept.display()
-            )));
+            on(RunEvent::Note(&format!("what an earlier run left unfinished is kept as {}", kept.display())));
         }
-        prepare(manifest, graph, outputs.partial(), &run_dir)?;
+        prepare(manifest, graph, outputs.partial(), run_dir)?;
         graph.plan.run_id = run_dir.run_id().to_owned();
         graph.plan.store(run_dir.path())?;
         let graph = &*graph;
         let control = Arc::new(SupervisorView::create(&graph.plan)?);
         let (plan, dir) = (&graph.plan, run_dir.path());
         // Dropped behind the supervisor, which ends the processes.
-        let descendants = self.adopts_orphans.then(|| Descendants::of_run(&place));
+        let descendants = self.adopts_orphans.then(|| Descendants::of_run(place));
         let world = HostWorld {
             host: self.host,
             manifest,
@@ -218,7 +232,7 @@ impl<'a> Launcher<'a> {
             descendants: descendants.as_ref(),
             sockets: BTreeMap::new(),
         };
-        let mut supervisor = Supervisor::new(graph, world, &self.stop, &mut self.on);
+        let mut supervisor = Supervisor::new(graph, world, &self.stop, on);
         supervisor.fly(manifest.content.run.start_order_seed)?;
         let mut outcome = outcome(plan, &control, &supervisor);
         outcome.replacements = supervisor.overseer.replacements.into_reports();

@@ -30,6 +30,9 @@ pub mod run_dir;
 mod sidecars;
 #[cfg(test)]
 mod simulation;
+#[cfg(test)]
+#[path = "../../tests/runs/skipped.rs"]
+mod skipped;
 mod spawn;
 mod supervision;
 mod supervisor;

@@ -147,7 +147,7 @@ impl Outputs {
 
     /// What a broken run leaves of its recording, if anything. A file without a message, of a run that never flew, is
     /// removed.
-    pub fn left(&mut self) -> Option<&Path> {
+    pub fn left(&mut self) -> Option<PathBuf> {
         let is_blank = |partial: &&Partial| {
             let whole = Recording::of_file(&partial.file, &partial.path);
             partial.is_there() && whole.is_ok_and(|recording| recording.messages().next().is_none())
@@ -157,7 +157,7 @@ impl Outputs {
             self.partial = None;
         }
         let partial = self.partial.as_ref().filter(|partial| !partial.is_empty() && partial.is_there());
-        partial.map(|partial| &*partial.path)
+        partial.map(Partial::current_path)
     }
 }
 

@@ -5,7 +5,7 @@
 //! launcher dies, however it dies: so who can have the lock knows that the run is dead.
 
 use crate::file_lock;
-use anyhow::{Context, Result, bail};
+use anyhow::{Context, Result, anyhow, bail};
 pub(crate) use bus::names::SHARED_MEMORY;
 use bus::names::shm_prefix;
 use bus::process::user_id;
@@ -20,6 +20,12 @@ use std::path::{Path, PathBuf};
 
 /// More than any entry has: two paths and a few numbers.
 const ENTRY_BYTES_MAX: u64 = 64 << 10;
+
+/// Files that are kept open for the removal of a run directory: one for each folder in a folder, and one for a list.
+const SPARE_FILES: usize = 8;
+/// Below this much the folder for temporary files is told with an error: what a process could not write may have been
+/// removed by then.
+const FULL_BYTES: u64 = 256 << 10;
 
 /// What a run says of itself in its entry.
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -87,6 +93,9 @@ pub(crate) struct RunDir {
     entry: Entry,
     /// The entry and the directory, locked until the process ends.
     _locks: [File; 2],
+    /// Kept open so that there is room to look at what is to be removed, however many files this process may open.
+    spare: Vec<File>,
+    is_removed: bool,
 }
 
 impl RunDir {
@@ -113,7 +122,13 @@ impl RunDir {
                     entry.run_dir.display()
                 )
             })?;
-        Ok(Self { entry, _locks: [registered, directory] })
+        let spare = (0..SPARE_FILES).map(|_| File::open("/dev/null")).collect::<std::io::Result<_>>();
+        let mut run_dir =
+            Self { entry, _locks: [registered, directory], spare: Vec::new(), is_removed: false };
+        run_dir.spare = spare.context(
+            "cannot open as many files as a run needs; raise the limit of this process (`ulimit -n`), 1024 is usual",
+        )?;
+        Ok(run_dir)
     }
 
     /// The directory.
@@ -127,12 +142,50 @@ impl RunDir {
     }
 }
 
+impl RunDir {
+    /// Adds to an error of the run that its directory has no room left, where that is so.
+    pub fn blame_room(&self, error: anyhow::Error) -> anyhow::Error {
+        let Ok(found) = rustix::fs::statvfs(self.path()) else { return error };
+        let free = found.f_bavail.saturating_mul(found.f_frsize);
+        if free >= FULL_BYTES {
+            return error;
+        }
+        let folder = self.path().parent().unwrap_or(self.path()).display();
+        anyhow!(
+            "{error:#}\nThe folder for temporary files, {folder}, has {free} bytes free; make room there, or set \
+             TMPDIR to another folder"
+        )
+    }
+
+    /// Removes everything; returns what could not be removed, each as a sentence.
+    pub fn remove(mut self) -> Vec<String> {
+        self.clear()
+    }
+
+    fn clear(&mut self) -> Vec<String> {
+        self.is_removed = true;
+        self.spare.clear();
+        let told = |path: &Path, removed: std::io::Result<()>| match removed {
+            Err(error) if error.kind() != std::io::ErrorKind::NotFound => Some(format!(
+                "cannot remove {}, which the run has left: {error}; `hummingbus clean` removes it once that is possible",
+                path.display()
+            )),
+            _ => None,
+        };
+        let directory = told(self.path(), std::fs::remove_dir_all(self.path()));
+        // The entry last: what has no entry belongs to nobody.
+        let files = shared_memory_of(self.run_id()).into_iter().chain([entry_path(self.run_id())]);
+        directory
+            .into_iter()
+            .chain(files.filter_map(|path| told(&path, std::fs::remove_file(&path))))
+            .collect()
+    }
+}
+
 impl Drop for RunDir {
     fn drop(&mut self) {
-        let _ = std::fs::remove_dir_all(self.path());
-        // The entry last: what has no entry belongs to nobody.
-        for path in shared_memory_of(self.run_id()).into_iter().chain([entry_path(self.run_id())]) {
-            let _ = std::fs::remove_file(path);
+        if !self.is_removed {
+            self.clear();
         }
     }
 }

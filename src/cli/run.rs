@@ -108,7 +108,7 @@ pub fn run(
         Ok((outcome, outputs.finish()?))
     });
     let (mut outcome, recording) =
-        flown.or_else(|error| Err(broken(&manifest, &error, outputs.left(), arguments.json)?))?;
+        flown.or_else(|error| Err(broken(&manifest, &error, outputs.left().as_deref(), arguments.json)?))?;
     let flight = outcome.flight.take();
     let profile = flight.as_ref().map(|flight| Profile::of(flight, outcome.missed_deadlines));
     let mut summary = Summary::new(manifest.name(), outcome, graph.plan.tick_s());

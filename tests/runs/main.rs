@@ -26,6 +26,7 @@
 //! - [`rights`]: rights that a run lacks are named
 //! - [`skipped`]: tests that cannot run here
 //! - [`sensors`]: sensors read what they should, and hand over what is under way
+//! - [`surroundings`]: hosts that lack something
 //! - [`untrusted`]: names and contents of files that others made
 //! - [`replay`]: the measured flight
 //! - [`validate`]: measured commands flown by vehicles side by side
@@ -70,6 +71,7 @@ mod sensors;
 mod skipped;
 #[allow(dead_code, reason = "shared with tests/faults")]
 mod support;
+mod surroundings;
 mod swap;
 mod terminal;
 mod untrusted;

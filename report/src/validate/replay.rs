@@ -142,13 +142,16 @@ fn manifest(ticks: u32, columns: &str, initial: [f64; 4], vehicles: &[&Path]) ->
         .set("process.player.parameters.columns", columns.parse::<toml::Table>()?)
         .set("process.recorder.kind", "recorder");
     for (number, vehicle) in vehicles.iter().enumerate() {
-        let vehicle = std::path::absolute(vehicle)?.display().to_string();
+        let path = std::path::absolute(vehicle)?;
+        let vehicle = path.to_str().with_context(|| {
+            format!("the path {} is not UTF-8: move the file into a folder whose name is", path.display())
+        })?;
         for horizon_ms in HORIZONS_MS {
             let plant = format!("process.{}", plant(number, horizon_ms));
             let command = format!("{plant}.inputs.command");
             manifest = manifest
                 .set(&format!("{plant}.kind"), "plant")
-                .set(&format!("{plant}.vehicle"), vehicle.as_str())
+                .set(&format!("{plant}.vehicle"), vehicle)
                 .set(&format!("{plant}.parameters.window_s"), f64::from(horizon_ms) * 1e-3)
                 .set(&format!("{command}.topic"), "/player/command")
                 .set(&format!("{command}.delay_ticks"), 1)

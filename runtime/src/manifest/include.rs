@@ -12,6 +12,8 @@ use toml::de::{DeArray, DeTable, DeValue};
 
 /// The key that names the files to include.
 const KEY: &str = "include";
+/// Files that stand within one another at most: each takes a part of the stack.
+const DEPTH_MAX: usize = 64;
 /// Lists at the top level, to which each file adds.
 pub const LISTS: [&str; 6] = ["compare", "measure", "pass", "shadow", "swap", "vehicle"];
 
@@ -72,6 +74,10 @@ impl Reader {
         }
         if self.read.contains(&identity) {
             return Ok(());
+        }
+        if self.open.len() == DEPTH_MAX {
+            let message = format!("includes stand more than {DEPTH_MAX} files deep, with {}", path.display());
+            return Err(at(message, "include the files side by side in one of them"));
         }
         let text = InputFiles::default().text(&path).map_err(|error| {
             let message = format!("the included file {} cannot be read: {error}", path.display());

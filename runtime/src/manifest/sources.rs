@@ -151,10 +151,16 @@ impl Sources {
         Ok(self.folder(written.span().start).join(expanded))
     }
 
-    /// The same, from the root on.
+    /// The same, from the root on; the processes of a run are given it as text.
     pub fn resolve(&self, written: &Spanned<String>) -> Result<PathBuf, Diagnostic> {
         let path = self.path(written)?;
-        Ok(std::path::absolute(&path).unwrap_or(path))
+        let path = std::path::absolute(&path).unwrap_or(path);
+        if path.to_str().is_none() {
+            let message = format!("the path {} is not UTF-8", path.display());
+            let help = "move the files into a folder whose name is UTF-8: processes are given paths as text";
+            return Err(self.problem(&written.span(), message, help));
+        }
+        Ok(path)
     }
 
     /// The folder at which a relative path written at `offset` starts.
