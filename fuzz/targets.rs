@@ -17,7 +17,7 @@ use vehicles::Vehicle;
 pub type Target = fn(&[u8]) -> bool;
 
 /// Every target by its name, which is that of its folder in `corpus/`.
-pub const TARGETS: [(&str, Target); 8] = [
+pub const TARGETS: [(&str, Target); 9] = [
     ("manifest", manifest),
     ("vehicle", vehicle),
     ("scene", scene),
@@ -25,6 +25,7 @@ pub const TARGETS: [(&str, Target); 8] = [
     ("csv", csv),
     ("ulog", ulog),
     ("crazyflie", crazyflie),
+    ("dataflash", dataflash),
     ("mcap", mcap),
 ];
 
@@ -55,6 +56,12 @@ angular_velocity = { topic = "sensor_combined", fields = ["gyro_rad[0]", "gyro_r
 battery_voltage = { topic = "battery", fields = ["cell[1].volts"], unit = "V" }
 "#;
 
+/// Fields of the seeds in ArduPilot's format.
+const DATAFLASH_CHANNELS: &str = r#"
+angular_velocity = { topic = "IMU" }
+command = { topic = "RCOU", fields = ["C1", "C2", "C3", "C4"], unit = "count" }
+"#;
+
 /// A manifest in the folder of the shipped ones.
 pub fn manifest(bytes: &[u8]) -> bool {
     let text = String::from_utf8_lossy(bytes);
@@ -63,7 +70,7 @@ pub fn manifest(bytes: &[u8]) -> bool {
     let path = repository().join("manifests/under-test.toml");
     let result = hummingbus::check_text(&text, &path, &overrides);
     let checked = said(result, "");
-    checked.is_some_and(|checked| !checked.json().is_empty() && !checked.to_string().is_empty())
+    checked.is_some_and(|checked| checked.json().is_object() && !checked.to_string().is_empty())
 }
 
 /// A vehicle file; one that is accepted is put into the hover.
@@ -116,6 +123,12 @@ pub fn crazyflie(bytes: &[u8]) -> bool {
         }
     }
     as_it_is
+}
+
+/// A log of ArduPilot.
+pub fn dataflash(bytes: &[u8]) -> bool {
+    let place = Place::with("log", bytes);
+    place.reads_log("dataflash", "") | place.reads_log("dataflash", DATAFLASH_CHANNELS)
 }
 
 /// A recording of hummingbus or a bag of ROS 2.

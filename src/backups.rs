@@ -16,7 +16,7 @@ fn hover() -> (Manifest, Graph) {
 fn a_backup_in_a_live_run_differs_in_what_is_asked_for() {
     let (manifest, graph) = hover();
     let with = "parameters.gains.altitude_integral_max_m_s2 = 1.5";
-    let backup = backup_of(&manifest, &graph.plan, "controller", with).unwrap();
+    let backup = backup_of(&manifest, &graph.plan, &graph.files, "controller", with).unwrap();
     let node = &graph.plan.nodes[backup.node];
     assert_eq!((node.name.as_str(), backup.take_over_tick, backup.is_standby), ("controller", None, false));
     assert_eq!(backup.plan.parameters["gains"]["altitude_integral_max_m_s2"], 1.5);
@@ -30,7 +30,7 @@ fn a_backup_in_a_live_run_differs_in_what_is_asked_for() {
 fn a_backup_in_a_live_run_that_cannot_be_is_refused_with_its_place() {
     let (manifest, graph) = hover();
     let refused = |process: &str, with: &str| {
-        backup_of(&manifest, &graph.plan, process, with).map(|_| ()).unwrap_err().to_string()
+        backup_of(&manifest, &graph.plan, &graph.files, process, with).map(|_| ()).unwrap_err().to_string()
     };
     let message = refused("contorller", "");
     assert!(message.starts_with("--with:1:1: there is no process `contorller`"), "{message}");

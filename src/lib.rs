@@ -29,6 +29,7 @@
 //! | [`report`] | verdicts, figures and pages from recordings |
 //! | [`plant`], [`sensors`], [`controllers`] | the components that this package brings |
 //! | [`vehicles`], [`scenes`] | files that describe what flies, and where |
+//! | [`inputs`] | files that are read once, for a run or a fit |
 //! | [`flights`], [`identify`] | measured flights, and what they show that a vehicle file lacks |
 #![forbid(unsafe_code)]
 
@@ -41,7 +42,7 @@ mod extremes;
 #[cfg(test)]
 mod properties;
 
-pub use check::{check, check_text};
+pub use check::{check, check_text, meshes};
 pub use components::COMPONENTS;
 pub use diagnostics::Diagnostic;
 pub use runtime::ctl::Remote;
@@ -51,7 +52,9 @@ pub use runtime::graph::Graph;
 pub use runtime::host::Host;
 pub use runtime::launcher::{Launcher, Outcome};
 pub use runtime::manifest::{Manifest, ManifestBuilder};
-pub use {bus, controllers, flights, identify, plant, recorder, report, runtime, scenes, sensors, vehicles};
+pub use {
+    bus, controllers, flights, identify, inputs, plant, recorder, report, runtime, scenes, sensors, vehicles,
+};
 
 use std::path::Path;
 

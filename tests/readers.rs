@@ -12,6 +12,8 @@ mod laps;
 mod plot;
 #[path = "readers/profile.rs"]
 mod profile;
+#[path = "runs/skipped.rs"]
+mod skipped;
 #[path = "readers/urdf.rs"]
 mod urdf;
 #[path = "readers/world.rs"]
@@ -22,7 +24,7 @@ use std::fs;
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
-use std::sync::{Arc, Mutex, Once, Weak};
+use std::sync::{Arc, Mutex, Weak};
 use tempfile::TempDir;
 
 const HUMMINGBUS: &str = env!("CARGO_BIN_EXE_hummingbus");
@@ -84,17 +86,9 @@ fn one_bit_more(number: &mut serde_json::Value) {
 
 /// The folder of the readers; absent only where a person runs `cargo test` by itself.
 fn readers() -> Option<PathBuf> {
-    static NOTICE: Once = Once::new();
-    let readers = std::env::var_os("HUMMINGBUS_READERS").map(PathBuf::from);
-    if readers.is_none() {
-        assert!(std::env::var_os("CI").is_none(), "HUMMINGBUS_READERS is not set, scripts/test sets it up");
-        NOTICE.call_once(|| {
-            let notice = "skipped: HUMMINGBUS_READERS is not set, scripts/test sets it up";
-            // Not `eprintln!`, which the test runner hides.
-            let _ = writeln!(std::io::stderr(), "{notice}");
-        });
-    }
-    readers
+    let readers = skipped::variable_or_skip("HUMMINGBUS_READERS", "which scripts/test sets up");
+    assert!(readers.is_some() || std::env::var_os("CI").is_none(), "HUMMINGBUS_READERS is not set");
+    readers.map(PathBuf::from)
 }
 
 /// A recording and what hummingbus's own reader finds in it.

@@ -1,6 +1,7 @@
 //! What a component is told of its run when it is made, and of the tick when it steps.
 
 use crate::ports::{InputSamples, OutputPorts, SampleSource};
+use inputs::InputFiles;
 use std::cell::RefCell;
 
 /// What a component may know of its node and the run, and where it leaves its warnings.
@@ -31,6 +32,8 @@ pub struct NodeContext<'a> {
     pub period_ticks: u32,
     /// Length of the run.
     pub duration_ticks: u32,
+    /// Files of the run: a component reads the files that its parameters name with these, and with nothing else.
+    pub files: InputFiles,
     warnings: RefCell<Vec<Warning>>,
 }
 
@@ -66,12 +69,13 @@ pub struct Warning {
 
 impl<'a> NodeContext<'a> {
     /// The node `name` with these `inputs`, in a run with seed 1 that lasts an hour: it computes at 1 kHz, once a tick.
+    /// It reads files from the disk.
     #[must_use]
     pub fn new(name: &'a str, inputs: &'a [&'a str]) -> Self {
         let (seed, tick_ns, period_ticks, duration_ticks) = (1, 1_000_000, 1, 3_600_000);
         let (outputs, warnings) = (&[] as &[_], RefCell::default());
-        let messages = &[] as &[_];
-        Self { name, seed, inputs, outputs, messages, tick_ns, period_ticks, duration_ticks, warnings }
+        let (messages, files) = (&[] as &[_], InputFiles::default());
+        Self { name, seed, inputs, outputs, messages, tick_ns, period_ticks, duration_ticks, files, warnings }
     }
 
     /// The same node where the manifest names these `outputs`.
@@ -96,6 +100,12 @@ impl<'a> NodeContext<'a> {
     #[must_use]
     pub fn seeded(self, seed: u64) -> Self {
         Self { seed, ..self }
+    }
+
+    /// The same node where the files that it reads are `files`.
+    #[must_use]
+    pub fn given(self, files: &InputFiles) -> Self {
+        Self { files: files.clone(), ..self }
     }
 
     /// Whether an input is wired, or an output named.

@@ -56,6 +56,9 @@ mod run_process;
 mod sample_memory;
 pub mod schema;
 mod shared_file;
+#[cfg(test)]
+#[path = "../../tests/runs/skipped.rs"]
+mod skipped;
 #[doc(hidden)]
 pub mod state_transfer;
 #[doc(hidden)]
@@ -72,6 +75,7 @@ pub use diagnostics::ParameterError;
 pub use error::BusError;
 pub use handles::{Input, Output};
 pub use harness::Harness;
+pub use inputs::InputFiles;
 pub use join::{GENERATION_VARIABLE, Join, NODE_VARIABLE};
 pub use message::Message;
 pub use node::Node;

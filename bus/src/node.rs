@@ -18,6 +18,7 @@ use crate::registration::{Registration, message_of};
 use crate::schema::Schema;
 use crate::tick::Tick;
 use crate::transport::Transport;
+use inputs::InputFiles;
 use serde::de::DeserializeOwned;
 use std::fmt::Display;
 use std::path::PathBuf;
@@ -107,6 +108,12 @@ impl Node {
     /// If they do not fit `P`; the error names the key.
     pub fn parameters<P: DeserializeOwned>(&self) -> Result<P, BusError> {
         diagnostics::read(&self.node.parameters).map_err(|error| self.error(format!("parameters: {error}")))
+    }
+
+    /// The files that the manifest names for the node, with the bytes that they had when the run began.
+    #[must_use]
+    pub fn files(&self) -> InputFiles {
+        InputFiles::stored(&self.run_dir.join(Plan::INPUTS), &self.node.files)
     }
 
     /// The plan of the run, and the node's part in it.

@@ -12,6 +12,7 @@ use crate::registration::{Registration, Stepper, message_of};
 use crate::sample_memory::SampleMemory;
 use crate::schema::Schema;
 use diagnostics::ParameterError;
+use inputs::InputFiles;
 
 /// A node of a plan, stepped without a run.
 ///
@@ -55,7 +56,7 @@ impl NodeHarness {
         node: usize,
     ) -> Result<Self, ParameterError> {
         let node = &plan.nodes[node];
-        let mut made = component.make_for(plan, node)?;
+        let mut made = component.make_for(plan, node, &InputFiles::default())?;
         let wire = |name: &str, schema: &'static Schema, is_forwarded: bool| {
             let output = node.outputs.iter().find(|output| output.port == name);
             let topic = output.map(|output| (output.topic, plan.topics[output.topic].period_ticks));

@@ -3,6 +3,7 @@
 use crate::computing_time::ComputingTime;
 use crate::error::BusError;
 use crate::json_file;
+use inputs::InputFile;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
@@ -98,6 +99,9 @@ pub struct NodePlan {
     pub outputs: Vec<OutputPlan>,
     /// The node's own parameters.
     pub parameters: serde_json::Value,
+    /// Files that the node reads: their copies lie in [`Plan::INPUTS`].
+    #[serde(default)]
+    pub files: Vec<InputFile>,
     /// Whether another process is started in its place when it dies: its publishers then keep enough history.
     #[serde(default)]
     pub restarts: bool,
@@ -168,6 +172,8 @@ pub fn backup_path(run_dir: &Path, node: usize, generation: u32) -> PathBuf {
 impl Plan {
     /// The name of the plan's file in the run directory.
     pub const FILE: &'static str = "plan.json";
+    /// The name of the folder in the run directory with the files that the run reads, each under its SHA-256.
+    pub const INPUTS: &'static str = "inputs";
 
     /// Reads the plan of the run in `run_dir`.
     ///
@@ -271,7 +277,18 @@ impl NodePlan {
         let (wait, parameters) = (Wait::Block, serde_json::Value::Null);
         let (name, restarts) = (name.to_owned(), false);
         let computing_time = None;
-        Self { name, period_ticks: 1, wait, cpu: None, inputs, outputs, parameters, restarts, computing_time }
+        Self {
+            name,
+            period_ticks: 1,
+            wait,
+            cpu: None,
+            inputs,
+            outputs,
+            parameters,
+            files: Vec::new(),
+            restarts,
+            computing_time,
+        }
     }
 }
 

@@ -8,6 +8,7 @@ use crate::plan::{NodePlan, Plan};
 use crate::ports::{InputPorts, InputSamples, Inputs, OutputPorts, OutputSamples, PortSpec};
 use crate::schema::Schema;
 use diagnostics::ParameterError;
+use inputs::InputFiles;
 use serde_json::Value;
 
 /// A component in a table of components: all that a launcher must know of it.
@@ -64,14 +65,20 @@ impl Registration {
         (self.check)(parameters, context)
     }
 
-    /// The component, made for `node` of `plan`.
-    pub(crate) fn make_for(&self, plan: &Plan, node: &NodePlan) -> Result<Box<dyn Stepper>, ParameterError> {
+    /// The component, made for `node` of `plan` from the run's `files`.
+    pub(crate) fn make_for(
+        &self,
+        plan: &Plan,
+        node: &NodePlan,
+        files: &InputFiles,
+    ) -> Result<Box<dyn Stepper>, ParameterError> {
         let inputs: Vec<&str> = node.inputs.iter().map(|input| input.port.as_str()).collect();
         let outputs: Vec<&str> = node.outputs.iter().map(|output| output.port.as_str()).collect();
         let context = NodeContext::new(&node.name, &inputs)
             .naming(&outputs)
             .timed(plan.tick_ns, node.period_ticks, plan.duration_ticks)
-            .seeded(plan.seed);
+            .seeded(plan.seed)
+            .given(files);
         (self.make)(&node.parameters, &context)
     }
 

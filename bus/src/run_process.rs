@@ -32,7 +32,8 @@ impl Registration {
         let mut node = Node::open(join)?;
         let wiring = node.declare(self, components)?;
         let (plan, node_plan) = node.plan();
-        let mut component = self.make_for(plan, node_plan).map_err(|reason| node.error(reason))?;
+        let mut component =
+            self.make_for(plan, node_plan, &node.files()).map_err(|reason| node.error(reason))?;
         let name = node.name().to_owned();
         let failed =
             |error: StepError| BusError::Parameters { node: name.clone(), reason: error.to_string() };

@@ -2,6 +2,7 @@
 
 use crate::allocation::{Allocation, AllocationError, THRUST_RESERVE};
 use diagnostics::ParameterError;
+use inputs::InputFiles;
 use nalgebra::Vector3;
 use std::path::Path;
 use vehicles::Vehicle;
@@ -25,12 +26,13 @@ pub struct ControlledVehicle {
 }
 
 impl ControlledVehicle {
-    /// The vehicle of the file at `path`.
+    /// The vehicle of the file at `path` among `files`.
     ///
     /// # Errors
     /// The file is refused, or four such rotors cannot be allocated to.
-    pub fn load(path: &Path) -> Result<Self, ParameterError> {
-        let vehicle = Vehicle::load(path).map_err(|error| ParameterError::conflict("vehicle", error))?;
+    pub fn load(files: &InputFiles, path: &Path) -> Result<Self, ParameterError> {
+        let vehicle = Vehicle::load_from(files, path);
+        let vehicle = vehicle.map_err(|error| ParameterError::conflict("vehicle", error))?;
         Self::new(vehicle).map_err(|error| ParameterError::conflict("vehicle", error))
     }
 

@@ -48,7 +48,7 @@ pub enum AllocationError {
 /// use nalgebra::Vector3;
 ///
 /// let vehicle = concat!(env!("CARGO_MANIFEST_DIR"), "/../vehicles/hummingbird.toml");
-/// let allocation = ControlledVehicle::load(vehicle.as_ref()).unwrap().allocation;
+/// let allocation = ControlledVehicle::load(&inputs::InputFiles::default(), vehicle.as_ref()).unwrap().allocation;
 /// let asked = RotorWrench { thrust_N: 4.7, torque_B_N_m: Vector3::new(0.02, 0.0, 0.0) };
 /// let allocated = allocation.allocate(&asked);
 /// assert!((allocated.wrench.torque_B_N_m.x - 0.02).abs() < 1e-9 && !allocated.is_saturated());

@@ -79,7 +79,7 @@ impl Law for CascadeLaw {
     }
 
     fn new(parameters: &Self::Parameters, context: &LawContext<'_>) -> Result<Self, ParameterError> {
-        let gains = CascadeGains::load(parameters.gains.as_deref())?;
+        let gains = CascadeGains::load(&context.node.files, parameters.gains.as_deref())?;
         Ok(Self { gains, vehicle: context.craft.hover_model(), period_s: context.node.period_s() })
     }
 

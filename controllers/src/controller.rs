@@ -54,7 +54,7 @@ impl<L: Law> Component for Controller<L> {
     type State = ControllerState;
 
     fn new(parameters: L::Parameters, context: &NodeContext<'_>) -> Result<Self, ParameterError> {
-        let craft = ControlledVehicle::load(L::vehicle(&parameters))?;
+        let craft = ControlledVehicle::load(&context.files, L::vehicle(&parameters))?;
         let law = L::new(&parameters, &LawContext { craft: &craft, node: context })?;
         let transfer = BumplessTransfer::to::<L>(&craft.vehicle, context.period_s());
         Ok(Self { law, craft, transfer })

@@ -2,6 +2,7 @@
 
 use diagnostics::ParameterError;
 use diagnostics::unit::{COUNT, Dimension, LENGTH, PURE_NUMBER, SPEED, TIME, VELOCITY};
+use inputs::InputFiles;
 use serde::Deserialize;
 use std::fmt::Display;
 use std::path::Path;
@@ -73,12 +74,12 @@ pub struct FlightLog {
 }
 
 impl FlightLog {
-    /// Reads the flight at `path`, the parameter `data`.
+    /// Reads the flight at `path` among `files`, the parameter `data`.
     ///
     /// # Errors
     /// If the file, a column or a unit is missing, or a cell is not a number.
-    pub fn load(path: &Path, map: &ColumnMap) -> Result<Self, ParameterError> {
-        let bytes = vehicles::text::read_log(path).map_err(|cause| {
+    pub fn load(files: &InputFiles, path: &Path, map: &ColumnMap) -> Result<Self, ParameterError> {
+        let bytes = files.bytes(path).map_err(|cause| {
             let hint = "Give its path with --set process.<player>.data=PATH";
             refused(path, format_args!(" cannot be read: {cause}. {hint}"))
         })?;

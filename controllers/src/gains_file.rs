@@ -8,6 +8,7 @@ use diagnostics::ParameterError;
 use diagnostics::parameter::Bounds;
 use diagnostics::unit::{ANGLE, Dimension, SPEED};
 use diagnostics::{Diagnostic, Faults};
+use inputs::InputFiles;
 use std::cell::RefCell;
 use std::collections::BTreeMap;
 use std::f64::consts::FRAC_PI_3;
@@ -31,12 +32,16 @@ macro_rules! gains {
             /// The text of the file that is built in.
             pub(crate) const BUILT_IN: &str = include_str!(concat!("../gains/", $file));
 
-            /// The gains in the file at `path`, or those built in.
+            /// The gains in the file at `path` among `files`, or those built in.
             ///
             /// # Errors
             /// The file cannot be read, or holds what no gains can be; all its faults.
-            pub fn load(path: Option<&std::path::Path>) -> Result<Self, diagnostics::ParameterError> {
-                path.map_or_else(|| Ok(Self::default()), |path| $crate::gains_file::load(path, Self::read))
+            pub fn load(
+                files: &inputs::InputFiles,
+                path: Option<&std::path::Path>,
+            ) -> Result<Self, diagnostics::ParameterError> {
+                let load = |path| $crate::gains_file::load(files, path, Self::read);
+                path.map_or_else(|| Ok(Self::default()), load)
             }
         }
 
@@ -70,13 +75,13 @@ macro_rules! gains {
 /// What makes gains of a file's root table.
 pub(crate) type Reader<G> = fn(&Table<'_, '_>) -> G;
 
-/// The gains in the file at `path`, the manifest's parameter `gains`.
+/// The gains in the file at `path` among `files`, the manifest's parameter `gains`.
 ///
 /// # Errors
 /// The file cannot be read, or holds what no gains can be; all its faults.
-pub(crate) fn load<G>(path: &Path, read: Reader<G>) -> Result<G, ParameterError> {
+pub(crate) fn load<G>(files: &InputFiles, path: &Path, read: Reader<G>) -> Result<G, ParameterError> {
     let file = path.display().to_string();
-    let text = vehicles::text::read(path);
+    let text = files.text(path);
     let unreadable = |cause| Diagnostic::unreadable(&file, &cause);
     let gains = text.map_err(unreadable).and_then(|text| parse(&text, &file, read));
     gains.map_err(|error| ParameterError::conflict("gains", error))

@@ -169,7 +169,7 @@ impl Law for GeometricLaw {
     }
 
     fn new(parameters: &Self::Parameters, context: &LawContext<'_>) -> Result<Self, ParameterError> {
-        let gains = GeometricGains::load(parameters.gains.as_deref())?;
+        let gains = GeometricGains::load(&context.node.files, parameters.gains.as_deref())?;
         Ok(Self::for_craft(gains, context.craft, context.node.period_s()))
     }
 

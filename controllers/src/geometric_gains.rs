@@ -46,7 +46,7 @@ mod tests {
 
     #[test]
     fn the_built_in_file_is_read_in_si() {
-        let gains = GeometricGains::load(None).unwrap();
+        let gains = GeometricGains::load(&inputs::InputFiles::default(), None).unwrap();
         assert_eq!(gains.position_proportional_1_s2, 9.0);
         assert_eq!(gains.motor.natural_frequency_rad_s, 50.0);
     }

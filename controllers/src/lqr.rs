@@ -159,7 +159,7 @@ impl Law for LqrLaw {
     }
 
     fn new(parameters: &Self::Parameters, context: &LawContext<'_>) -> Result<Self, ParameterError> {
-        let gains = LqrGains::load(parameters.gains.as_deref())?;
+        let gains = LqrGains::load(&context.node.files, parameters.gains.as_deref())?;
         Self::for_craft(gains, context.craft, context.node.period_s())
     }
 

@@ -42,7 +42,7 @@ mod tests {
 
     #[test]
     fn the_built_in_file_is_read_in_si() {
-        let gains = LqrGains::load(None).unwrap();
+        let gains = LqrGains::load(&inputs::InputFiles::default(), None).unwrap();
         assert_eq!((gains.position_m, gains.tilt_rad), (0.15, 10.0_f64.to_radians()));
     }
 

@@ -26,7 +26,7 @@ use std::path::{Path, PathBuf};
 /// use controllers::{pid::PidLaw, pid_gains::PidGains, set_points::SetPoint};
 ///
 /// let vehicle = concat!(env!("CARGO_MANIFEST_DIR"), "/../vehicles/hummingbird.toml");
-/// let craft = ControlledVehicle::load(vehicle.as_ref()).unwrap();
+/// let craft = ControlledVehicle::load(&inputs::InputFiles::default(), vehicle.as_ref()).unwrap();
 /// let law = PidLaw { gains: PidGains::default(), vehicle: craft.hover_model(), period_s: 1e-3 };
 /// let asked = SetPoint { yaw_rad: 0.1, ..SetPoint::default() };
 /// let wrench = law.wrench(&mut Integrals::default(), &asked, &HoverMotion::of(&MotionEstimate::default()));
@@ -73,7 +73,7 @@ impl Law for PidLaw {
     }
 
     fn new(parameters: &Self::Parameters, context: &LawContext<'_>) -> Result<Self, ParameterError> {
-        let gains = PidGains::given(parameters.gains.as_ref())?;
+        let gains = PidGains::given(&context.node.files, parameters.gains.as_ref())?;
         Ok(Self { gains, vehicle: context.craft.hover_model(), period_s: context.node.period_s() })
     }
 

@@ -30,6 +30,7 @@ use crate::altitude_loop::{AltitudeGains, LoopGains};
 use crate::gains_file::{self, GAIN};
 use diagnostics::parameter::{ParameterError, require};
 use diagnostics::unit::{ACCELERATION, ANGULAR_ACCELERATION, VELOCITY};
+use inputs::InputFiles;
 use serde::Deserialize;
 use serde_json::Value;
 
@@ -79,10 +80,10 @@ impl PidGains {
     ///
     /// # Errors
     /// The file or a number is refused; the text names the key.
-    pub(crate) fn given(given: Option<&Value>) -> Result<Self, ParameterError> {
+    pub(crate) fn given(files: &InputFiles, given: Option<&Value>) -> Result<Self, ParameterError> {
         match given {
             None => Ok(Self::default()),
-            Some(Value::String(path)) => Self::load(Some(path.as_ref())),
+            Some(Value::String(path)) => Self::load(files, Some(path.as_ref())),
             Some(table) => {
                 let gains = diagnostics::read(table).and_then(|gains: Self| gains.check().map(|()| gains));
                 gains.map_err(|error| error.within("gains"))
@@ -151,7 +152,7 @@ mod tests {
         assert!(error.contains("\"rad\", \"deg\""), "{error}");
         let table = |text| {
             let table: Value = toml::from_str(text).unwrap();
-            PidGains::given(Some(&table)).unwrap_err().to_string()
+            PidGains::given(&InputFiles::default(), Some(&table)).unwrap_err().to_string()
         };
         let error = table("yaw = { proportional_1_s2 = 1, integral_1_s3 = -1, derivative_1_s = 1 }");
         assert!(error.contains("`gains.yaw.integral_1_s3`") && error.contains("found -1"), "{error}");
@@ -160,7 +161,8 @@ mod tests {
 
     #[test]
     fn a_table_or_a_path_is_taken_and_nothing_else() {
-        let given = |json| PidGains::given(Some(&serde_json::from_str(json).unwrap()));
+        let given =
+            |json| PidGains::given(&InputFiles::default(), Some(&serde_json::from_str(json).unwrap()));
         let thesis = concat!("\"", env!("CARGO_MANIFEST_DIR"), "/gains/pid-thesis.toml\"");
         assert_eq!((given(thesis), given("{}")), (Ok(PidGains::thesis()), Ok(PidGains::default())));
         let error = given("3").unwrap_err().to_string();

@@ -82,7 +82,8 @@ impl Component for Pilot {
         })?;
         let initial = Values { altitude_m, ..Values::default() };
         let schedule = Schedule::new(&parameters.set_points, &initial, context.rate_hz())?;
-        let sticks = parameters.data.as_deref().map(Sticks::load).transpose()?;
+        let load = |path| Sticks::load(&context.files, path);
+        let sticks = parameters.data.as_deref().map(load).transpose()?;
         let taken = |entry: &&SetPointEntry| sticks.as_ref().is_some_and(|it| it.has(&entry.channel));
         if let Some(SetPointEntry { channel, .. }) = parameters.set_points.iter().find(taken) {
             let message = format!(

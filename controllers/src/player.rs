@@ -6,6 +6,7 @@ use bus::component::{Component, Info, StepError};
 use bus::context::{NodeContext, StepContext};
 use bus::messages::{MeasuredState, MotorCommand, Quaternion};
 use diagnostics::parameter::{ParameterError, refuse};
+use inputs::InputFiles;
 use serde::Deserialize;
 use std::path::PathBuf;
 
@@ -36,8 +37,8 @@ enum Gaps {
     Hold,
 }
 
-fn load(parameters: &Parameters) -> Result<FlightLog, ParameterError> {
-    let log = FlightLog::load(&parameters.data, &parameters.columns)?;
+fn load(parameters: &Parameters, files: &InputFiles) -> Result<FlightLog, ParameterError> {
+    let log = FlightLog::load(files, &parameters.data, &parameters.columns)?;
     let (from_s, length_s) = (parameters.from_s, log.duration_s());
     refuse(!(0.0..length_s).contains(&from_s), "from_s", || {
         format!("`from_s` is {from_s} s, the flight lasts {length_s:.3} s")
@@ -106,8 +107,8 @@ impl Component for Player {
     type Outputs = Outputs;
     type State = ();
 
-    fn new(parameters: Parameters, _: &NodeContext<'_>) -> Result<Self, ParameterError> {
-        let log = load(&parameters)?;
+    fn new(parameters: Parameters, context: &NodeContext<'_>) -> Result<Self, ParameterError> {
+        let log = load(&parameters, &context.files)?;
         Ok(Self { log, from_s: parameters.from_s, gaps: parameters.gaps, hint: 0 })
     }
 

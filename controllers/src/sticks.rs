@@ -13,6 +13,7 @@
 use crate::angle::wrap_rad;
 use crate::set_points::SetPoint;
 use diagnostics::ParameterError;
+use inputs::InputFiles;
 use std::fmt::Display;
 use std::path::Path;
 
@@ -22,7 +23,7 @@ use std::path::Path;
 /// use controllers::{set_points::SetPoint, sticks::Sticks};
 ///
 /// let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../manifests/sticks/roll.csv");
-/// let sticks = Sticks::load(path.as_ref()).unwrap();
+/// let sticks = Sticks::load(&inputs::InputFiles::default(), path.as_ref()).unwrap();
 /// let beside = SetPoint { altitude_m: 1.5, ..SetPoint::default() };
 /// assert!(sticks.has("roll") && !sticks.has("altitude"));
 /// assert_eq!(sticks.at(0.0, &beside).altitude_m, 1.5, "the recording does not say");
@@ -67,13 +68,13 @@ const MOST: [(f64, &str); 5] = [
 const EXPECTED: &str = "time_s, roll_deg, pitch_deg and, if recorded, yaw_rate_deg_s, altitude_m";
 
 impl Sticks {
-    /// The recording at `path`, the parameter `data`.
+    /// The recording at `path` among `files`, the parameter `data`.
     ///
     /// # Errors
     /// It cannot be read, or holds what no sticks can ask for.
-    pub fn load(path: &Path) -> Result<Self, ParameterError> {
+    pub fn load(files: &InputFiles, path: &Path) -> Result<Self, ParameterError> {
         let file = path.display().to_string();
-        let bytes = vehicles::text::read_log(path).map_err(|cause| unreadable(&file, &cause.into()))?;
+        let bytes = files.bytes(path).map_err(|cause| unreadable(&file, &cause.into()))?;
         Self::read(&file, &bytes)
     }
 
@@ -262,7 +263,7 @@ mod tests {
             let error = sticks(&text).unwrap_err().to_string();
             assert!(error.contains(expected), "{error}");
         }
-        let error = Sticks::load(Path::new("no-such.csv")).unwrap_err().to_string();
+        let error = Sticks::load(&InputFiles::default(), Path::new("no-such.csv")).unwrap_err().to_string();
         assert!(error.contains("no-such.csv") && error.contains("check the path"), "{error}");
     }
 }

@@ -235,7 +235,7 @@ impl Law for WallFollowLaw {
 
     fn new(parameters: &Self::Parameters, context: &LawContext<'_>) -> Result<Self, ParameterError> {
         parameters.check()?;
-        let gains = WallFollowGains::load(parameters.gains.as_deref())?;
+        let gains = WallFollowGains::load(&context.node.files, parameters.gains.as_deref())?;
         let nominal_m_s =
             if parameters.mode == Mode::Varying { VARYING_SPEED_M_S } else { CONSTANT_SPEED_M_S };
         Ok(Self {

@@ -187,7 +187,7 @@ impl Law for WallFollowThesisLaw {
         positive_up_to("distance_m", parameters.distance_m, DISTANCE_MAX_M, "m")?;
         let start_state = parameters.start_state;
         require("start_state", start_state, (1..=5).contains(&start_state), "1 to 5")?;
-        let gains = WallFollowThesisGains::load(parameters.gains.as_deref())?;
+        let gains = WallFollowThesisGains::load(&context.node.files, parameters.gains.as_deref())?;
         Ok(Self {
             velocity: VelocityLoop::new(&gains.loops, context.craft.hover_model(), context.node.period_s()),
             gains,

@@ -160,7 +160,7 @@ impl Law for WallStopLaw {
         finite("heading_rad", parameters.heading_rad)?;
         positive_up_to("cruise_speed_m_s", parameters.cruise_speed_m_s, SPEED_MAX_M_S, "m/s")?;
         positive_up_to("distance_m", parameters.distance_m, DISTANCE_MAX_M, "m")?;
-        let gains = WallStopGains::load(parameters.gains.as_deref())?;
+        let gains = WallStopGains::load(&context.node.files, parameters.gains.as_deref())?;
         Ok(Self {
             velocity: VelocityLoop::new(&gains.loops, context.craft.hover_model(), context.node.period_s()),
             gains,

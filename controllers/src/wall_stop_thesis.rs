@@ -142,7 +142,7 @@ impl Law for WallStopThesisLaw {
         finite("heading_rad", parameters.heading_rad)?;
         positive_up_to("pitch_deg", parameters.pitch_deg, PITCH_MAX_DEG, "deg")?;
         positive_up_to("distance_m", parameters.distance_m, DISTANCE_MAX_M, "m")?;
-        let gains = WallStopThesisGains::load(parameters.gains.as_deref())?;
+        let gains = WallStopThesisGains::load(&context.node.files, parameters.gains.as_deref())?;
         Ok(Self {
             velocity: VelocityLoop::new(&gains.loops, context.craft.hover_model(), context.node.period_s()),
             gains,

@@ -180,11 +180,16 @@ fn a_take_over_amid_a_doublet_does_not_jump_either_and_fades_out() {
 }
 
 fn lqr() -> LqrLaw {
-    LqrLaw::for_craft(LqrGains::load(None).unwrap(), &believed(), PERIOD_S).unwrap()
+    LqrLaw::for_craft(LqrGains::load(&inputs::InputFiles::default(), None).unwrap(), &believed(), PERIOD_S)
+        .unwrap()
 }
 
 fn geometric() -> GeometricLaw {
-    GeometricLaw::for_craft(GeometricGains::load(None).unwrap(), &believed(), PERIOD_S)
+    GeometricLaw::for_craft(
+        GeometricGains::load(&inputs::InputFiles::default(), None).unwrap(),
+        &believed(),
+        PERIOD_S,
+    )
 }
 
 /// `after` stays near and comes to hover again, although `before` left a state in which `go_mad` was at work.

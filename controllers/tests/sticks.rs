@@ -21,7 +21,7 @@ fn path(channel: &str) -> PathBuf {
 }
 
 fn stored(channel: &str) -> Sticks {
-    Sticks::load(&path(channel)).unwrap()
+    Sticks::load(&inputs::InputFiles::default(), &path(channel)).unwrap()
 }
 
 fn stick_deg(sticks: &Sticks, channel: &str, time_s: f64) -> f64 {

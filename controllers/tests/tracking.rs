@@ -26,11 +26,16 @@ const SLALOM: &str = r#"{ kind = "hover", duration_s = 1.0 },
       waypoints_m = [[1.5, 1.0, 1.5], [3.0, -1.0, 2.0], [4.5, 1.0, 1.5], [6.0, 0.0, 1.0]] }"#;
 
 fn geometric() -> GeometricLaw {
-    GeometricLaw::for_craft(GeometricGains::load(None).unwrap(), &believed(), PERIOD_S)
+    GeometricLaw::for_craft(
+        GeometricGains::load(&inputs::InputFiles::default(), None).unwrap(),
+        &believed(),
+        PERIOD_S,
+    )
 }
 
 fn lqr() -> LqrLaw {
-    LqrLaw::for_craft(LqrGains::load(None).unwrap(), &believed(), PERIOD_S).unwrap()
+    LqrLaw::for_craft(LqrGains::load(&inputs::InputFiles::default(), None).unwrap(), &believed(), PERIOD_S)
+        .unwrap()
 }
 
 /// Root mean square and greatest distance from the trajectory, in m, until 2 s behind its end.
@@ -59,7 +64,10 @@ fn geometric_follows_without_drag_or_noise_as_its_feed_forward_says() {
 
 #[test]
 fn geometric_with_the_drag_fed_forward_follows_closer() {
-    let gains = GeometricGains { drag_1_s: 0.28, ..GeometricGains::load(None).unwrap() };
+    let gains = GeometricGains {
+        drag_1_s: 0.28,
+        ..GeometricGains::load(&inputs::InputFiles::default(), None).unwrap()
+    };
     let knowing = GeometricLaw::for_craft(gains, &believed(), PERIOD_S);
     let (without_m, _) = distances("unknown drag", &geometric(), FIGURE_EIGHT, Craft::dragged(0));
     let (with_m, _) = distances("known drag", &knowing, FIGURE_EIGHT, Craft::dragged(0));
@@ -222,8 +230,13 @@ fn the_gain_of_the_lqr_is_the_one_that_scipy_finds() {
 fn an_lqr_without_a_solution_is_refused_with_a_reason() {
     let weightless =
         controllers::airframe::ControlledVehicle::new(Vehicle { gravity_m_s2: 0.0, ..vehicle() }).unwrap();
-    let error =
-        LqrLaw::for_craft(LqrGains::load(None).unwrap(), &weightless, PERIOD_S).unwrap_err().to_string();
+    let error = LqrLaw::for_craft(
+        LqrGains::load(&inputs::InputFiles::default(), None).unwrap(),
+        &weightless,
+        PERIOD_S,
+    )
+    .unwrap_err()
+    .to_string();
     assert!(error.contains("Riccati") && error.contains("`vehicle`"), "{error}");
 }
 

@@ -5,6 +5,7 @@
 //! | [`Diagnostic`] | what is wrong with a file: where, what was expected, what was found, what to do |
 //! | `nearest` | which of the names that there are was meant |
 //! | `place` | where something stands in a file |
+//! | `printable` | untrusted text as a terminal shows it |
 //! | [`mod@parameter`] | parameters of components: the error, and the checks that raise it |
 //! | `read` | types from JSON and TOML, whose errors carry their keys and places |
 //! | [`mod@unit`] | every unit that a file may use, with its factor to SI |
@@ -22,6 +23,7 @@ mod diagnostic;
 mod nearest;
 pub mod parameter;
 mod place;
+mod printable;
 mod read;
 pub mod unit;
 
@@ -29,5 +31,6 @@ pub use diagnostic::{Diagnostic, Faults};
 pub use nearest::{did_you_mean, nearest};
 pub use parameter::ParameterError;
 pub use place::Place;
+pub use printable::{printable, printable_json, printable_line, short_lines, shortened};
 pub use read::{Misread, parse_toml, read, read_toml, read_tree};
 pub use unit::{Dimension, convert};

@@ -4,10 +4,9 @@ use vehicles::gaps::GAP_PERIODS;
 
 use crate::error::{LogError, Spot};
 use crate::flight::{Channel, median, period_s};
+use crate::held;
 use crate::quantity::Quantity;
 
-/// Repeats are systematic, a value held on a finer grid, if this share of the distinct values is repeated.
-const HELD_SHARE: f64 = 0.1;
 /// A quaternion whose length is further from one than this is no attitude.
 const NORM_TOLERANCE: f64 = 0.1;
 
@@ -39,6 +38,32 @@ fn finite<const N: usize>(quantity: Quantity, channel: Channel<N>, notes: &mut V
     let kept = channel.kept(is_finite);
     say_dropped(quantity, &channel, &kept, "have no finite number", notes);
     kept
+}
+
+/// Leaves out samples of messages that do not hold the quantity, which their `fields` say.
+///
+/// # Errors
+/// If no message holds it.
+pub fn without_absent<const N: usize>(
+    quantity: Quantity,
+    channel: Channel<N>,
+    is_absent: &[bool],
+    fields: &str,
+    notes: &mut Vec<String>,
+) -> Result<Channel<N>, LogError> {
+    let kept = channel.kept(|index| is_absent.get(index) != Some(&true));
+    if kept.is_empty() && !channel.is_empty() {
+        let (expected, found) =
+            (format!("messages that hold it, by `{fields}`"), format!("none of {}", channel.time_s.len()));
+        return Err(LogError::unexpected(
+            Spot::Whole,
+            expected,
+            found,
+            "name another topic, or remove the channel",
+        ));
+    }
+    say_dropped(quantity, &channel, &kept, &format!("do not hold it, by `{fields}`"), notes);
+    Ok(kept)
 }
 
 /// Says how many samples were left out, and why.
@@ -92,14 +117,12 @@ fn longest_growing(times: &[f64]) -> Vec<bool> {
 /// Leaves out repeats where they are systematic. A vehicle at rest in a simulation repeats its values too, but
 /// that is one long run and not many short ones.
 fn unheld<const N: usize>(quantity: Quantity, channel: Channel<N>, notes: &mut Vec<String>) -> Channel<N> {
-    let is_new = |index: usize| index == 0 || channel.values[index] != channel.values[index - 1];
-    let starts: Vec<usize> = (0..channel.values.len()).filter(|&index| is_new(index)).collect();
-    let long = starts.windows(2).filter(|pair| pair[1] - pair[0] > 1).count();
-    let systematic = starts.len() > 2 && long as f64 >= HELD_SHARE * starts.len() as f64;
-    if !systematic {
+    if !held::is_held(&channel.values) {
         return channel;
     }
-    let kept = channel.kept(is_new);
+    let mut is_new = vec![false; channel.values.len()];
+    held::starts(&channel.values).for_each(|start| is_new[start] = true);
+    let kept = channel.kept(|index| is_new[index]);
     say_dropped(quantity, &channel, &kept, "repeat the one before (a held value)", notes);
     kept
 }

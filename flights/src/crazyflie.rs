@@ -10,13 +10,18 @@ use crate::bytes::{Cursor, Number};
 use crate::error::{LogError, Spot};
 use crate::log::{Log, Samples};
 
-/// What to do about a log that is cut or damaged.
+/// What to do about a log whose header is cut or damaged.
 const COPY_AGAIN: &str = "it is damaged or was not closed: copy the log from the card again";
+/// Records in a row that show where records begin again behind damage.
+const IN_STEP: usize = 4;
+/// Longest time between two records of a log, and back, in microseconds: beyond it there is none, but other bytes.
+const STEP_US: std::ops::RangeInclusive<i128> = -1_000_000..=600_000_000;
 
 /// A log, with the places of its records.
 pub struct CrazyflieLog {
     bytes: Vec<u8>,
     events: BTreeMap<u16, Event>,
+    notes: Vec<String>,
 }
 
 struct Event {
@@ -28,6 +33,16 @@ struct Event {
     records: Vec<(u64, usize)>,
 }
 
+/// A record, as it stands in the log.
+struct Record {
+    event: u16,
+    time_us: u64,
+    /// First byte of the variables.
+    values: usize,
+    /// The byte behind them.
+    end: usize,
+}
+
 struct Variable {
     name: String,
     number: Number,
@@ -35,24 +50,71 @@ struct Variable {
 }
 
 impl CrazyflieLog {
-    /// Checks and reads a log's bytes.
+    /// Reads a log's bytes. One that is cut or damaged is read as far as records fit, which its notes say.
     pub fn parse(bytes: Vec<u8>) -> Result<Self, LogError> {
-        check_crc(&bytes)?;
-        let end = bytes.len() - 4;
-        let mut cursor = Cursor { bytes: &bytes[..end], at: 1 };
-        let mut events = header(&mut cursor)?;
-        while cursor.at < end {
-            let from = cursor.at;
-            let cut = || LogError::unexpected(Spot::Byte(from), "a record", "one that is cut", COPY_AGAIN);
-            let id = cursor.u16().ok_or_else(cut)?;
-            let event = events.get_mut(&id).ok_or_else(|| {
-                let (expected, found) = ("an event that the header declares", format!("the event {id}"));
-                LogError::unexpected(Spot::Byte(from), expected, found, COPY_AGAIN)
-            })?;
-            let time_us = cursor.u64().ok_or_else(cut)?;
-            event.records.push((time_us, cursor.skip(event.size).ok_or_else(cut)?.start));
+        if bytes.first() != Some(&0xBC) {
+            let expected = "the byte 0xBC at its begin";
+            return Err(LogError::unexpected(Spot::Whole, expected, "no Crazyflie log", "check `format`"));
         }
-        Ok(Self { bytes, events })
+        let checked = bytes.split_last_chunk::<4>();
+        let is_whole =
+            checked.is_some_and(|(content, stored)| crc32fast::hash(content) == u32::from_le_bytes(*stored));
+        let end = if is_whole { bytes.len() - 4 } else { bytes.len() };
+        let mut cursor = Cursor { bytes: &bytes[..end], at: 1 };
+        let events = header(&mut cursor)?;
+        let start = cursor.at;
+        let mut log = Self { bytes, events, notes: Vec::new() };
+        log.read_records(start, end, is_whole);
+        Ok(log)
+    }
+
+    fn read_records(&mut self, start: usize, end: usize, is_whole: bool) {
+        let (mut at, mut last_us, mut count, mut left_out) = (start, None, 0_usize, 0);
+        while at < end {
+            if let Some(record) = self.record(at, end, last_us) {
+                at = record.end;
+                (last_us, count) = (Some(record.time_us), count + 1);
+                if let Some(event) = self.events.get_mut(&record.event) {
+                    event.records.push((record.time_us, record.values));
+                }
+                continue;
+            }
+            let next = (at + 1..end).find(|next| self.is_in_step(*next, end, last_us)).unwrap_or(end);
+            left_out += next - at;
+            at = next;
+        }
+        // Of a log that is damaged and not cut, the last four are the checksum.
+        let others = left_out - usize::from(!is_whole && left_out == 4) * 4;
+        if !is_whole {
+            self.notes.push(format!(
+                "the checksum at its end is missing or wrong: the log is cut or damaged; {count} records were read, \
+                 {others} bytes that are no record left out"
+            ));
+        } else if left_out > 0 {
+            self.notes.push(format!("{left_out} bytes of the log are no record; left out"));
+        }
+    }
+
+    /// The record at `at`, if one of a declared event fits there in front of `end`, in time behind the one before.
+    fn record(&self, at: usize, end: usize, last_us: Option<u64>) -> Option<Record> {
+        let mut cursor = Cursor { bytes: &self.bytes[..end], at };
+        let event = cursor.u16()?;
+        let size = self.events.get(&event)?.size;
+        let time_us = cursor.u64()?;
+        let values = cursor.skip(size)?.start;
+        let step = i128::from(time_us) - i128::from(last_us.unwrap_or(time_us));
+        STEP_US.contains(&step).then_some(Record { event, time_us, values, end: cursor.at })
+    }
+
+    /// True if records follow from `at` on.
+    fn is_in_step(&self, mut at: usize, end: usize, mut last_us: Option<u64>) -> bool {
+        (0..IN_STEP).all(|_| {
+            let record = self.record(at, end, last_us);
+            if let Some(record) = &record {
+                (at, last_us) = (record.end, Some(record.time_us));
+            }
+            record.is_some()
+        })
     }
 
     /// The event named `topic`, or the first that has all `names`.
@@ -90,25 +152,9 @@ impl Log for CrazyflieLog {
         Ok(Samples {
             time_s: event.records.iter().map(|(time_us, _)| *time_us as f64 * 1e-6).collect(),
             rows: event.records.iter().map(|(_, at)| row(*at)).collect(),
-            notes: Vec::new(),
+            notes: self.notes.clone(),
         })
     }
-}
-
-fn check_crc(bytes: &[u8]) -> Result<(), LogError> {
-    if bytes.first() != Some(&0xBC) {
-        let expected = "the byte 0xBC at its begin";
-        return Err(LogError::unexpected(Spot::Whole, expected, "no Crazyflie log", "check `format`"));
-    }
-    let damaged = |expected: &str, found| LogError::unexpected(Spot::Whole, expected, found, COPY_AGAIN);
-    let Some((content, &stored)) = bytes.split_last_chunk::<4>() else {
-        return Err(damaged("a checksum at its end", format!("{} bytes", bytes.len())));
-    };
-    let (stored, computed) = (u32::from_le_bytes(stored), crc32fast::hash(content));
-    if stored == computed {
-        return Ok(());
-    }
-    Err(damaged(&format!("the checksum {stored:08x} that is stored"), format!("content of {computed:08x}")))
 }
 
 fn header(cursor: &mut Cursor<'_>) -> Result<BTreeMap<u16, Event>, LogError> {
@@ -116,7 +162,12 @@ fn header(cursor: &mut Cursor<'_>) -> Result<BTreeMap<u16, Event>, LogError> {
     let version = cursor.u16().ok_or_else(cut)?;
     if version != 2 {
         let (expected, found) = ("a log of version 2", format!("version {version}"));
-        return Err(LogError::unexpected(Spot::Whole, expected, found, "log with newer firmware"));
+        return Err(LogError::unexpected(
+            Spot::Whole,
+            expected,
+            found,
+            "log with newer firmware, or convert it to CSV by the `cfusdlog.py` of its own",
+        ));
     }
     let count = cursor.u16().ok_or_else(cut)?;
     let mut events = BTreeMap::new();

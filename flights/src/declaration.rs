@@ -16,6 +16,8 @@ pub struct Declaration {
     pub vehicle: Spanned<String>,
     /// Format of the logs whose flight does not say it.
     pub format: Option<Format>,
+    /// Clock of the logs whose flight does not say it.
+    pub time: Option<Clock>,
     /// Channels of the logs; a flight's own come first.
     #[serde(default)]
     pub channels: ChannelMap,
@@ -36,6 +38,8 @@ pub struct FlightEntry {
     pub role: Role,
     /// Format of the log.
     pub format: Option<Format>,
+    /// Clock of the log, where it has two.
+    pub time: Option<Clock>,
     /// Start of the part that is used, in seconds from the log's first sample.
     pub from_s: Option<Spanned<f64>>,
     /// End of that part.
@@ -63,8 +67,20 @@ pub enum Format {
     Mcap,
     /// PX4's ULog.
     Ulog,
+    /// ArduPilot's dataflash log, `.BIN`.
+    Dataflash,
     /// The log that a Crazyflie writes to its card, version 2.
     Crazyflie,
+}
+
+/// Clock of an MCAP file's messages.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Clock {
+    /// The time at which the message was logged.
+    Log,
+    /// The stamp in the message.
+    Stamp,
 }
 
 /// What stands in for an attitude and an angular velocity that were not logged.

@@ -1,31 +1,49 @@
-//! The formats of logs: which one a file has, and its reader.
+//! Formats of logs: the one that a file has, and its reader.
 
 use std::path::Path;
 
+use vehicles::foreign;
+
 use crate::crazyflie::CrazyflieLog;
 use crate::csv_log::CsvLog;
-use crate::declaration::{Entry, Format};
-use crate::error::LogError;
+use crate::dataflash::Dataflash;
+use crate::declaration::{Clock, Entry, Format};
+use crate::error::{LogError, Spot};
 use crate::log::Log;
 use crate::mcap_log::McapLog;
 use crate::ulog::Ulog;
 
-/// The log with these bytes.
-pub fn parse(bytes: Vec<u8>, format: Format, time: Option<&Entry>) -> Result<Box<dyn Log>, LogError> {
+/// The log with these bytes. `time` declares the column of the time, and `clock` chooses one of two clocks.
+pub fn parse(
+    bytes: Vec<u8>,
+    format: Format,
+    time: Option<&Entry>,
+    clock: Option<Clock>,
+) -> Result<Box<dyn Log>, LogError> {
+    if clock.is_some() && format != Format::Mcap {
+        let (expected, found) = ("a log in MCAP, which can have two clocks", "another format");
+        return Err(LogError::unexpected(Spot::Key("time"), expected, found, "remove the flight's `time`"));
+    }
     match format {
         Format::Csv => Ok(Box::new(CsvLog::parse(&bytes, time)?)),
         Format::Crazyflie => Ok(Box::new(CrazyflieLog::parse(bytes)?)),
-        Format::Mcap => Ok(Box::new(McapLog::parse(bytes)?)),
+        Format::Dataflash => Ok(Box::new(Dataflash::parse(bytes)?)),
+        Format::Mcap => Ok(Box::new(McapLog::parse(bytes, clock)?)),
         Format::Ulog => Ok(Box::new(Ulog::parse(bytes)?)),
     }
 }
 
-/// The format of the log at `path` with these bytes: by the first of them, else by its name; CSV where neither says more.
+/// Returns the format of the log at `path` with these bytes: by the first of them, else by its name; CSV where neither says
+/// more, and for a format that has no reader.
 pub fn guess(path: &Path, bytes: &[u8]) -> Format {
     match bytes {
         [0x89, b'M', b'C', b'A', b'P', b'0', b'\r', b'\n', ..] => Format::Mcap,
         [b'U', b'L', b'o', b'g', 1, 0x12, 0x35, _, ..] => Format::Ulog,
-        [0xBC, 2, 0, _, _, _, _, _, ..] => Format::Crazyflie,
+        [0xA3, 0x95, 0x80, ..] => Format::Dataflash,
+        // Of every version: its reader names those that it does not read.
+        [0xBC, _, 0, _, _, _, _, _, ..] => Format::Crazyflie,
+        // Its reader names what it is.
+        _ if foreign::of(bytes).is_some() => Format::Csv,
         _ => match path.extension().and_then(|extension| extension.to_str()) {
             Some("mcap") => Format::Mcap,
             Some("ulg" | "ulog") => Format::Ulog,

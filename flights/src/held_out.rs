@@ -23,12 +23,13 @@ pub struct Clash {
 }
 
 /// The test flights that are not held out, each with the first flight that it is not held out from; `parts` are the parts
-/// of the logs that the flights are.
-pub fn clashes(flights: &[Flight], parts: &[Part]) -> Vec<Clash> {
+/// of the logs that the flights are, and `sha256` gives the SHA-256 of a log as it was read.
+pub fn clashes(flights: &[Flight], parts: &[Part], sha256: impl Fn(&Path) -> Option<String>) -> Vec<Clash> {
     let of_role = |role| (0..flights.len()).filter(move |index| flights[*index].role == role);
     let clash = |fit: usize, test: usize| {
         let pair = [fit, test].map(|index| (&flights[index], &parts[index]));
-        let reason = match same_file(&pair[0].0.file, &pair[1].0.file) {
+        let files = pair.map(|(flight, _)| flight.file.as_path());
+        let reason = match same_file(files[0], files[1], || sha256(files[0]) == sha256(files[1])) {
             Some(how) => same_part(pair, how),
             None => same_samples(pair),
         };
@@ -60,21 +61,22 @@ fn same_part([(fit, fit_part), (test, test_part)]: [(&Flight, &Part); 2], how: &
     })
 }
 
-/// Whether two paths lead to one file, or to files with the same bytes; how, as text.
+/// Whether two paths lead to one file, or `have_same_bytes` says that the same bytes were read from both; how, as text.
 ///
 /// ```
 /// let (here, there) = ("Cargo.toml".as_ref(), "src/../Cargo.toml".as_ref());
-/// assert_eq!(flights::same_file(here, there), Some("the same file"));
+/// assert_eq!(flights::same_file(here, there, || false), Some("the same file"));
+/// let (one, copy) = ("Cargo.toml".as_ref(), "src/lib.rs".as_ref());
+/// assert_eq!(flights::same_file(one, copy, || true), Some("copies of the same bytes"));
 /// ```
 #[must_use]
-pub fn same_file(a: &Path, b: &Path) -> Option<&'static str> {
+pub fn same_file(a: &Path, b: &Path, have_same_bytes: impl FnOnce() -> bool) -> Option<&'static str> {
     let (of_a, of_b) = (std::fs::metadata(a).ok(), std::fs::metadata(b).ok());
     let (Some(of_a), Some(of_b)) = (of_a, of_b) else { return (a == b).then_some("the same file") };
     if (of_a.dev(), of_a.ino()) == (of_b.dev(), of_b.ino()) {
         return Some("the same file");
     }
-    let are_same = of_a.len() == of_b.len() && std::fs::read(a).ok()? == std::fs::read(b).ok()?;
-    are_same.then_some("copies of the same bytes")
+    have_same_bytes().then_some("copies of the same bytes")
 }
 
 /// Whether the test flight holds measurements of the fit flight, whatever files they are in. Each channel of motion that

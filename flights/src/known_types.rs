@@ -19,9 +19,42 @@ const fn ours(kind: &'static str, quantity: Quantity, fields: &'static str, unit
     Known { kind, quantity, fields, unit, frame: Frame::FluEnu }
 }
 
-const fn px4(kind: &'static str, quantity: Quantity, fields: &'static str, unit: &'static str) -> Known {
+/// Of PX4 and ArduPilot.
+const fn forward_right_down(
+    kind: &'static str,
+    quantity: Quantity,
+    fields: &'static str,
+    unit: &'static str,
+) -> Known {
     Known { kind, quantity, fields, unit, frame: Frame::FrdNed }
 }
+
+/// Fields of a type of message that say if it holds a quantity.
+struct Validity {
+    kind: &'static str,
+    quantity: Quantity,
+    /// Their names, divided by blanks.
+    fields: &'static str,
+    /// True if a field with this number says that the message does not.
+    is_absent: fn(f64) -> bool,
+}
+
+const fn covariance(quantity: Quantity, fields: &'static str) -> Validity {
+    Validity { kind: "sensor_msgs/msg/Imu", quantity, fields, is_absent: |first| first == -1.0 }
+}
+
+const fn flags(kind: &'static str, quantity: Quantity, fields: &'static str) -> Validity {
+    Validity { kind, quantity, fields, is_absent: |flag| flag == 0.0 }
+}
+
+/// By the comments of `sensor_msgs/Imu` and `vehicle_local_position`. Other ROS messages have no such rule.
+const VALIDITIES: &[Validity] = &[
+    covariance(Quantity::Attitude, "orientation_covariance[0]"),
+    covariance(Quantity::AngularVelocity, "angular_velocity_covariance[0]"),
+    covariance(Quantity::SpecificForce, "linear_acceleration_covariance[0]"),
+    flags("vehicle_local_position", Quantity::Position, "xy_valid z_valid"),
+    flags("vehicle_local_position", Quantity::Velocity, "v_xy_valid v_z_valid"),
+];
 
 /// In the order of preference where no channel is declared: sensors come before the truth of a simulation.
 const KNOWN: &[Known] = &[
@@ -58,14 +91,20 @@ const KNOWN: &[Known] = &[
     ours("hummingbus_msgs/msg/PlantState", Quantity::Attitude, "attitude.*", "1"),
     ours("hummingbus_msgs/msg/PlantState", Quantity::AngularVelocity, "angular_velocity.*", "rad/s"),
     ours("hummingbus_msgs/msg/PlantState", Quantity::SpecificForce, "specific_force.*", "m/s^2"),
-    px4("vehicle_attitude", Quantity::Attitude, "q[1] q[2] q[3] q[0]", "1"),
-    px4("vehicle_local_position", Quantity::Position, "x y z", "m"),
-    px4("vehicle_local_position", Quantity::Velocity, "vx vy vz", "m/s"),
-    px4("sensor_combined", Quantity::AngularVelocity, "gyro_rad[#]", "rad/s"),
-    px4("sensor_combined", Quantity::SpecificForce, "accelerometer_m_s2[#]", "m/s^2"),
-    px4("vehicle_angular_velocity", Quantity::AngularVelocity, "xyz[#]", "rad/s"),
-    px4("vehicle_acceleration", Quantity::SpecificForce, "xyz[#]", "m/s^2"),
-    px4("battery_status", Quantity::BatteryVoltage, "voltage_v", "V"),
+    forward_right_down("vehicle_attitude", Quantity::Attitude, "q[1] q[2] q[3] q[0]", "1"),
+    forward_right_down("vehicle_local_position", Quantity::Position, "x y z", "m"),
+    forward_right_down("vehicle_local_position", Quantity::Velocity, "vx vy vz", "m/s"),
+    forward_right_down("sensor_combined", Quantity::AngularVelocity, "gyro_rad[#]", "rad/s"),
+    forward_right_down("sensor_combined", Quantity::SpecificForce, "accelerometer_m_s2[#]", "m/s^2"),
+    forward_right_down("vehicle_angular_velocity", Quantity::AngularVelocity, "xyz[#]", "rad/s"),
+    forward_right_down("vehicle_acceleration", Quantity::SpecificForce, "xyz[#]", "m/s^2"),
+    forward_right_down("battery_status", Quantity::BatteryVoltage, "voltage_v", "V"),
+    forward_right_down("ATT", Quantity::Attitude, "Roll Pitch Yaw", "deg"),
+    forward_right_down("XKF1", Quantity::Position, "PN PE PD", "m"),
+    forward_right_down("XKF1", Quantity::Velocity, "VN VE VD", "m/s"),
+    forward_right_down("IMU", Quantity::AngularVelocity, "GyrX GyrY GyrZ", "rad/s"),
+    forward_right_down("IMU", Quantity::SpecificForce, "AccX AccY AccZ", "m/s^2"),
+    forward_right_down("BAT", Quantity::BatteryVoltage, "Volt", "V"),
 ];
 
 impl Known {
@@ -74,19 +113,50 @@ impl Known {
         let parts = ["x", "y", "z", "w"].into_iter().enumerate().take(self.quantity.size());
         let name =
             |(index, part): (usize, &str)| self.fields.replace('*', part).replace('#', &index.to_string());
-        let columns = if self.fields.contains(['*', '#']) {
+        let names: Vec<String> = if self.fields.contains(['*', '#']) {
             parts.map(name).collect()
         } else {
             self.fields.split(' ').map(str::to_owned).collect()
         };
+        let is_euler = self.quantity == Quantity::Attitude && names.len() == 3;
+        let (columns, euler) = if is_euler { (None, Some(names)) } else { (Some(names), None) };
         Entry {
-            columns: Some(columns),
+            columns,
+            euler,
             topic: Some(topic.to_owned()),
             unit: Some(self.unit.to_owned()),
             frame: Some(self.frame),
             ..Entry::default()
         }
     }
+}
+
+/// Samples of a quantity that messages do not hold, although they have its fields.
+pub struct Absent {
+    /// For each message of the topic, true if it does not hold the quantity.
+    pub messages: Vec<bool>,
+    /// The fields that say so.
+    pub fields: &'static str,
+}
+
+/// The messages of the topic of `entry` that say that they do not hold the quantity; `None` if its type cannot say so, or other
+/// fields are declared than those of the type.
+pub fn absent(log: &dyn Log, quantity: Quantity, entry: &Entry) -> Option<Absent> {
+    let topic = entry.topic.as_deref()?;
+    let (_, kind) = log.topics().into_iter().find(|(name, _)| name == topic)?;
+    let validity =
+        VALIDITIES.iter().find(|validity| validity.kind == kind && validity.quantity == quantity)?;
+    let known = KNOWN.iter().find(|known| known.kind == kind && known.quantity == quantity)?.entry(topic);
+    let plain = |name: &String| name.trim_start_matches('-').to_owned();
+    let declared: Vec<String> = entry.columns.iter().flatten().map(plain).collect();
+    if !known.columns.iter().flatten().any(|name| declared.contains(name)) {
+        return None;
+    }
+    let fields: Vec<String> = validity.fields.split(' ').map(str::to_owned).collect();
+    // Older logs lack them.
+    let rows = log.samples(Some(topic), &fields).ok()?.rows;
+    let messages = rows.iter().map(|row| row.iter().any(|number| (validity.is_absent)(*number))).collect();
+    Some(Absent { messages, fields: validity.fields })
 }
 
 /// `entry` with what need not be said about a known type of message.
@@ -110,6 +180,7 @@ pub fn complete(log: &dyn Log, quantity: Quantity, entry: &Entry) -> Result<Entr
         unit: entry.unit.clone().or(default.unit),
         frame: entry.frame.or(default.frame),
         columns: default.columns,
+        euler: default.euler,
         ..entry.clone()
     })
 }
@@ -118,7 +189,7 @@ pub fn complete(log: &dyn Log, quantity: Quantity, entry: &Entry) -> Result<Entr
 /// exactly one topic has. The notes say what was taken and what was not clear.
 pub fn defaults(log: &dyn Log, format: Format) -> (ChannelMap, Vec<String>) {
     let (mut channels, mut notes) = (ChannelMap::new(), Vec::new());
-    if !matches!(format, Format::Mcap | Format::Ulog) {
+    if !matches!(format, Format::Mcap | Format::Ulog | Format::Dataflash) {
         return (channels, notes);
     }
     let topics = log.topics();
@@ -128,6 +199,12 @@ pub fn defaults(log: &dyn Log, format: Format) -> (ChannelMap, Vec<String>) {
                 topics.iter().filter(|(_, kind)| kind == known.kind).map(|(name, _)| name.as_str()).collect();
             match of_kind[..] {
                 [] => continue,
+                [topic] if holds_nothing(log, quantity, &known.entry(topic)) => {
+                    notes.push(format!(
+                        "{quantity}: not taken from {topic}, whose messages say that they have none"
+                    ));
+                    continue;
+                }
                 [topic] => {
                     notes.push(format!("{quantity}: taken from {topic}, as no channel is declared"));
                     channels.insert(quantity, toml::Spanned::new(0..0, known.entry(topic)));
@@ -141,4 +218,9 @@ pub fn defaults(log: &dyn Log, format: Format) -> (ChannelMap, Vec<String>) {
         }
     }
     (channels, notes)
+}
+
+/// True if no message of the topic holds the quantity.
+fn holds_nothing(log: &dyn Log, quantity: Quantity, entry: &Entry) -> bool {
+    absent(log, quantity, entry).is_some_and(|absent| !absent.messages.contains(&false))
 }

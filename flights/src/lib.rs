@@ -6,13 +6,13 @@
 //! | `set` | a flights file and all its logs |
 //! | `declaration`, `document` | what a flights file says, and where |
 //! | `quantity`, `frame` | units and frames |
-//! | `logs` | which logs flights are read from: names and patterns |
+//! | `logs`, `log_reader` | which logs flights are read from: names and patterns; each log is read once |
 //! | `log` | what every log can do: samples of numbers by name |
-//! | `formats` | the formats of logs: `csv_log`, `mcap_log`, `ulog`, `crazyflie`, `bytes`, `arrays` |
+//! | `formats` | the formats of logs: `csv_log`, `mcap_log`, `ulog` (`ulog_messages`, `ulog_format`), `crazyflie`, `dataflash`, `bytes`, `arrays` |
 //! | `known_types` | messages whose fields and units need not be said |
-//! | `channels`, `clean`, `jumps`, `reading` | from a log's numbers to a flight |
+//! | `channels`, `clean`, `held`, `jumps`, `reading` | from a log's numbers to a flight |
 //! | `specific_force` | specific force from what logs hold in its place |
-//! | `plausible`, `agreement`, `force_doubt`, `finding` | values against physics |
+//! | `plausible`, `agreement`, `force_doubt`, `still`, `finding` | values against physics |
 //! | `span` | times against the number of samples |
 //! | `held_out`, `twin` | whether test flights hold what parameters are fitted on: by file and time, by samples |
 //! | `state` | errors of a simulated state against the measured one |
@@ -29,6 +29,7 @@ mod channels;
 mod clean;
 mod crazyflie;
 mod csv_log;
+mod dataflash;
 mod declaration;
 mod document;
 mod error;
@@ -37,11 +38,13 @@ mod flight;
 mod force_doubt;
 mod formats;
 mod frame;
+mod held;
 mod held_out;
 mod jumps;
 mod known;
 mod known_types;
 mod log;
+mod log_reader;
 mod logs;
 mod mcap_log;
 mod plausible;
@@ -52,8 +55,11 @@ mod set;
 mod span;
 mod specific_force;
 pub mod state;
+mod still;
 mod twin;
 mod ulog;
+mod ulog_format;
+mod ulog_messages;
 
 pub use canonical::{COLUMNS, Canonical, HEADER, Row, csv, write_csv};
 pub use error::{FlightsError, LogError, Spot};
@@ -62,8 +68,9 @@ pub use flight::{Channel, Flight, Role};
 pub use held_out::same_file;
 pub use jumps::{leave_out_jumps, position_jumps};
 pub use known::{KnownRotors, SETTLE_S};
+pub use log_reader::ReadFile;
 pub use played::Played;
 pub use quantity::Quantity;
-pub use set::{FlightSet, ReadFile};
+pub use set::FlightSet;
 pub use span::{Moment, Sparse};
 pub use twin::{Comparison, Twin, twin};

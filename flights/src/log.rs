@@ -23,6 +23,11 @@ pub trait Log {
         None
     }
 
+    /// Checks that the times of these topics are of one clock.
+    fn check_clocks(&self, _topics: &[&str]) -> Result<(), LogError> {
+        Ok(())
+    }
+
     /// The topics that have data, with the type of each; none where the format has no types.
     fn topics(&self) -> Vec<(String, String)> {
         Vec::new()

@@ -5,8 +5,15 @@ use std::collections::BTreeMap;
 use recorder::definition::{Definition, DefinitionError, Leaf, number};
 use recorder::reader::Messages;
 
+use crate::declaration::Clock;
 use crate::error::{LogError, Spot};
+use crate::flight::median;
 use crate::log::{Log, Samples};
+
+/// Messages of a topic that are looked at for its clock.
+const CLOCK_SAMPLES: usize = 200;
+/// Clocks that are further apart than this are two: receiving a message takes less.
+const ONE_CLOCK_S: f64 = 1.0;
 
 /// A log, with what its topics are.
 pub struct McapLog {
@@ -14,6 +21,8 @@ pub struct McapLog {
     topics: BTreeMap<String, Topic>,
     /// Time of the first message: times count from it, as a double has no room for nanoseconds since 1970.
     start_ns: i128,
+    /// The clock that the flights file chooses.
+    clock: Option<Clock>,
     notes: Vec<String>,
 }
 
@@ -36,8 +45,8 @@ enum NoDefinition {
 
 impl McapLog {
     /// Reads a log's bytes. One that is cut or damaged is read up to there, which its notes say.
-    pub fn parse(bytes: Vec<u8>) -> Result<Self, LogError> {
-        let mut log = Self { bytes, topics: BTreeMap::new(), start_ns: 0, notes: Vec::new() };
+    pub fn parse(bytes: Vec<u8>, clock: Option<Clock>) -> Result<Self, LogError> {
+        let mut log = Self { bytes, topics: BTreeMap::new(), start_ns: 0, clock, notes: Vec::new() };
         let mut topics = BTreeMap::new();
         let mut start_ns = None;
         for (count, message) in Messages::new(&log.bytes).enumerate() {
@@ -82,6 +91,32 @@ impl McapLog {
     }
 }
 
+impl McapLog {
+    /// The messages of the topic `name`, up to where the log is damaged.
+    fn messages_of(&self, name: &str) -> impl Iterator<Item = mcap::Message<'static>> {
+        Messages::new(&self.bytes).map_while(Result::ok).filter(move |message| message.channel.topic == name)
+    }
+
+    /// The clocks of a topic's times, each with its median distance from the log's time in s, and in words.
+    fn clocks(&self, name: &str) -> Vec<(f64, String)> {
+        let Ok((name, topic, definition)) = self.topic(Some(name)) else { return Vec::new() };
+        let (mut offsets_s, mut unstamped) = (Vec::new(), 0);
+        for message in self.messages_of(name).take(CLOCK_SAMPLES) {
+            let Ok(leaves) = decoded(definition, &message, name, &topic.kind) else { break };
+            match set_stamp_ns(&leaves, message.log_time) {
+                Some(stamp_ns) => offsets_s.push((stamp_ns - i128::from(message.log_time)) as f64 * 1e-9),
+                None => unstamped += 1,
+            }
+        }
+        let logged =
+            (unstamped > 0).then(|| (0.0, format!("the log's time of `{name}`, which has no stamps")));
+        let stamps = median(offsets_s.into_iter()).map(|offset_s| {
+            (offset_s, format!("the stamps of `{name}`, {offset_s:.3} s from the log's time"))
+        });
+        logged.into_iter().chain(stamps).collect()
+    }
+}
+
 impl Topic {
     fn of(channel: &mcap::Channel<'_>) -> Self {
         let Some(schema) = &channel.schema else {
@@ -103,36 +138,55 @@ impl Log for McapLog {
         let (name, topic, definition) = self.topic(topic)?;
         let mut samples = Samples { notes: self.notes.clone(), ..Samples::default() };
         let mut stamped = 0_usize;
-        for message in Messages::new(&self.bytes).map_while(Result::ok) {
-            if message.channel.topic != name {
-                continue;
-            }
-            let decoded = definition.decode(&little_endian(&message.data));
-            let leaves = decoded.map_err(|found| {
-                let (at, expected) =
-                    (Spot::Named("topic", name.to_owned()), format!("messages of type {}", topic.kind));
-                LogError::unexpected(
-                    at,
-                    expected,
-                    found.to_string(),
-                    "the log is damaged, or its schema is another's",
-                )
-            })?;
-            // A stamp of zero was not set, unless the log begins at zero too: the first tick of a simulation.
-            let stamp_ns = stamp_ns(&leaves).filter(|ns| *ns > 0 || message.log_time == 0);
+        let mut absent = Absent::of(names);
+        for message in self.messages_of(name) {
+            let leaves = decoded(definition, &message, name, &topic.kind)?;
+            let stamp_ns = set_stamp_ns(&leaves, message.log_time).filter(|_| self.clock != Some(Clock::Log));
             stamped += usize::from(stamp_ns.is_some());
-            let time_ns = stamp_ns.unwrap_or_else(|| message.log_time.into()) - self.start_ns;
-            samples.time_s.push(time_ns as f64 * 1e-9);
-            samples.rows.push(row(&leaves, names)?);
+            let time_ns = match self.clock {
+                Some(Clock::Stamp) => stamp_ns,
+                _ => stamp_ns.or(Some(message.log_time.into())),
+            };
+            samples.time_s.push(time_ns.map_or(f64::NAN, |ns| (ns - self.start_ns) as f64 * 1e-9));
+            samples.rows.push(absent.row(&leaves, names)?);
         }
-        samples.notes.push(match stamped {
-            0 => "time is the log's own, as the messages have no stamp".to_owned(),
-            n if n == samples.time_s.len() => "time is the messages' stamp".to_owned(),
-            n => {
-                format!("time is the messages' stamp in {n} of {}, else the log's own", samples.time_s.len())
+        absent.check(names)?;
+        if self.clock == Some(Clock::Stamp) && stamped == 0 {
+            let at = Spot::Named("topic", name.to_owned());
+            let expected = "messages with a stamp, as `time = \"stamp\"` asks for";
+            let advice = "name another topic, or choose `time = \"log\"`";
+            return Err(LogError::unexpected(at, expected, "none", advice));
+        }
+        samples.notes.push(match (stamped, samples.time_s.len()) {
+            _ if self.clock == Some(Clock::Log) => "time is the log's own (`time = \"log\"`)".to_owned(),
+            (0, _) => "time is the log's own, as the messages have no stamp".to_owned(),
+            (stamped, all) if stamped == all => "time is the messages' stamp".to_owned(),
+            (stamped, all) if self.clock.is_some() => {
+                format!("time is the messages' stamp, which {stamped} of {all} have")
+            }
+            (stamped, all) => {
+                format!("time is the messages' stamp in {stamped} of {all}, else the log's own")
             }
         });
         Ok(samples)
+    }
+
+    /// Refuses topics whose times are of two clocks, where the flights file does not choose one.
+    fn check_clocks(&self, topics: &[&str]) -> Result<(), LogError> {
+        if self.clock.is_some() {
+            return Ok(());
+        }
+        let clocks = topics.iter().flat_map(|topic| self.clocks(topic));
+        let mut clocks: Vec<(f64, String)> = clocks.collect();
+        clocks.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let (Some(first), Some(last)) = (clocks.first(), clocks.last()) else { return Ok(()) };
+        let apart_s = last.0 - first.0;
+        if apart_s <= ONE_CLOCK_S {
+            return Ok(());
+        }
+        let found = format!("two that are {apart_s:.3} s apart: {}, and {}", first.1, last.1);
+        let advice = "choose by `time = \"log\"`, or by `time = \"stamp\"` where every topic has stamps, in the flight";
+        Err(LogError::unexpected(Spot::Key("time"), "one clock for all topics", found, advice))
     }
 
     fn topics(&self) -> Vec<(String, String)> {
@@ -162,15 +216,62 @@ fn stamp_ns(leaves: &[Leaf]) -> Option<i128> {
     integer("measured_ns").or_else(|| stamp("header.stamp")).or_else(|| stamp("stamp"))
 }
 
-/// The numbers of a message; NaN where a sensor of ours says that the sample was lost.
-fn row(leaves: &[Leaf], names: &[String]) -> Result<Vec<f64>, LogError> {
-    let lost = number(leaves, "measured_ns").is_some() && number(leaves, "valid") == Some(0.0);
-    let find = |name: &String| {
-        let found = number(leaves, name);
-        let found = found.ok_or_else(|| {
-            LogError::missing("field", name, leaves.iter().map(|leaf| &leaf.path), "`fields`")
-        })?;
-        Ok(if lost { f64::NAN } else { found })
-    };
-    names.iter().map(find).collect()
+/// The stamp of a message that was logged at `log_ns`. A stamp of zero was not set, unless the log begins at zero too: the
+/// first tick of a simulation.
+fn set_stamp_ns(leaves: &[Leaf], log_ns: u64) -> Option<i128> {
+    stamp_ns(leaves).filter(|ns| *ns > 0 || log_ns == 0)
+}
+
+fn decoded(
+    definition: &Definition,
+    message: &mcap::Message<'_>,
+    topic: &str,
+    kind: &str,
+) -> Result<Vec<Leaf>, LogError> {
+    definition.decode(&little_endian(&message.data)).map_err(|found| {
+        let (at, expected) = (Spot::Named("topic", topic.to_owned()), format!("messages of type {kind}"));
+        LogError::unexpected(
+            at,
+            expected,
+            found.to_string(),
+            "the log is damaged, or its schema is another's",
+        )
+    })
+}
+
+/// Fields that messages may lack: parts of arrays, which have any length in each message.
+struct Absent {
+    /// For each name, true if a message had it.
+    is_found: Vec<bool>,
+    /// The fields of the message with the most.
+    known: Vec<String>,
+}
+
+impl Absent {
+    fn of(names: &[String]) -> Self {
+        Self { is_found: vec![false; names.len()], known: Vec::new() }
+    }
+
+    /// The numbers of a message; NaN where its array is too short, or a sensor of ours says that the sample was lost.
+    fn row(&mut self, leaves: &[Leaf], names: &[String]) -> Result<Vec<f64>, LogError> {
+        let lost = number(leaves, "measured_ns").is_some() && number(leaves, "valid") == Some(0.0);
+        let row: Vec<Option<f64>> = names.iter().map(|name| number(leaves, name)).collect();
+        row.iter().zip(&mut self.is_found).for_each(|(number, is_found)| *is_found |= number.is_some());
+        if self.is_found.contains(&false) && leaves.len() > self.known.len() {
+            self.known = leaves.iter().map(|leaf| leaf.path.clone()).collect();
+        }
+        let is_gone = |name: &&String| !name.contains('[') && number(leaves, name).is_none();
+        if let Some(name) = names.iter().find(is_gone) {
+            return Err(LogError::missing("field", name, leaves.iter().map(|leaf| &leaf.path), "`fields`"));
+        }
+        Ok(row.into_iter().map(|number| number.filter(|_| !lost).unwrap_or(f64::NAN)).collect())
+    }
+
+    /// Refuses a field that no message has.
+    fn check(&self, names: &[String]) -> Result<(), LogError> {
+        match names.iter().zip(&self.is_found).find(|(_, is_found)| !**is_found) {
+            Some((name, _)) => Err(LogError::missing("field", name, &self.known, "`fields`")),
+            None => Ok(()),
+        }
+    }
 }

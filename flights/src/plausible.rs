@@ -13,6 +13,7 @@ use crate::flight::{Channel, Flight, median};
 use crate::force_doubt::{ForceDoubt, Kind};
 use crate::frame;
 use crate::quantity::{FRACTION, PERCENT, Quantity};
+use crate::still;
 use diagnostics::unit::ANGLE;
 
 /// Above this correlation a logged and a derived vector are the same but for a factor.
@@ -73,6 +74,7 @@ pub fn judge(flight: &Flight, vehicle: &Vehicle, channels: &ChannelMap) -> Vec<F
         judge.force().or_else(|| judge.gravity()),
         judge.upright(),
         judge.rates(),
+        judge.still(),
         judge.velocity(),
         judge.leaning().or_else(|| judge.axes()).or_else(|| judge.speed()),
         judge.commands(),
@@ -231,6 +233,19 @@ impl Judge<'_> {
             _ => "the axes, or angles of the attitude, with a `-` before the name".to_owned(),
         });
         Some(finding(quantity, fits, &what))
+    }
+
+    /// An attitude turns where the gyroscope does.
+    fn still(&self) -> Option<Finding> {
+        let still = still::turning(&self.flight.attitude, &self.flight.angular_velocity)?;
+        let what = format!(
+            "it stays the same from {:.3} s to {:.3} s, while the gyroscope turns by {:.1} degrees",
+            still.from_s,
+            still.to_s,
+            still.turned_rad.to_degrees()
+        );
+        let fits = "a part without that by `from_s` and `to_s`, or a flight without `attitude`,";
+        self.flight.assumed.is_empty().then(|| finding(Quantity::Attitude, Some(fits.to_owned()), &what))
     }
 
     /// The velocity is the position's derivative.

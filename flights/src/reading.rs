@@ -70,6 +70,9 @@ impl Reading<'_> {
         if self.channels.is_empty() {
             (self.channels, taken) = known_types::defaults(log, self.format);
         }
+        let topics: Vec<&str> =
+            self.channels.values().filter_map(|entry| entry.get_ref().topic.as_deref()).collect();
+        log.check_clocks(&topics).map_err(|cause| self.log_error(&self.at, None, cause))?;
         let mut flight = self.read_channels(log)?;
         flight.commands_on_change =
             self.declared(Quantity::Command).is_some_and(|entry| entry.on_change == Some(true));
@@ -129,8 +132,14 @@ impl Reading<'_> {
             return Channel::default();
         }
         let complete = known_types::complete(log, quantity, entry);
-        let read = complete
-            .and_then(|entry| channels::read(log, quantity, &entry, self.vehicle, self.entry.trust_units));
+        let read = complete.and_then(|entry| {
+            let (mut channel, said) =
+                channels::read(log, quantity, &entry, self.vehicle, self.entry.trust_units)?;
+            if let Some(absent) = known_types::absent(log, quantity, &entry) {
+                channel = clean::without_absent(quantity, channel, &absent.messages, absent.fields, notes)?;
+            }
+            Ok((channel, said))
+        });
         let cleaned = read.and_then(|(channel, said)| {
             notes.extend(said.into_iter().map(|said| format!("{quantity}: {said}")));
             clean::clean(quantity, channel, notes)

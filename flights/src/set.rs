@@ -5,6 +5,7 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 use diagnostics::Diagnostic;
+use inputs::InputFiles;
 use toml::Spanned;
 use vehicles::Vehicle;
 
@@ -14,6 +15,7 @@ use crate::error::{FlightsError, LogError};
 use crate::flight::Flight;
 use crate::formats;
 use crate::held_out;
+use crate::log_reader::{LogReader, ReadFile};
 use crate::logs::{self, Log, Patterns};
 use crate::quantity::Quantity;
 use crate::reading::{Part, Reading};
@@ -44,6 +46,8 @@ pub struct FlightSet {
     pub vehicle: PathBuf,
     /// The flights.
     pub flights: Vec<Flight>,
+    /// Files that were read: the vehicle file and its base. Whoever needs them again reads these bytes.
+    pub files: InputFiles,
 }
 
 impl FlightSet {
@@ -52,9 +56,9 @@ impl FlightSet {
     /// # Errors
     /// As [`FlightSet::parse`], and if a file cannot be read.
     pub fn load(path: &Path) -> Result<Self, FlightsError> {
-        let text = vehicles::text::read(path)
-            .map_err(|cause| Diagnostic::unreadable(path.display().to_string(), &cause))?;
-        Self::read(path, text, &vehicles::text::read_log, Patterns::Find)
+        let text = InputFiles::default().text(path);
+        let text = text.map_err(|cause| Diagnostic::unreadable(path.display().to_string(), &cause))?;
+        Self::read(path, text, &inputs::read_bytes, Patterns::Find)
     }
 
     /// Reads the flights file at `path` with this text; `read` gives the bytes of the vehicle file and of the logs. There are
@@ -73,7 +77,7 @@ impl FlightSet {
         read: &ReadFile<'_>,
         patterns: Patterns,
     ) -> Result<Self, FlightsError> {
-        let document = Document::new(path, text);
+        let (document, files) = (Document::new(path, text), InputFiles::default());
         let declaration: Declaration = document.parse()?;
         let mut errors = check_keys(&document, &declaration.flight);
         let mut logs = Vec::new();
@@ -86,15 +90,16 @@ impl FlightSet {
         errors.extend(check_names(&document, &logs));
         let vehicle = document.resolve("vehicle", &declaration.vehicle).and_then(|path| {
             let place = document.place(&declaration.vehicle.span());
-            let vehicle = vehicle(&path, read);
+            let vehicle = vehicle(&path, read, &files);
             let vehicle = vehicle.map_err(|cause| FlightsError::Vehicle { place, cause: Box::new(cause) })?;
             Ok((path, vehicle))
         });
         let (vehicle_path, vehicle) = FlightsError::gather_with(vehicle, errors)?;
-        let context = Context { document: &document, declaration: &declaration, vehicle: &vehicle, read };
+        let mut reader = LogReader::of(&logs, read);
+        let context = Context { document: &document, declaration: &declaration, vehicle: &vehicle };
         let (mut flights, mut parts, mut errors) = (Vec::new(), Vec::new(), Vec::new());
         for log in &logs {
-            match context.flight(log) {
+            match context.flight(log, &mut reader) {
                 Ok((flight, part)) => {
                     flights.push(flight);
                     parts.push(part);
@@ -103,27 +108,28 @@ impl FlightSet {
             }
         }
         FlightsError::gather(errors)?;
-        let clashes = held_out::clashes(&flights, &parts).into_iter().map(|clash| FlightsError::NotHeldOut {
-            place: document.place(&logs[clash.test].entry.get_ref().file.span()),
-            test: flights[clash.test].name.clone(),
-            fit: flights[clash.fit].name.clone(),
-            reason: clash.reason,
+        let clashes = held_out::clashes(&flights, &parts, reader.sha256()).into_iter().map(|clash| {
+            FlightsError::NotHeldOut {
+                place: document.place(&logs[clash.test].entry.get_ref().file.span()),
+                test: flights[clash.test].name.clone(),
+                fit: flights[clash.fit].name.clone(),
+                reason: clash.reason,
+            }
         });
         FlightsError::gather(clashes.collect())?;
-        Ok(Self { vehicle: vehicle_path, flights })
+        Ok(Self { vehicle: vehicle_path, flights, files })
     }
 }
 
-/// What gives the bytes of a file.
-pub type ReadFile<'a> = dyn Fn(&Path) -> std::io::Result<Vec<u8>> + 'a;
-
-fn vehicle(path: &Path, read: &ReadFile<'_>) -> Result<Vehicle, Diagnostic> {
+/// The vehicle in the file at `path`; what is read becomes part of `files`.
+fn vehicle(path: &Path, read: &ReadFile<'_>, files: &InputFiles) -> Result<Vehicle, Diagnostic> {
     let file = path.display().to_string();
-    let as_text = |bytes| {
-        String::from_utf8(bytes).map_err(|error| std::io::Error::new(std::io::ErrorKind::InvalidData, error))
+    let text = |path: &Path| {
+        files.keep(path, read(path)?);
+        files.text(path)
     };
-    match read(path).and_then(as_text) {
-        Ok(text) => Vehicle::parse(&text, &file),
+    match text(path) {
+        Ok(read) => Vehicle::parse_with(&read, &file, &text),
         Err(cause) => Err(Diagnostic::unreadable(file, &cause)),
     }
 }
@@ -179,12 +185,11 @@ struct Context<'a> {
     document: &'a Document,
     declaration: &'a Declaration,
     vehicle: &'a Vehicle,
-    read: &'a ReadFile<'a>,
 }
 
 impl Context<'_> {
     /// Reads a flight of the file.
-    fn flight(&self, declared: &Log<'_>) -> Result<(Flight, Part), FlightsError> {
+    fn flight(&self, declared: &Log<'_>, reader: &mut LogReader<'_>) -> Result<(Flight, Part), FlightsError> {
         let (entry, file) = (declared.entry.get_ref(), &declared.file);
         let broken = |cause| FlightsError::Log {
             place: self.document.place(&entry.file.span()),
@@ -196,10 +201,11 @@ impl Context<'_> {
         // Those of the file, overridden by those of the flight.
         let mut channels = self.declaration.channels.clone();
         channels.extend(entry.channels.clone());
-        let bytes = (self.read)(file).map_err(|error| broken(LogError::Unreadable(error)))?;
+        let bytes = reader.read(file).map_err(|error| broken(LogError::Unreadable(error)))?;
         let format = entry.format.or(self.declaration.format).unwrap_or_else(|| formats::guess(file, &bytes));
         let time = channels.get(&Quantity::Time).map(Spanned::get_ref);
-        let log = formats::parse(bytes, format, time).map_err(broken)?;
+        let clock = entry.time.or(self.declaration.time);
+        let log = formats::parse(bytes, format, time, clock).map_err(broken)?;
         Reading {
             document: self.document,
             vehicle: self.vehicle,

@@ -1,19 +1,15 @@
 //! Flights of the repository's flights files, read from real logs in the folder that `HUMMINGBUS_DATA` names.
 
-use std::io::Write as _;
+#[path = "../../tests/runs/skipped.rs"]
+mod skipped;
+
 use std::path::{Path, PathBuf};
 
 use flights::{Channel, Flight, FlightSet, Role};
 
 /// The folder of measured flights; says so where it is not given.
 fn data() -> Option<PathBuf> {
-    let data = std::env::var_os("HUMMINGBUS_DATA").map(PathBuf::from);
-    if data.is_none() {
-        // Not `eprintln!`, which the test runner hides.
-        let notice = "skipped: HUMMINGBUS_DATA, the folder of measured flights, is not set";
-        let _ = writeln!(std::io::stderr(), "{notice}");
-    }
-    data
+    skipped::variable_or_skip("HUMMINGBUS_DATA", "the folder of measured flights").map(PathBuf::from)
 }
 
 fn load(name: &str) -> FlightSet {
@@ -129,7 +125,10 @@ fn a_ulog_is_read_by_the_types_of_its_messages() {
     let f = &flight.specific_force.values;
     let mean_z = f.iter().map(|f| f[2]).sum::<f64>() / f.len() as f64;
     assert!((9.3..10.3).contains(&mean_z), "{mean_z}");
-    assert!(!flight.position.is_empty() && !flight.velocity.is_empty());
+    // Its estimator had no horizontal position: `xy_valid` is 0 in all messages.
+    assert!(flight.position.is_empty() && flight.velocity.is_empty());
+    let said = "not taken from vehicle_local_position, whose messages say that they have none";
+    assert!(flight.notes.iter().any(|note| note.contains(said)), "{:?}", flight.notes);
 }
 
 #[test]

@@ -91,6 +91,56 @@ fn data_in_other_units_than_declared_are_found() {
     assert!(findings(&share, CHANNELS).contains(&(Quantity::Command, "`unit = \"fraction\"`".to_owned())));
 }
 
+/// The made-up flight in CSV, its columns from `first` on changed by `change`, which knows the row.
+fn changed(first: &str, count: usize, change: impl Fn(usize, &mut [f64])) -> String {
+    let whole = Motion::default().csv();
+    let mut lines = whole.lines();
+    let header = lines.next().unwrap();
+    let at = header.split(',').position(|name| name == first).unwrap();
+    let row = |(row, line): (usize, &str)| {
+        let mut cells: Vec<f64> = line.split(',').map(|cell| cell.parse().unwrap()).collect();
+        change(row, &mut cells[at..at + count]);
+        cells.iter().map(f64::to_string).collect::<Vec<_>>().join(",") + "\n"
+    };
+    header.to_owned() + "\n" + &lines.enumerate().map(row).collect::<String>()
+}
+
+fn read_text(text: &str) -> Result<Flight, FlightsError> {
+    let place = Place::new();
+    place.write("log.csv", text.as_bytes());
+    place.load("log.csv", CHANNELS, "")
+}
+
+#[test]
+fn a_gyroscope_in_whole_degrees_loses_no_sample() {
+    let degree = 1_f64.to_radians();
+    let coarse = changed("wx", 3, |_, rates| {
+        rates.iter_mut().for_each(|rate| *rate = (*rate / degree).round() * degree);
+    });
+    let flight = read_text(&coarse).unwrap();
+    let repeats = flight.angular_velocity.values.windows(2).filter(|pair| pair[0] == pair[1]).count();
+    assert!(repeats > 100, "{repeats}: the case is none");
+    assert_eq!((flight.angular_velocity.time_s.len(), &flight.notes[..]), (1001, &[][..]));
+}
+
+#[test]
+fn an_attitude_that_stays_while_the_gyroscope_turns_is_refused() {
+    let stays = |from: usize| {
+        changed("qx", 4, move |row, q| {
+            if row >= from {
+                q.copy_from_slice(&[0.0, 0.0, 0.0, 1.0]);
+            }
+        })
+    };
+    // Three samples behind the jump are left out.
+    for (text, from_s) in [(stays(0), "0.000 s"), (stays(400), "4.030 s")] {
+        let message = read_text(&text).unwrap_err().to_string();
+        let said =
+            format!("`attitude`: it stays the same from {from_s} to 10.000 s, while the gyroscope turns by");
+        assert!(message.contains(&said), "{message}");
+    }
+}
+
 #[test]
 fn a_position_alone_that_is_too_fast_is_found() {
     let channels = without("velocity").replace("attitude =", "# attitude =");
@@ -536,7 +586,7 @@ battery_voltage = { fields = ["pm.vbatMV"], unit = "mV" }
 "#;
 
 #[test]
-fn a_crazyflie_log_is_read_and_its_checksum_checked() {
+fn a_crazyflie_log_is_read() {
     let place = Place::new();
     let log = support::crazyflie_log(200);
     place.write("log00", &log);
@@ -545,16 +595,61 @@ fn a_crazyflie_log_is_read_and_its_checksum_checked() {
     assert!((flight.specific_force.values[0][2] - 9.80665).abs() < 1e-6);
     assert_eq!(flight.battery_voltage.values[0], [3.7]);
     assert!((flight.command.time_s[3] - 0.03).abs() < 1e-9);
-    let mut broken = log.clone();
-    broken[100] ^= 1;
-    place.write("log00", &broken);
-    let error = place.load("log00", CRAZYFLIE, "").unwrap_err().to_string();
-    assert!(error.contains("checksum") && error.contains("copy the log"), "{error}");
+}
+
+/// Reads `log` as a Crazyflie's, by its first bytes.
+fn crazyflie(log: &[u8]) -> Result<Flight, FlightsError> {
+    let place = Place::new();
+    place.write("log00", log);
+    place.load("log00", CRAZYFLIE, "trust_units = true")
+}
+
+#[test]
+fn a_crazyflie_log_is_read_as_far_as_it_goes() {
+    let log = support::crazyflie_log(200);
+    let record = 2 + 8 + 29;
+    let start = log.len() - 4 - 200 * record;
+    let said = |flight: &Flight, part: &str| {
+        assert!(flight.notes.iter().any(|note| note.contains(part)), "`{part}`: {:?}", flight.notes);
+    };
+    for (cut, records) in [(2, 200), (14, 199), (4 + record, 199), (4 + record + 1, 198), (700, 182)] {
+        let flight = crazyflie(&log[..log.len() - cut]).unwrap();
+        assert_eq!(flight.command.time_s.len(), records, "{cut}: {:?}", flight.notes);
+        said(&flight, &format!("cut or damaged; {records} records were read"));
+    }
+    // Cut, with a checksum that fits.
     let mut cut = log[..log.len() - 10].to_vec();
     cut.extend(crc32(&cut).to_le_bytes());
-    place.write("log00", &cut);
-    let error = place.load("log00", CRAZYFLIE, "").unwrap_err().to_string();
-    assert!(error.contains("is cut"), "{error}");
+    said(&crazyflie(&cut).unwrap(), "33 bytes of the log are no record");
+    // A wrong event, a wrong byte in a value, and bytes that are missing, all in the middle.
+    let mut broken = log.clone();
+    broken[start + 100 * record] = 7;
+    let flight = crazyflie(&broken).unwrap();
+    assert_eq!(flight.command.time_s.len(), 199);
+    said(&flight, "199 records were read, 43 bytes that are no record left out");
+    let mut broken = log.clone();
+    broken[start + 100 * record + 10] ^= 1;
+    said(&crazyflie(&broken).unwrap(), "200 records were read, 0 bytes");
+    let missing = [&log[..start + 100 * record + 20], &log[start + 120 * record + 7..]].concat();
+    let flight = crazyflie(&missing).unwrap();
+    assert!((178..=180).contains(&flight.command.time_s.len()), "{:?}", flight.notes);
+    // Nothing is left of it.
+    let error = crazyflie(&log[..start + 10]).unwrap_err().to_string();
+    assert!(error.contains("none of 0"), "{error}");
+    let error = crazyflie(&log[..start - 10]).unwrap_err().to_string();
+    assert!(error.contains("a whole header") && error.contains("copy the log"), "{error}");
+}
+
+#[test]
+fn a_crazyflie_log_of_another_version_is_named_without_its_format() {
+    for version in [1, 3] {
+        let mut log = support::crazyflie_log(20);
+        log[1] = version;
+        let error = crazyflie(&log).unwrap_err().to_string();
+        for part in ["a log of version 2", &format!("found version {version}"), "newer firmware"] {
+            assert!(error.contains(part), "`{part}` is not in: {error}");
+        }
+    }
 }
 
 const ULOG: &str = r#"

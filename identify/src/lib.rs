@@ -30,7 +30,7 @@
 //! let set = FlightSet::load("flights/nanobench.toml".as_ref())?;
 //! let outcome = identify::run::identify(&set, &mut |step| println!("{step}"))?;
 //! println!("{}", outcome.report);
-//! let vehicle_file = identify::vehicle_file::text(&set.vehicle, &outcome.effects, &outcome.report)?;
+//! let vehicle_file = identify::vehicle_file::text(&set.files, &set.vehicle, &outcome.effects, &outcome.report)?;
 //! # let _ = vehicle_file;
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```

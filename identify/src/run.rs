@@ -46,7 +46,7 @@ const OTHER_FLIGHTS: &str =
 ///
 /// ```
 /// let vehicle = "../vehicles/hummingbird.toml".into();
-/// let set = flights::FlightSet { vehicle, flights: Vec::new() };
+/// let set = flights::FlightSet { vehicle, flights: Vec::new(), files: Default::default() };
 /// let error = identify::run::identify(&set, &mut |_| ()).unwrap_err();
 /// assert!(error.to_string().starts_with("no flight with role \"fit\" can be used: there is none."));
 /// ```
@@ -108,7 +108,7 @@ pub struct Picture {
 /// # Errors
 /// If the vehicle file cannot be read, or no flight of a role can be used.
 pub fn identify(set: &FlightSet, progress: &mut dyn FnMut(&str)) -> Result<Outcome, IdentifyError> {
-    let vehicle = Vehicle::load(&set.vehicle)?;
+    let vehicle = Vehicle::load_from(&set.files, &set.vehicle)?;
     let declared = entry::resolve(&vehicle.effects)?;
     progress("preparing flights");
     let (mut faults, believed) = faults::in_channels(&problem(&vehicle, &declared, set)?.0, set);

@@ -2,42 +2,50 @@
 
 use crate::report::{Estimate, Report};
 use diagnostics::Diagnostic;
+use inputs::InputFiles;
 use plant::effects::Effect;
-use std::fmt::Write;
 use std::path::Path;
+use toml_edit::{ArrayOfTables, DocumentMut, InlineTable, Item, Table, Value, value};
 use vehicles::{Uncertainty, Vehicle};
 
-/// The text of the new vehicle file: the declared file at `declared`, complete, with `effects` in place of its own.
-/// Parameters that were fitted carry their estimate, its interval and the flights that it comes from.
+/// The text of the new vehicle file: the declared file at `declared` among `files`, complete, with `effects` in place of
+/// its own. Parameters that were fitted carry their estimate, its interval and the flights that it comes from.
 ///
 /// # Errors
-/// If the declared file cannot be read again.
-pub fn text(declared: &Path, effects: &[Effect], report: &Report) -> Result<String, Diagnostic> {
-    let vehicle = Vehicle::load(declared)?;
-    let complete = Vehicle::base(declared).unwrap_or_else(|| declared.to_owned());
+/// If the declared file is not among `files` and cannot be read.
+pub fn text(
+    files: &InputFiles,
+    declared: &Path,
+    effects: &[Effect],
+    report: &Report,
+) -> Result<String, Diagnostic> {
+    let vehicle = Vehicle::load_from(files, declared)?;
+    let complete = Vehicle::base(files, declared).unwrap_or_else(|| declared.to_owned());
     let file = complete.display().to_string();
     let unreadable = |cause| Diagnostic::unreadable(&file, &cause);
-    let text = vehicles::text::read(&complete).map_err(unreadable)?;
-    let mut document: toml_edit::DocumentMut =
-        text.parse().map_err(|error| unreadable(std::io::Error::other(error)))?;
+    let text = files.text(&complete).map_err(unreadable)?;
+    let mut document: DocumentMut = text.parse().map_err(|error| unreadable(std::io::Error::other(error)))?;
     if complete != declared {
-        replace_tables(&mut document, &vehicles::text::read(declared).map_err(unreadable)?);
+        replace_tables(&mut document, &files.text(declared).map_err(unreadable)?);
     }
     document.remove("effects");
-    document["name"] = toml_edit::value(format!("{}, identified", vehicle.name));
-    let mut text = format!(
-        "# Written by hummingbus identify. Up to the effects at its end this is the declared file {file}, with its comments.\n{document}"
-    );
-    for effect in effects {
-        text += &entry(effect, &vehicle, report);
-    }
-    Ok(text)
+    document["name"] = value(format!("{}, identified", vehicle.name));
+    let mut tables = ArrayOfTables::new();
+    effects.iter().for_each(|effect| tables.push(table(effect, &vehicle, report)));
+    let mut added = DocumentMut::new();
+    added["effects"] = Item::ArrayOfTables(tables);
+    // A comment holds no control character.
+    let file = diagnostics::printable_line(&file);
+    Ok(format!(
+        "# Written by hummingbus identify. Up to the effects at its end this is the declared file {file}, with its \
+         comments.\n{document}\n{added}"
+    ))
 }
 
 /// Puts the tables of a file on a base, whose text is `upper`, in place of those of its base.
-fn replace_tables(document: &mut toml_edit::DocumentMut, upper: &str) {
+fn replace_tables(document: &mut DocumentMut, upper: &str) {
     // It has been read as a vehicle file, so it is TOML.
-    let Ok(upper) = upper.parse::<toml_edit::DocumentMut>() else { return };
+    let Ok(upper) = upper.parse::<DocumentMut>() else { return };
     for (key, item) in upper.iter().filter(|(_, item)| item.is_table() || item.is_array_of_tables()) {
         document[key] = item.clone();
     }
@@ -47,9 +55,10 @@ fn replace_tables(document: &mut toml_edit::DocumentMut, upper: &str) {
 const SCALED: &str = "typical of a vehicle of this size (`scale_to` of the effect)";
 
 #[allow(clippy::float_cmp, reason = "a value that was not touched is the same")]
-fn entry(effect: &Effect, vehicle: &Vehicle, report: &Report) -> String {
+fn table(effect: &Effect, vehicle: &Vehicle, report: &Report) -> Table {
     let name = effect.kind.name;
-    let mut text = format!("\n[[effects]]\nname = {name:?}\n");
+    let mut table = Table::new();
+    table["name"] = value(name);
     let fitted = report.effects.get(name).filter(|effect| effect.accepted);
     let stated = vehicle.effects.iter().find(|effect| effect.name == name);
     for (index, spec) in effect.kind.parameters.iter().enumerate() {
@@ -57,23 +66,21 @@ fn entry(effect: &Effect, vehicle: &Vehicle, report: &Report) -> String {
         let estimate = fitted.and_then(|effect| effect.parameters.get(spec.name));
         let declared =
             stated.and_then(|effect| effect.parameters.iter().find(|effect| effect.name == spec.name));
-        let line = match (estimate, declared) {
+        table[spec.name] = match (estimate, declared) {
             (Some(estimate), _) => of_estimate(estimate, &source(report)),
             (None, Some(declared)) => {
-                number(declared.value, &declared.unit, &declared.source, &said(&declared.uncertainty))
+                parameter(declared.value, &declared.unit, &declared.source, said(&declared.uncertainty))
             }
             (None, None) if spec.neutral == Some(value) => continue,
-            (None, None) => number(
+            (None, None) => parameter(
                 value,
                 spec.unit(),
                 if value == spec.nominal { spec.nominal_source } else { SCALED },
-                "\"not identified: held while the others were fitted\"",
+                "not identified: held while the others were fitted".into(),
             ),
         };
-        // Writing to a string cannot fail.
-        let _ = writeln!(text, "{} = {line}", spec.name);
     }
-    text
+    table
 }
 
 fn source(report: &Report) -> String {
@@ -89,28 +96,88 @@ fn source(report: &Report) -> String {
     )
 }
 
-fn of_estimate(estimate: &Estimate, source: &str) -> String {
+fn of_estimate(estimate: &Estimate, source: &str) -> Item {
     let doubt = match estimate {
         Estimate { determined: false, .. } => "not determined by these flights: ",
         Estimate { at_bound: true, .. } => "at its bound: ",
         _ => "",
     };
     let interval =
-        format!("\"{doubt}95 % interval {:e} to {:e} {}\"", estimate.low, estimate.high, estimate.unit);
-    number(estimate.value, estimate.unit, source, &interval)
+        format!("{doubt}95 % interval {:e} to {:e} {}", estimate.low, estimate.high, estimate.unit);
+    parameter(estimate.value, estimate.unit, source, interval.into())
 }
 
-fn number(value: f64, unit: &str, source: &str, uncertainty: &str) -> String {
-    let source = toml_edit::value(source).to_string();
-    format!(
-        "{{ value = {value:?}, unit = {unit:?}, source = {}, uncertainty = {uncertainty} }}",
-        source.trim()
-    )
+fn parameter(value: f64, unit: &str, source: &str, uncertainty: Value) -> Item {
+    let pairs = [
+        ("value", number(value)),
+        ("unit", unit.into()),
+        ("source", source.into()),
+        ("uncertainty", uncertainty),
+    ];
+    Item::Value(InlineTable::from_iter(pairs).into())
 }
 
-fn said(uncertainty: &Uncertainty) -> String {
+/// A number, with an exponent where it is small.
+fn number(value: f64) -> Value {
+    format!("{value:?}").parse().unwrap_or_else(|_| value.into())
+}
+
+fn said(uncertainty: &Uncertainty) -> Value {
     match uncertainty {
-        Uncertainty::OneSigma(value) => format!("{value:?}"),
-        Uncertainty::Said(text) => format!("{text:?}"),
+        Uncertainty::OneSigma(sigma) => number(*sigma),
+        Uncertainty::Said(text) => text.as_str().into(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::report::BeforeAfter;
+    use std::collections::BTreeMap;
+
+    fn empty_report() -> Report {
+        Report {
+            vehicle: String::new(),
+            flights: Vec::new(),
+            verdict: Vec::new(),
+            effects: BTreeMap::new(),
+            whiteness: BeforeAfter { before: BTreeMap::new(), after: BTreeMap::new() },
+            time_offsets_s: BTreeMap::new(),
+            faults: Vec::new(),
+            trims: Vec::new(),
+            held_out: BTreeMap::new(),
+            fitted: BTreeMap::new(),
+            noise_floor: BTreeMap::new(),
+            unexplained: BTreeMap::new(),
+            not_identifiable: Vec::new(),
+            block_s: 0.0,
+            test_blocks: 0,
+        }
+    }
+
+    /// Characters that Rust escapes and TOML does not, and the reverse; the folder's name is in the comment.
+    #[test]
+    fn any_text_of_a_declared_effect_is_written_as_toml() {
+        let said = "\u{200d}\u{a0}\u{7f}\u{85}\u{202e}\t\n\u{1b} \"'\\ é\u{301}";
+        let folder = tempfile::Builder::new().prefix("a\nb\u{1b}").tempdir().unwrap();
+        let path = folder.path().join("declared.toml");
+        let mut declared: DocumentMut = vehicles::reference::HUMMINGBIRD.parse().unwrap();
+        declared.remove("effects");
+        let mut effect = Table::new();
+        effect["name"] = value("mass-error");
+        effect["error"] = parameter(1e-7, "1", said, said.into());
+        let mut effects = ArrayOfTables::new();
+        effects.push(effect);
+        declared["effects"] = Item::ArrayOfTables(effects);
+        std::fs::write(&path, declared.to_string()).unwrap();
+        let effects = plant::effects::entry::resolve(&Vehicle::load(&path).unwrap().effects).unwrap();
+
+        let text = text(&InputFiles::default(), &path, &effects, &empty_report()).unwrap();
+
+        let read = Vehicle::parse(&text, "identified.toml").unwrap();
+        let parameter = &read.effects[0].parameters[0];
+        assert_eq!((parameter.value, parameter.source.as_str()), (1e-7, said), "{text}");
+        assert_eq!(parameter.uncertainty, Uncertainty::Said(said.to_owned()));
+        assert!(text.contains("value = 1e-7"), "{text}");
     }
 }

@@ -304,11 +304,29 @@ fn the_new_vehicle_file_is_complete_and_keeps_declared_effects() {
     let declared = std::path::Path::new("../vehicles/hummingbird-drag.toml");
     let effects =
         plant::effects::entry::resolve(&vehicles::Vehicle::load(declared).unwrap().effects).unwrap();
-    let text = identify::vehicle_file::text(declared, &effects, &report).unwrap();
+    let text = identify::vehicle_file::text(&Default::default(), declared, &effects, &report).unwrap();
     let read = vehicles::Vehicle::parse(&text, "anywhere.toml").unwrap();
     let names: Vec<&str> = read.effects.iter().map(|effect| effect.name.as_str()).collect();
     assert_eq!(names, ["rotor-drag", "parasitic-drag"], "{text}");
     assert!(!text.contains("base ="), "{text}");
+}
+
+/// An edit during a fit is not mixed with what was fitted to the file before.
+#[test]
+fn the_new_vehicle_file_has_the_bytes_that_were_fitted() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut set = heavy_with_drag(20).flights();
+    set.vehicle = folder.path().join("declared.toml");
+    std::fs::write(&set.vehicle, vehicles::reference::HUMMINGBIRD).unwrap();
+    // As the flights are read.
+    vehicles::Vehicle::load_from(&set.files, &set.vehicle).unwrap();
+    let edited = vehicles::reference::HUMMINGBIRD.replacen("value = 0.480", "value = 0.600", 1);
+    std::fs::write(&set.vehicle, edited).unwrap();
+    let outcome = identify(&set, &mut |_| ()).expect("flights to identify on");
+    require_named(&outcome.report, &["mass-error", "rotor-drag"]);
+    let text =
+        identify::vehicle_file::text(&set.files, &set.vehicle, &outcome.effects, &outcome.report).unwrap();
+    assert!(text.contains("mass = { value = 0.480,") && !text.contains("0.600"), "{text}");
 }
 
 /// How high the centre of mass lies shows only where something pushes the vehicle to the side.
@@ -321,7 +339,8 @@ fn what_flights_do_not_determine_is_said() {
     require_named(&outcome.report, &["com-offset"]);
     let found = &outcome.report.effects["com-offset"].parameters;
     assert!(found["x"].determined && !found["z"].determined, "{found:?}");
-    let text = identify::vehicle_file::text(&set.vehicle, &outcome.effects, &outcome.report).unwrap();
+    let text =
+        identify::vehicle_file::text(&set.files, &set.vehicle, &outcome.effects, &outcome.report).unwrap();
     let line = text.lines().rfind(|line| line.starts_with("z = ")).expect("the third component");
     assert!(line.contains("not determined by these flights"), "{line}");
 }

@@ -1,19 +1,16 @@
 //! Real flights, where they are: `HUMMINGBUS_DATA` names their folder. docs/validation.md has all of them.
 
+#[path = "../../tests/runs/skipped.rs"]
+mod skipped;
+
 use flights::FlightSet;
 use identify::report::Report;
 use identify::run::identify;
-use std::io::Write as _;
 use std::path::Path;
 
 /// The flights of a flights file; `None`, with a word about it, where there is no data.
 fn flights(name: &str) -> Option<FlightSet> {
-    if std::env::var_os("HUMMINGBUS_DATA").is_none() {
-        // Not `eprintln!`, which the test runner hides.
-        let notice = "skipped: HUMMINGBUS_DATA, the folder of measured flights, is not set";
-        let _ = writeln!(std::io::stderr(), "{notice}");
-        return None;
-    }
+    skipped::variable_or_skip("HUMMINGBUS_DATA", "the folder of measured flights")?;
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("../flights/{name}.toml"));
     Some(FlightSet::load(&path).expect("the flights that HUMMINGBUS_DATA promises"))
 }

@@ -1,6 +1,9 @@
 //! Stands of known rotors: the truth lies in the intervals as often as they promise, and the right order is chosen.
 //! The stand of esc-test: what it says, and what is wrong with it.
 
+#[path = "../../tests/runs/skipped.rs"]
+mod skipped;
+
 use std::fmt::Write as _;
 use std::fs;
 use std::io::Write as _;
@@ -410,12 +413,7 @@ fn stray_marks_and_stamps_of_any_size_in_stand_logs_end_in_words() {
 
 /// The report of a stand of this project on esc-test; says so where the data is not given.
 fn esc_test(stand: &str) -> Option<RotorReport> {
-    if std::env::var_os("HUMMINGBUS_DATA").is_none() {
-        // Not `eprintln!`, which the test runner hides.
-        let notice = "skipped: HUMMINGBUS_DATA, the folder of measured flights, is not set";
-        let _ = writeln!(std::io::stderr(), "{notice}");
-        return None;
-    }
+    skipped::variable_or_skip("HUMMINGBUS_DATA", "the folder of measured flights")?;
     let path: PathBuf = Path::new(env!("CARGO_MANIFEST_DIR")).join("../flights/stands").join(stand);
     Some(rotor::run(&path).unwrap().report)
 }

@@ -1,5 +1,8 @@
 //! The statistics say what SciPy and statsmodels say, and the intervals hold the truth as often as they promise.
 
+#[path = "../../tests/runs/skipped.rs"]
+mod skipped;
+
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
@@ -32,14 +35,9 @@ fn remembering(samples: usize, memory: f64, seed: u64) -> Vec<f64> {
 
 /// The folder with the Python that has SciPy and statsmodels; `scripts/test` makes it.
 fn readers() -> Option<PathBuf> {
-    let readers = std::env::var_os("HUMMINGBUS_READERS").map(PathBuf::from);
-    if readers.is_none() {
-        assert!(std::env::var_os("CI").is_none(), "HUMMINGBUS_READERS is not set, scripts/test sets it up");
-        // Not `eprintln!`, which the test runner hides.
-        let notice = "skipped: HUMMINGBUS_READERS is not set, scripts/test sets it up";
-        let _ = writeln!(std::io::stderr(), "{notice}");
-    }
-    readers
+    let readers = skipped::variable_or_skip("HUMMINGBUS_READERS", "which scripts/test sets up");
+    assert!(readers.is_some() || std::env::var_os("CI").is_none(), "HUMMINGBUS_READERS is not set");
+    readers.map(PathBuf::from)
 }
 
 fn answers(readers: &Path, question: &Value) -> Value {

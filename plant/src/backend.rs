@@ -38,6 +38,11 @@ pub trait Backend {
         &[]
     }
 
+    /// What of the motion since the start cannot be trusted, in words; the run ends with it.
+    fn trouble(&self) -> Option<String> {
+        None
+    }
+
     /// The battery, if an effect models it.
     fn battery(&self) -> Option<Battery>;
 
@@ -56,7 +61,7 @@ pub trait Backend {
 }
 
 /// The most vehicles that share a room, this one included.
-pub const TRAFFIC_MAX: usize = 16;
+pub const TRAFFIC_MAX: usize = 32;
 
 /// Another vehicle of the run.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]

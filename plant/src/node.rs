@@ -96,6 +96,9 @@ impl Component for Plant {
             )
             .into());
         }
+        if let Some(trouble) = self.backend.trouble() {
+            return Err(trouble.into());
+        }
         let outputs = Outputs::of(&*self.backend, context.time_ns());
         self.set_body(measured);
         Ok(outputs)

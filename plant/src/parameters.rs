@@ -11,6 +11,7 @@ use crate::rapier::{Misfit, Rapier};
 use crate::state::RigidBody;
 use bus::context::NodeContext;
 use diagnostics::parameter::{ParameterError, all, finite, positive, refuse, require};
+use inputs::InputFiles;
 use nalgebra::{UnitQuaternion, Vector3};
 use scenes::Scene;
 use serde::Deserialize;
@@ -148,7 +149,7 @@ impl Parameters {
         run: &NodeContext<'_>,
     ) -> Result<(Vehicle, Box<dyn Backend>), ParameterError> {
         self.check(run)?;
-        let (airframe, scene) = self.airframe()?;
+        let (airframe, scene) = self.airframe(&run.files)?;
         self.refuse_ports(&scene, run)?;
         // Before the backend, which a vehicle that is none might not survive.
         airworthy::tell_unsourced(airframe.vehicle(), run);
@@ -198,10 +199,11 @@ impl Parameters {
     }
 
     /// The vehicle as it flies, and what stands around it.
-    fn airframe(&self) -> Result<(Airframe, Scene), ParameterError> {
+    fn airframe(&self, files: &InputFiles) -> Result<(Airframe, Scene), ParameterError> {
         let refused = |error| ParameterError::conflict("vehicle", error);
-        let vehicle = Vehicle::load(&self.vehicle).map_err(refused)?;
-        let scene = self.scene.as_deref().map_or_else(|| Ok(Scene::default()), Scene::load);
+        let vehicle = Vehicle::load_from(files, &self.vehicle).map_err(refused)?;
+        let scene =
+            self.scene.as_deref().map_or_else(|| Ok(Scene::default()), |path| Scene::load_from(files, path));
         let scene = scene.map_err(|error| ParameterError::conflict("scene", error))?;
         refuse_double_rig(&vehicle, &scene)?;
         Ok((Airframe::from_files(vehicle, &scene.effects).map_err(refused)?, scene))

@@ -10,20 +10,32 @@
 //! | [`hull`] | how much room a vehicle takes |
 //! | `free_bodies` | the free bodies of the scene, and a step without contacts |
 //! | `joints`, `joint_forces` | what ties them: rows of constraints, and the forces that keep them |
-//! | `solver` | the impulses of contacts, stops and joints |
-//! | `stepping` | a step that is cut at impacts |
+//! | `solver` | the impulses of contacts, stops and joints, by sweeps |
+//! | `islands`, `direct` | the same of bodies that the sweeps do not settle, all at once |
+//! | `cone`, `cholesky` | the algebra of that |
+//! | `scratch`, `stepping` | a step that is cut at impacts, and what it works with |
+//! | `unsolved` | impulses that were not found |
 //! | `contacts` | when contacts begin and end |
+//! | `rim`, `rolling` | a disc's rim on an edge, and rolling |
 //! | `rig` | test rigs: joints and stops |
 
 mod body;
+mod cholesky;
+mod cone;
 mod contacts;
+mod direct;
 mod free_bodies;
 pub mod hull;
+mod islands;
 mod joint_forces;
 mod joints;
 mod rig;
+mod rim;
+mod rolling;
+mod scratch;
 mod solver;
 mod stepping;
+mod unsolved;
 mod world;
 
 use crate::actuation::Battery;
@@ -33,13 +45,14 @@ use crate::newton_euler::{Accelerations, NewtonEuler};
 use crate::snapshot::{Snapshot, SnapshotError};
 use crate::state::{RigidBody, State};
 use contacts::Contacts;
-use free_bodies::FreeBodies;
 pub(crate) use free_bodies::Misfit;
+use free_bodies::{FIRST_THING, FreeBodies};
 use hull::Hull;
 use nalgebra::{UnitQuaternion, Vector3};
 use scenes::{Rig, Scene};
+use scratch::Scratch;
 use serde::{Deserialize, Serialize};
-use stepping::{Changed, Held, Motion, Scratch};
+use stepping::{Changed, Held, Motion};
 use world::World;
 
 /// What its snapshots are called.
@@ -74,6 +87,8 @@ pub struct Rapier {
     reaction: Reaction,
     /// The other vehicles, moved on within a tick.
     others: Vec<Neighbour>,
+    /// The names of the scene's things.
+    names: Vec<String>,
 }
 
 /// What contacts and joints changed over the last tick, against free flight.
@@ -105,18 +120,21 @@ impl Rapier {
         let motion = Motion {
             rig: scene.rig.map(|rig| Rig { mount_B_m: rig.mount_B_m + mount_shift_B_m, ..rig }),
             crash_speed_m_s,
+            disc_radius_m: hull.disc_radius_m,
             inertia_min_kg_m2: vehicle.inertia_kg_m2.symmetric_eigenvalues().min(),
             world: World::new(&hull, scene, free_bodies.tied_pairs()),
             contacts: Contacts::new(1 + scene.thing_count() + TRAFFIC_MAX),
             state: model.start(free_bodies.carrier_at_start(), 0.0),
             free_bodies,
             held: Held::default(),
+            unsolved: None,
             changed: Changed::default(),
             scratch: Scratch::new(),
             model,
         };
         let others = Vec::with_capacity(TRAFFIC_MAX);
-        let mut rapier = Self { hull, motion, effects, reaction: Reaction::default(), others };
+        let names = scene.things().map(|thing| thing.name().to_owned()).collect();
+        let mut rapier = Self { hull, motion, effects, reaction: Reaction::default(), others, names };
         rapier.set_body(body);
         rapier
     }
@@ -268,6 +286,16 @@ impl Backend for Rapier {
         })
     }
 
+    fn trouble(&self) -> Option<String> {
+        let named = |number: u32| self.names.get((number as usize).checked_sub(FIRST_THING as usize)?);
+        let name = |number: u32| match number {
+            0 => "the vehicle".to_owned(),
+            world::GROUND => "the ground".to_owned(),
+            _ => named(number).map_or("another vehicle".to_owned(), |name| format!("\"{name}\"")),
+        };
+        self.motion.unsolved.map(|unsolved| unsolved.message(name))
+    }
+
     fn battery(&self) -> Option<Battery> {
         self.motion.model.airframe().battery(&self.effects, &self.motion.state)
     }
@@ -297,6 +325,7 @@ impl Backend for Rapier {
             snapshot.fitting("bodies", |states: &Vec<RigidBody>| states.len() == self.bodies().len())?;
         (self.motion.state, self.effects, self.reaction) = (state, effects, reaction);
         (self.motion.held, self.motion.contacts) = (held, contacts);
+        self.motion.unsolved = None;
         self.motion.free_bodies.states = states;
         Ok(())
     }

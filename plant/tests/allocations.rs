@@ -86,3 +86,25 @@ fn what_hangs_on_a_rope_takes_memory_only_where_it_lies() {
     let mut plant = rapier(scenes::reference::SLUNG_LOAD, Vector3::z() * 20.0);
     assert_eq!(taken(&mut plant, hummingbird().hover_command() * 1.02, &[]), 0);
 }
+
+#[test]
+fn impulses_that_are_found_directly_take_no_memory() {
+    let key = |value: &str, unit: &str| {
+        format!("{{ value = {value}, unit = \"{unit}\", source = \"test\", uncertainty = \"exact\" }}")
+    };
+    let cube = |name: &str, mass_kg: &str, centre_m: &str| {
+        let (centre, size, mass) = (key(centre_m, "m"), key("[0.2, 0.2, 0.2]", "m"), key(mass_kg, "kg"));
+        format!("[[boxes]]\nname = \"{name}\"\ncentre = {centre}\nsize = {size}\nmass = {mass}\n")
+    };
+    let [swept, direct] = ["10", "0.001"].map(|light_kg| {
+        let cubes =
+            [cube("light", light_kg, "[0, 0, 0.1]"), cube("heavy", "10", "[0.03, 0.02, 0.4]")].concat();
+        let scene = format!("name = \"test\"\nfriction = {}\n{cubes}", key("0", "1"));
+        let mut plant = rapier(&scene, Vector3::z() * 20.0);
+        let taken = taken(&mut plant, hummingbird().hover_command(), &[]);
+        assert_eq!(plant.trouble(), None);
+        taken
+    });
+    // Both as often as the search for contacts does; without friction sweeps do not settle a light one below.
+    assert_eq!(swept, direct);
+}

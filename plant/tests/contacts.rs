@@ -245,9 +245,8 @@ fn a_tumbling_fall_ends_on_the_ground_and_not_in_it() {
         let depth_m = reach_m(&plant, &hull, &-Vector3::z());
         assert!(depth_m < 2e-3, "at tick {tick} it enters the ground by {depth_m} m");
     }
-    // It may still roll on its rim: nothing but the air would stop that.
     assert!(plant.state().body.position_W_m.z < hull.disc_radius_m + 0.01, "it lies on the ground");
-    assert!(plant.state().body.velocity_W_m_s.norm() < 1.0);
+    assert!(plant.state().body.velocity_W_m_s.norm() < 0.05, "it does not roll on");
 }
 
 /// A table of 2 m by 2 m whose top is at 0.7 m, as a box or as a mesh.
@@ -314,4 +313,117 @@ fn a_vehicle_does_not_pass_through_triangles_that_it_flies_against() {
         let x_m = plant.state().body.position_W_m.x;
         assert!(x_m < 1.0 - 0.5 * reach_m, "{speed_m_s} m/s: it is at {x_m} m in the end");
     }
+}
+
+/// A box that stands on the ground with a vertical edge towards -x, at the origin.
+fn edge(height_m: f64) -> Scene {
+    let number = |value: &str, unit: &str| {
+        format!("{{ value = {value}, unit = \"{unit}\", source = \"test\", uncertainty = \"exact\" }}")
+    };
+    let half_m = 0.5 * std::f64::consts::SQRT_2;
+    let text = format!(
+        "name = \"edge\"\nfriction = {}\n[[boxes]]\nname = \"box\"\ncentre = {}\nsize = {}\nyaw = {}\n",
+        number("0", "1"),
+        number(&format!("[{half_m}, 0, {}]", height_m / 2.0), "m"),
+        number(&format!("[1, 1, {height_m}]"), "m"),
+        number("45", "deg"),
+    );
+    Scene::parse(&text, "edge.toml").unwrap_or_else(|error| panic!("{error}"))
+}
+
+#[test]
+fn a_rim_that_meets_a_vertical_edge_meets_it_along_a_line_and_does_not_pitch() {
+    let centre_z_m = hull().centre_B_m.z;
+    assert!(centre_z_m.abs() < 1e-9, "the disc is level with the centre of mass");
+    for (aside_m, turn_rad) in [(0.0, 0.0), (0.08, 0.0), (-0.15, 0.3), (0.2, 1.0), (0.11, -0.7)] {
+        let start = RigidBody {
+            attitude_WB: UnitQuaternion::from_axis_angle(&Vector3::z_axis(), turn_rad),
+            velocity_W_m_s: Vector3::x() * 2.0,
+            ..RigidBody::level_at(Vector3::new(-0.6, aside_m, 1.5))
+        };
+        let mut plant = common::rapier(NewtonEuler::new(common::free_body(), 2), &edge(3.0), &start, 1e9);
+        fly(&mut plant, &[0.0; 4], 300);
+        let body = plant.state().body;
+        assert_eq!(plant.contact().began, 1, "it met the edge");
+        assert!(body.velocity_W_m_s.x < 1.9, "{body:?}");
+        let spin = body.angular_velocity_B_rad_s;
+        assert!(spin.x.abs() < 1e-6 && spin.y.abs() < 1e-6, "{aside_m} m aside: {spin:?}");
+    }
+}
+
+#[test]
+fn a_box_that_hits_the_rim_with_a_vertical_edge_tips_neither() {
+    for (aside_m, yaw_deg) in [(0.05, 45.0), (-0.1, 30.0), (0.15, 60.0)] {
+        let mut scene = edge(1.0);
+        let number = |value: &str, unit: &str| {
+            format!("{{ value = {value}, unit = \"{unit}\", source = \"test\", uncertainty = \"exact\" }}")
+        };
+        let text = format!(
+            "name = \"thrown\"\n[[boxes]]\nname = \"box\"\ncentre = {}\nsize = {}\nyaw = {}\nmass = {}\nvelocity = {}\nfriction = {}\n",
+            number(&format!("[-1, {aside_m}, 3]"), "m"),
+            number("[0.2, 0.2, 0.4]", "m"),
+            number(&yaw_deg.to_string(), "deg"),
+            number("0.3", "kg"),
+            number("[2, 0, 0]", "m/s"),
+            number("0", "1"),
+        );
+        scene.boxes = Scene::parse(&text, "thrown.toml").unwrap_or_else(|error| panic!("{error}")).boxes;
+        let start = RigidBody::level_at(Vector3::z() * 3.0);
+        let mut plant = common::rapier(NewtonEuler::new(common::free_body(), 2), &scene, &start, 1e9);
+        fly(&mut plant, &[0.0; 4], 350);
+        let spins = [&plant.state().body, &plant.bodies()[0]]
+            .map(|body| body.attitude_WB * body.angular_velocity_B_rad_s);
+        assert!(plant.contact().began > 0, "they met");
+        for spin in spins {
+            assert!(spin.xy().norm() < 1e-6, "{aside_m} m aside: {spin:?}");
+        }
+    }
+}
+
+#[test]
+fn a_line_ends_where_the_edge_ends() {
+    let (speed_m_s, below_m) = (2.0, 5e-3);
+    let start = RigidBody {
+        velocity_W_m_s: Vector3::x() * speed_m_s,
+        ..RigidBody::level_at(Vector3::new(-0.3, 0.0, 1.5))
+    };
+    let fall_m = 0.5 * 9.81 * ((0.3 - hull().disc_radius_m) / speed_m_s).powi(2);
+    let scene = edge(1.5 - fall_m - below_m);
+    let vehicle = common::free_body();
+    let (mass_kg, inertia_kg_m2) = (vehicle.mass_kg, vehicle.inertia_kg_m2.m22);
+    let mut plant = common::rapier(NewtonEuler::new(vehicle, 2), &scene, &start, 1e9);
+    fly(&mut plant, &[0.0; 4], 20);
+    // The impulse acts at the upper end of the line, which is as high as the box.
+    let yields_per_kg = 1.0 / mass_kg + below_m * below_m / inertia_kg_m2;
+    let impulse_N_s = (1.0 + scene.boxes[0].surface.restitution) * speed_m_s / yields_per_kg;
+    let spin = plant.state().body.angular_velocity_B_rad_s;
+    let expected_rad_s = below_m * impulse_N_s / inertia_kg_m2;
+    assert!(
+        (spin.y - expected_rad_s).abs() < 1e-4 && spin.x.abs() < 1e-6,
+        "{spin:?}, not {expected_rad_s} rad/s"
+    );
+}
+
+#[test]
+fn a_vehicle_that_rolls_on_its_rim_slows_down_and_stops() {
+    let (radius_m, speed_m_s) = (hull().disc_radius_m, 0.2);
+    // The disc upright, its axis along y: rolling without slip.
+    let start = RigidBody {
+        attitude_WB: UnitQuaternion::from_axis_angle(&Vector3::x_axis(), -std::f64::consts::FRAC_PI_2),
+        velocity_W_m_s: Vector3::x() * speed_m_s,
+        angular_velocity_B_rad_s: Vector3::z() * (speed_m_s / radius_m),
+        ..RigidBody::level_at(Vector3::z() * radius_m)
+    };
+    let vehicle = common::free_body();
+    let mut plant = common::rapier(NewtonEuler::new(vehicle.clone(), 2), &Scene::default(), &start, 1e9);
+    fly(&mut plant, &[0.0; 4], 1_000);
+    // The ground carries it 0.02 radii ahead of the contact.
+    let carried_kg = vehicle.mass_kg + vehicle.inertia_kg_m2.m33 / (radius_m * radius_m);
+    let slows_m_s2 = 0.02 * vehicle.mass_kg * 9.81 / carried_kg;
+    let expected_m_s = speed_m_s - slows_m_s2;
+    let found_m_s = plant.state().body.velocity_W_m_s.x;
+    assert!((found_m_s - expected_m_s).abs() < 2e-3, "{found_m_s} m/s, not {expected_m_s} m/s");
+    fly(&mut plant, &[0.0; 4], 1_000);
+    let body = plant.state().body;
+    assert!(body.velocity_W_m_s.norm() < 1e-6 && body.angular_velocity_B_rad_s.norm() < 1e-6, "{body:?}");
 }

@@ -4,6 +4,7 @@
 mod common;
 
 use common::HUMMINGBIRD;
+use inputs::InputFiles;
 use plant::Airframe;
 use scenes::Scene;
 use std::path::Path;
@@ -137,8 +138,11 @@ fn a_base_gives_the_vehicle_and_the_file_its_effects() {
     let airframe = Airframe::from_files(with_drag, &[]).unwrap();
     let names: Vec<_> = airframe.effects().iter().map(|effect| effect.kind.name).collect();
     assert_eq!(names, ["rotor-drag", "parasitic-drag"]);
-    assert_eq!(Vehicle::base(path).unwrap(), Path::new("../vehicles/hummingbird.toml"));
-    assert_eq!(Vehicle::base(Path::new("../vehicles/hummingbird.toml")), None);
+    assert_eq!(
+        Vehicle::base(&InputFiles::default(), path).unwrap(),
+        Path::new("../vehicles/hummingbird.toml")
+    );
+    assert_eq!(Vehicle::base(&InputFiles::default(), Path::new("../vehicles/hummingbird.toml")), None);
 }
 
 #[test]

@@ -2,18 +2,32 @@
 //!
 //! mcap 0.26 takes memory for a length that a file states before it sees that the file is shorter, and computes with such
 //! lengths unchecked. So a record goes to it only where every length in it fits into it, and a chunk is unpacked as far
-//! as its bytes go, whatever its header says.
+//! as its bytes go, whatever its header says. What a file unpacks to and declares is bounded by its own length: a few
+//! bytes can be compressed from gigabytes.
 
+use crate::source::Source;
 use mcap::read::ChannelAccumulator;
-use mcap::records::{AttachmentIndex, ChunkHeader, Record, op};
+use mcap::records::{self, AttachmentIndex, ChunkHeader, Record, SchemaHeader, op};
 use mcap::{Channel, MAGIC, Message, parse_record};
 use std::borrow::Cow;
 use std::collections::{BTreeMap, BTreeSet};
-use std::io::Read as _;
+use std::io::Read;
 use std::sync::Arc;
 
 /// Larger chunks are refused: writers close theirs at some megabytes.
 const CHUNK_BYTES_MAX: u64 = 1 << 28;
+/// Longer records are refused: no chunk, message or attachment of a flight comes near.
+const RECORD_BYTES_MAX: u64 = 1 << 30;
+/// Bytes that the chunks of a file may unpack to: so many, and so many for each byte of the file. Messages that differ in
+/// nothing but their stamps are packed thirtyfold, zeros ten thousandfold.
+const UNPACKED_BYTES: u64 = 16 << 20;
+const UNPACKED_RATIO: u64 = 1024;
+/// Bytes of the schemas and channels that a file may declare, the schema counted for each of its channels: so many, and so
+/// many for each byte of the file.
+const DECLARED_BYTES: u64 = 4 << 20;
+const DECLARED_RATIO: u64 = 4;
+/// Longer names of topics and types are refused: they stand beside every value that is read.
+const NAME_BYTES_MAX: usize = 4096;
 /// Compressors look back over 8 MiB up to their level 19, however short what they compress is.
 const WINDOW_LOG: u32 = 23;
 /// Opcode and length, in front of every record.
@@ -27,11 +41,13 @@ const FOOTER_BYTES: usize = HEAD_BYTES + 8 + 8 + 4;
 pub struct Damage {
     place: String,
     reason: String,
+    /// True if the file itself may be sound: it cannot be read there, or is beyond a limit of this reader.
+    pub(crate) is_refused: bool,
 }
 
 /// Some bytes of a file, with the word for their places.
 struct Bytes<'a> {
-    bytes: &'a [u8],
+    source: Source<'a>,
     /// What the bytes belong to, such as ` of the chunk at byte 77`; nothing for the file itself.
     of: &'a str,
 }
@@ -39,34 +55,57 @@ struct Bytes<'a> {
 /// A record whose lengths fit into it.
 struct Raw<'a> {
     opcode: u8,
-    body: &'a [u8],
+    body: Cow<'a, [u8]>,
     /// The byte behind it.
     end: usize,
 }
 
 impl<'a> Bytes<'a> {
     fn damage(&self, at: usize, reason: impl ToString) -> Damage {
-        Damage { place: format!("byte {at}{}", self.of), reason: reason.to_string() }
+        let place = format!("byte {at}{}", self.of);
+        Damage { place, reason: reason.to_string(), is_refused: false }
+    }
+
+    fn refused(&self, at: usize, reason: impl ToString) -> Damage {
+        Damage { is_refused: true, ..self.damage(at, reason) }
+    }
+
+    /// What is wrong with the record at `at`, which the text calls `what`.
+    fn fault(&self, at: usize, what: &str, fault: &Fault) -> Damage {
+        let refuse = if fault.is_limit() { Self::refused } else { Self::damage };
+        refuse(self, at, format!("{what}{fault}"))
     }
 
     /// The record that begins at `at`.
     fn record(&self, at: usize) -> Result<Raw<'a>, Damage> {
-        let rest = self.bytes.get(at..).unwrap_or_default();
-        let Some((&[opcode, ref length @ ..], rest)) = rest.split_first_chunk::<HEAD_BYTES>() else {
-            let reason = format!("a record begins, and {} bytes are left of its head of 9", rest.len());
+        let head = self.read(at, HEAD_BYTES)?;
+        let Some((&[opcode, ref length @ ..], [])) = head.split_first_chunk::<HEAD_BYTES>() else {
+            let reason = format!("a record begins, and {} bytes are left of its head of 9", head.len());
             return Err(self.damage(at, reason));
         };
         let length = u64::from_le_bytes(*length);
-        let ((kind, parts), left) = (kind(opcode), rest.len());
-        let body = usize::try_from(length).ok().and_then(|length| rest.get(..length)).ok_or_else(|| {
-            self.damage(at, format!("a record ({kind}) says that it is {length} bytes long, {left} are left"))
-        })?;
-        check(parts, body).map_err(|fault| self.damage(at, format!("a record ({kind}) {fault}")))?;
-        Ok(Raw { opcode, body, end: at + HEAD_BYTES + body.len() })
+        let ((kind, parts), left) = (kind(opcode), self.source.len() - at - HEAD_BYTES);
+        let refused = |reason: String| Err(self.damage(at, format!("a record ({kind}) {reason}")));
+        let length = match usize::try_from(length) {
+            Ok(length) if length <= left => length,
+            _ => return refused(format!("says that it is {length} bytes long, {left} are left")),
+        };
+        if length as u64 > RECORD_BYTES_MAX {
+            let reason =
+                format!("a record ({kind}) is {length} bytes long, expected at most {RECORD_BYTES_MAX}");
+            return Err(self.refused(at, reason));
+        }
+        let body = self.read(at + HEAD_BYTES, length)?;
+        check(parts, &body).map_err(|fault| self.damage(at, format!("a record ({kind}) {fault}")))?;
+        Ok(Raw { opcode, body, end: at + HEAD_BYTES + length })
     }
 
-    fn parsed<'b>(&self, at: usize, raw: &Raw<'b>) -> Result<Record<'b>, Damage> {
-        parse_record(raw.opcode, raw.body)
+    fn read(&self, at: usize, length: usize) -> Result<Cow<'a, [u8]>, Damage> {
+        self.source.read(at, length).map_err(|error| self.refused(at, error))
+    }
+
+    fn parsed<'b>(&self, at: usize, raw: &'b Raw<'_>) -> Result<Record<'b>, Damage> {
+        parse_record(raw.opcode, &raw.body)
             .map_err(|error| self.damage(at, format!("a record ({}): {error}", kind(raw.opcode).0)))
     }
 }
@@ -113,7 +152,21 @@ enum Fault {
     Length { length: u64, left: usize },
     #[error("says that it unpacks to {0} bytes, expected at most {CHUNK_BYTES_MAX}")]
     Large(u64),
-    #[error("is compressed by `{0}`, expected zstd or nothing; convert the file")]
+    #[error(
+        "says that it unpacks to {stated} bytes; all chunks of this file may unpack to {limit}, {UNPACKED_RATIO} for each of \
+         its bytes and {UNPACKED_BYTES} more: it was made to fill the memory, or convert it without compression"
+    )]
+    Bomb { stated: u64, limit: u64 },
+    #[error(
+        "the schemas and channels of this file take more than {limit} bytes, {DECLARED_RATIO} for each of its bytes and \
+         {DECLARED_BYTES} more: it was made to fill the memory"
+    )]
+    Declared { limit: u64 },
+    #[error("the name of a {what} is {length} bytes long, expected at most {NAME_BYTES_MAX}")]
+    Name { what: &'static str, length: usize },
+    #[error("{0}")]
+    Contradiction(#[from] mcap::McapError),
+    #[error("is compressed by `{0}`, expected zstd, lz4 or nothing; convert the file")]
     Compression(String),
     #[error("has the checksum {stored:08x}, its content {found:08x}")]
     Checksum { stored: u32, found: u32 },
@@ -121,6 +174,13 @@ enum Fault {
     Decompression(#[from] std::io::Error),
     #[error("says that it unpacks to {stated} bytes, and unpacks to {found}")]
     Size { stated: u64, found: usize },
+}
+
+impl Fault {
+    /// Whether it is a limit of this reader.
+    fn is_limit(&self) -> bool {
+        matches!(self, Self::Large(_) | Self::Bomb { .. } | Self::Declared { .. } | Self::Name { .. })
+    }
 }
 
 /// Refuses a record with a length in it that goes beyond it.
@@ -165,19 +225,20 @@ fn long32<'a>(rest: &mut &'a [u8]) -> Result<&'a [u8], Fault> {
 /// assert!(damage.to_string().starts_with("byte 0: expected the magic bytes of MCAP"));
 /// assert!(messages.next().is_none());
 /// ```
-#[derive(Default)]
 pub struct Messages<'a> {
-    bytes: &'a [u8],
+    source: Source<'a>,
     at: usize,
-    chunk: Option<Chunk<'a>>,
-    channels: ChannelAccumulator<'static>,
+    chunk: Option<Chunk>,
+    /// Bytes that further chunks may unpack to.
+    unpacked_left: u64,
+    channels: Declared,
     is_behind_data: bool,
     is_done: bool,
 }
 
 /// A chunk that is being read.
-struct Chunk<'a> {
-    content: Cow<'a, [u8]>,
+struct Chunk {
+    content: Vec<u8>,
     at: usize,
     /// Its place, for errors.
     of: String,
@@ -187,21 +248,33 @@ impl<'a> Messages<'a> {
     /// The messages of a file with these bytes.
     #[must_use]
     pub fn new(bytes: &'a [u8]) -> Self {
-        Self { bytes, ..Self::default() }
+        Self::of(Source::Memory(bytes))
+    }
+
+    pub(crate) fn of(source: Source<'a>) -> Self {
+        Self {
+            source,
+            at: 0,
+            chunk: None,
+            unpacked_left: limit(&source, UNPACKED_BYTES, UNPACKED_RATIO),
+            channels: Declared::of(&source),
+            is_behind_data: false,
+            is_done: false,
+        }
     }
 
     /// The next message, if the next record is one.
     fn step(&mut self) -> Result<Option<Message<'static>>, Damage> {
         if let Some(chunk) = &mut self.chunk {
             if chunk.at < chunk.content.len() {
-                let bytes = Bytes { bytes: &chunk.content, of: &chunk.of };
+                let bytes = Bytes { source: Source::Memory(&chunk.content), of: &chunk.of };
                 let (at, raw) = (chunk.at, bytes.record(chunk.at)?);
                 chunk.at = raw.end;
                 return linked(&mut self.channels, &bytes, at, &raw);
             }
             self.chunk = None;
         }
-        let (file, at) = (Bytes { bytes: self.bytes, of: "" }, self.at);
+        let (file, at) = (Bytes { source: self.source, of: "" }, self.at);
         if at == 0 {
             self.at = magic(&file, 0)?;
             return Ok(None);
@@ -213,9 +286,17 @@ impl<'a> Messages<'a> {
             op::DATA_END => self.is_behind_data = true,
             op::CHUNK if !self.is_behind_data => {
                 if let Record::Chunk { header, data } = file.parsed(at, &raw)? {
-                    let Cow::Borrowed(data) = data else { return Ok(None) };
-                    let content = unpacked(&header, data)
-                        .map_err(|fault| file.damage(at, format!("a chunk {fault}")))?;
+                    let refused = |fault: Fault| file.fault(at, "a chunk ", &fault);
+                    let stated = header.uncompressed_size;
+                    let left = self.unpacked_left.checked_sub(stated).filter(|_| stated <= CHUNK_BYTES_MAX);
+                    let limit = limit(&self.source, UNPACKED_BYTES, UNPACKED_RATIO);
+                    self.unpacked_left = left.ok_or_else(|| {
+                        refused(match stated {
+                            ..=CHUNK_BYTES_MAX => Fault::Bomb { stated, limit },
+                            _ => Fault::Large(stated),
+                        })
+                    })?;
+                    let content = unpacked(&header, &data).map_err(refused)?.into_owned();
                     self.chunk = Some(Chunk { content, at: 0, of: format!(" of the chunk at byte {at}") });
                 }
             }
@@ -244,36 +325,86 @@ impl Iterator for Messages<'_> {
 
 /// A message with its channel; schemas and channels are kept for those that follow.
 fn linked(
-    channels: &mut ChannelAccumulator<'static>,
+    channels: &mut Declared,
     bytes: &Bytes<'_>,
     at: usize,
     raw: &Raw<'_>,
 ) -> Result<Option<Message<'static>>, Damage> {
     match bytes.parsed(at, raw)? {
-        Record::Schema { header, data } => channels.add_schema(header, Cow::Owned(data.into_owned())),
-        Record::Channel(channel) => channels.add_channel(channel),
+        Record::Schema { header, data } => channels.add_schema(header, data.into_owned()),
+        Record::Channel(channel) => channels.add_channel(channel, raw.body.len()),
         Record::Message { header, data } => {
             let id = header.channel_id;
             let unknown =
                 || bytes.damage(at, format!("a message of the channel {id}, which no record declares"));
-            let channel = channels.get(id).ok_or_else(unknown)?;
+            let channel = channels.all.get(id).ok_or_else(unknown)?;
             let data = Cow::Owned(data.into_owned());
             let (log_time, publish_time) = (header.log_time, header.publish_time);
             return Ok(Some(Message { channel, sequence: header.sequence, log_time, publish_time, data }));
         }
         _ => Ok(()),
     }
-    .map_err(|error| bytes.damage(at, error))?;
+    .map_err(|fault| bytes.fault(at, "", &fault))?;
     Ok(None)
+}
+
+/// So many bytes, and `ratio` for each byte of the file.
+fn limit(source: &Source<'_>, bytes: u64, ratio: u64) -> u64 {
+    bytes.saturating_add(ratio.saturating_mul(source.len() as u64))
+}
+
+/// The schemas and channels of a file, within its limit.
+struct Declared {
+    all: ChannelAccumulator<'static>,
+    schemas: BTreeSet<u16>,
+    left: u64,
+    limit: u64,
+}
+
+impl Declared {
+    fn of(source: &Source<'_>) -> Self {
+        let limit = limit(source, DECLARED_BYTES, DECLARED_RATIO);
+        Self { all: ChannelAccumulator::default(), schemas: BTreeSet::new(), left: limit, limit }
+    }
+
+    fn add_schema(&mut self, header: SchemaHeader, data: Vec<u8>) -> Result<(), Fault> {
+        require_name("type", &header.name)?;
+        if self.schemas.insert(header.id) {
+            self.take(data.len())?;
+        }
+        Ok(self.all.add_schema(header, Cow::Owned(data))?)
+    }
+
+    /// Adds a channel whose record is `length` bytes long.
+    fn add_channel(&mut self, channel: records::Channel, length: usize) -> Result<(), Fault> {
+        require_name("topic", &channel.topic)?;
+        let (id, is_new) = (channel.id, self.all.get(channel.id).is_none());
+        self.all.add_channel(channel)?;
+        let schema = self.all.get(id).and_then(|channel| channel.schema.clone()).filter(|_| is_new);
+        self.take(if is_new { length } else { 0 } + schema.map_or(0, |schema| schema.data.len()))
+    }
+
+    fn take(&mut self, bytes: usize) -> Result<(), Fault> {
+        let left = self.left.checked_sub(bytes as u64);
+        self.left = left.ok_or(Fault::Declared { limit: self.limit })?;
+        Ok(())
+    }
+}
+
+fn require_name(what: &'static str, name: &str) -> Result<(), Fault> {
+    if name.len() <= NAME_BYTES_MAX {
+        return Ok(());
+    }
+    Err(Fault::Name { what, length: name.len() })
 }
 
 /// The byte behind the magic bytes at `at`.
 fn magic(file: &Bytes<'_>, at: usize) -> Result<usize, Damage> {
-    let found = file.bytes.get(at..).unwrap_or_default();
-    if found.starts_with(MAGIC) {
+    let found = file.read(at, MAGIC.len())?;
+    if *found == *MAGIC {
         return Ok(at + MAGIC.len());
     }
-    let what = if MAGIC.starts_with(found) { "the file ends in front of" } else { "expected" };
+    let what = if MAGIC.starts_with(&found) { "the file ends in front of" } else { "expected" };
     Err(file.damage(at, format!("{what} the magic bytes of MCAP, 89 4d 43 41 50 30 0d 0a")))
 }
 
@@ -282,8 +413,8 @@ fn unpacked<'a>(header: &ChunkHeader, data: &'a [u8]) -> Result<Cow<'a, [u8]>, F
     let size = header.uncompressed_size;
     let content = match header.compression.as_str() {
         "" => Cow::Borrowed(data),
-        "zstd" if size <= CHUNK_BYTES_MAX => Cow::Owned(decompressed(data, size)?),
-        "zstd" => return Err(Fault::Large(size)),
+        "zstd" => Cow::Owned(read_all(zstd_decoder(data, size)?, size)?),
+        "lz4" => Cow::Owned(read_all(lz4_flex::frame::FrameDecoder::new(data), size)?),
         other => return Err(Fault::Compression(other.to_owned())),
     };
     let (stored, found) = (header.uncompressed_crc, crc32fast::hash(&content));
@@ -293,12 +424,17 @@ fn unpacked<'a>(header: &ChunkHeader, data: &'a [u8]) -> Result<Cow<'a, [u8]>, F
     Ok(content)
 }
 
-/// What `data` decompresses to, which is `size` bytes; the memory grows with what there is.
-fn decompressed(data: &[u8], size: u64) -> Result<Vec<u8>, Fault> {
-    let mut content = Vec::new();
+/// The decoder of a chunk of `size` bytes.
+fn zstd_decoder(data: &[u8], size: u64) -> Result<impl Read, Fault> {
     let mut decoder = zstd::Decoder::with_buffer(data)?;
     // A frame states how far it looks back, and the decoder takes as much: no further than the chunk is long.
     decoder.window_log_max(size.checked_ilog2().unwrap_or(0).saturating_add(1).max(WINDOW_LOG))?;
+    Ok(decoder)
+}
+
+/// The content of a chunk, which is `size` bytes; the memory grows with what there is.
+fn read_all(decoder: impl Read, size: u64) -> Result<Vec<u8>, Fault> {
+    let mut content = Vec::new();
     let read = decoder.take(size).read_to_end(&mut content)?;
     if read as u64 == size {
         return Ok(content);
@@ -316,22 +452,23 @@ pub(crate) struct Summary {
     pub attachments: Vec<AttachmentIndex>,
 }
 
-/// The summary of the file with these bytes; `None` where it has none.
-pub(crate) fn summary(bytes: &[u8]) -> Result<Option<Summary>, Damage> {
-    let file = Bytes { bytes, of: "" };
+/// The summary of a file; `None` where it has none.
+pub(crate) fn summary(source: Source<'_>) -> Result<Option<Summary>, Damage> {
+    let file = Bytes { source, of: "" };
     magic(&file, 0)?;
-    let end = bytes.len().saturating_sub(MAGIC.len());
+    let end = source.len().saturating_sub(MAGIC.len());
     magic(&file, end)?;
     let footer_at = end.saturating_sub(FOOTER_BYTES);
-    let Record::Footer(footer) = file.parsed(footer_at, &file.record(footer_at)?)? else {
+    let raw = file.record(footer_at)?;
+    let Record::Footer(footer) = file.parsed(footer_at, &raw)? else {
         return Err(file.damage(footer_at, "expected the footer"));
     };
     if footer.summary_start == 0 {
         return Ok(None);
     }
-    let (mut channels, mut known, mut counts) = (ChannelAccumulator::default(), Vec::new(), BTreeMap::new());
-    let (mut attachments, mut offsets) = (Vec::new(), BTreeSet::new());
-    let section = Bytes { bytes: &bytes[..footer_at], of: "" };
+    let (mut channels, mut known, mut counts) = (Declared::of(&source), Vec::new(), BTreeMap::new());
+    let (mut attachments, mut offsets, mut attached) = (Vec::new(), BTreeSet::new(), 0_u64);
+    let section = Bytes { source: source.up_to(footer_at), of: "" };
     let mut at = usize::try_from(footer.summary_start).unwrap_or(usize::MAX);
     while at != footer_at {
         let raw = section.record(at)?;
@@ -342,27 +479,33 @@ pub(crate) fn summary(bytes: &[u8]) -> Result<Option<Summary>, Damage> {
                 if !offsets.insert(index.offset) {
                     return Err(section.damage(at, "expected an attachment that is not listed yet"));
                 }
+                // One within another would be read twice.
+                attached = attached.saturating_add(index.length);
+                if attached > source.len() as u64 {
+                    return Err(section.damage(at, "the attachments are longer than the file"));
+                }
                 attachments.push(index);
             }
             Record::Channel(channel) => {
                 known.push(channel.id);
-                channels.add_channel(channel).map_err(|error| section.damage(at, error))?;
+                let added = channels.add_channel(channel, raw.body.len());
+                added.map_err(|fault| section.fault(at, "", &fault))?;
             }
             Record::Schema { header, data } => {
-                let data = Cow::Owned(data.into_owned());
-                channels.add_schema(header, data).map_err(|error| section.damage(at, error))?;
+                let added = channels.add_schema(header, data.into_owned());
+                added.map_err(|fault| section.fault(at, "", &fault))?;
             }
             _ => {}
         }
         at = raw.end;
     }
-    let counted = |id: u16| Some((id, (channels.get(id)?, counts.get(&id).copied().unwrap_or(0))));
+    let counted = |id: u16| Some((id, (channels.all.get(id)?, counts.get(&id).copied().unwrap_or(0))));
     Ok(Some(Summary { channels: known.into_iter().filter_map(counted).collect(), attachments }))
 }
 
 /// Name and content of the attachment at the place that `index` names.
-pub(crate) fn attachment(bytes: &[u8], index: &AttachmentIndex) -> Result<(String, Vec<u8>), Damage> {
-    let file = Bytes { bytes, of: "" };
+pub(crate) fn attachment(source: Source<'_>, index: &AttachmentIndex) -> Result<(String, Vec<u8>), Damage> {
+    let file = Bytes { source, of: "" };
     let at = usize::try_from(index.offset).unwrap_or(usize::MAX);
     let raw = file.record(at)?;
     match file.parsed(at, &raw)? {

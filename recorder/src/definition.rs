@@ -29,8 +29,13 @@ pub enum DecodeError {
     #[error("`{0}`: the definition names more values than the message has bytes")]
     Values(String),
     /// Names that would take memory without bound.
-    #[error("the paths of its values are longer than {PATH_BYTES_MAX} times the message")]
+    #[error(
+        "the paths and units of its values are longer than {PATH_BYTES_MAX} times the message, or than {NAMES_BYTES_MAX} bytes"
+    )]
     Paths,
+    /// Values that would take memory without bound.
+    #[error("it has more than {VALUES_MAX} values, as images have; name another topic")]
+    Large,
     /// A type that the definition names only.
     #[error("type {0} is not defined")]
     Undefined(String),
@@ -123,6 +128,11 @@ const DEPTH_MAX: usize = 64;
 /// How long the paths of values may be for each byte of the message, which counts as DEPTH_MAX bytes longer.
 const PATH_BYTES_MAX: usize = 1024;
 
+/// Bytes that the paths and units of the values of one message may have.
+const NAMES_BYTES_MAX: usize = 64 << 20;
+/// Values of one message: each takes a hundred times the memory of a byte of an image.
+const VALUES_MAX: usize = 1 << 20;
+
 /// A parsed definition.
 ///
 /// ```
@@ -183,7 +193,7 @@ impl Definition {
             leaves: Vec::new(),
             depth: 0,
             values_left: DEPTH_MAX.saturating_mul(body.len() + 1),
-            path_bytes_left: PATH_BYTES_MAX.saturating_mul(body.len() + DEPTH_MAX),
+            path_bytes_left: PATH_BYTES_MAX.saturating_mul(body.len() + DEPTH_MAX).min(NAMES_BYTES_MAX),
         };
         walk.message(&self.root, "", "")?;
         Ok(walk.leaves)
@@ -278,7 +288,11 @@ impl Walk<'_> {
     fn value(&mut self, base: &str, path: String, unit: &str) -> Result<(), DecodeError> {
         self.values_left =
             self.values_left.checked_sub(1).ok_or_else(|| DecodeError::Values(path.clone()))?;
-        self.path_bytes_left = self.path_bytes_left.checked_sub(path.len()).ok_or(DecodeError::Paths)?;
+        let names = path.len() + unit.len();
+        self.path_bytes_left = self.path_bytes_left.checked_sub(names).ok_or(DecodeError::Paths)?;
+        if self.leaves.len() == VALUES_MAX {
+            return Err(DecodeError::Large);
+        }
         let cdr = &mut self.cdr;
         let value = match base {
             "float64" => Value::Float(f64::from_le_bytes(cdr.take()?)),

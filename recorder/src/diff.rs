@@ -60,7 +60,8 @@ impl fmt::Display for Difference {
 /// # Errors
 /// If one of them is damaged.
 pub fn first_difference(a: &Recording, b: &Recording) -> Result<Option<Difference>, RecordingError> {
-    if a.bytes() == b.bytes() {
+    let is_same = a.source().is_same(&b.source()).map_err(RecordingError::file("read", a.path()))?;
+    if is_same {
         return Ok(None);
     }
     let prefix = |shorter: &Recording, last_tick, longer: &Recording| {

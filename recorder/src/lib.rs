@@ -3,6 +3,7 @@
 //! - [`node`]: the process that records a run
 //! - [`writer`]: the MCAP file it writes
 //! - [`definition`]: what a ROS 2 message definition says about bytes
+//! - `source`: the bytes of a recording, in memory or in a file
 //! - `container`: the records of an MCAP file, their lengths checked before memory is taken for them
 //! - [`reader`]: a recording's topics, messages and attachments
 //! - [`series`]: one field of one topic over time
@@ -52,6 +53,7 @@ mod error;
 pub mod node;
 pub mod reader;
 pub mod series;
+mod source;
 pub mod writer;
 
 pub use error::RecordingError;

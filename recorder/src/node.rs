@@ -7,6 +7,7 @@ use bus::component::{Component, Info, Internal, StepError};
 use bus::context::{NodeContext, StepContext};
 use bus::ports::AnyInputs;
 use diagnostics::ParameterError;
+use inputs::InputFiles;
 use serde::Deserialize;
 use std::path::PathBuf;
 
@@ -37,7 +38,7 @@ pub struct Parameters {
 pub struct AttachedFile {
     /// Name in the recording.
     pub name: String,
-    /// Where its content is.
+    /// Path of the file among those of the run.
     pub path: PathBuf,
 }
 
@@ -48,6 +49,7 @@ pub const SHADOW_PREFIX: &str = "/shadow";
 /// The recorder of a run.
 pub struct Recorder {
     parameters: Parameters,
+    files: InputFiles,
     flush_ticks: u32,
     recording: Option<Recording>,
 }
@@ -80,7 +82,8 @@ impl Component for Recorder {
     type State = Internal;
 
     fn new(parameters: Parameters, context: &NodeContext<'_>) -> Result<Self, ParameterError> {
-        Ok(Self { parameters, flush_ticks: flush_period_ticks(context.tick_s()), recording: None })
+        let (files, flush_ticks) = (context.files.clone(), flush_period_ticks(context.tick_s()));
+        Ok(Self { parameters, files, flush_ticks, recording: None })
     }
 
     fn initial(&self) -> Internal {
@@ -88,7 +91,7 @@ impl Component for Recorder {
     }
 
     fn connected(&mut self, topics: &[(&str, &Announcement)]) -> Result<(), StepError> {
-        self.recording = Some(Recording::begin(&self.parameters, topics)?);
+        self.recording = Some(Recording::begin(&self.parameters, &self.files, topics)?);
         Ok(())
     }
 
@@ -117,11 +120,15 @@ fn flush_period_ticks(tick_s: f64) -> u32 {
 }
 
 impl Recording {
-    fn begin(parameters: &Parameters, topics: &[(&str, &Announcement)]) -> Result<Self, RecordingError> {
+    fn begin(
+        parameters: &Parameters,
+        files: &InputFiles,
+        topics: &[(&str, &Announcement)],
+    ) -> Result<Self, RecordingError> {
         let mut writer = RecordingWriter::create(&parameters.path)?;
         for file in &parameters.attachments {
-            let text = std::fs::read(&file.path).map_err(RecordingError::file("attach to", &file.path))?;
-            writer.attach(&file.name, &text)?;
+            let bytes = files.bytes(&file.path).map_err(RecordingError::file("attach", &file.path))?;
+            writer.attach(&file.name, &bytes)?;
         }
         let topic = |&(name, announcement): &(&str, &Announcement)| {
             let shadow_name = format!("{SHADOW_PREFIX}{name}");

@@ -5,10 +5,11 @@ pub use crate::container::{Damage, Messages};
 use crate::container::{Channels, attachment, summary};
 use crate::definition::{Definition, Leaf};
 use crate::error::RecordingError;
-use memmap2::Mmap;
+use crate::source::Source;
 use std::collections::BTreeMap;
 use std::fs::File;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 /// A message of a recording.
 #[derive(Debug)]
@@ -50,9 +51,44 @@ pub struct Topic {
 #[derive(Debug)]
 pub struct Recording {
     path: PathBuf,
-    bytes: Mmap,
+    content: Content,
     topics: BTreeMap<String, Topic>,
     cut: Option<Cut>,
+}
+
+/// The bytes of a recording.
+#[derive(Debug)]
+enum Content {
+    /// Those of a file, read as they are needed.
+    File {
+        file: File,
+        /// Bytes of the file when it was opened; what is appended later does not belong to it.
+        length: usize,
+    },
+    /// Those that were read before.
+    Read(Arc<[u8]>),
+}
+
+impl Content {
+    /// Another handle on `file`, with its present length.
+    fn of_file(file: &File, path: &Path) -> Result<Self, RecordingError> {
+        let opened = file.try_clone().and_then(|file| {
+            let found = file.metadata()?;
+            if !found.is_file() {
+                return Err(std::io::Error::other("it is not a regular file"));
+            }
+            let length = usize::try_from(found.len()).map_err(std::io::Error::other)?;
+            Ok(Self::File { file, length })
+        });
+        opened.map_err(RecordingError::file("open", path))
+    }
+
+    fn source(&self) -> Source<'_> {
+        match self {
+            Self::File { file, length } => Source::File { file, length: *length },
+            Self::Read(bytes) => Source::Memory(bytes),
+        }
+    }
 }
 
 /// How a recording ends whose writer did not finish it.
@@ -91,11 +127,23 @@ impl Recording {
     /// # Errors
     /// As [`Recording::open`].
     pub fn of_file(file: &File, path: &Path) -> Result<Self, RecordingError> {
-        let bytes = map(file, path)?;
-        let summary = summary(&bytes).map_err(|damage| RecordingError::content(path, damage))?;
+        let content = Content::of_file(file, path)?;
+        Self::complete(content, path)
+    }
+
+    /// The complete recording that `bytes` are, which is called `path` in messages.
+    ///
+    /// # Errors
+    /// As [`Recording::open`].
+    pub fn of_bytes(bytes: Arc<[u8]>, path: &Path) -> Result<Self, RecordingError> {
+        Self::complete(Content::Read(bytes), path)
+    }
+
+    fn complete(content: Content, path: &Path) -> Result<Self, RecordingError> {
+        let summary = summary(content.source()).map_err(|damage| RecordingError::content(path, damage))?;
         let missing = || RecordingError::content(path, "it has no summary section");
         let topics = topics(&summary.ok_or_else(missing)?.channels, path)?;
-        Ok(Self { path: path.to_owned(), bytes, topics, cut: None })
+        Ok(Self { path: path.to_owned(), content, topics, cut: None })
     }
 
     /// Opens the recording at `path`, or what is whole of it if its writer did not come to the end of the file:
@@ -105,19 +153,29 @@ impl Recording {
     /// If the file cannot be read or is no MCAP file.
     pub fn salvage(path: &Path) -> Result<Self, RecordingError> {
         let file = File::open(path).map_err(RecordingError::file("open", path))?;
-        let bytes = map(&file, path)?;
-        if !bytes.starts_with(mcap::MAGIC) || bytes.ends_with(mcap::MAGIC) && bytes.len() > mcap::MAGIC.len()
-        {
+        let content = Content::of_file(&file, path)?;
+        let source = content.source();
+        let is_magic = |at: usize| {
+            let found = source.read(at, mcap::MAGIC.len());
+            found.map(|found| *found == *mcap::MAGIC).map_err(RecordingError::file("read", path))
+        };
+        let magic = mcap::MAGIC.len();
+        if !is_magic(0)? || (source.len() > magic && is_magic(source.len() - magic)?) {
             return Self::of_file(&file, path);
         }
         let mut channels = Channels::new();
         let mut last_tick = None;
-        for message in Messages::new(&bytes).map_while(Result::ok) {
+        for message in Messages::of(source) {
+            let message = match message {
+                Ok(message) => message,
+                Err(damage) if damage.is_refused => return Err(RecordingError::content(path, damage)),
+                Err(_) => break,
+            };
             last_tick = Some(message.sequence);
             channels.entry(message.channel.id).or_insert((message.channel, 0)).1 += 1;
         }
         let topics = topics(&channels, path)?;
-        Ok(Self { path: path.to_owned(), bytes, topics, cut: Some(Cut { last_tick }) })
+        Ok(Self { path: path.to_owned(), content, topics, cut: Some(Cut { last_tick }) })
     }
 
     /// How the file ends, where its writer did not finish it.
@@ -132,10 +190,9 @@ impl Recording {
         &self.path
     }
 
-    /// The whole file.
-    #[must_use]
-    pub fn bytes(&self) -> &[u8] {
-        &self.bytes
+    /// The bytes of the file.
+    pub(crate) fn source(&self) -> Source<'_> {
+        self.content.source()
     }
 
     /// The topics by name.
@@ -158,8 +215,12 @@ impl Recording {
     /// All messages in the order of the file: by tick, then by topic. A damaged chunk is an error in front of any
     /// of its messages; a recording that was cut ends in front of it.
     pub fn messages(&self) -> impl Iterator<Item = Result<Record, RecordingError>> {
-        let messages = Messages::new(&self.bytes);
-        messages.take_while(|message| message.is_ok() || self.cut.is_none()).map(|message| {
+        let messages = Messages::of(self.source());
+        let is_whole = |message: &Result<_, Damage>| match message {
+            Ok(_) => true,
+            Err(damage) => self.cut.is_none() || damage.is_refused,
+        };
+        messages.take_while(is_whole).map(|message| {
             let message = message.map_err(|damage| RecordingError::content(&self.path, damage))?;
             Ok(Record {
                 tick: message.sequence,
@@ -192,16 +253,10 @@ impl Recording {
             return Ok(Vec::new());
         }
         let broken = |damage| RecordingError::content(&self.path, damage);
-        let summary = summary(&self.bytes).map_err(broken)?;
+        let summary = summary(self.source()).map_err(broken)?;
         let attachments = summary.iter().flat_map(|summary| &summary.attachments);
-        attachments.map(|index| attachment(&self.bytes, index).map_err(broken)).collect()
+        attachments.map(|index| attachment(self.source(), index).map_err(broken)).collect()
     }
-}
-
-fn map(file: &File, path: &Path) -> Result<Mmap, RecordingError> {
-    // SAFETY: the mapping is read only, and no program of ours truncates a recording: it puts another file in
-    // its place. Another program that truncates it meanwhile ends this one with SIGBUS.
-    unsafe { Mmap::map(file) }.map_err(RecordingError::file("open", path))
 }
 
 /// The topics of `channels`, each given with the number of its messages.

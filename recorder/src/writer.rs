@@ -11,6 +11,7 @@ use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::BufWriter;
+use std::os::unix::fs::OpenOptionsExt as _;
 use std::path::{Path, PathBuf};
 
 /// Bytes of messages after which a chunk is closed.
@@ -20,6 +21,8 @@ const ZSTD_LEVEL: u32 = 1;
 /// The bytes with which every recording of ours starts, by MCAP's specification: "Magic", then the record "Header" with
 /// the profile and the library that are written here.
 pub const START: &[u8] = b"\x89MCAP0\r\n\x01\x16\0\0\0\0\0\0\0\x04\0\0\0ros2\x0a\0\0\0hummingbus";
+/// `O_NOFOLLOW` of the kernel.
+const NO_LINK: i32 = rustix::fs::OFlags::NOFOLLOW.bits().cast_signed();
 const FILE_BUFFER_BYTES: usize = 1024 * 1024;
 
 /// A recording being written.
@@ -139,7 +142,8 @@ fn open_empty(path: &Path) -> std::io::Result<File> {
         // To open a pipe or a device is to do something to it.
         Ok(old) if !old.is_file() => refused("it exists and is not a regular file"),
         Ok(old) if old.len() > 0 => refused("it exists and is not empty; name another file"),
-        Ok(_) => File::options().write(true).open(path),
+        // Whoever put a link in its place meanwhile leads nowhere.
+        Ok(_) => File::options().write(true).custom_flags(NO_LINK).open(path),
         Err(_) => File::create_new(path),
     }
 }

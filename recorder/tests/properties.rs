@@ -277,10 +277,10 @@ fn a_length_beyond_the_file_is_refused_with_its_place() {
     );
     let at = WHOLE.windows(9).position(|bytes| bytes[0] == 6 && bytes[3..9] == [0; 6]).unwrap();
     let mut claims = WHOLE.clone();
-    claims[at + 25..at + 33].copy_from_slice(&(1_u64 << 27).to_le_bytes());
+    claims[at + 25..at + 33].copy_from_slice(&(1_u64 << 24).to_le_bytes());
     let said = refused(&claims);
     assert!(
-        said.starts_with(&format!("byte {at}: a chunk says that it unpacks to 134217728 bytes, and ")),
+        said.starts_with(&format!("byte {at}: a chunk says that it unpacks to 16777216 bytes, and ")),
         "{said}"
     );
     // A record of a chunk that goes on behind the chunk's end, in the same file.
@@ -350,4 +350,159 @@ fn a_recording_starts_as_every_one_does_and_replaces_nothing() {
     std::fs::write(&empty, "").unwrap();
     RecordingWriter::create(&empty).unwrap().finish().unwrap();
     assert!(Recording::open(&empty).unwrap().topics().is_empty());
+}
+
+/// A record of an MCAP file.
+fn record(opcode: u8, body: &[u8]) -> Vec<u8> {
+    [&[opcode][..], &(body.len() as u64).to_le_bytes(), body].concat()
+}
+
+/// A text or a table with its length in front.
+fn sized(bytes: &[u8]) -> Vec<u8> {
+    [&u32::try_from(bytes.len()).unwrap().to_le_bytes()[..], bytes].concat()
+}
+
+fn schema(id: u16, text: &str) -> Vec<u8> {
+    record(
+        3,
+        &[&id.to_le_bytes()[..], &sized(b"a/msg/A"), &sized(b"ros2msg"), &sized(text.as_bytes())].concat(),
+    )
+}
+
+fn channel(id: u16, schema: u16, topic: &str) -> Vec<u8> {
+    let ids = [id.to_le_bytes(), schema.to_le_bytes()].concat();
+    record(4, &[&ids[..], &sized(topic.as_bytes()), &sized(b"cdr"), &sized(b"")].concat())
+}
+
+fn message(channel: u16, body: &[u8]) -> Vec<u8> {
+    record(5, &[&channel.to_le_bytes()[..], &[0; 20], &[0, 1, 0, 0], body].concat())
+}
+
+/// A file whose writer was cut off behind a chunk that holds `records`, packed as far as zstd packs.
+fn packed(records: &[u8]) -> Vec<u8> {
+    let chunk = zstd::encode_all(records, 3).unwrap();
+    let head = [[0; 16].as_slice(), &(records.len() as u64).to_le_bytes(), &[0; 4], &sized(b"zstd")].concat();
+    let body = [&head[..], &(chunk.len() as u64).to_le_bytes(), &chunk].concat();
+    [mcap::MAGIC, &record(1, &[0; 8]), &record(6, &body)].concat()
+}
+
+/// Reads a small file in every way, which must take little memory; returns the reason why reading ends, if there is one.
+#[track_caller]
+fn refused(bytes: &[u8]) -> Option<String> {
+    assert!(bytes.len() < 20_000, "{} bytes", bytes.len());
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("small.mcap");
+    std::fs::write(&path, bytes).unwrap();
+    let before = HELD.get();
+    HELD_MAX.set(before);
+    let reason = Messages::new(bytes).find_map(Result::err).map(|damage| damage.to_string());
+    let salvaged = Recording::salvage(&path);
+    let undecoded = salvaged.as_ref().ok().and_then(|recording| {
+        recording.messages().map_while(Result::ok).find_map(|record| recording.decode(&record).err())
+    });
+    let held = HELD_MAX.get() - before;
+    // A chunk of 16 MiB while it grows, and a million values.
+    assert!(held < 400 << 20, "{held} bytes were held");
+    let told = salvaged.err().or(undecoded).map(|error| error.to_string());
+    // A command tells what a reader of the bare messages does.
+    let reason = reason.filter(|reason| !reason.contains("a record begins, and 0 bytes are left"));
+    assert!(reason.is_none() || told.is_some(), "{reason:?} is not told");
+    told
+}
+
+#[test]
+fn a_small_file_that_unpacks_to_gigabytes_is_refused() {
+    let zeros = vec![0; 200 << 20];
+    let bomb = packed(&zeros);
+    let said = refused(&bomb).unwrap();
+    assert!(
+        said.contains("a chunk says that it unpacks to 209715200 bytes") && said.contains("convert it"),
+        "{said}"
+    );
+    // Each chunk is small, and all together are not.
+    let chunk = &packed(&record(0x80, &zeros[..9 << 20]))[8 + 17..];
+    let said = refused(&[&bomb[..8 + 17], &chunk.repeat(5)].concat()).unwrap();
+    assert!(said.contains("all chunks of this file may unpack to"), "{said}");
+    // A chunk of a few megabytes that is as constant as can be is read.
+    let constant = [
+        schema(1, "uint8[] data"),
+        channel(1, 1, "/a"),
+        message(1, &[&4_u32.to_le_bytes()[..], &[0; 4]].concat()),
+    ];
+    assert_eq!(refused(&packed(&[constant.concat(), record(0x80, &zeros[..8 << 20])].concat())), None);
+}
+
+#[test]
+fn a_small_file_that_declares_much_is_refused() {
+    let long =
+        packed(&[schema(1, &"a b\n".repeat(3 << 20)), channel(1, 1, "/a"), message(1, &[0; 8])].concat());
+    let said = refused(&long).unwrap();
+    assert!(said.contains("the schemas and channels of this file take more than"), "{said}");
+    // One schema of many channels is read for each of them.
+    let channels = (0..600).flat_map(|id| [channel(id, 1, &format!("/{id}")), message(id, &[0; 8])].concat());
+    let shared = packed(&[schema(1, &"int8 b\n".repeat(4096)), channels.collect()].concat());
+    let said = refused(&shared).unwrap();
+    assert!(said.contains("the schemas and channels of this file take more than"), "{said}");
+    let named =
+        packed(&[schema(1, "int8 b"), channel(1, 1, &"x".repeat(5000)), message(1, &[0; 8])].concat());
+    let said = refused(&named).unwrap();
+    assert!(said.contains("the name of a topic is 5000 bytes long, expected at most 4096"), "{said}");
+}
+
+#[test]
+fn a_message_of_millions_of_values_is_refused() {
+    let body = [&(12_u32 << 20).to_le_bytes()[..], &vec![0; 12 << 20]].concat();
+    let image = packed(&[schema(1, "uint8[] data"), channel(1, 1, "/a"), message(1, &body)].concat());
+    let said = refused(&image).unwrap();
+    assert!(said.contains("more than 1048576 values, as images have"), "{said}");
+    let units = format!("uint8[100000] data # [{}]", "m".repeat(5000));
+    let long = packed(&[schema(1, &units), channel(1, 1, "/a"), message(1, &[0; 100_000])].concat());
+    assert!(refused(&long).unwrap().contains("the paths and units of its values are longer than"));
+}
+
+/// An attachment may lie within another: both would be read whole.
+#[test]
+fn attachments_that_are_longer_than_the_file_are_refused() {
+    const ATTACHMENT_INDEX: u8 = 0x0a;
+    let mut bytes = PLAIN.clone();
+    let number = |bytes: &[u8], at: usize| {
+        usize::try_from(u64::from_le_bytes(bytes[at..at + 8].try_into().unwrap())).unwrap()
+    };
+    let mut at = number(&bytes, bytes.len() - 8 - 29 + 9);
+    while bytes[at] != ATTACHMENT_INDEX {
+        at += 9 + number(&bytes, at + 1);
+    }
+    let mut index = bytes[at..at + 9 + number(&bytes, at + 1)].to_vec();
+    index[9] += 1;
+    index[17..25].copy_from_slice(&(2 * PLAIN.len() as u64).to_le_bytes());
+    bytes.splice(at..at, index);
+    let crc = bytes.len() - 8 - 4;
+    bytes[crc..crc + 4].fill(0);
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("nested.mcap");
+    std::fs::write(&path, bytes).unwrap();
+    let error = Recording::open(&path).unwrap_err().to_string();
+    assert!(error.contains("the attachments are longer than the file"), "{error}");
+}
+
+#[test]
+fn a_recording_that_is_cut_while_it_is_read_is_an_error_in_words() {
+    let folder = tempfile::tempdir().unwrap();
+    let [path, other] = ["flown.mcap", "other.mcap"].map(|name| folder.path().join(name));
+    std::fs::write(&other, &*WHOLE).unwrap();
+    // Both a complete recording and what is left of one.
+    for length in [WHOLE.len(), WHOLE.len() - 1] {
+        std::fs::write(&path, &WHOLE[..length]).unwrap();
+        let recording = Recording::salvage(&path).unwrap();
+        let mut messages = recording.messages();
+        assert!(messages.next().unwrap().is_ok());
+        std::fs::File::options().write(true).open(&path).unwrap().set_len(4096).unwrap();
+        let error = messages.find_map(Result::err).unwrap().to_string();
+        assert!(
+            error.contains("flown.mcap") && error.contains("another program has cut the file"),
+            "{error}"
+        );
+        let error = first_difference(&recording, &Recording::open(&other).unwrap());
+        assert!(error.is_err() || length != WHOLE.len(), "{error:?}");
+    }
 }

@@ -52,7 +52,7 @@ pub struct Validation<'a> {
 
 impl Validation<'_> {
     /// Flies the measured commands of every flight with each of `vehicles`, all vehicles of a flight in one run, and
-    /// compares; `tell` hears a line for each flight.
+    /// compares; `tell` hears a line for each flight. Vehicle files that `flights` has read are not read again.
     ///
     /// # Errors
     /// A file that cannot be read, a flight without what a replay needs, a run that fails or is stopped.
@@ -63,7 +63,7 @@ impl Validation<'_> {
         tell: &mut dyn FnMut(&str),
     ) -> Result<Errors> {
         for vehicle in vehicles {
-            Vehicle::load(vehicle)?;
+            Vehicle::load_from(&flights.files, vehicle)?;
         }
         require_distinct_folders(flights)?;
         let scratch = if self.keep.is_none() { Some(Scratch::create()?) } else { None };
@@ -73,7 +73,7 @@ impl Validation<'_> {
             let replay = Replay::prepare(flight, vehicles, folder)
                 .with_context(|| format!("the flight `{}` cannot be replayed", flight.name))?;
             let (host_s, recording) = replay
-                .fly(self.components, self.stop, tell)
+                .fly(self.components, self.stop, &flights.files, tell)
                 .with_context(|| not_flown(flight, self.keep.map(|_| replay.folder.as_path())))?;
             let flown = windows::flight_errors(flight, &replay, &recording, vehicles.len())?;
             tell(&format!("{}: {:.1} s flown in {host_s:.1} s", flight.name, replay.duration_s()));

@@ -1,12 +1,13 @@
 //! Recordings and logs that one run at a time writes: claimed before it begins, locked while it writes.
 
 use crate::file_lock;
-use crate::output_file::{LOG, LOG_START, RECORDING, check};
+use crate::location::Location;
+use crate::output_file::{LOG, LOG_START, RECORDING, check, locate};
 use anyhow::{Context, Result, anyhow, bail};
 use rustix::fs::OFlags;
-use std::fs::{File, Metadata, OpenOptions};
+use std::fs::File;
 use std::io::{self, ErrorKind, Write as _};
-use std::os::unix::fs::{FileExt as _, MetadataExt as _, OpenOptionsExt as _};
+use std::os::unix::fs::FileExt as _;
 use std::path::{Path, PathBuf};
 
 /// What stands in the name of a recording in front of its extension while it is not complete.
@@ -21,34 +22,20 @@ enum Attempt {
     Gone,
 }
 
-fn try_lock(file: File, path: &Path) -> io::Result<Attempt> {
+fn try_lock(file: File, location: &Location) -> io::Result<Attempt> {
     Ok(match file_lock::try_exclusive(&file)? {
-        true if is_at(&file, path) => Attempt::Locked(file),
+        true if location.holds(&file) => Attempt::Locked(file),
         true => Attempt::Gone,
         false => Attempt::Held,
     })
-}
-
-/// Whether `file` is what lies at `path`.
-fn is_at(file: &File, path: &Path) -> bool {
-    let identity = |file: Metadata| (file.dev(), file.ino());
-    let found = std::fs::symlink_metadata(path).map(identity);
-    matches!((file.metadata().map(identity), found), (Ok(opened), Ok(found)) if opened == found)
-}
-
-fn open_options() -> OpenOptions {
-    let mut options = OpenOptions::new();
-    // Neither follows a link that was put there meanwhile nor waits for the other end of a pipe.
-    let flags = OFlags::NOFOLLOW | OFlags::NONBLOCK;
-    options.read(true).write(true).custom_flags(flags.bits().cast_signed());
-    options
 }
 
 /// A recording that is being written, under another name beside its place, and locked; dropping it leaves what was
 /// written there, or nothing where nothing was.
 #[derive(Debug)]
 pub struct Partial {
-    real: PathBuf,
+    real: Location,
+    location: Location,
     /// Where it is written.
     pub path: PathBuf,
     /// The file, whatever its name.
@@ -65,17 +52,18 @@ impl Partial {
     /// # Errors
     /// If something is in the way that must not be replaced, or the folder cannot be written to.
     pub fn claim(path: &Path) -> Result<Option<Self>> {
-        let real = check(path, &RECORDING)?;
-        let partial = partial_path(&real)?;
-        check(&partial, &RECORDING)?;
-        let cannot = || format!("cannot create the recording {}", partial.display());
-        let claimed = claim_new(&partial).with_context(cannot)?;
-        Ok(claimed.map(|(file, kept)| Self { real, path: partial, file, kept }))
+        let real = locate(path, &RECORDING)?;
+        let path = partial_path(&real.path)?;
+        check(&path, &RECORDING)?;
+        let location = real.sibling(path.file_name().unwrap_or_default());
+        let cannot = || format!("cannot create the recording {}", path.display());
+        let claimed = claim_new(&location).with_context(cannot)?;
+        Ok(claimed.map(|(file, kept)| Self { real, location, path, file, kept }))
     }
 
     /// Whether it still lies where it is written.
     pub fn is_there(&self) -> bool {
-        is_at(&self.file, &self.path)
+        self.location.holds(&self.file)
     }
 
     /// Whether something was written.
@@ -88,19 +76,25 @@ impl Partial {
     /// # Errors
     /// If something came there during the run that must not be replaced, or the file was taken away.
     pub fn finish(&self) -> Result<()> {
-        let cannot = || format!("cannot put {} in the place of {}", self.path.display(), self.real.display());
-        check(&self.real, &RECORDING)?;
+        let cannot =
+            || format!("cannot put {} in the place of {}", self.path.display(), self.real.path.display());
+        check(&self.real.path, &RECORDING)?;
         if !self.is_there() {
             bail!("{}: somebody removed or replaced it during the run", cannot());
         }
-        std::fs::rename(&self.path, &self.real).with_context(cannot)
+        self.location.rename(&self.real).with_context(cannot)
+    }
+
+    /// Removes it.
+    pub fn remove(&self) {
+        let _ = self.location.remove();
     }
 }
 
 impl Drop for Partial {
     fn drop(&mut self) {
         if self.is_empty() && self.is_there() {
-            let _ = std::fs::remove_file(&self.path);
+            self.remove();
         }
     }
 }
@@ -131,15 +125,15 @@ fn with_suffix(path: &Path, suffix: &str) -> PathBuf {
     path.with_file_name(name)
 }
 
-/// A new file at `path`, locked, and where what lay there before is kept; `None` where somebody else has one there.
+/// A new file at `location`, locked, and where what lay there before is kept; `None` where somebody else has one there.
 ///
 /// Of any number of processes that try at once exactly one gets it: only who has locked what lies there removes it, and
 /// who has created it and then finds it locked or gone has lost it to another.
-fn claim_new(path: &Path) -> io::Result<Option<(File, Option<PathBuf>)>> {
+fn claim_new(location: &Location) -> io::Result<Option<(File, Option<PathBuf>)>> {
     let mut kept = None;
     loop {
-        let old = match open_options().open(path) {
-            Ok(old) => try_lock(old, path)?,
+        let old = match location.open(OFlags::RDWR) {
+            Ok(old) => try_lock(old, location)?,
             Err(error) if error.kind() == ErrorKind::NotFound => Attempt::Gone,
             Err(error) => return Err(error),
         };
@@ -149,11 +143,11 @@ fn claim_new(path: &Path) -> io::Result<Option<(File, Option<PathBuf>)>> {
             // Locked until its name is gone: nobody removes what came after it.
             Attempt::Locked(old) => {
                 RECORDING.require(&old)?;
-                kept = keep_aside(&old, path)?.or(kept);
+                kept = keep_aside(&old, location)?.or(kept);
             }
         }
-        match open_options().create_new(true).open(path) {
-            Ok(new) => match try_lock(new, path)? {
+        match location.open(OFlags::RDWR | OFlags::CREATE | OFlags::EXCL) {
+            Ok(new) => match try_lock(new, location)? {
                 Attempt::Locked(new) => return Ok(Some((new, kept))),
                 Attempt::Held => return Ok(None),
                 Attempt::Gone => {}
@@ -164,20 +158,21 @@ fn claim_new(path: &Path) -> io::Result<Option<(File, Option<PathBuf>)>> {
     }
 }
 
-/// Gives the locked recording `old` at `path` the first free name of `NAME-2.mcap`, `NAME-3.mcap`, …; one that is empty
-/// is removed.
-fn keep_aside(old: &File, path: &Path) -> io::Result<Option<PathBuf>> {
+/// Gives the locked recording `old` at `location` the first free name of `NAME-2.mcap`, `NAME-3.mcap`, …; one that is
+/// empty is removed.
+fn keep_aside(old: &File, location: &Location) -> io::Result<Option<PathBuf>> {
     if old.metadata()?.len() == 0 {
-        return std::fs::remove_file(path).map(|()| None);
+        return location.remove().map(|()| None);
     }
     for number in 2_u32.. {
-        let aside = with_suffix(path, &format!("-{number}"));
+        let path = with_suffix(&location.path, &format!("-{number}"));
+        let aside = location.sibling(path.file_name().unwrap_or_default());
         // A second name first, which is never given to two files: no moment has none.
-        match std::fs::hard_link(path, &aside) {
-            Ok(()) => return std::fs::remove_file(path).map(|()| Some(aside)),
+        match location.link(&aside) {
+            Ok(()) => return location.remove().map(|()| Some(path)),
             Err(error) if error.kind() == ErrorKind::AlreadyExists => {}
             // Not every file system has second names.
-            Err(_) if !aside.exists() => return std::fs::rename(path, &aside).map(|()| Some(aside)),
+            Err(_) if aside.stat()?.is_none() => return location.rename(&aside).map(|()| Some(path)),
             Err(_) => {}
         }
     }
@@ -188,7 +183,7 @@ fn keep_aside(old: &File, path: &Path) -> io::Result<Option<PathBuf>> {
 #[derive(Debug)]
 pub struct LogClaim {
     file: File,
-    path: PathBuf,
+    location: Location,
     is_new: bool,
 }
 
@@ -198,17 +193,17 @@ impl LogClaim {
     /// # Errors
     /// If something is there that must not be replaced, or the file cannot be created.
     pub fn claim(path: &Path) -> Result<Option<Self>> {
-        let real = check(path, &LOG)?;
+        let location = locate(path, &LOG)?;
         let cannot = || format!("cannot create the log {}", path.display());
         loop {
-            let is_new = !real.exists();
-            let file = open_options().create(true).truncate(false).open(&real).with_context(cannot)?;
-            match try_lock(file, &real).with_context(cannot)? {
+            let is_new = location.stat().with_context(cannot)?.is_none();
+            let file = location.open(OFlags::RDWR | OFlags::CREATE).with_context(cannot)?;
+            match try_lock(file, &location).with_context(cannot)? {
                 Attempt::Held => return Ok(None),
                 Attempt::Gone => {}
                 Attempt::Locked(file) => {
                     LOG.require(&file).map_err(|error| anyhow!("{}: {error}", cannot()))?;
-                    return Ok(Some(Self { file, path: real, is_new }));
+                    return Ok(Some(Self { file, location, is_new }));
                 }
             }
         }
@@ -223,14 +218,14 @@ impl LogClaim {
         self.file
             .set_len(0)
             .and_then(|()| self.file.write_all_at(LOG_START.as_bytes(), 0))
-            .with_context(|| format!("cannot write the log {}", self.path.display()))
+            .with_context(|| format!("cannot write the log {}", self.location.path.display()))
     }
 }
 
 impl Drop for LogClaim {
     fn drop(&mut self) {
-        if self.is_new && is_at(&self.file, &self.path) {
-            let _ = std::fs::remove_file(&self.path);
+        if self.is_new && self.location.holds(&self.file) {
+            let _ = self.location.remove();
         }
     }
 }
@@ -241,10 +236,9 @@ impl Drop for LogClaim {
 /// If something else is there.
 pub fn append_to_log(path: &Path) -> Result<File> {
     let cannot = || format!("cannot open the log {}", path.display());
-    let real = check(path, &LOG)?;
-    let flags = OFlags::NOFOLLOW.bits().cast_signed();
-    let options = OpenOptions::new().create(true).append(true).custom_flags(flags).clone();
-    let mut file = options.open(real).with_context(cannot)?;
+    let location = locate(path, &LOG)?;
+    let flags = OFlags::WRONLY | OFlags::CREATE | OFlags::APPEND;
+    let mut file = location.open(flags).with_context(cannot)?;
     if file.metadata().with_context(cannot)?.len() == 0 {
         file.write_all(LOG_START.as_bytes()).with_context(cannot)?;
     }

@@ -95,7 +95,7 @@ fn replacements(graph: &Graph, node: usize) -> String {
 
 impl Graph {
     /// The graph as JSON: the plan, with who replaces whom and who takes no part.
-    pub fn json(&self) -> String {
+    pub fn json(&self) -> serde_json::Value {
         let backup = |backup: &BackupSpec| {
             serde_json::json!({
                 "process": self.plan.nodes[backup.node].name,
@@ -113,6 +113,6 @@ impl Graph {
         value["backups"] = self.backups.iter().map(backup).collect();
         value["warnings"] = serde_json::to_value(&self.warnings).unwrap_or_default();
         value["sidecars"] = self.sidecars.iter().map(|(name, _)| name.clone()).collect();
-        serde_json::to_string_pretty(&value).unwrap_or_default()
+        value
     }
 }

@@ -27,8 +27,8 @@ pub use backups::backup_of;
 
 use crate::manifest::Manifest;
 use crate::placement;
-use bus::Registration;
 use bus::plan::Plan;
+use bus::{InputFiles, Registration};
 use diagnostics::Diagnostic;
 use parameters::Notes;
 use std::path::PathBuf;
@@ -65,6 +65,8 @@ pub struct Graph {
     pub(crate) sidecars: Vec<(String, Program)>,
     /// The vehicle, scene and gains files the processes name, each once.
     pub(crate) models: Vec<PathBuf>,
+    /// The files that the run reads, each read once.
+    pub files: InputFiles,
     /// What is odd and flies all the same; `check` and `run` tell it.
     pub warnings: Vec<Diagnostic>,
 }
@@ -75,12 +77,21 @@ impl Graph {
         self.programs.iter().map(Program::component)
     }
 
-    /// Checks `manifest` and resolves it.
+    /// Checks `manifest` and resolves it. Files that it names are read from the disk, now and never again.
     ///
     /// # Errors
     /// What is wrong with it, each with its place; what a fault hides from sight is not told beside it.
     pub fn build(manifest: &Manifest) -> Result<Self, Diagnostic> {
-        let declared_nodes = processes::declared_nodes(manifest)?;
+        Self::build_from(manifest, InputFiles::default())
+    }
+
+    /// As [`Graph::build`]; files that `files` has read already are not read again.
+    ///
+    /// # Errors
+    /// As [`Graph::build`].
+    pub fn build_from(manifest: &Manifest, files: InputFiles) -> Result<Self, Diagnostic> {
+        manifest.included().for_each(|(path, text)| files.keep(path, text.as_bytes().to_vec()));
+        let declared_nodes = processes::declared_nodes(manifest, &files)?;
         let sidecars = processes::sidecars(manifest)?;
         processes::require_own_logs(manifest)?;
         let wiring = wire(&declared_nodes, None)?;
@@ -95,13 +106,14 @@ impl Graph {
                 let parameters = parameters::of(declared, &plan, node.period_ticks, &mut notes)?;
                 processes::require_replaceable(declared, node).map(|()| parameters)
             }))?;
-        plan.nodes.iter_mut().zip(parameters).for_each(|(node, parameters)| node.parameters = parameters);
+        let of_nodes = plan.nodes.iter_mut().zip(parameters);
+        of_nodes.for_each(|(node, of_node)| (node.parameters, node.files) = of_node);
         recorders::check(&declared_nodes, &plan.nodes)?;
         let backups = backups::all(manifest, &plan, &declared_nodes, &mut notes)?;
         let programs: Vec<Program> = declared_nodes.into_iter().map(|declared| declared.program).collect();
         evaluations::check(manifest, &plan, &programs, &mut notes)?;
         let (models, warnings) = notes.into_parts(manifest);
-        Ok(Self { plan, programs, backups, sidecars, models, warnings })
+        Ok(Self { plan, programs, backups, sidecars, models, files, warnings })
     }
 }
 

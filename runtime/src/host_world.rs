@@ -21,6 +21,7 @@ use bus::membership::Membership;
 use bus::plan::{InputPlan, NodePlan, Plan};
 use bus::{BusError, Join};
 use diagnostics::Diagnostic;
+use inputs::InputFiles;
 use std::collections::BTreeMap;
 use std::collections::btree_map::Entry;
 use std::os::unix::net::UnixDatagram;
@@ -42,6 +43,8 @@ pub struct HostWorld<'a> {
     pub manifest: &'a Manifest,
     /// Its plan.
     pub plan: &'a Plan,
+    /// The files that it reads.
+    pub files: &'a InputFiles,
     /// Its control segment.
     pub control: Arc<SupervisorView>,
     /// Where it keeps its files.
@@ -159,6 +162,7 @@ impl World for HostWorld<'_> {
     }
 
     fn store_backup(&mut self, plan: &NodePlan, node: usize, generation: u32) -> Result<(), BusError> {
+        store_files(self.files, self.run_dir, plan)?;
         plan.store_backup(self.run_dir, node, generation)
     }
 
@@ -185,8 +189,21 @@ impl World for HostWorld<'_> {
     }
 
     fn backup_of(&self, process: &str, with: &str) -> Result<BackupSpec, Diagnostic> {
-        backup_of(self.manifest, self.plan, process, with)
+        backup_of(self.manifest, self.plan, self.files, process, with)
     }
+}
+
+/// Writes the files that the node of `plan` reads into the run directory.
+///
+/// # Errors
+/// If they cannot be written.
+pub fn store_files(files: &InputFiles, run_dir: &Path, plan: &NodePlan) -> Result<(), BusError> {
+    let folder = run_dir.join(Plan::INPUTS);
+    files.store(&folder, &plan.files).map_err(|source| BusError::File {
+        action: "write",
+        path: folder,
+        source,
+    })
 }
 
 /// A process or thread, and its log.

@@ -7,7 +7,7 @@ use crate::event::{RunEvent, StopToken};
 use crate::flight::Flight;
 use crate::graph::Graph;
 use crate::host::{Host, needs_process};
-use crate::host_world::HostWorld;
+use crate::host_world::{HostWorld, store_files};
 use crate::manifest::Manifest;
 use crate::outputs::Outputs;
 pub use crate::replacement::{Purpose, Report};
@@ -17,9 +17,10 @@ use crate::world::Spent;
 use anyhow::{Context, Result};
 use bus::lockstep::SupervisorView;
 use bus::plan::Plan;
+use inputs::InputFiles;
 use recorder::reader::Recording;
 use std::collections::BTreeMap;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, channel};
 
@@ -106,6 +107,7 @@ pub struct Launcher<'a> {
     on: Box<dyn FnMut(RunEvent<'_>) + 'a>,
     remote: Remote,
     requests: Receiver<Asked>,
+    files: InputFiles,
 }
 
 impl<'a> Launcher<'a> {
@@ -120,7 +122,15 @@ impl<'a> Launcher<'a> {
             on: Box::new(|_| {}),
             remote: Remote::new(sender),
             requests,
+            files: InputFiles::default(),
         }
+    }
+
+    /// [`Launcher::fly`] flies the bytes of the files that `files` has read already; it reads others from the disk.
+    #[must_use]
+    pub fn reading(mut self, files: InputFiles) -> Self {
+        self.files = files;
+        self
     }
 
     /// The run ends when `token` is used.
@@ -159,7 +169,7 @@ impl<'a> Launcher<'a> {
     /// # Errors
     /// A problem in the manifest, or as [`Launcher::launch`].
     pub fn fly(self, manifest: &Manifest, recording: &Path) -> Result<(Outcome, Option<Recording>)> {
-        let mut graph = Graph::build(manifest)?;
+        let mut graph = Graph::build_from(manifest, self.files.clone())?;
         let mut outputs = Outputs::of(manifest, &graph, recording, Vec::new())?;
         let outcome = self.launch(manifest, &mut graph, &mut outputs)?;
         Ok((outcome, outputs.finish()?))
@@ -201,6 +211,7 @@ impl<'a> Launcher<'a> {
             host: self.host,
             manifest,
             plan,
+            files: &graph.files,
             control_server: ControlServer::open(dir, plan, &control, self.remote, self.requests)?,
             control: control.clone(),
             run_dir: dir,
@@ -243,21 +254,37 @@ fn require_host(host: &Host, manifest: &Manifest, graph: &Graph) -> Result<()> {
     }
 }
 
-/// Puts the files that recorders attach into the run directory and tells the recorders.
+/// Puts the files that the nodes read into the run directory, and tells the recorders what to attach: the manifest, what
+/// it includes, and the models.
 fn prepare(manifest: &Manifest, graph: &mut Graph, recording: Option<&Path>, run_dir: &RunDir) -> Result<()> {
-    let manifest_copy = run_dir.path().join("manifest.toml");
-    std::fs::write(&manifest_copy, &manifest.recorded_text).context("cannot write the manifest's copy")?;
-    let name = |path: &Path| path.file_name().unwrap_or_default().to_string_lossy().into_owned();
-    let attachment = |path: &Path, copy: &Path| serde_json::json!({ "name": name(path), "path": copy });
-    let files = manifest.included.iter().chain(&graph.models).map(|path| attachment(path, path));
-    let attachments: Vec<_> =
-        std::iter::once(attachment(&manifest.path, &manifest_copy)).chain(files).collect();
+    let (files, recorded) = (graph.files.listing_anew(), run_dir.path().join("manifest.toml"));
+    let whole = (manifest.path.as_path(), manifest.recorded_text.as_str(), recorded.as_path());
+    let texts = manifest.included().map(|(path, text)| (path, text, path));
+    let mut attachments = Vec::new();
+    for (path, text, key) in std::iter::once(whole).chain(texts) {
+        let key = PathBuf::from(key.to_string_lossy().into_owned());
+        files.keep(&key, text.into());
+        attachments.push(attachment(path, &key));
+        files.bytes(&key)?;
+    }
+    for path in &graph.models {
+        attachments.push(attachment(path, path));
+        files.bytes(path).with_context(|| format!("cannot attach {}", path.display()))?;
+    }
     for (program, node) in graph.programs.iter().zip(&mut graph.plan.nodes) {
         if program.is_recorder() {
             node.parameters = serde_json::json!({ "path": recording, "attachments": attachments });
+            node.files = files.used();
         }
     }
-    Ok(())
+    let mut nodes = graph.plan.nodes.iter().chain(graph.backups.iter().map(|backup| &backup.plan));
+    Ok(nodes.try_for_each(|node| store_files(&files, run_dir.path(), node))?)
+}
+
+/// What a recorder attaches under the name of `path`: the file `key` among those of the run.
+fn attachment(path: &Path, key: &Path) -> serde_json::Value {
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    serde_json::json!({ "name": name, "path": key })
 }
 
 fn outcome(plan: &Plan, control: &SupervisorView, supervisor: &Supervisor<'_, HostWorld<'_>>) -> Outcome {

@@ -13,6 +13,7 @@ pub mod graph;
 pub mod host;
 mod host_world;
 pub mod launcher;
+mod location;
 pub mod manifest;
 pub mod output_file;
 pub mod outputs;

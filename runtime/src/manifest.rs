@@ -52,8 +52,6 @@ use toml::de::{DeTable, DeValue};
 pub struct Manifest {
     /// The file.
     pub path: PathBuf,
-    /// The files it includes, each once.
-    pub(crate) included: Vec<PathBuf>,
     /// The file's text that goes into the recording: with every `--set` but those of host-only keys.
     pub recorded_text: String,
     /// What it says.
@@ -98,13 +96,18 @@ impl Manifest {
     fn of(path: PathBuf, sources: Sources) -> Result<Self, Diagnostic> {
         let tree = whole_tree(&sources)?;
         let content = content(&sources, tree)?;
-        let (included, recorded_text) = (sources.included(), recorded::text(&sources)?);
-        Ok(Self { path, included, recorded_text, content, sources })
+        let recorded_text = recorded::text(&sources)?;
+        Ok(Self { path, recorded_text, content, sources })
     }
 
     /// The manifest's name: its file name without `.toml`.
     pub fn name(&self) -> String {
         self.path.file_stem().unwrap_or_default().to_string_lossy().into_owned()
+    }
+
+    /// The files it includes, each once: their paths and texts.
+    pub(crate) fn included(&self) -> impl Iterator<Item = (&Path, &str)> {
+        self.sources.included()
     }
 
     /// The components that it may name.
@@ -176,9 +179,8 @@ impl Manifest {
         let whole = Spanned::new(span.clone(), DeValue::Table(whole));
         let whole = read_tree::<Process>(&whole).map_err(|misread| sources.refused(misread))?;
         let content = content(&sources, tree)?;
-        let (path, included) = (self.path.clone(), self.included.clone());
-        let recorded_text = self.recorded_text.clone();
-        Ok((Self { path, included, recorded_text, content, sources }, Spanned::new(span, whole)))
+        let (path, recorded_text) = (self.path.clone(), self.recorded_text.clone());
+        Ok((Self { path, recorded_text, content, sources }, Spanned::new(span, whole)))
     }
 }
 

@@ -2,16 +2,19 @@
 //! and only once it is whole.
 
 use crate::file_lock;
+use crate::location::{Location, Unlocated};
 use anyhow::{Context, Result, anyhow, bail};
-use std::fs::{File, Metadata, Permissions};
+use bus::host_time::monotonic_ns;
+use rustix::fs::OFlags;
+use std::fs::{File, Metadata};
 use std::io::{self, BufWriter, ErrorKind, Read as _, Write as _};
-use std::os::unix::fs::{MetadataExt as _, PermissionsExt as _};
+use std::os::unix::fs::MetadataExt as _;
 use std::path::{Path, PathBuf};
 
 /// Bytes at the start of a file within which its kind is looked for.
 const START_BYTES: u64 = 512;
-/// Symbolic links that are followed, as many as the kernel follows.
-const LINKS_MAX: usize = 40;
+/// Names that are tried for a draft before its folder is given up.
+const DRAFTS_MAX: u32 = 100;
 /// A kind of file that hummingbus writes, and how one is known that it has written: no other file is replaced.
 ///
 /// ```
@@ -81,55 +84,57 @@ impl Kind {
 
 const NOT_REGULAR: &str = "it exists and is not a regular file; name another file";
 
-/// The file that `path` names. Links are followed, so that all spellings of one file become one path.
+/// The file that `path` names, by its path without links: all spellings of one file become one path.
 ///
 /// # Errors
-/// If its folder is not there.
+/// If its folder is not there, or a link on the way is not to be trusted.
 pub(crate) fn real_path(path: &Path) -> Result<PathBuf> {
-    let cannot = || format!("cannot create {}", path.display());
-    let mut real = std::path::absolute(path).with_context(cannot)?;
-    for _ in 0..LINKS_MAX {
-        let (Some(folder), Some(name)) = (real.parent(), real.file_name()) else {
-            bail!("{}: it names a folder", cannot())
-        };
-        if !folder.is_dir() {
-            bail!("{}: there is no folder {}", cannot(), folder.display());
-        }
-        let folder = folder.canonicalize().with_context(cannot)?;
-        real = folder.join(name);
-        match std::fs::read_link(&real) {
-            Ok(target) => real = folder.join(target),
-            Err(_) => return Ok(real),
-        }
-    }
-    bail!("{}: more than {LINKS_MAX} symbolic links", cannot())
+    Ok(located(path)?.path)
 }
 
-/// Refuses a file of `kind` at `path` where something else would be lost; returns the file that `path` names.
+fn located(path: &Path) -> Result<Location> {
+    Location::find(path).map_err(|reason| anyhow!("cannot create {}: {reason}", path.display()))
+}
+
+/// Refuses a file of `kind` at `path` where something else would be lost.
 ///
 /// # Errors
-/// If its folder is not there, or something is in its place that is neither empty nor of this kind.
-pub fn check(path: &Path, kind: &Kind) -> Result<PathBuf> {
+/// If its folder is not there, a link on the way is not to be trusted, or something is in its place that is neither
+/// empty nor of this kind.
+pub fn check(path: &Path, kind: &Kind) -> Result<()> {
+    locate(path, kind).map(drop)
+}
+
+/// The location of the file of `kind` at `path`.
+///
+/// # Errors
+/// As [`check`].
+pub(crate) fn locate(path: &Path, kind: &Kind) -> Result<Location> {
     let cannot = || format!("cannot create the {} {}", kind.name, path.display());
-    let old = match std::fs::metadata(path) {
-        Ok(old) => old,
-        Err(_) => return real_path(path),
-    };
+    let found = Location::find(path);
+    if let Err(planted @ Unlocated::Planted { .. }) = &found {
+        bail!("{}: {planted}", cannot());
+    }
     // Before it is opened: to open a pipe or a device is to do something to it.
-    if !old.is_file() {
-        bail!("{}: {NOT_REGULAR}", cannot());
-    }
-    if is_standard_stream(&old) {
-        bail!("{}: it is where this command prints; name another file", cannot());
-    }
-    if old.len() > 0 {
-        match File::open(path).and_then(|file| kind.require(&file)) {
-            // Another run has just put it in its place, or removed it.
-            Err(error) if error.kind() == ErrorKind::NotFound => {}
-            required => required.map_err(|error| anyhow!("{}: {error}", cannot()))?,
+    if let Ok(old) = std::fs::metadata(path) {
+        if !old.is_file() {
+            bail!("{}: {NOT_REGULAR}", cannot());
+        }
+        if is_standard_stream(&old) {
+            bail!("{}: it is where this command prints; name another file", cannot());
         }
     }
-    real_path(path)
+    let location = located(path)?;
+    match location.open(OFlags::RDONLY) {
+        // Another run has just put it in its place, or removed it.
+        Err(error) if error.kind() == ErrorKind::NotFound => {}
+        // An empty one may be one that this user may only write to.
+        Err(_) if location.stat().is_ok_and(|old| old.is_some_and(|old| old.st_size == 0)) => {}
+        opened => {
+            opened.and_then(|file| kind.require(&file)).map_err(|error| anyhow!("{}: {error}", cannot()))?
+        }
+    }
+    Ok(location)
 }
 
 /// Whether standard output or standard error goes to this file.
@@ -155,20 +160,61 @@ pub fn write<T>(
     kind: &Kind,
     write: impl FnOnce(&mut BufWriter<&mut File>) -> io::Result<T>,
 ) -> Result<T> {
-    let real = check(path, kind)?;
-    let folder = real.parent().unwrap_or(Path::new("/"));
-    let mut draft = tempfile::Builder::new()
-        .prefix(".hummingbus-")
-        // As for any new file, the user's umask takes from it.
-        .permissions(Permissions::from_mode(0o666))
-        .tempfile_in(folder)
-        .with_context(|| format!("cannot create {}", path.display()))?;
+    let location = locate(path, kind)?;
+    let mut draft = Draft::beside(&location).with_context(|| format!("cannot create {}", path.display()))?;
     let cannot = || format!("cannot write {}", path.display());
-    let mut out = BufWriter::new(draft.as_file_mut());
+    let mut out = BufWriter::new(&mut draft.file);
     let written = write(&mut out).and_then(|written| out.flush().map(|()| written)).with_context(cannot)?;
     drop(out);
-    draft.persist(&real).map_err(|error| error.error).with_context(cannot)?;
+    draft.put(&location).with_context(cannot)?;
     Ok(written)
+}
+
+/// A file that is not whole yet, beside its location; dropping it removes it.
+struct Draft {
+    file: File,
+    location: Location,
+    is_put: bool,
+}
+
+impl Draft {
+    fn beside(location: &Location) -> io::Result<Self> {
+        for number in 0..DRAFTS_MAX {
+            let name = format!(".hummingbus-{:x}-{:x}-{number}", std::process::id(), monotonic_ns());
+            let draft = location.sibling(name.as_ref());
+            match draft.open(OFlags::RDWR | OFlags::CREATE | OFlags::EXCL) {
+                Ok(file) => return Ok(Self { file, location: draft, is_put: false }),
+                Err(error) if error.kind() == ErrorKind::AlreadyExists => {}
+                Err(error) => return Err(error),
+            }
+        }
+        Err(io::Error::other("no name is free"))
+    }
+
+    fn put(&mut self, location: &Location) -> io::Result<()> {
+        self.location.rename(location)?;
+        self.is_put = true;
+        Ok(())
+    }
+}
+
+impl Drop for Draft {
+    fn drop(&mut self) {
+        if !self.is_put {
+            let _ = self.location.remove();
+        }
+    }
+}
+
+/// Makes the folder `folder` and those above it where they are missing.
+///
+/// # Errors
+/// If that is not possible, or a link on the way is not to be trusted.
+pub fn make_folder(folder: &Path) -> Result<()> {
+    let inside = folder.join("file");
+    Location::make(&inside)
+        .map(drop)
+        .map_err(|reason| anyhow!("cannot make the folder {}: {reason}", folder.display()))
 }
 
 /// Holds the folder `folder` for one command that fills it.

@@ -153,7 +153,7 @@ impl Outputs {
             partial.is_there() && whole.is_ok_and(|recording| recording.messages().next().is_none())
         };
         if let Some(blank) = self.partial.as_ref().filter(is_blank) {
-            let _ = std::fs::remove_file(&blank.path);
+            blank.remove();
             self.partial = None;
         }
         let partial = self.partial.as_ref().filter(|partial| !partial.is_empty() && partial.is_there());
@@ -222,8 +222,9 @@ fn logs(graph: &Graph) -> Vec<Output> {
 
 /// The files that a run of `graph` reads.
 fn inputs(manifest: &Manifest, graph: &Graph) -> Vec<PathBuf> {
+    let included = manifest.included().map(|(path, _)| path.to_owned());
     let nodes = graph.plan.nodes.iter().chain(graph.backups.iter().map(|backup| &backup.plan));
-    let data = nodes.filter_map(|node| node.parameters.get("data")?.as_str().map(PathBuf::from));
-    let files = manifest.included.iter().chain(&graph.models).cloned();
-    std::iter::once(manifest.path.clone()).chain(files).chain(data).collect()
+    let of_nodes = nodes.flat_map(|node| node.files.clone());
+    let files = of_nodes.chain(graph.files.used()).map(|file| file.path);
+    std::iter::once(manifest.path.clone()).chain(included).chain(files).collect()
 }

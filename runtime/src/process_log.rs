@@ -1,6 +1,7 @@
 //! What a process writes: its log in the run directory, bounded, and its last words, bounded and safe to print.
 
 use crate::output_file::LOG_START;
+use diagnostics::{printable_line, shortened};
 use rustix::fs::{FallocateFlags, fallocate};
 use std::fs::{File, OpenOptions};
 use std::io::{self, Read as _, Seek as _, SeekFrom};
@@ -65,37 +66,12 @@ fn tail(path: &Path) -> io::Result<(Vec<u8>, bool)> {
 fn printable(line: &[u8]) -> String {
     let mut text = String::new();
     for chunk in line.utf8_chunks() {
-        chunk.valid().chars().for_each(|c| push_printable(&mut text, c));
+        // Other systems write the end of a line as `\r\n`.
+        let valid: String = chunk.valid().replace('\t', " ").replace('\r', "");
+        text.push_str(&printable_line(&valid));
         chunk.invalid().iter().for_each(|byte| text.push_str(&format!("\\x{byte:02x}")));
     }
-    shortened(&text)
-}
-
-fn push_printable(text: &mut String, c: char) {
-    match c {
-        '\t' => text.push(' '),
-        // The end of a line as other systems write it.
-        '\r' => {}
-        c if c.is_control() || is_format_control(c) => text.extend(c.escape_default()),
-        c => text.push(c),
-    }
-}
-
-/// Characters that change the direction or the place of the text around them (Unicode's Bidi_Control, and the
-/// zero-width ones).
-fn is_format_control(c: char) -> bool {
-    matches!(c, '\u{200b}'..='\u{200f}' | '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}' | '\u{feff}')
-}
-
-fn shortened(text: &str) -> String {
-    let count = text.chars().count();
-    if count <= LINE_CHARS {
-        return text.to_owned();
-    }
-    let (head, tail) = (LINE_CHARS * 3 / 4, LINE_CHARS / 4);
-    let start: String = text.chars().take(head).collect();
-    let end: String = text.chars().skip(count - tail).collect();
-    format!("{start} … {} characters left out … {end}", count - head - tail)
+    shortened(&text, LINE_CHARS).into_owned()
 }
 
 #[cfg(test)]

@@ -63,7 +63,7 @@ struct Backup {
     pending: Pending,
     generation: u32,
     stage: Stage,
-    /// When its process was started, and when the present stage began, on the clock of the watchdogs.
+    /// When its process could begin to join, and when the present stage began, on the clock of the watchdogs.
     started: Duration,
     stage_began: Duration,
     /// Host time at which its process was started, and since when the run waits for it: for the report.
@@ -230,6 +230,12 @@ impl<'a> Replacements<'a> {
     /// go now.
     pub(crate) fn advance(&mut self) {
         self.start_pending();
+        // Until the first instances have joined, a backup waits for them.
+        if self.view.phase != Phase::Running {
+            let now = self.view.now;
+            let backups = self.nodes.iter_mut().filter_map(|node| node.backup.as_mut());
+            backups.for_each(|backup| backup.started = now);
+        }
         for node in 0..self.nodes.len() {
             while self.advance_backup(node) {}
         }

@@ -120,9 +120,9 @@ fn whatever_happens_a_run_ends_and_every_sample_has_one_writer() {
         }
     }
     println!("seeds {first} to {}: {ends:?}", first + seeds - 1);
-    // Measured on seeds 0 to 5999: 76 % are stopped and 24 % fail. The floors are three standard deviations of 1000
+    // Measured on seeds 0 to 5999: 72 % are stopped and 28 % fail. The floors are three standard deviations of 1000
     // seeds lower: faults must neither end nearly every run nor spare nearly every run.
-    for (state, floor) in [(State::Stopped, 0.72), (State::Failed, 0.20)] {
+    for (state, floor) in [(State::Stopped, 0.67), (State::Failed, 0.23)] {
         let runs = ends.get(&format!("{state:?}")).copied().unwrap_or(0);
         assert!(seeds < 1000 || f64::from(runs) > floor * seeds as f64, "{state:?}: {ends:?}");
     }
@@ -146,6 +146,15 @@ fn bugs_that_are_planted_are_found() {
         let (seed, broken) = found.unwrap_or_else(|| panic!("{bug:?} is not found in {SEEDS_OF_BUG} seeds"));
         println!("{bug:?} is found by seed {seed}: {broken}");
         assert!(breaks.iter().any(|&rule| broken.contains(rule)), "{bug:?}, seed {seed}: {broken}");
+    }
+}
+
+/// A node is in time, and so is the clock: neither is to blame for the time that the other took.
+#[test]
+fn a_clock_is_not_blamed_for_the_time_in_which_nodes_join() {
+    for seed in 0..100 {
+        let life = live(seed, Some(&[Fault::SlowStart]), None, &None);
+        assert_eq!(life.state, State::Stopped, "seed {seed}");
     }
 }
 

@@ -23,6 +23,7 @@ use crate::view::{Command, SegmentWrite};
 use crate::watch_clock::WatchClock;
 use crate::world::{Body, Spent, World};
 use anyhow::{Result, anyhow};
+use bus::lockstep::Phase;
 use bus::plan::{Plan, SLOTS_PER_NODE};
 use std::time::Duration;
 
@@ -70,9 +71,22 @@ pub struct Supervisor<'a, W: World> {
 #[derive(Debug, Default)]
 struct Timing {
     /// How far the run had come when it last came on, and when that was.
-    last_change: (u32, Duration),
+    last_change: (Advance, Duration),
     logs_bounded: Duration,
     reaped: Duration,
+}
+
+/// How far a run has come. Whatever of it changes, another process has its turn, and its watchdog begins anew.
+#[derive(Debug, Default, PartialEq)]
+struct Advance {
+    /// How far the first instances have joined; none before the first look.
+    phase: Option<Phase>,
+    /// True if every node has joined as far as the next phase asks: then it is the clock's turn.
+    awaits_phase: bool,
+    /// Ticks that may be computed.
+    granted: u32,
+    /// Ticks that the instance in each slot has completed.
+    done: Vec<u32>,
 }
 
 impl<'a, W: World> Supervisor<'a, W> {

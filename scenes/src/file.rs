@@ -11,6 +11,7 @@ use crate::surface::Surface;
 use diagnostics::parameter::Bounds;
 use diagnostics::unit::{ANGLE, LENGTH, RATIO};
 use diagnostics::{Diagnostic, Faults};
+use inputs::InputFiles;
 use nalgebra::{Rotation3, Vector3};
 use std::io::Result as IoResult;
 use std::path::{Path, PathBuf};
@@ -34,6 +35,9 @@ const SCALE: Bounds = Bounds {
     unit: "m",
     why: "a unit of a mesh file is a micrometre at least and a kilometre at most",
 };
+
+/// Longest sides of meshes: a nut is longer, and a mountain range is not.
+const MESH_SIZE_M: std::ops::RangeInclusive<f64> = 1e-3..=1e4;
 
 /// Coulomb's coefficient.
 const FRICTION: Bounds = Bounds {
@@ -62,14 +66,22 @@ const RADIUS: Bounds =
 const THINGS_MAX: usize = 900;
 
 impl Scene {
-    /// Reads and checks a scene file, and the meshes that it names.
+    /// Reads and checks a scene file, and the meshes that it names, from the disk.
     ///
     /// # Errors
     /// What is wrong with the file, and where.
     pub fn load(path: &Path) -> Result<Self, Diagnostic> {
+        Self::load_from(&InputFiles::default(), path)
+    }
+
+    /// Reads and checks a scene file of `files`, and the meshes that it names: a component takes those of its context.
+    ///
+    /// # Errors
+    /// What is wrong with the file or a mesh, and where.
+    pub fn load_from(files: &InputFiles, path: &Path) -> Result<Self, Diagnostic> {
         let file = path.display().to_string();
-        match vehicles::text::read(path) {
-            Ok(text) => Self::parse(&text, &file),
+        match files.text(path) {
+            Ok(text) => Self::parse_with(&text, &file, &|path| Ok(files.bytes(path)?.to_vec())),
             Err(cause) => Err(Diagnostic::unreadable(file, &cause)),
         }
     }
@@ -80,7 +92,7 @@ impl Scene {
     /// # Errors
     /// What is wrong with the text or a mesh, and where.
     pub fn parse(text: &str, file_name: &str) -> Result<Self, Diagnostic> {
-        Self::parse_with(text, file_name, &|path| vehicles::text::read_log(path))
+        Self::parse_with(text, file_name, &inputs::read_bytes)
     }
 
     /// As [`Scene::parse`], with the bytes of its meshes from `read`, which gets their paths.
@@ -167,12 +179,12 @@ impl Scene {
 
     /// The mesh files that the scene file at `path` names; what is wrong with it is told where it is read.
     #[must_use]
-    pub fn mesh_files(path: &Path) -> Vec<PathBuf> {
-        let table = vehicles::text::read(path).ok().and_then(|text| text.parse::<toml::Table>().ok());
+    pub fn mesh_files(files: &InputFiles, path: &Path) -> Vec<PathBuf> {
+        let table = files.text(path).ok().and_then(|text| text.parse::<toml::Table>().ok());
         let meshes = table.as_ref().and_then(|table| table.get("meshes")?.as_array());
         let folder = path.parent().unwrap_or(Path::new(""));
-        let files = meshes.into_iter().flatten().filter_map(|mesh| mesh.get("file")?.as_str());
-        files.map(|file| folder.join(file)).collect()
+        let names = meshes.into_iter().flatten().filter_map(|mesh| mesh.get("file")?.as_str());
+        names.map(|name| folder.join(name)).collect()
     }
 }
 
@@ -255,12 +267,26 @@ fn one_mesh(
     let mesh = Mesh { name, file, corners_W_m, faces: triangles.faces, solidity, surface, body };
     let mut mesh = mesh.without_lines();
     mesh.shape().map_err(refused)?;
+    check_size(&mesh, scale_m).map_err(refused)?;
     mesh.body = keys.map(|keys| {
         let (centre_W_m, spread_m2) = body::solid_moments(&mesh.corners_W_m, &mesh.faces);
         // Along the file's axes, which are turned.
         keys.body(turn.transpose() * spread_m2 * turn, centre_W_m, yaw_rad)
     });
     Ok(mesh)
+}
+
+/// Refuses a mesh of a size that nothing has.
+fn check_size(mesh: &Mesh, scale_m: f64) -> Result<(), String> {
+    let [low, high] = mesh.extent_W_m();
+    let size_m = (0..3).map(|axis| high[axis] - low[axis]).fold(0.0, f64::max);
+    if MESH_SIZE_M.contains(&size_m) {
+        return Ok(());
+    }
+    let (min, max) = (MESH_SIZE_M.start(), MESH_SIZE_M.end());
+    Err(format!(
+        "its longest side is {size_m:e} m with a unit of {scale_m} m, expected {min} m to {max} m: correct `scale`"
+    ))
 }
 
 /// What `section` says of its surface, and what `otherwise` says where it is silent.

@@ -13,7 +13,8 @@ use crate::steps::in_steps;
 use bus::component::Info;
 use bus::messages::Barometer;
 use bus::random::normal;
-use diagnostics::parameter::{finite, not_negative, positive};
+use diagnostics::parameter::{ParameterError, finite, not_negative, positive};
+use inputs::InputFiles;
 
 /// The least pressure that the part reads, Pa (MS5611-01BA03 data sheet: 10 mbar).
 const PRESSURE_MIN_PA: f64 = 1.0e3;
@@ -70,6 +71,10 @@ impl Sensor for BarometerParams {
     type Inputs<'a> = TruthInputs<'a>;
     type Outputs = Outputs;
     type State = BarometerState;
+
+    fn made_of(parameters: Self, _: &InputFiles) -> Result<Self, ParameterError> {
+        Ok(parameters)
+    }
 
     fn initial(&self) -> BarometerState {
         BarometerState { bias: self.initial_bias_Pa, ..BarometerState::default() }

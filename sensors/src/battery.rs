@@ -13,7 +13,8 @@ use bus::InputPorts;
 use bus::component::Info;
 use bus::messages::Battery;
 use bus::random::normal;
-use diagnostics::parameter::{finite, not_negative, positive};
+use diagnostics::parameter::{ParameterError, finite, not_negative, positive};
+use inputs::InputFiles;
 
 parameters! {
     /// What a battery monitor makes of the truth; the defaults are a Texas Instruments INA226 with a shunt of 2 mΩ.
@@ -87,6 +88,10 @@ impl Sensor for BatteryParams {
     type Inputs<'a> = BatteryInputs<'a>;
     type Outputs = Outputs;
     type State = BatteryMonitorState;
+
+    fn made_of(parameters: Self, _: &InputFiles) -> Result<Self, ParameterError> {
+        Ok(parameters)
+    }
 
     fn initial(&self) -> BatteryMonitorState {
         BatteryMonitorState { charge: self.initial_charge, counted_ns: u64::MAX, ..Default::default() }

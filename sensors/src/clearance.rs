@@ -90,7 +90,7 @@ impl Component for ClearanceJudge {
     fn new(parameters: Parameters, context: &NodeContext<'_>) -> Result<Self, ParameterError> {
         parameters.validate()?;
         let Parameters { scene, keep_m, corner_m } = parameters;
-        let caster = caster(scene.as_deref())?;
+        let caster = caster(&context.files, scene.as_deref())?;
         check_bodies(&caster, context)?;
         Ok(Self { caster, keep_m, corner_m })
     }

@@ -10,6 +10,7 @@ use bus::component::StepError;
 use bus::context::NodeContext;
 use bus::messages::BodyStates;
 use diagnostics::parameter::{ParameterError, refuse};
+use inputs::InputFiles;
 use nalgebra::{Rotation3, Unit, UnitQuaternion, Vector3};
 use scenes::{BodyPose, RayCaster, Scene};
 use std::f64::consts::FRAC_PI_4;
@@ -18,13 +19,13 @@ use std::path::Path;
 /// Rays of a cone: the axis, and eight in each of two rings.
 const RAYS: usize = 17;
 
-/// What stands in the scene of the file at `path`, the parameter `scene`.
+/// What stands in the scene of the file at `path` among `files`, the parameter `scene`.
 ///
 /// # Errors
 /// There is none, or it is refused.
-pub fn caster(path: Option<&Path>) -> Result<RayCaster, ParameterError> {
+pub fn caster(files: &InputFiles, path: Option<&Path>) -> Result<RayCaster, ParameterError> {
     let path = path.ok_or_else(|| ParameterError::missing("scene", ""))?;
-    let scene = Scene::load(path).map_err(|error| ParameterError::conflict("scene", error))?;
+    let scene = Scene::load_from(files, path).map_err(|error| ParameterError::conflict("scene", error))?;
     Ok(RayCaster::new(&scene))
 }
 

@@ -12,7 +12,8 @@ use crate::wire::{vector, vector_message};
 use bus::component::Info;
 use bus::messages::Gps;
 use bus::random::Stream;
-use diagnostics::parameter::{finite, not_negative, positive};
+use diagnostics::parameter::{ParameterError, finite, not_negative, positive};
+use inputs::InputFiles;
 use nalgebra::Vector3;
 
 parameters! {
@@ -76,6 +77,10 @@ impl Sensor for GpsParams {
     type Inputs<'a> = TruthInputs<'a>;
     type Outputs = Outputs;
     type State = GpsState;
+
+    fn made_of(parameters: Self, _: &InputFiles) -> Result<Self, ParameterError> {
+        Ok(parameters)
+    }
 
     fn initial(&self) -> GpsState {
         GpsState { drift: [f64::NAN; 3].into(), ..GpsState::default() }

@@ -12,7 +12,8 @@ use crate::steps::in_steps;
 use crate::wire::{attitude, vector_message};
 use bus::component::Info;
 use bus::messages::Magnetometer;
-use diagnostics::parameter::{finite, not_negative, positive};
+use diagnostics::parameter::{ParameterError, finite, not_negative, positive};
+use inputs::InputFiles;
 use nalgebra::Vector3;
 
 parameters! {
@@ -64,6 +65,10 @@ impl Sensor for MagnetometerParams {
     type Inputs<'a> = TruthInputs<'a>;
     type Outputs = Outputs;
     type State = MagnetometerState;
+
+    fn made_of(parameters: Self, _: &InputFiles) -> Result<Self, ParameterError> {
+        Ok(parameters)
+    }
 
     fn measure(
         &self,

@@ -9,7 +9,8 @@ use crate::sensing::{Sensor, TruthInputs};
 use crate::wire::{attitude, attitude_message, vector, vector_message};
 use bus::component::Info;
 use bus::messages::Mocap;
-use diagnostics::parameter::{finite, not_negative};
+use diagnostics::parameter::{ParameterError, finite, not_negative};
+use inputs::InputFiles;
 use nalgebra::{UnitQuaternion, Vector3};
 
 parameters! {
@@ -56,6 +57,10 @@ impl Sensor for MocapParams {
     type Inputs<'a> = TruthInputs<'a>;
     type Outputs = Outputs;
     type State = MocapState;
+
+    fn made_of(parameters: Self, _: &InputFiles) -> Result<Self, ParameterError> {
+        Ok(parameters)
+    }
 
     fn measure(
         &self,

@@ -20,6 +20,7 @@ use bus::context::NodeContext;
 use bus::messages::{BodyStates, PlantState, Ranges, Traffic};
 use bus::random::normal;
 use diagnostics::parameter::{ParameterError, finite, not_negative, positive, require};
+use inputs::InputFiles;
 use nalgebra::{UnitQuaternion, Vector3};
 use scenes::RayCaster;
 use std::path::PathBuf;
@@ -151,26 +152,22 @@ pub struct RangeInputs<'a> {
     pub bodies: Option<&'a BodyStates>,
 }
 
-impl TryFrom<RangeParams> for RangeFinders {
-    type Error = ParameterError;
-
-    fn try_from(params: RangeParams) -> Result<Self, ParameterError> {
-        let nearest_is_good = (0.0..params.reach_m).contains(&params.nearest_m);
-        require("nearest_m", params.nearest_m, nearest_is_good, "zero or more and below `reach_m`")?;
-        let scene = caster(params.scene.as_deref())?;
-        let (x, y, z) = (Vector3::x_axis(), Vector3::y_axis(), Vector3::z_axis());
-        let half_angle_rad = params.half_angle_deg.to_radians();
-        let cones = [x, -x, y, -y, -z].map(|axis_B| Cone::new(axis_B, half_angle_rad));
-        Ok(Self { params, cones, scene })
-    }
-}
-
 impl Sensor for RangeFinders {
     const INFO: Info = Info::new("range", "five ultrasonic range finders in the scene of a scene file");
     type Parameters = RangeParams;
     type Inputs<'a> = RangeInputs<'a>;
     type Outputs = Outputs;
     type State = RangeState;
+
+    fn made_of(params: RangeParams, files: &InputFiles) -> Result<Self, ParameterError> {
+        let nearest_is_good = (0.0..params.reach_m).contains(&params.nearest_m);
+        require("nearest_m", params.nearest_m, nearest_is_good, "zero or more and below `reach_m`")?;
+        let scene = caster(files, params.scene.as_deref())?;
+        let (x, y, z) = (Vector3::x_axis(), Vector3::y_axis(), Vector3::z_axis());
+        let half_angle_rad = params.half_angle_deg.to_radians();
+        let cones = [x, -x, y, -y, -z].map(|axis_B| Cone::new(axis_B, half_angle_rad));
+        Ok(Self { params, cones, scene })
+    }
 
     fn check(&self, run: &NodeContext<'_>) -> Result<(), ParameterError> {
         check_bodies(&self.scene, run)

@@ -11,6 +11,7 @@ use bus::component::Info;
 use bus::messages::RotorSpeeds;
 use bus::random::normal;
 use diagnostics::parameter::{ParameterError, not_negative, require};
+use inputs::InputFiles;
 
 parameters! {
     /// What the motors' controllers make of the truth.
@@ -65,6 +66,10 @@ impl Sensor for RpmParams {
     type Inputs<'a> = TruthInputs<'a>;
     type Outputs = Outputs;
     type State = RpmState;
+
+    fn made_of(parameters: Self, _: &InputFiles) -> Result<Self, ParameterError> {
+        Ok(parameters)
+    }
 
     fn measure(
         &self,

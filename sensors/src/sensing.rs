@@ -8,6 +8,7 @@ use bus::messages::{Barometer, Battery, Gps, Magnetometer, Mocap, PlantState, Ra
 use bus::ports::{InputPorts, OutputPorts};
 use bus::{InputPorts, Message};
 use diagnostics::ParameterError;
+use inputs::InputFiles;
 
 /// Declares what a sensor remembers, `type_name` on the bus, and what it sends: the message at the port that is named.
 macro_rules! sensor {
@@ -84,9 +85,8 @@ impl Measurement for Ranges {
     }
 }
 
-/// A sensor: all of it that does not change during a run. Its parameters, within their ranges, become it, unless they do
-/// not go together or name a file that is refused.
-pub trait Sensor: TryFrom<Self::Parameters, Error: Into<ParameterError>> {
+/// A sensor: all of it that does not change during a run.
+pub trait Sensor: Sized {
     /// Its name in manifests, and what it does.
     const INFO: Info;
     /// What the manifest's `parameters` table holds.
@@ -97,6 +97,12 @@ pub trait Sensor: TryFrom<Self::Parameters, Error: Into<ParameterError>> {
     type Outputs: OutputPorts + From<Sent<Self>>;
     /// All that it remembers from tick to tick.
     type State: Message + Default + Remembered<Measurement: Measurement>;
+
+    /// Makes the sensor of parameters that are within their ranges, and of the files that they name.
+    ///
+    /// # Errors
+    /// Parameters that do not go together, or a file that is refused.
+    fn made_of(parameters: Self::Parameters, files: &InputFiles) -> Result<Self, ParameterError>;
 
     /// The state before the first tick.
     fn initial(&self) -> Self::State {
@@ -168,7 +174,7 @@ impl<S: Sensor> Component for Sensing<S> {
     fn new(parameters: S::Parameters, context: &NodeContext<'_>) -> Result<Self, ParameterError> {
         parameters.validate()?;
         let channel = Channel::new(&parameters.timing(), context)?;
-        let sensor = S::try_from(parameters).map_err(Into::into)?;
+        let sensor = S::made_of(parameters, &context.files)?;
         sensor.check(context)?;
         Ok(Self { sensor, channel })
     }

@@ -1,7 +1,7 @@
 //! The command `cat`.
 
 use super::files::open_recording;
-use super::output::gone_or_failed;
+use super::output::{gone_or_failed, write_json_line};
 use anyhow::Result;
 use clap::Args;
 use std::path::PathBuf;
@@ -39,7 +39,7 @@ pub fn cat(arguments: &CatArguments) -> Result<bool> {
         let line = serde_json::json!({
             "topic": record.topic, "tick": record.tick, "time_ns": record.time_ns, "fields": fields
         });
-        if let Err(error) = writeln!(out, "{line}") {
+        if let Err(error) = write_json_line(&mut out, &line) {
             return gone_or_failed(error);
         }
     }

@@ -1,6 +1,6 @@
 //! The command `check`.
 
-use super::output::{print_text, print_warnings};
+use super::output::{print_json, print_text, print_warnings};
 use anyhow::Result;
 use clap::Args;
 use std::path::PathBuf;
@@ -25,6 +25,6 @@ pub struct CheckArguments {
 pub fn check(arguments: &CheckArguments) -> Result<bool> {
     let checked = hummingbus::check(&arguments.manifest, &arguments.set)?;
     print_warnings(&checked.warnings);
-    print_text(&if arguments.json { checked.json() } else { checked.to_string() })?;
+    if arguments.json { print_json(&checked.json()) } else { print_text(&checked.to_string()) }?;
     Ok(true)
 }

@@ -1,6 +1,6 @@
 //! The command `clean`.
 
-use super::output::print_text;
+use super::output::{print_json, print_text};
 use anyhow::Result;
 use clap::Args;
 
@@ -21,6 +21,6 @@ pub struct CleanArguments {
 /// If what is there cannot be looked at.
 pub fn clean(arguments: &CleanArguments) -> Result<bool> {
     let report = runtime::clean::clean(arguments.dry_run)?;
-    print_text(&if arguments.json { serde_json::to_string_pretty(&report)? } else { report.to_string() })?;
+    if arguments.json { print_json(&report) } else { print_text(&report.to_string()) }?;
     Ok(report.is_done())
 }

@@ -1,6 +1,6 @@
 //! The command `components`.
 
-use super::output::print_text;
+use super::output::{print_file, print_json};
 use anyhow::Result;
 use bus::Registration;
 use bus::component::{Role, Transfer};
@@ -31,12 +31,12 @@ pub struct ComponentsArguments {
 /// # Errors
 /// If it cannot be printed.
 pub fn components(arguments: &ComponentsArguments) -> Result<bool> {
-    let text = if arguments.json {
-        serde_json::to_string_pretty(&COMPONENTS.iter().map(json).collect::<Vec<_>>())?
+    if arguments.json {
+        print_json(&COMPONENTS.iter().map(json).collect::<Vec<_>>())?;
     } else {
-        markdown()
-    };
-    print_text(&text).map(|()| true)
+        print_file(&markdown())?;
+    }
+    Ok(true)
 }
 
 fn markdown() -> String {

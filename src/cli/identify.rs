@@ -2,9 +2,9 @@
 
 use super::files::PAGE;
 use super::interrupts::stop_token;
-use super::output::print_text;
+use super::output::{print_json, print_text, readable};
 use super::progress;
-use anyhow::{Context, Result, bail};
+use anyhow::{Result, bail};
 use clap::{Args, Subcommand};
 use flights::FlightSet;
 use hummingbus::COMPONENTS;
@@ -89,7 +89,7 @@ fn rotor(stand: &Path, out: &Path, is_json: bool) -> Result<bool> {
     write(out, "rotor.toml", &TABLES, &found.tables)?;
     write(out, "rotor.json", &REPORT, &(found.figures + "\n"))?;
     let report = found.report;
-    print_text(&if is_json { serde_json::to_string_pretty(&report)? } else { report.to_string() })?;
+    if is_json { print_json(&report) } else { print_text(&report.to_string()) }?;
     Ok(true)
 }
 
@@ -98,18 +98,20 @@ fn flights_of(arguments: &IdentifyArguments, file: &Path, out: &Path) -> Result<
     if !arguments.json {
         bar.enable_steady_tick(Duration::from_millis(100));
     }
-    let say = |text: &str| bar.set_message(text.to_owned());
+    let say = |text: &str| bar.set_message(readable(text).into_owned());
     say("reading flights");
     let set = FlightSet::load(file)?;
-    let base = Vehicle::base(&set.vehicle);
+    let base = Vehicle::base(&set.files, &set.vehicle);
     let inputs: Vec<&Path> =
         [Some(file), Some(&set.vehicle), base.as_deref()].into_iter().flatten().collect();
     let files = [("vehicle.toml", &VEHICLE), ("report.html", &PAGE), ("report.json", &REPORT)];
     let _lock = claim(out, &files, &inputs)?;
     let outcome = identify::run::identify(&set, &mut |step| say(step))?;
     let vehicle = out.join("vehicle.toml");
-    let text = vehicle_file::text(&set.vehicle, &outcome.effects, &outcome.report)?;
+    let text = vehicle_file::text(&set.files, &set.vehicle, &outcome.effects, &outcome.report)?;
     write(out, "vehicle.toml", &VEHICLE, &text)?;
+    // It is flown as it was written.
+    set.files.keep(&vehicle, text.into_bytes());
     // All is written before anything is flown, so that a run that fails loses nothing.
     let write_page =
         |flown: Option<&Value>| write(out, "report.html", &PAGE, identification::page(&outcome, flown));
@@ -129,8 +131,11 @@ fn flights_of(arguments: &IdentifyArguments, file: &Path, out: &Path) -> Result<
     bar.finish_and_clear();
     report["bus"] = flown.clone().unwrap_or(Value::Null);
     write_json(out, &report)?;
-    let report = serde_json::to_string_pretty(&report)?;
-    print_text(&if arguments.json { report } else { summary(&outcome.report, flown.as_ref(), out) })?;
+    if arguments.json {
+        print_json(&report)?;
+    } else {
+        print_text(&summary(&outcome.report, flown.as_ref(), out))?;
+    }
     Ok(true)
 }
 
@@ -139,7 +144,7 @@ fn flights_of(arguments: &IdentifyArguments, file: &Path, out: &Path) -> Result<
 /// # Errors
 /// If another command writes to it, or one of the files would replace something of another kind or one of `inputs`.
 fn claim(out: &Path, files: &[(&str, &Kind)], inputs: &[&Path]) -> Result<File> {
-    std::fs::create_dir_all(out).with_context(|| format!("cannot make the folder {}", out.display()))?;
+    output_file::make_folder(out)?;
     for (name, kind) in files {
         let path = out.join(name);
         output_file::check(&path, kind)?;

@@ -25,7 +25,7 @@ mod validate;
 
 use anyhow::Result;
 use clap::{Parser, Subcommand};
-use output::{message, say};
+use output::{message, readable, say};
 use std::process::ExitCode;
 use table::commands;
 
@@ -101,7 +101,10 @@ commands! {
 
 /// Parses the arguments of this process, does what they ask for, and says with which code the process ends.
 pub fn main() -> ExitCode {
-    let command = Cli::parse().command;
+    let command = match Cli::try_parse() {
+        Ok(cli) => cli.command,
+        Err(error) => return refuse(&error),
+    };
     if !matches!(command, Command::Node(_)) {
         inherited::forget();
         bus::process::survive_file_limit();
@@ -115,4 +118,15 @@ pub fn main() -> ExitCode {
             ExitCode::from(2)
         }
     }
+}
+
+/// Prints help, the version, or the reason why the arguments are refused. A shell's `*` makes arguments of any names.
+fn refuse(error: &clap::Error) -> ExitCode {
+    let text = error.render().to_string();
+    if readable(&text) == text {
+        // In colour where the terminal has it.
+        error.exit();
+    }
+    say(text.trim_end());
+    ExitCode::from(2)
 }

@@ -1,11 +1,45 @@
-//! Standard output and standard error.
+//! Standard output and standard error: the one place that prints. Whatever a terminal would obey is escaped here.
 
 use anyhow::{Context, Result};
-use diagnostics::Diagnostic;
+use diagnostics::{Diagnostic, printable, printable_json, short_lines};
+use serde::Serialize;
+use std::borrow::Cow;
+use std::io::Write as _;
 
-/// Prints to standard output.
+/// Prints a text for people to standard output.
 pub fn print_text(text: &str) -> Result<()> {
-    use std::io::Write as _;
+    print(&readable(text))
+}
+
+/// Prints `value` as JSON to standard output.
+pub fn print_json(value: &impl Serialize) -> Result<()> {
+    print(&printable_json(&serde_json::to_string_pretty(value)?))
+}
+
+/// Prints a file that another program reads to standard output, whole.
+pub fn print_file(text: &str) -> Result<()> {
+    print(&printable(text))
+}
+
+/// Prints `value` as one line of JSON to standard output.
+pub fn print_json_line(value: &impl Serialize) -> Result<()> {
+    print(&printable_json(&serde_json::to_string(value)?))
+}
+
+/// Writes `value` as one line of JSON to `out`.
+pub fn write_json_line(out: &mut impl std::io::Write, value: &serde_json::Value) -> std::io::Result<()> {
+    writeln!(out, "{}", printable_json(&value.to_string()))
+}
+
+/// Text of a message as people can read it, whatever names and contents of files are in it.
+pub fn readable(text: &str) -> Cow<'_, str> {
+    match short_lines(text) {
+        Cow::Borrowed(text) => printable(text),
+        Cow::Owned(text) => Cow::Owned(printable(&text).into_owned()),
+    }
+}
+
+fn print(text: &str) -> Result<()> {
     writeln!(std::io::stdout(), "{}", text.trim_end()).or_else(|error| gone_or_failed(error).map(|_| ()))
 }
 
@@ -20,8 +54,7 @@ pub fn gone_or_failed(error: std::io::Error) -> Result<bool> {
 
 /// Says something on standard error. Where that is closed or full there is nobody to tell.
 pub fn say(text: &str) {
-    use std::io::Write as _;
-    let _ = writeln!(std::io::stderr(), "{text}");
+    let _ = writeln!(std::io::stderr(), "{}", readable(text));
 }
 
 /// What went wrong and why, with the lines of files that are to blame; a cause that the text holds already is not said

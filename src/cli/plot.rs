@@ -1,7 +1,7 @@
 //! The command `plot`.
 
 use super::files::{PAGE, open_recording};
-use super::output::print_text;
+use super::output::{print_json, print_text};
 use super::progress;
 use anyhow::{Context, Result, bail};
 use clap::{Args, ValueEnum};
@@ -9,7 +9,7 @@ use indicatif::ProgressBar;
 use recorder::reader::Recording;
 use report::plot::{Drawing, Format, PNG_MARK, Request, SVG_MARK, Span, View};
 use runtime::output_file::{self, Kind, Mark, is_same};
-use serde_json::json;
+use serde_json::{Value, json};
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
@@ -117,7 +117,11 @@ pub fn plot(arguments: &PlotArguments) -> Result<bool> {
         let bytes = drawing.file(*format).with_context(|| format!("cannot draw {}", path.display()))?;
         output_file::write(path, kind(*format), |out| out.write_all(&bytes))?;
     }
-    print_text(&if arguments.json { as_json(&drawing, &files)? } else { as_text(&drawing, &files) })?;
+    if arguments.json {
+        print_json(&as_json(&drawing, &files))?;
+    } else {
+        print_text(&as_text(&drawing, &files))?;
+    }
     Ok(recording.cut().is_none())
 }
 
@@ -184,10 +188,10 @@ fn bar(recording: &Recording) -> ProgressBar {
     bar
 }
 
-fn as_json(drawing: &Drawing, files: &[(Format, PathBuf)]) -> Result<String> {
+fn as_json(drawing: &Drawing, files: &[(Format, PathBuf)]) -> Value {
     let mut value = drawing.json();
     value["files"] = files.iter().map(|(format, path)| json!({ "path": path, "format": format })).collect();
-    Ok(serde_json::to_string_pretty(&value)?)
+    value
 }
 
 fn as_text(drawing: &Drawing, files: &[(Format, PathBuf)]) -> String {

@@ -1,7 +1,7 @@
 //! The command `run` and its kin: check a manifest, fly it, judge its recording, say what came of it.
 
 use super::interrupts::stop_token;
-use super::output::{message, print_text, print_warnings};
+use super::output::{message, print_json, print_text, print_warnings};
 use super::profile::Files;
 use super::progress::{self, RUN};
 use anyhow::{Context, Error, Result, anyhow, bail};
@@ -14,7 +14,7 @@ use runtime::host::Host;
 use runtime::launcher::Launcher;
 use runtime::manifest::{Manifest, PaceSetting};
 use runtime::outputs::Outputs;
-use serde_json::json;
+use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 
 /// What `run` and its kin take.
@@ -84,7 +84,7 @@ pub fn run(
     print_warnings(&graph.warnings);
     graph.plan.profile |= files.is_some();
     if let Some((process, with)) = extra_shadow {
-        let shadow = backup_of(&manifest, &graph.plan, process, with)?;
+        let shadow = backup_of(&manifest, &graph.plan, &graph.files, process, with)?;
         if graph.backups.iter().any(|other| other.node == shadow.node) {
             bail!("`{process}` has a backup, a standby or a shadow in this manifest already; one at a time");
         }
@@ -116,16 +116,35 @@ pub fn run(
         summary.judge(recording, &graph.plan, &manifest.content)?;
     }
     summary.warnings = graph.warnings;
-    let mut text =
-        if arguments.json { json_text(&summary, profile.as_ref(), &files)? } else { summary.to_string() };
+    let mut text = summary.to_string();
     if let (Some(flight), Some(profile)) = (&flight, &profile) {
         let lines = files.write(&summary.manifest, flight, profile)?;
-        if !arguments.json {
-            text += &format!("\n\n{profile}\n{}", lines.join("\n"));
-        }
+        text += &format!("\n\n{profile}\n{}", lines.join("\n"));
     }
-    print_text(&text)?;
+    if let Some(path) = &summary.recording {
+        text += &format!("\nto see it: {}", command("plot", path));
+    }
+    if arguments.json {
+        print_json(&as_json(&summary, profile.as_ref(), &files)?)?;
+    } else {
+        print_text(&text)?;
+    }
     Ok(summary.passed)
+}
+
+/// A command line of this program that a shell understands: the program as it was called, a subcommand, and a file.
+fn command(subcommand: &str, path: &Path) -> String {
+    let program = std::env::args_os().next().map_or_else(|| PathBuf::from("hummingbus"), PathBuf::from);
+    let folder = std::env::current_dir().unwrap_or_default();
+    let path = path.strip_prefix(folder).unwrap_or(path);
+    format!("{} {subcommand} {}", quoted(&program), quoted(path))
+}
+
+/// A path as one word of a shell.
+fn quoted(path: &Path) -> String {
+    let text = path.to_string_lossy();
+    let is_plain = |c: char| c.is_alphanumeric() || "/._-+=:,@".contains(c);
+    if text.chars().all(is_plain) { text.into_owned() } else { format!("'{}'", text.replace('\'', "'\\''")) }
 }
 
 /// What there is to say about a run that was refused or broke, with what is `left` of its recording; printed as JSON too
@@ -143,19 +162,19 @@ fn broken(manifest: &Manifest, error: &Error, left: Option<&Path>, is_json: bool
             "recording": null,
             "partial_recording": left,
         });
-        print_text(&serde_json::to_string_pretty(&value)?)?;
+        print_json(&value)?;
     }
     Ok(anyhow!(text))
 }
 
 /// The summary as JSON, with the profile and its files in it.
-fn json_text(summary: &Summary, profile: Option<&Profile>, files: &Files) -> Result<String> {
+fn as_json(summary: &Summary, profile: Option<&Profile>, files: &Files) -> Result<Value> {
     let mut value = serde_json::to_value(summary)?;
     if let Some(profile) = profile {
         value["profile"] = serde_json::to_value(profile)?;
         value["profile"]["files"] = serde_json::to_value(files)?;
     }
-    Ok(serde_json::to_string_pretty(&value)?)
+    Ok(value)
 }
 
 /// Where the run is recorded: `--record`, the manifest's `record`, or beside the manifest.
@@ -166,4 +185,16 @@ fn recording_path(manifest: &Manifest, argument: Option<&Path>) -> Result<PathBu
         (None, None) => manifest.path.with_extension("mcap"),
     };
     std::path::absolute(&path).with_context(|| format!("{} is not a path", path.display()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::quoted;
+    use std::path::Path;
+
+    #[test]
+    fn a_path_is_one_word_of_a_shell() {
+        assert_eq!(quoted(Path::new("manifests/hover.mcap")), "manifests/hover.mcap");
+        assert_eq!(quoted(Path::new("my flights/a'b.mcap")), "'my flights/a'\\''b.mcap'");
+    }
 }

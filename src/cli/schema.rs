@@ -1,7 +1,8 @@
 //! The command `schema`.
 
-use super::output::print_text;
+use super::output::{print_json, print_text};
 use anyhow::Result;
+use bus::announcement::Announcement;
 use clap::Args;
 use hummingbus::COMPONENTS;
 use std::fmt::Write as _;
@@ -19,7 +20,12 @@ pub struct SchemaArguments {
 /// # Errors
 /// If it cannot be printed.
 pub fn schema(arguments: &SchemaArguments) -> Result<bool> {
-    print_text(&if arguments.json { schemas_json() } else { schemas() }).map(|()| true)
+    if arguments.json {
+        print_json(&COMPONENTS.messages().into_iter().map(Announcement::of).collect::<Vec<_>>())?;
+    } else {
+        print_text(&schemas())?;
+    }
+    Ok(true)
 }
 
 /// Every message with its fields, units, frames and layout hash.
@@ -29,11 +35,4 @@ fn schemas() -> String {
         text.push('\n');
         text
     })
-}
-
-/// The same as JSON, with the ROS 2 definitions.
-fn schemas_json() -> String {
-    let schemas: Vec<_> =
-        COMPONENTS.messages().into_iter().map(bus::announcement::Announcement::of).collect();
-    serde_json::to_string_pretty(&schemas).unwrap_or_default()
 }

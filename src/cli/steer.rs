@@ -1,5 +1,6 @@
 //! `hummingbus ctl` and `hummingbus swap`: a live run is steered from outside.
 
+use super::output;
 use anyhow::{Context, Result, bail};
 use clap::{Args, Subcommand};
 use runtime::ctl::client;
@@ -120,15 +121,21 @@ pub fn description(given: &str) -> Result<String> {
 }
 
 fn ask(run_id: Option<&str>, request: &Request, json: bool) -> Result<()> {
-    let answer = client::ask(&find_live(run_id)?, request)?;
+    let run = find_live(run_id)?;
+    let answer = client::ask(&run, request)?;
     if json {
-        super::output::print_text(&serde_json::to_string(&answer)?)?;
+        output::print_json_line(&answer)?;
     }
     match answer {
         Answer::Refused { reason } => bail!("{reason}"),
         _ if json => Ok(()),
-        Answer::Done { text, .. } => super::output::print_text(&text),
-        Answer::Status(status) => super::output::print_text(&status.to_string()),
+        Answer::Done { text, .. } if run_id.is_some() => output::print_text(&text),
+        // Nobody named the run: the answer does.
+        Answer::Done { text, .. } => {
+            let manifest = run.entry.manifest.file_name().unwrap_or_default().display();
+            output::print_text(&format!("run {} ({manifest}): {text}", run.entry.run_id))
+        }
+        Answer::Status(status) => output::print_text(&status.to_string()),
     }
 }
 

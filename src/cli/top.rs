@@ -1,6 +1,6 @@
 //! The command `top`.
 
-use super::output::print_text;
+use super::output::{print_json, print_text};
 use anyhow::{Result, bail};
 use clap::Args;
 use report::top;
@@ -45,8 +45,8 @@ pub fn top(arguments: &TopArguments) -> Result<bool> {
     let run = Arc::new(find_live(arguments.run.as_deref())?);
     if arguments.once {
         let view = top::look(&run)?;
-        let text = if arguments.json { serde_json::to_string_pretty(&view)? } else { view.to_string() };
-        return print_text(&text).map(|()| true);
+        let printed = if arguments.json { print_json(&view) } else { print_text(&view.to_string()) };
+        return printed.map(|()| true);
     }
     let is_terminated = Arc::new(AtomicBool::new(false));
     let flag = is_terminated.clone();

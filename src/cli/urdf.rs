@@ -1,7 +1,7 @@
 //! The command `urdf`.
 
 use super::files::open_recording;
-use super::output::print_text;
+use super::output::print_file;
 use anyhow::{Context, Result, bail};
 use clap::Args;
 use hummingbus::plant::Airframe;
@@ -59,7 +59,7 @@ pub fn urdf(arguments: &UrdfArguments) -> Result<bool> {
     let text = report::urdf::text(&body, &arguments.frame);
     match &arguments.out {
         Some(out) => output_file::write(out, &URDF, |file| file.write_all(text.as_bytes()))?,
-        None => print_text(&text)?,
+        None => print_file(&text)?,
     }
     Ok(true)
 }

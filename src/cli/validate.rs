@@ -1,7 +1,7 @@
 //! The command `validate`.
 
 use super::interrupts::stop_token;
-use super::output::{print_text, say};
+use super::output::{print_json, print_text, say};
 use anyhow::{Result, bail};
 use clap::Args;
 use flights::FlightSet;
@@ -45,10 +45,6 @@ pub fn validate(arguments: &ValidateArguments) -> Result<bool> {
     let validation =
         Validation { components: COMPONENTS, stop: &stop_token()?, keep: arguments.keep.as_deref() };
     let errors = validation.errors(&vehicles, &flights, &mut tell)?;
-    print_text(&if arguments.json {
-        serde_json::to_string_pretty(&errors.json())?
-    } else {
-        errors.to_string()
-    })?;
+    if arguments.json { print_json(&errors.json()) } else { print_text(&errors.to_string()) }?;
     Ok(true)
 }

@@ -10,7 +10,7 @@ use std::time::Duration;
 fn stop_after(milliseconds: u64) {
     let place = Place::new();
     let path = place.write("flight.toml", manifest());
-    let launch = place.start(&["run", &path, "--record", &place.path("flight.mcap"), "--pace", "realtime"]);
+    let launch = place.start_endless(&["run", &path, "--record", &place.path("flight.mcap")]);
     let status = format!("/proc/{}/status", launch.id());
     poll("no handler of SIGTERM", || {
         let text = std::fs::read_to_string(&status).ok()?;
@@ -28,7 +28,7 @@ fn stop_after(milliseconds: u64) {
 fn stop_by(process: &str) {
     let place = Place::new();
     let path = place.write("flight.toml", manifest());
-    let launch = place.start(&["run", &path, "--record", &place.path("flight.mcap"), "--pace", "realtime"]);
+    let launch = place.start_endless(&["run", &path, "--record", &place.path("flight.mcap")]);
     let process = if process == "clock" { place.clock() } else { place.process_of(process) };
     kill_process(process, Signal::TERM).unwrap();
     let ended = launch.end().with_code(1);

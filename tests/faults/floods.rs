@@ -1,7 +1,7 @@
 //! Processes that write too much or what no terminal should see, and a launcher that cannot write at all.
 
 use crate::flight::write_manifest;
-use crate::support::{Ended, HUMMINGBUS, Place, repository};
+use crate::support::{ENDLESS, Ended, HUMMINGBUS, Place, repository};
 use std::fs::File;
 use std::process::{Command, Stdio};
 
@@ -19,7 +19,7 @@ fn fly(script: &str) -> Ended {
     // Who read a flood whole would need more memory than this.
     let mut command = Command::new("sh");
     command.args(["-c", &format!("ulimit -v {LAUNCHER_KIB}; exec \"$@\""), "sh", HUMMINGBUS]);
-    command.args(["run", &manifest, "--record", &recording, "--pace", "realtime"]);
+    command.args(["run", &manifest, "--record", &recording]).args(ENDLESS);
     place.launch(command).end().with_code(2)
 }
 

@@ -1,6 +1,6 @@
 //! Folders for temporary files of every kind: a run flies with each of them, or says what is wrong with it.
 
-use crate::support::{Ended, HUMMINGBUS, Launch, Place, poll};
+use crate::support::{ENDLESS, Ended, HUMMINGBUS, Launch, Place, poll};
 use std::ffi::{OsStr, OsString};
 use std::os::unix::ffi::{OsStrExt, OsStringExt};
 use std::path::{Path, PathBuf};
@@ -125,8 +125,8 @@ fn a_run_whose_directory_is_elsewhere_is_found_steered_and_watched() {
     std::fs::create_dir(&folder).unwrap();
     let (manifest, recording) =
         (crate::support::repository("manifests/hover.toml"), place.path("flown.mcap"));
-    let args = ["run", &manifest, "--record", &recording, "--pace", "realtime"];
-    let command = hummingbus(&place, &folder, &args);
+    let args = ["run", &manifest, "--record", &recording];
+    let command = hummingbus(&place, &folder, &[&args[..], &ENDLESS].concat());
     let launch = place.launch(command);
     let run_id = run_id(&launch);
     let ask =

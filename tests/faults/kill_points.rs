@@ -239,7 +239,7 @@ pub fn words_of(fault: Fault) -> &'static [&'static str] {
         Fault::ExitWith3 | Fault::LateExit | Fault::BehindTheEnd => &["ended with exit code 3"],
         Fault::ExitWith0 => &["ended with exit code 0 before the run did"],
         Fault::Unwritten => &["without writing its output `report`"],
-        Fault::SlowStep | Fault::Hang | Fault::NeverJoins | Fault::OtherLayout => {
+        Fault::SlowStep | Fault::Await | Fault::Hang | Fault::NeverJoins | Fault::OtherLayout => {
             unreachable!("{fault:?} ends no run by itself")
         }
     }

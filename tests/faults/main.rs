@@ -12,6 +12,7 @@
 //! - [`sidecars`]: sidecars that fail or are not ready
 //! - [`strays`]: what the nodes of a run started themselves
 //! - [`floods`]: too much output, and nowhere to write
+//! - [`skipped`]: tests that cannot run here
 //! - [`slow`]: steps that take too long
 //! - [`early`]: runs that are stopped while they start
 //! - [`disk`]: a full disk under the recorder
@@ -38,6 +39,8 @@ mod memory;
 mod saboteur;
 mod sidecars;
 mod silence;
+#[path = "../runs/skipped.rs"]
+mod skipped;
 mod slow;
 mod strays;
 #[allow(dead_code, reason = "shared with the tests of undisturbed runs, which use the rest")]

@@ -10,6 +10,8 @@ pub const FAULT_VARIABLE: &str = "HUMMINGBUS_TEST_FAULT";
 pub const TICK_VARIABLE: &str = "HUMMINGBUS_TEST_FAULT_TICK";
 /// The file that another instance makes when it computes the tick of a [`Fault::LateExit`].
 pub const MARK_VARIABLE: &str = "HUMMINGBUS_TEST_FAULT_MARK";
+/// The file for which a [`Fault::Await`] waits.
+pub const AWAITED_VARIABLE: &str = "HUMMINGBUS_TEST_FAULT_AWAITED";
 /// How many processes of the node fail, from the first on; all where it is not said.
 pub const GENERATIONS_VARIABLE: &str = "HUMMINGBUS_TEST_FAULT_GENERATIONS";
 
@@ -46,6 +48,8 @@ pub enum Fault {
     ExitWith0,
     Unwritten,
     SlowStep,
+    /// Its step lasts until somebody makes a file.
+    Await,
     Hang,
     NeverJoins,
     OtherLayout,
@@ -59,7 +63,7 @@ impl Fault {
         [Self::Error, Self::Panic, Self::ExitWith3, Self::ExitWith0, Self::Unwritten];
 
     fn find(name: &str) -> Option<Self> {
-        let others = [Self::SlowStep, Self::Hang, Self::NeverJoins, Self::OtherLayout];
+        let others = [Self::SlowStep, Self::Await, Self::Hang, Self::NeverJoins, Self::OtherLayout];
         let at_end = [Self::BehindTheEnd, Self::LateExit];
         let mut all = Self::ENDING.into_iter().chain(others).chain(at_end);
         all.find(|fault| format!("{fault:?}") == name)
@@ -71,21 +75,29 @@ impl Fault {
             Self::Panic => panic!("the propeller came off"),
             Self::ExitWith3 => std::process::exit(3),
             Self::LateExit => {
-                let is_awaited =
-                    || std::env::var_os(MARK_VARIABLE).is_some_and(|mark| !Path::new(&mark).exists());
-                while is_awaited() {
-                    std::thread::sleep(Duration::from_millis(1));
-                }
+                await_file(MARK_VARIABLE);
                 // From the mark to the end of the other's part are a sample and a store.
                 std::thread::sleep(Duration::from_millis(300));
                 std::process::exit(3)
             }
             Self::ExitWith0 => std::process::exit(0),
+            Self::Await => {
+                await_file(AWAITED_VARIABLE);
+                Ok(())
+            }
             Self::Hang => hang(),
             Self::Unwritten | Self::SlowStep | Self::NeverJoins | Self::OtherLayout | Self::BehindTheEnd => {
                 Ok(())
             }
         }
+    }
+}
+
+/// Waits until the file that `variable` names exists.
+fn await_file(variable: &str) {
+    let is_awaited = || std::env::var_os(variable).is_some_and(|path| !Path::new(&path).exists());
+    while is_awaited() {
+        std::thread::sleep(Duration::from_millis(1));
     }
 }
 
@@ -152,7 +164,10 @@ fn run() -> Result<(), BusError> {
         } else if let Some(fault) =
             fault.filter(|&fault| fault != Fault::BehindTheEnd && tick.number() == at_tick)
         {
-            return fault.strike();
+            fault.strike()?;
+            if fault != Fault::Await {
+                return Ok(());
+            }
         }
         if let Some(mark) = std::env::var_os(MARK_VARIABLE).filter(|_| tick.number() == at_tick) {
             std::fs::write(mark, "").map_err(|error| error.to_string())?;

@@ -2,6 +2,7 @@
 
 use crate::flight::write_manifest;
 use crate::support::{Ended, Launch, Place, poll};
+use rustix::process::Signal;
 
 /// Starts a flight of 0.5 s with a sidecar that runs `script`.
 fn start<'a>(place: &'a Place, script: &str, more: &str, settings: &[&str]) -> Launch<'a> {
@@ -20,10 +21,18 @@ fn fly(script: &str, more: &str, settings: &[&str]) -> Ended {
     start(&Place::new(), script, more, settings).end()
 }
 
-/// Long enough for the sidecar to end in.
+/// A run at real time.
 const PACED: &str = "run.pace=\"realtime\"";
-/// A second is its shortest life under `restart`.
-const LONGER: &str = "run.duration_s=4";
+/// A run that lasts until it is ended.
+const ENDLESS: [&str; 2] = [PACED, "run.duration_s=4000000"];
+
+/// Stops a run that goes on although its sidecar has ended.
+fn stop(launch: Launch<'_>) -> Ended {
+    launch.signal(Signal::INT);
+    let ended = launch.end().with_code(1);
+    ended.prints(&["stopped before its end"]);
+    ended
+}
 
 /// Says to whoever started it that it is ready, as systemd-notify does.
 const NOTIFY: &str = "python3 -c \"import os, socket; \
@@ -31,9 +40,9 @@ const NOTIFY: &str = "python3 -c \"import os, socket; \
 
 #[test]
 fn a_sidecar_that_ends_with_an_error_ends_the_run() {
-    let ended = fly("echo no display >&2; exit 4", "", &[PACED]).with_code(2);
+    let ended = fly("echo no display >&2; exit 4", "", &ENDLESS).with_code(2);
     ended.says(&["process `viewer` ended with exit code 4", "no display", "The run was aborted at tick"]);
-    fly("kill -9 $$", "", &[PACED]).with_code(2).says(&["process `viewer` was killed by signal 9 (SIGKILL)"]);
+    fly("kill -9 $$", "", &ENDLESS).with_code(2).says(&["process `viewer` was killed by signal 9 (SIGKILL)"]);
 }
 
 #[test]
@@ -44,17 +53,20 @@ fn a_sidecar_that_has_done_its_part_is_not_missed() {
 
 #[test]
 fn a_sidecar_that_may_be_missing_is_named_and_the_run_goes_on() {
-    let ended = fly("exit 4", "on_exit = \"ignore\"", &[PACED]).with_code(0);
-    ended.says(&["process `viewer` ended with exit code 4", "The run goes on without it"]);
+    let place = Place::new();
+    let launch = start(&place, "exit 4", "on_exit = \"ignore\"", &ENDLESS);
+    launch.await_said("The run goes on without it");
+    stop(launch).says(&["process `viewer` ended with exit code 4"]);
 }
 
 #[test]
 fn a_sidecar_is_restarted_unless_it_ends_again_at_once() {
     let place = Place::new();
     let once = "if [ -e started ]; then sleep 600; else touch started; exit 4; fi";
-    let ended = start(&place, once, "on_exit = \"restart\"", &[PACED]).end().with_code(0);
-    ended.says(&["process `viewer` ended with exit code 4", "`viewer` is restarted"]);
-    let ended = fly("exit 4", "on_exit = \"restart\"", &[PACED, LONGER]).with_code(2);
+    let launch = start(&place, once, "on_exit = \"restart\"", &ENDLESS);
+    launch.await_said("`viewer` is restarted");
+    stop(launch).says(&["process `viewer` ended with exit code 4"]);
+    let ended = fly("exit 4", "on_exit = \"restart\"", &ENDLESS).with_code(2);
     ended.says(&["`viewer` is restarted", "it was restarted and ended again within a second"]);
 }
 
@@ -117,8 +129,8 @@ fn a_sidecar_that_does_not_get_ready_is_named() {
 fn a_sidecar_dies_with_all_that_it_started() {
     let place = Place::new();
     let script = "setsid sleep 600 & sleep 600";
-    let launch = start(&place, script, "", &[PACED]);
+    let launch = start(&place, script, "", &ENDLESS);
     poll("no child of the sidecar", || (place.processes().len() >= 12).then_some(()));
-    // `end` requires that no process of the run is left.
-    launch.end().with_code(0);
+    // The end of a run requires that no process of it is left.
+    stop(launch);
 }

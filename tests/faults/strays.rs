@@ -8,7 +8,8 @@ use rustix::process::{Pid, Signal, kill_process, test_kill_process};
 /// A saboteur whose shell starts `detached` first, which writes its process number to a file.
 fn write_stray(place: &Place, detached: &str) -> String {
     let args = saboteur::command().map(|word| format!("'{word}'")).join(" ");
-    let script = format!("{detached} exec {args}");
+    // The node joins once the other has told its number, so that no run is over before.
+    let script = format!("{detached} until [ -s stray ]; do sleep 0.01; done; exec {args}");
     let tables = format!(
         "[process.saboteur]\ncommand = [\"sh\", \"-c\", {script:?}]\nworking_directory = {:?}\n",
         place.path("")
@@ -16,17 +17,22 @@ fn write_stray(place: &Place, detached: &str) -> String {
     write_manifest(place, &tables)
 }
 
+/// The process whose number is written to the file `stray`, once it is.
+fn stray(place: &Place) -> Pid {
+    poll("no process number was written", || {
+        let text = std::fs::read_to_string(place.path("stray")).ok()?;
+        text.strip_suffix('\n')?.parse().ok().and_then(Pid::from_raw)
+    })
+}
+
 /// Flies with a node that detaches a process in this way, ends the run with `end`, and requires that it is gone.
 fn require_gone(detached: &str, signal: Option<Signal>, code: i32) {
     let place = Place::new();
     let manifest = write_stray(&place, detached);
     let recording = place.path("flight.mcap");
-    let pace = if signal.is_some() { "run.pace=\"realtime\"" } else { "run.pace=\"free\"" };
-    let launch = place.start(&["run", &manifest, "--record", &recording, "--set", pace]);
-    let stray = poll("nothing was detached", || {
-        let text = std::fs::read_to_string(place.path("stray")).ok()?;
-        text.trim().parse().ok().and_then(Pid::from_raw)
-    });
+    let args = ["run", &manifest, "--record", &recording];
+    let launch = if signal.is_some() { place.start_endless(&args) } else { place.start(&args) };
+    let stray = stray(&place);
     if let Some(signal) = signal {
         kill_process(place.process_of("saboteur"), signal).unwrap();
     }
@@ -66,8 +72,7 @@ fn require_left_alone(others: &str) {
     let mut command = std::process::Command::new("sh");
     command.args(["-c", &script]).current_dir(place.path(""));
     place.launch(command).end_among_others().with_code(0);
-    let text = std::fs::read_to_string(place.path("stray")).unwrap();
-    let other = Pid::from_raw(text.trim().parse().unwrap()).unwrap();
+    let other = stray(&place);
     kill_process(other, Signal::KILL).expect("it lives");
 }
 

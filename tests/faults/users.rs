@@ -1,6 +1,7 @@
 //! Another user of the machine: can neither read nor write a run, nor signal its processes.
 
 use crate::flight::{Watched, manifest};
+use crate::skipped::skip;
 use crate::support::Place;
 use std::fs::Permissions;
 use std::os::unix::fs::PermissionsExt;
@@ -53,7 +54,7 @@ fn another_user_can_neither_read_nor_write_nor_signal_a_run() {
         // What the refusals above are measured against.
         assert!(succeeds_for_nobody("cat \"$1\" >/dev/null", &path), "nobody reads the manifest");
     } else {
-        println!("NOT SHOWN with a second user, whom only root can be: modes alone were checked");
+        skip("only root can act as a second user; the modes of the files were checked");
     }
     watched.control.set_hold_tick(u32::MAX);
     launch.end().with_code(0);
@@ -115,7 +116,7 @@ fn gid(number: u32) -> rustix::fs::Gid {
 #[test]
 fn another_user_who_tries_at_every_moment_opens_no_file_of_a_run() {
     if !rustix::process::getuid().is_root() {
-        println!("NOT SHOWN: only root can be a second user");
+        skip("only root can act as a second user");
         return;
     }
     let place = Place::new();

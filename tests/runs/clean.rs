@@ -1,6 +1,8 @@
 //! What dead runs left is removed, and nothing of live ones, wherever their temporary files lie.
 
-use crate::support::{Launch, Place, poll, repository};
+use crate::skipped::skip;
+use crate::support::{ENDLESS, Launch, Place, poll, repository};
+use rustix::process::Signal;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
@@ -18,7 +20,7 @@ fn alone() -> MutexGuard<'static, ()> {
 /// Starts hover.toml in real time; it is to be killed, or stopped.
 fn take_off(place: &Place) -> Launch<'_> {
     let (manifest, recording) = (repository("manifests/hover.toml"), place.path("flown.mcap"));
-    place.start(&["run", &manifest, "--record", &recording, "--pace", "realtime"])
+    place.start_endless(&["run", &manifest, "--record", &recording])
 }
 
 /// Has a run fly for a while, then kills its launcher; returns the run's name.
@@ -89,7 +91,8 @@ fn what_a_killed_launcher_left_is_removed_and_a_live_run_beside_it_is_kept() {
     }
     assert_eq!(dead.left(), [""; 0]);
     assert!(remains_of(&clean(&cleaner, &[]), &dead_id).is_none());
-    flight.end().with_code(0);
+    flight.signal(Signal::INT);
+    flight.end().with_code(1).prints(&["stopped before its end"]);
 }
 
 #[test]
@@ -237,13 +240,17 @@ fn a_run_that_a_process_of_a_dead_run_started_flies_on() {
     let command = format!("setsid --fork env TMPDIR='{}' {}; sleep 1000", inner.path("tmp"), args.join(" "));
     let sidecar = format!("\n[process.nested]\nlockstep = false\ncommand = [\"sh\", \"-c\", {command:?}]\n");
     let manifest = outer.write("outer.toml", format!("include = [{hover:?}]\n{sidecar}"));
-    let launch =
-        outer.start(&["run", &manifest, "--record", &outer.path("outer.mcap"), "--pace", "realtime"]);
+    let launch = outer.start_endless(&["run", &manifest, "--record", &outer.path("outer.mcap")]);
     let inner_id = poll("the inner run does not fly", || {
         let plan = bus::plan::Plan::load(inner.run_dirs().first()?).ok()?;
         let control = bus::lockstep::SupervisorView::open(&plan).ok()?;
         (control.completed_ticks() > 500).then_some(plan.run_id)
     });
+    // It is alive until it is let go on, however long what follows takes.
+    let ctl = |words: &[&str]| {
+        inner.start(&[&["ctl", "--run", &inner_id][..], words].concat()).end_among_others().with_code(0)
+    };
+    ctl(&["pause"]);
     let outer_id = outer.run_id();
     let outer_variable = format!("HUMMINGBUS_RUN={}", outer.run_dirs()[0].display());
     for (process, _) in inner.processes() {
@@ -259,6 +266,8 @@ fn a_run_that_a_process_of_a_dead_run_started_flies_on() {
     outer.await_no_process();
     assert_eq!(outer.left(), [""; 0]);
     assert!(!inner.processes().is_empty(), "the inner run is dead");
+    ctl(&["pace", "free"]);
+    ctl(&["resume"]);
     inner.await_no_process();
     assert_eq!(inner.run_dirs(), Vec::<PathBuf>::new(), "it took its files with it");
     let alone = place.path("alone.mcap");
@@ -333,7 +342,7 @@ fn names_of_runs_that_are_no_files_of_runs_hinder_nobody_and_lead_nowhere() {
     drop(strange);
     let strange = Strange::new(&target);
     if strange.0.iter().any(|path| std::os::unix::fs::lchown(path, Some(65534), None).is_err()) {
-        println!("NOT SHOWN for names of another user, which only root can give away");
+        skip("only root can give names to another user");
         return;
     }
     require_unmoved(&place, &target);
@@ -349,7 +358,7 @@ fn what_a_killed_launcher_left_in_the_place_of_a_folder_that_does_not_serve_is_r
     let (manifest, recording) = (repository("manifests/hover.toml"), dead.path("flown.mcap"));
     let mut command = Command::new("env");
     command.args([&format!("TMPDIR={folder}"), env!("CARGO_BIN_EXE_hummingbus"), "run", &manifest]);
-    command.args(["--record", &recording, "--pace", "realtime"]);
+    command.args(["--record", &recording]).args(ENDLESS);
     let launch = dead.launch(command);
     let prefix = format!("/dev/shm/hb_{:x}-", launch.id());
     let entry: Value = poll("no entry", || {

@@ -1,7 +1,7 @@
 //! Runs that are stopped or killed: they end at a tick boundary, and nothing outlives them.
 
 use crate::recordings::{open, require_same_messages, topics};
-use crate::support::{Ended, HUMMINGBUS, Place, partial, poll, repository};
+use crate::support::{ENDLESS, Ended, HUMMINGBUS, Place, partial, poll, repository};
 use rustix::process::{Signal, kill_process};
 use std::process::Command;
 use std::thread::sleep;
@@ -69,8 +69,7 @@ fn sigterm_to_a_node_stops_the_run_at_a_tick_as_well() {
     let place = Place::new();
     for node in ["recorder", "plant", "pilot"] {
         let (manifest, recording) = (repository("manifests/hover.toml"), place.path("stopped.mcap"));
-        let args = ["run", &manifest, "--record", &recording, "--pace", "realtime", "--json"];
-        let mut launch = place.start(&args);
+        let mut launch = place.start_endless(&["run", &manifest, "--record", &recording, "--json"]);
         launch.await_ticks(300);
         kill_process(place.process_of(node), Signal::TERM).unwrap();
         let ticks = launch.end().with_code(1).json()["ticks"].as_u64().unwrap();
@@ -82,8 +81,7 @@ fn sigterm_to_a_node_stops_the_run_at_a_tick_as_well() {
 fn sigterm_to_every_process_at_once_leaves_a_whole_recording() {
     let place = Place::new();
     let (manifest, recording) = (repository("manifests/hover.toml"), place.path("stopped.mcap"));
-    let args = ["run", &manifest, "--record", &recording, "--pace", "realtime", "--json"];
-    let mut launch = place.start(&args);
+    let mut launch = place.start_endless(&["run", &manifest, "--record", &recording, "--json"]);
     launch.await_ticks(300);
     // The first to hear of it may have ended the run before the last is told.
     for (pid, _) in place.processes() {
@@ -116,7 +114,7 @@ fn ctrl_c_stops_a_run_whose_next_tick_is_ten_seconds_away() {
 fn a_second_ctrl_c_aborts_a_run_that_does_not_come_to_its_boundary() {
     let place = Place::new();
     let (manifest, recording) = (repository("manifests/hover.toml"), place.path("stuck.mcap"));
-    let mut launch = place.start(&["run", &manifest, "--record", &recording, "--pace", "realtime"]);
+    let mut launch = place.start_endless(&["run", &manifest, "--record", &recording]);
     launch.await_ticks(300);
     kill_process(place.process_of("plant"), Signal::STOP).unwrap();
     launch.signal(Signal::INT);
@@ -144,7 +142,7 @@ fn ctrl_c_at_any_moment_of_the_start_leaves_nothing() {
         // Whoever started these tests in the background has SIGINT ignored from the start.
         let mut command = Command::new("env");
         command.args(["--default-signal=INT", HUMMINGBUS, "run", &manifest, "--record", &recording]);
-        command.args(["--pace", "realtime"]);
+        command.args(ENDLESS);
         let launch = place.launch(command);
         await_no_ignored_sigint(launch.id());
         sleep(Duration::from_millis(wait_ms));
@@ -162,7 +160,7 @@ fn ctrl_c_at_any_moment_of_the_start_leaves_nothing() {
 fn no_process_outlives_a_killed_launcher() {
     let place = Place::new();
     let (manifest, recording) = (repository("manifests/hover.toml"), place.path("killed.mcap"));
-    let mut launch = place.start(&["run", &manifest, "--record", &recording, "--pace", "realtime"]);
+    let mut launch = place.start_endless(&["run", &manifest, "--record", &recording]);
     launch.await_ticks(200);
     assert_eq!(place.processes().len(), 9, "launcher, clock and seven nodes");
     launch.kill();
@@ -174,7 +172,7 @@ fn no_process_outlives_a_launcher_killed_at_any_moment_of_the_start() {
     let place = Place::new();
     for wait_ms in [0, 1, 2, 4, 8, 12, 16, 24, 32, 48, 64] {
         let (manifest, recording) = (repository("manifests/hover.toml"), place.path("killed.mcap"));
-        let launch = place.start(&["run", &manifest, "--record", &recording, "--pace", "realtime"]);
+        let launch = place.start_endless(&["run", &manifest, "--record", &recording]);
         sleep(Duration::from_millis(wait_ms));
         launch.kill();
         place.await_no_process();
@@ -186,7 +184,7 @@ fn what_a_killed_launcher_left_does_not_hinder_the_next_run() {
     let place = Place::new();
     let (manifest, recording) = (repository("manifests/hover.toml"), place.path("killed.mcap"));
     let args = ["run", &manifest, "--record", &recording];
-    let mut launch = place.start(&[&args[..], &["--pace", "realtime"]].concat());
+    let mut launch = place.start_endless(&args);
     launch.await_ticks(200);
     launch.kill();
     place.await_no_process();

@@ -135,12 +135,40 @@ fn the_architecture_tells_every_crate_and_whom_it_knows() {
 }
 
 #[test]
-fn every_manifest_is_named_in_the_readme() {
-    let readme = fs::read_to_string(repository("README.md")).unwrap();
+fn every_manifest_is_named_in_the_scenarios() {
+    let scenarios = fs::read_to_string(repository("docs/scenarios.md")).unwrap();
     for entry in fs::read_dir(repository("manifests")).unwrap() {
         let name = entry.unwrap().file_name().to_string_lossy().into_owned();
-        assert!(!name.ends_with(".toml") || readme.contains(&name), "README.md does not name {name}");
+        let is_named = scenarios.contains(&format!("`{name}`"));
+        assert!(!name.ends_with(".toml") || is_named, "docs/scenarios.md does not name {name}");
     }
+}
+
+/// The content of each code block of a page that begins with this line.
+fn code_blocks(page: &str, fence: &str) -> Vec<String> {
+    let text = fs::read_to_string(repository(page)).unwrap();
+    let opening = format!("\n```{fence}\n");
+    let blocks = text.split(&opening).skip(1);
+    blocks.map(|block| block.split("\n```\n").next().unwrap().to_owned()).collect()
+}
+
+/// The README's controller is that of the example, which `manifests/custom-controller.toml` flies.
+#[test]
+fn the_component_of_the_readme_is_the_one_that_is_flown() {
+    let example = fs::read_to_string(repository("examples/custom_controller.rs")).unwrap();
+    let blocks = code_blocks("README.md", "rust,no_run");
+    assert!(example.ends_with(&format!("\n\n{}\n", blocks[0])), "README.md has another controller");
+    let manifest = fs::read_to_string(repository("manifests/custom-controller.toml")).unwrap();
+    let [package, process] = &code_blocks("README.md", "toml")[..] else { panic!("two blocks of TOML") };
+    assert!(manifest.contains(&format!("\n{process}\n")), "README.md wires the controller otherwise");
+    let package: toml::Table = package.parse().unwrap();
+    let bus = &package["dependencies"]["bus"];
+    assert_eq!(bus["path"].as_str(), Some("../hummingbus/bus"));
+    let named = fs::read_to_string(repository("bus/Cargo.toml")).unwrap().parse::<toml::Table>().unwrap();
+    assert_eq!(bus["package"], named["package"]["name"]);
+    // Whatever else the program uses is a dependency that the block names.
+    let used = |name: &str| blocks[0].contains(&format!("use {name}::"));
+    assert!(["bus", "serde"].iter().all(|name| used(name) && package["dependencies"].get(*name).is_some()));
 }
 
 /// The keys that the refusal of `unknown_key` in the good manifest, with `from` replaced by `to`, names as known.

@@ -97,7 +97,7 @@ fn a_killed_node_is_named_with_its_signal() {
     for node in ["plant", "imu", "recorder"] {
         let recording = place.path("killed.mcap");
         let manifest = repository("manifests/hover.toml");
-        let mut launch = place.start(&["run", &manifest, "--record", &recording, "--pace", "realtime"]);
+        let mut launch = place.start_endless(&["run", &manifest, "--record", &recording]);
         launch.await_ticks(100);
         kill_process(place.process_of(node), Signal::KILL).unwrap();
         let ended = launch.end().with_code(2);
@@ -109,7 +109,7 @@ fn a_killed_node_is_named_with_its_signal() {
 fn a_killed_clock_is_named_too() {
     let place = Place::new();
     let (manifest, recording) = (repository("manifests/hover.toml"), place.path("killed.mcap"));
-    let mut launch = place.start(&["run", &manifest, "--record", &recording, "--pace", "realtime"]);
+    let mut launch = place.start_endless(&["run", &manifest, "--record", &recording]);
     launch.await_ticks(100);
     kill_process(place.clock(), Signal::KILL).unwrap();
     launch.end().with_code(2).says(&["process `clock` was killed by signal 9"]);
@@ -119,7 +119,7 @@ fn a_killed_clock_is_named_too() {
 fn what_was_recorded_before_a_failure_is_that_of_an_undisturbed_run() {
     let place = Place::new();
     let (manifest, recording) = (repository("manifests/hover.toml"), place.path("killed.mcap"));
-    let mut launch = place.start(&["run", &manifest, "--record", &recording, "--pace", "realtime"]);
+    let mut launch = place.start_endless(&["run", &manifest, "--record", &recording]);
     launch.await_ticks(300);
     kill_process(place.process_of("pilot"), Signal::KILL).unwrap();
     launch.end().with_code(2);

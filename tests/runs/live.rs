@@ -42,7 +42,7 @@ fn state(place: &Place) -> (String, u64) {
 #[test]
 fn pausing_stepping_and_pacing_change_no_byte_of_a_recording() {
     let place = Place::new();
-    let flight = take_off(&place, "steered.mcap", "0.5", 3);
+    let flight = take_off(&place, "steered.mcap", "0.5", 30);
     let held = tick_after(&place, &["pause"]);
     assert!(held >= 100, "{held}");
     sleep(Duration::from_millis(300));
@@ -63,7 +63,7 @@ fn pausing_stepping_and_pacing_change_no_byte_of_a_recording() {
     flight.end().flown();
     let undisturbed = place.path("undisturbed.mcap");
     let args = ["run", &repository("manifests/hover.toml"), "--record", &undisturbed];
-    place.call(&[&args[..], &["--set", "run.duration_s=3"]].concat()).flown();
+    place.call(&[&args[..], &["--set", "run.duration_s=30"]].concat()).flown();
     require_same(&std::fs::read(undisturbed).unwrap(), &place.path("steered.mcap"));
 }
 
@@ -83,7 +83,7 @@ fn every_pause_holds_the_tick_that_it_names() {
 #[test]
 fn a_run_can_be_paused_for_longer_than_the_watchdog_waits() {
     let place = Place::new();
-    let flight = take_off(&place, "long.mcap", "realtime", 3);
+    let flight = take_off(&place, "long.mcap", "realtime", 30);
     let held = tick_after(&place, &["pause"]);
     sleep(Duration::from_secs(23));
     assert_eq!(state(&place), ("paused".to_owned(), held));
@@ -130,12 +130,12 @@ fn a_program_can_speak_to_the_socket_and_nonsense_is_refused() {
 #[test]
 fn a_step_to_the_end_ends_the_run_and_one_beyond_it_is_refused() {
     let place = Place::new();
-    let flight = take_off(&place, "stepped.mcap", "realtime", 3);
+    let flight = take_off(&place, "stepped.mcap", "realtime", 30);
     let held = tick_after(&place, &["pause"]);
-    call(&place, "ctl", &["step", "100000"]).with_code(2).says(&["only", "ends at tick 3000"]);
+    call(&place, "ctl", &["step", "100000"]).with_code(2).says(&["only", "ends at tick 30000"]);
     assert_eq!(state(&place), ("paused".to_owned(), held));
     ctl(&place, &["pace", "free"]);
-    assert_eq!(tick_after(&place, &["step", &(3000 - held).to_string()]), 3000);
+    assert_eq!(tick_after(&place, &["step", &(30_000 - held).to_string()]), 30_000);
     flight.end().flown();
 }
 
@@ -158,7 +158,7 @@ fn a_later_request_overtakes_a_long_step() {
 #[test]
 fn a_run_that_is_not_there_or_has_ended_is_an_error() {
     let place = Place::new();
-    let flight = take_off(&place, "gone.mcap", "realtime", 3);
+    let flight = take_off(&place, "gone.mcap", "realtime", 30);
     let run_id = place.run_id();
     for verb in [&["ctl", "pause"][..], &["top", "--once"]] {
         let ended = place.start(&[verb, &["--run", "0-0"]].concat()).end_among_others();

@@ -16,6 +16,7 @@
 //! - [`refusals`], [`refused_parameters`], [`refused_conditions`], [`refused_flights`]: manifests that are wrong
 //! - [`manifests`]: includes, sets, settings
 //! - [`backups`]: swaps, shadows and standbys in manifests
+//! - [`planted`]: links that another user has planted
 //! - [`processes`]: sidecars, and how a process runs on the host
 //! - [`commands`]: the other subcommands, exit codes and JSON
 //! - [`outputs`]: what runs and other commands write, where something is there already
@@ -23,11 +24,14 @@
 //! - [`laps`], [`plot`]: recordings that are written, and pictures of them
 //! - [`urdf`]: bodies of vehicles for other tools
 //! - [`rights`]: rights that a run lacks are named
+//! - [`skipped`]: tests that cannot run here
 //! - [`sensors`]: sensors read what they should, and hand over what is under way
+//! - [`untrusted`]: names and contents of files that others made
 //! - [`replay`]: the measured flight
 //! - [`validate`]: measured commands flown by vehicles side by side
 //! - [`scenarios`]: the thesis's scenarios and those beyond
 //! - [`scenes`]: ground, walls, rigs and other vehicles
+//! - [`inputs`]: files that are edited after they were read
 
 mod as_printed;
 mod backups;
@@ -41,12 +45,14 @@ mod determinism;
 mod documentation;
 mod failures;
 mod identify;
+mod inputs;
 mod laps;
 mod live;
 mod loss;
 mod manifests;
 mod nodes;
 mod outputs;
+mod planted;
 mod plot;
 mod processes;
 mod processors;
@@ -61,9 +67,11 @@ mod rights;
 mod scenarios;
 mod scenes;
 mod sensors;
+mod skipped;
 #[allow(dead_code, reason = "shared with tests/faults")]
 mod support;
 mod swap;
 mod terminal;
+mod untrusted;
 mod urdf;
 mod validate;

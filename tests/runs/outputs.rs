@@ -4,6 +4,7 @@ use crate::laps;
 use crate::nodes::{manifest, sender, table};
 use crate::recordings::{open, rows};
 use crate::support::{Ended, HUMMINGBUS, Launch, Place, partial, poll, repository};
+use recorder::reader::Recording;
 use rustix::process::{Signal, kill_process};
 use std::fs::{self, File};
 use std::os::unix::fs::{FileTypeExt, MetadataExt, PermissionsExt, symlink};
@@ -110,9 +111,8 @@ fn of_many_runs_that_start_at_once_exactly_one_flies() {
         if round % 2 == 1 {
             fs::copy(place.path("flown.mcap"), place.path("flown.partial.mcap")).unwrap();
         }
-        let args = ["run", &hover, "--record", &place.path("flown.mcap"), "--pace", "realtime"];
-        let args = [&args[..], &["--set", "run.duration_s=4000000"]].concat();
-        let mut launches: Vec<Launch<'_>> = (0..12).map(|_| place.start(&args)).collect();
+        let args = ["run", &hover, "--record", &place.path("flown.mcap")];
+        let mut launches: Vec<Launch<'_>> = (0..12).map(|_| place.start_endless(&args)).collect();
         let mut refused = Vec::new();
         poll("more than one run flies", || {
             let ended = launches.iter_mut().position(Launch::has_ended)?;
@@ -135,7 +135,7 @@ fn a_second_run_to_the_log_of_a_live_one_is_refused() {
     let (place, hover) = (Place::new(), repository("manifests/hover.toml"));
     let log = format!("process.imu.log={}", place.path("imu.log"));
     let fly = |recording: &str| {
-        place.start(&["run", &hover, "--record", &place.path(recording), "--set", &log, "--pace", "realtime"])
+        place.start_endless(&["run", &hover, "--record", &place.path(recording), "--set", &log])
     };
     let mut first = fly("first.mcap");
     first.await_ticks(100);
@@ -158,8 +158,9 @@ fn a_lock_does_not_outlive_a_killed_launcher() {
     let recording = place.path("flown.mcap");
     place.call(&["run", &short(&place), "--record", &recording]).with_code(0);
     let good = fs::read(&recording).unwrap();
-    let mut launch = place.start(&["run", &hover, "--record", &recording, "--pace", "realtime"]);
-    launch.await_ticks(1200);
+    let mut launch = place.start_endless(&["run", &hover, "--record", &recording]);
+    // Between two flushes of the recorder, whenever the kill comes.
+    launch.hold_at(1200);
     launch.kill();
     place.await_no_process();
     assert!(fs::read(&recording).unwrap() == good, "a killed run has replaced a recording");
@@ -459,11 +460,16 @@ fn who_reads_a_page_or_a_recording_keeps_it_whole_while_it_is_replaced() {
     place.call(&["run", &path]).with_code(0);
     place.call(&args).with_code(0);
     let (held, page) = (open(&recording), File::open(place.path("short.html")).unwrap());
-    let (bytes, length) = (held.bytes().to_vec(), page.metadata().unwrap().len());
+    let messages = |held: &Recording| -> Vec<_> {
+        held.messages()
+            .map(|record| record.map(|record| (record.topic, record.tick, record.cdr)).unwrap())
+            .collect()
+    };
+    let (flown, length) = (messages(&held), page.metadata().unwrap().len());
     place.call(&["run", &path]).with_code(0);
     place.call(&args).with_code(0);
     assert_ne!(page.metadata().unwrap().ino(), node(&place.path("short.html")), "it was written over");
-    assert!(held.bytes() == bytes && page.metadata().unwrap().len() == length);
+    assert!(messages(&held) == flown && page.metadata().unwrap().len() == length);
 }
 
 // Folders that commands fill

@@ -154,8 +154,7 @@ fn a_run_that_is_stopped_is_profiled_up_to_there() {
     let place = Place::new();
     let hover = repository("manifests/hover.toml");
     let args = ["profile", &hover, "--record", &place.path("a.mcap"), "--json"];
-    let mut launch =
-        place.start(&[&args[..], &["--pace", "realtime", "--set", "run.duration_s=60"]].concat());
+    let mut launch = place.start_endless(&args);
     launch.await_ticks(50);
     launch.signal(Signal::INT);
     let summary = launch.end().with_code(1).json();

@@ -5,7 +5,6 @@ use crate::support::{Ended, Place, repository};
 use serde_json::Value;
 use std::collections::BTreeMap;
 use std::fs;
-use std::io::Write as _;
 use std::path::Path;
 
 const MANIFEST: &str = "manifests/replay-nanobench.toml";
@@ -17,13 +16,7 @@ const PLANTS: [(&str, u32); 3] = [("plant-100ms", 100), ("plant-500ms", 500), ("
 
 /// The folder of measured flights; says so where it is not given.
 pub fn data() -> Option<String> {
-    let data = std::env::var("HUMMINGBUS_DATA").ok();
-    if data.is_none() {
-        // Not `eprintln!`, which the test runner hides.
-        let notice = "skipped: HUMMINGBUS_DATA, the folder of measured flights, is not set";
-        let _ = writeln!(std::io::stderr(), "{notice}");
-    }
-    data
+    crate::skipped::variable_or_skip("HUMMINGBUS_DATA", "the folder of measured flights")
 }
 
 /// Replays the flight; returns the summary and the recording.

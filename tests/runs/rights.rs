@@ -1,5 +1,6 @@
 //! What a run asks of the system and may not have is refused, with the right that it takes.
 
+use crate::skipped::skip;
 use crate::support::{Ended, HUMMINGBUS, Place, repository};
 use std::process::Command;
 
@@ -20,7 +21,7 @@ fn without_rights(place: &Place, args: &[&str]) -> Option<Ended> {
         command
     };
     if !command("true").status().is_ok_and(|status| status.success()) {
-        eprintln!("NOT SHOWN: setpriv or prlimit cannot take rights away here, so nothing was refused");
+        skip("setpriv or prlimit cannot take rights away here");
         return None;
     }
     let mut command = command(HUMMINGBUS);

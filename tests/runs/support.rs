@@ -17,6 +17,8 @@ pub const HUMMINGBUS: &str = env!("CARGO_BIN_EXE_hummingbus");
 /// A deadlock's end: no launch here needs a tenth of it on an idle machine.
 const WATCHDOG: Duration = Duration::from_secs(300);
 const POLL: Duration = Duration::from_millis(2);
+/// Arguments of a run that no test outlasts.
+pub const ENDLESS: [&str; 4] = ["--pace", "realtime", "--set", "run.duration_s=4000000"];
 
 /// A path in this repository.
 pub fn repository(path: &str) -> String {
@@ -62,6 +64,11 @@ impl Place {
     /// Starts `hummingbus` with `args`.
     pub fn start(&self, args: &[&str]) -> Launch<'_> {
         self.start_with(args, &[])
+    }
+
+    /// Starts `hummingbus` with `args`, a run at real time that lasts until it is ended, however loaded the machine is.
+    pub fn start_endless(&self, args: &[&str]) -> Launch<'_> {
+        self.start(&[args, &ENDLESS].concat())
     }
 
     /// Starts `hummingbus` with `args` and more environment variables.
@@ -276,6 +283,13 @@ impl Launch<'_> {
     /// What the run's own control segment says; `None` while it is not there yet.
     fn completed_ticks(&self) -> Option<u32> {
         self.control().map(|control| control.completed_ticks())
+    }
+
+    /// Waits until the run has written `text` to standard error.
+    pub fn await_said(&self, text: &str) {
+        poll(&format!("{text:?} was not said: {}", self.said()), || {
+            fs::read_to_string(&self.error).unwrap_or_default().contains(text).then_some(())
+        });
     }
 
     /// Whether it has ended.

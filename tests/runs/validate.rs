@@ -19,7 +19,7 @@ fn heavier(part: f64) -> String {
 
 /// Flies 4 s of a manifest of manifests/identify, with sensors without noise unless `settings` say otherwise, and
 /// returns a flights file that reads `channels` from it.
-fn flown(place: &Place, manifest: &str, settings: &[&str], channels: &str) -> String {
+pub fn flown(place: &Place, manifest: &str, settings: &[&str], channels: &str) -> String {
     let (path, recording) =
         (repository(&format!("manifests/identify/{manifest}.toml")), place.path("flown.mcap"));
     let still = [
@@ -43,7 +43,7 @@ fn flown(place: &Place, manifest: &str, settings: &[&str], channels: &str) -> St
     )
 }
 
-const ALL: &str = "position = { topic = \"/mocap/mocap\" }\nattitude = { topic = \"/mocap/mocap\" }\n\
+pub const ALL: &str = "position = { topic = \"/mocap/mocap\" }\nattitude = { topic = \"/mocap/mocap\" }\n\
                    angular_velocity = { topic = \"/imu/imu\" }";
 
 fn rms(json: &Value, flight: &str, horizon: &str, channel: &str, vehicle: &str) -> f64 {

@@ -14,16 +14,26 @@ use diagnostics::unit::{
     ACCELERATION, INERTIA, LENGTH, MASS, PURE_NUMBER, SPEED, THRUST_COEFFICIENT, TIME, TORQUE_COEFFICIENT,
 };
 use diagnostics::{Diagnostic, Faults};
+use inputs::InputFiles;
 
 /// How far a published tensor may miss the triangle inequality through rounding, relative to its size.
 const TRIANGLE_SLACK: f64 = 1e-9;
 
 impl Vehicle {
-    /// Reads and checks a vehicle file.
+    /// Reads and checks a vehicle file, from the disk.
     pub fn load(path: &Path) -> Result<Self, Diagnostic> {
+        Self::load_from(&InputFiles::default(), path)
+    }
+
+    /// Reads and checks a vehicle file of `files`: a component takes those of its context.
+    ///
+    /// # Errors
+    /// What is wrong with the file or its base, and where.
+    pub fn load_from(files: &InputFiles, path: &Path) -> Result<Self, Diagnostic> {
         let file = path.display().to_string();
-        match crate::text::read(path) {
-            Ok(text) => Self::parse(&text, &file),
+        let read = |path: &Path| files.text(path);
+        match read(path) {
+            Ok(text) => Self::parse_with(&text, &file, &read),
             Err(cause) => Err(Diagnostic::unreadable(file, &cause)),
         }
     }
@@ -33,7 +43,7 @@ impl Vehicle {
     /// before its own; a table `[body]`, `[rotor]`, `[motor]`, `[command]` or the `[[rotors]]` of the file replace those of
     /// its base whole.
     pub fn parse(text: &str, file_name: &str) -> Result<Self, Diagnostic> {
-        Self::parse_with(text, file_name, &crate::text::read)
+        Self::parse_with(text, file_name, &|path| InputFiles::default().text(path))
     }
 
     /// As [`Vehicle::parse`], with the text of the file's `base` from `read`, which takes its path: for files that are not on
@@ -64,8 +74,8 @@ impl Vehicle {
     }
 
     /// The file that the vehicle file at `path` adds effects to, or replaces tables of, if it names one.
-    pub fn base(path: &Path) -> Option<PathBuf> {
-        let text = crate::text::read(path).ok()?;
+    pub fn base(files: &InputFiles, path: &Path) -> Option<PathBuf> {
+        let text = files.text(path).ok()?;
         let table: toml::Table = text.parse().ok()?;
         Some(beside(path, table.get("base")?.as_str()?))
     }

@@ -9,11 +9,11 @@
 //! | `bounds` | what the numbers of a vehicle can be, and why |
 //! | [`gaps`] | gaps of logs whose samples hold until the next |
 //! | `file` | which keys a vehicle file has, and what is physical |
+//! | [`foreign`] | formats that are taken for another one, by their first bytes |
 //! | [`reader`] | walks the TOML tree with positions, refuses what it does not know; scene files and gains files use it too |
 //! | [`quotes`] | quotation marks in CSV files of measurements, whose rows are lines |
 //! | [`table`] | tables of measurements in CSV, for every log that has this format |
-//! | [`text`] | files that people write, read with an end to it |
-//! | [`variables`] | variables of the environment within paths |
+//! //! | [`variables`] | variables of the environment within paths |
 //! | [`mod@reference`] | the vehicle files of this crate, as text |
 //!
 //! ```
@@ -27,13 +27,13 @@ mod bounds;
 pub mod command;
 pub mod effects;
 mod file;
+pub mod foreign;
 pub mod gaps;
 pub mod provenance;
 pub mod quotes;
 pub mod reader;
 pub mod reference;
 pub mod table;
-pub mod text;
 pub mod variables;
 pub mod vehicle;
 

@@ -1,5 +1,6 @@
 //! Tables of measurements in CSV: a header, then rows that are lines.
 
+use crate::foreign::{self, Foreign};
 use crate::quotes::{self, StrayQuote};
 
 /// A file in CSV. Its delimiter is the one of tab, semicolon and comma that the header has most of.
@@ -30,6 +31,9 @@ pub struct Row {
 /// Why a file is no table.
 #[derive(Debug, thiserror::Error)]
 pub enum TableError {
+    /// It is of another format.
+    #[error(transparent)]
+    Foreign(#[from] Foreign),
     /// A quotation mark makes one cell of what are many.
     #[error(transparent)]
     Quote(#[from] StrayQuote),
@@ -42,8 +46,9 @@ impl Table {
     /// The table that a file's `bytes` hold; what is no UTF-8 in them is no number either.
     ///
     /// # Errors
-    /// A cell that is opened by a quotation mark and not closed on its line.
+    /// A file of another format, and a cell that is opened by a quotation mark and not closed on its line.
     pub fn parse(bytes: &[u8]) -> Result<Self, TableError> {
+        foreign::of(bytes).map_or(Ok(()), Err)?;
         let text = String::from_utf8_lossy(bytes);
         // Programs for other systems put a byte order mark before the first name.
         let text = text.trim_start_matches('\u{feff}');

@@ -188,7 +188,8 @@ pub fn crazyflie_log(count: u32) -> Vec<u8> {
     bytes
 }
 
-fn ulog_message(kind: u8, content: &[u8]) -> Vec<u8> {
+/// A message of a ULog.
+pub fn ulog_message(kind: u8, content: &[u8]) -> Vec<u8> {
     let mut bytes = u16::try_from(content.len()).unwrap().to_le_bytes().to_vec();
     bytes.push(kind);
     bytes.extend(content);
@@ -213,7 +214,7 @@ pub fn ulog(count: u32) -> Vec<u8> {
         // Down is positive, and an accelerometer reads -g then.
         let sensors = floats(&[0.0, 0.0, 0.001 * k as f32, 0.0, 0.001 * k as f32, -9.8]);
         bytes.extend(ulog_message(b'D', &[&[1, 0][..], &stamp, &sensors].concat()));
-        let cells = [floats(&[3.5]), vec![0; 4], floats(&[4.0]), vec![0; 4]].concat();
+        let cells = [floats(&[3.5]), vec![0; 4], floats(&[4.0 - 1e-4 * k as f32]), vec![0; 4]].concat();
         bytes.extend(ulog_message(b'D', &[&[2, 0][..], &stamp, &cells].concat()));
     }
     bytes

@@ -57,7 +57,11 @@ impl Log<'_> {
     /// How the file of another log is this log's; two topics of a recording are two logs.
     fn same_file(&self, other: &Self) -> Option<&'static str> {
         let (one, other) = (&self.source, &other.source);
-        if one.topic == other.topic { same_file(one.file, other.file) } else { None }
+        let have_same_bytes = || {
+            let bytes = [one, other].map(|source| source.files.bytes(source.file).ok());
+            bytes[0].is_some() && bytes[0] == bytes[1]
+        };
+        if one.topic == other.topic { same_file(one.file, other.file, have_same_bytes) } else { None }
     }
 
     /// The rows in which all columns have a number; one that the log does not have is zero.

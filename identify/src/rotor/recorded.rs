@@ -2,6 +2,8 @@
 
 use std::path::Path;
 
+use diagnostics::Diagnostic;
+use inputs::InputFiles;
 use recorder::RecordingError;
 use recorder::reader::Recording;
 use recorder::series::Series;
@@ -18,10 +20,18 @@ pub struct Recorded {
 }
 
 impl Recorded {
-    /// Reads the fields that are `columns`, each with its key in the stand file, of `topic` from the recording at `path`.
-    pub fn read(path: &Path, topic: &str, columns: &[(&'static str, &Column)]) -> Result<Self, RotorError> {
+    /// Reads the fields that are `columns`, each with its key in the stand file, of `topic` from the recording at `path`
+    /// among `files`.
+    pub fn read(
+        files: &InputFiles,
+        path: &Path,
+        topic: &str,
+        columns: &[(&'static str, &Column)],
+    ) -> Result<Self, RotorError> {
         let file = short_name(path);
-        let recording = Recording::open(path)?;
+        let bytes =
+            files.bytes(path).map_err(|cause| Diagnostic::unreadable(path.display().to_string(), &cause))?;
+        let recording = Recording::of_bytes(bytes, path)?;
         let fields: Vec<_> = columns.iter().map(|(_, column)| (topic, column.name())).collect();
         let series = recording.series(&fields).map_err(|cause| match cause {
             RecordingError::UnknownTopic { .. } | RecordingError::UnknownField { .. } => {

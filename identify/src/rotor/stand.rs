@@ -6,6 +6,7 @@ use diagnostics::parameter::{positive, require};
 use diagnostics::unit::{Dimension, FORCE, RATIO, SPEED, TIME, TORQUE};
 use diagnostics::{Diagnostic, ParameterError};
 use flights::Role;
+use inputs::InputFiles;
 use serde::Deserialize;
 use vehicles::Vehicle;
 use vehicles::variables::expand;
@@ -42,6 +43,9 @@ pub struct VehicleFile {
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct StaticLog {
+    /// The files of the fit.
+    #[serde(skip)]
+    pub files: InputFiles,
     /// The log; made a path by [`Stand::read`].
     pub file: PathBuf,
     /// Where the log is a recording: the topic whose fields are read.
@@ -72,6 +76,9 @@ pub struct StaticLog {
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct DynamicLog {
+    /// The files of the fit.
+    #[serde(skip)]
+    pub files: InputFiles,
     /// The log; made a path by [`Stand::read`].
     pub file: PathBuf,
     /// Where the log is a recording: the topic whose fields are read.
@@ -128,6 +135,8 @@ pub struct Column {
 
 /// A log as it is read: its file, and all of it that is asked for.
 pub struct Source<'s> {
+    /// The files of the fit.
+    pub files: &'s InputFiles,
     /// The log.
     pub file: &'s Path,
     /// Where it is a recording: the topic.
@@ -147,7 +156,13 @@ impl StaticLog {
             ("torque", self.torque.as_ref()),
         ];
         let columns = columns.into_iter().filter_map(|(key, column)| Some((key, column?))).collect();
-        Source { file: &self.file, topic: self.topic.as_deref(), time: self.time.as_ref(), columns }
+        Source {
+            files: &self.files,
+            file: &self.file,
+            topic: self.topic.as_deref(),
+            time: self.time.as_ref(),
+            columns,
+        }
     }
 }
 
@@ -155,7 +170,13 @@ impl DynamicLog {
     /// The log with all of its columns.
     pub fn source(&self) -> Source<'_> {
         let columns = vec![("speed", &self.speed), ("command", &self.command)];
-        Source { file: &self.file, topic: self.topic.as_deref(), time: self.time.as_ref(), columns }
+        Source {
+            files: &self.files,
+            file: &self.file,
+            topic: self.topic.as_deref(),
+            time: self.time.as_ref(),
+            columns,
+        }
     }
 
     /// Whether the command is the speed that the rotor is asked for, and not the vehicle's own command.
@@ -192,8 +213,8 @@ impl Stand {
     /// Reads and checks the stand file at `path`.
     pub fn read(path: &Path) -> Result<Self, RotorError> {
         let name = path.display().to_string();
-        let text =
-            vehicles::text::read(path).map_err(|cause| Diagnostic::unreadable(name.as_str(), &cause))?;
+        let inputs = InputFiles::default();
+        let text = inputs.text(path).map_err(|cause| Diagnostic::unreadable(name.as_str(), &cause))?;
         let mut stand: Self = diagnostics::read_toml(&name, &text)?;
         let in_file = |error: ParameterError| Diagnostic::in_file(name.as_str(), error);
         Diagnostic::gather(stand.checks().into_iter().map(|check| check.map_err(in_file)))?;
@@ -205,6 +226,8 @@ impl Stand {
         for (key, file) in stand.vehicle.iter_mut().map(|file| ("vehicle".to_owned(), file)).chain(files) {
             *file = folder.join(expanded(&key, file).map_err(in_file)?);
         }
+        stand.statics.iter_mut().for_each(|log| log.files = inputs.clone());
+        stand.dynamics.iter_mut().for_each(|log| log.files = inputs.clone());
         Ok(stand)
     }
 

@@ -4,6 +4,7 @@ use std::path::Path;
 
 use diagnostics::Diagnostic;
 use diagnostics::unit::TIME;
+use inputs::InputFiles;
 use vehicles::table::Table;
 
 use super::error::RotorError;
@@ -35,13 +36,13 @@ impl LogTable {
     pub fn read(source: &Source) -> Result<Self, RotorError> {
         let file = short_name(source.file);
         if let Some(topic) = source.topic {
-            let recorded = Recorded::read(source.file, topic, &source.columns)?;
+            let recorded = Recorded::read(source.files, source.file, topic, &source.columns)?;
             let time_s = recorded.time_s.clone();
             let place = |row: usize| format!("sample {} of {topic}", row + 1);
             check_times(&file, &time_s, place)?;
             return Ok(Self { file, time_s, content: Content::Recorded(recorded) });
         }
-        let table = table(source.file, &file)?;
+        let table = table(source.files, source.file, &file)?;
         let Some(column) = source.time else { return Err(no_column(&file, "time", table.headers)) };
         let time_s = times(&file, &table, column)?;
         let place = |row: usize| format!("line {}: column `{}`", table.rows[row].line, column.name());
@@ -66,8 +67,9 @@ impl LogTable {
     }
 }
 
-fn table(path: &Path, file: &str) -> Result<Table, RotorError> {
-    let bytes = vehicles::text::read_log(path)
+fn table(files: &InputFiles, path: &Path, file: &str) -> Result<Table, RotorError> {
+    let bytes = files
+        .bytes(path)
         .map_err(|cause| Diagnostic::unreadable(path.display().to_string(), &cause).help("check the path"))?;
     if bytes.starts_with(RECORDING) {
         return Err(RotorError::too_little(

@@ -15,7 +15,7 @@ pub fn text(report: &RotorReport, vehicle: Option<&VehicleFile>) -> String {
     let head = format!(
         "# Tables of a vehicle file, identified from a thrust stand: {}.\n\
          # An uncertainty is one standard deviation; rotor.json has intervals, scores and findings.\n",
-        report.name.replace('\n', " ")
+        diagnostics::printable_line(&report.name)
     );
     [head, rotor(report, vehicle), motor(report, vehicle), command(report, vehicle)].join("\n")
 }

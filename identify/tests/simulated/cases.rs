@@ -165,7 +165,7 @@ impl Case {
         all.extend(&self.plan.truth);
         let with = |seed, role| fly(&vehicle, &Plan { truth: all.clone(), seed, ..self.plan.clone() }, role);
         let flights = vec![with(self.plan.seed, Role::Fit), with(self.plan.seed + 100_000, Role::Test)];
-        FlightSet { vehicle: vehicle_file(self.vehicle), flights }
+        FlightSet { vehicle: vehicle_file(self.vehicle), flights, files: Default::default() }
     }
 
     /// Names of what is true and undeclared.

@@ -3,6 +3,7 @@
 //! With the Jacobian J of all rows and the bodies' mobility W they are the solution of (J W Jᵀ) λ = wanted, whose matrix is
 //! symmetric and positive semidefinite. Forces over accelerations, and shifts over distances, are found the same way.
 use super::body::lay_out;
+use super::cholesky::{factorise, substitute};
 use super::joints::{Joint, Line};
 use crate::state::RigidBody;
 use nalgebra::{Matrix6, Vector6};
@@ -70,7 +71,9 @@ impl JointForces {
         }
         self.impulses.clear();
         self.impulses.extend(self.lines.iter().map(|(_, line)| wanted(line, &self.frames)));
-        factorise(&mut matrix, count);
+        // The diagonal of a redundant row is infinite.
+        let pivot = |left, diagonal| if left <= REDUNDANT * diagonal { f64::INFINITY } else { left };
+        factorise(&mut matrix, count, pivot);
         substitute(&matrix, &mut self.impulses);
         self.matrix = matrix;
     }
@@ -150,36 +153,5 @@ impl JointForces {
                 accelerations[*end] += mobilities[*end] * jacobian * against;
             }
         }
-    }
-}
-
-/// The Cholesky factor L of a matrix of `count` rows, in the place of its lower triangle; a redundant row's diagonal is
-/// infinite.
-fn factorise(matrix: &mut [f64], count: usize) {
-    for row in 0..count {
-        let diagonal = matrix[row * count + row];
-        for column in 0..=row {
-            let known: f64 =
-                (0..column).map(|at| matrix[row * count + at] * matrix[column * count + at]).sum();
-            let left = matrix[row * count + column] - known;
-            matrix[row * count + column] = match column == row {
-                false => left / matrix[column * count + column],
-                true if left <= REDUNDANT * diagonal => f64::INFINITY,
-                true => left.sqrt(),
-            };
-        }
-    }
-}
-
-/// Solves L Lᵀ x = b; `solution` is b before.
-fn substitute(factor: &[f64], solution: &mut [f64]) {
-    let count = solution.len();
-    for row in 0..count {
-        let known: f64 = (0..row).map(|at| factor[row * count + at] * solution[at]).sum();
-        solution[row] = (solution[row] - known) / factor[row * count + row];
-    }
-    for row in (0..count).rev() {
-        let known: f64 = (row + 1..count).map(|at| factor[at * count + row] * solution[at]).sum();
-        solution[row] = (solution[row] - known) / factor[row * count + row];
     }
 }

@@ -49,8 +49,8 @@ pub(super) fn part(joined: &Vector6<f64>) -> [Vector3<f64>; 2] {
 /// the other way. Its rate is how fast the second leaves the first along it, in m/s.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Row {
-    bodies: [usize; 2],
-    jacobian: [Vector6<f64>; 2],
+    pub bodies: [usize; 2],
+    pub jacobian: [Vector6<f64>; 2],
     /// What an impulse of 1 N s changes each body's twist by.
     answer: [Vector6<f64>; 2],
     /// What it changes the rate by, 1/kg.
@@ -128,8 +128,8 @@ pub(super) fn stop(normal: Row, gap_m: f64) -> Unilateral {
 /// A joint, which keeps the rates of up to six rows between two bodies at zero: they are solved as a whole.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Bilateral {
-    rows: [Row; 6],
-    count: usize,
+    pub rows: [Row; 6],
+    pub count: usize,
     /// Takes the rates of the rows to the impulses that end them; of the rows that there are.
     inverse_kg: Matrix6<f64>,
 }
@@ -146,6 +146,11 @@ impl Bilateral {
             false => f64::from(u8::from(row == column)),
         });
         Some(Self { rows: all, count, inverse_kg: delassus_per_kg.try_inverse()? })
+    }
+
+    /// How far a rate of its rows is off at most.
+    pub(super) fn off_m_s(&self, all: &[Body]) -> f64 {
+        self.rows[..self.count].iter().map(|row| row.rate(all).abs()).fold(0.0, f64::max)
     }
 
     /// Ends the rates of all rows; returns by how much that changed one at most.
@@ -165,9 +170,9 @@ impl Bilateral {
 /// Coulomb friction of a contact.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Friction {
-    coefficient: f64,
-    slips: [Row; 2],
-    impulses_N_s: Vector2<f64>,
+    pub coefficient: f64,
+    pub slips: [Row; 2],
+    pub impulses_N_s: Vector2<f64>,
     /// Which way it slips, where it does: a unit vector.
     direction: Vector2<f64>,
     /// The contact's Delassus matrix, which takes its impulses (normal, and along the two) to its rates; and its
@@ -221,17 +226,22 @@ impl Friction {
         self.slips[1].push(all, impulses_N_s.y);
     }
 
-    /// Steps against the slip, equally far along both axes: only so does the iteration end with a force that is
-    /// opposite to the slip, whatever the bodies' inertia. Returns by how much that changed the slip at most.
-    fn relax(&mut self, all: &mut [Body], normal_N_s: f64) -> f64 {
+    /// A step against the slip, as far as friction goes.
+    fn change_N_s(&self, all: &[Body], normal_N_s: f64) -> Vector2<f64> {
         if self.largest_per_kg <= 0.0 {
-            return 0.0;
+            return Vector2::zeros();
         }
         let slip_m_s = Vector2::new(self.slips[0].rate(all), self.slips[1].rate(all));
         let wanted_N_s = self.impulses_N_s - slip_m_s / self.largest_per_kg;
         let (most_N_s, size_N_s) = (self.coefficient * normal_N_s, wanted_N_s.norm());
         let scale = if size_N_s > most_N_s { most_N_s / size_N_s } else { 1.0 };
-        let change_N_s = wanted_N_s * scale - self.impulses_N_s;
+        wanted_N_s * scale - self.impulses_N_s
+    }
+
+    /// Steps against the slip, equally far along both axes: only so does the iteration end with a force that is
+    /// opposite to the slip, whatever the bodies' inertia. Returns by how much that changed the slip at most.
+    fn relax(&mut self, all: &mut [Body], normal_N_s: f64) -> f64 {
+        let change_N_s = self.change_N_s(all, normal_N_s);
         self.push(all, &change_N_s);
         self.impulses_N_s += change_N_s;
         change_N_s.amax() * self.largest_per_kg
@@ -291,9 +301,8 @@ impl Friction {
 }
 
 /// Finds the impulses that `constraints` and `joints` need, from those that the former hold already, and gives them to the
-/// bodies. Returns by how much a rate stays below its bound at most: where two bounds contradict each other, no impulses do
-/// both.
-pub(super) fn solve(all: &mut [Body], constraints: &mut [Unilateral], joints: &[Bilateral]) -> f64 {
+/// bodies. Where a light body carries a heavy one, or two bounds contradict each other, they are not found.
+pub(super) fn solve(all: &mut [Body], constraints: &mut [Unilateral], joints: &[Bilateral]) {
     for constraint in constraints.iter() {
         constraint.normal.push(all, constraint.impulse_N_s);
         if let Some(friction) = &constraint.friction {
@@ -304,7 +313,6 @@ pub(super) fn solve(all: &mut [Body], constraints: &mut [Unilateral], joints: &[
     if unmet_m_s(all, constraints) > TO_AND_FRO_M_S {
         iterate(all, constraints, joints, ITERATIONS_MAX, Unilateral::relax_whole);
     }
-    unmet_m_s(all, constraints)
 }
 
 fn iterate(
@@ -331,6 +339,19 @@ fn unmet_m_s(all: &[Body], constraints: &[Unilateral]) -> f64 {
 }
 
 impl Unilateral {
+    /// How far its rates are from what its impulses may leave: by how much a step towards that would change a rate.
+    pub(super) fn off_m_s(&self, all: &[Body]) -> f64 {
+        let inverse_mass_per_kg = self.normal.inverse_mass_per_kg;
+        if self.bound_m_s == f64::NEG_INFINITY || inverse_mass_per_kg <= 0.0 {
+            return 0.0;
+        }
+        let above_m_s = self.normal.rate(all) - self.bound_m_s;
+        let normal_m_s = above_m_s.min(self.impulse_N_s * inverse_mass_per_kg).abs();
+        self.friction.as_ref().map_or(normal_m_s, |friction| {
+            normal_m_s.max(friction.change_N_s(all, self.impulse_N_s).amax() * friction.largest_per_kg)
+        })
+    }
+
     /// Relaxes the normal, and then friction; returns by how much that changed their rates.
     fn relax(&mut self, all: &mut [Body]) -> f64 {
         let slipped = |this: &mut Self, all: &mut [Body]| {

@@ -10,9 +10,12 @@
 use super::body::{lay_out, mobility, set_twist, shift, twist};
 use super::contacts::{Contacts, Sighting};
 use super::free_bodies::{Carrier, FIRST_BODY, FreeBodies, VEHICLE, Work};
-use super::joints::Line;
+use super::islands::FOUND_M_S;
 use super::rig::{self, Mounted};
-use super::solver::{self, Bilateral, Body, Friction, Row, Unilateral, join, part};
+use super::rolling;
+use super::scratch::{CONSTRAINTS, Scratch, TOUCH_M};
+use super::solver::{Bilateral, Body, Friction, Row, Unilateral, join, part};
+use super::unsolved::{Outcome, Unsolved};
 use super::world::{Near, World};
 use crate::actuation::Actuation;
 use crate::backend::Neighbour;
@@ -22,14 +25,8 @@ use nalgebra::{Matrix6, Vector3, Vector6};
 use scenes::Rig;
 use serde::{Deserialize, Serialize};
 
-/// What is nearer than this touches: far below what anybody sees, far above rounding. Tuned, no source.
-const TOUCH_M: f64 = 1e-6;
-
 /// Gaps that are not closed any further: what stands on several points stands on all of them. Tuned, no source.
 const LEVEL_M: f64 = 1e-9;
-
-/// Impulses are found where no rate stays this far below its bound. Tuned, no source.
-const FOUND_M_S: f64 = 1e-2;
 
 /// What meets something slower than gravity makes it in this many steps does not bounce: 2 cm/s at two steps of half a
 /// millisecond. Tuned, no source.
@@ -52,40 +49,6 @@ const PUSH_OUT_M_S: f64 = 1.0;
 
 /// Errors of a pose that are left as they are.
 const EXACT_M: f64 = 1e-12;
-
-/// As many constraints as a vehicle has in a corner among others, and as many again: more take memory.
-const CONSTRAINTS: usize = 64;
-
-/// What a step works with: kept, so that it takes no memory, and forgotten after it.
-#[derive(Default)]
-pub(super) struct Scratch {
-    near: Vec<Near>,
-    /// The contacts, in the order of `near`; then the stops.
-    constraints: Vec<Unilateral>,
-    /// The joints of free bodies; rows that a joint is made of.
-    joints: Vec<Bilateral>,
-    rows: Vec<Row>,
-    lines: Vec<Line>,
-    /// The world, the vehicle, free bodies and other vehicles at the step's start.
-    now: Vec<Body>,
-    /// The same at its end.
-    then: Vec<Body>,
-    /// The same before something was tried.
-    before: Vec<Body>,
-    /// The same, where they are.
-    frames: Vec<RigidBody>,
-    /// Places of ropes among the constraints, and among the joints.
-    ropes: Vec<[usize; 2]>,
-    free_bodies: Work,
-}
-
-impl Scratch {
-    pub(super) fn new() -> Self {
-        let bodies = || Vec::with_capacity(FIRST_BODY + crate::backend::TRAFFIC_MAX);
-        let (near, constraints) = (Vec::with_capacity(CONSTRAINTS), Vec::with_capacity(CONSTRAINTS));
-        Self { near, constraints, now: bodies(), then: bodies(), before: bodies(), ..Self::default() }
-    }
-}
 
 /// The impulses of the last step, with which the next one warm starts its search.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -134,9 +97,13 @@ pub(super) struct Motion {
     pub state: State,
     /// An impact that is faster is a crash.
     pub crash_speed_m_s: f64,
+    /// Radius of the vehicle's disc.
+    pub disc_radius_m: f64,
     /// The least moment of inertia about any axis.
     pub inertia_min_kg_m2: f64,
     pub held: Held,
+    /// The first impulses that were not found.
+    pub unsolved: Option<Unsolved>,
     pub changed: Changed,
     pub scratch: Scratch,
 }
@@ -389,17 +356,25 @@ impl Motion {
             let vehicle = &mut scratch.then[VEHICLE];
             vehicle.twist += vehicle.mobility * friction;
         }
+        rolling::resist(&scratch.near, &scratch.constraints, &mut scratch.then, self.disc_radius_m);
         self.tie(scratch, &free.state.body, true);
         scratch.let_ropes_yield();
-        let is_found = scratch.solve();
+        let start_J = self.energy_J(&scratch.then, &scratch.then);
+        let off_m_s = scratch.solve();
+        self.judge(scratch, off_m_s, start_J);
         self.note(scratch);
-        self.hold(scratch, is_found);
+        self.hold(scratch, off_m_s <= FOUND_M_S);
         let pushes = |it: &Unilateral| it.impulse_N_s > 0.0 && it.normal.is_on(VEHICLE);
         let is_pushed = scratch.constraints.iter().any(pushes);
         let is_anything_pushed = scratch.constraints.iter().any(|it| it.impulse_N_s > 0.0);
         if !is_anything_pushed && !self.is_held() {
             self.state = free.state;
             self.free_bodies.states.clone_from(&scratch.free_bodies.free);
+            // What bounces at every step, as a disc that whirls, sinks otherwise.
+            let is_inside = |it: &Unilateral| it.bound_m_s.is_finite() && it.gap_m < -TOUCH_M;
+            if scratch.constraints.iter().any(is_inside) {
+                self.push_out(scratch, span_s);
+            }
             return false;
         }
         if is_pushed || self.is_held() {
@@ -434,26 +409,38 @@ impl Motion {
         scratch.then.clone_from(&scratch.now);
         let vehicle = self.state.body;
         self.tie(scratch, &vehicle, false);
-        let is_found = scratch.solve();
+        let start_J = self.energy_J(&scratch.now, &scratch.now);
+        let off_m_s = scratch.solve();
         self.note(scratch);
-        self.lose_gain(scratch);
+        let off_m_s = self.lose_gain(scratch, off_m_s, start_J);
+        self.judge(scratch, off_m_s, start_J);
         let after = scratch.then[VEHICLE].twist;
         scratch.free_bodies.free.clone_from(&self.free_bodies.states);
         if after != scratch.now[VEHICLE].twist {
             self.take_over(&Free { state: self.state, held: Vector6::zeros() }, &after, 0.0);
         }
         self.take_over_bodies(scratch, 0.0);
-        is_found
+        off_m_s <= FOUND_M_S
+    }
+
+    /// Notes impulses that are not what they have to be. Others that push do work.
+    fn judge(&mut self, scratch: &Scratch, off_m_s: f64, start_J: f64) {
+        let end_J = self.energy_J(&scratch.then, &scratch.then);
+        let gain_J = if scratch.is_among_others() { 0.0 } else { end_J - start_J - scratch.lent_J() };
+        let outcome = Outcome { off_m_s, start_J, gain_J };
+        let unsolved = || Unsolved::of(&outcome, scratch, &self.free_bodies.objects);
+        self.unsolved = self.unsolved.or_else(unsolved);
     }
 
     /// Leaves the twists after an impact between those of an inelastic one, which never makes energy, and those found:
     /// Newton's law makes some where friction and an arm couple (Kane and Levinson, Dynamics, 1985). Others that push do
-    /// work on the vehicle, and are left out of this.
-    fn lose_gain(&self, scratch: &mut Scratch) {
-        let start_J = self.energy_J(&scratch.now, &scratch.now);
-        let is_among_others = scratch.near.iter().any(|near| near.neighbour.is_some());
-        if is_among_others || self.energy_J(&scratch.then, &scratch.then) <= start_J {
-            return;
+    /// work on the vehicle, and are left out of this. Where no impulses make the bodies leave as asked, the impact is
+    /// inelastic. Returns by how much a rate is off at most.
+    fn lose_gain(&self, scratch: &mut Scratch, off_m_s: f64, start_J: f64) -> f64 {
+        let is_met = Outcome::is_met(off_m_s);
+        let makes_none = self.energy_J(&scratch.then, &scratch.then) <= start_J;
+        if scratch.is_among_others() || (is_met && makes_none) {
+            return off_m_s;
         }
         for constraint in &mut scratch.constraints {
             constraint.bound_m_s = constraint.bound_m_s.min(0.0);
@@ -461,7 +448,10 @@ impl Motion {
         scratch.forget();
         scratch.before.clone_from(&scratch.then);
         scratch.then.clone_from(&scratch.now);
-        solver::solve(&mut scratch.then, &mut scratch.constraints, &scratch.joints);
+        let dull_off_m_s = scratch.find_impulses();
+        if !is_met {
+            return dull_off_m_s;
+        }
         let (more, dull) = (&mut scratch.before, &mut scratch.then);
         for (more, dull) in more.iter_mut().zip(&*dull) {
             more.twist -= dull.twist;
@@ -473,6 +463,7 @@ impl Motion {
         for (dull, more) in dull.iter_mut().zip(&*more) {
             dull.twist += more.twist * part;
         }
+        off_m_s.max(dull_off_m_s)
     }
 
     /// The kinetic energy of the vehicle and the free bodies; the mixed one of two where they differ.
@@ -592,69 +583,6 @@ impl Motion {
                 shift(state, &by.twist);
             }
         }
-    }
-}
-
-impl Scratch {
-    /// Finds the impulses and gives them to the bodies at the step's end. Where another vehicle would drive this one into
-    /// what stands, no impulses do both: the other is left out, and flies into it. Returns whether they were found.
-    fn solve(&mut self) -> bool {
-        let is_among_others = self.near.iter().any(|near| near.neighbour.is_some());
-        if is_among_others {
-            self.before.clone_from(&self.then);
-        }
-        let is_found = solver::solve(&mut self.then, &mut self.constraints, &self.joints) < FOUND_M_S;
-        if is_found || !is_among_others {
-            return is_found;
-        }
-        self.forget();
-        for (near, constraint) in self.near.iter().zip(&mut self.constraints) {
-            if near.neighbour.is_some() {
-                constraint.bound_m_s = f64::NEG_INFINITY;
-            }
-        }
-        self.then.clone_from(&self.before);
-        solver::solve(&mut self.then, &mut self.constraints, &self.joints) < FOUND_M_S
-    }
-
-    /// Hands what ropes pulled with over the free step to their stops, which may pull less where contacts carry: so that the
-    /// ends part no faster than they did. Where nothing else pushes, that leaves all as it is.
-    fn let_ropes_yield(&mut self) {
-        for [constraint, joint] in &self.ropes {
-            let pull_N_s = self.free_bodies.pulls_N_s[*joint];
-            if pull_N_s > 0.0 {
-                let stop = &mut self.constraints[*constraint];
-                stop.bound_m_s = stop.normal.rate(&self.then);
-                stop.normal.push(&mut self.then, -pull_N_s);
-                stop.impulse_N_s = pull_N_s;
-            }
-        }
-    }
-
-    /// Takes all impulses away.
-    fn forget(&mut self) {
-        for constraint in &mut self.constraints {
-            constraint.impulse_N_s = 0.0;
-            if let Some(friction) = &mut constraint.friction {
-                friction.warm_start(&Vector3::zeros());
-            }
-        }
-    }
-
-    /// How long after now the first gap closes, if any does in the free step of `span_s`, at more than `slow_m_s`; 0
-    /// where two that touch meet now.
-    fn next_impact_s(&self, span_s: f64, slow_m_s: f64) -> Option<f64> {
-        let after_s = |constraint: &Unilateral| {
-            let rate_m_s = constraint.normal.rate(&self.now);
-            if rate_m_s >= -slow_m_s {
-                return None;
-            }
-            let mean_m_s = (rate_m_s + constraint.normal.rate(&self.then)) / 2.0;
-            let gap_m = constraint.gap_m;
-            let closes_s = if gap_m <= TOUCH_M { 0.0 } else { (gap_m - TOUCH_M / 2.0) / -mean_m_s };
-            (0.0..span_s).contains(&closes_s).then_some(closes_s)
-        };
-        self.constraints.iter().filter_map(after_s).min_by(f64::total_cmp)
     }
 }
 

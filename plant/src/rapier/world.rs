@@ -6,6 +6,7 @@
 use super::body::{self, from_rapier, to_rapier};
 use super::free_bodies::{FIRST_BODY, FIRST_THING, VEHICLE, WORLD};
 use super::hull::Hull;
+use super::rim;
 use crate::backend::Neighbour;
 use crate::state::RigidBody;
 use nalgebra::{Unit, Vector3};
@@ -22,6 +23,8 @@ use std::f64::consts::FRAC_PI_2;
 pub(super) const GROUND: u32 = 1;
 /// The vehicle's feet, as [`Near::part`] numbers its colliders.
 pub(super) const FEET: u32 = 0b1111;
+/// The vehicle's disc.
+pub(super) const DISC: u32 = 0b1_0000;
 const FIRST_NEIGHBOUR: u32 = 1000;
 
 /// Free bodies that overlap more than this at the start are told: tuned, no source.
@@ -277,20 +280,31 @@ fn meet(
     // Every shape of a scene and a hull can be asked.
     debug_assert!(found.is_ok(), "{:?} and {:?}", shape.shape_type(), part_shape.shape_type());
     for manifold in manifolds.iter() {
-        let normal_W = from_rapier(thing_pose.rotation * manifold.local_n1);
-        for point in manifold.points.iter().filter(|point| point.dist < margin_m) {
-            let ends =
-                [thing_pose.transform_point(point.local_p1), part_pose.transform_point(point.local_p2)];
+        let normal = thing_pose.rotation * manifold.local_n1;
+        let mut tell = |ends: [Vector; 2], gap_m: f64| {
             note(Near {
                 object: thing.user_data as u32,
                 part: 0,
                 bodies: [WORLD, VEHICLE],
                 neighbour: None,
                 point_W_m: (from_rapier(ends[0]) + from_rapier(ends[1])) / 2.0,
-                normal_W,
-                gap_m: point.dist,
+                normal_W: from_rapier(normal),
+                gap_m,
                 friction: thing.friction(),
                 restitution: thing.restitution(),
+            });
+        };
+        for point in manifold.points.iter().filter(|point| point.dist < margin_m) {
+            let ends =
+                [thing_pose.transform_point(point.local_p1), part_pose.transform_point(point.local_p2)];
+            tell(ends, point.dist);
+        }
+        if !manifold.points.is_empty() {
+            let found = manifold.points.iter().map(|point| part_pose.transform_point(point.local_p2));
+            rim::missing_ends((thing, thing_pose), (part, part_pose), normal, found, |ends, gap_m| {
+                if gap_m < margin_m {
+                    tell(ends, gap_m);
+                }
             });
         }
     }

@@ -36,6 +36,7 @@ fn node(name: &str, period_ticks: u32, inputs: &[(usize, u32)], output: usize) -
         inputs: inputs.iter().map(input).collect(),
         outputs: vec![OutputPlan { port: "out".to_owned(), topic: output }],
         parameters: Value::Null,
+        files: Vec::new(),
         restarts: false,
         computing_time: None,
     }

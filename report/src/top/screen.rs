@@ -2,6 +2,7 @@
 
 use crate::cells::Cells;
 use crate::top::view::{View, processes, title, topics};
+use diagnostics::printable_line;
 use ratatui::buffer::Buffer;
 use ratatui::layout::{Constraint, Layout, Rect};
 use ratatui::style::{Color, Style, Stylize};
@@ -38,11 +39,12 @@ impl Widget for Screen<'_> {
         ])
         .areas(area);
         let [run, progress] = title(self.view);
+        let run = printable_line(&run);
         let lines = [Line::styled(run, title_style(self.view.status.state)), Line::raw(progress)];
         Text::from_iter(lines).render(head, buffer);
         table(&processes, &PROCESS_WIDTHS, self.scroll, first.height).render(first, buffer);
         table(&topics, &TOPIC_WIDTHS, self.scroll, second.height).render(second, buffer);
-        Line::raw(self.notice).bold().render(notice, buffer);
+        Line::raw(printable_line(self.notice)).bold().render(notice, buffer);
         Line::raw(KEYS).dim().render(keys, buffer);
     }
 }
@@ -71,7 +73,7 @@ fn table(cells: &Cells, widths: &[u16], scroll: usize, height: u16) -> Table<'st
     let widths = widths.iter().zip(&cells.is_number).map(width);
     let row = |texts: &Vec<String>| {
         let aligned = |(text, is_number): (&String, &bool)| {
-            let line = Line::raw(text.clone());
+            let line = Line::raw(printable_line(text).into_owned());
             Cell::new(if *is_number { line.right_aligned() } else { line })
         };
         Row::new(texts.iter().zip(&cells.is_number).map(aligned).collect::<Vec<_>>())
@@ -151,6 +153,20 @@ mod tests {
         assert_eq!(words(&lines[13]), ["topic", "publisher", "rate", "Hz", "samples", "lost"]);
         assert_eq!(words(&lines[21]), ["/process-7/estimate", "process-7", "1000", "12345", "0"]);
         assert_eq!(lines[22..], ["paused at tick 12345", KEYS]);
+    }
+
+    #[test]
+    fn names_and_answers_are_shown_and_not_obeyed() {
+        let hostile = "a\u{1b}[2J\u{202e}\u{200b}b";
+        let mut view = view(1);
+        view.manifest = hostile.to_owned();
+        view.processes[0].name = hostile.to_owned();
+        view.topics[0].name = hostile.to_owned();
+        let mut terminal = Terminal::new(TestBackend::new(120, 12)).unwrap();
+        let screen = Screen { view: &view, notice: hostile, scroll: 0 };
+        terminal.draw(|frame| frame.render_widget(screen, frame.area())).unwrap();
+        let drawn = terminal.backend().to_string();
+        assert_eq!(drawn.matches("a\\u{1b}[2J\\u{202e}\\u{200b}b").count(), 4, "{drawn}");
     }
 
     #[test]

@@ -5,6 +5,7 @@
 
 use anyhow::{Context, Result, bail};
 use flights::{Flight, Played};
+use inputs::InputFiles;
 use recorder::reader::Recording;
 use runtime::event::{RunEvent, StopToken};
 use runtime::host::Host;
@@ -65,7 +66,7 @@ impl Replay {
     /// A flight without commands or shorter than the shortest window, or a folder that cannot be written to.
     pub fn prepare(flight: &Flight, vehicles: &[&Path], folder: &Path) -> Result<Self> {
         let folder = std::path::absolute(folder)?.join(file_name(&flight.name));
-        std::fs::create_dir_all(&folder).with_context(|| format!("cannot create {}", folder.display()))?;
+        output_file::make_folder(&folder)?;
         let lock = output_file::lock_folder(&folder)?;
         let data = folder.join(DATA);
         for output in [data.clone(), folder.join(MANIFEST), folder.join(RECORDING)] {
@@ -84,7 +85,7 @@ impl Replay {
         Ok(Self { folder, manifest, played, ticks, _lock: lock })
     }
 
-    /// Flies; returns how long that took on the host, in seconds, and the recording.
+    /// Flies the vehicles of `files`; returns how long that took on the host, in seconds, and the recording.
     ///
     /// # Errors
     /// As `hummingbus run`; a run that was stopped too.
@@ -92,11 +93,13 @@ impl Replay {
         &self,
         components: Registry,
         stop: &StopToken,
+        files: &InputFiles,
         tell: &mut dyn FnMut(&str),
     ) -> Result<(f64, Recording)> {
         let manifest = self.manifest.build(&self.folder.join(MANIFEST), components)?;
-        let launcher = Launcher::new(Host::this_binary()).stopped_by(stop).adopting_orphans();
-        let launcher = launcher.followed_by(|event| {
+        // What the run reads beside them is its own.
+        let launcher = Launcher::new(Host::this_binary()).reading(files.branch());
+        let launcher = launcher.stopped_by(stop).adopting_orphans().followed_by(|event| {
             if let RunEvent::Note(text) = event {
                 tell(text);
             }

@@ -10,6 +10,7 @@ use bus::Registration;
 use bus::plan::{INPUTS_RESERVED, NodePlan, Plan};
 use bus::ports::{Inputs, PortSpec};
 use diagnostics::Diagnostic;
+use inputs::InputFiles;
 use std::collections::BTreeMap;
 use std::ops::Range;
 use toml::Spanned;
@@ -65,18 +66,20 @@ pub fn all(
 }
 
 /// The backup of `process` in a run of `manifest` by `plan` that is under way; `with_text` is TOML that says in what
-/// it differs, as `with` does. When it joins and takes over is left open.
+/// it differs, as `with` does. When it joins and takes over is left open. It reads the run's `files`; one that the run has
+/// not read yet is read now.
 ///
 /// # Errors
 /// If there is no such process, or it cannot be succeeded by that.
 pub fn backup_of(
     manifest: &Manifest,
     plan: &Plan,
+    files: &InputFiles,
     process: &str,
     with_text: &str,
 ) -> Result<BackupSpec, Diagnostic> {
     let (manifest, whole) = manifest.succeed(process, with_text)?;
-    let declared_nodes = declared_nodes(&manifest)?;
+    let declared_nodes = declared_nodes(&manifest, files)?;
     let run = Run { manifest: &manifest, plan, declared_nodes: &declared_nodes };
     let node = run.node(&Spanned::new(whole.span(), process.to_owned()))?;
     run.resolve(node, whole.get_ref(), &whole.span(), &mut Notes::default())
@@ -112,12 +115,13 @@ impl Run<'_> {
         }
         let process = Process { outputs: self.outputs(node, span), ..whole.clone() };
         let mut declared_nodes = self.declared_nodes.to_vec();
+        let files = declared_nodes[node].files;
         declared_nodes[node] =
-            DeclaredNode { manifest: self.manifest, name: &name, process: &process, program };
+            DeclaredNode { manifest: self.manifest, files, name: &name, process: &process, program };
         let mut wiring = wire(&declared_nodes, Some(node))?;
         let mut plan = wiring.nodes.swap_remove(node);
         let declared = &declared_nodes[node];
-        plan.parameters = parameters::of(declared, self.plan, plan.period_ticks, notes)?;
+        (plan.parameters, plan.files) = parameters::of(declared, self.plan, plan.period_ticks, notes)?;
         self.require_room(node, &plan, span)?;
         for input in &mut plan.inputs {
             // The same topics, but perhaps in another order.

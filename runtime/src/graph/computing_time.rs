@@ -5,6 +5,7 @@ use crate::manifest::ComputingTimeSetting;
 use bus::computing_time::ComputingTime;
 use diagnostics::Diagnostic;
 use diagnostics::parameter::{ParameterError, not_negative, positive, require};
+use inputs::InputFiles;
 use serde_json::Value;
 use std::path::Path;
 use toml::Spanned;
@@ -29,7 +30,7 @@ const QUANTILES: [(f64, &str); 6] = [
 /// # Errors
 /// An invalid time, or a file that does not hold any.
 pub fn of(declared: &DeclaredNode<'_>) -> Result<Option<ComputingTime>, Diagnostic> {
-    let DeclaredNode { manifest, name, process, .. } = declared;
+    let DeclaredNode { manifest, files, name, process, .. } = declared;
     let Some(setting) = &process.computing_time else { return Ok(None) };
     let who = format!("`computing_time` of `{}`", name.get_ref());
     let refused = |reason: ParameterError| {
@@ -40,7 +41,7 @@ pub fn of(declared: &DeclaredNode<'_>) -> Result<Option<ComputingTime>, Diagnost
     if let ComputingTimeSetting::Measured { file, process, scale } = setting.get_ref() {
         let path = manifest.resolve(&Spanned::new(setting.span(), file.clone()))?;
         let process = process.as_deref().unwrap_or(name.get_ref());
-        let time = measured(&path, process, scale.unwrap_or(1.0));
+        let time = measured(files, &path, process, scale.unwrap_or(1.0));
         return time.map(Some).map_err(refused);
     }
     stated(setting.get_ref()).map(Some).map_err(refused)
@@ -68,10 +69,15 @@ fn stated(setting: &ComputingTimeSetting) -> Result<ComputingTime, ParameterErro
 }
 
 /// The distribution in the file at `path`: that of `process` in a profile, or a list of times.
-fn measured(path: &Path, process: &str, scale: f64) -> Result<ComputingTime, ParameterError> {
+fn measured(
+    files: &InputFiles,
+    path: &Path,
+    process: &str,
+    scale: f64,
+) -> Result<ComputingTime, ParameterError> {
     positive("scale", scale)?;
     let at = |reason: String| ParameterError::conflict("file", format!("{}: {reason}", path.display()));
-    let text = std::fs::read_to_string(path).map_err(|error| at(error.to_string()))?;
+    let text = files.text(path).map_err(|error| at(error.to_string()))?;
     let mut points = match serde_json::from_str::<Value>(&text) {
         Ok(Value::Object(report)) => quantiles(&report.into(), process).map_err(at)?,
         Ok(Value::Array(times)) => evenly(times.iter().map(Value::as_f64)).map_err(at)?,

@@ -15,7 +15,7 @@ use toml::Spanned;
 /// # Errors
 /// A port or topic that is not there, or does not fit.
 pub fn inputs(declared: &DeclaredNode<'_>, topics: &[TopicPlan]) -> Result<Vec<InputPlan>, Diagnostic> {
-    let DeclaredNode { manifest, name, process, program } = declared;
+    let DeclaredNode { manifest, name, process, program, .. } = declared;
     match program.component().map(|kind| &kind.inputs) {
         Some(Inputs::Any) if process.inputs.is_empty() => {
             let port = |(topic, plan): (usize, &TopicPlan)| InputPlan {

@@ -7,6 +7,7 @@ use crate::program::Executable;
 use bus::context::{InputMessage, NodeContext};
 use bus::plan::Plan;
 use diagnostics::{Diagnostic, ParameterError};
+use inputs::{InputFile, InputFiles};
 use scenes::Scene;
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
@@ -52,8 +53,8 @@ impl Notes {
 }
 
 /// The parameters of `declared`, files resolved, checked for a node that computes every `period_ticks` of the run of
-/// `plan` where its kind is built in; notes its vehicle file, what that is based on, its scene and its gains file, and
-/// what is odd.
+/// `plan` where its kind is built in, and the files that it reads; notes its vehicle file, what that is based on, its scene
+/// and its gains file, and what is odd.
 ///
 /// # Errors
 /// A file or a parameter that is refused.
@@ -62,28 +63,28 @@ pub fn of(
     plan: &Plan,
     period_ticks: u32,
     notes: &mut Notes,
-) -> Result<serde_json::Value, Diagnostic> {
-    let DeclaredNode { manifest, name, process, program } = declared;
+) -> Result<(serde_json::Value, Vec<InputFile>), Diagnostic> {
+    let DeclaredNode { manifest, name, process, program, .. } = declared;
+    let read = declared.files.listing_anew();
     let mut parameters: BTreeMap<&str, serde_json::Value> =
         process.parameters.iter().map(|(key, value)| (key.get_ref().as_str(), value.clone())).collect();
     for (key, file) in files(process) {
         let Some(file) = file else { continue };
-        let path = manifest.resolve(file)?;
-        if parameters.insert(key, path.to_string_lossy().into()).is_some() {
+        // As the node gets it.
+        let path = manifest.resolve(file)?.to_string_lossy().into_owned();
+        if parameters.insert(key, path.as_str().into()).is_some() {
             let message = format!("`{}` has `{key}` twice: as a file, and in its parameters", name.get_ref());
             return Err(manifest.problem(&file.span(), message, "leave one of them out"));
         }
-        match key {
-            "data" => {}
-            "vehicle" => {
-                let base = Vehicle::base(&path);
-                notes.models.extend(std::iter::once(path).chain(base));
-            }
-            "scene" => {
-                let meshes = Scene::mesh_files(&path);
-                notes.models.extend(std::iter::once(path).chain(meshes));
-            }
-            _ => notes.models.push(path),
+        let named = named_files(&read, key, path.into());
+        if program.component().is_none() {
+            read_named(&read, key, &named).map_err(|message| {
+                let message = format!("process `{}`: {message}", name.get_ref());
+                manifest.problem(&file.span(), message, "correct the path, which is relative to the manifest")
+            })?;
+        }
+        if key != "data" {
+            notes.models.extend(named);
         }
     }
     let parameters = serde_json::to_value(parameters).unwrap_or_default();
@@ -98,7 +99,8 @@ pub fn of(
             .naming(&outputs)
             .reading(&messages)
             .timed(plan.tick_ns, period_ticks, plan.duration_ticks)
-            .seeded(plan.seed);
+            .seeded(plan.seed)
+            .given(&read);
         kind.check(&parameters, &context).map_err(|error| refused(declared, &error))?;
         for warning in context.into_warnings() {
             let at = place(declared, &warning.key);
@@ -107,7 +109,27 @@ pub fn of(
             }
         }
     }
-    Ok(parameters)
+    Ok((parameters, read.used()))
+}
+
+/// The file at `path`, the value of `key`, with the files that it names itself.
+fn named_files(files: &InputFiles, key: &str, path: PathBuf) -> Vec<PathBuf> {
+    let others = match key {
+        "vehicle" => Vehicle::base(files, &path).into_iter().collect(),
+        "scene" => Scene::mesh_files(files, &path),
+        _ => Vec::new(),
+    };
+    std::iter::once(path).chain(others).collect()
+}
+
+/// Reads the files that a command names, which nobody checks before it starts. The program alone knows what its `data` is:
+/// a device or a folder is left to it.
+fn read_named(files: &InputFiles, key: &str, named: &[PathBuf]) -> Result<(), String> {
+    let is_left = |path: &&PathBuf| key == "data" && !path.is_file();
+    named.iter().filter(|path| !is_left(path)).try_for_each(|path| {
+        let read = files.bytes(path).map(drop);
+        read.map_err(|cause| format!("`{key}`: cannot read {}: {cause}", path.display()))
+    })
 }
 
 /// What the inputs of `declared` carry, as far as the registry knows it.

@@ -8,6 +8,7 @@ use bus::plan::NodePlan;
 use bus::process::{LAUNCHER_VARIABLE, RUN_VARIABLE};
 use bus::{GENERATION_VARIABLE, NODE_VARIABLE};
 use diagnostics::{Diagnostic, did_you_mean, nearest};
+use inputs::InputFiles;
 use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::Read as _;
@@ -21,6 +22,8 @@ use toml::Spanned;
 pub struct DeclaredNode<'m> {
     /// The manifest that declares it.
     pub manifest: &'m Manifest,
+    /// The files of the run.
+    pub files: &'m InputFiles,
     /// Its name.
     pub name: &'m Spanned<String>,
     /// What the manifest says of it.
@@ -29,14 +32,18 @@ pub struct DeclaredNode<'m> {
     pub program: Program,
 }
 
-/// The processes that take part in the ticks, by name.
+/// The processes that take part in the ticks, by name; they read from `files`.
 ///
 /// # Errors
 /// If there is none, or one says what only a sidecar can, or cannot be started.
-pub fn declared_nodes(manifest: &Manifest) -> Result<Vec<DeclaredNode<'_>>, Diagnostic> {
+pub fn declared_nodes<'m>(
+    manifest: &'m Manifest,
+    files: &'m InputFiles,
+) -> Result<Vec<DeclaredNode<'m>>, Diagnostic> {
     let declared = |(name, process)| {
         require_no_sidecar(manifest, name, process)?;
-        Ok(DeclaredNode { manifest, name, process, program: program(manifest, name, process)? })
+        let program = program(manifest, name, process)?;
+        Ok(DeclaredNode { manifest, files, name, process, program })
     };
     let declared_nodes = manifest.content.process.iter().filter(|(_, process)| takes_part(process));
     let declared_nodes = Diagnostic::gather(declared_nodes.map(declared))?;
@@ -312,7 +319,7 @@ fn log(manifest: &Manifest, process: &Process) -> Result<Option<PathBuf>, Diagno
         return at(format!("`log`: the folder of {} is not there", path.display()), "make it");
     }
     match output_file::check(&path, &output_file::LOG) {
-        Ok(_) => Ok(Some(path)),
+        Ok(()) => Ok(Some(path)),
         Err(error) => at(format!("`log`: {error:#}"), ""),
     }
 }

@@ -32,6 +32,7 @@ pub fn wire(declared_nodes: &[DeclaredNode<'_>], changed: Option<usize>) -> Resu
             inputs: inputs::inputs(declared, &topics)?,
             outputs: outputs::outputs(&published, index),
             parameters: serde_json::Value::Null,
+            files: Vec::new(),
             restarts: declared.program.on_exit == OnExit::Restart,
             computing_time: computing_time::of(declared)?,
         })

@@ -4,6 +4,7 @@ use super::sources::{Origin, Sources};
 use super::tree;
 use crate::registry::Registry;
 use diagnostics::Diagnostic;
+use inputs::InputFiles;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use toml::Spanned;
@@ -19,7 +20,7 @@ pub const LISTS: [&str; 6] = ["compare", "measure", "pass", "shadow", "swap", "v
 /// # Errors
 /// If it cannot be read.
 pub fn text(path: &Path) -> Result<String, Diagnostic> {
-    vehicles::text::read(path).map_err(|error| {
+    InputFiles::default().text(path).map_err(|error| {
         let file = path.display().to_string();
         Diagnostic::in_file(file, format!("cannot be read: {error}")).help("give the path of a manifest")
     })
@@ -72,7 +73,7 @@ impl Reader {
         if self.read.contains(&identity) {
             return Ok(());
         }
-        let text = vehicles::text::read(&path).map_err(|error| {
+        let text = InputFiles::default().text(&path).map_err(|error| {
             let message = format!("the included file {} cannot be read: {error}", path.display());
             at(message, "a path is relative to the file that includes it")
         })?;

@@ -89,9 +89,9 @@ impl Sources {
         self.all.iter().filter(|source| source.path().is_some())
     }
 
-    /// The files beside the manifest's own.
-    pub fn included(&self) -> Vec<PathBuf> {
-        self.all.iter().skip(1).filter_map(Source::path).map(Path::to_owned).collect()
+    /// The files beside the manifest's own: their paths and texts.
+    pub fn included(&self) -> impl Iterator<Item = (&Path, &str)> {
+        self.all.iter().skip(1).filter_map(|source| Some((source.path()?, source.text.as_str())))
     }
 
     /// The values given with `--set`.

@@ -148,8 +148,7 @@ impl Replacements<'_> {
         self.nodes.iter().enumerate().find_map(|(node, nodes)| {
             let backup = nodes.backup.as_ref().filter(|backup| backup.stage == Stage::Starting)?;
             let is_late = self.view.since(backup.started) > backup.pending.spec.program.watchdog;
-            let is_up = self.view.phase != Phase::Running || self.is_prepared(backup);
-            (is_late && !is_up).then_some((node, backup.generation))
+            (is_late && !self.is_prepared(backup)).then_some((node, backup.generation))
         })
     }
 

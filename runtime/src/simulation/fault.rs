@@ -20,6 +20,9 @@ pub(super) enum Fault {
     Stop,
     /// The plan of a backup cannot be written.
     StoreBackup,
+    /// A node stands still while it starts, and then the clock when all have joined; both together are longer than a
+    /// watchdog.
+    SlowStart,
     // These may end it.
     /// Somebody asks for a second stop.
     Interrupt,
@@ -36,10 +39,10 @@ pub(super) enum Fault {
 }
 
 use Fault::{
-    Death, Hang, Interrupt, Leap, LostNotice, NeverReady, Pause, SpuriousWakeUp, Start, Steer, Stop,
-    StoreBackup, StoreMembership, Swap,
+    Death, Hang, Interrupt, Leap, LostNotice, NeverReady, Pause, SlowStart, SpuriousWakeUp, Start, Steer,
+    Stop, StoreBackup, StoreMembership, Swap,
 };
 
-pub(super) const HARMLESS: [Fault; 8] =
-    [Pause, Leap, LostNotice, SpuriousWakeUp, Swap, Steer, Stop, StoreBackup];
+pub(super) const HARMLESS: [Fault; 9] =
+    [Pause, Leap, LostNotice, SpuriousWakeUp, Swap, Steer, Stop, StoreBackup, SlowStart];
 pub(super) const HARMFUL: [Fault; 6] = [Interrupt, Death, Hang, NeverReady, Start, StoreMembership];

@@ -1,7 +1,8 @@
 //! An instance of a node in a simulated run: it follows the protocol of `bus`, a store or a wake-up a step, and may die
 //! between any two.
 
-use super::sim::{Bug, Doing, FOR_EVER, NEVER, Need, Sim};
+use super::fault::Fault;
+use super::sim::{Bug, Doing, FOR_EVER, NEVER, NODES, Need, SLOW_START, Sim};
 use crate::host::End;
 use crate::role::Role;
 use bus::lockstep::{Phase, SlotState, TransferOutcome};
@@ -54,6 +55,11 @@ impl Sim {
 
     fn get_ready(&mut self, slot: usize, phase: Phase) {
         self.segment.slots[slot].ready = phase;
+        let all_joined = self.segment.slots[..NODES].iter().all(|slot| slot.ready >= phase);
+        if all_joined && self.segment.phase < phase && self.faults.contains(&Fault::SlowStart) {
+            let clocks = self.instances.iter_mut().filter(|instance| instance.role == Role::Clock);
+            clocks.for_each(|clock| clock.frozen_until = clock.frozen_until.max(self.now + SLOW_START));
+        }
         self.wake(Need::State);
         self.notify();
     }

@@ -64,6 +64,7 @@ fn node(name: &str, period_ticks: u32, inputs: Vec<InputPlan>, outputs: &[usize]
         inputs,
         outputs: outputs.iter().map(|&topic| OutputPlan { port: "out".to_owned(), topic }).collect(),
         parameters: serde_json::Value::Null,
+        files: Vec::new(),
         restarts: true,
         computing_time: None,
     }
@@ -100,5 +101,6 @@ pub(super) fn graph(draw: &mut Draw) -> Graph {
         ("viewer".to_owned(), Program { ready, ..program(on_exit) })
     });
     let sidecars = sidecars.collect();
-    Graph { plan, programs, backups, sidecars, models: Vec::new(), warnings: Vec::new() }
+    let files = bus::InputFiles::default();
+    Graph { plan, programs, backups, sidecars, models: Vec::new(), files, warnings: Vec::new() }
 }

@@ -21,6 +21,8 @@ pub(super) const WINDOW: u32 = 4;
 pub(super) const NEVER: u32 = u32::MAX;
 /// Simulated time within which a run must end once nothing happens to it any more.
 const QUIET: Duration = Duration::from_secs(60);
+/// How long a node, and then the clock, stands still while the run starts: less than a watchdog, more than half of one.
+pub(super) const SLOW_START: Duration = Duration::from_millis(300);
 /// What never ends by itself.
 pub(super) const FOR_EVER: Duration = Duration::MAX;
 
@@ -245,7 +247,9 @@ impl Sim {
             Role::Sidecar { .. } if !notifies => Doing::Idle,
             Role::Node { .. } | Role::Sidecar { .. } => Doing::Starting,
         };
-        let start = self.draw.micros(1000);
+        let is_slow =
+            matches!(role, Role::Node { node: 0, generation: 0 }) && self.faults.contains(&Fault::SlowStart);
+        let start = if is_slow { SLOW_START } else { self.draw.micros(1000) };
         self.instances.push(Instance {
             role,
             doing,

@@ -1,25 +1,27 @@
 //! Runs that stand still, and backups that do not join in their time.
 
-use super::Supervisor;
+use super::{Advance, Supervisor};
 use crate::program::OnExit;
 use crate::replacement::Stage;
 use crate::role::Role;
 use crate::supervisor::Event;
 use crate::world::World;
 use anyhow::Result;
+use bus::lockstep::Phase;
 use std::time::Duration;
 
 impl<W: World> Supervisor<'_, W> {
     /// Looks whether the run stands still, and because of whom.
     pub(super) fn note_stall(&mut self) -> Result<()> {
         let view = &self.overseer.replacements.view;
-        let ticks = view.completed_ticks();
         // A paused run stands still because it was told to.
         let is_paused = view.held_at.is_some_and(|held| view.hold_tick <= held);
         // A sidecar that does not get ready has a watchdog of its own.
         let is_waiting = view.held_at.is_some() && !self.sidecars.all_ready();
-        if ticks != self.timing.last_change.0 || self.overseer.state.is_over() || is_paused || is_waiting {
-            self.timing.last_change = (ticks, self.clock.now());
+        let straggler = self.straggler();
+        let advance = self.advance(straggler);
+        if advance != self.timing.last_change.0 || self.overseer.state.is_over() || is_paused || is_waiting {
+            self.timing.last_change = (advance, self.clock.now());
             return Ok(());
         }
         if let Some((node, generation, stage, since)) = self.overseer.replacements.joining() {
@@ -27,7 +29,6 @@ impl<W: World> Supervisor<'_, W> {
             return Ok(());
         }
         let stood = self.clock.since(self.timing.last_change.1);
-        let straggler = self.straggler();
         if stood <= self.patience(straggler).max(2 * self.deadline()) {
             return Ok(());
         }
@@ -39,6 +40,17 @@ impl<W: World> Supervisor<'_, W> {
         self.timing.last_change.1 = self.clock.now();
         self.processes.kill(straggler, Some(format!("was killed by the watchdog: {text}")));
         Ok(())
+    }
+
+    /// How far the run has come.
+    fn advance(&self, straggler: Option<Role>) -> Advance {
+        let view = &self.overseer.replacements.view;
+        Advance {
+            phase: Some(view.phase),
+            awaits_phase: view.phase < Phase::Running && straggler == Some(Role::Clock),
+            granted: view.granted,
+            done: view.slots.iter().map(|slot| slot.done).collect(),
+        }
     }
 
     /// How long the run may stand still because of `straggler`: for the clock, and where nobody is to blame, as long as

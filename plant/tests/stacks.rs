@@ -1,0 +1,231 @@
+//! Heavy bodies on light ones: no stack makes energy, squeezes a body out, or sinks.
+#![allow(non_snake_case, reason = "a trailing _W or _B names the frame a vector is written in")]
+
+mod common;
+
+use common::{TICK_S, hummingbird};
+use nalgebra::Vector3;
+use plant::{Backend, NewtonEuler, Rapier, RigidBody};
+use scenes::Scene;
+
+const G_M_S2: f64 = 9.81;
+
+fn given(value: &str, unit: &str) -> String {
+    format!("{{ value = {value}, unit = \"{unit}\", source = \"test\", uncertainty = \"exact\" }}")
+}
+
+/// A cube with an edge of 0.2 m.
+fn cube(name: &str, mass_kg: f64, centre_m: [f64; 3]) -> String {
+    let keys = [
+        ("centre", format!("{centre_m:?}"), "m"),
+        ("size", "[0.2, 0.2, 0.2]".to_owned(), "m"),
+        ("mass", mass_kg.to_string(), "kg"),
+    ];
+    let keys: String =
+        keys.iter().map(|(key, value, unit)| format!("{key} = {}\n", given(value, unit))).collect();
+    format!("[[boxes]]\nname = \"{name}\"\n{keys}")
+}
+
+/// Free bodies on the ground, and a vehicle far away.
+struct Stack {
+    scene: Scene,
+    plant: Rapier,
+}
+
+impl Stack {
+    fn new(cubes: &[String], friction: f64, substeps: u32) -> Self {
+        let surface =
+            format!("friction = {}\nrestitution = {}\n", given(&friction.to_string(), "1"), given("0", "1"));
+        let text = format!("name = \"test\"\n{surface}{}", cubes.concat());
+        let scene = Scene::parse(&text, "test.toml").unwrap_or_else(|error| panic!("{error}\n{text}"));
+        let model = NewtonEuler::new(hummingbird(), substeps);
+        let start = RigidBody::level_at(Vector3::new(100.0, 0.0, 50.0));
+        let plant = common::rapier(model, &scene, &start, 1e9);
+        Self { scene, plant }
+    }
+
+    fn tick(&mut self) {
+        self.plant.step(&[hummingbird().hover_command(); 4], TICK_S, &[]);
+    }
+
+    /// Kinetic and potential energy of the bodies.
+    fn energy_J(&self) -> f64 {
+        let bodies = self.scene.bodies().zip(self.plant.bodies()).map(|((_, built), body)| {
+            let w = body.angular_velocity_B_rad_s;
+            0.5 * built.mass_kg * body.velocity_W_m_s.norm_squared()
+                + 0.5 * w.dot(&(built.inertia_kg_m2 * w))
+                + built.mass_kg * G_M_S2 * body.position_W_m.z
+        });
+        bodies.sum()
+    }
+
+    /// The most energy that any tick adds to the least before it.
+    fn most_gain_J(&mut self, ticks: usize) -> f64 {
+        let mut least_J = self.energy_J();
+        let mut most_J = f64::NEG_INFINITY;
+        for _ in 0..ticks {
+            self.tick();
+            let energy_J = self.energy_J();
+            most_J = most_J.max(energy_J - least_J);
+            least_J = least_J.min(energy_J);
+        }
+        most_J
+    }
+
+    /// The fastest body in any tick, and the farthest that the body `number` is off its place aside, m.
+    fn fastest_m_s(&mut self, ticks: usize, number: usize) -> (f64, f64) {
+        let start_W_m = self.plant.bodies()[number].position_W_m;
+        let (mut fastest_m_s, mut farthest_m) = (0.0_f64, 0.0_f64);
+        for _ in 0..ticks {
+            self.tick();
+            let speeds_m_s = self.plant.bodies().iter().map(|body| body.velocity_W_m_s.norm());
+            fastest_m_s = speeds_m_s.fold(fastest_m_s, f64::max);
+            let off_W_m = self.plant.bodies()[number].position_W_m - start_W_m;
+            farthest_m = farthest_m.max(off_W_m.xy().norm());
+        }
+        (fastest_m_s, farthest_m)
+    }
+
+    /// What a tick may gain: what touches may overlap by a micrometre, and is lifted out of that.
+    fn may_gain_J(&self, heaviest_kg: f64) -> f64 {
+        1e-6 * (1.0 + self.energy_J().abs()) + 2e-6 * G_M_S2 * heaviest_kg
+    }
+}
+
+/// Edges of 0.2 m; the heavy one falls 0.4 m.
+fn falling(ratio: f64, off_m: [f64; 2], drop_m: f64) -> [String; 2] {
+    let heavy = cube("heavy", 10.0, [off_m[0], off_m[1], 0.3 + drop_m]);
+    [cube("light", 10.0 / ratio, [0.0, 0.0, 0.1]), heavy]
+}
+
+/// The most energy that a tick adds, over drops from several heights at several steps and `offsets` places beside the middle.
+fn most_gain_J(ratio: f64, friction: f64, offsets: u32) -> f64 {
+    let mut most_J = f64::NEG_INFINITY;
+    for (sin, cos) in (0..offsets).map(|seed| libm::sincos(f64::from(3 * seed + 1))) {
+        for (substeps, drop_m) in [(1, 0.05), (1, 0.4), (2, 0.05), (2, 0.4), (5, 0.05), (5, 0.4)] {
+            let mut stack =
+                Stack::new(&falling(ratio, [0.06 * sin, 0.05 * cos * cos], drop_m), friction, substeps);
+            let may_gain_J = stack.may_gain_J(10.0);
+            let gain_J = stack.most_gain_J(500);
+            let what = format!("1:{ratio}, friction {friction}, {substeps} steps a tick, from {drop_m} m");
+            assert!(gain_J < may_gain_J, "{what}: {gain_J} J");
+            assert_eq!(stack.plant.trouble(), None, "{what}");
+            let aside_m = stack.plant.bodies()[0].position_W_m.xy().norm();
+            assert!(aside_m < 0.02, "{what}: it is squeezed out by {aside_m} m");
+            most_J = most_J.max(gain_J);
+        }
+    }
+    most_J
+}
+
+/// `STACKS` is the number of places beside the middle: the table of docs/world.md has ten.
+#[test]
+fn a_heavy_box_that_falls_on_a_light_one_makes_no_energy_and_does_not_squeeze_it_out() {
+    let offsets = std::env::var("STACKS").map_or(1, |text| text.parse().expect("STACKS is a number"));
+    println!("| mass ratio | no friction | friction 0.5 | friction 1 |\n|---|---|---|---|");
+    for ratio in [1.0, 10.0, 50.0, 100.0, 1_000.0, 10_000.0] {
+        let [none, half, one] = [0.0, 0.5, 1.0].map(|friction| most_gain_J(ratio, friction, offsets));
+        println!("| 1:{ratio} | {none:.1e} J | {half:.1e} J | {one:.1e} J |");
+    }
+}
+
+#[test]
+fn many_substeps_and_far_falls_make_no_energy_either() {
+    for substeps in [1, 20] {
+        for drop_m in [0.01, 2.0] {
+            let mut stack = Stack::new(&falling(100.0, [0.03, 0.02], drop_m), 0.5, substeps);
+            let may_gain_J = stack.may_gain_J(10.0);
+            let gain_J = stack.most_gain_J(900);
+            assert!(gain_J < may_gain_J, "{substeps} steps from {drop_m} m: {gain_J} J");
+        }
+    }
+}
+
+#[test]
+fn a_light_block_below_a_heavy_one_at_rest_stays_where_it_is() {
+    for (ratio, friction) in [(100.0, 0.5), (2_000.0, 0.3), (10_000.0, 0.5)] {
+        let mut stack = Stack::new(&falling(ratio, [0.03, -0.04], 0.0), friction, 2);
+        let (fastest_m_s, farthest_m) = stack.fastest_m_s(2_000, 0);
+        assert!(fastest_m_s < 1e-6 && farthest_m < 1e-6, "1:{ratio}: {fastest_m_s} m/s, {farthest_m} m");
+    }
+}
+
+#[test]
+fn a_tower_of_ten_with_the_heavy_ones_on_top_stands() {
+    let cubes: Vec<_> = (0..10_u32)
+        .map(|number| {
+            // From 1 g to 10 kg.
+            let mass_kg = 1e-3 * libm::pow(10.0, f64::from(number) * 4.0 / 9.0);
+            let side_m = if number % 2 == 0 { 0.01 } else { -0.01 };
+            cube(&format!("cube {number}"), mass_kg, [side_m, 0.0, 0.1 + 0.2 * f64::from(number)])
+        })
+        .collect();
+    let mut stack = Stack::new(&cubes, 0.5, 2);
+    let (fastest_m_s, farthest_m) = stack.fastest_m_s(1_000, 9);
+    assert!(fastest_m_s < 1e-4 && farthest_m < 1e-6, "{fastest_m_s} m/s, {farthest_m} m");
+    assert_eq!(stack.plant.trouble(), None);
+}
+
+#[test]
+fn the_vehicle_that_falls_on_a_light_box_is_not_thrown_away() {
+    for mass_kg in [5e-3, 5e-4] {
+        let text = format!("name = \"test\"\n{}", cube("box", mass_kg, [0.05, 0.03, 0.1]));
+        let scene = Scene::parse(&text, "test.toml").unwrap();
+        let start = RigidBody::level_at(Vector3::new(0.0, 0.0, 0.6));
+        let mut plant = common::rapier(NewtonEuler::new(hummingbird(), 2), &scene, &start, 1e9);
+        let fall_m_s = (2.0 * G_M_S2 * 0.6_f64).sqrt();
+        for tick in 0..1_500 {
+            plant.step(&[0.0; 4], TICK_S, &[]);
+            let speed_m_s = plant.state().body.velocity_W_m_s.norm();
+            assert!(speed_m_s < fall_m_s, "{mass_kg} kg, tick {tick}: {speed_m_s} m/s");
+        }
+        assert_eq!(plant.trouble(), None);
+    }
+}
+
+#[test]
+fn impulses_that_are_not_found_are_told_with_the_names_of_both() {
+    // 100 t on 1 mg: with numbers of 64 bits the impulse of one says nothing about the motion of the other.
+    let cubes = [cube("light", 1e-6, [0.0, 0.0, 0.1]), cube("heavy", 1e5, [0.03, 0.02, 0.35])];
+    let mut stack = Stack::new(&cubes, 0.5, 2);
+    assert_eq!(stack.plant.trouble(), None);
+    (0..300).for_each(|_| stack.tick());
+    let trouble = stack.plant.trouble().expect("no impulses are found");
+    assert!(
+        trouble.contains("\"light\"") && trouble.contains("m/s") && trouble.contains("substeps"),
+        "{trouble}"
+    );
+}
+
+mod drawn {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        #![proptest_config(ProptestConfig { cases: 10, failure_persistence: None, ..ProptestConfig::default() })]
+
+        /// Towers of two to ten cubes with gaps between them, none upright, thrown at each other's sides.
+        #[test]
+        fn towers_make_no_energy(
+            parts in prop::collection::vec((-2.0..2.0_f64, -0.05..0.05_f64, -0.05..0.05_f64, 0.0..0.1_f64), 2..=10),
+            friction in prop_oneof![Just(0.0), 0.1..1.0_f64],
+            substeps in 1..=4_u32,
+        ) {
+            let mut height_m = 0.1;
+            let mut heaviest_kg = 0.0_f64;
+            let cubes: Vec<_> = parts.iter().enumerate().map(|(number, (exponent, x_m, y_m, gap_m))| {
+                height_m += gap_m;
+                let mass_kg = 0.1 * libm::pow(10.0, *exponent);
+                heaviest_kg = heaviest_kg.max(mass_kg);
+                let text = cube(&format!("cube {number}"), mass_kg, [*x_m, *y_m, height_m]);
+                height_m += 0.2 + 1e-6;
+                text
+            }).collect();
+            let mut stack = Stack::new(&cubes, friction, substeps);
+            let may_gain_J = stack.may_gain_J(heaviest_kg * parts.len() as f64);
+            let gain_J = stack.most_gain_J(600);
+            prop_assert!(gain_J < may_gain_J, "{gain_J} J, {may_gain_J} J may be");
+            prop_assert_eq!(stack.plant.trouble(), None);
+        }
+    }
+}
