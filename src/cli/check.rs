@@ -25,6 +25,12 @@ pub struct CheckArguments {
 pub fn check(arguments: &CheckArguments) -> Result<bool> {
     let checked = hummingbus::check(&arguments.manifest, &arguments.set)?;
     print_warnings(&checked.warnings);
-    if arguments.json { print_json(&checked.json()) } else { print_text(&checked.to_string()) }?;
+    if arguments.json {
+        print_json(&checked.json())?;
+    } else {
+        let graph = checked.to_string().trim_end().to_owned();
+        let lines: Vec<String> = std::iter::once(graph).chain(hummingbus::meshes(&checked)).collect();
+        print_text(&lines.join("\n"))?;
+    }
     Ok(true)
 }
