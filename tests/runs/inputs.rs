@@ -165,8 +165,10 @@ fn a_live_swap_flies_the_files_of_the_run_and_reads_a_new_one_once() {
         launch.await_slot("controller", 1);
         // What the request has named is read by now.
         place.write("late.toml", "no gains");
-        launch.release();
+        // The run goes on to where the swap is over, and no further before that is told.
+        launch.hold_at(400);
         swap.end_among_others().with_code(0).prints(&["handed over: state"]);
+        launch.release();
     };
     let same = replaced_after_an_edit(&place, "", |launch| swap(launch, "kind = \"pid\""));
     let tables =
