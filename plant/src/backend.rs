@@ -38,7 +38,7 @@ pub trait Backend {
         &[]
     }
 
-    /// What of the motion since the start cannot be trusted, in words; the run ends with it.
+    /// The reason why the motion since the start cannot be trusted, if there is one; the run ends with it.
     fn trouble(&self) -> Option<String> {
         None
     }

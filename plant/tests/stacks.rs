@@ -118,7 +118,7 @@ fn most_gain_J(ratio: f64, friction: f64, offsets: u32) -> f64 {
     most_J
 }
 
-/// `STACKS` is the number of places beside the middle: the table of docs/world.md has ten.
+/// `STACKS` is the number of places beside the middle: the table of docs/world.md has three.
 #[test]
 fn a_heavy_box_that_falls_on_a_light_one_makes_no_energy_and_does_not_squeeze_it_out() {
     let offsets = std::env::var("STACKS").map_or(1, |text| text.parse().expect("STACKS is a number"));

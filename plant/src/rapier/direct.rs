@@ -1,4 +1,4 @@
-//! The impulses of contacts that push each other, found together: what the sweeps of `solver` need too long for.
+//! The impulses of contacts that push each other, found together where the sweeps of `solver` do not converge.
 //!
 //! With friction cones scaled to be their own duals, and a shift of each rate along its normal by μ times the slip, Coulomb's
 //! and Signorini's laws say that impulse and shifted rate lie in the cone and are orthogonal (G. De Saxcé and Z.-Q. Feng, The
@@ -30,19 +30,19 @@ const SHIFTS_MAX: usize = 60;
 /// Part of the way to the cone's surface that a step goes.
 const SHORT_OF_SURFACE: f64 = 0.99;
 
-/// What keeps the impulses of redundant contacts from drifting, against the inverse mass of a contact. Tuned, no source.
+/// Weight that keeps the impulses of redundant contacts from drifting, against the inverse mass of a contact. Tuned, no source.
 const PROXIMAL: f64 = 1e-11;
 
-/// What the residuals are to be below, against the greatest rate. Tuned, no source.
+/// Bound of the residuals, against the greatest rate or impulse. Tuned, no source.
 const EXACT: f64 = 1e-12;
 
-/// What the shifts are to be exact to. Tuned, no source.
+/// Bound of the error of the shifts. Tuned, no source.
 const SHIFT_EXACT_M_S: f64 = 1e-9;
 
-/// Rounds from which the next shifts are told.
+/// Number of rounds from which the next shifts are extrapolated.
 const DEPTH: usize = 3;
 
-/// Part of a change that rounding may be. Tuned, no source.
+/// Part of the greatest change that regularises the extrapolation. Tuned, no source.
 const REGULAR: f64 = 1e-9;
 
 /// The buffers of the solution.
@@ -58,7 +58,7 @@ pub(super) struct Direct {
     /// The change of the twists by impulses, in units of the square root of energy, and its last step.
     change: Vec<f64>,
     step: Vec<f64>,
-    /// Where the change is not what the impulses make.
+    /// Difference between the change that the impulses make and the change.
     off: Vec<f64>,
 }
 
@@ -136,7 +136,7 @@ struct Cone {
 #[derive(Debug, Clone, Copy, Default)]
 struct History {
     shift: f64,
-    /// What it led to, less the shift.
+    /// Slip that it led to, less the shift.
     off: f64,
     /// By how much each round changed both.
     by: [f64; DEPTH],
@@ -163,7 +163,7 @@ impl Cone {
         }
     }
 
-    /// What `wanted` is divided by the scaling's square.
+    /// `wanted` divided by the scaling's square.
     fn weigh(&self, wanted: &Vector3<f64>) -> Vector3<f64> {
         self.ways.iter().zip(self.weights).map(|(way, weight)| way * (weight * way.dot(wanted))).sum()
     }
@@ -174,7 +174,7 @@ impl Cone {
         Line { ways: [along(0), along(1)], ..self.lines[0] }
     }
 
-    /// How fast it slips with this change of the twists.
+    /// Speed of the slip with this change of the twists, scaled.
     fn slip(&self, change: &[f64]) -> f64 {
         (self.rates(change) + self.free).yz().norm()
     }
@@ -281,7 +281,7 @@ impl Direct {
             if steps >= STEPS_MAX || most_m_s <= SHIFT_EXACT_M_S {
                 return;
             }
-            // What has led astray is forgotten.
+            // An extrapolation that made it worse is forgotten.
             known = if most_m_s < before_m_s { (known + 1).min(DEPTH) } else { 0 };
             before_m_s = most_m_s;
             self.change_shifts(known);

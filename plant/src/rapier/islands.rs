@@ -101,7 +101,7 @@ impl Islands {
     }
 }
 
-/// Whether anything moves the body.
+/// True if anything can move the body.
 fn moves(body: &Body) -> bool {
     body.mobility != Matrix6::zeros()
 }

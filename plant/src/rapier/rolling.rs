@@ -4,7 +4,7 @@ use super::solver::{Body, Unilateral, join, part};
 use super::world::{DISC, Near};
 use nalgebra::{Matrix3, Vector3};
 
-/// How far before the contact the ground carries a rolling disc, against the disc's radius. A bicycle's tyre has 0.002 to
+/// Distance ahead of the contact at which the ground carries a rolling disc, against the disc's radius. A bicycle's tyre has 0.002 to
 /// 0.005; a rim of propeller guards is rougher. Tuned, no source.
 const LEAD: f64 = 0.02;
 

@@ -1,4 +1,4 @@
-//! What a step works with: the bodies and the constraints between them, and the search for their impulses.
+//! The buffers of a step: the bodies and the constraints between them, and the search for their impulses.
 
 use super::free_bodies::{FIRST_BODY, Work};
 use super::islands::{FOUND_M_S, Islands};
@@ -9,13 +9,13 @@ use crate::backend::TRAFFIC_MAX;
 use crate::state::RigidBody;
 use nalgebra::Vector3;
 
-/// What is nearer than this touches: far below what anybody sees, far above rounding. Tuned, no source.
+/// Greatest gap of a contact: far below what anybody sees, far above rounding. Tuned, no source.
 pub(super) const TOUCH_M: f64 = 1e-6;
 
 /// As many constraints as a vehicle has in a corner among others, and as many again: more take memory.
 pub(super) const CONSTRAINTS: usize = 64;
 
-/// What a step works with: kept, so that it takes no memory, and forgotten after it.
+/// The buffers of a step: kept, so that it takes no memory, and forgotten after it.
 #[derive(Default)]
 pub(super) struct Scratch {
     pub near: Vec<Near>,
@@ -46,7 +46,7 @@ impl Scratch {
         Self { near, constraints, now: bodies(), then: bodies(), before: bodies(), ..Self::default() }
     }
 
-    /// Whether another vehicle is near.
+    /// True if another vehicle is near.
     pub(super) fn is_among_others(&self) -> bool {
         self.near.iter().any(|near| near.neighbour.is_some())
     }

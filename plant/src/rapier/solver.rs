@@ -148,7 +148,7 @@ impl Bilateral {
         Some(Self { rows: all, count, inverse_kg: delassus_per_kg.try_inverse()? })
     }
 
-    /// How far a rate of its rows is off at most.
+    /// The greatest rate of its rows, which have to be zero.
     pub(super) fn off_m_s(&self, all: &[Body]) -> f64 {
         self.rows[..self.count].iter().map(|row| row.rate(all).abs()).fold(0.0, f64::max)
     }
@@ -339,7 +339,7 @@ fn unmet_m_s(all: &[Body], constraints: &[Unilateral]) -> f64 {
 }
 
 impl Unilateral {
-    /// How far its rates are from what its impulses may leave: by how much a step towards that would change a rate.
+    /// Error of its rates: the change of a rate by one step towards the laws of contact and friction.
     pub(super) fn off_m_s(&self, all: &[Body]) -> f64 {
         let inverse_mass_per_kg = self.normal.inverse_mass_per_kg;
         if self.bound_m_s == f64::NEG_INFINITY || inverse_mass_per_kg <= 0.0 {

@@ -9,7 +9,7 @@ const OFF_MOST_M_S: f64 = 1e-4;
 /// Part of the kinetic energy, and of 1 J, that the impulses of a step may make by rounding. Tuned, no source.
 const GAIN_MOST: f64 = 1e-6;
 
-/// What a search for impulses came to.
+/// The result of a search for impulses.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Outcome {
     /// By how much a rate is off at most.
@@ -21,7 +21,7 @@ pub(super) struct Outcome {
 }
 
 impl Outcome {
-    /// Whether the rates are what they have to be.
+    /// True if every rate is as near to its bound as it has to be.
     pub(super) fn is_met(off_m_s: f64) -> bool {
         off_m_s <= OFF_MOST_M_S
     }
@@ -41,7 +41,7 @@ pub(super) struct Unsolved {
 }
 
 impl Unsolved {
-    /// What is wrong with an outcome, if anything is; `objects` are the numbers of the free bodies.
+    /// The fault of an outcome, if it has one; `objects` are the numbers of the free bodies.
     pub(super) fn of(outcome: &Outcome, scratch: &Scratch, objects: &[u32]) -> Option<Self> {
         if outcome.is_sound() {
             return None;
@@ -57,7 +57,7 @@ impl Unsolved {
         Some(Self { objects, off_m_s: outcome.off_m_s, gain_J: outcome.gain_J })
     }
 
-    /// What failed, with the name of each object.
+    /// The error message, with the name of each object.
     pub(super) fn message(&self, name: impl Fn(u32) -> String) -> String {
         let place = self.objects.map_or("at a stop or a joint".to_owned(), |objects| {
             let [first, second] = objects.map(name);
