@@ -3,6 +3,9 @@
 use crate::foreign::{self, Foreign};
 use crate::quotes::{self, StrayQuote};
 
+/// Rows of one file at most: three hours at 1 kHz. Each takes some hundred bytes of memory, however short its line is.
+const ROWS_MAX: usize = 10_000_000;
+
 /// A file in CSV. Its delimiter is the one of tab, semicolon and comma that the header has most of.
 ///
 /// ```
@@ -40,14 +43,21 @@ pub enum TableError {
     /// It cannot be taken apart into cells.
     #[error("it is not CSV: {0}; check the path and the format")]
     Csv(#[from] csv::Error),
+    /// It has more rows than are read.
+    #[error("it has more than {0} rows; cut it into several files, or leave out rows")]
+    Rows(usize),
 }
 
 impl Table {
     /// The table that a file's `bytes` hold; what is no UTF-8 in them is no number either.
     ///
     /// # Errors
-    /// A file of another format, and a cell that is opened by a quotation mark and not closed on its line.
+    /// A file of another format, a cell that is opened by a quotation mark and not closed on its line, and millions of rows.
     pub fn parse(bytes: &[u8]) -> Result<Self, TableError> {
+        Self::parse_within(bytes, ROWS_MAX)
+    }
+
+    fn parse_within(bytes: &[u8], rows_max: usize) -> Result<Self, TableError> {
         foreign::of(bytes).map_or(Ok(()), Err)?;
         let text = String::from_utf8_lossy(bytes);
         // Programs for other systems put a byte order mark before the first name.
@@ -63,6 +73,9 @@ impl Table {
         let mut rows = Vec::new();
         for cells in reader.into_records() {
             let cells = cells?;
+            if rows.len() == rows_max {
+                return Err(TableError::Rows(rows_max));
+            }
             rows.push(Row { line: line(text, &cells), cells });
         }
         Ok(Self { headers, rows })
@@ -103,4 +116,17 @@ fn delimiter(text: &str) -> u8 {
     let count = |delimiter: u8| header.bytes().filter(|byte| *byte == delimiter).count();
     // The last of equals wins, which is the comma.
     [b'\t', b';', b','].into_iter().max_by_key(|delimiter| count(*delimiter)).unwrap_or(b',')
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Table;
+
+    #[test]
+    fn rows_beyond_a_limit_are_refused_with_it() {
+        let rows = |count: usize| Table::parse_within(&[b"a\n", &b"1\n".repeat(count)[..]].concat(), 5);
+        assert_eq!(rows(5).unwrap().rows.len(), 5);
+        let error = rows(6).err().unwrap().to_string();
+        assert_eq!(error, "it has more than 5 rows; cut it into several files, or leave out rows");
+    }
 }
